@@ -1,0 +1,39 @@
+#pragma once
+#include "core/math/so3.hpp"
+
+namespace vergence {
+
+/// A rigid transform written `T_to_from`: p_to = T_to_from * p_from = R p_from + t, metres.
+///
+/// Perturbed on the left of the rotation and plainly in translation (METHOD §1): R ← Exp(φ) R, t ← t + τ.
+struct Transform {
+  Mat3 R = Mat3::Identity();
+  Vec3 t = Vec3::Zero();
+
+  [[nodiscard]] Vec3 operator*(const Vec3& p) const noexcept { return R * p + t; }
+  [[nodiscard]] Transform operator*(const Transform& o) const noexcept { return {R * o.R, R * o.t + t}; }
+  [[nodiscard]] Transform inverse() const noexcept { return {R.transpose(), -(R.transpose() * t)}; }
+  /// Camera centre (or body origin) of a world-to-camera transform, in world.
+  [[nodiscard]] Vec3 centre() const noexcept { return -(R.transpose() * t); }
+  [[nodiscard]] bool finite() const noexcept { return R.allFinite() && t.allFinite(); }
+};
+
+/// R ← Exp(φ) R, t ← t + τ.
+[[nodiscard]] inline Transform perturbed(const Transform& T, const Vec3& phi, const Vec3& tau) noexcept {
+  return {normalised(exp_so3(phi) * T.R), T.t + tau};
+}
+
+/// Unit quaternion of a rotation, w ≥ 0: one sign, so that files are reproducible.
+[[nodiscard]] inline Eigen::Quaterniond quaternion(const Mat3& R) noexcept {
+  Eigen::Quaterniond q(R);
+  q.normalize();
+  if (q.w() < 0) q.coeffs() *= -1.0;
+  return q;
+}
+
+/// Position linear, rotation along the shorter arc; s in [0, 1] from a to b.
+[[nodiscard]] inline Transform interpolate(const Transform& a, const Transform& b, double s) noexcept {
+  return {Eigen::Quaterniond(a.R).slerp(s, Eigen::Quaterniond(b.R)).normalized().toRotationMatrix(), a.t + s * (b.t - a.t)};
+}
+
+}  // namespace vergence

@@ -1,0 +1,35 @@
+#include "core/memory/allocation_guard.hpp"
+
+#include <atomic>
+#include <cstdlib>
+
+namespace vergence {
+namespace {
+
+// Plain thread-local storage of a constant: reading it inside malloc must not allocate.
+thread_local constinit bool sealed = false;
+std::atomic<std::uint64_t> count{0};
+std::atomic<bool> abort_on{false};
+std::atomic<bool> hooked{false};
+
+}  // namespace
+
+bool AllocationGuard::available() noexcept { return hooked.load(std::memory_order_relaxed); }
+void AllocationGuard::seal_thread() noexcept { sealed = true; }
+void AllocationGuard::unseal_thread() noexcept { sealed = false; }
+bool AllocationGuard::thread_sealed() noexcept { return sealed; }
+std::uint64_t AllocationGuard::allocations_after_seal() noexcept { return count.load(std::memory_order_relaxed); }
+void AllocationGuard::abort_on_allocation(bool on) noexcept { abort_on.store(on, std::memory_order_relaxed); }
+
+void AllocationGuard::note_allocation() noexcept {
+  if (!sealed) return;
+  count.fetch_add(1, std::memory_order_relaxed);
+  if (abort_on.load(std::memory_order_relaxed)) {
+    sealed = false;  // abort() may allocate on its way out
+    std::abort();
+  }
+}
+
+void AllocationGuard::set_available() noexcept { hooked.store(true, std::memory_order_relaxed); }
+
+}  // namespace vergence

@@ -1,0 +1,48 @@
+// Stands before glibc's allocator in programs that link it: every allocation of every library passes here.
+// glibc exports its own functions under these names for exactly this purpose.
+#include <cerrno>
+#include <cstddef>
+
+#include "core/memory/allocation_guard.hpp"
+
+extern "C" {
+
+void* __libc_malloc(std::size_t);
+void* __libc_calloc(std::size_t, std::size_t);
+void* __libc_realloc(void*, std::size_t);
+void* __libc_memalign(std::size_t, std::size_t);
+
+void* malloc(std::size_t size) {
+  vergence::AllocationGuard::note_allocation();
+  return __libc_malloc(size);
+}
+
+void* calloc(std::size_t n, std::size_t size) {
+  vergence::AllocationGuard::note_allocation();
+  return __libc_calloc(n, size);
+}
+
+void* realloc(void* p, std::size_t size) {
+  vergence::AllocationGuard::note_allocation();
+  return __libc_realloc(p, size);
+}
+
+void* memalign(std::size_t alignment, std::size_t size) {
+  vergence::AllocationGuard::note_allocation();
+  return __libc_memalign(alignment, size);
+}
+
+void* aligned_alloc(std::size_t alignment, std::size_t size) { return memalign(alignment, size); }
+
+int posix_memalign(void** out, std::size_t alignment, std::size_t size) {
+  void* p = memalign(alignment, size);
+  if (p == nullptr) return ENOMEM;
+  *out = p;
+  return 0;
+}
+
+}  // extern "C"
+
+namespace {
+const bool announced = (vergence::AllocationGuard::set_available(), true);
+}

@@ -1,0 +1,65 @@
+#pragma once
+#include <array>
+#include <cstdint>
+#include <string_view>
+
+#include "core/math/se3.hpp"
+#include "core/types/time.hpp"
+
+namespace vergence {
+
+/// METHOD §3: what the running system is doing.
+enum class State : std::uint8_t { initialising, parallel_monocular, calibrating, stereo_odometry, recalibrating, lost };
+
+/// How far a pose may be trusted (DESIGN §6).
+enum class PoseStatus : std::uint8_t {
+  ok,        // use it
+  degraded,  // usable, `reason` says what is weak
+  lost,      // there is no pose: do not use
+};
+
+/// Why a pose is not `ok`. One word each: it stands in poses.csv.
+enum class Reason : std::uint8_t {
+  none,
+  no_image,            // a camera delivered nothing for this frame
+  image_dark,          // an image carries no structure: covered, black, saturated
+  few_features,        // too little texture to start from
+  no_stereo_matches,   // left and right do not fit this calibration
+  cameras_swapped,     // points would lie behind the rig: left and right exchanged
+  few_inliers,         // the pose rests on few points
+  one_camera,          // only one camera supports the pose; its scale is remembered, not measured
+  no_pose,             // tracking failed
+  time_gap,            // no frame for longer than motion can be predicted
+  scene_restarted,     // the map was rebuilt; the way across the gap was extrapolated
+  weak_geometry,       // the points do not hold the pose well in some direction
+  moving_scene,        // more outliers than a rigid scene has
+  unconfirmed,         // calibration from a state file that the monitor has not confirmed
+  recalibrating,       // the rig no longer fits its calibration
+};
+
+[[nodiscard]] std::string_view to_string(State) noexcept;
+[[nodiscard]] std::string_view to_string(PoseStatus) noexcept;
+[[nodiscard]] std::string_view to_string(Reason) noexcept;
+
+/// Stages of one frame, in order; times of summary.json carry these names.
+enum class Stage : std::uint8_t { pyramid, detect, track, match, pose, window };
+inline constexpr int kStages = 6;
+[[nodiscard]] std::string_view to_string(Stage) noexcept;
+
+/// What the estimator says about one frame. A value: copied through rings.
+struct PoseSample {
+  std::uint64_t frame = 0;
+  Stamp stamp{};
+  State state = State::initialising;
+  PoseStatus status = PoseStatus::lost;
+  Reason reason = Reason::none;
+  Transform T_world_left{};    // identity and meaningless when `lost`
+  int inliers = 0;             // points that support the pose
+  int stereo_inliers = 0;      // of these, seen by a second camera in this frame
+  double reprojection_px = 0;  // rms of the inliers' residuals, per coordinate
+  bool keyframe = false;
+  std::array<float, kStages> stage_ms{};  // wall time; the parallel stages as the slower side took
+  float estimate_ms = 0;                  // wall time from the images in hand to this sample
+};
+
+}  // namespace vergence

@@ -1,0 +1,56 @@
+#pragma once
+#include <compare>
+#include <cstdint>
+
+namespace vergence {
+
+/// A length of time, signed nanoseconds. Integer, so that ten years stay exact (DESIGN §3).
+class Duration {
+ public:
+  constexpr Duration() noexcept = default;
+  [[nodiscard]] static constexpr Duration nanoseconds(std::int64_t ns) noexcept { return Duration(ns); }
+  [[nodiscard]] static constexpr Duration microseconds(std::int64_t us) noexcept { return Duration(us * 1'000); }
+  [[nodiscard]] static constexpr Duration milliseconds(std::int64_t ms) noexcept { return Duration(ms * 1'000'000); }
+  /// Rounds to the nearest nanosecond; precondition |s| < 9.2e9.
+  [[nodiscard]] static constexpr Duration seconds(double s) noexcept {
+    return Duration(static_cast<std::int64_t>(s * 1e9 + (s < 0 ? -0.5 : 0.5)));
+  }
+
+  [[nodiscard]] constexpr std::int64_t ns() const noexcept { return ns_; }
+  /// For arithmetic of short lengths and for printing; never to be turned back into a stamp.
+  [[nodiscard]] constexpr double to_seconds() const noexcept { return static_cast<double>(ns_) * 1e-9; }
+
+  constexpr auto operator<=>(const Duration&) const noexcept = default;
+  constexpr Duration operator-() const noexcept { return Duration(-ns_); }
+  constexpr Duration operator+(Duration o) const noexcept { return Duration(ns_ + o.ns_); }
+  constexpr Duration operator-(Duration o) const noexcept { return Duration(ns_ - o.ns_); }
+  constexpr Duration operator*(std::int64_t k) const noexcept { return Duration(ns_ * k); }
+  constexpr Duration operator/(std::int64_t k) const noexcept { return Duration(ns_ / k); }
+
+ private:
+  explicit constexpr Duration(std::int64_t ns) noexcept : ns_(ns) {}
+  std::int64_t ns_ = 0;
+};
+
+/// A point in time on one clock; the tag keeps clocks apart. Nanoseconds since that clock's origin.
+template <class Clock>
+class Instant {
+ public:
+  constexpr Instant() noexcept = default;
+  explicit constexpr Instant(std::int64_t ns) noexcept : ns_(ns) {}
+  [[nodiscard]] constexpr std::int64_t ns() const noexcept { return ns_; }
+  constexpr auto operator<=>(const Instant&) const noexcept = default;
+  constexpr Duration operator-(Instant o) const noexcept { return Duration::nanoseconds(ns_ - o.ns_); }
+  constexpr Instant operator+(Duration d) const noexcept { return Instant(ns_ + d.ns()); }
+  constexpr Instant operator-(Duration d) const noexcept { return Instant(ns_ - d.ns()); }
+
+ private:
+  std::int64_t ns_ = 0;
+};
+
+/// Nanoseconds since the Unix epoch: what files and poses carry.
+using Stamp = Instant<struct UnixEpoch>;
+/// Nanoseconds of CLOCK_MONOTONIC: what drivers and the synchroniser reckon in.
+using HostStamp = Instant<struct Monotonic>;
+
+}  // namespace vergence
