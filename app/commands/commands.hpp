@@ -10,4 +10,11 @@ namespace vergence::app {
 void add_evaluate(CLI::App& root, ExitCode* exit_code);
 void add_replay(CLI::App& root, ExitCode* exit_code);
 
+/// The words of the contract (DESIGN §6) that have no command behind them yet: whatever options they are given, they
+/// say so in one sentence and exit 2.
+void add_announced(CLI::App& root, ExitCode* exit_code);
+
+/// The whole program: parses, runs one command, turns every exception into one sentence on stderr and an exit code.
+[[nodiscard]] ExitCode run_program(int argc, const char* const* argv) noexcept;
+
 }  // namespace vergence::app

@@ -1,0 +1,37 @@
+#include "app/commands/commands.hpp"
+
+#include <array>
+#include <string>
+
+namespace vergence::app {
+namespace {
+
+struct Announced {
+  const char* word;
+  const char* purpose;
+};
+
+constexpr std::array kAnnounced{
+    Announced{"run", "Drive: cameras, trigger board and INS live, or the mock drive"},
+    Announced{"simulate", "Repeat the calibration experiment on simulated point clouds"},
+    Announced{"calibrate", "Find intrinsics and the stereo transform with a checkerboard"},
+    Announced{"devices", "List the cameras, boards and sensors that are connected"},
+    Announced{"doctor", "Check this machine and its devices for what a drive needs"},
+    Announced{"snap", "Take one picture with every camera of a configuration"},
+    Announced{"report", "Write report.html of a session again"},
+};
+
+}  // namespace
+
+void add_announced(CLI::App& root, ExitCode* exit_code) {
+  for (const Announced& a : kAnnounced) {
+    CLI::App* command = root.add_subcommand(a.word, std::string(a.purpose) + " (not there yet)");
+    command->allow_extras();
+    command->callback([a, exit_code] {
+      *exit_code = ExitCode::bad_input;
+      throw InputError(std::string("'") + a.word + "' is not there yet in this version; 'vergence --help' lists the commands that are");
+    });
+  }
+}
+
+}  // namespace vergence::app

@@ -1,0 +1,112 @@
+#include <algorithm>
+#include <cstdio>
+#include <exception>
+#include <iostream>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "app/commands/commands.hpp"
+#include "app/runtime/nearest.hpp"
+#include "app/runtime/version.hpp"
+
+#include <CLI/Config.hpp>
+#include <CLI/Formatter.hpp>
+
+namespace vergence::app {
+namespace {
+
+/// One sentence on one line of stderr.
+void complain(std::string sentence) {
+  std::replace(sentence.begin(), sentence.end(), '\n', ' ');
+  std::cerr << "vergence: " << sentence << '\n';
+}
+
+std::vector<std::string> command_words(CLI::App& root) {
+  std::vector<std::string> words;
+  for (const CLI::App* command : root.get_subcommands({})) words.push_back(command->get_name());
+  return words;
+}
+
+std::vector<std::string> option_names(CLI::App& command) {
+  std::vector<std::string> names;
+  for (const CLI::Option* option : command.get_options())
+    for (const std::string& name : option->get_lnames()) names.push_back("--" + name);
+  return names;
+}
+
+/// The command's own name in a hint: `vergence replay --help`.
+std::string help_hint(const CLI::App& command) {
+  const std::string word = command.get_parent() == nullptr ? "" : " " + command.get_name();
+  return "'vergence" + word + " --help' shows what is";
+}
+
+/// CLI11's complaints about a command line, as one sentence.
+std::string sentence_for(const CLI::ParseError& error, CLI::App& root) {
+  const auto given = root.get_subcommands();
+  CLI::App& command = given.empty() ? root : *given.front();
+  const std::string who = given.empty() ? "" : command.get_name() + ": ";
+  if (dynamic_cast<const CLI::ExtrasError*>(&error) != nullptr) {
+    const auto extras = root.remaining(true);
+    const std::string first = extras.empty() ? "" : extras.front();
+    const std::string name = first.substr(0, first.find('='));
+    const bool option = name.size() > 1 && name.front() == '-';
+    return who + (option ? "unknown option " : "unexpected argument ") + "\"" + name + "\"" +
+           (option ? did_you_mean(name, option_names(command)) : "") + " (" + help_hint(command) + " understood)";
+  }
+  return who + error.what() + " (" + help_hint(command) + " expected)";
+}
+
+/// A first word that is no command is answered here: CLI11 would only call it unexpected.
+void check_first_word(CLI::App& root, int argc, const char* const* argv) {
+  if (argc < 2) throw InputError("no command given; 'vergence --help' lists them");
+  const std::string word = argv[1];
+  if (!word.empty() && word.front() == '-') return;
+  const auto words = command_words(root);
+  if (std::find(words.begin(), words.end(), word) == words.end())
+    throw InputError("unknown command \"" + word + "\"" + did_you_mean(word, words) + " ('vergence --help' lists the commands)");
+}
+
+ExitCode parse_and_run(int argc, const char* const* argv) {
+  CLI::App root("Stereo odometry that finds and keeps its own calibration", "vergence");
+  ExitCode exit_code = ExitCode::done;
+  root.set_version_flag("--version", "vergence " + std::string(version()));
+  root.require_subcommand(1);
+#ifdef VERGENCE_HAS_REPLAY
+  add_replay(root, &exit_code);
+#endif
+#ifdef VERGENCE_HAS_EVALUATE
+  add_evaluate(root, &exit_code);
+#endif
+  add_announced(root, &exit_code);
+  check_first_word(root, argc, argv);
+  try {
+    root.parse(argc, argv);
+  } catch (const CLI::Success& asked) {  // --help, --version
+    root.exit(asked, std::cout, std::cerr);
+    return ExitCode::done;
+  } catch (const CLI::ParseError& error) {
+    throw InputError(sentence_for(error, root));
+  }
+  return exit_code;
+}
+
+}  // namespace
+
+ExitCode run_program(int argc, const char* const* argv) noexcept {
+  try {
+    const ExitCode code = parse_and_run(argc, argv);
+    std::cout.flush();
+    if (!std::cout) throw InputError("standard output cannot be written; is the disk full?");
+    return code;
+  } catch (const InputError& error) {
+    complain(error.what());
+  } catch (const std::bad_alloc&) {
+    std::fputs("vergence: not enough memory; close other programs or choose smaller capacities\n", stderr);
+  } catch (const std::exception& error) {
+    complain(std::string("stopped by an error nobody foresaw: ") + error.what());
+  }
+  return ExitCode::bad_input;
+}
+
+}  // namespace vergence::app

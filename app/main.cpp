@@ -1,0 +1,3 @@
+#include "app/commands/commands.hpp"
+
+int main(int argc, char** argv) { return static_cast<int>(vergence::app::run_program(argc, argv)); }
