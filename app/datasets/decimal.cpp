@@ -1,0 +1,99 @@
+#include "app/datasets/decimal.hpp"
+
+#include <charconv>
+#include <limits>
+
+namespace vergence::app {
+namespace {
+
+constexpr int kDecimals = 9;         // of a second in nanoseconds
+constexpr int kMaxExponent = 100;    // of a number as written; beyond, it is 0 or no time of this universe
+constexpr std::size_t kMaxText = 64;  // longer is no number anybody wrote
+
+bool is_digit(char c) noexcept { return c >= '0' && c <= '9'; }
+
+/// Appends a decimal digit; false when it does not fit.
+bool append(std::uint64_t* value, int digit) noexcept {
+  constexpr auto kMax = static_cast<std::uint64_t>(std::numeric_limits<std::int64_t>::max());
+  const auto d = static_cast<std::uint64_t>(digit);
+  if (*value > (kMax - d) / 10) return false;
+  *value = *value * 10 + d;
+  return true;
+}
+
+/// Digits of a number with the place of its decimal point: 0.d1d2d3… × 10^point.
+struct Digits {
+  char digit[kMaxText];
+  int count = 0;
+  int point = 0;
+};
+
+std::optional<Digits> read_digits(std::string_view text) noexcept {
+  Digits d{};
+  bool any = false, after_point = false;
+  std::size_t i = 0;
+  for (; i < text.size() && (is_digit(text[i]) || (text[i] == '.' && !after_point)); ++i) {
+    if (text[i] == '.') {
+      after_point = true;
+      continue;
+    }
+    any = true;
+    d.digit[d.count++] = text[i];
+    if (!after_point) ++d.point;
+  }
+  if (!any) return std::nullopt;
+  if (i == text.size()) return d;
+  if (text[i] != 'e' && text[i] != 'E') return std::nullopt;
+  ++i;
+  if (i + 1 < text.size() && text[i] == '+' && is_digit(text[i + 1])) ++i;
+  int exponent = 0;
+  const auto [end, error] = std::from_chars(text.data() + i, text.data() + text.size(), exponent);
+  if (error != std::errc{} || end != text.data() + text.size() || exponent > kMaxExponent || exponent < -kMaxExponent) return std::nullopt;
+  d.point += exponent;
+  return d;
+}
+
+}  // namespace
+
+std::optional<std::int64_t> parse_seconds_ns(std::string_view text) noexcept {
+  if (text.empty() || text.size() >= kMaxText) return std::nullopt;
+  const bool negative = text.front() == '-';
+  if (negative || text.front() == '+') text.remove_prefix(1);
+  const std::optional<Digits> d = read_digits(text);
+  if (!d) return std::nullopt;
+  std::uint64_t ns = 0;
+  const int wanted = d->point + kDecimals;  // digits before the nanosecond's point
+  for (int i = 0; i < wanted; ++i) {
+    if (i >= d->count && ns == 0) break;  // only zeros follow zeros
+    if (!append(&ns, i < d->count ? d->digit[i] - '0' : 0)) return std::nullopt;
+  }
+  if (wanted >= 0 && wanted < d->count && d->digit[wanted] >= '5' && ns < static_cast<std::uint64_t>(std::numeric_limits<std::int64_t>::max()))
+    ++ns;
+  const auto value = static_cast<std::int64_t>(ns);
+  return negative ? -value : value;
+}
+
+std::optional<std::int64_t> parse_integer(std::string_view text) noexcept {
+  std::int64_t value = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (error != std::errc{} || end != text.data() + text.size() || text.empty()) return std::nullopt;
+  return value;
+}
+
+std::string format_seconds(std::int64_t ns) {
+  const bool negative = ns < 0;
+  // The magnitude in unsigned arithmetic: that of the least integer does not fit a signed one.
+  const std::uint64_t magnitude = negative ? 0 - static_cast<std::uint64_t>(ns) : static_cast<std::uint64_t>(ns);
+  std::string decimals = std::to_string(magnitude % 1'000'000'000U);
+  decimals.insert(0, static_cast<std::size_t>(kDecimals) - decimals.size(), '0');
+  return (negative ? "-" : "") + std::to_string(magnitude / 1'000'000'000U) + "." + decimals;
+}
+
+std::string_view trimmed(std::string_view text) noexcept {
+  constexpr std::string_view kBlanks = " \t\r\n";
+  const std::size_t first = text.find_first_not_of(kBlanks);
+  if (first == std::string_view::npos) return {};
+  return text.substr(first, text.find_last_not_of(kBlanks) - first + 1);
+}
+
+}  // namespace vergence::app

@@ -1,0 +1,97 @@
+#include "app/datasets/text_file.hpp"
+
+#include <array>
+#include <cerrno>
+#include <charconv>
+#include <cmath>
+#include <cstring>
+#include <fstream>
+#include <system_error>
+
+#include "app/datasets/decimal.hpp"
+#include "app/runtime/errors.hpp"
+
+namespace vergence::app {
+namespace {
+
+constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
+constexpr std::string_view kBlanks = " \t\r\v\f";
+
+}  // namespace
+
+void refuse(const std::filesystem::path& file, std::size_t line, std::string_view what) {
+  std::string sentence = file.string();
+  if (line > 0) sentence += ":" + std::to_string(line);
+  sentence += ": ";
+  sentence += what;
+  throw InputError(sentence);
+}
+
+std::string read_text(const std::filesystem::path& file, std::size_t limit) {
+  std::error_code ignored;
+  if (std::filesystem::is_directory(file, ignored)) refuse(file, 0, "is a folder where a file is expected");
+  std::ifstream in(file, std::ios::binary);
+  if (!in) {
+    const int e = errno;
+    refuse(file, 0, std::string("cannot be opened (") + std::strerror(e) + "): check the path and its permissions");
+  }
+  std::string text;
+  std::array<char, 1U << 16U> block;
+  while (in.read(block.data(), block.size()) || in.gcount() > 0) {
+    text.append(block.data(), static_cast<std::size_t>(in.gcount()));
+    if (text.size() > limit) refuse(file, 0, "is longer than " + std::to_string(limit) + " bytes: this is not the file that is meant");
+  }
+  if (in.bad()) refuse(file, 0, "reading it failed half way");
+  return text;
+}
+
+Lines::Lines(std::string_view text) noexcept : rest_(text) {
+  if (rest_.starts_with(kByteOrderMark)) rest_.remove_prefix(kByteOrderMark.size());
+}
+
+bool Lines::next(std::string_view* line) noexcept {
+  while (!rest_.empty()) {
+    const std::size_t end = rest_.find('\n');
+    const std::string_view raw = rest_.substr(0, end);
+    rest_.remove_prefix(end == std::string_view::npos ? rest_.size() : end + 1);
+    ++number_;
+    const std::string_view content = trimmed(raw);
+    if (content.empty() || content.front() == '#') continue;
+    *line = content;
+    return true;
+  }
+  return false;
+}
+
+std::size_t split(std::string_view line, char separator, std::span<std::string_view> fields) noexcept {
+  std::size_t count = 0;
+  const auto store = [&](std::string_view field) {
+    if (count < fields.size()) fields[count] = field;
+    ++count;
+  };
+  if (separator == ' ') {
+    for (line = trimmed(line); !line.empty(); line = trimmed(line)) {
+      const std::string_view field = line.substr(0, line.find_first_of(kBlanks));
+      store(field);
+      line.remove_prefix(field.size());
+    }
+    return count;
+  }
+  for (;;) {
+    const std::size_t end = line.find(separator);
+    store(trimmed(line.substr(0, end)));
+    if (end == std::string_view::npos) return count;
+    line.remove_prefix(end + 1);
+  }
+}
+
+bool parse_number(std::string_view field, double* value) noexcept {
+  if (field.size() > 1 && field.front() == '+' && field[1] != '-') field.remove_prefix(1);
+  double v = 0;
+  const auto [end, error] = std::from_chars(field.data(), field.data() + field.size(), v);
+  if (error != std::errc{} || end != field.data() + field.size() || !std::isfinite(v)) return false;
+  *value = v;
+  return true;
+}
+
+}  // namespace vergence::app
