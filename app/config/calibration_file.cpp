@@ -1,0 +1,264 @@
+#include "app/config/calibration_file.hpp"
+
+#include <algorithm>
+#include <cctype>
+#include <cerrno>
+#include <cstring>
+#include <fstream>
+#include <limits>
+#include <span>
+#include <vector>
+
+#include <fmt/format.h>
+#include <yaml-cpp/yaml.h>
+
+#include "app/config/yaml_file.hpp"
+#include "app/runtime/errors.hpp"
+
+namespace vergence::app {
+namespace {
+
+constexpr std::int64_t kVersion = 1;
+constexpr const char* kRadtan = "pinhole-radtan";
+constexpr const char* kEquidistant = "pinhole-equidistant";
+constexpr std::size_t kTriangle = 21;  // numbers in the upper triangle of a 6×6 matrix
+
+/// One group of the file: its node, its name in sentences, its fields by name.
+class Section {
+ public:
+  Section(const YamlFile& file, const YAML::Node& node, std::string name, const std::vector<std::string>& known)
+      : file_(file), node_(node), name_(std::move(name)) {
+    file_.check_keys(node_, name_.empty() ? "the calibration" : name_, known);
+  }
+
+  [[nodiscard]] bool has(const char* key) const { return static_cast<bool>(node_[key]); }
+  [[nodiscard]] std::string field(const char* key) const { return name_.empty() ? key : name_ + "." + key; }
+  [[nodiscard]] YAML::Node need(const char* key) const {
+    const YAML::Node node = node_[key];
+    if (!node) file_.fail(node_, field(key) + " is missing");
+    return node;
+  }
+  [[nodiscard]] double number(const char* key, double otherwise) const {
+    return has(key) ? file_.number(node_[key], field(key)) : otherwise;
+  }
+  [[nodiscard]] std::string text(const char* key, const std::string& otherwise) const {
+    return has(key) ? file_.text(node_[key], field(key)) : otherwise;
+  }
+  [[nodiscard]] std::int64_t integer(const char* key, std::int64_t otherwise, std::int64_t most) const {
+    return has(key) ? file_.integer(node_[key], field(key), 0, most) : otherwise;
+  }
+  [[nodiscard]] std::vector<double> numbers(const char* key, std::size_t least, std::size_t most) const {
+    return file_.numbers(need(key), field(key), least, most);
+  }
+  /// A list that may be left out, then zeros.
+  template <std::size_t N>
+  void optional_numbers(const char* key, std::array<double, N>* values) const {
+    if (!has(key)) return;
+    const auto given = numbers(key, N, N);
+    std::copy(given.begin(), given.end(), values->begin());
+  }
+
+ private:
+  const YamlFile& file_;
+  YAML::Node node_;
+  std::string name_;
+};
+
+Intrinsics read_intrinsics(const YamlFile& file, const Section& camera) {
+  constexpr std::int64_t kAnySize = std::numeric_limits<int>::max();  // what a size may be is checked with the rest
+  Intrinsics k;
+  const YAML::Node size = camera.need("size");
+  if (!size.IsSequence() || size.size() != 2) file.fail(size, camera.field("size") + " is not [width, height]");
+  k.width = static_cast<int>(file.integer(size[0], camera.field("size"), -kAnySize, kAnySize));
+  k.height = static_cast<int>(file.integer(size[1], camera.field("size"), -kAnySize, kAnySize));
+
+  const YAML::Node model = camera.need("model");
+  const std::string word = file.text(model, camera.field("model"));
+  if (word == kEquidistant)
+    k.kind = CameraModelKind::pinhole_equidistant;
+  else if (word != kRadtan)
+    file.fail(model, fmt::format("{} is \"{}\"; {} and {} are known", camera.field("model"), word.substr(0, 60), kRadtan, kEquidistant));
+
+  const auto f = camera.numbers("intrinsics", 4, 4);
+  k.fx = f[0], k.fy = f[1], k.cx = f[2], k.cy = f[3];
+  if (camera.has("distortion") && camera.need("distortion").size() > 0) {  // [] or nothing: none
+    const auto d = camera.numbers("distortion", 4, k.kind == CameraModelKind::pinhole_radtan ? 5 : 4);
+    std::copy(d.begin(), d.end(), k.distortion.begin());
+  }
+  camera.optional_numbers("intrinsics_sigma", &k.sigma);
+  return k;
+}
+
+Transform read_transform(const Section& camera) {
+  const auto n = camera.numbers("T_camera_left", 12, 12);
+  Transform T;
+  T.R << n[0], n[1], n[2], n[4], n[5], n[6], n[8], n[9], n[10];
+  T.t << n[3], n[7], n[11];
+  return T;
+}
+
+Mat6 read_covariance(const Section& camera) {
+  Mat6 covariance = Mat6::Zero();
+  if (!camera.has("covariance_wide")) return covariance;
+  const auto n = camera.numbers("covariance_wide", kTriangle, kTriangle);
+  auto next = n.begin();
+  for (int i = 0; i < 6; ++i)
+    for (int j = i; j < 6; ++j) covariance(i, j) = covariance(j, i) = *next++;
+  return covariance;
+}
+
+void read_camera(const YamlFile& file, const YAML::Node& node, std::size_t k, CalibrationFile* calibration) {
+  std::vector<std::string> known{"name", "serial", "size", "model", "intrinsics", "distortion", "intrinsics_sigma"};
+  if (k > 0) known.insert(known.end(), {"T_camera_left", "sigma_noise", "sigma_wide", "covariance_wide"});
+  const Section camera(file, node, fmt::format("cameras.{}", k), known);
+  RigCalibration& rig = calibration->rig;
+  calibration->names[k] = camera.text("name", calibration->names[k]);
+  calibration->serials[k] = camera.text("serial", "");
+  rig.intrinsics[k] = read_intrinsics(file, camera);
+  if (k == 0) return;
+  rig.T_camera_left[k] = read_transform(camera);
+  camera.optional_numbers("sigma_noise", &rig.sigma_noise[k]);
+  camera.optional_numbers("sigma_wide", &rig.sigma_wide[k]);
+  rig.covariance_wide[k] = read_covariance(camera);
+}
+
+void read_found(const YamlFile& file, const YAML::Node& node, CalibrationFile* calibration) {
+  const Section found(file, node, "found", {"stamp", "source", "frames", "reprojection_px", "scale_sigma"});
+  RigCalibration& rig = calibration->rig;
+  rig.found = Stamp(found.integer("stamp", 0, std::numeric_limits<std::int64_t>::max()));
+  calibration->source = found.text("source", "");
+  rig.frames = static_cast<int>(found.integer("frames", 0, std::numeric_limits<int>::max()));
+  rig.reprojection_px = found.number("reprojection_px", 0);
+  rig.scale_sigma = found.number("scale_sigma", 0);
+}
+
+/// The node that a dotted field names, or the nearest one above it that is there.
+YAML::Node locate(const YAML::Node& root, const std::string& field) {
+  YAML::Node node = root;
+  for (std::size_t from = 0; from < field.size();) {
+    const std::size_t dot = std::min(field.find('.', from), field.size());
+    const std::string part = field.substr(from, dot - from);
+    const YAML::Node& here = node;  // const: looking must not add the key
+    const YAML::Node below = here.IsSequence() ? here[std::stoul(part)] : here[part];
+    if (!below) break;
+    node.reset(below);
+    from = dot + 1;
+  }
+  return node;
+}
+
+CalibrationFile read_file(const YamlFile& file) {
+  if (file.root().IsNull()) throw InputError(file.name() + ": is empty; a calibration is expected");
+  const Section top(file, file.root(), "", {"version", "rig", "cameras", "found"});
+  if (const auto version = file.integer(top.need("version"), "version", 1, 1'000'000); version != kVersion)
+    file.fail(top.need("version"), fmt::format("version is {}; this program reads version {}", version, kVersion));
+
+  CalibrationFile calibration;
+  RigCalibration& rig = calibration.rig;
+  const YAML::Node cameras = top.need("cameras");
+  if (!cameras.IsSequence()) file.fail(cameras, "cameras is not a list");
+  if (cameras.size() < 2 || cameras.size() > kMaxCameras)
+    file.fail(cameras, fmt::format("cameras lists {}; a rig has 2 to {}", cameras.size(), kMaxCameras));
+  rig.cameras = static_cast<int>(cameras.size());
+  for (std::size_t k = 0; k < cameras.size(); ++k) read_camera(file, cameras[k], k, &calibration);
+
+  rig.baseline = rig.T_camera_left[1].t.norm();
+  if (top.has("rig")) {
+    const Section about(file, top.need("rig"), "rig", {"name", "baseline", "baseline_sigma"});
+    calibration.rig_name = about.text("name", "");
+    if (about.has("baseline") && about.number("baseline", 0) <= 0)
+      file.fail(about.need("baseline"), "rig.baseline must be positive, in metres");
+    rig.baseline = about.number("baseline", rig.baseline);
+    rig.baseline_sigma = about.number("baseline_sigma", 0);
+  }
+  if (top.has("found")) read_found(file, top.need("found"), &calibration);
+  if (const auto bad = find_implausible(&rig)) file.fail(locate(file.root(), bad->field), bad->sentence);
+  return calibration;
+}
+
+/// A text as a YAML scalar: plain where no reader could take it for anything else, else in double quotes.
+std::string scalar(const std::string& text) {
+  const auto plain = [](unsigned char c) { return std::isalnum(c) != 0 || c == '_' || c == '-'; };
+  static const std::vector<std::string> kWords{"true", "false", "yes", "no", "on", "off", "null", "y", "n"};
+  std::string lower;
+  for (const char c : text) lower += static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  const bool letter_first = !text.empty() && std::isalpha(static_cast<unsigned char>(text.front())) != 0;
+  if (letter_first && std::all_of(text.begin(), text.end(), plain) && std::find(kWords.begin(), kWords.end(), lower) == kWords.end())
+    return text;
+  std::string quoted = "\"";
+  for (const char c : text) {
+    if (c == '"' || c == '\\')
+      quoted += std::string("\\") + c;
+    else if (static_cast<unsigned char>(c) < 0x20 || c == 0x7f)
+      quoted += fmt::format("\\x{:02x}", static_cast<unsigned char>(c));
+    else
+      quoted += c;
+  }
+  return quoted + "\"";
+}
+
+std::string list(std::span<const double> values) { return fmt::format("[{}]", fmt::join(values, ", ")); }
+
+bool any(std::span<const double> values) {
+  return std::any_of(values.begin(), values.end(), [](double v) { return v != 0; });
+}
+
+std::string format_camera(const CalibrationFile& calibration, std::size_t k) {
+  const Intrinsics& i = calibration.rig.intrinsics[k];
+  const bool radtan = i.kind == CameraModelKind::pinhole_radtan;
+  const std::size_t coefficients = radtan && i.distortion[4] != 0 ? 5 : 4;
+  std::string text = fmt::format("  - name: {}\n", scalar(calibration.names[k]));
+  if (!calibration.serials[k].empty()) text += fmt::format("    serial: {}\n", scalar(calibration.serials[k]));
+  text += fmt::format("    size: [{}, {}]\n    model: {}\n", i.width, i.height, radtan ? kRadtan : kEquidistant);
+  text += "    intrinsics: " + list(std::array{i.fx, i.fy, i.cx, i.cy}) + "\n";
+  text += "    distortion: " + list(std::span(i.distortion).first(coefficients)) + "\n";
+  if (any(i.sigma)) text += "    intrinsics_sigma: " + list(i.sigma) + "\n";
+  return text;
+}
+
+std::string format_extrinsics(const RigCalibration& rig, std::size_t k) {
+  const Transform& T = rig.T_camera_left[k];
+  std::vector<double> numbers;
+  for (int row = 0; row < 3; ++row) numbers.insert(numbers.end(), {T.R(row, 0), T.R(row, 1), T.R(row, 2), T.t(row)});
+  std::string text = "    T_camera_left: " + list(numbers) + "  # X_camera = R X_left + t, rows of [R t], m\n";
+  if (any(rig.sigma_noise[k])) text += "    sigma_noise: " + list(rig.sigma_noise[k]) + "  # rad, m\n";
+  if (any(rig.sigma_wide[k])) text += "    sigma_wide: " + list(rig.sigma_wide[k]) + "\n";
+  if (!rig.covariance_wide[k].isZero(0)) {
+    std::vector<double> triangle;
+    for (int i = 0; i < 6; ++i)
+      for (int j = i; j < 6; ++j) triangle.push_back(rig.covariance_wide[k](i, j));
+    text += "    covariance_wide: " + list(triangle) + "\n";
+  }
+  return text;
+}
+
+}  // namespace
+
+CalibrationFile read_calibration(const std::filesystem::path& path) { return read_file(YamlFile::read(path)); }
+
+CalibrationFile parse_calibration(std::string_view yaml, const std::string& name) { return read_file(YamlFile::parse(yaml, name)); }
+
+std::string format_calibration(const CalibrationFile& calibration) {
+  const RigCalibration& rig = calibration.rig;
+  const double baseline = rig.baseline > 0 ? rig.baseline : rig.T_camera_left[1].t.norm();
+  std::string text = fmt::format("version: {}\nrig: {{name: {}, baseline: {}", kVersion, scalar(calibration.rig_name), baseline);
+  if (rig.baseline_sigma != 0) text += fmt::format(", baseline_sigma: {}", rig.baseline_sigma);
+  text += "}\ncameras:\n";
+  for (std::size_t k = 0; k < static_cast<std::size_t>(rig.cameras); ++k) {
+    text += format_camera(calibration, k);
+    if (k > 0) text += format_extrinsics(rig, k);
+  }
+  text += fmt::format("found: {{stamp: {}, source: {}, frames: {}, reprojection_px: {}, scale_sigma: {}}}\n", rig.found.ns(),
+                      scalar(calibration.source), rig.frames, rig.reprojection_px, rig.scale_sigma);
+  return text;
+}
+
+void write_calibration(const std::filesystem::path& path, const CalibrationFile& calibration) {
+  errno = 0;
+  std::ofstream out(path, std::ios::binary | std::ios::trunc);
+  out << format_calibration(calibration);
+  out.close();
+  if (!out) throw InputError(path.string() + ": cannot be written: " + (errno != 0 ? std::strerror(errno) : "unknown reason"));
+}
+
+}  // namespace vergence::app

@@ -1,0 +1,44 @@
+#pragma once
+#include <array>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <string_view>
+
+#include "core/types/calibration.hpp"
+
+namespace vergence::app {
+
+/// calibration.yaml (DESIGN §6): the rig's numbers and the words around them.
+struct CalibrationFile {
+  RigCalibration rig{};
+  std::string rig_name{};
+  std::array<std::string, kMaxCameras> names{"left", "right", "camera2", "camera3"};
+  std::array<std::string, kMaxCameras> serials{};  // empty: not known
+  std::string source{};                            // what found it: `given`, `online`, `checkerboard`; empty: not said
+};
+
+/// What is wrong with a calibration: the field as it stands in calibration.yaml (`cameras.1.T_camera_left`) and half a sentence
+/// that begins with it.
+struct Implausible {
+  std::string field;
+  std::string sentence;
+};
+
+/// Looks whether a rig can be real: sizes, focal lengths, principal points, distortion, rotations, baseline, side of camera 1,
+/// finite numbers. The first thing found; nothing when all is well.
+///
+/// For calibrations from other files (data sets): `if (auto bad = find_implausible(rig)) throw InputError(file + ": " + bad->sentence);`
+/// A rotation off by 1e-6 to 1e-3 (largest entry of RᵀR − I) is replaced by the nearest one; beyond, it is reported.
+[[nodiscard]] std::optional<Implausible> find_implausible(RigCalibration* rig);
+
+/// Errors  InputError with file:line and the field's name: unreadable, unknown key, missing or malformed field, implausible.
+[[nodiscard]] CalibrationFile read_calibration(const std::filesystem::path& path);
+/// `name` stands for the file in error messages.
+[[nodiscard]] CalibrationFile parse_calibration(std::string_view yaml, const std::string& name);
+
+/// read(write(c)) has the same doubles. Errors  InputError when the file cannot be written.
+void write_calibration(const std::filesystem::path& path, const CalibrationFile& calibration);
+[[nodiscard]] std::string format_calibration(const CalibrationFile& calibration);
+
+}  // namespace vergence::app

@@ -1,0 +1,202 @@
+#include "app/config/configuration.hpp"
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+
+#include <fmt/format.h>
+#include <yaml-cpp/yaml.h>
+
+#include "app/config/schema.hpp"
+#include "app/config/yaml_file.hpp"
+#include "app/runtime/errors.hpp"
+#include "app/runtime/nearest.hpp"
+
+namespace vergence::app {
+namespace {
+
+// A configuration is a tree of a few dozen leaves; aliases could unfold a small file into billions.
+constexpr std::size_t kMostEntries = 10'000;
+constexpr int kDeepest = 8;
+
+/// One value somebody gave: a leaf of the YAML tree, list items by number.
+struct Entry {
+  std::string name;    // cameras.0.serial
+  std::string value;   // the scalar's text
+  bool scalar = true;  // false: an empty group or list
+  std::string origin;  // for the sentence: file:line, or the --set argument
+};
+
+/// Unfolds YAML trees into entries.
+class Flattener {
+ public:
+  explicit Flattener(std::vector<Entry>* entries) : entries_(entries) {}
+
+  /// `origin`: for every entry instead of its file:line; empty: by file and line.
+  void add(const YamlFile& file, const YAML::Node& node, const std::string& name, const std::string& origin, int depth = 0) {
+    const std::string here = origin.empty() ? file.at(node) : origin;
+    if (depth > kDeepest) throw InputError(here + ": \"" + name.substr(0, 60) + "\" is nested too deeply; no key is");
+    if (entries_->size() >= kMostEntries) throw InputError(here + ": more values than any configuration has; is it the right file?");
+    if (node.IsMap() && node.size() > 0) {
+      std::vector<std::string> seen;
+      for (const auto& item : node) {
+        if (!item.first.IsScalar()) throw InputError(here + ": a key that is not a word");
+        const std::string key = name.empty() ? item.first.Scalar() : name + "." + item.first.Scalar();
+        if (std::find(seen.begin(), seen.end(), key) != seen.end())
+          throw InputError((origin.empty() ? file.at(item.first) : origin) + ": the key \"" + key + "\" stands twice");
+        seen.push_back(key);
+        add(file, item.second, key, origin, depth + 1);
+      }
+    } else if (node.IsSequence() && node.size() > 0) {
+      std::size_t index = 0;
+      for (const auto& item : node) add(file, item, name + "." + std::to_string(index++), origin, depth + 1);
+    } else {
+      const bool scalar = node.IsScalar() || node.IsNull();
+      entries_->push_back({name, node.IsScalar() ? node.Scalar() : std::string(), scalar, here});
+    }
+  }
+
+ private:
+  std::vector<Entry>* entries_;
+};
+
+void add_file(const YamlFile& file, std::vector<Entry>* entries) {
+  if (file.root().IsNull()) return;
+  if (!file.root().IsMap()) file.fail(file.root(), "is not a configuration: groups of `key: value` are expected");
+  Flattener(entries).add(file, file.root(), "", "");
+}
+
+/// A list, a group or a quoted text is YAML; any other value is taken as it stands, so that nothing in it needs quoting twice.
+void add_argument(const std::string& argument, std::vector<Entry>* entries) {
+  const auto equals = argument.find('=');
+  const std::string origin = "--set " + argument.substr(0, 120);
+  if (equals == std::string::npos || equals == 0) throw InputError(origin + ": KEY=VALUE is expected, as in --set odometry.features=400");
+  const std::string name = argument.substr(0, equals), value = argument.substr(equals + 1);
+  const bool yaml = !value.empty() && std::string_view("[{\"'").find(value.front()) != std::string_view::npos;
+  if (!yaml) {
+    entries->push_back({name, value, true, origin});
+    return;
+  }
+  const YamlFile file = YamlFile::parse(value, origin);
+  Flattener(entries).add(file, file.root(), name, origin);
+}
+
+bool is_group(const std::string& name) {
+  const auto& groups = schema();
+  return std::any_of(groups.begin(), groups.end(), [&](const Group& g) { return !g.name.empty() && g.name == name; });
+}
+
+const Key* find_key(const std::string& name) {
+  for (const Group& group : schema())
+    for (const Key& key : group.keys)
+      if (key.name == name) return &key;
+  return nullptr;
+}
+
+std::string last_part(const std::string& name) { return name.substr(name.rfind('.') + 1); }
+
+/// The nearest known key by its whole name; else the one whose last part is nearest (the group was forgotten).
+std::string suggestion(const std::string& name) {
+  std::vector<std::string> names, last_parts;
+  for (const Group& group : schema())
+    for (const Key& key : group.keys) {
+      names.push_back(key.name);
+      last_parts.push_back(last_part(key.name));
+    }
+  if (const auto near = nearest(name, names)) return "; did you mean \"" + *near + "\"?";
+  if (const auto near = nearest(last_part(name), last_parts)) {
+    const auto index = std::find(last_parts.begin(), last_parts.end(), *near) - last_parts.begin();
+    return "; did you mean \"" + names[static_cast<std::size_t>(index)] + "\"?";
+  }
+  return "; docs/configuration.md lists them all";
+}
+
+[[noreturn]] void refuse_unknown(const Entry& entry) {
+  const std::string shown = entry.name.substr(0, 120);
+  for (auto dot = entry.name.find('.'); dot != std::string::npos; dot = entry.name.find('.', dot + 1))
+    if (find_key(entry.name.substr(0, dot)) != nullptr)
+      throw InputError(entry.origin + ": " + entry.name.substr(0, dot) + " takes one value, not a group or a list");
+  throw InputError(entry.origin + ": there is no key \"" + shown + "\"" + suggestion(entry.name));
+}
+
+std::string with_unit(const Key& key) { return key.unit.empty() ? "" : " " + key.unit; }
+
+template <class Number>
+Number parse_number(const Entry& entry, const Key& key, const char* kind) {
+  Number value{};
+  const char* end = entry.value.data() + entry.value.size();
+  const auto [stop, error] = std::from_chars(entry.value.data(), end, value);
+  if (error != std::errc() || stop != end)
+    throw InputError(fmt::format("{}: {} is \"{}\", not {}; it must be in {}{}", entry.origin, key.name, entry.value.substr(0, 60), kind,
+                                 range_text(key), with_unit(key)));
+  // Written so that a NaN is refused.
+  if (!(static_cast<double>(value) >= key.least && static_cast<double>(value) <= key.most))
+    throw InputError(fmt::format("{}: {} is {}; it must be in {}{}", entry.origin, key.name, entry.value.substr(0, 60), range_text(key),
+                                 with_unit(key)));
+  return value;
+}
+
+void apply(const Entry& entry, Configuration* configuration) {
+  if (is_group(entry.name)) {
+    if (entry.scalar && !entry.value.empty()) throw InputError(entry.origin + ": " + entry.name + " is a group of keys, not a value");
+    return;  // an empty group
+  }
+  const Key* key = find_key(entry.name);
+  if (key == nullptr) refuse_unknown(entry);
+  if (!entry.scalar) throw InputError(entry.origin + ": " + entry.name + " takes one value, not a group or a list");
+  switch (key->type) {
+    case KeyType::integer:
+      key->set(*configuration, parse_number<std::int64_t>(entry, *key, "an integer"));
+      break;
+    case KeyType::number:
+      key->set(*configuration, parse_number<double>(entry, *key, "a number"));
+      break;
+    case KeyType::text:
+      if (static_cast<double>(entry.value.size()) > key->most)
+        throw InputError(fmt::format("{}: {} is longer than {} bytes", entry.origin, key->name, key->most));
+      key->set(*configuration, entry.value);
+      break;
+  }
+}
+
+Configuration from_entries(const std::vector<Entry>& entries, const std::string& name) {
+  Configuration configuration;
+  for (const Entry& entry : entries) apply(entry, &configuration);
+  if (const std::string sentence = find_contradiction(configuration); !sentence.empty()) throw InputError(name + ": " + sentence);
+  return configuration;
+}
+
+Configuration load(const std::optional<YamlFile>& file, const std::vector<std::string>& set) {
+  std::vector<Entry> entries;
+  if (file) add_file(*file, &entries);
+  for (const std::string& argument : set) add_argument(argument, &entries);
+  return from_entries(entries, file ? file->name() : "--set");
+}
+
+}  // namespace
+
+Configuration load_configuration(const std::optional<std::filesystem::path>& file, const std::vector<std::string>& set) {
+  return load(file ? std::optional(YamlFile::read(*file)) : std::nullopt, set);
+}
+
+Configuration parse_configuration(std::string_view yaml, const std::string& name, const std::vector<std::string>& set) {
+  return load(YamlFile::parse(yaml, name), set);
+}
+
+std::string canonical_text(const Configuration& configuration) {
+  std::vector<std::string> lines;
+  for (const Group& group : schema())
+    for (const Key& key : group.keys) lines.push_back(key.name + "=" + to_text(key.get(configuration)) + "\n");
+  std::sort(lines.begin(), lines.end());
+  std::string text;
+  for (const std::string& line : lines) text += line;
+  return text;
+}
+
+std::string configuration_hash(const Configuration& configuration) {
+  std::uint64_t hash = 0xcbf29ce484222325U;  // FNV-1a, 64 bit: offset basis and prime
+  for (const char c : canonical_text(configuration)) hash = (hash ^ static_cast<unsigned char>(c)) * 0x100000001b3U;
+  return fmt::format("{:016x}", hash);
+}
+
+}  // namespace vergence::app

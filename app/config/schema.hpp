@@ -1,0 +1,49 @@
+#pragma once
+#include <cstdint>
+#include <functional>
+#include <string>
+#include <string_view>
+#include <variant>
+#include <vector>
+
+#include "app/config/configuration.hpp"
+
+namespace vergence::app {
+
+enum class KeyType : std::uint8_t { integer, number, text };
+
+using KeyValue = std::variant<std::int64_t, double, std::string>;  // by KeyType, in its order
+
+/// One key of the configuration: what the parser checks, the hash covers and docs/configuration.md shows.
+struct Key {
+  std::string name;  // dotted: odometry.features
+  KeyType type = KeyType::integer;
+  std::string unit;            // empty: none
+  double least = 0, most = 0;  // both allowed; of a text: its length in bytes
+  std::string meaning;         // one sentence for a person who has never seen the key
+  std::function<void(Configuration&, const KeyValue&)> set;
+  std::function<KeyValue(const Configuration&)> get;
+};
+
+/// A group of keys (the part of the name before the first dot), or the keys without a group (empty name).
+struct Group {
+  std::string name;
+  std::string meaning;
+  std::vector<Key> keys;
+};
+
+/// All groups in the order of the documentation. A new group is a member of Configuration and a table in schema.cpp.
+[[nodiscard]] const std::vector<Group>& schema();
+
+/// What no single row can say (two keys that contradict each other): the sentence, empty when all is well.
+[[nodiscard]] std::string find_contradiction(const Configuration& configuration);
+
+/// The shortest text that reads back as the same value.
+[[nodiscard]] std::string to_text(const KeyValue& value);
+/// `50 … 1000`.
+[[nodiscard]] std::string range_text(const Key& key);
+
+/// docs/configuration.md, from the table.
+[[nodiscard]] std::string configuration_document();
+
+}  // namespace vergence::app

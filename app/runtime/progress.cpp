@@ -1,0 +1,142 @@
+#include "app/runtime/progress.hpp"
+
+#include <sys/ioctl.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cstdlib>
+#include <iostream>
+
+#include <fmt/format.h>
+
+namespace vergence::app {
+namespace {
+
+constexpr Duration kBetweenRedraws = Duration::milliseconds(100);
+constexpr Duration kBetweenLines = Duration::seconds(10);
+constexpr Duration kFirstEstimate = Duration::seconds(1);  // sooner the rate is that of the start
+constexpr int kUnknownWidth = 80;                          // columns
+constexpr double kLongestLeft = 360'000;                   // s, 100 hours: longer estimates tell nothing
+
+/// A code point of UTF-8 starts at every byte that does not continue one. Each takes one column here: the line holds no others.
+bool starts_code_point(char c) { return (static_cast<unsigned char>(c) & 0xC0U) != 0x80U; }
+
+std::size_t columns_of(std::string_view text) {
+  return static_cast<std::size_t>(std::count_if(text.begin(), text.end(), starts_code_point));
+}
+
+std::string_view cut(std::string_view text, std::size_t columns) {
+  std::size_t seen = 0;
+  for (std::size_t i = 0; i < text.size(); ++i)
+    if (starts_code_point(text[i]) && seen++ == columns) return text.substr(0, i);
+  return text;
+}
+
+std::string clock_text(double seconds) {
+  const auto s = static_cast<long>(seconds + 0.5);
+  if (s >= 3600) return fmt::format("{}:{:02}:{:02}", s / 3600, s / 60 % 60, s % 60);
+  return fmt::format("{:02}:{:02}", s / 60, s % 60);
+}
+
+int width_of_stderr() {
+  winsize size{};
+  return ::ioctl(STDERR_FILENO, TIOCGWINSZ, &size) == 0 ? size.ws_col : 0;
+}
+
+HostStamp monotonic_now() {
+  return HostStamp(std::chrono::duration_cast<std::chrono::nanoseconds>(std::chrono::steady_clock::now().time_since_epoch()).count());
+}
+
+Progress::Mode mode_of_stderr(bool quiet) {
+  if (quiet) return Progress::Mode::quiet;
+  const char* terminal = std::getenv("TERM");
+  const bool dumb = terminal != nullptr && std::string_view(terminal) == "dumb";
+  return ::isatty(STDERR_FILENO) == 1 && !dumb ? Progress::Mode::terminal : Progress::Mode::lines;
+}
+
+}  // namespace
+
+Progress::Progress(std::ostream& out, Mode mode, std::function<HostStamp()> clock, std::function<int()> width)
+    : out_(out), mode_(mode), clock_(std::move(clock)), width_(std::move(width)) {}
+
+Progress Progress::on_stderr(bool quiet) { return {std::cerr, mode_of_stderr(quiet), monotonic_now, width_of_stderr}; }
+
+Progress::~Progress() { finish(); }
+
+void Progress::update(const ProgressState& state) {
+  if (mode_ == Mode::quiet) return;
+  const HostStamp now = clock_();
+  state_word_ = state.state;
+  last_ = state;
+  last_.state = state_word_;
+  drawn_ = false;
+  if (!started_) {
+    started_ = true;
+    first_time_ = now;
+    first_frame_ = state.frame;
+    drawn_time_ = now;
+    if (mode_ == Mode::terminal) draw(now);
+    return;
+  }
+  if (now - drawn_time_ >= (mode_ == Mode::terminal ? kBetweenRedraws : kBetweenLines)) draw(now);
+}
+
+void Progress::say(std::string_view sentence) {
+  const bool redraw = columns_ > 0;
+  wipe();
+  out_ << sentence << '\n' << std::flush;
+  if (redraw) draw(clock_());
+}
+
+void Progress::finish() {
+  if (!started_) return;
+  if (!drawn_) draw(clock_());
+  if (mode_ == Mode::terminal) out_ << '\n' << std::flush;
+  columns_ = 0;
+  started_ = false;
+}
+
+std::string Progress::line(HostStamp now) const {
+  const ProgressState& s = last_;
+  std::string text;
+  const auto part = [&text](const std::string& p) { text += (text.empty() ? "" : " · ") + p; };
+  if (!s.state.empty()) part(std::string(s.state));
+  part(s.frames > 0 ? fmt::format("frame {}/{}", s.frame, s.frames) : fmt::format("frame {}", s.frame));
+  part(fmt::format("{:.2f} km", s.path_m / 1000.0));
+  if (s.inliers) part(fmt::format("{} inliers", *s.inliers));
+  if (s.estimate_ms) part(fmt::format("{:.1f} ms", *s.estimate_ms));
+  if (s.from_ins_m) part(fmt::format("{:.2f} m from INS", *s.from_ins_m));
+  const Duration elapsed = now - first_time_;
+  if (s.frames > s.frame && s.frame > first_frame_ && elapsed >= kFirstEstimate) {
+    const double rate = static_cast<double>(s.frame - first_frame_) / elapsed.to_seconds();
+    const double left = static_cast<double>(s.frames - s.frame) / rate;
+    if (left < kLongestLeft) part(clock_text(left) + " left");
+  }
+  return text;
+}
+
+void Progress::draw(HostStamp now) {
+  drawn_time_ = now;
+  drawn_ = true;
+  const std::string whole = line(now);
+  if (mode_ == Mode::lines) {
+    out_ << whole << '\n' << std::flush;
+    return;
+  }
+  const int width = width_();
+  // One column stays free: a terminal that has just filled its last one may already have begun the next line.
+  const auto room = static_cast<std::size_t>(std::max(1, (width < 1 ? kUnknownWidth : width) - 1));
+  const std::string_view shown = cut(whole, room);
+  const std::size_t columns = columns_of(shown);
+  out_ << '\r' << shown << std::string(columns_ > columns ? std::min(columns_, room) - columns : 0, ' ') << std::flush;
+  columns_ = columns;
+}
+
+void Progress::wipe() {
+  if (columns_ == 0) return;
+  out_ << '\r' << std::string(columns_, ' ') << '\r';
+  columns_ = 0;
+}
+
+}  // namespace vergence::app
