@@ -1,5 +1,6 @@
 #include "core/camera/camera.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 #include <Eigen/LU>
@@ -82,6 +83,7 @@ ProjectStatus Camera::project(const Vec3& p, Vec2* pixel, Mat23* J) const noexce
   if (!(p.z() >= kMinDepth)) return ProjectStatus::behind;  // also refuses NaN
   const double iz = 1.0 / p.z();
   const Vec2 n(p.x() * iz, p.y() * iz);
+  if (!(n.squaredNorm() <= max_radius2_)) return ProjectStatus::folded;  // also where x or y is not a number
   Vec2 d = n;
   Mat2 D = Mat2::Identity();
   if (distorted_ && !distort(n, &d, J != nullptr ? &D : nullptr)) return ProjectStatus::folded;

@@ -6,7 +6,7 @@ namespace vergence {
 enum class ProjectStatus : std::uint8_t {
   ok,
   behind,  // depth under kMinDepth, or not a number
-  folded,  // beyond the angle where the distortion model stops being monotonic: no image there
+  folded,  // beyond the angle where the distortion model stops being monotonic, or x or y not a number: no image there
 };
 
 inline constexpr double kMinDepth = 1e-3;  // m: nearer than any lens

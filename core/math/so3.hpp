@@ -47,9 +47,10 @@ namespace vergence {
 [[nodiscard]] inline Mat3 left_jacobian_so3(const Vec3& phi) noexcept {
   const double theta2 = phi.squaredNorm();
   const Mat3 K = skew(phi);
-  if (theta2 < 1e-8) return Mat3::Identity() + 0.5 * K + K * K / 6.0;
+  if (theta2 < 1e-8) return Mat3::Identity() + (0.5 - theta2 / 24.0) * K + K * K / 6.0;
   const double theta = std::sqrt(theta2);
-  return Mat3::Identity() + (1.0 - std::cos(theta)) / theta2 * K + (theta - std::sin(theta)) / (theta2 * theta) * K * K;
+  const double s = std::sin(0.5 * theta);  // 1 − cos θ = 2 sin²(θ/2), which loses no digits at small angles
+  return Mat3::Identity() + 2.0 * s * s / theta2 * K + (theta - std::sin(theta)) / (theta2 * theta) * K * K;
 }
 
 /// The rotation nearest to a matrix that has drifted from orthonormality by products.

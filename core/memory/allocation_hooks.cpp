@@ -11,6 +11,8 @@ void* __libc_malloc(std::size_t);
 void* __libc_calloc(std::size_t, std::size_t);
 void* __libc_realloc(void*, std::size_t);
 void* __libc_memalign(std::size_t, std::size_t);
+void* __libc_valloc(std::size_t);
+void* __libc_pvalloc(std::size_t);
 
 void* malloc(std::size_t size) {
   vergence::AllocationGuard::note_allocation();
@@ -30,6 +32,16 @@ void* realloc(void* p, std::size_t size) {
 void* memalign(std::size_t alignment, std::size_t size) {
   vergence::AllocationGuard::note_allocation();
   return __libc_memalign(alignment, size);
+}
+
+void* valloc(std::size_t size) {
+  vergence::AllocationGuard::note_allocation();
+  return __libc_valloc(size);
+}
+
+void* pvalloc(std::size_t size) {
+  vergence::AllocationGuard::note_allocation();
+  return __libc_pvalloc(size);
 }
 
 void* aligned_alloc(std::size_t alignment, std::size_t size) { return memalign(alignment, size); }

@@ -19,7 +19,8 @@ inline constexpr std::size_t kCacheLine = 64;  // bytes; also the widest SIMD ve
 /// Errors     Throws std::length_error when full, naming who asked: construction time only, outside the real-time path.
 class Arena {
  public:
-  explicit Arena(std::size_t bytes) : capacity_(bytes), storage_(static_cast<std::byte*>(::operator new(bytes, std::align_val_t{kCacheLine}))) {}
+  explicit Arena(std::size_t bytes)
+      : capacity_(bytes), storage_(static_cast<std::byte*>(::operator new (bytes, std::align_val_t{kCacheLine}))) {}
 
   Arena(const Arena&) = delete;
   Arena& operator=(const Arena&) = delete;
@@ -45,7 +46,7 @@ class Arena {
 
  private:
   struct Free {
-    void operator()(std::byte* p) const noexcept { ::operator delete(p, std::align_val_t{kCacheLine}); }
+    void operator()(std::byte* p) const noexcept { ::operator delete (p, std::align_val_t{kCacheLine}); }
   };
   std::size_t capacity_;
   std::size_t used_ = 0;

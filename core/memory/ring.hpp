@@ -35,14 +35,10 @@ class Ring {
     return true;
   }
   /// Exact for the consumer (it can only become less empty).
-  [[nodiscard]] bool empty() const noexcept {
-    return tail_.load(std::memory_order_acquire) == head_.load(std::memory_order_acquire);
-  }
+  [[nodiscard]] bool empty() const noexcept { return tail_.load(std::memory_order_acquire) == head_.load(std::memory_order_acquire); }
   /// Exact for the producer (it can only become less full).
   [[nodiscard]] bool full() const noexcept { return size() == N; }
-  [[nodiscard]] std::size_t size() const noexcept {
-    return tail_.load(std::memory_order_acquire) - head_.load(std::memory_order_acquire);
-  }
+  [[nodiscard]] std::size_t size() const noexcept { return tail_.load(std::memory_order_acquire) - head_.load(std::memory_order_acquire); }
   [[nodiscard]] static constexpr std::size_t capacity() noexcept { return N; }
 
  private:

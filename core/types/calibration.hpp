@@ -18,11 +18,11 @@ enum class CameraModelKind : std::uint8_t {
 /// One camera's image formation: x = K d(X/Z), pixels; pixel centres at integer coordinates.
 struct Intrinsics {
   CameraModelKind kind = CameraModelKind::pinhole_radtan;
-  int width = 0;   // px
-  int height = 0;  // px
-  double fx = 0, fy = 0, cx = 0, cy = 0;       // px
-  std::array<double, 5> distortion{};          // radtan: k1 k2 p1 p2 k3; equidistant: k1 k2 k3 k4, 0
-  std::array<double, 4> sigma{};               // of fx fy cx cy, px; 0: not given
+  int width = 0;                          // px
+  int height = 0;                         // px
+  double fx = 0, fy = 0, cx = 0, cy = 0;  // px
+  std::array<double, 5> distortion{};     // radtan: k1 k2 p1 p2 k3; equidistant: k1 k2 k3 k4, 0
+  std::array<double, 4> sigma{};          // of fx fy cx cy, px; 0: not given
 
   [[nodiscard]] bool has_distortion() const noexcept {
     for (const double d : distortion)
@@ -42,13 +42,13 @@ struct RigCalibration {
   std::array<std::array<double, 6>, kMaxCameras> sigma_noise{};  // rx ry rz (rad) tx ty tz (m); 0: not given
   std::array<std::array<double, 6>, kMaxCameras> sigma_wide{};   // the same with uncertain intrinsics
   std::array<Mat6, kMaxCameras> covariance_wide{};               // zero: not given
-  double baseline = 0;        // m, |t| of camera 1 as measured once
-  double baseline_sigma = 0;  // m; 0: exact
+  double baseline = 0;                                           // m, |t| of camera 1 as measured once
+  double baseline_sigma = 0;                                     // m; 0: exact
 
-  Stamp found{};              // when the stereo transform was found; 0: given
-  int frames = 0;             // rig frames it was found from
-  double reprojection_px = 0; // root mean square of that solve
-  double scale_sigma = 0;     // relative, of the odometry's scale
+  Stamp found{};               // when the stereo transform was found; 0: given
+  int frames = 0;              // rig frames it was found from
+  double reprojection_px = 0;  // root mean square of that solve
+  double scale_sigma = 0;      // relative, of the odometry's scale
 };
 
 }  // namespace vergence

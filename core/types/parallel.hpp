@@ -8,8 +8,7 @@ namespace vergence {
 class TaskRef {
  public:
   template <class F>
-    requires(!std::is_same_v<std::remove_cvref_t<F>, TaskRef>)
-  explicit TaskRef(F& f) noexcept
+  requires(!std::is_same_v<std::remove_cvref_t<F>, TaskRef>) explicit TaskRef(F& f) noexcept
       : object_(&f), call_([](void* o) noexcept { (*static_cast<F*>(o))(); }) {}
   void operator()() const noexcept { call_(object_); }
 

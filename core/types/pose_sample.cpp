@@ -15,8 +15,8 @@ std::string_view name(const std::array<std::string_view, N>& names, Enum value) 
 }  // namespace
 
 std::string_view to_string(State s) noexcept {
-  static constexpr std::array<std::string_view, 6> names = {
-      "initialising", "parallel_monocular", "calibrating", "stereo_odometry", "recalibrating", "lost"};
+  static constexpr std::array<std::string_view, 6> names = {"initialising",    "parallel_monocular", "calibrating",
+                                                            "stereo_odometry", "recalibrating",      "lost"};
   return name(names, s);
 }
 
@@ -27,8 +27,8 @@ std::string_view to_string(PoseStatus s) noexcept {
 
 std::string_view to_string(Reason r) noexcept {
   static constexpr std::array<std::string_view, 15> names = {
-      "",          "no_image", "image_dark", "few_features",    "no_stereo_matches", "cameras_swapped", "few_inliers",  "one_camera",
-      "no_pose",   "time_gap", "scene_restarted", "weak_geometry", "moving_scene",   "unconfirmed",     "recalibrating"};
+      "",        "no_image", "image_dark",      "few_features",  "no_stereo_matches", "cameras_swapped", "few_inliers",  "one_camera",
+      "no_pose", "time_gap", "scene_restarted", "weak_geometry", "moving_scene",      "unconfirmed",     "recalibrating"};
   return name(names, r);
 }
 

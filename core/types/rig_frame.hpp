@@ -15,7 +15,7 @@ namespace vergence {
 struct RigFrame {
   std::uint64_t number = 0;  // of the pulse or of the data set's line; gaps are gaps in time
   Stamp stamp{};
-  Duration stamp_error{};    // bound of the stamp's error; 0 where the source gives none
+  Duration stamp_error{};  // bound of the stamp's error; 0 where the source gives none
   Duration spread{};
   int cameras = 0;
   std::array<ImageView, kMaxCameras> images{};

@@ -1,0 +1,119 @@
+#include "core/memory/allocation_guard.hpp"
+
+#include <gtest/gtest.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <functional>
+#include <memory>
+#include <new>
+#include <thread>
+#include <vector>
+
+namespace vergence {
+namespace {
+
+/// Where an address goes so that the compiler cannot drop the allocation.
+void* volatile sink = nullptr;
+
+/// Allocations that `work` makes on this thread once it is sealed.
+std::uint64_t counted(void (*work)()) {
+  const std::uint64_t before = AllocationGuard::allocations_after_seal();
+  {
+    const SealedScope sealed;
+    work();
+  }
+  return AllocationGuard::allocations_after_seal() - before;
+}
+
+class AllocationGuardTest : public testing::Test {
+ protected:
+  void SetUp() override {
+    if (!AllocationGuard::available()) GTEST_SKIP() << "a sanitizer brings its own malloc: there is nothing to count";
+  }
+};
+
+TEST_F(AllocationGuardTest, countsEveryWayToTheHeap) {
+  EXPECT_EQ(counted([] { sink = malloc(8); }), 1U);
+  free(sink);
+  EXPECT_EQ(counted([] { sink = calloc(2, 8); }), 1U);
+  EXPECT_EQ(counted([] { sink = realloc(sink, 4096); }), 1U);
+  EXPECT_EQ(counted([] { sink = reallocarray(sink, 3, 4096); }), 1U);
+  free(sink);
+  EXPECT_EQ(counted([] { sink = aligned_alloc(64, 128); }), 1U);
+  free(sink);
+  EXPECT_EQ(counted([] {
+              void* p = nullptr;
+              if (posix_memalign(&p, 64, 128) == 0) sink = p;
+            }),
+            1U);
+  EXPECT_EQ(reinterpret_cast<std::uintptr_t>(sink) % 64, 0U);
+  free(sink);
+  EXPECT_EQ(counted([] { sink = valloc(100); }), 1U);
+  free(sink);
+  EXPECT_EQ(counted([] { sink = new int(3); }), 1U);
+  delete static_cast<int*>(sink);
+  EXPECT_EQ(counted([] { sink = ::operator new (256, std::align_val_t{64}); }), 1U);
+  ::operator delete (sink, std::align_val_t{64});
+  EXPECT_EQ(counted([] { sink = strdup("a line from the C library"); }), 1U);
+  free(sink);
+}
+
+TEST_F(AllocationGuardTest, givingBackIsNotCounted) {
+  sink = malloc(64);
+  EXPECT_EQ(counted([] { free(sink); }), 0U);
+}
+
+TEST_F(AllocationGuardTest, anUnsealedThreadMayAllocateWhileAnotherIsSealed) {
+  const std::uint64_t before = AllocationGuard::allocations_after_seal();
+  std::uint64_t inside = 1;
+  std::thread other([&inside] {
+    const std::uint64_t start = AllocationGuard::allocations_after_seal();
+    sink = malloc(1000);
+    free(sink);
+    inside = AllocationGuard::allocations_after_seal() - start;
+  });
+  {
+    const SealedScope sealed;
+    other.join();
+  }
+  EXPECT_EQ(inside, 0U);
+  EXPECT_EQ(AllocationGuard::allocations_after_seal(), before);
+}
+
+TEST_F(AllocationGuardTest, everySealedThreadCounts) {
+  const std::uint64_t before = AllocationGuard::allocations_after_seal();
+  std::vector<std::thread> threads;
+  for (int i = 0; i < 3; ++i)
+    threads.emplace_back([] {
+      const SealedScope sealed;
+      void* volatile p = malloc(32);
+      free(p);
+    });
+  for (std::thread& thread : threads) thread.join();
+  EXPECT_EQ(AllocationGuard::allocations_after_seal() - before, 3U);
+}
+
+TEST_F(AllocationGuardTest, scopesNest) {
+  EXPECT_FALSE(AllocationGuard::thread_sealed());
+  {
+    const SealedScope outer;
+    { const SealedScope inner; }
+    EXPECT_TRUE(AllocationGuard::thread_sealed());
+  }
+  EXPECT_FALSE(AllocationGuard::thread_sealed());
+}
+
+TEST_F(AllocationGuardTest, abortsWhenToldTo) {
+  testing::FLAGS_gtest_death_test_style = "threadsafe";
+  EXPECT_DEATH(
+      {
+        AllocationGuard::abort_on_allocation(true);
+        const SealedScope sealed;
+        sink = malloc(8);
+      },
+      "");
+}
+
+}  // namespace
+}  // namespace vergence

@@ -1,0 +1,63 @@
+#include "core/memory/arena.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cstdint>
+#include <cstring>
+#include <limits>
+#include <string>
+
+namespace vergence {
+namespace {
+
+TEST(Arena, piecesAreZeroedAlignedAndApart) {
+  Arena arena(1024);
+  const auto bytes = arena.make<std::uint8_t>(3, "bytes");
+  const auto numbers = arena.make<double>(9, "numbers");
+  const auto more = arena.make<std::uint8_t>(1, "more");
+  for (const std::uint8_t b : bytes) EXPECT_EQ(b, 0);
+  for (const double d : numbers) EXPECT_EQ(d, 0.0);
+  for (const void* piece :
+       {static_cast<const void*>(bytes.data()), static_cast<const void*>(numbers.data()), static_cast<const void*>(more.data())})
+    EXPECT_EQ(reinterpret_cast<std::uintptr_t>(piece) % kCacheLine, 0U);
+  std::memset(bytes.data(), 0xff, bytes.size_bytes());
+  for (const double d : numbers) EXPECT_EQ(d, 0.0);
+  EXPECT_EQ(arena.used(), 64U + 128U + 64U);
+}
+
+TEST(Arena, whenFullSaysWhoAskedForHowMuchAndStaysUsable) {
+  Arena arena(128);
+  (void)arena.make<std::uint8_t>(64, "first");
+  try {
+    (void)arena.make<std::uint8_t>(65, "tracks");
+    FAIL() << "65 bytes went into 64";
+  } catch (const std::length_error& error) {
+    const std::string sentence = error.what();
+    EXPECT_NE(sentence.find("tracks"), std::string::npos) << sentence;
+    EXPECT_NE(sentence.find("128"), std::string::npos) << sentence;
+  }
+  EXPECT_EQ(arena.make<std::uint8_t>(64, "second").size(), 64U);
+  EXPECT_EQ(arena.used(), arena.capacity());
+}
+
+TEST(Arena, sizesThatOverflowAreRefused) {
+  Arena arena(256);
+  EXPECT_THROW((void)arena.make<double>(std::numeric_limits<std::size_t>::max(), "too many"), std::length_error);
+  EXPECT_THROW((void)arena.make<double>(std::numeric_limits<std::size_t>::max() / sizeof(double) + 2, "wraps"), std::length_error);
+  EXPECT_EQ(arena.used(), 0U);
+}
+
+TEST(Arena, objectsTakeTheirDefaults) {
+  struct Slot {
+    int id = -1;
+    float score = 0.5F;
+  };
+  Arena arena(4096);
+  for (const Slot& slot : arena.make<Slot>(7, "slots")) {
+    EXPECT_EQ(slot.id, -1);
+    EXPECT_EQ(slot.score, 0.5F);
+  }
+}
+
+}  // namespace
+}  // namespace vergence
