@@ -11,6 +11,8 @@ namespace {
 
 // rad: a rotation about the direction of travel that the positions leave this uncertain is not worth comparing.
 constexpr double kMaxRollUncertainty = 0.1;
+// Ratio of extents: straighter than this is rounding, whatever the residuals.
+constexpr double kStraight = 1e-6;
 
 [[maybe_unused]] bool ascending(std::span<const StampedPose> poses) {
   return std::adjacent_find(poses.begin(), poses.end(), [](const StampedPose& a, const StampedPose& b) { return !(a.stamp < b.stamp); }) ==
@@ -171,15 +173,17 @@ Alignment align(std::span<const StampedPose> estimate, std::span<const StampedPo
     const double trace = svd.singularValues().dot(sign);
     if (scale == AlignmentScale::free) a.scale = trace / variance_e;
     a.lateral_extent = std::sqrt(svd.singularValues()[1]);
-    // What is left across the main direction, against the lever arm it turns on, is about how far the rotation may be wrong.
-    const Vec3 main = svd.matrixU().col(0);
-    double across = 0;
+    // A roll about the main direction moves what is off it along the second into the third. What the fit leaves there, against
+    // the lever arm, is about how far the roll may be wrong.
+    const Vec3 third = svd.matrixU().col(2);
+    double squares = 0;
     for (std::size_t i = 0; i < count; ++i) {
       const Vec3 e = estimate[i].T_world_body.t - mean_e, r = reference[i].T_world_body.t - mean_r;
-      const Vec3 residual = r - a.scale * (a.R_reference_estimate * e);
-      across += (residual - main.dot(residual) * main).squaredNorm();
+      const double residual = third.dot(r - a.scale * (a.R_reference_estimate * e));
+      squares += residual * residual;
     }
-    a.roll_unobservable = !(std::sqrt(across / n) < kMaxRollUncertainty * a.lateral_extent);
+    const double main_extent = std::sqrt(svd.singularValues()[0]);
+    a.roll_unobservable = !(std::sqrt(squares / n) < kMaxRollUncertainty * a.lateral_extent && a.lateral_extent > kStraight * main_extent);
   } else {
     a.roll_unobservable = true;
   }
