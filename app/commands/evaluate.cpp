@@ -1,0 +1,97 @@
+#include <cmath>
+#include <iostream>
+#include <memory>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include <nlohmann/json.hpp>
+
+#include "app/commands/commands.hpp"
+#include "app/commands/evaluation_report.hpp"
+#include "app/datasets/text_file.hpp"
+#include "app/datasets/trajectory_files.hpp"
+
+namespace vergence::app {
+namespace {
+
+/// The words as given; checked when the command runs.
+struct Arguments {
+  std::string estimate, reference;
+  bool json = false, estimate_mount = false;
+  std::string lengths = "100,200,300,400,500,600,700,800";  // m
+  int step = 10;
+  std::string associate = "interpolate";
+  double max_gap = 0.2;           // s
+  double max_difference = 0.005;  // s
+  std::string axes = "camera";
+};
+
+std::vector<double> parse_lengths(const std::string& text) {
+  constexpr std::size_t kMost = 1000;
+  std::vector<std::string_view> fields(kMost);
+  const std::size_t count = split(text, ',', fields);
+  if (count > kMost) throw InputError("--lengths has more than " + std::to_string(kMost) + " lengths");
+  std::vector<double> lengths(count);
+  for (std::size_t i = 0; i < count; ++i)
+    if (!parse_number(fields[i], &lengths[i]) || !(lengths[i] > 0))
+      throw InputError("--lengths: `" + std::string(fields[i]) + "` is not a length in metres; give them like 100,200,300");
+  return lengths;
+}
+
+Duration parse_duration(const char* option, double seconds) {
+  constexpr double kLongest = 1e6;  // s: eleven days, longer than a drive
+  if (!(seconds >= 0) || seconds > kLongest) throw InputError(std::string(option) + " needs seconds between 0 and 1e6");
+  return Duration::seconds(seconds);
+}
+
+EvaluationOptions options_of(const Arguments& a) {
+  EvaluationOptions options;
+  options.association = a.associate == "nearest" ? Association::nearest : Association::interpolate;
+  options.max_gap = parse_duration("--max-gap", a.max_gap);
+  options.max_difference = parse_duration("--max-difference", a.max_difference);
+  options.axes = a.axes == "flu" ? BodyAxes::forward_left_up : BodyAxes::camera;
+  if (a.step < 1) throw InputError("--step needs a whole number of poses, 1 or more");
+  options.segments = {{parse_lengths(a.lengths), a.step, false}};
+  return options;
+}
+
+ExitCode run(const Arguments& a) {
+  if (a.estimate_mount)
+    throw InputError("--estimate-mount is not there yet: bring both trajectories to the same point of the vehicle first");
+  const EvaluationOptions options = options_of(a);
+  const Trajectory estimate = read_trajectory(a.estimate);
+  const Trajectory reference = read_trajectory(a.reference);
+  const TrajectoryEvaluation evaluation = evaluate(estimate, reference, options);
+  if (a.json)
+    std::cout << evaluation_json(evaluation, options).dump(1) << '\n';
+  else
+    std::cout << evaluation_text(evaluation, options);
+  if (evaluation.status == EvaluationStatus::ok) return ExitCode::done;
+  std::cerr << "vergence: " << a.estimate << " against " << a.reference << ": " << evaluation_problem(evaluation, options) << '\n';
+  return ExitCode::not_usable;
+}
+
+}  // namespace
+
+void add_evaluate(CLI::App& root, ExitCode* exit_code) {
+  const auto a = std::make_shared<Arguments>();
+  CLI::App* command = root.add_subcommand("evaluate", "Compare a trajectory with a reference");
+  command->add_option("ESTIMATE", a->estimate, "TUM file, session folder, or data set")->required();
+  command->add_option("REFERENCE", a->reference, "TUM file, KITTI or EuRoC data-set folder, or its truth file")->required();
+  command->add_flag("--json", a->json, "The figures as JSON");
+  command->add_option("--lengths", a->lengths, "Lengths of the segments, m")->capture_default_str();
+  command->add_option("--step", a->step, "A segment begins at every so many poses")->capture_default_str();
+  command->add_option("--associate", a->associate, "How a reference is found for a pose")
+      ->check(CLI::IsMember({"interpolate", "nearest"}))
+      ->capture_default_str();
+  command->add_option("--max-gap", a->max_gap, "interpolate: widest hole of the reference to bridge, s")->capture_default_str();
+  command->add_option("--max-difference", a->max_difference, "nearest: largest difference of stamps, s")->capture_default_str();
+  command->add_option("--axes", a->axes, "Axes of the body: camera (z forward) or flu (x forward, y left, z up)")
+      ->check(CLI::IsMember({"camera", "flu"}))
+      ->capture_default_str();
+  command->add_flag("--estimate-mount", a->estimate_mount, "Fit the unknown mounting between the two bodies (not there yet)");
+  command->callback([a, exit_code] { *exit_code = run(*a); });
+}
+
+}  // namespace vergence::app
