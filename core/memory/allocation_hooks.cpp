@@ -7,12 +7,14 @@
 
 extern "C" {
 
+// NOLINTBEGIN(bugprone-reserved-identifier,readability-identifier-naming): the C library chose these names
 void* __libc_malloc(std::size_t);
 void* __libc_calloc(std::size_t, std::size_t);
 void* __libc_realloc(void*, std::size_t);
 void* __libc_memalign(std::size_t, std::size_t);
 void* __libc_valloc(std::size_t);
 void* __libc_pvalloc(std::size_t);
+// NOLINTEND(bugprone-reserved-identifier,readability-identifier-naming)
 
 void* malloc(std::size_t size) {
   vergence::AllocationGuard::note_allocation();
@@ -56,5 +58,5 @@ int posix_memalign(void** out, std::size_t alignment, std::size_t size) {
 }  // extern "C"
 
 namespace {
-const bool announced = (vergence::AllocationGuard::set_available(), true);
+const bool kAnnounced = (vergence::AllocationGuard::set_available(), true);
 }
