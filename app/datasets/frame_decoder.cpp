@@ -1,0 +1,157 @@
+#include "app/datasets/frame_decoder.hpp"
+
+#include <pthread.h>
+
+#include <algorithm>
+#include <cassert>
+#include <chrono>
+#include <new>
+
+#include <fmt/format.h>
+
+#include "app/datasets/decimal.hpp"
+
+namespace vergence::app {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+const char* kind_of(ImageFileStatus status) noexcept {
+  switch (status) {
+    case ImageFileStatus::missing:
+      return "image_missing";
+    case ImageFileStatus::torn:
+      return "image_torn";
+    case ImageFileStatus::wrong_size:
+      return "image_size";
+    default:
+      return "image_unreadable";
+  }
+}
+
+void note(DecodedPair* pair, const char* kind, const std::string& sentence) {
+  pair->kind = kind;
+  const std::size_t n = std::min(sentence.size(), pair->note.size() - 1);
+  std::copy_n(sentence.begin(), n, pair->note.begin());
+  pair->note[n] = 0;
+}
+
+}  // namespace
+
+FrameDecoder::FrameDecoder(const StereoSequence& sequence, std::size_t first, std::size_t count, FramePool& pool)
+    : sequence_(sequence),
+      next_index_(std::min(first, sequence.pairs.size())),
+      end_(next_index_ + std::min(count, sequence.pairs.size() - next_index_)),
+      pool_(pool) {
+  assert(pool.width() == sequence.calibration.intrinsics[0].width && pool.height() == sequence.calibration.intrinsics[0].height);
+  thread_ = std::thread([this] { work(); });
+}
+
+FrameDecoder::~FrameDecoder() {
+  stop();
+  thread_.join();
+}
+
+bool FrameDecoder::next(DecodedPair* pair) noexcept {
+  for (;;) {
+    const Doorbell::Rung seen = filled_.look();
+    if (stop_.load(std::memory_order_acquire)) return false;
+    // `finished_` is looked at before the ring: what was pushed before it was set is still found.
+    const bool finished = finished_.load(std::memory_order_acquire);
+    if (ring_.pop(pair)) {
+      freed_.ring();
+      return true;
+    }
+    if (finished) return false;
+    filled_.wait(seen);
+  }
+}
+
+void FrameDecoder::release(const DecodedPair& pair) noexcept {
+  if (!pair.decoded) return;
+  for (const FrameSlot slot : pair.slots) pool_.release(slot);
+  freed_.ring();
+}
+
+void FrameDecoder::stop() noexcept {
+  stop_.store(true, std::memory_order_release);
+  filled_.ring();
+  freed_.ring();
+}
+
+void FrameDecoder::work() {
+  (void)pthread_setname_np(pthread_self(), "vergence-decode");
+  for (; next_index_ < end_; ++next_index_) {
+    while (own_count_ < own_.size()) {
+      if (!wait_for_slot(&own_[own_count_])) return;
+      ++own_count_;
+    }
+    if (!hand_over(decode(next_index_))) return;
+  }
+  finished_.store(true, std::memory_order_release);
+  filled_.ring();
+}
+
+DecodedPair FrameDecoder::decode(std::size_t index) {
+  const auto start = Clock::now();
+  const StereoPair& listed = sequence_.pairs[index];
+  DecodedPair pair;
+  pair.frame = index;
+  pair.stamp = listed.stamp;
+  if (any_ && listed.stamp <= newest_) {
+    note(&pair, "time_backwards",
+         fmt::format("frame {} skipped: its time {} is not later than {}, the latest before it", index, format_seconds(listed.stamp.ns()),
+                     format_seconds(newest_.ns())));
+    return pair;
+  }
+  newest_ = listed.stamp;
+  any_ = true;
+  for (std::size_t k = 0; k < 2; ++k) {
+    const ImageFileStatus status = load(listed.file[k], own_[k]);
+    if (status == ImageFileStatus::ok) continue;
+    const std::string name = !listed.file[k].empty() ? listed.file[k] : k == 0 ? "the left image" : "the right image";
+    note(&pair, kind_of(status), fmt::format("frame {} skipped: {} {}", index, name, to_phrase(status)));
+    return pair;
+  }
+  pair.slots = own_;
+  pair.decoded = true;
+  own_count_ = 0;
+  pair.decode_ms = std::chrono::duration<float, std::milli>(Clock::now() - start).count();
+  return pair;
+}
+
+ImageFileStatus FrameDecoder::load(const std::string& name, FrameSlot slot) {
+  if (name.empty()) return ImageFileStatus::missing;
+  try {
+    if (const auto status = read_image_file(sequence_.root / name, &bytes_); status != ImageFileStatus::ok) return status;
+  } catch (const std::bad_alloc&) {  // a file too long for this machine's memory
+    return ImageFileStatus::unreadable;
+  }
+  return decode_grey(bytes_, {pool_.width(), pool_.height()}, pool_.writable(slot).data(), FramePool::stride(pool_.width()));
+}
+
+bool FrameDecoder::wait_for_slot(FrameSlot* slot) noexcept {
+  for (;;) {
+    const Doorbell::Rung seen = freed_.look();
+    if (stop_.load(std::memory_order_acquire)) return false;
+    if (const auto free = pool_.acquire()) {
+      *slot = *free;
+      return true;
+    }
+    freed_.wait(seen);
+  }
+}
+
+bool FrameDecoder::hand_over(const DecodedPair& pair) noexcept {
+  for (;;) {
+    const Doorbell::Rung seen = freed_.look();
+    if (stop_.load(std::memory_order_acquire)) return false;
+    if (ring_.push(pair)) {
+      filled_.ring();
+      return true;
+    }
+    freed_.wait(seen);
+  }
+}
+
+}  // namespace vergence::app

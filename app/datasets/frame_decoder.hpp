@@ -1,0 +1,83 @@
+#pragma once
+#include <array>
+#include <atomic>
+#include <cstddef>
+#include <cstdint>
+#include <thread>
+#include <vector>
+
+#include "app/datasets/image_file.hpp"
+#include "app/datasets/stereo_sequence.hpp"
+#include "app/runtime/doorbell.hpp"
+#include "core/memory/frame_pool.hpp"
+#include "core/memory/ring.hpp"
+
+namespace vergence::app {
+
+/// One frame of a sequence, decoded or not. A value that goes through a ring.
+struct DecodedPair {
+  std::uint64_t frame = 0;  // index into the sequence
+  Stamp stamp{};
+  bool decoded = false;              // else skipped: no slots, and `kind` and `note` say why
+  std::array<FrameSlot, 2> slots{};  // left, right
+  float decode_ms = 0;               // reading both files and decoding them
+  const char* kind = "";             // of the event: image_missing, image_torn, …, time_backwards
+  std::array<char, 256> note{};      // sentence, ends with 0
+};
+
+/// Reads and decodes the images of a sequence on a thread of its own, ahead of whoever consumes them.
+///
+/// A frame is skipped when an image is missing, unreadable or torn, when its size has changed since it was checked, or when its
+/// stamp is not later than every stamp before it. Skipped frames come through the ring in their turn, so events stay in order.
+///
+/// Ownership  A decoded pair's slots are the consumer's until release(). Sequence and pool outlive the decoder.
+/// Threads    next(), release(), one consumer. stop() from any thread; the destructor stops and joins.
+/// Full       Nothing is dropped: with kAhead pairs waiting, or no slot free, the decoder's thread waits.
+/// Errors     The constructor throws std::system_error when no thread can be had; next() and release() throw nothing.
+class FrameDecoder {
+ public:
+  static constexpr std::size_t kAhead = 8;                 // pairs: evens out a slow disk; more is only memory
+  static constexpr std::size_t kSlots = 2 * (kAhead + 2);  // waiting, being decoded, being consumed
+
+  /// Pairs [first, first + count) of the sequence, cut at its end. Precondition: the pool's images have the calibration's size;
+  /// both cameras' are the same.
+  FrameDecoder(const StereoSequence& sequence, std::size_t first, std::size_t count, FramePool& pool);
+  ~FrameDecoder();
+  FrameDecoder(const FrameDecoder&) = delete;
+  FrameDecoder& operator=(const FrameDecoder&) = delete;
+
+  /// The next frame, waiting for it. False: the end of the sequence, or stopped; *pair untouched.
+  [[nodiscard]] bool next(DecodedPair* pair) noexcept;
+  /// Gives the slots of a decoded pair back.
+  void release(const DecodedPair& pair) noexcept;
+  /// Wakes both sides. Twice is harmless.
+  void stop() noexcept;
+
+ private:
+  void work();
+  [[nodiscard]] DecodedPair decode(std::size_t index);
+  /// One image into the slot.
+  [[nodiscard]] ImageFileStatus load(const std::string& name, FrameSlot slot);
+  /// Waits for a slot. False: stopped.
+  [[nodiscard]] bool wait_for_slot(FrameSlot* slot) noexcept;
+  /// Hands the pair over, waiting for room. False: stopped.
+  [[nodiscard]] bool hand_over(const DecodedPair& pair) noexcept;
+
+  const StereoSequence& sequence_;
+  std::size_t next_index_, end_;
+  FramePool& pool_;
+  std::vector<std::uint8_t> bytes_;  // of the file being decoded
+  std::array<FrameSlot, 2> own_{};   // slots in hand: those of a skipped pair serve the next one
+  std::size_t own_count_ = 0;
+  Stamp newest_{};
+  bool any_ = false;  // newest_ means something
+
+  Ring<DecodedPair, kAhead> ring_;
+  Doorbell filled_;  // rung by the decoder: a pair, or the end
+  Doorbell freed_;   // rung by the consumer: room in the ring, slots in the pool
+  std::atomic<bool> stop_{false};
+  std::atomic<bool> finished_{false};
+  std::thread thread_;
+};
+
+}  // namespace vergence::app

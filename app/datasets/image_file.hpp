@@ -1,0 +1,45 @@
+#pragma once
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <span>
+#include <string>
+#include <vector>
+
+namespace vergence::app {
+
+enum class ImageFileStatus : std::uint8_t {
+  ok,
+  missing,       // there is no such file
+  unreadable,    // the system refuses to read it
+  not_an_image,  // neither PNG nor JPEG
+  torn,          // begins as an image and ends before it is complete, or its check sums fail
+  undecodable,   // complete, and yet the decoder refuses it
+  wrong_size,    // another width or height than asked for
+};
+
+/// The rest of a sentence that begins with the file's name: "is missing", "ends before the image is complete".
+[[nodiscard]] const char* to_phrase(ImageFileStatus status) noexcept;
+
+struct ImageSize {
+  int width = 0, height = 0;  // px
+  bool operator==(const ImageSize&) const = default;
+};
+
+/// Whole file into *bytes (its capacity is reused). → ok, missing, unreadable
+[[nodiscard]] ImageFileStatus read_image_file(const std::filesystem::path& file, std::vector<std::uint8_t>* bytes);
+
+/// Size from the head of a PNG or JPEG file; the rest is not looked at. → ok, missing, unreadable, not_an_image, torn
+[[nodiscard]] ImageFileStatus read_image_size(const std::filesystem::path& file, ImageSize* size);
+
+/// Whether a PNG or JPEG is all there. Decoders fill what is missing with grey and say nothing, and a half-grey image would be
+/// tracked as if it were the world: PNG chunks are walked to IEND with their check sums, JPEG has to end with its end marker.
+/// → ok, not_an_image, torn
+[[nodiscard]] ImageFileStatus check_image(std::span<const std::uint8_t> bytes, ImageSize* size) noexcept;
+
+/// PNG or JPEG of any depth and colour → 8-bit grey, into size.height rows of `stride` bytes at `out`; no other copy is made.
+/// Not `ok`: content of `out` undefined. Throws nothing. → ok, not_an_image, torn, undecodable, wrong_size
+[[nodiscard]] ImageFileStatus decode_grey(std::span<const std::uint8_t> bytes, ImageSize size, std::uint8_t* out,
+                                          std::size_t stride) noexcept;
+
+}  // namespace vergence::app

@@ -1,0 +1,102 @@
+#include "app/datasets/stereo_sequence.hpp"
+
+#include <algorithm>
+#include <system_error>
+
+#include "app/config/calibration_file.hpp"
+#include "app/datasets/detail/formats.hpp"
+#include "app/datasets/text_file.hpp"
+
+namespace vergence::app {
+namespace {
+
+std::string text(ImageSize s) { return std::to_string(s.width) + "x" + std::to_string(s.height); }
+
+StereoSequence open_by_format(SequenceFormat format, const std::filesystem::path& folder, bool given) {
+  switch (format) {
+    case SequenceFormat::kitti:
+      return detail::open_kitti(folder, given);
+    case SequenceFormat::euroc:
+      return detail::open_euroc(folder, given);
+    case SequenceFormat::folder:
+      return detail::open_folder(folder, given);
+  }
+  refuse(folder, 0, "has no reader for its format");
+}
+
+}  // namespace
+
+StereoSequence open_sequence(SequenceFormat format, const std::filesystem::path& folder,
+                             const std::optional<std::filesystem::path>& calibration) {
+  detail::require_folder(folder, "a drive");
+  StereoSequence sequence = open_by_format(format, folder, calibration.has_value());
+  if (calibration) {
+    sequence.calibration = read_calibration(*calibration).rig;
+    sequence.calibration_source = calibration->filename().string();
+  }
+  const std::filesystem::path source = calibration.value_or(sequence.root / sequence.calibration_source);
+  if (const auto bad = find_implausible(&sequence.calibration)) refuse(source, 0, bad->sentence);
+  if (sequence.calibration.cameras != 2)
+    refuse(source, 0, "describes " + std::to_string(sequence.calibration.cameras) + " cameras; a stereo drive has two");
+  const Intrinsics &left = sequence.calibration.intrinsics[0], &right = sequence.calibration.intrinsics[1];
+  if (left.width != right.width || left.height != right.height)
+    refuse(source, 0,
+           "gives the left camera " + text({left.width, left.height}) + " pixels and the right one " + text({right.width, right.height}) +
+               "; both have to be of one size");
+  check_image_sizes(sequence, 0, std::min<std::size_t>(1, sequence.pairs.size()));
+  return sequence;
+}
+
+void check_image_sizes(const StereoSequence& sequence, std::size_t first, std::size_t count) {
+  const std::size_t end = first + std::min(count, sequence.pairs.size() - std::min(first, sequence.pairs.size()));
+  for (std::size_t i = first; i < end; ++i)
+    for (std::size_t k = 0; k < 2; ++k) {
+      const std::string& name = sequence.pairs[i].file[k];
+      if (name.empty()) continue;
+      ImageSize size;
+      if (read_image_size(sequence.root / name, &size) != ImageFileStatus::ok) continue;
+      const Intrinsics& camera = sequence.calibration.intrinsics[k];
+      const ImageSize wanted{camera.width, camera.height};
+      if (size != wanted)
+        refuse(sequence.root / name, 0,
+               "is " + text(size) + " pixels, but the calibration of this camera (" + sequence.calibration_source + ") is for " +
+                   text(wanted) + "; use the calibration that belongs to these images");
+    }
+}
+
+namespace detail {
+
+void require_folder(const std::filesystem::path& folder, const char* what_it_should_hold) {
+  std::error_code error;
+  if (std::filesystem::is_directory(folder, error)) return;
+  refuse(folder, 0,
+         std::filesystem::exists(folder, error) ? std::string("is not a folder; a folder with ") + what_it_should_hold + " is expected"
+                                                : std::string("does not exist; a folder with ") + what_it_should_hold + " is expected");
+}
+
+std::vector<std::string> list_images(const std::filesystem::path& root, const std::string& below) {
+  const std::filesystem::path folder = root / below;
+  require_folder(folder, "PNG or JPEG images");
+  std::vector<std::string> names;
+  std::error_code error;
+  for (std::filesystem::directory_iterator it(folder, error), end; !error && it != end; it.increment(error)) {
+    std::string extension = it->path().extension().string();
+    std::transform(extension.begin(), extension.end(), extension.begin(),
+                   [](char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c; });
+    if (extension == ".png" || extension == ".jpg" || extension == ".jpeg") names.push_back(below + "/" + it->path().filename().string());
+  }
+  if (error) refuse(folder, 0, "cannot be listed (" + error.message() + "): check its permissions");
+  if (names.empty()) refuse(folder, 0, "holds no PNG or JPEG image");
+  std::sort(names.begin(), names.end());
+  return names;
+}
+
+ImageSize first_image_size(const StereoSequence& sequence, std::size_t camera) {
+  ImageSize size;
+  for (const StereoPair& pair : sequence.pairs)
+    if (!pair.file[camera].empty() && read_image_size(sequence.root / pair.file[camera], &size) == ImageFileStatus::ok) return size;
+  refuse(sequence.root, 0, std::string("has no readable image of the ") + (camera == 0 ? "left" : "right") + " camera");
+}
+
+}  // namespace detail
+}  // namespace vergence::app

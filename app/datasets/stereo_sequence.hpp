@@ -1,0 +1,53 @@
+#pragma once
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "core/types/calibration.hpp"
+#include "core/types/time.hpp"
+
+/// Recorded stereo drives as lists of image files with stamps: what a replay reads, whatever the data set's own layout.
+namespace vergence::app {
+
+enum class SequenceFormat : std::uint8_t { kitti, euroc, folder };
+
+/// One frame as the data set lists it.
+struct StereoPair {
+  Stamp stamp{};
+  std::array<std::string, 2> file;  // left, right: relative to StereoSequence::root; empty: the data set lists none
+};
+
+/// A whole drive but its pixels.
+///
+/// pairs        In the order of the data set; stamps as they are, so they may go backwards. Files may be missing or torn:
+///              who decodes them finds out, skips the frame and says so.
+/// calibration  Two cameras; from the data set's own files unless one was given.
+struct StereoSequence {
+  std::filesystem::path root;
+  std::vector<StereoPair> pairs;
+  RigCalibration calibration;
+  std::string calibration_source;  // the file's name, for calibrations.csv
+};
+
+/// A drive of the given format. `calibration`: a calibration.yaml that is used instead of the data set's own.
+///
+///   kitti   calib.txt (P0, P1), times.txt (seconds), image_0/, image_1/ with NNNNNN.png: image N belongs to line N of times.txt
+///   euroc   mav0/cam0, mav0/cam1 with data.csv and sensor.yaml, or that mav0 itself; paired by equal stamps; raw images
+///   folder  left/, right/ paired in order of name, times.txt (a line a pair: integer nanoseconds, or seconds if it has a
+///           point), calibration.yaml. Where one side lacks images that the other has, pairing goes by equal names.
+///
+/// InputError (file, line, what): folders or files that are not there, no images, numbers of images and times that do not go
+/// together, times that are no numbers, a calibration that makes no rig, images of another size than the calibration.
+[[nodiscard]] StereoSequence open_sequence(SequenceFormat format, const std::filesystem::path& folder,
+                                           const std::optional<std::filesystem::path>& calibration = std::nullopt);
+
+/// Looks at the head of every image of pairs [first, first + count): InputError names the first that has another size than the
+/// calibration. Missing and unreadable files pass: their frames are skipped when they come. Some 10 µs an image.
+void check_image_sizes(const StereoSequence& sequence, std::size_t first, std::size_t count);
+
+}  // namespace vergence::app

@@ -1,0 +1,60 @@
+#include "app/recorder/line_file.hpp"
+
+#include <fcntl.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstring>
+
+#include "app/runtime/errors.hpp"
+
+namespace vergence::app {
+
+LineFile::LineFile(const std::filesystem::path& file)
+    : path_(file), fd_(::open(file.c_str(), O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0644)) {
+  if (fd_ < 0) throw InputError(file.string() + ": cannot be written (" + std::strerror(errno) + "): check the folder's permissions");
+}
+
+LineFile::~LineFile() { close(); }
+
+bool LineFile::append(std::string_view line) {
+  if (waiting_.size() + line.size() > kPending) {
+    ++lost_lines_;
+    return false;
+  }
+  waiting_.append(line);
+  return true;
+}
+
+bool LineFile::flush() {
+  std::size_t done = 0;
+  int error = 0;
+  while (done < waiting_.size() && error == 0) {
+    const ssize_t n = ::write(fd_, waiting_.data() + done, waiting_.size() - done);
+    if (n > 0)
+      done += static_cast<std::size_t>(n);
+    else if (n == 0 || errno != EINTR)
+      error = n == 0 ? ENOSPC : errno;
+  }
+  waiting_.erase(0, done);
+  fault_ = error;
+  return error == 0;
+}
+
+bool LineFile::close() {
+  if (fd_ < 0) return fault_ == 0;
+  bool good = flush();
+  // Files that cannot be synchronised (pipes) say EINVAL; that is no loss.
+  if (good && ::fdatasync(fd_) != 0 && errno != EINVAL) {
+    fault_ = errno;
+    good = false;
+  }
+  if (::close(fd_) != 0 && good) {
+    fault_ = errno;
+    good = false;
+  }
+  fd_ = -1;
+  return good;
+}
+
+}  // namespace vergence::app

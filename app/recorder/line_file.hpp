@@ -1,0 +1,47 @@
+#pragma once
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <string_view>
+
+namespace vergence::app {
+
+/// A file that grows by whole lines and survives a full disk.
+///
+/// What the system does not take stays in memory and is tried again with the next flush(); when kPending bytes wait, new lines
+/// are refused and counted. So a file never holds a line that lacks its end in the middle, and goes on when room comes back.
+///
+/// Threads  One. Memory  Its buffer.
+/// Errors   The constructor throws InputError. Afterwards nothing throws: a failure is kept in fault().
+class LineFile {
+ public:
+  static constexpr std::size_t kPending = std::size_t{1} << 20;  // bytes: minutes of poses
+
+  /// Opens for appending; made when it is not there.
+  explicit LineFile(const std::filesystem::path& file);
+  ~LineFile();
+  LineFile(const LineFile&) = delete;
+  LineFile& operator=(const LineFile&) = delete;
+
+  /// Takes a line, end of line included; nothing is written yet. False: too much is waiting already; the line is lost and counted.
+  bool append(std::string_view line);
+  /// Hands the system what is waiting. False: not all was taken; fault() says why.
+  bool flush();
+  /// flush(), then asks the system to put it on the disk, and closes. Twice is harmless.
+  bool close();
+
+  /// errno of the last failure; 0 when none is standing, that is when all has been written since.
+  [[nodiscard]] int fault() const noexcept { return fault_; }
+  [[nodiscard]] std::uint64_t lost_lines() const noexcept { return lost_lines_; }
+  [[nodiscard]] const std::filesystem::path& path() const noexcept { return path_; }
+
+ private:
+  std::filesystem::path path_;
+  int fd_ = -1;
+  int fault_ = 0;
+  std::uint64_t lost_lines_ = 0;
+  std::string waiting_;
+};
+
+}  // namespace vergence::app

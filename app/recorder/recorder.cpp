@@ -1,0 +1,238 @@
+#include "app/recorder/recorder.hpp"
+
+#include <pthread.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <cstring>
+#include <iterator>
+#include <system_error>
+#include <type_traits>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include "app/datasets/decimal.hpp"
+#include "app/recorder/line_file.hpp"
+#include "app/runtime/errors.hpp"
+
+namespace vergence::app {
+
+static_assert(std::is_trivially_copyable_v<Record>);
+
+struct Recorder::Files {
+  explicit Files(const std::filesystem::path& folder)
+      : trajectory(folder / "trajectory.tum"),
+        reference(folder / "reference.tum"),
+        poses(folder / "poses.csv"),
+        calibrations(folder / "calibrations.csv"),
+        events(folder / "events.jsonl") {}
+  LineFile trajectory, reference, poses, calibrations, events;
+  std::array<int, 5> told{};  // errno that was complained about, by all()
+  [[nodiscard]] std::array<LineFile*, 5> all() noexcept { return {&trajectory, &reference, &poses, &calibrations, &events}; }
+};
+
+namespace {
+
+void append_tum(std::string* line, Stamp stamp, const PoseNumbers& pose) {
+  *line = format_seconds(stamp.ns());
+  for (const double v : pose.t) fmt::format_to(std::back_inserter(*line), " {:.9f}", v);
+  for (const double v : pose.q) fmt::format_to(std::back_inserter(*line), " {:.9f}", v);
+  *line += '\n';
+}
+
+}  // namespace
+
+void make_session_folder(const std::filesystem::path& folder) {
+  namespace fs = std::filesystem;
+  const std::string name = folder.string();
+  if (name.empty()) throw InputError("--out is empty; name a folder for the session");
+  std::error_code error;
+  if (fs::exists(folder, error)) {
+    if (!fs::is_directory(folder, error)) throw InputError(name + ": is not a folder; name a new or empty one for the session with --out");
+    const bool empty = fs::is_empty(folder, error);
+    if (error) throw InputError(name + ": cannot be looked into (" + error.message() + "): check its permissions");
+    if (!empty) throw InputError(name + ": is not empty, and nothing is ever overwritten; name a new or empty folder with --out");
+    return;
+  }
+  fs::create_directories(folder, error);
+  if (error) throw InputError(name + ": cannot be made (" + error.message() + "): check the folder above it");
+}
+
+Recorder::Recorder(const std::filesystem::path& folder, const Options& options)
+    : options_(options), files_(std::make_unique<Files>(folder)), totals_(std::make_unique<SessionTotals>()) {
+  if (options.keep_trajectory) totals_->trajectory.reserve(options.expected_frames);
+  files_->poses.append(std::string(kPosesHeader) + "\n");
+  files_->calibrations.append(std::string(kCalibrationsHeader) + "\n");
+  thread_ = std::thread([this] { work(); });
+}
+
+Recorder::~Recorder() { stop_and_join(); }
+
+void Recorder::stop_and_join() noexcept {
+  if (!thread_.joinable()) return;
+  stop_.store(true, std::memory_order_release);
+  filled_.ring();
+  thread_.join();
+}
+
+void Recorder::post(const Record& record) noexcept {
+  for (;;) {
+    const Doorbell::Rung seen = freed_.look();
+    if (ring_.push(record)) break;
+    if (options_.when_full == WhenFull::drop) {
+      dropped_.fetch_add(1, std::memory_order_relaxed);
+      return;
+    }
+    freed_.wait(seen);
+  }
+  high_water_ = std::max(high_water_, ring_.size());
+  filled_.ring();
+}
+
+void Recorder::work() {
+  (void)pthread_setname_np(pthread_self(), "vergence-record");
+  using Clock = std::chrono::steady_clock;
+  constexpr std::chrono::seconds kFlushAtLeast{1};
+  auto flushed = Clock::now();
+  flush();  // the heads of the tables
+  Record record;
+  for (;;) {
+    const Doorbell::Rung seen = filled_.look();
+    const bool stopping = stop_.load(std::memory_order_acquire);  // before the ring: what was posted before is still found
+    if (ring_.pop(&record)) {
+      freed_.ring();
+      std::visit([this](const auto& r) { write(r); }, record);
+      if (Clock::now() - flushed < kFlushAtLeast) continue;
+    } else if (stopping) {
+      break;
+    } else {
+      flush();
+      flushed = Clock::now();
+      filled_.wait(seen);
+      continue;
+    }
+    flush();
+    flushed = Clock::now();
+  }
+}
+
+void Recorder::write(const PoseRecord& p) {
+  ++totals_->read;
+  ++(p.status == PoseStatus::ok ? totals_->ok : p.status == PoseStatus::degraded ? totals_->degraded : totals_->lost);
+  totals_->estimate.add(static_cast<double>(p.estimate_ms));
+  totals_->decode.add(static_cast<double>(p.decode_ms));
+  for (std::size_t i = 0; i < p.stage_ms.size(); ++i) totals_->stages[i].add(static_cast<double>(p.stage_ms[i]));
+
+  const bool posed = p.status != PoseStatus::lost;
+  line_.clear();
+  const auto out = std::back_inserter(line_);
+  fmt::format_to(out, "{},{},{},{},{}", p.frame, p.stamp.ns(), to_string(p.state), to_string(p.status), to_string(p.reason));
+  if (posed) {
+    for (const double v : p.world_left.t) fmt::format_to(out, ",{:.9f}", v);
+    for (const double v : p.world_left.q) fmt::format_to(out, ",{:.9f}", v);
+  } else {
+    line_ += ",,,,,,,";
+  }
+  line_ += ",,,,,,,";  // east … heading_deg: no placement on the earth
+  line_ += ",,,,,,,";  // ins_east … ins_heading_deg
+  line_ += ",,,,";     // error_…
+  fmt::format_to(out, ",{}", p.inliers);
+  if (posed)
+    fmt::format_to(out, ",{:.4f}", p.reprojection_px);
+  else
+    line_ += ',';
+  fmt::format_to(out, ",{:.3f}\n", p.estimate_ms);
+  files_->poses.append(line_);
+  if (!posed) return;
+
+  append_tum(&line_, p.stamp, p.world_left);
+  files_->trajectory.append(line_);
+  if (p.has_reference) {
+    append_tum(&line_, p.stamp, p.reference_left);
+    files_->reference.append(line_);
+  }
+  if (have_last_pose_)
+    totals_->path_m +=
+        std::hypot(p.world_left.t[0] - last_pose_.t[0], p.world_left.t[1] - last_pose_.t[1], p.world_left.t[2] - last_pose_.t[2]);
+  last_pose_ = p.world_left;
+  have_last_pose_ = true;
+  if (options_.keep_trajectory) totals_->trajectory.push_back({p.stamp, p.world_left.transform()});
+}
+
+void Recorder::write(const EventRecord& e) {
+  nlohmann::ordered_json object;
+  object["stamp_ns"] = e.stamp.ns();
+  object["kind"] = e.kind;
+  object["sentence"] = e.sentence.data();
+  auto& fields = object["fields"] = nlohmann::ordered_json::object();
+  for (const EventField& f : e.fields)
+    if (f.name != nullptr) std::visit([&](auto value) { fields[f.name] = value; }, f.value);
+  // File names may hold any bytes; the line stays JSON.
+  files_->events.append(object.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n");
+}
+
+void Recorder::write(const CalibrationRecord& c) {
+  for (std::size_t k = 1; k < static_cast<std::size_t>(c.cameras); ++k) {
+    line_.clear();
+    const auto out = std::back_inserter(line_);
+    fmt::format_to(out, "{},{},{},{},{},{:.4f},{}", c.stamp.ns(), c.accepted ? "accepted" : "rejected", c.source, c.reason, c.frames,
+                   c.reprojection_px, k);
+    for (const double v : c.extra[k].T_camera_left) fmt::format_to(out, ",{:.9f}", v);
+    const auto sigmas = [&](const std::array<double, 6>& values) {  // zero stands for "not given"
+      const bool given = std::any_of(values.begin(), values.end(), [](double v) { return v > 0; });
+      for (const double v : values)
+        if (given)
+          fmt::format_to(out, ",{:.9f}", v);
+        else
+          line_ += ',';
+    };
+    sigmas(c.extra[k].sigma_noise);
+    sigmas(c.extra[k].sigma_wide);
+    line_ += '\n';
+    files_->calibrations.append(line_);
+  }
+}
+
+void Recorder::flush() {
+  const auto files = files_->all();
+  for (std::size_t i = 0; i < files.size(); ++i) {
+    if (files[i]->flush())
+      files_->told[i] = 0;
+    else if (files_->told[i] != files[i]->fault()) {
+      files_->told[i] = files[i]->fault();
+      complain(*files[i]);
+    }
+  }
+}
+
+void Recorder::complain(const LineFile& file) {
+  const std::lock_guard lock(complaints_mutex_);
+  complaints_.push_back(file.path().string() + ": cannot be written (" + std::strerror(file.fault()) +
+                        "); the session goes on, lines wait in memory: make room on that disk");
+}
+
+std::vector<std::string> Recorder::take_complaints() {
+  const std::lock_guard lock(complaints_mutex_);
+  return std::exchange(complaints_, {});
+}
+
+std::unique_ptr<SessionTotals> Recorder::close() {
+  stop_and_join();
+  for (LineFile* file : files_->all()) {
+    const bool good = file->close();
+    totals_->lost_lines += file->lost_lines();
+    if (!good)
+      totals_->faults.push_back(file->path().string() + ": is not complete (" + std::strerror(file->fault()) +
+                                "); make room on that disk and repeat the drive");
+    else if (file->lost_lines() > 0)
+      totals_->faults.push_back(file->path().string() + ": lacks " + std::to_string(file->lost_lines()) +
+                                " lines that found no room on the disk in time");
+  }
+  totals_->dropped_records = dropped_.load(std::memory_order_relaxed);
+  totals_->ring_high_water = high_water_;
+  return std::move(totals_);
+}
+
+}  // namespace vergence::app

@@ -1,0 +1,106 @@
+#pragma once
+#include <array>
+#include <atomic>
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "app/recorder/histogram.hpp"
+#include "app/recorder/records.hpp"
+#include "app/runtime/doorbell.hpp"
+#include "core/memory/ring.hpp"
+
+namespace vergence::app {
+
+class LineFile;
+
+/// What poses.csv has, in this order (DESIGN §6).
+inline constexpr const char* kPosesHeader =
+    "frame,stamp_ns,state,status,reason,x,y,z,qx,qy,qz,qw,east,north,up,latitude_deg,longitude_deg,height_m,heading_deg,"
+    "ins_east,ins_north,ins_up,ins_latitude_deg,ins_longitude_deg,ins_height_m,ins_heading_deg,"
+    "error_east_m,error_north_m,error_up_m,error_heading_deg,inliers,reprojection_px,estimate_ms";
+inline constexpr const char* kCalibrationsHeader =
+    "stamp_ns,outcome,source,reason,frames,reprojection_px,camera,rx,ry,rz,tx,ty,tz,"
+    "sigma_rx,sigma_ry,sigma_rz,sigma_tx,sigma_ty,sigma_tz,wide_rx,wide_ry,wide_rz,wide_tx,wide_ty,wide_tz";
+
+/// Makes the folder of a session. InputError: it exists and is not empty, is no folder, or cannot be made.
+void make_session_folder(const std::filesystem::path& folder);
+
+/// What a session has come to: for summary.json.
+struct SessionTotals {
+  std::uint64_t read = 0, ok = 0, degraded = 0, lost = 0;  // frames
+  TimeHistogram estimate, decode;                          // ms
+  std::array<TimeHistogram, kStages> stages;
+  double path_m = 0;                    // sum of the steps between successive poses
+  std::vector<StampedPose> trajectory;  // if asked for: the poses of trajectory.tum
+  std::uint64_t dropped_records = 0;    // the ring was full (live only)
+  std::uint64_t lost_lines = 0;         // the disk took no more
+  std::size_t ring_high_water = 0;
+  std::vector<std::string> faults;  // a sentence for each file that is not whole
+};
+
+/// Writes trajectory.tum, reference.tum, poses.csv, calibrations.csv and events.jsonl of a session as it goes on, on a thread of
+/// its own: the estimator never waits for a disk.
+///
+/// What has been posted is in the files as soon as the thread comes to it, at the latest after a second, so a killed session keeps its
+/// lines. Stamps are printed from their integers. The same records give the same bytes.
+/// Threads  post(): one producer. take_complaints(): any. close(): the owner's, after the last post().
+/// Memory   post() takes none. With keep_trajectory a pose of some 100 bytes is kept for every frame.
+/// Full     wait: the producer waits (replay). drop: the record is dropped and counted (live).
+/// Errors   The constructor throws InputError. A disk that takes no more: a complaint, the session goes on, see LineFile.
+class Recorder {
+ public:
+  enum class WhenFull : std::uint8_t { wait, drop };
+  struct Options {
+    WhenFull when_full = WhenFull::wait;
+    bool keep_trajectory = true;
+    std::size_t expected_frames = 0;  // memory taken beforehand for the trajectory
+  };
+
+  /// `folder` exists: make_session_folder().
+  Recorder(const std::filesystem::path& folder, const Options& options);
+  ~Recorder();
+  Recorder(const Recorder&) = delete;
+  Recorder& operator=(const Recorder&) = delete;
+
+  void post(const Record& record) noexcept;
+  /// Sentences about the disk since the last call.
+  [[nodiscard]] std::vector<std::string> take_complaints();
+  /// Writes what is waiting, closes the files. Once.
+  [[nodiscard]] std::unique_ptr<SessionTotals> close();
+
+ private:
+  static constexpr std::size_t kRing = 128;  // records: seconds of frames with their events
+
+  void work();
+  void write(const PoseRecord& pose);
+  void write(const EventRecord& event);
+  void write(const CalibrationRecord& calibration);
+  void flush();
+  void stop_and_join() noexcept;
+  void complain(const LineFile& file);
+
+  struct Files;
+  Options options_;
+  std::unique_ptr<Files> files_;
+  std::unique_ptr<SessionTotals> totals_;
+  PoseNumbers last_pose_{};
+  bool have_last_pose_ = false;
+  std::string line_;  // being formatted
+
+  Ring<Record, kRing> ring_;
+  Doorbell filled_, freed_;
+  std::atomic<bool> stop_{false};
+  std::atomic<std::uint64_t> dropped_{0};
+  std::size_t high_water_ = 0;  // the producer's
+  std::mutex complaints_mutex_;
+  std::vector<std::string> complaints_;
+  std::thread thread_;
+};
+
+}  // namespace vergence::app

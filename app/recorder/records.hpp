@@ -1,0 +1,83 @@
+#pragma once
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <string_view>
+#include <variant>
+
+#include "core/estimator/estimator.hpp"
+#include "core/types/calibration.hpp"
+#include "core/types/pose_sample.hpp"
+#include "core/types/stamped_pose.hpp"
+
+/// What goes through the recorder's ring: plain values of fixed size, made on the estimator's thread without heap.
+namespace vergence::app {
+
+/// A rigid transform as numbers.
+struct PoseNumbers {
+  std::array<double, 3> t{};            // m
+  std::array<double, 4> q{0, 0, 0, 1};  // x y z w
+
+  [[nodiscard]] static PoseNumbers of(const Transform& T) noexcept;
+  [[nodiscard]] Transform transform() const noexcept;
+};
+
+/// One frame that was read: a line of poses.csv and, unless lost, one of trajectory.tum.
+struct PoseRecord {
+  std::uint64_t frame = 0;
+  Stamp stamp{};
+  State state = State::initialising;
+  PoseStatus status = PoseStatus::lost;
+  Reason reason = Reason::none;
+  PoseNumbers world_left{};
+  bool has_reference = false;
+  PoseNumbers reference_left{};  // in the reference's own frame; meaningful with has_reference
+  int inliers = 0;
+  double reprojection_px = 0;
+  std::array<float, kStages> stage_ms{};
+  float estimate_ms = 0;
+  float decode_ms = 0;
+
+  [[nodiscard]] static PoseRecord of(const PoseSample& sample, float decode_ms, const std::optional<Transform>& T_reference_left) noexcept;
+};
+
+/// A number or a constant word beside an event's sentence. `name` null: not used.
+struct EventField {
+  const char* name = nullptr;
+  std::variant<std::int64_t, double, const char*> value{std::int64_t{0}};
+};
+
+/// A line of events.jsonl. `kind` and the fields' names point to constants.
+struct EventRecord {
+  Stamp stamp{};
+  const char* kind = "";
+  std::array<char, 256> sentence{};  // ends with 0
+  std::array<EventField, 4> fields{};
+
+  /// Cut at the array's end, at a whole UTF-8 character.
+  void set_sentence(std::string_view text) noexcept;
+  [[nodiscard]] static EventRecord of(const EstimatorEvent& event) noexcept;
+};
+
+/// A calibration that was accepted or rejected: a line of calibrations.csv for every camera but the left one.
+struct CalibrationRecord {
+  struct Extra {
+    std::array<double, 6> T_camera_left{};  // rotation vector, rad; translation, m
+    std::array<double, 6> sigma_noise{}, sigma_wide{};
+  };
+  Stamp stamp{};
+  bool accepted = false;
+  const char* source = "";
+  const char* reason = "";
+  int frames = 0;
+  double reprojection_px = 0;
+  int cameras = 0;
+  std::array<Extra, kMaxCameras> extra{};
+
+  [[nodiscard]] static CalibrationRecord of(const RigCalibration& rig, Stamp stamp, bool accepted, const char* source,
+                                            const char* reason) noexcept;
+};
+
+using Record = std::variant<PoseRecord, EventRecord, CalibrationRecord>;
+
+}  // namespace vergence::app
