@@ -1,0 +1,167 @@
+#include "core/geometry/pose_refine.hpp"
+
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+
+namespace vergence {
+namespace {
+
+constexpr const char* kWho = "pose refinement";
+constexpr double kRayleighMedian = 1.1774100225154747;  // √(2 ln 2)
+constexpr int kRescaleAfter = 2;                        // steps: by then the pose is within a sigma or two
+constexpr double kFirstDamping = 1e-4;                  // relative to the diagonal, once a plain step has failed
+constexpr int kMaxFailures = 6;                         // damping grows tenfold a time: beyond, rounding decides
+constexpr double kMaxCondition = 1e12;                  // of the scaled information: beyond, double holds no digit of the worst direction
+
+[[nodiscard]] bool valid(const PoseRefineOptions& o) noexcept {
+  return o.max_steps >= 1 && o.max_steps <= 10 && o.huber > 0 && o.min_scale > 0 && o.inlier_chi2 > 0 && o.small_update >= 0;
+}
+
+[[nodiscard]] bool small(const Vec6& delta, double limit) noexcept {
+  return delta.head<3>().norm() < limit && delta.tail<3>().norm() < limit;
+}
+
+}  // namespace
+
+std::size_t PoseRefiner::memory_needed(std::size_t capacity) noexcept {
+  return detail::PoseProblem::memory_needed(capacity) + static_cast<std::size_t>(kMaxCameras) * capacity * sizeof(double) + capacity +
+         2 * kCacheLine;
+}
+
+PoseRefiner::PoseRefiner(std::size_t capacity, Arena& arena)
+    : problem_(capacity, arena, kWho),
+      sorted_(arena.make<double>(static_cast<std::size_t>(kMaxCameras) * capacity, kWho)),
+      flags_(arena.make<std::uint8_t>(capacity, kWho)) {}
+
+double PoseRefiner::residual_scale(const Transform& T, std::span<const std::uint8_t> use, double floor) noexcept {
+  problem_.evaluate(T);
+  std::size_t n = 0;
+  for (int k = 0; k < problem_.cameras(); ++k) {
+    const std::span<const double> errors = problem_.errors(k);
+    for (std::size_t i = 0; i < errors.size(); ++i)
+      if (use.empty() || ((use[problem_.point(k, i)] >> k) & 1U) != 0) sorted_[n++] = errors[i];
+  }
+  if (n == 0) return floor;
+  const auto middle = sorted_.begin() + static_cast<std::ptrdiff_t>(n / 2);
+  std::nth_element(sorted_.begin(), middle, sorted_.begin() + static_cast<std::ptrdiff_t>(n));
+  const double scale = std::sqrt(*middle) / kRayleighMedian;
+  return std::isfinite(scale) ? std::max(floor, scale) : floor;
+}
+
+void PoseRefiner::describe(const RigObservations& o, const PoseRefineOptions& options, RefinedPose* pose) noexcept {
+  problem_.evaluate(pose->T_left_world);
+  std::fill_n(flags_.begin(), points_, std::uint8_t{0});
+  const double limit = options.inlier_chi2 * pose->scale * pose->scale;
+  double sum_px2 = 0;
+  for (int k = 0; k < problem_.cameras(); ++k) {
+    const std::span<const double> errors = problem_.errors(k);
+    for (std::size_t i = 0; i < errors.size(); ++i) {
+      if (!(errors[i] < limit)) continue;
+      const std::size_t p = problem_.point(k, i);
+      flags_[p] = static_cast<std::uint8_t>(flags_[p] | (1U << k));
+      sum_px2 += errors[i] * o.sigma[p] * o.sigma[p];
+      ++pose->inlier_observations;
+    }
+  }
+  for (std::size_t i = 0; i < points_; ++i) pose->inliers += flags_[i] != 0 && flags_[i] == o.seen[i] ? 1 : 0;
+  if (pose->inlier_observations > 0) pose->rms_px = std::sqrt(sum_px2 / (2.0 * pose->inlier_observations));
+}
+
+RefinedPose PoseRefiner::refine(const RigObservations& o, const Transform& start, std::span<const std::uint8_t> use,
+                                const PoseRefineOptions& options) noexcept {
+  RefinedPose out;
+  out.T_left_world = start;
+  points_ = 0;
+  const auto refuse = [&out](PoseRefineStatus why) noexcept {
+    out.status = why;
+    return out;
+  };
+  if (!valid(options) || !o.consistent() || !start.finite() || (!use.empty() && use.size() != o.size()))
+    return refuse(PoseRefineStatus::invalid_input);
+  if (o.size() > flags_.size()) return refuse(PoseRefineStatus::capacity);
+  points_ = o.size();
+  std::fill_n(flags_.begin(), points_, std::uint8_t{0});
+  problem_.gather(o);
+  out.observations = static_cast<int>(problem_.observations());
+  int used = 0;
+  for (int k = 0; k < problem_.cameras(); ++k)
+    for (std::size_t i = 0; i < problem_.count(k); ++i) {
+      const bool counts = use.empty() || ((use[problem_.point(k, i)] >> k) & 1U) != 0;
+      if (!counts) problem_.use(k, i, false);
+      used += counts ? 1 : 0;
+    }
+  if (used < 3) return refuse(PoseRefineStatus::too_few);
+
+  out.scale = residual_scale(start, use, options.min_scale);
+  detail::PoseProblem::Sums now = problem_.sums(out.T_left_world, out.scale, options.huber);
+  out.status = PoseRefineStatus::max_steps;
+  double damping = 0;
+  int failures = 0;
+  while (out.steps < options.max_steps) {
+    if (out.steps == kRescaleAfter && failures == 0) {
+      out.scale = residual_scale(out.T_left_world, use, options.min_scale);
+      now = problem_.sums(out.T_left_world, out.scale, options.huber);
+    }
+    ++out.steps;
+    Mat6 H = now.H;
+    H.diagonal() *= 1.0 + damping;
+    Vec6 delta;
+    if (!detail::solve_normal(H, now.g, &delta)) {
+      if (++failures > kMaxFailures) return refuse(PoseRefineStatus::rank_deficient);
+      damping = damping > 0 ? 10.0 * damping : kFirstDamping;
+      continue;
+    }
+    const Transform next = detail::moved(out.T_left_world, delta);
+    const detail::PoseProblem::Sums then = problem_.sums(next, out.scale, options.huber);
+    // Rounding of the sum is forgiven: at the optimum steps neither help nor hurt.
+    if (!(then.cost <= now.cost * (1.0 + 1e-12)) || !next.finite()) {
+      if (small(delta, options.small_update)) {
+        out.status = PoseRefineStatus::small_update;
+        break;
+      }
+      if (++failures > kMaxFailures) break;
+      damping = damping > 0 ? 10.0 * damping : kFirstDamping;
+      continue;
+    }
+    const bool converged = small(delta, options.small_update);
+    out.T_left_world = next;
+    now = then;
+    damping *= 0.1;
+    if (damping < 1e-9) damping = 0;
+    failures = 0;
+    if (converged) {
+      out.status = PoseRefineStatus::small_update;
+      break;
+    }
+  }
+  if (out.steps <= kRescaleAfter) {  // the scale at the end is the one that information and flags are in
+    out.scale = residual_scale(out.T_left_world, use, options.min_scale);
+    now = problem_.sums(out.T_left_world, out.scale, options.huber);
+  }
+  out.information = now.H;
+  describe(o, options, &out);
+
+  Vec6 d;
+  for (int i = 0; i < 6; ++i) {
+    if (!(out.information(i, i) > 0.0) || !std::isfinite(out.information(i, i))) return refuse(PoseRefineStatus::rank_deficient);
+    d[i] = 1.0 / std::sqrt(out.information(i, i));
+  }
+  const Mat6 unit = d.asDiagonal() * out.information * d.asDiagonal();
+  const Eigen::SelfAdjointEigenSolver<Mat6> scaled(unit, Eigen::EigenvaluesOnly);
+  out.eigenvalues = Eigen::SelfAdjointEigenSolver<Mat6>(out.information, Eigen::EigenvaluesOnly).eigenvalues();
+  const double least = scaled.eigenvalues()[0];
+  if (!(least > scaled.eigenvalues()[5] / kMaxCondition)) return refuse(PoseRefineStatus::rank_deficient);
+  out.condition = scaled.eigenvalues()[5] / least;
+  const Mat6 covariance = d.asDiagonal() * Mat6(Eigen::LLT<Mat6>(unit).solve(Mat6::Identity())) * d.asDiagonal();
+  const auto worst = [&covariance](int at) noexcept {
+    const Mat3 block = covariance.block<3, 3>(at, at);
+    return std::sqrt(std::max(0.0, Eigen::SelfAdjointEigenSolver<Mat3>(block, Eigen::EigenvaluesOnly).eigenvalues()[2]));
+  };
+  out.rotation_sigma = worst(0);
+  out.translation_sigma = worst(3);
+  return out;
+}
+
+}  // namespace vergence

@@ -1,0 +1,194 @@
+#include "core/geometry/mlesac.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cstring>
+#include <limits>
+
+#include "core/memory/allocation_guard.hpp"
+#include "tests/unit/core/geometry/rig_scene.hpp"
+
+namespace vergence {
+namespace {
+
+using test::make_scene;
+using test::RigScene;
+
+constexpr std::size_t kCapacity = 512;
+
+class RigMlesacTest : public testing::Test {
+ protected:
+  Arena arena_{RigMlesac::memory_needed(kCapacity) + RigObservationTable::memory_needed(kCapacity)};
+  RigMlesac mlesac_{kCapacity, arena_};
+  RigObservationTable table_{kCapacity, arena_};
+};
+
+double share_flagged_right(const RigScene& scene, const RigObservations& o, std::span<const std::uint8_t> flags) {
+  int right = 0;
+  for (std::size_t i = 0; i < o.size(); ++i) right += (flags[i] == o.seen[i]) == scene.good[i] ? 1 : 0;
+  return static_cast<double>(right) / static_cast<double>(o.size());
+}
+
+TEST_F(RigMlesacTest, findsThePoseAmongHalfOutliersAndFlagsThem) {
+  // T² = 9.21 alone calls 1 % of good pixels wrong, 2 % of points seen twice; three-point poses carry noise of their own,
+  // so sigma is told three times as large as it is.
+  int poses = 0;
+  for (std::uint64_t seed = 1; seed <= 50; ++seed) {
+    Random random(seed);
+    const RigScene scene = make_scene(random, 2, 300, 0.5, 0.3, 0.3, 0.9, &table_);
+    const MlesacPose found = mlesac_.solve(table_.view(), {}, nullptr, random);
+    ASSERT_EQ(found.status, MlesacStatus::ok);
+    EXPECT_GE(share_flagged_right(scene, table_.view(), mlesac_.flags()), 0.98) << "seed " << seed;
+    EXPECT_LT(rotation_angle(found.T_left_world.R * scene.T_left_world.R.transpose()), 0.02);
+    if ((found.T_left_world.centre() - scene.T_left_world.centre()).norm() < 0.2) ++poses;
+    EXPECT_EQ(static_cast<std::size_t>(found.observations), [&] {
+      std::size_t n = 0;
+      for (std::size_t i = 0; i < table_.size(); ++i) n += table_.view().sees(i, 0) + table_.view().sees(i, 1);
+      return n;
+    }());
+  }
+  EXPECT_GE(poses, 48);
+}
+
+TEST_F(RigMlesacTest, isExactOnExactData) {
+  for (int cameras = 1; cameras <= kMaxCameras; ++cameras) {
+    Random random(7);
+    const RigScene scene = make_scene(random, cameras, 100, 0.0, 0.0, 0.0, 0.3, &table_);
+    const MlesacPose found = mlesac_.solve(table_.view(), {}, nullptr, random);
+    ASSERT_EQ(found.status, MlesacStatus::ok);
+    EXPECT_LT(test::difference(found.T_left_world, scene.T_left_world), 1e-9) << cameras;
+    EXPECT_EQ(found.inliers, 100);
+  }
+}
+
+TEST_F(RigMlesacTest, drawsFromACameraThatAloneSeesThePoints) {
+  Random random(8);
+  const RigScene scene = make_scene(random, 2, 60, 0.0, 0.0, 0.0, 0.3, &table_);
+  RigObservations o = table_.view();
+  std::vector<std::uint8_t> right_only(o.size(), 2);
+  o.seen = right_only;
+  const MlesacPose found = mlesac_.solve(o, {}, nullptr, random);
+  ASSERT_EQ(found.status, MlesacStatus::ok);
+  EXPECT_LT(test::difference(found.T_left_world, scene.T_left_world), 1e-9);
+  EXPECT_EQ(found.inliers, 60);
+}
+
+TEST_F(RigMlesacTest, sameSeedSameResultToTheBit) {
+  const auto once = [&] {
+    Random random(9);
+    (void)make_scene(random, 2, 200, 0.4, 0.3, 0.3, 0.6, &table_);
+    return mlesac_.solve(table_.view(), {}, nullptr, random);
+  };
+  const MlesacPose a = once(), b = once();
+  EXPECT_EQ(a.T_left_world.R, b.T_left_world.R);
+  EXPECT_EQ(a.T_left_world.t, b.T_left_world.t);
+  EXPECT_EQ(a.score, b.score);
+  EXPECT_EQ(a.samples, b.samples);
+}
+
+TEST_F(RigMlesacTest, aGoodPriorEndsTheSearchEarlyAndABadOneDoesNoHarm) {
+  Random random(10);
+  const RigScene scene = make_scene(random, 2, 300, 0.1, 0.3, 0.3, 0.6, &table_);
+  MlesacOptions options;
+  options.max_hypotheses = 1000;
+  const MlesacPose good = mlesac_.solve(table_.view(), options, &scene.T_left_world, random);
+  EXPECT_EQ(good.status, MlesacStatus::ok);
+  EXPECT_LE(good.samples, 12);  // w ≥ 0.88 → ln 1e-3 / ln(1 − w³) ≤ 6, min_hypotheses 8
+  const Transform far{exp_so3({1, 1, 1}), {50, 0, 0}};
+  const MlesacPose bad = mlesac_.solve(table_.view(), options, &far, random);
+  EXPECT_FALSE(bad.prior_best);
+  EXPECT_LT(rotation_angle(bad.T_left_world.R * scene.T_left_world.R.transpose()), 0.02);
+}
+
+TEST_F(RigMlesacTest, theScoreIsTheTruncatedCostOfThePose) {
+  Random random(12);
+  (void)make_scene(random, 2, 150, 0.3, 0.3, 0.3, 0.6, &table_);
+  const MlesacOptions options;
+  const MlesacPose found = mlesac_.solve(table_.view(), options, nullptr, random);
+  ASSERT_EQ(found.status, MlesacStatus::ok);
+  const RigObservations o = table_.view();
+  double cost = 0;
+  for (std::size_t i = 0; i < o.size(); ++i)
+    for (std::size_t k = 0; k < 2; ++k) {
+      if (!o.sees(i, static_cast<int>(k))) continue;
+      const Vec3 p = o.T_camera_left[k] * (found.T_left_world * Vec3(o.x[i], o.y[i], o.z[i]));
+      const Pinhole& c = o.pinhole[k];
+      const double du = c.fx * p.x() / p.z() + c.cx - o.u[k][i], dv = c.fy * p.y() / p.z() + c.cy - o.v[k][i];
+      const double e2 = (du * du + dv * dv) / (o.sigma[i] * o.sigma[i]);
+      cost += p.z() > 0 && e2 < options.outlier_cost ? e2 : options.outlier_cost;
+    }
+  EXPECT_NEAR(found.score, cost, 1e-3 * cost);  // float: 1e-3 px of 0.6 px, hundreds of terms
+}
+
+TEST_F(RigMlesacTest, namesWhatIsWrongWithTheInput) {
+  Random random(13);
+  (void)make_scene(random, 2, 2, 0.0, 0.0, 0.0, 0.3, &table_);
+  EXPECT_EQ(mlesac_.solve(table_.view(), {}, nullptr, random).status, MlesacStatus::too_few);
+  const Transform prior;
+  EXPECT_EQ(mlesac_.solve(table_.view(), {}, &prior, random).status, MlesacStatus::ok);  // the prior is all there is
+  table_.clear();
+  EXPECT_EQ(mlesac_.solve(table_.view(), {}, &prior, random).status, MlesacStatus::too_few);
+
+  (void)make_scene(random, 2, 50, 0.0, 0.0, 0.0, 0.3, &table_);
+  RigObservations o = table_.view();
+  o.sigma = o.sigma.first(10);
+  EXPECT_EQ(mlesac_.solve(o, {}, nullptr, random).status, MlesacStatus::invalid_input);
+  o = table_.view();
+  o.pinhole[1].fx = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_EQ(mlesac_.solve(o, {}, nullptr, random).status, MlesacStatus::invalid_input);
+  o = table_.view();
+  o.cameras = kMaxCameras + 1;
+  EXPECT_EQ(mlesac_.solve(o, {}, nullptr, random).status, MlesacStatus::invalid_input);
+  MlesacOptions options;
+  options.confidence = 1.0;
+  EXPECT_EQ(mlesac_.solve(table_.view(), options, nullptr, random).status, MlesacStatus::invalid_input);
+
+  Arena small_arena(RigMlesac::memory_needed(20));
+  RigMlesac small(20, small_arena);
+  EXPECT_EQ(small.solve(table_.view(), {}, nullptr, random).status, MlesacStatus::capacity);
+
+  table_.clear();
+  for (int i = 0; i < 50; ++i) {  // all on one line: no sample has a pose
+    ASSERT_TRUE(table_.push(Vec3(0.1 * i, 0, 10), 0.3));
+    table_.see(0, Vec2(318 + 5.2 * i, 243));
+  }
+  EXPECT_EQ(mlesac_.solve(table_.view(), {}, nullptr, random).status, MlesacStatus::no_hypothesis);
+}
+
+TEST_F(RigMlesacTest, numbersThatAreNoneAreLeftOut) {
+  Random random(14);
+  const RigScene scene = make_scene(random, 2, 100, 0.0, 0.0, 0.0, 0.3, &table_);
+  ASSERT_TRUE(table_.push(Vec3(std::numeric_limits<double>::quiet_NaN(), 0, 0), 0.3));
+  table_.see(0, Vec2(10, 10));
+  ASSERT_TRUE(table_.push(Vec3(0, 0, 5), 0.0));
+  table_.see(0, Vec2(10, 10));
+  ASSERT_TRUE(table_.push(Vec3(0, 0, std::numeric_limits<double>::infinity()), 0.3));
+  table_.see(1, Vec2(std::numeric_limits<double>::infinity(), 10));
+  const MlesacPose found = mlesac_.solve(table_.view(), {}, nullptr, random);
+  EXPECT_LT(test::difference(found.T_left_world, scene.T_left_world), 1e-9);
+  EXPECT_EQ(found.inliers, 100);
+  EXPECT_EQ(found.observations, 200);
+}
+
+TEST_F(RigMlesacTest, allocatesNothing) {
+  if (!AllocationGuard::available()) GTEST_SKIP() << "a sanitizer owns malloc";
+  Random random(15);
+  (void)make_scene(random, 2, 300, 0.4, 0.3, 0.3, 0.6, &table_);
+  const std::uint64_t before = AllocationGuard::allocations_after_seal();
+  {
+    const SealedScope sealed;
+    EXPECT_EQ(mlesac_.solve(table_.view(), {}, nullptr, random).status, MlesacStatus::ok);
+  }
+  EXPECT_EQ(AllocationGuard::allocations_after_seal(), before);
+}
+
+TEST(SamplesNeeded, followsTheFormula) {
+  EXPECT_EQ(samples_needed(1.0, 3, 0.99, 1000), 1);
+  EXPECT_EQ(samples_needed(0.0, 3, 0.99, 1000), 1000);
+  EXPECT_EQ(samples_needed(0.5, 3, 0.99, 1000), 35);   // ln 0.01 / ln 0.875 = 34.5
+  EXPECT_EQ(samples_needed(0.5, 5, 0.99, 1000), 146);  // ln 0.01 / ln(1 − 1/32) = 145.05
+  EXPECT_EQ(samples_needed(0.1, 3, 0.99, 200), 200);
+}
+
+}  // namespace
+}  // namespace vergence

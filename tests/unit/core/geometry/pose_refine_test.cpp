@@ -1,0 +1,209 @@
+#include "core/geometry/pose_refine.hpp"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Cholesky>
+#include <limits>
+
+#include "core/memory/allocation_guard.hpp"
+#include "tests/unit/core/geometry/rig_scene.hpp"
+
+namespace vergence {
+namespace {
+
+using test::make_scene;
+using test::random_vector;
+using test::RigScene;
+
+constexpr std::size_t kCapacity = 512;
+
+class PoseRefinerTest : public testing::Test {
+ protected:
+  Arena arena_{PoseRefiner::memory_needed(kCapacity) + RigObservationTable::memory_needed(kCapacity) +
+               detail::PoseProblem::memory_needed(kCapacity)};
+  PoseRefiner refiner_{kCapacity, arena_};
+  RigObservationTable table_{kCapacity, arena_};
+  detail::PoseProblem problem_{kCapacity, arena_, "test"};
+};
+
+Transform disturbed(const Transform& T, Random& random, double angle, double metres) {
+  Vec6 d;
+  d << random_vector(random, -angle, angle), random_vector(random, -metres, metres);
+  return detail::moved(T, d);
+}
+
+/// δ = (φ, τ) of moved() that leads from a to b.
+Vec6 step_between(const Transform& a, const Transform& b) {
+  Vec6 d;
+  const Mat3 turn = b.R * a.R.transpose();
+  d << log_so3(turn), b.t - turn * a.t;
+  return d;
+}
+
+TEST_F(PoseRefinerTest, gradientIsTheDerivativeOfTheCost) {
+  // dC/dδ = −2 g, Huber's tail included; cost of some 1e4, so that central differences are good to about 1e-5 of |g|.
+  Random random(21);
+  for (int cameras = 1; cameras <= kMaxCameras; ++cameras) {
+    const RigScene scene = make_scene(random, cameras, 101, 0.2, 0.3, 0.3, 0.5, &table_);
+    problem_.gather(table_.view());
+    const Transform at = disturbed(scene.T_left_world, random, 0.003, 0.03);
+    const detail::PoseProblem::Sums sums = problem_.sums(at, 1.3, 2.0);
+    const double h = 1e-6;
+    for (int i = 0; i < 6; ++i) {
+      const double ahead = problem_.sums(detail::moved(at, h * Vec6::Unit(i)), 1.3, 2.0).cost;
+      const double behind = problem_.sums(detail::moved(at, -h * Vec6::Unit(i)), 1.3, 2.0).cost;
+      EXPECT_NEAR((ahead - behind) / (2 * h), -2.0 * sums.g[i], 1e-5 * sums.g.norm()) << cameras << " cameras, column " << i;
+    }
+  }
+}
+
+TEST_F(PoseRefinerTest, informationIsTheCurvatureOfTheCostWhereResidualsVanish) {
+  Random random(22);
+  const RigScene scene = make_scene(random, 2, 67, 0.0, 0.3, 0.0, 0.5, &table_);
+  problem_.gather(table_.view());
+  const Mat6 H = problem_.sums(scene.T_left_world, 1.0, 2.0).H;
+  Mat6 numeric;  // dg/dδ = −H
+  const double h = 1e-6;
+  for (int i = 0; i < 6; ++i)
+    numeric.col(i) = -(problem_.sums(detail::moved(scene.T_left_world, h * Vec6::Unit(i)), 1.0, 1e6).g -
+                       problem_.sums(detail::moved(scene.T_left_world, -h * Vec6::Unit(i)), 1.0, 1e6).g) /
+                     (2 * h);
+  EXPECT_LT((numeric - H).norm(), 1e-6 * H.norm()) << numeric << "\n\n" << H;
+}
+
+TEST_F(PoseRefinerTest, recoversTheExactPose) {
+  for (std::uint64_t seed = 1; seed <= 200; ++seed) {
+    Random random(seed);
+    const RigScene scene = make_scene(random, 1 + static_cast<int>(seed % 4), 60, 0.0, 0.3, 0.0, 0.3, &table_);
+    const RefinedPose found = refiner_.refine(table_.view(), disturbed(scene.T_left_world, random, 0.02, 0.2), {}, {});
+    ASSERT_EQ(found.status, PoseRefineStatus::small_update) << seed;
+    EXPECT_LT(test::difference(found.T_left_world, scene.T_left_world), 1e-9) << seed;
+    EXPECT_EQ(found.inliers, 60);
+    EXPECT_LT(found.rms_px, 1e-6);
+    EXPECT_LE(found.steps, 8);
+  }
+}
+
+TEST_F(PoseRefinerTest, resistsOutliersAndFlagsThem) {
+  for (std::uint64_t seed = 1; seed <= 30; ++seed) {
+    Random random(seed);
+    const RigScene scene = make_scene(random, 2, 300, 0.2, 0.3, 0.3, 0.3, &table_);
+    const RefinedPose found = refiner_.refine(table_.view(), disturbed(scene.T_left_world, random, 0.005, 0.05), {}, {});
+    ASSERT_TRUE(found.usable());
+    EXPECT_LT((found.T_left_world.centre() - scene.T_left_world.centre()).norm(), 0.05);
+    int right = 0;
+    for (std::size_t i = 0; i < table_.size(); ++i) right += (refiner_.flags()[i] == table_.view().seen[i]) == scene.good[i] ? 1 : 0;
+    EXPECT_GE(right, 290) << seed;  // χ² at 99 % of up to two observations a point: 2 % of 240, and their spread
+  }
+}
+
+TEST_F(PoseRefinerTest, informationPredictsTheSpreadOfThePose) {
+  // Normalised squared error: 6 in the mean. Huber at 2 sigmas down-weights 13.5 % of Gaussian data by a few percent, which
+  // makes both the information and the spread a little conservative; 200 draws know the mean to 0.25.
+  double nees = 0, rms = 0;
+  constexpr int kDraws = 200;
+  for (int k = 0; k < kDraws; ++k) {
+    Random random(1000 + static_cast<std::uint64_t>(k));
+    const RigScene scene = make_scene(random, 2, 150, 0.0, 0.3, 0.4, 0.4, &table_);
+    const RefinedPose found = refiner_.refine(table_.view(), scene.T_left_world, {}, {});
+    ASSERT_EQ(found.status, PoseRefineStatus::small_update);
+    const Vec6 d = step_between(found.T_left_world, scene.T_left_world);
+    nees += d.dot(found.information * d) / kDraws;
+    rms += found.rms_px / kDraws;
+    const Mat6 covariance = found.information.inverse();
+    EXPECT_LE(std::sqrt(covariance(0, 0)), found.rotation_sigma * (1 + 1e-9));
+    EXPECT_LE(std::sqrt(covariance(5, 5)), found.translation_sigma * (1 + 1e-9));
+    EXPECT_GE(found.eigenvalues[0], 0.0);
+  }
+  EXPECT_NEAR(nees, 6.0, 1.2);
+  EXPECT_NEAR(rms, 0.4, 0.02);  // the 1 % beyond the χ² threshold are not in it
+}
+
+TEST_F(PoseRefinerTest, saysThatFarPointsDoNotHoldThePosition) {
+  Random random(23);
+  const RigScene near = make_scene(random, 2, 100, 0.0, 0.3, 0.2, 0.3, &table_);
+  const RefinedPose held = refiner_.refine(table_.view(), near.T_left_world, {}, {});
+  table_.clear();
+  for (int i = 0; i < 100; ++i) {
+    const Vec3 p = test::visible_point(random, 2e4, 4e4);
+    ASSERT_TRUE(table_.push(p, 0.3));
+    table_.see(0, Vec2(520 * p.x() / p.z() + 318, 525 * p.y() / p.z() + 243));
+  }
+  const RefinedPose loose = refiner_.refine(table_.view(), Transform{}, {}, {});
+  ASSERT_TRUE(loose.usable());
+  EXPECT_LT(held.translation_sigma, 0.05);
+  EXPECT_GT(loose.translation_sigma, 1.0);
+  EXPECT_LT(loose.rotation_sigma, 0.01);
+}
+
+TEST_F(PoseRefinerTest, resultDoesNotDependOnWhereTheWorldBegan) {
+  Random random(24);
+  const RigScene scene = make_scene(random, 2, 120, 0.0, 0.3, 0.3, 0.3, &table_);
+  const RefinedPose here = refiner_.refine(table_.view(), scene.T_left_world, {}, {});
+  const Vec3 shift(3e4, -2e3, 5e4);  // an hour's drive
+  RigObservations o = table_.view();
+  std::vector<double> x(o.x.begin(), o.x.end()), y(o.y.begin(), o.y.end()), z(o.z.begin(), o.z.end());
+  for (std::size_t i = 0; i < o.size(); ++i) x[i] += shift.x(), y[i] += shift.y(), z[i] += shift.z();
+  o.x = x, o.y = y, o.z = z;
+  const Transform start{scene.T_left_world.R, scene.T_left_world.t - scene.T_left_world.R * shift};
+  const RefinedPose there = refiner_.refine(o, start, {}, {});
+  EXPECT_LT((there.T_left_world.centre() - shift - here.T_left_world.centre()).norm(), 1e-6);
+  EXPECT_NEAR(there.condition, here.condition, 1e-4 * here.condition);
+  EXPECT_NEAR(there.translation_sigma, here.translation_sigma, 1e-4 * here.translation_sigma);
+}
+
+TEST_F(PoseRefinerTest, usesOnlyWhatItIsTold) {
+  Random random(25);
+  const RigScene scene = make_scene(random, 2, 100, 0.4, 0.0, 0.0, 0.3, &table_);
+  std::vector<std::uint8_t> use(100, 0);
+  for (std::size_t i = 0; i < 100; ++i) use[i] = scene.good[i] ? 3 : 0;
+  const RefinedPose found = refiner_.refine(table_.view(), disturbed(scene.T_left_world, random, 0.02, 0.2), use, {});
+  EXPECT_LT(test::difference(found.T_left_world, scene.T_left_world), 1e-9);
+  for (std::size_t i = 0; i < 100; ++i) EXPECT_EQ(refiner_.flags()[i] == 3, scene.good[i]) << i;
+}
+
+TEST_F(PoseRefinerTest, namesWhatIsWrong) {
+  Random random(26);
+  const RigScene scene = make_scene(random, 1, 2, 0.0, 0.0, 0.0, 0.3, &table_);
+  EXPECT_EQ(refiner_.refine(table_.view(), scene.T_left_world, {}, {}).status, PoseRefineStatus::too_few);
+  (void)make_scene(random, 2, 50, 0.0, 0.0, 0.0, 0.3, &table_);
+  Transform bad;
+  bad.t.x() = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_EQ(refiner_.refine(table_.view(), bad, {}, {}).status, PoseRefineStatus::invalid_input);
+  const std::vector<std::uint8_t> use(3, 1);
+  EXPECT_EQ(refiner_.refine(table_.view(), Transform{}, use, {}).status, PoseRefineStatus::invalid_input);
+  PoseRefineOptions options;
+  options.huber = 0;
+  EXPECT_EQ(refiner_.refine(table_.view(), Transform{}, {}, options).status, PoseRefineStatus::invalid_input);
+  Arena small_arena(PoseRefiner::memory_needed(20));
+  PoseRefiner small(20, small_arena);
+  EXPECT_EQ(small.refine(table_.view(), Transform{}, {}, {}).status, PoseRefineStatus::capacity);
+
+  table_.clear();  // all points on one line: the turn about it is free
+  for (int i = 0; i < 50; ++i) {
+    ASSERT_TRUE(table_.push(Vec3(0.1 * i, 0, 10), 0.3));
+    table_.see(0, Vec2(318 + 5.2 * i, 243));
+  }
+  EXPECT_EQ(refiner_.refine(table_.view(), Transform{}, {}, {}).status, PoseRefineStatus::rank_deficient);
+  table_.clear();  // and all behind the camera
+  for (int i = 0; i < 50; ++i) {
+    ASSERT_TRUE(table_.push(test::visible_point(random, -9, -2), 0.3));
+    table_.see(0, Vec2(318, 243));
+  }
+  EXPECT_EQ(refiner_.refine(table_.view(), Transform{}, {}, {}).status, PoseRefineStatus::rank_deficient);
+}
+
+TEST_F(PoseRefinerTest, allocatesNothing) {
+  if (!AllocationGuard::available()) GTEST_SKIP() << "a sanitizer owns malloc";
+  Random random(27);
+  const RigScene scene = make_scene(random, 2, 300, 0.1, 0.3, 0.3, 0.3, &table_);
+  const std::uint64_t before = AllocationGuard::allocations_after_seal();
+  {
+    const SealedScope sealed;
+    EXPECT_TRUE(refiner_.refine(table_.view(), scene.T_left_world, {}, {}).usable());
+  }
+  EXPECT_EQ(AllocationGuard::allocations_after_seal(), before);
+}
+
+}  // namespace
+}  // namespace vergence
