@@ -1,0 +1,170 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include <CLI/App.hpp>
+#include <nlohmann/json.hpp>
+
+#include "app/commands/commands.hpp"
+#include "app/commands/evaluation_report.hpp"
+#include "tests/support/shared_data.hpp"
+#include "tests/support/temporary_folder.hpp"
+
+namespace vergence::app {
+namespace {
+
+struct Outcome {
+  ExitCode code = ExitCode::done;
+  std::string out, err;
+};
+
+/// The command as a user gives it; a refusal comes back as exit code 2 and its sentence.
+Outcome evaluate_command(std::vector<std::string> words) {
+  CLI::App root("test", "vergence");
+  Outcome outcome;
+  add_evaluate(root, &outcome.code);
+  words.insert(words.begin(), "evaluate");
+  std::reverse(words.begin(), words.end());  // CLI11 takes a vector from its end
+  testing::internal::CaptureStdout();
+  testing::internal::CaptureStderr();
+  std::string refused;
+  try {
+    root.parse(words);
+  } catch (const InputError& e) {
+    outcome.code = ExitCode::bad_input;
+    refused = e.what();
+  } catch (const CLI::ParseError& e) {
+    outcome.code = ExitCode::bad_input;
+    refused = e.what();
+  }
+  outcome.out = testing::internal::GetCapturedStdout();
+  outcome.err = testing::internal::GetCapturedStderr() + refused;
+  return outcome;
+}
+
+/// Every figure of `expected` is in `got` at the same place and agrees to six digits (expected has eight).
+void expect_same(const nlohmann::json& expected, const nlohmann::json& got, const std::string& where) {
+  if (expected.is_object()) {
+    ASSERT_TRUE(got.is_object()) << where;
+    for (const auto& [key, value] : expected.items()) {
+      ASSERT_TRUE(got.contains(key)) << where << "/" << key;
+      expect_same(value, got[key], where + "/" + key);
+    }
+  } else if (expected.is_array()) {
+    ASSERT_EQ(expected.size(), got.size()) << where;
+    for (std::size_t i = 0; i < expected.size(); ++i) expect_same(expected[i], got[i], where + "/" + std::to_string(i));
+  } else if (expected.is_number_integer()) {
+    EXPECT_EQ(expected, got) << where;
+  } else {
+    ASSERT_TRUE(got.is_number()) << where;
+    const double e = expected.get<double>();
+    EXPECT_NEAR(e, got.get<double>(), 1e-6 * std::abs(e)) << where;
+  }
+}
+
+std::string joined(const nlohmann::json& lengths) {
+  std::string out;
+  for (const auto& length : lengths) out += (out.empty() ? "" : ",") + length.dump();
+  return out;
+}
+
+TEST(EvaluateCommand, everyKnownAnswerToSixDigits) {
+  const auto folder = test::shared_data("data/eval");
+  if (!folder) GTEST_SKIP() << test::shared_data_missing("data/eval");
+  const auto answers = nlohmann::json::parse(test::read_file(*folder / "expected.json"));
+  ASSERT_EQ(answers.size(), 5U);
+  for (const auto& [name, answer] : answers.items()) {
+    const std::string pair = name.substr(0, 1);
+    for (const auto& segments : answer["segments"]) {
+      const Outcome o = evaluate_command({(*folder / (pair + "_estimate.tum")).string(), (*folder / (pair + "_reference.tum")).string(),
+                                          "--json", "--lengths", joined(segments["lengths"]), "--step", segments["step"].dump(),
+                                          "--associate", name == "b_nearest" ? "nearest" : "interpolate", "--max-gap",
+                                          pair == "b" ? "0.1" : "0.2", "--axes", pair < "c" ? "flu" : "camera"});
+      ASSERT_EQ(o.code, ExitCode::done) << o.err;
+      auto expected = answer;
+      expected["segments"] = nlohmann::json::array({segments});
+      const auto got = nlohmann::json::parse(o.out);
+      expect_same(expected, got, name);
+      EXPECT_EQ(got["dropped"], answer["dropped"]);
+      EXPECT_EQ(got["roll_about_path_unobservable"], pair == "c");  // the straight one, and only that
+    }
+  }
+}
+
+TEST(EvaluateCommand, dataSetFoldersAreReferencesOfTheirOwn) {
+  const auto kitti = test::shared_data("data/kitti06_51"), estimate = test::shared_data("data/eval/c_estimate.tum");
+  const auto euroc = test::shared_data("data/euroc_mh01"), camera = test::shared_data("data/eval/euroc_mh01_left_camera.tum");
+  if (!kitti || !estimate || !euroc || !camera) GTEST_SKIP() << test::shared_data_missing("data");
+  Outcome o = evaluate_command({estimate->string(), kitti->string(), "--json"});
+  ASSERT_EQ(o.code, ExitCode::done) << o.err;
+  auto got = nlohmann::json::parse(o.out);
+  EXPECT_NEAR(got["ate_se3_m"]["rmse"].get<double>(), 0.14752451, 1e-6);
+  EXPECT_EQ(got["segments"][0]["n"], 0);                   // 59.9 m hold no segment of 100 m:
+  EXPECT_TRUE(got["segments"][0]["t_percent"].is_null());  // none, not zero
+  EXPECT_TRUE(got["segments"][0]["per_length"]["100"]["t_percent"].is_null());
+
+  o = evaluate_command({camera->string(), euroc->string(), "--json"});
+  ASSERT_EQ(o.code, ExitCode::done) << o.err;
+  got = nlohmann::json::parse(o.out);
+  EXPECT_EQ(got["matched"], 105);
+  EXPECT_LT(got["ate_unaligned_m"]["max"].get<double>(), 2e-9);
+}
+
+TEST(EvaluateCommand, tableForAPersonHasTheFigures) {
+  const test::TemporaryFolder folder;
+  std::string reference, estimate;
+  for (int i = 0; i < 200; ++i) {
+    const double a = 0.05 * i;
+    const std::string stamp = std::to_string(i / 10) + "." + std::to_string(i % 10);
+    reference += stamp + " " + std::to_string(20 * std::cos(a)) + " " + std::to_string(20 * std::sin(a)) + " 0 0 0 0 1\n";
+    estimate += stamp + " " + std::to_string(20.4 * std::cos(a)) + " " + std::to_string(20.4 * std::sin(a)) + " 0 0 0 0 1\n";
+  }
+  const auto r = folder.write("r.tum", reference), e = folder.write("e.tum", estimate);
+  const Outcome o = evaluate_command({e.string(), r.string(), "--lengths", "10,300", "--step", "1"});
+  EXPECT_EQ(o.code, ExitCode::done) << o.err;
+  EXPECT_NE(o.out.find("200 poses matched"), std::string::npos) << o.out;
+  EXPECT_NE(o.out.find("scale: 0.980392"), std::string::npos) << o.out;
+  EXPECT_NE(o.out.find("SE(3)-aligned"), std::string::npos);
+  EXPECT_NE(o.out.find("the path is too short"), std::string::npos);
+}
+
+TEST(EvaluateCommand, trajectoriesWithoutCommonTimeAreNotUsable) {
+  const test::TemporaryFolder folder;
+  const auto a = folder.write("a.tum", "1 0 0 0 0 0 0 1\n2 1 0 0 0 0 0 1\n"),
+             b = folder.write("b.tum", "101 0 0 0 0 0 0 1\n102 1 0 0 0 0 0 1\n");
+  const Outcome o = evaluate_command({a.string(), b.string(), "--json"});
+  EXPECT_EQ(o.code, ExitCode::not_usable);
+  EXPECT_EQ(nlohmann::json::parse(o.out)["matched"], 0);
+  EXPECT_NE(o.err.find("no pose of the estimate has a reference at its time (2 before the reference"), std::string::npos) << o.err;
+}
+
+TEST(EvaluateCommand, refusesArgumentsThatMakeNoSense) {
+  const test::TemporaryFolder folder;
+  const std::string a = folder.write("a.tum", "1 0 0 0 0 0 0 1\n2 1 0 0 0 0 0 1\n").string();
+  const auto refused = [&](std::vector<std::string> words, const std::string& part) {
+    words.insert(words.begin(), {a, a});
+    const Outcome o = evaluate_command(words);
+    EXPECT_EQ(o.code, ExitCode::bad_input) << part;
+    EXPECT_TRUE(o.out.empty());
+    EXPECT_NE(o.err.find(part), std::string::npos) << o.err;
+  };
+  refused({"--lengths", "10,,30"}, "`` is not a length");
+  refused({"--lengths", "10,-5"}, "`-5` is not a length");
+  refused({"--lengths", "nan"}, "`nan` is not a length");
+  refused({"--step", "0"}, "--step needs");
+  refused({"--step", "many"}, "--step");
+  refused({"--associate", "guess"}, "guess");
+  refused({"--axes", "north"}, "north");
+  refused({"--max-gap", "-1"}, "--max-gap needs");
+  refused({"--max-gap", "nan"}, "--max-gap");
+  refused({"--max-difference", "1e300"}, "--max-difference needs");
+  refused({"--estimate-mount"}, "--estimate-mount is not there yet");
+  EXPECT_EQ(evaluate_command({(folder / "none.tum").string(), a}).code, ExitCode::bad_input);
+  EXPECT_EQ(evaluate_command({a}).code, ExitCode::bad_input);
+}
+
+}  // namespace
+}  // namespace vergence::app
