@@ -1,0 +1,34 @@
+#pragma once
+#include <bit>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+
+/// Big-endian numbers as they stand in Xbus payloads. Precondition of all: the span is as long as the type says.
+namespace vergence::xbus {
+
+[[nodiscard]] constexpr std::uint16_t read_u16(std::span<const std::uint8_t> b) noexcept {
+  return static_cast<std::uint16_t>((b[0] << 8U) | b[1]);
+}
+[[nodiscard]] constexpr std::uint32_t read_u32(std::span<const std::uint8_t> b) noexcept {
+  return (static_cast<std::uint32_t>(b[0]) << 24U) | (static_cast<std::uint32_t>(b[1]) << 16U) | (static_cast<std::uint32_t>(b[2]) << 8U) |
+         b[3];
+}
+[[nodiscard]] constexpr std::uint64_t read_u64(std::span<const std::uint8_t> b) noexcept {
+  return (static_cast<std::uint64_t>(read_u32(b)) << 32U) | read_u32(b.subspan(4));
+}
+[[nodiscard]] constexpr std::int32_t read_i32(std::span<const std::uint8_t> b) noexcept { return static_cast<std::int32_t>(read_u32(b)); }
+[[nodiscard]] constexpr double read_float32(std::span<const std::uint8_t> b) noexcept {
+  return static_cast<double>(std::bit_cast<float>(read_u32(b)));
+}
+[[nodiscard]] constexpr double read_float64(std::span<const std::uint8_t> b) noexcept { return std::bit_cast<double>(read_u64(b)); }
+/// 12.20: a signed 32-bit count of 2⁻²⁰, range ±2048.
+[[nodiscard]] constexpr double read_fp12_20(std::span<const std::uint8_t> b) noexcept {
+  return static_cast<double>(read_i32(b)) / 1048576.0;
+}
+/// 16.32: the 32-bit fraction first, then the signed 16-bit integer part; 48 bits, so a double holds it exactly.
+[[nodiscard]] constexpr double read_fp16_32(std::span<const std::uint8_t> b) noexcept {
+  return static_cast<double>(static_cast<std::int16_t>(read_u16(b.subspan(4)))) + static_cast<double>(read_u32(b)) / 4294967296.0;
+}
+
+}  // namespace vergence::xbus

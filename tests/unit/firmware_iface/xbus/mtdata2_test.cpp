@@ -1,0 +1,168 @@
+#include "firmware_iface/xbus/mtdata2.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+
+#include "firmware_iface/xbus/bytes.hpp"
+#include "firmware_iface/xbus/frame.hpp"
+#include "tests/unit/firmware_iface/xbus/hex.hpp"
+
+namespace vergence::xbus {
+namespace {
+
+/// The message of one frame, decoded; its spans point into `bytes`.
+Mtdata2 decoded(const std::vector<std::uint8_t>& bytes) {
+  const ParsedFrame frame = parse_frame(bytes);
+  EXPECT_EQ(frame.status, FrameStatus::ok);
+  EXPECT_TRUE(frame.message.is(MessageId::mtdata2));
+  Mtdata2 out;
+  EXPECT_EQ(decode_mtdata2(frame.message.payload, &out), PacketStatus::ok);
+  return out;
+}
+
+TEST(Numbers, fixedPointAsOnTheWire) {
+  EXPECT_EQ(read_fp16_32(from_hex("80 00 00 00 FF FF")), -0.5);
+  EXPECT_EQ(read_fp16_32(from_hex("00 00 00 00 00 01")), 1.0);
+  EXPECT_EQ(read_fp16_32(from_hex("00 00 00 00 80 00")), -32768.0);
+  EXPECT_NEAR(read_fp16_32(from_hex("86 01 47 28 FF E4")), -27.476543, 0x1p-32);
+  EXPECT_NEAR(read_fp16_32(from_hex("64 A6 8A A8 00 1F")), 31.393166223541, 1e-12);
+  EXPECT_EQ(read_fp12_20(from_hex("FF F8 00 00")), -0.5);
+  EXPECT_EQ(read_fp12_20(from_hex("00 9D 00 00")), 9.8125);
+  EXPECT_EQ(read_float64(from_hex("40 4A 20 00 00 00 00 00")), 52.25);
+  EXPECT_EQ(read_i32(from_hex("FF FF FF F4")), -12);
+}
+
+TEST(Mtdata2, decodesTheMakersExample) {
+  const Mtdata2 m = decoded(
+      from_hex("FA FF 36 31 10 20 02 DF C5 10 60 04 00 45 9D A0 40 20 0C BE DC 9A FA 3F 54 9F 37 41 1C BB 70 80 20 0C BB AA 5C 80 3B 8C 55 "
+               "01 BB 81 33 00 E0 20 04 00 00 00 81 45"));
+  EXPECT_EQ(m.packet_counter, 57285);
+  EXPECT_EQ(m.sample_time_fine, 4562336U);
+  ASSERT_TRUE(m.acceleration && m.rate_of_turn);
+  EXPECT_NEAR((*m.acceleration)[0], -.430870, 5e-7);
+  EXPECT_NEAR((*m.acceleration)[1], .830554, 5e-7);
+  EXPECT_NEAR((*m.acceleration)[2], 9.795761, 5e-7);
+  EXPECT_NEAR((*m.rate_of_turn)[0], -.00519902, 5e-9);
+  EXPECT_NEAR((*m.rate_of_turn)[2], -.00394285, 5e-9);
+  EXPECT_EQ(m.status_word, 0x81U);
+  EXPECT_EQ(m.packets, 5U);
+  EXPECT_EQ(m.unknown_packets + m.refused_packets, 0U);
+  EXPECT_FALSE(m.quaternion || m.latitude_longitude_deg || m.gnss_pvt || m.utc);
+}
+
+TEST(Mtdata2, keepsPositionInSixteenDotThirtyTwoExactly) {
+  const Mtdata2 m = decoded(from_hex(
+      "FA FF 36 53 10 20 02 FF FF 10 60 04 33 7F 97 9C 20 10 10 3F 35 04 F3 00 00 00 00 00 00 00 00 3F 35 04 F3 50 42 0C 86 01 47 28 "
+      "FF E4 07 5D 24 9E 00 99 50 22 06 40 00 00 00 00 34 D0 12 12 80 00 00 00 00 0A E0 00 00 00 FF FF 10 00 00 00 00 00 E0 20 04 01 "
+      "80 00 47 7F"));
+  EXPECT_EQ(m.packet_counter, 0xFFFF);
+  EXPECT_EQ(m.sample_time_fine, 863'999'900U);
+  ASSERT_TRUE(m.latitude_longitude_deg && m.altitude_ellipsoid_m && m.velocity && m.quaternion);
+  EXPECT_NEAR((*m.latitude_longitude_deg)[0], -27.476543, 0x1p-33);
+  EXPECT_NEAR((*m.latitude_longitude_deg)[1], 153.028765, 0x1p-33);
+  EXPECT_EQ(m.position_format, NumberFormat::fp16_32);
+  EXPECT_EQ(m.altitude_ellipsoid_m, 52.25);
+  EXPECT_EQ((*m.velocity), (Three{10.5, -0.125, 0.0625}));
+  EXPECT_EQ(m.velocity_frame, LocalFrame::enu);
+  EXPECT_NEAR((*m.quaternion)[0], std::sqrt(0.5), 1e-7);
+  EXPECT_EQ(m.status_word, 0x01800047U);
+}
+
+TEST(Mtdata2, readsFormatAndFrameOfTheId) {
+  const Mtdata2 m = decoded(from_hex("FA FF 36 13 20 15 10 00 10 00 00 00 00 00 00 00 00 00 00 FF F8 00 00 6C"));  // 12.20, NED
+  ASSERT_TRUE(m.quaternion);
+  EXPECT_EQ(*m.quaternion, (std::array<double, 4>{1, 0, 0, -0.5}));
+  EXPECT_EQ(m.orientation_frame, LocalFrame::ned);
+}
+
+TEST(Mtdata2, decodesAReceiversFixWithLongitudeFirst) {
+  const Mtdata2 m =
+      decoded(from_hex("FA FF 36 7C 70 10 5E 02 F5 C9 2A 07 E3 01 14 0D 2F 18 37 00 00 00 05 0E E3 2A 24 03 01 0B 00 07 15 22 E8 22 61 2F "
+                       "55 00 01 3F 71 00 00 A9 "
+                       "2A 00 00 08 D3 00 00 08 18 FF FF FF E5 00 00 00 0A FF FF FF FE 00 00 00 1D 00 00 00 00 00 00 01 5E 00 E5 51 9A 00 "
+                       "02 00 00 00 9A 00 8B 00 "
+                       "44 00 70 00 53 00 37 00 3E 10 10 0C 0E E6 B2 80 07 E3 01 14 0D 2F 18 37 10 60 04 03 14 F2 54 10 20 02 A9 98 08"));
+  ASSERT_TRUE(m.gnss_pvt && m.utc);
+  const GnssPvt& p = *m.gnss_pvt;
+  EXPECT_EQ(p.itow_ms, 49662250U);
+  EXPECT_EQ(p.latitude_1e7_deg, 576794453);
+  EXPECT_EQ(p.longitude_1e7_deg, 118825704);
+  EXPECT_EQ(p.height_ellipsoid_mm, 81777);
+  EXPECT_EQ(p.height_msl_mm, 43306);
+  EXPECT_EQ(p.nanosecond, 249768484);
+  EXPECT_EQ(p.velocity_north_mm_s, -27);
+  EXPECT_EQ(p.satellites, 11);
+  EXPECT_EQ(p.fix, 3);
+  EXPECT_EQ(p.valid & 7, 7);
+  EXPECT_EQ(p.dop_1e2, (std::array<std::uint16_t, 7>{154, 139, 68, 112, 83, 55, 62}));
+  EXPECT_EQ(m.utc->nanosecond, 250'000'000U);
+  EXPECT_EQ(m.utc->year, 2019);
+  EXPECT_EQ(m.utc->second, 24);
+  EXPECT_EQ(m.sample_time_fine, 51704404U);
+  EXPECT_EQ(m.packet_counter, 43416);
+}
+
+TEST(Mtdata2, tornPayloadsAreRefusedWhole) {
+  const std::vector<std::uint8_t> payload = from_hex("10 20 02 FF FF 10 60 04 33 7F 97 9C");
+  Mtdata2 out;
+  out.packets = 77;
+  for (std::size_t n = 0; n <= payload.size(); ++n) {
+    const bool whole = n == 0 || n == 5 || n == payload.size();
+    Mtdata2 at = out;
+    EXPECT_EQ(decode_mtdata2(std::span(payload).first(n), &at), whole ? PacketStatus::ok : PacketStatus::torn) << n;
+    EXPECT_EQ(at.packets == 77, !whole) << n;
+  }
+}
+
+TEST(Mtdata2, unknownPacketsAreSkippedAndCounted) {
+  Mtdata2 out;
+  ASSERT_EQ(decode_mtdata2(from_hex("88 30 03 01 02 03 10 20 02 00 07 FF FF 00"), &out), PacketStatus::ok);
+  EXPECT_EQ(out.unknown_packets, 2U);
+  EXPECT_EQ(out.packet_counter, 7);
+}
+
+TEST(Mtdata2, knownPacketsOfImpossibleSizeOrValueAreRefusedAndCounted) {
+  struct Case {
+    const char* bytes;
+    const char* what;
+  };
+  for (const auto& [bytes, what] :
+       {Case{"10 20 01 00", "a counter of one byte"}, Case{"10 60 02 00 00", "a time of two bytes"},
+        Case{"20 10 0F 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00", "a quaternion of fifteen bytes"},
+        Case{"20 10 00", "an empty quaternion"},
+        Case{"20 1C 10 3F 80 00 00 00 00 00 00 00 00 00 00 00 00 00 00", "a frame that does not exist"},
+        Case{"08 10 04 7F C0 00 00", "a temperature that is not a number"},
+        Case{"08 13 08 7F F0 00 00 00 00 00 00", "an infinite temperature"}, Case{"70 10 02 00 00", "a fix of two bytes"},
+        Case{"70 20 08 00 00 00 00 01 00 00 00", "a satellite list without its satellite"},
+        Case{"70 20 02 00 00", "a satellite list without its header"}, Case{"E0 10 02 00 00", "a status byte of two"}}) {
+    Mtdata2 out;
+    ASSERT_EQ(decode_mtdata2(from_hex(bytes), &out), PacketStatus::ok) << what;
+    EXPECT_EQ(out.refused_packets, 1U) << what;
+    EXPECT_FALSE(out.packet_counter || out.sample_time_fine || out.quaternion || out.temperature_c || out.gnss_pvt || out.satellites ||
+                 out.status_byte)
+        << what;
+  }
+}
+
+TEST(Mtdata2, thePacketsLengthOutranksItsFormatBits) {
+  Mtdata2 out;
+  ASSERT_EQ(decode_mtdata2(from_hex("30 13 04 00 01 8B C2  08 13 04 42 13 40 00"), &out), PacketStatus::ok);
+  EXPECT_EQ(out.pressure_pa, 101314U);
+  EXPECT_EQ(out.temperature_c, 36.8125);
+}
+
+TEST(Mtdata2, listsSatellites) {
+  const std::vector<std::uint8_t> payload = from_hex("70 20 10 02 F5 C9 2A 02 00 00 00 00 05 2B 07 06 0A 1F 0F");
+  Mtdata2 out;
+  ASSERT_EQ(decode_mtdata2(payload, &out), PacketStatus::ok);
+  ASSERT_TRUE(out.satellites);
+  EXPECT_EQ(out.satellites->count, 2);
+  EXPECT_EQ(out.satellites->satellite(1).gnss, 6);
+  EXPECT_EQ(out.satellites->satellite(1).id, 10);
+  EXPECT_EQ(out.satellites->satellite(1).signal_dbhz, 31);
+}
+
+}  // namespace
+}  // namespace vergence::xbus
