@@ -2,7 +2,7 @@
 
 #include <algorithm>
 #include <charconv>
-#include <cmath>
+#include <set>
 
 #include <fmt/format.h>
 #include <yaml-cpp/yaml.h>
@@ -38,14 +38,9 @@ class Flattener {
     if (depth > kDeepest) throw InputError(here + ": \"" + name.substr(0, 60) + "\" is nested too deeply; no key is");
     if (entries_->size() >= kMostEntries) throw InputError(here + ": more values than any configuration has; is it the right file?");
     if (node.IsMap() && node.size() > 0) {
-      std::vector<std::string> seen;
       for (const auto& item : node) {
         if (!item.first.IsScalar()) throw InputError(here + ": a key that is not a word");
-        const std::string key = name.empty() ? item.first.Scalar() : name + "." + item.first.Scalar();
-        if (std::find(seen.begin(), seen.end(), key) != seen.end())
-          throw InputError((origin.empty() ? file.at(item.first) : origin) + ": the key \"" + key + "\" stands twice");
-        seen.push_back(key);
-        add(file, item.second, key, origin, depth + 1);
+        add(file, item.second, name.empty() ? item.first.Scalar() : name + "." + item.first.Scalar(), origin, depth + 1);
       }
     } else if (node.IsSequence() && node.size() > 0) {
       std::size_t index = 0;
@@ -64,6 +59,9 @@ void add_file(const YamlFile& file, std::vector<Entry>* entries) {
   if (file.root().IsNull()) return;
   if (!file.root().IsMap()) file.fail(file.root(), "is not a configuration: groups of `key: value` are expected");
   Flattener(entries).add(file, file.root(), "", "");
+  std::set<std::string_view> names;
+  for (const Entry& entry : *entries)
+    if (!names.insert(entry.name).second) throw InputError(entry.origin + ": the key \"" + entry.name.substr(0, 120) + "\" stands twice");
 }
 
 /// A list, a group or a quoted text is YAML; any other value is taken as it stands, so that nothing in it needs quoting twice.

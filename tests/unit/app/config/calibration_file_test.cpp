@@ -1,0 +1,324 @@
+#include "app/config/calibration_file.hpp"
+
+#include <cmath>
+#include <limits>
+#include <string>
+
+#include <gtest/gtest.h>
+
+#include "app/runtime/errors.hpp"
+#include "core/math/random.hpp"
+#include "core/math/so3.hpp"
+#include "tests/support/temporary_folder.hpp"
+
+namespace vergence::app {
+namespace {
+
+const std::string kGood = R"(version: 1
+rig: {name: demo, baseline: 0.750702, baseline_sigma: 0.0005}
+cameras:
+  - {name: left, serial: "15021234", size: [1024, 768], model: pinhole-radtan, intrinsics: [980, 981, 512, 384], distortion: [-0.28, 0.07, 1e-4, 2e-5], intrinsics_sigma: [1.2, 1.2, 0.5, 0.5]}
+  - name: right
+    size: [1024, 768]
+    model: pinhole-radtan
+    intrinsics: [982, 983, 510, 380]
+    distortion: [-0.28, 0.07, 1e-4, 2e-5, 0.01]
+    T_camera_left: [1, 0, 0, -0.75, 0, 1, 0, 0.01, 0, 0, 1, 0.02]
+    sigma_noise: [1e-4, 2e-4, 3e-4, 1e-3, 2e-3, 3e-3]
+found: {stamp: 1403636584763555584, source: online, frames: 60, reprojection_px: 0.18, scale_sigma: 0.0021}
+)";
+
+/// The good file with one part replaced; the part must be there.
+std::string with(const std::string& part, const std::string& replacement) {
+  std::string text = kGood;
+  const auto at = text.find(part);
+  if (at == std::string::npos) throw std::logic_error("not in the file: " + part);
+  return text.replace(at, part.size(), replacement);
+}
+
+std::string refusal(const std::string& yaml) {
+  try {
+    static_cast<void>(parse_calibration(yaml, "c.yaml"));
+  } catch (const InputError& error) {
+    return error.what();
+  }
+  return "";
+}
+
+testing::AssertionResult refused(const std::string& yaml, const std::string& beginning, const std::string& part) {
+  const std::string sentence = refusal(yaml);
+  if (sentence.rfind(beginning, 0) == 0 && sentence.find(part) != std::string::npos) return testing::AssertionSuccess();
+  return testing::AssertionFailure() << "the sentence is: " << sentence;
+}
+
+TEST(CalibrationFile, ReadsTheDocumentedForm) {
+  const CalibrationFile c = parse_calibration(kGood, "c.yaml");
+  EXPECT_EQ(c.rig_name, "demo");
+  EXPECT_EQ(c.names[1], "right");
+  EXPECT_EQ(c.serials[0], "15021234");
+  EXPECT_EQ(c.source, "online");
+  const RigCalibration& rig = c.rig;
+  EXPECT_EQ(rig.cameras, 2);
+  EXPECT_EQ(rig.baseline, 0.750702);
+  EXPECT_EQ(rig.intrinsics[0].width, 1024);
+  EXPECT_EQ(rig.intrinsics[0].sigma[3], 0.5);
+  EXPECT_EQ(rig.intrinsics[1].cy, 380);
+  EXPECT_EQ(rig.intrinsics[1].distortion[4], 0.01);
+  EXPECT_EQ(rig.T_camera_left[1].t, Vec3(-0.75, 0.01, 0.02));
+  EXPECT_EQ(rig.sigma_noise[1][5], 3e-3);
+  EXPECT_EQ(rig.sigma_wide[1][5], 0.0);
+  EXPECT_EQ(rig.found, Stamp(1403636584763555584));
+  EXPECT_EQ(rig.frames, 60);
+}
+
+TEST(CalibrationFile, WhatMayBeLeftOutHasItsDefault) {
+  const CalibrationFile c = parse_calibration(R"(version: 1
+cameras:
+  - {size: [640, 480], model: pinhole-equidistant, intrinsics: [300, 300, 320, 240]}
+  - {size: [640, 480], model: pinhole-radtan, intrinsics: [300, 300, 320, 240], distortion: [], T_camera_left: [1, 0, 0, -0.3, 0, 1, 0, 0.4, 0, 0, 1, 0]}
+)",
+                                              "c.yaml");
+  EXPECT_EQ(c.names[0], "left");
+  EXPECT_EQ(c.rig.intrinsics[0].kind, CameraModelKind::pinhole_equidistant);
+  EXPECT_FALSE(c.rig.intrinsics[1].has_distortion());
+  EXPECT_DOUBLE_EQ(c.rig.baseline, 0.5);
+  EXPECT_EQ(c.rig.found, Stamp(0));
+}
+
+/// A rig of four with every field set to numbers that need all their digits.
+CalibrationFile awkward() {
+  Random random(7);
+  CalibrationFile c;
+  c.rig_name = "the \"blue\" van: № 3\n";
+  c.names = {"left", "true", "12", ""};
+  c.serials = {"0123", "", "a b", "0x1f"};
+  c.source = "online";
+  c.rig.cameras = 4;
+  for (std::size_t k = 0; k < 4; ++k) {
+    const auto number = [&random](double size) { return size * (random.uniform() - 0.5); };
+    Intrinsics& i = c.rig.intrinsics[k];
+    i.kind = k % 2 == 0 ? CameraModelKind::pinhole_radtan : CameraModelKind::pinhole_equidistant;
+    i.width = 1024;
+    i.height = 768;
+    i.fx = 980 + number(1);
+    i.fy = 980 + number(1);
+    i.cx = 512 + number(1);
+    i.cy = 384 + number(1);
+    for (std::size_t d = 0; d < (k == 0 ? 5U : 4U); ++d) i.distortion[d] = number(0.1);
+    i.sigma = {number(1) + 1, 1e-300, 1.0 / 3.0, 0.1};
+    if (k == 0) continue;
+    c.rig.T_camera_left[k] = {exp_so3(Vec3(number(0.2), number(0.2), number(0.2))), Vec3(-0.75 + number(0.1), number(0.1), number(0.1))};
+    for (std::size_t j = 0; j < 6; ++j) c.rig.sigma_noise[k][j] = (c.rig.sigma_wide[k][j] = number(1e-3) + 1e-3) / 3.0;
+    Mat6 root;
+    for (int row = 0; row < 6; ++row)
+      for (int column = 0; column < 6; ++column) root(row, column) = number(1e-3);
+    const Mat6 product = root * root.transpose();
+    c.rig.covariance_wide[k] = product.selfadjointView<Eigen::Upper>();
+  }
+  c.rig.baseline = c.rig.T_camera_left[1].t.norm() * 1.001;
+  c.rig.baseline_sigma = 1e-3 / 7.0;
+  c.rig.found = Stamp(1403636584763555584);
+  c.rig.frames = 61;
+  c.rig.reprojection_px = 0.1 + 0.2;
+  c.rig.scale_sigma = 2.1e-3 / 3.0;
+  return c;
+}
+
+TEST(CalibrationFile, WhatIsWrittenReadsBackToTheSameDoubles) {
+  const test::TemporaryFolder folder;
+  const CalibrationFile before = awkward();
+  write_calibration(folder / "c.yaml", before);
+  const CalibrationFile after = read_calibration(folder / "c.yaml");
+  EXPECT_EQ(after.rig_name, before.rig_name);
+  EXPECT_EQ(after.names, before.names);
+  EXPECT_EQ(after.serials, before.serials);
+  EXPECT_EQ(after.source, before.source);
+  ASSERT_EQ(after.rig.cameras, 4);
+  for (std::size_t k = 0; k < 4; ++k) {
+    SCOPED_TRACE(k);
+    const Intrinsics &a = after.rig.intrinsics[k], &b = before.rig.intrinsics[k];
+    EXPECT_EQ(a.kind, b.kind);
+    EXPECT_EQ(a.width, b.width);
+    EXPECT_EQ(a.height, b.height);
+    EXPECT_EQ((std::array{a.fx, a.fy, a.cx, a.cy}), (std::array{b.fx, b.fy, b.cx, b.cy}));
+    EXPECT_EQ(a.distortion, b.distortion);
+    EXPECT_EQ(a.sigma, b.sigma);
+    EXPECT_EQ(after.rig.T_camera_left[k].R, before.rig.T_camera_left[k].R);
+    EXPECT_EQ(after.rig.T_camera_left[k].t, before.rig.T_camera_left[k].t);
+    EXPECT_EQ(after.rig.sigma_noise[k], before.rig.sigma_noise[k]);
+    EXPECT_EQ(after.rig.sigma_wide[k], before.rig.sigma_wide[k]);
+    EXPECT_EQ(after.rig.covariance_wide[k], before.rig.covariance_wide[k]);
+  }
+  EXPECT_EQ(after.rig.baseline, before.rig.baseline);
+  EXPECT_EQ(after.rig.baseline_sigma, before.rig.baseline_sigma);
+  EXPECT_EQ(after.rig.found, before.rig.found);
+  EXPECT_EQ(after.rig.frames, before.rig.frames);
+  EXPECT_EQ(after.rig.reprojection_px, before.rig.reprojection_px);
+  EXPECT_EQ(after.rig.scale_sigma, before.rig.scale_sigma);
+  EXPECT_EQ(format_calibration(after), format_calibration(before));
+}
+
+TEST(CalibrationFile, AFileThatCannotBeWrittenIsNamed) {
+  EXPECT_THROW(write_calibration("/nowhere/at/all/c.yaml", awkward()), InputError);
+  EXPECT_THROW(write_calibration("/dev/full", awkward()), InputError);
+}
+
+TEST(CalibrationPlausibility, Sizes) {
+  EXPECT_TRUE(refused(with("size: [1024, 768]", "size: [1024, 0]"), "c.yaml:4: cameras.0.size", "1024 x 0"));
+  EXPECT_TRUE(refused(with("size: [1024, 768]", "size: [-5, 768]"), "c.yaml:4: cameras.0.size", ""));
+  EXPECT_TRUE(refused(with("size: [1024, 768]", "size: [1024, 768, 1]"), "c.yaml:4: cameras.0.size", "[width, height]"));
+  EXPECT_TRUE(refused(with("size: [1024, 768]", "size: [1024, 76800]"), "c.yaml:4: cameras.0.size", ""));
+  EXPECT_TRUE(refused(with("size: [1024, 768]", "size: [1e3, 768]"), "c.yaml:4: cameras.0.size", "not an integer"));
+}
+
+TEST(CalibrationPlausibility, FocalLengths) {
+  EXPECT_TRUE(refused(with("[982, 983, 510, 380]", "[-982, 983, 510, 380]"), "c.yaml:8: cameras.1.intrinsics", "positive"));
+  EXPECT_TRUE(refused(with("[982, 983, 510, 380]", "[982, 9830, 510, 380]"), "c.yaml:8: cameras.1.intrinsics", "9830"));
+  EXPECT_TRUE(refused(with("[982, 983, 510, 380]", "[0.98, 0.98, 510, 380]"), "c.yaml:8: cameras.1.intrinsics", "0.98"));
+  EXPECT_TRUE(refused(with("[982, 983, 510, 380]", "[982, 2000, 510, 380]"), "c.yaml:8: cameras.1.intrinsics", "different"));
+  EXPECT_TRUE(refused(with("[982, 983, 510, 380]", "[982, 983, 510]"), "c.yaml:8: cameras.1.intrinsics", "3 numbers"));
+}
+
+TEST(CalibrationPlausibility, PrincipalPoint) {
+  EXPECT_TRUE(refused(with("[982, 983, 510, 380]", "[982, 983, 1024, 380]"), "c.yaml:8: cameras.1.intrinsics", "outside the image"));
+  EXPECT_TRUE(refused(with("[982, 983, 510, 380]", "[982, 983, 510, -1]"), "c.yaml:8: cameras.1.intrinsics", "outside the image"));
+}
+
+TEST(CalibrationPlausibility, Distortion) {
+  EXPECT_TRUE(
+      refused(with("[-0.28, 0.07, 1e-4, 2e-5, 0.01]", "[-28, 0.07, 1e-4, 2e-5, 0.01]"), "c.yaml:9: cameras.1.distortion", "corner"));
+  EXPECT_TRUE(refused(with("[-0.28, 0.07, 1e-4, 2e-5, 0.01]", "[-0.28, 0.07, 2, 2e-5, 0.01]"), "c.yaml:9: cameras.1.distortion", "corner"));
+  EXPECT_TRUE(refused(with("[-0.28, 0.07, 1e-4, 2e-5, 0.01]", "[-0.28]"), "c.yaml:9: cameras.1.distortion", "4 to 5"));
+  std::string fisheye = with("model: pinhole-radtan\n", "model: pinhole-equidistant\n");
+  EXPECT_TRUE(refused(fisheye, "c.yaml:9: cameras.1.distortion", "5 numbers")) << "equidistant has four";
+}
+
+TEST(CalibrationPlausibility, RealLensesPass) {
+  // EuRoC's left camera, a KITTI raw camera, and the widest fisheye lens of a public data set.
+  for (const char* lens : {"size: [752, 480], model: pinhole-radtan, intrinsics: [458.654, 457.296, 367.215, 248.375], "
+                           "distortion: [-0.28340811, 0.07395907, 0.00019359, 1.76187114e-05]",
+                           "size: [1392, 512], model: pinhole-radtan, intrinsics: [984.2439, 980.8141, 690, 233.1966], "
+                           "distortion: [-0.3728755, 0.2037299, 0.002219027, 0.001383707, -0.07233722]",
+                           "size: [512, 512], model: pinhole-equidistant, intrinsics: [190.97847, 190.97330, 254.93170, 256.89744], "
+                           "distortion: [0.00348238, 0.00071503, -0.00205323, 0.00020293]"})
+    EXPECT_EQ(refusal(std::string("version: 1\ncameras:\n  - {") + lens + "}\n  - {" + lens +
+                      ", T_camera_left: [1, 0, 0, -0.11, 0, 1, 0, 0, 0, 0, 1, 0]}\n"),
+              "");
+}
+
+std::string with_rotation(const Mat3& R) {
+  CalibrationFile c = parse_calibration(kGood, "c.yaml");
+  c.rig.T_camera_left[1].R = R;
+  return format_calibration(c);
+}
+
+TEST(CalibrationPlausibility, ARotationOffByAMillionthPassesAsItIs) {
+  Mat3 R = exp_so3(Vec3(0.01, -0.02, 0.03));
+  R(0, 0) += 4e-7;  // RᵀR − I is twice that
+  EXPECT_EQ(parse_calibration(with_rotation(R), "c.yaml").rig.T_camera_left[1].R, R);
+}
+
+TEST(CalibrationPlausibility, ARotationWithFewDigitsIsReplacedByTheNearest) {
+  const Mat3 exact = exp_so3(Vec3(0.01, -0.02, 0.03));
+  const Mat3 rounded = (exact * 1e4).array().round().matrix() / 1e4;
+  const Mat3 R = parse_calibration(with_rotation(rounded), "c.yaml").rig.T_camera_left[1].R;
+  EXPECT_LT((R.transpose() * R - Mat3::Identity()).cwiseAbs().maxCoeff(), 1e-14);
+  EXPECT_LT((R - exact).cwiseAbs().maxCoeff(), 1e-4) << "the rounding itself is half of that";
+}
+
+TEST(CalibrationPlausibility, ARotationOffByAThousandthIsRefused) {
+  Mat3 R = Mat3::Identity();
+  R(0, 0) = 1 + 1e-3;
+  EXPECT_NE(refusal(with_rotation(R)).find("cameras.1.T_camera_left has a rotation that is not orthonormal"), std::string::npos);
+  EXPECT_NE(refusal(with_rotation(Mat3::Zero())).find("not orthonormal"), std::string::npos);
+  EXPECT_NE(refusal(with_rotation(-Mat3::Identity())).find("mirrors"), std::string::npos);
+}
+
+TEST(CalibrationPlausibility, BaselineAgainstTheTranslation) {
+  EXPECT_TRUE(refused(with("baseline: 0.750702, baseline_sigma: 0.0005", "baseline: 0.54"), "c.yaml:2: rig.baseline", "0.54 m"));
+  EXPECT_TRUE(refused(with("baseline: 0.750702", "baseline: 750.702"), "c.yaml:2: rig.baseline", "750.702 m"));
+  EXPECT_TRUE(refused(with("baseline: 0.750702", "baseline: 0"), "c.yaml:2: rig.baseline", "positive"));
+  EXPECT_TRUE(refused(with("-0.75, 0, 1, 0, 0.01", "-750, 0, 1, 0, 10"), "c.yaml:10: cameras.1.T_camera_left", "metres"));
+  EXPECT_TRUE(refused(with("-0.75, 0, 1, 0, 0.01, 0, 0, 1, 0.02", "0, 0, 1, 0, 0, 0, 0, 1, 0"), "c.yaml:10: cameras.1.T_camera_left", ""));
+}
+
+TEST(CalibrationPlausibility, ALeftCameraOnTheRightIsNoticed) {
+  EXPECT_TRUE(
+      refused(with("-0.75, 0, 1, 0, 0.01", "0.75, 0, 1, 0, 0.01"), "c.yaml:10: cameras.1.T_camera_left", "left and right seem exchanged"));
+}
+
+TEST(CalibrationPlausibility, OneCameraAboveTheOtherIsARigToo) {
+  EXPECT_EQ(refusal(with("-0.75, 0, 1, 0, 0.01", "0.001, 0, 1, 0, -0.75")), "");
+}
+
+TEST(CalibrationPlausibility, NumbersThatAreNotFinite) {
+  EXPECT_TRUE(refused(with("982, 983", ".nan, 983"), "c.yaml:8: cameras.1.intrinsics", "finite"));
+  EXPECT_TRUE(refused(with("982, 983", "nan, 983"), "c.yaml:8: cameras.1.intrinsics", "finite"));
+  EXPECT_TRUE(refused(with("-0.75, 0, 1", ".inf, 0, 1"), "c.yaml:10: cameras.1.T_camera_left", "finite"));
+  EXPECT_TRUE(refused(with("982, 983", "1e999, 983"), "c.yaml:8: cameras.1.intrinsics", ""));
+}
+
+TEST(CalibrationPlausibility, EveryNumberOfARigInMemoryIsCheckedToo) {
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  const auto field = [](const RigCalibration& rig) {
+    RigCalibration copy = rig;
+    const auto bad = find_implausible(&copy);
+    return bad ? bad->field : std::string();
+  };
+  const RigCalibration good = awkward().rig;
+  EXPECT_EQ(field(good), "");
+  RigCalibration r = good;
+  r.intrinsics[2].fy = nan;
+  EXPECT_EQ(field(r), "cameras.2.intrinsics");
+  r = good;
+  r.intrinsics[1].distortion[2] = nan;
+  EXPECT_EQ(field(r), "cameras.1.distortion");
+  r = good;
+  r.intrinsics[0].sigma[0] = -1;
+  EXPECT_EQ(field(r), "cameras.0.intrinsics_sigma");
+  r = good;
+  r.T_camera_left[3].R(1, 1) = nan;
+  EXPECT_EQ(field(r), "cameras.3.T_camera_left");
+  r = good;
+  r.sigma_wide[1][4] = nan;
+  EXPECT_EQ(field(r), "cameras.1.sigma_wide");
+  r = good;
+  r.covariance_wide[1](2, 2) = -1;
+  EXPECT_EQ(field(r), "cameras.1.covariance_wide");
+  r = good;
+  r.baseline = nan;
+  EXPECT_EQ(field(r), "rig.baseline");
+  r = good;
+  r.cameras = 1;
+  EXPECT_EQ(field(r), "cameras");
+}
+
+TEST(CalibrationFile, UnknownMissingAndRepeatedFieldsAreNamed) {
+  EXPECT_TRUE(refused(with("    T_camera_left", "    T_camera_lefd"), "c.yaml:10: cameras.1 has the unknown key",
+                      "did you mean \"T_camera_left\"?"));
+  EXPECT_TRUE(refused(with("    sigma_noise", "    size"), "c.yaml:11: cameras.1 has the key \"size\" twice", ""));
+  EXPECT_TRUE(refused(with("    intrinsics: [982, 983, 510, 380]\n", ""), "c.yaml:5: cameras.1.intrinsics is missing", ""));
+  EXPECT_TRUE(refused(with("version: 1\n", ""), "c.yaml:1: version is missing", ""));
+  EXPECT_TRUE(refused(with("version: 1", "version: 2"), "c.yaml:1: version is 2", "reads version 1"));
+  EXPECT_TRUE(refused(with("model: pinhole-radtan\n", "model: pinhole\n"), "c.yaml:7: cameras.1.model is \"pinhole\"", "pinhole-radtan"));
+  EXPECT_TRUE(refused("", "c.yaml: is empty", ""));
+  EXPECT_TRUE(refused("just words", "c.yaml:1: the calibration is not a group", ""));
+  EXPECT_TRUE(refused("version: 1\ncameras: 3\n", "c.yaml:2: cameras is not a list", ""));
+  EXPECT_TRUE(refused("version: 1\ncameras: [1, 2]\n", "c.yaml:2: cameras.0 is not a group", ""));
+  EXPECT_TRUE(refused("version: 1\ncameras: [{}]\n", "c.yaml:2: cameras lists 1", "2 to 4"));
+}
+
+/// No cut and no changed byte of a good file may do anything but be read or be refused.
+TEST(CalibrationFile, TornAndGarbledFilesNeverEscapeAsAnythingElse) {
+  Random random(11);
+  for (std::size_t length = 0; length < kGood.size(); ++length) static_cast<void>(refusal(kGood.substr(0, length)));
+  for (int i = 0; i < 2000; ++i) {
+    std::string text = kGood;
+    const auto at = static_cast<std::size_t>(random.uniform() * static_cast<double>(text.size()));
+    text[at] = static_cast<char>(random.uniform() * 256.0);
+    static_cast<void>(refusal(text));
+  }
+}
+
+}  // namespace
+}  // namespace vergence::app

@@ -1,0 +1,152 @@
+#include "app/config/configuration.hpp"
+
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "app/runtime/errors.hpp"
+#include "tests/support/temporary_folder.hpp"
+
+namespace vergence::app {
+namespace {
+
+/// The sentence with which a configuration is refused; empty when it is taken.
+std::string refusal(const std::string& yaml, const std::vector<std::string>& set = {}) {
+  try {
+    static_cast<void>(parse_configuration(yaml, "drive.yaml", set));
+  } catch (const InputError& error) {
+    return error.what();
+  }
+  return "";
+}
+
+bool contains(const std::string& text, const std::string& part) { return text.find(part) != std::string::npos; }
+
+TEST(Configuration, NothingGivenMeansTheDefaults) {
+  EXPECT_EQ(canonical_text(load_configuration(std::nullopt, {})), canonical_text(Configuration{}));
+  EXPECT_EQ(canonical_text(parse_configuration("", "drive.yaml", {})), canonical_text(Configuration{}));
+  EXPECT_EQ(canonical_text(parse_configuration("odometry:\n", "drive.yaml", {})), canonical_text(Configuration{}));
+}
+
+TEST(Configuration, ReadsNestedAndDottedKeys) {
+  const auto c = parse_configuration("rig: {name: van}\nodometry:\n  features: 400\n  band_px: 3.5\nthreads: 1\n", "drive.yaml", {});
+  EXPECT_EQ(c.rig.name, "van");
+  EXPECT_EQ(c.odometry.features, 400);
+  EXPECT_EQ(c.odometry.band_px, 3.5);
+  EXPECT_EQ(c.threads, 1);
+  EXPECT_EQ(parse_configuration("odometry.features: 401", "drive.yaml", {}).odometry.features, 401);
+}
+
+TEST(Configuration, TheLastSetWinsOverEarlierOnesAndTheFile) {
+  const auto c =
+      parse_configuration("odometry: {features: 400}", "drive.yaml", {"odometry.features=500", "odometry.features=600", "rig.name=a: b"});
+  EXPECT_EQ(c.odometry.features, 600);
+  EXPECT_EQ(c.rig.name, "a: b") << "a value is taken as it stands";
+}
+
+TEST(Configuration, SetTakesGroupsAsYaml) {
+  EXPECT_EQ(parse_configuration("", "drive.yaml", {"odometry={features: 70, band_px: 4}"}).odometry.features, 70);
+}
+
+TEST(Configuration, AnUnknownKeyNamesTheNearestFileAndLine) {
+  EXPECT_EQ(refusal("threads: 1\nodometry:\n  featurs: 3\n"),
+            "drive.yaml:3: there is no key \"odometry.featurs\"; did you mean \"odometry.features\"?");
+  EXPECT_EQ(refusal("", {"thread=1"}), "--set thread=1: there is no key \"thread\"; did you mean \"threads\"?");
+}
+
+TEST(Configuration, AKeyWithoutItsGroupIsFoundByItsLastPart) {
+  EXPECT_TRUE(contains(refusal("features: 300"), "did you mean \"odometry.features\"?")) << refusal("features: 300");
+}
+
+TEST(Configuration, ListItemsAreNamedByNumber) {
+  EXPECT_TRUE(contains(refusal("cameras: [{serial: a}, {serial: b}]"), "drive.yaml:1: there is no key \"cameras.0.serial\""));
+}
+
+TEST(Configuration, ValuesOfTheWrongTypeAreRefusedWithTheirPlace) {
+  EXPECT_TRUE(contains(refusal("odometry:\n  features: many"), "drive.yaml:2: odometry.features is \"many\", not an integer"));
+  EXPECT_TRUE(contains(refusal("odometry: {features: 300.5}"), "not an integer"));
+  EXPECT_TRUE(contains(refusal("odometry: {features: 99999999999999999999}"), "not an integer"));
+  EXPECT_TRUE(contains(refusal("odometry: {band_px: 2px}"), "not a number"));
+  EXPECT_TRUE(contains(refusal("odometry: {features: }"), "not an integer"));
+  EXPECT_TRUE(contains(refusal("odometry: {features: [1, 2]}"), "takes one value"));
+  EXPECT_TRUE(contains(refusal("odometry: {features: {a: 1}}"), "takes one value"));
+  EXPECT_TRUE(contains(refusal("threads: []"), "takes one value"));
+  EXPECT_TRUE(contains(refusal("odometry: 3"), "is a group of keys"));
+  EXPECT_TRUE(contains(refusal("[1, 2]"), "is not a configuration"));
+  EXPECT_TRUE(contains(refusal("rig: {name: " + std::string(65, 'x') + "}"), "longer than 64 bytes"));
+}
+
+TEST(Configuration, NotANumberIsNeverInsideARange) {
+  EXPECT_NE(refusal("odometry: {band_px: nan}"), "");
+  EXPECT_NE(refusal("odometry: {band_px: .nan}"), "");
+  EXPECT_NE(refusal("odometry: {band_px: inf}"), "");
+}
+
+TEST(Configuration, AKeyThatStandsTwiceIsRefused) {
+  EXPECT_EQ(refusal("odometry:\n  features: 300\n  features: 301\n"), "drive.yaml:3: the key \"odometry.features\" stands twice");
+  EXPECT_TRUE(contains(refusal("odometry: {features: 300}\nodometry.features: 301\n"), "stands twice"));
+}
+
+TEST(Configuration, KeysThatContradictEachOtherAreRefused) {
+  EXPECT_TRUE(contains(refusal("odometry: {min_inliers: 60, ok_inliers: 50}"),
+                       "drive.yaml: odometry.ok_inliers (50) is below odometry.min_inliers (60)"));
+}
+
+TEST(Configuration, WhatIsNotYamlIsSaidWithItsLine) {
+  EXPECT_TRUE(contains(refusal("threads: 1\nodometry: {features: 300\n"), "drive.yaml:"))
+      << refusal("threads: 1\nodometry: {features: 300\n");
+  EXPECT_TRUE(contains(refusal("a: 1\n---\nb: 2\n"), "several YAML documents"));
+  EXPECT_NE(refusal("threads: *unknown"), "");
+  EXPECT_NE(refusal(std::string(100'000, '[')), "") << "nested beyond any stack";
+}
+
+TEST(Configuration, AliasesThatUnfoldWithoutEndAreStopped) {
+  std::string bomb = "a0: &a0 [x, x, x, x, x, x, x, x, x, x]\n";
+  for (int i = 1; i < 9; ++i) {
+    const std::string last = "*a" + std::to_string(i - 1);
+    bomb += "a" + std::to_string(i) + ": &a" + std::to_string(i) + " [" + last;
+    for (int j = 1; j < 10; ++j) bomb += ", " + last;
+    bomb += "]\n";
+  }
+  EXPECT_NE(refusal(bomb), "");
+}
+
+TEST(Configuration, ASetWithoutKeyOrValueIsRefused) {
+  EXPECT_TRUE(contains(refusal("", {"features"}), "KEY=VALUE is expected"));
+  EXPECT_TRUE(contains(refusal("", {"=3"}), "KEY=VALUE is expected"));
+}
+
+TEST(Configuration, FilesThatCannotBeReadAreNamed) {
+  const test::TemporaryFolder folder;
+  const auto sentence = [](const std::filesystem::path& path) -> std::string {
+    try {
+      static_cast<void>(load_configuration(path, {}));
+    } catch (const InputError& error) {
+      return error.what();
+    }
+    return "";
+  };
+  EXPECT_EQ(sentence(folder / "none.yaml"), (folder / "none.yaml").string() + ": there is no such file");
+  EXPECT_TRUE(contains(sentence(folder.path()), "is a folder"));
+  EXPECT_TRUE(contains(sentence(folder.write("huge.yaml", std::string(2'000'000, ' '))), "is larger than"));
+  EXPECT_EQ(load_configuration(folder.write("good.yaml", "threads: 1\n"), {}).threads, 1);
+}
+
+TEST(ConfigurationHash, IsOfTheValuesNotOfTheWriting) {
+  const auto a = parse_configuration("odometry: {band_px: 2.50}\nthreads: 1", "a.yaml", {});
+  const auto b = parse_configuration("threads: 1 # one\nodometry:\n    band_px: 25e-1\n", "b.yaml", {});
+  EXPECT_EQ(configuration_hash(a), configuration_hash(b));
+  EXPECT_EQ(configuration_hash(a).size(), 16U);
+  EXPECT_NE(configuration_hash(a), configuration_hash(Configuration{}));
+}
+
+TEST(ConfigurationHash, SeesTheLastBitOfANumber) {
+  Configuration a, b;
+  b.odometry.band_px = std::nextafter(a.odometry.band_px, 100.0);
+  EXPECT_NE(configuration_hash(a), configuration_hash(b));
+}
+
+}  // namespace
+}  // namespace vergence::app

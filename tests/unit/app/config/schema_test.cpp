@@ -1,0 +1,139 @@
+#include "app/config/schema.hpp"
+
+#include <cmath>
+#include <fstream>
+#include <limits>
+#include <map>
+#include <regex>
+#include <set>
+#include <sstream>
+#include <string>
+
+#include <gtest/gtest.h>
+
+#include "app/runtime/errors.hpp"
+#include "tests/support/temporary_folder.hpp"
+
+namespace vergence::app {
+namespace {
+
+std::string file_text(const std::string& below) {
+  std::ifstream in(std::string(VERGENCE_SOURCE_DIR) + "/" + below, std::ios::binary);
+  std::ostringstream text;
+  text << in.rdbuf();
+  return text.str();
+}
+
+/// Taken with this value of this key, and the value arrives.
+bool accepts(const Key& key, const KeyValue& value) {
+  const std::string text = to_text(value);
+  try {
+    // Both sides of the one relation between keys, so that only the range of this row decides.
+    std::vector<std::string> set{"odometry.min_inliers=6", "odometry.ok_inliers=1000"};
+    set.push_back(key.name + "=" + text);
+    return to_text(key.get(parse_configuration("", "", set))) == text;
+  } catch (const InputError&) {
+    return false;
+  }
+}
+
+KeyValue value_at(const Key& key, double x) {
+  if (key.type == KeyType::integer) return static_cast<std::int64_t>(x);
+  return x;
+}
+
+TEST(Schema, EveryRowsRangeIsEnforcedAtBothEnds) {
+  int rows = 0;
+  for (const Group& group : schema())
+    for (const Key& key : group.keys) {
+      if (key.type == KeyType::text) continue;
+      SCOPED_TRACE(key.name);
+      const bool integer = key.type == KeyType::integer;
+      const double below = integer ? key.least - 1 : std::nextafter(key.least, -1e300);
+      EXPECT_TRUE(accepts(key, value_at(key, key.least)));
+      EXPECT_FALSE(accepts(key, value_at(key, below)));
+      if (integer && key.most >= 0x1p63) {
+        EXPECT_TRUE(accepts(key, std::numeric_limits<std::int64_t>::max()));
+      } else {
+        EXPECT_TRUE(accepts(key, value_at(key, key.most)));
+        EXPECT_FALSE(accepts(key, value_at(key, integer ? key.most + 1 : std::nextafter(key.most, 1e300))));
+      }
+      ++rows;
+    }
+  EXPECT_GE(rows, 19);
+}
+
+TEST(Schema, EveryDefaultIsInsideItsRange) {
+  for (const Group& group : schema())
+    for (const Key& key : group.keys) {
+      SCOPED_TRACE(key.name);
+      if (key.type == KeyType::text) continue;
+      EXPECT_TRUE(accepts(key, key.get(Configuration{})));
+    }
+}
+
+TEST(Schema, EveryKeyChangesItsOwnValueOnly) {
+  for (const Group& group : schema())
+    for (const Key& key : group.keys) {
+      SCOPED_TRACE(key.name);
+      Configuration changed;
+      key.set(changed, key.type == KeyType::text ? KeyValue(std::string("other")) : value_at(key, key.least));
+      if (to_text(key.get(changed)) == to_text(key.get(Configuration{}))) key.set(changed, value_at(key, key.least + 1));
+      for (const Group& other_group : schema())
+        for (const Key& other : other_group.keys) {
+          const bool same = to_text(other.get(changed)) == to_text(other.get(Configuration{}));
+          EXPECT_EQ(same, other.name != key.name) << other.name;
+        }
+    }
+}
+
+TEST(Schema, NamesAreUniqueAndInTheirGroup) {
+  std::set<std::string> names;
+  for (const Group& group : schema())
+    for (const Key& key : group.keys) {
+      EXPECT_TRUE(names.insert(key.name).second) << key.name;
+      EXPECT_EQ(key.name.substr(0, key.name.find('.')), group.name.empty() ? key.name : group.name);
+      EXPECT_GT(key.meaning.size(), 20U) << key.name;
+    }
+}
+
+/// The fields of OdometryOptions as its header declares them: name and the range in its comment, where there is one.
+std::map<std::string, std::string> declared_odometry_options() {
+  std::istringstream header(file_text("core/odometry/options.hpp"));
+  const std::regex field(R"(^  (?:bool|int|double|std::\w+) (\w+) = .*)"), range(R"(, ([0-9.]+ … [0-9.]+))");
+  std::map<std::string, std::string> fields;
+  for (std::string line; std::getline(header, line);) {
+    std::smatch name, numbers;
+    if (!std::regex_match(line, name, field)) continue;
+    fields[name[1]] = std::regex_search(line, numbers, range) ? numbers[1].str() : "";
+  }
+  return fields;
+}
+
+TEST(Schema, EveryOdometryOptionCanBeSetInTheRangeItsHeaderStates) {
+  const auto declared = declared_odometry_options();
+  ASSERT_GE(declared.size(), 10U) << "the header is read";
+  std::map<std::string, const Key*> rows;
+  for (const Group& group : schema())
+    if (group.name == "odometry")
+      for (const Key& key : group.keys) rows[key.name.substr(9)] = &key;
+  for (const auto& [name, range] : declared) {
+    ASSERT_TRUE(rows.contains(name)) << "app/config/schema.cpp has no row for OdometryOptions::" << name;
+    if (range.empty()) continue;
+    EXPECT_EQ(range_text(*rows[name]), range) << name;
+  }
+  EXPECT_EQ(rows.size(), declared.size());
+}
+
+TEST(Schema, TheDocumentIsWrittenFromTheTable) {
+  EXPECT_EQ(file_text("docs/configuration.md"), configuration_document()) << "write it again: ninja -C build docs";
+}
+
+TEST(Schema, TheDocumentsExampleIsUnderstood) {
+  const std::string page = configuration_document();
+  const auto start = page.find("```yaml\n") + 8;
+  EXPECT_NO_THROW(static_cast<void>(parse_configuration(page.substr(start, page.find("```", start) - start), "example", {})));
+}
+
+}  // namespace
+}  // namespace vergence::app

@@ -1,0 +1,57 @@
+#include "app/runtime/signals.hpp"
+
+#include <csignal>
+
+#include <gtest/gtest.h>
+
+namespace vergence::app {
+namespace {
+
+TEST(SignalGuard, NothingIsRequestedBeforeASignal) {
+  const SignalGuard guard;
+  EXPECT_FALSE(guard.stop_requested());
+  EXPECT_EQ(guard.stop_code(), std::nullopt);
+}
+
+TEST(SignalGuard, InterruptAndTerminateHaveTheirExitCodes) {
+  {
+    const SignalGuard guard;
+    std::raise(SIGINT);
+    EXPECT_TRUE(guard.stop_requested());
+    EXPECT_EQ(guard.stop_code(), ExitCode::interrupted);
+  }
+  const SignalGuard guard;
+  EXPECT_FALSE(guard.stop_requested()) << "a new guard starts afresh";
+  std::raise(SIGTERM);
+  EXPECT_EQ(guard.stop_code(), ExitCode::terminated);
+}
+
+TEST(SignalGuard, TheFirstSignalDecides) {
+  const SignalGuard guard;
+  std::raise(SIGTERM);
+  std::raise(SIGINT);
+  EXPECT_EQ(guard.stop_code(), ExitCode::terminated);
+}
+
+TEST(SignalGuard, PutsTheFormerHandlerBack) {
+  static int calls = 0;
+  calls = 0;
+  auto* const before = std::signal(SIGINT, [](int) { ++calls; });
+  { const SignalGuard guard; }
+  std::raise(SIGINT);
+  EXPECT_EQ(calls, 1);
+  std::signal(SIGINT, before);
+}
+
+TEST(SignalGuardDeathTest, TheSecondSignalEndsTheProgram) {
+  EXPECT_EXIT(
+      {
+        const SignalGuard guard;
+        std::raise(SIGINT);
+        std::raise(SIGINT);
+      },
+      testing::KilledBySignal(SIGINT), "");
+}
+
+}  // namespace
+}  // namespace vergence::app
