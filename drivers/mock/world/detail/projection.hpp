@@ -1,0 +1,43 @@
+#pragma once
+#include <vector>
+
+#include "core/camera/camera.hpp"
+#include "core/math/se3.hpp"
+#include "drivers/mock/world/detail/scene.hpp"
+#include "drivers/mock/world/detail/tile_kernel.hpp"
+
+namespace vergence::mock {
+
+/// The rays of a camera's pixels in tiles of 16 x 16, row after row of tiles, and the bounds of each tile.
+/// Pixels beyond the image's edge, or where the lens model has no ray, repeat the nearest one that has.
+struct RayTiles {
+  explicit RayTiles(const Camera& camera);
+
+  struct Bounds {
+    float x0, x1, y0, y1;
+  };
+  int columns = 0, rows = 0;  // of tiles
+  std::vector<float> x, y;
+  std::vector<Bounds> bounds;                     // per tile
+  std::vector<Bounds> column_bounds, row_bounds;  // of all tiles in a column or row of tiles
+  Bounds all{};
+};
+
+/// What one pose sees: the polygons in front of the camera and the candidates of every tile.
+class Projection {
+ public:
+  void build(const Scene& scene, const RayTiles& tiles, const Camera& camera, const Transform& T_camera_enu, bool bayer);
+
+  [[nodiscard]] std::span<const ProjectedPolygon> polygons() const noexcept { return polygons_; }
+  [[nodiscard]] std::span<const Candidate> candidates(std::size_t tile) const noexcept { return candidates_[tile]; }
+
+ private:
+  [[nodiscard]] bool add(const Scene& scene, const Polygon& polygon, const RayTiles& tiles, const Camera& camera,
+                         const Transform& T_camera_enu, bool bayer);
+  void bin(const ProjectedPolygon& polygon, std::int32_t index, const RayTiles& tiles, const RayTiles::Bounds& box);
+
+  std::vector<ProjectedPolygon> polygons_;
+  std::vector<std::vector<Candidate>> candidates_;
+};
+
+}  // namespace vergence::mock
