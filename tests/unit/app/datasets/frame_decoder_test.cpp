@@ -1,0 +1,158 @@
+#include "app/datasets/frame_decoder.hpp"
+
+#include <gtest/gtest.h>
+
+#include <chrono>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "core/memory/allocation_guard.hpp"
+#include "tests/unit/app/datasets/tiny_drive.hpp"
+
+namespace vergence::app {
+namespace {
+
+class Decoder : public testing::Test {
+ protected:
+  void open(int pairs) {
+    test::write_tiny_folder(folder_, pairs);
+    reopen();
+  }
+  void reopen() { sequence_ = open_sequence(SequenceFormat::folder, folder_.path()); }
+
+  struct Seen {
+    DecodedPair pair;
+    bool right_pixels = false;
+  };
+  /// All that comes, slots released as they are read.
+  std::vector<Seen> drain(std::size_t first, std::size_t count) {
+    FrameDecoder decoder(sequence_, first, count, pool_);
+    std::vector<Seen> seen;
+    for (DecodedPair pair; decoder.next(&pair);) {
+      seen.push_back({pair, pair.decoded && pixels_are_right(pair)});
+      decoder.release(pair);
+    }
+    return seen;
+  }
+  [[nodiscard]] bool pixels_are_right(const DecodedPair& pair) const {
+    for (int k = 0; k < 2; ++k) {
+      const ImageView image = pool_.view(pair.slots[static_cast<std::size_t>(k)]);
+      for (int y = 0; y < image.height; ++y)
+        for (int x = 0; x < image.width; ++x)
+          if (image.at(x, y) != test::tiny_pixel(x, y, test::tiny_seed(static_cast<int>(pair.frame), k))) return false;
+    }
+    return true;
+  }
+
+  test::TemporaryFolder folder_;
+  StereoSequence sequence_;
+  Arena arena_{FramePool::memory_needed(test::kTinyWidth, test::kTinyHeight, FrameDecoder::kSlots) + kCacheLine};
+  FramePool pool_{test::kTinyWidth, test::kTinyHeight, FrameDecoder::kSlots, arena_};
+};
+
+TEST_F(Decoder, everyPairComesInOrderWithItsPixelsThoughFarMoreThanSlots) {
+  constexpr int kPairs = 60;
+  open(kPairs);
+  const auto seen = drain(0, kPairs);
+  ASSERT_EQ(seen.size(), static_cast<std::size_t>(kPairs));
+  for (std::size_t i = 0; i < seen.size(); ++i) {
+    EXPECT_EQ(seen[i].pair.frame, i);
+    EXPECT_EQ(seen[i].pair.stamp, sequence_.pairs[i].stamp);
+    EXPECT_TRUE(seen[i].right_pixels) << i;
+  }
+  EXPECT_EQ(pool_.available(), FrameDecoder::kSlots);
+}
+
+TEST_F(Decoder, aRangeIsCutAtTheEnd) {
+  open(5);
+  const auto seen = drain(3, 100);
+  ASSERT_EQ(seen.size(), 2U);
+  EXPECT_EQ(seen[0].pair.frame, 3U);
+  EXPECT_TRUE(drain(5, 1).empty());
+  EXPECT_TRUE(drain(99, 1).empty());
+}
+
+TEST_F(Decoder, missingTornAndForeignImagesSkipTheirFrameAndNoOther) {
+  open(8);
+  std::filesystem::remove(folder_ / "left/001.png");
+  test::truncate_file(folder_ / "right/002.png", 0.5);
+  folder_.write("left/003.png", "not a picture at all");
+  folder_.write("right/004.png", "");
+  test::write_tiny_image(folder_ / "left/005.png", 1, 64, 48);
+  const auto seen = drain(0, 8);
+  ASSERT_EQ(seen.size(), 8U);
+  const std::vector<std::string> kinds = {"", "image_missing", "image_torn", "image_unreadable", "image_torn", "image_size", "", ""};
+  for (std::size_t i = 0; i < 8; ++i) {
+    EXPECT_EQ(seen[i].pair.kind, kinds[i]) << i;
+    EXPECT_EQ(seen[i].pair.decoded, kinds[i].empty()) << i;
+    EXPECT_EQ(seen[i].right_pixels, kinds[i].empty()) << i;
+  }
+  EXPECT_NE(std::string(seen[1].pair.note.data()).find("left/001.png is missing"), std::string::npos) << seen[1].pair.note.data();
+  EXPECT_NE(std::string(seen[2].pair.note.data()).find("right/002.png is torn"), std::string::npos) << seen[2].pair.note.data();
+}
+
+TEST_F(Decoder, timesThatDoNotGoForwardsSkipTheirFrame) {
+  open(5);
+  folder_.write("times.txt", "100\n300\n200\n300\n301\n");
+  reopen();
+  const auto seen = drain(0, 5);
+  ASSERT_EQ(seen.size(), 5U);
+  const std::vector<bool> decoded = {true, true, false, false, true};
+  for (std::size_t i = 0; i < 5; ++i) EXPECT_EQ(seen[i].pair.decoded, decoded[i]) << i;
+  EXPECT_STREQ(seen[2].pair.kind, "time_backwards");
+  EXPECT_EQ(std::string(seen[2].pair.note.data()),
+            "frame 2 skipped: its time 0.000000200 is not later than 0.000000300, the latest before it");
+}
+
+TEST_F(Decoder, aLongNameIsCutNotOverrun) {
+  open(1);
+  sequence_.pairs[0].file[0] = "left/" + std::string(2000, 'x') + ".png";
+  const auto seen = drain(0, 1);
+  ASSERT_EQ(seen.size(), 1U);
+  EXPECT_EQ(std::string(seen[0].pair.note.data()).size(), seen[0].pair.note.size() - 1);
+}
+
+TEST_F(Decoder, endsAtAnyMomentWhileTheConsumerHoldsPairsBack) {
+  open(40);
+  for (const int taken : {0, 1, 10}) {
+    Arena arena(FramePool::memory_needed(test::kTinyWidth, test::kTinyHeight, FrameDecoder::kSlots) + kCacheLine);
+    FramePool pool(test::kTinyWidth, test::kTinyHeight, FrameDecoder::kSlots, arena);
+    FrameDecoder decoder(sequence_, 0, 40, pool);
+    DecodedPair pair;
+    for (int i = 0; i < taken; ++i) {
+      ASSERT_TRUE(decoder.next(&pair));
+      decoder.release(pair);
+    }
+    if (taken == 0) continue;  // the destructor alone
+    decoder.stop();
+    EXPECT_FALSE(decoder.next(&pair));
+  }
+}
+
+TEST_F(Decoder, stopWakesAConsumerThatWaits) {
+  open(1);
+  FrameDecoder decoder(sequence_, 0, 1, pool_);
+  DecodedPair pair;
+  ASSERT_TRUE(decoder.next(&pair));
+  std::thread other([&] { decoder.stop(); });
+  EXPECT_FALSE(decoder.next(&pair));
+  other.join();
+}
+
+TEST_F(Decoder, theConsumersSideAllocatesNothing) {
+  if (!AllocationGuard::available()) GTEST_SKIP() << "needs the allocation hooks, which sanitizer builds leave out";
+  open(20);
+  FrameDecoder decoder(sequence_, 0, 20, pool_);
+  const auto before = AllocationGuard::allocations_after_seal();
+  int pairs = 0;
+  {
+    const SealedScope sealed;
+    for (DecodedPair pair; decoder.next(&pair); ++pairs) decoder.release(pair);
+  }
+  EXPECT_EQ(pairs, 20);
+  EXPECT_EQ(AllocationGuard::allocations_after_seal(), before);
+}
+
+}  // namespace
+}  // namespace vergence::app

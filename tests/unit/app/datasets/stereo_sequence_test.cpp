@@ -1,0 +1,208 @@
+#include "app/datasets/stereo_sequence.hpp"
+
+#include <gtest/gtest.h>
+
+#include "app/runtime/errors.hpp"
+#include "tests/support/shared_data.hpp"
+#include "tests/unit/app/datasets/tiny_drive.hpp"
+
+namespace vergence::app {
+namespace {
+
+std::string refusal(SequenceFormat format, const std::filesystem::path& folder,
+                    const std::optional<std::filesystem::path>& calibration = std::nullopt) {
+  return test::sentence_of<InputError>([&] { (void)open_sequence(format, folder, calibration); });
+}
+
+testing::AssertionResult says(const std::string& sentence, std::initializer_list<const char*> parts) {
+  for (const char* part : parts)
+    if (sentence.find(part) == std::string::npos) return testing::AssertionFailure() << "\"" << sentence << "\" lacks \"" << part << "\"";
+  return testing::AssertionSuccess();
+}
+
+class Sequence : public testing::Test {
+ protected:
+  test::TemporaryFolder folder_;
+};
+
+TEST_F(Sequence, kittiTimesKeepEveryDigitAndP1GivesTheBaseline) {
+  test::write_tiny_kitti(folder_, 3);
+  folder_.write("times.txt", "0.000000e+00\n1.044989e-01\n123456789.123456789\n");
+  const auto s = open_sequence(SequenceFormat::kitti, folder_.path());
+  ASSERT_EQ(s.pairs.size(), 3U);
+  EXPECT_EQ(s.pairs[1].stamp.ns(), 104498900);
+  EXPECT_EQ(s.pairs[2].stamp.ns(), 123456789123456789);
+  EXPECT_EQ(s.pairs[2].file[1], "image_1/000002.png");
+  EXPECT_EQ(s.calibration.intrinsics[1].width, test::kTinyWidth);
+  EXPECT_DOUBLE_EQ(s.calibration.T_camera_left[1].t.x(), -0.5);
+  EXPECT_DOUBLE_EQ(s.calibration.baseline, 0.5);
+}
+
+TEST_F(Sequence, kittiImagesThatAreMissingKeepTheirPlace) {
+  test::write_tiny_kitti(folder_, 4);
+  std::filesystem::remove(folder_ / "image_0/000000.png");
+  std::filesystem::remove(folder_ / "image_1/000002.png");
+  const auto s = open_sequence(SequenceFormat::kitti, folder_.path());
+  ASSERT_EQ(s.pairs.size(), 4U);
+  EXPECT_EQ(s.pairs[2].file[1], "image_1/000002.png");
+  EXPECT_EQ(s.pairs[3].file[1], "image_1/000003.png");
+}
+
+TEST_F(Sequence, kittiSaysWhatIsWrong) {
+  test::write_tiny_kitti(folder_, 3);
+  folder_.write("times.txt", "0\n0.1\n");
+  EXPECT_TRUE(says(refusal(SequenceFormat::kitti, folder_.path()), {"image_0/000002.png", "times.txt"}));
+  folder_.write("times.txt", "0\n0.1\nnoon\n");
+  EXPECT_TRUE(says(refusal(SequenceFormat::kitti, folder_.path()), {"times.txt:3", "noon"}));
+  folder_.write("times.txt", "0\n0.1\n0.2\n");
+  folder_.write("calib.txt", "P0: 60 0 35 0 0 60 24 0 0 0 1 0\n");
+  EXPECT_TRUE(says(refusal(SequenceFormat::kitti, folder_.path()), {"calib.txt", "P1"}));
+  folder_.write("calib.txt", "P0: 60 0 35 0 0 60 24 0 0 0 1 0\nP1: 60 0 35 -30 0 60 24 0 0 0 1\n");
+  EXPECT_TRUE(says(refusal(SequenceFormat::kitti, folder_.path()), {"calib.txt:2", "12 numbers"}));
+  folder_.write("calib.txt", "P0: 60 0 35 0 0 60 24 0 0 0 1 0\nP1: 60 0 35 30 0 60 24 0 0 0 1 0\n");
+  EXPECT_TRUE(says(refusal(SequenceFormat::kitti, folder_.path()), {"calib.txt", "exchanged"}));
+  folder_.write("calib.txt", "P0: 60 0 35 0 0 60 24 0 0 0 1 0\nP1: 60 0 35 nan 0 60 24 0 0 0 1 0\n");
+  EXPECT_TRUE(says(refusal(SequenceFormat::kitti, folder_.path()), {"calib.txt:2", "nan"}));
+}
+
+TEST_F(Sequence, foldersThatAreNotThereOrEmptyAreNamed) {
+  EXPECT_TRUE(says(refusal(SequenceFormat::kitti, folder_ / "nowhere"), {"nowhere", "does not exist"}));
+  EXPECT_TRUE(says(refusal(SequenceFormat::kitti, folder_.path()), {"times.txt"}));
+  EXPECT_TRUE(says(refusal(SequenceFormat::euroc, folder_.path()), {"cam0"}));
+  EXPECT_TRUE(says(refusal(SequenceFormat::folder, folder_.path()), {"left"}));
+  std::filesystem::create_directories(folder_ / "left");
+  EXPECT_TRUE(says(refusal(SequenceFormat::folder, folder_.path()), {"left", "no PNG or JPEG"}));
+}
+
+TEST_F(Sequence, eurocStampsAreExactAndTheRightCameraSitsWhereT_BSPutsIt) {
+  for (const auto& [end, first] : {std::pair{"\n", ""}, std::pair{"\r\n", "%YAML:1.0\n"}}) {
+    const test::TemporaryFolder folder;
+    test::write_tiny_euroc(folder, 3, end, first);
+    for (const char* below : {"", "mav0"}) {
+      const auto s = open_sequence(SequenceFormat::euroc, folder / below);
+      ASSERT_EQ(s.pairs.size(), 3U);
+      EXPECT_EQ(s.pairs[1].stamp.ns(), test::kTinyStart + test::kTinyStep);
+      EXPECT_EQ(s.pairs[1].file[0], "cam0/data/1403636584813555456.png");
+      // Camera 1 is 0.5 m along the body's y axis, which is the camera's x axis: in camera 1 the left camera lies at −0.5.
+      EXPECT_NEAR((s.calibration.T_camera_left[1].t - Vec3(-0.5, 0, 0)).norm(), 0, 1e-15);
+      EXPECT_NEAR((s.calibration.T_camera_left[1].R - Mat3::Identity()).norm(), 0, 1e-15);
+      EXPECT_EQ(s.calibration.intrinsics[0].distortion[3], -0.002);
+      EXPECT_EQ(s.calibration.intrinsics[1].fy, 61);
+    }
+  }
+}
+
+TEST_F(Sequence, eurocImagesOfOneCameraOnlyStandWhereTheirStampBelongs) {
+  test::write_tiny_euroc(folder_, 3);
+  const auto line = [](std::int64_t stamp) { return fmt::format("{0},{0}.png\n", stamp); };
+  folder_.write("mav0/cam1/data.csv", line(test::kTinyStart) + line(test::kTinyStart + 7) + line(test::kTinyStart + 2 * test::kTinyStep));
+  const auto s = open_sequence(SequenceFormat::euroc, folder_.path());
+  ASSERT_EQ(s.pairs.size(), 4U);
+  EXPECT_EQ(s.pairs[1].stamp.ns(), test::kTinyStart + 7);
+  EXPECT_TRUE(s.pairs[1].file[0].empty());
+  EXPECT_TRUE(s.pairs[2].file[1].empty());
+  EXPECT_FALSE(s.pairs[3].file[1].empty());
+}
+
+TEST_F(Sequence, eurocSaysWhatIsWrong) {
+  test::write_tiny_euroc(folder_, 2);
+  folder_.write("mav0/cam0/data.csv", "#timestamp [ns],filename\n1.5,x.png\n");
+  EXPECT_TRUE(says(refusal(SequenceFormat::euroc, folder_.path()), {"cam0/data.csv:2", "1.5"}));
+  folder_.write("mav0/cam0/data.csv", "15,../../secret.png\n");
+  EXPECT_TRUE(says(refusal(SequenceFormat::euroc, folder_.path()), {"cam0/data.csv:1", "outside"}));
+  folder_.write("mav0/cam0/data.csv", "15,15.png\n");
+  EXPECT_TRUE(says(refusal(SequenceFormat::euroc, folder_.path()), {"cam1/data.csv", "no stamp in common"}));
+  test::write_tiny_euroc(folder_, 2);
+  std::string yaml = test::tiny_sensor_yaml("", 0.5, "\n");
+  const auto with = [&](const std::string& from, const std::string& to) {
+    std::string changed = yaml;
+    changed.replace(changed.find(from), from.size(), to);
+    folder_.write("mav0/cam1/sensor.yaml", changed);
+    return refusal(SequenceFormat::euroc, folder_.path());
+  };
+  EXPECT_TRUE(says(with("0.0, -1.0, 0.0,", "0.0, -1.01, 0.0,"), {"cam1/sensor.yaml", "T_BS", "orthonormal"}));
+  EXPECT_TRUE(says(with("radial-tangential", "fov"), {"cam1/sensor.yaml", "fov"}));
+  EXPECT_TRUE(says(with("intrinsics: [60, 61, 35, 24]", "intrinsics: [60, 61, 35]"), {"cam1/sensor.yaml", "intrinsics", "4 numbers"}));
+  EXPECT_TRUE(says(with("intrinsics: [60, 61, 35, 24]", "intrinsics: {a: b}"), {"cam1/sensor.yaml", "intrinsics"}));
+  EXPECT_TRUE(says(with("resolution: [70, 48]", "resolution: [1e30, 48]"), {"cam1/sensor.yaml", "resolution"}));
+  EXPECT_TRUE(says(with("resolution: [70, 48]", "resolution: [80, 48]"), {"sensor.yaml", "80x48", "one size"}));
+}
+
+TEST_F(Sequence, folderPairsInOrderOfNameAndReadsBothKindsOfTime) {
+  test::write_tiny_folder(folder_, 2);
+  std::filesystem::rename(folder_ / "right/001.png", folder_ / "right/zz.png");
+  folder_.write("times.txt", "5\n1.5\n");
+  const auto s = open_sequence(SequenceFormat::folder, folder_.path());
+  ASSERT_EQ(s.pairs.size(), 2U);
+  EXPECT_EQ(s.pairs[0].stamp.ns(), 5);
+  EXPECT_EQ(s.pairs[1].stamp.ns(), 1500000000);
+  EXPECT_EQ(s.pairs[1].file[0], "left/001.png");
+  EXPECT_EQ(s.pairs[1].file[1], "right/zz.png");
+}
+
+TEST_F(Sequence, folderWithALostImagePairsTheRestByName) {
+  test::write_tiny_folder(folder_, 4);
+  std::filesystem::remove(folder_ / "right/001.png");
+  const auto s = open_sequence(SequenceFormat::folder, folder_.path());
+  ASSERT_EQ(s.pairs.size(), 4U);
+  EXPECT_EQ(s.pairs[1].file[1], "right/001.png");
+  EXPECT_EQ(s.pairs[2].file[1], "right/002.png");
+}
+
+TEST_F(Sequence, folderCountsThatDoNotGoTogetherAreRefused) {
+  test::write_tiny_folder(folder_, 3);
+  folder_.write("times.txt", "1\n2\n3\n4\n");
+  EXPECT_TRUE(says(refusal(SequenceFormat::folder, folder_.path()), {"3 images in left/", "4 lines in times.txt"}));
+  folder_.write("times.txt", "1\n2\nthree\n");
+  EXPECT_TRUE(says(refusal(SequenceFormat::folder, folder_.path()), {"times.txt:3", "three"}));
+}
+
+TEST_F(Sequence, aGivenCalibrationReplacesTheDataSetsOwnWhichNeedNotExist) {
+  test::write_tiny_kitti(folder_, 1);
+  std::filesystem::remove(folder_ / "calib.txt");
+  const auto file = folder_.write("mine.yaml", test::tiny_calibration());
+  const auto s = open_sequence(SequenceFormat::kitti, folder_.path(), file);
+  EXPECT_DOUBLE_EQ(s.calibration.T_camera_left[1].t.x(), -0.5);
+  EXPECT_EQ(s.calibration_source, "mine.yaml");
+  EXPECT_TRUE(says(refusal(SequenceFormat::kitti, folder_.path(), folder_ / "other.yaml"), {"other.yaml"}));
+}
+
+TEST_F(Sequence, imagesOfAnotherSizeAreRefusedWherverTheyStand) {
+  test::write_tiny_folder(folder_, 3);
+  test::write_tiny_image(folder_ / "left/000.png", 0, 64, 48);
+  EXPECT_TRUE(says(refusal(SequenceFormat::folder, folder_.path()), {"left/000.png", "64x48", "70x48", "calibration.yaml"}));
+  test::write_tiny_folder(folder_, 3);
+  test::write_tiny_image(folder_ / "right/002.png", 0, 70, 50);
+  const auto s = open_sequence(SequenceFormat::folder, folder_.path());
+  EXPECT_EQ(test::sentence_of<InputError>([&] { check_image_sizes(s, 0, 2); }), "");
+  EXPECT_TRUE(says(test::sentence_of<InputError>([&] { check_image_sizes(s, 0, 3); }), {"right/002.png", "70x50"}));
+  EXPECT_EQ(test::sentence_of<InputError>([&] { check_image_sizes(s, 99, 3); }), "");
+}
+
+TEST(RecordedSequence, kittiExcerptHasTheCalibrationOfItsDescription) {
+  const auto folder = test::shared_data("data/kitti06_51");
+  if (!folder) GTEST_SKIP() << test::shared_data_missing("data/kitti06_51");
+  const auto s = open_sequence(SequenceFormat::kitti, *folder);
+  ASSERT_EQ(s.pairs.size(), 51U);
+  EXPECT_EQ(s.pairs[1].stamp.ns(), 104498900);
+  EXPECT_EQ(s.calibration.intrinsics[0].width, 1226);
+  EXPECT_EQ(s.calibration.intrinsics[0].height, 370);
+  EXPECT_NEAR(s.calibration.baseline, 0.53715065, 5e-9);  // eight decimals are given
+  check_image_sizes(s, 0, s.pairs.size());
+}
+
+TEST(RecordedSequence, eurocExcerptHasTheCalibrationOfItsDescription) {
+  const auto folder = test::shared_data("data/euroc_mh01");
+  if (!folder) GTEST_SKIP() << test::shared_data_missing("data/euroc_mh01");
+  const auto s = open_sequence(SequenceFormat::euroc, *folder);
+  ASSERT_EQ(s.pairs.size(), 105U);
+  EXPECT_EQ(s.pairs.front().stamp.ns(), 1403636584763555584);
+  EXPECT_EQ(s.pairs.back().stamp.ns(), 1403636589963555584);
+  const Transform& T = s.calibration.T_camera_left[1];
+  EXPECT_LT((T.t - Vec3(-0.110073808, 0.000399122, -0.000853703)).cwiseAbs().maxCoeff(), 1e-9);
+  constexpr double kDegree = 3.14159265358979323846 / 180;
+  EXPECT_LT((log_so3(T.R) / kDegree - Vec3(-0.80734, 0.02061, -0.13262)).cwiseAbs().maxCoeff(), 1e-5);
+}
+
+}  // namespace
+}  // namespace vergence::app

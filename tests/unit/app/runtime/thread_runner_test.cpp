@@ -1,0 +1,78 @@
+#include "app/runtime/thread_runner.hpp"
+
+#include <gtest/gtest.h>
+
+#include <chrono>
+#include <thread>
+
+#include "core/memory/allocation_guard.hpp"
+
+namespace vergence::app {
+namespace {
+
+TEST(ThreadRunner, runsHereOnTheCallerAndThereOnOneOtherThread) {
+  ThreadRunner runner;
+  std::thread::id here_id, there_id, there_again;
+  auto here = [&] { here_id = std::this_thread::get_id(); };
+  auto there = [&] { there_id = std::this_thread::get_id(); };
+  auto again = [&] { there_again = std::this_thread::get_id(); };
+  runner.run(TaskRef(here), TaskRef(there));
+  runner.run(TaskRef(here), TaskRef(again));
+  EXPECT_EQ(here_id, std::this_thread::get_id());
+  EXPECT_NE(there_id, std::this_thread::get_id());
+  EXPECT_EQ(there_id, there_again);
+}
+
+TEST(ThreadRunner, everyRunIsDoneWhenItReturnsHoweverLongAHalfTakes) {
+  ThreadRunner runner;
+  int left = 0, right = 0;  // plain: a run that returned early would be a race
+  const auto pause = [](int i) {
+    // Longer than both sides spin now and then, so that sleeping and waking are walked, too.
+    if (i % 500 == 0) std::this_thread::sleep_for(std::chrono::microseconds(300));
+  };
+  for (int i = 0; i < 5000; ++i) {
+    auto here = [&] {
+      if (i % 1000 == 0) pause(i);
+      ++left;
+    };
+    auto there = [&] {
+      if (i % 1000 == 500) pause(i);
+      ++right;
+    };
+    runner.run(TaskRef(here), TaskRef(there));
+    ASSERT_EQ(left, i + 1);
+    ASSERT_EQ(right, i + 1);
+  }
+}
+
+TEST(ThreadRunner, sleepingBetweenRunsLosesNoWakeUp) {
+  ThreadRunner runner;
+  int count = 0;
+  auto nothing = [] {};
+  auto add = [&] { ++count; };
+  for (int i = 0; i < 20; ++i) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));  // far beyond the spin: the worker sleeps
+    runner.run(TaskRef(nothing), TaskRef(add));
+  }
+  EXPECT_EQ(count, 20);
+}
+
+TEST(ThreadRunner, joinsWithoutEverHavingRun) { const ThreadRunner runner; }
+
+TEST(ThreadRunner, allocatesNothingPerRunAndSealsItsWorker) {
+  if (!AllocationGuard::available()) GTEST_SKIP() << "needs the allocation hooks, which sanitizer builds leave out";
+  ThreadRunner runner;
+  bool worker_sealed = false;
+  auto nothing = [] {};
+  auto look = [&] { worker_sealed = AllocationGuard::thread_sealed(); };
+  const auto before = AllocationGuard::allocations_after_seal();
+  {
+    const SealedScope sealed;
+    for (int i = 0; i < 1000; ++i) runner.run(TaskRef(nothing), TaskRef(look));
+  }
+  EXPECT_TRUE(worker_sealed);
+  EXPECT_EQ(AllocationGuard::allocations_after_seal(), before);
+}
+
+}  // namespace
+}  // namespace vergence::app

@@ -1,0 +1,53 @@
+#include "core/memory/frame_pool.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <set>
+#include <stdexcept>
+#include <vector>
+
+namespace vergence {
+namespace {
+
+TEST(FramePool, slotsAreAlignedPaddedAndApart) {
+  Arena arena(FramePool::memory_needed(70, 5, 3));
+  FramePool pool(70, 5, 3, arena);
+  EXPECT_EQ(FramePool::stride(70), 128U);
+  EXPECT_EQ(FramePool::stride(64), 64U);
+  std::vector<FrameSlot> slots;
+  while (const auto slot = pool.acquire()) {
+    const auto bytes = pool.writable(*slot);
+    std::fill(bytes.begin(), bytes.end(), static_cast<std::uint8_t>(*slot + 1));
+    slots.push_back(*slot);
+  }
+  ASSERT_EQ(slots.size(), 3U);
+  for (const FrameSlot slot : slots) {
+    const ImageView view = pool.view(slot);
+    EXPECT_EQ(reinterpret_cast<std::uintptr_t>(view.data) % kCacheLine, 0U);
+    EXPECT_EQ(view.stride, 128);
+    EXPECT_EQ(view.width, 70);
+    for (int y = 0; y < view.height; ++y)
+      for (int x = 0; x < view.width; ++x) ASSERT_EQ(view.at(x, y), slot + 1);
+  }
+}
+
+TEST(FramePool, refusesWhenAllSlotsAreOutAndGoesOnAfterARelease) {
+  Arena arena(FramePool::memory_needed(8, 8, 2));
+  FramePool pool(8, 8, 2, arena);
+  const auto a = pool.acquire(), b = pool.acquire();
+  ASSERT_TRUE(a && b);
+  EXPECT_NE(*a, *b);
+  EXPECT_FALSE(pool.acquire());
+  EXPECT_EQ(pool.available(), 0U);
+  pool.release(*b);
+  EXPECT_EQ(pool.acquire(), b);
+}
+
+TEST(FramePool, anArenaThatIsTooSmallIsNamed) {
+  Arena arena(FramePool::memory_needed(64, 8, 2) - 1);
+  EXPECT_THROW(FramePool(64, 8, 2, arena), std::length_error);
+}
+
+}  // namespace
+}  // namespace vergence
