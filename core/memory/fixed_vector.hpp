@@ -88,6 +88,7 @@ class BoundedVector {
     return storage_[i];
   }
   [[nodiscard]] T& back() noexcept { return (*this)[size_ - 1]; }
+  [[nodiscard]] const T& back() const noexcept { return (*this)[size_ - 1]; }
   [[nodiscard]] std::size_t size() const noexcept { return size_; }
   [[nodiscard]] std::size_t capacity() const noexcept { return storage_.size(); }
   [[nodiscard]] bool empty() const noexcept { return size_ == 0; }

@@ -41,7 +41,8 @@ struct RigCalibration {
   std::array<Transform, kMaxCameras> T_camera_left{};
   std::array<std::array<double, 6>, kMaxCameras> sigma_noise{};  // rx ry rz (rad) tx ty tz (m); 0: not given
   std::array<std::array<double, 6>, kMaxCameras> sigma_wide{};   // the same with uncertain intrinsics
-  std::array<Mat6, kMaxCameras> covariance_wide{};               // zero: not given
+  // zero: not given (Eigen leaves a Mat6 without initialiser undefined)
+  std::array<Mat6, kMaxCameras> covariance_wide{Mat6::Zero(), Mat6::Zero(), Mat6::Zero(), Mat6::Zero()};
   double baseline = 0;                                           // m, |t| of camera 1 as measured once
   double baseline_sigma = 0;                                     // m; 0: exact
 

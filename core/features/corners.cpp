@@ -1,0 +1,88 @@
+#include "core/features/corners.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cstdint>
+
+#include "core/features/detail/corner_kernel.hpp"
+
+namespace vergence::features {
+namespace {
+
+// Vector loads run past the block by up to 16 + 8 pixels: cells nearer to the right edge are cut.
+constexpr int kRightMargin = 28;
+
+struct Grid {
+  int cell, columns, rows;
+  [[nodiscard]] int index(float x, float y) const noexcept {
+    const int c = std::clamp(static_cast<int>(x) / cell, 0, columns - 1);
+    const int r = std::clamp(static_cast<int>(y) / cell, 0, rows - 1);
+    return r * columns + c;
+  }
+};
+
+/// Best local maximum of the block's scores, leaving out its ring of one pixel; score 0 when there is none.
+Corner best_of(const float* score, int w, int h) noexcept {
+  Corner best;
+  for (int y = 1; y < h - 1; ++y) {
+    const float* s = score + y * detail::kMaxBlock;
+    for (int x = 1; x < w - 1; ++x) {
+      const float v = s[x];
+      if (!(v > best.score)) continue;
+      const float* up = s - detail::kMaxBlock;
+      const float* down = s + detail::kMaxBlock;
+      if (v >= s[x - 1] && v >= s[x + 1] && v >= up[x] && v >= down[x] && v >= up[x - 1] && v >= up[x + 1] && v >= down[x - 1] &&
+          v >= down[x + 1])
+        best = {static_cast<float>(x), static_cast<float>(y), v};
+    }
+  }
+  return best;
+}
+
+bool stronger(const Corner& a, const Corner& b) noexcept {
+  if (a.score != b.score) return a.score > b.score;
+  return a.y != b.y ? a.y < b.y : a.x < b.x;  // one order, whatever the sort does with equals
+}
+
+bool crowded(const Corner& c, std::span<const Corner> others, float distance) noexcept {
+  return std::any_of(others.begin(), others.end(), [&](const Corner& o) {
+    const float dx = c.x - o.x, dy = c.y - o.y;
+    return dx * dx + dy * dy < distance * distance;
+  });
+}
+
+}  // namespace
+
+void find_corners(const ImageView& image, const CornerOptions& options, std::span<const Corner> taken, BoundedVector<Corner>* out) noexcept {
+  out->clear();
+  const int cell = std::clamp(options.cell, 8, kMaxCell);
+  const Grid grid{cell, (image.width + cell - 1) / cell, (image.height + cell - 1) / cell};
+  if (image.empty() || grid.columns * grid.rows > kMaxGridCells) return;
+  std::array<bool, kMaxGridCells> occupied{};
+  for (const Corner& c : taken) occupied[static_cast<std::size_t>(grid.index(c.x, c.y))] = true;
+
+  alignas(64) std::array<float, detail::kMaxBlock * detail::kMaxBlock> score;
+  std::array<Corner, kMaxGridCells> found;
+  std::size_t n = 0;
+  const int low = std::max(options.border, detail::kTensorRadius + 2);
+  for (int r = 0; r < grid.rows; ++r) {
+    for (int c = 0; c < grid.columns; ++c) {
+      if (occupied[static_cast<std::size_t>(r * grid.columns + c)]) continue;
+      const int x0 = std::max(c * cell, low) - 1, y0 = std::max(r * cell, low) - 1;
+      const int x1 = std::min((c + 1) * cell, image.width - std::max(low, kRightMargin)) + 1;
+      const int y1 = std::min((r + 1) * cell, image.height - low) + 1;
+      if (x1 - x0 < 4 || y1 - y0 < 4) continue;
+      detail::corner_scores(image, x0, y0, x1 - x0, y1 - y0, score.data());
+      Corner best = best_of(score.data(), x1 - x0, y1 - y0);
+      if (!(best.score > options.min_score)) continue;
+      best.x += static_cast<float>(x0);
+      best.y += static_cast<float>(y0);
+      found[n++] = best;
+    }
+  }
+  std::sort(found.begin(), found.begin() + static_cast<std::ptrdiff_t>(n), stronger);
+  for (std::size_t i = 0; i < n && !out->full(); ++i)
+    if (!crowded(found[i], taken, options.min_distance) && !crowded(found[i], out->span(), options.min_distance)) (void)out->push(found[i]);
+}
+
+}  // namespace vergence::features

@@ -1,0 +1,30 @@
+#pragma once
+#include <span>
+
+#include "core/memory/fixed_vector.hpp"
+#include "core/types/image.hpp"
+
+namespace vergence::features {
+
+/// A pixel worth following.
+struct Corner {
+  float x = 0, y = 0;  // px of the image searched
+  float score = 0;     // least eigenvalue of the structure tensor's mean over 7×7 px, (grey levels / px)² (Shi & Tomasi 1994)
+};
+
+struct CornerOptions {
+  int cell = 32;            // px: at most one corner a cell
+  int border = 16;          // px kept free at the image's edge
+  float min_score = 30.F;   // (grey levels / px)²
+  float min_distance = 12;  // px to a corner already taken
+};
+
+inline constexpr int kMaxCell = 128;         // px: sizes the working memory of a cell
+inline constexpr int kMaxGridCells = 4096;   // of an image
+
+/// The strongest corner of every grid cell that holds none of `taken`, strongest first, as many as `out` has room for.
+///
+/// Memory  On the stack, bounded by kMaxCell. Cells whose corner finds no room are dropped, weakest first.
+void find_corners(const ImageView& image, const CornerOptions& options, std::span<const Corner> taken, BoundedVector<Corner>* out) noexcept;
+
+}  // namespace vergence::features

@@ -1,0 +1,159 @@
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "core/features/detail/align_kernel.cpp"
+#include <hwy/foreach_target.h>  // must come before highway.h
+#include <hwy/highway.h>
+
+#include "core/features/detail/align_kernel.hpp"
+
+HWY_BEFORE_NAMESPACE();
+namespace vergence::features::detail {
+namespace HWY_NAMESPACE {
+namespace hn = hwy::HWY_NAMESPACE;
+
+// A row of the window is 16 floats: at most that many lanes, and always a divisor of it.
+using Tag = hn::CappedTag<float, kWindowStride>;
+constexpr int kRows = kWindow + 2;  // with a border of one pixel for the gradients
+
+/// Bilinear samples of the patch on the turned grid: kRows × kWindowStride, of which kWindow + 2 columns count.
+void sample_patch(const std::uint8_t* patch, float cx, float cy, const float B[4], float* out) {
+  const float half = 0.5F * static_cast<float>(kRows - 1);
+  constexpr float kLast = kPatchSide - 1.001F;
+  for (int r = 0; r < kRows; ++r) {
+    const float dy = static_cast<float>(r) - half;
+    for (int c = 0; c < kRows; ++c) {
+      const float dx = static_cast<float>(c) - half;
+      float x = cx + B[0] * dx + B[1] * dy, y = cy + B[2] * dx + B[3] * dy;
+      x = x < 0.F ? 0.F : (x > kLast ? kLast : x);
+      y = y < 0.F ? 0.F : (y > kLast ? kLast : y);
+      const int ix = static_cast<int>(x), iy = static_cast<int>(y);
+      const float fx = x - static_cast<float>(ix), fy = y - static_cast<float>(iy);
+      const std::uint8_t* p = patch + iy * kPatchSide + ix;
+      const float top = static_cast<float>(p[0]) + fx * static_cast<float>(p[1] - p[0]);
+      const float bottom = static_cast<float>(p[kPatchSide]) + fx * static_cast<float>(p[kPatchSide + 1] - p[kPatchSide]);
+      out[r * (kWindowStride + 2) + c] = top + fy * (bottom - top);
+    }
+  }
+}
+
+void MakeWindow(const std::uint8_t* patch, float cx, float cy, const float B[4], Window* w) {
+  static_assert(kRows <= kWindowStride + 2);
+  constexpr int kStride = kWindowStride + 2;
+  HWY_ALIGN float t[kRows * kStride] = {};
+  sample_patch(patch, cx, cy, B, t);
+  const Tag d;
+  const int lanes = static_cast<int>(hn::Lanes(d));
+  HWY_ALIGN float mask[kWindowStride];
+  for (int c = 0; c < kWindowStride; ++c) mask[c] = c < kWindow ? 1.F : 0.F;
+
+  auto sum_t = hn::Zero(d), sum_x = hn::Zero(d), sum_y = hn::Zero(d);
+  const auto half = hn::Set(d, 0.5F);
+  for (int r = 0; r < kWindow; ++r) {
+    for (int c = 0; c < kWindowStride; c += lanes) {
+      const float* p = t + (r + 1) * kStride + c + 1;
+      const auto m = hn::Load(d, mask + c);
+      const auto v = hn::Mul(m, hn::LoadU(d, p));
+      const auto gx = hn::Mul(hn::Mul(m, half), hn::Sub(hn::LoadU(d, p + 1), hn::LoadU(d, p - 1)));
+      const auto gy = hn::Mul(hn::Mul(m, half), hn::Sub(hn::LoadU(d, p + kStride), hn::LoadU(d, p - kStride)));
+      hn::Store(v, d, w->value + r * kWindowStride + c);
+      hn::Store(gx, d, w->steep_x + r * kWindowStride + c);
+      hn::Store(gy, d, w->steep_y + r * kWindowStride + c);
+      sum_t = hn::Add(sum_t, v);
+      sum_x = hn::Add(sum_x, gx);
+      sum_y = hn::Add(sum_y, gy);
+    }
+  }
+  const auto n = hn::Set(d, 1.F / (kWindow * kWindow));
+  const auto mean_t = hn::Mul(n, hn::SumOfLanes(d, sum_t));
+  const auto mean_x = hn::Mul(n, hn::SumOfLanes(d, sum_x));
+  const auto mean_y = hn::Mul(n, hn::SumOfLanes(d, sum_y));
+
+  auto tt = hn::Zero(d), tx = hn::Zero(d), ty = hn::Zero(d);
+  for (int r = 0; r < kWindow; ++r) {
+    for (int c = 0; c < kWindowStride; c += lanes) {
+      const int i = r * kWindowStride + c;
+      const auto m = hn::Load(d, mask + c);
+      const auto v = hn::Mul(m, hn::Sub(hn::Load(d, w->value + i), mean_t));
+      const auto gx = hn::Mul(m, hn::Sub(hn::Load(d, w->steep_x + i), mean_x));
+      const auto gy = hn::Mul(m, hn::Sub(hn::Load(d, w->steep_y + i), mean_y));
+      hn::Store(v, d, w->value + i);
+      hn::Store(gx, d, w->steep_x + i);
+      hn::Store(gy, d, w->steep_y + i);
+      tt = hn::MulAdd(v, v, tt);
+      tx = hn::MulAdd(v, gx, tx);
+      ty = hn::MulAdd(v, gy, ty);
+    }
+  }
+  w->variance_sum = hn::GetLane(hn::SumOfLanes(d, tt));
+  const float inverse = w->variance_sum > 1e-3F ? 1.F / w->variance_sum : 0.F;
+  const auto along_x = hn::Set(d, hn::GetLane(hn::SumOfLanes(d, tx)) * inverse);
+  const auto along_y = hn::Set(d, hn::GetLane(hn::SumOfLanes(d, ty)) * inverse);
+  auto xx = hn::Zero(d), xy = hn::Zero(d), yy = hn::Zero(d);
+  for (int i = 0; i < kWindow * kWindowStride; i += lanes) {
+    const auto v = hn::Load(d, w->value + i);
+    const auto sx = hn::NegMulAdd(along_x, v, hn::Load(d, w->steep_x + i));
+    const auto sy = hn::NegMulAdd(along_y, v, hn::Load(d, w->steep_y + i));
+    hn::Store(sx, d, w->steep_x + i);
+    hn::Store(sy, d, w->steep_y + i);
+    xx = hn::MulAdd(sx, sx, xx);
+    xy = hn::MulAdd(sx, sy, xy);
+    yy = hn::MulAdd(sy, sy, yy);
+  }
+  w->hxx = hn::GetLane(hn::SumOfLanes(d, xx));
+  w->hxy = hn::GetLane(hn::SumOfLanes(d, xy));
+  w->hyy = hn::GetLane(hn::SumOfLanes(d, yy));
+}
+
+void WindowSumsAt(const Window& w, const std::uint8_t* at, std::ptrdiff_t stride, float fx, float fy, WindowSums* sums) {
+  const Tag d;
+  const hn::Rebind<std::int32_t, Tag> d32;
+  const hn::Rebind<std::uint8_t, Tag> d8;
+  const int lanes = static_cast<int>(hn::Lanes(d));
+  const auto vfx = hn::Set(d, fx), vfy = hn::Set(d, fy);
+  auto sx = hn::Zero(d), sy = hn::Zero(d), sv = hn::Zero(d), s1 = hn::Zero(d), s2 = hn::Zero(d);
+  HWY_ALIGN float mask[kWindowStride];
+  for (int c = 0; c < kWindowStride; ++c) mask[c] = c < kWindow ? 1.F : 0.F;
+  for (int c = 0; c < kWindowStride; c += lanes) {
+    const auto m = hn::Load(d, mask + c);
+    const auto lerped = [&](const std::uint8_t* p) {
+      const auto a = hn::ConvertTo(d, hn::PromoteTo(d32, hn::LoadU(d8, p)));
+      const auto b = hn::ConvertTo(d, hn::PromoteTo(d32, hn::LoadU(d8, p + 1)));
+      return hn::MulAdd(vfx, hn::Sub(b, a), a);
+    };
+    auto above = lerped(at + c);
+    for (int r = 0; r < kWindow; ++r) {
+      const auto below = lerped(at + (r + 1) * stride + c);
+      const auto v = hn::Mul(m, hn::MulAdd(vfy, hn::Sub(below, above), above));
+      const int i = r * kWindowStride + c;
+      sx = hn::MulAdd(v, hn::Load(d, w.steep_x + i), sx);
+      sy = hn::MulAdd(v, hn::Load(d, w.steep_y + i), sy);
+      sv = hn::MulAdd(v, hn::Load(d, w.value + i), sv);
+      s1 = hn::Add(s1, v);
+      s2 = hn::MulAdd(v, v, s2);
+      above = below;
+    }
+  }
+  sums->steep_x = hn::GetLane(hn::SumOfLanes(d, sx));
+  sums->steep_y = hn::GetLane(hn::SumOfLanes(d, sy));
+  sums->value = hn::GetLane(hn::SumOfLanes(d, sv));
+  sums->sum = hn::GetLane(hn::SumOfLanes(d, s1));
+  sums->square = hn::GetLane(hn::SumOfLanes(d, s2));
+}
+
+}  // namespace HWY_NAMESPACE
+}  // namespace vergence::features::detail
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace vergence::features::detail {
+HWY_EXPORT(MakeWindow);
+HWY_EXPORT(WindowSumsAt);
+
+void make_window(const std::uint8_t* patch, float centre_x, float centre_y, const float B[4], Window* window) noexcept {
+  HWY_DYNAMIC_DISPATCH(MakeWindow)(patch, centre_x, centre_y, B, window);
+}
+
+void window_sums(const Window& window, const std::uint8_t* at, std::ptrdiff_t stride, float fx, float fy, WindowSums* sums) noexcept {
+  HWY_DYNAMIC_DISPATCH(WindowSumsAt)(window, at, stride, fx, fy, sums);
+}
+}  // namespace vergence::features::detail
+#endif

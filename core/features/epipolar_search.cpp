@@ -1,0 +1,146 @@
+#include "core/features/epipolar_search.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstring>
+
+#include "core/features/detail/correlate_kernel.hpp"
+
+namespace vergence::features {
+namespace {
+
+using detail::BlockSums;
+using detail::kBlock;
+
+constexpr int kPlaces = kMaxSearchSteps * 5;  // along the curve times across it
+constexpr int kMaxBand = 2;
+
+struct Block {
+  std::array<std::uint8_t, kBlock * kBlock> pixels;
+  float sum = 0, variance = 0;  // Σ T, n Σ T² − (Σ T)²
+};
+
+Block middle_of(const Patch& patch, int level) noexcept {
+  Block b;
+  const auto& from = patch.pixels[static_cast<std::size_t>(level)];
+  constexpr int kFirst = kPatchSide / 2 - kBlock / 2;
+  float square = 0;
+  for (int r = 0; r < kBlock; ++r) {
+    std::memcpy(b.pixels.data() + r * kBlock, from.data() + (kFirst + r) * kPatchSide + kFirst, kBlock);
+    for (int c = 0; c < kBlock; ++c) {
+      const float v = b.pixels[static_cast<std::size_t>(r * kBlock + c)];
+      b.sum += v;
+      square += v * v;
+    }
+  }
+  b.variance = static_cast<float>(kBlock * kBlock) * square - b.sum * b.sum;
+  return b;
+}
+
+float zncc(const Block& b, const BlockSums& s) noexcept {
+  constexpr auto kN = static_cast<float>(kBlock * kBlock);
+  const auto sum = static_cast<float>(s.sum);
+  const float variance = kN * static_cast<float>(s.square) - sum * sum;
+  const float norm = b.variance * variance;
+  return norm > 1.F ? (kN * static_cast<float>(s.product) - b.sum * sum) / std::sqrt(norm) : 0.F;
+}
+
+}  // namespace
+
+SearchResult search_along(const Patch& patch, const Pyramid& image, const EpipolarCurve& curve, const EpipolarSearchOptions& options) noexcept {
+  SearchResult result;
+  const int level = std::min({options.level, image.levels() - 1, patch.levels - 1});
+  if (level < 0) return result;
+  const ImageView& view = image.level(level);
+  const double scale = std::ldexp(1.0, -level);
+  Vec2 first, last;
+  if (curve.at(options.rho_first, &first, nullptr) != ProjectStatus::ok) return result;
+  // The near end may lie beyond the lens: come back until it does not.
+  double rho_last = options.rho_last;
+  constexpr int kHalvings = 6;
+  int halvings = 0;
+  while (curve.at(rho_last, &last, nullptr) != ProjectStatus::ok && halvings++ < kHalvings)
+    rho_last = options.rho_first + 0.6 * (rho_last - options.rho_first);
+  if (halvings > kHalvings) return result;
+
+  const int steps = std::clamp(static_cast<int>(std::ceil((last - first).norm() * scale)), 1, kMaxSearchSteps - 1);
+  const Vec2 along = (last - first).normalized();
+  const bool horizontal = std::abs(along.x()) >= std::abs(along.y());
+  const int band = std::clamp(options.band, 0, kMaxBand);
+  const Block block = middle_of(patch, level);
+  // The block's first pixel stands kBlock/2 before the pixel searched for; the anchor's offset in its pixel moves with it.
+  const Vec2 anchor = patch.offset[static_cast<std::size_t>(level)].cast<double>();
+
+  std::array<std::int32_t, kPlaces> offsets;
+  std::array<std::int16_t, kPlaces> step_of;
+  std::array<Eigen::Vector2f, kPlaces> pixel_of;
+  int n = 0;
+  for (int i = 0; i <= steps; ++i) {
+    Vec2 p;
+    const double rho = options.rho_first + (rho_last - options.rho_first) * i / steps;
+    if (curve.at(rho, &p, nullptr) != ProjectStatus::ok) continue;
+    const int cx = static_cast<int>(std::lround(p.x() * scale - anchor.x())), cy = static_cast<int>(std::lround(p.y() * scale - anchor.y()));
+    for (int b = -band; b <= band; ++b) {
+      const int x = cx + (horizontal ? 0 : b), y = cy + (horizontal ? b : 0);
+      if (x < kBlock / 2 || y < kBlock / 2 || x + kBlock / 2 > view.width || y + kBlock / 2 > view.height) continue;
+      offsets[static_cast<std::size_t>(n)] = static_cast<std::int32_t>((y - kBlock / 2) * view.stride + (x - kBlock / 2));
+      step_of[static_cast<std::size_t>(n)] = static_cast<std::int16_t>(i);
+      pixel_of[static_cast<std::size_t>(n)] = {static_cast<float>(x), static_cast<float>(y)};
+      ++n;
+    }
+  }
+  if (n == 0) return result;
+  std::array<BlockSums, kPlaces> sums;
+  detail::correlate(block.pixels.data(), view.data, view.stride, offsets.data(), n, sums.data());
+
+  std::array<float, kMaxSearchSteps> best_of_step;
+  best_of_step.fill(-1.F);
+  int best = -1;
+  float best_score = -1.F;
+  for (int k = 0; k < n; ++k) {
+    const float z = zncc(block, sums[static_cast<std::size_t>(k)]);
+    float& of_step = best_of_step[static_cast<std::size_t>(step_of[static_cast<std::size_t>(k)])];
+    of_step = std::max(of_step, z);
+    if (z > best_score) {
+      best_score = z;
+      best = k;
+    }
+  }
+  const int best_step = step_of[static_cast<std::size_t>(best)];
+  float second = -1.F;
+  constexpr int kNeighbourhood = 3;  // px of the level: the same peak
+  for (int i = 0; i <= steps; ++i)
+    if (std::abs(i - best_step) > kNeighbourhood) second = std::max(second, best_of_step[static_cast<std::size_t>(i)]);
+  result.zncc = best_score;
+  result.rho = options.rho_first + (rho_last - options.rho_first) * best_step / steps;
+  result.pixel = (pixel_of[static_cast<std::size_t>(best)].cast<double>() + anchor) / scale;
+  if (best_score < options.min_zncc)
+    result.status = SearchStatus::uncorrelated;
+  else if (1.F - best_score > options.unique * (1.F - second))
+    result.status = SearchStatus::ambiguous;
+  else
+    result.status = SearchStatus::ok;
+  return result;
+}
+
+double fit_inverse_depth(const EpipolarCurve& curve, const Vec2& observed, double* rho, double* sigma_rho_per_px) noexcept {
+  constexpr int kSteps = 4;  // nearly linear in inverse depth: two suffice, lens distortion asks for a third
+  double value = *rho;
+  for (int i = 0; i < kSteps; ++i) {
+    Vec2 p;
+    Mat23 J;
+    if (curve.at(value, &p, &J) != ProjectStatus::ok) return -1.0;
+    const Vec2 d = J * curve.T_camera_left.t;
+    const double information = d.squaredNorm();
+    if (!(information > 1e-12)) return -1.0;
+    value += d.dot(observed - p) / information;
+    *sigma_rho_per_px = 1.0 / std::sqrt(information);
+  }
+  Vec2 p;
+  if (curve.at(value, &p, nullptr) != ProjectStatus::ok) return -1.0;
+  *rho = value;
+  return (observed - p).norm();
+}
+
+}  // namespace vergence::features

@@ -1,0 +1,268 @@
+#include "core/odometry/front_end.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+
+#include "core/features/epipolar_search.hpp"
+
+namespace vergence::odometry {
+namespace {
+
+constexpr double kImageMargin = 9.0;      // px: a window's half and one
+constexpr float kMinStructure = 3.0F;     // grey levels, standard deviation of the coarsest level: a lens cap's noise stays below 2
+constexpr double kFarBaselines = 2000.0;  // depth given to a point whose disparity is within the noise of zero
+constexpr double kNearDisparity = 3.0;    // px: ten times the noise of a match; what makes scale
+
+/// Shape of a patch seen from elsewhere, as if its surface faced the camera it was cut in: ∂(pixel there)/∂(pixel here).
+/// X = T (z ray): moving the pixel moves the ray, the depth z stays.
+Mat2 warp(const Mat23& d_pixel_d_point, const Mat3& R_there_here, double z, const Mat2& d_ray_d_pixel) noexcept {
+  return d_pixel_d_point * R_there_here.leftCols<2>() * (z * d_ray_d_pixel);
+}
+
+bool shows_something(const ImageView& image) noexcept {
+  std::int64_t sum = 0, square = 0;
+  for (int y = 0; y < image.height; ++y) {
+    const std::uint8_t* row = image.row(y);
+    for (int x = 0; x < image.width; ++x) {
+      sum += row[x];
+      square += row[x] * row[x];
+    }
+  }
+  const double n = static_cast<double>(image.width) * image.height;
+  const double mean = static_cast<double>(sum) / n;
+  return static_cast<double>(square) / n - mean * mean > static_cast<double>(kMinStructure * kMinStructure);
+}
+
+float milliseconds_since(std::chrono::steady_clock::time_point start) noexcept {
+  return std::chrono::duration<float, std::milli>(std::chrono::steady_clock::now() - start).count();
+}
+
+}  // namespace
+
+std::size_t FrontEnd::memory_needed(const OdometryOptions& options, const RigCalibration& rig) noexcept {
+  std::size_t bytes = 0;
+  for (int k = 0; k < rig.cameras; ++k) {
+    const Intrinsics& c = rig.intrinsics[static_cast<std::size_t>(k)];
+    bytes += features::Pyramid::memory_needed(c.width, c.height, options.pyramid_levels) + kMaxPoints * sizeof(Followed) + 2 * kCacheLine;
+  }
+  const auto n = static_cast<std::size_t>(options.features);
+  return bytes + n * (sizeof(features::Corner) + sizeof(NewPoint)) + kMaxPoints * sizeof(features::Corner) + 4 * kCacheLine;
+}
+
+FrontEnd::FrontEnd(const OdometryOptions& options, const RigCalibration& rig, Arena& arena, PairRunner& runner)
+    : options_(options), rig_(rig), runner_(runner), cameras_(rig.cameras) {
+  const auto n = static_cast<std::size_t>(options.features);
+  for (int k = 0; k < cameras_; ++k) {
+    const auto i = static_cast<std::size_t>(k);
+    const Intrinsics& c = rig.intrinsics[i];
+    lenses_[i] = Lens(c);
+    pyramids_[i] = features::Pyramid(c.width, c.height, options.pyramid_levels, arena);
+    followed_[i] = arena.make<Followed>(kMaxPoints, "followed points");
+  }
+  corners_ = BoundedVector<features::Corner>(arena.make<features::Corner>(n, "corners"));
+  taken_ = BoundedVector<features::Corner>(arena.make<features::Corner>(kMaxPoints, "taken corners"));
+  fresh_ = arena.make<NewPoint>(n, "new points");
+}
+
+ImageCheck FrontEnd::begin(const RigFrame& frame) noexcept {
+  std::array<bool, kMaxCameras> structured{};
+  const auto build = [&](int k) noexcept {
+    const auto i = static_cast<std::size_t>(k);
+    const ImageView& image = frame.images[i];
+    if (image.empty() || image.width != rig_.intrinsics[i].width || image.height != rig_.intrinsics[i].height) return;
+    pyramids_[i].build(image);
+    structured[i] = shows_something(pyramids_[i].level(pyramids_[i].levels() - 1));
+  };
+  auto left = [&]() noexcept { build(0); };
+  auto others = [&]() noexcept {
+    for (int k = 1; k < cameras_; ++k) build(k);
+  };
+  runner_.run(TaskRef(left), TaskRef(others));
+  ImageCheck check;
+  for (int k = 0; k < cameras_; ++k) {
+    const auto i = static_cast<std::size_t>(k);
+    if (!frame.images[i].empty()) check.given = static_cast<std::uint8_t>(check.given | (1U << static_cast<unsigned>(k)));
+    if (structured[i]) check.structured = static_cast<std::uint8_t>(check.structured | (1U << static_cast<unsigned>(k)));
+  }
+  structured_ = check.structured;
+  return check;
+}
+
+bool FrontEnd::finish(int k, const Vec2& raw, Followed* f) const noexcept {
+  Vec2 ideal;
+  double magnification = 1.0;
+  if (!lens(k).undistort(raw, &ideal, &magnification)) return false;
+  f->found = true;
+  f->raw = raw.cast<float>();
+  f->ideal = ideal.cast<float>();
+  f->sigma = static_cast<float>(options_.pixel_sigma * magnification);
+  return true;
+}
+
+FrontEnd::Followed FrontEnd::follow(const MapPoint& p, const Transform& T_left_world, int k, const features::AlignOptions& how) const noexcept {
+  Followed f;
+  const auto i = static_cast<std::size_t>(k);
+  const Transform T_k_world = rig_.T_camera_left[i] * T_left_world;
+  const Camera& camera = lenses_[i].raw();
+  Vec2 predicted;
+  Mat23 J;
+  if (camera.project(T_k_world * p.p_world, &predicted, &J) != ProjectStatus::ok || !camera.inside(predicted, kImageMargin)) return f;
+  const Transform T_k_origin = T_k_world * p.T_origin_world.inverse();
+  const double z = (p.T_origin_world * p.p_world).z();
+  const features::AlignResult a = features::align(p.patch, pyramids_[i], predicted, warp(J, T_k_origin.R, z, p.d_ray_d_pixel), how);
+  if (a.status == features::AlignStatus::ok) (void)finish(k, a.pixel, &f);
+  return f;
+}
+
+void FrontEnd::store(const Followed& f, int k, MapPoint* p) noexcept {
+  p->now.set(k, f.ideal.cast<double>(), f.sigma);
+  p->raw[static_cast<std::size_t>(k)] = f.raw;
+}
+
+void FrontEnd::follow_sample(Map& map, const Transform& T_left_world, int k, int sample) noexcept {
+  int active = 0;
+  for (const MapPoint& p : map.points()) active += p.stage == PointStage::active ? 1 : 0;
+  const int stride = std::max(1, (active + sample - 1) / std::max(sample, 1));
+  features::AlignOptions how;
+  how.coarsest = features::kPatchLevels - 1;
+  how.finest = std::min(1, pyramids_[static_cast<std::size_t>(k)].levels() - 1);
+  how.min_zncc = 0.8F;
+  how.max_shift = 64.F;
+  int n = 0;
+  for (MapPoint& p : map.points()) {
+    p.now.cameras = 0;
+    if (p.stage != PointStage::active || n++ % stride != 0) continue;
+    const Followed f = follow(p, T_left_world, k, how);
+    if (f.found) store(f, k, &p);
+  }
+}
+
+void FrontEnd::follow_all(Map& map, const Transform& T_left_world) noexcept {
+  const std::span<MapPoint> points = map.points();
+  features::AlignOptions how;
+  how.coarsest = 1;
+  how.finest = 0;
+  how.min_zncc = static_cast<float>(options_.match_zncc);
+  how.max_shift = 8.F;
+  const auto one = [&](int k) noexcept {
+    const auto c = static_cast<std::size_t>(k);
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      followed_[c][i].found = false;
+      if (points[i].followed() && ((structured_ >> static_cast<unsigned>(k)) & 1U) != 0) followed_[c][i] = follow(points[i], T_left_world, k, how);
+    }
+  };
+  auto left = [&]() noexcept { one(0); };
+  auto others = [&]() noexcept {
+    for (int k = 1; k < cameras_; ++k) one(k);
+  };
+  runner_.run(TaskRef(left), TaskRef(others));
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    points[i].now.cameras = 0;
+    for (int k = 0; k < cameras_; ++k)
+      if (followed_[static_cast<std::size_t>(k)][i].found) store(followed_[static_cast<std::size_t>(k)][i], k, &points[i]);
+  }
+}
+
+void FrontEnd::match_across(const features::Corner& corner, bool exchanged, NewPoint* out) const noexcept {
+  out->usable = false;
+  out->behind = false;
+  const Vec2 at(corner.x, corner.y);
+  if (!features::cut_patch(pyramids_[0], at, &out->patch)) return;
+  if (!lenses_[0].ray_jacobian(at, &out->ray, &out->d_ray_d_pixel)) return;
+  if (!finish(0, at, &out->left)) return;
+  for (int k = 1; k < cameras_; ++k) {
+    if (((structured_ >> static_cast<unsigned>(k)) & 1U) == 0) continue;
+    const auto i = static_cast<std::size_t>(k);
+    const features::EpipolarCurve curve{&lenses_[i].raw(), rig_.T_camera_left[i], out->ray};
+    const double baseline = rig_.T_camera_left[i].t.norm();
+    features::EpipolarSearchOptions search;
+    search.level = 1;
+    search.rho_last = (exchanged ? -1.0 : 1.0) / (options_.nearest_baselines * baseline);
+    const features::SearchResult s = features::search_along(out->patch, pyramids_[i], curve, search);
+    if (s.status != features::SearchStatus::ok) continue;
+    double rho = s.rho;
+    Vec2 foot;
+    Mat23 J;
+    if (curve.at(rho, &foot, &J) != ProjectStatus::ok) continue;
+    features::AlignOptions how;
+    how.coarsest = 1;
+    how.min_zncc = static_cast<float>(options_.match_zncc);
+    how.max_shift = 6.F;
+    // The curve's point is in units of depth 1, so the warp's depth is 1 too.
+    const features::AlignResult a =
+        features::align(out->patch, pyramids_[i], s.pixel, warp(J, curve.T_camera_left.R, 1.0, out->d_ray_d_pixel), how);
+    if (a.status != features::AlignStatus::ok) continue;
+    double sigma_per_px = 0;
+    const double off = features::fit_inverse_depth(curve, a.pixel, &rho, &sigma_per_px);
+    if (off < 0 || off > options_.band_px) continue;
+    out->disparity = rho / sigma_per_px;
+    const double noise = 2.0 * std::sqrt(2.0) * options_.pixel_sigma;  // px, two sigmas of a difference of two positions
+    if (exchanged) {
+      out->behind = out->disparity < -kNearDisparity;
+      return;
+    }
+    if (out->disparity < -noise) continue;
+    out->rho = std::max(rho, 1.0 / (kFarBaselines * baseline));
+    if (!finish(k, a.pixel, &out->across)) continue;
+    out->matched_camera = k;
+    out->usable = true;
+    return;
+  }
+}
+
+void FrontEnd::match_all(std::span<const features::Corner> corners, bool exchanged) noexcept {
+  const std::size_t half = corners.size() / 2;
+  auto first = [&]() noexcept {
+    for (std::size_t i = 0; i < half; ++i) match_across(corners[i], exchanged, &fresh_[i]);
+  };
+  auto second = [&]() noexcept {
+    for (std::size_t i = half; i < corners.size(); ++i) match_across(corners[i], exchanged, &fresh_[i]);
+  };
+  runner_.run(TaskRef(first), TaskRef(second));
+}
+
+AcrossCount FrontEnd::add_points(Map& map, const Transform& T_left_world, PointStage stage) noexcept {
+  AcrossCount count;
+  const auto start = std::chrono::steady_clock::now();
+  taken_.clear();
+  for (const MapPoint& p : map.points())
+    if (p.followed() && p.now.by(0)) (void)taken_.push({p.raw[0].x(), p.raw[0].y(), 0.F});
+  features::CornerOptions corner_options;
+  corner_options.cell = options_.cell_px;
+  corner_options.min_score = static_cast<float>(options_.min_corner_score);
+  corner_options.min_distance = 0.4F * static_cast<float>(options_.cell_px);
+  features::find_corners(pyramids_[0].level(0), corner_options, taken_.span(), &corners_);
+  const auto room = static_cast<std::size_t>(std::max(0, options_.features - static_cast<int>(taken_.size())));
+  if (corners_.size() > room) corners_.truncate(room);
+  detect_ms_ = milliseconds_since(start);
+
+  count.corners = static_cast<int>(corners_.size());
+  match_all(corners_.span(), false);
+  const Transform T_world_left = T_left_world.inverse();
+  for (std::size_t i = 0; i < corners_.size(); ++i) {
+    const NewPoint& f = fresh_[i];
+    if (!f.usable) continue;
+    ++count.matched;
+    if (f.disparity > kNearDisparity) ++count.near;
+    MapPoint* p = map.make_point();
+    if (p == nullptr) break;
+    p->stage = stage;
+    p->p_world = T_world_left * (f.ray / f.rho);
+    p->T_origin_world = T_left_world;
+    p->ray = f.ray;
+    p->d_ray_d_pixel = f.d_ray_d_pixel;
+    p->patch = f.patch;
+    p->found = 1;
+    store(f.left, 0, p);
+    store(f.across, f.matched_camera, p);
+  }
+  // Few matches in front of the rig: are they behind it?
+  if (count.near * 4 < count.corners) {
+    match_all(corners_.span(), true);
+    for (std::size_t i = 0; i < corners_.size(); ++i) count.exchanged += fresh_[i].behind ? 1 : 0;
+  }
+  return count;
+}
+
+}  // namespace vergence::odometry

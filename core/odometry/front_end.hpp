@@ -1,0 +1,91 @@
+#pragma once
+#include <array>
+#include <cstdint>
+#include <span>
+
+#include "core/features/corners.hpp"
+#include "core/features/pyramid.hpp"
+#include "core/odometry/lens.hpp"
+#include "core/odometry/map.hpp"
+#include "core/odometry/options.hpp"
+#include "core/types/parallel.hpp"
+#include "core/types/rig_frame.hpp"
+
+namespace vergence::odometry {
+
+/// What the images of one frame are good for.
+struct ImageCheck {
+  std::uint8_t given = 0;       // bit k: camera k delivered an image
+  std::uint8_t structured = 0;  // bit k: and it shows something
+};
+
+/// How the search across went for the corners of one frame.
+struct AcrossCount {
+  int corners = 0;
+  int matched = 0;    // in front of the rig
+  int near = 0;       // of these, with a disparity that measures depth
+  int exchanged = 0;  // would lie behind it: asked for only when few matched
+};
+
+/// Pixels of one rig frame: pyramids, following points, new corners and their matches across.
+///
+/// Ownership  Reads the frame's images until the next begin(). Options, rig and runner are the owner's.
+/// Threads    One caller; the runner takes the cameras but `left` to its other side. Results do not depend on it.
+/// Memory     From the arena at construction. When the map has no room for a new point, the weakest corners are dropped.
+class FrontEnd {
+ public:
+  FrontEnd(const OdometryOptions& options, const RigCalibration& rig, Arena& arena, PairRunner& runner);
+  [[nodiscard]] static std::size_t memory_needed(const OdometryOptions& options, const RigCalibration& rig) noexcept;
+
+  /// Builds the pyramids of a frame's images.
+  [[nodiscard]] ImageCheck begin(const RigFrame& frame) noexcept;
+
+  /// Follows a spread sample of at most `sample` active points into camera k from far away: coarse levels, wide search.
+  void follow_sample(Map& map, const Transform& T_left_world, int k, int sample) noexcept;
+  /// Follows every followed point into every structured camera from a good prediction.
+  void follow_all(Map& map, const Transform& T_left_world) noexcept;
+
+  /// New corners of `left` where there are no points, matched across, as points of the given stage, each with its sighting in `now`.
+  AcrossCount add_points(Map& map, const Transform& T_left_world, PointStage stage) noexcept;
+
+  [[nodiscard]] const Lens& lens(int k) const noexcept { return lenses_[static_cast<std::size_t>(k)]; }
+  [[nodiscard]] float detect_ms() const noexcept { return detect_ms_; }
+
+ private:
+  struct Followed {
+    bool found = false;
+    Eigen::Vector2f raw{}, ideal{};
+    float sigma = 0;
+  };
+  struct NewPoint {
+    bool usable = false;
+    bool behind = false;  // matched where a point of exchanged cameras would lie
+    int matched_camera = 0;
+    double rho = 0;       // 1/m
+    double disparity = 0; // px between here and a point at infinity
+    Vec3 ray{};
+    Mat2 d_ray_d_pixel{};
+    features::Patch patch{};
+    Followed left, across;
+  };
+
+  [[nodiscard]] Followed follow(const MapPoint& p, const Transform& T_left_world, int k, const features::AlignOptions& how) const noexcept;
+  [[nodiscard]] bool finish(int k, const Vec2& raw, Followed* f) const noexcept;
+  void match_across(const features::Corner& corner, bool exchanged, NewPoint* out) const noexcept;
+  void match_all(std::span<const features::Corner> corners, bool exchanged) noexcept;
+  static void store(const Followed& f, int k, MapPoint* p) noexcept;
+
+  const OdometryOptions& options_;
+  const RigCalibration& rig_;
+  PairRunner& runner_;
+  int cameras_;
+  std::uint8_t structured_ = 0;
+  std::array<Lens, kMaxCameras> lenses_{};
+  std::array<features::Pyramid, kMaxCameras> pyramids_{};
+  std::array<std::span<Followed>, kMaxCameras> followed_{};
+  BoundedVector<features::Corner> corners_, taken_;
+  std::span<NewPoint> fresh_;
+  float detect_ms_ = 0;
+};
+
+}  // namespace vergence::odometry

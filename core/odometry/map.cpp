@@ -1,0 +1,50 @@
+#include "core/odometry/map.hpp"
+
+#include <algorithm>
+
+namespace vergence::odometry {
+
+void Map::clear() noexcept {
+  for (MapPoint& p : points_) p.stage = PointStage::free;
+  order_.clear();
+  next_point_ = 0;
+}
+
+MapPoint* Map::make_point() noexcept {
+  for (std::size_t i = 0; i < points_.size(); ++i) {
+    MapPoint& p = points_[(next_point_ + i) % points_.size()];
+    if (p.stage != PointStage::free) continue;
+    next_point_ = (next_point_ + i + 1) % points_.size();
+    p.missed = 0;
+    p.found = 0;
+    p.now.cameras = 0;
+    for (Sighting& s : p.seen) s.cameras = 0;
+    return &p;
+  }
+  return nullptr;
+}
+
+void Map::drop_oldest_keyframe() noexcept {
+  const std::size_t slot = order_[0];
+  std::rotate(order_.begin(), order_.begin() + 1, order_.end());
+  order_.truncate(order_.size() - 1);
+  for (MapPoint& p : points_) {
+    if (p.stage == PointStage::free) continue;
+    p.seen[slot].cameras = 0;
+    if (p.stage != PointStage::dormant) continue;
+    const bool still = std::any_of(order_.begin(), order_.end(), [&](std::uint8_t s) { return p.seen[s].cameras != 0; });
+    if (!still) p.stage = PointStage::free;
+  }
+}
+
+std::size_t Map::make_keyframe(const Transform& T_left_world, Stamp stamp) noexcept {
+  if (order_.size() >= window_) drop_oldest_keyframe();
+  std::size_t slot = 0;
+  while (std::find(order_.begin(), order_.end(), slot) != order_.end()) ++slot;
+  (void)order_.push(static_cast<std::uint8_t>(slot));
+  keyframes_[slot] = {T_left_world, stamp};
+  for (MapPoint& p : points_) p.seen[slot].cameras = 0;
+  return slot;
+}
+
+}  // namespace vergence::odometry

@@ -1,0 +1,92 @@
+#pragma once
+#include <array>
+#include <cstdint>
+
+#include "core/features/patch.hpp"
+#include "core/memory/fixed_vector.hpp"
+#include "core/types/calibration.hpp"
+#include "core/types/time.hpp"
+
+namespace vergence::odometry {
+
+inline constexpr std::size_t kMaxWindow = 20;     // keyframes; OdometryOptions::window_keyframes stays below
+inline constexpr std::size_t kMaxPoints = 2048;   // of the map: tracked ones and those the window still sees
+
+/// What one rig frame saw of a point: pixels of an ideal pinhole camera with each camera's own K, distortion removed.
+struct Sighting {
+  std::array<Eigen::Vector2f, kMaxCameras> pixel{};
+  std::array<float, kMaxCameras> sigma{};  // px, one coordinate
+  std::uint8_t cameras = 0;                // bit k: camera k saw it
+
+  [[nodiscard]] bool by(int k) const noexcept { return ((cameras >> static_cast<unsigned>(k)) & 1U) != 0; }
+  void set(int k, const Vec2& at, float s) noexcept {
+    pixel[static_cast<std::size_t>(k)] = at.cast<float>();
+    sigma[static_cast<std::size_t>(k)] = s;
+    cameras = static_cast<std::uint8_t>(cameras | (1U << static_cast<unsigned>(k)));
+  }
+  void drop(int k) noexcept { cameras = static_cast<std::uint8_t>(cameras & ~(1U << static_cast<unsigned>(k))); }
+};
+
+enum class PointStage : std::uint8_t {
+  free,       // slot not in use
+  candidate,  // followed, but not yet seen often enough to hold a pose
+  active,     // followed, holds poses
+  dormant,    // no longer followed; the window still adjusts with its sightings
+};
+
+/// A point of the scene. p_world in metres; the patch is what it looked like in `left` where it was made.
+struct MapPoint {
+  PointStage stage = PointStage::free;
+  std::uint8_t missed = 0;      // frames in a row that did not find it
+  std::uint16_t found = 0;      // frames that did
+  Vec3 p_world = Vec3::Zero();
+  Transform T_origin_world{};   // left camera where the patch was cut
+  Vec3 ray = Vec3::UnitZ();     // (x, y, 1) of its pixel there
+  Mat2 d_ray_d_pixel = Mat2::Identity();  // of that ray's x, y by the raw pixel
+  features::Patch patch{};
+  Sighting now{};               // this frame's
+  std::array<Eigen::Vector2f, kMaxCameras> raw{};  // this frame's pixels as the image has them
+  std::array<Sighting, kMaxWindow> seen{};         // by keyframe slot
+
+  [[nodiscard]] bool followed() const noexcept { return stage == PointStage::candidate || stage == PointStage::active; }
+};
+
+struct Keyframe {
+  Transform T_left_world{};
+  Stamp stamp{};
+};
+
+/// Points and the window of keyframes, fixed memory.
+///
+/// Policies when full  Points: make_point() refuses, the caller counts. Keyframes: make_keyframe() drops the oldest first.
+class Map {
+ public:
+  Map(std::size_t window, Arena& arena)
+      : points_(arena.make<MapPoint>(kMaxPoints, "map points")), window_(window) {}
+  [[nodiscard]] static std::size_t memory_needed() noexcept { return kMaxPoints * sizeof(MapPoint) + 2 * kCacheLine; }
+
+  void clear() noexcept;
+  /// A free slot, cleared; null when there is none.
+  [[nodiscard]] MapPoint* make_point() noexcept;
+  void free_point(MapPoint* p) noexcept { p->stage = PointStage::free; }
+  /// Slot of a new keyframe, dropping the oldest when the window is full. Every point's sighting there is empty.
+  [[nodiscard]] std::size_t make_keyframe(const Transform& T_left_world, Stamp stamp) noexcept;
+
+  [[nodiscard]] std::span<MapPoint> points() noexcept { return points_; }
+  [[nodiscard]] std::span<const MapPoint> points() const noexcept { return points_; }
+  [[nodiscard]] Keyframe& keyframe(std::size_t slot) noexcept { return keyframes_[slot]; }
+  [[nodiscard]] const Keyframe& keyframe(std::size_t slot) const noexcept { return keyframes_[slot]; }
+  /// Slots in use, oldest first.
+  [[nodiscard]] std::span<const std::uint8_t> order() const noexcept { return order_.span(); }
+
+ private:
+  void drop_oldest_keyframe() noexcept;
+
+  std::span<MapPoint> points_;
+  std::size_t window_;
+  std::size_t next_point_ = 0;  // where the search for a free slot goes on
+  std::array<Keyframe, kMaxWindow> keyframes_{};
+  FixedVector<std::uint8_t, kMaxWindow> order_;
+};
+
+}  // namespace vergence::odometry
