@@ -1,0 +1,133 @@
+#include "core/geometry/triangulate.hpp"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+
+namespace vergence {
+namespace {
+
+constexpr double kMinForward = 1e-6;        // of h_z, where the first view has 1: a ray nearly at right angles to the camera's axis
+constexpr double kConverged = 1e-12;        // of the ray, radians
+constexpr double kMinParallaxGain = 1e-18;  // of Σ (∂ray/∂ρ)², m²: cameras within nanometres of each other
+
+struct Reduced {
+  Mat3 H;
+  Vec3 g;
+  double chi2;
+};
+
+[[nodiscard]] bool valid(std::span<const RayView> views) noexcept {
+  if (views.size() < 2) return false;
+  return std::all_of(views.begin(), views.end(), [](const RayView& v) noexcept {
+    return v.T_camera_world.finite() && v.ray.allFinite() && v.sigma > 0 && std::isfinite(v.sigma);
+  });
+}
+
+/// T_view_first as seen by every view in turn.
+[[nodiscard]] Transform relative(const RayView& view, const RayView& first) noexcept {
+  const Mat3 R = view.T_camera_world.R * first.T_camera_world.R.transpose();
+  return {R, view.T_camera_world.t - R * first.T_camera_world.t};
+}
+
+/// False: a view has the point beside or behind it.
+[[nodiscard]] bool reduce(std::span<const RayView> views, const Vec3& abr, Reduced* out) noexcept {
+  *out = {Mat3::Zero(), Vec3::Zero(), 0.0};
+  for (const RayView& v : views) {
+    const Transform T = relative(v, views.front());
+    const Vec3 h = T.R * Vec3(abr[0], abr[1], 1.0) + abr[2] * T.t;
+    if (!(h.z() > kMinForward)) return false;
+    const double iz = 1.0 / h.z(), x = h.x() * iz, y = h.y() * iz;
+    Mat3 dh;  // ∂h/∂(a, b, ρ)
+    dh << T.R.col(0), T.R.col(1), T.t;
+    Mat23 J;
+    J.row(0) = iz * (dh.row(0) - x * dh.row(2));
+    J.row(1) = iz * (dh.row(1) - y * dh.row(2));
+    const Vec2 r = v.ray - Vec2(x, y);
+    const double w = 1.0 / (v.sigma * v.sigma);
+    out->H.noalias() += w * J.transpose() * J;
+    out->g.noalias() += w * J.transpose() * r;
+    out->chi2 += w * r.squaredNorm();
+  }
+  return true;
+}
+
+/// Weighted least squares of ρ with (a, b) as the first view measured them. False: no view tells.
+[[nodiscard]] bool linear_inverse_depth(std::span<const RayView> views, double* rho) noexcept {
+  const RayView& first = views.front();
+  double num = 0, den = 0, gain = 0;
+  for (const RayView& v : views.subspan(1)) {
+    const Transform T = relative(v, first);
+    const Vec3 m = T.R * Vec3(first.ray.x(), first.ray.y(), 1.0);
+    const double scale = 1.0 / (v.sigma * std::max(std::abs(m.z()), kMinForward));
+    // x (m_z + ρ t_z) = m_x + ρ t_x, likewise y.
+    const Vec2 a = (v.ray * T.t.z() - T.t.head<2>()) * scale, b = (m.head<2>() - v.ray * m.z()) * scale;
+    num += a.dot(b);
+    den += a.squaredNorm();
+    gain += a.squaredNorm() * v.sigma * v.sigma;
+  }
+  if (!(gain > kMinParallaxGain)) return false;
+  *rho = num / den;
+  return std::isfinite(*rho);
+}
+
+}  // namespace
+
+TriangulatedPoint triangulate(std::span<const RayView> views, const TriangulateOptions& options) noexcept {
+  TriangulatedPoint out;
+  if (!valid(views)) return out;
+  const RayView& first = views.front();
+  Vec3 abr(first.ray.x(), first.ray.y(), 0.0);
+  if (!linear_inverse_depth(views, &abr[2])) {
+    out.status = TriangulateStatus::no_baseline;
+    return out;
+  }
+  Reduced now;
+  if (!reduce(views, abr, &now)) {
+    out.status = TriangulateStatus::behind;
+    out.inverse_depth = abr[2];
+    return out;
+  }
+  for (int step = 0; step < options.max_steps; ++step) {
+    const Eigen::LLT<Mat3> llt(now.H);
+    if (llt.info() != Eigen::Success) break;
+    const Vec3 delta = llt.solve(now.g);
+    const Vec3 next = abr + delta;
+    Reduced then;
+    // A step that does not lower the error ends it: rounding, or a point that no depth explains.
+    if (!next.allFinite() || !reduce(views, next, &then) || !(then.chi2 <= now.chi2)) break;
+    abr = next;
+    now = then;
+    if (delta.norm() < kConverged) break;
+  }
+  const Eigen::LLT<Mat3> llt(now.H);
+  const Mat3 S = llt.info() == Eigen::Success ? Mat3(llt.solve(Mat3::Identity())) : Mat3(Mat3::Zero());
+  if (llt.info() != Eigen::Success || !S.allFinite() || !(S(2, 2) > 0)) {
+    out.status = TriangulateStatus::no_baseline;
+    return out;
+  }
+  out.chi2 = now.chi2;
+  out.inverse_depth = abr[2];
+  out.inverse_depth_sigma = std::sqrt(S(2, 2));
+  const double rho = abr[2], sigma = out.inverse_depth_sigma;
+  if (rho < -options.min_significance * sigma) {
+    out.status = TriangulateStatus::behind;
+    return out;
+  }
+  const Transform T_world_first = first.T_camera_world.inverse();
+  if (rho < options.min_significance * sigma) {
+    out.status = TriangulateStatus::no_parallax;
+    out.p_world = T_world_first * Vec3(Vec3(abr[0], abr[1], 1.0) / (std::max(rho, 0.0) + options.min_significance * sigma));
+    return out;
+  }
+  out.status = TriangulateStatus::ok;
+  const double d = 1.0 / rho;
+  out.p_world = T_world_first * Vec3(abr[0] * d, abr[1] * d, d);
+  Mat3 J;  // ∂p_first/∂(a, b, ρ)
+  J << d, 0, -abr[0] * d * d, 0, d, -abr[1] * d * d, 0, 0, -d * d;
+  J = T_world_first.R * J;
+  out.covariance = J * S * J.transpose();
+  return out;
+}
+
+}  // namespace vergence

@@ -1,0 +1,102 @@
+#include "core/geometry/epipolar.hpp"
+
+#include <gtest/gtest.h>
+
+#include "tests/support/numeric_jacobian.hpp"
+#include "tests/unit/core/geometry/random_scene.hpp"
+
+namespace vergence {
+namespace {
+
+using Value = Eigen::Matrix<double, 1, 1>;
+
+Transform random_stereo(Random& random) { return {exp_so3(test::random_vector(random, -0.5, 0.5)), test::random_vector(random, -1, 1)}; }
+
+Vec2 ray_of(const Vec3& p) { return {p.x() / p.z(), p.y() / p.z()}; }
+
+TEST(Epipolar, trueMatchesHaveNoResidual) {
+  Random random(41);
+  for (int k = 0; k < 1000; ++k) {
+    const Transform T = random_stereo(random);
+    const Vec3 p = test::visible_point(random, 4, 40);
+    const EpipolarGeometry geometry(T);
+    double sampson = 1, line = 1;
+    ASSERT_EQ(geometry.sampson(ray_of(p), ray_of(T * p), &sampson, nullptr), EpipolarStatus::ok);
+    ASSERT_EQ(geometry.to_line(ray_of(p), ray_of(T * p), &line, nullptr), EpipolarStatus::ok);
+    EXPECT_NEAR(sampson, 0, 1e-13);
+    EXPECT_NEAR(line, 0, 1e-13);
+    double left = 0, right = 0;
+    ASSERT_TRUE(match_depths(T, ray_of(p), ray_of(T * p), &left, &right));
+    EXPECT_NEAR(left, p.z(), 1e-6 * p.z());
+    EXPECT_NEAR(right, (T * p).z(), 1e-6 * p.z());
+  }
+}
+
+TEST(Epipolar, parallelCamerasMeasureTheVerticalDisparity) {
+  const EpipolarGeometry geometry(Transform{Mat3::Identity(), {-0.5, 0, 0}});
+  double line = 0, sampson = 0;
+  ASSERT_EQ(geometry.to_line({0.1, 0.2}, {0.05, 0.23}, &line, nullptr), EpipolarStatus::ok);
+  ASSERT_EQ(geometry.sampson({0.1, 0.2}, {0.05, 0.23}, &sampson, nullptr), EpipolarStatus::ok);
+  EXPECT_NEAR(std::abs(line), 0.03, 1e-15);
+  EXPECT_NEAR(std::abs(sampson), 0.03 / std::sqrt(2.0), 1e-15);  // shared between both images
+}
+
+TEST(Epipolar, derivativesMatchCentralDifferences) {
+  Random random(42);
+  std::vector<Transform> transforms = {Transform{Mat3::Identity(), {-0.75, 0, 0}}, Transform{exp_so3({0, 3.1, 0}), {0.1, 0.2, 5}}};
+  for (int k = 0; k < 100; ++k) transforms.push_back(random_stereo(random));
+  for (const Transform& T : transforms) {
+    const Vec2 left(random.uniform(-0.6, 0.6), random.uniform(-0.4, 0.4));
+    const Vec2 right(left.x() + random.uniform(-0.2, 0.1), left.y() + random.uniform(-0.05, 0.05));
+    double value = 0;
+    Vec5 J;
+    ASSERT_EQ(EpipolarGeometry(T).sampson(left, right, &value, &J), EpipolarStatus::ok);
+    EXPECT_TRUE(test::jacobian_matches(
+        J.transpose(),
+        [&](const Vec5& d) {
+          double v = 0;
+          EXPECT_EQ(EpipolarGeometry(moved_on_sphere(T, d)).sampson(left, right, &v, nullptr), EpipolarStatus::ok);
+          return Value(v);
+        },
+        1e-7));
+    ASSERT_EQ(EpipolarGeometry(T).to_line(left, right, &value, &J), EpipolarStatus::ok);
+    EXPECT_TRUE(test::jacobian_matches(
+        J.transpose(),
+        [&](const Vec5& d) {
+          double v = 0;
+          EXPECT_EQ(EpipolarGeometry(moved_on_sphere(T, d)).to_line(left, right, &v, nullptr), EpipolarStatus::ok);
+          return Value(v);
+        },
+        1e-7));
+  }
+}
+
+TEST(Epipolar, movingKeepsTheLengthAndTheBasisIsOrthonormal) {
+  Random random(43);
+  for (int k = 0; k < 100; ++k) {
+    const Transform T = random_stereo(random);
+    Vec5 delta;
+    for (double& d : delta) d = random.uniform(-0.3, 0.3);
+    const Transform moved = moved_on_sphere(T, delta);
+    EXPECT_NEAR(moved.t.norm(), T.t.norm(), 1e-14);
+    const Vec3 unit = T.t.normalized();
+    const Mat32 B = tangent_basis(unit);
+    EXPECT_LT((B.transpose() * B - Mat2::Identity()).norm(), 1e-14);
+    EXPECT_LT((B.transpose() * unit).norm(), 1e-14);
+  }
+}
+
+TEST(Epipolar, namesWhereNothingIsMeasured) {
+  double value = 7;
+  EXPECT_EQ(EpipolarGeometry(Transform{}).sampson({0, 0}, {0, 0}, &value, nullptr), EpipolarStatus::no_baseline);
+  const EpipolarGeometry forward(Transform{Mat3::Identity(), {0, 0, -1}});
+  EXPECT_EQ(forward.sampson({0, 0}, {0, 0}, &value, nullptr), EpipolarStatus::at_epipole);
+  EXPECT_EQ(forward.to_line({0, 0}, {0.1, 0}, &value, nullptr), EpipolarStatus::at_epipole);
+  EXPECT_EQ(value, 7);
+  double l = 3, r = 3;
+  EXPECT_FALSE(match_depths(Transform{Mat3::Identity(), {1, 0, 0}}, {0.1, 0}, {0.1, 0}, &l, &r));
+  EXPECT_EQ(l, 3);
+}
+
+}  // namespace
+}  // namespace vergence
