@@ -16,9 +16,10 @@
 namespace vergence::app {
 namespace {
 
-/// One sentence on one line of stderr.
+/// One sentence on one line of stderr. Words of the user's may stand in it: nothing in them may steer a terminal.
 void complain(std::string sentence) {
-  std::replace(sentence.begin(), sentence.end(), '\n', ' ');
+  std::replace_if(
+      sentence.begin(), sentence.end(), [](unsigned char c) { return c < 0x20 || c == 0x7f; }, ' ');
   std::cerr << "vergence: " << sentence << '\n';
 }
 
@@ -46,9 +47,9 @@ std::string sentence_for(const CLI::ParseError& error, CLI::App& root) {
   const auto given = root.get_subcommands();
   CLI::App& command = given.empty() ? root : *given.front();
   const std::string who = given.empty() ? "" : command.get_name() + ": ";
-  if (dynamic_cast<const CLI::ExtrasError*>(&error) != nullptr) {
-    const auto extras = root.remaining(true);
-    const std::string first = extras.empty() ? "" : extras.front();
+  // What was not understood is said first: it is often why something else seems to be missing.
+  if (const auto extras = root.remaining(true); !extras.empty()) {
+    const std::string& first = extras.front();
     const std::string name = first.substr(0, first.find('='));
     const bool option = name.size() > 1 && name.front() == '-';
     return who + (option ? "unknown option " : "unexpected argument ") + "\"" + name + "\"" +

@@ -1,0 +1,96 @@
+#include <algorithm>
+#include <string>
+
+#include <gtest/gtest.h>
+
+#include "app/runtime/version.hpp"
+#include "tests/unit/app/commands/run_vergence.hpp"
+
+namespace vergence::app {
+namespace {
+
+using test::Outcome;
+using test::run_vergence;
+
+/// Refused as DESIGN §6 wants it: exit 2, nothing on stdout, one line on stderr.
+testing::AssertionResult refused_in_one_sentence(const Outcome& outcome) {
+  const auto lines = std::count(outcome.err.begin(), outcome.err.end(), '\n');
+  if (outcome.code == 2 && outcome.out.empty() && lines == 1 && outcome.err.size() > 20) return testing::AssertionSuccess();
+  return testing::AssertionFailure() << "exit code " << outcome.code << ", stdout \"" << outcome.out << "\", stderr \"" << outcome.err
+                                     << '"';
+}
+
+bool contains(const std::string& text, const std::string& part) { return text.find(part) != std::string::npos; }
+
+TEST(Program, VersionAndHelpGoToStandardOutput) {
+  const Outcome version_asked = run_vergence("--version");
+  EXPECT_EQ(version_asked.code, 0);
+  EXPECT_EQ(version_asked.out, "vergence " + std::string(version()) + "\n");
+  EXPECT_EQ(version_asked.err, "");
+  const Outcome help = run_vergence("--help");
+  EXPECT_EQ(help.code, 0);
+  EXPECT_EQ(help.err, "");
+  for (const char* word : {"run", "replay", "evaluate", "simulate", "calibrate", "devices", "doctor", "snap", "report"})
+    EXPECT_TRUE(contains(help.out, std::string("\n  ") + word + " ")) << word;
+}
+
+TEST(Program, EveryCommandHasItsHelp) {
+  for (const char* word : {"run", "replay", "evaluate", "simulate", "calibrate", "devices", "doctor", "snap", "report"}) {
+    const Outcome help = run_vergence(std::string(word) + " --help");
+    EXPECT_EQ(help.code, 0) << word;
+    EXPECT_TRUE(contains(help.out, std::string("vergence ") + word)) << help.out;
+    EXPECT_EQ(help.err, "") << word;
+  }
+}
+
+TEST(Program, AnUnknownCommandNamesTheNearest) {
+  const Outcome outcome = run_vergence("evalute a b");
+  EXPECT_TRUE(refused_in_one_sentence(outcome));
+  EXPECT_TRUE(contains(outcome.err, "unknown command \"evalute\"; did you mean \"evaluate\"?")) << outcome.err;
+  EXPECT_TRUE(refused_in_one_sentence(run_vergence("''")));
+}
+
+TEST(Program, ACommandLineThatSaysNothingIsRefused) {
+  EXPECT_TRUE(refused_in_one_sentence(run_vergence("")));
+  EXPECT_TRUE(refused_in_one_sentence(run_vergence("--loud")));
+  EXPECT_TRUE(refused_in_one_sentence(run_vergence("--")));
+}
+
+TEST(Program, AnUnknownOptionNamesTheNearest) {
+  const Outcome outcome = run_vergence("--verison");
+  EXPECT_TRUE(refused_in_one_sentence(outcome));
+  EXPECT_TRUE(contains(outcome.err, "unknown option \"--verison\"; did you mean \"--version\"?")) << outcome.err;
+  const Outcome of_command = run_vergence("evaluate a.tum b.tum --jsno");
+  EXPECT_TRUE(refused_in_one_sentence(of_command));
+  EXPECT_TRUE(contains(of_command.err, "evaluate: unknown option \"--jsno\"; did you mean \"--json\"?")) << of_command.err;
+}
+
+TEST(Program, WrongValuesOfOptionsAreOneSentence) {
+  EXPECT_TRUE(refused_in_one_sentence(run_vergence("replay somewhere --format kitti --out out --frames many")));
+  EXPECT_TRUE(refused_in_one_sentence(run_vergence("replay")));
+}
+
+TEST(Program, CommandsThatAreNotThereYetSaySoWhateverTheyAreGiven) {
+  for (const char* line :
+       {"run mock.yaml --out d --fast --fault 'knock@3 pitch_deg=1' --from-scratch --set a.b=1 --seed 3 --quiet",
+        "simulate --points 100 --noise 0,0.1 --json f", "calibrate --left 'l*.png' --right 'r*.png' --board 9x6 --square 0.1 --out f",
+        "devices --json --write-udev", "doctor", "snap mock.yaml --out d", "report session", "report report"}) {
+    const Outcome outcome = run_vergence(line);
+    EXPECT_TRUE(refused_in_one_sentence(outcome)) << line;
+    EXPECT_TRUE(contains(outcome.err, "is not there yet")) << outcome.err;
+  }
+}
+
+TEST(Program, WordsOfTheUserCannotSteerTheTerminal) {
+  const Outcome outcome = run_vergence("\"$(printf 'a\\033[2Jb\\nc')\"");
+  EXPECT_TRUE(refused_in_one_sentence(outcome));
+  EXPECT_FALSE(contains(outcome.err, "\033"));
+}
+
+TEST(Program, AStandardOutputThatTakesNothingIsAnError) {
+  const std::string command = std::string("'") + VERGENCE_PROGRAM + "' --help >/dev/full 2>/dev/null";
+  EXPECT_EQ(WEXITSTATUS(std::system(command.c_str())), 2);
+}
+
+}  // namespace
+}  // namespace vergence::app

@@ -1,0 +1,39 @@
+#pragma once
+#include <sys/wait.h>
+
+#include <cstdlib>
+#include <fstream>
+#include <sstream>
+#include <string>
+
+#include "tests/support/temporary_folder.hpp"
+
+namespace vergence::test {
+
+/// What one run of the built program left behind.
+struct Outcome {
+  int code = -1;  // exit code; 128 + number when a signal ended it
+  std::string out, err;
+};
+
+/// Runs the program with arguments as a shell takes them. VERGENCE_PROGRAM is its path.
+[[nodiscard]] inline Outcome run_vergence(const std::string& arguments) {
+  const TemporaryFolder folder;
+  const auto text = [](const std::filesystem::path& path) {
+    std::ifstream in(path, std::ios::binary);
+    std::ostringstream all;
+    all << in.rdbuf();
+    return all.str();
+  };
+  const auto out = folder / "out", err = folder / "err";
+  const std::string command =
+      std::string("'") + VERGENCE_PROGRAM + "' " + arguments + " >'" + out.string() + "' 2>'" + err.string() + "' </dev/null";
+  const int status = std::system(command.c_str());
+  Outcome outcome;
+  outcome.code = WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
+  outcome.out = text(out);
+  outcome.err = text(err);
+  return outcome;
+}
+
+}  // namespace vergence::test
