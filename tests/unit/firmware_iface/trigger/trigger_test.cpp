@@ -1,0 +1,211 @@
+#include "firmware_iface/trigger/trigger.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cstring>
+#include <vector>
+
+#include "tests/unit/firmware_iface/trigger/c_side.h"
+
+namespace vergence {
+namespace {
+
+using Bytes = std::vector<std::uint8_t>;
+
+Bytes framed(std::uint8_t type, std::uint8_t sequence, const Bytes& payload) {
+  Bytes out(trigger_max_frame);
+  out.resize(trigger_write_frame(type, sequence, payload.data(), payload.size(), out.data()));
+  return out;
+}
+
+struct Decoded {
+  std::vector<TriggerFrame> frames;
+  TriggerDecoder decoder{};
+};
+
+Decoded decode_all(const Bytes& bytes) {
+  Decoded all;
+  TriggerFrame frame{};
+  for (const std::uint8_t b : bytes)
+    if (trigger_decode(&all.decoder, b, &frame) == trigger_frame_ready) all.frames.push_back(frame);
+  return all;
+}
+
+Bytes payload_of(const TriggerFrame& frame) { return {frame.payload, frame.payload + frame.size}; }
+
+Bytes noise(std::size_t n, std::uint32_t seed) {
+  Bytes bytes(n);
+  for (std::uint8_t& b : bytes) {
+    seed = seed * 1664525U + 1013904223U;
+    b = static_cast<std::uint8_t>(seed >> 24U);
+  }
+  return bytes;
+}
+
+TriggerEvent some_event() {
+  TriggerEvent event{};
+  event.boot_id = 0xDEADBEEF;
+  event.pulse = 1234567;
+  event.tick = 0x0102030405060708;
+  event.lines = 0x3;
+  event.flags = 1;
+  event.exposure[0] = {12, 8012};
+  event.exposure[1] = {-3, 4000};
+  event.exposure[2] = {TRIGGER_NOT_SEEN, TRIGGER_NOT_SEEN};
+  event.exposure[3] = {TRIGGER_NOT_SEEN, TRIGGER_NOT_SEEN};
+  return event;
+}
+
+TEST(TriggerCrc, isThatOfIeee8023) {
+  const char* check = "123456789";
+  EXPECT_EQ(trigger_crc32(reinterpret_cast<const std::uint8_t*>(check), 9), 0xCBF43926U);
+  EXPECT_EQ(trigger_crc32(nullptr, 0), 0U);
+}
+
+TEST(TriggerFrames, anEmptyStartFrameHasItsDocumentedBytes) {
+  // 03 00 and its CRC, each 00 replaced by the distance to the next.
+  const std::uint8_t body[] = {trigger_start, 0};
+  const std::uint32_t crc = trigger_crc32(body, 2);
+  const auto byte = [crc](unsigned i) { return static_cast<std::uint8_t>(crc >> (8 * i)); };
+  ASSERT_TRUE(byte(0) != 0 && byte(1) != 0 && byte(2) != 0 && byte(3) != 0);
+  EXPECT_EQ(framed(trigger_start, 0, {}), (Bytes{2, 3, 5, byte(0), byte(1), byte(2), byte(3), 0}));
+}
+
+TEST(TriggerFrames, everyPayloadLengthComesBackAndHoldsNoZeroInside) {
+  for (std::size_t n = 0; n <= trigger_max_payload; ++n)
+    for (const Bytes& payload : {Bytes(n, 0), Bytes(n, 0xFF), noise(n, 7)}) {
+      const Bytes frame = framed(0x90, static_cast<std::uint8_t>(n), payload);
+      ASSERT_EQ(frame.size(), n + trigger_overhead + 2);
+      EXPECT_EQ(std::count(frame.begin(), frame.end(), 0), 1);
+      EXPECT_EQ(frame.back(), 0);
+      const Decoded all = decode_all(frame);
+      ASSERT_EQ(all.frames.size(), 1U);
+      EXPECT_EQ(all.frames[0].type, 0x90);
+      EXPECT_EQ(all.frames[0].sequence, n);
+      EXPECT_EQ(payload_of(all.frames[0]), payload);
+    }
+}
+
+TEST(TriggerFrames, aPayloadThatIsTooLongIsRefused) {
+  const Bytes payload(trigger_max_payload + 1);
+  Bytes out(200, 0x55);
+  EXPECT_EQ(trigger_write_frame(1, 0, payload.data(), payload.size(), out.data()), 0U);
+  EXPECT_EQ(out, Bytes(200, 0x55));
+}
+
+TEST(TriggerFrames, noSingleDamagedByteGetsThrough) {
+  const Bytes good = framed(trigger_pong, 9, noise(24, 3));
+  for (std::size_t i = 0; i < good.size(); ++i)
+    for (const unsigned flip : {0x01U, 0x80U, 0xFFU}) {
+      Bytes bad = good;
+      bad[i] = static_cast<std::uint8_t>(bad[i] ^ flip);
+      bad.push_back(0);  // where the damage hit the end
+      EXPECT_TRUE(decode_all(bad).frames.empty()) << i << " " << flip;
+    }
+}
+
+TEST(TriggerFrames, afterGarbageAndACutFrameTheNextIsFoundAndEachLossIsNamed) {
+  Bytes bytes = noise(300, 5);  // longer than a frame, zeros inside
+  bytes.push_back(0);
+  const Bytes cut = framed(trigger_event, 1, noise(50, 6));
+  bytes.insert(bytes.end(), cut.begin() + 20, cut.end());
+  bytes.insert(bytes.end(), 200, 0x11);  // no end in sight
+  bytes.push_back(0);
+  bytes.insert(bytes.end(), {2, 1, 0});  // COBS of one byte too few for a frame
+  const Bytes good = framed(trigger_event, 2, noise(50, 6));
+  bytes.insert(bytes.end(), good.begin(), good.end());
+  const Decoded all = decode_all(bytes);
+  ASSERT_EQ(all.frames.size(), 1U);
+  EXPECT_EQ(all.frames[0].sequence, 2);
+  EXPECT_EQ(all.decoder.frames, 1U);
+  EXPECT_GE(all.decoder.bad_coding, 1U);
+  EXPECT_GE(all.decoder.bad_length, 2U);
+}
+
+TEST(TriggerFrames, idleZerosAreNothing) {
+  const Decoded all = decode_all(Bytes(100, 0));
+  EXPECT_TRUE(all.frames.empty());
+  EXPECT_EQ(all.decoder.bad_coding + all.decoder.bad_length + all.decoder.bad_crc, 0U);
+}
+
+TEST(TriggerFrames, aRefusedFrameLeavesTheOutputAlone) {
+  TriggerDecoder decoder{};
+  TriggerFrame frame{};
+  frame.type = 0x77;
+  Bytes bad = framed(trigger_ping, 3, {1, 2, 3, 4});
+  bad[4] ^= 0x10U;
+  for (const std::uint8_t b : bad) EXPECT_NE(trigger_decode(&decoder, b, &frame), trigger_frame_ready);
+  EXPECT_EQ(frame.type, 0x77);
+}
+
+TEST(TriggerPayloads, anEventStandsByteForByteWhereTheHeaderSays) {
+  std::uint8_t p[trigger_event_payload_size];
+  const TriggerEvent event = some_event();
+  trigger_put_event(&event, p);
+  EXPECT_EQ(Bytes(p, p + 22), (Bytes{0xEF, 0xBE, 0xAD, 0xDE, 0x87, 0xD6, 0x12, 0x00, 8, 7, 6, 5, 4, 3, 2, 1, 3, 1, 12, 0, 0, 0}));
+  EXPECT_EQ(Bytes(p + 26, p + 30), (Bytes{0xFD, 0xFF, 0xFF, 0xFF}));
+  TriggerEvent back{};
+  ASSERT_TRUE(trigger_get_event(p, sizeof p, &back));
+  EXPECT_EQ(back.tick, event.tick);
+  EXPECT_EQ(back.exposure[1].start_us, -3);
+  EXPECT_EQ(back.exposure[3].end_us, TRIGGER_NOT_SEEN);
+}
+
+/// Any bytes → struct → the same bytes: every byte of the layout is read and written, and none twice.
+template <class Message, std::size_t kSize, class Get, class Put>
+void expect_bijective(Get get, Put put) {
+  const Bytes bytes = noise(kSize, 42);
+  Message m{};
+  ASSERT_TRUE(get(bytes.data(), kSize, &m));
+  Bytes again(kSize + 1, 0xA5);
+  put(&m, again.data());
+  EXPECT_EQ(again.back(), 0xA5) << "writes past its size";
+  again.pop_back();
+  EXPECT_EQ(again, bytes);
+  EXPECT_FALSE(get(bytes.data(), kSize - 1, &m));
+  EXPECT_FALSE(get(bytes.data(), kSize + 1, &m));
+}
+
+TEST(TriggerPayloads, everyLayoutReadsAndWritesEachOfItsBytesOnce) {
+  expect_bijective<TriggerInfo, trigger_info_payload_size>(trigger_get_info, trigger_put_info);
+  expect_bijective<TriggerConfig, trigger_config_payload_size>(trigger_get_config, trigger_put_config);
+  expect_bijective<TriggerPause, trigger_pause_payload_size>(trigger_get_pause, trigger_put_pause);
+  expect_bijective<TriggerPing, trigger_ping_payload_size>(trigger_get_ping, trigger_put_ping);
+  expect_bijective<TriggerPong, trigger_pong_payload_size>(trigger_get_pong, trigger_put_pong);
+  expect_bijective<TriggerEvent, trigger_event_payload_size>(trigger_get_event, trigger_put_event);
+  expect_bijective<TriggerEdge, trigger_edge_payload_size>(trigger_get_edge, trigger_put_edge);
+  expect_bijective<TriggerStatus, trigger_status_payload_size>(trigger_get_status, trigger_put_status);
+  expect_bijective<TriggerError, trigger_error_payload_size>(trigger_get_error, trigger_put_error);
+}
+
+TEST(TriggerBothSides, theFirmwaresCompilerMakesTheHostsBytes) {
+  const TriggerEvent event = some_event();
+  Bytes payload(trigger_event_payload_size);
+  trigger_put_event(&event, payload.data());
+  Bytes from_c(trigger_max_frame);
+  from_c.resize(c_side_write_event(&event, 5, from_c.data()));
+  EXPECT_EQ(from_c, framed(trigger_event, 5, payload));
+  TriggerDecoder decoder{};
+  TriggerFrame frame{};
+  int ready = 0;
+  for (const std::uint8_t b : from_c) ready += c_side_decode(&decoder, b, &frame) == trigger_frame_ready ? 1 : 0;
+  EXPECT_EQ(ready, 1);
+  EXPECT_EQ(payload_of(frame), payload);
+}
+
+TEST(TriggerVariedIntervals, noRunOf24FitsItselfShifted) {
+  constexpr std::uint32_t kPulses = 100'000, kRun = 24;
+  std::uint32_t longer = 0;
+  for (std::uint32_t i = 0; i < kPulses; ++i) longer += trigger_interval_is_longer(i) ? 1U : 0U;
+  EXPECT_NEAR(longer, kPulses / 2, 5 * 158) << "five sigmas of a fair coin: the mean rate is kept";
+  for (std::uint32_t start = 0; start < kPulses; ++start)
+    for (std::uint32_t shift = 1; shift <= 8; ++shift) {
+      std::uint32_t same = 0;
+      while (same < kRun && trigger_interval_is_longer(start + same) == trigger_interval_is_longer(start + same + shift)) ++same;
+      ASSERT_LT(same, kRun) << "from pulse " << start << " shifted by " << shift;
+    }
+}
+
+}  // namespace
+}  // namespace vergence
