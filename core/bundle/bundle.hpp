@@ -163,8 +163,8 @@ struct BundleCapacities {
   std::size_t poses = 12;
   std::size_t points = 500;
   std::size_t observations = 8000;
-  std::size_t intrinsics = 0;  // estimated ones of all cameras together; covariances with `wide` need 4 a camera
-  std::size_t blocks = 0;      // pairs (eight points | pose) with an observation; 0: the worst case of the sizes above
+  bool shared = true;      // room for θ_S; false: stereo_calibration is refused with `capacity`
+  std::size_t blocks = 0;  // pairs (eight points | pose) with an observation; 0: the worst case of the sizes above
 };
 
 namespace detail {

@@ -1,0 +1,329 @@
+#include "core/bundle/bundle.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+
+#include <Eigen/Cholesky>
+
+#include "core/bundle/detail/covariance.hpp"
+#include "core/bundle/detail/setup.hpp"
+#include "core/bundle/detail/system.hpp"
+
+namespace vergence {
+namespace {
+
+using detail::BundleState;
+using detail::BundleWorkspace;
+using detail::System;
+
+constexpr double kLeastDamping = 1e-12;      // below it the damping is lost in rounding
+constexpr double kLeastGaugeDamping = 1e-9;  // where the scale is free the damping alone holds it
+constexpr double kLargestDamping = 1e10;     // steps are then shorter than any tolerance
+constexpr double kPivotTolerance = 1e-14;    // relative pivot of the damped system below which it counts as singular
+constexpr double kRankTolerance = 1e-11;     // of the undamped one
+
+/// Takes storage for every array of a workspace from `take`, which either hands out arena memory or only counts.
+template <class Take>
+void lay_out(BundleWorkspace& w, const BundleCapacities& c, Take& take) {
+  using namespace detail;
+  w.capacity = c;
+  const std::size_t batches = (c.points + kBatch - 1) / kBatch;
+  w.block_capacity = c.blocks > 0 ? c.blocks : std::min(batches * c.poses, c.observations);
+  w.slot_capacity = std::min(w.block_capacity * c.cameras, c.observations);
+  const std::size_t shared_rows = c.shared ? kBlock * (c.cameras - 1) + kIntrinsicsSize * c.cameras : 0;
+  const std::size_t shared_blocks = (shared_rows + kBlock - 1) / kBlock;
+  w.reduced_capacity = (c.poses + shared_blocks) * kBlock;
+  const std::size_t ld = (w.reduced_capacity + kBatch - 1) / kBatch * kBatch;
+  take(w.order, c.points, "bundle: order of points");
+  take(w.first_observation, c.points + 1, "bundle: first observations");
+  take(w.pose_observations, c.poses, "bundle: observations a pose");
+  take(w.pose_slot, c.poses, "bundle: slots of a batch");
+  take(w.pose_cameras, c.poses, "bundle: cameras of a batch");
+  take(w.observation_lane, c.observations, "bundle: places of observations");
+  take(w.batches, batches, "bundle: batches");
+  take(w.blocks, w.block_capacity, "bundle: pose blocks");
+  take(w.slots, w.slot_capacity, "bundle: observations");
+  take(w.poses, c.poses, "bundle: poses");
+  take(w.point_free, batches * kBatch, "bundle: free points");
+  take(w.y, w.block_capacity * kYSize, "bundle: Y of poses");
+  take(w.y_shared, batches * shared_blocks * kYSize, "bundle: Y of shared parameters");
+  take(w.factors, batches * kFactorRows * kBatch, "bundle: point factors");
+  take(w.sums, c.poses * c.cameras * kPoseSums * kBatch, "bundle: sums of poses");
+  take(w.intrinsic_sums, c.shared ? c.poses * kMaxCameras * kIntrinsicsSize * 6 * kBatch : 0, "bundle: sums of intrinsics");
+  take(w.intrinsic_own, c.shared ? kMaxCameras * kIntrinsicsSize * (kIntrinsicsSize + 1) * kBatch : 0, "bundle: intrinsics");
+  take(w.reduced, w.reduced_capacity * kBatch, "bundle: reduced gradient");
+  take(w.jets, std::min(c.poses * c.cameras, w.slot_capacity) * kJetRows * kBatch, "bundle: jets");
+  take(w.A, ld * w.reduced_capacity, "bundle: reduced system");
+  take(w.rhs, ld, "bundle: right-hand side");
+  take(w.delta, ld, "bundle: step");
+  take(w.squared, w.slot_capacity * kBatch, "bundle: squared residuals");
+  for (BundleState& s : w.states) {
+    take(s.poses, c.poses, "bundle: state");
+    take(s.points, batches * 3 * kBatch, "bundle: points");
+  }
+}
+
+struct TakeFromArena {
+  Arena& arena;
+  template <class T>
+  void operator()(std::span<T>& out, std::size_t n, const char* who) {
+    out = arena.make<T>(n, who);
+  }
+};
+
+struct Count {
+  std::size_t bytes = 0;
+  template <class T>
+  void operator()(std::span<T>&, std::size_t n, const char*) {
+    bytes += (n * sizeof(T) + kCacheLine - 1) / kCacheLine * kCacheLine;
+  }
+};
+
+/// One solve(): the loop of Levenberg and Marquardt and what comes after it.
+class Solve {
+ public:
+  Solve(BundleWorkspace& w, const BundleProblem& problem, const BundleOptions& options, BundleResult& result) noexcept
+      : w_(w), problem_(problem), options_(options), result_(result), system_(w, problem, options) {
+    if (options.configuration == BundleConfiguration::parallel_monocular) least_damping_ = kLeastGaugeDamping;
+  }
+
+  void run() noexcept {
+    damping_ = options_.initial_damping;
+    if (!system_.linearise(best(), damping_)) {
+      find_behind();
+      return;
+    }
+    cost_ = result_.initial_cost = system_.cost();
+    squared_px_ = system_.squared_px();
+    iterate();
+    if (rank_suspicious() && rank_deficient()) result_.termination = BundleTermination::rank_deficient;
+    if (options_.pose_covariance) pose_covariance();
+    if (options_.covariance && options_.configuration == BundleConfiguration::stereo_calibration)
+      detail::shared_covariance(w_, problem_, options_, best(), system_, &result_);
+    write_back();
+  }
+
+ private:
+  BundleState& best() noexcept { return w_.states[best_]; }
+  BundleState& other() noexcept { return w_.states[1 - best_]; }
+
+  void iterate() noexcept {
+    result_.termination = BundleTermination::max_steps;
+    while (result_.steps < options_.max_steps) {
+      if (gradient() <= options_.gradient_tolerance) return end(BundleTermination::small_gradient);
+      ++result_.steps;
+      std::copy_n(w_.rhs.begin(), system_.rows(), w_.delta.begin());
+      pivots_ = detail::cholesky(w_.A.data(), system_.rows(), system_.rows(), system_.ld(), kPivotTolerance);
+      if (pivots_.small > 0) {
+        if (!retreat()) return end(BundleTermination::rank_deficient);
+        continue;
+      }
+      detail::solve_factored(w_.A.data(), system_.rows(), system_.ld(), w_.delta.data());
+      double decrement = system_.point_decrement();
+      for (std::size_t i = 0; i < system_.rows(); ++i) decrement += w_.delta[i] * w_.rhs[i];
+      system_.move(best(), w_.delta.data(), &other());
+      const double tolerance = options_.update_tolerance;
+      const bool small = std::sqrt(system_.update_squared()) <= tolerance * (std::sqrt(system_.norm_squared()) + tolerance);
+      const bool expected_last = 0.5 * decrement <= options_.cost_tolerance * cost_ || small || result_.steps == options_.max_steps;
+      const double next_damping = std::max(damping_ * 0.1, least_damping_);
+      const bool valid = std::isfinite(system_.update_squared()) && (expected_last ? system_.evaluate(other(), false) : system_.linearise(other(), next_damping));
+      if (valid && system_.cost() <= cost_) {
+        const double change = cost_ - system_.cost();
+        best_ = 1 - best_;
+        cost_ = system_.cost();
+        squared_px_ = system_.squared_px();
+        damping_ = next_damping;
+        ++result_.accepted;
+        if (small) return end(BundleTermination::small_update);
+        if (change <= options_.cost_tolerance * cost_) return end(BundleTermination::small_cost_change);
+        if (expected_last && result_.steps < options_.max_steps && !system_.linearise(best(), damping_)) return end(BundleTermination::diverged);
+        continue;
+      }
+      if (small) return end(BundleTermination::small_update);
+      if (0.5 * decrement <= options_.cost_tolerance * cost_) return end(BundleTermination::small_cost_change);
+      if (!retreat()) return end(BundleTermination::diverged);
+    }
+  }
+
+  /// More damping about the best state. False: no more to be had.
+  bool retreat() noexcept {
+    damping_ *= 10;
+    return damping_ <= kLargestDamping && system_.linearise(best(), damping_);
+  }
+
+  void end(BundleTermination t) noexcept { result_.termination = t; }
+
+  /// Largest component of the reduced gradient, each over the root of its diagonal.
+  double gradient() const noexcept {
+    if (!(options_.gradient_tolerance > 0) && system_.rows() > 0) return 1;
+    double largest = 0;
+    for (std::size_t i = 0; i < system_.rows(); ++i) {
+      const double diagonal = w_.A[i * system_.ld() + i];
+      if (diagonal > 0) largest = std::max(largest, std::abs(w_.rhs[i]) / std::sqrt(diagonal));
+    }
+    return std::max(largest, std::sqrt(system_.rows() > 0 ? 0.0 : system_.point_decrement()));
+  }
+
+  /// A free scale has one direction that nothing sees: in parallel_monocular that is as it should be.
+  int free_directions() const noexcept { return options_.configuration == BundleConfiguration::parallel_monocular ? 1 : 0; }
+
+  bool rank_suspicious() const noexcept {
+    if (result_.termination == BundleTermination::rank_deficient || result_.accepted == 0) return false;
+    constexpr double kMargin = 30;  // pivots of a direction that only the damping holds are a few λ
+    const double ratio = free_directions() == 0 ? pivots_.least_ratio : pivots_.second_ratio;
+    return ratio < kRankTolerance + kMargin * damping_ * 10;
+  }
+
+  bool rank_deficient() noexcept {
+    if (system_.rows() == 0 || !system_.linearise(best(), 0.0)) return false;
+    return detail::cholesky(w_.A.data(), system_.rows(), system_.rows(), system_.ld(), kRankTolerance).small > free_directions();
+  }
+
+  void pose_covariance() noexcept {
+    const std::size_t rows = system_.rows();
+    if (w_.free_poses == 0 || system_.job().shared.blocks > 0 || !system_.linearise(best(), 0.0)) return;
+    const std::size_t before = rows - detail::kBlock;
+    if (detail::cholesky(w_.A.data(), rows, before, system_.ld(), kRankTolerance).small > 0) return;
+    Mat6 information;  // (τ, φ)
+    for (std::size_t r = 0; r < detail::kBlock; ++r)
+      for (std::size_t c = 0; c <= r; ++c) {
+        double v = w_.A[(before + c) * system_.ld() + before + r];
+        for (std::size_t k = 0; k < before; ++k) v -= w_.A[k * system_.ld() + before + r] * w_.A[k * system_.ld() + before + c];
+        information(static_cast<Eigen::Index>(r), static_cast<Eigen::Index>(c)) = information(static_cast<Eigen::Index>(c), static_cast<Eigen::Index>(r)) = v;
+      }
+    const Eigen::LLT<Mat6> factor(information);
+    if (factor.info() != Eigen::Success) return;
+    const Mat6 covariance = factor.solve(Mat6::Identity());
+    if (!covariance.allFinite()) return;
+    result_.pose_covariance << covariance.bottomRightCorner<3, 3>(), covariance.bottomLeftCorner<3, 3>(), covariance.topRightCorner<3, 3>(),
+        covariance.topLeftCorner<3, 3>();
+    for (std::size_t i = 0; i < problem_.T_left_world.size(); ++i)
+      if (w_.poses[i].block == w_.free_poses - 1) result_.pose = static_cast<std::uint16_t>(i);
+    result_.has_pose_covariance = true;
+  }
+
+  /// The start is no start: names the first observation that has no projection.
+  void find_behind() noexcept {
+    result_.termination = BundleTermination::invalid_input;
+    result_.defect = BundleDefect::not_finite;
+    for (std::size_t i = 0; i < problem_.observations.size(); ++i) {
+      const BundleObservation& o = problem_.observations[i];
+      Vec2 pixel;
+      const Vec3 p = best().T_camera_left[o.camera] * (best().poses[o.pose] * problem_.points[o.point]);
+      if (best().cameras[o.camera].project(p, &pixel, nullptr) == ProjectStatus::ok) continue;
+      result_.defect = BundleDefect::behind;
+      result_.defect_index = static_cast<std::uint32_t>(i);
+      return;
+    }
+  }
+
+  void write_back() noexcept {
+    const BundleState& s = best();
+    result_.final_cost = cost_;
+    result_.damping = damping_;
+    result_.rms_px = problem_.observations.empty() ? 0 : std::sqrt(squared_px_ / static_cast<double>(problem_.observations.size()));
+    if (!problem_.squared_residuals.empty() && system_.evaluate(s, true))
+      for (std::size_t i = 0; i < problem_.observations.size(); ++i) problem_.squared_residuals[i] = w_.squared[w_.observation_lane[i]];
+    for (std::size_t i = 0; i < problem_.T_left_world.size(); ++i)
+      if (w_.poses[i].block >= 0) problem_.T_left_world[i] = s.poses[i];
+    for (std::size_t i = 0; i < w_.point_count; ++i) {
+      if (w_.point_free[i] == 0) continue;
+      const std::size_t batch = i / detail::kBatch, lane = i % detail::kBatch;
+      for (std::size_t c = 0; c < 3; ++c)
+        problem_.points[static_cast<std::uint32_t>(w_.order[i])][static_cast<Eigen::Index>(c)] = s.points[(batch * 3 + c) * detail::kBatch + lane];
+    }
+    if (options_.configuration != BundleConfiguration::stereo_calibration) return;
+    for (std::size_t k = 0; k < problem_.cameras.size(); ++k) {
+      if (k > 0) problem_.T_camera_left[k] = s.T_camera_left[k];
+      if (options_.intrinsics[k].free != 0) problem_.cameras[k] = s.cameras[k];
+    }
+  }
+
+  BundleWorkspace& w_;
+  const BundleProblem& problem_;
+  const BundleOptions& options_;
+  BundleResult& result_;
+  System system_;
+  detail::PivotReport pivots_;
+  int best_ = 0;
+  double damping_ = 0, least_damping_ = kLeastDamping, cost_ = 0, squared_px_ = 0;
+};
+
+}  // namespace
+
+const char* BundleOptions::validate() const noexcept {
+  constexpr int kMostSteps = 1000;
+  constexpr double kMostDamping = 1e6;
+  if (!(loss_threshold > 0) || !std::isfinite(loss_threshold)) return "loss_threshold is not above 0";
+  if (max_steps < 1 || max_steps > kMostSteps) return "max_steps is not in 1 … 1000";
+  if (!(cost_tolerance >= 0)) return "cost_tolerance is negative";
+  if (!(update_tolerance >= 0)) return "update_tolerance is negative";
+  if (!(gradient_tolerance >= 0)) return "gradient_tolerance is negative";
+  if (!(initial_damping > 0) || initial_damping > kMostDamping) return "initial_damping is not in (0, 1e6]";
+  for (const BundleLengthConstraint& l : length) {
+    if (!(l.metres >= 0) || !std::isfinite(l.metres)) return "length: metres is negative or not a number";
+    if (l.kind == BundleLength::measured && (!(l.sigma > 0) || !(l.metres > 0))) return "length: a measured length needs metres and sigma above 0";
+  }
+  for (const BundleIntrinsics& i : intrinsics)
+    for (std::size_t k = 0; k < kIntrinsicsSize; ++k) {
+      if (!(i.prior_sigma[k] >= 0) || !std::isfinite(i.prior_mean[k])) return "intrinsics: a prior is not a number";
+      if (std::isnan(i.held_sigma[k])) return "intrinsics: held_sigma is not a number";
+      if (i.free >> kIntrinsicsSize != 0) return "intrinsics: free has bits beyond the nine parameters";
+    }
+  return "";
+}
+
+const char* to_string(BundleTermination t) noexcept {
+  switch (t) {
+    case BundleTermination::small_update: return "small_update";
+    case BundleTermination::small_gradient: return "small_gradient";
+    case BundleTermination::small_cost_change: return "small_cost_change";
+    case BundleTermination::max_steps: return "max_steps";
+    case BundleTermination::diverged: return "diverged";
+    case BundleTermination::invalid_input: return "invalid_input";
+    case BundleTermination::rank_deficient: return "rank_deficient";
+    case BundleTermination::capacity: return "capacity";
+  }
+  return "unknown";
+}
+
+const char* to_string(BundleDefect d) noexcept {
+  switch (d) {
+    case BundleDefect::none: return "none";
+    case BundleDefect::options: return "options";
+    case BundleDefect::sizes: return "sizes";
+    case BundleDefect::index: return "index";
+    case BundleDefect::order: return "order";
+    case BundleDefect::not_finite: return "not_finite";
+    case BundleDefect::state_not_finite: return "state_not_finite";
+    case BundleDefect::behind: return "behind";
+    case BundleDefect::seen_once: return "seen_once";
+    case BundleDefect::pose_without_observations: return "pose_without_observations";
+  }
+  return "unknown";
+}
+
+std::size_t BundleAdjuster::memory_needed(const BundleCapacities& capacities) noexcept {
+  BundleWorkspace w;
+  Count count{(sizeof(BundleWorkspace) + kCacheLine - 1) / kCacheLine * kCacheLine};
+  lay_out(w, capacities, count);
+  return count.bytes;
+}
+
+BundleAdjuster::BundleAdjuster(const BundleCapacities& c, Arena& arena) : workspace_(nullptr) {
+  constexpr std::size_t kMostPoses = 65535, kMostObservations = 1U << 28U;  // what the indices hold
+  if (c.cameras == 0 || c.cameras > kMaxCameras || c.poses == 0 || c.poses > kMostPoses || c.points > kMostObservations || c.observations > kMostObservations)
+    throw std::invalid_argument("bundle adjustment: capacities out of range (cameras 1 … 4, poses 1 … 65535)");
+  workspace_ = arena.make<BundleWorkspace>(1, "bundle: workspace").data();
+  TakeFromArena take{arena};
+  lay_out(*workspace_, c, take);
+}
+
+BundleResult BundleAdjuster::solve(const BundleProblem& problem, const BundleOptions& options) noexcept {
+  BundleResult result;
+  if (detail::set_up(*workspace_, problem, options, &result)) Solve(*workspace_, problem, options, result).run();
+  return result;
+}
+
+}  // namespace vergence

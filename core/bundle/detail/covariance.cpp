@@ -1,0 +1,242 @@
+#include "core/bundle/detail/covariance.hpp"
+
+#include <cmath>
+
+#include <Eigen/Cholesky>
+
+#include "core/bundle/detail/setup.hpp"
+
+namespace vergence::detail {
+namespace {
+
+using Shared = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::ColMajor, kMaxShared, kMaxShared>;
+using SharedVector = Eigen::Matrix<double, Eigen::Dynamic, 1, Eigen::ColMajor, kMaxShared, 1>;
+using Index = Eigen::Index;
+
+constexpr double kPivotTolerance = 1e-12;
+
+/// Rows of θ_S that are estimated, and those that are held but uncertain.
+struct Partition {
+  int estimated[kMaxShared], held[kMaxShared];
+  double held_variance[kMaxShared];
+  int estimated_count = 0, held_count = 0;
+};
+
+Partition partition(const SharedLayout& s, const BundleProblem& problem, const BundleOptions& options) noexcept {
+  Partition p;
+  for (std::size_t k = 0; k < problem.cameras.size(); ++k)
+    if (s.extrinsic[k] >= 0)
+      for (int i = 0; i < (s.exact[k] ? 5 : 6); ++i) p.estimated[p.estimated_count++] = s.extrinsic[k] + i;
+  for (std::size_t k = 0; k < problem.cameras.size(); ++k)
+    for (int i = 0; i < s.intrinsic_count[k]; ++i) {
+      const int parameter = s.intrinsic_index[k][i], row = s.intrinsic[k] + i;
+      if (((options.intrinsics[k].free >> static_cast<unsigned>(parameter)) & 1U) != 0) {
+        p.estimated[p.estimated_count++] = row;
+      } else {
+        const double sigma = held_sigma(options.intrinsics[k], problem.cameras[k].intrinsics(), parameter);
+        p.held_variance[p.held_count] = sigma * sigma;
+        p.held[p.held_count++] = row;
+      }
+    }
+  return p;
+}
+
+/// K = L_SI L_II⁻¹ in the place of L_SI: what a pose's gradient adds to that of θ_S once the poses are eliminated.
+void poses_to_shared(double* A, std::size_t ld, std::size_t first, std::size_t size) noexcept {
+  for (std::size_t c = first; c-- > 0;) {
+    double* column = A + c * ld;
+    for (std::size_t q = c + 1; q < first; ++q) {
+      const double factor = column[q];
+      if (factor == 0) continue;
+      const double* other = A + q * ld + first;
+      for (std::size_t s = 0; s < size; ++s) column[first + s] -= factor * other[s];
+    }
+    for (std::size_t s = 0; s < size; ++s) column[first + s] /= column[c];
+  }
+}
+
+/// The gradients of one lane's observations, straight from the camera model, and the robust weight of each.
+class TrackGradient {
+ public:
+  TrackGradient(const BundleWorkspace& w, const BundleOptions& options, const BundleState& state, const System& system, std::size_t cameras) noexcept
+      : w_(w), options_(options), state_(state), job_(system.job()), cameras_(cameras), first_(static_cast<std::size_t>(w.free_poses) * kBlock), ld_(system.ld()) {}
+
+  /// s_j: the gradient of θ_S that this track causes, its point and the poses eliminated.
+  SharedVector operator()(const BundleProblem& problem, std::size_t index) noexcept {
+    const SharedLayout& layout = job_.shared;
+    SharedVector s = SharedVector::Zero(layout.size);
+    const auto point = static_cast<std::uint32_t>(w_.order[index]);
+    const std::size_t batch = index / kBatch, lane = index % kBatch;
+    const Vec3 X = coordinates(batch, lane);
+    for (std::uint32_t i = w_.first_observation[point]; i < w_.first_observation[point + 1]; ++i) add_observation(problem.observations[i], X, &s);
+    const double* z = job_.factors + (batch * kFactorRows + 6) * kBatch + lane;
+    const auto product = [&](const double* y) { return y[0] * z[0] + y[kBatch] * z[kBatch] + y[2 * kBatch] * z[2 * kBatch]; };
+    for (std::uint32_t b = w_.batches[batch].block_begin; b < w_.batches[batch].block_end; ++b) {
+      const std::int32_t block = w_.poses[w_.blocks[b].pose].block;
+      if (block < 0) continue;
+      for (std::size_t r = 0; r < kBlock; ++r)
+        subtract_pose(static_cast<std::size_t>(block) * kBlock + r, -product(job_.y + b * kYSize + r * 3 * kBatch + lane), &s);
+    }
+    const double* rows = job_.y_shared + batch * static_cast<std::size_t>(layout.blocks) * kYSize + lane;
+    for (int r = 0; r < layout.size; ++r) s[r] -= product(rows + static_cast<std::size_t>(r) * 3 * kBatch);
+    return s;
+  }
+
+ private:
+  Vec3 coordinates(std::size_t batch, std::size_t lane) const noexcept {
+    const auto c = [&](std::size_t i) { return state_.points[(batch * 3 + i) * kBatch + lane]; };
+    return {c(0), c(1), c(2)};
+  }
+
+  void subtract_pose(std::size_t row, double gradient, SharedVector* s) const noexcept {
+    const double* K = w_.A.data() + row * ld_ + first_;
+    for (Index i = 0; i < s->size(); ++i) (*s)[i] -= K[i] * gradient;
+  }
+
+  double weight(double squared) const noexcept {
+    const double c = options_.loss_threshold;
+    if (options_.loss == BundleLoss::huber) return squared > c * c ? c / std::sqrt(squared) : 1.0;
+    return options_.loss == BundleLoss::cauchy ? 1.0 / (1.0 + squared / (c * c)) : 1.0;
+  }
+
+  void add_observation(const BundleObservation& o, const Vec3& X, SharedVector* s) const noexcept {
+    const SharedLayout& layout = job_.shared;
+    const Camera& camera = state_.cameras[o.camera];
+    const Transform& T = state_.T_camera_left[o.camera];
+    const Vec3 Xi = state_.poses[o.pose] * X, Xc = T * Xi;
+    Vec2 pixel;
+    Mat23 G;
+    if (camera.project(Xc, &pixel, &G) != ProjectStatus::ok) return;
+    const double information = static_cast<double>(o.inverse_sigma) * static_cast<double>(o.inverse_sigma);
+    const Vec2 miss(o.x - pixel.x(), o.y - pixel.y());
+    const Vec2 weighted = weight(miss.squaredNorm() * information) * information * miss;
+    const Vec3 q = (G * T.R).transpose() * weighted;
+    Vec6 gradient;
+    gradient << q, Xi.cross(q);
+    const std::int32_t block = w_.poses[o.pose].block;
+    if (block >= 0)
+      for (std::size_t r = 0; r < kBlock; ++r) subtract_pose(static_cast<std::size_t>(block) * kBlock + r, gradient[static_cast<Index>(r)], s);
+    const int k = o.camera;
+    if (layout.extrinsic[k] >= 0) {
+      const Vec6 own = extrinsic_basis(layout, job_.cameras[k], k).transpose() * gradient;
+      for (int i = 0; i < (layout.exact[k] ? 5 : 6); ++i) (*s)[layout.extrinsic[k] + i] += own[i];
+    }
+    if (layout.intrinsic_count[k] == 0) return;
+    const auto J = camera.intrinsics_jacobian(Xc);
+    for (int i = 0; i < layout.intrinsic_count[k]; ++i) (*s)[layout.intrinsic[k] + i] += J.col(layout.intrinsic_index[k][i]).dot(weighted);
+  }
+
+  const BundleWorkspace& w_;
+  const BundleOptions& options_;
+  const BundleState& state_;
+  const KernelJob& job_;
+  std::size_t cameras_, first_, ld_;
+};
+
+/// What is known beside the tracks counts as clusters of its own, with the variance it claims.
+void add_prior_clusters(const SharedLayout& s, const BundleProblem& problem, const BundleOptions& options, const BundleState& state, Shared* meat) noexcept {
+  for (std::size_t k = 0; k < problem.cameras.size(); ++k) {
+    if (s.extrinsic[k] >= 0 && options.length[k].kind == BundleLength::measured) {
+      const Transform& T = state.T_camera_left[k];
+      const Vec3 j = T.R.transpose() * T.t.normalized() / options.length[k].sigma;
+      meat->block<3, 3>(s.extrinsic[k], s.extrinsic[k]) += j * j.transpose();
+    }
+    for (int i = 0; i < s.intrinsic_count[k]; ++i) {
+      const std::size_t parameter = s.intrinsic_index[k][i];
+      const double sigma = options.intrinsics[k].prior_sigma[parameter];
+      if (((options.intrinsics[k].free >> parameter) & 1U) != 0 && sigma > 0) (*meat)(s.intrinsic[k] + i, s.intrinsic[k] + i) += 1.0 / (sigma * sigma);
+    }
+  }
+}
+
+/// From the rows of camera k to (φ, τ) of the left perturbation R ← Exp(φ) R, t ← t + τ.
+Mat6 published(const Shared& estimated, const SharedLayout& s, const KernelCamera& camera, const Transform& T, int k) noexcept {
+  const int size = s.exact[k] ? 5 : 6;
+  Mat6 rows = Mat6::Zero();
+  rows.topLeftCorner(size, size) = estimated.block(s.extrinsic[k], s.extrinsic[k], size, size);
+  const Mat6 J = extrinsic_basis(s, camera, k);
+  Mat6 turn = Mat6::Zero();
+  turn.topRightCorner<3, 3>() = T.R;
+  turn.bottomLeftCorner<3, 3>() = T.R;
+  const Mat6 to = turn * J;
+  return to * rows * to.transpose();
+}
+
+/// Σ w|ε|²/σ² over what is left after the parameters.
+double residual_variance(const BundleWorkspace& w, const BundleProblem& problem, const Partition& p, double weighted) noexcept {
+  const double freedom = 2.0 * static_cast<double>(problem.observations.size()) - 3.0 * static_cast<double>(w.free_points) -
+                         static_cast<double>(kBlock * w.free_poses) - p.estimated_count;
+  return freedom > 0 ? weighted / freedom : 1.0;
+}
+
+}  // namespace
+
+void shared_covariance(BundleWorkspace& w, const BundleProblem& problem, const BundleOptions& options, const BundleState& state, System& system,
+                       BundleResult* result) noexcept {
+  const SharedLayout layout = shared_layout(problem, options, true);
+  system.use(layout);
+  if (!system.linearise(state, 0.0)) return;
+  const std::size_t first = static_cast<std::size_t>(w.free_poses) * kBlock, ld = system.ld();
+  const auto size = static_cast<std::size_t>(layout.size);
+  double* A = w.A.data();
+  if (cholesky(A, system.rows(), first, ld, kPivotTolerance).small > 0) return;
+
+  Shared H(layout.size, layout.size);
+  for (std::size_t r = 0; r < size; ++r)
+    for (std::size_t c = 0; c <= r; ++c) {
+      double v = A[(first + c) * ld + first + r];
+      for (std::size_t k = 0; k < first; ++k) v -= A[k * ld + first + r] * A[k * ld + first + c];
+      H(static_cast<Index>(r), static_cast<Index>(c)) = H(static_cast<Index>(c), static_cast<Index>(r)) = v;
+    }
+  const Partition p = partition(layout, problem, options);
+  Shared inner(p.estimated_count, p.estimated_count), cross(p.estimated_count, p.held_count);
+  for (int r = 0; r < p.estimated_count; ++r) {
+    for (int c = 0; c < p.estimated_count; ++c) inner(r, c) = H(p.estimated[r], p.estimated[c]);
+    for (int c = 0; c < p.held_count; ++c) cross(r, c) = H(p.estimated[r], p.held[c]);
+  }
+  const Eigen::LLT<Shared> factor(inner);
+  if (factor.info() != Eigen::Success) return;
+  const Shared inverse = factor.solve(Shared::Identity(p.estimated_count, p.estimated_count));
+  if (!inverse.allFinite()) return;
+
+  poses_to_shared(A, ld, first, size);
+  Shared meat = Shared::Zero(layout.size, layout.size);
+  TrackGradient gradient(w, options, state, system, problem.cameras.size());
+  for (std::size_t i = 0; i < w.point_count; ++i) {
+    const SharedVector s = gradient(problem, i);
+    meat.noalias() += s.lazyProduct(s.transpose());
+  }
+  add_prior_clusters(layout, problem, options, state, &meat);
+  Shared own_meat(p.estimated_count, p.estimated_count);
+  for (int r = 0; r < p.estimated_count; ++r)
+    for (int c = 0; c < p.estimated_count; ++c) own_meat(r, c) = meat(p.estimated[r], p.estimated[c]);
+
+  result->sigma0_squared = residual_variance(w, problem, p, system.weighted());
+  const Shared white = result->sigma0_squared * inverse;
+  const Shared noise = inverse.lazyProduct(Shared(own_meat.lazyProduct(inverse)));
+  Shared wide = noise;
+  if (p.held_count > 0) {
+    const Shared D = inverse.lazyProduct(cross);
+    Shared scaled = D;
+    for (int c = 0; c < p.held_count; ++c) scaled.col(c) *= p.held_variance[c];
+    wide += scaled.lazyProduct(D.transpose());
+  }
+  // Extrinsics are the first rows of θ_S and of the estimated ones alike; intrinsics are found by their place in the partition.
+  for (std::size_t k = 1; k < problem.cameras.size(); ++k) {
+    const int number = static_cast<int>(k);
+    const KernelCamera& camera = system.job().cameras[k];
+    const Transform& T = state.T_camera_left[k];
+    result->covariance_white[k] = published(white, layout, camera, T, number);
+    result->covariance_noise[k] = published(noise, layout, camera, T, number);
+    result->covariance_wide[k] = published(wide, layout, camera, T, number);
+  }
+  for (int i = 0; i < p.estimated_count; ++i)
+    for (std::size_t k = 0; k < problem.cameras.size(); ++k) {
+      const int place = p.estimated[i] - layout.intrinsic[k];
+      if (layout.intrinsic_count[k] > 0 && place >= 0 && place < layout.intrinsic_count[k])
+        result->intrinsics_sigma[k][layout.intrinsic_index[k][place]] = std::sqrt(white(i, i));
+    }
+  result->has_covariance = true;
+}
+
+}  // namespace vergence::detail

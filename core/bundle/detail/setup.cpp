@@ -1,0 +1,253 @@
+#include "core/bundle/detail/setup.hpp"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+
+namespace vergence::detail {
+namespace {
+
+constexpr double kOrthonormal = 1e-6;  // largest entry of RᵀR − I of a rotation that only rounding has touched
+
+bool refuse(BundleResult* result, BundleTermination termination, BundleDefect defect, std::size_t index = 0) noexcept {
+  result->termination = termination;
+  result->defect = defect;
+  result->defect_index = static_cast<std::uint32_t>(index);
+  return false;
+}
+
+bool rigid(const Transform& T) noexcept {
+  return T.finite() && (T.R.transpose() * T.R - Mat3::Identity()).cwiseAbs().maxCoeff() < kOrthonormal && T.R.determinant() > 0;
+}
+
+bool usable(const Intrinsics& k) noexcept {
+  for (const double v : parameters(k))
+    if (!std::isfinite(v)) return false;
+  return k.fx > 0 && k.fy > 0;
+}
+
+bool check_sizes(const BundleWorkspace& w, const BundleProblem& p, const BundleOptions& o, BundleResult* r) noexcept {
+  const bool mono = o.configuration == BundleConfiguration::parallel_monocular;
+  const auto as_many = [](std::size_t n, std::size_t of) { return n == of || n == 0; };
+  if (p.cameras.empty() || p.cameras.size() > kMaxCameras || p.T_left_world.empty() || !as_many(p.pose_constant.size(), p.T_left_world.size()) ||
+      !as_many(p.point_constant.size(), p.points.size()) || !as_many(p.squared_residuals.size(), p.observations.size()) ||
+      (mono ? !as_many(p.T_camera_left.size(), p.cameras.size()) : p.T_camera_left.size() != p.cameras.size()))
+    return refuse(r, BundleTermination::invalid_input, BundleDefect::sizes);
+  if (p.cameras.size() > w.capacity.cameras || p.T_left_world.size() > w.capacity.poses || p.points.size() > w.capacity.points ||
+      p.observations.size() > w.capacity.observations || (o.configuration == BundleConfiguration::stereo_calibration && !w.capacity.shared))
+    return refuse(r, BundleTermination::capacity, BundleDefect::none);
+  return true;
+}
+
+bool check_state(const BundleProblem& p, const BundleOptions& o, BundleResult* r) noexcept {
+  const auto bad = [&](std::size_t i) { return refuse(r, BundleTermination::invalid_input, BundleDefect::state_not_finite, i); };
+  for (std::size_t i = 0; i < p.points.size(); ++i)
+    if (!p.points[i].allFinite()) return bad(i);
+  for (std::size_t i = 0; i < p.T_left_world.size(); ++i)
+    if (!rigid(p.T_left_world[i])) return bad(i);
+  const bool mono = o.configuration == BundleConfiguration::parallel_monocular;
+  for (std::size_t k = 0; k < p.cameras.size(); ++k) {
+    if (!usable(p.cameras[k].intrinsics())) return bad(k);
+    if (mono) continue;
+    if (!rigid(p.T_camera_left[k])) return bad(k);
+    if (k == 0 && !(p.T_camera_left[0].R.isIdentity(kOrthonormal) && p.T_camera_left[0].t.norm() < kOrthonormal)) return bad(k);
+    if (k > 0 && o.configuration == BundleConfiguration::stereo_calibration && o.length[k].kind != BundleLength::free &&
+        !(p.T_camera_left[k].t.norm() > kOrthonormal))
+      return bad(k);  // a length without a direction
+  }
+  return true;
+}
+
+/// Observations: index, order, values; where each point's begin; how many each pose has.
+bool check_observations(BundleWorkspace& w, const BundleProblem& p, BundleResult* r) noexcept {
+  std::fill(w.pose_observations.begin(), w.pose_observations.end(), 0U);
+  std::size_t next_point = 0;
+  std::uint64_t last = 0;
+  for (std::size_t i = 0; i < p.observations.size(); ++i) {
+    const BundleObservation& o = p.observations[i];
+    if (o.point >= p.points.size() || o.pose >= p.T_left_world.size() || o.camera >= p.cameras.size())
+      return refuse(r, BundleTermination::invalid_input, BundleDefect::index, i);
+    const std::uint64_t key = (static_cast<std::uint64_t>(o.point) << 24U) | (static_cast<std::uint64_t>(o.pose) << 8U) | o.camera;
+    if (i > 0 && key <= last) return refuse(r, BundleTermination::invalid_input, BundleDefect::order, i);
+    last = key;
+    if (!std::isfinite(o.x) || !std::isfinite(o.y) || !std::isfinite(o.inverse_sigma) || !(o.inverse_sigma > 0))
+      return refuse(r, BundleTermination::invalid_input, BundleDefect::not_finite, i);
+    while (next_point <= o.point) w.first_observation[next_point++] = static_cast<std::uint32_t>(i);
+    ++w.pose_observations[o.pose];
+  }
+  while (next_point <= p.points.size()) w.first_observation[next_point++] = static_cast<std::uint32_t>(p.observations.size());
+  return true;
+}
+
+/// Numbers the free poses; every one of them has to be determined by something.
+bool check_poses(BundleWorkspace& w, const BundleProblem& p, const BundleOptions& o, BundleResult* r) noexcept {
+  w.free_poses = 0;
+  bool anchored = !p.pose_priors.empty();
+  for (std::size_t i = 0; i < p.T_left_world.size(); ++i) {
+    const bool constant = p.pose_constant.empty() ? i == 0 : p.pose_constant[i] != 0;
+    anchored = anchored || constant;
+    w.poses[i].block = constant ? -1 : w.free_poses++;
+  }
+  if (!anchored) return refuse(r, BundleTermination::invalid_input, BundleDefect::sizes);
+  for (std::size_t i = 0; i < p.pose_priors.size(); ++i) {
+    const BundlePosePrior& prior = p.pose_priors[i];
+    if (prior.pose >= p.T_left_world.size()) return refuse(r, BundleTermination::invalid_input, BundleDefect::index, i);
+    if (!rigid(prior.T_left_world) || !prior.information.allFinite()) return refuse(r, BundleTermination::invalid_input, BundleDefect::not_finite, i);
+  }
+  for (std::size_t i = 0; i < p.T_left_world.size(); ++i) {
+    if (w.poses[i].block < 0 || w.pose_observations[i] > 0) continue;
+    const bool held = std::any_of(p.pose_priors.begin(), p.pose_priors.end(), [&](const BundlePosePrior& q) { return q.pose == i; });
+    if (!held) return refuse(r, BundleTermination::rank_deficient, BundleDefect::pose_without_observations, i);
+  }
+  if (static_cast<std::size_t>(w.free_poses) * kBlock + static_cast<std::size_t>(shared_layout(p, o, false).blocks) * kBlock == 0 && p.points.empty())
+    return refuse(r, BundleTermination::invalid_input, BundleDefect::sizes);
+  return true;
+}
+
+/// Points with observations, those seen by the same poses together.
+bool order_points(BundleWorkspace& w, const BundleProblem& p, BundleResult* r) noexcept {
+  w.point_count = 0;
+  w.free_points = 0;
+  for (std::size_t i = 0; i < p.points.size(); ++i) {
+    const std::uint32_t begin = w.first_observation[i], end = w.first_observation[i + 1];
+    if (begin == end) continue;
+    const bool free = p.point_constant.empty() || p.point_constant[i] == 0;
+    if (free && end - begin < 2) return refuse(r, BundleTermination::rank_deficient, BundleDefect::seen_once, i);
+    w.free_points += free ? 1U : 0U;
+    const std::uint64_t first = p.observations[begin].pose, last = p.observations[end - 1].pose;
+    w.order[w.point_count++] = (first << 48U) | (last << 32U) | i;
+  }
+  const auto used = w.order.first(w.point_count);
+  if (!std::is_sorted(used.begin(), used.end())) std::sort(used.begin(), used.end());
+  return true;
+}
+
+/// The images of one batch: the union of those that see its points. False: more than there is room for.
+bool lay_out_batch(BundleWorkspace& w, const BundleProblem& p, std::size_t index) noexcept {
+  Batch& batch = w.batches[index];
+  batch.lanes = static_cast<std::uint32_t>(std::min<std::size_t>(kBatch, w.point_count - index * kBatch));
+  batch.block_begin = static_cast<std::uint32_t>(w.block_count);
+  std::size_t lowest = p.T_left_world.size(), highest = 0;
+  const auto point_of = [&](std::size_t lane) { return static_cast<std::uint32_t>(w.order[index * kBatch + lane]); };
+  for (std::size_t lane = 0; lane < batch.lanes; ++lane) {
+    const std::uint32_t point = point_of(lane);
+    for (std::uint32_t i = w.first_observation[point]; i < w.first_observation[point + 1]; ++i) {
+      const BundleObservation& o = p.observations[i];
+      w.pose_cameras[o.pose] = static_cast<std::uint8_t>(w.pose_cameras[o.pose] | (1U << o.camera));
+      lowest = std::min<std::size_t>(lowest, o.pose);
+      highest = std::max<std::size_t>(highest, o.pose);
+    }
+  }
+  bool room = true;
+  for (std::size_t pose = lowest; pose <= highest; ++pose) {
+    const std::uint8_t cameras = w.pose_cameras[pose];
+    if (cameras == 0) continue;
+    const auto count = static_cast<std::size_t>(std::popcount(cameras));
+    if (w.block_count == w.blocks.size() || w.slot_count + count > w.slots.size()) {
+      room = false;
+      break;
+    }
+    w.blocks[w.block_count++] = {static_cast<std::uint32_t>(w.slot_count), static_cast<std::uint16_t>(pose), cameras};
+    w.pose_slot[pose] = static_cast<std::uint32_t>(w.slot_count);
+    for (std::size_t i = 0; i < count; ++i) w.slots[w.slot_count++] = Slot{};
+  }
+  for (std::size_t lane = 0; lane < batch.lanes && room; ++lane) {
+    const std::uint32_t point = point_of(lane);
+    for (std::uint32_t i = w.first_observation[point]; i < w.first_observation[point + 1]; ++i) {
+      const BundleObservation& o = p.observations[i];
+      const unsigned before = w.pose_cameras[o.pose] & ((1U << o.camera) - 1U);
+      const std::uint32_t slot = w.pose_slot[o.pose] + static_cast<std::uint32_t>(std::popcount(before));
+      w.slots[slot].x[lane] = o.x;
+      w.slots[slot].y[lane] = o.y;
+      w.slots[slot].inverse_sigma[lane] = static_cast<double>(o.inverse_sigma);
+      w.observation_lane[i] = slot * kBatch + static_cast<std::uint32_t>(lane);
+    }
+  }
+  if (lowest <= highest) std::fill(w.pose_cameras.begin() + static_cast<std::ptrdiff_t>(lowest), w.pose_cameras.begin() + static_cast<std::ptrdiff_t>(highest) + 1, std::uint8_t{0});
+  batch.block_end = static_cast<std::uint32_t>(w.block_count);
+  return room;
+}
+
+bool same_poses(const BundleWorkspace& w, const Batch& a, const Batch& b) noexcept {
+  const auto begin = w.blocks.begin();
+  return std::equal(begin + a.block_begin, begin + a.block_end, begin + b.block_begin, begin + b.block_end,
+                    [](const PoseBlock& x, const PoseBlock& y) { return x.pose == y.pose; });
+}
+
+}  // namespace
+
+std::array<double, kIntrinsicsSize> parameters(const Intrinsics& k) noexcept {
+  return {k.fx, k.fy, k.cx, k.cy, k.distortion[0], k.distortion[1], k.distortion[2], k.distortion[3], k.distortion[4]};
+}
+
+void set_parameters(Intrinsics& k, const std::array<double, kIntrinsicsSize>& v) noexcept {
+  k.fx = v[0];
+  k.fy = v[1];
+  k.cx = v[2];
+  k.cy = v[3];
+  for (std::size_t i = 0; i < k.distortion.size(); ++i) k.distortion[i] = v[4 + i];
+}
+
+double held_sigma(const BundleIntrinsics& intrinsics, const Intrinsics& k, int parameter) noexcept {
+  constexpr double kFocalShare = 1e-3, kPrincipalPoint = 0.5;  // px; METHOD §2
+  const double given = intrinsics.held_sigma[static_cast<std::size_t>(parameter)];
+  if (given >= 0) return given;
+  return parameter == 0 ? kFocalShare * k.fx : parameter == 1 ? kFocalShare * k.fy : parameter < 4 ? kPrincipalPoint : 0;
+}
+
+SharedLayout shared_layout(const BundleProblem& p, const BundleOptions& o, bool held_too) noexcept {
+  SharedLayout s;
+  if (o.configuration != BundleConfiguration::stereo_calibration) return s;
+  for (std::size_t k = 1; k < p.cameras.size(); ++k) {
+    s.extrinsic[k] = s.size;
+    s.exact[k] = o.length[k].kind == BundleLength::exact;
+    s.size += s.exact[k] ? 5 : 6;
+  }
+  for (std::size_t k = 0; k < p.cameras.size(); ++k) {
+    s.intrinsic[k] = s.size;
+    for (int i = 0; i < kIntrinsicsSize; ++i) {
+      const bool free = ((o.intrinsics[k].free >> static_cast<unsigned>(i)) & 1U) != 0;
+      const bool held = held_too && held_sigma(o.intrinsics[k], p.cameras[k].intrinsics(), i) > 0;
+      if (free || held) s.intrinsic_index[k][s.intrinsic_count[k]++] = static_cast<std::uint8_t>(i);
+    }
+    s.size += s.intrinsic_count[k];
+  }
+  s.blocks = (s.size + kBlock - 1) / kBlock;
+  return s;
+}
+
+bool set_up(BundleWorkspace& w, const BundleProblem& p, const BundleOptions& o, BundleResult* r) noexcept {
+  if (o.validate()[0] != '\0') return refuse(r, BundleTermination::invalid_input, BundleDefect::options);
+  if (!check_sizes(w, p, o, r) || !check_state(p, o, r) || !check_observations(w, p, r) || !check_poses(w, p, o, r) || !order_points(w, p, r))
+    return false;
+  w.batch_count = (w.point_count + kBatch - 1) / kBatch;
+  w.block_count = w.slot_count = 0;
+  std::uint32_t group = 0, in_group = 0;
+  for (std::size_t b = 0; b < w.batch_count; ++b) {
+    if (!lay_out_batch(w, p, b)) return refuse(r, BundleTermination::capacity, BundleDefect::none);
+    if (b > 0 && (in_group == kGroupLimit || !same_poses(w, w.batches[b - 1], w.batches[b]))) {
+      ++group;
+      in_group = 0;
+    }
+    ++in_group;
+    w.batches[b].group = group;
+  }
+  BundleState& state = w.states[0];
+  for (std::size_t i = 0; i < w.batch_count * kBatch; ++i) {
+    const std::size_t batch = i / kBatch, lane = i % kBatch;
+    const bool used = i < w.point_count;
+    const auto point = used ? static_cast<std::uint32_t>(w.order[i]) : 0U;
+    for (std::size_t c = 0; c < 3; ++c) state.points[(batch * 3 + c) * kBatch + lane] = used ? p.points[point][static_cast<Eigen::Index>(c)] : 0.0;
+    w.point_free[i] = used && (p.point_constant.empty() || p.point_constant[point] == 0) ? 1.0 : 0.0;
+  }
+  std::copy(p.T_left_world.begin(), p.T_left_world.end(), state.poses.begin());
+  for (std::size_t k = 0; k < p.cameras.size(); ++k) {
+    state.cameras[k] = p.cameras[k];
+    state.T_camera_left[k] = o.configuration == BundleConfiguration::parallel_monocular || k == 0 ? Transform{} : p.T_camera_left[k];
+    if (o.configuration != BundleConfiguration::stereo_calibration || k == 0 || o.length[k].kind != BundleLength::exact) continue;
+    if (o.length[k].metres > 0) state.T_camera_left[k].t *= o.length[k].metres / state.T_camera_left[k].t.norm();
+  }
+  return true;
+}
+
+}  // namespace vergence::detail

@@ -1,0 +1,57 @@
+#pragma once
+#include "core/bundle/detail/kernels.hpp"
+#include "core/bundle/detail/workspace.hpp"
+
+namespace vergence::detail {
+
+/// The normal equations of METHOD §2 about one state, points eliminated: A δ = rhs, δ = [poses | θ_S].
+///
+/// Threads  One at a time; lives on the stack of solve(). Memory  The workspace's.
+class System {
+ public:
+  System(BundleWorkspace& workspace, const BundleProblem& problem, const BundleOptions& options) noexcept;
+
+  /// Rows of θ_S from now on (free ones, or held intrinsics too).
+  void use(const SharedLayout& shared) noexcept;
+
+  /// Cost, gradient and damped reduced system about `state`. False: an observed point is behind its camera or the cost is not finite.
+  [[nodiscard]] bool linearise(const BundleState& state, double damping) noexcept;
+  /// Cost alone; `squared`: also |ε|²/σ² of every slot into the workspace.
+  [[nodiscard]] bool evaluate(const BundleState& state, bool squared) noexcept;
+  /// candidate ← state moved by `delta` (the reduced system's solution), points by back substitution. The last linearise() was about `state`.
+  void move(const BundleState& state, const double* delta, BundleState* candidate) noexcept;
+
+  [[nodiscard]] std::size_t rows() const noexcept { return rows_; }
+  [[nodiscard]] std::size_t ld() const noexcept { return ld_; }
+  [[nodiscard]] double cost() const noexcept { return cost_; }
+  [[nodiscard]] double squared_px() const noexcept { return job_.squared_px; }
+  [[nodiscard]] double weighted() const noexcept { return job_.weighted; }
+  [[nodiscard]] double point_decrement() const noexcept { return job_.decrement; }
+  [[nodiscard]] double update_squared() const noexcept { return update_; }  // of the last move(): |δ|², |θ|²
+  [[nodiscard]] double norm_squared() const noexcept { return norm_; }
+  [[nodiscard]] const KernelJob& job() const noexcept { return job_; }
+
+ private:
+  void prepare(const BundleState& state) noexcept;
+  void fill_jets(const BundleState& state, const Batch& batch) noexcept;
+  void assemble(const BundleState& state) noexcept;
+  void assemble_pose(std::size_t pose) noexcept;
+  void assemble_intrinsics() noexcept;
+  void add_priors(const BundleState& state) noexcept;
+  [[nodiscard]] double prior_cost(const BundleState& state) const noexcept;
+  double& at(std::size_t row, std::size_t column) noexcept { return w_.A[column * ld_ + row]; }
+  void add_information(std::size_t row, std::size_t column, double value) noexcept;
+
+  BundleWorkspace& w_;
+  const BundleProblem& problem_;
+  const BundleOptions& options_;
+  KernelJob job_;
+  bool use_jets_ = false;
+  std::size_t rows_ = 0, ld_ = 0, first_shared_ = 0;
+  double cost_ = 0, update_ = 0, norm_ = 0;
+};
+
+/// J (6 × size, row-major): how (τ, φ) of camera k follows from its rows of θ_S.
+[[nodiscard]] Eigen::Matrix<double, 6, 6> extrinsic_basis(const SharedLayout& shared, const KernelCamera& camera, int k) noexcept;
+
+}  // namespace vergence::detail
