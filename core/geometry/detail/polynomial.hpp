@@ -1,6 +1,8 @@
 #pragma once
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstddef>
 
 namespace vergence::detail {
 
@@ -41,6 +43,62 @@ namespace vergence::detail {
     if (std::abs(next - x) < 1e-6 * (std::abs(x) + 1e-300)) x = next;
   }
   return x;
+}
+
+/// Real roots in [-1, 1] of Σ c[i] xⁱ, i ≤ Degree, ascending, where the polynomial changes its sign; returns how many.
+///
+/// Between neighbouring critical points a polynomial is monotonic; those are the roots of its derivative, found the same way
+/// from the linear one upwards. Each root: Newton, bisected where it would leave its bracket, at most kSteps.
+template <std::size_t Degree>
+[[nodiscard]] std::size_t roots_in_unit_interval(const std::array<double, Degree + 1>& c, std::array<double, Degree>* roots) noexcept {
+  constexpr int kSteps = 60;  // bisection alone reaches the last bit of [-1, 1] in 54
+  std::array<double, Degree + 1> critical{};
+  std::size_t n = 0;
+  for (std::size_t degree = 1; degree <= Degree; ++degree) {
+    // The derivative of that degree, up to a common factor: d[i] ∝ c[i + m] (i + m)!/i!.
+    const std::size_t m = Degree - degree;
+    std::array<double, Degree + 1> d{};
+    for (std::size_t i = 0; i <= degree; ++i) {
+      d[i] = c[i + m];
+      for (std::size_t f = i + 1; f <= i + m; ++f) d[i] *= static_cast<double>(f);
+    }
+    const auto at = [&d, degree](double x, double* slope) noexcept {
+      double value = d[degree], first = 0;
+      for (std::size_t i = degree; i-- > 0;) {
+        first = first * x + value;
+        value = value * x + d[i];
+      }
+      *slope = first;
+      return value;
+    };
+    std::array<double, Degree + 1> found{};
+    std::size_t count = 0;
+    double lo = -1.0, slope = 0.0;
+    double f_lo = at(lo, &slope);
+    for (std::size_t k = 0; k <= n; ++k) {
+      const double hi = k < n ? critical[k] : 1.0;
+      const double f_hi = at(hi, &slope);
+      if ((f_lo < 0.0) != (f_hi < 0.0)) {
+        double a = lo, b = hi, x = 0.5 * (a + b);
+        for (int step = 0; step < kSteps; ++step) {
+          const double f = at(x, &slope);
+          ((f < 0.0) == (f_lo < 0.0) ? a : b) = x;
+          double next = x - f / slope;
+          if (!(next > a && next < b)) next = 0.5 * (a + b);
+          const double moved = std::abs(next - x);
+          x = next;
+          if (moved <= 1e-16) break;
+        }
+        found[count++] = x;
+      }
+      lo = hi;
+      f_lo = f_hi;
+    }
+    critical = found;
+    n = count;
+  }
+  for (std::size_t i = 0; i < n; ++i) (*roots)[i] = critical[i];
+  return n;
 }
 
 }  // namespace vergence::detail

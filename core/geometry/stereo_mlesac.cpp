@@ -1,0 +1,211 @@
+#include "core/geometry/stereo_mlesac.hpp"
+
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+
+#include "core/geometry/detail/buckets.hpp"
+#include "core/geometry/detail/kernels.hpp"
+#include "core/geometry/five_point.hpp"
+#include "core/geometry/mlesac.hpp"
+
+namespace vergence {
+namespace {
+
+constexpr const char* kWho = "stereo MLESAC";
+constexpr std::size_t kAbortChunk = 128;  // matches scored between looks at the best so far; a multiple of the block
+constexpr int kPolishSteps = 4;           // Gauss–Newton from a pose a few sigmas off
+constexpr int kMaxPolished = 12;          // new bests polished a call: they come log(hypotheses) often
+constexpr double kMaxCondition = 1e12;    // of the information: beyond, double holds no digit of the worst direction
+
+[[nodiscard]] bool valid(const StereoMatches& m, double baseline, const StereoMlesacOptions& o) noexcept {
+  const std::size_t n = m.size();
+  return m.left_y.size() == n && m.right_x.size() == n && m.right_y.size() == n && m.sigma.size() == n && baseline > 0 &&
+         std::isfinite(baseline) && o.max_hypotheses >= 1 && o.min_hypotheses >= 0 && o.confidence > 0 && o.confidence < 1 &&
+         o.outlier_cost > 0 && std::isfinite(o.outlier_cost);
+}
+
+}  // namespace
+
+std::size_t StereoMlesac::memory_needed(std::size_t capacity) noexcept {
+  const std::size_t n = detail::padded(capacity, detail::kFloatBlock);
+  return n * (6 * sizeof(float) + 4 * sizeof(Vec2) + sizeof(double) + sizeof(std::uint32_t) + 2) + 14 * kCacheLine;
+}
+
+StereoMlesac::StereoMlesac(std::size_t capacity, Arena& arena) {
+  const std::size_t n = detail::padded(capacity, detail::kFloatBlock);
+  for (std::span<float>* column : {&x1_, &y1_, &x2_, &y2_, &weight_, &cap_}) *column = arena.make<float>(n, kWho);
+  for (std::span<Vec2>* rays : {&left_, &right_, &near_left_, &near_right_}) *rays = arena.make<Vec2>(n, kWho);
+  inverse_sigma_ = arena.make<double>(n, kWho);
+  match_ = arena.make<std::uint32_t>(n, kWho);
+  bucket_ = arena.make<std::uint8_t>(n, kWho);
+  flags_ = arena.make<std::uint8_t>(capacity, kWho);
+}
+
+void StereoMlesac::gather(const StereoMatches& m, double cap) noexcept {
+  matches_ = m.size();
+  count_ = 0;
+  detail::PixelBox box;
+  for (std::size_t i = 0; i < matches_; ++i) {
+    const Vec2 l(m.left_x[i], m.left_y[i]), r(m.right_x[i], m.right_y[i]);
+    if (!l.allFinite() || !r.allFinite() || !(m.sigma[i] > 0) || !std::isfinite(m.sigma[i])) continue;
+    const std::size_t n = count_++;
+    left_[n] = l;
+    right_[n] = r;
+    inverse_sigma_[n] = 1.0 / m.sigma[i];
+    match_[n] = static_cast<std::uint32_t>(i);
+    x1_[n] = static_cast<float>(l.x());
+    y1_[n] = static_cast<float>(l.y());
+    x2_[n] = static_cast<float>(r.x());
+    y2_[n] = static_cast<float>(r.y());
+    weight_[n] = static_cast<float>(inverse_sigma_[n] * inverse_sigma_[n]);
+    cap_[n] = static_cast<float>(cap);
+    box.include(l.x(), l.y());
+  }
+  for (std::size_t n = 0; n < count_; ++n) bucket_[n] = box.bucket(left_[n].x(), left_[n].y());
+  whole_ = detail::padded(count_, detail::kFloatBlock);
+  for (std::size_t n = count_; n < whole_; ++n) x1_[n] = y1_[n] = x2_[n] = y2_[n] = weight_[n] = cap_[n] = 0.0F;
+}
+
+double StereoMlesac::score(const Mat3& E, double best) const noexcept {
+  std::array<float, 9> e;
+  for (std::size_t i = 0; i < 9; ++i) e[i] = static_cast<float>(E(static_cast<int>(i / 3), static_cast<int>(i % 3)));
+  const detail::MatchColumns columns{x1_.data(), y1_.data(), x2_.data(), y2_.data(), weight_.data(), cap_.data()};
+  double cost = 0;
+  for (std::size_t first = 0; first < whole_; first += kAbortChunk) {
+    cost += static_cast<double>(detail::sampson_cost(columns, first, std::min(first + kAbortChunk, whole_), e));
+    if (!(cost < best)) return std::numeric_limits<double>::infinity();
+  }
+  return cost;
+}
+
+bool StereoMlesac::transform_of(const Mat3& E, double cap, double baseline, Transform* T) noexcept {
+  std::size_t n = 0;
+  for (std::size_t i = 0; i < count_; ++i) {
+    const Vec3 x = left_[i].homogeneous(), y = right_[i].homogeneous();
+    const Vec3 l = E * x, k = E.transpose() * y;
+    const double d = y.dot(l) * inverse_sigma_[i];
+    if (!(d * d < cap * (l.head<2>().squaredNorm() + k.head<2>().squaredNorm()))) continue;
+    near_left_[n] = left_[i];
+    near_right_[n++] = right_[i];
+  }
+  return decompose_essential(E, near_left_.first(n), near_right_.first(n), baseline, T) > 0;
+}
+
+Mat5 StereoMlesac::information(double cap, const Transform& T, Vec5* gradient) const noexcept {
+  const EpipolarGeometry geometry(T);
+  Mat5 H = Mat5::Zero();
+  *gradient = Vec5::Zero();
+  for (std::size_t i = 0; i < count_; ++i) {
+    double r = 0;
+    Vec5 J;
+    if (geometry.sampson(left_[i], right_[i], &r, &J) != EpipolarStatus::ok) continue;
+    r *= inverse_sigma_[i];
+    if (!(r * r < cap)) continue;
+    J *= inverse_sigma_[i];
+    H.noalias() += J * J.transpose();
+    *gradient -= r * J;
+  }
+  return H;
+}
+
+bool StereoMlesac::polish(double cap, Transform* T) const noexcept {
+  Transform next = *T;
+  for (int step = 0; step < kPolishSteps; ++step) {
+    Vec5 g;
+    const Mat5 H = information(cap, next, &g);
+    const Eigen::LLT<Mat5> llt(H);
+    if (llt.info() != Eigen::Success) return false;
+    const Vec5 delta = llt.solve(g);
+    if (!delta.allFinite() || !(delta.norm() < 1.0)) return false;
+    next = moved_on_sphere(next, delta);
+  }
+  *T = next;
+  return true;
+}
+
+int StereoMlesac::flag(double cap, const Transform& T) noexcept {
+  std::fill_n(flags_.begin(), matches_, std::uint8_t{0});
+  const EpipolarGeometry geometry(T);
+  int inliers = 0;
+  for (std::size_t i = 0; i < count_; ++i) {
+    double r = 0, depth_left = 0, depth_right = 0;
+    if (geometry.sampson(left_[i], right_[i], &r, nullptr) != EpipolarStatus::ok) continue;
+    r *= inverse_sigma_[i];
+    if (!(r * r < cap)) continue;
+    // A point at infinity has parallel rays: noise decides the sign of its depth, which then means nothing.
+    const bool parallel = !match_depths(T, left_[i], right_[i], &depth_left, &depth_right);
+    const Vec3 turned = T.R * left_[i].homogeneous();
+    const double gap = (turned / turned.z() - right_[i].homogeneous()).norm() * inverse_sigma_[i];
+    if (!parallel && !(depth_left > 0 && depth_right > 0) && !(turned.z() > 0 && gap * gap < 2.0 * cap)) continue;
+    flags_[match_[i]] = 1;
+    ++inliers;
+  }
+  return inliers;
+}
+
+StereoEstimate StereoMlesac::estimate_stereo_transform(const StereoMatches& matches, double baseline, const StereoMlesacOptions& options,
+                                                       Random& random) noexcept {
+  StereoEstimate out;
+  matches_ = 0;
+  const auto refuse = [&out](StereoMlesacStatus why) noexcept {
+    out.status = why;
+    return out;
+  };
+  if (!valid(matches, baseline, options)) return refuse(StereoMlesacStatus::invalid_input);
+  if (matches.size() > flags_.size()) return refuse(StereoMlesacStatus::capacity);
+  const double cap = options.outlier_cost;
+  gather(matches, cap);
+  std::fill_n(flags_.begin(), matches_, std::uint8_t{0});
+  if (count_ < 5) return refuse(StereoMlesacStatus::too_few);
+
+  double best = std::numeric_limits<double>::infinity();
+  int needed = options.max_hypotheses, polished = 0;
+  while (out.samples < needed) {
+    ++out.samples;
+    std::array<std::uint32_t, 5> picks{};
+    if (!detail::draw_spread<5>(bucket_.first(count_), random, &picks)) continue;
+    std::array<Vec2, 5> left, right;
+    for (std::size_t j = 0; j < 5; ++j) left[j] = left_[picks[j]], right[j] = right_[picks[j]];
+    const FivePointSolutions found = solve_five_point(left, right);
+    for (int j = 0; j < found.count; ++j) {
+      ++out.hypotheses;
+      const Mat3& E = found.E[static_cast<std::size_t>(j)];
+      const double cost = score(E, best);
+      Transform T;
+      if (!(cost < best) || !transform_of(E, cap, baseline, &T)) continue;
+      best = cost;
+      Transform better = T;
+      if (polished < kMaxPolished && polish(cap, &better)) {
+        ++polished;
+        const double polished_cost = score(essential_matrix(better), best);
+        if (polished_cost < best) best = polished_cost, T = better;
+      }
+      out.status = StereoMlesacStatus::ok;
+      out.T_right_left = T;
+      out.inliers = flag(cap, T);
+      needed = std::max(
+          std::min(options.min_hypotheses, options.max_hypotheses),
+          samples_needed(static_cast<double>(out.inliers) / static_cast<double>(count_), 5, options.confidence, options.max_hypotheses));
+    }
+  }
+  if (out.status != StereoMlesacStatus::ok) return out;
+  out.score = best;
+  Vec5 unused;
+  out.information = information(cap, out.T_right_left, &unused);
+  out.rotation_sigma = out.direction_sigma = std::numeric_limits<double>::infinity();
+  const Eigen::SelfAdjointEigenSolver<Mat5> eigen(out.information);
+  if (eigen.eigenvalues()[0] > eigen.eigenvalues()[4] / kMaxCondition) {
+    const Mat5 covariance = eigen.eigenvectors() * eigen.eigenvalues().cwiseInverse().asDiagonal() * eigen.eigenvectors().transpose();
+    const Mat3 turn = covariance.topLeftCorner<3, 3>();
+    const Mat2 direction = covariance.bottomRightCorner<2, 2>();
+    out.rotation_sigma = std::sqrt(Eigen::SelfAdjointEigenSolver<Mat3>(turn, Eigen::EigenvaluesOnly).eigenvalues()[2]);
+    out.direction_sigma = std::sqrt(Eigen::SelfAdjointEigenSolver<Mat2>(direction, Eigen::EigenvaluesOnly).eigenvalues()[1]);
+  }
+  return out;
+}
+
+}  // namespace vergence

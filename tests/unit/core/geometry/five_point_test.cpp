@@ -1,0 +1,161 @@
+#include "core/geometry/five_point.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <limits>
+#include <opencv2/calib3d.hpp>
+#include <vector>
+
+#include "core/geometry/epipolar.hpp"
+#include "core/memory/allocation_guard.hpp"
+#include "tests/unit/core/geometry/random_scene.hpp"
+
+namespace vergence {
+namespace {
+
+struct Matches {
+  Transform T_right_left;
+  std::array<Vec2, 5> left, right;
+};
+
+Matches random_matches(Random& random) {
+  Matches m;
+  m.T_right_left = {exp_so3(test::random_vector(random, -0.3, 0.3)), test::random_vector(random, -1, 1)};
+  for (std::size_t i = 0; i < 5; ++i) {
+    const Vec3 p = test::visible_point(random, 3, 20), q = m.T_right_left * p;
+    m.left[i] = Vec2(p.x() / p.z(), p.y() / p.z());
+    m.right[i] = Vec2(q.x() / q.z(), q.y() / q.z());
+  }
+  return m;
+}
+
+/// Distance to the nearest solution; both have Frobenius norm √2 and free sign.
+double nearest(const FivePointSolutions& s, const Mat3& E) {
+  double best = std::numeric_limits<double>::infinity();
+  for (int i = 0; i < s.count; ++i) {
+    const Mat3& F = s.E[static_cast<std::size_t>(i)];
+    best = std::min({best, (F - E).norm(), (F + E).norm()});
+  }
+  return best;
+}
+
+TEST(FivePoint, findsTheTrueMatrixOfRandomMatches) {
+  Random random(51);
+  constexpr int kProblems = 3000;
+  std::vector<double> errors;
+  int missed = 0;
+  for (int k = 0; k < kProblems; ++k) {
+    const Matches m = random_matches(random);
+    const FivePointSolutions s = solve_five_point(m.left, m.right);
+    const double error = nearest(s, essential_matrix(m.T_right_left));
+    errors.push_back(error);
+    missed += error < 1e-6 ? 0 : 1;
+  }
+  std::sort(errors.begin(), errors.end());
+  EXPECT_LT(errors[kProblems / 2], 1e-12);
+  EXPECT_LT(errors[kProblems * 98 / 100], 1e-9);
+  EXPECT_LE(missed, 3);  // two roots of the tenth degree so near to each other that no sign change lies between: one in thousands
+}
+
+TEST(FivePoint, everySolutionIsEssentialAndFitsTheFiveMatches) {
+  Random random(52);
+  for (int k = 0; k < 500; ++k) {
+    const Matches m = random_matches(random);
+    const FivePointSolutions s = solve_five_point(m.left, m.right);
+    for (int i = 0; i < s.count; ++i) {
+      const Mat3& E = s.E[static_cast<std::size_t>(i)];
+      EXPECT_NEAR(E.norm(), std::sqrt(2.0), 1e-12);
+      EXPECT_NEAR(E.determinant(), 0.0, 1e-7);
+      EXPECT_LT((2 * E * E.transpose() * E - (E * E.transpose()).trace() * E).norm(), 1e-7);
+      for (std::size_t j = 0; j < 5; ++j) EXPECT_NEAR(m.right[j].homogeneous().dot(E * m.left[j].homogeneous()), 0.0, 1e-11);
+    }
+  }
+}
+
+TEST(FivePoint, findsWhatOpenCvFindsInTheSameFive) {
+  Random random(53);
+  int compared = 0, missing = 0;
+  for (int k = 0; k < 200; ++k) {
+    const Matches m = random_matches(random);
+    std::vector<cv::Point2d> left, right;
+    for (std::size_t i = 0; i < 5; ++i) left.emplace_back(m.left[i].x(), m.left[i].y()), right.emplace_back(m.right[i].x(), m.right[i].y());
+    const cv::Mat all = cv::findEssentialMat(left, right, cv::Mat::eye(3, 3, CV_64F), cv::RANSAC, 0.999, 1e-3);
+    const FivePointSolutions s = solve_five_point(m.left, m.right);
+    for (int at = 0; at + 3 <= all.rows; at += 3) {  // with five matches it returns every solution, one below the other
+      Mat3 E;
+      for (int r = 0; r < 3; ++r)
+        for (int c = 0; c < 3; ++c) E(r, c) = all.at<double>(at + r, c);
+      E *= std::sqrt(2.0) / E.norm();
+      if ((2 * E * E.transpose() * E - (E * E.transpose()).trace() * E).norm() > 1e-8) continue;  // its own rounding
+      ++compared;
+      missing += nearest(s, E) < 1e-5 ? 0 : 1;
+    }
+  }
+  EXPECT_GT(compared, 400);
+  EXPECT_LE(missing, compared / 500);
+}
+
+TEST(FivePoint, decompositionFindsTheTransform) {
+  Random random(54);
+  for (int k = 0; k < 1000; ++k) {
+    const Matches m = random_matches(random);
+    Transform T;
+    const double baseline = m.T_right_left.t.norm();
+    ASSERT_EQ(decompose_essential(-3.0 * essential_matrix(m.T_right_left), m.left, m.right, baseline, &T), 5);
+    EXPECT_LT(test::difference(T, m.T_right_left), 1e-9);
+  }
+}
+
+TEST(FivePoint, refusesDegenerateInputByName) {
+  Random random(55);
+  Matches m = random_matches(random);
+  m.left[4] = m.left[0];
+  m.right[4] = m.right[0];
+  EXPECT_EQ(solve_five_point(m.left, m.right).status, FivePointStatus::degenerate);
+  m = random_matches(random);
+  m.right[2].x() = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_EQ(solve_five_point(m.left, m.right).status, FivePointStatus::not_finite);
+  m = random_matches(random);
+  m.left.fill(Vec2::Zero());
+  m.right.fill(Vec2::Zero());
+  EXPECT_EQ(solve_five_point(m.left, m.right).status, FivePointStatus::degenerate);
+  Transform T;
+  EXPECT_EQ(decompose_essential(Mat3::Constant(std::numeric_limits<double>::quiet_NaN()), m.left, m.right, 1, &T), 0);
+  EXPECT_EQ(T.R, Mat3::Identity());
+}
+
+TEST(FivePoint, nothingIsNotANumberAndNothingAllocates) {
+  Random random(56);
+  const std::uint64_t before = AllocationGuard::allocations_after_seal();
+  for (int k = 0; k < 2000; ++k) {
+    Matches m = random_matches(random);
+    switch (random.below(4)) {
+      case 0:
+        m.right = m.left;
+        break;  // at infinity, no turn
+      case 1:
+        for (std::size_t i = 0; i < 5; ++i) m.left[i].y() = m.right[i].y() = 0;  // all on one line
+        break;
+      case 2:
+        for (std::size_t i = 0; i < 5; ++i) {  // at infinity, turned
+          const Vec3 q = m.T_right_left.R * m.left[i].homogeneous();
+          m.right[i] = q.head<2>() / q.z();
+        }
+        break;
+      default:
+        m.left[3] = m.left[2] + Vec2(1e-9, 0);
+    }
+    const SealedScope sealed;
+    const FivePointSolutions s = solve_five_point(m.left, m.right);
+    for (int i = 0; i < s.count; ++i) {
+      Transform T;
+      (void)decompose_essential(s.E[static_cast<std::size_t>(i)], m.left, m.right, 1.0, &T);
+      ASSERT_TRUE(s.E[static_cast<std::size_t>(i)].allFinite() && T.finite());
+    }
+  }
+  EXPECT_EQ(AllocationGuard::allocations_after_seal(), before);
+}
+
+}  // namespace
+}  // namespace vergence
