@@ -1,0 +1,187 @@
+#pragma once
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+
+#include "core/comparison/geodesy.hpp"
+#include "core/comparison/placement.hpp"
+#include "core/math/se3.hpp"
+#include "core/memory/arena.hpp"
+#include "core/memory/fixed_vector.hpp"
+#include "core/types/ins_sample.hpp"
+#include "core/types/pose_sample.hpp"
+
+namespace vergence {
+
+struct ComparisonOptions {
+  /// p_ins = T_ins_left * p_left; made by mount_of() from the configuration's lever arm and boresight.
+  Transform T_ins_left{};
+  /// m driven with a valid fix, after which the placement is fitted and frozen. > 0
+  double placement_m = 100.0;
+  /// s: for so long the INS's position errors resemble one another; sets the placement's sigma. > 0
+  double correlation_s = 10.0;
+  /// Used where a sample gives no sigma of its own. > 0
+  double position_sigma_m = 2.5;
+  double height_sigma_m = 5.0;
+  double tilt_sigma_rad = 0.0087;  // half a degree
+  /// Two samples farther apart than this are not interpolated between.
+  Duration max_gap = Duration::milliseconds(100);
+  /// A pose waits so long for the INS sample after it, by the stamps of the poses that follow; then it goes out without.
+  Duration max_wait = Duration::milliseconds(500);
+  /// m: a step from sample to sample beyond this and 60 m/s is a jump: not interpolated across.
+  double jump_m = 20.0;
+  /// m: path lengths are compared over the newest stretch of this length; `scale_disagrees` beyond `scale_tolerance` and 4 sigma.
+  double scale_stretch_m = 200.0;
+  double scale_tolerance = 0.02;
+  /// INS samples held; the oldest goes. 8192 are 68 s at 120 Hz, far more than any pose waits. Power of two.
+  std::size_t ins_capacity = 8192;
+
+  /// Nothing wrong: nullptr; else a sentence.
+  [[nodiscard]] const char* validate() const noexcept;
+};
+
+/// From where the left camera sits in the body of the INS (forward, left, up; m) and how the rig's forward-left-up axes are turned
+/// against the INS's (roll, pitch, yaw, rad: R = Rz(yaw) Ry(pitch) Rx(roll)). All zero: they look the same way.
+[[nodiscard]] Transform mount_of(const Vec3& lever_arm_m, const Vec3& boresight_rad) noexcept;
+
+/// What the INS had to say at a frame's stamp.
+enum class InsMatch : std::uint8_t {
+  ok,
+  none,    // no sample yet, or none after the frame: late, gone
+  gap,     // samples are missing around the frame
+  no_fix,  // the receiver has no position: the comparison pauses
+  jump,    // the position leapt around the frame
+};
+[[nodiscard]] const char* to_string(InsMatch) noexcept;
+
+/// A place and a direction of the left camera on the earth.
+struct EarthPose {
+  Transform T_enu_left{};
+  Geodetic position{};
+  double yaw = 0;  // rad, of the camera's view in the horizontal plane, counter-clockwise from east
+};
+
+/// One frame with both. What is not there (`placed` or `ins_valid` false) is zero and means nothing.
+struct ComparedPose {
+  PoseSample pose{};
+  InsMatch ins = InsMatch::none;
+  bool ins_valid = false;
+  bool placed = false;    // the pose is not lost and there is a placement
+  bool compared = false;  // both: the errors mean something
+  std::uint32_t placement_revision = 0;
+  EarthPose ours{};
+  EarthPose reference{};          // the INS brought to the left camera and to the frame's stamp
+  Duration ins_stamp_error{};     // the larger of the two samples' around the frame
+  Vec3 error_enu = Vec3::Zero();  // m, ours − INS
+  double error_yaw = 0;           // rad, in (−π, π], counter-clockwise from above positive
+  double path_ratio = 0;          // ours / INS over the newest scale_stretch_m; 0: not yet that far
+  bool scale_disagrees = false;
+};
+
+/// Counters; all only grow.
+struct ComparisonCounters {
+  std::uint64_t ins_samples = 0;
+  std::uint64_t ins_refused = 0;   // out of order, not a number, not a place on the earth
+  std::uint64_t ins_restarts = 0;  // the INS's stamps went back for good: its history was begun anew
+  std::uint64_t jumps = 0;
+  std::uint64_t compared = 0;
+  std::uint64_t without_ins = 0;  // poses that went out with an InsMatch other than ok
+  std::uint64_t pushed_out = 0;   // poses that went out before their time because the queue was full
+};
+
+/// Our poses against a geodetic INS, frame by frame: interpolation, placement on the earth, errors, scale (DESIGN §6).
+///
+/// Ownership  Memory comes from the arena given at construction; nothing is taken later. Values in, values out.
+/// Threads    One thread calls everything. Rings bring samples and poses to it.
+/// Memory     ins_capacity samples (the oldest goes), kPending poses (the oldest goes out at once, counted), a fixed number of
+///            placement pairs. An hour or a year makes no difference.
+/// Time       Constant a call, but for the call that fits the placement (linear in kPlacementPairs, well under a millisecond).
+/// Frames     `enu` has its origin at the first valid fix. `world` is the odometry's.
+/// Errors     Nothing throws after construction. What is missing is said in each ComparedPose.
+class Comparison {
+ public:
+  static constexpr std::size_t kPending = 64;
+  static constexpr std::size_t kPlacementPairs = 1024;
+
+  /// Precondition: options.validate() == nullptr. Throws std::length_error when the arena is full.
+  Comparison(const ComparisonOptions& options, Arena& arena);
+  /// What the arena must have left.
+  [[nodiscard]] static std::size_t bytes_needed(const ComparisonOptions& options) noexcept;
+
+  /// Samples in order of their stamps; others are refused and counted.
+  void add(const InsSample& sample) noexcept;
+  /// Poses in order of their stamps, lost ones too. Precondition: next() was called until false since the last one, so there is room.
+  void add(const PoseSample& pose) noexcept;
+  /// The next pose that has met its INS samples, or will not any more. False: none yet, *out as it was. Call until false.
+  [[nodiscard]] bool next(ComparedPose* out) noexcept;
+  /// No more samples will come: everything pending goes out by next(), and a drive too short for the placement is placed with what
+  /// there is once the last has gone.
+  void finish() noexcept { finishing_ = true; }
+
+  /// revision 0: none yet.
+  [[nodiscard]] const Placement& placement() const noexcept { return placement_; }
+  /// Why the last attempt gave none, while the drive is too short or its way does not hold a heading.
+  [[nodiscard]] PlacementStatus placement_status() const noexcept { return placement_status_; }
+  [[nodiscard]] bool has_origin() const noexcept { return has_origin_; }
+  [[nodiscard]] const LocalTangentPlane& plane() const noexcept { return plane_; }
+  [[nodiscard]] const ComparisonCounters& counters() const noexcept { return counters_; }
+
+ private:
+  struct Reading {  // an InsSample in enu
+    Stamp stamp{};
+    Duration stamp_error{};
+    bool valid = false;
+    bool jumped = false;  // against the reading before
+    Vec3 p_enu_ins = Vec3::Zero();
+    Mat3 R_enu_ins = Mat3::Identity();
+    double position_sigma = 0, height_sigma = 0, tilt_sigma = 0;
+  };
+  struct Chord {  // a step along both paths
+    double ours = 0, ins = 0;
+  };
+  static constexpr std::size_t kChords = 40;
+
+  [[nodiscard]] const Reading& reading(std::uint64_t i) const noexcept {
+    return readings_[static_cast<std::size_t>(i) & (readings_.size() - 1)];
+  }
+  [[nodiscard]] bool ready(const PoseSample& pose) const noexcept;
+  [[nodiscard]] InsMatch reference_at(Stamp stamp, ComparedPose* out, Reading* sigmas) const noexcept;
+  [[nodiscard]] EarthPose on_earth(const Transform& T_enu_left) const;
+  void collect(const ComparedPose& c, const Reading& sigmas) noexcept;
+  void begin_collecting() noexcept;
+  void place() noexcept;
+  void measure_scale(const Reading& sigmas, ComparedPose* c) noexcept;
+
+  ComparisonOptions options_;
+  LocalTangentPlane plane_{};
+  bool has_origin_ = false;
+  std::span<Reading> readings_;
+  std::uint64_t begin_ = 0, end_ = 0;  // numbers of the readings held
+  int backwards_ = 0;                  // refused in a row for their stamps
+
+  std::array<PoseSample, kPending> pending_{};
+  std::uint64_t pending_begin_ = 0, pending_end_ = 0;
+  bool finishing_ = false;
+
+  BoundedVector<PlacementPair> pairs_;
+  bool collecting_ = true;
+  bool restarted_ = false;  // the newest pose was of a restarted scene
+  bool has_last_ = false;   // of a pose with a fix, for the distance driven
+  Vec3 last_world_ = Vec3::Zero();
+  double driven_ = 0;  // m, since collecting began
+  double next_pair_at_ = 0;
+  Placement placement_{};
+  PlacementStatus placement_status_ = PlacementStatus::too_few;
+
+  std::array<Chord, kChords> chords_{};
+  std::uint64_t chord_count_ = 0;
+  bool has_anchor_ = false;
+  Vec3 anchor_ours_ = Vec3::Zero(), anchor_ins_ = Vec3::Zero();
+  double ratio_ = 0;
+  bool disagrees_ = false;
+
+  ComparisonCounters counters_{};
+};
+
+}  // namespace vergence

@@ -1,0 +1,36 @@
+#include "core/comparison/geodesy.hpp"
+
+namespace vergence {
+namespace {
+
+/// Columns: east, north, up at a place, in earth-centred axes. Up is the ellipsoid's normal.
+Mat3 R_ecef_local(const Geodetic& place) noexcept {
+  const double phi = place.latitude_deg * (std::numbers::pi / 180.0), lambda = place.longitude_deg * (std::numbers::pi / 180.0);
+  const double sp = std::sin(phi), cp = std::cos(phi), sl = std::sin(lambda), cl = std::cos(lambda);
+  Mat3 R;
+  R << -sl, -sp * cl, cp * cl, cl, -sp * sl, cp * sl, 0, cp, sp;
+  return R;
+}
+
+}  // namespace
+
+LocalTangentPlane::LocalTangentPlane(const Geodetic& origin)
+    : origin_(origin), plane_(origin.latitude_deg, origin.longitude_deg, origin.height_m) {}
+
+Vec3 LocalTangentPlane::to_enu(const Geodetic& place) const {
+  double e = 0, n = 0, u = 0;
+  plane_.Forward(place.latitude_deg, place.longitude_deg, place.height_m, e, n, u);
+  return {e, n, u};
+}
+
+Geodetic LocalTangentPlane::to_geodetic(const Vec3& p_enu) const {
+  Geodetic place;
+  plane_.Reverse(p_enu.x(), p_enu.y(), p_enu.z(), place.latitude_deg, place.longitude_deg, place.height_m);
+  return place;
+}
+
+Mat3 LocalTangentPlane::R_enu_local(const Geodetic& place) const noexcept {
+  return R_ecef_local(origin_).transpose() * R_ecef_local(place);
+}
+
+}  // namespace vergence

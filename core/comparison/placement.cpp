@@ -1,0 +1,112 @@
+#include "core/comparison/placement.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include <Eigen/Cholesky>
+
+namespace vergence {
+namespace {
+
+// rad: a heading known worse than this is no heading (a standing rig, or a way far shorter than the receiver's error).
+constexpr double kWorstHeading = 1.0;
+constexpr double kConverged = 1e-12;  // rad and m
+
+/// Mean of what the attitudes say, then turned about up to the heading that the positions say, whatever the INS's heading was.
+Mat3 start(std::span<const PlacementPair> pairs, const Vec3& middle_world, const Vec3& middle_enu) noexcept {
+  const Eigen::Quaterniond first(pairs.front().R_enu_world);
+  Vec4 sum = Vec4::Zero();
+  for (const PlacementPair& p : pairs) {
+    const Eigen::Quaterniond q(p.R_enu_world);
+    sum += q.dot(first) < 0 ? Vec4(-q.coeffs()) : Vec4(q.coeffs());
+  }
+  Eigen::Quaterniond mean;
+  mean.coeffs() = sum.normalized();
+  const Mat3 R = sum.norm() > 0 ? mean.toRotationMatrix() : pairs.front().R_enu_world;
+  double along = 0, across = 0;
+  for (const PlacementPair& p : pairs) {
+    const Vec3 d = R * (p.p_world_left - middle_world), y = p.p_enu_left - middle_enu;
+    along += d.x() * y.x() + d.y() * y.y();
+    across += d.x() * y.y() - d.y() * y.x();
+  }
+  return exp_so3({0, 0, std::atan2(across, along)}) * R;
+}
+
+struct Normal {
+  Mat6 H = Mat6::Zero();  // rotation φ (left, enu axes), then position of the middle
+  Vec6 g = Vec6::Zero();
+  double squares = 0;   // of the positions' residuals, m²
+  double weighted = 0;  // the same over their variances
+};
+
+Normal normal_equations(std::span<const PlacementPair> pairs, const Mat3& R, const Vec3& middle_world, const Vec3& middle_enu,
+                        double independent) noexcept {
+  Normal out;
+  const auto n = static_cast<double>(pairs.size());
+  for (const PlacementPair& p : pairs) {
+    const Vec3 d = R * (p.p_world_left - middle_world);
+    const Vec3 r = p.p_enu_left - middle_enu - d;
+    const Vec3 sigma(p.position_sigma, p.position_sigma, p.height_sigma);
+    const Vec3 w = (independent / n) * sigma.cwiseAbs2().cwiseInverse();
+    // r(φ, τ) = y − (m + τ) − Exp(φ) d:  ∂r/∂φ = [d]×, ∂r/∂τ = −I
+    Eigen::Matrix<double, 3, 6> J;
+    J << skew(d), -Mat3::Identity();
+    out.H += J.transpose() * w.asDiagonal() * J;
+    out.g += J.transpose() * w.asDiagonal() * r;
+    out.squares += r.squaredNorm();
+    out.weighted += r.cwiseAbs2().dot(sigma.cwiseAbs2().cwiseInverse());
+
+    // Up of the world as the INS's attitude has it; under the placement it must point up: r = (ẑ − R v) in east and north.
+    const Vec3 up = R * (p.R_enu_world.transpose() * Vec3::UnitZ());
+    const Eigen::Matrix<double, 2, 3> J_tilt = skew(up).topRows<2>();
+    const double w_tilt = 1.0 / (n * p.tilt_sigma * p.tilt_sigma);
+    out.H.topLeftCorner<3, 3>() += w_tilt * J_tilt.transpose() * J_tilt;
+    out.g.head<3>() -= w_tilt * J_tilt.transpose() * up.head<2>();
+  }
+  return out;
+}
+
+}  // namespace
+
+PlacementStatus fit_placement(std::span<const PlacementPair> pairs, Duration correlation, Placement* placement) noexcept {
+  if (pairs.size() < 3) return PlacementStatus::too_few;
+  const auto n = static_cast<double>(pairs.size());
+  Vec3 middle_world = Vec3::Zero(), middle_enu = Vec3::Zero();
+  for (const PlacementPair& p : pairs) {
+    middle_world += p.p_world_left / n;
+    middle_enu += p.p_enu_left / n;
+  }
+  const double span = (pairs.back().stamp - pairs.front().stamp).to_seconds();
+  const double independent = std::min(n, 1.0 + span / std::max(correlation.to_seconds(), 1e-3));
+
+  Mat3 R = start(pairs, middle_world, middle_enu);
+  Normal normal = normal_equations(pairs, R, middle_world, middle_enu, independent);
+  for (int step = 0; step < kPlacementSteps; ++step) {
+    const Eigen::LDLT<Mat6> ldlt(normal.H);
+    if (ldlt.info() != Eigen::Success || !ldlt.isPositive()) return PlacementStatus::not_held;
+    const Vec6 delta = -ldlt.solve(normal.g);
+    if (!delta.allFinite()) return PlacementStatus::not_held;
+    R = normalised(exp_so3(delta.head<3>()) * R);
+    middle_enu += delta.tail<3>();
+    normal = normal_equations(pairs, R, middle_world, middle_enu, independent);
+    if (delta.norm() < kConverged) break;
+  }
+
+  // Residuals larger than the sigmas say make the result worse by as much; smaller ones do not make it better: they share their error.
+  const double excess = std::max(1.0, normal.weighted / (3.0 * n));
+  const Mat6 covariance = excess * normal.H.ldlt().solve(Mat6::Identity());
+  const Vec6 sigma = covariance.diagonal().cwiseSqrt();
+  if (!sigma.allFinite() || !(sigma[2] < kWorstHeading)) return PlacementStatus::not_held;
+
+  placement->T_enu_world = {R, middle_enu - R * middle_world};
+  placement->rotation_sigma = sigma.head<3>();
+  placement->position_sigma = sigma.tail<3>();
+  placement->residual = std::sqrt(normal.squares / n);
+  placement->pairs = static_cast<int>(pairs.size());
+  placement->first = pairs.front().stamp;
+  placement->last = pairs.back().stamp;
+  ++placement->revision;
+  return PlacementStatus::ok;
+}
+
+}  // namespace vergence

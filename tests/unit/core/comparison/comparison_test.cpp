@@ -1,0 +1,408 @@
+#include "core/comparison/comparison.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <functional>
+#include <memory>
+#include <vector>
+
+#include "core/memory/allocation_guard.hpp"
+
+namespace vergence {
+namespace {
+
+const Geodetic kOrigin{-27.4975, 153.0137, 60};
+constexpr double kDegree = std::numbers::pi / 180.0;
+
+/// A drive over the ground as a smooth function of time: body (forward, left, up) of the INS in enu. About 10 m/s.
+Transform T_enu_ins(double t) {
+  const double w = 0.05;
+  const Vec3 p(200 * std::sin(w * t), 150 * (1 - std::cos(w * t)), 3 * std::sin(0.5 * w * t));
+  const Vec3 v(200 * w * std::cos(w * t), 150 * w * std::sin(w * t), 1.5 * w * std::cos(0.5 * w * t));
+  const double yaw = std::atan2(v.y(), v.x()), pitch = -std::atan2(v.z(), v.head<2>().norm());
+  return {exp_so3({0, 0, yaw}) * exp_so3({0, pitch, 0}) * exp_so3({0.02 * std::sin(t), 0, 0}), p};
+}
+
+Stamp at(double t) { return Stamp(1403636584000000000) + Duration::seconds(t); }
+
+struct Bench {
+  ComparisonOptions options;
+  Arena arena;
+  LocalTangentPlane plane{kOrigin};
+  Comparison comparison;
+  std::vector<ComparedPose> out;
+
+  explicit Bench(ComparisonOptions o = with_mount()) : options(o), arena(Comparison::bytes_needed(o)), comparison(o, arena) {}
+
+  static ComparisonOptions with_mount() {
+    ComparisonOptions o;
+    o.T_ins_left = mount_of({1.2, 0.4, -0.3}, {1 * kDegree, -2 * kDegree, 3 * kDegree});
+    return o;
+  }
+  [[nodiscard]] Transform T_enu_left(double t) const { return T_enu_ins(t) * options.T_ins_left; }
+
+  [[nodiscard]] InsSample sample(double t, const Vec3& shift = Vec3::Zero()) const {
+    InsSample s;
+    s.stamp = at(t);
+    s.fix = FixStatus::fix_3d;
+    s.attitude_valid = true;
+    const Transform T = T_enu_ins(t);
+    s.position = plane.to_geodetic(T.t + shift);
+    const Eigen::Quaterniond q = quaternion(plane.R_enu_local(s.position).transpose() * T.R);
+    s.q_enu_ins = {q.x(), q.y(), q.z(), q.w()};
+    s.position_sigma = s.height_sigma = 0.001;
+    s.tilt_sigma = 1e-5;
+    return s;
+  }
+  /// The odometry without any error: world is the left camera at t = 0.
+  [[nodiscard]] PoseSample pose(double t, double scale = 1.0) const {
+    PoseSample p;
+    p.stamp = at(t);
+    p.status = PoseStatus::ok;
+    p.T_world_left = T_enu_left(0).inverse() * T_enu_left(t);
+    p.T_world_left.t *= scale;
+    return p;
+  }
+  void take() {
+    ComparedPose c;
+    while (comparison.next(&c)) out.push_back(c);
+  }
+
+  using EditSample = std::function<bool(double, InsSample*)>;  // false: not sent
+  using EditPose = std::function<void(double, PoseSample*)>;
+  /// INS at 120 Hz, poses at 20 Hz, the pose a little before the INS samples around it.
+  void drive(double from, double to, const EditSample& edit_sample = {}, const EditPose& edit_pose = {}) {
+    for (int i = static_cast<int>(std::lround(from * 120)); i <= static_cast<int>(std::lround(to * 120)); ++i) {
+      const double t = i / 120.0;
+      if (i % 6 == 0) {
+        PoseSample p = pose(t + 0.003);
+        if (edit_pose) edit_pose(t, &p);
+        comparison.add(p);
+        take();
+      }
+      InsSample s = sample(t);
+      if (!edit_sample || edit_sample(t, &s)) comparison.add(s);
+      take();
+    }
+  }
+  void finish() {
+    comparison.finish();
+    take();
+  }
+};
+
+TEST(MountOf, turnsCameraAxesIntoTheVehicles) {
+  const Transform T = mount_of({1, 2, 3}, Vec3::Zero());
+  EXPECT_LT((T * Vec3(0, 0, 5) - Vec3(6, 2, 3)).norm(), 1e-15);   // seen ahead is ahead
+  EXPECT_LT((T * Vec3(5, 0, 0) - Vec3(1, -3, 3)).norm(), 1e-15);  // seen on the right is on the right
+  EXPECT_LT((T * Vec3(0, 5, 0) - Vec3(1, 2, -2)).norm(), 1e-15);  // seen below is below
+  // A rig turned to the left by yaw sees ahead of it what lies ahead and left of the INS.
+  EXPECT_LT((mount_of(Vec3::Zero(), {0, 0, std::numbers::pi / 2}) * Vec3(0, 0, 1) - Vec3(0, 1, 0)).norm(), 1e-15);
+}
+
+TEST(Comparison, idealInsAndTruePosesAgreeThroughTheWholeChain) {
+  Bench b;
+  b.drive(0, 100);
+  b.finish();
+  ASSERT_EQ(b.out.size(), 2001U);
+  ASSERT_EQ(b.comparison.placement().revision, 1U);
+  EXPECT_NEAR(b.comparison.placement().distance, 100, 1);
+  EXPECT_LT((b.comparison.plane().to_enu(kOrigin)).norm(), 1e-6);
+  std::size_t compared = 0;
+  for (const ComparedPose& c : b.out) {
+    if (!c.compared) continue;
+    ++compared;
+    const double t = (c.pose.stamp - at(0)).to_seconds();
+    EXPECT_LT(c.error_enu.norm(), 1e-3);
+    EXPECT_LT(std::abs(c.error_yaw), 0.001 * kDegree);
+    EXPECT_LT((c.reference.T_enu_left.t - b.T_enu_left(t).t).norm(), 1e-3);
+    EXPECT_LT(rotation_angle(c.reference.T_enu_left.R.transpose() * b.T_enu_left(t).R), 0.001 * kDegree);
+    EXPECT_LT((b.plane.to_enu(c.ours.position) - b.T_enu_left(t).t).norm(), 1e-3);
+    EXPECT_FALSE(c.scale_disagrees);
+  }
+  // All but the first 100 m: about 10 s of 100 s, and the last frame, whose INS never came.
+  EXPECT_GT(compared, 1750U);
+  EXPECT_LT(compared, 1820U);
+  EXPECT_EQ(compared, b.comparison.counters().compared);
+  EXPECT_NEAR(b.out[1990].path_ratio, 1.0, 1e-5);
+  EXPECT_EQ(b.out.back().ins, InsMatch::none);
+}
+
+TEST(Comparison, nothingIsPlacedBeforeTheFirst100Metres) {
+  Bench b;
+  b.drive(0, 12);
+  double driven = 0;
+  for (std::size_t i = 1; i < b.out.size(); ++i) {
+    driven += (b.out[i].pose.T_world_left.t - b.out[i - 1].pose.T_world_left.t).norm();
+    EXPECT_EQ(b.out[i].placed, driven > 100.0 - 0.01) << driven;
+    EXPECT_TRUE(b.out[i].ins_valid);  // the INS is there all the same
+  }
+}
+
+TEST(Comparison, aShortDriveIsPlacedAtItsEnd) {
+  Bench b;
+  b.drive(0, 4);
+  EXPECT_EQ(b.comparison.placement().revision, 0U);
+  b.finish();
+  ASSERT_EQ(b.comparison.placement().revision, 1U);
+  EXPECT_LT((b.comparison.placement().T_enu_world * b.pose(3).T_world_left.t - b.T_enu_left(3).t).norm(), 1e-3);
+}
+
+TEST(Comparison, theErrorIsTheDriftAfterThePlacement) {
+  Bench b;
+  const Vec3 drift(0.5, -0.25, 0.125);  // m in the world's axes, from 50 s on
+  b.drive(0, 60, {}, [&](double t, PoseSample* p) {
+    if (t > 50) {
+      p->T_world_left.t += drift;
+      p->T_world_left.R = exp_so3({0, -0.01, 0}) * p->T_world_left.R;
+    }
+  });
+  const ComparedPose& c = b.out[b.out.size() - 2];
+  ASSERT_TRUE(c.compared);
+  EXPECT_LT((c.error_enu - b.T_enu_left(0).R * drift).norm(), 1e-3);
+  // The world's y axis points down but for the mounting and the slope at the start; the view is level but for them.
+  EXPECT_NEAR(c.error_yaw, 0.01, 0.001);
+  EXPECT_EQ(b.comparison.placement().revision, 1U);  // frozen
+}
+
+TEST(Comparison, gapsAreFlaggedAndNotBridged) {
+  Bench b;
+  b.drive(0, 30, [](double t, InsSample*) { return !(t > 20 && t < 20.5); });
+  int gaps = 0;
+  for (const ComparedPose& c : b.out) {
+    const double t = (c.pose.stamp - at(0)).to_seconds();
+    if (t > 20.0 && t < 20.5) {
+      EXPECT_EQ(c.ins, InsMatch::gap) << t;
+      EXPECT_FALSE(c.compared);
+      EXPECT_TRUE(c.placed);
+      ++gaps;
+    } else if (t < 29.9) {
+      EXPECT_EQ(c.ins, InsMatch::ok) << t;
+    }
+  }
+  EXPECT_EQ(gaps, 10);
+}
+
+TEST(Comparison, noFixPausesIt) {
+  Bench b;
+  b.drive(0, 30, [](double t, InsSample* s) {
+    if (t > 20 && t < 25) s->fix = FixStatus::none;
+    return true;
+  });
+  for (const ComparedPose& c : b.out) {
+    const double t = (c.pose.stamp - at(0)).to_seconds();
+    if (t > 20.01 && t < 24.99) {
+      EXPECT_EQ(c.ins, InsMatch::no_fix) << t;
+    }
+    if (t > 25.01 && t < 29.9) {
+      EXPECT_TRUE(c.compared) << t;
+      EXPECT_LT(c.error_enu.norm(), 1e-3);
+    }
+  }
+}
+
+TEST(Comparison, aDriveWithoutAnyFixGoesOnWithoutPlacement) {
+  Bench b;
+  b.drive(0, 20, [](double, InsSample* s) {
+    s->fix = FixStatus::none;
+    return true;
+  });
+  b.finish();
+  EXPECT_EQ(b.out.size(), 401U);
+  EXPECT_FALSE(b.comparison.has_origin());
+  EXPECT_EQ(b.comparison.placement().revision, 0U);
+  for (const ComparedPose& c : b.out) EXPECT_FALSE(c.ins_valid || c.placed || c.compared);
+}
+
+TEST(Comparison, anInsThatStartsLateOrStopsLeavesThePosesGoing) {
+  Bench b;
+  b.drive(0, 60, [](double t, InsSample*) { return t > 20 && t < 40; });
+  b.finish();
+  EXPECT_EQ(b.out.size(), 1201U);
+  for (const ComparedPose& c : b.out) {
+    const double t = (c.pose.stamp - at(0)).to_seconds();
+    if (t < 20) {
+      EXPECT_EQ(c.ins, InsMatch::none);
+    }
+    if (t > 33 && t < 39.9) {
+      EXPECT_TRUE(c.compared) << t;
+    }
+    if (t > 40) {
+      EXPECT_EQ(c.ins, InsMatch::none);
+    }
+  }
+  EXPECT_EQ(b.comparison.counters().pushed_out, 0U);
+}
+
+TEST(Comparison, aPoseWaitsNoLongerThanItMay) {
+  Bench b;
+  for (int i = 0; i < 20; ++i) b.comparison.add(b.pose(0.05 * i));  // no INS at all
+  b.take();
+  EXPECT_EQ(b.out.size(), 9U);  // those that lie more than 0.5 s before the newest, 0.95 s
+  EXPECT_EQ(b.out.front().ins, InsMatch::none);
+}
+
+TEST(Comparison, aFullQueueLetsTheOldestOut) {
+  ComparisonOptions options = Bench::with_mount();
+  options.max_wait = Duration::seconds(1e6);
+  Bench b(options);
+  for (int i = 0; i < 100; ++i) {
+    b.comparison.add(b.pose(0.05 * i));
+    b.take();
+  }
+  EXPECT_EQ(b.out.size(), 100U - Comparison::kPending + 1);
+  EXPECT_EQ(b.comparison.counters().pushed_out, b.out.size());
+}
+
+TEST(Comparison, aJumpOf100MetresIsSaidAndNotInterpolatedAcross) {
+  Bench b;
+  const Vec3 jump(0, 100, 0);
+  for (int i = 0; i <= 40 * 120; ++i) {
+    const double t = i / 120.0;
+    b.comparison.add(b.sample(t, t > 30.0 ? jump : Vec3::Zero()));
+    if (i % 3 == 1) b.comparison.add(b.pose(t - 0.004));
+    b.take();
+  }
+  EXPECT_EQ(b.comparison.counters().jumps, 1U);
+  int jumped = 0;
+  for (const ComparedPose& c : b.out) jumped += c.ins == InsMatch::jump ? 1 : 0;
+  EXPECT_EQ(jumped, 1);
+  EXPECT_TRUE(b.out.back().compared);
+  EXPECT_NEAR(b.out.back().error_enu.norm(), 100, 1e-2);
+}
+
+TEST(Comparison, aJumpWhilePlacingBeginsThePlacementAnew) {
+  Bench b;
+  const Vec3 jump(30, 100, 0);
+  for (int i = 0; i <= 40 * 120; ++i) {
+    const double t = i / 120.0;
+    b.comparison.add(b.sample(t, t > 5.0 ? jump : Vec3::Zero()));
+    if (i % 3 == 1) b.comparison.add(b.pose(t - 0.004));
+    b.take();
+  }
+  ASSERT_TRUE(b.out.back().compared);
+  EXPECT_LT(b.out.back().error_enu.norm(), 1e-3);
+  EXPECT_GT((b.comparison.placement().first - at(5.0)).ns(), 0);
+}
+
+TEST(Comparison, aRestartedOdometryIsPlacedAnew) {
+  Bench b;
+  const Transform elsewhere{exp_so3({0, 0.3, 0}), {5, 0, 5}};
+  b.drive(0, 60, {}, [&](double t, PoseSample* p) {
+    if (t < 30) return;
+    p->T_world_left = elsewhere * p->T_world_left;
+    if (t < 31) p->reason = Reason::scene_restarted;
+  });
+  EXPECT_EQ(b.comparison.placement().revision, 2U);
+  ASSERT_TRUE(b.out[b.out.size() - 2].compared);
+  EXPECT_LT(b.out[b.out.size() - 2].error_enu.norm(), 1e-3);
+}
+
+TEST(Comparison, aLostPoseIsNotComparedButKeepsItsIns) {
+  Bench b;
+  b.drive(0, 30, {}, [](double t, PoseSample* p) {
+    if (t > 20 && t < 21) {
+      p->status = PoseStatus::lost;
+      p->T_world_left = {};
+    }
+  });
+  for (const ComparedPose& c : b.out) {
+    const double t = (c.pose.stamp - at(0)).to_seconds();
+    if (t > 20.05 && t < 20.95) {
+      EXPECT_FALSE(c.placed || c.compared);
+      EXPECT_TRUE(c.ins_valid);
+    }
+  }
+  EXPECT_LT(b.out[b.out.size() - 2].error_enu.norm(), 1e-3);
+}
+
+TEST(Comparison, aWrongScaleIsSeen) {
+  for (const double scale : {1.0, 1.01, 1.03, 0.97}) {
+    Bench b;
+    b.drive(0, 60, {}, [&](double, PoseSample* p) { p->T_world_left.t *= scale; });
+    const ComparedPose& c = b.out[b.out.size() - 2];
+    EXPECT_NEAR(c.path_ratio, scale, 1e-4);
+    EXPECT_EQ(c.scale_disagrees, std::abs(scale - 1) > 0.02);
+  }
+  // A receiver that knows 2.5 m cannot tell 3 % of 200 m: 4 √2 2.5 / 200 = 7 %.
+  Bench b;
+  b.drive(
+      0, 60, [](double, InsSample* s) { return s->position_sigma = 2.5, true; }, [](double, PoseSample* p) { p->T_world_left.t *= 1.03; });
+  EXPECT_FALSE(b.out[b.out.size() - 2].scale_disagrees);
+}
+
+TEST(Comparison, samplesThatMeanNothingAreRefusedAndCounted) {
+  Bench b;
+  b.comparison.add(b.sample(1.0));
+  b.comparison.add(b.sample(1.0));  // the same stamp
+  b.comparison.add(b.sample(0.5));  // older
+  EXPECT_EQ(b.comparison.counters().ins_refused, 2U);
+  InsSample s = b.sample(1.1);
+  std::swap(s.position.latitude_deg, s.position.longitude_deg);
+  b.comparison.add(s);
+  EXPECT_EQ(b.comparison.counters().ins_refused, 3U);
+  s = b.sample(1.2);
+  s.position.height_m = std::nan("");
+  b.comparison.add(s);
+  EXPECT_EQ(b.comparison.counters().ins_refused, 4U);
+  s = b.sample(1.3);
+  s.q_enu_ins = {0, 0, 0, 0};
+  b.comparison.add(s);
+  b.comparison.add(b.pose(1.25));
+  b.take();
+  ASSERT_EQ(b.out.size(), 1U);
+  EXPECT_EQ(b.out[0].ins, InsMatch::no_fix);
+}
+
+TEST(Comparison, anInsWhoseClockWentBackForGoodIsTakenUpAgain) {
+  Bench b;
+  for (int i = 0; i < 1200; ++i) b.comparison.add(b.sample(100 + i / 120.0));
+  for (int i = 0; i < 1200; ++i) b.comparison.add(b.sample(i / 120.0));
+  EXPECT_EQ(b.comparison.counters().ins_restarts, 1U);
+  b.comparison.add(b.pose(5));
+  b.take();
+  ASSERT_EQ(b.out.size(), 1U);
+  EXPECT_EQ(b.out[0].ins, InsMatch::ok);
+}
+
+TEST(Comparison, optionsAreChecked) {
+  EXPECT_EQ(ComparisonOptions{}.validate(), nullptr);
+  const auto bad = [](auto edit) {
+    ComparisonOptions o;
+    edit(&o);
+    return o.validate() != nullptr;
+  };
+  EXPECT_TRUE(bad([](ComparisonOptions* o) { o->placement_m = 0; }));
+  EXPECT_TRUE(bad([](ComparisonOptions* o) { o->placement_m = std::nan(""); }));
+  EXPECT_TRUE(bad([](ComparisonOptions* o) { o->correlation_s = -1; }));
+  EXPECT_TRUE(bad([](ComparisonOptions* o) { o->tilt_sigma_rad = 0; }));
+  EXPECT_TRUE(bad([](ComparisonOptions* o) { o->max_gap = Duration{}; }));
+  EXPECT_TRUE(bad([](ComparisonOptions* o) { o->ins_capacity = 1000; }));
+  EXPECT_TRUE(bad([](ComparisonOptions* o) { o->T_ins_left.t.x() = std::nan(""); }));
+}
+
+TEST(Comparison, anHourAt120HzTakesNoMemory) {
+  Bench b;
+  if (!AllocationGuard::available()) GTEST_SKIP() << "the allocation hooks are not in this build";
+  const std::uint64_t before = AllocationGuard::allocations_after_seal();
+  std::uint64_t out = 0;
+  {
+    const SealedScope sealed;
+    ComparedPose c;
+    for (int i = 0; i < 3600 * 120; ++i) {
+      const double t = i / 120.0;
+      b.comparison.add(b.sample(t));
+      if (i % 4 == 3) b.comparison.add(b.pose(t - 0.004));
+      while (b.comparison.next(&c)) ++out;
+    }
+    b.comparison.finish();
+    while (b.comparison.next(&c)) ++out;
+  }
+  EXPECT_EQ(AllocationGuard::allocations_after_seal(), before);
+  EXPECT_EQ(out, 108000U);
+  EXPECT_GT(b.comparison.counters().compared, 107000U);
+}
+
+}  // namespace
+}  // namespace vergence

@@ -1,0 +1,103 @@
+#include "core/comparison/geodesy.hpp"
+
+#include <gtest/gtest.h>
+
+#include <array>
+#include <charconv>
+#include <fstream>
+#include <string>
+#include <vector>
+
+#include "tests/support/shared_data.hpp"
+
+namespace vergence {
+namespace {
+
+struct KnownPoint {
+  Geodetic origin, point;
+  Vec3 enu;  // m, six decimals
+};
+
+// Both hemispheres, computed with GeographicLib's CartConvert and checked through earth-centred coordinates.
+const std::array kKnown = {
+    KnownPoint{{49.011212804408, 8.4228850417969, 112.83492279053}, {49.012, 8.4235, 113.5}, {44.987583, 87.545734, 0.664317}},
+    KnownPoint{{-27.4975, 153.0137, 40}, {-27.4980, 153.0142, 41.5}, {49.407283, -55.406162, 1.499567}},
+    KnownPoint{{-27.4975, 153.0137, 40}, {-27.5100, 152.9990, 38}, {-1452.415758, -1385.238005, -2.316367}},
+};
+
+TEST(LocalTangentPlane, knownPointsOfBothHemispheres) {
+  for (const KnownPoint& k : kKnown) {
+    const LocalTangentPlane plane(k.origin);
+    EXPECT_LT((plane.to_enu(k.point) - k.enu).cwiseAbs().maxCoeff(), 1e-6);
+    const Geodetic back = plane.to_geodetic(plane.to_enu(k.point));
+    EXPECT_NEAR(back.latitude_deg, k.point.latitude_deg, 1e-12);
+    EXPECT_NEAR(back.longitude_deg, k.point.longitude_deg, 1e-12);
+    EXPECT_NEAR(back.height_m, k.point.height_m, 1e-7);
+  }
+}
+
+TEST(LocalTangentPlane, axesOfAnotherPlaceAreTheDerivativesOfItsCoordinates) {
+  for (const KnownPoint& k : kKnown) {
+    const LocalTangentPlane plane(k.origin);
+    const Mat3 R = plane.R_enu_local(k.point);
+    EXPECT_LT((R * R.transpose() - Mat3::Identity()).norm(), 1e-14);
+    // One metre along the local axes at the point, laid off by a plane that stands there.
+    const LocalTangentPlane there(k.point);
+    for (int axis = 0; axis < 3; ++axis) {
+      const Vec3 moved = plane.to_enu(there.to_geodetic(Vec3::Unit(axis)));
+      EXPECT_LT((moved - plane.to_enu(k.point) - R.col(axis)).norm(), 1e-7) << axis;
+    }
+  }
+}
+
+TEST(Geodetic, whatIsNoPlaceIsNotPlausible) {
+  EXPECT_TRUE((Geodetic{-27.4975, 153.0137, 60}).plausible());
+  EXPECT_FALSE((Geodetic{153.0137, -27.4975, 60}).plausible());  // swapped
+  EXPECT_FALSE((Geodetic{std::nan(""), 0, 0}).plausible());
+  EXPECT_FALSE((Geodetic{0, std::nan(""), 0}).plausible());
+  EXPECT_FALSE((Geodetic{0, 0, std::nan("")}).plausible());
+}
+
+TEST(CompassHeading, isClockwiseFromNorth) {
+  constexpr double kPi = std::numbers::pi;
+  EXPECT_NEAR(compass_heading_deg(0), 90, 1e-12);          // east
+  EXPECT_NEAR(compass_heading_deg(kPi / 2), 0, 1e-12);     // north
+  EXPECT_NEAR(compass_heading_deg(-kPi / 2), 180, 1e-12);  // south
+  EXPECT_NEAR(compass_heading_deg(kPi), 270, 1e-12);       // west
+  EXPECT_NEAR(compass_heading_deg(5 * kPi / 2 + 0.1), 360 - 0.1 * 180 / kPi, 1e-9);
+}
+
+/// The numbers of a CSV line.
+std::vector<double> numbers(const std::string& line) {
+  std::vector<double> out;
+  for (std::size_t at = 0; at < line.size();) {
+    std::size_t end = line.find(',', at);
+    if (end == std::string::npos) end = line.size();
+    double v = 0;
+    if (std::from_chars(line.data() + at, line.data() + end, v).ec == std::errc{}) out.push_back(v);
+    at = end + 1;
+  }
+  return out;
+}
+
+TEST(LocalTangentPlane, realDriveToTheMillimetre) {
+  const auto file = test::shared_data("data/oxts/enu.csv");
+  if (!file) GTEST_SKIP() << test::shared_data_missing("data/oxts/enu.csv");
+  std::ifstream in(*file);
+  std::string line;
+  std::getline(in, line);
+  LocalTangentPlane plane;
+  int rows = 0;
+  while (std::getline(in, line)) {
+    const std::vector<double> v = numbers(line);
+    ASSERT_EQ(v.size(), 7U);
+    const Geodetic place{v[1], v[2], v[3]};
+    if (rows == 0) plane = LocalTangentPlane(place);
+    EXPECT_LT((plane.to_enu(place) - Vec3(v[4], v[5], v[6])).norm(), 2e-6) << line;  // six decimals
+    ++rows;
+  }
+  EXPECT_EQ(rows, 3565);
+}
+
+}  // namespace
+}  // namespace vergence

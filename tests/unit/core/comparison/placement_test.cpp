@@ -1,0 +1,139 @@
+#include "core/comparison/placement.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <vector>
+
+#include "core/math/random.hpp"
+
+namespace vergence {
+namespace {
+
+const Duration kCorrelation = Duration::seconds(10);
+const Mat3 kCameraInEnu = (Mat3() << 0, 0, 1, -1, 0, 0, 0, -1, 0).finished();  // looks east
+
+Transform truth() { return {exp_so3({0.02, -0.03, 2.5}) * kCameraInEnu, {30, -40, 5}}; }
+
+/// A drive forward (z of the world) with a bend, exact, 10 m/s.
+std::vector<PlacementPair> drive(double length, double bend, int count, const Vec3& sigma = {2.5, 5.0, 0.0087}) {
+  std::vector<PlacementPair> pairs;
+  for (int i = 0; i < count; ++i) {
+    const double s = length * i / (count - 1);
+    PlacementPair p;
+    p.stamp = Stamp{} + Duration::seconds(s / 10.0);
+    p.p_world_left = {bend * s * s / length, -0.01 * s, s};
+    p.p_enu_left = truth() * p.p_world_left;
+    p.R_enu_world = truth().R;
+    p.position_sigma = sigma[0];
+    p.height_sigma = sigma[1];
+    p.tilt_sigma = sigma[2];
+    pairs.push_back(p);
+  }
+  return pairs;
+}
+
+double rotation_error(const Placement& p) { return rotation_angle(p.T_enu_world.R * truth().R.transpose()); }
+
+TEST(FitPlacement, findsAnExactPlacement) {
+  Placement placement;
+  const auto pairs = drive(100, 0.3, 200);
+  ASSERT_EQ(fit_placement(pairs, kCorrelation, &placement), PlacementStatus::ok);
+  EXPECT_LT(rotation_error(placement), 1e-10);
+  for (const PlacementPair& p : pairs) EXPECT_LT((placement.T_enu_world * p.p_world_left - p.p_enu_left).norm(), 1e-8);
+  EXPECT_LT(placement.residual, 1e-8);
+  EXPECT_EQ(placement.revision, 1U);
+  EXPECT_EQ(placement.pairs, 200);
+}
+
+TEST(FitPlacement, headingOfTheInsIsNotUsed) {
+  for (const double wrong : {0.2, -1.0, 3.1}) {
+    auto pairs = drive(100, 0.3, 200);
+    for (PlacementPair& p : pairs) p.R_enu_world = exp_so3({0, 0, wrong}) * p.R_enu_world;
+    Placement placement;
+    ASSERT_EQ(fit_placement(pairs, kCorrelation, &placement), PlacementStatus::ok);
+    EXPECT_LT(rotation_error(placement), 1e-10) << wrong;
+  }
+}
+
+TEST(FitPlacement, aStraightRoadTakesItsRollFromTheAttitude) {
+  Placement placement;
+  ASSERT_EQ(fit_placement(drive(100, 0.0, 200), kCorrelation, &placement), PlacementStatus::ok);
+  EXPECT_LT(rotation_error(placement), 1e-9);
+}
+
+TEST(FitPlacement, attitudeAndPositionsShareThePitchByTheirSigmas) {
+  // Positions say level; the attitude of the INS is pitched by 10 mrad across the way. The result lies where the weights put it.
+  const double wrong = 0.01;
+  const auto pitched = [&](double tilt_sigma) {
+    auto pairs = drive(100, 0.0, 200, {2.5, 5.0, tilt_sigma});
+    // The road leads along R·z; the pitch axis is horizontal and across it.
+    const Vec3 axis = Vec3::UnitZ().cross(truth().R.col(2)).normalized();
+    for (PlacementPair& p : pairs) p.R_enu_world = exp_so3(wrong * axis) * p.R_enu_world;
+    Placement placement;
+    EXPECT_EQ(fit_placement(pairs, kCorrelation, &placement), PlacementStatus::ok);
+    return rotation_error(placement);
+  };
+  EXPECT_LT(pitched(1.0), 0.02 * wrong);   // attitude that knows nothing
+  EXPECT_GT(pitched(1e-5), 0.98 * wrong);  // attitude that knows all
+  // Two independent heights over 100 m (10 s, correlation 10 s) hold the pitch to σ_h √12 / (L √2).
+  const double sigma_pitch = 5.0 * std::sqrt(12.0) / (100.0 * std::sqrt(2.0));
+  const double tilt = 0.1, expected = wrong / (1.0 + tilt * tilt / (sigma_pitch * sigma_pitch));
+  EXPECT_NEAR(pitched(tilt), expected, 0.03 * expected);
+}
+
+TEST(FitPlacement, sigmaOfTheHeadingIsWhatTheReceiverCanTell) {
+  // A line of length L with n_eff independent positions: σ_yaw = σ √12 / (L √n_eff), for many pairs.
+  Placement placement;
+  ASSERT_EQ(fit_placement(drive(100, 0.0, 1000), kCorrelation, &placement), PlacementStatus::ok);
+  const double expected = 2.5 * std::sqrt(12.0) / (100.0 * std::sqrt(2.0));
+  EXPECT_NEAR(placement.rotation_sigma.z(), expected, 0.02 * expected);
+  EXPECT_GT(placement.rotation_sigma.z(), 0.017);  // a degree or more
+  EXPECT_NEAR(placement.position_sigma.x(), 2.5 / std::sqrt(2.0), 0.01);
+}
+
+TEST(FitPlacement, sigmasHoldOverManyNoisyDrives) {
+  // White errors and a correlation short enough that each pair counts: the squared error over the variance averages to one a parameter.
+  Random random(11);
+  const int runs = 300;
+  Vec3 nees = Vec3::Zero();
+  for (int run = 0; run < runs; ++run) {
+    auto pairs = drive(100, 0.3, 60, {2.5, 5.0, 0.0087});
+    const Vec3 tilt(0.0087 * random.normal(), 0.0087 * random.normal(), 0);  // one error a drive
+    for (PlacementPair& p : pairs) {
+      p.p_enu_left += Vec3(2.5 * random.normal(), 2.5 * random.normal(), 5.0 * random.normal());
+      p.R_enu_world = exp_so3(tilt) * p.R_enu_world;
+    }
+    Placement placement;
+    ASSERT_EQ(fit_placement(pairs, Duration::milliseconds(1), &placement), PlacementStatus::ok);
+    nees += log_so3(placement.T_enu_world.R * truth().R.transpose()).cwiseQuotient(placement.rotation_sigma).cwiseAbs2() / runs;
+  }
+  // χ² of 300 degrees of freedom over 300: σ = √(2/300) = 0.082; four of them, and the excess factor may only widen the sigmas.
+  for (int axis = 0; axis < 3; ++axis) EXPECT_NEAR(nees[axis], 1.0, 0.35) << axis;
+}
+
+TEST(FitPlacement, residualsBeyondTheSigmasWidenTheResult) {
+  Random random(5);
+  auto pairs = drive(100, 0.3, 200, {0.01, 0.01, 1e-4});
+  Placement exact, noisy;
+  ASSERT_EQ(fit_placement(pairs, kCorrelation, &exact), PlacementStatus::ok);
+  for (PlacementPair& p : pairs) p.p_enu_left += 0.1 * Vec3(random.normal(), random.normal(), random.normal());
+  ASSERT_EQ(fit_placement(pairs, kCorrelation, &noisy), PlacementStatus::ok);
+  EXPECT_NEAR(noisy.rotation_sigma.z() / exact.rotation_sigma.z(), 10.0, 1.0);
+  EXPECT_NEAR(noisy.residual, 0.1 * std::sqrt(3.0), 0.02);
+}
+
+TEST(FitPlacement, saysWhatDoesNotHold) {
+  Placement placement;
+  placement.revision = 7;
+  EXPECT_EQ(fit_placement(drive(100, 0.3, 2), kCorrelation, &placement), PlacementStatus::too_few);
+  EXPECT_EQ(fit_placement(drive(0.5, 0.0, 50), kCorrelation, &placement), PlacementStatus::not_held);  // half a metre against 2.5 m
+  EXPECT_EQ(fit_placement(drive(0.0, 0.0, 50), kCorrelation, &placement), PlacementStatus::not_held);
+  auto pairs = drive(100, 0.3, 50);
+  pairs[20].p_enu_left.x() = std::nan("");
+  EXPECT_EQ(fit_placement(pairs, kCorrelation, &placement), PlacementStatus::not_held);
+  EXPECT_EQ(placement.revision, 7U);
+}
+
+}  // namespace
+}  // namespace vergence
