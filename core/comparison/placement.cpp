@@ -10,7 +10,7 @@ namespace {
 
 // rad: a heading known worse than this is no heading (a standing rig, or a way far shorter than the receiver's error).
 constexpr double kWorstHeading = 1.0;
-constexpr double kConverged = 1e-12;  // rad and m
+constexpr double kConverged = 1e-9;  // rad and m: a thousandth of what any receiver or reader can tell
 
 /// Mean of what the attitudes say, then turned about up to the heading that the positions say, whatever the INS's heading was.
 Mat3 start(std::span<const PlacementPair> pairs, const Vec3& middle_world, const Vec3& middle_enu) noexcept {

@@ -2,12 +2,17 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
+#include <filesystem>
+#include <fstream>
 #include <functional>
-#include <memory>
+#include <sstream>
+#include <string>
 #include <vector>
 
 #include "core/memory/allocation_guard.hpp"
+#include "tests/support/shared_data.hpp"
 
 namespace vergence {
 namespace {
@@ -364,6 +369,59 @@ TEST(Comparison, anInsWhoseClockWentBackForGoodIsTakenUpAgain) {
   b.take();
   ASSERT_EQ(b.out.size(), 1U);
   EXPECT_EQ(b.out[0].ins, InsMatch::ok);
+}
+
+/// Rows of `row,latitude,longitude,altitude,east,north,up`.
+std::vector<std::array<double, 7>> read_known_enu(const std::filesystem::path& file) {
+  std::ifstream in(file);
+  std::string line;
+  std::getline(in, line);
+  std::vector<std::array<double, 7>> rows;
+  while (std::getline(in, line)) {
+    std::array<double, 7> row{};
+    std::istringstream fields(line);
+    std::string field;
+    for (double& v : row) {
+      std::getline(fields, field, ',');
+      v = std::stod(field);
+    }
+    rows.push_back(row);
+  }
+  return rows;
+}
+
+TEST(Comparison, aRealDriveWithKnownAnswersToTheMillimetre) {
+  const auto file = test::shared_data("data/oxts/enu.csv");
+  if (!file) GTEST_SKIP() << test::shared_data_missing("data/oxts/enu.csv");
+  ComparisonOptions options;
+  options.T_ins_left = mount_of(Vec3::Zero(), Vec3::Zero());
+  options.max_gap = Duration::seconds(1);  // the log's own, up to 30 rows
+  Bench b(options);
+  // The odometry is the known answer itself, in a world of its own.
+  const Transform T_world_enu{exp_so3({1, -2, 0.5}), {10, 20, 30}};
+  const auto rows = read_known_enu(*file);
+  ASSERT_EQ(rows.size(), 3565U);
+  for (const auto& row : rows) {
+    const double t = 0.02 * row[0];
+    InsSample s;
+    s.stamp = at(t);
+    s.fix = FixStatus::fix_3d;
+    s.attitude_valid = true;
+    s.position = {row[1], row[2], row[3]};
+    b.comparison.add(s);
+    PoseSample p;
+    p.stamp = at(t);
+    p.status = PoseStatus::ok;
+    p.T_world_left = T_world_enu * Transform{options.T_ins_left.R, {row[4], row[5], row[6]}};
+    b.comparison.add(p);
+    b.take();
+    ASSERT_EQ(b.out.back().ins, InsMatch::ok);
+    EXPECT_LT((b.out.back().reference.T_enu_left.t - Vec3(row[4], row[5], row[6])).norm(), 1e-3);
+  }
+  // Attitude level in the axes at each place, 600 m apart: the tangent plane turns by 1e-4 rad, the placement's roll and pitch by less.
+  EXPECT_GT(b.comparison.counters().compared, 3000U);
+  EXPECT_LT(b.comparison.placement().residual, 1e-3);
+  EXPECT_LT(rotation_angle(b.comparison.placement().T_enu_world.R * T_world_enu.R), 1e-4);
 }
 
 TEST(Comparison, optionsAreChecked) {
