@@ -127,7 +127,8 @@ class Solve {
       const bool small = std::sqrt(system_.update_squared()) <= tolerance * (std::sqrt(system_.norm_squared()) + tolerance);
       const bool expected_last = 0.5 * decrement <= options_.cost_tolerance * cost_ || small || result_.steps == options_.max_steps;
       const double next_damping = std::max(damping_ * 0.1, least_damping_);
-      const bool valid = std::isfinite(system_.update_squared()) && (expected_last ? system_.evaluate(other(), false) : system_.linearise(other(), next_damping));
+      const bool valid = std::isfinite(system_.update_squared()) &&
+                         (expected_last ? system_.evaluate(other(), false) : system_.linearise(other(), next_damping));
       if (valid && system_.cost() <= cost_) {
         const double change = cost_ - system_.cost();
         best_ = 1 - best_;
@@ -137,7 +138,8 @@ class Solve {
         ++result_.accepted;
         if (small) return end(BundleTermination::small_update);
         if (change <= options_.cost_tolerance * cost_) return end(BundleTermination::small_cost_change);
-        if (expected_last && result_.steps < options_.max_steps && !system_.linearise(best(), damping_)) return end(BundleTermination::diverged);
+        if (expected_last && result_.steps < options_.max_steps && !system_.linearise(best(), damping_))
+          return end(BundleTermination::diverged);
         continue;
       }
       if (small) return end(BundleTermination::small_update);
@@ -190,7 +192,8 @@ class Solve {
       for (std::size_t c = 0; c <= r; ++c) {
         double v = w_.A[(before + c) * system_.ld() + before + r];
         for (std::size_t k = 0; k < before; ++k) v -= w_.A[k * system_.ld() + before + r] * w_.A[k * system_.ld() + before + c];
-        information(static_cast<Eigen::Index>(r), static_cast<Eigen::Index>(c)) = information(static_cast<Eigen::Index>(c), static_cast<Eigen::Index>(r)) = v;
+        information(static_cast<Eigen::Index>(r), static_cast<Eigen::Index>(c)) =
+            information(static_cast<Eigen::Index>(c), static_cast<Eigen::Index>(r)) = v;
       }
     const Eigen::LLT<Mat6> factor(information);
     if (factor.info() != Eigen::Success) return;
@@ -231,7 +234,8 @@ class Solve {
       if (w_.point_free[i] == 0) continue;
       const std::size_t batch = i / detail::kBatch, lane = i % detail::kBatch;
       for (std::size_t c = 0; c < 3; ++c)
-        problem_.points[static_cast<std::uint32_t>(w_.order[i])][static_cast<Eigen::Index>(c)] = s.points[(batch * 3 + c) * detail::kBatch + lane];
+        problem_.points[static_cast<std::uint32_t>(w_.order[i])][static_cast<Eigen::Index>(c)] =
+            s.points[(batch * 3 + c) * detail::kBatch + lane];
     }
     if (options_.configuration != BundleConfiguration::stereo_calibration) return;
     for (std::size_t k = 0; k < problem_.cameras.size(); ++k) {
@@ -263,7 +267,8 @@ const char* BundleOptions::validate() const noexcept {
   if (!(initial_damping > 0) || initial_damping > kMostDamping) return "initial_damping is not in (0, 1e6]";
   for (const BundleLengthConstraint& l : length) {
     if (!(l.metres >= 0) || !std::isfinite(l.metres)) return "length: metres is negative or not a number";
-    if (l.kind == BundleLength::measured && (!(l.sigma > 0) || !(l.metres > 0))) return "length: a measured length needs metres and sigma above 0";
+    if (l.kind == BundleLength::measured && (!(l.sigma > 0) || !(l.metres > 0)))
+      return "length: a measured length needs metres and sigma above 0";
   }
   for (const BundleIntrinsics& i : intrinsics)
     for (std::size_t k = 0; k < kIntrinsicsSize; ++k) {
@@ -276,30 +281,48 @@ const char* BundleOptions::validate() const noexcept {
 
 const char* to_string(BundleTermination t) noexcept {
   switch (t) {
-    case BundleTermination::small_update: return "small_update";
-    case BundleTermination::small_gradient: return "small_gradient";
-    case BundleTermination::small_cost_change: return "small_cost_change";
-    case BundleTermination::max_steps: return "max_steps";
-    case BundleTermination::diverged: return "diverged";
-    case BundleTermination::invalid_input: return "invalid_input";
-    case BundleTermination::rank_deficient: return "rank_deficient";
-    case BundleTermination::capacity: return "capacity";
+    case BundleTermination::small_update:
+      return "small_update";
+    case BundleTermination::small_gradient:
+      return "small_gradient";
+    case BundleTermination::small_cost_change:
+      return "small_cost_change";
+    case BundleTermination::max_steps:
+      return "max_steps";
+    case BundleTermination::diverged:
+      return "diverged";
+    case BundleTermination::invalid_input:
+      return "invalid_input";
+    case BundleTermination::rank_deficient:
+      return "rank_deficient";
+    case BundleTermination::capacity:
+      return "capacity";
   }
   return "unknown";
 }
 
 const char* to_string(BundleDefect d) noexcept {
   switch (d) {
-    case BundleDefect::none: return "none";
-    case BundleDefect::options: return "options";
-    case BundleDefect::sizes: return "sizes";
-    case BundleDefect::index: return "index";
-    case BundleDefect::order: return "order";
-    case BundleDefect::not_finite: return "not_finite";
-    case BundleDefect::state_not_finite: return "state_not_finite";
-    case BundleDefect::behind: return "behind";
-    case BundleDefect::seen_once: return "seen_once";
-    case BundleDefect::pose_without_observations: return "pose_without_observations";
+    case BundleDefect::none:
+      return "none";
+    case BundleDefect::options:
+      return "options";
+    case BundleDefect::sizes:
+      return "sizes";
+    case BundleDefect::index:
+      return "index";
+    case BundleDefect::order:
+      return "order";
+    case BundleDefect::not_finite:
+      return "not_finite";
+    case BundleDefect::state_not_finite:
+      return "state_not_finite";
+    case BundleDefect::behind:
+      return "behind";
+    case BundleDefect::seen_once:
+      return "seen_once";
+    case BundleDefect::pose_without_observations:
+      return "pose_without_observations";
   }
   return "unknown";
 }
@@ -313,7 +336,8 @@ std::size_t BundleAdjuster::memory_needed(const BundleCapacities& capacities) no
 
 BundleAdjuster::BundleAdjuster(const BundleCapacities& c, Arena& arena) : workspace_(nullptr) {
   constexpr std::size_t kMostPoses = 65535, kMostObservations = 1U << 28U;  // what the indices hold
-  if (c.cameras == 0 || c.cameras > kMaxCameras || c.poses == 0 || c.poses > kMostPoses || c.points > kMostObservations || c.observations > kMostObservations)
+  if (c.cameras == 0 || c.cameras > kMaxCameras || c.poses == 0 || c.poses > kMostPoses || c.points > kMostObservations ||
+      c.observations > kMostObservations)
     throw std::invalid_argument("bundle adjustment: capacities out of range (cameras 1 … 4, poses 1 … 65535)");
   workspace_ = arena.make<BundleWorkspace>(1, "bundle: workspace").data();
   TakeFromArena take{arena};

@@ -58,8 +58,15 @@ void poses_to_shared(double* A, std::size_t ld, std::size_t first, std::size_t s
 /// The gradients of one lane's observations, straight from the camera model, and the robust weight of each.
 class TrackGradient {
  public:
-  TrackGradient(const BundleWorkspace& w, const BundleOptions& options, const BundleState& state, const System& system, std::size_t cameras) noexcept
-      : w_(w), options_(options), state_(state), job_(system.job()), cameras_(cameras), first_(static_cast<std::size_t>(w.free_poses) * kBlock), ld_(system.ld()) {}
+  TrackGradient(const BundleWorkspace& w, const BundleOptions& options, const BundleState& state, const System& system,
+                std::size_t cameras) noexcept
+      : w_(w),
+        options_(options),
+        state_(state),
+        job_(system.job()),
+        cameras_(cameras),
+        first_(static_cast<std::size_t>(w.free_poses) * kBlock),
+        ld_(system.ld()) {}
 
   /// s_j: the gradient of θ_S that this track causes, its point and the poses eliminated.
   SharedVector operator()(const BundleProblem& problem, std::size_t index) noexcept {
@@ -68,7 +75,8 @@ class TrackGradient {
     const auto point = static_cast<std::uint32_t>(w_.order[index]);
     const std::size_t batch = index / kBatch, lane = index % kBatch;
     const Vec3 X = coordinates(batch, lane);
-    for (std::uint32_t i = w_.first_observation[point]; i < w_.first_observation[point + 1]; ++i) add_observation(problem.observations[i], X, &s);
+    for (std::uint32_t i = w_.first_observation[point]; i < w_.first_observation[point + 1]; ++i)
+      add_observation(problem.observations[i], X, &s);
     const double* z = job_.factors + (batch * kFactorRows + 6) * kBatch + lane;
     const auto product = [&](const double* y) { return y[0] * z[0] + y[kBatch] * z[kBatch] + y[2 * kBatch] * z[2 * kBatch]; };
     for (std::uint32_t b = w_.batches[batch].block_begin; b < w_.batches[batch].block_end; ++b) {
@@ -115,7 +123,8 @@ class TrackGradient {
     gradient << q, Xi.cross(q);
     const std::int32_t block = w_.poses[o.pose].block;
     if (block >= 0)
-      for (std::size_t r = 0; r < kBlock; ++r) subtract_pose(static_cast<std::size_t>(block) * kBlock + r, gradient[static_cast<Index>(r)], s);
+      for (std::size_t r = 0; r < kBlock; ++r)
+        subtract_pose(static_cast<std::size_t>(block) * kBlock + r, gradient[static_cast<Index>(r)], s);
     const int k = o.camera;
     if (layout.extrinsic[k] >= 0) {
       const Vec6 own = extrinsic_basis(layout, job_.cameras[k], k).transpose() * gradient;
@@ -134,7 +143,8 @@ class TrackGradient {
 };
 
 /// What is known beside the tracks counts as clusters of its own, with the variance it claims.
-void add_prior_clusters(const SharedLayout& s, const BundleProblem& problem, const BundleOptions& options, const BundleState& state, Shared* meat) noexcept {
+void add_prior_clusters(const SharedLayout& s, const BundleProblem& problem, const BundleOptions& options, const BundleState& state,
+                        Shared* meat) noexcept {
   for (std::size_t k = 0; k < problem.cameras.size(); ++k) {
     if (s.extrinsic[k] >= 0 && options.length[k].kind == BundleLength::measured) {
       const Transform& T = state.T_camera_left[k];
@@ -144,7 +154,8 @@ void add_prior_clusters(const SharedLayout& s, const BundleProblem& problem, con
     for (int i = 0; i < s.intrinsic_count[k]; ++i) {
       const std::size_t parameter = s.intrinsic_index[k][i];
       const double sigma = options.intrinsics[k].prior_sigma[parameter];
-      if (((options.intrinsics[k].free >> parameter) & 1U) != 0 && sigma > 0) (*meat)(s.intrinsic[k] + i, s.intrinsic[k] + i) += 1.0 / (sigma * sigma);
+      if (((options.intrinsics[k].free >> parameter) & 1U) != 0 && sigma > 0)
+        (*meat)(s.intrinsic[k] + i, s.intrinsic[k] + i) += 1.0 / (sigma * sigma);
     }
   }
 }
@@ -171,8 +182,8 @@ double residual_variance(const BundleWorkspace& w, const BundleProblem& problem,
 
 }  // namespace
 
-void shared_covariance(BundleWorkspace& w, const BundleProblem& problem, const BundleOptions& options, const BundleState& state, System& system,
-                       BundleResult* result) noexcept {
+void shared_covariance(BundleWorkspace& w, const BundleProblem& problem, const BundleOptions& options, const BundleState& state,
+                       System& system, BundleResult* result) noexcept {
   const SharedLayout layout = shared_layout(problem, options, true);
   system.use(layout);
   if (!system.linearise(state, 0.0)) return;

@@ -57,7 +57,8 @@ HWY_INLINE void tile(const YBlock& a, const YBlock& b, std::size_t count, int ro
 #pragma GCC unroll 6
   for (int r = 0; r < kTileRows; ++r)
 #pragma GCC unroll 3
-    for (int c = 0; c < 3; ++c) at[static_cast<std::size_t>(c) * ld + static_cast<std::size_t>(r)] -= hn::GetLane(hn::SumOfLanes(d, sum[3 * r + c]));
+    for (int c = 0; c < 3; ++c)
+      at[static_cast<std::size_t>(c) * ld + static_cast<std::size_t>(r)] -= hn::GetLane(hn::SumOfLanes(d, sum[3 * r + c]));
 }
 
 void subtract_points_one(const KernelJob& job, std::size_t first, std::size_t last, double* A, std::size_t ld) {
@@ -65,7 +66,8 @@ void subtract_points_one(const KernelJob& job, std::size_t first, std::size_t la
   const std::size_t block_count = batch.block_end - batch.block_begin;
   const auto block_at = [&](std::size_t i) {
     if (i < block_count)
-      return YBlock{job.y + (batch.block_begin + i) * kYSize, block_count * kYSize, job.poses[job.blocks[batch.block_begin + i].pose].block * kBlock};
+      return YBlock{job.y + (batch.block_begin + i) * kYSize, block_count * kYSize,
+                    job.poses[job.blocks[batch.block_begin + i].pose].block * kBlock};
     const std::size_t s = i - block_count, shared = static_cast<std::size_t>(job.shared.blocks);
     return YBlock{job.y_shared + (first * shared + s) * kYSize, shared * kYSize, (job.free_poses + static_cast<std::int32_t>(s)) * kBlock};
   };

@@ -20,9 +20,9 @@ void evaluate(KernelJob& job, std::size_t first, std::size_t last) noexcept;
 
 /// What Cholesky met.
 struct PivotReport {
-  int small = 0;           // pivots not above `tolerance` times their diagonal: their parameter is left where it is
-  double least_ratio = 1;  // least pivot over its diagonal
-  double second_ratio = 1; // the least but one
+  int small = 0;            // pivots not above `tolerance` times their diagonal: their parameter is left where it is
+  double least_ratio = 1;   // least pivot over its diagonal
+  double second_ratio = 1;  // the least but one
 };
 
 /// A = L Lᵀ in place for the first `columns` columns, all n rows (columns a multiple of kBlock, ld ≥ n rounded up to kBatch).

@@ -16,9 +16,9 @@
 #define HWY_TARGET_INCLUDE "core/bundle/detail/normal_equations.cpp"
 #include "core/bundle/detail/simd.hpp"
 // clang-format off: the order is Highway's
+#include <hwy/contrib/math/math-inl.h>
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
-#include <hwy/contrib/math/math-inl.h>
 // clang-format on
 
 HWY_BEFORE_NAMESPACE();
@@ -46,9 +46,9 @@ HWY_INLINE void transform(const double* R, const double* t, const V X[3], V out[
 
 /// What a slot says of its points.
 struct Residual {
-  V x, y;      // observed less predicted, px
-  V weight;    // 1/σ², 0 where there is no observation
-  V depth;     // along the camera's axis; kFar where there is no observation
+  V x, y;    // observed less predicted, px
+  V weight;  // 1/σ², 0 where there is no observation
+  V depth;   // along the camera's axis; kFar where there is no observation
   V iz, xn, yn;
 };
 
@@ -137,11 +137,13 @@ HWY_INLINE void add_pose_sums(const V Q[6], const V q[3], const V X[3], double* 
 }
 
 /// Intrinsics of one slot: their own equations, those with the pose, and their rows of N.
-HWY_INLINE void add_intrinsics(KernelJob& job, int camera, const double* jet, std::size_t lane, std::uint16_t pose, V wx, V wy, const V F[6],
-                               V weight, const V Xi[3], const double* R, double* HWY_RESTRICT rows) {
+HWY_INLINE void add_intrinsics(KernelJob& job, int camera, const double* jet, std::size_t lane, std::uint16_t pose, V wx, V wy,
+                               const V F[6], V weight, const V Xi[3], const double* R, double* HWY_RESTRICT rows) {
   const int count = job.shared.intrinsic_count[camera];
   double* own = job.intrinsic_own + static_cast<std::size_t>(camera) * kIntrinsicsSize * (kIntrinsicsSize + 1) * kBatch + lane;
-  double* with_pose = job.intrinsic_sums + (static_cast<std::size_t>(pose) * kMaxCameras + static_cast<std::size_t>(camera)) * kIntrinsicsSize * 6 * kBatch + lane;
+  double* with_pose = job.intrinsic_sums +
+                      (static_cast<std::size_t>(pose) * kMaxCameras + static_cast<std::size_t>(camera)) * kIntrinsicsSize * 6 * kBatch +
+                      lane;
   for (int i = 0; i < count; ++i) {
     const double* J = jet + (kJetIntrinsics + 2 * job.shared.intrinsic_index[camera][i]) * kBatch + lane;
     const V jx = load(J), jy = load(J + kBatch);
@@ -262,7 +264,11 @@ HWY_INLINE void linearise_lanes(KernelJob& job, std::size_t index, std::size_t l
 
       const bool moving = k > 0;  // class k > 0 is camera k, free
       if (moving || pose.block >= 0)
-        add_pose_sums(Q, q, Xi, job.sums + (static_cast<std::size_t>(block.pose) * static_cast<std::size_t>(job.classes) + static_cast<std::size_t>(k)) * kPoseSums * kBatch + lane);
+        add_pose_sums(Q, q, Xi,
+                      job.sums +
+                          (static_cast<std::size_t>(block.pose) * static_cast<std::size_t>(job.classes) + static_cast<std::size_t>(k)) *
+                              kPoseSums * kBatch +
+                          lane);
       V Tk[3][3];  // Q R_i
 #pragma GCC unroll 3
       for (int c = 0; c < 3; ++c) {
@@ -279,7 +285,8 @@ HWY_INLINE void linearise_lanes(KernelJob& job, std::size_t index, std::size_t l
         for (int c = 0; c < 3; ++c) {
           if (job.shared.exact[k]) {
             for (int b = 0; b < 2; ++b)
-              add_to(hn::MulAdd(set(basis[b]), Tk[0][c], hn::MulAdd(set(basis[2 + b]), Tk[1][c], hn::Mul(set(basis[4 + b]), Tk[2][c]))), N + (3 * b + c) * kBatch);
+              add_to(hn::MulAdd(set(basis[b]), Tk[0][c], hn::MulAdd(set(basis[2 + b]), Tk[1][c], hn::Mul(set(basis[4 + b]), Tk[2][c]))),
+                     N + (3 * b + c) * kBatch);
           } else {
             for (int r = 0; r < 3; ++r) add_to(Tk[r][c], N + (3 * r + c) * kBatch);
           }
@@ -331,7 +338,8 @@ HWY_INLINE void linearise_lanes(KernelJob& job, std::size_t index, std::size_t l
   const V m10 = hn::Neg(hn::Mul(hn::Mul(l10, m00), m11));
   const V m21 = hn::Neg(hn::Mul(hn::Mul(l21, m11), m22));
   const V m20 = hn::Neg(hn::Mul(m22, hn::MulAdd(l20, m00, hn::Mul(l21, m10))));
-  const V z[3] = {hn::Mul(m00, e[0]), hn::MulAdd(m10, e[0], hn::Mul(m11, e[1])), hn::MulAdd(m20, e[0], hn::MulAdd(m21, e[1], hn::Mul(m22, e[2])))};
+  const V z[3] = {hn::Mul(m00, e[0]), hn::MulAdd(m10, e[0], hn::Mul(m11, e[1])),
+                  hn::MulAdd(m20, e[0], hn::MulAdd(m21, e[1], hn::Mul(m22, e[2])))};
   double* factor = job.factors + index * kFactorRows * kBatch + lane;
   const V stored[10] = {m00, m10, m11, m20, m21, m22, z[0], z[1], z[2], least_depth};
 #pragma GCC unroll 10
@@ -371,7 +379,8 @@ HWY_INLINE void linearise_lanes(KernelJob& job, std::size_t index, std::size_t l
     double* n = rows + i * 3 * kBatch;
     double* g = job.reduced + (static_cast<std::size_t>(job.free_poses) * kBlock + static_cast<std::size_t>(i)) * kBatch + lane;
     const V n0 = load(n), n1 = load(n + kBatch), n2 = load(n + 2 * kBatch);
-    const V y0 = hn::Mul(n0, m00), y1 = hn::MulAdd(n0, m10, hn::Mul(n1, m11)), y2 = hn::MulAdd(n0, m20, hn::MulAdd(n1, m21, hn::Mul(n2, m22)));
+    const V y0 = hn::Mul(n0, m00), y1 = hn::MulAdd(n0, m10, hn::Mul(n1, m11)),
+            y2 = hn::MulAdd(n0, m20, hn::MulAdd(n1, m21, hn::Mul(n2, m22)));
     store(y0, n);
     store(y1, n + kBatch);
     store(y2, n + 2 * kBatch);
@@ -402,7 +411,8 @@ HWY_INLINE void evaluate_lanes(KernelJob& job, std::size_t index, std::size_t la
     std::size_t slot = block.slot;
     for (unsigned mask = block.cameras; mask != 0; mask &= mask - 1, ++slot) {
       const double* jet = kJets ? job.jets + jet_index++ * kJetRows * kBatch : nullptr;
-      const Residual r = kJets ? from_jets(jet, job.slots[slot], lane) : project(job.cameras[std::countr_zero(mask)], job.slots[slot], lane, Xi, &behind);
+      const Residual r =
+          kJets ? from_jets(jet, job.slots[slot], lane) : project(job.cameras[std::countr_zero(mask)], job.slots[slot], lane, Xi, &behind);
       const V r2 = hn::MulAdd(r.x, r.x, hn::Mul(r.y, r.y));
       const V s = hn::Mul(r.weight, r2);
       V factor;
@@ -448,7 +458,8 @@ HWY_INLINE void back_substitute_lanes(KernelJob& job, std::size_t index, std::si
     for (int c = 0; c < 3; ++c) v[c] = hn::NegMulAdd(load(rows + (3 * i + c) * kBatch), set(shared_step[i]), v[c]);
   const V m00 = load(factor), m10 = load(factor + kBatch), m11 = load(factor + 2 * kBatch), m20 = load(factor + 3 * kBatch),
           m21 = load(factor + 4 * kBatch), m22 = load(factor + 5 * kBatch);
-  V step[3] = {hn::MulAdd(m00, v[0], hn::MulAdd(m10, v[1], hn::Mul(m20, v[2]))), hn::MulAdd(m11, v[1], hn::Mul(m21, v[2])), hn::Mul(m22, v[2])};
+  V step[3] = {hn::MulAdd(m00, v[0], hn::MulAdd(m10, v[1], hn::Mul(m20, v[2]))), hn::MulAdd(m11, v[1], hn::Mul(m21, v[2])),
+               hn::Mul(m22, v[2])};
   const V length2 = hn::MulAdd(step[0], step[0], hn::MulAdd(step[1], step[1], hn::Mul(step[2], step[2])));
   const V limit = hn::Mul(set(kDepthShare), load(factor + 9 * kBatch));
   const V limit2 = hn::Mul(limit, limit);

@@ -29,8 +29,9 @@ bool usable(const Intrinsics& k) noexcept {
 bool check_sizes(const BundleWorkspace& w, const BundleProblem& p, const BundleOptions& o, BundleResult* r) noexcept {
   const bool mono = o.configuration == BundleConfiguration::parallel_monocular;
   const auto as_many = [](std::size_t n, std::size_t of) { return n == of || n == 0; };
-  if (p.cameras.empty() || p.cameras.size() > kMaxCameras || p.T_left_world.empty() || !as_many(p.pose_constant.size(), p.T_left_world.size()) ||
-      !as_many(p.point_constant.size(), p.points.size()) || !as_many(p.squared_residuals.size(), p.observations.size()) ||
+  if (p.cameras.empty() || p.cameras.size() > kMaxCameras || p.T_left_world.empty() ||
+      !as_many(p.pose_constant.size(), p.T_left_world.size()) || !as_many(p.point_constant.size(), p.points.size()) ||
+      !as_many(p.squared_residuals.size(), p.observations.size()) ||
       (mono ? !as_many(p.T_camera_left.size(), p.cameras.size()) : p.T_camera_left.size() != p.cameras.size()))
     return refuse(r, BundleTermination::invalid_input, BundleDefect::sizes);
   if (p.cameras.size() > w.capacity.cameras || p.T_left_world.size() > w.capacity.poses || p.points.size() > w.capacity.points ||
@@ -92,14 +93,16 @@ bool check_poses(BundleWorkspace& w, const BundleProblem& p, const BundleOptions
   for (std::size_t i = 0; i < p.pose_priors.size(); ++i) {
     const BundlePosePrior& prior = p.pose_priors[i];
     if (prior.pose >= p.T_left_world.size()) return refuse(r, BundleTermination::invalid_input, BundleDefect::index, i);
-    if (!rigid(prior.T_left_world) || !prior.information.allFinite()) return refuse(r, BundleTermination::invalid_input, BundleDefect::not_finite, i);
+    if (!rigid(prior.T_left_world) || !prior.information.allFinite())
+      return refuse(r, BundleTermination::invalid_input, BundleDefect::not_finite, i);
   }
   for (std::size_t i = 0; i < p.T_left_world.size(); ++i) {
     if (w.poses[i].block < 0 || w.pose_observations[i] > 0) continue;
     const bool held = std::any_of(p.pose_priors.begin(), p.pose_priors.end(), [&](const BundlePosePrior& q) { return q.pose == i; });
     if (!held) return refuse(r, BundleTermination::rank_deficient, BundleDefect::pose_without_observations, i);
   }
-  if (static_cast<std::size_t>(w.free_poses) * kBlock + static_cast<std::size_t>(shared_layout(p, o, false).blocks) * kBlock == 0 && p.points.empty())
+  if (static_cast<std::size_t>(w.free_poses) * kBlock + static_cast<std::size_t>(shared_layout(p, o, false).blocks) * kBlock == 0 &&
+      p.points.empty())
     return refuse(r, BundleTermination::invalid_input, BundleDefect::sizes);
   return true;
 }
@@ -163,7 +166,9 @@ bool lay_out_batch(BundleWorkspace& w, const BundleProblem& p, std::size_t index
       w.observation_lane[i] = slot * kBatch + static_cast<std::uint32_t>(lane);
     }
   }
-  if (lowest <= highest) std::fill(w.pose_cameras.begin() + static_cast<std::ptrdiff_t>(lowest), w.pose_cameras.begin() + static_cast<std::ptrdiff_t>(highest) + 1, std::uint8_t{0});
+  if (lowest <= highest)
+    std::fill(w.pose_cameras.begin() + static_cast<std::ptrdiff_t>(lowest),
+              w.pose_cameras.begin() + static_cast<std::ptrdiff_t>(highest) + 1, std::uint8_t{0});
   batch.block_end = static_cast<std::uint32_t>(w.block_count);
   return room;
 }
@@ -218,7 +223,8 @@ SharedLayout shared_layout(const BundleProblem& p, const BundleOptions& o, bool 
 
 bool set_up(BundleWorkspace& w, const BundleProblem& p, const BundleOptions& o, BundleResult* r) noexcept {
   if (o.validate()[0] != '\0') return refuse(r, BundleTermination::invalid_input, BundleDefect::options);
-  if (!check_sizes(w, p, o, r) || !check_state(p, o, r) || !check_observations(w, p, r) || !check_poses(w, p, o, r) || !order_points(w, p, r))
+  if (!check_sizes(w, p, o, r) || !check_state(p, o, r) || !check_observations(w, p, r) || !check_poses(w, p, o, r) ||
+      !order_points(w, p, r))
     return false;
   w.batch_count = (w.point_count + kBatch - 1) / kBatch;
   w.block_count = w.slot_count = 0;
@@ -237,7 +243,8 @@ bool set_up(BundleWorkspace& w, const BundleProblem& p, const BundleOptions& o, 
     const std::size_t batch = i / kBatch, lane = i % kBatch;
     const bool used = i < w.point_count;
     const auto point = used ? static_cast<std::uint32_t>(w.order[i]) : 0U;
-    for (std::size_t c = 0; c < 3; ++c) state.points[(batch * 3 + c) * kBatch + lane] = used ? p.points[point][static_cast<Eigen::Index>(c)] : 0.0;
+    for (std::size_t c = 0; c < 3; ++c)
+      state.points[(batch * 3 + c) * kBatch + lane] = used ? p.points[point][static_cast<Eigen::Index>(c)] : 0.0;
     w.point_free[i] = used && (p.point_constant.empty() || p.point_constant[point] == 0) ? 1.0 : 0.0;
   }
   std::copy(p.T_left_world.begin(), p.T_left_world.end(), state.poses.begin());

@@ -106,7 +106,8 @@ void System::use(const SharedLayout& shared) noexcept {
   job_.jets = use_jets_ ? w_.jets.data() : nullptr;
   const bool calibration = options_.configuration == BundleConfiguration::stereo_calibration;
   job_.classes = calibration ? static_cast<int>(problem_.cameras.size()) : 1;
-  for (int k = 0; k < kMaxCameras; ++k) job_.class_cameras[k] = calibration ? static_cast<std::uint8_t>(1U << static_cast<unsigned>(k)) : 0xFF;
+  for (int k = 0; k < kMaxCameras; ++k)
+    job_.class_cameras[k] = calibration ? static_cast<std::uint8_t>(1U << static_cast<unsigned>(k)) : 0xFF;
 }
 
 void System::prepare(const BundleState& state) noexcept {
@@ -262,7 +263,8 @@ void System::assemble_pose(std::size_t pose) noexcept {
   const auto first = static_cast<std::size_t>(block) * kBlock;
   for (std::size_t r = 0; r < kBlock; ++r) {
     w_.rhs[first + r] += gradient[static_cast<Eigen::Index>(r)];
-    for (std::size_t c = 0; c <= r; ++c) add_information(first + r, first + c, all(static_cast<Eigen::Index>(r), static_cast<Eigen::Index>(c)));
+    for (std::size_t c = 0; c <= r; ++c)
+      add_information(first + r, first + c, all(static_cast<Eigen::Index>(r), static_cast<Eigen::Index>(c)));
   }
 }
 
@@ -278,7 +280,8 @@ void System::assemble_intrinsics() noexcept {
       w_.rhs[row] += lane_sum(own + kIntrinsicsSize * kBatch);
       Vec6 with_extrinsic = Vec6::Zero();
       for (std::size_t pose = 0; pose < problem_.T_left_world.size(); ++pose) {
-        const double* sums = w_.intrinsic_sums.data() + ((pose * kMaxCameras + k) * kIntrinsicsSize + static_cast<std::size_t>(i)) * 6 * kBatch;
+        const double* sums =
+            w_.intrinsic_sums.data() + ((pose * kMaxCameras + k) * kIntrinsicsSize + static_cast<std::size_t>(i)) * 6 * kBatch;
         Vec6 v;
         for (int c = 0; c < 6; ++c) v[c] = lane_sum(sums + c * kBatch);
         with_extrinsic += v;
@@ -306,7 +309,8 @@ void System::add_priors(const BundleState& state) noexcept {
     const auto first = static_cast<std::size_t>(block) * kBlock;
     for (std::size_t r = 0; r < kBlock; ++r) {
       w_.rhs[first + r] += e[static_cast<Eigen::Index>(r)];
-      for (std::size_t c = 0; c <= r; ++c) add_information(first + r, first + c, H(static_cast<Eigen::Index>(r), static_cast<Eigen::Index>(c)));
+      for (std::size_t c = 0; c <= r; ++c)
+        add_information(first + r, first + c, H(static_cast<Eigen::Index>(r), static_cast<Eigen::Index>(c)));
     }
   }
   for (std::size_t k = 0; k < problem_.cameras.size(); ++k) {
@@ -388,7 +392,8 @@ void System::move(const BundleState& state, const double* delta, BundleState* ca
     if (job_.shared.intrinsic_count[k] > 0) {
       Intrinsics intrinsics = state.cameras[k].intrinsics();
       auto values = parameters(intrinsics);
-      for (int i = 0; i < job_.shared.intrinsic_count[k]; ++i) values[job_.shared.intrinsic_index[k][i]] += shared[job_.shared.intrinsic[k] + i];
+      for (int i = 0; i < job_.shared.intrinsic_count[k]; ++i)
+        values[job_.shared.intrinsic_index[k][i]] += shared[job_.shared.intrinsic[k] + i];
       set_parameters(intrinsics, values);
       candidate->cameras[k] = Camera(intrinsics);
     }

@@ -18,7 +18,8 @@ class System {
   [[nodiscard]] bool linearise(const BundleState& state, double damping) noexcept;
   /// Cost alone; `squared`: also |ε|²/σ² of every slot into the workspace.
   [[nodiscard]] bool evaluate(const BundleState& state, bool squared) noexcept;
-  /// candidate ← state moved by `delta` (the reduced system's solution), points by back substitution. The last linearise() was about `state`.
+  /// candidate ← state moved by `delta` (the reduced system's solution), points by back substitution. The last linearise() was about
+  /// `state`.
   void move(const BundleState& state, const double* delta, BundleState* candidate) noexcept;
 
   [[nodiscard]] std::size_t rows() const noexcept { return rows_; }

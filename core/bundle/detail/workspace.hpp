@@ -7,13 +7,13 @@
 
 namespace vergence::detail {
 
-inline constexpr int kBatch = 8;                  // points worked on together: a cache line of doubles, the widest SIMD vector
-inline constexpr int kBlock = 6;                  // rows of one pose in the reduced system; θ_S is padded to a multiple
+inline constexpr int kBatch = 8;                    // points worked on together: a cache line of doubles, the widest SIMD vector
+inline constexpr int kBlock = 6;                    // rows of one pose in the reduced system; θ_S is padded to a multiple
 inline constexpr int kYSize = kBlock * 3 * kBatch;  // doubles of one block of Y
-inline constexpr int kFactorRows = 11;            // of PointFactor
-inline constexpr double kFar = 1e30;              // m: depth of what nobody sees
-inline constexpr int kPoseSums = 27;              // 21 of the symmetric 6×6, 6 of the gradient
-inline constexpr int kGroupLimit = 16;            // batches multiplied together: one block of each, 18 kB, stays in the first-level cache
+inline constexpr int kFactorRows = 11;              // of PointFactor
+inline constexpr double kFar = 1e30;                // m: depth of what nobody sees
+inline constexpr int kPoseSums = 27;                // 21 of the symmetric 6×6, 6 of the gradient
+inline constexpr int kGroupLimit = 16;              // batches multiplied together: one block of each, 18 kB, stays in the first-level cache
 inline constexpr int kMaxShared = kBlock * (kMaxCameras - 1) + kIntrinsicsSize * kMaxCameras;
 inline constexpr int kMaxSharedBlocks = (kMaxShared + kBlock - 1) / kBlock;
 inline constexpr int kJetDepth = 8;
@@ -46,14 +46,14 @@ struct KernelPose {
 struct KernelCamera {
   double R[9], t[3];  // row-major, T_camera_left
   double fx, fy, cx, cy;
-  double basis[6];    // 3×2, row-major: where τ may go with the exact length
+  double basis[6];  // 3×2, row-major: where τ may go with the exact length
   bool identity;
 };
 
 /// Rows of θ_S. Extrinsics of camera k: (τ, φ), or (β, φ) with τ = basis β; then free intrinsics of each camera.
 struct SharedLayout {
-  int size = 0;    // rows used
-  int blocks = 0;  // of kBlock rows, the last one padded
+  int size = 0;                                   // rows used
+  int blocks = 0;                                 // of kBlock rows, the last one padded
   int extrinsic[kMaxCameras] = {-1, -1, -1, -1};  // first row, −1: constant
   bool exact[kMaxCameras] = {};
   int intrinsic[kMaxCameras] = {-1, -1, -1, -1};
@@ -94,7 +94,7 @@ struct KernelJob {
   double decrement = 0;   // out: Σ |z|²
   double update = 0;      // out of back_substitute: Σ |δ|² and Σ |X|² of the points
   double norm = 0;
-  bool behind = false;    // out: an observed point is behind its camera
+  bool behind = false;  // out: an observed point is behind its camera
 };
 
 /// A set of parameters. Two of them: the best so far and the one being tried.
@@ -110,12 +110,12 @@ struct BundleWorkspace {
   BundleCapacities capacity;
   std::size_t block_capacity = 0, slot_capacity = 0, reduced_capacity = 0;
 
-  std::span<std::uint64_t> order;               // points with observations: (first pose, last pose, index)
-  std::span<std::uint32_t> first_observation;   // of each point; as many as points + 1
-  std::span<std::uint32_t> pose_observations;   // how many
-  std::span<std::uint32_t> pose_slot;           // scratch of the set-up: first slot of each pose in the batch
-  std::span<std::uint8_t> pose_cameras;         // scratch of the set-up
-  std::span<std::uint32_t> observation_lane;    // of each observation: slot · kBatch + lane
+  std::span<std::uint64_t> order;              // points with observations: (first pose, last pose, index)
+  std::span<std::uint32_t> first_observation;  // of each point; as many as points + 1
+  std::span<std::uint32_t> pose_observations;  // how many
+  std::span<std::uint32_t> pose_slot;          // scratch of the set-up: first slot of each pose in the batch
+  std::span<std::uint8_t> pose_cameras;        // scratch of the set-up
+  std::span<std::uint32_t> observation_lane;   // of each observation: slot · kBatch + lane
   std::span<Batch> batches;
   std::span<PoseBlock> blocks;
   std::span<Slot> slots;
