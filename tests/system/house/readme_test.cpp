@@ -1,0 +1,41 @@
+// What the README tells a newcomer to copy must work as it stands there.
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <string>
+
+#include "app/config/calibration_file.hpp"
+#include "tests/support/shared_data.hpp"
+#include "tests/support/temporary_folder.hpp"
+
+namespace vergence::app {
+namespace {
+
+std::string readme() { return test::read_file(std::filesystem::path(VERGENCE_SOURCE_DIR) / "README.md"); }
+
+TEST(Readme, itsCalibrationIsRead) {
+  const std::string text = readme();
+  const std::string open = "```yaml\n";
+  const std::size_t begin = text.find(open);
+  ASSERT_NE(begin, std::string::npos);
+  const std::size_t end = text.find("```", begin + open.size());
+  const CalibrationFile file = parse_calibration(text.substr(begin + open.size(), end - begin - open.size()), "README.md");
+  EXPECT_EQ(file.rig.cameras, 2);
+  EXPECT_EQ(file.rig.intrinsics[1].width, 752);
+  EXPECT_LT(file.rig.T_camera_left[1].t.x(), 0) << "the camera to the right";
+  EXPECT_NEAR(file.rig.T_camera_left[1].t.norm(), file.rig.baseline, 1e-5);
+}
+
+TEST(Readme, theScriptsAndPapersItNamesExist) {
+  const std::string text = readme();
+  const std::filesystem::path root(VERGENCE_SOURCE_DIR);
+  int scripts = 0;
+  for (const auto& entry : std::filesystem::directory_iterator(root / "scripts"))
+    if (entry.is_regular_file() && text.find("scripts/" + entry.path().filename().string()) != std::string::npos) ++scripts;
+  EXPECT_GE(scripts, 4) << "demo, test, bench and the list of packages";
+  for (const char* named : {"docs/configuration.md", "CONTRIBUTING.md", "CHANGELOG.md", "LICENSE"})
+    EXPECT_TRUE(std::filesystem::exists(root / named)) << named;
+}
+
+}  // namespace
+}  // namespace vergence::app
