@@ -86,9 +86,10 @@ std::vector<Stamp> read_times(const fs::path& file) {
   return times;
 }
 
-Trajectory parse_kitti(const fs::path& file, std::string_view text, const fs::path& times_file) {
-  const std::vector<Stamp> times = read_times(times_file);
+/// Row k of the text at times[k]. Rows whose time is not later than all before are left out.
+Trajectory parse_kitti(const fs::path& file, std::string_view text, std::span<const Stamp> times, const std::string& times_name) {
   Trajectory trajectory;
+  std::size_t rows = 0;
   Lines lines(text);
   std::string_view line;
   while (lines.next(&line)) {
@@ -96,10 +97,10 @@ Trajectory parse_kitti(const fs::path& file, std::string_view text, const fs::pa
     std::array<std::string_view, 12> fields;
     const std::size_t count = split(line, ' ', fields);
     if (count != fields.size()) refuse(file, n, "has " + std::to_string(count) + " numbers where a pose has 12: a 3x4 matrix row by row");
-    if (trajectory.size() == times.size())
-      refuse(file, n,
-             "is pose " + std::to_string(times.size() + 1) + ", but " + times_file.string() + " has only " + std::to_string(times.size()) +
-                 " times");
+    if (rows == times.size())
+      refuse(
+          file, n,
+          "is pose " + std::to_string(times.size() + 1) + ", but " + times_name + " has only " + std::to_string(times.size()) + " times");
     std::array<double, 12> v{};
     numbers(file, n, fields, v);
     Mat3 written;
@@ -108,13 +109,16 @@ Trajectory parse_kitti(const fs::path& file, std::string_view text, const fs::pa
     T.t = {v[3], v[7], v[11]};
     if (!accept_rotation(written, &T.R))
       refuse(file, n, "the matrix is not a rotation: it is off orthonormal by more than 1e-4, or it is a reflection");
-    append(file, n, {times[trajectory.size()], T}, &trajectory);
+    const Stamp stamp = times[rows++];
+    if (trajectory.empty() || trajectory.back().stamp < stamp) trajectory.push_back({stamp, T});
   }
-  if (trajectory.size() != times.size())
-    refuse(file, 0,
-           "has " + std::to_string(trajectory.size()) + " poses, but " + times_file.string() + " has " + std::to_string(times.size()) +
-               " times");
+  if (rows != times.size())
+    refuse(file, 0, "has " + std::to_string(rows) + " poses, but " + times_name + " has " + std::to_string(times.size()) + " times");
   return checked(file, std::move(trajectory));
+}
+
+Trajectory parse_kitti(const fs::path& file, std::string_view text, const fs::path& times_file) {
+  return parse_kitti(file, text, read_times(times_file), times_file.string());
 }
 
 Trajectory parse_euroc(const fs::path& file, std::string_view text, const fs::path& camera_yaml) {
@@ -162,6 +166,10 @@ Trajectory read_tum(const fs::path& file) { return parse_tum(file, read_text(fil
 
 Trajectory read_kitti(const fs::path& poses_file, const fs::path& times_file) {
   return parse_kitti(poses_file, read_text(poses_file), times_file);
+}
+
+Trajectory read_kitti(const fs::path& poses_file, std::span<const Stamp> times) {
+  return parse_kitti(poses_file, read_text(poses_file), times, "the drive");
 }
 
 Trajectory read_euroc(const fs::path& csv_file, const fs::path& camera_yaml) {

@@ -1,6 +1,7 @@
 #pragma once
 #include <filesystem>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "core/types/stamped_pose.hpp"
@@ -19,6 +20,8 @@ using Trajectory = std::vector<StampedPose>;
 /// KITTI odometry: twelve numbers a line, T_world_left row by row; line k belongs to line k of the times file (seconds).
 /// Rotations off orthonormal by up to 1e-4 are normalised, others refused.
 [[nodiscard]] Trajectory read_kitti(const std::filesystem::path& poses_file, const std::filesystem::path& times_file);
+/// The same with the times in hand. They may go backwards: poses whose time is not later than all before are left out, like their frames.
+[[nodiscard]] Trajectory read_kitti(const std::filesystem::path& poses_file, std::span<const Stamp> times);
 
 /// EuRoC: `state_groundtruth_estimate0/data.csv` (stamp in ns, p, q with w first; further columns are passed over), brought from the
 /// body to the left camera: T_R_left = T_R_B · T_BS of the camera's sensor.yaml.

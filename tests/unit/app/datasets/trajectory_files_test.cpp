@@ -225,6 +225,19 @@ TEST(Trajectory, kittiExcerptIsTheReferenceOfPairC) {
   }
 }
 
+TEST(Trajectory, kittiPosesWithTimesInHandLeaveOutThoseThatGoBackwards) {
+  const test::TemporaryFolder folder;
+  std::string rows;
+  for (int i = 0; i < 4; ++i) rows += "1 0 0 " + std::to_string(i) + " 0 1 0 0 0 0 1 0\n";
+  const auto file = folder.write("poses.txt", rows);
+  const std::vector<Stamp> times = {Stamp(10), Stamp(30), Stamp(20), Stamp(31)};
+  const Trajectory trajectory = read_kitti(file, times);
+  ASSERT_EQ(trajectory.size(), 3U);
+  EXPECT_EQ(trajectory[2].stamp, Stamp(31));
+  EXPECT_EQ(trajectory[2].T_world_body.t.x(), 3.0);
+  EXPECT_THROW((void)read_kitti(file, std::span(times).first(3)), InputError);
+}
+
 TEST(Trajectory, eurocExcerptGivesTheKnownLeftCamera) {
   const auto folder = test::shared_data("data/euroc_mh01"), tum = test::shared_data("data/eval/euroc_mh01_left_camera.tum");
   if (!folder || !tum) GTEST_SKIP() << test::shared_data_missing("data/euroc_mh01");

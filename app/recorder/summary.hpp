@@ -1,0 +1,39 @@
+#pragma once
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <nlohmann/json_fwd.hpp>
+
+#include "app/recorder/recorder.hpp"
+#include "core/comparison/trajectory_metrics.hpp"
+#include "core/types/calibration.hpp"
+
+namespace vergence::app {
+
+/// What summary.json is made of beside the recorder's totals.
+struct SummaryInput {
+  std::uint64_t skipped = 0;                       // frames that were not read: torn, missing, out of time
+  std::uint64_t dropped_by_estimator = 0;          // points and observations over capacity
+  std::optional<TrajectoryEvaluation> evaluation;  // against the reference, by summary_evaluation_options()
+  RigCalibration calibration;                      // in use at the end
+  std::string calibration_source;
+  std::uint64_t allocations_after_seal = 0;
+  std::vector<std::pair<std::string, std::size_t>> memory;  // bytes by what holds them
+  std::string configuration_hash;
+};
+
+/// What the metrics of summary.json are computed with: segments of 100–800 m (step 10), 10–50 m (step 1), and these once more after one
+/// scale.
+[[nodiscard]] EvaluationOptions summary_evaluation_options();
+
+/// Predicted relative error of a depth at z metres, from the wide sigma of the right camera: a yaw error σ moves the disparity by f·σ, so
+/// σ_z/z = √((z σ_ry / b)² + (σ_tx / b)²). Nothing where the calibration gives no sigmas.
+[[nodiscard]] std::optional<double> depth_error(const RigCalibration& rig, double z);
+
+/// summary.json (DESIGN §6), keys in a fixed order; what does not exist is null.
+[[nodiscard]] nlohmann::ordered_json summary_json(const SessionTotals& totals, const SummaryInput& input);
+
+}  // namespace vergence::app

@@ -1,0 +1,234 @@
+#include "app/recorder/recorder.hpp"
+
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <sstream>
+#include <thread>
+
+#include <nlohmann/json.hpp>
+
+#include "app/recorder/line_file.hpp"
+#include "app/runtime/errors.hpp"
+#include "core/memory/allocation_guard.hpp"
+#include "tests/support/temporary_folder.hpp"
+
+namespace vergence::app {
+namespace {
+
+constexpr std::int64_t kStamp = 1403636584763555584;  // ns: a double loses its last digits
+
+PoseRecord pose(std::uint64_t frame, PoseStatus status, double x) {
+  PoseSample sample;
+  sample.frame = frame;
+  sample.stamp = Stamp(kStamp + static_cast<std::int64_t>(frame) * 50'000'000);
+  sample.state = State::stereo_odometry;
+  sample.status = status;
+  sample.reason = status == PoseStatus::ok ? Reason::none : Reason::few_inliers;
+  sample.T_world_left.t = {x, 0, 0};
+  sample.inliers = 100;
+  sample.reprojection_px = 0.25;
+  sample.estimate_ms = 7.5F;
+  return PoseRecord::of(sample, 2.0F, std::nullopt);
+}
+
+std::vector<std::string> lines_of(const std::filesystem::path& file) {
+  std::istringstream in(test::read_file(file));
+  std::vector<std::string> lines;
+  for (std::string line; std::getline(in, line);) lines.push_back(line);
+  return lines;
+}
+
+TEST(SessionFolder, isMadeOrTakenWhenEmptyAndRefusedOtherwise) {
+  const test::TemporaryFolder folder;
+  make_session_folder(folder / "a/b/session");
+  EXPECT_TRUE(std::filesystem::is_directory(folder / "a/b/session"));
+  make_session_folder(folder / "a/b/session");  // empty: taken
+  folder.write("a/b/session/notes.txt", "mine");
+  EXPECT_THROW(make_session_folder(folder / "a/b/session"), InputError);
+  EXPECT_THROW(make_session_folder(folder / "a/b/session/notes.txt"), InputError);
+  EXPECT_THROW(make_session_folder(folder / "a/b/session/notes.txt/below"), InputError);
+  EXPECT_THROW(make_session_folder(""), InputError);
+  EXPECT_EQ(test::read_file(folder / "a/b/session/notes.txt"), "mine");
+}
+
+TEST(Recorder, posesGoToTheirFilesWithExactStampsAndLostOnesHaveNoPose) {
+  const test::TemporaryFolder folder;
+  Recorder recorder(folder.path(), {});
+  PoseRecord first = pose(0, PoseStatus::ok, 0);
+  first.has_reference = true;
+  first.reference_left = {{1, 2, 3}, {0, 0, 0, 1}};
+  recorder.post(first);
+  recorder.post(pose(1, PoseStatus::lost, 9));
+  recorder.post(pose(2, PoseStatus::degraded, 1.5));
+  const auto totals = recorder.close();
+
+  const auto tum = lines_of(folder / "trajectory.tum");
+  ASSERT_EQ(tum.size(), 2U);
+  EXPECT_EQ(tum[0], "1403636584.763555584 0.000000000 0.000000000 0.000000000 0.000000000 0.000000000 0.000000000 1.000000000");
+  EXPECT_EQ(tum[1].substr(0, 32), "1403636584.863555584 1.500000000");
+  const auto reference = lines_of(folder / "reference.tum");
+  ASSERT_EQ(reference.size(), 1U);
+  EXPECT_EQ(reference[0].substr(0, 54), "1403636584.763555584 1.000000000 2.000000000 3.0000000");
+
+  const auto csv = lines_of(folder / "poses.csv");
+  ASSERT_EQ(csv.size(), 4U);
+  EXPECT_EQ(csv[0], kPosesHeader);
+  for (const std::string& line : csv) EXPECT_EQ(std::count(line.begin(), line.end(), ','), 32) << line;  // 33 columns
+  EXPECT_EQ(csv[2], "1,1403636584813555584,stereo_odometry,lost,few_inliers" + std::string(26, ',') + "100,,7.500");
+  EXPECT_EQ(csv[3].substr(0, 64), "2,1403636584863555584,stereo_odometry,degraded,few_inliers,1.500");
+
+  EXPECT_EQ(totals->read, 3U);
+  EXPECT_EQ(totals->ok, 1U);
+  EXPECT_EQ(totals->degraded, 1U);
+  EXPECT_EQ(totals->lost, 1U);
+  EXPECT_DOUBLE_EQ(totals->path_m, 1.5);
+  EXPECT_EQ(totals->trajectory.size(), 2U);
+  EXPECT_NEAR(totals->decode.mean(), 2.0, 1e-9);
+  EXPECT_TRUE(totals->faults.empty());
+}
+
+TEST(Recorder, eventsAreOneJsonObjectALineWhateverTheirText) {
+  const test::TemporaryFolder folder;
+  Recorder recorder(folder.path(), {});
+  EventRecord event;
+  event.stamp = Stamp(kStamp);
+  event.kind = "image_torn";
+  event.set_sentence("left/\"a\"\n\xff.png is torn");
+  event.fields[0] = {"frame", std::int64_t{7}};
+  event.fields[1] = {"seconds", 0.5};
+  event.fields[2] = {"word", "late"};
+  recorder.post(event);
+  EstimatorEvent change;
+  change.stamp = Stamp(kStamp);
+  change.from = State::initialising;
+  change.to = State::stereo_odometry;
+  change.why = "trusted calibration";
+  recorder.post(EventRecord::of(change));
+  (void)recorder.close();
+  const auto lines = lines_of(folder / "events.jsonl");
+  ASSERT_EQ(lines.size(), 2U);
+  const auto torn = nlohmann::json::parse(lines[0]), state = nlohmann::json::parse(lines[1]);
+  EXPECT_EQ(torn["stamp_ns"], kStamp);
+  EXPECT_EQ(torn["kind"], "image_torn");
+  EXPECT_EQ(torn["fields"]["frame"], 7);
+  EXPECT_EQ(torn["fields"]["seconds"], 0.5);
+  EXPECT_EQ(torn["fields"]["word"], "late");
+  EXPECT_EQ(state["kind"], "state");
+  EXPECT_EQ(state["sentence"], "initialising to stereo_odometry: trusted calibration");
+  EXPECT_EQ(state["fields"]["to"], "stereo_odometry");
+}
+
+TEST(EventRecord, aLongSentenceIsCutBetweenCharacters) {
+  EventRecord event;
+  event.set_sentence(std::string(254, 'a') + "é and more");  // the é would straddle the end
+  const std::string kept = event.sentence.data();
+  EXPECT_EQ(kept, std::string(254, 'a'));
+}
+
+TEST(Recorder, calibrationsCarryTheirNumbersAndEmptyFieldsWhereNoSigmaIsGiven) {
+  const test::TemporaryFolder folder;
+  RigCalibration rig;
+  rig.cameras = 2;
+  rig.T_camera_left[1].t = {-0.5, 0, 0.25};
+  rig.sigma_noise[1] = {1e-4, 2e-4, 3e-4, 0.001, 0.002, 0.003};
+  Recorder recorder(folder.path(), {});
+  recorder.post(CalibrationRecord::of(rig, Stamp(kStamp), true, "given", "trusted"));
+  (void)recorder.close();
+  const auto lines = lines_of(folder / "calibrations.csv");
+  ASSERT_EQ(lines.size(), 2U);
+  EXPECT_EQ(lines[0], kCalibrationsHeader);
+  EXPECT_EQ(lines[1],
+            "1403636584763555584,accepted,given,trusted,0,0.0000,1,0.000000000,0.000000000,0.000000000,-0.500000000,0.000000000,"
+            "0.250000000,0.000100000,0.000200000,0.000300000,0.001000000,0.002000000,0.003000000,,,,,,");
+  EXPECT_EQ(std::count(lines[0].begin(), lines[0].end(), ','), std::count(lines[1].begin(), lines[1].end(), ','));
+}
+
+TEST(Recorder, theSameRecordsGiveTheSameBytes) {
+  std::array<std::string, 2> bytes;
+  for (std::string& b : bytes) {
+    const test::TemporaryFolder folder;
+    Recorder recorder(folder.path(), {});
+    for (std::uint64_t i = 0; i < 500; ++i)
+      recorder.post(pose(i, i % 7 == 3 ? PoseStatus::lost : PoseStatus::ok, std::sin(static_cast<double>(i))));
+    (void)recorder.close();
+    b = test::read_file(folder / "trajectory.tum") + test::read_file(folder / "poses.csv") + test::read_file(folder / "events.jsonl");
+  }
+  EXPECT_EQ(bytes[0], bytes[1]);
+}
+
+TEST(Recorder, nothingIsLostWhenTheProducerOutrunsTheDisk) {
+  const test::TemporaryFolder folder;
+  Recorder recorder(folder.path(), {});
+  constexpr std::uint64_t kFrames = 20000;
+  for (std::uint64_t i = 0; i < kFrames; ++i) recorder.post(pose(i, PoseStatus::ok, 0));
+  const auto totals = recorder.close();
+  EXPECT_EQ(totals->read, kFrames);
+  EXPECT_EQ(totals->dropped_records, 0U);
+  EXPECT_EQ(lines_of(folder / "poses.csv").size(), kFrames + 1);
+}
+
+TEST(Recorder, liveDropsAreCountedAndNeverMakeTheProducerWait) {
+  const test::TemporaryFolder folder;
+  Recorder recorder(folder.path(), {.when_full = Recorder::WhenFull::drop, .keep_trajectory = false});
+  constexpr std::uint64_t kFrames = 20000;
+  for (std::uint64_t i = 0; i < kFrames; ++i) recorder.post(pose(i, PoseStatus::ok, 0));
+  const auto totals = recorder.close();
+  EXPECT_EQ(totals->read + totals->dropped_records, kFrames);
+  EXPECT_TRUE(totals->trajectory.empty());
+}
+
+TEST(Recorder, whatWasPostedIsInTheFilesWhileTheSessionGoesOn) {
+  const test::TemporaryFolder folder;
+  Recorder recorder(folder.path(), {});
+  recorder.post(pose(0, PoseStatus::ok, 0));
+  bool found = false;
+  for (int i = 0; i < 200 && !found; ++i) {  // two seconds at most, one is promised
+    found = lines_of(folder / "trajectory.tum").size() == 1;
+    if (!found) std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  }
+  EXPECT_TRUE(found);
+}
+
+TEST(Recorder, aFullDiskIsASentenceAndTheOtherFilesAreWhole) {
+  const test::TemporaryFolder folder;
+  std::filesystem::create_symlink("/dev/full", folder / "poses.csv");
+  Recorder recorder(folder.path(), {});
+  for (std::uint64_t i = 0; i < 10; ++i) recorder.post(pose(i, PoseStatus::ok, 0));
+  const auto totals = recorder.close();
+  const auto complaints = recorder.take_complaints();
+  ASSERT_EQ(complaints.size(), 1U);  // once, not for every line
+  EXPECT_NE(complaints[0].find("poses.csv"), std::string::npos);
+  ASSERT_EQ(totals->faults.size(), 1U);
+  EXPECT_NE(totals->faults[0].find("poses.csv: is not complete"), std::string::npos) << totals->faults[0];
+  EXPECT_EQ(lines_of(folder / "trajectory.tum").size(), 10U);
+  EXPECT_EQ(totals->read, 10U);
+}
+
+TEST(Recorder, aFolderThatCannotBeWrittenIsNamed) {
+  const test::TemporaryFolder folder;
+  EXPECT_THROW(Recorder(folder / "none", {}), InputError);
+}
+
+TEST(Recorder, postingAllocatesNothing) {
+  if (!AllocationGuard::available()) GTEST_SKIP() << "needs the allocation hooks, which sanitizer builds leave out";
+  const test::TemporaryFolder folder;
+  Recorder recorder(folder.path(), {});
+  EstimatorEvent event;
+  event.why = "a state changed";
+  const auto before = AllocationGuard::allocations_after_seal();
+  {
+    const SealedScope sealed;
+    for (std::uint64_t i = 0; i < 1000; ++i) {
+      recorder.post(pose(i, PoseStatus::ok, 0));
+      recorder.post(EventRecord::of(event));
+    }
+  }
+  EXPECT_EQ(AllocationGuard::allocations_after_seal(), before);
+}
+
+}  // namespace
+}  // namespace vergence::app
