@@ -7,7 +7,8 @@
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "core/bundle/detail/dense.cpp"
 #include "core/bundle/detail/simd.hpp"
-// clang-format off: the order is Highway's
+// Highway wants this order.
+// clang-format off
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
 // clang-format on

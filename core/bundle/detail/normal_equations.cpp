@@ -15,10 +15,11 @@
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "core/bundle/detail/normal_equations.cpp"
 #include "core/bundle/detail/simd.hpp"
-// clang-format off: the order is Highway's
-#include <hwy/contrib/math/math-inl.h>
+// Highway wants this order.
+// clang-format off
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
+#include <hwy/contrib/math/math-inl.h>
 // clang-format on
 
 HWY_BEFORE_NAMESPACE();
