@@ -17,15 +17,27 @@ namespace {
 
 constexpr const char* kWho = "stereo MLESAC";
 constexpr std::size_t kAbortChunk = 128;  // matches scored between looks at the best so far; a multiple of the block
-constexpr int kPolishSteps = 4;           // Gauss–Newton from a pose a few sigmas off
-constexpr int kMaxPolished = 12;          // new bests polished a call: they come log(hypotheses) often
-constexpr double kMaxCondition = 1e12;    // of the information: beyond, double holds no digit of the worst direction
+                                          // Gauss–Newton from a pose a few sigmas off
+// Gauss–Newton steps of a polish and, for each, by how much T² is widened: a sample's noise hides good matches at first.
+constexpr std::array kPolishWidths = {9.0, 4.0, 1.0, 1.0, 1.0};
+constexpr int kMaxPolished = 12;        // new bests polished a call: they come log(hypotheses) often
+constexpr double kMaxCondition = 1e12;  // of the information: beyond, double holds no digit of the worst direction
 
 [[nodiscard]] bool valid(const StereoMatches& m, double baseline, const StereoMlesacOptions& o) noexcept {
   const std::size_t n = m.size();
   return m.left_y.size() == n && m.right_x.size() == n && m.right_y.size() == n && m.sigma.size() == n && baseline > 0 &&
          std::isfinite(baseline) && o.max_hypotheses >= 1 && o.min_hypotheses >= 0 && o.confidence > 0 && o.confidence < 1 &&
          o.outlier_cost > 0 && std::isfinite(o.outlier_cost);
+}
+
+/// In front of both cameras, or so far away that noise decides the sign of its depth, which then means nothing.
+[[nodiscard]] bool in_front(const Transform& T, const Vec2& left, const Vec2& right, double inverse_sigma, double cap) noexcept {
+  double depth_left = 0, depth_right = 0;
+  if (match_depths(T, left, right, &depth_left, &depth_right) && depth_left > 0 && depth_right > 0) return true;
+  const Vec3 turned = T.R * left.homogeneous();
+  if (!(turned.z() > 0)) return false;
+  const double gap = (turned.head<2>() / turned.z() - right).norm() * inverse_sigma;
+  return gap * gap < 2.0 * cap;  // of both rays' noise
 }
 
 }  // namespace
@@ -104,7 +116,8 @@ Mat5 StereoMlesac::information(double cap, const Transform& T, Vec5* gradient) c
     Vec5 J;
     if (geometry.sampson(left_[i], right_[i], &r, &J) != EpipolarStatus::ok) continue;
     r *= inverse_sigma_[i];
-    if (!(r * r < cap)) continue;
+    // A wrong match that the line lets pass has a large disparity and with it a long lever on t: half of them stand behind.
+    if (!(r * r < cap) || !in_front(T, left_[i], right_[i], inverse_sigma_[i], cap)) continue;
     J *= inverse_sigma_[i];
     H.noalias() += J * J.transpose();
     *gradient -= r * J;
@@ -114,9 +127,9 @@ Mat5 StereoMlesac::information(double cap, const Transform& T, Vec5* gradient) c
 
 bool StereoMlesac::polish(double cap, Transform* T) const noexcept {
   Transform next = *T;
-  for (int step = 0; step < kPolishSteps; ++step) {
+  for (const double width : kPolishWidths) {
     Vec5 g;
-    const Mat5 H = information(cap, next, &g);
+    const Mat5 H = information(width * cap, next, &g);
     const Eigen::LLT<Mat5> llt(H);
     if (llt.info() != Eigen::Success) return false;
     const Vec5 delta = llt.solve(g);
@@ -132,15 +145,11 @@ int StereoMlesac::flag(double cap, const Transform& T) noexcept {
   const EpipolarGeometry geometry(T);
   int inliers = 0;
   for (std::size_t i = 0; i < count_; ++i) {
-    double r = 0, depth_left = 0, depth_right = 0;
+    double r = 0;
     if (geometry.sampson(left_[i], right_[i], &r, nullptr) != EpipolarStatus::ok) continue;
     r *= inverse_sigma_[i];
     if (!(r * r < cap)) continue;
-    // A point at infinity has parallel rays: noise decides the sign of its depth, which then means nothing.
-    const bool parallel = !match_depths(T, left_[i], right_[i], &depth_left, &depth_right);
-    const Vec3 turned = T.R * left_[i].homogeneous();
-    const double gap = (turned / turned.z() - right_[i].homogeneous()).norm() * inverse_sigma_[i];
-    if (!parallel && !(depth_left > 0 && depth_right > 0) && !(turned.z() > 0 && gap * gap < 2.0 * cap)) continue;
+    if (!in_front(T, left_[i], right_[i], inverse_sigma_[i], cap)) continue;
     flags_[match_[i]] = 1;
     ++inliers;
   }
@@ -181,8 +190,10 @@ StereoEstimate StereoMlesac::estimate_stereo_transform(const StereoMatches& matc
       Transform better = T;
       if (polished < kMaxPolished && polish(cap, &better)) {
         ++polished;
-        const double polished_cost = score(essential_matrix(better), best);
-        if (polished_cost < best) best = polished_cost, T = better;
+        // The distances do not see the sign of t: with the better E the depths are asked again.
+        const Mat3 E_better = essential_matrix(better);
+        const double polished_cost = score(E_better, best);
+        if (polished_cost < best && transform_of(E_better, cap, baseline, &better)) best = polished_cost, T = better;
       }
       out.status = StereoMlesacStatus::ok;
       out.T_right_left = T;
