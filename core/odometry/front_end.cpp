@@ -120,36 +120,17 @@ void FrontEnd::store(const Followed& f, int k, MapPoint* p) noexcept {
   p->raw[static_cast<std::size_t>(k)] = f.raw;
 }
 
-void FrontEnd::follow_sample(Map& map, const Transform& T_left_world, int k, int sample) noexcept {
-  int active = 0;
-  for (const MapPoint& p : map.points()) active += p.stage == PointStage::active ? 1 : 0;
-  const int stride = std::max(1, (active + sample - 1) / std::max(sample, 1));
-  features::AlignOptions how;
-  how.coarsest = features::kPatchLevels - 1;
-  how.finest = std::min(1, pyramids_[static_cast<std::size_t>(k)].levels() - 1);
-  how.min_zncc = 0.8F;
-  how.max_shift = 64.F;
-  int n = 0;
-  for (MapPoint& p : map.points()) {
-    p.now.cameras = 0;
-    if (p.stage != PointStage::active || n++ % stride != 0) continue;
-    const Followed f = follow(p, T_left_world, k, how);
-    if (f.found) store(f, k, &p);
-  }
-}
-
-void FrontEnd::follow_all(Map& map, const Transform& T_left_world) noexcept {
+void FrontEnd::follow_into_all(Map& map, const Transform& T_left_world, const features::AlignOptions& how, int stride) noexcept {
   const std::span<MapPoint> points = map.points();
-  features::AlignOptions how;
-  how.coarsest = 1;
-  how.finest = 0;
-  how.min_zncc = static_cast<float>(options_.match_zncc);
-  how.max_shift = 8.F;
   const auto one = [&](int k) noexcept {
     const auto c = static_cast<std::size_t>(k);
+    const bool structured = ((structured_ >> static_cast<unsigned>(k)) & 1U) != 0;
+    int active = 0;
     for (std::size_t i = 0; i < points.size(); ++i) {
       followed_[c][i].found = false;
-      if (points[i].followed() && ((structured_ >> static_cast<unsigned>(k)) & 1U) != 0) followed_[c][i] = follow(points[i], T_left_world, k, how);
+      if (!structured || !points[i].followed()) continue;
+      if (stride > 1 && (points[i].stage != PointStage::active || active++ % stride != 0)) continue;
+      followed_[c][i] = follow(points[i], T_left_world, k, how);
     }
   };
   auto left = [&]() noexcept { one(0); };
@@ -162,6 +143,27 @@ void FrontEnd::follow_all(Map& map, const Transform& T_left_world) noexcept {
     for (int k = 0; k < cameras_; ++k)
       if (followed_[static_cast<std::size_t>(k)][i].found) store(followed_[static_cast<std::size_t>(k)][i], k, &points[i]);
   }
+}
+
+void FrontEnd::follow_sample(Map& map, const Transform& T_left_world, int sample, int coarsest) noexcept {
+  int active = 0;
+  for (const MapPoint& p : map.points()) active += p.stage == PointStage::active ? 1 : 0;
+  features::AlignOptions how;
+  how.coarsest = coarsest;
+  how.finest = 0;
+  how.min_zncc = static_cast<float>(options_.match_zncc);
+  how.max_shift = static_cast<float>(8 << coarsest);
+  // At least every second: stride 1 would mean the candidates too.
+  follow_into_all(map, T_left_world, how, std::max(2, active / std::max(sample, 1)));
+}
+
+void FrontEnd::follow_all(Map& map, const Transform& T_left_world) noexcept {
+  features::AlignOptions how;
+  how.coarsest = 1;
+  how.finest = 0;
+  how.min_zncc = static_cast<float>(options_.match_zncc);
+  how.max_shift = 8.F;
+  follow_into_all(map, T_left_world, how, 1);
 }
 
 void FrontEnd::match_across(const features::Corner& corner, bool exchanged, NewPoint* out) const noexcept {

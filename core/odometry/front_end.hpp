@@ -40,8 +40,9 @@ class FrontEnd {
   /// Builds the pyramids of a frame's images.
   [[nodiscard]] ImageCheck begin(const RigFrame& frame) noexcept;
 
-  /// Follows a spread sample of at most `sample` active points into camera k from far away: coarse levels, wide search.
-  void follow_sample(Map& map, const Transform& T_left_world, int k, int sample) noexcept;
+  /// Follows a spread sample of about `sample` active points from a rough prediction, from pyramid level `coarsest` down: it
+  /// may be off by some 8·2^coarsest px.
+  void follow_sample(Map& map, const Transform& T_left_world, int sample, int coarsest) noexcept;
   /// Follows every followed point into every structured camera from a good prediction.
   void follow_all(Map& map, const Transform& T_left_world) noexcept;
 
@@ -70,6 +71,7 @@ class FrontEnd {
   };
 
   [[nodiscard]] Followed follow(const MapPoint& p, const Transform& T_left_world, int k, const features::AlignOptions& how) const noexcept;
+  void follow_into_all(Map& map, const Transform& T_left_world, const features::AlignOptions& how, int stride) noexcept;
   [[nodiscard]] bool finish(int k, const Vec2& raw, Followed* f) const noexcept;
   void match_across(const features::Corner& corner, bool exchanged, NewPoint* out) const noexcept;
   void match_all(std::span<const features::Corner> corners, bool exchanged) noexcept;

@@ -9,6 +9,7 @@ namespace {
 
 constexpr int kSample = 100;             // points followed from far away: enough for MLESAC, a third of the work
 constexpr int kSampleInliers = 12;       // of the sample, below which the prediction was wrong
+constexpr double kSampleShare = 0.3;     // and of those found, which must agree
 constexpr std::uint8_t kMissesAllowed = 2;  // frames a point may be hidden
 constexpr std::uint16_t kFoundEnough = 2;   // rig frames, so four images, before a point holds a pose
 constexpr double kOutlier = 9.21;        // squared sigmas, two coordinates at 99 %
@@ -132,14 +133,17 @@ Odometry::PoseFit Odometry::track(const Transform& predicted, std::uint8_t struc
   PoseFit fit;
   if (structured == 0) return fit;
   StageClock clock(out);
-  const int k = std::countr_zero(structured);
-  // From the prediction; if that was wrong, from where the last frame stood.
-  for (const Transform* start : std::array<const Transform*, 2>{&predicted, &T_left_world_}) {
-    front_end_.follow_sample(map_, *start, k, kSample);
+  // From the prediction; if that was wrong, from further away; if that was, from where the last frame stood.
+  struct Attempt {
+    const Transform* start;
+    int coarsest;
+  };
+  for (const Attempt& a : {Attempt{&predicted, 2}, Attempt{&predicted, 3}, Attempt{&T_left_world_, 3}}) {
+    front_end_.follow_sample(map_, *a.start, kSample, a.coarsest);
     clock.mark(Stage::track);
-    fit = fit_pose(*start, true);
+    fit = fit_pose(*a.start, true);
     clock.mark(Stage::pose);
-    if (fit.inliers >= kSampleInliers) break;
+    if (fit.inliers >= kSampleInliers && fit.inliers > kSampleShare * fit.given) break;
   }
   if (fit.inliers < kSampleInliers) {
     fit.found = false;

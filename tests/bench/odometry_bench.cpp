@@ -118,8 +118,9 @@ Replay replay(const DecodedDrive& d, const app::Configuration& configuration, in
     for (std::size_t k = 0; k < kStages; ++k) r.stage_ms[k] += static_cast<double>(s.stage_ms[k]);
     r.keyframes += s.keyframe ? 1 : 0;
     if (frames != nullptr)
-      fmt::print(frames, "{},{},{},{},{},{:.3f},{},{:.2f}\n", i, to_string(s.status), to_string(s.reason), s.inliers, s.stereo_inliers,
-                 s.reprojection_px, s.keyframe ? 1 : 0, s.estimate_ms);
+      fmt::print(frames, "{},{},{},{},{},{},{:.3f},{},{:.2f},{:.6f},{:.6f},{:.6f}\n", i, s.stamp.ns(), to_string(s.status), to_string(s.reason),
+                 s.inliers, s.stereo_inliers, s.reprojection_px, s.keyframe ? 1 : 0, s.estimate_ms, s.T_world_left.t.x(), s.T_world_left.t.y(),
+                 s.T_world_left.t.z());
     if (s.status == PoseStatus::lost) continue;
     ++r.posed;
     r.ok += s.status == PoseStatus::ok ? 1 : 0;
