@@ -87,7 +87,7 @@ void Comparison::add(const InsSample& sample) noexcept {
     }
     r.valid = true;
     r.p_enu_ins = plane_.to_enu(sample.position);
-    r.R_enu_ins = plane_.R_enu_local(sample.position) * R_local_ins;
+    r.R_enu_ins = plane_.rotation_from(sample.position) * R_local_ins;
     r.position_sigma = or_default(sample.position_sigma, options_.position_sigma_m);
     r.height_sigma = or_default(sample.height_sigma, options_.height_sigma_m);
     r.tilt_sigma = or_default(sample.tilt_sigma, options_.tilt_sigma_rad);

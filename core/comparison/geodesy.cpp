@@ -29,7 +29,7 @@ Geodetic LocalTangentPlane::to_geodetic(const Vec3& p_enu) const {
   return place;
 }
 
-Mat3 LocalTangentPlane::R_enu_local(const Geodetic& place) const noexcept {
+Mat3 LocalTangentPlane::rotation_from(const Geodetic& place) const noexcept {
   return R_ecef_local(origin_).transpose() * R_ecef_local(place);
 }
 

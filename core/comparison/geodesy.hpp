@@ -19,7 +19,7 @@ class LocalTangentPlane {
   [[nodiscard]] Vec3 to_enu(const Geodetic& place) const;
   [[nodiscard]] Geodetic to_geodetic(const Vec3& p_enu) const;
   /// v_enu = R_enu_local * v_local, from the east-north-up axes at a place to those at the origin. 1 km away they differ by 1.6e-4 rad.
-  [[nodiscard]] Mat3 R_enu_local(const Geodetic& place) const noexcept;
+  [[nodiscard]] Mat3 rotation_from(const Geodetic& place) const noexcept;
 
  private:
   Geodetic origin_{};

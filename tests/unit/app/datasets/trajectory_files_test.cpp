@@ -186,11 +186,11 @@ TEST(Euroc, saysFileAndLineOfWhatIsWrong) {
   folder.write("cam0/sensor.yaml", "rate_hz: 20\n");
   EXPECT_TRUE(has(said(), "sensor.yaml: has no T_BS"));
   folder.write("cam0/sensor.yaml", "a: 1\nT_BS:\n  data: [1, 0, 0]\n");
-  EXPECT_TRUE(has(said(), "sensor.yaml:3: T_BS needs `data` with 16 numbers"));
+  EXPECT_TRUE(has(said(), "sensor.yaml:3: T_BS data"));
   folder.write("cam0/sensor.yaml", "T_BS:\n  data: [1,0,0,0, 0,1,0,0, 0,0,1.01,0, 0,0,0,1]\n");
-  EXPECT_TRUE(has(said(), "not a rigid transform"));
+  EXPECT_TRUE(has(said(), "sensor.yaml:2: T_BS is not a rigid transform"));
   folder.write("cam0/sensor.yaml", "T_BS:\n  data: [1,0,0,x, 0,1,0,0, 0,0,1,0, 0,0,0,1]\n");
-  EXPECT_TRUE(has(said(), "sensor.yaml:2: T_BS cannot be read"));
+  EXPECT_TRUE(has(said(), "sensor.yaml:2: T_BS data"));
   folder.write("cam0/sensor.yaml", "a: [1\nb: 2\n");
   EXPECT_TRUE(has(said(), "is not YAML"));
   folder.write("cam0/sensor.yaml", "just words\n");

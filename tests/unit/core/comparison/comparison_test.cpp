@@ -54,7 +54,7 @@ struct Bench {
     s.attitude_valid = true;
     const Transform T = T_enu_ins(t);
     s.position = plane.to_geodetic(T.t + shift);
-    const Eigen::Quaterniond q = quaternion(plane.R_enu_local(s.position).transpose() * T.R);
+    const Eigen::Quaterniond q = quaternion(plane.rotation_from(s.position).transpose() * T.R);
     s.q_enu_ins = {q.x(), q.y(), q.z(), q.w()};
     s.position_sigma = s.height_sigma = 0.001;
     s.tilt_sigma = 1e-5;

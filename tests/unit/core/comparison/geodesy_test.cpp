@@ -39,7 +39,7 @@ TEST(LocalTangentPlane, knownPointsOfBothHemispheres) {
 TEST(LocalTangentPlane, axesOfAnotherPlaceAreTheDerivativesOfItsCoordinates) {
   for (const KnownPoint& k : kKnown) {
     const LocalTangentPlane plane(k.origin);
-    const Mat3 R = plane.R_enu_local(k.point);
+    const Mat3 R = plane.rotation_from(k.point);
     EXPECT_LT((R * R.transpose() - Mat3::Identity()).norm(), 1e-14);
     // One metre along the local axes at the point, laid off by a plane that stands there.
     const LocalTangentPlane there(k.point);
