@@ -12,7 +12,7 @@ namespace vergence::app {
 
 /// `rig:` of the configuration.
 struct RigSettings {
-  std::string name{};  // of the rig, in calibration.yaml; empty: the name that the calibration carries
+  std::string name{};  // of the rig, in the calibration.yaml that a session writes
 };
 
 /// Everything a user may change, with its defaults. Each member is bound to a row of the schema (app/config/schema.hpp),

@@ -70,8 +70,7 @@ Group general() {
 
 Group rig() {
   return Rows("rig", "The rig as a whole.", &Configuration::rig)
-      .text("name", &RigSettings::name, 64,
-            "Name of the rig in the calibration.yaml that a session writes; empty: the name that the calibration carries.")
+      .text("name", &RigSettings::name, 64, "Name of the rig in the calibration.yaml that a session writes.")
       .done();
 }
 
@@ -95,6 +94,8 @@ Group odometry() {
               "Least normalised correlation of the two image patches of a match across (1: the same picture).")
       .number("pixel_sigma", &O::pixel_sigma, 0.02, 5, "px",
               "Standard deviation of a tracked corner's position, each coordinate, at full resolution; the scale of all residuals.")
+      .number("parallax_sigma", &O::parallax_sigma, 0, 10, "px",
+              "Added to it (in quadrature) for a patch seen from one depth further to the side than where it was cut: its slope is unknown.")
       .number("huber", &O::huber, 1, 10, "sigmas", "Residuals beyond this count less and less (Huber's weight).")
       .integer("window_keyframes", &O::window_keyframes, 3, 20, "keyframes", "Keyframes that are adjusted together with their points.")
       .integer("window_steps", &O::window_steps, 1, 30, "steps", "Most solver steps of one such adjustment.")
