@@ -89,14 +89,14 @@ ImageCheck FrontEnd::begin(const RigFrame& frame) noexcept {
   return check;
 }
 
-bool FrontEnd::finish(int k, const Vec2& raw, Followed* f) const noexcept {
+bool FrontEnd::finish(int k, const Vec2& raw, double parallax, Followed* f) const noexcept {
   Vec2 ideal;
   double magnification = 1.0;
   if (!lens(k).undistort(raw, &ideal, &magnification)) return false;
   f->found = true;
   f->raw = raw.cast<float>();
   f->ideal = ideal.cast<float>();
-  f->sigma = static_cast<float>(options_.pixel_sigma * magnification);
+  f->sigma = static_cast<float>(std::hypot(options_.pixel_sigma, options_.parallax_sigma * parallax) * magnification);
   return true;
 }
 
@@ -111,7 +111,7 @@ FrontEnd::Followed FrontEnd::follow(const MapPoint& p, const Transform& T_left_w
   const Transform T_k_origin = T_k_world * p.T_origin_world.inverse();
   const double z = (p.T_origin_world * p.p_world).z();
   const features::AlignResult a = features::align(p.patch, pyramids_[i], predicted, warp(J, T_k_origin.R, z, p.d_ray_d_pixel), how);
-  if (a.status == features::AlignStatus::ok) (void)finish(k, a.pixel, &f);
+  if (a.status == features::AlignStatus::ok) (void)finish(k, a.pixel, T_k_origin.t.norm() / z, &f);
   return f;
 }
 
@@ -172,7 +172,7 @@ void FrontEnd::match_across(const features::Corner& corner, bool exchanged, NewP
   const Vec2 at(corner.x, corner.y);
   if (!features::cut_patch(pyramids_[0], at, &out->patch)) return;
   if (!lenses_[0].ray_jacobian(at, &out->ray, &out->d_ray_d_pixel)) return;
-  if (!finish(0, at, &out->left)) return;
+  if (!finish(0, at, 0.0, &out->left)) return;
   for (int k = 1; k < cameras_; ++k) {
     if (((structured_ >> static_cast<unsigned>(k)) & 1U) == 0) continue;
     const auto i = static_cast<std::size_t>(k);
@@ -199,14 +199,14 @@ void FrontEnd::match_across(const features::Corner& corner, bool exchanged, NewP
     const double off = features::fit_inverse_depth(curve, a.pixel, &rho, &sigma_per_px);
     if (off < 0 || off > options_.band_px) continue;
     out->disparity = rho / sigma_per_px;
-    const double noise = 2.0 * std::sqrt(2.0) * options_.pixel_sigma;  // px, two sigmas of a difference of two positions
+    const double noise = 3.0 * std::sqrt(2.0) * options_.pixel_sigma;  // px, three sigmas of a difference of two positions
     if (exchanged) {
       out->behind = out->disparity < -kNearDisparity;
       return;
     }
     if (out->disparity < -noise) continue;
     out->rho = std::max(rho, 1.0 / (kFarBaselines * baseline));
-    if (!finish(k, a.pixel, &out->across)) continue;
+    if (!finish(k, a.pixel, out->rho * baseline, &out->across)) continue;
     out->matched_camera = k;
     out->usable = true;
     return;

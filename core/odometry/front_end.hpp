@@ -72,7 +72,8 @@ class FrontEnd {
 
   [[nodiscard]] Followed follow(const MapPoint& p, const Transform& T_left_world, int k, const features::AlignOptions& how) const noexcept;
   void follow_into_all(Map& map, const Transform& T_left_world, const features::AlignOptions& how, int stride) noexcept;
-  [[nodiscard]] bool finish(int k, const Vec2& raw, Followed* f) const noexcept;
+  /// `parallax`: how far this camera stands from where the patch was cut, over the depth there: what its unknown slope can do.
+  [[nodiscard]] bool finish(int k, const Vec2& raw, double parallax, Followed* f) const noexcept;
   void match_across(const features::Corner& corner, bool exchanged, NewPoint* out) const noexcept;
   void match_all(std::span<const features::Corner> corners, bool exchanged) noexcept;
   static void store(const Followed& f, int k, MapPoint* p) noexcept;

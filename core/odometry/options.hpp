@@ -12,7 +12,8 @@ struct OdometryOptions {
   double nearest_baselines = 4.0;   // nearest depth looked for across, in baselines: sets the largest disparity, 1 … 50
   double band_px = 2.0;             // half width of the band about the epipolar line across, 0.5 … 20
   double match_zncc = 0.8;          // least normalised correlation of a match across, 0.5 … 0.99
-  double pixel_sigma = 0.3;         // px, of one coordinate of a tracked corner, level 0; also the floor of the residual scale (METHOD §2)
+  double pixel_sigma = 0.15;        // px, of one coordinate of a tracked corner, level 0; also the floor of the residual scale (METHOD §2)
+  double parallax_sigma = 0.8;      // px more, in quadrature, for a patch seen from one depth further to the side: its slope is unknown, 0 … 10
   double huber = 2.0;               // robust threshold in sigmas, 1 … 10
   int window_keyframes = 10;        // poses in the adjusted window, 3 … 20
   int window_steps = 5;             // solver steps a keyframe at most, 1 … 30
