@@ -97,7 +97,8 @@ class Solve {
     cost_ = result_.initial_cost = system_.cost();
     squared_px_ = system_.squared_px();
     iterate();
-    if (rank_suspicious() && rank_deficient()) result_.termination = BundleTermination::rank_deficient;
+    if (rank_suspicious_ && result_.termination != BundleTermination::rank_deficient && rank_deficient())
+      result_.termination = BundleTermination::rank_deficient;
     if (options_.pose_covariance) pose_covariance();
     if (options_.covariance && options_.configuration == BundleConfiguration::stereo_calibration)
       detail::shared_covariance(w_, problem_, options_, best(), system_, &result_);
@@ -119,6 +120,7 @@ class Solve {
         if (!retreat()) return end(BundleTermination::rank_deficient);
         continue;
       }
+      watch_rank();
       detail::solve_factored(w_.A.data(), system_.rows(), system_.ld(), w_.delta.data());
       double decrement = system_.point_decrement();
       for (std::size_t i = 0; i < system_.rows(); ++i) decrement += w_.delta[i] * w_.rhs[i];
@@ -170,11 +172,14 @@ class Solve {
   /// A free scale has one direction that nothing sees: in parallel_monocular that is as it should be.
   int free_directions() const noexcept { return options_.configuration == BundleConfiguration::parallel_monocular ? 1 : 0; }
 
-  bool rank_suspicious() const noexcept {
-    if (result_.termination == BundleTermination::rank_deficient || result_.accepted == 0) return false;
-    constexpr double kMargin = 30;  // pivots of a direction that only the damping holds are a few λ
+  /// A direction that only the damping holds: its pivot falls with λ, that of a seen one stays. One factorisation cannot tell them apart.
+  void watch_rank() noexcept {
+    constexpr double kFell = 0.3;  // of the ratio, when λ fell to a tenth
     const double ratio = free_directions() == 0 ? pivots_.least_ratio : pivots_.second_ratio;
-    return ratio < kRankTolerance + kMargin * damping_ * 10;
+    if (watched_damping_ > 0 && damping_ < 0.5 * watched_damping_) rank_suspicious_ = ratio < kFell * watched_ratio_;
+    rank_suspicious_ = rank_suspicious_ || ratio < kRankTolerance;
+    watched_damping_ = damping_;
+    watched_ratio_ = ratio;
   }
 
   bool rank_deficient() noexcept {
@@ -251,6 +256,8 @@ class Solve {
   System system_;
   detail::PivotReport pivots_;
   int best_ = 0;
+  bool rank_suspicious_ = false;
+  double watched_damping_ = 0, watched_ratio_ = 1;
   double damping_ = 0, least_damping_ = kLeastDamping, cost_ = 0, squared_px_ = 0;
 };
 

@@ -131,6 +131,11 @@ enum class BundleDefect : std::uint8_t {
 /// Covariances are of the left perturbation (rotation rad, then translation m), R ← Exp(φ) R, t ← t + τ, as in RigCalibration;
 /// with an exact length the 6×6 has rank 5.
 struct BundleResult {
+  BundleResult() noexcept {  // Eigen leaves a matrix as it finds the memory
+    for (auto* all : {&covariance_white, &covariance_noise, &covariance_wide})
+      for (Mat6& m : *all) m.setZero();
+  }
+
   BundleTermination termination = BundleTermination::invalid_input;
   BundleDefect defect = BundleDefect::none;
   std::uint32_t defect_index = 0;

@@ -198,7 +198,7 @@ bool System::linearise(const BundleState& state, double damping) noexcept {
     b = end;
   }
   cost_ = job_.cost + prior_cost(state);
-  if (job_.behind || !std::isfinite(cost_)) return false;
+  if (job_.behind || !std::isfinite(cost_) || !std::isfinite(job_.squared_px)) return false;
   assemble(state);
   return true;
 }
@@ -215,7 +215,7 @@ bool System::evaluate(const BundleState& state, bool squared) noexcept {
     detail::evaluate(job_, 0, w_.batch_count);
   }
   cost_ = job_.cost + prior_cost(state);
-  return !job_.behind && std::isfinite(cost_);
+  return !job_.behind && std::isfinite(cost_) && std::isfinite(job_.squared_px);
 }
 
 /// Undamped information: the diagonal grows by (1 + λ).

@@ -1,0 +1,227 @@
+#include <cmath>
+#include <limits>
+
+#include <gtest/gtest.h>
+
+#include "tests/unit/core/bundle/bundle_fixture.hpp"
+
+namespace vergence {
+namespace {
+
+constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+
+class BadBundle : public ::testing::Test {
+ protected:
+  BadBundle() : own(capacities_for(small())), rig(make()) {}
+  static SimulationOptions small() {
+    SimulationOptions s;
+    s.points = 30;
+    s.poses = 4;
+    return s;
+  }
+  static SimulatedRig make() {
+    Random random(31);
+    return simulate_rig(small(), random);
+  }
+  /// Refused with this reason, and nothing of the caller's is changed.
+  void expect(BundleTermination termination, BundleDefect defect, const BundleProblem& p, const BundleOptions& o = calibration_options()) {
+    const std::vector<Vec3> points(p.points.begin(), p.points.end());
+    const BundleResult r = own.adjuster.solve(p, o);
+    EXPECT_EQ(r.termination, termination) << to_string(r.termination);
+    EXPECT_EQ(r.defect, defect) << to_string(r.defect);
+    EXPECT_FALSE(r.usable());
+    for (std::size_t i = 0; i < points.size(); ++i) EXPECT_TRUE(points[i] == p.points[i] || points[i].hasNaN());
+    index = r.defect_index;
+  }
+  OwnAdjuster own;
+  SimulatedRig rig;
+  std::uint32_t index = 0;
+};
+
+TEST_F(BadBundle, pointBehindItsCameraIsNamed) {
+  rig.points[7] = rig.true_T_left_world[0].inverse() * Vec3(0, 0, -5);
+  expect(BundleTermination::invalid_input, BundleDefect::behind, rig.problem());
+  EXPECT_EQ(rig.observations[index].point, 7U);
+}
+
+TEST_F(BadBundle, pointSeenOnceIsNamed) {
+  std::erase_if(rig.observations, [](const BundleObservation& o) { return o.point == 5 && !(o.pose == 2 && o.camera == 1); });
+  expect(BundleTermination::rank_deficient, BundleDefect::seen_once, rig.problem());
+  EXPECT_EQ(index, 5U);
+}
+
+TEST_F(BadBundle, pointSeenNeverIsLeftAlone) {
+  std::erase_if(rig.observations, [](const BundleObservation& o) { return o.point == 5; });
+  const Vec3 before = rig.points[5];
+  EXPECT_TRUE(own.adjuster.solve(rig.problem(), calibration_options()).converged());
+  EXPECT_EQ(rig.points[5], before);
+}
+
+TEST_F(BadBundle, poseWithoutObservationsIsNamed) {
+  std::erase_if(rig.observations, [](const BundleObservation& o) { return o.pose == 3; });
+  expect(BundleTermination::rank_deficient, BundleDefect::pose_without_observations, rig.problem());
+  EXPECT_EQ(index, 3U);
+}
+
+TEST_F(BadBundle, numbersThatAreNoneAreNamed) {
+  rig.observations[11].x = kNaN;
+  expect(BundleTermination::invalid_input, BundleDefect::not_finite, rig.problem());
+  EXPECT_EQ(index, 11U);
+  rig = make();
+  rig.observations[3].inverse_sigma = 0;
+  expect(BundleTermination::invalid_input, BundleDefect::not_finite, rig.problem());
+  rig = make();
+  rig.points[2].x() = kNaN;
+  expect(BundleTermination::invalid_input, BundleDefect::state_not_finite, rig.problem());
+  rig = make();
+  rig.T_left_world[2].R *= 1.1;
+  expect(BundleTermination::invalid_input, BundleDefect::state_not_finite, rig.problem());
+  rig = make();
+  rig.T_camera_left[1].t.setZero();  // a length without a direction
+  expect(BundleTermination::invalid_input, BundleDefect::state_not_finite, rig.problem());
+  rig = make();
+  rig.observations[3].x = 1e200;  // finite, but not its square
+  expect(BundleTermination::invalid_input, BundleDefect::not_finite, rig.problem());
+}
+
+TEST_F(BadBundle, indicesAndOrderAreChecked) {
+  rig.observations[9].point = 1000;
+  expect(BundleTermination::invalid_input, BundleDefect::index, rig.problem());
+  rig = make();
+  rig.observations[9].pose = 4;
+  expect(BundleTermination::invalid_input, BundleDefect::index, rig.problem());
+  rig = make();
+  std::swap(rig.observations[9], rig.observations[10]);
+  expect(BundleTermination::invalid_input, BundleDefect::order, rig.problem());
+  rig = make();
+  rig.observations[10] = rig.observations[9];
+  expect(BundleTermination::invalid_input, BundleDefect::order, rig.problem());
+}
+
+TEST_F(BadBundle, sizesThatDoNotGoTogetherAreRefused) {
+  BundleProblem p = rig.problem();
+  p.T_camera_left = p.T_camera_left.first(1);
+  expect(BundleTermination::invalid_input, BundleDefect::sizes, p);
+  p = rig.problem();
+  const std::vector<std::uint8_t> none_constant(rig.T_left_world.size(), 0);
+  p.pose_constant = none_constant;
+  expect(BundleTermination::invalid_input, BundleDefect::sizes, p);
+  expect(BundleTermination::invalid_input, BundleDefect::sizes, BundleProblem{});
+}
+
+TEST_F(BadBundle, moreThanTheCapacityIsRefused) {
+  for (const int what : {0, 1, 2, 3, 4}) {
+    BundleCapacities c = capacities_for(small());
+    if (what == 0) c.points = 29;
+    if (what == 1) c.poses = 3;
+    if (what == 2) c.observations = 239;
+    if (what == 3) c.cameras = 1;
+    if (what == 4) c.blocks = 15;
+    OwnAdjuster tight(c);
+    EXPECT_EQ(tight.adjuster.solve(rig.problem(), calibration_options()).termination, BundleTermination::capacity) << what;
+  }
+  BundleCapacities c = capacities_for(small());
+  c.shared = false;
+  OwnAdjuster odometry_only(c);
+  EXPECT_EQ(odometry_only.adjuster.solve(rig.problem(), calibration_options()).termination, BundleTermination::capacity);
+  EXPECT_TRUE(odometry_only.adjuster.solve(rig.problem(), {}).usable());
+}
+
+TEST_F(BadBundle, aPoseSeenByTwoPointsIsRankDeficient) {
+  std::erase_if(rig.observations, [](const BundleObservation& o) { return o.pose == 3 && (o.point > 1 || o.camera == 1); });
+  rig.T_camera_left = rig.true_T_camera_left;
+  const BundleResult r = own.adjuster.solve(rig.problem(), {});
+  EXPECT_EQ(r.termination, BundleTermination::rank_deficient) << to_string(r.termination);
+  EXPECT_TRUE(rig.T_left_world[3].finite());
+}
+
+TEST(BundleConstruction, impossibleCapacitiesThrow) {
+  Arena arena(1 << 20);
+  BundleCapacities c;
+  c.cameras = 5;
+  EXPECT_THROW(BundleAdjuster(c, arena), std::invalid_argument);
+  Arena small(1024);
+  EXPECT_THROW(BundleAdjuster(BundleCapacities{}, small), std::length_error);
+}
+
+/// Problems that nobody would pose: whatever comes out has a name and is finite.
+TEST(BundleFuzz, hostileProblemsEndWithANameAndNeverWithNaN) {
+  SimulationOptions s;
+  s.points = 20;
+  s.poses = 5;
+  OwnAdjuster own(capacities_for(s));
+  int usable = 0;
+  for (std::uint64_t seed = 1; seed <= 600; ++seed) {
+    Random random(seed);
+    s.start_position = random.uniform(0, seed % 3 == 0 ? 30 : 1);
+    s.start_translation = random.uniform(0, seed % 5 == 0 ? 10 : 0.3);
+    s.start_rotation = random.uniform(0, seed % 7 == 0 ? 3 : 0.3);
+    s.start_points = seed % 2 == 0 ? -1 : random.uniform(0, 20);
+    SimulatedRig rig = simulate_rig(s, random);
+    const double hostile[] = {kNaN, std::numeric_limits<double>::infinity(), -1e308, 1e30, 0, -1e-300};
+    for (std::uint32_t i = random.below(4); i > 0; --i) {
+      const double value = hostile[random.below(6)];
+      BundleObservation& o = rig.observations[random.below(static_cast<std::uint32_t>(rig.observations.size()))];
+      switch (random.below(8)) {
+        case 0:
+          o.x = value;
+          break;
+        case 1:
+          o.inverse_sigma = static_cast<float>(value);
+          break;
+        case 2:
+          rig.points[random.below(20)][random.below(3)] = value;
+          break;
+        case 3:
+          rig.T_left_world[random.below(5)].t[random.below(3)] = value;
+          break;
+        case 4:
+          rig.T_camera_left[random.below(2)].t[random.below(3)] = value;
+          break;
+        case 5:
+          o.point = random.next();
+          break;
+        case 6:
+          std::erase_if(rig.observations, [&](const BundleObservation&) { return random.below(3) == 0; });
+          break;
+        default:
+          for (Vec3& p : rig.points) p = rig.points[0];
+          break;
+      }
+      if (rig.observations.empty()) break;
+    }
+    BundleOptions o;
+    o.configuration = static_cast<BundleConfiguration>(random.below(3));
+    o.loss = static_cast<BundleLoss>(random.below(3));
+    o.length[1].kind = static_cast<BundleLength>(random.below(3));
+    o.length[1].metres = random.uniform(0.1, 1);
+    o.length[1].sigma = random.uniform(1e-4, 1e-1);
+    o.initial_damping = std::pow(10.0, random.uniform(-9, 2));
+    o.covariance = o.pose_covariance = true;
+    if (random.below(4) == 0) o.intrinsics[1].free = static_cast<std::uint16_t>(random.below(512));
+    std::vector<Transform> images;
+    std::vector<BundleObservation> per_image;
+    std::vector<std::uint8_t> constant;
+    const BundleProblem p =
+        o.configuration == BundleConfiguration::parallel_monocular ? rig.monocular_problem(&images, &per_image, &constant) : rig.problem();
+    const BundleResult r = own.adjuster.solve(p, o);
+    EXPECT_GE(r.steps, 0);
+    EXPECT_LE(r.steps, o.max_steps);
+    if (r.termination == BundleTermination::invalid_input || r.termination == BundleTermination::capacity) {
+      EXPECT_TRUE(r.termination == BundleTermination::capacity || r.defect != BundleDefect::none) << seed;
+      continue;
+    }
+    EXPECT_TRUE(std::isfinite(r.final_cost) && std::isfinite(r.rms_px)) << seed;
+    EXPECT_LE(r.final_cost, r.initial_cost) << seed;
+    for (const Vec3& point : p.points) EXPECT_TRUE(point.allFinite()) << seed;
+    for (const Transform& T : p.T_left_world) EXPECT_TRUE(T.finite()) << seed;
+    for (const Transform& T : p.T_camera_left) EXPECT_TRUE(T.finite()) << seed;
+    EXPECT_TRUE(r.pose_covariance.allFinite()) << seed;
+    for (const Mat6& m : r.covariance_wide) EXPECT_TRUE(m.allFinite()) << seed;
+    usable += r.usable() ? 1 : 0;
+  }
+  EXPECT_GT(usable, 100);  // the fuzz reaches the solver, not only its gate
+}
+
+}  // namespace
+}  // namespace vergence

@@ -1,0 +1,305 @@
+#include "core/bundle/bundle.hpp"
+
+#include <gtest/gtest.h>
+#include <hwy/targets.h>
+
+#include "core/memory/allocation_guard.hpp"
+#include "tests/unit/core/bundle/bundle_fixture.hpp"
+
+namespace vergence {
+namespace {
+
+// Rounding of a pixel near 1000 is 1e-13 px; of a 25 m coordinate 4e-15 m. A direction as weak as a rig's depth loses three digits more.
+constexpr double kExactPixel = 1e-11, kExactMetre = 1e-10, kExactRadian = 1e-11;
+
+TEST(Bundle, stereoCalibrationFitsNoiseFreeDataToMachinePrecisionFromHalfAMetreAndTriangulatedPoints) {
+  SimulationOptions s;
+  s.noise = 0;
+  s.generator = SimulationGenerator::tight;
+  s.start_translation = 0.5;
+  s.start_points = -1;
+  OwnAdjuster own(capacities_for(s));
+  Random random(11);
+  for (int run = 0; run < 100; ++run) {
+    SimulatedRig rig = simulate_rig(s, random);
+    const BundleResult r = own.adjuster.solve(rig.problem(), calibration_options());
+    ASSERT_TRUE(r.converged()) << run << ": " << to_string(r.termination);
+    EXPECT_LT(r.rms_px, kExactPixel) << run;
+    EXPECT_LT(rotation_error(rig, 1), kExactRadian) << run;
+    EXPECT_LT(translation_error(rig, 1), kExactMetre) << run;
+    EXPECT_LT(pose_error(rig), kExactMetre) << run;
+  }
+}
+
+TEST(Bundle, everyRunOfTheSimulationWithAThousandPointsConverges) {
+  SimulationOptions s;
+  s.points = 1000;
+  OwnAdjuster own(capacities_for(s));
+  Random random(12);
+  for (const double noise : {0.0, 0.1, 0.3}) {
+    s.noise = noise;
+    SimulatedRig rig = simulate_rig(s, random);
+    const BundleResult r = own.adjuster.solve(rig.problem(), calibration_options());
+    ASSERT_TRUE(r.converged()) << to_string(r.termination);
+    // √2 σ less the degrees of freedom that 3 · 1000 + 54 + 5 parameters take of 40 000 residuals.
+    EXPECT_NEAR(r.rms_px, noise * std::sqrt(2.0 * (1 - 3059.0 / 40000.0)), 0.02 * noise + kExactPixel);
+  }
+}
+
+TEST(Bundle, stereoOdometryLeavesTheRigAloneAndFindsThePoses) {
+  SimulationOptions s;
+  s.noise = 0;
+  OwnAdjuster own(capacities_for(s));
+  Random random(13);
+  for (int run = 0; run < 20; ++run) {
+    SimulatedRig rig = simulate_rig(s, random);
+    rig.T_camera_left = rig.true_T_camera_left;
+    const BundleResult r = own.adjuster.solve(rig.problem(), {});
+    ASSERT_TRUE(r.converged()) << to_string(r.termination);
+    EXPECT_LT(r.rms_px, kExactPixel);
+    EXPECT_LT(pose_error(rig), kExactMetre);
+    EXPECT_EQ(rig.T_camera_left[1].t, rig.true_T_camera_left[1].t);
+  }
+}
+
+TEST(Bundle, parallelMonocularFindsEveryImageUpToScale) {
+  SimulationOptions s;
+  s.noise = 0;
+  OwnAdjuster own(capacities_for(s));
+  BundleOptions options;
+  options.configuration = BundleConfiguration::parallel_monocular;
+  Random random(14);
+  for (int run = 0; run < 20; ++run) {
+    SimulatedRig rig = simulate_rig(s, random);
+    std::vector<Transform> images;
+    std::vector<BundleObservation> observations;
+    std::vector<std::uint8_t> constant;
+    const BundleResult r = own.adjuster.solve(rig.monocular_problem(&images, &observations, &constant), options);
+    ASSERT_TRUE(r.converged()) << to_string(r.termination);
+    EXPECT_LT(r.rms_px, kExactPixel);
+    const Transform& newest_left = images[images.size() - 2];
+    const Transform T_right_left = images.back() * newest_left.inverse();
+    const double scale = rig.true_T_camera_left[1].t.norm() / T_right_left.t.norm();
+    EXPECT_LT(rotation_angle(T_right_left.R * rig.true_T_camera_left[1].R.transpose()), kExactRadian);
+    EXPECT_LT((scale * T_right_left.t - rig.true_T_camera_left[1].t).norm(), kExactMetre);
+  }
+}
+
+TEST(Bundle, everyExtraCameraOfTwoThreeAndFourIsFound) {
+  for (const int cameras : {2, 3, 4}) {
+    SimulationOptions s;
+    s.cameras = cameras;
+    s.noise = 0;
+    s.points = 60;
+    OwnAdjuster own(capacities_for(s));
+    Random random(15);
+    SimulatedRig rig = simulate_rig(s, random);
+    BundleOptions o = calibration_options();
+    for (std::size_t k = 2; k < kMaxCameras; ++k) o.length[k].kind = BundleLength::free;  // one known length is the scale of all
+    const BundleResult r = own.adjuster.solve(rig.problem(), o);
+    ASSERT_TRUE(r.converged()) << cameras << " cameras: " << to_string(r.termination);
+    for (std::size_t k = 1; k < static_cast<std::size_t>(cameras); ++k) {
+      EXPECT_LT(rotation_error(rig, k), kExactRadian);
+      EXPECT_LT(translation_error(rig, k), kExactMetre);
+    }
+  }
+}
+
+TEST(Bundle, intrinsicsWithPriorsAreFoundThroughDistortion) {
+  SimulationOptions s;
+  s.noise = 0;
+  Random random(16);
+  SimulatedRig rig = simulate_rig(s, random);
+  for (std::size_t k = 0; k < 2; ++k) {
+    Intrinsics in = rig.cameras[k].intrinsics();
+    in.distortion = {-0.1, 0.02, 1e-4, -2e-4, 0};
+    rig.cameras[k] = Camera(in);
+  }
+  for (BundleObservation& o : rig.observations) {
+    Vec2 pixel;
+    ASSERT_EQ(rig.cameras[o.camera].project(rig.true_T_camera_left[o.camera] * (rig.true_T_left_world[o.pose] * rig.true_points[o.point]),
+                                            &pixel, nullptr),
+              ProjectStatus::ok);
+    o.x = pixel.x();
+    o.y = pixel.y();
+  }
+  const Intrinsics truth = rig.cameras[1].intrinsics();
+  Intrinsics start = truth;
+  start.fx += 3;
+  start.fy -= 2;
+  start.distortion[0] += 0.01;
+  rig.cameras[1] = Camera(start);
+  BundleOptions o = calibration_options();
+  o.intrinsics[1].free = 0b10011;
+  for (const std::size_t i : {0U, 1U, 4U}) o.intrinsics[1].prior_sigma[i] = 1e9;  // a prior that says nothing keeps the fit exact
+  o.update_tolerance = 1e-12;
+  OwnAdjuster own(capacities_for(s));
+  const BundleResult r = own.adjuster.solve(rig.problem(), o);
+  ASSERT_TRUE(r.converged()) << to_string(r.termination);
+  EXPECT_NEAR(rig.cameras[1].intrinsics().fx, truth.fx, 1e-7);
+  EXPECT_NEAR(rig.cameras[1].intrinsics().fy, truth.fy, 1e-7);
+  EXPECT_NEAR(rig.cameras[1].intrinsics().distortion[0], truth.distortion[0], 1e-9);
+  EXPECT_LT(translation_error(rig, 1), 1e-8);
+}
+
+TEST(Bundle, robustLossesShrugOffWrongObservations) {
+  SimulationOptions s;
+  s.noise = 0.1;
+  Random random(17);
+  const SimulatedRig original = simulate_rig(s, random);
+  OwnAdjuster own(capacities_for(s));
+  const auto error_with = [&](BundleLoss loss) {
+    SimulatedRig rig = original;
+    for (std::size_t i = 0; i < rig.observations.size(); i += 50) rig.observations[i].x += 20;  // 2 % wrong by 200 sigmas
+    BundleOptions o = calibration_options();
+    o.loss = loss;
+    const BundleResult r = own.adjuster.solve(rig.problem(), o);
+    EXPECT_TRUE(r.usable()) << to_string(r.termination);
+    return rotation_error(rig, 1);
+  };
+  const double none = error_with(BundleLoss::none);
+  EXPECT_LT(error_with(BundleLoss::huber), 0.2 * none);
+  EXPECT_LT(error_with(BundleLoss::cauchy), 0.1 * none);
+}
+
+TEST(Bundle, residualsOfTheResultAreGivenBackWhitened) {
+  SimulationOptions s;
+  s.points = 37;  // not a multiple of the batch
+  Random random(18);
+  SimulatedRig rig = simulate_rig(s, random);
+  std::vector<float> squared(rig.observations.size());
+  BundleProblem p = rig.problem();
+  p.squared_residuals = squared;
+  OwnAdjuster own(capacities_for(s));
+  ASSERT_TRUE(own.adjuster.solve(p, calibration_options()).converged());
+  for (std::size_t i = 0; i < squared.size(); ++i) {
+    const BundleObservation& o = rig.observations[i];
+    Vec2 pixel;
+    ASSERT_EQ(rig.cameras[0].project(rig.T_camera_left[o.camera] * (rig.T_left_world[o.pose] * rig.points[o.point]), &pixel, nullptr),
+              ProjectStatus::ok);
+    const double expected = (pixel - Vec2(o.x, o.y)).squaredNorm() * o.inverse_sigma * o.inverse_sigma;
+    EXPECT_NEAR(squared[i], expected, 1e-5 * (1 + expected)) << i;
+  }
+}
+
+TEST(Bundle, constantPosesAndPointsStayToTheBit) {
+  SimulationOptions s;
+  Random random(19);
+  SimulatedRig rig = simulate_rig(s, random);
+  const SimulatedRig before = rig;
+  std::vector<std::uint8_t> pose_constant(10, 0), point_constant(100, 0);
+  pose_constant[0] = pose_constant[4] = 1;
+  point_constant[3] = point_constant[99] = 1;
+  BundleProblem p = rig.problem();
+  p.pose_constant = pose_constant;
+  p.point_constant = point_constant;
+  OwnAdjuster own(capacities_for(s));
+  ASSERT_TRUE(own.adjuster.solve(p, calibration_options()).usable());
+  EXPECT_EQ(rig.T_left_world[4].t, before.T_left_world[4].t);
+  EXPECT_EQ(rig.points[3], before.points[3]);
+  EXPECT_EQ(rig.points[99], before.points[99]);
+  EXPECT_NE(rig.points[4], before.points[4]);
+  EXPECT_NE(rig.T_left_world[5].t, before.T_left_world[5].t);
+}
+
+TEST(Bundle, aPosePriorHoldsAPoseThatNothingElseHolds) {
+  SimulationOptions s;
+  s.noise = 0;
+  Random random(20);
+  SimulatedRig rig = simulate_rig(s, random);
+  rig.T_camera_left = rig.true_T_camera_left;
+  BundlePosePrior prior;
+  prior.pose = 0;
+  prior.T_left_world = rig.true_T_left_world[0];
+  prior.information = Mat6::Identity() * 1e4;
+  rig.T_left_world[0] = perturbed(rig.T_left_world[0], {0.01, -0.02, 0.01}, {0.1, 0.1, -0.1});
+  std::vector<std::uint8_t> constant(10, 0);
+  BundleProblem p = rig.problem();
+  p.pose_constant = constant;
+  p.pose_priors = {&prior, 1};
+  OwnAdjuster own(capacities_for(s));
+  const BundleResult r = own.adjuster.solve(p, {});
+  ASSERT_TRUE(r.converged()) << to_string(r.termination);
+  EXPECT_LT(pose_error(rig), 1e-8);
+  EXPECT_LT(rotation_angle(rig.T_left_world[0].R * rig.true_T_left_world[0].R.transpose()), 1e-9);
+}
+
+TEST(Bundle, solveDoesNotAllocate) {
+  if (!AllocationGuard::available()) GTEST_SKIP() << "the allocation hooks are not in this build (sanitizers bring their own)";
+  SimulationOptions s;
+  Random random(21);
+  SimulatedRig rig = simulate_rig(s, random);
+  OwnAdjuster own(capacities_for(s));
+  BundleOptions o = calibration_options();
+  o.covariance = true;
+  o.intrinsics[1].free = 0b11;
+  o.intrinsics[1].prior_mean = {887, 887, 0, 0, 0, 0, 0, 0, 0};
+  o.intrinsics[1].prior_sigma = {1, 1, 0, 0, 0, 0, 0, 0, 0};
+  o.loss = BundleLoss::cauchy;
+  BundleOptions odometry;
+  odometry.pose_covariance = true;
+  const BundleProblem p = rig.problem();
+  const std::uint64_t before = AllocationGuard::allocations_after_seal();
+  BundleResult first, second;
+  {
+    const SealedScope sealed;
+    first = own.adjuster.solve(p, o);
+    second = own.adjuster.solve(p, odometry);
+  }
+  EXPECT_EQ(AllocationGuard::allocations_after_seal(), before);
+  EXPECT_TRUE(first.has_covariance);
+  EXPECT_TRUE(second.has_pose_covariance);
+}
+
+TEST(Bundle, everySimdTargetFindsTheSameOptimum) {
+  SimulationOptions s;
+  s.points = 61;
+  Random random(22);
+  const SimulatedRig original = simulate_rig(s, random);
+  OwnAdjuster own(capacities_for(s));
+  SimulatedRig reference = original;
+  const BundleResult expected = own.adjuster.solve(reference.problem(), calibration_options());
+  for (std::int64_t targets = hwy::SupportedTargets(); targets != 0; targets &= targets - 1) {
+    hwy::SetSupportedTargetsForTest(targets & -targets);
+    hwy::GetChosenTarget().Update(hwy::SupportedTargets());
+    SimulatedRig rig = original;
+    const BundleResult r = own.adjuster.solve(rig.problem(), calibration_options());
+    EXPECT_EQ(r.steps, expected.steps) << hwy::TargetName(targets & -targets);
+    // Sums of 2440 squares in another order: about √2440 roundings of 1e-16.
+    EXPECT_NEAR(r.final_cost, expected.final_cost, 1e-12 * expected.final_cost) << hwy::TargetName(targets & -targets);
+    EXPECT_LT((rig.T_camera_left[1].t - reference.T_camera_left[1].t).norm(), 1e-9);
+  }
+  hwy::SetSupportedTargetsForTest(0);
+  hwy::GetChosenTarget().Update(hwy::SupportedTargets());
+}
+
+TEST(Bundle, everyTerminationHasItsProblem) {
+  SimulationOptions s;
+  Random random(23);
+  const SimulatedRig original = simulate_rig(s, random);
+  OwnAdjuster own(capacities_for(s));
+  const auto end = [&](const BundleOptions& o) {
+    SimulatedRig rig = original;
+    return own.adjuster.solve(rig.problem(), o).termination;
+  };
+  BundleOptions o = calibration_options();
+  EXPECT_EQ(end(o), BundleTermination::small_cost_change);
+  o.max_steps = 1;
+  EXPECT_EQ(end(o), BundleTermination::max_steps);
+  o = calibration_options();
+  o.cost_tolerance = 0;
+  o.update_tolerance = 1e-3;
+  EXPECT_EQ(end(o), BundleTermination::small_update);
+  o = calibration_options();
+  o.cost_tolerance = 0;
+  o.gradient_tolerance = 1e-3;
+  EXPECT_EQ(end(o), BundleTermination::small_gradient);
+  o = calibration_options();
+  o.length[1].kind = BundleLength::free;  // nothing fixes the scale
+  EXPECT_EQ(end(o), BundleTermination::rank_deficient);
+  o.loss_threshold = -1;
+  EXPECT_EQ(end(o), BundleTermination::invalid_input);
+}
+
+}  // namespace
+}  // namespace vergence
