@@ -107,7 +107,7 @@ StereoSequence open_euroc(const std::filesystem::path& folder, bool given) {
   RigCalibration& rig = sequence.calibration;
   rig.cameras = 2;
   rig.intrinsics = {read_intrinsics(left), read_intrinsics(right)};
-  rig.T_camera_left[1] = read_T_body_sensor(right).inverse() * read_T_body_sensor(left);
+  rig.T_camera_left[1] = read_sensor_mount(right).inverse() * read_sensor_mount(left);
   rig.T_camera_left[1].R = normalised(rig.T_camera_left[1].R);
   rig.baseline = rig.T_camera_left[1].t.norm();
   sequence.calibration_source = "cam1/sensor.yaml";

@@ -31,11 +31,11 @@ bool accept_rotation(const Mat3& written, Mat3* R) noexcept {
 
 YAML::Node read_sensor_yaml(const std::filesystem::path& file) { return read_yaml(file).root(); }
 
-Transform read_T_body_sensor(const std::filesystem::path& file) {
+Transform read_sensor_mount(const std::filesystem::path& file) {
   const YamlFile yaml = read_yaml(file);
-  const YAML::Node T_BS = yaml.root()["T_BS"];
-  if (!T_BS || !T_BS.IsMap() || !T_BS["data"]) refuse(file, 0, "has no T_BS with `data`: give the sensor.yaml of the camera");
-  const YAML::Node data = T_BS["data"];
+  const YAML::Node mount = yaml.root()["T_BS"];
+  if (!mount || !mount.IsMap() || !mount["data"]) refuse(file, 0, "has no T_BS with `data`: give the sensor.yaml of the camera");
+  const YAML::Node data = mount["data"];
   const std::vector<double> v = yaml.numbers(data, "T_BS data, a 4x4 matrix row by row,", 16, 16);
   Transform T;
   Mat3 written;

@@ -122,7 +122,7 @@ Trajectory parse_kitti(const fs::path& file, std::string_view text, const fs::pa
 }
 
 Trajectory parse_euroc(const fs::path& file, std::string_view text, const fs::path& camera_yaml) {
-  const Transform T_body_left = read_T_body_sensor(camera_yaml);
+  const Transform T_body_left = read_sensor_mount(camera_yaml);
   Trajectory trajectory;
   Lines lines(text);
   std::string_view line;

@@ -4,7 +4,7 @@ namespace vergence {
 namespace {
 
 /// Columns: east, north, up at a place, in earth-centred axes. Up is the ellipsoid's normal.
-Mat3 R_ecef_local(const Geodetic& place) noexcept {
+Mat3 earth_axes(const Geodetic& place) noexcept {
   const double phi = place.latitude_deg * (std::numbers::pi / 180.0), lambda = place.longitude_deg * (std::numbers::pi / 180.0);
   const double sp = std::sin(phi), cp = std::cos(phi), sl = std::sin(lambda), cl = std::cos(lambda);
   Mat3 R;
@@ -29,8 +29,6 @@ Geodetic LocalTangentPlane::to_geodetic(const Vec3& p_enu) const {
   return place;
 }
 
-Mat3 LocalTangentPlane::rotation_from(const Geodetic& place) const noexcept {
-  return R_ecef_local(origin_).transpose() * R_ecef_local(place);
-}
+Mat3 LocalTangentPlane::rotation_from(const Geodetic& place) const noexcept { return earth_axes(origin_).transpose() * earth_axes(place); }
 
 }  // namespace vergence
