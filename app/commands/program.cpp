@@ -73,12 +73,8 @@ ExitCode parse_and_run(int argc, const char* const* argv) {
   ExitCode exit_code = ExitCode::done;
   root.set_version_flag("--version", "vergence " + std::string(version()));
   root.require_subcommand(1);
-#ifdef VERGENCE_HAS_REPLAY
   add_replay(root, &exit_code);
-#endif
-#ifdef VERGENCE_HAS_EVALUATE
   add_evaluate(root, &exit_code);
-#endif
   add_announced(root, &exit_code);
   check_first_word(root, argc, argv);
   try {

@@ -1,0 +1,73 @@
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "app/commands/commands.hpp"
+#include "app/commands/common_options.hpp"
+#include "app/commands/replay_session.hpp"
+#include "app/runtime/nearest.hpp"
+
+namespace vergence::app {
+namespace {
+
+/// The words as given; checked when the command runs.
+struct Arguments {
+  CommonOptions common;
+  std::string data, format, out;
+  std::optional<std::string> calibration;
+  std::int64_t start = 0;
+  std::optional<std::int64_t> frames;
+  std::optional<double> baseline;
+  bool from_scratch = false, memory = false;
+};
+
+SequenceFormat format_of(const std::string& word) {
+  if (word == "kitti") return SequenceFormat::kitti;
+  if (word == "euroc") return SequenceFormat::euroc;
+  if (word == "folder") return SequenceFormat::folder;
+  if (word == "st-lucia" || word == "session")
+    throw InputError("--format " + word + " is not there yet in this version; kitti, euroc and folder are");
+  throw InputError("--format \"" + word + "\" is not known" + did_you_mean(word, {"kitti", "euroc", "folder", "st-lucia", "session"}) +
+                   "; kitti, euroc and folder are what can be read");
+}
+
+ReplayRequest request_of(const Arguments& a) {
+  if (a.from_scratch) throw InputError("--from-scratch is not there yet in this version; give a calibration with --calibration");
+  if (a.baseline) throw InputError("--baseline is not there yet in this version; the length stands in the calibration's translation");
+  if (a.start < 0) throw InputError("--start is the number of a frame, 0 or more");
+  if (a.frames && *a.frames < 1) throw InputError("--frames needs at least 1");
+  ReplayRequest r;
+  r.data = a.data;
+  r.format = format_of(a.format);
+  r.out = a.out;
+  if (a.calibration) r.calibration = *a.calibration;
+  r.start = static_cast<std::size_t>(a.start);
+  if (a.frames) r.frames = static_cast<std::size_t>(*a.frames);
+  r.configuration = a.common.configuration(std::nullopt);
+  r.quiet = a.common.quiet;
+  r.print_memory = a.memory;
+  return r;
+}
+
+}  // namespace
+
+void add_replay(CLI::App& root, ExitCode* exit_code) {
+  const auto a = std::make_shared<Arguments>();
+  CLI::App* command = root.add_subcommand("replay", "Run a recorded drive through the estimator and write a session folder");
+  command->add_option("DATA", a->data, "Folder of the data set")->required();
+  command->add_option("--format", a->format, "Layout of DATA: kitti, euroc, folder (st-lucia and session come later)")
+      ->required()
+      ->type_name("NAME");
+  command->add_option("--out", a->out, "Session folder; must not exist or be empty")->required()->type_name("DIR");
+  command->add_option("--calibration", a->calibration, "calibration.yaml to use instead of the data set's own")->type_name("FILE");
+  command->add_option("--start", a->start, "First frame, from 0")->type_name("K");
+  command->add_option("--frames", a->frames, "At most so many frames")->type_name("N");
+  command->add_option("--baseline", a->baseline, "Length of the stereo transform in metres (not there yet)")->type_name("M");
+  command->add_flag("--from-scratch", a->from_scratch, "Find the calibration from the drive itself (not there yet)");
+  command->add_flag("--memory", a->memory, "Print what memory is held, by whom");
+  a->common.declare(*command);
+  command->callback([a, exit_code] { *exit_code = run_replay(request_of(*a)); });
+}
+
+}  // namespace vergence::app

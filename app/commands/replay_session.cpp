@@ -1,0 +1,330 @@
+#include "app/commands/replay_session.hpp"
+
+#include <pthread.h>
+
+#include <algorithm>
+#include <atomic>
+#include <chrono>
+#include <condition_variable>
+#include <cstring>
+#include <iostream>
+#include <memory>
+#include <mutex>
+#include <stdexcept>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include "app/config/calibration_file.hpp"
+#include "app/datasets/frame_decoder.hpp"
+#include "app/datasets/reference_track.hpp"
+#include "app/datasets/trajectory_files.hpp"
+#include "app/recorder/line_file.hpp"
+#include "app/recorder/recorder.hpp"
+#include "app/recorder/summary.hpp"
+#include "app/runtime/progress.hpp"
+#include "app/runtime/signals.hpp"
+#include "app/runtime/thread_runner.hpp"
+#include "core/estimator/estimator.hpp"
+#include "core/memory/allocation_guard.hpp"
+
+namespace vergence::app {
+namespace {
+
+/// What the estimator's thread tells the progress line: the newest counts, older ones may be lost.
+struct Glimpse {
+  std::uint64_t done = 0;  // frames, skipped ones included
+  State state = State::initialising;
+  double path_m = 0;
+  int inliers = 0;
+  float estimate_ms = 0;
+};
+
+/// Everything that is set up before the first frame and torn down after the last, in the order of its members.
+class Replay {
+ public:
+  Replay(const ReplayRequest& request, StereoSequence sequence, Trajectory truth);
+
+  [[nodiscard]] ExitCode run();
+
+ private:
+  void estimate() noexcept;
+  void handle(const DecodedPair& pair) noexcept;
+  void post_events() noexcept;
+  void watch(const SignalGuard& signals, Progress* progress);
+  void write_calibration_file(std::vector<std::string>* faults) const;
+  void show(Progress* progress);
+  void write_summary(const SessionTotals& totals, const SummaryInput& input, std::vector<std::string>* faults) const;
+  [[nodiscard]] SummaryInput summary_input(const SessionTotals& totals, std::uint64_t allocations) const;
+  void tell(const SessionTotals& totals, const SummaryInput& input, Progress* progress) const;
+  [[nodiscard]] std::vector<std::pair<std::string, std::size_t>> memory() const;
+  void print_memory() const;
+
+  const ReplayRequest& request_;
+  const StereoSequence sequence_;
+  const Trajectory truth_;
+  const ReferenceTrack reference_;
+  const std::size_t count_;  // frames of this replay
+  EstimatorOptions options_;
+  Arena frames_arena_, estimator_arena_;
+  FramePool pool_;
+  std::unique_ptr<PairRunner> runner_;
+  std::unique_ptr<Estimator> estimator_;
+  std::unique_ptr<Recorder> recorder_;
+  std::unique_ptr<FrameDecoder> decoder_;
+
+  // Of the estimator's thread; read by others after it has joined.
+  Glimpse glimpse_;
+  std::uint64_t skipped_ = 0, dropped_ = 0;
+  Vec3 last_position_ = Vec3::Zero();
+  bool posed_ = false;
+
+  Ring<Glimpse, 64> glimpses_;  // full: the newest is lost, the next one tells the same and more
+  std::mutex mutex_;            // with done_, for the caller's thread that waits
+  std::condition_variable changed_;
+  bool done_ = false;
+};
+
+std::size_t arena_size(std::size_t bytes) { return bytes + kCacheLine; }
+
+std::unique_ptr<PairRunner> make_runner(int threads) {
+  if (threads >= 2) return std::make_unique<ThreadRunner>();
+  return std::make_unique<SequentialRunner>();
+}
+
+int width_of(const StereoSequence& s) { return s.calibration.intrinsics[0].width; }
+int height_of(const StereoSequence& s) { return s.calibration.intrinsics[0].height; }
+
+Replay::Replay(const ReplayRequest& request, StereoSequence sequence, Trajectory truth)
+    : request_(request),
+      sequence_(std::move(sequence)),
+      truth_(std::move(truth)),
+      reference_(truth_),
+      count_(std::min(request.frames.value_or(sequence_.pairs.size()), sequence_.pairs.size() - request.start)),
+      options_{request.configuration.odometry},
+      frames_arena_(arena_size(FramePool::memory_needed(width_of(sequence_), height_of(sequence_), FrameDecoder::kSlots))),
+      estimator_arena_(arena_size(Estimator::memory_needed(options_, sequence_.calibration))),
+      pool_(width_of(sequence_), height_of(sequence_), FrameDecoder::kSlots, frames_arena_),
+      runner_(make_runner(request.configuration.threads)),
+      estimator_(std::make_unique<Estimator>(options_, sequence_.calibration, estimator_arena_, *runner_)) {}
+
+void Replay::estimate() noexcept {
+  (void)pthread_setname_np(pthread_self(), "vergence-estim");
+  AllocationGuard::seal_thread();
+  for (DecodedPair pair; decoder_->next(&pair);) {
+    handle(pair);
+    decoder_->release(pair);
+    ++glimpse_.done;
+    (void)glimpses_.push(glimpse_);
+  }
+  AllocationGuard::unseal_thread();
+  const std::lock_guard lock(mutex_);
+  done_ = true;
+  changed_.notify_one();
+}
+
+void Replay::handle(const DecodedPair& pair) noexcept {
+  if (!pair.decoded) {
+    ++skipped_;
+    EventRecord event;
+    event.stamp = pair.stamp;
+    event.kind = pair.kind;
+    event.set_sentence(pair.note.data());
+    event.fields[0] = {"frame", static_cast<std::int64_t>(pair.frame)};
+    recorder_->post(event);
+    return;
+  }
+  RigFrame frame;
+  frame.number = pair.frame;
+  frame.stamp = pair.stamp;
+  frame.cameras = 2;
+  for (std::size_t k = 0; k < 2; ++k) frame.images[k] = pool_.view(pair.slots[k]);
+  const PoseSample sample = estimator_->process(frame);
+  post_events();
+  recorder_->post(PoseRecord::of(sample, pair.decode_ms, reference_.at(sample.stamp)));
+
+  glimpse_.state = sample.state;
+  glimpse_.inliers = sample.inliers;
+  glimpse_.estimate_ms = sample.estimate_ms;
+  if (sample.status == PoseStatus::lost) return;
+  if (posed_) glimpse_.path_m += (sample.T_world_left.t - last_position_).norm();
+  last_position_ = sample.T_world_left.t;
+  posed_ = true;
+}
+
+void Replay::post_events() noexcept {
+  for (const EstimatorEvent& event : estimator_->events()) {
+    if (event.kind == EstimatorEvent::Kind::dropped) dropped_ += static_cast<std::uint64_t>(std::max(0.0, event.value));
+    recorder_->post(EventRecord::of(event));
+  }
+}
+
+void Replay::watch(const SignalGuard& signals, Progress* progress) {
+  constexpr std::chrono::milliseconds kLook{50};
+  std::unique_lock lock(mutex_);
+  while (!changed_.wait_for(lock, kLook, [this] { return done_; })) {
+    if (signals.stop_requested()) decoder_->stop();
+    lock.unlock();
+    show(progress);
+    for (const std::string& sentence : recorder_->take_complaints()) progress->say("vergence: " + sentence);
+    lock.lock();
+  }
+  lock.unlock();
+  show(progress);
+}
+
+void Replay::show(Progress* progress) {
+  Glimpse newest;
+  bool any = false;
+  while (glimpses_.pop(&newest)) any = true;
+  if (!any) return;
+  ProgressState state;
+  state.state = newest.state == State::stereo_odometry ? "stereo" : to_string(newest.state);
+  state.frame = newest.done;
+  state.frames = count_;
+  state.path_m = newest.path_m;
+  state.inliers = newest.inliers;
+  state.estimate_ms = static_cast<double>(newest.estimate_ms);
+  progress->update(state);
+}
+
+void Replay::write_calibration_file(std::vector<std::string>* faults) const {
+  CalibrationFile file;
+  file.rig = estimator_->calibration();
+  file.rig_name = request_.configuration.rig.name;
+  file.source = "given";
+  try {
+    write_calibration(request_.out / "calibration.yaml", file);
+  } catch (const InputError& e) {
+    faults->emplace_back(e.what());
+  }
+}
+
+void Replay::write_summary(const SessionTotals& totals, const SummaryInput& input, std::vector<std::string>* faults) const {
+  const std::string text = summary_json(totals, input).dump(2) + "\n";
+  try {
+    LineFile file(request_.out / "summary.json");
+    (void)file.append(text);
+    if (!file.close()) faults->push_back(file.path().string() + ": is not complete (" + std::strerror(file.fault()) + ")");
+  } catch (const InputError& e) {
+    faults->emplace_back(e.what());
+  }
+}
+
+SummaryInput Replay::summary_input(const SessionTotals& totals, std::uint64_t allocations) const {
+  SummaryInput input;
+  input.skipped = skipped_;
+  input.dropped_by_estimator = dropped_;
+  if (!truth_.empty() && !totals.trajectory.empty()) input.evaluation = evaluate(totals.trajectory, truth_, summary_evaluation_options());
+  input.calibration = estimator_->calibration();
+  input.calibration_source = sequence_.calibration_source;
+  input.allocations_after_seal = allocations;
+  input.memory = memory();
+  input.configuration_hash = configuration_hash(request_.configuration);
+  return input;
+}
+
+std::vector<std::pair<std::string, std::size_t>> Replay::memory() const {
+  return {{"estimator_bytes", estimator_arena_.capacity()},
+          {"images_bytes", frames_arena_.capacity()},
+          {"rings_bytes", sizeof(Recorder) + sizeof(FrameDecoder) + sizeof(glimpses_)}};
+}
+
+void Replay::print_memory() const {
+  std::size_t sum = 0;
+  for (const auto& [what, bytes] : memory()) {
+    std::cout << fmt::format("{:<24}{:>14}\n", what, bytes);
+    sum += bytes;
+  }
+  std::cout << fmt::format("{:<24}{:>14}\n", "sum_bytes", sum) << std::flush;
+}
+
+void Replay::tell(const SessionTotals& totals, const SummaryInput& input, Progress* progress) const {
+  const std::uint64_t posed = totals.ok + totals.degraded;
+  progress->say(
+      fmt::format("session {}: {} frames, {} posed ({} degraded), {} lost, {} skipped; {:.2f} m; {:.1f} ms a frame, {:.1f} at p99",
+                  request_.out.string(), totals.read, posed, totals.degraded, totals.lost, skipped_, totals.path_m, totals.estimate.mean(),
+                  totals.estimate.percentile(0.99)));
+  if (input.evaluation && input.evaluation->status == EvaluationStatus::ok) {
+    const TrajectoryEvaluation& e = *input.evaluation;
+    const SegmentErrors& near = e.segments[1];
+    const std::string segments = near.count > 0 ? fmt::format("; segments of 10 to 50 m {:.2f} %", 100 * near.translation) : "";
+    progress->say(fmt::format("against the reference over {:.2f} m: ATE {:.4f} m, {:.4f} m after a scale of {:.4f}{}", e.path_reference,
+                              e.ate_se3.rmse, e.ate_sim3.rmse, e.sim3.scale, segments));
+    progress->say(fmt::format("next: vergence evaluate {} {}", (request_.out / "trajectory.tum").string(), request_.data.string()));
+  } else {
+    progress->say(fmt::format("there is no reference to compare with; next: vergence evaluate {} REFERENCE",
+                              (request_.out / "trajectory.tum").string()));
+  }
+}
+
+ExitCode Replay::run() {
+  const SignalGuard signals;
+  make_session_folder(request_.out);
+  recorder_ = std::make_unique<Recorder>(request_.out, Recorder::Options{Recorder::WhenFull::wait, true, count_});
+  const Stamp first = sequence_.pairs[request_.start].stamp;
+  recorder_->post(CalibrationRecord::of(sequence_.calibration, first, true, "given", "given with the drive"));
+  std::vector<std::string> faults;
+  write_calibration_file(&faults);  // at once: a session that is killed has it, too
+  if (request_.print_memory) print_memory();
+
+  Progress progress = Progress::on_stderr(request_.quiet);
+  decoder_ = std::make_unique<FrameDecoder>(sequence_, request_.start, count_, pool_);
+  const auto allocations_before = AllocationGuard::allocations_after_seal();
+  std::thread estimating([this] { estimate(); });
+  watch(signals, &progress);
+  estimating.join();
+  decoder_.reset();
+  progress.finish();
+
+  const auto totals = recorder_->close();
+  const SummaryInput input = summary_input(*totals, AllocationGuard::allocations_after_seal() - allocations_before);
+  if (faults.empty()) write_calibration_file(&faults);
+  write_summary(*totals, input, &faults);
+  faults.insert(faults.end(), totals->faults.begin(), totals->faults.end());
+  for (const std::string& sentence : recorder_->take_complaints()) progress.say("vergence: " + sentence);
+  for (const std::string& sentence : faults) progress.say("vergence: " + sentence);
+  if (!request_.quiet) tell(*totals, input, &progress);
+
+  if (const auto stopped = signals.stop_code()) return *stopped;
+  if (totals->ok + totals->degraded == 0) {
+    progress.say("vergence: there never was a pose; events.jsonl and poses.csv in " + request_.out.string() + " say why");
+    return ExitCode::not_usable;
+  }
+  return faults.empty() ? ExitCode::done : ExitCode::not_usable;
+}
+
+/// The truth that lies with the data set, for the stamps that its frames have; empty when there is none.
+Trajectory read_reference(const ReplayRequest& request, const StereoSequence& sequence) {
+  if (request.format == SequenceFormat::folder) return {};  // its layout has no truth
+  const auto files = find_truth(request.data);
+  if (!files) return {};
+  if (files->kind != TruthFiles::Kind::kitti) return read_truth(*files);
+  std::vector<Stamp> times;
+  times.reserve(sequence.pairs.size());
+  for (const StereoPair& pair : sequence.pairs) times.push_back(pair.stamp);
+  return read_kitti(files->poses, times);
+}
+
+}  // namespace
+
+ExitCode run_replay(const ReplayRequest& request) {
+  StereoSequence sequence = open_sequence(request.format, request.data, request.calibration);
+  if (request.start >= sequence.pairs.size())
+    throw InputError(
+        fmt::format("--start {} is beyond the drive: {} has {} frames", request.start, request.data.string(), sequence.pairs.size()));
+  check_image_sizes(sequence, request.start, request.frames.value_or(sequence.pairs.size()));
+  Trajectory truth = read_reference(request, sequence);
+  std::unique_ptr<Replay> replay;
+  try {
+    replay = std::make_unique<Replay>(request, std::move(sequence), std::move(truth));
+  } catch (const std::invalid_argument& e) {  // options and rig do not go together
+    throw InputError(e.what());
+  }
+  return replay->run();
+}
+
+}  // namespace vergence::app

@@ -1,0 +1,34 @@
+#pragma once
+#include <cstddef>
+#include <filesystem>
+#include <optional>
+#include <string>
+
+#include "app/config/configuration.hpp"
+#include "app/datasets/stereo_sequence.hpp"
+#include "app/runtime/errors.hpp"
+
+namespace vergence::app {
+
+/// What a replay is to do; checked against the data by run_replay().
+struct ReplayRequest {
+  std::filesystem::path data;
+  SequenceFormat format = SequenceFormat::kitti;
+  std::filesystem::path out;
+  std::optional<std::filesystem::path> calibration;  // instead of the data set's own
+  std::size_t start = 0;                             // first frame
+  std::optional<std::size_t> frames;                 // at most so many; all when not set
+  Configuration configuration;
+  bool quiet = false;
+  bool print_memory = false;  // a table of what is held, on stdout
+};
+
+/// Reads a recorded drive, estimates a pose for every frame, writes the session folder of DESIGN §6 and the figures against the data
+/// set's truth.
+///
+/// Threads  Decoder, estimator (sealed), its worker, recorder; the caller's thread draws the progress line and watches for signals.
+/// Errors   InputError before the session folder is made, for all that can be known by then. Afterwards sentences on stderr.
+/// → done, not_usable (there never was a pose, or a file of the session is not whole), interrupted, terminated
+[[nodiscard]] ExitCode run_replay(const ReplayRequest& request);
+
+}  // namespace vergence::app
