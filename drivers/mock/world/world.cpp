@@ -2,6 +2,7 @@
 
 #include <stdexcept>
 #include <string>
+#include <utility>
 
 #include <Eigen/Geometry>
 
@@ -40,21 +41,29 @@ World::World(const WorldOptions& options) : options_(checked(options)), scene_(s
   paint_materials(options_.seed, options_.texture_detail, scene_.get());
   build_town(options_, scene_.get());
 }
+World::World(const WorldOptions& options, std::unique_ptr<Scene> scene) : options_(checked(options)), scene_(std::move(scene)) {}
 World::~World() = default;
 
 double World::ground(double x, double) const noexcept { return smooth_ground(options_.hill_deg, x); }
 double World::ground_slope(double x) const noexcept { return smooth_ground_slope(options_.hill_deg, x); }
 
-std::optional<double> World::cast(const Vec3& origin, const Vec3& direction) const noexcept {
-  std::optional<double> nearest;
-  for (const Polygon& p : scene_->polygons) {
-    const bool solid = scene_->materials[static_cast<std::size_t>(p.material)].opacity.base < 0;
-    const double approach = p.normal.dot(direction);
-    if (!solid || p.material == kClouds || approach == 0 || (approach > 0 && !p.two_sided)) continue;
-    const double t = p.normal.dot(p.corners[0] - origin) / approach;
-    if (t > 0 && (!nearest || t < *nearest) && inside(p, origin + t * direction)) nearest = t;
+std::optional<World::Hit> World::cast(const Vec3& origin, const Vec3& direction) const noexcept {
+  constexpr double kNothing = 1e300;
+  double solid = kNothing, veil = kNothing;
+  for (const Object& object : scene_->objects) {
+    const Vec3 to = object.centre - origin;
+    if (to.cross(direction).squaredNorm() > object.radius * object.radius * direction.squaredNorm()) continue;  // the ray passes by
+    for (std::size_t i = object.first; i < object.first + object.count; ++i) {
+      const Polygon& p = scene_->polygons[i];
+      const double approach = p.normal.dot(direction);
+      if (p.material == kClouds || approach == 0 || (approach > 0 && !p.two_sided)) continue;
+      double& nearest = scene_->materials[static_cast<std::size_t>(p.material)].opacity.base < 0 ? solid : veil;
+      const double t = p.normal.dot(p.corners[0] - origin) / approach;
+      if (t > 0 && t < nearest && inside(p, origin + t * direction)) nearest = t;
+    }
   }
-  return nearest;
+  if (solid == kNothing) return std::nullopt;
+  return Hit{solid, veil < solid};
 }
 
 }  // namespace vergence::mock

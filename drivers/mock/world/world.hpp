@@ -30,6 +30,8 @@ struct WorldOptions {
 class World {
  public:
   explicit World(const WorldOptions& options);
+  /// A scene made by hand instead of the town; of the options only hill_deg counts, for ground().
+  World(const WorldOptions& options, std::unique_ptr<Scene> scene);
   ~World();
 
   /// Height of the smooth ground the streets follow, m. Pavements and gardens lie kKerb above it.
@@ -37,9 +39,12 @@ class World {
   /// Derivative of ground() towards x; it does not depend on y.
   [[nodiscard]] double ground_slope(double x) const noexcept;
 
-  /// Distance in units of |direction| to the first solid surface from `origin`; nothing where there is only sky.
-  /// Plain and slow: the measure for tests.
-  [[nodiscard]] std::optional<double> cast(const Vec3& origin, const Vec3& direction) const noexcept;
+  struct Hit {
+    double distance = 0;  // in units of |direction|, to the first solid surface
+    bool veiled = false;  // leaves or another surface with holes may be in front of it
+  };
+  /// What a ray from `origin` (m) meets; nothing where there is only sky. Plain and slow: the measure for tests.
+  [[nodiscard]] std::optional<Hit> cast(const Vec3& origin, const Vec3& direction) const noexcept;
 
   [[nodiscard]] const WorldOptions& options() const noexcept { return options_; }
   [[nodiscard]] const Scene& scene() const noexcept { return *scene_; }

@@ -14,8 +14,10 @@ constexpr Tint kWarm{1.0F, 1.08F, 0.98F, 0.88F}, kGreen{1.0F, 0.86F, 1.08F, 0.70
 Canvas paint_asphalt(std::uint64_t seed, int detail) {
   Canvas c(9 + detail, 9 + detail, 16, 16, 0.30F);
   c.octaves(5.3, 4, 0.035F, 0.8F, seed);
-  c.octaves(0.4, 4, 0.035F, 1.05F, seed + 50);  // aggregate
+  c.octaves(0.4, 4, 0.045F, 1.1F, seed + 50);  // aggregate
   Random random(seed, 1);
+  for (int i = 0; i < 2600; ++i)  // stones and worn spots
+    c.disc(random.uniform(0, 16), random.uniform(0, 16), random.uniform(0.02, 0.06), static_cast<float>(random.uniform(0.10, 0.62)), 0.65F);
   for (int i = 0; i < 7; ++i) {  // mended trenches and patches with tarred rims
     const double u = random.uniform(0, 16), v = random.uniform(0, 16), a = random.uniform(0.6, 3.0), b = random.uniform(0.5, 1.6);
     const auto tone = static_cast<float>(random.uniform(0.17, 0.40));
@@ -95,19 +97,21 @@ Canvas paint_roof(std::uint64_t seed, int detail) {
   return c;
 }
 
-/// Leaves: overlapping blobs of light and shade inside a crown, holes towards its rim. (u, v) in 0..1 of the crown.
+/// Leaves in clumps, lit from above, with sky between the clumps. (u, v) in 0..1 of the crown.
 void paint_foliage(std::uint64_t seed, int detail, Canvas* brightness, Canvas* opacity) {
-  *brightness = Canvas(7 + detail, 7 + detail, 1, 1, 0.24F);
+  *brightness = Canvas(7 + detail, 7 + detail, 1, 1, 0.20F);
   *opacity = Canvas(7 + detail, 7 + detail, 1, 1, 0.0F);
   Random random(seed, 12);
-  for (int i = 0; i < 900; ++i) {
-    const double r = 0.44 * std::sqrt(random.uniform()), a = random.uniform(0, 2 * std::numbers::pi);
-    const double u = 0.5 + r * std::cos(a), v = 0.5 + 0.95 * r * std::sin(a);
-    const double size = random.uniform(0.012, 0.04);
-    // Lit from above: tops of clumps bright, undersides dark.
-    const auto tone = static_cast<float>(0.20 + 0.22 * v + random.uniform(-0.14, 0.2));
-    brightness->disc(u, v, size * 1.3, tone, 0.85F);
-    opacity->disc(u, v, size, 1.0F, 1.0F);
+  for (int clump = 0; clump < 34; ++clump) {
+    const double r = 0.33 * std::sqrt(random.uniform()), a = random.uniform(0, 2 * std::numbers::pi);
+    const double cu = 0.5 + r * std::cos(a), cv = 0.48 + r * std::sin(a), spread = random.uniform(0.035, 0.07);
+    const double lit = 0.14 + 0.16 * cv + random.uniform(-0.04, 0.08);
+    for (int leaf = 0; leaf < 75; ++leaf) {
+      const double du = spread * random.normal(), dv = 0.75 * spread * random.normal();
+      const double u = std::clamp(cu + du, 0.03, 0.97), v = std::clamp(cv + dv, 0.03, 0.97), size = random.uniform(0.006, 0.017);
+      brightness->disc(u, v, size * 1.6, static_cast<float>(lit + 1.3 * dv + random.uniform(-0.06, 0.10)), 0.85F);
+      opacity->disc(u, v, size, 1.0F);
+    }
   }
   brightness->clamp(0.04F, 0.9F);
 }
@@ -258,7 +262,7 @@ void paint_materials(std::uint64_t seed, int detail, Scene* scene) {
   p.add(paint_asphalt(s + 903, detail), kNeutral);
   p.add(paint_pavement(s + 904, detail), kWarm);
   p.add(paint_grass(s + 905, detail), kGreen);
-  p.add(paint_plain(6 + detail, 2, 0.80F, 0.05F, s + 906), kNeutral);
+  p.add(paint_plain(6 + detail, 2, 0.72F, 0.05F, s + 906), kNeutral);
   p.add(paint_plain(6 + detail, 4, 0.55F, 0.05F, s + 907), kNeutral);
   Canvas a(1, 1, 1, 1, 0), b(1, 1, 1, 1, 0);
   paint_foliage(s + 908, detail, &a, &b);
@@ -266,7 +270,7 @@ void paint_materials(std::uint64_t seed, int detail, Scene* scene) {
   p.add(paint_plain(6, 1, 0.25F, 0.06F, s + 909), kWarm);
   p.add(paint_car_side(s + 910, detail), kNeutral);
   p.add(paint_car_end(s + 911, detail), kNeutral);
-  p.add(paint_plain(6, 4, 0.62F, 0.02F, s + 912), kNeutral);
+  p.add(paint_plain(6, 4, 0.56F, 0.02F, s + 912), kNeutral);
   Canvas hedge = paint_plain(7 + detail, 4, 0.27F, 0.08F, s + 913);
   p.add(hedge, kGreen);
   p.add(paint_fence(s + 914, detail), kWarm);

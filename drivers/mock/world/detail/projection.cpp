@@ -8,10 +8,9 @@ namespace {
 
 using Bounds = RayTiles::Bounds;
 
-constexpr double kEdgeWidth = 1.25;  // px over which an edge fades: the pixel itself and the lens's blur
-constexpr double kNearest = 0.05;    // m: polygons are cut here only to find the tiles they touch
-constexpr double kSmallest = 0.35;   // px: objects with a smaller bounding radius are not drawn
-constexpr double kFlat = 1e-4;       // m: a plane nearer to the eye than this is seen edge-on
+constexpr double kNearest = 0.05;   // m: polygons are cut here only to find the tiles they touch
+constexpr double kSmallest = 0.35;  // px: objects with a smaller bounding radius are not drawn
+constexpr double kFlat = 1e-4;      // m: a plane nearer to the eye than this is seen edge-on
 
 Bounds empty() noexcept { return {1e30F, -1e30F, 1e30F, -1e30F}; }
 
@@ -149,8 +148,7 @@ bool Projection::add(const Scene& scene, const Polygon& polygon, const RayTiles&
     Vec3 m = corners[i].cross(corners[(i + 1) % count]);
     if (height < 0) m = -m;
     const double per_pixel = std::hypot(m.x() / fx, m.y() / fy);
-    out.edge[i] = floats(m / std::max(per_pixel * kEdgeWidth, 1e-9 * m.norm() + 1e-300));
-    out.edge[i][2] += 0.5F;
+    out.edge[i] = floats(m / std::max(per_pixel, 1e-9 * m.norm() + 1e-300));
   }
   const Material& material = scene.materials[static_cast<std::size_t>(polygon.material)];
   const Vec3 origin = T_camera_enu * polygon.texture_origin;
@@ -179,11 +177,11 @@ bool Projection::add(const Scene& scene, const Polygon& polygon, const RayTiles&
   }
   const auto index = static_cast<std::int32_t>(polygons_.size());
   polygons_.push_back(out);
-  bin(out, index, tiles, box);
+  bin(out, index, tiles, box, kEdgeReach * static_cast<float>(std::hypot(q.x() / fx, q.y() / fy)));
   return true;
 }
 
-void Projection::bin(const ProjectedPolygon& polygon, std::int32_t index, const RayTiles& tiles, const Bounds& box) {
+void Projection::bin(const ProjectedPolygon& polygon, std::int32_t index, const RayTiles& tiles, const Bounds& box, float slope) {
   int r0 = 0, r1 = tiles.rows - 1, c0 = 0, c1 = tiles.columns - 1;
   while (r0 <= r1 && tiles.row_bounds[static_cast<std::size_t>(r0)].y1 < box.y0) ++r0;
   while (r1 >= r0 && tiles.row_bounds[static_cast<std::size_t>(r1)].y0 > box.y1) --r1;
@@ -199,10 +197,10 @@ void Projection::bin(const ProjectedPolygon& polygon, std::int32_t index, const 
       bool inside = q.lo > 0 && polygon.opacity < 0, outside = false;
       for (const auto& edge : polygon.edge) {
         const Range e = range(edge, b);
-        outside = outside || e.hi <= 0;
-        inside = inside && e.lo >= 1;
+        outside = outside || e.hi <= -kEdgeReach;
+        inside = inside && e.lo >= kEdgeReach;
       }
-      if (!outside) candidates_[tile].push_back({index, q.hi, q.lo, inside});
+      if (!outside) candidates_[tile].push_back({index, q.hi + slope, q.lo - slope, slope, inside});
     }
 }
 

@@ -34,7 +34,7 @@ class Projection {
  private:
   [[nodiscard]] bool add(const Scene& scene, const Polygon& polygon, const RayTiles& tiles, const Camera& camera,
                          const Transform& T_camera_enu, bool bayer);
-  void bin(const ProjectedPolygon& polygon, std::int32_t index, const RayTiles& tiles, const RayTiles::Bounds& box);
+  void bin(const ProjectedPolygon& polygon, std::int32_t index, const RayTiles& tiles, const RayTiles::Bounds& box, float slope);
 
   std::vector<ProjectedPolygon> polygons_;
   std::vector<std::vector<Candidate>> candidates_;

@@ -45,7 +45,7 @@ void add_house(SceneBuilder* builder, const Lot& lot, Random* random) {
   const double floor = builder->ground(centre.x()) + kKerb, below = 0.7;  // m: into the slope
   walls.base = raised(centre, floor - below);
   walls.height = height + below;
-  const float tone = paint(random, 0.82, 1.15);
+  const float tone = paint(random, 0.78, 1.0);
   const double shift = (kFacadeWidth - 2 * half_length) * 0.5;
   builder->begin();
   const SceneBuilder::Face front{kind, tone, shift, -below}, side{kSideWall, tone, random->uniform(0, 12), -below};
@@ -66,7 +66,7 @@ void add_house(SceneBuilder* builder, const Lot& lot, Random* random) {
 }
 
 void add_garden(SceneBuilder* builder, const Lot& lot, Random* random) {
-  const double line = kRoadHalf + kPavementWidth + 0.3;
+  const double line = kRoadHalf + kPavementWidth + 0.45;
   const int kind = random->below(2) == 0 ? kHedge : kFence;
   const double height = kind == kHedge ? random->uniform(0.7, 1.3) : 1.15, half = kind == kHedge ? 0.3 : 0.04;
   const float tone = paint(random, 0.75, 1.3);
@@ -81,26 +81,26 @@ void add_garden(SceneBuilder* builder, const Lot& lot, Random* random) {
 }
 
 void add_car(SceneBuilder* builder, const Lot& lot, double along_m, Random* random) {
-  constexpr double kHalfLength = 2.1, kHalfWidth = 0.88, kClearance = 0.0, kBelt = 0.88, kTop = 1.45;
+  constexpr double kHalfLength = 2.1, kHalfWidth = 0.88, kFloor = -0.05, kBelt = 0.88, kTop = 1.45;
   const Vec2 c = lot.at(along_m, kRoadHalf - 1.1);
   const Vec2 a = random->below(2) == 0 ? lot.along : Vec2(-lot.along), n(a.y(), -a.x());
   // The car stands on the slope: its own z axis stays vertical, its floor follows the ground.
   const double slope = (builder->ground(c.x() + 0.5) - builder->ground(c.x() - 0.5)) * a.x();
-  const double ground = builder->ground(c.x()) + kClearance;
+  const double ground = builder->ground(c.x());
   const auto at = [&](double s, double t, double z) { return raised(c + s * a + t * n, ground + slope * s + z); };
-  const float tone = paint(random, 0.45, 1.45);
+  const float tone = paint(random, 0.4, 1.2);
   builder->begin();
-  builder->flat(std::array<Vec3, 4>{at(-kHalfLength, kHalfWidth, 0), at(kHalfLength, kHalfWidth, 0), at(kHalfLength, kHalfWidth, kBelt),
-                                    at(-kHalfLength, kHalfWidth, kBelt)},
+  builder->flat(std::array<Vec3, 4>{at(-kHalfLength, kHalfWidth, kFloor), at(kHalfLength, kHalfWidth, kFloor),
+                                    at(kHalfLength, kHalfWidth, kBelt), at(-kHalfLength, kHalfWidth, kBelt)},
                 {kCarSide, tone, 0, 0});
-  builder->flat(std::array<Vec3, 4>{at(kHalfLength, -kHalfWidth, 0), at(-kHalfLength, -kHalfWidth, 0), at(-kHalfLength, -kHalfWidth, kBelt),
-                                    at(kHalfLength, -kHalfWidth, kBelt)},
+  builder->flat(std::array<Vec3, 4>{at(kHalfLength, -kHalfWidth, kFloor), at(-kHalfLength, -kHalfWidth, kFloor),
+                                    at(-kHalfLength, -kHalfWidth, kBelt), at(kHalfLength, -kHalfWidth, kBelt)},
                 {kCarSide, tone, 0, 0});
-  builder->flat(std::array<Vec3, 4>{at(kHalfLength, kHalfWidth, 0), at(kHalfLength, -kHalfWidth, 0), at(kHalfLength, -kHalfWidth, kBelt),
-                                    at(kHalfLength, kHalfWidth, kBelt)},
+  builder->flat(std::array<Vec3, 4>{at(kHalfLength, kHalfWidth, kFloor), at(kHalfLength, -kHalfWidth, kFloor),
+                                    at(kHalfLength, -kHalfWidth, kBelt), at(kHalfLength, kHalfWidth, kBelt)},
                 {kCarEnd, tone, 0, 0});
-  builder->flat(std::array<Vec3, 4>{at(-kHalfLength, -kHalfWidth, 0), at(-kHalfLength, kHalfWidth, 0), at(-kHalfLength, kHalfWidth, kBelt),
-                                    at(-kHalfLength, -kHalfWidth, kBelt)},
+  builder->flat(std::array<Vec3, 4>{at(-kHalfLength, -kHalfWidth, kFloor), at(-kHalfLength, kHalfWidth, kFloor),
+                                    at(-kHalfLength, kHalfWidth, kBelt), at(-kHalfLength, -kHalfWidth, kBelt)},
                 {kCarEnd, tone, 0, 0});
   builder->flat(std::array<Vec3, 4>{at(-kHalfLength, kHalfWidth, kBelt), at(kHalfLength, kHalfWidth, kBelt),
                                     at(kHalfLength, -kHalfWidth, kBelt), at(-kHalfLength, -kHalfWidth, kBelt)},
@@ -117,8 +117,8 @@ void add_car(SceneBuilder* builder, const Lot& lot, double along_m, Random* rand
                 {kCarEnd, tone, 0, kBelt});
   builder->flat(std::array<Vec3, 4>{at(r1, w1, kTop), at(f1, w1, kTop), at(f1, -w1, kTop), at(r1, -w1, kTop)}, {kCarTop, tone, 0, 0});
   builder->picture(
-      std::array<Vec3, 4>{at(-kHalfLength - 0.35, kHalfWidth + 0.35, 0.012), at(kHalfLength + 0.35, kHalfWidth + 0.35, 0.012),
-                          at(kHalfLength + 0.35, -kHalfWidth - 0.35, 0.012), at(-kHalfLength - 0.35, -kHalfWidth - 0.35, 0.012)},
+      std::array<Vec3, 4>{at(-kHalfLength - 0.35, kHalfWidth + 0.35, 0.004), at(kHalfLength + 0.35, kHalfWidth + 0.35, 0.004),
+                          at(kHalfLength + 0.35, -kHalfWidth - 0.35, 0.004), at(-kHalfLength - 0.35, -kHalfWidth - 0.35, 0.004)},
       kShadow, 0.6F, 2 * kHalfLength + 0.7, 2 * kHalfWidth + 0.7);
   builder->end();
 }

@@ -18,7 +18,7 @@ double amplitude(double hill_deg) noexcept { return std::tan(hill_deg * std::num
 /// Sun from the north-east over an even sky; the ground receives about 1.15.
 float light_of(const Vec3& normal) noexcept {
   static const Vec3 sun = Vec3(0.40, 0.50, 0.77).normalized();
-  return static_cast<float>(0.60 + 0.75 * std::max(0.0, normal.dot(sun)));
+  return static_cast<float>(0.60 + 0.72 * std::max(0.0, normal.dot(sun)));
 }
 
 /// Keeps the part with sign · (x − cut) >= 0.

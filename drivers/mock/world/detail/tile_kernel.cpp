@@ -1,5 +1,8 @@
 #include "drivers/mock/world/detail/tile_kernel.hpp"
 
+#include <algorithm>
+#include <cstddef>
+
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "drivers/mock/world/detail/tile_kernel.cpp"
 #include "hwy/foreach_target.h"
@@ -17,16 +20,12 @@ using VF = hn::Vec<F>;
 using VI = hn::Vec<I>;
 using MF = hn::Mask<F>;
 
+constexpr float kSoftness = 0.6F;  // levels of detail coarser than one texel a pixel: what bilinear look-ups need to stay free of aliasing
 constexpr float kNegligible = 1.0F / 512.0F;  // half a grey level of a full-scale surface
 
 HWY_INLINE VF dot(const std::array<float, 3>& a, VF x, VF y) {
   const F f;
   return hn::MulAdd(hn::Set(f, a[0]), x, hn::MulAdd(hn::Set(f, a[1]), y, hn::Set(f, a[2])));
-}
-
-HWY_INLINE VF clamp01(VF v) {
-  const F f;
-  return hn::Min(hn::Max(v, hn::Zero(f)), hn::Set(f, 1.0F));
 }
 
 /// log2 of the length whose square is given: exponent plus linear mantissa, off by at most 0.043. Continuous, which is what counts.
@@ -108,8 +107,8 @@ HWY_INLINE Footprint footprint(const TileInput& in, const ProjectedPolygon& p, V
   const VF qx = hn::Set(f, p.q[0]), qy = hn::Set(f, p.q[1]);
   const VF ux = hn::Mul(sx, hn::NegMulAdd(at.u, qx, hn::Set(f, p.u[0]))), uy = hn::Mul(sy, hn::NegMulAdd(at.u, qy, hn::Set(f, p.u[1])));
   const VF vx = hn::Mul(sx, hn::NegMulAdd(at.v, qx, hn::Set(f, p.v[0]))), vy = hn::Mul(sy, hn::NegMulAdd(at.v, qy, hn::Set(f, p.v[1])));
-  at.lu = half_log2(hn::MulAdd(ux, ux, hn::Mul(uy, uy)));
-  at.lv = half_log2(hn::MulAdd(vx, vx, hn::Mul(vy, vy)));
+  at.lu = hn::Add(half_log2(hn::MulAdd(ux, ux, hn::Mul(uy, uy))), hn::Set(f, kSoftness));
+  at.lv = hn::Add(half_log2(hn::MulAdd(vx, vx, hn::Mul(vy, vy))), hn::Set(f, kSoftness));
   return at;
 }
 
@@ -158,12 +157,22 @@ HWY_INLINE void insert(Layers& l, VF q, VF c, VI p) {
   (void)step(l.q3, l.c3, l.p3);
 }
 
+/// What lies on the inner side of an edge at signed distance e (px) in a pixel blurred by two unit boxes, its own aperture
+/// and the lens: the integral of a triangle. Its samples at whole pixels add up to the exact distance, so an edge is seen
+/// where it is at every sub-pixel phase (a ramp of any other width sways by some 0.05 px).
+HWY_INLINE VF inner_part(VF e) {
+  const F f;
+  const VF one = hn::Set(f, 1.0F), half = hn::Set(f, 0.5F);
+  e = hn::Min(hn::Max(e, hn::Neg(one)), one);
+  return hn::MulAdd(e, hn::NegMulAdd(half, hn::Abs(e), one), half);
+}
+
 HWY_INLINE VF coverage(const ProjectedPolygon& p, VF x, VF y) {
   const F f;
-  const VF e0 = clamp01(dot(p.edge[0], x, y)), e1 = clamp01(dot(p.edge[1], x, y));
-  const VF e2 = clamp01(dot(p.edge[2], x, y)), e3 = clamp01(dot(p.edge[3], x, y));
+  const VF e0 = inner_part(dot(p.edge[0], x, y)), e1 = inner_part(dot(p.edge[1], x, y));
+  const VF e2 = inner_part(dot(p.edge[2], x, y)), e3 = inner_part(dot(p.edge[3], x, y));
   const VF one = hn::Set(f, 1.0F), zero = hn::Zero(f);
-  // Opposite edges: what both leave of a pixel, right also for strips thinner than a pixel.
+  // Opposite edges: what both leave of a pixel, exact for parallel ones, also for strips thinner than a pixel.
   const VF across = hn::Max(zero, hn::Sub(hn::Add(e0, e2), one)), along = hn::Max(zero, hn::Sub(hn::Add(e1, e3), one));
   return hn::Mul(across, along);
 }
@@ -175,15 +184,20 @@ HWY_INLINE void find_layers(const TileInput& in, VF x, VF y, Layers& l) {
   l.q0 = l.q1 = l.q2 = l.q3 = zero;
   l.c0 = l.c1 = l.c2 = l.c3 = zero;
   l.p0 = l.p1 = l.p2 = l.p3 = hn::Zero(i);
+  float steepest = 0;  // of the surfaces so far, inverse depth per pixel
   for (const Candidate& candidate : in.candidates) {
-    // Closed everywhere in front of all that is left: the candidates are sorted by their nearest possible point.
-    const MF closed = hn::And(hn::Ge(l.c0, hn::Set(f, 1.0F)), hn::Gt(l.q0, hn::Set(f, candidate.q_max)));
+    // Closed in front of all that is left, with room for what meets it within a pixel: candidates are sorted by their nearest
+    // possible point.
+    const MF closed = hn::And(hn::Ge(l.c0, hn::Set(f, 1.0F)), hn::Gt(l.q0, hn::Set(f, candidate.q_max + steepest)));
+    steepest = std::max(steepest, candidate.slope);
     if (hn::AllTrue(f, closed)) break;
     const ProjectedPolygon& p = in.polygons[static_cast<std::size_t>(candidate.polygon)];
     const VF q = dot(p.q, x, y);
     VF c = candidate.covers ? hn::Set(f, 1.0F) : coverage(p, x, y);
-    c = hn::IfThenElseZero(hn::Gt(q, zero), c);
-    if (!candidate.covers && hn::AllFalse(f, hn::Gt(c, hn::Set(f, kNegligible)))) continue;
+    // Lane by lane, so that a pixel does not depend on its neighbours in the packet.
+    const MF seen = hn::AndNot(closed, hn::And(hn::Gt(q, zero), hn::Gt(c, hn::Set(f, kNegligible))));
+    if (hn::AllFalse(f, seen)) continue;
+    c = hn::IfThenElseZero(seen, c);
     if (p.opacity >= 0) {
       c = hn::Mul(c, opacity(in, p, x, y, hn::Max(q, hn::Set(f, 1e-7F))));
       c = hn::IfThenElseZero(hn::Gt(c, hn::Set(f, 4 * kNegligible)), c);
@@ -191,6 +205,28 @@ HWY_INLINE void find_layers(const TileInput& in, VF x, VF y, Layers& l) {
     // A lane with no coverage carries inverse depth zero and so sinks below every surface.
     insert(l, hn::IfThenElseZero(hn::Gt(c, zero), q), c, hn::Set(i, candidate.polygon));
   }
+}
+
+/// Where two surfaces cut through each other, the pixel belongs to each on its side of the line of equal depth: what the
+/// nearer one keeps of its coverage. The difference of inverse depths is linear in the pixel, so its distance to that
+/// line is exact. Without it everything that stands on the ground would have a jagged foot.
+HWY_INLINE VF share_crossing(const TileInput& in, const Layers& l, MF close) {
+  const F f;
+  const I i;
+  const VF one = hn::Set(f, 1.0F), zero = hn::Zero(f);
+  constexpr std::int32_t kStride = sizeof(ProjectedPolygon) / sizeof(float), kSlope = offsetof(ProjectedPolygon, q) / sizeof(float);
+  const float* slopes = reinterpret_cast<const float*>(in.polygons.data());
+  const VI a = hn::Add(hn::Mul(l.p0, hn::Set(i, kStride)), hn::Set(i, kSlope)),
+           b = hn::Add(hn::Mul(l.p1, hn::Set(i, kStride)), hn::Set(i, kSlope));
+  const VI next = hn::Set(i, 1);
+  const VF dx = hn::Mul(hn::Sub(hn::GatherIndex(f, slopes, a), hn::GatherIndex(f, slopes, b)), hn::Set(f, in.pixel_x));
+  const VF dy =
+      hn::Mul(hn::Sub(hn::GatherIndex(f, slopes, hn::Add(a, next)), hn::GatherIndex(f, slopes, hn::Add(b, next))), hn::Set(f, in.pixel_y));
+  const VF per_pixel = hn::Max(hn::Sqrt(hn::MulAdd(dx, dx, hn::Mul(dy, dy))), hn::Set(f, 1e-12F));
+  const VF side = inner_part(hn::Div(hn::Sub(l.q0, l.q1), per_pixel));
+  const VF behind = hn::Min(l.c0, hn::Max(zero, hn::Sub(one, l.c1)));
+  const VF shared = hn::MulAdd(side, hn::Sub(l.c0, behind), behind);
+  return hn::IfThenElse(hn::And(close, hn::Gt(l.c1, zero)), shared, l.c0);
 }
 
 HWY_INLINE VF shade(const TileInput& in, const ProjectedPolygon& p, VF x, VF y, VF q, VF gain_pattern_even, int row_parity) {
@@ -215,6 +251,9 @@ void ShadeTile(const TileInput& in, float weight, float* out, std::ptrdiff_t out
       const VF x = hn::LoadU(f, in.ray_x + row * kTile + column), y = hn::LoadU(f, in.ray_y + row * kTile + column);
       Layers l;
       find_layers(in, x, y, l);
+      // Surfaces that meet within a pixel are not far apart in depth.
+      const MF close = hn::Gt(l.q1, hn::Mul(hn::Set(f, 0.5F), l.q0));
+      if (!hn::AllFalse(f, close)) l.c0 = share_crossing(in, l, close);
       VF sum = hn::Zero(f), covered = hn::Zero(f);
       const auto add = [&](VF q, VF c, VI p) HWY_ATTR {
         // Coverage adds up to one: surfaces that share an edge close the pixel between them, and whatever is behind an

@@ -7,12 +7,13 @@ namespace vergence::mock {
 
 inline constexpr int kTile = 16;  // px, width and height; one to four SIMD packets a row
 inline constexpr int kTilePixels = kTile * kTile;
-inline constexpr int kLayers = 4;  // surfaces kept per pixel: an edge, two leaves of a tree, what is behind
+inline constexpr float kEdgeReach = 1.0F;  // px: an edge fades over as much to each side
+inline constexpr int kLayers = 4;          // surfaces kept per pixel: an edge, two leaves of a tree, what is behind
 
 /// A polygon as one frame sees it. With d = (x, y, 1) the ray of a pixel, all linear in d:
 ///   inverse depth    1/Z = q · d          (X = Z d lies in the plane)
 ///   texture          u = (U · d)/(q · d), v likewise, texels
-///   edge i           E_i · d = signed distance to the edge in pixels over the edge's width, plus 1/2
+///   edge i           E_i · d = signed distance to the edge in pixels, inside positive
 struct ProjectedPolygon {
   std::array<std::array<float, 3>, 4> edge{};
   std::array<float, 3> q{}, u{}, v{};
@@ -25,8 +26,9 @@ struct ProjectedPolygon {
 /// A polygon that may be seen in a tile, with bounds on its inverse depth there.
 struct Candidate {
   std::int32_t polygon = 0;
-  float q_max = 0, q_min = 0;
-  bool covers = false;  // every pixel of the tile is inside and it is solid
+  float q_max = 0, q_min = 0;  // over the tile and a pixel around it
+  float slope = 0;             // of q, per pixel
+  bool covers = false;         // every pixel of the tile is inside and it is solid
 };
 
 struct TileInput {

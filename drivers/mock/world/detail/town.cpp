@@ -11,9 +11,10 @@ namespace {
 constexpr std::array<double, 3> kStreetX{0, kStreetSpacingX, 2 * kStreetSpacingX};  // x of the streets that run along y
 constexpr std::array<double, 3> kStreetY{0, kStreetSpacingY, 2 * kStreetSpacingY};  // y of the streets that run along x
 constexpr double kLot = 12.0;                                                       // m
-constexpr double kFrontDepth = 24.0;    // m of a block's corner that belong to the houses of the other street
-constexpr double kRing = 1200.0;        // m: the hills on the horizon
-constexpr double kCloudHeight = 900.0;  // m
+constexpr double kFrontDepth = 24.0;       // m of a block's corner that belong to the houses of the other street
+constexpr double kRing = 1200.0;           // m: the hills on the horizon
+constexpr double kPaintThickness = 0.001;  // m: enough to lie above the road, too little to show in a disparity
+constexpr double kCloudHeight = 900.0;     // m
 
 /// Ground between four centrelines; on the outer sides of the town there is no street.
 struct Block {
@@ -88,7 +89,7 @@ void add_roads(SceneBuilder* builder) {
 void mark(SceneBuilder* builder, const Vec2& c, const Vec2& d, double half_a, double half_b, float light) {
   const Vec2 n(-d.y(), d.x());
   const Vec2 a = half_a * d, b = half_b * n;
-  builder->ground_polygon(std::array<Vec2, 4>{c - a - b, c + a - b, c + a + b, c - a + b}, 0.006, kPaint, light);
+  builder->ground_polygon(std::array<Vec2, 4>{c - a - b, c + a - b, c + a + b, c - a + b}, kPaintThickness, kPaint, light);
 }
 
 void mark_street(SceneBuilder* builder, const Vec2& start, const Vec2& d, double length, std::span<const double> crossings,

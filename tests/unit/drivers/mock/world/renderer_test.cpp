@@ -1,0 +1,305 @@
+#include "drivers/mock/world/renderer.hpp"
+
+#include <gtest/gtest.h>
+#include <hwy/targets.h>
+
+#include <cmath>
+#include <stdexcept>
+#include <vector>
+
+#include "drivers/mock/world/detail/town.hpp"
+
+namespace vergence::mock {
+namespace {
+
+// One grey level in a picture of two levels 150 apart moves an edge by 1/150 px; rounding to 8 bits moves it by half of that
+// on each of the two pixels an edge spans.
+constexpr double kRounding = 1.0 / 150;
+
+/// A dark wall and bright plates in front of it; the camera looks along +y from the origin.
+struct Plates {
+  std::unique_ptr<Scene> scene = std::make_unique<Scene>();
+  WorldOptions options;
+  SceneBuilder builder{options, scene.get()};
+
+  Plates() {
+    for (const float value : {0.1F, 0.8F}) {
+      const Canvas c(3, 3, 1, 1, value);
+      scene->materials.push_back({scene->atlas.add(c), {}, 8, 8, {}});
+    }
+    plate(-400, 400, -400, 400, 60, 0);
+  }
+  void plate(double x0, double x1, double z0, double z1, double y, int material) {
+    builder.begin();
+    builder.picture(std::array<Vec3, 4>{Vec3(x0, y, z0), Vec3(x1, y, z0), Vec3(x1, y, z1), Vec3(x0, y, z1)}, material, 1.0F, 1, 1);
+    builder.end();
+  }
+  [[nodiscard]] std::shared_ptr<const World> world() { return std::make_shared<const World>(options, std::move(scene)); }
+};
+
+/// Camera axes in enu: right = east, down = −up, forward = north.
+Transform looking_north(const Vec3& position) {
+  Mat3 R;
+  R << 1, 0, 0, 0, 0, -1, 0, 1, 0;
+  return {R, -(R * position)};
+}
+
+Intrinsics lens(bool distorted) {
+  Intrinsics k;
+  k.width = 320;
+  k.height = 240;
+  k.fx = 290;
+  k.fy = 285;
+  k.cx = 158.3;
+  k.cy = 121.7;
+  if (distorted) k.distortion = {-0.28, 0.08, 0.0007, -0.0004, 0};
+  return k;
+}
+
+struct Picture {
+  int width = 0, height = 0;
+  std::vector<std::uint8_t> pixels;
+  [[nodiscard]] int at(int x, int y) const { return pixels[static_cast<std::size_t>(y * width + x)]; }
+};
+
+Picture take(Renderer* renderer, const Transform& T_camera_enu, const Shot& shot) {
+  const Intrinsics& k = renderer->camera().intrinsics();
+  Picture p{k.width, k.height, std::vector<std::uint8_t>(static_cast<std::size_t>(k.width * k.height))};
+  renderer->render(T_camera_enu, shot, p.pixels.data(), k.width);
+  return p;
+}
+
+Shot clean() {
+  Shot s;
+  s.vignetting = 0;
+  return s;
+}
+
+/// Where the brightness from x0 to x1 of a row steps between `left` and `right`: the edge that would give this sum.
+double edge_position(const Picture& p, int y, int x0, int x1, double left, double right) {
+  double sum = 0;
+  for (int x = x0; x < x1; ++x) sum += (p.at(x, y) - right) / (left - right);
+  return x0 - 0.5 + sum;
+}
+
+TEST(Renderer, edgesAppearWhereTheLensModelPutsThem) {
+  for (const bool distorted : {false, true}) {
+    Plates scene;
+    scene.plate(-1.2, 1.7, -1.1, 1.4, 6.0, 1);
+    const Camera camera(lens(distorted));
+    Renderer renderer(scene.world(), camera);
+    for (double shift = 0; shift < 0.03; shift += 0.0041) {  // a pixel at 6 m is 0.02 m: every sub-pixel phase
+      const Transform T_camera_enu = looking_north({shift, 0, 0});
+      const Picture p = take(&renderer, T_camera_enu, clean());
+      const double dark = p.at(2, 120), bright = p.at(160, 120);
+      ASSERT_GT(bright - dark, 150);
+      for (const double plate_x : {-1.2, 1.7}) {
+        for (int y = 90; y < 160; y += 7) {
+          // The height on the plate's vertical border that this row sees, by bisection on the model's projection.
+          double lo = -1.1, hi = 1.4;
+          Vec2 pixel(0, 0);
+          for (int i = 0; i < 60; ++i) {
+            const double mid = 0.5 * (lo + hi);
+            ASSERT_EQ(camera.project(T_camera_enu * Vec3(plate_x, 6.0, mid), &pixel, nullptr), ProjectStatus::ok);
+            (pixel.y() > y ? lo : hi) = mid;
+          }
+          const int x = static_cast<int>(pixel.x());
+          const double measured =
+              plate_x < 0 ? edge_position(p, y, x - 5, x + 6, dark, bright) : edge_position(p, y, x - 5, x + 6, bright, dark);
+          // A ray at a pixel's centre stands for the pixel: exact for an undistorted straight edge, and under distortion up
+          // to the change of the local scale across the ramp, some 1e-3 px.
+          EXPECT_NEAR(measured, pixel.x(), kRounding + 3e-3) << "row " << y << (distorted ? " distorted" : "");
+        }
+      }
+    }
+  }
+}
+
+TEST(Renderer, stripThinnerThanAPixelKeepsItsArea) {
+  Plates scene;
+  const double width = 0.3 * 8.0 / 290;  // 0.3 px at 8 m
+  scene.plate(0, width, -3, 3, 8.0, 1);
+  scene.plate(-2, -0.5, -3, 3, 8.0, 1);  // wide, for the brightness of its like
+  Renderer renderer(scene.world(), Camera(lens(false)));
+  for (double shift = 0; shift < 0.03; shift += 0.0037) {
+    const Picture p = take(&renderer, looking_north({shift, 0, 0}), clean());
+    const double step = p.at(110, 120) - p.at(2, 120);
+    ASSERT_GT(step, 150);
+    double sum = 0;
+    for (int x = 150; x < 180; ++x) sum += p.at(x, 120) - p.at(2, 120);
+    EXPECT_NEAR(sum, 0.3 * step, 2.0) << shift;  // three pixels and the step are rounded
+  }
+}
+
+TEST(Renderer, surfacesThatShareAnEdgeLeaveNoSeam) {
+  Plates scene;
+  scene.plate(-2, 0.1234, -2, 2, 6.0, 1);
+  scene.plate(0.1234, 2, -2, 2, 6.0, 1);
+  Renderer renderer(scene.world(), Camera(lens(true)));
+  const Picture p = take(&renderer, looking_north({0, 0, 0}), clean());
+  for (int y = 80; y < 160; ++y)
+    for (int x = 120; x < 200; ++x) EXPECT_NEAR(p.at(x, y), p.at(120, 80), 1) << x << ' ' << y;
+}
+
+TEST(Renderer, surfacesThatCutThroughEachOtherMeetInASmoothLine) {
+  Plates scene;
+  // A bright wall across the view, a dark one that turns from before it to behind it, 0.6 m deep over 4 m of width.
+  scene.plate(-4, 4, -4, 4, 6.0, 1);
+  scene.builder.begin();
+  scene.builder.picture(std::array<Vec3, 4>{Vec3(-2, 5.7, -4), Vec3(2, 6.3, -4), Vec3(2.4, 6.3, 4), Vec3(-1.6, 5.7, 4)}, 0, 1.0F, 1, 1);
+  scene.builder.end();
+  const Camera camera(lens(false));
+  Renderer renderer(scene.world(), camera);
+  const Transform T_camera_enu = looking_north({0, 0, 0});
+  const Picture p = take(&renderer, T_camera_enu, clean());
+  for (int y = 60; y < 180; ++y) {
+    double lo = -3, hi = 3;  // both walls meet on the line x = 0.2 + 0.05 z at y = 6
+    Vec2 pixel(0, 0);
+    for (int i = 0; i < 60; ++i) {
+      const double mid = 0.5 * (lo + hi);
+      ASSERT_EQ(camera.project(T_camera_enu * Vec3(0.2 + 0.05 * mid, 6.0, mid), &pixel, nullptr), ProjectStatus::ok);
+      (pixel.y() > y ? lo : hi) = mid;
+    }
+    const int x = static_cast<int>(pixel.x());
+    EXPECT_NEAR(edge_position(p, y, x - 5, x + 6, p.at(x - 5, y), p.at(x + 5, y)), pixel.x(), kRounding + 3e-3) << y;
+  }
+}
+
+TEST(Renderer, exposureScalesAndCoveredLensIsBlack) {
+  Plates scene;
+  Renderer renderer(scene.world(), Camera(lens(false)));
+  Shot shot = clean();
+  const int nominal = take(&renderer, looking_north({0, 0, 0}), shot).at(100, 100);
+  shot.exposure = 3;
+  EXPECT_NEAR(take(&renderer, looking_north({0, 0, 0}), shot).at(100, 100), 3 * nominal, 2);
+  shot.exposure = 100;
+  EXPECT_EQ(take(&renderer, looking_north({0, 0, 0}), shot).at(100, 100), 255);
+  shot.exposure = 0;
+  EXPECT_EQ(take(&renderer, looking_north({0, 0, 0}), shot).at(100, 100), 0);
+}
+
+TEST(Renderer, vignettingFollowsItsLaw) {
+  Plates scene;
+  scene.plate(-100, 100, -100, 100, 6.0, 1);
+  const Camera camera(lens(false));
+  Renderer renderer(scene.world(), camera);
+  Shot shot;
+  shot.vignetting = 1.0;
+  const Picture p = take(&renderer, looking_north({0, 0, 0}), shot);
+  for (const auto& [x, y] : {std::pair{158, 122}, std::pair{0, 0}, std::pair{319, 239}, std::pair{300, 20}}) {
+    Vec3 ray;
+    ASSERT_TRUE(camera.unproject({x, y}, &ray));
+    EXPECT_NEAR(p.at(x, y), p.at(158, 122) * std::pow(1 / ray.norm(), 4), 1.01);  // cos⁴ of the angle to the axis
+  }
+}
+
+TEST(Renderer, noiseHasTheStatedVarianceAndItsOwnSeed) {
+  Plates scene;
+  scene.plate(-100, 100, -100, 100, 6.0, 1);
+  Renderer renderer(scene.world(), Camera(lens(false)));
+  const Transform T = looking_north({0, 0, 0});
+  Shot shot = clean();
+  shot.shot_noise = 0.03;
+  shot.read_noise = 1.5;
+  shot.noise_seed = 7;
+  const Picture a = take(&renderer, T, shot), again = take(&renderer, T, shot);
+  EXPECT_EQ(a.pixels, again.pixels);
+  shot.noise_seed = 8;
+  const Picture b = take(&renderer, T, shot);
+  double mean = 0, difference2 = 0, product = 0;
+  const double n = static_cast<double>(a.pixels.size());
+  for (const std::uint8_t v : a.pixels) mean += v / n;
+  for (std::size_t i = 0; i < a.pixels.size(); ++i) {
+    difference2 += std::pow(a.pixels[i] - b.pixels[i], 2) / n;
+    product += (a.pixels[i] - mean) * (b.pixels[i] - mean) / n;
+  }
+  const double variance = shot.shot_noise * mean + shot.read_noise * shot.read_noise + 1.0 / 12;  // the last from rounding
+  // Standard errors over n pixels: of a variance √(2/n), of a product √(1/n) of the variance; four of them.
+  EXPECT_NEAR(0.5 * difference2, variance, 4 * std::sqrt(2 / n) * variance + 0.01 * variance);
+  EXPECT_NEAR(product, 0, 4 * std::sqrt(1 / n) * variance);
+  EXPECT_NEAR(mean, 0.8 * 255, 0.1);
+}
+
+TEST(Renderer, severalPosesAreTheirMean) {
+  Plates scene;
+  scene.plate(-1.2, 1.7, -1.1, 1.4, 6.0, 1);
+  Renderer renderer(scene.world(), Camera(lens(true)));
+  const std::array<Transform, 3> way{looking_north({0, 0, 0}), looking_north({0.05, 0, 0}), looking_north({0.1, 0, 0})};
+  Picture blurred{320, 240, std::vector<std::uint8_t>(320 * 240)};
+  renderer.render(way, clean(), blurred.pixels.data(), 320);
+  std::vector<Picture> sharp;
+  for (const Transform& T : way) sharp.push_back(take(&renderer, T, clean()));
+  for (std::size_t i = 0; i < blurred.pixels.size(); ++i)
+    EXPECT_NEAR(blurred.pixels[i], (sharp[0].pixels[i] + sharp[1].pixels[i] + sharp[2].pixels[i]) / 3.0, 1.01);
+}
+
+TEST(Renderer, everyTargetDrawsTheSamePicture) {
+  Plates scene;
+  scene.plate(-1.2, 1.7, -1.1, 1.4, 6.0, 1);
+  const auto town = std::make_shared<const World>(WorldOptions{.seed = 5, .texture_detail = 0});
+  const Transform T_town = looking_north({-1.9, 60, town->ground(-1.9, 60) + 1.7});
+  Shot noisy;
+  noisy.noise_seed = 3;
+  Renderer renderer(town, Camera(lens(true)));
+  const auto targets = hwy::SupportedAndGeneratedTargets();
+  ASSERT_FALSE(targets.empty());
+  Picture first;
+  for (const std::int64_t target : targets) {
+    hwy::SetSupportedTargetsForTest(target);
+    hwy::GetChosenTarget().Update(hwy::SupportedTargets());
+    const Picture p = take(&renderer, T_town, noisy);
+    if (first.pixels.empty()) first = p;
+    // Fused or not, a product rounds differently in the last bit: a grey value may round to its neighbour, and where two
+    // surfaces are equally deep the order may change, whose pixels are shared by both to within the rounding.
+    int differing = 0;
+    for (std::size_t i = 0; i < p.pixels.size(); ++i) {
+      const int d = std::abs(p.pixels[i] - first.pixels[i]);
+      EXPECT_LE(d, 2) << hwy::TargetName(target) << " pixel " << i;
+      differing += d > 0;
+    }
+    EXPECT_LT(differing, static_cast<int>(p.pixels.size() / 200)) << hwy::TargetName(target);
+  }
+  hwy::SetSupportedTargetsForTest(0);
+  hwy::GetChosenTarget().Update(hwy::SupportedTargets());
+}
+
+TEST(Renderer, oddSizesAndStridesStayInsideTheirRows) {
+  Plates scene;
+  Intrinsics k = lens(true);
+  k.width = 53;
+  k.height = 37;
+  k.cx = 26;
+  k.cy = 18;
+  Renderer renderer(scene.world(), Camera(k));
+  constexpr int kStride = 61;
+  std::vector<std::uint8_t> memory(kStride * 38, 7);
+  renderer.render(looking_north({0, 0, 0}), clean(), memory.data(), kStride);
+  for (int y = 0; y < 38; ++y)
+    for (int x = 0; x < kStride; ++x) {
+      if (y < 37 && x < 53)
+        EXPECT_GT(memory[static_cast<std::size_t>(y * kStride + x)], 20);
+      else
+        EXPECT_EQ(memory[static_cast<std::size_t>(y * kStride + x)], 7);
+    }
+}
+
+TEST(Renderer, bayerPatternFollowsTheTint) {
+  Plates scene;
+  scene.scene->materials[0].tint = {1.0F, 0.5F, 1.0F, 1.5F};
+  Renderer renderer(scene.world(), Camera(lens(false)), Pattern::gbrg);
+  const Picture p = take(&renderer, looking_north({0, 0, 0}), Shot{.exposure = 4, .vignetting = 0});
+  const int green = p.at(100, 100);
+  EXPECT_EQ(p.at(101, 101), green);
+  EXPECT_NEAR(p.at(101, 100) / static_cast<double>(green), 1.5, 0.3);  // haze has no colour
+  EXPECT_NEAR(p.at(100, 101) / static_cast<double>(green), 0.5, 0.3);
+  EXPECT_GT(p.at(101, 100), green);
+  EXPECT_LT(p.at(100, 101), green);
+}
+
+TEST(Renderer, refusesACameraWithoutSize) {
+  Plates scene;
+  EXPECT_THROW(Renderer(scene.world(), Camera(Intrinsics{})), std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace vergence::mock
