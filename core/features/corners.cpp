@@ -51,38 +51,51 @@ bool crowded(const Corner& c, std::span<const Corner> others, float distance) no
   });
 }
 
-}  // namespace
-
-void find_corners(const ImageView& image, const CornerOptions& options, std::span<const Corner> taken, BoundedVector<Corner>* out) noexcept {
-  out->clear();
-  const int cell = std::clamp(options.cell, 8, kMaxCell);
-  const Grid grid{cell, (image.width + cell - 1) / cell, (image.height + cell - 1) / cell};
-  if (image.empty() || grid.columns * grid.rows > kMaxGridCells) return;
-  std::array<bool, kMaxGridCells> occupied{};
-  for (const Corner& c : taken) occupied[static_cast<std::size_t>(grid.index(c.x, c.y))] = true;
-
+/// The best corner of each free cell in rows [first, last) of the grid, at found[cell]; score 0 where there is none.
+void scan_rows(const ImageView& image, const CornerOptions& options, const Grid& grid, const bool* occupied, int first, int last,
+               Corner* found) noexcept {
   alignas(64) std::array<float, detail::kMaxBlock * detail::kMaxBlock> score;
-  std::array<Corner, kMaxGridCells> found;
-  std::size_t n = 0;
   const int low = std::max(options.border, detail::kTensorRadius + 2);
-  for (int r = 0; r < grid.rows; ++r) {
+  for (int r = first; r < last; ++r) {
     for (int c = 0; c < grid.columns; ++c) {
-      if (occupied[static_cast<std::size_t>(r * grid.columns + c)]) continue;
-      const int x0 = std::max(c * cell, low) - 1, y0 = std::max(r * cell, low) - 1;
-      const int x1 = std::min((c + 1) * cell, image.width - std::max(low, kRightMargin)) + 1;
-      const int y1 = std::min((r + 1) * cell, image.height - low) + 1;
+      const int cell = r * grid.columns + c;
+      found[cell] = {};
+      if (occupied[cell]) continue;
+      const int x0 = std::max(c * grid.cell, low) - 1, y0 = std::max(r * grid.cell, low) - 1;
+      const int x1 = std::min((c + 1) * grid.cell, image.width - std::max(low, kRightMargin)) + 1;
+      const int y1 = std::min((r + 1) * grid.cell, image.height - low) + 1;
       if (x1 - x0 < 4 || y1 - y0 < 4) continue;
       detail::corner_scores(image, x0, y0, x1 - x0, y1 - y0, score.data());
       Corner best = best_of(score.data(), x1 - x0, y1 - y0);
       if (!(best.score > options.min_score)) continue;
       best.x += static_cast<float>(x0);
       best.y += static_cast<float>(y0);
-      found[n++] = best;
+      found[cell] = best;
     }
   }
-  std::sort(found.begin(), found.begin() + static_cast<std::ptrdiff_t>(n), stronger);
-  for (std::size_t i = 0; i < n && !out->full(); ++i)
-    if (!crowded(found[i], taken, options.min_distance) && !crowded(found[i], out->span(), options.min_distance)) (void)out->push(found[i]);
+}
+
+}  // namespace
+
+void find_corners(const ImageView& image, const CornerOptions& options, std::span<const Corner> taken, PairRunner& runner,
+                  BoundedVector<Corner>* out) noexcept {
+  out->clear();
+  const int cell = std::clamp(options.cell, 8, kMaxCell);
+  const Grid grid{cell, (image.width + cell - 1) / cell, (image.height + cell - 1) / cell};
+  const int cells = grid.columns * grid.rows;
+  if (image.empty() || cells > kMaxGridCells) return;
+  std::array<bool, kMaxGridCells> occupied{};
+  for (const Corner& c : taken) occupied[static_cast<std::size_t>(grid.index(c.x, c.y))] = true;
+
+  std::array<Corner, kMaxGridCells> found;
+  auto upper = [&]() noexcept { scan_rows(image, options, grid, occupied.data(), 0, grid.rows / 2, found.data()); };
+  auto lower = [&]() noexcept { scan_rows(image, options, grid, occupied.data(), grid.rows / 2, grid.rows, found.data()); };
+  runner.run(TaskRef(upper), TaskRef(lower));
+
+  const auto end = std::remove_if(found.begin(), found.begin() + cells, [](const Corner& c) { return !(c.score > 0.F); });
+  std::sort(found.begin(), end, stronger);
+  for (auto it = found.begin(); it != end && !out->full(); ++it)
+    if (!crowded(*it, taken, options.min_distance) && !crowded(*it, out->span(), options.min_distance)) (void)out->push(*it);
 }
 
 }  // namespace vergence::features

@@ -3,6 +3,7 @@
 
 #include "core/memory/fixed_vector.hpp"
 #include "core/types/image.hpp"
+#include "core/types/parallel.hpp"
 
 namespace vergence::features {
 
@@ -24,7 +25,9 @@ inline constexpr int kMaxGridCells = 4096;   // of an image
 
 /// The strongest corner of every grid cell that holds none of `taken`, strongest first, as many as `out` has room for.
 ///
-/// Memory  On the stack, bounded by kMaxCell. Cells whose corner finds no room are dropped, weakest first.
-void find_corners(const ImageView& image, const CornerOptions& options, std::span<const Corner> taken, BoundedVector<Corner>* out) noexcept;
+/// Threads  The runner takes the lower half of the grid to its other side; the result does not depend on it.
+/// Memory   On the stacks, bounded by kMaxCell and kMaxGridCells. Corners that find no room are dropped, weakest first.
+void find_corners(const ImageView& image, const CornerOptions& options, std::span<const Corner> taken, PairRunner& runner,
+                  BoundedVector<Corner>* out) noexcept;
 
 }  // namespace vergence::features

@@ -56,7 +56,7 @@ LevelOutcome align_level(const detail::Window& w, const ImageView& image, float 
     const float gain = std::max(s.value / w.variance_sum, 0.3F * std::sqrt(std::max(image_variance, 0.F) / w.variance_sum) + 1e-3F);
     float dx = (ixx * s.steep_x + ixy * s.steep_y) / gain;
     float dy = (ixy * s.steep_x + iyy * s.steep_y) / gain;
-    const float length = std::hypot(dx, dy);
+    const float length = std::sqrt(dx * dx + dy * dy);
     constexpr float kMaxStep = 3.F;  // px of the level: beyond it the linear model says nothing
     if (length > kMaxStep) {
       dx *= kMaxStep / length;
@@ -64,7 +64,8 @@ LevelOutcome align_level(const detail::Window& w, const ImageView& image, float 
     }
     out.x -= dx;
     out.y -= dy;
-    if (std::hypot(out.x - start_x, out.y - start_y) > max_shift) return out;
+    const float moved_x = out.x - start_x, moved_y = out.y - start_y;
+    if (!(moved_x * moved_x + moved_y * moved_y <= max_shift * max_shift)) return out;
     if (length < kSettled) {
       out.status = AlignStatus::ok;
       return out;

@@ -9,14 +9,15 @@ namespace vergence::features {
 
 inline constexpr int kPatchLevels = 4;   // pyramid levels a patch is kept at
 inline constexpr int kPatchSide = 28;    // px kept a side: the window turned by 45° or seen 1.5 times smaller still lies inside
-inline constexpr int kWindow = 14;       // px aligned a side
+inline constexpr int kPatchBytes = kPatchSide * kPatchSide + 16;  // room for vector loads behind the last pixel
+inline constexpr int kWindow = 12;       // px aligned a side
 inline constexpr int kWindowStride = 16; // floats a row of the window in memory
 
 /// What a point looked like where it was first seen: the pixels about it at several levels.
 /// Its anchor is the pixel (x, y) of level 0 it was cut at; at level l the patch's middle pixel is the anchor's nearest,
 /// and `offset` says where in that pixel the anchor lies, so that no level moves it.
 struct Patch {
-  std::array<std::array<std::uint8_t, kPatchSide * kPatchSide>, kPatchLevels> pixels;
+  std::array<std::array<std::uint8_t, kPatchBytes>, kPatchLevels> pixels;
   std::array<Eigen::Vector2f, kPatchLevels> offset;  // px of the level, |·| ≤ 0.5
   std::uint8_t levels = 0;                           // how many levels lay inside the image
 };

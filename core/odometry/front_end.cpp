@@ -234,7 +234,7 @@ AcrossCount FrontEnd::add_points(Map& map, const Transform& T_left_world, PointS
   corner_options.cell = options_.cell_px;
   corner_options.min_score = static_cast<float>(options_.min_corner_score);
   corner_options.min_distance = 0.4F * static_cast<float>(options_.cell_px);
-  features::find_corners(pyramids_[0].level(0), corner_options, taken_.span(), &corners_);
+  features::find_corners(pyramids_[0].level(0), corner_options, taken_.span(), runner_, &corners_);
   const auto room = static_cast<std::size_t>(std::max(0, options_.features - static_cast<int>(taken_.size())));
   if (corners_.size() > room) corners_.truncate(room);
   detect_ms_ = milliseconds_since(start);

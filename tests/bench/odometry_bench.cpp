@@ -129,6 +129,16 @@ Replay replay(const DecodedDrive& d, const app::Configuration& configuration, in
   return r;
 }
 
+void write_tum(const std::string& file, const std::vector<StampedPose>& poses) {
+  std::ofstream out(file);
+  for (const StampedPose& p : poses) {
+    const Eigen::Quaterniond q = quaternion(p.T_world_body.R);
+    const Vec3& t = p.T_world_body.t;
+    out << fmt::format("{}.{:09} {:.9f} {:.9f} {:.9f} {:.9f} {:.9f} {:.9f} {:.9f}\n", p.stamp.ns() / 1'000'000'000, p.stamp.ns() % 1'000'000'000,
+                       t.x(), t.y(), t.z(), q.x(), q.y(), q.z(), q.w());
+  }
+}
+
 double yardstick_ms(const DecodedDrive& euroc) {
   const int threads = cv::getNumThreads();
   cv::setNumThreads(1);
@@ -156,7 +166,10 @@ nlohmann::json measure(const Excerpt& excerpt, const DecodedDrive& drive, const 
   for (int i = 0; i < arguments.repeats; ++i) {
     std::FILE* frames = i == 0 && !arguments.frames.empty() ? std::fopen((arguments.frames + "." + excerpt.name + ".csv").c_str(), "w") : nullptr;
     last = replay(drive, configuration, arguments.threads, frames);
-    if (frames != nullptr) std::fclose(frames);
+    if (frames != nullptr) {
+      std::fclose(frames);
+      write_tum(arguments.frames + "." + excerpt.name + ".tum", last.poses);
+    }
     pooled.insert(pooled.end(), last.milliseconds.begin(), last.milliseconds.end());
     means.push_back(static_cast<float>(mean(last.milliseconds)));
   }

@@ -14,31 +14,47 @@ namespace hn = hwy::HWY_NAMESPACE;
 using Tag = hn::CappedTag<float, kWindowStride>;
 constexpr int kRows = kWindow + 2;  // with a border of one pixel for the gradients
 
-/// Bilinear samples of the patch on the turned grid: kRows × kWindowStride, of which kWindow + 2 columns count.
+/// Bilinear samples of the patch on the turned grid: kRows × (kWindowStride + 2), of which kRows columns count.
 void sample_patch(const std::uint8_t* patch, float cx, float cy, const float B[4], float* out) {
-  const float half = 0.5F * static_cast<float>(kRows - 1);
-  constexpr float kLast = kPatchSide - 1.001F;
-  for (int r = 0; r < kRows; ++r) {
-    const float dy = static_cast<float>(r) - half;
-    for (int c = 0; c < kRows; ++c) {
-      const float dx = static_cast<float>(c) - half;
-      float x = cx + B[0] * dx + B[1] * dy, y = cy + B[2] * dx + B[3] * dy;
-      x = x < 0.F ? 0.F : (x > kLast ? kLast : x);
-      y = y < 0.F ? 0.F : (y > kLast ? kLast : y);
-      const int ix = static_cast<int>(x), iy = static_cast<int>(y);
-      const float fx = x - static_cast<float>(ix), fy = y - static_cast<float>(iy);
-      const std::uint8_t* p = patch + iy * kPatchSide + ix;
-      const float top = static_cast<float>(p[0]) + fx * static_cast<float>(p[1] - p[0]);
-      const float bottom = static_cast<float>(p[kPatchSide]) + fx * static_cast<float>(p[kPatchSide + 1] - p[kPatchSide]);
-      out[r * (kWindowStride + 2) + c] = top + fy * (bottom - top);
+  const Tag d;
+  const hn::RebindToSigned<Tag> d32;
+  const int lanes = static_cast<int>(hn::Lanes(d));
+  constexpr float kHalf = 0.5F * static_cast<float>(kRows - 1);
+  const auto zero = hn::Zero(d), last = hn::Set(d, kPatchSide - 1.001F);
+  const auto byte = hn::Set(d32, 0xFF);
+  // Four bytes at once: the two neighbours in x are the lower ones. kPatchBytes leaves room behind the last pixel.
+  const auto* base = reinterpret_cast<const std::int32_t*>(patch);
+  for (int c = 0; c < kWindowStride; c += lanes) {
+    const auto dx = hn::Add(hn::Iota(d, 0.F), hn::Set(d, static_cast<float>(c) - kHalf));
+    const auto x_row = hn::MulAdd(hn::Set(d, B[0]), dx, hn::Set(d, cx));
+    const auto y_row = hn::MulAdd(hn::Set(d, B[2]), dx, hn::Set(d, cy));
+    for (int r = 0; r < kRows; ++r) {
+      const auto dy = hn::Set(d, static_cast<float>(r) - kHalf);
+      const auto x = hn::Min(hn::Max(hn::MulAdd(hn::Set(d, B[1]), dy, x_row), zero), last);
+      const auto y = hn::Min(hn::Max(hn::MulAdd(hn::Set(d, B[3]), dy, y_row), zero), last);
+      const auto ix = hn::ConvertTo(d32, x), iy = hn::ConvertTo(d32, y);
+      const auto fx = hn::Sub(x, hn::ConvertTo(d, ix)), fy = hn::Sub(y, hn::ConvertTo(d, iy));
+      static_assert(kPatchSide == 28, "28 y = 32 y - 4 y");
+      const auto offset = hn::Add(hn::Sub(hn::ShiftLeft<5>(iy), hn::ShiftLeft<2>(iy)), ix);
+      const auto upper = hn::GatherOffset(d32, base, offset);
+      const auto lower = hn::GatherOffset(d32, base, hn::Add(offset, hn::Set(d32, kPatchSide)));
+      const auto lerped = [&](hn::Vec<decltype(d32)> four) {
+        const auto a = hn::ConvertTo(d, hn::And(four, byte));
+        const auto b = hn::ConvertTo(d, hn::And(hn::ShiftRight<8>(four), byte));
+        return hn::MulAdd(fx, hn::Sub(b, a), a);
+      };
+      const auto top = lerped(upper), bottom = lerped(lower);
+      hn::StoreU(hn::MulAdd(fy, hn::Sub(bottom, top), top), d, out + r * (kWindowStride + 2) + c);
     }
   }
 }
 
 void MakeWindow(const std::uint8_t* patch, float cx, float cy, const float B[4], Window* w) {
-  static_assert(kRows <= kWindowStride + 2);
+  static_assert(kRows <= kWindowStride);
   constexpr int kStride = kWindowStride + 2;
-  HWY_ALIGN float t[kRows * kStride] = {};
+  HWY_ALIGN float t[kRows * kStride + kWindowStride];
+  for (int i = kRows * kStride; i < kRows * kStride + kWindowStride; ++i) t[i] = 0.F;
+  for (int r = 0; r < kRows; ++r) t[r * kStride + kWindowStride] = t[r * kStride + kWindowStride + 1] = 0.F;
   sample_patch(patch, cx, cy, B, t);
   const Tag d;
   const int lanes = static_cast<int>(hn::Lanes(d));

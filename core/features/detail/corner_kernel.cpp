@@ -41,18 +41,24 @@ void CornerScores(const ImageView& image, int x0, int y0, int w, int h, float* s
   // A ring of rows: the products of the seven image rows under the window.
   HWY_ALIGN float ring[kWindowSide][3][kColumns];
   HWY_ALIGN float column_sum[3][kColumns];
-  for (int r = 0; r < kWindowSide - 1; ++r)
-    gradient_products(image, x0 - kTensorRadius, y0 - kTensorRadius + r, columns, ring[r][0], ring[r][1], ring[r][2]);
-  for (int y = 0; y < h; ++y) {
-    float(*newest)[kColumns] = ring[(y + kWindowSide - 1) % kWindowSide];
-    gradient_products(image, x0 - kTensorRadius, y0 + y + kTensorRadius, columns, newest[0], newest[1], newest[2]);
+  for (int p = 0; p < 3; ++p)
+    for (int i = 0; i < columns; i += lanes) hn::StoreU(hn::Zero(d), d, column_sum[p] + i);
+  HWY_ALIGN float newest[3][kColumns];
+  for (int row = 0; row < h + kWindowSide - 1; ++row) {
+    float(*oldest)[kColumns] = ring[row % kWindowSide];
+    gradient_products(image, x0 - kTensorRadius, y0 - kTensorRadius + row, columns, newest[0], newest[1], newest[2]);
+    // Sums of quarters below 2²⁴ quarters: exact in float, so adding the new row and taking the old one away leaves no error.
     for (int p = 0; p < 3; ++p) {
       for (int i = 0; i < columns; i += lanes) {
-        auto s = hn::LoadU(d, ring[0][p] + i);
-        for (int r = 1; r < kWindowSide; ++r) s = hn::Add(s, hn::LoadU(d, ring[r][p] + i));
+        const auto in = hn::LoadU(d, newest[p] + i);
+        auto s = hn::Add(hn::LoadU(d, column_sum[p] + i), in);
+        if (row >= kWindowSide) s = hn::Sub(s, hn::LoadU(d, oldest[p] + i));
         hn::StoreU(s, d, column_sum[p] + i);
+        hn::StoreU(in, d, oldest[p] + i);
       }
     }
+    const int y = row - (kWindowSide - 1);
+    if (y < 0) continue;
     const auto scale = hn::Set(d, 1.F / (kWindowSide * kWindowSide));
     const auto half = hn::Set(d, 0.5F);
     for (int x = 0; x < w; x += lanes) {
