@@ -35,6 +35,37 @@ struct YBlock {
   std::int32_t row;    // in A
 };
 
+#if HWY_TARGET == HWY_SCALAR
+
+/// at[0] −= x, at[1] −= y.
+HWY_INLINE void subtract_sums(V x, V y, double* at) {
+  at[0] -= hn::GetLane(x);
+  at[1] -= hn::GetLane(y);
+}
+
+#else
+
+/// Folds a vector of pairs (x, y, x, y, …) to one pair.
+template <class DPairs>
+HWY_INLINE hn::Vec<hn::FixedTag<double, 2> > fold_pairs(DPairs d, hn::Vec<DPairs> v) {
+  if constexpr (sizeof(hn::Vec<DPairs>) > 2 * sizeof(double)) {
+    const hn::Half<DPairs> half;
+    return fold_pairs(half, hn::Add(hn::LowerHalf(half, v), hn::UpperHalf(half, v)));
+  } else {
+    return v;
+  }
+}
+
+/// at[0] −= Σ x, at[1] −= Σ y.
+HWY_INLINE void subtract_sums(V x, V y, double* at) {
+  const D d;
+  const hn::FixedTag<double, 2> pair;
+  const V both = hn::Add(hn::InterleaveLower(d, x, y), hn::InterleaveUpper(d, x, y));
+  hn::StoreU(hn::Sub(hn::LoadU(pair, at), fold_pairs(d, both)), pair, at);
+}
+
+#endif
+
 /// A[a, b] −= Σ Y_a Y_bᵀ over `count` batches; rows row0 … row0 + kTileRows, columns col0 … col0 + 3 of the block.
 HWY_INLINE void tile(const YBlock& a, const YBlock& b, std::size_t count, int row0, int col0, double* HWY_RESTRICT A, std::size_t ld) {
   const D d;
@@ -55,11 +86,12 @@ HWY_INLINE void tile(const YBlock& a, const YBlock& b, std::size_t count, int ro
     }
   }
   double* at = A + static_cast<std::size_t>(b.row + col0) * ld + static_cast<std::size_t>(a.row + row0);
-#pragma GCC unroll 6
-  for (int r = 0; r < kTileRows; ++r)
 #pragma GCC unroll 3
-    for (int c = 0; c < 3; ++c)
-      at[static_cast<std::size_t>(c) * ld + static_cast<std::size_t>(r)] -= hn::GetLane(hn::SumOfLanes(d, sum[3 * r + c]));
+  for (int c = 0; c < 3; ++c, at += ld) {
+#pragma GCC unroll 6
+    for (int r = 0; r + 1 < kTileRows; r += 2) subtract_sums(sum[3 * r + c], sum[3 * (r + 1) + c], at + r);
+    if constexpr (kTileRows % 2 != 0) at[kTileRows - 1] -= hn::GetLane(hn::SumOfLanes(d, sum[3 * (kTileRows - 1) + c]));
+  }
 }
 
 void subtract_points_one(const KernelJob& job, std::size_t first, std::size_t last, double* A, std::size_t ld) {

@@ -1,6 +1,7 @@
 #include "core/bundle/detail/setup.hpp"
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <cmath>
 
@@ -62,11 +63,13 @@ bool check_state(const BundleProblem& p, const BundleOptions& o, BundleResult* r
 /// Observations: index, order, values; where each point's begin; how many each pose has.
 bool check_observations(BundleWorkspace& w, const BundleProblem& p, BundleResult* r) noexcept {
   std::fill(w.pose_observations.begin(), w.pose_observations.end(), 0U);
+  const std::size_t points = p.points.size(), poses = p.T_left_world.size(), cameras = p.cameras.size();
+  std::uint32_t* const pose_observations = w.pose_observations.data();
   std::size_t next_point = 0;
   std::uint64_t last = 0;
   for (std::size_t i = 0; i < p.observations.size(); ++i) {
     const BundleObservation& o = p.observations[i];
-    if (o.point >= p.points.size() || o.pose >= p.T_left_world.size() || o.camera >= p.cameras.size())
+    if (o.point >= points || o.pose >= poses || o.camera >= cameras)
       return refuse(r, BundleTermination::invalid_input, BundleDefect::index, i);
     const std::uint64_t key = (static_cast<std::uint64_t>(o.point) << 24U) | (static_cast<std::uint64_t>(o.pose) << 8U) | o.camera;
     if (i > 0 && key <= last) return refuse(r, BundleTermination::invalid_input, BundleDefect::order, i);
@@ -74,7 +77,7 @@ bool check_observations(BundleWorkspace& w, const BundleProblem& p, BundleResult
     if (!std::isfinite(o.x) || !std::isfinite(o.y) || !std::isfinite(o.inverse_sigma) || !(o.inverse_sigma > 0))
       return refuse(r, BundleTermination::invalid_input, BundleDefect::not_finite, i);
     while (next_point <= o.point) w.first_observation[next_point++] = static_cast<std::uint32_t>(i);
-    ++w.pose_observations[o.pose];
+    ++pose_observations[o.pose];
   }
   while (next_point <= p.points.size()) w.first_observation[next_point++] = static_cast<std::uint32_t>(p.observations.size());
   return true;
@@ -125,50 +128,60 @@ bool order_points(BundleWorkspace& w, const BundleProblem& p, BundleResult* r) n
   return true;
 }
 
+/// Slots of a pose in order of camera: how many before camera k for every set of cameras, [set][k]; [set][kMaxCameras]: all.
+constexpr auto kSlotsBefore = [] {
+  std::array<std::array<std::uint8_t, kMaxCameras + 1>, 1U << kMaxCameras> table{};
+  for (unsigned set = 0; set < table.size(); ++set)
+    for (unsigned k = 0; k <= kMaxCameras; ++k) table[set][k] = static_cast<std::uint8_t>(std::popcount(set & ((1U << k) - 1U)));
+  return table;
+}();
+
 /// The images of one batch: the union of those that see its points. False: more than there is room for.
 bool lay_out_batch(BundleWorkspace& w, const BundleProblem& p, std::size_t index) noexcept {
   Batch& batch = w.batches[index];
   batch.lanes = static_cast<std::uint32_t>(std::min<std::size_t>(kBatch, w.point_count - index * kBatch));
   batch.block_begin = static_cast<std::uint32_t>(w.block_count);
+  const BundleObservation* const observations = p.observations.data();
+  const std::uint32_t* const first_observation = w.first_observation.data();
+  std::uint8_t* const pose_cameras = w.pose_cameras.data();
+  std::uint32_t* const pose_slot = w.pose_slot.data();
   std::size_t lowest = p.T_left_world.size(), highest = 0;
   const auto point_of = [&](std::size_t lane) { return static_cast<std::uint32_t>(w.order[index * kBatch + lane]); };
   for (std::size_t lane = 0; lane < batch.lanes; ++lane) {
-    const std::uint32_t point = point_of(lane);
-    for (std::uint32_t i = w.first_observation[point]; i < w.first_observation[point + 1]; ++i) {
-      const BundleObservation& o = p.observations[i];
-      w.pose_cameras[o.pose] = static_cast<std::uint8_t>(w.pose_cameras[o.pose] | (1U << o.camera));
-      lowest = std::min<std::size_t>(lowest, o.pose);
-      highest = std::max<std::size_t>(highest, o.pose);
-    }
+    const std::uint32_t begin = first_observation[point_of(lane)], end = first_observation[point_of(lane) + 1];
+    for (std::uint32_t i = begin; i < end; ++i)
+      pose_cameras[observations[i].pose] = static_cast<std::uint8_t>(pose_cameras[observations[i].pose] | (1U << observations[i].camera));
+    lowest = std::min<std::size_t>(lowest, observations[begin].pose);
+    highest = std::max<std::size_t>(highest, observations[end - 1].pose);
   }
   bool room = true;
   for (std::size_t pose = lowest; pose <= highest; ++pose) {
-    const std::uint8_t cameras = w.pose_cameras[pose];
+    const std::uint8_t cameras = pose_cameras[pose];
     if (cameras == 0) continue;
-    const auto count = static_cast<std::size_t>(std::popcount(cameras));
+    const std::size_t count = kSlotsBefore[cameras][kMaxCameras];
     if (w.block_count == w.blocks.size() || w.slot_count + count > w.slots.size()) {
       room = false;
       break;
     }
     w.blocks[w.block_count++] = {static_cast<std::uint32_t>(w.slot_count), static_cast<std::uint16_t>(pose), cameras};
-    w.pose_slot[pose] = static_cast<std::uint32_t>(w.slot_count);
-    for (std::size_t i = 0; i < count; ++i) w.slots[w.slot_count++] = Slot{};
+    pose_slot[pose] = static_cast<std::uint32_t>(w.slot_count);
+    std::fill_n(w.slots.begin() + static_cast<std::ptrdiff_t>(w.slot_count), count, Slot{});
+    w.slot_count += count;
   }
+  Slot* const slots = w.slots.data();
+  std::uint32_t* const observation_lane = w.observation_lane.data();
   for (std::size_t lane = 0; lane < batch.lanes && room; ++lane) {
-    const std::uint32_t point = point_of(lane);
-    for (std::uint32_t i = w.first_observation[point]; i < w.first_observation[point + 1]; ++i) {
-      const BundleObservation& o = p.observations[i];
-      const unsigned before = w.pose_cameras[o.pose] & ((1U << o.camera) - 1U);
-      const std::uint32_t slot = w.pose_slot[o.pose] + static_cast<std::uint32_t>(std::popcount(before));
-      w.slots[slot].x[lane] = o.x;
-      w.slots[slot].y[lane] = o.y;
-      w.slots[slot].inverse_sigma[lane] = static_cast<double>(o.inverse_sigma);
-      w.observation_lane[i] = slot * kBatch + static_cast<std::uint32_t>(lane);
+    const std::uint32_t end = first_observation[point_of(lane) + 1];
+    for (std::uint32_t i = first_observation[point_of(lane)]; i < end; ++i) {
+      const BundleObservation& o = observations[i];
+      const std::uint32_t slot = pose_slot[o.pose] + kSlotsBefore[pose_cameras[o.pose]][o.camera];
+      slots[slot].x[lane] = o.x;
+      slots[slot].y[lane] = o.y;
+      slots[slot].inverse_sigma[lane] = static_cast<double>(o.inverse_sigma);
+      observation_lane[i] = slot * kBatch + static_cast<std::uint32_t>(lane);
     }
   }
-  if (lowest <= highest)
-    std::fill(w.pose_cameras.begin() + static_cast<std::ptrdiff_t>(lowest),
-              w.pose_cameras.begin() + static_cast<std::ptrdiff_t>(highest) + 1, std::uint8_t{0});
+  if (lowest <= highest) std::fill(pose_cameras + lowest, pose_cameras + highest + 1, std::uint8_t{0});
   batch.block_end = static_cast<std::uint32_t>(w.block_count);
   return room;
 }
