@@ -12,6 +12,9 @@ namespace {
 constexpr double kImageMargin = 9.0;      // px: a window's half and one
 constexpr float kMinStructure = 3.0F;     // grey levels, standard deviation of the coarsest level: a lens cap's noise stays below 2
 constexpr double kFarBaselines = 2000.0;  // depth given to a point whose disparity is within the noise of zero
+constexpr int kMaxDistance = 64;         // bits of 256: unrelated patches lie at 128 ± 8
+constexpr double kDistinct = 0.8;         // of the second best's distance
+constexpr float kRoughSigma = 3.F;        // px: two corners found independently
 constexpr double kNearDisparity = 3.0;    // px: ten times the noise of a match; what makes scale
 
 /// Shape of a patch seen from elsewhere, as if its surface faced the camera it was cut in: ∂(pixel there)/∂(pixel here).
@@ -47,7 +50,7 @@ std::size_t FrontEnd::memory_needed(const OdometryOptions& options, const RigCal
     bytes += features::Pyramid::memory_needed(c.width, c.height, options.pyramid_levels) + kMaxPoints * sizeof(Followed) + 2 * kCacheLine;
   }
   const auto n = static_cast<std::size_t>(options.features);
-  return bytes + n * (sizeof(features::Corner) + sizeof(NewPoint)) + kMaxPoints * sizeof(features::Corner) + 4 * kCacheLine;
+  return bytes + n * (sizeof(features::Corner) + sizeof(NewPoint)) + kMaxPoints * (sizeof(features::Corner) + sizeof(features::Descriptor)) + 5 * kCacheLine;
 }
 
 FrontEnd::FrontEnd(const OdometryOptions& options, const RigCalibration& rig, Arena& arena, PairRunner& runner)
@@ -63,6 +66,7 @@ FrontEnd::FrontEnd(const OdometryOptions& options, const RigCalibration& rig, Ar
   corners_ = BoundedVector<features::Corner>(arena.make<features::Corner>(n, "corners"));
   taken_ = BoundedVector<features::Corner>(arena.make<features::Corner>(kMaxPoints, "taken corners"));
   fresh_ = arena.make<NewPoint>(n, "new points");
+  described_ = arena.make<features::Descriptor>(kMaxPoints, "descriptors");
 }
 
 ImageCheck FrontEnd::begin(const RigFrame& frame) noexcept {
@@ -164,6 +168,45 @@ void FrontEnd::follow_all(Map& map, const Transform& T_left_world) noexcept {
   how.min_zncc = static_cast<float>(options_.match_zncc);
   how.max_shift = 8.F;
   follow_into_all(map, T_left_world, how, 1);
+}
+
+int FrontEnd::find_again(Map& map) noexcept {
+  const std::span<MapPoint> points = map.points();
+  for (MapPoint& p : points) p.now.cameras = 0;
+  if ((structured_ & 1U) == 0) return 0;
+  for (std::size_t i = 0; i < points.size(); ++i)
+    if (points[i].holds_poses()) described_[i] = features::describe(points[i].patch);
+  features::CornerOptions how;
+  how.cell = options_.cell_px;
+  how.min_score = static_cast<float>(options_.min_corner_score);
+  how.min_distance = 0.4F * static_cast<float>(options_.cell_px);
+  features::find_corners(pyramids_[0].level(0), how, {}, runner_, &corners_);
+  int found = 0;
+  features::Patch patch;
+  for (const features::Corner& c : corners_) {
+    const Vec2 at(c.x, c.y);
+    if (!features::cut_patch(pyramids_[0], at, &patch)) continue;
+    const features::Descriptor d = features::describe(patch);
+    int best = kMaxDistance + 1, second = 256;
+    std::size_t which = 0;
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      if (!points[i].holds_poses()) continue;
+      const int bits = features::distance(d, described_[i]);
+      if (bits < best) {
+        second = best;
+        best = bits;
+        which = i;
+      } else if (bits < second) {
+        second = bits;
+      }
+    }
+    Followed f;
+    if (best > kMaxDistance || best > kDistinct * second || points[which].now.cameras != 0 || !finish(0, at, 0.0, &f)) continue;
+    f.sigma = kRoughSigma;
+    store(f, 0, &points[which]);
+    ++found;
+  }
+  return found;
 }
 
 void FrontEnd::match_across(const features::Corner& corner, bool exchanged, NewPoint* out) const noexcept {

@@ -4,6 +4,7 @@
 #include <span>
 
 #include "core/features/corners.hpp"
+#include "core/features/descriptor.hpp"
 #include "core/features/pyramid.hpp"
 #include "core/odometry/lens.hpp"
 #include "core/odometry/map.hpp"
@@ -45,6 +46,10 @@ class FrontEnd {
   void follow_sample(Map& map, const Transform& T_left_world, int sample, int coarsest) noexcept;
   /// Follows every followed point into every structured camera from a good prediction.
   void follow_all(Map& map, const Transform& T_left_world) noexcept;
+
+  /// Looks for the map's points in `left` wherever they may be, by what they look like. Answers how many seem found; their
+  /// sightings, wrong ones among them, are rough. Some milliseconds: for frames that tracking has lost.
+  [[nodiscard]] int find_again(Map& map) noexcept;
 
   /// New corners of `left` where there are no points, matched across, as points of the given stage, each with its sighting in `now`.
   AcrossCount add_points(Map& map, const Transform& T_left_world, PointStage stage) noexcept;
@@ -88,6 +93,7 @@ class FrontEnd {
   std::array<std::span<Followed>, kMaxCameras> followed_{};
   BoundedVector<features::Corner> corners_, taken_;
   std::span<NewPoint> fresh_;
+  std::span<features::Descriptor> described_;  // of the map's points, in find_again()
   float detect_ms_ = 0;
 };
 

@@ -48,6 +48,8 @@ struct MapPoint {
   std::array<Eigen::Vector2f, kMaxCameras> raw{};  // this frame's pixels as the image has them
   std::array<Sighting, kMaxWindow> seen{};         // by keyframe slot
 
+  /// Its position is good enough to reckon poses with.
+  [[nodiscard]] bool holds_poses() const noexcept { return stage == PointStage::active || stage == PointStage::dormant; }
   [[nodiscard]] bool followed() const noexcept { return stage == PointStage::candidate || stage == PointStage::active; }
 };
 

@@ -10,6 +10,7 @@ namespace {
 constexpr int kSample = 100;             // points followed from far away: enough for MLESAC, a third of the work
 constexpr int kSampleInliers = 12;       // of the sample, below which the prediction was wrong
 constexpr double kSampleShare = 0.3;     // and of those found, which must agree
+constexpr int kRelocaliseInliers = 15;   // that agree on one pose: by chance of rough matches 8 do
 constexpr std::uint8_t kMissesAllowed = 2;  // frames a point may be hidden
 constexpr std::uint16_t kFoundEnough = 2;   // rig frames, so four images, before a point holds a pose
 constexpr double kOutlier = 9.21;        // squared sigmas, two coordinates at 99 %
@@ -81,7 +82,7 @@ void Odometry::collect() noexcept {
   const std::span<MapPoint> points = map_.points();
   for (std::size_t i = 0; i < points.size(); ++i) {
     const MapPoint& p = points[i];
-    if (p.stage != PointStage::active || p.now.cameras == 0) continue;
+    if (!p.holds_poses() || p.now.cameras == 0) continue;
     const auto first = static_cast<std::size_t>(std::countr_zero(p.now.cameras));
     if (!table_.push(p.p_world, p.now.sigma[first])) return;
     for (int k = 0; k < rig_.cameras; ++k)
@@ -145,9 +146,9 @@ Odometry::PoseFit Odometry::track(const Transform& predicted, std::uint8_t struc
     clock.mark(Stage::pose);
     if (fit.inliers >= kSampleInliers && fit.inliers > kSampleShare * fit.given) break;
   }
-  if (fit.inliers < kSampleInliers) {
-    fit.found = false;
-    return fit;
+  if (fit.inliers < kSampleInliers || fit.inliers <= kSampleShare * fit.given) {
+    fit = relocalise(out);
+    if (!fit.found) return fit;
   }
   const Transform coarse = fit.T_left_world;
   front_end_.follow_all(map_, coarse);
@@ -155,6 +156,26 @@ Odometry::PoseFit Odometry::track(const Transform& predicted, std::uint8_t struc
   fit = fit_pose(coarse, false);
   if (!fit.found || fit.inliers < kRigidShare * fit.given) fit = fit_pose(coarse, true);
   clock.mark(Stage::pose);
+  return fit;
+}
+
+Odometry::PoseFit Odometry::relocalise(FrameOutcome* out) noexcept {
+  StageClock clock(out);
+  const int candidates = front_end_.find_again(map_);
+  clock.mark(Stage::match);
+  PoseFit fit;
+  if (candidates < kRelocaliseInliers) return fit;
+  fit = fit_pose(T_left_world_, true);
+  clock.mark(Stage::pose);
+  fit.found = fit.inliers >= kRelocaliseInliers;
+  if (!fit.found) return fit;
+  out->relocalised = true;
+  // Points long out of sight are followed again; those that do not show are dropped as any other.
+  for (MapPoint& p : map_.points()) {
+    if (p.stage != PointStage::dormant) continue;
+    p.stage = PointStage::active;
+    p.missed = 0;
+  }
   return fit;
 }
 
@@ -317,7 +338,6 @@ FrameOutcome Odometry::process(const RigFrame& frame) noexcept {
     return out;
   }
   settle_points(fit);
-  if (frames_lost_ > 0) out.relocalised = true;
   frames_lost_ = 0;
   out.posed = true;
   out.inliers = fit.inliers;

@@ -50,6 +50,7 @@ class Odometry {
 
   [[nodiscard]] Transform predict(double dt_s) const noexcept;
   [[nodiscard]] PoseFit track(const Transform& predicted, std::uint8_t structured, FrameOutcome* out) noexcept;
+  [[nodiscard]] PoseFit relocalise(FrameOutcome* out) noexcept;
   [[nodiscard]] PoseFit fit_pose(const Transform& start, bool sample) noexcept;
   void collect() noexcept;
   void settle_points(const PoseFit& fit) noexcept;

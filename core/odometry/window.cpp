@@ -49,7 +49,7 @@ void WindowAdjuster::gather(Map& map) noexcept {
   const std::span<MapPoint> all = map.points();
   for (std::size_t i = 0; i < all.size(); ++i) {
     const MapPoint& p = all[i];
-    if (p.stage != PointStage::active && p.stage != PointStage::dormant) continue;
+    if (!p.holds_poses()) continue;
     const std::size_t first = observations_.size();
     int keyframes = 0;
     bool fits = !points_.full();
