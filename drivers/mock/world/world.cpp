@@ -56,7 +56,7 @@ std::optional<World::Hit> World::cast(const Vec3& origin, const Vec3& direction)
     for (std::size_t i = object.first; i < object.first + object.count; ++i) {
       const Polygon& p = scene_->polygons[i];
       const double approach = p.normal.dot(direction);
-      if (p.material == kClouds || approach == 0 || (approach > 0 && !p.two_sided)) continue;
+      if (p.material == material::clouds || approach == 0 || (approach > 0 && !p.two_sided)) continue;
       double& nearest = scene_->materials[static_cast<std::size_t>(p.material)].opacity.base < 0 ? solid : veil;
       const double t = p.normal.dot(p.corners[0] - origin) / approach;
       if (t > 0 && t < nearest && inside(p, origin + t * direction)) nearest = t;

@@ -11,34 +11,35 @@ inline constexpr double kStorey = 3.0;         // m
 
 /// Index into Scene::materials; facades come first, kFacades of them.
 inline constexpr int kFacades = 7;
-enum MaterialIndex : int {
-  kSideWall = kFacades,
-  kFlats,  // tall blocks: 24 m x 24 m
-  kRoof,
-  kAsphalt,
-  kPavement,
-  kGrass,
-  kPaint,     // road markings
-  kConcrete,  // kerbs, poles
-  kFoliage,
-  kBark,
-  kCarSide,  // 4.2 m x 1.5 m
-  kCarEnd,   // 1.8 m x 1.5 m
-  kCarTop,
-  kHedge,
-  kFence,
-  kTreeLine,  // 64 m x 16 m
-  kHills,     // 2048 m x 128 m
-  kClouds,
-  kSign,    // 2 m x 2 m: four boards
-  kShadow,  // 1 x 1 units
-  kMaterials,
+namespace material {
+enum Index : int {
+  side_wall = kFacades,
+  flats,  // tall blocks: 24 m x 24 m
+  roof,
+  asphalt,
+  pavement,
+  grass,
+  paint,     // road markings
+  concrete,  // kerbs, poles
+  foliage,
+  bark,
+  car_side,  // 4.2 m x 1.5 m
+  car_end,   // 1.8 m x 1.5 m
+  car_top,
+  hedge,
+  fence,
+  tree_line,  // 64 m x 16 m
+  hills,      // 2048 m x 128 m
+  clouds,
+  sign,    // 2 m x 2 m: four boards
+  shadow,  // 1 x 1 units
 };
+}  // namespace material
 
 /// Paints every texture and fills scene->materials in the order above. `detail` as in WorldOptions.
 void paint_materials(std::uint64_t seed, int detail, Scene* scene);
 
-/// The seven house fronts and the plain side wall, one after the other (materials_facades.cpp).
+/// The seven house fronts and the plain side wall, one after the other (facades.cpp).
 Canvas paint_facade(int kind, std::uint64_t seed, int detail);
 Canvas paint_side_wall(std::uint64_t seed, int detail);
 Canvas paint_flats(std::uint64_t seed, int detail);

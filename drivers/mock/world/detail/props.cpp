@@ -19,13 +19,13 @@ void hip_roof(SceneBuilder* builder, const SceneBuilder::Box& walls, double rise
   const double z0 = walls.base.z() + walls.height - 0.1, z1 = z0 + rise;
   const Vec2 c = walls.base.head<2>();
   const auto at = [&](double s, double t, double z) { return raised(c + s * a + t * n, z); };
-  const SceneBuilder::Face face{kRoof, light, 0, 0};
+  const SceneBuilder::Face face{material::roof, light, 0, 0};
   builder->flat(std::array<Vec3, 4>{at(-l, w, z0), at(l, w, z0), at(ridge, 0, z1), at(-ridge, 0, z1)}, face);
   builder->flat(std::array<Vec3, 4>{at(l, -w, z0), at(-l, -w, z0), at(-ridge, 0, z1), at(ridge, 0, z1)}, face);
   builder->flat(std::array<Vec3, 3>{at(l, w, z0), at(l, -w, z0), at(ridge, 0, z1)}, face);
   builder->flat(std::array<Vec3, 3>{at(-l, -w, z0), at(-l, w, z0), at(-ridge, 0, z1)}, face);
   // Eaves seen from below.
-  builder->flat(std::array<Vec3, 4>{at(-l, -w, z0), at(l, -w, z0), at(l, w, z0), at(-l, w, z0)}, {kConcrete, 0.55F, 0, 0}, true);
+  builder->flat(std::array<Vec3, 4>{at(-l, -w, z0), at(l, -w, z0), at(l, w, z0), at(-l, w, z0)}, {material::concrete, 0.55F, 0, 0}, true);
 }
 
 }  // namespace
@@ -48,27 +48,27 @@ void add_house(SceneBuilder* builder, const Lot& lot, Random* random) {
   const float tone = paint(random, 0.78, 1.0);
   const double shift = (kFacadeWidth - 2 * half_length) * 0.5;
   builder->begin();
-  const SceneBuilder::Face front{kind, tone, shift, -below}, side{kSideWall, tone, random->uniform(0, 12), -below};
-  const SceneBuilder::Face flat_top{kConcrete, 0.8F, 0, 0};
+  const SceneBuilder::Face front{kind, tone, shift, -below}, side{material::side_wall, tone, random->uniform(0, 12), -below};
+  const SceneBuilder::Face flat_top{material::concrete, 0.8F, 0, 0};
   const bool parapet = kind == 3 || storeys == 3;
   builder->box(walls, front, side, parapet ? &flat_top : nullptr);
   if (!parapet) hip_roof(builder, walls, random->uniform(1.4, 2.3), paint(random, 0.7, 1.25));
   if (random->below(3) == 0) {  // a porch: posts and a roof over the door
     const double depth = 1.6, reach = random->uniform(1.5, 3.0), offset = random->uniform(-2.0, 2.0);
     for (const double s : {-reach, reach})
-      builder->box({raised(lot.at(offset + s, setback - depth), floor - 0.2), lot.along, 0.08, 0.08, 2.9}, {kConcrete, 1.3F, 0, 0},
-                   {kConcrete, 1.3F, 0, 0}, nullptr);
-    const SceneBuilder::Face roof{kRoof, tone, 0, 0};
+      builder->box({raised(lot.at(offset + s, setback - depth), floor - 0.2), lot.along, 0.08, 0.08, 2.9}, {material::concrete, 1.3F, 0, 0},
+                   {material::concrete, 1.3F, 0, 0}, nullptr);
+    const SceneBuilder::Face roof{material::roof, tone, 0, 0};
     builder->box({raised(lot.at(offset, setback - 0.5 * depth), floor + 2.6), lot.along, reach + 0.3, 0.5 * depth + 0.2, 0.22},
-                 {kConcrete, 1.2F, 0, 0}, {kConcrete, 1.2F, 0, 0}, &roof);
+                 {material::concrete, 1.2F, 0, 0}, {material::concrete, 1.2F, 0, 0}, &roof);
   }
   builder->end();
 }
 
 void add_garden(SceneBuilder* builder, const Lot& lot, Random* random) {
   const double line = kRoadHalf + kPavementWidth + 0.45;
-  const int kind = random->below(2) == 0 ? kHedge : kFence;
-  const double height = kind == kHedge ? random->uniform(0.7, 1.3) : 1.15, half = kind == kHedge ? 0.3 : 0.04;
+  const int kind = random->below(2) == 0 ? material::hedge : material::fence;
+  const double height = kind == material::hedge ? random->uniform(0.7, 1.3) : 1.15, half = kind == material::hedge ? 0.3 : 0.04;
   const float tone = paint(random, 0.75, 1.3);
   const double gate = random->uniform(-3.5, 3.5);
   builder->begin();
@@ -92,34 +92,35 @@ void add_car(SceneBuilder* builder, const Lot& lot, double along_m, Random* rand
   builder->begin();
   builder->flat(std::array<Vec3, 4>{at(-kHalfLength, kHalfWidth, kFloor), at(kHalfLength, kHalfWidth, kFloor),
                                     at(kHalfLength, kHalfWidth, kBelt), at(-kHalfLength, kHalfWidth, kBelt)},
-                {kCarSide, tone, 0, 0});
+                {material::car_side, tone, 0, 0});
   builder->flat(std::array<Vec3, 4>{at(kHalfLength, -kHalfWidth, kFloor), at(-kHalfLength, -kHalfWidth, kFloor),
                                     at(-kHalfLength, -kHalfWidth, kBelt), at(kHalfLength, -kHalfWidth, kBelt)},
-                {kCarSide, tone, 0, 0});
+                {material::car_side, tone, 0, 0});
   builder->flat(std::array<Vec3, 4>{at(kHalfLength, kHalfWidth, kFloor), at(kHalfLength, -kHalfWidth, kFloor),
                                     at(kHalfLength, -kHalfWidth, kBelt), at(kHalfLength, kHalfWidth, kBelt)},
-                {kCarEnd, tone, 0, 0});
+                {material::car_end, tone, 0, 0});
   builder->flat(std::array<Vec3, 4>{at(-kHalfLength, -kHalfWidth, kFloor), at(-kHalfLength, kHalfWidth, kFloor),
                                     at(-kHalfLength, kHalfWidth, kBelt), at(-kHalfLength, -kHalfWidth, kBelt)},
-                {kCarEnd, tone, 0, 0});
+                {material::car_end, tone, 0, 0});
   builder->flat(std::array<Vec3, 4>{at(-kHalfLength, kHalfWidth, kBelt), at(kHalfLength, kHalfWidth, kBelt),
                                     at(kHalfLength, -kHalfWidth, kBelt), at(-kHalfLength, -kHalfWidth, kBelt)},
-                {kCarTop, tone, 0, 0});
+                {material::car_top, tone, 0, 0});
   // The cabin leans inwards on all sides.
   constexpr double r0 = -1.5, f0 = 1.35, r1 = -1.0, f1 = 0.55, w1 = 0.66;
   builder->flat(std::array<Vec3, 4>{at(r0, kHalfWidth, kBelt), at(f0, kHalfWidth, kBelt), at(f1, w1, kTop), at(r1, w1, kTop)},
-                {kCarSide, tone, r0 + kHalfLength, kBelt});
+                {material::car_side, tone, r0 + kHalfLength, kBelt});
   builder->flat(std::array<Vec3, 4>{at(f0, -kHalfWidth, kBelt), at(r0, -kHalfWidth, kBelt), at(r1, -w1, kTop), at(f1, -w1, kTop)},
-                {kCarSide, tone, kHalfLength - f0, kBelt});
+                {material::car_side, tone, kHalfLength - f0, kBelt});
   builder->flat(std::array<Vec3, 4>{at(f0, kHalfWidth, kBelt), at(f0, -kHalfWidth, kBelt), at(f1, -w1, kTop), at(f1, w1, kTop)},
-                {kCarEnd, tone, 0, kBelt});
+                {material::car_end, tone, 0, kBelt});
   builder->flat(std::array<Vec3, 4>{at(r0, -kHalfWidth, kBelt), at(r0, kHalfWidth, kBelt), at(r1, w1, kTop), at(r1, -w1, kTop)},
-                {kCarEnd, tone, 0, kBelt});
-  builder->flat(std::array<Vec3, 4>{at(r1, w1, kTop), at(f1, w1, kTop), at(f1, -w1, kTop), at(r1, -w1, kTop)}, {kCarTop, tone, 0, 0});
+                {material::car_end, tone, 0, kBelt});
+  builder->flat(std::array<Vec3, 4>{at(r1, w1, kTop), at(f1, w1, kTop), at(f1, -w1, kTop), at(r1, -w1, kTop)},
+                {material::car_top, tone, 0, 0});
   builder->picture(
       std::array<Vec3, 4>{at(-kHalfLength - 0.35, kHalfWidth + 0.35, 0.004), at(kHalfLength + 0.35, kHalfWidth + 0.35, 0.004),
                           at(kHalfLength + 0.35, -kHalfWidth - 0.35, 0.004), at(-kHalfLength - 0.35, -kHalfWidth - 0.35, 0.004)},
-      kShadow, 0.6F, 2 * kHalfLength + 0.7, 2 * kHalfWidth + 0.7);
+      material::shadow, 0.6F, 2 * kHalfLength + 0.7, 2 * kHalfWidth + 0.7);
   builder->end();
 }
 
@@ -129,15 +130,15 @@ void add_tree(SceneBuilder* builder, const Vec2& foot, double size_m, double lif
   const double turn = random->uniform(0, std::numbers::pi);
   const float tone = paint(random, 0.8, 1.25);
   builder->begin();
-  const SceneBuilder::Face bark{kBark, 1.0F, random->uniform(0, 1), 0};
+  const SceneBuilder::Face bark{material::bark, 1.0F, random->uniform(0, 1), 0};
   builder->box({raised(foot, ground - 0.2), Vec2(std::cos(turn), std::sin(turn)), 0.03 * size_m, 0.03 * size_m, trunk + 0.3 * size_m}, bark,
                bark, nullptr);
   for (int i = 0; i < 3; ++i) {
     const double angle = turn + i * std::numbers::pi / 3;
     const Vec2 d(half * std::cos(angle), half * std::sin(angle));
     const double z0 = ground + 0.28 * size_m, z1 = z0 + crown;
-    builder->picture(std::array<Vec3, 4>{raised(foot - d, z0), raised(foot + d, z0), raised(foot + d, z1), raised(foot - d, z1)}, kFoliage,
-                     tone * (0.92F + 0.1F * static_cast<float>(i)), 2 * half, crown);
+    builder->picture(std::array<Vec3, 4>{raised(foot - d, z0), raised(foot + d, z0), raised(foot + d, z1), raised(foot - d, z1)},
+                     material::foliage, tone * (0.92F + 0.1F * static_cast<float>(i)), 2 * half, crown);
   }
   builder->end();
 }
@@ -145,32 +146,32 @@ void add_tree(SceneBuilder* builder, const Vec2& foot, double size_m, double lif
 void add_power_pole(SceneBuilder* builder, const Lot& lot) {
   const Vec2 foot = lot.at(0, kRoadHalf + 0.5);
   const double ground = builder->ground(foot.x()) + kKerb;
-  const SceneBuilder::Face wood{kBark, 1.3F, 0, 0};
+  const SceneBuilder::Face wood{material::bark, 1.3F, 0, 0};
   builder->begin();
   builder->box({raised(foot, ground - 0.1), lot.along, 0.13, 0.13, 8.6}, wood, wood, nullptr);
   builder->box({raised(foot, ground + 7.6), lot.outward, 1.1, 0.06, 0.14}, wood, wood, &wood);
-  builder->box({raised(foot + 0.2 * lot.along, ground + 6.4), lot.along, 0.22, 0.22, 0.8}, {kConcrete, 1, 0, 0}, {kConcrete, 1, 0, 0},
-               nullptr);
+  builder->box({raised(foot + 0.2 * lot.along, ground + 6.4), lot.along, 0.22, 0.22, 0.8}, {material::concrete, 1, 0, 0},
+               {material::concrete, 1, 0, 0}, nullptr);
   builder->end();
 }
 
 void add_sign(SceneBuilder* builder, const Vec2& foot, const Vec2& facing, int board) {
   const double ground = builder->ground(foot.x()) + kKerb;
   const Vec2 right(-facing.y(), facing.x());  // of the board, seen from the front
-  const SceneBuilder::Face steel{kConcrete, 0.9F, 0, 0};
+  const SceneBuilder::Face steel{material::concrete, 0.9F, 0, 0};
   builder->begin();
   builder->box({raised(foot - 0.05 * facing, ground - 0.1), right, 0.035, 0.035, 2.9}, steel, steel, nullptr);
   const double half = 0.38, z0 = ground + 2.05;
   builder->flat(std::array<Vec3, 4>{raised(foot - half * right, z0), raised(foot + half * right, z0),
                                     raised(foot + half * right, z0 + 2 * half), raised(foot - half * right, z0 + 2 * half)},
-                {kSign, 1.1F, board % 2 == 0 ? 0.12 : 1.12, board / 2 == 0 ? 0.12 : 1.12});
+                {material::sign, 1.1F, board % 2 == 0 ? 0.12 : 1.12, board / 2 == 0 ? 0.12 : 1.12});
   builder->end();
 }
 
 void add_flats(SceneBuilder* builder, const Vec2& centre, double half_length, double half_width, int storeys, Random* random) {
   const double ground = builder->ground(centre.x()) - 2.0;
   const float tone = paint(random, 0.75, 1.15);
-  const SceneBuilder::Face face{kFlats, tone, 3.0 * random->below(8), -2.0}, top{kConcrete, 0.8F, 0, 0};
+  const SceneBuilder::Face face{material::flats, tone, 3.0 * random->below(8), -2.0}, top{material::concrete, 0.8F, 0, 0};
   const double turn = random->uniform(-0.3, 0.3);
   builder->begin();
   builder->box({raised(centre, ground), Vec2(std::cos(turn), std::sin(turn)), half_length, half_width, storeys * kStorey + 2.6}, face, face,
@@ -181,8 +182,8 @@ void add_flats(SceneBuilder* builder, const Vec2& centre, double half_length, do
 void add_tree_line(SceneBuilder* builder, const Vec2& a, const Vec2& b, double height_m, Random* random) {
   const double za = builder->ground(a.x()) - 0.8, zb = builder->ground(b.x()) - 0.8;
   builder->begin();
-  builder->picture(std::array<Vec3, 4>{raised(a, za), raised(b, zb), raised(b, zb + height_m), raised(a, za + height_m)}, kTreeLine,
-                   paint(random, 0.75, 1.2), 64.0, 1.06 * height_m);  // less than the texture, which wraps around
+  builder->picture(std::array<Vec3, 4>{raised(a, za), raised(b, zb), raised(b, zb + height_m), raised(a, za + height_m)},
+                   material::tree_line, paint(random, 0.75, 1.2), 64.0, 1.06 * height_m);  // less than the texture, which wraps around
   builder->end();
 }
 

@@ -142,7 +142,7 @@ void SceneBuilder::kerb(const Vec2& a, const Vec2& b) {
     const std::array<Vec3, 4> corners{Vec3(p.x(), p.y(), ground(p.x())), Vec3(q.x(), q.y(), ground(q.x())),
                                       Vec3(q.x(), q.y(), ground(q.x()) + kKerb), Vec3(p.x(), p.y(), ground(p.x()) + kKerb)};
     begin();
-    flat(corners, {kConcrete, 0.8F, cuts[i] * length, 0});
+    flat(corners, {material::concrete, 0.8F, cuts[i] * length, 0});
     end();
   }
 }

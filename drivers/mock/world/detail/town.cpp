@@ -53,24 +53,24 @@ void add_block_ground(SceneBuilder* builder, const Block& b) {
     const Vec2 d = (kerb_line[j] - kerb_line[i]).normalized(), normal(-d.y(), d.x());
     if (std::abs(normal.dot(stone[i] - kerb_line[i])) < 1e-9) continue;
     builder->kerb(kerb_line[i], kerb_line[j]);
-    builder->ground_polygon(std::array<Vec2, 4>{kerb_line[i], kerb_line[j], stone[j], stone[i]}, kKerb, kConcrete, 1.15F);
-    builder->ground_polygon(std::array<Vec2, 4>{stone[i], stone[j], back[j], back[i]}, kKerb, kPavement);
+    builder->ground_polygon(std::array<Vec2, 4>{kerb_line[i], kerb_line[j], stone[j], stone[i]}, kKerb, material::concrete, 1.15F);
+    builder->ground_polygon(std::array<Vec2, 4>{stone[i], stone[j], back[j], back[i]}, kKerb, material::pavement);
   }
-  builder->ground_polygon(back, kKerb, kGrass);
+  builder->ground_polygon(back, kKerb, material::grass);
 }
 
 void add_roads(SceneBuilder* builder) {
   for (const double y : kStreetY)
     builder->ground_polygon(std::array<Vec2, 4>{Vec2(kWorldX0 + 30, y - kRoadHalf), Vec2(kWorldX1 - 30, y - kRoadHalf),
                                                 Vec2(kWorldX1 - 30, y + kRoadHalf), Vec2(kWorldX0 + 30, y + kRoadHalf)},
-                            0, kAsphalt);
+                            0, material::asphalt);
   for (const double x : kStreetX) {
     double from = kWorldY0 + 30;
     for (std::size_t k = 0; k <= kStreetY.size(); ++k) {  // between the crossings
       const double to = k < kStreetY.size() ? kStreetY[k] - kRoadHalf : kWorldY1 - 30;
       builder->ground_polygon(
           std::array<Vec2, 4>{Vec2(x - kRoadHalf, from), Vec2(x + kRoadHalf, from), Vec2(x + kRoadHalf, to), Vec2(x - kRoadHalf, to)}, 0,
-          kAsphalt);
+          material::asphalt);
       from = to + 2 * kRoadHalf;
     }
     for (const double y : kStreetY)  // what the cut kerbs leave open
@@ -80,7 +80,7 @@ void add_roads(SceneBuilder* builder) {
                                      Vec2(x + sx * (kRoadHalf + kCornerCut), y + sy * kRoadHalf),
                                      Vec2(x + sx * kRoadHalf, y + sy * (kRoadHalf + kCornerCut))};
           if (sx * sy < 0) std::swap(corner[1], corner[2]);
-          builder->ground_polygon(corner, 0, kAsphalt);
+          builder->ground_polygon(corner, 0, material::asphalt);
         }
   }
 }
@@ -89,7 +89,7 @@ void add_roads(SceneBuilder* builder) {
 void mark(SceneBuilder* builder, const Vec2& c, const Vec2& d, double half_a, double half_b, float light) {
   const Vec2 n(-d.y(), d.x());
   const Vec2 a = half_a * d, b = half_b * n;
-  builder->ground_polygon(std::array<Vec2, 4>{c - a - b, c + a - b, c + a + b, c - a + b}, kPaintThickness, kPaint, light);
+  builder->ground_polygon(std::array<Vec2, 4>{c - a - b, c + a - b, c + a + b, c - a + b}, kPaintThickness, material::paint, light);
 }
 
 void mark_street(SceneBuilder* builder, const Vec2& start, const Vec2& d, double length, std::span<const double> crossings,
@@ -195,13 +195,13 @@ void add_surroundings(SceneBuilder* builder, Random* random) {
       return Vec3(middle.x() + r * std::cos(a), middle.y() + r * std::sin(a), z);
     };
     const std::array<Vec3, 4> corners{at(i + 1, -10), at(i, -10), at(i, 130), at(i + 1, 130)};
-    builder->picture(corners, kHills, 1.0F, side * kSides / 4, 150);  // the texture's top is left out: textures wrap around
+    builder->picture(corners, material::hills, 1.0F, side * kSides / 4, 150);  // the texture's top is left out: textures wrap around
   }
   builder->end();
   builder->begin();
   const double r = 40 * kCloudHeight;
   const std::array<Vec3, 4> sky{Vec3(-r, r, kCloudHeight), Vec3(r, r, kCloudHeight), Vec3(r, -r, kCloudHeight), Vec3(-r, -r, kCloudHeight)};
-  builder->picture(sky, kClouds, 1.12F, 4096, 4096);
+  builder->picture(sky, material::clouds, 1.12F, 4096, 4096);
   builder->end();
 }
 
@@ -209,7 +209,7 @@ void add_open_country(SceneBuilder* builder) {
   constexpr double kFar = 2500.0;
   const double x0 = kWorldX0 + 30, x1 = kWorldX1 - 30, y0 = kWorldY0 + 30, y1 = kWorldY1 - 30;
   const auto rectangle = [&](double a0, double b0, double a1, double b1) {
-    builder->ground_polygon(std::array<Vec2, 4>{Vec2(a0, b0), Vec2(a1, b0), Vec2(a1, b1), Vec2(a0, b1)}, kKerb, kGrass);
+    builder->ground_polygon(std::array<Vec2, 4>{Vec2(a0, b0), Vec2(a1, b0), Vec2(a1, b1), Vec2(a0, b1)}, kKerb, material::grass);
   };
   rectangle(-kFar, -kFar, x0, kFar);
   rectangle(x1, -kFar, kFar, kFar);
