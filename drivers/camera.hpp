@@ -1,0 +1,98 @@
+#pragma once
+#include <cstdint>
+#include <memory>
+#include <string_view>
+#include <vector>
+
+#include "core/memory/frame_pool.hpp"
+#include "core/types/image.hpp"
+#include "drivers/device.hpp"
+
+namespace vergence {
+
+enum class CameraTrigger : std::uint8_t {
+  hardware,  // every pulse at the trigger input is one exposure
+  software,  // the driver asks for each
+  free,      // the camera's own clock
+};
+
+/// What a camera is asked to do, and what it then does.
+struct CameraConfiguration {
+  int width = 0;       // px
+  int height = 0;      // px
+  double rate_hz = 0;  // exposures a second; with a hardware trigger the rate to be ready for
+  Duration exposure{};
+  double gain_db = 0;
+  CameraTrigger trigger = CameraTrigger::hardware;
+};
+
+enum class FrameStatus : std::uint8_t {
+  complete,
+  torn,  // parts of the image never came; their pixels mean nothing
+};
+
+/// One exposure, handed out by wait().
+struct Frame {
+  FrameSlot slot = 0;
+  std::uint64_t counter = 0;     // exposures since start(), the first is 0, unwrapped; gaps are frames that never came
+  DeviceStamp exposure_start{};  // by the camera's clock
+  HostStamp arrival{};           // when the last byte was here
+  Duration exposure{};           // as this frame had it
+  FrameStatus status = FrameStatus::complete;
+};
+
+/// Counters since open; all only grow.
+struct CameraStatistics {
+  std::uint64_t delivered = 0;  // handed out by wait()
+  std::uint64_t torn = 0;       // of these
+  std::uint64_t underruns = 0;  // exposures dropped because no slot was free
+  std::uint64_t lost = 0;       // exposures known to have happened that never arrived
+  std::uint64_t starts = 0;     // successful start() calls
+};
+
+/// One opened camera: gige, iidc, v4l2 and mock, all behind this.
+///
+/// Ownership  A slot belongs to the camera until wait() hands it out, then to the caller until release(). Slots are the transport's own
+///            buffers or those of a FramePool; either way view() shows the pixels, without a copy.
+/// Threads    configure, start, stop: the owner's thread. wait: one consumer thread. release: one thread, the same or another. wait and
+///            release may overlap stop(). statistics: any.
+/// Memory     No allocation by the caller's thread between start() and stop(). Slots are fixed at configure().
+/// Time       exposure_start by the device's clock, arrival by the host's (or by virtual time, for a mock that runs faster).
+/// Pixels     8-bit grey, row 0 on top, rows padded to cache lines; the padding is not initialised.
+/// Full       With no slot free the newest exposure is dropped and counted (`underruns`); a mock in virtual time waits instead.
+/// Errors     Nothing throws. A call that is not `ok` has changed nothing but the counters and *arrival.
+class Camera {
+ public:
+  virtual ~Camera() = default;  // stops
+
+  [[nodiscard]] virtual const DeviceInfo& info() const noexcept = 0;
+  /// While not streaming. *actual (may be null): what the camera will do, rounded to what it can. → ok, unsupported, bad_configuration,
+  /// gone
+  [[nodiscard]] virtual DeviceStatus configure(const CameraConfiguration& wanted, CameraConfiguration* actual) noexcept = 0;
+  /// Starts streaming, also again after `gone`; while streaming it does nothing. `ready` (may be null) is told of every frame and of the
+  /// device's going. → ok, gone, no_permission, no_bandwidth, bad_configuration (not configured)
+  [[nodiscard]] virtual DeviceStatus start(Notifier* ready) noexcept = 0;
+  /// Oldest frame not yet handed out, waiting at most `limit` (0: look once). `ok`: frame->slot is the caller's. `gone`: frame->arrival
+  /// says when it was noticed. → ok, timeout, stopped, ended, gone
+  [[nodiscard]] virtual DeviceStatus wait(Duration limit, Frame* frame) noexcept = 0;
+  /// Precondition: the slot was handed out and not yet released.
+  [[nodiscard]] virtual ImageView view(FrameSlot slot) const noexcept = 0;
+  /// Gives a slot back, in any order. Precondition as view().
+  virtual void release(FrameSlot slot) noexcept = 0;
+  /// Wakes wait() with `stopped`; no device access and no notify() after it returns. Twice is harmless.
+  virtual void stop() noexcept = 0;
+  [[nodiscard]] virtual CameraStatistics statistics() const noexcept = 0;
+};
+
+/// One kind of camera: a row in the table of drivers.
+///
+/// Threads  One caller. Memory: ordinary; before the drive only.
+class CameraDriver {
+ public:
+  virtual ~CameraDriver() = default;
+  [[nodiscard]] virtual std::vector<DeviceInfo> enumerate() = 0;
+  /// `serial` empty: the first. Null: *status says why. → ok, not_found, no_permission, busy, failed
+  [[nodiscard]] virtual std::unique_ptr<Camera> open(std::string_view serial, DeviceStatus* status) = 0;
+};
+
+}  // namespace vergence

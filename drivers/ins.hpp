@@ -1,0 +1,59 @@
+#pragma once
+#include <cstdint>
+#include <memory>
+#include <string_view>
+#include <vector>
+
+#include "core/types/ins_sample.hpp"
+#include "drivers/device.hpp"
+
+namespace vergence {
+
+/// One reading as it came. `sample.stamp` and `sample.stamp_error` are not set yet: the ClockMapper does that.
+struct InsReading {
+  InsSample sample{};
+  DeviceStamp measured{};  // by the INS's clock
+  HostStamp arrival{};     // when the last byte was here
+};
+
+/// Counters since open; all only grow.
+struct InsStatistics {
+  std::uint64_t delivered = 0;
+  std::uint64_t lost = 0;       // gaps in the device's count
+  std::uint64_t malformed = 0;  // packets that made no sense
+  std::uint64_t overruns = 0;   // readings that found the ring full (live); never silent
+  std::uint64_t starts = 0;
+};
+
+/// One opened inertial navigation system with satellite receiver.
+///
+/// Ownership  Values; nothing to give back.
+/// Threads    configure, start, stop: the owner's thread. wait: one consumer thread; it may overlap stop(). statistics: any.
+/// Memory     No allocation by the caller's thread between start() and stop().
+/// Full       A reading that finds no room is dropped and counted; a mock in virtual time waits instead.
+/// Errors     Nothing throws. A call that is not `ok` has changed nothing but the counters and reading->arrival.
+class Ins {
+ public:
+  virtual ~Ins() = default;  // stops
+
+  [[nodiscard]] virtual const DeviceInfo& info() const noexcept = 0;
+  /// Readings a second. *actual_hz (may be null): what it will do. → ok, unsupported, bad_configuration, gone
+  [[nodiscard]] virtual DeviceStatus configure(double rate_hz, double* actual_hz) noexcept = 0;
+  /// As Camera::start().
+  [[nodiscard]] virtual DeviceStatus start(Notifier* ready) noexcept = 0;
+  /// Oldest reading not yet taken, in the order of measurement, waiting at most `limit` (0: look once). `gone`: reading->arrival says when
+  /// it was noticed. → ok, timeout, stopped, ended, gone
+  [[nodiscard]] virtual DeviceStatus wait(Duration limit, InsReading* reading) noexcept = 0;
+  virtual void stop() noexcept = 0;
+  [[nodiscard]] virtual InsStatistics statistics() const noexcept = 0;
+};
+
+/// One kind of INS: a row in the table of drivers. As CameraDriver.
+class InsDriver {
+ public:
+  virtual ~InsDriver() = default;
+  [[nodiscard]] virtual std::vector<DeviceInfo> enumerate() = 0;
+  [[nodiscard]] virtual std::unique_ptr<Ins> open(std::string_view serial, DeviceStatus* status) = 0;
+};
+
+}  // namespace vergence

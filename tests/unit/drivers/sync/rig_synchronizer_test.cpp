@@ -1,0 +1,247 @@
+#include "drivers/sync/rig_synchronizer.hpp"
+
+#include <gtest/gtest.h>
+
+#include <map>
+#include <set>
+#include <vector>
+
+#include "core/math/random.hpp"
+
+namespace vergence {
+namespace {
+
+constexpr Duration kInterval = Duration::milliseconds(50);
+
+SyncOptions options(int cameras = 2) {
+  SyncOptions o;
+  o.cameras = cameras;
+  o.interval = kInterval;
+  o.hold = kInterval * 2;
+  return o;
+}
+
+HostStamp middle_of(std::uint64_t pulse) { return HostStamp(1'000'000'000) + kInterval * static_cast<std::int64_t>(pulse); }
+
+SyncFrame frame(int camera, std::uint64_t counter, std::uint64_t pulse, FrameSlot slot = 0) {
+  SyncFrame f;
+  f.camera = camera;
+  f.slot = slot;
+  f.counter = counter;
+  f.middle = {middle_of(pulse) + Duration::microseconds(30 * camera), Duration::microseconds(100)};
+  f.arrival = middle_of(pulse) + Duration::milliseconds(10 + camera);
+  return f;
+}
+
+std::vector<SyncedSet> drain(RigSynchronizer* sync) {
+  std::vector<SyncedSet> sets;
+  for (SyncedSet set; sync->next(&set);) sets.push_back(set);
+  return sets;
+}
+
+std::vector<SyncedSet> offer(RigSynchronizer* sync, const SyncFrame& f, SyncVerdict expected = SyncVerdict::taken) {
+  EXPECT_EQ(sync->offer(f), expected) << "camera " << f.camera << " counter " << f.counter;
+  return drain(sync);
+}
+
+TEST(RigSynchronizer, aSetGoesOutWithItsLastImageAndCarriesCameraZerosStamp) {
+  RigSynchronizer sync(options());
+  EXPECT_TRUE(offer(&sync, frame(1, 0, 0, 7)).empty());
+  const auto sets = offer(&sync, frame(0, 0, 0, 3));
+  ASSERT_EQ(sets.size(), 1U);
+  EXPECT_TRUE(sets[0].complete);
+  EXPECT_EQ(sets[0].slots[0], 3);
+  EXPECT_EQ(sets[0].slots[1], 7);
+  EXPECT_EQ(sets[0].stamp, middle_of(0));
+  EXPECT_EQ(sets[0].error, Duration::microseconds(100));
+  EXPECT_EQ(sets[0].spread, Duration::microseconds(30));
+}
+
+TEST(RigSynchronizer, aLostImageIsKnownWhenTheNextOneOfThatCameraComes) {
+  RigSynchronizer sync(options());
+  EXPECT_TRUE(offer(&sync, frame(0, 0, 0)).empty());
+  EXPECT_TRUE(offer(&sync, frame(0, 1, 1)).empty());
+  const auto sets = offer(&sync, frame(1, 1, 1));
+  ASSERT_EQ(sets.size(), 2U);
+  EXPECT_FALSE(sets[0].complete);
+  EXPECT_FALSE(sets[0].present[1]);
+  EXPECT_TRUE(sets[1].complete);
+  EXPECT_EQ(sync.counters().lost[1], 1U);
+  EXPECT_EQ(sync.counters().missed, 0U);
+}
+
+TEST(RigSynchronizer, aPulseThatNobodySawIsMissedAndNotLost) {
+  RigSynchronizer sync(options());
+  (void)offer(&sync, frame(0, 0, 0));
+  (void)offer(&sync, frame(1, 0, 0));
+  (void)offer(&sync, frame(0, 3, 3));
+  EXPECT_EQ(offer(&sync, frame(1, 3, 3)).size(), 1U);
+  EXPECT_EQ(sync.counters().missed, 2U);
+  EXPECT_EQ(sync.counters().lost[0] + sync.counters().lost[1], 0U);
+}
+
+TEST(RigSynchronizer, duplicatesAndLateFramesAreToldApart) {
+  RigSynchronizer sync(options());
+  (void)offer(&sync, frame(0, 0, 0));
+  (void)offer(&sync, frame(0, 0, 0), SyncVerdict::duplicate);
+  (void)offer(&sync, frame(1, 0, 0));
+  (void)offer(&sync, frame(1, 0, 0), SyncVerdict::duplicate);
+  (void)offer(&sync, frame(0, 1, 1));
+  (void)offer(&sync, frame(1, 2, 2));  // pulse 1 goes out without camera 1
+  (void)offer(&sync, frame(1, 1, 1), SyncVerdict::late);
+  EXPECT_EQ(sync.counters().duplicate[0], 1U);
+  EXPECT_EQ(sync.counters().duplicate[1], 1U);
+  EXPECT_EQ(sync.counters().late[1], 1U);
+  EXPECT_EQ(sync.counters().lost[1], 1U);
+}
+
+TEST(RigSynchronizer, aSilentCameraHoldsASetNoLongerThanTheHold) {
+  RigSynchronizer sync(options());
+  EXPECT_TRUE(offer(&sync, frame(0, 0, 0)).empty());
+  EXPECT_TRUE(offer(&sync, frame(0, 1, 1)).empty());
+  const auto sets = offer(&sync, frame(0, 2, 2));
+  ASSERT_EQ(sets.size(), 1U);
+  EXPECT_EQ(sets[0].number, 0U);
+}
+
+TEST(RigSynchronizer, nobodyWaitsForAnAbsentCameraAndItComesBackByTime) {
+  RigSynchronizer sync(options());
+  (void)offer(&sync, frame(0, 0, 0));
+  (void)offer(&sync, frame(1, 0, 0));
+  sync.absent(1);
+  for (std::uint64_t i = 1; i < 40; ++i) EXPECT_EQ(offer(&sync, frame(0, i, i)).size(), 1U);
+  EXPECT_EQ(sync.counters().absent[1], 39U);
+  EXPECT_EQ(sync.counters().lost[1], 0U);
+  sync.restarted(1);
+  EXPECT_TRUE(offer(&sync, frame(0, 40, 40)).empty()) << "camera 1 is waited for again";
+  const auto sets = offer(&sync, frame(1, 0, 40, 9));
+  ASSERT_EQ(sets.size(), 1U);
+  EXPECT_TRUE(sets[0].complete);
+  (void)offer(&sync, frame(1, 1, 41));
+  EXPECT_EQ(offer(&sync, frame(0, 41, 41)).size(), 1U);
+}
+
+TEST(RigSynchronizer, aCounterThatLeapsIsNotBelieved) {
+  RigSynchronizer sync(options());
+  (void)offer(&sync, frame(0, 0, 0));
+  (void)offer(&sync, frame(1, 0, 0));
+  (void)offer(&sync, frame(0, 1, 1));
+  EXPECT_EQ(offer(&sync, frame(1, 0xffff'ffff'0000'0000U, 1)).size(), 1U);
+  EXPECT_EQ(sync.counters().complete, 2U);
+}
+
+TEST(RigSynchronizer, nonsenseIsNamed) {
+  SyncOptions o = options();
+  EXPECT_EQ(o.validate(), nullptr);
+  o.cameras = 5;
+  EXPECT_NE(o.validate(), nullptr);
+  o = options();
+  o.interval = Duration{};
+  EXPECT_NE(o.validate(), nullptr);
+}
+
+/// What a synchroniser may know, kept in plain containers: which pulses each camera has given, which sets are out.
+class Shadow {
+ public:
+  explicit Shadow(int cameras) : given_(static_cast<std::size_t>(cameras)) {}
+
+  SyncVerdict verdict(int camera, std::uint64_t pulse) {
+    auto& given = given_[static_cast<std::size_t>(camera)];
+    if (given.contains(pulse)) return SyncVerdict::duplicate;
+    if (any_out_ && pulse <= last_out_) return SyncVerdict::late;
+    given.insert(pulse);
+    return SyncVerdict::taken;
+  }
+  void taken(int camera, std::uint64_t pulse, FrameSlot slot) { waiting_[pulse][camera] = slot; }
+
+  void out(const SyncedSet& set) {
+    if (any_out_) {
+      ASSERT_GT(set.number, last_out_) << "in order, each once";
+    }
+    any_out_ = true;
+    last_out_ = set.number;
+    ASSERT_FALSE(waiting_.empty());
+    ASSERT_EQ(waiting_.begin()->first, set.number) << "the oldest first, and none without an image";
+    const auto images = waiting_.begin()->second;
+    waiting_.erase(waiting_.begin());
+    for (int k = 0; k < static_cast<int>(given_.size()); ++k) {
+      ASSERT_EQ(set.present[static_cast<std::size_t>(k)], images.contains(k));
+      if (images.contains(k)) {
+        ASSERT_EQ(set.slots[static_cast<std::size_t>(k)], images.at(k));
+      }
+    }
+    ASSERT_EQ(set.complete, images.size() == given_.size());
+    ++sets_;
+  }
+  [[nodiscard]] std::size_t waiting() const { return waiting_.size(); }
+  [[nodiscard]] std::uint64_t sets() const { return sets_; }
+  /// No complete set may wait behind nothing.
+  [[nodiscard]] bool oldest_complete() const { return !waiting_.empty() && waiting_.begin()->second.size() == given_.size(); }
+
+ private:
+  std::vector<std::set<std::uint64_t>> given_;
+  std::map<std::uint64_t, std::map<int, FrameSlot>> waiting_;
+  bool any_out_ = false;
+  std::uint64_t last_out_ = 0, sets_ = 0;
+};
+
+TEST(RigSynchronizer, behavesLikeItsShadowUnderRandomLossRepetitionAndDelay) {
+  for (std::uint64_t seed = 1; seed <= 6; ++seed) {
+    SCOPED_TRACE("seed " + std::to_string(seed));
+    const int cameras = 2 + static_cast<int>(seed % 3);
+    Random random(seed);
+    RigSynchronizer sync(options(cameras));
+    Shadow shadow(cameras);
+    std::vector<std::uint64_t> at(static_cast<std::size_t>(cameras), 0);  // next pulse of each camera
+    FrameSlot slot = 0;
+    std::uint64_t duplicates = 0, lates = 0;
+    for (int step = 0; step < 20000; ++step) {
+      const int k = static_cast<int>(random.below(static_cast<std::uint32_t>(cameras)));
+      auto& pulse = at[static_cast<std::size_t>(k)];
+      std::uint64_t number = pulse;
+      switch (random.below(20)) {
+        case 0:  // some are lost
+          pulse += 1 + random.below(3);
+          continue;
+        case 1:  // one again, not older than what is remembered
+          if (pulse > 0) number = pulse - 1 - std::min<std::uint64_t>(pulse - 1, random.below(6));
+          break;
+        default: {  // no camera runs ahead of another by more than the transport's depth
+          std::uint64_t slowest = pulse;
+          for (const std::uint64_t p : at) slowest = std::min(slowest, p);
+          if (pulse > slowest + 6) continue;
+          ++pulse;
+        }
+      }
+      const SyncVerdict expected = shadow.verdict(k, number);
+      const SyncFrame f = frame(k, number, number, slot);
+      ASSERT_EQ(sync.offer(f), expected) << "step " << step << " camera " << k << " pulse " << number;
+      duplicates += expected == SyncVerdict::duplicate ? 1 : 0;
+      lates += expected == SyncVerdict::late ? 1 : 0;
+      if (expected == SyncVerdict::taken) shadow.taken(k, number, slot);
+      slot = static_cast<FrameSlot>(slot + 1);
+      for (SyncedSet set; sync.next(&set);) {
+        shadow.out(set);
+        if (::testing::Test::HasFatalFailure()) return;
+      }
+      ASSERT_FALSE(shadow.oldest_complete()) << "step " << step;
+      ASSERT_LE(shadow.waiting(), RigSynchronizer::kOpen);
+    }
+    sync.finish();
+    for (SyncedSet set; sync.next(&set);) shadow.out(set);
+    EXPECT_EQ(shadow.waiting(), 0U) << "every slot that was taken has come out";
+    const SyncCounters& c = sync.counters();
+    EXPECT_EQ(c.complete + c.incomplete, shadow.sets());
+    std::uint64_t counted_duplicates = 0, counted_lates = 0;
+    for (std::size_t k = 0; k < kMaxCameras; ++k) counted_duplicates += c.duplicate[k], counted_lates += c.late[k];
+    EXPECT_EQ(counted_duplicates, duplicates);
+    EXPECT_EQ(counted_lates, lates);
+    EXPECT_GT(duplicates, 100U);
+    EXPECT_GT(lates, 10U);
+    EXPECT_GT(c.complete, 100U);
+    EXPECT_GT(c.incomplete, 100U);
+  }
+}
+
+}  // namespace
+}  // namespace vergence
