@@ -71,7 +71,7 @@ inline constexpr Duration kDriveStep = Duration::milliseconds(20);  // between c
 /// Camera on the vehicle: at `position_body` (m), looking forward, tilted down by `tilt_down` (rad). p_body = T · p_camera.
 [[nodiscard]] Transform camera_mount(const Vec3& position_body, double tilt_down) noexcept;
 
-/// The left camera of the default rack: 1.7 m above the ground, level.
+/// T_body_left of the default rack: 1.7 m above the ground, level.
 [[nodiscard]] inline Transform default_T_body_left() noexcept { return camera_mount({1.2, 0.375, 1.7}, 0.0); }
 
 /// What a renderer asks for: p_camera = T_camera_enu · p_enu, from where the body is and where the camera sits on it.
