@@ -17,12 +17,14 @@ constexpr int kLostAfter = 3;  // frames without a pose in a row before the stat
 
 void check(const RigCalibration& rig) {
   if (rig.cameras < 2 || rig.cameras > kMaxCameras)
-    throw std::invalid_argument("a rig of 2 to " + std::to_string(kMaxCameras) + " cameras is needed, this one has " + std::to_string(rig.cameras));
+    throw std::invalid_argument("a rig of 2 to " + std::to_string(kMaxCameras) + " cameras is needed, this one has " +
+                                std::to_string(rig.cameras));
   for (int k = 0; k < rig.cameras; ++k) {
     const auto i = static_cast<std::size_t>(k);
     const Intrinsics& c = rig.intrinsics[i];
     if (c.width < 64 || c.height < 64 || !(c.fx > 0) || !(c.fy > 0))
-      throw std::invalid_argument("camera " + std::to_string(k) + ": images of at least 64×64 pixels and positive focal lengths are needed");
+      throw std::invalid_argument("camera " + std::to_string(k) +
+                                  ": images of at least 64×64 pixels and positive focal lengths are needed");
     if (k > 0 && !(rig.T_camera_left[i].t.norm() > 1e-3))
       throw std::invalid_argument("camera " + std::to_string(k) + ": its baseline is below a millimetre, no depth can be measured");
   }
@@ -102,7 +104,9 @@ PoseSample Estimator::process(const RigFrame& frame) noexcept {
   if (out.posed) {
     p.without_pose = 0;
     if (p.state == State::lost) p.transition(Trigger::pose_found, frame.stamp);
-    if (out.restarted) p.note(EstimatorEvent::Kind::scene_restarted, frame.stamp, "the scene was built anew; the way since the last pose is extrapolated", out.gap_s);
+    if (out.restarted)
+      p.note(EstimatorEvent::Kind::scene_restarted, frame.stamp, "the scene was built anew; the way since the last pose is extrapolated",
+             out.gap_s);
     if (out.relocalised) p.note(EstimatorEvent::Kind::relocalised, frame.stamp, "found again among the window's points", 0);
   } else if (++p.without_pose == kLostAfter) {
     p.transition(Trigger::pose_lost, frame.stamp);

@@ -20,8 +20,8 @@ struct CornerOptions {
   float min_distance = 12;  // px to a corner already taken
 };
 
-inline constexpr int kMaxCell = 128;         // px: sizes the working memory of a cell
-inline constexpr int kMaxGridCells = 4096;   // of an image
+inline constexpr int kMaxCell = 128;        // px: sizes the working memory of a cell
+inline constexpr int kMaxGridCells = 4096;  // of an image
 
 /// The strongest corner of every grid cell that holds none of `taken`, strongest first, as many as `out` has room for.
 ///

@@ -9,8 +9,8 @@
 namespace vergence::features {
 namespace {
 
-constexpr int kSmooth = 2;                               // radius of the box that takes the noise away
-constexpr int kReach = kPatchSide / 2 - kSmooth - 1;     // px from the middle
+constexpr int kSmooth = 2;                            // radius of the box that takes the noise away
+constexpr int kReach = kPatchSide / 2 - kSmooth - 1;  // px from the middle
 constexpr std::uint64_t kPatternSeed = 20260131;
 
 struct Pair {

@@ -48,7 +48,8 @@ float zncc(const Block& b, const BlockSums& s) noexcept {
 
 }  // namespace
 
-SearchResult search_along(const Patch& patch, const Pyramid& image, const EpipolarCurve& curve, const EpipolarSearchOptions& options) noexcept {
+SearchResult search_along(const Patch& patch, const Pyramid& image, const EpipolarCurve& curve,
+                          const EpipolarSearchOptions& options) noexcept {
   SearchResult result;
   const int level = std::min({options.level, image.levels() - 1, patch.levels - 1});
   if (level < 0) return result;
@@ -80,7 +81,8 @@ SearchResult search_along(const Patch& patch, const Pyramid& image, const Epipol
     Vec2 p;
     const double rho = options.rho_first + (rho_last - options.rho_first) * i / steps;
     if (curve.at(rho, &p, nullptr) != ProjectStatus::ok) continue;
-    const int cx = static_cast<int>(std::lround(p.x() * scale - anchor.x())), cy = static_cast<int>(std::lround(p.y() * scale - anchor.y()));
+    const int cx = static_cast<int>(std::lround(p.x() * scale - anchor.x())),
+              cy = static_cast<int>(std::lround(p.y() * scale - anchor.y()));
     for (int b = -band; b <= band; ++b) {
       const int x = cx + (horizontal ? 0 : b), y = cy + (horizontal ? b : 0);
       if (x < kBlock / 2 || y < kBlock / 2 || x + kBlock / 2 > view.width || y + kBlock / 2 > view.height) continue;

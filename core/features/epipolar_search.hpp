@@ -8,7 +8,7 @@ namespace vergence::features {
 struct EpipolarCurve {
   const Camera* camera = nullptr;  // the other camera
   Transform T_camera_left{};
-  Vec3 ray{};                      // (x, y, 1) in left
+  Vec3 ray{};  // (x, y, 1) in left
 
   /// Pixel at inverse depth rho (1/m, of z in left; 0: infinity). Not ok: behind the camera or beyond its lens.
   [[nodiscard]] ProjectStatus at(double rho, Vec2* pixel, Mat23* J) const noexcept {
@@ -17,20 +17,20 @@ struct EpipolarCurve {
 };
 
 struct EpipolarSearchOptions {
-  int level = 1;                 // pyramid level searched
-  double rho_first = 0.0;        // 1/m, start of the range; may be negative to ask for exchanged cameras
-  double rho_last = 1.0;         // 1/m, its end
-  int band = 1;                  // px of the level to each side of the curve
-  float min_zncc = 0.7F;         // of the 8×8 px compared
-  float unique = 0.85F;          // (1 − best) / (1 − second best): above it the match is ambiguous
+  int level = 1;           // pyramid level searched
+  double rho_first = 0.0;  // 1/m, start of the range; may be negative to ask for exchanged cameras
+  double rho_last = 1.0;   // 1/m, its end
+  int band = 1;            // px of the level to each side of the curve
+  float min_zncc = 0.7F;   // of the 8×8 px compared
+  float unique = 0.85F;    // (1 − best) / (1 − second best): above it the match is ambiguous
 };
 
 enum class SearchStatus : std::uint8_t { ok, off_image, uncorrelated, ambiguous };
 
 struct SearchResult {
   SearchStatus status = SearchStatus::off_image;
-  double rho = 0;    // 1/m of the best position's foot on the curve
-  Vec2 pixel{};      // level 0, whole pixels of the level searched
+  double rho = 0;  // 1/m of the best position's foot on the curve
+  Vec2 pixel{};    // level 0, whole pixels of the level searched
   float zncc = 0;
 };
 

@@ -11,10 +11,10 @@
 namespace vergence::features {
 namespace {
 
-constexpr int kHalf = kPatchSide / 2;            // the middle pixel's index
-constexpr float kSettled = 0.01F;                // px of the level: a tenth of what noise leaves
-constexpr float kMinContrast = 2.0F;             // grey levels, standard deviation of the window
-constexpr float kMinHessian = 1.0F;              // grey levels² / px², least eigenvalue over the window's pixels
+constexpr int kHalf = kPatchSide / 2;  // the middle pixel's index
+constexpr float kSettled = 0.01F;      // px of the level: a tenth of what noise leaves
+constexpr float kMinContrast = 2.0F;   // grey levels, standard deviation of the window
+constexpr float kMinHessian = 1.0F;    // grey levels² / px², least eigenvalue over the window's pixels
 
 struct LevelOutcome {
   AlignStatus status;
@@ -48,7 +48,8 @@ LevelOutcome align_level(const detail::Window& w, const ImageView& image, float 
     }
     const int ix = static_cast<int>(left), iy = static_cast<int>(top);
     detail::WindowSums s{};
-    detail::window_sums(w, image.data + iy * image.stride + ix, image.stride, left - static_cast<float>(ix), top - static_cast<float>(iy), &s);
+    detail::window_sums(w, image.data + iy * image.stride + ix, image.stride, left - static_cast<float>(ix), top - static_cast<float>(iy),
+                        &s);
     const float image_variance = s.square - s.sum * s.sum / kPixels;
     const float norm = w.variance_sum * image_variance;
     out.zncc = norm > 1.F ? s.value / std::sqrt(norm) : 0.F;
@@ -128,8 +129,10 @@ AlignResult align(const Patch& patch, const Pyramid& image, const Vec2& predicte
     }
   }
   result.pixel = pixel;
-  if ((pixel - predicted).norm() > options.max_shift) result.status = AlignStatus::diverged;
-  else if (!(result.zncc >= options.min_zncc)) result.status = AlignStatus::uncorrelated;
+  if ((pixel - predicted).norm() > options.max_shift)
+    result.status = AlignStatus::diverged;
+  else if (!(result.zncc >= options.min_zncc))
+    result.status = AlignStatus::uncorrelated;
   return result;
 }
 

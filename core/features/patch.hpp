@@ -7,11 +7,11 @@
 
 namespace vergence::features {
 
-inline constexpr int kPatchLevels = 4;   // pyramid levels a patch is kept at
-inline constexpr int kPatchSide = 28;    // px kept a side: the window turned by 45° or seen 1.5 times smaller still lies inside
+inline constexpr int kPatchLevels = 4;  // pyramid levels a patch is kept at
+inline constexpr int kPatchSide = 28;   // px kept a side: the window turned by 45° or seen 1.5 times smaller still lies inside
 inline constexpr int kPatchBytes = kPatchSide * kPatchSide + 16;  // room for vector loads behind the last pixel
-inline constexpr int kWindow = 12;       // px aligned a side
-inline constexpr int kWindowStride = 16; // floats a row of the window in memory
+inline constexpr int kWindow = 12;                                // px aligned a side
+inline constexpr int kWindowStride = 16;                          // floats a row of the window in memory
 
 /// What a point looked like where it was first seen: the pixels about it at several levels.
 /// Its anchor is the pixel (x, y) of level 0 it was cut at; at level l the patch's middle pixel is the anchor's nearest,
@@ -35,9 +35,9 @@ enum class AlignStatus : std::uint8_t {
 
 struct AlignResult {
   AlignStatus status = AlignStatus::outside;
-  Vec2 pixel{};      // level 0
-  float zncc = 0;    // normalised correlation of window and image at the end, level of the last step
-  float sigma = 0;   // px, level 0: predicted from the window's gradients for one grey level of noise
+  Vec2 pixel{};     // level 0
+  float zncc = 0;   // normalised correlation of window and image at the end, level of the last step
+  float sigma = 0;  // px, level 0: predicted from the window's gradients for one grey level of noise
   int steps = 0;
 };
 

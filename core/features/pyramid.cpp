@@ -23,9 +23,7 @@ int usable_levels(int width, int height, int levels) noexcept {
   return n;
 }
 
-std::size_t padded_stride(int width) noexcept {
-  return (static_cast<std::size_t>(width) + kCacheLine - 1) / kCacheLine * kCacheLine;
-}
+std::size_t padded_stride(int width) noexcept { return (static_cast<std::size_t>(width) + kCacheLine - 1) / kCacheLine * kCacheLine; }
 
 }  // namespace
 

@@ -12,7 +12,7 @@ namespace {
 constexpr double kImageMargin = 9.0;      // px: a window's half and one
 constexpr float kMinStructure = 3.0F;     // grey levels, standard deviation of the coarsest level: a lens cap's noise stays below 2
 constexpr double kFarBaselines = 2000.0;  // depth given to a point whose disparity is within the noise of zero
-constexpr int kMaxDistance = 64;         // bits of 256: unrelated patches lie at 128 ± 8
+constexpr int kMaxDistance = 64;          // bits of 256: unrelated patches lie at 128 ± 8
 constexpr double kDistinct = 0.8;         // of the second best's distance
 constexpr float kRoughSigma = 3.F;        // px: two corners found independently
 constexpr double kNearDisparity = 3.0;    // px: ten times the noise of a match; what makes scale
@@ -50,7 +50,8 @@ std::size_t FrontEnd::memory_needed(const OdometryOptions& options, const RigCal
     bytes += features::Pyramid::memory_needed(c.width, c.height, options.pyramid_levels) + kMaxPoints * sizeof(Followed) + 2 * kCacheLine;
   }
   const auto n = static_cast<std::size_t>(options.features);
-  return bytes + n * (sizeof(features::Corner) + sizeof(NewPoint)) + kMaxPoints * (sizeof(features::Corner) + sizeof(features::Descriptor)) + 5 * kCacheLine;
+  return bytes + n * (sizeof(features::Corner) + sizeof(NewPoint)) +
+         kMaxPoints * (sizeof(features::Corner) + sizeof(features::Descriptor)) + 5 * kCacheLine;
 }
 
 FrontEnd::FrontEnd(const OdometryOptions& options, const RigCalibration& rig, Arena& arena, PairRunner& runner)
@@ -104,7 +105,8 @@ bool FrontEnd::finish(int k, const Vec2& raw, double parallax, Followed* f) cons
   return true;
 }
 
-FrontEnd::Followed FrontEnd::follow(const MapPoint& p, const Transform& T_left_world, int k, const features::AlignOptions& how) const noexcept {
+FrontEnd::Followed FrontEnd::follow(const MapPoint& p, const Transform& T_left_world, int k,
+                                    const features::AlignOptions& how) const noexcept {
   Followed f;
   const auto i = static_cast<std::size_t>(k);
   const Transform T_k_world = rig_.T_camera_left[i] * T_left_world;

@@ -67,8 +67,8 @@ class FrontEnd {
     bool usable = false;
     bool behind = false;  // matched where a point of exchanged cameras would lie
     int matched_camera = 0;
-    double rho = 0;       // 1/m
-    double disparity = 0; // px between here and a point at infinity
+    double rho = 0;        // 1/m
+    double disparity = 0;  // px between here and a point at infinity
     Vec3 ray{};
     Mat2 d_ray_d_pixel{};
     features::Patch patch{};

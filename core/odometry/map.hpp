@@ -9,8 +9,8 @@
 
 namespace vergence::odometry {
 
-inline constexpr std::size_t kMaxWindow = 20;     // keyframes; OdometryOptions::window_keyframes stays below
-inline constexpr std::size_t kMaxPoints = 2048;   // of the map: tracked ones and those the window still sees
+inline constexpr std::size_t kMaxWindow = 20;    // keyframes; OdometryOptions::window_keyframes stays below
+inline constexpr std::size_t kMaxPoints = 2048;  // of the map: tracked ones and those the window still sees
 
 /// What one rig frame saw of a point: pixels of an ideal pinhole camera with each camera's own K, distortion removed.
 struct Sighting {
@@ -37,14 +37,14 @@ enum class PointStage : std::uint8_t {
 /// A point of the scene. p_world in metres; the patch is what it looked like in `left` where it was made.
 struct MapPoint {
   PointStage stage = PointStage::free;
-  std::uint8_t missed = 0;      // frames in a row that did not find it
-  std::uint16_t found = 0;      // frames that did
+  std::uint8_t missed = 0;  // frames in a row that did not find it
+  std::uint16_t found = 0;  // frames that did
   Vec3 p_world = Vec3::Zero();
-  Transform T_origin_world{};   // left camera where the patch was cut
-  Vec3 ray = Vec3::UnitZ();     // (x, y, 1) of its pixel there
+  Transform T_origin_world{};             // left camera where the patch was cut
+  Vec3 ray = Vec3::UnitZ();               // (x, y, 1) of its pixel there
   Mat2 d_ray_d_pixel = Mat2::Identity();  // of that ray's x, y by the raw pixel
   features::Patch patch{};
-  Sighting now{};               // this frame's
+  Sighting now{};                                  // this frame's
   std::array<Eigen::Vector2f, kMaxCameras> raw{};  // this frame's pixels as the image has them
   std::array<Sighting, kMaxWindow> seen{};         // by keyframe slot
 
@@ -63,8 +63,7 @@ struct Keyframe {
 /// Policies when full  Points: make_point() refuses, the caller counts. Keyframes: make_keyframe() drops the oldest first.
 class Map {
  public:
-  Map(std::size_t window, Arena& arena)
-      : points_(arena.make<MapPoint>(kMaxPoints, "map points")), window_(window) {}
+  Map(std::size_t window, Arena& arena) : points_(arena.make<MapPoint>(kMaxPoints, "map points")), window_(window) {}
   [[nodiscard]] static std::size_t memory_needed() noexcept { return kMaxPoints * sizeof(MapPoint) + 2 * kCacheLine; }
 
   void clear() noexcept;

@@ -7,21 +7,21 @@
 namespace vergence::odometry {
 namespace {
 
-constexpr int kSample = 100;             // points followed from far away: enough for MLESAC, a third of the work
-constexpr int kSampleInliers = 12;       // of the sample, below which the prediction was wrong
-constexpr double kSampleShare = 0.3;     // and of those found, which must agree
-constexpr int kRelocaliseInliers = 15;   // that agree on one pose: by chance of rough matches 8 do
+constexpr int kSample = 100;                // points followed from far away: enough for MLESAC, a third of the work
+constexpr int kSampleInliers = 12;          // of the sample, below which the prediction was wrong
+constexpr double kSampleShare = 0.3;        // and of those found, which must agree
+constexpr int kRelocaliseInliers = 15;      // that agree on one pose: by chance of rough matches 8 do
 constexpr std::uint8_t kMissesAllowed = 2;  // frames a point may be hidden
 constexpr std::uint16_t kFoundEnough = 2;   // rig frames, so four images, before a point holds a pose
-constexpr double kOutlier = 9.21;        // squared sigmas, two coordinates at 99 %
-constexpr double kNearDisparity = 3.0;   // px: ten times the noise of a match
-constexpr int kNearEnough = 10;          // near points that keep the scale
-constexpr int kCameraHolds = 8;          // inliers for a camera to count as one that supports the pose
-constexpr double kRigidShare = 0.4;      // of the points found that must agree: below it something else moves
-constexpr int kRestartedFrames = 10;     // frames marked after the scene was built anew
+constexpr double kOutlier = 9.21;           // squared sigmas, two coordinates at 99 %
+constexpr double kNearDisparity = 3.0;      // px: ten times the noise of a match
+constexpr int kNearEnough = 10;             // near points that keep the scale
+constexpr int kCameraHolds = 8;             // inliers for a camera to count as one that supports the pose
+constexpr double kRigidShare = 0.4;         // of the points found that must agree: below it something else moves
+constexpr int kRestartedFrames = 10;        // frames marked after the scene was built anew
 constexpr int kFramesLostBeforeRestart = 3;
 constexpr double kLongestExtrapolation = 2.0;  // s: a vehicle's speed says nothing about later
-constexpr int kStartMatches = 30;        // points across to start from
+constexpr int kStartMatches = 30;              // points across to start from
 
 class StageClock {
  public:
@@ -125,7 +125,8 @@ Odometry::PoseFit Odometry::fit_pose(const Transform& start, bool sample) noexce
     if (rig_.intrinsics[0].fx * rig_.T_camera_left[other].t.norm() > kNearDisparity * z) ++fit.near;
   }
   for (int k = 0; k < rig_.cameras; ++k)
-    if (held[static_cast<std::size_t>(k)] >= kCameraHolds) fit.cameras = static_cast<std::uint8_t>(fit.cameras | (1U << static_cast<unsigned>(k)));
+    if (held[static_cast<std::size_t>(k)] >= kCameraHolds)
+      fit.cameras = static_cast<std::uint8_t>(fit.cameras | (1U << static_cast<unsigned>(k)));
   fit.found = fit.inliers >= options_.min_inliers;
   return fit;
 }
@@ -188,7 +189,8 @@ void Odometry::settle_points(const PoseFit& fit) noexcept {
         if (!p.now.by(k)) continue;
         const auto c = static_cast<std::size_t>(k);
         Vec2 pixel;
-        const bool seen = front_end_.lens(k).ideal().project(rig_.T_camera_left[c] * (fit.T_left_world * p.p_world), &pixel, nullptr) == ProjectStatus::ok;
+        const bool seen = front_end_.lens(k).ideal().project(rig_.T_camera_left[c] * (fit.T_left_world * p.p_world), &pixel, nullptr) ==
+                          ProjectStatus::ok;
         const double limit = kOutlier * p.now.sigma[c] * p.now.sigma[c];
         if (!seen || (pixel - p.now.pixel[c].cast<double>()).squaredNorm() > 4.0 * limit) p.now.drop(k);
       }

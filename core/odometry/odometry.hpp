@@ -18,9 +18,9 @@ struct FrameOutcome {
   int stereo_inliers = 0;
   double reprojection_px = 0;
   bool keyframe = false;
-  bool restarted = false;     // the scene was built anew in this frame
-  bool relocalised = false;   // found again in the window after being lost
-  double gap_s = 0;           // time since the frame before, when it was too long to predict over
+  bool restarted = false;    // the scene was built anew in this frame
+  bool relocalised = false;  // found again in the window after being lost
+  double gap_s = 0;          // time since the frame before, when it was too long to predict over
   std::array<float, kStages> stage_ms{};
 };
 
@@ -41,10 +41,10 @@ class Odometry {
     Transform T_left_world{};
     int inliers = 0;
     int stereo = 0;
-    int near = 0;            // inliers whose depth this frame measures
-    int given = 0;           // points that were found in the images at all
+    int near = 0;   // inliers whose depth this frame measures
+    int given = 0;  // points that were found in the images at all
     double rms_px = 0;
-    bool weak = false;       // the points leave some direction of motion open
+    bool weak = false;         // the points leave some direction of motion open
     std::uint8_t cameras = 0;  // bit k: camera k holds at least a few of the inliers
   };
 
@@ -71,15 +71,15 @@ class Odometry {
   BoundedVector<std::uint16_t> owner_;  // map index of each row of the table
   Random random_;
 
-  Transform T_left_world_{};   // of the last posed frame
-  Vec3 turn_per_s_ = Vec3::Zero();   // of the last step: rotation vector and translation of T_now_before, a second
+  Transform T_left_world_{};        // of the last posed frame
+  Vec3 turn_per_s_ = Vec3::Zero();  // of the last step: rotation vector and translation of T_now_before, a second
   Vec3 shift_per_s_ = Vec3::Zero();
   Stamp stamp_{};
   bool any_pose_ = false;
-  int frames_lost_ = 0;        // in a row, with images that show something
-  int restart_cooldown_ = 0;   // frames still marked after a restart
+  int frames_lost_ = 0;       // in a row, with images that show something
+  int restart_cooldown_ = 0;  // frames still marked after a restart
   Reason restart_reason_ = Reason::none;
-  int keyframe_points_ = 0;    // active points when the last keyframe was made
+  int keyframe_points_ = 0;  // active points when the last keyframe was made
 };
 
 }  // namespace vergence::odometry

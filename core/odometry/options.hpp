@@ -5,18 +5,18 @@ namespace vergence {
 
 /// Every number a user may change in `odometry:`; the configuration's schema (app/config) has a row for each field.
 struct OdometryOptions {
-  int features = 320;               // tracked points per image aimed at, 50 … 1000
-  int cell_px = 32;                 // side of the detection grid's cells at full resolution, 16 … 128
-  int pyramid_levels = 4;           // 2 … 6; each halves the image
-  double min_corner_score = 30.0;   // least eigenvalue of the structure tensor's mean, grey levels² / px², > 0
-  double nearest_baselines = 4.0;   // nearest depth looked for across, in baselines: sets the largest disparity, 1 … 50
-  double band_px = 2.0;             // half width of the band about the epipolar line across, 0.5 … 20
-  double match_zncc = 0.8;          // least normalised correlation of a match across, 0.5 … 0.99
-  double pixel_sigma = 0.15;        // px, of one coordinate of a tracked corner, level 0; also the floor of the residual scale (METHOD §2)
-  double parallax_sigma = 0.8;      // px more, in quadrature, for a patch seen from one depth further to the side: its slope is unknown, 0 … 10
-  double huber = 2.0;               // robust threshold in sigmas, 1 … 10
-  int window_keyframes = 10;        // poses in the adjusted window, 3 … 20
-  int window_steps = 5;             // solver steps a keyframe at most, 1 … 30
+  int features = 320;              // tracked points per image aimed at, 50 … 1000
+  int cell_px = 32;                // side of the detection grid's cells at full resolution, 16 … 128
+  int pyramid_levels = 4;          // 2 … 6; each halves the image
+  double min_corner_score = 30.0;  // least eigenvalue of the structure tensor's mean, grey levels² / px², > 0
+  double nearest_baselines = 4.0;  // nearest depth looked for across, in baselines: sets the largest disparity, 1 … 50
+  double band_px = 2.0;            // half width of the band about the epipolar line across, 0.5 … 20
+  double match_zncc = 0.8;         // least normalised correlation of a match across, 0.5 … 0.99
+  double pixel_sigma = 0.15;       // px, of one coordinate of a tracked corner, level 0; also the floor of the residual scale (METHOD §2)
+  double parallax_sigma = 0.8;  // px more, in quadrature, for a patch seen from one depth further to the side: its slope is unknown, 0 … 10
+  double huber = 2.0;           // robust threshold in sigmas, 1 … 10
+  int window_keyframes = 10;    // poses in the adjusted window, 3 … 20
+  int window_steps = 5;         // solver steps a keyframe at most, 1 … 30
   double keyframe_parallax = 0.03;  // rad: median turn of the rays since the last keyframe that makes a new one, 0.005 … 0.3
   double keyframe_tracked = 0.8;    // share of the last keyframe's points still tracked below which a new one is made, 0.1 … 1
   int min_inliers = 20;             // points under which a pose is not believed (`lost`), 6 … 200

@@ -8,9 +8,9 @@ namespace vergence::odometry {
 namespace {
 
 constexpr std::size_t kMaxWindowPoints = 1024;
-constexpr std::size_t kSightingsAPoint = 10;     // on average, of all cameras; more are left out of the step
-constexpr float kOutlier = 16.F;                 // squared whitened residual, 2 degrees of freedom: 3e-4 of Gaussian errors
-constexpr double kMinDepthOfPoint = 0.05;        // m in front of every camera that sees it
+constexpr std::size_t kSightingsAPoint = 10;  // on average, of all cameras; more are left out of the step
+constexpr float kOutlier = 16.F;              // squared whitened residual, 2 degrees of freedom: 3e-4 of Gaussian errors
+constexpr double kMinDepthOfPoint = 0.05;     // m in front of every camera that sees it
 
 }  // namespace
 
@@ -36,8 +36,7 @@ WindowAdjuster::WindowAdjuster(const OdometryOptions& options, const RigCalibrat
   owner_ = BoundedVector<std::uint16_t>(arena.make<std::uint16_t>(c.points, "window points"));
   observations_ = BoundedVector<BundleObservation>(arena.make<BundleObservation>(c.observations, "window observations"));
   residuals_ = arena.make<float>(c.observations, "window residuals");
-  for (int k = 0; k < rig.cameras; ++k)
-    cameras_[static_cast<std::size_t>(k)] = Lens(rig.intrinsics[static_cast<std::size_t>(k)]).ideal();
+  for (int k = 0; k < rig.cameras; ++k) cameras_[static_cast<std::size_t>(k)] = Lens(rig.intrinsics[static_cast<std::size_t>(k)]).ideal();
 }
 
 void WindowAdjuster::gather(Map& map) noexcept {

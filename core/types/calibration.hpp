@@ -43,8 +43,8 @@ struct RigCalibration {
   std::array<std::array<double, 6>, kMaxCameras> sigma_wide{};   // the same with uncertain intrinsics
   // zero: not given (Eigen leaves a Mat6 without initialiser undefined)
   std::array<Mat6, kMaxCameras> covariance_wide{Mat6::Zero(), Mat6::Zero(), Mat6::Zero(), Mat6::Zero()};
-  double baseline = 0;                                           // m, |t| of camera 1 as measured once
-  double baseline_sigma = 0;                                     // m; 0: exact
+  double baseline = 0;        // m, |t| of camera 1 as measured once
+  double baseline_sigma = 0;  // m; 0: exact
 
   Stamp found{};               // when the stereo transform was found; 0: given
   int frames = 0;              // rig frames it was found from

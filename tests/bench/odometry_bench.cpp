@@ -1,6 +1,6 @@
 // Stereo odometry on recorded excerpts: accuracy, time a frame by stage, and a yardstick of the machine's speed in the same run.
 //
-//   odometry_bench [--repeats N] [--threads 1|2] [--set KEY=VALUE]… [--json FILE] [--no-yardstick] [--frames FILE]
+//   odometry_bench [--repeats N] [--threads 1|2] [--set KEY=VALUE]… [--json FILE] [--markdown FILE] [--no-yardstick] [--frames PREFIX]
 //
 // Images are decoded beforehand; the clock runs from the decoded pair to the pose. Yardstick: OpenCV's pyramidal Lucas–Kanade on
 // 1000 corners of one pair of successive EuRoC left images (pyramids included, one thread). A time counts as its ratio to it.
@@ -23,6 +23,7 @@
 #include "app/datasets/stereo_sequence.hpp"
 #include "app/datasets/trajectory_files.hpp"
 #include "app/runtime/thread_runner.hpp"
+#include "app/runtime/version.hpp"
 #include "core/comparison/trajectory_metrics.hpp"
 #include "core/estimator/estimator.hpp"
 #include "core/memory/allocation_guard.hpp"
@@ -43,6 +44,7 @@ struct DecodedDrive {
   app::StereoSequence sequence;
   std::vector<std::array<cv::Mat, 2>> pairs;
   app::Trajectory truth;
+  double decode_ms = 0;  // mean a pair, one thread
 };
 
 struct Replay {
@@ -57,7 +59,7 @@ struct Arguments {
   int threads = 2;
   bool yardstick = true;
   std::vector<std::string> set;
-  std::string json, frames;
+  std::string json, frames, markdown;
 };
 
 double quantile(std::vector<float> values, double q) {
@@ -86,12 +88,16 @@ DecodedDrive load(const Excerpt& excerpt, const std::filesystem::path& folder) {
   DecodedDrive d;
   d.sequence = app::open_sequence(excerpt.format, folder);
   d.truth = app::read_trajectory(folder);
+  const auto start = std::chrono::steady_clock::now();
   for (const app::StereoPair& p : d.sequence.pairs) {
     std::array<cv::Mat, 2> images;
     for (std::size_t k = 0; k < 2; ++k)
-      images[k] = decode(d.sequence.root / p.file[k], d.sequence.calibration.intrinsics[k].width, d.sequence.calibration.intrinsics[k].height);
+      images[k] =
+          decode(d.sequence.root / p.file[k], d.sequence.calibration.intrinsics[k].width, d.sequence.calibration.intrinsics[k].height);
     d.pairs.push_back(std::move(images));
   }
+  d.decode_ms =
+      std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count() / static_cast<double>(d.pairs.size());
   return d;
 }
 
@@ -118,9 +124,9 @@ Replay replay(const DecodedDrive& d, const app::Configuration& configuration, in
     for (std::size_t k = 0; k < kStages; ++k) r.stage_ms[k] += static_cast<double>(s.stage_ms[k]);
     r.keyframes += s.keyframe ? 1 : 0;
     if (frames != nullptr)
-      fmt::print(frames, "{},{},{},{},{},{},{:.3f},{},{:.2f},{:.6f},{:.6f},{:.6f}\n", i, s.stamp.ns(), to_string(s.status), to_string(s.reason),
-                 s.inliers, s.stereo_inliers, s.reprojection_px, s.keyframe ? 1 : 0, s.estimate_ms, s.T_world_left.t.x(), s.T_world_left.t.y(),
-                 s.T_world_left.t.z());
+      fmt::print(frames, "{},{},{},{},{},{},{:.3f},{},{:.2f},{:.6f},{:.6f},{:.6f}\n", i, s.stamp.ns(), to_string(s.status),
+                 to_string(s.reason), s.inliers, s.stereo_inliers, s.reprojection_px, s.keyframe ? 1 : 0, s.estimate_ms,
+                 s.T_world_left.t.x(), s.T_world_left.t.y(), s.T_world_left.t.z());
     if (s.status == PoseStatus::lost) continue;
     ++r.posed;
     r.ok += s.status == PoseStatus::ok ? 1 : 0;
@@ -134,8 +140,8 @@ void write_tum(const std::string& file, const std::vector<StampedPose>& poses) {
   for (const StampedPose& p : poses) {
     const Eigen::Quaterniond q = quaternion(p.T_world_body.R);
     const Vec3& t = p.T_world_body.t;
-    out << fmt::format("{}.{:09} {:.9f} {:.9f} {:.9f} {:.9f} {:.9f} {:.9f} {:.9f}\n", p.stamp.ns() / 1'000'000'000, p.stamp.ns() % 1'000'000'000,
-                       t.x(), t.y(), t.z(), q.x(), q.y(), q.z(), q.w());
+    out << fmt::format("{}.{:09} {:.9f} {:.9f} {:.9f} {:.9f} {:.9f} {:.9f} {:.9f}\n", p.stamp.ns() / 1'000'000'000,
+                       p.stamp.ns() % 1'000'000'000, t.x(), t.y(), t.z(), q.x(), q.y(), q.z(), q.w());
   }
 }
 
@@ -164,7 +170,8 @@ nlohmann::json measure(const Excerpt& excerpt, const DecodedDrive& drive, const 
   std::vector<float> pooled, means, yards;
   Replay last;
   for (int i = 0; i < arguments.repeats; ++i) {
-    std::FILE* frames = i == 0 && !arguments.frames.empty() ? std::fopen((arguments.frames + "." + excerpt.name + ".csv").c_str(), "w") : nullptr;
+    std::FILE* frames =
+        i == 0 && !arguments.frames.empty() ? std::fopen((arguments.frames + "." + excerpt.name + ".csv").c_str(), "w") : nullptr;
     last = replay(drive, configuration, arguments.threads, frames);
     if (frames != nullptr) {
       std::fclose(frames);
@@ -198,7 +205,9 @@ nlohmann::json measure(const Excerpt& excerpt, const DecodedDrive& drive, const 
     j["yardstick_ms"] = *yardstick;
     j["ratio"] = quantile(means, 0.5) / *yardstick;
   }
-  for (int k = 0; k < kStages; ++k) j["stages_ms"][std::string(to_string(static_cast<Stage>(k)))] = last.stage_ms[static_cast<std::size_t>(k)] / n;
+  j["stages_ms"]["decode"] = drive.decode_ms;
+  for (int k = 0; k < kStages; ++k)
+    j["stages_ms"][std::string(to_string(static_cast<Stage>(k)))] = last.stage_ms[static_cast<std::size_t>(k)] / n;
   return j;
 }
 
@@ -216,6 +225,45 @@ void print(const nlohmann::json& j) {
   fmt::print("\n");
 }
 
+std::string processor() {
+  std::ifstream info("/proc/cpuinfo");
+  for (std::string line; std::getline(info, line);)
+    if (line.rfind("model name", 0) == 0) return line.substr(line.find(':') + 2);
+  return "unknown processor";
+}
+
+/// docs/benchmarks.md: accuracy, time and stages of the last run, with the version and the machine that gave them.
+void write_markdown(const std::string& file, const nlohmann::json& all, const Arguments& arguments) {
+  std::ofstream out(file);
+  out << "# Benchmarks\n\nWritten by `scripts/bench` (`build/bench/odometry_bench`), version " << app::version() << ", " << processor()
+      << ", " << arguments.threads << " threads.\nMedian of " << arguments.repeats
+      << " replays' means; images decoded beforehand, the clock runs from the decoded pair to the pose.\n"
+         "Yardstick: OpenCV's pyramidal Lucas–Kanade on 1000 corners of one EuRoC pair, in the same run; only the ratio compares between "
+         "machines.\n\n"
+         "| data | frames posed | ATE SE(3) mm | ATE Sim(3) mm | scale | segments % | after one scale % | °/m "
+         "|\n|---|---|---|---|---|---|---|---|\n";
+  for (const auto& j : all)
+    out << fmt::format("| {} | {} of {} | {:.2f} | {:.2f} | {:.5f} | {:.3f} | {:.3f} | {:.4f} |\n", j["data"].get<std::string>(),
+                       j["posed"].get<int>(), j["frames"].get<int>(), j["ate_mm"].get<double>(), j["ate_sim3_mm"].get<double>(),
+                       j["scale"].get<double>(), j["segment_percent"].get<double>(), j["segment_scaled_percent"].get<double>(),
+                       j["rotation_deg_per_m"].get<double>());
+  out << "\nSegments: 0.2, 0.5, 1 m on EuRoC, 10 to 50 m on KITTI, every frame a start.\n\n| data | mean ms | p50 | p99 | max | yardstick "
+         "ms | mean / yardstick |\n|---|---|---|---|---|---|---|\n";
+  for (const auto& j : all)
+    out << fmt::format("| {} | {:.2f} | {:.2f} | {:.2f} | {:.2f} | {:.2f} | {:.3f} |\n", j["data"].get<std::string>(),
+                       j["mean_ms"].get<double>(), j["p50_ms"].get<double>(), j["p99_ms"].get<double>(), j["max_ms"].get<double>(),
+                       j.value("yardstick_ms", 0.0), j.value("ratio", 0.0));
+  out << "\n| stage, ms a frame |";
+  for (const auto& j : all) out << " " << j["data"].get<std::string>() << " |";
+  out << "\n|---|";
+  for (std::size_t i = 0; i < all.size(); ++i) out << "---|";
+  for (const char* stage : {"decode", "pyramid", "detect", "track", "match", "pose", "window"}) {
+    out << "\n| " << stage << " |";
+    for (const auto& j : all) out << fmt::format(" {:.2f} |", j["stages_ms"][stage].get<double>());
+  }
+  out << "\n\nDecode runs on its own thread ahead of the estimator and is not in the times above.\n";
+}
+
 Arguments parse(int argc, char** argv) {
   Arguments a;
   for (int i = 1; i < argc; ++i) {
@@ -224,13 +272,22 @@ Arguments parse(int argc, char** argv) {
       if (i + 1 >= argc) throw std::runtime_error(word + " needs a value");
       return argv[++i];
     };
-    if (word == "--repeats") a.repeats = std::stoi(value());
-    else if (word == "--threads") a.threads = std::stoi(value());
-    else if (word == "--set") a.set.push_back(value());
-    else if (word == "--json") a.json = value();
-    else if (word == "--frames") a.frames = value();
-    else if (word == "--no-yardstick") a.yardstick = false;
-    else throw std::runtime_error("unknown argument " + word);
+    if (word == "--repeats")
+      a.repeats = std::stoi(value());
+    else if (word == "--threads")
+      a.threads = std::stoi(value());
+    else if (word == "--set")
+      a.set.push_back(value());
+    else if (word == "--json")
+      a.json = value();
+    else if (word == "--markdown")
+      a.markdown = value();
+    else if (word == "--frames")
+      a.frames = value();
+    else if (word == "--no-yardstick")
+      a.yardstick = false;
+    else
+      throw std::runtime_error("unknown argument " + word);
   }
   return a;
 }
@@ -257,6 +314,7 @@ int main(int argc, char** argv) {
       all.push_back(measure(excerpt, drive, arguments, &yardstick));
       print(all.back());
     }
+    if (!arguments.markdown.empty() && !all.empty()) write_markdown(arguments.markdown, all, arguments);
     if (!arguments.json.empty()) std::ofstream(arguments.json) << all.dump(2) << '\n';
     return all.empty() ? 2 : 0;
   } catch (const std::exception& e) {

@@ -7,7 +7,7 @@ namespace vergence::features::detail {
 
 /// The window of a patch brought to the shape it has in the image, and what alignment needs of it.
 struct alignas(64) Window {
-  float value[kWindow * kWindowStride];  // T − mean T; columns from kWindow on are 0
+  float value[kWindow * kWindowStride];    // T − mean T; columns from kWindow on are 0
   float steep_x[kWindow * kWindowStride];  // ∂T/∂x, orthogonal to 1 and T
   float steep_y[kWindow * kWindowStride];
   float variance_sum;   // Σ (T − mean)²

@@ -26,8 +26,7 @@ void filter_rows(const std::uint8_t* const rows[5], int width, std::uint16_t* ou
     const auto six = hn::Add(hn::ShiftLeft<2>(mid), hn::ShiftLeft<1>(mid));
     hn::StoreU(hn::Add(hn::Add(outer, six), hn::ShiftLeft<2>(inner)), d16, out + x);
   }
-  for (; x < width; ++x)
-    out[x] = static_cast<std::uint16_t>(rows[0][x] + rows[4][x] + 4 * (rows[1][x] + rows[3][x]) + 6 * rows[2][x]);
+  for (; x < width; ++x) out[x] = static_cast<std::uint16_t>(rows[0][x] + rows[4][x] + 4 * (rows[1][x] + rows[3][x]) + 6 * rows[2][x]);
 }
 
 /// Every second pixel of the row, filtered the same way; v[-2] … v[width + 1] are valid.
