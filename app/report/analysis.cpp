@@ -1,0 +1,265 @@
+#include "app/report/analysis.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include <fmt/format.h>
+
+#include "app/report/decimation.hpp"
+#include "core/comparison/trajectory_metrics.hpp"
+#include "core/math/so3.hpp"
+
+namespace vergence::app::report {
+namespace {
+
+constexpr double kDegrees = 180.0 / std::numbers::pi;
+constexpr double kPlacement = 100.0;  // m: the stretch that lays the trajectory on its reference, as with the INS
+constexpr double kPercent = 100.0;
+constexpr double kWideGap = 4.0;                 // frame intervals: nothing is drawn across more
+constexpr std::size_t kMostEvaluated = 200'000;  // poses: the figures of a longer torn session are left out, not waited for
+
+void measure_time(const Session& s, Analysis* a) {
+  std::vector<double> steps;
+  for (std::size_t i = 0; i < s.frames.size(); ++i) {
+    a->time_s.push_back(seconds_between(s.frames.front().stamp, s.frames[i].stamp));
+    if (i > 0) steps.push_back(a->time_s[i] - a->time_s[i - 1]);
+  }
+  a->breaks.assign(s.frames.size(), 0);
+  if (steps.empty()) return;
+  a->duration_s = a->time_s.back();
+  const auto middle = steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2);
+  std::nth_element(steps.begin(), middle, steps.end());
+  a->interval_s = *middle;
+  for (std::size_t i = 1; i < s.frames.size(); ++i) a->breaks[i] = a->time_s[i] - a->time_s[i - 1] > kWideGap * a->interval_s ? 1 : 0;
+}
+
+void measure_distance(const Session& s, Analysis* a) {
+  const Vec3* last = nullptr;
+  for (const Frame& f : s.frames) {
+    if (f.posed) {
+      if (last != nullptr) a->path_m += (f.T_world_left.t - *last).norm();
+      last = &f.T_world_left.t;
+    }
+    a->distance_m.push_back(a->path_m);
+  }
+}
+
+void count_frames(const Session& s, Analysis* a) {
+  a->by_reason.assign(s.reasons.size(), 0);
+  a->read = s.frames.size();
+  for (const Frame& f : s.frames) {
+    if (!f.status)
+      ++a->unknown;
+    else
+      ++(*f.status == PoseStatus::ok ? a->ok : *f.status == PoseStatus::degraded ? a->degraded : a->lost);
+    if (f.status && *f.status != PoseStatus::ok) ++a->by_reason[f.reason];
+  }
+  a->skipped = static_cast<std::size_t>(std::clamp(number_at(s.summary, "frames.skipped").value_or(0.0), 0.0, 1e12));
+  if (a->read > a->unknown) a->ok_share = static_cast<double>(a->ok) / static_cast<double>(a->read + a->skipped);
+}
+
+std::vector<StampedPose> posed_frames(const Session& s) {
+  std::vector<StampedPose> poses;
+  for (const Frame& f : s.frames)
+    if (f.posed) poses.push_back({f.stamp, f.T_world_left});
+  return poses;
+}
+
+/// The rotation that turns the estimate's bodies onto the reference's, on average: the quaternion of the summed products, which lie
+/// close together at the start of a drive.
+Mat3 mean_rotation(std::span<const StampedPose> estimate, std::span<const StampedPose> reference) {
+  Eigen::Vector4d sum = Eigen::Vector4d::Zero();
+  for (std::size_t i = 0; i < estimate.size(); ++i) {
+    const Eigen::Vector4d q = quaternion(reference[i].T_world_body.R * estimate[i].T_world_body.R.transpose()).coeffs();
+    sum += q.dot(sum) < 0 ? Eigen::Vector4d(-q) : q;
+  }
+  return Eigen::Quaterniond(sum).normalized().toRotationMatrix();
+}
+
+struct Laid {
+  Transform T_reference_world{};
+  double stretch = 0;  // m
+  bool by_rotations = false;
+};
+
+/// Lays the first kPlacement metres of the estimate on the reference.
+Laid lay_on(const MatchedTrajectories& m) {
+  Laid laid;
+  std::size_t n = 1;
+  for (; n < m.reference.size() && laid.stretch < kPlacement; ++n)
+    laid.stretch += (m.reference[n].T_world_body.t - m.reference[n - 1].T_world_body.t).norm();
+  const auto estimate = std::span(m.estimate).first(n), reference = std::span(m.reference).first(n);
+  const Alignment fit = align(estimate, reference, AlignmentScale::one);
+  laid.T_reference_world = {fit.R_reference_estimate, fit.t_reference_estimate};
+  // Positions on a straight line, or all in one place, hold no rotation: the attitudes do.
+  constexpr double kHeld = 0.02;  // of the stretch
+  laid.by_rotations = n < 3 || fit.roll_unobservable || fit.lateral_extent < kHeld * laid.stretch;
+  if (!laid.by_rotations) return laid;
+  const Mat3 R = mean_rotation(estimate, reference);
+  Vec3 shift = Vec3::Zero();
+  for (std::size_t i = 0; i < n; ++i) shift += reference[i].T_world_body.t - R * estimate[i].T_world_body.t;
+  laid.T_reference_world = {R, shift / static_cast<double>(n)};
+  return laid;
+}
+
+/// Axes of the picture for a world whose up is +z, or for a camera's, whose up is −y: x to the right both times.
+Point on_map(const Vec3& p, bool up_is_z) { return up_is_z ? Point{p.x(), p.y()} : Point{p.x(), p.z()}; }
+
+/// Direction of view in the map, rad, counter-clockwise from the right.
+double view_angle(const Mat3& R, bool up_is_z) {
+  const Point v = on_map(R.col(2), up_is_z);
+  return std::atan2(v.y, v.x);
+}
+
+void compare_with_reference(const Session& s, const MatchedTrajectories& m, const Laid& laid, bool up_is_z, Analysis* a) {
+  std::size_t k = 0;
+  for (std::size_t i = 0; i < s.frames.size(); ++i) {
+    const Frame& f = s.frames[i];
+    if (!f.posed) continue;
+    const Transform T = laid.T_reference_world * f.T_world_left;
+    const Point ours = on_map(T.t, up_is_z);
+    a->ours_x[i] = ours.x, a->ours_y[i] = ours.y;
+    while (k < m.estimate.size() && m.estimate[k].stamp < f.stamp) ++k;
+    if (k == m.estimate.size() || m.estimate[k].stamp != f.stamp) continue;
+    const Transform& R = m.reference[k].T_world_body;
+    const Point theirs = on_map(R.t, up_is_z);
+    a->theirs_x[i] = theirs.x, a->theirs_y[i] = theirs.y;
+    a->horizontal_m[i] = std::hypot(ours.x - theirs.x, ours.y - theirs.y);
+    a->vertical_m[i] = up_is_z ? T.t.z() - R.t.z() : R.t.y() - T.t.y();
+    a->heading_deg[i] = std::remainder(view_angle(T.R, up_is_z) - view_angle(R.R, up_is_z), 2 * std::numbers::pi) * kDegrees;
+  }
+}
+
+void take_reference(const Session& s, Analysis* a) {
+  const std::vector<StampedPose> ours = posed_frames(s);
+  const MatchedTrajectories m = ours.empty() ? MatchedTrajectories{} : associate(ours, s.reference, EvaluationOptions{});
+  if (m.estimate.empty()) {
+    a->source_sentence = "reference.tum has no pose at the times of ours: there is nothing to compare, so no errors are shown.";
+    return;
+  }
+  const Laid laid = lay_on(m);
+  const bool up_is_z = world_up(m.reference, BodyAxes::camera).z() > 0.5;
+  a->source = ErrorSource::reference;
+  a->source_sentence = fmt::format(
+      "Errors against the reference trajectory. Ours was laid on it once, rigidly and without scale, over the first {:.0f} m ({}); what "
+      "grows after that is drift.",
+      laid.stretch, laid.by_rotations ? "by attitudes and mean position: the way is too straight for positions alone" : "by positions");
+  compare_with_reference(s, m, laid, up_is_z, a);
+}
+
+void take_ins(const Session& s, Analysis* a) {
+  a->map_is_enu = true;
+  bool compared = false;
+  for (std::size_t i = 0; i < s.frames.size(); ++i) {
+    const Frame& f = s.frames[i];
+    if (f.placed) a->ours_x[i] = f.enu[0], a->ours_y[i] = f.enu[1];
+    if (f.has_ins) a->theirs_x[i] = f.ins[0], a->theirs_y[i] = f.ins[1];
+    if (!f.compared) continue;
+    compared = true;
+    a->horizontal_m[i] = std::hypot(f.error[0], f.error[1]);
+    a->vertical_m[i] = f.error[2];
+    a->heading_deg[i] = f.error_heading_deg;
+  }
+  if (!compared) {
+    a->source_sentence = "There was an INS, but never a frame that could be compared with it: no errors are shown.";
+    return;
+  }
+  a->source = ErrorSource::ins;
+  a->source_sentence =
+      "Errors against the INS after the placement on the earth, which was fitted at the start and then frozen; they hold the INS's own "
+      "errors, too.";
+}
+
+void take_world(const Session& s, Analysis* a) {
+  for (std::size_t i = 0; i < s.frames.size(); ++i)
+    if (s.frames[i].posed) {
+      const Point p = on_map(s.frames[i].T_world_left.t, false);
+      a->ours_x[i] = p.x, a->ours_y[i] = p.y;
+    }
+}
+
+void compare(const Session& s, Analysis* a) {
+  for (auto* curve : {&a->horizontal_m, &a->vertical_m, &a->heading_deg, &a->ours_x, &a->ours_y, &a->theirs_x, &a->theirs_y})
+    curve->assign(s.frames.size(), kNone);
+  const bool placed = std::any_of(s.frames.begin(), s.frames.end(), [](const Frame& f) { return f.placed; });
+  const bool ins = std::any_of(s.frames.begin(), s.frames.end(), [](const Frame& f) { return f.has_ins; });
+  if (placed) return take_ins(s, a);
+  if (ins) {
+    a->source_sentence = "There was an INS, but the drive could not be placed on the earth with it: no errors are shown.";
+    return take_world(s, a);
+  }
+  if (!s.reference.empty()) take_reference(s, a);
+  if (a->source != ErrorSource::none) return;
+  if (a->source_sentence.empty())
+    a->source_sentence = "There was no reference: how far the trajectory drifted is not known, so no errors are shown.";
+  take_world(s, a);
+}
+
+Analysis::Spread spread_of(const std::vector<double>& values) {
+  Analysis::Spread s;
+  double sum = 0;
+  std::size_t n = 0;
+  for (const double v : values) {
+    if (!std::isfinite(v)) continue;
+    sum += v * v;
+    ++n;
+    s.max = n == 1 ? std::abs(v) : std::max(s.max, std::abs(v));
+    s.end = v;
+  }
+  if (n > 0) s.rms = std::sqrt(sum / static_cast<double>(n));
+  return s;
+}
+
+void take_metrics(const Session& s, Analysis* a) {
+  const auto metric = [&s](const char* name) { return number_at(s.summary, std::string("metrics.") + name); };
+  a->scale = metric("scale"), a->ate_m = metric("ate_m"), a->rotation_deg_per_m = metric("rotation_error_deg_per_m");
+  if (const auto e = metric("end_error_percent")) a->end_error = *e / kPercent;
+  const auto far = metric("segment_error_percent"), near = metric("segment_error_short_percent");
+  if (far || near) a->drift = far.value_or(near.value_or(0)) / kPercent;
+  a->drift_sentence = far ? "mean of all segments of 100 to 800 m" : near ? "mean of all segments of 10 to 50 m" : "";
+}
+
+/// What summary.json would have said.
+void reckon_metrics(const Session& s, Analysis* a) {
+  const std::vector<StampedPose> ours = posed_frames(s);
+  if (ours.size() > kMostEvaluated || s.reference.size() > kMostEvaluated || ours.size() < 3 || s.reference.empty()) return;
+  EvaluationOptions options;
+  constexpr int kNearStep = 10;  // poses: a tenth of the segments gives the mean as well
+  options.segments = {SegmentOptions{}, {{10, 20, 30, 40, 50}, kNearStep, false}};
+  const TrajectoryEvaluation e = evaluate(ours, s.reference, options);
+  if (e.status != EvaluationStatus::ok) return;
+  const bool far = e.segments[0].count > 0;
+  const SegmentErrors& used = e.segments[far ? 0 : 1];
+  a->scale = e.sim3.scale, a->ate_m = e.ate_se3.rmse, a->end_error = e.end_error_ratio;
+  if (used.count == 0) return;
+  a->drift = used.translation;
+  a->rotation_deg_per_m = used.rotation * kDegrees;
+  a->drift_sentence = far ? "mean of all segments of 100 to 800 m" : "mean of segments of 10 to 50 m";
+}
+
+}  // namespace
+
+double seconds_between(Stamp from, Stamp to) noexcept {
+  // Unsigned, because the difference of two signed stamps need not fit.
+  return static_cast<double>(static_cast<std::uint64_t>(to.ns()) - static_cast<std::uint64_t>(from.ns())) * 1e-9;
+}
+
+Analysis analyse(const Session& session) {
+  Analysis a;
+  measure_time(session, &a);
+  measure_distance(session, &a);
+  count_frames(session, &a);
+  compare(session, &a);
+  a.horizontal = spread_of(a.horizontal_m);
+  a.vertical = spread_of(a.vertical_m);
+  a.heading = spread_of(a.heading_deg);
+  if (a.source == ErrorSource::none) return a;
+  if (session.summary.is_object())
+    take_metrics(session, &a);
+  else
+    reckon_metrics(session, &a);
+  return a;
+}
+
+}  // namespace vergence::app::report

@@ -1,0 +1,53 @@
+#pragma once
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "app/report/session.hpp"
+
+namespace vergence::app::report {
+
+/// What the errors of the page are differences to.
+enum class ErrorSource : std::uint8_t {
+  none,       // there is no reference: no errors
+  ins,        // errors of poses.csv, after the placement on the earth
+  reference,  // reference.tum, the start of the trajectory laid on it
+};
+
+/// Curves and counts of a session, one value a frame; kNone where there is none.
+struct Analysis {
+  std::vector<double> time_s;        // since the first frame
+  std::vector<double> distance_m;    // driven up to the frame
+  std::vector<std::uint8_t> breaks;  // frames are missing before this one: nothing may be drawn across
+  double interval_s = 0;             // median between frames; 0: fewer than two
+  double duration_s = 0;
+
+  ErrorSource source = ErrorSource::none;
+  std::string source_sentence;  // what was compared with what, and how the two were laid on each other
+  std::vector<double> horizontal_m, vertical_m, heading_deg;
+  struct Spread {
+    double rms = kNone, max = kNone, end = kNone;
+  };
+  Spread horizontal, vertical, heading;
+
+  bool map_is_enu = false;                                 // east to the right, north up
+  std::vector<double> ours_x, ours_y, theirs_x, theirs_y;  // m
+
+  std::size_t read = 0, ok = 0, degraded = 0, lost = 0, unknown = 0, skipped = 0;  // frames
+  std::vector<std::size_t> by_reason;                                              // frames that were not ok, by Session::reasons
+  std::optional<double> ok_share;  // of the frames read and skipped; nothing: status is not known
+  double path_m = 0;
+
+  std::optional<double> drift;  // ratio: mean translation error of segments over their length
+  std::string drift_sentence;   // which segments
+  std::optional<double> scale, ate_m, rotation_deg_per_m, end_error;
+};
+
+/// Seconds from one stamp to a later one; exact to the nanosecond for drives of days, whatever the stamps.
+[[nodiscard]] double seconds_between(Stamp from, Stamp to) noexcept;
+
+[[nodiscard]] Analysis analyse(const Session& session);
+
+}  // namespace vergence::app::report

@@ -1,0 +1,46 @@
+#pragma once
+#include <cstdint>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "app/report/analysis.hpp"
+#include "app/report/session.hpp"
+
+/// Pictures of a session, each a whole <svg>; every coordinate is in units of its viewBox, kPlotWidth wide, so that letters stay readable
+/// on a phone. Curves are decimated so that extremes stay; where there is no value nothing is drawn.
+namespace vergence::app::report {
+
+inline constexpr double kPlotWidth = 440, kPlotHeight = 190;
+
+enum class XAxis : std::uint8_t { time_s, distance_m };
+
+struct CurvePlot {
+  std::string description;
+  XAxis axis = XAxis::time_s;
+  std::span<const double> x, y;          // of one size
+  std::span<const std::uint8_t> breaks;  // of the same, or empty
+  const char* css = "curve s-ours";
+  bool from_zero = false;  // the y axis begins at 0
+};
+/// Empty when there is no value at all.
+[[nodiscard]] std::string curve_plot(const CurvePlot& plot, const Analysis& analysis, std::span<const Frame> frames);
+
+/// Ours and the reference from above, equal scale, scale bar, north arrow where up is north.
+[[nodiscard]] std::string map_picture(const Analysis& analysis, std::span<const Frame> frames);
+
+/// A lane for every status and state that occurred, and one for events. In a pixel column that holds several, each shows.
+[[nodiscard]] std::string bands_picture(const Session& session, const Analysis& analysis);
+
+/// Times of the frames with the budget as a line. `over_budget`: how many frames took longer.
+struct TimingPicture {
+  std::string svg;
+  std::size_t frames = 0, over_budget = 0;
+};
+[[nodiscard]] TimingPicture timing_picture(const Session& session, const Analysis& analysis);
+
+/// One number of a camera's calibration as it held over the drive, with a band of ± 2 sigma; hollow marks are rejected ones.
+/// `component`: 0–2 rotation vector, shown in degrees; 3–5 translation, in millimetres.
+[[nodiscard]] std::string calibration_plot(const Session& session, const Analysis& analysis, int camera, int component);
+
+}  // namespace vergence::app::report

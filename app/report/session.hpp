@@ -1,0 +1,86 @@
+#pragma once
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <limits>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include <nlohmann/json.hpp>
+
+#include "app/config/calibration_file.hpp"
+#include "core/types/pose_sample.hpp"
+#include "core/types/stamped_pose.hpp"
+
+/// A session folder as it was found, whole or torn.
+namespace vergence::app::report {
+
+inline constexpr double kNone = std::numeric_limits<double>::quiet_NaN();  // a number that is not there
+
+/// A line of poses.csv, or of trajectory.tum where poses.csv is lost (then state and status are not known).
+struct Frame {
+  Stamp stamp{};
+  std::int64_t number = -1;
+  std::optional<State> state{};
+  std::optional<PoseStatus> status{};
+  std::uint16_t reason = 0;  // Session::reasons
+  bool posed = false;
+  bool placed = false;    // enu and heading_deg mean something
+  bool has_ins = false;   // ins means something
+  bool compared = false;  // error means something
+  Transform T_world_left{};
+  std::array<double, 3> enu{}, ins{};  // m: east, north, up
+  std::array<double, 3> error{};       // m: ours - INS, east, north, up
+  double error_heading_deg = kNone;
+  int inliers = -1;
+  double estimate_ms = kNone;
+};
+
+/// A line of calibrations.csv.
+struct CalibrationRow {
+  Stamp stamp{};
+  bool accepted = false;
+  std::string source{}, reason{};
+  std::int64_t frames = 0;
+  int camera = 1;
+  std::array<double, 6> value{};  // rotation vector, rad; translation, m
+  std::array<double, 6> sigma{};  // the wide one, else the noise's; meaningless without has_sigma
+  bool has_sigma = false;
+};
+
+struct Event {
+  Stamp stamp{};
+  std::string kind{}, sentence{};
+};
+
+/// Stamps of `frames` and of `reference` ascend strictly; rows that break this are left out and told in `missing`.
+struct Session {
+  std::string name{};
+  std::vector<Frame> frames{};
+  std::vector<std::string> reasons{""};  // words of poses.csv, the empty one first
+  std::vector<StampedPose> reference{};  // reference.tum
+  std::vector<CalibrationRow> calibrations{};
+  std::vector<Event> events{};
+  std::size_t events_dropped = 0;  // beyond kMostEvents
+  nlohmann::json summary{};        // null when it is missing or no JSON
+  std::optional<CalibrationFile> calibration{};
+  std::vector<std::string> missing{};  // sentences
+};
+
+inline constexpr std::size_t kMostFrames = 4'000'000;  // 37 hours at 30 Hz; further ones are left out and told
+inline constexpr std::size_t kMostEvents = 200'000;
+inline constexpr std::size_t kMostCalibrations = 20'000;
+inline constexpr std::size_t kLongestText = 300;  // characters kept of a word or sentence from outside
+
+/// Reads what is there. Errors  InputError: `folder` is no folder, or none of a session's files is in it.
+[[nodiscard]] Session read_session(const std::filesystem::path& folder);
+
+/// A finite number of summary.json by its path, `metrics.ate_m`. Nothing: not there, null, no number.
+[[nodiscard]] std::optional<double> number_at(const nlohmann::json& json, std::string_view path);
+/// The same for texts, cut at kLongestText.
+[[nodiscard]] std::string text_at(const nlohmann::json& json, std::string_view path);
+
+}  // namespace vergence::app::report

@@ -1,0 +1,28 @@
+#pragma once
+#include <array>
+#include <string>
+
+namespace vergence::app::report {
+
+/// A colour with a job, for a light and a dark page: #rrggbb.
+struct Colour {
+  const char* name;  // of the CSS variable
+  const char* light;
+  const char* dark;
+  bool text;  // letters have it: contrast of 4.5 to `page` and `panel`, others of 3
+};
+
+inline constexpr Colour kPage{"page", "#f5f6f8", "#101418", false};
+inline constexpr Colour kPanel{"panel", "#ffffff", "#181e25", false};
+inline constexpr std::array kColours{
+    Colour{"ink", "#17202a", "#e6ebf0", true},    Colour{"soft", "#4d5b69", "#a6b3c0", true},
+    Colour{"frame", "#7c8896", "#73808d", false}, Colour{"ours", "#0b5cc4", "#6fb1ff", true},
+    Colour{"theirs", "#a34a00", "#f0a35e", true}, Colour{"good", "#1a6e34", "#58c878", true},
+    Colour{"care", "#875b00", "#e0b03c", true},   Colour{"bad", "#b3202c", "#ff8078", true},
+    Colour{"third", "#7a3fb0", "#c79bf2", true},  Colour{"fourth", "#00707a", "#4fc7d1", true},
+};
+
+/// The page's style sheet: both themes, phone, print.
+[[nodiscard]] std::string style_sheet();
+
+}  // namespace vergence::app::report

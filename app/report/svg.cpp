@@ -1,0 +1,194 @@
+#include "app/report/svg.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <iterator>
+
+#include <fmt/format.h>
+
+namespace vergence::app::report {
+namespace {
+
+bool continues(std::string_view text, std::size_t at) {
+  return at < text.size() && (static_cast<unsigned char>(text[at]) & 0xc0U) == 0x80U;
+}
+
+/// Length of the well-formed UTF-8 character at the front; 0: none.
+std::size_t utf8_length(std::string_view text) {
+  const auto first = static_cast<unsigned char>(text[0]);
+  if (first < 0x80) return 1;
+  const std::size_t n = first >= 0xc2 && first < 0xe0 ? 2 : first >= 0xe0 && first < 0xf0 ? 3 : first >= 0xf0 && first < 0xf5 ? 4 : 0;
+  for (std::size_t i = 1; i < n; ++i)
+    if (!continues(text, i)) return 0;
+  if (n < 3) return n;
+  const auto second = static_cast<unsigned char>(text[1]);
+  const bool overlong = (first == 0xe0 && second < 0xa0) || (first == 0xf0 && second < 0x90);
+  const bool surrogate = first == 0xed && second >= 0xa0;
+  const bool beyond = first == 0xf4 && second >= 0x90;
+  const bool nonce = first == 0xef && second == 0xbf && static_cast<unsigned char>(text[2]) >= 0xbe;  // U+FFFE, U+FFFF are no XML
+  return overlong || surrogate || beyond || nonce ? 0 : n;
+}
+
+void append_escaped(std::string* out, std::string_view character) {
+  switch (character[0]) {
+    case '&':
+      *out += "&amp;";
+      return;
+    case '<':
+      *out += "&lt;";
+      return;
+    case '>':
+      *out += "&gt;";
+      return;
+    case '"':
+      *out += "&quot;";
+      return;
+    case '\'':
+      *out += "&#39;";
+      return;
+    default:
+      break;
+  }
+  const auto c = static_cast<unsigned char>(character[0]);
+  if (c < 0x20 || c == 0x7f)
+    *out += ' ';
+  else
+    *out += character;
+}
+
+constexpr double kLargestCoordinate = 1e6;  // far outside every picture
+
+/// Least value of `steps` with at most `most` intervals over `span`; the last when none does.
+template <std::size_t N>
+double step_of(const std::array<double, N>& steps, double span, int most) {
+  for (const double step : steps)
+    if (span / step <= most) return step;
+  return steps.back();
+}
+
+std::vector<double> multiples(double low, double high, double step, int most) {
+  std::vector<double> ticks;
+  const double first = std::ceil(low / step - 1e-9);
+  for (int i = 0; i <= most + 1; ++i) {
+    const double tick = (first + i) * step;
+    if (tick > high + 1e-9 * step) break;
+    ticks.push_back(tick);
+  }
+  return ticks;
+}
+
+double nice_step(double span, int most) {
+  const double raw = span / std::max(1, most);
+  const double power = std::pow(10.0, std::floor(std::log10(raw)));
+  for (const double m : {1.0, 2.0, 5.0, 10.0})
+    if (m * power >= raw * (1 - 1e-9)) return m * power;
+  return 10 * power;
+}
+
+}  // namespace
+
+std::string escape(std::string_view text, std::size_t most) {
+  std::string out;
+  out.reserve(std::min(text.size(), most) + 16);
+  for (std::size_t i = 0; i < text.size();) {
+    const std::size_t n = utf8_length(text.substr(i));
+    if (i + std::max<std::size_t>(n, 1) > most) return out + "…";
+    if (n == 0)
+      out += "\xEF\xBF\xBD";
+    else
+      append_escaped(&out, text.substr(i, n));
+    i += std::max<std::size_t>(n, 1);
+  }
+  return out;
+}
+
+std::string coordinate(double value) {
+  if (!std::isfinite(value)) return "0";
+  const double v = std::round(std::clamp(value, -kLargestCoordinate, kLargestCoordinate) * 10) / 10 + 0.0;  // + 0.0: no negative zero
+  return v == std::floor(v) ? fmt::format("{:.0f}", v) : fmt::format("{:.1f}", v);
+}
+
+std::vector<double> nice_ticks(double low, double high, int most) {
+  if (!(high > low)) return {low};
+  return multiples(low, high, nice_step(high - low, most), most);
+}
+
+std::vector<double> time_ticks(double low, double high, int most) {
+  constexpr std::array kSteps{60.0, 120.0, 300.0, 600.0, 900.0, 1800.0, 3600.0, 7200.0, 14400.0, 21600.0, 43200.0, 86400.0};
+  constexpr std::array kShort{1.0, 2.0, 5.0, 10.0, 15.0, 30.0, 60.0};
+  const double span = high - low;
+  if (span / kShort.front() < most || span / kSteps.back() > most) return nice_ticks(low, high, most);
+  const double step = span / kShort.back() <= most ? step_of(kShort, span, most) : step_of(kSteps, span, most);
+  return multiples(low, high, step, most);
+}
+
+std::string tick_label(double value, double step) {
+  const double v = value + 0.0;
+  if (std::abs(v) >= 1e6 || (step < 1e-6 && step > 0)) return fmt::format("{:.3g}", v);
+  const int decimals = step > 0 ? std::clamp(static_cast<int>(std::ceil(-std::log10(step) - 1e-9)), 0, 6) : 2;
+  const std::string text = fmt::format("{:.{}f}", std::abs(v) < step * 1e-6 ? 0.0 : v, decimals);
+  return v < 0 && text.front() == '-' ? "−" + text.substr(1) : text;  // a minus sign of a digit's width
+}
+
+std::string time_label(double seconds, double step) {
+  if (std::abs(seconds) < 60 && step < 60) return tick_label(seconds, step);
+  if (seconds > 1e7) return fmt::format("{:.3g}", seconds);
+  const auto whole = static_cast<std::int64_t>(std::llround(std::abs(seconds)));
+  const char* sign = seconds < 0 ? "−" : "";
+  if (whole < 3600) return fmt::format("{}{}:{:02}", sign, whole / 60, whole % 60);
+  return fmt::format("{}{}:{:02}:{:02}", sign, whole / 3600, whole / 60 % 60, whole % 60);
+}
+
+Svg::Svg(double width, double height, std::string_view description) {
+  out_ = fmt::format(R"(<svg viewBox="0 0 {} {}" role="img" aria-label="{}">)", coordinate(width), coordinate(height), escape(description));
+}
+
+void Svg::line(const char* css, double x1, double y1, double x2, double y2) {
+  fmt::format_to(std::back_inserter(out_), R"(<line class="{}" x1="{}" y1="{}" x2="{}" y2="{}"/>)", css, coordinate(x1), coordinate(y1),
+                 coordinate(x2), coordinate(y2));
+}
+
+void Svg::rect(const char* css, double x, double y, double width, double height) {
+  fmt::format_to(std::back_inserter(out_), R"(<rect class="{}" x="{}" y="{}" width="{}" height="{}"/>)", css, coordinate(x), coordinate(y),
+                 coordinate(std::max(0.0, width)), coordinate(std::max(0.0, height)));
+}
+
+void Svg::circle(const char* css, double x, double y, double radius) {
+  fmt::format_to(std::back_inserter(out_), R"(<circle class="{}" cx="{}" cy="{}" r="{}"/>)", css, coordinate(x), coordinate(y),
+                 coordinate(radius));
+}
+
+void Svg::lines(const char* css, const std::vector<Line>& lines) {
+  if (lines.empty()) return;
+  out_ += fmt::format(R"(<path class="{}" d=")", css);
+  for (const Line& line : lines) {
+    char command = 'M';
+    for (const Point& p : line) {
+      (out_ += command) += coordinate(p.x);
+      (out_ += ' ') += coordinate(p.y);
+      command = command == 'M' ? 'L' : ' ';
+    }
+    if (line.size() == 1) out_ += "h0";
+  }
+  out_ += R"("/>)";
+}
+
+void Svg::polygon(const char* css, const Line& corners) {
+  out_ += fmt::format(R"(<polygon class="{}" points=")", css);
+  for (const Point& p : corners) ((out_ += coordinate(p.x)) += ',') += coordinate(p.y) + " ";
+  out_ += R"("/>)";
+}
+
+void Svg::text(const char* css, Anchor anchor, double x, double y, std::string_view words) {
+  const char* name = anchor == Anchor::start ? "start" : anchor == Anchor::middle ? "middle" : "end";
+  fmt::format_to(std::back_inserter(out_), R"(<text class="{}" text-anchor="{}" x="{}" y="{}">{}</text>)", css, name, coordinate(x),
+                 coordinate(y), escape(words));
+}
+
+std::string Svg::finish() && {
+  out_ += "</svg>\n";
+  return std::move(out_);
+}
+
+}  // namespace vergence::app::report

@@ -1,0 +1,51 @@
+#pragma once
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "app/report/decimation.hpp"
+
+/// The few shapes the page is drawn with. Everything that goes in is numbers of ours, class names of ours, or escaped text.
+namespace vergence::app::report {
+
+/// Text from outside for HTML and SVG, in elements and in quoted attributes: markup escaped, control characters and broken UTF-8
+/// replaced, cut with an ellipsis after `most` bytes.
+[[nodiscard]] std::string escape(std::string_view text, std::size_t most = 300);
+
+/// A coordinate: one decimal, no negative zero. What is not finite becomes 0.
+[[nodiscard]] std::string coordinate(double value);
+
+/// Places on an axis: multiples of 1, 2 or 5 times a power of ten, at most `most` of them, all within [low, high].
+[[nodiscard]] std::vector<double> nice_ticks(double low, double high, int most);
+/// The same for seconds: steps of whole minutes and hours beyond a minute.
+[[nodiscard]] std::vector<double> time_ticks(double low, double high, int most);
+/// A tick's number with as many decimals as its distance to the next needs.
+[[nodiscard]] std::string tick_label(double value, double step);
+/// Seconds as `8`, `1:05`, `2:03:00`; below a minute with the decimals that `step` needs.
+[[nodiscard]] std::string time_label(double seconds, double step);
+
+enum class Anchor : std::uint8_t { start, middle, end };
+
+/// An <svg> that grows; its units are those of the viewBox.
+class Svg {
+ public:
+  /// `description` is for who cannot see it.
+  Svg(double width, double height, std::string_view description);
+
+  void line(const char* css, double x1, double y1, double x2, double y2);
+  void rect(const char* css, double x, double y, double width, double height);
+  void circle(const char* css, double x, double y, double radius);
+  /// Every line of the set in one path. A line of one point shows as a dot (CSS has round caps).
+  void lines(const char* css, const std::vector<Line>& lines);
+  void polygon(const char* css, const Line& corners);
+  void text(const char* css, Anchor anchor, double x, double y, std::string_view words);
+  /// The whole element; nothing may follow.
+  [[nodiscard]] std::string finish() &&;
+
+ private:
+  std::string out_;
+};
+
+}  // namespace vergence::app::report

@@ -1,0 +1,221 @@
+#include "app/report/tables.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+#include <optional>
+#include <vector>
+
+#include <fmt/format.h>
+
+#include "app/report/svg.hpp"
+#include "core/math/so3.hpp"
+
+namespace vergence::app::report {
+namespace {
+
+constexpr double kDegrees = 180.0 / std::numbers::pi;
+constexpr std::size_t kMostRows = 40;  // of a group whose keys come from a file
+
+/// Rows "name value" under heads; names of ours are plain text, all else is escaped by who adds it.
+class Figures {
+ public:
+  void group(const char* head) { pending_ = head; }
+  void row(std::string_view name, const std::string& value) {
+    if (!pending_.empty()) out_ += fmt::format(R"(<tr class="group"><th colspan="2" scope="colgroup">{}</th></tr>)", pending_);
+    pending_.clear();
+    out_ += fmt::format(R"(<tr><th scope="row">{}</th><td class="n">{}</td></tr>)", escape(name), escape(value));
+    out_ += '\n';
+  }
+  void row(std::string_view name, std::optional<double> value, const char* format) {
+    if (value && std::isfinite(*value)) row(name, fmt::format(fmt::runtime(format), *value));
+  }
+  [[nodiscard]] std::string finish() && { return "<table>" + out_ + "</table>\n"; }
+
+ private:
+  std::string out_, pending_;
+};
+
+std::optional<double> times(std::optional<double> value, double factor) { return value ? std::optional(*value * factor) : std::nullopt; }
+
+void frames_group(const Session& s, const Analysis& a, Figures* f) {
+  f->group("Frames");
+  f->row("read", grouped(a.read));
+  if (a.read > a.unknown) {
+    f->row("ok", grouped(a.ok));
+    f->row("degraded", grouped(a.degraded));
+    f->row("lost", grouped(a.lost));
+  }
+  if (s.summary.is_object()) f->row("skipped (not readable)", grouped(a.skipped));
+  for (std::size_t i = 1; i < a.by_reason.size(); ++i)
+    if (a.by_reason[i] > 0) f->row("of these " + s.reasons[i], grouped(a.by_reason[i]));
+  if (a.interval_s > 0) f->row("frame interval", fmt::format("{:.1f} ms", a.interval_s * 1e3));
+}
+
+void error_group(const Analysis& a, Figures* f) {
+  f->group(a.source == ErrorSource::ins ? "Against the INS" : "Against the reference");
+  f->row("drift, " + a.drift_sentence, times(a.drift, 100), "{:.2f} %");
+  f->row("horizontal error, rms", a.horizontal.rms, "{:.2f} m");
+  f->row("horizontal error, largest", a.horizontal.max, "{:.2f} m");
+  f->row("vertical error, rms", a.vertical.rms, "{:.2f} m");
+  f->row("heading error, rms", a.heading.rms, "{:.2f}°");
+  f->row("heading error, largest", a.heading.max, "{:.2f}°");
+  f->row("rotation error", a.rotation_deg_per_m, "{:.4f} °/m");
+  f->row("whole path laid on it, rms (ATE)", a.ate_m, "{:.2f} m");
+  f->row("error at the end", times(a.end_error, 100), "{:.2f} % of the way");
+  f->row("scale (reference over ours)", a.scale, "{:.4f}");
+}
+
+void timing_group(const Session& s, const TimingPicture& timing, Figures* f) {
+  f->group("Time a frame, ms");
+  constexpr std::array<std::array<const char*, 2>, 5> kRows{
+      {{"mean", "mean"}, {"median", "p50"}, {"99 of 100 within", "p99"}, {"999 of 1000 within", "p99_9"}, {"longest", "max"}}};
+  for (const auto& [name, key] : kRows) f->row(name, number_at(s.summary, std::string("timing_ms.") + key), "{:.1f}");
+  for (const char* stage : {"decode", "pyramid", "detect", "track", "match", "pose", "window"})
+    f->row(std::string(stage) + ", mean", number_at(s.summary, std::string("timing_ms.stages.") + stage), "{:.2f}");
+  if (timing.frames > 0) f->row("frames over the frame interval", grouped(timing.over_budget));
+}
+
+void calibration_group(const Session& s, Figures* f) {
+  f->group("Calibration at the end");
+  if (const std::string source = text_at(s.summary, "calibration.source"); !source.empty()) f->row("from", source);
+  if (s.calibration) {
+    const RigCalibration& rig = s.calibration->rig;
+    for (std::size_t k = 1; k < static_cast<std::size_t>(rig.cameras); ++k) {
+      const Vec3 phi = log_so3(rig.T_camera_left[k].R) * kDegrees;
+      const std::string camera = rig.cameras > 2 ? s.calibration->names[k] + ": " : "";
+      f->row(camera + "baseline", fmt::format("{:.2f} mm", rig.T_camera_left[k].t.norm() * 1e3));
+      f->row(camera + "rotation x, y, z", fmt::format("{:.4f}°, {:.4f}°, {:.4f}°", phi.x() + 0.0, phi.y() + 0.0, phi.z() + 0.0));
+    }
+  }
+  if (const std::string word = text_at(s.summary, "calibration.word"); !word.empty()) f->row("health", word);
+  for (const char* z : {"5", "10", "20", "50"})
+    f->row(std::string("depth error at ") + z + " m", number_at(s.summary, std::string("calibration.depth_error_percent.") + z),
+           "{:.1f} %");
+}
+
+/// Numbers below an object, dotted names; for blocks whose keys are not fixed.
+void flatten(const nlohmann::json& json, const std::string& prefix, int depth, std::size_t* rows, Figures* f) {
+  constexpr int kDeepest = 3;
+  if (!json.is_object() || depth > kDeepest) return;
+  for (const auto& [key, value] : json.items()) {
+    if (*rows >= kMostRows) return;
+    const std::string name = prefix + key.substr(0, 60);
+    if (value.is_number()) {
+      ++*rows;
+      f->row(name, fmt::format("{:.5g}", value.get<double>()));
+    } else {
+      flatten(value, name + " ", depth + 1, rows, f);
+    }
+  }
+}
+
+void memory_group(const Session& s, Figures* f) {
+  f->group("Memory and drops");
+  constexpr double kMegabyte = 1e6;
+  if (const auto bytes = number_at(s.summary, "memory.sum_bytes")) f->row("memory held", fmt::format("{:.1f} MB", *bytes / kMegabyte));
+  for (const auto& [key, name] :
+       {std::pair{"estimator_bytes", "of these the estimator"}, {"images_bytes", "images"}, {"rings_bytes", "rings"}})
+    if (const auto bytes = number_at(s.summary, std::string("memory.") + key)) f->row(name, fmt::format("{:.1f} MB", *bytes / kMegabyte));
+  f->row("allocations after the seal", number_at(s.summary, "allocations_after_seal"), "{:.0f}");
+  for (const auto& [key, name] : {std::pair{"frames", "frames dropped"},
+                                  {"estimator", "points over capacity"},
+                                  {"records", "records dropped"},
+                                  {"lines", "lines the disk did not take"}})
+    f->row(name, number_at(s.summary, std::string("drops.") + key), "{:.0f}");
+}
+
+std::string event_time(const Session& s, Stamp stamp) {
+  if (s.frames.empty()) return "";
+  const Stamp first = s.frames.front().stamp;
+  return stamp >= first ? time_label(seconds_between(first, stamp), 0.1) : "−" + time_label(seconds_between(stamp, first), 0.1);
+}
+
+struct EventRun {
+  const Event* first = nullptr;
+  Stamp last{};
+  std::size_t count = 0;
+};
+
+std::vector<EventRun> condensed(const std::vector<Event>& events) {
+  std::vector<EventRun> runs;
+  for (const Event& e : events) {
+    if (!runs.empty() && runs.back().first->kind == e.kind && runs.back().first->sentence == e.sentence) {
+      ++runs.back().count;
+      runs.back().last = e.stamp;
+    } else {
+      runs.push_back({&e, e.stamp, 1});
+    }
+  }
+  return runs;
+}
+
+std::string event_row(const Session& s, const EventRun& run) {
+  std::string when = event_time(s, run.first->stamp);
+  if (run.count > 1) when += " … " + event_time(s, run.last);
+  const std::string many = run.count > 1 ? " (" + grouped(run.count) + " times)" : "";
+  return fmt::format("<tr><td class=\"t\">{}</td><td>{}</td><td>{}{}</td></tr>\n", when, escape(run.first->kind, 60),
+                     escape(run.first->sentence), many);
+}
+
+}  // namespace
+
+std::string grouped(std::size_t count) {
+  std::string text = std::to_string(count);
+  for (std::size_t i = text.size(); i > 3; i -= 3) text.insert(i - 3, " ");  // narrow no-break space
+  return text;
+}
+
+std::string figures_table(const Session& session, const Analysis& analysis, const TimingPicture& timing) {
+  Figures f;
+  f.group("Drive");
+  if (analysis.duration_s > 0) f.row("duration", time_label(analysis.duration_s, 0.1) + (analysis.duration_s < 60 ? " s" : ""));
+  f.row("way", fmt::format("{:.1f} m", analysis.path_m));
+  frames_group(session, analysis, &f);
+  if (analysis.source != ErrorSource::none) error_group(analysis, &f);
+  timing_group(session, timing, &f);
+  calibration_group(session, &f);
+  if (const auto truth = session.summary.is_object() ? session.summary.find("truth") : session.summary.end();
+      truth != session.summary.end()) {
+    f.group("Against the truth of the mock drive");
+    std::size_t rows = 0;
+    flatten(*truth, "", 0, &rows, &f);
+  }
+  memory_group(session, &f);
+  return std::move(f).finish();
+}
+
+std::string calibrations_table(const Session& session) {
+  constexpr std::size_t kMost = 60;
+  std::string out = "<table><tr><th>time</th><th>outcome</th><th>from</th><th>why</th></tr>\n";
+  const std::size_t n = session.calibrations.size();
+  if (n > kMost) out += fmt::format("<tr><td colspan=\"4\">{} earlier ones are in calibrations.csv</td></tr>", grouped(n - kMost));
+  for (std::size_t i = n > kMost ? n - kMost : 0; i < n; ++i) {
+    const CalibrationRow& c = session.calibrations[i];
+    const std::string frames = c.frames > 0 ? fmt::format(" ({} frames)", c.frames) : "";
+    out += fmt::format("<tr><td class=\"t\">{}</td><td>{}</td><td>{}{}</td><td>{}</td></tr>\n", event_time(session, c.stamp),
+                       c.accepted ? "accepted" : "rejected", escape(c.source, 60), frames, escape(c.reason));
+  }
+  return out + "</table>\n";
+}
+
+std::string events_table(const Session& session) {
+  constexpr std::size_t kEachEnd = 80;
+  const std::vector<EventRun> runs = condensed(session.events);
+  std::string out = "<table><tr><th>time</th><th>kind</th><th>what</th></tr>\n";
+  for (std::size_t i = 0; i < runs.size(); ++i) {
+    const bool many = runs.size() > 2 * kEachEnd;
+    if (many && i == kEachEnd) {
+      const std::size_t left_out = runs.size() - 2 * kEachEnd;
+      out += fmt::format("<tr><td></td><td></td><td>… {} rows are left out here; events.jsonl has them …</td></tr>\n", grouped(left_out));
+      i += left_out;
+    }
+    out += event_row(session, runs[i]);
+  }
+  if (session.events_dropped > 0)
+    out += fmt::format("<tr><td></td><td></td><td>… and {} more in events.jsonl</td></tr>\n", grouped(session.events_dropped));
+  return out + "</table>\n";
+}
+
+}  // namespace vergence::app::report

@@ -1,0 +1,23 @@
+#pragma once
+#include <string>
+
+#include "app/report/analysis.hpp"
+#include "app/report/plots.hpp"
+#include "app/report/session.hpp"
+
+/// The page's tables as HTML.
+namespace vergence::app::report {
+
+/// Counts, errors, times, calibration, memory, drops: what is known; a figure that does not exist has no row.
+[[nodiscard]] std::string figures_table(const Session& session, const Analysis& analysis, const TimingPicture& timing);
+
+/// The calibrations accepted and rejected, the newest sixty of them.
+[[nodiscard]] std::string calibrations_table(const Session& session);
+
+/// Events in their order, successive ones of one kind and sentence as one row with a count; of very many the first and the last.
+[[nodiscard]] std::string events_table(const Session& session);
+
+/// 12 400 with a thin space between thousands.
+[[nodiscard]] std::string grouped(std::size_t count);
+
+}  // namespace vergence::app::report

@@ -1,0 +1,177 @@
+#include "app/report/verdict.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <string_view>
+
+#include <fmt/format.h>
+
+namespace vergence::app::report {
+namespace {
+
+// Limits of drift, the same as of the depth error's words (METHOD §3): 2 % is good, beyond 5 % something is wrong with the rig.
+constexpr double kGoodDrift = 0.02, kWorstDrift = 0.05;
+// A length measured by the rig against the reference's; 2 % is where the comparison says scale_disagrees.
+constexpr double kGoodScale = 0.02, kWorstScale = 0.05;
+// Share of frames without a pose: a handful is a bump; a tenth are holes that no one can drive by.
+constexpr double kFewLost = 0.002, kManyLost = 0.10;
+constexpr double kFewDegraded = 0.05;
+constexpr double kFewOverBudget = 0.01;  // the 99th percentile is what the summary keeps
+constexpr double kPercent = 100.0;
+
+struct Advice {
+  std::string_view word;  // of poses.csv
+  const char* sentence;
+};
+
+constexpr std::array kAdvice{
+    Advice{"no_image", "A camera delivered no image: check its cable, its power and the trigger line."},
+    Advice{"image_dark", "Images carried no structure: clean the lenses, take covers off, set exposure and gain for the light."},
+    Advice{"few_features", "There was too little texture: raise the exposure, look for fog, rain or dirt on the lenses."},
+    Advice{"no_stereo_matches",
+           "Left and right do not fit this calibration: calibrate again, and check that both cameras expose at the same time."},
+    Advice{"cameras_swapped", "Left and right seem to be exchanged: swap the two cables or the cameras' order in the configuration."},
+    Advice{"few_inliers", "Poses rested on few points: look at the images of those moments for dirt, blur or a covered lens."},
+    Advice{"one_camera", "One camera did not support the pose: look at its images for dirt, blur or a wrong exposure."},
+    Advice{"no_pose", "Tracking failed: look at the images of those moments; shorter exposure or a higher frame rate helps in fast turns."},
+    Advice{"time_gap", "Frames are missing: check cables, trigger and the disk's speed; see the events for when."},
+    Advice{"scene_restarted", "After a gap the way across was extrapolated: do not use distances that span it."},
+    Advice{"weak_geometry", "The points did not hold the pose well in some direction: expect it in tunnels, open fields and beside walls."},
+    Advice{"moving_scene", "Much of the picture moved by itself, as behind a bus: compare those stretches with the map before use."},
+    Advice{"unconfirmed", "The calibration from the last drive was not confirmed: drive on until it is, or give one with --calibration."},
+    Advice{"recalibrating", "The rig no longer fitted its calibration: look for a camera that was knocked or is loose on its mount."},
+};
+
+/// Collects reasons; the grade is that of the worst.
+class Judge {
+ public:
+  void find(Grade grade, std::string reason) {
+    found_.push_back({grade, std::move(reason)});
+    verdict_.grade = std::max(verdict_.grade, grade);
+  }
+  void advise(std::string sentence) { verdict_.advice.push_back(std::move(sentence)); }
+  [[nodiscard]] Verdict finish() {
+    std::stable_sort(found_.begin(), found_.end(), [](const Found& a, const Found& b) { return a.grade > b.grade; });
+    for (Found& f : found_) verdict_.reasons.push_back(std::move(f.reason));
+    return std::move(verdict_);
+  }
+
+ private:
+  struct Found {
+    Grade grade;
+    std::string reason;
+  };
+  std::vector<Found> found_;
+  Verdict verdict_;
+};
+
+std::string percent(double share) { return fmt::format("{:.{}f} %", share * kPercent, share < 0.0995 ? 1 : 0); }
+
+void judge_frames(const Session& s, const Analysis& a, Judge* j) {
+  const std::size_t posed =
+      static_cast<std::size_t>(std::count_if(s.frames.begin(), s.frames.end(), [](const Frame& f) { return f.posed; }));
+  if (posed == 0) {
+    j->find(Grade::bad, "there never was a pose");
+    return;
+  }
+  if (!a.ok_share) {
+    j->find(Grade::care, "the status of the frames is not known");
+    return;
+  }
+  const auto all = static_cast<double>(a.read + a.skipped);
+  const double lost = static_cast<double>(a.lost + a.skipped) / all, degraded = static_cast<double>(a.degraded) / all;
+  if (lost > kFewLost) j->find(lost > kManyLost ? Grade::bad : Grade::care, fmt::format("{} of the frames have no pose", percent(lost)));
+  if (degraded > kFewDegraded) j->find(Grade::care, fmt::format("{} of the frames are degraded", percent(degraded)));
+}
+
+void judge_drift(const Analysis& a, Judge* j) {
+  if (a.source == ErrorSource::none) {
+    j->find(Grade::care, "nothing says how far it drifted: there was no reference");
+    j->advise("For a judgement of the drift record with an INS, or compare with a reference: vergence evaluate SESSION REFERENCE.");
+    return;
+  }
+  if (!a.drift)
+    j->find(Grade::care, "the drive is too short to tell its drift");
+  else if (*a.drift > kGoodDrift)
+    j->find(*a.drift > kWorstDrift ? Grade::bad : Grade::care, fmt::format("it drifts by {} of the way", percent(*a.drift)));
+  const double off = a.scale ? std::abs(*a.scale - 1) : 0;
+  if (off > kGoodScale) {
+    j->find(off > kWorstScale ? Grade::bad : Grade::care,
+            fmt::format("lengths come out {} too {}", percent(off), *a.scale < 1 ? "long" : "short"));
+    j->advise("Lengths disagree with the reference: measure the baseline again, then calibrate again.");
+  }
+}
+
+void judge_calibration(const Session& s, Judge* j) {
+  const std::string word = text_at(s.summary, "calibration.word");
+  if (word == "recalibrate") {
+    j->find(Grade::bad, "the calibration is too uncertain for depths");
+    j->advise("The calibration is weak: drive through a place with near and far structure and some turns, or calibrate on a checkerboard.");
+  } else if (word == "can be improved") {
+    j->find(Grade::care, "the calibration can be improved");
+  }
+  if (s.calibrations.empty()) return;
+  const bool rejected = !s.calibrations.back().accepted;
+  if (rejected) j->find(Grade::care, "the last calibration was rejected");
+}
+
+void judge_session(const Session& s, const Analysis& a, Judge* j) {
+  if (!s.missing.empty()) j->find(Grade::care, "the session's files are not whole");
+  if (!s.summary.is_object() && !s.missing.empty())
+    j->advise("The session was not closed: stop with Ctrl-C and wait for the last message; check power and the disk's free space.");
+  const double lines = number_at(s.summary, "drops.lines").value_or(0) + number_at(s.summary, "drops.records").value_or(0);
+  if (lines > 0) {
+    j->find(Grade::care, fmt::format("{:.0f} lines did not get to the disk", lines));
+    j->advise("The disk did not keep up or was full: make room, or record to a faster one.");
+  }
+  if (const auto allocations = number_at(s.summary, "allocations_after_seal"); allocations && *allocations > 0)
+    j->advise(fmt::format("Memory was taken {:.0f} times on the way, which must not happen: report it with this session.", *allocations));
+  const double p99 = number_at(s.summary, "timing_ms.p99").value_or(0) * 1e-3;
+  const double slow = static_cast<double>(
+      std::count_if(s.frames.begin(), s.frames.end(), [&a](const Frame& f) { return f.estimate_ms * 1e-3 > a.interval_s; }));
+  if (a.interval_s > 0 && (p99 > a.interval_s || slow > kFewOverBudget * static_cast<double>(a.read)))
+    j->advise(
+        "More than one frame in a hundred took longer than the frame interval: live, work would be dropped; lower the rate or odometry's "
+        "features.");
+}
+
+void advise_by_reasons(const Session& s, const Analysis& a, Judge* j) {
+  for (const Advice& advice : kAdvice) {
+    const auto found = std::find(s.reasons.begin(), s.reasons.end(), advice.word);
+    if (found == s.reasons.end()) continue;
+    const std::size_t frames = a.by_reason[static_cast<std::size_t>(found - s.reasons.begin())];
+    if (frames > 0) j->advise(fmt::format("{} frame{} {}: {}", frames, frames == 1 ? "" : "s", advice.word, advice.sentence));
+  }
+}
+
+}  // namespace
+
+const char* to_words(Grade grade) noexcept {
+  switch (grade) {
+    case Grade::good:
+      return "Good";
+    case Grade::care:
+      return "Usable with care";
+    case Grade::bad:
+      return "Do not use";
+  }
+  return "";
+}
+
+Verdict judge(const Session& session, const Analysis& analysis) {
+  Judge j;
+  judge_frames(session, analysis, &j);
+  judge_drift(analysis, &j);
+  judge_calibration(session, &j);
+  judge_session(session, analysis, &j);
+  advise_by_reasons(session, analysis, &j);
+  Verdict v = j.finish();
+  for (const std::string& reason : v.reasons) v.sentence += (v.sentence.empty() ? "" : "; ") + reason;
+  if (v.reasons.empty()) v.sentence = "every check passed: poses throughout, little drift, a calibration that holds";
+  v.sentence.front() = static_cast<char>(std::toupper(static_cast<unsigned char>(v.sentence.front())));
+  v.sentence += '.';
+  return v;
+}
+
+}  // namespace vergence::app::report
