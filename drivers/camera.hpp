@@ -61,16 +61,18 @@ struct CameraStatistics {
 /// Pixels     8-bit grey, row 0 on top, rows padded to cache lines; the padding is not initialised.
 /// Full       With no slot free the newest exposure is dropped and counted (`underruns`); a mock in virtual time waits instead.
 /// Errors     Nothing throws. A call that is not `ok` has changed nothing but the counters and *arrival.
-class Camera {
+class CameraDevice {
  public:
-  virtual ~Camera() = default;  // stops
+  virtual ~CameraDevice() = default;  // stops
 
   [[nodiscard]] virtual const DeviceInfo& info() const noexcept = 0;
   /// While not streaming. *actual (may be null): what the camera will do, rounded to what it can. → ok, unsupported, bad_configuration,
   /// gone
   [[nodiscard]] virtual DeviceStatus configure(const CameraConfiguration& wanted, CameraConfiguration* actual) noexcept = 0;
+  /// From the start of an exposure to its arrival. Precondition: configured.
+  [[nodiscard]] virtual DeviceTiming timing() const noexcept = 0;
   /// Starts streaming, also again after `gone`; while streaming it does nothing. `ready` (may be null) is told of every frame and of the
-  /// device's going. → ok, gone, no_permission, no_bandwidth, bad_configuration (not configured)
+  /// device's going. → ok, gone, ended, no_permission, no_bandwidth, bad_configuration (not configured)
   [[nodiscard]] virtual DeviceStatus start(Notifier* ready) noexcept = 0;
   /// Oldest frame not yet handed out, waiting at most `limit` (0: look once). `ok`: frame->slot is the caller's. `gone`: frame->arrival
   /// says when it was noticed. → ok, timeout, stopped, ended, gone
@@ -92,7 +94,7 @@ class CameraDriver {
   virtual ~CameraDriver() = default;
   [[nodiscard]] virtual std::vector<DeviceInfo> enumerate() = 0;
   /// `serial` empty: the first. Null: *status says why. → ok, not_found, no_permission, busy, failed
-  [[nodiscard]] virtual std::unique_ptr<Camera> open(std::string_view serial, DeviceStatus* status) = 0;
+  [[nodiscard]] virtual std::unique_ptr<CameraDevice> open(std::string_view serial, DeviceStatus* status) = 0;
 };
 
 }  // namespace vergence

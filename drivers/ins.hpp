@@ -32,14 +32,16 @@ struct InsStatistics {
 /// Memory     No allocation by the caller's thread between start() and stop().
 /// Full       A reading that finds no room is dropped and counted; a mock in virtual time waits instead.
 /// Errors     Nothing throws. A call that is not `ok` has changed nothing but the counters and reading->arrival.
-class Ins {
+class InsDevice {
  public:
-  virtual ~Ins() = default;  // stops
+  virtual ~InsDevice() = default;  // stops
 
   [[nodiscard]] virtual const DeviceInfo& info() const noexcept = 0;
   /// Readings a second. *actual_hz (may be null): what it will do. → ok, unsupported, bad_configuration, gone
   [[nodiscard]] virtual DeviceStatus configure(double rate_hz, double* actual_hz) noexcept = 0;
-  /// As Camera::start().
+  /// From the measurement to its arrival. Precondition: configured.
+  [[nodiscard]] virtual DeviceTiming timing() const noexcept = 0;
+  /// As CameraDevice::start().
   [[nodiscard]] virtual DeviceStatus start(Notifier* ready) noexcept = 0;
   /// Oldest reading not yet taken, in the order of measurement, waiting at most `limit` (0: look once). `gone`: reading->arrival says when
   /// it was noticed. → ok, timeout, stopped, ended, gone
@@ -53,7 +55,7 @@ class InsDriver {
  public:
   virtual ~InsDriver() = default;
   [[nodiscard]] virtual std::vector<DeviceInfo> enumerate() = 0;
-  [[nodiscard]] virtual std::unique_ptr<Ins> open(std::string_view serial, DeviceStatus* status) = 0;
+  [[nodiscard]] virtual std::unique_ptr<InsDevice> open(std::string_view serial, DeviceStatus* status) = 0;
 };
 
 }  // namespace vergence

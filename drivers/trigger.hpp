@@ -29,15 +29,15 @@ struct TriggerStatistics {
 
 /// One opened trigger board. Cameras are armed (started) first, then the board: so every camera's exposure 0 is pulse 0.
 ///
-/// Ownership, threads, memory, errors: as Ins.
-class Trigger {
+/// Ownership, threads, memory, errors: as InsDevice.
+class TriggerDevice {
  public:
-  virtual ~Trigger() = default;  // stops
+  virtual ~TriggerDevice() = default;  // stops
 
   [[nodiscard]] virtual const DeviceInfo& info() const noexcept = 0;
   /// → ok, unsupported, bad_configuration, gone
   [[nodiscard]] virtual DeviceStatus configure(const TriggerConfiguration& wanted, TriggerConfiguration* actual) noexcept = 0;
-  /// The first pulse goes out after this. As Camera::start().
+  /// The first pulse goes out after this. As CameraDevice::start().
   [[nodiscard]] virtual DeviceStatus start(Notifier* ready) noexcept = 0;
   /// Oldest report not yet taken, waiting at most `limit` (0: look once). → ok, timeout, stopped, ended, gone
   [[nodiscard]] virtual DeviceStatus wait(Duration limit, Pulse* pulse) noexcept = 0;
@@ -51,7 +51,7 @@ class TriggerDriver {
  public:
   virtual ~TriggerDriver() = default;
   [[nodiscard]] virtual std::vector<DeviceInfo> enumerate() = 0;
-  [[nodiscard]] virtual std::unique_ptr<Trigger> open(std::string_view serial, DeviceStatus* status) = 0;
+  [[nodiscard]] virtual std::unique_ptr<TriggerDevice> open(std::string_view serial, DeviceStatus* status) = 0;
 };
 
 }  // namespace vergence

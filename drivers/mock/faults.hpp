@@ -1,0 +1,76 @@
+#pragma once
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "core/math/se3.hpp"
+#include "core/types/time.hpp"
+
+namespace vergence::mock {
+
+enum class FaultKind : std::uint8_t {
+  knock,
+  drift,
+  cover,
+  night,
+  exposure,
+  camera_gone,
+  lose_frames,
+  late_frames,
+  duplicate_frames,
+  ins_gone,
+  no_fix,
+  position_jump,
+  time_jump,
+};
+
+/// Something that goes wrong at a time of the drive. Parameters that a kind does not have are zero.
+struct Fault {
+  FaultKind kind = FaultKind::knock;
+  Duration at{};              // since the drive's start
+  Duration duration{};        // zero: to the end
+  int camera = -1;            // −1: every camera
+  Vec3 turn = Vec3::Zero();   // rad about the camera's x (pitch), y (yaw), z (roll)
+  Vec3 shift = Vec3::Zero();  // m along the camera's x, y, z; of position_jump: east, north, up
+  double factor = 1;          // of the brightness
+  double share = 0;           // of the frames, 0..1
+  double delay = 0;           // s
+  double jump = 0;            // s
+
+  [[nodiscard]] bool active(Duration time) const noexcept { return time >= at && (duration <= Duration{} || time < at + duration); }
+  [[nodiscard]] bool concerns(int k) const noexcept { return camera < 0 || camera == k; }
+};
+
+/// What a kind's parameter is; the table behind docs/mock.md.
+struct FaultParameter {
+  const char* name;  // its unit is its ending: _deg, _m, _s
+  double fallback;   // when not given
+  double least, most;
+  const char* meaning;
+};
+struct FaultRow {
+  FaultKind kind;
+  const char* name;
+  const char* meaning;
+  std::span<const FaultParameter> parameters;
+};
+
+/// Every kind that acts, in the order of FaultKind.
+[[nodiscard]] std::span<const FaultRow> fault_rows() noexcept;
+[[nodiscard]] std::string_view to_string(FaultKind) noexcept;
+
+/// A fault from its kind, time in seconds and parameters. Throws std::invalid_argument: half a sentence about what is wrong.
+[[nodiscard]] Fault make_fault(const std::string& kind, double at_s, const std::vector<std::pair<std::string, double>>& parameters);
+
+/// `knock@42 camera=1 pitch_deg=0.2`. Throws as make_fault().
+[[nodiscard]] Fault parse_fault(std::string_view text);
+
+/// The table of docs/mock.md.
+[[nodiscard]] std::string fault_document();
+
+}  // namespace vergence::mock

@@ -1,0 +1,45 @@
+#pragma once
+#include <array>
+#include <memory>
+#include <vector>
+
+#include "core/types/calibration.hpp"
+#include "drivers/mock/faults.hpp"
+#include "drivers/mock/world/drive.hpp"
+
+namespace vergence::mock {
+
+/// Where everything on the vehicle truly is at a time of the drive: the drive's spline, the mounts, and the faults that move them.
+///
+/// Threads  Const after construction. Time: since the drive's start.
+class RigTruth {
+ public:
+  /// `rig`: as mounted, before any fault. p_body = T_body_left · p_left, p_body = T_body_ins · p_ins.
+  RigTruth(std::shared_ptr<const World> world, const DriveOptions& drive, const RigCalibration& rig, const Transform& T_body_left,
+           const Transform& T_body_ins, std::vector<Fault> faults);
+
+  [[nodiscard]] const World& world() const noexcept { return *world_; }
+  [[nodiscard]] std::shared_ptr<const World> shared_world() const noexcept { return world_; }
+  [[nodiscard]] const Drive& drive() const noexcept { return drive_; }
+  [[nodiscard]] const RigCalibration& mounted() const noexcept { return rig_; }
+  [[nodiscard]] const std::vector<Fault>& faults() const noexcept { return faults_; }
+
+  /// p_body = T · p_camera. A knock moves it: p_camera' = Exp(turn) p_camera + shift.
+  [[nodiscard]] Transform T_body_camera(int camera, Duration time) const noexcept;
+  [[nodiscard]] Transform T_enu_camera(int camera, Duration time) const noexcept {
+    return drive_.at(time).T_enu_body * T_body_camera(camera, time);
+  }
+  [[nodiscard]] Transform T_enu_ins(Duration time) const noexcept { return drive_.at(time).T_enu_body * T_body_ins_; }
+  /// The rig's calibration as it truly is then.
+  [[nodiscard]] RigCalibration calibration(Duration time) const noexcept;
+
+ private:
+  std::shared_ptr<const World> world_;
+  Drive drive_;
+  RigCalibration rig_;
+  std::array<Transform, kMaxCameras> mounts_{};  // T_body_camera
+  Transform T_body_ins_;
+  std::vector<Fault> faults_;
+};
+
+}  // namespace vergence::mock

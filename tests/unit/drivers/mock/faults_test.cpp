@@ -1,0 +1,69 @@
+#include "drivers/mock/faults.hpp"
+
+#include <gtest/gtest.h>
+
+#include <numbers>
+#include <stdexcept>
+#include <string>
+
+namespace vergence::mock {
+namespace {
+
+std::string refusal(const std::string& text) {
+  try {
+    (void)parse_fault(text);
+  } catch (const std::invalid_argument& e) {
+    return e.what();
+  }
+  return "";
+}
+
+TEST(Faults, aFaultIsReadFromOneLine) {
+  const Fault f = parse_fault("knock@42 camera=1 pitch_deg=0.2");
+  EXPECT_EQ(f.kind, FaultKind::knock);
+  EXPECT_EQ(f.at, Duration::seconds(42));
+  EXPECT_EQ(f.camera, 1);
+  EXPECT_DOUBLE_EQ(f.turn.x(), 0.2 * std::numbers::pi / 180);
+  EXPECT_EQ(f.turn.y(), 0);
+  EXPECT_EQ(f.shift, Vec3::Zero());
+}
+
+TEST(Faults, everyKindStandsInTheTableAtItsPlaceAndTakesItsOwnParametersAtBothEnds) {
+  for (std::size_t i = 0; i < fault_rows().size(); ++i) {
+    const FaultRow& row = fault_rows()[i];
+    EXPECT_EQ(static_cast<std::size_t>(row.kind), i) << row.name;
+    EXPECT_EQ(to_string(row.kind), row.name);
+    EXPECT_NO_THROW((void)make_fault(row.name, 0, {})) << row.name;
+    for (const FaultParameter& p : row.parameters) {
+      EXPECT_NO_THROW((void)make_fault(row.name, 0, {{p.name, p.least}})) << row.name << p.name;
+      EXPECT_NO_THROW((void)make_fault(row.name, 0, {{p.name, p.most}})) << row.name << p.name;
+      EXPECT_THROW((void)make_fault(row.name, 0, {{p.name, p.most + 1}}), std::invalid_argument) << row.name << p.name;
+      EXPECT_THROW((void)make_fault(row.name, 0, {{p.name, p.least - 1}}), std::invalid_argument) << row.name << p.name;
+    }
+  }
+}
+
+TEST(Faults, nonsenseIsNamed) {
+  EXPECT_NE(refusal("knock").find("KIND@SECONDS"), std::string::npos);
+  EXPECT_NE(refusal("knok@3").find("there is no fault \"knok\""), std::string::npos);
+  EXPECT_NE(refusal("knock@soon").find("not a number"), std::string::npos);
+  EXPECT_NE(refusal("knock@-1").find("0 … 86400"), std::string::npos);
+  EXPECT_NE(refusal("knock@nan").find("0 … 86400"), std::string::npos);
+  EXPECT_NE(refusal("knock@1 pitch_deg").find("NAME=NUMBER"), std::string::npos);
+  EXPECT_NE(refusal("knock@1 share=0.1").find("has no parameter \"share\""), std::string::npos);
+  EXPECT_NE(refusal("knock@1 pitch_deg=nan").find("must be in"), std::string::npos);
+  EXPECT_NE(refusal("cover@1 camera=0.5").find("whole number"), std::string::npos);
+  EXPECT_NE(refusal("").find("KIND@SECONDS"), std::string::npos);
+}
+
+TEST(Faults, aFaultActsForItsDurationAndWithoutOneToTheEnd) {
+  Fault f = parse_fault("cover@2 duration_s=3");
+  EXPECT_FALSE(f.active(Duration::seconds(1.999)));
+  EXPECT_TRUE(f.active(Duration::seconds(2)));
+  EXPECT_FALSE(f.active(Duration::seconds(5)));
+  f = parse_fault("cover@2 duration_s=0");
+  EXPECT_TRUE(f.active(Duration::seconds(5000)));
+}
+
+}  // namespace
+}  // namespace vergence::mock

@@ -1,0 +1,344 @@
+#include "drivers/mock/mock_rig.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+#include <string>
+#include <vector>
+
+#include "drivers/sync/clock_mapper.hpp"
+
+namespace vergence::mock {
+namespace {
+
+constexpr double kRate = 20;
+
+RigCalibration small_rig() {
+  RigCalibration rig;
+  rig.cameras = 2;
+  for (std::size_t k = 0; k < 2; ++k) {
+    rig.intrinsics[k].width = 96;
+    rig.intrinsics[k].height = 64;
+    rig.intrinsics[k].fx = rig.intrinsics[k].fy = 70;
+    rig.intrinsics[k].cx = 47.5;
+    rig.intrinsics[k].cy = 31.5;
+  }
+  rig.T_camera_left[1].t = {-0.75, 0, 0};
+  return rig;
+}
+
+/// A light world, shared by all tests: building it takes longer than driving through it.
+std::shared_ptr<const World> world() {
+  static const auto shared = [] {
+    WorldOptions o;
+    o.texture_detail = 0;
+    return std::make_shared<const World>(o);
+  }();
+  return shared;
+}
+
+std::shared_ptr<const RigTruth> truth_with(const std::vector<std::string>& faults) {
+  std::vector<Fault> parsed;
+  for (const std::string& f : faults) parsed.push_back(parse_fault(f));
+  DriveOptions drive;
+  drive.kind = DriveKind::brief;
+  return std::make_shared<const RigTruth>(world(), drive, small_rig(), default_T_body_left(), Transform{Mat3::Identity(), {0.5, 0, 1.2}},
+                                          std::move(parsed));
+}
+
+MockRigOptions options(double seconds) {
+  MockRigOptions o;
+  o.duration = Duration::seconds(seconds);
+  o.noise = false;
+  return o;
+}
+
+struct Seen {
+  Frame frame;
+  double mean = 0;  // grey
+};
+
+/// What a whole drive brings, device by device; frames are released at once.
+struct Harvest {
+  std::array<std::vector<Seen>, 2> frames;
+  std::array<int, 2> gone{};
+  std::array<CameraStatistics, 2> statistics;
+  std::vector<InsReading> readings;
+  InsStatistics ins;
+  HostStamp start;
+};
+
+double mean_of(const ImageView& v) {
+  double sum = 0;
+  for (int y = 0; y < v.height; ++y)
+    for (int x = 0; x < v.width; ++x) sum += v.at(x, y);
+  return sum / (v.width * v.height);
+}
+
+Harvest drive(MockRig* rig) {
+  Harvest h;
+  CameraConfiguration c{96, 64, kRate, Duration::milliseconds(8), 0, CameraTrigger::hardware};
+  for (int k = 0; k < 2; ++k) {
+    EXPECT_EQ(rig->camera(k).configure(c, nullptr), DeviceStatus::ok);
+    EXPECT_EQ(rig->camera(k).start(nullptr), DeviceStatus::ok);
+  }
+  EXPECT_EQ(rig->ins().configure(120, nullptr), DeviceStatus::ok);
+  EXPECT_EQ(rig->ins().start(nullptr), DeviceStatus::ok);
+  EXPECT_EQ(rig->trigger().configure({kRate}, nullptr), DeviceStatus::ok);
+  EXPECT_EQ(rig->trigger().start(nullptr), DeviceStatus::ok);
+  h.start = rig->start();
+  std::array<bool, 3> ended{};
+  while (!(ended[0] && ended[1] && ended[2])) {
+    for (int k = 0; k < 2; ++k) {
+      Frame f;
+      const auto i = static_cast<std::size_t>(k);
+      const DeviceStatus status = rig->camera(k).wait(Duration{}, &f);
+      if (status == DeviceStatus::ok) {
+        h.frames[i].push_back({f, mean_of(rig->camera(k).view(f.slot))});
+        rig->camera(k).release(f.slot);
+      } else if (status == DeviceStatus::gone) {
+        const DeviceStatus again = rig->camera(k).start(nullptr);
+        h.gone[i] += again == DeviceStatus::ok ? 1 : 0;
+        ended[i] = ended[i] || again == DeviceStatus::ended;
+      } else {
+        ended[i] = ended[i] || status == DeviceStatus::ended;
+      }
+    }
+    InsReading r;
+    const DeviceStatus status = rig->ins().wait(Duration::microseconds(100), &r);
+    if (status == DeviceStatus::ok) h.readings.push_back(r);
+    ended[2] = ended[2] || status == DeviceStatus::ended;
+  }
+  for (int k = 0; k < 2; ++k) h.statistics[static_cast<std::size_t>(k)] = rig->camera(k).statistics();
+  h.ins = rig->ins().statistics();
+  return h;
+}
+
+Harvest drive_with(const std::vector<std::string>& faults, double seconds = 3, bool ideal = false) {
+  MockRigOptions o = options(seconds);
+  o.ideal_ins = ideal;
+  MockRig rig(truth_with(faults), o);
+  return drive(&rig);
+}
+
+TEST(MockRig, everyPulseOfAGoodDriveHasAFrameOfEveryCamera) {
+  const Harvest h = drive_with({});
+  for (const auto& frames : h.frames) {
+    ASSERT_EQ(frames.size(), 61U);
+    for (std::size_t i = 0; i < frames.size(); ++i) {
+      EXPECT_EQ(frames[i].frame.counter, i);
+      EXPECT_GT(frames[i].mean, 30) << "daylight";
+    }
+  }
+  EXPECT_EQ(h.statistics[0].underruns + h.statistics[0].lost, 0U);
+  EXPECT_GE(h.readings.size(), 360U);
+  EXPECT_EQ(h.ins.lost + h.ins.overruns, 0U);
+}
+
+TEST(MockRig, arrivalsKeepTheStatedDelaysAndDeviceStampsTheirClock) {
+  MockRig rig(truth_with({}), options(3));
+  const Harvest h = drive(&rig);
+  const DeviceTiming timing = rig.camera(1).timing();
+  ClockMapper mapper({timing.least_delay, timing.delay_spread, timing.resolution});
+  for (std::size_t i = 0; i < h.frames[1].size(); ++i) {
+    const Frame& f = h.frames[1][i].frame;
+    const HostStamp truth = h.start + Duration::milliseconds(50) * static_cast<std::int64_t>(i);
+    EXPECT_GE(f.arrival, truth + timing.least_delay);
+    EXPECT_LE(f.arrival, truth + timing.least_delay + timing.delay_spread);
+    const MappedStamp m = mapper.map(f.exposure_start, f.arrival);
+    EXPECT_LE(std::abs((m.host - truth).ns()), m.error.ns());
+  }
+}
+
+TEST(MockRig, theSameSeedGivesTheSameBytesAndStamps) {
+  const Harvest a = drive_with({"lose_frames@0 share=0.2 duration_s=0"}), b = drive_with({"lose_frames@0 share=0.2 duration_s=0"});
+  for (std::size_t k = 0; k < 2; ++k) {
+    ASSERT_EQ(a.frames[k].size(), b.frames[k].size());
+    for (std::size_t i = 0; i < a.frames[k].size(); ++i) {
+      EXPECT_EQ(a.frames[k][i].mean, b.frames[k][i].mean);
+      EXPECT_EQ(a.frames[k][i].frame.arrival, b.frames[k][i].frame.arrival);
+      EXPECT_EQ(a.frames[k][i].frame.exposure_start, b.frames[k][i].frame.exposure_start);
+    }
+  }
+}
+
+TEST(MockRig, aCoveredLensIsBlackForItsTimeAndOnlyThere) {
+  const Harvest h = drive_with({"cover@1 camera=1 duration_s=1"});
+  for (const Seen& s : h.frames[1]) {
+    const bool covered = s.frame.counter >= 20 && s.frame.counter < 40;
+    EXPECT_EQ(s.mean < 1, covered) << s.frame.counter;
+  }
+  for (const Seen& s : h.frames[0]) EXPECT_GT(s.mean, 30);
+}
+
+TEST(MockRig, exposureAndNightChangeTheBrightness) {
+  const Harvest h = drive_with({"exposure@1 camera=0 factor=0.5 duration_s=1", "night@2 duration_s=0"});
+  const double day = h.frames[0][10].mean;
+  EXPECT_NEAR(h.frames[0][30].mean, 0.5 * day, 0.1 * day);
+  EXPECT_NEAR(h.frames[1][30].mean, h.frames[1][10].mean, 0.1 * day);
+  EXPECT_LT(h.frames[1][50].mean, 0.05 * day);
+}
+
+TEST(MockRig, aCameraThatWasGoneComesBackAndCountsAnew) {
+  const Harvest h = drive_with({"camera_gone@1 camera=1 duration_s=0.5"});
+  EXPECT_EQ(h.gone[1], 1);
+  EXPECT_EQ(h.gone[0], 0);
+  ASSERT_EQ(h.frames[1].size(), 51U);
+  EXPECT_EQ(h.frames[1][19].frame.counter, 19U);
+  EXPECT_EQ(h.frames[1][20].frame.counter, 0U);
+  EXPECT_EQ(h.statistics[1].starts, 2U);
+  EXPECT_EQ(h.frames[0].size(), 61U);
+}
+
+TEST(MockRig, aCameraThatNeverComesBackEndsWithTheDrive) {
+  const Harvest h = drive_with({"camera_gone@1 camera=1 duration_s=0"});
+  EXPECT_EQ(h.gone[1], 0);
+  EXPECT_EQ(h.frames[1].size(), 20U);
+  EXPECT_EQ(h.frames[0].size(), 61U);
+}
+
+TEST(MockRig, lostLateAndDoubledFramesShowInCountersAndArrivals) {
+  const Harvest lost = drive_with({"lose_frames@0 camera=0 share=0.3 duration_s=0"});
+  EXPECT_GT(lost.statistics[0].lost, 5U);
+  EXPECT_EQ(lost.frames[0].size() + lost.statistics[0].lost, 61U);
+  EXPECT_EQ(lost.frames[1].size(), 61U);
+
+  const Harvest doubled = drive_with({"duplicate_frames@0 camera=0 share=1 duration_s=1"});
+  EXPECT_EQ(doubled.frames[0].size(), 81U);
+
+  const Harvest late = drive_with({"late_frames@1 camera=0 share=1 delay_s=0.3 duration_s=0.1"});
+  ASSERT_EQ(late.frames[0].size(), 61U);
+  std::vector<std::uint64_t> order;
+  for (const Seen& s : late.frames[0]) order.push_back(s.frame.counter);
+  EXPECT_FALSE(std::is_sorted(order.begin(), order.end()));
+}
+
+TEST(MockRig, aKnockTurnsTheTrueRigByWhatItSays) {
+  const auto truth = truth_with({"knock@1 camera=1 pitch_deg=0.2 x_m=0.003"});
+  const RigCalibration before = truth->calibration(Duration::seconds(0.9)), after = truth->calibration(Duration::seconds(1.1));
+  EXPECT_TRUE(before.T_camera_left[1].R.isApprox(Mat3::Identity(), 1e-14));
+  const Vec3 turned = log_so3(after.T_camera_left[1].R * before.T_camera_left[1].R.transpose());
+  EXPECT_NEAR(turned.x(), 0.2 * std::numbers::pi / 180, 1e-12);
+  EXPECT_LT(turned.tail<2>().norm(), 1e-12);
+  EXPECT_NEAR(after.T_camera_left[1].t.x(), -0.747, 1e-12);
+  // The left camera is where it was, and what the right one sees has moved.
+  const Duration t = Duration::seconds(2);
+  EXPECT_TRUE(truth->T_body_camera(0, t).t.isApprox(default_T_body_left().t, 1e-14));
+}
+
+TEST(MockRig, aDriftGrowsEvenlyAndStays) {
+  const auto truth = truth_with({"drift@1 camera=1 yaw_deg=1 duration_s=4"});
+  const auto yaw = [&](double s) {
+    return log_so3(truth->calibration(Duration::seconds(s)).T_camera_left[1].R).y() * 180 / std::numbers::pi;
+  };
+  EXPECT_NEAR(yaw(1), 0, 1e-12);
+  EXPECT_NEAR(yaw(2), 0.25, 1e-9);
+  EXPECT_NEAR(yaw(9), 1, 1e-9);
+}
+
+TEST(MockRig, anIdealInsIsTheTruthToAMicrometre) {
+  const auto truth = truth_with({});
+  InsModel model({true, 1, 120}, *truth);
+  const GeographicLib::LocalCartesian plane(kWorldOrigin.latitude_deg, kWorldOrigin.longitude_deg, kWorldOrigin.height_m);
+  for (std::uint64_t i = 0; i < 1200; ++i) {
+    const Duration t = Duration::seconds(static_cast<double>(i) / 120);
+    const InsSample s = model.sample(i, t);
+    const Transform T = truth->T_enu_ins(t);
+    Vec3 p;
+    plane.Forward(s.position.latitude_deg, s.position.longitude_deg, s.position.height_m, p.x(), p.y(), p.z());
+    ASSERT_LT((p - T.t).norm(), 1e-6);
+    // Axes at the place and at the origin differ by less than distance / earth's radius: 300 m / 6.4e6 m.
+    const Eigen::Quaterniond q(s.q_enu_ins[3], s.q_enu_ins[0], s.q_enu_ins[1], s.q_enu_ins[2]);
+    ASSERT_LT(log_so3(q.toRotationMatrix().transpose() * T.R).norm(), 1e-4);
+  }
+}
+
+TEST(MockRig, aNoisyInsErrsByItsSigmasAndSlowly) {
+  const auto truth = truth_with({});
+  const GeographicLib::LocalCartesian plane(kWorldOrigin.latitude_deg, kWorldOrigin.longitude_deg, kWorldOrigin.height_m);
+  double squares = 0, step = 0;
+  int n = 0;
+  for (std::uint64_t seed = 1; seed <= 200; ++seed) {
+    InsModel model({false, seed, 120}, *truth);
+    Vec3 last = Vec3::Zero();
+    for (std::uint64_t i = 0; i < 2; ++i) {
+      const Duration t = Duration::seconds(static_cast<double>(i) / 120);
+      const InsSample s = model.sample(i, t);
+      Vec3 p;
+      plane.Forward(s.position.latitude_deg, s.position.longitude_deg, s.position.height_m, p.x(), p.y(), p.z());
+      const Vec3 error = p - truth->T_enu_ins(t).t;
+      if (i == 0) {
+        squares += error.head<2>().squaredNorm();
+        n += 2;
+      } else {
+        step = std::max(step, (error - last).norm());
+      }
+      last = error;
+    }
+  }
+  // 400 draws: the sigma is known to 1/√800 = 3.5 %; five of those.
+  EXPECT_NEAR(std::sqrt(squares / n), 2.12, 0.18 * 2.12);
+  // A step is σ √(2 Δt/τ) = 3.5 cm across and 6.7 cm up; five sigma of the largest.
+  EXPECT_LT(step, 0.4);
+}
+
+TEST(MockRig, insFaultsAct) {
+  const Harvest gone = drive_with({"ins_gone@1 duration_s=1"});
+  EXPECT_EQ(gone.ins.lost, 120U);
+  for (const InsReading& r : gone.readings) EXPECT_FALSE(r.sample.number >= 120 && r.sample.number < 240);
+
+  const Harvest dark = drive_with({"no_fix@1 duration_s=1"}, 3, true);
+  for (const InsReading& r : dark.readings)
+    EXPECT_EQ(r.sample.fix == FixStatus::none, r.sample.number >= 120 && r.sample.number < 240) << r.sample.number;
+
+  const Harvest leap = drive_with({"position_jump@1 east_m=100"}, 2, true);
+  for (std::size_t i = 1; i < leap.readings.size(); ++i) {
+    const double east = (leap.readings[i].sample.position.longitude_deg - leap.readings[i - 1].sample.position.longitude_deg) *
+                        std::cos(27.4975 * std::numbers::pi / 180) * 111320;
+    EXPECT_EQ(std::abs(east) > 90, leap.readings[i].sample.number == 120) << leap.readings[i].sample.number;
+  }
+}
+
+TEST(MockRig, aClockThatIsSetShowsInItsDevicesStampsOnly) {
+  const Harvest h = drive_with({"time_jump@1 camera=0 jump_s=2"});
+  for (std::size_t k = 0; k < 2; ++k)
+    for (std::size_t i = 1; i < h.frames[k].size(); ++i) {
+      const double step = (h.frames[k][i].frame.exposure_start - h.frames[k][i - 1].frame.exposure_start).to_seconds();
+      EXPECT_NEAR(step, k == 0 && i == 20 ? 2.05 : 0.05, 1e-4) << k << " " << i;
+    }
+}
+
+TEST(MockRig, nonsenseIsRefusedByName) {
+  EXPECT_THROW(MockRig(truth_with({"cover@1 camera=2"}), options(1)), std::invalid_argument);
+  MockRig rig(truth_with({}), options(1));
+  EXPECT_EQ(rig.camera(0).configure({96, 64, 0, Duration::milliseconds(8), 0, CameraTrigger::hardware}, nullptr),
+            DeviceStatus::bad_configuration);
+  EXPECT_EQ(rig.camera(0).configure({97, 64, 20, Duration::milliseconds(8), 0, CameraTrigger::hardware}, nullptr),
+            DeviceStatus::unsupported);
+  EXPECT_EQ(rig.camera(0).start(nullptr), DeviceStatus::bad_configuration);
+  EXPECT_EQ(rig.ins().configure(0, nullptr), DeviceStatus::bad_configuration);
+  EXPECT_EQ(rig.trigger().configure({-1}, nullptr), DeviceStatus::bad_configuration);
+  Frame f;
+  EXPECT_EQ(rig.camera(0).wait(Duration{}, &f), DeviceStatus::stopped);
+}
+
+TEST(MockRig, stoppingAmidTheDriveEndsAtOnce) {
+  MockRig rig(truth_with({}), options(10));
+  CameraConfiguration c{96, 64, kRate, Duration::milliseconds(8), 0, CameraTrigger::hardware};
+  for (int k = 0; k < 2; ++k) {
+    ASSERT_EQ(rig.camera(k).configure(c, nullptr), DeviceStatus::ok);
+    ASSERT_EQ(rig.camera(k).start(nullptr), DeviceStatus::ok);
+  }
+  ASSERT_EQ(rig.trigger().configure({kRate}, nullptr), DeviceStatus::ok);
+  ASSERT_EQ(rig.trigger().start(nullptr), DeviceStatus::ok);
+  Frame f;
+  ASSERT_EQ(rig.camera(0).wait(Duration::seconds(10), &f), DeviceStatus::ok);
+  rig.camera(0).stop();  // the producer may be waiting for a slot
+  EXPECT_EQ(rig.camera(0).wait(Duration{}, &f), DeviceStatus::stopped);
+  rig.trigger().stop();
+  rig.trigger().stop();
+}
+
+}  // namespace
+}  // namespace vergence::mock
