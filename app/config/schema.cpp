@@ -80,8 +80,8 @@ Group odometry() {
   Rows rows("odometry", "How motion is found from the images. The defaults suit road vehicles and hand-held rigs; change one at a time.",
             &Configuration::odometry);
   rows.integer("features", &O::features, 50, 1000, "points",
-               "Points tracked in each image: more of them cost time and hold the pose better where texture is poor.")
-      .integer("cell_px", &O::cell_px, 16, 128, "px", "Side of the grid's cells that spread the points over the image, at full resolution.")
+               "Points tracked in each image: more of them cost time and hold the pose better where texture is poor. They are spread "
+               "over a grid of cells of the size that this number asks for.")
       .integer("pyramid_levels", &O::pyramid_levels, 2, 6, "levels",
                "Sizes of the image that are searched, each half of the one before: more levels follow faster motion.")
       .number("min_corner_score", &O::min_corner_score, 0.01, 1e5, "grey² / px²",

@@ -12,6 +12,7 @@ namespace {
 constexpr double kImageMargin = 9.0;      // px: a window's half and one
 constexpr float kMinStructure = 3.0F;     // grey levels, standard deviation of the coarsest level: a lens cap's noise stays below 2
 constexpr double kFarBaselines = 2000.0;  // depth given to a point whose disparity is within the noise of zero
+constexpr int kSmallestCell = 12;         // px: a window's side; nearer corners share their pixels
 constexpr int kMaxDistance = 64;          // bits of 256: unrelated patches lie at 128 ± 8
 constexpr double kDistinct = 0.8;         // of the second best's distance
 constexpr float kRoughSigma = 3.F;        // px: two corners found independently
@@ -23,7 +24,8 @@ Mat2 warp(const Mat23& d_pixel_d_point, const Mat3& R_there_here, double z, cons
   return d_pixel_d_point * R_there_here.leftCols<2>() * (z * d_ray_d_pixel);
 }
 
-bool shows_something(const ImageView& image) noexcept {
+/// Sums over a small image: whether it shows something, and whether it is the one seen before.
+FrontEnd::Fingerprint fingerprint(const ImageView& image) noexcept {
   std::int64_t sum = 0, square = 0;
   for (int y = 0; y < image.height; ++y) {
     const std::uint8_t* row = image.row(y);
@@ -32,9 +34,13 @@ bool shows_something(const ImageView& image) noexcept {
       square += row[x] * row[x];
     }
   }
+  return {sum, square};
+}
+
+bool shows_something(const FrontEnd::Fingerprint& f, const ImageView& image) noexcept {
   const double n = static_cast<double>(image.width) * image.height;
-  const double mean = static_cast<double>(sum) / n;
-  return static_cast<double>(square) / n - mean * mean > static_cast<double>(kMinStructure * kMinStructure);
+  const double mean = static_cast<double>(f.sum) / n;
+  return static_cast<double>(f.square) / n - mean * mean > static_cast<double>(kMinStructure * kMinStructure);
 }
 
 float milliseconds_since(std::chrono::steady_clock::time_point start) noexcept {
@@ -71,13 +77,17 @@ FrontEnd::FrontEnd(const OdometryOptions& options, const RigCalibration& rig, Ar
 }
 
 ImageCheck FrontEnd::begin(const RigFrame& frame) noexcept {
-  std::array<bool, kMaxCameras> structured{};
+  std::array<bool, kMaxCameras> structured{}, repeated{};
   const auto build = [&](int k) noexcept {
     const auto i = static_cast<std::size_t>(k);
     const ImageView& image = frame.images[i];
     if (image.empty() || image.width != rig_.intrinsics[i].width || image.height != rig_.intrinsics[i].height) return;
     pyramids_[i].build(image);
-    structured[i] = shows_something(pyramids_[i].level(pyramids_[i].levels() - 1));
+    const ImageView& coarsest = pyramids_[i].level(pyramids_[i].levels() - 1);
+    const Fingerprint f = fingerprint(coarsest);
+    structured[i] = shows_something(f, coarsest);
+    repeated[i] = f == fingerprints_[i];
+    fingerprints_[i] = f;
   };
   auto left = [&]() noexcept { build(0); };
   auto others = [&]() noexcept {
@@ -88,6 +98,7 @@ ImageCheck FrontEnd::begin(const RigFrame& frame) noexcept {
   for (int k = 0; k < cameras_; ++k) {
     const auto i = static_cast<std::size_t>(k);
     if (!frame.images[i].empty()) check.given = static_cast<std::uint8_t>(check.given | (1U << static_cast<unsigned>(k)));
+    if (repeated[i]) check.repeated = true;
     if (structured[i]) check.structured = static_cast<std::uint8_t>(check.structured | (1U << static_cast<unsigned>(k)));
   }
   structured_ = check.structured;
@@ -172,17 +183,25 @@ void FrontEnd::follow_all(Map& map, const Transform& T_left_world) noexcept {
   follow_into_all(map, T_left_world, how, 1);
 }
 
+features::CornerOptions FrontEnd::corner_options() const noexcept {
+  // Half of the cells hold a corner that can be followed and matched: sky, road and the like fill the rest.
+  constexpr double kCellsAPoint = 1.6;
+  const Intrinsics& c = rig_.intrinsics[0];
+  features::CornerOptions how;
+  how.cell =
+      std::clamp(static_cast<int>(std::sqrt(c.width * c.height / (kCellsAPoint * options_.features))), kSmallestCell, features::kMaxCell);
+  how.min_score = static_cast<float>(options_.min_corner_score);
+  how.min_distance = 0.5F * static_cast<float>(how.cell);
+  return how;
+}
+
 int FrontEnd::find_again(Map& map) noexcept {
   const std::span<MapPoint> points = map.points();
   for (MapPoint& p : points) p.now.cameras = 0;
   if ((structured_ & 1U) == 0) return 0;
   for (std::size_t i = 0; i < points.size(); ++i)
     if (points[i].holds_poses()) described_[i] = features::describe(points[i].patch);
-  features::CornerOptions how;
-  how.cell = options_.cell_px;
-  how.min_score = static_cast<float>(options_.min_corner_score);
-  how.min_distance = 0.4F * static_cast<float>(options_.cell_px);
-  features::find_corners(pyramids_[0].level(0), how, {}, runner_, &corners_);
+  features::find_corners(pyramids_[0].level(0), corner_options(), {}, runner_, &corners_);
   int found = 0;
   features::Patch patch;
   for (const features::Corner& c : corners_) {
@@ -275,11 +294,7 @@ AcrossCount FrontEnd::add_points(Map& map, const Transform& T_left_world, PointS
   taken_.clear();
   for (const MapPoint& p : map.points())
     if (p.followed() && p.now.by(0)) (void)taken_.push({p.raw[0].x(), p.raw[0].y(), 0.F});
-  features::CornerOptions corner_options;
-  corner_options.cell = options_.cell_px;
-  corner_options.min_score = static_cast<float>(options_.min_corner_score);
-  corner_options.min_distance = 0.4F * static_cast<float>(options_.cell_px);
-  features::find_corners(pyramids_[0].level(0), corner_options, taken_.span(), runner_, &corners_);
+  features::find_corners(pyramids_[0].level(0), corner_options(), taken_.span(), runner_, &corners_);
   const auto room = static_cast<std::size_t>(std::max(0, options_.features - static_cast<int>(taken_.size())));
   if (corners_.size() > room) corners_.truncate(room);
   detect_ms_ = milliseconds_since(start);

@@ -18,6 +18,7 @@ namespace vergence::odometry {
 struct ImageCheck {
   std::uint8_t given = 0;       // bit k: camera k delivered an image
   std::uint8_t structured = 0;  // bit k: and it shows something
+  bool repeated = false;        // some camera gave the image of the frame before once more: sensor noise makes that impossible
 };
 
 /// How the search across went for the corners of one frame.
@@ -35,6 +36,12 @@ struct AcrossCount {
 /// Memory     From the arena at construction. When the map has no room for a new point, the weakest corners are dropped.
 class FrontEnd {
  public:
+  /// Sum and sum of squares of the coarsest level: equal for equal images.
+  struct Fingerprint {
+    std::int64_t sum = 0, square = 0;
+    bool operator==(const Fingerprint&) const = default;
+  };
+
   FrontEnd(const OdometryOptions& options, const RigCalibration& rig, Arena& arena, PairRunner& runner);
   [[nodiscard]] static std::size_t memory_needed(const OdometryOptions& options, const RigCalibration& rig) noexcept;
 
@@ -80,6 +87,7 @@ class FrontEnd {
   /// `parallax`: how far this camera stands from where the patch was cut, over the depth there: what its unknown slope can do.
   [[nodiscard]] bool finish(int k, const Vec2& raw, double parallax, Followed* f) const noexcept;
   void match_across(const features::Corner& corner, bool exchanged, NewPoint* out) const noexcept;
+  [[nodiscard]] features::CornerOptions corner_options() const noexcept;
   void match_all(std::span<const features::Corner> corners, bool exchanged) noexcept;
   static void store(const Followed& f, int k, MapPoint* p) noexcept;
 
@@ -88,6 +96,7 @@ class FrontEnd {
   PairRunner& runner_;
   int cameras_;
   std::uint8_t structured_ = 0;
+  std::array<Fingerprint, kMaxCameras> fingerprints_{};  // of the last images
   std::array<Lens, kMaxCameras> lenses_{};
   std::array<features::Pyramid, kMaxCameras> pyramids_{};
   std::array<std::span<Followed>, kMaxCameras> followed_{};

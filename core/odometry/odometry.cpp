@@ -18,6 +18,7 @@ constexpr double kNearDisparity = 3.0;      // px: ten times the noise of a matc
 constexpr int kNearEnough = 10;             // near points that keep the scale
 constexpr int kCameraHolds = 8;             // inliers for a camera to count as one that supports the pose
 constexpr double kRigidShare = 0.4;         // of the points found that must agree: below it something else moves
+constexpr double kAcrossShare = 0.5;        // of the points found in two cameras, in which both must agree with the pose
 constexpr int kRestartedFrames = 10;        // frames marked after the scene was built anew
 constexpr int kFramesLostBeforeRestart = 3;
 constexpr double kLongestExtrapolation = 2.0;  // s: a vehicle's speed says nothing about later
@@ -114,6 +115,7 @@ Odometry::PoseFit Odometry::fit_pose(const Transform& start, bool sample) noexce
   std::array<int, kMaxCameras> held{};
   for (std::size_t i = 0; i < owner_.size(); ++i) {
     const std::uint8_t good = refiner_.flags()[i];
+    if (std::popcount(map_.points()[owner_[i]].now.cameras) > 1) ++fit.across;
     if (good == 0) continue;
     ++fit.inliers;
     for (int k = 0; k < rig_.cameras; ++k) held[static_cast<std::size_t>(k)] += (good >> k) & 1;
@@ -278,17 +280,26 @@ bool Odometry::start_scene(const Transform& T_left_world, Stamp stamp, FrameOutc
   return false;
 }
 
-void Odometry::judge(const PoseFit& fit, const ImageCheck& images, FrameOutcome* out) const noexcept {
+Reason Odometry::weakness(const ImageCheck& images) const noexcept {
   const auto all = static_cast<std::uint8_t>((1U << static_cast<unsigned>(rig_.cameras)) - 1U);
+  if (images.given != all) return Reason::no_image;
+  if (images.structured != all) return Reason::image_dark;
+  return images.repeated ? Reason::image_repeated : Reason::none;
+}
+
+void Odometry::judge(const PoseFit& fit, const ImageCheck& images, FrameOutcome* out) const noexcept {
   out->status = PoseStatus::degraded;
+  const Reason of_images = weakness(images);
   if (restart_cooldown_ > 0)
-    out->reason = restart_reason_;
-  else if (images.given != all)
-    out->reason = Reason::no_image;
-  else if (images.structured != all)
-    out->reason = Reason::image_dark;
+    out->reason = Reason::scene_restarted;
+  else if (of_images != Reason::none)
+    out->reason = of_images;
+  else if (out->gap_s > 0)
+    out->reason = Reason::time_gap;
   else if (std::popcount(fit.cameras) < 2)
     out->reason = Reason::one_camera;
+  else if (fit.stereo < kAcrossShare * fit.across)
+    out->reason = Reason::no_stereo_matches;
   else if (fit.inliers < options_.ok_inliers)
     out->reason = Reason::few_inliers;
   else if (fit.inliers < kRigidShare * fit.given)
@@ -312,14 +323,13 @@ FrameOutcome Odometry::process(const RigFrame& frame) noexcept {
   if (map_.order().empty()) {
     // Nothing to follow: this frame begins a scene, where the last one is thought to have ended.
     if (!start_scene(predicted, frame.stamp, &out)) {
-      if (images.structured == 0) out.reason = images.given == 0 ? Reason::no_image : Reason::image_dark;
+      if (weakness(images) != Reason::none) out.reason = weakness(images);
       return out;
     }
     if (any_pose_) {
       out.restarted = true;
       out.gap_s = dt;
       restart_cooldown_ = kRestartedFrames;
-      restart_reason_ = Reason::scene_restarted;
       out.status = PoseStatus::degraded;
       out.reason = Reason::scene_restarted;
     }
@@ -332,10 +342,7 @@ FrameOutcome Odometry::process(const RigFrame& frame) noexcept {
   if (dt > options_.max_gap_s && frames_lost_ == 0) out.gap_s = dt;
   const PoseFit fit = track(predicted, images.structured, &out);
   if (!fit.found) {
-    out.reason = images.given == 0        ? Reason::no_image
-                 : images.structured == 0 ? Reason::image_dark
-                 : out.gap_s > 0          ? Reason::time_gap
-                                          : Reason::no_pose;
+    out.reason = weakness(images) != Reason::none ? weakness(images) : out.gap_s > 0 ? Reason::time_gap : Reason::no_pose;
     if (images.structured != 0 && ++frames_lost_ >= kFramesLostBeforeRestart) map_.clear();
     return out;
   }
@@ -345,8 +352,12 @@ FrameOutcome Odometry::process(const RigFrame& frame) noexcept {
   out.inliers = fit.inliers;
   out.stereo_inliers = fit.stereo;
   out.reprojection_px = fit.rms_px;
-  remember(fit.T_left_world, frame.stamp);
-  if (wants_keyframe()) make_keyframe(frame.stamp, &out);
+  // The same image again says nothing about motion: the speed stays what it was.
+  if (images.repeated)
+    out.T_left_world = T_left_world_;
+  else
+    remember(fit.T_left_world, frame.stamp);
+  if (!images.repeated && wants_keyframe()) make_keyframe(frame.stamp, &out);
   out.T_left_world = T_left_world_;
   judge(fit, images, &out);
   if (restart_cooldown_ > 0) --restart_cooldown_;

@@ -41,8 +41,9 @@ class Odometry {
     Transform T_left_world{};
     int inliers = 0;
     int stereo = 0;
-    int near = 0;   // inliers whose depth this frame measures
-    int given = 0;  // points that were found in the images at all
+    int across = 0;  // points found in two cameras, whether they agree or not
+    int near = 0;    // inliers whose depth this frame measures
+    int given = 0;   // points that were found in the images at all
     double rms_px = 0;
     bool weak = false;         // the points leave some direction of motion open
     std::uint8_t cameras = 0;  // bit k: camera k holds at least a few of the inliers
@@ -57,6 +58,8 @@ class Odometry {
   [[nodiscard]] bool wants_keyframe() const noexcept;
   void make_keyframe(Stamp stamp, FrameOutcome* out) noexcept;
   [[nodiscard]] bool start_scene(const Transform& T_left_world, Stamp stamp, FrameOutcome* out) noexcept;
+  /// What is wrong with the images themselves, `none` if nothing.
+  [[nodiscard]] Reason weakness(const ImageCheck& images) const noexcept;
   void judge(const PoseFit& fit, const ImageCheck& images, FrameOutcome* out) const noexcept;
   void remember(const Transform& T_left_world, Stamp stamp) noexcept;
 
@@ -78,8 +81,7 @@ class Odometry {
   bool any_pose_ = false;
   int frames_lost_ = 0;       // in a row, with images that show something
   int restart_cooldown_ = 0;  // frames still marked after a restart
-  Reason restart_reason_ = Reason::none;
-  int keyframe_points_ = 0;  // active points when the last keyframe was made
+  int keyframe_points_ = 0;   // active points when the last keyframe was made
 };
 
 }  // namespace vergence::odometry

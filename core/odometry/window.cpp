@@ -20,6 +20,7 @@ BundleCapacities WindowAdjuster::capacities(const OdometryOptions& options, cons
   c.poses = static_cast<std::size_t>(options.window_keyframes);
   c.points = kMaxWindowPoints;
   c.observations = kMaxWindowPoints * kSightingsAPoint;
+  c.shared = false;
   return c;
 }
 

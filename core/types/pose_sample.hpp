@@ -23,6 +23,7 @@ enum class Reason : std::uint8_t {
   none,
   no_image,           // a camera delivered nothing for this frame
   image_dark,         // an image carries no structure: covered, black, saturated
+  image_repeated,     // a camera delivered the image of the frame before once more
   few_features,       // too little texture to start from
   no_stereo_matches,  // left and right do not fit this calibration
   cameras_swapped,    // points would lie behind the rig: left and right exchanged
