@@ -91,8 +91,9 @@ std::string map_section(const Session& s, const Analysis& a) {
   const bool theirs = std::any_of(a.theirs_x.begin(), a.theirs_x.end(), [](double v) { return std::isfinite(v); });
   std::string legend = "<p class=\"soft legend\"><span><i class=\"key k-ours\"></i>ours (● start, ■ end)</span>";
   if (theirs) legend += fmt::format("<span><i class=\"key k-theirs\"></i>{}</span>", a.map_is_enu ? "INS" : "reference");
+  if (a.degraded > 0) legend += "<span><i class=\"key k-care\"></i>ours, degraded</span>";
   if (a.lost > 0) legend += "<span>× no pose from here</span>";
-  return section("", "Map", map + legend + "</p>");
+  return section("tall", "Map", map + legend + "</p>");
 }
 
 void error_plots(const Session& s, const Analysis& a, std::string* out) {

@@ -81,7 +81,13 @@ void PlotBox::draw_x_axis(Svg* svg, XAxis axis) const {
     const double at = x(t * unit);
     svg->line("tick", at, top, at, bottom);
     const std::string label = axis == XAxis::time_s ? time_label(t, step) : tick_label(t, step);
-    svg->text("", at > right - 14 ? Anchor::end : Anchor::middle, std::min(at, right + 10), bottom + 15, label);
+    // The outer ones keep clear of the other axis's numbers and of the edge.
+    const bool first = at<left + 14, last = at> right - 14;
+    svg->text("",
+              first  ? Anchor::start
+              : last ? Anchor::end
+                     : Anchor::middle,
+              first ? left - 3 : std::min(at, right + 10), bottom + 16, label);
   }
   svg->line("axis", left, bottom, right, bottom);
   const char* words = kilometres ? "driven, km" : axis == XAxis::distance_m ? "driven, m" : x1 - x0 > 60 ? "time, min:s" : "time, s";
@@ -252,7 +258,8 @@ TimingPicture timing_picture(const Session& session, const Analysis& analysis) {
   box.draw_y_axis(&svg);
   const auto ticks = nice_ticks(box.x0, box.x1, 6);
   for (const double t : ticks)
-    svg.text("", Anchor::middle, box.x(t), box.bottom + 15, tick_label(t, ticks.size() > 1 ? ticks[1] - ticks[0] : 1));
+    svg.text("", t == 0.0 ? Anchor::start : Anchor::middle, box.x(t) - (t == 0.0 ? 3 : 0), box.bottom + 16,
+             tick_label(t, ticks.size() > 1 ? ticks[1] - ticks[0] : 1));
   svg.text("", Anchor::middle, (box.left + box.right) / 2, box.bottom + 32, "from the images to the pose, ms");
   const double width = (box.right - box.left) / kBars;
   for (int i = 0; i < kBars; ++i) {

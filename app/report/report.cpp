@@ -32,7 +32,10 @@ void replace_file(const std::filesystem::path& file, const std::string& text) {
   }
   std::error_code error;
   std::filesystem::rename(fresh, file, error);
-  if (error) throw InputError(file.string() + ": cannot be replaced (" + error.message() + "): is it a folder or write-protected?");
+  if (!error) return;
+  std::error_code ignored;
+  std::filesystem::remove(fresh, ignored);
+  throw InputError(file.string() + ": cannot be replaced (" + error.message() + "): is it a folder or write-protected?");
 }
 
 }  // namespace

@@ -42,19 +42,21 @@ path,line,polyline{fill:none}
 .track{fill:var(--frame);opacity:.16}
 .budget{stroke:var(--bad);stroke-width:1.6;stroke-dasharray:6 4}
 .key{display:inline-block;width:1.5em;height:.34em;border-radius:2px;vertical-align:middle;margin:0 .35em 0 0}
-.k-ours{background:var(--ours)}.k-theirs{background:var(--theirs)}.k-bad{background:var(--bad)}
+.k-ours{background:var(--ours)}.k-theirs{background:var(--theirs)}.k-care{background:var(--care)}
 .legend span{margin-right:1.1em;white-space:nowrap}
 table{border-collapse:collapse;width:100%;font-size:.9rem}
 th,td{text-align:left;padding:3px 8px 3px 0;vertical-align:top;border-bottom:1px solid color-mix(in srgb,var(--frame) 30%,transparent);overflow-wrap:anywhere}
 th{font-weight:400;color:var(--soft)}
-td.n{text-align:right;font-variant-numeric:tabular-nums;white-space:nowrap;padding-right:0}
+th[scope=row]{min-width:8.5em}
+td.n{text-align:right;font-variant-numeric:tabular-nums;padding-right:0}
+td.k{min-width:6.4em}
 td.t{white-space:nowrap;font-variant-numeric:tabular-nums}
 tr.group th{color:var(--ink);font-weight:600;padding-top:9px}
-@media (min-width:860px){.grid{grid-template-columns:1fr 1fr}.two{columns:2;column-gap:24px}}
+@media (min-width:860px){.grid{grid-template-columns:1fr 1fr}.tall{grid-row:span 2}.two{columns:2;column-gap:24px}}
 @page{size:A4;margin:12mm}
 @media print{
 body{font-size:10pt;background:#fff}main{max-width:none;padding:0}
-.grid{grid-template-columns:1fr 1fr;gap:6px}
+.grid{grid-template-columns:1fr 1fr;gap:6px}.tall{grid-row:span 2}.two{columns:2}
 section{border:1px solid var(--frame);padding:8px;break-inside:avoid;border-radius:4px}
 .verdict{border-left:10px solid var(--tone)}
 section.long{break-inside:auto}

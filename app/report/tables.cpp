@@ -155,7 +155,7 @@ std::string event_row(const Session& s, const EventRun& run) {
   std::string when = event_time(s, run.first->stamp);
   if (run.count > 1) when += " … " + event_time(s, run.last);
   const std::string many = run.count > 1 ? " (" + grouped(run.count) + " times)" : "";
-  return fmt::format("<tr><td class=\"t\">{}</td><td>{}</td><td>{}{}</td></tr>\n", when, escape(run.first->kind, 60),
+  return fmt::format("<tr><td class=\"t\">{}</td><td class=\"k\">{}</td><td>{}{}</td></tr>\n", when, escape(run.first->kind, 60),
                      escape(run.first->sentence), many);
 }
 
@@ -194,7 +194,7 @@ std::string calibrations_table(const Session& session) {
   for (std::size_t i = n > kMost ? n - kMost : 0; i < n; ++i) {
     const CalibrationRow& c = session.calibrations[i];
     const std::string frames = c.frames > 0 ? fmt::format(" ({} frames)", c.frames) : "";
-    out += fmt::format("<tr><td class=\"t\">{}</td><td>{}</td><td>{}{}</td><td>{}</td></tr>\n", event_time(session, c.stamp),
+    out += fmt::format("<tr><td class=\"t\">{}</td><td class=\"k\">{}</td><td>{}{}</td><td>{}</td></tr>\n", event_time(session, c.stamp),
                        c.accepted ? "accepted" : "rejected", escape(c.source, 60), frames, escape(c.reason));
   }
   return out + "</table>\n";

@@ -28,6 +28,7 @@ struct Advice {
 constexpr std::array kAdvice{
     Advice{"no_image", "A camera delivered no image: check its cable, its power and the trigger line."},
     Advice{"image_dark", "Images carried no structure: clean the lenses, take covers off, set exposure and gain for the light."},
+    Advice{"image_repeated", "A camera gave an older image again: check its link, its buffers and the trigger rate it is set to."},
     Advice{"few_features", "There was too little texture: raise the exposure, look for fog, rain or dirt on the lenses."},
     Advice{"no_stereo_matches",
            "Left and right do not fit this calibration: calibrate again, and check that both cameras expose at the same time."},

@@ -1,0 +1,166 @@
+#include "app/report/analysis.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "core/math/so3.hpp"
+
+namespace vergence::app::report {
+namespace {
+
+constexpr std::int64_t kStep = 100'000'000;  // ns
+constexpr double kDegree = 0.017453292519943295;
+
+/// A way of 0.5 m a frame that bends, in a camera's axes; n = 600 is 300 m.
+Session bent_drive(std::size_t n) {
+  Session s;
+  for (std::size_t i = 0; i < n; ++i) {
+    Frame f;
+    f.stamp = Stamp(static_cast<std::int64_t>(i) * kStep);
+    f.status = PoseStatus::ok;
+    f.state = State::stereo_odometry;
+    f.posed = true;
+    const double angle = 0.005 * static_cast<double>(i), radius = 100;
+    f.T_world_left = {exp_so3({0, angle, 0}), {radius * (1 - std::cos(angle)), 0.3 * std::sin(7 * angle), radius * std::sin(angle)}};
+    s.frames.push_back(f);
+  }
+  return s;
+}
+
+Session with_reference(Session s, const Transform& T_reference_world) {
+  for (const Frame& f : s.frames)
+    if (f.posed) s.reference.push_back({f.stamp, T_reference_world * f.T_world_left});
+  return s;
+}
+
+TEST(Analysis, aReferenceThatIsTheSameElsewhereGivesNoError) {
+  // From the camera's axes to one with z up, turned and far away.
+  Mat3 up;
+  up << 0, 0, 1, -1, 0, 0, 0, -1, 0;
+  const Transform T{exp_so3({0, 0, 0.7}) * up, {400, -300, 60}};
+  const Analysis a = analyse(with_reference(bent_drive(600), T));
+  ASSERT_EQ(a.source, ErrorSource::reference);
+  EXPECT_LT(a.horizontal.max, 1e-6);
+  EXPECT_LT(a.vertical.max, 1e-6);
+  EXPECT_LT(a.heading.max, 1e-5);
+  EXPECT_NEAR(a.path_m, 300, 3);
+  EXPECT_NEAR(a.interval_s, 0.1, 1e-12);
+  EXPECT_FALSE(a.map_is_enu);
+}
+
+TEST(Analysis, driftAfterTheFirstHundredMetresShowsInFullAndWithItsSign) {
+  Session s = with_reference(bent_drive(600), Transform{});
+  for (std::size_t i = 400; i < 600; ++i) {  // after 200 m: up 2 m, turned left by 3°
+    s.frames[i].T_world_left.t.y() -= 2;
+    s.frames[i].T_world_left.R = exp_so3({0, -3 * kDegree, 0}) * s.frames[i].T_world_left.R;
+  }
+  const Analysis a = analyse(s);
+  EXPECT_NEAR(a.vertical_m[399], 0, 1e-9);
+  EXPECT_NEAR(a.vertical_m[400], 2, 1e-9);
+  EXPECT_NEAR(a.heading_deg[599], 3, 1e-6);
+  EXPECT_NEAR(a.vertical.end, 2, 1e-9);
+}
+
+TEST(Analysis, aStraightWayIsLaidByAttitudesAndKeepsItsVerticalError) {
+  Session s;
+  for (int i = 0; i < 120; ++i) {
+    Frame f;
+    f.stamp = Stamp(i * kStep);
+    f.posed = true;
+    f.T_world_left.t = {0, -0.01 * i, 0.5 * i};
+    s.frames.push_back(f);
+    f.T_world_left.t.y() = 0;
+    s.reference.push_back({f.stamp, f.T_world_left});
+  }
+  const Analysis a = analyse(s);
+  EXPECT_NE(a.source_sentence.find("attitudes"), std::string::npos);
+  EXPECT_NEAR(a.vertical_m.back() - a.vertical_m.front(), 0.01 * 119, 1e-9) << "a climb that the reference lacks is not turned away";
+}
+
+TEST(Analysis, withoutAReferenceThereAreNoErrorsAndItIsSaid) {
+  const Analysis a = analyse(bent_drive(50));
+  EXPECT_EQ(a.source, ErrorSource::none);
+  for (const auto* curve : {&a.horizontal_m, &a.vertical_m, &a.heading_deg, &a.theirs_x})
+    for (const double v : *curve) EXPECT_TRUE(std::isnan(v));
+  EXPECT_NE(a.source_sentence.find("no reference"), std::string::npos);
+  EXPECT_FALSE(a.drift.has_value());
+}
+
+TEST(Analysis, aReferenceOfAnotherTimeIsNone) {
+  Session s = with_reference(bent_drive(50), Transform{});
+  for (StampedPose& p : s.reference) p.stamp = Stamp(p.stamp.ns() + 3'600'000'000'000);
+  const Analysis a = analyse(s);
+  EXPECT_EQ(a.source, ErrorSource::none);
+  EXPECT_NE(a.source_sentence.find("reference.tum has no pose at the times of ours"), std::string::npos);
+}
+
+TEST(Analysis, lostFramesHaveNoPlaceAndMissingOnesABreak) {
+  Session s = bent_drive(100);
+  for (std::size_t i = 40; i < 45; ++i) s.frames[i].posed = false, s.frames[i].status = PoseStatus::lost;
+  s.frames.erase(s.frames.begin() + 70, s.frames.begin() + 80);
+  const Analysis a = analyse(s);
+  EXPECT_TRUE(std::isnan(a.ours_x[42]));
+  EXPECT_FALSE(std::isnan(a.ours_x[45]));
+  EXPECT_EQ(a.breaks[70], 1);
+  EXPECT_EQ(std::count(a.breaks.begin(), a.breaks.end(), 1), 1);
+  EXPECT_EQ(a.lost, 5U);
+  EXPECT_NEAR(a.ok_share.value(), 85.0 / 90.0, 1e-12);
+}
+
+TEST(Analysis, skippedFramesCountAgainstTheShare) {
+  Session s = bent_drive(90);
+  s.summary = {{"frames", {{"skipped", 10}}}};
+  EXPECT_NEAR(analyse(s).ok_share.value(), 0.9, 1e-12);
+}
+
+TEST(Analysis, errorsToTheInsAreThoseOfTheFile) {
+  Session s = bent_drive(10);
+  for (std::size_t i = 5; i < 10; ++i) {
+    Frame& f = s.frames[i];
+    f.placed = f.has_ins = f.compared = true;
+    f.enu = {1, 2, 3}, f.ins = {4, 6, 3}, f.error = {-3, -4, -0.5};
+    f.error_heading_deg = -1.5;
+  }
+  const Analysis a = analyse(s);
+  EXPECT_EQ(a.source, ErrorSource::ins);
+  EXPECT_TRUE(a.map_is_enu);
+  EXPECT_TRUE(std::isnan(a.horizontal_m[4]));
+  EXPECT_EQ(a.horizontal_m[7], 5);
+  EXPECT_EQ(a.vertical_m[7], -0.5);
+  EXPECT_EQ(a.heading.max, 1.5);
+  EXPECT_EQ(a.theirs_x[7], 4);
+}
+
+TEST(Analysis, anInsThatNeverGaveAPlacementGivesNoErrors) {
+  Session s = bent_drive(10);
+  for (Frame& f : s.frames) f.has_ins = true, f.ins = {1, 2, 3};
+  const Analysis a = analyse(with_reference(s, Transform{}));
+  EXPECT_EQ(a.source, ErrorSource::none);
+  EXPECT_NE(a.source_sentence.find("could not be placed"), std::string::npos);
+}
+
+TEST(Analysis, withoutASummaryTheFiguresAreReckonedAgain) {
+  Session s = with_reference(bent_drive(600), Transform{});
+  for (StampedPose& p : s.reference) p.T_world_body.t *= 1.03;
+  const Analysis a = analyse(s);
+  EXPECT_NEAR(a.scale.value(), 1.03, 1e-6);
+  ASSERT_TRUE(a.drift.has_value());
+  EXPECT_NEAR(*a.drift, 0.03 / 1.03, 0.006) << "segments of a bent way are a little shorter than their nominal length";
+}
+
+TEST(Analysis, extremeStampsDoNotOverflow) {
+  Session s = bent_drive(2);
+  s.frames[0].stamp = Stamp(std::numeric_limits<std::int64_t>::min());
+  s.frames[1].stamp = Stamp(std::numeric_limits<std::int64_t>::max());
+  EXPECT_NEAR(analyse(s).duration_s, 1.8446744e10, 1e4);
+}
+
+TEST(Analysis, nothingAtAllIsAnAnswer) {
+  const Analysis a = analyse(Session{});
+  EXPECT_EQ(a.read, 0U);
+  EXPECT_FALSE(a.ok_share.has_value());
+}
+
+}  // namespace
+}  // namespace vergence::app::report

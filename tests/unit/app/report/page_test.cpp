@@ -1,0 +1,169 @@
+#include "app/report/page.hpp"
+
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <fstream>
+
+#include "app/report/plots.hpp"
+#include "app/report/report.hpp"
+#include "app/report/tables.hpp"
+#include "app/runtime/errors.hpp"
+#include "tests/support/session_writer.hpp"
+#include "tests/support/temporary_folder.hpp"
+#include "tests/unit/app/report/xml_check.hpp"
+
+namespace vergence::app {
+namespace {
+
+bool contains(const std::string& text, const std::string& part) { return text.find(part) != std::string::npos; }
+
+/// Nothing that a browser would load or run.
+testing::AssertionResult self_contained(const std::string& html) {
+  for (const char* word : {"<script", "src=", "@import", "url(", "http:", "https:", "javascript:", "onload", "<iframe", "<object"})
+    if (contains(html, word)) return testing::AssertionFailure() << "has " << word;
+  const std::string problem = test::XmlCheck::problem(html);
+  if (!problem.empty()) return testing::AssertionFailure() << problem;
+  return testing::AssertionSuccess();
+}
+
+std::string page_of(const std::filesystem::path& folder) {
+  const ReportOutcome outcome = write_report(folder);
+  return test::read_file(outcome.page);
+}
+
+test::SessionWriter writer_of(std::size_t frames) {
+  test::SessionWriter writer;
+  writer.frames = frames;
+  return writer;
+}
+
+TEST(Page, ofAWholeSessionShowsEverythingAndLoadsNothing) {
+  const test::TemporaryFolder folder;
+  writer_of(2000).write(folder.path());
+  const std::string html = page_of(folder.path());
+  EXPECT_TRUE(self_contained(html));
+  for (const char* part :
+       {"Usable with care", "0.74 %", "Error to the INS", "Map", "north", "Status and state", "Inliers", "Time a frame", "Horizontal error",
+        "Vertical error", "Heading error", "over the way", "rotation x, degrees", "translation z, mm", "found again against the window",
+        "(20 times)", "allocations after the seal", "What to do next"})
+    EXPECT_TRUE(contains(html, part)) << part;
+  EXPECT_FALSE(contains(html, "What is missing"));
+  EXPECT_FALSE(contains(html, ">nan")) << "a number that is not there has no row";
+}
+
+TEST(Page, of33000FramesIsSmall) {
+  const test::TemporaryFolder folder;
+  writer_of(33'000).write(folder.path());
+  const std::string html = page_of(folder.path());
+  EXPECT_LE(html.size(), 3'000'000U);
+  EXPECT_EQ(test::XmlCheck::problem(html), "");
+}
+
+TEST(Page, withoutAReferenceSaysSoAndHasNoErrorPlots) {
+  const test::TemporaryFolder folder;
+  auto writer = writer_of(500);
+  writer.ins = false;
+  writer.write(folder.path());
+  const std::string html = page_of(folder.path());
+  EXPECT_TRUE(contains(html, "There was no reference"));
+  EXPECT_TRUE(contains(html, "not known"));
+  for (const char* part : {"Horizontal error", "Vertical error", "Heading error", "north"}) EXPECT_FALSE(contains(html, part)) << part;
+  EXPECT_TRUE(self_contained(html));
+}
+
+TEST(Page, isMadeOfEveryTornSession) {
+  const test::TemporaryFolder whole;
+  writer_of(300).write(whole.path());
+  for (const char* gone :
+       {"summary.json", "poses.csv", "trajectory.tum", "reference.tum", "calibrations.csv", "calibration.yaml", "events.jsonl"})
+    for (const double kept : {-1.0, 0.0, 0.37, 0.99}) {  // of the file; negative: no file
+      const test::TemporaryFolder folder;
+      std::filesystem::copy(whole.path(), folder.path(), std::filesystem::copy_options::recursive);
+      const std::string text = test::read_file(folder / gone);
+      std::filesystem::remove(folder / gone);
+      if (kept >= 0) folder.write(gone, text.substr(0, static_cast<std::size_t>(kept * static_cast<double>(text.size()))));
+      const std::string html = page_of(folder.path());
+      EXPECT_TRUE(self_contained(html)) << gone << " " << kept;
+      if (std::string(gone) != "trajectory.tum" && (kept < 0 || kept == 0.37)) {
+        EXPECT_TRUE(contains(html, "What is missing")) << gone << " " << kept;
+      }
+    }
+}
+
+TEST(Page, hostileTextNeverBecomesMarkup) {
+  const test::TemporaryFolder folder;
+  writer_of(200).write(folder.path());
+  const std::string evil = "</svg><script>alert(1)</script><img src=x onerror=alert(2)>";
+  std::ofstream(folder / "events.jsonl", std::ios::app)
+      << R"({"stamp_ns":1,"kind":")" << evil << R"(","sentence":")" << evil << std::string(5000, 'x') << "\"}\n";
+  std::ofstream(folder / "calibrations.csv", std::ios::app) << "1,accepted," << evil << ',' << evil << ",1,1,1,0,0,0,0,0,0,,,,,,,,,,,,\n";
+  folder.write("summary.json", R"({"version":")" + evil + R"(","configuration_hash":")" + evil + R"(","calibration":{"source":")" + evil +
+                                   R"(","word":")" + evil + R"("},"truth":{")" + evil + R"(":1}})");
+  const std::string html = page_of(folder.path());
+  EXPECT_EQ(test::XmlCheck::problem(html), "");
+  for (const char* word : {"<script", "<img"}) EXPECT_FALSE(contains(html, word)) << word;
+  EXPECT_TRUE(contains(html, "&lt;script&gt;alert(1)"));
+  EXPECT_FALSE(contains(html, std::string(400, 'x')));
+}
+
+TEST(Page, hugeAndNonsensicalNumbersStayWellFormed) {
+  const test::TemporaryFolder folder;
+  std::string poses = test::SessionWriter::kHead;
+  const std::string nothing(26, ',');
+  poses +=
+      "0,-9223372036854775808,stereo_odometry,ok,,9e6,9e6,9e6,0,0,0,1,9e6,9e6,9e6,,,,,-9e6,-9e6,9e6,,,,,1e7,1e7,1e7,1e300,1e300,1,1e300\n";
+  poses += "1,9223372036854775807,lost,lost,no_pose" + nothing + ",,\n";
+  folder.write("poses.csv", poses);
+  folder.write("events.jsonl", R"({"stamp_ns":9223372036854775807,"kind":"","sentence":""})"
+                               "\n");
+  const std::string html = page_of(folder.path());
+  EXPECT_TRUE(self_contained(html));
+  EXPECT_FALSE(contains(html, "\"nan") || contains(html, "\"inf"));
+}
+
+TEST(Page, manyEventsAreCondensed) {
+  report::Session s;
+  for (int i = 0; i < 5000; ++i) s.events.push_back({Stamp(i), "dropped", "number " + std::to_string(i)});
+  const std::string table = report::events_table(s);
+  EXPECT_LT(table.size(), 40'000U);
+  for (const char* part : {"number 0<", "number 79<", "number 4920<", "number 4999<", "4 840 rows are left out"})
+    EXPECT_TRUE(contains(table, part)) << part;
+  EXPECT_FALSE(contains(table, "number 80<"));
+}
+
+TEST(Bands, aSingleLostFrameAmongManyShows) {
+  report::Session s;
+  for (int i = 0; i < 50'000; ++i) {
+    report::Frame f;
+    f.stamp = Stamp(i * 50'000'000LL);
+    f.status = i == 31'234 ? PoseStatus::lost : PoseStatus::ok;
+    f.state = State::stereo_odometry;
+    f.posed = i != 31'234;
+    s.frames.push_back(f);
+  }
+  const std::string svg = report::bands_picture(s, report::analyse(s));
+  EXPECT_TRUE(contains(svg, "class=\"f-bad\""));
+  EXPECT_FALSE(contains(svg, "class=\"f-care\""));
+}
+
+TEST(WriteReport, replacesAnOlderPageAndLeavesNothingElse) {
+  const test::TemporaryFolder folder;
+  writer_of(100).write(folder.path());
+  folder.write("report.html", "old");
+  const std::string html = page_of(folder.path());
+  EXPECT_TRUE(html.starts_with("<!DOCTYPE html>"));
+  EXPECT_EQ(html, page_of(folder.path())) << "the same session gives the same bytes";
+  EXPECT_FALSE(std::filesystem::exists(folder / "report.html.new"));
+}
+
+TEST(WriteReport, aPageThatCannotBeWrittenIsASentence) {
+  const test::TemporaryFolder folder;
+  writer_of(100).write(folder.path());
+  folder.write("report.html/in_the_way", "");
+  EXPECT_THROW((void)write_report(folder.path()), InputError);
+  EXPECT_FALSE(std::filesystem::exists(folder / "report.html.new"));
+}
+
+}  // namespace
+}  // namespace vergence::app

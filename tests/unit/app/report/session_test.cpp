@@ -1,0 +1,146 @@
+#include "app/report/session.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "app/report/csv.hpp"
+#include "app/runtime/errors.hpp"
+#include "tests/support/session_writer.hpp"
+#include "tests/support/temporary_folder.hpp"
+
+namespace vergence::app::report {
+namespace {
+
+constexpr const char* kShortHead = "frame,stamp_ns,state,status,reason,x,y,z,qx,qy,qz,qw,inliers,estimate_ms\n";
+
+bool says(const Session& s, const std::string& part) {
+  return std::any_of(s.missing.begin(), s.missing.end(), [&](const std::string& m) { return m.find(part) != std::string::npos; });
+}
+
+/// A folder with poses.csv of that text and nothing else.
+Session with_poses(const std::string& text) {
+  const test::TemporaryFolder folder;
+  folder.write("poses.csv", text);
+  return read_session(folder.path());
+}
+
+TEST(WholeLines, whatFollowsTheLastLineEndIsTorn) {
+  EXPECT_EQ(whole_lines("a\nb\nc"), "a\nb\n");
+  EXPECT_EQ(whole_lines("a\n"), "a\n");
+  EXPECT_EQ(whole_lines("abc"), "");
+  EXPECT_EQ(whole_lines(""), "");
+}
+
+TEST(CsvRows, columnsAreFoundByNameAndDamagedRowsAreCounted) {
+  CsvRows rows("a,b,c\n1,,x\n1,2\n3,4.5,y,z\n7,8,\n");
+  ASSERT_TRUE(rows.next());
+  EXPECT_EQ(rows.integer(rows.column("a")), 1);
+  EXPECT_FALSE(rows.number(rows.column("b")));
+  EXPECT_EQ(rows.text(rows.column("c")), "x");
+  EXPECT_EQ(rows.text(rows.column("no such")), "");
+  ASSERT_TRUE(rows.next());
+  EXPECT_EQ(rows.number(rows.column("b")), 8.0);
+  EXPECT_FALSE(rows.next());
+  EXPECT_EQ(rows.torn_rows(), 2U);
+}
+
+TEST(ReadSession, aWholeOneHasNothingMissing) {
+  const test::TemporaryFolder folder;
+  test::SessionWriter writer;
+  writer.frames = 400;
+  writer.write(folder.path());
+  const Session s = read_session(folder.path());
+  EXPECT_EQ(s.missing, std::vector<std::string>{});
+  ASSERT_EQ(s.frames.size(), 400U);
+  EXPECT_EQ(s.frames.front().stamp.ns(), writer.first_stamp_ns);
+  EXPECT_EQ(s.frames[250].status, PoseStatus::lost);  // 62 to 64 %
+  EXPECT_FALSE(s.frames[250].posed);
+  EXPECT_TRUE(s.frames[399].compared && s.frames[399].placed && s.frames[399].has_ins && s.frames[399].posed);
+  EXPECT_EQ(s.calibrations.size(), 4U);
+  EXPECT_FALSE(s.calibrations[1].accepted);
+  EXPECT_NEAR(s.calibrations[0].sigma[0], 2 * 0.0009, 1e-9) << "the wide sigma goes before the noise's";
+  EXPECT_EQ(s.reference.size(), 392U);
+  EXPECT_TRUE(s.calibration.has_value());
+  EXPECT_EQ(number_at(s.summary, "timing_ms.stages.track"), 5.5);
+}
+
+TEST(ReadSession, aFolderThatIsNoSessionIsRefused) {
+  const test::TemporaryFolder folder;
+  EXPECT_THROW((void)read_session(folder.path()), InputError);
+  EXPECT_THROW((void)read_session(folder / "nowhere"), InputError);
+  EXPECT_THROW((void)read_session(folder.write("file", "x")), InputError);
+}
+
+TEST(ReadSession, everyFileThatIsMissingIsSaid) {
+  const Session s = with_poses(std::string(kShortHead) + "0,1000,stereo_odometry,ok,,1,2,3,0,0,0,1,100,5\n");
+  ASSERT_EQ(s.frames.size(), 1U);
+  for (const char* file : {"summary.json", "reference.tum", "calibrations.csv", "calibration.yaml", "events.jsonl"})
+    EXPECT_TRUE(says(s, file)) << file;
+}
+
+TEST(ReadSession, aTornLastLineIsLeftOutEvenWhenItLooksWhole) {
+  const std::string good = "0,1000,stereo_odometry,ok,,1,2,3,0,0,0,1,100,5.25\n";
+  const Session s = with_poses(kShortHead + good + "1,2000,stereo_odometry,ok,,1,2,3,0,0,0,1,100,5");
+  EXPECT_EQ(s.frames.size(), 1U);
+  EXPECT_TRUE(says(s, "poses.csv: the last line is torn"));
+}
+
+TEST(ReadSession, damagedAndDisorderedLinesAreLeftOutAndCounted) {
+  const Session s = with_poses(std::string(kShortHead) +
+                               "0,1000,stereo_odometry,ok,,1,2,3,0,0,0,1,100,5\n"
+                               "garbage\n"
+                               "1,x,stereo_odometry,ok,,1,2,3,0,0,0,1,100,5\n"
+                               "2,900,stereo_odometry,ok,,1,2,3,0,0,0,1,100,5\n"
+                               "3,3000,dancing,splendid,,1,2,1e300,0,0,0,1,100,5\n"
+                               "4,4000,stereo_odometry,ok,,nan,2,3,0,0,0,1,-1e99,inf\n"
+                               "5,5000,stereo_odometry,ok,,1,2,3,0,0,0,0,100,5\n");
+  EXPECT_TRUE(says(s, "2 damaged lines"));
+  EXPECT_TRUE(says(s, "1 line left out whose stamp is not later"));
+  ASSERT_EQ(s.frames.size(), 4U);
+  EXPECT_FALSE(s.frames[1].state || s.frames[1].status);
+  EXPECT_FALSE(s.frames[1].posed) << "a coordinate beyond the earth";
+  EXPECT_FALSE(s.frames[2].posed);
+  EXPECT_EQ(s.frames[2].inliers, -1);
+  EXPECT_FALSE(s.frames[3].posed) << "a quaternion of no length";
+}
+
+TEST(ReadSession, aLostFrameNeverHasAPoseWhateverItsLineSays) {
+  const Session s = with_poses(std::string(kShortHead) + "0,1000,lost,lost,no_pose,1,2,3,0,0,0,1,100,5\n");
+  ASSERT_EQ(s.frames.size(), 1U);
+  EXPECT_FALSE(s.frames[0].posed);
+}
+
+TEST(ReadSession, withoutPosesTheTrajectoryStandsIn) {
+  const test::TemporaryFolder folder;
+  folder.write("trajectory.tum", "1.5 0 0 0 0 0 0 1\n2.5 0 0 1 0 0 0 1\n3.5 0 0 2 0 0 0");
+  const Session s = read_session(folder.path());
+  ASSERT_EQ(s.frames.size(), 2U);
+  EXPECT_EQ(s.frames[0].stamp.ns(), 1'500'000'000);
+  EXPECT_TRUE(s.frames[1].posed);
+  EXPECT_FALSE(s.frames[1].status.has_value());
+}
+
+TEST(ReadSession, tornJsonIsSaidAndNeverHalfTaken) {
+  const test::TemporaryFolder folder;
+  folder.write("summary.json", "{\"frames\": {\"read\": 5, ");
+  folder.write("events.jsonl",
+               "{\"stamp_ns\":1,\"kind\":\"state\",\"sentence\":\"a\"}\n[1,2]\n{\"stamp_ns\":\"x\",\"kind\":7}\n{\"stamp_ns\":2,\"ki");
+  const Session s = read_session(folder.path());
+  EXPECT_TRUE(s.summary.is_null());
+  EXPECT_TRUE(says(s, "summary.json is torn"));
+  EXPECT_TRUE(says(s, "events.jsonl: 1 damaged line left out"));
+  ASSERT_EQ(s.events.size(), 2U);
+  EXPECT_EQ(s.events[1].kind, "") << "a kind that is no text";
+}
+
+TEST(NumberAt, isNothingWhereThereIsNoFiniteNumber) {
+  const auto json = nlohmann::json::parse(R"({"a": {"b": 1.5, "c": null, "d": "7", "e": [1]}})");
+  EXPECT_EQ(number_at(json, "a.b"), 1.5);
+  for (const char* path : {"a.c", "a.d", "a.e", "a", "b", "a.b.c", ""}) EXPECT_FALSE(number_at(json, path)) << path;
+  EXPECT_FALSE(number_at(nlohmann::json(), "a"));
+  EXPECT_EQ(text_at(json, "a.d"), "7");
+}
+
+}  // namespace
+}  // namespace vergence::app::report

@@ -1,0 +1,119 @@
+#include "app/report/verdict.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+namespace vergence::app::report {
+namespace {
+
+/// A drive with which nothing is wrong: 1000 frames, a reference, 0.8 % drift.
+struct Case {
+  Session session;
+  Analysis analysis;
+
+  Case() {
+    for (int i = 0; i < 1000; ++i) {
+      Frame f;
+      f.posed = true;
+      f.status = PoseStatus::ok;
+      f.estimate_ms = 10;
+      session.frames.push_back(f);
+    }
+    session.summary = {{"calibration", {{"word", "good"}}}, {"timing_ms", {{"p99", 20.0}}}, {"allocations_after_seal", 0}};
+    analysis.read = analysis.ok = 1000;
+    analysis.ok_share = 1.0;
+    analysis.by_reason = {0};
+    analysis.source = ErrorSource::reference;
+    analysis.drift = 0.008;
+    analysis.scale = 1.001;
+    analysis.interval_s = 0.05;
+  }
+  [[nodiscard]] Verdict verdict() const { return judge(session, analysis); }
+};
+
+bool any_has(const std::vector<std::string>& sentences, const std::string& part) {
+  return std::any_of(sentences.begin(), sentences.end(), [&](const std::string& s) { return s.find(part) != std::string::npos; });
+}
+
+TEST(Verdict, aDriveWithNothingWrongIsGood) {
+  const Verdict v = Case().verdict();
+  EXPECT_EQ(v.grade, Grade::good);
+  EXPECT_TRUE(v.reasons.empty() && v.advice.empty());
+  EXPECT_FALSE(v.sentence.empty());
+}
+
+TEST(Verdict, withoutAReferenceItIsNeverGood) {
+  Case c;
+  c.analysis.source = ErrorSource::none;
+  c.analysis.drift.reset();
+  const Verdict v = c.verdict();
+  EXPECT_EQ(v.grade, Grade::care);
+  EXPECT_TRUE(any_has(v.reasons, "no reference"));
+}
+
+TEST(Verdict, driftAndScaleMoveTheGradeAtTheirLimits) {
+  const std::vector<std::pair<double, Grade>> drifts{{0.02, Grade::good}, {0.021, Grade::care}, {0.05, Grade::care}, {0.051, Grade::bad}};
+  for (const auto& [drift, grade] : drifts) {
+    Case c;
+    c.analysis.drift = drift;
+    EXPECT_EQ(c.verdict().grade, grade) << drift;
+  }
+  Case c;
+  c.analysis.scale = 0.96;  // reference = 0.96 of ours
+  EXPECT_EQ(c.verdict().grade, Grade::care);
+  EXPECT_TRUE(any_has(c.verdict().reasons, "too long"));
+}
+
+TEST(Verdict, lostFramesAndNoPosesAtAll) {
+  Case c;
+  c.analysis.ok = 950, c.analysis.lost = 50;
+  EXPECT_EQ(c.verdict().grade, Grade::care);
+  c.analysis.ok = 800, c.analysis.lost = 200;
+  EXPECT_EQ(c.verdict().grade, Grade::bad);
+  for (Frame& f : c.session.frames) f.posed = false;
+  EXPECT_TRUE(any_has(c.verdict().reasons, "never was a pose"));
+  EXPECT_EQ(judge(Session{}, analyse(Session{})).grade, Grade::bad);
+}
+
+TEST(Verdict, theWorstReasonComesFirst) {
+  Case c;
+  c.analysis.ok = 950, c.analysis.lost = 50;
+  c.session.summary["calibration"]["word"] = "recalibrate";
+  const Verdict v = c.verdict();
+  EXPECT_EQ(v.grade, Grade::bad);
+  ASSERT_EQ(v.reasons.size(), 2U);
+  EXPECT_NE(v.reasons[0].find("calibration"), std::string::npos);
+}
+
+TEST(Verdict, everyReasonOfAPoseHasItsAdvice) {
+  for (int i = 1; i <= static_cast<int>(Reason::recalibrating); ++i) {
+    Case c;
+    c.session.reasons.emplace_back(to_string(static_cast<Reason>(i)));
+    c.analysis.by_reason = {0, 3};
+    EXPECT_TRUE(any_has(c.verdict().advice, "3 frames")) << c.session.reasons.back();
+  }
+}
+
+TEST(Verdict, aTornSessionSaysHowToCloseOne) {
+  Case c;
+  c.session.summary = nullptr;
+  c.session.missing = {"summary.json is missing"};
+  const Verdict v = c.verdict();
+  EXPECT_EQ(v.grade, Grade::care);
+  EXPECT_TRUE(any_has(v.advice, "not closed"));
+}
+
+TEST(Verdict, slowFramesAndAllocationsGiveAdvice) {
+  Case c;
+  for (std::size_t i = 0; i < 20; ++i) c.session.frames[i].estimate_ms = 80;
+  c.session.summary["allocations_after_seal"] = 3;
+  c.session.summary["drops"] = {{"lines", 4}};
+  const Verdict v = c.verdict();
+  EXPECT_TRUE(any_has(v.advice, "frame interval"));
+  EXPECT_TRUE(any_has(v.advice, "Memory was taken 3 times"));
+  EXPECT_TRUE(any_has(v.reasons, "4 lines"));
+}
+
+}  // namespace
+}  // namespace vergence::app::report
