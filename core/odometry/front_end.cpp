@@ -319,12 +319,14 @@ AcrossCount FrontEnd::add_points(Map& map, const Transform& T_left_world, PointS
     store(f.left, 0, p);
     store(f.across, f.matched_camera, p);
   }
-  // Few matches in front of the rig: are they behind it?
-  if (count.near * 4 < count.corners) {
-    match_all(corners_.span(), true);
-    for (std::size_t i = 0; i < corners_.size(); ++i) count.exchanged += fresh_[i].behind ? 1 : 0;
-  }
   return count;
+}
+
+int FrontEnd::count_exchanged() noexcept {
+  match_all(corners_.span(), true);
+  int n = 0;
+  for (std::size_t i = 0; i < corners_.size(); ++i) n += fresh_[i].behind ? 1 : 0;
+  return n;
 }
 
 }  // namespace vergence::odometry

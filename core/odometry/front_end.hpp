@@ -24,9 +24,8 @@ struct ImageCheck {
 /// How the search across went for the corners of one frame.
 struct AcrossCount {
   int corners = 0;
-  int matched = 0;    // in front of the rig
-  int near = 0;       // of these, with a disparity that measures depth
-  int exchanged = 0;  // would lie behind it: asked for only when few matched
+  int matched = 0;  // in front of the rig
+  int near = 0;     // of these, with a disparity that measures depth
 };
 
 /// Pixels of one rig frame: pyramids, following points, new corners and their matches across.
@@ -60,6 +59,9 @@ class FrontEnd {
 
   /// New corners of `left` where there are no points, matched across, as points of the given stage, each with its sighting in `now`.
   AcrossCount add_points(Map& map, const Transform& T_left_world, PointStage stage) noexcept;
+
+  /// How many corners of the last add_points() match where points of a rig with exchanged cameras would lie: behind it.
+  [[nodiscard]] int count_exchanged() noexcept;
 
   [[nodiscard]] const Lens& lens(int k) const noexcept { return lenses_[static_cast<std::size_t>(k)]; }
   [[nodiscard]] float detect_ms() const noexcept { return detect_ms_; }

@@ -22,6 +22,8 @@ constexpr double kAcrossShare = 0.5;        // of the points found in two camera
 constexpr int kRestartedFrames = 10;        // frames marked after the scene was built anew
 constexpr int kFramesLostBeforeRestart = 3;
 constexpr double kLongestExtrapolation = 2.0;  // s: a vehicle's speed says nothing about later
+constexpr double kCertainShare = 0.6;          // near matches of the corners above which nobody asks whether the cameras are exchanged
+constexpr double kStartShare = 0.4;            // of the corners that must match: chance across a wrong rig gives a tenth to a quarter
 constexpr int kStartMatches = 30;              // points across to start from
 
 class StageClock {
@@ -256,9 +258,9 @@ bool Odometry::start_scene(const Transform& T_left_world, Stamp stamp, FrameOutc
   clock.mark(Stage::match);
   if (across.corners < kStartMatches)
     out->reason = Reason::few_features;
-  else if (across.exchanged > 2 * across.near)
+  else if (across.near < kCertainShare * across.corners && front_end_.count_exchanged() > across.near)
     out->reason = Reason::cameras_swapped;
-  else if (across.matched < kStartMatches || across.near < kNearEnough)
+  else if (across.matched < kStartMatches || across.matched < kStartShare * across.corners || across.near < kNearEnough)
     out->reason = Reason::no_stereo_matches;
   else {
     const std::size_t slot = map_.make_keyframe(T_left_world, stamp);
