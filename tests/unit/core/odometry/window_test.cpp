@@ -1,0 +1,173 @@
+#include "core/odometry/window.hpp"
+
+#include <gtest/gtest.h>
+
+#include <vector>
+
+#include "core/math/random.hpp"
+#include "core/memory/allocation_guard.hpp"
+#include "core/odometry/lens.hpp"
+
+namespace vergence::odometry {
+namespace {
+
+RigCalibration rig() {
+  RigCalibration r;
+  r.cameras = 2;
+  r.baseline = 0.5;
+  for (std::size_t k = 0; k < 2; ++k) {
+    Intrinsics& c = r.intrinsics[k];
+    c.width = 640;
+    c.height = 480;
+    c.fx = c.fy = 500;
+    c.cx = 320;
+    c.cy = 240;
+  }
+  r.T_camera_left[1] = {exp_so3(Vec3(0.01, -0.02, 0.015)), Vec3(-0.5, 0.01, 0.02)};
+  return r;
+}
+
+OdometryOptions many_steps() {
+  OdometryOptions o;
+  o.window_keyframes = 6;
+  o.window_steps = 30;
+  return o;
+}
+
+/// Six keyframes along a bend before a cloud of points, each seen wherever it falls into an image; exact but for the rounding to
+/// floats, 3e-5 px.
+struct Bend {
+  RigCalibration calibration = rig();
+  OdometryOptions options = many_steps();
+  Arena arena{Map::memory_needed() + WindowAdjuster::memory_needed(options, calibration)};
+  Map map{6, arena};
+  WindowAdjuster adjuster{options, calibration, arena};
+  std::vector<Transform> poses;
+  std::vector<Vec3> points;
+
+  Bend() {
+    Random random(17);
+    for (int i = 0; i < 120; ++i) {
+      const double z = random.uniform(5, 25);
+      points.emplace_back(random.uniform(-0.45, 0.45) * z, random.uniform(-0.4, 0.4) * z, z);
+      MapPoint* p = map.make_point();
+      p->stage = i % 4 == 0 ? PointStage::dormant : PointStage::active;
+      p->p_world = points.back();
+    }
+    for (int i = 0; i < 6; ++i) {
+      poses.push_back(Transform{exp_so3(Vec3(0.002 * i, 0.02 * i, -0.003 * i)), Vec3(0.03 * i, 0.01 * i, -0.4 * i)});
+      const std::size_t slot = map.make_keyframe(poses.back(), Stamp(i));
+      for (MapPoint& p : map.points())
+        if (p.stage != PointStage::free) see(&p, slot, poses.back());
+    }
+  }
+  void see(MapPoint* p, std::size_t slot, const Transform& T_left_world) const {
+    for (int k = 0; k < 2; ++k) {
+      const auto i = static_cast<std::size_t>(k);
+      const Camera camera = Lens(calibration.intrinsics[i]).ideal();
+      Vec2 pixel;
+      if (camera.project(calibration.T_camera_left[i] * (T_left_world * p->p_world), &pixel, nullptr) == ProjectStatus::ok &&
+          camera.inside(pixel, 0))
+        p->seen[slot].set(k, pixel, 0.15F);
+    }
+  }
+  /// All poses but the first, and all points, from where they are not.
+  void disturb() {
+    Random random(23);
+    const auto some = [&](double size) { return Vec3(size * random.normal(), size * random.normal(), size * random.normal()); };
+    for (std::size_t i = 1; i < poses.size(); ++i) map.keyframe(map.order()[i]).T_left_world = perturbed(poses[i], some(0.003), some(0.03));
+    for (MapPoint& p : map.points())
+      if (p.stage != PointStage::free) p.p_world += some(0.005 * p.p_world.z());
+  }
+  [[nodiscard]] double worst_pose_error() const {
+    double worst = 0;
+    for (std::size_t i = 0; i < poses.size(); ++i) {
+      const Transform& T = map.keyframe(map.order()[i]).T_left_world;
+      worst = std::max({worst, (T.t - poses[i].t).norm(), log_so3(T.R * poses[i].R.transpose()).norm()});
+    }
+    return worst;
+  }
+  [[nodiscard]] int sightings() const {
+    int n = 0;
+    for (const MapPoint& p : map.points())
+      for (const std::uint8_t slot : map.order())
+        n += p.stage == PointStage::free ? 0 : (p.seen[slot].by(0) ? 1 : 0) + (p.seen[slot].by(1) ? 1 : 0);
+    return n;
+  }
+};
+
+TEST(WindowAdjuster, exactSightingsBringThePosesBack) {
+  Bend b;
+  const Transform first = b.map.keyframe(b.map.order()[0]).T_left_world;
+  b.disturb();
+  ASSERT_GT(b.worst_pose_error(), 0.02);
+  const int before = b.sightings();
+  const WindowOutcome out = b.adjuster.adjust(b.map);
+  EXPECT_LT(b.worst_pose_error(), 1e-6);
+  EXPECT_LT(out.rms_px, 1e-4);  // what rounding to floats leaves
+  EXPECT_GT(out.points, 100);
+  EXPECT_EQ(out.dropped, 0);
+  EXPECT_EQ(b.sightings(), before);
+  EXPECT_EQ(b.map.keyframe(b.map.order()[0]).T_left_world.t, first.t) << "the oldest keyframe holds the window";
+}
+
+TEST(WindowAdjuster, grossOutliersAreDroppedAndNothingElse) {
+  Bend b;
+  b.disturb();
+  std::vector<MapPoint*> wrong;
+  for (std::size_t i = 3; i < 120 && wrong.size() < 10; i += 11) {
+    MapPoint& p = b.map.points()[i];
+    const std::size_t slot = b.map.order()[2 + i % 3];
+    if (!p.seen[slot].by(1)) continue;
+    p.seen[slot].pixel[1] += Eigen::Vector2f(20, -14);
+    wrong.push_back(&p);
+  }
+  ASSERT_GE(wrong.size(), 8U);
+  const int before = b.sightings();
+  const WindowOutcome out = b.adjuster.adjust(b.map);
+  EXPECT_EQ(out.dropped, static_cast<int>(wrong.size()));
+  EXPECT_EQ(b.sightings(), before - static_cast<int>(wrong.size()));
+  for (std::size_t n = 0, i = 3; n < wrong.size(); i += 11) {
+    MapPoint& p = b.map.points()[i];
+    if (n < wrong.size() && &p == wrong[n]) {
+      EXPECT_FALSE(p.seen[b.map.order()[2 + i % 3]].by(1));
+      ++n;
+    }
+  }
+  (void)b.adjuster.adjust(b.map);
+  EXPECT_LT(b.worst_pose_error(), 1e-6) << "once they are gone they leave nothing behind";
+}
+
+TEST(WindowAdjuster, candidatesDoNotMoveAnything) {
+  Bend b;
+  MapPoint* lie = b.map.make_point();
+  lie->stage = PointStage::candidate;
+  lie->p_world = Vec3(0, 0, 10);
+  for (const std::uint8_t slot : b.map.order()) lie->seen[slot].set(0, {10.0 * slot, 400}, 0.01F);
+  (void)b.adjuster.adjust(b.map);
+  EXPECT_LT(b.worst_pose_error(), 1e-6);
+  EXPECT_EQ(lie->p_world, Vec3(0, 0, 10));
+}
+
+TEST(WindowAdjuster, oneKeyframeOrNoPointsChangeNothing) {
+  Bend b;
+  b.map.clear();
+  EXPECT_EQ(b.adjuster.adjust(b.map).observations, 0);
+  (void)b.map.make_keyframe(b.poses[1], Stamp(1));
+  (void)b.adjuster.adjust(b.map);
+  EXPECT_EQ(b.map.keyframe(b.map.order()[0]).T_left_world.t, b.poses[1].t);
+}
+
+TEST(WindowAdjuster, allocatesNothing) {
+  Bend b;
+  b.disturb();
+  const std::uint64_t before = AllocationGuard::allocations_after_seal();
+  {
+    const SealedScope sealed;
+    (void)b.adjuster.adjust(b.map);
+  }
+  EXPECT_EQ(AllocationGuard::allocations_after_seal(), before);
+}
+
+}  // namespace
+}  // namespace vergence::odometry
