@@ -17,7 +17,6 @@ constexpr std::array kAnnounced{
     Announced{"devices", "List the cameras, boards and sensors that are connected"},
     Announced{"doctor", "Check this machine and its devices for what a drive needs"},
     Announced{"snap", "Take one picture with every camera of a configuration"},
-    Announced{"report", "Write report.html of a session again"},
 };
 
 }  // namespace

@@ -75,6 +75,7 @@ ExitCode parse_and_run(int argc, const char* const* argv) {
   root.require_subcommand(1);
   add_replay(root, &exit_code);
   add_evaluate(root, &exit_code);
+  add_report(root, &exit_code);
   add_simulate(root, &exit_code);
   add_announced(root, &exit_code);
   check_first_word(root, argc, argv);

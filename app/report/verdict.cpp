@@ -142,7 +142,7 @@ void advise_by_reasons(const Session& s, const Analysis& a, Judge* j) {
     const auto found = std::find(s.reasons.begin(), s.reasons.end(), advice.word);
     if (found == s.reasons.end()) continue;
     const std::size_t frames = a.by_reason[static_cast<std::size_t>(found - s.reasons.begin())];
-    if (frames > 0) j->advise(fmt::format("{} frame{} {}: {}", frames, frames == 1 ? "" : "s", advice.word, advice.sentence));
+    if (frames > 0) j->advise(fmt::format("{} ({} frame{}): {}", advice.word, frames, frames == 1 ? "" : "s", advice.sentence));
   }
 }
 
@@ -169,7 +169,9 @@ Verdict judge(const Session& session, const Analysis& analysis) {
   advise_by_reasons(session, analysis, &j);
   Verdict v = j.finish();
   for (const std::string& reason : v.reasons) v.sentence += (v.sentence.empty() ? "" : "; ") + reason;
-  if (v.reasons.empty()) v.sentence = "every check passed: poses throughout, little drift, a calibration that holds";
+  if (v.reasons.empty())
+    v.sentence = fmt::format("every check passed: drift of {} on a drive of {:.0f} m, {} of {} frames ok",
+                             percent(analysis.drift.value_or(0)), analysis.path_m, analysis.ok, analysis.read + analysis.skipped);
   v.sentence.front() = static_cast<char>(std::toupper(static_cast<unsigned char>(v.sentence.front())));
   v.sentence += '.';
   return v;

@@ -110,7 +110,11 @@ struct SessionWriter {
     if (lost(i)) return;
     trajectory << fmt::format("{} {:.9f} {:.9f} {:.9f} 0 {:.9f} 0 {:.9f}\n", seconds, -ours.north, -ours.up, ours.east, std::sin(half),
                               std::cos(half));
-    if (ins) reference << fmt::format("{} {:.9f} {:.9f} {:.9f} -0.5 0.5 -0.5 0.5\n", seconds, theirs.east, theirs.north, theirs.up);
+    if (!ins) return;
+    // About up by the yaw, after the axes of a camera that looks east.
+    const double c = 0.5 * std::cos(yaw / 2), d = 0.5 * std::sin(yaw / 2);
+    reference << fmt::format("{} {:.9f} {:.9f} {:.9f} {:.9f} {:.9f} {:.9f} {:.9f}\n", seconds, theirs.east, theirs.north, theirs.up, -c - d,
+                             c - d, d - c, c + d);
   }
 
   void write_calibrations(const std::filesystem::path& folder) const {

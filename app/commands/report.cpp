@@ -1,0 +1,30 @@
+#include <iostream>
+#include <memory>
+#include <string>
+
+#include "app/commands/commands.hpp"
+#include "app/report/report.hpp"
+
+namespace vergence::app {
+namespace {
+
+void make_report(const std::string& session) {
+  const ReportOutcome outcome = write_report(session);
+  for (const std::string& sentence : outcome.missing) std::cerr << "vergence: " << sentence << '\n';
+  std::cerr << outcome.headline << '\n';
+  std::cout << outcome.page.string() << '\n';
+}
+
+}  // namespace
+
+void add_report(CLI::App& root, ExitCode* exit_code) {
+  const auto session = std::make_shared<std::string>();
+  CLI::App* command = root.add_subcommand("report", "Write report.html of a session again, also of one that was cut off");
+  command->add_option("SESSION", *session, "Session folder, as --out named it")->required();
+  command->callback([session, exit_code] {
+    make_report(*session);
+    *exit_code = ExitCode::done;
+  });
+}
+
+}  // namespace vergence::app
