@@ -95,20 +95,41 @@ void calibration_group(const Session& s, Figures* f) {
            "{:.1f} %");
 }
 
-/// Numbers below an object, dotted names; for blocks whose keys are not fixed.
+/// `1.2, -0.3, 4`; empty for anything but a short row of numbers.
+std::string numbers_text(const nlohmann::json& value) {
+  constexpr std::size_t kMostNumbers = 8;
+  if (value.is_number()) return fmt::format("{:.5g}", value.get<double>());
+  std::string text;
+  if (!value.is_array() || value.size() > kMostNumbers) return text;
+  for (const auto& item : value) {
+    if (!item.is_number()) return "";
+    text += fmt::format("{}{:.3g}", text.empty() ? "" : ", ", item.get<double>());
+  }
+  return text;
+}
+
+/// Numbers below an object, its keys as names; for blocks whose keys are not fixed.
 void flatten(const nlohmann::json& json, const std::string& prefix, int depth, std::size_t* rows, Figures* f) {
   constexpr int kDeepest = 3;
   if (!json.is_object() || depth > kDeepest) return;
   for (const auto& [key, value] : json.items()) {
     if (*rows >= kMostRows) return;
-    const std::string name = prefix + key.substr(0, 60);
-    if (value.is_number()) {
+    std::string name = prefix + key.substr(0, 60);
+    std::replace(name.begin(), name.end(), '_', ' ');
+    if (const std::string text = numbers_text(value); !text.empty()) {
       ++*rows;
-      f->row(name, fmt::format("{:.5g}", value.get<double>()));
+      f->row(name, text);
     } else {
       flatten(value, name + " ", depth + 1, rows, f);
     }
   }
+}
+
+void block_group(const Session& s, const char* key, const char* head, Figures* f) {
+  if (!s.summary.is_object() || !s.summary.contains(key)) return;
+  f->group(head);
+  std::size_t rows = 0;
+  flatten(s.summary[key], "", 0, &rows, f);
 }
 
 void memory_group(const Session& s, Figures* f) {
@@ -176,12 +197,9 @@ std::string figures_table(const Session& session, const Analysis& analysis, cons
   if (analysis.source != ErrorSource::none) error_group(analysis, &f);
   timing_group(session, timing, &f);
   calibration_group(session, &f);
-  if (const auto truth = session.summary.is_object() ? session.summary.find("truth") : session.summary.end();
-      truth != session.summary.end()) {
-    f.group("Against the truth of the mock drive");
-    std::size_t rows = 0;
-    flatten(*truth, "", 0, &rows, &f);
-  }
+  block_group(session, "truth", "Against the truth of the mock drive (metres, radians)", &f);
+  block_group(session, "devices", "Devices", &f);
+  block_group(session, "comparison", "Comparison with the INS", &f);
   memory_group(session, &f);
   return std::move(f).finish();
 }

@@ -163,7 +163,8 @@ struct SessionWriter {
   "calibration": {{"source": "online", "baseline_m": 0.75, "word": "good", "depth_error_percent": {{"5": 0.3, "10": 0.6, "20": 1.2, "50": 3.1}}}},
   "recalibrations": [], "allocations_after_seal": 0,
   "memory": {{"estimator_bytes": 15957952, "images_bytes": 9472064, "rings_bytes": 87168, "sum_bytes": 25517184}},
-  "drops": {{"frames": 0, "estimator": 20, "records": 0, "lines": 0, "recorder_high_water": 3}}, "truth": null,
+  "drops": {{"frames": 0, "estimator": 20, "records": 0, "lines": 0, "recorder_high_water": 3}},
+  "truth": {{"ate_m": 0.41, "calibration_error": [0.0001, 0, 0, 0.001, 0, 0]}}, "devices": {{"left_frames": 3000}},
   "version": "0.1.0", "configuration_hash": "890eaa09a20a4e1c"}})",
         frames, frames - lost_count, frames - lost_count - degraded_count, degraded_count, lost_count, driven_, metrics);
   }

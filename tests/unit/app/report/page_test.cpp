@@ -43,10 +43,27 @@ TEST(Page, ofAWholeSessionShowsEverythingAndLoadsNothing) {
   writer_of(2000).write(folder.path());
   const std::string html = page_of(folder.path());
   EXPECT_TRUE(self_contained(html));
-  for (const char* part :
-       {"Usable with care", "0.74 %", "Error to the INS", "Map", "north", "Status and state", "Inliers", "Time a frame", "Horizontal error",
-        "Vertical error", "Heading error", "over the way", "rotation x, degrees", "translation z, mm", "found again against the window",
-        "(20 times)", "allocations after the seal", "What to do next"})
+  for (const char* part : {"Usable with care",
+                           "0.74 %",
+                           "Error to the INS",
+                           "Map",
+                           "north",
+                           "Status and state",
+                           "Inliers",
+                           "Time a frame",
+                           "Horizontal error",
+                           "Vertical error",
+                           "Heading error",
+                           "over the way",
+                           "rotation x, degrees",
+                           "translation z, mm",
+                           "found again against the window",
+                           "(20 times)",
+                           "allocations after the seal",
+                           "What to do next",
+                           "Against the truth",
+                           "0.0001, 0, 0, 0.001, 0, 0",
+                           "left frames"})
     EXPECT_TRUE(contains(html, part)) << part;
   EXPECT_FALSE(contains(html, "What is missing"));
   EXPECT_FALSE(contains(html, ">nan")) << "a number that is not there has no row";
