@@ -12,7 +12,6 @@ struct Announced {
 };
 
 constexpr std::array kAnnounced{
-    Announced{"run", "Drive: cameras, trigger board and INS live, or the mock drive"},
     Announced{"calibrate", "Find intrinsics and the stereo transform with a checkerboard"},
     Announced{"devices", "List the cameras, boards and sensors that are connected"},
     Announced{"doctor", "Check this machine and its devices for what a drive needs"},

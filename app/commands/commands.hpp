@@ -10,6 +10,7 @@ namespace vergence::app {
 void add_evaluate(CLI::App& root, ExitCode* exit_code);
 void add_replay(CLI::App& root, ExitCode* exit_code);
 void add_report(CLI::App& root, ExitCode* exit_code);
+void add_run(CLI::App& root, ExitCode* exit_code);
 void add_simulate(CLI::App& root, ExitCode* exit_code);
 
 /// The words of the contract (DESIGN §6) that have no command behind them yet: whatever options they are given, they

@@ -73,6 +73,7 @@ ExitCode parse_and_run(int argc, const char* const* argv) {
   ExitCode exit_code = ExitCode::done;
   root.set_version_flag("--version", "vergence " + std::string(version()));
   root.require_subcommand(1);
+  add_run(root, &exit_code);
   add_replay(root, &exit_code);
   add_evaluate(root, &exit_code);
   add_report(root, &exit_code);

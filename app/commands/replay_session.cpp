@@ -6,8 +6,6 @@
 #include <atomic>
 #include <chrono>
 #include <condition_variable>
-#include <cstring>
-#include <iostream>
 #include <memory>
 #include <mutex>
 #include <stdexcept>
@@ -16,18 +14,15 @@
 #include <vector>
 
 #include <fmt/format.h>
-#include <nlohmann/json.hpp>
 
-#include "app/config/calibration_file.hpp"
+#include "app/commands/session_files.hpp"
 #include "app/datasets/frame_decoder.hpp"
 #include "app/datasets/reference_track.hpp"
 #include "app/datasets/trajectory_files.hpp"
-#include "app/recorder/line_file.hpp"
 #include "app/recorder/recorder.hpp"
 #include "app/recorder/summary.hpp"
 #include "app/runtime/progress.hpp"
 #include "app/runtime/signals.hpp"
-#include "app/runtime/thread_runner.hpp"
 #include "core/estimator/estimator.hpp"
 #include "core/memory/allocation_guard.hpp"
 
@@ -55,13 +50,10 @@ class Replay {
   void handle(const DecodedPair& pair) noexcept;
   void post_events() noexcept;
   void watch(const SignalGuard& signals, Progress* progress);
-  void write_calibration_file(std::vector<std::string>* faults) const;
   void show(Progress* progress);
-  void write_summary(const SessionTotals& totals, const SummaryInput& input, std::vector<std::string>* faults) const;
   [[nodiscard]] SummaryInput summary_input(const SessionTotals& totals, std::uint64_t allocations) const;
   void tell(const SessionTotals& totals, const SummaryInput& input, Progress* progress) const;
   [[nodiscard]] std::vector<std::pair<std::string, std::size_t>> memory() const;
-  void print_memory() const;
 
   const ReplayRequest& request_;
   const StereoSequence sequence_;
@@ -87,13 +79,6 @@ class Replay {
   std::condition_variable changed_;
   bool done_ = false;
 };
-
-std::size_t arena_size(std::size_t bytes) { return bytes + kCacheLine; }
-
-std::unique_ptr<PairRunner> make_runner(int threads) {
-  if (threads >= 2) return std::make_unique<ThreadRunner>();
-  return std::make_unique<SequentialRunner>();
-}
 
 int width_of(const StereoSequence& s) { return s.calibration.intrinsics[0].width; }
 int height_of(const StereoSequence& s) { return s.calibration.intrinsics[0].height; }
@@ -191,29 +176,6 @@ void Replay::show(Progress* progress) {
   progress->update(state);
 }
 
-void Replay::write_calibration_file(std::vector<std::string>* faults) const {
-  CalibrationFile file;
-  file.rig = estimator_->calibration();
-  file.rig_name = request_.configuration.rig.name;
-  file.source = "given";
-  try {
-    write_calibration(request_.out / "calibration.yaml", file);
-  } catch (const InputError& e) {
-    faults->emplace_back(e.what());
-  }
-}
-
-void Replay::write_summary(const SessionTotals& totals, const SummaryInput& input, std::vector<std::string>* faults) const {
-  const std::string text = summary_json(totals, input).dump(2) + "\n";
-  try {
-    LineFile file(request_.out / "summary.json");
-    (void)file.append(text);
-    if (!file.close()) faults->push_back(file.path().string() + ": is not complete (" + std::strerror(file.fault()) + ")");
-  } catch (const InputError& e) {
-    faults->emplace_back(e.what());
-  }
-}
-
 SummaryInput Replay::summary_input(const SessionTotals& totals, std::uint64_t allocations) const {
   SummaryInput input;
   input.skipped = skipped_;
@@ -231,15 +193,6 @@ std::vector<std::pair<std::string, std::size_t>> Replay::memory() const {
   return {{"estimator_bytes", estimator_arena_.capacity()},
           {"images_bytes", frames_arena_.capacity()},
           {"rings_bytes", sizeof(Recorder) + sizeof(FrameDecoder) + sizeof(glimpses_)}};
-}
-
-void Replay::print_memory() const {
-  std::size_t sum = 0;
-  for (const auto& [what, bytes] : memory()) {
-    std::cout << fmt::format("{:<24}{:>14}\n", what, bytes);
-    sum += bytes;
-  }
-  std::cout << fmt::format("{:<24}{:>14}\n", "sum_bytes", sum) << std::flush;
 }
 
 void Replay::tell(const SessionTotals& totals, const SummaryInput& input, Progress* progress) const {
@@ -268,8 +221,9 @@ ExitCode Replay::run() {
   const Stamp first = sequence_.pairs[request_.start].stamp;
   recorder_->post(CalibrationRecord::of(sequence_.calibration, first, true, "given", "given with the drive"));
   std::vector<std::string> faults;
-  write_calibration_file(&faults);  // at once: a session that is killed has it, too
-  if (request_.print_memory) print_memory();
+  write_session_calibration(request_.out, estimator_->calibration(), request_.configuration.rig.name,
+                            &faults);  // at once: a session that is killed has it, too
+  if (request_.print_memory) print_memory_table(memory());
 
   Progress progress = Progress::on_stderr(request_.quiet);
   decoder_ = std::make_unique<FrameDecoder>(sequence_, request_.start, count_, pool_);
@@ -282,8 +236,8 @@ ExitCode Replay::run() {
 
   const auto totals = recorder_->close();
   const SummaryInput input = summary_input(*totals, AllocationGuard::allocations_after_seal() - allocations_before);
-  if (faults.empty()) write_calibration_file(&faults);
-  write_summary(*totals, input, &faults);
+  if (faults.empty()) write_session_calibration(request_.out, estimator_->calibration(), request_.configuration.rig.name, &faults);
+  write_session_summary(request_.out, *totals, input, &faults);
   faults.insert(faults.end(), totals->faults.begin(), totals->faults.end());
   for (const std::string& sentence : recorder_->take_complaints()) progress.say("vergence: " + sentence);
   for (const std::string& sentence : faults) progress.say("vergence: " + sentence);

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <charconv>
+#include <map>
 #include <set>
 
 #include <fmt/format.h>
@@ -157,7 +158,34 @@ void apply(const Entry& entry, Configuration* configuration) {
   }
 }
 
-Configuration from_entries(const std::vector<Entry>& entries, const std::string& name) {
+/// The faults that stand as groups, `faults.N.NAME`, become texts of one line: `KIND@SECONDS NAME=NUMBER …`.
+std::vector<Entry> with_faults_as_text(const std::vector<Entry>& entries) {
+  std::vector<Entry> out;
+  std::map<std::string, std::map<std::string, Entry>> faults;  // by `faults.N`, then by name; the last one wins
+  for (const Entry& entry : entries) {
+    const auto dot = entry.name.find('.', 7);
+    if (!entry.name.starts_with("faults.") || dot == std::string::npos) {
+      out.push_back(entry);
+    } else {
+      if (!entry.scalar || entry.value.find_first_of(" =@") != std::string::npos)
+        throw InputError(entry.origin + ": " + entry.name.substr(0, 120) + " takes one number or word");
+      faults[entry.name.substr(0, dot)].insert_or_assign(entry.name.substr(dot + 1), entry);
+    }
+  }
+  for (const auto& [name, parts] : faults) {
+    const std::string& origin = parts.begin()->second.origin;
+    if (!parts.contains("kind") || !parts.contains("at"))
+      throw InputError(origin + ": " + name + " needs `kind` and `at`, as in {at: 42, kind: knock, camera: 1, pitch_deg: 0.2}");
+    std::string text = parts.at("kind").value + "@" + parts.at("at").value;
+    for (const auto& [key, entry] : parts)
+      if (key != "kind" && key != "at") text += " " + key + "=" + entry.value;
+    out.push_back({name, text, true, origin});
+  }
+  return out;
+}
+
+Configuration from_entries(const std::vector<Entry>& given, const std::string& name) {
+  const std::vector<Entry> entries = with_faults_as_text(given);
   Configuration configuration;
   for (const Entry& entry : entries) apply(entry, &configuration);
   if (const std::string sentence = find_contradiction(configuration); !sentence.empty()) throw InputError(name + ": " + sentence);

@@ -1,4 +1,6 @@
 #pragma once
+#include <array>
+#include <cstddef>
 #include <cstdint>
 #include <filesystem>
 #include <optional>
@@ -7,18 +9,75 @@
 #include <vector>
 
 #include "core/odometry/options.hpp"
+#include "core/types/calibration.hpp"
 
 namespace vergence::app {
 
 /// `rig:` of the configuration.
 struct RigSettings {
   std::string name{};  // of the rig, in the calibration.yaml that a session writes
+  double baseline_m = 0.75;
+  double focal_px = 0;  // 0: 0.72 of the image's width
+  double k1 = 0, k2 = 0;
 };
+
+/// One entry of `cameras:`. Without a driver there is no such camera.
+struct CameraSettings {
+  std::string name{}, driver{}, serial{};
+  int width = 640, height = 480;  // px
+  double exposure_us = 8000;
+  double gain_db = 0;
+};
+
+struct InsSettings {
+  std::string driver = "none";
+  double rate = 120;                      // Hz
+  std::array<double, 3> lever_arm_m{};    // of the left camera in the INS's body: forward, left, up
+  std::array<double, 3> boresight_deg{};  // roll, pitch, yaw
+};
+
+struct TriggerSettings {
+  std::string driver = "none";
+  double rate = 20;  // Hz
+};
+
+struct SyncSettings {
+  std::string mode = "counter";
+  double hold_ms = 100;
+};
+
+struct ComparisonSettings {
+  double placement_m = 100;
+  double correlation_s = 10;
+  double max_gap_ms = 100;
+  double max_wait_ms = 500;
+  double jump_m = 20;
+  double scale_tolerance = 0.02;
+};
+
+struct MockSettings {
+  std::string world = "suburb", drive = "loop", pattern = "grey", ins = "noisy";
+  std::int64_t seed = 1;
+  int texture_detail = 1;
+  int noise = 1;
+  int blur_samples = 1;
+  double speed = 12, suspension = 1, vibration = 1, stop_s = 3, hill_deg = 3;
+  double clock_drift_ppm = 30;
+};
+
+inline constexpr std::size_t kMostFaults = 16;
 
 /// Everything a user may change, with its defaults. Each member is bound to a row of the schema (app/config/schema.hpp),
 /// which is where its unit, range and meaning stand.
 struct Configuration {
   RigSettings rig{};
+  std::array<CameraSettings, kMaxCameras> cameras{};
+  InsSettings ins{};
+  TriggerSettings trigger{};
+  SyncSettings sync{};
+  ComparisonSettings comparison{};
+  MockSettings mock{};
+  std::array<std::string, kMostFaults> faults{};  // `KIND@SECONDS NAME=NUMBER …`; empty: none
   OdometryOptions odometry{};
   int threads = 2;  // 1: both images on the estimator's thread
 };

@@ -57,6 +57,13 @@ std::string_view type_text(KeyType type) {
   return "";
 }
 
+/// The items of a list have the same keys: item 0 stands for all, as N.
+std::string documented_name(const Group& group, const Key& key) {
+  if (group.list.empty()) return key.name;
+  const std::string first = group.list + "0";
+  return key.name.starts_with(first) ? group.list + "N" + key.name.substr(first.size()) : std::string();
+}
+
 }  // namespace
 
 std::string configuration_document() {
@@ -65,9 +72,12 @@ std::string configuration_document() {
     page += group.name.empty() ? std::string("\n## Without a group\n\n") : "\n## `" + group.name + "`\n\n";
     page += group.meaning + "\n\n";
     page += "| key | default | type | unit | range | meaning |\n|---|---|---|---|---|---|\n";
-    for (const Key& key : group.keys)
-      page += fmt::format("| `{}` | {} | {} | {} | {} | {} |\n", key.name, default_text(key), type_text(key.type), cell(key.unit),
+    for (const Key& key : group.keys) {
+      const std::string name = documented_name(group, key);
+      if (name.empty()) continue;
+      page += fmt::format("| `{}` | {} | {} | {} | {} | {} |\n", name, default_text(key), type_text(key.type), cell(key.unit),
                           range_text(key), key.meaning);
+    }
   }
   return page;
 }

@@ -1,59 +1,78 @@
 #include "app/config/schema.hpp"
 
+#include <algorithm>
+#include <array>
+#include <iterator>
 #include <limits>
+#include <utility>
 
 #include <fmt/format.h>
 
 namespace vergence::app {
 namespace {
 
-/// Rows whose values are fields of one member of Configuration; the member itself for keys without a group.
+/// Rows whose values are fields of one part of the configuration. `part` gives that part, of a Configuration const or not.
 template <class Settings>
 class Rows {
  public:
-  Rows(std::string group, std::string meaning, Settings Configuration::*member) : member_(member) {
-    group_.name = std::move(group);
+  template <class Part>
+  Rows(std::string prefix, std::string meaning, Part part)
+      : prefix_(std::move(prefix)),
+        part_([part](Configuration& c) -> Settings& { return part(c); }),
+        const_part_([part](const Configuration& c) -> const Settings& { return part(c); }) {
+    group_.name = prefix_.substr(0, prefix_.find('.'));
     group_.meaning = std::move(meaning);
   }
 
   /// Any integral field.
   template <class Integer>
   Rows& integer(const char* name, Integer Settings::*field, std::int64_t least, std::int64_t most, const char* unit, const char* meaning) {
-    const auto member = member_;
     add(
         name, KeyType::integer, static_cast<double>(least), static_cast<double>(most), unit, meaning,
-        [member, field](Configuration& c, const KeyValue& v) { (c.*member).*field = static_cast<Integer>(std::get<std::int64_t>(v)); },
-        [member, field](const Configuration& c) -> KeyValue { return static_cast<std::int64_t>((c.*member).*field); });
+        [field](Settings& s, const KeyValue& v) { s.*field = static_cast<Integer>(std::get<std::int64_t>(v)); },
+        [field](const Settings& s) -> KeyValue { return static_cast<std::int64_t>(s.*field); });
     return *this;
   }
 
   Rows& number(const char* name, double Settings::*field, double least, double most, const char* unit, const char* meaning) {
-    const auto member = member_;
     add(
-        name, KeyType::number, least, most, unit, meaning,
-        [member, field](Configuration& c, const KeyValue& v) { (c.*member).*field = std::get<double>(v); },
-        [member, field](const Configuration& c) -> KeyValue { return (c.*member).*field; });
+        name, KeyType::number, least, most, unit, meaning, [field](Settings& s, const KeyValue& v) { s.*field = std::get<double>(v); },
+        [field](const Settings& s) -> KeyValue { return s.*field; });
+    return *this;
+  }
+
+  /// A list of three: one key for each, `name.0` to `name.2`.
+  Rows& numbers(const char* name, std::array<double, 3> Settings::*field, double least, double most, const char* unit,
+                const std::array<const char*, 3>& meanings) {
+    for (std::size_t i = 0; i < 3; ++i)
+      add(
+          name + ("." + std::to_string(i)), KeyType::number, least, most, unit, meanings[i],
+          [field, i](Settings& s, const KeyValue& v) { (s.*field)[i] = std::get<double>(v); },
+          [field, i](const Settings& s) -> KeyValue { return (s.*field)[i]; });
     return *this;
   }
 
   Rows& text(const char* name, std::string Settings::*field, std::size_t longest, const char* meaning) {
-    const auto member = member_;
     add(
         name, KeyType::text, 0, static_cast<double>(longest), "", meaning,
-        [member, field](Configuration& c, const KeyValue& v) { (c.*member).*field = std::get<std::string>(v); },
-        [member, field](const Configuration& c) -> KeyValue { return (c.*member).*field; });
+        [field](Settings& s, const KeyValue& v) { s.*field = std::get<std::string>(v); },
+        [field](const Settings& s) -> KeyValue { return s.*field; });
     return *this;
   }
 
   [[nodiscard]] Group done() { return std::move(group_); }
 
  private:
-  void add(const char* name, KeyType type, double least, double most, const char* unit, const char* meaning,
-           std::function<void(Configuration&, const KeyValue&)> set, std::function<KeyValue(const Configuration&)> get) {
-    group_.keys.push_back({group_.name + "." + name, type, unit, least, most, meaning, std::move(set), std::move(get)});
+  void add(const std::string& name, KeyType type, double least, double most, const char* unit, const char* meaning,
+           std::function<void(Settings&, const KeyValue&)> set, std::function<KeyValue(const Settings&)> get) {
+    group_.keys.push_back({prefix_ + "." + name, type, unit, least, most, meaning,
+                           [part = part_, set = std::move(set)](Configuration& c, const KeyValue& v) { set(part(c), v); },
+                           [part = const_part_, get = std::move(get)](const Configuration& c) { return get(part(c)); }});
   }
 
-  Settings Configuration::*member_;
+  std::string prefix_;
+  std::function<Settings&(Configuration&)> part_;
+  std::function<const Settings&(const Configuration&)> const_part_;
   Group group_;
 };
 
@@ -69,16 +88,127 @@ Group general() {
 }
 
 Group rig() {
-  return Rows("rig", "The rig as a whole.", &Configuration::rig)
-      .text("name", &RigSettings::name, 64, "Name of the rig in the calibration.yaml that a session writes.")
+  using R = RigSettings;
+  return Rows<R>(
+             "rig", "The rig as a whole.", [](auto& c) -> auto& { return c.rig; })
+      .text("name", &R::name, 64, "Name of the rig in the calibration.yaml that a session writes.")
+      .number("nominal.baseline_m", &R::baseline_m, 0.02, 10, "m", "Distance of the right camera from the left one, to its right.")
+      .number("nominal.focal_px", &R::focal_px, 0, 20000, "px", "Focal length of every camera; 0: 0.72 of the image's width.")
+      .number("nominal.k1", &R::k1, -1, 1, "", "First radial coefficient of every lens (radtan model).")
+      .number("nominal.k2", &R::k2, -1, 1, "", "Second radial coefficient of every lens.")
       .done();
+}
+
+Group cameras() {
+  using C = CameraSettings;
+  Group all;
+  for (std::size_t k = 0; k < kMaxCameras; ++k) {
+    Group one = Rows<C>(
+                    "cameras." + std::to_string(k),
+                    "The cameras, a list; the first is the left one.", [k](auto& c) -> auto& { return c.cameras[k]; })
+                    .text("driver", &C::driver, 16, "What talks to it: `mock`. Empty: there is no such camera.")
+                    .text("name", &C::name, 32, "How it is called in messages and in calibration.yaml.")
+                    .text("serial", &C::serial, 64, "Which one, where there are several; empty: the next one.")
+                    .integer("size.0", &C::width, 64, 4096, "px", "Width of the image.")
+                    .integer("size.1", &C::height, 48, 4096, "px", "Height of the image.")
+                    .number("exposure_us", &C::exposure_us, 10, 1e6, "µs", "Time of an exposure; 8000 is daylight in the mock's world.")
+                    .number("gain_db", &C::gain_db, 0, 40, "dB", "Gain of the sensor's amplifier.")
+                    .done();
+    all.name = one.name;
+    all.meaning = one.meaning;
+    std::move(one.keys.begin(), one.keys.end(), std::back_inserter(all.keys));
+  }
+  all.list = "cameras.";
+  return all;
+}
+
+Group ins() {
+  using I = InsSettings;
+  return Rows<I>(
+             "ins", "The inertial navigation system that the pose is compared with.", [](auto& c) -> auto& { return c.ins; })
+      .text("driver", &I::driver, 16, "What talks to it: `mock`, or `none`.")
+      .number("rate", &I::rate, 1, 400, "Hz", "Readings a second.")
+      .numbers("lever_arm_m", &I::lever_arm_m, -100, 100, "m",
+               {"Where the left camera sits in the INS's body: forward.", "The same place, to the left.", "The same place, upwards."})
+      .numbers("boresight_deg", &I::boresight_deg, -180, 180, "°",
+               {"How the rig's forward-left-up axes are turned against the INS's: roll.", "The same turn, its pitch.",
+                "The same turn, its yaw."})
+      .done();
+}
+
+Group trigger() {
+  using T = TriggerSettings;
+  return Rows<T>(
+             "trigger", "What makes the cameras expose together.", [](auto& c) -> auto& { return c.trigger; })
+      .text("driver", &T::driver, 16, "What talks to the trigger board: `mock`, or `none`.")
+      .number("rate", &T::rate, 1, 200, "Hz", "Pulses, and so images of every camera, a second.")
+      .done();
+}
+
+Group sync() {
+  using S = SyncSettings;
+  return Rows<S>(
+             "sync", "How images are paired.", [](auto& c) -> auto& { return c.sync; })
+      .text("mode", &S::mode, 16, "By what images are paired: `counter`, exposure n of every camera belongs together.")
+      .number("hold_ms", &S::hold_ms, 1, 10000, "ms", "How long the images of a pulse wait for one that is late.")
+      .done();
+}
+
+Group comparison() {
+  using C = ComparisonSettings;
+  return Rows<C>(
+             "comparison", "The comparison with the INS.", [](auto& c) -> auto& { return c.comparison; })
+      .number("placement_m", &C::placement_m, 1, 100000, "m",
+              "Distance driven with a valid fix after which the path is placed on the earth.")
+      .number("correlation_s", &C::correlation_s, 0.1, 3600, "s", "For so long the INS's position errors resemble one another.")
+      .number("max_gap_ms", &C::max_gap_ms, 1, 10000, "ms", "Readings farther apart than this are not interpolated between.")
+      .number("max_wait_ms", &C::max_wait_ms, 1, 3000, "ms", "A pose waits so long for the reading after it.")
+      .number("jump_m", &C::jump_m, 0.1, 1e6, "m", "A step of the INS's position beyond this (and 60 m/s) is a jump.")
+      .number("scale_tolerance", &C::scale_tolerance, 0.001, 1, "", "Relative difference of the path lengths that is told.")
+      .done();
+}
+
+Group mock() {
+  using M = MockSettings;
+  constexpr std::int64_t kLargestSeed = std::numeric_limits<std::int64_t>::max();
+  return Rows<M>(
+             "mock", "The world and the vehicle of the mock drivers; docs/mock.md tells more.", [](auto& c) -> auto& { return c.mock; })
+      .text("world", &M::world, 16, "What is driven through: `suburb`.")
+      .text("drive", &M::drive, 16, "Where: `loop` (1 km), `figure-eight`, `straight`, `brief` (120 m) or `still`.")
+      .integer("seed", &M::seed, 0, kLargestSeed, "", "Of the town, the vehicle's unrest and all noise: the same seed, the same drive.")
+      .text("pattern", &M::pattern, 8, "Sensors: `grey`, or `gbrg` (Bayer).")
+      .text("ins", &M::ins, 8, "Errors of the INS: `noisy` as an MTi-G, or `ideal`.")
+      .integer("texture_detail", &M::texture_detail, 0, 2, "", "Resolution of the facades: 4.7, 2.3 or 1.2 cm a texel (8, 32, 128 MB).")
+      .integer("noise", &M::noise, 0, 1, "", "1: shot and read noise of the sensors; 0: none.")
+      .integer("blur_samples", &M::blur_samples, 1, 16, "", "Poses averaged over an exposure: 1 is no motion blur; time grows with it.")
+      .number("speed", &M::speed, 1, 20, "m/s", "Speed on the straights.")
+      .number("suspension", &M::suspension, 0, 3, "", "Gain on pitch, roll and heave of the springs.")
+      .number("vibration", &M::vibration, 0, 5, "", "Gain on the shake at 6 to 12 Hz.")
+      .number("stop_s", &M::stop_s, 1, 60, "s", "Length of each stop, and of the standing start and end.")
+      .number("hill_deg", &M::hill_deg, 0, 5, "°", "Steepest slope of the streets.")
+      .number("clock_drift_ppm", &M::clock_drift_ppm, 0, 150, "ppm", "Largest drift of the devices' clocks; each has its own.")
+      .done();
+}
+
+Group faults() {
+  Group group;
+  group.name = "faults";
+  group.list = "faults.";
+  group.meaning = "What goes wrong in the mock, a list; docs/mock.md has the kinds and their parameters.";
+  for (std::size_t i = 0; i < kMostFaults; ++i)
+    group.keys.push_back({"faults." + std::to_string(i), KeyType::text, "", 0, 200,
+                          "`KIND@SECONDS NAME=NUMBER …`, or the same as a group: `{at: 42, kind: knock, camera: 1, pitch_deg: 0.2}`.",
+                          [i](Configuration& c, const KeyValue& v) { c.faults[i] = std::get<std::string>(v); },
+                          [i](const Configuration& c) -> KeyValue { return c.faults[i]; }});
+  return group;
 }
 
 Group odometry() {
   using O = OdometryOptions;
   constexpr std::int64_t kLargestSeed = std::numeric_limits<std::int64_t>::max();
-  Rows rows("odometry", "How motion is found from the images. The defaults suit road vehicles and hand-held rigs; change one at a time.",
-            &Configuration::odometry);
+  Rows<O> rows(
+      "odometry", "How motion is found from the images. The defaults suit road vehicles and hand-held rigs; change one at a time.",
+      [](auto& c) -> auto& { return c.odometry; });
   rows.integer("features", &O::features, 50, 1000, "points",
                "Points tracked in each image: more of them cost time and hold the pose better where texture is poor. They are spread "
                "over a grid of cells of the size that this number asks for.")
@@ -94,8 +224,9 @@ Group odometry() {
               "Least normalised correlation of the two image patches of a match across (1: the same picture).")
       .number("pixel_sigma", &O::pixel_sigma, 0.02, 5, "px",
               "Standard deviation of a tracked corner's position, each coordinate, at full resolution; the scale of all residuals.")
-      .number("parallax_sigma", &O::parallax_sigma, 0, 10, "px",
-              "Added to it (in quadrature) for a patch seen from one depth further to the side than where it was cut: its slope is unknown.")
+      .number(
+          "parallax_sigma", &O::parallax_sigma, 0, 10, "px",
+          "Added to it (in quadrature) for a patch seen from one depth further to the side than where it was cut: its slope is unknown.")
       .number("huber", &O::huber, 1, 10, "sigmas", "Residuals beyond this count less and less (Huber's weight).")
       .integer("window_keyframes", &O::window_keyframes, 3, 20, "keyframes", "Keyframes that are adjusted together with their points.")
       .integer("window_steps", &O::window_steps, 1, 30, "steps", "Most solver steps of one such adjustment.")
@@ -116,7 +247,7 @@ Group odometry() {
 }  // namespace
 
 const std::vector<Group>& schema() {
-  static const std::vector<Group> groups{general(), rig(), odometry()};
+  static const std::vector<Group> groups{general(), rig(), cameras(), ins(), trigger(), sync(), odometry(), comparison(), mock(), faults()};
   return groups;
 }
 

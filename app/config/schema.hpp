@@ -30,6 +30,7 @@ struct Group {
   std::string name;
   std::string meaning;
   std::vector<Key> keys;
+  std::string list{};  // `cameras.`: keys go on with the item's number; the documentation shows item 0 as N. Empty: no list
 };
 
 /// All groups in the order of the documentation. A new group is a member of Configuration and a table in schema.cpp.

@@ -42,6 +42,19 @@ void append_tum(std::string* line, Stamp stamp, const PoseNumbers& pose) {
   *line += '\n';
 }
 
+/// east … heading_deg, a comma before each; empty where there is nothing.
+void append_earth(std::string* line, bool valid, const EarthNumbers& e) {
+  if (!valid) {
+    *line += ",,,,,,,";
+    return;
+  }
+  const auto out = std::back_inserter(*line);
+  for (const double v : e.enu) fmt::format_to(out, ",{:.4f}", v);
+  // 1e-9 degrees are a tenth of a millimetre.
+  fmt::format_to(out, ",{:.9f},{:.9f},{:.4f},{:.4f}", e.position.latitude_deg, e.position.longitude_deg, e.position.height_m,
+                 e.heading_deg);
+}
+
 }  // namespace
 
 void make_session_folder(const std::filesystem::path& folder) {
@@ -62,7 +75,7 @@ void make_session_folder(const std::filesystem::path& folder) {
 
 Recorder::Recorder(const std::filesystem::path& folder, const Options& options)
     : options_(options), files_(std::make_unique<Files>(folder)), totals_(std::make_unique<SessionTotals>()) {
-  if (options.keep_trajectory) totals_->trajectory.reserve(options.expected_frames);
+  if (options.keep_trajectory) totals_->trajectory.reserve(options.expected_frames), totals_->reference.reserve(options.expected_frames);
   files_->poses.append(std::string(kPosesHeader) + "\n");
   files_->calibrations.append(std::string(kCalibrationsHeader) + "\n");
   thread_ = std::thread([this] { work(); });
@@ -135,9 +148,13 @@ void Recorder::write(const PoseRecord& p) {
   } else {
     line_ += ",,,,,,,";
   }
-  line_ += ",,,,,,,";  // east … heading_deg: no placement on the earth
-  line_ += ",,,,,,,";  // ins_east … ins_heading_deg
-  line_ += ",,,,";     // error_…
+  append_earth(&line_, p.placed, p.ours);
+  append_earth(&line_, p.ins_valid, p.ins);
+  for (const double v : p.error)
+    if (p.compared)
+      fmt::format_to(out, ",{:.4f}", v);
+    else
+      line_ += ',';
   fmt::format_to(out, ",{}", p.inliers);
   if (posed)
     fmt::format_to(out, ",{:.4f}", p.reprojection_px);
@@ -152,6 +169,7 @@ void Recorder::write(const PoseRecord& p) {
   if (p.has_reference) {
     append_tum(&line_, p.stamp, p.reference_left);
     files_->reference.append(line_);
+    if (options_.keep_trajectory) totals_->reference.push_back({p.stamp, p.reference_left.transform()});
   }
   if (have_last_pose_)
     totals_->path_m +=

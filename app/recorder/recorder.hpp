@@ -38,6 +38,7 @@ struct SessionTotals {
   std::array<TimeHistogram, kStages> stages;
   double path_m = 0;                    // sum of the steps between successive poses
   std::vector<StampedPose> trajectory;  // if asked for: the poses of trajectory.tum
+  std::vector<StampedPose> reference;   // if asked for: of reference.tum, in its own frame
   std::uint64_t dropped_records = 0;    // the ring was full (live only)
   std::uint64_t lost_lines = 0;         // the disk took no more
   std::size_t ring_high_water = 0;

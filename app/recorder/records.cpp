@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cstdio>
+#include <numbers>
 
 namespace vergence::app {
 namespace {
@@ -49,6 +50,23 @@ PoseRecord PoseRecord::of(const PoseSample& sample, float decode_ms, const std::
   r.stage_ms = sample.stage_ms;
   r.estimate_ms = sample.estimate_ms;
   r.decode_ms = decode_ms;
+  return r;
+}
+
+EarthNumbers EarthNumbers::of(const EarthPose& pose) noexcept {
+  const Vec3& t = pose.T_enu_left.t;
+  return {{t.x(), t.y(), t.z()}, pose.position, compass_heading_deg(pose.yaw)};
+}
+
+PoseRecord PoseRecord::of(const ComparedPose& pose, float decode_ms) noexcept {
+  PoseRecord r = of(pose.pose, decode_ms, pose.ins_valid ? std::optional(pose.reference.T_enu_left) : std::nullopt);
+  r.placed = pose.placed;
+  r.ins_valid = pose.ins_valid;
+  r.compared = pose.compared;
+  if (pose.placed) r.ours = EarthNumbers::of(pose.ours);
+  if (pose.ins_valid) r.ins = EarthNumbers::of(pose.reference);
+  // A compass counts clockwise, a yaw the other way.
+  r.error = {pose.error_enu.x(), pose.error_enu.y(), pose.error_enu.z(), -pose.error_yaw * (180.0 / std::numbers::pi)};
   return r;
 }
 

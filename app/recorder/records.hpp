@@ -5,6 +5,7 @@
 #include <string_view>
 #include <variant>
 
+#include "core/comparison/comparison.hpp"
 #include "core/estimator/estimator.hpp"
 #include "core/types/calibration.hpp"
 #include "core/types/pose_sample.hpp"
@@ -22,6 +23,15 @@ struct PoseNumbers {
   [[nodiscard]] Transform transform() const noexcept;
 };
 
+/// A place and a direction on the earth as numbers.
+struct EarthNumbers {
+  std::array<double, 3> enu{};  // m
+  Geodetic position{};
+  double heading_deg = 0;  // clockwise from north
+
+  [[nodiscard]] static EarthNumbers of(const EarthPose& pose) noexcept;
+};
+
 /// One frame that was read: a line of poses.csv and, unless lost, one of trajectory.tum.
 struct PoseRecord {
   std::uint64_t frame = 0;
@@ -31,7 +41,10 @@ struct PoseRecord {
   Reason reason = Reason::none;
   PoseNumbers world_left{};
   bool has_reference = false;
-  PoseNumbers reference_left{};  // in the reference's own frame; meaningful with has_reference
+  PoseNumbers reference_left{};                              // in the reference's own frame; meaningful with has_reference
+  bool placed = false, ins_valid = false, compared = false;  // as in ComparedPose: whether the next three mean something
+  EarthNumbers ours{}, ins{};
+  std::array<double, 4> error{};  // ours − INS: east, north, up, m; heading, deg clockwise
   int inliers = 0;
   double reprojection_px = 0;
   std::array<float, kStages> stage_ms{};
@@ -39,6 +52,8 @@ struct PoseRecord {
   float decode_ms = 0;
 
   [[nodiscard]] static PoseRecord of(const PoseSample& sample, float decode_ms, const std::optional<Transform>& T_reference_left) noexcept;
+  /// With the INS as the reference.
+  [[nodiscard]] static PoseRecord of(const ComparedPose& pose, float decode_ms) noexcept;
 };
 
 /// A number or a constant word beside an event's sentence. `name` null: not used.

@@ -81,6 +81,27 @@ Json calibration_json(const RigCalibration& rig, const std::string& source) {
           {"depth_error_percent", depth}};
 }
 
+/// Null where nothing was counted.
+Json counters_json(const std::vector<std::pair<std::string, std::uint64_t>>& counters) {
+  Json json;
+  for (const auto& [name, count] : counters) json[name] = count;
+  return json;
+}
+
+Json truth_json(const std::optional<TruthFigures>& truth, const RigCalibration& rig) {
+  if (!truth) return nullptr;
+  Json json = metrics_json(truth->evaluation);
+  if (json.is_null()) json = Json::object();
+  Json in_sigmas;
+  if (given(rig.sigma_wide[1])) {
+    in_sigmas = Json::array();
+    for (std::size_t i = 0; i < 6; ++i) in_sigmas.push_back(truth->calibration_error[i] / rig.sigma_wide[1][i]);
+  }
+  json["calibration_error"] = truth->calibration_error;
+  json["calibration_error_sigmas"] = in_sigmas;
+  return json;
+}
+
 }  // namespace
 
 EvaluationOptions summary_evaluation_options() {
@@ -121,7 +142,9 @@ Json summary_json(const SessionTotals& totals, const SummaryInput& input) {
                    {"records", totals.dropped_records},
                    {"lines", totals.lost_lines},
                    {"recorder_high_water", totals.ring_high_water}};
-  json["truth"] = nullptr;
+  json["devices"] = counters_json(input.devices);
+  json["comparison"] = counters_json(input.comparison);
+  json["truth"] = truth_json(input.truth, input.calibration);
   json["version"] = std::string(version());
   json["configuration_hash"] = input.configuration_hash;
   return json;

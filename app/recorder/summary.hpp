@@ -1,8 +1,10 @@
 #pragma once
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <nlohmann/json_fwd.hpp>
@@ -12,6 +14,12 @@
 #include "core/types/calibration.hpp"
 
 namespace vergence::app {
+
+/// What a mock drive knows beside: our trajectory and calibration against the truth.
+struct TruthFigures {
+  std::optional<TrajectoryEvaluation> evaluation;
+  std::array<double, 6> calibration_error{};  // of camera 1 at the end: rotation vector, rad; translation, m; ours against the true one
+};
 
 /// What summary.json is made of beside the recorder's totals.
 struct SummaryInput {
@@ -23,6 +31,9 @@ struct SummaryInput {
   std::uint64_t allocations_after_seal = 0;
   std::vector<std::pair<std::string, std::size_t>> memory;  // bytes by what holds them
   std::string configuration_hash;
+  std::vector<std::pair<std::string, std::uint64_t>> devices{};     // counters of the devices and of the pairing; none in a replay
+  std::vector<std::pair<std::string, std::uint64_t>> comparison{};  // counters of the comparison with an INS
+  std::optional<TruthFigures> truth{};
 };
 
 /// What the metrics of summary.json are computed with: segments of 100–800 m (step 10), 10–50 m (step 1), and these once more after one

@@ -61,7 +61,22 @@ TEST(Configuration, AKeyWithoutItsGroupIsFoundByItsLastPart) {
 }
 
 TEST(Configuration, ListItemsAreNamedByNumber) {
-  EXPECT_TRUE(contains(refusal("cameras: [{serial: a}, {serial: b}]"), "drive.yaml:1: there is no key \"cameras.0.serial\""));
+  const auto c = parse_configuration("cameras: [{serial: a, size: [800, 600]}, {serial: b}]", "drive.yaml", {"cameras.1.serial=c"});
+  EXPECT_EQ(c.cameras[0].serial, "a");
+  EXPECT_EQ(c.cameras[0].width, 800);
+  EXPECT_EQ(c.cameras[0].height, 600);
+  EXPECT_EQ(c.cameras[1].serial, "c");
+  EXPECT_TRUE(contains(refusal("cameras: [{serail: a}]"), "drive.yaml:1: there is no key \"cameras.0.serail\""));
+  EXPECT_TRUE(contains(refusal("cameras: [{}, {}, {}, {}, {driver: mock}]"), "there is no key \"cameras."));
+}
+
+TEST(Configuration, AFaultIsALineOrAGroup) {
+  const auto c = parse_configuration("faults: [{at: 42.0, kind: knock, camera: 1, pitch_deg: 0.2}, 'cover@3 camera=0']", "drive.yaml", {});
+  EXPECT_EQ(c.faults[0], "knock@42.0 camera=1 pitch_deg=0.2");
+  EXPECT_EQ(c.faults[1], "cover@3 camera=0");
+  EXPECT_TRUE(contains(refusal("faults: [{kind: knock}]"), "drive.yaml:1: faults.0 needs `kind` and `at`"));
+  EXPECT_TRUE(contains(refusal("faults: [{kind: knock, at: [1, 2]}]"), "faults.0")) << refusal("faults: [{kind: knock, at: [1, 2]}]");
+  EXPECT_EQ(refusal("faults: []"), "");
 }
 
 TEST(Configuration, ValuesOfTheWrongTypeAreRefusedWithTheirPlace) {

@@ -1,0 +1,173 @@
+#include "app/commands/mock_drive.hpp"
+
+#include <cmath>
+#include <numbers>
+#include <stdexcept>
+#include <string>
+
+#include <fmt/format.h>
+
+#include "app/config/calibration_file.hpp"
+#include "app/runtime/errors.hpp"
+#include "app/runtime/nearest.hpp"
+
+namespace vergence::app {
+namespace {
+
+constexpr double kFocalOfWidth = 0.72;  // of the image's width: 70° across, what machine-vision rigs on cars have
+
+/// Checks a key that takes one of a few words.
+void one_of(const std::string& key, const std::string& value, const std::vector<std::string>& words) {
+  for (const std::string& word : words)
+    if (value == word) return;
+  throw InputError(fmt::format("{} is \"{}\"{}; this version knows {}", key, value, did_you_mean(value, words), fmt::join(words, ", ")));
+}
+
+int camera_count(const Configuration& c) {
+  int n = 0;
+  for (std::size_t k = 0; k < c.cameras.size(); ++k) {
+    if (c.cameras[k].driver.empty()) continue;
+    if (static_cast<int>(k) != n)
+      throw InputError(fmt::format("cameras.{} has a driver, cameras.{} before it has none; the list has no holes", k, k - 1));
+    ++n;
+  }
+  return n;
+}
+
+std::vector<mock::Fault> all_faults(const Configuration& c, const std::vector<std::string>& more) {
+  std::vector<mock::Fault> faults;
+  const auto add = [&](const std::string& text, const std::string& where) {
+    try {
+      faults.push_back(mock::parse_fault(text));
+    } catch (const std::invalid_argument& e) {
+      throw InputError(where + ": " + e.what());
+    }
+  };
+  for (std::size_t i = 0; i < c.faults.size(); ++i)
+    if (!c.faults[i].empty()) add(c.faults[i], fmt::format("faults.{}", i));
+  for (const std::string& text : more) add(text, "--fault \"" + text.substr(0, 80) + "\"");
+  return faults;
+}
+
+void configured(DeviceStatus status, const std::string& what) {
+  if (status != DeviceStatus::ok) throw InputError(what + " is not possible: " + std::string(to_string(status)));
+}
+
+Vec3 vec3(const std::array<double, 3>& v) { return {v[0], v[1], v[2]}; }
+
+}  // namespace
+
+void check_drive(const Configuration& c) {
+  const int n = camera_count(c);
+  if (n == 0) throw InputError("the configuration names no camera; cameras: [{driver: mock}, {driver: mock}] is the least");
+  if (n < 2) throw InputError("one camera alone has no scale; two are the least, cameras: [{driver: mock}, {driver: mock}]");
+  for (int k = 0; k < n; ++k) {
+    const CameraSettings& camera = c.cameras[static_cast<std::size_t>(k)];
+    one_of(fmt::format("cameras.{}.driver", k), camera.driver, {"mock"});
+    if (camera.width != c.cameras[0].width || camera.height != c.cameras[0].height)
+      throw InputError(fmt::format("cameras.{}.size is {} x {}, that of camera 0 is {} x {}; all cameras of a rig have one size", k,
+                                   camera.width, camera.height, c.cameras[0].width, c.cameras[0].height));
+    if (camera.exposure_us * 1e-6 * c.trigger.rate > 1)
+      throw InputError(fmt::format("cameras.{}.exposure_us is {}, longer than the {:.0f} µs between two pulses (trigger.rate {})", k,
+                                   camera.exposure_us, 1e6 / c.trigger.rate, c.trigger.rate));
+  }
+  one_of("ins.driver", c.ins.driver, {"mock", "none"});
+  one_of("trigger.driver", c.trigger.driver, {"mock"});
+  one_of("sync.mode", c.sync.mode, {"counter"});
+  one_of("mock.world", c.mock.world, {"suburb"});
+  one_of("mock.drive", c.mock.drive, {"loop", "figure-eight", "straight", "brief", "still"});
+  one_of("mock.pattern", c.mock.pattern, {"grey", "gbrg"});
+  one_of("mock.ins", c.mock.ins, {"noisy", "ideal"});
+}
+
+RigCalibration nominal_rig(const Configuration& c) {
+  RigCalibration rig;
+  rig.cameras = camera_count(c);
+  for (std::size_t k = 0; k < static_cast<std::size_t>(rig.cameras); ++k) {
+    Intrinsics& lens = rig.intrinsics[k];
+    lens.width = c.cameras[k].width;
+    lens.height = c.cameras[k].height;
+    lens.fx = lens.fy = c.rig.focal_px > 0 ? c.rig.focal_px : kFocalOfWidth * lens.width;
+    lens.cx = 0.5 * (lens.width - 1);
+    lens.cy = 0.5 * (lens.height - 1);
+    lens.distortion = {c.rig.k1, c.rig.k2, 0, 0, 0};
+    rig.T_camera_left[k].t = {-static_cast<double>(k) * c.rig.baseline_m, 0, 0};
+  }
+  rig.baseline = c.rig.baseline_m;
+  if (const auto bad = find_implausible(&rig)) throw InputError("rig.nominal: " + bad->sentence);
+  return rig;
+}
+
+MockDrive make_mock_drive(const Configuration& c, const std::vector<std::string>& more_faults, bool real_time,
+                          std::optional<double> duration_s) {
+  MockDrive drive;
+  const RigCalibration rig = nominal_rig(c);
+  const std::vector<mock::Fault> faults = all_faults(c, more_faults);
+  try {
+    mock::WorldOptions world;
+    world.seed = static_cast<std::uint64_t>(c.mock.seed);
+    world.texture_detail = c.mock.texture_detail;
+    world.hill_deg = c.mock.hill_deg;
+    mock::DriveOptions way;
+    (void)mock::parse(c.mock.drive, &way.kind);
+    way.seed = world.seed;
+    way.speed = c.mock.speed;
+    way.suspension = c.mock.suspension;
+    way.vibration = c.mock.vibration;
+    way.stop_s = c.mock.stop_s;
+    // The INS sits where the configuration says: p_ins = T_ins_left p_left.
+    const Transform T_body_left = mock::default_T_body_left();
+    const Transform T_body_ins = T_body_left * comparison_options(c).T_ins_left.inverse();
+    auto truth =
+        std::make_shared<const mock::RigTruth>(std::make_shared<const mock::World>(world), way, rig, T_body_left, T_body_ins, faults);
+    mock::MockRigOptions o;
+    o.real_time = real_time;
+    o.seed = world.seed;
+    o.pattern = c.mock.pattern == "gbrg" ? mock::Pattern::gbrg : mock::Pattern::grey;
+    o.noise = c.mock.noise != 0;
+    o.blur_samples = c.mock.blur_samples;
+    o.ideal_ins = c.mock.ins == "ideal";
+    o.clock_drift_ppm = c.mock.clock_drift_ppm;
+    if (duration_s) o.duration = Duration::seconds(*duration_s);
+    drive.rig = std::make_unique<mock::MockRig>(std::move(truth), o);
+  } catch (const std::invalid_argument& e) {
+    throw InputError(e.what());
+  }
+  for (int k = 0; k < rig.cameras; ++k) {
+    const CameraSettings& camera = c.cameras[static_cast<std::size_t>(k)];
+    const CameraConfiguration wanted{camera.width,   camera.height,          c.trigger.rate, Duration::seconds(camera.exposure_us * 1e-6),
+                                     camera.gain_db, CameraTrigger::hardware};
+    configured(drive.rig->camera(k).configure(wanted, nullptr), fmt::format("cameras.{}", k));
+  }
+  configured(drive.rig->trigger().configure({c.trigger.rate}, nullptr), "trigger");
+  drive.has_ins = c.ins.driver == "mock";
+  if (drive.has_ins) configured(drive.rig->ins().configure(c.ins.rate, nullptr), "ins");
+  return drive;
+}
+
+ComparisonOptions comparison_options(const Configuration& c) {
+  ComparisonOptions o;
+  o.T_ins_left = mount_of(vec3(c.ins.lever_arm_m), vec3(c.ins.boresight_deg) * (std::numbers::pi / 180));
+  o.placement_m = c.comparison.placement_m;
+  o.correlation_s = c.comparison.correlation_s;
+  o.max_gap = Duration::seconds(c.comparison.max_gap_ms * 1e-3);
+  o.max_wait = Duration::seconds(c.comparison.max_wait_ms * 1e-3);
+  o.jump_m = c.comparison.jump_m;
+  o.scale_tolerance = c.comparison.scale_tolerance;
+  if (const char* sentence = o.validate()) throw InputError(std::string("comparison: ") + sentence);
+  return o;
+}
+
+std::vector<StampedPose> true_trajectory(const mock::MockRig& rig, const Configuration& c, Stamp start) {
+  std::vector<StampedPose> poses;
+  const std::uint64_t n = rig.pulses(c.trigger.rate);
+  poses.reserve(n);
+  for (std::uint64_t i = 0; i < n; ++i) {
+    const Duration middle =
+        Duration::seconds(static_cast<double>(i) / c.trigger.rate) + Duration::seconds(c.cameras[0].exposure_us * 0.5e-6);
+    poses.push_back({start + middle, rig.truth().T_enu_camera(0, middle)});
+  }
+  return poses;
+}
+
+}  // namespace vergence::app

@@ -1,0 +1,34 @@
+#pragma once
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "app/config/configuration.hpp"
+#include "core/comparison/comparison.hpp"
+#include "core/types/stamped_pose.hpp"
+#include "drivers/mock/mock_rig.hpp"
+
+/// From the configuration to the mock's rig. All of it throws InputError naming the key.
+namespace vergence::app {
+
+/// The rig that `rig.nominal` and `cameras` describe: parallel cameras, equal lenses. It is what the estimator is given.
+[[nodiscard]] RigCalibration nominal_rig(const Configuration& configuration);
+
+/// Whether a drive with these devices is possible at all.
+void check_drive(const Configuration& configuration);
+
+struct MockDrive {
+  std::unique_ptr<mock::MockRig> rig;
+  bool has_ins = false;
+};
+/// World, drive and devices, configured and ready to start. `faults` are added to the configuration's.
+[[nodiscard]] MockDrive make_mock_drive(const Configuration& configuration, const std::vector<std::string>& faults, bool real_time,
+                                        std::optional<double> duration_s);
+
+[[nodiscard]] ComparisonOptions comparison_options(const Configuration& configuration);
+
+/// The left camera's true pose in enu at every pulse's mid-exposure. `start`: the stamp of the drive's time 0.
+[[nodiscard]] std::vector<StampedPose> true_trajectory(const mock::MockRig& rig, const Configuration& configuration, Stamp start);
+
+}  // namespace vergence::app

@@ -1,0 +1,57 @@
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "app/commands/commands.hpp"
+#include "app/commands/common_options.hpp"
+#include "app/commands/run_session.hpp"
+
+namespace vergence::app {
+namespace {
+
+/// The words as given; checked when the command runs.
+struct Arguments {
+  CommonOptions common;
+  std::string configuration, out;
+  std::vector<std::string> faults;
+  std::optional<double> duration_s;
+  bool fast = false, from_scratch = false, memory = false;
+};
+
+RunRequest request_of(const Arguments& a) {
+  if (a.from_scratch)
+    throw InputError("--from-scratch is not there yet in this version; the rig of `rig.nominal` is what a drive begins with");
+  if (a.duration_s && !(*a.duration_s > 0 && *a.duration_s <= 86400))
+    throw InputError("--duration needs seconds, more than 0 and at most 86400");
+  RunRequest r;
+  r.out = a.out;
+  r.configuration = a.common.configuration(a.configuration);
+  r.faults = a.faults;
+  r.duration_s = a.duration_s;
+  r.fast = a.fast;
+  r.quiet = a.common.quiet;
+  r.print_memory = a.memory;
+  return r;
+}
+
+}  // namespace
+
+void add_run(CLI::App& root, ExitCode* exit_code) {
+  const auto a = std::make_shared<Arguments>();
+  CLI::App* command = root.add_subcommand("run", "Drive: cameras, trigger board and INS of a configuration; in this version the mock's");
+  command->add_option("CONFIG", a->configuration, "Configuration (docs/configuration.md), e.g. app/config/mock.yaml")->required();
+  command->add_option("--out", a->out, "Session folder; must not exist or be empty")->required()->type_name("DIR");
+  command->add_flag("--fast", a->fast, "Mock: virtual time, as fast as this machine allows; nothing is dropped");
+  command
+      ->add_option("--fault", a->faults, "Mock: something that goes wrong, as in \"knock@42 camera=1 pitch_deg=0.2\"; as often as needed")
+      ->type_name("\"KIND@SECONDS …\"")
+      ->allow_extra_args(false);
+  command->add_option("--duration", a->duration_s, "End the drive after so many seconds")->type_name("S");
+  command->add_flag("--from-scratch", a->from_scratch, "Find the calibration from the drive itself (not there yet)");
+  command->add_flag("--memory", a->memory, "Print what memory is held, by whom");
+  a->common.declare(*command);
+  command->callback([a, exit_code] { *exit_code = run_drive(request_of(*a)); });
+}
+
+}  // namespace vergence::app

@@ -1,0 +1,475 @@
+#include "app/commands/run_session.hpp"
+
+#include <pthread.h>
+#include <time.h>
+
+#include <algorithm>
+#include <chrono>
+#include <condition_variable>
+#include <cstdio>
+#include <memory>
+#include <mutex>
+#include <stdexcept>
+#include <string_view>
+#include <thread>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "app/commands/mock_drive.hpp"
+#include "app/commands/session_files.hpp"
+#include "app/datasets/decimal.hpp"
+#include "app/recorder/line_file.hpp"
+#include "app/recorder/recorder.hpp"
+#include "app/report/report.hpp"
+#include "app/runtime/live_source.hpp"
+#include "app/runtime/progress.hpp"
+#include "app/runtime/signals.hpp"
+#include "core/estimator/estimator.hpp"
+#include "core/memory/allocation_guard.hpp"
+
+namespace vergence::app {
+namespace {
+
+constexpr Stamp kVirtualEpoch{1'577'836'800'000'000'000};  // 2020-01-01 00:00 UTC: a drive in virtual time has the same stamps on every run
+
+/// What the estimator's thread tells the progress line: the newest counts, older ones may be lost.
+struct Glimpse {
+  std::uint64_t done = 0;
+  State state = State::initialising;
+  double path_m = 0;
+  int inliers = 0;
+  float estimate_ms = 0;
+  double from_ins_m = -1;  // negative: not compared
+};
+
+std::int64_t clock_ns(clockid_t clock) {
+  timespec t{};
+  (void)::clock_gettime(clock, &t);
+  return static_cast<std::int64_t>(t.tv_sec) * 1'000'000'000 + t.tv_nsec;
+}
+
+/// Everything that is set up before the first frame and torn down after the last, in the order of its members.
+class Drive {
+ public:
+  explicit Drive(const RunRequest& request);
+  [[nodiscard]] ExitCode run();
+
+ private:
+  void begin();
+  void estimate() noexcept;
+  void handle_images(const LiveItem& item) noexcept;
+  void drain_comparison() noexcept;
+  void note_placement(Stamp stamp) noexcept;
+  void note_ins(const ComparedPose& pose) noexcept;
+  void note_faults(Stamp stamp) noexcept;
+  void tell_event(Stamp stamp, const char* kind, std::string_view sentence, bool aloud) noexcept;
+  void watch(const SignalGuard& signals, Progress* progress);
+  void show(Progress* progress);
+  void write_truth(std::vector<std::string>* faults) const;
+  [[nodiscard]] SummaryInput summary_input(const SessionTotals& totals, std::uint64_t allocations) const;
+  [[nodiscard]] TruthFigures truth_figures(const SessionTotals& totals) const;
+  void tell(const SessionTotals& totals, const SummaryInput& input, Progress* progress) const;
+  void make_report(Progress* progress) const;
+  [[nodiscard]] ExitCode verdict(const SessionTotals& totals, const std::vector<std::string>& faults, Progress* progress) const;
+  [[nodiscard]] std::vector<std::pair<std::string, std::size_t>> memory() const;
+  [[nodiscard]] std::vector<std::pair<std::string, std::uint64_t>> device_counters() const;
+
+  const RunRequest& request_;
+  const Configuration& configuration_;
+  MockDrive mock_;
+  const RigCalibration rig_;
+  EstimatorOptions options_;
+  ComparisonOptions comparison_options_;
+  Arena arena_;
+  std::unique_ptr<PairRunner> runner_;
+  std::unique_ptr<Estimator> estimator_;
+  std::unique_ptr<Comparison> comparison_;
+  std::unique_ptr<LiveSource> source_;
+  std::unique_ptr<Recorder> recorder_;
+  Stamp start_{};  // of the drive
+  std::vector<StampedPose> truth_;
+
+  // Of the estimator's thread; read by others after it has joined.
+  Glimpse glimpse_;
+  std::uint64_t dropped_ = 0, ins_matches_ = 0;
+  Vec3 last_position_ = Vec3::Zero();
+  bool posed_ = false;
+  std::uint32_t placement_revision_ = 0;
+  InsMatch last_match_ = InsMatch::ok;
+  std::uint64_t match_run_ = 0;  // poses in a row with that
+  Stamp newest_stamp_{};
+  std::vector<bool> fault_told_;
+
+  Ring<Glimpse, 64> glimpses_;     // full: the newest is lost, the next one tells the same and more
+  Ring<EventRecord, 32> notices_;  // for stderr; full: events.jsonl has it
+  std::mutex mutex_;               // with done_, for the caller's thread that waits
+  std::condition_variable changed_;
+  bool done_ = false;
+};
+
+Drive::Drive(const RunRequest& request)
+    : request_(request),
+      configuration_(request.configuration),
+      mock_(make_mock_drive(request.configuration, request.faults, !request.fast, request.duration_s)),
+      rig_(nominal_rig(request.configuration)),
+      options_{request.configuration.odometry},
+      comparison_options_(comparison_options(request.configuration)),
+      arena_(arena_size(Estimator::memory_needed(options_, rig_)) + arena_size(Comparison::bytes_needed(comparison_options_))),
+      runner_(make_runner(request.configuration.threads)),
+      estimator_(std::make_unique<Estimator>(options_, rig_, arena_, *runner_)),
+      comparison_(std::make_unique<Comparison>(comparison_options_, arena_)),
+      fault_told_(mock_.rig->truth().faults().size(), false) {
+  LiveSource::Options o;
+  o.sync.cameras = rig_.cameras;
+  o.sync.interval = Duration::seconds(1 / configuration_.trigger.rate);
+  o.sync.hold = Duration::seconds(configuration_.sync.hold_ms * 1e-3);
+  o.wait_when_full = request.fast;
+  o.tie_stamp = request.fast ? kVirtualEpoch : Stamp(clock_ns(CLOCK_REALTIME));
+  o.tie_host = request.fast ? mock_.rig->start() : HostStamp(clock_ns(CLOCK_MONOTONIC));
+  std::vector<CameraDevice*> cameras;
+  for (int k = 0; k < mock_.rig->cameras(); ++k) cameras.push_back(&mock_.rig->camera(k));
+  source_ = std::make_unique<LiveSource>(std::move(cameras), mock_.has_ins ? &mock_.rig->ins() : nullptr, &mock_.rig->trigger(), o);
+  start_ = o.tie_stamp + (mock_.rig->start() - o.tie_host);
+}
+
+// ---- the estimator's thread ---------------------------------------------------------------------------------------
+
+void Drive::estimate() noexcept {
+  (void)pthread_setname_np(pthread_self(), "vergence-estim");
+  AllocationGuard::seal_thread();
+  for (LiveItem item; source_->next(&item);) {
+    switch (item.kind) {
+      case LiveItem::Kind::images:
+        handle_images(item);
+        break;
+      case LiveItem::Kind::reading:
+        comparison_->add(item.sample);
+        break;
+      case LiveItem::Kind::device_gone:
+      case LiveItem::Kind::device_back: {
+        const bool gone = item.kind == LiveItem::Kind::device_gone;
+        std::array<char, 96> text{};
+        (void)std::snprintf(text.data(), text.size(), gone ? "camera %d is gone; the drive goes on without it" : "camera %d is back",
+                            item.camera);
+        tell_event(item.stamp, gone ? "camera_gone" : "camera_back", text.data(), true);
+        break;
+      }
+      case LiveItem::Kind::refused:
+        break;
+    }
+    drain_comparison();
+  }
+  comparison_->finish();
+  drain_comparison();
+  note_placement(newest_stamp_);
+  AllocationGuard::unseal_thread();
+  const std::lock_guard lock(mutex_);
+  done_ = true;
+  changed_.notify_one();
+}
+
+void Drive::handle_images(const LiveItem& item) noexcept {
+  RigFrame frame;
+  frame.number = item.set.number;
+  frame.stamp = item.stamp;
+  frame.stamp_error = item.set.error;
+  frame.spread = item.set.spread;
+  frame.cameras = rig_.cameras;
+  for (int k = 0; k < rig_.cameras; ++k) frame.images[static_cast<std::size_t>(k)] = source_->image(item.set, k);
+  const PoseSample sample = estimator_->process(frame);
+  source_->release(item.set);
+  note_faults(item.stamp);
+  for (const EstimatorEvent& event : estimator_->events()) {
+    if (event.kind == EstimatorEvent::Kind::dropped) dropped_ += static_cast<std::uint64_t>(std::max(0.0, event.value));
+    recorder_->post(EventRecord::of(event));
+  }
+  newest_stamp_ = item.stamp;
+  comparison_->add(sample);
+
+  ++glimpse_.done;
+  glimpse_.state = sample.state;
+  glimpse_.inliers = sample.inliers;
+  glimpse_.estimate_ms = sample.estimate_ms;
+  if (sample.status != PoseStatus::lost) {
+    if (posed_) glimpse_.path_m += (sample.T_world_left.t - last_position_).norm();
+    last_position_ = sample.T_world_left.t;
+    posed_ = true;
+  }
+  (void)glimpses_.push(glimpse_);
+}
+
+void Drive::drain_comparison() noexcept {
+  for (ComparedPose pose; comparison_->next(&pose);) {
+    recorder_->post(PoseRecord::of(pose, 0.0F));
+    if (pose.ins_valid) ++ins_matches_;
+    glimpse_.from_ins_m = pose.compared ? pose.error_enu.norm() : -1;
+    note_placement(pose.pose.stamp);
+    if (mock_.has_ins) note_ins(pose);
+  }
+}
+
+void Drive::note_placement(Stamp stamp) noexcept {
+  const Placement& p = comparison_->placement();
+  if (p.revision == placement_revision_) return;
+  placement_revision_ = p.revision;
+  std::array<char, 160> text{};
+  constexpr double kDegrees = 180.0 / std::numbers::pi;
+  (void)std::snprintf(text.data(), text.size(), "placed on the earth after %.1f m: heading to %.2f deg, residual %.2f m", p.distance,
+                      p.rotation_sigma.z() * kDegrees, p.residual);
+  tell_event(stamp, "placement", text.data(), false);
+}
+
+void Drive::note_ins(const ComparedPose& pose) noexcept {
+  constexpr std::uint64_t kSettled = 3;  // poses: one missed reading is no event
+  match_run_ = pose.ins == last_match_ ? match_run_ + 1 : 1;
+  last_match_ = pose.ins;
+  if (match_run_ != kSettled && !(pose.ins == InsMatch::jump && match_run_ == 1)) return;
+  switch (pose.ins) {
+    case InsMatch::ok:
+      if (ins_matches_ > kSettled) tell_event(pose.pose.stamp, "ins_ok", "the INS has a position again; the comparison goes on", false);
+      break;
+    case InsMatch::none:
+      tell_event(pose.pose.stamp, "ins_silent", "the INS is silent: the drive goes on without it; check its cable and its rate", true);
+      break;
+    case InsMatch::gap:
+      tell_event(pose.pose.stamp, "ins_gap", "readings of the INS are missing: these poses are not compared", true);
+      break;
+    case InsMatch::no_fix:
+      tell_event(pose.pose.stamp, "ins_no_fix", "the INS has no position: the comparison pauses; check its antenna", true);
+      break;
+    case InsMatch::jump:
+      tell_event(pose.pose.stamp, "ins_jump", "the INS's position leapt: not interpolated across, errors from here on contain the leap",
+                 true);
+      break;
+  }
+}
+
+void Drive::note_faults(Stamp stamp) noexcept {
+  const auto& faults = mock_.rig->truth().faults();
+  for (std::size_t i = 0; i < faults.size(); ++i) {
+    if (fault_told_[i] || stamp < start_ + faults[i].at) continue;
+    fault_told_[i] = true;
+    std::array<char, 96> text{};
+    const std::string_view kind = mock::to_string(faults[i].kind);
+    (void)std::snprintf(text.data(), text.size(), "%.*s, as scheduled", static_cast<int>(kind.size()), kind.data());
+    tell_event(start_ + faults[i].at, "fault", text.data(), false);
+  }
+}
+
+void Drive::tell_event(Stamp stamp, const char* kind, std::string_view sentence, bool aloud) noexcept {
+  EventRecord event;
+  event.stamp = stamp;
+  event.kind = kind;
+  event.set_sentence(sentence);
+  recorder_->post(event);
+  if (aloud) (void)notices_.push(event);
+}
+
+// ---- the caller's thread ------------------------------------------------------------------------------------------
+
+void Drive::watch(const SignalGuard& signals, Progress* progress) {
+  constexpr std::chrono::milliseconds kLook{50};
+  std::unique_lock lock(mutex_);
+  while (!changed_.wait_for(lock, kLook, [this] { return done_; })) {
+    if (signals.stop_requested()) source_->stop();
+    lock.unlock();
+    show(progress);
+    lock.lock();
+  }
+  lock.unlock();
+  show(progress);
+}
+
+void Drive::show(Progress* progress) {
+  for (EventRecord notice; notices_.pop(&notice);)
+    progress->say(fmt::format("vergence: at {:.1f} s {}", (notice.stamp - start_).to_seconds(), notice.sentence.data()));
+  for (const std::string& sentence : recorder_->take_complaints()) progress->say("vergence: " + sentence);
+  Glimpse newest;
+  bool any = false;
+  while (glimpses_.pop(&newest)) any = true;
+  if (!any) return;
+  ProgressState state;
+  state.state = newest.state == State::stereo_odometry ? "stereo" : to_string(newest.state);
+  state.frame = newest.done;
+  state.frames = mock_.rig->pulses(configuration_.trigger.rate);
+  state.path_m = newest.path_m;
+  state.inliers = newest.inliers;
+  state.estimate_ms = static_cast<double>(newest.estimate_ms);
+  if (newest.from_ins_m >= 0) state.from_ins_m = newest.from_ins_m;
+  progress->update(state);
+}
+
+void Drive::write_truth(std::vector<std::string>* faults) const {
+  try {
+    LineFile file(request_.out / "truth.tum");
+    for (const StampedPose& pose : truth_) {
+      const PoseNumbers n = PoseNumbers::of(pose.T_world_body);
+      (void)file.append(fmt::format("{} {:.9f} {:.9f} {:.9f} {:.9f} {:.9f} {:.9f} {:.9f}\n", format_seconds(pose.stamp.ns()), n.t[0],
+                                    n.t[1], n.t[2], n.q[0], n.q[1], n.q[2], n.q[3]));
+    }
+    if (!file.close()) faults->push_back(file.path().string() + ": is not complete; make room on that disk");
+  } catch (const InputError& e) {
+    faults->emplace_back(e.what());
+  }
+}
+
+std::vector<std::pair<std::string, std::size_t>> Drive::memory() const {
+  return {{"estimator_bytes", arena_.capacity()},
+          {"images_bytes", mock_.rig->image_bytes()},
+          {"rings_bytes", sizeof(Recorder) + sizeof(LiveSource)}};
+}
+
+std::vector<std::pair<std::string, std::uint64_t>> Drive::device_counters() const {
+  const LiveCounters& c = source_->counters();
+  std::vector<std::pair<std::string, std::uint64_t>> out{
+      {"sets_complete", c.sync.complete},       {"sets_incomplete", c.sync.incomplete},
+      {"pulses_missed", c.sync.missed},         {"sets_overtaken", c.dropped_sets},
+      {"readings_dropped", c.dropped_readings}, {"frames_torn", c.torn},
+      {"clock_resets", c.clock_resets},         {"worst_stamp_error_ns", static_cast<std::uint64_t>(c.worst_stamp_error_ns)}};
+  for (int k = 0; k < rig_.cameras; ++k) {
+    const auto i = static_cast<std::size_t>(k);
+    const CameraStatistics s = mock_.rig->camera(k).statistics();
+    const std::string name = fmt::format("camera{}_", k);
+    out.insert(out.end(), {{name + "delivered", s.delivered},
+                           {name + "lost", s.lost},
+                           {name + "underruns", s.underruns},
+                           {name + "starts", s.starts},
+                           {name + "unpaired", c.sync.lost[i]},
+                           {name + "absent", c.sync.absent[i]},
+                           {name + "duplicate", c.sync.duplicate[i]},
+                           {name + "late", c.sync.late[i]}});
+  }
+  return out;
+}
+
+TruthFigures Drive::truth_figures(const SessionTotals& totals) const {
+  TruthFigures figures;
+  if (totals.trajectory.empty()) return figures;
+  figures.evaluation = evaluate(totals.trajectory, truth_, summary_evaluation_options());
+  const RigCalibration truly = mock_.rig->truth().calibration(totals.trajectory.back().stamp - start_);
+  const Transform &ours = estimator_->calibration().T_camera_left[1], &theirs = truly.T_camera_left[1];
+  const Vec3 turn = log_so3(ours.R * theirs.R.transpose()), shift = ours.t - theirs.t;
+  figures.calibration_error = {turn.x(), turn.y(), turn.z(), shift.x(), shift.y(), shift.z()};
+  return figures;
+}
+
+SummaryInput Drive::summary_input(const SessionTotals& totals, std::uint64_t allocations) const {
+  SummaryInput input;
+  const LiveCounters& c = source_->counters();
+  input.skipped = c.dropped_sets + c.sync.missed;
+  input.dropped_by_estimator = dropped_;
+  if (!totals.reference.empty() && !totals.trajectory.empty())
+    input.evaluation = evaluate(totals.trajectory, totals.reference, summary_evaluation_options());
+  input.calibration = estimator_->calibration();
+  input.calibration_source = "rig.nominal";
+  input.allocations_after_seal = allocations;
+  input.memory = memory();
+  input.configuration_hash = configuration_hash(configuration_);
+  input.devices = device_counters();
+  const ComparisonCounters& k = comparison_->counters();
+  if (mock_.has_ins)
+    input.comparison = {{"ins_samples", k.ins_samples},   {"ins_refused", k.ins_refused},
+                        {"ins_restarts", k.ins_restarts}, {"jumps", k.jumps},
+                        {"compared", k.compared},         {"without_ins", k.without_ins},
+                        {"pushed_out", k.pushed_out},     {"placements", comparison_->placement().revision}};
+  input.truth = truth_figures(totals);
+  return input;
+}
+
+void Drive::tell(const SessionTotals& totals, const SummaryInput& input, Progress* progress) const {
+  progress->say(
+      fmt::format("session {}: {} frames, {} posed ({} degraded), {} lost, {} dropped; {:.2f} m; {:.1f} ms a frame, {:.1f} at p99",
+                  request_.out.string(), totals.read, totals.ok + totals.degraded, totals.degraded, totals.lost, input.skipped,
+                  totals.path_m, totals.estimate.mean(), totals.estimate.percentile(0.99)));
+  if (!input.truth || !input.truth->evaluation || input.truth->evaluation->status != EvaluationStatus::ok) return;
+  const TrajectoryEvaluation& e = *input.truth->evaluation;
+  const SegmentErrors &far = e.segments[0], &near = e.segments[1];
+  const std::string segments = far.count > 0    ? fmt::format("; segments of 100 to 800 m {:.3f} %", 100 * far.translation)
+                               : near.count > 0 ? fmt::format("; segments of 10 to 50 m {:.3f} %", 100 * near.translation)
+                                                : "";
+  progress->say(fmt::format("against the truth over {:.1f} m: ATE {:.3f} m{}", e.path_reference, e.ate_se3.rmse, segments));
+}
+
+void Drive::make_report(Progress* progress) const {
+  try {
+    const ReportOutcome outcome = write_report(request_.out);
+    if (!request_.quiet) progress->say(fmt::format("report: {}", outcome.page.string()));
+  } catch (const InputError& e) {
+    progress->say(std::string("vergence: ") + e.what());
+  }
+}
+
+ExitCode Drive::verdict(const SessionTotals& totals, const std::vector<std::string>& faults, Progress* progress) const {
+  if (totals.ok + totals.degraded == 0) {
+    progress->say("vergence: there never was a pose; events.jsonl and poses.csv in " + request_.out.string() + " say why");
+    return ExitCode::not_usable;
+  }
+  if (!source_->missing().empty()) {
+    progress->say(fmt::format("vergence: camera {} was gone at the end; check its cable and power", fmt::join(source_->missing(), ", ")));
+    return ExitCode::device_failed;
+  }
+  if (mock_.has_ins && ins_matches_ == 0) {
+    progress->say("vergence: the INS never had a position for a frame: nothing is compared; the poses are there");
+    return ExitCode::not_usable;
+  }
+  return faults.empty() ? ExitCode::done : ExitCode::not_usable;
+}
+
+ExitCode Drive::run() {
+  const SignalGuard signals;
+  make_session_folder(request_.out);
+  const std::size_t frames = mock_.rig->pulses(configuration_.trigger.rate);
+  recorder_ = std::make_unique<Recorder>(
+      request_.out, Recorder::Options{request_.fast ? Recorder::WhenFull::wait : Recorder::WhenFull::drop, true, frames});
+  recorder_->post(CalibrationRecord::of(rig_, start_, true, "given", "rig.nominal of the configuration"));
+  std::vector<std::string> faults;
+  write_session_calibration(request_.out, rig_, configuration_.rig.name, &faults);  // at once: a session that is killed has it, too
+  if (request_.print_memory) print_memory_table(memory());
+
+  Progress progress = Progress::on_stderr(request_.quiet);
+  const auto allocations_before = AllocationGuard::allocations_after_seal();
+  begin();
+  write_truth(&faults);
+  std::thread estimating([this] { estimate(); });
+  watch(signals, &progress);
+  estimating.join();
+  source_->join();
+  progress.finish();
+
+  const auto totals = recorder_->close();
+  const SummaryInput input = summary_input(*totals, AllocationGuard::allocations_after_seal() - allocations_before);
+  if (faults.empty()) write_session_calibration(request_.out, estimator_->calibration(), configuration_.rig.name, &faults);
+  write_session_summary(request_.out, *totals, input, &faults);
+  faults.insert(faults.end(), totals->faults.begin(), totals->faults.end());
+  for (const std::string& sentence : recorder_->take_complaints()) progress.say("vergence: " + sentence);
+  for (const std::string& sentence : faults) progress.say("vergence: " + sentence);
+  if (!request_.quiet) tell(*totals, input, &progress);
+  make_report(&progress);
+  const ExitCode code = verdict(*totals, faults, &progress);
+  return signals.stop_code().value_or(code);
+}
+
+void Drive::begin() {
+  const HostStamp assumed = mock_.rig->start();
+  source_->start();
+  start_ = start_ + (mock_.rig->start() - assumed);  // real time: known only now
+  truth_ = true_trajectory(*mock_.rig, configuration_, start_);
+}
+
+}  // namespace
+
+ExitCode run_drive(const RunRequest& request) {
+  check_drive(request.configuration);
+  std::unique_ptr<Drive> drive;
+  try {
+    drive = std::make_unique<Drive>(request);
+  } catch (const std::invalid_argument& e) {  // options and rig do not go together
+    throw InputError(e.what());
+  } catch (const std::length_error& e) {
+    throw InputError(e.what());
+  }
+  return drive->run();
+}
+
+}  // namespace vergence::app

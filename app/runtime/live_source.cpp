@@ -1,0 +1,257 @@
+#include "app/runtime/live_source.hpp"
+
+#include <pthread.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cstdlib>
+#include <utility>
+
+#include "app/runtime/errors.hpp"
+
+namespace vergence::app {
+namespace {
+
+constexpr std::int64_t kAskAgain = 1'000'000'000;  // ns: opening a bus device takes a while, a second more is no loss
+
+std::int64_t steady_ns() noexcept { return std::chrono::steady_clock::now().time_since_epoch().count(); }
+
+ClockMapperOptions clock_options(const DeviceTiming& t) noexcept {
+  ClockMapperOptions o;
+  o.least_delay = t.least_delay;
+  o.delay_spread = t.delay_spread;
+  o.resolution = t.resolution;
+  return o;
+}
+
+void check(DeviceStatus status, const DeviceInfo& who) {
+  if (status != DeviceStatus::ok)
+    throw InputError(who.driver + " " + who.serial + " cannot be started: " + std::string(to_string(status)) +
+                     "; check its cable and its section of the configuration");
+}
+
+}  // namespace
+
+LiveSource::LiveSource(std::vector<CameraDevice*> cameras, InsDevice* ins, TriggerDevice* trigger, const Options& options)
+    : cameras_(std::move(cameras)), ins_(ins), trigger_(trigger), options_(options), sync_(options.sync), heads_(cameras_.size()) {
+  for (const CameraDevice* camera : cameras_) clocks_.emplace_back(clock_options(camera->timing()));
+  if (ins_ != nullptr) ins_clock_ = std::make_unique<ClockMapper>(clock_options(ins_->timing()));
+}
+
+LiveSource::~LiveSource() {
+  stop();
+  join();
+}
+
+void LiveSource::start() {
+  for (CameraDevice* camera : cameras_) check(camera->start(this), camera->info());
+  if (ins_ != nullptr) check(ins_->start(this), ins_->info());
+  if (trigger_ != nullptr) check(trigger_->start(this), trigger_->info());
+  thread_ = std::thread([this] { work(); });
+}
+
+void LiveSource::stop() noexcept {
+  stop_.store(true, std::memory_order_release);
+  bell_.ring();
+  filled_.ring();
+  freed_.ring();
+}
+
+void LiveSource::join() noexcept {
+  if (thread_.joinable()) thread_.join();
+  for (CameraDevice* camera : cameras_) camera->stop();
+  if (ins_ != nullptr) ins_->stop();
+  if (trigger_ != nullptr) trigger_->stop();
+  counters_.sync = sync_.counters();
+  counters_.dropped_sets = skipped_.load();
+  counters_.clock_resets = ins_clock_ ? ins_clock_->resets() : 0;
+  for (const ClockMapper& clock : clocks_) counters_.clock_resets += clock.resets();
+}
+
+bool LiveSource::next(LiveItem* item) noexcept {
+  for (;;) {
+    const Doorbell::Rung seen = filled_.look();
+    const bool finished = finished_.load(std::memory_order_acquire);  // before the ring: what was pushed before is still found
+    if (ring_.pop(item)) {
+      freed_.ring();
+      if (item->kind == LiveItem::Kind::refused) {
+        release(item->set);
+        continue;
+      }
+      if (item->kind != LiveItem::Kind::images) return true;
+      const int behind = waiting_.fetch_sub(1, std::memory_order_acq_rel) - 1;
+      if (options_.wait_when_full || behind < kMostWaiting) return true;
+      release(item->set);
+      skipped_.fetch_add(1, std::memory_order_relaxed);
+      continue;
+    }
+    if (finished) return false;
+    filled_.wait(seen);
+  }
+}
+
+void LiveSource::release(const SyncedSet& set) noexcept {
+  for (std::size_t k = 0; k < cameras_.size(); ++k)
+    if (set.present[k]) cameras_[k]->release(set.slots[k]);
+}
+
+void LiveSource::work() {
+  (void)pthread_setname_np(pthread_self(), "vergence-sync");
+  for (Pulse pulse; !stop_.load(std::memory_order_acquire);) {
+    const Doorbell::Rung seen = bell_.look();
+    while (trigger_ != nullptr && trigger_->wait(Duration{}, &pulse) == DeviceStatus::ok) ++counters_.pulses;
+    // Twice: whatever arrived before an item of the first look is there at the second.
+    for (int pass = 0; pass < 2; ++pass) {
+      for (std::size_t k = 0; k < cameras_.size(); ++k) look(k);
+      look_ins();
+    }
+    const int device = earliest();
+    if (device >= 0) {
+      if (static_cast<std::size_t>(device) < cameras_.size())
+        take_frame(static_cast<std::size_t>(device));
+      else
+        take_reading();
+      hand_out_sets();
+      continue;
+    }
+    const bool over = std::all_of(heads_.begin(), heads_.end(), [](const auto& h) { return h.ended; }) && ins_head_.ended;
+    if (over) break;
+    bell_.wait(seen);
+  }
+  sync_.finish();
+  hand_out_sets();
+  for (std::size_t k = 0; k < heads_.size(); ++k) {
+    if (heads_[k].gone) missing_.push_back(static_cast<int>(k));
+  }
+  finished_.store(true, std::memory_order_release);
+  filled_.ring();
+}
+
+void LiveSource::look(std::size_t k) {
+  auto& head = heads_[k];
+  if (head.held || head.ended) return;
+  if (head.gone) {
+    const std::int64_t now = steady_ns();
+    if (!options_.wait_when_full && now - head.asked_ns < kAskAgain) return;
+    head.asked_ns = now;
+    const DeviceStatus status = cameras_[k]->start(this);
+    if (status == DeviceStatus::ended) head.ended = true;
+    if (status != DeviceStatus::ok) return;
+    head.gone = false;
+    head.back = true;
+  }
+  const DeviceStatus status = cameras_[k]->wait(Duration{}, &head.value);
+  head.event = status == DeviceStatus::gone;
+  head.held = status == DeviceStatus::ok || head.event;
+  head.ended = status == DeviceStatus::ended || status == DeviceStatus::stopped;
+}
+
+void LiveSource::look_ins() {
+  if (ins_ == nullptr) ins_head_.ended = true;
+  if (ins_head_.held || ins_head_.ended) return;
+  if (ins_head_.gone) {
+    const std::int64_t now = steady_ns();
+    if (!options_.wait_when_full && now - ins_head_.asked_ns < kAskAgain) return;
+    ins_head_.asked_ns = now;
+    const DeviceStatus status = ins_->start(this);
+    if (status == DeviceStatus::ended) ins_head_.ended = true;
+    if (status != DeviceStatus::ok) return;
+    ins_head_.gone = false;
+    ins_clock_->restart();
+  }
+  const DeviceStatus status = ins_->wait(Duration{}, &ins_head_.value);
+  ins_head_.gone = status == DeviceStatus::gone;
+  ins_head_.held = status == DeviceStatus::ok;
+  ins_head_.ended = status == DeviceStatus::ended || status == DeviceStatus::stopped;
+}
+
+int LiveSource::earliest() const {
+  int device = -1;
+  HostStamp first{};
+  for (std::size_t k = 0; k < heads_.size(); ++k)
+    if (heads_[k].held && (device < 0 || heads_[k].value.arrival < first)) {
+      device = static_cast<int>(k);
+      first = heads_[k].value.arrival;
+    }
+  // At the same instant the INS goes first: the images may need it.
+  if (ins_head_.held && (device < 0 || ins_head_.value.arrival <= first)) device = static_cast<int>(heads_.size());
+  return device;
+}
+
+void LiveSource::take_frame(std::size_t k) {
+  auto& head = heads_[k];
+  head.held = false;
+  LiveItem item;
+  item.camera = static_cast<int>(k);
+  item.stamp = stamp_of(head.value.arrival);
+  if (head.event) {
+    head.gone = true;
+    sync_.absent(item.camera);
+    item.kind = LiveItem::Kind::device_gone;
+    push(item);
+    return;
+  }
+  if (head.back) {
+    head.back = false;
+    clocks_[k].restart();
+    sync_.restarted(item.camera);
+    item.kind = LiveItem::Kind::device_back;
+    push(item);
+  }
+  const Frame& frame = head.value;
+  SyncFrame in;
+  in.camera = item.camera;
+  in.slot = frame.slot;
+  in.counter = frame.counter;
+  in.middle = clocks_[k].map(frame.exposure_start, frame.arrival);
+  in.middle.host = in.middle.host + frame.exposure / 2;
+  in.arrival = frame.arrival;
+  const bool torn = frame.status != FrameStatus::complete;
+  counters_.torn += torn ? 1 : 0;
+  if (!torn && sync_.offer(in) == SyncVerdict::taken) return;
+  item.kind = LiveItem::Kind::refused;
+  item.set.present[k] = true;
+  item.set.slots[k] = frame.slot;
+  push(item);
+}
+
+void LiveSource::take_reading() {
+  ins_head_.held = false;
+  LiveItem item;
+  item.kind = LiveItem::Kind::reading;
+  item.sample = ins_head_.value.sample;
+  const MappedStamp at = ins_clock_->map(ins_head_.value.measured, ins_head_.value.arrival);
+  item.stamp = item.sample.stamp = stamp_of(at.host);
+  item.sample.stamp_error = at.error;
+  push(item);
+}
+
+void LiveSource::hand_out_sets() {
+  constexpr std::uint64_t kSettled = 30;  // sets, after which the clocks are known
+  LiveItem item;
+  item.kind = LiveItem::Kind::images;
+  while (sync_.next(&item.set)) {
+    item.stamp = stamp_of(item.set.stamp);
+    if (item.set.number > kSettled) counters_.worst_stamp_error_ns = std::max(counters_.worst_stamp_error_ns, item.set.error.ns());
+    push(item);
+  }
+}
+
+void LiveSource::push(const LiveItem& item) {
+  const bool images = item.kind == LiveItem::Kind::images;
+  if (images) waiting_.fetch_add(1, std::memory_order_acq_rel);
+  for (;;) {
+    const Doorbell::Rung seen = freed_.look();
+    if (ring_.push(item)) break;
+    if (stop_.load(std::memory_order_acquire)) return;  // nobody may be taking any more
+    if (!options_.wait_when_full && item.kind == LiveItem::Kind::reading) {
+      ++counters_.dropped_readings;
+      return;
+    }
+    freed_.wait(seen);  // images: meanwhile the cameras drop, and count
+  }
+  counters_.ring_high_water = std::max(counters_.ring_high_water, ring_.size());
+  filled_.ring();
+}
+
+}  // namespace vergence::app
