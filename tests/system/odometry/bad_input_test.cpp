@@ -1,0 +1,206 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <memory>
+
+#include "tests/system/odometry/faults.hpp"
+#include "tests/system/odometry/mock_drive.hpp"
+
+namespace vergence::test {
+namespace {
+
+// The vehicle moves at 9 m/s and turns a corner: frames 120 on are half way.
+constexpr std::size_t kFirst = 120, kLast = 135;
+
+/// What every condition is asked: no `ok` while it lasts, none that is wrong at any time, and `ok` again at the end.
+struct Verdict {
+  Replay replayed;
+  std::size_t first, last;
+
+  Verdict(const Edit& edit, std::size_t from, std::size_t to) : replayed(replay(brief_drive(), edit)), first(from), last(to) {
+    EXPECT_EQ(count_ok(replayed.answers, first, last), 0) << story(replayed.answers);
+    EXPECT_EQ(wrong_ok(replayed.answers, {}), "") << story(replayed.answers);
+    EXPECT_EQ(replayed.allocations, 0U);
+  }
+  /// `ok` before the condition, and again from `settled` frames after it to the end.
+  void expect_recovery(std::size_t settled) const {
+    const std::size_t n = brief_drive().size();
+    const auto before =
+        std::count_if(replayed.answers.begin(), replayed.answers.end(), [this](const Answer& a) { return a.sample.frame < first; });
+    EXPECT_EQ(count_ok(replayed.answers, 0, first), static_cast<int>(before)) << story(replayed.answers);
+    EXPECT_EQ(count_ok(replayed.answers, last + settled, n), static_cast<int>(n - last - settled)) << story(replayed.answers);
+  }
+  void expect_status(PoseStatus status) const {
+    for (const Answer& a : replayed.answers)
+      if (a.sample.frame >= first && a.sample.frame < last) {
+        EXPECT_EQ(a.sample.status, status) << story(replayed.answers);
+      }
+  }
+  void expect_reason(Reason reason) const {
+    for (const Answer& a : replayed.answers)
+      if (a.sample.frame >= first && a.sample.frame < last) {
+        EXPECT_EQ(a.sample.reason, reason) << "frame " << a.sample.frame << '\n' << story(replayed.answers);
+      }
+  }
+  [[nodiscard]] const Answer* at(std::size_t frame) const {
+    const auto found =
+        std::find_if(replayed.answers.begin(), replayed.answers.end(), [&](const Answer& a) { return a.sample.frame == frame; });
+    return found == replayed.answers.end() ? nullptr : &*found;
+  }
+};
+
+constexpr std::size_t kAtOnce = 3;         // frames: the map still knows the place
+constexpr std::size_t kAfterRestart = 20;  // frames: three tries, ten marked ones after the restart, and as many to fill the map
+
+const StereoDrive& drive() { return brief_drive(); }
+
+TEST(OdometryInBadConditions, allBlackFramesAreLostAndTheWayGoesOnAfterThem) {
+  const Verdict v(cover(drive(), Cover::both, kFirst, kLast), kFirst, kLast);
+  v.expect_status(PoseStatus::lost);
+  v.expect_reason(Reason::image_dark);
+  v.expect_recovery(kAfterRestart);
+}
+
+TEST(OdometryInBadConditions, aDriveThatBeginsInTheDarkStartsWithTheFirstLight) {
+  const Verdict v(cover(drive(), Cover::both, 0, 10), 0, 10);
+  v.expect_status(PoseStatus::lost);
+  v.expect_reason(Reason::image_dark);
+  v.expect_recovery(0);
+}
+
+TEST(OdometryInBadConditions, oneCoveredCameraIsDegraded) {
+  for (const Cover side : {Cover::left, Cover::right}) {
+    const Verdict v(cover(drive(), side, kFirst, kLast), kFirst, kLast);
+    v.expect_status(PoseStatus::degraded);
+    v.expect_reason(Reason::image_dark);
+    v.expect_recovery(kAfterRestart);
+  }
+}
+
+TEST(OdometryInBadConditions, aCameraCoveredForGoodIsNeverOkAgain) {
+  for (const Cover side : {Cover::left, Cover::right}) {
+    const Verdict v(cover(drive(), side, 20, drive().size()), 20, drive().size());
+    EXPECT_EQ(count_ok(v.replayed.answers, 0, 20), 20);
+    EXPECT_EQ(v.replayed.answers.back().sample.reason, Reason::image_dark);
+  }
+}
+
+TEST(OdometryInBadConditions, aMissingImageIsDegradedAndTwoAreLost) {
+  for (const int camera : {0, 1}) {
+    const Verdict v(take_away(camera, kFirst, kLast), kFirst, kLast);
+    v.expect_status(PoseStatus::degraded);
+    v.expect_reason(Reason::no_image);
+    v.expect_recovery(kAfterRestart);
+  }
+  const Verdict both(
+      [](std::size_t i, RigFrame* f) {
+        if (i >= kFirst && i < kLast) f->images[0] = f->images[1] = {};
+        return true;
+      },
+      kFirst, kLast);
+  both.expect_status(PoseStatus::lost);
+  both.expect_reason(Reason::no_image);
+  both.expect_recovery(kAfterRestart);
+}
+
+TEST(OdometryInBadConditions, aGlaredPairIsLost) {
+  const auto white = std::make_shared<Picture>(drive().pairs[0][0].width, drive().pairs[0][0].height);
+  std::fill(white->bytes.begin(), white->bytes.end(), std::uint8_t{255});
+  const Verdict v(
+      [=](std::size_t i, RigFrame* f) {
+        if (i >= kFirst && i < kLast) f->images[0] = f->images[1] = white->view();
+        return true;
+      },
+      kFirst, kLast);
+  v.expect_status(PoseStatus::lost);
+  v.expect_recovery(kAfterRestart);
+}
+
+TEST(OdometryInBadConditions, camerasExchangedFromTheStartNeverGiveAPose) {
+  const Verdict v(swap_cameras(0, drive().size()), 0, drive().size());
+  v.expect_status(PoseStatus::lost);
+  const auto said = std::count_if(v.replayed.answers.begin(), v.replayed.answers.end(),
+                                  [](const Answer& a) { return a.sample.reason == Reason::cameras_swapped; });
+  EXPECT_GT(said, 0) << "somewhere on the way there is enough near the rig to know it";
+}
+
+TEST(OdometryInBadConditions, camerasExchangedOnTheWayAreNeverOk) {
+  const Verdict for_good(swap_cameras(kFirst, drive().size()), kFirst, drive().size());
+  EXPECT_EQ(for_good.replayed.answers.back().sample.status, PoseStatus::lost);
+  const Verdict for_a_while(swap_cameras(kFirst, kLast), kFirst, kLast);
+  for_a_while.expect_recovery(kAfterRestart);
+}
+
+TEST(OdometryInBadConditions, afterTwoSecondsWithoutFramesItSaysSoAndStartsAnew) {
+  const std::size_t back = kFirst + 40;
+  const Verdict v(leave_out(kFirst, back), back, back + 3);
+  ASSERT_NE(v.at(back), nullptr);
+  EXPECT_EQ(v.at(back)->sample.reason, Reason::time_gap);
+  v.expect_recovery(kAfterRestart);
+  // Where a scene is built anew, it stands where constant velocity leads to: the step before the gap, as many times as it would have been
+  // made.
+  const auto restart = std::find_if(v.replayed.answers.begin(), v.replayed.answers.end(), [](const Answer& a) { return a.restarted; });
+  if (restart == v.replayed.answers.end()) return;
+  EXPECT_EQ(restart->sample.status, PoseStatus::degraded);
+  EXPECT_EQ(restart->sample.reason, Reason::scene_restarted);
+  const Transform& last = v.at(kFirst - 1)->sample.T_world_left;
+  const Vec3 step = last.t - v.at(kFirst - 2)->sample.T_world_left.t;
+  const double frames = std::min<double>(static_cast<double>(restart->sample.frame - (kFirst - 1)), 40);  // no further than two seconds
+  // The way bends with the rig's turn: a path of that length ends within it, and ahead.
+  const Vec3 way = restart->sample.T_world_left.t - last.t;
+  EXPECT_LT(way.norm(), 1.01 * frames * step.norm());
+  EXPECT_GT(way.norm(), 0.5 * frames * step.norm());
+}
+
+TEST(OdometryInBadConditions, aShortGapIsMarkedAndBridged) {
+  const std::size_t back = kFirst + 12;  // 0.65 s, more than max_gap_s
+  const Verdict v(leave_out(kFirst, back), back, back + 1);
+  v.expect_reason(Reason::time_gap);
+  v.expect_recovery(kAtOnce);
+}
+
+TEST(OdometryInBadConditions, oneLostFrameInThreeIsNothing) {
+  const Replay r = replay(drive(), [](std::size_t i, RigFrame*) { return i % 3 != 1; });
+  EXPECT_EQ(count_ok(r.answers, 0, drive().size()), static_cast<int>(r.answers.size())) << story(r.answers);
+  EXPECT_EQ(wrong_ok(r.answers, {}), "");
+}
+
+TEST(OdometryInBadConditions, aFrameThatComesAgainIsDegraded) {
+  const Verdict v(
+      [](std::size_t i, RigFrame* f) {
+        if (i >= kFirst && i < kFirst + 3)
+          for (std::size_t k = 0; k < 2; ++k) f->images[k] = drive().pairs[kFirst - 1][k].view();
+        return true;
+      },
+      kFirst, kFirst + 3);
+  v.expect_status(PoseStatus::degraded);
+  v.expect_reason(Reason::image_repeated);
+  v.expect_recovery(0);
+}
+
+TEST(OdometryInBadConditions, stampsThatGoBackAreLostAndDisturbNothing) {
+  const Replay plain = replay(drive());
+  const Replay r = replay(drive(), [](std::size_t i, RigFrame* f) {
+    if (i == kFirst || i == kFirst + 1) f->stamp = drive().stamps[10];
+    return true;
+  });
+  EXPECT_EQ(count_ok(r.answers, kFirst, kFirst + 2), 0);
+  EXPECT_EQ(r.answers[kFirst].sample.reason, Reason::time_gap);
+  EXPECT_EQ(wrong_ok(r.answers, {}), "");
+  EXPECT_EQ(count_ok(r.answers, kFirst + 2, drive().size()), static_cast<int>(drive().size() - kFirst - 2)) << story(r.answers);
+}
+
+TEST(OdometryInBadConditions, withTwoThreadsTheyAreTheSameBitForBit) {
+  for (const Edit& edit : {cover(drive(), Cover::right, kFirst, kLast), swap_cameras(kFirst, kLast), leave_out(kFirst, kFirst + 40)}) {
+    const Replay one = replay(drive(), edit, 1), two = replay(drive(), edit, 2);
+    ASSERT_EQ(one.answers.size(), two.answers.size());
+    for (std::size_t i = 0; i < one.answers.size(); ++i) {
+      EXPECT_EQ(one.answers[i].sample.reason, two.answers[i].sample.reason);
+      EXPECT_EQ(one.answers[i].sample.T_world_left.t, two.answers[i].sample.T_world_left.t);
+    }
+    EXPECT_EQ(two.allocations, 0U);
+  }
+}
+
+}  // namespace
+}  // namespace vergence::test

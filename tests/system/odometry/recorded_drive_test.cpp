@@ -1,0 +1,112 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <stdexcept>
+
+#include "app/datasets/image_file.hpp"
+#include "app/datasets/stereo_sequence.hpp"
+#include "app/datasets/trajectory_files.hpp"
+#include "core/comparison/trajectory_metrics.hpp"
+#include "tests/support/shared_data.hpp"
+#include "tests/system/odometry/faults.hpp"
+
+namespace vergence::test {
+namespace {
+
+struct Excerpt {
+  const char* name;
+  const char* folder;
+  app::SequenceFormat format;
+  std::size_t frames;           // all of them, or enough of them
+  std::size_t frames_of_a_gap;  // two seconds
+};
+constexpr Excerpt kKitti{"kitti", "data/kitti06_51", app::SequenceFormat::kitti, 51, 20};
+constexpr Excerpt kEuroc{"euroc", "data/euroc_mh01", app::SequenceFormat::euroc, 80, 40};
+
+Picture decode(const std::filesystem::path& file, const Intrinsics& camera) {
+  Picture p(camera.width, camera.height);
+  std::vector<std::uint8_t> bytes;
+  if (app::read_image_file(file, &bytes) != app::ImageFileStatus::ok ||
+      app::decode_grey(bytes, {p.width, p.height}, p.bytes.data(), static_cast<std::size_t>(p.stride)) != app::ImageFileStatus::ok)
+    throw std::runtime_error(file.string() + " cannot be decoded");
+  return p;
+}
+
+StereoDrive load(const Excerpt& excerpt, const std::filesystem::path& folder) {
+  const app::StereoSequence sequence = app::open_sequence(excerpt.format, folder);
+  const app::Trajectory truth = app::read_trajectory(folder);
+  StereoDrive drive;
+  drive.rig = sequence.calibration;
+  for (std::size_t i = 0; i < std::min(excerpt.frames, sequence.pairs.size()); ++i) {
+    const app::StereoPair& pair = sequence.pairs[i];
+    const std::vector<StampedPose> here{{pair.stamp, Transform{}}};
+    const MatchedTrajectories matched = associate(here, truth, {});
+    if (matched.reference.empty()) continue;
+    drive.stamps.push_back(pair.stamp);
+    drive.truth.push_back(matched.reference[0].T_world_body);
+    drive.pairs.push_back(
+        {decode(sequence.root / pair.file[0], drive.rig.intrinsics[0]), decode(sequence.root / pair.file[1], drive.rig.intrinsics[1])});
+  }
+  return drive;
+}
+
+class RecordedDrive : public testing::TestWithParam<Excerpt> {
+ protected:
+  void SetUp() override {
+    const auto folder = shared_data(GetParam().folder);
+    if (!folder) GTEST_SKIP() << shared_data_missing(GetParam().folder);
+    drive_ = load(GetParam(), *folder);
+    ASSERT_GT(drive_.size(), 45U);
+  }
+  /// Truth here has errors of its own: EuRoC's of a centimetre, KITTI's calibration of half a per cent and a degree of yaw over the
+  /// excerpt.
+  [[nodiscard]] static OkBound bound() {
+    OkBound b;
+    b.translation = 0.05;
+    b.per_metre = 0.02;
+    b.rotation = 0.02;
+    return b;
+  }
+  void expect_no_wrong_ok(const Replay& r, std::size_t first, std::size_t last) const {
+    EXPECT_EQ(count_ok(r.answers, first, last), 0) << story(r.answers);
+    EXPECT_EQ(wrong_ok(r.answers, bound()), "") << story(r.answers);
+    EXPECT_EQ(r.allocations, 0U);
+  }
+  StereoDrive drive_;
+};
+
+TEST_P(RecordedDrive, isOkAllTheWayAndRight) {
+  const Replay r = replay(drive_, {}, 2);
+  EXPECT_EQ(count_ok(r.answers, 0, drive_.size()), static_cast<int>(drive_.size())) << story(r.answers);
+  EXPECT_EQ(wrong_ok(r.answers, bound()), "");
+  EXPECT_EQ(r.allocations, 0U);
+}
+
+TEST_P(RecordedDrive, withItsCamerasExchangedNeverGivesAPose) {
+  const Replay r = replay(drive_, swap_cameras(0, drive_.size()), 2);
+  expect_no_wrong_ok(r, 0, drive_.size());
+  for (const Answer& a : r.answers) EXPECT_EQ(a.sample.status, PoseStatus::lost) << a.sample.frame;
+}
+
+TEST_P(RecordedDrive, withItsRightCameraCoveredIsNotOkFromThere) {
+  expect_no_wrong_ok(replay(drive_, cover(drive_, Cover::right, 20, drive_.size()), 2), 20, drive_.size());
+}
+
+TEST_P(RecordedDrive, blackFramesAreLost) {
+  const Replay r = replay(drive_, cover(drive_, Cover::both, 20, 30), 2);
+  expect_no_wrong_ok(r, 20, 30);
+  EXPECT_NE(r.answers.back().sample.status, PoseStatus::lost) << story(r.answers);
+}
+
+TEST_P(RecordedDrive, afterTwoSecondsWithoutFramesItSaysSo) {
+  const std::size_t back = 20 + GetParam().frames_of_a_gap;
+  const Replay r = replay(drive_, leave_out(20, back), 2);
+  expect_no_wrong_ok(r, back, back + 1);
+  EXPECT_NE(r.answers.back().sample.status, PoseStatus::lost) << story(r.answers);
+}
+
+INSTANTIATE_TEST_SUITE_P(Excerpts, RecordedDrive, testing::Values(kKitti, kEuroc),
+                         [](const auto& instance) { return std::string(instance.param.name); });
+
+}  // namespace
+}  // namespace vergence::test

@@ -1,0 +1,77 @@
+#pragma once
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "core/estimator/estimator.hpp"
+#include "core/types/stamped_pose.hpp"
+
+namespace vergence::test {
+
+/// 8-bit grey pixels, rows padded to whole cache lines.
+struct Picture {
+  int width = 0, height = 0;
+  std::ptrdiff_t stride = 0;
+  std::vector<std::uint8_t> bytes;
+
+  Picture() = default;
+  Picture(int w, int h);
+  [[nodiscard]] ImageView view() const noexcept { return {bytes.data(), width, height, stride}; }
+};
+
+/// A stereo drive in memory with the truth: T_reference_left of every frame, in any world.
+struct StereoDrive {
+  RigCalibration rig;
+  std::vector<Stamp> stamps;
+  std::vector<std::array<Picture, 2>> pairs;
+  std::vector<Transform> truth;  // T_reference_left
+
+  [[nodiscard]] std::size_t size() const noexcept { return pairs.size(); }
+};
+
+/// What an estimator said about one frame, and where the left camera truly was when its image was taken.
+struct Answer {
+  PoseSample sample;
+  Transform T_reference_left{};
+  bool restarted = false;  // an event said that the scene was built anew
+};
+
+/// A change of one frame before the estimator sees it. False: the frame never comes.
+using Edit = std::function<bool(std::size_t index, RigFrame* frame)>;
+
+struct Replay {
+  std::vector<Answer> answers;
+  std::uint64_t allocations = 0;  // on sealed threads, from the first frame to the last
+};
+
+/// Every frame of the drive through a new estimator. `threads`: 1 or 2.
+[[nodiscard]] Replay replay(const StereoDrive& drive, const Edit& edit = {}, int threads = 1);
+
+/// Difference of two relative motions over the same pair of frames.
+struct MotionError {
+  double translation = 0;  // m
+  double rotation = 0;     // rad
+};
+[[nodiscard]] MotionError motion_error(const Answer& from, const Answer& to);
+
+/// How far a pose called `ok` may be from the truth, relative to the first `ok` pose of its unbroken run.
+struct OkBound {
+  double translation = 0.05;  // m
+  double per_metre = 0.015;   // m of the way driven since
+  double rotation = 0.01;     // rad
+};
+
+/// The worst breach of the bound among poses called `ok`, in words; empty when there is none.
+[[nodiscard]] std::string wrong_ok(const std::vector<Answer>& answers, const OkBound& bound);
+
+/// Frames of [first, last) that were called `ok`.
+[[nodiscard]] int count_ok(const std::vector<Answer>& answers, std::size_t first, std::size_t last);
+
+/// One line for every run of frames with the same status and reason: for the message of a failed expectation.
+[[nodiscard]] std::string story(const std::vector<Answer>& answers);
+
+}  // namespace vergence::test
