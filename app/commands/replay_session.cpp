@@ -242,6 +242,7 @@ ExitCode Replay::run() {
   for (const std::string& sentence : recorder_->take_complaints()) progress.say("vergence: " + sentence);
   for (const std::string& sentence : faults) progress.say("vergence: " + sentence);
   if (!request_.quiet) tell(*totals, input, &progress);
+  write_session_report(request_.out, request_.quiet, &progress);
 
   if (const auto stopped = signals.stop_code()) return *stopped;
   if (totals->ok + totals->degraded == 0) {

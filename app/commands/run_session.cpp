@@ -21,7 +21,6 @@
 #include "app/datasets/decimal.hpp"
 #include "app/recorder/line_file.hpp"
 #include "app/recorder/recorder.hpp"
-#include "app/report/report.hpp"
 #include "app/runtime/live_source.hpp"
 #include "app/runtime/progress.hpp"
 #include "app/runtime/signals.hpp"
@@ -70,7 +69,6 @@ class Drive {
   [[nodiscard]] SummaryInput summary_input(const SessionTotals& totals, std::uint64_t allocations) const;
   [[nodiscard]] TruthFigures truth_figures(const SessionTotals& totals) const;
   void tell(const SessionTotals& totals, const SummaryInput& input, Progress* progress) const;
-  void make_report(Progress* progress) const;
   [[nodiscard]] ExitCode verdict(const SessionTotals& totals, const std::vector<std::string>& faults, Progress* progress) const;
   [[nodiscard]] std::vector<std::pair<std::string, std::size_t>> memory() const;
   [[nodiscard]] std::vector<std::pair<std::string, std::uint64_t>> device_counters() const;
@@ -391,15 +389,6 @@ void Drive::tell(const SessionTotals& totals, const SummaryInput& input, Progres
   progress->say(fmt::format("against the truth over {:.1f} m: ATE {:.3f} m{}", e.path_reference, e.ate_se3.rmse, segments));
 }
 
-void Drive::make_report(Progress* progress) const {
-  try {
-    const ReportOutcome outcome = write_report(request_.out);
-    if (!request_.quiet) progress->say(fmt::format("report: {}", outcome.page.string()));
-  } catch (const InputError& e) {
-    progress->say(std::string("vergence: ") + e.what());
-  }
-}
-
 ExitCode Drive::verdict(const SessionTotals& totals, const std::vector<std::string>& faults, Progress* progress) const {
   if (totals.ok + totals.degraded == 0) {
     progress->say("vergence: there never was a pose; events.jsonl and poses.csv in " + request_.out.string() + " say why");
@@ -445,7 +434,7 @@ ExitCode Drive::run() {
   for (const std::string& sentence : recorder_->take_complaints()) progress.say("vergence: " + sentence);
   for (const std::string& sentence : faults) progress.say("vergence: " + sentence);
   if (!request_.quiet) tell(*totals, input, &progress);
-  make_report(&progress);
+  write_session_report(request_.out, request_.quiet, &progress);
   const ExitCode code = verdict(*totals, faults, &progress);
   return signals.stop_code().value_or(code);
 }

@@ -8,6 +8,7 @@
 
 #include "app/config/calibration_file.hpp"
 #include "app/recorder/line_file.hpp"
+#include "app/report/report.hpp"
 #include "app/runtime/errors.hpp"
 #include "app/runtime/thread_runner.hpp"
 
@@ -40,6 +41,15 @@ void write_session_summary(const std::filesystem::path& session, const SessionTo
     if (!file.close()) faults->push_back(file.path().string() + ": is not complete (" + std::strerror(file.fault()) + ")");
   } catch (const InputError& e) {
     faults->emplace_back(e.what());
+  }
+}
+
+void write_session_report(const std::filesystem::path& session, bool quiet, Progress* progress) {
+  try {
+    const ReportOutcome outcome = write_report(session);
+    if (!quiet) progress->say(fmt::format("report {}: {}", outcome.page.string(), outcome.headline));
+  } catch (const InputError& e) {
+    progress->say(std::string("vergence: ") + e.what());
   }
 }
 

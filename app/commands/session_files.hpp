@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "app/recorder/summary.hpp"
+#include "app/runtime/progress.hpp"
 #include "core/types/parallel.hpp"
 
 /// What every command that writes a session folder does alike.
@@ -25,6 +26,9 @@ void write_session_calibration(const std::filesystem::path& session, const RigCa
 /// summary.json of the session; what goes wrong becomes a sentence of *faults.
 void write_session_summary(const std::filesystem::path& session, const SessionTotals& totals, const SummaryInput& input,
                            std::vector<std::string>* faults);
+
+/// report.html of the session, and a line that says where it is and what it says; what goes wrong is said, too.
+void write_session_report(const std::filesystem::path& session, bool quiet, Progress* progress);
 
 /// The table of --memory, on stdout.
 void print_memory_table(const std::vector<std::pair<std::string, std::size_t>>& memory);

@@ -64,7 +64,7 @@ std::string drift_card(const Analysis& a) {
 std::string error_card(const Analysis& a) {
   const std::string name = a.source == ErrorSource::ins ? "Error to the INS" : "Error to the reference";
   if (a.source == ErrorSource::none) return number_card("not known", name, "no reference");
-  return number_card(fmt::format("{:.2f} m", a.horizontal.rms), name, fmt::format("horizontal, rms; {:.2f} m at most", a.horizontal.max));
+  return number_card(metres(a.horizontal.rms), name, "horizontal, rms; " + metres(a.horizontal.max) + " at most");
 }
 
 std::string ok_card(const Analysis& a) {

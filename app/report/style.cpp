@@ -52,6 +52,12 @@ td.n{text-align:right;font-variant-numeric:tabular-nums;padding-right:0}
 td.k{min-width:6.4em}
 td.t{white-space:nowrap;font-variant-numeric:tabular-nums}
 tr.group th{color:var(--ink);font-weight:600;padding-top:9px}
+@media screen and (max-width:560px){
+.stack tr{display:block;border-bottom:1px solid color-mix(in srgb,var(--frame) 30%,transparent);padding:3px 0}
+.stack tr:first-child{display:none}
+.stack td{display:inline;border:0;padding:0 .7em 0 0}
+.stack td:last-child{display:block}
+}
 @media (min-width:860px){.grid{grid-template-columns:1fr 1fr}.tall{grid-row:span 2}.two{columns:2;column-gap:24px}}
 @page{size:A4;margin:12mm}
 @media print{

@@ -49,20 +49,20 @@ void frames_group(const Session& s, const Analysis& a, Figures* f) {
   }
   if (s.summary.is_object()) f->row("skipped (not readable)", grouped(a.skipped));
   for (std::size_t i = 1; i < a.by_reason.size(); ++i)
-    if (a.by_reason[i] > 0) f->row("of these " + s.reasons[i], grouped(a.by_reason[i]));
+    if (a.by_reason[i] > 0) f->row("reason " + s.reasons[i], grouped(a.by_reason[i]));
   if (a.interval_s > 0) f->row("frame interval", fmt::format("{:.1f} ms", a.interval_s * 1e3));
 }
 
 void error_group(const Analysis& a, Figures* f) {
   f->group(a.source == ErrorSource::ins ? "Against the INS" : "Against the reference");
   f->row("drift, " + a.drift_sentence, times(a.drift, 100), "{:.2f} %");
-  f->row("horizontal error, rms", a.horizontal.rms, "{:.2f} m");
-  f->row("horizontal error, largest", a.horizontal.max, "{:.2f} m");
-  f->row("vertical error, rms", a.vertical.rms, "{:.2f} m");
+  f->row("horizontal error, rms", metres(a.horizontal.rms));
+  f->row("horizontal error, largest", metres(a.horizontal.max));
+  f->row("vertical error, rms", metres(a.vertical.rms));
   f->row("heading error, rms", a.heading.rms, "{:.2f}°");
   f->row("heading error, largest", a.heading.max, "{:.2f}°");
   f->row("rotation error", a.rotation_deg_per_m, "{:.4f} °/m");
-  f->row("whole path laid on it, rms (ATE)", a.ate_m, "{:.2f} m");
+  if (a.ate_m) f->row("whole path laid on it, rms (ATE)", metres(*a.ate_m));
   f->row("error at the end", times(a.end_error, 100), "{:.2f} % of the way");
   f->row("scale (reference over ours)", a.scale, "{:.4f}");
 }
@@ -188,6 +188,8 @@ std::string grouped(std::size_t count) {
   return text;
 }
 
+std::string metres(double value) { return fmt::format("{:.{}f} m", value, value < 0.0995 ? 3 : 2); }
+
 std::string figures_table(const Session& session, const Analysis& analysis, const TimingPicture& timing) {
   Figures f;
   f.group("Drive");
@@ -206,7 +208,7 @@ std::string figures_table(const Session& session, const Analysis& analysis, cons
 
 std::string calibrations_table(const Session& session) {
   constexpr std::size_t kMost = 60;
-  std::string out = "<table><tr><th>time</th><th>outcome</th><th>from</th><th>why</th></tr>\n";
+  std::string out = "<table class=\"stack\"><tr><th>time</th><th>outcome</th><th>from</th><th>why</th></tr>\n";
   const std::size_t n = session.calibrations.size();
   if (n > kMost) out += fmt::format("<tr><td colspan=\"4\">{} earlier ones are in calibrations.csv</td></tr>", grouped(n - kMost));
   for (std::size_t i = n > kMost ? n - kMost : 0; i < n; ++i) {
@@ -221,7 +223,7 @@ std::string calibrations_table(const Session& session) {
 std::string events_table(const Session& session) {
   constexpr std::size_t kEachEnd = 80;
   const std::vector<EventRun> runs = condensed(session.events);
-  std::string out = "<table><tr><th>time</th><th>kind</th><th>what</th></tr>\n";
+  std::string out = "<table class=\"stack\"><tr><th>time</th><th>kind</th><th>what</th></tr>\n";
   for (std::size_t i = 0; i < runs.size(); ++i) {
     const bool many = runs.size() > 2 * kEachEnd;
     if (many && i == kEachEnd) {

@@ -17,6 +17,9 @@ namespace vergence::app::report {
 /// Events in their order, successive ones of one kind and sentence as one row with a count; of very many the first and the last.
 [[nodiscard]] std::string events_table(const Session& session);
 
+/// `0.004 m`, `54.34 m`: millimetres below a decimetre.
+[[nodiscard]] std::string metres(double value);
+
 /// 12 400 with a thin space between thousands.
 [[nodiscard]] std::string grouped(std::size_t count);
 
