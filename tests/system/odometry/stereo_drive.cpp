@@ -60,10 +60,8 @@ std::string wrong_ok(const std::vector<Answer>& answers, const OkBound& bound) {
   const Answer* previous = nullptr;
   double way = 0;
   for (const Answer& a : answers) {
-    if (a.sample.status != PoseStatus::ok) {
-      first = nullptr;
-      continue;
-    }
+    if (a.restarted) first = nullptr;
+    if (a.sample.status != PoseStatus::ok) continue;
     if (first == nullptr) {
       first = previous = &a;
       way = 0;

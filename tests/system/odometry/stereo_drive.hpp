@@ -58,7 +58,7 @@ struct MotionError {
 };
 [[nodiscard]] MotionError motion_error(const Answer& from, const Answer& to);
 
-/// How far a pose called `ok` may be from the truth, relative to the first `ok` pose of its unbroken run.
+/// How far a pose called `ok` may be from the truth, relative to the first `ok` pose since the drive's start or the last marked restart.
 struct OkBound {
   double translation = 0.05;  // m
   double per_metre = 0.015;   // m of the way driven since
