@@ -40,8 +40,9 @@ struct Analysis {
   std::optional<double> ok_share;  // of the frames read and skipped; nothing: status is not known
   double path_m = 0;
 
-  std::optional<double> drift;  // ratio: mean translation error of segments over their length
-  std::string drift_sentence;   // which segments
+  std::optional<double> drift;          // ratio: mean translation error of segments over their length
+  std::string drift_sentence;           // which segments
+  std::optional<double> segment_error;  // KITTI's, as in summary.json, where `drift` is another
   std::optional<double> scale, ate_m, rotation_deg_per_m, end_error;
 };
 

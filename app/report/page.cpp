@@ -93,6 +93,7 @@ std::string map_section(const Session& s, const Analysis& a) {
   if (theirs) legend += fmt::format("<span><i class=\"key k-theirs\"></i>{}</span>", a.map_is_enu ? "INS" : "reference");
   if (a.degraded > 0) legend += "<span><i class=\"key k-care\"></i>ours, degraded</span>";
   if (a.lost > 0) legend += "<span>× no pose from here</span>";
+  if (a.map_is_enu) legend += "<br/>Ours begins where the drive was placed on the earth.";
   return section("tall", "Map", map + legend + "</p>");
 }
 

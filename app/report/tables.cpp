@@ -56,6 +56,7 @@ void frames_group(const Session& s, const Analysis& a, Figures* f) {
 void error_group(const Analysis& a, Figures* f) {
   f->group(a.source == ErrorSource::ins ? "Against the INS" : "Against the reference");
   f->row("drift, " + a.drift_sentence, times(a.drift, 100), "{:.2f} %");
+  f->row("KITTI segment error, with the INS's attitude", times(a.segment_error, 100), "{:.2f} %");
   f->row("horizontal error, rms", metres(a.horizontal.rms));
   f->row("horizontal error, largest", metres(a.horizontal.max));
   f->row("vertical error, rms", metres(a.vertical.rms));
