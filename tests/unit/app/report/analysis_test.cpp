@@ -132,6 +132,25 @@ TEST(Analysis, errorsToTheInsAreThoseOfTheFile) {
   EXPECT_EQ(a.theirs_x[7], 4);
 }
 
+TEST(Analysis, driftAgainstTheInsIsByPositionsWhateverItsAttitudeAndThePlacementSay) {
+  Session s = bent_drive(600);
+  Mat3 up;
+  up << 0, 0, 1, -1, 0, 0, 0, -1, 0;  // camera axes that look east, in enu
+  for (Frame& f : s.frames) {
+    const Vec3 p = exp_so3({0, 0, 0.4}) * up * f.T_world_left.t;
+    f.placed = f.has_ins = f.compared = true;
+    f.ins = {p.x(), p.y(), p.z()};
+    f.enu = {0.9 * p.x(), p.y(), p.z()};  // a bad placement: its errors are large
+    f.error = {-0.1 * p.x(), 0, 0};
+  }
+  EXPECT_LT(analyse(s).drift.value(), 1e-9);
+  for (Frame& f : s.frames) f.T_world_left.t *= 1.02;  // two per cent too long
+  const Analysis a = analyse(s);
+  EXPECT_NE(a.drift_sentence.find("300 m"), std::string::npos);
+  // 300 m of ours are an arc of 300/102 rad on a circle of 102 m; the ways differ by 2 m of radius over its chord.
+  EXPECT_NEAR(a.drift.value(), 2 * 2 * std::sin(150.0 / 102) / 300, 2e-4);
+}
+
 TEST(Analysis, anInsThatNeverGaveAPlacementGivesNoErrors) {
   Session s = bent_drive(10);
   for (Frame& f : s.frames) f.has_ins = true, f.ins = {1, 2, 3};
