@@ -4,11 +4,13 @@
 #include <time.h>
 
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <condition_variable>
 #include <cstdio>
 #include <memory>
 #include <mutex>
+#include <numbers>
 #include <stdexcept>
 #include <string_view>
 #include <thread>
@@ -61,6 +63,7 @@ class Drive {
   void drain_comparison() noexcept;
   void note_placement(Stamp stamp) noexcept;
   void note_ins(const ComparedPose& pose) noexcept;
+  void note_jump(Stamp stamp) noexcept;
   void note_faults(Stamp stamp) noexcept;
   void tell_event(Stamp stamp, const char* kind, std::string_view sentence, bool aloud) noexcept;
   void watch(const SignalGuard& signals, Progress* progress);
@@ -90,7 +93,7 @@ class Drive {
 
   // Of the estimator's thread; read by others after it has joined.
   Glimpse glimpse_;
-  std::uint64_t dropped_ = 0, ins_matches_ = 0;
+  std::uint64_t dropped_ = 0, ins_matches_ = 0, jumps_ = 0;
   Vec3 last_position_ = Vec3::Zero();
   bool posed_ = false;
   std::uint32_t placement_revision_ = 0;
@@ -143,6 +146,7 @@ void Drive::estimate() noexcept {
         break;
       case LiveItem::Kind::reading:
         comparison_->add(item.sample);
+        note_jump(item.stamp);
         break;
       case LiveItem::Kind::device_gone:
       case LiveItem::Kind::device_back: {
@@ -222,7 +226,7 @@ void Drive::note_ins(const ComparedPose& pose) noexcept {
   constexpr std::uint64_t kSettled = 3;  // poses: one missed reading is no event
   match_run_ = pose.ins == last_match_ ? match_run_ + 1 : 1;
   last_match_ = pose.ins;
-  if (match_run_ != kSettled && !(pose.ins == InsMatch::jump && match_run_ == 1)) return;
+  if (match_run_ != kSettled) return;
   switch (pose.ins) {
     case InsMatch::ok:
       if (ins_matches_ > kSettled) tell_event(pose.pose.stamp, "ins_ok", "the INS has a position again; the comparison goes on", false);
@@ -236,11 +240,16 @@ void Drive::note_ins(const ComparedPose& pose) noexcept {
     case InsMatch::no_fix:
       tell_event(pose.pose.stamp, "ins_no_fix", "the INS has no position: the comparison pauses; check its antenna", true);
       break;
-    case InsMatch::jump:
-      tell_event(pose.pose.stamp, "ins_jump", "the INS's position leapt: not interpolated across, errors from here on contain the leap",
-                 true);
+    case InsMatch::jump:  // told with the reading: it may fall between two frames
       break;
   }
+}
+
+void Drive::note_jump(Stamp stamp) noexcept {
+  const std::uint64_t jumps = comparison_->counters().jumps;
+  if (jumps == jumps_) return;
+  jumps_ = jumps;
+  tell_event(stamp, "ins_jump", "the INS's position leapt: not interpolated across, errors from here on contain the leap", true);
 }
 
 void Drive::note_faults(Stamp stamp) noexcept {

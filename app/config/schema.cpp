@@ -109,8 +109,8 @@ Group cameras() {
                     .text("driver", &C::driver, 16, "What talks to it: `mock`. Empty: there is no such camera.")
                     .text("name", &C::name, 32, "How it is called in messages and in calibration.yaml.")
                     .text("serial", &C::serial, 64, "Which one, where there are several; empty: the next one.")
-                    .integer("size.0", &C::width, 64, 4096, "px", "Width of the image.")
-                    .integer("size.1", &C::height, 48, 4096, "px", "Height of the image.")
+                    .integer("size.0", &C::width, 64, 4096, "px", "Width of the image in pixels.")
+                    .integer("size.1", &C::height, 48, 4096, "px", "Height of the image in pixels.")
                     .number("exposure_us", &C::exposure_us, 10, 1e6, "µs", "Time of an exposure; 8000 is daylight in the mock's world.")
                     .number("gain_db", &C::gain_db, 0, 40, "dB", "Gain of the sensor's amplifier.")
                     .done();
@@ -127,7 +127,7 @@ Group ins() {
   return Rows<I>(
              "ins", "The inertial navigation system that the pose is compared with.", [](auto& c) -> auto& { return c.ins; })
       .text("driver", &I::driver, 16, "What talks to it: `mock`, or `none`.")
-      .number("rate", &I::rate, 1, 400, "Hz", "Readings a second.")
+      .number("rate", &I::rate, 1, 400, "Hz", "Readings of the INS a second.")
       .numbers("lever_arm_m", &I::lever_arm_m, -100, 100, "m",
                {"Where the left camera sits in the INS's body: forward.", "The same place, to the left.", "The same place, upwards."})
       .numbers("boresight_deg", &I::boresight_deg, -180, 180, "°",

@@ -2,7 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <fstream>
 #include <numbers>
+#include <sstream>
 #include <stdexcept>
 #include <string>
 
@@ -41,6 +43,15 @@ TEST(Faults, everyKindStandsInTheTableAtItsPlaceAndTakesItsOwnParametersAtBothEn
       EXPECT_THROW((void)make_fault(row.name, 0, {{p.name, p.least - 1}}), std::invalid_argument) << row.name << p.name;
     }
   }
+}
+
+TEST(Faults, thePageHasTheTable) {
+  std::ifstream in(std::string(VERGENCE_SOURCE_DIR) + "/docs/mock.md", std::ios::binary);
+  std::ostringstream page;
+  page << in.rdbuf();
+  EXPECT_NE(page.str().find("-->\n" + fault_document() + "<!--"), std::string::npos)
+      << "the table between the comments of docs/mock.md is not this one:\n"
+      << fault_document();
 }
 
 TEST(Faults, nonsenseIsNamed) {

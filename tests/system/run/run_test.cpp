@@ -1,0 +1,200 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstdint>
+#include <filesystem>
+#include <fstream>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include <nlohmann/json.hpp>
+
+#include "app/datasets/trajectory_files.hpp"
+#include "tests/support/temporary_folder.hpp"
+#include "tests/unit/app/commands/run_vergence.hpp"
+
+namespace vergence {
+namespace {
+
+using test::Outcome;
+using test::run_vergence;
+using test::TemporaryFolder;
+
+const std::string kMock = std::string(VERGENCE_SOURCE_DIR) + "/app/config/mock.yaml";
+// A quarter of the pixels: the same rig and drive in a quarter of the time.
+const std::string kSmall = " --set cameras.0.size=[320,240] --set cameras.1.size=[320,240] --set mock.texture_detail=0";
+
+Outcome drive(const std::filesystem::path& session, const std::string& more) {
+  return run_vergence("run '" + kMock + "' --fast --out '" + session.string() + "' " + more);
+}
+
+std::string text_of(const std::filesystem::path& file) {
+  std::ifstream in(file, std::ios::binary);
+  std::ostringstream all;
+  all << in.rdbuf();
+  return all.str();
+}
+
+nlohmann::json summary_of(const std::filesystem::path& session) { return nlohmann::json::parse(text_of(session / "summary.json")); }
+
+/// Sentences of the events of one kind.
+std::vector<std::string> events(const std::filesystem::path& session, const std::string& kind) {
+  std::istringstream in(text_of(session / "events.jsonl"));
+  std::vector<std::string> found;
+  for (std::string line; std::getline(in, line);) {
+    const auto event = nlohmann::json::parse(line);
+    if (event["kind"] == kind) found.push_back(event["sentence"]);
+  }
+  return found;
+}
+
+TEST(Run, aMockDrivePosesEveryFrameNearTheTruthWithoutAllocating) {
+  const TemporaryFolder folder;
+  const auto session = folder / "s";
+  const Outcome o = drive(session, "--duration 25");
+  ASSERT_EQ(o.code, 0) << o.err;
+  const auto summary = summary_of(session);
+  EXPECT_EQ(summary["frames"]["read"], 501);
+  EXPECT_EQ(summary["frames"]["posed"], 501);
+  EXPECT_EQ(summary["allocations_after_seal"], 0);
+  EXPECT_EQ(summary["devices"]["sets_complete"], 501);
+  EXPECT_EQ(summary["devices"]["sets_incomplete"], 0);
+  EXPECT_EQ(summary["comparison"]["without_ins"], 0);
+  EXPECT_EQ(summary["comparison"]["placements"], 1);
+  // The kilometre's aim is 0.4 % over 100 to 800 m; here only the shortest of those lengths exist, with less to average over.
+  EXPECT_LT(summary["truth"]["segment_error_percent"].get<double>(), 0.8);
+  EXPECT_LT(summary["truth"]["rotation_error_deg_per_m"].get<double>(), 0.004);
+  EXPECT_NEAR(summary["truth"]["path_ratio"].get<double>(), 1, 0.01);
+  // The INS wanders by metres: against it the path looks far worse, and the summary does not mix the two up.
+  EXPECT_GT(summary["metrics"]["ate_m"].get<double>(), summary["truth"]["ate_m"].get<double>());
+  for (const double e : summary["truth"]["calibration_error"]) EXPECT_EQ(e, 0) << "the estimator was given the true rig";
+  for (const char* name : {"trajectory.tum", "reference.tum", "truth.tum", "poses.csv", "events.jsonl", "calibration.yaml", "report.html"})
+    EXPECT_GT(std::filesystem::file_size(session / name), 0U) << name;
+}
+
+TEST(Run, theSameDriveGivesTheSameBytesWhateverTheThreads) {
+  const TemporaryFolder folder;
+  ASSERT_EQ(drive(folder / "a", "--duration 6 --threads 2 --quiet" + kSmall).code, 0);
+  ASSERT_EQ(drive(folder / "b", "--duration 6 --threads 1 --quiet" + kSmall).code, 0);
+  for (const char* name : {"trajectory.tum", "reference.tum", "truth.tum", "events.jsonl"})
+    EXPECT_EQ(text_of(folder / "a" / name), text_of(folder / "b" / name)) << name;
+}
+
+TEST(Run, withAnIdealInsTheReferenceIsTheTruthToAMillimetre) {
+  const TemporaryFolder folder;
+  const auto session = folder / "s";
+  const Outcome o = drive(session, "--duration 20 --set mock.ins=ideal --quiet" + kSmall);
+  ASSERT_EQ(o.code, 0) << o.err;
+  // The whole chain but the odometry: device clocks, tangent plane, interpolation, lever arm. `enu` of the reference begins at the first
+  // fix; its axes differ from the world's by the way there over the earth's radius.
+  const app::Trajectory reference = app::read_tum(session / "reference.tum"), truth = app::read_tum(session / "truth.tum");
+  ASSERT_GT(reference.size(), 390U);
+  ASSERT_LE(reference.size(), truth.size());
+  double worst_m = 0, worst_rad = 0;
+  const Transform& T0 = truth[100].T_world_body;
+  const Transform& R0 = reference[100].T_world_body;
+  for (std::size_t i = 100; i < reference.size(); ++i) {  // the clocks are known after five seconds
+    ASSERT_LT(std::abs((reference[i].stamp - truth[i].stamp).to_seconds()), 1e-4);
+    const Transform step = T0.inverse() * truth[i].T_world_body, ours = R0.inverse() * reference[i].T_world_body;
+    worst_m = std::max(worst_m, (step.t - ours.t).norm());
+    worst_rad = std::max(worst_rad, log_so3(step.R.transpose() * ours.R).norm());
+  }
+  // A stamp that is off by the clocks' 20 µs is 0.24 mm at 12 m/s, one of the INS's as much; straight lines between readings add 0.03 mm.
+  EXPECT_LT(worst_m, 1e-3);
+  EXPECT_LT(worst_rad, 0.001 * 3.14159265 / 180 * 2) << "twice a thousandth of a degree: the chosen start errs, too";
+}
+
+TEST(Run, faultsActAndTheDriveGoesOn) {
+  const TemporaryFolder folder;
+  const auto session = folder / "s";
+  const Outcome o =
+      drive(session, "--duration 12" + kSmall +
+                         " --fault 'camera_gone@6 camera=1 duration_s=1' --fault 'lose_frames@8 camera=0 share=0.2 duration_s=2'"
+                         " --fault 'time_jump@11 camera=0 jump_s=5'");
+  ASSERT_EQ(o.code, 0) << o.err;
+  const auto summary = summary_of(session);
+  EXPECT_EQ(events(session, "camera_gone").size(), 1U);
+  EXPECT_EQ(events(session, "camera_back").size(), 1U);
+  EXPECT_EQ(events(session, "fault").size(), 3U);
+  EXPECT_GE(summary["devices"]["camera1_absent"].get<int>(), 18);
+  EXPECT_EQ(summary["devices"]["camera1_starts"], 2);
+  EXPECT_GT(summary["devices"]["camera0_unpaired"].get<int>(), 2);
+  EXPECT_EQ(summary["devices"]["clock_resets"], 1);
+  EXPECT_EQ(summary["allocations_after_seal"], 0);
+  EXPECT_NE(o.err.find("camera 1 is gone"), std::string::npos) << o.err;
+}
+
+TEST(Run, aCameraThatNeverComesBackIsADeviceThatFailed) {
+  const TemporaryFolder folder;
+  const Outcome o = drive(folder / "s", "--duration 4 --fault 'camera_gone@2 camera=1 duration_s=0'" + kSmall);
+  EXPECT_EQ(o.code, 3) << o.err;
+  EXPECT_NE(o.err.find("camera 1 was gone at the end"), std::string::npos) << o.err;
+  EXPECT_EQ(summary_of(folder / "s")["frames"]["read"], 81) << "the drive went on with the other";
+}
+
+TEST(Run, aKnockIsSeenInTheTruthOnly) {
+  const TemporaryFolder folder;
+  const Outcome o = drive(folder / "s", "--duration 4 --fault 'knock@2 camera=1 pitch_deg=0.2'" + kSmall);
+  ASSERT_EQ(o.code, 0) << o.err;
+  const auto summary = summary_of(folder / "s");
+  EXPECT_NEAR(summary["truth"]["calibration_error"][0].get<double>(), -0.2 * 3.14159265 / 180, 1e-6);
+  EXPECT_EQ(summary["calibration"]["T_right_left"][0], 1.0);
+}
+
+struct InsCase {
+  const char* fault;
+  const char* event;
+  int code;
+};
+class RunWithABadIns : public ::testing::TestWithParam<InsCase> {};
+
+TEST_P(RunWithABadIns, saysSoAndDrivesOn) {
+  const TemporaryFolder folder;
+  const auto session = folder / "s";
+  const Outcome o = drive(session, std::string("--duration 9 --fault '") + GetParam().fault + "'" + kSmall);
+  EXPECT_EQ(o.code, GetParam().code) << o.err;
+  EXPECT_GE(events(session, GetParam().event).size(), 1U) << text_of(session / "events.jsonl");
+  EXPECT_NE(o.err.find("INS"), std::string::npos) << o.err;
+  const auto summary = summary_of(session);
+  EXPECT_EQ(summary["frames"]["posed"], 181);
+  EXPECT_EQ(summary["allocations_after_seal"], 0);
+}
+
+INSTANTIATE_TEST_SUITE_P(Ways, RunWithABadIns,
+                         ::testing::Values(InsCase{"ins_gone@0 duration_s=4", "ins_silent", 0},   // starts late
+                                           InsCase{"ins_gone@5 duration_s=0", "ins_silent", 0},   // stops
+                                           InsCase{"ins_gone@0 duration_s=0", "ins_silent", 1},   // never speaks
+                                           InsCase{"position_jump@5 east_m=100", "ins_jump", 0},  //
+                                           InsCase{"no_fix@4 duration_s=2", "ins_no_fix", 0},     //
+                                           InsCase{"no_fix@0 duration_s=0", "ins_no_fix", 1}));
+
+struct BadCase {
+  const char* arguments;
+  const char* says;
+};
+class RunRefuses : public ::testing::TestWithParam<BadCase> {};
+
+TEST_P(RunRefuses, whatIsImpossibleWithASentenceAndExitsTwo) {
+  const TemporaryFolder folder;
+  const Outcome o = drive(folder / "s", GetParam().arguments);
+  EXPECT_EQ(o.code, 2) << o.err;
+  EXPECT_NE(o.err.find(GetParam().says), std::string::npos) << o.err;
+  EXPECT_FALSE(std::filesystem::exists(folder / "s")) << "nothing is begun";
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Ways, RunRefuses,
+    ::testing::Values(BadCase{"--set trigger.rate=0", "trigger.rate is 0"}, BadCase{"--set ins.rate=0", "ins.rate is 0"},
+                      BadCase{"--set cameras.1.size=[800,600]", "all cameras of a rig have one size"},
+                      BadCase{"--set cameras.0.exposure_us=60000", "longer than the 50000 µs between two pulses"},
+                      BadCase{"--set cameras.0.driver=gige", "cameras.0.driver is \"gige\""},
+                      BadCase{"--set cameras.1.driver=", "one camera alone has no scale"},
+                      BadCase{"--set sync.mode=board", "sync.mode is \"board\""}, BadCase{"--set mock.drive=lop", "did you mean \"loop\"?"},
+                      BadCase{"--set rig.nominal.focal_px=3", "rig.nominal"}, BadCase{"--fault knok@3", "there is no fault \"knok\""},
+                      BadCase{"--fault 'cover@1 camera=3'", "there is no camera 3"},
+                      BadCase{"--set 'faults.0=drift@x'", "faults.0: the time of drift is \"x\""},
+                      BadCase{"--duration=-1", "--duration needs seconds"}, BadCase{"--from-scratch", "--from-scratch is not there yet"}));
+
+}  // namespace
+}  // namespace vergence
