@@ -86,7 +86,7 @@ ImageCheck FrontEnd::begin(const RigFrame& frame) noexcept {
     const ImageView& coarsest = pyramids_[i].level(pyramids_[i].levels() - 1);
     const Fingerprint f = fingerprint(coarsest);
     structured[i] = shows_something(f, coarsest);
-    repeated[i] = f == fingerprints_[i];
+    repeated[i] = structured[i] && f == fingerprints_[i];
     fingerprints_[i] = f;
   };
   auto left = [&]() noexcept { build(0); };
@@ -98,6 +98,11 @@ ImageCheck FrontEnd::begin(const RigFrame& frame) noexcept {
   for (int k = 0; k < cameras_; ++k) {
     const auto i = static_cast<std::size_t>(k);
     if (!frame.images[i].empty()) check.given = static_cast<std::uint8_t>(check.given | (1U << static_cast<unsigned>(k)));
+    // The left image once more on another line is as impossible as the last one once more.
+    if (k > 0 && structured[i] && fingerprints_[i] == fingerprints_[0]) {
+      repeated[i] = true;
+      structured[i] = false;
+    }
     if (repeated[i]) check.repeated = true;
     if (structured[i]) check.structured = static_cast<std::uint8_t>(check.structured | (1U << static_cast<unsigned>(k)));
   }

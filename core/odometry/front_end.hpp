@@ -18,7 +18,7 @@ namespace vergence::odometry {
 struct ImageCheck {
   std::uint8_t given = 0;       // bit k: camera k delivered an image
   std::uint8_t structured = 0;  // bit k: and it shows something
-  bool repeated = false;        // some camera gave the image of the frame before once more: sensor noise makes that impossible
+  bool repeated = false;        // a camera gave its last image or the left one's once more: noise makes that impossible
 };
 
 /// How the search across went for the corners of one frame.

@@ -11,6 +11,7 @@ constexpr int kSample = 100;                // points followed from far away: en
 constexpr int kSampleInliers = 12;          // of the sample, below which the prediction was wrong
 constexpr double kSampleShare = 0.3;        // and of those found, which must agree
 constexpr int kRelocaliseInliers = 15;      // that agree on one pose: by chance of rough matches 8 do
+constexpr double kRecognisedShare = 0.5;    // of the points in view that must be found again where the way to a place was not followed
 constexpr std::uint8_t kMissesAllowed = 2;  // frames a point may be hidden
 constexpr std::uint16_t kFoundEnough = 2;   // rig frames, so four images, before a point holds a pose
 constexpr double kOutlier = 9.21;           // squared sigmas, two coordinates at 99 %
@@ -19,7 +20,9 @@ constexpr int kNearEnough = 10;             // near points that keep the scale
 constexpr int kCameraHolds = 8;             // inliers for a camera to count as one that supports the pose
 constexpr double kRigidShare = 0.4;         // of the points found that must agree: below it something else moves
 constexpr double kAcrossShare = 0.5;        // of the points found in two cameras, in which both must agree with the pose
-constexpr int kRestartedFrames = 10;        // frames marked after the scene was built anew
+constexpr double kConfirmedShare =
+    0.3;  // of points and new corners together: 0.44 to 0.65 on a rig that fits, 0.12 to 0.2 a frame out of step
+constexpr int kRestartedFrames = 10;  // frames marked after the scene was built anew
 constexpr int kFramesLostBeforeRestart = 3;
 constexpr double kLongestExtrapolation = 2.0;  // s: a vehicle's speed says nothing about later
 constexpr double kCertainShare = 0.6;          // near matches of the corners above which nobody asks whether the cameras are exchanged
@@ -151,17 +154,34 @@ Odometry::PoseFit Odometry::track(const Transform& predicted, std::uint8_t struc
     clock.mark(Stage::pose);
     if (fit.inliers >= kSampleInliers && fit.inliers > kSampleShare * fit.given) break;
   }
+  bool doubtful = frames_lost_ > 0 || out->gap_s > 0;
   if (fit.inliers < kSampleInliers || fit.inliers <= kSampleShare * fit.given) {
     fit = relocalise(out);
     if (!fit.found) return fit;
+    doubtful = true;
   }
   const Transform coarse = fit.T_left_world;
   front_end_.follow_all(map_, coarse);
   clock.mark(Stage::track);
   fit = fit_pose(coarse, false);
   if (!fit.found || fit.inliers < kRigidShare * fit.given) fit = fit_pose(coarse, true);
+  // One facade looks like the next: a place is believed again only if most of what should be seen from there is.
+  if (doubtful && fit.inliers < kRecognisedShare * points_in_view(fit.T_left_world)) fit.found = false;
   clock.mark(Stage::pose);
   return fit;
+}
+
+int Odometry::points_in_view(const Transform& T_left_world) const noexcept {
+  constexpr double kBorder = 12.0;  // px: nearer to the edge a patch does not fit
+  int n = 0;
+  for (const MapPoint& p : map_.points()) {
+    Vec2 pixel;
+    const Camera& camera = front_end_.lens(0).raw();
+    if (p.stage == PointStage::active && camera.project(T_left_world * p.p_world, &pixel, nullptr) == ProjectStatus::ok &&
+        camera.inside(pixel, kBorder))
+      ++n;
+  }
+  return n;
 }
 
 Odometry::PoseFit Odometry::relocalise(FrameOutcome* out) noexcept {
@@ -230,7 +250,7 @@ bool Odometry::wants_keyframe() const noexcept {
   return *middle > options_.keyframe_parallax * rig_.intrinsics[0].fx;
 }
 
-void Odometry::make_keyframe(Stamp stamp, FrameOutcome* out) noexcept {
+void Odometry::make_keyframe(const PoseFit& fit, Stamp stamp, FrameOutcome* out) noexcept {
   StageClock clock(out);
   const std::size_t slot = map_.make_keyframe(T_left_world_, stamp);
   for (MapPoint& p : map_.points())
@@ -238,7 +258,9 @@ void Odometry::make_keyframe(Stamp stamp, FrameOutcome* out) noexcept {
   (void)window_.adjust(map_);
   T_left_world_ = map_.keyframe(slot).T_left_world;
   clock.mark(Stage::window);
-  (void)front_end_.add_points(map_, T_left_world_, PointStage::candidate);
+  const AcrossCount across = front_end_.add_points(map_, T_left_world_, PointStage::candidate);
+  // Of all that the left image offers, how much the other cameras confirm.
+  across_fails_ = across.matched + fit.stereo < kConfirmedShare * (across.corners + fit.inliers);
   keyframe_points_ = 0;
   for (MapPoint& p : map_.points()) {
     if (!p.followed()) continue;
@@ -263,6 +285,7 @@ bool Odometry::start_scene(const Transform& T_left_world, Stamp stamp, FrameOutc
   else if (across.matched < kStartMatches || across.matched < kStartShare * across.corners || across.near < kNearEnough)
     out->reason = Reason::no_stereo_matches;
   else {
+    across_fails_ = false;
     const std::size_t slot = map_.make_keyframe(T_left_world, stamp);
     keyframe_points_ = 0;
     for (MapPoint& p : map_.points()) {
@@ -282,11 +305,15 @@ bool Odometry::start_scene(const Transform& T_left_world, Stamp stamp, FrameOutc
   return false;
 }
 
+bool Odometry::confirmed_across(const PoseFit& fit) noexcept {
+  return std::popcount(fit.cameras) >= 2 && fit.stereo >= kAcrossShare * fit.across;
+}
+
 Reason Odometry::weakness(const ImageCheck& images) const noexcept {
   const auto all = static_cast<std::uint8_t>((1U << static_cast<unsigned>(rig_.cameras)) - 1U);
   if (images.given != all) return Reason::no_image;
-  if (images.structured != all) return Reason::image_dark;
-  return images.repeated ? Reason::image_repeated : Reason::none;
+  if (images.repeated) return Reason::image_repeated;
+  return images.structured != all ? Reason::image_dark : Reason::none;
 }
 
 void Odometry::judge(const PoseFit& fit, const ImageCheck& images, FrameOutcome* out) const noexcept {
@@ -300,7 +327,7 @@ void Odometry::judge(const PoseFit& fit, const ImageCheck& images, FrameOutcome*
     out->reason = Reason::time_gap;
   else if (std::popcount(fit.cameras) < 2)
     out->reason = Reason::one_camera;
-  else if (fit.stereo < kAcrossShare * fit.across)
+  else if (across_fails_ || !confirmed_across(fit))
     out->reason = Reason::no_stereo_matches;
   else if (fit.inliers < options_.ok_inliers)
     out->reason = Reason::few_inliers;
@@ -359,7 +386,7 @@ FrameOutcome Odometry::process(const RigFrame& frame) noexcept {
     out.T_left_world = T_left_world_;
   else
     remember(fit.T_left_world, frame.stamp);
-  if (!images.repeated && wants_keyframe()) make_keyframe(frame.stamp, &out);
+  if (confirmed_across(fit) && !images.repeated && wants_keyframe()) make_keyframe(fit, frame.stamp, &out);
   out.T_left_world = T_left_world_;
   judge(fit, images, &out);
   if (restart_cooldown_ > 0) --restart_cooldown_;

@@ -51,13 +51,16 @@ class Odometry {
 
   [[nodiscard]] Transform predict(double dt_s) const noexcept;
   [[nodiscard]] PoseFit track(const Transform& predicted, std::uint8_t structured, FrameOutcome* out) noexcept;
+  [[nodiscard]] int points_in_view(const Transform& T_left_world) const noexcept;
   [[nodiscard]] PoseFit relocalise(FrameOutcome* out) noexcept;
   [[nodiscard]] PoseFit fit_pose(const Transform& start, bool sample) noexcept;
   void collect() noexcept;
   void settle_points(const PoseFit& fit) noexcept;
   [[nodiscard]] bool wants_keyframe() const noexcept;
-  void make_keyframe(Stamp stamp, FrameOutcome* out) noexcept;
+  void make_keyframe(const PoseFit& fit, Stamp stamp, FrameOutcome* out) noexcept;
   [[nodiscard]] bool start_scene(const Transform& T_left_world, Stamp stamp, FrameOutcome* out) noexcept;
+  /// The cameras agree about the scene: only then does a frame shape the map.
+  [[nodiscard]] static bool confirmed_across(const PoseFit& fit) noexcept;
   /// What is wrong with the images themselves, `none` if nothing.
   [[nodiscard]] Reason weakness(const ImageCheck& images) const noexcept;
   void judge(const PoseFit& fit, const ImageCheck& images, FrameOutcome* out) const noexcept;
@@ -79,9 +82,10 @@ class Odometry {
   Vec3 shift_per_s_ = Vec3::Zero();
   Stamp stamp_{};
   bool any_pose_ = false;
-  int frames_lost_ = 0;       // in a row, with images that show something
-  int restart_cooldown_ = 0;  // frames still marked after a restart
-  int keyframe_points_ = 0;   // active points when the last keyframe was made
+  int frames_lost_ = 0;        // in a row, with images that show something
+  bool across_fails_ = false;  // at the last keyframe the other cameras confirmed hardly anything
+  int restart_cooldown_ = 0;   // frames still marked after a restart
+  int keyframe_points_ = 0;    // active points when the last keyframe was made
 };
 
 }  // namespace vergence::odometry
