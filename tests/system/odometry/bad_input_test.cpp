@@ -190,6 +190,21 @@ TEST(OdometryInBadConditions, stampsThatGoBackAreLostAndDisturbNothing) {
   EXPECT_EQ(count_ok(r.answers, kFirst + 2, drive().size()), static_cast<int>(drive().size() - kFirst - 2)) << story(r.answers);
 }
 
+TEST(OdometryInBadConditions, aLongGapIsNowhereTakenForAPlaceThatLooksTheSame) {
+  for (const std::size_t from : {std::size_t{40}, std::size_t{70}, std::size_t{110}, std::size_t{150}}) {
+    const Replay r = replay(drive(), leave_out(from, from + 40));
+    EXPECT_EQ(wrong_ok(r.answers, {}), "") << "gap from frame " << from << '\n' << story(r.answers);
+  }
+}
+
+TEST(OdometryInBadConditions, exchangedCamerasLeaveNoTraceWhenTheyArePutBack) {
+  for (const std::size_t from : {std::size_t{40}, std::size_t{70}, std::size_t{110}}) {
+    const Replay r = replay(drive(), swap_cameras(from, from + 40));
+    EXPECT_EQ(count_ok(r.answers, from, from + 40), 0) << story(r.answers);
+    EXPECT_EQ(wrong_ok(r.answers, {}), "") << "exchanged from frame " << from << '\n' << story(r.answers);
+  }
+}
+
 TEST(OdometryInBadConditions, withTwoThreadsTheyAreTheSameBitForBit) {
   for (const Edit& edit : {cover(drive(), Cover::right, kFirst, kLast), swap_cameras(kFirst, kLast), leave_out(kFirst, kFirst + 40)}) {
     const Replay one = replay(drive(), edit, 1), two = replay(drive(), edit, 2);
