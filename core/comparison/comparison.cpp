@@ -95,7 +95,11 @@ void Comparison::add(const InsSample& sample) noexcept {
       const Reading& before = reading(end_ - 1);
       const double farthest = options_.jump_m + kFastest * (r.stamp - before.stamp).to_seconds();
       r.jumped = (r.p_enu_ins - before.p_enu_ins).norm() > farthest;
-      if (r.jumped) ++counters_.jumps;
+      if (r.jumped) {
+        ++counters_.jumps;
+        leapt_ = true;
+        leapt_at_ = r.stamp;
+      }
     }
   }
   if (end_ - begin_ == readings_.size()) ++begin_;
@@ -223,7 +227,12 @@ bool Comparison::next(ComparedPose* out) noexcept {
   c.ins = reference_at(pose.stamp, &c, &sigmas);
   c.ins_valid = c.ins == InsMatch::ok;
   if (!c.ins_valid) ++counters_.without_ins;
-  if (c.ins == InsMatch::jump && collecting_) begin_collecting();  // what was before and what comes after do not fit together
+  // What was before a leap and what comes after do not fit together, also when no frame fell between the two readings.
+  if (leapt_ && pose.stamp >= leapt_at_) {
+    leapt_ = false;
+    has_anchor_ = false;
+    if (collecting_) begin_collecting();
+  }
 
   const bool posed = pose.status != PoseStatus::lost && pose.T_world_left.finite();
   const bool restarted = pose.reason == Reason::scene_restarted;

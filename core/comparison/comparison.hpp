@@ -166,6 +166,8 @@ class Comparison {
 
   BoundedVector<PlacementPair> pairs_;
   bool collecting_ = true;
+  bool leapt_ = false;  // the INS has, at leapt_at_, and no pose after it has been looked at
+  Stamp leapt_at_{};
   bool restarted_ = false;  // the newest pose was of a restarted scene
   bool has_last_ = false;   // of a pose with a fix, for the distance driven
   Vec3 last_world_ = Vec3::Zero();

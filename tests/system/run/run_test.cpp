@@ -73,6 +73,32 @@ TEST(Run, aMockDrivePosesEveryFrameNearTheTruthWithoutAllocating) {
     EXPECT_GT(std::filesystem::file_size(session / name), 0U) << name;
 }
 
+TEST(Run, everyConfigurationThatComesWithTheProgramRunsAsItStands) {
+  int files = 0;
+  for (const auto& entry : std::filesystem::directory_iterator(std::string(VERGENCE_SOURCE_DIR) + "/app/config")) {
+    if (entry.path().extension() != ".yaml") continue;
+    ++files;
+    const TemporaryFolder folder;
+    const Outcome o = run_vergence("run '" + entry.path().string() + "' --fast --duration 2 --out '" + (folder / "s").string() + "'");
+    EXPECT_EQ(o.code, 0) << entry.path() << ": " << o.err;
+  }
+  EXPECT_GE(files, 1);
+}
+
+TEST(Run, inRealTimeEveryFrameIsPosedOrCounted) {
+  const TemporaryFolder folder;
+  const auto session = folder / "s";
+  const Outcome o = run_vergence("run '" + kMock + "' --duration 4 --out '" + session.string() + "'" + kSmall);
+  ASSERT_EQ(o.code, 0) << o.err;
+  const auto summary = summary_of(session);
+  const auto& devices = summary["devices"];
+  const int read = summary["frames"]["read"], overtaken = devices["sets_overtaken"];
+  EXPECT_EQ(read + overtaken, devices["sets_complete"].get<int>() + devices["sets_incomplete"].get<int>());
+  // How many a loaded machine drops is its own affair; that none vanishes uncounted is ours.
+  EXPECT_EQ(devices["camera0_delivered"].get<int>() + devices["camera0_lost"].get<int>() + devices["camera0_underruns"].get<int>(), 81);
+  EXPECT_EQ(summary["allocations_after_seal"], 0);
+}
+
 TEST(Run, theSameDriveGivesTheSameBytesWhateverTheThreads) {
   const TemporaryFolder folder;
   ASSERT_EQ(drive(folder / "a", "--duration 6 --threads 2 --quiet" + kSmall).code, 0);
