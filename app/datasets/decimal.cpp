@@ -6,8 +6,8 @@
 namespace vergence::app {
 namespace {
 
-constexpr int kDecimals = 9;         // of a second in nanoseconds
-constexpr int kMaxExponent = 100;    // of a number as written; beyond, it is 0 or no time of this universe
+constexpr int kDecimals = 9;          // of a second in nanoseconds
+constexpr int kMaxExponent = 100;     // of a number as written; beyond, it is 0 or no time of this universe
 constexpr std::size_t kMaxText = 64;  // longer is no number anybody wrote
 
 bool is_digit(char c) noexcept { return c >= '0' && c <= '9'; }
@@ -67,7 +67,8 @@ std::optional<std::int64_t> parse_seconds_ns(std::string_view text) noexcept {
     if (i >= d->count && ns == 0) break;  // only zeros follow zeros
     if (!append(&ns, i < d->count ? d->digit[i] - '0' : 0)) return std::nullopt;
   }
-  if (wanted >= 0 && wanted < d->count && d->digit[wanted] >= '5' && ns < static_cast<std::uint64_t>(std::numeric_limits<std::int64_t>::max()))
+  if (wanted >= 0 && wanted < d->count && d->digit[wanted] >= '5' &&
+      ns < static_cast<std::uint64_t>(std::numeric_limits<std::int64_t>::max()))
     ++ns;
   const auto value = static_cast<std::int64_t>(ns);
   return negative ? -value : value;
