@@ -165,7 +165,7 @@ std::vector<StampedPose> true_trajectory(const mock::MockRig& rig, const Configu
   for (std::uint64_t i = 0; i < n; ++i) {
     const Duration middle =
         Duration::seconds(static_cast<double>(i) / c.trigger.rate) + Duration::seconds(c.cameras[0].exposure_us * 0.5e-6);
-    poses.push_back({start + middle, rig.truth().T_enu_camera(0, middle)});
+    poses.push_back({start + middle, rig.truth().camera_in_enu(0, middle)});
   }
   return poses;
 }

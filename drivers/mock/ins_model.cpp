@@ -42,7 +42,7 @@ InsSample InsModel::sample(std::uint64_t number, Duration time) {
   s.attitude_valid = s.velocity_valid = true;
   s.fix = FixStatus::fix_3d;
   const BodyState body = truth_.drive().at(time);
-  Transform T_enu_ins = truth_.T_enu_ins(time);
+  Transform T_enu_ins = truth_.ins_in_enu(time);
   // The sensor is carried round by the body: v = v_body + R (ω × r).
   const Vec3 lever = body.T_enu_body.inverse() * T_enu_ins.t;
   Vec3 velocity = body.velocity + body.T_enu_body.R * body.angular_rate.cross(lever);

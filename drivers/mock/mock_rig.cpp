@@ -61,7 +61,7 @@ struct DeviceOscillator {
 };
 
 DeviceOscillator oscillator(std::uint64_t seed, int owner, double drift_ppm) noexcept {
-  Random random(mixed(seed, static_cast<std::uint64_t>(owner + 10)));
+  Random random(mixed(seed, static_cast<std::uint64_t>(owner) + 10));
   return {std::llround(random.uniform(1e9, 1e12)), drift_ppm * 1e-6 * random.uniform(-1, 1), owner};
 }
 
@@ -159,23 +159,23 @@ class MockRig::Impl::MockCamera final : public CameraDevice {
     if (!(wanted.rate_hz > 0) || wanted.exposure <= Duration{} || wanted.exposure.to_seconds() * wanted.rate_hz > 1)
       return DeviceStatus::bad_configuration;
     if (wanted.width != lens.width || wanted.height != lens.height) return DeviceStatus::unsupported;
-    if (stream_.streaming()) return DeviceStatus::busy;
+    if (stream.streaming()) return DeviceStatus::busy;
     try {
       arena_ = std::make_unique<Arena>(FramePool::memory_needed(lens.width, lens.height, kSlots) + kCacheLine);
-      pool_ = std::make_unique<FramePool>(lens.width, lens.height, kSlots, *arena_);
-      renderer_ = std::make_unique<Renderer>(rig_->truth->shared_world(), vergence::Camera(lens), rig_->options.pattern);
+      pool = std::make_unique<FramePool>(lens.width, lens.height, kSlots, *arena_);
+      renderer = std::make_unique<Renderer>(rig_->truth->shared_world(), vergence::Camera(lens), rig_->options.pattern);
     } catch (const std::exception&) {
       return DeviceStatus::failed;
     }
-    configuration_ = wanted;
+    configuration = wanted;
     if (actual != nullptr) *actual = wanted;
     return DeviceStatus::ok;
   }
-  DeviceTiming timing() const noexcept override { return {configuration_.exposure + kTransfer}; }
+  DeviceTiming timing() const noexcept override { return {configuration.exposure + kTransfer}; }
   DeviceStatus start(Notifier* ready) noexcept override {
-    if (pool_ == nullptr) return DeviceStatus::bad_configuration;
-    const bool was = stream_.streaming() && !gone_;
-    const DeviceStatus status = stream_.start(ready);
+    if (pool == nullptr) return DeviceStatus::bad_configuration;
+    const bool was = stream.streaming() && !gone_;
+    const DeviceStatus status = stream.start(ready);
     if (status == DeviceStatus::ok && !was) {
       gone_ = false;
       starts_.fetch_add(1, std::memory_order_relaxed);
@@ -184,7 +184,7 @@ class MockRig::Impl::MockCamera final : public CameraDevice {
   }
   DeviceStatus wait(Duration limit, Frame* frame) noexcept override {
     Delivery<Frame> d;
-    const DeviceStatus status = stream_.take(limit, &d);
+    const DeviceStatus status = stream.take(limit, &d);
     if (status == DeviceStatus::ok) {
       *frame = d.value;
       frame->arrival = d.arrival;
@@ -196,13 +196,13 @@ class MockRig::Impl::MockCamera final : public CameraDevice {
     }
     return status;
   }
-  ImageView view(FrameSlot slot) const noexcept override { return pool_->view(slot); }
+  ImageView view(FrameSlot slot) const noexcept override { return pool->view(slot); }
   void release(FrameSlot slot) noexcept override {
-    pool_->release(slot);
+    pool->release(slot);
     rig_->freed();
   }
   void stop() noexcept override {
-    stream_.stop();
+    stream.stop();
     rig_->freed();
   }
   CameraStatistics statistics() const noexcept override {
@@ -211,10 +211,10 @@ class MockRig::Impl::MockCamera final : public CameraDevice {
   }
 
   // The producer's side.
-  Stream<Frame, 64> stream_;
-  std::unique_ptr<FramePool> pool_;
-  std::unique_ptr<Renderer> renderer_;
-  CameraConfiguration configuration_{};
+  Stream<Frame, 64> stream;
+  std::unique_ptr<FramePool> pool;
+  std::unique_ptr<Renderer> renderer;
+  CameraConfiguration configuration{};
   std::atomic<std::uint64_t> underruns{0}, lost{0};
   bool unplugged = false;
   std::uint64_t counter_base = 0;
@@ -240,19 +240,19 @@ class MockRig::Impl::MockIns final : public InsDevice {
   DeviceStatus configure(double rate_hz, double* actual_hz) noexcept override {
     if (!(rate_hz > 0)) return DeviceStatus::bad_configuration;
     if (rate_hz > 400) return DeviceStatus::unsupported;
-    rate_ = rate_hz;
-    model_ = std::make_unique<InsModel>(InsModelOptions{rig_->options.ideal_ins, mixed(rig_->options.seed, 99), rate_hz}, *rig_->truth);
+    rate = rate_hz;
+    model = std::make_unique<InsModel>(InsModelOptions{rig_->options.ideal_ins, mixed(rig_->options.seed, 99), rate_hz}, *rig_->truth);
     if (actual_hz != nullptr) *actual_hz = rate_hz;
     return DeviceStatus::ok;
   }
   DeviceTiming timing() const noexcept override { return {kInsLatency}; }
   DeviceStatus start(Notifier* ready) noexcept override {
-    if (model_ == nullptr) return DeviceStatus::bad_configuration;
-    return stream_.start(ready);
+    if (model == nullptr) return DeviceStatus::bad_configuration;
+    return stream.start(ready);
   }
   DeviceStatus wait(Duration limit, InsReading* reading) noexcept override {
     Delivery<InsReading> d;
-    const DeviceStatus status = stream_.take(limit, &d);
+    const DeviceStatus status = stream.take(limit, &d);
     if (status != DeviceStatus::ok) return status;
     *reading = d.value;
     reading->arrival = d.arrival;
@@ -261,7 +261,7 @@ class MockRig::Impl::MockIns final : public InsDevice {
     return status;
   }
   void stop() noexcept override {
-    stream_.stop();
+    stream.stop();
     rig_->freed();
   }
   InsStatistics statistics() const noexcept override {
@@ -269,9 +269,9 @@ class MockRig::Impl::MockIns final : public InsDevice {
             1};
   }
 
-  Stream<InsReading, kInsRing> stream_;
-  std::unique_ptr<InsModel> model_;
-  double rate_ = 0;
+  Stream<InsReading, kInsRing> stream;
+  std::unique_ptr<InsModel> model;
+  double rate = 0;
   std::atomic<std::uint64_t> lost{0}, overruns{0};
   [[nodiscard]] const DeviceOscillator& clock() const noexcept { return clock_; }
 
@@ -297,20 +297,20 @@ class MockRig::Impl::MockTrigger final : public TriggerDevice {
   }
   DeviceStatus start(Notifier* ready) noexcept override {
     if (!(rate_ > 0)) return DeviceStatus::bad_configuration;
-    if (stream_.streaming()) return DeviceStatus::ok;
-    const DeviceStatus status = stream_.start(ready);
+    if (stream.streaming()) return DeviceStatus::ok;
+    const DeviceStatus status = stream.start(ready);
     if (status != DeviceStatus::ok) return status;
     try {
       rig_->begin(rate_);
     } catch (const std::exception&) {
-      stream_.stop();
+      stream.stop();
       return DeviceStatus::failed;
     }
     return status;
   }
   DeviceStatus wait(Duration limit, Pulse* pulse) noexcept override {
     Delivery<Pulse> d;
-    const DeviceStatus status = stream_.take(limit, &d);
+    const DeviceStatus status = stream.take(limit, &d);
     if (status != DeviceStatus::ok) return status;
     *pulse = d.value;
     pulse->arrival = d.arrival;
@@ -318,14 +318,14 @@ class MockRig::Impl::MockTrigger final : public TriggerDevice {
     return status;
   }
   void stop() noexcept override {
-    stream_.stop();
+    stream.stop();
     rig_->halt();
   }
   TriggerStatistics statistics() const noexcept override {
     return {pulses_.load(std::memory_order_relaxed), 0, overruns.load(std::memory_order_relaxed), 1};
   }
 
-  Stream<Pulse, kPulseRing> stream_;
+  Stream<Pulse, kPulseRing> stream;
   std::atomic<std::uint64_t> overruns{0};
   [[nodiscard]] const DeviceOscillator& clock() const noexcept { return clock_; }
 
@@ -411,12 +411,12 @@ void MockRig::Impl::produce() {
 }
 
 void MockRig::Impl::make_readings(HostStamp until) {
-  if (!ins->stream_.streaming()) return;
+  if (!ins->stream.streaming()) return;
   for (;; ++readings_) {
-    const HostStamp at = start_ + Duration::seconds(static_cast<double>(readings_) / ins->rate_);
+    const HostStamp at = start_ + Duration::seconds(static_cast<double>(readings_) / ins->rate);
     if (at >= until) return;
     const Duration time = at - start_;
-    InsSample sample = ins->model_->sample(readings_, time);
+    InsSample sample = ins->model->sample(readings_, time);
     bool silent = false;
     for (const Fault& f : truth->faults()) silent = silent || (f.kind == FaultKind::ins_gone && f.active(time));
     if (silent) {
@@ -428,7 +428,7 @@ void MockRig::Impl::make_readings(HostStamp until) {
     p.arrival = jittered(at + kInsLatency, 10, readings_);
     p.reading.value.sample = sample;
     p.reading.value.measured = ins->clock().read(at, time, truth->faults());
-    post(std::move(p));
+    post(p);
   }
 }
 
@@ -443,11 +443,11 @@ void MockRig::Impl::make_frames(std::uint64_t pulse) {
       p.device = k;
       p.arrival = host_of(pulse) + kTransfer;  // after what was under way, before the next frame
       p.frame.what = unplugged ? Delivery<Frame>::What::gone : Delivery<Frame>::What::back;
-      post(std::move(p));
+      post(p);
       camera.unplugged = unplugged;
       camera.counter_base = pulse;
     }
-    if (!unplugged && camera.stream_.streaming()) make_frame(pulse, k);
+    if (!unplugged && camera.stream.streaming()) make_frame(pulse, k);
   }
 }
 
@@ -456,18 +456,18 @@ std::optional<FrameSlot> MockRig::Impl::slot_of(int k) {
   for (;;) {
     const std::uint32_t seen = freed_.load(std::memory_order_acquire);
     if (stop_.load(std::memory_order_acquire)) return std::nullopt;
-    if (const auto slot = camera.pool_->acquire()) return slot;
+    if (const auto slot = camera.pool->acquire()) return slot;
     // Slots that only time will free are not waited for: late frames hold them.
     const bool held_by_delay = on_the_way_[static_cast<std::size_t>(k)].load() > static_cast<int>(kSlots) / 2;
-    if (options.real_time || held_by_delay || !camera.stream_.streaming()) return std::nullopt;
+    if (options.real_time || held_by_delay || !camera.stream.streaming()) return std::nullopt;
     freed_.wait(seen, std::memory_order_acquire);
   }
 }
 
 void MockRig::Impl::make_frame(std::uint64_t pulse, int k) {
   MockCamera& camera = *cameras[static_cast<std::size_t>(k)];
-  const Duration time = host_of(pulse) - start_, exposure = camera.configuration_.exposure;
-  double brightness = exposure.to_seconds() / kNominalExposure.to_seconds() * std::pow(10.0, camera.configuration_.gain_db / 20);
+  const Duration time = host_of(pulse) - start_, exposure = camera.configuration.exposure;
+  double brightness = exposure.to_seconds() / kNominalExposure.to_seconds() * std::pow(10.0, camera.configuration.gain_db / 20);
   double delay = 0;
   bool lost = false, twice = false;
   std::uint64_t number = 0;
@@ -493,14 +493,14 @@ void MockRig::Impl::make_frame(std::uint64_t pulse, int k) {
   std::vector<Transform> way;
   for (int i = 0; i < options.blur_samples; ++i) {
     const double part = (i + 0.5) / options.blur_samples;
-    way.push_back(truth->T_enu_camera(k, time + Duration::seconds(part * exposure.to_seconds())).inverse());
+    way.push_back(truth->camera_in_enu(k, time + Duration::seconds(part * exposure.to_seconds())).inverse());
   }
   Shot shot;
   shot.exposure = brightness;
   shot.noise_seed =
       options.noise ? static_cast<std::uint32_t>(mixed(options.seed, pulse * kMaxCameras + static_cast<std::uint64_t>(k))) | 1U : 0U;
-  camera.renderer_->render(way, shot, camera.pool_->writable(*slot).data(),
-                           static_cast<std::ptrdiff_t>(FramePool::stride(camera.pool_->width())));
+  camera.renderer->render(way, shot, camera.pool->writable(*slot).data(),
+                          static_cast<std::ptrdiff_t>(FramePool::stride(camera.pool->width())));
   Parcel p;
   p.device = k;
   p.arrival = jittered(host_of(pulse) + exposure + kTransfer, static_cast<std::uint64_t>(k), pulse) + Duration::seconds(delay);
@@ -508,17 +508,17 @@ void MockRig::Impl::make_frame(std::uint64_t pulse, int k) {
                    exposure, FrameStatus::complete};
   on_the_way_[static_cast<std::size_t>(k)].fetch_add(1);
   std::optional<FrameSlot> copy;
-  if (twice) copy = camera.pool_->acquire();
+  if (twice) copy = camera.pool->acquire();
   if (copy) {
-    const auto from = camera.pool_->writable(*slot), to = camera.pool_->writable(*copy);
+    const auto from = camera.pool->writable(*slot), to = camera.pool->writable(*copy);
     std::memcpy(to.data(), from.data(), from.size());
     Parcel again = p;
     again.frame.value.slot = *copy;
     again.arrival = p.arrival + kTransfer;
     on_the_way_[static_cast<std::size_t>(k)].fetch_add(1);
-    post(std::move(again));
+    post(again);
   }
-  post(std::move(p));
+  post(p);
 }
 
 void MockRig::Impl::announce_end(HostStamp at) {
@@ -529,14 +529,14 @@ void MockRig::Impl::announce_end(HostStamp at) {
     p.frame.what = Delivery<Frame>::What::end;
     p.reading.what = Delivery<InsReading>::What::end;
     p.pulse.what = Delivery<Pulse>::What::end;
-    post(std::move(p));
+    post(p);
   }
 }
 
 void MockRig::Impl::post(Parcel parcel) {
   const std::lock_guard lock(mutex_);
   parcel.order = orders_++;
-  parcels_.push(std::move(parcel));
+  parcels_.push(parcel);
   posted_.notify_all();
 }
 
@@ -587,21 +587,21 @@ void MockRig::Impl::deliver(const Parcel& parcel, HostStamp arrival) {
     Delivery<Pulse> d = parcel.pulse;
     d.arrival = arrival;
     // Nobody needs to take the reports; the latest that find no room are counted.
-    if (trigger->stream_.streaming() && !trigger->stream_.push(d)) trigger->overruns.fetch_add(1, std::memory_order_relaxed);
+    if (trigger->stream.streaming() && !trigger->stream.push(d)) trigger->overruns.fetch_add(1, std::memory_order_relaxed);
     return;
   }
   if (parcel.device == kInsDevice) {
     Delivery<InsReading> d = parcel.reading;
     d.arrival = arrival;
-    if (options.real_time && ins->stream_.full()) ins->overruns.fetch_add(1, std::memory_order_relaxed);
-    push_or_wait(&ins->stream_, d);
+    if (options.real_time && ins->stream.full()) ins->overruns.fetch_add(1, std::memory_order_relaxed);
+    push_or_wait(&ins->stream, d);
     return;
   }
   Delivery<Frame> d = parcel.frame;
   d.arrival = arrival;
   const auto k = static_cast<std::size_t>(parcel.device);
   if (d.what == Delivery<Frame>::What::item) on_the_way_[k].fetch_sub(1);
-  push_or_wait(&cameras[k]->stream_, d);  // deeper than the slots: frames always find room
+  push_or_wait(&cameras[k]->stream, d);  // deeper than the slots: frames always find room
 }
 
 // ---- the front ----------------------------------------------------------------------------------------------------

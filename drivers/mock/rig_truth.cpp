@@ -11,7 +11,7 @@ RigTruth::RigTruth(std::shared_ptr<const World> world, const DriveOptions& drive
   for (std::size_t k = 0; k < static_cast<std::size_t>(rig.cameras); ++k) mounts_[k] = T_body_left * rig.T_camera_left[k].inverse();
 }
 
-Transform RigTruth::T_body_camera(int camera, Duration time) const noexcept {
+Transform RigTruth::camera_on_body(int camera, Duration time) const noexcept {
   Transform T_moved_camera;  // from where it was mounted to where it is
   for (const Fault& f : faults_) {
     if (!f.concerns(camera) || time < f.at) continue;
@@ -25,8 +25,8 @@ Transform RigTruth::T_body_camera(int camera, Duration time) const noexcept {
 
 RigCalibration RigTruth::calibration(Duration time) const noexcept {
   RigCalibration rig = rig_;
-  const Transform T_body_left = T_body_camera(0, time);
-  for (int k = 1; k < rig.cameras; ++k) rig.T_camera_left[static_cast<std::size_t>(k)] = T_body_camera(k, time).inverse() * T_body_left;
+  const Transform T_body_left = camera_on_body(0, time);
+  for (int k = 1; k < rig.cameras; ++k) rig.T_camera_left[static_cast<std::size_t>(k)] = camera_on_body(k, time).inverse() * T_body_left;
   return rig;
 }
 

@@ -25,11 +25,13 @@ class RigTruth {
   [[nodiscard]] const std::vector<Fault>& faults() const noexcept { return faults_; }
 
   /// p_body = T · p_camera. A knock moves it: p_camera' = Exp(turn) p_camera + shift.
-  [[nodiscard]] Transform T_body_camera(int camera, Duration time) const noexcept;
-  [[nodiscard]] Transform T_enu_camera(int camera, Duration time) const noexcept {
-    return drive_.at(time).T_enu_body * T_body_camera(camera, time);
+  [[nodiscard]] Transform camera_on_body(int camera, Duration time) const noexcept;
+  /// p_enu = T · p_camera.
+  [[nodiscard]] Transform camera_in_enu(int camera, Duration time) const noexcept {
+    return drive_.at(time).T_enu_body * camera_on_body(camera, time);
   }
-  [[nodiscard]] Transform T_enu_ins(Duration time) const noexcept { return drive_.at(time).T_enu_body * T_body_ins_; }
+  /// p_enu = T · p_ins.
+  [[nodiscard]] Transform ins_in_enu(Duration time) const noexcept { return drive_.at(time).T_enu_body * T_body_ins_; }
   /// The rig's calibration as it truly is then.
   [[nodiscard]] RigCalibration calibration(Duration time) const noexcept;
 

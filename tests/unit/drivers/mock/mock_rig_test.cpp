@@ -224,7 +224,7 @@ TEST(MockRig, aKnockTurnsTheTrueRigByWhatItSays) {
   EXPECT_NEAR(after.T_camera_left[1].t.x(), -0.747, 1e-12);
   // The left camera is where it was, and what the right one sees has moved.
   const Duration t = Duration::seconds(2);
-  EXPECT_TRUE(truth->T_body_camera(0, t).t.isApprox(default_T_body_left().t, 1e-14));
+  EXPECT_TRUE(truth->camera_on_body(0, t).t.isApprox(default_T_body_left().t, 1e-14));
 }
 
 TEST(MockRig, aDriftGrowsEvenlyAndStays) {
@@ -244,7 +244,7 @@ TEST(MockRig, anIdealInsIsTheTruthToAMicrometre) {
   for (std::uint64_t i = 0; i < 1200; ++i) {
     const Duration t = Duration::seconds(static_cast<double>(i) / 120);
     const InsSample s = model.sample(i, t);
-    const Transform T = truth->T_enu_ins(t);
+    const Transform T = truth->ins_in_enu(t);
     Vec3 p;
     plane.Forward(s.position.latitude_deg, s.position.longitude_deg, s.position.height_m, p.x(), p.y(), p.z());
     ASSERT_LT((p - T.t).norm(), 1e-6);
@@ -267,7 +267,7 @@ TEST(MockRig, aNoisyInsErrsByItsSigmasAndSlowly) {
       const InsSample s = model.sample(i, t);
       Vec3 p;
       plane.Forward(s.position.latitude_deg, s.position.longitude_deg, s.position.height_m, p.x(), p.y(), p.z());
-      const Vec3 error = p - truth->T_enu_ins(t).t;
+      const Vec3 error = p - truth->ins_in_enu(t).t;
       if (i == 0) {
         squares += error.head<2>().squaredNorm();
         n += 2;
