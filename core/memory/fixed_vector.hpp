@@ -7,22 +7,21 @@
 
 namespace vergence {
 
-/// At most N values in place, never a heap. When full, push() refuses and says so.
-template <class T, std::size_t N>
-class FixedVector {
-  static_assert(std::is_trivially_copyable_v<T> || std::is_default_constructible_v<T>);
-
+/// What the two vectors below share: at most capacity() values of type T, never a heap. When full, push() refuses and says so.
+/// Storage has data() and size().
+template <class T, class Storage>
+class VectorOn {
  public:
   /// False: full, nothing changed; the caller counts it.
   [[nodiscard]] bool push(const T& value) noexcept {
-    if (size_ == N) return false;
-    items_[size_++] = value;
+    if (full()) return false;
+    storage_[size_++] = value;
     return true;
   }
   /// Removes by moving the last into its place: order is not kept.
   void remove_swapping(std::size_t i) noexcept {
     assert(i < size_);
-    items_[i] = items_[--size_];
+    storage_[i] = storage_[--size_];
   }
   /// Drops everything from n on. Precondition: n ≤ size().
   void truncate(std::size_t n) noexcept {
@@ -33,54 +32,6 @@ class FixedVector {
 
   [[nodiscard]] T& operator[](std::size_t i) noexcept {
     assert(i < size_);
-    return items_[i];
-  }
-  [[nodiscard]] const T& operator[](std::size_t i) const noexcept {
-    assert(i < size_);
-    return items_[i];
-  }
-  [[nodiscard]] T& back() noexcept { return (*this)[size_ - 1]; }
-  [[nodiscard]] const T& back() const noexcept { return (*this)[size_ - 1]; }
-  [[nodiscard]] std::size_t size() const noexcept { return size_; }
-  [[nodiscard]] bool empty() const noexcept { return size_ == 0; }
-  [[nodiscard]] bool full() const noexcept { return size_ == N; }
-  [[nodiscard]] static constexpr std::size_t capacity() noexcept { return N; }
-  [[nodiscard]] T* begin() noexcept { return items_.data(); }
-  [[nodiscard]] T* end() noexcept { return items_.data() + size_; }
-  [[nodiscard]] const T* begin() const noexcept { return items_.data(); }
-  [[nodiscard]] const T* end() const noexcept { return items_.data() + size_; }
-  [[nodiscard]] std::span<T> span() noexcept { return {items_.data(), size_}; }
-  [[nodiscard]] std::span<const T> span() const noexcept { return {items_.data(), size_}; }
-
- private:
-  std::array<T, N> items_{};
-  std::size_t size_ = 0;
-};
-
-/// The same over memory of an arena: capacity chosen at construction. When full, push() refuses and says so.
-template <class T>
-class BoundedVector {
- public:
-  BoundedVector() noexcept = default;
-  explicit BoundedVector(std::span<T> storage) noexcept : storage_(storage) {}
-
-  [[nodiscard]] bool push(const T& value) noexcept {
-    if (size_ == storage_.size()) return false;
-    storage_[size_++] = value;
-    return true;
-  }
-  void remove_swapping(std::size_t i) noexcept {
-    assert(i < size_);
-    storage_[i] = storage_[--size_];
-  }
-  void truncate(std::size_t n) noexcept {
-    assert(n <= size_);
-    size_ = n;
-  }
-  void clear() noexcept { size_ = 0; }
-
-  [[nodiscard]] T& operator[](std::size_t i) noexcept {
-    assert(i < size_);
     return storage_[i];
   }
   [[nodiscard]] const T& operator[](std::size_t i) const noexcept {
@@ -90,19 +41,40 @@ class BoundedVector {
   [[nodiscard]] T& back() noexcept { return (*this)[size_ - 1]; }
   [[nodiscard]] const T& back() const noexcept { return (*this)[size_ - 1]; }
   [[nodiscard]] std::size_t size() const noexcept { return size_; }
-  [[nodiscard]] std::size_t capacity() const noexcept { return storage_.size(); }
   [[nodiscard]] bool empty() const noexcept { return size_ == 0; }
   [[nodiscard]] bool full() const noexcept { return size_ == storage_.size(); }
   [[nodiscard]] T* begin() noexcept { return storage_.data(); }
   [[nodiscard]] T* end() noexcept { return storage_.data() + size_; }
   [[nodiscard]] const T* begin() const noexcept { return storage_.data(); }
   [[nodiscard]] const T* end() const noexcept { return storage_.data() + size_; }
-  [[nodiscard]] std::span<T> span() noexcept { return storage_.first(size_); }
-  [[nodiscard]] std::span<const T> span() const noexcept { return storage_.first(size_); }
+  [[nodiscard]] std::span<T> span() noexcept { return {storage_.data(), size_}; }
+  [[nodiscard]] std::span<const T> span() const noexcept { return {storage_.data(), size_}; }
+
+ protected:
+  VectorOn() noexcept = default;
+  explicit VectorOn(const Storage& storage) noexcept : storage_(storage) {}
+  Storage storage_{};
 
  private:
-  std::span<T> storage_;
   std::size_t size_ = 0;
+};
+
+/// In place, capacity in the type.
+template <class T, std::size_t N>
+class FixedVector : public VectorOn<T, std::array<T, N>> {
+  static_assert(std::is_trivially_copyable_v<T> || std::is_default_constructible_v<T>);
+
+ public:
+  [[nodiscard]] static constexpr std::size_t capacity() noexcept { return N; }
+};
+
+/// Over memory of an arena, capacity chosen at construction. Copies share the storage.
+template <class T>
+class BoundedVector : public VectorOn<T, std::span<T>> {
+ public:
+  BoundedVector() noexcept = default;
+  explicit BoundedVector(std::span<T> storage) noexcept : VectorOn<T, std::span<T>>(storage) {}
+  [[nodiscard]] std::size_t capacity() const noexcept { return this->storage_.size(); }
 };
 
 }  // namespace vergence
