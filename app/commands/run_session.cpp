@@ -129,6 +129,7 @@ Drive::Drive(const RunRequest& request)
   o.tie_stamp = request.fast ? kVirtualEpoch : Stamp(clock_ns(CLOCK_REALTIME));
   o.tie_host = request.fast ? mock_.rig->start() : HostStamp(clock_ns(CLOCK_MONOTONIC));
   std::vector<CameraDevice*> cameras;
+  cameras.reserve(static_cast<std::size_t>(mock_.rig->cameras()));
   for (int k = 0; k < mock_.rig->cameras(); ++k) cameras.push_back(&mock_.rig->camera(k));
   source_ = std::make_unique<LiveSource>(std::move(cameras), mock_.has_ins ? &mock_.rig->ins() : nullptr, &mock_.rig->trigger(), o);
   start_ = o.tie_stamp + (mock_.rig->start() - o.tie_host);
