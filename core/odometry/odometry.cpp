@@ -134,7 +134,8 @@ Odometry::PoseFit Odometry::fit_pose(const Transform& start, bool sample) noexce
   for (int k = 0; k < rig_.cameras; ++k)
     if (held[static_cast<std::size_t>(k)] >= kCameraHolds)
       fit.cameras = static_cast<std::uint8_t>(fit.cameras | (1U << static_cast<unsigned>(k)));
-  fit.found = fit.inliers >= options_.min_inliers;
+  // One camera alone measures no depth and makes no new points: what is left of the map has to hold the pose well.
+  fit.found = fit.inliers >= (std::popcount(fit.cameras) < 2 ? options_.ok_inliers : options_.min_inliers);
   return fit;
 }
 

@@ -41,7 +41,8 @@ function(vergence_test name)
   if(ARG_SERIAL)
     list(APPEND properties RUN_SERIAL TRUE)
   endif()
-  gtest_discover_tests(${name} DISCOVERY_MODE PRE_TEST PROPERTIES ${properties})
+  # Parameters that print as bytes would make a name of addresses.
+  gtest_discover_tests(${name} DISCOVERY_MODE PRE_TEST NO_PRETTY_VALUES PROPERTIES ${properties})
 endfunction()
 
 # vergence_benchmark(NAME SOURCES … [DEPENDS …]): a program under build/bench, never run by ctest.
