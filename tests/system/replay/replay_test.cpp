@@ -1,0 +1,170 @@
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <fstream>
+#include <functional>
+#include <string>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+#include <opencv2/imgcodecs.hpp>
+
+#include "app/config/calibration_file.hpp"
+#include "tests/support/temporary_folder.hpp"
+#include "tests/system/odometry/mock_drive.hpp"
+#include "tests/unit/app/commands/run_vergence.hpp"
+
+namespace vergence::test {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::size_t kFrames = 24;  // of a straight stretch at 9 m/s: 10 m
+
+std::string image_name(int camera, std::size_t pair) { return fmt::format("{}/{:03d}.png", camera == 0 ? "left" : "right", pair); }
+
+/// A rendered stretch in the layout of `--format folder`: what a newcomer brings.
+class ReplayedFolder : public ::testing::Test {
+ protected:
+  static void SetUpTestSuite() {
+    master_ = new TemporaryFolder;
+    mock::DriveOptions options;
+    options.kind = mock::DriveKind::brief;
+    const StereoDrive drive = render_drive(options, Duration::seconds(6), kFrames);
+    std::string times;
+    for (std::size_t i = 0; i < drive.size(); ++i) {
+      times += fmt::format("{}\n", drive.stamps[i].ns());
+      for (int k = 0; k < 2; ++k) {
+        const Picture& p = drive.pairs[i][static_cast<std::size_t>(k)];
+        const fs::path file = *master_ / image_name(k, i);
+        fs::create_directories(file.parent_path());
+        const cv::Mat image(p.height, p.width, CV_8U, const_cast<std::uint8_t*>(p.bytes.data()), static_cast<std::size_t>(p.stride));
+        ASSERT_TRUE(cv::imwrite(file.string(), image));
+      }
+    }
+    master_->write("times.txt", times);
+    app::CalibrationFile calibration;
+    calibration.rig = drive.rig;
+    app::write_calibration(*master_ / "calibration.yaml", calibration);
+  }
+  static void TearDownTestSuite() { delete master_; }
+
+  /// A copy of the stretch, to be spoilt.
+  ReplayedFolder() { fs::copy(*master_ / ".", data(), fs::copy_options::recursive); }
+
+  [[nodiscard]] fs::path data() const { return work_ / "data"; }
+  [[nodiscard]] fs::path session() const { return work_ / "session"; }
+  [[nodiscard]] Outcome replay(const std::string& more = "") const {
+    return run_vergence("replay '" + data().string() + "' --format folder --quiet --out '" + session().string() + "' " + more);
+  }
+  [[nodiscard]] nlohmann::json summary() const { return nlohmann::json::parse(read_file(session() / "summary.json")); }
+  void expect_refused(const std::string& named) const {
+    const Outcome o = replay();
+    EXPECT_EQ(o.code, 2) << o.err;
+    EXPECT_NE(o.err.find(named), std::string::npos) << o.err;
+    EXPECT_FALSE(fs::exists(session() / "trajectory.tum"));
+  }
+  void expect_skipped(std::size_t frames) const {
+    const Outcome o = replay();
+    EXPECT_EQ(o.code, 0) << o.err;
+    const auto s = summary();
+    EXPECT_EQ(s["frames"]["skipped"], frames);
+    EXPECT_EQ(s["frames"]["read"], kFrames - frames);
+    EXPECT_EQ(s["frames"]["posed"], kFrames - frames);
+    EXPECT_NE(read_file(session() / "events.jsonl").find("skipped"), std::string::npos);
+  }
+  void write(const std::string& name, const std::string& text) const { std::ofstream(data() / name, std::ios::binary) << text; }
+
+  TemporaryFolder work_;
+  static TemporaryFolder* master_;
+};
+
+TemporaryFolder* ReplayedFolder::master_ = nullptr;
+
+TEST_F(ReplayedFolder, givesASessionWithAPoseForEveryFrame) {
+  const Outcome o = replay();
+  ASSERT_EQ(o.code, 0) << o.err;
+  for (const char* file :
+       {"trajectory.tum", "poses.csv", "calibration.yaml", "calibrations.csv", "events.jsonl", "summary.json", "report.html"})
+    EXPECT_TRUE(fs::exists(session() / file)) << file;
+  const auto s = summary();
+  EXPECT_EQ(s["frames"]["ok"], kFrames);
+  EXPECT_EQ(s["frames"]["skipped"], 0);
+  EXPECT_EQ(s["allocations_after_seal"], 0);
+  EXPECT_TRUE(s["metrics"].is_null());  // a plain folder has no truth
+}
+
+TEST_F(ReplayedFolder, theSameBytesWithOneThreadAndTwo) {
+  ASSERT_EQ(replay("--threads 1").code, 0);
+  const fs::path other = work_ / "other";
+  ASSERT_EQ(run_vergence("replay '" + data().string() + "' --format folder --quiet --threads 2 --out '" + other.string() + "'").code, 0);
+  EXPECT_EQ(read_file(session() / "trajectory.tum"), read_file(other / "trajectory.tum"));
+  EXPECT_EQ(read_file(session() / "events.jsonl"), read_file(other / "events.jsonl"));
+}
+
+TEST_F(ReplayedFolder, aMissingImageSkipsItsFrame) {
+  // Pairing goes by equal names where one side lacks an image.
+  fs::remove(data() / image_name(1, 9));
+  expect_skipped(1);
+}
+
+TEST_F(ReplayedFolder, aTruncatedImageSkipsItsFrame) {
+  fs::resize_file(data() / image_name(0, 9), fs::file_size(data() / image_name(0, 9)) / 2);
+  expect_skipped(1);
+}
+
+TEST_F(ReplayedFolder, aTimeThatGoesBackSkipsItsFrame) {
+  std::istringstream lines(read_file(data() / "times.txt"));
+  std::string text, first, line;
+  for (int i = 0; std::getline(lines, line); ++i) {
+    if (i == 0) first = line;
+    text += (i == 12 ? first : line) + "\n";
+  }
+  write("times.txt", text);
+  expect_skipped(1);
+}
+
+TEST_F(ReplayedFolder, aCalibrationWhoseRotationIsNoneIsRefused) {
+  std::string text = read_file(data() / "calibration.yaml");
+  const auto at = text.find("T_camera_left: [");
+  ASSERT_NE(at, std::string::npos);
+  text.insert(at + 16, "2");  // the first entry becomes twenty-odd
+  write("calibration.yaml", text);
+  expect_refused("calibration.yaml");
+}
+
+TEST_F(ReplayedFolder, imagesOfAnotherSizeAreRefused) {
+  ASSERT_TRUE(cv::imwrite((data() / image_name(0, 3)).string(), cv::Mat(100, 100, CV_8U, cv::Scalar(90))));
+  expect_refused("003.png");
+}
+
+TEST_F(ReplayedFolder, anEmptyFolderIsRefused) {
+  fs::remove_all(data());
+  fs::create_directories(data());
+  expect_refused("data");
+}
+
+TEST_F(ReplayedFolder, anUnknownKeyNamesTheNearestKnownOne) {
+  const Outcome o = replay("--set odometry.feature=300");
+  EXPECT_EQ(o.code, 2);
+  EXPECT_NE(o.err.find("odometry.features"), std::string::npos) << o.err;
+}
+
+TEST_F(ReplayedFolder, aSessionThatExistsIsNotTouched) {
+  fs::create_directories(session());
+  std::ofstream(session() / "mine.txt") << "precious";
+  EXPECT_EQ(replay().code, 2);
+  EXPECT_EQ(read_file(session() / "mine.txt"), "precious");
+  EXPECT_EQ(std::distance(fs::directory_iterator(session()), fs::directory_iterator{}), 1);
+}
+
+TEST_F(ReplayedFolder, blackImagesOnlyEndWithOneAndSayWhy) {
+  for (std::size_t i = 0; i < kFrames; ++i)
+    for (int k = 0; k < 2; ++k) ASSERT_TRUE(cv::imwrite((data() / image_name(k, i)).string(), cv::Mat(480, 640, CV_8U, cv::Scalar(2))));
+  const Outcome o = replay();
+  EXPECT_EQ(o.code, 1) << o.err;
+  EXPECT_NE(read_file(session() / "poses.csv").find("image_dark"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace vergence::test
