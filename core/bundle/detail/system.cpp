@@ -107,7 +107,7 @@ void System::use(const SharedLayout& shared) noexcept {
   const bool calibration = options_.configuration == BundleConfiguration::stereo_calibration;
   job_.classes = calibration ? static_cast<int>(problem_.cameras.size()) : 1;
   for (int k = 0; k < kMaxCameras; ++k)
-    job_.class_cameras[k] = calibration ? static_cast<std::uint8_t>(1U << static_cast<unsigned>(k)) : 0xFF;
+    job_.class_cameras[k] = static_cast<std::uint8_t>(calibration ? 1U << static_cast<unsigned>(k) : 0xFFU);
 }
 
 void System::prepare(const BundleState& state) noexcept {
