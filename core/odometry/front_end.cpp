@@ -16,7 +16,6 @@ constexpr int kSmallestCell = 12;         // px: a window's side; nearer corners
 constexpr int kMaxDistance = 64;          // bits of 256: unrelated patches lie at 128 ± 8
 constexpr double kDistinct = 0.8;         // of the second best's distance
 constexpr float kRoughSigma = 3.F;        // px: two corners found independently
-constexpr double kNearDisparity = 3.0;    // px: ten times the noise of a match; what makes scale
 
 /// Shape of a patch seen from elsewhere, as if its surface faced the camera it was cut in: ∂(pixel there)/∂(pixel here).
 /// X = T (z ray): moving the pixel moves the ray, the depth z stays.

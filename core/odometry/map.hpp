@@ -12,6 +12,8 @@ namespace vergence::odometry {
 inline constexpr std::size_t kMaxWindow = 20;    // keyframes; OdometryOptions::window_keyframes stays below
 inline constexpr std::size_t kMaxPoints = 2048;  // of the map: tracked ones and those the window still sees
 
+inline constexpr double kNearDisparity = 3.0;  // px between a point and infinity: ten times the noise of a match; what makes scale
+
 /// What one rig frame saw of a point: pixels of an ideal pinhole camera with each camera's own K, distortion removed.
 struct Sighting {
   std::array<Eigen::Vector2f, kMaxCameras> pixel{};

@@ -15,7 +15,6 @@ constexpr double kRecognisedShare = 0.5;    // of the points in view that must b
 constexpr std::uint8_t kMissesAllowed = 2;  // frames a point may be hidden
 constexpr std::uint16_t kFoundEnough = 2;   // rig frames, so four images, before a point holds a pose
 constexpr double kOutlier = 9.21;           // squared sigmas, two coordinates at 99 %
-constexpr double kNearDisparity = 3.0;      // px: ten times the noise of a match
 constexpr int kNearEnough = 10;             // near points that keep the scale
 constexpr int kCameraHolds = 8;             // inliers for a camera to count as one that supports the pose
 constexpr double kRigidShare = 0.4;         // of the points found that must agree: below it something else moves
