@@ -1,6 +1,8 @@
 #pragma once
 #include <cstdint>
+#include <map>
 #include <memory>
+#include <string>
 #include <string_view>
 #include <vector>
 
@@ -24,6 +26,10 @@ struct CameraConfiguration {
   Duration exposure{};
   double gain_db = 0;
   CameraTrigger trigger = CameraTrigger::hardware;
+  int offset_x = 0;            // px, of the region read out, on the sensor
+  int offset_y = 0;            // px
+  std::string pixel_format{};  // the device's own name (Mono8, BayerGB8, GREY …); empty: the driver takes the cheapest that gives grey
+  std::map<std::string, std::string> options{};  // what only this kind of camera has (docs/cameras.md); an unknown name is unsupported
 };
 
 enum class FrameStatus : std::uint8_t {
@@ -83,6 +89,11 @@ class CameraDevice {
   virtual void release(FrameSlot slot) noexcept = 0;
   /// Wakes wait() with `stopped`; no device access and no notify() after it returns. Twice is harmless.
   virtual void stop() noexcept = 0;
+  /// One exposure, with CameraTrigger::software and while streaming. → ok, unsupported, stopped, gone
+  [[nodiscard]] virtual DeviceStatus trigger_once() noexcept { return DeviceStatus::unsupported; }
+  /// One sentence about the last call that was not `ok`: what was refused, what the camera offers, what to do. Empty: the status says
+  /// it all. Owner's thread; may allocate.
+  [[nodiscard]] virtual std::string complaint() const { return {}; }
   [[nodiscard]] virtual CameraStatistics statistics() const noexcept = 0;
 };
 
