@@ -1,0 +1,154 @@
+#include "drivers/serial/serial_port.hpp"
+
+#include <errno.h>
+#include <fcntl.h>
+#include <libserialport.h>
+#include <sys/eventfd.h>
+#include <sys/file.h>
+#include <sys/ioctl.h>
+#include <unistd.h>
+
+#include <filesystem>
+#include <fstream>
+#include <system_error>
+#include <utility>
+
+#include "drivers/serial/detail/fd_line.hpp"
+
+namespace vergence {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// The device file behind links; the name itself when there is none.
+fs::path resolved(const std::string& port) {
+  std::error_code error;
+  fs::path real = fs::canonical(port, error);
+  return error ? fs::path(port) : real;
+}
+
+bool known_to_library(const fs::path& real) {
+  std::error_code error;
+  return real.parent_path() == "/dev" && fs::exists(fs::path("/sys/class/tty") / real.filename(), error) && real.filename() != "tty";
+}
+
+DeviceStatus status_of(int system_error) noexcept {
+  switch (system_error) {
+    case ENOENT:
+    case ENODEV:
+    case ENXIO:
+      return DeviceStatus::not_found;
+    case EACCES:
+    case EPERM:
+      return DeviceStatus::no_permission;
+    case EBUSY:
+      return DeviceStatus::busy;
+    case ENOTTY:
+    case EINVAL:
+      return DeviceStatus::unsupported;
+    default:
+      return DeviceStatus::failed;
+  }
+}
+
+std::string text(const char* t) { return t == nullptr ? std::string() : std::string(t); }
+
+SerialPortInfo info_of(const sp_port* port) {
+  SerialPortInfo info;
+  info.port = text(::sp_get_port_name(port));
+  info.description = text(::sp_get_port_description(port));
+  if (::sp_get_port_transport(port) == SP_TRANSPORT_USB) {
+    int vendor = 0, product = 0;
+    if (::sp_get_port_usb_vid_pid(port, &vendor, &product) == SP_OK) {
+      info.usb_vendor = static_cast<std::uint16_t>(vendor);
+      info.usb_product = static_cast<std::uint16_t>(product);
+    }
+    info.usb_serial = text(::sp_get_port_usb_serial(port));
+  }
+  info.latency_timer_ms = read_latency_timer_ms(info.port);
+  return info;
+}
+
+/// The line is ours alone: TIOCEXCL keeps others out, the lock also those with the rights to ignore that.
+DeviceStatus hold(int fd) noexcept {
+  if (::flock(fd, LOCK_EX | LOCK_NB) != 0) return errno == EWOULDBLOCK ? DeviceStatus::busy : status_of(errno);
+  return ::ioctl(fd, TIOCEXCL) == 0 ? DeviceStatus::ok : status_of(errno);
+}
+
+/// What the library opens, or a plain tty. Not ok: both empty.
+DeviceStatus open_tty(const fs::path& real, const LineSettings& settings, UniquePort* port, UniqueFd* tty) {
+  if (known_to_library(real)) {
+    sp_port* found = nullptr;
+    if (::sp_get_port_by_name(real.c_str(), &found) != SP_OK) return DeviceStatus::not_found;
+    UniquePort opened(found);
+    if (const sp_return r = ::sp_open(found, SP_MODE_READ_WRITE); r != SP_OK)
+      return r == SP_ERR_FAIL ? status_of(::sp_last_error_code()) : DeviceStatus::failed;
+    int fd = -1;
+    if (::sp_get_port_handle(found, &fd) != SP_OK) return DeviceStatus::failed;
+    if (const DeviceStatus s = hold(fd); s != DeviceStatus::ok) return s;
+    if (const DeviceStatus s = set_port(found, settings); s != DeviceStatus::ok) return s;
+    *port = std::move(opened);
+    return DeviceStatus::ok;
+  }
+  UniqueFd fd(::open(real.c_str(), O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC));
+  if (!fd.valid()) return status_of(errno);
+  if (::isatty(fd.get()) == 0) return DeviceStatus::unsupported;
+  if (const DeviceStatus s = hold(fd.get()); s != DeviceStatus::ok) return s;
+  if (const DeviceStatus s = set_raw_tty(fd.get(), settings); s != DeviceStatus::ok) return s;
+  *tty = std::move(fd);
+  return DeviceStatus::ok;
+}
+
+}  // namespace
+
+std::vector<SerialPortInfo> list_serial_ports() {
+  std::vector<SerialPortInfo> ports;
+  sp_port** list = nullptr;
+  if (::sp_list_ports(&list) != SP_OK) return ports;
+  for (sp_port** p = list; *p != nullptr; ++p) ports.push_back(info_of(*p));
+  ::sp_free_port_list(list);
+  return ports;
+}
+
+std::optional<int> read_latency_timer_ms(const std::string& port) {
+  std::ifstream file(fs::path("/sys/class/tty") / resolved(port).filename() / "device/latency_timer");
+  int ms = 0;
+  if (!(file >> ms) || ms < 1 || ms > 255) return std::nullopt;
+  return ms;
+}
+
+std::string SerialPort::find() const {
+  if (!usb_serial_.empty()) {
+    for (const SerialPortInfo& info : list_serial_ports())
+      if (info.usb_serial == usb_serial_) return info.port;
+  }
+  return port_;
+}
+
+std::unique_ptr<ByteLine> SerialPort::open(const LineSettings& settings, DeviceStatus* status) {
+  if (settings.baud == 0 || settings.stop_bits < 1 || settings.stop_bits > 2) {
+    *status = DeviceStatus::unsupported;
+    return nullptr;
+  }
+  const fs::path real = resolved(find());
+  UniquePort port;
+  UniqueFd tty;
+  *status = open_tty(real, settings, &port, &tty);
+  if (*status != DeviceStatus::ok) return nullptr;
+  UniqueFd wake(::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK));
+  if (!wake.valid()) {
+    *status = DeviceStatus::failed;
+    return nullptr;
+  }
+  if (port && usb_serial_.empty()) usb_serial_ = text(::sp_get_port_usb_serial(port.get()));
+  auto line = std::make_unique<FdLine>(std::move(port), std::move(tty), std::move(wake), settings);
+  line->discard_input();
+  return line;
+}
+
+Duration SerialPort::latency_timer() const {
+  const std::optional<int> ms = read_latency_timer_ms(find());
+  return Duration::milliseconds(ms.value_or(0));
+}
+
+}  // namespace vergence

@@ -1,0 +1,256 @@
+#include "drivers/serial/serial.hpp"
+
+#include <fcntl.h>
+#include <gtest/gtest.h>
+#include <stdlib.h>
+#include <sys/resource.h>
+#include <unistd.h>
+
+#include <array>
+#include <chrono>
+#include <filesystem>
+#include <memory>
+#include <thread>
+#include <vector>
+
+namespace vergence {
+namespace {
+
+using Bytes = std::vector<std::uint8_t>;
+constexpr Duration kSoon = Duration::milliseconds(20);
+constexpr Duration kLong = Duration::seconds(5);
+
+/// A line under test and the other side of it.
+class Pair {
+ public:
+  virtual ~Pair() = default;
+  virtual ByteLine& line() = 0;
+  virtual void send(const Bytes& bytes) = 0;
+  virtual Bytes received(std::size_t n) = 0;
+  virtual void hang_up() = 0;
+};
+
+class TerminalPair final : public Pair {
+ public:
+  TerminalPair() : master_(::posix_openpt(O_RDWR | O_NOCTTY)) {
+    if (master_ < 0 || ::grantpt(master_) != 0 || ::unlockpt(master_) != 0) throw std::runtime_error("no pseudo-terminal");
+    place_ = std::make_unique<SerialPort>(::ptsname(master_));
+    DeviceStatus status = DeviceStatus::ok;
+    line_ = place_->open({}, &status);
+    if (!line_) throw std::runtime_error("the terminal does not open");
+  }
+  ~TerminalPair() override { hang_up(); }
+  ByteLine& line() override { return *line_; }
+  void send(const Bytes& bytes) override { ASSERT_EQ(::write(master_, bytes.data(), bytes.size()), static_cast<ssize_t>(bytes.size())); }
+  Bytes received(std::size_t n) override {
+    Bytes all;
+    std::array<std::uint8_t, 4096> some{};
+    while (all.size() < n) {
+      const ssize_t got = ::read(master_, some.data(), some.size());
+      if (got <= 0) break;
+      all.insert(all.end(), some.begin(), some.begin() + got);
+    }
+    return all;
+  }
+  void hang_up() override {
+    if (master_ >= 0) ::close(master_);
+    master_ = -1;
+  }
+  SerialPort& place() { return *place_; }
+
+ private:
+  int master_;
+  std::unique_ptr<SerialPort> place_;
+  std::unique_ptr<ByteLine> line_;
+};
+
+class PipePair final : public Pair {
+ public:
+  PipePair() {
+    auto ends = make_byte_pipe();
+    line_ = std::move(ends.first);
+    other_ = std::move(ends.second);
+  }
+  ByteLine& line() override { return *line_; }
+  void send(const Bytes& bytes) override { ASSERT_EQ(other_->write(bytes, kLong), DeviceStatus::ok); }
+  Bytes received(std::size_t n) override {
+    Bytes all(n);
+    std::size_t have = 0;
+    while (have < n) {
+      const LineRead r = other_->read(std::span(all).subspan(have), kLong);
+      if (r.status != DeviceStatus::ok) break;
+      have += r.size;
+    }
+    all.resize(have);
+    return all;
+  }
+  void hang_up() override { other_.reset(); }
+
+ private:
+  std::unique_ptr<ByteLine> line_, other_;
+};
+
+enum class Kind : std::uint8_t { terminal, pipe };
+
+class EveryLine : public ::testing::TestWithParam<Kind> {
+ protected:
+  EveryLine() {
+    if (GetParam() == Kind::terminal)
+      pair_ = std::make_unique<TerminalPair>();
+    else
+      pair_ = std::make_unique<PipePair>();
+  }
+  ByteLine& line() { return pair_->line(); }
+  std::unique_ptr<Pair> pair_;
+};
+
+TEST_P(EveryLine, carriesEveryByteBothWays) {
+  Bytes all(256);
+  for (std::size_t i = 0; i < all.size(); ++i) all[i] = static_cast<std::uint8_t>(i);  // XON, XOFF, CR, NUL and FF among them
+  pair_->send(all);
+  Bytes got;
+  while (got.size() < all.size()) {
+    std::array<std::uint8_t, 100> some{};
+    const LineRead r = line().read(some, kLong);
+    ASSERT_EQ(r.status, DeviceStatus::ok);
+    ASSERT_GT(r.size, 0U);
+    got.insert(got.end(), some.begin(), some.begin() + static_cast<std::ptrdiff_t>(r.size));
+  }
+  EXPECT_EQ(got, all);
+  ASSERT_EQ(line().write(all, kLong), DeviceStatus::ok);
+  EXPECT_EQ(pair_->received(all.size()), all);
+}
+
+TEST_P(EveryLine, aReadTakesWhatIsThereAndDoesNotWaitForMore) {
+  pair_->send({1, 2, 3});
+  std::array<std::uint8_t, 64> some{};
+  const HostStamp before = line().now();
+  const LineRead r = line().read(some, kLong);
+  ASSERT_EQ(r.status, DeviceStatus::ok);
+  EXPECT_LT(line().now() - before, Duration::seconds(2)) << "three bytes are enough";
+}
+
+TEST_P(EveryLine, arrivalIsNeverBeforeTheBytesWereSent) {
+  std::array<std::uint8_t, 64> some{};
+  HostStamp before = line().now();
+  for (int i = 0; i < 50; ++i) {
+    const HostStamp sent = line().now();
+    pair_->send({9});
+    const LineRead r = line().read(some, kLong);
+    ASSERT_EQ(r.status, DeviceStatus::ok);
+    EXPECT_GE(r.arrival, sent);
+    EXPECT_GE(r.arrival, before) << "the clock goes one way";
+    EXPECT_LE(r.arrival, line().now());
+    before = r.arrival;
+  }
+}
+
+TEST_P(EveryLine, aQuietLineIsATimeoutAfterItsLimit) {
+  std::array<std::uint8_t, 8> some{};
+  const HostStamp before = line().now();
+  EXPECT_EQ(line().read(some, kSoon).status, DeviceStatus::timeout);
+  EXPECT_GE(line().now() - before, kSoon);
+  EXPECT_EQ(line().read(some, Duration{}).status, DeviceStatus::timeout);
+}
+
+TEST_P(EveryLine, wakeEndsOneReadAndOnlyOne) {
+  std::array<std::uint8_t, 8> some{};
+  std::thread waker([this] {
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    line().wake();
+  });
+  EXPECT_EQ(line().read(some, kLong).status, DeviceStatus::stopped);
+  waker.join();
+  EXPECT_EQ(line().read(some, Duration{}).status, DeviceStatus::timeout);
+  line().wake();
+  EXPECT_EQ(line().read(some, Duration{}).status, DeviceStatus::stopped) << "the next one, when none waits";
+  pair_->send({5});
+  EXPECT_EQ(line().read(some, kLong).status, DeviceStatus::ok);
+}
+
+TEST_P(EveryLine, aHungUpLineIsGoneAtOnceAndDoesNotBurnTime) {
+  pair_->hang_up();
+  std::array<std::uint8_t, 8> some{};
+  const HostStamp before = line().now();
+  EXPECT_EQ(line().read(some, kLong).status, DeviceStatus::gone);
+  EXPECT_EQ(line().read(some, kLong).status, DeviceStatus::gone) << "and stays so";
+  EXPECT_EQ(line().write(Bytes{1}, kLong), DeviceStatus::gone);
+  EXPECT_LT(line().now() - before, kLong);
+}
+
+TEST_P(EveryLine, discardedInputDoesNotComeAgain) {
+  pair_->send({1, 2, 3});
+  std::array<std::uint8_t, 8> some{};
+  ASSERT_EQ(line().read(std::span(some).first(1), kLong).status, DeviceStatus::ok);  // the others are there, too
+  line().discard_input();
+  EXPECT_EQ(line().read(some, Duration{}).status, DeviceStatus::timeout);
+}
+
+TEST_P(EveryLine, baudChangesAndIsTold) {
+  EXPECT_EQ(line().baud(), 115200U);
+  for (const std::uint32_t baud : {921600U, 460800U, 123456U}) {  // the last is in no table
+    EXPECT_EQ(line().set_baud(baud), DeviceStatus::ok);
+    EXPECT_EQ(line().baud(), baud);
+  }
+}
+
+TEST_P(EveryLine, aWriteThatNobodyTakesEndsAtItsLimit) {
+  const Bytes much(200'000, 0x55);
+  const HostStamp before = line().now();
+  EXPECT_EQ(line().write(much, kSoon), DeviceStatus::timeout);
+  EXPECT_LT(line().now() - before, Duration::seconds(2));
+}
+
+INSTANTIATE_TEST_SUITE_P(Serial, EveryLine, ::testing::Values(Kind::terminal, Kind::pipe),
+                         [](const auto& one) { return one.param == Kind::terminal ? "terminal" : "pipe"; });
+
+TEST(SerialPort, aWaitingReadUsesNoTime) {
+  TerminalPair pair;
+  std::array<std::uint8_t, 8> some{};
+  rusage before{}, after{};
+  ASSERT_EQ(::getrusage(RUSAGE_THREAD, &before), 0);
+  for (int i = 0; i < 10; ++i) ASSERT_EQ(pair.line().read(some, kSoon).status, DeviceStatus::timeout);
+  ASSERT_EQ(::getrusage(RUSAGE_THREAD, &after), 0);
+  const auto us = [](const rusage& r) {
+    return r.ru_utime.tv_usec + r.ru_stime.tv_usec + 1'000'000 * (r.ru_utime.tv_sec + r.ru_stime.tv_sec);
+  };
+  EXPECT_LT(us(after) - us(before), 50'000) << "200 ms were waited; a spinning read burns most of them";
+}
+
+TEST(SerialPort, isHeldByOne) {
+  TerminalPair pair;
+  DeviceStatus status = DeviceStatus::ok;
+  EXPECT_EQ(pair.place().open({}, &status), nullptr);
+  EXPECT_EQ(status, DeviceStatus::busy);
+}
+
+TEST(SerialPort, opensThroughALink) {
+  const int master = ::posix_openpt(O_RDWR | O_NOCTTY);
+  ASSERT_GE(master, 0);
+  ASSERT_EQ(::grantpt(master), 0);
+  ASSERT_EQ(::unlockpt(master), 0);
+  const std::filesystem::path link = std::filesystem::temp_directory_path() / ("vergence-line-" + std::to_string(::getpid()));
+  std::filesystem::create_symlink(::ptsname(master), link);
+  DeviceStatus status = DeviceStatus::failed;
+  SerialPort place(link.string());
+  EXPECT_NE(place.open({}, &status), nullptr);
+  EXPECT_EQ(status, DeviceStatus::ok);
+  EXPECT_EQ(place.name(), link.string());
+  std::filesystem::remove(link);
+  ::close(master);
+}
+
+TEST(SerialPort, whatCannotBeOpenedIsNamed) {
+  DeviceStatus status = DeviceStatus::ok;
+  EXPECT_EQ(SerialPort("/dev/ttyThatIsNotThere").open({}, &status), nullptr);
+  EXPECT_EQ(status, DeviceStatus::not_found);
+  EXPECT_EQ(SerialPort("/dev/null").open({}, &status), nullptr);
+  EXPECT_EQ(status, DeviceStatus::unsupported);
+  EXPECT_EQ(SerialPort("/dev/null").open({0, 1}, &status), nullptr);
+  EXPECT_EQ(status, DeviceStatus::unsupported);
+  EXPECT_FALSE(read_latency_timer_ms("/dev/null").has_value());
+  (void)list_serial_ports();  // whatever is there: it does not throw
+}
+
+}  // namespace
+}  // namespace vergence
