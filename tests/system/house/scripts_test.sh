@@ -26,5 +26,7 @@ expect_refusal "$work/empty is neither KITTI" "$source/scripts/demo" empty
 
 if command -v shellcheck >/dev/null; then
   shellcheck "$source"/scripts/{setup,demo,test,bench} "$source/.ci/run" "$source"/tests/system/house/*.sh || failures=$((failures + 1))
+  (cd "$source/tests/rigs" && shellcheck -x build-kernel build-qemu run-in-kernel run-in-qemu init-in-kernel check ./*.sh) ||
+    failures=$((failures + 1))
 fi
 exit "$((failures > 0))"

@@ -1,0 +1,235 @@
+/* sim_ftdi: an FT232R on the virtual USB host, so that the kernel's ftdi_sio makes /dev/ttyUSB* of it.
+ *
+ *   sim_ftdi --wire PATH [--serial TEXT] [--product TEXT] [--seconds S] [--ready FILE]
+ *
+ * PATH becomes a link to a pseudo-terminal: the far end of the serial line, for a simulated instrument to open. Bytes
+ * from there reach the host at the line rate the host has set, packed as the chip does it: at most 62 to a USB packet, a
+ * short packet when the latency timer has run out. Commands on standard input: "unplug", "replug", "quit".
+ */
+#include <errno.h>
+#include <fcntl.h>
+#include <poll.h>
+#include <signal.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <termios.h>
+#include <unistd.h>
+
+#include "sim_clock.h"
+#include "usbip_device.h"
+
+#define FIFO 256u   /* the chip's receive buffer, towards the host */
+#define PACKET 64u  /* two status bytes and 62 of data */
+#define MODEM 0x31u /* CTS and DSR on, in the layout of the chip's first status byte */
+#define LINE 0x60u  /* transmitter empty */
+
+static struct ftdi {
+  struct usb_device usb;
+  int wire;
+  uint8_t fifo[FIFO];
+  size_t used;
+  uint64_t oldest;    /* when the oldest byte of the buffer came */
+  uint64_t reported;  /* when the last packet went up */
+  uint64_t line_free; /* when the line can carry the next byte */
+  unsigned latency_ms;
+  double baud;
+  unsigned long up, down, overrun;
+} ftdi;
+static volatile sig_atomic_t stop;
+
+static const uint8_t device_descriptor[18] = {18, 1, 0x00, 0x02, 0, 0, 0, 8, 0x03, 0x04, 0x01, 0x60, 0x00, 0x06, 1, 2, 3, 1};
+static const uint8_t config_descriptor[32] = {9,    2, 32, 0, 1,    1, 0,  0xa0, 45, 9, 4, 0,    0, 2,  0xff, 0xff,
+                                              0xff, 2, 7,  5, 0x81, 2, 64, 0,    0,  7, 5, 0x02, 2, 64, 0,    0};
+
+static void on_signal(int n) {
+  (void)n;
+  stop = 1;
+}
+
+/* Divisor of 3 MHz with eighths coded in three bits; 0 and 1 mean 3 and 2 Mbaud. */
+static double baud_of(unsigned value, unsigned index) {
+  static const double eighths[8] = {0, 0.5, 0.25, 0.125, 0.375, 0.625, 0.75, 0.875};
+  unsigned whole = value & 0x3fff, code = value >> 14 | (index & 1) << 2;
+  if (whole == 0 && code == 0) return 3e6;
+  if (whole == 1 && code == 0) return 2e6;
+  return 3e6 / (whole + eighths[code]);
+}
+
+static int control(void* self, const struct usb_setup* s, uint8_t* data) {
+  (void)self;
+  if ((s->type & 0x60) != 0x40) return -1;
+  switch (s->request) {
+    case 0: /* reset, or drop what is buffered */
+      if (s->value <= 1) ftdi.used = 0;
+      return 0;
+    case 1: /* modem lines */
+    case 2: /* flow control */
+    case 4: /* data bits, parity, stop bits */
+    case 6: /* event character */
+    case 7: /* error character */
+      return 0;
+    case 3:
+      ftdi.baud = baud_of(s->value, s->index);
+      return 0;
+    case 5:
+      data[0] = MODEM;
+      data[1] = LINE;
+      return 2;
+    case 9:
+      ftdi.latency_ms = s->value & 0xff;
+      return 0;
+    case 10:
+      data[0] = (uint8_t)ftdi.latency_ms;
+      return 1;
+    case 0x90: /* EEPROM: an erased one */
+      data[0] = data[1] = 0xff;
+      return 2;
+    default:
+      return -1;
+  }
+}
+
+static void from_host(void* self, unsigned endpoint, const uint8_t* data, size_t bytes) {
+  (void)self;
+  (void)endpoint;
+  ftdi.down += bytes;
+  while (bytes) {
+    ssize_t n = write(ftdi.wire, data, bytes);
+    if (n <= 0) break; /* nobody reads at the far end: a serial line does not wait */
+    data += n;
+    bytes -= (size_t)n;
+  }
+}
+
+static void take_from_wire(uint64_t ns) {
+  uint8_t some[FIFO];
+  double byte_ns = 1e10 / ftdi.baud; /* start, eight, stop */
+  size_t allowed;
+
+  if (ftdi.line_free + 100000000 < ns) /* idle until now */
+    ftdi.line_free = ns - 1000000;
+  allowed = ns > ftdi.line_free ? (size_t)((double)(ns - ftdi.line_free) / byte_ns) : 0;
+  if (allowed > FIFO - ftdi.used) allowed = FIFO - ftdi.used;
+  if (!allowed) return;
+  ssize_t n = read(ftdi.wire, some, allowed);
+  if (n <= 0) return;
+  if (!ftdi.used) ftdi.oldest = ns;
+  memcpy(ftdi.fifo + ftdi.used, some, (size_t)n);
+  ftdi.used += (size_t)n;
+  ftdi.line_free += (uint64_t)((double)n * byte_ns);
+}
+
+/* Whole packets go at once; a part of one, or the bare status, when the latency timer has run out. */
+static void send_up(uint64_t ns) {
+  uint64_t latency = (uint64_t)ftdi.latency_ms * 1000000;
+  long room = usb_in_room(&ftdi.usb, 1);
+  uint8_t transfer[4096];
+  size_t at = 0;
+
+  if (room < (long)PACKET) return;
+  while (ftdi.used >= PACKET - 2 && at + PACKET <= (size_t)room && at + PACKET <= sizeof transfer) {
+    transfer[at] = MODEM;
+    transfer[at + 1] = LINE;
+    memcpy(transfer + at + 2, ftdi.fifo, PACKET - 2);
+    ftdi.used -= PACKET - 2;
+    memmove(ftdi.fifo, ftdi.fifo + PACKET - 2, ftdi.used);
+    ftdi.oldest = ns;
+    at += PACKET;
+    ftdi.up += PACKET - 2;
+  }
+  bool expired = ns - ftdi.reported >= latency && (!ftdi.used || ns - ftdi.oldest >= latency);
+  if (expired && at + PACKET <= (size_t)room && at + PACKET <= sizeof transfer) {
+    transfer[at] = MODEM;
+    transfer[at + 1] = LINE;
+    memcpy(transfer + at + 2, ftdi.fifo, ftdi.used);
+    at += 2 + ftdi.used;
+    ftdi.up += ftdi.used;
+    ftdi.used = 0;
+  } else if (at && at < (size_t)room && !expired) {
+    /* only a short packet ends a transfer: a transfer of whole packets waits for one */
+    transfer[at] = MODEM;
+    transfer[at + 1] = LINE;
+    at += 2;
+  }
+  if (at) {
+    usb_in(&ftdi.usb, 1, transfer, at);
+    ftdi.reported = ns;
+  }
+}
+
+int main(int argc, char** argv) {
+  const char *wire = NULL, *serial = "VG000001", *product = "FT232R USB UART", *ready = NULL;
+  double seconds = 0;
+  uint64_t start = now_ns();
+  char line[64];
+
+  for (int i = 1; i + 1 < argc; i += 2) {
+    if (!strcmp(argv[i], "--wire"))
+      wire = argv[i + 1];
+    else if (!strcmp(argv[i], "--serial"))
+      serial = argv[i + 1];
+    else if (!strcmp(argv[i], "--product"))
+      product = argv[i + 1];
+    else if (!strcmp(argv[i], "--seconds"))
+      seconds = atof(argv[i + 1]);
+    else if (!strcmp(argv[i], "--ready"))
+      ready = argv[i + 1];
+    else
+      return fprintf(stderr, "sim_ftdi: unknown option %s\n", argv[i]), 2;
+  }
+  if (!wire) return fprintf(stderr, "sim_ftdi: --wire PATH is needed\n"), 2;
+  ftdi.wire = posix_openpt(O_RDWR | O_NOCTTY | O_NONBLOCK);
+  if (ftdi.wire < 0 || grantpt(ftdi.wire) || unlockpt(ftdi.wire)) return perror("sim_ftdi: pty"), 1;
+  int keep = open(ptsname(ftdi.wire), O_RDWR | O_NOCTTY); /* so that it survives its users */
+  struct termios raw;
+  tcgetattr(keep, &raw);
+  cfmakeraw(&raw);
+  tcsetattr(keep, TCSANOW, &raw);
+  unlink(wire);
+  if (symlink(ptsname(ftdi.wire), wire)) return perror(wire), 1;
+  ftdi.latency_ms = 16;
+  ftdi.baud = 9600;
+  ftdi.usb = (struct usb_device){.device_descriptor = device_descriptor,
+                                 .config_descriptor = config_descriptor,
+                                 .strings = {NULL, "FTDI", product, serial},
+                                 .speed = USB_FULL,
+                                 .control = control,
+                                 .out = from_host,
+                                 .fd = -1};
+  signal(SIGTERM, on_signal);
+  signal(SIGINT, on_signal);
+  if (usb_plug(&ftdi.usb)) return 1;
+  if (ready) close(open(ready, O_CREAT | O_WRONLY, 0644));
+
+  bool input = true;
+  while (!stop) {
+    struct pollfd fds[3] = {{ftdi.usb.fd, POLLIN, 0}, {input ? 0 : -1, POLLIN, 0}, {-1, 0, 0}};
+    poll(fds, 2, 1);
+    if (fds[1].revents) {
+      ssize_t got = read(0, line, sizeof line - 1);
+      if (got <= 0) {
+        input = false;
+      } else {
+        line[got] = 0;
+        if (strstr(line, "unplug"))
+          usb_unplug(&ftdi.usb);
+        else if (strstr(line, "replug") && ftdi.usb.fd < 0)
+          usb_plug(&ftdi.usb);
+        else if (strstr(line, "quit"))
+          stop = 1;
+      }
+    }
+    uint64_t ns = now_ns();
+    usb_service(&ftdi.usb);
+    if (ftdi.usb.configuration && ftdi.usb.fd >= 0) {
+      take_from_wire(ns);
+      send_up(ns);
+    }
+    if (seconds > 0 && (double)(ns - start) > seconds * 1e9) break;
+  }
+  usb_unplug(&ftdi.usb);
+  unlink(wire);
+  printf("sim_ftdi: %lu bytes to the host, %lu from it\n", ftdi.up, ftdi.down);
+  return 0;
+}
