@@ -30,6 +30,7 @@ struct CameraConfiguration {
   int offset_y = 0;            // px
   std::string pixel_format{};  // the device's own name (Mono8, BayerGB8, GREY …); empty: the driver takes the cheapest that gives grey
   std::map<std::string, std::string> options{};  // what only this kind of camera has (docs/cameras.md); an unknown name is unsupported
+  int sharing = 1;  // cameras of the rig on this camera's link or bus, itself included: its share of the bandwidth
 };
 
 enum class FrameStatus : std::uint8_t {
@@ -64,7 +65,8 @@ struct CameraStatistics {
 ///            release may overlap stop(). statistics: any.
 /// Memory     No allocation by the caller's thread between start() and stop(). Slots are fixed at configure().
 /// Time       exposure_start by the device's clock, arrival by the host's (or by virtual time, for a mock that runs faster).
-/// Pixels     8-bit grey, row 0 on top, rows padded to cache lines; the padding is not initialised.
+/// Pixels     8-bit grey, row 0 on top; rows as the transport brings them, or padded to cache lines where the driver converts.
+///            The padding is not initialised.
 /// Full       With no slot free the newest exposure is dropped and counted (`underruns`); a mock in virtual time waits instead.
 /// Errors     Nothing throws. A call that is not `ok` has changed nothing but the counters and *arrival.
 class CameraDevice {
@@ -72,8 +74,8 @@ class CameraDevice {
   virtual ~CameraDevice() = default;  // stops
 
   [[nodiscard]] virtual const DeviceInfo& info() const noexcept = 0;
-  /// While not streaming. *actual (may be null): what the camera will do, rounded to what it can. → ok, unsupported, bad_configuration,
-  /// gone
+  /// While not streaming and with every slot released, else `busy`. *actual (may be null): what the camera will do, rounded to what it
+  /// can. → ok, unsupported, bad_configuration, busy, gone
   [[nodiscard]] virtual DeviceStatus configure(const CameraConfiguration& wanted, CameraConfiguration* actual) noexcept = 0;
   /// From the start of an exposure to its arrival. Precondition: configured.
   [[nodiscard]] virtual DeviceTiming timing() const noexcept = 0;
@@ -94,18 +96,24 @@ class CameraDevice {
   /// One sentence about the last call that was not `ok`: what was refused, what the camera offers, what to do. Empty: the status says
   /// it all. Owner's thread; may allocate.
   [[nodiscard]] virtual std::string complaint() const { return {}; }
+  /// One sentence about what works, but not as well as it should (a buffer the system made smaller): what, and what to do. Empty: nothing.
+  /// Owner's thread; may allocate.
+  [[nodiscard]] virtual std::string remark() const { return {}; }
   [[nodiscard]] virtual CameraStatistics statistics() const noexcept = 0;
 };
 
 /// One kind of camera: a row in the table of drivers.
 ///
-/// Threads  One caller. Memory: ordinary; before the drive only.
+/// Ownership  A device may outlive its driver.
+/// Threads    One caller. Memory: ordinary; before the drive only.
 class CameraDriver {
  public:
   virtual ~CameraDriver() = default;
   [[nodiscard]] virtual std::vector<DeviceInfo> enumerate() = 0;
   /// `serial` empty: the first. Null: *status says why. → ok, not_found, no_permission, busy, failed
   [[nodiscard]] virtual std::unique_ptr<CameraDevice> open(std::string_view serial, DeviceStatus* status) = 0;
+  /// One sentence about the last open() that gave nothing, or enumerate() that found nothing. Empty: the status says it all.
+  [[nodiscard]] virtual std::string complaint() const { return {}; }
 };
 
 }  // namespace vergence

@@ -26,9 +26,9 @@ class Stream {
  public:
   [[nodiscard]] bool push(const Delivery<T>& d) noexcept {
     if (!ring_.push(d)) return false;
-    { const std::lock_guard lock(mutex_); }
+    const std::lock_guard lock(mutex_);  // stop() waits for it: nobody is told after it has returned
     filled_.notify_one();
-    if (Notifier* n = notifier_.load(std::memory_order_acquire)) n->notify();
+    if (notifier_ != nullptr) notifier_->notify();
     return true;
   }
   [[nodiscard]] bool full() const noexcept { return ring_.full(); }
@@ -36,7 +36,10 @@ class Stream {
 
   /// While gone: whether it has come back.
   [[nodiscard]] DeviceStatus start(Notifier* notifier) noexcept {
-    notifier_.store(notifier, std::memory_order_release);
+    {
+      const std::lock_guard lock(mutex_);
+      notifier_ = notifier;
+    }
     if (ended_) return DeviceStatus::ended;
     if (gone_) {
       Delivery<T> d;
@@ -52,8 +55,10 @@ class Stream {
   }
   void stop() noexcept {
     streaming_.store(false, std::memory_order_release);
-    notifier_.store(nullptr, std::memory_order_release);
-    { const std::lock_guard lock(mutex_); }
+    {
+      const std::lock_guard lock(mutex_);
+      notifier_ = nullptr;
+    }
     filled_.notify_all();
   }
 
@@ -75,10 +80,10 @@ class Stream {
 
  private:
   Ring<Delivery<T>, N> ring_;
-  std::atomic<Notifier*> notifier_{nullptr};
   std::atomic<bool> streaming_{false};
   bool gone_ = false, ended_ = false;  // the consumer's
   std::mutex mutex_;
+  Notifier* notifier_ = nullptr;  // under mutex_
   std::condition_variable filled_;
 };
 

@@ -1,0 +1,251 @@
+#include "tests/unit/drivers/conformance/camera_conformance.hpp"
+
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <chrono>
+#include <cstdlib>
+#include <mutex>
+#include <thread>
+
+#include "core/math/random.hpp"
+#include "tests/unit/drivers/conformance/shadow_camera.hpp"
+
+namespace vergence::test {
+namespace {
+
+using State = ShadowCamera::State;
+
+int asked_for(const char* name, int fallback) {
+  const char* text = std::getenv(name);
+  return text == nullptr ? fallback : std::atoi(text);
+}
+
+/// What no camera can do.
+std::vector<CameraConfiguration> nonsense(const CameraConfiguration& good) {
+  std::vector<CameraConfiguration> all(6, good);
+  all[0].width = 0;
+  all[1].height = -480;
+  all[2].rate_hz = 0;
+  all[3].exposure = -good.exposure;
+  all[4].exposure = Duration::seconds(2 / good.rate_hz);  // longer than the time between two
+  all[5].width = 1'000'003;
+  return all;
+}
+
+class CameraConformance : public ::testing::Test {
+ protected:
+  /// Null: the test was skipped.
+  ConformanceRig* make(std::uint64_t seed) {
+    std::string why = "this machine has no such rig";
+    rig_ = make_conformance_rig(seed, &why);
+    why_ = why;
+    return rig_.get();
+  }
+  std::unique_ptr<ConformanceRig> rig_;
+  std::string why_;
+};
+
+TEST_F(CameraConformance, randomRulesKeepTheContract) {
+  const int seeds = asked_for("VERGENCE_CONFORMANCE_SEEDS", 3), steps = asked_for("VERGENCE_CONFORMANCE_STEPS", 60);
+  for (int seed = 1; seed <= seeds && !HasFailure(); ++seed) {
+    if (make(static_cast<std::uint64_t>(seed)) == nullptr) GTEST_SKIP() << why_;
+    const auto possible = rig_->possible();
+    auto impossible = nonsense(possible.front());
+    for (const CameraConfiguration& c : rig_->impossible()) impossible.push_back(c);
+    Random random(static_cast<std::uint64_t>(seed));
+    const auto any_of = [&random](const auto& list) { return list[random.below(static_cast<std::uint32_t>(list.size()))]; };
+    ShadowCamera camera(rig_.get());
+    int unplugs = 1;  // each takes seconds, because cameras are given time to answer
+    for (int step = 0; step < steps && !HasFailure(); ++step) {
+      SCOPED_TRACE("seed " + std::to_string(seed) + ", step " + std::to_string(step));
+      const std::uint32_t rule = random.below(100);
+      const Duration period = Duration::seconds(1 / std::max(1.0, camera.configuration().rate_hz));
+      if (rule < 6) {
+        camera.configure(any_of(possible));
+      } else if (rule < 12) {
+        camera.refuse(any_of(impossible));
+      } else if (rule < 24) {
+        camera.start();
+      } else if (rule < 29) {
+        camera.stop();
+      } else if (rule < 65) {
+        const Duration limits[] = {Duration{}, Duration::milliseconds(1), period, period * 4};
+        (void)camera.wait(limits[random.below(4)]);
+      } else if (rule < 85) {
+        if (camera.holds()) camera.release(random.below(static_cast<std::uint32_t>(camera.held())));
+      } else if (rule < 92) {
+        if (camera.state() == State::streaming) camera.expect_frames(3);
+      } else if (rule < 94) {
+        if (unplugs > 0 && camera.unplug_and_replug()) --unplugs;
+      } else {
+        camera.check_statistics();
+      }
+    }
+    camera.release_all();
+    camera.check_statistics();
+  }
+}
+
+TEST_F(CameraConformance, nonsenseIsRefusedAndChangesNothing) {
+  if (make(11) == nullptr) GTEST_SKIP() << why_;
+  ShadowCamera camera(rig_.get());
+  const auto possible = rig_->possible();
+  for (const CameraConfiguration& c : nonsense(possible.front())) camera.refuse(c);
+  camera.start();  // still not configured
+  camera.configure(possible.front());
+  for (const CameraConfiguration& c : nonsense(possible.front())) camera.refuse(c);
+  for (const CameraConfiguration& c : rig_->impossible()) camera.refuse(c);
+  camera.start();
+  camera.expect_frames(3);
+  camera.configure(possible.back());  // busy
+  camera.expect_frames(3);
+  camera.check_statistics();
+}
+
+TEST_F(CameraConformance, aStartAfterAStopBeginsAnew) {
+  if (make(12) == nullptr) GTEST_SKIP() << why_;
+  ShadowCamera camera(rig_.get());
+  camera.configure(rig_->possible().front());
+  for (int i = 0; i < 4 && !HasFatalFailure(); ++i) {
+    camera.start();
+    camera.expect_frames(3);
+    camera.stop();
+    camera.release_all();
+    camera.check_statistics();
+  }
+}
+
+TEST_F(CameraConformance, aWaitEndsWhenTheCameraIsStopped) {
+  if (make(13) == nullptr) GTEST_SKIP() << why_;
+  auto configuration = rig_->possible().front();
+  CameraDevice& camera = rig_->camera();
+  ASSERT_EQ(camera.configure(configuration, nullptr), DeviceStatus::ok) << camera.complaint();
+  ASSERT_EQ(camera.start(nullptr), DeviceStatus::ok) << camera.complaint();
+  rig_->started();
+  std::atomic<bool> ended{false};
+  std::thread consumer([&] {
+    Frame frame;
+    for (;;) {
+      const DeviceStatus status = camera.wait(Duration::seconds(30), &frame);
+      if (status != DeviceStatus::ok) {
+        EXPECT_EQ(status, DeviceStatus::stopped);
+        break;
+      }
+      camera.release(frame.slot);
+    }
+    ended = true;
+  });
+  std::this_thread::sleep_for(std::chrono::milliseconds(200));
+  camera.stop();
+  for (int i = 0; i < 200 && !ended; ++i) std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  EXPECT_TRUE(ended) << "stop() did not wake wait()";
+  consumer.join();
+}
+
+TEST_F(CameraConformance, withoutAFreeSlotTheNewestIsDroppedAndCounted) {
+  if (make(14) == nullptr) GTEST_SKIP() << why_;
+  ShadowCamera camera(rig_.get());
+  camera.configure(rig_->possible().front());
+  camera.start();
+  camera.expect_frames(1);
+  const std::uint64_t before = rig_->camera().statistics().underruns;
+  const auto deadline = std::chrono::steady_clock::now() + std::chrono::seconds(20);
+  std::uint64_t dropped = 0;
+  while (dropped < 3 && std::chrono::steady_clock::now() < deadline && !HasFatalFailure()) {
+    const DeviceStatus status = camera.wait(Duration::milliseconds(100));
+    ASSERT_TRUE(status == DeviceStatus::ok || status == DeviceStatus::timeout) << to_string(status);
+    dropped = rig_->camera().statistics().underruns - before;
+  }
+  ASSERT_GE(dropped, 3U) << "with " << camera.held() << " slots out nothing was dropped";
+  EXPECT_LE(camera.held(), FramePool::kMaxSlots);
+  camera.release_all();
+  camera.expect_frames(6);
+  EXPECT_GE(camera.gaps(), 3U);
+  camera.check_statistics();
+}
+
+TEST_F(CameraConformance, exposuresThatNeverArriveAreCounted) {
+  if (make(15) == nullptr) GTEST_SKIP() << why_;
+  ShadowCamera camera(rig_.get());
+  camera.configure(rig_->possible().front());
+  camera.start();
+  camera.expect_frames(5);
+  const std::uint64_t gaps = camera.gaps();
+  const CameraStatistics before = rig_->camera().statistics();
+  if (!rig_->lose(4)) return;  // nothing on this rig loses frames
+  camera.expect_frames(12);
+  const CameraStatistics after = rig_->camera().statistics();
+  EXPECT_EQ(camera.gaps() - gaps, 4 + after.underruns - before.underruns);
+  EXPECT_EQ(after.lost - before.lost, 4U);
+}
+
+TEST_F(CameraConformance, anUnpluggedCameraIsGoneAndComesBack) {
+  if (make(16) == nullptr) GTEST_SKIP() << why_;
+  ShadowCamera camera(rig_.get());
+  camera.configure(rig_->possible().front());
+  camera.start();
+  camera.expect_frames(3);
+  if (!camera.unplug_and_replug()) return;
+  camera.expect_frames(5);
+  camera.release_all();
+  camera.check_statistics();
+}
+
+TEST_F(CameraConformance, ownerConsumerAndReleaserMayBeThreeThreads) {
+  if (make(17) == nullptr) GTEST_SKIP() << why_;
+  CameraDevice& camera = rig_->camera();
+  const auto configuration = rig_->possible().front();
+  ASSERT_EQ(camera.configure(configuration, nullptr), DeviceStatus::ok) << camera.complaint();
+  std::mutex mutex;
+  std::vector<FrameSlot> back;
+  std::atomic<bool> over{false};
+  std::atomic<int> frames{0};
+  std::thread consumer([&] {
+    for (Frame frame; !over;) {
+      const DeviceStatus status = camera.wait(Duration::milliseconds(20), &frame);
+      if (status == DeviceStatus::stopped) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+      if (status != DeviceStatus::ok) continue;
+      ++frames;
+      const std::lock_guard lock(mutex);
+      back.push_back(frame.slot);
+    }
+  });
+  std::thread releaser([&] {
+    for (bool last = false;;) {
+      std::vector<FrameSlot> mine;
+      {
+        const std::lock_guard lock(mutex);
+        mine.swap(back);
+      }
+      for (const FrameSlot slot : mine) camera.release(slot);
+      if (last) break;
+      last = over;
+      std::this_thread::sleep_for(std::chrono::milliseconds(3));
+    }
+  });
+  CountingNotifier notifier;
+  for (int i = 0; i < 6; ++i) {
+    EXPECT_EQ(camera.start(&notifier), DeviceStatus::ok) << camera.complaint();
+    rig_->started();
+    for (int k = 0; k < 10; ++k) {
+      if (configuration.trigger == CameraTrigger::software) (void)camera.trigger_once();
+      std::this_thread::sleep_for(std::chrono::milliseconds(15));
+      (void)camera.statistics();
+    }
+    camera.stop();
+  }
+  over = true;
+  consumer.join();
+  {
+    const std::lock_guard lock(mutex);  // the releaser's last round may have been before the last frame
+  }
+  releaser.join();
+  for (const FrameSlot slot : back) camera.release(slot);
+  EXPECT_GT(frames, 6);
+  EXPECT_EQ(camera.statistics().delivered, static_cast<std::uint64_t>(frames.load()));
+  EXPECT_EQ(camera.statistics().starts, 6U);
+}
+
+}  // namespace
+}  // namespace vergence::test

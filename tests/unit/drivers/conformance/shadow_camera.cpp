@@ -1,0 +1,256 @@
+#include "tests/unit/drivers/conformance/shadow_camera.hpp"
+
+#include <gtest/gtest.h>
+#include <time.h>
+
+#include <algorithm>
+#include <chrono>
+#include <thread>
+
+namespace vergence::test {
+namespace {
+
+using std::chrono::steady_clock;
+
+constexpr Duration kSlack = Duration::milliseconds(500);   // a busy machine's, beyond any limit that is asked for
+constexpr Duration kFirst = Duration::milliseconds(4000);  // from start() to a frame at the latest: links are probed, sensors settle
+
+HostStamp now() noexcept {
+  timespec t{};
+  (void)::clock_gettime(CLOCK_MONOTONIC, &t);
+  return HostStamp(static_cast<std::int64_t>(t.tv_sec) * 1'000'000'000 + t.tv_nsec);
+}
+
+/// FNV-1a over the pixels, without the padding.
+std::uint64_t sum_of(const ImageView& view) noexcept {
+  std::uint64_t h = 0xcbf29ce484222325U;
+  for (int y = 0; y < view.height; ++y)
+    for (const std::uint8_t *p = view.row(y), *end = p + view.width; p != end; ++p) h = (h ^ *p) * 0x100000001b3U;
+  return h;
+}
+
+bool overlap(const ImageView& a, const ImageView& b) noexcept {
+  return a.data < b.row(b.height - 1) + b.width && b.data < a.row(a.height - 1) + a.width;
+}
+
+}  // namespace
+
+ShadowCamera::ShadowCamera(ConformanceRig* rig) : rig_(rig), camera_(rig->camera()) {
+  EXPECT_FALSE(camera_.info().driver.empty());
+  last_ = at_start_ = camera_.statistics();
+  Frame frame;
+  EXPECT_EQ(camera_.wait(Duration{}, &frame), DeviceStatus::stopped) << "never started";
+  EXPECT_EQ(camera_.start(nullptr), DeviceStatus::bad_configuration) << "never configured";
+}
+
+ShadowCamera::~ShadowCamera() {
+  stop();
+  release_all();
+}
+
+void ShadowCamera::configure(const CameraConfiguration& wanted) {
+  CameraConfiguration actual;
+  const DeviceStatus status = camera_.configure(wanted, &actual);
+  if (state_ == State::streaming || state_ == State::gone) {
+    EXPECT_EQ(status, DeviceStatus::busy) << "configured while streaming";
+    return;
+  }
+  if (holds()) {
+    EXPECT_EQ(status, DeviceStatus::busy) << "configured with slots out";
+    return;
+  }
+  ASSERT_EQ(status, DeviceStatus::ok) << camera_.complaint();
+  EXPECT_EQ(actual.width, wanted.width);
+  EXPECT_EQ(actual.height, wanted.height);
+  EXPECT_EQ(actual.trigger, wanted.trigger);
+  now_ = wanted;
+  state_ = State::stopped;
+  EXPECT_GE(camera_.timing().least_delay, Duration{});
+  EXPECT_GT(camera_.timing().resolution, Duration{});
+}
+
+void ShadowCamera::refuse(const CameraConfiguration& nonsense) {
+  CameraConfiguration actual = nonsense;
+  const DeviceStatus status = camera_.configure(nonsense, &actual);
+  if (state_ == State::streaming || state_ == State::gone) {
+    EXPECT_NE(status, DeviceStatus::ok);
+    return;
+  }
+  EXPECT_TRUE(status == DeviceStatus::unsupported || status == DeviceStatus::bad_configuration || status == DeviceStatus::busy)
+      << to_string(status) << " for " << nonsense.width << " x " << nonsense.height << " at " << nonsense.rate_hz << " Hz";
+  EXPECT_EQ(actual.width, nonsense.width) << "refused, and *actual written";
+  if (status == DeviceStatus::unsupported && camera_.info().driver != "mock") {
+    EXPECT_FALSE(camera_.complaint().empty()) << "what the camera offers is not said";
+  }
+}
+
+void ShadowCamera::start() {
+  const DeviceStatus status = camera_.start(&notifier_);
+  if (state_ == State::unconfigured) {
+    EXPECT_EQ(status, DeviceStatus::bad_configuration);
+    return;
+  }
+  if (state_ == State::gone) return;  // only unplug_and_replug() asks for it back
+  ASSERT_EQ(status, DeviceStatus::ok) << camera_.complaint();
+  if (state_ == State::streaming) return;
+  state_ = State::streaming;
+  ++starts_;
+  any_ = false;
+  gaps_ = 0;
+  at_start_ = last_;
+  rig_->started();
+}
+
+void ShadowCamera::stop() {
+  camera_.stop();
+  const std::uint64_t told = notifier_.told();
+  if (state_ != State::unconfigured) state_ = State::stopped;
+  Frame frame;
+  EXPECT_EQ(camera_.wait(Duration::milliseconds(5), &frame), DeviceStatus::stopped);
+  camera_.stop();
+  EXPECT_EQ(notifier_.told(), told) << "told after stop() returned";
+}
+
+void ShadowCamera::trigger_if_asked() {
+  if (now_.trigger != CameraTrigger::software || state_ != State::streaming) return;
+  const DeviceStatus status = camera_.trigger_once();
+  EXPECT_TRUE(status == DeviceStatus::ok || (unplugged_ && status == DeviceStatus::gone)) << to_string(status) << camera_.complaint();
+}
+
+DeviceStatus ShadowCamera::wait(Duration limit) {
+  trigger_if_asked();
+  Frame frame;
+  frame.slot = 0xFFFF;
+  const auto begin = steady_clock::now();
+  const DeviceStatus status = camera_.wait(limit, &frame);
+  const auto took = Duration::nanoseconds((steady_clock::now() - begin).count());
+  EXPECT_LE(took, limit + kSlack) << "waited " << took.to_seconds() << " s for a limit of " << limit.to_seconds();
+  switch (status) {
+    case DeviceStatus::ok:
+      EXPECT_TRUE(state_ == State::streaming) << "a frame while not streaming";
+      take(frame);
+      break;
+    case DeviceStatus::timeout:
+      EXPECT_TRUE(state_ == State::streaming);
+      EXPECT_EQ(frame.slot, 0xFFFF) << "no frame, and *frame written";
+      EXPECT_GE(took + Duration::milliseconds(1), limit) << "gave up early";
+      break;
+    case DeviceStatus::stopped:
+      EXPECT_TRUE(state_ == State::unconfigured || state_ == State::stopped);
+      break;
+    case DeviceStatus::gone:
+      EXPECT_TRUE(unplugged_) << "gone with the cable in: " << camera_.complaint();
+      if (state_ == State::streaming) {
+        EXPECT_LE(frame.arrival, now());
+        EXPECT_GT(frame.arrival.ns(), 0) << "when it went is not said";
+      }
+      state_ = State::gone;
+      break;
+    default:
+      ADD_FAILURE() << "wait() → " << to_string(status);
+  }
+  return status;
+}
+
+void ShadowCamera::take(const Frame& frame) {
+  ++delivered_;
+  const bool torn = frame.status != FrameStatus::complete;
+  if (torn) ++torn_;
+  const ImageView view = camera_.view(frame.slot);
+  ASSERT_FALSE(view.empty());
+  EXPECT_EQ(view.width, now_.width);
+  EXPECT_EQ(view.height, now_.height);
+  EXPECT_GE(view.stride, view.width);
+  for (const Held& h : held_) {
+    EXPECT_NE(h.frame.slot, frame.slot) << "handed out twice";
+    EXPECT_FALSE(overlap(h.view, view)) << "two slots share pixels";
+  }
+  EXPECT_LE(frame.arrival, now());
+  EXPECT_GT(frame.exposure, Duration{});
+  if (any_) {
+    EXPECT_GT(frame.counter, newest_.counter) << "counters go up";
+    if (!torn && newest_.status == FrameStatus::complete) {
+      EXPECT_GT(frame.exposure_start, newest_.exposure_start) << "stamps go up";
+    }
+    EXPECT_GE(frame.arrival, newest_.arrival);
+    gaps_ += frame.counter - newest_.counter - 1;
+  } else if (rig_->counts_from_start()) {
+    gaps_ += frame.counter;
+  }
+  const CameraStatistics s = camera_.statistics();
+  const std::uint64_t missing = s.lost + s.underruns - at_start_.lost - at_start_.underruns;
+  EXPECT_LE(gaps_, missing) << "frame " << frame.counter << ": a gap that no counter tells";
+  any_ = true;
+  newest_ = frame;
+  if (!torn) {
+    EXPECT_TRUE(rig_->content_fits(frame, view)) << "frame " << frame.counter << " has another one's pixels";
+  }
+  held_.push_back({frame, view, sum_of(view)});
+}
+
+void ShadowCamera::release(std::size_t which) {
+  const Held h = held_[which];
+  EXPECT_EQ(sum_of(h.view), h.sum) << "frame " << h.frame.counter << " was written to while it was ours";
+  held_.erase(held_.begin() + static_cast<std::ptrdiff_t>(which));
+  camera_.release(h.frame.slot);
+}
+
+void ShadowCamera::release_all() {
+  while (holds()) release(held_.size() - 1);
+}
+
+void ShadowCamera::expect_frames(int count) {
+  const auto deadline = steady_clock::now() + std::chrono::nanoseconds(kFirst.ns());
+  for (int got = 0; got < count && !::testing::Test::HasFatalFailure();) {
+    ASSERT_LT(steady_clock::now(), deadline) << got << " of " << count << " frames came: " << camera_.complaint();
+    release_all();
+    if (wait(Duration::milliseconds(200)) == DeviceStatus::ok) ++got;
+  }
+}
+
+bool ShadowCamera::unplug_and_replug() {
+  if (state_ != State::streaming || !rig_->unplug()) return false;
+  unplugged_ = true;
+  const auto soon = [this] { return steady_clock::now() + std::chrono::nanoseconds(rig_->gone_within().ns()); };
+  for (const auto deadline = soon(); state_ != State::gone;) {  // what was under way still comes
+    if (steady_clock::now() > deadline) {
+      ADD_FAILURE() << "unplugged, and not gone";
+      return true;
+    }
+    release_all();
+    (void)wait(Duration::milliseconds(100));
+  }
+  EXPECT_EQ(wait(Duration::milliseconds(50)), DeviceStatus::gone) << "gone stays gone";
+  EXPECT_EQ(camera_.start(&notifier_), DeviceStatus::gone) << "started without a cable";
+  rig_->replug();
+  for (const auto deadline = soon();;) {
+    const DeviceStatus status = camera_.start(&notifier_);
+    if (status == DeviceStatus::ok) break;
+    EXPECT_EQ(status, DeviceStatus::gone);
+    if (steady_clock::now() > deadline) {
+      ADD_FAILURE() << "plugged in again, and not back: " << camera_.complaint();
+      return true;
+    }
+    std::this_thread::sleep_for(std::chrono::milliseconds(100));
+  }
+  unplugged_ = false;
+  state_ = State::streaming;
+  ++starts_;
+  any_ = false;
+  gaps_ = 0;
+  at_start_ = camera_.statistics();
+  rig_->started();
+  return true;
+}
+
+void ShadowCamera::check_statistics() {
+  const CameraStatistics s = camera_.statistics();
+  EXPECT_EQ(s.delivered, delivered_);
+  EXPECT_EQ(s.torn, torn_);
+  EXPECT_EQ(s.starts, starts_);
+  EXPECT_GE(s.underruns, last_.underruns);
+  EXPECT_GE(s.lost, last_.lost);
+  last_ = s;
+}
+
+}  // namespace vergence::test

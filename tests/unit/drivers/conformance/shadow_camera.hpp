@@ -1,0 +1,76 @@
+#pragma once
+#include <atomic>
+#include <cstdint>
+#include <vector>
+
+#include "tests/unit/drivers/conformance/camera_conformance.hpp"
+
+namespace vergence::test {
+
+/// Counts what a camera tells it.
+class CountingNotifier final : public Notifier {
+ public:
+  void notify() noexcept override { told_.fetch_add(1); }
+  [[nodiscard]] std::uint64_t told() const noexcept { return told_.load(); }
+
+ private:
+  std::atomic<std::uint64_t> told_{0};
+};
+
+/// The model beside the camera: every call goes through it, and what the camera answers is held against the contract.
+///
+/// Failures are GoogleTest's, each with the number of the step. Threads  One.
+class ShadowCamera {
+ public:
+  explicit ShadowCamera(ConformanceRig* rig);
+  ~ShadowCamera();
+
+  enum class State : std::uint8_t { unconfigured, stopped, streaming, gone };
+  [[nodiscard]] State state() const noexcept { return state_; }
+  [[nodiscard]] bool holds() const noexcept { return !held_.empty(); }
+  [[nodiscard]] std::size_t held() const noexcept { return held_.size(); }
+  [[nodiscard]] const CameraConfiguration& configuration() const noexcept { return now_; }
+
+  void configure(const CameraConfiguration& wanted);
+  /// Must be refused and change nothing.
+  void refuse(const CameraConfiguration& nonsense);
+  void start();
+  void stop();
+  /// → what the camera answered, checked.
+  DeviceStatus wait(Duration limit);
+  void release(std::size_t which);
+  void release_all();
+  /// Takes frames until one comes, releasing as it goes; fails when none comes in time.
+  void expect_frames(int count);
+  /// Cable out and in again; what is in between is checked. False: the rig cannot.
+  bool unplug_and_replug();
+  /// Statistics against the model.
+  void check_statistics();
+
+  [[nodiscard]] std::uint64_t gaps() const noexcept { return gaps_; }  // exposures missing between handed out frames, this start
+  [[nodiscard]] const CameraStatistics& at_start() const noexcept { return at_start_; }
+
+ private:
+  struct Held {
+    Frame frame;
+    ImageView view;
+    std::uint64_t sum = 0;
+  };
+  void take(const Frame& frame);
+  void trigger_if_asked();
+
+  ConformanceRig* rig_;
+  CameraDevice& camera_;
+  CountingNotifier notifier_;
+  State state_ = State::unconfigured;
+  bool unplugged_ = false;
+  CameraConfiguration now_{};
+  std::vector<Held> held_;
+  std::uint64_t delivered_ = 0, torn_ = 0, starts_ = 0;
+  CameraStatistics last_{}, at_start_{};
+  bool any_ = false;  // frame since start
+  Frame newest_{};
+  std::uint64_t gaps_ = 0;
+};
+
+}  // namespace vergence::test
