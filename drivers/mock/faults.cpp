@@ -12,6 +12,7 @@ constexpr double kLongest = 86400;  // s: a day
 constexpr FaultParameter kCamera{"camera", -1, -1, 3, "which camera, from 0; -1: every one"};
 constexpr FaultParameter kCamera1{"camera", 1, 0, 3, "which camera, from 0"};
 constexpr FaultParameter kDuration{"duration_s", 5, 0, kLongest, "for how long; 0: to the end"};
+constexpr FaultParameter kForGood{"duration_s", 0, 0, kLongest, "for how long; 0: to the end"};
 constexpr FaultParameter kShare{"share", 0.1, 0, 1, "of the frames, drawn at random"};
 constexpr FaultParameter kPitch{"pitch_deg", 0, -45, 45, "turn about the camera's x axis (right)"};
 constexpr FaultParameter kYaw{"yaw_deg", 0, -45, 45, "turn about its y axis (down)"};
@@ -23,11 +24,20 @@ constexpr FaultParameter kZ{"z_m", 0, -1, 1, "shift along its z axis"};
 constexpr FaultParameter kKnock[] = {kCamera1, kPitch, kYaw, kRoll, kX, kY, kZ};
 constexpr FaultParameter kDrift[] = {kCamera1, kPitch, kYaw, kRoll,
                                      kX,       kY,     kZ,   {"duration_s", 60, 1, kLongest, "how long it takes; then it stays"}};
+constexpr FaultParameter kLag[] = {kCamera1, kForGood};
+constexpr FaultParameter kSwap[] = {kForGood};
+constexpr FaultParameter kOccluder[] = {
+    {"ahead_m", 1.2, 0.3, 200, "from the left camera to its nearest face, along the vehicle's heading"},
+    {"left_m", 0, -50, 50, "its middle, to the left of the vehicle's"},
+    {"turn_deg", 0, -180, 180, "its heading against the vehicle's, to the left; 90: it stands across"},
+    {"speed_mps", 0, -40, 40, "along its own heading, relative to the vehicle; 0: it moves with the rig"},
+    kDuration};
 constexpr FaultParameter kCover[] = {kCamera, kDuration};
 constexpr FaultParameter kNight[] = {{"factor", 0.02, 0, 1, "brightness against daylight"}, kDuration};
 constexpr FaultParameter kExposure[] = {kCamera, {"factor", 3, 0, 100, "brightness against what was set"}, kDuration};
 constexpr FaultParameter kLose[] = {kCamera, kShare, kDuration};
 constexpr FaultParameter kLate[] = {kCamera, kShare, {"delay_s", 0.2, 0, 10, "later than usual by this"}, kDuration};
+constexpr FaultParameter kBreakPairs[] = {{"share", 1, 0, 1, "of the pulses, drawn at random"}, kDuration};
 constexpr FaultParameter kInsGone[] = {kDuration};
 constexpr FaultParameter kPositionJump[] = {{"east_m", 100, -1e5, 1e5, "towards east"},
                                             {"north_m", 0, -1e5, 1e5, "towards north"},
@@ -39,6 +49,11 @@ constexpr FaultParameter kTimeJump[] = {{"camera", -1, -1, 3, "whose clock; -1: 
 constexpr FaultRow kRows[] = {
     {FaultKind::knock, "knock", "A camera is knocked out of its place and stays so.", kKnock},
     {FaultKind::drift, "drift", "A camera turns or moves evenly, as a mount that warms up.", kDrift},
+    {FaultKind::recalibrate, "recalibrate", "The calibration is asked for anew, as with SIGUSR1; nothing happens to the devices.", {}},
+    {FaultKind::lag, "lag", "A camera is a frame late: the image of the exposure before, with the counter and the stamp of this one.",
+     kLag},
+    {FaultKind::swap_cables, "swap_cables", "The cables of cameras 0 and 1 are exchanged; the truth stays that of the cameras.", kSwap},
+    {FaultKind::occluder, "occluder", "A bus (12 m, 2.5 m wide, 3.2 m high) is in the way.", kOccluder},
     {FaultKind::cover, "cover", "A lens is covered: black pictures.", kCover},
     {FaultKind::night, "night", "It gets dark for every camera.", kNight},
     {FaultKind::exposure, "exposure", "The brightness of the pictures changes.", kExposure},
@@ -46,10 +61,12 @@ constexpr FaultRow kRows[] = {
     {FaultKind::lose_frames, "lose_frames", "Frames never arrive; the counter shows the gaps.", kLose},
     {FaultKind::late_frames, "late_frames", "Frames arrive late.", kLate},
     {FaultKind::duplicate_frames, "duplicate_frames", "Frames arrive twice.", kLose},
+    {FaultKind::break_pairs, "break_pairs", "Of a pulse one camera's image, drawn at random, never arrives.", kBreakPairs},
     {FaultKind::ins_gone, "ins_gone", "The INS is silent; at 0 it starts late.", kInsGone},
     {FaultKind::no_fix, "no_fix", "The satellite receiver has no position.", kInsGone},
     {FaultKind::position_jump, "position_jump", "The INS's position leaps.", kPositionJump},
     {FaultKind::time_jump, "time_jump", "A device's clock is set.", kTimeJump},
+    {FaultKind::disk_full, "disk_full", "The disk of the session has no room; nothing happens to the devices.", kInsGone},
 };
 
 double number(std::string_view text, const std::string& what) {
@@ -75,8 +92,10 @@ void set(Fault* fault, std::string_view name, double value) {
   if (name == "pitch_deg") fault->turn.x() = value * kDegree;
   if (name == "yaw_deg") fault->turn.y() = value * kDegree;
   if (name == "roll_deg") fault->turn.z() = value * kDegree;
-  if (name == "x_m" || name == "east_m") fault->shift.x() = value;
-  if (name == "y_m" || name == "north_m") fault->shift.y() = value;
+  if (name == "turn_deg") fault->turn.z() = value * kDegree;
+  if (name == "x_m" || name == "east_m" || name == "ahead_m") fault->shift.x() = value;
+  if (name == "y_m" || name == "north_m" || name == "left_m") fault->shift.y() = value;
+  if (name == "speed_mps") fault->speed = value;
   if (name == "z_m" || name == "up_m") fault->shift.z() = value;
   if (name == "factor") fault->factor = value;
   if (name == "share") fault->share = value;
@@ -110,6 +129,7 @@ Fault make_fault(const std::string& kind, double at_s, const std::vector<std::pa
       if (name == p.name) known = &p;
       names += std::string(names.empty() ? "" : ", ") + p.name;
     }
+    if (row.parameters.empty()) names = "none";
     if (known == nullptr) throw std::invalid_argument(kind + " has no parameter \"" + name.substr(0, 40) + "\"; it has " + names);
     if (!(value >= known->least && value <= known->most))
       throw std::invalid_argument(kind + "'s " + name + " is " + text_of(value) + "; it must be in " + text_of(known->least) + " … " +
@@ -141,6 +161,7 @@ Fault parse_fault(std::string_view text) {
 std::string fault_document() {
   std::string table = "| kind | what happens | parameter | default | range | meaning |\n|---|---|---|---|---|---|\n";
   for (const FaultRow& row : kRows) {
+    if (row.parameters.empty()) table += "| `" + std::string(row.name) + "` | " + row.meaning + " | – | | | |\n";
     bool first = true;
     for (const FaultParameter& p : row.parameters) {
       table += first ? "| `" + std::string(row.name) + "` | " + row.meaning : std::string("| | ");

@@ -16,6 +16,10 @@ namespace vergence::mock {
 enum class FaultKind : std::uint8_t {
   knock,
   drift,
+  recalibrate,
+  lag,
+  swap_cables,
+  occluder,
   cover,
   night,
   exposure,
@@ -23,10 +27,12 @@ enum class FaultKind : std::uint8_t {
   lose_frames,
   late_frames,
   duplicate_frames,
+  break_pairs,
   ins_gone,
   no_fix,
   position_jump,
   time_jump,
+  disk_full,
 };
 
 /// Something that goes wrong at a time of the drive. Parameters that a kind does not have are zero.
@@ -35,8 +41,9 @@ struct Fault {
   Duration at{};              // since the drive's start
   Duration duration{};        // zero: to the end
   int camera = -1;            // −1: every camera
-  Vec3 turn = Vec3::Zero();   // rad about the camera's x (pitch), y (yaw), z (roll)
-  Vec3 shift = Vec3::Zero();  // m along the camera's x, y, z; of position_jump: east, north, up
+  Vec3 turn = Vec3::Zero();   // rad about the camera's x (pitch), y (yaw), z (roll); of occluder: z alone, about the vertical
+  Vec3 shift = Vec3::Zero();  // m along the camera's x, y, z; of position_jump: east, north, up; of occluder: ahead, to the left, 0
+  double speed = 0;           // m/s, along its own length, relative to the vehicle
   double factor = 1;          // of the brightness
   double share = 0;           // of the frames, 0..1
   double delay = 0;           // s

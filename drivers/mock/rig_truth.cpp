@@ -1,6 +1,7 @@
 #include "drivers/mock/rig_truth.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
 namespace vergence::mock {
@@ -21,6 +22,23 @@ Transform RigTruth::camera_on_body(int camera, Duration time) const noexcept {
     if (part > 0) T_moved_camera = Transform{exp_so3(part * f.turn), part * f.shift} * T_moved_camera;
   }
   return mounts_[static_cast<std::size_t>(camera)] * T_moved_camera.inverse();
+}
+
+std::optional<Transform> RigTruth::bus_in_enu(Duration time) const noexcept {
+  const Fault* bus = nullptr;  // the last one that was scheduled
+  for (const Fault& f : faults_)
+    if (f.kind == FaultKind::occluder && f.active(time)) bus = &f;
+  if (bus == nullptr) return std::nullopt;
+  const Transform T_enu_body = drive_.at(time).T_enu_body;
+  const Vec3 forward = T_enu_body.R.col(0);
+  const Mat3 R_enu_level = exp_so3(Vec3(0, 0, std::atan2(forward.y(), forward.x())));
+  const double turn = bus->turn.z(), way = bus->speed * (time - bus->at).to_seconds();
+  // From its middle to the face that is turned to the vehicle.
+  const double reach = 0.5 * (kBusLength * std::abs(std::cos(turn)) + kBusWidth * std::abs(std::sin(turn)));
+  const Vec3 middle(mounts_[0].t.x() + bus->shift.x() + reach + way * std::cos(turn), bus->shift.y() + way * std::sin(turn), 0);
+  Transform T{R_enu_level * exp_so3(Vec3(0, 0, turn)), T_enu_body.t + R_enu_level * middle};
+  T.t.z() = world_->ground(T.t.x(), T.t.y());
+  return T;
 }
 
 RigCalibration RigTruth::calibration(Duration time) const noexcept {

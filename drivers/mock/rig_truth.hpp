@@ -1,6 +1,7 @@
 #pragma once
 #include <array>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "core/types/calibration.hpp"
@@ -32,6 +33,9 @@ class RigTruth {
   }
   /// p_enu = T · p_ins.
   [[nodiscard]] Transform ins_in_enu(Duration time) const noexcept { return drive_.at(time).T_enu_body * T_body_ins_; }
+  /// p_enu = T · p_bus (x forward, y left, z up, the middle of its floor): the bus that is in the way then, if one is. It stands level on
+  /// the ground.
+  [[nodiscard]] std::optional<Transform> bus_in_enu(Duration time) const noexcept;
   /// The rig's calibration as it truly is then.
   [[nodiscard]] RigCalibration calibration(Duration time) const noexcept;
 

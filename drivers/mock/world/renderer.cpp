@@ -1,6 +1,7 @@
 #include "drivers/mock/world/renderer.hpp"
 
 #include <algorithm>
+#include <cassert>
 #include <stdexcept>
 #include <utility>
 #include <vector>
@@ -21,9 +22,9 @@ struct Renderer::Impl {
     brightness.resize(static_cast<std::size_t>(stride) * static_cast<std::size_t>(tiles.rows) * kTile);
   }
 
-  void add_pose(const Transform& T_camera_enu, float weight) {
+  void add_pose(const Transform& T_camera_enu, const Transform* T_camera_bus, float weight) {
     const Scene& scene = world->scene();
-    projection.build(scene, tiles, camera, T_camera_enu, pattern == Pattern::gbrg);
+    projection.build(scene, tiles, camera, T_camera_enu, T_camera_bus, pattern == Pattern::gbrg);
     TileInput in;
     in.polygons = projection.polygons();
     in.texture_words = scene.atlas.words();
@@ -72,10 +73,13 @@ Renderer& Renderer::operator=(Renderer&&) noexcept = default;
 
 const Camera& Renderer::camera() const noexcept { return impl_->camera; }
 
-void Renderer::render(std::span<const Transform> T_camera_enu, const Shot& shot, std::uint8_t* out, std::ptrdiff_t stride) {
+void Renderer::render(std::span<const Transform> T_camera_enu, const Shot& shot, std::uint8_t* out, std::ptrdiff_t stride,
+                      std::span<const Transform> T_camera_bus) {
+  assert(T_camera_bus.empty() || T_camera_bus.size() == T_camera_enu.size());
   Impl& m = *impl_;
   std::fill(m.brightness.begin(), m.brightness.end(), 0.0F);
-  for (const Transform& T : T_camera_enu) m.add_pose(T, 1.0F / static_cast<float>(T_camera_enu.size()));
+  for (std::size_t i = 0; i < T_camera_enu.size(); ++i)
+    m.add_pose(T_camera_enu[i], T_camera_bus.empty() ? nullptr : &T_camera_bus[i], 1.0F / static_cast<float>(T_camera_enu.size()));
 
   SensorInput sensor;
   sensor.exposure = static_cast<float>(shot.exposure);

@@ -40,8 +40,9 @@ class Renderer {
   Renderer& operator=(Renderer&&) noexcept;
 
   /// One picture into width x height bytes, rows `stride` apart. Several poses are the camera's way during the exposure,
-  /// averaged (motion blur); precondition: at least one.
-  void render(std::span<const Transform> T_camera_enu, const Shot& shot, std::uint8_t* out, std::ptrdiff_t stride);
+  /// averaged (motion blur); precondition: at least one. `T_camera_bus`: where the bus is at each of them, or nothing.
+  void render(std::span<const Transform> T_camera_enu, const Shot& shot, std::uint8_t* out, std::ptrdiff_t stride,
+              std::span<const Transform> T_camera_bus = {});
   void render(const Transform& T_camera_enu, const Shot& shot, std::uint8_t* out, std::ptrdiff_t stride) {
     render(std::span(&T_camera_enu, 1), shot, out, stride);
   }

@@ -40,6 +40,7 @@ bool inside(const Polygon& polygon, const Vec3& p) noexcept {
 World::World(const WorldOptions& options) : options_(checked(options)), scene_(std::make_unique<Scene>()) {
   paint_materials(options_.seed, options_.texture_detail, scene_.get());
   build_town(options_, scene_.get());
+  build_bus(options_, scene_.get());
 }
 World::World(const WorldOptions& options, std::unique_ptr<Scene> scene) : options_(checked(options)), scene_(std::move(scene)) {}
 World::~World() = default;

@@ -54,7 +54,8 @@ class World {
   std::unique_ptr<Scene> scene_;
 };
 
-inline constexpr double kKerb = 0.12;                                      // m
-inline constexpr double kStreetSpacingX = 150.0, kStreetSpacingY = 100.0;  // m between centrelines
+inline constexpr double kKerb = 0.12;                                          // m
+inline constexpr double kBusLength = 12.0, kBusWidth = 2.5, kBusHeight = 3.2;  // m
+inline constexpr double kStreetSpacingX = 150.0, kStreetSpacingY = 100.0;      // m between centrelines
 
 }  // namespace vergence::mock

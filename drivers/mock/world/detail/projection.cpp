@@ -94,7 +94,8 @@ RayTiles::RayTiles(const Camera& camera) {
     }
 }
 
-void Projection::build(const Scene& scene, const RayTiles& tiles, const Camera& camera, const Transform& T_camera_enu, bool bayer) {
+void Projection::build(const Scene& scene, const RayTiles& tiles, const Camera& camera, const Transform& T_camera_enu,
+                       const Transform* T_camera_bus, bool bayer) {
   polygons_.clear();
   candidates_.resize(tiles.bounds.size());
   for (auto& list : candidates_) list.clear();
@@ -112,6 +113,8 @@ void Projection::build(const Scene& scene, const RayTiles& tiles, const Camera& 
     for (std::size_t i = object.first; i < object.first + object.count; ++i)
       (void)add(scene, scene.polygons[i], tiles, camera, T_camera_enu, bayer);
   }
+  if (T_camera_bus != nullptr)
+    for (const Polygon& polygon : scene.bus) (void)add(scene, polygon, tiles, camera, *T_camera_bus, bayer);
   for (auto& list : candidates_) {
     float closed = 0;  // inverse depth in front of which everything that counts lies
     for (const Candidate& c : list)

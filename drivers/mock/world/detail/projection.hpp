@@ -26,7 +26,9 @@ struct RayTiles {
 /// What one pose sees: the polygons in front of the camera and the candidates of every tile.
 class Projection {
  public:
-  void build(const Scene& scene, const RayTiles& tiles, const Camera& camera, const Transform& T_camera_enu, bool bayer);
+  /// `T_camera_bus`: null, there is none.
+  void build(const Scene& scene, const RayTiles& tiles, const Camera& camera, const Transform& T_camera_enu, const Transform* T_camera_bus,
+             bool bayer);
 
   [[nodiscard]] std::span<const ProjectedPolygon> polygons() const noexcept { return polygons_; }
   [[nodiscard]] std::span<const Candidate> candidates(std::size_t tile) const noexcept { return candidates_[tile]; }

@@ -124,6 +124,18 @@ void add_car(SceneBuilder* builder, const Lot& lot, double along_m, Random* rand
   builder->end();
 }
 
+void build_bus(const WorldOptions& options, Scene* scene) {
+  constexpr double kFloor = 0.3;  // m above the ground
+  const std::size_t first = scene->polygons.size();
+  SceneBuilder builder(options, scene);
+  // Rows of windows along it, boards with letters at both ends: there is much to be seen on it.
+  const SceneBuilder::Face side{material::flats, 1.1F, 0, 0}, end{material::sign, 1.0F, 0, 0}, top{material::concrete, 1.0F, 0, 0};
+  builder.box({Vec3(0, 0, kFloor), Vec2::UnitX(), 0.5 * kBusLength, 0.5 * kBusWidth, kBusHeight - kFloor}, side, end, &top);
+  const auto begin = scene->polygons.begin() + static_cast<std::ptrdiff_t>(first);
+  scene->bus.assign(begin, scene->polygons.end());
+  scene->polygons.erase(begin, scene->polygons.end());
+}
+
 void add_tree(SceneBuilder* builder, const Vec2& foot, double size_m, double lift_m, Random* random) {
   const double ground = builder->ground(foot.x()) + lift_m, trunk = 0.42 * size_m, crown = 0.78 * size_m,
                half = 0.36 * size_m * random->uniform(0.85, 1.15);

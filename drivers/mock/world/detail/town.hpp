@@ -60,6 +60,9 @@ class SceneBuilder {
   std::size_t first_ = 0;
 };
 
+/// Fills scene->bus; it stands nowhere.
+void build_bus(const WorldOptions& options, Scene* scene);
+
 /// The whole suburb (town.cpp), from small things (props.cpp).
 void build_town(const WorldOptions& options, Scene* scene);
 

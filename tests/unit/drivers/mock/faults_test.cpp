@@ -65,6 +65,7 @@ TEST(Faults, nonsenseIsNamed) {
   EXPECT_NE(refusal("knock@1 pitch_deg=nan").find("must be in"), std::string::npos);
   EXPECT_NE(refusal("cover@1 camera=0.5").find("whole number"), std::string::npos);
   EXPECT_NE(refusal("").find("KIND@SECONDS"), std::string::npos);
+  EXPECT_NE(refusal("recalibrate@1 camera=1").find("it has none"), std::string::npos);
 }
 
 TEST(Faults, aFaultActsForItsDurationAndWithoutOneToTheEnd) {

@@ -214,6 +214,78 @@ TEST(MockRig, lostLateAndDoubledFramesShowInCountersAndArrivals) {
   EXPECT_FALSE(std::is_sorted(order.begin(), order.end()));
 }
 
+TEST(MockRig, ofABrokenPairOneImageAtRandomNeverArrives) {
+  const Harvest h = drive_with({"break_pairs@0 duration_s=0"});
+  EXPECT_EQ(h.frames[0].size() + h.frames[1].size(), 61U);
+  EXPECT_GT(h.frames[0].size(), 15U);
+  EXPECT_GT(h.frames[1].size(), 15U);
+  for (const Seen& left : h.frames[0])
+    for (const Seen& right : h.frames[1]) EXPECT_NE(left.frame.counter, right.frame.counter);
+}
+
+TEST(MockRig, aLaggingCameraSendsTheImageBeforeWithTheCounterAndStampOfThisOne) {
+  const Harvest good = drive_with({}, 6), lagging = drive_with({"lag@4 camera=1 duration_s=1"}, 6);
+  ASSERT_EQ(lagging.frames[1].size(), good.frames[1].size());
+  for (std::size_t i = 1; i < good.frames[1].size(); ++i) {
+    const bool late = i >= 80 && i < 100;
+    EXPECT_EQ(lagging.frames[1][i].mean, good.frames[1][late ? i - 1 : i].mean) << i;
+    EXPECT_EQ(lagging.frames[1][i].frame.counter, i);
+    EXPECT_EQ(lagging.frames[1][i].frame.exposure_start, good.frames[1][i].frame.exposure_start);
+    EXPECT_EQ(lagging.frames[0][i].mean, good.frames[0][i].mean);
+  }
+  EXPECT_NE(good.frames[1][90].mean, good.frames[1][89].mean) << "the vehicle moves by then";
+}
+
+TEST(MockRig, swappedCablesExchangeTheImagesAndNothingElse) {
+  const Harvest good = drive_with({}), swapped = drive_with({"swap_cables@1", "cover@2 camera=0 duration_s=0.5"});
+  for (std::size_t i = 0; i < 61; ++i) {
+    const bool exchanged = i >= 20, covered = i >= 40 && i < 50;
+    EXPECT_EQ(swapped.frames[0][i].mean, good.frames[exchanged ? 1 : 0][i].mean) << i;
+    if (covered)  // the lens of camera 0, at the end of the other's cable
+      EXPECT_LT(swapped.frames[1][i].mean, 1) << i;
+    else
+      EXPECT_EQ(swapped.frames[1][i].mean, good.frames[exchanged ? 0 : 1][i].mean) << i;
+    EXPECT_EQ(swapped.frames[0][i].frame.exposure_start, good.frames[0][i].frame.exposure_start);
+  }
+}
+
+TEST(MockRig, aBusIsInTheWayForItsTimeOnly) {
+  const Harvest good = drive_with({}), h = drive_with({"occluder@1 duration_s=1"});
+  for (std::size_t i = 0; i < 61; ++i) EXPECT_EQ(h.frames[0][i].mean != good.frames[0][i].mean, i >= 20 && i < 40) << i;
+}
+
+TEST(MockRig, aRequestOrAFullDiskDoesNothingToTheDevices) {
+  const Harvest good = drive_with({}, 1), h = drive_with({"recalibrate@0.5", "disk_full@0.2"}, 1);
+  ASSERT_EQ(h.frames[0].size(), good.frames[0].size());
+  for (std::size_t i = 0; i < h.frames[0].size(); ++i) EXPECT_EQ(h.frames[0][i].mean, good.frames[0][i].mean);
+}
+
+TEST(RigTruth, aBusStandsLevelOnTheGroundWhereItsFaultSays) {
+  const auto truth = truth_with({"occluder@2 ahead_m=1.5 left_m=3 duration_s=2", "occluder@5 ahead_m=4 turn_deg=90 speed_mps=-6"});
+  EXPECT_FALSE(truth->bus_in_enu(Duration::seconds(1.9)));
+  EXPECT_FALSE(truth->bus_in_enu(Duration::seconds(4.1)));
+  // What the bus's own axes are in the vehicle's, without the vehicle's pitch and roll.
+  const auto seen = [&](double s) {
+    const Duration t = Duration::seconds(s);
+    const Transform T_enu_body = truth->drive().at(t).T_enu_body;
+    const auto T_enu_bus = truth->bus_in_enu(t);
+    EXPECT_TRUE(T_enu_bus);
+    EXPECT_NEAR(T_enu_bus->R(2, 2), 1, 1e-12) << "level";
+    EXPECT_NEAR(T_enu_bus->t.z(), truth->world().ground(T_enu_bus->t.x(), T_enu_bus->t.y()), 1e-12);
+    const Vec3 forward = T_enu_body.R.col(0);
+    const Mat3 level = exp_so3(Vec3(0, 0, std::atan2(forward.y(), forward.x())));
+    return Transform{level.transpose() * T_enu_bus->R, level.transpose() * (T_enu_bus->t - T_enu_body.t)};
+  };
+  const double camera_x = default_T_body_left().t.x();
+  EXPECT_TRUE(seen(3).R.isApprox(Mat3::Identity(), 1e-12));
+  EXPECT_NEAR(seen(3).t.x(), camera_x + 1.5 + kBusLength / 2, 1e-9);
+  EXPECT_NEAR(seen(3).t.y(), 3, 1e-9);
+  EXPECT_NEAR(seen(3.5).t.x(), seen(2.5).t.x(), 1e-9) << "moves with the rig";
+  EXPECT_NEAR(seen(6).t.x(), camera_x + 4 + kBusWidth / 2, 1e-9) << "its side is turned to the vehicle";
+  EXPECT_NEAR(seen(6).t.y(), -6, 1e-9);
+  EXPECT_NEAR(seen(6.5).t.y(), -9, 1e-9) << "crosses to the right";
+}
+
 TEST(MockRig, aKnockTurnsTheTrueRigByWhatItSays) {
   const auto truth = truth_with({"knock@1 camera=1 pitch_deg=0.2 x_m=0.003"});
   const RigCalibration before = truth->calibration(Duration::seconds(0.9)), after = truth->calibration(Duration::seconds(1.1));

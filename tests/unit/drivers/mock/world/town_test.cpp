@@ -258,6 +258,25 @@ TEST(Town, sameSeedSamePictureOtherSeedOtherTown) {
   EXPECT_GT(cv::norm(take(&a, T), take(&c, T), cv::NORM_INF), 50);
 }
 
+TEST(Town, aBusThatFillsTheViewHidesTheTownAndIsTexturedItself) {
+  Renderer renderer(town(), lens());
+  // Its rear 1.2 m ahead: 92 by 106 degrees, the picture is 60 by 47.
+  Transform T_camera_bus = view(20) * view(20).inverse();
+  T_camera_bus.R << 0, -1, 0, 0, 0, -1, 1, 0, 0;  // its forward, left, up in the camera's axes
+  T_camera_bus.t = {0, 1.7, 1.2 + 0.5 * kBusLength};
+  const auto take_behind = [&](const Transform& T_camera_enu) {
+    cv::Mat image(480, 640, CV_8UC1);
+    renderer.render(std::span(&T_camera_enu, 1), Shot{.vignetting = 0}, image.data, static_cast<std::ptrdiff_t>(image.step),
+                    std::span(&T_camera_bus, 1));
+    return image;
+  };
+  const cv::Mat here = take_behind(view(20)), there = take_behind(view(45));
+  EXPECT_EQ(cv::norm(here, there, cv::NORM_INF), 0) << "something of the town is seen";
+  cv::Scalar mean, deviation;
+  cv::meanStdDev(here, mean, deviation);
+  EXPECT_GT(deviation[0], 15) << "there are edges to be seen on it";
+}
+
 TEST(World, refusesImpossibleOptionsByName) {
   WorldOptions options;
   options.built_fraction = 1.5;

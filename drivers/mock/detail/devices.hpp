@@ -1,0 +1,152 @@
+#pragma once
+#include <atomic>
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "core/memory/arena.hpp"
+#include "drivers/camera.hpp"
+#include "drivers/ins.hpp"
+#include "drivers/mock/detail/oscillator.hpp"
+#include "drivers/mock/ins_model.hpp"
+#include "drivers/mock/mock_rig.hpp"
+#include "drivers/mock/stream.hpp"
+#include "drivers/trigger.hpp"
+
+/// The mock's devices as their consumers meet them; what they deliver comes from the scheduler through their streams.
+namespace vergence::mock {
+
+/// Tells the scheduler that a consumer has made room: a slot, or a place in a stream.
+///
+/// Threads  Everything from any.
+class Room {
+ public:
+  [[nodiscard]] std::uint32_t look() const noexcept { return made_.load(std::memory_order_acquire); }
+  void made() noexcept {
+    made_.fetch_add(1, std::memory_order_release);
+    made_.notify_all();
+  }
+  /// Returns when made() was called after that look().
+  void wait(std::uint32_t seen) const noexcept { made_.wait(seen, std::memory_order_acquire); }
+
+ private:
+  std::atomic<std::uint32_t> made_{0};
+};
+
+/// What the devices of one rig share.
+struct RigContext {
+  std::shared_ptr<const RigTruth> truth;
+  MockRigOptions options;
+  Room room;
+};
+
+inline constexpr Duration kTransfer = Duration::milliseconds(5);    // of an image over its bus
+inline constexpr Duration kInsLatency = Duration::milliseconds(4);  // filter and serial line
+
+class MockCamera final : public CameraDevice {
+ public:
+  MockCamera(RigContext* rig, int k);
+  ~MockCamera() override { stop(); }
+
+  const DeviceInfo& info() const noexcept override { return info_; }
+  DeviceStatus configure(const CameraConfiguration& wanted, CameraConfiguration* actual) noexcept override;
+  DeviceTiming timing() const noexcept override { return {configuration_.exposure + kTransfer}; }
+  DeviceStatus start(Notifier* ready) noexcept override;
+  DeviceStatus wait(Duration limit, Frame* frame) noexcept override;
+  ImageView view(FrameSlot slot) const noexcept override { return pool_->view(slot); }
+  void release(FrameSlot slot) noexcept override;
+  void stop() noexcept override;
+  CameraStatistics statistics() const noexcept override;
+
+  // The scheduler's side.
+  Stream<Frame, 64> stream;
+  std::atomic<std::uint64_t> underruns{0}, lost{0};
+  [[nodiscard]] FramePool& pool() noexcept { return *pool_; }
+  [[nodiscard]] const CameraConfiguration& configuration() const noexcept { return configuration_; }
+  [[nodiscard]] const DeviceOscillator& clock() const noexcept { return clock_; }
+  /// Image memory, bytes.
+  [[nodiscard]] std::size_t bytes() const noexcept { return arena_ ? arena_->capacity() : 0; }
+  /// The picture through this camera's lens, as this sensor gives it, into width x height bytes in rows of the pool's stride.
+  void take(std::span<const Transform> T_camera_enu, std::span<const Transform> T_camera_bus, const Shot& shot, std::uint8_t* out);
+
+ private:
+  RigContext* rig_;
+  int k_;
+  DeviceInfo info_;
+  DeviceOscillator clock_;
+  CameraConfiguration configuration_{};
+  std::unique_ptr<Arena> arena_;
+  std::unique_ptr<FramePool> pool_;
+  std::unique_ptr<Renderer> renderer_;
+  std::atomic<std::uint64_t> delivered_{0}, starts_{0};
+  bool gone_ = false;  // the consumer's
+};
+
+class MockIns final : public InsDevice {
+ public:
+  explicit MockIns(RigContext* rig);
+  ~MockIns() override { stop(); }
+
+  const DeviceInfo& info() const noexcept override { return info_; }
+  DeviceStatus configure(double rate_hz, double* actual_hz) noexcept override;
+  DeviceTiming timing() const noexcept override { return {kInsLatency}; }
+  DeviceStatus start(Notifier* ready) noexcept override;
+  DeviceStatus wait(Duration limit, InsReading* reading) noexcept override;
+  void stop() noexcept override;
+  InsStatistics statistics() const noexcept override;
+
+  // The scheduler's side.
+  static constexpr std::size_t kRing = 1024;
+  Stream<InsReading, kRing> stream;
+  std::atomic<std::uint64_t> lost{0}, overruns{0};
+  [[nodiscard]] InsModel& model() noexcept { return *model_; }
+  [[nodiscard]] double rate_hz() const noexcept { return rate_; }
+  [[nodiscard]] const DeviceOscillator& clock() const noexcept { return clock_; }
+
+ private:
+  RigContext* rig_;
+  DeviceInfo info_{"mock", "mock-ins", "simulated MTi-G", "world"};
+  DeviceOscillator clock_;
+  std::unique_ptr<InsModel> model_;
+  double rate_ = 0;
+  std::atomic<std::uint64_t> delivered_{0};
+};
+
+/// Who is told that the board begins to pulse, and that it ends.
+class PulseListener {
+ public:
+  virtual ~PulseListener() = default;
+  /// Throws std::exception when that is not possible.
+  virtual void begin(double rate_hz) = 0;
+  /// Twice is harmless.
+  virtual void halt() noexcept = 0;
+};
+
+class MockTrigger final : public TriggerDevice {
+ public:
+  /// The listener outlives it.
+  MockTrigger(const RigContext& rig, PulseListener* listener);
+  ~MockTrigger() override { stop(); }
+
+  const DeviceInfo& info() const noexcept override { return info_; }
+  DeviceStatus configure(const TriggerConfiguration& wanted, TriggerConfiguration* actual) noexcept override;
+  DeviceStatus start(Notifier* ready) noexcept override;
+  DeviceStatus wait(Duration limit, Pulse* pulse) noexcept override;
+  void stop() noexcept override;
+  TriggerStatistics statistics() const noexcept override;
+
+  // The scheduler's side.
+  static constexpr std::size_t kRing = 64;
+  Stream<Pulse, kRing> stream;
+  std::atomic<std::uint64_t> overruns{0};
+  [[nodiscard]] const DeviceOscillator& clock() const noexcept { return clock_; }
+
+ private:
+  PulseListener* listener_;
+  DeviceInfo info_{"mock", "mock-board", "simulated trigger board", "world"};
+  DeviceOscillator clock_;
+  double rate_ = 0;
+  std::atomic<std::uint64_t> pulses_{0};
+};
+
+}  // namespace vergence::mock

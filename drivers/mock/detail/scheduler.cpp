@@ -1,0 +1,297 @@
+#include "drivers/mock/detail/scheduler.hpp"
+
+#include <pthread.h>
+#include <time.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <cstring>
+
+namespace vergence::mock {
+namespace {
+
+constexpr Duration kNominalExposure = Duration::milliseconds(8);
+constexpr Duration kReportLatency = Duration::milliseconds(1);  // of a pulse
+constexpr Duration kJitterMean = Duration::microseconds(150);
+constexpr Duration kJitterMost = Duration::microseconds(1900);  // below DeviceTiming::delay_spread
+
+HostStamp monotonic_now() noexcept {
+  timespec t{};
+  (void)::clock_gettime(CLOCK_MONOTONIC, &t);
+  return HostStamp(static_cast<std::int64_t>(t.tv_sec) * 1'000'000'000 + t.tv_nsec);
+}
+
+}  // namespace
+
+void Scheduler::begin(double rate_hz) {
+  halt();
+  rate_ = rate_hz;
+  stop_ = false;
+  finished_ = false;
+  constexpr Duration kLead = Duration::milliseconds(100);  // the first pictures are rendered before they are due
+  if (rig_.options.real_time) start_ = monotonic_now() + kLead;
+  producer_ = std::thread([this] { produce(); });
+  if (rig_.options.real_time) deliverer_ = std::thread([this] { hand_out_in_time(); });
+}
+
+void Scheduler::halt() noexcept {
+  stop_.store(true, std::memory_order_release);
+  rig_.room.made();
+  { const std::lock_guard lock(mutex_); }
+  posted_.notify_all();
+  if (producer_.joinable()) producer_.join();
+  if (deliverer_.joinable()) deliverer_.join();
+}
+
+std::uint64_t Scheduler::pulses(double rate_hz) const noexcept {
+  Duration length = rig_.truth->drive().duration();
+  if (rig_.options.duration > Duration{}) length = std::min(length, rig_.options.duration);
+  return static_cast<std::uint64_t>(length.to_seconds() * rate_hz) + 1;
+}
+
+HostStamp Scheduler::jittered(HostStamp least, std::uint64_t device, std::uint64_t number) const noexcept {
+  if (!rig_.options.jitter) return least;
+  Random random(mixed(rig_.options.seed, number), device);
+  const double late = -static_cast<double>(kJitterMean.ns()) * std::log(1 - random.uniform());
+  return least + std::min(kJitterMost, Duration::nanoseconds(std::llround(late)));
+}
+
+// ---- making -------------------------------------------------------------------------------------------------------
+
+void Scheduler::produce() {
+  (void)pthread_setname_np(pthread_self(), "vergence-mock");
+  const std::uint64_t count = pulses(rate_);
+  for (std::uint64_t n = 0; n < count && !stopping(); ++n) {
+    make_readings(host_of(n + 4));
+    make_pulse(n);
+    if (rig_.options.real_time && !wait_for_its_turn(n)) {
+      for (const auto& camera : cameras_) camera->lost.fetch_add(1, std::memory_order_relaxed);
+      continue;
+    }
+    make_frames(n);
+    // Whatever is made later was measured at the next pulse or after it.
+    if (!rig_.options.real_time) deliver_until(host_of(n + 1));
+  }
+  announce_end(host_of(count + 4) + Duration::seconds(11));
+  if (!rig_.options.real_time) {
+    deliver_until(HostStamp(INT64_MAX));
+  } else {
+    const std::lock_guard lock(mutex_);
+    finished_ = true;
+    posted_.notify_all();
+  }
+}
+
+/// Not further ahead than two pulses. False: the pulse is over before its pictures are begun.
+bool Scheduler::wait_for_its_turn(std::uint64_t pulse) {
+  const Duration period = Duration::seconds(1 / rate_);
+  while (monotonic_now() < host_of(pulse) - period * 2 && !stopping()) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  return monotonic_now() <= host_of(pulse) + period;
+}
+
+void Scheduler::make_pulse(std::uint64_t pulse) {
+  Parcel p;
+  p.device = kTriggerDevice;
+  p.arrival = jittered(host_of(pulse) + kReportLatency, 20, pulse);
+  p.pulse.value = {pulse, trigger_->clock().read(host_of(pulse), host_of(pulse) - start_, rig_.truth->faults()), {}};
+  post(p);
+}
+
+void Scheduler::make_readings(HostStamp until) {
+  if (!ins_.stream.streaming()) return;
+  for (;; ++readings_) {
+    const HostStamp at = start_ + Duration::seconds(static_cast<double>(readings_) / ins_.rate_hz());
+    if (at >= until) return;
+    const Duration time = at - start_;
+    InsSample sample = ins_.model().sample(readings_, time);
+    bool silent = false;
+    for (const Fault& f : rig_.truth->faults()) silent = silent || (f.kind == FaultKind::ins_gone && f.active(time));
+    if (silent) {
+      ins_.lost.fetch_add(1, std::memory_order_relaxed);
+      continue;
+    }
+    Parcel p;
+    p.device = kInsDevice;
+    p.arrival = jittered(at + kInsLatency, 10, readings_);
+    p.reading.value.sample = sample;
+    p.reading.value.measured = ins_.clock().read(at, time, rig_.truth->faults());
+    post(p);
+  }
+}
+
+void Scheduler::make_frames(std::uint64_t pulse) {
+  const Duration time = host_of(pulse) - start_;
+  for (int k = 0; k < static_cast<int>(cameras_.size()); ++k) {
+    Sender& sender = senders_[static_cast<std::size_t>(k)];
+    bool unplugged = false;
+    for (const Fault& f : rig_.truth->faults())
+      unplugged = unplugged || (f.kind == FaultKind::camera_gone && f.concerns(k) && f.active(time));
+    if (unplugged != sender.unplugged) {
+      Parcel p;
+      p.device = k;
+      p.arrival = host_of(pulse) + kTransfer;  // after what was under way, before the next frame
+      p.frame.what = unplugged ? Delivery<Frame>::What::gone : Delivery<Frame>::What::back;
+      post(p);
+      sender.unplugged = unplugged;
+      sender.counter_base = pulse;
+    }
+    if (!unplugged && cameras_[static_cast<std::size_t>(k)]->stream.streaming()) make_frame(pulse, k);
+  }
+}
+
+std::optional<FrameSlot> Scheduler::slot_of(int k) {
+  MockCamera& camera = *cameras_[static_cast<std::size_t>(k)];
+  for (;;) {
+    const std::uint32_t seen = rig_.room.look();
+    if (stopping()) return std::nullopt;
+    if (const auto slot = camera.pool().acquire()) return slot;
+    // Slots that only time will free are not waited for: late frames hold them.
+    const bool held_by_delay = senders_[static_cast<std::size_t>(k)].on_the_way.load() > static_cast<int>(MockRig::kSlots) / 2;
+    if (rig_.options.real_time || held_by_delay || !camera.stream.streaming()) return std::nullopt;
+    rig_.room.wait(seen);
+  }
+}
+
+void Scheduler::make_frame(std::uint64_t pulse, int k) {
+  MockCamera& camera = *cameras_[static_cast<std::size_t>(k)];
+  Sender& sender = senders_[static_cast<std::size_t>(k)];
+  const Duration time = host_of(pulse) - start_;
+  const Exposure exposure = exposure_of(*rig_.truth, rig_.options.seed, {pulse, time, Duration::seconds(1 / rate_)}, k);
+  if (exposure.lost) {
+    camera.lost.fetch_add(1, std::memory_order_relaxed);
+    return;
+  }
+  const auto slot = slot_of(k);
+  if (!slot) {
+    camera.underruns.fetch_add(1, std::memory_order_relaxed);
+    return;
+  }
+  render(exposure, k, *slot);
+  const Duration open = camera.configuration().exposure;
+  Parcel p;
+  p.device = k;
+  p.arrival = jittered(host_of(pulse) + open + kTransfer, static_cast<std::uint64_t>(k), pulse) + exposure.delay;
+  p.frame.value = {*slot, pulse - sender.counter_base, camera.clock().read(host_of(pulse), time, rig_.truth->faults()), {},
+                   open,  FrameStatus::complete};
+  std::optional<FrameSlot> copy;
+  if (exposure.twice) copy = camera.pool().acquire();
+  if (copy) {
+    const auto from = camera.pool().writable(*slot), to = camera.pool().writable(*copy);
+    std::memcpy(to.data(), from.data(), from.size());
+    Parcel again = p;
+    again.frame.value.slot = *copy;
+    again.arrival = p.arrival + kTransfer;
+    sender.on_the_way.fetch_add(1);
+    post(again);
+  }
+  sender.on_the_way.fetch_add(1);
+  post(p);
+}
+
+void Scheduler::render(const Exposure& exposure, int k, FrameSlot slot) {
+  const CameraConfiguration& c = cameras_[static_cast<std::size_t>(k)]->configuration();
+  std::vector<Transform> way, bus;
+  for (int i = 0; i < rig_.options.blur_samples; ++i) {
+    const Duration at = exposure.time + Duration::seconds((i + 0.5) / rig_.options.blur_samples * c.exposure.to_seconds());
+    way.push_back(rig_.truth->camera_in_enu(exposure.camera, at).inverse());
+    if (const auto T_enu_bus = rig_.truth->bus_in_enu(at)) bus.push_back(way.back() * *T_enu_bus);
+  }
+  if (bus.size() != way.size()) bus.clear();  // it comes or goes amid the exposure
+  Shot shot;
+  shot.exposure = exposure.brightness * c.exposure.to_seconds() / kNominalExposure.to_seconds() * std::pow(10.0, c.gain_db / 20);
+  if (rig_.options.noise) {
+    const std::uint64_t picture = exposure.pulse * kMaxCameras + static_cast<std::uint64_t>(exposure.camera);
+    shot.noise_seed = static_cast<std::uint32_t>(mixed(rig_.options.seed, picture)) | 1U;
+  }
+  // Through the lens of the camera that sees it, into the memory of the one that sends it.
+  MockCamera& sender = *cameras_[static_cast<std::size_t>(k)];
+  cameras_[static_cast<std::size_t>(exposure.camera)]->take(way, bus, shot, sender.pool().writable(slot).data());
+}
+
+// ---- handing out --------------------------------------------------------------------------------------------------
+
+void Scheduler::announce_end(HostStamp at) {
+  for (int device = kTriggerDevice; device < static_cast<int>(cameras_.size()); ++device) {
+    Parcel p;
+    p.device = device;
+    p.arrival = at;
+    p.frame.what = Delivery<Frame>::What::end;
+    p.reading.what = Delivery<InsReading>::What::end;
+    p.pulse.what = Delivery<Pulse>::What::end;
+    post(p);
+  }
+}
+
+void Scheduler::post(Parcel parcel) {
+  const std::lock_guard lock(mutex_);
+  parcel.order = orders_++;
+  parcels_.push(parcel);
+  posted_.notify_all();
+}
+
+void Scheduler::deliver_until(HostStamp horizon) {
+  for (;;) {
+    if (stopping() || parcels_.empty() || parcels_.top().arrival >= horizon) return;
+    const Parcel parcel = parcels_.top();
+    parcels_.pop();
+    deliver(parcel, parcel.arrival);
+  }
+}
+
+void Scheduler::hand_out_in_time() {
+  (void)pthread_setname_np(pthread_self(), "vergence-mockio");
+  std::unique_lock lock(mutex_);
+  while (!stopping()) {
+    if (parcels_.empty()) {
+      if (finished_) return;
+      posted_.wait(lock);
+      continue;
+    }
+    const HostStamp now = monotonic_now();
+    const bool end = parcels_.top().frame.what == Delivery<Frame>::What::end;  // after the last delivery nothing is waited for
+    if (parcels_.top().arrival > now && !end) {
+      (void)posted_.wait_for(lock, std::chrono::nanoseconds((parcels_.top().arrival - now).ns()));
+      continue;
+    }
+    const Parcel parcel = parcels_.top();
+    parcels_.pop();
+    lock.unlock();
+    deliver(parcel, monotonic_now());
+    lock.lock();
+  }
+}
+
+template <class S, class D>
+void Scheduler::push_or_wait(S* stream, const D& delivery) {
+  for (;;) {
+    const std::uint32_t seen = rig_.room.look();
+    if (stopping() || !stream->streaming() || stream->push(delivery)) return;
+    if (rig_.options.real_time) return;
+    rig_.room.wait(seen);
+  }
+}
+
+void Scheduler::deliver(const Parcel& parcel, HostStamp arrival) {
+  if (parcel.device == kTriggerDevice) {
+    Delivery<Pulse> d = parcel.pulse;
+    d.arrival = arrival;
+    // Nobody needs to take the reports; the latest that find no room are counted.
+    if (trigger_->stream.streaming() && !trigger_->stream.push(d)) trigger_->overruns.fetch_add(1, std::memory_order_relaxed);
+    return;
+  }
+  if (parcel.device == kInsDevice) {
+    Delivery<InsReading> d = parcel.reading;
+    d.arrival = arrival;
+    if (rig_.options.real_time && ins_.stream.full()) ins_.overruns.fetch_add(1, std::memory_order_relaxed);
+    push_or_wait(&ins_.stream, d);
+    return;
+  }
+  Delivery<Frame> d = parcel.frame;
+  d.arrival = arrival;
+  const auto k = static_cast<std::size_t>(parcel.device);
+  if (d.what == Delivery<Frame>::What::item) senders_[k].on_the_way.fetch_sub(1);
+  push_or_wait(&cameras_[k]->stream, d);  // deeper than the slots: frames always find room
+}
+
+}  // namespace vergence::mock

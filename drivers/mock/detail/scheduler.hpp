@@ -1,0 +1,98 @@
+#pragma once
+#include <array>
+#include <atomic>
+#include <condition_variable>
+#include <cstdint>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <queue>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include "drivers/mock/detail/devices.hpp"
+#include "drivers/mock/detail/exposure.hpp"
+
+namespace vergence::mock {
+
+/// Makes what the devices deliver, pulse after pulse, and hands it out in the order of arrival.
+///
+/// Threads  begin(), halt(): the owner's. One thread renders; in real time another hands out what is due.
+/// Time     Virtual: what is made before the next pulse is delivered before it, and the producer waits for room. Real: a pulse that is
+///          over before its pictures are begun has none.
+class Scheduler final : public PulseListener {
+ public:
+  /// All of it outlives the scheduler; `trigger` is given by attach().
+  Scheduler(RigContext* rig, std::vector<std::unique_ptr<MockCamera>>* cameras, MockIns* ins)
+      : rig_(*rig), cameras_(*cameras), ins_(*ins) {}
+  ~Scheduler() override { halt(); }
+  void attach(MockTrigger* trigger) noexcept { trigger_ = trigger; }
+
+  void begin(double rate_hz) override;
+  void halt() noexcept override;
+  /// The host's time at the drive's start.
+  [[nodiscard]] HostStamp start() const noexcept { return start_; }
+  [[nodiscard]] std::uint64_t pulses(double rate_hz) const noexcept;
+
+ private:
+  /// One delivery on its way; `device`: camera, kInsDevice or kTriggerDevice.
+  struct Parcel {
+    HostStamp arrival{};
+    std::uint64_t order = 0;  // of making: breaks ties
+    int device = 0;
+    Delivery<Frame> frame{};
+    Delivery<InsReading> reading{};
+    Delivery<Pulse> pulse{};
+    [[nodiscard]] bool operator<(const Parcel& o) const noexcept {  // the queue's top is the earliest
+      return std::pair(arrival, order) > std::pair(o.arrival, o.order);
+    }
+  };
+  /// What the scheduler knows of a camera.
+  struct Sender {
+    bool unplugged = false;
+    std::uint64_t counter_base = 0;  // pulse of the frame that it counts as 0
+    std::atomic<int> on_the_way{0};  // frames in parcels_
+  };
+  static constexpr int kInsDevice = -1, kTriggerDevice = -2;
+  static constexpr HostStamp kVirtualStart{1'000'000'000'000};  // 1000 s after a machine's start, on every run
+
+  void produce();
+  [[nodiscard]] bool wait_for_its_turn(std::uint64_t pulse);
+  void make_pulse(std::uint64_t pulse);
+  void make_readings(HostStamp until);
+  void make_frames(std::uint64_t pulse);
+  void make_frame(std::uint64_t pulse, int k);
+  void render(const Exposure& exposure, int k, FrameSlot slot);
+  void post(Parcel parcel);
+  void announce_end(HostStamp at);
+  void deliver_until(HostStamp horizon);
+  void hand_out_in_time();
+  void deliver(const Parcel& parcel, HostStamp arrival);
+  template <class S, class D>
+  void push_or_wait(S* stream, const D& delivery);
+  [[nodiscard]] std::optional<FrameSlot> slot_of(int k);
+  [[nodiscard]] HostStamp jittered(HostStamp least, std::uint64_t device, std::uint64_t number) const noexcept;
+  [[nodiscard]] HostStamp host_of(std::uint64_t pulse) const noexcept {
+    return start_ + Duration::seconds(static_cast<double>(pulse) / rate_);
+  }
+  [[nodiscard]] bool stopping() const noexcept { return stop_.load(std::memory_order_acquire); }
+
+  RigContext& rig_;
+  std::vector<std::unique_ptr<MockCamera>>& cameras_;
+  MockIns& ins_;
+  MockTrigger* trigger_ = nullptr;
+
+  double rate_ = 0;
+  HostStamp start_ = kVirtualStart;
+  std::uint64_t readings_ = 0, orders_ = 0;
+  std::array<Sender, kMaxCameras> senders_{};
+  std::mutex mutex_;  // of parcels_, in real time
+  std::condition_variable posted_;
+  std::priority_queue<Parcel> parcels_;
+  bool finished_ = false;  // under mutex_: nothing more will be posted
+  std::atomic<bool> stop_{false};
+  std::thread producer_, deliverer_;
+};
+
+}  // namespace vergence::mock
