@@ -1,0 +1,63 @@
+#pragma once
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string_view>
+
+/// Video formats: the fixed modes of formats 0 to 2, and the arithmetic of Format 7.
+namespace vergence::iidc {
+
+enum class ColorCoding : std::uint8_t {  // the number is the COLOR_CODING_ID
+  mono8 = 0,
+  yuv411 = 1,
+  yuv422 = 2,
+  yuv444 = 3,
+  rgb8 = 4,
+  mono16 = 5,
+  rgb16 = 6,
+  mono16_signed = 7,
+  rgb16_signed = 8,
+  raw8 = 9,
+  raw16 = 10,
+};
+inline constexpr unsigned kColorCodings = 11;
+[[nodiscard]] std::string_view to_string(ColorCoding) noexcept;  // Mono8, YUV411 …
+[[nodiscard]] std::optional<ColorCoding> color_coding(std::string_view name) noexcept;
+[[nodiscard]] unsigned bits_per_pixel(ColorCoding) noexcept;
+
+/// One mode of formats 0 to 2.
+struct FixedMode {
+  std::uint8_t format = 0, mode = 0;
+  std::uint16_t width = 0, height = 0;
+  ColorCoding coding = ColorCoding::mono8;
+};
+[[nodiscard]] std::span<const FixedMode> fixed_modes() noexcept;
+[[nodiscard]] std::size_t frame_bytes(unsigned width, unsigned height, ColorCoding coding) noexcept;
+
+inline constexpr unsigned kRates = 8;
+/// Frames a second of a rate code: 1.875 · 2^code.
+[[nodiscard]] constexpr double rate_of(unsigned code) noexcept { return 1.875 * static_cast<double>(1U << code); }
+/// The smallest code with rate_of(code) ≥ rate (to a ten-thousandth); none above 240 Hz.
+[[nodiscard]] std::optional<unsigned> rate_code_for(double rate_hz) noexcept;
+
+/// Bytes of one packet of a fixed mode; 0: not a whole number of quadlets, such a rate does not exist.
+/// A frame of 30 Hz is 240 packets, of 768 lines 256: whole parts of lines travel together.
+[[nodiscard]] std::size_t fixed_packet_bytes(const FixedMode& mode, unsigned rate_code) noexcept;
+
+inline constexpr double kCyclesPerSecond = 8000;  // each carries one packet of every camera
+
+[[nodiscard]] constexpr std::size_t packets_for(std::size_t bytes, std::size_t packet_bytes) noexcept {
+  return packet_bytes == 0 ? 0 : (bytes + packet_bytes - 1) / packet_bytes;
+}
+/// Highest frame rate that packets of this size allow, with one cycle between two frames.
+[[nodiscard]] double packet_rate(std::size_t image_bytes, std::size_t packet_bytes) noexcept;
+/// The smallest packet, a multiple of `unit`, with packet_rate ≥ rate; 0: none up to `most`.
+[[nodiscard]] std::size_t packet_for_rate(std::size_t image_bytes, double rate_hz, std::size_t unit, std::size_t most) noexcept;
+
+/// A mosaic of colour filters, by the letters of its first two rows.
+enum class BayerTile : std::uint8_t { none, rggb, grbg, gbrg, bggr };
+/// From Point Grey's register: four letters, YYYY or 0 is mono.
+[[nodiscard]] BayerTile bayer_tile(std::uint32_t quadlet) noexcept;
+
+}  // namespace vergence::iidc

@@ -1,0 +1,106 @@
+#pragma once
+#include <cstdint>
+
+/// Offsets from the command base (ConfigRom::command_base) and the bits in them.
+namespace vergence::iidc {
+
+[[nodiscard]] constexpr std::uint32_t bit(unsigned n) noexcept { return std::uint32_t{1} << n; }
+/// Bits high … low of a quadlet.
+[[nodiscard]] constexpr std::uint32_t field(std::uint32_t quadlet, unsigned high, unsigned low) noexcept {
+  return quadlet >> low & static_cast<std::uint32_t>((std::uint64_t{1} << (high - low + 1)) - 1);
+}
+
+namespace reg {
+
+inline constexpr std::uint32_t kInitialize = 0x000;     // b31: back to factory settings
+inline constexpr std::uint32_t kFormatInquiry = 0x100;  // b31 − f: format f
+inline constexpr std::uint32_t kBasicFunctions = 0x400;
+inline constexpr std::uint32_t kOptionalFunctions = 0x40C;  // b28: strobe
+inline constexpr std::uint32_t kAdvancedBase = 0x480;       // quadlet offset
+inline constexpr std::uint32_t kStrobeBase = 0x48C;         // quadlet offset
+inline constexpr std::uint32_t kTriggerInquiry = 0x530;
+inline constexpr std::uint32_t kFrameRate = 0x600;    // b31–29
+inline constexpr std::uint32_t kVideoMode = 0x604;    // b31–29
+inline constexpr std::uint32_t kVideoFormat = 0x608;  // b31–29
+inline constexpr std::uint32_t kIsoChannel = 0x60C;
+inline constexpr std::uint32_t kPower = 0x610;            // b31
+inline constexpr std::uint32_t kTransmit = 0x614;         // b31 ("ISO_EN")
+inline constexpr std::uint32_t kSoftwareTrigger = 0x62C;  // b31: write fires; reads 1 while busy
+inline constexpr std::uint32_t kTriggerMode = 0x830;
+// Point Grey
+inline constexpr std::uint32_t kBayerTile = 0x1040;  // four letters, "YYYY": mono
+inline constexpr std::uint32_t kFrameInfo = 0x12F8;
+inline constexpr std::uint32_t kSerialNumber = 0x1F20;
+
+[[nodiscard]] constexpr std::uint32_t mode_inquiry(unsigned format) noexcept { return 0x180 + 4 * format; }  // b31 − m: mode m
+[[nodiscard]] constexpr std::uint32_t rate_inquiry(unsigned format, unsigned mode) noexcept {                // b31 − r: rate r
+  return 0x200 + 0x20 * format + 4 * mode;
+}
+[[nodiscard]] constexpr std::uint32_t format7_base(unsigned mode) noexcept { return 0x2E0 + 4 * mode; }  // quadlet offset
+
+/// Of a Format 7 mode, from its base.
+namespace format7 {
+inline constexpr std::uint32_t kMaxSize = 0x00;  // width b31–16, height b15–0, as in the next three
+inline constexpr std::uint32_t kUnitSize = 0x04;
+inline constexpr std::uint32_t kPosition = 0x08;
+inline constexpr std::uint32_t kSize = 0x0C;
+inline constexpr std::uint32_t kCoding = 0x10;         // b31–24
+inline constexpr std::uint32_t kCodingInquiry = 0x14;  // b31 − c: coding c
+inline constexpr std::uint32_t kTotalBytesHigh = 0x38;
+inline constexpr std::uint32_t kTotalBytesLow = 0x3C;
+inline constexpr std::uint32_t kPacketLimits = 0x40;  // unit b31–16, largest b15–0
+inline constexpr std::uint32_t kPacketBytes = 0x44;   // set b31–16, recommended b15–0
+inline constexpr std::uint32_t kUnitPosition = 0x4C;  // 0: as the size
+inline constexpr std::uint32_t kValueSetting = 0x7C;
+inline constexpr std::uint32_t kValuePresent = bit(31), kValueApply = bit(30), kErrorRegion = bit(23), kErrorPacket = bit(22);
+}  // namespace format7
+
+/// Of the strobe outputs, from their base.
+namespace strobe {
+[[nodiscard]] constexpr std::uint32_t inquiry(unsigned pin) noexcept { return 0x100 + 4 * pin; }
+[[nodiscard]] constexpr std::uint32_t control(unsigned pin) noexcept { return 0x200 + 4 * pin; }
+}  // namespace strobe
+
+/// Of a feature with absolute values, from its base.
+namespace absolute {
+inline constexpr std::uint32_t kLeast = 0, kMost = 4, kValue = 8;  // IEEE 754 single
+}  // namespace absolute
+
+}  // namespace reg
+
+/// reg::kBasicFunctions.
+struct BasicFunctions {
+  bool advanced = false;
+  bool optional_functions = false;
+  bool beta = false;  // 1394b: S800
+  bool power_switch = false;
+  bool one_shot = false;
+  [[nodiscard]] static constexpr BasicFunctions of(std::uint32_t q) noexcept {
+    return {(q & bit(31)) != 0, (q & bit(28)) != 0, (q & bit(23)) != 0, (q & bit(15)) != 0, (q & bit(12)) != 0};
+  }
+};
+
+struct Size {
+  std::uint16_t width = 0, height = 0;  // px; of a position: x, y
+  [[nodiscard]] static constexpr Size of(std::uint32_t q) noexcept {
+    return {static_cast<std::uint16_t>(q >> 16U), static_cast<std::uint16_t>(q & 0xFFFFU)};
+  }
+  [[nodiscard]] constexpr std::uint32_t quadlet() const noexcept { return static_cast<std::uint32_t>(width) << 16U | height; }
+  [[nodiscard]] constexpr bool operator==(const Size&) const noexcept = default;
+};
+
+/// The isochronous channel and speed in both layouts of reg::kIsoChannel.
+struct IsoChannel {
+  unsigned channel = 0;  // legacy: at most 15
+  unsigned speed = 2;    // 0: S100 … 3: S800; above 2 only in the 1394b layout
+  bool beta = false;     // 1394b layout
+  [[nodiscard]] static constexpr IsoChannel of(std::uint32_t q) noexcept {
+    if ((q & bit(15)) != 0) return {field(q, 13, 8), field(q, 2, 0), true};
+    return {field(q, 31, 28), field(q, 25, 24), false};
+  }
+  [[nodiscard]] constexpr std::uint32_t quadlet() const noexcept {
+    return beta ? bit(15) | (channel & 63U) << 8U | (speed & 7U) : (channel & 15U) << 28U | (speed & 3U) << 24U;
+  }
+};
+
+}  // namespace vergence::iidc

@@ -1,0 +1,53 @@
+#include "firmware_iface/iidc/bandwidth.hpp"
+
+#include <gtest/gtest.h>
+
+#include <array>
+#include <string>
+
+namespace vergence::iidc {
+namespace {
+
+TEST(Bandwidth, UnitsAreThoseTheBusManagerCounts) {
+  EXPECT_EQ(bandwidth_units(1280, BusSpeed::s400), 1292U);
+  EXPECT_EQ(bandwidth_units(1476, BusSpeed::s400), 1488U);
+  EXPECT_EQ(bandwidth_units(4608, BusSpeed::s800), 2310U);
+  EXPECT_EQ(bandwidth_units(6680, BusSpeed::s800), 3346U);
+  EXPECT_EQ(bandwidth_units(1024, BusSpeed::s100), 4144U);
+  EXPECT_EQ(bandwidth_units(1024, BusSpeed::s200), 2072U);
+}
+
+TEST(Bandwidth, TheLargestPacketForAShareFitsAndTheNextDoesNot) {
+  for (const BusSpeed speed : {BusSpeed::s100, BusSpeed::s200, BusSpeed::s400, BusSpeed::s800})
+    for (unsigned units = 0; units <= kBandwidthUnits; units += 7) {
+      const std::size_t packet = packet_for_units(units, speed);
+      EXPECT_EQ(packet % 4, 0U);
+      EXPECT_LE(packet, largest_packet(speed));
+      if (packet > 0) {
+        EXPECT_LE(bandwidth_units(packet, speed), units);
+      }
+      if (packet < largest_packet(speed)) {
+        EXPECT_GT(bandwidth_units(packet + 4, speed), units);
+      }
+    }
+}
+
+TEST(Bandwidth, WhatFitsIsNotCommentedOn) {
+  const BusShare one{4608, BusSpeed::s800, 1280 * 960};
+  EXPECT_EQ(budget_complaint(std::array{one, one}), "");  // 4620 of 4915
+  EXPECT_EQ(budget_complaint({}), "");
+}
+
+TEST(Bandwidth, WhatDoesNotFitIsSaidInNumbersWithAWayOut) {
+  const BusShare one{6680, BusSpeed::s800, 1280 * 960};
+  const std::string text = budget_complaint(std::array{one, one});
+  EXPECT_EQ(
+      text,
+      "2 cameras need 3346 + 3346 = 6692 of the bus's 4915 bandwidth units; packets of at most 4900 bytes each (31.75 Hz at this size) "
+      "fit at S800: lower the rate or the image size, or use a second bus");
+  const BusShare slow{4096, BusSpeed::s400, 640 * 480};
+  EXPECT_NE(budget_complaint(std::array{slow, slow}).find("or use S800"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace vergence::iidc

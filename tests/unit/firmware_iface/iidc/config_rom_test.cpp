@@ -1,0 +1,121 @@
+#include "firmware_iface/iidc/config_rom.hpp"
+
+#include <gtest/gtest.h>
+
+#include <array>
+#include <string_view>
+#include <vector>
+
+#include "rom_vector.hpp"
+
+namespace vergence::iidc {
+namespace {
+
+TEST(ConfigRom, SaysWhoTheCameraIsAndWhereItsRegistersAre) {
+  const auto q = example_rom();
+  ConfigRom rom;
+  ASSERT_EQ(parse_config_rom(q, &rom), RomStatus::ok);
+  EXPECT_EQ(rom.guid, 0x00B0'9D01'0012'3456U);
+  EXPECT_EQ(rom.vendor_id, 0x00B09DU);
+  EXPECT_EQ(rom.specifier, 0x00A02DU);
+  EXPECT_EQ(rom.version, IidcVersion::v1_31);
+  EXPECT_EQ(rom.command_base, 0xFFFF'F0F0'0000U);
+  EXPECT_EQ(std::string_view(rom.vendor.data()), "Point Grey");
+  EXPECT_EQ(std::string_view(rom.model.data()), "Flea3");
+  EXPECT_FALSE(rom.checksum_wrong);
+}
+
+TEST(ConfigRom, AWrongChecksumIsToldAndNotRefused) {
+  auto q = example_rom();
+  q[5] ^= 1;
+  ConfigRom rom;
+  ASSERT_EQ(parse_config_rom(q, &rom), RomStatus::ok);
+  EXPECT_TRUE(rom.checksum_wrong);
+}
+
+TEST(ConfigRom, TheChecksumIsThatOfTheStandard) {
+  // CRC-16-CCITT (polynomial 0x1021, initial value 0) of the bytes "1234" and "12345678".
+  EXPECT_EQ(rom_checksum(std::array<std::uint32_t, 1>{0x3132'3334}), 0xD789);
+  EXPECT_EQ(rom_checksum(std::array<std::uint32_t, 2>{0x3132'3334, 0x3536'3738}), 0x9015);
+}
+
+TEST(ConfigRom, EveryTruncationGivesAStatusOrLosesTexts) {
+  const auto q = example_rom();
+  for (std::size_t n = 0; n < q.size(); ++n) {
+    ConfigRom rom;
+    const RomStatus status = parse_config_rom(std::span(q).first(n), &rom);
+    if (n < 20) {
+      EXPECT_NE(status, RomStatus::ok) << n;
+      EXPECT_EQ(rom.guid, 0U) << n;  // untouched
+    } else {
+      ASSERT_EQ(status, RomStatus::ok) << n;
+      EXPECT_EQ(rom.model[0], '\0') << n;
+      EXPECT_EQ(rom.vendor[0] != 0, n >= 26) << n;
+    }
+  }
+}
+
+TEST(ConfigRom, WhatIsNoCameraIsNamed) {
+  ConfigRom rom;
+  auto q = example_rom();
+  q[1] = 0;
+  EXPECT_EQ(parse_config_rom(q, &rom), RomStatus::not_1394);
+  q = example_rom();
+  q[5] = 0xFFFF'0000;
+  EXPECT_EQ(parse_config_rom(q, &rom), RomStatus::broken_root);
+  q = example_rom();
+  q[11] = 0x1200'609E;  // a disk (SBP-2)
+  EXPECT_EQ(parse_config_rom(q, &rom), RomStatus::no_camera);
+  q = example_rom();
+  q[8] = 0xD1FF'FFFF;  // unit directory far outside
+  EXPECT_EQ(parse_config_rom(q, &rom), RomStatus::no_camera);
+  q = example_rom();
+  q[13] = 0xD4FF'FFFF;
+  EXPECT_EQ(parse_config_rom(q, &rom), RomStatus::no_command_base);
+  q = example_rom();
+  q[16] = 0x3900'0000;
+  EXPECT_EQ(parse_config_rom(q, &rom), RomStatus::no_command_base);
+}
+
+TEST(ConfigRom, TextLeavesThatLieAreLeftOut) {
+  ConfigRom rom;
+  for (const std::uint32_t header : {0U, 0x0001'0000U, 0x0002'0000U, 0xFFFF'0000U, 0x0006'0000U}) {
+    auto q = example_rom();
+    q[26] = header;  // too short for the two leading quadlets, or beyond the end
+    ASSERT_EQ(parse_config_rom(q, &rom), RomStatus::ok);
+    EXPECT_EQ(rom.model[0], '\0') << std::hex << header;
+  }
+  auto q = example_rom();
+  q[29] = 0x0746'0A80;  // control characters are shown as such
+  ASSERT_EQ(parse_config_rom(q, &rom), RomStatus::ok);
+  EXPECT_EQ(std::string_view(rom.model.data()), "?F??3");
+}
+
+TEST(ConfigRom, ALongTextEndsInItsRoom) {
+  auto q = example_rom();
+  q.resize(26 + 1 + 2 + 40, 0x4142'4344);
+  q[26] = 42U << 16U;
+  for (std::size_t i = 29; i < q.size(); ++i) q[i] = 0x4142'4344;
+  ConfigRom rom;
+  ASSERT_EQ(parse_config_rom(q, &rom), RomStatus::ok);
+  EXPECT_EQ(std::string_view(rom.model.data()).size(), rom.model.size() - 1);
+}
+
+TEST(ConfigRom, VersionsOfOldAndNewCameras) {
+  const auto version = [](std::uint32_t unit, std::uint32_t sub) {
+    auto q = example_rom();
+    q[12] = 0x1300'0000 | unit;
+    q[19] = 0x3800'0000 | sub;
+    ConfigRom rom;
+    EXPECT_EQ(parse_config_rom(q, &rom), RomStatus::ok);
+    return rom.version;
+  };
+  EXPECT_EQ(version(0x100, 0), IidcVersion::v1_04);
+  EXPECT_EQ(version(0x101, 0), IidcVersion::v1_20);
+  EXPECT_EQ(version(0x102, 0), IidcVersion::v1_30);
+  EXPECT_EQ(version(0x102, 0x10), IidcVersion::v1_31);
+  EXPECT_EQ(version(0x102, 0x20), IidcVersion::v1_32);
+}
+
+}  // namespace
+}  // namespace vergence::iidc

@@ -1,0 +1,71 @@
+#include "firmware_iface/iidc/cycle_time.hpp"
+
+#include <gtest/gtest.h>
+
+namespace vergence::iidc {
+namespace {
+
+constexpr std::int64_t kSecond = 1'000'000'000;
+
+TEST(CycleTime, FieldsAndNanoseconds) {
+  const CycleTime t = CycleTime::of(127U << 25U | 7999U << 12U | 3071U);
+  EXPECT_EQ(t.seconds, 127U);
+  EXPECT_EQ(t.cycle, 7999U);
+  EXPECT_EQ(t.tick, 3071U);
+  EXPECT_TRUE(t.valid());
+  EXPECT_EQ(t.ns(), 128 * kSecond - 41);  // one tick of 40.69 ns before the wrap
+  EXPECT_EQ((CycleTime{1, 1, 1536}.ns()), kSecond + 125'000 + 62'500);
+  EXPECT_FALSE(CycleTime::of(8000U << 12U).valid());
+  EXPECT_FALSE(CycleTime::of(3072U).valid());
+}
+
+TEST(CycleTime, ThereAndBackWithinATick) {
+  for (std::int64_t ns = 0; ns < kCycleTimeWrapNs; ns += 777'777'777) {
+    const CycleTime t = CycleTime::at(ns);
+    ASSERT_TRUE(t.valid());
+    EXPECT_LE(std::abs(t.ns() - ns), 41) << ns;
+    EXPECT_EQ(CycleTime::of(t.quadlet()).ns(), t.ns());
+  }
+}
+
+TEST(CycleUnwrapper, CountsThroughTheWrap) {
+  CycleUnwrapper u;
+  const std::int64_t host = 5'000 * kSecond;
+  std::int64_t first = 0;
+  for (std::int64_t i = 0; i < 10'000; ++i) {  // 1000 s at 10 Hz
+    const std::int64_t bus = 120 * kSecond + i * kSecond / 10;
+    const std::int64_t t = u.unwrap(bus % kCycleTimeWrapNs, host + i * kSecond / 10 + i % 7 * 1'000'000);
+    if (i == 0) first = t;
+    ASSERT_EQ(t - first, i * kSecond / 10) << i;
+  }
+}
+
+TEST(CycleUnwrapper, APauseOfHoursIsMeasuredByTheHost) {
+  CycleUnwrapper u;
+  const std::int64_t t0 = u.unwrap(100 * kSecond, 0);
+  const std::int64_t pause = 10'000 * kSecond;
+  // The bus clock ran 50 ppm fast meanwhile.
+  const std::int64_t bus = pause + pause / 20'000;
+  EXPECT_EQ(u.unwrap((100 * kSecond + bus) % kCycleTimeWrapNs, pause) - t0, bus);
+}
+
+TEST(CycleUnwrapper, CamerasThatShareItAgreeWhicheverCameFirst) {
+  // The clocks are 64 s apart: alone, each camera's wrap would be a matter of luck.
+  CycleUnwrapper u;
+  const std::int64_t host = 1'000 * kSecond, bus = 127 * kSecond + 990'000'000;
+  const std::int64_t a = u.unwrap(bus, host);
+  const std::int64_t b = u.unwrap((bus + 20'000'000) % kCycleTimeWrapNs, host + 5'000'000);  // exposed 20 ms later, arrived sooner
+  EXPECT_EQ(b - a, 20'000'000);
+  EXPECT_EQ(u.unwrap(bus, host + 60'000'000), a);  // an older stamp that arrives late
+}
+
+TEST(CycleUnwrapper, ARestartForgets) {
+  CycleUnwrapper u;
+  (void)u.unwrap(127 * kSecond, 0);
+  EXPECT_EQ(u.unwrap(kSecond, 2 * kSecond), 129 * kSecond);
+  u.restart();
+  EXPECT_EQ(u.unwrap(kSecond, 3 * kSecond), kSecond);
+}
+
+}  // namespace
+}  // namespace vergence::iidc

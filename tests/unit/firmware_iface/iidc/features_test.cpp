@@ -1,0 +1,95 @@
+#include "firmware_iface/iidc/features.hpp"
+
+#include <gtest/gtest.h>
+
+#include <set>
+#include <string>
+
+namespace vergence::iidc {
+namespace {
+
+TEST(Features, RegistersStandWhereTheStandardPutsThem) {
+  EXPECT_EQ(reg::feature_value(Feature::shutter), 0x81CU);
+  EXPECT_EQ(reg::feature_value(Feature::gain), 0x820U);
+  EXPECT_EQ(reg::feature_value(Feature::trigger), reg::kTriggerMode);
+  EXPECT_EQ(reg::feature_inquiry(Feature::trigger), reg::kTriggerInquiry);
+  EXPECT_EQ(reg::feature_value(Feature::frame_rate), 0x83CU);
+  EXPECT_EQ(reg::feature_value(Feature::zoom), 0x880U);
+  EXPECT_EQ(reg::feature_inquiry(Feature::zoom), 0x580U);
+  EXPECT_EQ(reg::feature_absolute_base(Feature::zoom), 0x780U);
+  EXPECT_EQ(reg::rate_inquiry(2, 2), 0x248U);
+  EXPECT_EQ(reg::mode_inquiry(7), 0x19CU);
+}
+
+TEST(Features, AnInquiryIsTakenApart) {
+  const FeatureInquiry q = FeatureInquiry::of(0xCF00'1FFF);
+  EXPECT_TRUE(q.present && q.absolute && q.readable && q.on_off && q.automatic && q.manual);
+  EXPECT_FALSE(q.one_push);
+  EXPECT_EQ(q.least, 1U);
+  EXPECT_EQ(q.most, 0xFFFU);
+  EXPECT_FALSE(FeatureInquiry::of(0).present);
+}
+
+TEST(Features, AValueGoesThereAndBack) {
+  FeatureValue v;
+  v.present = v.absolute = v.on = true;
+  v.value = 0x123;
+  EXPECT_EQ(v.quadlet(), 0xC200'0123U);
+  for (const std::uint32_t q : {0xC200'0123U, 0x8100'0FFFU, 0x8700'0000U}) EXPECT_EQ(FeatureValue::of(q).quadlet(), q);
+}
+
+TEST(Features, TriggerModesZeroAndFourteenAndTheirSources) {
+  // Present, readable, switchable, polarity, level, sources 0 and 1, software, modes 0, 14, 15.
+  const TriggerInquiry t = TriggerInquiry::of(bit(31) | bit(27) | bit(26) | bit(25) | bit(24) | bit(23) | bit(22) | bit(16) | bit(15) | 3);
+  EXPECT_TRUE(t.present && t.polarity && t.software);
+  EXPECT_TRUE(t.has_mode(0) && t.has_mode(14) && t.has_mode(15));
+  EXPECT_FALSE(t.has_mode(1) || t.has_mode(13) || t.has_mode(99));
+  EXPECT_TRUE(t.has_source(0) && t.has_source(1) && t.has_source(kTriggerSourceSoftware));
+  EXPECT_FALSE(t.has_source(2) || t.has_source(4));
+
+  TriggerMode m;
+  m.on = true;
+  m.source = 1;
+  m.mode = 14;
+  EXPECT_EQ(m.quadlet(), 0x832E'0000U);
+  const TriggerMode back = TriggerMode::of(m.quadlet());
+  EXPECT_TRUE(back.on && back.rising);
+  EXPECT_EQ(back.source, 1U);
+  EXPECT_EQ(back.mode, 14U);
+  m.rising = false;
+  m.source = kTriggerSourceSoftware;
+  m.mode = 0;
+  EXPECT_EQ(m.quadlet(), 0x82E0'0000U);
+}
+
+TEST(Features, StrobeTimesKeepToTheirBits) {
+  StrobeControl s;
+  s.on = true;
+  s.delay = 0x1ABC;
+  s.duration = 0x1DEF;
+  EXPECT_EQ(s.quadlet(), 0x83AB'CDEFU);
+  EXPECT_EQ(StrobeControl::of(s.quadlet()).delay, 0xABCU);
+}
+
+TEST(Features, IsoChannelsInBothLayouts) {
+  EXPECT_EQ((IsoChannel{5, 2, false}.quadlet()), 0x5200'0000U);
+  EXPECT_EQ((IsoChannel{33, 3, true}.quadlet()), 0x0000'A103U);
+  const IsoChannel b = IsoChannel::of(0x0000'A103);
+  EXPECT_TRUE(b.beta);
+  EXPECT_EQ(b.channel, 33U);
+  EXPECT_EQ(b.speed, 3U);
+  EXPECT_EQ(IsoChannel::of(0x5200'0000).channel, 5U);
+}
+
+TEST(Features, EveryFeatureHasAName) {
+  std::set<std::string> names;
+  for (unsigned f = 0; f < 64; ++f) {
+    const auto name = to_string(static_cast<Feature>(f));
+    if (name == "unknown feature") continue;
+    EXPECT_TRUE(names.emplace(name).second) << name;
+  }
+  EXPECT_EQ(names.size(), 19U);
+}
+
+}  // namespace
+}  // namespace vergence::iidc
