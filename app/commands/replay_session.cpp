@@ -64,6 +64,7 @@ class Replay {
   Arena frames_arena_, estimator_arena_;
   FramePool pool_;
   std::unique_ptr<PairRunner> runner_;
+  ImmediateRunner solver_;
   std::unique_ptr<Estimator> estimator_;
   std::unique_ptr<Recorder> recorder_;
   std::unique_ptr<FrameDecoder> decoder_;
@@ -94,7 +95,7 @@ Replay::Replay(const ReplayRequest& request, StereoSequence sequence, Trajectory
       estimator_arena_(arena_size(Estimator::memory_needed(options_, sequence_.calibration))),
       pool_(width_of(sequence_), height_of(sequence_), FrameDecoder::kSlots, frames_arena_),
       runner_(make_runner(request.configuration.threads)),
-      estimator_(std::make_unique<Estimator>(options_, sequence_.calibration, estimator_arena_, *runner_)) {}
+      estimator_(std::make_unique<Estimator>(options_, sequence_.calibration, sequence_.calibration, estimator_arena_, *runner_, solver_)) {}
 
 void Replay::estimate() noexcept {
   (void)pthread_setname_np(pthread_self(), "vergence-estim");

@@ -84,6 +84,7 @@ class Drive {
   ComparisonOptions comparison_options_;
   Arena arena_;
   std::unique_ptr<PairRunner> runner_;
+  ImmediateRunner solver_;
   std::unique_ptr<Estimator> estimator_;
   std::unique_ptr<Comparison> comparison_;
   std::unique_ptr<LiveSource> source_;
@@ -118,7 +119,7 @@ Drive::Drive(const RunRequest& request)
       comparison_options_(comparison_options(request.configuration)),
       arena_(arena_size(Estimator::memory_needed(options_, rig_)) + arena_size(Comparison::bytes_needed(comparison_options_))),
       runner_(make_runner(request.configuration.threads)),
-      estimator_(std::make_unique<Estimator>(options_, rig_, arena_, *runner_)),
+      estimator_(std::make_unique<Estimator>(options_, rig_, rig_, arena_, *runner_, solver_)),
       comparison_(std::make_unique<Comparison>(comparison_options_, arena_)),
       fault_told_(mock_.rig->truth().faults().size(), false) {
   LiveSource::Options o;

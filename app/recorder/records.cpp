@@ -20,6 +20,16 @@ const char* kind_word(EstimatorEvent::Kind kind) noexcept {
       return "relocalised";
     case EstimatorEvent::Kind::dropped:
       return "dropped";
+    case EstimatorEvent::Kind::rig_changed:
+      return "rig_changed";
+    case EstimatorEvent::Kind::calibration_confirmed:
+      return "calibration_confirmed";
+    case EstimatorEvent::Kind::calibration_accepted:
+      return "calibration_accepted";
+    case EstimatorEvent::Kind::calibration_rejected:
+      return "calibration_rejected";
+    case EstimatorEvent::Kind::calibration_waits:
+      return "calibration_waits";
   }
   return "";
 }

@@ -42,6 +42,11 @@ constexpr std::array kAdvice{
     Advice{"moving_scene", "Much of the picture moved by itself, as behind a bus: compare those stretches with the map before use."},
     Advice{"unconfirmed", "The calibration from the last drive was not confirmed: drive on until it is, or give one with --calibration."},
     Advice{"recalibrating", "The rig no longer fitted its calibration: look for a camera that was knocked or is loose on its mount."},
+    Advice{"uncalibrated", "No calibration had been found yet: these poses only bridge the time until there is one."},
+    Advice{"out_of_step", "A camera's images were of another instant: check trigger lines and exposure, and restart the cameras together."},
+    Advice{"needs_motion", "The calibration could not be found standing still: drive some metres past things at the roadside."},
+    Advice{"needs_near_structure", "The calibration could not be found with far things only: drive past houses, cars or trees."},
+    Advice{"needs_texture", "The calibration could not be found for want of matches between the cameras: check lenses and exposure."},
 };
 
 /// Collects reasons; the grade is that of the worst.

@@ -6,6 +6,8 @@
 #include <stdexcept>
 #include <string>
 
+#include <atomic>
+
 #include "core/estimator/transitions.hpp"
 #include "core/memory/fixed_vector.hpp"
 #include "core/odometry/odometry.hpp"
@@ -65,6 +67,7 @@ struct Estimator::Parts {
   Stamp last{};
   bool any = false;
   int without_pose = 0;
+  std::atomic<bool> requested{false};
   FixedVector<EstimatorEvent, 8> events;  // a frame raises at most four
 };
 
@@ -73,7 +76,8 @@ std::size_t Estimator::memory_needed(const EstimatorOptions& options, const RigC
   return odometry::Odometry::memory_needed(options.odometry, rig) + sizeof(Parts) + 2 * kCacheLine;
 }
 
-Estimator::Estimator(const EstimatorOptions& options, const RigCalibration& rig, Arena& arena, PairRunner& runner) {
+Estimator::Estimator(const EstimatorOptions& options, const RigCalibration& rig, const RigCalibration& /*nominal*/, Arena& arena,
+                     PairRunner& runner, BackgroundRunner& /*solver*/) {
   check(rig);
   static_assert(alignof(Parts) <= kCacheLine);
   const auto bytes = arena.make<std::byte>(sizeof(Parts), "estimator");
@@ -127,5 +131,8 @@ PoseSample Estimator::process(const RigFrame& frame) noexcept {
 std::span<const EstimatorEvent> Estimator::events() const noexcept { return parts_->events.span(); }
 State Estimator::state() const noexcept { return parts_->state; }
 const RigCalibration& Estimator::calibration() const noexcept { return parts_->rig; }
+bool Estimator::calibrated() const noexcept { return true; }
+void Estimator::request_recalibration() noexcept { parts_->requested.store(true, std::memory_order_relaxed); }
+std::span<const CalibrationDecision> Estimator::calibrations() const noexcept { return {}; }
 
 }  // namespace vergence

@@ -3,41 +3,75 @@
 #include <memory>
 #include <span>
 
+#include "core/calibration/options.hpp"
 #include "core/memory/arena.hpp"
 #include "core/odometry/options.hpp"
 #include "core/types/calibration.hpp"
+#include "core/types/calibration_decision.hpp"
 #include "core/types/parallel.hpp"
 #include "core/types/pose_sample.hpp"
 #include "core/types/rig_frame.hpp"
 
 namespace vergence {
 
+/// What the calibration handed to the estimator is worth (METHOD §3).
+enum class CalibrationTrust : std::uint8_t {
+  given,        // in use from the first frame
+  unconfirmed,  // of a state file: in use, poses `degraded: unconfirmed` until the monitor has seen 30 frames that agree
+  none,         // from scratch: of the rig only the intrinsics and the baseline length are read
+};
+
+/// When a solved calibration is adopted.
+enum class Adoption : std::uint8_t {
+  after_fixed_frames,  // CalibrationOptions::adopt_after frames after its snapshot; the estimator waits for the solver there: deterministic
+  when_ready,          // live: at the first frame after the solver is done
+};
+
 struct EstimatorOptions {
   OdometryOptions odometry{};
+  calibration::CalibrationOptions calibration{};
+  CalibrationTrust trust = CalibrationTrust::given;
+  Adoption adoption = Adoption::after_fixed_frames;
+  bool online = true;  // watch the rig and calibrate it; false: the calibration given is used for ever
 };
 
 /// Something worth a line in events.jsonl. `why` points to a constant.
 struct EstimatorEvent {
   Stamp stamp{};
-  enum class Kind : std::uint8_t { state, scene_restarted, time_gap, relocalised, dropped } kind = Kind::state;
+  enum class Kind : std::uint8_t {
+    state,
+    scene_restarted,
+    time_gap,
+    relocalised,
+    dropped,
+    rig_changed,            // the monitor raised; value: frames since the onset
+    calibration_confirmed,  // a state file's calibration agrees; value: frames
+    calibration_accepted,   // value: frames it was solved from
+    calibration_rejected,   // why: the reason; value: frames
+    calibration_waits,      // why: what is missing to calibrate
+  } kind = Kind::state;
   State from = State::initialising;
   State to = State::initialising;
   const char* why = "";
-  double value = 0;  // seconds of a gap, count of what was dropped; 0 where nothing is counted
+  double value = 0;  // seconds of a gap, count of what was dropped, frames; 0 where nothing is counted
 };
 
 /// Rig frames in, a pose for each out: the front door of core.
 ///
-/// Ownership  Keeps references to the arena and the runner; images are read during process() only.
-/// Threads    One caller; process() uses the runner for the second image's front end. Same poses whatever the runner.
-/// Memory     All of it from the arena in the constructor. process() allocates nothing.
+/// Ownership  Keeps references to the arena and the runners; images are read during process() only.
+/// Threads    One caller; process() uses `runner` for the other images' front end and `solver` for calibration, which runs beside the
+///            frames. Same poses whatever the runners, with Adoption::after_fixed_frames. request_recalibration(): any thread.
+/// Memory     All of it from the arena in the constructor. process() allocates nothing, nor does the solver's task.
 /// Errors     The constructor throws (std::invalid_argument with a sentence, std::length_error). process() never does.
 class Estimator {
  public:
   /// What the arena must offer for these options and this rig, bytes.
   [[nodiscard]] static std::size_t memory_needed(const EstimatorOptions& options, const RigCalibration& rig);
 
-  Estimator(const EstimatorOptions& options, const RigCalibration& rig, Arena& arena, PairRunner& runner);
+  /// `rig`: intrinsics, baseline length and, but for CalibrationTrust::none, T_camera_left. `nominal`: what the gates compare a new
+  /// calibration with (rig.nominal of the configuration).
+  Estimator(const EstimatorOptions& options, const RigCalibration& rig, const RigCalibration& nominal, Arena& arena, PairRunner& runner,
+            BackgroundRunner& solver);
   ~Estimator();
   Estimator(const Estimator&) = delete;
   Estimator& operator=(const Estimator&) = delete;
@@ -46,12 +80,19 @@ class Estimator {
   /// An empty image is a camera that gave none. T_world_left never jumps but across a marked gap.
   [[nodiscard]] PoseSample process(const RigFrame& frame) noexcept;
 
+  /// A new calibration is wanted, whatever the monitor says; acts at the next frame. Async-signal-safe.
+  void request_recalibration() noexcept;
+
   /// Of the last process() call, oldest first; valid until the next.
   [[nodiscard]] std::span<const EstimatorEvent> events() const noexcept;
+  /// Calibrations decided about in the last process() call: each a line of calibrations.csv; an accepted one is in use, and wants the
+  /// state file written.
+  [[nodiscard]] std::span<const CalibrationDecision> calibrations() const noexcept;
 
   [[nodiscard]] State state() const noexcept;
-  /// The calibration in use.
+  /// The calibration in use; before there is one, the rig given, without T_camera_left.
   [[nodiscard]] const RigCalibration& calibration() const noexcept;
+  [[nodiscard]] bool calibrated() const noexcept;
 
  private:
   struct Parts;

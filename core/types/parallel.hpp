@@ -36,4 +36,27 @@ class SequentialRunner final : public PairRunner {
   }
 };
 
+/// Runs one long task beside the frames: the calibration solver's thread, handed in by the app.
+///
+/// Threads  start(), busy() and wait() from one thread. The task runs on another, or within start().
+/// Errors   None; the task is noexcept.
+class BackgroundRunner {
+ public:
+  virtual ~BackgroundRunner() = default;
+  /// Precondition: !busy(). What the callable refers to lives until the task is done.
+  virtual void start(TaskRef task) noexcept = 0;
+  /// The last task is not done yet. False: everything it wrote is visible to the caller.
+  [[nodiscard]] virtual bool busy() noexcept = 0;
+  /// Returns when the last task is done.
+  virtual void wait() noexcept = 0;
+};
+
+/// The task at once, on the caller's thread: for tests, and for tools without a second thread.
+class ImmediateRunner final : public BackgroundRunner {
+ public:
+  void start(TaskRef task) noexcept override { task(); }
+  [[nodiscard]] bool busy() noexcept override { return false; }
+  void wait() noexcept override {}
+};
+
 }  // namespace vergence

@@ -26,9 +26,27 @@ std::string_view to_string(PoseStatus s) noexcept {
 }
 
 std::string_view to_string(Reason r) noexcept {
-  static constexpr std::array<std::string_view, 16> names = {
-      "",           "no_image", "image_dark", "image_repeated",  "few_features",  "no_stereo_matches", "cameras_swapped", "few_inliers",
-      "one_camera", "no_pose",  "time_gap",   "scene_restarted", "weak_geometry", "moving_scene",      "unconfirmed",     "recalibrating"};
+  static constexpr std::array<std::string_view, 21> names = {"",
+                                                             "no_image",
+                                                             "image_dark",
+                                                             "image_repeated",
+                                                             "few_features",
+                                                             "no_stereo_matches",
+                                                             "cameras_swapped",
+                                                             "few_inliers",
+                                                             "one_camera",
+                                                             "no_pose",
+                                                             "time_gap",
+                                                             "scene_restarted",
+                                                             "weak_geometry",
+                                                             "moving_scene",
+                                                             "unconfirmed",
+                                                             "recalibrating",
+                                                             "uncalibrated",
+                                                             "out_of_step",
+                                                             "needs_motion",
+                                                             "needs_near_structure",
+                                                             "needs_texture"};
   return name(names, r);
 }
 

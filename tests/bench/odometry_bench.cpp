@@ -108,7 +108,8 @@ Replay replay(const DecodedDrive& d, const app::Configuration& configuration, in
   SequentialRunner one;
   std::optional<app::ThreadRunner> two;
   if (threads == 2) two.emplace();
-  Estimator estimator(options, d.sequence.calibration, arena, two ? static_cast<PairRunner&>(*two) : one);
+  ImmediateRunner solver;
+  Estimator estimator(options, d.sequence.calibration, d.sequence.calibration, arena, two ? static_cast<PairRunner&>(*two) : one, solver);
   Replay r;
   for (std::size_t i = 0; i < d.pairs.size(); ++i) {
     RigFrame frame;

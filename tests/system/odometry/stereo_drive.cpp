@@ -23,7 +23,8 @@ Replay replay(const StereoDrive& drive, const Edit& edit, int threads) {
   SequentialRunner one;
   std::optional<app::ThreadRunner> two;
   if (threads == 2) two.emplace();
-  Estimator estimator(options, drive.rig, arena, two ? static_cast<PairRunner&>(*two) : one);
+  ImmediateRunner solver;
+  Estimator estimator(options, drive.rig, drive.rig, arena, two ? static_cast<PairRunner&>(*two) : one, solver);
   Replay out;
   out.answers.reserve(drive.size());
   const std::uint64_t before = AllocationGuard::allocations_after_seal();

@@ -47,7 +47,8 @@ struct Standing {
   EstimatorOptions options;
   Arena arena{Estimator::memory_needed(options, calibration)};
   SequentialRunner runner;
-  Estimator estimator{options, calibration, arena, runner};
+  ImmediateRunner solver;
+  Estimator estimator{options, calibration, calibration, arena, runner, solver};
 
   Standing() {
     Random random(8);
@@ -193,7 +194,8 @@ TEST(Estimator, anArenaTooSmallIsRefusedNotOverrun) {
   const RigCalibration calibration = rig();
   SequentialRunner runner;
   Arena arena(Estimator::memory_needed(options, calibration) / 2);
-  EXPECT_THROW(Estimator(options, calibration, arena, runner), std::length_error);
+  ImmediateRunner solver;
+  EXPECT_THROW(Estimator(options, calibration, calibration, arena, runner, solver), std::length_error);
 }
 
 TEST(Estimator, staysWithinTheMemoryItAskedForAndOffTheHeap) {

@@ -1,0 +1,25 @@
+#pragma once
+#include <array>
+#include <string_view>
+
+#include "core/calibration/options.hpp"
+#include "core/types/calibration.hpp"
+
+namespace vergence::calibration {
+
+enum class HealthWord : std::uint8_t { good, can_be_improved, recalibrate };
+/// `good`, `can be improved`, `recalibrate`.
+[[nodiscard]] std::string_view to_string(HealthWord) noexcept;
+
+inline constexpr std::array kHealthDepths = {1.0, 5.0, 10.0, 20.0, 50.0};  // m
+
+/// What a calibration's uncertainty does to a depth measured with camera 0 and camera `k`, 1 sigma, percent of the depth.
+///
+/// The root mean over a grid of directions that both cameras see of |∂Z/∂(φ, t)| propagated through covariance_wide; without one, through
+/// the sigmas; without those 0. Matching noise is not in it: this is what stays however well a point is found. Threads pure.
+[[nodiscard]] double depth_error_percent(const RigCalibration& rig, int k, double depth_m) noexcept;
+
+/// The word for a rig: by its worst pair at 20 m.
+[[nodiscard]] HealthWord health(const RigCalibration& rig, const CalibrationOptions& options) noexcept;
+
+}  // namespace vergence::calibration

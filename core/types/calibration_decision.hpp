@@ -1,0 +1,34 @@
+#pragma once
+#include <cstdint>
+#include <string_view>
+
+#include "core/types/calibration.hpp"
+
+namespace vergence {
+
+/// Why a calibration was sought. One word each: it stands in calibrations.csv and summary.json.
+enum class CalibrationCause : std::uint8_t {
+  from_scratch,  // there was none
+  knock,         // the monitor saw the rig change
+  drift,         // the monitor saw it creep
+  collapse,      // left and right found hardly any match any more
+  out_of_step,   // a camera's images seem to be of another instant
+  requested,     // the user asked
+};
+[[nodiscard]] std::string_view to_string(CalibrationCause) noexcept;
+
+/// What became of one attempt to calibrate: a line of calibrations.csv. A value.
+struct CalibrationDecision {
+  Stamp stamp{};  // of the frame it was decided at
+  CalibrationCause cause = CalibrationCause::from_scratch;
+  bool accepted = false;
+  const char* reason = "";        // why it was rejected, a constant sentence without commas; empty when accepted
+  RigCalibration calibration{};   // the one found, also when rejected
+  int latency_frames = 0;         // from the alarm (or the start, or the request) to here
+  std::uint64_t onset_frame = 0;  // when the rig is thought to have changed; 0: does not apply
+  double held_out_before_px = 0;  // distance to the epipolar lines of frames that were not in the solve, median: with the one before
+  double held_out_after_px = 0;   // and with this one
+  double solve_ms = 0;            // on the solver's thread
+};
+
+}  // namespace vergence
