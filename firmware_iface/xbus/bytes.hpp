@@ -31,4 +31,42 @@ namespace vergence::xbus {
   return static_cast<double>(static_cast<std::int16_t>(read_u16(b.subspan(4)))) + static_cast<double>(read_u32(b)) / 4294967296.0;
 }
 
+constexpr void write_u16(std::span<std::uint8_t> b, std::uint16_t v) noexcept {
+  b[0] = static_cast<std::uint8_t>(v >> 8U);
+  b[1] = static_cast<std::uint8_t>(v);
+}
+constexpr void write_u32(std::span<std::uint8_t> b, std::uint32_t v) noexcept {
+  write_u16(b, static_cast<std::uint16_t>(v >> 16U));
+  write_u16(b.subspan(2), static_cast<std::uint16_t>(v));
+}
+constexpr void write_u64(std::span<std::uint8_t> b, std::uint64_t v) noexcept {
+  write_u32(b, static_cast<std::uint32_t>(v >> 32U));
+  write_u32(b.subspan(4), static_cast<std::uint32_t>(v));
+}
+
+/// How floating numbers travel: the lowest two bits of a packet's id (MTData2), bits 8 and 9 of the output settings (MTData).
+enum class NumberFormat : std::uint8_t { float32 = 0, fp12_20 = 1, fp16_32 = 2, float64 = 3 };
+
+/// Bytes of one number.
+[[nodiscard]] constexpr std::size_t size_of(NumberFormat format) noexcept {
+  return format == NumberFormat::fp16_32 ? 6 : format == NumberFormat::float64 ? 8 : 4;
+}
+
+[[nodiscard]] constexpr double read_number(std::span<const std::uint8_t> b, NumberFormat format) noexcept {
+  switch (format) {
+    case NumberFormat::float32:
+      return read_float32(b);
+    case NumberFormat::fp12_20:
+      return read_fp12_20(b);
+    case NumberFormat::fp16_32:
+      return read_fp16_32(b);
+    case NumberFormat::float64:
+      return read_float64(b);
+  }
+  return 0;  // not reached: two bits have four values
+}
+
+/// Rounds to the format; outside a fixed-point format's range its nearest end. Not a number becomes 0 in fixed point.
+void write_number(std::span<std::uint8_t> b, NumberFormat format, double value) noexcept;
+
 }  // namespace vergence::xbus

@@ -15,15 +15,38 @@ inline constexpr std::uint8_t kLengthExtended = 0xFF;
 inline constexpr std::size_t kMaxPayload = 2048;           // bytes; longer claims are false frames
 inline constexpr std::size_t kMaxFrame = kMaxPayload + 7;  // FA, bus, id, FF, two of length, payload, checksum
 
-/// Message ids that both generations share; an answer's id is the request's plus one.
+/// Message ids; an answer's id is the request's plus one, and a request for a setting is the message that sets it, without payload.
+/// L: MTi-G (MTData), 4: MTi-G-700/710 (MTData2).
 enum class MessageId : std::uint8_t {
   device_id_request = 0x00,
+  init_bus = 0x02,             // L
+  period = 0x04,               // L: ticks of 1/115200 s
+  data_length_request = 0x0A,  // L
+  configuration_request = 0x0C,
+  configuration = 0x0D,
+  restore_factory_settings = 0x0E,
   go_to_measurement = 0x10,
+  firmware_request = 0x12,
+  baudrate = 0x18,  // takes effect at the next reset
+  product_code_request = 0x1C,
+  sync_settings = 0x2C,  // 4: the whole list
   go_to_config = 0x30,
-  mtdata = 0x32,   // legacy MTi-G
-  mtdata2 = 0x36,  // MTi-G-700/710
+  mtdata = 0x32,   // L
+  mtdata2 = 0x36,  // 4
   wake_up = 0x3E,
+  wake_up_answer = 0x3F,
+  reset = 0x40,
   error = 0x42,
+  scenario = 0x64,
+  lever_arm = 0x68,  // L
+  declination = 0x6A,
+  string_output = 0x8E,         // 4
+  output_configuration = 0xC0,  // 4
+  output_mode = 0xD0,           // L
+  output_settings = 0xD2,       // L
+  output_skip = 0xD4,           // L
+  legacy_sync_in = 0xD6,        // L; the same number sets the heading of a 4: never sent before the generation is known
+  legacy_sync_out = 0xD8,       // L
 };
 
 struct Message {

@@ -1,5 +1,6 @@
 #include "firmware_iface/xbus/mtdata2.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 #include "firmware_iface/xbus/bytes.hpp"
@@ -10,39 +11,8 @@ namespace {
 using Bytes = std::span<const std::uint8_t>;
 
 constexpr std::size_t kPacketHeader = 3;  // id, id, size
-constexpr std::size_t kUtcSize = 12;
 constexpr std::size_t kPvtSize = 94;
 constexpr std::size_t kSatelliteHeader = 8;
-
-/// An id without its format and frame bits.
-enum class Group : std::uint16_t {
-  temperature = 0x0810,
-  utc = 0x1010,
-  packet_counter = 0x1020,
-  sample_time_fine = 0x1060,
-  sample_time_coarse = 0x1070,
-  quaternion = 0x2010,
-  rotation_matrix = 0x2020,
-  euler = 0x2030,
-  pressure = 0x3010,
-  delta_v = 0x4010,
-  acceleration = 0x4020,
-  free_acceleration = 0x4030,
-  altitude_msl = 0x5010,
-  altitude_ellipsoid = 0x5020,
-  position_ecef = 0x5030,
-  latitude_longitude = 0x5040,
-  gnss_pvt = 0x7010,
-  satellites = 0x7020,
-  rate_of_turn = 0x8020,
-  delta_q = 0x8030,
-  magnetic_field = 0xC020,
-  velocity = 0xD010,
-  status_byte = 0xE010,
-  status_word = 0xE020,
-};
-
-Group group_of(std::uint16_t id) noexcept { return static_cast<Group>(id & 0xFFF0U); }
 
 std::optional<LocalFrame> frame_of(std::uint16_t id) noexcept {
   const unsigned bits = (id >> 2U) & 3U;
@@ -65,20 +35,6 @@ std::optional<NumberFormat> format_of(std::uint16_t id, std::size_t size) noexce
   }
 }
 
-double number(Bytes b, NumberFormat format) noexcept {
-  switch (format) {
-    case NumberFormat::float32:
-      return read_float32(b);
-    case NumberFormat::fp12_20:
-      return read_fp12_20(b);
-    case NumberFormat::fp16_32:
-      return read_fp16_32(b);
-    case NumberFormat::float64:
-      return read_float64(b);
-  }
-  return 0;  // not reached: two bits have four values
-}
-
 /// N numbers, or nothing when the packet cannot hold N or one is not finite.
 template <std::size_t N>
 std::optional<std::array<double, N>> numbers(const Packet& packet) noexcept {
@@ -88,7 +44,7 @@ std::optional<std::array<double, N>> numbers(const Packet& packet) noexcept {
   if (!format) return std::nullopt;
   std::array<double, N> values{};
   for (std::size_t i = 0; i < N; ++i) {
-    values[i] = number(packet.data.subspan(i * size, size), *format);
+    values[i] = read_number(packet.data.subspan(i * size, size), *format);
     if (!std::isfinite(values[i])) return std::nullopt;
   }
   return values;
@@ -131,7 +87,7 @@ bool store_u32(Bytes b, std::optional<std::uint32_t>* field) noexcept {
 
 bool store_utc(Bytes b, std::optional<Utc>* field) noexcept {
   if (b.size() != kUtcSize) return false;
-  *field = Utc{read_u32(b), read_u16(b.subspan(4)), b[6], b[7], b[8], b[9], b[10], b[11]};
+  *field = read_utc(b);
   return true;
 }
 
@@ -183,58 +139,58 @@ enum class Taken : std::uint8_t { yes, refused, unknown };
 Taken taken(bool stored) noexcept { return stored ? Taken::yes : Taken::refused; }
 
 Taken take(const Packet& packet, Mtdata2* out) noexcept {
-  switch (group_of(packet.id)) {
-    case Group::temperature:
+  switch (packet_id(packet.id)) {
+    case PacketId::temperature:
       return taken(store_scalar(packet, &out->temperature_c));
-    case Group::utc:
+    case PacketId::utc:
       return taken(store_utc(packet.data, &out->utc));
-    case Group::packet_counter:
+    case PacketId::packet_counter:
       return taken(store_u16(packet.data, &out->packet_counter));
-    case Group::sample_time_fine:
+    case PacketId::sample_time_fine:
       return taken(store_u32(packet.data, &out->sample_time_fine));
-    case Group::sample_time_coarse:
+    case PacketId::sample_time_coarse:
       return taken(store_u32(packet.data, &out->sample_time_coarse_s));
-    case Group::quaternion:
+    case PacketId::quaternion:
       return taken(store_in_frame(packet, numbers<4>(packet), &out->quaternion, &out->orientation_frame));
-    case Group::rotation_matrix:
+    case PacketId::rotation_matrix:
       return taken(store_in_frame(packet, numbers<9>(packet), &out->rotation_matrix, &out->orientation_frame));
-    case Group::euler:
+    case PacketId::euler:
       return taken(store_in_frame(packet, numbers<3>(packet), &out->euler_deg, &out->orientation_frame));
-    case Group::pressure:
+    case PacketId::pressure:
       return taken(store_u32(packet.data, &out->pressure_pa));
-    case Group::delta_v:
+    case PacketId::delta_v:
       return taken(store(numbers<3>(packet), &out->delta_v));
-    case Group::acceleration:
+    case PacketId::acceleration:
       return taken(store(numbers<3>(packet), &out->acceleration));
-    case Group::free_acceleration:
+    case PacketId::free_acceleration:
       return taken(store(numbers<3>(packet), &out->free_acceleration));
-    case Group::altitude_msl:
+    case PacketId::altitude_msl:
       return taken(store_scalar(packet, &out->altitude_msl_m));
-    case Group::altitude_ellipsoid:
+    case PacketId::altitude_ellipsoid:
       return taken(store_scalar(packet, &out->altitude_ellipsoid_m));
-    case Group::position_ecef:
+    case PacketId::position_ecef:
       return taken(store(numbers<3>(packet), &out->position_ecef_m));
-    case Group::latitude_longitude:
+    case PacketId::latitude_longitude:
       if (!store(numbers<2>(packet), &out->latitude_longitude_deg)) return Taken::refused;
       out->position_format = *format_of(packet.id, packet.data.size() / 2);
       return Taken::yes;
-    case Group::gnss_pvt:
+    case PacketId::gnss_pvt:
       return taken(store_pvt(packet.data, &out->gnss_pvt));
-    case Group::satellites:
+    case PacketId::satellites:
       return taken(store_satellites(packet.data, &out->satellites));
-    case Group::rate_of_turn:
+    case PacketId::rate_of_turn:
       return taken(store(numbers<3>(packet), &out->rate_of_turn));
-    case Group::delta_q:
+    case PacketId::delta_q:
       return taken(store(numbers<4>(packet), &out->delta_q));
-    case Group::magnetic_field:
+    case PacketId::magnetic_field:
       return taken(store(numbers<3>(packet), &out->magnetic_field));
-    case Group::velocity:
+    case PacketId::velocity:
       return taken(store_in_frame(packet, numbers<3>(packet), &out->velocity, &out->velocity_frame));
-    case Group::status_byte:
+    case PacketId::status_byte:
       if (packet.data.size() != 1) return Taken::refused;
       out->status_byte = packet.data[0];
       return Taken::yes;
-    case Group::status_word:
+    case PacketId::status_word:
       return taken(store_u32(packet.data, &out->status_word));
   }
   return Taken::unknown;
@@ -248,6 +204,127 @@ PacketStatus PacketReader::next(Packet* packet) noexcept {
   *packet = {read_u16(rest_), rest_.subspan(kPacketHeader, rest_[2])};
   rest_ = rest_.subspan(kPacketHeader + rest_[2]);
   return PacketStatus::ok;
+}
+
+std::optional<std::size_t> packet_size(std::uint16_t id) noexcept {
+  const std::size_t number = size_of(static_cast<NumberFormat>(id & 3U));
+  switch (packet_id(id)) {
+    case PacketId::temperature:
+    case PacketId::altitude_msl:
+    case PacketId::altitude_ellipsoid:
+      return number;
+    case PacketId::latitude_longitude:
+      return 2 * number;
+    case PacketId::euler:
+    case PacketId::delta_v:
+    case PacketId::acceleration:
+    case PacketId::free_acceleration:
+    case PacketId::position_ecef:
+    case PacketId::rate_of_turn:
+    case PacketId::magnetic_field:
+    case PacketId::velocity:
+      return 3 * number;
+    case PacketId::quaternion:
+    case PacketId::delta_q:
+      return 4 * number;
+    case PacketId::rotation_matrix:
+      return 9 * number;
+    case PacketId::utc:
+      return kUtcSize;
+    case PacketId::packet_counter:
+      return 2;
+    case PacketId::sample_time_fine:
+    case PacketId::sample_time_coarse:
+    case PacketId::pressure:
+    case PacketId::status_word:
+      return 4;
+    case PacketId::status_byte:
+      return 1;
+    case PacketId::gnss_pvt:
+      return kPvtSize;
+    case PacketId::satellites:
+      break;
+  }
+  return std::nullopt;
+}
+
+void PacketWriter::put(std::uint16_t id, Bytes data) noexcept {
+  constexpr std::size_t kLongest = 255;
+  if (full_ || data.size() > kLongest || out_.size() - size_ < kPacketHeader + data.size()) {
+    full_ = true;
+    return;
+  }
+  const auto to = out_.subspan(size_);
+  write_u16(to, id);
+  to[2] = static_cast<std::uint8_t>(data.size());
+  std::copy(data.begin(), data.end(), to.begin() + kPacketHeader);
+  size_ += kPacketHeader + data.size();
+}
+
+void PacketWriter::put_numbers(std::uint16_t id, std::span<const double> values) noexcept {
+  constexpr std::size_t kMost = 9;
+  std::array<std::uint8_t, kMost * sizeof(double)> bytes{};
+  const auto format = static_cast<NumberFormat>(id & 3U);
+  const std::size_t size = size_of(format);
+  if (values.size() > kMost) {
+    full_ = true;
+    return;
+  }
+  for (std::size_t i = 0; i < values.size(); ++i) write_number(std::span(bytes).subspan(i * size), format, values[i]);
+  put(id, std::span(bytes).first(values.size() * size));
+}
+
+void PacketWriter::put_u16(std::uint16_t id, std::uint16_t value) noexcept {
+  std::array<std::uint8_t, 2> bytes{};
+  write_u16(bytes, value);
+  put(id, bytes);
+}
+
+void PacketWriter::put_u32(std::uint16_t id, std::uint32_t value) noexcept {
+  std::array<std::uint8_t, 4> bytes{};
+  write_u32(bytes, value);
+  put(id, bytes);
+}
+
+void PacketWriter::put_utc(const Utc& utc) noexcept {
+  std::array<std::uint8_t, kUtcSize> bytes{};
+  write_utc(bytes, utc);
+  put(wire_id(PacketId::utc), bytes);
+}
+
+void PacketWriter::put_pvt(const GnssPvt& p) noexcept {
+  std::array<std::uint8_t, kPvtSize> b{};
+  const auto u32 = [&b](std::size_t at, std::uint32_t v) { write_u32(std::span(b).subspan(at), v); };
+  const auto i32 = [&u32](std::size_t at, std::int32_t v) { u32(at, static_cast<std::uint32_t>(v)); };
+  u32(0, p.itow_ms);
+  write_u16(std::span(b).subspan(4), p.year);
+  b[6] = p.month;
+  b[7] = p.day;
+  b[8] = p.hour;
+  b[9] = p.minute;
+  b[10] = p.second;
+  b[11] = p.valid;
+  u32(12, p.time_accuracy_ns);
+  i32(16, p.nanosecond);
+  b[20] = p.fix;
+  b[21] = p.flags;
+  b[22] = p.satellites;
+  i32(24, p.longitude_1e7_deg);
+  i32(28, p.latitude_1e7_deg);
+  i32(32, p.height_ellipsoid_mm);
+  i32(36, p.height_msl_mm);
+  u32(40, p.horizontal_accuracy_mm);
+  u32(44, p.vertical_accuracy_mm);
+  i32(48, p.velocity_north_mm_s);
+  i32(52, p.velocity_east_mm_s);
+  i32(56, p.velocity_down_mm_s);
+  i32(60, p.ground_speed_mm_s);
+  i32(64, p.heading_of_motion_1e5_deg);
+  u32(68, p.speed_accuracy_mm_s);
+  u32(72, p.heading_accuracy_1e5_deg);
+  i32(76, p.heading_of_vehicle_1e5_deg);
+  for (std::size_t i = 0; i < p.dop_1e2.size(); ++i) write_u16(std::span(b).subspan(80 + 2 * i), p.dop_1e2[i]);
+  put(wire_id(PacketId::gnss_pvt), b);
 }
 
 PacketStatus decode_mtdata2(Bytes payload, Mtdata2* out) noexcept {

@@ -5,9 +5,59 @@
 #include <optional>
 #include <span>
 
+#include "firmware_iface/xbus/values.hpp"
+
 /// MTData2 (message 36) of MTi-G-700/710 and their kin: packets of id (16 bits), size (8 bits), data; all big endian.
 /// Every packet is optional in every message, in any order: parse the whole message, then use its stamps.
 namespace vergence::xbus {
+
+/// Ids of the packets, without number format (+ 0 … 3) and frame (+ 0 ENU, + 4 NED, + 8 NWU).
+enum class PacketId : std::uint16_t {
+  temperature = 0x0810,
+  utc = 0x1010,
+  packet_counter = 0x1020,
+  sample_time_fine = 0x1060,
+  sample_time_coarse = 0x1070,
+  quaternion = 0x2010,
+  rotation_matrix = 0x2020,
+  euler = 0x2030,
+  pressure = 0x3010,
+  delta_v = 0x4010,
+  acceleration = 0x4020,
+  free_acceleration = 0x4030,
+  altitude_msl = 0x5010,
+  altitude_ellipsoid = 0x5020,
+  position_ecef = 0x5030,
+  latitude_longitude = 0x5040,
+  gnss_pvt = 0x7010,
+  satellites = 0x7020,
+  rate_of_turn = 0x8020,
+  delta_q = 0x8030,
+  magnetic_field = 0xC020,
+  velocity = 0xD010,
+  status_byte = 0xE010,
+  status_word = 0xE020,
+};
+
+[[nodiscard]] constexpr PacketId packet_id(std::uint16_t id) noexcept { return static_cast<PacketId>(id & 0xFFF0U); }
+/// An id as it stands on the wire.
+[[nodiscard]] constexpr std::uint16_t wire_id(PacketId id, NumberFormat format = NumberFormat::float32,
+                                              LocalFrame frame = LocalFrame::enu) noexcept {
+  return static_cast<std::uint16_t>(static_cast<unsigned>(id) | static_cast<unsigned>(format) | (static_cast<unsigned>(frame) << 2U));
+}
+/// Bytes of a packet's data; nothing: not known, or not fixed.
+[[nodiscard]] std::optional<std::size_t> packet_size(std::uint16_t id) noexcept;
+
+/// Bits of the status word (status_word); the status byte is its lowest eight.
+inline constexpr std::uint32_t kStatusSelfTest = 1U << 0U;
+inline constexpr std::uint32_t kStatusFilterValid = 1U << 1U;
+inline constexpr std::uint32_t kStatusGnssFix = 1U << 2U;
+inline constexpr std::uint32_t kStatusClockSynced = 1U << 6U;
+inline constexpr std::uint32_t kStatusClipping = 1U << 19U;
+inline constexpr std::uint32_t kStatusSyncInMarker = 1U << 21U;
+inline constexpr std::uint32_t kStatusSyncOutMarker = 1U << 22U;
+/// Filter mode of a status word: 0 without GNSS, 1 coasting (less than a minute without), 3 with GNSS.
+[[nodiscard]] constexpr unsigned filter_mode(std::uint32_t status_word) noexcept { return (status_word >> 23U) & 7U; }
 
 /// One packet as it stands in the payload.
 struct Packet {
@@ -30,20 +80,6 @@ class PacketReader {
 
  private:
   std::span<const std::uint8_t> rest_;
-};
-
-/// How floating numbers travel: the lowest two bits of an id.
-enum class NumberFormat : std::uint8_t { float32 = 0, fp12_20 = 1, fp16_32 = 2, float64 = 3 };
-
-/// The frame that orientation and velocity refer to: the next two bits of an id.
-enum class LocalFrame : std::uint8_t { enu = 0, ned = 1, nwu = 2 };
-
-/// Universal time of the sample; second may be 60.
-struct Utc {
-  std::uint32_t nanosecond = 0;
-  std::uint16_t year = 0;
-  std::uint8_t month = 0, day = 0, hour = 0, minute = 0, second = 0;
-  std::uint8_t flags = 0;  // 1 time of week valid, 2 week valid, 4 leap seconds known: without it the time is GPS-based
 };
 
 /// GNSS position, velocity and time (7010), raw integers as the receiver gives them.
@@ -84,8 +120,6 @@ struct SatelliteInfo {
   }
 };
 
-using Three = std::array<double, 3>;
-
 /// A message's fields; absent: the message had no such packet. Units as in the names; vectors are in sensor axes unless said.
 struct Mtdata2 {
   std::optional<std::uint16_t> packet_counter;    // steps by one with every message, of any content
@@ -119,6 +153,28 @@ struct Mtdata2 {
   std::uint32_t packets = 0;
   std::uint32_t unknown_packets = 0;  // skipped by their size
   std::uint32_t refused_packets = 0;  // known, but of a size the field cannot have, or a number that is not finite
+};
+
+/// Puts packets one behind the other into a payload.
+///
+/// Memory  The caller's. Errors  What does not fit is not written, and full() says so from then on.
+class PacketWriter {
+ public:
+  explicit PacketWriter(std::span<std::uint8_t> out) noexcept : out_(out) {}
+  void put(std::uint16_t id, std::span<const std::uint8_t> data) noexcept;
+  /// Numbers in the format of the id's lowest two bits; at most nine.
+  void put_numbers(std::uint16_t id, std::span<const double> values) noexcept;
+  void put_u16(std::uint16_t id, std::uint16_t value) noexcept;
+  void put_u32(std::uint16_t id, std::uint32_t value) noexcept;
+  void put_utc(const Utc& utc) noexcept;
+  void put_pvt(const GnssPvt& pvt) noexcept;
+  [[nodiscard]] std::span<const std::uint8_t> payload() const noexcept { return out_.first(size_); }
+  [[nodiscard]] bool full() const noexcept { return full_; }
+
+ private:
+  std::span<std::uint8_t> out_;
+  std::size_t size_ = 0;
+  bool full_ = false;
 };
 
 /// Decodes a message's payload. `torn`: *out untouched. Never `end`.

@@ -1,0 +1,194 @@
+#include "firmware_iface/xbus/mtdata.hpp"
+
+#include <cmath>
+
+namespace vergence::xbus {
+namespace {
+
+constexpr std::size_t kRawSize = 20;
+constexpr std::size_t kFixSize = 44;
+constexpr std::uint16_t kModesKnown = kModeTemperature | kModeCalibrated | kModeOrientation | kModeAuxiliary | kModePosition |
+                                      kModeVelocity | kModeStatus | kModeGnss | kModeRaw;
+constexpr std::uint32_t kOrientationBits = 0xC;
+constexpr std::uint32_t kPlaceBits = 0x7U << 14U;  // 0: latitude, longitude, altitude on WGS84
+constexpr std::uint32_t kSpeedBits = 0x3U << 17U;  // 0: m/s along x, y, z
+
+/// Walks a payload in the layout's order; reading and writing differ only in what happens to a field.
+/// `Fields` has raw(), fix(), numbers(span of doubles by optional), u8(), u16(), utc(): each takes the optional it belongs to.
+template <class Data, class Fields>
+void walk(const MtdataLayout& layout, Data& d, Fields& fields) noexcept {
+  const std::uint16_t m = layout.mode;
+  const std::uint32_t s = layout.settings;
+  if ((m & kModeRaw) != 0) fields.raw(d.raw);
+  if ((m & kModeGnss) != 0) fields.fix(d.fix);
+  if ((m & kModeTemperature) != 0) fields.number(d.temperature_c);
+  if ((m & kModeCalibrated) != 0) {
+    if ((s & kSettingsNoAcceleration) == 0) fields.numbers(d.acceleration);
+    if ((s & kSettingsNoRateOfTurn) == 0) fields.numbers(d.rate_of_turn);
+    if ((s & kSettingsNoMagneticField) == 0) fields.numbers(d.magnetic_field);
+  }
+  if ((m & kModeOrientation) != 0) {
+    if ((s & kOrientationBits) == kSettingsQuaternion) fields.numbers(d.quaternion);
+    if ((s & kOrientationBits) == kSettingsEuler) fields.numbers(d.euler_deg);
+    if ((s & kOrientationBits) == kSettingsMatrix) fields.numbers(d.rotation_matrix);
+  }
+  if ((m & kModeAuxiliary) != 0) {
+    if ((s & kSettingsNoAnalogue1) == 0) fields.u16(d.analogue_1);
+    if ((s & kSettingsNoAnalogue2) == 0) fields.u16(d.analogue_2);
+  }
+  if ((m & kModePosition) != 0) {
+    fields.numbers(d.latitude_longitude_deg);
+    fields.number(d.altitude_m);
+  }
+  if ((m & kModeVelocity) != 0) fields.numbers(d.velocity);
+  if ((m & kModeStatus) != 0) fields.u8(d.status);
+  if ((s & kSettingsCounter) != 0) fields.u16(d.sample_counter);
+  if ((s & kSettingsUtc) != 0) fields.utc(d.utc);
+}
+
+/// Counts bytes.
+struct Sizes {
+  std::size_t number_size;
+  std::size_t total = 0;
+  void raw(const std::optional<RawInertial>& /*field*/) noexcept { total += kRawSize; }
+  void fix(const std::optional<LegacyFix>& /*field*/) noexcept { total += kFixSize; }
+  void number(const std::optional<double>& /*field*/) noexcept { total += number_size; }
+  template <std::size_t N>
+  void numbers(const std::optional<std::array<double, N>>& /*field*/) noexcept {
+    total += N * number_size;
+  }
+  void u8(const std::optional<std::uint8_t>& /*field*/) noexcept { total += 1; }
+  void u16(const std::optional<std::uint16_t>& /*field*/) noexcept { total += 2; }
+  void utc(const std::optional<Utc>& /*field*/) noexcept { total += kUtcSize; }
+};
+
+/// Takes fields from bytes of which there are enough.
+struct Reader {
+  std::span<const std::uint8_t> rest;
+  NumberFormat format;
+  bool finite = true;
+
+  std::span<const std::uint8_t> take(std::size_t n) noexcept {
+    const auto bytes = rest.first(n);
+    rest = rest.subspan(n);
+    return bytes;
+  }
+  std::uint16_t next_u16() noexcept { return read_u16(take(2)); }
+  std::uint32_t next_u32() noexcept { return read_u32(take(4)); }
+  std::int32_t next_i32() noexcept { return read_i32(take(4)); }
+  double next_number() noexcept {
+    const double value = read_number(take(size_of(format)), format);
+    finite = finite && std::isfinite(value);
+    return value;
+  }
+  void raw(std::optional<RawInertial>& field) noexcept {
+    RawInertial r;
+    for (auto* axes : {&r.acceleration, &r.rate_of_turn, &r.magnetic_field})
+      for (std::uint16_t& count : *axes) count = next_u16();
+    r.temperature = next_u16();
+    field = r;
+  }
+  void fix(std::optional<LegacyFix>& field) noexcept {
+    LegacyFix f;
+    f.pressure_2pa = next_u16();
+    f.pressure_age = take(1)[0];
+    f.itow_ms = next_u32();
+    f.latitude_1e7_deg = next_i32();
+    f.longitude_1e7_deg = next_i32();
+    f.height_mm = next_i32();
+    f.velocity_north_cm_s = next_i32();
+    f.velocity_east_cm_s = next_i32();
+    f.velocity_down_cm_s = next_i32();
+    f.horizontal_accuracy_mm = next_u32();
+    f.vertical_accuracy_mm = next_u32();
+    f.speed_accuracy_cm_s = next_u32();
+    f.age = take(1)[0];
+    field = f;
+  }
+  void number(std::optional<double>& field) noexcept { field = next_number(); }
+  template <std::size_t N>
+  void numbers(std::optional<std::array<double, N>>& field) noexcept {
+    std::array<double, N> values{};
+    for (double& value : values) value = next_number();
+    field = values;
+  }
+  void u8(std::optional<std::uint8_t>& field) noexcept { field = take(1)[0]; }
+  void u16(std::optional<std::uint16_t>& field) noexcept { field = next_u16(); }
+  void utc(std::optional<Utc>& field) noexcept { field = read_utc(take(kUtcSize)); }
+};
+
+/// Puts fields into bytes of which there are enough.
+struct Writer {
+  std::span<std::uint8_t> rest;
+  NumberFormat format;
+
+  std::span<std::uint8_t> room(std::size_t n) noexcept {
+    const auto bytes = rest.first(n);
+    rest = rest.subspan(n);
+    return bytes;
+  }
+  void put_i32(std::int32_t v) noexcept { write_u32(room(4), static_cast<std::uint32_t>(v)); }
+  void raw(const std::optional<RawInertial>& field) noexcept {
+    const RawInertial r = field.value_or(RawInertial{});
+    for (const auto* axes : {&r.acceleration, &r.rate_of_turn, &r.magnetic_field})
+      for (const std::uint16_t count : *axes) write_u16(room(2), count);
+    write_u16(room(2), r.temperature);
+  }
+  void fix(const std::optional<LegacyFix>& field) noexcept {
+    const LegacyFix f = field.value_or(LegacyFix{});
+    write_u16(room(2), f.pressure_2pa);
+    room(1)[0] = f.pressure_age;
+    write_u32(room(4), f.itow_ms);
+    for (const std::int32_t v :
+         {f.latitude_1e7_deg, f.longitude_1e7_deg, f.height_mm, f.velocity_north_cm_s, f.velocity_east_cm_s, f.velocity_down_cm_s})
+      put_i32(v);
+    for (const std::uint32_t v : {f.horizontal_accuracy_mm, f.vertical_accuracy_mm, f.speed_accuracy_cm_s}) write_u32(room(4), v);
+    room(1)[0] = f.age;
+  }
+  void number(const std::optional<double>& field) noexcept { write_number(room(size_of(format)), format, field.value_or(0)); }
+  template <std::size_t N>
+  void numbers(const std::optional<std::array<double, N>>& field) noexcept {
+    for (const double value : field.value_or(std::array<double, N>{})) write_number(room(size_of(format)), format, value);
+  }
+  void u8(const std::optional<std::uint8_t>& field) noexcept { room(1)[0] = field.value_or(0); }
+  void u16(const std::optional<std::uint16_t>& field) noexcept { write_u16(room(2), field.value_or(0)); }
+  void utc(const std::optional<Utc>& field) noexcept { write_utc(room(kUtcSize), field.value_or(Utc{})); }
+};
+
+}  // namespace
+
+std::optional<std::size_t> MtdataLayout::payload_size() const noexcept {
+  if ((mode & static_cast<std::uint16_t>(~kModesKnown)) != 0) return std::nullopt;
+  if ((mode & kModeRaw) != 0 && (mode & static_cast<std::uint16_t>(~(kModeRaw | kModeGnss))) != 0) return std::nullopt;
+  if ((mode & kModeOrientation) != 0 && (settings & kOrientationBits) == kOrientationBits) return std::nullopt;
+  if ((mode & kModePosition) != 0 && (settings & kPlaceBits) != 0) return std::nullopt;
+  if ((mode & kModeVelocity) != 0 && (settings & kSpeedBits) != 0) return std::nullopt;
+  Sizes sizes{size_of(format())};
+  const Mtdata nothing;
+  walk(*this, nothing, sizes);
+  return sizes.total;
+}
+
+MtdataStatus decode_mtdata(std::span<const std::uint8_t> payload, const MtdataLayout& layout, Mtdata* out) noexcept {
+  const std::optional<std::size_t> size = layout.payload_size();
+  if (!size) return MtdataStatus::layout_unknown;
+  if (*size != payload.size()) return MtdataStatus::length_wrong;
+  Mtdata decoded;
+  decoded.frame = layout.frame();
+  decoded.format = layout.format();
+  Reader reader{payload, layout.format()};
+  walk(layout, decoded, reader);
+  if (!reader.finite) return MtdataStatus::not_finite;
+  *out = decoded;
+  return MtdataStatus::ok;
+}
+
+std::size_t encode_mtdata(const Mtdata& data, const MtdataLayout& layout, std::span<std::uint8_t> out) noexcept {
+  const std::optional<std::size_t> size = layout.payload_size();
+  if (!size || *size > out.size()) return 0;
+  Writer writer{out.first(*size), layout.format()};
+  walk(layout, data, writer);
+  return *size;
+}
+
+}  // namespace vergence::xbus

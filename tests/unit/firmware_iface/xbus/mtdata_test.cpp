@@ -1,0 +1,304 @@
+#include "firmware_iface/xbus/mtdata.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <sstream>
+
+#include "firmware_iface/xbus/frame.hpp"
+#include "tests/support/shared_data.hpp"
+#include "tests/support/temporary_folder.hpp"
+#include "tests/unit/firmware_iface/xbus/hex.hpp"
+
+namespace vergence::xbus {
+namespace {
+
+using Bytes = std::vector<std::uint8_t>;
+
+Mtdata decoded(const Bytes& frame_bytes, const MtdataLayout& layout) {
+  const ParsedFrame frame = parse_frame(frame_bytes);
+  EXPECT_EQ(frame.status, FrameStatus::ok);
+  EXPECT_TRUE(frame.message.is(MessageId::mtdata));
+  Mtdata out;
+  EXPECT_EQ(decode_mtdata(frame.message.payload, layout, &out), MtdataStatus::ok);
+  return out;
+}
+
+constexpr double kQuarter = 0.70710678118654752;  // cos 45°
+
+void expect_place(const Mtdata& m, double tolerance_deg) {
+  ASSERT_TRUE(m.latitude_longitude_deg && m.altitude_m);
+  EXPECT_NEAR((*m.latitude_longitude_deg)[0], -27.476543, tolerance_deg);
+  EXPECT_NEAR((*m.latitude_longitude_deg)[1], 153.028765, tolerance_deg);
+  EXPECT_EQ(*m.altitude_m, 52.25);
+}
+
+void expect_attitude(const Mtdata& m, double tolerance) {
+  ASSERT_TRUE(m.quaternion);
+  EXPECT_NEAR((*m.quaternion)[0], kQuarter, tolerance);
+  EXPECT_EQ((*m.quaternion)[1], 0);
+  EXPECT_EQ((*m.quaternion)[2], 0);
+  EXPECT_NEAR((*m.quaternion)[3], kQuarter, tolerance);
+}
+
+TEST(Mtdata, decodesFloats) {
+  const Mtdata m = decoded(
+      from_hex(
+          "FA FF 32 4F 3E 00 00 00 BE 80 00 00 41 1D 00 00 3B 00 00 00 BC 00 00 00 3D 00 00 00 3F 00 00 00 BE 80 00 00 BF 40 00 00 3F "
+          "35 04 F3 00 00 00 00 00 00 00 00 3F 35 04 F3 C1 DB CF F6 43 19 07 5D 42 51 00 00 41 28 00 00 BE 00 00 00 3D 80 00 00 07 12 34 "
+          "3B"),
+      {0x0836, 0x001});
+  EXPECT_EQ(m.acceleration, (Three{0.125, -0.25, 9.8125}));
+  EXPECT_EQ(m.rate_of_turn, (Three{0x1p-9, -0x1p-7, 0x1p-5}));
+  EXPECT_EQ(m.magnetic_field, (Three{0.5, -0.25, -0.75}));
+  expect_attitude(m, 1e-7);
+  expect_place(m, 1.4e-5);  // half a step of a float at 153
+  EXPECT_EQ(m.velocity, (Three{10.5, -0.125, 0.0625}));
+  EXPECT_EQ(m.frame, LocalFrame::nwu);
+  EXPECT_EQ(m.status, 7);
+  EXPECT_EQ(m.sample_counter, 0x1234);
+  EXPECT_FALSE(m.utc || m.fix || m.raw || m.temperature_c || m.euler_deg);
+}
+
+void expect_fp1632_tail(const Mtdata& m) {
+  expect_attitude(m, 1e-7);
+  expect_place(m, 0x1p-33);
+  EXPECT_EQ(m.velocity, (Three{10.5, -0.125, 0.0625}));
+  EXPECT_EQ(m.status, 7);
+  EXPECT_EQ(m.sample_counter, 0x1234);
+  ASSERT_TRUE(m.utc);
+  EXPECT_EQ(m.utc->year, 2012);
+  EXPECT_EQ(m.utc->month, 5);
+  EXPECT_EQ(m.utc->day, 14);
+  EXPECT_EQ(m.utc->hour, 3);
+  EXPECT_EQ(m.utc->second, 5);
+  EXPECT_EQ(m.utc->nanosecond, 250'000'000U);
+  EXPECT_EQ(m.utc->flags, 7);
+}
+
+TEST(Mtdata, decodesSixteenDotThirtyTwoExactly) {
+  expect_fp1632_tail(decoded(
+      from_hex("FA FF 32 4B B5 04 F3 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 B5 04 F3 00 00 00 86 01 47 28 FF E4 07 5D 24 9E 00 99 40 "
+               "00 00 00 00 34 80 00 00 00 00 0A E0 00 00 00 FF FF 10 00 00 00 00 00 07 12 34 0E E6 B2 80 07 DC 05 0E 03 04 05 07 2C"),
+      {0x0834, 0x203}));
+}
+
+TEST(Mtdata, decodesTheReceiversFixWhichIsInIntegersWhateverTheFormat) {
+  const Mtdata m = decoded(
+      from_hex(
+          "FA FF 32 77 C5 E7 02 12 06 42 FA EF 9F 69 8A 5B 36 56 22 00 00 CC 1A 00 00 04 1A FF FF FF F4 00 00 00 06 00 00 09 C4 00 00 "
+          "0E D8 00 00 00 2D 03 B5 04 F3 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 B5 04 F3 00 00 00 86 01 47 28 FF E4 07 5D 24 9E 00 "
+          "99 40 00 00 00 00 34 80 00 00 00 00 0A E0 00 00 00 FF FF 10 00 00 00 00 00 07 12 34 0E E6 B2 80 07 DC 05 0E 03 04 05 07 96"),
+      {0x1834, 0x203});
+  ASSERT_TRUE(m.fix);
+  EXPECT_EQ(m.fix->pressure_2pa, 0xC5E7);
+  EXPECT_EQ(m.fix->pressure_age, 2);
+  EXPECT_EQ(m.fix->itow_ms, 302400250U);
+  EXPECT_EQ(m.fix->latitude_1e7_deg, -274765430);
+  EXPECT_EQ(m.fix->longitude_1e7_deg, 1530287650);
+  EXPECT_EQ(m.fix->height_mm, 52250);
+  EXPECT_EQ(m.fix->velocity_north_cm_s, 1050);
+  EXPECT_EQ(m.fix->velocity_east_cm_s, -12);
+  EXPECT_EQ(m.fix->velocity_down_cm_s, 6);
+  EXPECT_EQ(m.fix->horizontal_accuracy_mm, 2500U);
+  EXPECT_EQ(m.fix->vertical_accuracy_mm, 3800U);
+  EXPECT_EQ(m.fix->speed_accuracy_cm_s, 45U);
+  EXPECT_EQ(m.fix->age, 3);
+  expect_fp1632_tail(m);
+}
+
+TEST(Mtdata, decodesTwelveDotTwenty) {
+  const Mtdata m =
+      decoded(from_hex("FA FF 32 37 00 02 00 00 FF FC 00 00 00 9D 00 00 00 00 08 00 FF FF E0 00 00 00 80 00 00 08 00 00 FF FC 00 00 "
+                       "FF F4 00 00 00 0B 50 4F 00 00 00 00 00 00 00 00 00 0B 50 4F 07 12 34 01"),
+              {0x0806, 0x101});
+  EXPECT_EQ(m.acceleration, (Three{0.125, -0.25, 9.8125}));
+  EXPECT_EQ(m.rate_of_turn, (Three{0x1p-9, -0x1p-7, 0x1p-5}));
+  expect_attitude(m, 0x1p-21);
+  EXPECT_EQ(m.sample_counter, 0x1234);
+}
+
+TEST(Mtdata, decodesDoubles) {
+  const Mtdata m =
+      decoded(from_hex("FA FF 32 3B 3F E6 A0 9E 60 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 3F E6 A0 9E 60 00 00 00 "
+                       "C0 3B 79 FE B8 D8 23 42 40 63 20 EB A4 93 C8 9F 40 4A 20 00 00 00 00 00 07 12 34 64"),
+              {0x0814, 0x301});
+  expect_attitude(m, 1e-7);
+  expect_place(m, 1e-13);
+}
+
+TEST(Mtdata, aLengthThatIsNotTheLayoutsIsRefused) {
+  const Bytes bytes(74, 0);
+  const MtdataLayout layout{0x0834, 0x203};
+  ASSERT_EQ(layout.payload_size(), 75U);
+  Mtdata out;
+  out.status = 99;
+  EXPECT_EQ(decode_mtdata(bytes, layout, &out), MtdataStatus::length_wrong);
+  EXPECT_EQ(decode_mtdata(Bytes(76, 0), layout, &out), MtdataStatus::length_wrong);
+  EXPECT_EQ(decode_mtdata({}, layout, &out), MtdataStatus::length_wrong);
+  EXPECT_EQ(out.status, 99) << "untouched";
+}
+
+TEST(Mtdata, layoutsWithoutMeaningAreRefused) {
+  EXPECT_FALSE((MtdataLayout{0x4002, 0}).payload_size()) << "raw excludes calibrated";
+  EXPECT_TRUE((MtdataLayout{0x5000, 0}).payload_size()) << "but not the receiver";
+  EXPECT_FALSE((MtdataLayout{0x0004, 0xC}).payload_size()) << "the fourth kind of orientation";
+  EXPECT_FALSE((MtdataLayout{0x0010, 1U << 14U}).payload_size()) << "a position that is not latitude and longitude";
+  EXPECT_FALSE((MtdataLayout{0x0020, 1U << 17U}).payload_size()) << "a velocity in another mode";
+  EXPECT_FALSE((MtdataLayout{0x0040, 0}).payload_size()) << "a bit without a field";
+  Mtdata out;
+  EXPECT_EQ(decode_mtdata({}, {0x0040, 0}, &out), MtdataStatus::layout_unknown);
+}
+
+TEST(Mtdata, notANumberIsRefused) {
+  Bytes bytes(12, 0);
+  bytes[0] = 0x7F, bytes[1] = 0xC0;
+  Mtdata out;
+  EXPECT_EQ(decode_mtdata(bytes, {kModeCalibrated, kSettingsNoRateOfTurn | kSettingsNoMagneticField}, &out), MtdataStatus::not_finite);
+}
+
+/// A value that every format holds exactly.
+template <std::size_t N>
+std::array<double, N> exact(double first) {
+  std::array<double, N> values{};
+  for (std::size_t i = 0; i < N; ++i) values[i] = (i % 2 == 0 ? 1 : -1) * (first + static_cast<double>(i) / 1024);
+  return values;
+}
+
+TEST(Mtdata, everyLayoutReadsBackWhatWasWritten) {
+  Mtdata all;
+  all.raw = RawInertial{{1, 2, 65535}, {4, 5, 6}, {7, 8, 9}, 10};
+  all.fix = LegacyFix{50660, 3, 302400250, -274765430, 1530287650, -52250, -1050, 12, -6, 2500, 3800, 45, 255};
+  all.temperature_c = -37.5;
+  all.acceleration = exact<3>(9.75), all.rate_of_turn = exact<3>(0.5), all.magnetic_field = exact<3>(0.25);
+  all.quaternion = exact<4>(0.5), all.euler_deg = exact<3>(170.5), all.rotation_matrix = exact<9>(0.75);
+  all.analogue_1 = 17, all.analogue_2 = 65535;
+  all.latitude_longitude_deg = exact<2>(27.5);
+  all.altitude_m = -12.5;
+  all.velocity = exact<3>(33.25);
+  all.status = 0x47;
+  all.sample_counter = 65535;
+  all.utc = Utc{999'999'999, 2036, 12, 31, 23, 59, 60, 7};
+  int layouts = 0;
+  for (unsigned mode = 0; mode < 0x8000; ++mode) {
+    for (const std::uint32_t orientation : {kSettingsQuaternion, kSettingsEuler, kSettingsMatrix})
+      for (std::uint32_t format = 0; format < 4; ++format) {
+        // The bits that switch single fields off go round with the mode.
+        const std::uint32_t off = (mode * 0x9E3779B1U) & 0xC70U, stamps = mode % 4;
+        const MtdataLayout layout{static_cast<std::uint16_t>(mode),
+                                  orientation | (format << 8U) | off | stamps | (mode % 3 == 0 ? kSettingsNed : 0U)};
+        const std::optional<std::size_t> size = layout.payload_size();
+        if (!size) continue;
+        ++layouts;
+        Bytes bytes(*size);
+        ASSERT_EQ(encode_mtdata(all, layout, bytes), *size);
+        Mtdata back;
+        ASSERT_EQ(decode_mtdata(bytes, layout, &back), MtdataStatus::ok);
+        Bytes again(*size);
+        ASSERT_EQ(encode_mtdata(back, layout, again), *size);
+        ASSERT_EQ(bytes, again) << mode;
+        ASSERT_TRUE(!back.velocity || back.velocity == all.velocity);
+        ASSERT_TRUE(!back.latitude_longitude_deg || back.latitude_longitude_deg == all.latitude_longitude_deg);
+        ASSERT_TRUE(!back.rotation_matrix || back.rotation_matrix == all.rotation_matrix);
+        ASSERT_TRUE(!back.analogue_2 || back.analogue_2 == all.analogue_2);
+        ASSERT_TRUE(!back.fix || back.fix->age == 255);
+        ASSERT_TRUE(!back.utc || back.utc->second == 60);
+        ASSERT_TRUE(!back.raw || back.raw->temperature == 10);
+      }
+  }
+  EXPECT_GT(layouts, 3000);
+}
+
+TEST(Mtdata, encodingWithoutRoomWritesNothing) {
+  Bytes bytes(74, 0xEE);
+  EXPECT_EQ(encode_mtdata({}, {0x0834, 0x203}, bytes), 0U);
+  EXPECT_EQ(bytes, Bytes(74, 0xEE));
+}
+
+TEST(Numbers, writingRoundsAndStaysInsideTheFormat) {
+  const auto written = [](double v, NumberFormat f) {
+    Bytes b(size_of(f));
+    write_number(b, f, v);
+    return read_number(b, f);
+  };
+  EXPECT_NEAR(written(-27.476543, NumberFormat::fp16_32), -27.476543, 0x1p-33);
+  EXPECT_NEAR(written(-27.476543, NumberFormat::fp12_20), -27.476543, 0x1p-21);
+  EXPECT_EQ(written(-0.5, NumberFormat::fp16_32), -0.5);
+  EXPECT_EQ(written(1e9, NumberFormat::fp16_32), 32768 - 0x1p-32);
+  EXPECT_EQ(written(-1e9, NumberFormat::fp16_32), -32768);
+  EXPECT_EQ(written(1e9, NumberFormat::fp12_20), 2048 - 0x1p-20);
+  EXPECT_EQ(written(-1e9, NumberFormat::fp12_20), -2048);
+  EXPECT_EQ(written(std::numeric_limits<double>::quiet_NaN(), NumberFormat::fp12_20), 0);
+  EXPECT_EQ(written(0.1, NumberFormat::float64), 0.1);
+  EXPECT_EQ(written(0.1, NumberFormat::float32), static_cast<double>(0.1F));
+}
+
+TEST(Utc, goesToUnixNanosecondsAndBack) {
+  const Utc utc{249'768'484, 2019, 1, 20, 13, 47, 24, 7};
+  EXPECT_TRUE(plausible(utc));
+  EXPECT_EQ(unix_ns(utc), 1'547'992'044'249'768'484);
+  const Utc back = utc_of_unix_ns(1'547'992'044'249'768'484, 7);
+  EXPECT_EQ(back.year, 2019);
+  EXPECT_EQ(back.day, 20);
+  EXPECT_EQ(back.hour, 13);
+  EXPECT_EQ(back.minute, 47);
+  EXPECT_EQ(back.second, 24);
+  EXPECT_EQ(back.nanosecond, 249'768'484U);
+  EXPECT_FALSE(plausible({0, 2019, 2, 29, 0, 0, 0, 7})) << "no leap year";
+  EXPECT_TRUE(plausible({0, 2016, 12, 31, 23, 59, 60, 7})) << "a leap second";
+  EXPECT_FALSE(plausible({1'000'000'000, 2019, 1, 1, 0, 0, 0, 7}));
+  EXPECT_FALSE(plausible({0, 0, 0, 0, 0, 0, 0, 0})) << "what a device without a fix sends";
+}
+
+/// The constructed vectors beside the captures, as their text gives them.
+TEST(ConstructedVectors, agree) {
+  constexpr const char* kFile = "data/xsens_mtdata2/legacy_constructed.txt";
+  const auto file = test::shared_data(kFile);
+  if (!file) GTEST_SKIP() << test::shared_data_missing(kFile);
+  std::istringstream in(test::read_file(*file));
+  std::map<std::string, Bytes> frames;
+  std::string name;
+  for (std::string line; std::getline(in, line);) {
+    if (line.rfind("name: ", 0) == 0) name = line.substr(6);
+    if (line.rfind("hex: ", 0) == 0) frames[name] = from_hex(line.substr(5));
+  }
+  ASSERT_EQ(frames.size(), 12U);
+  for (const auto& [what, bytes] : frames) {
+    const ParsedFrame frame = parse_frame(bytes);
+    EXPECT_EQ(frame.status, FrameStatus::ok) << what;
+    EXPECT_EQ(frame.size, bytes.size()) << what;
+    Bytes again(bytes.size());
+    ASSERT_EQ(write_frame(frame.message, again).status, WriteStatus::ok) << what;
+    EXPECT_EQ(again, bytes) << what;
+  }
+  const Mtdata all = decoded(frames.at("float_all"), {0x0836, 0x001});
+  EXPECT_EQ(all.acceleration, (Three{0.0625, -0.25, 9.8125}));
+  EXPECT_EQ(all.rate_of_turn, (Three{0.015625, -0.03125, 0.5}));
+  EXPECT_EQ(all.quaternion, (std::array<double, 4>{0.5, 0.5, -0.5, 0.5}));
+  EXPECT_EQ(*all.latitude_longitude_deg, (std::array<double, 2>{-27.497499465942383, 153.01370239257812}));
+  EXPECT_EQ(all.sample_counter, 65535);
+  const Mtdata fixed = decoded(frames.at("fp1632_position_velocity_euler"), {0x0834, 0x80000205});
+  EXPECT_EQ(fixed.euler_deg, (Three{1.5, -2.25, -170.125}));
+  EXPECT_NEAR((*fixed.latitude_longitude_deg)[0], -27.4975, 1.2e-10);
+  EXPECT_NEAR((*fixed.latitude_longitude_deg)[1], 153.0137, 1.2e-10);
+  EXPECT_EQ(*fixed.altitude_m, 40);
+  EXPECT_EQ(fixed.velocity, (Three{1.5, -2.25, 0.125}));
+  EXPECT_EQ(fixed.frame, LocalFrame::ned);
+  EXPECT_EQ(fixed.status, 5);
+  EXPECT_EQ(fixed.sample_counter, 0);
+  const Mtdata acceleration = decoded(frames.at("fp1220_acc_only"), {0x0002, 0x160});
+  EXPECT_EQ(acceleration.acceleration, (Three{0.0625, -0.25, 9.8125}));
+  EXPECT_FALSE(acceleration.rate_of_turn || acceleration.magnetic_field);
+  const Mtdata place = decoded(frames.at("double_position_utc"), {0x0010, 0x302});
+  EXPECT_EQ(*place.latitude_longitude_deg, (std::array<double, 2>{-27.4975, 153.0137}));
+  EXPECT_EQ(*place.altitude_m, 40);
+  EXPECT_EQ(unix_ns(*place.utc), 1'292'391'531'250'000'000);
+  const Mtdata matrix = decoded(frames.at("temperature_rotation_matrix_counter"), {0x0005, 0x009});
+  EXPECT_EQ(matrix.temperature_c, 37.5);
+  EXPECT_EQ(matrix.rotation_matrix, (std::array<double, 9>{0, -1, 0, 1, 0, 0, 0, 0, 1}));
+  EXPECT_EQ(matrix.sample_counter, 256);
+}
+
+}  // namespace
+}  // namespace vergence::xbus
