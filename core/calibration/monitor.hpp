@@ -64,8 +64,9 @@ struct MonitorVerdict {
     out_of_step,  // camera k exposes `lag_frames` frames late (negative: early); no fixed transform explains it
   };
   Kind kind = Kind::quiet;
-  double statistic = 0;  // largest of all windows
-  double threshold = 0;  // what it is held against
+  bool undecided = false;  // over the threshold, but not yet told what it is: at most a second
+  double statistic = 0;    // largest of all windows
+  double threshold = 0;    // what it is held against
   Vec6 offset = Vec6::Zero();  // true minus reference, (φ rad, τ m): R ← Exp(φ) R, t ← t + τ; of the window of `statistic`, or since onset
   Mat6 covariance = Mat6::Zero();  // of `offset`; rank 5, the length is not seen
   double lag_frames = 0;           // best estimate over the longest window, frames; meaningless where lag_sigma is infinite

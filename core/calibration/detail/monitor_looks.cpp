@@ -1,0 +1,340 @@
+#include "core/calibration/detail/monitor_looks.hpp"
+
+#include <Eigen/Cholesky>
+#include <Eigen/LU>
+
+#include <algorithm>
+#include <cmath>
+
+namespace vergence::calibration::detail {
+namespace {
+
+constexpr int kAcrossRounds = 4;     // of reweighting: the scale falls from that of a knock to that of the noise in two or three
+constexpr int kMotionRounds = 3;     // the odometry's motion is near, so fewer do
+constexpr double kTukey = 4.685;     // robust scales, where a scalar's weight reaches 0: 95 % efficient on Gaussian errors
+constexpr double kTukey3 = 6.0;      // the same for the length of three
+constexpr double kMedian1 = 0.6745;  // median of |normal|
+constexpr double kMedian3 = 1.5382;  // of the length of three normals
+constexpr double kMinScale = 0.1;    // of the sigma the sightings claim
+// An M-estimate's covariance has E ψ' where this code sums E w: (E w / E ψ')² for Gaussian errors at the constants above.
+constexpr double kTukeySpread = 1.46, kTukeySpread3 = 1.27;
+constexpr double kFitSigma = 0.1;        // rad: prior that keeps a frame's own fit from running off where it sees nothing
+constexpr double kMaxInverseDepth = 2;   // 1/m
+constexpr int kMinMotionTracks = 12;     // six of the pose and something left to say
+constexpr std::uint64_t kTrackGap = 30;  // frames: a number seen after longer is another track
+
+using Mat36 = Eigen::Matrix<double, 3, 6>;
+using Mat43 = Eigen::Matrix<double, 4, 3>;
+using Row6 = Eigen::Matrix<double, 1, 6>;
+
+Vec2 ray(const Pinhole& k, const Vec2& pixel) noexcept { return {(pixel.x() - k.cx) / k.fx, (pixel.y() - k.cy) / k.fy}; }
+
+double tukey(double squared, double limit) noexcept {
+  const double u = 1.0 - squared / (limit * limit);
+  return u > 0 ? u * u : 0.0;
+}
+
+/// Where camera k sees the point now minus where it saw it a frame ago, px; q = (x, y, 1/Z) in the left camera.
+Vec2 image_motion(const Reference& c, const Vec3& q, const Transform& T_previous_now) noexcept {
+  const Mat3& R = c.T_right_left.R;
+  const Vec3& t = c.T_right_left.t;
+  const Vec3 x(q.x(), q.y(), 1);
+  const Vec3 now = R * x + q.z() * t;
+  const Vec3 then = R * (T_previous_now.R * x + q.z() * T_previous_now.t) + q.z() * t;
+  if (!(now.z() > 0.1 && then.z() > 0.1)) return Vec2::Zero();
+  return {c.right.fx * (now.x() / now.z() - then.x() / then.z()), c.right.fy * (now.y() / now.z() - then.y() / then.z())};
+}
+
+double inverse_depth(const Reference& c, const Vec2& left, const Vec2& right) noexcept {
+  double zl = 0, zr = 0;
+  if (!match_depths(c.T_right_left, left, right, &zl, &zr)) return 0.0;
+  return std::clamp(1.0 / zl, 0.0, kMaxInverseDepth);
+}
+
+/// Both cameras' pixels of q with derivatives; false: behind a camera.
+bool predict(const Reference& c, const Vec3& q, Vec4* pixels, Mat43* J_q, Vec3* seen) noexcept {
+  const Mat3& R = c.T_right_left.R;
+  const Vec3& t = c.T_right_left.t;
+  const Vec3 Y = R * Vec3(q.x(), q.y(), 1) + q.z() * t;
+  if (!(Y.z() > 0.1)) return false;
+  const double i = 1.0 / Y.z(), u = Y.x() * i, v = Y.y() * i;
+  *pixels << c.left.fx * q.x(), c.left.fy * q.y(), c.right.fx * u, c.right.fy * v;
+  const double a = c.right.fx * i, b = c.right.fy * i;
+  *J_q << c.left.fx, 0, 0,                                                                //
+      0, c.left.fy, 0,                                                                    //
+      a * (R(0, 0) - u * R(2, 0)), a * (R(0, 1) - u * R(2, 1)), a * (t.x() - u * t.z()),  //
+      b * (R(1, 0) - v * R(2, 0)), b * (R(1, 1) - v * R(2, 1)), b * (t.y() - v * t.z());
+  *seen = Y;
+  return true;
+}
+
+/// A point from its two pixels by least squares in (x, y, 1/Z), one Gauss–Newton step from the two rays' meeting.
+struct Triangulated {
+  Vec3 q;
+  Mat3 information;  // for a sigma of 1 px
+
+  [[nodiscard]] bool from(const Reference& c, const Vec2& left, const Vec2& right) noexcept {
+    const Vec2 l = ray(c.left, left), r = ray(c.right, right);
+    q = {l.x(), l.y(), inverse_depth(c, l, r)};
+    Vec4 pixels;
+    Mat43 J;
+    Vec3 seen;
+    if (!predict(c, q, &pixels, &J, &seen)) return false;
+    const Vec4 e = Vec4(c.left.fx * l.x(), c.left.fy * l.y(), c.right.fx * r.x(), c.right.fy * r.y()) - pixels;
+    information.noalias() = J.transpose() * J;
+    q += information.inverse() * (J.transpose() * e);
+    return q.allFinite() && std::abs(q.z()) < kMaxInverseDepth;
+  }
+};
+
+/// Derivative by θ of where least squares puts the point: −(JᵀJ)⁻¹ Jᵀ ∂pixels/∂θ at q.
+bool point_by_theta(const Reference& c, const Vec3& q, const Transform& T_previous_now, Mat36* d) noexcept {
+  Vec4 pixels;
+  Mat43 J;
+  Vec3 Y;
+  if (!predict(c, q, &pixels, &J, &Y)) return false;
+  const double i = 1.0 / Y.z();
+  Mat23 G;
+  G << c.right.fx * i, 0, -c.right.fx * Y.x() * i * i, 0, c.right.fy * i, -c.right.fy * Y.y() * i * i;
+  Mat26 J_right;
+  J_right.leftCols<3>() = -G * skew(Y - q.z() * c.T_right_left.t);
+  J_right.middleCols<2>(3) = G * (q.z() * c.length * c.B);
+  J_right.col(kLag) = -image_motion(c, q, T_previous_now);
+  const Mat3 H = J.transpose() * J;
+  d->noalias() = -(H.inverse() * (J.bottomRows<2>().transpose() * J_right));
+  return true;
+}
+
+template <class Range, class Value>
+double median(Range& scratch, std::size_t n, const Value& value) noexcept {
+  for (std::size_t i = 0; i < n; ++i) scratch[i] = value(i);
+  const auto middle = scratch.begin() + static_cast<std::ptrdiff_t>(n / 2);
+  std::nth_element(scratch.begin(), middle, scratch.begin() + static_cast<std::ptrdiff_t>(n));
+  return *middle;
+}
+
+}  // namespace
+
+void Looks::reset() noexcept {
+  for (Memory& m : memories_) m.frame = 0;
+}
+
+AcrossLook Looks::across(const Reference& c, const MonitorFrame& frame, int min_matches, bool follow) noexcept {
+  const double f = 0.5 * (c.right.fx + c.right.fy);
+  const Transform T_previous_now = frame.T_now_previous.inverse();
+  const Mat3& E = c.epipolar.E();
+  rows_ = 0;
+  for (const AcrossSighting& s : frame.across) {
+    if (rows_ == kMaxSightings) break;
+    if (!(s.sigma_px > 0) || !s.left.allFinite() || !s.right.allFinite()) continue;
+    AcrossRow& row = across_[rows_];
+    const Vec2 left = ray(c.left, s.left), right = ray(c.right, s.right);
+    Vec5 J;
+    if (c.epipolar.to_line(left, right, &row.r, &J) != EpipolarStatus::ok) continue;
+    row.r *= f;
+    for (int i = 0; i < kFixed; ++i) row.J[static_cast<std::size_t>(i)] = f * J[i];
+    const Vec2 normal = (E * left.homogeneous()).head<2>().normalized();
+    const Vec2 v = image_motion(c, {left.x(), left.y(), inverse_depth(c, left, right)}, T_previous_now);
+    row.J[kLag] = normal.dot(v);
+    row.inverse_sigma2 = 1.0 / (2.0 * s.sigma_px * s.sigma_px);  // two images' errors across the line
+    row.track = s.track;
+    if (std::isfinite(row.r) && std::isfinite(row.inverse_sigma2)) ++rows_;
+  }
+  AcrossLook look;
+  if (rows_ < static_cast<std::size_t>(min_matches)) return look;
+
+  Vec5 fit = Vec5::Zero();
+  for (int round = 0; round < kAcrossRounds; ++round) {
+    const auto rest = [&](const AcrossRow& row) { return row.r + Eigen::Map<const Vec5>(row.J.data()).dot(fit); };
+    const double middle =
+        median(sizes_, rows_, [&](std::size_t i) { return std::abs(rest(across_[i])) * std::sqrt(across_[i].inverse_sigma2); });
+    const double scale = std::max(middle / kMedian1, kMinScale);
+    look.evidence = Evidence{};
+    Evidence& e = look.evidence;
+    for (std::size_t i = 0; i < rows_; ++i) {
+      AcrossRow& row = across_[i];
+      const double d = rest(row);
+      row.weight = row.inverse_sigma2 * tukey(d * d * row.inverse_sigma2, kTukey * scale);
+      if (row.weight == 0) continue;
+      std::size_t at = 0;
+      for (std::size_t a = 0; a < kTheta; ++a) {
+        const double wa = row.weight * row.J[a];
+        e.g[a] -= wa * row.r;
+        for (std::size_t b = 0; b <= a; ++b) e.A[at++] += wa * row.J[b];
+      }
+      e.n += row.weight;
+    }
+    std::array<double, kTriangle> A = e.A;
+    for (int i = 0; i < kFixed; ++i) A[lower(i, i)] += 1.0 / (kFitSigma * kFitSigma);
+    const Solved solved(A, e.g);
+    for (int i = kFixed - 1; i >= 0; --i) {  // back through Lᵀ of the first five
+      double s = solved.y[static_cast<std::size_t>(i)];
+      for (int k = i + 1; k < kFixed; ++k) s -= solved.L[lower(k, i)] * fit[k];
+      fit[i] = s / solved.L[lower(i, i)];
+    }
+  }
+  look.usable = std::count_if(across_.begin(), across_.begin() + static_cast<std::ptrdiff_t>(rows_),
+                              [](const AcrossRow& r) { return r.weight > 0; }) >= min_matches;
+  spread_of(look.evidence, fit, frame.frame, follow && look.usable, &look);
+  return look;
+}
+
+void Looks::spread_of(const Evidence& evidence, const Vec5& fit, std::uint64_t frame, bool follow, AcrossLook* look) noexcept {
+  // With x the part of a track in the gradient's noise and A = L Lᵀ: trace A⁻¹ Σ x xᵀ = Σ |L⁻¹ x|², and the variance that the frame adds to
+  // a running sum is Σ (x xᵀ + x sᵀ + s xᵀ), s what the track brought before.
+  const Solved factor(evidence.A, evidence.g);
+  const auto whitened = [&](std::array<double, kFixed>& v) {
+    for (int i = 0; i < kFixed; ++i) {
+      const auto ii = static_cast<std::size_t>(i);
+      double s = v[ii];
+      for (int k = 0; k < i; ++k) s -= factor.L[lower(i, k)] * v[static_cast<std::size_t>(k)];
+      v[ii] = s / factor.L[lower(i, i)];
+    }
+  };
+  double now = 0, before = 0;
+  for (std::size_t i = 0; i < rows_; ++i) {
+    const AcrossRow& row = across_[i];
+    const double size = row.weight * (row.r + Eigen::Map<const Vec5>(row.J.data()).dot(fit));
+    std::array<double, kFixed> x, white;
+    for (std::size_t a = 0; a < kFixed; ++a) white[a] = x[a] = size * row.J[a];
+    whitened(white);
+    for (const double a : white) now += a * a;
+    if (!follow) continue;
+    Memory& m = memories_[row.track % memories_.size()];
+    if (m.frame == 0 || m.track != row.track || frame + 1 - m.frame > kTrackGap) m = Memory{row.track, 0, {}};
+    std::array<double, kFixed> s = m.sum;
+    whitened(s);
+    for (std::size_t a = 0; a < kFixed; ++a) before += 2 * white[a] * s[a], m.sum[a] += x[a];
+    m.frame = frame + 1;
+  }
+  look->spread_now = kTukeySpread * now / kFixed;
+  look->spread_life = kTukeySpread * (now + before) / kFixed;
+}
+
+bool Looks::motion_row(const Reference& c, const MonitorFrame& frame, const MotionTrack& track, MotionRow* row) noexcept {
+  const Transform& T = frame.T_now_before;
+  if (!(track.sigma_px > 0)) return false;
+  Triangulated b, n;
+  if (!b.from(c, track.left_before, track.right_before) || !n.from(c, track.left_now, track.right_now)) return false;
+
+  // h: q before → q now, by Y = R (x, y, 1) + t/Z.
+  Mat3 D;
+  const auto carried = [&](const Vec3& q, Vec3* to, Vec3* at) {
+    const Vec3 Y = T.R * Vec3(q.x(), q.y(), 1) + q.z() * T.t;
+    if (!(Y.z() > 0.05)) return false;
+    const double i = 1.0 / Y.z();
+    *to = {Y.x() * i, Y.y() * i, q.z() * i};
+    *at = Y;
+    return true;
+  };
+  Vec3 now, Y;
+  if (!carried(b.q, &now, &Y)) return false;
+  const auto derivative = [&](const Vec3& q, const Vec3& at) {
+    const double i = 1.0 / at.z();
+    Mat3 M;  // ∂h/∂Y
+    M << i, 0, -at.x() * i * i, 0, i, -at.y() * i * i, 0, 0, -q.z() * i * i;
+    return M;
+  };
+  Mat3 M = derivative(b.q, Y);
+  Mat3 columns;
+  columns << T.R.col(0), T.R.col(1), T.t;
+  D.noalias() = M * columns;
+  D(2, 2) += 1.0 / Y.z();
+  const Vec3 gap = n.q - now;
+  if (!gap.allFinite()) return false;
+
+  // Linearised at the point both sightings agree on: its error and the gap's are independent, so noise in depth does not bias the fit.
+  const Mat3 joint = b.information + D.transpose() * n.information * D;
+  const Vec3 q = b.q + joint.inverse() * (D.transpose() * (n.information * gap));
+  if (!carried(q, &now, &Y)) return false;
+  M = derivative(q, Y);
+  D.noalias() = M * columns;
+  D(2, 2) += 1.0 / Y.z();
+  Mat36 by_theta_now, by_theta_before, J_theta, J_pose;
+  if (!point_by_theta(c, now, frame.T_now_previous.inverse(), &by_theta_now)) return false;
+  if (!point_by_theta(c, q, frame.T_before_earlier.inverse(), &by_theta_before)) return false;
+  J_theta = by_theta_now - D * by_theta_before;
+  J_pose.leftCols<3>() = M * skew(Y - q.z() * T.t);
+  J_pose.rightCols<3>() = -q.z() * M;
+
+  const Mat3 C = n.information.inverse() + D * b.information.inverse() * D.transpose();  // of the gap, for 1 px
+  const Eigen::LLT<Mat3> llt(C);
+  if (llt.info() != Eigen::Success) return false;
+  row->r = llt.matrixL().solve(gap);
+  row->J_theta = llt.matrixL().solve(J_theta);
+  row->J_pose = llt.matrixL().solve(J_pose);
+  row->inverse_sigma2 = 1.0 / (track.sigma_px * track.sigma_px);
+  return row->r.allFinite() && row->J_theta.allFinite() && row->J_pose.allFinite();
+}
+
+MotionLook Looks::motion(const Reference& c, const MonitorFrame& frame) noexcept {
+  std::size_t n = 0;
+  for (const MotionTrack& track : frame.motion) {
+    if (n == motion_.size()) break;
+    if (motion_row(c, frame, track, &motion_[n])) ++n;
+  }
+  MotionLook look;
+  if (n < kMinMotionTracks) return look;
+
+  Vec6 pose = Vec6::Zero(), theta = Vec6::Zero(), g_theta, g_pose;
+  Mat6 A_theta, A_pose, A_cross;  // A_cross: θ by pose
+  Eigen::LLT<Mat6> pose_factor;
+  for (int round = 0; round < kMotionRounds; ++round) {
+    const auto size2 = [&](const MotionRow& row) {
+      return (row.r + row.J_theta * theta + row.J_pose * pose).squaredNorm() * row.inverse_sigma2;
+    };
+    for (std::size_t i = 0; i < n; ++i) motion_[i].weight = size2(motion_[i]);
+    const double middle = median(sizes_, n, [&](std::size_t i) { return motion_[i].weight; });
+    const double scale = std::max(std::sqrt(middle) / kMedian3, kMinScale);
+    A_theta.setZero(), A_pose.setZero(), A_cross.setZero(), g_theta.setZero(), g_pose.setZero();
+    for (std::size_t i = 0; i < n; ++i) {
+      MotionRow& row = motion_[i];
+      row.weight = row.inverse_sigma2 * tukey(row.weight, kTukey3 * scale);
+      if (row.weight == 0) continue;
+      const Mat36 weighted_theta = row.weight * row.J_theta, weighted_pose = row.weight * row.J_pose;
+      A_theta.noalias() += weighted_theta.transpose() * row.J_theta;
+      A_cross.noalias() += weighted_theta.transpose() * row.J_pose;
+      A_pose.noalias() += weighted_pose.transpose() * row.J_pose;
+      g_theta.noalias() -= weighted_theta.transpose() * row.r;
+      g_pose.noalias() -= weighted_pose.transpose() * row.r;
+    }
+    for (int i = 0; i < 6; ++i) A_pose(i, i) *= 1.0 + 1e-9;
+    pose_factor.compute(A_pose);
+    if (pose_factor.info() != Eigen::Success) return look;
+    const Mat6 eliminated = pose_factor.solve(A_cross.transpose());
+    Mat6 A = A_theta - A_cross * eliminated;
+    const Vec6 g = g_theta - eliminated.transpose() * g_pose;
+    look.evidence = Evidence{};
+    for (int i = 0; i < kTheta; ++i)
+      for (int j = 0; j <= i; ++j) look.evidence.A[lower(i, j)] = 0.5 * (A(i, j) + A(j, i));
+    Eigen::Map<Vec6>(look.evidence.g.data()) = g;
+    // The fit of this look alone: the lag and the directions it hardly sees are left where they are.
+    Mat6 regular = A;
+    regular.diagonal().head<kFixed>().array() += 1.0 / (kFitSigma * kFitSigma);
+    regular(kLag, kLag) += 1e12;
+    theta = Eigen::LDLT<Mat6>(regular).solve(g);
+    pose = pose_factor.solve(g_pose - A_cross.transpose() * theta);
+  }
+  const Solved factor(look.evidence.A, look.evidence.g);
+  const Mat6 eliminated = pose_factor.solve(A_cross.transpose());
+  double spread = 0;
+  for (std::size_t i = 0; i < n; ++i) {
+    const MotionRow& row = motion_[i];
+    if (row.weight == 0) continue;
+    const Vec3 rest = row.weight * (row.r + row.J_theta * theta + row.J_pose * pose);
+    const Vec6 x = row.J_theta.transpose() * rest - eliminated.transpose() * (row.J_pose.transpose() * rest);
+    std::array<double, kFixed> y{};
+    for (int a = 0; a < kFixed; ++a) {
+      double s = x[a];
+      for (int k = 0; k < a; ++k) s -= factor.L[lower(a, k)] * y[static_cast<std::size_t>(k)];
+      y[static_cast<std::size_t>(a)] = s / factor.L[lower(a, a)];
+      spread += y[static_cast<std::size_t>(a)] * y[static_cast<std::size_t>(a)];
+    }
+    look.evidence.n += 1.5 * row.weight;  // three numbers a track, each the difference of two sightings
+  }
+  look.spread = kTukeySpread3 * spread / kFixed;
+  look.usable = true;
+  return look;
+}
+
+}  // namespace vergence::calibration::detail

@@ -1,0 +1,90 @@
+#pragma once
+#include <array>
+#include <cstdint>
+
+#include "core/calibration/detail/monitor_evidence.hpp"
+#include "core/calibration/monitor.hpp"
+#include "core/geometry/epipolar.hpp"
+
+namespace vergence::calibration::detail {
+
+/// What one moving frame brings.
+struct FrameEvidence {
+  std::uint64_t frame = 0;
+  TwoEvidences evidence;
+  double spread_life = 0;     // AcrossLook::spread_life
+  double spread_motion = -1;  // MotionLook::spread; negative: no look
+};
+
+/// What all windows together say. Angles rad, as θ.
+struct Decision {
+  MonitorVerdict::Kind kind = MonitorVerdict::Kind::quiet;
+  double statistic = 0;
+  bool undecided = false;  // over the threshold, but a lag would explain it as well so far
+  Vec5 theta = Vec5::Zero();
+  Mat5 covariance = Mat5::Zero();
+  double lag = 0, lag_sigma = 0, yaw_sigma = 0;  // over the longest window
+  std::uint64_t onset = 0;
+  int frames = 0;  // measured since the onset
+};
+
+/// Evidence of the past moving frames in sliding windows, and the tests on it. It knows nothing of images or tracks.
+///
+/// Memory  Fixed, in place (some 160 kB). Time: a few µs a frame; up to 0.1 ms while something is over the threshold.
+class Windows {
+ public:
+  /// covariance: of θ's first five at the reference.
+  void reset(const MonitorOptions& options, const Mat5& covariance) noexcept;
+  void push(const FrameEvidence& e) noexcept;
+  [[nodiscard]] Decision decide() noexcept;
+  /// The statistic of one frame by itself, `spread` its own λ: what a standing camera allows.
+  [[nodiscard]] double single(const Evidence& across, double spread) const noexcept;
+  /// A⁻¹ g and A⁻¹ of that frame, floors included.
+  void single_estimate(const Evidence& across, double spread, Vec5* theta, Mat5* covariance) const noexcept;
+
+  [[nodiscard]] double across_inflation() const noexcept { return lambda_across_; }
+  [[nodiscard]] double motion_inflation() const noexcept { return lambda_motion_; }
+  [[nodiscard]] std::uint64_t frames() const noexcept { return count_; }
+
+ private:
+  static constexpr std::size_t kRecent = 64;   // single frames: an onset among them is exact
+  static constexpr std::size_t kBlock = 15;    // frames that older ones are summed by
+  static constexpr std::size_t kBlocks = 240;  // two minutes at 30 Hz: how far back a drift is traced
+  struct Entry {
+    std::uint64_t frame = 0;
+    TwoEvidences evidence;
+  };
+  struct Onset {
+    double gain = 0;  // twice the log likelihood ratio against "nothing has changed"
+    std::uint64_t frame = 0;
+    int frames = 0;
+    Evidence since;  // inflated, without floor
+    TwoEvidences raw;
+  };
+  struct Search {
+    Onset step, ramp, both;  // five; five growing from zero; five and the lag
+  };
+
+  [[nodiscard]] Evidence effective(const TwoEvidences& sum) const noexcept;
+  [[nodiscard]] double statistic(const Evidence& e) const noexcept;
+  void estimate(const Evidence& e, Vec5* theta, Mat5* covariance) const noexcept;
+  void sum_of(std::size_t frames, TwoEvidences* sum) const noexcept;
+  [[nodiscard]] const Entry& recent(std::size_t age) const noexcept { return recent_[(count_ - 1 - age) % kRecent]; }
+  [[nodiscard]] const Entry& block(std::size_t age) const noexcept { return blocks_[(closed_ - 1 - age) % kBlocks]; }
+  void search(Search* found) const noexcept;
+  void attribute(Decision* d) noexcept;
+
+  MonitorOptions options_{};
+  Mat5 covariance_ = Mat5::Zero();
+  double bias2_ = 0;
+  std::array<std::size_t, 5> windows_{};
+  std::size_t window_count_ = 0;
+  std::uint64_t count_ = 0, closed_ = 0;  // frames, full blocks
+  std::array<Entry, kRecent> recent_{};
+  std::array<Entry, kBlocks> blocks_{};
+  Entry open_{};  // the block being filled
+  double lambda_across_ = 0, lambda_motion_ = 0;
+  int over_ = 0;  // frames in a row over the threshold
+};
+
+}  // namespace vergence::calibration::detail

@@ -1,0 +1,179 @@
+#include "core/calibration/monitor.hpp"
+
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <stdexcept>
+#include <string>
+
+#include "core/calibration/detail/monitor_looks.hpp"
+#include "core/calibration/detail/monitor_windows.hpp"
+
+namespace vergence::calibration {
+namespace {
+
+using Kind = MonitorVerdict::Kind;
+
+constexpr double kYawKnown = 0.1 * std::numbers::pi / 180;  // rad: less is `needs_motion`
+constexpr int kPoorFrames = 30;                             // without enough matches that make `needs_texture`
+constexpr int kStandingFrames = 3;                          // in a row over the threshold while standing
+constexpr double kAgrees = 0.5;                             // of the threshold: below, a frame agrees
+
+void check(bool good, const char* name, const char* range) {
+  if (!good) throw std::invalid_argument(std::string("monitor.") + name + " is out of range: allowed is " + range);
+}
+
+void validate(const MonitorOptions& o) {
+  check(o.threshold >= 20 && o.threshold <= 500, "threshold", "20 … 500");
+  check(o.bias_px >= 0 && o.bias_px <= 1, "bias_px", "0 … 1");
+  check(o.min_matches >= 12 && o.min_matches <= 1000, "min_matches", "12 … 1000");
+  check(o.short_window >= 1 && o.short_window <= 10, "short_window", "1 … 10");
+  check(o.long_window >= 60 && o.long_window <= 1800, "long_window", "60 … 1800");
+  check(o.lag_frames >= 0.1 && o.lag_frames <= 1, "lag_frames", "0.1 … 1");
+  check(o.lag_sigmas >= 3 && o.lag_sigmas <= 20, "lag_sigmas", "3 … 20");
+  check(o.collapse_frames >= 2 && o.collapse_frames <= 60, "collapse_frames", "2 … 60");
+  check(o.collapse_share >= 0.01 && o.collapse_share <= 0.9, "collapse_share", "0.01 … 0.9");
+  check(o.collapse_expected >= 10 && o.collapse_expected <= 1000, "collapse_expected", "10 … 1000");
+}
+
+}  // namespace
+
+struct Monitor::Parts {
+  MonitorOptions options{};
+  bool valid = false;
+  detail::Reference reference{};
+  Eigen::Matrix<double, 6, 5> d_offset_d_theta = Eigen::Matrix<double, 6, 5>::Zero();  // (φ, τ) by (φ, α, β)
+  Mat5 covariance = Mat5::Zero();
+  detail::Looks looks{};
+  detail::Windows windows{};
+  detail::Decision latest{};
+  int agreed = 0, poor = 0, collapsed = 0, standing_over = 0;
+  std::uint64_t collapsed_from = 0, standing_from = 0;
+
+  void forget() noexcept {
+    looks.reset();
+    windows.reset(options, covariance);
+    latest = detail::Decision{};
+    latest.lag_sigma = latest.yaw_sigma = std::numeric_limits<double>::infinity();
+    agreed = poor = collapsed = standing_over = 0;
+  }
+  void watch_collapse(const MonitorFrame& frame) noexcept;
+  void watch_matches(const MonitorFrame& frame) noexcept;
+  void watch_standing(const MonitorFrame& frame, const detail::AcrossLook& look) noexcept;
+};
+
+std::size_t Monitor::memory_needed(const MonitorOptions&) noexcept { return sizeof(Parts) + kCacheLine; }
+
+Monitor::Monitor(const MonitorOptions& options, Arena& arena) {
+  validate(options);
+  parts_ = arena.make<Parts>(1, "monitor").data();
+  parts_->options = options;
+  parts_->forget();
+}
+
+bool Monitor::set_reference(const Transform& T_camera_left, const Pinhole& left, const Pinhole& right, const Mat6& covariance) noexcept {
+  Parts& p = *parts_;
+  const double length = T_camera_left.t.norm();
+  const auto good = [](const Pinhole& k) { return k.fx > 0 && k.fy > 0 && std::isfinite(k.fx + k.fy + k.cx + k.cy); };
+  p.valid = T_camera_left.finite() && length > 0 && good(left) && good(right) && covariance.allFinite();
+  if (p.valid) {
+    const Mat32 B = tangent_basis(T_camera_left.t / length);
+    p.reference = {T_camera_left, EpipolarGeometry(T_camera_left), B, length, left, right};
+    p.d_offset_d_theta.setZero();
+    p.d_offset_d_theta.topLeftCorner<3, 3>().setIdentity();
+    p.d_offset_d_theta.bottomRightCorner<3, 2>() = length * B;
+    Eigen::Matrix<double, 5, 6> back = Eigen::Matrix<double, 5, 6>::Zero();
+    back.topLeftCorner<3, 3>().setIdentity();
+    back.bottomRightCorner<2, 3>() = B.transpose() / length;
+    p.covariance = back * covariance * back.transpose();
+  }
+  p.forget();
+  return p.valid;
+}
+
+void Monitor::reset() noexcept { parts_->forget(); }
+
+int Monitor::frames_agreed() const noexcept { return parts_->agreed; }
+
+void Monitor::Parts::watch_collapse(const MonitorFrame& frame) noexcept {
+  const bool missing =
+      frame.expected_across >= options.collapse_expected && frame.found_across < options.collapse_share * frame.expected_across;
+  if (missing && collapsed == 0) collapsed_from = frame.frame;
+  // A frame that expects nothing (night, a covered lens) neither adds nor takes away.
+  if (missing)
+    ++collapsed;
+  else if (frame.expected_across >= options.collapse_expected)
+    collapsed = 0;
+}
+
+void Monitor::Parts::watch_matches(const MonitorFrame& frame) noexcept {
+  // Of a pair that mostly finds nothing, what is found is chance.
+  const detail::AcrossLook across =
+      collapsed > 0 ? detail::AcrossLook{} : looks.across(reference, frame, options.min_matches, frame.moving);
+  poor = across.usable ? 0 : poor + 1;
+  if (!across.usable) return;
+  if (!frame.moving) {
+    watch_standing(frame, across);
+    return;
+  }
+  standing_over = 0;
+  detail::FrameEvidence e;
+  e.frame = frame.frame;
+  e.evidence.across = across.evidence;
+  e.spread_life = across.spread_life;
+  if (!frame.motion.empty()) {
+    const detail::MotionLook motion = looks.motion(reference, frame);
+    if (motion.usable) e.evidence.motion = motion.evidence, e.spread_motion = motion.spread;
+  }
+  windows.push(e);
+  latest = windows.decide();
+  agreed = latest.kind == Kind::quiet && latest.statistic < kAgrees * options.threshold ? agreed + 1 : 0;
+}
+
+void Monitor::Parts::watch_standing(const MonitorFrame& frame, const detail::AcrossLook& look) noexcept {
+  if (latest.kind != Kind::quiet && standing_over < kStandingFrames) return;  // what moving frames have found stands
+  latest.statistic = windows.single(look.evidence, look.spread_now);
+  if (latest.statistic > options.threshold) {
+    if (standing_over++ == 0) standing_from = frame.frame;
+    agreed = 0;
+  } else {
+    standing_over = 0;
+  }
+  windows.single_estimate(look.evidence, look.spread_now, &latest.theta, &latest.covariance);
+  latest.kind = standing_over >= kStandingFrames ? Kind::knock : Kind::quiet;
+  latest.undecided = standing_over > 0 && standing_over < kStandingFrames;
+  latest.onset = standing_over > 0 ? standing_from : frame.frame;
+  latest.frames = standing_over;
+}
+
+MonitorVerdict Monitor::look(const MonitorFrame& frame) noexcept {
+  Parts& p = *parts_;
+  MonitorVerdict v;
+  v.threshold = p.options.threshold;
+  v.onset_frame = frame.frame;
+  v.lag_sigma = std::numeric_limits<double>::infinity();
+  if (!p.valid || !frame.T_now_previous.finite()) return v;
+  p.watch_collapse(frame);
+  p.watch_matches(frame);
+  const detail::Decision& d = p.latest;
+  v.kind = d.kind;
+  v.statistic = d.statistic;
+  v.undecided = d.undecided;
+  v.offset = p.d_offset_d_theta * d.theta;
+  v.covariance = p.d_offset_d_theta * d.covariance * p.d_offset_d_theta.transpose();
+  v.lag_frames = d.lag;
+  v.lag_sigma = d.lag_sigma;
+  v.onset_frame = d.kind == Kind::quiet ? frame.frame : d.onset;
+  v.frames_since_onset = d.kind == Kind::quiet ? 0 : d.frames;
+  if (p.collapsed >= p.options.collapse_frames) {
+    p.agreed = 0;
+    v.kind = Kind::collapse;
+    v.onset_frame = p.collapsed_from;
+    v.frames_since_onset = p.collapsed;
+  }
+  v.needs_motion = !(d.yaw_sigma < kYawKnown);
+  v.needs_texture = p.poor >= kPoorFrames;
+  return v;
+}
+
+}  // namespace vergence::calibration
