@@ -6,19 +6,22 @@ namespace vergence::app {
 namespace {
 
 std::atomic<int> caught{0};  // the first signal's number; all a handler may touch
-static_assert(std::atomic<int>::is_always_lock_free);
+std::atomic<bool> calibration_asked{false};
+static_assert(std::atomic<int>::is_always_lock_free && std::atomic<bool>::is_always_lock_free);
 
 extern "C" void note_signal(int number) {
   int none = 0;
   caught.compare_exchange_strong(none, number);
 }
 
-void install(int number, struct sigaction* former) {
+extern "C" void note_calibration_request(int /*number*/) { calibration_asked.store(true); }
+
+/// Restart: a signal must not turn a write of the session into an error. `once`: the second one acts as it would by default.
+void install(int number, void (*handler)(int), bool once, struct sigaction* former) {
   struct sigaction action {};
-  action.sa_handler = note_signal;
+  action.sa_handler = handler;
   sigemptyset(&action.sa_mask);
-  // Restart: a signal must not turn a write of the session into an error. Reset: the second one acts as it would by default.
-  action.sa_flags = static_cast<int>(static_cast<unsigned>(SA_RESTART) | static_cast<unsigned>(SA_RESETHAND));
+  action.sa_flags = static_cast<int>(static_cast<unsigned>(SA_RESTART) | (once ? static_cast<unsigned>(SA_RESETHAND) : 0U));
   sigaction(number, &action, former);  // fails only for numbers that cannot be caught
 }
 
@@ -26,16 +29,21 @@ void install(int number, struct sigaction* former) {
 
 SignalGuard::SignalGuard() {
   caught.store(0);
-  install(SIGINT, &former_interrupt_);
-  install(SIGTERM, &former_terminate_);
+  calibration_asked.store(false);
+  install(SIGINT, note_signal, true, &former_interrupt_);
+  install(SIGTERM, note_signal, true, &former_terminate_);
+  install(SIGUSR1, note_calibration_request, false, &former_user_);
 }
 
 SignalGuard::~SignalGuard() {
   sigaction(SIGINT, &former_interrupt_, nullptr);
   sigaction(SIGTERM, &former_terminate_, nullptr);
+  sigaction(SIGUSR1, &former_user_, nullptr);
 }
 
 bool SignalGuard::stop_requested() const noexcept { return caught.load(std::memory_order_relaxed) != 0; }
+
+bool SignalGuard::take_calibration_request() const noexcept { return calibration_asked.exchange(false); }
 
 std::optional<ExitCode> SignalGuard::stop_code() const noexcept {
   switch (caught.load(std::memory_order_relaxed)) {

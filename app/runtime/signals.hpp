@@ -8,10 +8,10 @@
 namespace vergence::app {
 
 /// SIGINT and SIGTERM become a flag that a command looks at between frames: it stops, closes its session and
-/// returns stop_code().
+/// returns stop_code(). SIGUSR1 asks for a new calibration; a command that has none to make takes no notice.
 ///
 /// Ownership  One at a time in a program; the destructor puts the former handlers back.
-/// Threads    stop_requested() and stop_code() from any thread.
+/// Threads    stop_requested(), stop_code() and take_calibration_request() from any thread.
 /// Errors     A second signal of the same kind ends the program at once, as it would without this: the way out of a hang.
 class SignalGuard {
  public:
@@ -23,10 +23,13 @@ class SignalGuard {
   [[nodiscard]] bool stop_requested() const noexcept;
   /// `interrupted` (130) or `terminated` (143) by the first signal that came; nothing when none did.
   [[nodiscard]] std::optional<ExitCode> stop_code() const noexcept;
+  /// Whether SIGUSR1 has come since the last call, however often.
+  [[nodiscard]] bool take_calibration_request() const noexcept;
 
  private:
   struct sigaction former_interrupt_ {};
   struct sigaction former_terminate_ {};
+  struct sigaction former_user_ {};
 };
 
 }  // namespace vergence::app

@@ -43,6 +43,17 @@ TEST(SignalGuard, PutsTheFormerHandlerBack) {
   std::signal(SIGINT, before);
 }
 
+TEST(SignalGuard, SigusrAsksForACalibrationEachTimeAndStopsNothing) {
+  const SignalGuard guard;
+  EXPECT_FALSE(guard.take_calibration_request());
+  for (int i = 0; i < 3; ++i) {
+    std::raise(SIGUSR1);
+    EXPECT_TRUE(guard.take_calibration_request());
+    EXPECT_FALSE(guard.take_calibration_request());
+  }
+  EXPECT_FALSE(guard.stop_requested());
+}
+
 TEST(SignalGuardDeathTest, TheSecondSignalEndsTheProgram) {
   EXPECT_EXIT(
       {

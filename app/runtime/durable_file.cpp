@@ -1,0 +1,78 @@
+#include "app/runtime/durable_file.hpp"
+
+#include <fcntl.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstdio>
+#include <cstring>
+
+#include "app/runtime/errors.hpp"
+
+namespace vergence::app {
+namespace {
+
+/// A descriptor that closes itself; close() tells what the system says.
+class Descriptor {
+ public:
+  explicit Descriptor(int fd) : fd_(fd) {}
+  ~Descriptor() {
+    if (fd_ >= 0) (void)::close(fd_);
+  }
+  Descriptor(const Descriptor&) = delete;
+  Descriptor& operator=(const Descriptor&) = delete;
+  [[nodiscard]] int get() const { return fd_; }
+  [[nodiscard]] int close() {
+    const int fd = fd_;
+    fd_ = -1;
+    return ::close(fd);
+  }
+
+ private:
+  int fd_;
+};
+
+/// errno, 0 when all of it is on the disk.
+int write_whole(const std::filesystem::path& file, std::string_view text) {
+  Descriptor out(::open(file.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644));
+  if (out.get() < 0) return errno;
+  while (!text.empty()) {
+    const ssize_t n = ::write(out.get(), text.data(), text.size());
+    if (n > 0)
+      text.remove_prefix(static_cast<std::size_t>(n));
+    else if (n == 0 || errno != EINTR)
+      return n == 0 ? ENOSPC : errno;
+  }
+  if (::fsync(out.get()) != 0) return errno;
+  return out.close() == 0 ? 0 : errno;
+}
+
+/// The new name is on the disk only with the folder. File systems that cannot do that say EINVAL; that is no loss.
+int synchronise_folder(const std::filesystem::path& folder) {
+  const Descriptor at(::open(folder.empty() ? "." : folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
+  if (at.get() < 0) return errno;
+  return ::fsync(at.get()) == 0 || errno == EINVAL ? 0 : errno;
+}
+
+}  // namespace
+
+void replace_durably(const std::filesystem::path& file, std::string_view text) {
+  std::filesystem::path fresh = file;
+  fresh += ".new";
+  int error = write_whole(fresh, text);
+  if (error != 0) {
+    (void)::unlink(fresh.c_str());
+    throw InputError(file.string() + ": cannot be written (" + std::strerror(error) +
+                     "): check the folder's permissions and the disk's space");
+  }
+  if (std::rename(fresh.c_str(), file.c_str()) != 0) {
+    error = errno;
+    (void)::unlink(fresh.c_str());
+    throw InputError(file.string() + ": cannot be replaced (" + std::strerror(error) + "): is it a folder or write-protected?");
+  }
+  error = synchronise_folder(file.parent_path());
+  if (error != 0)
+    throw InputError(file.string() + ": is written, but may not outlast a power cut (" + std::strerror(error) + "): check the disk");
+}
+
+}  // namespace vergence::app
