@@ -9,6 +9,7 @@
 
 #include "app/runtime/errors.hpp"
 #include "app/runtime/nearest.hpp"
+#include "drivers/gige/gige.hpp"
 
 namespace vergence::app {
 namespace {
@@ -105,7 +106,9 @@ class Openings {
 
 const std::vector<CameraDriverRow>& camera_driver_rows() {
   // One row a driver: {name, meaning, its make_driver, what to do without permission}.
-  static const std::vector<CameraDriverRow> rows{};
+  static const std::vector<CameraDriverRow> rows{
+      {"gige", "GigE Vision cameras", gige::make_driver, "run `vergence doctor`"},
+  };
   return rows;
 }
 

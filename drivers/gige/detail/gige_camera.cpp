@@ -1,0 +1,406 @@
+#include "drivers/gige/detail/gige_camera.hpp"
+
+#include <pthread.h>
+#include <time.h>
+
+#include <algorithm>
+#include <chrono>
+#include <exception>
+#include <utility>
+
+namespace vergence::gige {
+namespace {
+
+constexpr std::size_t kSpare = 3;        // buffers beside the slots that may be out: one is being filled, the next two wait
+constexpr std::size_t kWireBuffers = 4;  // where every frame is converted at once
+constexpr Duration kTick = Duration::milliseconds(100);
+constexpr Duration kLeastSilence = Duration::seconds(1);  // of a free running camera before it is taken for gone
+constexpr Duration kAskEvery = Duration::seconds(1);      // a triggered one may rest; it is asked whether it is there
+constexpr Duration kFirstPause = Duration::milliseconds(500), kLongestPause = Duration::seconds(5);  // between attempts to reopen
+constexpr int kWrongSizes = 3;                                                                       // in a row: no accident
+
+HostStamp now() noexcept {
+  timespec t{};
+  (void)::clock_gettime(CLOCK_MONOTONIC, &t);
+  return HostStamp(static_cast<std::int64_t>(t.tv_sec) * 1'000'000'000 + t.tv_nsec);
+}
+
+std::string size_text(int width, int height) { return std::to_string(width) + " x " + std::to_string(height); }
+
+}  // namespace
+
+GigeCamera::GigeCamera(std::unique_ptr<Session> session) : info_(session->info()), session_(std::move(session)) {}
+
+GigeCamera::~GigeCamera() {
+  stop();
+  session_.reset();
+  drop_buffers();
+}
+
+DeviceStatus GigeCamera::refuse(DeviceStatus status, std::string sentence) {
+  const std::lock_guard lock(words_);
+  complaint_ = std::move(sentence);
+  return status;
+}
+
+std::string GigeCamera::complaint() const {
+  const std::lock_guard lock(words_);
+  return complaint_;
+}
+
+std::string GigeCamera::remark() const {
+  const std::lock_guard lock(words_);
+  return remark_;
+}
+
+// ---- the owner ------------------------------------------------------------------------------------------------------
+
+DeviceStatus GigeCamera::configure(const CameraConfiguration& wanted, CameraConfiguration* actual) noexcept {
+  try {
+    if (handover_.state() != Handover::State::stopped) return refuse(DeviceStatus::busy, "the camera streams; stop it first");
+    if (handover_.any_out()) return refuse(DeviceStatus::busy, "images are still in use; release them first");
+    if (wanted.width <= 0 || wanted.height <= 0 || wanted.offset_x < 0 || wanted.offset_y < 0)
+      return refuse(DeviceStatus::bad_configuration, "a region of " + size_text(wanted.width, wanted.height) + " px is none");
+    if (!(wanted.rate_hz > 0) || wanted.exposure <= Duration{} || wanted.exposure.to_seconds() * wanted.rate_hz > 1)
+      return refuse(DeviceStatus::bad_configuration,
+                    "rate and exposure must be positive, the exposure shorter than the time between two images");
+    Options options;
+    if (std::string sentence = parse_options(wanted.options, &options); !sentence.empty())
+      return refuse(DeviceStatus::unsupported, std::move(sentence));
+    const std::lock_guard lock(device_);
+    if (const DeviceStatus s = reach(); s != DeviceStatus::ok) return s;
+    Applied applied;
+    stale_ = true;
+    if (const DeviceStatus s = session_->apply(wanted, options, &applied); s != DeviceStatus::ok) return refuse(s, session_->complaint());
+    stale_ = false;
+    wanted_ = wanted;
+    options_ = options;
+    applied_ = std::move(applied);
+    make_slots();
+    configured_ = true;
+    if (actual != nullptr) *actual = applied_.actual;
+    const std::lock_guard words(words_);
+    remark_ = session_->remark();
+    return DeviceStatus::ok;
+  } catch (const std::exception& e) {
+    configured_ = false;
+    return DeviceStatus::failed;
+  }
+}
+
+void GigeCamera::make_slots() {
+  drop_buffers();
+  converting_ = applied_.format->how != GreyFormat::How::as_it_is;
+  const auto most = static_cast<std::size_t>(options_.buffers);
+  const auto width = static_cast<std::size_t>(wanted_.width), height = static_cast<std::size_t>(wanted_.height);
+  const auto padded = [](std::size_t bytes) { return (bytes + kCacheLine - 1) / kCacheLine * kCacheLine; };
+  slots_ = most + (converting_ ? 1 : kSpare);  // converting: one more, into which the frame goes that is then refused
+  stride_ = converting_ ? FramePool::stride(wanted_.width) : width;
+  slot_bytes_ = converting_ ? stride_ * height : padded(applied_.payload);
+  wire_bytes_ = converting_ ? padded(applied_.payload) : 0;
+  arena_ = std::make_unique<Arena>(slots_ * slot_bytes_ + kWireBuffers * wire_bytes_);
+  pixels_ = arena_->make<std::uint8_t>(slots_ * slot_bytes_, "slots");
+  wire_ = arena_->make<std::uint8_t>(converting_ ? kWireBuffers * wire_bytes_ : 0, "packets");
+  // Exactly the payload: Aravis counts the packets of a frame by it.
+  for (std::size_t i = 0; i < (converting_ ? kWireBuffers : slots_); ++i)
+    buffers_.push_back(arv_buffer_new_full(
+        applied_.payload, converting_ ? wire_.data() + i * wire_bytes_ : pixels_.data() + i * slot_bytes_, GSIZE_TO_POINTER(i), nullptr));
+  free_.reserve(slots_);
+  handover_.set_slots(slots_, most);
+}
+
+void GigeCamera::drop_buffers() noexcept {
+  for (ArvBuffer* b : buffers_) g_object_unref(b);
+  buffers_.clear();
+}
+
+DeviceTiming GigeCamera::timing() const noexcept {
+  DeviceTiming t;
+  t.least_delay = applied_.plan.transfer + (options_.stamp_at_end ? Duration{} : applied_.actual.exposure);
+  if (applied_.tick_frequency > 0)
+    t.resolution = std::max(Duration::nanoseconds(1), Duration::seconds(1.0 / static_cast<double>(applied_.tick_frequency)));
+  return t;
+}
+
+/// A session, the old one or a new one. Precondition: device_ held.
+DeviceStatus GigeCamera::reach() {
+  if (session_ != nullptr && !session_->lost() && session_->in_control()) return DeviceStatus::ok;
+  session_.reset();
+  DeviceStatus status = DeviceStatus::ok;
+  std::string why;
+  session_ = Session::open(info_.place, &status, &why);
+  if (session_ == nullptr) return refuse(DeviceStatus::gone, why);
+  stale_ = true;
+  return DeviceStatus::ok;
+}
+
+/// Precondition: device_ held, configured. The slots stay: the same configuration has the same payload.
+DeviceStatus GigeCamera::apply_again() {
+  Applied again;
+  if (const DeviceStatus s = session_->apply(wanted_, options_, &again); s != DeviceStatus::ok) return refuse(s, session_->complaint());
+  if (again.payload != applied_.payload || again.format != applied_.format)
+    return refuse(DeviceStatus::gone, "the camera came back with frames of another size");
+  applied_ = std::move(again);
+  stale_ = false;
+  return DeviceStatus::ok;
+}
+
+DeviceStatus GigeCamera::start(Notifier* ready) noexcept {
+  try {
+    if (!configured_) return DeviceStatus::bad_configuration;
+    const Handover::State state = handover_.state();
+    if (state == Handover::State::streaming) return DeviceStatus::ok;
+    if (state == Handover::State::gone) return DeviceStatus::gone;  // the supervisor is at it
+    const std::lock_guard lock(device_);
+    DeviceStatus status = state == Handover::State::stopped ? reach() : DeviceStatus::ok;
+    if (status == DeviceStatus::ok && stale_) status = apply_again();
+    if (status == DeviceStatus::ok) status = begin(ready);
+    if (status == DeviceStatus::ok) {
+      handover_.count_start();
+      if (!supervising_.joinable()) supervising_ = std::thread([this] { supervise(); });
+      return status;
+    }
+    if (session_ != nullptr) session_->close_stream(false);
+    stream_ = nullptr;
+    if (state == Handover::State::back) {  // not yet, after all
+      session_.reset();
+      handover_.fail(now());
+      return DeviceStatus::gone;
+    }
+    handover_.end();
+    return status == DeviceStatus::unsupported ? DeviceStatus::bad_configuration : status;
+  } catch (const std::exception&) {
+    return DeviceStatus::failed;
+  }
+}
+
+/// Precondition: device_ held, a session that is configured.
+DeviceStatus GigeCamera::begin(Notifier* ready) {
+  if (const DeviceStatus s = session_->open_stream(applied_, &GigeCamera::called, this); s != DeviceStatus::ok)
+    return refuse(s, session_->complaint());
+  stream_ = session_->stream();
+  blocks_.restart();
+  wrong_sizes_ = 0;
+  heard_ns_ = now().ns();
+  handover_.begin(ready);
+  free_.clear();
+  for (std::size_t i = 0; i < slots_; ++i) {
+    const auto slot = static_cast<FrameSlot>(i);
+    if (handover_.is_out(slot)) continue;  // comes when it is released
+    if (converting_)
+      free_.push_back(slot);
+    else
+      session_->push(buffers_[i]);
+  }
+  if (converting_)
+    for (ArvBuffer* b : buffers_) session_->push(b);
+  if (const DeviceStatus s = session_->start_acquisition(); s != DeviceStatus::ok) return refuse(s, session_->complaint());
+  const std::lock_guard words(words_);
+  remark_ = session_->remark();
+  return DeviceStatus::ok;
+}
+
+void GigeCamera::stop() noexcept {
+  handover_.end();
+  {
+    const std::lock_guard lock(supervisor_);
+    quit_ = true;
+  }
+  wake_.notify_all();
+  if (supervising_.joinable()) supervising_.join();
+  quit_ = false;
+  const std::lock_guard lock(device_);
+  if (session_ != nullptr) session_->close_stream(!session_->lost());
+  stream_ = nullptr;
+}
+
+DeviceStatus GigeCamera::trigger_once() noexcept {
+  if (!configured_ || wanted_.trigger != CameraTrigger::software) return DeviceStatus::unsupported;
+  try {
+    const auto standing = [this] {
+      switch (handover_.state()) {
+        case Handover::State::stopped:
+          return DeviceStatus::stopped;
+        case Handover::State::streaming:
+          return DeviceStatus::ok;
+        default:
+          return DeviceStatus::gone;
+      }
+    };
+    if (const DeviceStatus s = standing(); s != DeviceStatus::ok) return s;
+    const std::lock_guard lock(device_);
+    if (session_ == nullptr || standing() != DeviceStatus::ok)
+      return standing() == DeviceStatus::stopped ? DeviceStatus::stopped : DeviceStatus::gone;
+    const DeviceStatus s = session_->trigger();
+    return s == DeviceStatus::ok ? s : refuse(s, session_->complaint());
+  } catch (const std::exception&) {
+    return DeviceStatus::failed;
+  }
+}
+
+ImageView GigeCamera::view(FrameSlot slot) const noexcept {
+  return {pixels_.data() + slot * slot_bytes_, wanted_.width, wanted_.height, static_cast<std::ptrdiff_t>(stride_)};
+}
+
+// ---- Aravis's thread ------------------------------------------------------------------------------------------------
+
+void GigeCamera::called(void* self, ArvStreamCallbackType type, ArvBuffer*) {
+  auto* camera = static_cast<GigeCamera*>(self);
+  if (type == ARV_STREAM_CALLBACK_TYPE_INIT) (void)pthread_setname_np(pthread_self(), "vergence-gige");
+  if (type != ARV_STREAM_CALLBACK_TYPE_BUFFER_DONE) return;
+  if (ArvBuffer* done = arv_stream_try_pop_buffer(camera->stream_); done != nullptr) camera->take(done);
+}
+
+/// Slots that came back go to the transport again.
+void GigeCamera::recycle() noexcept {
+  for (FrameSlot slot = 0; handover_.returned(&slot);) {
+    if (converting_)
+      free_.push_back(slot);
+    else
+      session_->push(buffers_[slot]);
+  }
+}
+
+void GigeCamera::take(ArvBuffer* buffer) noexcept {
+  const HostStamp arrival = now();
+  g_object_unref(buffer);  // ours still holds it
+  recycle();
+  const auto index = static_cast<std::size_t>(reinterpret_cast<std::uintptr_t>(arv_buffer_get_user_data(buffer)));
+  Frame frame;
+  if (arv_buffer_get_status(buffer) == ARV_BUFFER_STATUS_ABORTED) return;  // the stream is closing
+  if (!describe(buffer, arrival, &frame)) {
+    session_->push(buffer);
+    return;
+  }
+  if (!converting_) {
+    frame.slot = static_cast<FrameSlot>(index);
+    if (!handover_.offer(frame)) session_->push(buffer);
+    return;
+  }
+  if (free_.empty()) {  // cannot be: one more than may be out
+    session_->push(buffer);
+    return;
+  }
+  frame.slot = free_.back();
+  to_grey(*applied_.format, wire_.data() + index * wire_bytes_, wanted_.width, wanted_.height, pixels_.data() + frame.slot * slot_bytes_,
+          stride_);
+  session_->push(buffer);
+  if (handover_.offer(frame)) free_.pop_back();
+}
+
+/// What is known of a buffer that is done; false: nothing that could be handed out.
+bool GigeCamera::describe(ArvBuffer* buffer, HostStamp arrival, Frame* frame) noexcept {
+  const bool whole = arv_buffer_get_status(buffer) == ARV_BUFFER_STATUS_SUCCESS;
+  const std::uint64_t id = arv_buffer_get_frame_id(buffer);
+  heard_ns_.store(arrival.ns(), std::memory_order_release);
+  const auto step = blocks_.next(id);  // 0, as it was pushed: the leader is lost; the next frame's id tells that one is missing
+  if (!step) return false;
+  handover_.count_lost(step->missing);
+  frame->counter = step->counter;
+  frame->arrival = arrival;
+  frame->exposure = applied_.actual.exposure;
+  frame->status = whole && right_size(buffer) ? FrameStatus::complete : FrameStatus::torn;
+  const Duration before = timing().least_delay;
+  frame->exposure_start = applied_.tick_frequency > 0 ? DeviceStamp(static_cast<std::int64_t>(arv_buffer_get_timestamp(buffer)))
+                                                      : DeviceStamp(arrival.ns()) - before;
+  if (options_.stamp_at_end) frame->exposure_start = frame->exposure_start - applied_.actual.exposure;
+  return true;
+}
+
+/// A frame that came whole may still be another than the one that was asked for.
+bool GigeCamera::right_size(ArvBuffer* buffer) noexcept {
+  gint x = 0, y = 0, width = 0, height = 0;
+  arv_buffer_get_image_region(buffer, &x, &y, &width, &height);
+  std::size_t bytes = 0;
+  (void)arv_buffer_get_data(buffer, &bytes);
+  if (width == wanted_.width && height == wanted_.height && bytes >= applied_.payload) {
+    wrong_sizes_.store(0, std::memory_order_relaxed);
+    return true;
+  }
+  seen_width_.store(width, std::memory_order_relaxed);
+  seen_height_.store(height, std::memory_order_relaxed);
+  wrong_sizes_.fetch_add(1, std::memory_order_relaxed);
+  return false;
+}
+
+// ---- the supervisor -------------------------------------------------------------------------------------------------
+
+void GigeCamera::supervise() {
+  (void)pthread_setname_np(pthread_self(), "vergence-watch");
+  Duration pause = kFirstPause;
+  HostStamp next_try{}, asked = now();
+  for (std::unique_lock lock(supervisor_); !quit_;) {
+    (void)wake_.wait_for(lock, std::chrono::nanoseconds(kTick.ns()), [this] { return quit_; });
+    if (quit_) return;
+    lock.unlock();
+    try {
+      switch (handover_.state()) {
+        case Handover::State::streaming:
+          pause = kFirstPause;
+          next_try = now() + pause;
+          if (const std::string why = what_is_wrong(now(), &asked); !why.empty()) lose(why);
+          break;
+        case Handover::State::gone:
+          if (now() < next_try) break;
+          if (reopen()) handover_.ready_again();
+          pause = std::min(pause * 2, kLongestPause);
+          next_try = now() + pause;
+          break;
+        case Handover::State::back:
+          handover_.ready_again();
+          break;
+        case Handover::State::stopped:
+          break;
+      }
+    } catch (const std::exception&) {  // no memory for a sentence: the next round tries again
+    }
+    lock.lock();
+  }
+}
+
+std::string GigeCamera::what_is_wrong(HostStamp at, HostStamp* asked) {
+  if (wrong_sizes_.load(std::memory_order_relaxed) >= kWrongSizes)
+    return "the camera sends " + size_text(seen_width_, seen_height_) + " where " + size_text(wanted_.width, wanted_.height) +
+           " was configured; power it off and on";
+  const std::lock_guard lock(device_);
+  if (session_ == nullptr || handover_.state() != Handover::State::streaming) return {};
+  if (session_->lost()) return "the camera does not answer any more";
+  const Duration silence = at - HostStamp(heard_ns_.load(std::memory_order_acquire));
+  const Duration period = Duration::seconds(1 / wanted_.rate_hz);
+  if (wanted_.trigger == CameraTrigger::free && silence > std::max(kLeastSilence, period * 10)) {
+    return session_->in_control() ? "the camera answers, but sends no images; check the firewall, and the MTU on the way"
+                                  : "the camera neither answers nor sends";
+  }
+  if (wanted_.trigger != CameraTrigger::free && silence > std::max(kAskEvery, period * 3) && at - *asked > kAskEvery) {
+    *asked = at;
+    if (!session_->in_control()) return "the camera does not answer any more";
+  }
+  return {};
+}
+
+void GigeCamera::lose(const std::string& why) {
+  (void)refuse(DeviceStatus::gone, why);
+  handover_.lose(now());
+  const std::lock_guard lock(device_);
+  if (session_ != nullptr) session_->close_stream(!session_->lost());
+  stream_ = nullptr;
+  session_.reset();
+}
+
+bool GigeCamera::reopen() {
+  const std::lock_guard lock(device_);
+  DeviceStatus status = DeviceStatus::ok;
+  std::string why;
+  session_ = Session::open(info_.place, &status, &why);
+  if (session_ != nullptr && session_->info().serial != info_.serial) session_.reset();
+  if (session_ == nullptr && status == DeviceStatus::not_found)  // with another address, perhaps
+    for (const Found& f : discover())
+      if (f.info.serial == info_.serial && session_ == nullptr) session_ = Session::open(f.info.place, &status, &why);
+  if (session_ == nullptr) return false;
+  info_.place = session_->info().place;
+  if (apply_again() == DeviceStatus::ok) return true;
+  session_.reset();
+  return false;
+}
+
+}  // namespace vergence::gige

@@ -1,0 +1,97 @@
+#pragma once
+#include <atomic>
+#include <condition_variable>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "core/memory/arena.hpp"
+#include "drivers/camera.hpp"
+#include "drivers/gige/detail/block_counter.hpp"
+#include "drivers/gige/detail/handover.hpp"
+#include "drivers/gige/detail/session.hpp"
+
+namespace vergence::gige {
+
+/// A GigE Vision camera: drivers/camera.hpp and gige.hpp have the contract.
+///
+/// Aravis's receive thread fills buffers that are the slots (or, where the format is not 8-bit grey, are converted into them) and offers
+/// them to the Handover. A supervisor watches while streaming: a camera that answers no more, or sends no more, is gone; then it opens and
+/// configures it again, with growing pauses, until start() can go on.
+/// Threads  The owner, Aravis's, the supervisor; the session is under device_, which the frames' way never takes.
+/// Time     stop() and start() may take as long as the session's calls: 2.5 s each, once the camera has gone.
+class GigeCamera final : public CameraDevice {
+ public:
+  explicit GigeCamera(std::unique_ptr<Session> session);
+  ~GigeCamera() override;
+
+  const DeviceInfo& info() const noexcept override { return info_; }
+  DeviceStatus configure(const CameraConfiguration& wanted, CameraConfiguration* actual) noexcept override;
+  DeviceTiming timing() const noexcept override;
+  DeviceStatus start(Notifier* ready) noexcept override;
+  DeviceStatus wait(Duration limit, Frame* frame) noexcept override { return handover_.wait(limit, frame); }
+  ImageView view(FrameSlot slot) const noexcept override;
+  void release(FrameSlot slot) noexcept override { handover_.release(slot); }
+  void stop() noexcept override;
+  DeviceStatus trigger_once() noexcept override;
+  std::string complaint() const override;
+  std::string remark() const override;
+  CameraStatistics statistics() const noexcept override { return handover_.statistics(); }
+
+ private:
+  [[nodiscard]] DeviceStatus refuse(DeviceStatus status, std::string sentence);
+  [[nodiscard]] DeviceStatus reach();
+  [[nodiscard]] DeviceStatus apply_again();
+  [[nodiscard]] DeviceStatus begin(Notifier* ready);
+  void make_slots();
+  void drop_buffers() noexcept;
+
+  // Aravis's thread.
+  static void called(void* self, ArvStreamCallbackType type, ArvBuffer* buffer);
+  void take(ArvBuffer* buffer) noexcept;
+  [[nodiscard]] bool describe(ArvBuffer* buffer, HostStamp arrival, Frame* frame) noexcept;
+  [[nodiscard]] bool right_size(ArvBuffer* buffer) noexcept;
+  void recycle() noexcept;
+
+  // The supervisor.
+  void supervise();
+  [[nodiscard]] std::string what_is_wrong(HostStamp now, HostStamp* asked);
+  void lose(const std::string& why);
+  [[nodiscard]] bool reopen();
+
+  DeviceInfo info_;
+  mutable std::mutex device_;  // session_
+  std::unique_ptr<Session> session_;
+  mutable std::mutex words_;  // complaint_, remark_
+  std::string complaint_, remark_;
+
+  // Of configure(); constant while streaming.
+  CameraConfiguration wanted_{};
+  Options options_{};
+  Applied applied_{};
+  bool configured_ = false, stale_ = false;  // stale: the camera may hold what was refused
+  std::unique_ptr<Arena> arena_;
+  std::span<std::uint8_t> pixels_, wire_;  // slots; transport's buffers where they are not the slots
+  std::size_t slot_bytes_ = 0, wire_bytes_ = 0, slots_ = 0, stride_ = 0;
+  std::vector<ArvBuffer*> buffers_;
+  bool converting_ = false;
+
+  Handover handover_;
+
+  // Of Aravis's thread while a stream is open.
+  ArvStream* stream_ = nullptr;
+  BlockCounter blocks_;
+  std::vector<FrameSlot> free_;  // converting: slots that are the transport's
+  std::atomic<std::int64_t> heard_ns_{0};
+  std::atomic<int> wrong_sizes_{0};  // in a row
+  std::atomic<int> seen_width_{0}, seen_height_{0};
+
+  std::mutex supervisor_;
+  std::condition_variable wake_;
+  bool quit_ = false;
+  std::thread supervising_;
+};
+
+}  // namespace vergence::gige

@@ -1,0 +1,27 @@
+#pragma once
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace vergence::gige {
+
+/// How a pixel format becomes 8-bit grey.
+struct GreyFormat {
+  const char* name;  // of the standard's pixel format naming convention
+  enum class How : std::uint8_t { as_it_is, words, mosaic } how;
+  int shift = 0;  // words: bits below the eight that are kept
+};
+
+/// Of the formats a camera offers the one called `wanted`, or without a wish the cheapest. Null: none that gives grey.
+[[nodiscard]] const GreyFormat* choose_format(const std::vector<std::string>& offered, std::string_view wanted) noexcept;
+
+/// Rows of `width` pixels without padding into rows of `stride` bytes.
+///
+/// Words, little endian: the eight highest of the format's bits. Mosaic: the binomial 3 × 3 mean, which weights red, green and blue
+/// 1 : 2 : 1 around every pixel, so that the filter's grid does not show; at the border the mosaic is mirrored.
+/// Preconditions: width, height ≥ 2; `from` holds the image.
+void to_grey(const GreyFormat& format, const std::uint8_t* from, int width, int height, std::uint8_t* to, std::size_t stride) noexcept;
+
+}  // namespace vergence::gige

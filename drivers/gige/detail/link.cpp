@@ -1,0 +1,114 @@
+#include "drivers/gige/detail/link.hpp"
+
+#include <arpa/inet.h>
+#include <dirent.h>
+#include <ifaddrs.h>
+#include <net/if.h>
+#include <netinet/in.h>
+#include <sys/ioctl.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <climits>
+#include <cstdlib>
+#include <cstring>
+#include <fstream>
+
+namespace vergence::gige {
+namespace {
+
+constexpr int kWireOverhead = 38;     // bytes: Ethernet's header 14, check sum 4, preamble 8, gap 12
+constexpr int kHeaders = 20 + 8 + 8;  // IP, UDP, GVSP
+constexpr int kExtendedHeaders = 20 + 8 + 20;
+constexpr int kMostBySwitches = 9000;  // bytes; beyond it few switches go
+
+double packets_of(const LinkLoad& load, int packet_size) noexcept {
+  const int data = std::max(1, packet_size - (load.extended_ids ? kExtendedHeaders : kHeaders));
+  return static_cast<double>((load.payload + data - 1) / data + 2);  // leader and trailer
+}
+
+}  // namespace
+
+Interface interface_of(const std::string& address) {
+  Interface found;
+  in_addr wanted{};
+  if (::inet_pton(AF_INET, address.c_str(), &wanted) != 1) return found;
+  ifaddrs* list = nullptr;
+  if (::getifaddrs(&list) != 0) return found;
+  for (const ifaddrs* i = list; i != nullptr && found.name.empty(); i = i->ifa_next) {
+    if (i->ifa_addr == nullptr || i->ifa_addr->sa_family != AF_INET) continue;
+    sockaddr_in own{};
+    std::memcpy(&own, i->ifa_addr, sizeof own);
+    if (own.sin_addr.s_addr == wanted.s_addr) found.name = i->ifa_name;
+  }
+  ::freeifaddrs(list);
+  if (found.name.empty()) return found;
+  ifreq request{};
+  std::strncpy(request.ifr_name, found.name.c_str(), IFNAMSIZ - 1);
+  const int fd = ::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
+  if (fd >= 0) {
+    if (::ioctl(fd, SIOCGIFMTU, &request) == 0) found.mtu = request.ifr_mtu;
+    (void)::close(fd);
+  }
+  std::ifstream speed("/sys/class/net/" + found.name + "/speed");
+  std::int64_t megabits = 0;
+  if (speed >> megabits && megabits > 0) found.speed = megabits * 1'000'000;
+  return found;
+}
+
+int choose_packet_size(int wished, int mtu, std::int64_t least, std::int64_t most, std::int64_t step) noexcept {
+  std::int64_t size = wished > 0 ? wished : std::min(mtu, kMostBySwitches);
+  size = std::min<std::int64_t>({size, most, mtu});
+  step = std::max<std::int64_t>(step, 1);
+  size = least + (size - least) / step * step;
+  return static_cast<int>(std::max(size, least));
+}
+
+LinkPlan plan_link(const LinkLoad& load, int packet_size, std::int64_t speed, Duration delay) noexcept {
+  LinkPlan plan;
+  plan.packet_size = packet_size;
+  const double on_wire = speed > 0 ? static_cast<double>(packet_size + kWireOverhead) * 8 / static_cast<double>(speed) : 0;
+  plan.delay = delay >= Duration{} ? delay : Duration::seconds(1.1 * (load.cameras - 1) * on_wire);
+  plan.transfer = Duration::seconds(packets_of(load, packet_size) * (on_wire + plan.delay.to_seconds()));
+  plan.share = plan.transfer.to_seconds() * load.rate_hz;
+  return plan;
+}
+
+double highest_rate(const LinkLoad& load, int packet_size, std::int64_t speed) noexcept {
+  const double transfer = plan_link(load, packet_size, speed, Duration::nanoseconds(-1)).transfer.to_seconds();
+  return transfer > 0 ? kMostOfPeriod / transfer : 1e9;
+}
+
+int find_udp_socket(std::uint16_t port) {
+  DIR* folder = ::opendir("/proc/self/fd");
+  if (folder == nullptr) return -1;
+  int found = -1;
+  while (const dirent* entry = ::readdir(folder)) {
+    const int fd = std::atoi(entry->d_name);
+    int type = 0;
+    socklen_t length = sizeof type;
+    if (fd <= 2 || ::getsockopt(fd, SOL_SOCKET, SO_TYPE, &type, &length) != 0 || type != SOCK_DGRAM) continue;
+    sockaddr_in own{};
+    length = sizeof own;
+    if (::getsockname(fd, reinterpret_cast<sockaddr*>(&own), &length) != 0 || own.sin_family != AF_INET || ntohs(own.sin_port) != port)
+      continue;
+    found = fd;
+    break;
+  }
+  (void)::closedir(folder);
+  return found;
+}
+
+std::int64_t set_receive_buffer(int socket, std::int64_t bytes) {
+  const int wanted = static_cast<int>(std::min<std::int64_t>(bytes, INT_MAX / 4));
+  // Beyond the system's limit where we may (CAP_NET_ADMIN); the plain call is capped by it in silence.
+  if (::setsockopt(socket, SOL_SOCKET, SO_RCVBUFFORCE, &wanted, sizeof wanted) != 0)
+    (void)::setsockopt(socket, SOL_SOCKET, SO_RCVBUF, &wanted, sizeof wanted);
+  int got = 0;
+  socklen_t length = sizeof got;
+  if (::getsockopt(socket, SOL_SOCKET, SO_RCVBUF, &got, &length) != 0) return 0;
+  return got / 2;  // the kernel doubles what it is asked for, for its own book-keeping
+}
+
+}  // namespace vergence::gige

@@ -1,0 +1,51 @@
+#include "drivers/gige/gige.hpp"
+
+#include <arpa/inet.h>
+
+#include "drivers/gige/detail/gige_camera.hpp"
+
+namespace vergence::gige {
+namespace {
+
+bool is_address(const std::string& text) {
+  in_addr ignored{};
+  return ::inet_pton(AF_INET, text.c_str(), &ignored) == 1;
+}
+
+class GigeDriver final : public CameraDriver {
+ public:
+  std::vector<DeviceInfo> enumerate() override {
+    std::vector<DeviceInfo> all;
+    for (Found& f : discover()) all.push_back(std::move(f.info));
+    complaint_.clear();
+    if (all.empty())
+      complaint_ = "no GigE camera answers a broadcast; is its address in the network of this host, and no firewall in between?";
+    return all;
+  }
+
+  std::unique_ptr<CameraDevice> open(std::string_view serial, DeviceStatus* status) override {
+    std::string where(serial);
+    *status = DeviceStatus::not_found;
+    complaint_.clear();
+    if (!is_address(where)) {
+      where.clear();
+      for (const Found& f : discover())
+        if (where.empty() && (serial.empty() || f.info.serial == serial)) where = f.info.place;
+      if (where.empty()) return nullptr;
+    }
+    std::unique_ptr<Session> session = Session::open(where, status, &complaint_);
+    if (session == nullptr) return nullptr;
+    return std::make_unique<GigeCamera>(std::move(session));
+  }
+
+  std::string complaint() const override { return complaint_; }
+
+ private:
+  std::string complaint_;
+};
+
+}  // namespace
+
+std::unique_ptr<CameraDriver> make_driver() { return std::make_unique<GigeDriver>(); }
+
+}  // namespace vergence::gige

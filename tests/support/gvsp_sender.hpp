@@ -1,0 +1,110 @@
+#pragma once
+#include <netinet/in.h>
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <deque>
+#include <mutex>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "core/math/random.hpp"
+#include "tests/support/gige_camera.hpp"
+
+namespace vergence::test {
+
+/// Bytes in network order, appended.
+class Wire {
+ public:
+  Wire& u8(std::uint32_t v) {
+    bytes_.push_back(static_cast<std::uint8_t>(v));
+    return *this;
+  }
+  Wire& u16(std::uint32_t v) { return u8(v >> 8U & 0xFFU).u8(v & 0xFFU); }
+  Wire& u32(std::uint32_t v) { return u16(v >> 16U).u16(v & 0xFFFFU); }
+  Wire& u64(std::uint64_t v) { return u32(static_cast<std::uint32_t>(v >> 32U)).u32(static_cast<std::uint32_t>(v)); }
+  [[nodiscard]] const std::vector<std::uint8_t>& bytes() const noexcept { return bytes_; }
+
+ private:
+  std::vector<std::uint8_t> bytes_;
+};
+
+/// One frame to be sent.
+struct GvspFrame {
+  std::uint64_t number = 0, block = 0, ticks = 0;
+  std::uint32_t pixel_format = 0;
+  int width = 0, height = 0, offset_x = 0, offset_y = 0;
+  std::vector<std::uint8_t> pixels;
+};
+
+/// The stream channel of the simulated camera: packets, their loss, what is sent again, and the accounts of it all.
+///
+/// Threads  send(): one. Everything else: any.
+class GvspSender {
+ public:
+  GvspSender(const std::string& address, bool extended_ids, double loss, std::uint64_t seed);
+  ~GvspSender();
+  GvspSender(const GvspSender&) = delete;
+  GvspSender& operator=(const GvspSender&) = delete;
+
+  void aim(const sockaddr_in& target, std::uint32_t packet_size, Duration packet_delay);
+  /// What becomes of a frame on purpose.
+  enum class Fate : std::uint8_t { normal, unsent, torn, delayed };
+  void send(GvspFrame frame, Fate fate);
+  /// The held back halves that are due; all of them when asked.
+  void send_held(HostStamp until);
+  void hold_back(Duration by);
+  /// Answers a request; unknown blocks are answered as unavailable.
+  void resend(std::uint64_t block, std::uint32_t first, std::uint32_t last);
+  void fire_test_packet(std::uint32_t size);
+  void set_loss(double share);
+
+  void add_to(GigeCameraReport* report) const;
+  [[nodiscard]] HostStamp sent(std::uint64_t number) const;
+  [[nodiscard]] std::uint16_t port() const noexcept { return port_; }
+
+ private:
+  static constexpr std::size_t kHistory = 8;  // frames that can be asked for again
+  struct Record {
+    GvspFrame frame;
+    std::uint32_t data_bytes = 0, packets = 0;  // of a packet; of the frame, leader and trailer among them
+    std::size_t account = 0;
+  };
+  struct Account {
+    std::vector<bool> went;  // by packet
+    bool never = false;      // torn on purpose: packet `hole` is not sent again either
+    std::uint32_t hole = 0;
+  };
+  struct Held {
+    std::size_t record = 0;
+    std::uint64_t block = 0;
+    std::uint32_t from = 0;
+    HostStamp due{};
+  };
+  void packet(const Record& record, std::uint32_t id, bool again);
+  void transmit(const std::vector<std::uint8_t>& head, std::span<const std::uint8_t> data);
+  [[nodiscard]] Wire header(std::uint64_t block, std::uint32_t format, std::uint32_t id, std::uint32_t status) const;
+
+  int socket_ = -1;
+  std::uint16_t port_ = 0;
+  bool extended_;
+  mutable std::mutex mutex_;  // held for one packet at a time while a frame goes out
+  double loss_;
+  Random random_;
+  sockaddr_in target_{};
+  std::uint32_t packet_size_ = 1500;
+  Duration packet_delay_{}, held_by_{};
+  std::array<Record, kHistory> history_{};
+  std::uint64_t frames_ = 0;
+  std::vector<Account> accounts_;
+  std::deque<Held> held_;
+  std::array<std::pair<std::uint64_t, HostStamp>, 64> sent_{};
+  std::uint64_t dropped_ = 0, asked_ = 0, resent_ = 0, packets_ = 0;
+};
+
+[[nodiscard]] HostStamp monotonic_now() noexcept;
+void sleep_until(HostStamp when) noexcept;
+
+}  // namespace vergence::test

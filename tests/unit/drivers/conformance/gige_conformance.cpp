@@ -1,0 +1,85 @@
+#include "drivers/gige/gige.hpp"
+
+#include <cstring>
+#include <memory>
+#include <stdexcept>
+
+#include "tests/support/gige_camera.hpp"
+#include "tests/unit/drivers/conformance/camera_conformance.hpp"
+
+namespace vergence::test {
+namespace {
+
+constexpr int kWidth = 160, kHeight = 120;
+constexpr double kRate = 50;
+
+/// The project's own GigE camera on the loopback; images carry their number.
+class GigeConformance final : public ConformanceRig {
+ public:
+  explicit GigeConformance(std::uint64_t seed) : simulator_(options(seed)) {
+    DeviceStatus status = DeviceStatus::ok;
+    camera_ = gige::make_driver()->open(simulator_.options().address, &status);
+    if (camera_ == nullptr) throw std::runtime_error(std::string(to_string(status)));
+  }
+
+  CameraDevice& camera() override { return *camera_; }
+  std::vector<CameraConfiguration> possible() override {
+    CameraConfiguration free{kWidth, kHeight, kRate, Duration::milliseconds(2), 0, CameraTrigger::free};
+    CameraConfiguration software = free;
+    software.trigger = CameraTrigger::software;
+    CameraConfiguration region = free;
+    region.width = 96;
+    region.offset_x = 32;
+    region.options["packet_size"] = "1000";
+    CameraConfiguration words = free;
+    words.pixel_format = "Mono12";
+    return {free, software, region, words, free};
+  }
+  std::vector<CameraConfiguration> impossible() override {
+    std::vector<CameraConfiguration> all(4, possible().front());
+    all[0].width = 4096;
+    all[1].pixel_format = "RGB8";
+    all[2].options["packet_sise"] = "1500";
+    all[3].gain_db = 90;
+    return all;
+  }
+  bool unplug() override {
+    simulator_.unplug();
+    return true;
+  }
+  void replug() override { simulator_.replug(); }
+  Duration gone_within() const override { return Duration::seconds(25); }  // two unanswered calls and the longest pause
+  bool lose(int exposures) override {
+    simulator_.lose_frames(exposures);
+    return true;
+  }
+
+ private:
+  static GigeCameraOptions options(std::uint64_t seed) {
+    GigeCameraOptions o;
+    o.address = GigeCamera::address(static_cast<int>(seed));
+    o.serial = "CONF-" + std::to_string(seed);
+    o.sensor_width = kWidth;
+    o.sensor_height = kHeight;
+    o.first_block = 65'520;
+    o.extended_ids = seed % 2 == 0;
+    o.discoverable = false;
+    o.seed = seed;
+    return o;
+  }
+  GigeCamera simulator_;
+  std::unique_ptr<CameraDevice> camera_;
+};
+
+}  // namespace
+
+std::unique_ptr<ConformanceRig> make_conformance_rig(std::uint64_t seed, std::string* why) {
+  try {
+    return std::make_unique<GigeConformance>(seed);
+  } catch (const std::exception& e) {
+    *why = std::string("the simulated GigE camera cannot be reached on the loopback: ") + e.what();
+    return nullptr;
+  }
+}
+
+}  // namespace vergence::test
