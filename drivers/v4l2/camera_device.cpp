@@ -1,0 +1,424 @@
+#include "drivers/v4l2/camera_device.hpp"
+
+#include <fcntl.h>
+#include <linux/videodev2.h>
+#include <poll.h>
+#include <pthread.h>
+#include <sys/eventfd.h>
+#include <time.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <chrono>
+#include <cstring>
+#include <exception>
+#include <utility>
+
+#include "drivers/v4l2/v4l2.hpp"
+
+namespace vergence::v4l2 {
+namespace {
+
+constexpr std::size_t kReserve = 2;  // buffers the kernel always has: with none it drops frames, and nobody knows how many
+constexpr int kPollLimit_ms = 500;   // the longest look of the capture thread; nothing depends on it
+constexpr int kPollErrors = 20;      // looks in a row that end in an error without a frame: nothing comes any more
+constexpr Duration kUnstamped = Duration::milliseconds(10);  // spread of arrivals where they have to serve as stamps
+
+HostStamp monotonic_now() noexcept {
+  timespec t{};
+  (void)::clock_gettime(CLOCK_MONOTONIC, &t);
+  return HostStamp(static_cast<std::int64_t>(t.tv_sec) * 1'000'000'000 + t.tv_nsec);
+}
+
+}  // namespace
+
+V4l2Camera::V4l2Camera(UniqueFd fd, Node node)
+    : info_{"v4l2", node.serial, node.card, node.path},
+      node_(std::move(node)),
+      fd_(std::move(fd)),
+      wake_(::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)) {
+  controls_.add(fd_.get());
+}
+
+V4l2Camera::~V4l2Camera() { stop(); }
+
+// ---- the owner's side ---------------------------------------------------------------------------------------------
+
+DeviceStatus V4l2Camera::refuse(DeviceStatus status, std::string sentence) noexcept {
+  complaint_ = std::move(sentence);
+  return status;
+}
+
+DeviceStatus V4l2Camera::configure(const CameraConfiguration& wanted, CameraConfiguration* actual) noexcept {
+  complaint_.clear();
+  {
+    const std::lock_guard lock(mutex_);
+    if (streaming_ || slots_.held() > 0) return DeviceStatus::busy;
+  }
+  try {
+    if (std::string nonsense = find_nonsense(wanted); !nonsense.empty())
+      return refuse(DeviceStatus::bad_configuration, nonsense + " is no configuration");
+    if (lost_node_)
+      if (const DeviceStatus status = open_again(); status != DeviceStatus::ok) return status;
+    const DeviceStatus status = bring_to(wanted, false);
+    if (status == DeviceStatus::ok) {
+      wanted_ = wanted;
+      if (actual != nullptr) *actual = settings_->actual;
+    } else if (wanted_) {
+      const std::string why = complaint_;
+      if (bring_to(*wanted_, false) != DeviceStatus::ok) lost_node_ = true;  // start() tries once more, from the beginning
+      complaint_ = why;
+    }
+    return status;
+  } catch (const std::exception& e) {
+    lost_node_ = true;
+    return refuse(DeviceStatus::failed, std::string("there is no memory for its images: ") + e.what());
+  }
+}
+
+/// `keep_slots`: of a camera that came back, whose images may be held; its size is the same.
+DeviceStatus V4l2Camera::bring_to(const CameraConfiguration& wanted, bool keep_slots) {
+  Options options;
+  if (!parse_options(wanted, &options, &complaint_)) return DeviceStatus::unsupported;
+  Controls controls;
+  if (!options.subdevice.empty()) {
+    subdevice_.reset(::open(options.subdevice.c_str(), O_RDWR | O_CLOEXEC));
+    if (!subdevice_.valid())
+      return refuse(DeviceStatus::unsupported, "option subdevice: " + options.subdevice + ": " + std::strerror(errno));
+    controls.add(subdevice_.get());
+  }
+  controls.add(fd_.get());
+  controls_ = std::move(controls);
+
+  if (queue_) {  // formats can be changed only while there are no buffers
+    forget_buffers();
+    queue_->free();
+    queue_.reset();
+  }
+  Settings settings;
+  if (const DeviceStatus s = apply(fd_.get(), node_.type, controls_, wanted, options, &settings, &complaint_); s != DeviceStatus::ok)
+    return s;
+  CaptureQueue queue(fd_.get(), node_.type);
+  std::vector<Mapping> mappings;
+  if (const int error = queue.request(static_cast<std::uint32_t>(options.buffers), &mappings); error != 0) {
+    if (error == ENODEV) return refuse(DeviceStatus::gone, {});
+    if (error == EBUSY) return refuse(DeviceStatus::busy, "another program streams from this camera: end it first");
+    return refuse(DeviceStatus::failed, std::string("the kernel gives no buffers: ") + std::strerror(error));
+  }
+  if (mappings.size() <= kReserve || mappings.front().bytes() < settings.image_size) {
+    queue.free();
+    return refuse(DeviceStatus::failed, "the kernel gives " + std::to_string(mappings.size()) + " buffers of " +
+                                            std::to_string(mappings.front().bytes()) + " bytes, too few or too small");
+  }
+  stamps_ = stamp_kind(queue.description_flags(), 1);
+  if (!keep_slots) {
+    if (settings.format.layout == Layout::luma_plane)
+      slots_.use_buffers(wanted.width, wanted.height, settings.stride);
+    else
+      slots_.use_pool(wanted.width, wanted.height);
+  }
+  const std::lock_guard lock(mutex_);
+  slots_.install(std::move(mappings));
+  queue_ = queue;
+  settings_ = std::move(settings);
+  return DeviceStatus::ok;
+}
+
+void V4l2Camera::forget_buffers() noexcept {
+  const std::lock_guard lock(mutex_);
+  slots_.install({});
+}
+
+void V4l2Camera::close_node() noexcept {
+  forget_buffers();
+  queue_.reset();
+  subdevice_.reset();
+  fd_.reset();
+}
+
+DeviceStatus V4l2Camera::open_again() {
+  close_node();
+  Node node;
+  const DeviceStatus found = find_node(info_.serial, &fd_, &node);
+  if (found == DeviceStatus::no_permission) return refuse(found, node_.path + ": no permission; add the user to the group video");
+  if (found != DeviceStatus::ok) return refuse(DeviceStatus::gone, "there is no camera " + info_.serial + " any more: check its cable");
+  node_ = std::move(node);
+  info_.place = node_.path;
+  lost_node_ = false;
+  return DeviceStatus::ok;
+}
+
+DeviceTiming V4l2Camera::timing() const noexcept {
+  if (!settings_) return {};
+  DeviceTiming t{settings_->actual.exposure + settings_->readout};
+  if (stamps_ == StampKind::none) t.delay_spread = kUnstamped;
+  return t;
+}
+
+DeviceStatus V4l2Camera::start(Notifier* ready) noexcept {
+  complaint_.clear();
+  {
+    const std::lock_guard lock(mutex_);
+    if (streaming_ && !gone_) return DeviceStatus::ok;
+  }
+  if (!wanted_) return DeviceStatus::bad_configuration;
+  try {
+    end_thread();
+    if (lost_node_) {
+      if (const DeviceStatus status = open_again(); status != DeviceStatus::ok) return status;
+      // Whatever keeps a camera that is back from its configuration may pass; it is asked again.
+      if (bring_to(*wanted_, true) != DeviceStatus::ok) {
+        lost_node_ = true;
+        return DeviceStatus::gone;
+      }
+    }
+    if (const DeviceStatus status = start_streaming(); status != DeviceStatus::ok) return status;
+    notifier_ = ready;
+    const Duration period = settings_->camera_rate_hz > 0 ? Duration::seconds(1 / settings_->camera_rate_hz) : Duration{};
+    counter_.emplace(period);
+    raster_.reset();
+    if (settings_->options.thin > 1) raster_.emplace(Duration::seconds(1 / settings_->actual.rate_hz));
+    poll_errors_ = 0;
+    {
+      const std::lock_guard lock(mutex_);
+      streaming_ = true;
+      gone_ = node_died_ = false;
+      ++statistics_.starts;
+    }
+    thread_ = std::thread([this] { capture(); });
+  } catch (const std::exception& e) {
+    {
+      const std::lock_guard lock(mutex_);
+      streaming_ = false;
+    }
+    (void)queue_->stop();
+    return refuse(DeviceStatus::failed, e.what());
+  }
+  return DeviceStatus::ok;
+}
+
+DeviceStatus V4l2Camera::start_streaming() {
+  {
+    const std::lock_guard lock(mutex_);
+    returned_count_ = 0;
+    with_kernel_ = 0;
+    for (std::uint32_t i = 0; i < slots_.buffers(); ++i)
+      if (slots_.may_enqueue(i) && queue_->enqueue(i) == 0) ++with_kernel_;
+  }
+  const int error = queue_->start();
+  switch (error) {
+    case 0:
+      return DeviceStatus::ok;
+    case ENODEV:
+      lost_node_ = true;
+      break;
+    default:
+      break;
+  }
+  (void)queue_->stop();
+  if (error == ENODEV) return DeviceStatus::gone;
+  if (error == ENOSPC)
+    return refuse(DeviceStatus::no_bandwidth,
+                  "its bus has no room for another stream: a lower rate, a smaller size, or a port of another USB controller");
+  const std::string advice = media_advice(node_.path);
+  return refuse(DeviceStatus::failed,
+                std::string("it does not begin to stream: ") + std::strerror(error) + (advice.empty() ? "" : "\n" + advice));
+}
+
+/// After it the owner alone has the camera.
+void V4l2Camera::end_thread() noexcept {
+  if (!thread_.joinable()) return;
+  wake_capture();
+  thread_.join();
+  if (queue_) (void)queue_->stop();
+  const std::lock_guard lock(mutex_);
+  if (node_died_) lost_node_ = true;
+  for (; ready_count_ > 0; --ready_count_, ready_first_ = (ready_first_ + 1) % ready_.size())
+    (void)slots_.release(ready_[ready_first_].slot);
+}
+
+void V4l2Camera::stop() noexcept {
+  {
+    const std::lock_guard lock(mutex_);
+    streaming_ = false;
+    gone_ = false;
+  }
+  changed_.notify_all();
+  end_thread();
+}
+
+// ---- the consumer's side ------------------------------------------------------------------------------------------
+
+DeviceStatus V4l2Camera::wait(Duration limit, Frame* frame) noexcept {
+  std::unique_lock lock(mutex_);
+  if (!streaming_) return DeviceStatus::stopped;
+  const auto something = [this] { return ready_count_ > 0 || gone_ || !streaming_; };
+  if (!something() && limit > Duration{}) (void)changed_.wait_for(lock, std::chrono::nanoseconds(limit.ns()), something);
+  if (!streaming_) return DeviceStatus::stopped;
+  if (ready_count_ > 0) {
+    *frame = ready_[ready_first_];
+    ready_first_ = (ready_first_ + 1) % ready_.size();
+    --ready_count_;
+    ++statistics_.delivered;
+    if (frame->status == FrameStatus::torn) ++statistics_.torn;
+    return DeviceStatus::ok;
+  }
+  if (!gone_) return DeviceStatus::timeout;
+  frame->arrival = gone_at_;
+  return DeviceStatus::gone;
+}
+
+void V4l2Camera::release(FrameSlot slot) noexcept {
+  {
+    const std::lock_guard lock(mutex_);
+    const std::optional<std::uint32_t> buffer = slots_.release(slot);
+    if (!buffer) return;
+    returned_[returned_count_++] = *buffer;  // while stopped start() finds it by itself
+  }
+  wake_capture();
+}
+
+CameraStatistics V4l2Camera::statistics() const noexcept {
+  const std::lock_guard lock(mutex_);
+  return statistics_;
+}
+
+// ---- the capture thread -------------------------------------------------------------------------------------------
+
+void V4l2Camera::wake_capture() const noexcept {
+  const std::uint64_t one = 1;
+  (void)!::write(wake_.get(), &one, sizeof one);
+}
+
+void V4l2Camera::capture() noexcept {
+  (void)pthread_setname_np(pthread_self(), "vergence-v4l2");
+  for (;;) {
+    {
+      const std::lock_guard lock(mutex_);
+      if (!streaming_) return;
+    }
+    enqueue_returned();
+    // Without a buffer of ours the kernel answers at once that there is nothing to wait for.
+    pollfd fds[2] = {{with_kernel_ > 0 ? fd_.get() : -1, POLLIN, 0}, {wake_.get(), POLLIN, 0}};
+    (void)::poll(fds, 2, kPollLimit_ms);
+    std::uint64_t woken = 0;
+    if (fds[1].revents != 0) (void)!::read(wake_.get(), &woken, sizeof woken);
+    if (fds[0].revents == 0) continue;
+    if (!take_filled()) {
+      leave();
+      return;
+    }
+    if (poll_errors_ > 0) {
+      pollfd pause{wake_.get(), POLLIN, 0};
+      (void)::poll(&pause, 1, poll_errors_);
+    }
+  }
+}
+
+void V4l2Camera::enqueue_returned() noexcept {
+  std::array<std::uint32_t, Slots::kMost> list{};
+  std::size_t count = 0;
+  {
+    const std::lock_guard lock(mutex_);
+    std::swap(count, returned_count_);
+    list = returned_;
+  }
+  for (std::size_t i = 0; i < count; ++i) give_back(list[i]);
+}
+
+void V4l2Camera::give_back(std::uint32_t buffer) noexcept {
+  if (queue_->enqueue(buffer) == 0) ++with_kernel_;  // else the camera is gone, which the next look finds
+}
+
+/// False: the camera is gone.
+bool V4l2Camera::take_filled() noexcept {
+  Filled filled;
+  switch (queue_->dequeue(&filled)) {
+    case 0:
+      poll_errors_ = 0;
+      --with_kernel_;
+      handle(filled);
+      return true;
+    case EAGAIN:
+      return ++poll_errors_ < kPollErrors;
+    case ENODEV: {
+      const std::lock_guard lock(mutex_);
+      node_died_ = true;
+      return false;
+    }
+    default:  // EIO: the driver's queue is in error until streaming starts anew
+      return ++poll_errors_ < kPollErrors;
+  }
+}
+
+void V4l2Camera::handle(const Filled& filled) noexcept {
+  const Settings& s = *settings_;
+  if (filled.index >= slots_.buffers()) return;  // a driver that invents buffers
+  Frame frame;
+  frame.arrival = monotonic_now();
+  frame.exposure = s.actual.exposure;
+  const StampKind kind = stamp_kind(filled.flags, filled.stamp_ns);
+  frame.exposure_start = exposure_start(kind, filled.stamp_ns, frame.arrival, frame.exposure, s.readout);
+  const bool whole = filled.bytes >= least_frame_bytes(s.format, s.actual.width, s.actual.height, s.stride);
+  if ((filled.flags & V4L2_BUF_FLAG_ERROR) != 0 || !whole) frame.status = FrameStatus::torn;
+
+  SequenceCounter::Step step = counter_->next(filled.sequence, frame.exposure_start);
+  if (raster_ && !raster_->keep(frame.exposure_start, &step)) {
+    give_back(filled.index);
+    return;
+  }
+  frame.counter = step.counter;
+  if (step.missing > 0) {
+    const std::lock_guard lock(mutex_);
+    statistics_.lost += step.missing;
+  }
+  if (hand_over(filled, frame)) {
+    changed_.notify_one();
+    if (notifier_ != nullptr) notifier_->notify();
+  }
+}
+
+/// False: no slot was free.
+bool V4l2Camera::hand_over(const Filled& filled, Frame frame) noexcept {
+  enqueue_returned();
+  std::unique_lock lock(mutex_);
+  if (slots_.in_place()) {
+    if (with_kernel_ < kReserve) {
+      ++statistics_.underruns;
+      lock.unlock();
+      give_back(filled.index);
+      return false;
+    }
+    frame.slot = slots_.hold_buffer(filled.index);
+  } else {
+    const std::optional<FrameSlot> slot = slots_.hold_pooled();
+    if (!slot) {
+      ++statistics_.underruns;
+      lock.unlock();
+      give_back(filled.index);
+      return false;
+    }
+    frame.slot = *slot;
+    lock.unlock();
+    to_grey(settings_->format, slots_.buffer(filled.index).data(), settings_->stride, settings_->actual.width, settings_->actual.height,
+            slots_.writable(*slot).data(), FramePool::stride(settings_->actual.width));
+    give_back(filled.index);
+    lock.lock();
+  }
+  ready_[(ready_first_ + ready_count_) % ready_.size()] = frame;
+  ++ready_count_;
+  return true;
+}
+
+void V4l2Camera::leave() noexcept {
+  {
+    const std::lock_guard lock(mutex_);
+    if (!streaming_) return;
+    gone_ = true;
+    gone_at_ = monotonic_now();
+  }
+  changed_.notify_all();
+  if (notifier_ != nullptr) notifier_->notify();
+}
+
+}  // namespace vergence::v4l2

@@ -1,0 +1,374 @@
+// The V4L2 driver on the kernel's own test cameras, as a USB camera would be: webcam inputs, nobody at the far side.
+#include <fcntl.h>
+#include <gtest/gtest.h>
+#include <linux/videodev2.h>
+#include <sys/ioctl.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cstring>
+#include <filesystem>
+#include <map>
+#include <set>
+#include <thread>
+
+#include "drivers/v4l2/v4l2.hpp"
+#include "tests/rigs/vivid.hpp"
+
+namespace vergence::v4l2 {
+namespace {
+
+using test::set_control;
+
+constexpr Duration kSoon = Duration::seconds(2);  // a frame, or the news that the camera is gone
+
+CameraConfiguration webcam() {
+  CameraConfiguration c{640, 360, 25, Duration::milliseconds(8)};
+  c.trigger = CameraTrigger::free;
+  return c;
+}
+
+/// Waits of at most `limit` until something other than a time-out comes.
+DeviceStatus next(CameraDevice* camera, Frame* frame, Duration limit = kSoon) { return camera->wait(limit, frame); }
+
+class V4l2Rig : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    if (!std::filesystem::exists("/dev/video0")) GTEST_SKIP() << "no video nodes: this test runs inside the rig's kernel";
+    for (const DeviceInfo& d : driver_->enumerate()) serials_.push_back(d.serial);
+    ASSERT_EQ(serials_.size(), 2U) << "two test cameras";
+  }
+  std::unique_ptr<CameraDevice> open(std::size_t k) {
+    DeviceStatus status = DeviceStatus::failed;
+    auto camera = driver_->open(serials_.at(k), &status);
+    EXPECT_EQ(status, DeviceStatus::ok);
+    return camera;
+  }
+  std::unique_ptr<CameraDevice> streaming(std::size_t k, const CameraConfiguration& c = webcam()) {
+    auto camera = open(k);
+    EXPECT_EQ(camera->configure(c, nullptr), DeviceStatus::ok) << camera->complaint();
+    EXPECT_EQ(camera->start(nullptr), DeviceStatus::ok) << camera->complaint();
+    return camera;
+  }
+  std::string node(std::size_t k) { return driver_->enumerate().at(k).place; }
+
+  std::unique_ptr<CameraDriver> driver_ = make_driver();
+  std::vector<std::string> serials_;
+};
+
+TEST_F(V4l2Rig, camerasAreListedAndOpenedBySerialOrPath) {
+  EXPECT_NE(serials_[0], serials_[1]);
+  DeviceStatus status = DeviceStatus::ok;
+  const auto by_path = driver_->open("/dev/video1", &status);
+  ASSERT_NE(by_path, nullptr);
+  EXPECT_EQ(by_path->info().place, "/dev/video1");
+  const auto first = driver_->open("", &status);
+  ASSERT_NE(first, nullptr);
+  EXPECT_EQ(first->info().serial, serials_[0]);
+  EXPECT_EQ(driver_->open("platform:nothing", &status), nullptr);
+  EXPECT_EQ(status, DeviceStatus::not_found);
+  EXPECT_EQ(driver_->open("/dev/video77", &status), nullptr);
+  EXPECT_EQ(status, DeviceStatus::not_found);
+  EXPECT_EQ(driver_->open("/dev/null", &status), nullptr);
+  EXPECT_EQ(status, DeviceStatus::failed);
+  EXPECT_NE(driver_->complaint().find("/dev/null"), std::string::npos);
+}
+
+TEST_F(V4l2Rig, withoutPermissionItSaysSo) {
+  const std::string path = node(0);
+  ASSERT_EQ(::setegid(65534), 0);
+  ASSERT_EQ(::seteuid(65534), 0);
+  DeviceStatus status = DeviceStatus::ok;
+  const auto camera = driver_->open(path, &status);
+  const std::string said = driver_->complaint();
+  ASSERT_EQ(::seteuid(0), 0);
+  ASSERT_EQ(::setegid(0), 0);
+  EXPECT_EQ(camera, nullptr);
+  EXPECT_EQ(status, DeviceStatus::no_permission);
+  EXPECT_NE(said.find("group video"), std::string::npos) << said;
+}
+
+TEST_F(V4l2Rig, twoCamerasStreamEveryFrame) {
+  std::unique_ptr<CameraDevice> cameras[2] = {streaming(0), streaming(1)};
+  for (std::uint64_t i = 0; i < 50; ++i)
+    for (auto& camera : cameras) {
+      Frame frame;
+      ASSERT_EQ(next(camera.get(), &frame), DeviceStatus::ok);
+      EXPECT_EQ(frame.status, FrameStatus::complete);
+      const CameraStatistics s = camera->statistics();
+      EXPECT_EQ(frame.counter, i + s.lost + s.underruns);
+      const ImageView view = camera->view(frame.slot);
+      EXPECT_EQ(view.width, 640);
+      EXPECT_EQ(view.height, 360);
+      std::set<std::uint8_t> levels;
+      for (int x = 0; x < view.width; ++x) levels.insert(view.at(x, 180));
+      EXPECT_GT(levels.size(), 5U) << "colour bars have that many levels of grey";
+      camera->release(frame.slot);
+    }
+  for (auto& camera : cameras) {
+    EXPECT_EQ(camera->statistics().delivered, 50U);
+    EXPECT_EQ(camera->statistics().torn, 0U);
+    EXPECT_EQ(camera->statistics().underruns, 0U);
+  }
+}
+
+TEST_F(V4l2Rig, everyFormatGivesTheSameGrey) {
+  set_control(node(0), "test_pattern", 20);  // a ramp of grey: the weights of colours do not matter
+  set_control(node(0), "osd_text_mode", 2);
+  std::vector<std::uint8_t> reference;
+  int formats = 0;
+  for (const char* name : {"GREY", "NV12", "NV16", "YU12", "422P", "Y10", "Y12", "Y16", "YUYV", "UYVY", "YVYU", "VYUY"}) {
+    CameraConfiguration c = webcam();
+    c.pixel_format = name;
+    auto camera = open(0);
+    if (camera->configure(c, &c) != DeviceStatus::ok) {
+      EXPECT_NE(camera->complaint().find("offers"), std::string::npos) << camera->complaint();
+      continue;
+    }
+    EXPECT_EQ(c.pixel_format, name);
+    ASSERT_EQ(camera->start(nullptr), DeviceStatus::ok) << name << camera->complaint();
+    Frame frame;
+    ASSERT_EQ(next(camera.get(), &frame), DeviceStatus::ok) << name;
+    EXPECT_EQ(frame.status, FrameStatus::complete) << name;
+    const ImageView view = camera->view(frame.slot);
+    std::vector<std::uint8_t> row(view.row(200), view.row(200) + view.width);
+    if (reference.empty()) reference = row;
+    // Colour formats have black at 16 and white at 235 (ITU-R 601); each rounds by a level.
+    const bool colour = std::set<std::string>{"GREY", "Y10", "Y12", "Y16"}.count(name) == 0;
+    for (std::size_t x = 0; x < row.size(); ++x)
+      ASSERT_NEAR(row[x], colour ? 16 + reference[x] * 219.0 / 255 : reference[x], 2) << name << " at " << x;
+    camera->release(frame.slot);
+    ++formats;
+  }
+  EXPECT_GE(formats, 6) << "of those the test camera offers";
+  EXPECT_GT(*std::max_element(reference.begin(), reference.end()) - *std::min_element(reference.begin(), reference.end()), 200);
+  set_control(node(0), "test_pattern", 0);
+}
+
+TEST_F(V4l2Rig, whatItCannotDoIsSaidWithWhatItOffers) {
+  auto camera = open(0);
+  const auto said = [&](auto&& change) {
+    CameraConfiguration c = webcam();
+    change(&c);
+    EXPECT_EQ(camera->configure(c, nullptr), DeviceStatus::unsupported);
+    return camera->complaint();
+  };
+  EXPECT_NE(said([](auto* c) { c->width = 641; }).find("640 x 360"), std::string::npos) << camera->complaint();
+  EXPECT_NE(said([](auto* c) { c->pixel_format = "Mono8"; }).find("GREY"), std::string::npos) << camera->complaint();
+  EXPECT_NE(said([](auto* c) { c->trigger = CameraTrigger::hardware; }).find("trigger"), std::string::npos) << camera->complaint();
+  EXPECT_NE(said([](auto* c) { c->trigger = CameraTrigger::software; }).find("free"), std::string::npos) << camera->complaint();
+  EXPECT_NE(said([](auto* c) { c->options["control_nonsense"] = "1"; }).find("brightness"), std::string::npos) << camera->complaint();
+  EXPECT_NE(said([](auto* c) { c->options["control_brightness"] = "256"; }).find("0 to 255"), std::string::npos) << camera->complaint();
+  EXPECT_NE(said([](auto* c) { c->options["subdevice"] = "/dev/v4l-subdev9"; }).find("v4l-subdev9"), std::string::npos);
+  EXPECT_NE(said([](auto* c) { c->gain_db = 6; }).find("gain_step_db"), std::string::npos) << camera->complaint();
+  CameraConfiguration actual;
+  EXPECT_EQ(camera->configure(webcam(), &actual), DeviceStatus::ok) << camera->complaint();
+  EXPECT_EQ(actual.rate_hz, 25);
+  EXPECT_NE(camera->remark().find("exposure"), std::string::npos) << "this camera has none that can be set";
+  EXPECT_EQ(media_advice(camera->info().place), "") << "nothing stands before a test camera";
+}
+
+TEST_F(V4l2Rig, aRateItDoesNotHaveIsRoundedAndRemarked) {
+  auto camera = open(0);
+  CameraConfiguration c = webcam(), actual;
+  c.rate_hz = 22;
+  ASSERT_EQ(camera->configure(c, &actual), DeviceStatus::ok);
+  EXPECT_EQ(actual.rate_hz, 25);
+  EXPECT_NE(camera->remark().find("25 Hz"), std::string::npos) << camera->remark();
+}
+
+TEST_F(V4l2Rig, controlsAreSetByName) {
+  auto camera = open(0);
+  CameraConfiguration c = webcam();
+  c.options["control_brightness"] = "200";
+  c.options["control_test_pattern"] = "100% Black";
+  c.options["control_osd_text_mode"] = "None";
+  ASSERT_EQ(camera->configure(c, nullptr), DeviceStatus::ok) << camera->complaint();
+  ASSERT_EQ(camera->start(nullptr), DeviceStatus::ok);
+  Frame frame;
+  ASSERT_EQ(next(camera.get(), &frame), DeviceStatus::ok);
+  EXPECT_NEAR(camera->view(frame.slot).at(320, 180), 200 - 128, 2) << "black, made brighter";
+  camera->release(frame.slot);
+  set_control(node(0), "brightness", 128);
+}
+
+TEST_F(V4l2Rig, stampsOfTheStartOfExposureAreTakenAsTheyAre) {
+  // The test camera delivers at the start of a frame; the end of frame it stamps lies nine tenths of a period later.
+  const Duration exposure = Duration::milliseconds(8), later = Duration::milliseconds(36);
+  Duration age[2];
+  for (int source = 0; source < 2; ++source) {
+    CameraConfiguration c = webcam();
+    c.options["control_timestamp_source"] = source == 0 ? "End of Frame" : "Start of Exposure";
+    auto camera = streaming(0, c);
+    Frame frame;
+    age[source] = Duration::seconds(1);
+    for (int i = 0; i < 20; ++i) {
+      ASSERT_EQ(next(camera.get(), &frame), DeviceStatus::ok);
+      age[source] = std::min(age[source], Duration::nanoseconds(frame.arrival.ns() - frame.exposure_start.ns()));
+      camera->release(frame.slot);
+    }
+  }
+  set_control(node(0), "timestamp_source", 0);
+  EXPECT_GE(age[1], Duration{}) << "as it is: before the arrival";
+  EXPECT_NEAR((age[1] - age[0]).to_seconds(), (later - exposure).to_seconds(), 0.012) << "the exposure is taken off the end of frame";
+}
+
+TEST_F(V4l2Rig, sequenceNumbersGoOnAcrossTheirWrap) {
+  set_control(node(0), "wrap_sequence_number", 1);
+  auto camera = streaming(0);
+  std::uint64_t last = 0;
+  for (int i = 0; i < 150; ++i) {  // the test camera begins 128 before the wrap
+    Frame frame;
+    ASSERT_EQ(next(camera.get(), &frame), DeviceStatus::ok);
+    last = frame.counter;
+    camera->release(frame.slot);
+  }
+  const CameraStatistics s = camera->statistics();
+  EXPECT_EQ(last + 1, 150 + s.lost + s.underruns);
+  EXPECT_LT(s.lost, 10U);
+  set_control(node(0), "wrap_sequence_number", 0);
+}
+
+TEST_F(V4l2Rig, aSilentCameraIsATimeoutAndWhatItSwallowedIsCounted) {
+  auto camera = streaming(0);
+  Frame frame;
+  ASSERT_EQ(next(camera.get(), &frame), DeviceStatus::ok);
+  camera->release(frame.slot);
+  set_control(node(0), "percentage_of_dropped_buffers", 100);
+  std::uint64_t newest = frame.counter;
+  while (camera->wait(Duration::milliseconds(100), &frame) == DeviceStatus::ok) {  // what was under way
+    newest = frame.counter;
+    camera->release(frame.slot);
+  }
+  EXPECT_EQ(camera->wait(Duration::milliseconds(300), &frame), DeviceStatus::timeout);
+  const CameraStatistics before = camera->statistics();
+  set_control(node(0), "percentage_of_dropped_buffers", 0);
+  ASSERT_EQ(next(camera.get(), &frame), DeviceStatus::ok);
+  const CameraStatistics after = camera->statistics();
+  EXPECT_GE(frame.counter - newest, 10U) << "400 ms at 25 Hz";
+  EXPECT_EQ(after.lost - before.lost, frame.counter - newest - 1);
+  camera->release(frame.slot);
+}
+
+TEST_F(V4l2Rig, aBufferWithTheErrorFlagIsTorn) {
+  auto camera = streaming(0);
+  Frame frame;
+  ASSERT_EQ(next(camera.get(), &frame), DeviceStatus::ok);
+  camera->release(frame.slot);
+  set_control(node(0), "inject_v4l2_buf_flag_error", 1);
+  int torn = 0;
+  for (int i = 0; i < 10; ++i) {
+    ASSERT_EQ(next(camera.get(), &frame), DeviceStatus::ok);
+    torn += frame.status == FrameStatus::torn ? 1 : 0;
+    camera->release(frame.slot);
+  }
+  EXPECT_EQ(torn, 1);
+  EXPECT_EQ(camera->statistics().torn, 1U);
+}
+
+TEST_F(V4l2Rig, aQueueInErrorIsGoneAndStartMendsIt) {
+  auto camera = streaming(0);
+  Frame frame;
+  ASSERT_EQ(next(camera.get(), &frame), DeviceStatus::ok);
+  const FrameSlot held = frame.slot;
+  set_control(node(0), "inject_fatal_streaming_error", 1);
+  DeviceStatus status = DeviceStatus::ok;
+  while ((status = next(camera.get(), &frame)) == DeviceStatus::ok) camera->release(frame.slot);
+  ASSERT_EQ(status, DeviceStatus::gone);
+  EXPECT_GT(frame.arrival.ns(), 0);
+  ASSERT_EQ(camera->start(nullptr), DeviceStatus::ok) << camera->complaint();
+  for (int i = 0; i < 40; ++i) {
+    ASSERT_EQ(next(camera.get(), &frame), DeviceStatus::ok);
+    EXPECT_NE(frame.slot, held);
+    camera->release(frame.slot);
+  }
+  camera->release(held);
+}
+
+TEST_F(V4l2Rig, anUnpluggedCameraComesBackWithItsConfigurationWhileImagesAreHeld) {
+  auto camera = streaming(0);
+  Frame frame;
+  ASSERT_EQ(next(camera.get(), &frame), DeviceStatus::ok);
+  set_control(node(0), "disconnect", 1);
+  // As long as anybody has a handle of its node the test camera stays unplugged; a held image is one.
+  const FrameSlot held = frame.slot;
+  const std::uint8_t pixel = camera->view(held).at(100, 100);
+  DeviceStatus status = DeviceStatus::ok;
+  while ((status = next(camera.get(), &frame)) == DeviceStatus::ok) camera->release(frame.slot);
+  ASSERT_EQ(status, DeviceStatus::gone);
+  EXPECT_EQ(camera->start(nullptr), DeviceStatus::gone);
+  EXPECT_FALSE(camera->complaint().empty());
+  EXPECT_EQ(camera->wait(Duration{}, &frame), DeviceStatus::gone);
+  EXPECT_EQ(camera->view(held).at(100, 100), pixel) << "what is held stays";
+  camera->release(held);
+  for (int i = 0; i < 50 && (status = camera->start(nullptr)) != DeviceStatus::ok; ++i)
+    std::this_thread::sleep_for(std::chrono::milliseconds(50));
+  ASSERT_EQ(status, DeviceStatus::ok) << camera->complaint();
+  ASSERT_EQ(next(camera.get(), &frame), DeviceStatus::ok);
+  EXPECT_EQ(frame.counter, 0U);
+  camera->release(frame.slot);
+  EXPECT_EQ(camera->statistics().starts, 2U);
+}
+
+TEST_F(V4l2Rig, anotherProgramsStreamIsBusy) {
+  const auto first = streaming(0);
+  const auto second = open(0);
+  EXPECT_EQ(second->configure(webcam(), nullptr), DeviceStatus::busy);
+  EXPECT_NE(second->complaint().find("another program"), std::string::npos);
+}
+
+TEST_F(V4l2Rig, stopsAndStartsUnderLoadLeakNothing) {
+  const auto open_files = [] { return std::distance(std::filesystem::directory_iterator("/proc/self/fd"), {}); };
+  const auto before = open_files();
+  {
+    std::unique_ptr<CameraDevice> cameras[2] = {open(0), open(1)};
+    for (auto& camera : cameras) ASSERT_EQ(camera->configure(webcam(), nullptr), DeviceStatus::ok);
+    for (int i = 0; i < 15; ++i)
+      for (auto& camera : cameras) {
+        ASSERT_EQ(camera->start(nullptr), DeviceStatus::ok) << camera->complaint();
+        Frame frame;
+        ASSERT_EQ(next(camera.get(), &frame), DeviceStatus::ok);
+        if (i % 2 == 0) camera->release(frame.slot);  // else it is given back only after the stop
+        camera->stop();
+        if (i % 2 != 0) camera->release(frame.slot);
+      }
+  }
+  EXPECT_EQ(open_files(), before);
+}
+
+TEST_F(V4l2Rig, thinnedCamerasKeepFramesOfTheSameMoments) {
+  CameraConfiguration c = webcam(), actual;
+  c.rate_hz = 5;
+  c.options["thin"] = "5";
+  c.options["control_timestamp_source"] = "Start of Exposure";
+  auto left = open(0), right = open(1);
+  ASSERT_EQ(left->configure(c, &actual), DeviceStatus::ok);
+  EXPECT_EQ(actual.rate_hz, 5);
+  ASSERT_EQ(right->configure(c, nullptr), DeviceStatus::ok);
+  ASSERT_EQ(left->start(nullptr), DeviceStatus::ok);
+  std::this_thread::sleep_for(std::chrono::milliseconds(130));
+  ASSERT_EQ(right->start(nullptr), DeviceStatus::ok);
+  const auto interval = [](const Frame& f) { return f.exposure_start.ns() / 200'000'000; };
+  std::map<std::int64_t, std::int64_t> lefts;
+  int pairs = 0;
+  for (int i = 0; i < 12; ++i) {
+    Frame frame;
+    ASSERT_EQ(next(left.get(), &frame), DeviceStatus::ok);
+    lefts[interval(frame)] = frame.exposure_start.ns();
+    left->release(frame.slot);
+  }
+  for (int i = 0; i < 11; ++i) {
+    Frame frame;
+    ASSERT_EQ(next(right.get(), &frame), DeviceStatus::ok);
+    right->release(frame.slot);
+    const auto partner = lefts.find(interval(frame));
+    if (i == 0 || partner == lefts.end() || partner == lefts.begin()) continue;  // the first of each may come late in its interval
+    EXPECT_LE(std::llabs(partner->second - frame.exposure_start.ns()), 60'000'000) << "a frame's time and the scheduler's";
+    ++pairs;
+  }
+  EXPECT_GE(pairs, 8);
+}
+
+}  // namespace
+}  // namespace vergence::v4l2

@@ -1,0 +1,87 @@
+#include "drivers/v4l2/slots.hpp"
+
+#include <gtest/gtest.h>
+#include <sys/mman.h>
+
+#include <cstring>
+
+namespace vergence::v4l2 {
+namespace {
+
+std::vector<Mapping> memory(std::size_t count, int fill) {
+  std::vector<Mapping> list;
+  for (std::size_t i = 0; i < count; ++i) {
+    void* at = ::mmap(nullptr, 4096, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
+    std::memset(at, fill + static_cast<int>(i), 4096);
+    list.emplace_back(at, 4096);
+  }
+  return list;
+}
+
+TEST(V4l2Slots, buffersAreSlotsWithTheDriversRows) {
+  Slots slots;
+  slots.use_buffers(60, 40, 64);
+  slots.install(memory(4, 10));
+  ASSERT_EQ(slots.buffers(), 4U);
+  const FrameSlot slot = slots.hold_buffer(2);
+  const ImageView view = slots.view(slot);
+  EXPECT_EQ(view.data, slots.buffer(2).data()) << "no copy";
+  EXPECT_EQ(view.stride, 64);
+  EXPECT_EQ(view.at(59, 39), 12);
+  EXPECT_FALSE(slots.may_enqueue(2)) << "held";
+  EXPECT_TRUE(slots.may_enqueue(1));
+  EXPECT_EQ(slots.release(slot), 2U);
+  EXPECT_TRUE(slots.may_enqueue(2));
+  EXPECT_EQ(slots.held(), 0U);
+}
+
+TEST(V4l2Slots, whatIsHeldOutlivesTheCamera) {
+  Slots slots;
+  slots.use_buffers(60, 40, 64);
+  slots.install(memory(4, 10));
+  const FrameSlot old = slots.hold_buffer(1);
+  slots.install({});  // the cable is out
+  slots.install(memory(4, 20));
+  EXPECT_EQ(slots.view(old).at(0, 0), 11) << "still its pixels";
+  for (std::uint32_t i = 0; i < 4; ++i) {
+    EXPECT_TRUE(slots.may_enqueue(i));
+    const FrameSlot slot = slots.hold_buffer(i);
+    EXPECT_NE(slot, old);
+    EXPECT_EQ(slots.view(slot).at(0, 0), 20 + i);
+    EXPECT_EQ(slots.release(slot), i);
+  }
+  EXPECT_EQ(slots.release(old), std::nullopt) << "nobody's buffer any more";
+  EXPECT_EQ(slots.held(), 0U);
+}
+
+TEST(V4l2Slots, moreBuffersThanSlotsAreNotUsed) {
+  Slots slots;
+  slots.use_buffers(60, 40, 64);
+  std::vector<FrameSlot> held;
+  for (int camera = 0; camera < 3; ++camera) {
+    slots.install(memory(32, 0));
+    for (std::uint32_t i = 0; i < 32; ++i)
+      if (slots.may_enqueue(i)) held.push_back(slots.hold_buffer(i));
+  }
+  EXPECT_EQ(held.size(), Slots::kMost);
+  for (const FrameSlot slot : held) (void)slots.release(slot);
+  EXPECT_EQ(slots.held(), 0U);
+}
+
+TEST(V4l2Slots, convertedImagesComeFromAPool) {
+  Slots slots;
+  slots.use_pool(60, 40);
+  slots.install(memory(4, 10));
+  EXPECT_EQ(slots.buffer(3)[0], 13);
+  std::vector<FrameSlot> held;
+  while (const auto slot = slots.hold_pooled()) held.push_back(*slot);
+  EXPECT_EQ(held.size(), Slots::kPool);
+  EXPECT_TRUE(slots.may_enqueue(0)) << "buffers are never held";
+  EXPECT_EQ(slots.view(held[0]).stride, static_cast<std::ptrdiff_t>(FramePool::stride(60)));
+  for (const FrameSlot slot : held) EXPECT_EQ(slots.release(slot), std::nullopt);
+  slots.use_buffers(60, 40, 64);
+  EXPECT_TRUE(slots.in_place());
+}
+
+}  // namespace
+}  // namespace vergence::v4l2
