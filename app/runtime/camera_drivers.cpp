@@ -10,6 +10,7 @@
 #include "app/runtime/errors.hpp"
 #include "app/runtime/nearest.hpp"
 #include "drivers/gige/gige.hpp"
+#include "drivers/v4l2/v4l2.hpp"
 
 namespace vergence::app {
 namespace {
@@ -108,6 +109,8 @@ const std::vector<CameraDriverRow>& camera_driver_rows() {
   // One row a driver: {name, meaning, its make_driver, what to do without permission}.
   static const std::vector<CameraDriverRow> rows{
       {"gige", "GigE Vision cameras", gige::make_driver, "run `vergence doctor`"},
+      {"v4l2", "Video4Linux: USB video class, sensors of a board, capture cards", v4l2::make_driver,
+       "add the user to the group video: sudo usermod -aG video $USER, then log in again"},
   };
   return rows;
 }

@@ -351,7 +351,7 @@ bool V4l2Camera::take_filled() noexcept {
   }
 }
 
-void V4l2Camera::handle(const Filled& filled) noexcept {
+void V4l2Camera::handle(Filled filled) noexcept {
   const Settings& s = *settings_;
   if (filled.index >= slots_.buffers()) return;  // a driver that invents buffers
   Frame frame;
@@ -359,7 +359,10 @@ void V4l2Camera::handle(const Filled& filled) noexcept {
   frame.exposure = s.actual.exposure;
   const StampKind kind = stamp_kind(filled.flags, filled.stamp_ns);
   frame.exposure_start = exposure_start(kind, filled.stamp_ns, frame.arrival, frame.exposure, s.readout);
-  const bool whole = filled.bytes >= least_frame_bytes(s.format, s.actual.width, s.actual.height, s.stride);
+  const std::size_t needed = least_frame_bytes(s.format, s.actual.width, s.actual.height, s.stride);
+  const bool inside = filled.offset <= slots_.buffer(filled.index).size() - needed;  // buffers hold what is needed: configure() has looked
+  const bool whole = inside && filled.bytes >= needed;
+  if (!inside) filled.offset = 0;
   if ((filled.flags & V4L2_BUF_FLAG_ERROR) != 0 || !whole) frame.status = FrameStatus::torn;
 
   SequenceCounter::Step step = counter_->next(filled.sequence, frame.exposure_start);
@@ -389,7 +392,7 @@ bool V4l2Camera::hand_over(const Filled& filled, Frame frame) noexcept {
       give_back(filled.index);
       return false;
     }
-    frame.slot = slots_.hold_buffer(filled.index);
+    frame.slot = slots_.hold_buffer(filled.index, filled.offset);
   } else {
     const std::optional<FrameSlot> slot = slots_.hold_pooled();
     if (!slot) {
@@ -400,8 +403,8 @@ bool V4l2Camera::hand_over(const Filled& filled, Frame frame) noexcept {
     }
     frame.slot = *slot;
     lock.unlock();
-    to_grey(settings_->format, slots_.buffer(filled.index).data(), settings_->stride, settings_->actual.width, settings_->actual.height,
-            slots_.writable(*slot).data(), FramePool::stride(settings_->actual.width));
+    to_grey(settings_->format, slots_.buffer(filled.index).data() + filled.offset, settings_->stride, settings_->actual.width,
+            settings_->actual.height, slots_.writable(*slot).data(), FramePool::stride(settings_->actual.width));
     give_back(filled.index);
     lock.lock();
   }

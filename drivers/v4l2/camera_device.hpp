@@ -54,7 +54,7 @@ class V4l2Camera final : public CameraDevice {
   void capture() noexcept;
   void enqueue_returned() noexcept;
   [[nodiscard]] bool take_filled() noexcept;
-  void handle(const Filled& filled) noexcept;
+  void handle(Filled filled) noexcept;
   [[nodiscard]] bool hand_over(const Filled& filled, Frame frame) noexcept;
   void give_back(std::uint32_t buffer) noexcept;
   void leave() noexcept;

@@ -35,6 +35,7 @@ struct Description {
     if (!planes()) return buffer.bytesused;
     return plane.bytesused - std::min(plane.data_offset, plane.bytesused);
   }
+  [[nodiscard]] std::size_t first() const noexcept { return planes() ? plane.data_offset : 0; }
 };
 
 }  // namespace
@@ -85,9 +86,12 @@ int CaptureQueue::dequeue(Filled* filled) noexcept {
   Description d(type_, 0);
   if (const int error = control(fd_, VIDIOC_DQBUF, &d.buffer); error != 0) return error;
   *filled = {
-      d.buffer.index, d.buffer.sequence, d.buffer.flags,
+      d.buffer.index,
+      d.buffer.sequence,
+      d.buffer.flags,
       static_cast<std::int64_t>(d.buffer.timestamp.tv_sec) * 1'000'000'000 + static_cast<std::int64_t>(d.buffer.timestamp.tv_usec) * 1'000,
-      d.used()};
+      d.used(),
+      d.first()};
   return 0;
 }
 

@@ -27,7 +27,8 @@ struct Filled {
   std::uint32_t sequence = 0;
   std::uint32_t flags = 0;
   std::int64_t stamp_ns = 0;
-  std::size_t bytes = 0;  // that came
+  std::size_t bytes = 0;   // that came
+  std::size_t offset = 0;  // of the first pixel in the buffer: some drivers put a header before the image
 };
 
 /// The kernel's queue of capture buffers of one open node, single plane or a multi-plane queue of one plane.

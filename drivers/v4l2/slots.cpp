@@ -62,10 +62,11 @@ bool Slots::may_enqueue(std::uint32_t index) const noexcept {
   return buffer_slots_[index] != kNone && !entries_[buffer_slots_[index]].held;
 }
 
-FrameSlot Slots::hold_buffer(std::uint32_t index) noexcept {
+FrameSlot Slots::hold_buffer(std::uint32_t index, std::size_t offset) noexcept {
   Entry& e = entries_[buffer_slots_[index]];
   assert(!e.held);
   e.held = true;
+  e.offset = offset;
   ++held_;
   return buffer_slots_[index];
 }
@@ -92,7 +93,7 @@ std::optional<std::uint32_t> Slots::release(FrameSlot slot) noexcept {
 
 ImageView Slots::view(FrameSlot slot) const noexcept {
   if (!in_place()) return pool_->view(slot);
-  return {entries_[slot].memory.data(), width_, height_, static_cast<std::ptrdiff_t>(stride_)};
+  return {entries_[slot].memory.data() + entries_[slot].offset, width_, height_, static_cast<std::ptrdiff_t>(stride_)};
 }
 
 }  // namespace vergence::v4l2

@@ -36,8 +36,8 @@ class Slots {
   /// In place: buffers that are neither the kernel's nor held may go to the kernel. A pool's: always.
   [[nodiscard]] bool may_enqueue(std::uint32_t index) const noexcept;
 
-  /// The slot that a filled buffer is, now held.
-  [[nodiscard]] FrameSlot hold_buffer(std::uint32_t index) noexcept;
+  /// The slot that a filled buffer is, now held; its first pixel lies at `offset`.
+  [[nodiscard]] FrameSlot hold_buffer(std::uint32_t index, std::size_t offset = 0) noexcept;
   [[nodiscard]] std::optional<FrameSlot> hold_pooled() noexcept;
   [[nodiscard]] std::span<std::uint8_t> writable(FrameSlot slot) noexcept { return pool_->writable(slot); }
   /// → the buffer that is free by it; nothing for a pool's slot, or a buffer of a camera that was lost.
@@ -52,6 +52,7 @@ class Slots {
     bool used = false, held = false;
     bool current = false;  // of the newest buffers
     std::uint32_t buffer = 0;
+    std::size_t offset = 0;
   };
   int width_ = 0, height_ = 0;
   std::size_t stride_ = 0;

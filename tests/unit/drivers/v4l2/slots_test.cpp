@@ -35,6 +35,14 @@ TEST(V4l2Slots, buffersAreSlotsWithTheDriversRows) {
   EXPECT_EQ(slots.held(), 0U);
 }
 
+TEST(V4l2Slots, anImageMayBeginBehindAHeader) {
+  Slots slots;
+  slots.use_buffers(60, 40, 64);
+  slots.install(memory(4, 10));
+  const FrameSlot slot = slots.hold_buffer(0, 128);
+  EXPECT_EQ(slots.view(slot).data, slots.buffer(0).data() + 128);
+}
+
 TEST(V4l2Slots, whatIsHeldOutlivesTheCamera) {
   Slots slots;
   slots.use_buffers(60, 40, 64);
