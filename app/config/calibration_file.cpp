@@ -2,9 +2,6 @@
 
 #include <algorithm>
 #include <cctype>
-#include <cerrno>
-#include <cstring>
-#include <fstream>
 #include <limits>
 #include <span>
 #include <vector>
@@ -13,6 +10,7 @@
 #include <yaml-cpp/yaml.h>
 
 #include "app/config/yaml_file.hpp"
+#include "app/runtime/durable_file.hpp"
 #include "app/runtime/errors.hpp"
 
 namespace vergence::app {
@@ -107,7 +105,7 @@ Mat6 read_covariance(const Section& camera) {
   return covariance;
 }
 
-void read_camera(const YamlFile& file, const YAML::Node& node, std::size_t k, CalibrationFile* calibration) {
+void read_camera(const YamlFile& file, const YAML::Node& node, std::size_t k, const CalibrationUse& use, CalibrationFile* calibration) {
   std::vector<std::string> known{"name", "serial", "size", "model", "intrinsics", "distortion", "intrinsics_sigma"};
   if (k > 0) known.insert(known.end(), {"T_camera_left", "sigma_noise", "sigma_wide", "covariance_wide"});
   const Section camera(file, node, fmt::format("cameras.{}", k), known);
@@ -115,7 +113,7 @@ void read_camera(const YamlFile& file, const YAML::Node& node, std::size_t k, Ca
   calibration->names[k] = camera.text("name", calibration->names[k]);
   calibration->serials[k] = camera.text("serial", "");
   rig.intrinsics[k] = read_intrinsics(file, camera);
-  if (k == 0) return;
+  if (k == 0 || (use.length_only && !camera.has("T_camera_left"))) return;
   rig.T_camera_left[k] = read_transform(camera);
   camera.optional_numbers("sigma_noise", &rig.sigma_noise[k]);
   camera.optional_numbers("sigma_wide", &rig.sigma_wide[k]);
@@ -147,7 +145,7 @@ YAML::Node locate(const YAML::Node& root, const std::string& field) {
   return node;
 }
 
-CalibrationFile read_file(const YamlFile& file) {
+CalibrationFile read_file(const YamlFile& file, const CalibrationUse& use) {
   if (file.root().IsNull()) throw InputError(file.name() + ": is empty; a calibration is expected");
   const Section top(file, file.root(), "", {"version", "rig", "cameras", "found"});
   if (const auto version = file.integer(top.need("version"), "version", 1, 1'000'000); version != kVersion)
@@ -160,7 +158,7 @@ CalibrationFile read_file(const YamlFile& file) {
   if (cameras.size() < 2 || cameras.size() > kMaxCameras)
     file.fail(cameras, fmt::format("cameras lists {}; a rig has 2 to {}", cameras.size(), kMaxCameras));
   rig.cameras = static_cast<int>(cameras.size());
-  for (std::size_t k = 0; k < cameras.size(); ++k) read_camera(file, cameras[k], k, &calibration);
+  for (std::size_t k = 0; k < cameras.size(); ++k) read_camera(file, cameras[k], k, use, &calibration);
 
   rig.baseline = rig.T_camera_left[1].t.norm();
   if (top.has("rig")) {
@@ -172,6 +170,9 @@ CalibrationFile read_file(const YamlFile& file) {
     rig.baseline_sigma = about.number("baseline_sigma", 0);
   }
   if (top.has("found")) read_found(file, top.need("found"), &calibration);
+  if (use.length_only && !(use.baseline > 0) && !(rig.baseline > 0))
+    file.fail(file.root(), "tells no length of the baseline (rig.baseline), which images alone cannot; give it with --baseline M");
+  apply_use(use, &rig);
   if (const auto bad = find_implausible(&rig)) file.fail(locate(file.root(), bad->field), bad->sentence);
   return calibration;
 }
@@ -234,9 +235,40 @@ std::string format_extrinsics(const RigCalibration& rig, std::size_t k) {
 
 }  // namespace
 
-CalibrationFile read_calibration(const std::filesystem::path& path) { return read_file(YamlFile::read(path)); }
+CalibrationFile read_calibration(const std::filesystem::path& path, const CalibrationUse& use) {
+  return read_file(YamlFile::read(path), use);
+}
 
-CalibrationFile parse_calibration(std::string_view yaml, const std::string& name) { return read_file(YamlFile::parse(yaml, name)); }
+CalibrationFile parse_calibration(std::string_view yaml, const std::string& name, const CalibrationUse& use) {
+  return read_file(YamlFile::parse(yaml, name), use);
+}
+
+void make_parallel(RigCalibration* rig) {
+  for (std::size_t k = 0; k < static_cast<std::size_t>(rig->cameras); ++k)
+    rig->T_camera_left[k] = {Mat3::Identity(), Vec3(-static_cast<double>(k) * rig->baseline, 0, 0)};
+}
+
+void apply_use(const CalibrationUse& use, RigCalibration* rig) {
+  if (use.baseline > 0) {
+    const double had = rig->T_camera_left[1].t.norm();
+    const double factor = had > 0 ? use.baseline / had : 1;
+    for (std::size_t k = 1; k < static_cast<std::size_t>(rig->cameras); ++k) {
+      rig->T_camera_left[k].t *= factor;
+      for (std::size_t i = 3; i < 6; ++i) rig->sigma_noise[k][i] *= factor, rig->sigma_wide[k][i] *= factor;
+      rig->covariance_wide[k].rightCols<3>() *= factor;
+      rig->covariance_wide[k].bottomRows<3>() *= factor;
+    }
+    rig->baseline = use.baseline;
+  }
+  if (!use.length_only) return;
+  make_parallel(rig);
+  for (auto& sigmas : rig->sigma_noise) sigmas.fill(0);
+  for (auto& sigmas : rig->sigma_wide) sigmas.fill(0);
+  for (Mat6& covariance : rig->covariance_wide) covariance.setZero();
+  rig->found = Stamp();
+  rig->frames = 0;
+  rig->reprojection_px = rig->scale_sigma = 0;
+}
 
 std::string format_calibration(const CalibrationFile& calibration) {
   const RigCalibration& rig = calibration.rig;
@@ -254,11 +286,7 @@ std::string format_calibration(const CalibrationFile& calibration) {
 }
 
 void write_calibration(const std::filesystem::path& path, const CalibrationFile& calibration) {
-  errno = 0;
-  std::ofstream out(path, std::ios::binary | std::ios::trunc);
-  out << format_calibration(calibration);
-  out.close();
-  if (!out) throw InputError(path.string() + ": cannot be written: " + (errno != 0 ? std::strerror(errno) : "unknown reason"));
+  replace_durably(path, format_calibration(calibration));
 }
 
 }  // namespace vergence::app

@@ -1,6 +1,7 @@
 #include "app/runtime/durable_file.hpp"
 
 #include <fcntl.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <cerrno>
@@ -57,6 +58,9 @@ int synchronise_folder(const std::filesystem::path& folder) {
 }  // namespace
 
 void replace_durably(const std::filesystem::path& file, std::string_view text) {
+  struct stat old {};
+  if (::stat(file.c_str(), &old) == 0 && !S_ISREG(old.st_mode))  // a device in whose place a file came would be gone for all
+    throw InputError(file.string() + ": cannot be replaced: it is no ordinary file; give another name");
   std::filesystem::path fresh = file;
   fresh += ".new";
   int error = write_whole(fresh, text);
@@ -68,7 +72,7 @@ void replace_durably(const std::filesystem::path& file, std::string_view text) {
   if (std::rename(fresh.c_str(), file.c_str()) != 0) {
     error = errno;
     (void)::unlink(fresh.c_str());
-    throw InputError(file.string() + ": cannot be replaced (" + std::strerror(error) + "): is it a folder or write-protected?");
+    throw InputError(file.string() + ": cannot be replaced (" + std::strerror(error) + "): check the folder's permissions");
   }
   error = synchronise_folder(file.parent_path());
   if (error != 0)

@@ -320,5 +320,48 @@ TEST(CalibrationFile, TornAndGarbledFilesNeverEscapeAsAnythingElse) {
   }
 }
 
+constexpr const char* kNewRig =
+    "version: 1\nrig: {baseline: 0.5}\ncameras:\n"
+    "  - {size: [640, 480], model: pinhole-radtan, intrinsics: [450, 450, 320, 240]}\n"
+    "  - {size: [640, 480], model: pinhole-radtan, intrinsics: [450, 450, 320, 240]}\n";
+
+TEST(CalibrationFile, fromScratchIntrinsicsAndALengthAreEnough) {
+  EXPECT_THROW((void)parse_calibration(kNewRig, "c.yaml"), InputError) << "without --from-scratch the places are needed";
+  const RigCalibration rig = parse_calibration(kNewRig, "c.yaml", {.length_only = true}).rig;
+  EXPECT_EQ(rig.baseline, 0.5);
+  EXPECT_EQ(rig.T_camera_left[1].t, Vec3(-0.5, 0, 0));
+  EXPECT_EQ(parse_calibration(kNewRig, "c.yaml", {.length_only = true, .baseline = 0.6}).rig.T_camera_left[1].t, Vec3(-0.6, 0, 0));
+}
+
+TEST(CalibrationFile, fromScratchNothingButTheLengthOfAnOldTransformIsRead) {
+  // Turned by a right angle about z and 0.5 m long: no rig that would be taken as it is.
+  const std::string old = std::string(kNewRig).replace(
+      std::string(kNewRig).rfind('}'), 1, ", T_camera_left: [0, -1, 0, 0.3, 1, 0, 0, 0.4, 0, 0, 1, 0], sigma_wide: [1, 1, 1, 1, 1, 1]}");
+  const RigCalibration rig = parse_calibration(old, "c.yaml", {.length_only = true}).rig;
+  EXPECT_EQ(rig.T_camera_left[1].R, Mat3(Mat3::Identity()));
+  EXPECT_EQ(rig.T_camera_left[1].t, Vec3(-0.5, 0, 0));
+  EXPECT_EQ(rig.sigma_wide[1][0], 0);
+  std::string no_length = kNewRig;
+  no_length.replace(no_length.find("rig: {baseline: 0.5}\n"), 21, "");
+  EXPECT_THROW((void)parse_calibration(no_length, "c.yaml", {.length_only = true}), InputError);
+}
+
+TEST(CalibrationFile, aGivenBaselineScalesEveryLengthByOneFactor) {
+  CalibrationFile file = awkward();
+  const RigCalibration before = file.rig;
+  RigCalibration rig = before;
+  apply_use({.baseline = 2 * before.T_camera_left[1].t.norm()}, &rig);
+  EXPECT_EQ(rig.baseline, 2 * before.T_camera_left[1].t.norm());
+  for (std::size_t k = 1; k < static_cast<std::size_t>(rig.cameras); ++k) {
+    EXPECT_TRUE(rig.T_camera_left[k].t.isApprox(2 * before.T_camera_left[k].t, 1e-15));
+    EXPECT_EQ(rig.T_camera_left[k].R, before.T_camera_left[k].R);
+    EXPECT_EQ(rig.sigma_wide[k][2], before.sigma_wide[k][2]);
+    EXPECT_EQ(rig.sigma_wide[k][4], 2 * before.sigma_wide[k][4]);
+    EXPECT_EQ(rig.covariance_wide[k](0, 0), before.covariance_wide[k](0, 0));
+    EXPECT_EQ(rig.covariance_wide[k](1, 4), 2 * before.covariance_wide[k](1, 4));
+    EXPECT_EQ(rig.covariance_wide[k](3, 5), 4 * before.covariance_wide[k](3, 5));
+  }
+}
+
 }  // namespace
 }  // namespace vergence::app
