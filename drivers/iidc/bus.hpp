@@ -1,0 +1,94 @@
+#pragma once
+#include <cstddef>
+#include <cstdint>
+#include <string>
+
+#include "core/memory/frame_pool.hpp"
+#include "drivers/device.hpp"
+#include "firmware_iface/iidc/bandwidth.hpp"
+
+/// What an IIDC camera hangs on: registers and a stream, the same for USB, IEEE 1394 and a test's fake.
+namespace vergence::iidc {
+
+/// The registers of one camera, by their 48-bit addresses.
+///
+/// Threads  One caller at a time.
+/// Time     Every call ends, at the latest after the transport's own time-out (a second on USB, the split time-out on 1394).
+/// Errors   → ok, unsupported (the camera refuses that address), timeout, gone, failed
+class RegisterPort {
+ public:
+  virtual ~RegisterPort() = default;
+  [[nodiscard]] virtual DeviceStatus read(std::uint64_t address, std::uint32_t* value) noexcept = 0;
+  [[nodiscard]] virtual DeviceStatus write(std::uint64_t address, std::uint32_t value) noexcept = 0;
+};
+
+/// What one frame is on its way.
+struct StreamShape {
+  std::size_t image_bytes = 0;   // pixels
+  std::size_t frame_bytes = 0;   // with the padding of the last packet
+  std::size_t packet_bytes = 0;  // of one bus cycle
+  BusSpeed speed = BusSpeed::s400;
+  std::size_t buffers = 0;  // slots, 4 … kMaxBuffers
+  [[nodiscard]] bool operator==(const StreamShape&) const noexcept = default;
+};
+inline constexpr std::size_t kMaxBuffers = 32;  // half of FramePool::kMaxSlots: two generations of a ring fit into one range of slots
+
+/// One filled buffer.
+struct Arrival {
+  FrameSlot slot = 0;
+  const std::uint8_t* data = nullptr;
+  std::size_t bytes = 0;
+  HostStamp at{};       // when the last byte was here
+  bool broken = false;  // the transport says that something is wrong with it
+  bool spare = true;    // false: the buffer is needed at once, it cannot be kept
+  bool has_bus_stamp = false;
+  HostStamp bus_stamp{};  // when the frame's first packet was on the bus, by the host's clock
+};
+
+/// Who takes what the stream brings. On the stream's thread.
+class StreamSink {
+ public:
+  virtual ~StreamSink() = default;
+  /// True: the slot is kept, until give_back(). Not possible when `spare` is false.
+  [[nodiscard]] virtual bool frame(const Arrival& arrival) noexcept = 0;
+  /// The device is gone; nothing follows.
+  virtual void gone(HostStamp at) noexcept = 0;
+};
+
+/// What a bus can, for the choice of a mode.
+struct BusTraits {
+  bool isochronous = false;           // one packet a cycle, in order; a lost one shifts the rest of its frame
+  BusSpeed fastest = BusSpeed::s400;  // of the path to the camera; USB: its packets are as those of S800
+  std::size_t largest_packet = 0;     // bytes
+  double bytes_per_second = 0;        // at best
+};
+
+/// One camera's place on a bus.
+///
+/// Ownership  Slots are the bus's until frame() keeps them, then the sink's until give_back(). bytes() stays valid that long, also over
+///            stop(), an unplug and a reopen().
+/// Threads    start, stop, reopen, allocate, registers: the owner's thread. give_back, bytes: any.
+/// Errors     Nothing throws.
+class CameraBus : public RegisterPort {
+ public:
+  [[nodiscard]] virtual const DeviceInfo& info() const noexcept = 0;
+  [[nodiscard]] virtual const BusTraits& traits() const noexcept = 0;
+  /// Memory for such frames. Precondition: stopped, no slot kept. → ok, failed
+  [[nodiscard]] virtual DeviceStatus allocate(const StreamShape& shape) noexcept = 0;
+  /// Buffers are ready for the camera when this returns. → ok, gone, no_permission, no_bandwidth, failed
+  [[nodiscard]] virtual DeviceStatus start(StreamSink* sink) noexcept = 0;
+  /// The camera has been told to be quiet, or is gone. No call of the sink after it returns. Twice is harmless.
+  virtual void stop() noexcept = 0;
+  /// After gone: finds the camera again and opens it. Precondition: stopped. → ok, gone, no_permission, busy
+  [[nodiscard]] virtual DeviceStatus reopen() noexcept = 0;
+
+  virtual void give_back(FrameSlot slot) noexcept = 0;
+  [[nodiscard]] virtual const std::uint8_t* bytes(FrameSlot slot) const noexcept = 0;
+
+  /// One sentence about the last call that was not ok; empty: the status says it all.
+  [[nodiscard]] virtual std::string complaint() const { return {}; }
+  /// One sentence about what will be tight with `sharing` cameras of this shape and rate; empty: nothing.
+  [[nodiscard]] virtual std::string remark(const StreamShape& shape, double rate_hz, int sharing) const = 0;
+};
+
+}  // namespace vergence::iidc

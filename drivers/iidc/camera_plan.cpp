@@ -1,0 +1,423 @@
+#include "drivers/iidc/camera_plan.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <initializer_list>
+#include <vector>
+
+namespace vergence::iidc {
+namespace {
+
+constexpr double kRateSlack = 0.01;  // a rate is met when it is short by less: 29.96 Hz is called 30 Hz
+constexpr unsigned kFormat7Modes = 8;
+
+template <class... A>
+std::string text(const char* format, A... values) {
+  std::array<char, 256> out{};
+  (void)std::snprintf(out.data(), out.size(), format, values...);
+  return out.data();
+}
+
+/// From the cheapest to the dearest on the bus.
+constexpr std::array kCodings{ColorCoding::mono8, ColorCoding::raw8,   ColorCoding::yuv411, ColorCoding::mono16,
+                              ColorCoding::raw16, ColorCoding::yuv422, ColorCoding::yuv444, ColorCoding::rgb8};
+
+class Planner {
+ public:
+  Planner(CameraRegisters* registers, const BusTraits& bus, const CameraConfiguration& wanted, CameraPlan* plan, std::string* complaint)
+      : r_(*registers), bus_(bus), wanted_(wanted), plan_(*plan), complaint_(*complaint) {}
+
+  DeviceStatus run() {
+    if (const DeviceStatus s = check_numbers(); s != DeviceStatus::ok) return s;
+    if (const DeviceStatus s = parse_options(wanted_.options, &plan_.options, &complaint_); s != DeviceStatus::ok) return s;
+    plan_.trigger = wanted_.trigger;
+    plan_.wanted_rate_hz = wanted_.rate_hz;
+    plan_.size = {static_cast<std::uint16_t>(wanted_.width), static_cast<std::uint16_t>(wanted_.height)};
+    plan_.position = {static_cast<std::uint16_t>(wanted_.offset_x), static_cast<std::uint16_t>(wanted_.offset_y)};
+    for (const auto step :
+         {&Planner::choose_speed, &Planner::choose_trigger, &Planner::choose_features, &Planner::choose_strobe, &Planner::choose_mode}) {
+      const bool possible = (this->*step)();
+      if (r_.status() != DeviceStatus::ok) {
+        const DeviceStatus failed = r_.take_status();
+        complaint_ = r_.complaint();
+        return failed;
+      }
+      if (!possible) return DeviceStatus::unsupported;
+    }
+    return DeviceStatus::ok;
+  }
+
+ private:
+  DeviceStatus check_numbers() {
+    constexpr int kMost = 65535;
+    if (!(wanted_.rate_hz > 0) || !std::isfinite(wanted_.rate_hz) || wanted_.width <= 0 || wanted_.height <= 0 || wanted_.offset_x < 0 ||
+        wanted_.offset_y < 0 || !std::isfinite(wanted_.gain_db)) {
+      complaint_ = "size and rate must be above zero";
+      return DeviceStatus::bad_configuration;
+    }
+    if (wanted_.exposure <= Duration{} || wanted_.exposure.to_seconds() * wanted_.rate_hz > 1) {
+      complaint_ =
+          text("an exposure of %.0f us does not fit between two images at %g Hz", wanted_.exposure.to_seconds() * 1e6, wanted_.rate_hz);
+      return DeviceStatus::bad_configuration;
+    }
+    if (wanted_.width > kMost || wanted_.height > kMost || wanted_.offset_x > kMost || wanted_.offset_y > kMost) {
+      complaint_ = text("%d x %d is more than any camera has", wanted_.width, wanted_.height);
+      return DeviceStatus::unsupported;
+    }
+    return DeviceStatus::ok;
+  }
+
+  bool choose_speed() {
+    const bool beta = BasicFunctions::of(r_.get(reg::kBasicFunctions)).beta;
+    BusSpeed most = bus_.isochronous && !beta ? std::min(bus_.fastest, BusSpeed::s400) : bus_.fastest;
+    if (plan_.options.speed && bus_.isochronous) {
+      if (*plan_.options.speed > most) {
+        complaint_ = text("option speed: the camera and its bus reach %s", std::string(to_string(most)).c_str());
+        return false;
+      }
+      most = *plan_.options.speed;
+    }
+    plan_.shape.speed = most;
+    plan_.shape.buffers = plan_.options.buffers;
+    largest_ = std::min(bus_.largest_packet, bus_.isochronous ? largest_packet(most) : bus_.largest_packet);
+    return true;
+  }
+
+  bool choose_trigger() {
+    if (wanted_.trigger == CameraTrigger::free) return true;
+    const TriggerInquiry t = TriggerInquiry::of(r_.get(reg::kTriggerInquiry));
+    const unsigned source = wanted_.trigger == CameraTrigger::software ? kTriggerSourceSoftware : plan_.options.trigger_source;
+    if (!t.present || !t.has_source(source) || (!t.has_mode(0) && !t.has_mode(14))) {
+      complaint_ = wanted_.trigger == CameraTrigger::software ? "this camera has no software trigger"
+                                                              : text("this camera has no trigger input %u", source);
+      complaint_ += offered_triggers(t);
+      return false;
+    }
+    plan_.trigger_mode = plan_.options.trigger_mode.value_or(t.has_mode(14) ? 14 : 0);
+    if (!t.has_mode(plan_.trigger_mode)) {
+      complaint_ = text("this camera has no trigger mode %u", plan_.trigger_mode) + offered_triggers(t);
+      return false;
+    }
+    if (!plan_.options.trigger_rising && !t.polarity) {
+      complaint_ = "the edge of this camera's trigger cannot be changed; option trigger_edge must be rising";
+      return false;
+    }
+    return true;
+  }
+  static std::string offered_triggers(const TriggerInquiry& t) {
+    if (!t.present) return "; it offers trigger: free";
+    std::string out = "; it offers inputs";
+    for (unsigned n = 0; n < 4; ++n)
+      if (t.has_source(n)) out += " " + std::to_string(n);
+    if (t.software) out += ", the software trigger";
+    out += ", modes";
+    for (unsigned n = 0; n < 16; ++n)
+      if (t.has_mode(n)) out += " " + std::to_string(n);
+    return out;
+  }
+
+  bool choose_features() {
+    constexpr double kFloat = 1e-6;  // single precision in the camera
+    const AbsoluteRange shutter = r_.absolute_range(Feature::shutter);
+    const double s = wanted_.exposure.to_seconds();
+    if (!shutter.present) {
+      complaint_ = "this camera does not take its exposure in seconds, which version 1.31 of IIDC and later do";
+      return false;
+    }
+    if (s < shutter.least * (1 - kFloat) || s > shutter.most * (1 + kFloat)) {
+      complaint_ = text("an exposure of %.6g us is not possible; this camera offers %.6g to %.6g us", s * 1e6, shutter.least * 1e6,
+                        shutter.most * 1e6);
+      return false;
+    }
+    const AbsoluteRange gain = r_.absolute_range(Feature::gain);
+    const double slack = kFloat * std::max(1.0, std::abs(wanted_.gain_db));
+    if (gain.present ? wanted_.gain_db < gain.least - slack || wanted_.gain_db > gain.most + slack : wanted_.gain_db != 0) {
+      complaint_ = gain.present
+                       ? text("a gain of %g dB is not possible; this camera offers %g to %g dB", wanted_.gain_db, gain.least, gain.most)
+                       : "this camera does not take its gain in dB; gain_db must be 0";
+      return false;
+    }
+    plan_.exposure = wanted_.exposure;
+    plan_.gain_db = wanted_.gain_db;
+    frame_rate_ = r_.absolute_range(Feature::frame_rate);
+    return true;
+  }
+
+  bool choose_strobe() {
+    if (!plan_.options.strobe_pin) return true;
+    const bool any = (r_.get(reg::kOptionalFunctions) & bit(28)) != 0;
+    const std::uint64_t csr = any ? r_.table(reg::kStrobeBase) : 0;
+    if (csr != 0 && (r_.get_at(csr + reg::strobe::inquiry(*plan_.options.strobe_pin)) & bit(31)) != 0) return true;
+    complaint_ = csr == 0 ? "this camera has no strobe outputs" : text("this camera has no strobe output %u", *plan_.options.strobe_pin);
+    return false;
+  }
+
+  [[nodiscard]] std::vector<ColorCoding> codings() {
+    if (wanted_.pixel_format.empty()) return {kCodings.begin(), kCodings.end()};
+    const auto c = color_coding(wanted_.pixel_format);
+    return c ? std::vector{*c} : std::vector<ColorCoding>{};
+  }
+
+  bool choose_mode() {
+    const auto wishes = codings();
+    const bool region = wanted_.offset_x != 0 || wanted_.offset_y != 0;
+    const bool may_fixed = !region && !plan_.options.packet_bytes && !plan_.options.format7.value_or(false);
+    const bool may_format7 = plan_.options.format7.value_or(true);
+    for (const ColorCoding c : wishes) {
+      if (may_fixed && fixed(c, true)) return true;
+      if (may_format7 && format7(c)) return true;
+      if (r_.status() != DeviceStatus::ok) return false;
+    }
+    for (const ColorCoding c : wishes)
+      if (may_fixed && fixed(c, false)) return true;
+    complaint_ = text("%d x %d", wanted_.width, wanted_.height) + (wanted_.pixel_format.empty() ? "" : " " + wanted_.pixel_format) +
+                 text(" at %g Hz is not possible", wanted_.rate_hz) + (why_not_.empty() ? "" : ": " + why_not_) + "; this camera offers " +
+                 offers();
+    return false;
+  }
+
+  /// `exactly`: a free-running camera at the rate that is wanted, not at the next higher one.
+  bool fixed(ColorCoding coding, bool exactly) {
+    for (const FixedMode& m : fixed_modes()) {
+      if (m.coding != coding || m.width != wanted_.width || m.height != wanted_.height || !r_.has_mode(m.format, m.mode)) continue;
+      const std::uint32_t rates = r_.get(reg::rate_inquiry(m.format, m.mode));
+      for (unsigned code = 0; code < kRates; ++code) {
+        const std::size_t packet = fixed_packet_bytes(m, code);
+        if ((rates & bit(31 - code)) == 0 || packet == 0 || packet > largest_) continue;
+        if (rate_of(code) < wanted_.rate_hz * (1 - kRateSlack)) continue;
+        if (exactly && wanted_.trigger == CameraTrigger::free && rate_of(code) > wanted_.rate_hz * (1 + kRateSlack)) break;
+        plan_.format = m.format;
+        plan_.mode = m.mode;
+        plan_.rate_code = code;
+        plan_.coding = coding;
+        plan_.rate_hz = wanted_.trigger == CameraTrigger::free ? rate_of(code) : wanted_.rate_hz;
+        plan_.shape.image_bytes = plan_.shape.frame_bytes = frame_bytes(m.width, m.height, coding);
+        plan_.shape.packet_bytes = packet;
+        return possible_as_grey();
+      }
+    }
+    return false;
+  }
+
+  bool format7(ColorCoding coding) {
+    using namespace reg::format7;
+    for (unsigned mode = 0; mode < kFormat7Modes; ++mode) {
+      if (!r_.has_mode(7, mode)) continue;
+      const std::uint64_t csr = r_.table(reg::format7_base(mode));
+      if (csr == 0 || (r_.get_at(csr + kCodingInquiry) & bit(31 - static_cast<unsigned>(coding))) == 0) continue;
+      const Size most = Size::of(r_.get_at(csr + kMaxSize)), unit = Size::of(r_.get_at(csr + kUnitSize));
+      Size step = Size::of(r_.get_at(csr + kUnitPosition));
+      if (step.width == 0 || step.height == 0) step = unit;
+      if (unit.width == 0 || unit.height == 0) continue;
+      if (wanted_.offset_x + wanted_.width > most.width || wanted_.offset_y + wanted_.height > most.height) continue;
+      if (wanted_.width % unit.width != 0 || wanted_.height % unit.height != 0 || wanted_.offset_x % step.width != 0 ||
+          wanted_.offset_y % step.height != 0)
+        continue;
+      const std::size_t bytes = frame_bytes(plan_.size.width, plan_.size.height, coding);
+      const Size limits = Size::of(r_.get_at(csr + kPacketLimits));  // unit, most
+      if (!choose_packet(bytes, limits)) continue;
+      if (wanted_.trigger == CameraTrigger::free && frame_rate_.present &&
+          (wanted_.rate_hz < frame_rate_.least * (1 - kRateSlack) || wanted_.rate_hz > frame_rate_.most * (1 + kRateSlack))) {
+        say_why_not(text("its frame rate goes from %g to %g Hz", frame_rate_.least, frame_rate_.most));
+        continue;
+      }
+      plan_.format = 7;
+      plan_.mode = mode;
+      plan_.csr = csr;
+      plan_.coding = coding;
+      plan_.rate_hz =
+          wanted_.trigger != CameraTrigger::free || frame_rate_.present ? wanted_.rate_hz : packet_rate(bytes, plan_.shape.packet_bytes);
+      plan_.shape.image_bytes = bytes;
+      plan_.shape.frame_bytes = packets_for(bytes, plan_.shape.packet_bytes) * plan_.shape.packet_bytes;
+      return possible_as_grey();
+    }
+    return false;
+  }
+
+  /// `limits`: unit and largest, as the camera says; zeros: anything.
+  bool choose_packet(std::size_t bytes, const Size& limits) {
+    const std::size_t unit = limits.width == 0 ? 4 : limits.width;
+    const std::size_t most = limits.height == 0 ? largest_ : std::min<std::size_t>(limits.height, largest_);
+    const std::size_t asked = plan_.options.packet_bytes.value_or(0);
+    const std::size_t packet = asked != 0 ? asked : packet_for_rate(bytes, wanted_.rate_hz * (1 - kRateSlack), unit, most);
+    if (packet == 0 || packet > most || packet % unit != 0 || packet_rate(bytes, packet) < wanted_.rate_hz * (1 - kRateSlack)) {
+      const std::size_t best = asked != 0 && asked <= most ? asked : most / unit * unit;
+      say_why_not(
+          text("packets of %zu bytes (largest %zu, in steps of %zu) carry %.4g Hz of it", best, most, unit, packet_rate(bytes, best)));
+      return false;
+    }
+    plan_.shape.packet_bytes = packet;
+    return true;
+  }
+
+  bool possible_as_grey() {
+    const bool raw = plan_.coding == ColorCoding::raw8 || plan_.coding == ColorCoding::raw16;
+    plan_.grey.coding = plan_.coding;
+    plan_.grey.mosaic = raw && bayer_tile(r_.get_optional(reg::kBayerTile)) != BayerTile::none;
+    if (plan_.grey.possible()) return true;
+    say_why_not(std::string(to_string(plan_.coding)) + " of this camera is not turned to grey here");
+    return false;
+  }
+
+  /// Of the first way that was tried: the cheapest.
+  void say_why_not(const std::string& why) {
+    if (why_not_.empty()) why_not_ = why;
+  }
+
+  std::string offers() {
+    std::string out;
+    for (const FixedMode& m : fixed_modes()) {
+      if (!r_.has_mode(m.format, m.mode)) continue;
+      out += (out.empty() ? "" : ", ") + text("%d x %d ", m.width, m.height) + std::string(to_string(m.coding)) + " at";
+      const std::uint32_t rates = r_.get(reg::rate_inquiry(m.format, m.mode));
+      for (unsigned code = 0; code < kRates; ++code)
+        if ((rates & bit(31 - code)) != 0) out += text(" %g", rate_of(code));
+      out += " Hz";
+    }
+    for (unsigned mode = 0; mode < kFormat7Modes; ++mode) {
+      const std::uint64_t csr = r_.has_mode(7, mode) ? r_.table(reg::format7_base(mode)) : 0;
+      if (csr == 0) continue;
+      const Size most = Size::of(r_.get_at(csr + reg::format7::kMaxSize)), unit = Size::of(r_.get_at(csr + reg::format7::kUnitSize));
+      out +=
+          (out.empty() ? "" : ", ") + text("any region of %d x %d in steps of %d x %d", most.width, most.height, unit.width, unit.height);
+      const std::uint32_t codings = r_.get_at(csr + reg::format7::kCodingInquiry);
+      for (unsigned c = 0; c < kColorCodings; ++c)
+        if ((codings & bit(31 - c)) != 0) out += " " + std::string(to_string(static_cast<ColorCoding>(c)));
+    }
+    return out.empty() ? "nothing that its registers name" : out;
+  }
+
+  CameraRegisters& r_;
+  const BusTraits& bus_;
+  const CameraConfiguration& wanted_;
+  CameraPlan& plan_;
+  std::string& complaint_;
+  std::size_t largest_ = 0;  // packet
+  AbsoluteRange frame_rate_{};
+  std::string why_not_;
+};
+
+/// The size and packets of a Format 7 mode, in the order in which region and sensor always agree.
+bool write_format7(CameraRegisters& r, const CameraPlan& plan, std::string* complaint) {
+  using namespace reg::format7;
+  r.set_at(plan.csr + kCoding, static_cast<std::uint32_t>(plan.coding) << 24U);
+  r.set_at(plan.csr + kPosition, 0);
+  r.set_at(plan.csr + kSize, plan.size.quadlet());
+  r.set_at(plan.csr + kPosition, plan.position.quadlet());
+  if (!r.apply_format7(plan.csr, kErrorRegion)) {
+    *complaint = text("the camera refuses the region %d x %d at (%d, %d)", plan.size.width, plan.size.height, plan.position.width,
+                      plan.position.height);
+    return false;
+  }
+  const Size limits = Size::of(r.get_at(plan.csr + kPacketLimits));  // they may depend on the size
+  const std::size_t packet = plan.shape.packet_bytes;
+  if (limits.height != 0 && (packet > limits.height || (limits.width != 0 && packet % limits.width != 0))) {
+    *complaint =
+        text("the camera takes packets of at most %d bytes in steps of %d at this size, not %zu", limits.height, limits.width, packet);
+    return false;
+  }
+  r.set_at(plan.csr + kPacketBytes, static_cast<std::uint32_t>(packet) << 16U);
+  if (!r.apply_format7(plan.csr, kErrorPacket)) {
+    *complaint = text("the camera refuses packets of %zu bytes", packet);
+    return false;
+  }
+  return true;
+}
+
+/// Exposure and gain by hand, every automatic that would change them off.
+void write_features(CameraRegisters& r, CameraPlan* plan) {
+  for (const Feature f : {Feature::auto_exposure, Feature::gamma, Feature::trigger_delay}) r.switch_off(f);
+  plan->exposure = Duration::seconds(r.set_absolute(Feature::shutter, plan->exposure.to_seconds()));
+  if (r.absolute_range(Feature::gain).present) plan->gain_db = r.set_absolute(Feature::gain, plan->gain_db);
+  const AbsoluteRange rate = r.absolute_range(Feature::frame_rate);
+  if (plan->trigger == CameraTrigger::free && rate.present && plan->format == 7) {
+    plan->rate_hz = r.set_absolute(Feature::frame_rate, std::clamp(plan->wanted_rate_hz, rate.least, rate.most));
+  } else if (plan->trigger != CameraTrigger::free) {
+    r.switch_off(Feature::frame_rate);  // on, it shortens exposures and skips pulses
+  }
+}
+
+void write_trigger(CameraRegisters& r, const CameraPlan& plan) {
+  if ((r.get(reg::kTriggerInquiry) & bit(31)) == 0) return;
+  TriggerMode t;
+  t.on = plan.trigger != CameraTrigger::free;
+  t.rising = plan.options.trigger_rising;
+  t.source = plan.trigger == CameraTrigger::software ? kTriggerSourceSoftware : plan.options.trigger_source;
+  t.mode = plan.trigger_mode;
+  r.set(reg::kTriggerMode, t.quadlet());
+}
+
+void write_strobe(CameraRegisters& r, const CameraOptions& o) {
+  if (!o.strobe_pin) return;
+  const auto ticks = [](Duration d) { return static_cast<std::uint32_t>(std::min(4095.0, std::round(d.to_seconds() * 1024e3))); };
+  StrobeControl s;
+  s.on = true;
+  s.high = o.strobe_high;
+  s.delay = ticks(o.strobe_delay);
+  s.duration = ticks(o.strobe_duration);
+  const std::uint64_t csr = r.table(reg::kStrobeBase);
+  if (csr != 0) r.set_at(csr + reg::strobe::control(*o.strobe_pin), s.quadlet());
+}
+
+FrameInfoLayout write_frame_info(CameraRegisters& r, bool wanted) {
+  if (!BasicFunctions::of(r.get(reg::kBasicFunctions)).advanced) return {};
+  if ((r.get_optional(reg::kFrameInfo) & kFrameInfoPresent) == 0) return {};
+  const std::uint32_t items = frame_info_bit(FrameInfoItem::time) | frame_info_bit(FrameInfoItem::counter);
+  r.set(reg::kFrameInfo, kFrameInfoPresent | (wanted ? items : 0));
+  return FrameInfoLayout::of(r.get(reg::kFrameInfo));  // what a camera lacks stays off
+}
+
+unsigned effective_bits(CameraRegisters& r, const CameraPlan& plan) {
+  constexpr std::uint32_t kDataDepth = 0x630, kFormat7DataDepth = 0x54;
+  if (bits_per_pixel(plan.coding) != 16) return 16;
+  const std::uint32_t depth = (plan.format == 7 ? r.get_at(plan.csr + kFormat7DataDepth) : r.get_optional(kDataDepth)) >> 24U;
+  return depth >= 8 && depth <= 16 ? depth : 16;
+}
+
+}  // namespace
+
+DeviceStatus make_plan(CameraRegisters* registers, const BusTraits& bus, const CameraConfiguration& wanted, CameraPlan* plan,
+                       std::string* complaint) {
+  CameraPlan out;
+  const DeviceStatus status = Planner(registers, bus, wanted, &out, complaint).run();
+  if (status == DeviceStatus::ok) *plan = out;
+  return status;
+}
+
+DeviceStatus apply_plan(CameraRegisters* registers, const BusTraits& bus, CameraPlan* plan, std::string* complaint) {
+  CameraRegisters& r = *registers;
+  CameraPlan out = *plan;
+  r.transmit(false);  // also what a program that crashed has left on
+  if (BasicFunctions::of(r.get(reg::kBasicFunctions)).power_switch) r.set(reg::kPower, bit(31));
+  r.set(reg::kVideoFormat, out.format << 29U);
+  r.set(reg::kVideoMode, out.mode << 29U);
+  if (bus.isochronous) {
+    IsoChannel iso = IsoChannel::of(r.get(reg::kIsoChannel));
+    iso.beta = out.shape.speed == BusSpeed::s800;
+    iso.speed = static_cast<unsigned>(out.shape.speed);
+    r.set(reg::kIsoChannel, iso.quadlet());
+  }
+  if (out.format == 7) {
+    if (!write_format7(r, out, complaint) && r.status() == DeviceStatus::ok) return DeviceStatus::unsupported;
+    const std::uint32_t total = r.get_at(out.csr + reg::format7::kTotalBytesLow);  // the high half: frames of 4 GB
+    if (total >= out.shape.image_bytes && total <= out.shape.image_bytes + out.shape.packet_bytes) out.shape.frame_bytes = total;
+  } else {
+    r.set(reg::kFrameRate, out.rate_code << 29U);
+  }
+  write_features(r, &out);
+  write_trigger(r, out);
+  write_strobe(r, out.options);
+  out.info = write_frame_info(r, out.options.embedded);
+  out.grey.effective_bits = effective_bits(r, out);
+  const DeviceStatus status = r.take_status();
+  if (status != DeviceStatus::ok) {
+    *complaint = r.complaint();
+    return status;
+  }
+  *plan = out;
+  return DeviceStatus::ok;
+}
+
+}  // namespace vergence::iidc

@@ -1,0 +1,41 @@
+#pragma once
+#include <cstdint>
+#include <string>
+
+#include "drivers/camera.hpp"
+#include "drivers/iidc/camera_options.hpp"
+#include "drivers/iidc/camera_registers.hpp"
+#include "drivers/iidc/grey.hpp"
+
+namespace vergence::iidc {
+
+/// How one camera is going to do what it is asked for: the mode, its packets, what is embedded.
+struct CameraPlan {
+  CameraOptions options{};
+  CameraTrigger trigger = CameraTrigger::hardware;
+  unsigned trigger_mode = 0;  // 0 or 14
+  unsigned format = 0, mode = 0;
+  unsigned rate_code = 0;  // formats 0 to 2
+  std::uint64_t csr = 0;   // Format 7
+  Size size{}, position{};
+  ColorCoding coding = ColorCoding::mono8;
+  double wanted_rate_hz = 0;
+  // As the camera rounds them, once applied:
+  double rate_hz = 0;
+  Duration exposure{};
+  double gain_db = 0;
+  StreamShape shape{};
+  GreyConversion grey{};
+  FrameInfoLayout info{};
+};
+
+/// Finds a mode for it: the fixed one of that size and rate, else a region of Format 7; the cheapest pixels that give grey first.
+/// Only reads registers. → ok, unsupported, bad_configuration, or why a register failed; then *complaint says what the camera offers.
+[[nodiscard]] DeviceStatus make_plan(CameraRegisters* registers, const BusTraits& bus, const CameraConfiguration& wanted, CameraPlan* plan,
+                                     std::string* complaint);
+
+/// Stops the camera and writes the plan into it; fills in what the camera made of it. The camera stays quiet.
+/// → ok, unsupported, or why a register failed; then *complaint says it.
+[[nodiscard]] DeviceStatus apply_plan(CameraRegisters* registers, const BusTraits& bus, CameraPlan* plan, std::string* complaint);
+
+}  // namespace vergence::iidc

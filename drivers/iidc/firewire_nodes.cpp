@@ -1,0 +1,49 @@
+#include "drivers/iidc/firewire_nodes.hpp"
+
+#include <algorithm>
+#include <array>
+#include <fstream>
+#include <system_error>
+
+namespace vergence::iidc {
+namespace fs = std::filesystem;
+namespace {
+
+constexpr const char* kDevices = "bus/firewire/devices";
+
+std::vector<std::uint32_t> read_rom_file(const fs::path& file) {
+  std::ifstream in(file, std::ios::binary);
+  std::array<unsigned char, 4 * kMaxRomQuadlets> bytes{};
+  in.read(reinterpret_cast<char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
+  std::vector<std::uint32_t> quadlets(static_cast<std::size_t>(in.gcount()) / 4);
+  for (std::size_t i = 0; i < quadlets.size(); ++i)  // as on the bus: big-endian
+    quadlets[i] = static_cast<std::uint32_t>(bytes[4 * i]) << 24U | static_cast<std::uint32_t>(bytes[4 * i + 1]) << 16U |
+                  static_cast<std::uint32_t>(bytes[4 * i + 2]) << 8U | bytes[4 * i + 3];
+  return quadlets;
+}
+
+}  // namespace
+
+bool has_firewire(const fs::path& root) {
+  std::error_code error;
+  return fs::is_directory(root / kDevices, error);
+}
+
+std::vector<FirewireNode> list_firewire_cameras(const fs::path& root) {
+  std::vector<FirewireNode> out;
+  std::error_code error;
+  for (fs::directory_iterator it(root / kDevices, error), end; !error && it != end; it.increment(error)) {
+    const std::string name = it->path().filename().string();
+    if (!name.starts_with("fw") || name.find('.') != std::string::npos) continue;  // fw1.0 is a unit of fw1
+    FirewireNode node;
+    node.device = "/dev/" + name;
+    if (parse_config_rom(read_rom_file(it->path() / "config_rom"), &node.rom) != RomStatus::ok) continue;
+    std::error_code none;
+    node.bus = fs::canonical(it->path(), none).parent_path().string();
+    out.push_back(node);
+  }
+  std::sort(out.begin(), out.end(), [](const FirewireNode& a, const FirewireNode& b) { return a.rom.guid < b.rom.guid; });
+  return out;
+}
+
+}  // namespace vergence::iidc

@@ -1,0 +1,28 @@
+#include "drivers/iidc/identity.hpp"
+
+#include <array>
+#include <charconv>
+#include <cstdio>
+
+namespace vergence::iidc {
+
+std::string guid_text(std::uint64_t guid) {
+  std::array<char, 24> text{};
+  (void)std::snprintf(text.data(), text.size(), "%016llx", static_cast<unsigned long long>(guid));
+  return text.data();
+}
+
+bool names_camera(std::string_view wanted, std::uint64_t guid, std::string_view transport_serial) {
+  if (wanted.empty() || wanted == transport_serial) return true;
+  const auto value = [](std::string_view text, int base) -> std::uint64_t {
+    std::uint64_t v = 0;
+    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), v, base);
+    return error == std::errc{} && end == text.data() + text.size() ? v : 0;
+  };
+  if (wanted.starts_with("0x") || wanted.starts_with("0X")) wanted.remove_prefix(2);
+  if (value(wanted, 16) == guid && guid != 0) return true;
+  const std::uint64_t number = value(wanted, 10);
+  return number != 0 && number == (guid & 0xFFFF'FFFFU);
+}
+
+}  // namespace vergence::iidc

@@ -1,0 +1,302 @@
+#include "drivers/iidc/iidc_camera.hpp"
+
+#include <chrono>
+#include <exception>
+#include <utility>
+
+namespace vergence::iidc {
+namespace {
+
+/// A clock that nobody shares.
+class OwnClock final : public SharedClock {
+ public:
+  std::int64_t unwrap(std::int64_t wrapped_ns, HostStamp at) noexcept override { return unwrapper_.unwrap(wrapped_ns, at.ns()); }
+
+ private:
+  CycleUnwrapper unwrapper_;
+};
+
+}  // namespace
+
+IidcCamera::IidcCamera(std::unique_ptr<CameraBus> bus, const ConfigRom& rom, std::shared_ptr<SharedClock> clock, Duration patience)
+    : bus_(std::move(bus)),
+      clock_(clock != nullptr ? std::move(clock) : std::make_shared<OwnClock>()),
+      registers_(bus_.get(), rom.command_base, patience) {}
+
+IidcCamera::~IidcCamera() { stop(); }
+
+DeviceStatus IidcCamera::refused(DeviceStatus status, std::string why) {
+  complaint_ = std::move(why);
+  return status;
+}
+
+// ---- the owner's thread -------------------------------------------------------------------------------------------
+
+DeviceStatus IidcCamera::configure(const CameraConfiguration& wanted, CameraConfiguration* actual) noexcept {
+  try {
+    return configure_or_throw(wanted, actual);
+  } catch (const std::exception&) {  // no memory for the slots, or for a sentence
+    return DeviceStatus::failed;
+  }
+}
+
+DeviceStatus IidcCamera::configure_or_throw(const CameraConfiguration& wanted, CameraConfiguration* actual) {
+  if (streaming_.load(std::memory_order_acquire)) return refused(DeviceStatus::busy, "it is streaming; stop it first");
+  if (held_.size() != 0) return refused(DeviceStatus::busy, "images of it are still in use");
+  drain();
+  CameraPlan plan;
+  std::string why;
+  DeviceStatus status = make_plan(&registers_, bus_->traits(), wanted, &plan, &why);
+  if (status == DeviceStatus::ok) status = apply_plan(&registers_, bus_->traits(), &plan, &why);
+  if (status == DeviceStatus::ok && (!configured_ || !(plan.shape == plan_.shape))) {
+    configured_ = false;
+    status = bus_->allocate(plan.shape);
+    why = bus_->complaint();
+  }
+  if (status != DeviceStatus::ok) return refused(status, std::move(why));
+  if (!plan.grey.none())
+    converted_.allocate(plan.options.buffers, FramePool::stride(plan.size.width) * static_cast<std::size_t>(plan.size.height));
+  plan_ = plan;
+  sharing_ = wanted.sharing;
+  configured_ = true;
+  complaint_.clear();
+  if (actual != nullptr) {
+    CameraConfiguration done = wanted;
+    done.rate_hz = plan.rate_hz;
+    done.exposure = plan.exposure;
+    done.gain_db = plan.gain_db;
+    done.pixel_format = to_string(plan.coding);
+    *actual = done;
+  }
+  return DeviceStatus::ok;
+}
+
+DeviceTiming IidcCamera::timing() const noexcept {
+  DeviceTiming t;
+  const BusTraits& bus = bus_->traits();
+  // From one packet a cycle on 1394; on USB as fast as the wire at best.
+  const double transfer = bus.isochronous
+                              ? static_cast<double>(packets_for(plan_.shape.frame_bytes, plan_.shape.packet_bytes)) / kCyclesPerSecond
+                              : static_cast<double>(plan_.shape.image_bytes) / bus.bytes_per_second;
+  t.least_delay = plan_.exposure + Duration::seconds(transfer);
+  const bool stamped = plan_.info.has(FrameInfoItem::time);
+  t.resolution = stamped ? Duration::nanoseconds(kCycleNs / kTicksPerCycle + 1) : Duration::nanoseconds(kCycleNs);
+  if (!stamped && !bus.isochronous) {  // the stamp is the arrival
+    t.least_delay = plan_.exposure;
+    t.resolution = Duration::milliseconds(1);
+  }
+  return t;
+}
+
+DeviceStatus IidcCamera::start(Notifier* ready) noexcept {
+  if (!configured_) return DeviceStatus::bad_configuration;
+  if (streaming_.load(std::memory_order_acquire) && !lost_.load(std::memory_order_acquire)) return DeviceStatus::ok;
+  const bool again = streaming_.load(std::memory_order_acquire);
+  bus_->stop();
+  notifier_.store(ready, std::memory_order_release);
+  try {
+    const DeviceStatus status = begin();
+    if (status == DeviceStatus::ok) return status;
+    if (!lost_.load(std::memory_order_acquire)) {
+      registers_.transmit(false);
+      (void)registers_.take_status();
+    }
+    bus_->stop();
+    if (again) {  // still gone, until it comes back or stop()
+      gone_.store(true, std::memory_order_release);
+      streaming_.store(true, std::memory_order_release);
+    }
+    return status;
+  } catch (const std::exception&) {
+    return DeviceStatus::failed;
+  }
+}
+
+DeviceStatus IidcCamera::begin() {
+  std::string why;
+  if (lost_.load(std::memory_order_acquire)) {
+    const DeviceStatus back = bus_->reopen();
+    if (back != DeviceStatus::ok) return refused(DeviceStatus::gone, bus_->complaint());
+    lost_.store(false, std::memory_order_release);
+  }
+  CameraPlan plan = plan_;
+  DeviceStatus status = apply_plan(&registers_, bus_->traits(), &plan, &why);
+  if (status == DeviceStatus::gone) lost_.store(true, std::memory_order_release);  // unplugged while stopped
+  if (status == DeviceStatus::timeout || status == DeviceStatus::failed || status == DeviceStatus::unsupported) {
+    lost_.store(true, std::memory_order_release);
+    status = DeviceStatus::gone;  // it does not answer as it did; asked again, it is opened anew
+  }
+  if (status == DeviceStatus::ok && !(plan.shape == plan_.shape)) {
+    why = "the camera's frames are not those it was configured for; configure it again";
+    status = DeviceStatus::bad_configuration;
+  }
+  if (status != DeviceStatus::ok) return refused(status, std::move(why));
+  // Field by field: a consumer may be looking at an image of before, by plan_.size.
+  plan_.exposure = plan.exposure;
+  plan_.gain_db = plan.gain_db;
+  plan_.rate_hz = plan.rate_hz;
+  plan_.info = plan.info;
+  drain();
+  reader_.begin(plan_, bus_->traits().isochronous, clock_.get());
+  strays_ = 0;
+  gone_.store(false, std::memory_order_release);
+  streaming_.store(true, std::memory_order_release);
+  status = bus_->start(this);
+  if (status == DeviceStatus::ok) {
+    registers_.transmit(true);
+    status = registers_.take_status();
+    if (status != DeviceStatus::ok) why = registers_.complaint();
+    if (status == DeviceStatus::timeout || status == DeviceStatus::unsupported) status = DeviceStatus::gone;
+  } else {
+    why = bus_->complaint();
+  }
+  if (status != DeviceStatus::ok) {
+    if (status == DeviceStatus::gone) lost_.store(true, std::memory_order_release);
+    streaming_.store(false, std::memory_order_release);
+    return refused(status, std::move(why));
+  }
+  starts_.fetch_add(1, std::memory_order_relaxed);
+  complaint_.clear();
+  return DeviceStatus::ok;
+}
+
+void IidcCamera::stop() noexcept {
+  const bool was = streaming_.exchange(false, std::memory_order_acq_rel);
+  if (was && !lost_.load(std::memory_order_acquire)) {
+    registers_.transmit(false);
+    if (registers_.take_status() == DeviceStatus::gone) lost_.store(true, std::memory_order_release);
+  }
+  if (was) bus_->stop();
+  notifier_.store(nullptr, std::memory_order_release);
+  { const std::lock_guard lock(mutex_); }
+  changed_.notify_all();
+}
+
+DeviceStatus IidcCamera::trigger_once() noexcept {
+  if (!configured_ || plan_.trigger != CameraTrigger::software) return DeviceStatus::unsupported;
+  if (!streaming_.load(std::memory_order_acquire)) return DeviceStatus::stopped;
+  if (lost_.load(std::memory_order_acquire)) return DeviceStatus::gone;
+  registers_.software_trigger();
+  const DeviceStatus status = registers_.take_status();
+  if (status == DeviceStatus::ok) return status;
+  try {
+    complaint_ = registers_.complaint();
+  } catch (const std::exception&) {
+    complaint_.clear();
+  }
+  return status;
+}
+
+std::string IidcCamera::remark() const {
+  if (!configured_) return {};
+  std::string text = bus_->remark(plan_.shape, plan_.rate_hz, sharing_);
+  if (!plan_.info.has(FrameInfoItem::counter))
+    text += std::string(text.empty() ? "" : "; ") + "it embeds no counter and no stamp: lost images are told by their times only";
+  return text;
+}
+
+CameraStatistics IidcCamera::statistics() const noexcept {
+  return {delivered_.load(std::memory_order_relaxed), torn_.load(std::memory_order_relaxed), underruns_.load(std::memory_order_relaxed),
+          missing_.load(std::memory_order_relaxed), starts_.load(std::memory_order_relaxed)};
+}
+
+// ---- the stream's thread ------------------------------------------------------------------------------------------
+
+bool IidcCamera::frame(const Arrival& arrival) noexcept {
+  if (lost_.load(std::memory_order_acquire)) return false;  // nothing follows a `gone`
+  const ReadFrame read = reader_.read(arrival);
+  if (!read.taken) {
+    if (read.stray && ++strays_ == kStrays) gone(arrival.at);
+    return false;
+  }
+  strays_ = 0;
+  missing_.fetch_add(read.missing, std::memory_order_relaxed);
+  Delivery d;
+  d.frame = {arrival.slot, read.counter, read.exposure_start, arrival.at, plan_.exposure, read.status};
+  const bool convert = !plan_.grey.none();
+  if (convert) {
+    const auto slot = converted_.acquire();
+    if (!slot) {
+      underruns_.fetch_add(1, std::memory_order_relaxed);
+      return false;
+    }
+    d.frame.slot = *slot;
+    if (read.status == FrameStatus::complete)
+      to_grey(plan_.grey, arrival.data, plan_.size.width, plan_.size.height, converted_.bytes(*slot), FramePool::stride(plan_.size.width));
+  } else if (!arrival.spare) {
+    underruns_.fetch_add(1, std::memory_order_relaxed);
+    return false;
+  }
+  push(d);
+  return !convert;
+}
+
+void IidcCamera::gone(HostStamp at) noexcept {
+  if (lost_.exchange(true, std::memory_order_acq_rel)) return;
+  Delivery d;
+  d.gone = true;
+  d.frame.arrival = at;
+  push(d);
+}
+
+void IidcCamera::push(const Delivery& delivery) noexcept {
+  if (!ready_.push(delivery)) return;  // cannot be: it holds more than there are slots
+  { const std::lock_guard lock(mutex_); }
+  changed_.notify_one();
+  if (Notifier* n = notifier_.load(std::memory_order_acquire)) n->notify();
+}
+
+// ---- the consumer's thread ----------------------------------------------------------------------------------------
+
+DeviceStatus IidcCamera::wait(Duration limit, Frame* frame) noexcept {
+  Delivery d;
+  {
+    std::unique_lock lock(mutex_);
+    if (!streaming_.load(std::memory_order_acquire)) return DeviceStatus::stopped;
+    if (gone_.load(std::memory_order_acquire)) return DeviceStatus::gone;
+    if (!ready_.pop(&d)) {
+      if (limit <= Duration{}) return DeviceStatus::timeout;
+      (void)changed_.wait_for(lock, std::chrono::nanoseconds(limit.ns()),
+                              [this] { return !ready_.empty() || !streaming_.load(std::memory_order_acquire); });
+      if (!streaming_.load(std::memory_order_acquire)) return DeviceStatus::stopped;
+      if (!ready_.pop(&d)) return DeviceStatus::timeout;
+    }
+    if (!d.gone) held_.put(d.frame.slot);
+  }
+  if (d.gone) {
+    frame->arrival = d.frame.arrival;
+    gone_.store(true, std::memory_order_release);
+    return DeviceStatus::gone;
+  }
+  *frame = d.frame;
+  delivered_.fetch_add(1, std::memory_order_relaxed);
+  if (d.frame.status != FrameStatus::complete) torn_.fetch_add(1, std::memory_order_relaxed);
+  return DeviceStatus::ok;
+}
+
+ImageView IidcCamera::view(FrameSlot slot) const noexcept {
+  const int width = plan_.size.width, height = plan_.size.height;
+  if (plan_.grey.none()) return {bus_->bytes(slot), width, height, width};
+  return {converted_.bytes(slot), width, height, static_cast<std::ptrdiff_t>(FramePool::stride(width))};
+}
+
+void IidcCamera::return_slot(FrameSlot slot) noexcept {
+  if (plan_.grey.none()) {
+    bus_->give_back(slot);
+  } else {
+    converted_.release(slot);
+  }
+}
+
+void IidcCamera::release(FrameSlot slot) noexcept {
+  if (held_.remove(slot)) return_slot(slot);
+}
+
+/// What a stop left between stream and consumer. Precondition: the stream is stopped.
+void IidcCamera::drain() noexcept {
+  const std::lock_guard lock(mutex_);
+  for (Delivery d; ready_.pop(&d);)
+    if (!d.gone) return_slot(d.frame.slot);
+}
+
+}  // namespace vergence::iidc

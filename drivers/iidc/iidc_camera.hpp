@@ -1,0 +1,89 @@
+#pragma once
+#include <atomic>
+#include <condition_variable>
+#include <cstdint>
+#include <memory>
+#include <mutex>
+#include <string>
+
+#include "core/memory/ring.hpp"
+#include "drivers/camera.hpp"
+#include "drivers/iidc/bus.hpp"
+#include "drivers/iidc/camera_plan.hpp"
+#include "drivers/iidc/frame_reader.hpp"
+#include "drivers/iidc/slot_memory.hpp"
+
+namespace vergence::iidc {
+
+/// An IIDC camera, whatever it hangs on.
+///
+/// Contract as drivers/camera.hpp. Slots are the bus's buffers; only modes that are not 8-bit grey are converted, on the stream's thread,
+/// into memory of the camera's own.
+/// Counter   The camera's, where it embeds one: gaps are exposures that never arrived. `lost` counts them as soon as a later one is here.
+/// Stamps    The camera's own clock where it embeds it (on one 1394 bus common to all cameras), else the arrival.
+/// Gone      When the bus says so, or when the stream is out of step for kStrays frames: start() begins anew.
+/// Restart   start() writes all registers again: after a stop or a replug the camera is as configured.
+class IidcCamera final : public CameraDevice, private StreamSink {
+ public:
+  static constexpr int kStrays = 8;
+
+  /// `rom` of this camera. `clock` null: the camera's clock is its own. `patience`: how long a register may take to become ready.
+  IidcCamera(std::unique_ptr<CameraBus> bus, const ConfigRom& rom, std::shared_ptr<SharedClock> clock,
+             Duration patience = Duration::seconds(1));
+  ~IidcCamera() override;
+  IidcCamera(const IidcCamera&) = delete;
+  IidcCamera& operator=(const IidcCamera&) = delete;
+
+  [[nodiscard]] const DeviceInfo& info() const noexcept override { return bus_->info(); }
+  [[nodiscard]] DeviceStatus configure(const CameraConfiguration& wanted, CameraConfiguration* actual) noexcept override;
+  [[nodiscard]] DeviceTiming timing() const noexcept override;
+  [[nodiscard]] DeviceStatus start(Notifier* ready) noexcept override;
+  [[nodiscard]] DeviceStatus wait(Duration limit, Frame* frame) noexcept override;
+  [[nodiscard]] ImageView view(FrameSlot slot) const noexcept override;
+  void release(FrameSlot slot) noexcept override;
+  void stop() noexcept override;
+  [[nodiscard]] DeviceStatus trigger_once() noexcept override;
+  [[nodiscard]] std::string complaint() const override { return complaint_; }
+  [[nodiscard]] std::string remark() const override;
+  [[nodiscard]] CameraStatistics statistics() const noexcept override;
+
+  /// The plan in force; its mode and packets are what the diagnosis of a bus needs. Owner's thread.
+  [[nodiscard]] const CameraPlan& plan() const noexcept { return plan_; }
+
+ private:
+  struct Delivery {
+    bool gone = false;
+    Frame frame{};
+  };
+  [[nodiscard]] bool frame(const Arrival& arrival) noexcept override;
+  void gone(HostStamp at) noexcept override;
+  void push(const Delivery& delivery) noexcept;
+  [[nodiscard]] DeviceStatus configure_or_throw(const CameraConfiguration& wanted, CameraConfiguration* actual);
+  [[nodiscard]] DeviceStatus begin();
+  void return_slot(FrameSlot slot) noexcept;
+  void drain() noexcept;
+  [[nodiscard]] DeviceStatus refused(DeviceStatus status, std::string why);
+
+  std::unique_ptr<CameraBus> bus_;
+  std::shared_ptr<SharedClock> clock_;
+  CameraRegisters registers_;
+  CameraPlan plan_{};
+  int sharing_ = 1;
+  bool configured_ = false;
+  std::string complaint_;
+
+  FrameReader reader_;    // the stream's thread
+  SlotMemory converted_;  // where the bus's buffers are not the image
+  int strays_ = 0;
+
+  Ring<Delivery, 128> ready_;  // more than there are slots
+  SlotSet held_;               // handed out by wait()
+  std::atomic<Notifier*> notifier_{nullptr};
+  std::atomic<bool> streaming_{false}, gone_{false};  // gone_: wait() has told it
+  std::atomic<bool> lost_{false};                     // the device is gone, whether told or not
+  std::mutex mutex_;                                  // of the consumer's end of ready_, and for sleeping
+  std::condition_variable changed_;
+  std::atomic<std::uint64_t> delivered_{0}, torn_{0}, underruns_{0}, missing_{0}, starts_{0};
+};
+
+}  // namespace vergence::iidc

@@ -1,0 +1,496 @@
+#include "drivers/iidc/usb_bus.hpp"
+
+#include <pthread.h>
+#include <sys/time.h>
+
+#include <algorithm>
+#include <array>
+#include <cstdio>
+#include <exception>
+#include <new>
+#include <utility>
+
+#include "drivers/iidc/camera_registers.hpp"
+#include "drivers/iidc/identity.hpp"
+
+namespace vergence::iidc {
+namespace {
+
+constexpr std::uint16_t kPointGrey = 0x1E10;
+struct Product {
+  std::uint16_t id;
+  const char* name;
+};
+constexpr std::array kProducts{
+    Product{0x2000, "Firefly MV"},   Product{0x2001, "Firefly MV"}, Product{0x2002, "Firefly MV"}, Product{0x2003, "Firefly MV"},
+    Product{0x2004, "Chameleon"},    Product{0x2005, "Chameleon"},  Product{0x3000, "Flea3"},      Product{0x3005, "Flea3"},
+    Product{0x3006, "Flea3"},        Product{0x3008, "Flea3"},      Product{0x300A, "Flea3"},      Product{0x300B, "Flea3"},
+    Product{0x3103, "Grasshopper3"}, Product{0x3300, "Flea3"},      Product{0x3800, "Ladybug5"},
+};
+
+constexpr unsigned char kReadRequest = 0xC0, kWriteRequest = 0x40;  // vendor, device
+constexpr unsigned char kQuadlets = 0x7F;                           // addresses 0xFFFF….
+constexpr int kMostErrors = 8;                                      // transfers in a row that failed: the device is given up
+constexpr std::size_t kSuperSpeedBlock = 1024;                      // transfers of USB 3 are whole packets of this size
+
+const Product* product_of(const libusb_device_descriptor& d) noexcept {
+  if (d.idVendor != kPointGrey) return nullptr;
+  for (const Product& p : kProducts)
+    if (p.id == d.idProduct) return &p;
+  return nullptr;
+}
+
+DeviceStatus status_of(int error) noexcept {
+  switch (error) {
+    case LIBUSB_SUCCESS:
+      return DeviceStatus::ok;
+    case LIBUSB_ERROR_TIMEOUT:
+      return DeviceStatus::timeout;
+    case LIBUSB_ERROR_NO_DEVICE:
+    case LIBUSB_ERROR_NOT_FOUND:
+      return DeviceStatus::gone;
+    case LIBUSB_ERROR_ACCESS:
+      return DeviceStatus::no_permission;
+    case LIBUSB_ERROR_BUSY:
+      return DeviceStatus::busy;
+    case LIBUSB_ERROR_PIPE:  // the device stalled the request
+      return DeviceStatus::unsupported;
+    default:
+      return DeviceStatus::failed;
+  }
+}
+
+std::string place_of(libusb_device* device) {
+  std::array<char, 32> text{};
+  (void)std::snprintf(text.data(), text.size(), "usb %03d/%03d", libusb_get_bus_number(device), libusb_get_device_address(device));
+  return text.data();
+}
+
+std::string node_of(libusb_device* device) {
+  std::array<char, 48> text{};
+  (void)std::snprintf(text.data(), text.size(), "/dev/bus/usb/%03d/%03d", libusb_get_bus_number(device), libusb_get_device_address(device));
+  return text.data();
+}
+
+unsigned limit_ms() noexcept { return static_cast<unsigned>(UsbBus::kRegisterLimit.ns() / 1'000'000); }
+
+DeviceStatus read_quadlet(libusb_device_handle* handle, std::uint64_t address, std::uint32_t* value) noexcept {
+  std::array<unsigned char, 4> b{};
+  const int got = libusb_control_transfer(handle, kReadRequest, kQuadlets, static_cast<std::uint16_t>(address & 0xFFFF),
+                                          static_cast<std::uint16_t>(address >> 16U & 0xFFFF), b.data(), b.size(), limit_ms());
+  if (got < 0) return status_of(got);
+  if (got != static_cast<int>(b.size())) return DeviceStatus::failed;
+  *value = static_cast<std::uint32_t>(b[0]) | static_cast<std::uint32_t>(b[1]) << 8U | static_cast<std::uint32_t>(b[2]) << 16U |
+           static_cast<std::uint32_t>(b[3]) << 24U;
+  return DeviceStatus::ok;
+}
+
+/// Registers of a device that is opened, but not yet anybody's camera.
+class HandlePort final : public RegisterPort {
+ public:
+  explicit HandlePort(libusb_device_handle* handle) : handle_(handle) {}
+  DeviceStatus read(std::uint64_t address, std::uint32_t* value) noexcept override { return read_quadlet(handle_, address, value); }
+  DeviceStatus write(std::uint64_t, std::uint32_t) noexcept override { return DeviceStatus::unsupported; }
+
+ private:
+  libusb_device_handle* handle_;
+};
+
+struct FoundDevice {
+  UsbCandidate who;
+  ConfigRom rom;
+};
+
+/// Opens a device and asks who it is. *handle stays open when `access` is ok.
+FoundDevice ask(libusb_device* device, const libusb_device_descriptor& d, const Product& product, libusb_device_handle** handle,
+                std::string* complaint) {
+  FoundDevice found;
+  UsbCandidate& who = found.who;
+  who.info = {"iidc-usb", "", product.name, place_of(device)};
+  const int error = libusb_open(device, handle);
+  if (error != LIBUSB_SUCCESS) {
+    who.access = status_of(error);
+    if (who.access == DeviceStatus::no_permission)
+      *complaint =
+          "no permission to open " + node_of(device) + ": install the udev rules (vergence devices --write-udev) and plug it in again";
+    return found;
+  }
+  std::array<unsigned char, 64> text{};
+  if (d.iSerialNumber != 0) {
+    const int n = libusb_get_string_descriptor_ascii(*handle, d.iSerialNumber, text.data(), static_cast<int>(text.size()));
+    if (n > 0) who.transport_serial.assign(text.begin(), text.begin() + n);
+  }
+  HandlePort port(*handle);
+  std::string why;
+  who.access = read_rom(&port, &found.rom, &why);
+  if (who.access != DeviceStatus::ok) {
+    *complaint = std::string(product.name) + " at " + place_of(device) + ": " + why;
+    libusb_close(*handle);
+    *handle = nullptr;
+    return found;
+  }
+  who.guid = found.rom.guid;
+  who.info.serial = guid_text(who.guid);
+  if (found.rom.model[0] != 0) who.info.model = found.rom.model.data();
+  return found;
+}
+
+/// Calls back with every device of ours; ends when that says true.
+template <class F>
+int for_each_device(libusb_context* context, F&& f) {
+  libusb_device** list = nullptr;
+  const ssize_t n = libusb_get_device_list(context, &list);
+  if (n < 0) return static_cast<int>(n);
+  bool done = false;
+  for (ssize_t i = 0; i < n && !done; ++i) {
+    libusb_device_descriptor d{};
+    if (libusb_get_device_descriptor(list[i], &d) != LIBUSB_SUCCESS) continue;
+    if (const Product* p = product_of(d)) done = f(list[i], d, *p);
+  }
+  libusb_free_device_list(list, 1);
+  return LIBUSB_SUCCESS;
+}
+
+constexpr const char* kNoUsb = "the system's USB devices cannot be listed";
+
+}  // namespace
+
+// ---- finding and opening ------------------------------------------------------------------------------------------
+
+std::vector<UsbCandidate> UsbBus::find(std::string* complaint) {
+  std::vector<UsbCandidate> all;
+  libusb_context* context = nullptr;
+  if (libusb_init(&context) != LIBUSB_SUCCESS) {
+    *complaint = kNoUsb;
+    return all;
+  }
+  (void)for_each_device(context, [&](libusb_device* device, const libusb_device_descriptor& d, const Product& p) {
+    libusb_device_handle* handle = nullptr;
+    all.push_back(ask(device, d, p, &handle, complaint).who);
+    if (handle != nullptr) libusb_close(handle);
+    return false;
+  });
+  libusb_exit(context);
+  return all;
+}
+
+std::unique_ptr<UsbBus> UsbBus::open(std::string_view wanted, DeviceStatus* status, std::string* complaint) {
+  std::unique_ptr<UsbBus> bus(new UsbBus);
+  *status = bus->open_device(wanted);
+  if (*status == DeviceStatus::ok) return bus;
+  *complaint = bus->complaint_;
+  return nullptr;
+}
+
+DeviceStatus UsbBus::open_device(std::string_view wanted) {
+  complaint_.clear();
+  // A context of its own: libusb's list of devices is as old as its context where no udev daemon tells it of new ones.
+  if (libusb_init(&context_) != LIBUSB_SUCCESS) {
+    context_ = nullptr;
+    complaint_ = kNoUsb;
+    return DeviceStatus::failed;
+  }
+  DeviceStatus status = DeviceStatus::not_found;
+  const int listed = for_each_device(context_, [&](libusb_device* device, const libusb_device_descriptor& d, const Product& p) {
+    libusb_device_handle* handle = nullptr;
+    const FoundDevice found = ask(device, d, p, &handle, &complaint_);
+    if (handle == nullptr) {  // it may have been the one
+      if (status == DeviceStatus::not_found && found.who.access == DeviceStatus::no_permission) status = found.who.access;
+      return false;
+    }
+    if (!names_camera(wanted, found.who.guid, found.who.transport_serial)) {
+      libusb_close(handle);
+      return false;
+    }
+    status = claim(handle);
+    if (status != DeviceStatus::ok) {
+      libusb_close(handle);
+      return !wanted.empty();  // any other will do when none is named
+    }
+    handle_ = handle;
+    info_ = found.who.info;
+    rom_ = found.rom;
+    const bool super = libusb_get_device_speed(device) >= LIBUSB_SPEED_SUPER;
+    traits_ = {false, BusSpeed::s800, super ? std::size_t{65532} : largest_packet(BusSpeed::s800), super ? 400e6 : 53e6};
+    complaint_.clear();
+    return true;
+  });
+  if (listed < 0) complaint_ = kNoUsb;
+  if (status != DeviceStatus::ok) close_device();
+  return status;
+}
+
+DeviceStatus UsbBus::claim(libusb_device_handle* handle) {
+  int active = 0;
+  // Setting the configuration that is active already would reset what another program does with it.
+  if (libusb_get_configuration(handle, &active) == LIBUSB_SUCCESS && active != 1) (void)libusb_set_configuration(handle, 1);
+  libusb_config_descriptor* config = nullptr;
+  if (libusb_get_active_config_descriptor(libusb_get_device(handle), &config) != LIBUSB_SUCCESS) {
+    complaint_ = "its USB configuration cannot be read";
+    return DeviceStatus::failed;
+  }
+  interface_ = -1;
+  constexpr unsigned char kImages = 0x81;
+  for (int i = 0; i < config->bNumInterfaces && interface_ < 0; ++i) {
+    if (config->interface[i].num_altsetting < 1) continue;
+    const libusb_interface_descriptor& alt = config->interface[i].altsetting[0];
+    for (int e = 0; e < alt.bNumEndpoints; ++e)
+      if (alt.endpoint[e].bEndpointAddress == kImages && (alt.endpoint[e].bmAttributes & 3) == LIBUSB_TRANSFER_TYPE_BULK) {
+        interface_ = alt.bInterfaceNumber;
+        endpoint_ = kImages;
+      }
+  }
+  libusb_free_config_descriptor(config);
+  if (interface_ < 0) {
+    complaint_ = "it has no bulk endpoint 0x81 for images: not an IIDC camera, or a USB3 Vision one (driver gige's library reads those)";
+    return DeviceStatus::failed;
+  }
+  const int error = libusb_claim_interface(handle, interface_);
+  if (error == LIBUSB_SUCCESS) return DeviceStatus::ok;
+  complaint_ = error == LIBUSB_ERROR_BUSY ? "another program has claimed it" : libusb_strerror(static_cast<libusb_error>(error));
+  return status_of(error);
+}
+
+void UsbBus::close_device() noexcept {
+  if (handle_ != nullptr) {
+    (void)libusb_release_interface(handle_, interface_);
+    libusb_close(handle_);
+    handle_ = nullptr;
+  }
+  if (context_ != nullptr) {
+    libusb_exit(context_);
+    context_ = nullptr;
+  }
+}
+
+UsbBus::~UsbBus() {
+  stop();
+  close_device();
+  drop_memory();
+}
+
+void UsbBus::drop_memory() noexcept {
+  if (given_up_) (void)memory_.release();
+  given_up_ = false;
+  memory_.reset();
+}
+
+DeviceStatus UsbBus::reopen() noexcept {
+  try {
+    const std::string mine = info_.serial;
+    close_device();
+    const DeviceStatus status = open_device(mine);
+    if (status != DeviceStatus::ok) {
+      if (complaint_.empty()) complaint_ = "the camera is not plugged in";
+      info_.serial = mine;
+      return status == DeviceStatus::no_permission || status == DeviceStatus::busy ? status : DeviceStatus::gone;
+    }
+    lost_.store(false, std::memory_order_release);
+    return status;
+  } catch (const std::exception&) {
+    return DeviceStatus::gone;
+  }
+}
+
+// ---- registers ----------------------------------------------------------------------------------------------------
+
+DeviceStatus UsbBus::read(std::uint64_t address, std::uint32_t* value) noexcept {
+  return handle_ == nullptr ? DeviceStatus::gone : read_quadlet(handle_, address, value);
+}
+
+DeviceStatus UsbBus::write(std::uint64_t address, std::uint32_t value) noexcept {
+  if (handle_ == nullptr) return DeviceStatus::gone;
+  std::array<unsigned char, 4> b{static_cast<unsigned char>(value), static_cast<unsigned char>(value >> 8U),
+                                 static_cast<unsigned char>(value >> 16U), static_cast<unsigned char>(value >> 24U)};
+  const int sent = libusb_control_transfer(handle_, kWriteRequest, kQuadlets, static_cast<std::uint16_t>(address & 0xFFFF),
+                                           static_cast<std::uint16_t>(address >> 16U & 0xFFFF), b.data(), b.size(), limit_ms());
+  if (sent < 0) return status_of(sent);
+  return sent == static_cast<int>(b.size()) ? DeviceStatus::ok : DeviceStatus::failed;
+}
+
+// ---- streaming ----------------------------------------------------------------------------------------------------
+
+DeviceStatus UsbBus::allocate(const StreamShape& shape) noexcept {
+  try {
+    const bool super = traits_.largest_packet > largest_packet(BusSpeed::s800);
+    // USB 3 sends the image, USB 2 the packets with their padding.
+    transfer_bytes_ = super ? (shape.image_bytes + kSuperSpeedBlock - 1) / kSuperSpeedBlock * kSuperSpeedBlock : shape.frame_bytes;
+    drop_memory();
+    memory_ = std::make_unique<SlotMemory>();
+    memory_->allocate(shape.buffers, transfer_bytes_);
+    flights_.resize(std::min(kTransfers, shape.buffers - 1));
+    shape_ = shape;
+    return DeviceStatus::ok;
+  } catch (const std::bad_alloc&) {
+    complaint_ = "there is no memory for its images";
+    return DeviceStatus::failed;
+  }
+}
+
+int UsbBus::submit(Flight* flight) noexcept {
+  libusb_fill_bulk_transfer(flight->transfer, handle_, endpoint_, memory_->bytes(flight->slot), static_cast<int>(transfer_bytes_),
+                            &UsbBus::on_transfer, flight, 0);  // no limit: a camera may be silent, cancelling ends it
+  flying_.fetch_add(1, std::memory_order_acq_rel);
+  flight->flying = true;
+  const int error = libusb_submit_transfer(flight->transfer);
+  if (error == LIBUSB_SUCCESS) return error;
+  flight->flying = false;
+  flying_.fetch_sub(1, std::memory_order_acq_rel);
+  return error;
+}
+
+DeviceStatus UsbBus::start(StreamSink* sink) noexcept {
+  if (handle_ == nullptr) return DeviceStatus::gone;
+  stop();
+  sink_ = sink;
+  errors_ = 0;
+  stopping_.store(false, std::memory_order_release);
+  lost_.store(false, std::memory_order_release);
+  (void)libusb_clear_halt(handle_, endpoint_);  // what a program before us left
+  int error = LIBUSB_SUCCESS;
+  for (Flight& f : flights_) {
+    const auto slot = memory_->acquire();
+    if (!slot) {  // the consumer holds the others
+      error = LIBUSB_ERROR_NO_MEM;
+      break;
+    }
+    f = {this, libusb_alloc_transfer(0), *slot, false};
+    error = f.transfer == nullptr ? LIBUSB_ERROR_NO_MEM : submit(&f);
+    if (error != LIBUSB_SUCCESS) break;
+  }
+  if (error == LIBUSB_SUCCESS) {
+    try {
+      thread_ = std::thread([this] { handle_events(); });
+      return DeviceStatus::ok;
+    } catch (const std::exception&) {
+      error = LIBUSB_ERROR_OTHER;
+    }
+  }
+  stop();
+  if (error == LIBUSB_ERROR_NO_DEVICE) return DeviceStatus::gone;
+  complaint_ = error == LIBUSB_ERROR_OTHER
+                   ? "no thread for its stream"
+                   : "the kernel takes no more USB memory, or its images are all in use: raise the limit, which is 16 MB for all devices, "
+                     "with echo 256 > /sys/module/usbcore/parameters/usbfs_memory_mb";
+  return error == LIBUSB_ERROR_OTHER ? DeviceStatus::failed : DeviceStatus::no_bandwidth;
+}
+
+void UsbBus::on_transfer(libusb_transfer* transfer) {
+  auto* flight = static_cast<Flight*>(transfer->user_data);
+  flight->bus->completed(flight);
+}
+
+/// A transfer has come back. One that is not sent again keeps its slot until stop(): the owner may be cancelling it at this moment.
+void UsbBus::completed(Flight* flight) noexcept {
+  bool again = !stopping_.load(std::memory_order_acquire) && !lost_.load(std::memory_order_acquire);
+  if (again) {
+    switch (flight->transfer->status) {
+      case LIBUSB_TRANSFER_COMPLETED:
+      case LIBUSB_TRANSFER_OVERFLOW:  // more than a frame: its end was lost
+        errors_ = 0;
+        filled(flight);
+        break;
+      case LIBUSB_TRANSFER_NO_DEVICE:
+        again = false;
+        break;
+      default:  // error, stall, or cancelled by nobody we know
+        again = ++errors_ < kMostErrors;
+        break;
+    }
+    again = again && submit(flight) == LIBUSB_SUCCESS;
+    if (!again) lose();
+  }
+  if (!again) flight->flying = false;
+  flying_.fetch_sub(1, std::memory_order_acq_rel);  // the last: from here on stop() may free it
+}
+
+void UsbBus::filled(Flight* flight) noexcept {
+  const auto next = memory_->acquire();
+  Arrival a;
+  a.slot = flight->slot;
+  a.data = memory_->bytes(flight->slot);
+  a.bytes = static_cast<std::size_t>(std::max(flight->transfer->actual_length, 0));
+  a.at = monotonic_now();
+  a.broken = flight->transfer->status == LIBUSB_TRANSFER_OVERFLOW;
+  a.spare = next.has_value();
+  const bool kept = sink_->frame(a);
+  if (kept && next) {
+    flight->slot = *next;
+  } else if (next) {
+    memory_->release(*next);
+  }
+}
+
+/// A transfer that flies no more gives its slot back. Owner's thread.
+void UsbBus::land(Flight* flight) noexcept {
+  if (flight->bus == nullptr) return;
+  memory_->release(flight->slot);
+  libusb_free_transfer(flight->transfer);
+  *flight = {};
+}
+
+void UsbBus::lose() noexcept {
+  if (lost_.exchange(true, std::memory_order_acq_rel) || stopping_.load(std::memory_order_acquire)) return;
+  sink_->gone(monotonic_now());
+}
+
+void UsbBus::handle_events() noexcept {
+  (void)pthread_setname_np(pthread_self(), "vergence-iidcus");
+  while (flying_.load(std::memory_order_acquire) > 0) {
+    timeval limit{0, 100'000};
+    const int error = libusb_handle_events_timeout_completed(context_, &limit, nullptr);
+    if (error == LIBUSB_ERROR_NO_DEVICE) lose();
+    if (stopping_.load(std::memory_order_acquire) && error != LIBUSB_SUCCESS && error != LIBUSB_ERROR_INTERRUPTED) break;
+  }
+}
+
+void UsbBus::stop() noexcept {
+  stopping_.store(true, std::memory_order_release);
+  const HostStamp end = monotonic_now() + kCancelLimit;
+  // Asked again while some fly: a transfer may have been between its callback and its next submission.
+  while (flying_.load(std::memory_order_acquire) > 0 && monotonic_now() < end) {
+    for (Flight& f : flights_)
+      if (f.transfer != nullptr) (void)libusb_cancel_transfer(f.transfer);
+    timeval limit{0, 20'000};
+    (void)libusb_handle_events_timeout_completed(context_, &limit, nullptr);
+  }
+  if (flying_.load(std::memory_order_acquire) > 0) {
+    given_up_ = true;  // the host controller does not give them back: their memory stays for as long as the program runs
+    flying_.store(0, std::memory_order_release);
+  }
+  if (context_ != nullptr && thread_.joinable()) libusb_interrupt_event_handler(context_);
+  if (thread_.joinable()) thread_.join();
+  for (Flight& f : flights_)
+    if (!f.flying) land(&f);
+  sink_ = nullptr;
+}
+
+std::string UsbBus::remark(const StreamShape& shape, double rate_hz, int sharing) const {
+  std::string out;
+  constexpr double kPractical = 0.62;  // of the wire: what host controllers reach
+  const double need = static_cast<double>(shape.frame_bytes) * rate_hz * sharing, have = traits_.bytes_per_second * kPractical;
+  std::array<char, 220> text{};
+  if (need > have) {
+    (void)std::snprintf(
+        text.data(), text.size(),
+        "%d cameras of %.1f MB/s each are %.1f MB/s, one USB controller carries about %.0f: give each its own, or lower the rate", sharing,
+        static_cast<double>(shape.frame_bytes) * rate_hz / 1e6, need / 1e6, have / 1e6);
+    out = text.data();
+  }
+  const double megabytes = static_cast<double>(kTransfers * shape.frame_bytes) * sharing / 1048576.0;
+  int limit = 0;
+  if (std::FILE* f = std::fopen("/sys/module/usbcore/parameters/usbfs_memory_mb", "r")) {
+    if (std::fscanf(f, "%d", &limit) != 1) limit = 0;
+    (void)std::fclose(f);
+  }
+  if (limit > 0 && megabytes > limit) {
+    (void)std::snprintf(
+        text.data(), text.size(),
+        "%d cameras need %.0f MB of USB memory, the kernel gives %d: echo %d > /sys/module/usbcore/parameters/usbfs_memory_mb", sharing,
+        megabytes, limit, static_cast<int>(megabytes * 2) + 1);
+    out += (out.empty() ? "" : "; ") + std::string(text.data());
+  }
+  return out;
+}
+
+}  // namespace vergence::iidc

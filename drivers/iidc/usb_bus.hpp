@@ -1,0 +1,105 @@
+#pragma once
+#include <libusb-1.0/libusb.h>
+
+#include <atomic>
+#include <memory>
+#include <string>
+#include <string_view>
+#include <thread>
+#include <vector>
+
+#include "drivers/iidc/bus.hpp"
+#include "drivers/iidc/slot_memory.hpp"
+#include "firmware_iface/iidc/config_rom.hpp"
+
+namespace vergence::iidc {
+
+/// One attached device that may be an IIDC camera.
+struct UsbCandidate {
+  DeviceInfo info{};             // serial: the GUID; empty when it could not be opened
+  std::string transport_serial;  // the USB string
+  std::uint64_t guid = 0;
+  DeviceStatus access = DeviceStatus::ok;  // why it could not be asked
+};
+
+/// An IIDC camera on USB.
+///
+/// Registers  Control requests, a second at most each. Stream: kTransfers bulk transfers of a whole frame each, straight into the slots;
+///            a full slot is replaced by a free one in the same callback, so the camera never waits for us. A short or empty packet ends a
+///            frame.
+/// Threads    A thread handles libusb's events between start() and stop(). Arrivals are stamped in its callbacks; while a register is
+///            accessed the owner's thread may run one in its place, never at the same time.
+/// Stop       Transfers are cancelled, and waited for until each has come back, at most kCancelLimit; those that have not are given up
+///            with their memory, never freed under the kernel's hands.
+/// Unplug     Seen by the transfers' ends. reopen() looks with a context of its own each time: it needs no hot-plug events, which
+///            containers and small systems do not have.
+class UsbBus final : public CameraBus {
+ public:
+  static constexpr std::size_t kTransfers = 4;  // 130 ms at 30 Hz: longer than any scheduling hold-up seen
+  static constexpr Duration kRegisterLimit = Duration::seconds(1);
+  static constexpr Duration kCancelLimit = Duration::seconds(2);
+
+  /// Every device with a known id, each asked for its GUID.
+  [[nodiscard]] static std::vector<UsbCandidate> find(std::string* complaint);
+  /// `wanted` as names_camera(). Null: *status and *complaint say why.
+  [[nodiscard]] static std::unique_ptr<UsbBus> open(std::string_view wanted, DeviceStatus* status, std::string* complaint);
+  ~UsbBus() override;
+  UsbBus(const UsbBus&) = delete;
+  UsbBus& operator=(const UsbBus&) = delete;
+
+  [[nodiscard]] const ConfigRom& rom() const noexcept { return rom_; }
+  [[nodiscard]] DeviceStatus read(std::uint64_t address, std::uint32_t* value) noexcept override;
+  [[nodiscard]] DeviceStatus write(std::uint64_t address, std::uint32_t value) noexcept override;
+  [[nodiscard]] const DeviceInfo& info() const noexcept override { return info_; }
+  [[nodiscard]] const BusTraits& traits() const noexcept override { return traits_; }
+  [[nodiscard]] DeviceStatus allocate(const StreamShape& shape) noexcept override;
+  [[nodiscard]] DeviceStatus start(StreamSink* sink) noexcept override;
+  void stop() noexcept override;
+  [[nodiscard]] DeviceStatus reopen() noexcept override;
+  void give_back(FrameSlot slot) noexcept override { memory_->release(slot); }
+  [[nodiscard]] const std::uint8_t* bytes(FrameSlot slot) const noexcept override { return memory_->bytes(slot); }
+  [[nodiscard]] std::string complaint() const override { return complaint_; }
+  [[nodiscard]] std::string remark(const StreamShape& shape, double rate_hz, int sharing) const override;
+
+ private:
+  struct Flight {
+    UsbBus* bus = nullptr;
+    libusb_transfer* transfer = nullptr;
+    FrameSlot slot = 0;
+    bool flying = false;
+  };
+  UsbBus() = default;
+  [[nodiscard]] DeviceStatus open_device(std::string_view wanted);
+  [[nodiscard]] DeviceStatus claim(libusb_device_handle* handle);
+  void close_device() noexcept;
+  void drop_memory() noexcept;
+  [[nodiscard]] int submit(Flight* flight) noexcept;
+  void completed(Flight* flight) noexcept;
+  void filled(Flight* flight) noexcept;
+  void land(Flight* flight) noexcept;
+  void lose() noexcept;
+  void handle_events() noexcept;
+  static void on_transfer(libusb_transfer* transfer);
+
+  libusb_context* context_ = nullptr;
+  libusb_device_handle* handle_ = nullptr;
+  int interface_ = -1;
+  unsigned char endpoint_ = 0;
+  DeviceInfo info_{};
+  BusTraits traits_{};
+  ConfigRom rom_{};
+  std::string complaint_;
+
+  StreamShape shape_{};
+  std::size_t transfer_bytes_ = 0;
+  std::unique_ptr<SlotMemory> memory_;
+  bool given_up_ = false;  // transfers never came back: memory_ is never freed
+  std::vector<Flight> flights_;
+  StreamSink* sink_ = nullptr;
+  std::thread thread_;
+  std::atomic<int> flying_{0};
+  std::atomic<bool> stopping_{false}, lost_{false};
+  int errors_ = 0;  // in a row
+};
+
+}  // namespace vergence::iidc

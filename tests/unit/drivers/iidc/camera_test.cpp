@@ -1,0 +1,239 @@
+#include <gtest/gtest.h>
+
+#include <vector>
+
+#include "camera_under_test.hpp"
+
+namespace vergence::test {
+namespace {
+
+class CountingNotifier final : public Notifier {
+ public:
+  void notify() noexcept override { ++told; }
+  int told = 0;
+};
+
+TEST(IidcCamera, FramesCarryCounterStampArrivalAndTheirPixels) {
+  CameraUnderTest c;
+  c.configure();
+  CountingNotifier notifier;
+  ASSERT_EQ(c.camera->start(&notifier), DeviceStatus::ok);
+  EXPECT_TRUE(c.bus->model().transmitting);
+  for (std::uint64_t n = 0; n < 5; ++n) {
+    c.bus->expose(1);
+    const Frame f = c.take();
+    EXPECT_EQ(f.counter, n);
+    EXPECT_EQ(f.status, FrameStatus::complete);
+    EXPECT_EQ(f.exposure, c.actual.exposure);
+    // The camera stamps the end of its exposure, in ticks of 41 ns, and its clock wraps at 128 s.
+    EXPECT_NEAR(static_cast<double>(f.exposure_start.ns()),
+                static_cast<double>((c.bus->camera_now() % iidc::kCycleTimeWrapNs) - c.actual.exposure.ns()), 50);
+    EXPECT_EQ(f.arrival, c.bus->now() + Duration::milliseconds(5));
+    const ImageView view = c.camera->view(f.slot);
+    EXPECT_EQ(view.width, 640);
+    EXPECT_EQ(view.height, 480);
+    EXPECT_EQ(view.data, c.bus->bytes(f.slot)) << "no copy";
+    EXPECT_EQ(view.at(100, 9), (9 + n) & 0xFFU);
+    c.camera->release(f.slot);
+  }
+  EXPECT_EQ(notifier.told, 5);
+  Frame f;
+  EXPECT_EQ(c.camera->wait(Duration{}, &f), DeviceStatus::timeout);
+  const CameraStatistics s = c.camera->statistics();
+  EXPECT_EQ(s.delivered, 5U);
+  EXPECT_EQ(s.lost + s.torn + s.underruns, 0U);
+}
+
+TEST(IidcCamera, StampsGoOnThroughTheWrapOfTheBusClock) {
+  CameraUnderTest c;
+  c.start();
+  DeviceStamp last{};
+  for (int i = 0; i < 60; ++i) {  // 100 s … 160 s of the camera's clock
+    c.bus->expose(1, Duration::seconds(1.0));
+    const Frame f = c.take_and_release();
+    if (i > 0) {
+      EXPECT_NEAR(static_cast<double>((f.exposure_start - last).ns()), 1e9, 82) << i;
+    }
+    last = f.exposure_start;
+  }
+}
+
+TEST(IidcCamera, LostExposuresAreCountedWhenALaterOneComes) {
+  CameraUnderTest c;
+  c.start();
+  c.bus->expose(10, Duration::milliseconds(100), {0, 3, 4, 5, 9});
+  std::vector<std::uint64_t> counters;
+  for (int i = 0; i < 5; ++i) counters.push_back(c.take_and_release().counter);
+  EXPECT_EQ(counters, (std::vector<std::uint64_t>{0, 1, 5, 6, 7}));
+  EXPECT_EQ(c.camera->statistics().lost, 3U);  // what came before the first or after the last is not known
+}
+
+TEST(IidcCamera, SlotsComeBackInAnyOrderAndTheNewestIsDroppedWithoutOne) {
+  CameraUnderTest c;
+  CameraConfiguration wanted = CameraUnderTest::usual();
+  wanted.options["buffers"] = "4";
+  c.configure(wanted);
+  ASSERT_EQ(c.camera->start(nullptr), DeviceStatus::ok);
+  c.bus->expose(7);
+  std::vector<Frame> held;
+  for (Frame f; c.camera->wait(Duration{}, &f) == DeviceStatus::ok;) held.push_back(f);
+  ASSERT_EQ(held.size(), 3U);  // the fourth is on the wire
+  EXPECT_EQ(c.camera->statistics().underruns, 4U);
+  for (std::size_t i = 0; i < held.size(); ++i) {
+    EXPECT_EQ(held[i].counter, i);
+    EXPECT_EQ(c.camera->view(held[i].slot).at(0, 1), 1 + i);
+  }
+  c.camera->release(held[1].slot);
+  c.bus->expose(1);
+  const Frame next = c.take_and_release();
+  EXPECT_EQ(next.counter, 7U);
+  EXPECT_EQ(next.slot, held[1].slot);
+  c.camera->release(held[2].slot);
+  c.camera->release(held[0].slot);
+  EXPECT_EQ(c.camera->statistics().lost, 0U) << "dropped here is not lost on the way";
+}
+
+TEST(IidcCamera, AFrameShortOfBytesIsTornAndKeepsItsNumber) {
+  CameraUnderTest c;
+  c.start();
+  c.bus->expose(1);
+  c.bus->expose_tampered([](auto*, std::size_t* bytes) { *bytes -= 512; });
+  c.bus->expose_tampered([](auto*, std::size_t* bytes) { *bytes = 0; });  // the empty packet that ends a frame
+  c.bus->expose_tampered([](auto*, std::size_t* bytes) { *bytes = 4; });  // nothing to tell its number from
+  c.bus->expose(1);
+  EXPECT_EQ(c.take_and_release().counter, 0U);
+  const Frame torn = c.take_and_release();
+  EXPECT_EQ(torn.status, FrameStatus::torn);
+  EXPECT_EQ(torn.counter, 1U);
+  EXPECT_EQ(c.take_and_release().counter, 4U);
+  const CameraStatistics s = c.camera->statistics();
+  EXPECT_EQ(s.torn, 1U);
+  EXPECT_EQ(s.lost, 2U);
+}
+
+TEST(IidcCamera, ALostPacketIsFoundByTheNextFramesStampInTheImage) {
+  for (const std::size_t lost : {1U, 3U, 100U}) {
+    CameraUnderTest c(true);
+    c.start();
+    c.bus->expose(1);
+    // The receiver fills up with the beginning of the next frame and waits for the start of the one after that.
+    const std::size_t packet = c.bus->shape().packet_bytes, frame = c.bus->shape().frame_bytes;
+    std::vector<std::uint8_t> first;
+    c.bus->expose_tampered([&](std::vector<std::uint8_t>* image, std::size_t* bytes) {
+      first = *image;
+      *bytes = 0;
+    });
+    c.bus->expose_tampered([&](std::vector<std::uint8_t>* image, std::size_t*) {
+      const std::vector<std::uint8_t> second = *image;
+      *image = first;
+      const std::size_t keep = frame - lost * packet, hole = packet * 5;
+      std::copy(first.begin() + static_cast<std::ptrdiff_t>(hole + lost * packet), first.end(),
+                image->begin() + static_cast<std::ptrdiff_t>(hole));
+      std::copy(second.begin(), second.begin() + static_cast<std::ptrdiff_t>(lost * packet),
+                image->begin() + static_cast<std::ptrdiff_t>(keep));
+    });
+    c.bus->expose(1);
+    EXPECT_EQ(c.take_and_release().status, FrameStatus::complete);
+    const Frame torn = c.take_and_release();
+    EXPECT_EQ(torn.status, FrameStatus::torn) << lost;
+    EXPECT_EQ(torn.counter, 1U);
+    const Frame good = c.take_and_release();
+    EXPECT_EQ(good.status, FrameStatus::complete);
+    EXPECT_EQ(good.counter, 3U);
+    EXPECT_EQ(c.camera->statistics().lost, 1U);
+  }
+}
+
+TEST(IidcCamera, TheSameOptionSaysWhichInstantIsStamped) {
+  std::vector<std::int64_t> starts;
+  for (const char* at : {"start", "middle", "end"}) {
+    CameraUnderTest c;
+    CameraConfiguration wanted = CameraUnderTest::usual();
+    wanted.options["stamp_at"] = at;
+    c.configure(wanted);
+    ASSERT_EQ(c.camera->start(nullptr), DeviceStatus::ok);
+    c.bus->expose(1);
+    starts.push_back(c.take_and_release().exposure_start.ns());
+  }
+  EXPECT_NEAR(static_cast<double>(starts[0] - starts[1]), 2.5e6, 2);
+  EXPECT_NEAR(static_cast<double>(starts[0] - starts[2]), 5e6, 2);
+}
+
+TEST(IidcCamera, SixteenBitPixelsBecomeGreyInSlotsOfTheirOwn) {
+  CameraUnderTest c;
+  CameraConfiguration wanted = CameraUnderTest::usual();
+  wanted.pixel_format = "Mono16";
+  wanted.options["buffers"] = "5";
+  c.configure(wanted);
+  ASSERT_EQ(c.camera->start(nullptr), DeviceStatus::ok);
+  c.bus->expose(7);
+  EXPECT_EQ(c.camera->statistics().underruns, 2U);
+  for (std::uint64_t n = 0; n < 5; ++n) {
+    const Frame f = c.take();
+    EXPECT_EQ(f.counter, n);
+    const ImageView view = c.camera->view(f.slot);
+    EXPECT_EQ(view.at(639, 479), (479 + n) & 0xFFU);
+    EXPECT_EQ(view.stride % 64, 0);
+  }
+}
+
+TEST(IidcCamera, ARestartCountsFromZeroAndForgetsWhatWasUnderWay) {
+  CameraUnderTest c;
+  c.start();
+  c.bus->expose(3);
+  const Frame held = c.take();
+  c.camera->stop();
+  EXPECT_FALSE(c.bus->model().transmitting);
+  Frame f;
+  EXPECT_EQ(c.camera->wait(Duration::milliseconds(1), &f), DeviceStatus::stopped);
+  EXPECT_EQ(c.camera->configure(CameraUnderTest::usual(), nullptr), DeviceStatus::busy) << "an image is held";
+  EXPECT_EQ(c.camera->view(held.slot).at(0, 1), 1) << "still there";
+  ASSERT_EQ(c.camera->start(nullptr), DeviceStatus::ok);
+  EXPECT_EQ(c.camera->configure(CameraUnderTest::usual(), nullptr), DeviceStatus::busy) << "streaming";
+  c.bus->expose(1);
+  EXPECT_EQ(c.take_and_release().counter, 0U);
+  c.camera->release(held.slot);
+  EXPECT_EQ(c.camera->statistics().starts, 2U);
+  EXPECT_EQ(c.camera->statistics().lost, 0U);
+}
+
+TEST(IidcCamera, TheSoftwareTriggerFiresOnceACall) {
+  CameraUnderTest c;
+  CameraConfiguration wanted = CameraUnderTest::usual();
+  wanted.trigger = CameraTrigger::software;
+  c.configure(wanted);
+  EXPECT_EQ(c.camera->trigger_once(), DeviceStatus::stopped);
+  ASSERT_EQ(c.camera->start(nullptr), DeviceStatus::ok);
+  EXPECT_EQ(c.camera->trigger_once(), DeviceStatus::ok);
+  EXPECT_EQ(c.bus->model().software_triggers, 1U);
+  EXPECT_EQ(iidc::TriggerMode::of(c.bus->command(iidc::reg::kTriggerMode)).source, iidc::kTriggerSourceSoftware);
+  CameraUnderTest free;
+  free.start();
+  EXPECT_EQ(free.camera->trigger_once(), DeviceStatus::unsupported);
+}
+
+TEST(IidcCamera, WithoutEmbeddedInformationFramesAreCountedAsTheyCome) {
+  CameraUnderTest c;
+  CameraConfiguration wanted = CameraUnderTest::usual();
+  wanted.options["embedded"] = "no";
+  c.configure(wanted);
+  ASSERT_EQ(c.camera->start(nullptr), DeviceStatus::ok);
+  c.bus->expose(3, Duration::milliseconds(100), {1});
+  EXPECT_EQ(c.take_and_release().counter, 0U);
+  const Frame f = c.take_and_release();
+  EXPECT_EQ(f.counter, 1U);
+  EXPECT_EQ(f.exposure_start.ns(), f.arrival.ns() - f.exposure.ns());
+}
+
+TEST(IidcCamera, TimingIsExposureAndTheWay) {
+  CameraUnderTest usb, bus(true);
+  usb.configure();
+  bus.configure();
+  EXPECT_GT(usb.camera->timing().least_delay, usb.actual.exposure);
+  // One packet in each cycle of 125 us, at a rate of 10 Hz spread over nearly all of the period.
+  EXPECT_NEAR(bus.camera->timing().least_delay.to_seconds(), 0.005 + 0.1, 0.002);
+  EXPECT_LT(usb.camera->timing().resolution, Duration::microseconds(1));
+}
+
+}  // namespace
+}  // namespace vergence::test

@@ -1,0 +1,56 @@
+#pragma once
+#include <gtest/gtest.h>
+
+#include <memory>
+#include <string>
+#include <utility>
+
+#include "drivers/iidc/iidc_camera.hpp"
+#include "tests/unit/drivers/iidc/fake_bus.hpp"
+
+namespace vergence::test {
+
+constexpr Duration kPatience = Duration::milliseconds(50);
+
+/// A camera on the register model.
+struct CameraUnderTest {
+  explicit CameraUnderTest(bool isochronous = false, bool beta = false) {
+    auto made = std::make_unique<FakeBus>(isochronous, beta);
+    bus = made.get();
+    const iidc::ConfigRom rom = made->rom();
+    camera = std::make_unique<iidc::IidcCamera>(std::move(made), rom, nullptr, kPatience);
+  }
+  /// 640 x 480 at 10 Hz of its own, 5 ms.
+  [[nodiscard]] static CameraConfiguration usual() { return {640, 480, 10, Duration::milliseconds(5), 0, CameraTrigger::free}; }
+
+  void configure(const CameraConfiguration& c = usual()) {
+    ASSERT_EQ(camera->configure(c, &actual), DeviceStatus::ok) << camera->complaint();
+  }
+  void start() {
+    configure();
+    ASSERT_EQ(camera->start(nullptr), DeviceStatus::ok) << camera->complaint();
+  }
+  /// The next frame, which must be there.
+  Frame take() {
+    Frame f;
+    EXPECT_EQ(camera->wait(Duration{}, &f), DeviceStatus::ok);
+    return f;
+  }
+  Frame take_and_release() {
+    const Frame f = take();
+    camera->release(f.slot);
+    return f;
+  }
+  /// What configure() answers; its sentence in *said.
+  DeviceStatus refuse(const CameraConfiguration& c, std::string* said) {
+    const DeviceStatus s = camera->configure(c, nullptr);
+    *said = camera->complaint();
+    return s;
+  }
+
+  FakeBus* bus = nullptr;
+  std::unique_ptr<iidc::IidcCamera> camera;
+  CameraConfiguration actual{};
+};
+
+}  // namespace vergence::test

@@ -1,0 +1,203 @@
+#include <gtest/gtest.h>
+
+#include "camera_under_test.hpp"
+
+namespace vergence::test {
+namespace {
+
+using namespace iidc;
+
+void expect_says(const std::string& sentence, std::initializer_list<const char*> parts) {
+  for (const char* part : parts) EXPECT_NE(sentence.find(part), std::string::npos) << '"' << part << "\" in: " << sentence;
+}
+
+TEST(IidcConfigure, AFixedModeIsTakenWhereSizeAndRateAreItsOwn) {
+  CameraUnderTest c;
+  CameraConfiguration wanted = CameraUnderTest::usual();
+  wanted.rate_hz = 30;
+  c.configure(wanted);
+  EXPECT_EQ(c.bus->command(reg::kVideoFormat), 0U << 29U);
+  EXPECT_EQ(c.bus->command(reg::kVideoMode), 5U << 29U);
+  EXPECT_EQ(c.bus->command(reg::kFrameRate), 4U << 29U);
+  EXPECT_EQ(c.actual.rate_hz, 30);
+  EXPECT_EQ(c.actual.pixel_format, "Mono8");
+  EXPECT_EQ(c.bus->shape().packet_bytes, 1280U);
+  EXPECT_EQ(c.bus->shape().frame_bytes, 640U * 480U);
+}
+
+TEST(IidcConfigure, AHigherFixedRateServesTriggers) {
+  CameraUnderTest c;
+  CameraConfiguration wanted = CameraUnderTest::usual();
+  wanted.rate_hz = 20;
+  wanted.trigger = CameraTrigger::hardware;
+  c.configure(wanted);
+  EXPECT_EQ(c.bus->command(reg::kFrameRate), 4U << 29U);  // 30 Hz
+  EXPECT_EQ(c.actual.rate_hz, 20);
+  const TriggerMode t = TriggerMode::of(c.bus->command(reg::kTriggerMode));
+  EXPECT_TRUE(t.on && t.rising);
+  EXPECT_EQ(t.mode, 14U);  // full rate
+  EXPECT_EQ(t.source, 0U);
+  EXPECT_FALSE(FeatureValue::of(c.bus->command(reg::feature_value(Feature::frame_rate))).on);
+}
+
+TEST(IidcConfigure, AnyOtherRateOrRegionIsFormat7WithTheSmallestPacket) {
+  CameraUnderTest c;
+  CameraConfiguration wanted = CameraUnderTest::usual();
+  wanted.width = 320;
+  wanted.height = 240;
+  wanted.offset_x = 64;
+  wanted.offset_y = 32;
+  c.configure(wanted);
+  EXPECT_EQ(c.bus->command(reg::kVideoFormat), 7U << 29U);
+  EXPECT_EQ(c.bus->model().f7_size, 320U << 16U | 240U);
+  EXPECT_EQ(c.bus->model().f7_position, 64U << 16U | 32U);
+  EXPECT_EQ(c.bus->model().f7_packet, packet_for_rate(320 * 240, 10 * 0.99, 4, 4096));
+  EXPECT_NEAR(c.actual.rate_hz, 10, 1e-6);
+  EXPECT_NEAR(iidc_rate(&c.bus->model()), 10, 0.1);
+  EXPECT_GE(c.bus->shape().frame_bytes, 320U * 240U);
+  EXPECT_FALSE(TriggerMode::of(c.bus->command(reg::kTriggerMode)).on);
+}
+
+TEST(IidcConfigure, MovingALargeRegionNeverLeavesTheSensor) {
+  CameraUnderTest c;
+  CameraConfiguration wanted = CameraUnderTest::usual();
+  wanted.width = 320;
+  wanted.height = 240;
+  wanted.offset_x = 960;
+  wanted.offset_y = 720;
+  c.configure(wanted);
+  wanted.width = 1280;
+  wanted.height = 960;
+  wanted.offset_x = wanted.offset_y = 0;
+  wanted.rate_hz = 5;
+  c.configure(wanted);
+  std::uint32_t x = 0, width = 640;
+  for (const auto& [address, value] : c.bus->written) {
+    if (address == kRegisterSpace + 0xF08008) x = value >> 16U;
+    if (address == kRegisterSpace + 0xF0800C) width = value >> 16U;
+    EXPECT_LE(x + width, 1280U);
+  }
+}
+
+TEST(IidcConfigure, ExposureAndGainAreAbsoluteAndReadBack) {
+  CameraUnderTest c;
+  CameraConfiguration wanted = CameraUnderTest::usual();
+  wanted.exposure = Duration::microseconds(1234);
+  wanted.gain_db = 6.5;
+  c.configure(wanted);
+  EXPECT_FLOAT_EQ(c.bus->model().shutter_abs, 0.001234F);
+  EXPECT_FLOAT_EQ(c.bus->model().gain_abs, 6.5F);
+  EXPECT_NEAR(c.actual.exposure.to_seconds(), 0.001234, 1e-9);
+  const FeatureValue v = FeatureValue::of(c.bus->command(reg::feature_value(Feature::shutter)));
+  EXPECT_TRUE(v.absolute && v.on);
+  EXPECT_FALSE(v.automatic);
+}
+
+TEST(IidcConfigure, TheEmbeddedStampAndCounterAreAskedFor) {
+  CameraUnderTest c;
+  c.configure();
+  EXPECT_EQ(c.bus->model().frame_info, 0x41U);
+  EXPECT_EQ(c.camera->plan().info.size(), 8U);
+  EXPECT_TRUE(c.camera->remark().empty());
+  CameraConfiguration wanted = CameraUnderTest::usual();
+  wanted.options["embedded"] = "no";
+  c.configure(wanted);
+  EXPECT_EQ(c.bus->model().frame_info, 0U);
+  expect_says(c.camera->remark(), {"embeds no counter"});
+}
+
+TEST(IidcConfigure, ACameraWithoutTheVendorsRegistersIsTakenAsItIs) {
+  CameraUnderTest c;
+  c.bus->refused.insert(kRegisterSpace + 0xF00000 + reg::kFrameInfo);
+  c.configure();
+  EXPECT_EQ(c.camera->plan().info.size(), 0U);
+}
+
+TEST(IidcConfigure, StrobeAndTriggerOptionsReachTheirRegisters) {
+  CameraUnderTest c;
+  CameraConfiguration wanted = CameraUnderTest::usual();
+  wanted.trigger = CameraTrigger::hardware;
+  wanted.options = {{"strobe_pin", "2"},         {"strobe_delay_us", "1000"}, {"strobe_duration_us", "2000"}, {"strobe_level", "low"},
+                    {"trigger_edge", "falling"}, {"trigger_source", "1"},     {"trigger_mode", "0"}};
+  c.configure(wanted);
+  const StrobeControl s = StrobeControl::of(c.bus->model().strobe[2]);
+  EXPECT_TRUE(s.on);
+  EXPECT_FALSE(s.high);
+  EXPECT_EQ(s.delay, 1024U);
+  EXPECT_EQ(s.duration, 2048U);
+  const TriggerMode t = TriggerMode::of(c.bus->command(reg::kTriggerMode));
+  EXPECT_FALSE(t.rising);
+  EXPECT_EQ(t.source, 1U);
+  EXPECT_EQ(t.mode, 0U);
+}
+
+TEST(IidcConfigure, TheBusSpeedIsTheCamerasBest) {
+  CameraUnderTest legacy(true, false), beta(true, true);
+  legacy.configure();
+  EXPECT_EQ(legacy.bus->model().iso_speed, 2U);
+  beta.configure();
+  EXPECT_EQ(beta.bus->model().iso_speed, 3U);
+  CameraConfiguration wanted = CameraUnderTest::usual();
+  wanted.options["speed"] = "800";
+  std::string said;
+  EXPECT_EQ(legacy.refuse(wanted, &said), DeviceStatus::unsupported);
+  expect_says(said, {"speed", "S400"});
+  wanted.options["speed"] = "400";
+  beta.configure(wanted);
+  EXPECT_EQ(beta.bus->model().iso_speed, 2U);
+}
+
+TEST(IidcConfigure, WhatCannotBeSaysWhatTheCameraOffers) {
+  CameraUnderTest c(true);
+  std::string said;
+  auto with = [](auto change) {
+    CameraConfiguration wanted = CameraUnderTest::usual();
+    change(wanted);
+    return wanted;
+  };
+  EXPECT_EQ(c.refuse(with([](auto& w) { w.width = 641; }), &said), DeviceStatus::unsupported);
+  expect_says(said, {"641 x 480", "640 x 480 Mono8 at", "1280 x 960 in steps of 8 x 2"});
+  EXPECT_EQ(c.refuse(with([](auto& w) { w.width = 1280, w.height = 960, w.rate_hz = 30; }), &said), DeviceStatus::unsupported);
+  expect_says(said, {"packets of 4096 bytes", "26.58 Hz"});  // S400
+  EXPECT_EQ(c.refuse(with([](auto& w) { w.exposure = Duration::microseconds(3); }), &said), DeviceStatus::unsupported);
+  expect_says(said, {"3 us", "10 to 100000 us"});
+  EXPECT_EQ(c.refuse(with([](auto& w) { w.gain_db = 30; }), &said), DeviceStatus::unsupported);
+  expect_says(said, {"30 dB", "0 to 24 dB"});
+  EXPECT_EQ(c.refuse(with([](auto& w) { w.pixel_format = "RGB8"; }), &said), DeviceStatus::unsupported);
+  expect_says(said, {"RGB8", "Mono8 Mono16 Raw8"});
+  EXPECT_EQ(c.refuse(with([](auto& w) { w.trigger = CameraTrigger::hardware, w.options["trigger_source"] = "3"; }), &said),
+            DeviceStatus::unsupported);
+  expect_says(said, {"input 3", "inputs 0 1", "software", "modes 0 14 15"});
+  EXPECT_EQ(c.refuse(with([](auto& w) { w.options["shutter_mode"] = "x"; }), &said), DeviceStatus::unsupported);
+  expect_says(said, {"shutter_mode", "packet_bytes", "trigger_mode"});
+  EXPECT_EQ(c.refuse(with([](auto& w) { w.options["packet_bytes"] = "1022"; }), &said), DeviceStatus::bad_configuration);
+  expect_says(said, {"1022", "multiple of 4"});
+  EXPECT_EQ(c.refuse(with([](auto& w) { w.options["packet_bytes"] = "256", w.rate_hz = 25; }), &said), DeviceStatus::unsupported);
+  expect_says(said, {"packets of 256 bytes"});
+  EXPECT_EQ(c.refuse(with([](auto& w) { w.exposure = Duration::milliseconds(150); }), &said), DeviceStatus::bad_configuration);
+  expect_says(said, {"150000 us", "10 Hz"});
+}
+
+TEST(IidcConfigure, ARefusedRequestWritesNothing) {
+  CameraUnderTest c;
+  c.configure();
+  c.bus->written.clear();
+  CameraConfiguration wanted = CameraUnderTest::usual();
+  wanted.gain_db = 99;
+  std::string said;
+  EXPECT_EQ(c.refuse(wanted, &said), DeviceStatus::unsupported);
+  EXPECT_TRUE(c.bus->written.empty());
+  EXPECT_EQ(c.camera->start(nullptr), DeviceStatus::ok);
+}
+
+TEST(IidcConfigure, WithoutFormat7ARateBetweenTheFixedOnesBecomesTheNext) {
+  CameraUnderTest c;
+  CameraConfiguration wanted = CameraUnderTest::usual();
+  wanted.options["format7"] = "no";
+  c.configure(wanted);
+  EXPECT_EQ(c.actual.rate_hz, 15);
+  EXPECT_EQ(c.bus->command(reg::kVideoFormat), 0U);
+}
+
+}  // namespace
+}  // namespace vergence::test

@@ -1,0 +1,151 @@
+#include "tests/unit/drivers/iidc/fake_bus.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <cstring>
+
+#include "drivers/iidc/camera_registers.hpp"
+
+namespace vergence::test {
+
+using iidc::CycleTime;
+
+FakeBus::FakeBus(bool isochronous, bool beta) {
+  iidc_init(&model_, 0);
+  if (beta) iidc_init_beta(&model_);
+  traits_ = {isochronous, iidc::BusSpeed::s800, 8192, 53e6};
+}
+
+iidc::ConfigRom FakeBus::rom() {
+  iidc::ConfigRom rom;
+  std::string why;
+  (void)iidc::read_rom(this, &rom, &why);
+  return rom;
+}
+
+std::uint32_t FakeBus::command(std::uint32_t offset) {
+  std::uint32_t value = 0;
+  (void)iidc_read(&model_, iidc::kRegisterSpace + 0xF00000 + offset, &value);
+  return value;
+}
+
+DeviceStatus FakeBus::read(std::uint64_t address, std::uint32_t* value) noexcept {
+  const std::lock_guard lock(mutex_);
+  if (!plugged_) return DeviceStatus::gone;
+  if (all_accesses != DeviceStatus::ok) return all_accesses;
+  if (refused.contains(address) || iidc_read(&model_, address, value) != 0) return DeviceStatus::unsupported;
+  if (const auto it = stuck.find(address); it != stuck.end()) *value |= it->second;
+  return DeviceStatus::ok;
+}
+
+DeviceStatus FakeBus::write(std::uint64_t address, std::uint32_t value) noexcept {
+  const std::lock_guard lock(mutex_);
+  if (!plugged_) return DeviceStatus::gone;
+  if (all_accesses != DeviceStatus::ok) return all_accesses;
+  written.emplace_back(address, value);
+  return refused.contains(address) || iidc_write(&model_, address, value) != 0 ? DeviceStatus::unsupported : DeviceStatus::ok;
+}
+
+DeviceStatus FakeBus::allocate(const iidc::StreamShape& shape) noexcept {
+  shape_ = shape;
+  memory_.allocate(shape.buffers, shape.frame_bytes);
+  return DeviceStatus::ok;
+}
+
+DeviceStatus FakeBus::start(iidc::StreamSink* sink) noexcept {
+  if (!plugged_) return DeviceStatus::gone;
+  if (start_status != DeviceStatus::ok) return start_status;
+  sink_ = sink;
+  stopping_ = false;
+  if (real_time_) thread_ = std::thread([this] { work(); });
+  return DeviceStatus::ok;
+}
+
+void FakeBus::stop() noexcept {
+  stopping_ = true;
+  if (thread_.joinable()) thread_.join();
+  sink_ = nullptr;
+}
+
+DeviceStatus FakeBus::reopen() noexcept {
+  ++reopened_;
+  return plugged_ ? DeviceStatus::ok : DeviceStatus::gone;
+}
+
+void FakeBus::unplug() {
+  plugged_ = false;
+  if (!real_time_ && sink_ != nullptr) sink_->gone(now());
+}
+
+void FakeBus::replug() {
+  const std::lock_guard lock(mutex_);
+  const bool beta = model_.beta;
+  iidc_init(&model_, 0);
+  if (beta) iidc_init_beta(&model_);
+  sensor_ = {};
+  plugged_ = true;
+}
+
+std::vector<std::uint8_t> FakeBus::draw(std::int64_t end_of_exposure) {
+  std::vector<std::uint8_t> image(std::max(iidc_frame_bytes(&model_), shape_.frame_bytes));
+  iidc_draw(&model_, image.data(), static_cast<std::uint64_t>(end_of_exposure), CycleTime::at(end_of_exposure).quadlet());
+  return image;
+}
+
+void FakeBus::deliver(const std::vector<std::uint8_t>& image, std::size_t bytes, HostStamp at) {
+  if (sink_ == nullptr) return;
+  // As the real buses: a free buffer must be there to replace a full one; one is always on the wire.
+  const auto filling = memory_.acquire();
+  if (!filling) return;
+  const auto next = memory_.acquire();
+  bytes = std::min(bytes, shape_.frame_bytes);
+  std::memcpy(memory_.bytes(*filling), image.data(), bytes);
+  const iidc::Arrival a{*filling, memory_.bytes(*filling), bytes, at, false, next.has_value()};
+  if (next) memory_.release(*next);
+  if (!sink_->frame(a)) memory_.release(*filling);
+}
+
+void FakeBus::expose(int count, Duration period, const std::set<int>& lost) {
+  for (int i = 0; i < count; ++i) {
+    elapsed_ += period.ns();
+    if (!model_.transmitting) continue;
+    const auto image = draw(camera_now());
+    if (!lost.contains(i)) deliver(image, shape_.frame_bytes, now() + Duration::milliseconds(5));
+  }
+}
+
+void FakeBus::expose_tampered(const Tamper& tamper, Duration period) {
+  elapsed_ += period.ns();
+  auto image = draw(camera_now());
+  std::size_t bytes = shape_.frame_bytes;
+  tamper(&image, &bytes);
+  deliver(image, bytes, now() + Duration::milliseconds(5));
+}
+
+void FakeBus::work() {
+  while (!stopping_) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    if (!plugged_) {
+      sink_->gone(iidc::monotonic_now());
+      return;
+    }
+    std::vector<std::uint8_t> image;
+    const HostStamp host = iidc::monotonic_now();
+    {
+      const std::lock_guard lock(mutex_);
+      const auto ns = static_cast<std::uint64_t>(host.ns());
+      // A pulse every 20 ms for those that wait for one.
+      const std::uint64_t edge = ns / 20'000'000 != (ns - 1'100'000) / 20'000'000 ? ns / 20'000'000 * 20'000'000 : 0;
+      std::uint64_t begin = 0;
+      if (!iidc_next_frame(&model_, &sensor_, ns, edge, &begin)) continue;
+      image = draw(static_cast<std::int64_t>(begin + static_cast<std::uint64_t>(static_cast<double>(model_.shutter_abs) * 1e9)));
+    }
+    if (lose_ > 0) {
+      --lose_;
+      continue;
+    }
+    deliver(image, shape_.frame_bytes, host);
+  }
+}
+
+}  // namespace vergence::test

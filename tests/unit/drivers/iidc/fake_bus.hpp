@@ -1,0 +1,97 @@
+#pragma once
+#include <array>
+#include <atomic>
+#include <functional>
+#include <map>
+#include <mutex>
+#include <set>
+#include <string>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include "drivers/iidc/bus.hpp"
+#include "drivers/iidc/slot_memory.hpp"
+#include "firmware_iface/iidc/iidc.hpp"
+
+extern "C" {
+#include "tests/rigs/emulators/iidc_model.h"
+}
+
+namespace vergence::test {
+
+/// The register model behind a bus that is nothing but function calls.
+///
+/// Exposures are made by expose() on the caller's thread, which then is the stream's; or, after run(), by a thread in real time.
+/// Its time is virtual: host and camera clock begin at kStart and 100 s, and expose() moves both.
+class FakeBus final : public iidc::CameraBus {
+ public:
+  static constexpr std::int64_t kStart = 5'000'000'000'000;  // ns, host
+  static constexpr std::int64_t kCameraStart = 100'000'000'000;
+
+  explicit FakeBus(bool isochronous = false, bool beta = false);
+  ~FakeBus() override { stop(); }
+
+  // ---- the camera's side ----
+  iidc_camera& model() { return model_; }
+  [[nodiscard]] iidc::ConfigRom rom();
+  /// Makes exposures `period` apart and delivers them, those in `lost` (0: the first of this call) excepted.
+  void expose(int count, Duration period = Duration::milliseconds(100), const std::set<int>& lost = {});
+  /// One exposure whose buffer is changed before it is delivered: what is there, how many bytes of it are said to have come.
+  using Tamper = std::function<void(std::vector<std::uint8_t>* image, std::size_t* bytes)>;
+  void expose_tampered(const Tamper& tamper, Duration period = Duration::milliseconds(100));
+  /// Real time from the next start() on, at the rate that the registers ask for.
+  void run() { real_time_ = true; }
+  void unplug();
+  void replug();
+  void lose(int exposures) { lose_ += exposures; }
+
+  // ---- faults of the registers ----
+  std::map<std::uint64_t, std::uint32_t> stuck;  // address → bits that always read 1
+  std::set<std::uint64_t> refused;               // addresses the camera does not know
+  DeviceStatus all_accesses = DeviceStatus::ok;  // not ok: what every access says
+  std::vector<std::pair<std::uint64_t, std::uint32_t>> written;
+  DeviceStatus start_status = DeviceStatus::ok;
+
+  // ---- CameraBus ----
+  DeviceStatus read(std::uint64_t address, std::uint32_t* value) noexcept override;
+  DeviceStatus write(std::uint64_t address, std::uint32_t value) noexcept override;
+  const DeviceInfo& info() const noexcept override { return info_; }
+  const iidc::BusTraits& traits() const noexcept override { return traits_; }
+  DeviceStatus allocate(const iidc::StreamShape& shape) noexcept override;
+  DeviceStatus start(iidc::StreamSink* sink) noexcept override;
+  void stop() noexcept override;
+  DeviceStatus reopen() noexcept override;
+  void give_back(FrameSlot slot) noexcept override { memory_.release(slot); }
+  const std::uint8_t* bytes(FrameSlot slot) const noexcept override { return memory_.bytes(slot); }
+  std::string complaint() const override { return "the fake bus says so"; }
+  std::string remark(const iidc::StreamShape&, double, int) const override { return {}; }
+
+  [[nodiscard]] HostStamp now() const { return HostStamp(kStart + elapsed_); }
+  [[nodiscard]] std::int64_t camera_now() const { return kCameraStart + elapsed_; }
+  [[nodiscard]] const iidc::StreamShape& shape() const { return shape_; }
+  [[nodiscard]] int reopened() const { return reopened_; }
+  [[nodiscard]] std::uint32_t command(std::uint32_t offset);
+
+ private:
+  void deliver(const std::vector<std::uint8_t>& image, std::size_t bytes, HostStamp at);
+  std::vector<std::uint8_t> draw(std::int64_t end_of_exposure);
+  void work();
+
+  iidc_camera model_{};
+  iidc_sensor sensor_{};
+  std::mutex mutex_;  // of the model, in real time
+  DeviceInfo info_{"iidc-fake", "0205a9000000c000", "register model", "this process"};
+  iidc::BusTraits traits_{};
+  iidc::StreamShape shape_{};
+  iidc::SlotMemory memory_;
+  std::atomic<bool> plugged_{true}, stopping_{false};
+  bool real_time_ = false;
+  std::atomic<int> lose_{0};
+  std::int64_t elapsed_ = 0;
+  int reopened_ = 0;
+  iidc::StreamSink* sink_ = nullptr;
+  std::thread thread_;
+};
+
+}  // namespace vergence::test

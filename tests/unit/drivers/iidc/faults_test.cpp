@@ -1,0 +1,164 @@
+#include <gtest/gtest.h>
+
+#include "camera_under_test.hpp"
+
+namespace vergence::test {
+namespace {
+
+using namespace iidc;
+constexpr std::uint64_t kCommand = kRegisterSpace + 0xF00000, kFormat7 = kRegisterSpace + 0xF08000;
+constexpr Duration kSlack = Duration::milliseconds(300);  // of a busy machine
+
+TEST(IidcFaults, ARegisterThatNeverBecomesReadyEndsInTime) {
+  CameraUnderTest c;
+  c.bus->stuck[kFormat7 + reg::format7::kValueSetting] = reg::format7::kValueApply;
+  const HostStamp begun = monotonic_now();
+  EXPECT_EQ(c.camera->configure(CameraUnderTest::usual(), nullptr), DeviceStatus::timeout);
+  EXPECT_GE(monotonic_now() - begun, kPatience);
+  EXPECT_LE(monotonic_now() - begun, kPatience + kSlack);
+  EXPECT_EQ(c.camera->complaint(), "register 0xf0807c did not become ready in time");
+  EXPECT_EQ(c.camera->start(nullptr), DeviceStatus::bad_configuration);
+  c.bus->stuck.clear();
+  c.start();
+}
+
+TEST(IidcFaults, ASoftwareTriggerThatStaysBusyEndsInTime) {
+  CameraUnderTest c;
+  CameraConfiguration wanted = CameraUnderTest::usual();
+  wanted.trigger = CameraTrigger::software;
+  c.configure(wanted);
+  ASSERT_EQ(c.camera->start(nullptr), DeviceStatus::ok);
+  c.bus->stuck[kCommand + reg::kSoftwareTrigger] = bit(31);
+  const HostStamp begun = monotonic_now();
+  EXPECT_EQ(c.camera->trigger_once(), DeviceStatus::timeout);
+  EXPECT_LE(monotonic_now() - begun, kPatience + kSlack);
+  EXPECT_FALSE(c.camera->complaint().empty());
+}
+
+TEST(IidcFaults, ARegionThatTheCameraRefusesIsToldAsSuch) {
+  CameraUnderTest c;
+  c.bus->stuck[kFormat7 + reg::format7::kValueSetting] = reg::format7::kErrorRegion;
+  EXPECT_EQ(c.camera->configure(CameraUnderTest::usual(), nullptr), DeviceStatus::unsupported);
+  EXPECT_NE(c.camera->complaint().find("refuses the region 640 x 480"), std::string::npos) << c.camera->complaint();
+  c.bus->stuck[kFormat7 + reg::format7::kValueSetting] = reg::format7::kErrorPacket;
+  EXPECT_EQ(c.camera->configure(CameraUnderTest::usual(), nullptr), DeviceStatus::unsupported);
+  EXPECT_NE(c.camera->complaint().find("refuses packets"), std::string::npos) << c.camera->complaint();
+}
+
+TEST(IidcFaults, EveryRegisterMayRefuseAndNothingHangsOrCrashes) {
+  CameraUnderTest probe;
+  probe.start();
+  probe.camera->stop();
+  std::set<std::uint64_t> used;
+  for (const auto& [address, value] : probe.bus->written) used.insert(address);
+  for (std::uint32_t offset = 0; offset < 0x900; offset += 4) used.insert(kCommand + offset);
+  for (std::uint32_t offset = 0; offset < 0x80; offset += 4) used.insert(kFormat7 + offset);
+  for (const std::uint64_t address : used) {
+    CameraUnderTest c;
+    c.bus->refused.insert(address);
+    const DeviceStatus status = c.camera->configure(CameraUnderTest::usual(), nullptr);
+    EXPECT_TRUE(status == DeviceStatus::ok || status == DeviceStatus::unsupported) << std::hex << address << ' ' << to_string(status);
+    EXPECT_EQ(status == DeviceStatus::ok, c.camera->complaint().empty()) << std::hex << address;
+  }
+}
+
+TEST(IidcFaults, RegistersFullOfNonsenseGiveAStatus) {
+  for (const std::uint32_t pattern : {0xFFFF'FFFFU, 0x7F80'0001U, 0xAAAA'AAAAU, 0x8000'0000U})
+    for (std::uint32_t first = 0x100; first < 0x900; first += 0x40) {
+      CameraUnderTest c;
+      for (std::uint32_t offset = first; offset < first + 0x40; offset += 4) c.bus->stuck[kCommand + offset] = pattern;
+      (void)c.camera->configure(CameraUnderTest::usual(), nullptr);
+      (void)c.camera->start(nullptr);
+      c.bus->expose(2);
+      c.camera->stop();
+    }
+}
+
+TEST(IidcFaults, AnUnpluggedCameraIsGoneAfterWhatWasUnderWayAndComesBackAsConfigured) {
+  CameraUnderTest c;
+  c.start();
+  c.bus->expose(2);
+  c.bus->unplug();
+  c.bus->expose(1);  // nothing follows
+  EXPECT_EQ(c.take_and_release().counter, 0U);
+  const Frame held = c.take();
+  Frame f;
+  EXPECT_EQ(c.camera->wait(Duration::milliseconds(20), &f), DeviceStatus::gone);
+  EXPECT_EQ(f.arrival, c.bus->now() - Duration::milliseconds(100));
+  EXPECT_EQ(c.camera->wait(Duration{}, &f), DeviceStatus::gone);
+  EXPECT_EQ(c.camera->start(nullptr), DeviceStatus::gone);
+  EXPECT_EQ(c.camera->wait(Duration{}, &f), DeviceStatus::gone);
+  EXPECT_EQ(c.camera->view(held.slot).at(0, 1), 2) << "an image that is held stays";
+  c.bus->replug();
+  EXPECT_FALSE(c.bus->model().transmitting);
+  ASSERT_EQ(c.camera->start(nullptr), DeviceStatus::ok) << c.camera->complaint();
+  EXPECT_EQ(c.bus->model().format, 7U) << "all registers are written anew";
+  EXPECT_EQ(c.bus->reopened(), 2);
+  c.bus->expose(1);
+  EXPECT_EQ(c.take_and_release().counter, 0U);
+  c.camera->release(held.slot);
+}
+
+TEST(IidcFaults, ACameraUnpluggedWhileStoppedIsGoneAtTheNextStart) {
+  CameraUnderTest c;
+  c.start();
+  c.camera->stop();
+  c.bus->unplug();
+  EXPECT_EQ(c.camera->start(nullptr), DeviceStatus::gone);
+  Frame f;
+  EXPECT_EQ(c.camera->wait(Duration{}, &f), DeviceStatus::stopped);
+  c.bus->replug();
+  EXPECT_EQ(c.camera->start(nullptr), DeviceStatus::ok);
+}
+
+TEST(IidcFaults, ACameraThatDoesNotAnswerIsGoneAndNotWaitedFor) {
+  CameraUnderTest c;
+  c.configure();
+  c.bus->all_accesses = DeviceStatus::timeout;
+  EXPECT_EQ(c.camera->start(nullptr), DeviceStatus::gone);
+  EXPECT_NE(c.camera->complaint().find("did not become ready"), std::string::npos);
+  c.bus->all_accesses = DeviceStatus::ok;
+  EXPECT_EQ(c.camera->start(nullptr), DeviceStatus::ok);
+}
+
+TEST(IidcFaults, ABusWithoutRoomSaysSoAndLeavesTheCameraQuiet) {
+  CameraUnderTest c;
+  c.configure();
+  c.bus->start_status = DeviceStatus::no_bandwidth;
+  EXPECT_EQ(c.camera->start(nullptr), DeviceStatus::no_bandwidth);
+  EXPECT_FALSE(c.bus->model().transmitting);
+  EXPECT_FALSE(c.camera->complaint().empty());
+  Frame f;
+  EXPECT_EQ(c.camera->wait(Duration{}, &f), DeviceStatus::stopped);
+  c.bus->start_status = DeviceStatus::ok;
+  EXPECT_EQ(c.camera->start(nullptr), DeviceStatus::ok);
+}
+
+TEST(IidcFaults, AStreamOutOfStepEndsAndBeginsAnew) {
+  CameraUnderTest c;
+  c.start();
+  c.bus->expose(1);
+  (void)c.take_and_release();
+  for (int i = 0; i < IidcCamera::kStrays; ++i)
+    c.bus->expose_tampered(
+        [](std::vector<std::uint8_t>* image, std::size_t*) { std::rotate(image->begin(), image->begin() + 4096, image->end()); });
+  Frame f;
+  EXPECT_EQ(c.camera->wait(Duration{}, &f), DeviceStatus::gone);
+  ASSERT_EQ(c.camera->start(nullptr), DeviceStatus::ok);
+  c.bus->expose(1);
+  EXPECT_EQ(c.take_and_release().status, FrameStatus::complete);
+}
+
+TEST(IidcFaults, ACounterThatBeginsAnewIsFollowedAfterTwoFrames) {
+  CameraUnderTest c;
+  c.start();
+  c.bus->expose(5);
+  for (int i = 0; i < 5; ++i) (void)c.take_and_release();
+  c.bus->model().frames_made = 0;  // the camera rebooted by itself
+  c.bus->expose(3);
+  EXPECT_EQ(c.take_and_release().counter, 5U);
+  EXPECT_EQ(c.take_and_release().counter, 6U);
+}
+
+}  // namespace
+}  // namespace vergence::test

@@ -1,0 +1,53 @@
+#include "drivers/iidc/firewire_nodes.hpp"
+
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <fstream>
+
+#include "tests/support/temporary_folder.hpp"
+#include "tests/unit/drivers/iidc/fake_bus.hpp"
+
+namespace vergence::iidc {
+namespace {
+namespace fs = std::filesystem;
+
+void add_node(const fs::path& root, const std::string& card, const std::string& name, const std::vector<std::uint32_t>& rom) {
+  const fs::path real = root / "devices" / card / name;
+  fs::create_directories(real);
+  fs::create_directories(root / "bus/firewire/devices");
+  fs::create_symlink(real, root / "bus/firewire/devices" / name);
+  std::ofstream out(real / "config_rom", std::ios::binary);
+  for (const std::uint32_t q : rom)
+    for (int shift = 24; shift >= 0; shift -= 8) out.put(static_cast<char>(q >> shift));
+}
+
+std::vector<std::uint32_t> model_rom(unsigned index) {
+  iidc_camera c{};
+  iidc_init(&c, index);
+  return {c.rom, c.rom + c.rom_length};
+}
+
+TEST(FirewireNodes, CamerasAreTheNodesWhoseRomSaysSo) {
+  const test::TemporaryFolder folder;
+  EXPECT_FALSE(has_firewire(folder.path()));
+  EXPECT_TRUE(list_firewire_cameras(folder.path()).empty());
+  add_node(folder.path(), "card0", "fw0", {0x04040000, 0x31333934, 0, 0, 1, 0});  // the card itself
+  add_node(folder.path(), "card0", "fw2", model_rom(1));
+  add_node(folder.path(), "card0", "fw1", model_rom(0));
+  add_node(folder.path(), "card1", "fw4", model_rom(2));
+  add_node(folder.path(), "card0", "fw1.0", model_rom(0));                // a unit, not a node
+  add_node(folder.path(), "card0", "fw3", std::vector<std::uint32_t>{});  // a node that did not tell
+  EXPECT_TRUE(has_firewire(folder.path()));
+  const auto nodes = list_firewire_cameras(folder.path());
+  ASSERT_EQ(nodes.size(), 3U);
+  EXPECT_EQ(nodes[0].device, "/dev/fw1");
+  EXPECT_EQ(nodes[1].device, "/dev/fw2");
+  EXPECT_EQ(nodes[2].device, "/dev/fw4");
+  EXPECT_EQ(nodes[0].bus, nodes[1].bus);
+  EXPECT_NE(nodes[0].bus, nodes[2].bus);
+  EXPECT_STREQ(nodes[0].rom.model.data(), "Emulated IIDC 0");
+}
+
+}  // namespace
+}  // namespace vergence::iidc

@@ -1,0 +1,120 @@
+#include "drivers/iidc/frame_reader.hpp"
+
+#include <gtest/gtest.h>
+
+#include <vector>
+
+#include "core/math/random.hpp"
+#include "drivers/iidc/bus_ledger.hpp"
+
+namespace vergence::iidc {
+namespace {
+
+CameraPlan plan() {
+  CameraPlan p;
+  p.shape = {640 * 8, 640 * 8, 640, BusSpeed::s400, 4};
+  p.info = FrameInfoLayout::of(0x8000'0041);
+  p.exposure = Duration::milliseconds(2);
+  p.rate_hz = 10;
+  p.trigger = CameraTrigger::free;
+  return p;
+}
+
+/// A picture of noise with number and stamp.
+std::vector<std::uint8_t> image(std::uint32_t counter, std::int64_t camera_ns, Random* random) {
+  std::vector<std::uint8_t> out(640 * 8);
+  for (auto& b : out) b = static_cast<std::uint8_t>(random->below(256));
+  const std::uint32_t stamp = CycleTime::at(camera_ns).quadlet();
+  for (unsigned i = 0; i < 4; ++i) {
+    out[i] = static_cast<std::uint8_t>(stamp >> (24 - 8 * i));
+    out[4 + i] = static_cast<std::uint8_t>(counter >> (24 - 8 * i));
+  }
+  return out;
+}
+
+TEST(FrameReader, NoiseIsNeverTakenForTheNextFramesBeginning) {
+  Random random(9);
+  BusLedger ledger;
+  FrameReader reader;
+  const auto clock = ledger.clock("bus");
+  reader.begin(plan(), true, clock.get());
+  for (std::uint32_t n = 0; n < 20'000; ++n) {
+    const auto pixels = image(n, 1'000'000'000 + n * std::int64_t{100'000'000}, &random);
+    Arrival a;
+    a.data = pixels.data();
+    a.bytes = pixels.size();
+    a.at = HostStamp(n * std::int64_t{100'000'000});
+    const ReadFrame f = reader.read(a);
+    ASSERT_TRUE(f.taken);
+    ASSERT_EQ(f.status, FrameStatus::complete) << n;
+    ASSERT_EQ(f.counter, n);
+  }
+}
+
+TEST(FrameReader, AnyBytesGiveAnAnswer) {
+  Random random(10);
+  BusLedger ledger;
+  const auto clock = ledger.clock("bus");
+  for (const std::uint32_t items : {0U, 0x8000'0001U, 0x8000'0040U, 0x8000'0041U, 0x8000'03FFU}) {
+    FrameReader reader;
+    CameraPlan p = plan();
+    p.info = FrameInfoLayout::of(items);
+    reader.begin(p, true, clock.get());
+    std::uint64_t last = 0;
+    bool any = false;
+    for (int n = 0; n < 3000; ++n) {
+      std::vector<std::uint8_t> bytes(random.below(3) == 0 ? random.below(60) : 640 * 8);
+      for (auto& b : bytes) b = static_cast<std::uint8_t>(random.below(4) == 0 ? random.below(256) : 0);
+      Arrival a;
+      a.data = bytes.data();
+      a.bytes = bytes.size();
+      a.at = HostStamp(n * std::int64_t{10'000'000});
+      const ReadFrame f = reader.read(a);
+      if (!f.taken) continue;
+      ASSERT_TRUE(!any || f.counter > last);
+      any = true;
+      last = f.counter;
+    }
+  }
+}
+
+TEST(FrameReader, BusStampsTellGapsWhereNothingIsEmbedded) {
+  FrameReader reader;
+  CameraPlan p = plan();
+  p.info = {};
+  reader.begin(p, true, nullptr);
+  const std::vector<std::uint8_t> pixels(640 * 8);
+  std::uint64_t missing = 0, last = 0;
+  for (const int k : {0, 1, 2, 5, 6, 8}) {
+    Arrival a;
+    a.data = pixels.data();
+    a.bytes = pixels.size();
+    a.has_bus_stamp = true;
+    a.bus_stamp = HostStamp(k * std::int64_t{100'000'000} + k % 2 * 125'000);
+    a.at = a.bus_stamp + Duration::milliseconds(80);
+    const ReadFrame f = reader.read(a);
+    missing += f.missing;
+    last = f.counter;
+  }
+  EXPECT_EQ(missing, 3U);
+  EXPECT_EQ(last, 8U);
+}
+
+TEST(BusLedger, CamerasOfOneBusShareItsRoomAndItsClock) {
+  BusLedger ledger;
+  const int a = 0, b = 0;
+  const BusShare large{6680, BusSpeed::s800, 1280 * 960};
+  ledger.put(&a, "card0", large);
+  EXPECT_EQ(ledger.complaint("card0"), "");
+  ledger.put(&b, "card0", large);
+  EXPECT_NE(ledger.complaint("card0").find("6692 of the bus's 4915"), std::string::npos);
+  EXPECT_EQ(ledger.complaint("card1"), "");
+  ledger.put(&b, "card1", large);
+  EXPECT_EQ(ledger.complaint("card0"), "");
+  ledger.remove(&a);
+  EXPECT_EQ(ledger.clock("card0"), ledger.clock("card0"));
+  EXPECT_NE(ledger.clock("card0"), ledger.clock("card1"));
+}
+
+}  // namespace
+}  // namespace vergence::iidc
