@@ -35,6 +35,11 @@ struct iidc_camera {
 
   /* what the simulated sensor did */
   uint32_t frames_made;
+
+  /* what it looks at: images of one size, 8 bits, one after the other; NULL: a moving pattern */
+  const uint8_t* film;
+  size_t film_bytes;
+  double film_hz;
 };
 
 void iidc_init(struct iidc_camera* c, unsigned index);
@@ -65,7 +70,12 @@ struct iidc_sensor {
  * `edge`: time of an external trigger pulse, or 0. Consumes one-shots and software triggers. */
 bool iidc_next_frame(struct iidc_camera* c, struct iidc_sensor* s, uint64_t ns, uint64_t edge, uint64_t* begin);
 
-/* Draws frame number c->frames_made (a moving pattern), stamps it and counts on.
+/* The camera looks at DIR/camera<INDEX>.raw, image n of all cameras standing from (n - 1/2) / hz to (n + 1/2) / hz after the
+ * exposure of the first frame anybody takes; the last one stays. Modes of another size or depth show the pattern. 0, or -1 with a
+ * message. */
+int iidc_load_film(struct iidc_camera* c, const char* dir, unsigned index, double hz);
+
+/* Draws frame number c->frames_made (the film's image, or a moving pattern), stamps it and counts on.
  * Row 0, from byte 64: "VRGF", frame number (u32), middle of the exposure on CLOCK_MONOTONIC in ns (u64), GUID (u64);
  * all little endian. */
 #define IIDC_STAMP_OFFSET 64

@@ -1,6 +1,6 @@
 /* sim_1394: cameras on the virtual IEEE 1394 bus (/dev/vbus1394).
  *
- *   sim_1394 [--cameras N] [--s800] [--trigger-hz F] [--seconds S] [--ready FILE]
+ *   sim_1394 [--cameras N] [--s800] [--trigger-hz F] [--seconds S] [--ready FILE] [--film DIR] [--film-hz F]
  *
  * Commands on standard input, one a line:
  *   plug N        N cameras on the bus from now on (0 to 3): a bus reset
@@ -191,8 +191,8 @@ static void command(const char* line, uint64_t* edge) {
 }
 
 int main(int argc, char** argv) {
-  double trigger_hz = 0, seconds = 0;
-  const char* ready = NULL;
+  double trigger_hz = 0, seconds = 0, film_hz = 10;
+  const char *ready = NULL, *film = NULL;
   uint64_t start = now_ns(), last_pulse = 0;
   uint8_t* batch = malloc(MAX_BATCH);
   char line[128];
@@ -209,6 +209,10 @@ int main(int argc, char** argv) {
       trigger_hz = atof(value), i++;
     else if (!strcmp(argv[i], "--seconds"))
       seconds = atof(value), i++;
+    else if (!strcmp(argv[i], "--film"))
+      film = value, i++;
+    else if (!strcmp(argv[i], "--film-hz"))
+      film_hz = atof(value), i++;
     else if (!strcmp(argv[i], "--ready"))
       ready = value, i++;
     else
@@ -222,6 +226,7 @@ int main(int argc, char** argv) {
   for (unsigned i = 0; i < VB_MAX_NODES; i++) {
     iidc_init(&nodes[i].camera, i);
     if (s800) iidc_init_beta(&nodes[i].camera);
+    if (i < node_count && film && iidc_load_film(&nodes[i].camera, film, i, film_hz)) return 1;
   }
   bus_clock();
   announce();

@@ -1,7 +1,7 @@
 /* sim_usb_iidc: cameras with the IIDC register map behind USB vendor requests and one bulk endpoint, as Point Grey built
  * them and libdc1394 expects them (1e10:2005).
  *
- *   sim_usb_iidc [--cameras N] [--trigger-hz F] [--seconds S] [--ready FILE]
+ *   sim_usb_iidc [--cameras N] [--trigger-hz F] [--seconds S] [--ready FILE] [--film DIR] [--film-hz F]
  *
  * Registers: control transfers 0xc0/0x40, request 0x7f for the 0xffff page, value and index = low and high half of the
  * lower 32 bits of the address, quadlets little endian. Image: bulk IN 0x81, a short packet at the end of a frame only
@@ -119,7 +119,12 @@ static void command(const char* line, uint64_t* edge) {
   } else if (sscanf(line, "replug %u", &a) == 1 && a < count && units[a].usb.fd < 0) {
     units[a].gone = false;
     units[a].bytes = units[a].sent = 0;
-    iidc_init(&units[a].camera, a);
+    struct iidc_camera fresh;
+    iidc_init(&fresh, a);
+    fresh.film = units[a].camera.film;
+    fresh.film_bytes = units[a].camera.film_bytes;
+    fresh.film_hz = units[a].camera.film_hz;
+    units[a].camera = fresh;
     usb_plug(&units[a].usb);
   } else if (!strncmp(line, "quit", 4)) {
     stop = 1;
@@ -129,8 +134,8 @@ static void command(const char* line, uint64_t* edge) {
 }
 
 int main(int argc, char** argv) {
-  double trigger_hz = 0, seconds = 0;
-  const char* ready = NULL;
+  double trigger_hz = 0, seconds = 0, film_hz = 10;
+  const char *ready = NULL, *film = NULL;
   uint64_t start = now_ns(), last_pulse = 0;
   char line[128];
   size_t filled = 0;
@@ -144,6 +149,10 @@ int main(int argc, char** argv) {
       trigger_hz = atof(value), i++;
     else if (!strcmp(argv[i], "--seconds"))
       seconds = atof(value), i++;
+    else if (!strcmp(argv[i], "--film"))
+      film = value, i++;
+    else if (!strcmp(argv[i], "--film-hz"))
+      film_hz = atof(value), i++;
     else if (!strcmp(argv[i], "--ready"))
       ready = value, i++;
     else
@@ -155,6 +164,7 @@ int main(int argc, char** argv) {
   for (unsigned i = 0; i < count; i++) {
     struct unit* u = &units[i];
     iidc_init(&u->camera, i);
+    if (film && iidc_load_film(&u->camera, film, i, film_hz)) return 1;
     snprintf(u->serial, sizeof u->serial, "%u", 10240000 + i);
     u->usb = (struct usb_device){.device_descriptor = device_descriptor,
                                  .config_descriptor = high_speed,
