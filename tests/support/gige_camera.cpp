@@ -2,6 +2,7 @@
 
 #include <arpa/inet.h>
 #include <poll.h>
+#include <pthread.h>
 #include <sys/eventfd.h>
 #include <sys/socket.h>
 #include <unistd.h>
@@ -74,6 +75,7 @@ class GigeCamera::Impl {
     controller_ = {};
     foreign_ = taken;
     put(kControl, taken ? 2 : 0);
+    acquiring_ = false;  // as whenever its controller changes
   }
   std::uint64_t ticks(HostStamp host) const {
     if (options.tick_frequency == 0) return 0;
@@ -103,9 +105,7 @@ class GigeCamera::Impl {
   GvspFrame make_frame(std::uint64_t number, HostStamp when);
   void follow_registers();
   [[nodiscard]] bool may_write(const sockaddr_in& from, std::uint32_t address) const;
-  [[nodiscard]] std::uint32_t word(std::uint32_t address) const {
-    return address + 4 <= kMemory ? from_wire(&memory_[address]) : 0;
-  }
+  [[nodiscard]] std::uint32_t word(std::uint32_t address) const { return address + 4 <= kMemory ? from_wire(&memory_[address]) : 0; }
   [[nodiscard]] float real(std::uint32_t address) const { return std::bit_cast<float>(word(address)); }
   [[nodiscard]] std::uint32_t payload() const {
     return from_wire(&memory_[width]) * from_wire(&memory_[height]) * (from_wire(&memory_[pixel_format]) >> 16U & 0xFFU) / 8;
@@ -139,6 +139,8 @@ GigeCamera::Impl::Impl(const GigeCameraOptions& o)
   reset();
   answering_ = std::thread([this] { answer(); });
   exposing_ = std::thread([this] { expose(); });
+  (void)pthread_setname_np(answering_.native_handle(), "simulator-c");
+  (void)pthread_setname_np(exposing_.native_handle(), "simulator-x");
 }
 
 GigeCamera::Impl::~Impl() {

@@ -29,7 +29,7 @@ std::string size_text(int width, int height) { return std::to_string(width) + " 
 
 }  // namespace
 
-GigeCamera::GigeCamera(std::unique_ptr<Session> session) : info_(session->info()), session_(std::move(session)) {}
+GigeCamera::GigeCamera(std::unique_ptr<Session> session) : info_(session->info()), session_(std::move(session)), address_(info_.place) {}
 
 GigeCamera::~GigeCamera() {
   stop();
@@ -128,7 +128,7 @@ DeviceStatus GigeCamera::reach() {
   session_.reset();
   DeviceStatus status = DeviceStatus::ok;
   std::string why;
-  session_ = Session::open(info_.place, &status, &why);
+  session_ = Session::open(address_, &status, &why);
   if (session_ == nullptr) return refuse(DeviceStatus::gone, why);
   stale_ = true;
   return DeviceStatus::ok;
@@ -338,7 +338,7 @@ void GigeCamera::supervise() {
         case Handover::State::streaming:
           pause = kFirstPause;
           next_try = now() + pause;
-          if (const std::string why = what_is_wrong(now(), &asked); !why.empty()) lose(why);
+          if (const Trouble trouble = what_is_wrong(now(), &asked); !trouble.why.empty()) lose(trouble);
           break;
         case Handover::State::gone:
           if (now() < next_try) break;
@@ -358,46 +358,52 @@ void GigeCamera::supervise() {
   }
 }
 
-std::string GigeCamera::what_is_wrong(HostStamp at, HostStamp* asked) {
+GigeCamera::Trouble GigeCamera::what_is_wrong(HostStamp at, HostStamp* asked) {
+  static const Trouble kSilent{"the camera does not answer any more", false};
   if (wrong_sizes_.load(std::memory_order_relaxed) >= kWrongSizes)
-    return "the camera sends " + size_text(seen_width_, seen_height_) + " where " + size_text(wanted_.width, wanted_.height) +
-           " was configured; power it off and on";
+    return {"the camera sends " + size_text(seen_width_, seen_height_) + " where " + size_text(wanted_.width, wanted_.height) +
+            " was configured; power it off and on"};
   const std::lock_guard lock(device_);
   if (session_ == nullptr || handover_.state() != Handover::State::streaming) return {};
-  if (session_->lost()) return "the camera does not answer any more";
+  if (session_->lost()) return kSilent;
   const Duration silence = at - HostStamp(heard_ns_.load(std::memory_order_acquire));
   const Duration period = Duration::seconds(1 / wanted_.rate_hz);
   if (wanted_.trigger == CameraTrigger::free && silence > std::max(kLeastSilence, period * 10)) {
-    return session_->in_control() ? "the camera answers, but sends no images; check the firewall, and the MTU on the way"
-                                  : "the camera neither answers nor sends";
+    if (!session_->in_control()) return kSilent;
+    return {"the camera answers, but sends no images; check the firewall, and the MTU on the way"};
   }
   if (wanted_.trigger != CameraTrigger::free && silence > std::max(kAskEvery, period * 3) && at - *asked > kAskEvery) {
     *asked = at;
-    if (!session_->in_control()) return "the camera does not answer any more";
+    if (!session_->in_control()) return kSilent;
   }
   return {};
 }
 
-void GigeCamera::lose(const std::string& why) {
-  (void)refuse(DeviceStatus::gone, why);
+void GigeCamera::lose(const Trouble& trouble) {
+  (void)refuse(DeviceStatus::gone, trouble.why);
   handover_.lose(now());
   const std::lock_guard lock(device_);
-  if (session_ != nullptr) session_->close_stream(!session_->lost());
+  if (session_ != nullptr) session_->close_stream(trouble.reachable);
   stream_ = nullptr;
   session_.reset();
+}
+
+bool GigeCamera::quitting() {
+  const std::lock_guard lock(supervisor_);
+  return quit_;
 }
 
 bool GigeCamera::reopen() {
   const std::lock_guard lock(device_);
   DeviceStatus status = DeviceStatus::ok;
   std::string why;
-  session_ = Session::open(info_.place, &status, &why);
+  session_ = Session::open(address_, &status, &why);
   if (session_ != nullptr && session_->info().serial != info_.serial) session_.reset();
-  if (session_ == nullptr && status == DeviceStatus::not_found)  // with another address, perhaps
+  if (session_ == nullptr && status == DeviceStatus::not_found && !quitting())  // with another address, perhaps
     for (const Found& f : discover())
       if (f.info.serial == info_.serial && session_ == nullptr) session_ = Session::open(f.info.place, &status, &why);
-  if (session_ == nullptr) return false;
-  info_.place = session_->info().place;
+  if (session_ == nullptr || quitting()) return false;
+  address_ = session_->info().place;
   if (apply_again() == DeviceStatus::ok) return true;
   session_.reset();
   return false;

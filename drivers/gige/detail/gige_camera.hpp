@@ -57,13 +57,19 @@ class GigeCamera final : public CameraDevice {
 
   // The supervisor.
   void supervise();
-  [[nodiscard]] std::string what_is_wrong(HostStamp now, HostStamp* asked);
-  void lose(const std::string& why);
+  struct Trouble {
+    std::string why;        // empty: none
+    bool reachable = true;  // it still answers
+  };
+  [[nodiscard]] Trouble what_is_wrong(HostStamp now, HostStamp* asked);
+  void lose(const Trouble& trouble);
+  [[nodiscard]] bool quitting();
   [[nodiscard]] bool reopen();
 
   DeviceInfo info_;
-  mutable std::mutex device_;  // session_
+  mutable std::mutex device_;  // session_, address_
   std::unique_ptr<Session> session_;
+  std::string address_;       // where it was last; info_.place is where it was first
   mutable std::mutex words_;  // complaint_, remark_
   std::string complaint_, remark_;
 

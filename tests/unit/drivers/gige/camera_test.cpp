@@ -1,0 +1,246 @@
+#include <sys/socket.h>
+
+#include <bit>
+#include <cmath>
+
+#include "drivers/gige/detail/link.hpp"
+#include "tests/unit/drivers/gige/gige_bench_rig.hpp"
+
+namespace vergence::test {
+namespace {
+
+namespace reg = gige_register;
+
+float real(std::uint32_t word) { return std::bit_cast<float>(word); }
+
+TEST(GigeCamera, isConfiguredByTheNamesOfEitherGeneration) {
+  for (const bool old_names : {false, true}) {
+    GigeCameraOptions o;
+    o.old_names = old_names;
+    GigeBench b(o);
+    CameraConfiguration c = b.wish();
+    c.width = 160;
+    c.height = 120;
+    c.offset_x = 64;
+    c.offset_y = 32;
+    c.exposure = Duration::microseconds(1234);
+    c.rate_hz = 40;
+    CameraConfiguration actual;
+    ASSERT_EQ(b.camera->configure(c, &actual), DeviceStatus::ok) << b.camera->complaint();
+    EXPECT_EQ(b.reg(reg::width), 160U);
+    EXPECT_EQ(b.reg(reg::height), 120U);
+    EXPECT_EQ(b.reg(reg::offset_x), 64U);
+    EXPECT_EQ(b.reg(reg::offset_y), 32U);
+    EXPECT_FLOAT_EQ(real(b.reg(reg::exposure_time)), 1234.0F);
+    EXPECT_FLOAT_EQ(real(b.reg(reg::frame_rate)), 40.0F);
+    EXPECT_EQ(b.reg(reg::exposure_auto), 0U);
+    EXPECT_EQ(b.reg(reg::gain_auto), 0U);
+    EXPECT_EQ(b.reg(reg::trigger_mode), 0U);
+    EXPECT_EQ(actual.pixel_format, "Mono8");
+    EXPECT_EQ(actual.exposure, Duration::microseconds(1234));
+    EXPECT_EQ(b.camera->info().serial, "UNIT-0");
+    EXPECT_EQ(b.camera->info().place, b.simulator->options().address);
+  }
+}
+
+TEST(GigeCamera, whatItCannotDoIsRefusedWithWhatItOffers) {
+  GigeBench b;
+  b.configure(b.wish());
+  const auto refused = [&](auto&& change, const std::string& word) {
+    CameraConfiguration c = b.wish();
+    change(&c);
+    EXPECT_EQ(b.camera->configure(c, nullptr), DeviceStatus::unsupported) << word;
+    EXPECT_NE(b.camera->complaint().find(word), std::string::npos) << b.camera->complaint();
+  };
+  refused([](auto* c) { c->width = 1920; }, "16 to 320 px");
+  refused([](auto* c) { c->width = 316; }, "steps of 8");
+  refused([](auto* c) { c->pixel_format = "RGB8"; }, "Mono8, Mono12, BayerGB8");
+  refused([](auto* c) { c->gain_db = 48; }, "0 to 24 dB");
+  refused(
+      [](auto* c) {
+        c->rate_hz = 450;
+        c->exposure = Duration::microseconds(100);
+      },
+      "0.5 to 400 Hz");
+  refused([](auto* c) { c->exposure = Duration::microseconds(2); }, "10 to 900000 us");
+  refused(
+      [](auto* c) {
+        c->trigger = CameraTrigger::hardware;
+        c->options["trigger_line"] = "Line7";
+      },
+      "Software, Line1, Line2");
+  refused(
+      [](auto* c) {
+        c->trigger = CameraTrigger::hardware;
+        c->options["trigger_overlap"] = "previous_frame";
+      },
+      "Off, ReadOut");
+  refused([](auto* c) { c->options["feature.Gamma"] = "2"; }, "Gamma");
+  refused([](auto* c) { c->options["packetsize"] = "2"; }, "packet_size");
+  // What was configured before is in force again.
+  b.start();
+  EXPECT_EQ(b.take(3).size(), 3U);
+  EXPECT_EQ(b.reg(reg::width), 320U);
+}
+
+TEST(GigeCamera, hardwareTriggerSetsLineEdgeOverlapAndDelay) {
+  GigeBench b;
+  CameraConfiguration c = b.wish();
+  c.trigger = CameraTrigger::hardware;
+  c.options = {{"trigger_line", "Line2"},
+               {"trigger_edge", "falling"},
+               {"trigger_overlap", "readout"},
+               {"trigger_delay_us", "250"},
+               {"exposure_line", "Line2"}};
+  b.configure(c);
+  EXPECT_EQ(b.reg(reg::trigger_mode), 1U);
+  EXPECT_EQ(b.reg(reg::trigger_source), 2U);
+  EXPECT_EQ(b.reg(reg::trigger_activation), 1U);
+  EXPECT_EQ(b.reg(reg::trigger_overlap), 1U);
+  EXPECT_FLOAT_EQ(real(b.reg(reg::trigger_delay)), 250.0F);
+  EXPECT_EQ(b.reg(reg::line_mode), 1U);
+  EXPECT_EQ(b.reg(reg::line_source), 1U);
+}
+
+TEST(GigeCamera, everyPulseIsOneFrameAndRestIsNoError) {
+  GigeBench b;
+  CameraConfiguration c = b.wish();
+  c.trigger = CameraTrigger::hardware;
+  b.configure(c);
+  b.start();
+  Frame frame;
+  EXPECT_EQ(b.camera->wait(Duration::milliseconds(1500), &frame), DeviceStatus::timeout) << "no pulse, no frame, and still there";
+  for (std::uint64_t n = 100; n < 110; ++n) {
+    b.simulator->pulse(n);
+    ASSERT_EQ(b.take(1).size(), 1U) << n;
+    EXPECT_EQ(b.numbers.back(), n);
+  }
+  EXPECT_EQ(b.camera->trigger_once(), DeviceStatus::unsupported);
+}
+
+TEST(GigeCamera, softwareTriggersAreFrames) {
+  GigeBench b;
+  CameraConfiguration c = b.wish();
+  c.trigger = CameraTrigger::software;
+  b.configure(c);
+  EXPECT_EQ(b.camera->trigger_once(), DeviceStatus::stopped);
+  b.start();
+  for (std::uint64_t n = 0; n < 10; ++n) {
+    ASSERT_EQ(b.camera->trigger_once(), DeviceStatus::ok) << b.camera->complaint();
+    const auto frames = b.take(1);
+    ASSERT_EQ(frames.size(), 1U);
+    EXPECT_EQ(frames[0].counter, n);
+  }
+}
+
+TEST(GigeCamera, stampsAreTheCamerasClockInNanoseconds) {
+  GigeCameraOptions o;
+  o.tick_frequency = 62'500'000;
+  o.clock_drift_ppm = 0;
+  GigeBench b(o);
+  b.configure(b.wish());
+  b.start();
+  for (const Frame& f : b.take(20)) {
+    // One tick is 16 ns; exposed at a multiple of the period of the host's clock, 2 ms before the first packet.
+    const auto now = static_cast<std::int64_t>(b.simulator->ticks(f.arrival)) * 16;
+    const double age_ms = static_cast<double>(now - f.exposure_start.ns()) * 1e-6;
+    EXPECT_GE(age_ms, 2.0);
+    EXPECT_LT(age_ms, 1000.0);
+    EXPECT_EQ(f.exposure, Duration::milliseconds(2));
+    EXPECT_EQ(f.exposure_start.ns() % 16, 0);
+  }
+  EXPECT_EQ(b.camera->timing().resolution, Duration::nanoseconds(16));
+  EXPECT_GE(b.camera->timing().least_delay, Duration::milliseconds(2));
+}
+
+TEST(GigeCamera, withoutAClockItSaysSoAndStampsByArrival) {
+  GigeCameraOptions o;
+  o.tick_frequency = 0;
+  GigeBench b(o);
+  b.configure(b.wish());
+  EXPECT_NE(b.camera->remark().find("no clock"), std::string::npos) << b.camera->remark();
+  b.start();
+  for (const Frame& f : b.take(5)) EXPECT_EQ(f.exposure_start, DeviceStamp(f.arrival.ns()) - b.camera->timing().least_delay);
+}
+
+TEST(GigeCamera, ptpIsSwitchedOnAndItsStateIsTold) {
+  GigeBench b;
+  CameraConfiguration c = b.wish();
+  c.options["ptp"] = "on";
+  b.configure(c);
+  EXPECT_EQ(b.reg(reg::ptp_enable), 1U);
+  EXPECT_EQ(b.camera->remark().find("PTP"), std::string::npos) << "it is a slave: " << b.camera->remark();
+  EXPECT_EQ(b.camera->timing().resolution, Duration::nanoseconds(1));
+  GigeCameraOptions old;
+  old.old_names = true;
+  GigeBench without(old, 1);
+  EXPECT_EQ(without.camera->configure(c, nullptr), DeviceStatus::unsupported);
+  EXPECT_NE(without.camera->complaint().find("PTP"), std::string::npos);
+}
+
+TEST(GigeCamera, packetSizeAndDelayAreComputedForTheLink) {
+  GigeBench b;
+  CameraConfiguration c = b.wish();
+  c.sharing = 2;
+  c.options["link_mbps"] = "1000";
+  c.options["packet_size"] = "1500";
+  b.configure(c);
+  EXPECT_EQ(b.reg(0xD04) & 0xFFFFU, 1500U);
+  // 13.534 µs of 125 MHz.
+  EXPECT_EQ(b.reg(0xD08), 1692U);
+  c.options["link_mbps"] = "50";
+  EXPECT_EQ(b.camera->configure(c, nullptr), DeviceStatus::unsupported);
+  EXPECT_NE(b.camera->complaint().find("2 cameras of 320 x 240 Mono8 at 50 Hz do not fit on lo of 50 Mbit/s"), std::string::npos)
+      << b.camera->complaint();
+  c.options["packet_size"] = "20000";
+  c.options["link_mbps"] = "1000";
+  b.configure(c);
+  EXPECT_NE(b.camera->remark().find("packets of 16000 bytes instead of 20000"), std::string::npos) << b.camera->remark();
+}
+
+TEST(GigeCamera, widerAndColouredFormatsBecomeGrey) {
+  std::vector<std::uint8_t> words(320 * 240 * 2), mosaic(320 * 240, 80);
+  for (std::size_t i = 0; i < 320 * 240; ++i) {
+    const unsigned value = static_cast<unsigned>(i % 4096);
+    words[2 * i] = static_cast<std::uint8_t>(value);
+    words[2 * i + 1] = static_cast<std::uint8_t>(value >> 8U);
+  }
+  for (const std::string format : {"Mono12", "BayerGB8"}) {
+    GigeCameraOptions o;
+    o.number_images = false;
+    o.images = [&, format](std::uint64_t) { return format == "Mono12" ? words.data() : mosaic.data(); };
+    GigeBench b(o);
+    CameraConfiguration c = b.wish();
+    c.pixel_format = format;
+    b.configure(c);
+    b.start();
+    Frame frame;
+    for (int i = 0; i < 30; ++i) {
+      ASSERT_EQ(b.camera->wait(Duration::seconds(1), &frame), DeviceStatus::ok);
+      const ImageView image = b.camera->view(frame.slot);
+      EXPECT_EQ(image.at(7, 5), format == "Mono12" ? (5 * 320 + 7) >> 4U : 80);
+      EXPECT_EQ(image.at(319, 239), format == "Mono12" ? ((320 * 240 - 1) % 4096) >> 4U : 80);
+      b.camera->release(frame.slot);
+    }
+  }
+}
+
+TEST(GigeCamera, theReceiveBufferIsThereBeforeTheFirstPacket) {
+  GigeBench b;
+  for (const int kib : {64, 150}) {  // below what any system allows
+    CameraConfiguration c = b.wish();
+    c.options["socket_buffer_kb"] = std::to_string(kib);
+    b.configure(c);
+    b.start();
+    const int socket = gige::find_udp_socket(static_cast<std::uint16_t>(b.reg(0xD00)));
+    ASSERT_GE(socket, 0);
+    int bytes = 0;
+    socklen_t length = sizeof bytes;
+    ASSERT_EQ(::getsockopt(socket, SOL_SOCKET, SO_RCVBUF, &bytes, &length), 0);
+    EXPECT_EQ(bytes, 2 * kib * 1024) << "the kernel doubles it";
+    b.camera->stop();
+  }
+}
+
+}  // namespace
+}  // namespace vergence::test

@@ -1,0 +1,77 @@
+#pragma once
+#include <gtest/gtest.h>
+
+#include <chrono>
+#include <memory>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "drivers/gige/gige.hpp"
+#include "tests/support/gige_camera.hpp"
+#include "tests/support/gvsp_sender.hpp"
+
+namespace vergence::test {
+
+/// One simulated camera and the driver's side of it.
+struct GigeBench {
+  explicit GigeBench(GigeCameraOptions options = {}, int k = 0) {
+    options.address = GigeCamera::address(k);
+    options.serial = "UNIT-" + std::to_string(k);
+    if (options.sensor_width == 1280) {
+      options.sensor_width = 320;
+      options.sensor_height = 240;
+    }
+    simulator = std::make_unique<GigeCamera>(options);
+    open();
+  }
+  void open() {
+    DeviceStatus status = DeviceStatus::ok;
+    const auto driver = gige::make_driver();
+    camera = driver->open(simulator->options().address, &status);
+    EXPECT_EQ(status, DeviceStatus::ok) << driver->complaint();
+  }
+
+  [[nodiscard]] CameraConfiguration wish() const {
+    return {simulator->options().sensor_width, simulator->options().sensor_height, 50, Duration::milliseconds(2), 0, CameraTrigger::free};
+  }
+  void configure(const CameraConfiguration& c) { ASSERT_EQ(camera->configure(c, nullptr), DeviceStatus::ok) << camera->complaint(); }
+  void start() { ASSERT_EQ(camera->start(nullptr), DeviceStatus::ok) << camera->complaint(); }
+
+  /// What comes until `count` complete frames came, or a second nothing; all slots given back.
+  std::vector<Frame> take(std::size_t count) {
+    std::vector<Frame> frames;
+    for (std::size_t complete = 0; complete < count;) {
+      Frame frame;
+      if (camera->wait(Duration::seconds(1), &frame) != DeviceStatus::ok) break;
+      complete += frame.status == FrameStatus::complete ? 1 : 0;
+      if (frame.status == FrameStatus::complete) numbers.push_back(number(frame));
+      camera->release(frame.slot);
+      frames.push_back(frame);
+    }
+    return frames;
+  }
+  /// No more exposures; then what was on its way.
+  std::vector<Frame> drain() {
+    simulator->silence(true);
+    std::vector<Frame> frames;
+    for (Frame frame; camera->wait(Duration::milliseconds(400), &frame) == DeviceStatus::ok; frames.push_back(frame)) {
+      if (frame.status == FrameStatus::complete) numbers.push_back(number(frame));
+      camera->release(frame.slot);
+    }
+    return frames;
+  }
+  /// What the image says it is.
+  [[nodiscard]] std::uint64_t number(const Frame& frame) const {
+    std::uint64_t n = 0;
+    for (int i = 7; i >= 0; --i) n = n << 8U | camera->view(frame.slot).at(i, 0);
+    return n;
+  }
+  [[nodiscard]] std::uint32_t reg(std::uint32_t address) const { return simulator->read(address); }
+
+  std::unique_ptr<GigeCamera> simulator;
+  std::unique_ptr<CameraDevice> camera;
+  std::vector<std::uint64_t> numbers;  // of the complete frames taken
+};
+
+}  // namespace vergence::test

@@ -1,0 +1,134 @@
+#include <algorithm>
+#include <set>
+
+#include "tests/unit/drivers/gige/gige_bench_rig.hpp"
+
+namespace vergence::test {
+namespace {
+
+/// Counters of a run against what the simulator did. The counters since start(), the report since the simulator's beginning.
+void expect_equal_accounts(const GigeBench& b, std::size_t taken) {
+  const GigeCameraReport r = b.simulator->report();
+  const CameraStatistics s = b.camera->statistics();
+  EXPECT_EQ(s.delivered, taken);
+  EXPECT_EQ(s.underruns, 0U);
+  EXPECT_EQ(s.delivered - s.torn, r.whole) << "frames that were sent whole";
+  EXPECT_EQ(s.torn, r.torn) << "frames that were sent in part, with their leader";
+  EXPECT_EQ(s.lost, r.headless + r.nothing) << "frames without a leader";
+  EXPECT_EQ(b.numbers.size(), r.whole);
+}
+
+CameraConfiguration many_packets(const GigeBench& b, const char* resend) {
+  CameraConfiguration c = b.wish();
+  c.options["packet_size"] = "600";  // 137 packets a frame
+  c.options["resend"] = resend;
+  return c;
+}
+
+TEST(GigeLoss, lostFramesAreCountedByTheirGap) {
+  GigeBench b;
+  b.configure(b.wish());
+  b.start();
+  std::size_t taken = b.take(5).size();
+  b.simulator->lose_frames(3);
+  taken += b.take(10).size();
+  taken += b.drain().size();
+  EXPECT_EQ(b.camera->statistics().lost, 3U);
+  expect_equal_accounts(b, taken);
+}
+
+TEST(GigeLoss, brokenFramesAreTornAndTheNextOnesWhole) {
+  for (const char* resend : {"off", "on"}) {
+    GigeBench b;
+    b.configure(many_packets(b, resend));
+    b.start();
+    std::size_t taken = b.take(5).size();
+    b.simulator->tear_frames(4);
+    const auto frames = b.take(15);
+    EXPECT_EQ(std::count_if(frames.begin(), frames.end(), [](const Frame& f) { return f.status == FrameStatus::torn; }), 4);
+    taken += frames.size() + b.drain().size();
+    EXPECT_EQ(b.camera->statistics().lost, 0U);
+    expect_equal_accounts(b, taken);
+  }
+}
+
+TEST(GigeLoss, everyPacketLostAtRandomIsInTheAccounts) {
+  for (const std::uint64_t seed : {1, 2}) {
+    GigeCameraOptions o;
+    o.seed = seed;
+    GigeBench b(o);
+    b.configure(many_packets(b, "off"));
+    b.start();
+    std::size_t taken = b.take(3).size();
+    b.simulator->set_loss(0.01);  // a quarter of the frames comes through
+    taken += b.take(12).size();
+    b.simulator->set_loss(0);
+    taken += b.take(3).size();
+    taken += b.drain().size();
+    EXPECT_GT(b.camera->statistics().torn, 12U);
+    expect_equal_accounts(b, taken);
+  }
+}
+
+TEST(GigeLoss, withResendNoFrameIsLostAtHalfAPercent) {
+  GigeBench b;
+  b.configure(many_packets(b, "auto"));
+  b.start();
+  std::size_t taken = b.take(3).size();
+  b.simulator->set_loss(0.005);  // half of the frames lose a packet
+  taken += b.take(100).size();
+  b.simulator->set_loss(0);
+  taken += b.take(3).size() + b.drain().size();
+  const GigeCameraReport r = b.simulator->report();
+  EXPECT_GT(r.dropped, 50U);
+  EXPECT_GE(r.resent, r.dropped);
+  EXPECT_EQ(r.whole, r.exposed);
+  EXPECT_EQ(b.camera->statistics().lost, 0U);
+  EXPECT_EQ(b.camera->statistics().torn, 0U);
+  expect_equal_accounts(b, taken);
+}
+
+TEST(GigeLoss, aCameraThatCannotSendAgainIsNotAsked) {
+  GigeCameraOptions o;
+  o.resend = false;
+  GigeBench b(o);
+  b.configure(many_packets(b, "auto"));
+  b.start();
+  (void)b.take(3);
+  b.simulator->set_loss(0.01);
+  (void)b.take(10);
+  EXPECT_EQ(b.simulator->report().asked, 0U);
+}
+
+TEST(GigeLoss, lateHalvesComeInTimeOrAreTorn) {
+  GigeBench b;
+  CameraConfiguration c = many_packets(b, "off");
+  b.configure(c);
+  b.start();
+  (void)b.take(5);
+  b.simulator->delay_frames(3, Duration::milliseconds(60));  // three periods: after frames that came whole
+  const auto frames = b.take(20);
+  (void)b.drain();
+  const CameraStatistics s = b.camera->statistics();
+  EXPECT_EQ(s.torn + s.lost, 3U);
+  EXPECT_EQ(b.numbers.size() + 3, b.simulator->report().exposed);
+  EXPECT_TRUE(std::is_sorted(frames.begin(), frames.end(), [](const Frame& x, const Frame& y) { return x.counter < y.counter; }));
+}
+
+TEST(GigeLoss, idsWrapAndWideIdsCountOn) {
+  for (const bool wide : {false, true}) {
+    GigeCameraOptions o;
+    o.extended_ids = wide;
+    o.first_block = 65'528;
+    GigeBench b(o);
+    b.configure(b.wish());
+    b.start();
+    const auto frames = b.take(40);
+    ASSERT_EQ(frames.size(), 40U);
+    for (std::size_t i = 0; i < frames.size(); ++i) EXPECT_EQ(frames[i].counter, i) << (wide ? "64-bit" : "16-bit");
+    EXPECT_EQ(b.camera->statistics().lost, 0U);
+  }
+}
+
+}  // namespace
+}  // namespace vergence::test

@@ -1,0 +1,251 @@
+#include <gtest/gtest.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <map>
+#include <string>
+#include <vector>
+
+#include "drivers/gige/detail/block_counter.hpp"
+#include "drivers/gige/detail/grey.hpp"
+#include "drivers/gige/detail/handover.hpp"
+#include "drivers/gige/detail/link.hpp"
+#include "drivers/gige/detail/options.hpp"
+#include "drivers/gige/gige.hpp"
+
+namespace vergence::gige {
+namespace {
+
+TEST(GigeBlocks, sixteenBitIdsSkipZeroWhenTheyWrap) {
+  BlockCounter blocks;
+  std::uint64_t id = 65'533, expected = 0;
+  for (int i = 0; i < 200'000; ++i, ++expected, id = id == 65'535 ? 1 : id + 1) {
+    const auto step = blocks.next(id);
+    ASSERT_TRUE(step) << id;
+    ASSERT_EQ(step->counter, expected);
+    ASSERT_EQ(step->missing, 0U);
+  }
+}
+
+TEST(GigeBlocks, gapsAreCountedAcrossTheWrap) {
+  BlockCounter blocks;
+  EXPECT_EQ(blocks.next(65'530)->counter, 0U);
+  const auto step = blocks.next(3);  // 65531 … 65535, 1, 2 are missing
+  EXPECT_EQ(step->counter, 8U);
+  EXPECT_EQ(step->missing, 7U);
+}
+
+TEST(GigeBlocks, wideIdsDoNotWrap) {
+  BlockCounter blocks;
+  EXPECT_EQ(blocks.next(65'534)->counter, 0U);
+  EXPECT_EQ(blocks.next(65'535)->counter, 1U);
+  EXPECT_EQ(blocks.next(65'536)->counter, 2U);
+  EXPECT_EQ(blocks.next(65'540)->missing, 3U);
+  EXPECT_EQ(blocks.next(0x1'0000'0000U)->counter, 0x1'0000'0000U - 65'534);
+}
+
+TEST(GigeBlocks, lateAndRepeatedAndZeroAreNoFrames) {
+  BlockCounter blocks;
+  EXPECT_FALSE(blocks.next(0));
+  EXPECT_TRUE(blocks.next(10));
+  EXPECT_TRUE(blocks.next(12));
+  EXPECT_FALSE(blocks.next(11));
+  EXPECT_FALSE(blocks.next(12));
+  EXPECT_FALSE(blocks.next(0));
+  EXPECT_FALSE(blocks.next(65'535)) << "just before 1: old, not 65523 ahead";
+  EXPECT_EQ(blocks.next(13)->counter, 3U);
+}
+
+constexpr std::int64_t kGigabit = 1'000'000'000;
+constexpr Duration kComputed = Duration::nanoseconds(-1);
+
+TEST(GigeLink, theDelayLeavesRoomForTheOtherCameras) {
+  const LinkLoad two{1280 * 960, 30, 2, false};
+  // (2 − 1) · (1500 + 38) · 8 / 10⁹ = 12.304 µs, and 10 % more.
+  EXPECT_NEAR(plan_link(two, 1500, kGigabit, kComputed).delay.to_seconds(), 13.53e-6, 1e-8);
+  EXPECT_NEAR(plan_link(two, 9000, kGigabit, kComputed).delay.to_seconds(), 79.53e-6, 1e-8);
+  EXPECT_EQ(plan_link({1280 * 960, 30, 1, false}, 1500, kGigabit, kComputed).delay, Duration{}) << "alone on its link";
+  EXPECT_EQ(plan_link(two, 1500, 0, kComputed).delay, Duration{}) << "the loopback has no speed";
+  EXPECT_EQ(plan_link(two, 1500, kGigabit, Duration::microseconds(5)).delay, Duration::microseconds(5));
+}
+
+TEST(GigeLink, aGigabitCarriesTwoCamerasOf1280By960At30HzAndNotAt45) {
+  for (const int size : {1500, 9000}) {
+    EXPECT_LT(plan_link({1280 * 960, 30, 2, false}, size, kGigabit, kComputed).share, kMostOfPeriod) << size;
+    EXPECT_GT(plan_link({1280 * 960, 45, 2, false}, size, kGigabit, kComputed).share, kMostOfPeriod) << size;
+    const double most = highest_rate({1280 * 960, 45, 2, false}, size, kGigabit);
+    EXPECT_GT(most, 38) << size;
+    EXPECT_LT(most, 45) << size;
+  }
+}
+
+TEST(GigeLink, packetsFitInterfaceCameraAndStep) {
+  EXPECT_EQ(choose_packet_size(0, 1500, 576, 16'000, 4), 1500);
+  EXPECT_EQ(choose_packet_size(0, 65'536, 576, 16'000, 4), 9000) << "what switches carry";
+  EXPECT_EQ(choose_packet_size(0, 9000, 576, 8192, 4), 8192);
+  EXPECT_EQ(choose_packet_size(0, 1501, 577, 9000, 4), 1501);
+  EXPECT_EQ(choose_packet_size(0, 1503, 577, 9000, 4), 1501);
+  EXPECT_EQ(choose_packet_size(16'000, 65'536, 576, 16'000, 4), 16'000);
+  EXPECT_EQ(choose_packet_size(9000, 1500, 576, 16'000, 4), 1500) << "never fragmented";
+}
+
+TEST(GigeLink, theLoopbackIsFoundByItsAddress) {
+  const Interface lo = interface_of("127.0.0.1");
+  EXPECT_EQ(lo.name, "lo");
+  EXPECT_GE(lo.mtu, 1500);
+  EXPECT_TRUE(interface_of("203.0.113.77").name.empty());
+  EXPECT_TRUE(interface_of("nonsense").name.empty());
+}
+
+TEST(GigeLink, aReceiveBufferIsReadBack) {
+  const int fd = ::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
+  ASSERT_GE(fd, 0);
+  EXPECT_EQ(set_receive_buffer(fd, 100'000), 100'000);
+  ::close(fd);
+  EXPECT_EQ(find_udp_socket(1), -1);
+}
+
+TEST(GigeOptions, everyRowOfTheTableIsUnderstood) {
+  const std::map<std::string, std::string> all{{"packet_size", "1500"},
+                                               {"packet_delay_us", "12.5"},
+                                               {"link_mbps", "1000"},
+                                               {"link_cameras", "2"},
+                                               {"packet_socket", "on"},
+                                               {"resend", "off"},
+                                               {"frame_retention_ms", "20"},
+                                               {"socket_buffer_kb", "8192"},
+                                               {"buffers", "16"},
+                                               {"trigger_line", "Line2"},
+                                               {"trigger_edge", "falling"},
+                                               {"trigger_overlap", "readout"},
+                                               {"trigger_delay_us", "10"},
+                                               {"exposure_mode", "trigger_width"},
+                                               {"exposure_line", "Line3"},
+                                               {"stamp_at", "end"},
+                                               {"ptp", "on"},
+                                               {"heartbeat_ms", "5000"},
+                                               {"feature.BlackLevel", "3"}};
+  EXPECT_EQ(all.size(), option_rows().size());
+  Options o;
+  EXPECT_EQ(parse_options(all, &o), "");
+  EXPECT_EQ(o.packet_size, 1500);
+  EXPECT_EQ(o.packet_delay, Duration::nanoseconds(12'500));
+  EXPECT_EQ(o.link_speed, kGigabit);
+  EXPECT_EQ(o.resend, Options::Resend::off);
+  EXPECT_EQ(o.socket_buffer, 8192 * 1024);
+  EXPECT_TRUE(o.packet_socket && o.ptp && o.stamp_at_end);
+  ASSERT_EQ(o.features.size(), 1U);
+  EXPECT_EQ(o.features[0].first, "BlackLevel");
+}
+
+TEST(GigeOptions, whatIsNotUnderstoodIsNamedWithWhatThereIs) {
+  Options o;
+  EXPECT_NE(parse_options({{"packet_sise", "1500"}}, &o).find("packet_size"), std::string::npos);
+  for (const auto& [name, value] : std::map<std::string, std::string>{{"packet_size", "ten"},
+                                                                      {"packet_delay_us", "nan"},
+                                                                      {"buffers", "3"},
+                                                                      {"heartbeat_ms", "1e9"},
+                                                                      {"link_cameras", "1.5"},
+                                                                      {"resend", "perhaps"},
+                                                                      {"trigger_edge", ""},
+                                                                      {"feature.", "1"}})
+    EXPECT_NE(parse_options({{name, value}}, &o).find(name), std::string::npos) << name;
+}
+
+TEST(GigeGrey, theCheapestFormatIsTaken) {
+  EXPECT_STREQ(choose_format({"Mono16", "BayerRG8", "Mono8"}, "")->name, "Mono8");
+  EXPECT_STREQ(choose_format({"RGB8", "Mono16", "BayerRG8"}, "")->name, "BayerRG8");
+  EXPECT_STREQ(choose_format({"Mono16", "Mono8"}, "Mono16")->name, "Mono16");
+  EXPECT_EQ(choose_format({"Mono16", "Mono8"}, "Mono12"), nullptr);
+  EXPECT_EQ(choose_format({"RGB8"}, ""), nullptr);
+}
+
+TEST(GigeGrey, wordsKeepTheirHighestEightBits) {
+  const std::vector<std::uint8_t> words{0xFF, 0x0F, 0x10, 0x00, 0x00, 0x08, 0xEF, 0x0A};  // 4095, 16, 2048, 2799
+  std::vector<std::uint8_t> out(2 * 64, 7);
+  to_grey(*choose_format({"Mono12"}, ""), words.data(), 2, 2, out.data(), 64);
+  EXPECT_EQ(out[0], 255);
+  EXPECT_EQ(out[1], 1);
+  EXPECT_EQ(out[64], 128);
+  EXPECT_EQ(out[65], 174);
+  EXPECT_EQ(out[2], 7) << "padding is not touched";
+}
+
+TEST(GigeGrey, aMosaicOfOneColourHasNoGrid) {
+  // Red 200, green 100, blue 40 everywhere: (200 + 2 · 100 + 40) / 4 at every pixel, the border too.
+  constexpr int kW = 10, kH = 8;
+  std::vector<std::uint8_t> mosaic(kW * kH), out(kW * kH);
+  for (int y = 0; y < kH; ++y)
+    for (int x = 0; x < kW; ++x) mosaic[static_cast<std::size_t>(y * kW + x)] = (x + y) % 2 == 1 ? 100 : y % 2 == 0 ? 200 : 40;
+  to_grey(*choose_format({"BayerRG8"}, ""), mosaic.data(), kW, kH, out.data(), kW);
+  for (const std::uint8_t v : out) EXPECT_EQ(v, 110);
+}
+
+TEST(GigeHandover, slotsOutAreLimitedAndComeBack) {
+  Handover h;
+  h.set_slots(6, 3);
+  Frame frame;
+  EXPECT_EQ(h.wait(Duration{}, &frame), DeviceStatus::stopped);
+  h.begin(nullptr);
+  h.count_start();
+  for (FrameSlot s = 0; s < 3; ++s) {
+    frame.slot = s;
+    EXPECT_TRUE(h.offer(frame));
+  }
+  frame.slot = 3;
+  EXPECT_FALSE(h.offer(frame));
+  EXPECT_EQ(h.statistics().underruns, 1U);
+  EXPECT_EQ(h.wait(Duration{}, &frame), DeviceStatus::ok);
+  EXPECT_EQ(frame.slot, 0);
+  EXPECT_TRUE(h.any_out());
+  h.release(0);
+  EXPECT_FALSE(h.any_out());
+  FrameSlot back = 9;
+  EXPECT_TRUE(h.returned(&back));
+  EXPECT_EQ(back, 0);
+  EXPECT_FALSE(h.returned(&back));
+  frame.slot = 3;
+  EXPECT_TRUE(h.offer(frame));
+  EXPECT_EQ(h.statistics().delivered, 1U);
+}
+
+TEST(GigeHandover, aNewBeginningKeepsOnlyWhatTheConsumerHolds) {
+  Handover h;
+  h.set_slots(4, 4);
+  h.begin(nullptr);
+  Frame frame;
+  for (FrameSlot s = 0; s < 4; ++s) {
+    frame.slot = s;
+    EXPECT_TRUE(h.offer(frame));
+  }
+  ASSERT_EQ(h.wait(Duration{}, &frame), DeviceStatus::ok);  // 0, kept
+  ASSERT_EQ(h.wait(Duration{}, &frame), DeviceStatus::ok);  // 1, given back
+  h.release(1);
+  h.end();
+  EXPECT_EQ(h.wait(Duration{}, &frame), DeviceStatus::stopped) << "2 and 3 are of the stream before";
+  EXPECT_FALSE(h.offer(frame));
+  h.begin(nullptr);
+  EXPECT_EQ(h.wait(Duration{}, &frame), DeviceStatus::timeout);
+  EXPECT_TRUE(h.is_out(0));
+  for (FrameSlot s = 1; s < 4; ++s) EXPECT_FALSE(h.is_out(s)) << s;
+}
+
+TEST(GigeHandover, whatWasOfferedIsHandedOutBeforeGone) {
+  Handover h;
+  h.set_slots(4, 4);
+  h.begin(nullptr);
+  Frame frame;
+  EXPECT_TRUE(h.offer(frame));
+  h.lose(HostStamp(77));
+  EXPECT_EQ(h.wait(Duration::seconds(1), &frame), DeviceStatus::ok);
+  EXPECT_EQ(h.wait(Duration::seconds(1), &frame), DeviceStatus::gone);
+  EXPECT_EQ(frame.arrival, HostStamp(77));
+  h.ready_again();
+  EXPECT_EQ(h.state(), Handover::State::back);
+  EXPECT_EQ(h.wait(Duration::seconds(1), &frame), DeviceStatus::gone) << "until start()";
+  h.end();
+  EXPECT_EQ(h.wait(Duration::seconds(1), &frame), DeviceStatus::stopped);
+}
+
+}  // namespace
+}  // namespace vergence::gige

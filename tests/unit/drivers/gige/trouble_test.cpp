@@ -1,0 +1,140 @@
+#include <sys/prctl.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include "tests/unit/drivers/gige/gige_bench_rig.hpp"
+
+namespace vergence::test {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+double seconds_since(Clock::time_point begin) { return std::chrono::duration<double>(Clock::now() - begin).count(); }
+
+/// Waits for `gone`, releasing what comes; false: not within the limit.
+bool goes(GigeBench* b, double limit_s) {
+  const auto begin = Clock::now();
+  for (Frame frame; seconds_since(begin) < limit_s;) {
+    const DeviceStatus status = b->camera->wait(Duration::milliseconds(100), &frame);
+    if (status == DeviceStatus::gone) return true;
+    if (status == DeviceStatus::ok) b->camera->release(frame.slot);
+  }
+  return false;
+}
+
+TEST(GigeTrouble, whoIsNotThereIsNotFoundInTime) {
+  const auto driver = gige::make_driver();
+  DeviceStatus status = DeviceStatus::ok;
+  const auto begin = Clock::now();
+  EXPECT_EQ(driver->open("NO-SUCH-SERIAL", &status), nullptr);
+  EXPECT_EQ(status, DeviceStatus::not_found);
+  EXPECT_EQ(driver->open(GigeCamera::address(240), &status), nullptr);
+  EXPECT_EQ(status, DeviceStatus::not_found);
+  EXPECT_FALSE(driver->complaint().empty());
+  EXPECT_LT(seconds_since(begin), 8) << "one look of a second, one address that does not answer";
+}
+
+TEST(GigeTrouble, camerasAreFoundByBroadcastAndOpenedBySerial) {
+  GigeCameraOptions o;
+  o.address = GigeCamera::address(200);
+  o.serial = "FIND-" + std::to_string(::getpid() % 100'000);
+  const GigeCamera simulator(o);
+  const auto driver = gige::make_driver();
+  bool found = false;
+  for (const DeviceInfo& d : driver->enumerate()) {
+    if (d.serial != o.serial) continue;
+    found = true;
+    EXPECT_EQ(d.driver, "gige");
+    EXPECT_EQ(d.place, o.address);
+    EXPECT_EQ(d.model, "Vergence Simulator");
+  }
+  if (!found) GTEST_SKIP() << "broadcasts do not come through here; cameras are opened by their address";
+  DeviceStatus status = DeviceStatus::failed;
+  EXPECT_NE(driver->open(o.serial, &status), nullptr) << to_string(status);
+  EXPECT_EQ(status, DeviceStatus::ok);
+}
+
+TEST(GigeTrouble, aCameraOfAnotherProgramIsBusy) {
+  GigeCameraOptions o;
+  o.address = GigeCamera::address(201);
+  GigeCamera simulator(o);
+  simulator.take_control(true);
+  const auto driver = gige::make_driver();
+  DeviceStatus status = DeviceStatus::ok;
+  EXPECT_EQ(driver->open(o.address, &status), nullptr);
+  EXPECT_EQ(status, DeviceStatus::busy);
+  EXPECT_NE(driver->complaint().find("another program"), std::string::npos) << driver->complaint();
+  simulator.take_control(false);
+  EXPECT_NE(driver->open(o.address, &status), nullptr) << "and free again";
+}
+
+TEST(GigeTrouble, aCameraThatSendsNothingIsGoneWithASentenceAndComesBack) {
+  GigeBench b;
+  b.configure(b.wish());
+  b.start();
+  EXPECT_EQ(b.take(3).size(), 3U);
+  b.simulator->silence(true);
+  ASSERT_TRUE(goes(&b, 6));
+  EXPECT_NE(b.camera->complaint().find("sends no images"), std::string::npos) << b.camera->complaint();
+  b.simulator->silence(false);
+  const auto begin = Clock::now();
+  DeviceStatus status = DeviceStatus::gone;
+  while ((status = b.camera->start(nullptr)) == DeviceStatus::gone && seconds_since(begin) < 10)
+    std::this_thread::sleep_for(std::chrono::milliseconds(50));
+  ASSERT_EQ(status, DeviceStatus::ok) << b.camera->complaint();
+  const auto frames = b.take(3);
+  ASSERT_EQ(frames.size(), 3U);
+  EXPECT_EQ(frames[0].counter, 0U);
+  EXPECT_EQ(b.camera->statistics().starts, 2U);
+}
+
+TEST(GigeTrouble, anotherSizeThanConfiguredIsToldAndNeverComplete) {
+  for (const auto& [width, height] : {std::pair{160, 120}, {640, 480}}) {
+    GigeBench b;
+    b.configure(b.wish());
+    b.start();
+    EXPECT_EQ(b.take(3).size(), 3U);
+    const std::size_t whole = b.numbers.size();
+    b.simulator->lie_about_size(width, height);
+    ASSERT_TRUE(goes(&b, 6)) << width;
+    const CameraStatistics s = b.camera->statistics();
+    EXPECT_LE(s.delivered - s.torn, whole + 5) << "what was on its way before";
+    EXPECT_NE(b.camera->complaint().find(std::to_string(width) + " x " + std::to_string(height)), std::string::npos)
+        << b.camera->complaint();
+  }
+}
+
+TEST(GigeTrouble, anUnpluggedCameraThatRestsIsNoticed) {
+  GigeBench b;
+  CameraConfiguration c = b.wish();
+  c.trigger = CameraTrigger::hardware;
+  b.configure(c);
+  b.start();
+  b.simulator->unplug();
+  EXPECT_TRUE(goes(&b, 10)) << "no pulses, so only asking shows it";
+  const auto begin = Clock::now();
+  b.camera->stop();
+  EXPECT_LT(seconds_since(begin), 8) << "stop() waits for one attempt at most";
+}
+
+TEST(GigeTrouble, losingControlToSomebodyElseIsGone) {
+  GigeBench b;
+  b.configure(b.wish());
+  b.start();
+  EXPECT_EQ(b.take(3).size(), 3U);
+  b.simulator->take_control(true);
+  EXPECT_TRUE(goes(&b, 12));
+}
+
+TEST(GigeTrouble, thePacketSocketNeedsPermission) {
+  GigeBench b;
+  CameraConfiguration c = b.wish();
+  c.options["packet_socket"] = "on";
+  b.configure(c);
+  if (::geteuid() == 0) GTEST_SKIP() << "root may open packet sockets";
+  EXPECT_EQ(b.camera->start(nullptr), DeviceStatus::no_permission);
+  EXPECT_NE(b.camera->complaint().find("CAP_NET_RAW"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace vergence::test
