@@ -10,10 +10,27 @@ const char* SyncOptions::validate() const noexcept {
   if (cameras < 1 || cameras > kMaxCameras) return "a rig has one to four cameras";
   if (interval <= Duration{}) return "the interval between two pulses must be positive";
   if (hold <= Duration{}) return "the time a set waits for its images must be positive";
+  if (mode == SyncMode::software && (tolerance <= Duration{} || tolerance * 2 > interval))
+    return "the tolerance must be positive and at most half of the interval between two exposures";
   return nullptr;
 }
 
-RigSynchronizer::RigSynchronizer(const SyncOptions& options) noexcept : options_(options) { assert(options.validate() == nullptr); }
+const char* to_string(SyncProof proof) noexcept {
+  switch (proof) {
+    case SyncProof::counted:
+      return "counted";
+    case SyncProof::unproven:
+      return "unproven";
+    case SyncProof::by_time:
+      return "by_time";
+  }
+  return "";
+}
+
+RigSynchronizer::RigSynchronizer(const SyncOptions& options) noexcept : options_(options) {
+  assert(options.validate() == nullptr);
+  for (Source& s : sources_) s.align = options.align_start;
+}
 
 std::uint64_t RigSynchronizer::number_of(const SyncFrame& frame) noexcept {
   constexpr std::uint64_t kLeap = 100'000;  // pulses: over an hour of silence; a counter that leaps further is broken
@@ -33,6 +50,40 @@ std::uint64_t RigSynchronizer::number_of(const SyncFrame& frame) noexcept {
   return number < 0 ? 0 : static_cast<std::uint64_t>(number);
 }
 
+/// The number of the open set that it fits into, or a new one in the order of time; a number that is out already: too late.
+std::uint64_t RigSynchronizer::number_by_time(const SyncFrame& frame) noexcept {
+  const HostStamp middle = frame.middle.host;
+  const Open *best = nullptr, *newest = nullptr;
+  Duration nearest = options_.tolerance;
+  for (const Open& o : open_) {
+    if (!o.used) continue;
+    if (newest == nullptr || o.set.number > newest->set.number) newest = &o;
+    std::size_t first = 0;
+    while (!o.set.present[first]) ++first;
+    const Duration apart = middle - o.middles[first].host, distance = apart < Duration{} ? -apart : apart;
+    if (distance > nearest) continue;
+    nearest = distance;
+    best = &o;
+  }
+  if (best != nullptr) return best->set.number;
+  if (any_out_ && middle - last_middle_ <= options_.tolerance) return last_out_;
+  if (newest == nullptr && !any_out_) return 0;
+  std::uint64_t reference = last_out_;
+  HostStamp reference_middle = last_middle_;
+  if (newest != nullptr) {
+    std::size_t first = 0;
+    while (!newest->set.present[first]) ++first;
+    reference = newest->set.number;
+    reference_middle = newest->middles[first].host;
+  }
+  const std::int64_t steps = std::llround((middle - reference_middle).to_seconds() / options_.interval.to_seconds());
+  const bool after = middle > reference_middle;
+  const std::int64_t number =
+      static_cast<std::int64_t>(reference) + (after ? std::max<std::int64_t>(steps, 1) : std::min<std::int64_t>(steps, -1));
+  const bool taken = number < 0 || find(static_cast<std::uint64_t>(number)) != nullptr;
+  return taken ? last_out_ : static_cast<std::uint64_t>(number);
+}
+
 RigSynchronizer::Open* RigSynchronizer::find(std::uint64_t number) noexcept {
   for (Open& o : open_)
     if (o.used && o.set.number == number) return &o;
@@ -50,10 +101,12 @@ SyncVerdict RigSynchronizer::offer(const SyncFrame& frame) noexcept {
   assert(frame.camera >= 0 && frame.camera < options_.cameras && open_count_ <= kOpen);
   const auto k = static_cast<std::size_t>(frame.camera);
   now_ = std::max(now_, frame.arrival);
-  const std::uint64_t number = number_of(frame);
+  const bool by_time = options_.mode == SyncMode::software;
+  const std::uint64_t number = by_time ? number_by_time(frame) : number_of(frame);
   if (any_out_ && number <= last_out_) {
     const Gone& g = history_[number % kHistory];
-    const bool given = g.used && g.number == number && g.present[k];
+    const bool of_it = !by_time || frame.middle.host - last_middle_ >= -options_.tolerance;
+    const bool given = of_it && g.used && g.number == number && g.present[k];
     ++(given ? counters_.duplicate : counters_.late)[k];
     return given ? SyncVerdict::duplicate : SyncVerdict::late;
   }
@@ -120,14 +173,36 @@ void RigSynchronizer::emit(Open* open, SyncedSet* set) noexcept {
       ++(sources_[k].here ? counters_.lost : counters_.absent)[k];
     }
   }
+  prove(set);
   ++(set->complete ? counters_.complete : counters_.incomplete);
   if (!set->complete && open_count_ > kOpen) ++counters_.pushed_out;
   counters_.missed += any_out_ ? set->number - last_out_ - 1 : set->number;
   history_[set->number % kHistory] = {set->number, set->present, true};
   any_out_ = true;
   last_out_ = set->number;
+  last_middle_ = set->stamp;
   open->used = false;
   --open_count_;
+}
+
+/// What can be said of a set's togetherness, and whether the pulses have to be found anew.
+void RigSynchronizer::prove(SyncedSet* set) noexcept {
+  if (options_.mode == SyncMode::software) {
+    set->proof = SyncProof::by_time;
+    return;
+  }
+  const bool several = std::count(set->present.begin(), set->present.end(), true) > 1;
+  if (!several) return;
+  if (set->spread * 2 <= options_.interval) {
+    unproven_run_ = 0;
+    return;
+  }
+  set->proof = SyncProof::unproven;
+  ++counters_.unproven;
+  if (!options_.align_start || ++unproven_run_ < kUnproven) return;
+  unproven_run_ = 0;
+  ++counters_.realigned;
+  for (std::size_t k = 1; k < sources_.size(); ++k) sources_[k].align = true;  // to camera 0, whose numbers go on
 }
 
 void RigSynchronizer::absent(int camera) noexcept { sources_[static_cast<std::size_t>(camera)].here = false; }

@@ -10,10 +10,21 @@
 
 namespace vergence {
 
+/// By what images are paired.
+enum class SyncMode : std::uint8_t {
+  counter,   // exposure n of every camera belongs to pulse n
+  software,  // what was exposed within `tolerance` belongs together: nothing makes the cameras expose at once
+};
+
 struct SyncOptions {
   int cameras = 2;                              // 1 … kMaxCameras
   Duration interval{};                          // between two pulses, > 0
   Duration hold = Duration::milliseconds(100);  // an incomplete set waits so long, by the arrivals of others, for its missing images
+  SyncMode mode = SyncMode::counter;
+  Duration tolerance = Duration::milliseconds(2);  // software: between the middles of a set's exposures
+  /// counter: the pulses may have begun before the cameras, so each camera's first exposure is given its pulse by its stamp; and again
+  /// after kUnproven unproven sets in a row.
+  bool align_start = false;
   /// Nothing wrong: nullptr; else a sentence.
   [[nodiscard]] const char* validate() const noexcept;
 };
@@ -27,6 +38,14 @@ struct SyncFrame {
   HostStamp arrival{};
 };
 
+/// How sure it is that a set's images were exposed together.
+enum class SyncProof : std::uint8_t {
+  counted,   // paired by counter, and the stamps agree within half an interval (also: one image only)
+  unproven,  // paired by counter, and the stamps do not agree: a pulse was missed, or a clock is wrong
+  by_time,   // paired by stamp
+};
+[[nodiscard]] const char* to_string(SyncProof) noexcept;
+
 /// The images of one pulse.
 ///
 /// stamp   Camera 0's mid-exposure; without camera 0 the first one's that is there. `spread`: the largest distance of another's to it.
@@ -39,6 +58,7 @@ struct SyncedSet {
   std::array<bool, kMaxCameras> present{};
   std::array<FrameSlot, kMaxCameras> slots{};
   bool complete = false;
+  SyncProof proof = SyncProof::counted;
 };
 
 enum class SyncVerdict : std::uint8_t {
@@ -56,9 +76,11 @@ struct SyncCounters {
   std::array<std::uint64_t, kMaxCameras> duplicate{};
   std::array<std::uint64_t, kMaxCameras> late{};
   std::uint64_t pushed_out = 0;  // of the incomplete: before their time, because more pulses were open than kOpen
+  std::uint64_t unproven = 0;    // sets whose stamps do not agree
+  std::uint64_t realigned = 0;   // times that all cameras' pulses were found by their stamps again
 };
 
-/// Pairs the frames of a rig by their counters: exposure n of every camera belongs to pulse n.
+/// Pairs the frames of a rig: by their counters, or by their stamps.
 ///
 /// A set goes out as soon as every camera that is there has given its image, or has given a later one (its image is lost), or an
 /// image of any camera has arrived `hold` after the set's first one. Sets go out in order of their numbers, each once.
@@ -70,6 +92,7 @@ class RigSynchronizer {
  public:
   static constexpr std::size_t kOpen = 4;      // pulses waiting at most: bounds the latency and the slots held
   static constexpr std::size_t kHistory = 64;  // sets remembered, to tell a duplicate from a late frame
+  static constexpr int kUnproven = 10;         // in a row: the pulses were not found rightly
 
   /// Precondition: options.validate() == nullptr.
   explicit RigSynchronizer(const SyncOptions& options) noexcept;
@@ -109,6 +132,8 @@ class RigSynchronizer {
   };
 
   [[nodiscard]] std::uint64_t number_of(const SyncFrame& frame) noexcept;
+  [[nodiscard]] std::uint64_t number_by_time(const SyncFrame& frame) noexcept;
+  void prove(SyncedSet* set) noexcept;
   [[nodiscard]] Open* oldest() noexcept;
   [[nodiscard]] Open* find(std::uint64_t number) noexcept;
   [[nodiscard]] bool ready(const Open& open) const noexcept;
@@ -121,6 +146,8 @@ class RigSynchronizer {
   std::array<Gone, kHistory> history_{};
   bool any_out_ = false;
   std::uint64_t last_out_ = 0;
+  HostStamp last_middle_{};  // of the set that went out last
+  int unproven_run_ = 0;
   bool timed_ = false;  // a number and its time, to find the pulse of a camera that came back
   std::uint64_t timed_number_ = 0;
   HostStamp timed_middle_{};

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <map>
 #include <set>
 #include <vector>
@@ -241,6 +242,136 @@ TEST(RigSynchronizer, behavesLikeItsShadowUnderRandomLossRepetitionAndDelay) {
     EXPECT_GT(c.complete, 100U);
     EXPECT_GT(c.incomplete, 100U);
   }
+}
+
+TEST(RigSynchronizer, stampsThatDisagreeMakeASetUnproven) {
+  RigSynchronizer sync(options());
+  (void)offer(&sync, frame(0, 0, 0));
+  auto sets = offer(&sync, frame(1, 0, 0));
+  ASSERT_EQ(sets.size(), 1U);
+  EXPECT_EQ(sets[0].proof, SyncProof::counted);
+  (void)offer(&sync, frame(0, 1, 1));
+  sets = offer(&sync, frame(1, 1, 2));  // the same counter, exposed a pulse later
+  ASSERT_EQ(sets.size(), 1U);
+  EXPECT_TRUE(sets[0].complete);
+  EXPECT_EQ(sets[0].proof, SyncProof::unproven);
+  EXPECT_EQ(sync.counters().unproven, 1U);
+  EXPECT_EQ(sync.counters().realigned, 0U) << "the pulses began with the cameras: the counters are right or a trigger was missed";
+}
+
+TEST(RigSynchronizer, camerasThatStartAmidPulsesAreAlignedByTheirStamps) {
+  SyncOptions o = options();
+  o.align_start = true;
+  RigSynchronizer sync(o);
+  (void)offer(&sync, frame(0, 0, 5));  // camera 1 was started three pulses after camera 0
+  (void)offer(&sync, frame(0, 1, 6));
+  (void)offer(&sync, frame(0, 2, 7));
+  (void)offer(&sync, frame(0, 3, 8));
+  const auto sets = offer(&sync, frame(1, 0, 8));
+  ASSERT_FALSE(sets.empty());
+  EXPECT_TRUE(sets.back().complete);
+  EXPECT_EQ(sets.back().number, 3U);
+  EXPECT_EQ(sets.back().proof, SyncProof::counted);
+  EXPECT_EQ(sync.counters().unproven, 0U);
+}
+
+TEST(RigSynchronizer, aStartThatWasFoundWronglyIsFoundAgain) {
+  SyncOptions o = options();
+  o.align_start = true;
+  RigSynchronizer sync(o);
+  (void)offer(&sync, frame(0, 0, 0));
+  SyncFrame misled = frame(1, 0, 1);
+  misled.middle.host = middle_of(0);  // the first stamps of a clock that is not known yet
+  (void)offer(&sync, misled);
+  int unproven = 0, counted = 0;
+  for (std::uint64_t n = 1; n < 40; ++n) {
+    auto sets = offer(&sync, frame(0, n, n));
+    SyncFrame other = frame(1, n, n + 1);  // of the next pulse, in truth
+    other.arrival = frame(0, n, n).arrival;
+    EXPECT_NE(sync.offer(other), SyncVerdict::late);
+    for (const SyncedSet& set : drain(&sync)) sets.push_back(set);
+    for (const SyncedSet& set : sets) {
+      unproven += set.proof == SyncProof::unproven ? 1 : 0;
+      counted += set.complete && set.proof == SyncProof::counted ? 1 : 0;
+    }
+  }
+  EXPECT_EQ(unproven, RigSynchronizer::kUnproven);
+  EXPECT_GE(counted, 25);
+  EXPECT_EQ(sync.counters().realigned, 1U);
+}
+
+SyncOptions by_time() {
+  SyncOptions o = options();
+  o.mode = SyncMode::software;
+  o.tolerance = Duration::milliseconds(3);
+  return o;
+}
+
+SyncFrame timed(int camera, std::uint64_t counter, double ms) {
+  SyncFrame f = frame(camera, counter, 0);
+  f.middle.host = middle_of(0) + Duration::seconds(ms * 1e-3);
+  f.arrival = f.middle.host + Duration::milliseconds(10);
+  return f;
+}
+
+TEST(RigSynchronizer, withoutATriggerWhatIsNearInTimeIsPairedAndSaysSo) {
+  RigSynchronizer sync(by_time());
+  // The counters mean nothing: camera 1 has counted 1000 exposures more, and jitters by up to 2.5 ms.
+  Random random(5);
+  int complete = 0;
+  for (std::uint64_t n = 0; n < 200; ++n) {
+    const double at = 50.0 * static_cast<double>(n);
+    (void)offer(&sync, timed(0, n, at));
+    const auto sets = offer(&sync, timed(1, n + 1000, at + random.uniform(-2.5, 2.5)));
+    ASSERT_EQ(sets.size(), 1U) << n;
+    complete += sets[0].complete ? 1 : 0;
+    EXPECT_EQ(sets[0].proof, SyncProof::by_time);
+    EXPECT_EQ(sets[0].number, n);
+    EXPECT_LE(sets[0].spread, Duration::milliseconds(3));
+  }
+  EXPECT_EQ(complete, 200);
+}
+
+TEST(RigSynchronizer, byTimeWhatIsTooFarApartIsNotPaired) {
+  RigSynchronizer sync(by_time());
+  for (std::uint64_t n = 0; n < 20; ++n) {
+    const double at = 50.0 * static_cast<double>(n);
+    (void)sync.offer(timed(0, n, at));
+    for (const SyncedSet& set : drain(&sync)) EXPECT_FALSE(set.complete);
+    (void)sync.offer(timed(1, n, at + 20));
+    for (const SyncedSet& set : drain(&sync)) EXPECT_FALSE(set.complete);
+  }
+  sync.finish();
+  for (const SyncedSet& set : drain(&sync)) EXPECT_FALSE(set.complete);
+  EXPECT_EQ(sync.counters().complete, 0U);
+  EXPECT_EQ(sync.counters().incomplete, 40U);
+}
+
+TEST(RigSynchronizer, byTimeAPauseAndALostImageCostNothingElse) {
+  RigSynchronizer sync(by_time());
+  std::uint64_t complete = 0;
+  std::vector<HostStamp> stamps;
+  const auto take = [&](const SyncFrame& f) {
+    for (const SyncedSet& set : offer(&sync, f)) {
+      complete += set.complete ? 1 : 0;
+      stamps.push_back(set.stamp);
+    }
+  };
+  for (std::uint64_t n = 0; n < 30; ++n) {
+    const double at = n < 15 ? 50.0 * static_cast<double>(n) : 50.0 * static_cast<double>(n) + 5013;  // five seconds of rest
+    take(timed(0, n, at));
+    if (n != 7) take(timed(1, n, at + 1));
+  }
+  EXPECT_EQ(complete, 29U);
+  EXPECT_EQ(sync.counters().lost[1], 1U);
+  EXPECT_TRUE(std::is_sorted(stamps.begin(), stamps.end()));
+  EXPECT_EQ(sync.offer(timed(1, 99, 100)), SyncVerdict::late);
+}
+
+TEST(RigSynchronizer, aToleranceBeyondHalfAnIntervalIsRefused) {
+  SyncOptions o = by_time();
+  o.tolerance = Duration::milliseconds(26);
+  EXPECT_NE(o.validate(), nullptr);
 }
 
 }  // namespace
