@@ -69,7 +69,8 @@ void set_control(const std::string& node, const std::string& key, std::int64_t v
 void loop(const std::string& capture, const std::string& output) {
   set_timings(capture);
   set_timings(output);
-  set_control(output, "loop_video", 1);
+  set_control(capture, "loop_video", 1);
+  set_control(capture, "osd_text_mode", 2);  // else the frame's number is written over the image
 }
 
 VividPlayer::VividPlayer(const std::vector<std::string>& outputs, std::int64_t interval_ns, Draw draw)

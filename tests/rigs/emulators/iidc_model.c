@@ -133,7 +133,8 @@ static double nominal_rate(unsigned code) { return 1.875 * (double)(1u << code);
 /* One packet every 125 us: the packet size of the fixed modes follows from the rate. */
 unsigned iidc_packet_bytes(const struct iidc_camera* c) {
   if (c->format == 7) return c->f7_packet;
-  return (unsigned)((double)iidc_frame_bytes(c) * nominal_rate(c->rate) / 7200.0); /* 240 packets at 30 Hz */
+  /* 240 packets at 30 Hz, 256 for 768 lines: whole parts of lines travel together */
+  return (unsigned)((double)iidc_frame_bytes(c) * nominal_rate(c->rate) / (iidc_height(c) == 768 ? 7680.0 : 7200.0));
 }
 
 double iidc_rate(const struct iidc_camera* c) {

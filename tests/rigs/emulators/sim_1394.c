@@ -6,6 +6,7 @@
  *   plug N        N cameras on the bus from now on (0 to 3): a bus reset
  *   trigger       one external trigger pulse to all cameras
  *   drop C N      the next N frames of camera C are exposed but lost on the wire
+ *   tear C N      the next N frames of camera C lose one packet each, in the middle
  *   mute C 0|1    camera C stops sending / goes on
  *   quit
  * At the end it prints for each camera what was exposed and what was put on the bus.
@@ -34,9 +35,9 @@ struct node {
   size_t bytes, sent;
   uint64_t next_cycle; /* of its next packet */
   struct iidc_sensor sensor;
-  unsigned drop;
-  bool muted;
-  uint64_t exposed, transmitted, overtaken;
+  unsigned drop, tear;
+  bool muted, tearing;
+  uint64_t exposed, transmitted, overtaken, dropped, torn;
 };
 
 static struct node nodes[VB_MAX_NODES];
@@ -130,6 +131,12 @@ static size_t transmit(struct node* n, uint64_t cycle, uint8_t* batch, size_t ro
     size_t bytes = n->bytes - n->sent < packet ? n->bytes - n->sent : packet;
     struct vb_iso iso = {{VB_ISO, (uint32_t)(sizeof iso + packet)}, (uint8_t)c->channel, 0, n->sent == 0, 0, 0};
     size_t whole = (sizeof iso + packet + 7) & ~(size_t)7;
+    if (n->tearing && n->sent >= n->bytes / 2) { /* nobody hears this one */
+      n->tearing = false;
+      n->sent += bytes;
+      n->next_cycle++;
+      continue;
+    }
     if (used + whole > room) break;
     iso.cycle = (uint32_t)(n->next_cycle / 8000 % 8 << 13 | n->next_cycle % 8000);
     memcpy(batch + used, &iso, sizeof iso);
@@ -158,12 +165,18 @@ static size_t advance(struct node* n, uint64_t ns, uint64_t edge, uint8_t* batch
     }
     n->bytes = iidc_frame_bytes(c);
     n->image = realloc(n->image, n->bytes + 64);
-    iidc_draw(c, n->image, begin + shutter / 2, cycle_time(bus_time(begin + shutter / 2)));
+    iidc_draw(c, n->image, begin + shutter / 2, cycle_time(bus_time(begin + shutter))); /* cameras stamp its end */
     n->sent = 0;
+    n->tearing = false;
     n->next_cycle = bus_time(begin + shutter) / 125000 + 1;
     if (n->drop || n->muted) {
       n->drop -= n->drop > 0;
+      n->dropped++;
       n->sent = n->bytes;
+    } else if (n->tear) {
+      n->tear--;
+      n->torn++;
+      n->tearing = true;
     } else {
       n->transmitted++;
     }
@@ -181,6 +194,8 @@ static void command(const char* line, uint64_t* edge) {
     *edge = now_ns();
   } else if (sscanf(line, "drop %u %u", &a, &b) == 2 && a < VB_MAX_NODES) {
     nodes[a].drop = b;
+  } else if (sscanf(line, "tear %u %u", &a, &b) == 2 && a < VB_MAX_NODES) {
+    nodes[a].tear = b;
   } else if (sscanf(line, "mute %u %u", &a, &b) == 2 && a < VB_MAX_NODES) {
     nodes[a].muted = b;
   } else if (!strncmp(line, "quit", 4)) {
@@ -278,8 +293,9 @@ int main(int argc, char** argv) {
   }
   for (unsigned i = 0; i < VB_MAX_NODES; i++)
     if (nodes[i].exposed)
-      printf("sim_1394: camera %u exposed %llu transmitted %llu overtaken %llu missed triggers %llu\n", i,
-             (unsigned long long)nodes[i].exposed, (unsigned long long)nodes[i].transmitted, (unsigned long long)nodes[i].overtaken,
+      printf("sim_1394: camera %u exposed %llu transmitted %llu torn %llu dropped %llu overtaken %llu missed triggers %llu\n", i,
+             (unsigned long long)nodes[i].exposed, (unsigned long long)nodes[i].transmitted, (unsigned long long)nodes[i].torn,
+             (unsigned long long)nodes[i].dropped, (unsigned long long)nodes[i].overtaken,
              (unsigned long long)nodes[i].sensor.missed_edges);
   return 0;
 }

@@ -5,7 +5,8 @@
  *
  * Registers: control transfers 0xc0/0x40, request 0x7f for the 0xffff page, value and index = low and high half of the
  * lower 32 bits of the address, quadlets little endian. Image: bulk IN 0x81, a short packet at the end of a frame only
- * where its size asks for one. Commands on standard input as in sim_1394, and "unplug C", "replug C".
+ * where its size asks for one. Commands on standard input as in sim_1394 ("tear": the frame ends in its middle), and
+ * "unplug C", "replug C".
  */
 #include <fcntl.h>
 #include <poll.h>
@@ -28,9 +29,9 @@ struct unit {
   uint8_t* image;
   size_t bytes, sent;
   struct iidc_sensor sensor;
-  unsigned drop;
-  bool muted, gone, was_transmitting;
-  uint64_t exposed, delivered, overtaken;
+  unsigned drop, tear;
+  bool muted, gone, was_transmitting, tearing;
+  uint64_t exposed, delivered, overtaken, dropped, torn;
 };
 
 static struct unit units[MOST];
@@ -79,13 +80,21 @@ static void expose(struct unit* u, uint64_t ns, uint64_t edge) {
       continue;
     }
     if (u->bytes && u->sent == 0) u->overtaken++; /* nobody fetched the last one */
-    u->bytes = iidc_frame_bytes(c);
+    size_t packet = iidc_packet_bytes(c), image = iidc_frame_bytes(c);
+    u->bytes = packet ? (image + packet - 1) / packet * packet : image; /* whole packets, as over a bus */
     u->image = realloc(u->image, u->bytes);
-    iidc_draw(c, u->image, begin + shutter / 2, cycle_time(begin + shutter / 2));
+    memset(u->image + image, 0, u->bytes - image);
+    iidc_draw(c, u->image, begin + shutter / 2, cycle_time(begin + shutter)); /* cameras stamp its end */
     u->sent = 0;
+    u->tearing = false;
     if (u->drop || u->muted) {
       u->drop -= u->drop > 0;
+      u->dropped++;
       u->bytes = 0;
+    } else if (u->tear) {
+      u->tear--;
+      u->tearing = true;
+      u->bytes = u->bytes / 2 / 512 * 512 + 100; /* a short packet */
     }
     deliver(u);
   }
@@ -98,7 +107,8 @@ static void deliver(struct unit* u) {
   while (u->sent < u->bytes && usb_in_room(&u->usb, 1) >= 0) {
     u->sent += usb_in(&u->usb, 1, u->image + u->sent, u->bytes - u->sent);
     if (u->sent == u->bytes) {
-      u->delivered++;
+      u->delivered += !u->tearing;
+      u->torn += u->tearing;
       u->bytes = u->sent = 0;
       break;
     }
@@ -111,6 +121,8 @@ static void command(const char* line, uint64_t* edge) {
     *edge = now_ns();
   } else if (sscanf(line, "drop %u %u", &a, &b) == 2 && a < count) {
     units[a].drop = b;
+  } else if (sscanf(line, "tear %u %u", &a, &b) == 2 && a < count) {
+    units[a].tear = b;
   } else if (sscanf(line, "mute %u %u", &a, &b) == 2 && a < count) {
     units[a].muted = b;
   } else if (sscanf(line, "unplug %u", &a) == 1 && a < count) {
@@ -222,8 +234,9 @@ int main(int argc, char** argv) {
   for (unsigned i = 0; i < count; i++) {
     usb_unplug(&units[i].usb);
     if (units[i].exposed)
-      printf("sim_usb_iidc: camera %u exposed %llu delivered %llu overtaken %llu\n", i, (unsigned long long)units[i].exposed,
-             (unsigned long long)units[i].delivered, (unsigned long long)units[i].overtaken);
+      printf("sim_usb_iidc: camera %u exposed %llu delivered %llu torn %llu dropped %llu overtaken %llu\n", i,
+             (unsigned long long)units[i].exposed, (unsigned long long)units[i].delivered, (unsigned long long)units[i].torn,
+             (unsigned long long)units[i].dropped, (unsigned long long)units[i].overtaken);
   }
   return 0;
 }
