@@ -17,7 +17,8 @@ using Kind = MonitorVerdict::Kind;
 constexpr double kYawKnown = 0.1 * std::numbers::pi / 180;  // rad: less is `needs_motion`
 constexpr int kPoorFrames = 30;                             // without enough matches that make `needs_texture`
 constexpr int kStandingFrames = 3;                          // in a row over the threshold while standing
-constexpr double kAgrees = 0.5;                             // of the threshold: below, a frame agrees
+constexpr double kStandingFactor = 1.5;  // of the threshold: one frame's few hundred errors are less normal than the sum of many frames'
+constexpr double kAgrees = 0.5;          // of the threshold: below, a frame agrees
 
 void check(bool good, const char* name, const char* range) {
   if (!good) throw std::invalid_argument(std::string("monitor.") + name + " is out of range: allowed is " + range);
@@ -119,7 +120,9 @@ void Monitor::Parts::watch_matches(const MonitorFrame& frame) noexcept {
   standing_over = 0;
   detail::FrameEvidence e;
   e.frame = frame.frame;
+  e.before = frame.before;
   e.evidence.across = across.evidence;
+  e.spread_now = across.spread_now;
   e.spread_life = across.spread_life;
   if (!frame.motion.empty()) {
     const detail::MotionLook motion = looks.motion(reference, frame);
@@ -127,12 +130,13 @@ void Monitor::Parts::watch_matches(const MonitorFrame& frame) noexcept {
   }
   windows.push(e);
   latest = windows.decide();
-  agreed = latest.kind == Kind::quiet && latest.statistic < kAgrees * options.threshold ? agreed + 1 : 0;
+  const bool measured = windows.frames() >= static_cast<std::uint64_t>(options.short_window);
+  agreed = measured && latest.kind == Kind::quiet && latest.statistic < kAgrees * options.threshold ? agreed + 1 : 0;
 }
 
 void Monitor::Parts::watch_standing(const MonitorFrame& frame, const detail::AcrossLook& look) noexcept {
   if (latest.kind != Kind::quiet && standing_over < kStandingFrames) return;  // what moving frames have found stands
-  latest.statistic = windows.single(look.evidence, look.spread_now);
+  latest.statistic = windows.single(look.evidence, look.spread_now) / kStandingFactor;
   if (latest.statistic > options.threshold) {
     if (standing_over++ == 0) standing_from = frame.frame;
     agreed = 0;

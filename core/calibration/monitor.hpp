@@ -11,9 +11,8 @@ namespace vergence::calibration {
 /// Every number a user may change in `monitor:`; the configuration's schema has a row for each field.
 /// What the defaults reach, and the commands that measured it: docs/monitor.md.
 struct MonitorOptions {
-  double threshold =
-      50.0;  // of the statistic (χ² of five with floor) that raises a knock or a drift, 20 … 500: ≥ 80 h between false alarms
-  double bias_px = 0.02;    // px rms a mode: slow error that intrinsics leave in vertical differences and the test must not see, 0 … 1
+  double threshold = 40.0;  // of the statistic that raises a knock or a drift; ≥ 80 h between false alarms, 20 … 500
+  double bias_px = 0.02;    // px rms over the image: slow error of vertical differences that intrinsics leave, to be overlooked, 0 … 1
   int min_matches = 30;     // matches across under which a frame measures nothing (`needs_texture`), 12 … 1000
   int short_window = 3;     // moving frames of the shortest window: large knocks, 1 … 10
   int long_window = 300;    // moving frames of the longest window: drift, 60 … 1800
@@ -28,7 +27,7 @@ struct MonitorOptions {
 /// Searched for in a band wide enough that the calibration in use did not force the answer.
 struct AcrossSighting {
   Vec2 left, right;
-  double sigma_px = 0;      // of one coordinate, > 0; only its ratio between sightings matters, the spread is measured
+  double sigma_px = 0;      // of one coordinate, > 0; a common factor does not matter, the spread is measured
   std::uint32_t track = 0;  // the same number in every frame that sees the same point
 };
 
@@ -48,6 +47,7 @@ struct MonitorFrame {
   std::span<const AcrossSighting> across;
   std::span<const MotionTrack> motion;  // empty in most frames
   Transform T_now_previous{};           // left camera, from the frame before to this one, from the odometry
+  std::uint64_t before = 0;             // number of that earlier frame
   Transform T_now_before{};             // left camera, from `before` to now; read with `motion` only
   Transform T_before_earlier{};         // T_now_previous as it was at `before`
   int expected_across = 0;              // matches a good pair of images would give; 0 where either image is poor by itself
@@ -67,7 +67,8 @@ struct MonitorVerdict {
   bool undecided = false;  // over the threshold, but not yet told what it is: at most a second
   double statistic = 0;    // largest of all windows
   double threshold = 0;    // what it is held against
-  Vec6 offset = Vec6::Zero();  // true minus reference, (φ rad, τ m): R ← Exp(φ) R, t ← t + τ; of the window of `statistic`, or since onset
+  Vec6 offset = Vec6::Zero();  // true minus reference, (φ rad, τ m): R ← Exp(φ) R, t ← t + τ; since the onset, else of the longest window;
+                               // first order
   Mat6 covariance = Mat6::Zero();  // of `offset`; rank 5, the length is not seen
   double lag_frames = 0;           // best estimate over the longest window, frames; meaningless where lag_sigma is infinite
   double lag_sigma = 0;            // frames; infinite: not seen
@@ -84,10 +85,12 @@ struct MonitorVerdict {
 /// each pair of sightings is a point with its covariance, and the two must be one rigid motion apart, which is eliminated; the part
 /// of the sightings that speaks of the epipolar distance is not used again. Over a window of frames
 ///
-///     A = Σ A_f/μ,  g = Σ g_f/μ,  μ = λ + n b²/σ²      λ: spread of whole tracks over the white one, measured; b: MonitorOptions::bias_px
+///     A = Σ A_f/μ,  g = Σ g_f/μ,  μ = λ + n b²/5σ²     λ: spread of whole tracks over the white one, measured; b: MonitorOptions::bias_px
 ///     statistic = gᵀ (A + A C A)⁻¹ g                    C: covariance of the reference; κ held at 0
 ///
-/// Windows of a few to several hundred moving frames; the largest statistic counts. Standing frames are tested one by one.
+/// The same against what the two minutes before the window have shown, whose covariance is smaller than the reference's: small knocks.
+/// Windows of a few to several hundred moving frames; the largest statistic counts. Standing frames are tested one by one, more strictly:
+/// their errors stay.
 ///
 /// Memory   All of it from the arena in the constructor. look() allocates nothing.
 /// Threads  One caller.

@@ -25,6 +25,7 @@ struct MonitorFeed::Parts {
   bool has_earlier = false, has_stamp = false;
   std::size_t stored = 0;
   Stamp last{};
+  std::uint64_t earlier = 0;  // frame
   Transform T_now_earlier{}, T_earlier_previous{};
   double travelled = 0;
 
@@ -39,7 +40,8 @@ struct MonitorFeed::Parts {
     }
     return nullptr;
   }
-  void remember(std::span<const AcrossSighting> across, const Transform& T_now_previous) noexcept {
+  void remember(std::uint64_t frame, std::span<const AcrossSighting> across, const Transform& T_now_previous) noexcept {
+    earlier = frame;
     for (Slot& s : slots) s.used = false;
     stored = 0;
     for (const AcrossSighting& sighting : across.first(std::min(across.size(), capacity))) {
@@ -85,7 +87,7 @@ MonitorFrame MonitorFeed::next(Stamp stamp, std::uint64_t frame, std::span<const
   p.last = stamp;
   p.has_stamp = true;
   if (!p.has_earlier) {
-    p.remember(across, T_now_previous);
+    p.remember(frame, across, T_now_previous);
     return out;
   }
   p.T_now_earlier = T_now_previous * p.T_now_earlier;
@@ -101,10 +103,11 @@ MonitorFrame MonitorFeed::next(Stamp stamp, std::uint64_t frame, std::span<const
   if (!few && p.travelled < kTravel) return out;
   if (p.travelled >= kLeastTravel) {
     out.motion = p.motion.first(n);
+    out.before = p.earlier;
     out.T_now_before = p.T_now_earlier;
     out.T_before_earlier = p.T_earlier_previous;
   }
-  p.remember(across, T_now_previous);
+  p.remember(frame, across, T_now_previous);
   return out;
 }
 

@@ -1,13 +1,13 @@
 #include "core/estimator/estimator.hpp"
 
 #include <algorithm>
+#include <atomic>
 #include <chrono>
 #include <new>
 #include <stdexcept>
 #include <string>
 
-#include <atomic>
-
+#include "core/estimator/rig_keeper.hpp"
 #include "core/estimator/transitions.hpp"
 #include "core/memory/fixed_vector.hpp"
 #include "core/odometry/odometry.hpp"
@@ -17,7 +17,11 @@ namespace {
 
 constexpr int kLostAfter = 3;  // frames without a pose in a row before the state says so
 
-void check(const RigCalibration& rig) {
+constexpr int kConfirmedAfter = 30;  // frames that agree with a calibration from a file
+constexpr int kInStepAfter = 60;     // frames without a sign of the cameras being out of step, before that is over
+
+/// What must be known of a rig. `known`: its transforms too.
+void check(const RigCalibration& rig, bool known) {
   if (rig.cameras < 2 || rig.cameras > kMaxCameras)
     throw std::invalid_argument("a rig of 2 to " + std::to_string(kMaxCameras) + " cameras is needed, this one has " +
                                 std::to_string(rig.cameras));
@@ -27,16 +31,56 @@ void check(const RigCalibration& rig) {
     if (c.width < 64 || c.height < 64 || !(c.fx > 0) || !(c.fy > 0))
       throw std::invalid_argument("camera " + std::to_string(k) +
                                   ": images of at least 64×64 pixels and positive focal lengths are needed");
-    if (k > 0 && !(rig.T_camera_left[i].t.norm() > 1e-3))
+    if (k > 0 && known && !(rig.T_camera_left[i].t.norm() > 1e-3))
       throw std::invalid_argument("camera " + std::to_string(k) + ": its baseline is below a millimetre, no depth can be measured");
   }
+  if (!known && !(rig.baseline > 1e-3))
+    throw std::invalid_argument("the length of the baseline is needed to calibrate from scratch: it sets the scale of everything");
+}
+
+CalibrationCause cause_of(calibration::MonitorVerdict::Kind kind) noexcept {
+  using K = calibration::MonitorVerdict::Kind;
+  switch (kind) {
+    case K::drift:
+      return CalibrationCause::drift;
+    case K::collapse:
+      return CalibrationCause::collapse;
+    case K::out_of_step:
+      return CalibrationCause::out_of_step;
+    case K::knock:
+    case K::quiet:
+      break;
+  }
+  return CalibrationCause::knock;
+}
+
+const char* sentence_of(CalibrationCause cause) noexcept {
+  switch (cause) {
+    case CalibrationCause::from_scratch:
+      return "there is no calibration";
+    case CalibrationCause::knock:
+      return "the rig has changed: a camera was knocked";
+    case CalibrationCause::drift:
+      return "the rig is creeping away from its calibration";
+    case CalibrationCause::collapse:
+      return "left and right hardly match any more: a camera was knocked far off or is out of focus";
+    case CalibrationCause::out_of_step:
+      return "the cameras' images are not of the same instant";
+    case CalibrationCause::requested:
+      return "a new calibration is asked for";
+  }
+  return "";
 }
 
 }  // namespace
 
 struct Estimator::Parts {
-  Parts(const EstimatorOptions& o, const RigCalibration& r, Arena& arena, PairRunner& runner)
-      : options(o), rig(r), odometry(options.odometry, rig, arena, runner) {}
+  Parts(const EstimatorOptions& o, const RigCalibration& r, const RigCalibration& nominal, Arena& arena, PairRunner& runner,
+        BackgroundRunner& solver)
+      : options(o),
+        odometry(options.odometry, r, o.trust != CalibrationTrust::none, arena, runner),
+        keeper(options, r, nominal, arena, solver),
+        confirmed(o.trust != CalibrationTrust::unconfirmed) {}
 
   void transition(Trigger trigger, Stamp stamp) noexcept {
     const Transition* t = find_transition(state, trigger);
@@ -60,36 +104,186 @@ struct Estimator::Parts {
     (void)events.push(e);
   }
 
+  void doubt(CalibrationCause cause, std::uint64_t onset, const RigFrame& frame) noexcept;
+  void watch(const odometry::FrameOutcome& out, const RigFrame& frame) noexcept;
+  void calibrate(const RigFrame& frame) noexcept;
+  void take(const CalibrationDecision& decision, Stamp stamp) noexcept;
+  void follow(const odometry::FrameOutcome& out, const RigFrame& frame) noexcept;
+  void tell_missing(Stamp stamp) noexcept;
+  void grade(const odometry::FrameOutcome& out, PoseSample* sample) const noexcept;
+
   EstimatorOptions options;
-  RigCalibration rig;
   odometry::Odometry odometry;
+  RigKeeper keeper;
   State state = State::initialising;
   Stamp last{};
   bool any = false;
+  bool confirmed;          // the calibration in use is more than a file's word
+  bool undecided = false;  // something is wrong with the rig, and not yet told what
+  int out_of_step = 0;     // frames for which that is still believed
   int without_pose = 0;
+  Reason told_missing = Reason::none;
   std::atomic<bool> requested{false};
-  FixedVector<EstimatorEvent, 8> events;  // a frame raises at most four
+  FixedVector<EstimatorEvent, 16> events;  // a frame raises at most eight
+  FixedVector<CalibrationDecision, 1> decisions;
 };
 
-std::size_t Estimator::memory_needed(const EstimatorOptions& options, const RigCalibration& rig) {
-  check(rig);
-  return odometry::Odometry::memory_needed(options.odometry, rig) + sizeof(Parts) + 2 * kCacheLine;
+void Estimator::Parts::doubt(CalibrationCause cause, std::uint64_t onset, const RigFrame& frame) noexcept {
+  note(EstimatorEvent::Kind::rig_changed, frame.stamp, sentence_of(cause),
+       static_cast<double>(frame.number - std::min(onset, frame.number)));
+  transition(cause == CalibrationCause::requested ? Trigger::requested : Trigger::rig_changed, frame.stamp);
+  keeper.seek(cause, onset, frame.number);
+  odometry.unlink();
 }
 
-Estimator::Estimator(const EstimatorOptions& options, const RigCalibration& rig, const RigCalibration& /*nominal*/, Arena& arena,
-                     PairRunner& runner, BackgroundRunner& /*solver*/) {
-  check(rig);
+/// What the monitors say of a frame posed with the calibration in use.
+void Estimator::Parts::watch(const odometry::FrameOutcome& out, const RigFrame& frame) noexcept {
+  using K = calibration::MonitorVerdict::Kind;
+  const calibration::MonitorVerdict v = keeper.watch(odometry, out, frame);
+  undecided = v.undecided;
+  if (v.kind == K::out_of_step) {
+    if (out_of_step == 0) note(EstimatorEvent::Kind::rig_changed, frame.stamp, sentence_of(CalibrationCause::out_of_step), v.lag_frames);
+    out_of_step = kInStepAfter;
+    return;
+  }
+  if (out_of_step > 0) {
+    // A rig out of step fits no calibration: what else the monitor says is of no use until that is over.
+    if (v.kind == K::quiet && !v.undecided && --out_of_step == 0)
+      note(EstimatorEvent::Kind::calibration_confirmed, frame.stamp, "the cameras are in step again", 0);
+    return;
+  }
+  if (v.kind != K::quiet) {
+    doubt(cause_of(v.kind), v.onset_frame, frame);
+  } else if (!confirmed && keeper.frames_agreed() >= kConfirmedAfter) {
+    confirmed = true;
+    note(EstimatorEvent::Kind::calibration_confirmed, frame.stamp, "the calibration of the last drive still fits", kConfirmedAfter);
+  }
+}
+
+/// A calibration is sought: solves are started and decided.
+void Estimator::Parts::calibrate(const RigFrame& frame) noexcept {
+  if (const auto decision = keeper.decide(frame.stamp, frame.number)) take(*decision, frame.stamp);
+  if ((state == State::parallel_monocular || state == State::recalibrating) && keeper.can_solve()) {
+    keeper.start_solve();
+    transition(Trigger::frames_enough, frame.stamp);
+  }
+  tell_missing(frame.stamp);
+}
+
+void Estimator::Parts::take(const CalibrationDecision& decision, Stamp stamp) noexcept {
+  (void)decisions.push(decision);
+  if (decision.accepted) {
+    note(EstimatorEvent::Kind::calibration_accepted, stamp, "a calibration is accepted", decision.calibration.frames);
+    keeper.use(decision.calibration);
+    odometry.link(decision.calibration);
+    confirmed = true;
+    undecided = false;
+    transition(Trigger::calibration_accepted, stamp);
+    return;
+  }
+  note(EstimatorEvent::Kind::calibration_rejected, stamp, decision.reason, decision.calibration.frames);
+  switch (keeper.last_gate()) {
+    case calibration::Gate::no_better:
+      keeper.use(keeper.in_use());
+      odometry.link(keeper.in_use());
+      transition(Trigger::calibration_kept, stamp);
+      break;
+    case calibration::Gate::out_of_step:
+      out_of_step = kInStepAfter;
+      [[fallthrough]];
+    default:
+      transition(Trigger::calibration_rejected, stamp);
+  }
+}
+
+void Estimator::Parts::tell_missing(Stamp stamp) noexcept {
+  const Reason missing = keeper.missing();
+  if (missing == told_missing) return;
+  told_missing = missing;
+  if (missing == Reason::needs_motion)
+    note(EstimatorEvent::Kind::calibration_waits, stamp, "the rig has to move before it can be calibrated", 0);
+  else if (missing == Reason::needs_near_structure)
+    note(EstimatorEvent::Kind::calibration_waits, stamp, "nearer things have to be seen before the rig can be calibrated", 0);
+}
+
+/// States that follow from whether there is a pose.
+void Estimator::Parts::follow(const odometry::FrameOutcome& out, const RigFrame& frame) noexcept {
+  if (out.gap_s > 0) note(EstimatorEvent::Kind::time_gap, frame.stamp, "no frame for longer than motion can be predicted", out.gap_s);
+  if (!out.posed) {
+    if (++without_pose == kLostAfter) {
+      transition(Trigger::pose_lost, frame.stamp);
+      keeper.scene_lost();
+    }
+    return;
+  }
+  without_pose = 0;
+  if (state == State::lost)
+    transition(odometry.linked() == odometry::Link::linked ? Trigger::pose_found
+               : keeper.calibrated()                       ? Trigger::pose_found_doubtful
+                                                           : Trigger::pose_found_uncalibrated,
+               frame.stamp);
+  if (state == State::initialising) {
+    transition(Trigger::pair_found, frame.stamp);
+    keeper.seek(CalibrationCause::from_scratch, 0, frame.number);
+  }
+  if (out.restarted) {
+    note(EstimatorEvent::Kind::scene_restarted, frame.stamp, "the scene was built anew; the way since the last pose is extrapolated",
+         out.gap_s);
+    keeper.scene_lost();
+  }
+  if (out.relocalised) note(EstimatorEvent::Kind::relocalised, frame.stamp, "found again among the window's points", 0);
+}
+
+/// What the state of the calibration makes of a pose's status.
+void Estimator::Parts::grade(const odometry::FrameOutcome& out, PoseSample* sample) const noexcept {
+  sample->status = out.posed ? out.status : PoseStatus::lost;
+  sample->reason = out.reason;
+  if (!out.posed) {
+    if (state == State::initialising && out.reason == Reason::uncalibrated && keeper.missing() != Reason::none)
+      sample->reason = keeper.missing();
+    return;
+  }
+  const bool only_uncalibrated = out.reason == Reason::uncalibrated;
+  if (sample->status == PoseStatus::ok && out_of_step > 0) {
+    sample->status = PoseStatus::degraded;
+    sample->reason = Reason::out_of_step;
+  } else if (sample->status == PoseStatus::ok && (undecided || state == State::recalibrating)) {
+    sample->status = PoseStatus::degraded;
+    sample->reason = Reason::recalibrating;
+  } else if (sample->status == PoseStatus::ok && !confirmed) {
+    sample->status = PoseStatus::degraded;
+    sample->reason = Reason::unconfirmed;
+  } else if (only_uncalibrated) {
+    sample->reason = out_of_step > 0                    ? Reason::out_of_step
+                     : keeper.missing() != Reason::none ? keeper.missing()
+                     : state == State::recalibrating    ? Reason::recalibrating
+                                                        : Reason::uncalibrated;
+  }
+}
+
+std::size_t Estimator::memory_needed(const EstimatorOptions& options, const RigCalibration& rig) {
+  check(rig, options.trust != CalibrationTrust::none);
+  return odometry::Odometry::memory_needed(options.odometry, rig) + RigKeeper::memory_needed(options, rig) + sizeof(Parts) + 2 * kCacheLine;
+}
+
+Estimator::Estimator(const EstimatorOptions& options, const RigCalibration& rig, const RigCalibration& nominal, Arena& arena,
+                     PairRunner& runner, BackgroundRunner& solver) {
+  check(rig, options.trust != CalibrationTrust::none);
   static_assert(alignof(Parts) <= kCacheLine);
   const auto bytes = arena.make<std::byte>(sizeof(Parts), "estimator");
-  parts_ = new (bytes.data()) Parts(options, rig, arena, runner);
+  parts_ = new (bytes.data()) Parts(options, rig, nominal, arena, runner, solver);
 }
 
-Estimator::~Estimator() { parts_->~Parts(); }
+Estimator::~Estimator() {
+  parts_->keeper.finish();
+  parts_->~Parts();
+}
 
 PoseSample Estimator::process(const RigFrame& frame) noexcept {
   const auto start = std::chrono::steady_clock::now();
   Parts& p = *parts_;
   p.events.clear();
+  p.decisions.clear();
   PoseSample sample;
   sample.frame = frame.number;
   sample.stamp = frame.stamp;
@@ -101,23 +295,22 @@ PoseSample Estimator::process(const RigFrame& frame) noexcept {
   }
   p.any = true;
   p.last = frame.stamp;
-  if (p.state == State::initialising) p.transition(Trigger::calibration_given, frame.stamp);
+  if (p.state == State::initialising && p.keeper.calibrated()) p.transition(Trigger::calibration_given, frame.stamp);
+  if (p.requested.exchange(false, std::memory_order_relaxed) && p.state == State::stereo_odometry && p.options.online)
+    p.doubt(CalibrationCause::requested, frame.number, frame);
 
   const odometry::FrameOutcome out = p.odometry.process(frame);
-  if (out.gap_s > 0) p.note(EstimatorEvent::Kind::time_gap, frame.stamp, "no frame for longer than motion can be predicted", out.gap_s);
-  if (out.posed) {
-    p.without_pose = 0;
-    if (p.state == State::lost) p.transition(Trigger::pose_found, frame.stamp);
-    if (out.restarted)
-      p.note(EstimatorEvent::Kind::scene_restarted, frame.stamp, "the scene was built anew; the way since the last pose is extrapolated",
-             out.gap_s);
-    if (out.relocalised) p.note(EstimatorEvent::Kind::relocalised, frame.stamp, "found again among the window's points", 0);
-  } else if (++p.without_pose == kLostAfter) {
-    p.transition(Trigger::pose_lost, frame.stamp);
+  p.follow(out, frame);
+  if (p.options.online) {
+    if (out.posed) {
+      const bool linked = p.odometry.linked() == odometry::Link::linked;
+      if (linked && p.state == State::stereo_odometry && !out.restarted) p.watch(out, frame);
+      p.keeper.log(p.odometry, out, frame);
+    }
+    if (p.keeper.seeking()) p.calibrate(frame);
   }
   sample.state = p.state;
-  sample.status = out.posed ? out.status : PoseStatus::lost;
-  sample.reason = out.reason;
+  p.grade(out, &sample);
   if (out.posed) sample.T_world_left = out.T_left_world.inverse();
   sample.inliers = out.inliers;
   sample.stereo_inliers = out.stereo_inliers;
@@ -129,10 +322,10 @@ PoseSample Estimator::process(const RigFrame& frame) noexcept {
 }
 
 std::span<const EstimatorEvent> Estimator::events() const noexcept { return parts_->events.span(); }
-State Estimator::state() const noexcept { return parts_->state; }
-const RigCalibration& Estimator::calibration() const noexcept { return parts_->rig; }
-bool Estimator::calibrated() const noexcept { return true; }
+std::span<const CalibrationDecision> Estimator::calibrations() const noexcept { return parts_->decisions.span(); }
 void Estimator::request_recalibration() noexcept { parts_->requested.store(true, std::memory_order_relaxed); }
-std::span<const CalibrationDecision> Estimator::calibrations() const noexcept { return {}; }
+State Estimator::state() const noexcept { return parts_->state; }
+const RigCalibration& Estimator::calibration() const noexcept { return parts_->keeper.in_use(); }
+bool Estimator::calibrated() const noexcept { return parts_->keeper.calibrated(); }
 
 }  // namespace vergence

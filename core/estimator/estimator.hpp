@@ -3,6 +3,7 @@
 #include <memory>
 #include <span>
 
+#include "core/calibration/monitor.hpp"
 #include "core/calibration/options.hpp"
 #include "core/memory/arena.hpp"
 #include "core/odometry/options.hpp"
@@ -30,6 +31,7 @@ enum class Adoption : std::uint8_t {
 struct EstimatorOptions {
   OdometryOptions odometry{};
   calibration::CalibrationOptions calibration{};
+  calibration::MonitorOptions monitor{};
   CalibrationTrust trust = CalibrationTrust::given;
   Adoption adoption = Adoption::after_fixed_frames;
   bool online = true;  // watch the rig and calibrate it; false: the calibration given is used for ever

@@ -6,7 +6,20 @@
 namespace vergence {
 
 /// What can happen to the running system (METHOD §3).
-enum class Trigger : std::uint8_t { calibration_given, pose_lost, pose_found };
+enum class Trigger : std::uint8_t {
+  calibration_given,     // one is in use from the first frame
+  pair_found,            // the first pair gave the cameras' transform
+  frames_enough,         // the tracks since then are thought to hold a calibration
+  calibration_accepted,  // through the gates
+  calibration_rejected,  // not through
+  calibration_kept,      // a new one is no better than the one in use
+  rig_changed,           // the monitor raised
+  requested,             // the user wants a new calibration
+  pose_lost,
+  pose_found,               // with a calibration in use
+  pose_found_doubtful,      // with one in use that is doubted
+  pose_found_uncalibrated,  // without one
+};
 
 /// One edge of the state machine; `why` goes to events.jsonl as it stands.
 struct Transition {
@@ -16,11 +29,24 @@ struct Transition {
   const char* why;
 };
 
-/// All edges there are. Online calibration adds its own.
+/// All edges there are.
 inline constexpr std::array kTransitions = {
     Transition{State::initialising, Trigger::calibration_given, State::stereo_odometry, "a calibration is given"},
+    Transition{State::initialising, Trigger::pair_found, State::parallel_monocular, "the first pair gave a transform between the cameras"},
+    Transition{State::parallel_monocular, Trigger::frames_enough, State::calibrating, "there are frames enough to calibrate from"},
+    Transition{State::parallel_monocular, Trigger::pose_lost, State::lost, "no pose for three frames"},
+    Transition{State::calibrating, Trigger::calibration_accepted, State::stereo_odometry, "the calibration is accepted"},
+    Transition{State::calibrating, Trigger::calibration_rejected, State::parallel_monocular, "the calibration is rejected"},
+    Transition{State::calibrating, Trigger::pose_lost, State::lost, "no pose for three frames"},
+    Transition{State::stereo_odometry, Trigger::rig_changed, State::recalibrating, "the rig no longer fits its calibration"},
+    Transition{State::stereo_odometry, Trigger::requested, State::recalibrating, "a new calibration is asked for"},
     Transition{State::stereo_odometry, Trigger::pose_lost, State::lost, "no pose for three frames"},
+    Transition{State::recalibrating, Trigger::calibration_accepted, State::stereo_odometry, "the new calibration is accepted"},
+    Transition{State::recalibrating, Trigger::calibration_kept, State::stereo_odometry, "the calibration in use fits as well as a new one"},
+    Transition{State::recalibrating, Trigger::pose_lost, State::lost, "no pose for three frames"},
     Transition{State::lost, Trigger::pose_found, State::stereo_odometry, "a pose again"},
+    Transition{State::lost, Trigger::pose_found_doubtful, State::recalibrating, "a pose again, the rig still in doubt"},
+    Transition{State::lost, Trigger::pose_found_uncalibrated, State::initialising, "a pose again, without a calibration"},
 };
 
 /// The row that fires, or nullptr: the trigger means nothing in this state and nothing happens.

@@ -31,6 +31,11 @@ struct Transform {
   return q;
 }
 
+/// The same camera after everything in the world has grown by `factor` about a place.
+[[nodiscard]] inline Transform scaled_about(const Transform& T_camera_world, const Vec3& centre, double factor) noexcept {
+  return {T_camera_world.R, -(T_camera_world.R * (centre + factor * (T_camera_world.centre() - centre)))};
+}
+
 /// Position linear, rotation along the shorter arc; s in [0, 1] from a to b.
 [[nodiscard]] inline Transform interpolate(const Transform& a, const Transform& b, double s) noexcept {
   return {Eigen::Quaterniond(a.R).slerp(s, Eigen::Quaterniond(b.R)).normalized().toRotationMatrix(), a.t + s * (b.t - a.t)};

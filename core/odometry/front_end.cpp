@@ -55,17 +55,16 @@ std::size_t FrontEnd::memory_needed(const OdometryOptions& options, const RigCal
     bytes += features::Pyramid::memory_needed(c.width, c.height, options.pyramid_levels) + kMaxPoints * sizeof(Followed) + 2 * kCacheLine;
   }
   const auto n = static_cast<std::size_t>(options.features);
-  return bytes + n * (sizeof(features::Corner) + sizeof(NewPoint)) +
-         kMaxPoints * (sizeof(features::Corner) + sizeof(features::Descriptor)) + 5 * kCacheLine;
+  return bytes + n * (sizeof(features::Corner) + sizeof(NewPoint) + sizeof(FreeMatch)) +
+         kMaxPoints * (sizeof(features::Corner) + sizeof(features::Descriptor)) + 6 * kCacheLine;
 }
 
 FrontEnd::FrontEnd(const OdometryOptions& options, const RigCalibration& rig, Arena& arena, PairRunner& runner)
-    : options_(options), rig_(rig), runner_(runner), cameras_(rig.cameras) {
+    : options_(options), rig_(rig), runner_(runner), cameras_(rig.cameras), band_px_(options.band_px) {
   const auto n = static_cast<std::size_t>(options.features);
   for (int k = 0; k < cameras_; ++k) {
     const auto i = static_cast<std::size_t>(k);
     const Intrinsics& c = rig.intrinsics[i];
-    lenses_[i] = Lens(c);
     pyramids_[i] = features::Pyramid(c.width, c.height, options.pyramid_levels, arena);
     followed_[i] = arena.make<Followed>(kMaxPoints, "followed points");
   }
@@ -73,6 +72,12 @@ FrontEnd::FrontEnd(const OdometryOptions& options, const RigCalibration& rig, Ar
   taken_ = BoundedVector<features::Corner>(arena.make<features::Corner>(kMaxPoints, "taken corners"));
   fresh_ = arena.make<NewPoint>(n, "new points");
   described_ = arena.make<features::Descriptor>(kMaxPoints, "descriptors");
+  free_matches_ = BoundedVector<FreeMatch>(arena.make<FreeMatch>(n, "free matches"));
+  rebuild_lenses();
+}
+
+void FrontEnd::rebuild_lenses() noexcept {
+  for (int k = 0; k < cameras_; ++k) lenses_[static_cast<std::size_t>(k)] = Lens(rig_.intrinsics[static_cast<std::size_t>(k)]);
 }
 
 ImageCheck FrontEnd::begin(const RigFrame& frame) noexcept {
@@ -124,6 +129,7 @@ FrontEnd::Followed FrontEnd::follow(const MapPoint& p, const Transform& T_left_w
                                     const features::AlignOptions& how) const noexcept {
   Followed f;
   const auto i = static_cast<std::size_t>(k);
+  if (!placed(k)) return f;
   const Transform T_k_world = rig_.T_camera_left[i] * T_left_world;
   const Camera& camera = lenses_[i].raw();
   Vec2 predicted;
@@ -199,18 +205,26 @@ features::CornerOptions FrontEnd::corner_options() const noexcept {
   return how;
 }
 
-int FrontEnd::find_again(Map& map) noexcept {
+void FrontEnd::find_dense_corners(int k) noexcept {
+  features::CornerOptions how = corner_options();
+  how.cell = std::max(kSmallestCell, how.cell / 2);
+  how.min_distance = 0.5F * static_cast<float>(how.cell);
+  features::find_corners(pyramids_[static_cast<std::size_t>(k)].level(0), how, {}, runner_, &taken_);
+}
+
+int FrontEnd::find_again(Map& map, int k) noexcept {
+  const auto c = static_cast<std::size_t>(k);
   const std::span<MapPoint> points = map.points();
-  for (MapPoint& p : points) p.now.cameras = 0;
-  if ((structured_ & 1U) == 0) return 0;
+  for (MapPoint& p : points) p.now.drop(k);
+  if (((structured_ >> static_cast<unsigned>(k)) & 1U) == 0) return 0;
   for (std::size_t i = 0; i < points.size(); ++i)
     if (points[i].holds_poses()) described_[i] = features::describe(points[i].patch);
-  features::find_corners(pyramids_[0].level(0), corner_options(), {}, runner_, &corners_);
+  find_dense_corners(k);
   int found = 0;
   features::Patch patch;
-  for (const features::Corner& c : corners_) {
-    const Vec2 at(c.x, c.y);
-    if (!features::cut_patch(pyramids_[0], at, &patch)) continue;
+  for (const features::Corner& corner : taken_) {
+    const Vec2 at(corner.x, corner.y);
+    if (!features::cut_patch(pyramids_[c], at, &patch)) continue;
     const features::Descriptor d = features::describe(patch);
     int best = kMaxDistance + 1, second = 256;
     std::size_t which = 0;
@@ -226,12 +240,72 @@ int FrontEnd::find_again(Map& map) noexcept {
       }
     }
     Followed f;
-    if (best > kMaxDistance || best > kDistinct * second || points[which].now.cameras != 0 || !finish(0, at, 0.0, &f)) continue;
+    if (best > kMaxDistance || best > kDistinct * second || points[which].now.by(k) || !finish(k, at, 0.0, &f)) continue;
     f.sigma = kRoughSigma;
-    store(f, 0, &points[which]);
+    store(f, k, &points[which]);
     ++found;
   }
   return found;
+}
+
+std::span<const FreeMatch> FrontEnd::match_free(int k) noexcept {
+  free_matches_.clear();
+  const auto c = static_cast<std::size_t>(k);
+  if ((structured_ & 1U) == 0 || ((structured_ >> static_cast<unsigned>(k)) & 1U) == 0) return {};
+  features::find_corners(pyramids_[0].level(0), corner_options(), {}, runner_, &corners_);
+  find_dense_corners(k);
+  features::Patch patch;
+  for (std::size_t j = 0; j < taken_.size(); ++j) {
+    const bool cut = features::cut_patch(pyramids_[c], {taken_[j].x, taken_[j].y}, &patch);
+    described_[j] = cut ? features::describe(patch) : features::Descriptor{};
+  }
+  // By dense corner: the left corner it resembles most.
+  std::array<std::uint16_t, kMaxPoints> owner;
+  std::array<std::uint16_t, kMaxPoints> owner_bits;
+  owner_bits.fill(256);
+  const auto nearest = [&](const features::Descriptor& d, int* second) noexcept {
+    std::size_t best = 0;
+    int least = 257;
+    *second = 257;
+    for (std::size_t j = 0; j < taken_.size(); ++j) {
+      const int bits = features::distance(d, described_[j]);
+      if (bits < least) {
+        *second = least;
+        least = bits;
+        best = j;
+      } else if (bits < *second) {
+        *second = bits;
+      }
+    }
+    return std::pair(best, least);
+  };
+  for (std::size_t i = 0; i < corners_.size(); ++i) {
+    fresh_[i].usable = false;
+    if (!features::cut_patch(pyramids_[0], {corners_[i].x, corners_[i].y}, &fresh_[i].patch)) continue;
+    int second = 0;
+    const auto [j, bits] = nearest(features::describe(fresh_[i].patch), &second);
+    if (bits > kMaxDistance || bits > kDistinct * second || bits >= owner_bits[j]) continue;
+    if (owner_bits[j] < 256) fresh_[owner[j]].usable = false;
+    owner[j] = static_cast<std::uint16_t>(i);
+    owner_bits[j] = static_cast<std::uint16_t>(bits);
+    fresh_[i].usable = true;
+    fresh_[i].matched_camera = static_cast<int>(j);
+  }
+  features::AlignOptions how;
+  how.coarsest = 1;
+  how.min_zncc = static_cast<float>(options_.match_zncc);
+  how.max_shift = 8.F;
+  for (std::size_t i = 0; i < corners_.size(); ++i) {
+    if (!fresh_[i].usable) continue;
+    const auto j = static_cast<std::size_t>(fresh_[i].matched_camera);
+    const features::AlignResult a = features::align(fresh_[i].patch, pyramids_[c], Vec2(taken_[j].x, taken_[j].y), Mat2::Identity(), how);
+    Followed left, other;
+    if (a.status != features::AlignStatus::ok || !finish(0, {corners_[i].x, corners_[i].y}, 0.0, &left) || !finish(k, a.pixel, 0.0, &other))
+      continue;
+    (void)free_matches_.push(
+        {left.ideal.cast<double>(), other.ideal.cast<double>(), static_cast<double>(std::max(left.sigma, other.sigma))});
+  }
+  return free_matches_.span();
 }
 
 void FrontEnd::match_across(const features::Corner& corner, bool exchanged, NewPoint* out) const noexcept {
@@ -242,12 +316,13 @@ void FrontEnd::match_across(const features::Corner& corner, bool exchanged, NewP
   if (!lenses_[0].ray_jacobian(at, &out->ray, &out->d_ray_d_pixel)) return;
   if (!finish(0, at, 0.0, &out->left)) return;
   for (int k = 1; k < cameras_; ++k) {
-    if (((structured_ >> static_cast<unsigned>(k)) & 1U) == 0) continue;
+    if (((structured_ >> static_cast<unsigned>(k)) & 1U) == 0 || !placed(k)) continue;
     const auto i = static_cast<std::size_t>(k);
     const features::EpipolarCurve curve{&lenses_[i].raw(), rig_.T_camera_left[i], out->ray};
     const double baseline = rig_.T_camera_left[i].t.norm();
     features::EpipolarSearchOptions search;
     search.level = 1;
+    search.band = std::max(1, static_cast<int>(std::lround(0.5 * band_px_)));
     search.rho_last = (exchanged ? -1.0 : 1.0) / (options_.nearest_baselines * baseline);
     const features::SearchResult s = features::search_along(out->patch, pyramids_[i], curve, search);
     if (s.status != features::SearchStatus::ok) continue;
@@ -265,7 +340,7 @@ void FrontEnd::match_across(const features::Corner& corner, bool exchanged, NewP
     if (a.status != features::AlignStatus::ok) continue;
     double sigma_per_px = 0;
     const double off = features::fit_inverse_depth(curve, a.pixel, &rho, &sigma_per_px);
-    if (off < 0 || off > options_.band_px) continue;
+    if (off < 0 || off > band_px_) continue;
     out->disparity = rho / sigma_per_px;
     const double noise = 3.0 * std::sqrt(2.0) * options_.pixel_sigma;  // px, three sigmas of a difference of two positions
     if (exchanged) {
@@ -322,6 +397,7 @@ AcrossCount FrontEnd::add_points(Map& map, const Transform& T_left_world, PointS
     p->found = 1;
     store(f.left, 0, p);
     store(f.across, f.matched_camera, p);
+    p->in_images = p->now.cameras;
   }
   return count;
 }

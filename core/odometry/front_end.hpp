@@ -28,6 +28,12 @@ struct AcrossCount {
   int near = 0;     // of these, with a disparity that measures depth
 };
 
+/// A match between the left and another image found without knowing the rig: ideal pixels.
+struct FreeMatch {
+  Vec2 left = Vec2::Zero(), other = Vec2::Zero();
+  double sigma = 0;  // px
+};
+
 /// Pixels of one rig frame: pyramids, following points, new corners and their matches across.
 ///
 /// Ownership  Reads the frame's images until the next begin(). Options, rig and runner are the owner's.
@@ -53,9 +59,19 @@ class FrontEnd {
   /// Follows every followed point into every structured camera from a good prediction.
   void follow_all(Map& map, const Transform& T_left_world) noexcept;
 
-  /// Looks for the map's points in `left` wherever they may be, by what they look like. Answers how many seem found; their
-  /// sightings, wrong ones among them, are rough. Some milliseconds: for frames that tracking has lost.
-  [[nodiscard]] int find_again(Map& map) noexcept;
+  /// The owner's rig has other intrinsics than before.
+  void rebuild_lenses() noexcept;
+  /// Half width of the band about the epipolar line, px, from now on.
+  void set_band(double px) noexcept { band_px_ = px; }
+
+  /// Looks for the map's points in camera k wherever they may be, by what they look like. Answers how many seem found; their
+  /// sightings there, wrong ones among them, are rough; those in other cameras stay. Some milliseconds: for frames that tracking has
+  /// lost.
+  [[nodiscard]] int find_again(Map& map, int k) noexcept;
+
+  /// Corners of `left` found in camera k with nothing known of the rig but that it does not turn the image by more than some 20°:
+  /// mutually best descriptors, then aligned. Wrong ones are among them. Some ten milliseconds. Valid until the next call.
+  [[nodiscard]] std::span<const FreeMatch> match_free(int k) noexcept;
 
   /// New corners of `left` where there are no points, matched across, as points of the given stage, each with its sighting in `now`.
   AcrossCount add_points(Map& map, const Transform& T_left_world, PointStage stage) noexcept;
@@ -90,7 +106,11 @@ class FrontEnd {
   [[nodiscard]] bool finish(int k, const Vec2& raw, double parallax, Followed* f) const noexcept;
   void match_across(const features::Corner& corner, bool exchanged, NewPoint* out) const noexcept;
   [[nodiscard]] features::CornerOptions corner_options() const noexcept;
+  /// Corners of camera k four times as dense as points are: so that most of the other image's have their partner.
+  void find_dense_corners(int k) noexcept;
   void match_all(std::span<const features::Corner> corners, bool exchanged) noexcept;
+  /// Where camera k sits is known, if only roughly: before, its transform is the identity.
+  [[nodiscard]] bool placed(int k) const noexcept { return k == 0 || rig_.T_camera_left[static_cast<std::size_t>(k)].t.squaredNorm() > 0; }
   static void store(const Followed& f, int k, MapPoint* p) noexcept;
 
   const OdometryOptions& options_;
@@ -104,7 +124,9 @@ class FrontEnd {
   std::array<std::span<Followed>, kMaxCameras> followed_{};
   BoundedVector<features::Corner> corners_, taken_;
   std::span<NewPoint> fresh_;
-  std::span<features::Descriptor> described_;  // of the map's points, in find_again()
+  std::span<features::Descriptor> described_;  // of the map's points in find_again(), of dense corners in match_free()
+  BoundedVector<FreeMatch> free_matches_;
+  double band_px_;
   float detect_ms_ = 0;
 };
 

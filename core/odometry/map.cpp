@@ -15,9 +15,12 @@ MapPoint* Map::make_point() noexcept {
     MapPoint& p = points_[(next_point_ + i) % points_.size()];
     if (p.stage != PointStage::free) continue;
     next_point_ = (next_point_ + i + 1) % points_.size();
+    p.id = next_id_++;
     p.missed = 0;
     p.found = 0;
     p.now.cameras = 0;
+    p.in_images = 0;
+    p.logged = false;
     for (Sighting& s : p.seen) s.cameras = 0;
     return &p;
   }
@@ -42,9 +45,22 @@ std::size_t Map::make_keyframe(const Transform& T_left_world, Stamp stamp) noexc
   std::size_t slot = 0;
   while (std::find(order_.begin(), order_.end(), slot) != order_.end()) ++slot;
   (void)order_.push(static_cast<std::uint8_t>(slot));
-  keyframes_[slot] = {T_left_world, stamp};
+  keyframes_[slot] = {T_left_world, {}, stamp};
   for (MapPoint& p : points_) p.seen[slot].cameras = 0;
   return slot;
+}
+
+void Map::scale_about(const Vec3& centre, double factor) noexcept {
+  for (MapPoint& p : points_) {
+    if (p.stage == PointStage::free) continue;
+    p.p_world = centre + factor * (p.p_world - centre);
+    p.T_origin_world = scaled_about(p.T_origin_world, centre, factor);
+  }
+  for (const std::uint8_t slot : order_) {
+    Keyframe& k = keyframes_[slot];
+    k.T_left_world = scaled_about(k.T_left_world, centre, factor);
+    for (Transform& T : k.T_camera_left) T.t *= factor;
+  }
 }
 
 }  // namespace vergence::odometry

@@ -39,6 +39,7 @@ enum class PointStage : std::uint8_t {
 /// A point of the scene. p_world in metres; the patch is what it looked like in `left` where it was made.
 struct MapPoint {
   PointStage stage = PointStage::free;
+  std::uint32_t id = 0;     // of the track, never given twice
   std::uint8_t missed = 0;  // frames in a row that did not find it
   std::uint16_t found = 0;  // frames that did
   Vec3 p_world = Vec3::Zero();
@@ -47,6 +48,9 @@ struct MapPoint {
   Mat2 d_ray_d_pixel = Mat2::Identity();  // of that ray's x, y by the raw pixel
   features::Patch patch{};
   Sighting now{};                                  // this frame's
+  std::uint8_t in_images = 0;                      // bit k: found in camera k's image now, whether that agrees with the pose or not
+  bool logged = false;                             // `logged_at` says where
+  Eigen::Vector2f logged_at{};                     // raw pixel in `left` when the track log last took a frame
   std::array<Eigen::Vector2f, kMaxCameras> raw{};  // this frame's pixels as the image has them
   std::array<Sighting, kMaxWindow> seen{};         // by keyframe slot
 
@@ -57,6 +61,7 @@ struct MapPoint {
 
 struct Keyframe {
   Transform T_left_world{};
+  std::array<Transform, kMaxCameras> T_camera_left{};  // as they were then; read while the cameras are not linked
   Stamp stamp{};
 };
 
@@ -74,6 +79,8 @@ class Map {
   void free_point(MapPoint* p) noexcept { p->stage = PointStage::free; }
   /// Slot of a new keyframe, dropping the oldest when the window is full. Every point's sighting there is empty.
   [[nodiscard]] std::size_t make_keyframe(const Transform& T_left_world, Stamp stamp) noexcept;
+  /// Everything grows by `factor` about a place of the world: points, keyframes and the distances of their cameras.
+  void scale_about(const Vec3& centre, double factor) noexcept;
 
   [[nodiscard]] std::span<MapPoint> points() noexcept { return points_; }
   [[nodiscard]] std::span<const MapPoint> points() const noexcept { return points_; }
@@ -88,6 +95,7 @@ class Map {
   std::span<MapPoint> points_;
   std::size_t window_;
   std::size_t next_point_ = 0;  // where the search for a free slot goes on
+  std::uint32_t next_id_ = 1;
   std::array<Keyframe, kMaxWindow> keyframes_{};
   FixedVector<std::uint8_t, kMaxWindow> order_;
 };

@@ -28,6 +28,11 @@ constexpr double kCertainShare = 0.6;          // near matches of the corners ab
 constexpr double kStartShare = 0.4;            // of the corners that must match: chance across a wrong rig gives a tenth to a quarter
 constexpr int kStartMatches = 30;              // points across to start from
 
+constexpr double kUnlinkedBand = 4.0;    // px: this frame's transform between the cameras is itself measured
+constexpr double kFreeMatchSigma = 2.0;  // sigmas of a tracked corner: patches are aligned without their shape being known
+constexpr double kWorstDirection = 0.1;  // rad, of t, to start from
+constexpr double kWorstRotation = 0.01;  // rad
+
 class StageClock {
  public:
   explicit StageClock(FrameOutcome* out) noexcept : out_(out), last_(std::chrono::steady_clock::now()) {}
@@ -46,23 +51,37 @@ class StageClock {
 }  // namespace
 
 std::size_t Odometry::memory_needed(const OdometryOptions& options, const RigCalibration& rig) noexcept {
+  const auto n = static_cast<std::size_t>(options.features);
   return FrontEnd::memory_needed(options, rig) + Map::memory_needed() + WindowAdjuster::memory_needed(options, rig) +
-         RigObservationTable::memory_needed(kMaxPoints) + RigMlesac::memory_needed(kMaxPoints) + PoseRefiner::memory_needed(kMaxPoints) +
-         kMaxPoints * sizeof(std::uint16_t) + 2 * kCacheLine;
+         PoseEstimator::memory_needed() + StereoMlesac::memory_needed(n) + 5 * (n * sizeof(double) + kCacheLine);
 }
 
-Odometry::Odometry(const OdometryOptions& options, const RigCalibration& rig, Arena& arena, PairRunner& runner)
+Odometry::Odometry(const OdometryOptions& options, const RigCalibration& rig, bool known, Arena& arena, PairRunner& runner)
     : options_(options),
       rig_(rig),
-      front_end_(options, rig, arena, runner),
+      link_(known ? Link::linked : Link::unlinked),
+      rig_known_(known),
+      front_end_(options, rig_, arena, runner),
       map_(static_cast<std::size_t>(options.window_keyframes), arena),
-      window_(options, rig, arena),
-      table_(kMaxPoints, arena),
-      mlesac_(kMaxPoints, arena),
-      refiner_(kMaxPoints, arena),
-      owner_(arena.make<std::uint16_t>(kMaxPoints, "pose rows")),
+      window_(options, rig_, arena),
+      poses_(options, rig_, arena),
+      across_(static_cast<std::size_t>(options.features), arena),
       random_(options.seed) {
-  table_.set_rig(rig);
+  for (std::span<double>& column : columns_) column = arena.make<double>(static_cast<std::size_t>(options.features), "matches across");
+  if (known) return;
+  unlink();
+  forget_rig();
+}
+
+void Odometry::link(const RigCalibration& rig) noexcept {
+  next_rig_ = rig;
+  link_pending_ = true;
+}
+
+void Odometry::unlink() noexcept {
+  link_ = Link::unlinked;
+  link_pending_ = false;
+  front_end_.set_band(std::max(options_.band_px, kUnlinkedBand));
 }
 
 Transform Odometry::predict(double dt_s) const noexcept {
@@ -81,64 +100,16 @@ void Odometry::remember(const Transform& T_left_world, Stamp stamp) noexcept {
   any_pose_ = true;
 }
 
-void Odometry::collect() noexcept {
-  table_.clear();
-  owner_.clear();
-  const std::span<MapPoint> points = map_.points();
-  for (std::size_t i = 0; i < points.size(); ++i) {
-    const MapPoint& p = points[i];
-    if (!p.holds_poses() || p.now.cameras == 0) continue;
-    const auto first = static_cast<std::size_t>(std::countr_zero(p.now.cameras));
-    if (!table_.push(p.p_world, p.now.sigma[first])) return;
-    for (int k = 0; k < rig_.cameras; ++k)
-      if (p.now.by(k)) table_.see(k, p.now.pixel[static_cast<std::size_t>(k)].cast<double>());
-    (void)owner_.push(static_cast<std::uint16_t>(i));
-  }
+PoseFit Odometry::fit(const Transform& start, bool sample) noexcept {
+  if (link_ == Link::unlinked) return poses_.fit_unlinked(map_, start, sample, rig_.T_camera_left);
+  PoseFit all = poses_.fit_linked(map_, start, sample);
+  if (!all.found || confirmed_across(all) || all.across == 0) return all;
+  // The cameras contradict each other. Which is right the images do not say, but the left one is what the pose is of.
+  const PoseFit left = poses_.fit_left(map_, start);
+  return left.found && left.inliers >= options_.ok_inliers ? left : all;
 }
 
-Odometry::PoseFit Odometry::fit_pose(const Transform& start, bool sample) noexcept {
-  PoseFit fit;
-  collect();
-  fit.given = static_cast<int>(table_.size());
-  if (fit.given < 3) return fit;
-  Transform T = start;
-  if (sample) {
-    MlesacOptions how;
-    how.max_hypotheses = options_.mlesac_hypotheses;
-    const MlesacPose m = mlesac_.solve(table_.view(), how, &start, random_);
-    if (m.status != MlesacStatus::ok) return fit;
-    T = m.T_left_world;
-  }
-  PoseRefineOptions refine;
-  refine.huber = options_.huber;
-  refine.inlier_chi2 = kOutlier;
-  const RefinedPose r = refiner_.refine(table_.view(), T, sample ? mlesac_.flags() : std::span<const std::uint8_t>{}, refine);
-  if (!r.usable()) return fit;
-  fit.T_left_world = r.T_left_world;
-  fit.rms_px = r.rms_px;
-  std::array<int, kMaxCameras> held{};
-  for (std::size_t i = 0; i < owner_.size(); ++i) {
-    const std::uint8_t good = refiner_.flags()[i];
-    if (std::popcount(map_.points()[owner_[i]].now.cameras) > 1) ++fit.across;
-    if (good == 0) continue;
-    ++fit.inliers;
-    for (int k = 0; k < rig_.cameras; ++k) held[static_cast<std::size_t>(k)] += (good >> k) & 1;
-    if ((good & 1U) == 0 || (good & ~1U) == 0) continue;
-    ++fit.stereo;
-    const MapPoint& p = map_.points()[owner_[i]];
-    const double z = (fit.T_left_world * p.p_world).z();
-    const auto other = static_cast<std::size_t>(std::countr_zero(static_cast<unsigned>(good & ~1U)));
-    if (rig_.intrinsics[0].fx * rig_.T_camera_left[other].t.norm() > kNearDisparity * z) ++fit.near;
-  }
-  for (int k = 0; k < rig_.cameras; ++k)
-    if (held[static_cast<std::size_t>(k)] >= kCameraHolds)
-      fit.cameras = static_cast<std::uint8_t>(fit.cameras | (1U << static_cast<unsigned>(k)));
-  // One camera alone measures no depth and makes no new points: what is left of the map has to hold the pose well.
-  fit.found = fit.inliers >= (std::popcount(fit.cameras) < 2 ? options_.ok_inliers : options_.min_inliers);
-  return fit;
-}
-
-Odometry::PoseFit Odometry::track(const Transform& predicted, std::uint8_t structured, FrameOutcome* out) noexcept {
+PoseFit Odometry::track(const Transform& predicted, std::uint8_t structured, FrameOutcome* out) noexcept {
   PoseFit fit;
   if (structured == 0) return fit;
   StageClock clock(out);
@@ -150,7 +121,7 @@ Odometry::PoseFit Odometry::track(const Transform& predicted, std::uint8_t struc
   for (const Attempt& a : {Attempt{&predicted, 2}, Attempt{&predicted, 3}, Attempt{&T_left_world_, 3}}) {
     front_end_.follow_sample(map_, *a.start, kSample, a.coarsest);
     clock.mark(Stage::track);
-    fit = fit_pose(*a.start, true);
+    fit = this->fit(*a.start, true);
     clock.mark(Stage::pose);
     if (fit.inliers >= kSampleInliers && fit.inliers > kSampleShare * fit.given) break;
   }
@@ -161,14 +132,28 @@ Odometry::PoseFit Odometry::track(const Transform& predicted, std::uint8_t struc
     doubtful = true;
   }
   const Transform coarse = fit.T_left_world;
+  if (link_ == Link::unlinked && recover_cameras(fit)) out->relocalised = false;
   front_end_.follow_all(map_, coarse);
   clock.mark(Stage::track);
-  fit = fit_pose(coarse, false);
-  if (!fit.found || fit.inliers < kRigidShare * fit.given) fit = fit_pose(coarse, true);
+  fit = this->fit(coarse, false);
+  if (!fit.found || fit.inliers < kRigidShare * fit.given) fit = this->fit(coarse, true);
   // One facade looks like the next: a place is believed again only if most of what should be seen from there is.
   if (doubtful && fit.inliers < kRecognisedShare * points_in_view(fit.T_left_world)) fit.found = false;
   clock.mark(Stage::pose);
   return fit;
+}
+
+bool Odometry::recover_cameras(const PoseFit& fit) noexcept {
+  bool any = false;
+  for (int k = 1; k < rig_.cameras; ++k) {
+    if (((fit.cameras >> static_cast<unsigned>(k)) & 1U) != 0 || front_end_.find_again(map_, k) < kRelocaliseInliers) continue;
+    Transform& T_camera_left = rig_.T_camera_left[static_cast<std::size_t>(k)];
+    Transform T_camera_world;
+    if (!poses_.fit_camera(map_, k, T_camera_left * fit.T_left_world, true, &T_camera_world)) continue;
+    T_camera_left = T_camera_world * fit.T_left_world.inverse();
+    any = true;
+  }
+  return any;
 }
 
 int Odometry::points_in_view(const Transform& T_left_world) const noexcept {
@@ -184,13 +169,14 @@ int Odometry::points_in_view(const Transform& T_left_world) const noexcept {
   return n;
 }
 
-Odometry::PoseFit Odometry::relocalise(FrameOutcome* out) noexcept {
+PoseFit Odometry::relocalise(FrameOutcome* out) noexcept {
   StageClock clock(out);
-  const int candidates = front_end_.find_again(map_);
+  for (MapPoint& p : map_.points()) p.now.cameras = 0;
+  const int candidates = front_end_.find_again(map_, 0);
   clock.mark(Stage::match);
   PoseFit fit;
   if (candidates < kRelocaliseInliers) return fit;
-  fit = fit_pose(T_left_world_, true);
+  fit = this->fit(T_left_world_, true);
   clock.mark(Stage::pose);
   fit.found = fit.inliers >= kRelocaliseInliers;
   if (!fit.found) return fit;
@@ -205,7 +191,9 @@ Odometry::PoseFit Odometry::relocalise(FrameOutcome* out) noexcept {
 }
 
 void Odometry::settle_points(const PoseFit& fit) noexcept {
-  for (std::size_t i = 0; i < owner_.size(); ++i) map_.points()[owner_[i]].now.cameras &= refiner_.flags()[i];
+  for (MapPoint& p : map_.points()) p.in_images = p.now.cameras;
+  for (std::size_t i = 0; i < map_.points().size(); ++i)
+    if (map_.points()[i].holds_poses()) map_.points()[i].now.cameras &= poses_.agrees()[i];
   for (MapPoint& p : map_.points()) {
     if (!p.followed()) continue;
     if (p.stage == PointStage::candidate) {
@@ -250,12 +238,29 @@ bool Odometry::wants_keyframe() const noexcept {
   return *middle > options_.keyframe_parallax * rig_.intrinsics[0].fx;
 }
 
+double Odometry::renew_scale(std::size_t slot) noexcept {
+  const double length = map_.keyframe(slot).T_camera_left[1].t.norm();
+  if (!(length > 0.1 * rig_.baseline && length < 10.0 * rig_.baseline)) return 1.0;
+  const double factor = rig_.baseline / length;
+  const Vec3 here = map_.keyframe(slot).T_left_world.centre();
+  map_.scale_about(here, factor);
+  shift_per_s_ *= factor;
+  return factor;
+}
+
 void Odometry::make_keyframe(const PoseFit& fit, Stamp stamp, FrameOutcome* out) noexcept {
   StageClock clock(out);
   const std::size_t slot = map_.make_keyframe(T_left_world_, stamp);
+  map_.keyframe(slot).T_camera_left = rig_.T_camera_left;
   for (MapPoint& p : map_.points())
     if (p.followed()) p.seen[slot] = p.now;
-  (void)window_.adjust(map_);
+  if (link_ == Link::linked) {
+    (void)window_.adjust(map_);
+  } else {
+    (void)window_.adjust_unlinked(map_);
+    out->scale = renew_scale(slot);
+    rig_.T_camera_left = map_.keyframe(slot).T_camera_left;
+  }
   T_left_world_ = map_.keyframe(slot).T_left_world;
   clock.mark(Stage::window);
   const AcrossCount across = front_end_.add_points(map_, T_left_world_, PointStage::candidate);
@@ -273,6 +278,33 @@ void Odometry::make_keyframe(const PoseFit& fit, Stamp stamp, FrameOutcome* out)
   out->keyframe = true;
 }
 
+bool Odometry::initialise_rig(FrameOutcome* out) noexcept {
+  StageClock clock(out);
+  const std::span<const FreeMatch> matches = front_end_.match_free(1);
+  const Pinhole left{rig_.intrinsics[0].fx, rig_.intrinsics[0].fy, rig_.intrinsics[0].cx, rig_.intrinsics[0].cy};
+  const Pinhole right{rig_.intrinsics[1].fx, rig_.intrinsics[1].fy, rig_.intrinsics[1].cx, rig_.intrinsics[1].cy};
+  const std::size_t n = matches.size();
+  for (std::size_t i = 0; i < n; ++i) {
+    columns_[0][i] = (matches[i].left.x() - left.cx) / left.fx;
+    columns_[1][i] = (matches[i].left.y() - left.cy) / left.fy;
+    columns_[2][i] = (matches[i].other.x() - right.cx) / right.fx;
+    columns_[3][i] = (matches[i].other.y() - right.cy) / right.fy;
+    columns_[4][i] = kFreeMatchSigma * matches[i].sigma / left.fx;
+  }
+  const StereoMatches rays{columns_[0].first(n), columns_[1].first(n), columns_[2].first(n), columns_[3].first(n), columns_[4].first(n)};
+  const StereoEstimate e = across_.estimate_stereo_transform(rays, rig_.baseline, StereoMlesacOptions{}, random_);
+  clock.mark(Stage::match);
+  out->reason = n < static_cast<std::size_t>(kStartMatches) ? Reason::needs_texture : Reason::uncalibrated;
+  if (e.status != StereoMlesacStatus::ok || e.inliers < kStartMatches || e.inliers < kRigidShare * static_cast<double>(n)) return false;
+  // A direction of t that the scene does not hold (all of it far away) is no start: depth would be arbitrary.
+  if (!(e.direction_sigma < kWorstDirection) || !(e.rotation_sigma < kWorstRotation)) {
+    out->reason = Reason::needs_near_structure;
+    return false;
+  }
+  rig_.T_camera_left[1] = e.T_right_left;
+  return true;
+}
+
 bool Odometry::start_scene(const Transform& T_left_world, Stamp stamp, FrameOutcome* out) noexcept {
   StageClock clock(out);
   map_.clear();
@@ -287,6 +319,7 @@ bool Odometry::start_scene(const Transform& T_left_world, Stamp stamp, FrameOutc
   else {
     across_fails_ = false;
     const std::size_t slot = map_.make_keyframe(T_left_world, stamp);
+    map_.keyframe(slot).T_camera_left = rig_.T_camera_left;
     keyframe_points_ = 0;
     for (MapPoint& p : map_.points()) {
       if (!p.followed()) continue;
@@ -333,12 +366,67 @@ void Odometry::judge(const PoseFit& fit, const ImageCheck& images, FrameOutcome*
     out->reason = Reason::few_inliers;
   else if (fit.inliers < kRigidShare * fit.given)
     out->reason = Reason::moving_scene;
-  else if (fit.weak || fit.near < kNearEnough)
+  else if (fit.near < kNearEnough)
     out->reason = Reason::weak_geometry;
+  else if (link_ == Link::unlinked)
+    out->reason = Reason::uncalibrated;
   else {
     out->reason = Reason::none;
     out->status = PoseStatus::ok;
   }
+}
+
+void Odometry::begin_scene(const RigFrame& frame, const ImageCheck& images, const Transform& predicted, double dt,
+                           FrameOutcome* out) noexcept {
+  // Nothing to follow: this frame begins a scene, where the last one is thought to have ended.
+  const bool initialise = link_ == Link::unlinked && !rig_known_;
+  bool started = !initialise || initialise_rig(out);
+  if (started && !start_scene(predicted, frame.stamp, out)) started = false;
+  if (!started) {
+    if (weakness(images) != Reason::none) out->reason = weakness(images);
+    return;
+  }
+  if (link_ == Link::unlinked) {
+    out->initialised = initialise;
+    // Further cameras see the scene that the first two have made.
+    PoseFit of_two;
+    of_two.T_left_world = predicted;
+    of_two.cameras = 0b11;
+    if (initialise && rig_.cameras > 2) (void)recover_cameras(of_two);
+    rig_known_ = true;
+    out->status = PoseStatus::degraded;
+    out->reason = Reason::uncalibrated;
+  }
+  if (any_pose_) {
+    out->restarted = true;
+    out->gap_s = dt;
+    restart_cooldown_ = kRestartedFrames;
+    out->status = PoseStatus::degraded;
+    out->reason = Reason::scene_restarted;
+  }
+  out->T_left_world = predicted;
+  remember(predicted, frame.stamp);
+  frames_lost_ = 0;
+}
+
+void Odometry::lose_scene() noexcept {
+  map_.clear();
+  if (link_ == Link::unlinked) forget_rig();
+}
+
+void Odometry::forget_rig() noexcept {
+  rig_known_ = false;
+  for (Transform& T : rig_.T_camera_left) T = {};
+}
+
+void Odometry::take_up_link() noexcept {
+  link_pending_ = false;
+  link_ = Link::linked;
+  rig_ = next_rig_;
+  rig_known_ = true;
+  front_end_.rebuild_lenses();
+  front_end_.set_band(options_.band_px);
+  window_.rebuild_cameras();
 }
 
 FrameOutcome Odometry::process(const RigFrame& frame) noexcept {
@@ -346,25 +434,13 @@ FrameOutcome Odometry::process(const RigFrame& frame) noexcept {
   StageClock clock(&out);
   const ImageCheck images = front_end_.begin(frame);
   clock.mark(Stage::pyramid);
+  out.images_good = weakness(images) == Reason::none;
   const double dt = any_pose_ ? (frame.stamp - stamp_).to_seconds() : 0.0;
   const Transform predicted = any_pose_ ? predict(std::min(dt, kLongestExtrapolation)) : Transform{};
 
   if (map_.order().empty()) {
-    // Nothing to follow: this frame begins a scene, where the last one is thought to have ended.
-    if (!start_scene(predicted, frame.stamp, &out)) {
-      if (weakness(images) != Reason::none) out.reason = weakness(images);
-      return out;
-    }
-    if (any_pose_) {
-      out.restarted = true;
-      out.gap_s = dt;
-      restart_cooldown_ = kRestartedFrames;
-      out.status = PoseStatus::degraded;
-      out.reason = Reason::scene_restarted;
-    }
-    out.T_left_world = predicted;
-    remember(predicted, frame.stamp);
-    frames_lost_ = 0;
+    if (link_pending_) take_up_link();
+    begin_scene(frame, images, predicted, dt, &out);
     return out;
   }
 
@@ -372,7 +448,7 @@ FrameOutcome Odometry::process(const RigFrame& frame) noexcept {
   const PoseFit fit = track(predicted, images.structured, &out);
   if (!fit.found) {
     out.reason = weakness(images) != Reason::none ? weakness(images) : out.gap_s > 0 ? Reason::time_gap : Reason::no_pose;
-    if (images.structured != 0 && ++frames_lost_ >= kFramesLostBeforeRestart) map_.clear();
+    if (images.structured != 0 && ++frames_lost_ >= kFramesLostBeforeRestart) lose_scene();
     return out;
   }
   settle_points(fit);
@@ -386,9 +462,17 @@ FrameOutcome Odometry::process(const RigFrame& frame) noexcept {
     out.T_left_world = T_left_world_;
   else
     remember(fit.T_left_world, frame.stamp);
-  if (confirmed_across(fit) && !images.repeated && wants_keyframe()) make_keyframe(fit, frame.stamp, &out);
   out.T_left_world = T_left_world_;
   judge(fit, images, &out);
+  if (link_pending_ && weakness(images) == Reason::none) {
+    // The scene was made with another rig: it is built anew, where the camera now is.
+    take_up_link();
+    FrameOutcome built;
+    if (!start_scene(T_left_world_, frame.stamp, &built)) out.reason = built.reason;
+  } else if (confirmed_across(fit) && !images.repeated && wants_keyframe()) {
+    make_keyframe(fit, frame.stamp, &out);
+    out.T_left_world = T_left_world_;
+  }
   if (restart_cooldown_ > 0) --restart_cooldown_;
   return out;
 }

@@ -1,8 +1,8 @@
 #pragma once
-#include "core/geometry/mlesac.hpp"
-#include "core/geometry/pose_refine.hpp"
+#include "core/geometry/stereo_mlesac.hpp"
 #include "core/odometry/front_end.hpp"
 #include "core/odometry/map.hpp"
+#include "core/odometry/pose_estimator.hpp"
 #include "core/odometry/window.hpp"
 #include "core/types/pose_sample.hpp"
 
@@ -20,45 +20,66 @@ struct FrameOutcome {
   bool keyframe = false;
   bool restarted = false;    // the scene was built anew in this frame
   bool relocalised = false;  // found again in the window after being lost
+  bool initialised = false;  // the rig's transform was found from this frame's images alone
   double gap_s = 0;          // time since the frame before, when it was too long to predict over
+  bool images_good = false;  // every camera gave an image, new and with structure
+  double scale = 1;          // everything of the world was scaled by this about the left camera, to the known baseline
   std::array<float, kStages> stage_ms{};
 };
 
-/// Stereo odometry with a given calibration (METHOD §3): predicts, follows, poses, keeps a window of keyframes.
+/// How the cameras hang together.
+enum class Link : std::uint8_t {
+  linked,    // one rigid rig with the calibration in use: stereo odometry
+  unlinked,  // each camera's pose is found for itself; the baseline's length alone keeps the scale: parallel monocular
+};
+
+/// Visual odometry (METHOD §3): predicts, follows, poses, keeps a window of keyframes; linked or not.
 ///
+/// Unlinked, rig() is this frame's transform between the cameras and no calibration. A knock of one camera is a motion of that camera
+/// like any other there.
 /// Frames     T_left_world; world is the left camera of the first frame posed and stays when the scene is built anew.
 /// Threads    One caller. Memory: from the arena at construction. Errors: by FrameOutcome.
 class Odometry {
  public:
-  Odometry(const OdometryOptions& options, const RigCalibration& rig, Arena& arena, PairRunner& runner);
+  /// `known`: rig.T_camera_left is a calibration. False: of the rig only intrinsics and baseline are read; the first pair that allows it
+  /// initialises the cameras, unlinked.
+  Odometry(const OdometryOptions& options, const RigCalibration& rig, bool known, Arena& arena, PairRunner& runner);
   [[nodiscard]] static std::size_t memory_needed(const OdometryOptions& options, const RigCalibration& rig) noexcept;
 
   [[nodiscard]] FrameOutcome process(const RigFrame& frame) noexcept;
 
- private:
-  struct PoseFit {
-    bool found = false;
-    Transform T_left_world{};
-    int inliers = 0;
-    int stereo = 0;
-    int across = 0;  // points found in two cameras, whether they agree or not
-    int near = 0;    // inliers whose depth this frame measures
-    int given = 0;   // points that were found in the images at all
-    double rms_px = 0;
-    bool weak = false;         // the points leave some direction of motion open
-    std::uint8_t cameras = 0;  // bit k: camera k holds at least a few of the inliers
-  };
+  /// From the next frame on the cameras are one rig with this calibration: the scene is built anew where the left camera then is.
+  void link(const RigCalibration& rig) noexcept;
+  /// From the next frame on the cameras are not linked; the scene stays.
+  void unlink() noexcept;
+  [[nodiscard]] Link linked() const noexcept { return link_; }
 
+  [[nodiscard]] const RigCalibration& rig() const noexcept { return rig_; }
+  [[nodiscard]] const Map& map() const noexcept { return map_; }
+  [[nodiscard]] Map& map() noexcept { return map_; }
+  [[nodiscard]] const FrontEnd& front_end() const noexcept { return front_end_; }
+  /// Bit k by map point: camera k's sighting of the last frame agrees with its pose.
+  [[nodiscard]] std::span<const std::uint8_t> agrees() const noexcept { return poses_.agrees(); }
+
+ private:
   [[nodiscard]] Transform predict(double dt_s) const noexcept;
+  [[nodiscard]] PoseFit fit(const Transform& start, bool sample) noexcept;
   [[nodiscard]] PoseFit track(const Transform& predicted, std::uint8_t structured, FrameOutcome* out) noexcept;
   [[nodiscard]] int points_in_view(const Transform& T_left_world) const noexcept;
   [[nodiscard]] PoseFit relocalise(FrameOutcome* out) noexcept;
-  [[nodiscard]] PoseFit fit_pose(const Transform& start, bool sample) noexcept;
-  void collect() noexcept;
+  /// Cameras whose own pose was not found are sought by what the points look like. True: one was found.
+  [[nodiscard]] bool recover_cameras(const PoseFit& fit) noexcept;
   void settle_points(const PoseFit& fit) noexcept;
   [[nodiscard]] bool wants_keyframe() const noexcept;
   void make_keyframe(const PoseFit& fit, Stamp stamp, FrameOutcome* out) noexcept;
+  [[nodiscard]] double renew_scale(std::size_t slot) noexcept;
+  [[nodiscard]] bool initialise_rig(FrameOutcome* out) noexcept;
   [[nodiscard]] bool start_scene(const Transform& T_left_world, Stamp stamp, FrameOutcome* out) noexcept;
+  void begin_scene(const RigFrame& frame, const ImageCheck& images, const Transform& predicted, double dt, FrameOutcome* out) noexcept;
+  void take_up_link() noexcept;
+  /// Nothing of the scene is of use any more; without a calibration the rig has to be initialised again.
+  void lose_scene() noexcept;
+  void forget_rig() noexcept;
   /// The cameras agree about the scene: only then does a frame shape the map.
   [[nodiscard]] static bool confirmed_across(const PoseFit& fit) noexcept;
   /// What is wrong with the images themselves, `none` if nothing.
@@ -67,14 +88,17 @@ class Odometry {
   void remember(const Transform& T_left_world, Stamp stamp) noexcept;
 
   const OdometryOptions& options_;
-  const RigCalibration& rig_;
+  RigCalibration rig_;
+  Link link_;
+  bool rig_known_;             // rig_ has a transform to begin with
+  bool link_pending_ = false;  // next_rig_ waits for the next pose
+  RigCalibration next_rig_;
   FrontEnd front_end_;
   Map map_;
   WindowAdjuster window_;
-  RigObservationTable table_;
-  RigMlesac mlesac_;
-  PoseRefiner refiner_;
-  BoundedVector<std::uint16_t> owner_;  // map index of each row of the table
+  PoseEstimator poses_;
+  StereoMlesac across_;
+  std::array<std::span<double>, 5> columns_{};  // of the matches given to it: left x, y, right x, y, sigma
   Random random_;
 
   Transform T_left_world_{};        // of the last posed frame

@@ -10,6 +10,7 @@ namespace {
 constexpr std::size_t kMaxWindowPoints = 1024;
 constexpr std::size_t kSightingsAPoint = 10;  // on average, of all cameras; more are left out of the step
 constexpr float kOutlier = 16.F;              // squared whitened residual, 2 degrees of freedom: 3e-4 of Gaussian errors
+constexpr int kSightingsOfPose = 3;           // that hold six degrees of freedom
 constexpr double kMinDepthOfPoint = 0.05;     // m in front of every camera that sees it
 
 }  // namespace
@@ -17,7 +18,7 @@ constexpr double kMinDepthOfPoint = 0.05;     // m in front of every camera that
 BundleCapacities WindowAdjuster::capacities(const OdometryOptions& options, const RigCalibration& rig) noexcept {
   BundleCapacities c;
   c.cameras = static_cast<std::size_t>(rig.cameras);
-  c.poses = static_cast<std::size_t>(options.window_keyframes);
+  c.poses = static_cast<std::size_t>(options.window_keyframes * rig.cameras);
   c.points = kMaxWindowPoints;
   c.observations = kMaxWindowPoints * kSightingsAPoint;
   c.shared = false;
@@ -37,15 +38,27 @@ WindowAdjuster::WindowAdjuster(const OdometryOptions& options, const RigCalibrat
   owner_ = BoundedVector<std::uint16_t>(arena.make<std::uint16_t>(c.points, "window points"));
   observations_ = BoundedVector<BundleObservation>(arena.make<BundleObservation>(c.observations, "window observations"));
   residuals_ = arena.make<float>(c.observations, "window residuals");
-  for (int k = 0; k < rig.cameras; ++k) cameras_[static_cast<std::size_t>(k)] = Lens(rig.intrinsics[static_cast<std::size_t>(k)]).ideal();
+  rebuild_cameras();
 }
 
-void WindowAdjuster::gather(Map& map) noexcept {
+void WindowAdjuster::rebuild_cameras() noexcept {
+  for (int k = 0; k < rig_.cameras; ++k) cameras_[static_cast<std::size_t>(k)] = Lens(rig_.intrinsics[static_cast<std::size_t>(k)]).ideal();
+}
+
+void WindowAdjuster::gather(Map& map, bool linked) noexcept {
   poses_.clear();
+  constant_.clear();
   points_.clear();
   owner_.clear();
   observations_.clear();
-  for (const std::uint8_t slot : map.order()) (void)poses_.push(map.keyframe(slot).T_left_world);
+  const int images = linked ? 1 : rig_.cameras;  // poses a keyframe
+  for (std::size_t i = 0; i < map.order().size(); ++i) {
+    const Keyframe& keyframe = map.keyframe(map.order()[i]);
+    for (int k = 0; k < images; ++k) {
+      (void)poses_.push(linked ? keyframe.T_left_world : keyframe.T_camera_left[static_cast<std::size_t>(k)] * keyframe.T_left_world);
+      (void)constant_.push(i == 0 ? 1 : 0);
+    }
+  }
   const std::span<MapPoint> all = map.points();
   for (std::size_t i = 0; i < all.size(); ++i) {
     const MapPoint& p = all[i];
@@ -53,14 +66,16 @@ void WindowAdjuster::gather(Map& map) noexcept {
     const std::size_t first = observations_.size();
     int keyframes = 0;
     bool fits = !points_.full();
-    for (std::size_t pose = 0; pose < map.order().size() && fits; ++pose) {
-      const Sighting& s = p.seen[map.order()[pose]];
+    for (std::size_t frame = 0; frame < map.order().size() && fits; ++frame) {
+      const Sighting& s = p.seen[map.order()[frame]];
       if (s.cameras == 0) continue;
       ++keyframes;
       for (int k = 0; k < rig_.cameras && fits; ++k) {
         if (!s.by(k)) continue;
         const auto c = static_cast<std::size_t>(k);
-        if ((rig_.T_camera_left[c] * (poses_[pose] * p.p_world)).z() < kMinDepthOfPoint) continue;
+        const std::size_t pose = linked ? frame : frame * static_cast<std::size_t>(images) + c;
+        const Vec3 here = poses_[pose] * p.p_world;
+        if ((linked ? rig_.T_camera_left[c] * here : here).z() < kMinDepthOfPoint) continue;
         BundleObservation o;
         o.point = static_cast<std::uint32_t>(points_.size());
         o.pose = static_cast<std::uint16_t>(pose);
@@ -79,6 +94,11 @@ void WindowAdjuster::gather(Map& map) noexcept {
     (void)points_.push(p.p_world);
     (void)owner_.push(static_cast<std::uint16_t>(i));
   }
+  // An image that saw nothing of the window stays where it is thought to be.
+  std::array<int, kMaxWindow * kMaxCameras> seen{};
+  for (const BundleObservation& o : observations_) ++seen[o.pose];
+  for (std::size_t i = 0; i < poses_.size(); ++i)
+    if (seen[i] < kSightingsOfPose) constant_[i] = 1;
 }
 
 int WindowAdjuster::drop_outliers(Map& map) noexcept {
@@ -87,15 +107,15 @@ int WindowAdjuster::drop_outliers(Map& map) noexcept {
     if (!(residuals_[i] > kOutlier)) continue;
     const BundleObservation& o = observations_[i];
     MapPoint& p = map.points()[owner_[o.point]];
-    p.seen[map.order()[o.pose]].drop(o.camera);
+    const std::size_t images = poses_.size() / map.order().size();
+    p.seen[map.order()[o.pose / images]].drop(o.camera);
     ++dropped;
   }
   return dropped;
 }
 
-WindowOutcome WindowAdjuster::adjust(Map& map) noexcept {
+WindowOutcome WindowAdjuster::solve(BundleConfiguration configuration) noexcept {
   WindowOutcome outcome;
-  gather(map);
   outcome.points = static_cast<int>(points_.size());
   outcome.observations = static_cast<int>(observations_.size());
   if (poses_.size() < 2 || points_.empty()) return outcome;
@@ -106,23 +126,47 @@ WindowOutcome WindowAdjuster::adjust(Map& map) noexcept {
   problem.cameras = std::span(cameras_).first(n);
   problem.T_camera_left = std::span(T_camera_left_).first(n);
   problem.T_left_world = poses_.span();
+  problem.pose_constant = constant_.span();
   problem.points = points_.span();
   problem.observations = observations_.span();
   problem.squared_residuals = residuals_.first(observations_.size());
   BundleOptions how;
-  how.configuration = BundleConfiguration::stereo_odometry;
+  how.configuration = configuration;
   how.loss = BundleLoss::huber;
   how.loss_threshold = options_.huber;
   how.max_steps = options_.window_steps;
   how.cost_tolerance = 1e-4;
   const BundleResult result = adjuster_.solve(problem, how);
   outcome.termination = result.termination;
+  outcome.usable = result.usable();
   outcome.steps = result.steps;
   outcome.rms_px = result.rms_px;
-  if (!result.usable()) return outcome;
-  for (std::size_t i = 0; i < poses_.size(); ++i) {
-    Transform& T = map.keyframe(map.order()[i]).T_left_world;
-    T = {normalised(poses_[i].R), poses_[i].t};
+  return outcome;
+}
+
+WindowOutcome WindowAdjuster::adjust(Map& map) noexcept {
+  gather(map, true);
+  WindowOutcome outcome = solve(BundleConfiguration::stereo_odometry);
+  if (!outcome.usable) return outcome;
+  for (std::size_t i = 0; i < poses_.size(); ++i) map.keyframe(map.order()[i]).T_left_world = {normalised(poses_[i].R), poses_[i].t};
+  for (std::size_t i = 0; i < points_.size(); ++i) map.points()[owner_[i]].p_world = points_[i];
+  outcome.dropped = drop_outliers(map);
+  return outcome;
+}
+
+WindowOutcome WindowAdjuster::adjust_unlinked(Map& map) noexcept {
+  gather(map, false);
+  WindowOutcome outcome = solve(BundleConfiguration::parallel_monocular);
+  if (!outcome.usable) return outcome;
+  const auto images = static_cast<std::size_t>(rig_.cameras);
+  for (std::size_t i = 0; i < map.order().size(); ++i) {
+    Keyframe& keyframe = map.keyframe(map.order()[i]);
+    const Transform& left = poses_[i * images];
+    keyframe.T_left_world = {normalised(left.R), left.t};
+    for (std::size_t k = 1; k < images; ++k) {
+      const Transform T = poses_[i * images + k] * left.inverse();
+      keyframe.T_camera_left[k] = {normalised(T.R), T.t};
+    }
   }
   for (std::size_t i = 0; i < points_.size(); ++i) map.points()[owner_[i]].p_world = points_[i];
   outcome.dropped = drop_outliers(map);

@@ -6,6 +6,7 @@
 namespace vergence::odometry {
 
 struct WindowOutcome {
+  bool usable = false;  // poses and points were written back
   BundleTermination termination = BundleTermination::invalid_input;
   int points = 0;
   int observations = 0;
@@ -24,10 +25,16 @@ class WindowAdjuster {
 
   /// Writes poses and points back if the result is usable, and drops sightings beyond the robust limit.
   WindowOutcome adjust(Map& map) noexcept;
+  /// The same with the cameras not linked: every image has a pose of its own, in Keyframe::T_camera_left (METHOD §2, parallel
+  /// monocular). Both images of the oldest keyframe are constant; the caller renews the scale.
+  WindowOutcome adjust_unlinked(Map& map) noexcept;
+  /// The owner's rig has other intrinsics than before.
+  void rebuild_cameras() noexcept;
 
  private:
   [[nodiscard]] static BundleCapacities capacities(const OdometryOptions& options, const RigCalibration& rig) noexcept;
-  void gather(Map& map) noexcept;
+  void gather(Map& map, bool linked) noexcept;
+  [[nodiscard]] WindowOutcome solve(BundleConfiguration configuration) noexcept;
   [[nodiscard]] int drop_outliers(Map& map) noexcept;
 
   const OdometryOptions& options_;
@@ -35,7 +42,8 @@ class WindowAdjuster {
   BundleAdjuster adjuster_;
   std::array<Camera, kMaxCameras> cameras_{};
   std::array<Transform, kMaxCameras> T_camera_left_{};
-  FixedVector<Transform, kMaxWindow> poses_;
+  FixedVector<Transform, kMaxWindow * kMaxCameras> poses_;
+  FixedVector<std::uint8_t, kMaxWindow * kMaxCameras> constant_;
   BoundedVector<Vec3> points_;
   BoundedVector<std::uint16_t> owner_;  // index in the map of each point
   BoundedVector<BundleObservation> observations_;

@@ -332,7 +332,9 @@ MotionLook Looks::motion(const Reference& c, const MonitorFrame& frame) noexcept
     }
     look.evidence.n += 1.5 * row.weight;  // three numbers a track, each the difference of two sightings
   }
-  look.spread = kTukeySpread3 * spread / kFixed;
+  // The look's own fit has taken up eleven of its 3 n numbers.
+  const double numbers = 3.0 * static_cast<double>(n);
+  look.spread = kTukeySpread3 * numbers / (numbers - kTheta - kFixed) * spread / kFixed;
   look.usable = true;
   return look;
 }

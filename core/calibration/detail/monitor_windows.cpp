@@ -1,6 +1,7 @@
 #include "core/calibration/detail/monitor_windows.hpp"
 
 #include <Eigen/Cholesky>
+#include <Eigen/LU>
 
 #include <algorithm>
 #include <cmath>
@@ -8,52 +9,90 @@
 namespace vergence::calibration::detail {
 namespace {
 
-// Inflation before anything is measured, and how many frames (looks) it weighs: what correlated tracks of method and mock show.
-constexpr double kFirstAcross = 6.0, kFirstMotion = 1.5;
-constexpr double kForgetAcross = 1.0 / 300, kForgetMotion = 1.0 / 40;  // a frame, a look
-constexpr double kLeastInflation = 0.3, kMostInflation = 200;          // below: sigmas claimed far too large; above: not a spread any more
+// What correlated tracks bring in over their life, until it is measured: times the spread of the first frame, of the first look;
+// and the frames (looks) that guess weighs.
+constexpr double kFirstLife = 6.5, kFirstMotion = 2.0, kGuessFrames = 30, kGuessLooks = 4;
+constexpr double kForgetAcross = 1.0 / 300, kForgetFast = 1.0 / 10, kForgetMotion = 1.0 / 40;  // a frame, a frame, a look
+constexpr double kLeastInflation = 0.3, kMostInflation = 200;  // below: sigmas claimed far too large; above: not a spread any more
 constexpr double kSpreadOutlier = 5;  // times the inflation: what one frame may count for at most, else one frame blinds the monitor
+// Windows that are also held against what was seen before them: a knock smaller than the reference's own error shows so, and only so.
+constexpr std::size_t kLearnWindow = 30, kLearnLongest = 150;
 constexpr double kPriorSigma = 0.2;   // rad: of directions nothing was seen of
+constexpr double kRelease = 0.5;      // of the threshold: an alarm stands until the statistic is below
 constexpr double kRampMargin = 10;    // gain by which a drift must beat a knock
-constexpr int kRampFrames = 90;       // and the least length of one
+constexpr int kRampFrames = 150;      // and the least length of one
 constexpr double kLagMargin = 25;     // gain by which a lag must beat every fixed or drifting transform
-constexpr double kLagExplains = 0.8;  // share of the gain from which a lag alone is a rival of the knock
+constexpr double kLagMost = 2;        // frames: what pairs images farther apart is no camera's fault
+constexpr double kLagModel = 0.6;     // frames: error of a lag from few frames, where speed and rocking change within one
+constexpr double kLagExplains = 0.6;  // share of the gain from which a lag alone is a rival of the knock
+constexpr int kLagFrames = 8;         // and the least frames it must have lasted
 constexpr int kLagPatience = 30;      // frames a verdict waits for the rivals to part
+
+Mat5 fixed_block(const Evidence& e) noexcept {
+  Mat5 A;
+  for (int i = 0; i < kFixed; ++i)
+    for (int j = 0; j <= i; ++j) A(i, j) = A(j, i) = e.A[lower(i, j)];
+  return A;
+}
 
 }  // namespace
 
 void Windows::reset(const MonitorOptions& options, const Mat5& covariance) noexcept {
   options_ = options;
   covariance_ = covariance;
-  bias2_ = options.bias_px * options.bias_px;
+  bias2_ = options.bias_px * options.bias_px / kFixed;  // of all five together
   window_count_ = 0;
-  for (const int frames : {options.short_window, 10, 30, 90, options.long_window}) {
+  for (const int frames : {options.short_window, 10, 30, 75, 150, options.long_window}) {
     const auto n = static_cast<std::size_t>(frames);
     if (n > static_cast<std::size_t>(options.long_window) || (window_count_ > 0 && n <= windows_[window_count_ - 1])) continue;
     windows_[window_count_++] = n;
   }
   count_ = closed_ = 0;
   open_ = Entry{};
-  lambda_across_ = kFirstAcross;
-  lambda_motion_ = kFirstMotion;
+  total_ = TwoEvidences{};
+  lambda_across_ = lambda_motion_ = now_fast_ = now_slow_ = life_slow_ = 0;
+  looks_ = 0;
   over_ = 0;
 }
 
-void Windows::push(const FrameEvidence& e) noexcept {
-  const auto follow = [](double* lambda, double spread, double rate) {
-    if (!(spread >= -kSpreadOutlier * *lambda)) return;  // also refuses NaN
-    const double bounded = std::min(spread, kSpreadOutlier * *lambda);
-    *lambda = std::clamp(*lambda + rate * (bounded - *lambda), kLeastInflation, kMostInflation);
+void Windows::follow_spread(const FrameEvidence& e) noexcept {
+  const auto follow = [](double* mean, double value, double rate) {
+    const double most = kSpreadOutlier * *mean;
+    if (value > -most) *mean += rate * (std::min(value, most) - *mean);  // also refuses NaN
   };
-  follow(&lambda_across_, e.spread_life, kForgetAcross);
-  if (e.spread_motion >= 0) follow(&lambda_motion_, e.spread_motion, kForgetMotion);
+  if (count_ == 0) {
+    now_fast_ = now_slow_ = e.spread_now;
+    life_slow_ = kFirstLife * e.spread_now;
+  } else {
+    const double n = static_cast<double>(count_);
+    follow(&now_fast_, e.spread_now, kForgetFast);
+    follow(&now_slow_, e.spread_now, std::max(kForgetAcross, 1.0 / (n + 1)));
+    follow(&life_slow_, e.spread_life, std::max(kForgetAcross, 1.0 / (n + kGuessFrames)));
+  }
+  // Noise that has just grown (rain, dusk) counts at once, for the tracks it will go on to spoil.
+  const double grown = now_slow_ > 0 ? std::max(1.0, now_fast_ / now_slow_) : 1.0;
+  lambda_across_ = std::clamp(std::max(life_slow_, now_slow_) * grown, kLeastInflation, kMostInflation);
+  if (e.spread_motion < 0) return;
+  if (looks_ == 0)
+    lambda_motion_ = kFirstMotion * e.spread_motion;
+  else
+    follow(&lambda_motion_, e.spread_motion, std::max(kForgetMotion, 1.0 / (static_cast<double>(looks_) + kGuessLooks)));
+  lambda_motion_ = std::clamp(lambda_motion_, kLeastInflation, kMostInflation);
+  ++looks_;
+}
+
+void Windows::push(const FrameEvidence& e) noexcept {
+  follow_spread(e);
   Entry& entry = recent_[count_ % kRecent];
   entry.frame = e.frame;
+  entry.before = e.before;
   entry.evidence = e.evidence;
-  if (count_ % kBlock == 0) open_ = Entry{e.frame, {}};
+  if (count_ % kBlock == 0) open_ = Entry{e.frame, 0, {}};
   open_.evidence.add(e.evidence);
   ++count_;
   if (count_ % kBlock == 0) {
+    if (closed_ >= kBlocks) total_.add(blocks_[closed_ % kBlocks].evidence, -1.0);
+    total_.add(open_.evidence);
     blocks_[closed_ % kBlocks] = open_;
     ++closed_;
     open_ = Entry{};
@@ -63,25 +102,37 @@ void Windows::push(const FrameEvidence& e) noexcept {
 Evidence Windows::effective(const TwoEvidences& sum) const noexcept {
   Evidence e;
   e.add(sum.across, 1.0 / (lambda_across_ + bias2_ * sum.across.n));
-  e.add(sum.motion, 1.0 / (lambda_motion_ + bias2_ * sum.motion.n));
+  if (sum.motion.n > 0) e.add(sum.motion, 1.0 / (lambda_motion_ + bias2_ * sum.motion.n));
   return e;
 }
 
-double Windows::statistic(const Evidence& e) const noexcept {
-  Mat5 A;
-  for (int i = 0; i < kFixed; ++i)
-    for (int j = 0; j <= i; ++j) A(i, j) = A(j, i) = e.A[lower(i, j)];
-  const Mat5 M = A + A * covariance_ * A;
+double Windows::statistic(const Evidence& e, const Vec5& mean, const Mat5& covariance) noexcept {
+  const Mat5 A = fixed_block(e);
+  const Mat5 M = A + A * covariance * A;
   std::array<double, kTriangle> packed{};
   for (int i = 0; i < kFixed; ++i)
     for (int j = 0; j <= i; ++j) packed[lower(i, j)] = M(i, j);
-  return Solved(packed, e.g).fixed_gain();
+  Theta g = e.g;
+  Eigen::Map<Vec5>(g.data()) -= A * mean;
+  return Solved(packed, g).fixed_gain();
+}
+
+void Windows::learn(const TwoEvidences& window, Vec5* mean, Mat5* covariance) const noexcept {
+  TwoEvidences past = total_;
+  past.add(open_.evidence);
+  past.add(window, -1.0);
+  // Without the floor: window and past share most of the slow error, and the window's own floor stands for what they do not share.
+  Evidence e;
+  e.add(past.across, 1.0 / lambda_across_);
+  if (past.motion.n > 0) e.add(past.motion, 1.0 / lambda_motion_);
+  // (C⁻¹ + A)⁻¹, written so that neither need have an inverse.
+  const Mat5 spread = Mat5::Identity() + covariance_ * fixed_block(e);
+  *covariance = Eigen::PartialPivLU<Mat5>(spread).solve(covariance_);
+  *mean = *covariance * Eigen::Map<const Vec5>(e.g.data());
 }
 
 void Windows::estimate(const Evidence& e, Vec5* theta, Mat5* covariance) const noexcept {
-  Mat5 A;
-  for (int i = 0; i < kFixed; ++i)
-    for (int j = 0; j <= i; ++j) A(i, j) = A(j, i) = e.A[lower(i, j)];
+  Mat5 A = fixed_block(e);
   A.diagonal().array() += 1.0 / (kPriorSigma * kPriorSigma);
   const Eigen::LLT<Mat5> llt(A);
   *covariance = llt.solve(Mat5::Identity());
@@ -91,7 +142,7 @@ void Windows::estimate(const Evidence& e, Vec5* theta, Mat5* covariance) const n
 double Windows::single(const Evidence& across, double spread) const noexcept {
   Evidence e;
   e.add(across, 1.0 / (std::max(spread, kLeastInflation) + bias2_ * across.n));
-  return statistic(e);
+  return statistic(e, Vec5::Zero(), covariance_);
 }
 
 void Windows::single_estimate(const Evidence& across, double spread, Vec5* theta, Mat5* covariance) const noexcept {
@@ -113,6 +164,12 @@ Decision Windows::decide() noexcept {
   if (count_ == 0) return d;
   d.onset = recent(0).frame;
   bool lagging = false;
+  Evidence longest;
+  // What the rig was before the window of the largest statistic, where that is known: a reference that is a little off is no onset.
+  Vec5 learnt = Vec5::Zero(), mean = Vec5::Zero();
+  const auto stands_out = [this](const Solved& s) {
+    return std::abs(s.lag()) > options_.lag_frames && std::abs(s.lag()) > options_.lag_sigmas * s.lag_sigma();
+  };
   TwoEvidences sum;
   std::size_t summed = 0;
   for (std::size_t w = 0; w < window_count_ && windows_[w] <= count_; ++w) {
@@ -121,46 +178,66 @@ Decision Windows::decide() noexcept {
     } else {
       sum_of(windows_[w], &sum);
     }
-    const Evidence e = effective(sum);
-    const double s = statistic(e);
-    Mat5 covariance;
-    if (s > d.statistic || w == 0) d.statistic = s, estimate(e, &d.theta, &covariance), d.covariance = covariance;
-    const Solved solved(e.A, e.g);
+    longest = effective(sum);
+    double most = statistic(longest, Vec5::Zero(), covariance_);
+    if (windows_[w] >= kLearnWindow && windows_[w] <= kLearnLongest && count_ >= 2 * windows_[w]) {
+      Mat5 covariance;
+      learn(sum, &learnt, &covariance);
+      most = std::max(most, statistic(longest, learnt, covariance));
+    }
+    if (most > d.statistic) d.statistic = most, mean = learnt;
+    Evidence across;
+    across.add(sum.across, 1.0 / (lambda_across_ + bias2_ * sum.across.n));
+    const Solved solved(across.A, across.g);
     d.lag = solved.lag();
     d.lag_sigma = solved.lag_sigma();
-    lagging = lagging || (std::abs(d.lag) > options_.lag_frames && std::abs(d.lag) > options_.lag_sigmas * d.lag_sigma);
-    Vec5 theta;
-    estimate(e, &theta, &covariance);
-    d.yaw_sigma = std::sqrt(covariance(kYaw, kYaw));
+    lagging = lagging || stands_out(solved);
   }
-  over_ = d.statistic > options_.threshold ? over_ + 1 : 0;
-  if (over_ > 0 || lagging) attribute(&d);
+  estimate(longest, &d.theta, &d.covariance);
+  d.yaw_sigma = std::sqrt(d.covariance(kYaw, kYaw));
+  const double limit = over_ > 0 ? kRelease * options_.threshold : options_.threshold;
+  over_ = d.statistic > limit ? over_ + 1 : 0;
+  if (over_ > 0 || lagging) attribute(mean, &d);
   return d;
 }
 
-void Windows::search(Search* found) const noexcept {
-  Evidence zeroth, first, second;  // Σ e, Σ age e, Σ age² e from now back
+void Windows::search(const Vec5& mean, Search* found) const noexcept {
+  struct Moments {
+    Evidence zeroth, first, second;  // Σ e, Σ age e, Σ age² e from now back
+    void add(const Evidence& e, double scale, double age) noexcept {
+      zeroth.add(e, scale), first.add(e, scale * age), second.add(e, scale * age * age);
+    }
+    [[nodiscard]] Evidence ramp(double length) const noexcept {  // weight 1 − age/length
+      Evidence r = zeroth;
+      for (std::size_t i = 0; i < r.g.size(); ++i) r.g[i] -= first.g[i] / length;
+      for (std::size_t i = 0; i < r.A.size(); ++i) r.A[i] += (second.A[i] / length - 2 * first.A[i]) / length;
+      return r;
+    }
+  };
+  Moments all, across;
   TwoEvidences raw;
   const auto take = [&](const Entry& entry, double age, int frames) {
-    Evidence e;
-    e.add(entry.evidence.across, 1.0 / lambda_across_);
-    e.add(entry.evidence.motion, 1.0 / lambda_motion_);
-    zeroth.add(e);
-    first.add(e, age);
-    second.add(e, age * age);
+    all.add(entry.evidence.across, 1.0 / lambda_across_, age);
+    across.add(entry.evidence.across, 1.0 / lambda_across_, age);
+    if (entry.evidence.motion.n > 0) all.add(entry.evidence.motion, 1.0 / lambda_motion_, age);
     raw.add(entry.evidence);
-    const auto keep = [&](Onset* best, double gain, const Evidence& since) {
-      if (gain > best->gain) *best = Onset{gain, entry.frame, frames, since, raw};
+    const auto solved = [&](const Evidence& e) {
+      Theta g = e.g;
+      for (int i = 0; i < kTheta; ++i)
+        for (int j = 0; j < kFixed; ++j) g[static_cast<std::size_t>(i)] -= e.A[lower(std::max(i, j), std::min(i, j))] * mean[j];
+      return Solved(e.A, g);
     };
-    const Solved solved(zeroth.A, zeroth.g);
-    keep(&found->step, solved.fixed_gain(), zeroth);
-    keep(&found->both, solved.fixed_gain() + solved.lag_gain(), zeroth);
+    const auto keep = [&](Onset* best, double gain, const Evidence& sum) {
+      if (gain > best->gain) *best = Onset{gain, entry.frame, frames, sum, raw};
+    };
+    const Solved fixed = solved(all.zeroth), lagged = solved(across.zeroth);
+    keep(&found->step, fixed.fixed_gain(), all.zeroth);
+    keep(&found->step_across, lagged.fixed_gain(), across.zeroth);
+    keep(&found->both_across, lagged.fixed_gain() + lagged.lag_gain(), across.zeroth);
     if (frames < kRampFrames) return;
-    Evidence ramp = zeroth;  // weight 1 − age/length
-    const double length = frames;
-    for (std::size_t i = 0; i < ramp.g.size(); ++i) ramp.g[i] -= first.g[i] / length;
-    for (std::size_t i = 0; i < ramp.A.size(); ++i) ramp.A[i] += (second.A[i] / length - 2 * first.A[i]) / length;
-    keep(&found->ramp, Solved(ramp.A, ramp.g).fixed_gain(), ramp);
+    const Evidence ramp = all.ramp(frames), ramp_across = across.ramp(frames);
+    keep(&found->ramp, solved(ramp).fixed_gain(), ramp);
+    keep(&found->ramp_across, solved(ramp_across).fixed_gain(), ramp_across);
   };
   // Single frames up to a block's edge, then blocks.
   const std::size_t open = count_ % kBlock;
@@ -173,38 +250,59 @@ void Windows::search(Search* found) const noexcept {
   }
 }
 
-void Windows::attribute(Decision* d) noexcept {
-  using Kind = MonitorVerdict::Kind;
-  Search found;
-  search(&found);
-  const double fixed = std::max(found.step.gain, found.ramp.gain);
+bool Windows::find_lag(const Search& found, Decision* d) const noexcept {
+  const Onset& both = found.both_across;
+  Evidence e;
+  e.add(both.raw.across, 1.0 / (lambda_across_ + bias2_ * both.raw.across.n));
+  const Solved lag(e.A, e.g);
+  if (both.frames < kLagFrames ||
+      !(std::abs(lag.lag()) > options_.lag_frames && std::abs(lag.lag()) > options_.lag_sigmas * lag.lag_sigma()))
+    return false;
+  if (both.gain < std::max(found.step_across.gain, found.ramp_across.gain) + kLagMargin) return false;
+  d->kind = MonitorVerdict::Kind::out_of_step;
+  d->lag = lag.lag();
+  d->lag_sigma = lag.lag_sigma();
+  d->onset = both.frame;
+  d->frames = both.frames;
+  estimate(e, &d->theta, &d->covariance);
+  return true;
+}
 
-  const Evidence with_lag = effective(found.both.raw);
-  const Solved lag(with_lag.A, with_lag.g);
-  if (std::abs(lag.lag()) > options_.lag_frames && std::abs(lag.lag()) > options_.lag_sigmas * lag.lag_sigma() &&
-      found.both.gain > fixed + kLagMargin) {
-    d->kind = Kind::out_of_step;
-    d->lag = lag.lag();
-    d->lag_sigma = lag.lag_sigma();
-    d->onset = found.both.frame;
-    d->frames = found.both.frames;
-    return;
+bool Windows::lag_is_rival(const Search& found) const noexcept {
+  const Onset& step = found.step_across;
+  const double A = step.since.A[lower(kLag, kLag)], g = step.since.g[kLag];
+  if (!(A > 0) || g * g / A < kLagExplains * step.gain) return false;
+  const double alone = g / A;
+  if (std::abs(alone) < options_.lag_frames || std::abs(alone) > kLagMost) return false;
+  const Solved both(step.since.A, step.since.g);
+  return std::abs(both.lag() - alone) < std::max(options_.lag_sigmas * both.lag_sigma(), kLagModel);
+}
+
+TwoEvidences Windows::since(const Onset& onset) const noexcept {
+  // A look from before the onset to after it compares two rigs: it alarms, but it measures neither.
+  TwoEvidences sum = onset.raw;
+  for (std::size_t age = 0; age < std::min<std::size_t>({static_cast<std::size_t>(onset.frames), kRecent, count_}); ++age) {
+    const Entry& e = recent(age);
+    if (e.evidence.motion.n > 0 && e.before < onset.frame) sum.motion.add(e.evidence.motion, -1.0);
   }
+  return sum;
+}
+
+void Windows::attribute(const Vec5& mean, Decision* d) noexcept {
+  Search found;
+  search(mean, &found);
+  if (find_lag(found, d)) return;
   if (over_ == 0) return;  // the lag of a window alone, which a step inside that window can make
-  const Evidence& e = found.step.since;
-  const double A = e.A[lower(kLag, kLag)], alone = A > 0 ? e.g[kLag] / A : 0.0, sigma = Solved(e.A, e.g).lag_sigma();
-  const bool rival = std::abs(alone) > options_.lag_frames && alone * e.g[kLag] > kLagExplains * found.step.gain &&
-                     std::abs(Solved(e.A, e.g).lag() - alone) < options_.lag_sigmas * sigma;
-  if (rival && over_ <= kLagPatience) {
+  if (over_ <= kLagPatience && lag_is_rival(found)) {
     d->undecided = true;
     return;
   }
   const bool ramp = found.ramp.gain > found.step.gain + kRampMargin;
-  d->kind = ramp ? Kind::drift : Kind::knock;
+  d->kind = ramp ? MonitorVerdict::Kind::drift : MonitorVerdict::Kind::knock;
   const Onset& onset = ramp ? found.ramp : found.step;
   d->onset = onset.frame;
   d->frames = onset.frames;
-  estimate(ramp ? onset.since : effective(onset.raw), &d->theta, &d->covariance);
+  estimate(ramp ? onset.since : effective(since(onset)), &d->theta, &d->covariance);
 }
 
 }  // namespace vergence::calibration::detail

@@ -11,9 +11,10 @@ namespace vergence::calibration::detail {
 /// What one moving frame brings.
 struct FrameEvidence {
   std::uint64_t frame = 0;
+  std::uint64_t before = 0;  // the earlier frame of the motion look
   TwoEvidences evidence;
-  double spread_life = 0;     // AcrossLook::spread_life
-  double spread_motion = -1;  // MotionLook::spread; negative: no look
+  double spread_now = 0, spread_life = 0;  // of the AcrossLook
+  double spread_motion = -1;               // MotionLook::spread; negative: no look
 };
 
 /// What all windows together say. Angles rad, as θ.
@@ -51,7 +52,7 @@ class Windows {
   static constexpr std::size_t kBlock = 15;    // frames that older ones are summed by
   static constexpr std::size_t kBlocks = 240;  // two minutes at 30 Hz: how far back a drift is traced
   struct Entry {
-    std::uint64_t frame = 0;
+    std::uint64_t frame = 0, before = 0;
     TwoEvidences evidence;
   };
   struct Onset {
@@ -62,28 +63,37 @@ class Windows {
     TwoEvidences raw;
   };
   struct Search {
-    Onset step, ramp, both;  // five; five growing from zero; five and the lag
+    Onset step, ramp;                             // five; five growing from zero
+    Onset step_across, both_across, ramp_across;  // the same without motion; five and the lag
   };
 
+  void follow_spread(const FrameEvidence& e) noexcept;
   [[nodiscard]] Evidence effective(const TwoEvidences& sum) const noexcept;
-  [[nodiscard]] double statistic(const Evidence& e) const noexcept;
+  [[nodiscard]] static double statistic(const Evidence& e, const Vec5& mean, const Mat5& covariance) noexcept;
+  void learn(const TwoEvidences& window, Vec5* mean, Mat5* covariance) const noexcept;
   void estimate(const Evidence& e, Vec5* theta, Mat5* covariance) const noexcept;
   void sum_of(std::size_t frames, TwoEvidences* sum) const noexcept;
   [[nodiscard]] const Entry& recent(std::size_t age) const noexcept { return recent_[(count_ - 1 - age) % kRecent]; }
   [[nodiscard]] const Entry& block(std::size_t age) const noexcept { return blocks_[(closed_ - 1 - age) % kBlocks]; }
-  void search(Search* found) const noexcept;
-  void attribute(Decision* d) noexcept;
+  void search(const Vec5& mean, Search* found) const noexcept;
+  [[nodiscard]] bool find_lag(const Search& found, Decision* d) const noexcept;
+  [[nodiscard]] bool lag_is_rival(const Search& found) const noexcept;
+  [[nodiscard]] TwoEvidences since(const Onset& onset) const noexcept;
+  void attribute(const Vec5& mean, Decision* d) noexcept;
 
   MonitorOptions options_{};
   Mat5 covariance_ = Mat5::Zero();
-  double bias2_ = 0;
-  std::array<std::size_t, 5> windows_{};
+  double bias2_ = 0;  // px², of a mode
+  std::array<std::size_t, 6> windows_{};
   std::size_t window_count_ = 0;
   std::uint64_t count_ = 0, closed_ = 0;  // frames, full blocks
   std::array<Entry, kRecent> recent_{};
   std::array<Entry, kBlocks> blocks_{};
-  Entry open_{};  // the block being filled
+  Entry open_{};          // the block being filled
+  TwoEvidences total_{};  // of the blocks kept
   double lambda_across_ = 0, lambda_motion_ = 0;
+  double now_fast_ = 0, now_slow_ = 0, life_slow_ = 0;  // running means of the spreads
+  std::uint64_t looks_ = 0;
   int over_ = 0;  // frames in a row over the threshold
 };
 

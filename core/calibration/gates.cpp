@@ -1,0 +1,146 @@
+#include "core/calibration/gates.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "core/camera/camera.hpp"
+#include "core/geometry/epipolar.hpp"
+#include "core/math/so3.hpp"
+
+namespace vergence::calibration {
+namespace {
+
+constexpr double kFullWindow = 3.0;         // times the wanted sigmas, at max_frames
+constexpr double kBaselineOfSigmas = 0.75;  // m, for which the wanted sigma of t is given
+constexpr int kFewestHeldOut = 3;           // frames that say anything
+constexpr double kChance = 2.0;             // standard errors
+constexpr double kWorstFit = 1.5;           // px: matches of frames not in the solve, median
+constexpr double kNeedsBaselines = 3.0;     // travelled, besides needs_motion_m
+
+/// Median distance to the epipolar lines of one frame's matches, px; negative: hardly a match.
+double median_distance(const LoggedFrame& frame, const RigCalibration& rig) noexcept {
+  const Camera left(rig.intrinsics[0]), right(rig.intrinsics[1]);
+  const EpipolarGeometry geometry(rig.T_camera_left[1]);
+  std::array<double, kHeldOutMatches> distance;
+  std::size_t n = 0;
+  const std::size_t step = frame.sightings.size() / kHeldOutMatches + 1;
+  for (std::size_t i = 0; i < frame.sightings.size() && n < distance.size(); i += step) {
+    const LoggedSighting& s = frame.sightings[i];
+    Vec3 a, b;
+    double d = 0;
+    if (!s.by(0) || !s.by(1) || !left.unproject(s.raw[0].cast<double>(), &a) || !right.unproject(s.raw[1].cast<double>(), &b) ||
+        geometry.to_line(a.head<2>() / a.z(), b.head<2>() / b.z(), &d, nullptr) != EpipolarStatus::ok)
+      continue;
+    distance[n++] = std::abs(d) * rig.intrinsics[1].fx;
+  }
+  if (n < 10) return -1.0;
+  const auto middle = distance.begin() + static_cast<std::ptrdiff_t>(n / 2);
+  std::nth_element(distance.begin(), middle, distance.begin() + static_cast<std::ptrdiff_t>(n));
+  return *middle;
+}
+
+/// Calls `each` for the newest frames after a number.
+template <class Each>
+void for_held_out(const TrackLog& log, std::uint64_t after, Each each) noexcept {
+  std::size_t n = 0;
+  for (std::size_t i = log.size(); i-- > 0 && n < kHeldOutFrames && log.frame(i).number > after; ++n) each(log.frame(i));
+}
+
+double angle_between(const Vec3& a, const Vec3& b) noexcept { return std::atan2(a.cross(b).norm(), a.dot(b)); }
+
+}  // namespace
+
+HeldOut held_out(const TrackLog& log, std::uint64_t after, const RigCalibration& rig) noexcept {
+  std::array<double, kHeldOutFrames> medians;
+  HeldOut h;
+  for_held_out(log, after, [&](const LoggedFrame& f) noexcept {
+    const double m = median_distance(f, rig);
+    if (m >= 0) medians[static_cast<std::size_t>(h.frames++)] = m;
+  });
+  if (h.frames == 0) return h;
+  const auto middle = medians.begin() + h.frames / 2;
+  std::nth_element(medians.begin(), middle, medians.begin() + h.frames);
+  h.median_px = *middle;
+  return h;
+}
+
+bool fits_better(const TrackLog& log, std::uint64_t after, const RigCalibration& better, const RigCalibration& worse) noexcept {
+  double sum = 0, squares = 0;
+  int n = 0;
+  for_held_out(log, after, [&](const LoggedFrame& f) noexcept {
+    const double a = median_distance(f, worse), b = median_distance(f, better);
+    // Without a match by which to tell: the one that was searched with the other's band is no witness.
+    if (a < 0 || b < 0) return;
+    sum += a - b;
+    squares += (a - b) * (a - b);
+    ++n;
+  });
+  if (n < kFewestHeldOut) return true;
+  const double mean = sum / n, variance = std::max(0.0, squares / n - mean * mean);
+  return mean > kChance * std::sqrt(variance / (n - 1));
+}
+
+const char* reason(Gate gate) noexcept {
+  switch (gate) {
+    case Gate::open:
+      return "";
+    case Gate::not_solved:
+      return "the adjustment did not converge";
+    case Gate::sigmas_too_large:
+      return "the tracks do not hold it well enough yet";
+    case Gate::needs_motion:
+      return "too little way was driven to see it";
+    case Gate::needs_near_structure:
+      return "too few near points were seen";
+    case Gate::cameras_swapped:
+      return "the right camera is on the left: cables or their order in the configuration are exchanged";
+    case Gate::implausible_direction:
+      return "the direction between the cameras is far from the configured one";
+    case Gate::implausible_rotation:
+      return "the rotation between the cameras is far from the configured one";
+    case Gate::out_of_step:
+      return "the cameras' images are not of the same instant";
+    case Gate::does_not_fit:
+      return "frames that were not used contradict it";
+    case Gate::no_better:
+      return "the calibration in use fits as well";
+  }
+  return "";
+}
+
+double sigma_excess(const RigCalibration& rig, const CalibrationOptions& o) noexcept {
+  double worst = 0;
+  for (int k = 1; k < rig.cameras; ++k) {
+    const auto& sigma = rig.sigma_noise[static_cast<std::size_t>(k)];
+    for (std::size_t i = 0; i < 3; ++i) worst = std::max(worst, sigma[i] / (1e-3 * o.rotation_sigma_mrad));
+    for (std::size_t i = 4; i < 6; ++i)
+      worst = std::max(
+          worst, sigma[i] / (1e-3 * o.translation_sigma_mm * rig.T_camera_left[static_cast<std::size_t>(k)].t.norm() / kBaselineOfSigmas));
+  }
+  return worst;
+}
+
+Gate ask_gates(const GateQuestion& q, const CalibrationOptions& o) noexcept {
+  constexpr double kDegree = std::numbers::pi / 180.0;
+  const RigSolution& s = *q.solution;
+  if (s.status != RigSolveStatus::ok) return Gate::not_solved;
+  for (int k = 1; k < s.rig.cameras; ++k) {
+    const auto c = static_cast<std::size_t>(k);
+    const Transform &found = s.rig.T_camera_left[c], &nominal = q.nominal->T_camera_left[c];
+    if (found.t.dot(nominal.t) < 0) return Gate::cameras_swapped;
+    if (s.out_of_step) return Gate::out_of_step;
+    if (angle_between(found.t, nominal.t) > o.max_direction_deg * kDegree) return Gate::implausible_direction;
+    if (q.in_use != nullptr && log_so3(found.R * nominal.R.transpose()).norm() > o.max_rotation_deg * kDegree)
+      return Gate::implausible_rotation;
+  }
+  if (s.travelled_m < std::max(o.needs_motion_m, kNeedsBaselines * s.rig.baseline)) return Gate::needs_motion;
+  if (s.near < o.needs_near_points) return Gate::needs_near_structure;
+  if (sigma_excess(s.rig, o) > (q.window_full ? kFullWindow : 1.0)) return Gate::sigmas_too_large;
+  const HeldOut fit = held_out(*q.log, s.newest, s.rig);
+  if (fit.frames >= kFewestHeldOut && fit.median_px > kWorstFit) return Gate::does_not_fit;
+  if (q.in_use != nullptr && !fits_better(*q.log, s.newest, s.rig, *q.in_use)) return Gate::no_better;
+  return Gate::open;
+}
+
+}  // namespace vergence::calibration

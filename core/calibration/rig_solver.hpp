@@ -1,0 +1,87 @@
+#pragma once
+#include "core/bundle/bundle.hpp"
+#include "core/calibration/monitor.hpp"
+#include "core/calibration/monitor_feed.hpp"
+#include "core/calibration/options.hpp"
+#include "core/calibration/track_log.hpp"
+#include "core/memory/arena.hpp"
+
+namespace vergence::calibration {
+
+enum class RigSolveStatus : std::uint8_t {
+  ok,
+  too_few_tracks,  // hardly a point was seen by both cameras in two frames
+  no_candidate,    // in no frame the cameras' own poses were found
+  not_converged,
+  not_observable,  // converged, but the tracks leave some direction of the transform open
+};
+
+struct RigSolution {
+  RigSolveStatus status = RigSolveStatus::too_few_tracks;
+  RigCalibration rig{};      // the result: transforms, sigmas, intrinsics where they were estimated, frames, rms, scale_sigma
+  std::uint64_t newest = 0;  // number of the newest frame used
+  int frames = 0;
+  int tracks = 0;
+  int observations = 0;
+  int steps = 0;
+  int near = 0;              // tracks nearer than CalibrationOptions::near_baselines
+  double travelled_m = 0;    // along the frames used
+  double lag_frames = 0;     // of camera 1, by the monitor over the frames used
+  bool out_of_step = false;  // and it is significant
+  double solve_ms = 0;       // wall time
+};
+
+/// The stereo calibration adjustment of METHOD §3 over a snapshot of the track log: candidate pair, right cameras re-initialised through
+/// it, points triangulated, all adjusted with the shared transform; sigmas noise-only and wide.
+///
+/// Threads  log() is filled by the estimator's thread while no solve runs; solve() runs on the solver's.
+/// Memory   All from the arena at construction. Time: bounded; some hundred milliseconds for 60 frames of 500 tracks.
+/// Errors   By status; a solution that is not `ok` has no calibration to use.
+class RigSolver {
+ public:
+  RigSolver(const CalibrationOptions& options, const MonitorOptions& monitor, int cameras, std::size_t features, Arena& arena);
+  [[nodiscard]] static std::size_t memory_needed(const CalibrationOptions& options, const MonitorOptions& monitor, int cameras,
+                                                 std::size_t features) noexcept;
+
+  [[nodiscard]] TrackLog& log() noexcept { return log_; }
+  /// Of `rig` are read: cameras, intrinsics and baseline.
+  [[nodiscard]] RigSolution solve(const RigCalibration& rig) noexcept;
+
+ private:
+  struct Reference {
+    std::uint32_t track;
+    std::uint16_t frame;
+    std::uint16_t sighting;
+  };
+  [[nodiscard]] static BundleCapacities capacities(const CalibrationOptions& options, int cameras, std::size_t features) noexcept;
+  [[nodiscard]] bool choose_candidate(RigSolution* s) noexcept;
+  void sort_tracks() noexcept;
+  void make_points() noexcept;
+  [[nodiscard]] bool add_point(std::span<const Reference> track) noexcept;
+  [[nodiscard]] BundleOptions options_of(const RigCalibration& rig) const noexcept;
+  [[nodiscard]] BundleResult adjust(const BundleOptions& how) noexcept;
+  [[nodiscard]] double residual_scale() noexcept;
+  void drop_outliers(double limit) noexcept;
+  void write_result(const BundleResult& r, RigSolution* s) const noexcept;
+  void describe(RigSolution* s) const noexcept;
+  void look_for_lag(RigSolution* s) noexcept;
+
+  const CalibrationOptions& options_;
+  TrackLog log_;
+  BundleAdjuster adjuster_;
+  Monitor monitor_;
+  MonitorFeed feed_;
+  std::size_t most_frames_;
+  std::array<Camera, kMaxCameras> cameras_{};
+  std::array<Transform, kMaxCameras> T_camera_left_{};
+  int count_ = 0;  // cameras
+  BoundedVector<Transform> poses_;
+  BoundedVector<std::uint16_t> logged_;  // index in the log of each pose
+  BoundedVector<Vec3> points_;
+  BoundedVector<BundleObservation> observations_;
+  BoundedVector<Reference> references_;
+  BoundedVector<AcrossSighting> across_;
+  std::span<float> residuals_, sorted_;
+};
+
+}  // namespace vergence::calibration

@@ -1,0 +1,73 @@
+#pragma once
+#include <array>
+#include <cstdint>
+#include <span>
+
+#include "core/memory/arena.hpp"
+#include "core/memory/fixed_vector.hpp"
+#include "core/types/calibration.hpp"
+#include "core/types/time.hpp"
+
+namespace vergence::calibration {
+
+/// One track in one rig frame: raw pixels, as the images have them.
+struct LoggedSighting {
+  std::uint32_t track = 0;
+  std::uint8_t cameras = 0;  // bit k: camera k saw it
+  float sigma = 0;           // px, of one coordinate
+  std::array<Eigen::Vector2f, kMaxCameras> raw{};
+
+  [[nodiscard]] bool by(int k) const noexcept { return ((cameras >> static_cast<unsigned>(k)) & 1U) != 0; }
+};
+
+/// One rig frame of the log. `T_camera_left`: as the cameras' own poses had it (unlinked) or the calibration in use (linked).
+struct LoggedFrame {
+  std::uint64_t number = 0;
+  Stamp stamp{};
+  Transform T_left_world{};
+  std::array<Transform, kMaxCameras> T_camera_left{};
+  bool unlinked = false;       // T_camera_left was measured in this frame
+  double reprojection_px = 0;  // rms of that frame's pose
+  int across = 0;              // tracks that both cameras hold
+  std::span<LoggedSighting> sightings;
+};
+
+/// The newest moving rig frames with their tracks: what a calibration is found from.
+///
+/// Policies when full  Frames: the oldest goes. Sightings of a frame: the rest is left out and counted.
+/// Threads one. Memory from the arena at construction.
+class TrackLog {
+ public:
+  TrackLog(std::size_t frames, std::size_t sightings, Arena& arena);
+  [[nodiscard]] static std::size_t memory_needed(std::size_t frames, std::size_t sightings) noexcept;
+
+  /// A new frame; push() then fills it.
+  void begin(const LoggedFrame& frame) noexcept;
+  void push(const LoggedSighting& sighting) noexcept;
+
+  void clear() noexcept { size_ = 0; }
+  /// Forgets frames with a number below.
+  void drop_before(std::uint64_t number) noexcept;
+  /// The world was scaled about a place: the poses follow.
+  void scale_about(const Vec3& centre, double factor) noexcept;
+  /// The newest `frames` of another log with its sightings, in place of what is here.
+  void copy(const TrackLog& from, std::size_t frames) noexcept;
+
+  [[nodiscard]] std::size_t size() const noexcept { return size_; }
+  [[nodiscard]] bool empty() const noexcept { return size_ == 0; }
+  /// i = 0: the oldest.
+  [[nodiscard]] LoggedFrame& frame(std::size_t i) noexcept { return frames_[slot(i)]; }
+  [[nodiscard]] const LoggedFrame& frame(std::size_t i) const noexcept { return frames_[slot(i)]; }
+  [[nodiscard]] std::uint64_t left_out() const noexcept { return left_out_; }
+
+ private:
+  [[nodiscard]] std::size_t slot(std::size_t i) const noexcept { return (first_ + i) % frames_.size(); }
+
+  std::span<LoggedFrame> frames_;
+  std::span<LoggedSighting> sightings_;  // as many a frame as capacity_
+  std::size_t capacity_;
+  std::size_t first_ = 0, size_ = 0;
+  std::uint64_t left_out_ = 0;
+};
+
+}  // namespace vergence::calibration

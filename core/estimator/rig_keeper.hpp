@@ -1,0 +1,92 @@
+#pragma once
+#include <array>
+#include <optional>
+
+#include "core/calibration/gates.hpp"
+#include "core/calibration/monitor.hpp"
+#include "core/calibration/monitor_feed.hpp"
+#include "core/calibration/rig_solver.hpp"
+#include "core/calibration/track_log.hpp"
+#include "core/estimator/estimator.hpp"
+#include "core/odometry/odometry.hpp"
+
+namespace vergence {
+
+/// Keeps the rig's calibration: logs the tracks, watches that they fit, has a new calibration solved beside the frames and decides
+/// about it. The estimator tells it what was posed and follows its advice; states are the estimator's.
+///
+/// Threads one, but for the solver's task. Memory from the arena at construction.
+class RigKeeper {
+ public:
+  RigKeeper(const EstimatorOptions& options, const RigCalibration& rig, const RigCalibration& nominal, Arena& arena,
+            BackgroundRunner& solver);
+  [[nodiscard]] static std::size_t memory_needed(const EstimatorOptions& options, const RigCalibration& rig) noexcept;
+
+  /// What a posed frame saw goes into the log, if the rig has moved since the last one that did.
+  void log(odometry::Odometry& odometry, const odometry::FrameOutcome& outcome, const RigFrame& frame) noexcept;
+
+  /// The worst verdict of the further cameras' monitors on a posed frame; linked odometry only.
+  [[nodiscard]] calibration::MonitorVerdict watch(const odometry::Odometry& odometry, const odometry::FrameOutcome& outcome,
+                                                  const RigFrame& frame) noexcept;
+
+  /// From now on a calibration is sought. Frames before `onset` belong to another rig and are forgotten.
+  void seek(CalibrationCause cause, std::uint64_t onset, std::uint64_t now) noexcept;
+  [[nodiscard]] bool seeking() const noexcept { return seeking_; }
+  /// There are frames enough to solve from and no solve is under way.
+  [[nodiscard]] bool can_solve() const noexcept;
+  /// Takes a snapshot and starts the solver on it.
+  void start_solve() noexcept;
+  [[nodiscard]] bool solving() const noexcept { return solving_; }
+  /// After every frame. A value: the solve is over and decided.
+  [[nodiscard]] std::optional<CalibrationDecision> decide(Stamp stamp, std::uint64_t number) noexcept;
+  [[nodiscard]] calibration::Gate last_gate() const noexcept { return gate_; }
+
+  /// What is missing to calibrate: needs_motion, needs_near_structure, needs_texture; `none` if nothing is known to be.
+  [[nodiscard]] Reason missing() const noexcept { return missing_; }
+
+  /// Waits for the solver's task, which writes into this.
+  void finish() noexcept {
+    if (solving_) runner_.wait();
+  }
+  /// The scene was lost: what is logged does not go on.
+  void scene_lost() noexcept;
+  /// The calibration in use is this one.
+  void use(const RigCalibration& rig) noexcept;
+  [[nodiscard]] const RigCalibration& in_use() const noexcept { return rig_; }
+  [[nodiscard]] bool calibrated() const noexcept { return calibrated_; }
+  /// Frames in a row that agree with the calibration in use.
+  [[nodiscard]] int frames_agreed() const noexcept;
+
+ private:
+  struct SolveTask {
+    RigKeeper* keeper;
+    void operator()() const noexcept;
+  };
+  [[nodiscard]] double pixels_moved(const odometry::Map& map) const noexcept;
+  [[nodiscard]] int expected_across(const odometry::Odometry& odometry, int k, const Transform& T_left_world) const noexcept;
+
+  const EstimatorOptions& options_;
+  RigCalibration rig_, nominal_;
+  bool calibrated_;
+  calibration::TrackLog log_;
+  calibration::RigSolver rig_solver_;
+  BackgroundRunner& runner_;
+  SolveTask task_;
+  std::array<std::optional<calibration::Monitor>, kMaxCameras> monitors_;  // [k] of camera k ≥ 1
+  std::array<std::optional<calibration::MonitorFeed>, kMaxCameras> feeds_;
+  BoundedVector<calibration::AcrossSighting> across_;
+  Transform T_left_world_{};
+  bool any_ = false;  // T_left_world_ is the frame before's
+
+  CalibrationCause cause_ = CalibrationCause::from_scratch;
+  bool seeking_ = false, solving_ = false;
+  std::uint64_t sought_since_ = 0, onset_ = 0;  // frame numbers
+  std::size_t logged_ = 0, wanted_ = 0;         // frames logged for what is sought; and how many the next solve needs
+  int frames_since_snapshot_ = 0;
+  int frames_still_ = 0;  // since one was logged
+  calibration::RigSolution solution_;
+  calibration::Gate gate_ = calibration::Gate::open;
+  Reason missing_ = Reason::none;
+};
+
+}  // namespace vergence

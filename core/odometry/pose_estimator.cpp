@@ -1,0 +1,188 @@
+#include "core/odometry/pose_estimator.hpp"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+
+namespace vergence::odometry {
+namespace {
+
+constexpr double kOutlier = 9.21;  // squared sigmas, two coordinates at 99 %
+constexpr int kCameraHolds = 8;    // inliers for a camera to count as one that supports the pose
+constexpr int kCameraAlone = 12;   // inliers for a camera's own pose to be believed
+
+}  // namespace
+
+std::size_t PoseEstimator::memory_needed() noexcept {
+  return RigObservationTable::memory_needed(kMaxPoints) + RigMlesac::memory_needed(kMaxPoints) + PoseRefiner::memory_needed(kMaxPoints) +
+         kMaxPoints * (sizeof(std::uint16_t) + 1) + 2 * kCacheLine;
+}
+
+PoseEstimator::PoseEstimator(const OdometryOptions& options, const RigCalibration& rig, Arena& arena)
+    : options_(options),
+      rig_(rig),
+      table_(kMaxPoints, arena),
+      mlesac_(kMaxPoints, arena),
+      refiner_(kMaxPoints, arena),
+      owner_(arena.make<std::uint16_t>(kMaxPoints, "pose rows")),
+      agrees_(arena.make<std::uint8_t>(kMaxPoints, "pose flags")),
+      random_(options.seed) {}
+
+void PoseEstimator::collect(const Map& map) noexcept {
+  table_.set_rig(rig_);
+  table_.clear();
+  owner_.clear();
+  const std::span<const MapPoint> points = map.points();
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const MapPoint& p = points[i];
+    if (!p.holds_poses() || p.now.cameras == 0) continue;
+    const auto first = static_cast<std::size_t>(std::countr_zero(p.now.cameras));
+    if (!table_.push(p.p_world, p.now.sigma[first])) return;
+    for (int k = 0; k < rig_.cameras; ++k)
+      if (p.now.by(k)) table_.see(k, p.now.pixel[static_cast<std::size_t>(k)].cast<double>());
+    (void)owner_.push(static_cast<std::uint16_t>(i));
+  }
+}
+
+void PoseEstimator::collect_camera(const Map& map, int k) noexcept {
+  const auto c = static_cast<std::size_t>(k);
+  RigCalibration one;
+  one.cameras = 1;
+  one.intrinsics[0] = rig_.intrinsics[c];
+  table_.set_rig(one);
+  table_.clear();
+  owner_.clear();
+  const std::span<const MapPoint> points = map.points();
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const MapPoint& p = points[i];
+    if (!p.holds_poses() || !p.now.by(k)) continue;
+    if (!table_.push(p.p_world, p.now.sigma[c])) return;
+    table_.see(0, p.now.pixel[c].cast<double>());
+    (void)owner_.push(static_cast<std::uint16_t>(i));
+  }
+}
+
+PoseEstimator::Solved PoseEstimator::solve(const Transform& start, bool sample) noexcept {
+  Solved s;
+  if (table_.size() < 3) return s;
+  s.T = start;
+  if (sample) {
+    MlesacOptions how;
+    how.max_hypotheses = options_.mlesac_hypotheses;
+    const MlesacPose m = mlesac_.solve(table_.view(), how, &start, random_);
+    if (m.status != MlesacStatus::ok) return s;
+    s.T = m.T_left_world;
+  }
+  PoseRefineOptions refine;
+  refine.huber = options_.huber;
+  refine.inlier_chi2 = kOutlier;
+  const RefinedPose r = refiner_.refine(table_.view(), s.T, sample ? mlesac_.flags() : std::span<const std::uint8_t>{}, refine);
+  if (!r.usable()) return s;
+  s.found = true;
+  s.T = r.T_left_world;
+  s.rms_px = r.rms_px;
+  s.inliers = r.inliers;
+  return s;
+}
+
+void PoseEstimator::count(const Map& map, PoseFit* fit) const noexcept {
+  std::array<int, kMaxCameras> held{};
+  const std::span<const MapPoint> points = map.points();
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const MapPoint& p = points[i];
+    if (!p.holds_poses() || p.now.cameras == 0) continue;
+    ++fit->given;
+    if (std::popcount(p.now.cameras) > 1) ++fit->across;
+    const std::uint8_t good = agrees_[i];
+    if (good == 0) continue;
+    ++fit->inliers;
+    for (int k = 0; k < rig_.cameras; ++k) held[static_cast<std::size_t>(k)] += (good >> k) & 1;
+    if ((good & 1U) == 0 || (good & ~1U) == 0) continue;
+    ++fit->stereo;
+    const double z = (fit->T_left_world * p.p_world).z();
+    const auto other = static_cast<std::size_t>(std::countr_zero(static_cast<unsigned>(good & ~1U)));
+    if (rig_.intrinsics[0].fx * rig_.T_camera_left[other].t.norm() > kNearDisparity * z) ++fit->near;
+  }
+  for (int k = 0; k < rig_.cameras; ++k)
+    if (held[static_cast<std::size_t>(k)] >= kCameraHolds)
+      fit->cameras = static_cast<std::uint8_t>(fit->cameras | (1U << static_cast<unsigned>(k)));
+  // One camera alone measures no depth and makes no new points: what is left of the map has to hold the pose well.
+  fit->found = fit->inliers >= (std::popcount(fit->cameras) < 2 ? options_.ok_inliers : options_.min_inliers);
+}
+
+PoseFit PoseEstimator::fit_linked(const Map& map, const Transform& start, bool sample) noexcept {
+  PoseFit fit;
+  collect(map);
+  fit.T_left_world = start;
+  std::fill(agrees_.begin(), agrees_.end(), std::uint8_t{0});
+  const Solved s = solve(start, sample);
+  if (s.found) {
+    fit.T_left_world = s.T;
+    fit.rms_px = s.rms_px;
+    for (std::size_t i = 0; i < owner_.size(); ++i) agrees_[owner_[i]] = refiner_.flags()[i];
+  }
+  count(map, &fit);
+  return fit;
+}
+
+PoseFit PoseEstimator::fit_left(const Map& map, const Transform& start) noexcept {
+  PoseFit fit;
+  fit.T_left_world = start;
+  Transform T;
+  if (!fit_camera(map, 0, start, true, &T)) return fit;
+  collect(map);
+  std::fill(agrees_.begin(), agrees_.end(), std::uint8_t{0});
+  std::array<std::uint8_t, kMaxPoints> left;
+  left.fill(1);
+  PoseRefineOptions refine;
+  refine.huber = options_.huber;
+  refine.inlier_chi2 = kOutlier;
+  const RefinedPose r = refiner_.refine(table_.view(), T, std::span<const std::uint8_t>(left).first(table_.size()), refine);
+  if (!r.usable()) return fit;
+  fit.T_left_world = r.T_left_world;
+  fit.rms_px = r.rms_px;
+  for (std::size_t i = 0; i < owner_.size(); ++i) agrees_[owner_[i]] = refiner_.flags()[i];
+  count(map, &fit);
+  return fit;
+}
+
+bool PoseEstimator::fit_camera(const Map& map, int k, const Transform& start, bool sample, Transform* T_camera_world) noexcept {
+  collect_camera(map, k);
+  const Solved s = solve(start, sample);
+  // Wrong matches agree with each other by chance, so a share is asked for besides a count.
+  if (s.inliers < kCameraAlone || s.inliers < static_cast<int>(owner_.size()) / 4) return false;
+  *T_camera_world = s.T;
+  return true;
+}
+
+PoseFit PoseEstimator::fit_unlinked(const Map& map, const Transform& start, bool sample, std::span<Transform> T_camera_left) noexcept {
+  PoseFit fit;
+  fit.T_left_world = start;
+  std::fill(agrees_.begin(), agrees_.end(), std::uint8_t{0});
+  double squares = 0;
+  int cameras = 0;
+  for (int k = 0; k < rig_.cameras; ++k) {
+    const auto c = static_cast<std::size_t>(k);
+    collect_camera(map, k);
+    const Solved s = solve(T_camera_left[c] * (k == 0 ? start : fit.T_left_world), sample);
+    if (s.inliers < kCameraAlone) {
+      // Without the left camera's pose there is none of the rig.
+      if (k == 0) break;
+      continue;
+    }
+    for (std::size_t i = 0; i < owner_.size(); ++i)
+      if (refiner_.flags()[i] != 0) agrees_[owner_[i]] = static_cast<std::uint8_t>(agrees_[owner_[i]] | (1U << static_cast<unsigned>(k)));
+    if (k == 0)
+      fit.T_left_world = s.T;
+    else
+      T_camera_left[c] = s.T * fit.T_left_world.inverse();
+    squares += s.rms_px * s.rms_px;
+    ++cameras;
+  }
+  fit.rms_px = cameras == 0 ? 0.0 : std::sqrt(squares / cameras);
+  count(map, &fit);
+  if ((fit.cameras & 1U) == 0) fit.found = false;
+  return fit;
+}
+
+}  // namespace vergence::odometry

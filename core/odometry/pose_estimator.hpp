@@ -1,0 +1,66 @@
+#pragma once
+#include "core/geometry/mlesac.hpp"
+#include "core/geometry/pose_refine.hpp"
+#include "core/odometry/map.hpp"
+#include "core/odometry/options.hpp"
+
+namespace vergence::odometry {
+
+/// A pose of the rig found from this frame's sightings of the map, and what it rests on.
+struct PoseFit {
+  bool found = false;
+  Transform T_left_world{};
+  int inliers = 0;
+  int stereo = 0;
+  int across = 0;  // points found in two cameras, whether they agree or not
+  int near = 0;    // inliers whose depth this frame measures
+  int given = 0;   // points that were found in the images at all
+  double rms_px = 0;
+  std::uint8_t cameras = 0;  // bit k: camera k holds at least a few of the inliers
+};
+
+/// Poses from points: three points in MLESAC, then all of them (METHOD §3).
+///
+/// Linked, the cameras are one rigid rig; unlinked, each camera's pose is found for itself and the rig's transform is what comes out.
+/// Ownership  Options and rig are the owner's. agrees() stays valid until the next fit. Threads: one caller. Memory: the arena's.
+class PoseEstimator {
+ public:
+  PoseEstimator(const OdometryOptions& options, const RigCalibration& rig, Arena& arena);
+  [[nodiscard]] static std::size_t memory_needed() noexcept;
+
+  /// From `start`; with `sample` by MLESAC first, else by refinement alone.
+  [[nodiscard]] PoseFit fit_linked(const Map& map, const Transform& start, bool sample) noexcept;
+  /// By the left camera's sightings alone; the others' are judged by the pose that comes out. Not found: the fit says so.
+  [[nodiscard]] PoseFit fit_left(const Map& map, const Transform& start) noexcept;
+  /// Each camera for itself. T_camera_left (in/out, as many as cameras): prediction, then this frame's; a camera that found no pose
+  /// keeps its prediction and supports nothing.
+  [[nodiscard]] PoseFit fit_unlinked(const Map& map, const Transform& start, bool sample, std::span<Transform> T_camera_left) noexcept;
+  /// One camera alone, for its own pose T_camera_world; false: none found.
+  [[nodiscard]] bool fit_camera(const Map& map, int k, const Transform& start, bool sample, Transform* T_camera_world) noexcept;
+
+  /// By map point: bit k set if camera k's sighting agrees with the last fit.
+  [[nodiscard]] std::span<const std::uint8_t> agrees() const noexcept { return agrees_; }
+
+ private:
+  struct Solved {
+    bool found = false;
+    int inliers = 0;
+    Transform T{};
+    double rms_px = 0;
+  };
+  void collect(const Map& map) noexcept;
+  void collect_camera(const Map& map, int k) noexcept;
+  [[nodiscard]] Solved solve(const Transform& start, bool sample) noexcept;
+  void count(const Map& map, PoseFit* fit) const noexcept;
+
+  const OdometryOptions& options_;
+  const RigCalibration& rig_;
+  RigObservationTable table_;
+  RigMlesac mlesac_;
+  PoseRefiner refiner_;
+  BoundedVector<std::uint16_t> owner_;  // map index of each row of the table
+  std::span<std::uint8_t> agrees_;
+  Random random_;
+};
+
+}  // namespace vergence::odometry

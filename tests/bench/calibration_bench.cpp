@@ -1,0 +1,224 @@
+// Calibration from nothing but the baseline's length: error of the transform found and its sigmas.
+//
+//   calibration_bench mock [--starts N] [--first K] [--from SECONDS] [--frames N] [--set KEY=VALUE]…    the paper's rig on the mock's
+//   streets calibration_bench euroc|kitti [--set …]                                              recorded excerpts, images as they are
+//
+// One line a calibration, then the largest errors and their root means. `--verbose`: every event and the poses' status.
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <functional>
+#include <numbers>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <fmt/format.h>
+#include <opencv2/core.hpp>
+
+#include "app/config/configuration.hpp"
+#include "app/datasets/image_file.hpp"
+#include "app/datasets/stereo_sequence.hpp"
+#include "app/runtime/thread_runner.hpp"
+#include "core/calibration/health.hpp"
+#include "core/estimator/estimator.hpp"
+#include "core/math/so3.hpp"
+#include "tests/support/rendered_drive.hpp"
+#include "tests/support/shared_data.hpp"
+
+namespace {
+
+using namespace vergence;
+
+struct Arguments {
+  std::string what;
+  int starts = 20, first = 0, frames = 400;
+  double from = -1;
+  bool verbose = false;
+  std::vector<std::string> set;
+};
+
+struct Found {
+  bool accepted = false;
+  RigCalibration rig;
+  int at_frame = 0;
+  double solve_ms = 0;
+  double slowest_ms = 0;  // frame while calibrating
+};
+
+using FrameSource = std::function<const RigFrame*(int)>;
+
+RigCalibration nominal_of(const RigCalibration& rig) {
+  RigCalibration n = rig;
+  for (int k = 1; k < rig.cameras; ++k) {
+    const auto c = static_cast<std::size_t>(k);
+    n.T_camera_left[c] = {Mat3::Identity(), Vec3(-rig.T_camera_left[c].t.norm(), 0, 0)};
+  }
+  return n;
+}
+
+Found calibrate(const Arguments& a, const RigCalibration& rig, const FrameSource& source) {
+  const app::Configuration configuration = app::load_configuration(std::nullopt, a.set);
+  EstimatorOptions options;
+  options.odometry = configuration.odometry;
+  options.calibration = configuration.calibration;
+  options.trust = CalibrationTrust::none;
+  RigCalibration blank = rig;
+  for (Transform& T : blank.T_camera_left) T = {};
+  Arena arena(Estimator::memory_needed(options, blank));
+  app::ThreadRunner two;
+  ImmediateRunner solver;
+  Estimator estimator(options, blank, nominal_of(rig), arena, two, solver);
+  Found f;
+  for (int i = 0; i < a.frames; ++i) {
+    const RigFrame* frame = source(i);
+    if (frame == nullptr) break;
+    const PoseSample s = estimator.process(*frame);
+    if (a.verbose) {
+      const Vec3& t = s.T_world_left.t;
+      fmt::print("  {:4d} {} {} {} {} inl {} st {} {:.2f} px {:.1f} ms  {:.3f} {:.3f} {:.3f}\n", i, to_string(s.state), to_string(s.status),
+                 to_string(s.reason), s.keyframe ? "K" : " ", s.inliers, s.stereo_inliers, s.reprojection_px, s.estimate_ms, t.x(), t.y(),
+                 t.z());
+      for (const EstimatorEvent& e : estimator.events()) fmt::print("       {} {:.3g}\n", e.why, e.value);
+    }
+    for (const CalibrationDecision& d : estimator.calibrations()) {
+      if (a.verbose || !d.accepted)
+        fmt::print("       decision {} {} frames {} rms {:.3f} px held out {:.2f} -> {:.2f} px solve {:.0f} ms\n",
+                   d.accepted ? "yes" : "no", d.reason, d.calibration.frames, d.calibration.reprojection_px, d.held_out_before_px,
+                   d.held_out_after_px, d.solve_ms);
+      f.solve_ms = d.solve_ms;
+      f.rig = d.calibration;
+      f.at_frame = i;
+      f.accepted = d.accepted;
+    }
+    if (f.accepted) break;
+  }
+  return f;
+}
+
+/// Errors of camera 1 about the axes (mrad) and of t (mm); sigma_noise and sigma_wide beside them.
+struct Errors {
+  std::array<double, 6> value{}, noise{}, wide{};
+};
+
+Errors errors_of(const RigCalibration& found, const Transform& truth) {
+  Errors e;
+  const Vec3 turn = 1e3 * log_so3(found.T_camera_left[1].R * truth.R.transpose());
+  const Vec3 shift = 1e3 * (found.T_camera_left[1].t - truth.t);
+  for (int i = 0; i < 3; ++i) {
+    e.value[static_cast<std::size_t>(i)] = turn[i];
+    e.value[static_cast<std::size_t>(i + 3)] = shift[i];
+  }
+  for (std::size_t i = 0; i < 6; ++i) {
+    e.noise[i] = 1e3 * found.sigma_noise[1][i];
+    e.wide[i] = 1e3 * found.sigma_wide[1][i];
+  }
+  return e;
+}
+
+void print(const std::string& name, const Found& f, const Errors& e) {
+  fmt::print("{:10s} {} frame {:3d}  {:3d} frames {:.3f} px ", name, f.accepted ? "ok" : "NO", f.at_frame, f.rig.frames,
+             f.rig.reprojection_px);
+  for (std::size_t i = 0; i < 6; ++i) fmt::print(" {:+8.4f}({:.3f})", e.value[i], e.noise[i]);
+  fmt::print("  f {:.2f} {:.2f} px  scale {:.2f} %  {:.0f} ms\n", f.rig.intrinsics[1].fx, f.rig.intrinsics[1].fy, 100 * f.rig.scale_sigma,
+             f.solve_ms);
+}
+
+int run_mock(const Arguments& a) {
+  mock::DriveOptions drive;
+  std::vector<double> starts = a.from >= 0 ? std::vector<double>{a.from} : test::RenderedDrive::starts(drive, a.starts, 3.0, 5.0);
+  std::array<double, 6> largest{}, squares{}, nees{};
+  int n = 0;
+  for (std::size_t i = static_cast<std::size_t>(a.first); i < starts.size(); ++i) {
+    test::RenderedDriveOptions o;
+    o.drive = drive;
+    o.from_s = starts[i];
+    test::RenderedDrive rendered(o);
+    const Found f = calibrate(a, o.rig, [&](int k) { return &rendered.frame(static_cast<std::uint64_t>(k)); });
+    const Errors e = errors_of(f.rig, o.rig.T_camera_left[1]);
+    print(fmt::format("{:.2f} s", starts[i]), f, e);
+    std::fflush(stdout);
+    if (!f.accepted) continue;
+    ++n;
+    for (std::size_t k = 0; k < 6; ++k) {
+      largest[k] = std::max(largest[k], std::abs(e.value[k]));
+      squares[k] += e.value[k] * e.value[k];
+      nees[k] += e.value[k] * e.value[k] / (e.noise[k] * e.noise[k]);
+    }
+  }
+  fmt::print("{} calibrated of {}; mrad and mm\n", n, starts.size() - static_cast<std::size_t>(a.first));
+  for (const auto& [name, row] : {std::pair("largest", &largest), std::pair("rms", &squares), std::pair("z rms", &nees)}) {
+    fmt::print("{:10s}", name);
+    for (const double v : *row) fmt::print(" {:8.4f}", name == std::string("largest") ? v : std::sqrt(v / std::max(1, n)));
+    fmt::print("\n");
+  }
+  return 0;
+}
+
+int run_recorded(const Arguments& a) {
+  const bool euroc = a.what == "euroc";
+  const auto folder = test::shared_data(euroc ? "data/euroc_mh01" : "data/kitti06_51");
+  if (!folder) {
+    fmt::print(stderr, "calibration_bench: no recorded excerpts; set VERGENCE_SHARED to the folder that holds data/\n");
+    return 2;
+  }
+  const app::StereoSequence sequence = app::open_sequence(euroc ? app::SequenceFormat::euroc : app::SequenceFormat::kitti, *folder);
+  RigFrame frame;
+  std::array<cv::Mat, 2> images;
+  const Found f = calibrate(a, sequence.calibration, [&](int i) -> const RigFrame* {
+    if (i >= static_cast<int>(sequence.pairs.size())) return nullptr;
+    const app::StereoPair& pair = sequence.pairs[static_cast<std::size_t>(i)];
+    frame.number = static_cast<std::uint64_t>(i);
+    frame.stamp = pair.stamp;
+    frame.cameras = 2;
+    for (std::size_t k = 0; k < 2; ++k) {
+      const Intrinsics& c = sequence.calibration.intrinsics[k];
+      images[k].create(c.height, (c.width + 63) / 64 * 64, CV_8U);
+      std::vector<std::uint8_t> bytes;
+      if (app::read_image_file(sequence.root / pair.file[k], &bytes) != app::ImageFileStatus::ok ||
+          app::decode_grey(bytes, {c.width, c.height}, images[k].data, images[k].step) != app::ImageFileStatus::ok)
+        return nullptr;
+      frame.images[k] = {images[k].data, c.width, c.height, static_cast<std::ptrdiff_t>(images[k].step)};
+    }
+    return &frame;
+  });
+  print(a.what, f, errors_of(f.rig, sequence.calibration.T_camera_left[1]));
+  const Vec3 turn = log_so3(f.rig.T_camera_left[1].R) * 180 / std::numbers::pi;
+  fmt::print("rotation vector {:.4f} {:.4f} {:.4f} deg, t {:.5f} {:.5f} {:.5f} m\n", turn.x(), turn.y(), turn.z(),
+             f.rig.T_camera_left[1].t.x(), f.rig.T_camera_left[1].t.y(), f.rig.T_camera_left[1].t.z());
+  return 0;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  Arguments a;
+  for (int i = 1; i < argc; ++i) {
+    const std::string word = argv[i];
+    const auto next = [&]() -> std::string { return i + 1 < argc ? argv[++i] : ""; };
+    if (word == "--starts")
+      a.starts = std::stoi(next());
+    else if (word == "--first")
+      a.first = std::stoi(next());
+    else if (word == "--from")
+      a.from = std::stod(next());
+    else if (word == "--frames")
+      a.frames = std::stoi(next());
+    else if (word == "--set")
+      a.set.push_back(next());
+    else if (word == "--verbose")
+      a.verbose = true;
+    else
+      a.what = word;
+  }
+  try {
+    if (a.what == "mock") return run_mock(a);
+    if (a.what == "euroc" || a.what == "kitti") return run_recorded(a);
+  } catch (const std::exception& e) {
+    fmt::print(stderr, "calibration_bench: {}\n", e.what());
+    return 2;
+  }
+  fmt::print(stderr, "calibration_bench: mock, euroc or kitti is wanted\n");
+  return 2;
+}

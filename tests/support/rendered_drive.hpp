@@ -1,0 +1,46 @@
+#pragma once
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <vector>
+
+#include "core/types/calibration.hpp"
+#include "core/types/rig_frame.hpp"
+#include "drivers/mock/world/drive.hpp"
+#include "drivers/mock/world/renderer.hpp"
+
+namespace vergence::test {
+
+/// The rig of the paper's experiment: 1024 × 768 px, 0.75 m, its published intrinsics and extrinsics, no distortion.
+[[nodiscard]] RigCalibration paper_rig();
+
+struct RenderedDriveOptions {
+  RigCalibration rig = paper_rig();  // true
+  mock::DriveOptions drive{};
+  double from_s = 8;  // into the drive, of frame 0
+  double rate = 30;   // Hz
+  /// The true T_camera_left of camera k in frame i; empty: the rig's.
+  std::function<Transform(int k, std::uint64_t frame)> placed;
+};
+
+/// A drive through the mock's suburb, rendered frame by frame as it is asked for; two threads. The same options, the same pixels.
+class RenderedDrive {
+ public:
+  explicit RenderedDrive(const RenderedDriveOptions& options);
+  ~RenderedDrive();
+
+  /// Frame i; its images live until the next call.
+  [[nodiscard]] const RigFrame& frame(std::uint64_t i);
+  [[nodiscard]] Transform T_enu_left(std::uint64_t i) const;
+  [[nodiscard]] double speed(std::uint64_t i) const;  // m/s
+  [[nodiscard]] Transform T_camera_left(int k, std::uint64_t i) const;
+  [[nodiscard]] const RigCalibration& rig() const noexcept;
+  /// Times into the drive at which the vehicle is faster than `speed` for `seconds` on end, spread over it.
+  [[nodiscard]] static std::vector<double> starts(const mock::DriveOptions& drive, int count, double speed, double seconds);
+
+ private:
+  struct Parts;
+  std::unique_ptr<Parts> parts_;
+};
+
+}  // namespace vergence::test
