@@ -7,31 +7,17 @@
 
 #include <fmt/format.h>
 
-#include "app/config/calibration_file.hpp"
 #include "app/runtime/errors.hpp"
 #include "app/runtime/nearest.hpp"
 
 namespace vergence::app {
 namespace {
 
-constexpr double kFocalOfWidth = 0.72;  // of the image's width: 70° across, what machine-vision rigs on cars have
-
 /// Checks a key that takes one of a few words.
 void one_of(const std::string& key, const std::string& value, const std::vector<std::string>& words) {
   for (const std::string& word : words)
     if (value == word) return;
   throw InputError(fmt::format("{} is \"{}\"{}; this version knows {}", key, value, did_you_mean(value, words), fmt::join(words, ", ")));
-}
-
-int camera_count(const Configuration& c) {
-  int n = 0;
-  for (std::size_t k = 0; k < c.cameras.size(); ++k) {
-    if (c.cameras[k].driver.empty()) continue;
-    if (static_cast<int>(k) != n)
-      throw InputError(fmt::format("cameras.{} has a driver, cameras.{} before it has none; the list has no holes", k, k - 1));
-    ++n;
-  }
-  return n;
 }
 
 std::vector<mock::Fault> all_faults(const Configuration& c, const std::vector<std::string>& more) {
@@ -80,28 +66,10 @@ void check_drive(const Configuration& c) {
   one_of("mock.ins", c.mock.ins, {"noisy", "ideal"});
 }
 
-RigCalibration nominal_rig(const Configuration& c) {
-  RigCalibration rig;
-  rig.cameras = camera_count(c);
-  for (std::size_t k = 0; k < static_cast<std::size_t>(rig.cameras); ++k) {
-    Intrinsics& lens = rig.intrinsics[k];
-    lens.width = c.cameras[k].width;
-    lens.height = c.cameras[k].height;
-    lens.fx = lens.fy = c.rig.focal_px > 0 ? c.rig.focal_px : kFocalOfWidth * lens.width;
-    lens.cx = 0.5 * (lens.width - 1);
-    lens.cy = 0.5 * (lens.height - 1);
-    lens.distortion = {c.rig.k1, c.rig.k2, 0, 0, 0};
-    rig.T_camera_left[k].t = {-static_cast<double>(k) * c.rig.baseline_m, 0, 0};
-  }
-  rig.baseline = c.rig.baseline_m;
-  if (const auto bad = find_implausible(&rig)) throw InputError("rig.nominal: " + bad->sentence);
-  return rig;
-}
-
 MockDrive make_mock_drive(const Configuration& c, const std::vector<std::string>& more_faults, bool real_time,
                           std::optional<double> duration_s) {
   MockDrive drive;
-  const RigCalibration rig = nominal_rig(c);
+  const RigCalibration rig = mounted_rig(c);
   const std::vector<mock::Fault> faults = all_faults(c, more_faults);
   try {
     mock::WorldOptions world;

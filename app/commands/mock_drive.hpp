@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "app/commands/rig_settings.hpp"
 #include "app/config/configuration.hpp"
 #include "core/comparison/comparison.hpp"
 #include "core/types/stamped_pose.hpp"
@@ -11,9 +12,6 @@
 
 /// From the configuration to the mock's rig. All of it throws InputError naming the key.
 namespace vergence::app {
-
-/// The rig that `rig.nominal` and `cameras` describe: parallel cameras, equal lenses. It is what the estimator is given.
-[[nodiscard]] RigCalibration nominal_rig(const Configuration& configuration);
 
 /// Whether a drive with these devices is possible at all.
 void check_drive(const Configuration& configuration);

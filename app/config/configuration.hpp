@@ -27,6 +27,9 @@ struct CameraSettings {
   int width = 640, height = 480;  // px
   double exposure_us = 8000;
   double gain_db = 0;
+  std::array<double, 4> intrinsics{};      // fx fy cx cy, px; fx 0: those of rig.nominal, distortion included
+  std::array<double, 5> distortion{};      // k1 k2 p1 p2 k3
+  std::array<double, 12> T_camera_left{};  // rows of [R t], m; zeros: as rig.nominal
 };
 
 struct InsSettings {
@@ -55,6 +58,19 @@ struct ComparisonSettings {
   double scale_tolerance = 0.02;
 };
 
+/// What the intrinsics handed to the estimator are off by, sigmas.
+struct IntrinsicsErrorSettings {
+  double principal_point_px = 0, focal_percent = 0;
+  std::int64_t seed = 1;
+};
+
+/// What the stereo transform handed to the estimator is off by: camera 1 as if it had been knocked, then all lengths.
+struct CalibrationErrorSettings {
+  double pitch_deg = 0, yaw_deg = 0, roll_deg = 0;
+  double x_m = 0, y_m = 0, z_m = 0;
+  double length_percent = 0;
+};
+
 struct MockSettings {
   std::string world = "suburb", drive = "loop", pattern = "grey", ins = "noisy";
   std::int64_t seed = 1;
@@ -63,6 +79,8 @@ struct MockSettings {
   int blur_samples = 1;
   double speed = 12, suspension = 1, vibration = 1, stop_s = 3, hill_deg = 3;
   double clock_drift_ppm = 30;
+  IntrinsicsErrorSettings intrinsics_error{};
+  CalibrationErrorSettings calibration_error{};
 };
 
 inline constexpr std::size_t kMostFaults = 16;

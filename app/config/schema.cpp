@@ -41,10 +41,11 @@ class Rows {
     return *this;
   }
 
-  /// A list of three: one key for each, `name.0` to `name.2`.
-  Rows& numbers(const char* name, std::array<double, 3> Settings::*field, double least, double most, const char* unit,
-                const std::array<const char*, 3>& meanings) {
-    for (std::size_t i = 0; i < 3; ++i)
+  /// A list: one key for each number, `name.0` and so on.
+  template <std::size_t N>
+  Rows& numbers(const char* name, std::array<double, N> Settings::*field, double least, double most, const char* unit,
+                const std::array<const char*, N>& meanings) {
+    for (std::size_t i = 0; i < N; ++i)
       add(
           name + ("." + std::to_string(i)), KeyType::number, least, most, unit, meanings[i],
           [field, i](Settings& s, const KeyValue& v) { (s.*field)[i] = std::get<double>(v); },
@@ -57,6 +58,12 @@ class Rows {
         name, KeyType::text, 0, static_cast<double>(longest), "", meaning,
         [field](Settings& s, const KeyValue& v) { s.*field = std::get<std::string>(v); },
         [field](const Settings& s) -> KeyValue { return s.*field; });
+    return *this;
+  }
+
+  /// The rows of another part, behind these.
+  Rows& also(Group&& other) {
+    std::move(other.keys.begin(), other.keys.end(), std::back_inserter(group_.keys));
     return *this;
   }
 
@@ -113,6 +120,21 @@ Group cameras() {
                     .integer("size.1", &C::height, 48, 4096, "px", "Height of the image in pixels.")
                     .number("exposure_us", &C::exposure_us, 10, 1e6, "µs", "Time of an exposure; 8000 is daylight in the mock's world.")
                     .number("gain_db", &C::gain_db, 0, 40, "dB", "Gain of the sensor's amplifier.")
+                    .numbers("intrinsics", &C::intrinsics, 0, 20000, "px",
+                             {"Focal length along x of this camera's lens; 0: the lens is that of `rig.nominal`.", "Focal length along y.",
+                              "Principal point, x.", "Principal point, y."})
+                    .numbers("distortion", &C::distortion, -2, 2, "",
+                             {"With `intrinsics`: first radial coefficient, k1 (radtan model).", "Second radial coefficient, k2.",
+                              "First tangential coefficient, p1.", "Second tangential coefficient, p2.", "Third radial coefficient, k3."})
+                    .numbers("T_camera_left", &C::T_camera_left, -20, 20, "1, m",
+                             {"Where the camera sits, X_camera = R X_left + t, as rows of [R t]: r11. All zero: parallel, N baselines to "
+                              "the right.",
+                              "The same transform: r12 of its rotation.", "The same transform: r13 of its rotation.",
+                              "The same transform: t1 in metres.", "The same transform: r21 of its rotation.",
+                              "The same transform: r22 of its rotation.", "The same transform: r23 of its rotation.",
+                              "The same transform: t2 in metres.", "The same transform: r31 of its rotation.",
+                              "The same transform: r32 of its rotation.", "The same transform: r33 of its rotation.",
+                              "The same transform: t3 in metres."})
                     .done();
     all.name = one.name;
     all.meaning = one.meaning;
@@ -168,6 +190,34 @@ Group comparison() {
       .done();
 }
 
+Group intrinsics_error() {
+  using E = IntrinsicsErrorSettings;
+  constexpr std::int64_t kLargestSeed = std::numeric_limits<std::int64_t>::max();
+  return Rows<E>(
+             "mock.intrinsics_error", "", [](auto& c) -> auto& { return c.mock.intrinsics_error; })
+      .number("principal_point_px", &E::principal_point_px, 0, 50, "px",
+              "Sigma of the error of each principal point coordinate that the estimator is given; what is rendered stays exact.")
+      .number("focal_percent", &E::focal_percent, 0, 10, "%", "Sigma of the error of the focal length that it is given, one draw a camera.")
+      .integer("seed", &E::seed, 0, kLargestSeed, "", "Of these errors: the same seed, the same errors.")
+      .done();
+}
+
+Group calibration_error() {
+  using E = CalibrationErrorSettings;
+  return Rows<E>(
+             "mock.calibration_error", "", [](auto& c) -> auto& { return c.mock.calibration_error; })
+      .number("pitch_deg", &E::pitch_deg, -45, 45, "°",
+              "Camera 1 of the transform that the estimator is given, against the true one: turned about its x axis.")
+      .number("yaw_deg", &E::yaw_deg, -45, 45, "°", "The same, turned about its y axis.")
+      .number("roll_deg", &E::roll_deg, -45, 45, "°", "The same, turned about its z axis.")
+      .number("x_m", &E::x_m, -1, 1, "m", "The same, shifted along its x axis.")
+      .number("y_m", &E::y_m, -1, 1, "m", "The same, shifted along its y axis.")
+      .number("z_m", &E::z_m, -1, 1, "m", "The same, shifted along its z axis.")
+      .number("length_percent", &E::length_percent, -60, 200, "%",
+              "By how much every length that it is given is too long, the baseline's included; images alone cannot show it.")
+      .done();
+}
+
 Group mock() {
   using M = MockSettings;
   constexpr std::int64_t kLargestSeed = std::numeric_limits<std::int64_t>::max();
@@ -187,6 +237,8 @@ Group mock() {
       .number("stop_s", &M::stop_s, 1, 60, "s", "Length of each stop, and of the standing start and end.")
       .number("hill_deg", &M::hill_deg, 0, 5, "°", "Steepest slope of the streets.")
       .number("clock_drift_ppm", &M::clock_drift_ppm, 0, 150, "ppm", "Largest drift of the devices' clocks; each has its own.")
+      .also(intrinsics_error())
+      .also(calibration_error())
       .done();
 }
 
