@@ -184,8 +184,32 @@ std::vector<Entry> with_faults_as_text(const std::vector<Entry>& entries) {
   return out;
 }
 
+/// Camera options that stand as groups, `cameras.N.options.NAME`, become texts of one line: `NAME=VALUE …`.
+std::vector<Entry> with_options_as_text(const std::vector<Entry>& entries) {
+  constexpr std::string_view kGroup = ".options.";
+  std::vector<Entry> out;
+  std::map<std::string, std::map<std::string, Entry>> options;  // by `cameras.N.options`, then by name; the last one wins
+  for (const Entry& entry : entries) {
+    const auto at = entry.name.find(kGroup);
+    if (!entry.name.starts_with("cameras.") || at == std::string::npos) {
+      out.push_back(entry);
+      continue;
+    }
+    if (!entry.scalar || entry.value.empty() || entry.value.find_first_of(" =") != std::string::npos)
+      throw InputError(entry.origin + ": " + entry.name.substr(0, 120) + " takes one number or word");
+    const auto list = at + kGroup.size() - 1;
+    options[entry.name.substr(0, list)].insert_or_assign(entry.name.substr(list + 1), entry);
+  }
+  for (const auto& [name, parts] : options) {
+    std::string text;
+    for (const auto& [key, entry] : parts) text += (text.empty() ? "" : " ") + key + "=" + entry.value;
+    out.push_back({name, text, true, parts.begin()->second.origin});
+  }
+  return out;
+}
+
 Configuration from_entries(const std::vector<Entry>& given, const std::string& name) {
-  const std::vector<Entry> entries = with_faults_as_text(given);
+  const std::vector<Entry> entries = with_options_as_text(with_faults_as_text(given));
   Configuration configuration;
   for (const Entry& entry : entries) apply(entry, &configuration);
   if (const std::string sentence = find_contradiction(configuration); !sentence.empty()) throw InputError(name + ": " + sentence);

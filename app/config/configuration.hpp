@@ -24,7 +24,10 @@ struct RigSettings {
 /// One entry of `cameras:`. Without a driver there is no such camera.
 struct CameraSettings {
   std::string name{}, driver{}, serial{};
-  int width = 640, height = 480;  // px
+  int width = 640, height = 480;   // px
+  int offset_x = 0, offset_y = 0;  // px, of the region on the sensor
+  std::string pixel_format{}, trigger = "hardware";
+  std::string options{};  // `NAME=VALUE …`, of the kind of camera
   double exposure_us = 8000;
   double gain_db = 0;
   std::array<double, 4> intrinsics{};      // fx fy cx cy, px; fx 0: those of rig.nominal, distortion included
@@ -47,6 +50,7 @@ struct TriggerSettings {
 struct SyncSettings {
   std::string mode = "counter";
   double hold_ms = 100;
+  double tolerance_ms = 2;
 };
 
 struct ComparisonSettings {

@@ -110,32 +110,43 @@ Group cameras() {
   using C = CameraSettings;
   Group all;
   for (std::size_t k = 0; k < kMaxCameras; ++k) {
-    Group one = Rows<C>(
-                    "cameras." + std::to_string(k),
-                    "The cameras, a list; the first is the left one.", [k](auto& c) -> auto& { return c.cameras[k]; })
-                    .text("driver", &C::driver, 16, "What talks to it: `mock`. Empty: there is no such camera.")
-                    .text("name", &C::name, 32, "How it is called in messages and in calibration.yaml.")
-                    .text("serial", &C::serial, 64, "Which one, where there are several; empty: the next one.")
-                    .integer("size.0", &C::width, 64, 4096, "px", "Width of the image in pixels.")
-                    .integer("size.1", &C::height, 48, 4096, "px", "Height of the image in pixels.")
-                    .number("exposure_us", &C::exposure_us, 10, 1e6, "µs", "Time of an exposure; 8000 is daylight in the mock's world.")
-                    .number("gain_db", &C::gain_db, 0, 40, "dB", "Gain of the sensor's amplifier.")
-                    .numbers("intrinsics", &C::intrinsics, 0, 20000, "px",
-                             {"Focal length along x of this camera's lens; 0: the lens is that of `rig.nominal`.", "Focal length along y.",
-                              "Principal point, x.", "Principal point, y."})
-                    .numbers("distortion", &C::distortion, -2, 2, "",
-                             {"With `intrinsics`: first radial coefficient, k1 (radtan model).", "Second radial coefficient, k2.",
-                              "First tangential coefficient, p1.", "Second tangential coefficient, p2.", "Third radial coefficient, k3."})
-                    .numbers("T_camera_left", &C::T_camera_left, -20, 20, "1, m",
-                             {"Where the camera sits, X_camera = R X_left + t, as rows of [R t]: r11. All zero: parallel, N baselines to "
-                              "the right.",
-                              "The same transform: r12 of its rotation.", "The same transform: r13 of its rotation.",
-                              "The same transform: t1 in metres.", "The same transform: r21 of its rotation.",
-                              "The same transform: r22 of its rotation.", "The same transform: r23 of its rotation.",
-                              "The same transform: t2 in metres.", "The same transform: r31 of its rotation.",
-                              "The same transform: r32 of its rotation.", "The same transform: r33 of its rotation.",
-                              "The same transform: t3 in metres."})
-                    .done();
+    Group one =
+        Rows<C>(
+            "cameras." + std::to_string(k),
+            "The cameras, a list; the first is the left one.", [k](auto& c) -> auto& { return c.cameras[k]; })
+            .text("driver", &C::driver, 16,
+                  "What talks to it: `mock`, `gige`, `iidc-usb`, `iidc-1394` or `v4l2`. Empty: there is no such camera.")
+            .text("name", &C::name, 32, "How it is called in messages and in calibration.yaml.")
+            .text("serial", &C::serial, 64, "Which one, where there are several; empty: the next one. GigE: or its address.")
+            .integer("size.0", &C::width, 64, 4096, "px", "Width of the image in pixels.")
+            .integer("size.1", &C::height, 48, 4096, "px", "Height of the image in pixels.")
+            .integer("offset.0", &C::offset_x, 0, 16384, "px", "Left edge of the region that is read out, on the sensor.")
+            .integer("offset.1", &C::offset_y, 0, 16384, "px", "Upper edge of that region.")
+            .text("pixel_format", &C::pixel_format, 32,
+                  "The device's own name (`Mono8`, `BayerGB8`, `GREY`); empty: the cheapest that gives grey.")
+            .text("trigger", &C::trigger, 16,
+                  "What makes it expose: `hardware`, a pulse at its input; `software`, a command at `trigger.rate`; `free`, its own "
+                  "clock. All cameras alike.")
+            .text("options", &C::options, 400,
+                  "What only this kind of camera has (docs/cameras): `NAME=VALUE …`, or a group: `{packet_size: 9000}`.")
+            .number("exposure_us", &C::exposure_us, 10, 1e6, "µs", "Time of an exposure; 8000 is daylight in the mock's world.")
+            .number("gain_db", &C::gain_db, 0, 40, "dB", "Gain of the sensor's amplifier.")
+            .numbers("intrinsics", &C::intrinsics, 0, 20000, "px",
+                     {"Focal length along x of this camera's lens; 0: the lens is that of `rig.nominal`.", "Focal length along y.",
+                      "Principal point, x.", "Principal point, y."})
+            .numbers("distortion", &C::distortion, -2, 2, "",
+                     {"With `intrinsics`: first radial coefficient, k1 (radtan model).", "Second radial coefficient, k2.",
+                      "First tangential coefficient, p1.", "Second tangential coefficient, p2.", "Third radial coefficient, k3."})
+            .numbers("T_camera_left", &C::T_camera_left, -20, 20, "1, m",
+                     {"Where the camera sits, X_camera = R X_left + t, as rows of [R t]: r11. All zero: parallel, N baselines to "
+                      "the right.",
+                      "The same transform: r12 of its rotation.", "The same transform: r13 of its rotation.",
+                      "The same transform: t1 in metres.", "The same transform: r21 of its rotation.",
+                      "The same transform: r22 of its rotation.", "The same transform: r23 of its rotation.",
+                      "The same transform: t2 in metres.", "The same transform: r31 of its rotation.",
+                      "The same transform: r32 of its rotation.", "The same transform: r33 of its rotation.",
+                      "The same transform: t3 in metres."})
+            .done();
     all.name = one.name;
     all.meaning = one.meaning;
     std::move(one.keys.begin(), one.keys.end(), std::back_inserter(all.keys));
@@ -171,8 +182,11 @@ Group sync() {
   using S = SyncSettings;
   return Rows<S>(
              "sync", "How images are paired.", [](auto& c) -> auto& { return c.sync; })
-      .text("mode", &S::mode, 16, "By what images are paired: `counter`, exposure n of every camera belongs together.")
+      .text("mode", &S::mode, 16,
+            "By what images are paired: `counter`, exposure n of every camera belongs together; `software`, what was exposed within "
+            "`tolerance_ms`, for cameras that nothing triggers.")
       .number("hold_ms", &S::hold_ms, 1, 10000, "ms", "How long the images of a pulse wait for one that is late.")
+      .number("tolerance_ms", &S::tolerance_ms, 0.01, 1000, "ms", "With `software`: the farthest that exposures of one set are apart.")
       .done();
 }
 

@@ -24,10 +24,11 @@ ClockMapperOptions clock_options(const DeviceTiming& t) noexcept {
   return o;
 }
 
-void check(DeviceStatus status, const DeviceInfo& who) {
-  if (status != DeviceStatus::ok)
-    throw InputError(who.driver + " " + who.serial + " cannot be started: " + std::string(to_string(status)) +
-                     "; check its cable and its section of the configuration");
+void check(DeviceStatus status, const DeviceInfo& who, const std::string& complaint) {
+  if (status == DeviceStatus::ok) return;
+  const std::string why =
+      complaint.empty() ? std::string(to_string(status)) + "; check its cable and its section of the configuration" : complaint;
+  throw InputError(who.driver + " " + who.serial + " cannot be started: " + why);
 }
 
 }  // namespace
@@ -44,9 +45,12 @@ LiveSource::~LiveSource() {
 }
 
 void LiveSource::start() {
-  for (CameraDevice* camera : cameras_) check(camera->start(this), camera->info());
-  if (ins_ != nullptr) check(ins_->start(this), ins_->info());
-  if (trigger_ != nullptr) check(trigger_->start(this), trigger_->info());
+  for (CameraDevice* camera : cameras_) {
+    const DeviceStatus status = camera->start(this);
+    check(status, camera->info(), camera->complaint());
+  }
+  if (ins_ != nullptr) check(ins_->start(this), ins_->info(), {});
+  if (trigger_ != nullptr) check(trigger_->start(this), trigger_->info(), {});
   thread_ = std::thread([this] { work(); });
 }
 
