@@ -1,6 +1,7 @@
 #pragma once
 #include <cstdint>
 #include <memory>
+#include <string>
 #include <string_view>
 #include <vector>
 
@@ -9,11 +10,27 @@
 
 namespace vergence {
 
-/// One reading as it came. `sample.stamp` and `sample.stamp_error` are not set yet: the ClockMapper does that.
+/// What a device says about itself and its receiver beside the sample.
+struct InsQuality {
+  std::uint32_t status = 0;     // the device's own word; bits in its protocol's header
+  bool utc_valid = false;       // the device knows UTC, leap seconds too
+  std::int64_t utc_ns = 0;      // of the sample, since 1970; 0: not told
+  std::uint8_t satellites = 0;  // used; 0: not told
+  float position_dop = 0;       // 0: not told
+  bool filter_valid = false;
+  bool sync_out = false;  // a pulse left SyncOut with this sample
+};
+
+/// One reading as it came. `sample.stamp` and `sample.stamp_error` are not set yet: the host's clock is tied to Unix time elsewhere.
 struct InsReading {
   InsSample sample{};
-  DeviceStamp measured{};  // by the INS's clock
+  InsQuality quality{};
+  DeviceStamp measured{};  // by the INS's clock, unwrapped; grows while the device is not gone
   HostStamp arrival{};     // when the last byte was here
+  // A driver that knows how bytes travel (when each was on the wire) maps the stamp itself; else a ClockMapper does, from `arrival`.
+  bool mapped = false;
+  HostStamp host{};       // `measured` on the host's clock
+  Duration host_error{};  // |true − host| is below this
 };
 
 /// Counters since open; all only grow.
@@ -21,6 +38,7 @@ struct InsStatistics {
   std::uint64_t delivered = 0;
   std::uint64_t lost = 0;       // gaps in the device's count
   std::uint64_t malformed = 0;  // packets that made no sense
+  std::uint64_t restarts = 0;   // the device started anew, or its clock was set
   std::uint64_t overruns = 0;   // readings that found the ring full (live); never silent
   std::uint64_t starts = 0;
 };
@@ -47,6 +65,11 @@ class InsDevice {
   /// it was noticed. → ok, timeout, stopped, ended, gone
   [[nodiscard]] virtual DeviceStatus wait(Duration limit, InsReading* reading) noexcept = 0;
   virtual void stop() noexcept = 0;
+  /// One sentence about the last call that was not `ok`: what was refused, what to do. Empty: the status says it all. Owner's thread; may
+  /// allocate.
+  [[nodiscard]] virtual std::string complaint() const { return {}; }
+  /// One sentence about what works, but not as asked. Empty: nothing. As complaint().
+  [[nodiscard]] virtual std::string remark() const { return {}; }
   [[nodiscard]] virtual InsStatistics statistics() const noexcept = 0;
 };
 
@@ -56,6 +79,8 @@ class InsDriver {
   virtual ~InsDriver() = default;
   [[nodiscard]] virtual std::vector<DeviceInfo> enumerate() = 0;
   [[nodiscard]] virtual std::unique_ptr<InsDevice> open(std::string_view serial, DeviceStatus* status) = 0;
+  /// One sentence about the last open() that gave nothing. Empty: the status says it all.
+  [[nodiscard]] virtual std::string complaint() const { return {}; }
 };
 
 }  // namespace vergence

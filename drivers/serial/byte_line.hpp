@@ -61,6 +61,8 @@ class LinePlace {
   [[nodiscard]] virtual std::string name() const = 0;
   /// How long a chip between device and host may hold bytes back (latency timer of a USB converter); 0: it does not, or is not known.
   [[nodiscard]] virtual Duration latency_timer() const { return {}; }
+  /// For a simulation in virtual time: lets so much of it pass, with no line open. False: time is real, the caller waits by itself.
+  [[nodiscard]] virtual bool pass(Duration /*time*/) { return false; }
 };
 
 }  // namespace vergence

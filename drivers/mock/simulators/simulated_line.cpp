@@ -1,0 +1,370 @@
+#include "drivers/mock/simulators/simulated_line.hpp"
+
+#include <time.h>
+
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <cmath>
+#include <condition_variable>
+#include <deque>
+#include <mutex>
+#include <utility>
+
+#include "core/math/random.hpp"
+
+namespace vergence::mock {
+namespace {
+
+constexpr Duration kUsbFrame = Duration::milliseconds(1);
+constexpr std::size_t kPacketBytes = 62;
+constexpr std::size_t kTransferPackets = 8;
+constexpr HostStamp kNever{INT64_MAX};
+
+HostStamp monotonic() noexcept {
+  timespec t{};
+  (void)::clock_gettime(CLOCK_MONOTONIC, &t);
+  return HostStamp(static_cast<std::int64_t>(t.tv_sec) * 1'000'000'000 + t.tv_nsec);
+}
+
+}  // namespace
+
+/// All bytes under way, and the clock. Every member function with the mutex held.
+class SimulatedPlace::World {
+ public:
+  World(std::shared_ptr<DeviceModel> device, const SimulatedLineOptions& options)
+      : device_(std::move(device)), options_(options), random_(options.seed, 62), now_(options.real_time ? monotonic() : options.start) {
+    next_frame_ = now_ + Duration::nanoseconds(random_.below(1'000'000));
+    last_packet_ = now_;
+  }
+
+  std::mutex mutex;
+  std::condition_variable woken_up;
+  bool woken = false;
+
+  [[nodiscard]] const SimulatedLineOptions& options() const noexcept { return options_; }
+  [[nodiscard]] HostStamp now() const noexcept { return options_.real_time ? monotonic() : now_; }
+  [[nodiscard]] bool unplugged() const noexcept { return outage_ < options_.outages.size() && now_ >= options_.outages[outage_].from; }
+  [[nodiscard]] std::size_t outages_begun() const noexcept { return outages_begun_; }
+  [[nodiscard]] bool anything_readable() const noexcept { return !ready_.empty(); }
+  [[nodiscard]] bool ended() const {
+    return device_->ended() && on_wire_.empty() && chip_.empty() && frozen_.empty() && transfer_.empty() && arriving_.empty() &&
+           ready_.empty();
+  }
+
+  /// Lets time pass until `until`, or until bytes can be read or the line is cut.
+  void run(HostStamp until) {
+    const std::size_t outages = outages_begun_;
+    while (ready_.empty() && outages == outages_begun_ && step(until)) {
+    }
+  }
+  void run_through(HostStamp until) {
+    while (step(until)) {
+    }
+  }
+
+  std::size_t take(std::span<std::uint8_t> out) noexcept {
+    const std::size_t n = std::min(out.size(), ready_.size());
+    for (std::size_t i = 0; i < n; ++i) out[i] = ready_[i];
+    ready_.erase(ready_.begin(), ready_.begin() + static_cast<std::ptrdiff_t>(n));
+    return n;
+  }
+  void send(std::span<const std::uint8_t> bytes) {
+    const HostStamp begin = std::max(now_ + options_.transfer, host_line_free_);
+    host_line_free_ = begin + byte_time(host_baud_) * static_cast<std::int64_t>(bytes.size());
+    to_device_.push_back({host_line_free_, {bytes.begin(), bytes.end()}});
+  }
+  void set_baud(std::uint32_t baud) {
+    host_baud_ = baud;
+    discard();
+  }
+  [[nodiscard]] std::uint32_t baud() const noexcept { return host_baud_; }
+  void discard() {
+    ready_.clear();
+    arriving_.clear();
+    transfer_.clear();
+    transfer_packets_ = 0;
+    chip_.clear();
+    frozen_.clear();
+  }
+  void set_open(bool open) {
+    open_ = open;
+    discard();
+  }
+
+ private:
+  struct Byte {
+    HostStamp done{};
+    std::uint8_t value = 0;
+  };
+  struct Chunk {
+    HostStamp at{};
+    std::vector<std::uint8_t> bytes;
+  };
+
+  [[nodiscard]] static Duration byte_time(std::uint32_t baud) noexcept { return Duration::nanoseconds(10'000'000'000 / baud); }
+
+  /// The earliest thing that happens by `until`; false: nothing any more, and now_ is `until`.
+  bool step(HostStamp until) {
+    enum class What : std::uint8_t { nothing, arrival, outage, command, produce, byte, timer, frame } what = What::nothing;
+    HostStamp at = until;
+    const auto consider = [&](HostStamp t, What w) {
+      if (t < at || (t == at && what == What::nothing)) at = std::max(t, now_), what = w;
+    };
+    if (!arriving_.empty()) consider(arriving_.front().at, What::arrival);
+    if (outage_ < options_.outages.size())
+      consider(outage_begun_ ? options_.outages[outage_].to : options_.outages[outage_].from, What::outage);
+    if (!to_device_.empty()) consider(to_device_.front().at, What::command);
+    if (const auto next = device_->next()) consider(*next, What::produce);
+    if (!on_wire_.empty()) consider(on_wire_.front().done, What::byte);
+    if (options_.converter) {
+      if (!timer_fired_) consider(last_packet_ + timer(), What::timer);
+      consider(next_frame_, What::frame);
+    }
+    now_ = std::max(now_, at);
+    switch (what) {
+      case What::nothing:
+        return false;
+      case What::arrival:
+        ready_.insert(ready_.end(), arriving_.front().bytes.begin(), arriving_.front().bytes.end());
+        arriving_.pop_front();
+        return true;
+      case What::outage:
+        change_outage();
+        return true;
+      case What::command:
+        command();
+        return true;
+      case What::produce:
+        produce();
+        return true;
+      case What::byte:
+        take_byte();
+        return true;
+      case What::timer:
+        freeze();
+        return true;
+      case What::frame:
+        frame();
+        return true;
+    }
+    return false;
+  }
+
+  [[nodiscard]] Duration timer() const noexcept {
+    return Duration::nanoseconds(
+        std::llround(static_cast<double>(options_.latency_timer.ns()) * (1 + 1e-6 * options_.converter_clock_ppm)));
+  }
+
+  void change_outage() {
+    const Outage& o = options_.outages[outage_];
+    if (!outage_begun_) {
+      outage_begun_ = true;
+      ++outages_begun_;
+      discard();
+      return;
+    }
+    if (!o.device_powered) {
+      on_wire_.clear();
+      device_->power_cycle(now_);
+    }
+    outage_begun_ = false;
+    ++outage_;
+  }
+
+  void command() {
+    Chunk chunk = std::move(to_device_.front());
+    to_device_.pop_front();
+    if (outage_begun_) return;
+    if (device_->baud() != host_baud_) garble(&chunk.bytes);
+    device_->receive(chunk.bytes, now_);
+  }
+
+  void produce() {
+    std::vector<std::uint8_t> bytes;
+    device_->produce(now_, &bytes);
+    line_free_ = std::max(line_free_, now_);
+    const Duration each = byte_time(device_->baud());
+    if (device_->baud() != host_baud_) garble(&bytes);
+    for (const std::uint8_t value : bytes) {
+      line_free_ = line_free_ + each;
+      on_wire_.push_back({line_free_, value});
+    }
+  }
+
+  void take_byte() {
+    std::uint8_t value = on_wire_.front().value;
+    on_wire_.pop_front();
+    if (outage_begun_ || !open_) return;
+    if (options_.corrupt > 0 && random_.uniform() < options_.corrupt) value ^= static_cast<std::uint8_t>(1U << random_.below(8));
+    if (options_.converter) {
+      chip_.push_back(value);
+      return;
+    }
+    // The UART's FIFO: an interrupt at fourteen bytes, or when the line falls idle.
+    transfer_.push_back(value);
+    constexpr std::size_t kTrigger = 14;
+    if (transfer_.size() >= kTrigger || on_wire_.empty()) complete_transfer();
+  }
+
+  /// The latency timer has run out: what is there now goes with the next frame, what comes later does not.
+  void freeze() {
+    timer_fired_ = true;
+    if (chip_.size() >= kPacketBytes) return;
+    frozen_.assign(chip_.begin(), chip_.end());
+    chip_.clear();
+  }
+
+  void frame() {
+    next_frame_ = next_frame_ + kUsbFrame;
+    if (timer_fired_ && (!frozen_.empty() || chip_.size() < kPacketBytes)) {
+      transfer_.insert(transfer_.end(), frozen_.begin(), frozen_.end());
+      frozen_.clear();
+      packet_went();
+      complete_transfer();
+    }
+    while (chip_.size() >= kPacketBytes) {
+      transfer_.insert(transfer_.end(), chip_.begin(), chip_.begin() + kPacketBytes);
+      chip_.erase(chip_.begin(), chip_.begin() + kPacketBytes);
+      packet_went();
+      if (++transfer_packets_ == kTransferPackets) complete_transfer();
+    }
+  }
+
+  void packet_went() noexcept {
+    last_packet_ = now_;
+    timer_fired_ = false;
+  }
+
+  void complete_transfer() {
+    transfer_packets_ = 0;
+    if (transfer_.empty()) return;
+    arrive(std::exchange(transfer_, {}));
+  }
+
+  void arrive(std::vector<std::uint8_t> bytes) {
+    HostStamp at = now_ + options_.transfer;
+    if (options_.late_fraction > 0 && random_.uniform() < options_.late_fraction)
+      at = at + Duration::nanoseconds(std::llround(-std::log(1 - random_.uniform()) * static_cast<double>(options_.late_mean.ns())));
+    last_arrival_ = std::max(last_arrival_, at);
+    arriving_.push_back({last_arrival_, std::move(bytes)});
+  }
+
+  void garble(std::vector<std::uint8_t>* bytes) {
+    for (std::uint8_t& b : *bytes) b = static_cast<std::uint8_t>(random_.next() >> 24U);
+  }
+
+  std::shared_ptr<DeviceModel> device_;
+  SimulatedLineOptions options_;
+  Random random_;
+  HostStamp now_;
+  HostStamp line_free_{}, host_line_free_{}, next_frame_{}, last_packet_{}, last_arrival_{};
+  std::uint32_t host_baud_ = LineSettings{}.baud;
+  bool open_ = false, timer_fired_ = false, outage_begun_ = false;
+  std::size_t outage_ = 0, outages_begun_ = 0;
+  std::deque<Chunk> to_device_, arriving_;
+  std::deque<Byte> on_wire_;
+  std::deque<std::uint8_t> chip_;       // in the converter
+  std::vector<std::uint8_t> frozen_;    // its short packet that waits for a frame
+  std::vector<std::uint8_t> transfer_;  // gathered by the host's controller
+  std::size_t transfer_packets_ = 0;
+  std::deque<std::uint8_t> ready_;  // to be read
+};
+
+namespace {
+
+class SimulatedLine final : public ByteLine {
+ public:
+  explicit SimulatedLine(std::shared_ptr<SimulatedPlace::World> world) : world_(std::move(world)), outages_(world_->outages_begun()) {
+    world_->set_open(true);
+  }
+  SimulatedLine(const SimulatedLine&) = delete;
+  SimulatedLine& operator=(const SimulatedLine&) = delete;
+  ~SimulatedLine() override {
+    const std::lock_guard lock(world_->mutex);
+    world_->set_open(false);
+  }
+
+  LineRead read(std::span<std::uint8_t> out, Duration limit) noexcept override {
+    std::unique_lock lock(world_->mutex);
+    if (gone()) return {DeviceStatus::gone, 0, world_->now()};
+    const HostStamp deadline = world_->now() + limit;
+    for (;;) {  // ends at the deadline: virtual time passes by run(), real time by itself
+      world_->run(world_->options().real_time ? std::min(world_->now(), deadline) : deadline);
+      if (std::exchange(world_->woken, false)) return {DeviceStatus::stopped, 0, {}};
+      const HostStamp now = world_->now();
+      if (gone()) return {DeviceStatus::gone, 0, now};
+      if (world_->anything_readable()) return {DeviceStatus::ok, world_->take(out), now};
+      if (world_->ended()) return {DeviceStatus::ended, 0, now};
+      if (now >= deadline) return {DeviceStatus::timeout, 0, {}};
+      constexpr Duration kLook = Duration::milliseconds(1);  // a USB frame: nothing arrives more often
+      const Duration wait = std::min(kLook, deadline - now);
+      (void)world_->woken_up.wait_for(lock, std::chrono::nanoseconds(wait.ns()));
+    }
+  }
+  DeviceStatus write(std::span<const std::uint8_t> bytes, Duration /*limit*/) noexcept override {
+    const std::lock_guard lock(world_->mutex);
+    if (world_->options().real_time) world_->run_through(world_->now());
+    if (gone()) return DeviceStatus::gone;
+    world_->send(bytes);
+    return DeviceStatus::ok;
+  }
+  DeviceStatus set_baud(std::uint32_t baud) noexcept override {
+    const std::lock_guard lock(world_->mutex);
+    if (gone()) return DeviceStatus::gone;
+    world_->set_baud(baud);
+    return DeviceStatus::ok;
+  }
+  std::uint32_t baud() const noexcept override {
+    const std::lock_guard lock(world_->mutex);
+    return world_->baud();
+  }
+  void discard_input() noexcept override {
+    const std::lock_guard lock(world_->mutex);
+    world_->discard();
+  }
+  void wake() noexcept override {
+    const std::lock_guard lock(world_->mutex);
+    world_->woken = true;
+    world_->woken_up.notify_all();
+  }
+  HostStamp now() const noexcept override {
+    const std::lock_guard lock(world_->mutex);
+    return world_->now();
+  }
+
+ private:
+  [[nodiscard]] bool gone() const noexcept { return world_->outages_begun() != outages_; }
+
+  std::shared_ptr<SimulatedPlace::World> world_;
+  std::size_t outages_;  // that had begun when it was opened: one more, and this line is dead
+};
+
+}  // namespace
+
+SimulatedPlace::SimulatedPlace(std::shared_ptr<DeviceModel> device, const SimulatedLineOptions& options)
+    : world_(std::make_shared<World>(std::move(device), options)) {}
+SimulatedPlace::~SimulatedPlace() = default;
+
+std::unique_ptr<ByteLine> SimulatedPlace::open(const LineSettings& settings, DeviceStatus* status) {
+  const std::lock_guard lock(world_->mutex);
+  if (world_->options().real_time) world_->run_through(world_->now());
+  if (world_->unplugged()) {
+    *status = DeviceStatus::not_found;
+    return nullptr;
+  }
+  *status = DeviceStatus::ok;
+  world_->set_baud(settings.baud);
+  return std::make_unique<SimulatedLine>(world_);
+}
+
+Duration SimulatedPlace::latency_timer() const { return world_->options().converter ? world_->options().latency_timer : Duration{}; }
+
+bool SimulatedPlace::pass(Duration time) {
+  const std::lock_guard lock(world_->mutex);
+  if (world_->options().real_time) return false;
+  world_->run_through(world_->now() + time);
+  return true;
+}
+
+}  // namespace vergence::mock

@@ -1,0 +1,52 @@
+#pragma once
+#include <cstdint>
+#include <optional>
+
+#include "core/types/time.hpp"
+#include "firmware_iface/xbus/xbus.hpp"
+
+namespace vergence::xsens {
+
+/// What SyncIn shall do.
+enum class SyncIn : std::uint8_t {
+  leave,  // as the device has it
+  off,
+  rising,  // an edge marks the time (MTi-G-700/710), or makes the MTi-G send its newest sample
+  falling,
+};
+
+/// How an XSens INS is to be set. Defaults leave alone what is not named.
+struct Options {
+  std::uint32_t baud = 0;        // 0: as the device has it
+  double sync_out_hz = 0;        // 0: as the device has it; negative: off
+  double sync_out_width_ms = 1;  // of its pulse
+  SyncIn sync_in = SyncIn::leave;
+  Duration processing = Duration::milliseconds(2);  // from a sample to its first byte on the wire: acquisition and filter
+};
+
+/// What a device is.
+struct Identity {
+  xbus::Generation generation = xbus::Generation::mark4;
+  std::uint32_t device_id = 0;
+  char product[21] = "";  // of at most 20 characters
+  std::uint8_t firmware[3] = {0, 0, 0};
+};
+
+/// How it was set, so far as decoding depends on it.
+struct StreamSettings {
+  xbus::Generation generation = xbus::Generation::mark4;
+  xbus::MtdataLayout layout{};            // MTi-G
+  xbus::OutputConfiguration outputs{};    // MTi-G-700/710
+  std::int64_t period_numerator = 1;      // the period is so many …
+  std::int64_t period_denominator = 100;  // … parts of a second
+  double sync_out_hz = 0;                 // as it is; 0: not set by us
+
+  [[nodiscard]] double rate_hz() const noexcept { return static_cast<double>(period_denominator) / static_cast<double>(period_numerator); }
+  /// Nanoseconds of so many samples, exact to one over any count that a drive reaches.
+  [[nodiscard]] std::int64_t time_ns(std::int64_t samples) const noexcept {
+    const std::int64_t ticks = samples * period_numerator, whole = ticks / period_denominator, part = ticks % period_denominator;
+    return whole * 1'000'000'000 + part * 1'000'000'000 / period_denominator;
+  }
+};
+
+}  // namespace vergence::xsens

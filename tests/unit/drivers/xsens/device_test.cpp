@@ -1,0 +1,411 @@
+#include "drivers/xsens/device.hpp"
+
+#include <gtest/gtest.h>
+
+#include "tests/unit/drivers/xsens/rig.hpp"
+
+namespace vergence::xsens {
+namespace {
+
+using test::easy_drive;
+using test::simulated;
+using test::XsensRig;
+using xbus::Generation;
+
+class BothGenerations : public ::testing::TestWithParam<Generation> {
+ protected:
+  [[nodiscard]] static bool legacy() { return GetParam() == Generation::legacy; }
+  [[nodiscard]] static std::int64_t origin_ns(const mock::XsensSimulator& s) {
+    // The MTi-G's clock is its counter: zero where the counter was.
+    return s.sample_time_origin_ns();
+  }
+};
+
+TEST_P(BothGenerations, isFoundSetAndRead) {
+  mock::XsensSimulatorOptions sensor = simulated(GetParam());
+  sensor.duration = Duration::seconds(8);
+  XsensRig rig(sensor);
+  ASSERT_EQ(rig.device->connect(), DeviceStatus::ok) << rig.device->complaint();
+  EXPECT_EQ(rig.device->identity().generation, GetParam());
+  EXPECT_EQ(rig.device->info().serial, legacy() ? "00500123" : "07701234");
+  EXPECT_NE(rig.device->info().model.find("G"), std::string::npos);
+  double actual = 0;
+  ASSERT_EQ(rig.device->configure(100, &actual), DeviceStatus::ok) << rig.device->complaint();
+  EXPECT_EQ(actual, 100);
+  ASSERT_EQ(rig.device->start(nullptr), DeviceStatus::ok);
+  const auto all = rig.readings();
+  ASSERT_GT(all.size(), 500U);
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    const InsReading& r = all[i];
+    ASSERT_TRUE(r.mapped);
+    ASSERT_EQ(r.sample.number, i);
+    ASSERT_EQ(r.sample.fix, FixStatus::fix_3d);
+    ASSERT_TRUE(r.sample.attitude_valid && r.sample.velocity_valid);
+    if (i > 0) {
+      ASSERT_EQ(r.measured - all[i - 1].measured, Duration::milliseconds(10));
+      ASSERT_GE(r.arrival, all[i - 1].arrival);
+    }
+  }
+  const InsStatistics s = rig.device->statistics();
+  EXPECT_EQ(s.delivered, all.size());
+  EXPECT_EQ(s.malformed + s.lost + s.overruns, 0U);
+}
+
+TEST_P(BothGenerations, valuesAreThoseOfTheDriveInEastNorthUp) {
+  mock::XsensSimulatorOptions sensor = simulated(GetParam());
+  sensor.duration = Duration::seconds(4);
+  XsensRig rig(sensor);
+  ASSERT_EQ(rig.device->configure(100, nullptr), DeviceStatus::ok) << rig.device->complaint();
+  ASSERT_EQ(rig.device->start(nullptr), DeviceStatus::ok);
+  const auto all = rig.readings();
+  ASSERT_GT(all.size(), 100U);
+  const auto& times = rig.simulator->sample_times_ns();
+  ASSERT_GE(times.size(), all.size());
+  // A first sample or two may have been sent before reading began.
+  const std::size_t skipped = times.size() - all.size();
+  ASSERT_LE(skipped, 13U) << "two bursts of 496 bytes";
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    const InsSample& s = all[i].sample;
+    const InsSample truth = easy_drive(0, rig.simulator->host_time(times[i + skipped]) - HostStamp{});
+    ASSERT_NEAR(s.position.latitude_deg, truth.position.latitude_deg, 0x1p-32);
+    ASSERT_NEAR(s.position.longitude_deg, truth.position.longitude_deg, 0x1p-32);
+    ASSERT_NEAR(s.position.height_m, truth.position.height_m, 0x1p-32);
+    double dot = 0;
+    for (std::size_t k = 0; k < 4; ++k) dot += s.q_enu_ins[k] * truth.q_enu_ins[k];
+    ASSERT_NEAR(std::abs(dot), 1, 1e-12);
+    for (std::size_t k = 0; k < 3; ++k) ASSERT_NEAR(s.velocity_enu[k], truth.velocity_enu[k], 2.5e-7) << "a float's step at 2 m/s";
+    ASSERT_TRUE(all[i].quality.utc_valid);
+    ASSERT_EQ(all[i].quality.utc_ns, sensor.unix_ns_at_power_on + times[i + skipped]);
+  }
+  EXPECT_EQ(all.back().quality.filter_valid, true);
+  if (!legacy()) {  // the receiver's word comes along at this rate and baud
+    EXPECT_EQ(all.back().quality.satellites, 11);
+    EXPECT_NEAR(all.back().sample.position_sigma, 1.5, 1e-3);
+    EXPECT_NEAR(all.back().sample.height_sigma, 3, 1e-3);
+    EXPECT_NEAR(all.back().sample.velocity_sigma, 0.1, 1e-3);
+  }
+}
+
+TEST_P(BothGenerations, whatIsSetAlreadyIsNotWrittenAgain) {
+  mock::XsensSimulatorOptions sensor = simulated(GetParam());
+  XsensRig rig(sensor);
+  Options options;
+  options.sync_out_hz = 25;
+  options.sync_in = SyncIn::rising;
+  rig.device = std::make_unique<Device>(std::make_unique<mock::SimulatedPlace>(rig.simulator, mock::SimulatedLineOptions{}), options);
+  ASSERT_EQ(rig.device->configure(100, nullptr), DeviceStatus::ok) << rig.device->complaint();
+  const mock::XsensWrites first = rig.simulator->writes();
+  EXPECT_GT(first.outputs + first.layout, 0);
+  EXPECT_GT(first.sync_out + first.sync_settings, 0);
+  ASSERT_EQ(rig.device->configure(100, nullptr), DeviceStatus::ok) << rig.device->complaint();
+  const mock::XsensWrites& second = rig.simulator->writes();
+  EXPECT_EQ(second.outputs, first.outputs);
+  EXPECT_EQ(second.layout, first.layout);
+  EXPECT_EQ(second.period, first.period);
+  EXPECT_EQ(second.skip, first.skip);
+  EXPECT_EQ(second.sync_out, first.sync_out);
+  EXPECT_EQ(second.sync_in, first.sync_in);
+  EXPECT_EQ(second.sync_settings, first.sync_settings);
+  EXPECT_EQ(second.baud, 0);
+  EXPECT_EQ(second.heading, 0) << "message D6 means the heading to a newer device";
+}
+
+TEST_P(BothGenerations, syncOutIsSetPerGeneration) {
+  XsensRig rig(simulated(GetParam()), {}, [] {
+    Options o;
+    o.sync_out_hz = 30;
+    o.sync_out_width_ms = 2;
+    return o;
+  }());
+  double actual = 0;
+  ASSERT_EQ(rig.device->configure(legacy() ? 120 : 100, &actual), DeviceStatus::ok) << rig.device->complaint();
+  if (legacy()) {
+    EXPECT_EQ(rig.simulator->legacy_sync_out(), (std::array<std::uint32_t, 4>{0x12, 3, 0, 58982}));
+    EXPECT_EQ(rig.device->stream().sync_out_hz, 30);
+    EXPECT_TRUE(rig.device->remark().empty()) << rig.device->remark();
+  } else {
+    const auto entries = rig.simulator->sync_settings().items();
+    ASSERT_EQ(entries.size(), 2U);
+    EXPECT_EQ(entries[0].function, 14) << "the receiver's clock stays";
+    EXPECT_EQ(entries[1], (xbus::SyncEntry{xbus::kSyncIntervalTransition, xbus::kSyncLineOut, xbus::kSyncPositive, 0, 0, 12, 20, 0}));
+    EXPECT_NEAR(rig.device->stream().sync_out_hz, 30.77, 0.01);
+    EXPECT_NE(rig.device->remark().find("30.77"), std::string::npos) << "it cannot make 30 Hz, and says so";
+  }
+}
+
+TEST_P(BothGenerations, isFoundAtAnotherBaudRateAndBroughtToTheOneAskedFor) {
+  mock::XsensSimulatorOptions sensor = simulated(GetParam());
+  sensor.baud = 57600;
+  sensor.layout = {0x0004, 0x001};  // what that rate carries
+  sensor.duration = Duration::seconds(30);
+  Options options;
+  options.baud = 460800;
+  XsensRig rig(sensor, {}, options);
+  ASSERT_EQ(rig.device->configure(100, nullptr), DeviceStatus::ok) << rig.device->complaint();
+  EXPECT_EQ(rig.simulator->baud(), 460800U);
+  EXPECT_EQ(rig.simulator->writes().baud, 1);
+  ASSERT_EQ(rig.device->start(nullptr), DeviceStatus::ok);
+  EXPECT_EQ(rig.readings(50).size(), 50U);
+}
+
+TEST_P(BothGenerations, aLineTooSlowIsRefusedWithWhatWouldDo) {
+  XsensRig rig(simulated(GetParam()));
+  ASSERT_EQ(rig.device->connect(), DeviceStatus::ok);
+  EXPECT_EQ(rig.device->configure(400, nullptr), DeviceStatus::no_bandwidth);
+  EXPECT_NE(rig.device->complaint().find("115200 baud"), std::string::npos) << rig.device->complaint();
+  EXPECT_NE(rig.device->complaint().find("ins.baud"), std::string::npos) << rig.device->complaint();
+  EXPECT_EQ(rig.simulator->writes().outputs + rig.simulator->writes().layout + rig.simulator->writes().period, 0) << "nothing was changed";
+  EXPECT_EQ(rig.device->configure(100, nullptr), DeviceStatus::ok) << "and it can still be set otherwise";
+}
+
+TEST_P(BothGenerations, comesBackAfterItWasUnplugged) {
+  mock::XsensSimulatorOptions sensor = simulated(GetParam());
+  sensor.duration = Duration::seconds(30);
+  mock::SimulatedLineOptions line;
+  line.outages = {{HostStamp(10'000'000'000), HostStamp(13'000'000'000), true},
+                  {HostStamp(18'000'000'000), HostStamp(20'000'000'000), false}};
+  XsensRig rig(sensor, line);
+  ASSERT_EQ(rig.device->configure(100, nullptr), DeviceStatus::ok) << rig.device->complaint();
+  ASSERT_EQ(rig.device->start(nullptr), DeviceStatus::ok);
+  const auto all = rig.readings();
+  EXPECT_EQ(rig.times_gone, 2);
+  ASSERT_GT(all.size(), 1500U);
+  EXPECT_GT(all.back().arrival, HostStamp(29'500'000'000)) << "it measures to the end";
+  for (std::size_t i = 1; i < all.size(); ++i) {
+    ASSERT_GT(all[i].sample.number, all[i - 1].sample.number);
+    ASSERT_GT(all[i].host, all[i - 1].host);
+  }
+}
+
+TEST_P(BothGenerations, goesOnByItselfAfterTheSupplyDipped) {
+  mock::XsensSimulatorOptions sensor = simulated(GetParam());
+  sensor.duration = Duration::seconds(20);
+  sensor.dips = {HostStamp(9'000'000'000)};
+  XsensRig rig(sensor);
+  ASSERT_EQ(rig.device->configure(100, nullptr), DeviceStatus::ok) << rig.device->complaint();
+  ASSERT_EQ(rig.device->start(nullptr), DeviceStatus::ok);
+  const auto all = rig.readings();
+  EXPECT_EQ(rig.times_gone, 0);
+  EXPECT_GT(all.back().arrival, HostStamp(19'500'000'000));
+  EXPECT_EQ(rig.device->statistics().restarts, 1U) << "its clock began anew";
+  for (std::size_t i = 1; i < all.size(); ++i) ASSERT_GT(all[i].measured, all[i - 1].measured);
+  // The stamps after the dip are right again, though its clock begins at another value.
+  const InsReading& last = all.back();
+  EXPECT_LT(std::abs(((last.arrival - last.host) - Duration::milliseconds(30)).to_seconds()), 0.05);
+}
+
+TEST_P(BothGenerations, oneThatFellSilentIsAskedAgain) {
+  mock::XsensSimulatorOptions sensor = simulated(GetParam());
+  sensor.duration = Duration::seconds(20);
+  sensor.silences = {HostStamp(9'000'000'000)};
+  XsensRig rig(sensor);
+  ASSERT_EQ(rig.device->configure(100, nullptr), DeviceStatus::ok) << rig.device->complaint();
+  ASSERT_EQ(rig.device->start(nullptr), DeviceStatus::ok);
+  const auto all = rig.readings();
+  EXPECT_EQ(rig.times_gone, 1);
+  EXPECT_GT(all.back().arrival, HostStamp(19'500'000'000));
+}
+
+TEST_P(BothGenerations, bytesThatFlipOnTheLineCostMessagesAndNothingElse) {
+  mock::XsensSimulatorOptions sensor = simulated(GetParam());
+  sensor.duration = Duration::seconds(40);
+  mock::SimulatedLineOptions line;
+  line.corrupt = 1e-4;
+  XsensRig rig(sensor, line);
+  ASSERT_EQ(rig.device->configure(100, nullptr), DeviceStatus::ok) << rig.device->complaint();
+  ASSERT_EQ(rig.device->start(nullptr), DeviceStatus::ok);
+  const auto all = rig.readings();
+  EXPECT_EQ(rig.times_gone, 0);
+  EXPECT_GT(all.size(), 3400U) << "of 3900 a hundredth of each hundred bytes";
+  const InsStatistics s = rig.device->statistics();
+  EXPECT_GT(s.malformed, 10U);
+  EXPECT_GT(s.lost, 10U);
+  for (std::size_t i = 1; i < all.size(); ++i) {
+    ASSERT_GT(all[i].measured, all[i - 1].measured);
+    const auto steps = all[i].sample.number - all[i - 1].sample.number;
+    ASSERT_NEAR((all[i].measured - all[i - 1].measured).to_seconds(), 0.01 * static_cast<double>(steps), 1e-6);
+  }
+}
+
+TEST_P(BothGenerations, stopsAndStartsAgain) {
+  mock::XsensSimulatorOptions sensor = simulated(GetParam());
+  sensor.duration = Duration::seconds(60);
+  XsensRig rig(sensor);
+  ASSERT_EQ(rig.device->configure(100, nullptr), DeviceStatus::ok);
+  InsReading r;
+  EXPECT_EQ(rig.device->wait(Duration{}, &r), DeviceStatus::stopped);
+  for (int i = 0; i < 3; ++i) {
+    ASSERT_EQ(rig.device->start(nullptr), DeviceStatus::ok);
+    EXPECT_EQ(rig.device->start(nullptr), DeviceStatus::ok) << "twice does nothing";
+    EXPECT_EQ(rig.readings(20).size(), 20U);
+    rig.device->stop();
+    rig.device->stop();
+    EXPECT_EQ(rig.device->wait(Duration{}, &r), DeviceStatus::stopped);
+  }
+  EXPECT_EQ(rig.device->statistics().starts, 3U);
+}
+
+INSTANTIATE_TEST_SUITE_P(Xsens, BothGenerations, ::testing::Values(Generation::legacy, Generation::mark4),
+                         [](const auto& one) { return one.param == Generation::legacy ? "legacy" : "mark4"; });
+
+// ---- stamps ---------------------------------------------------------------------------------------------------------
+
+struct Timing {
+  const char* name;
+  Generation generation;
+  double rate;
+  std::uint32_t baud;
+  int latency_ms;  // 0: no converter
+};
+
+class Stamps : public ::testing::TestWithParam<Timing> {};
+
+TEST_P(Stamps, areRightWithinThreeTenthsOfAMillisecondAfterTwentySeconds) {
+  const Timing& t = GetParam();
+  std::vector<double> errors;
+  for (const std::uint64_t seed : {1U, 2U, 3U}) {
+    mock::XsensSimulatorOptions sensor = simulated(t.generation);
+    sensor.baud = t.baud;
+    sensor.clock_ppm = seed == 2 ? -50 : 50;
+    sensor.seed = seed;
+    sensor.duration = Duration::seconds(80);
+    mock::SimulatedLineOptions line;
+    line.converter = t.latency_ms > 0;
+    line.latency_timer = Duration::milliseconds(t.latency_ms);
+    line.seed = seed;
+    XsensRig rig(sensor, line);
+    ASSERT_EQ(rig.device->configure(t.rate, nullptr), DeviceStatus::ok) << rig.device->complaint();
+    ASSERT_EQ(rig.device->start(nullptr), DeviceStatus::ok);
+    const auto all = rig.readings();
+    ASSERT_GT(all.size(), 70U * static_cast<unsigned>(t.rate));
+    // The simulator's newest samples are the readings' newest: the device's clock is tied by the last of both.
+    const std::int64_t origin = t.generation == Generation::mark4 ? rig.simulator->sample_time_origin_ns()
+                                                                  : all.back().measured.ns() - rig.simulator->sample_times_ns().back();
+    const auto some = test::stamp_errors_ms(*rig.simulator, all, origin, Duration::seconds(20));
+    errors.insert(errors.end(), some.begin(), some.end());
+  }
+  std::sort(errors.begin(), errors.end());
+  EXPECT_LE(test::percentile(errors, 0.99), 0.3) << "ms";
+  RecordProperty("p50_us", static_cast<int>(1e3 * test::percentile(errors, 0.5)));
+  RecordProperty("p99_us", static_cast<int>(1e3 * test::percentile(errors, 0.99)));
+}
+
+INSTANTIATE_TEST_SUITE_P(Lines, Stamps,
+                         ::testing::Values(Timing{"legacy_115200_16ms", Generation::legacy, 120, 115200, 16},
+                                           Timing{"mark4_115200_16ms", Generation::mark4, 100, 115200, 16},
+                                           Timing{"mark4_921600_16ms", Generation::mark4, 100, 921600, 16},
+                                           Timing{"mark4_115200_direct", Generation::mark4, 100, 115200, 0}),
+                         [](const auto& one) { return one.param.name; });
+
+// ---- what is special to one of them, and what is none ----------------------------------------------------------------
+
+TEST(Mark4, theDayOfItsClockWraps) {
+  mock::XsensSimulatorOptions sensor = simulated(Generation::mark4);
+  sensor.first_sample_time = 863'900'000;  // ten seconds before the end of its day
+  sensor.duration = Duration::seconds(25);
+  XsensRig rig(sensor);
+  ASSERT_EQ(rig.device->configure(100, nullptr), DeviceStatus::ok);
+  ASSERT_EQ(rig.device->start(nullptr), DeviceStatus::ok);
+  const auto all = rig.readings();
+  ASSERT_GT(all.size(), 2000U);
+  for (std::size_t i = 1; i < all.size(); ++i) ASSERT_EQ(all[i].measured - all[i - 1].measured, Duration::milliseconds(10));
+  EXPECT_EQ(rig.device->statistics().restarts, 0U);
+}
+
+TEST(Mark4, positionsThatAreMissingNowAndThenMakeNoHoleInTheFix) {
+  mock::XsensSimulatorOptions sensor = simulated(Generation::mark4);
+  sensor.missing_position = 0.2;
+  sensor.duration = Duration::seconds(20);
+  XsensRig rig(sensor);
+  ASSERT_EQ(rig.device->configure(100, nullptr), DeviceStatus::ok);
+  ASSERT_EQ(rig.device->start(nullptr), DeviceStatus::ok);
+  const auto all = rig.readings();
+  ASSERT_GT(all.size(), 1200U);
+  for (const InsReading& r : all) ASSERT_EQ(r.sample.fix, FixStatus::fix_3d);
+  EXPECT_LT(all.size(), 1700U);
+}
+
+TEST(Mark4, aDriveWithoutAFixIsToldAndGoesOn) {
+  mock::XsensSimulatorOptions sensor = simulated(Generation::mark4);
+  sensor.duration = Duration::seconds(20);
+  XsensRig rig(sensor, {}, {}, [](std::uint64_t n, Duration t) {
+    InsSample s = easy_drive(n, t);
+    if (t > Duration::seconds(8)) s.fix = FixStatus::none;
+    if (t > Duration::seconds(14)) s.fix = FixStatus::dead_reckoning;
+    return s;
+  });
+  ASSERT_EQ(rig.device->configure(100, nullptr), DeviceStatus::ok);
+  ASSERT_EQ(rig.device->start(nullptr), DeviceStatus::ok);
+  int without = 0, reckoned = 0;
+  for (const InsReading& r : rig.readings()) {
+    without += r.sample.fix == FixStatus::none ? 1 : 0;
+    reckoned += r.sample.fix == FixStatus::dead_reckoning ? 1 : 0;
+    ASSERT_TRUE(r.sample.attitude_valid);
+    ASSERT_TRUE(r.sample.fix != FixStatus::none || r.sample.position_sigma == 0);
+  }
+  EXPECT_NEAR(without, 600, 5);
+  EXPECT_NEAR(reckoned, 600, 8);
+}
+
+TEST(Mark4, syncOutIsMarkedInTheStream) {
+  mock::XsensSimulatorOptions sensor = simulated(Generation::mark4);
+  sensor.duration = Duration::seconds(20);
+  Options options;
+  options.sync_out_hz = 25;
+  XsensRig rig(sensor, {}, options);
+  ASSERT_EQ(rig.device->configure(100, nullptr), DeviceStatus::ok);
+  ASSERT_EQ(rig.device->start(nullptr), DeviceStatus::ok);
+  const auto all = rig.readings();
+  const auto marked = std::count_if(all.begin(), all.end(), [](const InsReading& r) { return r.quality.sync_out; });
+  EXPECT_NEAR(static_cast<double>(marked), static_cast<double>(all.size()) / 4, 2);
+}
+
+/// Something else on the port.
+class Talker final : public mock::DeviceModel {
+ public:
+  explicit Talker(std::string says) : says_(std::move(says)) {}
+  void receive(std::span<const std::uint8_t> /*bytes*/, HostStamp /*at*/) override {}
+  std::optional<HostStamp> next() const override { return says_.empty() ? std::nullopt : std::optional(next_); }
+  void produce(HostStamp at, std::vector<std::uint8_t>* out) override {
+    out->insert(out->end(), says_.begin(), says_.end());
+    next_ = at + Duration::milliseconds(200);
+  }
+  std::uint32_t baud() const override { return 9600; }
+  void power_cycle(HostStamp /*at*/) override {}
+
+ private:
+  std::string says_;
+  HostStamp next_{};
+};
+
+std::string complaint_about(const std::string& says, DeviceStatus* status) {
+  Device device(std::make_unique<mock::SimulatedPlace>(std::make_shared<Talker>(says), mock::SimulatedLineOptions{}), {});
+  *status = device.connect();
+  return device.complaint();
+}
+
+TEST(AnotherMake, isNamed) {
+  DeviceStatus status = DeviceStatus::ok;
+  EXPECT_NE(complaint_about("$GPGGA,130305.0,4717.115,N,00833.912,E,1,08,0.9,499.6,M,48.0,M,,*5B\r\n", &status).find("NMEA"),
+            std::string::npos);
+  EXPECT_EQ(status, DeviceStatus::not_found);
+  EXPECT_NE(complaint_about("\xB5\x62\x01\x07 some more bytes", &status).find("u-blox"), std::string::npos);
+  EXPECT_NE(complaint_about("hello hello hello", &status).find("no Xbus"), std::string::npos);
+  EXPECT_NE(complaint_about("", &status).find("silent"), std::string::npos);
+}
+
+TEST(Configuration, ratesThatTheDeviceHasNotAreNamed) {
+  XsensRig rig(simulated(Generation::legacy));
+  EXPECT_EQ(rig.device->configure(110, nullptr), DeviceStatus::unsupported);
+  EXPECT_NE(rig.device->complaint().find("ins.rate"), std::string::npos) << rig.device->complaint();
+  EXPECT_EQ(rig.device->configure(-1, nullptr), DeviceStatus::bad_configuration);
+  EXPECT_EQ(rig.device->start(nullptr), DeviceStatus::bad_configuration) << "not configured";
+  XsensRig newer(simulated(Generation::mark4));
+  double actual = 0;
+  EXPECT_EQ(newer.device->configure(110, &actual), DeviceStatus::ok);
+  EXPECT_EQ(actual, 100);
+  EXPECT_FALSE(newer.device->remark().empty());
+}
+
+}  // namespace
+}  // namespace vergence::xsens

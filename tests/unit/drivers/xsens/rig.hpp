@@ -1,0 +1,86 @@
+#pragma once
+#include <algorithm>
+#include <cmath>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "drivers/mock/simulators/simulators.hpp"
+#include "drivers/xsens/device.hpp"
+
+namespace vergence::test {
+
+/// A drive that is easy to recompute: the sensor turns and moves along known functions of time.
+[[nodiscard]] inline InsSample easy_drive(std::uint64_t number, Duration time) {
+  const double t = time.to_seconds();
+  InsSample s;
+  s.number = number;
+  s.fix = FixStatus::fix_3d;
+  s.attitude_valid = s.velocity_valid = true;
+  s.position = {-27.4975 + 1e-5 * t, 153.0137 + 2e-5 * t, 60 + 0.1 * t};
+  s.velocity_enu = {2.0 + 0.01 * t, 1.1, -0.1};
+  const double yaw = 0.3 + 0.02 * t, roll = 0.05, h = 0.5;
+  // yaw about up, then roll about forward
+  s.q_enu_ins = {std::cos(h * yaw) * std::sin(h * roll), std::sin(h * yaw) * std::sin(h * roll), std::sin(h * yaw) * std::cos(h * roll),
+                 std::cos(h * yaw) * std::cos(h * roll)};
+  s.position_sigma = 1.5, s.height_sigma = 3, s.velocity_sigma = 0.1;
+  return s;
+}
+
+/// The simulator of a generation with what goes with it.
+[[nodiscard]] inline mock::XsensSimulatorOptions simulated(xbus::Generation generation) {
+  mock::XsensSimulatorOptions o;
+  o.generation = generation;
+  o.device_id = generation == xbus::Generation::legacy ? 0x00500123 : 0x07701234;
+  return o;
+}
+
+/// A driver's device on a simulated line.
+struct XsensRig {
+  explicit XsensRig(const mock::XsensSimulatorOptions& sensor = {}, const mock::SimulatedLineOptions& line = {},
+                    const xsens::Options& options = {}, mock::InsSource source = easy_drive)
+      : simulator(std::make_shared<mock::XsensSimulator>(std::move(source), sensor)),
+        device(std::make_unique<xsens::Device>(std::make_unique<mock::SimulatedPlace>(simulator, line), options)) {}
+
+  std::shared_ptr<mock::XsensSimulator> simulator;
+  std::unique_ptr<xsens::Device> device;
+
+  /// All readings until the device has no more, or this many; `gone` is passed over, the device is asked to come back.
+  std::vector<InsReading> readings(std::size_t most = SIZE_MAX) {
+    std::vector<InsReading> all;
+    while (all.size() < most) {
+      InsReading r;
+      const DeviceStatus s = device->wait(Duration::seconds(20), &r);
+      if (s == DeviceStatus::ok) {
+        all.push_back(r);
+      } else if (s == DeviceStatus::gone) {
+        ++times_gone;
+        while (device->start(nullptr) == DeviceStatus::gone) std::this_thread::yield();
+      } else {
+        break;
+      }
+    }
+    return all;
+  }
+  int times_gone = 0;
+};
+
+/// |mapped − true| of every reading after `settled` of the first, in milliseconds, ascending.
+[[nodiscard]] inline std::vector<double> stamp_errors_ms(const mock::XsensSimulator& simulator, const std::vector<InsReading>& readings,
+                                                         std::int64_t origin_ns, Duration settled) {
+  std::vector<double> errors;
+  for (const InsReading& r : readings) {
+    if (r.measured - readings.front().measured < settled) continue;
+    const HostStamp truth = simulator.host_time(r.measured.ns() - origin_ns);
+    errors.push_back(std::abs((r.host - truth).to_seconds()) * 1e3);
+  }
+  std::sort(errors.begin(), errors.end());
+  return errors;
+}
+
+[[nodiscard]] inline double percentile(const std::vector<double>& ascending, double p) {
+  return ascending.empty() ? 1e9
+                           : ascending[std::min(ascending.size() - 1, static_cast<std::size_t>(p * static_cast<double>(ascending.size())))];
+}
+
+}  // namespace vergence::test
