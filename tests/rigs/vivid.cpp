@@ -18,6 +18,10 @@ namespace vergence::test {
 namespace {
 
 constexpr std::uint32_t kBuffers = 4;
+// The frames of 59.94 Hz come 25 ms apart: the kernel of the rig counts time in ticks of 10 ms, of which one or two are rounded up.
+constexpr std::int64_t kFrame_ns = 25'000'000;
+// From a buffer's filling to its time: those before it in the queue, and half a frame of what is not known.
+constexpr std::int64_t kAhead_ns = (kBuffers - 1) * kFrame_ns + kFrame_ns / 2;
 
 [[noreturn]] void fail(const std::string& node, const std::string& what, int error) {
   throw std::runtime_error(node + ": " + what + ": " + std::strerror(error));
@@ -124,7 +128,7 @@ void VividPlayer::stop() {
 }
 
 void VividPlayer::feed() {
-  const auto due = [this] { return static_cast<std::uint64_t>((now_ns() - interval_ns_ / 2) / interval_ns_); };
+  const auto due = [this] { return static_cast<std::uint64_t>((now_ns() + kAhead_ns - interval_ns_ / 2) / interval_ns_); };
   const std::uint64_t first = due();
   std::vector<pollfd> looks;
   for (const Output& out : outputs_) looks.push_back({out.fd.get(), POLLOUT, 0});
