@@ -19,6 +19,7 @@ constexpr double kSpreadOutlier = 5;  // times the inflation: what one frame may
 constexpr std::size_t kLearnWindow = 30, kLearnLongest = 150;
 constexpr double kPriorSigma = 0.2;   // rad: of directions nothing was seen of
 constexpr double kRelease = 0.5;      // of the threshold: an alarm stands until the statistic is below
+constexpr double kRampShare = 0.05;   // a ramp's best step explains 8/9 of it
 constexpr double kRampMargin = 10;    // gain by which a drift must beat a knock
 constexpr int kRampFrames = 150;      // and the least length of one
 constexpr double kLagMargin = 25;     // gain by which a lag must beat every fixed or drifting transform
@@ -165,8 +166,7 @@ Decision Windows::decide() noexcept {
   d.onset = recent(0).frame;
   bool lagging = false;
   Evidence longest;
-  // What the rig was before the window of the largest statistic, where that is known: a reference that is a little off is no onset.
-  Vec5 learnt = Vec5::Zero(), mean = Vec5::Zero();
+  std::size_t window = 0;  // of the largest statistic
   const auto stands_out = [this](const Solved& s) {
     return std::abs(s.lag()) > options_.lag_frames && std::abs(s.lag()) > options_.lag_sigmas * s.lag_sigma();
   };
@@ -181,11 +181,12 @@ Decision Windows::decide() noexcept {
     longest = effective(sum);
     double most = statistic(longest, Vec5::Zero(), covariance_);
     if (windows_[w] >= kLearnWindow && windows_[w] <= kLearnLongest && count_ >= 2 * windows_[w]) {
+      Vec5 learnt;
       Mat5 covariance;
       learn(sum, &learnt, &covariance);
       most = std::max(most, statistic(longest, learnt, covariance));
     }
-    if (most > d.statistic) d.statistic = most, mean = learnt;
+    if (most > d.statistic) d.statistic = most, window = windows_[w];
     Evidence across;
     across.add(sum.across, 1.0 / (lambda_across_ + bias2_ * sum.across.n));
     const Solved solved(across.A, across.g);
@@ -197,7 +198,7 @@ Decision Windows::decide() noexcept {
   d.yaw_sigma = std::sqrt(d.covariance(kYaw, kYaw));
   const double limit = over_ > 0 ? kRelease * options_.threshold : options_.threshold;
   over_ = d.statistic > limit ? over_ + 1 : 0;
-  if (over_ > 0 || lagging) attribute(mean, &d);
+  if (over_ > 0 || lagging) attribute(window, &d);
   return d;
 }
 
@@ -288,7 +289,16 @@ TwoEvidences Windows::since(const Onset& onset) const noexcept {
   return sum;
 }
 
-void Windows::attribute(const Vec5& mean, Decision* d) noexcept {
+void Windows::attribute(std::size_t window, Decision* d) noexcept {
+  // What the rig was before, where that is known: a reference that is a little off is no onset.
+  Vec5 mean = Vec5::Zero();
+  const std::size_t recent_frames = std::clamp(window, kLearnWindow, kLearnLongest);
+  if (count_ >= 2 * recent_frames) {
+    TwoEvidences sum;
+    Mat5 covariance;
+    sum_of(recent_frames, &sum);
+    learn(sum, &mean, &covariance);
+  }
   Search found;
   search(mean, &found);
   if (find_lag(found, d)) return;
@@ -297,7 +307,7 @@ void Windows::attribute(const Vec5& mean, Decision* d) noexcept {
     d->undecided = true;
     return;
   }
-  const bool ramp = found.ramp.gain > found.step.gain + kRampMargin;
+  const bool ramp = found.ramp.gain > found.step.gain + std::max(kRampMargin, kRampShare * found.step.gain);
   d->kind = ramp ? MonitorVerdict::Kind::drift : MonitorVerdict::Kind::knock;
   const Onset& onset = ramp ? found.ramp : found.step;
   d->onset = onset.frame;

@@ -79,7 +79,7 @@ class Windows {
   [[nodiscard]] bool find_lag(const Search& found, Decision* d) const noexcept;
   [[nodiscard]] bool lag_is_rival(const Search& found) const noexcept;
   [[nodiscard]] TwoEvidences since(const Onset& onset) const noexcept;
-  void attribute(const Vec5& mean, Decision* d) noexcept;
+  void attribute(std::size_t window, Decision* d) noexcept;
 
   MonitorOptions options_{};
   Mat5 covariance_ = Mat5::Zero();

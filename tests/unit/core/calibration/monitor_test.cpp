@@ -1,0 +1,248 @@
+#include "core/calibration/monitor.hpp"
+
+#include <gtest/gtest.h>
+
+#include <limits>
+#include <string>
+
+#include "core/memory/allocation_guard.hpp"
+#include "tests/unit/core/calibration/monitor_trial.hpp"
+
+namespace vergence::test {
+namespace {
+
+using calibration::MonitorOptions;
+using calibration::MonitorVerdict;
+using Kind = MonitorVerdict::Kind;
+
+constexpr int kBefore = 300;  // frames driven before the rig changes: ten seconds
+
+FeatureDriveOptions street(double speed, std::uint64_t seed, int tracks = 220) {
+  FeatureDriveOptions o;
+  o.speed = speed;
+  o.seed = seed;
+  o.tracks = tracks;
+  return o;
+}
+
+struct KnockRow {
+  const char* name;
+  Vec3 rotation_deg, translation_mm;
+  int limit;  // moving frames
+};
+
+class MonitorKnock : public testing::TestWithParam<KnockRow> {};
+
+TEST_P(MonitorKnock, isNoticedInTimeAndItsOnsetFound) {
+  const KnockRow& row = GetParam();
+  for (const double speed : {3.0, 8.0, 15.0}) {
+    for (const std::uint64_t seed : {1U, 2U, 3U}) {
+      SCOPED_TRACE(testing::Message() << row.name << " at " << speed << " m/s, seed " << seed);
+      FeatureDriveOptions o = street(speed, seed);
+      o.changes = {{kBefore, row.rotation_deg / kRadian, row.translation_mm * 1e-3, 0}};
+      const TrialReference reference = calibrated(o);
+      MonitorTrial trial(o, reference.T_right_left, reference.covariance);
+      for (int i = 0; i < kBefore; ++i) ASSERT_EQ(trial.step().kind, Kind::quiet) << "frame " << i;
+      ASSERT_GE(trial.frame().found_across, 190);
+      const auto frames = trial.frames_until(row.limit);
+      ASSERT_TRUE(frames.has_value()) << "statistic " << trial.verdict().statistic;
+      EXPECT_NE(trial.verdict().kind, Kind::out_of_step);
+      RecordProperty("frames", *frames);
+      for (int i = 0; i < 10; ++i) (void)trial.step();
+      // A recalibration that starts here must hold next to nothing of the old rig: 10 of the 60 frames it wants.
+      EXPECT_GE(trial.verdict().onset_frame + 10, static_cast<std::uint64_t>(kBefore));
+      EXPECT_LE(trial.verdict().onset_frame, static_cast<std::uint64_t>(kBefore) + 15);
+    }
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Table, MonitorKnock,
+    testing::Values(KnockRow{"pitch_0_2_deg", {0.2, 0, 0}, {0, 0, 0}, 10}, KnockRow{"pitch_0_05_deg", {-0.05, 0, 0}, {0, 0, 0}, 30},
+                    KnockRow{"roll_0_1_deg", {0, 0, 0.1}, {0, 0, 0}, 30}, KnockRow{"yaw_0_3_deg", {0, 0.3, 0}, {0, 0, 0}, 30},
+                    KnockRow{"yaw_minus_0_3_deg", {0, -0.3, 0}, {0, 0, 0}, 30}, KnockRow{"t_y_4_mm", {0, 0, 0}, {0, 4, 0}, 30},
+                    KnockRow{"t_z_10_mm", {0, 0, 0}, {0, 0, 10}, 150}, KnockRow{"pitch_2_deg", {2, 0, 0}, {0, 0, 0}, 10}),
+    [](const auto& row) { return std::string(row.param.name); });
+
+TEST(Monitor, estimatesASmallKnockWithinItsCovarianceAndALargeOneToFirstOrder) {
+  for (const Vec3& degrees :
+       {Vec3(0.03, 0, 0), Vec3(0, 0.04, 0), Vec3(0.02, -0.04, 0.05), Vec3(0.1, 0, 0), Vec3(0, 0.3, 0), Vec3(0.05, -0.2, 0.1)}) {
+    SCOPED_TRACE(degrees.transpose());
+    FeatureDriveOptions o = street(8, 5, 300);
+    o.changes = {{150, degrees / kRadian, Vec3::Zero(), 0}};
+    MonitorTrial trial(o);
+    for (int i = 0; i < 300; ++i) (void)trial.step();
+    ASSERT_EQ(trial.verdict().kind, Kind::knock);
+    const Vec3 error = trial.verdict().offset.head<3>() - degrees / kRadian;
+    EXPECT_LT(error.norm() * kRadian, 0.003 + 0.1 * degrees.norm());
+    if (degrees.norm() > 0.08) continue;
+    // χ² of three beyond 30: one in a million, with room for what is not Gaussian.
+    EXPECT_LT(error.dot(trial.verdict().covariance.topLeftCorner<3, 3>().inverse() * error), 30.0) << error.transpose();
+  }
+}
+
+TEST(Monitor, callsASlowTurnADriftBeforeItReachesThreeHundredthsOfADegree) {
+  for (const double rate : {0.02, -0.02}) {  // ° a minute
+    FeatureDriveOptions o = street(8, 2);
+    o.changes = {{kBefore, Vec3(10 * rate, 0, 0) / kRadian, Vec3::Zero(), 18000}};
+    const TrialReference reference = calibrated(o);
+    MonitorTrial trial(o, reference.T_right_left, reference.covariance);
+    for (int i = 0; i < kBefore; ++i) ASSERT_EQ(trial.step().kind, Kind::quiet);
+    const auto frames = trial.frames_until(2700);  // 0.03°
+    ASSERT_TRUE(frames.has_value());
+    const auto as_drift = trial.verdict().kind == Kind::drift ? frames : trial.frames_until(2700 - *frames, Kind::drift);
+    EXPECT_TRUE(as_drift.has_value());
+  }
+}
+
+TEST(Monitor, findsACameraOneFrameOutOfStepWithinASecond) {
+  for (const double speed : {3.0, 8.0, 15.0})
+    for (const double lag : {1.0, -1.0})
+      for (const std::uint64_t from : {0U, 150U}) {
+        SCOPED_TRACE(testing::Message() << lag << " frames at " << speed << " m/s from frame " << from);
+        FeatureDriveOptions o = street(speed, 3, 300);
+        o.lags = {{from, lag}};
+        MonitorTrial trial(o);
+        for (std::uint64_t i = 0; i < from; ++i) ASSERT_EQ(trial.step().kind, Kind::quiet);
+        const auto frames = trial.frames_until(30, Kind::out_of_step);
+        ASSERT_TRUE(frames.has_value()) << "lag " << trial.verdict().lag_frames << " ± " << trial.verdict().lag_sigma;
+        for (int i = 0; i < 60; ++i) (void)trial.step();
+        EXPECT_EQ(trial.verdict().kind, Kind::out_of_step);
+        EXPECT_NEAR(trial.verdict().lag_frames, lag, 0.2);
+      }
+}
+
+TEST(Monitor, findsALagThatTheCalibrationHasSwallowed) {
+  FeatureDriveOptions o = street(8, 4, 300);
+  o.lags = {{0, 1.0}};
+  Transform T_wrong = o.T_right_left;
+  for (int round = 0; round < 4; ++round) {  // the fixed transform that fits the first two seconds best
+    MonitorTrial fit(o, T_wrong, Mat6::Zero());
+    for (int i = 0; i < 75; ++i) (void)fit.step();
+    Vec6 step = fit.verdict().offset;
+    T_wrong = perturbed(T_wrong, step.head<3>(), step.tail<3>());
+    T_wrong.t *= o.T_right_left.t.norm() / T_wrong.t.norm();
+  }
+  EXPECT_GT(std::abs(T_wrong.t.z()), 0.15);  // v/30 = 0.27 m at 8 m/s
+  MonitorTrial trial(o, T_wrong, Mat6::Zero());
+  EXPECT_TRUE(trial.frames_until(30, Kind::out_of_step).has_value());
+}
+
+TEST(Monitor, isQuietWhenNothingHappensStandingIncluded) {
+  for (const std::uint64_t seed : {1U, 2U, 3U}) {
+    FeatureDriveOptions o = street(8, seed, 300);
+    o.drive_s = 40;
+    o.stop_s = 20;
+    o.outliers = 0.1;
+    const TrialReference reference = calibrated(o);
+    MonitorTrial trial(o, reference.T_right_left, reference.covariance);
+    int standing = 0;
+    for (int i = 0; i < 2 * 60 * 30; ++i) {
+      ASSERT_EQ(trial.step().kind, Kind::quiet) << "frame " << i << ", statistic " << trial.verdict().statistic;
+      standing += trial.frame().moving ? 0 : 1;
+    }
+    EXPECT_GT(standing, 900);
+    EXPECT_GT(trial.monitor().frames_agreed(), 1000);
+  }
+}
+
+TEST(Monitor, noticesAKnockOfAStandingRig) {
+  FeatureDriveOptions o = street(8, 6, 300);
+  o.drive_s = 10;
+  o.stop_s = 60;
+  o.changes = {{900, Vec3(0.2, 0, 0) / kRadian, Vec3::Zero(), 0}};
+  MonitorTrial trial(o);
+  for (int i = 0; i < 900; ++i) ASSERT_EQ(trial.step().kind, Kind::quiet);
+  ASSERT_FALSE(trial.frame().moving);
+  EXPECT_TRUE(trial.frames_until(10, Kind::knock).has_value());
+  EXPECT_EQ(trial.verdict().onset_frame, 900U);
+}
+
+TEST(Monitor, staysQuietWhenTheNoiseDoubles) {
+  FeatureDriveOptions quiet = street(8, 7, 300);
+  MonitorTrial trial(quiet);
+  for (int i = 0; i < 300; ++i) (void)trial.step();
+  FeatureDriveOptions rain = quiet;
+  rain.white_px = 0.6, rain.constant_px = 0.6, rain.walk_px = 0.2;
+  FeatureDrive drive(rain);
+  for (int i = 0; i < 300; ++i) drive.next();
+  for (int i = 0; i < 300; ++i) {
+    drive.next();
+    ASSERT_EQ(trial.show(drive).kind, Kind::quiet) << "frame " << i << ", statistic " << trial.verdict().statistic;
+  }
+}
+
+TEST(Monitor, callsNoCollapseWhereNothingIsExpected) {
+  MonitorTrial trial(street(8, 8));
+  for (int i = 0; i < 60; ++i) (void)trial.step();
+  calibration::MonitorFrame night;
+  for (std::uint64_t i = 60; i < 120; ++i) {
+    night.frame = i;
+    const MonitorVerdict v = trial.monitor().look(night);
+    ASSERT_EQ(v.kind, Kind::quiet);
+  }
+  EXPECT_TRUE(trial.monitor().look(night).needs_texture);
+  night.expected_across = 200;
+  for (int i = 0; i < 4; ++i) EXPECT_EQ(trial.monitor().look(night).kind, Kind::quiet);
+  EXPECT_EQ(trial.monitor().look(night).kind, Kind::collapse);
+}
+
+TEST(Monitor, saysThatItNeedsMotion) {
+  FeatureDriveOptions standing = street(0, 9);
+  MonitorTrial still(standing);
+  for (int i = 0; i < 60; ++i) (void)still.step();
+  EXPECT_TRUE(still.verdict().needs_motion);
+  EXPECT_EQ(still.monitor().frames_agreed(), 0);
+  MonitorTrial moving(street(8, 9));
+  for (int i = 0; i < 60; ++i) (void)moving.step();
+  EXPECT_FALSE(moving.verdict().needs_motion);
+  EXPECT_EQ(moving.monitor().frames_agreed(), 57);  // of 59 that move: the shortest window wants three
+  moving.monitor().reset();
+  EXPECT_EQ(moving.monitor().frames_agreed(), 0);
+}
+
+TEST(Monitor, leavesOutWhatIsNotANumber) {
+  MonitorTrial clean(street(8, 10)), dirty(street(8, 10));
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  dirty.spoil = [nan](std::vector<calibration::AcrossSighting>& sightings) {
+    sightings.push_back({{nan, 1}, {2, 3}, 0.5, 4'000'000'001U});
+    sightings.push_back({{10, 1}, {2, std::numeric_limits<double>::infinity()}, 0.5, 4'000'000'002U});
+    sightings.push_back({{10, 1}, {2, 3}, 0, 4'000'000'003U});
+    sightings.push_back({{10, 1}, {2, 3}, nan, 4'000'000'004U});
+  };
+  for (int i = 0; i < 60; ++i) {
+    (void)clean.step();
+    (void)dirty.step();
+  }
+  EXPECT_EQ(clean.verdict().statistic, dirty.verdict().statistic);
+  EXPECT_EQ(dirty.verdict().kind, Kind::quiet);
+}
+
+TEST(Monitor, allocatesNothingWhileLooking) {
+  if (!AllocationGuard::available()) GTEST_SKIP() << "a sanitizer brings its own malloc: there is nothing to count";
+  FeatureDriveOptions o = street(8, 11);
+  o.changes = {{40, Vec3(0, 0.3, 0) / kRadian, Vec3::Zero(), 0}};
+  MonitorTrial trial(o);
+  for (int i = 0; i < 80; ++i) (void)trial.step();  // vectors of the trial have grown
+  const std::uint64_t before = AllocationGuard::allocations_after_seal();
+  {
+    const SealedScope sealed;
+    (void)trial.monitor().look(trial.frame());
+  }
+  EXPECT_EQ(AllocationGuard::allocations_after_seal(), before);
+}
+
+TEST(Monitor, refusesAReferenceWithoutABaselineAndOptionsOutOfRange) {
+  MonitorTrial trial(street(8, 12));
+  const Pinhole k{1247, 1247, 511.5, 383.5};
+  EXPECT_FALSE(trial.monitor().set_reference(Transform{}, k, k, Mat6::Zero()));
+  EXPECT_EQ(trial.step().kind, Kind::quiet);
+  Arena arena(calibration::Monitor::memory_needed({}));
+  MonitorOptions bad;
+  bad.threshold = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_THROW(calibration::Monitor(bad, arena), std::invalid_argument);
+  EXPECT_NO_THROW(calibration::Monitor(MonitorOptions{}, arena));
+}
+
+}  // namespace
+}  // namespace vergence::test

@@ -1,0 +1,108 @@
+#pragma once
+#include <cmath>
+#include <functional>
+#include <memory>
+#include <numbers>
+#include <optional>
+#include <vector>
+
+#include "core/calibration/monitor.hpp"
+#include "core/calibration/monitor_feed.hpp"
+#include "core/geometry/epipolar.hpp"
+#include "tests/support/feature_drive.hpp"
+
+namespace vergence::test {
+
+inline constexpr double kRadian = 180.0 / std::numbers::pi;
+
+/// A feature drive watched by a Monitor as the estimator would run one: matches are those within `gate_px` of the epipolar line
+/// of the calibration in use.
+class MonitorTrial {
+ public:
+  /// The reference is the true transform, exactly.
+  explicit MonitorTrial(const FeatureDriveOptions& drive, const calibration::MonitorOptions& options = {})
+      : MonitorTrial(drive, drive.T_right_left, Mat6::Zero(), options) {}
+  MonitorTrial(const FeatureDriveOptions& drive, const Transform& T_right_left, const Mat6& covariance,
+               const calibration::MonitorOptions& options = {})
+      : arena_(std::make_unique<Arena>(calibration::Monitor::memory_needed(options) + calibration::MonitorFeed::memory_needed(kTracks))),
+        drive_(drive),
+        monitor_(options, *arena_),
+        feed_(kTracks, *arena_),
+        epipolar_(T_right_left) {
+    (void)monitor_.set_reference(T_right_left, drive.left, drive.right, covariance);
+    sightings_.reserve(kTracks);
+  }
+
+  /// The next frame.
+  const calibration::MonitorVerdict& step() {
+    drive_.next();
+    return show(drive_);
+  }
+
+  /// A frame of some drive.
+  const calibration::MonitorVerdict& show(const FeatureDrive& drive) {
+    sightings_.clear();
+    const Pinhole &l = drive.options().left, &r = drive.options().right;
+    for (const FeatureTrack& t : drive.tracks()) {
+      double off = 0;
+      const Vec2 left((t.left.x() - l.cx) / l.fx, (t.left.y() - l.cy) / l.fy),
+          right((t.right.x() - r.cx) / r.fx, (t.right.y() - r.cy) / r.fy);
+      if (epipolar_.to_line(left, right, &off, nullptr) != EpipolarStatus::ok) continue;
+      if (std::abs(off) * r.fy < gate_px) sightings_.push_back({t.left, t.right, t.sigma_px, t.id});
+    }
+    frame_ = feed_.next(drive.stamp(), drive.frame(), sightings_, drive.T_now_previous());
+    frame_.expected_across = static_cast<int>(drive.tracks().size());
+    if (spoil) spoil(sightings_), frame_.across = sightings_;
+    verdict_ = monitor_.look(frame_);
+    return verdict_;
+  }
+
+  /// Frames until the verdict is `wanted` or, without one, anything but quiet; nothing within `limit` frames.
+  [[nodiscard]] std::optional<int> frames_until(int limit, std::optional<calibration::MonitorVerdict::Kind> wanted = {}) {
+    for (int i = 1; i <= limit; ++i) {
+      const auto kind = step().kind;
+      if (wanted ? kind == *wanted : kind != calibration::MonitorVerdict::Kind::quiet) return i;
+    }
+    return {};
+  }
+
+  [[nodiscard]] const calibration::MonitorVerdict& verdict() const { return verdict_; }
+  [[nodiscard]] const calibration::MonitorFrame& frame() const { return frame_; }
+  [[nodiscard]] const FeatureDrive& drive() const { return drive_; }
+  [[nodiscard]] calibration::Monitor& monitor() { return monitor_; }
+
+  double gate_px = 20;
+  std::function<void(std::vector<calibration::AcrossSighting>&)> spoil;  // what is done to a frame's matches
+
+ private:
+  static constexpr std::size_t kTracks = 1000;
+  std::unique_ptr<Arena> arena_;
+  FeatureDrive drive_;
+  calibration::Monitor monitor_;
+  calibration::MonitorFeed feed_;
+  EpipolarGeometry epipolar_;
+  std::vector<calibration::AcrossSighting> sightings_;
+  calibration::MonitorFrame frame_;
+  calibration::MonitorVerdict verdict_;
+};
+
+/// A calibration as a drive of two seconds through another street finds it: off by its error, with its covariance.
+struct TrialReference {
+  Transform T_right_left;
+  Mat6 covariance;
+};
+[[nodiscard]] inline TrialReference calibrated(FeatureDriveOptions drive) {
+  drive.changes.clear();
+  drive.lags.clear();
+  drive.drive_s = drive.stop_s = 0;
+  drive.seed += 1000;
+  calibration::MonitorOptions options;
+  options.bias_px = 0;  // noise only
+  options.long_window = 60;
+  MonitorTrial trial(drive, options);
+  for (int i = 0; i < 75; ++i) (void)trial.step();
+  const Vec6 off = trial.verdict().offset;
+  return {perturbed(drive.T_right_left, off.head<3>(), off.tail<3>()), trial.verdict().covariance};
+}
+
+}  // namespace vergence::test
