@@ -151,6 +151,13 @@ void apply(const Entry& entry, Configuration* configuration) {
       key->set(*configuration, parse_number<double>(entry, *key, "a number"));
       break;
     case KeyType::text:
+      if (!key->words.empty()) {
+        if (std::find(key->words.begin(), key->words.end(), entry.value) == key->words.end())
+          throw InputError(fmt::format("{}: {} is \"{}\"{}; it is one of {}", entry.origin, key->name, entry.value.substr(0, 60),
+                                       did_you_mean(entry.value, key->words), range_text(*key)));
+        key->set(*configuration, entry.value);
+        break;
+      }
       if (static_cast<double>(entry.value.size()) > key->most)
         throw InputError(fmt::format("{}: {} is longer than {} bytes", entry.origin, key->name, key->most));
       key->set(*configuration, entry.value);

@@ -8,6 +8,8 @@
 #include <string_view>
 #include <vector>
 
+#include "core/calibration/monitor.hpp"
+#include "core/calibration/options.hpp"
 #include "core/odometry/options.hpp"
 #include "core/types/calibration.hpp"
 
@@ -19,6 +21,7 @@ struct RigSettings {
   double baseline_m = 0.75;
   double focal_px = 0;  // 0: 0.72 of the image's width
   double k1 = 0, k2 = 0;
+  std::string state_dir{};  // of the state file; empty: the user's folder for such things; `none`: no state file
 };
 
 /// One entry of `cameras:`. Without a driver there is no such camera.
@@ -101,6 +104,9 @@ struct Configuration {
   MockSettings mock{};
   std::array<std::string, kMostFaults> faults{};  // `KIND@SECONDS NAME=NUMBER …`; empty: none
   OdometryOptions odometry{};
+  calibration::CalibrationOptions calibration{};
+  int online = 1;  // calibration.online: 0: the calibration given is used for ever
+  calibration::MonitorOptions monitor{};
   int threads = 2;  // 1: both images on the estimator's thread
 };
 

@@ -4,7 +4,9 @@
 #include <array>
 #include <iterator>
 #include <limits>
+#include <string>
 #include <utility>
+#include <vector>
 
 #include <fmt/format.h>
 
@@ -61,6 +63,18 @@ class Rows {
     return *this;
   }
 
+  /// A number that is chosen by its word: the first stands for 0.
+  Rows& choice(const char* name, int Settings::*field, const std::vector<std::string>& words, const char* meaning) {
+    add(
+        name, KeyType::text, 0, 0, "", meaning,
+        [field, words](Settings& s, const KeyValue& v) {
+          s.*field = static_cast<int>(std::find(words.begin(), words.end(), std::get<std::string>(v)) - words.begin());
+        },
+        [field, words](const Settings& s) -> KeyValue { return words[static_cast<std::size_t>(s.*field)]; });
+    group_.keys.back().words = words;
+    return *this;
+  }
+
   /// The rows of another part, behind these.
   Rows& also(Group&& other) {
     std::move(other.keys.begin(), other.keys.end(), std::back_inserter(group_.keys));
@@ -72,9 +86,15 @@ class Rows {
  private:
   void add(const std::string& name, KeyType type, double least, double most, const char* unit, const char* meaning,
            std::function<void(Settings&, const KeyValue&)> set, std::function<KeyValue(const Settings&)> get) {
-    group_.keys.push_back({prefix_ + "." + name, type, unit, least, most, meaning,
+    group_.keys.push_back({prefix_ + "." + name,
+                           type,
+                           unit,
+                           least,
+                           most,
+                           meaning,
                            [part = part_, set = std::move(set)](Configuration& c, const KeyValue& v) { set(part(c), v); },
-                           [part = const_part_, get = std::move(get)](const Configuration& c) { return get(part(c)); }});
+                           [part = const_part_, get = std::move(get)](const Configuration& c) { return get(part(c)); },
+                           {}});
   }
 
   std::string prefix_;
@@ -103,6 +123,9 @@ Group rig() {
       .number("nominal.focal_px", &R::focal_px, 0, 20000, "px", "Focal length of every camera; 0: 0.72 of the image's width.")
       .number("nominal.k1", &R::k1, -1, 1, "", "First radial coefficient of every lens (radtan model).")
       .number("nominal.k2", &R::k2, -1, 1, "", "Second radial coefficient of every lens.")
+      .text("state_dir", &R::state_dir, 400,
+            "Folder of `calibration_state.yaml`, the last calibration accepted: written at once, where the next `run` begins. Empty: "
+            "`$XDG_STATE_HOME/vergence/NAME`, without that variable `~/.local/state/vergence/NAME`; `none`: there is none.")
       .done();
 }
 
@@ -133,7 +156,7 @@ Group cameras() {
             .number("gain_db", &C::gain_db, 0, 40, "dB", "Gain of the sensor's amplifier.")
             .numbers("intrinsics", &C::intrinsics, 0, 20000, "px",
                      {"Focal length along x of this camera's lens; 0: the lens is that of `rig.nominal`.", "Focal length along y.",
-                      "Principal point, x.", "Principal point, y."})
+                      "Principal point of that lens, x.", "Principal point of that lens, y."})
             .numbers("distortion", &C::distortion, -2, 2, "",
                      {"With `intrinsics`: first radial coefficient, k1 (radtan model).", "Second radial coefficient, k2.",
                       "First tangential coefficient, p1.", "Second tangential coefficient, p2.", "Third radial coefficient, k3."})
@@ -310,10 +333,73 @@ Group odometry() {
   return rows.done();
 }
 
+Group calibration_options() {
+  using C = calibration::CalibrationOptions;
+  return Rows<C>(
+             "calibration", "How the stereo transform is found and kept while driving; docs/calibration.md tells more.",
+             [](auto& c) -> auto& { return c.calibration; })
+      .integer("min_frames", &C::min_frames, 5, 150, "frames",
+               "Frames with motion that are gathered before a calibration is tried; not above `max_frames`.")
+      .integer("max_frames", &C::max_frames, 10, 150, "frames", "The newest so many are kept, and solved at once.")
+      .number("rotation_sigma_mrad", &C::rotation_sigma_mrad, 0.001, 10, "mrad",
+              "Enough: predicted sigma of each rotation axis, noise only, at which a calibration is solved before `max_frames`.")
+      .number("translation_sigma_mm", &C::translation_sigma_mm, 0.01, 1000, "mm",
+              "The same of the translation across the baseline, for a baseline of 0.75 m and in proportion to it.")
+      .integer(
+          "adopt_after", &C::adopt_after, 0, 1000, "frames",
+          "In a replay and with `--fast` a result is adopted so many frames after its snapshot, on every machine alike; live when ready.")
+      .choice("focal_lengths", &C::estimate_focal_lengths, {"hold", "estimate"},
+              "`estimate`: the focal length of each further camera is found with the transform, by its prior; `hold`: it is believed.")
+      .choice("intrinsics", &C::refine_intrinsics, {"hold", "refine"},
+              "`refine`: focal lengths and principal points of all cameras are found, too, by their priors.")
+      .number("focal_sigma_percent", &C::focal_sigma_percent, 0.001, 10, "%", "Prior sigma of a focal length.")
+      .number("principal_point_sigma_px", &C::principal_point_sigma_px, 0.01, 50, "px", "Prior sigma of a principal point's coordinate.")
+      .number("max_direction_deg", &C::max_direction_deg, 0.1, 180, "°",
+              "A calibration whose translation points farther from the nominal one is rejected.")
+      .number("max_rotation_deg", &C::max_rotation_deg, 0.1, 180, "°",
+              "The same of the rotation; with `--from-scratch` only the side of the camera is asked.")
+      .number("needs_motion_m", &C::needs_motion_m, 0.01, 1000, "m",
+              "Way within the frames gathered (or three baselines) below which the reason is `needs_motion`.")
+      .integer("needs_near_points", &C::needs_near_points, 0, 1000, "points",
+               "Near points among those gathered below which the reason is `needs_near_structure`.")
+      .number("near_baselines", &C::near_baselines, 5, 500, "baselines", "Nearer than this a point is near.")
+      .number("good_depth_percent", &C::good_depth_percent, 0.01, 100, "%",
+              "Predicted depth error at 20 m up to which a calibration is called `good`.")
+      .number("usable_depth_percent", &C::usable_depth_percent, 0.01, 100, "%",
+              "The same up to which it `can be improved`; beyond, the word is `recalibrate`.")
+      .also(Rows<Configuration>(
+                "calibration", "", [](auto& c) -> auto& { return c; })
+                .choice("online", &Configuration::online, {"off", "on"},
+                        "`off`: nothing watches the rig, the calibration given is used to the end.")
+                .done())
+      .done();
+}
+
+Group monitor() {
+  using M = calibration::MonitorOptions;
+  return Rows<M>(
+             "monitor", "What watches whether the calibration in use is still true.", [](auto& c) -> auto& { return c.monitor; })
+      .number("threshold", &M::threshold, 20, 500, "",
+              "Statistic that raises a knock or a drift: higher for fewer false alarms, lower for smaller knocks found sooner.")
+      .number("bias_px", &M::bias_px, 0, 1, "px", "Slow error that imperfect intrinsics leave in the matches across and that is no knock.")
+      .integer("min_matches", &M::min_matches, 12, 1000, "matches", "A frame with fewer matches across measures nothing.")
+      .integer("short_window", &M::short_window, 1, 10, "frames", "Shortest window of moving frames that is tested: for large knocks.")
+      .integer("long_window", &M::long_window, 60, 1800, "frames", "Longest window of moving frames that is tested: for drift.")
+      .number("lag_frames", &M::lag_frames, 0.1, 1, "frames", "Least lag of a camera behind the others that is called `out_of_step`.")
+      .number("lag_sigmas", &M::lag_sigmas, 3, 20, "sigmas", "By how much that lag has to stand out from every fixed transform.")
+      .integer("collapse_frames", &M::collapse_frames, 2, 60, "frames",
+               "So many frames in a row without the matches across that there should be are a `collapse`.")
+      .number("collapse_share", &M::collapse_share, 0.01, 0.9, "", "Of the matches expected: finding fewer is that.")
+      .integer("collapse_expected", &M::collapse_expected, 10, 1000, "matches",
+               "Matches that must be expected before their absence says anything.")
+      .done();
+}
+
 }  // namespace
 
 const std::vector<Group>& schema() {
-  static const std::vector<Group> groups{general(), rig(), cameras(), ins(), trigger(), sync(), odometry(), comparison(), mock(), faults()};
+  static const std::vector<Group> groups{general(), rig(),        cameras(), ins(),   trigger(), sync(), odometry(), calibration_options(),
+                                         monitor(), comparison(), mock(),    faults()};
   return groups;
 }
 
@@ -321,6 +407,12 @@ std::string find_contradiction(const Configuration& c) {
   if (c.odometry.ok_inliers < c.odometry.min_inliers)
     return fmt::format("odometry.ok_inliers ({}) is below odometry.min_inliers ({}); a pose would be lost before it is degraded",
                        c.odometry.ok_inliers, c.odometry.min_inliers);
+  if (c.calibration.max_frames < c.calibration.min_frames)
+    return fmt::format("calibration.max_frames ({}) is below calibration.min_frames ({}); no calibration would ever be tried",
+                       c.calibration.max_frames, c.calibration.min_frames);
+  if (c.calibration.usable_depth_percent < c.calibration.good_depth_percent)
+    return fmt::format("calibration.usable_depth_percent ({}) is below calibration.good_depth_percent ({})",
+                       c.calibration.usable_depth_percent, c.calibration.good_depth_percent);
   return {};
 }
 
@@ -329,6 +421,7 @@ std::string to_text(const KeyValue& value) {
 }
 
 std::string range_text(const Key& key) {
+  if (!key.words.empty()) return fmt::format("{}", fmt::join(key.words, ", "));
   if (key.type == KeyType::text) return fmt::format("up to {} bytes", key.most);
   if (key.type == KeyType::number) return fmt::format("{} … {}", key.least, key.most);
   // The largest 64-bit integer is no double: as a bound it stands for "any".

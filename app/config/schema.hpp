@@ -23,6 +23,7 @@ struct Key {
   std::string meaning;         // one sentence for a person who has never seen the key
   std::function<void(Configuration&, const KeyValue&)> set;
   std::function<KeyValue(const Configuration&)> get;
+  std::vector<std::string> words{};  // of a text that is one of a few; empty: any
 };
 
 /// A group of keys (the part of the name before the first dot), or the keys without a group (empty name).
@@ -41,7 +42,7 @@ struct Group {
 
 /// The shortest text that reads back as the same value.
 [[nodiscard]] std::string to_text(const KeyValue& value);
-/// `50 … 1000`.
+/// `50 … 1000`, `hold, estimate`.
 [[nodiscard]] std::string range_text(const Key& key);
 
 /// docs/configuration.md, from the table.

@@ -29,7 +29,12 @@ bool accepts(const Key& key, const KeyValue& value) {
   const std::string text = to_text(value);
   try {
     // Both sides of the one relation between keys, so that only the range of this row decides.
-    std::vector<std::string> set{"odometry.min_inliers=6", "odometry.ok_inliers=1000"};
+    std::vector<std::string> set{"odometry.min_inliers=6",
+                                 "odometry.ok_inliers=1000",
+                                 "calibration.min_frames=5",
+                                 "calibration.max_frames=150",
+                                 "calibration.good_depth_percent=0.01",
+                                 "calibration.usable_depth_percent=100"};
     set.push_back(key.name + "=" + text);
     return to_text(key.get(parse_configuration("", "", set))) == text;
   } catch (const InputError&) {
@@ -77,7 +82,9 @@ TEST(Schema, EveryKeyChangesItsOwnValueOnly) {
     for (const Key& key : group.keys) {
       SCOPED_TRACE(key.name);
       Configuration changed;
-      key.set(changed, key.type == KeyType::text ? KeyValue(std::string("other")) : value_at(key, key.least));
+      const std::string text = key.words.empty() ? "other" : key.words.front();
+      key.set(changed, key.type == KeyType::text ? KeyValue(text) : value_at(key, key.least));
+      if (!key.words.empty() && to_text(key.get(changed)) == to_text(key.get(Configuration{}))) key.set(changed, key.words.back());
       if (to_text(key.get(changed)) == to_text(key.get(Configuration{}))) key.set(changed, value_at(key, key.least + 1));
       for (const Group& other_group : schema())
         for (const Key& other : other_group.keys) {
@@ -97,32 +104,61 @@ TEST(Schema, NamesAreUniqueAndInTheirGroup) {
     }
 }
 
-/// The fields of OdometryOptions as its header declares them: name and the range in its comment, where there is one.
-std::map<std::string, std::string> declared_odometry_options() {
-  std::istringstream header(file_text("core/odometry/options.hpp"));
-  const std::regex field(R"(^  (?:bool|int|double|std::\w+) (\w+) = .*)"), range(R"(, ([0-9.]+ … [0-9.]+))");
+/// The fields of a struct as its header declares them: name and the range in its comment, where there is one.
+std::map<std::string, std::string> declared_fields(const std::string& header_file, const std::string& name_of_struct) {
+  std::istringstream header(file_text(header_file));
+  // A field whose line is full has its value, or its comment, on the next one.
+  const std::regex field(R"(^  (?:bool|int|double|std::\w+) (\w+) =.*)"), range(R"(, ([0-9.]+ … [0-9.]+))");
   std::map<std::string, std::string> fields;
+  bool inside = false;
+  std::string last;
   for (std::string line; std::getline(header, line);) {
+    if (line.starts_with("struct")) inside = line.starts_with("struct " + name_of_struct + " ");
+    if (line.starts_with("};")) inside = false;
+    if (!inside) continue;
     std::smatch name, numbers;
-    if (!std::regex_match(line, name, field)) continue;
-    fields[name[1]] = std::regex_search(line, numbers, range) ? numbers[1].str() : "";
+    if (std::regex_match(line, name, field)) fields[last = name[1]] = "";
+    if (!last.empty() && fields[last].empty() && std::regex_search(line, numbers, range)) fields[last] = numbers[1].str();
   }
   return fields;
 }
 
-TEST(Schema, EveryOdometryOptionCanBeSetInTheRangeItsHeaderStates) {
-  const auto declared = declared_odometry_options();
-  ASSERT_GE(declared.size(), 10U) << "the header is read";
+/// Every field has a row in the group, by its own name or that in `renamed`, with the range that its header states.
+void expect_rows_for(const std::map<std::string, std::string>& declared, const std::string& group_name,
+                     const std::map<std::string, std::string>& renamed = {}) {
+  ASSERT_GE(declared.size(), 8U) << "the header is read";
   std::map<std::string, const Key*> rows;
   for (const Group& group : schema())
-    if (group.name == "odometry")
-      for (const Key& key : group.keys) rows[key.name.substr(9)] = &key;
-  for (const auto& [name, range] : declared) {
-    ASSERT_TRUE(rows.contains(name)) << "app/config/schema.cpp has no row for OdometryOptions::" << name;
+    if (group.name == group_name)
+      for (const Key& key : group.keys) rows[key.name.substr(group_name.size() + 1)] = &key;
+  for (const auto& [field, range] : declared) {
+    const auto other = renamed.find(field);
+    const std::string& name = other == renamed.end() ? field : other->second;
+    ASSERT_TRUE(rows.contains(name)) << "app/config/schema.cpp has no row for " << group_name << "'s " << field;
     if (range.empty()) continue;
     EXPECT_EQ(range_text(*rows[name]), range) << name;
   }
-  EXPECT_EQ(rows.size(), declared.size());
+}
+
+TEST(Schema, EveryOptionOfTheCoreCanBeSetInTheRangeItsHeaderStates) {
+  expect_rows_for(declared_fields("core/odometry/options.hpp", "OdometryOptions"), "odometry");
+  expect_rows_for(declared_fields("core/calibration/options.hpp", "CalibrationOptions"), "calibration",
+                  {{"estimate_focal_lengths", "focal_lengths"}, {"refine_intrinsics", "intrinsics"}});
+  expect_rows_for(declared_fields("core/calibration/monitor.hpp", "MonitorOptions"), "monitor");
+}
+
+TEST(Schema, AKeyOfAFewWordsTakesTheseOnly) {
+  EXPECT_EQ(
+      parse_configuration("calibration: {focal_lengths: hold, intrinsics: refine, online: off}", "", {}).calibration.estimate_focal_lengths,
+      0);
+  EXPECT_EQ(parse_configuration("calibration: {intrinsics: refine}", "", {}).calibration.refine_intrinsics, 1);
+  EXPECT_EQ(parse_configuration("calibration: {online: off}", "", {}).online, 0);
+  try {
+    static_cast<void>(parse_configuration("calibration: {focal_lengths: holds}", "drive.yaml", {}));
+    FAIL() << "taken";
+  } catch (const InputError& e) {
+    EXPECT_STREQ(e.what(), "drive.yaml:1: calibration.focal_lengths is \"holds\"; did you mean \"hold\"?; it is one of hold, estimate");
+  }
 }
 
 TEST(Schema, TheDocumentIsWrittenFromTheTable) {

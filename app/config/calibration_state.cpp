@@ -1,0 +1,90 @@
+#include "app/config/calibration_state.hpp"
+
+#include <cctype>
+#include <cmath>
+#include <cstdlib>
+#include <system_error>
+
+#include <fmt/format.h>
+
+#include "app/runtime/durable_file.hpp"
+#include "app/runtime/errors.hpp"
+
+namespace vergence::app {
+namespace {
+
+constexpr const char* kFileName = "calibration_state.yaml";
+constexpr double kSameLength = 1e-3;  // relative: beyond, somebody has measured the baseline anew
+
+std::string folder_name(const std::string& rig_name) {
+  std::string name = rig_name.empty() ? "rig" : rig_name;
+  for (char& c : name)
+    if (std::isalnum(static_cast<unsigned char>(c)) == 0 && c != '-' && c != '_' && c != '.') c = '_';
+  if (name.front() == '.') name.front() = '_';
+  return name;
+}
+
+/// An absolute path from the environment, as the XDG rules want; nothing for any other.
+std::optional<std::filesystem::path> folder_of(const char* variable) {
+  const char* value = std::getenv(variable);
+  if (value == nullptr || value[0] != '/') return std::nullopt;
+  return std::filesystem::path(value);
+}
+
+/// Why a calibration is not of this rig; empty: it is.
+std::string mismatch(const CalibrationFile& found, const CalibrationFile& expected) {
+  const RigCalibration &a = found.rig, &b = expected.rig;
+  if (a.cameras != b.cameras) return fmt::format("it is of {} cameras, the configuration has {}", a.cameras, b.cameras);
+  for (std::size_t k = 0; k < static_cast<std::size_t>(a.cameras); ++k) {
+    if (found.serials[k] != expected.serials[k])
+      return fmt::format("its camera {} has the serial \"{}\", the configuration's \"{}\"", k, found.serials[k], expected.serials[k]);
+    const Intrinsics &x = a.intrinsics[k], &y = b.intrinsics[k];
+    if (x.width != y.width || x.height != y.height)
+      return fmt::format("its camera {} has {} x {} pixels, the configuration's {} x {}", k, x.width, x.height, y.width, y.height);
+    if (x.kind != y.kind) return fmt::format("its camera {} has another lens model than the configuration's", k);
+  }
+  if (!(std::abs(a.baseline - b.baseline) <= kSameLength * b.baseline))
+    return fmt::format("it was found with a baseline of {:g} m, the configuration says {:g} m", a.baseline, b.baseline);
+  return "";
+}
+
+}  // namespace
+
+std::optional<std::filesystem::path> state_file(const RigSettings& rig) {
+  if (rig.state_dir == "none") return std::nullopt;
+  if (!rig.state_dir.empty()) return std::filesystem::path(rig.state_dir) / kFileName;
+  const std::filesystem::path below = std::filesystem::path("vergence") / folder_name(rig.name) / kFileName;
+  if (const auto state = folder_of("XDG_STATE_HOME")) return *state / below;
+  if (const auto home = folder_of("HOME")) return *home / ".local" / "state" / below;
+  return std::nullopt;
+}
+
+CalibrationState read_state(const std::filesystem::path& file, const CalibrationFile& expected) {
+  CalibrationState state;
+  std::error_code error;
+  if (!std::filesystem::exists(file, error)) {
+    if (error) state.sentence = file.string() + ": cannot be looked at (" + error.message() + "); the drive begins without it";
+    return state;
+  }
+  try {
+    CalibrationFile found = read_calibration(file);
+    if (const std::string why = mismatch(found, expected); !why.empty())
+      state.sentence = file.string() + ": is not used: " + why;
+    else
+      state.calibration = std::move(found);
+  } catch (const InputError& e) {
+    state.sentence = std::string(e.what()) + "; the drive begins without it";
+  }
+  return state;
+}
+
+void write_state(const std::filesystem::path& file, const CalibrationFile& calibration) {
+  std::error_code error;
+  std::filesystem::create_directories(file.parent_path(), error);
+  if (error)
+    throw InputError(file.parent_path().string() + ": cannot be made (" + error.message() +
+                     "): set rig.state_dir to a folder that can, or to none");
+  write_calibration(file, calibration);
+}
+
+}  // namespace vergence::app

@@ -1,0 +1,126 @@
+#include "app/config/calibration_state.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+#include <optional>
+#include <string>
+
+#include "app/runtime/errors.hpp"
+#include "tests/support/temporary_folder.hpp"
+
+namespace vergence::app {
+namespace {
+
+/// Sets a variable of the environment for a scope; nullptr: there is none.
+class Environment {
+ public:
+  Environment(const char* name, const char* value) : name_(name) {
+    if (const char* old = std::getenv(name)) former_ = old;
+    set(value);
+  }
+  ~Environment() { set(former_ ? former_->c_str() : nullptr); }
+  Environment(const Environment&) = delete;
+  Environment& operator=(const Environment&) = delete;
+
+ private:
+  void set(const char* value) const {
+    if (value != nullptr)
+      ::setenv(name_, value, 1);
+    else
+      ::unsetenv(name_);
+  }
+  const char* name_;
+  std::optional<std::string> former_;
+};
+
+RigSettings rig(const std::string& name, const std::string& state_dir = "") {
+  RigSettings r;
+  r.name = name;
+  r.state_dir = state_dir;
+  return r;
+}
+
+TEST(StateFile, LiesWhereTheKeyOrTheUsersEnvironmentSays) {
+  const Environment home("HOME", "/home/anna");
+  {
+    const Environment state("XDG_STATE_HOME", "/var/state");
+    EXPECT_EQ(state_file(rig("van")), "/var/state/vergence/van/calibration_state.yaml");
+    EXPECT_EQ(state_file(rig("van", "/srv/rigs")), "/srv/rigs/calibration_state.yaml");
+    EXPECT_EQ(state_file(rig("van", "none")), std::nullopt);
+  }
+  for (const char* useless : {static_cast<const char*>(nullptr), "", "relative/path"}) {
+    const Environment state("XDG_STATE_HOME", useless);
+    EXPECT_EQ(state_file(rig("van")), "/home/anna/.local/state/vergence/van/calibration_state.yaml");
+  }
+  const Environment state("XDG_STATE_HOME", nullptr), homeless("HOME", nullptr);
+  EXPECT_EQ(state_file(rig("van")), std::nullopt);
+}
+
+TEST(StateFile, ARigsNameNeverLeavesTheFolder) {
+  const Environment state("XDG_STATE_HOME", "/s");
+  EXPECT_EQ(state_file(rig("../../etc")), "/s/vergence/_._.._etc/calibration_state.yaml");
+  EXPECT_EQ(state_file(rig("..")), "/s/vergence/_./calibration_state.yaml");
+  EXPECT_EQ(state_file(rig("a b/c")), "/s/vergence/a_b_c/calibration_state.yaml");
+  EXPECT_EQ(state_file(rig("")), "/s/vergence/rig/calibration_state.yaml");
+}
+
+CalibrationFile two_cameras() {
+  CalibrationFile file;
+  file.rig.cameras = 2;
+  for (std::size_t k = 0; k < 2; ++k) file.rig.intrinsics[k] = {.width = 640, .height = 480, .fx = 460, .fy = 460, .cx = 320, .cy = 240};
+  file.rig.T_camera_left[1].t = {-0.75, 0.001, 0.002};
+  file.rig.T_camera_left[1].t *= 0.75 / file.rig.T_camera_left[1].t.norm();
+  file.rig.baseline = 0.75;
+  file.serials = {"101", "102", "", ""};
+  file.source = "online";
+  return file;
+}
+
+TEST(StateFile, WhatWasWrittenIsReadAgainForTheSameRig) {
+  const test::TemporaryFolder folder;
+  const auto path = folder / "not/there/yet/calibration_state.yaml";
+  EXPECT_FALSE(read_state(path, two_cameras()).calibration);
+  EXPECT_EQ(read_state(path, two_cameras()).sentence, "") << "a first drive is nothing to tell";
+  write_state(path, two_cameras());
+  const CalibrationState state = read_state(path, two_cameras());
+  ASSERT_TRUE(state.calibration) << state.sentence;
+  EXPECT_EQ(state.calibration->rig.T_camera_left[1].t, two_cameras().rig.T_camera_left[1].t);
+  EXPECT_EQ(state.calibration->serials, two_cameras().serials);
+}
+
+TEST(StateFile, OfAnotherRigIsNotUsedAndTheSentenceSaysWhy) {
+  const test::TemporaryFolder folder;
+  const auto path = folder / "calibration_state.yaml";
+  write_state(path, two_cameras());
+  const auto refused = [&](const char* why, const auto& change) {
+    CalibrationFile expected = two_cameras();
+    change(&expected);
+    const CalibrationState state = read_state(path, expected);
+    EXPECT_FALSE(state.calibration) << why;
+    EXPECT_NE(state.sentence.find(why), std::string::npos) << state.sentence;
+    EXPECT_NE(state.sentence.find("calibration_state.yaml: is not used"), std::string::npos) << state.sentence;
+  };
+  refused("serial \"102\", the configuration's \"103\"", [](CalibrationFile* c) { c->serials[1] = "103"; });
+  refused("2 cameras, the configuration has 3", [](CalibrationFile* c) { c->rig.cameras = 3; });
+  refused("640 x 480", [](CalibrationFile* c) { c->rig.intrinsics[0].width = 1280; });
+  refused("lens model", [](CalibrationFile* c) { c->rig.intrinsics[1].kind = CameraModelKind::pinhole_equidistant; });
+  refused("baseline of 0.75 m, the configuration says 0.76 m", [](CalibrationFile* c) { c->rig.baseline = 0.76; });
+}
+
+TEST(StateFile, ADamagedOneIsASentenceAndNoEnd) {
+  const test::TemporaryFolder folder;
+  folder.write("calibration_state.yaml", "version: 1\ncameras: [{name: left");
+  const CalibrationState state = read_state(folder / "calibration_state.yaml", two_cameras());
+  EXPECT_FALSE(state.calibration);
+  EXPECT_NE(state.sentence.find("the drive begins without it"), std::string::npos) << state.sentence;
+}
+
+TEST(StateFile, AFolderThatCannotBeMadeIsNamed) {
+  const test::TemporaryFolder folder;
+  folder.write("file", "");
+  EXPECT_THROW(write_state(folder / "file/below/calibration_state.yaml", two_cameras()), InputError);
+}
+
+}  // namespace
+}  // namespace vergence::app
