@@ -212,6 +212,7 @@ void LiveSource::take_frame(std::size_t k) {
   in.arrival = frame.arrival;
   const bool torn = frame.status != FrameStatus::complete;
   counters_.torn += torn ? 1 : 0;
+  if (torn) sync_.lost(in.camera, in.counter);
   if (!torn && sync_.offer(in) == SyncVerdict::taken) return;
   item.kind = LiveItem::Kind::refused;
   item.set.present[k] = true;

@@ -94,7 +94,8 @@ class LiveSource final : private Notifier {
     T value{};
   };
   static constexpr std::size_t kRing = 256;
-  static constexpr int kMostWaiting = 2;  // live: images that may wait for the estimator before the oldest is skipped
+  // Live: sets that may wait for the estimator before the oldest is skipped; when an image was lost so many come at once.
+  static constexpr int kMostWaiting = static_cast<int>(RigSynchronizer::kOpen);
 
   void notify() noexcept override { bell_.ring(); }
   void work();

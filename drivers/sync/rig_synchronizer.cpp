@@ -205,6 +205,16 @@ void RigSynchronizer::prove(SyncedSet* set) noexcept {
   for (std::size_t k = 1; k < sources_.size(); ++k) sources_[k].align = true;  // to camera 0, whose numbers go on
 }
 
+void RigSynchronizer::lost(int camera, std::uint64_t counter) noexcept {
+  Source& source = sources_[static_cast<std::size_t>(camera)];
+  if (options_.mode != SyncMode::counter || source.align) return;
+  const std::int64_t number = source.base + static_cast<std::int64_t>(counter);
+  if (number < 0) return;
+  const auto next = static_cast<std::uint64_t>(number) + 1;  // the first that is still waited for
+  source.newest = source.any ? std::max(source.newest, next) : next;
+  source.any = true;
+}
+
 void RigSynchronizer::absent(int camera) noexcept { sources_[static_cast<std::size_t>(camera)].here = false; }
 
 void RigSynchronizer::restarted(int camera) noexcept {

@@ -102,6 +102,8 @@ class RigSynchronizer {
   /// The next set that is ready. Call until false.
   [[nodiscard]] bool next(SyncedSet* set) noexcept;
 
+  /// That exposure of a camera gave no image that could be used: nobody waits for it. Else as offer(); only where counters pair.
+  void lost(int camera, std::uint64_t counter) noexcept;
   /// A camera has gone: nobody waits for it.
   void absent(int camera) noexcept;
   /// It has come back and counts from 0 again: its first frame joins the pulse nearest in time, the others follow by counter.

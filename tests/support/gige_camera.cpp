@@ -16,6 +16,8 @@
 #include <deque>
 #include <stdexcept>
 #include <thread>
+#include <tuple>
+#include <utility>
 
 #include "tests/support/gvsp_sender.hpp"
 
@@ -25,6 +27,7 @@ namespace {
 using namespace gige_register;
 
 constexpr std::uint16_t kControlPort = 3956;
+constexpr std::size_t kLatchedPulses = 4;  // exposed one after the other, stamped with their own time: a busy machine's delays are none
 constexpr std::uint32_t kMemory = 0x40000, kDescription = 0x20000;  // bytes; address of the description in it
 constexpr std::uint32_t kHeartbeat = 0x938, kTicksHigh = 0x93C, kTicksLow = 0x940, kLatch = 0x944, kLatchedHigh = 0x948, kControl = 0xA00,
                         kStreamPort = 0xD00, kPacketSize = 0xD04, kPacketDelay = 0xD08, kStreamTarget = 0xD18;
@@ -123,9 +126,9 @@ class GigeCamera::Impl {
   int control_ = -1, broadcast_ = -1, wake_ = -1;
   bool quit_ = false, powered_ = true, acquiring_ = false, foreign_ = false;
   sockaddr_in controller_{};
-  HostStamp heard_{};                 // the controller's last word
-  std::deque<std::uint64_t> pulses_;  // triggers not yet served: the image's number
-  std::uint64_t triggered_ = 0;       // by software
+  HostStamp heard_{};                                       // the controller's last word
+  std::deque<std::pair<std::uint64_t, HostStamp>> pulses_;  // triggers not yet served: the image's number, and when
+  std::uint64_t triggered_ = 0;                             // by software
   std::uint64_t block_ = 0;
   std::thread answering_, exposing_;
 };
@@ -375,7 +378,7 @@ std::uint32_t GigeCamera::Impl::store(std::uint32_t address, std::uint32_t value
       changed_.notify_all();
       return kOk;
     case trigger_software:
-      pulses_.push_back(triggered_++);
+      pulses_.emplace_back(triggered_++, monotonic_now());
       changed_.notify_all();
       return kOk;
     case kLatch: {
@@ -415,11 +418,11 @@ void GigeCamera::Impl::follow_registers() {
 
 void GigeCamera::Impl::pulse(std::uint64_t number, std::uint32_t source) {
   const std::lock_guard lock(mutex_);
-  if (!acquiring_ || !powered_ || word(trigger_mode) == 0 || word(trigger_source) != source || !pulses_.empty()) {
+  if (!acquiring_ || !powered_ || word(trigger_mode) == 0 || word(trigger_source) != source || pulses_.size() >= kLatchedPulses) {
     ++ignored_;
     return;
   }
-  pulses_.push_back(number);
+  pulses_.emplace_back(number, monotonic_now());
   changed_.notify_all();
 }
 
@@ -467,7 +470,7 @@ void GigeCamera::Impl::expose() {
     HostStamp when = monotonic_now();
     const Duration exposure = Duration::seconds(static_cast<double>(real(exposure_time)) * 1e-6);
     if (triggered) {
-      number = pulses_.front();
+      std::tie(number, when) = pulses_.front();
     } else {
       const std::int64_t period = Duration::seconds(1.0 / static_cast<double>(real(frame_rate))).ns();
       number = static_cast<std::uint64_t>(std::max(when.ns() - exposure.ns(), last.ns()) / period + 1);
@@ -477,7 +480,7 @@ void GigeCamera::Impl::expose() {
     lock.unlock();
     sleep_until(when + exposure);
     lock.lock();
-    if (triggered && !pulses_.empty()) pulses_.pop_front();  // pulses during the exposure were ignored
+    if (triggered && !pulses_.empty()) pulses_.pop_front();
     if (!acquiring_ || !powered_ || silent_) continue;
     GvspFrame frame = make_frame(number, when);
     GvspSender::Fate fate = GvspSender::Fate::normal;
@@ -542,6 +545,7 @@ GigeCameraReport GigeCamera::report() const {
   r.starts = impl_->starts_;
   return r;
 }
+std::vector<std::uint64_t> GigeCamera::whole() const { return impl_->sender.whole(); }
 std::uint32_t GigeCamera::read(std::uint32_t address) const { return impl_->get(address); }
 void GigeCamera::write(std::uint32_t address, std::uint32_t value) { impl_->set(address, value); }
 HostStamp GigeCamera::sent(std::uint64_t number) const { return impl_->sender.sent(number); }

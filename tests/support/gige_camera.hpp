@@ -73,6 +73,8 @@ class GigeCamera {
   void take_control(bool taken);
 
   [[nodiscard]] GigeCameraReport report() const;
+  /// Numbers of the images that were sent whole, in order.
+  [[nodiscard]] std::vector<std::uint64_t> whole() const;
   /// A bootstrap register or one of the features.
   [[nodiscard]] std::uint32_t read(std::uint32_t address) const;
   void write(std::uint32_t address, std::uint32_t value);

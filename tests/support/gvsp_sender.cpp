@@ -118,7 +118,7 @@ void GvspSender::send(GvspFrame frame, Fate fate) {
   record.data_bytes = packet_size_ - (extended_ ? 48U : 36U);
   record.packets = static_cast<std::uint32_t>((record.frame.pixels.size() + record.data_bytes - 1) / record.data_bytes) + 2;
   record.account = accounts_.size();
-  accounts_.push_back({std::vector<bool>(record.packets, false), fate == Fate::torn, 1 + (record.packets - 2) / 2});
+  accounts_.push_back({number, std::vector<bool>(record.packets, false), fate == Fate::torn, 1 + (record.packets - 2) / 2});
   packets_ += record.packets;
   if (fate == Fate::unsent) {
     record.packets = 0;
@@ -185,6 +185,14 @@ void GvspSender::add_to(GigeCameraReport* r) const {
   r->dropped += dropped_;
   r->asked += asked_;
   r->resent += resent_;
+}
+
+std::vector<std::uint64_t> GvspSender::whole() const {
+  const std::lock_guard lock(mutex_);
+  std::vector<std::uint64_t> numbers;
+  for (const Account& a : accounts_)
+    if (std::find(a.went.begin(), a.went.end(), false) == a.went.end()) numbers.push_back(a.number);
+  return numbers;
 }
 
 HostStamp GvspSender::sent(std::uint64_t number) const {

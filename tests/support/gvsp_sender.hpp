@@ -62,6 +62,7 @@ class GvspSender {
   void set_loss(double share);
 
   void add_to(GigeCameraReport* report) const;
+  [[nodiscard]] std::vector<std::uint64_t> whole() const;
   [[nodiscard]] HostStamp sent(std::uint64_t number) const;
   [[nodiscard]] std::uint16_t port() const noexcept { return port_; }
 
@@ -73,8 +74,9 @@ class GvspSender {
     std::size_t account = 0;
   };
   struct Account {
-    std::vector<bool> went;  // by packet
-    bool never = false;      // torn on purpose: packet `hole` is not sent again either
+    std::uint64_t number = 0;  // of the image
+    std::vector<bool> went;    // by packet
+    bool never = false;        // torn on purpose: packet `hole` is not sent again either
     std::uint32_t hole = 0;
   };
   struct Held {

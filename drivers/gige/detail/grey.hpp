@@ -19,8 +19,7 @@ struct GreyFormat {
 
 /// Rows of `width` pixels without padding into rows of `stride` bytes.
 ///
-/// Words, little endian: the eight highest of the format's bits. Mosaic: the binomial 3 × 3 mean, which weights red, green and blue
-/// 1 : 2 : 1 around every pixel, so that the filter's grid does not show; at the border the mosaic is mirrored.
+/// Words, little endian: the eight highest of the format's bits. Mosaic: bayer_to_grey().
 /// Preconditions: width, height ≥ 2; `from` holds the image.
 void to_grey(const GreyFormat& format, const std::uint8_t* from, int width, int height, std::uint8_t* to, std::size_t stride) noexcept;
 

@@ -244,6 +244,21 @@ TEST(RigSynchronizer, behavesLikeItsShadowUnderRandomLossRepetitionAndDelay) {
   }
 }
 
+TEST(RigSynchronizer, nobodyWaitsForAnImageThatIsKnownToBeLost) {
+  RigSynchronizer sync(options());
+  (void)offer(&sync, frame(1, 0, 0));
+  sync.lost(0, 0);
+  auto sets = drain(&sync);
+  ASSERT_EQ(sets.size(), 1U);
+  EXPECT_FALSE(sets[0].present[0]);
+  EXPECT_TRUE(sets[0].present[1]);
+  (void)offer(&sync, frame(1, 1, 1));
+  sets = offer(&sync, frame(0, 1, 1));
+  ASSERT_EQ(sets.size(), 1U) << "the next one is waited for";
+  EXPECT_TRUE(sets[0].complete);
+  EXPECT_EQ(sync.counters().lost[0], 1U);
+}
+
 TEST(RigSynchronizer, stampsThatDisagreeMakeASetUnproven) {
   RigSynchronizer sync(options());
   (void)offer(&sync, frame(0, 0, 0));
