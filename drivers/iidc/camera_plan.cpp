@@ -256,7 +256,7 @@ class Planner {
     const bool raw = plan_.coding == ColorCoding::raw8 || plan_.coding == ColorCoding::raw16;
     plan_.grey.coding = plan_.coding;
     plan_.grey.mosaic = raw && bayer_tile(r_.get_optional(reg::kBayerTile)) != BayerTile::none;
-    if (plan_.grey.possible()) return true;
+    if (plan_.grey.possible() && (!plan_.grey.mosaic || (wanted_.width > 1 && wanted_.height > 1))) return true;
     say_why_not(std::string(to_string(plan_.coding)) + " of this camera is not turned to grey here");
     return false;
   }

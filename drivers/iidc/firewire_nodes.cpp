@@ -1,7 +1,6 @@
 #include "drivers/iidc/firewire_nodes.hpp"
 
 #include <algorithm>
-#include <array>
 #include <fstream>
 #include <system_error>
 
@@ -13,12 +12,9 @@ constexpr const char* kDevices = "bus/firewire/devices";
 
 std::vector<std::uint32_t> read_rom_file(const fs::path& file) {
   std::ifstream in(file, std::ios::binary);
-  std::array<unsigned char, 4 * kMaxRomQuadlets> bytes{};
-  in.read(reinterpret_cast<char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
-  std::vector<std::uint32_t> quadlets(static_cast<std::size_t>(in.gcount()) / 4);
-  for (std::size_t i = 0; i < quadlets.size(); ++i)  // as on the bus: big-endian
-    quadlets[i] = static_cast<std::uint32_t>(bytes[4 * i]) << 24U | static_cast<std::uint32_t>(bytes[4 * i + 1]) << 16U |
-                  static_cast<std::uint32_t>(bytes[4 * i + 2]) << 8U | bytes[4 * i + 3];
+  std::vector<std::uint32_t> quadlets(kMaxRomQuadlets);  // in the processor's order, as the kernel shows them
+  in.read(reinterpret_cast<char*>(quadlets.data()), static_cast<std::streamsize>(4 * quadlets.size()));
+  quadlets.resize(static_cast<std::size_t>(in.gcount()) / 4);
   return quadlets;
 }
 

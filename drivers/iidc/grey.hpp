@@ -19,10 +19,10 @@ struct GreyConversion {
 
 /// Converts width × height pixels, rows of `stride` bytes in `out`.
 ///
-/// Method  Mosaic: the binomial 3×3 mean, which weights red, green and blue 1:2:1 at every pixel of every pattern, so that no grid shows.
-///         16 bits: the eight highest of the effective ones. YUV: the luma. RGB: 1:2:1.
+/// Method  Mosaic: bayer_to_grey(). 16 bits: the eight highest of the effective ones. YUV: the luma. RGB: 1:2:1.
 /// Time    One pass. Memory: none beside the images.
-/// Precondition  conversion.possible() and not none(); `in` holds frame_bytes(width, height, coding).
+/// Precondition  conversion.possible() and not none(); a mosaic has at least two rows and columns; `in` holds frame_bytes(width, height,
+/// coding).
 void to_grey(const GreyConversion& conversion, const std::uint8_t* in, int width, int height, std::uint8_t* out,
              std::size_t stride) noexcept;
 

@@ -18,8 +18,7 @@ void add_node(const fs::path& root, const std::string& card, const std::string& 
   fs::create_directories(root / "bus/firewire/devices");
   fs::create_symlink(real, root / "bus/firewire/devices" / name);
   std::ofstream out(real / "config_rom", std::ios::binary);
-  for (const std::uint32_t q : rom)
-    for (int shift = 24; shift >= 0; shift -= 8) out.put(static_cast<char>(q >> shift));
+  out.write(reinterpret_cast<const char*>(rom.data()), static_cast<std::streamsize>(4 * rom.size()));
 }
 
 std::vector<std::uint32_t> model_rom(unsigned index) {

@@ -1,0 +1,73 @@
+#pragma once
+#include <chrono>
+#include <memory>
+#include <string>
+#include <thread>
+
+#include "tests/system/iidc/iidc_rig.hpp"
+#include "tests/unit/drivers/conformance/camera_conformance.hpp"
+
+namespace vergence::test {
+
+/// One emulated camera on a real stack, as the conformance suite wants it.
+class BusConformance final : public ConformanceRig {
+ public:
+  BusConformance(std::unique_ptr<CameraDriver> driver, const std::string& program, std::string unplug, std::string replug)
+      : driver_(std::move(driver)), unplug_(std::move(unplug)), replug_(std::move(replug)) {
+    const bool none = await_cameras(driver_.get(), 0);  // those of the rig before
+    emulator_ = std::make_unique<Emulator>(program, std::vector<std::string>{"--cameras", "1", "--trigger-hz", "20"});
+    DeviceStatus status = DeviceStatus::not_found;
+    if (none && await_cameras(driver_.get(), 1)) camera_ = driver_->open("", &status);
+    if (camera_ == nullptr) throw std::runtime_error("the emulated camera does not open: " + driver_->complaint());
+  }
+  CameraDevice& camera() override { return *camera_; }
+  std::vector<CameraConfiguration> possible() override {
+    CameraConfiguration free{320, 240, 30, Duration::milliseconds(4), 0, CameraTrigger::free};
+    free.options["buffers"] = "8";
+    CameraConfiguration pulsed = free;
+    pulsed.trigger = CameraTrigger::hardware;
+    CameraConfiguration asked = free;
+    asked.trigger = CameraTrigger::software;
+    CameraConfiguration wide = free;
+    wide.pixel_format = "Mono16";
+    CameraConfiguration region = free;
+    region.offset_x = 64;
+    region.height = 120;
+    return {free, pulsed, asked, wide, region};
+  }
+  std::vector<CameraConfiguration> impossible() override {
+    std::vector<CameraConfiguration> all(6, possible().front());
+    all[0].width = 321;
+    all[1].gain_db = 60;
+    all[2].exposure = Duration::microseconds(2);
+    all[3].pixel_format = "Mono9";
+    all[4].options["zoom"] = "2";
+    all[5].offset_x = 1200;
+    return all;
+  }
+  bool unplug() override {
+    emulator_->command(unplug_);
+    return true;
+  }
+  void replug() override { emulator_->command(replug_); }
+  Duration gone_within() const override { return Duration::seconds(20); }
+  bool lose(int exposures) override {
+    emulator_->command("drop 0 " + std::to_string(exposures));
+    return true;
+  }
+  bool content_fits(const Frame&, ImageView image) override {
+    // All rows move on by one grey level an exposure; the number itself stands in row 0 of 8-bit images only.
+    for (int y = 2; y < image.height; ++y)
+      for (const int x : {0, image.width - 1})
+        if (image.at(x, y) != static_cast<std::uint8_t>(image.at(0, 1) + y - 1)) return false;
+    return true;
+  }
+
+ private:
+  std::unique_ptr<CameraDriver> driver_;
+  std::unique_ptr<Emulator> emulator_;
+  std::string unplug_, replug_;
+  std::unique_ptr<CameraDevice> camera_;
+};
+
+}  // namespace vergence::test

@@ -1,0 +1,87 @@
+#include <filesystem>
+#include <fstream>
+
+#include "drivers/iidc/iidc.hpp"
+#include "tests/system/iidc/iidc_rig.hpp"
+
+namespace vergence::test {
+
+struct BusUnderTest {
+  static constexpr const char* kEmulator = "sim_1394";
+  static constexpr const char* kSent = "transmitted";
+  static constexpr std::uint64_t kLostWithTorn = 1;  // the torn frame's buffer swallows the beginning of the next one
+  static std::unique_ptr<CameraDriver> driver() { return iidc::make_1394_driver(); }
+  // Nodes are numbered along the bus: the last one goes.
+  static void unplug(Emulator* e, unsigned camera) { e->command("plug " + std::to_string(camera)); }
+  static void replug(Emulator* e, unsigned camera) { e->command("plug " + std::to_string(camera + 1)); }
+};
+
+}  // namespace vergence::test
+
+#include "tests/system/iidc/rig_cases.hpp"  // NOLINT: after what it is made of
+
+namespace vergence::test {
+namespace {
+
+TEST_F(IidcRig, CamerasThatDoNotFitTogetherAreToldInNumbersBeforeTheyStart) {
+  CameraConfiguration wide = usual();
+  wide.width = 1280;
+  wide.height = 960;
+  wide.rate_hz = 20;  // 3088 bytes a packet at S400: 3100 units each
+  wide.sharing = 2;
+  ASSERT_NO_FATAL_FAILURE(begin(wide));
+  EXPECT_NE(cameras_[0]->remark().find("of the bus's 4915"), std::string::npos) << cameras_[0]->remark();
+  EXPECT_EQ(cameras_[0]->start(nullptr), DeviceStatus::no_bandwidth);
+  EXPECT_NE(cameras_[0]->complaint().find("2 cameras need "), std::string::npos) << cameras_[0]->complaint();
+  cameras_.pop_back();  // one alone fits
+  EXPECT_EQ(cameras_[0]->start(nullptr), DeviceStatus::ok) << cameras_[0]->complaint();
+  (void)end();
+}
+
+TEST_F(IidcRig, AtS800TheyFit) {
+  CameraConfiguration wide = usual();
+  wide.width = 1280;
+  wide.height = 960;
+  wide.rate_hz = 15;
+  wide.sharing = 2;
+  ASSERT_NO_FATAL_FAILURE(begin(wide, {"--s800"}));
+  EXPECT_EQ(cameras_[0]->remark(), "");
+  ASSERT_NO_FATAL_FAILURE(start());
+  ASSERT_TRUE(taker_->take(10));
+  EXPECT_EQ(taker_->account(0).wrong + taker_->account(1).wrong, 0U);
+  (void)end();
+}
+
+TEST_F(IidcRig, TheBusClockIsOneForBothCamerasThroughItsWrap) {
+  ASSERT_NO_FATAL_FAILURE(begin(usual()));
+  ASSERT_NO_FATAL_FAILURE(start());
+  // Fifteen seconds: with the card's clock at 100 s the wrap at 128 s comes in between, whatever the start took.
+  const bool wraps = std::filesystem::exists("/sys/module/vergence_1394/parameters/offset_s") && [] {
+    std::ifstream f("/sys/module/vergence_1394/parameters/offset_s");
+    int s = 0;
+    return static_cast<bool>(f >> s) && s != 0;
+  }();
+  const std::uint64_t frames = wraps ? 30 * 32 : 60;
+  ASSERT_TRUE(taker_->take(frames, Duration::seconds(90)));
+  (void)end();
+  const Account &a = taker_->account(0), &b = taker_->account(1);
+  EXPECT_EQ(a.wrong + b.wrong, 0U);
+  std::size_t compared = 0;
+  for (std::size_t i = 0, j = 0; i < a.middles.size() && j < b.middles.size();) {
+    if (a.middles[i] == b.middles[j]) {
+      EXPECT_EQ(a.starts[i], b.starts[j]) << "exposed at once, stamped at once";
+      ++compared, ++i, ++j;
+    } else {
+      ++(a.middles[i] < b.middles[j] ? i : j);
+    }
+  }
+  EXPECT_GT(compared, frames / 2);
+  // Against the host's clock: 50 ppm fast where the card says so, and never a leap.
+  const double host = static_cast<double>(a.middles.back() - a.middles.front());
+  const double bus = static_cast<double>(a.starts.back() - a.starts.front());
+  EXPECT_NEAR(bus / host - 1, wraps ? 50e-6 : 0, 1e-6);
+  for (std::size_t i = 1; i < a.starts.size(); ++i) ASSERT_GT(a.starts[i], a.starts[i - 1]);
+}
+
+}  // namespace
+}  // namespace vergence::test

@@ -1,0 +1,264 @@
+#pragma once
+#include <gtest/gtest.h>
+
+#include <chrono>
+#include <memory>
+#include <string>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include "tests/system/iidc/iidc_rig.hpp"
+
+/// What holds on both buses: one set of cases, included once by each bus's test with its own BusUnderTest.
+///
+///   struct BusUnderTest { static constexpr const char* kEmulator; static constexpr const char* kSent;   // its word for frames sent whole
+///                         static std::unique_ptr<CameraDriver> driver();
+///                         static void unplug(Emulator*, unsigned), replug(Emulator*, unsigned); };
+namespace vergence::test {
+
+class IidcRig : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    if (!inside_rig()) GTEST_SKIP() << "this test runs inside the rig's kernel: ctest -L rig";
+  }
+  /// The emulator, and its two cameras configured.
+  void begin(const CameraConfiguration& wanted, std::vector<std::string> arguments = {}) {
+    ASSERT_TRUE(await_cameras(driver_.get(), 0)) << "those of the test before";
+    emulator_ = std::make_unique<Emulator>(BusUnderTest::kEmulator, std::move(arguments));
+    ASSERT_TRUE(await_cameras(driver_.get(), 2));
+    for (unsigned k = 0; k < 2; ++k) {
+      cameras_.push_back(open_camera(driver_.get(), k, wanted));
+      ASSERT_NE(cameras_.back(), nullptr);
+    }
+    taker_ = std::make_unique<Taker>(std::vector<CameraDevice*>{cameras_[0].get(), cameras_[1].get()});
+  }
+  void start() {
+    for (const auto& c : cameras_) ASSERT_EQ(c->start(nullptr), DeviceStatus::ok) << c->complaint();
+  }
+  /// n pulses, slower than the cameras can take them.
+  void pulse(int n) {
+    for (int i = 0; i < n; ++i) {
+      emulator_->command("trigger");
+      std::this_thread::sleep_for(std::chrono::milliseconds(70));
+      taker_->drain(Duration{});
+    }
+  }
+  /// Ends everything; what the emulator says it did.
+  std::string end() {
+    for (const auto& c : cameras_) c->stop();
+    const std::string report = emulator_->finish();
+    emulator_.reset();
+    return report;
+  }
+
+  std::unique_ptr<CameraDriver> driver_ = BusUnderTest::driver();
+  std::unique_ptr<Emulator> emulator_;
+  std::vector<std::unique_ptr<CameraDevice>> cameras_;
+  std::unique_ptr<Taker> taker_;
+};
+
+TEST_F(IidcRig, TwoCamerasAreListedWithIdsThatOpenThem) {
+  ASSERT_NO_FATAL_FAILURE(begin(usual()));
+  const auto found = driver_->enumerate();
+  ASSERT_EQ(found.size(), 2U);
+  for (unsigned k = 0; k < 2; ++k) {
+    EXPECT_EQ(cameras_[k]->info().serial, emulated_serial(k));
+    EXPECT_EQ(cameras_[k]->info().model, "Emulated IIDC " + std::to_string(k));
+  }
+  DeviceStatus status = DeviceStatus::ok;
+  EXPECT_EQ(driver_->open(emulated_serial(0), &status), nullptr);
+  EXPECT_EQ(status, DeviceStatus::busy) << "two programs on one camera";
+  EXPECT_FALSE(driver_->complaint().empty());
+  EXPECT_EQ(driver_->open("15021234", &status), nullptr);
+  EXPECT_EQ(status, DeviceStatus::not_found);
+  (void)end();
+}
+
+TEST_F(IidcRig, TwoCamerasStreamEveryExposureInStep) {
+  ASSERT_NO_FATAL_FAILURE(begin(usual()));
+  ASSERT_NO_FATAL_FAILURE(start());
+  ASSERT_TRUE(taker_->take(90));
+  const std::string report = end();
+  for (unsigned k = 0; k < 2; ++k) {
+    const Account& a = taker_->account(k);
+    const CameraStatistics s = cameras_[k]->statistics();
+    EXPECT_EQ(a.complete, 90U);
+    EXPECT_EQ(a.wrong, 0U);
+    EXPECT_EQ(a.torn, 0U);
+    // Whatever is missing between the first and the last is in the counters: the difference is 0.
+    EXPECT_EQ(a.span(), a.complete + s.lost + s.underruns) << "camera " << k << '\n' << report;
+    EXPECT_EQ(a.gaps, s.lost + s.underruns);
+    EXPECT_EQ(s.lost, static_cast<std::uint64_t>(count_of(report, static_cast<int>(k), "overtaken"))) << report;
+    EXPECT_GE(count_of(report, static_cast<int>(k), "exposed"), static_cast<std::int64_t>(a.span()));
+  }
+  // Free-running cameras of one rate expose together.
+  for (const std::int64_t m : taker_->account(0).middles) {
+    std::int64_t nearest = INT64_MAX;
+    for (const std::int64_t other : taker_->account(1).middles) nearest = std::min(nearest, std::abs(other - m));
+    EXPECT_LT(nearest, 1'000'000'000) << "another time altogether";
+  }
+}
+
+TEST_F(IidcRig, EveryPulseIsOneFrameAndTheEmulatorsAccountsAgree) {
+  ASSERT_NO_FATAL_FAILURE(begin(usual(CameraTrigger::hardware)));
+  ASSERT_NO_FATAL_FAILURE(start());
+  pulse(5);
+  emulator_->command("drop 1 3");
+  pulse(5);
+  pulse(10);
+  taker_->drain();
+  const std::string report = end();
+  for (int k = 0; k < 2; ++k) {
+    const Account& a = taker_->account(static_cast<std::size_t>(k));
+    const CameraStatistics s = cameras_[static_cast<std::size_t>(k)]->statistics();
+    EXPECT_EQ(count_of(report, k, "exposed"), 20) << report;
+    EXPECT_EQ(static_cast<std::int64_t>(a.complete), count_of(report, k, BusUnderTest::kSent)) << report;
+    EXPECT_EQ(static_cast<std::int64_t>(s.lost), count_of(report, k, "dropped") + count_of(report, k, "overtaken")) << report;
+    EXPECT_EQ(count_of(report, k, "dropped"), k == 1 ? 3 : 0);
+    EXPECT_EQ(a.complete + s.lost, 20U);
+    EXPECT_EQ(a.gaps, s.lost);
+    EXPECT_EQ(a.torn + a.wrong + s.underruns, 0U);
+    // A frame stamped by its pulse: the camera's clock and the emulator's run alike.
+    for (std::size_t i = 1; i < a.starts.size(); ++i)
+      EXPECT_NEAR(static_cast<double>(a.starts[i] - a.starts[i - 1]), static_cast<double>(a.middles[i] - a.middles[i - 1]), 200);
+  }
+  EXPECT_EQ(taker_->account(0).middles.back(), taker_->account(1).middles.back()) << "one pulse, one instant";
+}
+
+TEST_F(IidcRig, ATornFrameIsMarkedAndNoOther) {
+  ASSERT_NO_FATAL_FAILURE(begin(usual(CameraTrigger::hardware)));
+  ASSERT_NO_FATAL_FAILURE(start());
+  pulse(4);
+  emulator_->command("tear 0 1");
+  pulse(6);
+  emulator_->command("tear 0 1");
+  pulse(6);
+  taker_->drain();
+  const std::string report = end();
+  const Account& a = taker_->account(0);
+  const CameraStatistics s = cameras_[0]->statistics();
+  EXPECT_EQ(count_of(report, 0, "torn"), 2) << report;
+  EXPECT_EQ(a.torn, 2U);
+  EXPECT_EQ(a.wrong, 0U) << "a torn frame was called complete";
+  EXPECT_EQ(s.lost, BusUnderTest::kLostWithTorn * 2) << report;
+  EXPECT_EQ(a.complete + a.torn + s.lost, 16U) << report;
+  EXPECT_EQ(taker_->account(1).complete, 16U);
+}
+
+TEST_F(IidcRig, TheSoftwareTriggerMakesOneFrameACall) {
+  ASSERT_NO_FATAL_FAILURE(begin(usual(CameraTrigger::software)));
+  ASSERT_NO_FATAL_FAILURE(start());
+  for (int i = 0; i < 5; ++i) {
+    for (const auto& c : cameras_) EXPECT_EQ(c->trigger_once(), DeviceStatus::ok) << c->complaint();
+    EXPECT_TRUE(taker_->take(1, Duration::seconds(3)));
+  }
+  const std::string report = end();
+  for (int k = 0; k < 2; ++k) EXPECT_EQ(count_of(report, k, "exposed"), 5) << report;
+}
+
+TEST_F(IidcRig, ACameraThatFallsSilentIsATimeoutAndGoesOn) {
+  ASSERT_NO_FATAL_FAILURE(begin(usual()));
+  ASSERT_NO_FATAL_FAILURE(start());
+  ASSERT_TRUE(taker_->take(10));
+  emulator_->command("mute 0 1");
+  Frame frame;
+  DeviceStatus status = DeviceStatus::ok;
+  while ((status = cameras_[0]->wait(Duration::milliseconds(500), &frame)) == DeviceStatus::ok) cameras_[0]->release(frame.slot);
+  EXPECT_EQ(status, DeviceStatus::timeout);
+  emulator_->command("mute 0 0");
+  ASSERT_TRUE(taker_->take(10));
+  const std::string report = end();
+  EXPECT_GT(cameras_[0]->statistics().lost, 5U);
+  EXPECT_EQ(cameras_[0]->statistics().lost, static_cast<std::uint64_t>(count_of(report, 0, "dropped") + count_of(report, 0, "overtaken")))
+      << report;
+}
+
+TEST_F(IidcRig, StopsUnderLoadAndStartsAgain) {
+  ASSERT_NO_FATAL_FAILURE(begin(usual()));
+  for (int i = 0; i < 6; ++i) {
+    ASSERT_NO_FATAL_FAILURE(start());
+    EXPECT_TRUE(taker_->take(3)) << i;
+    // With frames under way, some delivered and not taken.
+    std::this_thread::sleep_for(std::chrono::milliseconds(60));
+    for (std::size_t k = 0; k < 2; ++k) {
+      const auto begun = std::chrono::steady_clock::now();
+      cameras_[k]->stop();
+      EXPECT_LT(std::chrono::steady_clock::now() - begun, std::chrono::seconds(3));
+      taker_->restarted(k);
+    }
+  }
+  for (unsigned k = 0; k < 2; ++k) {
+    EXPECT_EQ(taker_->account(k).wrong + taker_->account(k).torn, 0U);
+    EXPECT_EQ(cameras_[k]->statistics().starts, 6U);
+  }
+  (void)end();
+}
+
+TEST_F(IidcRig, UnpluggedWhileStreamingAndPluggedInAgainLeavesNothingBehind) {
+  ASSERT_NO_FATAL_FAILURE(begin(usual()));
+  ASSERT_NO_FATAL_FAILURE(start());
+  ASSERT_TRUE(taker_->take(10));
+  const Holdings before = Holdings::now();
+  for (int round = 0; round < 3; ++round) {
+    BusUnderTest::unplug(emulator_.get(), 1);
+    Frame frame;
+    DeviceStatus status = DeviceStatus::ok;
+    const auto limit = std::chrono::steady_clock::now() + std::chrono::seconds(10);
+    Frame held;
+    bool holds = false;
+    while (status != DeviceStatus::gone && std::chrono::steady_clock::now() < limit) {
+      status = cameras_[1]->wait(Duration::milliseconds(200), &frame);
+      if (status != DeviceStatus::ok) continue;
+      if (holds) {
+        cameras_[1]->release(frame.slot);
+      } else {
+        held = frame;
+        holds = true;
+      }
+    }
+    ASSERT_EQ(status, DeviceStatus::gone);
+    std::uint32_t number = 0;
+    if (holds) number = read_stamp(cameras_[1]->view(held.slot)).number;
+    EXPECT_EQ(cameras_[1]->start(nullptr), DeviceStatus::gone);
+    EXPECT_FALSE(cameras_[1]->complaint().empty());
+    BusUnderTest::replug(emulator_.get(), 1);
+    ASSERT_TRUE(start_again(cameras_[1].get())) << cameras_[1]->complaint();
+    if (holds) {
+      EXPECT_EQ(read_stamp(cameras_[1]->view(held.slot)).number, number) << "an image that is held stays, whatever happens to its camera";
+      cameras_[1]->release(held.slot);
+    }
+    taker_->restarted(1);
+    ASSERT_TRUE(taker_->take(10)) << "camera 1 after the replug, camera 0 all along: " << cameras_[1]->complaint();
+    cameras_[1]->stop();  // what waited for the last image to be released goes now
+    taker_->restarted(1);
+    ASSERT_EQ(cameras_[1]->start(nullptr), DeviceStatus::ok) << cameras_[1]->complaint();
+    ASSERT_TRUE(taker_->take(3));
+    EXPECT_EQ(Holdings::now(), before) << "round " << round << ": " << Holdings::now().descriptors << " descriptors instead of "
+                                       << before.descriptors << ", " << Holdings::now().mappings << " mappings instead of "
+                                       << before.mappings;
+  }
+  EXPECT_EQ(taker_->account(0).wrong + taker_->account(1).wrong, 0U);
+  EXPECT_EQ(cameras_[0]->statistics().starts, 1U) << "the other camera goes on";
+  (void)end();
+}
+
+TEST_F(IidcRig, WhatIsDroppedForWantOfASlotIsCountedExactly) {
+  CameraConfiguration few = usual();
+  few.options["buffers"] = "6";
+  ASSERT_NO_FATAL_FAILURE(begin(few));
+  ASSERT_NO_FATAL_FAILURE(start());
+  ASSERT_TRUE(taker_->take(5));
+  std::this_thread::sleep_for(std::chrono::milliseconds(1500));  // nobody takes
+  ASSERT_TRUE(taker_->take(20));
+  const std::string report = end();
+  for (unsigned k = 0; k < 2; ++k) {
+    const Account& a = taker_->account(k);
+    const CameraStatistics s = cameras_[k]->statistics();
+    EXPECT_GT(s.underruns, 20U);
+    EXPECT_EQ(a.span(), a.complete + a.torn + s.underruns + s.lost) << report;
+    EXPECT_EQ(a.wrong, 0U);
+  }
+}
+
+}  // namespace vergence::test

@@ -1,0 +1,35 @@
+#include "drivers/iidc/iidc.hpp"
+#include "tests/system/iidc/iidc_rig.hpp"
+
+namespace vergence::test {
+
+struct BusUnderTest {
+  static constexpr const char* kEmulator = "sim_usb_iidc";
+  static constexpr const char* kSent = "delivered";
+  static constexpr std::uint64_t kLostWithTorn = 0;  // a short packet ends the frame, the next is whole
+  static std::unique_ptr<CameraDriver> driver() { return iidc::make_usb_driver(); }
+  static void unplug(Emulator* e, unsigned camera) { e->command("unplug " + std::to_string(camera)); }
+  static void replug(Emulator* e, unsigned camera) { e->command("replug " + std::to_string(camera)); }
+};
+
+}  // namespace vergence::test
+
+#include "tests/system/iidc/rig_cases.hpp"  // NOLINT: after what it is made of
+
+namespace vergence::test {
+namespace {
+
+TEST_F(IidcRig, ACameraIsOpenedByTheNumberThatUsbCallsItsSerial) {
+  const Emulator emulator("sim_usb_iidc", {"--cameras", "1"});
+  DeviceStatus status = DeviceStatus::failed;
+  std::unique_ptr<CameraDevice> camera;
+  for (int i = 0; i < 100 && camera == nullptr; ++i) {
+    camera = driver_->open("10240000", &status);
+    if (camera == nullptr) std::this_thread::sleep_for(std::chrono::milliseconds(50));
+  }
+  ASSERT_NE(camera, nullptr) << driver_->complaint();
+  EXPECT_EQ(camera->info().serial, emulated_serial(0));
+}
+
+}  // namespace
+}  // namespace vergence::test
