@@ -40,7 +40,13 @@ struct CameraSettings {
 
 struct InsSettings {
   std::string driver = "none";
-  double rate = 120;                      // Hz
+  std::string port{};      // empty: the only serial port on USB
+  int baud = 0;            // 0: as the device has it
+  double rate = 120;       // Hz
+  double sync_out_hz = 0;  // 0: as the device has it; negative: off
+  double sync_out_width_ms = 1;
+  std::string sync_in = "leave";
+  double processing_ms = 2;               // from a sample to its first byte on the line
   std::array<double, 3> lever_arm_m{};    // of the left camera in the INS's body: forward, left, up
   std::array<double, 3> boresight_deg{};  // roll, pitch, yaw
 };

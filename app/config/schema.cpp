@@ -182,8 +182,18 @@ Group ins() {
   using I = InsSettings;
   return Rows<I>(
              "ins", "The inertial navigation system that the pose is compared with.", [](auto& c) -> auto& { return c.ins; })
-      .text("driver", &I::driver, 16, "What talks to it: `mock`, or `none`.")
-      .number("rate", &I::rate, 1, 400, "Hz", "Readings of the INS a second.")
+      .text("driver", &I::driver, 16, "What talks to it: `xsens`, `mock` (with mock cameras), or `none`.")
+      .text("port", &I::port, 200,
+            "Serial port of the INS, `/dev/ttyUSB0` or better a link that stays: `/dev/serial/by-id/…`. Empty: the only one on USB.")
+      .integer("baud", &I::baud, 0, 2000000, "baud",
+               "Rate of that line; the device is brought to it. 0: as the device has it, which is looked for.")
+      .number("rate", &I::rate, 1, 400, "Hz", "Readings of the INS a second; an MTi-G-700/710 takes the nearest it has (100 for 120).")
+      .number("sync_out_hz", &I::sync_out_hz, -1, 400, "Hz",
+              "Pulses a second at the INS's SyncOut; 0: as the device has it, -1: none. An MTi-G-700/710 makes 400 Hz / n, no 30.")
+      .number("sync_out_width_ms", &I::sync_out_width_ms, 0.1, 100, "ms", "Length of such a pulse.")
+      .text("sync_in", &I::sync_in, 8, "What an edge at SyncIn marks: `leave` as the device has it, `off`, `rising` or `falling`.")
+      .number("processing_ms", &I::processing_ms, 0, 50, "ms",
+              "From a sample to its first byte on the line, as the device's manual says; it goes into every stamp.")
       .numbers("lever_arm_m", &I::lever_arm_m, -100, 100, "m",
                {"Where the left camera sits in the INS's body: forward.", "The same place, to the left.", "The same place, upwards."})
       .numbers("boresight_deg", &I::boresight_deg, -180, 180, "°",

@@ -225,7 +225,8 @@ void LiveSource::take_reading() {
   LiveItem item;
   item.kind = LiveItem::Kind::reading;
   item.sample = ins_head_.value.sample;
-  const MappedStamp at = ins_clock_->map(ins_head_.value.measured, ins_head_.value.arrival);
+  const InsReading& r = ins_head_.value;
+  const MappedStamp at = r.mapped ? MappedStamp{r.host, r.host_error} : ins_clock_->map(r.measured, r.arrival);
   item.stamp = item.sample.stamp = stamp_of(at.host);
   item.sample.stamp_error = at.error;
   push(item);

@@ -1,0 +1,43 @@
+#pragma once
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "drivers/ins.hpp"
+
+namespace vergence::app {
+
+/// An INS as the configuration wants it.
+struct InsRequest {
+  std::string driver;  // `none`: there is none
+  std::string port;    // empty: the only one there is
+  double rate_hz = 100;
+  std::uint32_t baud = 0;  // 0: as the device has it
+  double sync_out_hz = 0;  // 0: as the device has it; negative: off
+  double sync_out_width_ms = 1;
+  std::string sync_in = "leave";  // leave, off, rising, falling
+  double processing_ms = 2;
+};
+
+/// A kind of INS that a configuration can name.
+struct InsDriverRow {
+  const char* name;     // of `ins.driver`
+  const char* meaning;  // for lists
+  std::unique_ptr<InsDriver> (*make)(const InsRequest& request);
+  const char* permission;  // what to do where the system does not let us
+};
+
+/// The table of drivers for real INS: everything that talks to one is chosen here. The mock's INS comes from its rig.
+[[nodiscard]] const std::vector<InsDriverRow>& ins_driver_rows();
+[[nodiscard]] std::vector<std::string> ins_driver_names();
+
+/// Opens and configures it; null for `none`.
+///
+/// Errors  InputError, one sentence: the key, what was found, what to do. Nothing stays open then.
+/// `remarks`: sentences about what works, but not as asked.
+[[nodiscard]] std::unique_ptr<InsDevice> open_ins(const InsRequest& request, std::vector<std::string>* remarks);
+
+/// An INS for a sentence: `ins (xsens 07701234, MTI-G-710 on /dev/ttyUSB0)`.
+[[nodiscard]] std::string ins_title(const DeviceInfo& info);
+
+}  // namespace vergence::app
