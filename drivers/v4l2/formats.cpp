@@ -7,6 +7,8 @@
 #include <cassert>
 #include <cstring>
 
+#include "core/types/bayer.hpp"
+
 namespace vergence::v4l2 {
 namespace {
 
@@ -19,6 +21,8 @@ constexpr std::array kFormats = {
     PixelFormat{V4L2_PIX_FMT_Y14, Layout::words, 6},       PixelFormat{V4L2_PIX_FMT_Y16, Layout::words, 8},
     PixelFormat{V4L2_PIX_FMT_YUYV, Layout::luma_first},    PixelFormat{V4L2_PIX_FMT_YVYU, Layout::luma_first},
     PixelFormat{V4L2_PIX_FMT_UYVY, Layout::chroma_first},  PixelFormat{V4L2_PIX_FMT_VYUY, Layout::chroma_first},
+    PixelFormat{V4L2_PIX_FMT_SRGGB8, Layout::mosaic},      PixelFormat{V4L2_PIX_FMT_SGRBG8, Layout::mosaic},
+    PixelFormat{V4L2_PIX_FMT_SGBRG8, Layout::mosaic},      PixelFormat{V4L2_PIX_FMT_SBGGR8, Layout::mosaic},
 };
 
 // One row each. The loops are plain so that the compiler makes vectors of them.
@@ -66,6 +70,7 @@ std::size_t least_row_bytes(const PixelFormat& format, int width) noexcept {
   const auto w = static_cast<std::size_t>(width);
   switch (format.layout) {
     case Layout::luma_plane:
+    case Layout::mosaic:
       return w;
     case Layout::packed10:
       return (w * 5 + 3) / 4;
@@ -84,10 +89,15 @@ std::size_t least_frame_bytes(const PixelFormat& format, int width, int height, 
 void to_grey(const PixelFormat& format, const std::uint8_t* from, std::size_t from_stride, int width, int height, std::uint8_t* to,
              std::size_t to_stride) noexcept {
   assert(from_stride >= least_row_bytes(format, width) && to_stride >= static_cast<std::size_t>(width));
+  if (format.layout == Layout::mosaic) {
+    bayer_to_grey(from, static_cast<std::ptrdiff_t>(from_stride), width, height, to, static_cast<std::ptrdiff_t>(to_stride));
+    return;
+  }
   const auto w = static_cast<std::size_t>(width);
   for (int y = 0; y < height; ++y, from += from_stride, to += to_stride) {
     switch (format.layout) {
       case Layout::luma_plane:
+      case Layout::mosaic:
         std::memcpy(to, from, w);
         break;
       case Layout::words:

@@ -14,6 +14,7 @@ enum class Layout : std::uint8_t {
   packed10,      // four pixels in five bytes: four high bytes, then the low bits
   luma_first,    // YUYV: brightness in the even bytes
   chroma_first,  // UYVY: in the odd ones
+  mosaic,        // 8 bits behind a Bayer filter of any pattern
 };
 
 struct PixelFormat {
@@ -37,7 +38,8 @@ struct PixelFormat {
 
 /// Brightness, 8 bits, into rows of `to_stride` bytes. `shift` as in PixelFormat.
 ///
-/// Memory  Reads least_frame_bytes() of `from`, writes `width` bytes of every row. Preconditions: strides hold a row; 0 ≤ shift ≤ 8.
+/// Method  Mosaics: bayer_to_grey(). Memory: reads least_frame_bytes() of `from`, writes `width` bytes of every row. Preconditions: strides
+/// hold a row; 0 ≤ shift ≤ 8; a mosaic has at least two rows and columns.
 void to_grey(const PixelFormat& format, const std::uint8_t* from, std::size_t from_stride, int width, int height, std::uint8_t* to,
              std::size_t to_stride) noexcept;
 

@@ -184,6 +184,8 @@ class Applier {
     out_.stride = planes ? f.fmt.pix_mp.plane_fmt[0].bytesperline : f.fmt.pix.bytesperline;
     out_.image_size = planes ? f.fmt.pix_mp.plane_fmt[0].sizeimage : f.fmt.pix.sizeimage;
     out_.format = *chosen;
+    if (chosen->layout == Layout::mosaic && (wanted_.width < 2 || wanted_.height < 2))
+      return refuse(DeviceStatus::unsupported, "a mosaic of colours needs at least two rows and columns");
     if (options_.shift >= 0 && chosen->layout == Layout::words) out_.format.shift = options_.shift;
     out_.stride = std::max(out_.stride, least_row_bytes(out_.format, wanted_.width));
     if (out_.image_size < least_frame_bytes(out_.format, wanted_.width, wanted_.height, out_.stride))
