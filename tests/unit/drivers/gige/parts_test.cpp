@@ -2,7 +2,9 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
+#include <fstream>
 #include <map>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -150,6 +152,17 @@ TEST(GigeOptions, whatIsNotUnderstoodIsNamedWithWhatThereIs) {
                                                                       {"trigger_edge", ""},
                                                                       {"feature.", "1"}})
     EXPECT_NE(parse_options({{name, value}}, &o).find(name), std::string::npos) << name;
+}
+
+TEST(GigeOptions, thePageHasEveryRowAsItStands) {
+  std::ifstream page(std::string(VERGENCE_SOURCE_DIR) + "/docs/cameras/gige.md");
+  std::set<std::string> lines;
+  for (std::string line; std::getline(page, line);) lines.insert(line);
+  for (const OptionRow& r : option_rows()) {
+    const std::string fallback = *r.fallback == '\0' ? "–" : r.fallback;
+    const std::string line = std::string("| `") + r.name + "` | " + r.values + " | " + fallback + " | " + r.meaning + " |";
+    EXPECT_TRUE(lines.contains(line)) << line;
+  }
 }
 
 TEST(GigeGrey, theCheapestFormatIsTaken) {

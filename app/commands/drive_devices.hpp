@@ -1,0 +1,59 @@
+#pragma once
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "app/commands/mock_drive.hpp"
+#include "app/config/configuration.hpp"
+#include "app/runtime/camera_drivers.hpp"
+#include "drivers/sync/rig_synchronizer.hpp"
+
+namespace vergence::app {
+
+/// The devices of a drive, configured and ready to start: a mock's rig, or cameras that exist.
+///
+/// Ownership  Cameras, INS and trigger live in it and outlive the LiveSource that uses them. Threads: one caller.
+class DriveDevices {
+ public:
+  /// InputError names the key, or the device and what it offers. `fast`: virtual time, mock only.
+  DriveDevices(const Configuration& configuration, const std::vector<std::string>& faults, bool fast, std::optional<double> duration_s);
+
+  [[nodiscard]] const std::vector<CameraDevice*>& cameras() const noexcept { return cameras_; }
+  [[nodiscard]] InsDevice* ins() const noexcept { return ins_; }              // null: none
+  [[nodiscard]] TriggerDevice* trigger() const noexcept { return trigger_; }  // null: pulses come from elsewhere, or none
+  [[nodiscard]] const SyncOptions& sync() const noexcept { return sync_; }
+  /// Sentences about what works, but not as well as it should.
+  [[nodiscard]] const std::vector<std::string>& remarks() const noexcept { return remarks_; }
+
+  /// Null: the devices are real.
+  [[nodiscard]] const mock::MockRig* mock() const noexcept { return mock_.rig.get(); }
+  /// Scheduled in the mock.
+  [[nodiscard]] std::span<const mock::Fault> faults() const noexcept;
+  /// When the drive begins; a mock in real time knows it only after the start.
+  [[nodiscard]] HostStamp start() const noexcept;
+  /// Rig frames of the whole drive; 0: nobody knows.
+  [[nodiscard]] std::uint64_t frames() const noexcept { return frames_; }
+  /// Of a mock; real cameras do not tell.
+  [[nodiscard]] std::size_t image_bytes() const noexcept { return mock_.rig ? mock_.rig->image_bytes() : 0; }
+
+ private:
+  void open_real(const Configuration& configuration);
+
+  MockDrive mock_;
+  std::vector<OpenedCamera> opened_;
+  std::unique_ptr<TriggerDevice> software_;
+  std::vector<CameraDevice*> cameras_;
+  InsDevice* ins_ = nullptr;
+  TriggerDevice* trigger_ = nullptr;
+  SyncOptions sync_;
+  std::vector<std::string> remarks_;
+  std::uint64_t frames_ = 0;
+  HostStamp start_{};
+};
+
+/// `NAME=VALUE NAME=VALUE …` of `cameras.N.options`. InputError names the key.
+[[nodiscard]] std::map<std::string, std::string> parse_camera_options(const std::string& key, const std::string& text);
+
+}  // namespace vergence::app
