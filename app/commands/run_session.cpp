@@ -18,7 +18,7 @@
 
 #include <fmt/format.h>
 
-#include "app/commands/mock_drive.hpp"
+#include "app/commands/drive_devices.hpp"
 #include "app/commands/session_files.hpp"
 #include "app/datasets/decimal.hpp"
 #include "app/recorder/line_file.hpp"
@@ -78,7 +78,7 @@ class Drive {
 
   const RunRequest& request_;
   const Configuration& configuration_;
-  MockDrive mock_;
+  DriveDevices devices_;
   const RigCalibration rig_;
   EstimatorOptions options_;
   ComparisonOptions comparison_options_;
@@ -113,7 +113,7 @@ class Drive {
 Drive::Drive(const RunRequest& request)
     : request_(request),
       configuration_(request.configuration),
-      mock_(make_mock_drive(request.configuration, request.faults, !request.fast, request.duration_s)),
+      devices_(request.configuration, request.faults, request.fast, request.duration_s),
       rig_(nominal_rig(request.configuration)),
       options_{request.configuration.odometry},
       comparison_options_(comparison_options(request.configuration)),
@@ -121,19 +121,14 @@ Drive::Drive(const RunRequest& request)
       runner_(make_runner(request.configuration.threads)),
       estimator_(std::make_unique<Estimator>(options_, rig_, rig_, arena_, *runner_, solver_)),
       comparison_(std::make_unique<Comparison>(comparison_options_, arena_)),
-      fault_told_(mock_.rig->truth().faults().size(), false) {
+      fault_told_(devices_.faults().size(), false) {
   LiveSource::Options o;
-  o.sync.cameras = rig_.cameras;
-  o.sync.interval = Duration::seconds(1 / configuration_.trigger.rate);
-  o.sync.hold = Duration::seconds(configuration_.sync.hold_ms * 1e-3);
+  o.sync = devices_.sync();
   o.wait_when_full = request.fast;
   o.tie_stamp = request.fast ? kVirtualEpoch : Stamp(clock_ns(CLOCK_REALTIME));
-  o.tie_host = request.fast ? mock_.rig->start() : HostStamp(clock_ns(CLOCK_MONOTONIC));
-  std::vector<CameraDevice*> cameras;
-  cameras.reserve(static_cast<std::size_t>(mock_.rig->cameras()));
-  for (int k = 0; k < mock_.rig->cameras(); ++k) cameras.push_back(&mock_.rig->camera(k));
-  source_ = std::make_unique<LiveSource>(std::move(cameras), mock_.has_ins ? &mock_.rig->ins() : nullptr, &mock_.rig->trigger(), o);
-  start_ = o.tie_stamp + (mock_.rig->start() - o.tie_host);
+  o.tie_host = request.fast ? devices_.start() : HostStamp(clock_ns(CLOCK_MONOTONIC));
+  source_ = std::make_unique<LiveSource>(devices_.cameras(), devices_.ins(), devices_.trigger(), o);
+  start_ = o.tie_stamp + (devices_.start() - o.tie_host);
 }
 
 // ---- the estimator's thread ---------------------------------------------------------------------------------------
@@ -209,7 +204,7 @@ void Drive::drain_comparison() noexcept {
     if (pose.ins_valid) ++ins_matches_;
     glimpse_.from_ins_m = pose.compared ? pose.error_enu.norm() : -1;
     note_placement(pose.pose.stamp);
-    if (mock_.has_ins) note_ins(pose);
+    if (devices_.ins() != nullptr) note_ins(pose);
   }
 }
 
@@ -255,7 +250,7 @@ void Drive::note_jump(Stamp stamp) noexcept {
 }
 
 void Drive::note_faults(Stamp stamp) noexcept {
-  const auto& faults = mock_.rig->truth().faults();
+  const auto faults = devices_.faults();
   for (std::size_t i = 0; i < faults.size(); ++i) {
     if (fault_told_[i] || stamp < start_ + faults[i].at) continue;
     fault_told_[i] = true;
@@ -279,9 +274,14 @@ void Drive::tell_event(Stamp stamp, const char* kind, std::string_view sentence,
 
 void Drive::watch(const SignalGuard& signals, Progress* progress) {
   constexpr std::chrono::milliseconds kLook{50};
+  const auto begun = std::chrono::steady_clock::now();
+  const auto over = [&] {  // real cameras do not end by themselves
+    return devices_.mock() == nullptr && request_.duration_s &&
+           std::chrono::steady_clock::now() - begun > std::chrono::duration<double>(*request_.duration_s);
+  };
   std::unique_lock lock(mutex_);
   while (!changed_.wait_for(lock, kLook, [this] { return done_; })) {
-    if (signals.stop_requested()) source_->stop();
+    if (signals.stop_requested() || over()) source_->stop();
     lock.unlock();
     show(progress);
     lock.lock();
@@ -301,7 +301,7 @@ void Drive::show(Progress* progress) {
   ProgressState state;
   state.state = newest.state == State::stereo_odometry ? "stereo" : to_string(newest.state);
   state.frame = newest.done;
-  state.frames = mock_.rig->pulses(configuration_.trigger.rate);
+  state.frames = devices_.frames();
   state.path_m = newest.path_m;
   state.inliers = newest.inliers;
   state.estimate_ms = static_cast<double>(newest.estimate_ms);
@@ -325,20 +325,24 @@ void Drive::write_truth(std::vector<std::string>* faults) const {
 
 std::vector<std::pair<std::string, std::size_t>> Drive::memory() const {
   return {{"estimator_bytes", arena_.capacity()},
-          {"images_bytes", mock_.rig->image_bytes()},
+          {"images_bytes", devices_.image_bytes()},
           {"rings_bytes", sizeof(Recorder) + sizeof(LiveSource)}};
 }
 
 std::vector<std::pair<std::string, std::uint64_t>> Drive::device_counters() const {
   const LiveCounters& c = source_->counters();
-  std::vector<std::pair<std::string, std::uint64_t>> out{
-      {"sets_complete", c.sync.complete},       {"sets_incomplete", c.sync.incomplete},
-      {"pulses_missed", c.sync.missed},         {"sets_overtaken", c.dropped_sets},
-      {"readings_dropped", c.dropped_readings}, {"frames_torn", c.torn},
-      {"clock_resets", c.clock_resets},         {"worst_stamp_error_ns", static_cast<std::uint64_t>(c.worst_stamp_error_ns)}};
+  std::vector<std::pair<std::string, std::uint64_t>> out{{"sets_complete", c.sync.complete},
+                                                         {"sets_incomplete", c.sync.incomplete},
+                                                         {"pulses_missed", c.sync.missed},
+                                                         {"sets_overtaken", c.dropped_sets},
+                                                         {"readings_dropped", c.dropped_readings},
+                                                         {"frames_torn", c.torn},
+                                                         {"sets_unproven", c.sync.unproven},
+                                                         {"clock_resets", c.clock_resets},
+                                                         {"worst_stamp_error_ns", static_cast<std::uint64_t>(c.worst_stamp_error_ns)}};
   for (int k = 0; k < rig_.cameras; ++k) {
     const auto i = static_cast<std::size_t>(k);
-    const CameraStatistics s = mock_.rig->camera(k).statistics();
+    const CameraStatistics s = devices_.cameras()[i]->statistics();
     const std::string name = fmt::format("camera{}_", k);
     out.insert(out.end(), {{name + "delivered", s.delivered},
                            {name + "lost", s.lost},
@@ -354,9 +358,9 @@ std::vector<std::pair<std::string, std::uint64_t>> Drive::device_counters() cons
 
 TruthFigures Drive::truth_figures(const SessionTotals& totals) const {
   TruthFigures figures;
-  if (totals.trajectory.empty()) return figures;
+  if (totals.trajectory.empty() || devices_.mock() == nullptr) return figures;
   figures.evaluation = evaluate(totals.trajectory, truth_, summary_evaluation_options());
-  const RigCalibration truly = mock_.rig->truth().calibration(totals.trajectory.back().stamp - start_);
+  const RigCalibration truly = devices_.mock()->truth().calibration(totals.trajectory.back().stamp - start_);
   const Transform &ours = estimator_->calibration().T_camera_left[1], &theirs = truly.T_camera_left[1];
   const Vec3 turn = log_so3(ours.R * theirs.R.transpose()), shift = ours.t - theirs.t;
   figures.calibration_error = {turn.x(), turn.y(), turn.z(), shift.x(), shift.y(), shift.z()};
@@ -377,12 +381,12 @@ SummaryInput Drive::summary_input(const SessionTotals& totals, std::uint64_t all
   input.configuration_hash = configuration_hash(configuration_);
   input.devices = device_counters();
   const ComparisonCounters& k = comparison_->counters();
-  if (mock_.has_ins)
+  if (devices_.ins() != nullptr)
     input.comparison = {{"ins_samples", k.ins_samples},   {"ins_refused", k.ins_refused},
                         {"ins_restarts", k.ins_restarts}, {"jumps", k.jumps},
                         {"compared", k.compared},         {"without_ins", k.without_ins},
                         {"pushed_out", k.pushed_out},     {"placements", comparison_->placement().revision}};
-  input.truth = truth_figures(totals);
+  if (devices_.mock() != nullptr) input.truth = truth_figures(totals);
   return input;
 }
 
@@ -409,7 +413,7 @@ ExitCode Drive::verdict(const SessionTotals& totals, const std::vector<std::stri
     progress->say(fmt::format("vergence: camera {} was gone at the end; check its cable and power", fmt::join(source_->missing(), ", ")));
     return ExitCode::device_failed;
   }
-  if (mock_.has_ins && ins_matches_ == 0) {
+  if (devices_.ins() != nullptr && ins_matches_ == 0) {
     progress->say("vergence: the INS never had a position for a frame: nothing is compared; the poses are there");
     return ExitCode::not_usable;
   }
@@ -419,7 +423,9 @@ ExitCode Drive::verdict(const SessionTotals& totals, const std::vector<std::stri
 ExitCode Drive::run() {
   const SignalGuard signals;
   make_session_folder(request_.out);
-  const std::size_t frames = mock_.rig->pulses(configuration_.trigger.rate);
+  constexpr double kUnknownDrive = 3600;  // s, memory for as long where nobody knows how long it is
+  const std::size_t frames =
+      devices_.frames() > 0 ? devices_.frames() : static_cast<std::size_t>(kUnknownDrive * configuration_.trigger.rate);
   recorder_ = std::make_unique<Recorder>(
       request_.out, Recorder::Options{request_.fast ? Recorder::WhenFull::wait : Recorder::WhenFull::drop, true, frames});
   recorder_->post(CalibrationRecord::of(rig_, start_, true, "given", "rig.nominal of the configuration"));
@@ -429,8 +435,12 @@ ExitCode Drive::run() {
 
   Progress progress = Progress::on_stderr(request_.quiet);
   const auto allocations_before = AllocationGuard::allocations_after_seal();
+  for (const std::string& remark : devices_.remarks()) {
+    progress.say("vergence: " + remark);
+    tell_event(start_, "device", remark, false);
+  }
   begin();
-  write_truth(&faults);
+  if (devices_.mock() != nullptr) write_truth(&faults);
   std::thread estimating([this] { estimate(); });
   watch(signals, &progress);
   estimating.join();
@@ -451,16 +461,15 @@ ExitCode Drive::run() {
 }
 
 void Drive::begin() {
-  const HostStamp assumed = mock_.rig->start();
+  const HostStamp assumed = devices_.start();
   source_->start();
-  start_ = start_ + (mock_.rig->start() - assumed);  // real time: known only now
-  truth_ = true_trajectory(*mock_.rig, configuration_, start_);
+  start_ = start_ + (devices_.start() - assumed);  // a mock in real time knows it only now
+  if (devices_.mock() != nullptr) truth_ = true_trajectory(*devices_.mock(), configuration_, start_);
 }
 
 }  // namespace
 
 ExitCode run_drive(const RunRequest& request) {
-  check_drive(request.configuration);
   std::unique_ptr<Drive> drive;
   try {
     drive = std::make_unique<Drive>(request);
