@@ -9,8 +9,8 @@
 namespace vergence::calibration::detail {
 namespace {
 
-constexpr int kAcrossRounds = 4;     // of reweighting: the scale falls from that of a knock to that of the noise in two or three
-constexpr int kMotionRounds = 3;     // the odometry's motion is near, so fewer do
+constexpr int kAcrossRounds = 3;     // of reweighting: the scale falls from that of a knock to that of the noise in two
+constexpr int kMotionRounds = 2;     // the odometry's motion is near, so fewer do
 constexpr double kTukey = 4.685;     // robust scales, where a scalar's weight reaches 0: 95 % efficient on Gaussian errors
 constexpr double kTukey3 = 6.0;      // the same for the length of three
 constexpr double kMedian1 = 0.6745;  // median of |normal|
@@ -24,8 +24,6 @@ constexpr int kMinMotionTracks = 12;     // six of the pose and something left t
 constexpr std::uint64_t kTrackGap = 30;  // frames: a number seen after longer is another track
 
 using Mat36 = Eigen::Matrix<double, 3, 6>;
-using Mat43 = Eigen::Matrix<double, 4, 3>;
-using Row6 = Eigen::Matrix<double, 1, 6>;
 
 Vec2 ray(const Pinhole& k, const Vec2& pixel) noexcept { return {(pixel.x() - k.cx) / k.fx, (pixel.y() - k.cy) / k.fy}; }
 
@@ -51,57 +49,47 @@ double inverse_depth(const Reference& c, const Vec2& left, const Vec2& right) no
   return std::clamp(1.0 / zl, 0.0, kMaxInverseDepth);
 }
 
-/// Both cameras' pixels of q with derivatives; false: behind a camera.
-bool predict(const Reference& c, const Vec3& q, Vec4* pixels, Mat43* J_q, Vec3* seen) noexcept {
-  const Mat3& R = c.T_right_left.R;
-  const Vec3& t = c.T_right_left.t;
-  const Vec3 Y = R * Vec3(q.x(), q.y(), 1) + q.z() * t;
-  if (!(Y.z() > 0.1)) return false;
-  const double i = 1.0 / Y.z(), u = Y.x() * i, v = Y.y() * i;
-  *pixels << c.left.fx * q.x(), c.left.fy * q.y(), c.right.fx * u, c.right.fy * v;
-  const double a = c.right.fx * i, b = c.right.fy * i;
-  *J_q << c.left.fx, 0, 0,                                                                //
-      0, c.left.fy, 0,                                                                    //
-      a * (R(0, 0) - u * R(2, 0)), a * (R(0, 1) - u * R(2, 1)), a * (t.x() - u * t.z()),  //
-      b * (R(1, 0) - v * R(2, 0)), b * (R(1, 1) - v * R(2, 1)), b * (t.y() - v * t.z());
-  *seen = Y;
-  return true;
-}
-
 /// A point from its two pixels by least squares in (x, y, 1/Z), one Gauss–Newton step from the two rays' meeting.
 struct Triangulated {
   Vec3 q;
-  Mat3 information;  // for a sigma of 1 px
+  Mat3 information, covariance;  // for a sigma of 1 px
+  Mat23 J_right;                 // ∂(right pixel)/∂q
 
   [[nodiscard]] bool from(const Reference& c, const Vec2& left, const Vec2& right) noexcept {
     const Vec2 l = ray(c.left, left), r = ray(c.right, right);
+    const Mat3& R = c.T_right_left.R;
+    const Vec3& t = c.T_right_left.t;
     q = {l.x(), l.y(), inverse_depth(c, l, r)};
-    Vec4 pixels;
-    Mat43 J;
-    Vec3 seen;
-    if (!predict(c, q, &pixels, &J, &seen)) return false;
-    const Vec4 e = Vec4(c.left.fx * l.x(), c.left.fy * l.y(), c.right.fx * r.x(), c.right.fy * r.y()) - pixels;
-    information.noalias() = J.transpose() * J;
-    q += information.inverse() * (J.transpose() * e);
+    const Vec3 Y = R * Vec3(q.x(), q.y(), 1) + q.z() * t;
+    if (!(Y.z() > 0.1)) return false;
+    const double i = 1.0 / Y.z(), u = Y.x() * i, v = Y.y() * i;
+    const double a = c.right.fx * i, b = c.right.fy * i;
+    J_right << a * (R(0, 0) - u * R(2, 0)), a * (R(0, 1) - u * R(2, 1)), a * (t.x() - u * t.z()),  //
+        b * (R(1, 0) - v * R(2, 0)), b * (R(1, 1) - v * R(2, 1)), b * (t.y() - v * t.z());
+    information.noalias() = J_right.transpose() * J_right;
+    information(0, 0) += c.left.fx * c.left.fx;
+    information(1, 1) += c.left.fy * c.left.fy;
+    covariance = information.inverse();
+    // The left pixel is met exactly, so the right one alone is left over.
+    q += covariance * (J_right.transpose() * Vec2(c.right.fx * (r.x() - u), c.right.fy * (r.y() - v)));
     return q.allFinite() && std::abs(q.z()) < kMaxInverseDepth;
   }
 };
 
-/// Derivative by θ of where least squares puts the point: −(JᵀJ)⁻¹ Jᵀ ∂pixels/∂θ at q.
-bool point_by_theta(const Reference& c, const Vec3& q, const Transform& T_previous_now, Mat36* d) noexcept {
-  Vec4 pixels;
-  Mat43 J;
-  Vec3 Y;
-  if (!predict(c, q, &pixels, &J, &Y)) return false;
+/// Derivative by θ of where least squares puts the point, −(JᵀJ)⁻¹ Jᵀ ∂pixels/∂θ: what depends on the depth at q, the rest as triangulated.
+bool point_by_theta(const Reference& c, const Triangulated& point, const Vec3& q, const Transform& T_previous_now, Mat36* d) noexcept {
+  const Vec3 turned = c.T_right_left.R * Vec3(q.x(), q.y(), 1);
+  const Vec3 Y = turned + q.z() * c.T_right_left.t;
+  if (!(Y.z() > 0.1)) return false;
   const double i = 1.0 / Y.z();
   Mat23 G;
   G << c.right.fx * i, 0, -c.right.fx * Y.x() * i * i, 0, c.right.fy * i, -c.right.fy * Y.y() * i * i;
-  Mat26 J_right;
-  J_right.leftCols<3>() = -G * skew(Y - q.z() * c.T_right_left.t);
-  J_right.middleCols<2>(3) = G * (q.z() * c.length * c.B);
-  J_right.col(kLag) = -image_motion(c, q, T_previous_now);
-  const Mat3 H = J.transpose() * J;
-  d->noalias() = -(H.inverse() * (J.bottomRows<2>().transpose() * J_right));
+  Mat26 J_theta;
+  J_theta.leftCols<3>() = -G * skew(turned);
+  J_theta.middleCols<2>(3) = G * (q.z() * c.length * c.B);
+  J_theta.col(kLag) = -image_motion(c, q, T_previous_now);
+  const Eigen::Matrix<double, 3, 2> back = point.covariance * point.J_right.transpose();
+  d->noalias() = -(back * J_theta);
   return true;
 }
 
@@ -183,12 +171,14 @@ void Looks::spread_of(const Evidence& evidence, const Vec5& fit, std::uint64_t f
   // With x the part of a track in the gradient's noise and A = L Lᵀ: trace A⁻¹ Σ x xᵀ = Σ |L⁻¹ x|², and the variance that the frame adds to
   // a running sum is Σ (x xᵀ + x sᵀ + s xᵀ), s what the track brought before.
   const Solved factor(evidence.A, evidence.g);
+  std::array<double, kFixed> inverse;
+  for (int i = 0; i < kFixed; ++i) inverse[static_cast<std::size_t>(i)] = 1.0 / factor.L[lower(i, i)];
   const auto whitened = [&](std::array<double, kFixed>& v) {
     for (int i = 0; i < kFixed; ++i) {
       const auto ii = static_cast<std::size_t>(i);
       double s = v[ii];
       for (int k = 0; k < i; ++k) s -= factor.L[lower(i, k)] * v[static_cast<std::size_t>(k)];
-      v[ii] = s / factor.L[lower(i, i)];
+      v[ii] = s * inverse[ii];
     }
   };
   double now = 0, before = 0;
@@ -214,6 +204,7 @@ void Looks::spread_of(const Evidence& evidence, const Vec5& fit, std::uint64_t f
 bool Looks::motion_row(const Reference& c, const MonitorFrame& frame, const MotionTrack& track, MotionRow* row) noexcept {
   const Transform& T = frame.T_now_before;
   if (!(track.sigma_px > 0)) return false;
+  const Transform T_previous_now = frame.T_now_previous.inverse(), T_earlier_before = frame.T_before_earlier.inverse();
   Triangulated b, n;
   if (!b.from(c, track.left_before, track.right_before) || !n.from(c, track.left_now, track.right_now)) return false;
 
@@ -251,18 +242,19 @@ bool Looks::motion_row(const Reference& c, const MonitorFrame& frame, const Moti
   D.noalias() = M * columns;
   D(2, 2) += 1.0 / Y.z();
   Mat36 by_theta_now, by_theta_before, J_theta, J_pose;
-  if (!point_by_theta(c, now, frame.T_now_previous.inverse(), &by_theta_now)) return false;
-  if (!point_by_theta(c, q, frame.T_before_earlier.inverse(), &by_theta_before)) return false;
+  if (!point_by_theta(c, n, now, T_previous_now, &by_theta_now)) return false;
+  if (!point_by_theta(c, b, q, T_earlier_before, &by_theta_before)) return false;
   J_theta = by_theta_now - D * by_theta_before;
   J_pose.leftCols<3>() = M * skew(Y - q.z() * T.t);
   J_pose.rightCols<3>() = -q.z() * M;
 
-  const Mat3 C = n.information.inverse() + D * b.information.inverse() * D.transpose();  // of the gap, for 1 px
+  const Mat3 C = n.covariance + D * b.covariance * D.transpose();  // of the gap, for 1 px
   const Eigen::LLT<Mat3> llt(C);
   if (llt.info() != Eigen::Success) return false;
-  row->r = llt.matrixL().solve(gap);
-  row->J_theta = llt.matrixL().solve(J_theta);
-  row->J_pose = llt.matrixL().solve(J_pose);
+  const Mat3 whiten = llt.matrixL().solve(Mat3::Identity());
+  row->r.noalias() = whiten * gap;
+  row->J_theta.noalias() = whiten * J_theta;
+  row->J_pose.noalias() = whiten * J_pose;
   row->inverse_sigma2 = 1.0 / (track.sigma_px * track.sigma_px);
   return row->r.allFinite() && row->J_theta.allFinite() && row->J_pose.allFinite();
 }

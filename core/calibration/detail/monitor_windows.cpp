@@ -17,6 +17,8 @@ constexpr double kLeastInflation = 0.3, kMostInflation = 200;  // below: sigmas 
 constexpr double kSpreadOutlier = 5;  // times the inflation: what one frame may count for at most, else one frame blinds the monitor
 // Windows that are also held against what was seen before them: a knock smaller than the reference's own error shows so, and only so.
 constexpr std::size_t kLearnWindow = 30, kLearnLongest = 150;
+// Of the blocks older than so many only every fourth is asked whether it is the onset: a search every frame of an alarm costs little then.
+constexpr std::size_t kFineBlocks = 24, kCoarse = 4;
 constexpr double kPriorSigma = 0.2;   // rad: of directions nothing was seen of
 constexpr double kRelease = 0.5;      // of the threshold: an alarm stands until the statistic is below
 constexpr double kRampShare = 0.05;   // a ramp's best step explains 8/9 of it
@@ -217,11 +219,12 @@ void Windows::search(const Vec5& mean, Search* found) const noexcept {
   };
   Moments all, across;
   TwoEvidences raw;
-  const auto take = [&](const Entry& entry, double age, int frames) {
+  const auto take = [&](const Entry& entry, double age, int frames, bool ask) {
     all.add(entry.evidence.across, 1.0 / lambda_across_, age);
     across.add(entry.evidence.across, 1.0 / lambda_across_, age);
     if (entry.evidence.motion.n > 0) all.add(entry.evidence.motion, 1.0 / lambda_motion_, age);
     raw.add(entry.evidence);
+    if (!ask) return;
     const auto solved = [&](const Evidence& e) {
       Theta g = e.g;
       for (int i = 0; i < kTheta; ++i)
@@ -244,10 +247,10 @@ void Windows::search(const Vec5& mean, Search* found) const noexcept {
   const std::size_t open = count_ % kBlock;
   const std::size_t whole = std::min<std::size_t>((kRecent - open) / kBlock, closed_);
   const std::size_t singles = open + whole * kBlock;
-  for (std::size_t age = 0; age < singles; ++age) take(recent(age), static_cast<double>(age), static_cast<int>(age) + 1);
+  for (std::size_t age = 0; age < singles; ++age) take(recent(age), static_cast<double>(age), static_cast<int>(age) + 1, true);
   for (std::size_t b = whole; b < std::min<std::size_t>(closed_, kBlocks); ++b) {
     const std::size_t oldest = open + (b + 1) * kBlock - 1;
-    take(block(b), static_cast<double>(oldest) - 0.5 * (kBlock - 1), static_cast<int>(oldest) + 1);
+    take(block(b), static_cast<double>(oldest) - 0.5 * (kBlock - 1), static_cast<int>(oldest) + 1, b < kFineBlocks || b % kCoarse == 0);
   }
 }
 
