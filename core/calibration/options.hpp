@@ -16,7 +16,7 @@ struct CalibrationOptions {
   double principal_point_sigma_px = 0.5;  // prior sigma of a principal point's coordinate, 0.01 … 50
   double max_direction_deg = 10;          // gate: direction of t from the nominal one, 0.1 … 180
   double max_rotation_deg = 10;           // gate: rotation from the nominal one; from scratch only the sign of t_x is asked, 0.1 … 180
-  double needs_motion_m = 1;              // travelled in the window, or three baselines, else `needs_motion`, 0.01 … 1000
+  double needs_motion_m = 1;              // travelled in the window, and three baselines, else `needs_motion`, 0.01 … 1000
   int needs_near_points = 30;             // points nearer than near_baselines, else `needs_near_structure`, 0 … 1000
   double near_baselines = 40;             // 5 … 500
   double good_depth_percent = 2;          // health word: predicted depth error at 20 m up to which it is `good`, 0.01 … 100

@@ -331,8 +331,8 @@ RigSolution RigSolver::solve(const RigCalibration& rig) noexcept {
     how.loss = BundleLoss::cauchy;
     how.loss_threshold = kCauchy * scale;
     const bool last = cut == kLastCut;
-    how.max_steps = last ? 20 : 8;
-    how.cost_tolerance = last ? 1e-7 : 1e-4;
+    how.max_steps = last ? 60 : 8;
+    how.cost_tolerance = last ? 3e-6 : 1e-4;
     how.covariance = how.pose_covariance = last;
     r = adjust(how);
     s.steps += r.steps;

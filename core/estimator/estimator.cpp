@@ -117,6 +117,7 @@ struct Estimator::Parts {
   RigKeeper keeper;
   State state = State::initialising;
   Stamp last{};
+  std::uint64_t last_number = 0;
   bool any = false;
   bool confirmed;          // the calibration in use is more than a file's word
   bool undecided = false;  // something is wrong with the rig, and not yet told what
@@ -295,6 +296,7 @@ PoseSample Estimator::process(const RigFrame& frame) noexcept {
   }
   p.any = true;
   p.last = frame.stamp;
+  p.last_number = frame.number;
   if (p.state == State::initialising && p.keeper.calibrated()) p.transition(Trigger::calibration_given, frame.stamp);
   if (p.requested.exchange(false, std::memory_order_relaxed) && p.state == State::stereo_odometry && p.options.online)
     p.doubt(CalibrationCause::requested, frame.number, frame);
@@ -319,6 +321,18 @@ PoseSample Estimator::process(const RigFrame& frame) noexcept {
   sample.stage_ms = out.stage_ms;
   sample.estimate_ms = std::chrono::duration<float, std::milli>(std::chrono::steady_clock::now() - start).count();
   return sample;
+}
+
+void Estimator::finish() noexcept {
+  Parts& p = *parts_;
+  p.events.clear();
+  p.decisions.clear();
+  // One solve may be under way; what it lacked, the frames since then may give.
+  for (int attempt = 0; attempt < 2 && p.decisions.empty() && p.keeper.seeking(); ++attempt) {
+    if (!p.keeper.solving() && !p.keeper.start_last_solve()) return;
+    if (const auto decision = p.keeper.decide_now(p.last, p.last_number)) p.take(*decision, p.last);
+    if (!p.decisions.empty() && !p.decisions.back().accepted && attempt == 0) p.decisions.clear();
+  }
 }
 
 std::span<const EstimatorEvent> Estimator::events() const noexcept { return parts_->events.span(); }

@@ -82,6 +82,10 @@ class Estimator {
   /// An empty image is a camera that gave none. T_world_left never jumps but across a marked gap.
   [[nodiscard]] PoseSample process(const RigFrame& frame) noexcept;
 
+  /// No more frames will come. A calibration still sought is solved and decided from what there is; events() and calibrations() tell of it.
+  /// Waits for the solver.
+  void finish() noexcept;
+
   /// A new calibration is wanted, whatever the monitor says; acts at the next frame. Async-signal-safe.
   void request_recalibration() noexcept;
 

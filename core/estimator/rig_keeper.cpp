@@ -219,8 +219,24 @@ std::optional<CalibrationDecision> RigKeeper::decide(Stamp stamp, std::uint64_t 
     runner_.wait();
   }
   solving_ = false;
-  if (!seeking_) return std::nullopt;  // the scene was lost meanwhile, and with it what this was for
+  if (!seeking_) return std::nullopt;  // what this was for is no longer sought
+  return judge(stamp, number);
+}
 
+std::optional<CalibrationDecision> RigKeeper::decide_now(Stamp stamp, std::uint64_t number) noexcept {
+  if (!solving_) return std::nullopt;
+  runner_.wait();
+  solving_ = false;
+  return judge(stamp, number);
+}
+
+bool RigKeeper::start_last_solve() noexcept {
+  if (solving_ || log_.size() < static_cast<std::size_t>(options_.calibration.min_frames)) return false;
+  start_solve();
+  return true;
+}
+
+CalibrationDecision RigKeeper::judge(Stamp stamp, std::uint64_t number) noexcept {
   calibration::GateQuestion question;
   question.solution = &solution_;
   question.nominal = &nominal_;
@@ -241,9 +257,9 @@ std::optional<CalibrationDecision> RigKeeper::decide(Stamp stamp, std::uint64_t 
   d.held_out_after_px = calibration::held_out(log_, solution_.newest, solution_.rig).median_px;
   if (calibrated_) d.held_out_before_px = calibration::held_out(log_, solution_.newest, rig_).median_px;
   d.solve_ms = solution_.solve_ms;
-  if (gate_ == Gate::sigmas_too_large) {
-    // Sigmas fall with the root of the number of frames.
-    const double excess = calibration::sigma_excess(solution_.rig, options_.calibration);
+  if (gate_ == Gate::sigmas_too_large || gate_ == Gate::needs_motion || gate_ == Gate::needs_near_structure) {
+    // More of the same helps: sigmas fall with the root of the number of frames.
+    const double excess = gate_ == Gate::sigmas_too_large ? calibration::sigma_excess(solution_.rig, options_.calibration) : 1.0;
     const double grow = std::clamp(excess * excess, kGrow, 4.0);
     wanted_ = std::max(std::min(most, static_cast<std::size_t>(std::ceil(grow * solution_.frames))), logged_ + kNewFrames);
   } else if (gate_ != Gate::open) {

@@ -39,6 +39,10 @@ class RigKeeper {
   [[nodiscard]] bool solving() const noexcept { return solving_; }
   /// After every frame. A value: the solve is over and decided.
   [[nodiscard]] std::optional<CalibrationDecision> decide(Stamp stamp, std::uint64_t number) noexcept;
+  /// No more frames come: waits for the solve under way and decides.
+  [[nodiscard]] std::optional<CalibrationDecision> decide_now(Stamp stamp, std::uint64_t number) noexcept;
+  /// And this begins one with whatever is logged; false: that is too little.
+  [[nodiscard]] bool start_last_solve() noexcept;
   [[nodiscard]] calibration::Gate last_gate() const noexcept { return gate_; }
 
   /// What is missing to calibrate: needs_motion, needs_near_structure, needs_texture; `none` if nothing is known to be.
@@ -62,6 +66,7 @@ class RigKeeper {
     RigKeeper* keeper;
     void operator()() const noexcept;
   };
+  [[nodiscard]] CalibrationDecision judge(Stamp stamp, std::uint64_t number) noexcept;
   [[nodiscard]] double pixels_moved(const odometry::Map& map) const noexcept;
   [[nodiscard]] int expected_across(const odometry::Odometry& odometry, int k, const Transform& T_left_world) const noexcept;
 

@@ -13,6 +13,7 @@ constexpr double kImageMargin = 9.0;      // px: a window's half and one
 constexpr float kMinStructure = 3.0F;     // grey levels, standard deviation of the coarsest level: a lens cap's noise stays below 2
 constexpr double kFarBaselines = 2000.0;  // depth given to a point whose disparity is within the noise of zero
 constexpr int kSmallestCell = 12;         // px: a window's side; nearer corners share their pixels
+constexpr double kDenseCells = 3500;      // of an image: below features::kMaxGridCells with their rounding
 constexpr int kMaxDistance = 64;          // bits of 256: unrelated patches lie at 128 ± 8
 constexpr double kDistinct = 0.8;         // of the second best's distance
 constexpr float kRoughSigma = 3.F;        // px: two corners found independently
@@ -207,7 +208,10 @@ features::CornerOptions FrontEnd::corner_options() const noexcept {
 
 void FrontEnd::find_dense_corners(int k) noexcept {
   features::CornerOptions how = corner_options();
-  how.cell = std::max(kSmallestCell, how.cell / 2);
+  // A corner finds its partner if that is among the strongest of its cell; there is room for kMaxPoints of them.
+  const Intrinsics& c = rig_.intrinsics[static_cast<std::size_t>(k)];
+  const auto least = static_cast<int>(std::ceil(std::sqrt(static_cast<double>(c.width) * c.height / kDenseCells)));
+  how.cell = std::max({kSmallestCell, how.cell / 2, least});
   how.min_distance = 0.5F * static_cast<float>(how.cell);
   features::find_corners(pyramids_[static_cast<std::size_t>(k)].level(0), how, {}, runner_, &taken_);
 }

@@ -71,6 +71,18 @@ Found calibrate(const Arguments& a, const RigCalibration& rig, const FrameSource
   ImmediateRunner solver;
   Estimator estimator(options, blank, nominal_of(rig), arena, two, solver);
   Found f;
+  const auto note = [&](int i) {
+    for (const CalibrationDecision& d : estimator.calibrations()) {
+      if (a.verbose || !d.accepted)
+        fmt::print("       decision {} {} frames {} rms {:.3f} px held out {:.2f} -> {:.2f} px solve {:.0f} ms\n",
+                   d.accepted ? "yes" : "no", d.reason, d.calibration.frames, d.calibration.reprojection_px, d.held_out_before_px,
+                   d.held_out_after_px, d.solve_ms);
+      f.solve_ms = d.solve_ms;
+      f.rig = d.calibration;
+      f.at_frame = i;
+      f.accepted = d.accepted;
+    }
+  };
   for (int i = 0; i < a.frames; ++i) {
     const RigFrame* frame = source(i);
     if (frame == nullptr) break;
@@ -82,21 +94,15 @@ Found calibrate(const Arguments& a, const RigCalibration& rig, const FrameSource
                  t.z());
       for (const EstimatorEvent& e : estimator.events()) fmt::print("       {} {:.3g}\n", e.why, e.value);
     }
-    for (const CalibrationDecision& d : estimator.calibrations()) {
-      if (a.verbose || !d.accepted)
-        fmt::print("       decision {} {} frames {} rms {:.3f} px held out {:.2f} -> {:.2f} px solve {:.0f} ms\n",
-                   d.accepted ? "yes" : "no", d.reason, d.calibration.frames, d.calibration.reprojection_px, d.held_out_before_px,
-                   d.held_out_after_px, d.solve_ms);
-      f.solve_ms = d.solve_ms;
-      f.rig = d.calibration;
-      f.at_frame = i;
-      f.accepted = d.accepted;
-    }
+    note(i);
     if (f.accepted) break;
+  }
+  if (!f.accepted) {
+    estimator.finish();
+    note(a.frames);
   }
   return f;
 }
-
 /// Errors of camera 1 about the axes (mrad) and of t (mm); sigma_noise and sigma_wide beside them.
 struct Errors {
   std::array<double, 6> value{}, noise{}, wide{};
@@ -152,6 +158,80 @@ int run_mock(const Arguments& a) {
     fmt::print("{:10s}", name);
     for (const double v : *row) fmt::print(" {:8.4f}", name == std::string("largest") ? v : std::sqrt(v / std::max(1, n)));
     fmt::print("\n");
+  }
+  return 0;
+}
+
+struct Knock {
+  const char* name;
+  Vec3 turn_deg, shift_mm;
+  double lag = 0;  // frames that the right camera is late
+};
+
+/// A rig that knows its calibration is knocked at frame kKnockAt.
+int run_knocks(const Arguments& a) {
+  constexpr std::uint64_t kKnockAt = 60;
+  const std::array knocks = {Knock{"none", {0, 0, 0}, {0, 0, 0}},
+                             Knock{"pitch 0.2 deg", {0.2, 0, 0}, {0, 0, 0}},
+                             Knock{"pitch 0.05 deg", {0.05, 0, 0}, {0, 0, 0}},
+                             Knock{"roll 0.1 deg", {0, 0, 0.1}, {0, 0, 0}},
+                             Knock{"yaw 0.3 deg", {0, 0.3, 0}, {0, 0, 0}},
+                             Knock{"t_y 4 mm", {0, 0, 0}, {0, 4, 0}},
+                             Knock{"t_z 10 mm", {0, 0, 0}, {0, 0, 10}},
+                             Knock{"pitch 2 deg", {2, 0, 0}, {0, 0, 0}}};
+  for (std::size_t index = static_cast<std::size_t>(a.first); index < knocks.size() && static_cast<int>(index) < a.first + a.starts;
+       ++index) {
+    const Knock& knock = knocks[index];
+    test::RenderedDriveOptions o;
+    o.from_s = a.from >= 0 ? a.from : 20;
+    const Transform before = o.rig.T_camera_left[1];
+    Transform after{exp_so3(knock.turn_deg * std::numbers::pi / 180) * before.R, before.t + 1e-3 * knock.shift_mm};
+    after.t *= before.t.norm() / after.t.norm();
+    o.placed = [&](int, std::uint64_t i) { return i < kKnockAt ? before : after; };
+    test::RenderedDrive rendered(o);
+
+    const app::Configuration configuration = app::load_configuration(std::nullopt, a.set);
+    EstimatorOptions options;
+    options.odometry = configuration.odometry;
+    options.calibration = configuration.calibration;
+    options.monitor = configuration.monitor;
+    Arena arena(Estimator::memory_needed(options, o.rig));
+    app::ThreadRunner two;
+    ImmediateRunner solver;
+    Estimator estimator(options, o.rig, nominal_of(o.rig), arena, two, solver);
+    int noticed = -1, mended = -1, lost = 0, wrong_ok = 0;
+    Transform T_enu_world{};
+    double drift = 0;
+    fmt::print("{}\n", knock.name);
+    for (int i = 0; i < a.frames; ++i) {
+      const auto n = static_cast<std::uint64_t>(i);
+      const PoseSample s = estimator.process(rendered.frame(n));
+      if (i == 0) T_enu_world = rendered.T_enu_left(0);
+      const Transform truth = T_enu_world.inverse() * rendered.T_enu_left(n);
+      drift = (s.T_world_left.t - truth.t).norm();
+      if (s.status == PoseStatus::lost) ++lost;
+      if (a.verbose)
+        fmt::print("  {:4d} {} {} {} inl {} st {} {:.2f} px {:.1f} ms  off {:.3f} m {:.2f} mrad\n", i, to_string(s.state),
+                   to_string(s.status), to_string(s.reason), s.inliers, s.stereo_inliers, s.reprojection_px, s.estimate_ms, drift,
+                   1e3 * log_so3(s.T_world_left.R * truth.R.transpose()).norm());
+      if (n >= kKnockAt && mended < 0 && s.status == PoseStatus::ok) ++wrong_ok;
+      for (const EstimatorEvent& e : estimator.events()) {
+        fmt::print("    frame {}: {} {:.3g}\n", i, e.why, e.value);
+        if (e.kind == EstimatorEvent::Kind::rig_changed && noticed < 0) noticed = i;
+      }
+      for (const CalibrationDecision& d : estimator.calibrations()) {
+        fmt::print("    decision {} frames {} held out {:.2f} -> {:.2f} px\n", d.reason, d.calibration.frames, d.held_out_before_px,
+                   d.held_out_after_px);
+        if (d.accepted) {
+          mended = i;
+          Found f{true, d.calibration, i, d.solve_ms, 0};
+          print("    found", f, errors_of(d.calibration, after));
+        }
+      }
+    }
+    fmt::print("  noticed after {} frames, mended {} frames later, {} lost, {} ok between, {:.3f} m off at the end\n",
+               noticed < 0 ? -1 : noticed - static_cast<int>(kKnockAt), mended < 0 ? -1 : mended - noticed, lost, wrong_ok, drift);
+    std::fflush(stdout);
   }
   return 0;
 }
@@ -214,6 +294,7 @@ int main(int argc, char** argv) {
   }
   try {
     if (a.what == "mock") return run_mock(a);
+    if (a.what == "knock") return run_knocks(a);
     if (a.what == "euroc" || a.what == "kitti") return run_recorded(a);
   } catch (const std::exception& e) {
     fmt::print(stderr, "calibration_bench: {}\n", e.what());
