@@ -7,6 +7,7 @@
 
 #include <fmt/format.h>
 
+#include "app/commands/simulated_ins.hpp"
 #include "app/runtime/errors.hpp"
 #include "app/runtime/nearest.hpp"
 #include "app/runtime/software_trigger.hpp"
@@ -87,6 +88,10 @@ std::vector<CameraRequest> requests_of(const Configuration& c) {
   return requests;
 }
 
+InsRequest ins_request(const InsSettings& s) {
+  return {s.driver, s.port, s.rate, static_cast<std::uint32_t>(s.baud), s.sync_out_hz, s.sync_out_width_ms, s.sync_in, s.processing_ms};
+}
+
 }  // namespace
 
 std::map<std::string, std::string> parse_camera_options(const std::string& key, const std::string& text) {
@@ -114,6 +119,11 @@ DriveDevices::DriveDevices(const Configuration& c, const std::vector<std::string
   mock_ = make_mock_drive(c, faults, !fast, duration_s);
   for (int k = 0; k < mock_.rig->cameras(); ++k) cameras_.push_back(&mock_.rig->camera(k));
   if (mock_.has_ins) ins_ = &mock_.rig->ins();
+  if (mock_.has_ins && c.mock.ins_line != "none") {
+    if (!fast) throw InputError("mock.ins_line is \"" + c.mock.ins_line + "\", a line in virtual time; run with --fast, or set it to none");
+    opened_ins_ = make_simulated_ins(c, *mock_.rig, &remarks_);
+    ins_ = opened_ins_.get();
+  }
   trigger_ = &mock_.rig->trigger();
   sync_ = sync_options(c, mock_.rig->cameras());
   frames_ = mock_.rig->pulses(c.trigger.rate);
@@ -124,6 +134,8 @@ void DriveDevices::open_real(const Configuration& c) {
   sync_ = sync_options(c, static_cast<int>(requests.size()));
   opened_ = open_cameras(requests, &remarks_);
   for (const OpenedCamera& camera : opened_) cameras_.push_back(camera.device.get());
+  opened_ins_ = open_ins(ins_request(c.ins), &remarks_);
+  ins_ = opened_ins_.get();
   const CameraTrigger trigger = requests[0].configuration.trigger;
   sync_.align_start = trigger == CameraTrigger::hardware;  // the pulses do not wait for us
   if (trigger == CameraTrigger::software) {

@@ -8,6 +8,7 @@
 #include "app/commands/mock_drive.hpp"
 #include "app/config/configuration.hpp"
 #include "app/runtime/camera_drivers.hpp"
+#include "app/runtime/ins_drivers.hpp"
 #include "drivers/sync/rig_synchronizer.hpp"
 
 namespace vergence::app {
@@ -43,6 +44,7 @@ class DriveDevices {
 
   MockDrive mock_;
   std::vector<OpenedCamera> opened_;
+  std::unique_ptr<InsDevice> opened_ins_;
   std::unique_ptr<TriggerDevice> software_;
   std::vector<CameraDevice*> cameras_;
   InsDevice* ins_ = nullptr;

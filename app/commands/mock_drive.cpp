@@ -64,6 +64,7 @@ void check_drive(const Configuration& c) {
   one_of("mock.drive", c.mock.drive, {"loop", "figure-eight", "straight", "brief", "still"});
   one_of("mock.pattern", c.mock.pattern, {"grey", "gbrg"});
   one_of("mock.ins", c.mock.ins, {"noisy", "ideal"});
+  one_of("mock.ins_line", c.mock.ins_line, {"none", "mti-g", "mti-g-710"});
 }
 
 MockDrive make_mock_drive(const Configuration& c, const std::vector<std::string>& more_faults, bool real_time,

@@ -85,7 +85,9 @@ struct CalibrationErrorSettings {
 };
 
 struct MockSettings {
-  std::string world = "suburb", drive = "loop", pattern = "grey", ins = "noisy";
+  std::string world = "suburb", drive = "loop", pattern = "grey", ins = "noisy", ins_line = "none";
+  int ins_latency_timer_ms = 16;  // 0: no converter
+  double ins_late_percent = 1, ins_late_ms = 4;
   std::int64_t seed = 1;
   int texture_detail = 1;
   int noise = 1;

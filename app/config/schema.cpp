@@ -275,6 +275,12 @@ Group mock() {
       .integer("seed", &M::seed, 0, kLargestSeed, "", "Of the town, the vehicle's unrest and all noise: the same seed, the same drive.")
       .text("pattern", &M::pattern, 8, "Sensors: `grey`, or `gbrg` (Bayer).")
       .text("ins", &M::ins, 8, "Errors of the INS: `noisy` as an MTi-G, or `ideal`.")
+      .text("ins_line", &M::ins_line, 16,
+            "With `--fast`: the INS as bytes on a simulated line, read by the real driver: `mti-g` or `mti-g-710`; `none`.")
+      .integer("ins_latency_timer_ms", &M::ins_latency_timer_ms, 0, 255, "ms",
+               "Latency timer of that line's USB converter; 0: there is none.")
+      .number("ins_late_percent", &M::ins_late_percent, 0, 100, "%", "Of its reads: they come late …")
+      .number("ins_late_ms", &M::ins_late_ms, 0, 1000, "ms", "… by an exponential time of this mean.")
       .integer("texture_detail", &M::texture_detail, 0, 2, "", "Resolution of the facades: 4.7, 2.3 or 1.2 cm a texel (8, 32, 128 MB).")
       .integer("noise", &M::noise, 0, 1, "", "1: shot and read noise of the sensors; 0: none.")
       .integer("blur_samples", &M::blur_samples, 1, 16, "", "Poses averaged over an exposure: 1 is no motion blur; time grows with it.")

@@ -157,13 +157,22 @@ void LiveSource::look_ins() {
     const std::int64_t now = steady_ns();
     if (!options_.wait_when_full && now - ins_head_.asked_ns < kAskAgain) return;
     ins_head_.asked_ns = now;
-    const DeviceStatus status = ins_->start(this);
+    DeviceStatus status = ins_->start(this);
+    // Its time passes by itself: as long as it is not back, nothing says what else may go on.
+    while (status == DeviceStatus::gone && ins_->keeps_own_time() && !stop_.load(std::memory_order_acquire)) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(1));
+      status = ins_->start(this);
+    }
     if (status == DeviceStatus::ended) ins_head_.ended = true;
     if (status != DeviceStatus::ok) return;
     ins_head_.gone = false;
     ins_clock_->restart();
   }
-  const DeviceStatus status = ins_->wait(Duration{}, &ins_head_.value);
+  DeviceStatus status = DeviceStatus::timeout;
+  do {
+    constexpr Duration kLook = Duration::milliseconds(100);
+    status = ins_->wait(ins_->keeps_own_time() ? kLook : Duration{}, &ins_head_.value);
+  } while (status == DeviceStatus::timeout && ins_->keeps_own_time() && !stop_.load(std::memory_order_acquire));
   ins_head_.gone = status == DeviceStatus::gone;
   ins_head_.held = status == DeviceStatus::ok;
   ins_head_.ended = status == DeviceStatus::ended || status == DeviceStatus::stopped;

@@ -41,6 +41,7 @@ class Device final : public InsDevice {
   void stop() noexcept override;
   [[nodiscard]] std::string complaint() const override { return complaint_; }
   [[nodiscard]] std::string remark() const override { return remark_; }
+  [[nodiscard]] bool keeps_own_time() const noexcept override { return virtual_time_; }
   [[nodiscard]] InsStatistics statistics() const noexcept override;
 
   [[nodiscard]] const Identity& identity() const noexcept { return identity_; }
