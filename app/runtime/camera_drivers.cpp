@@ -10,6 +10,7 @@
 #include "app/runtime/errors.hpp"
 #include "app/runtime/nearest.hpp"
 #include "drivers/gige/gige.hpp"
+#include "drivers/iidc/iidc.hpp"
 #include "drivers/v4l2/v4l2.hpp"
 
 namespace vergence::app {
@@ -109,6 +110,10 @@ const std::vector<CameraDriverRow>& camera_driver_rows() {
   // One row a driver: {name, meaning, its make_driver, what to do without permission}.
   static const std::vector<CameraDriverRow> rows{
       {"gige", "GigE Vision cameras", gige::make_driver, "run `vergence doctor`"},
+      {"iidc-usb", "IIDC cameras on USB (Point Grey's Firefly, Chameleon, Flea3, Grasshopper3)", iidc::make_usb_driver,
+       "install the udev rules: vergence devices --write-udev, then plug the camera in again"},
+      {"iidc-1394", "IIDC cameras on IEEE 1394", iidc::make_1394_driver,
+       "install the udev rules, and add the user to the group video: sudo usermod -aG video $USER, then log in again"},
       {"v4l2", "Video4Linux: USB video class, sensors of a board, capture cards", v4l2::make_driver,
        "add the user to the group video: sudo usermod -aG video $USER, then log in again"},
   };
