@@ -50,7 +50,9 @@ class MonitorTrial {
       if (epipolar_.to_line(left, right, &off, nullptr) != EpipolarStatus::ok) continue;
       if (std::abs(off) * r.fy < gate_px) sightings_.push_back({t.left, t.right, t.sigma_px, t.id});
     }
-    frame_ = feed_.next(drive.stamp(), drive.frame(), sightings_, drive.T_now_previous());
+    Transform T_now_previous = drive.T_now_previous();
+    if (disturb) disturb(T_now_previous);
+    frame_ = feed_.next(drive.stamp(), drive.frame(), sightings_, T_now_previous);
     frame_.expected_across = static_cast<int>(drive.tracks().size());
     if (spoil) spoil(sightings_), frame_.across = sightings_;
     verdict_ = monitor_.look(frame_);
@@ -73,6 +75,7 @@ class MonitorTrial {
 
   double gate_px = 20;
   std::function<void(std::vector<calibration::AcrossSighting>&)> spoil;  // what is done to a frame's matches
+  std::function<void(Transform&)> disturb;                               // and to its motion
 
  private:
   static constexpr std::size_t kTracks = 1000;

@@ -1,0 +1,124 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <cstdio>
+#include <memory>
+#include <vector>
+
+#include "tests/unit/core/calibration/monitor_modes.hpp"
+
+namespace vergence::test {
+namespace {
+
+using calibration::MonitorVerdict;
+using calibration::detail::Decision;
+using calibration::detail::Windows;
+
+constexpr int kHour = 108000;  // frames at 30 Hz
+
+FeatureDriveOptions street(double speed) {
+  FeatureDriveOptions o;
+  o.speed = speed;
+  o.tracks = 220;
+  return o;
+}
+
+struct FiveReference {
+  Mat5 covariance, root;
+};
+/// Covariance of θ's five after two seconds of driving.
+FiveReference five_of(const FeatureDriveOptions& o) {
+  const TrialReference reference = calibrated(o);
+  Eigen::Matrix<double, 5, 6> back = Eigen::Matrix<double, 5, 6>::Zero();
+  back.topLeftCorner<3, 3>().setIdentity();
+  back.bottomRightCorner<2, 3>() = tangent_basis(o.T_right_left.t.normalized()).transpose() / o.T_right_left.t.norm();
+  const Mat5 C = back * reference.covariance * back.transpose();
+  return {C, Eigen::LLT<Mat5>(C).matrixL()};
+}
+
+double quantile(std::vector<double> v, double share) {
+  const auto at = v.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(v.size() - 1));
+  std::nth_element(v.begin(), at, v.end());
+  return *at;
+}
+
+TEST(MonitorModes, haveTheStatisticsOfWholeTracks) {
+  const FeatureDriveOptions o = street(8);
+  std::vector<double> tracks, modes;
+  for (const std::uint64_t seed : {11U, 12U, 13U, 14U}) {
+    FeatureDriveOptions drive = o;
+    drive.seed = seed;
+    MonitorTrial trial(drive);
+    for (int i = 0; i < 1500; ++i)
+      if (trial.step().statistic > 0 && i > 300) tracks.push_back(trial.verdict().statistic);
+  }
+  ModeDrive drive(o, 3);
+  const auto windows = std::make_unique<Windows>();
+  windows->reset({}, Mat5::Zero());
+  for (int i = 0; i < 60000; ++i) {
+    const ModeDrive::Frame f = drive.next(Vec5::Zero());
+    if (!f.moving) continue;
+    windows->push(f.evidence);
+    const double s = windows->decide().statistic;
+    if (i > 300) modes.push_back(s);
+  }
+  // The slow error wanders over ten seconds: 160 s of tracks hold some sixteen draws of it, so a third either way.
+  for (const double share : {0.5, 0.9, 0.99}) {
+    const double a = quantile(tracks, share), b = quantile(modes, share);
+    std::printf("quantile %.2f of the statistic: %.1f with tracks, %.1f with modes\n", share, a, b);
+    EXPECT_LT(std::abs(a - b), 0.33 * b) << share;
+  }
+}
+
+TEST(MonitorFalseAlarms, areFourAtMostInAHundredHours) {
+  constexpr std::array<double, 3> kSpeeds{3, 8, 15};
+  std::vector<std::unique_ptr<ModeDrive>> drives;
+  std::vector<FiveReference> references;
+  for (const double speed : kSpeeds) {
+    drives.push_back(std::make_unique<ModeDrive>(street(speed), 100 + static_cast<std::uint64_t>(speed)));
+    references.push_back(five_of(street(speed)));
+  }
+  Random random(17);
+  const calibration::MonitorOptions options;
+  const auto windows = std::make_unique<Windows>();
+  int alarms = 0;
+  double worst = 0, worst_standing = 0;
+  std::vector<double> hourly;
+  for (int hour = 0; hour < 100; ++hour) {
+    const std::size_t i = static_cast<std::size_t>(hour) % kSpeeds.size();
+    Vec5 z;
+    for (int k = 0; k < 5; ++k) z[k] = random.normal();
+    const Vec5 error = references[i].root * z;  // every hour another calibration
+    windows->reset(options, references[i].covariance);
+    double most = 0;
+    int standing_over = 0;
+    for (int n = 0; n < kHour; ++n) {
+      const ModeDrive::Frame f = drives[i]->next(error);
+      bool alarm = false;
+      if (f.moving) {
+        standing_over = 0;
+        windows->push(f.evidence);
+        const Decision d = windows->decide();
+        most = std::max(most, d.statistic);
+        alarm = d.kind != MonitorVerdict::Kind::quiet;
+      } else {
+        const double s = windows->single(f.evidence.evidence.across, f.spread_now) / 1.5;
+        worst_standing = std::max(worst_standing, s);
+        standing_over = s > options.threshold ? standing_over + 1 : 0;
+        alarm = standing_over == 3;
+      }
+      if (!alarm) continue;
+      ++alarms;
+      windows->reset(options, references[i].covariance);
+    }
+    hourly.push_back(most);
+    worst = std::max(worst, most);
+  }
+  std::printf("100 h: %d alarms; largest statistic %.1f, median of the hours' largest %.1f, standing %.1f; threshold %.0f\n", alarms, worst,
+              quantile(hourly, 0.5), worst_standing, options.threshold);
+  EXPECT_LE(alarms, 4);
+}
+
+}  // namespace
+}  // namespace vergence::test
