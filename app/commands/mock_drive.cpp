@@ -68,7 +68,7 @@ void check_drive(const Configuration& c) {
 }
 
 MockDrive make_mock_drive(const Configuration& c, const std::vector<std::string>& more_faults, bool real_time,
-                          std::optional<double> duration_s) {
+                          std::optional<double> duration_s, bool raw) {
   MockDrive drive;
   const RigCalibration rig = mounted_rig(c);
   const std::vector<mock::Fault> faults = all_faults(c, more_faults);
@@ -93,6 +93,7 @@ MockDrive make_mock_drive(const Configuration& c, const std::vector<std::string>
     o.real_time = real_time;
     o.seed = world.seed;
     o.pattern = c.mock.pattern == "gbrg" ? mock::Pattern::gbrg : mock::Pattern::grey;
+    o.raw = raw;
     o.noise = c.mock.noise != 0;
     o.blur_samples = c.mock.blur_samples;
     o.ideal_ins = c.mock.ins == "ideal";
@@ -112,6 +113,10 @@ MockDrive make_mock_drive(const Configuration& c, const std::vector<std::string>
   drive.has_ins = c.ins.driver == "mock";
   if (drive.has_ins) configured(drive.rig->ins().configure(c.ins.rate, nullptr), "ins");
   return drive;
+}
+
+Duration stamp_grid(const Configuration& c) noexcept {
+  return c.mock.pattern == "gbrg" ? Duration::microseconds(1) : Duration::nanoseconds(1);
 }
 
 ComparisonOptions comparison_options(const Configuration& c) {

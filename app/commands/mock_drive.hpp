@@ -20,9 +20,13 @@ struct MockDrive {
   std::unique_ptr<mock::MockRig> rig;
   bool has_ins = false;
 };
-/// World, drive and devices, configured and ready to start. `faults` are added to the configuration's.
+/// World, drive and devices, configured and ready to start. `faults` are added to the configuration's. `raw`: cameras of a Bayer
+/// pattern hand out the mosaic itself.
 [[nodiscard]] MockDrive make_mock_drive(const Configuration& configuration, const std::vector<std::string>& faults, bool real_time,
-                                        std::optional<double> duration_s);
+                                        std::optional<double> duration_s, bool raw = false);
+
+/// What the stamps of the drive are multiples of: with `mock.pattern: gbrg` whole microseconds, which a St Lucia log can hold.
+[[nodiscard]] Duration stamp_grid(const Configuration& configuration) noexcept;
 
 [[nodiscard]] ComparisonOptions comparison_options(const Configuration& configuration);
 

@@ -125,6 +125,7 @@ Drive::Drive(const RunRequest& request)
   LiveSource::Options o;
   o.sync = devices_.sync();
   o.wait_when_full = request.fast;
+  o.stamp_grid = stamp_grid(configuration_);
   o.tie_stamp = request.fast ? kVirtualEpoch : Stamp(clock_ns(CLOCK_REALTIME));
   o.tie_host = request.fast ? devices_.start() : HostStamp(clock_ns(CLOCK_MONOTONIC));
   source_ = std::make_unique<LiveSource>(devices_.cameras(), devices_.ins(), devices_.trigger(), o);

@@ -10,6 +10,7 @@
 #include <fmt/format.h>
 
 #include "app/datasets/decimal.hpp"
+#include "core/types/bayer.hpp"
 
 namespace vergence::app {
 namespace {
@@ -44,6 +45,7 @@ FrameDecoder::FrameDecoder(const StereoSequence& sequence, std::size_t first, st
       end_(next_index_ + std::min(count, sequence.pairs.size() - next_index_)),
       pool_(pool) {
   assert(pool.width() == sequence.calibration.intrinsics[0].width && pool.height() == sequence.calibration.intrinsics[0].height);
+  if (sequence.bayer) mosaic_.resize(FramePool::stride(pool.width()) * static_cast<std::size_t>(pool.height()));
   thread_ = std::thread([this] { work(); });
 }
 
@@ -127,7 +129,14 @@ ImageFileStatus FrameDecoder::load(const std::string& name, FrameSlot slot) {
   } catch (const std::bad_alloc&) {  // a file too long for this machine's memory
     return ImageFileStatus::unreadable;
   }
-  return decode_grey(bytes_, {pool_.width(), pool_.height()}, pool_.writable(slot).data(), FramePool::stride(pool_.width()));
+  const ImageSize size{pool_.width(), pool_.height()};
+  const std::size_t stride = FramePool::stride(size.width);
+  std::uint8_t* out = pool_.writable(slot).data();
+  if (!sequence_.bayer) return decode_grey(bytes_, size, out, stride);
+  const ImageFileStatus status = decode_grey(bytes_, size, mosaic_.data(), stride);
+  const auto step = static_cast<std::ptrdiff_t>(stride);
+  if (status == ImageFileStatus::ok) bayer_to_grey(mosaic_.data(), step, size.width, size.height, out, step);
+  return status;
 }
 
 bool FrameDecoder::wait_for_slot(FrameSlot* slot) noexcept {

@@ -66,8 +66,9 @@ class FrameDecoder {
   const StereoSequence& sequence_;
   std::size_t next_index_, end_;
   FramePool& pool_;
-  std::vector<std::uint8_t> bytes_;  // of the file being decoded
-  std::array<FrameSlot, 2> own_{};   // slots in hand: those of a skipped pair serve the next one
+  std::vector<std::uint8_t> bytes_;   // of the file being decoded
+  std::vector<std::uint8_t> mosaic_;  // of a raw sequence, rows as the pool's
+  std::array<FrameSlot, 2> own_{};    // slots in hand: those of a skipped pair serve the next one
   std::size_t own_count_ = 0;
   Stamp newest_{};
   bool any_ = false;  // newest_ means something

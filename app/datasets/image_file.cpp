@@ -11,6 +11,8 @@
 #include <cstring>
 #include <opencv2/imgcodecs.hpp>
 
+#include "app/datasets/detail/bmp.hpp"
+
 namespace vergence::app {
 namespace {
 
@@ -89,6 +91,7 @@ ImageFileStatus check_jpeg(Bytes b) noexcept {
 ImageFileStatus size_of(Bytes b, ImageSize* size) noexcept {
   if (is_png(b)) return png_size(b, size);
   if (is_jpeg(b)) return jpeg_size(b, size);
+  if (detail::is_bmp(b)) return detail::bmp_size(b, size);
   // A file of nothing, or of the first bytes of a signature, is a torn write; another content is another kind of file.
   const std::size_t n = std::min(b.size(), kPngSignature.size());
   const bool begins = std::equal(b.begin(), b.begin() + static_cast<std::ptrdiff_t>(n), kPngSignature.begin());
@@ -140,7 +143,7 @@ const char* to_phrase(ImageFileStatus status) noexcept {
     case ImageFileStatus::unreadable:
       return "cannot be read";
     case ImageFileStatus::not_an_image:
-      return "is neither a PNG nor a JPEG image";
+      return "is no PNG, JPEG or BMP image";
     case ImageFileStatus::torn:
       return "is torn: it ends before the image is complete, or its check sums fail";
     case ImageFileStatus::undecodable:
@@ -165,6 +168,7 @@ ImageFileStatus read_image_size(const std::filesystem::path& file, ImageSize* si
 
 ImageFileStatus check_image(std::span<const std::uint8_t> bytes, ImageSize* size) noexcept {
   if (const auto status = size_of(bytes, size); status != ImageFileStatus::ok) return status;
+  if (detail::is_bmp(bytes)) return detail::check_bmp(bytes);
   return is_png(bytes) ? check_png(bytes) : check_jpeg(bytes);
 }
 
@@ -172,6 +176,7 @@ ImageFileStatus decode_grey(std::span<const std::uint8_t> bytes, ImageSize size,
   ImageSize found;
   if (const auto status = check_image(bytes, &found); status != ImageFileStatus::ok) return status;
   if (found != size) return ImageFileStatus::wrong_size;
+  if (detail::is_bmp(bytes)) return detail::decode_bmp(bytes, size, out, stride);
   try {
     // The decoder asks for pixels of this size and type and finds them there already: it writes into the slot itself.
     cv::Mat image(size.height, size.width, CV_8UC1, out, stride);

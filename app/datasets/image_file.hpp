@@ -12,7 +12,7 @@ enum class ImageFileStatus : std::uint8_t {
   ok,
   missing,       // there is no such file
   unreadable,    // the system refuses to read it
-  not_an_image,  // neither PNG nor JPEG
+  not_an_image,  // no PNG, JPEG or BMP
   torn,          // begins as an image and ends before it is complete, or its check sums fail
   undecodable,   // complete, and yet the decoder refuses it
   wrong_size,    // another width or height than asked for
@@ -29,16 +29,16 @@ struct ImageSize {
 /// Whole file into *bytes (its capacity is reused). → ok, missing, unreadable
 [[nodiscard]] ImageFileStatus read_image_file(const std::filesystem::path& file, std::vector<std::uint8_t>* bytes);
 
-/// Size from the head of a PNG or JPEG file; the rest is not looked at. → ok, missing, unreadable, not_an_image, torn
+/// Size from the head of a PNG, JPEG or BMP file; the rest is not looked at. → ok, missing, unreadable, not_an_image, torn
 [[nodiscard]] ImageFileStatus read_image_size(const std::filesystem::path& file, ImageSize* size);
 
-/// Whether a PNG or JPEG is all there. Decoders fill what is missing with grey and say nothing, and a half-grey image would be
-/// tracked as if it were the world: PNG chunks are walked to IEND with their check sums, JPEG has to end with its end marker.
-/// → ok, not_an_image, torn
+/// Whether a PNG, JPEG or BMP is all there. Decoders fill what is missing with grey and say nothing, and a half-grey image would be
+/// tracked as if it were the world: PNG chunks are walked to IEND with their check sums, JPEG has to end with its end marker, BMP to hold
+/// its rows. → ok, not_an_image, torn
 [[nodiscard]] ImageFileStatus check_image(std::span<const std::uint8_t> bytes, ImageSize* size) noexcept;
 
-/// PNG or JPEG of any depth and colour → 8-bit grey, into size.height rows of `stride` bytes at `out`; no other copy is made.
-/// Not `ok`: content of `out` undefined. Throws nothing. → ok, not_an_image, torn, undecodable, wrong_size
+/// PNG or JPEG of any depth and colour, or 8-bit grey BMP → 8-bit grey, into size.height rows of `stride` bytes at `out`; no other copy is
+/// made. Not `ok`: content of `out` undefined. Throws nothing. → ok, not_an_image, torn, undecodable, wrong_size
 [[nodiscard]] ImageFileStatus decode_grey(std::span<const std::uint8_t> bytes, ImageSize size, std::uint8_t* out,
                                           std::size_t stride) noexcept;
 

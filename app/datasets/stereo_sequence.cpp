@@ -20,6 +20,8 @@ StereoSequence open_by_format(SequenceFormat format, const std::filesystem::path
       return detail::open_euroc(folder, given);
     case SequenceFormat::folder:
       return detail::open_folder(folder, given);
+    case SequenceFormat::st_lucia:
+      return detail::open_st_lucia(folder, given);
   }
   refuse(folder, 0, "has no reader for its format");
 }

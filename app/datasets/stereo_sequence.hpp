@@ -14,7 +14,7 @@
 /// Recorded stereo drives as lists of image files with stamps: what a replay reads, whatever the data set's own layout.
 namespace vergence::app {
 
-enum class SequenceFormat : std::uint8_t { kitti, euroc, folder };
+enum class SequenceFormat : std::uint8_t { kitti, euroc, folder, st_lucia };
 
 /// One frame as the data set lists it.
 struct StereoPair {
@@ -32,6 +32,7 @@ struct StereoSequence {
   std::vector<StereoPair> pairs;
   RigCalibration calibration;
   std::string calibration_source;  // the file's name, for calibrations.csv
+  bool bayer = false;              // images are raw mosaics: grey is made of them (core/types/bayer.hpp)
 };
 
 /// A drive of the given format. `calibration`: a calibration.yaml that is used instead of the data set's own.
@@ -40,6 +41,8 @@ struct StereoSequence {
 ///   euroc   mav0/cam0, mav0/cam1 with data.csv and sensor.yaml, or that mav0 itself; paired by equal stamps; raw images
 ///   folder  left/, right/ paired in order of name, times.txt (a line a pair: integer nanoseconds, or seconds if it has a
 ///           point), calibration.yaml. Where one side lacks images that the other has, pairing goes by equal names.
+///   st_lucia  PREFIX_MultiCamera0.log names the images in PREFIX_MultiCamera0/; paired by line, stamp of the left camera; raw Bayer BMP;
+///           the calibration published with the data set
 ///
 /// InputError (file, line, what): folders or files that are not there, no images, numbers of images and times that do not go
 /// together, times that are no numbers, a calibration that makes no rig, images of another size than the calibration.

@@ -99,6 +99,11 @@ void LiveSource::release(const SyncedSet& set) noexcept {
     if (set.present[k]) cameras_[k]->release(set.slots[k]);
 }
 
+Stamp LiveSource::stamp_of(HostStamp host) const noexcept {
+  const std::int64_t ns = (options_.tie_stamp + (host - options_.tie_host)).ns(), grid = options_.stamp_grid.ns();
+  return Stamp((ns + grid / 2) / grid * grid);  // after 1970
+}
+
 void LiveSource::work() {
   (void)pthread_setname_np(pthread_self(), "vergence-sync");
   for (Pulse pulse; !stop_.load(std::memory_order_acquire);) {

@@ -59,8 +59,9 @@ class LiveSource final : private Notifier {
   struct Options {
     SyncOptions sync{};
     bool wait_when_full = false;
-    Stamp tie_stamp{};     // this stamp …
-    HostStamp tie_host{};  // … was this time of the host's clock
+    Stamp tie_stamp{};                               // this stamp …
+    HostStamp tie_host{};                            // … was this time of the host's clock
+    Duration stamp_grid = Duration::nanoseconds(1);  // stamps are whole multiples of it, rounded to the nearest; > 0
   };
 
   /// `ins` may be null. The cameras in the order of the rig, camera 0 first.
@@ -106,7 +107,7 @@ class LiveSource final : private Notifier {
   void take_reading();
   void hand_out_sets();
   void push(const LiveItem& item);
-  [[nodiscard]] Stamp stamp_of(HostStamp host) const noexcept { return options_.tie_stamp + (host - options_.tie_host); }
+  [[nodiscard]] Stamp stamp_of(HostStamp host) const noexcept;
 
   std::vector<CameraDevice*> cameras_;
   InsDevice* ins_;

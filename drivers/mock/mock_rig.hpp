@@ -16,9 +16,10 @@ namespace vergence::mock {
 struct MockRigOptions {
   bool real_time = false;  // false: virtual time, the producer waits for the consumer
   std::uint64_t seed = 1;
-  Pattern pattern = Pattern::grey;
-  bool noise = true;     // shot and read noise of the sensors
-  int blur_samples = 1;  // poses averaged over an exposure: 1 is none; the time to render grows with it
+  Pattern pattern = Pattern::grey;  // gbrg: grey is made of the mosaic, as the drivers of colour cameras do
+  bool raw = false;                 // with gbrg: the cameras hand out the mosaic itself, for who writes a data set
+  bool noise = true;                // shot and read noise of the sensors
+  int blur_samples = 1;             // poses averaged over an exposure: 1 is none; the time to render grows with it
   bool ideal_ins = false;
   double clock_drift_ppm = 30;  // largest of the devices' clocks; each has its own
   bool jitter = true;           // of the arrivals
@@ -30,7 +31,7 @@ struct MockRigOptions {
 /// The drive begins when the trigger is started (the cameras and the INS before it), with pulse 0 at the drive's time 0.
 /// Every device has a clock of its own, with offset and drift; arrivals have a least delay and a jitter above it.
 /// Ownership  The devices live in the rig; it outlives their use.
-/// Threads    Pictures are rendered on a thread of the rig's; in real time another hands them out when they are due.
+/// Threads    Pictures are rendered on two threads of the rig's, one camera each; in real time another hands them out when they are due.
 /// Time       Virtual: arrivals are what they would be, nothing waits for a clock; items become visible in the order of their arrivals over
 ///            all devices, so that a consumer that merges by arrival sees the same on every run. Real: a pulse that the renderer cannot
 ///            keep up with has no frames (Camera statistics `lost`), a frame that finds no slot is dropped (`underruns`).

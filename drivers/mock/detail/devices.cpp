@@ -3,6 +3,8 @@
 #include <exception>
 #include <string>
 
+#include "core/types/bayer.hpp"
+
 namespace vergence::mock {
 
 // ---- camera -------------------------------------------------------------------------------------------------------
@@ -23,6 +25,8 @@ DeviceStatus MockCamera::configure(const CameraConfiguration& wanted, CameraConf
     arena_ = std::make_unique<Arena>(FramePool::memory_needed(lens.width, lens.height, MockRig::kSlots) + kCacheLine);
     pool_ = std::make_unique<FramePool>(lens.width, lens.height, MockRig::kSlots, *arena_);
     renderer_ = std::make_unique<Renderer>(rig_->truth->shared_world(), vergence::Camera(lens), rig_->options.pattern);
+    if (rig_->options.pattern == Pattern::gbrg && !rig_->options.raw)
+      mosaic_.resize(FramePool::stride(lens.width) * static_cast<std::size_t>(lens.height));
   } catch (const std::exception&) {
     return DeviceStatus::failed;
   }
@@ -68,13 +72,19 @@ void MockCamera::stop() noexcept {
 }
 
 CameraStatistics MockCamera::statistics() const noexcept {
-  return {delivered_.load(std::memory_order_relaxed), 0, underruns.load(std::memory_order_relaxed), lost.load(std::memory_order_relaxed),
-          starts_.load(std::memory_order_relaxed)};
+  CameraStatistics s;
+  s.delivered = delivered_.load(std::memory_order_relaxed);
+  s.underruns = underruns.load(std::memory_order_relaxed);
+  s.lost = lost.load(std::memory_order_relaxed);
+  s.starts = starts_.load(std::memory_order_relaxed);
+  return s;
 }
 
 void MockCamera::take(std::span<const Transform> T_camera_enu, std::span<const Transform> T_camera_bus, const Shot& shot,
                       std::uint8_t* out) {
-  renderer_->render(T_camera_enu, shot, out, static_cast<std::ptrdiff_t>(FramePool::stride(pool_->width())), T_camera_bus);
+  const auto stride = static_cast<std::ptrdiff_t>(FramePool::stride(pool_->width()));
+  renderer_->render(T_camera_enu, shot, mosaic_.empty() ? out : mosaic_.data(), stride, T_camera_bus);
+  if (!mosaic_.empty()) bayer_to_grey(mosaic_.data(), stride, pool_->width(), pool_->height(), out, stride);
 }
 
 // ---- INS ----------------------------------------------------------------------------------------------------------
@@ -112,7 +122,12 @@ void MockIns::stop() noexcept {
 }
 
 InsStatistics MockIns::statistics() const noexcept {
-  return {delivered_.load(std::memory_order_relaxed), lost.load(std::memory_order_relaxed), 0, overruns.load(std::memory_order_relaxed), 1};
+  InsStatistics s;
+  s.delivered = delivered_.load(std::memory_order_relaxed);
+  s.lost = lost.load(std::memory_order_relaxed);
+  s.overruns = overruns.load(std::memory_order_relaxed);
+  s.starts = 1;
+  return s;
 }
 
 // ---- trigger board ------------------------------------------------------------------------------------------------
@@ -158,7 +173,11 @@ void MockTrigger::stop() noexcept {
 }
 
 TriggerStatistics MockTrigger::statistics() const noexcept {
-  return {pulses_.load(std::memory_order_relaxed), 0, overruns.load(std::memory_order_relaxed), 1};
+  TriggerStatistics s;
+  s.pulses = pulses_.load(std::memory_order_relaxed);
+  s.overruns = overruns.load(std::memory_order_relaxed);
+  s.starts = 1;
+  return s;
 }
 
 }  // namespace vergence::mock

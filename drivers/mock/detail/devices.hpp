@@ -78,6 +78,7 @@ class MockCamera final : public CameraDevice {
   std::unique_ptr<Arena> arena_;
   std::unique_ptr<FramePool> pool_;
   std::unique_ptr<Renderer> renderer_;
+  std::vector<std::uint8_t> mosaic_;  // empty: the renderer's picture is what is handed out
   std::atomic<std::uint64_t> delivered_{0}, starts_{0};
   bool gone_ = false;  // the consumer's
 };

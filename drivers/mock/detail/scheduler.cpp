@@ -121,23 +121,39 @@ void Scheduler::make_readings(HostStamp until) {
 }
 
 void Scheduler::make_frames(std::uint64_t pulse) {
-  const Duration time = host_of(pulse) - start_;
+  std::array<Shooting, kMaxCameras> shootings;
+  std::size_t count = 0;
   for (int k = 0; k < static_cast<int>(cameras_.size()); ++k) {
-    Sender& sender = senders_[static_cast<std::size_t>(k)];
-    bool unplugged = false;
-    for (const Fault& f : rig_.truth->faults())
-      unplugged = unplugged || (f.kind == FaultKind::camera_gone && f.concerns(k) && f.active(time));
-    if (unplugged != sender.unplugged) {
-      Parcel p;
-      p.device = k;
-      p.arrival = host_of(pulse) + kTransfer;  // after what was under way, before the next frame
-      p.frame.what = unplugged ? Delivery<Frame>::What::gone : Delivery<Frame>::What::back;
-      post(p);
-      sender.unplugged = unplugged;
-      sender.counter_base = pulse;
-    }
-    if (!unplugged && cameras_[static_cast<std::size_t>(k)]->stream.streaming()) make_frame(pulse, k);
+    if (!present(pulse, k)) continue;
+    if (const auto shooting = plan(pulse, k)) shootings[count++] = *shooting;
   }
+  // Each camera renders with its own memory. A thread that lives for one pulse costs a thousandth of a picture.
+  const auto render_every_other = [&](std::size_t first) {
+    for (std::size_t i = first; i < count; i += 2) render(shootings[i]);
+  };
+  std::thread beside;
+  if (count > 1) beside = std::thread(render_every_other, 1);
+  render_every_other(0);
+  if (beside.joinable()) beside.join();
+  for (std::size_t i = 0; i < count; ++i) send(pulse, shootings[i]);
+}
+
+bool Scheduler::present(std::uint64_t pulse, int k) {
+  Sender& sender = senders_[static_cast<std::size_t>(k)];
+  const Duration time = host_of(pulse) - start_;
+  bool unplugged = false;
+  for (const Fault& f : rig_.truth->faults())
+    unplugged = unplugged || (f.kind == FaultKind::camera_gone && f.concerns(k) && f.active(time));
+  if (unplugged != sender.unplugged) {
+    Parcel p;
+    p.device = k;
+    p.arrival = host_of(pulse) + kTransfer;  // after what was under way, before the next frame
+    p.frame.what = unplugged ? Delivery<Frame>::What::gone : Delivery<Frame>::What::back;
+    post(p);
+    sender.unplugged = unplugged;
+    sender.counter_base = pulse;
+  }
+  return !unplugged && cameras_[static_cast<std::size_t>(k)]->stream.streaming();
 }
 
 std::optional<FrameSlot> Scheduler::slot_of(int k) {
@@ -153,31 +169,39 @@ std::optional<FrameSlot> Scheduler::slot_of(int k) {
   }
 }
 
-void Scheduler::make_frame(std::uint64_t pulse, int k) {
+std::optional<Scheduler::Shooting> Scheduler::plan(std::uint64_t pulse, int k) {
   MockCamera& camera = *cameras_[static_cast<std::size_t>(k)];
-  Sender& sender = senders_[static_cast<std::size_t>(k)];
-  const Duration time = host_of(pulse) - start_;
-  const Exposure exposure = exposure_of(*rig_.truth, rig_.options.seed, {pulse, time, Duration::seconds(1 / rate_)}, k);
-  if (exposure.lost) {
+  Shooting s;
+  s.camera = k;
+  s.exposure = exposure_of(*rig_.truth, rig_.options.seed, {pulse, host_of(pulse) - start_, Duration::seconds(1 / rate_)}, k);
+  if (s.exposure.lost) {
     camera.lost.fetch_add(1, std::memory_order_relaxed);
-    return;
+    return std::nullopt;
   }
   const auto slot = slot_of(k);
   if (!slot) {
     camera.underruns.fetch_add(1, std::memory_order_relaxed);
-    return;
+    return std::nullopt;
   }
-  render(exposure, k, *slot);
+  s.slot = *slot;
+  return s;
+}
+
+void Scheduler::send(std::uint64_t pulse, const Shooting& shooting) {
+  const auto k = static_cast<std::size_t>(shooting.camera);
+  MockCamera& camera = *cameras_[k];
+  Sender& sender = senders_[k];
+  const Duration time = host_of(pulse) - start_;
   const Duration open = camera.configuration().exposure;
   Parcel p;
-  p.device = k;
-  p.arrival = jittered(host_of(pulse) + open + kTransfer, static_cast<std::uint64_t>(k), pulse) + exposure.delay;
-  p.frame.value = {*slot, pulse - sender.counter_base, camera.clock().read(host_of(pulse), time, rig_.truth->faults()), {},
-                   open,  FrameStatus::complete};
+  p.device = shooting.camera;
+  p.arrival = jittered(host_of(pulse) + open + kTransfer, k, pulse) + shooting.exposure.delay;
+  p.frame.value = {shooting.slot, pulse - sender.counter_base, camera.clock().read(host_of(pulse), time, rig_.truth->faults()), {},
+                   open,          FrameStatus::complete};
   std::optional<FrameSlot> copy;
-  if (exposure.twice) copy = camera.pool().acquire();
+  if (shooting.exposure.twice) copy = camera.pool().acquire();
   if (copy) {
-    const auto from = camera.pool().writable(*slot), to = camera.pool().writable(*copy);
+    const auto from = camera.pool().writable(shooting.slot), to = camera.pool().writable(*copy);
     std::memcpy(to.data(), from.data(), from.size());
     Parcel again = p;
     again.frame.value.slot = *copy;
@@ -189,8 +213,10 @@ void Scheduler::make_frame(std::uint64_t pulse, int k) {
   post(p);
 }
 
-void Scheduler::render(const Exposure& exposure, int k, FrameSlot slot) {
-  const CameraConfiguration& c = cameras_[static_cast<std::size_t>(k)]->configuration();
+void Scheduler::render(const Shooting& shooting) {
+  const Exposure& exposure = shooting.exposure;
+  MockCamera& sender = *cameras_[static_cast<std::size_t>(shooting.camera)];
+  const CameraConfiguration& c = sender.configuration();
   std::vector<Transform> way, bus;
   for (int i = 0; i < rig_.options.blur_samples; ++i) {
     const Duration at = exposure.time + Duration::seconds((i + 0.5) / rig_.options.blur_samples * c.exposure.to_seconds());
@@ -205,8 +231,7 @@ void Scheduler::render(const Exposure& exposure, int k, FrameSlot slot) {
     shot.noise_seed = static_cast<std::uint32_t>(mixed(rig_.options.seed, picture)) | 1U;
   }
   // Through the lens of the camera that sees it, into the memory of the one that sends it.
-  MockCamera& sender = *cameras_[static_cast<std::size_t>(k)];
-  cameras_[static_cast<std::size_t>(exposure.camera)]->take(way, bus, shot, sender.pool().writable(slot).data());
+  cameras_[static_cast<std::size_t>(exposure.camera)]->take(way, bus, shot, sender.pool().writable(shooting.slot).data());
 }
 
 // ---- handing out --------------------------------------------------------------------------------------------------

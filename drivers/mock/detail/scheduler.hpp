@@ -18,7 +18,8 @@ namespace vergence::mock {
 
 /// Makes what the devices deliver, pulse after pulse, and hands it out in the order of arrival.
 ///
-/// Threads  begin(), halt(): the owner's. One thread renders; in real time another hands out what is due.
+/// Threads  begin(), halt(): the owner's. One thread makes everything, a second one renders every other camera; in real time another hands
+///          out what is due.
 /// Time     Virtual: what is made before the next pulse is delivered before it, and the producer waits for room. Real: a pulse that is
 ///          over before its pictures are begun has none.
 class Scheduler final : public PulseListener {
@@ -54,6 +55,11 @@ class Scheduler final : public PulseListener {
     std::uint64_t counter_base = 0;  // pulse of the frame that it counts as 0
     std::atomic<int> on_the_way{0};  // frames in parcels_
   };
+  struct Shooting {
+    int camera = 0;  // that sends it
+    Exposure exposure{};
+    FrameSlot slot = 0;
+  };
   static constexpr int kInsDevice = -1, kTriggerDevice = -2;
   static constexpr HostStamp kVirtualStart{1'000'000'000'000};  // 1000 s after a machine's start, on every run
 
@@ -62,8 +68,12 @@ class Scheduler final : public PulseListener {
   void make_pulse(std::uint64_t pulse);
   void make_readings(HostStamp until);
   void make_frames(std::uint64_t pulse);
-  void make_frame(std::uint64_t pulse, int k);
-  void render(const Exposure& exposure, int k, FrameSlot slot);
+  /// Whether camera k is there at this pulse; posts its going and coming.
+  [[nodiscard]] bool present(std::uint64_t pulse, int k);
+  /// What camera k will send of this pulse, with a slot for it; nothing: it is lost.
+  [[nodiscard]] std::optional<Shooting> plan(std::uint64_t pulse, int k);
+  void render(const Shooting& shooting);
+  void send(std::uint64_t pulse, const Shooting& shooting);
   void post(Parcel parcel);
   void announce_end(HostStamp at);
   void deliver_until(HostStamp horizon);

@@ -46,6 +46,51 @@ TEST_F(ImageFile, pngIsDecodedToTheBitIntoPaddedRowsAndPaddingIsLeftAlone) {
           << x << " " << y;
 }
 
+/// A tiny grey BMP as OpenCV writes it.
+std::vector<std::uint8_t> tiny_bmp(const test::TemporaryFolder& folder, const cv::Mat& image) {
+  cv::imwrite((folder / "a.bmp").string(), image);
+  return bytes_of(folder / "a.bmp");
+}
+
+TEST_F(ImageFile, greyBmpIsReadToTheBitFromBothEnds) {
+  cv::Mat image(kTinyHeight, kTinyWidth, CV_8UC1);
+  for (int y = 0; y < kTinyHeight; ++y)
+    for (int x = 0; x < kTinyWidth; ++x) image.at<std::uint8_t>(y, x) = static_cast<std::uint8_t>(test::tiny_pixel(x, y, 5));
+  auto bytes = tiny_bmp(folder_, image);
+  std::vector<std::uint8_t> out(kStride * kTinyHeight, 77);
+  ASSERT_EQ(decode_grey(bytes, kSize, out.data(), kStride), ImageFileStatus::ok);
+  for (int y = 0; y < kTinyHeight; ++y)
+    for (int x = 0; x < static_cast<int>(kStride); ++x)
+      ASSERT_EQ(out[static_cast<std::size_t>(y) * kStride + static_cast<std::size_t>(x)], x < kTinyWidth ? test::tiny_pixel(x, y, 5) : 77);
+  const std::uint32_t turned = 0U - static_cast<std::uint32_t>(kTinyHeight);  // a negative height: the first row is the top one
+  for (std::size_t i = 0; i < 4; ++i) bytes[22 + i] = static_cast<std::uint8_t>(turned >> (8 * i));
+  ASSERT_EQ(decode_grey(bytes, kSize, out.data(), kStride), ImageFileStatus::ok);
+  EXPECT_EQ(out[0], test::tiny_pixel(0, kTinyHeight - 1, 5));
+  ImageSize size;
+  EXPECT_EQ(read_image_size(folder_ / "a.bmp", &size), ImageFileStatus::ok);
+  EXPECT_EQ(size, kSize);
+}
+
+TEST_F(ImageFile, aBmpCutAnywhereIsTornAndOneOfColoursIsRefused) {
+  const auto bytes = tiny_bmp(folder_, cv::Mat(kTinyHeight, kTinyWidth, CV_8UC1, cv::Scalar(90)));
+  for (std::size_t n = 2; n < bytes.size(); n += n < 60 ? 1 : 37)
+    EXPECT_EQ(decode({bytes.begin(), bytes.begin() + static_cast<std::ptrdiff_t>(n)}), ImageFileStatus::torn) << n;
+  EXPECT_EQ(decode(tiny_bmp(folder_, cv::Mat(kTinyHeight, kTinyWidth, CV_8UC3, cv::Scalar(90, 80, 70)))), ImageFileStatus::undecodable);
+  auto painted = bytes;
+  painted[14 + 40 + 4 * 90] ^= 1U;  // blue of palette entry 90
+  EXPECT_EQ(decode(painted), ImageFileStatus::undecodable);
+}
+
+TEST_F(ImageFile, aBmpWhoseNumbersLieReadsNothingBeyondItsBytes) {
+  const auto bytes = tiny_bmp(folder_, cv::Mat(kTinyHeight, kTinyWidth, CV_8UC1, cv::Scalar(90)));
+  for (std::size_t at = 2; at < 54; ++at)
+    for (const int value : {0x00, 0x01, 0x7f, 0x80, 0xff}) {
+      auto lying = bytes;
+      lying[at] = static_cast<std::uint8_t>(value);
+      (void)decode(lying);  // the sanitizers look
+    }
+}
+
 TEST_F(ImageFile, colourAndSixteenBitAreReadAsGrey) {
   cv::Mat grey(kTinyHeight, kTinyWidth, CV_8UC1, cv::Scalar(90)), deep(kTinyHeight, kTinyWidth, CV_16UC1, cv::Scalar(90 * 257)), colour;
   cv::cvtColor(grey, colour, cv::COLOR_GRAY2BGR);

@@ -16,7 +16,7 @@ constexpr Stamp kStart{1'577'836'800'000'000'000};
 
 /// A mock rig with tiny pictures in an almost empty town, and the source on top of it.
 struct Bench {
-  explicit Bench(const std::vector<std::string>& faults, bool real_time = false) {
+  explicit Bench(const std::vector<std::string>& faults, bool real_time = false, Duration grid = Duration::nanoseconds(1)) {
     mock::WorldOptions town;
     town.texture_detail = 0;
     town.built_fraction = town.tree_fraction = town.car_fraction = 0;
@@ -51,6 +51,7 @@ struct Bench {
     options.wait_when_full = !real_time;
     options.tie_stamp = kStart;
     options.tie_host = rig->start();
+    options.stamp_grid = grid;
     source =
         std::make_unique<LiveSource>(std::vector<CameraDevice*>{&rig->camera(0), &rig->camera(1)}, &rig->ins(), &rig->trigger(), options);
   }
@@ -113,6 +114,21 @@ TEST(LiveSource, twoRunsOfADriveInVirtualTimeAreTheSameItemByItem) {
     ASSERT_EQ(a[i].set.number, b[i].set.number) << i;
     ASSERT_EQ(a[i].set.present, b[i].set.present) << i;
   }
+}
+
+TEST(LiveSource, stampsLieOnTheirGridAndNoFartherFromWhereTheyWereThanHalfOfIt) {
+  const auto fine = Bench({}).drive(), coarse = Bench({}, false, Duration::microseconds(1)).drive();
+  ASSERT_EQ(fine.size(), coarse.size());
+  int off = 0;
+  for (std::size_t i = 0; i < fine.size(); ++i) {
+    EXPECT_EQ(coarse[i].stamp.ns() % 1000, 0);
+    EXPECT_LE(std::abs((coarse[i].stamp - fine[i].stamp).ns()), 500);
+    if (coarse[i].kind == LiveItem::Kind::reading) {
+      EXPECT_EQ(coarse[i].sample.stamp, coarse[i].stamp);
+    }
+    off += fine[i].stamp.ns() % 1000 != 0 ? 1 : 0;
+  }
+  EXPECT_GT(off, 100);
 }
 
 TEST(LiveSource, aCameraThatWasGoneJoinsTheRightPulsesAgain) {

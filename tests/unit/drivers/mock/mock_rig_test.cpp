@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "core/types/bayer.hpp"
 #include "drivers/sync/clock_mapper.hpp"
 
 namespace vergence::mock {
@@ -212,6 +213,33 @@ TEST(MockRig, lostLateAndDoubledFramesShowInCountersAndArrivals) {
   std::vector<std::uint64_t> order;
   for (const Seen& s : late.frames[0]) order.push_back(s.frame.counter);
   EXPECT_FALSE(std::is_sorted(order.begin(), order.end()));
+}
+
+TEST(MockRig, aColourSensorsGreyIsMadeOfTheMosaicThatItWouldHandOutRaw) {
+  MockRigOptions o = options(0.2);
+  o.noise = true;
+  o.pattern = Pattern::gbrg;
+  const auto first_picture = [&o] {
+    MockRig rig(truth_with({}), o);
+    const CameraConfiguration c{96, 64, kRate, Duration::milliseconds(8), 0, CameraTrigger::hardware};
+    EXPECT_EQ(rig.camera(0).configure(c, nullptr), DeviceStatus::ok);
+    EXPECT_EQ(rig.camera(0).start(nullptr), DeviceStatus::ok);
+    EXPECT_EQ(rig.trigger().configure({kRate}, nullptr), DeviceStatus::ok);
+    EXPECT_EQ(rig.trigger().start(nullptr), DeviceStatus::ok);
+    Frame f;
+    EXPECT_EQ(rig.camera(0).wait(Duration::seconds(20), &f), DeviceStatus::ok);
+    const ImageView v = rig.camera(0).view(f.slot);
+    std::vector<std::uint8_t> pixels;
+    for (int y = 0; y < v.height; ++y) pixels.insert(pixels.end(), v.row(y), v.row(y) + v.width);
+    return pixels;
+  };
+  const auto grey = first_picture();
+  o.raw = true;
+  const auto raw = first_picture();
+  std::vector<std::uint8_t> made(grey.size());
+  bayer_to_grey(raw.data(), 96, 96, 64, made.data(), 96);
+  EXPECT_EQ(made, grey);
+  EXPECT_NE(raw, grey);
 }
 
 TEST(MockRig, ofABrokenPairOneImageAtRandomNeverArrives) {

@@ -1,0 +1,262 @@
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include <fmt/format.h>
+#include <GeographicLib/LocalCartesian.hpp>
+
+#include "app/datasets/detail/st_lucia_logs.hpp"
+#include "app/datasets/st_lucia.hpp"
+#include "app/datasets/text_file.hpp"
+
+namespace vergence::app {
+namespace {
+
+using Velocity = StLuciaConventions::Velocity;
+using Yaw = StLuciaConventions::Yaw;
+
+constexpr double kPi = std::numbers::pi;
+constexpr double kFast = 5.0;             // m/s: above it the way goes where the vehicle points
+constexpr double kApart = 1.0;            // s between the positions whose difference is the motion
+constexpr std::size_t kEnough = 100;      // samples: below, nothing is decided
+constexpr double kTells = 0.3;            // correlation from which the slope decides about pitch
+constexpr std::size_t kMostBroken = 100;  // one line in so many
+
+/// One line as it stands.
+struct Line {
+  Stamp stamp{};
+  Geodetic place{};
+  Vec3 velocity, angles;  // fields 6 to 8, 9 to 11
+};
+
+/// A sample with how its position moves, in the axes at the first place.
+struct Moving {
+  const Line* line = nullptr;
+  Vec3 motion;  // m/s, east, north, up
+};
+
+bool parse_line(std::string_view text, Line* line) noexcept {
+  constexpr std::size_t kFields = 12;
+  std::array<std::string_view, kFields> f;
+  if (split(text, ' ', f) != kFields) return false;
+  const auto stamp = detail::st_lucia_stamp(f[0], f[1]);
+  std::array<double, kFields> v{};
+  for (std::size_t i = 2; i < kFields; ++i)
+    if (!parse_number(f[i], &v[i])) return false;
+  if (!stamp) return false;
+  line->stamp = *stamp;
+  line->place = {v[2], v[3], v[4]};
+  line->velocity = {v[6], v[7], v[8]};
+  line->angles = {v[9], v[10], v[11]};
+  return true;
+}
+
+std::vector<Line> read_lines(const std::filesystem::path& log, std::vector<std::string>* remarks) {
+  const std::string text = read_text(log);
+  Lines lines(text);
+  std::vector<Line> out;
+  std::size_t broken = 0, first_broken = 0;
+  for (std::string_view raw; lines.next(&raw);) {
+    Line line;
+    if (parse_line(raw, &line)) {
+      out.push_back(line);
+    } else if (broken++ == 0) {
+      first_broken = lines.number();
+    }
+  }
+  if (out.empty() || broken > 1 + out.size() / kMostBroken)
+    refuse(log, first_broken,
+           fmt::format("and {} more lines are not twelve numbers; this is not the log of the INS", broken > 0 ? broken - 1 : 0));
+  if (broken > 0)
+    remarks->push_back(fmt::format("{}: {} lines that are not twelve numbers were left out", log.filename().string(), broken));
+  const bool ordered = std::is_sorted(out.begin(), out.end(), [](const Line& a, const Line& b) { return a.stamp < b.stamp; });
+  std::stable_sort(out.begin(), out.end(), [](const Line& a, const Line& b) { return a.stamp < b.stamp; });
+  const auto twice = std::unique(out.begin(), out.end(), [](const Line& a, const Line& b) { return a.stamp == b.stamp; });
+  if (!ordered) remarks->push_back("the samples of the INS were not in the order of their stamps");
+  if (twice != out.end())
+    remarks->push_back(fmt::format("{} samples of the INS had the stamp of another and were left out", out.end() - twice));
+  out.erase(twice, out.end());
+  return out;
+}
+
+/// Latitude is the field that stays within 90; south and east of Brisbane both columns are places of their own only one way round.
+void check_places(const std::filesystem::path& log, std::vector<Line>* lines, std::vector<std::string>* remarks) {
+  const bool exchanged = std::all_of(lines->begin(), lines->end(), [](const Line& l) { return std::abs(l.place.latitude_deg) > 90; });
+  for (Line& line : *lines) {
+    if (exchanged) std::swap(line.place.latitude_deg, line.place.longitude_deg);
+    if (!line.place.plausible())
+      refuse(log, 0,
+             fmt::format("has a place that is none: {} {} {}", line.place.latitude_deg, line.place.longitude_deg, line.place.height_m));
+  }
+  if (exchanged) remarks->push_back("longitude stands before latitude in the log of the INS");
+}
+
+GeographicLib::LocalCartesian plane_at(const Geodetic& g) { return {g.latitude_deg, g.longitude_deg, g.height_m}; }
+
+std::vector<Moving> motions(const std::vector<Line>& lines) {
+  const GeographicLib::LocalCartesian plane = plane_at(lines.front().place);
+  std::vector<Vec3> places(lines.size());
+  for (std::size_t i = 0; i < lines.size(); ++i) {
+    const Geodetic& g = lines[i].place;
+    plane.Forward(g.latitude_deg, g.longitude_deg, g.height_m, places[i].x(), places[i].y(), places[i].z());
+  }
+  std::vector<Moving> out;
+  std::size_t before = 0, after = 0;
+  for (std::size_t i = 0; i < lines.size(); ++i) {
+    while ((lines[i].stamp - lines[before].stamp).to_seconds() > kApart / 2) ++before;
+    while (after + 1 < lines.size() && (lines[after].stamp - lines[i].stamp).to_seconds() < kApart / 2) ++after;
+    const double span = (lines[after].stamp - lines[before].stamp).to_seconds();
+    if (span > 0.9 * kApart && span < 1.5 * kApart) out.push_back({&lines[i], (places[after] - places[before]) / span});
+  }
+  return out;
+}
+
+Vec3 in_enu(const Vec3& v, Velocity axes) noexcept {
+  switch (axes) {
+    case Velocity::east_north_up:
+      return v;
+    case Velocity::north_east_down:
+      return {v.y(), v.x(), -v.z()};
+    case Velocity::north_west_up:
+      return {-v.y(), v.x(), v.z()};
+  }
+  return v;
+}
+
+double yaw_in_enu(double angle, Yaw yaw) noexcept {
+  switch (yaw) {
+    case Yaw::north_to_west:
+      return angle + kPi / 2;
+    case Yaw::north_to_east:
+      return kPi / 2 - angle;
+    case Yaw::east_to_north:
+      return angle;
+  }
+  return angle;
+}
+
+/// The axes in which the velocities are nearest to how the position moves.
+void decide_velocity(const std::vector<Moving>& moving, StLuciaConventions* c) {
+  double least = 1e300;
+  for (const Velocity axes : {Velocity::north_west_up, Velocity::north_east_down, Velocity::east_north_up}) {
+    double sum = 0;
+    for (const Moving& m : moving) sum += (in_enu(m.line->velocity, axes) - m.motion).head<2>().squaredNorm();
+    if (sum >= least) continue;
+    least = sum;
+    c->velocity = axes;
+  }
+}
+
+/// The yaw that points where the vehicle goes; it goes backwards now and then, so the mean of the cosines counts.
+void decide_yaw(const std::vector<Moving>& fast, StLuciaConventions* c) {
+  double most = -1e300;
+  for (const Yaw yaw : {Yaw::north_to_west, Yaw::north_to_east, Yaw::east_to_north}) {
+    double sum = 0;
+    for (const Moving& m : fast) sum += std::cos(yaw_in_enu(m.line->angles.z(), yaw) - std::atan2(m.motion.y(), m.motion.x()));
+    if (sum <= most) continue;
+    most = sum;
+    c->yaw = yaw;
+  }
+}
+
+double correlation(const std::vector<Moving>& fast, const std::vector<double>& slopes, Eigen::Index field) {
+  const double n = static_cast<double>(fast.size());
+  double x = 0, y = 0, xx = 0, yy = 0, xy = 0;
+  for (std::size_t i = 0; i < fast.size(); ++i) {
+    const double a = fast[i].line->angles[field], b = slopes[i];
+    x += a, y += b, xx += a * a, yy += b * b, xy += a * b;
+  }
+  const double spread = (xx - x * x / n) * (yy - y * y / n);
+  return spread > 0 ? (xy - x * y / n) / std::sqrt(spread) : 0;
+}
+
+/// The angle that follows the slope of the way is pitch. False: neither does.
+bool decide_pitch(const std::vector<Moving>& fast, StLuciaConventions* c) {
+  std::vector<double> slopes;
+  for (const Moving& m : fast) {
+    const Vec3 v = in_enu(m.line->velocity, c->velocity);
+    slopes.push_back(std::atan2(v.z(), v.head<2>().norm()));
+  }
+  const double first = correlation(fast, slopes, 0), second = correlation(fast, slopes, 1);
+  if (std::max(std::abs(first), std::abs(second)) < kTells) return false;
+  c->pitch_first = std::abs(first) > std::abs(second);
+  c->nose_up_positive = (c->pitch_first ? first : second) > 0;
+  return true;
+}
+
+const char* to_phrase(Velocity v) noexcept {
+  return v == Velocity::east_north_up ? "east, north, up" : v == Velocity::north_east_down ? "north, east, down" : "north, west, up";
+}
+const char* to_phrase(Yaw y) noexcept {
+  return y == Yaw::north_to_west   ? "from north counter-clockwise"
+         : y == Yaw::north_to_east ? "a compass heading"
+                                   : "from east counter-clockwise";
+}
+
+StLuciaConventions decide(const std::vector<Line>& lines, std::vector<std::string>* remarks) {
+  StLuciaConventions c;
+  const std::vector<Moving> moving = motions(lines);
+  std::vector<Moving> fast;
+  for (const Moving& m : moving)
+    if (m.motion.head<2>().norm() > kFast) fast.push_back(m);
+  if (fast.size() < kEnough) {
+    remarks->push_back(
+        "the drive is too slow or too short to show the INS's axes: north, west, up and yaw from north counter-clockwise are taken");
+    return c;
+  }
+  decide_velocity(moving, &c);
+  decide_yaw(fast, &c);
+  const bool slope = decide_pitch(fast, &c);
+  remarks->push_back(fmt::format("the INS's velocity is along {}, its yaw {}, its pitch field {}, {} with the nose up{}",
+                                 to_phrase(c.velocity), to_phrase(c.yaw), c.pitch_first ? 10 : 11,
+                                 c.nose_up_positive ? "positive" : "negative", slope ? "" : " (taken: the drive is too level to show it)"));
+  return c;
+}
+
+InsSample sample_of(const Line& line, const StLuciaConventions& c, std::uint64_t number) {
+  InsSample s;
+  s.number = number;
+  s.stamp = line.stamp;
+  s.fix = FixStatus::fix_3d;
+  s.attitude_valid = s.velocity_valid = true;
+  s.position = line.place;
+  const Vec3 v = in_enu(line.velocity, c.velocity);
+  s.velocity_enu = {v.x(), v.y(), v.z()};
+  const double roll = line.angles[c.pitch_first ? 1 : 0], pitch = line.angles[c.pitch_first ? 0 : 1];
+  const Mat3 R = exp_so3(Vec3(0, 0, yaw_in_enu(line.angles.z(), c.yaw))) * exp_so3(Vec3(0, c.nose_up_positive ? -pitch : pitch, 0)) *
+                 exp_so3(Vec3(roll, 0, 0));
+  const Eigen::Quaterniond q = quaternion(R);
+  s.q_enu_ins = {q.x(), q.y(), q.z(), q.w()};
+  return s;
+}
+
+}  // namespace
+
+StLuciaIns read_st_lucia_ins(const std::filesystem::path& folder) {
+  const std::filesystem::path log = detail::find_st_lucia_log(folder, "_Ins0.log");
+  StLuciaIns ins;
+  std::vector<Line> lines = read_lines(log, &ins.remarks);
+  check_places(log, &lines, &ins.remarks);
+  ins.conventions = decide(lines, &ins.remarks);
+  ins.samples.reserve(lines.size());
+  for (const Line& line : lines) ins.samples.push_back(sample_of(line, ins.conventions, ins.samples.size()));
+  return ins;
+}
+
+Trajectory st_lucia_reference(const StLuciaIns& ins, const Transform& T_ins_left) {
+  Trajectory out;
+  if (ins.samples.empty()) return out;
+  const GeographicLib::LocalCartesian plane = plane_at(ins.samples.front().position);
+  std::vector<double> rotation(9);  // v_enu = M · v_local, row-major
+  for (const InsSample& s : ins.samples) {
+    Transform T_enu_ins;
+    plane.Forward(s.position.latitude_deg, s.position.longitude_deg, s.position.height_m, T_enu_ins.t.x(), T_enu_ins.t.y(), T_enu_ins.t.z(),
+                  rotation);
+    const Eigen::Quaterniond q(s.q_enu_ins[3], s.q_enu_ins[0], s.q_enu_ins[1], s.q_enu_ins[2]);
+    T_enu_ins.R = Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(rotation.data()) * q.toRotationMatrix();
+    out.push_back({s.stamp, T_enu_ins * T_ins_left});
+  }
+  return out;
+}
+
+}  // namespace vergence::app
