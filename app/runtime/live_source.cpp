@@ -191,6 +191,10 @@ int LiveSource::earliest() const {
       device = static_cast<int>(k);
       first = heads_[k].value.arrival;
     }
+  // An INS in a time of its own may be ahead of the cameras: until one of them has something, an earlier image may still come.
+  if (device < 0 && ins_ != nullptr && ins_->keeps_own_time() &&
+      std::any_of(heads_.begin(), heads_.end(), [](const auto& h) { return !h.ended && !h.gone; }))
+    return -1;
   // At the same instant the INS goes first: the images may need it.
   if (ins_head_.held && (device < 0 || ins_head_.value.arrival <= first)) device = static_cast<int>(heads_.size());
   return device;
