@@ -11,7 +11,7 @@ namespace vergence::calibration {
 /// Every number a user may change in `monitor:`; the configuration's schema has a row for each field.
 /// What the defaults reach, and the commands that measured it: docs/monitor.md.
 struct MonitorOptions {
-  double threshold = 40.0;  // of the statistic that raises a knock or a drift; ≥ 80 h between false alarms, 20 … 500
+  double threshold = 45.0;  // of the statistic that raises a knock or a drift; ≥ 80 h between false alarms, 20 … 500
   double bias_px = 0.02;    // px rms over the image: slow error of vertical differences that intrinsics leave, to be overlooked, 0 … 1
   int min_matches = 30;     // matches across under which a frame measures nothing (`needs_texture`), 12 … 1000
   int short_window = 3;     // moving frames of the shortest window: large knocks, 1 … 10

@@ -259,8 +259,8 @@ bool Windows::find_lag(const Search& found, Decision* d) const noexcept {
   Evidence e;
   e.add(both.raw.across, 1.0 / (lambda_across_ + bias2_ * both.raw.across.n));
   const Solved lag(e.A, e.g);
-  if (both.frames < kLagFrames ||
-      !(std::abs(lag.lag()) > options_.lag_frames && std::abs(lag.lag()) > options_.lag_sigmas * lag.lag_sigma()))
+  const double size = std::abs(lag.lag());
+  if (both.frames < kLagFrames || !(size > options_.lag_frames && size < kLagMost && size > options_.lag_sigmas * lag.lag_sigma()))
     return false;
   if (both.gain < std::max(found.step_across.gain, found.ramp_across.gain) + kLagMargin) return false;
   d->kind = MonitorVerdict::Kind::out_of_step;
