@@ -26,10 +26,10 @@ SequenceFormat format_of(const std::string& word) {
   if (word == "kitti") return SequenceFormat::kitti;
   if (word == "euroc") return SequenceFormat::euroc;
   if (word == "folder") return SequenceFormat::folder;
-  if (word == "st-lucia" || word == "session")
-    throw InputError("--format " + word + " is not there yet in this version; kitti, euroc and folder are");
+  if (word == "st-lucia") return SequenceFormat::st_lucia;
+  if (word == "session") throw InputError("--format session is not there yet in this version; kitti, euroc, folder and st-lucia are");
   throw InputError("--format \"" + word + "\" is not known" + did_you_mean(word, {"kitti", "euroc", "folder", "st-lucia", "session"}) +
-                   "; kitti, euroc and folder are what can be read");
+                   "; kitti, euroc, folder and st-lucia are what can be read");
 }
 
 ReplayRequest request_of(const Arguments& a) {
@@ -56,7 +56,7 @@ void add_replay(CLI::App& root, ExitCode* exit_code) {
   const auto a = std::make_shared<Arguments>();
   CLI::App* command = root.add_subcommand("replay", "Run a recorded drive through the estimator and write a session folder");
   command->add_option("DATA", a->data, "Folder of the data set")->required();
-  command->add_option("--format", a->format, "Layout of DATA: kitti, euroc, folder (st-lucia and session come later)")
+  command->add_option("--format", a->format, "Layout of DATA: kitti, euroc, folder, st-lucia (session comes later)")
       ->required()
       ->type_name("NAME");
   command->add_option("--out", a->out, "Session folder; must not exist or be empty")->required()->type_name("DIR");

@@ -15,9 +15,11 @@
 
 #include <fmt/format.h>
 
+#include "app/commands/mock_drive.hpp"
 #include "app/commands/session_files.hpp"
 #include "app/datasets/frame_decoder.hpp"
 #include "app/datasets/reference_track.hpp"
+#include "app/datasets/st_lucia.hpp"
 #include "app/datasets/trajectory_files.hpp"
 #include "app/recorder/recorder.hpp"
 #include "app/recorder/summary.hpp"
@@ -253,9 +255,18 @@ ExitCode Replay::run() {
   return faults.empty() ? ExitCode::done : ExitCode::not_usable;
 }
 
+/// The way of the INS of a St Lucia drive; what its log had to be taken for is said.
+Trajectory read_ins_reference(const ReplayRequest& request) {
+  const StLuciaIns ins = read_st_lucia_ins(request.data);
+  if (!request.quiet)
+    for (const std::string& sentence : ins.remarks) fmt::print(stderr, "vergence: {}\n", sentence);
+  return st_lucia_reference(ins, comparison_options(request.configuration).T_ins_left);
+}
+
 /// The truth that lies with the data set, for the stamps that its frames have; empty when there is none.
 Trajectory read_reference(const ReplayRequest& request, const StereoSequence& sequence) {
   if (request.format == SequenceFormat::folder) return {};  // its layout has no truth
+  if (request.format == SequenceFormat::st_lucia) return read_ins_reference(request);
   const auto files = find_truth(request.data);
   if (!files) return {};
   if (files->kind != TruthFiles::Kind::kitti) return read_truth(*files);

@@ -50,13 +50,13 @@ StereoPair read_pair(const std::filesystem::path& log, std::size_t line_number, 
 
 }  // namespace
 
-std::filesystem::path find_st_lucia_log(const std::filesystem::path& folder, std::string_view ending) {
+std::optional<std::filesystem::path> find_st_lucia_log(const std::filesystem::path& folder, std::string_view ending) {
   std::vector<std::filesystem::path> found;
   std::error_code error;
   for (std::filesystem::directory_iterator it(folder, error), end; !error && it != end; it.increment(error))
     if (it->path().filename().string().ends_with(ending)) found.push_back(it->path());
   if (error) refuse(folder, 0, "cannot be listed (" + error.message() + "): check its permissions");
-  if (found.empty()) refuse(folder, 0, "holds no file that ends in " + std::string(ending) + ": it is not a folder of this data set");
+  if (found.empty()) return std::nullopt;
   if (found.size() > 1) {
     std::sort(found.begin(), found.end());
     refuse(folder, 0,
@@ -74,7 +74,9 @@ std::optional<Stamp> st_lucia_stamp(std::string_view seconds, std::string_view m
 }
 
 StereoSequence open_st_lucia(const std::filesystem::path& folder, bool given) {
-  const std::filesystem::path log = find_st_lucia_log(folder, kImageLog);
+  const auto found = find_st_lucia_log(folder, kImageLog);
+  if (!found) refuse(folder, 0, "holds no file that ends in " + std::string(kImageLog) + ": it is not a folder of this data set");
+  const std::filesystem::path& log = *found;
   const std::string images = log.stem().string();
   require_folder(folder / images, "the images that its log names");
   StereoSequence sequence;

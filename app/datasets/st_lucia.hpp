@@ -32,7 +32,8 @@ struct StLuciaIns {
 /// The log of the drive in `folder` (the one that holds `PREFIX_Ins0.log`). Lines that are no twelve numbers are left out and counted,
 /// samples are sorted by their stamps. What the drive cannot tell (it never is fast or steep enough) is the MTi-G's own: x forward, y left,
 /// z up, yaw from north counter-clockwise.
-/// InputError: no log or several, more than one line in a hundred broken, positions that are no places.
+/// Without a log there are no samples, and a remark. InputError: several logs, more than one line in a hundred broken, positions that
+/// are no places.
 [[nodiscard]] StLuciaIns read_st_lucia_ins(const std::filesystem::path& folder);
 
 /// The left camera's way in the east-north-up axes at the first sample. p_ins = T_ins_left · p_left.

@@ -233,8 +233,13 @@ InsSample sample_of(const Line& line, const StLuciaConventions& c, std::uint64_t
 }  // namespace
 
 StLuciaIns read_st_lucia_ins(const std::filesystem::path& folder) {
-  const std::filesystem::path log = detail::find_st_lucia_log(folder, "_Ins0.log");
   StLuciaIns ins;
+  const auto found = detail::find_st_lucia_log(folder, "_Ins0.log");
+  if (!found) {
+    ins.remarks.push_back(folder.string() + ": holds no file that ends in _Ins0.log; there is no INS to compare with");
+    return ins;
+  }
+  const std::filesystem::path& log = *found;
   std::vector<Line> lines = read_lines(log, &ins.remarks);
   check_places(log, &lines, &ins.remarks);
   ins.conventions = decide(lines, &ins.remarks);

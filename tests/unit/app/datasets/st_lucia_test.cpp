@@ -236,7 +236,9 @@ TEST(StLuciaIns, whatIsNoSuchLogIsRefused) {
   EXPECT_NE(refusal([] { (void)read({"1 2 3", "4 5 6", "7 8 9"}); }).find("Ins0.log:1: and 2 more lines"), std::string::npos);
   EXPECT_NE(refusal([] { (void)read({"1292391531 0 -27.5 153 1e9 0 0 0 0 0 0 0"}); }).find("a place that is none"), std::string::npos);
   const test::TemporaryFolder empty;
-  EXPECT_NE(refusal([&] { (void)read_st_lucia_ins(empty.path()); }).find("holds no file that ends in _Ins0.log"), std::string::npos);
+  const StLuciaIns none = read_st_lucia_ins(empty.path());
+  EXPECT_TRUE(none.samples.empty());
+  EXPECT_TRUE(says(none, "holds no file that ends in _Ins0.log"));
 }
 
 TEST(StLuciaIns, theReferenceIsTheLeftCamerasWayFromTheFirstPlace) {
