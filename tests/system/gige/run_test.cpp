@@ -13,6 +13,7 @@
 #include "app/datasets/trajectory_files.hpp"
 #include "tests/support/gige_camera.hpp"
 #include "tests/support/temporary_folder.hpp"
+#include "tests/system/gige/pairs.hpp"
 #include "tests/unit/app/commands/run_vergence.hpp"
 
 namespace vergence {
@@ -93,6 +94,7 @@ double path_length(const std::vector<StampedPose>& poses) {
 }
 
 TEST(GigeRun, aDriveOverTheWireHasAPoseForEveryPair) {
+  if (const std::string why = test::socket_buffer_obstacle(); !why.empty()) GTEST_SKIP() << why;
   const RenderedDrive drive;
   const Wires wires(&drive);
   std::thread pulses([&wires] {
