@@ -171,6 +171,9 @@ std::vector<UsbCandidate> UsbBus::find(std::string* complaint) {
     return false;
   });
   libusb_exit(context);
+  // By GUID, those that do not tell theirs last: the order in which ports were found changes from one start to the next.
+  std::sort(all.begin(), all.end(),
+            [](const UsbCandidate& a, const UsbCandidate& b) { return std::pair(a.guid == 0, a.guid) < std::pair(b.guid == 0, b.guid); });
   return all;
 }
 

@@ -39,7 +39,7 @@ class UsbBus final : public CameraBus {
   static constexpr Duration kRegisterLimit = Duration::seconds(1);
   static constexpr Duration kCancelLimit = Duration::seconds(2);
 
-  /// Every device with a known id, each asked for its GUID.
+  /// Every device with a known id, each asked for its GUID; in that order.
   [[nodiscard]] static std::vector<UsbCandidate> find(std::string* complaint);
   /// `wanted` as names_camera(). Null: *status and *complaint say why.
   [[nodiscard]] static std::unique_ptr<UsbBus> open(std::string_view wanted, DeviceStatus* status, std::string* complaint);

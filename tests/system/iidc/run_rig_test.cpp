@@ -1,0 +1,130 @@
+// `vergence run` on emulated IIDC cameras that look at a rendered drive: what the example configurations do on real stacks.
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <sstream>
+
+#include "drivers/iidc/iidc.hpp"
+#include "tests/rigs/film.hpp"
+#include "tests/system/iidc/iidc_rig.hpp"
+
+namespace vergence::test {
+namespace {
+
+/// Position of the left camera and status, by the number of the rig frame.
+struct Pose {
+  Vec3 position = Vec3::Zero();
+  std::string status;
+};
+
+std::map<std::uint64_t, Pose> read_poses(const std::filesystem::path& file) {
+  std::map<std::uint64_t, Pose> out;
+  std::ifstream in(file);
+  std::string line;
+  std::getline(in, line);
+  while (std::getline(in, line)) {
+    std::vector<std::string> cells;
+    std::istringstream row(line);
+    for (std::string cell; std::getline(row, cell, ',');) cells.push_back(cell);
+    if (cells.size() < 8) continue;
+    Pose p;
+    p.status = cells[3];
+    if (!cells[5].empty()) p.position = {std::stod(cells[5]), std::stod(cells[6]), std::stod(cells[7])};
+    out[std::stoull(cells[0])] = p;
+  }
+  return out;
+}
+
+/// Distance of the track from the film's, worst of all poses, as part of the way: the film begins with the first exposure of any
+/// camera, the track with the first pair, a few images later.
+double worst_error(const std::map<std::uint64_t, Pose>& poses, const Film& film) {
+  constexpr std::size_t kLatest = 20;
+  double best = 1e9;
+  for (std::size_t shift = 0; shift < kLatest; ++shift) {
+    double worst = 0, way = 0;
+    Transform first;
+    bool any = false;
+    std::uint64_t begin = 0;
+    Vec3 last = Vec3::Zero(), offset = Vec3::Zero();
+    for (const auto& [number, pose] : poses) {
+      if (pose.status == "lost") continue;
+      if (!any) {
+        begin = number;
+        offset = pose.position;
+        if (shift >= film.pairs()) break;
+        first = film.T_first_left(shift).inverse();
+      }
+      const std::size_t n = shift + static_cast<std::size_t>(number - begin);
+      if (n >= film.pairs()) break;
+      const Vec3 truth = (first * film.T_first_left(n)).t;
+      if (any) way += (truth - last).norm();
+      last = truth;
+      any = true;
+      worst = std::max(worst, (pose.position - offset - truth).norm());
+    }
+    if (way > 5) best = std::min(best, worst / way);
+  }
+  return best;
+}
+
+struct Bus {
+  const char *name, *emulator, *configuration;
+  bool pulses;
+};
+
+class IidcRun : public ::testing::TestWithParam<Bus> {};
+
+TEST_P(IidcRun, TheExampleConfigurationDrivesOnWhatTheCamerasSend) {
+  const char* film_folder = std::getenv("VERGENCE_FILM");
+  if (!inside_rig() || film_folder == nullptr) GTEST_SKIP() << "this test runs inside the rig's kernel: ctest -L rig";
+  const Film film(film_folder);
+  std::vector<std::string> arguments{"--cameras", "2", "--film", film_folder, "--film-hz", "10"};
+  if (GetParam().pulses) arguments.insert(arguments.end(), {"--trigger-hz", "10"});
+  auto driver = std::string(GetParam().emulator) == "sim_1394" ? iidc::make_1394_driver() : iidc::make_usb_driver();
+  Emulator emulator(GetParam().emulator, arguments);
+  ASSERT_TRUE(await_cameras(driver.get(), 2));
+
+  const std::filesystem::path out = std::filesystem::absolute(std::string("session-") + GetParam().name);
+  std::filesystem::remove_all(out);
+  const std::string command = std::string(VERGENCE_PROGRAM) + " run " + VERGENCE_SOURCE_FOLDER + "/app/config/" + GetParam().configuration +
+                              " --out " + out.string() + " --duration 9 --quiet --set rig.state_dir=none";
+  const int status = std::system(command.c_str());
+  ASSERT_EQ(status, 0) << command;
+  const std::string report = emulator.finish();
+
+  const auto summary = nlohmann::json::parse(std::ifstream(out / "summary.json"));
+  const auto& frames = summary.at("frames");
+  const auto& devices = summary.at("devices");
+  SCOPED_TRACE(summary.dump(1) + report);
+  EXPECT_GE(frames.at("read").get<int>(), 60) << "of 90 at 10 Hz";
+  // The cameras start one after the other: the first exposures of one may be without their pair.
+  EXPECT_LE(frames.at("lost").get<int>(), devices.at("sets_incomplete").get<int>());
+  EXPECT_LE(devices.at("sets_incomplete").get<int>(), 3);
+  EXPECT_GE(frames.at("posed").get<int>(), devices.at("sets_complete").get<int>()) << "every pair that came gets a pose";
+  EXPECT_GE(frames.at("ok").get<int>(), 15) << "until a calibration is found the poses are degraded";
+  EXPECT_EQ(summary.at("allocations_after_seal").get<int>(), 0);
+  for (int k = 0; k < 2; ++k) {
+    const std::string name = "camera" + std::to_string(k) + "_";
+    const auto delivered = devices.at(name + "delivered").get<std::int64_t>();
+    const auto lost = devices.at(name + "lost").get<std::int64_t>(), underruns = devices.at(name + "underruns").get<std::int64_t>();
+    EXPECT_EQ(devices.at("frames_torn").get<int>(), 0);
+    // What the emulator says it exposed, but for the images that were under way when the drive ended.
+    EXPECT_LE(delivered + lost + underruns, count_of(report, k, "exposed"));
+    EXPECT_GE(delivered + lost + underruns + 4, count_of(report, k, "exposed"));
+    EXPECT_LE(lost, count_of(report, k, "overtaken"));
+  }
+  const auto poses = read_poses(out / "poses.csv");
+  EXPECT_LT(worst_error(poses, film), 0.03);
+}
+
+INSTANTIATE_TEST_SUITE_P(Buses, IidcRun,
+                         ::testing::Values(Bus{"usb", "sim_usb_iidc", "iidc_usb.yaml", true},
+                                           Bus{"1394", "sim_1394", "iidc_1394.yaml", false}),
+                         [](const auto& bus) { return std::string(bus.param.name); });
+
+}  // namespace
+}  // namespace vergence::test
