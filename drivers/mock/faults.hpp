@@ -28,6 +28,7 @@ enum class FaultKind : std::uint8_t {
   late_frames,
   duplicate_frames,
   break_pairs,
+  missed_trigger,
   ins_gone,
   no_fix,
   position_jump,
@@ -48,6 +49,7 @@ struct Fault {
   double share = 0;           // of the frames, 0..1
   double delay = 0;           // s
   double jump = 0;            // s
+  int pulses = 0;             // one after the other
 
   [[nodiscard]] bool active(Duration time) const noexcept { return time >= at && (duration <= Duration{} || time < at + duration); }
   [[nodiscard]] bool concerns(int k) const noexcept { return camera < 0 || camera == k; }

@@ -40,6 +40,7 @@ Exposure exposure_of(const RigTruth& truth, std::uint64_t seed, const PulseAt& p
     if (f.kind == FaultKind::lose_frames && drawn) e.lost = true;
     if (f.kind == FaultKind::late_frames && drawn) e.delay = e.delay + Duration::seconds(f.delay);
     if (f.kind == FaultKind::duplicate_frames && drawn) e.twice = true;
+    if (f.kind == FaultKind::missed_trigger && pulse.time < f.at + pulse.period * f.pulses) e.missed = true;
     if (f.kind == FaultKind::break_pairs) {
       Random together(of_pulse, kEveryCamera);
       const bool broken = together.uniform() < f.share;

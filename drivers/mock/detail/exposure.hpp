@@ -14,9 +14,10 @@ struct PulseAt {
 
 /// What becomes of one camera's image of one pulse, by the faults that are due.
 struct Exposure {
-  bool lost = false;   // never arrives
-  bool twice = false;  // arrives again
-  Duration delay{};    // of the arrival, beyond the usual
+  bool missed = false;  // never happens
+  bool lost = false;    // never arrives
+  bool twice = false;   // arrives again
+  Duration delay{};     // of the arrival, beyond the usual
   double brightness = 1;
   // Which image it is: usually this camera's, of this pulse.
   int camera = 0;

@@ -174,6 +174,10 @@ std::optional<Scheduler::Shooting> Scheduler::plan(std::uint64_t pulse, int k) {
   Shooting s;
   s.camera = k;
   s.exposure = exposure_of(*rig_.truth, rig_.options.seed, {pulse, host_of(pulse) - start_, Duration::seconds(1 / rate_)}, k);
+  if (s.exposure.missed) {
+    ++senders_[static_cast<std::size_t>(k)].counter_base;
+    return std::nullopt;
+  }
   if (s.exposure.lost) {
     camera.lost.fetch_add(1, std::memory_order_relaxed);
     return std::nullopt;

@@ -52,7 +52,7 @@ class Scheduler final : public PulseListener {
   /// What the scheduler knows of a camera.
   struct Sender {
     bool unplugged = false;
-    std::uint64_t counter_base = 0;  // pulse of the frame that it counts as 0
+    std::uint64_t counter_base = 0;  // of the pulse's number less what the camera counts
     std::atomic<int> on_the_way{0};  // frames in parcels_
   };
   struct Shooting {

@@ -251,6 +251,19 @@ TEST(MockRig, ofABrokenPairOneImageAtRandomNeverArrives) {
     for (const Seen& right : h.frames[1]) EXPECT_NE(left.frame.counter, right.frame.counter);
 }
 
+TEST(MockRig, aPulseThatACameraDoesNotSeeIsNeitherExposedNorCounted) {
+  const Harvest good = drive_with({}), h = drive_with({"missed_trigger@0.98 camera=1 pulses=2"});
+  EXPECT_EQ(h.frames[0].size(), 61U);
+  ASSERT_EQ(h.frames[1].size(), 59U);
+  EXPECT_EQ(h.statistics[1].lost, 0U);
+  for (std::size_t i = 0; i < 59; ++i) {
+    const std::size_t pulse = i < 20 ? i : i + 2;
+    EXPECT_EQ(h.frames[1][i].frame.counter, i);
+    EXPECT_EQ(h.frames[1][i].frame.exposure_start, good.frames[1][pulse].frame.exposure_start);
+    EXPECT_EQ(h.frames[1][i].mean, good.frames[1][pulse].mean);
+  }
+}
+
 TEST(MockRig, aLaggingCameraSendsTheImageBeforeWithTheCounterAndStampOfThisOne) {
   const Harvest good = drive_with({}, 6), lagging = drive_with({"lag@4 camera=1 duration_s=1"}, 6);
   ASSERT_EQ(lagging.frames[1].size(), good.frames[1].size());
