@@ -1,0 +1,302 @@
+#include "core/comparison/mount.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include <Eigen/Dense>
+
+#include "core/math/so3.hpp"
+
+namespace vergence {
+namespace {
+
+// Parameters: R_m and R_enu_world as left perturbations, lever arm, translation, clock offset.
+enum Index : int { mount_rotation = 0, lever = 3, clock = 6, world_rotation = 7, world_translation = 10, kParameters = 13 };
+// Errors of a moment: tilt x y, heading, place x y, height, velocity x y z.
+constexpr int kErrors = 9;
+constexpr std::array<int, kErrors> kChannel{0, 0, 1, 2, 2, 3, 4, 4, 4};
+constexpr int kChannels = 5;
+
+using Parameters = Eigen::Matrix<double, kParameters, 1>;
+using Information = Eigen::Matrix<double, kParameters, kParameters>;
+using Errors = Eigen::Matrix<double, kErrors, 1>;
+
+/// A reading of the reference, at its own stamp: interpolating it would calm its noise by where between two readings a stamp falls, and the
+/// clock offset would be drawn to the middle. The estimate, which has next to no noise, is interpolated instead.
+struct Moment {
+  MountReference reference{};
+  bool follows = false;  // one step after the moment before it
+};
+
+struct State {
+  Mat3 R_m = Mat3::Identity(), R_enu_world = Mat3::Identity();
+  Vec3 lever = Vec3::Zero(), translation = Vec3::Zero();
+  double offset = 0;  // s
+};
+
+State moved(const State& s, const Parameters& d) {
+  State out = s;
+  out.R_m = exp_so3(d.segment<3>(mount_rotation)) * s.R_m;
+  out.lever += d.segment<3>(lever);
+  out.offset += d[clock];
+  out.R_enu_world = exp_so3(d.segment<3>(world_rotation)) * s.R_enu_world;
+  out.translation += d.segment<3>(world_translation);
+  return out;
+}
+
+/// The estimate at a time; false: none there.
+bool estimate_at(std::span<const StampedPose> estimate, Stamp at, Duration max_gap, Transform* out) {
+  const auto after = std::lower_bound(estimate.begin(), estimate.end(), at, [](const StampedPose& e, Stamp t) { return e.stamp < t; });
+  if (after == estimate.end() || after == estimate.begin()) return false;
+  const StampedPose &a = *(after - 1), &b = *after;
+  if (b.stamp - a.stamp > max_gap) return false;
+  const double u = (at - a.stamp).to_seconds() / (b.stamp - a.stamp).to_seconds();
+  out->R = a.T_world_body.R * exp_so3(u * log_so3(a.T_world_body.R.transpose() * b.T_world_body.R));
+  out->t = (1 - u) * a.T_world_body.t + u * b.T_world_body.t;
+  return true;
+}
+
+/// Readings a step apart, with an estimate around each.
+std::vector<Moment> moments_of(std::span<const StampedPose> estimate, std::span<const MountReference> reference, const MountOptions& o) {
+  constexpr Duration kRoom = Duration::milliseconds(500);  // for the clock offset
+  std::vector<Moment> moments;
+  Transform unused;
+  Stamp next = reference.front().stamp;
+  for (const MountReference& r : reference) {
+    if (r.stamp < next) continue;
+    if (!estimate_at(estimate, r.stamp - kRoom, o.max_gap, &unused) || !estimate_at(estimate, r.stamp, o.max_gap, &unused) ||
+        !estimate_at(estimate, r.stamp + kRoom, o.max_gap, &unused))
+      continue;
+    moments.push_back({r, !moments.empty() && r.stamp - moments.back().reference.stamp < o.step * 3 / 2});
+    next = r.stamp + o.step;
+  }
+  return moments;
+}
+
+class Fit {
+ public:
+  Fit(std::vector<Moment> moments, std::span<const StampedPose> estimate, const MountOptions& options)
+      : moments_(std::move(moments)), estimate_(estimate), options_(options) {}
+
+  [[nodiscard]] MountStatus run(const Mat3& nominal, Mount* mount);
+
+ private:
+  /// Gauss–Markov, per channel: e_k = memory · e_{k−1} + white.
+  struct Noise {
+    double memory = 0.98, white = 1;  // white: standard deviation
+  };
+
+  [[nodiscard]] bool start(const Mat3& nominal);
+  [[nodiscard]] bool errors_at(const State& s, const Moment& m, Errors* e) const;
+  [[nodiscard]] bool all_errors(const State& s, std::vector<Errors>* all) const;
+  [[nodiscard]] bool step(Parameters* d);
+  void learn_noise(const std::vector<Errors>& all);
+  void tell(const Mat3& nominal, Mount* mount) const;
+
+  std::vector<Moment> moments_;
+  std::span<const StampedPose> estimate_;
+  MountOptions options_;
+  State state_;
+  std::array<Noise, kChannels> noise_{};
+  bool velocity_ = true;  // every moment has one
+  Information information_ = Information::Zero();
+};
+
+bool Fit::errors_at(const State& s, const Moment& m, Errors* e) const {
+  constexpr Duration kAround = Duration::milliseconds(50);  // velocity and rate: from both sides
+  const Stamp at = m.reference.stamp - Duration::seconds(s.offset);
+  Transform here, before, after;
+  if (!estimate_at(estimate_, at, options_.max_gap, &here)) return false;
+  const MountReference& r = m.reference;
+  const Mat3& R = r.T_enu_ref.R;
+  // In the reference's axes: there a tilt stays a tilt when the vehicle turns.
+  e->segment<3>(0) = R.transpose() * log_so3(R * s.R_m * (s.R_enu_world * here.R).transpose());
+  e->segment<3>(3) = r.T_enu_ref.t + R * s.lever - s.R_enu_world * here.t - s.translation;
+  e->segment<3>(6).setZero();
+  if (velocity_) {
+    if (!estimate_at(estimate_, at - kAround, options_.max_gap, &before) || !estimate_at(estimate_, at + kAround, options_.max_gap, &after))
+      return false;
+    const double span = 2 * kAround.to_seconds();
+    const Vec3 velocity = (after.t - before.t) / span, rate = log_so3(before.R.transpose() * after.R) / span;
+    e->segment<3>(6) = r.v_enu_ref + R * (s.R_m * rate).cross(s.lever) - s.R_enu_world * velocity;
+  }
+  return e->allFinite();
+}
+
+bool Fit::all_errors(const State& s, std::vector<Errors>* all) const {
+  all->resize(moments_.size());
+  for (std::size_t i = 0; i < moments_.size(); ++i)
+    if (!errors_at(s, moments_[i], &(*all)[i])) return false;
+  return true;
+}
+
+/// Rotation by Wahba's problem over turns and ways, the rest from it. False: nothing moved.
+bool Fit::start(const Mat3& nominal) {
+  Mat3 B = Mat3::Zero();
+  Transform e0, e1;
+  double way = 0;
+  for (std::size_t i = 1; i < moments_.size(); ++i) {
+    const MountReference &r0 = moments_[i - 1].reference, &r1 = moments_[i].reference;
+    velocity_ = velocity_ && r0.has_velocity && r1.has_velocity;
+    if (!moments_[i].follows) continue;
+    if (!estimate_at(estimate_, r0.stamp, options_.max_gap, &e0) || !estimate_at(estimate_, r1.stamp, options_.max_gap, &e1)) return false;
+    const Mat3 R_ref_enu = r0.T_enu_ref.R.transpose();
+    const Vec3 turn_ref = log_so3(R_ref_enu * r1.T_enu_ref.R), turn_est = log_so3(e0.R.transpose() * e1.R);
+    const Vec3 way_est = e0.R.transpose() * (e1.t - e0.t), way_ref = R_ref_enu * (r1.T_enu_ref.t - r0.T_enu_ref.t);
+    B += 20 * turn_ref * turn_est.transpose() + way_ref * way_est.transpose();  // a radian weighs as 20 m
+    way += way_est.norm();
+  }
+  constexpr double kLeastWay = 10;  // m
+  if (way < kLeastWay) return false;
+  const auto rotation_of = [](const Mat3& M) {
+    const Eigen::JacobiSVD<Mat3> svd(M, Eigen::ComputeFullU | Eigen::ComputeFullV);
+    const Vec3 d(1, 1, (svd.matrixU() * svd.matrixV().transpose()).determinant());
+    return Mat3(svd.matrixU() * d.asDiagonal() * svd.matrixV().transpose());
+  };
+  // A thousandth of what was seen for the drawing: it decides only what nothing else does.
+  state_.R_m = rotation_of(B + 1e-3 * B.norm() * nominal);
+  Mat3 sum = Mat3::Zero();
+  for (const Moment& m : moments_) {
+    if (!estimate_at(estimate_, m.reference.stamp, options_.max_gap, &e0)) return false;
+    sum += m.reference.T_enu_ref.R * state_.R_m * e0.R.transpose();
+  }
+  state_.R_enu_world = rotation_of(sum);
+  for (const Moment& m : moments_) {
+    (void)estimate_at(estimate_, m.reference.stamp, options_.max_gap, &e0);
+    state_.translation += (m.reference.T_enu_ref.t - state_.R_enu_world * e0.t) / static_cast<double>(moments_.size());
+  }
+  return true;
+}
+
+void Fit::learn_noise(const std::vector<Errors>& all) {
+  for (int c = 0; c < kChannels; ++c) {
+    double now = 0, lagged = 0, n = 0;
+    for (std::size_t i = 1; i < all.size(); ++i) {
+      if (!moments_[i].follows) continue;
+      for (int k = 0; k < kErrors; ++k) {
+        if (kChannel[static_cast<std::size_t>(k)] != c) continue;
+        now += all[i - 1][k] * all[i - 1][k];
+        lagged += all[i][k] * all[i - 1][k];
+        n += 1;
+      }
+    }
+    constexpr double kMost = 0.998;  // a random walk as good as: beyond it the mean is lost to rounding
+    double memory = now > 0 ? lagged / now : 0;
+    // A short series seems to forget faster than it does (Kendall 1954), and fitted parameters have taken their share.
+    memory = std::clamp(memory + (1 + 3 * memory) / std::max(8.0, static_cast<double>(all.size())), 0.0, kMost);
+    constexpr int kVelocity = 4;
+    if (c != kVelocity) memory = std::max(memory, std::exp(-options_.step.to_seconds() / options_.least_correlation.to_seconds()));
+    double white = 0;
+    for (std::size_t i = 1; i < all.size(); ++i) {
+      if (!moments_[i].follows) continue;
+      for (int k = 0; k < kErrors; ++k)
+        if (kChannel[static_cast<std::size_t>(k)] == c) white += std::pow(all[i][k] - memory * all[i - 1][k], 2) / n;
+    }
+    constexpr std::array<double, kChannels> kLeast{1e-5, 1e-5, 1e-4, 1e-4, 1e-4};  // rad, m, m/s: an ideal reference has some noise, too
+    noise_[static_cast<std::size_t>(c)] = {memory, std::max(std::sqrt(white), kLeast[static_cast<std::size_t>(c)])};
+  }
+}
+
+/// One Gauss–Newton step on the whitened errors. False: the reference does not reach that far.
+bool Fit::step(Parameters* d) {
+  std::vector<Errors> at;
+  if (!all_errors(state_, &at)) return false;
+  learn_noise(at);
+  constexpr std::array<double, kParameters> kDelta{1e-5, 1e-5, 1e-5, 1e-4, 1e-4, 1e-4, 1e-4, 1e-5, 1e-5, 1e-5, 1e-3, 1e-3, 1e-3};
+  std::vector<std::vector<Errors>> columns(kParameters);
+  for (int p = 0; p < kParameters; ++p) {
+    Parameters small = Parameters::Zero();
+    const double h = kDelta[static_cast<std::size_t>(p)];
+    small[p] = h;
+    std::vector<Errors> minus;
+    if (!all_errors(moved(state_, small), &columns[static_cast<std::size_t>(p)]) || !all_errors(moved(state_, -small), &minus))
+      return false;
+    for (std::size_t i = 0; i < minus.size(); ++i)
+      columns[static_cast<std::size_t>(p)][i] = (columns[static_cast<std::size_t>(p)][i] - minus[i]) / (2 * h);
+  }
+  // Next to nothing, so that a drive that shows nothing of a parameter leaves it where it is.
+  constexpr std::array<double, kParameters> kPrior{1, 1, 1, 100, 100, 100, 0.3, 4, 4, 4, 1e6, 1e6, 1e6};
+  Information H = Information::Zero();
+  Parameters g = Parameters::Zero();
+  for (int p = 0; p < kParameters; ++p) H(p, p) = std::pow(kPrior[static_cast<std::size_t>(p)], -2);
+  for (int p : {3, 4, 5}) g[p] = H(p, p) * state_.lever[p - lever];
+  g[clock] = H(clock, clock) * state_.offset;
+  const int used = velocity_ ? kErrors : 6;
+  for (std::size_t i = 0; i < at.size(); ++i) {
+    for (int k = 0; k < used; ++k) {
+      const Noise& noise = noise_[static_cast<std::size_t>(kChannel[static_cast<std::size_t>(k)])];
+      const bool chained = moments_[i].follows;
+      const double memory = chained ? noise.memory : 0;
+      const double weight = 1 / (chained ? noise.white : noise.white / std::sqrt(1 - noise.memory * noise.memory));
+      Parameters row;
+      for (int p = 0; p < kParameters; ++p) {
+        const auto& column = columns[static_cast<std::size_t>(p)];
+        row[p] = weight * (column[i][k] - (chained ? memory * column[i - 1][k] : 0));
+      }
+      const double value = weight * (at[i][k] - (chained ? memory * at[i - 1][k] : 0));
+      H += row * row.transpose();
+      g += row * value;
+    }
+  }
+  information_ = H;
+  *d = -H.ldlt().solve(g);
+  return d->allFinite();
+}
+
+void Fit::tell(const Mat3& nominal, Mount* mount) const {
+  const Information covariance = information_.ldlt().solve(Information::Identity());
+  const auto sigma = [&covariance](int p) { return std::sqrt(std::max(0.0, covariance(p, p))); };
+  const Vec3 turn = log_so3(state_.R_m * nominal.transpose());
+  Mount m;
+  Vec3 seen = Vec3::Zero();
+  for (int k = 0; k < 3; ++k) {
+    const auto i = static_cast<std::size_t>(k);
+    m.rotation[i] = {sigma(mount_rotation + k) <= options_.rotation_sigma, turn[k], sigma(mount_rotation + k)};
+    m.lever_arm[i] = {sigma(lever + k) <= options_.lever_sigma, state_.lever[k], sigma(lever + k)};
+    if (m.rotation[i].observable) seen[k] = turn[k];
+    if (m.lever_arm[i].observable) m.T_ref_est.t[k] = state_.lever[k];
+  }
+  m.T_ref_est.R = exp_so3(seen) * nominal;
+  m.clock_offset = {sigma(clock) <= options_.offset_sigma.to_seconds(), state_.offset, sigma(clock)};
+  m.moments = moments_.size();
+  std::vector<Errors> all;
+  if (all_errors(state_, &all)) {
+    double rotation = 0, position = 0;
+    for (const Errors& e : all) {
+      rotation += e.segment<3>(0).squaredNorm() / static_cast<double>(all.size());
+      position += e.segment<3>(3).squaredNorm() / static_cast<double>(all.size());
+    }
+    m.residual_rotation = std::sqrt(rotation);
+    m.residual_position = std::sqrt(position);
+  }
+  *mount = m;
+}
+
+MountStatus Fit::run(const Mat3& nominal, Mount* mount) {
+  if (!start(nominal)) return MountStatus::no_motion;
+  constexpr double kLargest = 0.3;   // s: the room that moments have for the offset
+  constexpr double kSettled = 1e-2;  // of a sigma
+  for (int round = 0; round < kMountRounds; ++round) {
+    Parameters d;
+    if (!step(&d)) return MountStatus::not_converged;
+    state_ = moved(state_, d);
+    state_.offset = std::clamp(state_.offset, -kLargest, kLargest);
+    constexpr int kLeastRounds = 6;  // for the correlations
+    if (round >= kLeastRounds && d.dot(information_ * d) < kSettled * kSettled) break;
+  }
+  tell(nominal, mount);
+  return MountStatus::ok;
+}
+
+}  // namespace
+
+MountStatus estimate_mount(std::span<const StampedPose> estimate, std::span<const MountReference> reference, const Mat3& nominal,
+                           const MountOptions& options, Mount* mount) {
+  if (estimate.size() < kMountMoments || reference.size() < 2) return MountStatus::too_few;
+  std::vector<Moment> moments = moments_of(estimate, reference, options);
+  if (moments.size() < kMountMoments) return MountStatus::too_few;
+  return Fit(std::move(moments), estimate, options).run(nominal, mount);
+}
+
+}  // namespace vergence

@@ -1,0 +1,184 @@
+#include "core/comparison/mount.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstdio>
+#include <memory>
+#include <vector>
+
+#include "core/comparison/comparison.hpp"
+#include "core/comparison/geodesy.hpp"
+#include "core/math/random.hpp"
+#include "core/math/so3.hpp"
+#include "drivers/mock/ins_model.hpp"
+
+namespace vergence {
+namespace {
+
+constexpr Stamp kStart{1'000'000'000'000};
+const Vec3 kLever(0.9, 0.375, 0.5);
+const Vec3 kBoresight(0.02, -0.03, 0.05);  // rad
+
+std::shared_ptr<const mock::World> town() {
+  static const auto world = [] {
+    mock::WorldOptions o;
+    o.texture_detail = 0;
+    o.built_fraction = o.tree_fraction = o.car_fraction = 0;
+    return std::make_shared<const mock::World>(o);
+  }();
+  return world;
+}
+
+struct Drove {
+  std::vector<StampedPose> estimate;
+  std::vector<MountReference> reference;
+};
+
+struct How {
+  mock::DriveKind kind = mock::DriveKind::loop;
+  std::uint64_t seed = 1;
+  bool ideal = false;
+  bool velocity = true;
+  double late_s = 0;  // of the reference's stamps
+};
+
+/// The left camera as an odometry would have it (in its own world, drifting a little), and the mock's INS.
+Drove drove(const How& how) {
+  mock::DriveOptions options;
+  options.kind = how.kind;
+  options.seed = how.seed;
+  const Transform T_body_left = mock::default_T_body_left();
+  const Transform T_body_ins = T_body_left * mount_of(kLever, kBoresight).inverse();
+  RigCalibration rig;
+  rig.cameras = 2;
+  const mock::RigTruth truth(town(), options, rig, T_body_left, T_body_ins, {});
+  const double length = truth.drive().duration().to_seconds();
+  Drove d;
+  Random random(how.seed, 40);
+  constexpr double kFrames = 20, kReadings = 60;  // Hz
+  const Transform T_enu_first = truth.camera_in_enu(0, {});
+  Transform T_world_left, before = T_enu_first;
+  for (double t = 0; t < length; t += 1 / kFrames) {
+    const Transform now = truth.camera_in_enu(0, Duration::seconds(t));
+    Transform motion = before.inverse() * now;
+    if (!how.ideal) {
+      motion.R = motion.R * exp_so3(5e-5 * Vec3(random.normal(), random.normal(), random.normal()));
+      motion.t += 1e-3 * Vec3(random.normal(), random.normal(), random.normal());
+    }
+    T_world_left = T_world_left * motion;
+    before = now;
+    d.estimate.push_back({kStart + Duration::seconds(t), T_world_left});
+  }
+  mock::InsModel ins({how.ideal, how.seed, kReadings}, truth);
+  const LocalTangentPlane plane(mock::kWorldOrigin);
+  std::uint64_t number = 0;
+  for (double t = -1; t < length + 1; t += 1 / kReadings) {
+    const InsSample s = ins.sample(number++, Duration::seconds(t));
+    const Mat3 R_enu_local = plane.rotation_from(s.position);
+    MountReference r;
+    r.stamp = kStart + Duration::seconds(t + how.late_s);
+    r.T_enu_ref.R = R_enu_local * Eigen::Quaterniond(s.q_enu_ins[3], s.q_enu_ins[0], s.q_enu_ins[1], s.q_enu_ins[2]).toRotationMatrix();
+    r.T_enu_ref.t = plane.to_enu(s.position);
+    r.v_enu_ref = R_enu_local * Vec3(s.velocity_enu[0], s.velocity_enu[1], s.velocity_enu[2]);
+    r.has_velocity = how.velocity;
+    d.reference.push_back(r);
+  }
+  return d;
+}
+
+Mat3 nominal() { return mount_of(Vec3::Zero(), Vec3::Zero()).R; }
+
+/// What the truth is in Mount's parameters.
+Vec3 true_turn() { return log_so3(mount_of(kLever, kBoresight).R * nominal().transpose()); }
+
+TEST(Mount, anIdealReferenceGivesItsMount) {
+  for (const bool velocity : {true, false}) {
+    How how;
+    how.ideal = true;
+    how.velocity = velocity;
+    how.late_s = 0.012;
+    const Drove d = drove(how);
+    Mount m;
+    ASSERT_EQ(estimate_mount(d.estimate, d.reference, nominal(), {}, &m), MountStatus::ok);
+    for (std::size_t k = 0; k < 3; ++k) {
+      ASSERT_TRUE(m.rotation[k].observable) << k;
+      EXPECT_NEAR(m.rotation[k].value, true_turn()[static_cast<int>(k)], 1e-4);
+    }
+    for (std::size_t k = 0; k < 2; ++k) EXPECT_NEAR(m.lever_arm[k].value, kLever[static_cast<int>(k)], 0.02);
+    ASSERT_TRUE(m.clock_offset.observable);
+    EXPECT_NEAR(m.clock_offset.value, 0.012, 1e-3);
+  }
+}
+
+/// Thirty drives with an INS of the MTi-G's class: what is said is true within what is said of it.
+void sigmas_hold(bool velocity) {
+  constexpr int kDrives = 30;
+  std::array<std::vector<double>, 7> ratios;
+  int heights = 0;
+  for (int seed = 1; seed <= kDrives; ++seed) {
+    How how;
+    how.kind = seed % 2 == 0 ? mock::DriveKind::loop : mock::DriveKind::figure_eight;
+    how.seed = static_cast<std::uint64_t>(seed);
+    how.velocity = velocity;
+    how.late_s = 0.02;
+    const Drove d = drove(how);
+    Mount m;
+    ASSERT_EQ(estimate_mount(d.estimate, d.reference, nominal(), {}, &m), MountStatus::ok) << seed;
+    for (std::size_t k = 0; k < 3; ++k) {
+      const int i = static_cast<int>(k);
+      if (m.rotation[k].observable) ratios[k].push_back((m.rotation[k].value - true_turn()[i]) / m.rotation[k].sigma);
+      if (m.lever_arm[k].observable) ratios[3 + k].push_back((m.lever_arm[k].value - kLever[i]) / m.lever_arm[k].sigma);
+    }
+    if (m.lever_arm[2].observable) ++heights;
+    if (m.clock_offset.observable) ratios[6].push_back((m.clock_offset.value - 0.02) / m.clock_offset.sigma);
+  }
+  // By position a car's small pitch and roll show no height; to the velocity the springs' quick motion does.
+  EXPECT_EQ(heights, velocity ? kDrives : 0);
+  for (std::size_t k = 0; k < ratios.size(); ++k) {
+    if (k == 5 && !velocity) continue;
+    ASSERT_GE(ratios[k].size(), 20U) << "parameter " << k << " is seen on most drives";
+    double sum = 0, worst = 0;
+    for (const double r : ratios[k]) sum += r * r, worst = std::max(worst, std::abs(r));
+    const double rms = std::sqrt(sum / static_cast<double>(ratios[k].size()));
+    // The root mean square of 30 normal ratios is within 1 ± 0.4 at three sigma; a sigma up to twice too large is still an honest one.
+    EXPECT_GT(rms, 0.4) << "parameter " << k;
+    EXPECT_LT(rms, 1.4) << "parameter " << k;
+    EXPECT_LT(worst, 3.8) << "parameter " << k;
+    std::printf("[ figures  ] parameter %zu: %zu drives, rms of error over sigma %.2f, worst %.2f\n", k, ratios[k].size(), rms, worst);
+  }
+}
+
+TEST(Mount, sigmasHoldOverThirtyDrivesWithVelocity) { sigmas_hold(true); }
+TEST(Mount, sigmasHoldOverThirtyDrivesByPositionAlone) { sigmas_hold(false); }
+
+TEST(Mount, aStraightDriveShowsNoLeverArm) {
+  How how;
+  how.kind = mock::DriveKind::straight;
+  how.velocity = false;
+  const Drove d = drove(how);
+  Mount m;
+  ASSERT_EQ(estimate_mount(d.estimate, d.reference, nominal(), {}, &m), MountStatus::ok);
+  EXPECT_FALSE(m.lever_arm[0].observable) << m.lever_arm[0].sigma;
+  EXPECT_FALSE(m.lever_arm[2].observable) << m.lever_arm[2].sigma;
+  EXPECT_EQ(m.T_ref_est.t.x(), 0) << "no number";
+}
+
+TEST(Mount, whatCannotBeDoneIsToldAndLeavesTheResultAlone) {
+  How still;
+  still.kind = mock::DriveKind::still;
+  Drove d = drove(still);
+  Mount m;
+  m.moments = 77;
+  EXPECT_EQ(estimate_mount(d.estimate, d.reference, nominal(), {}, &m), MountStatus::no_motion);
+  d.estimate.resize(10);
+  EXPECT_EQ(estimate_mount(d.estimate, d.reference, nominal(), {}, &m), MountStatus::too_few);
+  EXPECT_EQ(estimate_mount({}, {}, nominal(), {}, &m), MountStatus::too_few);
+  d = drove({});
+  for (MountReference& r : d.reference) r.stamp = r.stamp + Duration::seconds(1e6);
+  EXPECT_EQ(estimate_mount(d.estimate, d.reference, nominal(), {}, &m), MountStatus::too_few) << "no time in common";
+  EXPECT_EQ(m.moments, 77U);
+}
+
+}  // namespace
+}  // namespace vergence
