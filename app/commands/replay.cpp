@@ -33,8 +33,8 @@ SequenceFormat format_of(const std::string& word) {
 }
 
 ReplayRequest request_of(const Arguments& a) {
-  if (a.from_scratch) throw InputError("--from-scratch is not there yet in this version; give a calibration with --calibration");
-  if (a.baseline) throw InputError("--baseline is not there yet in this version; the length stands in the calibration's translation");
+  if (a.baseline && !(*a.baseline >= 0.005 && *a.baseline <= 20))
+    throw InputError("--baseline is the distance of the two cameras in metres, 0.005 to 20");
   if (a.start < 0) throw InputError("--start is the number of a frame, 0 or more");
   if (a.frames && *a.frames < 1) throw InputError("--frames needs at least 1");
   ReplayRequest r;
@@ -42,6 +42,8 @@ ReplayRequest request_of(const Arguments& a) {
   r.format = format_of(a.format);
   r.out = a.out;
   if (a.calibration) r.calibration = *a.calibration;
+  r.baseline = a.baseline;
+  r.from_scratch = a.from_scratch;
   r.start = static_cast<std::size_t>(a.start);
   if (a.frames) r.frames = static_cast<std::size_t>(*a.frames);
   r.configuration = a.common.configuration(std::nullopt);
@@ -63,8 +65,9 @@ void add_replay(CLI::App& root, ExitCode* exit_code) {
   command->add_option("--calibration", a->calibration, "calibration.yaml to use instead of the data set's own")->type_name("FILE");
   command->add_option("--start", a->start, "First frame, from 0")->type_name("K");
   command->add_option("--frames", a->frames, "At most so many frames")->type_name("N");
-  command->add_option("--baseline", a->baseline, "Length of the stereo transform in metres (not there yet)")->type_name("M");
-  command->add_flag("--from-scratch", a->from_scratch, "Find the calibration from the drive itself (not there yet)");
+  command->add_option("--baseline", a->baseline, "Distance of the two cameras in metres, instead of the calibration's")->type_name("M");
+  command->add_flag("--from-scratch", a->from_scratch,
+                    "Find the calibration from the drive itself: only intrinsics and the baseline's length are read");
   command->add_flag("--memory", a->memory, "Print what memory is held, by whom");
   a->common.declare(*command);
   command->callback([a, exit_code] { *exit_code = run_replay(request_of(*a)); });

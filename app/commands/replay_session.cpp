@@ -15,14 +15,17 @@
 
 #include <fmt/format.h>
 
+#include "app/commands/drive_journal.hpp"
 #include "app/commands/mock_drive.hpp"
 #include "app/commands/session_files.hpp"
+#include "app/commands/starting_calibration.hpp"
 #include "app/datasets/frame_decoder.hpp"
 #include "app/datasets/reference_track.hpp"
 #include "app/datasets/st_lucia.hpp"
 #include "app/datasets/trajectory_files.hpp"
 #include "app/recorder/recorder.hpp"
 #include "app/recorder/summary.hpp"
+#include "app/runtime/background_thread.hpp"
 #include "app/runtime/progress.hpp"
 #include "app/runtime/signals.hpp"
 #include "core/estimator/estimator.hpp"
@@ -31,54 +34,41 @@
 namespace vergence::app {
 namespace {
 
-/// What the estimator's thread tells the progress line: the newest counts, older ones may be lost.
-struct Glimpse {
-  std::uint64_t done = 0;  // frames, skipped ones included
-  State state = State::initialising;
-  double path_m = 0;
-  int inliers = 0;
-  float estimate_ms = 0;
-};
-
 /// Everything that is set up before the first frame and torn down after the last, in the order of its members.
 class Replay {
  public:
-  Replay(const ReplayRequest& request, StereoSequence sequence, Trajectory truth);
+  Replay(const ReplayRequest& request, StereoSequence sequence, StartingCalibration begin, Trajectory truth);
 
   [[nodiscard]] ExitCode run();
 
  private:
   void estimate() noexcept;
   void handle(const DecodedPair& pair) noexcept;
-  void post_events() noexcept;
   void watch(const SignalGuard& signals, Progress* progress);
-  void show(Progress* progress);
   [[nodiscard]] SummaryInput summary_input(const SessionTotals& totals, std::uint64_t allocations) const;
   void tell(const SessionTotals& totals, const SummaryInput& input, Progress* progress) const;
   [[nodiscard]] std::vector<std::pair<std::string, std::size_t>> memory() const;
 
   const ReplayRequest& request_;
   const StereoSequence sequence_;
+  const StartingCalibration begin_;
   const Trajectory truth_;
   const ReferenceTrack reference_;
   const std::size_t count_;  // frames of this replay
-  EstimatorOptions options_;
+  const EstimatorOptions options_;
   Arena frames_arena_, estimator_arena_;
   FramePool pool_;
   std::unique_ptr<PairRunner> runner_;
-  ImmediateRunner solver_;
+  BackgroundThread solver_;
   std::unique_ptr<Estimator> estimator_;
   std::unique_ptr<Recorder> recorder_;
   std::unique_ptr<FrameDecoder> decoder_;
 
   // Of the estimator's thread; read by others after it has joined.
-  Glimpse glimpse_;
-  std::uint64_t skipped_ = 0, dropped_ = 0;
-  Vec3 last_position_ = Vec3::Zero();
-  bool posed_ = false;
+  DriveJournal journal_;
+  std::uint64_t skipped_ = 0;
 
-  Ring<Glimpse, 64> glimpses_;  // full: the newest is lost, the next one tells the same and more
-  std::mutex mutex_;            // with done_, for the caller's thread that waits
+  std::mutex mutex_;  // with done_, for the caller's thread that waits
   std::condition_variable changed_;
   bool done_ = false;
 };
@@ -86,18 +76,19 @@ class Replay {
 int width_of(const StereoSequence& s) { return s.calibration.intrinsics[0].width; }
 int height_of(const StereoSequence& s) { return s.calibration.intrinsics[0].height; }
 
-Replay::Replay(const ReplayRequest& request, StereoSequence sequence, Trajectory truth)
+Replay::Replay(const ReplayRequest& request, StereoSequence sequence, StartingCalibration begin, Trajectory truth)
     : request_(request),
       sequence_(std::move(sequence)),
+      begin_(std::move(begin)),
       truth_(std::move(truth)),
       reference_(truth_),
       count_(std::min(request.frames.value_or(sequence_.pairs.size()), sequence_.pairs.size() - request.start)),
-      options_{request.configuration.odometry},
+      options_(estimator_options(request.configuration, begin_.trust, Adoption::after_fixed_frames)),
       frames_arena_(arena_size(FramePool::memory_needed(width_of(sequence_), height_of(sequence_), FrameDecoder::kSlots))),
-      estimator_arena_(arena_size(Estimator::memory_needed(options_, sequence_.calibration))),
+      estimator_arena_(arena_size(Estimator::memory_needed(options_, begin_.file.rig))),
       pool_(width_of(sequence_), height_of(sequence_), FrameDecoder::kSlots, frames_arena_),
       runner_(make_runner(request.configuration.threads)),
-      estimator_(std::make_unique<Estimator>(options_, sequence_.calibration, sequence_.calibration, estimator_arena_, *runner_, solver_)) {}
+      estimator_(std::make_unique<Estimator>(options_, begin_.file.rig, begin_.nominal, estimator_arena_, *runner_, solver_)) {}
 
 void Replay::estimate() noexcept {
   (void)pthread_setname_np(pthread_self(), "vergence-estim");
@@ -105,9 +96,9 @@ void Replay::estimate() noexcept {
   for (DecodedPair pair; decoder_->next(&pair);) {
     handle(pair);
     decoder_->release(pair);
-    ++glimpse_.done;
-    (void)glimpses_.push(glimpse_);
   }
+  estimator_->finish();
+  journal_.note(*estimator_);
   AllocationGuard::unseal_thread();
   const std::lock_guard lock(mutex_);
   done_ = true;
@@ -117,6 +108,7 @@ void Replay::estimate() noexcept {
 void Replay::handle(const DecodedPair& pair) noexcept {
   if (!pair.decoded) {
     ++skipped_;
+    journal_.note_skipped();
     EventRecord event;
     event.stamp = pair.stamp;
     event.kind = pair.kind;
@@ -131,23 +123,9 @@ void Replay::handle(const DecodedPair& pair) noexcept {
   frame.cameras = 2;
   for (std::size_t k = 0; k < 2; ++k) frame.images[k] = pool_.view(pair.slots[k]);
   const PoseSample sample = estimator_->process(frame);
-  post_events();
+  journal_.note(*estimator_);
+  journal_.note(sample);
   recorder_->post(PoseRecord::of(sample, pair.decode_ms, reference_.at(sample.stamp)));
-
-  glimpse_.state = sample.state;
-  glimpse_.inliers = sample.inliers;
-  glimpse_.estimate_ms = sample.estimate_ms;
-  if (sample.status == PoseStatus::lost) return;
-  if (posed_) glimpse_.path_m += (sample.T_world_left.t - last_position_).norm();
-  last_position_ = sample.T_world_left.t;
-  posed_ = true;
-}
-
-void Replay::post_events() noexcept {
-  for (const EstimatorEvent& event : estimator_->events()) {
-    if (event.kind == EstimatorEvent::Kind::dropped) dropped_ += static_cast<std::uint64_t>(std::max(0.0, event.value));
-    recorder_->post(EventRecord::of(event));
-  }
 }
 
 void Replay::watch(const SignalGuard& signals, Progress* progress) {
@@ -156,36 +134,19 @@ void Replay::watch(const SignalGuard& signals, Progress* progress) {
   while (!changed_.wait_for(lock, kLook, [this] { return done_; })) {
     if (signals.stop_requested()) decoder_->stop();
     lock.unlock();
-    show(progress);
-    for (const std::string& sentence : recorder_->take_complaints()) progress->say("vergence: " + sentence);
+    journal_.show(progress, count_);
     lock.lock();
   }
   lock.unlock();
-  show(progress);
-}
-
-void Replay::show(Progress* progress) {
-  Glimpse newest;
-  bool any = false;
-  while (glimpses_.pop(&newest)) any = true;
-  if (!any) return;
-  ProgressState state;
-  state.state = newest.state == State::stereo_odometry ? "stereo" : to_string(newest.state);
-  state.frame = newest.done;
-  state.frames = count_;
-  state.path_m = newest.path_m;
-  state.inliers = newest.inliers;
-  state.estimate_ms = static_cast<double>(newest.estimate_ms);
-  progress->update(state);
+  journal_.show(progress, count_);
 }
 
 SummaryInput Replay::summary_input(const SessionTotals& totals, std::uint64_t allocations) const {
   SummaryInput input;
   input.skipped = skipped_;
-  input.dropped_by_estimator = dropped_;
+  input.dropped_by_estimator = journal_.dropped();
   if (!truth_.empty() && !totals.trajectory.empty()) input.evaluation = evaluate(totals.trajectory, truth_, summary_evaluation_options());
-  input.calibration = estimator_->calibration();
-  input.calibration_source = sequence_.calibration_source;
+  describe_calibration(*estimator_, begin_, totals, options_.calibration, &input);
   input.allocations_after_seal = allocations;
   input.memory = memory();
   input.configuration_hash = configuration_hash(request_.configuration);
@@ -195,7 +156,7 @@ SummaryInput Replay::summary_input(const SessionTotals& totals, std::uint64_t al
 std::vector<std::pair<std::string, std::size_t>> Replay::memory() const {
   return {{"estimator_bytes", estimator_arena_.capacity()},
           {"images_bytes", frames_arena_.capacity()},
-          {"rings_bytes", sizeof(Recorder) + sizeof(FrameDecoder) + sizeof(glimpses_)}};
+          {"rings_bytes", sizeof(Recorder) + sizeof(FrameDecoder) + sizeof(DriveJournal)}};
 }
 
 void Replay::tell(const SessionTotals& totals, const SummaryInput& input, Progress* progress) const {
@@ -220,12 +181,14 @@ void Replay::tell(const SessionTotals& totals, const SummaryInput& input, Progre
 ExitCode Replay::run() {
   const SignalGuard signals;
   make_session_folder(request_.out);
-  recorder_ = std::make_unique<Recorder>(request_.out, Recorder::Options{Recorder::WhenFull::wait, true, count_});
+  Recorder::Options to_record;
+  to_record.expected_frames = count_;
+  to_record.keep = calibration_keeper(request_.out, begin_.file, std::nullopt);
+  recorder_ = std::make_unique<Recorder>(request_.out, to_record);
   const Stamp first = sequence_.pairs[request_.start].stamp;
-  recorder_->post(CalibrationRecord::of(sequence_.calibration, first, true, "given", "given with the drive"));
+  journal_.open(recorder_.get(), first);
   std::vector<std::string> faults;
-  write_session_calibration(request_.out, estimator_->calibration(), request_.configuration.rig.name,
-                            &faults);  // at once: a session that is killed has it, too
+  begin_session(request_.out, begin_, first, recorder_.get(), &faults);
   if (request_.print_memory) print_memory_table(memory());
 
   Progress progress = Progress::on_stderr(request_.quiet);
@@ -239,7 +202,7 @@ ExitCode Replay::run() {
 
   const auto totals = recorder_->close();
   const SummaryInput input = summary_input(*totals, AllocationGuard::allocations_after_seal() - allocations_before);
-  if (faults.empty()) write_session_calibration(request_.out, estimator_->calibration(), request_.configuration.rig.name, &faults);
+  if (faults.empty()) end_session(request_.out, begin_, input, *totals, &faults);
   write_session_summary(request_.out, *totals, input, &faults);
   faults.insert(faults.end(), totals->faults.begin(), totals->faults.end());
   for (const std::string& sentence : recorder_->take_complaints()) progress.say("vergence: " + sentence);
@@ -279,16 +242,20 @@ Trajectory read_reference(const ReplayRequest& request, const StereoSequence& se
 }  // namespace
 
 ExitCode run_replay(const ReplayRequest& request) {
-  StereoSequence sequence = open_sequence(request.format, request.data, request.calibration);
+  StereoSequence sequence =
+      open_sequence(request.format, request.data, request.calibration, {request.from_scratch, request.baseline.value_or(0)});
   if (request.start >= sequence.pairs.size())
     throw InputError(
         fmt::format("--start {} is beyond the drive: {} has {} frames", request.start, request.data.string(), sequence.pairs.size()));
   check_image_sizes(sequence, request.start, request.frames.value_or(sequence.pairs.size()));
+  StartingCalibration begin = replayed_calibration(request.configuration, sequence, request.from_scratch);
   Trajectory truth = read_reference(request, sequence);
   std::unique_ptr<Replay> replay;
   try {
-    replay = std::make_unique<Replay>(request, std::move(sequence), std::move(truth));
+    replay = std::make_unique<Replay>(request, std::move(sequence), std::move(begin), std::move(truth));
   } catch (const std::invalid_argument& e) {  // options and rig do not go together
+    throw InputError(e.what());
+  } catch (const std::length_error& e) {
     throw InputError(e.what());
   }
   return replay->run();

@@ -16,6 +16,8 @@ struct ReplayRequest {
   SequenceFormat format = SequenceFormat::kitti;
   std::filesystem::path out;
   std::optional<std::filesystem::path> calibration;  // instead of the data set's own
+  std::optional<double> baseline;                    // m: instead of the calibration's length
+  bool from_scratch = false;                         // of the calibration only intrinsics and length are read
   std::size_t start = 0;                             // first frame
   std::optional<std::size_t> frames;                 // at most so many; all when not set
   Configuration configuration;
@@ -26,9 +28,9 @@ struct ReplayRequest {
 /// Reads a recorded drive, estimates a pose for every frame, writes the session folder of DESIGN §6 and the figures against the data
 /// set's truth.
 ///
-/// Threads  Decoder, estimator (sealed), its worker, recorder; the caller's thread draws the progress line and watches for signals.
-/// Errors   InputError before the session folder is made, for all that can be known by then. Afterwards sentences on stderr.
-/// → done, not_usable (there never was a pose, or a file of the session is not whole), interrupted, terminated
+/// Threads  Decoder, estimator (sealed), its worker, the calibration solver (sealed, too), recorder; the caller's thread draws the progress
+/// line and watches for signals. Errors   InputError before the session folder is made, for all that can be known by then. Afterwards
+/// sentences on stderr. → done, not_usable (there never was a pose, or a file of the session is not whole), interrupted, terminated
 [[nodiscard]] ExitCode run_replay(const ReplayRequest& request);
 
 }  // namespace vergence::app

@@ -15,18 +15,19 @@ struct Arguments {
   CommonOptions common;
   std::string configuration, out;
   std::vector<std::string> faults;
+  std::optional<std::string> calibration;
   std::optional<double> duration_s;
   bool fast = false, from_scratch = false, memory = false;
 };
 
 RunRequest request_of(const Arguments& a) {
-  if (a.from_scratch)
-    throw InputError("--from-scratch is not there yet in this version; the rig of `rig.nominal` is what a drive begins with");
   if (a.duration_s && !(*a.duration_s > 0 && *a.duration_s <= 86400))
     throw InputError("--duration needs seconds, more than 0 and at most 86400");
   RunRequest r;
   r.out = a.out;
   r.configuration = a.common.configuration(a.configuration);
+  r.calibration.from_scratch = a.from_scratch;
+  if (a.calibration) r.calibration.file = *a.calibration;
   r.faults = a.faults;
   r.duration_s = a.duration_s;
   r.fast = a.fast;
@@ -48,7 +49,13 @@ void add_run(CLI::App& root, ExitCode* exit_code) {
       ->type_name("\"KIND@SECONDS …\"")
       ->allow_extra_args(false);
   command->add_option("--duration", a->duration_s, "End the drive after so many seconds")->type_name("S");
-  command->add_flag("--from-scratch", a->from_scratch, "Find the calibration from the drive itself (not there yet)");
+  command->add_flag("--from-scratch", a->from_scratch,
+                    "Find the calibration from the drive itself: only intrinsics and the baseline's length are read");
+  command
+      ->add_option(
+          "--calibration", a->calibration,
+          "calibration.yaml to begin with, instead of the state file's and the configuration's; SIGUSR1 asks for a new one on the way")
+      ->type_name("FILE");
   command->add_flag("--memory", a->memory, "Print what memory is held, by whom");
   a->common.declare(*command);
   command->callback([a, exit_code] { *exit_code = run_drive(request_of(*a)); });

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <chrono>
 #include <condition_variable>
 #include <cstdio>
@@ -19,10 +20,12 @@
 #include <fmt/format.h>
 
 #include "app/commands/drive_devices.hpp"
+#include "app/commands/drive_journal.hpp"
 #include "app/commands/session_files.hpp"
 #include "app/datasets/decimal.hpp"
 #include "app/recorder/line_file.hpp"
 #include "app/recorder/recorder.hpp"
+#include "app/runtime/background_thread.hpp"
 #include "app/runtime/live_source.hpp"
 #include "app/runtime/progress.hpp"
 #include "app/runtime/signals.hpp"
@@ -34,20 +37,16 @@ namespace {
 
 constexpr Stamp kVirtualEpoch{1'577'836'800'000'000'000};  // 2020-01-01 00:00 UTC: a drive in virtual time has the same stamps on every run
 
-/// What the estimator's thread tells the progress line: the newest counts, older ones may be lost.
-struct Glimpse {
-  std::uint64_t done = 0;
-  State state = State::initialising;
-  double path_m = 0;
-  int inliers = 0;
-  float estimate_ms = 0;
-  double from_ins_m = -1;  // negative: not compared
-};
-
 std::int64_t clock_ns(clockid_t clock) {
   timespec t{};
   (void)::clock_gettime(clock, &t);
   return static_cast<std::int64_t>(t.tv_sec) * 1'000'000'000 + t.tv_nsec;
+}
+
+std::vector<std::string> serials_of(const std::vector<CameraDevice*>& cameras) {
+  std::vector<std::string> serials;
+  for (const CameraDevice* camera : cameras) serials.push_back(camera->info().serial);
+  return serials;
 }
 
 /// Everything that is set up before the first frame and torn down after the last, in the order of its members.
@@ -65,9 +64,8 @@ class Drive {
   void note_ins(const ComparedPose& pose) noexcept;
   void note_jump(Stamp stamp) noexcept;
   void note_faults(Stamp stamp) noexcept;
-  void tell_event(Stamp stamp, const char* kind, std::string_view sentence, bool aloud) noexcept;
-  void watch(const SignalGuard& signals, Progress* progress);
-  void show(Progress* progress);
+  void note_scale(const ComparedPose& pose) noexcept;
+  void watch(Progress* progress);
   void write_truth(std::vector<std::string>* faults) const;
   [[nodiscard]] SummaryInput summary_input(const SessionTotals& totals, std::uint64_t allocations) const;
   [[nodiscard]] TruthFigures truth_figures(const SessionTotals& totals) const;
@@ -76,15 +74,16 @@ class Drive {
   [[nodiscard]] std::vector<std::pair<std::string, std::size_t>> memory() const;
   [[nodiscard]] std::vector<std::pair<std::string, std::uint64_t>> device_counters() const;
 
+  const SignalGuard signals_;  // before the world is built, which takes seconds: an impatient user's signal is heard
   const RunRequest& request_;
   const Configuration& configuration_;
   DriveDevices devices_;
-  const RigCalibration rig_;
-  EstimatorOptions options_;
+  const StartingCalibration begin_;
+  const EstimatorOptions options_;
   ComparisonOptions comparison_options_;
   Arena arena_;
   std::unique_ptr<PairRunner> runner_;
-  ImmediateRunner solver_;
+  BackgroundThread solver_;
   std::unique_ptr<Estimator> estimator_;
   std::unique_ptr<Comparison> comparison_;
   std::unique_ptr<LiveSource> source_;
@@ -93,19 +92,17 @@ class Drive {
   std::vector<StampedPose> truth_;
 
   // Of the estimator's thread; read by others after it has joined.
-  Glimpse glimpse_;
-  std::uint64_t dropped_ = 0, ins_matches_ = 0, jumps_ = 0;
-  Vec3 last_position_ = Vec3::Zero();
-  bool posed_ = false;
+  DriveJournal journal_;
+  std::uint64_t ins_matches_ = 0, jumps_ = 0, scale_disagreements_ = 0;
+  bool scale_disagrees_ = false;
   std::uint32_t placement_revision_ = 0;
   InsMatch last_match_ = InsMatch::ok;
   std::uint64_t match_run_ = 0;  // poses in a row with that
   Stamp newest_stamp_{};
   std::vector<bool> fault_told_;
 
-  Ring<Glimpse, 64> glimpses_;     // full: the newest is lost, the next one tells the same and more
-  Ring<EventRecord, 32> notices_;  // for stderr; full: events.jsonl has it
-  std::mutex mutex_;               // with done_, for the caller's thread that waits
+  std::atomic<bool> calibration_asked_{false};  // by the caller's thread, for the estimator's
+  std::mutex mutex_;                            // with done_, for the caller's thread that waits
   std::condition_variable changed_;
   bool done_ = false;
 };
@@ -114,12 +111,12 @@ Drive::Drive(const RunRequest& request)
     : request_(request),
       configuration_(request.configuration),
       devices_(request.configuration, request.faults, request.fast, request.duration_s),
-      rig_(nominal_rig(request.configuration)),
-      options_{request.configuration.odometry},
+      begin_(starting_calibration(request.configuration, request.calibration, serials_of(devices_.cameras()))),
+      options_(estimator_options(request.configuration, begin_.trust, request.fast ? Adoption::after_fixed_frames : Adoption::when_ready)),
       comparison_options_(comparison_options(request.configuration)),
-      arena_(arena_size(Estimator::memory_needed(options_, rig_)) + arena_size(Comparison::bytes_needed(comparison_options_))),
+      arena_(arena_size(Estimator::memory_needed(options_, begin_.file.rig)) + arena_size(Comparison::bytes_needed(comparison_options_))),
       runner_(make_runner(request.configuration.threads)),
-      estimator_(std::make_unique<Estimator>(options_, rig_, rig_, arena_, *runner_, solver_)),
+      estimator_(std::make_unique<Estimator>(options_, begin_.file.rig, begin_.nominal, arena_, *runner_, solver_)),
       comparison_(std::make_unique<Comparison>(comparison_options_, arena_)),
       fault_told_(devices_.faults().size(), false) {
   LiveSource::Options o;
@@ -152,7 +149,7 @@ void Drive::estimate() noexcept {
         std::array<char, 96> text{};
         (void)std::snprintf(text.data(), text.size(), gone ? "camera %d is gone; the drive goes on without it" : "camera %d is back",
                             item.camera);
-        tell_event(item.stamp, gone ? "camera_gone" : "camera_back", text.data(), true);
+        journal_.tell(item.stamp, gone ? "camera_gone" : "camera_back", text.data(), true);
         break;
       }
       case LiveItem::Kind::refused:
@@ -160,6 +157,8 @@ void Drive::estimate() noexcept {
     }
     drain_comparison();
   }
+  estimator_->finish();
+  journal_.note(*estimator_);
   comparison_->finish();
   drain_comparison();
   note_placement(newest_stamp_);
@@ -175,37 +174,29 @@ void Drive::handle_images(const LiveItem& item) noexcept {
   frame.stamp = item.stamp;
   frame.stamp_error = item.set.error;
   frame.spread = item.set.spread;
-  frame.cameras = rig_.cameras;
-  for (int k = 0; k < rig_.cameras; ++k) frame.images[static_cast<std::size_t>(k)] = source_->image(item.set, k);
+  frame.cameras = begin_.file.rig.cameras;
+  for (int k = 0; k < frame.cameras; ++k) frame.images[static_cast<std::size_t>(k)] = source_->image(item.set, k);
+  note_faults(item.stamp);
+  if (calibration_asked_.exchange(false, std::memory_order_relaxed)) {
+    estimator_->request_recalibration();
+    journal_.tell(item.stamp, "recalibration_requested", "a new calibration was asked for by SIGUSR1", true);
+  }
   const PoseSample sample = estimator_->process(frame);
   source_->release(item.set);
-  note_faults(item.stamp);
-  for (const EstimatorEvent& event : estimator_->events()) {
-    if (event.kind == EstimatorEvent::Kind::dropped) dropped_ += static_cast<std::uint64_t>(std::max(0.0, event.value));
-    recorder_->post(EventRecord::of(event));
-  }
+  journal_.note(*estimator_);
+  journal_.note(sample);
   newest_stamp_ = item.stamp;
   comparison_->add(sample);
-
-  ++glimpse_.done;
-  glimpse_.state = sample.state;
-  glimpse_.inliers = sample.inliers;
-  glimpse_.estimate_ms = sample.estimate_ms;
-  if (sample.status != PoseStatus::lost) {
-    if (posed_) glimpse_.path_m += (sample.T_world_left.t - last_position_).norm();
-    last_position_ = sample.T_world_left.t;
-    posed_ = true;
-  }
-  (void)glimpses_.push(glimpse_);
 }
 
 void Drive::drain_comparison() noexcept {
   for (ComparedPose pose; comparison_->next(&pose);) {
     recorder_->post(PoseRecord::of(pose, 0.0F));
     if (pose.ins_valid) ++ins_matches_;
-    glimpse_.from_ins_m = pose.compared ? pose.error_enu.norm() : -1;
+    journal_.note_distance_from_ins(pose.compared ? pose.error_enu.norm() : -1);
     note_placement(pose.pose.stamp);
     if (devices_.ins() != nullptr) note_ins(pose);
+    note_scale(pose);
   }
 }
 
@@ -217,7 +208,7 @@ void Drive::note_placement(Stamp stamp) noexcept {
   constexpr double kDegrees = 180.0 / std::numbers::pi;
   (void)std::snprintf(text.data(), text.size(), "placed on the earth after %.1f m: heading to %.2f deg, residual %.2f m", p.distance,
                       p.rotation_sigma.z() * kDegrees, p.residual);
-  tell_event(stamp, "placement", text.data(), false);
+  journal_.tell(stamp, "placement", text.data(), false);
 }
 
 void Drive::note_ins(const ComparedPose& pose) noexcept {
@@ -227,16 +218,16 @@ void Drive::note_ins(const ComparedPose& pose) noexcept {
   if (match_run_ != kSettled) return;
   switch (pose.ins) {
     case InsMatch::ok:
-      if (ins_matches_ > kSettled) tell_event(pose.pose.stamp, "ins_ok", "the INS has a position again; the comparison goes on", false);
+      if (ins_matches_ > kSettled) journal_.tell(pose.pose.stamp, "ins_ok", "the INS has a position again; the comparison goes on", false);
       break;
     case InsMatch::none:
-      tell_event(pose.pose.stamp, "ins_silent", "the INS is silent: the drive goes on without it; check its cable and its rate", true);
+      journal_.tell(pose.pose.stamp, "ins_silent", "the INS is silent: the drive goes on without it; check its cable and its rate", true);
       break;
     case InsMatch::gap:
-      tell_event(pose.pose.stamp, "ins_gap", "readings of the INS are missing: these poses are not compared", true);
+      journal_.tell(pose.pose.stamp, "ins_gap", "readings of the INS are missing: these poses are not compared", true);
       break;
     case InsMatch::no_fix:
-      tell_event(pose.pose.stamp, "ins_no_fix", "the INS has no position: the comparison pauses; check its antenna", true);
+      journal_.tell(pose.pose.stamp, "ins_no_fix", "the INS has no position: the comparison pauses; check its antenna", true);
       break;
     case InsMatch::jump:  // told with the reading: it may fall between two frames
       break;
@@ -247,7 +238,7 @@ void Drive::note_jump(Stamp stamp) noexcept {
   const std::uint64_t jumps = comparison_->counters().jumps;
   if (jumps == jumps_) return;
   jumps_ = jumps;
-  tell_event(stamp, "ins_jump", "the INS's position leapt: not interpolated across, errors from here on contain the leap", true);
+  journal_.tell(stamp, "ins_jump", "the INS's position leapt: not interpolated across, errors from here on contain the leap", true);
 }
 
 void Drive::note_faults(Stamp stamp) noexcept {
@@ -257,23 +248,29 @@ void Drive::note_faults(Stamp stamp) noexcept {
     fault_told_[i] = true;
     std::array<char, 96> text{};
     const std::string_view kind = mock::to_string(faults[i].kind);
+    if (faults[i].kind == mock::FaultKind::recalibrate) estimator_->request_recalibration();
     (void)std::snprintf(text.data(), text.size(), "%.*s, as scheduled", static_cast<int>(kind.size()), kind.data());
-    tell_event(start_ + faults[i].at, "fault", text.data(), false);
+    journal_.tell(start_ + faults[i].at, "fault", text.data(), false);
   }
 }
 
-void Drive::tell_event(Stamp stamp, const char* kind, std::string_view sentence, bool aloud) noexcept {
-  EventRecord event;
-  event.stamp = stamp;
-  event.kind = kind;
-  event.set_sentence(sentence);
-  recorder_->post(event);
-  if (aloud) (void)notices_.push(event);
+void Drive::note_scale(const ComparedPose& pose) noexcept {
+  if (pose.scale_disagrees) ++scale_disagreements_;
+  if (pose.scale_disagrees == scale_disagrees_) return;
+  scale_disagrees_ = pose.scale_disagrees;
+  std::array<char, 200> text{};
+  if (scale_disagrees_)
+    (void)std::snprintf(
+        text.data(), text.size(), "the way comes out %.1f %% %s than the INS's over %.0f m: images cannot tell, measure the baseline again",
+        100 * std::abs(pose.path_ratio - 1), pose.path_ratio > 1 ? "longer" : "shorter", comparison_options_.scale_stretch_m);
+  else
+    (void)std::snprintf(text.data(), text.size(), "the way is as long as the INS's again");
+  journal_.tell(pose.pose.stamp, scale_disagrees_ ? "scale_disagrees" : "scale_agrees", text.data(), scale_disagrees_);
 }
 
 // ---- the caller's thread ------------------------------------------------------------------------------------------
 
-void Drive::watch(const SignalGuard& signals, Progress* progress) {
+void Drive::watch(Progress* progress) {
   constexpr std::chrono::milliseconds kLook{50};
   const auto begun = std::chrono::steady_clock::now();
   const auto over = [&] {  // real cameras do not end by themselves
@@ -282,32 +279,14 @@ void Drive::watch(const SignalGuard& signals, Progress* progress) {
   };
   std::unique_lock lock(mutex_);
   while (!changed_.wait_for(lock, kLook, [this] { return done_; })) {
-    if (signals.stop_requested() || over()) source_->stop();
+    if (signals_.stop_requested() || over()) source_->stop();
+    if (signals_.take_calibration_request()) calibration_asked_.store(true, std::memory_order_relaxed);
     lock.unlock();
-    show(progress);
+    journal_.show(progress, devices_.frames());
     lock.lock();
   }
   lock.unlock();
-  show(progress);
-}
-
-void Drive::show(Progress* progress) {
-  for (EventRecord notice; notices_.pop(&notice);)
-    progress->say(fmt::format("vergence: at {:.1f} s {}", (notice.stamp - start_).to_seconds(), notice.sentence.data()));
-  for (const std::string& sentence : recorder_->take_complaints()) progress->say("vergence: " + sentence);
-  Glimpse newest;
-  bool any = false;
-  while (glimpses_.pop(&newest)) any = true;
-  if (!any) return;
-  ProgressState state;
-  state.state = newest.state == State::stereo_odometry ? "stereo" : to_string(newest.state);
-  state.frame = newest.done;
-  state.frames = devices_.frames();
-  state.path_m = newest.path_m;
-  state.inliers = newest.inliers;
-  state.estimate_ms = static_cast<double>(newest.estimate_ms);
-  if (newest.from_ins_m >= 0) state.from_ins_m = newest.from_ins_m;
-  progress->update(state);
+  journal_.show(progress, devices_.frames());
 }
 
 void Drive::write_truth(std::vector<std::string>* faults) const {
@@ -341,7 +320,7 @@ std::vector<std::pair<std::string, std::uint64_t>> Drive::device_counters() cons
                                                          {"sets_unproven", c.sync.unproven},
                                                          {"clock_resets", c.clock_resets},
                                                          {"worst_stamp_error_ns", static_cast<std::uint64_t>(c.worst_stamp_error_ns)}};
-  for (int k = 0; k < rig_.cameras; ++k) {
+  for (int k = 0; k < begin_.file.rig.cameras; ++k) {
     const auto i = static_cast<std::size_t>(k);
     const CameraStatistics s = devices_.cameras()[i]->statistics();
     const std::string name = fmt::format("camera{}_", k);
@@ -361,10 +340,9 @@ TruthFigures Drive::truth_figures(const SessionTotals& totals) const {
   TruthFigures figures;
   if (totals.trajectory.empty() || devices_.mock() == nullptr) return figures;
   figures.evaluation = evaluate(totals.trajectory, truth_, summary_evaluation_options());
-  const RigCalibration truly = devices_.mock()->truth().calibration(totals.trajectory.back().stamp - start_);
-  const Transform &ours = estimator_->calibration().T_camera_left[1], &theirs = truly.T_camera_left[1];
-  const Vec3 turn = log_so3(ours.R * theirs.R.transpose()), shift = ours.t - theirs.t;
-  figures.calibration_error = {turn.x(), turn.y(), turn.z(), shift.x(), shift.y(), shift.z()};
+  if (estimator_->calibrated())
+    figures.calibration_error =
+        calibration_errors(estimator_->calibration(), devices_.mock()->truth().calibration(totals.trajectory.back().stamp - start_));
   return figures;
 }
 
@@ -372,21 +350,25 @@ SummaryInput Drive::summary_input(const SessionTotals& totals, std::uint64_t all
   SummaryInput input;
   const LiveCounters& c = source_->counters();
   input.skipped = c.dropped_sets + c.sync.missed;
-  input.dropped_by_estimator = dropped_;
+  input.dropped_by_estimator = journal_.dropped();
   if (!totals.reference.empty() && !totals.trajectory.empty())
     input.evaluation = evaluate(totals.trajectory, totals.reference, summary_evaluation_options());
-  input.calibration = estimator_->calibration();
-  input.calibration_source = "rig.nominal";
+  describe_calibration(*estimator_, begin_, totals, options_.calibration, &input);
   input.allocations_after_seal = allocations;
   input.memory = memory();
   input.configuration_hash = configuration_hash(configuration_);
   input.devices = device_counters();
   const ComparisonCounters& k = comparison_->counters();
   if (devices_.ins() != nullptr)
-    input.comparison = {{"ins_samples", k.ins_samples},   {"ins_refused", k.ins_refused},
-                        {"ins_restarts", k.ins_restarts}, {"jumps", k.jumps},
-                        {"compared", k.compared},         {"without_ins", k.without_ins},
-                        {"pushed_out", k.pushed_out},     {"placements", comparison_->placement().revision}};
+    input.comparison = {{"ins_samples", k.ins_samples},
+                        {"ins_refused", k.ins_refused},
+                        {"ins_restarts", k.ins_restarts},
+                        {"jumps", k.jumps},
+                        {"compared", k.compared},
+                        {"without_ins", k.without_ins},
+                        {"pushed_out", k.pushed_out},
+                        {"placements", comparison_->placement().revision},
+                        {"scale_disagrees", scale_disagreements_}};
   if (devices_.mock() != nullptr) input.truth = truth_figures(totals);
   return input;
 }
@@ -422,35 +404,38 @@ ExitCode Drive::verdict(const SessionTotals& totals, const std::vector<std::stri
 }
 
 ExitCode Drive::run() {
-  const SignalGuard signals;
   make_session_folder(request_.out);
   constexpr double kUnknownDrive = 3600;  // s, memory for as long where nobody knows how long it is
   const std::size_t frames =
       devices_.frames() > 0 ? devices_.frames() : static_cast<std::size_t>(kUnknownDrive * configuration_.trigger.rate);
-  recorder_ = std::make_unique<Recorder>(
-      request_.out, Recorder::Options{request_.fast ? Recorder::WhenFull::wait : Recorder::WhenFull::drop, true, frames});
-  recorder_->post(CalibrationRecord::of(rig_, start_, true, "given", "rig.nominal of the configuration"));
+  Recorder::Options to_record;
+  to_record.when_full = request_.fast ? Recorder::WhenFull::wait : Recorder::WhenFull::drop;
+  to_record.expected_frames = frames;
+  to_record.keep = calibration_keeper(request_.out, begin_.file, begin_.state);
+  recorder_ = std::make_unique<Recorder>(request_.out, to_record);
+  journal_.open(recorder_.get(), start_);
   std::vector<std::string> faults;
-  write_session_calibration(request_.out, rig_, configuration_.rig.name, &faults);  // at once: a session that is killed has it, too
+  begin_session(request_.out, begin_, start_, recorder_.get(), &faults);
   if (request_.print_memory) print_memory_table(memory());
 
   Progress progress = Progress::on_stderr(request_.quiet);
+  for (const std::string& sentence : begin_.remarks) progress.say("vergence: " + sentence);
   const auto allocations_before = AllocationGuard::allocations_after_seal();
   for (const std::string& remark : devices_.remarks()) {
     progress.say("vergence: " + remark);
-    tell_event(start_, "device", remark, false);
+    journal_.tell(start_, "device", remark, false);
   }
   begin();
   if (devices_.mock() != nullptr) write_truth(&faults);
   std::thread estimating([this] { estimate(); });
-  watch(signals, &progress);
+  watch(&progress);
   estimating.join();
   source_->join();
   progress.finish();
 
   const auto totals = recorder_->close();
   const SummaryInput input = summary_input(*totals, AllocationGuard::allocations_after_seal() - allocations_before);
-  if (faults.empty()) write_session_calibration(request_.out, estimator_->calibration(), configuration_.rig.name, &faults);
+  if (faults.empty()) end_session(request_.out, begin_, input, *totals, &faults);
   write_session_summary(request_.out, *totals, input, &faults);
   faults.insert(faults.end(), totals->faults.begin(), totals->faults.end());
   for (const std::string& sentence : recorder_->take_complaints()) progress.say("vergence: " + sentence);
@@ -458,7 +443,7 @@ ExitCode Drive::run() {
   if (!request_.quiet) tell(*totals, input, &progress);
   write_session_report(request_.out, request_.quiet, &progress);
   const ExitCode code = verdict(*totals, faults, &progress);
-  return signals.stop_code().value_or(code);
+  return signals_.stop_code().value_or(code);
 }
 
 void Drive::begin() {

@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "app/commands/starting_calibration.hpp"
 #include "app/config/configuration.hpp"
 #include "app/runtime/errors.hpp"
 
@@ -13,6 +14,7 @@ namespace vergence::app {
 struct RunRequest {
   std::filesystem::path out;
   Configuration configuration;
+  CalibrationWish calibration{};     // --from-scratch, --calibration
   std::vector<std::string> faults;   // of the command line, beside the configuration's
   std::optional<double> duration_s;  // all of the drive when not set
   bool fast = false;                 // virtual time: nothing is dropped for time
@@ -22,7 +24,8 @@ struct RunRequest {
 
 /// Drives: cameras, INS and board of the configuration through pairing, estimator and comparison into a session folder (DESIGN §6).
 ///
-/// Threads  The devices' own, the synchroniser's, the estimator (sealed, with the comparison), its worker, the recorder; the caller's
+/// Threads  The devices' own, the synchroniser's, the estimator (sealed, with the comparison), its worker, the calibration
+///          solver's (sealed, too), the recorder; the caller's
 ///          thread draws the progress line and watches for signals.
 /// Errors   InputError before the session folder is made, for all that can be known by then. Afterwards sentences on stderr.
 /// → done, not_usable (never a pose, an INS that never had a fix, a file that is not whole), device_failed (gone at the end),

@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "app/config/calibration_file.hpp"
+#include "app/config/calibration_state.hpp"
 #include "app/recorder/line_file.hpp"
 #include "app/report/report.hpp"
 #include "app/runtime/errors.hpp"
@@ -19,17 +20,59 @@ std::unique_ptr<PairRunner> make_runner(int threads) {
   return std::make_unique<SequentialRunner>();
 }
 
-void write_session_calibration(const std::filesystem::path& session, const RigCalibration& rig, const std::string& rig_name,
-                               std::vector<std::string>* faults) {
-  CalibrationFile file;
-  file.rig = rig;
-  file.rig_name = rig_name;
-  file.source = "given";
+void write_session_calibration(const std::filesystem::path& session, const CalibrationFile& calibration, std::vector<std::string>* faults) {
   try {
-    write_calibration(session / "calibration.yaml", file);
+    write_calibration(session / "calibration.yaml", calibration);
   } catch (const InputError& e) {
     faults->emplace_back(e.what());
   }
+}
+
+std::function<Kept(const RigCalibration&)> calibration_keeper(const std::filesystem::path& session, const CalibrationFile& words,
+                                                              const std::optional<std::filesystem::path>& state) {
+  return [session, words, state](const RigCalibration& rig) -> Kept {
+    CalibrationFile file = words;
+    file.rig = rig;
+    file.source = "online";
+    Kept kept;
+    std::vector<std::string> faults;
+    write_session_calibration(session, file, &faults);
+    if (state) {
+      try {
+        write_state(*state, file);
+        kept.sentence = "the calibration is kept for the next drive: " + state->string();
+      } catch (const InputError& e) {
+        faults.insert(faults.begin(), std::string(e.what()) + "; the next drive will not know this calibration");
+      }
+    }
+    if (!faults.empty()) kept = {true, fmt::format("{}", fmt::join(faults, "; "))};
+    return kept;
+  };
+}
+
+void begin_session(const std::filesystem::path& session, const StartingCalibration& begin, Stamp stamp, Recorder* recorder,
+                   std::vector<std::string>* faults) {
+  if (begin.trust == CalibrationTrust::none) return;
+  recorder->post(CalibrationRecord::begin(begin.file.rig, stamp, begin.cause, begin.source.c_str()));
+  write_session_calibration(session, begin.file, faults);  // at once: a session that is killed has it, too
+}
+
+void describe_calibration(const Estimator& estimator, const StartingCalibration& begin, const SessionTotals& totals,
+                          const calibration::CalibrationOptions& options, SummaryInput* input) {
+  input->calibrated = estimator.calibrated();
+  input->calibration = estimator.calibration();
+  input->calibration_source = totals.accepted > 0 ? "online" : begin.source;
+  if (begin.trust != CalibrationTrust::none) input->before = begin.file.rig;
+  input->options = options;
+}
+
+void end_session(const std::filesystem::path& session, const StartingCalibration& begin, const SummaryInput& input,
+                 const SessionTotals& totals, std::vector<std::string>* faults) {
+  if (!input.calibrated) return;
+  CalibrationFile file = begin.file;
+  file.rig = input.calibration;
+  if (totals.accepted > 0) file.source = "online";
+  write_session_calibration(session, file, faults);
 }
 
 void write_session_summary(const std::filesystem::path& session, const SessionTotals& totals, const SummaryInput& input,

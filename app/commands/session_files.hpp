@@ -1,11 +1,15 @@
 #pragma once
 #include <cstddef>
 #include <filesystem>
+#include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include "app/commands/starting_calibration.hpp"
+#include "app/config/calibration_file.hpp"
 #include "app/recorder/summary.hpp"
 #include "app/runtime/progress.hpp"
 #include "core/types/parallel.hpp"
@@ -20,8 +24,25 @@ namespace vergence::app {
 [[nodiscard]] std::unique_ptr<PairRunner> make_runner(int threads);
 
 /// calibration.yaml of the session; what goes wrong becomes a sentence of *faults.
-void write_session_calibration(const std::filesystem::path& session, const RigCalibration& rig, const std::string& rig_name,
-                               std::vector<std::string>* faults);
+void write_session_calibration(const std::filesystem::path& session, const CalibrationFile& calibration, std::vector<std::string>* faults);
+
+/// What the recorder does with a calibration found while driving: calibration.yaml of the session at once, so that a session that is
+/// killed has it, and the state file, if there is to be one. `words`: names and serials of the cameras.
+[[nodiscard]] std::function<Kept(const RigCalibration&)> calibration_keeper(const std::filesystem::path& session,
+                                                                            const CalibrationFile& words,
+                                                                            const std::optional<std::filesystem::path>& state);
+
+/// The session's first files: calibrations.csv and calibration.yaml have what the drive begins with, if there is anything.
+void begin_session(const std::filesystem::path& session, const StartingCalibration& begin, Stamp stamp, Recorder* recorder,
+                   std::vector<std::string>* faults);
+
+/// The calibration's part of the summary.
+void describe_calibration(const Estimator& estimator, const StartingCalibration& begin, const SessionTotals& totals,
+                          const calibration::CalibrationOptions& options, SummaryInput* input);
+
+/// calibration.yaml as it is in use at the end, if there is one.
+void end_session(const std::filesystem::path& session, const StartingCalibration& begin, const SummaryInput& input,
+                 const SessionTotals& totals, std::vector<std::string>* faults);
 
 /// summary.json of the session; what goes wrong becomes a sentence of *faults.
 void write_session_summary(const std::filesystem::path& session, const SessionTotals& totals, const SummaryInput& input,

@@ -48,7 +48,7 @@ std::vector<StereoPair> pair_in_order(const std::vector<std::string>& left, cons
 
 }  // namespace
 
-StereoSequence open_folder(const std::filesystem::path& folder, bool given) {
+StereoSequence open_folder(const std::filesystem::path& folder, bool given, const CalibrationUse& use) {
   StereoSequence sequence;
   sequence.root = folder;
   const auto left = list_images(folder, "left"), right = list_images(folder, "right");
@@ -62,7 +62,7 @@ StereoSequence open_folder(const std::filesystem::path& folder, bool given) {
                std::to_string(times.size()) + " lines in times.txt; one of each a pair is expected");
   for (std::size_t i = 0; i < times.size(); ++i) sequence.pairs[i].stamp = times[i];
   if (given) return sequence;
-  sequence.calibration = read_calibration(folder / "calibration.yaml").rig;
+  sequence.calibration = read_calibration(folder / "calibration.yaml", use).rig;
   sequence.calibration_source = "calibration.yaml";
   return sequence;
 }

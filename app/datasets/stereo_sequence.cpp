@@ -12,14 +12,14 @@ namespace {
 
 std::string text(ImageSize s) { return std::to_string(s.width) + "x" + std::to_string(s.height); }
 
-StereoSequence open_by_format(SequenceFormat format, const std::filesystem::path& folder, bool given) {
+StereoSequence open_by_format(SequenceFormat format, const std::filesystem::path& folder, bool given, const CalibrationUse& use) {
   switch (format) {
     case SequenceFormat::kitti:
       return detail::open_kitti(folder, given);
     case SequenceFormat::euroc:
       return detail::open_euroc(folder, given);
     case SequenceFormat::folder:
-      return detail::open_folder(folder, given);
+      return detail::open_folder(folder, given, use);
     case SequenceFormat::st_lucia:
       return detail::open_st_lucia(folder, given);
   }
@@ -29,13 +29,14 @@ StereoSequence open_by_format(SequenceFormat format, const std::filesystem::path
 }  // namespace
 
 StereoSequence open_sequence(SequenceFormat format, const std::filesystem::path& folder,
-                             const std::optional<std::filesystem::path>& calibration) {
+                             const std::optional<std::filesystem::path>& calibration, const CalibrationUse& use) {
   detail::require_folder(folder, "a drive");
-  StereoSequence sequence = open_by_format(format, folder, calibration.has_value());
+  StereoSequence sequence = open_by_format(format, folder, calibration.has_value(), use);
   if (calibration) {
-    sequence.calibration = read_calibration(*calibration).rig;
+    sequence.calibration = read_calibration(*calibration, use).rig;
     sequence.calibration_source = calibration->filename().string();
   }
+  apply_use(use, &sequence.calibration);
   const std::filesystem::path source = calibration.value_or(sequence.root / sequence.calibration_source);
   if (const auto bad = find_implausible(&sequence.calibration)) refuse(source, 0, bad->sentence);
   if (sequence.calibration.cameras != 2)

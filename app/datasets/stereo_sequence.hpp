@@ -8,6 +8,7 @@
 #include <string_view>
 #include <vector>
 
+#include "app/config/calibration_file.hpp"
 #include "core/types/calibration.hpp"
 #include "core/types/time.hpp"
 
@@ -44,10 +45,12 @@ struct StereoSequence {
 ///   st_lucia  PREFIX_MultiCamera0.log names the images in PREFIX_MultiCamera0/; paired by line, stamp of the left camera; raw Bayer BMP;
 ///           the calibration published with the data set
 ///
+/// `use`: what of the calibration is wanted, whichever it is.
 /// InputError (file, line, what): folders or files that are not there, no images, numbers of images and times that do not go
 /// together, times that are no numbers, a calibration that makes no rig, images of another size than the calibration.
 [[nodiscard]] StereoSequence open_sequence(SequenceFormat format, const std::filesystem::path& folder,
-                                           const std::optional<std::filesystem::path>& calibration = std::nullopt);
+                                           const std::optional<std::filesystem::path>& calibration = std::nullopt,
+                                           const CalibrationUse& use = {});
 
 /// Looks at the head of every image of pairs [first, first + count): InputError names the first that has another size than the
 /// calibration. Missing and unreadable files pass: their frames are skipped when they come. Some 10 µs an image.

@@ -135,6 +135,7 @@ void Recorder::write(const PoseRecord& p) {
   ++totals_->read;
   ++(p.status == PoseStatus::ok ? totals_->ok : p.status == PoseStatus::degraded ? totals_->degraded : totals_->lost);
   totals_->estimate.add(static_cast<double>(p.estimate_ms));
+  if (p.state != State::stereo_odometry && p.state != State::lost) totals_->calibrating.add(static_cast<double>(p.estimate_ms));
   totals_->decode.add(static_cast<double>(p.decode_ms));
   for (std::size_t i = 0; i < p.stage_ms.size(); ++i) totals_->stages[i].add(static_cast<double>(p.stage_ms[i]));
 
@@ -191,26 +192,70 @@ void Recorder::write(const EventRecord& e) {
   files_->events.append(object.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n");
 }
 
+namespace {
+
+/// A comma and a number for each; commas alone where all are zero, which stands for "not given".
+template <std::size_t N>
+void append_sigmas(std::string* line, const std::array<double, N>& values) {
+  const bool given = std::any_of(values.begin(), values.end(), [](double v) { return v > 0; });
+  for (const double v : values)
+    if (given)
+      fmt::format_to(std::back_inserter(*line), ",{:.9f}", v);
+    else
+      *line += ',';
+}
+
+/// A word or sentence as one field.
+std::string field(const char* text) {
+  std::string f = text;
+  for (char& c : f)
+    if (c == ',' || c == '\n' || c == '"') c = ';';
+  return f;
+}
+
+}  // namespace
+
 void Recorder::write(const CalibrationRecord& c) {
-  for (std::size_t k = 1; k < static_cast<std::size_t>(c.cameras); ++k) {
+  const RigCalibration rig = c.rig.rig();
+  for (std::size_t k = 1; k < static_cast<std::size_t>(rig.cameras); ++k) {
     line_.clear();
     const auto out = std::back_inserter(line_);
-    fmt::format_to(out, "{},{},{},{},{},{:.4f},{}", c.stamp.ns(), c.accepted ? "accepted" : "rejected", c.source, c.reason, c.frames,
-                   c.reprojection_px, k);
-    for (const double v : c.extra[k].T_camera_left) fmt::format_to(out, ",{:.9f}", v);
-    const auto sigmas = [&](const std::array<double, 6>& values) {  // zero stands for "not given"
-      const bool given = std::any_of(values.begin(), values.end(), [](double v) { return v > 0; });
-      for (const double v : values)
-        if (given)
-          fmt::format_to(out, ",{:.9f}", v);
-        else
-          line_ += ',';
-    };
-    sigmas(c.extra[k].sigma_noise);
-    sigmas(c.extra[k].sigma_wide);
+    fmt::format_to(out, "{},{},{},{},{}", c.stamp.ns(), c.accepted ? "accepted" : "rejected", field(c.cause), field(c.reason), rig.frames);
+    if (c.decided)
+      fmt::format_to(out, ",{},{},{:.4f},{:.4f},{:.4f},{:.6f}", c.latency_frames, c.onset_frame, rig.reprojection_px, c.held_out_before_px,
+                     c.held_out_after_px, rig.scale_sigma);
+    else
+      fmt::format_to(out, ",,,{:.4f},,,{:.6f}", rig.reprojection_px, rig.scale_sigma);
+    const Transform& T = rig.T_camera_left[k];
+    const Vec3 phi = log_so3(T.R);
+    fmt::format_to(out, ",{}", k);
+    for (const double v : {phi.x(), phi.y(), phi.z(), T.t.x(), T.t.y(), T.t.z()}) fmt::format_to(out, ",{:.9f}", v);
+    append_sigmas(&line_, rig.sigma_noise[k]);
+    append_sigmas(&line_, rig.sigma_wide[k]);
+    const Intrinsics& lens = rig.intrinsics[k];
+    fmt::format_to(out, ",{:.5f},{:.5f},{:.5f},{:.5f}", lens.fx, lens.fy, lens.cx, lens.cy);
+    append_sigmas(&line_, lens.sigma);
     line_ += '\n';
     files_->calibrations.append(line_);
   }
+  if (c.decided) note(c);
+}
+
+void Recorder::note(const CalibrationRecord& c) {
+  ++(c.accepted ? totals_->accepted : totals_->rejected);
+  if (totals_->attempts.size() == kMostAttempts) totals_->attempts.erase(totals_->attempts.begin());
+  totals_->attempts.push_back({c.stamp, c.cause, c.reason, c.accepted, c.latency_frames, c.rig.frames, c.solve_ms});
+  if (!c.accepted || !options_.keep) return;
+  const Kept kept = options_.keep(c.rig.rig());
+  if (kept.sentence.empty()) return;
+  EventRecord event;
+  event.stamp = c.stamp;
+  event.kind = kept.failed ? "calibration_not_kept" : "calibration_kept";
+  event.set_sentence(kept.sentence);
+  write(event);
+  if (!kept.failed) return;
+  const std::lock_guard lock(complaints_mutex_);
+  complaints_.push_back(kept.sentence);
 }
 
 void Recorder::flush() {

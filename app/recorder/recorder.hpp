@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <memory>
 #include <mutex>
 #include <string>
@@ -24,25 +25,48 @@ inline constexpr const char* kPosesHeader =
     "frame,stamp_ns,state,status,reason,x,y,z,qx,qy,qz,qw,east,north,up,latitude_deg,longitude_deg,height_m,heading_deg,"
     "ins_east,ins_north,ins_up,ins_latitude_deg,ins_longitude_deg,ins_height_m,ins_heading_deg,"
     "error_east_m,error_north_m,error_up_m,error_heading_deg,inliers,reprojection_px,estimate_ms";
+/// What calibrations.csv has: rotation vectors and their sigmas in rad, lengths in m, `sigma_` by noise alone, `wide_` with uncertain
+/// intrinsics, pixels. Latency in frames since the alarm, the request or the start; held-out errors are medians before and after.
 inline constexpr const char* kCalibrationsHeader =
-    "stamp_ns,outcome,source,reason,frames,reprojection_px,camera,rx,ry,rz,tx,ty,tz,"
-    "sigma_rx,sigma_ry,sigma_rz,sigma_tx,sigma_ty,sigma_tz,wide_rx,wide_ry,wide_rz,wide_tx,wide_ty,wide_tz";
+    "stamp_ns,outcome,cause,reason,frames,latency_frames,onset_frame,reprojection_px,held_out_before_px,held_out_after_px,scale_sigma,"
+    "camera,rx,ry,rz,tx,ty,tz,sigma_rx,sigma_ry,sigma_rz,sigma_tx,sigma_ty,sigma_tz,wide_rx,wide_ry,wide_rz,wide_tx,wide_ty,wide_tz,"
+    "fx,fy,cx,cy,sigma_fx,sigma_fy,sigma_cx,sigma_cy";
 
 /// Makes the folder of a session. InputError: it exists and is not empty, is no folder, or cannot be made.
 void make_session_folder(const std::filesystem::path& folder);
+
+/// One attempt to calibrate while driving.
+struct CalibrationAttempt {
+  Stamp stamp{};
+  std::string cause{}, reason{};  // CalibrationCause's word; why it was rejected
+  bool accepted = false;
+  int latency_frames = 0, frames = 0;
+  double solve_ms = 0;
+};
 
 /// What a session has come to: for summary.json.
 struct SessionTotals {
   std::uint64_t read = 0, ok = 0, degraded = 0, lost = 0;  // frames
   TimeHistogram estimate, decode;                          // ms
+  TimeHistogram calibrating;                               // ms, of the frames in other states than stereo_odometry and lost
   std::array<TimeHistogram, kStages> stages;
-  double path_m = 0;                    // sum of the steps between successive poses
-  std::vector<StampedPose> trajectory;  // if asked for: the poses of trajectory.tum
-  std::vector<StampedPose> reference;   // if asked for: of reference.tum, in its own frame
-  std::uint64_t dropped_records = 0;    // the ring was full (live only)
-  std::uint64_t lost_lines = 0;         // the disk took no more
+  std::vector<CalibrationAttempt> attempts;  // the newest kMostAttempts
+  std::uint64_t accepted = 0, rejected = 0;  // of all of them
+  double path_m = 0;                         // sum of the steps between successive poses
+  std::vector<StampedPose> trajectory;       // if asked for: the poses of trajectory.tum
+  std::vector<StampedPose> reference;        // if asked for: of reference.tum, in its own frame
+  std::uint64_t dropped_records = 0;         // the ring was full (live only)
+  std::uint64_t lost_lines = 0;              // the disk took no more
   std::size_t ring_high_water = 0;
   std::vector<std::string> faults;  // a sentence for each file that is not whole
+};
+
+inline constexpr std::size_t kMostAttempts = 1000;  // in summary.json; calibrations.csv has all
+
+/// What became of a calibration that was to be kept: a line of events.jsonl, a complaint as well when it failed.
+struct Kept {
+  bool failed = false;
+  std::string sentence{};  // empty: nothing to tell
 };
 
 /// Writes trajectory.tum, reference.tum, poses.csv, calibrations.csv and events.jsonl of a session as it goes on, on a thread of
@@ -61,6 +85,8 @@ class Recorder {
     WhenFull when_full = WhenFull::wait;
     bool keep_trajectory = true;
     std::size_t expected_frames = 0;  // memory taken beforehand for the trajectory
+    /// Called on the recorder's thread with every calibration that was accepted while driving: files may be written there. May be empty.
+    std::function<Kept(const RigCalibration&)> keep{};
   };
 
   /// `folder` exists: make_session_folder().
@@ -82,6 +108,7 @@ class Recorder {
   void write(const PoseRecord& pose);
   void write(const EventRecord& event);
   void write(const CalibrationRecord& calibration);
+  void note(const CalibrationRecord& calibration);
   void flush();
   void stop_and_join() noexcept;
   void complain(const LineFile& file);

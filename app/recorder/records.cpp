@@ -34,6 +34,22 @@ const char* kind_word(EstimatorEvent::Kind kind) noexcept {
   return "";
 }
 
+/// What stands before the reason that the estimator gives.
+const char* opening(EstimatorEvent::Kind kind) noexcept {
+  switch (kind) {
+    case EstimatorEvent::Kind::calibration_accepted:
+      return "a new calibration is in use";
+    case EstimatorEvent::Kind::calibration_rejected:
+      return "a calibration was rejected";
+    case EstimatorEvent::Kind::calibration_waits:
+      return "the calibration waits";
+    case EstimatorEvent::Kind::calibration_confirmed:
+      return "the calibration of the state file is confirmed";
+    default:
+      return "";
+  }
+}
+
 }  // namespace
 
 PoseNumbers PoseNumbers::of(const Transform& T) noexcept {
@@ -103,26 +119,87 @@ EventRecord EventRecord::of(const EstimatorEvent& event) noexcept {
     r.fields[0] = {"from", from.data()};
     r.fields[1] = {"to", to.data()};
   } else {
-    r.set_sentence(event.why);
+    const char* begin = opening(event.kind);
+    const bool said = event.kind == EstimatorEvent::Kind::calibration_accepted || event.kind == EstimatorEvent::Kind::calibration_confirmed;
+    const char* why = said ? "" : event.why;
+    std::array<char, 256> text{};
+    (void)std::snprintf(text.data(), text.size(), "%s%s%s", begin, *begin != 0 && *why != 0 ? ": " : "", why);
+    r.set_sentence(text.data());
     r.fields[0] = {"value", event.value};
   }
   return r;
 }
 
-CalibrationRecord CalibrationRecord::of(const RigCalibration& rig, Stamp stamp, bool accepted, const char* source,
-                                        const char* reason) noexcept {
+RigNumbers RigNumbers::of(const RigCalibration& rig) noexcept {
+  RigNumbers n;
+  n.cameras = rig.cameras;
+  n.intrinsics = rig.intrinsics;
+  n.sigma_noise = rig.sigma_noise;
+  n.sigma_wide = rig.sigma_wide;
+  for (std::size_t k = 0; k < static_cast<std::size_t>(rig.cameras); ++k) {
+    const Transform& T = rig.T_camera_left[k];
+    for (int row = 0; row < 3; ++row) {
+      for (int column = 0; column < 3; ++column) n.T_camera_left[k][static_cast<std::size_t>(4 * row + column)] = T.R(row, column);
+      n.T_camera_left[k][static_cast<std::size_t>(4 * row + 3)] = T.t(row);
+    }
+    auto next = n.covariance_wide[k].begin();
+    for (int i = 0; i < 6; ++i)
+      for (int j = i; j < 6; ++j) *next++ = rig.covariance_wide[k](i, j);
+  }
+  n.baseline = rig.baseline;
+  n.baseline_sigma = rig.baseline_sigma;
+  n.found = rig.found;
+  n.frames = rig.frames;
+  n.reprojection_px = rig.reprojection_px;
+  n.scale_sigma = rig.scale_sigma;
+  return n;
+}
+
+RigCalibration RigNumbers::rig() const noexcept {
+  RigCalibration r;
+  r.cameras = cameras;
+  r.intrinsics = intrinsics;
+  r.sigma_noise = sigma_noise;
+  r.sigma_wide = sigma_wide;
+  for (std::size_t k = 0; k < static_cast<std::size_t>(cameras); ++k) {
+    const auto& T = T_camera_left[k];
+    r.T_camera_left[k].R << T[0], T[1], T[2], T[4], T[5], T[6], T[8], T[9], T[10];
+    r.T_camera_left[k].t << T[3], T[7], T[11];
+    auto next = covariance_wide[k].begin();
+    for (int i = 0; i < 6; ++i)
+      for (int j = i; j < 6; ++j) r.covariance_wide[k](i, j) = r.covariance_wide[k](j, i) = *next++;
+  }
+  r.baseline = baseline;
+  r.baseline_sigma = baseline_sigma;
+  r.found = found;
+  r.frames = frames;
+  r.reprojection_px = reprojection_px;
+  r.scale_sigma = scale_sigma;
+  return r;
+}
+
+CalibrationRecord CalibrationRecord::of(const CalibrationDecision& d) noexcept {
+  CalibrationRecord r;
+  r.stamp = d.stamp;
+  r.decided = true;
+  r.accepted = d.accepted;
+  r.cause = to_string(d.cause).data();  // a literal: ends with 0
+  r.reason = d.reason;
+  r.latency_frames = d.latency_frames;
+  r.onset_frame = d.onset_frame;
+  r.held_out_before_px = d.held_out_before_px;
+  r.held_out_after_px = d.held_out_after_px;
+  r.solve_ms = d.solve_ms;
+  r.rig = RigNumbers::of(d.calibration);
+  return r;
+}
+
+CalibrationRecord CalibrationRecord::begin(const RigCalibration& rig, Stamp stamp, const char* cause, const char* reason) noexcept {
   CalibrationRecord r;
   r.stamp = stamp;
-  r.accepted = accepted;
-  r.source = source;
+  r.cause = cause;
   r.reason = reason;
-  r.frames = rig.frames;
-  r.reprojection_px = rig.reprojection_px;
-  r.cameras = rig.cameras;
-  for (std::size_t k = 1; k < static_cast<std::size_t>(rig.cameras); ++k) {
-    const Vec3 phi = log_so3(rig.T_camera_left[k].R), &t = rig.T_camera_left[k].t;
-    r.extra[k] = {{phi.x(), phi.y(), phi.z(), t.x(), t.y(), t.z()}, rig.sigma_noise[k], rig.sigma_wide[k]};
-  }
+  r.rig = RigNumbers::of(rig);
   return r;
 }
 

@@ -8,6 +8,7 @@
 #include "core/comparison/comparison.hpp"
 #include "core/estimator/estimator.hpp"
 #include "core/types/calibration.hpp"
+#include "core/types/calibration_decision.hpp"
 #include "core/types/pose_sample.hpp"
 #include "core/types/stamped_pose.hpp"
 
@@ -74,23 +75,38 @@ struct EventRecord {
   [[nodiscard]] static EventRecord of(const EstimatorEvent& event) noexcept;
 };
 
-/// A calibration that was accepted or rejected: a line of calibrations.csv for every camera but the left one.
-struct CalibrationRecord {
-  struct Extra {
-    std::array<double, 6> T_camera_left{};  // rotation vector, rad; translation, m
-    std::array<double, 6> sigma_noise{}, sigma_wide{};
-  };
-  Stamp stamp{};
-  bool accepted = false;
-  const char* source = "";
-  const char* reason = "";
-  int frames = 0;
-  double reprojection_px = 0;
+/// A rig's calibration as numbers.
+struct RigNumbers {
   int cameras = 0;
-  std::array<Extra, kMaxCameras> extra{};
+  std::array<Intrinsics, kMaxCameras> intrinsics{};
+  std::array<std::array<double, 12>, kMaxCameras> T_camera_left{};  // rows of [R t]
+  std::array<std::array<double, 6>, kMaxCameras> sigma_noise{}, sigma_wide{};
+  std::array<std::array<double, 21>, kMaxCameras> covariance_wide{};  // upper triangle
+  double baseline = 0, baseline_sigma = 0;
+  Stamp found{};
+  int frames = 0;
+  double reprojection_px = 0, scale_sigma = 0;
 
-  [[nodiscard]] static CalibrationRecord of(const RigCalibration& rig, Stamp stamp, bool accepted, const char* source,
-                                            const char* reason) noexcept;
+  [[nodiscard]] static RigNumbers of(const RigCalibration& rig) noexcept;
+  [[nodiscard]] RigCalibration rig() const noexcept;
+};
+
+/// A calibration that was accepted or rejected, or that the drive began with: a line of calibrations.csv for every camera but the left one.
+struct CalibrationRecord {
+  Stamp stamp{};
+  bool decided = false;  // while driving; false: the drive began with it
+  bool accepted = true;
+  const char* cause = "";  // of a decision the word of its CalibrationCause, else `given`, `state_file`
+  const char* reason = "";
+  int latency_frames = 0;
+  std::uint64_t onset_frame = 0;
+  double held_out_before_px = 0, held_out_after_px = 0;
+  double solve_ms = 0;
+  RigNumbers rig{};
+
+  [[nodiscard]] static CalibrationRecord of(const CalibrationDecision& decision) noexcept;
+  /// What the drive begins with.
+  [[nodiscard]] static CalibrationRecord begin(const RigCalibration& rig, Stamp stamp, const char* cause, const char* reason) noexcept;
 };
 
 using Record = std::variant<PoseRecord, EventRecord, CalibrationRecord>;

@@ -1,5 +1,6 @@
 #include "app/recorder/summary.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 
@@ -7,6 +8,8 @@
 #include <nlohmann/json.hpp>
 
 #include "app/runtime/version.hpp"
+#include "core/calibration/health.hpp"
+#include "core/math/so3.hpp"
 
 namespace vergence::app {
 namespace {
@@ -22,11 +25,18 @@ double ms(double value) { return std::round(value * 1e3) / 1e3; }
 Json timing_json(const SessionTotals& t) {
   Json stages = {{"decode", ms(t.decode.mean())}};
   for (std::size_t i = 0; i < t.stages.size(); ++i) stages[std::string(to_string(static_cast<Stage>(i)))] = ms(t.stages[i].mean());
+  Json calibrating;
+  if (t.calibrating.count() > 0)
+    calibrating = {{"frames", t.calibrating.count()},
+                   {"mean", ms(t.calibrating.mean())},
+                   {"p99", ms(t.calibrating.percentile(0.99))},
+                   {"max", ms(t.calibrating.max())}};
   return {{"mean", ms(t.estimate.mean())},
           {"p50", ms(t.estimate.percentile(0.5))},
           {"p99", ms(t.estimate.percentile(0.99))},
           {"p99_9", ms(t.estimate.percentile(0.999))},
           {"max", ms(t.estimate.max())},
+          {"while_calibrating", calibrating},
           {"stages", stages}};
 }
 
@@ -47,38 +57,91 @@ Json metrics_json(const std::optional<TrajectoryEvaluation>& evaluation) {
           {"end_error_percent", e.end_error_ratio * kPercent}};
 }
 
-/// METHOD §3: what the predicted depth error at 20 m says about the rig's health.
-const char* health_word(double error_at_20_m) {
-  constexpr double kGood = 0.02, kUsable = 0.05;
-  return error_at_20_m <= kGood ? "good" : error_at_20_m <= kUsable ? "can be improved" : "recalibrate";
-}
-
 bool given(const std::array<double, 6>& sigmas) {
   for (const double s : sigmas)
     if (s > 0) return true;
   return false;
 }
 
-Json calibration_json(const RigCalibration& rig, const std::string& source) {
-  const Transform& T = rig.T_camera_left[1];
+/// Whether every further camera comes with what its uncertainty is; else nothing can be predicted.
+bool has_sigmas(const RigCalibration& rig) {
+  for (std::size_t k = 1; k < static_cast<std::size_t>(rig.cameras); ++k)
+    if (!given(rig.sigma_wide[k]) && !(rig.covariance_wide[k].diagonal().maxCoeff() > 0)) return false;
+  return rig.cameras > 1;
+}
+
+/// The word and the predicted depth errors, of the worst pair at each depth; null where the calibration brings no sigmas.
+Json health_json(const RigCalibration& rig, const calibration::CalibrationOptions& options) {
+  const bool known = has_sigmas(rig);
+  Json depth = Json::object();
+  for (const double z : calibration::kHealthDepths) {
+    double worst = 0;
+    for (int k = 1; known && k < rig.cameras; ++k) worst = std::max(worst, calibration::depth_error_percent(rig, k, z));
+    depth[fmt::format("{:g}", z)] = worst > 0 ? Json(worst) : Json();  // 0: so near that no point is seen by both
+  }
+  return {{"word", known ? Json(std::string(to_string(calibration::health(rig, options)))) : Json()}, {"depth_error_percent", depth}};
+}
+
+Json matrix_json(const Transform& T) {
   Json matrix = Json::array();
   for (int row = 0; row < 3; ++row) {
     for (int column = 0; column < 3; ++column) matrix.push_back(T.R(row, column));
     matrix.push_back(T.t(row));
   }
-  Json depth = Json::object(), word;
-  for (const int z : {1, 5, 10, 20, 50}) {
-    const auto error = depth_error(rig, z);
-    depth[std::to_string(z)] = error ? Json(*error * kPercent) : Json();
-    if (z == 20 && error) word = health_word(*error);
+  return matrix;
+}
+
+Json sigmas_json(const std::array<double, 6>& sigmas) { return given(sigmas) ? Json(sigmas) : Json(); }
+
+/// The attempt by which a drive from scratch found its first calibration.
+Json from_scratch_json(const SessionTotals& totals) {
+  constexpr std::string_view kWord = "from_scratch";
+  std::uint64_t rejected = 0;
+  for (const CalibrationAttempt& a : totals.attempts) {
+    if (a.cause != kWord) continue;
+    if (a.accepted)
+      return {{"stamp_ns", a.stamp.ns()},
+              {"latency_frames", a.latency_frames},
+              {"frames", a.frames},
+              {"solve_ms", ms(a.solve_ms)},
+              {"rejected_before", rejected}};
+    ++rejected;
   }
-  return {{"source", source},
-          {"baseline_m", T.t.norm()},
-          {"T_right_left", matrix},
-          {"sigma_noise", given(rig.sigma_noise[1]) ? Json(rig.sigma_noise[1]) : Json()},
-          {"sigma_wide", given(rig.sigma_wide[1]) ? Json(rig.sigma_wide[1]) : Json()},
-          {"word", word},
-          {"depth_error_percent", depth}};
+  return nullptr;
+}
+
+Json calibration_json(const SessionTotals& totals, const SummaryInput& input) {
+  const RigCalibration& rig = input.calibration;
+  Json json = {{"source", input.calibration_source},
+               {"baseline_m", rig.T_camera_left[1].t.norm()},
+               {"T_right_left", input.calibrated ? matrix_json(rig.T_camera_left[1]) : Json()},
+               {"sigma_noise", sigmas_json(rig.sigma_noise[1])},
+               {"sigma_wide", sigmas_json(rig.sigma_wide[1])},
+               {"scale_sigma", rig.scale_sigma > 0 ? Json(rig.scale_sigma) : Json()},
+               {"frames", rig.frames}};
+  const Json health = health_json(rig, input.options);
+  for (const auto& [key, value] : health.items()) json[key] = value;
+  json["before"] = input.before ? health_json(*input.before, input.options) : Json();
+  json["from_scratch"] = from_scratch_json(totals);
+  json["accepted"] = totals.accepted;
+  json["rejected"] = totals.rejected;
+  return json;
+}
+
+/// What became of alarms and requests; the first calibration of a drive from scratch is none of them.
+Json recalibrations_json(const SessionTotals& totals) {
+  Json json = Json::array();
+  for (const CalibrationAttempt& a : totals.attempts) {
+    if (a.cause == "from_scratch") continue;
+    json.push_back({{"reason", a.cause},
+                    {"stamp_ns", a.stamp.ns()},
+                    {"latency_frames", a.latency_frames},
+                    {"accepted", a.accepted},
+                    {"why", a.accepted ? Json() : Json(a.reason)},
+                    {"frames", a.frames},
+                    {"solve_ms", ms(a.solve_ms)}});
+  }
+  return json;
 }
 
 /// Null where nothing was counted.
@@ -88,17 +151,35 @@ Json counters_json(const std::vector<std::pair<std::string, std::uint64_t>>& cou
   return json;
 }
 
-Json truth_json(const std::optional<TruthFigures>& truth, const RigCalibration& rig) {
+/// Errors over sigmas; null without sigmas. A sigma of zero is of a direction that was held: its error is in no sigmas.
+Json in_sigmas(const std::array<double, 6>& error, const std::array<double, 6>& sigmas) {
+  if (!given(sigmas)) return nullptr;
+  Json json = Json::array();
+  for (std::size_t i = 0; i < 6; ++i) json.push_back(sigmas[i] > 0 ? Json(error[i] / sigmas[i]) : Json());
+  return json;
+}
+
+Json truth_json(const std::optional<TruthFigures>& truth, const SummaryInput& input) {
   if (!truth) return nullptr;
+  const RigCalibration& rig = input.calibration;
   Json json = metrics_json(truth->evaluation);
   if (json.is_null()) json = Json::object();
-  Json in_sigmas;
-  if (given(rig.sigma_wide[1])) {
-    in_sigmas = Json::array();
-    for (std::size_t i = 0; i < 6; ++i) in_sigmas.push_back(truth->calibration_error[i] / rig.sigma_wide[1][i]);
+  if (!input.calibrated || truth->calibration_error.empty()) {
+    for (const char* key : {"calibration_error", "calibration_error_sigmas", "calibration"}) json[key] = nullptr;
+    return json;
   }
-  json["calibration_error"] = truth->calibration_error;
-  json["calibration_error_sigmas"] = in_sigmas;
+  json["calibration_error"] = truth->calibration_error[0];
+  json["calibration_error_sigmas"] = in_sigmas(truth->calibration_error[0], rig.sigma_wide[1]);
+  Json cameras = Json::array();
+  for (std::size_t k = 1; k <= truth->calibration_error.size(); ++k) {
+    const auto& e = truth->calibration_error[k - 1];
+    cameras.push_back({{"camera", k},
+                       {"rotation_rad", {e[0], e[1], e[2]}},
+                       {"translation_m", {e[3], e[4], e[5]}},
+                       {"sigmas_noise", in_sigmas(e, rig.sigma_noise[k])},
+                       {"sigmas_wide", in_sigmas(e, rig.sigma_wide[k])}});
+  }
+  json["calibration"] = cameras;
   return json;
 }
 
@@ -111,11 +192,14 @@ EvaluationOptions summary_evaluation_options() {
   return options;
 }
 
-std::optional<double> depth_error(const RigCalibration& rig, double z) {
-  const auto& sigma = rig.sigma_wide[1];
-  const double baseline = rig.T_camera_left[1].t.norm();
-  if (!given(sigma) || !(baseline > 0)) return std::nullopt;
-  return std::hypot(z * sigma[1] / baseline, sigma[3] / baseline);
+std::vector<std::array<double, 6>> calibration_errors(const RigCalibration& ours, const RigCalibration& truth) {
+  std::vector<std::array<double, 6>> errors;
+  for (std::size_t k = 1; k < static_cast<std::size_t>(std::min(ours.cameras, truth.cameras)); ++k) {
+    const Transform &a = ours.T_camera_left[k], &b = truth.T_camera_left[k];
+    const Vec3 turn = log_so3(a.R * b.R.transpose()), shift = a.t - b.t;
+    errors.push_back({turn.x(), turn.y(), turn.z(), shift.x(), shift.y(), shift.z()});
+  }
+  return errors;
 }
 
 Json summary_json(const SessionTotals& totals, const SummaryInput& input) {
@@ -126,8 +210,8 @@ Json summary_json(const SessionTotals& totals, const SummaryInput& input) {
   json["path_m"] = totals.path_m;
   json["timing_ms"] = timing_json(totals);
   json["metrics"] = metrics_json(input.evaluation);
-  json["calibration"] = calibration_json(input.calibration, input.calibration_source);
-  json["recalibrations"] = Json::array();
+  json["calibration"] = calibration_json(totals, input);
+  json["recalibrations"] = recalibrations_json(totals);
   json["allocations_after_seal"] = input.allocations_after_seal;
   Json memory = Json::object();
   std::size_t sum = 0;
@@ -144,7 +228,7 @@ Json summary_json(const SessionTotals& totals, const SummaryInput& input) {
                    {"recorder_high_water", totals.ring_high_water}};
   json["devices"] = counters_json(input.devices);
   json["comparison"] = counters_json(input.comparison);
-  json["truth"] = truth_json(input.truth, input.calibration);
+  json["truth"] = truth_json(input.truth, input);
   json["version"] = std::string(version());
   json["configuration_hash"] = input.configuration_hash;
   return json;

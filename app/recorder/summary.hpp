@@ -10,6 +10,7 @@
 #include <nlohmann/json_fwd.hpp>
 
 #include "app/recorder/recorder.hpp"
+#include "core/calibration/options.hpp"
 #include "core/comparison/trajectory_metrics.hpp"
 #include "core/types/calibration.hpp"
 
@@ -18,7 +19,8 @@ namespace vergence::app {
 /// What a mock drive knows beside: our trajectory and calibration against the truth.
 struct TruthFigures {
   std::optional<TrajectoryEvaluation> evaluation;
-  std::array<double, 6> calibration_error{};  // of camera 1 at the end: rotation vector, rad; translation, m; ours against the true one
+  /// Of camera 1 and so on, of the calibration in use at the end: rotation vector, rad; translation, m; ours against the true one.
+  std::vector<std::array<double, 6>> calibration_error{};
 };
 
 /// What summary.json is made of beside the recorder's totals.
@@ -26,8 +28,11 @@ struct SummaryInput {
   std::uint64_t skipped = 0;                       // frames that were not read: torn, missing, out of time
   std::uint64_t dropped_by_estimator = 0;          // points and observations over capacity
   std::optional<TrajectoryEvaluation> evaluation;  // against the reference, by summary_evaluation_options()
+  bool calibrated = true;                          // false: no calibration has been found
   RigCalibration calibration;                      // in use at the end
-  std::string calibration_source;
+  std::string calibration_source;                  // where it comes from
+  std::optional<RigCalibration> before{};          // the drive began with it; none: from scratch
+  calibration::CalibrationOptions options{};       // what its words mean
   std::uint64_t allocations_after_seal = 0;
   std::vector<std::pair<std::string, std::size_t>> memory;  // bytes by what holds them
   std::string configuration_hash;
@@ -40,9 +45,9 @@ struct SummaryInput {
 /// scale.
 [[nodiscard]] EvaluationOptions summary_evaluation_options();
 
-/// Predicted relative error of a depth at z metres, from the wide sigma of the right camera: a yaw error σ moves the disparity by f·σ, so
-/// σ_z/z = √((z σ_ry / b)² + (σ_tx / b)²). Nothing where the calibration gives no sigmas.
-[[nodiscard]] std::optional<double> depth_error(const RigCalibration& rig, double z);
+/// How far a calibration is from the true one: rotation vector, rad, and translation, m, that lead from the true
+/// transform of each further camera to ours (left perturbation).
+[[nodiscard]] std::vector<std::array<double, 6>> calibration_errors(const RigCalibration& ours, const RigCalibration& truth);
 
 /// summary.json (DESIGN §6), keys in a fixed order; what does not exist is null.
 [[nodiscard]] nlohmann::ordered_json summary_json(const SessionTotals& totals, const SummaryInput& input);

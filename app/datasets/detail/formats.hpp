@@ -12,7 +12,7 @@ namespace vergence::app::detail {
 /// Each reader fills root, pairs and, unless `given`, the calibration.
 [[nodiscard]] StereoSequence open_kitti(const std::filesystem::path& folder, bool given);
 [[nodiscard]] StereoSequence open_euroc(const std::filesystem::path& folder, bool given);
-[[nodiscard]] StereoSequence open_folder(const std::filesystem::path& folder, bool given);
+[[nodiscard]] StereoSequence open_folder(const std::filesystem::path& folder, bool given, const CalibrationUse& use);
 [[nodiscard]] StereoSequence open_st_lucia(const std::filesystem::path& folder, bool given);
 
 /// Names of the PNG and JPEG files in root/below, sorted, as root-relative paths. InputError: no such folder, no image in it.

@@ -13,6 +13,7 @@
 
 #include "app/recorder/line_file.hpp"
 #include "app/runtime/errors.hpp"
+#include "core/math/so3.hpp"
 #include "core/memory/allocation_guard.hpp"
 #include "tests/support/temporary_folder.hpp"
 
@@ -129,22 +130,136 @@ TEST(EventRecord, aLongSentenceIsCutBetweenCharacters) {
   EXPECT_EQ(kept, std::string(254, 'a'));
 }
 
-TEST(Recorder, calibrationsCarryTheirNumbersAndEmptyFieldsWhereNoSigmaIsGiven) {
-  const test::TemporaryFolder folder;
+RigCalibration two_cameras() {
   RigCalibration rig;
   rig.cameras = 2;
+  for (std::size_t k = 0; k < 2; ++k) rig.intrinsics[k] = {.width = 640, .height = 480, .fx = 460, .fy = 461, .cx = 320, .cy = 240};
   rig.T_camera_left[1].t = {-0.5, 0, 0.25};
   rig.sigma_noise[1] = {1e-4, 2e-4, 3e-4, 0.001, 0.002, 0.003};
+  return rig;
+}
+
+CalibrationDecision decision(bool accepted) {
+  CalibrationDecision d;
+  d.stamp = Stamp(kStamp);
+  d.cause = CalibrationCause::knock;
+  d.accepted = accepted;
+  d.reason = accepted ? "" : "held-out frames do not fit better";
+  d.calibration = two_cameras();
+  d.calibration.frames = 60;
+  d.calibration.reprojection_px = 0.18;
+  d.calibration.scale_sigma = 0.002;
+  d.calibration.intrinsics[1].sigma = {0.2, 0.3, 0, 0};
+  d.latency_frames = 71;
+  d.onset_frame = 840;
+  d.held_out_before_px = 1.5;
+  d.held_out_after_px = 0.125;
+  d.solve_ms = 33;
+  return d;
+}
+
+TEST(Recorder, calibrationsCarryTheirNumbersAndEmptyFieldsWhereNothingIsGiven) {
+  const test::TemporaryFolder folder;
   Recorder recorder(folder.path(), {});
-  recorder.post(CalibrationRecord::of(rig, Stamp(kStamp), true, "given", "trusted"));
-  (void)recorder.close();
+  recorder.post(CalibrationRecord::begin(two_cameras(), Stamp(kStamp), "given", "of a, file"));
+  recorder.post(CalibrationRecord::of(decision(true)));
+  recorder.post(CalibrationRecord::of(decision(false)));
+  const auto totals = recorder.close();
   const auto lines = lines_of(folder / "calibrations.csv");
-  ASSERT_EQ(lines.size(), 2U);
+  ASSERT_EQ(lines.size(), 4U);
   EXPECT_EQ(lines[0], kCalibrationsHeader);
-  EXPECT_EQ(lines[1],
-            "1403636584763555584,accepted,given,trusted,0,0.0000,1,0.000000000,0.000000000,0.000000000,-0.500000000,0.000000000,"
-            "0.250000000,0.000100000,0.000200000,0.000300000,0.001000000,0.002000000,0.003000000,,,,,,");
-  EXPECT_EQ(std::count(lines[0].begin(), lines[0].end(), ','), std::count(lines[1].begin(), lines[1].end(), ','));
+  const std::string numbers =
+      ",1,0.000000000,0.000000000,0.000000000,-0.500000000,0.000000000,0.250000000,"
+      "0.000100000,0.000200000,0.000300000,0.001000000,0.002000000,0.003000000,,,,,,,460.00000,461.00000,320.00000,240.00000,";
+  EXPECT_EQ(lines[1], "1403636584763555584,accepted,given,of a; file,0,,,0.0000,,,0.000000" + numbers + ",,,");
+  EXPECT_EQ(lines[2], "1403636584763555584,accepted,knock,,60,71,840,0.1800,1.5000,0.1250,0.002000" + numbers +
+                          "0.200000000,0.300000000,0.000000000,0.000000000");
+  EXPECT_EQ(lines[3].substr(0, 71), "1403636584763555584,rejected,knock,held-out frames do not fit better,60");
+  for (const std::string& line : lines)
+    EXPECT_EQ(std::count(lines[0].begin(), lines[0].end(), ','), std::count(line.begin(), line.end(), ',')) << line;
+
+  EXPECT_EQ(totals->accepted, 1U) << "what the drive begins with is no decision";
+  EXPECT_EQ(totals->rejected, 1U);
+  ASSERT_EQ(totals->attempts.size(), 2U);
+  EXPECT_EQ(totals->attempts[0].cause, "knock");
+  EXPECT_EQ(totals->attempts[0].latency_frames, 71);
+  EXPECT_EQ(totals->attempts[1].reason, "held-out frames do not fit better");
+}
+
+TEST(RigNumbers, thereAndBackAreTheSameDoubles) {
+  RigCalibration rig = two_cameras();
+  rig.cameras = 3;
+  rig.T_camera_left[2] = {exp_so3({0.1, -0.2, 0.3}), Vec3(-0.1, 0.2, 0.3)};
+  rig.covariance_wide[2] = Mat6::Identity() * 3e-7;
+  rig.covariance_wide[2](1, 4) = rig.covariance_wide[2](4, 1) = 1e-8;
+  rig.baseline = 0.559;
+  rig.baseline_sigma = 0.001;
+  rig.found = Stamp(kStamp);
+  const RigCalibration again = RigNumbers::of(rig).rig();
+  EXPECT_EQ(again.cameras, 3);
+  EXPECT_EQ(again.T_camera_left[2].R, rig.T_camera_left[2].R);
+  EXPECT_EQ(again.T_camera_left[2].t, rig.T_camera_left[2].t);
+  EXPECT_EQ(again.covariance_wide[2], rig.covariance_wide[2]);
+  EXPECT_EQ(again.intrinsics[1].fy, 461);
+  EXPECT_EQ(again.sigma_noise, rig.sigma_noise);
+  EXPECT_EQ(again.baseline_sigma, 0.001);
+  EXPECT_EQ(again.found, rig.found);
+}
+
+TEST(Recorder, acceptedCalibrationsAreKeptOnItsOwnThreadAndAFailureIsAnEventAndASentence) {
+  for (const bool fails : {false, true}) {
+    const test::TemporaryFolder folder;
+    std::thread::id where;
+    int calls = 0;
+    Recorder::Options options;
+    options.keep = [&](const RigCalibration& rig) {
+      ++calls;
+      where = std::this_thread::get_id();
+      EXPECT_EQ(rig.frames, 60);
+      return Kept{fails, fails ? "state: no room" : "kept"};
+    };
+    Recorder recorder(folder.path(), options);
+    recorder.post(CalibrationRecord::begin(two_cameras(), Stamp(kStamp), "given", ""));
+    recorder.post(CalibrationRecord::of(decision(false)));
+    recorder.post(CalibrationRecord::of(decision(true)));
+    (void)recorder.close();
+    EXPECT_EQ(calls, 1);
+    EXPECT_NE(where, std::this_thread::get_id());
+    const auto events = lines_of(folder / "events.jsonl");
+    ASSERT_EQ(events.size(), 1U);
+    const auto event = nlohmann::json::parse(events[0]);
+    EXPECT_EQ(event["kind"], fails ? "calibration_not_kept" : "calibration_kept");
+    EXPECT_EQ(recorder.take_complaints().size(), fails ? 1U : 0U);
+  }
+}
+
+TEST(EventRecord, whatHappensToACalibrationIsAWholeSentence) {
+  EstimatorEvent event;
+  event.kind = EstimatorEvent::Kind::calibration_rejected;
+  event.why = "too little motion";
+  EXPECT_STREQ(EventRecord::of(event).sentence.data(), "a calibration was rejected: too little motion");
+  event.kind = EstimatorEvent::Kind::calibration_confirmed;
+  event.why = "frames agree";
+  EXPECT_STREQ(EventRecord::of(event).sentence.data(), "the calibration of the state file is confirmed");
+  event.kind = EstimatorEvent::Kind::rig_changed;
+  event.why = "the rig no longer fits";
+  EXPECT_STREQ(EventRecord::of(event).sentence.data(), "the rig no longer fits");
+}
+
+TEST(Recorder, framesOfOtherStatesThanOdometryAreTimedByThemselves) {
+  const test::TemporaryFolder folder;
+  Recorder recorder(folder.path(), {});
+  const std::array states{State::initialising,    State::parallel_monocular, State::calibrating,
+                          State::stereo_odometry, State::recalibrating,      State::lost};
+  for (std::size_t i = 0; i < states.size(); ++i) {
+    PoseRecord p = pose(i, PoseStatus::ok, 0);
+    p.state = states[i];
+    p.estimate_ms = static_cast<float>(i + 1);
+    recorder.post(p);
+  }
+  const auto totals = recorder.close();
+  EXPECT_EQ(totals->calibrating.count(), 4U);
+  EXPECT_DOUBLE_EQ(totals->calibrating.mean(), (1 + 2 + 3 + 5) / 4.0);
 }
 
 TEST(Recorder, theSameRecordsGiveTheSameBytes) {
@@ -219,12 +334,14 @@ TEST(Recorder, postingAllocatesNothing) {
   Recorder recorder(folder.path(), {});
   EstimatorEvent event;
   event.why = "a state changed";
+  const CalibrationDecision made = decision(false);
   const auto before = AllocationGuard::allocations_after_seal();
   {
     const SealedScope sealed;
     for (std::uint64_t i = 0; i < 1000; ++i) {
       recorder.post(pose(i, PoseStatus::ok, 0));
       recorder.post(EventRecord::of(event));
+      recorder.post(CalibrationRecord::of(made));
     }
   }
   EXPECT_EQ(AllocationGuard::allocations_after_seal(), before);

@@ -2,12 +2,16 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 #include <memory>
+#include <string>
+#include <utility>
 
 #include <nlohmann/json.hpp>
 
 #include "app/recorder/histogram.hpp"
+#include "core/math/so3.hpp"
 
 namespace vergence::app {
 namespace {
@@ -88,19 +92,79 @@ TEST(Summary, metricsOfAKnownScaleComeOutAndLongSegmentsOfAShortDriveAreNull) {
   EXPECT_NE(metrics.dump().find("\"segment_error_percent\":null"), std::string::npos) << metrics.dump();
 }
 
+RigCalibration with_yaw_sigma(double sigma) {
+  RigCalibration rig;
+  rig.cameras = 2;
+  for (std::size_t k = 0; k < 2; ++k) rig.intrinsics[k] = {.width = 640, .height = 480, .fx = 1500, .fy = 1500, .cx = 320, .cy = 240};
+  rig.T_camera_left[1].t = {-0.1, 0, 0};
+  rig.sigma_wide[1] = {1e-9, sigma, 1e-9, 0, 1e-9, 1e-9};
+  return rig;
+}
+
 TEST(Summary, aYawSigmaTellsTheDepthErrorAndTheWord) {
+  // A yaw error σ moves the disparity by f σ (a narrow lens: the same everywhere), so σ_z/z = z σ/b: at 20 m 200 σ.
+  const std::array<std::pair<double, const char*>, 3> cases{{{8e-5, "good"}, {2e-4, "can be improved"}, {4e-4, "recalibrate"}}};
+  for (const auto& [sigma, word] : cases) {
+    auto totals = std::make_unique<SessionTotals>();
+    SummaryInput in = input();
+    in.calibration = with_yaw_sigma(sigma);
+    in.before = with_yaw_sigma(8e-5);
+    const auto json = summary_json(*totals, in)["calibration"];
+    EXPECT_EQ(json["word"], word);
+    EXPECT_EQ(json["before"]["word"], "good");
+    for (const int z : {1, 5, 10, 20, 50})
+      EXPECT_NEAR(json["depth_error_percent"][std::to_string(z)].get<double>(), 100 * z * sigma / 0.1, 0.03 * 100 * z * sigma / 0.1) << z;
+  }
+}
+
+TEST(Summary, anUnknownCalibrationHasNoNumbers) {
   auto totals = std::make_unique<SessionTotals>();
   SummaryInput in = input();
-  in.calibration.sigma_wide[1] = {1e-4, 5e-4, 1e-4, 0, 0.001, 0.001};  // at 20 m: 20 · 0.5 mrad / 0.5 m = 2 %
-  EXPECT_NEAR(*depth_error(in.calibration, 20), 0.02, 1e-12);
-  in.calibration.sigma_wide[1][1] = 4e-4;
-  EXPECT_EQ(summary_json(*totals, in)["calibration"]["word"], "good");
-  in.calibration.sigma_wide[1][1] = 1e-3;
-  EXPECT_EQ(summary_json(*totals, in)["calibration"]["word"], "can be improved");
-  in.calibration.sigma_wide[1][1] = 2e-3;
+  in.calibrated = false;
+  in.truth = TruthFigures{};
   const auto json = summary_json(*totals, in);
-  EXPECT_EQ(json["calibration"]["word"], "recalibrate");
-  EXPECT_NEAR(json["calibration"]["depth_error_percent"]["50"].get<double>(), 20.0, 1e-9);
+  EXPECT_TRUE(json["calibration"]["T_right_left"].is_null());
+  EXPECT_TRUE(json["calibration"]["before"].is_null());
+  EXPECT_TRUE(json["truth"]["calibration"].is_null());
+}
+
+TEST(Summary, recalibrationsAreListedAndTheFirstFromScratchStandsApart) {
+  auto totals = std::make_unique<SessionTotals>();
+  totals->attempts = {{Stamp(10), "from_scratch", "too little motion", false, 40, 25, 9.0},
+                      {Stamp(20), "from_scratch", "", true, 75, 60, 12.0},
+                      {Stamp(30), "knock", "held-out frames do not fit better", false, 90, 25, 11.0},
+                      {Stamp(40), "knock", "", true, 150, 60, 13.0}};
+  totals->calibrating.add(4);
+  const auto json = summary_json(*totals, input());
+  ASSERT_EQ(json["recalibrations"].size(), 2U);
+  EXPECT_EQ(json["recalibrations"][0]["accepted"], false);
+  EXPECT_EQ(json["recalibrations"][0]["why"], "held-out frames do not fit better");
+  EXPECT_EQ(json["recalibrations"][1]["reason"], "knock");
+  EXPECT_EQ(json["recalibrations"][1]["stamp_ns"], 40);
+  EXPECT_EQ(json["recalibrations"][1]["latency_frames"], 150);
+  EXPECT_EQ(json["calibration"]["from_scratch"]["latency_frames"], 75);
+  EXPECT_EQ(json["calibration"]["from_scratch"]["rejected_before"], 1);
+  EXPECT_EQ(json["timing_ms"]["while_calibrating"]["mean"], 4.0);
+}
+
+TEST(Summary, errorsOfACalibrationAreInUnitsAndInSigmas) {
+  auto totals = std::make_unique<SessionTotals>();
+  SummaryInput in = input();
+  in.calibration = with_yaw_sigma(1e-3);
+  RigCalibration truth = in.calibration;
+  const Vec3 turn(0.001, -0.002, 0.003);
+  in.calibration.T_camera_left[1].R = exp_so3(turn) * truth.T_camera_left[1].R;
+  in.calibration.T_camera_left[1].t += Vec3(0, 0.004, 0);
+  in.truth = TruthFigures{std::nullopt, calibration_errors(in.calibration, truth)};
+  const auto json = summary_json(*totals, in)["truth"];
+  ASSERT_EQ(json["calibration"].size(), 1U);
+  const auto& camera = json["calibration"][0];
+  for (std::size_t i = 0; i < 3; ++i) EXPECT_NEAR(camera["rotation_rad"][i].get<double>(), turn(static_cast<int>(i)), 1e-12);
+  EXPECT_NEAR(camera["translation_m"][1].get<double>(), 0.004, 1e-15);
+  EXPECT_NEAR(camera["sigmas_wide"][1].get<double>(), -2, 1e-9);
+  EXPECT_TRUE(camera["sigmas_wide"][3].is_null()) << "held: no sigma";
+  EXPECT_TRUE(camera["sigmas_noise"].is_null());
+  EXPECT_NEAR(json["calibration_error"][2].get<double>(), 0.003, 1e-12);
 }
 
 }  // namespace
