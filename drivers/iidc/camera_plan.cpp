@@ -178,7 +178,8 @@ class Planner {
     return false;
   }
 
-  /// `exactly`: a free-running camera at the rate that is wanted, not at the next higher one.
+  /// `exactly`: a free-running camera at the rate that is wanted, not at the next higher one; and packets of which every camera of the
+  /// rig can send one a cycle.
   bool fixed(ColorCoding coding, bool exactly) {
     for (const FixedMode& m : fixed_modes()) {
       if (m.coding != coding || m.width != wanted_.width || m.height != wanted_.height || !r_.has_mode(m.format, m.mode)) continue;
@@ -187,6 +188,7 @@ class Planner {
         const std::size_t packet = fixed_packet_bytes(m, code);
         if ((rates & bit(31 - code)) == 0 || packet == 0 || packet > largest_) continue;
         if (rate_of(code) < wanted_.rate_hz * (1 - kRateSlack)) continue;
+        if (exactly && crowded(packet)) break;
         if (exactly && wanted_.trigger == CameraTrigger::free && rate_of(code) > wanted_.rate_hz * (1 + kRateSlack)) break;
         plan_.format = m.format;
         plan_.mode = m.mode;
@@ -199,6 +201,11 @@ class Planner {
       }
     }
     return false;
+  }
+
+  [[nodiscard]] bool crowded(std::size_t packet) const {
+    return bus_.isochronous && wanted_.sharing > 1 &&
+           bandwidth_units(packet, plan_.shape.speed) * static_cast<unsigned>(wanted_.sharing) > kBandwidthUnits;
   }
 
   bool format7(ColorCoding coding) {

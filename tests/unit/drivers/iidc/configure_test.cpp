@@ -147,6 +147,24 @@ TEST(IidcConfigure, TheBusSpeedIsTheCamerasBest) {
   EXPECT_EQ(beta.bus->model().iso_speed, 2U);
 }
 
+TEST(IidcConfigure, APacketThatLeavesNoRoomForTheOthersIsTakenOnlyWhereThereIsNoSmallerOne) {
+  CameraConfiguration wanted = CameraUnderTest::usual();
+  wanted.width = 1280;
+  wanted.height = 960;
+  wanted.rate_hz = 30;
+  CameraUnderTest c(true, true);
+  c.configure(wanted);
+  EXPECT_EQ(c.bus->shape().packet_bytes, 5120U) << "alone: the fixed mode";
+  wanted.sharing = 2;
+  c.configure(wanted);
+  EXPECT_EQ(c.bus->command(reg::kVideoFormat), 7U << 29U);
+  EXPECT_LE(2 * bandwidth_units(c.bus->shape().packet_bytes, BusSpeed::s800), kBandwidthUnits);
+  EXPECT_NEAR(c.actual.rate_hz, 30, 0.3);
+  wanted.options["format7"] = "no";
+  c.configure(wanted);
+  EXPECT_EQ(c.bus->shape().packet_bytes, 5120U);
+}
+
 TEST(IidcConfigure, WhatCannotBeSaysWhatTheCameraOffers) {
   CameraUnderTest c(true);
   std::string said;
