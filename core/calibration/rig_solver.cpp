@@ -17,7 +17,10 @@ constexpr int kLeastTracks = 60;
 constexpr int kLeastCandidateMatches = 40;         // across, of the frame whose own transform begins the solve
 constexpr double kHuber = 2.0, kCauchy = 2.5;      // residual scales
 constexpr double kFirstCut = 6.0, kLastCut = 4.0;  // residual scales beyond which a sighting is left out
-constexpr double kMedianOfTwo = 1.1774;            // median length of a vector of two standard normal numbers
+// Tracks on one surface share errors that a cluster a track does not see: variance of the transforms found on rendered drives over the
+// one by clusters (docs/calibration.md).
+constexpr double kSharedErrors = 2.5;
+constexpr double kMedianOfTwo = 1.1774;  // median length of a vector of two standard normal numbers
 
 double milliseconds_since(std::chrono::steady_clock::time_point start) noexcept {
   return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
@@ -248,10 +251,11 @@ void RigSolver::write_result(const BundleResult& r, RigSolution* s) const noexce
       if (r.intrinsics_sigma[c][i] > 0) rig.intrinsics[c].sigma[i] = r.intrinsics_sigma[c][i];
     if (k == 0) continue;
     rig.T_camera_left[c] = {normalised(T_camera_left_[c].R), T_camera_left_[c].t};
-    rig.covariance_wide[c] = r.covariance_wide[c];
+    const Mat6 noise = kSharedErrors * r.covariance_noise[c];
+    rig.covariance_wide[c] = noise + (r.covariance_wide[c] - r.covariance_noise[c]);
     for (int i = 0; i < 6; ++i) {
-      rig.sigma_noise[c][static_cast<std::size_t>(i)] = std::sqrt(std::max(0.0, r.covariance_noise[c](i, i)));
-      rig.sigma_wide[c][static_cast<std::size_t>(i)] = std::sqrt(std::max(0.0, r.covariance_wide[c](i, i)));
+      rig.sigma_noise[c][static_cast<std::size_t>(i)] = std::sqrt(std::max(0.0, noise(i, i)));
+      rig.sigma_wide[c][static_cast<std::size_t>(i)] = std::sqrt(std::max(0.0, rig.covariance_wide[c](i, i)));
     }
   }
   rig.frames = s->frames;

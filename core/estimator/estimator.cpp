@@ -154,7 +154,8 @@ void Estimator::Parts::watch(const odometry::FrameOutcome& out, const RigFrame& 
     return;
   }
   if (v.kind != K::quiet) {
-    doubt(cause_of(v.kind), v.onset_frame, frame);
+    // Of a rig that matches no more, the frames until now hold wrong matches only.
+    doubt(cause_of(v.kind), v.kind == K::collapse ? frame.number : v.onset_frame, frame);
   } else if (!confirmed && keeper.frames_agreed() >= kConfirmedAfter) {
     confirmed = true;
     note(EstimatorEvent::Kind::calibration_confirmed, frame.stamp, "the calibration of the last drive still fits", kConfirmedAfter);

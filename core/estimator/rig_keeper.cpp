@@ -1,6 +1,8 @@
 #include "core/estimator/rig_keeper.hpp"
 
+#include <Eigen/Cholesky>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 
@@ -13,11 +15,23 @@ using odometry::MapPoint;
 
 constexpr double kMovedPixels = 1.0;   // px, mean of the tracks since the last logged frame: less repeats the same errors
 constexpr double kImageMargin = 12.0;  // px: nearer to the edge a track need not be found
-constexpr int kStillFrames = 15;       // sought for so long without a new frame in the log: the rig stands
-constexpr std::size_t kNewFrames = 5;  // at least, between two solves
-constexpr double kGrow = 1.3;          // at least, of the frames between two solves
+// Sigmas taken for a calibration that says none: of rotation (rad), and of t in baselines. At first yaw and t_z are known by what a single
+// pair sees of them, and that is what a lens model's misfit looks like too.
+constexpr std::array kGivenAtFirst = {1e-3, 1e-2, 1e-3, 0.015, 0.015, 0.05};
+constexpr std::array kGiven = {1e-3, 2e-3, 1e-3, 0.015, 0.015, 0.03};
+constexpr double kLearnedCovariance = 4.0;  // times the monitor's own: the scene it was measured in was one
+constexpr int kLearnFrames = 45;            // moving, in agreement
+constexpr int kStillFrames = 15;            // sought for so long without a new frame in the log: the rig stands
+constexpr std::size_t kNewFrames = 5;       // at least, between two solves
+constexpr double kGrow = 1.3;               // at least, of the frames between two solves
 
 std::size_t most_tracks(const EstimatorOptions& o) noexcept { return static_cast<std::size_t>(o.odometry.features); }
+
+Mat6 given_covariance(const std::array<double, 6>& sigma, double baseline) noexcept {
+  Vec6 spread = Eigen::Map<const Vec6>(sigma.data());
+  spread.tail<3>() *= baseline;
+  return spread.cwiseAbs2().asDiagonal();
+}
 
 int rank(MonitorVerdict::Kind kind) noexcept {
   using K = MonitorVerdict::Kind;
@@ -69,21 +83,43 @@ RigKeeper::RigKeeper(const EstimatorOptions& options, const RigCalibration& rig,
 void RigKeeper::use(const RigCalibration& rig) noexcept {
   rig_ = rig;
   calibrated_ = true;
-  const auto pinhole = [&](std::size_t k) {
-    const Intrinsics& c = rig_.intrinsics[k];
-    return Pinhole{c.fx, c.fy, c.cx, c.cy};
-  };
-  for (std::size_t k = 1; k < static_cast<std::size_t>(rig_.cameras); ++k) {
-    Mat6 covariance = Mat6::Zero();
-    for (int i = 0; i < 6; ++i)
-      covariance(i, i) = rig_.sigma_noise[k][static_cast<std::size_t>(i)] * rig_.sigma_noise[k][static_cast<std::size_t>(i)];
-    (void)monitors_[k]->set_reference(rig_.T_camera_left[k], pinhole(0), pinhole(k), covariance);
-    feeds_[k]->reset();
+  for (int k = 1; k < rig_.cameras; ++k) {
+    const auto c = static_cast<std::size_t>(k);
+    const auto& sigma = rig_.sigma_noise[c];
+    learning_[c] = std::all_of(sigma.begin(), sigma.end(), [](double v) { return v == 0; });
+    Mat6 covariance = given_covariance(kGivenAtFirst, rig_.T_camera_left[c].t.norm());
+    if (!learning_[c]) covariance = Eigen::Map<const Vec6>(sigma.data()).cwiseAbs2().asDiagonal();
+    watch_against(k, rig_.T_camera_left[c], covariance);
   }
   any_ = false;
   seeking_ = false;
   missing_ = Reason::none;
   log_.clear();
+}
+
+void RigKeeper::watch_against(int k, const Transform& T_camera_left, const Mat6& covariance) noexcept {
+  const auto pinhole = [&](std::size_t c) {
+    const Intrinsics& lens = rig_.intrinsics[c];
+    return Pinhole{lens.fx, lens.fy, lens.cx, lens.cy};
+  };
+  const auto c = static_cast<std::size_t>(k);
+  (void)monitors_[c]->set_reference(T_camera_left, pinhole(0), pinhole(c), covariance);
+  feeds_[c]->reset();
+}
+
+void RigKeeper::learn(int k, MonitorVerdict* verdict) noexcept {
+  const auto c = static_cast<std::size_t>(k);
+  if (!learning_[c] || verdict->kind != MonitorVerdict::Kind::quiet || monitors_[c]->frames_agreed() < kLearnFrames) return;
+  learning_[c] = false;
+  const double length = rig_.T_camera_left[c].t.norm();
+  const Mat6 together = given_covariance(kGiven, length) + verdict->covariance;
+  if (verdict->offset.dot(together.ldlt().solve(verdict->offset)) > verdict->threshold) {
+    verdict->kind = MonitorVerdict::Kind::knock;
+    return;
+  }
+  Transform measured = perturbed(rig_.T_camera_left[c], verdict->offset.head<3>(), verdict->offset.tail<3>());
+  measured.t *= length / measured.t.norm();
+  watch_against(k, measured, kLearnedCovariance * verdict->covariance);
 }
 
 void RigKeeper::scene_lost() noexcept {
@@ -176,7 +212,8 @@ MonitorVerdict RigKeeper::watch(const odometry::Odometry& odometry, const odomet
     calibration::MonitorFrame f = feeds_[c]->next(frame.stamp, frame.number, across_.span(), step);
     f.expected_across = outcome.images_good ? expected_across(odometry, k, outcome.T_left_world) : 0;
     f.found_across = found;
-    const MonitorVerdict v = monitors_[c]->look(f);
+    MonitorVerdict v = monitors_[c]->look(f);
+    learn(k, &v);
     if (rank(v.kind) > rank(worst.kind) || (rank(v.kind) == rank(worst.kind) && (v.undecided || v.statistic > worst.statistic))) worst = v;
   }
   return worst;

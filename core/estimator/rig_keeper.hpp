@@ -66,6 +66,11 @@ class RigKeeper {
     RigKeeper* keeper;
     void operator()() const noexcept;
   };
+  /// The monitor of camera k watches this transform from now on.
+  void watch_against(int k, const Transform& T_camera_left, const Mat6& covariance) noexcept;
+  /// A calibration that came without sigmas is a rough one: the monitor takes what it measures itself in the first frames that agree with
+  /// it as what must not change. What they measure is too far from it: the verdict becomes a knock.
+  void learn(int k, calibration::MonitorVerdict* verdict) noexcept;
   [[nodiscard]] CalibrationDecision judge(Stamp stamp, std::uint64_t number) noexcept;
   [[nodiscard]] double pixels_moved(const odometry::Map& map) const noexcept;
   [[nodiscard]] int expected_across(const odometry::Odometry& odometry, int k, const Transform& T_left_world) const noexcept;
@@ -80,6 +85,7 @@ class RigKeeper {
   std::array<std::optional<calibration::Monitor>, kMaxCameras> monitors_;  // [k] of camera k ≥ 1
   std::array<std::optional<calibration::MonitorFeed>, kMaxCameras> feeds_;
   BoundedVector<calibration::AcrossSighting> across_;
+  std::array<bool, kMaxCameras> learning_{};
   Transform T_left_world_{};
   bool any_ = false;  // T_left_world_ is the frame before's
 
