@@ -18,6 +18,8 @@
 
 namespace vergence::v4l2 {
 
+inline constexpr std::size_t kBufferReserve = 2;  // the kernel always has: with none it drops frames, and nobody knows how many
+
 /// A camera behind a video node: drivers/camera.hpp and v4l2.hpp have the contract.
 ///
 /// The capture thread alone calls the kernel while streaming; the owner does in between. What passes between them, the consumer and the
