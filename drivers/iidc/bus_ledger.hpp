@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "drivers/iidc/budget_words.hpp"
 #include "drivers/iidc/frame_reader.hpp"
 #include "firmware_iface/iidc/bandwidth.hpp"
 #include "firmware_iface/iidc/cycle_time.hpp"

@@ -2,7 +2,6 @@
 #include <cstddef>
 #include <cstdint>
 #include <span>
-#include <string>
 #include <string_view>
 
 /// How much of an IEEE 1394 bus a stream takes.
@@ -29,7 +28,5 @@ struct BusShare {
   std::size_t image_bytes = 0;  // of the stream: for the rate in the advice
 };
 [[nodiscard]] unsigned total_units(std::span<const BusShare> shares) noexcept;
-/// Empty when the streams fit. Else one sentence: what each needs, what there is, and the packet and rate that would fit if all were equal.
-[[nodiscard]] std::string budget_complaint(std::span<const BusShare> shares);
 
 }  // namespace vergence::iidc

@@ -2,7 +2,7 @@
 
 #include <vector>
 
-#include "camera_under_test.hpp"
+#include "tests/unit/drivers/iidc/camera_under_test.hpp"
 
 namespace vergence::test {
 namespace {

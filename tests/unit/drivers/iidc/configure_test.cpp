@@ -1,6 +1,6 @@
 #include <gtest/gtest.h>
 
-#include "camera_under_test.hpp"
+#include "tests/unit/drivers/iidc/camera_under_test.hpp"
 
 namespace vergence::test {
 namespace {

@@ -6,7 +6,7 @@
 #include <string_view>
 #include <vector>
 
-#include "rom_vector.hpp"
+#include "tests/unit/firmware_iface/iidc/rom_vector.hpp"
 
 namespace vergence::iidc {
 namespace {

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "firmware_iface/iidc/frame_info.hpp"
-#include "rom_vector.hpp"
+#include "tests/unit/firmware_iface/iidc/rom_vector.hpp"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size);
 
