@@ -1,4 +1,4 @@
-#include "iidc_model.h"
+#include "tests/rigs/emulators/iidc_model.h"
 
 #include <fcntl.h>
 #include <math.h>

@@ -21,9 +21,9 @@
 #include <string.h>
 #include <unistd.h>
 
-#include "../kernel/vergence_1394_abi.h"
-#include "iidc_model.h"
-#include "sim_clock.h"
+#include "tests/rigs/emulators/iidc_model.h"
+#include "tests/rigs/emulators/sim_clock.h"
+#include "tests/rigs/kernel/vergence_1394_abi.h"
 
 #define MAX_BATCH (1u << 20)
 

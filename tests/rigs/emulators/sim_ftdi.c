@@ -16,8 +16,8 @@
 #include <termios.h>
 #include <unistd.h>
 
-#include "sim_clock.h"
-#include "usbip_device.h"
+#include "tests/rigs/emulators/sim_clock.h"
+#include "tests/rigs/emulators/usbip_device.h"
 
 #define FIFO 256u   /* the chip's receive buffer, towards the host */
 #define PACKET 64u  /* two status bytes and 62 of data */

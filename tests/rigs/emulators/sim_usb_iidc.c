@@ -16,9 +16,9 @@
 #include <string.h>
 #include <unistd.h>
 
-#include "iidc_model.h"
-#include "sim_clock.h"
-#include "usbip_device.h"
+#include "tests/rigs/emulators/iidc_model.h"
+#include "tests/rigs/emulators/sim_clock.h"
+#include "tests/rigs/emulators/usbip_device.h"
 
 #define MOST 4
 

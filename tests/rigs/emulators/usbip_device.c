@@ -1,4 +1,4 @@
-#include "usbip_device.h"
+#include "tests/rigs/emulators/usbip_device.h"
 
 #include <arpa/inet.h>
 #include <errno.h>
