@@ -79,8 +79,6 @@ std::vector<CameraRequest> requests_of(const Configuration& c) {
         fmt::format("trigger.driver is \"{}\"; with real cameras this version knows none: pulses from elsewhere, "
                     "cameras[].trigger: software, or free",
                     c.trigger.driver));
-  if (c.ins.driver != "none")
-    throw InputError(fmt::format("ins.driver is \"{}\"; with real cameras this version knows none", c.ins.driver));
   if (requests[0].configuration.trigger == CameraTrigger::free && c.sync.mode == "counter")
     throw InputError(
         "cameras[].trigger is free: nothing makes the cameras expose together, so their counters cannot pair the images; "

@@ -9,6 +9,7 @@
 
 #include "app/commands/commands.hpp"
 #include "app/commands/evaluation_report.hpp"
+#include "app/commands/mount_report.hpp"
 #include "app/datasets/text_file.hpp"
 #include "app/datasets/trajectory_files.hpp"
 
@@ -57,16 +58,22 @@ EvaluationOptions options_of(const Arguments& a) {
 }
 
 ExitCode run(const Arguments& a) {
-  if (a.estimate_mount)
-    throw InputError("--estimate-mount is not there yet: bring both trajectories to the same point of the vehicle first");
   const EvaluationOptions options = options_of(a);
   const Trajectory estimate = read_trajectory(a.estimate);
-  const Trajectory reference = read_trajectory(a.reference);
+  Trajectory reference = read_trajectory(a.reference);
+  FoundMount mount;
+  if (a.estimate_mount) {
+    mount = find_mount(estimate, reference);
+    if (mount.status == MountStatus::ok) reference = brought_over(reference, mount.mount);
+  }
   const TrajectoryEvaluation evaluation = evaluate(estimate, reference, options);
-  if (a.json)
-    std::cout << evaluation_json(evaluation, options).dump(1) << '\n';
-  else
-    std::cout << evaluation_text(evaluation, options);
+  if (a.json) {
+    nlohmann::ordered_json out = evaluation_json(evaluation, options);
+    if (a.estimate_mount) out["mount"] = mount_json(mount);
+    std::cout << out.dump(1) << '\n';
+  } else {
+    std::cout << (a.estimate_mount ? mount_text(mount) : "") << evaluation_text(evaluation, options);
+  }
   if (evaluation.status == EvaluationStatus::ok) return ExitCode::done;
   std::cerr << "vergence: " << a.estimate << " against " << a.reference << ": " << evaluation_problem(evaluation, options) << '\n';
   return ExitCode::not_usable;
@@ -90,7 +97,7 @@ void add_evaluate(CLI::App& root, ExitCode* exit_code) {
   command->add_option("--axes", a->axes, "Axes of the body: camera (z forward) or flu (x forward, y left, z up)")
       ->check(CLI::IsMember({"camera", "flu"}))
       ->capture_default_str();
-  command->add_flag("--estimate-mount", a->estimate_mount, "Fit the unknown mounting between the two bodies (not there yet)");
+  command->add_flag("--estimate-mount", a->estimate_mount, "Find how the two bodies sit to one another; compare at the estimate's");
   command->callback([a, exit_code] { *exit_code = run(*a); });
 }
 
