@@ -142,11 +142,20 @@ void running_plots(const Session& s, const Analysis& a, const TimingPicture& tim
                  curve_plot({"Time a frame", XAxis::time_s, a.time_s, times, a.breaks, "curve s-ours", true}, a, s.frames));
 }
 
-/// Successive rows are the same numbers: nothing to plot.
+/// A single one that the drive began with is no curve.
 bool changed(const Session& s, int camera) {
-  std::size_t rows = 0;
-  for (const CalibrationRow& c : s.calibrations) rows += c.camera == camera ? 1U : 0U;
-  return rows > 1;
+  return std::any_of(s.calibrations.begin(), s.calibrations.end(),
+                     [camera](const CalibrationRow& c) { return c.camera == camera && c.decided; });
+}
+
+bool focal_length_changed(const Session& s, int camera) {
+  double first = kNone;
+  for (const CalibrationRow& c : s.calibrations) {
+    if (c.camera != camera || !std::isfinite(c.focal_px)) continue;
+    if (std::isfinite(first) ? c.focal_px != first : c.focal_sigma_px > 0) return true;
+    first = c.focal_px;
+  }
+  return false;
 }
 
 void calibration_sections(const Session& s, const Analysis& a, std::string* out) {
@@ -158,14 +167,15 @@ void calibration_sections(const Session& s, const Analysis& a, std::string* out)
     const std::string whose = camera == 1 ? "Right camera" : fmt::format("Camera {}", camera);
     for (const int component : {0, 3, 1, 4, 2, 5})  // rotation and translation side by side
       plots += figure(fmt::format("{}: {}", whose, kNames[static_cast<std::size_t>(component)]), calibration_plot(s, a, camera, component));
+    if (focal_length_changed(s, camera)) plots += figure(whose + ": focal length, px", calibration_plot(s, a, camera, 6));
   }
-  std::string body;
+  std::string body = health_table(s);
   if (s.calibrations.empty())
-    body = "<p>No calibration was recorded.</p>";
+    body += "<p>No calibration was recorded.</p>";
   else if (plots.empty())
-    body = "<p>One calibration throughout; it did not change.</p>" + calibrations_table(s);
+    body += "<p>One calibration throughout; it did not change.</p>" + calibrations_table(s);
   else
-    body =
+    body +=
         "<p class=\"soft\">Where the other cameras sit relative to the left one, as it was in use; the band is ± 2 σ (wide, with uncertain "
         "intrinsics). Hollow red marks were rejected.</p>" +
         calibrations_table(s);

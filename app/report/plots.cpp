@@ -287,21 +287,32 @@ struct CalibrationCurve {
   std::vector<Point> rejected;
 };
 
-CalibrationCurve calibration_curve(const Session& s, const Analysis& a, int camera, int component) {
+struct Component {
+  double value = kNone, sigma = kNone;
+};
+
+/// A number of a row in the unit it is shown in.
+Component component_of(const CalibrationRow& c, int component) {
+  if (component == 6) return {c.focal_px, c.focal_sigma_px};
   const double unit = component < 3 ? kDegrees : kMillimetres;
   const auto k = static_cast<std::size_t>(component);
+  return {c.value[k] * unit, c.has_sigma ? c.sigma[k] * unit : kNone};
+}
+
+CalibrationCurve calibration_curve(const Session& s, const Analysis& a, int camera, int component) {
   CalibrationCurve curve;
   for (const CalibrationRow& c : s.calibrations) {
-    if (c.camera != camera) continue;
+    const Component number = component_of(c, component);
+    if (c.camera != camera || !std::isfinite(number.value)) continue;
     const double since =
         s.frames.empty() ? 0 : (static_cast<double>(c.stamp.ns()) - static_cast<double>(s.frames.front().stamp.ns())) * 1e-9;
     const double at = std::clamp(since, 0.0, a.duration_s);
     if (!c.accepted) {
-      curve.rejected.push_back({at, c.value[k] * unit});
+      curve.rejected.push_back({at, number.value});
       continue;
     }
     if (!curve.held.empty()) curve.held.back().to = at;
-    curve.held.push_back({at, a.duration_s, c.value[k] * unit, c.has_sigma ? 2 * c.sigma[k] * unit : kNone});
+    curve.held.push_back({at, a.duration_s, number.value, 2 * number.sigma});
   }
   return curve;
 }

@@ -40,7 +40,8 @@ struct TimingPicture {
 [[nodiscard]] TimingPicture timing_picture(const Session& session, const Analysis& analysis);
 
 /// One number of a camera's calibration as it held over the drive, with a band of ± 2 sigma; hollow marks are rejected ones.
-/// `component`: 0–2 rotation vector, shown in degrees; 3–5 translation, in millimetres.
+/// `component`: 0–2 rotation vector, shown in degrees; 3–5 translation, in millimetres; 6 focal length along x, in pixels. Empty when
+/// no row has it.
 [[nodiscard]] std::string calibration_plot(const Session& session, const Analysis& analysis, int camera, int component);
 
 }  // namespace vergence::app::report

@@ -226,9 +226,15 @@ void read_calibrations(const fs::path& folder, Session* session) {
     c.stamp = Stamp(*stamp);
     c.camera = static_cast<int>(*camera);
     c.accepted = rows.text(rows.column("outcome")) == "accepted";
-    c.source = rows.text(rows.column("source")).substr(0, kLongestText);
+    c.cause = rows.text(rows.column("cause")).substr(0, kLongestText);
     c.reason = rows.text(rows.column("reason")).substr(0, kLongestText);
     c.frames = rows.integer(rows.column("frames")).value_or(0);
+    c.latency_frames = rows.number(rows.column("latency_frames")).value_or(kNone);
+    c.decided = std::isfinite(c.latency_frames);
+    c.held_out_before_px = rows.number(rows.column("held_out_before_px")).value_or(kNone);
+    c.held_out_after_px = rows.number(rows.column("held_out_after_px")).value_or(kNone);
+    c.focal_px = rows.number(rows.column("fx")).value_or(kNone);
+    c.focal_sigma_px = rows.number(rows.column("sigma_fx")).value_or(kNone);
     c.has_sigma = read_six(rows, "wide_", &c.sigma) || read_six(rows, "sigma_", &c.sigma);
     session->calibrations.push_back(std::move(c));
   }

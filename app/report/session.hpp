@@ -43,12 +43,15 @@ struct Frame {
 struct CalibrationRow {
   Stamp stamp{};
   bool accepted = false;
-  std::string source{}, reason{};
+  bool decided = false;  // while driving; else the drive began with it
+  std::string cause{}, reason{};
   std::int64_t frames = 0;
+  double latency_frames = kNone, held_out_before_px = kNone, held_out_after_px = kNone;
   int camera = 1;
   std::array<double, 6> value{};  // rotation vector, rad; translation, m
   std::array<double, 6> sigma{};  // the wide one, else the noise's; meaningless without has_sigma
   bool has_sigma = false;
+  double focal_px = kNone, focal_sigma_px = kNone;  // along x
 };
 
 struct Event {

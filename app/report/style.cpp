@@ -48,8 +48,9 @@ table{border-collapse:collapse;width:100%;font-size:.9rem}
 th,td{text-align:left;padding:3px 8px 3px 0;vertical-align:top;border-bottom:1px solid color-mix(in srgb,var(--frame) 30%,transparent);overflow-wrap:anywhere}
 th{font-weight:400;color:var(--soft)}
 th[scope=row]{min-width:8.5em}
-td.n{text-align:right;font-variant-numeric:tabular-nums;padding-right:0}
+td.n,th.n{text-align:right;font-variant-numeric:tabular-nums;padding-right:0}
 td.k{min-width:6.4em}
+.health{max-width:640px;margin-bottom:4px}
 td.t{white-space:nowrap;font-variant-numeric:tabular-nums}
 tr.group th{color:var(--ink);font-weight:600;padding-top:9px}
 @media screen and (max-width:560px){

@@ -91,7 +91,7 @@ void calibration_group(const Session& s, Figures* f) {
     }
   }
   if (const std::string word = text_at(s.summary, "calibration.word"); !word.empty()) f->row("health", word);
-  for (const char* z : {"5", "10", "20", "50"})
+  for (const char* z : {"1", "5", "10", "20", "50"})
     f->row(std::string("depth error at ") + z + " m", number_at(s.summary, std::string("calibration.depth_error_percent.") + z),
            "{:.1f} %");
 }
@@ -207,16 +207,58 @@ std::string figures_table(const Session& session, const Analysis& analysis, cons
   return std::move(f).finish();
 }
 
+namespace {
+
+/// One row of words about a calibration; empty when nothing is known of it.
+std::string health_row(const nlohmann::json& summary, const char* name, const std::string& path) {
+  const std::string word = text_at(summary, path + "word");
+  if (word.empty()) return "";
+  std::string row = fmt::format("<tr><th scope=\"row\">{}</th><td class=\"k\">{}</td>", name, escape(word, 60));
+  for (const char* z : {"1", "5", "10", "20", "50"}) {
+    const auto percent = number_at(summary, path + "depth_error_percent." + z);
+    row += percent ? fmt::format("<td class=\"n\">{:.{}f} %</td>", *percent, *percent < 0.995 ? 2 : 1) : "<td></td>";
+  }
+  return row + "</tr>\n";
+}
+
+std::string held_out_text(const CalibrationRow& c) {
+  if (!std::isfinite(c.held_out_after_px) || !(c.held_out_after_px > 0)) return "";
+  if (!(c.held_out_before_px > 0)) return fmt::format("{:.2f} px", c.held_out_after_px);
+  return fmt::format("{:.2f} → {:.2f} px", c.held_out_before_px, c.held_out_after_px);
+}
+
+}  // namespace
+
+std::string health_table(const Session& session) {
+  const std::string rows =
+      health_row(session.summary, "at the start", "calibration.before.") + health_row(session.summary, "at the end", "calibration.");
+  if (rows.empty()) return "";
+  return "<table class=\"health\"><tr><th></th><th>calibration</th><th class=\"n\">1 m</th><th class=\"n\">5 m</th><th class=\"n\">10 "
+         "m</th>"
+         "<th class=\"n\">20 m</th><th class=\"n\">50 m</th></tr>\n" +
+         rows +
+         "</table>\n<p class=\"soft\">Predicted error of a depth at that distance, one sigma, from what the calibration leaves open.</p>\n";
+}
+
 std::string calibrations_table(const Session& session) {
   constexpr std::size_t kMost = 60;
-  std::string out = "<table class=\"stack\"><tr><th>time</th><th>outcome</th><th>from</th><th>why</th></tr>\n";
-  const std::size_t n = session.calibrations.size();
-  if (n > kMost) out += fmt::format("<tr><td colspan=\"4\">{} earlier ones are in calibrations.csv</td></tr>", grouped(n - kMost));
+  std::string out =
+      "<table class=\"stack\"><tr><th>time</th><th>outcome</th><th>cause</th><th>after</th><th>held-out error</th><th>why</th></tr>\n";
+  std::vector<const CalibrationRow*> rows;  // one for all cameras: they are decided together
+  for (const CalibrationRow& c : session.calibrations)
+    if (c.camera == 1) rows.push_back(&c);
+  const std::size_t n = rows.size();
+  if (n > kMost) out += fmt::format("<tr><td colspan=\"6\">{} earlier ones are in calibrations.csv</td></tr>", grouped(n - kMost));
   for (std::size_t i = n > kMost ? n - kMost : 0; i < n; ++i) {
-    const CalibrationRow& c = session.calibrations[i];
-    const std::string frames = c.frames > 0 ? fmt::format(" ({} frames)", c.frames) : "";
-    out += fmt::format("<tr><td class=\"t\">{}</td><td class=\"k\">{}</td><td>{}{}</td><td>{}</td></tr>\n", event_time(session, c.stamp),
-                       c.accepted ? "accepted" : "rejected", escape(c.source, 60), frames, escape(c.reason));
+    const CalibrationRow& c = *rows[i];
+    std::string cause = c.cause;
+    std::replace(cause.begin(), cause.end(), '_', ' ');
+    const std::string after = c.decided ? fmt::format("{:.0f} frames", c.latency_frames) : "";
+    const std::string from = c.frames > 0 ? fmt::format("from {} frames", c.frames) : "";
+    const std::string why = from.empty() || c.reason.empty() ? from + c.reason : from + "; " + c.reason;
+    out += fmt::format("<tr><td class=\"t\">{}</td><td class=\"k\">{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td></tr>\n",
+                       event_time(session, c.stamp), c.accepted ? "accepted" : "rejected", escape(cause, 60), after, held_out_text(c),
+                       escape(why));
   }
   return out + "</table>\n";
 }

@@ -11,7 +11,10 @@ namespace vergence::app::report {
 /// Counts, errors, times, calibration, memory, drops: what is known; a figure that does not exist has no row.
 [[nodiscard]] std::string figures_table(const Session& session, const Analysis& analysis, const TimingPicture& timing);
 
-/// The calibrations accepted and rejected, the newest sixty of them.
+/// The word for the calibration and the depth errors it predicts, at the start and at the end. Empty when the summary has neither.
+[[nodiscard]] std::string health_table(const Session& session);
+
+/// The calibrations accepted and rejected, the newest sixty of them: why they were sought, how long it took, how held-out frames fit.
 [[nodiscard]] std::string calibrations_table(const Session& session);
 
 /// Events in their order, successive ones of one kind and sentence as one row with a count; of very many the first and the last.

@@ -109,6 +109,38 @@ void judge_drift(const Analysis& a, Judge* j) {
   }
 }
 
+/// Rejected because the one in use is as good: no reason for doubt.
+bool fits_as_well(const CalibrationRow& rejected) {
+  constexpr double kBetter = 0.9;  // of the held-out error before: clearly better
+  return rejected.held_out_before_px > 0 && rejected.held_out_after_px > kBetter * rejected.held_out_before_px;
+}
+
+/// What the causes of accepted calibrations ask for.
+void advise_on_causes(const Session& s, Judge* j) {
+  constexpr std::array kCauses{
+      Advice{"knock", "The rig was knocked on the way and has been calibrated anew: look at the camera's mount before the next drive."},
+      Advice{"collapse",
+             "The rig was knocked hard on the way and has been calibrated anew: look at the camera's mount before the next drive."},
+      Advice{"drift", "The rig crept out of its calibration and was followed: look for a mount that warms up or works loose."}};
+  for (const Advice& advice : kCauses)
+    if (std::any_of(s.calibrations.begin(), s.calibrations.end(),
+                    [&advice](const CalibrationRow& c) { return c.accepted && c.cause == advice.word; }))
+      j->advise(advice.sentence);
+}
+
+/// What events about calibrations and lengths ask for.
+void advise_on_events(const Session& s, Judge* j) {
+  const auto told = [&s](std::string_view kind) {
+    return std::find_if(s.events.begin(), s.events.end(), [kind](const Event& e) { return e.kind == kind; });
+  };
+  if (const auto event = told("calibration_not_kept"); event != s.events.end())
+    j->advise("A calibration was not kept: " + event->sentence + ".");
+  if (const auto event = told("scale_disagrees"); event != s.events.end()) {
+    j->find(Grade::care, "lengths disagree with the INS");
+    j->advise("At some time " + event->sentence + ".");
+  }
+}
+
 void judge_calibration(const Session& s, Judge* j) {
   const std::string word = text_at(s.summary, "calibration.word");
   if (word == "recalibrate") {
@@ -117,9 +149,16 @@ void judge_calibration(const Session& s, Judge* j) {
   } else if (word == "can be improved") {
     j->find(Grade::care, "the calibration can be improved");
   }
-  if (s.calibrations.empty()) return;
-  const bool rejected = !s.calibrations.back().accepted;
-  if (rejected) j->find(Grade::care, "the last calibration was rejected");
+  // A drive that begins with a calibration has a row of it; a session of another make has no count.
+  if (s.calibrations.empty() && !number_at(s.summary, "calibration.accepted")) return;
+  if (std::none_of(s.calibrations.begin(), s.calibrations.end(), [](const CalibrationRow& c) { return c.accepted; })) {
+    j->find(Grade::care, "no calibration was found");
+    j->advise("No calibration was found: drive past things at the roadside, near and far; calibrations.csv says what each attempt lacked.");
+  } else if (const CalibrationRow& last = s.calibrations.back(); !last.accepted && !fits_as_well(last)) {
+    j->find(Grade::care, "the last calibration was rejected");
+    if (!last.reason.empty()) j->advise("The last calibration was rejected: " + last.reason + ".");
+  }
+  advise_on_causes(s, j);
 }
 
 void judge_session(const Session& s, const Analysis& a, Judge* j) {
@@ -170,6 +209,7 @@ Verdict judge(const Session& session, const Analysis& analysis) {
   judge_frames(session, analysis, &j);
   judge_drift(analysis, &j);
   judge_calibration(session, &j);
+  advise_on_events(session, &j);
   judge_session(session, analysis, &j);
   advise_by_reasons(session, analysis, &j);
   Verdict v = j.finish();

@@ -57,6 +57,15 @@ TEST(Page, ofAWholeSessionShowsEverythingAndLoadsNothing) {
                            "over the way",
                            "rotation x, degrees",
                            "translation z, mm",
+                           "focal length, px",
+                           "can be improved",
+                           "9.1 %",
+                           "0.06 %",
+                           "Predicted error of a depth",
+                           "from scratch",
+                           "75 frames",
+                           "0.90 → 0.21 px",
+                           "from 60 frames; too little motion",
                            "found again against the window",
                            "(20 times)",
                            "allocations after the seal",
@@ -114,7 +123,8 @@ TEST(Page, hostileTextNeverBecomesMarkup) {
   const std::string evil = "</svg><script>alert(1)</script><img src=x onerror=alert(2)>";
   std::ofstream(folder / "events.jsonl", std::ios::app)
       << R"({"stamp_ns":1,"kind":")" << evil << R"(","sentence":")" << evil << std::string(5000, 'x') << "\"}\n";
-  std::ofstream(folder / "calibrations.csv", std::ios::app) << "1,accepted," << evil << ',' << evil << ",1,1,1,0,0,0,0,0,0,,,,,,,,,,,,\n";
+  std::ofstream(folder / "calibrations.csv", std::ios::app)
+      << "1,accepted," << evil << ',' << evil << ",1,7,0,1,1,1,0,1,0,0,0,0,0,0" << std::string(20, ',') << '\n';
   folder.write("summary.json", R"({"version":")" + evil + R"(","configuration_hash":")" + evil + R"(","calibration":{"source":")" + evil +
                                    R"(","word":")" + evil + R"("},"truth":{")" + evil + R"(":1}})");
   const std::string html = page_of(folder.path());

@@ -60,6 +60,11 @@ TEST(ReadSession, aWholeOneHasNothingMissing) {
   EXPECT_EQ(s.calibrations.size(), 4U);
   EXPECT_FALSE(s.calibrations[1].accepted);
   EXPECT_NEAR(s.calibrations[0].sigma[0], 2 * 0.0009, 1e-9) << "the wide sigma goes before the noise's";
+  EXPECT_EQ(s.calibrations[3].cause, "knock");
+  EXPECT_TRUE(s.calibrations[3].decided);
+  EXPECT_EQ(s.calibrations[3].latency_frames, 75);
+  EXPECT_EQ(s.calibrations[3].held_out_after_px, 0.21);
+  EXPECT_NEAR(s.calibrations[3].focal_px, 450.09, 1e-9);
   EXPECT_EQ(s.reference.size(), 392U);
   EXPECT_TRUE(s.calibration.has_value());
   EXPECT_EQ(number_at(s.summary, "timing_ms.stages.track"), 5.5);

@@ -87,12 +87,63 @@ TEST(Verdict, theWorstReasonComesFirst) {
 }
 
 TEST(Verdict, everyReasonOfAPoseHasItsAdvice) {
-  for (int i = 1; i <= static_cast<int>(Reason::recalibrating); ++i) {
+  for (int i = 1; i <= static_cast<int>(Reason::needs_texture); ++i) {
     Case c;
     c.session.reasons.emplace_back(to_string(static_cast<Reason>(i)));
     c.analysis.by_reason = {0, 3};
     EXPECT_TRUE(any_has(c.verdict().advice, "3 frames")) << c.session.reasons.back();
   }
+}
+
+CalibrationRow attempt(bool accepted, const char* cause, double before_px, double after_px) {
+  CalibrationRow row;
+  row.accepted = accepted;
+  row.decided = true;
+  row.cause = cause;
+  row.reason = accepted ? "" : "it is worse";
+  row.held_out_before_px = before_px;
+  row.held_out_after_px = after_px;
+  return row;
+}
+
+TEST(Verdict, aKnockThatWasMendedIsAdviceAndNoGrade) {
+  Case c;
+  c.session.calibrations = {attempt(true, "knock", 1.4, 0.2)};
+  const Verdict v = c.verdict();
+  EXPECT_EQ(v.grade, Grade::good);
+  EXPECT_TRUE(any_has(v.advice, "knocked"));
+}
+
+TEST(Verdict, aRejectedCalibrationIsADoubtUnlessTheOneInUseFitsAsWell) {
+  Case c;
+  c.session.calibrations = {attempt(true, "from_scratch", 0, 0.2), attempt(false, "drift", 1.4, 0.2)};
+  EXPECT_EQ(c.verdict().grade, Grade::care);
+  EXPECT_TRUE(any_has(c.verdict().advice, "it is worse"));
+  c.session.calibrations.back() = attempt(false, "requested", 0.2, 0.2);
+  EXPECT_EQ(c.verdict().grade, Grade::good);
+}
+
+TEST(Verdict, neverACalibrationSaysHowToGetOne) {
+  Case c;
+  c.session.calibrations = {attempt(false, "from_scratch", 0, 0.9)};
+  const Verdict v = c.verdict();
+  EXPECT_EQ(v.grade, Grade::care);
+  EXPECT_TRUE(any_has(v.reasons, "no calibration was found"));
+  EXPECT_TRUE(any_has(v.advice, "near and far"));
+  c.session.calibrations.clear();
+  EXPECT_EQ(c.verdict().grade, Grade::good) << "nothing is known of it";
+  c.session.summary["calibration"]["accepted"] = 0;
+  EXPECT_TRUE(any_has(c.verdict().reasons, "no calibration was found"));
+}
+
+TEST(Verdict, aScaleThatDisagreesAndACalibrationThatWasNotKeptAreTold) {
+  Case c;
+  c.session.events = {{Stamp(), "scale_disagrees", "the way comes out 90.0 % longer"}, {Stamp(), "calibration_not_kept", "no room"}};
+  c.session.calibrations = {attempt(true, "from_scratch", 0, 0.2)};
+  const Verdict v = c.verdict();
+  EXPECT_EQ(v.grade, Grade::care);
+  EXPECT_TRUE(any_has(v.advice, "90.0 % longer"));
+  EXPECT_TRUE(any_has(v.advice, "no room"));
 }
 
 TEST(Verdict, aTornSessionSaysHowToCloseOne) {
