@@ -27,7 +27,7 @@ namespace {
 using namespace gige_register;
 
 constexpr std::uint16_t kControlPort = 3956;
-constexpr std::size_t kLatchedPulses = 4;  // exposed one after the other, stamped with their own time: a busy machine's delays are none
+constexpr std::size_t kLatchedPulses = 256;  // exposed one after the other, stamped with their own time: a busy machine's delays are none
 constexpr std::uint32_t kMemory = 0x40000, kDescription = 0x20000;  // bytes; address of the description in it
 constexpr std::uint32_t kHeartbeat = 0x938, kTicksHigh = 0x93C, kTicksLow = 0x940, kLatch = 0x944, kLatchedHigh = 0x948, kControl = 0xA00,
                         kStreamPort = 0xD00, kPacketSize = 0xD04, kPacketDelay = 0xD08, kStreamTarget = 0xD18;
@@ -72,7 +72,7 @@ class GigeCamera::Impl {
     (void)store(address, value);
   }
   void power(bool on);
-  void pulse(std::uint64_t number, std::uint32_t source);
+  void pulse(std::uint64_t number, std::uint32_t source, HostStamp when);
   void take_control(bool taken) {
     const std::lock_guard lock(mutex_);
     controller_ = {};
@@ -416,13 +416,13 @@ void GigeCamera::Impl::follow_registers() {
 
 // ---- exposures ------------------------------------------------------------------------------------------------------
 
-void GigeCamera::Impl::pulse(std::uint64_t number, std::uint32_t source) {
+void GigeCamera::Impl::pulse(std::uint64_t number, std::uint32_t source, HostStamp when) {
   const std::lock_guard lock(mutex_);
   if (!acquiring_ || !powered_ || word(trigger_mode) == 0 || word(trigger_source) != source || pulses_.size() >= kLatchedPulses) {
     ++ignored_;
     return;
   }
-  pulses_.emplace_back(number, monotonic_now());
+  pulses_.emplace_back(number, when.ns() != 0 ? when : monotonic_now());
   changed_.notify_all();
 }
 
@@ -535,7 +535,7 @@ void GigeCamera::lie_about_size(int width, int height) {
   impl_->lie_width_ = width;
   impl_->lie_height_ = height;
 }
-void GigeCamera::pulse(std::uint64_t number) { impl_->pulse(number, 1); }
+void GigeCamera::pulse(std::uint64_t number, HostStamp when) { impl_->pulse(number, 1, when); }
 void GigeCamera::take_control(bool taken) { impl_->take_control(taken); }
 GigeCameraReport GigeCamera::report() const {
   GigeCameraReport r;

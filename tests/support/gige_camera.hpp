@@ -67,8 +67,8 @@ class GigeCamera {
   void delay_frames(int exposures, Duration by);  // the last half of each is sent so much later, after what comes between
   void set_loss(double share);
   void lie_about_size(int width, int height);  // sends this size, whatever the registers say; 0: honest again
-  /// A pulse at Line1: one exposure of image `number` where the camera waits for one.
-  void pulse(std::uint64_t number);
+  /// A pulse at Line1: one exposure of image `number` where the camera waits for one. `when`: its time; 0: now.
+  void pulse(std::uint64_t number, HostStamp when = {});
   /// Somebody else takes control, as another program would; false gives it back.
   void take_control(bool taken);
 

@@ -13,21 +13,16 @@ namespace {
 
 constexpr std::size_t kSpare = 3;        // buffers beside the slots that may be out: one is being filled, the next two wait
 constexpr std::size_t kWireBuffers = 4;  // where every frame is converted at once
-constexpr Duration kTick = Duration::milliseconds(100);
-constexpr Duration kLeastSilence = Duration::seconds(1);  // of a free running camera before it is taken for gone
-constexpr Duration kAskEvery = Duration::seconds(1);      // a triggered one may rest; it is asked whether it is there
-constexpr Duration kFirstPause = Duration::milliseconds(500), kLongestPause = Duration::seconds(5);  // between attempts to reopen
-constexpr int kWrongSizes = 3;                                                                       // in a row: no accident
 
-HostStamp now() noexcept {
+}  // namespace
+
+HostStamp monotonic_now() noexcept {
   timespec t{};
   (void)::clock_gettime(CLOCK_MONOTONIC, &t);
   return HostStamp(static_cast<std::int64_t>(t.tv_sec) * 1'000'000'000 + t.tv_nsec);
 }
 
 std::string size_text(int width, int height) { return std::to_string(width) + " x " + std::to_string(height); }
-
-}  // namespace
 
 GigeCamera::GigeCamera(std::unique_ptr<Session> session) : info_(session->info()), session_(std::move(session)), address_(info_.place) {}
 
@@ -164,7 +159,7 @@ DeviceStatus GigeCamera::start(Notifier* ready) noexcept {
     stream_ = nullptr;
     if (state == Handover::State::back) {  // not yet, after all
       session_.reset();
-      handover_.fail(now());
+      handover_.fail(monotonic_now());
       return DeviceStatus::gone;
     }
     handover_.end();
@@ -181,7 +176,7 @@ DeviceStatus GigeCamera::begin(Notifier* ready) {
   stream_ = session_->stream();
   blocks_.restart();
   wrong_sizes_ = 0;
-  heard_ns_ = now().ns();
+  heard_ns_ = monotonic_now().ns();
   handover_.begin(ready);
   free_.clear();
   for (std::size_t i = 0; i < slots_; ++i) {
@@ -262,7 +257,7 @@ void GigeCamera::recycle() noexcept {
 }
 
 void GigeCamera::take(ArvBuffer* buffer) noexcept {
-  const HostStamp arrival = now();
+  const HostStamp arrival = monotonic_now();
   g_object_unref(buffer);  // ours still holds it
   recycle();
   const auto index = static_cast<std::size_t>(reinterpret_cast<std::uintptr_t>(arv_buffer_get_user_data(buffer)));
@@ -320,92 +315,6 @@ bool GigeCamera::right_size(ArvBuffer* buffer) noexcept {
   seen_width_.store(width, std::memory_order_relaxed);
   seen_height_.store(height, std::memory_order_relaxed);
   wrong_sizes_.fetch_add(1, std::memory_order_relaxed);
-  return false;
-}
-
-// ---- the supervisor -------------------------------------------------------------------------------------------------
-
-void GigeCamera::supervise() {
-  (void)pthread_setname_np(pthread_self(), "vergence-watch");
-  Duration pause = kFirstPause;
-  HostStamp next_try{}, asked = now();
-  for (std::unique_lock lock(supervisor_); !quit_;) {
-    (void)wake_.wait_for(lock, std::chrono::nanoseconds(kTick.ns()), [this] { return quit_; });
-    if (quit_) return;
-    lock.unlock();
-    try {
-      switch (handover_.state()) {
-        case Handover::State::streaming:
-          pause = kFirstPause;
-          next_try = now() + pause;
-          if (const Trouble trouble = what_is_wrong(now(), &asked); !trouble.why.empty()) lose(trouble);
-          break;
-        case Handover::State::gone:
-          if (now() < next_try) break;
-          if (reopen()) handover_.ready_again();
-          pause = std::min(pause * 2, kLongestPause);
-          next_try = now() + pause;
-          break;
-        case Handover::State::back:
-          handover_.ready_again();
-          break;
-        case Handover::State::stopped:
-          break;
-      }
-    } catch (const std::exception&) {  // no memory for a sentence: the next round tries again
-    }
-    lock.lock();
-  }
-}
-
-GigeCamera::Trouble GigeCamera::what_is_wrong(HostStamp at, HostStamp* asked) {
-  static const Trouble kSilent{"the camera does not answer any more", false};
-  if (wrong_sizes_.load(std::memory_order_relaxed) >= kWrongSizes)
-    return {"the camera sends " + size_text(seen_width_, seen_height_) + " where " + size_text(wanted_.width, wanted_.height) +
-            " was configured; power it off and on"};
-  const std::lock_guard lock(device_);
-  if (session_ == nullptr || handover_.state() != Handover::State::streaming) return {};
-  if (session_->lost()) return kSilent;
-  const Duration silence = at - HostStamp(heard_ns_.load(std::memory_order_acquire));
-  const Duration period = Duration::seconds(1 / wanted_.rate_hz);
-  if (wanted_.trigger == CameraTrigger::free && silence > std::max(kLeastSilence, period * 10)) {
-    if (!session_->in_control()) return kSilent;
-    return {"the camera answers, but sends no images; check the firewall, and the MTU on the way"};
-  }
-  if (wanted_.trigger != CameraTrigger::free && silence > std::max(kAskEvery, period * 3) && at - *asked > kAskEvery) {
-    *asked = at;
-    if (!session_->in_control()) return kSilent;
-  }
-  return {};
-}
-
-void GigeCamera::lose(const Trouble& trouble) {
-  (void)refuse(DeviceStatus::gone, trouble.why);
-  handover_.lose(now());
-  const std::lock_guard lock(device_);
-  if (session_ != nullptr) session_->close_stream(trouble.reachable);
-  stream_ = nullptr;
-  session_.reset();
-}
-
-bool GigeCamera::quitting() {
-  const std::lock_guard lock(supervisor_);
-  return quit_;
-}
-
-bool GigeCamera::reopen() {
-  const std::lock_guard lock(device_);
-  DeviceStatus status = DeviceStatus::ok;
-  std::string why;
-  session_ = Session::open(address_, &status, &why);
-  if (session_ != nullptr && session_->info().serial != info_.serial) session_.reset();
-  if (session_ == nullptr && status == DeviceStatus::not_found && !quitting())  // with another address, perhaps
-    for (const Found& f : discover())
-      if (f.info.serial == info_.serial && session_ == nullptr) session_ = Session::open(f.info.place, &status, &why);
-  if (session_ == nullptr || quitting()) return false;
-  address_ = session_->info().place;
-  if (apply_again() == DeviceStatus::ok) return true;
-  session_.reset();
   return false;
 }
 

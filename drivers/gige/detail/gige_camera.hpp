@@ -15,6 +15,11 @@
 
 namespace vergence::gige {
 
+/// CLOCK_MONOTONIC.
+[[nodiscard]] HostStamp monotonic_now() noexcept;
+/// `640 x 480`.
+[[nodiscard]] std::string size_text(int width, int height);
+
 /// A GigE Vision camera: drivers/camera.hpp and gige.hpp have the contract.
 ///
 /// Aravis's receive thread fills buffers that are the slots (or, where the format is not 8-bit grey, are converted into them) and offers

@@ -49,7 +49,7 @@ constexpr std::array kRows{
     OptionRow{"link_cameras", "1 to 16", "all GigE cameras", "Cameras that share that link."},
     OptionRow{"packet_socket", "on, off", "off", "Receives through a packet socket (needs CAP_NET_RAW): less work, frames some ms later."},
     OptionRow{"resend", "auto, on, off", "auto", "Asks again for lost packets; auto: where the camera says that it can."},
-    OptionRow{"frame_retention_ms", "ms, 1 to 1000", "1.5 periods",
+    OptionRow{"frame_retention_ms", "ms, 1 to 1000", "3 periods",
               "How long an incomplete frame waits for packets that were asked for again."},
     OptionRow{"socket_buffer_kb", "KiB", "eight frames", "Receive buffer of the socket; needs net.core.rmem_max of that size."},
     OptionRow{"buffers", "4 to 48", "12", "Frames that may be in use at once."},

@@ -16,7 +16,7 @@ struct Options {
   int link_cameras = 0;                               // 0: CameraConfiguration::sharing
   bool packet_socket = false;
   enum class Resend : std::uint8_t { automatic, on, off } resend = Resend::automatic;
-  Duration frame_retention{};      // 0: 1.5 frame periods, 10 to 100 ms
+  Duration frame_retention{};      // 0: 3 frame periods, 60 to 100 ms
   std::int64_t socket_buffer = 0;  // bytes; 0: eight frames, at least 4 MiB
   int buffers = 12;                // slots
   std::string line = "Line1", edge = "rising", overlap;

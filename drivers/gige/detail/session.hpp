@@ -83,6 +83,7 @@ class Session {
   Object<ArvStream> stream_;
   Features features_;
   DeviceInfo info_;
+  Interface link_;
   std::string complaint_, remark_;
   std::atomic<bool> lost_{false};
 };

@@ -105,7 +105,8 @@ TEST(GigeRun, aDriveOverTheWireHasAPoseForEveryPair) {
     }
     std::this_thread::sleep_for(std::chrono::milliseconds(300));
     for (std::uint64_t n = 0; n < kPairs; ++n) {
-      for (const auto& camera : wires.cameras) camera->pulse(n);
+      const HostStamp now(std::chrono::steady_clock::now().time_since_epoch().count());
+      for (const auto& camera : wires.cameras) camera->pulse(n, now);
       std::this_thread::sleep_for(std::chrono::duration<double>(1 / kRate));
     }
   });
