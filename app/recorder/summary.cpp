@@ -70,14 +70,13 @@ bool has_sigmas(const RigCalibration& rig) {
   return rig.cameras > 1;
 }
 
-/// The word and the predicted depth errors, of the worst pair at each depth; null where the calibration brings no sigmas.
+/// The word and the predicted depth errors, of the best pair at each depth; null where the calibration brings no sigmas.
 Json health_json(const RigCalibration& rig, const calibration::CalibrationOptions& options) {
   const bool known = has_sigmas(rig);
   Json depth = Json::object();
   for (const double z : calibration::kHealthDepths) {
-    double worst = 0;
-    for (int k = 1; known && k < rig.cameras; ++k) worst = std::max(worst, calibration::depth_error_percent(rig, k, z));
-    depth[fmt::format("{:g}", z)] = worst > 0 ? Json(worst) : Json();  // 0: so near that no point is seen by both
+    const double percent = known ? calibration::depth_error_percent(rig, z) : 0.0;
+    depth[fmt::format("{:g}", z)] = percent > 0 ? Json(percent) : Json();  // 0: so near that no point is seen by both
   }
   return {{"word", known ? Json(std::string(to_string(calibration::health(rig, options)))) : Json()}, {"depth_error_percent", depth}};
 }

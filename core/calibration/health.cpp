@@ -57,11 +57,20 @@ double depth_error_percent(const RigCalibration& rig, int k, double depth_m) noe
   return seen == 0 ? 0.0 : 100.0 * std::sqrt(std::max(0.0, sum / seen)) / depth_m;
 }
 
+double depth_error_percent(const RigCalibration& rig, double depth_m) noexcept {
+  double best = 0;
+  for (int k = 1; k < rig.cameras; ++k) {
+    const double error = depth_error_percent(rig, k, depth_m);
+    // Zero says that no direction is seen by both, or that nothing is known of the pair.
+    if (error > 0 && (best == 0 || error < best)) best = error;
+  }
+  return best;
+}
+
 HealthWord health(const RigCalibration& rig, const CalibrationOptions& options) noexcept {
-  double worst = 0;
-  for (int k = 1; k < rig.cameras; ++k) worst = std::max(worst, depth_error_percent(rig, k, kWordDepth));
-  if (worst <= options.good_depth_percent) return HealthWord::good;
-  return worst <= options.usable_depth_percent ? HealthWord::can_be_improved : HealthWord::recalibrate;
+  const double error = depth_error_percent(rig, kWordDepth);
+  if (error <= options.good_depth_percent) return HealthWord::good;
+  return error <= options.usable_depth_percent ? HealthWord::can_be_improved : HealthWord::recalibrate;
 }
 
 }  // namespace vergence::calibration

@@ -19,7 +19,10 @@ inline constexpr std::array kHealthDepths = {1.0, 5.0, 10.0, 20.0, 50.0};  // m
 /// the sigmas; without those 0. Matching noise is not in it: this is what stays however well a point is found. Threads pure.
 [[nodiscard]] double depth_error_percent(const RigCalibration& rig, int k, double depth_m) noexcept;
 
-/// The word for a rig: by its worst pair at 20 m.
+/// The same for the whole rig: its best pair, as a depth is measured with.
+[[nodiscard]] double depth_error_percent(const RigCalibration& rig, double depth_m) noexcept;
+
+/// The word for a rig, by its depth error at 20 m.
 [[nodiscard]] HealthWord health(const RigCalibration& rig, const CalibrationOptions& options) noexcept;
 
 }  // namespace vergence::calibration
