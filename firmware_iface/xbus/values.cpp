@@ -1,7 +1,7 @@
 #include "firmware_iface/xbus/values.hpp"
 
 #include <algorithm>
-#include <chrono>
+#include <array>
 #include <cmath>
 
 namespace vergence::xbus {
@@ -11,6 +11,21 @@ namespace {
 std::int64_t nearest(double value, double lo, double hi) noexcept {
   if (!(value == value)) return 0;
   return std::llround(std::clamp(value, lo, hi));
+}
+
+constexpr std::int64_t kDayNs = 86'400'000'000'000;
+
+constexpr bool leap(int year) noexcept { return (year % 4 == 0 && year % 100 != 0) || year % 400 == 0; }
+
+constexpr int days_of(int year, int month) noexcept {
+  constexpr std::array<int, 12> kDays{31, 28, 31, 30, 31, 30, 31, 31, 30, 31, 30, 31};
+  return kDays[static_cast<std::size_t>(month - 1)] + (month == 2 && leap(year) ? 1 : 0);
+}
+
+/// Days from 1970-01-01 to the first of January, Gregorian.
+constexpr std::int64_t days_before(int year) noexcept {
+  const int y = year - 1;
+  return 365LL * (year - 1970) + (y / 4 - y / 100 + y / 400) - (1969 / 4 - 1969 / 100 + 1969 / 400);
 }
 
 }  // namespace
@@ -53,28 +68,31 @@ void write_utc(std::span<std::uint8_t> b, const Utc& utc) noexcept {
 }
 
 bool plausible(const Utc& utc) noexcept {
-  const std::chrono::year_month_day date{std::chrono::year(utc.year), std::chrono::month(utc.month), std::chrono::day(utc.day)};
-  return utc.year >= 1980 && utc.year < 2200 && date.ok() && utc.hour < 24 && utc.minute < 60 && utc.second <= 60 &&
-         utc.nanosecond < 1'000'000'000U;
+  return utc.year >= 1980 && utc.year < 2200 && utc.month >= 1 && utc.month <= 12 && utc.day >= 1 &&
+         utc.day <= days_of(utc.year, utc.month) && utc.hour < 24 && utc.minute < 60 && utc.second <= 60 && utc.nanosecond < 1'000'000'000U;
 }
 
 std::int64_t unix_ns(const Utc& utc) noexcept {
-  const std::chrono::sys_days day =
-      std::chrono::year_month_day{std::chrono::year(utc.year), std::chrono::month(utc.month), std::chrono::day(utc.day)};
-  const std::int64_t seconds =
-      static_cast<std::int64_t>(day.time_since_epoch().count()) * 86400 + utc.hour * 3600 + utc.minute * 60 + utc.second;
-  return seconds * 1'000'000'000 + utc.nanosecond;
+  std::int64_t days = days_before(utc.year) + utc.day - 1;
+  for (int month = 1; month < utc.month; ++month) days += days_of(utc.year, month);
+  const std::int64_t seconds = utc.hour * 3600 + utc.minute * 60 + utc.second;
+  return days * kDayNs + seconds * 1'000'000'000 + utc.nanosecond;
 }
 
 Utc utc_of_unix_ns(std::int64_t ns, std::uint8_t flags) noexcept {
-  const std::chrono::sys_time<std::chrono::nanoseconds> t{std::chrono::nanoseconds(ns)};
-  const auto day = std::chrono::floor<std::chrono::days>(t);
-  const std::chrono::year_month_day date{day};
-  const std::int64_t of_day = (t - day).count(), second = of_day / 1'000'000'000;
+  std::int64_t day = ns / kDayNs, of_day = ns % kDayNs;
+  if (of_day < 0) --day, of_day += kDayNs;
+  int year = static_cast<int>(1970 + day * 400 / 146'097);  // within a year; 146 097 days are four centuries
+  while (days_before(year + 1) <= day) ++year;
+  while (days_before(year) > day) --year;
+  std::int64_t left = day - days_before(year);
+  int month = 1;
+  while (left >= days_of(year, month)) left -= days_of(year, month++);
+  const std::int64_t second = of_day / 1'000'000'000;
   return {static_cast<std::uint32_t>(of_day % 1'000'000'000),
-          static_cast<std::uint16_t>(static_cast<int>(date.year())),
-          static_cast<std::uint8_t>(static_cast<unsigned>(date.month())),
-          static_cast<std::uint8_t>(static_cast<unsigned>(date.day())),
+          static_cast<std::uint16_t>(year),
+          static_cast<std::uint8_t>(month),
+          static_cast<std::uint8_t>(left + 1),
           static_cast<std::uint8_t>(second / 3600),
           static_cast<std::uint8_t>(second / 60 % 60),
           static_cast<std::uint8_t>(second % 60),

@@ -251,6 +251,20 @@ TEST(Utc, goesToUnixNanosecondsAndBack) {
   EXPECT_FALSE(plausible({0, 0, 0, 0, 0, 0, 0, 0})) << "what a device without a fix sends";
 }
 
+TEST(Utc, everyDayOfTwoCenturiesIsTheOneAfterTheDayBefore) {
+  constexpr std::int64_t kDay = 86'400'000'000'000;
+  const Utc first{0, 1980, 1, 1, 0, 0, 0, 7};
+  ASSERT_EQ(unix_ns(first), 315'532'800'000'000'000);
+  for (int i = 0; i < 80'000; ++i) {
+    const std::int64_t ns = unix_ns(first) + i * kDay + i;
+    const Utc utc = utc_of_unix_ns(ns, 7);
+    ASSERT_TRUE(plausible(utc)) << i;
+    ASSERT_EQ(unix_ns(utc), ns) << i;
+  }
+  EXPECT_EQ(utc_of_unix_ns(unix_ns({0, 2000, 2, 28, 0, 0, 0, 7}) + kDay, 7).day, 29) << "2000 was a leap year";
+  EXPECT_EQ(utc_of_unix_ns(unix_ns({0, 2100, 2, 28, 0, 0, 0, 7}) + kDay, 7).month, 3) << "2100 will be none";
+}
+
 /// The constructed vectors beside the captures, as their text gives them.
 TEST(ConstructedVectors, agree) {
   constexpr const char* kFile = "data/xsens_mtdata2/legacy_constructed.txt";
