@@ -102,6 +102,31 @@ TEST_F(ReplayedFolder, theSameBytesWithOneThreadAndTwo) {
   EXPECT_EQ(read_file(session() / "events.jsonl"), read_file(other / "events.jsonl"));
 }
 
+TEST_F(ReplayedFolder, fromScratchIntrinsicsAndALengthAreEnough) {
+  std::string text = read_file(data() / "calibration.yaml");
+  const auto at = text.find("    T_camera_left: [");
+  ASSERT_NE(at, std::string::npos);
+  text.erase(at, text.find('\n', at) + 1 - at);
+  write("calibration.yaml", text);
+  expect_refused("T_camera_left");
+  fs::remove_all(session());
+  const Outcome o = replay("--from-scratch");
+  ASSERT_EQ(o.code, 0) << o.err;
+  EXPECT_EQ(summary()["frames"]["posed"], kFrames);
+  EXPECT_TRUE(summary()["calibration"]["before"].is_null());
+}
+
+TEST_F(ReplayedFolder, aBaselineGivenScalesTheWay) {
+  ASSERT_EQ(replay().code, 0);
+  const double way = summary()["path_m"], length = summary()["calibration"]["baseline_m"];
+  fs::remove_all(session());
+  const Outcome o = replay(fmt::format("--baseline {}", 2 * length));
+  ASSERT_EQ(o.code, 0) << o.err;
+  EXPECT_NEAR(summary()["path_m"].get<double>(), 2 * way, 0.02 * way);
+  EXPECT_NEAR(summary()["calibration"]["baseline_m"].get<double>(), 2 * length, 1e-9);
+  EXPECT_EQ(run_vergence("replay x --format folder --out y --baseline 0").code, 2);
+}
+
 TEST_F(ReplayedFolder, aMissingImageSkipsItsFrame) {
   // Pairing goes by equal names where one side lacks an image.
   fs::remove(data() / image_name(1, 9));
