@@ -17,8 +17,10 @@ namespace {
 
 constexpr int kLostAfter = 3;  // frames without a pose in a row before the state says so
 
-constexpr int kConfirmedAfter = 30;  // frames that agree with a calibration from a file
-constexpr int kInStepAfter = 60;     // frames without a sign of the cameras being out of step, before that is over
+constexpr int kConfirmedAfter = 30;         // frames that agree with a calibration from a file
+constexpr std::uint64_t kDriftFrames = 60;  // of a creeping rig that are taken for one
+constexpr int kUnmatchedAfter = 15;         // frames with good images that no scene can be made of with the calibration in use
+constexpr int kInStepAfter = 60;            // frames without a sign of the cameras being out of step, before that is over
 
 /// What must be known of a rig. `known`: its transforms too.
 void check(const RigCalibration& rig, bool known) {
@@ -36,6 +38,15 @@ void check(const RigCalibration& rig, bool known) {
   }
   if (!known && !(rig.baseline > 1e-3))
     throw std::invalid_argument("the length of the baseline is needed to calibrate from scratch: it sets the scale of everything");
+}
+
+/// From which frame on the tracks tell of the rig as it is now.
+std::uint64_t first_frame_of_use(const calibration::MonitorVerdict& v, std::uint64_t now) noexcept {
+  using K = calibration::MonitorVerdict::Kind;
+  if (v.kind == K::collapse) return now;  // until now there were wrong matches only
+  // A rig that creeps is another one by and by.
+  if (v.kind == K::drift) return std::max(v.onset_frame, now - std::min(now, kDriftFrames));
+  return v.onset_frame;
 }
 
 CalibrationCause cause_of(calibration::MonitorVerdict::Kind kind) noexcept {
@@ -123,6 +134,7 @@ struct Estimator::Parts {
   bool undecided = false;  // something is wrong with the rig, and not yet told what
   int out_of_step = 0;     // frames for which that is still believed
   int without_pose = 0;
+  int unmatched_frames = 0;  // in a row
   Reason told_missing = Reason::none;
   std::atomic<bool> requested{false};
   FixedVector<EstimatorEvent, 16> events;  // a frame raises at most eight
@@ -154,8 +166,7 @@ void Estimator::Parts::watch(const odometry::FrameOutcome& out, const RigFrame& 
     return;
   }
   if (v.kind != K::quiet) {
-    // Of a rig that matches no more, the frames until now hold wrong matches only.
-    doubt(cause_of(v.kind), v.kind == K::collapse ? frame.number : v.onset_frame, frame);
+    doubt(cause_of(v.kind), first_frame_of_use(v, frame.number), frame);
   } else if (!confirmed && keeper.frames_agreed() >= kConfirmedAfter) {
     confirmed = true;
     note(EstimatorEvent::Kind::calibration_confirmed, frame.stamp, "the calibration of the last drive still fits", kConfirmedAfter);
@@ -211,6 +222,16 @@ void Estimator::Parts::tell_missing(Stamp stamp) noexcept {
 /// States that follow from whether there is a pose.
 void Estimator::Parts::follow(const odometry::FrameOutcome& out, const RigFrame& frame) noexcept {
   if (out.gap_s > 0) note(EstimatorEvent::Kind::time_gap, frame.stamp, "no frame for longer than motion can be predicted", out.gap_s);
+  const bool unmatched = !out.posed && out.images_good && odometry.linked() == odometry::Link::linked &&
+                         (out.reason == Reason::no_stereo_matches || out.reason == Reason::cameras_swapped);
+  unmatched_frames = unmatched ? unmatched_frames + 1 : 0;
+  if (options.online && unmatched_frames == kUnmatchedAfter) {
+    // Good images of which no scene can be made: then it is the rig that does not fit.
+    note(EstimatorEvent::Kind::rig_changed, frame.stamp, sentence_of(CalibrationCause::collapse), kUnmatchedAfter);
+    keeper.seek(CalibrationCause::collapse, frame.number, frame.number);
+    odometry.unlink();
+    odometry.forget_rig();
+  }
   if (!out.posed) {
     if (++without_pose == kLostAfter) {
       transition(Trigger::pose_lost, frame.stamp);

@@ -17,12 +17,13 @@ constexpr double kMovedPixels = 1.0;   // px, mean of the tracks since the last 
 constexpr double kImageMargin = 12.0;  // px: nearer to the edge a track need not be found
 // Sigmas taken for a calibration that says none: of rotation (rad), and of t in baselines. At first yaw and t_z are known by what a single
 // pair sees of them, and that is what a lens model's misfit looks like too.
-constexpr std::array kGivenAtFirst = {1e-3, 1e-2, 1e-3, 0.015, 0.015, 0.05};
-constexpr std::array kGiven = {1e-3, 2e-3, 1e-3, 0.015, 0.015, 0.03};
+constexpr std::array kGivenAtFirst = {5e-4, 1e-2, 1e-3, 0.015, 0.01, 0.05};
+constexpr std::array kGiven = {5e-4, 2e-3, 1e-3, 0.015, 0.01, 0.03};
 constexpr double kLearnedCovariance = 4.0;  // times the monitor's own: the scene it was measured in was one
 constexpr int kLearnFrames = 45;            // moving, in agreement
 constexpr int kStillFrames = 15;            // sought for so long without a new frame in the log: the rig stands
 constexpr std::size_t kNewFrames = 5;       // at least, between two solves
+constexpr int kMostDoublings = 4;           // of the frames between two solves
 constexpr double kGrow = 1.3;               // at least, of the frames between two solves
 
 std::size_t most_tracks(const EstimatorOptions& o) noexcept { return static_cast<std::size_t>(o.odometry.features); }
@@ -225,6 +226,8 @@ void RigKeeper::seek(CalibrationCause cause, std::uint64_t onset, std::uint64_t 
   sought_since_ = now;
   seeking_ = true;
   frames_still_ = 0;
+  rejections_ = 0;
+  gate_ = Gate::open;
   missing_ = Reason::none;
   log_.drop_before(onset);
   logged_ = log_.size();
@@ -300,9 +303,10 @@ CalibrationDecision RigKeeper::judge(Stamp stamp, std::uint64_t number) noexcept
     const double grow = std::clamp(excess * excess, kGrow, 4.0);
     wanted_ = std::max(std::min(most, static_cast<std::size_t>(std::ceil(grow * solution_.frames))), logged_ + kNewFrames);
   } else if (gate_ != Gate::open) {
-    // The same frames would say the same again.
+    // The same frames would say the same again; and what is rejected again and again is asked about less and less often.
     log_.drop_before(solution_.newest + 1);
-    wanted_ = logged_ - log_.size() + static_cast<std::size_t>(options_.calibration.min_frames);
+    wanted_ = logged_ - log_.size() + (static_cast<std::size_t>(options_.calibration.min_frames) << std::min(rejections_, kMostDoublings));
+    ++rejections_;
   }
   if (gate_ == Gate::needs_motion) missing_ = Reason::needs_motion;
   if (gate_ == Gate::needs_near_structure) missing_ = Reason::needs_near_structure;

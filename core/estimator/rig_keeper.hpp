@@ -93,6 +93,7 @@ class RigKeeper {
   bool seeking_ = false, solving_ = false;
   std::uint64_t sought_since_ = 0, onset_ = 0;  // frame numbers
   std::size_t logged_ = 0, wanted_ = 0;         // frames logged for what is sought; and how many the next solve needs
+  int rejections_ = 0;                          // for other reasons than a want of frames
   int frames_since_snapshot_ = 0;
   int frames_still_ = 0;  // since one was logged
   calibration::RigSolution solution_;

@@ -52,6 +52,8 @@ class Odometry {
   void link(const RigCalibration& rig) noexcept;
   /// From the next frame on the cameras are not linked; the scene stays.
   void unlink() noexcept;
+  /// What is known of the cameras' transform is of no use: unlinked, the next scene begins with finding it.
+  void forget_rig() noexcept;
   [[nodiscard]] Link linked() const noexcept { return link_; }
 
   [[nodiscard]] const RigCalibration& rig() const noexcept { return rig_; }
@@ -79,7 +81,6 @@ class Odometry {
   void take_up_link() noexcept;
   /// Nothing of the scene is of use any more; without a calibration the rig has to be initialised again.
   void lose_scene() noexcept;
-  void forget_rig() noexcept;
   /// The cameras agree about the scene: only then does a frame shape the map.
   [[nodiscard]] static bool confirmed_across(const PoseFit& fit) noexcept;
   /// What is wrong with the images themselves, `none` if nothing.
