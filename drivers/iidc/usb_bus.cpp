@@ -16,166 +16,12 @@
 namespace vergence::iidc {
 namespace {
 
-constexpr std::uint16_t kPointGrey = 0x1E10;
-struct Product {
-  std::uint16_t id;
-  const char* name;
-};
-constexpr std::array kProducts{
-    Product{0x2000, "Firefly MV"},   Product{0x2001, "Firefly MV"}, Product{0x2002, "Firefly MV"}, Product{0x2003, "Firefly MV"},
-    Product{0x2004, "Chameleon"},    Product{0x2005, "Chameleon"},  Product{0x3000, "Flea3"},      Product{0x3005, "Flea3"},
-    Product{0x3006, "Flea3"},        Product{0x3008, "Flea3"},      Product{0x300A, "Flea3"},      Product{0x300B, "Flea3"},
-    Product{0x3103, "Grasshopper3"}, Product{0x3300, "Flea3"},      Product{0x3800, "Ladybug5"},
-};
-
-constexpr unsigned char kReadRequest = 0xC0, kWriteRequest = 0x40;  // vendor, device
-constexpr unsigned char kQuadlets = 0x7F;                           // addresses 0xFFFF….
-constexpr int kMostErrors = 8;                                      // transfers in a row that failed: the device is given up
-constexpr std::size_t kSuperSpeedBlock = 1024;                      // transfers of USB 3 are whole packets of this size
-
-const Product* product_of(const libusb_device_descriptor& d) noexcept {
-  if (d.idVendor != kPointGrey) return nullptr;
-  for (const Product& p : kProducts)
-    if (p.id == d.idProduct) return &p;
-  return nullptr;
-}
-
-DeviceStatus status_of(int error) noexcept {
-  switch (error) {
-    case LIBUSB_SUCCESS:
-      return DeviceStatus::ok;
-    case LIBUSB_ERROR_TIMEOUT:
-      return DeviceStatus::timeout;
-    case LIBUSB_ERROR_NO_DEVICE:
-    case LIBUSB_ERROR_NOT_FOUND:
-      return DeviceStatus::gone;
-    case LIBUSB_ERROR_ACCESS:
-      return DeviceStatus::no_permission;
-    case LIBUSB_ERROR_BUSY:
-      return DeviceStatus::busy;
-    case LIBUSB_ERROR_PIPE:  // the device stalled the request
-      return DeviceStatus::unsupported;
-    default:
-      return DeviceStatus::failed;
-  }
-}
-
-std::string place_of(libusb_device* device) {
-  std::array<char, 32> text{};
-  (void)std::snprintf(text.data(), text.size(), "usb %03d/%03d", libusb_get_bus_number(device), libusb_get_device_address(device));
-  return text.data();
-}
-
-std::string node_of(libusb_device* device) {
-  std::array<char, 48> text{};
-  (void)std::snprintf(text.data(), text.size(), "/dev/bus/usb/%03d/%03d", libusb_get_bus_number(device), libusb_get_device_address(device));
-  return text.data();
-}
-
-unsigned limit_ms() noexcept { return static_cast<unsigned>(UsbBus::kRegisterLimit.ns() / 1'000'000); }
-
-DeviceStatus read_quadlet(libusb_device_handle* handle, std::uint64_t address, std::uint32_t* value) noexcept {
-  std::array<unsigned char, 4> b{};
-  const int got = libusb_control_transfer(handle, kReadRequest, kQuadlets, static_cast<std::uint16_t>(address & 0xFFFF),
-                                          static_cast<std::uint16_t>(address >> 16U & 0xFFFF), b.data(), b.size(), limit_ms());
-  if (got < 0) return status_of(got);
-  if (got != static_cast<int>(b.size())) return DeviceStatus::failed;
-  *value = static_cast<std::uint32_t>(b[0]) | static_cast<std::uint32_t>(b[1]) << 8U | static_cast<std::uint32_t>(b[2]) << 16U |
-           static_cast<std::uint32_t>(b[3]) << 24U;
-  return DeviceStatus::ok;
-}
-
-/// Registers of a device that is opened, but not yet anybody's camera.
-class HandlePort final : public RegisterPort {
- public:
-  explicit HandlePort(libusb_device_handle* handle) : handle_(handle) {}
-  DeviceStatus read(std::uint64_t address, std::uint32_t* value) noexcept override { return read_quadlet(handle_, address, value); }
-  DeviceStatus write(std::uint64_t, std::uint32_t) noexcept override { return DeviceStatus::unsupported; }
-
- private:
-  libusb_device_handle* handle_;
-};
-
-struct FoundDevice {
-  UsbCandidate who;
-  ConfigRom rom;
-};
-
-/// Opens a device and asks who it is. *handle stays open when `access` is ok.
-FoundDevice ask(libusb_device* device, const libusb_device_descriptor& d, const Product& product, libusb_device_handle** handle,
-                std::string* complaint) {
-  FoundDevice found;
-  UsbCandidate& who = found.who;
-  who.info = {"iidc-usb", "", product.name, place_of(device)};
-  const int error = libusb_open(device, handle);
-  if (error != LIBUSB_SUCCESS) {
-    who.access = status_of(error);
-    if (who.access == DeviceStatus::no_permission)
-      *complaint =
-          "no permission to open " + node_of(device) + ": install the udev rules (vergence devices --write-udev) and plug it in again";
-    return found;
-  }
-  std::array<unsigned char, 64> text{};
-  if (d.iSerialNumber != 0) {
-    const int n = libusb_get_string_descriptor_ascii(*handle, d.iSerialNumber, text.data(), static_cast<int>(text.size()));
-    if (n > 0) who.transport_serial.assign(text.begin(), text.begin() + n);
-  }
-  HandlePort port(*handle);
-  std::string why;
-  who.access = read_rom(&port, &found.rom, &why);
-  if (who.access != DeviceStatus::ok) {
-    *complaint = std::string(product.name) + " at " + place_of(device) + ": " + why;
-    libusb_close(*handle);
-    *handle = nullptr;
-    return found;
-  }
-  who.guid = found.rom.guid;
-  who.info.serial = guid_text(who.guid);
-  if (found.rom.model[0] != 0) who.info.model = found.rom.model.data();
-  return found;
-}
-
-/// Calls back with every device of ours; ends when that says true.
-template <class F>
-int for_each_device(libusb_context* context, F&& f) {
-  libusb_device** list = nullptr;
-  const ssize_t n = libusb_get_device_list(context, &list);
-  if (n < 0) return static_cast<int>(n);
-  bool done = false;
-  for (ssize_t i = 0; i < n && !done; ++i) {
-    libusb_device_descriptor d{};
-    if (libusb_get_device_descriptor(list[i], &d) != LIBUSB_SUCCESS) continue;
-    if (const Product* p = product_of(d)) done = f(list[i], d, *p);
-  }
-  libusb_free_device_list(list, 1);
-  return LIBUSB_SUCCESS;
-}
-
-constexpr const char* kNoUsb = "the system's USB devices cannot be listed";
+constexpr int kMostErrors = 8;                  // transfers in a row that failed: the device is given up
+constexpr std::size_t kSuperSpeedBlock = 1024;  // transfers of USB 3 are whole packets of this size
 
 }  // namespace
 
-// ---- finding and opening ------------------------------------------------------------------------------------------
-
-std::vector<UsbCandidate> UsbBus::find(std::string* complaint) {
-  std::vector<UsbCandidate> all;
-  libusb_context* context = nullptr;
-  if (libusb_init(&context) != LIBUSB_SUCCESS) {
-    *complaint = kNoUsb;
-    return all;
-  }
-  (void)for_each_device(context, [&](libusb_device* device, const libusb_device_descriptor& d, const Product& p) {
-    libusb_device_handle* handle = nullptr;
-    all.push_back(ask(device, d, p, &handle, complaint).who);
-    if (handle != nullptr) libusb_close(handle);
-    return false;
-  });
-  libusb_exit(context);
-  // By GUID, those that do not tell theirs last: the order in which ports were found changes from one start to the next.
-  std::sort(all.begin(), all.end(),
-            [](const UsbCandidate& a, const UsbCandidate& b) { return std::pair(a.guid == 0, a.guid) < std::pair(b.guid == 0, b.guid); });
-  return all;
-}
+// ---- opening -------------------------------------------------------------------------------------------------------
 
 std::unique_ptr<UsbBus> UsbBus::open(std::string_view wanted, DeviceStatus* status, std::string* complaint) {
   std::unique_ptr<UsbBus> bus(new UsbBus);
@@ -194,31 +40,23 @@ DeviceStatus UsbBus::open_device(std::string_view wanted) {
     return DeviceStatus::failed;
   }
   DeviceStatus status = DeviceStatus::not_found;
-  const int listed = for_each_device(context_, [&](libusb_device* device, const libusb_device_descriptor& d, const Product& p) {
-    libusb_device_handle* handle = nullptr;
-    const FoundDevice found = ask(device, d, p, &handle, &complaint_);
-    if (handle == nullptr) {  // it may have been the one
-      if (status == DeviceStatus::not_found && found.who.access == DeviceStatus::no_permission) status = found.who.access;
+  const bool listed = for_each_usb_camera(context_, &complaint_, [&](FoundUsbCamera* found) {
+    if (found->handle == nullptr) {  // it may have been the one
+      if (status == DeviceStatus::not_found && found->who.access == DeviceStatus::no_permission) status = found->who.access;
       return false;
     }
-    if (!names_camera(wanted, found.who.guid, found.who.transport_serial)) {
-      libusb_close(handle);
-      return false;
-    }
-    status = claim(handle);
-    if (status != DeviceStatus::ok) {
-      libusb_close(handle);
-      return !wanted.empty();  // any other will do when none is named
-    }
-    handle_ = handle;
-    info_ = found.who.info;
-    rom_ = found.rom;
-    const bool super = libusb_get_device_speed(device) >= LIBUSB_SPEED_SUPER;
+    if (!names_camera(wanted, found->who.guid, found->who.transport_serial)) return false;
+    status = claim(found->handle);
+    if (status != DeviceStatus::ok) return !wanted.empty();  // any other will do when none is named
+    handle_ = std::exchange(found->handle, nullptr);
+    info_ = found->who.info;
+    rom_ = found->rom;
+    const bool super = libusb_get_device_speed(found->device) >= LIBUSB_SPEED_SUPER;
     traits_ = {false, BusSpeed::s800, super ? std::size_t{65532} : largest_packet(BusSpeed::s800), super ? 400e6 : 53e6};
     complaint_.clear();
     return true;
   });
-  if (listed < 0) complaint_ = kNoUsb;
+  if (!listed) status = DeviceStatus::failed;
   if (status != DeviceStatus::ok) close_device();
   return status;
 }
@@ -251,7 +89,7 @@ DeviceStatus UsbBus::claim(libusb_device_handle* handle) {
   const int error = libusb_claim_interface(handle, interface_);
   if (error == LIBUSB_SUCCESS) return DeviceStatus::ok;
   complaint_ = error == LIBUSB_ERROR_BUSY ? "another program has claimed it" : libusb_strerror(static_cast<libusb_error>(error));
-  return status_of(error);
+  return usb_status(error);
 }
 
 void UsbBus::close_device() noexcept {
@@ -298,17 +136,11 @@ DeviceStatus UsbBus::reopen() noexcept {
 // ---- registers ----------------------------------------------------------------------------------------------------
 
 DeviceStatus UsbBus::read(std::uint64_t address, std::uint32_t* value) noexcept {
-  return handle_ == nullptr ? DeviceStatus::gone : read_quadlet(handle_, address, value);
+  return handle_ == nullptr ? DeviceStatus::gone : read_usb_quadlet(handle_, address, value);
 }
 
 DeviceStatus UsbBus::write(std::uint64_t address, std::uint32_t value) noexcept {
-  if (handle_ == nullptr) return DeviceStatus::gone;
-  std::array<unsigned char, 4> b{static_cast<unsigned char>(value), static_cast<unsigned char>(value >> 8U),
-                                 static_cast<unsigned char>(value >> 16U), static_cast<unsigned char>(value >> 24U)};
-  const int sent = libusb_control_transfer(handle_, kWriteRequest, kQuadlets, static_cast<std::uint16_t>(address & 0xFFFF),
-                                           static_cast<std::uint16_t>(address >> 16U & 0xFFFF), b.data(), b.size(), limit_ms());
-  if (sent < 0) return status_of(sent);
-  return sent == static_cast<int>(b.size()) ? DeviceStatus::ok : DeviceStatus::failed;
+  return handle_ == nullptr ? DeviceStatus::gone : write_usb_quadlet(handle_, address, value);
 }
 
 // ---- streaming ----------------------------------------------------------------------------------------------------

@@ -10,21 +10,15 @@
 
 #include "drivers/iidc/bus.hpp"
 #include "drivers/iidc/slot_memory.hpp"
+#include "drivers/iidc/usb_devices.hpp"
 #include "firmware_iface/iidc/config_rom.hpp"
 
 namespace vergence::iidc {
 
-/// One attached device that may be an IIDC camera.
-struct UsbCandidate {
-  DeviceInfo info{};             // serial: the GUID; empty when it could not be opened
-  std::string transport_serial;  // the USB string
-  std::uint64_t guid = 0;
-  DeviceStatus access = DeviceStatus::ok;  // why it could not be asked
-};
-
 /// An IIDC camera on USB.
 ///
-/// Registers  Control requests, a second at most each. Stream: kTransfers bulk transfers of a whole frame each, straight into the slots;
+/// Registers  Control requests, kUsbRegisterLimit at most each. Stream: kTransfers bulk transfers of a whole frame each, straight into the
+/// slots;
 ///            a full slot is replaced by a free one in the same callback, so the camera never waits for us. A short or empty packet ends a
 ///            frame.
 /// Threads    A thread handles libusb's events between start() and stop(). Arrivals are stamped in its callbacks; while a register is
@@ -36,11 +30,8 @@ struct UsbCandidate {
 class UsbBus final : public CameraBus {
  public:
   static constexpr std::size_t kTransfers = 4;  // 130 ms at 30 Hz: longer than any scheduling hold-up seen
-  static constexpr Duration kRegisterLimit = Duration::seconds(1);
   static constexpr Duration kCancelLimit = Duration::seconds(2);
 
-  /// Every device with a known id, each asked for its GUID; in that order.
-  [[nodiscard]] static std::vector<UsbCandidate> find(std::string* complaint);
   /// `wanted` as names_camera(). Null: *status and *complaint say why.
   [[nodiscard]] static std::unique_ptr<UsbBus> open(std::string_view wanted, DeviceStatus* status, std::string* complaint);
   ~UsbBus() override;

@@ -14,7 +14,7 @@ class UsbDriver final : public CameraDriver {
   std::vector<DeviceInfo> enumerate() override {
     complaint_.clear();
     std::vector<DeviceInfo> out;
-    for (UsbCandidate& c : UsbBus::find(&complaint_)) out.push_back(std::move(c.info));
+    for (UsbCandidate& c : find_usb_cameras(&complaint_)) out.push_back(std::move(c.info));
     return out;
   }
   std::unique_ptr<CameraDevice> open(std::string_view serial, DeviceStatus* status) override {
