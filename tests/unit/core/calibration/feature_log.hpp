@@ -1,0 +1,98 @@
+#pragma once
+#include <array>
+#include <memory>
+
+#include "core/calibration/rig_solver.hpp"
+#include "core/math/random.hpp"
+#include "tests/support/feature_drive.hpp"
+
+namespace vergence::test {
+
+/// The street of a feature drive without any error in its tracks.
+[[nodiscard]] inline FeatureDriveOptions exact_drive() {
+  FeatureDriveOptions o;
+  o.white_px = o.constant_px = o.walk_px = o.bias_px = o.outliers = o.movers = 0;
+  return o;
+}
+
+/// The rig of a feature drive as a calibration: cameras of these intrinsics, each number of them known to its sigma (px).
+[[nodiscard]] inline RigCalibration rig_of(const FeatureDriveOptions& drive, const std::array<Pinhole, 2>& lenses,
+                                           const std::array<double, 4>& sigma) {
+  RigCalibration rig;
+  rig.cameras = 2;
+  for (std::size_t k = 0; k < 2; ++k) {
+    Intrinsics& c = rig.intrinsics[k];
+    c.width = drive.width, c.height = drive.height;
+    c.fx = lenses[k].fx, c.fy = lenses[k].fy, c.cx = lenses[k].cx, c.cy = lenses[k].cy;
+    c.sigma = sigma;
+  }
+  rig.T_camera_left[1] = drive.T_right_left;
+  rig.baseline = drive.T_right_left.t.norm();
+  return rig;
+}
+/// The same with intrinsics that are exact.
+[[nodiscard]] inline RigCalibration rig_of(const FeatureDriveOptions& drive) {
+  constexpr double kExact = 1e-6;  // px; zero would say that nothing is known of them
+  return rig_of(drive, {drive.left, drive.right}, {kExact, kExact, kExact, kExact});
+}
+
+/// How far what is logged is from the truth, beyond the errors of the tracks: where a solve starts from.
+struct LogStart {
+  double pose_rad = 0, pose_m = 0;  // of every frame's pose but the first, each axis, sigma
+  double rig_rad = 0, rig_m = 0;    // of every frame's T_camera_left
+};
+
+/// The next `frames` frames of a drive as the estimator would log them.
+inline void log_drive(FeatureDrive& drive, int frames, const LogStart& start, calibration::TrackLog& log) {
+  Random random(drive.options().seed, 5);
+  const auto vector = [&](double sigma) { return Vec3(sigma * Vec3(random.normal(), random.normal(), random.normal())); };
+  for (int i = 0; i < frames; ++i) {
+    drive.next();
+    calibration::LoggedFrame f;
+    f.number = drive.frame();
+    f.stamp = drive.stamp();
+    f.T_left_world = i == 0 ? drive.T_left_world() : perturbed(drive.T_left_world(), vector(start.pose_rad), vector(start.pose_m));
+    f.T_camera_left[1] = perturbed(drive.T_right_left(), vector(start.rig_rad), vector(start.rig_m));
+    f.unlinked = true;
+    f.reprojection_px = 0.5;
+    f.across = static_cast<int>(drive.tracks().size());
+    log.begin(f);
+    for (const FeatureTrack& t : drive.tracks()) {
+      calibration::LoggedSighting s;
+      s.track = t.id;
+      s.cameras = t.seen;
+      s.sigma = static_cast<float>(t.sigma_px);
+      s.raw[0] = t.left.cast<float>();
+      s.raw[1] = t.right.cast<float>();
+      log.push(s);
+    }
+  }
+}
+
+/// A RigSolver with its memory.
+struct SolverInArena {
+  calibration::CalibrationOptions options;
+  calibration::MonitorOptions monitor;
+  Arena arena;
+  calibration::RigSolver solver;
+  explicit SolverInArena(const calibration::CalibrationOptions& o, std::size_t features = 300)
+      : options(o), arena(calibration::RigSolver::memory_needed(o, monitor, 2, features)), solver(options, monitor, 2, features, arena) {}
+};
+
+using Vec5 = Eigen::Matrix<double, 5, 1>;
+using Mat5 = Eigen::Matrix<double, 5, 5>;
+/// Rotation and the two coordinates of t that the known length leaves: along the baseline there is nothing to find.
+[[nodiscard]] inline Vec5 five_errors(const RigCalibration& found, const Transform& truth) {
+  Vec5 e;
+  e << log_so3(found.T_camera_left[1].R * truth.R.transpose()), (found.T_camera_left[1].t - truth.t).tail<2>();
+  return e;
+}
+[[nodiscard]] inline Mat5 five_covariance(const Mat6& C) {
+  constexpr std::array<int, 5> kWhich = {0, 1, 2, 4, 5};
+  Mat5 out;
+  for (int i = 0; i < 5; ++i)
+    for (int j = 0; j < 5; ++j) out(i, j) = C(kWhich[static_cast<std::size_t>(i)], kWhich[static_cast<std::size_t>(j)]);
+  return out;
+}
+
+}  // namespace vergence::test

@@ -1,0 +1,183 @@
+#include "core/calibration/gates.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+#include <set>
+#include <string>
+
+#include "tests/unit/core/calibration/feature_log.hpp"
+
+namespace vergence::calibration {
+namespace {
+
+constexpr double kDegree = std::numbers::pi / 180;
+
+/// A question that every gate answers with `open`: frames 30 to 49 were not in the solve, and fit.
+struct Case {
+  test::FeatureDriveOptions drive;
+  Arena arena{TrackLog::memory_needed(60, 300)};
+  TrackLog log{60, 300, arena};
+  CalibrationOptions options;
+  RigCalibration nominal, in_use;
+  RigSolution solution;
+  GateQuestion question;
+
+  Case() {
+    test::FeatureDrive d(drive);
+    test::log_drive(d, 50, {}, log);
+    solution.status = RigSolveStatus::ok;
+    const RigCalibration rig = test::rig_of(drive);
+    solution.rig = rig;
+    solution.rig.sigma_noise[1] = {1e-4, 1e-4, 1e-4, 1e-3, 2e-3, 2e-3};
+    solution.newest = 29;
+    solution.frames = 30;
+    solution.tracks = 900;
+    solution.near = 500;
+    solution.travelled_m = 8;
+    nominal = solution.rig;
+    nominal.T_camera_left[1] = {Mat3::Identity(), {-0.75, 0, 0}};
+    in_use = solution.rig;
+    question.solution = &solution;
+    question.nominal = &nominal;
+    question.log = &log;
+  }
+  [[nodiscard]] Gate ask() const { return ask_gates(question, options); }
+  void turn(RigCalibration* rig, const Vec3& degrees) const {
+    rig->T_camera_left[1] = perturbed(rig->T_camera_left[1], kDegree * degrees, Vec3::Zero());
+  }
+  [[nodiscard]] Transform& found() { return solution.rig.T_camera_left[1]; }
+};
+
+TEST(Gates, aSoundSolutionPassesThem) { EXPECT_EQ(Case().ask(), Gate::open); }
+
+TEST(Gates, whatWasNotSolvedIsNotAdopted) {
+  for (const RigSolveStatus status :
+       {RigSolveStatus::too_few_tracks, RigSolveStatus::no_candidate, RigSolveStatus::not_converged, RigSolveStatus::not_observable}) {
+    Case c;
+    c.solution.status = status;
+    EXPECT_EQ(c.ask(), Gate::not_solved);
+  }
+}
+
+TEST(Gates, eachSigmaHasToBeSmallEnough) {
+  // Axes of rotation 0.15 mrad; t_y and t_z 4 mm for 0.75 m. t_x is not asked: the length is known.
+  for (const std::size_t i : {0U, 1U, 2U, 4U, 5U}) {
+    Case c;
+    const double enough = i < 3 ? 0.15e-3 : 4e-3;
+    c.solution.rig.sigma_noise[1][i] = 0.999 * enough;
+    EXPECT_EQ(c.ask(), Gate::open) << i;
+    c.solution.rig.sigma_noise[1][i] = 1.001 * enough;
+    EXPECT_EQ(c.ask(), Gate::sigmas_too_large) << i;
+    EXPECT_NEAR(sigma_excess(c.solution.rig, c.options), 1.001, 1e-9) << i;
+    // With a full window three times that is enough.
+    c.question.window_full = true;
+    c.solution.rig.sigma_noise[1][i] = 2.999 * enough;
+    EXPECT_EQ(c.ask(), Gate::open) << i;
+    c.solution.rig.sigma_noise[1][i] = 3.001 * enough;
+    EXPECT_EQ(c.ask(), Gate::sigmas_too_large) << i;
+  }
+}
+
+TEST(Gates, theSigmaWantedOfTheTranslationIsInProportionToTheBaseline) {
+  Case c;
+  c.solution.rig.sigma_noise[1] = {0, 0, 0, 0, 3e-3, 0};
+  EXPECT_NEAR(sigma_excess(c.solution.rig, c.options), 0.75, 1e-9);
+  c.found().t *= 0.5;
+  EXPECT_NEAR(sigma_excess(c.solution.rig, c.options), 1.5, 1e-9);
+}
+
+TEST(Gates, tooLittleWayNeedsMotion) {
+  Case c;
+  c.solution.travelled_m = 2.24;  // three baselines are 2.25 m
+  EXPECT_EQ(c.ask(), Gate::needs_motion);
+  c.solution.travelled_m = 2.26;
+  EXPECT_EQ(c.ask(), Gate::open);
+  c.options.needs_motion_m = 5;
+  EXPECT_EQ(c.ask(), Gate::needs_motion);
+}
+
+TEST(Gates, tooFewNearPointsNeedNearStructure) {
+  Case c;
+  c.solution.near = c.options.needs_near_points - 1;
+  EXPECT_EQ(c.ask(), Gate::needs_near_structure);
+  ++c.solution.near;
+  EXPECT_EQ(c.ask(), Gate::open);
+}
+
+TEST(Gates, aRightCameraOnTheLeftIsAnExchange) {
+  Case c;
+  c.found() = c.found().inverse();
+  EXPECT_EQ(c.ask(), Gate::cameras_swapped);
+}
+
+TEST(Gates, aDirectionFarFromTheConfiguredOneIsImplausible) {
+  Case c;
+  for (const double degrees : {9.9, 10.1}) {
+    const double a = degrees * kDegree;
+    c.found().t = 0.75 * Vec3(-std::cos(a), 0, std::sin(a));
+    EXPECT_EQ(c.ask() == Gate::implausible_direction, degrees > 10) << degrees;
+  }
+}
+
+TEST(Gates, aRotationFarFromTheConfiguredOneIsImplausibleUnlessFromScratch) {
+  for (const double degrees : {9.9, 10.1}) {
+    Case c;
+    c.nominal.T_camera_left[1].R = exp_so3(degrees * kDegree * Vec3(0, 0.6, 0.8)) * c.found().R;
+    EXPECT_EQ(c.ask(), Gate::open) << "from scratch only the sign of t_x and the direction are asked";
+    c.turn(&c.in_use, {0.3, 0, 0});
+    c.question.in_use = &c.in_use;
+    EXPECT_EQ(c.ask(), degrees > 10 ? Gate::implausible_rotation : Gate::open) << degrees;
+  }
+}
+
+TEST(Gates, camerasOutOfStepHaveNoCalibration) {
+  Case c;
+  c.solution.out_of_step = true;
+  EXPECT_EQ(c.ask(), Gate::out_of_step);
+}
+
+TEST(Gates, whatFramesNotUsedContradictIsNotAdopted) {
+  Case c;
+  c.turn(&c.solution.rig, {0.2, 0, 0});  // 4.4 px of row, against 1.5 allowed
+  EXPECT_EQ(c.ask(), Gate::does_not_fit);
+  const HeldOut h = held_out(c.log, c.solution.newest, c.solution.rig);
+  EXPECT_NEAR(h.median_px, 1247 * 0.2 * kDegree, 0.3);
+  // Without frames to tell, nothing contradicts it.
+  c.solution.newest = 47;
+  EXPECT_EQ(held_out(c.log, c.solution.newest, c.solution.rig).frames, 2);
+  EXPECT_EQ(c.ask(), Gate::open);
+}
+
+TEST(Gates, framesNotUsedAreTheNewestTwelve) {
+  const Case c;
+  EXPECT_EQ(held_out(c.log, 29, c.solution.rig).frames, static_cast<int>(kHeldOutFrames));
+  EXPECT_EQ(held_out(c.log, 44, c.solution.rig).frames, 5);
+  EXPECT_EQ(held_out(c.log, 49, c.solution.rig).frames, 0);
+  EXPECT_EQ(held_out(c.log, 49, c.solution.rig).median_px, 0);
+}
+
+TEST(Gates, oneThatIsNoBetterThanTheOneInUseIsNotAdopted) {
+  Case c;
+  c.question.in_use = &c.in_use;
+  EXPECT_EQ(c.ask(), Gate::no_better) << "the same";
+  c.turn(&c.solution.rig, {0.03, 0, 0});
+  EXPECT_EQ(c.ask(), Gate::no_better) << "a worse one";
+  std::swap(c.solution.rig.T_camera_left[1], c.in_use.T_camera_left[1]);
+  EXPECT_EQ(c.ask(), Gate::open) << "the better one, by 0.65 px of row: many times the spread of a median of 150 matches";
+}
+
+TEST(Gates, everyReasonIsASentenceOfItsOwnWithoutCommas) {
+  std::set<std::string> seen;
+  for (int g = 1; g <= static_cast<int>(Gate::no_better); ++g) {
+    const std::string text = reason(static_cast<Gate>(g));
+    EXPECT_GT(text.size(), 10U) << g;
+    EXPECT_EQ(text.find(','), std::string::npos) << text;
+    EXPECT_TRUE(seen.insert(text).second) << text;
+  }
+  EXPECT_STREQ(reason(Gate::open), "");
+}
+
+}  // namespace
+}  // namespace vergence::calibration

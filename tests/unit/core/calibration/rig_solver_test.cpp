@@ -1,0 +1,184 @@
+#include "core/calibration/rig_solver.hpp"
+
+#include <gtest/gtest.h>
+
+#include "core/memory/allocation_guard.hpp"
+#include "tests/unit/core/calibration/feature_log.hpp"
+
+namespace vergence::test {
+namespace {
+
+using calibration::CalibrationOptions;
+using calibration::RigSolution;
+using calibration::RigSolveStatus;
+
+constexpr LogStart kRough{2e-3, 0.02, 5e-3, 0.02};  // what cameras posed each for itself are off, and more
+
+CalibrationOptions held() {
+  CalibrationOptions o;
+  o.max_frames = 60;
+  o.estimate_focal_lengths = 0;
+  return o;
+}
+
+/// 40 frames from the same rough start.
+RigSolution solve(const FeatureDriveOptions& drive_options, const CalibrationOptions& o, const RigCalibration& rig) {
+  SolverInArena s(o);
+  FeatureDrive drive(drive_options);
+  log_drive(drive, 40, kRough, s.solver.log());
+  return s.solver.solve(rig);
+}
+
+TEST(RigSolver, exactTracksGiveTheTransformToTheirRounding) {
+  const FeatureDriveOptions drive = exact_drive();
+  const RigSolution s = solve(drive, held(), rig_of(drive));
+  ASSERT_EQ(s.status, RigSolveStatus::ok);
+  // Pixels are logged as floats: up to 3e-5 px of rounding near 1000 px. One pair of images turns that into 3e-8 rad; over tens of
+  // thousands of sightings rotation is better than that. t_y and t_z follow from directions to points 10 to 20 m away: 1e-6 m at most.
+  const Vec5 e = five_errors(s.rig, drive.T_right_left);
+  EXPECT_LT(e.head<3>().cwiseAbs().maxCoeff(), 3e-8) << e.transpose();
+  EXPECT_LT(e.tail<2>().cwiseAbs().maxCoeff(), 1e-6) << e.transpose();
+  EXPECT_NEAR(s.rig.T_camera_left[1].t.norm(), drive.T_right_left.t.norm(), 1e-12);
+  EXPECT_LT(s.rig.reprojection_px, 3e-5);
+  EXPECT_EQ(s.frames, 40);
+  EXPECT_EQ(s.rig.frames, 40);
+  EXPECT_EQ(s.newest, 39U);
+  EXPECT_FALSE(s.out_of_step);
+  EXPECT_GT(s.near, 0);
+  EXPECT_LE(s.near, s.tracks);
+  // 39 steps of 8 m/s at 30 Hz.
+  EXPECT_NEAR(s.travelled_m, 39 * 8.0 / 30.0, 0.1);
+}
+
+TEST(RigSolver, withNoiseTheErrorsAreWithinItsSigmas) {
+  for (const std::uint64_t seed : {1U, 2U, 3U}) {
+    FeatureDriveOptions drive;
+    drive.seed = seed;
+    const RigSolution s = solve(drive, held(), rig_of(drive));
+    ASSERT_EQ(s.status, RigSolveStatus::ok);
+    const Vec5 e = five_errors(s.rig, drive.T_right_left);
+    const Mat5 C = five_covariance(s.rig.covariance_wide[1]);
+    for (int i = 0; i < 5; ++i) {
+      EXPECT_LT(std::abs(e[i]), 3 * std::sqrt(C(i, i))) << i;
+      EXPECT_GT(C(i, i), 0) << i;
+    }
+    // Exact intrinsics make nothing wider.
+    for (std::size_t i = 0; i < 6; ++i) EXPECT_NEAR(s.rig.sigma_wide[1][i], s.rig.sigma_noise[1][i], 0.02 * s.rig.sigma_noise[1][i]);
+    EXPECT_GT(s.rig.reprojection_px, 0.1);
+    EXPECT_LT(s.rig.reprojection_px, 1.0);
+  }
+}
+
+TEST(RigSolver, uncertainIntrinsicsMakeTheSigmasWider) {
+  const FeatureDriveOptions drive;
+  const RigSolution exact = solve(drive, held(), rig_of(drive));
+  const RigSolution uncertain = solve(drive, held(), rig_of(drive, {drive.left, drive.right}, {1.2, 1.2, 0.5, 0.5}));
+  ASSERT_EQ(exact.status, RigSolveStatus::ok);
+  ASSERT_EQ(uncertain.status, RigSolveStatus::ok);
+  EXPECT_EQ(exact.rig.T_camera_left[1].t, uncertain.rig.T_camera_left[1].t) << "held intrinsics are held";
+  for (std::size_t i = 0; i < 6; ++i) {
+    EXPECT_NEAR(uncertain.rig.sigma_noise[1][i], exact.rig.sigma_noise[1][i], 1e-12 + 1e-9 * exact.rig.sigma_noise[1][i]);
+    EXPECT_GE(uncertain.rig.sigma_wide[1][i], uncertain.rig.sigma_noise[1][i]);
+  }
+  // Half a pixel of the principal point is 0.4 mrad of pitch, many times what tracks leave open.
+  EXPECT_GT(uncertain.rig.sigma_wide[1][0], 3e-4);
+}
+
+TEST(RigSolver, theFurtherCamerasFocalLengthIsFoundWhenItIsAskedFor) {
+  FeatureDriveOptions drive = exact_drive();
+  drive.right.fx *= 1.002;
+  drive.right.fy *= 1.002;
+  CalibrationOptions o = held();
+  o.estimate_focal_lengths = 1;
+  // Two thousandths off, known to five: the tracks outweigh that by far.
+  const double sigma = 0.005 * drive.left.fx;
+  const RigSolution s = solve(drive, o, rig_of(drive, {drive.left, drive.left}, {sigma, sigma, 1e-6, 1e-6}));
+  ASSERT_EQ(s.status, RigSolveStatus::ok);
+  EXPECT_NEAR(s.rig.intrinsics[1].fx, drive.right.fx, 0.05 * std::abs(drive.right.fx - drive.left.fx));
+  EXPECT_NEAR(s.rig.intrinsics[1].fy, drive.right.fy, 0.05 * std::abs(drive.right.fy - drive.left.fy));
+  EXPECT_EQ(s.rig.intrinsics[0].fx, drive.left.fx);
+  EXPECT_LT(s.rig.intrinsics[1].sigma[0], sigma);
+}
+
+TEST(RigSolver, aSolveLeavesNoTraceInTheNext) {
+  const FeatureDriveOptions first, other = [] {
+    FeatureDriveOptions o;
+    o.seed = 7;
+    o.T_right_left = {exp_so3({-0.01, 0.004, 0.002}), {-0.6, 0.03, 0.01}};
+    return o;
+  }();
+  SolverInArena used(held()), fresh(held());
+  FeatureDrive a(first), b(other), c(other);
+  log_drive(a, 50, kRough, used.solver.log());
+  (void)used.solver.solve(rig_of(first));
+  used.solver.log().clear();
+  log_drive(b, 30, kRough, used.solver.log());
+  log_drive(c, 30, kRough, fresh.solver.log());
+  const RigSolution s = used.solver.solve(rig_of(other)), t = fresh.solver.solve(rig_of(other));
+  ASSERT_EQ(s.status, RigSolveStatus::ok);
+  EXPECT_EQ(s.rig.T_camera_left[1].R, t.rig.T_camera_left[1].R);
+  EXPECT_EQ(s.rig.T_camera_left[1].t, t.rig.T_camera_left[1].t);
+  EXPECT_EQ(s.rig.sigma_wide[1], t.rig.sigma_wide[1]);
+}
+
+TEST(RigSolver, aRightCameraThatIsLateIsOutOfStep) {
+  FeatureDriveOptions drive;
+  // Standing starts and stops: at one speed a lag is a transform like any other.
+  drive.drive_s = 4;
+  drive.stop_s = 0.2;
+  drive.lags = {{0, 1.0}};
+  CalibrationOptions o = held();
+  o.max_frames = 110;
+  SolverInArena s(o);
+  FeatureDrive d(drive);
+  log_drive(d, 110, kRough, s.solver.log());
+  const RigSolution solution = s.solver.solve(rig_of(drive));
+  EXPECT_TRUE(solution.status != RigSolveStatus::ok || solution.out_of_step) << solution.lag_frames;
+}
+
+TEST(RigSolver, whatHoldsNoTransformSaysSo) {
+  const FeatureDriveOptions drive = exact_drive();
+  const RigCalibration rig = rig_of(drive);
+  SolverInArena empty(held());
+  EXPECT_EQ(empty.solver.solve(rig).status, RigSolveStatus::no_candidate);
+
+  SolverInArena linked(held());
+  FeatureDrive a(drive);
+  log_drive(a, 30, kRough, linked.solver.log());
+  for (std::size_t i = 0; i < linked.solver.log().size(); ++i) linked.solver.log().frame(i).unlinked = false;
+  EXPECT_EQ(linked.solver.solve(rig).status, RigSolveStatus::no_candidate) << "no frame measured the cameras each for itself";
+
+  SolverInArena one_eyed(held());
+  FeatureDrive b(drive);
+  log_drive(b, 30, kRough, one_eyed.solver.log());
+  for (std::size_t i = 0; i < one_eyed.solver.log().size(); ++i)
+    for (auto& s : one_eyed.solver.log().frame(i).sightings) s.cameras = 1;
+  EXPECT_EQ(one_eyed.solver.solve(rig).status, RigSolveStatus::too_few_tracks);
+
+  SolverInArena garbage(held());
+  FeatureDrive c(drive);
+  log_drive(c, 30, kRough, garbage.solver.log());
+  Random random(3);
+  for (std::size_t i = 0; i < garbage.solver.log().size(); ++i)
+    for (auto& s : garbage.solver.log().frame(i).sightings)
+      for (auto& p : s.raw) p = Eigen::Vector2f(static_cast<float>(random.uniform(0, 1023)), static_cast<float>(random.uniform(0, 767)));
+  const RigSolution g = garbage.solver.solve(rig);
+  EXPECT_NE(g.status, RigSolveStatus::ok) << g.tracks << " tracks";
+}
+
+TEST(RigSolver, worksOffTheHeap) {
+  const FeatureDriveOptions drive;
+  SolverInArena s(held());
+  EXPECT_LE(s.arena.used(), s.arena.capacity());
+  FeatureDrive d(drive);
+  log_drive(d, 30, kRough, s.solver.log());
+  const std::uint64_t before = AllocationGuard::allocations_after_seal();
+  {
+    const SealedScope sealed;
+    EXPECT_EQ(s.solver.solve(rig_of(drive)).status, RigSolveStatus::ok);
+  }
+  EXPECT_EQ(AllocationGuard::allocations_after_seal(), before);
+}
+
+}  // namespace
+}  // namespace vergence::test
