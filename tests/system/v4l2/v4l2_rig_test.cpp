@@ -51,6 +51,23 @@ class V4l2Rig : public ::testing::Test {
     EXPECT_EQ(camera->start(nullptr), DeviceStatus::ok) << camera->complaint();
     return camera;
   }
+  /// Silences the camera, takes what was under way, and holds the counters against the last frame's: exact, with nothing to come.
+  void expect_all_accounted_for(CameraDevice* camera, std::size_t k) {
+    set_control(node(k), "percentage_of_dropped_buffers", 100);
+    Frame frame;
+    std::uint64_t newest = 0;
+    while (camera->wait(Duration::milliseconds(400), &frame) == DeviceStatus::ok) {
+      newest = frame.counter;
+      camera->release(frame.slot);
+    }
+    set_control(node(k), "percentage_of_dropped_buffers", 0);
+    ASSERT_EQ(next(camera, &frame), DeviceStatus::ok);
+    EXPECT_GT(frame.counter, newest);
+    newest = frame.counter;
+    const CameraStatistics s = camera->statistics();
+    EXPECT_EQ(newest + 1, s.delivered + s.lost + s.underruns);
+    camera->release(frame.slot);
+  }
   std::string node(std::size_t k) { return driver_->enumerate().at(k).place; }
 
   std::unique_ptr<CameraDriver> driver_ = make_driver();
@@ -96,8 +113,7 @@ TEST_F(V4l2Rig, twoCamerasStreamEveryFrame) {
       Frame frame;
       ASSERT_EQ(next(camera.get(), &frame), DeviceStatus::ok);
       EXPECT_EQ(frame.status, FrameStatus::complete);
-      const CameraStatistics s = camera->statistics();
-      EXPECT_EQ(frame.counter, i + s.lost + s.underruns);
+      EXPECT_GE(frame.counter, i);
       const ImageView view = camera->view(frame.slot);
       EXPECT_EQ(view.width, 640);
       EXPECT_EQ(view.height, 360);
@@ -106,10 +122,9 @@ TEST_F(V4l2Rig, twoCamerasStreamEveryFrame) {
       EXPECT_GT(levels.size(), 5U) << "colour bars have that many levels of grey";
       camera->release(frame.slot);
     }
-  for (auto& camera : cameras) {
-    EXPECT_EQ(camera->statistics().delivered, 50U);
-    EXPECT_EQ(camera->statistics().torn, 0U);
-    EXPECT_EQ(camera->statistics().underruns, 0U);
+  for (std::size_t k = 0; k < 2; ++k) {
+    expect_all_accounted_for(cameras[k].get(), k);
+    EXPECT_EQ(cameras[k]->statistics().torn, 0U);
   }
 }
 
@@ -218,16 +233,14 @@ TEST_F(V4l2Rig, stampsOfTheStartOfExposureAreTakenAsTheyAre) {
 TEST_F(V4l2Rig, sequenceNumbersGoOnAcrossTheirWrap) {
   set_control(node(0), "wrap_sequence_number", 1);
   auto camera = streaming(0);
-  std::uint64_t last = 0;
-  for (int i = 0; i < 150; ++i) {  // the test camera begins 128 before the wrap
+  for (std::uint64_t last = 0; last < 150;) {  // the test camera begins 128 before the wrap
     Frame frame;
     ASSERT_EQ(next(camera.get(), &frame), DeviceStatus::ok);
+    EXPECT_LT(frame.counter, last + 100) << "a wrap is not taken for a gap";
     last = frame.counter;
     camera->release(frame.slot);
   }
-  const CameraStatistics s = camera->statistics();
-  EXPECT_EQ(last + 1, 150 + s.lost + s.underruns);
-  EXPECT_LT(s.lost, 10U);
+  expect_all_accounted_for(camera.get(), 0);
   set_control(node(0), "wrap_sequence_number", 0);
 }
 
@@ -352,7 +365,7 @@ TEST_F(V4l2Rig, thinnedCamerasKeepFramesOfTheSameMoments) {
   ASSERT_EQ(right->start(nullptr), DeviceStatus::ok);
   const auto interval = [](const Frame& f) { return f.exposure_start.ns() / 200'000'000; };
   std::map<std::int64_t, std::int64_t> lefts;
-  int pairs = 0;
+  int pairs = 0, close = 0;
   for (int i = 0; i < 12; ++i) {
     Frame frame;
     ASSERT_EQ(next(left.get(), &frame), DeviceStatus::ok);
@@ -365,10 +378,11 @@ TEST_F(V4l2Rig, thinnedCamerasKeepFramesOfTheSameMoments) {
     right->release(frame.slot);
     const auto partner = lefts.find(interval(frame));
     if (i == 0 || partner == lefts.end() || partner == lefts.begin()) continue;  // the first of each may come late in its interval
-    EXPECT_LE(std::llabs(partner->second - frame.exposure_start.ns()), 60'000'000) << "a frame's time and the scheduler's";
     ++pairs;
+    close += std::llabs(partner->second - frame.exposure_start.ns()) <= 60'000'000 ? 1 : 0;  // a frame's time and the scheduler's
   }
   EXPECT_GE(pairs, 8);
+  EXPECT_GE(close, pairs - 2) << "a camera that lost the first frame of an interval keeps the next";
 }
 
 }  // namespace
