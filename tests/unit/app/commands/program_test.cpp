@@ -71,8 +71,7 @@ TEST(Program, WrongValuesOfOptionsAreOneSentence) {
 }
 
 TEST(Program, CommandsThatAreNotThereYetSaySoWhateverTheyAreGiven) {
-  for (const char* line : {"run mock.yaml --out d --fast --fault 'knock@3 pitch_deg=1' --from-scratch --set a.b=1 --seed 3 --quiet",
-                           "calibrate --left 'l*.png' --right 'r*.png' --board 9x6 --square 0.1 --out f", "devices --json --write-udev",
+  for (const char* line : {"calibrate --left 'l*.png' --right 'r*.png' --board 9x6 --square 0.1 --out f", "devices --json --write-udev",
                            "doctor", "snap mock.yaml --out d"}) {
     const Outcome outcome = run_vergence(line);
     EXPECT_TRUE(refused_in_one_sentence(outcome)) << line;
