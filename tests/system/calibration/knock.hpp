@@ -1,0 +1,16 @@
+#pragma once
+#include "tests/system/calibration/course.hpp"
+
+namespace vergence::test {
+
+/// What happens to the right camera, and how soon that has to be noticed.
+struct Knock {
+  const char* name;
+  Vec3 turn_deg, shift_mm;
+  int frames;  // within which it is noticed
+};
+
+/// A rig that knows its calibration is knocked on the way and mended.
+void expect_noticed_and_mended(const Knock& knock);
+
+}  // namespace vergence::test

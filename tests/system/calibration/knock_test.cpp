@@ -1,0 +1,13 @@
+#include <gtest/gtest.h>
+
+#include "tests/system/calibration/knock.hpp"
+
+namespace vergence::test {
+namespace {
+
+TEST(Knock, aPitchOfAFifthOfADegree) { expect_noticed_and_mended({"pitch 0.2 deg", {0.2, 0, 0}, {0, 0, 0}, 10}); }
+TEST(Knock, aYawOfThreeTenths) { expect_noticed_and_mended({"yaw 0.3 deg", {0, 0.3, 0}, {0, 0, 0}, 30}); }
+TEST(Knock, aShiftAlongTheView) { expect_noticed_and_mended({"t_z 10 mm", {0, 0, 0}, {0, 0, 10}, 150}); }
+
+}  // namespace
+}  // namespace vergence::test
