@@ -12,7 +12,8 @@ namespace vergence {
 namespace {
 
 // Parameters: R_m and R_enu_world as left perturbations, lever arm, translation, clock offset.
-enum Index : int { mount_rotation = 0, lever = 3, clock = 6, world_rotation = 7, world_translation = 10, kParameters = 13 };
+constexpr int kParameters = 13;
+enum Index : int { mount_rotation = 0, lever = 3, clock = 6, world_rotation = 7, world_translation = 10 };
 // Errors of a moment: tilt x y, heading, place x y, height, velocity x y z.
 constexpr int kErrors = 9;
 constexpr std::array<int, kErrors> kChannel{0, 0, 1, 2, 2, 3, 4, 4, 4};

@@ -13,8 +13,7 @@ namespace vergence::xsens {
 /// Errors   Status and complaint(); a device that was found stays in its configuration state.
 class Setup {
  public:
-  Setup(ByteLine& line, const Options& options, const std::atomic<bool>& stop)
-      : line_(line), options_(options), stop_(stop), dialogue_(line, stop) {}
+  Setup(ByteLine& line, const Options& options, const std::atomic<bool>& stop) : line_(line), options_(options), dialogue_(line, stop) {}
 
   /// Tries the rate asked for, then the usual ones. → ok, not_found, gone, stopped
   [[nodiscard]] DeviceStatus find();
@@ -42,7 +41,6 @@ class Setup {
 
   ByteLine& line_;
   Options options_;
-  const std::atomic<bool>& stop_;
   Dialogue dialogue_;
   Reply reply_;
   std::string complaint_;

@@ -19,7 +19,6 @@ namespace {
 constexpr Duration kUsbFrame = Duration::milliseconds(1);
 constexpr std::size_t kPacketBytes = 62;
 constexpr std::size_t kTransferPackets = 8;
-constexpr HostStamp kNever{INT64_MAX};
 
 HostStamp monotonic() noexcept {
   timespec t{};

@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdio>
 #include <memory>
@@ -114,7 +116,7 @@ TEST(Mount, anIdealReferenceGivesItsMount) {
 /// Thirty drives with an INS of the MTi-G's class: what is said is true within what is said of it.
 void sigmas_hold(bool velocity) {
   constexpr int kDrives = 30;
-  std::array<std::vector<double>, 7> ratios;
+  std::array<std::vector<double>, 7> ratios, sigmas;
   int heights = 0;
   for (int seed = 1; seed <= kDrives; ++seed) {
     How how;
@@ -127,10 +129,13 @@ void sigmas_hold(bool velocity) {
     ASSERT_EQ(estimate_mount(d.estimate, d.reference, nominal(), {}, &m), MountStatus::ok) << seed;
     for (std::size_t k = 0; k < 3; ++k) {
       const int i = static_cast<int>(k);
+      sigmas[k].push_back(m.rotation[k].sigma);
+      sigmas[3 + k].push_back(m.lever_arm[k].sigma);
       if (m.rotation[k].observable) ratios[k].push_back((m.rotation[k].value - true_turn()[i]) / m.rotation[k].sigma);
       if (m.lever_arm[k].observable) ratios[3 + k].push_back((m.lever_arm[k].value - kLever[i]) / m.lever_arm[k].sigma);
     }
     if (m.lever_arm[2].observable) ++heights;
+    sigmas[6].push_back(m.clock_offset.sigma);
     if (m.clock_offset.observable) ratios[6].push_back((m.clock_offset.value - 0.02) / m.clock_offset.sigma);
   }
   // By position a car's small pitch and roll show no height; to the velocity the springs' quick motion does.
@@ -145,7 +150,9 @@ void sigmas_hold(bool velocity) {
     EXPECT_GT(rms, 0.4) << "parameter " << k;
     EXPECT_LT(rms, 1.4) << "parameter " << k;
     EXPECT_LT(worst, 3.8) << "parameter " << k;
-    std::printf("[ figures  ] parameter %zu: %zu drives, rms of error over sigma %.2f, worst %.2f\n", k, ratios[k].size(), rms, worst);
+    std::sort(sigmas[k].begin(), sigmas[k].end());
+    std::printf("[ figures  ] parameter %zu: %zu drives, sigma %.4f to %.4f, rms of error over sigma %.2f, worst %.2f\n", k,
+                ratios[k].size(), sigmas[k].front(), sigmas[k].back(), rms, worst);
   }
 }
 
