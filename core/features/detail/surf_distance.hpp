@@ -1,0 +1,9 @@
+#pragma once
+#include "core/features/surf.hpp"
+
+namespace vergence::features::detail {
+
+/// Of two descriptors, squared.
+[[nodiscard]] float squared_distance(const SurfDescriptor& a, const SurfDescriptor& b) noexcept;
+
+}  // namespace vergence::features::detail

@@ -1,0 +1,508 @@
+#include "core/features/surf.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+#include "core/features/detail/surf_hessian.hpp"
+#include "core/features/surf_match.hpp"
+#include "core/memory/allocation_guard.hpp"
+#include "tests/unit/core/features/texture.hpp"
+
+namespace vergence::features {
+namespace {
+
+using test::draw;
+using test::Image;
+using test::Texture;
+
+constexpr double kDegree = std::numbers::pi / 180;
+
+struct Blob {
+  Vec2 at;
+  double sigma;      // px
+  double amplitude;  // grey levels
+};
+
+/// Gaussian blobs on a grey ground.
+struct Blobs {
+  std::vector<Blob> blobs;
+  [[nodiscard]] double operator()(const Vec2& p) const {
+    double v = 128;
+    for (const Blob& b : blobs) v += b.amplitude * std::exp(-0.5 * (p - b.at).squaredNorm() / (b.sigma * b.sigma));
+    return v;
+  }
+};
+
+/// Points and descriptors of a picture, with the memory they lie in.
+struct Described {
+  Described(const Image& image, std::size_t capacity, const SurfOptions& options, bool upright = true)
+      : arena(Surf::memory_needed(image.width, image.height) + capacity * sizeof(SurfPoint) + 4 * kCacheLine),
+        surf(image.width, image.height, arena),
+        points(arena.make<SurfPoint>(capacity, "points")) {
+    EXPECT_EQ(surf.set_image(image.view()), SurfStatus::ok);
+    found = surf.detect(options, &points);
+    if (!upright) surf.orient(points.span());
+    descriptors.resize(points.size());
+    surf.describe(points.span(), descriptors);
+  }
+  [[nodiscard]] SurfView view() const { return {points.span(), descriptors}; }
+  Arena arena;
+  Surf surf;
+  BoundedVector<SurfPoint> points;
+  std::vector<SurfDescriptor> descriptors;
+  int found = 0;
+};
+
+double distance(const SurfDescriptor& a, const SurfDescriptor& b) {
+  double square = 0;
+  for (std::size_t i = 0; i < a.values.size(); ++i) {
+    const double d = static_cast<double>(a.values[i]) - static_cast<double>(b.values[i]);
+    square += d * d;
+  }
+  return std::sqrt(square);
+}
+
+constexpr int kSide = 121;  // room for a square of 20 s turned by 45°, at s = 4
+constexpr float kMiddle = 60;
+
+/// The description of one given point of a picture.
+template <class Value>
+SurfDescriptor describe_at(const Value& value, const SurfPoint& at, bool upright, SurfPoint* oriented = nullptr) {
+  const Image image = draw(kSide, kSide, value);
+  Arena arena(Surf::memory_needed(kSide, kSide));
+  Surf surf(kSide, kSide, arena);
+  EXPECT_EQ(surf.set_image(image.view()), SurfStatus::ok);
+  SurfPoint p = at;
+  if (!upright) surf.orient({&p, 1});
+  if (oriented != nullptr) *oriented = p;
+  SurfDescriptor d;
+  surf.describe({&p, 1}, {&d, 1});
+  return d;
+}
+
+/// Response of boxes of any size L about the middle of a Gaussian blob, boxes summed as integrals:
+/// ∫∫ over |x| < a, |y| < b of exp(−r²/2σ²) = 2πσ² erf(a/√2σ) erf(b/√2σ).
+double box_response(double L, const Blob& blob) {
+  const auto box = [&](double width, double height) {
+    const double unit = 2 * std::numbers::sqrt2 * blob.sigma;
+    return 2 * std::numbers::pi * blob.sigma * blob.sigma * std::erf(width / unit) * std::erf(height / unit);
+  };
+  const double lobe = L / 3, height = 2 * lobe - 1;
+  const double xx = blob.amplitude * (box(L, height) - 3 * box(lobe, height)) / (L * L);
+  return xx * xx;  // of the four boxes of xy nothing is left
+}
+
+/// Of the octave whose inner sizes hold a blob: boxes of some 5.2 σ answer it most; those of 12 … 24, 21 … 45, 39 … 87 px can be a maximum.
+double places_apart(double sigma) { return 5.2 * sigma < 21 ? 1 : 5.2 * sigma < 42 ? 2 : 4; }
+
+TEST(SurfHessian, isTheSumOverTheBoxesItStandsFor) {
+  const Image image = test::white_noise(70, 60, 3, 5, 255);
+  Arena arena(detail::IntegralImage::memory_needed(70, 60));
+  detail::IntegralImage sums(70, 60, arena);
+  sums.build(image.view());
+  for (const int L : {9, 15, 27, 51}) {
+    for (const auto& [x, y] : {std::pair(35, 30), std::pair(26, 25), std::pair(L / 2, L / 2), std::pair(69 - L / 2, 59 - L / 2)}) {
+      const int half = L / 2, lobe = L / 3;
+      long xx = 0, yy = 0, xy = 0;
+      for (int v = -half; v <= half; ++v) {
+        for (int u = -half; u <= half; ++u) {
+          if (x + u < 0 || y + v < 0 || x + u >= 70 || y + v >= 60) continue;
+          const int g = image.view().at(x + u, y + v);
+          if (std::abs(v) < lobe) xx += 2 * std::abs(u) < lobe ? -2 * g : g;
+          if (std::abs(u) < lobe) yy += 2 * std::abs(v) < lobe ? -2 * g : g;
+          if (u != 0 && v != 0 && std::abs(u) <= lobe && std::abs(v) <= lobe) xy += (u > 0) == (v > 0) ? g : -g;
+        }
+      }
+      if (x < half || y < half || x + half >= 70 || y + half >= 60) continue;
+      const detail::BoxHessian h = detail::box_hessian(sums, x, y, L);
+      const float area = static_cast<float>(L * L);
+      EXPECT_FLOAT_EQ(h.xx, static_cast<float>(xx) / area) << L;
+      EXPECT_FLOAT_EQ(h.yy, static_cast<float>(yy) / area) << L;
+      EXPECT_FLOAT_EQ(h.xy, static_cast<float>(xy) / area) << L;
+      float row[3];
+      for (const int step : {1, 2}) {
+        const int n = x + step + half < 70 ? 2 : 1;
+        detail::determinant_row(sums, x, y, L, step, n, row);
+        EXPECT_EQ(row[0], h.determinant());
+        if (n == 2) {
+          EXPECT_EQ(row[1], detail::box_hessian(sums, x + step, y, L).determinant());
+        }
+      }
+    }
+  }
+}
+
+// Along one size the determinant of a blob falls like a Gaussian of w² = (σ² + s²)/4, symmetric about its centre. A parabola through
+// three samples h apart of such a top misses it by at most 0.048 h³/w² (from its series, h δ (δ² − 1/4) h²/w², δ h the top's place
+// between the samples); boxes make a coarser top than the Gaussian's derivatives: twice that. Rounded grey values: 0.02 px.
+TEST(Surf, findsABlobAtItsSubPixelPlace) {
+  Random random(5);
+  for (const double sigma : {2.5, 3.0, 3.6, 5.5, 6.5, 7.5, 10.0, 13.0}) {
+    for (int i = 0; i < 8; ++i) {
+      const Blob blob{{random.uniform(80, 84), random.uniform(80, 84)}, sigma, i % 2 == 0 ? 90.0 : -90.0};
+      const Described d(draw(161, 165, Blobs{{blob}}), 50, SurfOptions{});
+      ASSERT_GE(d.points.size(), 1U) << sigma;
+      const SurfPoint& p = d.points[0];
+      const double h = places_apart(sigma), s = static_cast<double>(p.scale);
+      const double tolerance = 0.02 + 2 * 0.048 * h * h * h / ((sigma * sigma + s * s) / 4);
+      EXPECT_NEAR(static_cast<double>(p.x), blob.at.x(), tolerance) << sigma;
+      EXPECT_NEAR(static_cast<double>(p.y), blob.at.y(), tolerance) << sigma;
+      EXPECT_EQ(p.dark, blob.amplitude < 0);
+    }
+  }
+}
+
+TEST(Surf, theScaleIsThatOfTheBoxesThatAnswerMost) {
+  for (const double sigma : {2.5, 2.8, 3.2, 3.8, 5.0, 6.0, 7.5, 10.0, 13.0}) {
+    const Blob blob{{80, 80}, sigma, 90};
+    const Described d(draw(161, 161, Blobs{{blob}}), 50, SurfOptions{});
+    ASSERT_GE(d.points.size(), 1U);
+    double best = 0, size = 0;
+    for (double L = 9; L < 99; L += 0.05) {
+      const double r = box_response(L, blob);
+      if (r > best) {
+        best = r;
+        size = L;
+      }
+    }
+    // Sizes differ by 6, 12, 24 px in octaves 1, 2, 3; the response rises steeper than it falls, so the parabola through three of them
+    // leans towards larger ones, by less than a quarter of a step.
+    const double step = 6 * places_apart(sigma);
+    EXPECT_NEAR(static_cast<double>(d.points[0].scale), 1.2 / 9 * size, 1.2 / 9 * step / 4) << sigma;
+    EXPECT_LE(static_cast<double>(d.points[0].response), 1.02 * best);
+  }
+}
+
+TEST(Surf, everyBlobOfManyIsFoundStrongestFirst) {
+  Blobs many;
+  Random random(11);
+  for (int y = 0; y < 4; ++y)
+    for (int x = 0; x < 5; ++x)
+      many.blobs.push_back({{60.0 + 50 * x + random.uniform(-5, 5), 60.0 + 50 * y + random.uniform(-5, 5)},
+                            random.uniform(2.5, 5.0),
+                            (random.below(2) == 0 ? 1 : -1) * random.uniform(30, 100)});
+  const Described d(draw(320, 270, many), 400, SurfOptions{});
+  for (const Blob& b : many.blobs) {
+    const auto here = std::find_if(d.points.begin(), d.points.end(), [&](const SurfPoint& p) {
+      return (Vec2(static_cast<double>(p.x), static_cast<double>(p.y)) - b.at).norm() < 0.3 && p.dark == (b.amplitude < 0);
+    });
+    EXPECT_NE(here, d.points.end()) << b.at.transpose();
+  }
+  for (std::size_t i = 1; i < d.points.size(); ++i) EXPECT_GE(d.points[i - 1].response, d.points[i].response);
+  EXPECT_EQ(d.found, static_cast<int>(d.points.size()));
+}
+
+TEST(Surf, withoutRoomForAllTheStrongestStay) {
+  const Image image = draw(300, 300, Texture(7));
+  const Described all(image, 2000, SurfOptions{});
+  const Described few(image, 20, SurfOptions{});
+  ASSERT_GT(all.points.size(), 50U);
+  ASSERT_EQ(few.points.size(), 20U);
+  EXPECT_EQ(few.found, all.found);
+  for (std::size_t i = 0; i < few.points.size(); ++i) {
+    EXPECT_EQ(few.points[i].x, all.points[i].x);
+    EXPECT_EQ(few.points[i].y, all.points[i].y);
+    EXPECT_EQ(few.points[i].response, all.points[i].response);
+  }
+}
+
+TEST(SurfDescriptor, brightnessAndContrastDoNotChangeIt) {
+  // Contrast that keeps whole grey levels whole: no rounding.
+  const Texture texture(3);
+  const auto coarse = [&](const Vec2& p) { return std::round(0.4 * texture(p)); };
+  const SurfPoint at{60.3F, 59.6F, 2.5F, 0, 0, false};
+  for (const bool upright : {true, false}) {
+    const SurfDescriptor before = describe_at(coarse, at, upright);
+    const SurfDescriptor after = describe_at([&](const Vec2& p) { return 2 * coarse(p) + 17; }, at, upright);
+    EXPECT_LT(distance(before, after), 1e-5);
+    float square = 0;
+    for (const float v : before.values) square += v * v;
+    EXPECT_NEAR(square, 1.F, 1e-5F);
+  }
+}
+
+TEST(SurfDescriptor, theDirectionTurnsWithThePicture) {
+  const SurfPoint at{kMiddle, kMiddle, 2.4F, 0, 0, false};
+  const Vec2 middle(60, 60);
+  // A ramp's direction is its own; wavelets sit on whole pixels and their boxes do not turn: symmetric about the point, so that is exact
+  // for a ramp but for the rounding of grey levels (0.3 of a rise of 3 a pixel over sides of 10 px).
+  for (double angle = -170; angle < 180; angle += 25) {
+    SurfPoint p;
+    const Vec2 g(std::cos(angle * kDegree), std::sin(angle * kDegree));
+    (void)describe_at([&](const Vec2& q) { return 128 + 3 * g.dot(q - middle); }, at, false, &p);
+    EXPECT_NEAR(std::remainder(static_cast<double>(p.angle) - angle * kDegree, 2 * std::numbers::pi), 0, 1 * kDegree) << angle;
+  }
+}
+
+/// How far apart descriptions of one place are, against those of other places, over many textures.
+struct Separation {
+  int nearer = 0, of = 0;  // places nearer to themselves seen again than to any other
+  double mean = 0;
+};
+
+template <class Warp>
+Separation separation(const Warp& seen_again, float scale_again, bool upright) {
+  constexpr int kTextures = 12;
+  const SurfPoint at{kMiddle, kMiddle, 2.F, 0, 0, false};
+  SurfPoint again = at;
+  again.scale *= scale_again;
+  std::vector<SurfDescriptor> first, second;
+  for (std::uint64_t seed = 1; seed <= kTextures; ++seed) {
+    const Texture texture(seed);
+    first.push_back(describe_at(texture, at, upright));
+    second.push_back(describe_at([&](const Vec2& p) { return texture(seen_again(p)); }, again, upright));
+  }
+  Separation s;
+  for (std::size_t i = 0; i < kTextures; ++i) {
+    const double same = distance(first[i], second[i]);
+    double other = 2;
+    for (std::size_t k = 0; k < kTextures; ++k)
+      if (k != i) other = std::min(other, distance(first[k], second[i]));
+    s.nearer += same < other ? 1 : 0;
+    s.mean += same / kTextures;
+    ++s.of;
+  }
+
+  return s;
+}
+
+auto turned_by(double degrees, double larger = 1) {
+  Mat2 turn;
+  turn << std::cos(degrees * kDegree), -std::sin(degrees * kDegree), std::sin(degrees * kDegree), std::cos(degrees * kDegree);
+  const Vec2 middle(static_cast<double>(kMiddle), static_cast<double>(kMiddle));
+  return [=](const Vec2& p) -> Vec2 { return middle + turn.transpose() * (p - middle) / larger; };
+}
+
+TEST(SurfDescriptor, aTurnedPictureIsKnownAgainUnlessUpright) {
+  // One texture in six may have two directions of nearly equal strength, of which another wins after the turn.
+  for (const double angle : {33.0, 90.0, 160.0, -75.0}) {
+    const Separation s = separation(turned_by(angle), 1, false);
+    EXPECT_GE(s.nearer, s.of - 2) << angle;
+  }
+  EXPECT_LT(separation(turned_by(90), 1, true).nearer, 6);
+  const Separation little = separation(turned_by(8), 1, true);
+  EXPECT_GE(little.nearer, little.of - 1);
+}
+
+TEST(SurfDescriptor, aLargerPictureIsKnownAgainAtItsScale) {
+  for (const float larger : {1.25F, 1.7F, 2.F}) {
+    const Separation s = separation(turned_by(0, static_cast<double>(larger)), larger, true);
+    EXPECT_GE(s.nearer, s.of - 1) << larger;
+    EXPECT_LT(s.mean, separation(turned_by(0, static_cast<double>(larger)), 1.F, true).mean) << larger;
+  }
+}
+
+/// Matches of a picture with itself moved, turned and enlarged: where each left point went is known.
+struct Moved {
+  int matches = 0, right = 0;
+};
+
+Moved match_moved(const Vec2& shift, double degrees, double larger, bool upright) {
+  constexpr int kWhole = 260;
+  const Vec2 middle(130, 130);
+  Mat2 turn;
+  turn << std::cos(degrees * kDegree), -std::sin(degrees * kDegree), std::sin(degrees * kDegree), std::cos(degrees * kDegree);
+  Moved m;
+  for (std::uint64_t seed = 1; seed <= 2; ++seed) {
+    // Waves of many lengths: one length alone has no size of its own.
+    const Texture fine(seed, 9, 40), coarse(seed + 50, 20, 120);
+    const auto picture = [&](const Vec2& p) { return 0.6 * fine(p) + 0.9 * coarse(p) - 64; };
+    const auto again = [&](const Vec2& p) { return picture(middle + turn.transpose() * (p - middle - shift) / larger); };
+    SurfOptions options;
+    options.min_response = 1;
+    const Described left(draw(kWhole, kWhole, picture), 600, options, upright), right(draw(kWhole, kWhole, again), 600, options, upright);
+    Arena arena(SurfMatcher::memory_needed(600) + 600 * sizeof(SurfMatch) + kCacheLine);
+    SurfMatcher matcher(600, arena);
+    BoundedVector<SurfMatch> matches(arena.make<SurfMatch>(600, "matches"));
+    EXPECT_EQ(matcher.match(left.view(), right.view(), {}, nullptr, &matches), SurfMatchStatus::ok);
+    for (const SurfMatch& match : matches) {
+      const SurfPoint &a = left.points[match.left], &b = right.points[match.right];
+      const Vec2 there = middle + shift + larger * (turn * (Vec2(static_cast<double>(a.x), static_cast<double>(a.y)) - middle));
+      ++m.matches;
+      // Within the finer of the two scales: the same blob.
+      const double off = (there - Vec2(static_cast<double>(b.x), static_cast<double>(b.y))).norm();
+      m.right += off < static_cast<double>(b.scale) ? 1 : 0;
+    }
+  }
+  return m;
+}
+
+TEST(SurfMatcher, findsThePartnersInAShiftedTurnedAndEnlargedPicture) {
+  const Moved shifted = match_moved({7.3, -4.6}, 0, 1, true);
+  EXPECT_GE(shifted.matches, 100);
+  EXPECT_GE(shifted.right, 0.97 * shifted.matches);
+  const Moved turned = match_moved({3, 5}, 40, 1, false);
+  EXPECT_GE(turned.matches, 40);
+  EXPECT_GE(turned.right, 0.9 * turned.matches);
+  const Moved larger = match_moved({-4, 2}, 0, 1.3, true);
+  EXPECT_GE(larger.matches, 25);
+  EXPECT_GE(larger.right, 0.9 * larger.matches);
+}
+
+/// Two sets of points with descriptors of one number each: distances that can be read off.
+struct Set {
+  std::vector<SurfPoint> points;
+  std::vector<SurfDescriptor> descriptors;
+  void add(float x, float y, bool dark, double angle) {
+    points.push_back({x, y, 2, 0, 1, dark});
+    SurfDescriptor d;
+    d.values[0] = static_cast<float>(std::cos(angle));
+    d.values[1] = static_cast<float>(std::sin(angle));
+    descriptors.push_back(d);
+  }
+  [[nodiscard]] SurfView view() const { return {points, descriptors}; }
+};
+
+class Matching : public ::testing::Test {
+ protected:
+  Arena arena{SurfMatcher::memory_needed(8) + 8 * sizeof(SurfMatch) + kCacheLine};
+  SurfMatcher matcher{8, arena};
+  BoundedVector<SurfMatch> out{arena.make<SurfMatch>(8, "matches")};
+};
+
+TEST_F(Matching, wantsTheBestOfBothOfOneSignAndClearlySo) {
+  Set left, right;
+  left.add(0, 0, false, 0.00);   // nearest: right 0, which prefers left 1
+  left.add(1, 0, false, 0.05);   // mutual with right 0
+  left.add(2, 0, true, 1.00);    // nearest of its sign: right 2
+  left.add(3, 0, false, 2.00);   // two equally near: refused
+  left.add(4, 0, false, -1.50);  // too far from all
+  right.add(0, 0, false, 0.06);
+  right.add(0, 0, false, 1.01);
+  right.add(0, 0, true, 1.10);
+  right.add(0, 0, false, 1.80);
+  right.add(0, 0, false, 2.20);
+  ASSERT_EQ(matcher.match(left.view(), right.view(), {}, nullptr, &out), SurfMatchStatus::ok);
+  ASSERT_EQ(out.size(), 2U);
+  EXPECT_EQ(out[0].left, 1U);
+  EXPECT_EQ(out[0].right, 0U);
+  EXPECT_NEAR(out[0].distance, 2 * std::sin(0.005), 1e-6);
+  EXPECT_EQ(out[1].left, 2U);
+  EXPECT_EQ(out[1].right, 2U);
+}
+
+TEST_F(Matching, looksInTheBandOnly) {
+  Set left, right;
+  left.add(50, 20, false, 0);
+  right.add(10, 40, false, 0);  // looks the same, 20 px beside the line
+  right.add(30, 21.5F, false, 0.2);
+  EpipolarBand rectified;  // y' = y
+  rectified.F << 0, 0, 0, 0, 0, -1, 0, 1, 0;
+  rectified.px = 2;
+  ASSERT_EQ(matcher.match(left.view(), right.view(), {}, &rectified, &out), SurfMatchStatus::ok);
+  ASSERT_EQ(out.size(), 1U);
+  EXPECT_EQ(out[0].right, 1U);
+  rectified.px = 1;
+  ASSERT_EQ(matcher.match(left.view(), right.view(), {}, &rectified, &out), SurfMatchStatus::ok);
+  EXPECT_TRUE(out.empty());
+}
+
+TEST_F(Matching, badInputIsNamedAndMatchesNothing) {
+  Set left, right;
+  for (int i = 0; i < 9; ++i) left.add(0, 0, false, i);
+  right.add(0, 0, false, 0);
+  EXPECT_EQ(matcher.match(left.view(), right.view(), {}, nullptr, &out), SurfMatchStatus::capacity);
+  EXPECT_TRUE(out.empty());
+  left.points.pop_back();
+  EXPECT_EQ(matcher.match(left.view(), right.view(), {}, nullptr, &out), SurfMatchStatus::invalid_input);
+  left.descriptors.pop_back();
+  EXPECT_EQ(matcher.match({}, right.view(), {}, nullptr, &out), SurfMatchStatus::ok);
+  EXPECT_TRUE(out.empty());
+  // Flat neighbourhoods resemble each other; what is not a number resembles nothing.
+  left.descriptors.assign(8, {});
+  right.descriptors.assign(1, {});
+  EXPECT_EQ(matcher.match(left.view(), right.view(), {}, nullptr, &out), SurfMatchStatus::ok);
+  EXPECT_TRUE(out.empty());
+  right.descriptors[0].values.fill(std::numeric_limits<float>::quiet_NaN());
+  left.descriptors[0].values.fill(1.F);
+  EXPECT_EQ(matcher.match(left.view(), right.view(), {}, nullptr, &out), SurfMatchStatus::ok);
+  EXPECT_TRUE(out.empty());
+}
+
+TEST(Surf, smallFlatAndWrongImagesGiveNoPoints) {
+  Arena arena(Surf::memory_needed(100, 80) + 50 * sizeof(SurfPoint) + kCacheLine);
+  Surf surf(100, 80, arena);
+  BoundedVector<SurfPoint> points(arena.make<SurfPoint>(50, "points"));
+  EXPECT_EQ(surf.detect({}, &points), 0);  // no image yet
+  for (const auto& [w, h] : {std::pair(1, 1), std::pair(26, 80), std::pair(27, 27), std::pair(100, 3), std::pair(28, 29)}) {
+    const Image noise = test::white_noise(w, h, 1);
+    EXPECT_EQ(surf.set_image(noise.view()), SurfStatus::ok);
+    EXPECT_EQ(surf.detect({}, &points), 0) << w << " x " << h;
+    // A point that lies outside has nothing about it.
+    constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
+    for (SurfPoint outside : {SurfPoint{1e6F, -1e6F, 3, 0, 1, false}, SurfPoint{kNaN, 1e30F, 3, 0, 1, false},
+                              SurfPoint{5, 5, kNaN, 0, 1, false}, SurfPoint{5, 5, 1e30F, 0, 1, false}}) {
+      SurfDescriptor d;
+      surf.orient({&outside, 1});
+      EXPECT_EQ(outside.angle, 0) << outside.x << " " << outside.scale;
+      surf.describe({&outside, 1}, {&d, 1});
+      EXPECT_EQ(distance(d, {}), 0);
+    }
+  }
+  for (const std::uint8_t grey : {std::uint8_t{0}, std::uint8_t{255}}) {
+    Image flat(100, 80);
+    std::fill(flat.bytes.begin(), flat.bytes.end(), grey);
+    EXPECT_EQ(surf.set_image(flat.view()), SurfStatus::ok);
+    EXPECT_EQ(surf.detect({0, -1}, &points), 0);
+    EXPECT_EQ(surf.detect({99, std::numeric_limits<float>::quiet_NaN()}, &points), 0);
+  }
+  const Image large = test::white_noise(101, 80, 1);
+  EXPECT_EQ(surf.set_image(large.view()), SurfStatus::too_large);
+  EXPECT_EQ(surf.detect({}, &points), 0);
+  EXPECT_EQ(surf.set_image({}), SurfStatus::invalid_image);
+  EXPECT_EQ(surf.set_image({large.bytes.data(), 50, 50, 20}), SurfStatus::invalid_image);
+  EXPECT_EQ(surf.set_image({large.bytes.data(), 50, -50, 50}), SurfStatus::invalid_image);
+}
+
+TEST(Surf, nothingBesideThePictureIsReadAndPaddingIsNoPicture) {
+  for (const auto guard : {test::GuardedImage::Guard::before, test::GuardedImage::Guard::behind}) {
+    const test::GuardedImage guarded(test::white_noise(131, 117, 9), guard);
+    const Image padded = test::white_noise(131, 117, 9, 13, 200);
+    Arena arena(2 * Surf::memory_needed(131, 117) + 4 * 300 * sizeof(SurfPoint));
+    Surf a(131, 117, arena), b(200, 20, arena);
+    EXPECT_EQ(b.set_image(guarded.view()), SurfStatus::too_large);
+    BoundedVector<SurfPoint> one(arena.make<SurfPoint>(300, "points")), two(arena.make<SurfPoint>(300, "points"));
+    ASSERT_EQ(a.set_image(guarded.view()), SurfStatus::ok);
+    EXPECT_GT(a.detect({4, 0.1F}, &one), 0);
+    ASSERT_EQ(a.set_image(padded.view()), SurfStatus::ok);
+    a.detect({4, 0.1F}, &two);
+    ASSERT_EQ(one.size(), two.size());
+    for (std::size_t i = 0; i < one.size(); ++i) EXPECT_EQ(one[i].response, two[i].response);
+  }
+}
+
+TEST(Surf, takesTheMemoryItSaysAndNoneAfterwards) {
+  const Image image = draw(240, 180, Texture(2));
+  constexpr std::size_t kRoom = 200;
+  Arena arena(Surf::memory_needed(240, 180) + SurfMatcher::memory_needed(kRoom) +
+              kRoom * (sizeof(SurfPoint) + sizeof(SurfDescriptor) + sizeof(SurfMatch)) + 3 * kCacheLine);
+  Surf surf(240, 180, arena);
+  SurfMatcher matcher(kRoom, arena);
+  BoundedVector<SurfPoint> points(arena.make<SurfPoint>(kRoom, "points"));
+  const std::span<SurfDescriptor> descriptors = arena.make<SurfDescriptor>(kRoom, "descriptors");
+  BoundedVector<SurfMatch> matches(arena.make<SurfMatch>(kRoom, "matches"));
+  Arena small(Surf::memory_needed(240, 180) / 2);
+  EXPECT_THROW(Surf(240, 180, small), std::length_error);
+
+  const std::uint64_t before = AllocationGuard::allocations_after_seal();
+  {
+    const SealedScope sealed;
+    ASSERT_EQ(surf.set_image(image.view()), SurfStatus::ok);
+    (void)surf.detect({}, &points);
+    surf.orient(points.span());
+    surf.describe(points.span(), descriptors.first(points.size()));
+    const SurfView view{points.span(), descriptors.first(points.size())};
+    ASSERT_EQ(matcher.match(view, view, {}, nullptr, &matches), SurfMatchStatus::ok);
+  }
+  EXPECT_EQ(AllocationGuard::allocations_after_seal(), before);
+  ASSERT_GT(points.size(), 30U);
+  // Everything finds itself.
+  EXPECT_EQ(matches.size(), points.size());
+  for (const SurfMatch& m : matches) EXPECT_EQ(m.left, m.right);
+}
+
+}  // namespace
+}  // namespace vergence::features
