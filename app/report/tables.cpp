@@ -91,6 +91,7 @@ void calibration_group(const Session& s, Figures* f) {
     }
   }
   if (const std::string word = text_at(s.summary, "calibration.word"); !word.empty()) f->row("health", word);
+  if (const std::string by = text_at(s.summary, "calibration.limited_by"); !by.empty()) f->row("limited by", by);
   for (const char* z : {"1", "5", "10", "20", "50"})
     f->row(std::string("depth error at ") + z + " m", number_at(s.summary, std::string("calibration.depth_error_percent.") + z),
            "{:.1f} %");

@@ -145,7 +145,11 @@ void judge_calibration(const Session& s, Judge* j) {
   const std::string word = text_at(s.summary, "calibration.word");
   if (word == "recalibrate") {
     j->find(Grade::bad, "the calibration is too uncertain for depths");
-    j->advise("The calibration is weak: drive through a place with near and far structure and some turns, or calibrate on a checkerboard.");
+    j->advise(text_at(s.summary, "calibration.limited_by") == "intrinsics"
+                  ? "The calibration is weak because focal lengths or principal points are not known better: calibrate the lenses on a "
+                    "checkerboard; driving on does not help."
+                  : "The calibration is weak: drive through a place with near and far structure and some turns, or calibrate on a "
+                    "checkerboard.");
   } else if (word == "can be improved") {
     j->find(Grade::care, "the calibration can be improved");
   }

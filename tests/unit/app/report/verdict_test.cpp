@@ -106,6 +106,14 @@ CalibrationRow attempt(bool accepted, const char* cause, double before_px, doubl
   return row;
 }
 
+TEST(Verdict, aWeakCalibrationSaysWhatWouldHelp) {
+  Case c;
+  c.session.summary["calibration"] = {{"word", "recalibrate"}, {"limited_by", "intrinsics"}};
+  EXPECT_TRUE(any_has(c.verdict().advice, "driving on does not help"));
+  c.session.summary["calibration"]["limited_by"] = "noise";
+  EXPECT_TRUE(any_has(c.verdict().advice, "near and far structure"));
+}
+
 TEST(Verdict, aKnockThatWasMendedIsAdviceAndNoGrade) {
   Case c;
   c.session.calibrations = {attempt(true, "knock", 1.4, 0.2)};
