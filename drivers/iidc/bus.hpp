@@ -63,6 +63,8 @@ struct BusTraits {
   double bytes_per_second = 0;        // at best
 };
 
+inline constexpr double kUsbPractical = 0.62;  // of a USB wire's bytes a second: what host controllers reach
+
 /// One camera's place on a bus.
 ///
 /// Ownership  Slots are the bus's until frame() keeps them, then the sink's until give_back(). bytes() stays valid that long, also over

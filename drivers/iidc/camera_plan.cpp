@@ -248,8 +248,17 @@ class Planner {
           text("packets of %zu bytes (largest %zu, in steps of %zu) carry %.4g Hz of it", best, most, unit, packet_rate(bytes, best)));
       return false;
     }
-    plan_.shape.packet_bytes = packet;
+    // Larger ones bring the image sooner, where it is not the packets that set a free camera's rate.
+    const bool paced = wanted_.trigger != CameraTrigger::free || frame_rate_.present;
+    plan_.shape.packet_bytes = asked == 0 && paced ? std::max(packet, std::min(share(), most) / unit * unit) : packet;
     return true;
+  }
+
+  /// Bytes of each cycle that are this camera's when all of the rig share the bus alike.
+  [[nodiscard]] std::size_t share() const {
+    const auto cameras = static_cast<unsigned>(std::max(wanted_.sharing, 1));
+    if (bus_.isochronous) return packet_for_units(kBandwidthUnits / cameras, plan_.shape.speed);
+    return static_cast<std::size_t>(bus_.bytes_per_second * kUsbPractical / kCyclesPerSecond) / cameras;
   }
 
   bool possible_as_grey() {

@@ -302,8 +302,7 @@ void UsbBus::stop() noexcept {
 
 std::string UsbBus::remark(const StreamShape& shape, double rate_hz, int sharing) const {
   std::string out;
-  constexpr double kPractical = 0.62;  // of the wire: what host controllers reach
-  const double need = static_cast<double>(shape.frame_bytes) * rate_hz * sharing, have = traits_.bytes_per_second * kPractical;
+  const double need = static_cast<double>(shape.frame_bytes) * rate_hz * sharing, have = traits_.bytes_per_second * kUsbPractical;
   std::array<char, 220> text{};
   if (need > have) {
     (void)std::snprintf(

@@ -114,7 +114,10 @@ TEST(IidcCamera, AFrameShortOfBytesIsTornAndKeepsItsNumber) {
 TEST(IidcCamera, ALostPacketIsFoundByTheNextFramesStampInTheImage) {
   for (const std::size_t lost : {1U, 3U, 100U}) {
     CameraUnderTest c(true);
-    c.start();
+    CameraConfiguration wanted = CameraUnderTest::usual();
+    wanted.options["packet_bytes"] = "1024";
+    c.configure(wanted);
+    ASSERT_EQ(c.camera->start(nullptr), DeviceStatus::ok);
     c.bus->expose(1);
     // The receiver fills up with the beginning of the next frame and waits for the start of the one after that.
     const std::size_t packet = c.bus->shape().packet_bytes, frame = c.bus->shape().frame_bytes;
@@ -230,8 +233,8 @@ TEST(IidcCamera, TimingIsExposureAndTheWay) {
   usb.configure();
   bus.configure();
   EXPECT_GT(usb.camera->timing().least_delay, usb.actual.exposure);
-  // One packet in each cycle of 125 us, at a rate of 10 Hz spread over nearly all of the period.
-  EXPECT_NEAR(bus.camera->timing().least_delay.to_seconds(), 0.005 + 0.1, 0.002);
+  // 75 packets of 4096 bytes, one in each cycle of 125 us.
+  EXPECT_EQ(bus.camera->timing().least_delay, bus.actual.exposure + Duration::microseconds(75 * 125));
   EXPECT_LT(usb.camera->timing().resolution, Duration::microseconds(1));
 }
 

@@ -40,7 +40,7 @@ TEST(IidcConfigure, AHigherFixedRateServesTriggers) {
   EXPECT_FALSE(FeatureValue::of(c.bus->command(reg::feature_value(Feature::frame_rate))).on);
 }
 
-TEST(IidcConfigure, AnyOtherRateOrRegionIsFormat7WithTheSmallestPacket) {
+TEST(IidcConfigure, AnyOtherRateOrRegionIsFormat7) {
   CameraUnderTest c;
   CameraConfiguration wanted = CameraUnderTest::usual();
   wanted.width = 320;
@@ -51,11 +51,39 @@ TEST(IidcConfigure, AnyOtherRateOrRegionIsFormat7WithTheSmallestPacket) {
   EXPECT_EQ(c.bus->command(reg::kVideoFormat), 7U << 29U);
   EXPECT_EQ(c.bus->model().f7_size, 320U << 16U | 240U);
   EXPECT_EQ(c.bus->model().f7_position, 64U << 16U | 32U);
-  EXPECT_EQ(c.bus->model().f7_packet, packet_for_rate(320 * 240, 10 * 0.99, 4, 4096));
+  EXPECT_GE(c.bus->model().f7_packet, packet_for_rate(320 * 240, 10, 4, 4096));
   EXPECT_NEAR(c.actual.rate_hz, 10, 1e-6);
   EXPECT_NEAR(iidc_rate(&c.bus->model()), 10, 0.1);
   EXPECT_GE(c.bus->shape().frame_bytes, 320U * 240U);
   EXPECT_FALSE(TriggerMode::of(c.bus->command(reg::kTriggerMode)).on);
+}
+
+TEST(IidcConfigure, APacketIsTheCamerasShareOfTheBus) {
+  CameraUnderTest bus(true), usb;
+  for (const int cameras : {1, 2, 3}) {
+    CameraConfiguration wanted = CameraUnderTest::usual();
+    wanted.sharing = cameras;
+    bus.configure(wanted);
+    const std::size_t packet = bus.bus->shape().packet_bytes, share = kBandwidthUnits / static_cast<unsigned>(cameras);
+    EXPECT_LE(bandwidth_units(packet, BusSpeed::s400), share);
+    if (packet < 4096) {
+      EXPECT_GT(bandwidth_units(packet + 4, BusSpeed::s400), share);
+    }
+    usb.configure(wanted);
+    EXPECT_LE(static_cast<double>(usb.bus->shape().packet_bytes) * kCyclesPerSecond * cameras, 33e6);
+  }
+  CameraConfiguration wanted = CameraUnderTest::usual();
+  wanted.options["packet_bytes"] = "1024";
+  bus.configure(wanted);
+  EXPECT_EQ(bus.bus->model().f7_packet, 1024U);
+}
+
+TEST(IidcConfigure, WherePacketsSetTheRateTheyAreTheSmallestThatReachIt) {
+  CameraUnderTest c(true);
+  c.bus->masked[kRegisterSpace + 0xF00000 + reg::feature_inquiry(Feature::frame_rate)] = 0;
+  c.configure();
+  EXPECT_EQ(c.bus->model().f7_packet, packet_for_rate(640 * 480, 10 * 0.99, 4, 4096));
+  EXPECT_NEAR(c.actual.rate_hz, 10, 0.1);
 }
 
 TEST(IidcConfigure, MovingALargeRegionNeverLeavesTheSensor) {

@@ -35,6 +35,7 @@ DeviceStatus FakeBus::read(std::uint64_t address, std::uint32_t* value) noexcept
   if (all_accesses != DeviceStatus::ok) return all_accesses;
   if (refused.contains(address) || iidc_read(&model_, address, value) != 0) return DeviceStatus::unsupported;
   if (const auto it = stuck.find(address); it != stuck.end()) *value |= it->second;
+  if (const auto it = masked.find(address); it != masked.end()) *value &= it->second;
   return DeviceStatus::ok;
 }
 
