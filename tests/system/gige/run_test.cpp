@@ -78,7 +78,7 @@ struct Wires {
   [[nodiscard]] std::string settings() const {
     std::string s =
         " --set trigger.rate=10 --set rig.nominal.k1=-0.08 --set rig.nominal.k2=0.02 --set rig.nominal.baseline_m=0.75"
-        " --set 'cameras.1.T_camera_left=[1,0,0,-0.75,0,1,0,0,0,0,1,0]'";
+        " --set rig.state_dir=none --set 'cameras.1.T_camera_left=[1,0,0,-0.75,0,1,0,0,0,0,1,0]'";
     for (int k = 0; k < 2; ++k)
       s += " --set cameras." + std::to_string(k) + ".serial=" + cameras[static_cast<std::size_t>(k)]->options().address +
            " --set cameras." + std::to_string(k) + ".size=[640,480]";
