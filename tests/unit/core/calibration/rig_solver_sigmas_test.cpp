@@ -70,6 +70,7 @@ CalibrationOptions held() {
 // 250 normal errors lie within two sigmas for 95 %, give or take 1.4; ninety leaves room for the drives being few.
 TEST(RigSolverSigmas, holdUpOverFiftyDrivesWithExactIntrinsics) {
   const Statistics s = drives(held(), false);
+  EXPECT_GT(s.nees, 0.5);
   EXPECT_LT(s.nees, 2.0);
   EXPECT_GE(s.within, 0.90);
 }
