@@ -42,7 +42,7 @@ RigSettings rig(const std::string& name, const std::string& state_dir = "") {
 }
 
 TEST(StateFile, LiesWhereTheKeyOrTheUsersEnvironmentSays) {
-  const Environment home("HOME", "/home/anna");
+  const Environment home("HOME", "/users/anna");
   {
     const Environment state("XDG_STATE_HOME", "/var/state");
     EXPECT_EQ(state_file(rig("van")), "/var/state/vergence/van/calibration_state.yaml");
@@ -51,7 +51,7 @@ TEST(StateFile, LiesWhereTheKeyOrTheUsersEnvironmentSays) {
   }
   for (const char* useless : {static_cast<const char*>(nullptr), "", "relative/path"}) {
     const Environment state("XDG_STATE_HOME", useless);
-    EXPECT_EQ(state_file(rig("van")), "/home/anna/.local/state/vergence/van/calibration_state.yaml");
+    EXPECT_EQ(state_file(rig("van")), "/users/anna/.local/state/vergence/van/calibration_state.yaml");
   }
   const Environment state("XDG_STATE_HOME", nullptr), homeless("HOME", nullptr);
   EXPECT_EQ(state_file(rig("van")), std::nullopt);
