@@ -4,6 +4,8 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <chrono>
+#include <thread>
 #include <utility>
 
 namespace vergence::gige {
@@ -79,6 +81,15 @@ Session::Session(Object<ArvDevice> device) : device_(std::move(device)), feature
 Session::~Session() {
   close_stream(!lost());
   (void)g_signal_handlers_disconnect_by_data(device_.get(), this);
+  // Aravis's heartbeat holds the device for a moment when it notices that control is lost. Were its reference the last, it would have to
+  // wait for its own thread: so it is told that there is nothing to lose any more, and waited for.
+  if (!lost()) {
+    Error error;
+    (void)arv_gv_device_leave_control(ARV_GV_DEVICE(device_.get()), error.out());
+  }
+  constexpr int kMoments = 1000;  // of a millisecond
+  const auto references = [this] { return g_atomic_int_get(&G_OBJECT(device_.get())->ref_count); };
+  for (int i = 0; i < kMoments && references() > 1; ++i) std::this_thread::sleep_for(std::chrono::milliseconds(1));
 }
 
 DeviceStatus Session::refuse(DeviceStatus status, std::string sentence) {
@@ -172,7 +183,8 @@ void Session::close_stream(bool reachable) noexcept {
     arv_device_execute_command(device_.get(), "AcquisitionStop", error.out());
     if (!error && features_.has("TLParamsLocked")) arv_device_set_integer_feature_value(device_.get(), "TLParamsLocked", 0, error.out());
   }
-  stream_.reset();  // joins its thread
+  g_object_unref(stream_.get());  // joins its thread, whose callbacks use stream_ until then
+  (void)stream_.release();
 }
 
 DeviceStatus Session::trigger() {
