@@ -222,10 +222,11 @@ void Estimator::Parts::tell_missing(Stamp stamp) noexcept {
 /// States that follow from whether there is a pose.
 void Estimator::Parts::follow(const odometry::FrameOutcome& out, const RigFrame& frame) noexcept {
   if (out.gap_s > 0) note(EstimatorEvent::Kind::time_gap, frame.stamp, "no frame for longer than motion can be predicted", out.gap_s);
-  const bool unmatched = !out.posed && out.images_good && odometry.linked() == odometry::Link::linked &&
-                         (out.reason == Reason::no_stereo_matches || out.reason == Reason::cameras_swapped);
+  const bool unmatched =
+      !out.posed && out.images_good && out.reason == Reason::no_stereo_matches && odometry.linked() == odometry::Link::linked;
   unmatched_frames = unmatched ? unmatched_frames + 1 : 0;
   if (options.online && unmatched_frames == kUnmatchedAfter) {
+    unmatched_frames = 0;
     // Good images of which no scene can be made: then it is the rig that does not fit.
     note(EstimatorEvent::Kind::rig_changed, frame.stamp, sentence_of(CalibrationCause::collapse), kUnmatchedAfter);
     keeper.seek(CalibrationCause::collapse, frame.number, frame.number);

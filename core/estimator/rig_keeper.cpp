@@ -19,7 +19,10 @@ constexpr double kImageMargin = 12.0;  // px: nearer to the edge a track need no
 // pair sees of them, and that is what a lens model's misfit looks like too.
 constexpr std::array kGivenAtFirst = {5e-4, 1e-2, 1e-3, 0.015, 0.01, 0.05};
 constexpr std::array kGiven = {5e-4, 2e-3, 1e-3, 0.015, 0.01, 0.03};
+// What a lens model's misfit makes of it from scene to scene.
+constexpr std::array kLearned = {5e-5, 2e-4, 1e-4, 0.002, 0.002, 0.005};
 constexpr double kLearnedCovariance = 4.0;  // times the monitor's own: the scene it was measured in was one
+constexpr int kGraceFrames = 5;             // after a new reference: the monitor does not yet know how far matches spread
 constexpr int kLearnFrames = 45;            // moving, in agreement
 constexpr int kStillFrames = 15;            // sought for so long without a new frame in the log: the rig stands
 constexpr std::size_t kNewFrames = 5;       // at least, between two solves
@@ -106,6 +109,7 @@ void RigKeeper::watch_against(int k, const Transform& T_camera_left, const Mat6&
   const auto c = static_cast<std::size_t>(k);
   (void)monitors_[c]->set_reference(T_camera_left, pinhole(0), pinhole(c), covariance);
   feeds_[c]->reset();
+  grace_[c] = kGraceFrames;
 }
 
 void RigKeeper::learn(int k, MonitorVerdict* verdict) noexcept {
@@ -120,7 +124,7 @@ void RigKeeper::learn(int k, MonitorVerdict* verdict) noexcept {
   }
   Transform measured = perturbed(rig_.T_camera_left[c], verdict->offset.head<3>(), verdict->offset.tail<3>());
   measured.t *= length / measured.t.norm();
-  watch_against(k, measured, kLearnedCovariance * verdict->covariance);
+  watch_against(k, measured, kLearnedCovariance * verdict->covariance + given_covariance(kLearned, length));
 }
 
 void RigKeeper::scene_lost() noexcept {
@@ -214,6 +218,10 @@ MonitorVerdict RigKeeper::watch(const odometry::Odometry& odometry, const odomet
     f.expected_across = outcome.images_good ? expected_across(odometry, k, outcome.T_left_world) : 0;
     f.found_across = found;
     MonitorVerdict v = monitors_[c]->look(f);
+    if (grace_[c] > 0) {
+      --grace_[c];
+      v = MonitorVerdict{};
+    }
     learn(k, &v);
     if (rank(v.kind) > rank(worst.kind) || (rank(v.kind) == rank(worst.kind) && (v.undecided || v.statistic > worst.statistic))) worst = v;
   }

@@ -86,6 +86,7 @@ class RigKeeper {
   std::array<std::optional<calibration::MonitorFeed>, kMaxCameras> feeds_;
   BoundedVector<calibration::AcrossSighting> across_;
   std::array<bool, kMaxCameras> learning_{};
+  std::array<int, kMaxCameras> grace_{};  // frames whose verdict does not count yet
   Transform T_left_world_{};
   bool any_ = false;  // T_left_world_ is the frame before's
 
