@@ -17,8 +17,9 @@ Picture::Picture(int w, int h)
       stride(static_cast<std::ptrdiff_t>(FramePool::stride(w))),
       bytes(FramePool::stride(w) * static_cast<std::size_t>(h)) {}
 
-Replay replay(const StereoDrive& drive, const Edit& edit, int threads) {
-  const EstimatorOptions options;
+Replay replay(const StereoDrive& drive, const Edit& edit, int threads, bool online) {
+  EstimatorOptions options;
+  options.online = online;
   Arena arena(Estimator::memory_needed(options, drive.rig));
   SequentialRunner one;
   std::optional<app::ThreadRunner> two;

@@ -48,8 +48,8 @@ struct Replay {
   std::uint64_t allocations = 0;  // on sealed threads, from the first frame to the last
 };
 
-/// Every frame of the drive through a new estimator. `threads`: 1 or 2.
-[[nodiscard]] Replay replay(const StereoDrive& drive, const Edit& edit = {}, int threads = 1);
+/// Every frame of the drive through a new estimator. `threads`: 1 or 2. `online`: it may find the rig's calibration anew.
+[[nodiscard]] Replay replay(const StereoDrive& drive, const Edit& edit = {}, int threads = 1, bool online = true);
 
 /// Difference of two relative motions over the same pair of frames.
 struct MotionError {
