@@ -317,6 +317,9 @@ Group odometry() {
   rows.integer("features", &O::features, 50, 1000, "points",
                "Points tracked in each image: more of them cost time and hold the pose better where texture is poor. They are spread "
                "over a grid of cells of the size that this number asks for.")
+      .choice("first_pair", &O::first_pair, {"corners", "surf"},
+              "What is matched across the first images of a rig that is calibrated from scratch: the corners that are tracked anyway, or "
+              "SURF-64; docs/front_ends.md compares them.")
       .integer("pyramid_levels", &O::pyramid_levels, 2, 6, "levels",
                "Sizes of the image that are searched, each half of the one before: more levels follow faster motion.")
       .number("min_corner_score", &O::min_corner_score, 0.01, 1e5, "grey² / px²",

@@ -47,6 +47,18 @@ float milliseconds_since(std::chrono::steady_clock::time_point start) noexcept {
   return std::chrono::duration<float, std::milli>(std::chrono::steady_clock::now() - start).count();
 }
 
+int largest_width(const RigCalibration& rig) noexcept {
+  int w = 0;
+  for (int k = 0; k < rig.cameras; ++k) w = std::max(w, rig.intrinsics[static_cast<std::size_t>(k)].width);
+  return w;
+}
+
+int largest_height(const RigCalibration& rig) noexcept {
+  int h = 0;
+  for (int k = 0; k < rig.cameras; ++k) h = std::max(h, rig.intrinsics[static_cast<std::size_t>(k)].height);
+  return h;
+}
+
 }  // namespace
 
 std::size_t FrontEnd::memory_needed(const OdometryOptions& options, const RigCalibration& rig) noexcept {
@@ -55,6 +67,7 @@ std::size_t FrontEnd::memory_needed(const OdometryOptions& options, const RigCal
     const Intrinsics& c = rig.intrinsics[static_cast<std::size_t>(k)];
     bytes += features::Pyramid::memory_needed(c.width, c.height, options.pyramid_levels) + kMaxPoints * sizeof(Followed) + 2 * kCacheLine;
   }
+  if (options.first_pair != 0) bytes += BlobMatcher::memory_needed(largest_width(rig), largest_height(rig));
   const auto n = static_cast<std::size_t>(options.features);
   return bytes + n * (sizeof(features::Corner) + sizeof(NewPoint) + sizeof(FreeMatch)) +
          kMaxPoints * (sizeof(features::Corner) + sizeof(features::Descriptor)) + 6 * kCacheLine;
@@ -74,6 +87,7 @@ FrontEnd::FrontEnd(const OdometryOptions& options, const RigCalibration& rig, Ar
   fresh_ = arena.make<NewPoint>(n, "new points");
   described_ = arena.make<features::Descriptor>(kMaxPoints, "descriptors");
   free_matches_ = BoundedVector<FreeMatch>(arena.make<FreeMatch>(n, "free matches"));
+  if (options.first_pair != 0) blobs_ = BlobMatcher(largest_width(rig), largest_height(rig), arena);
   rebuild_lenses();
 }
 
@@ -254,8 +268,30 @@ int FrontEnd::find_again(Map& map, int k) noexcept {
 
 std::span<const FreeMatch> FrontEnd::match_free(int k) noexcept {
   free_matches_.clear();
-  const auto c = static_cast<std::size_t>(k);
   if ((structured_ & 1U) == 0 || ((structured_ >> static_cast<unsigned>(k)) & 1U) == 0) return {};
+  if (options_.first_pair == 0) {
+    match_corners_freely(k);
+  } else {
+    features::Patch patch;
+    for (const RoughMatch& m : blobs_.match(pyramids_[0].level(0), pyramids_[static_cast<std::size_t>(k)].level(0)))
+      if (features::cut_patch(pyramids_[0], m.left, &patch)) keep_free_match(patch, m, k);
+  }
+  return free_matches_.span();
+}
+
+void FrontEnd::keep_free_match(const features::Patch& patch, const RoughMatch& rough, int k) noexcept {
+  features::AlignOptions how;
+  how.coarsest = 1;
+  how.min_zncc = static_cast<float>(options_.match_zncc);
+  how.max_shift = 8.F;
+  const features::AlignResult a = features::align(patch, pyramids_[static_cast<std::size_t>(k)], rough.other, Mat2::Identity(), how);
+  Followed left, other;
+  if (a.status != features::AlignStatus::ok || !finish(0, rough.left, 0.0, &left) || !finish(k, a.pixel, 0.0, &other)) return;
+  (void)free_matches_.push({left.ideal.cast<double>(), other.ideal.cast<double>(), static_cast<double>(std::max(left.sigma, other.sigma))});
+}
+
+void FrontEnd::match_corners_freely(int k) noexcept {
+  const auto c = static_cast<std::size_t>(k);
   features::find_corners(pyramids_[0].level(0), corner_options(), {}, runner_, &corners_);
   find_dense_corners(k);
   features::Patch patch;
@@ -295,21 +331,11 @@ std::span<const FreeMatch> FrontEnd::match_free(int k) noexcept {
     fresh_[i].usable = true;
     fresh_[i].matched_camera = static_cast<int>(j);
   }
-  features::AlignOptions how;
-  how.coarsest = 1;
-  how.min_zncc = static_cast<float>(options_.match_zncc);
-  how.max_shift = 8.F;
   for (std::size_t i = 0; i < corners_.size(); ++i) {
     if (!fresh_[i].usable) continue;
-    const auto j = static_cast<std::size_t>(fresh_[i].matched_camera);
-    const features::AlignResult a = features::align(fresh_[i].patch, pyramids_[c], Vec2(taken_[j].x, taken_[j].y), Mat2::Identity(), how);
-    Followed left, other;
-    if (a.status != features::AlignStatus::ok || !finish(0, {corners_[i].x, corners_[i].y}, 0.0, &left) || !finish(k, a.pixel, 0.0, &other))
-      continue;
-    (void)free_matches_.push(
-        {left.ideal.cast<double>(), other.ideal.cast<double>(), static_cast<double>(std::max(left.sigma, other.sigma))});
+    const features::Corner& other = taken_[static_cast<std::size_t>(fresh_[i].matched_camera)];
+    keep_free_match(fresh_[i].patch, {{corners_[i].x, corners_[i].y}, {other.x, other.y}}, k);
   }
-  return free_matches_.span();
 }
 
 void FrontEnd::match_across(const features::Corner& corner, bool exchanged, NewPoint* out) const noexcept {

@@ -6,6 +6,7 @@
 #include "core/features/corners.hpp"
 #include "core/features/descriptor.hpp"
 #include "core/features/pyramid.hpp"
+#include "core/odometry/blob_matcher.hpp"
 #include "core/odometry/lens.hpp"
 #include "core/odometry/map.hpp"
 #include "core/odometry/options.hpp"
@@ -69,8 +70,9 @@ class FrontEnd {
   /// lost.
   [[nodiscard]] int find_again(Map& map, int k) noexcept;
 
-  /// Corners of `left` found in camera k with nothing known of the rig but that it does not turn the image by more than some 20°:
-  /// mutually best descriptors, then aligned. Wrong ones are among them. Some ten milliseconds. Valid until the next call.
+  /// Corners of `left`, or blobs (OdometryOptions::first_pair), found in camera k with nothing known of the rig but that it does not turn
+  /// the image by more than some 20°: mutually best descriptors, then aligned. Wrong ones are among them. Some ten milliseconds, with
+  /// blobs three times that. Valid until the next call.
   [[nodiscard]] std::span<const FreeMatch> match_free(int k) noexcept;
 
   /// New corners of `left` where there are no points, matched across, as points of the given stage, each with its sighting in `now`.
@@ -108,6 +110,9 @@ class FrontEnd {
   [[nodiscard]] features::CornerOptions corner_options() const noexcept;
   /// Corners of camera k four times as dense as points are: so that most of the other image's have their partner.
   void find_dense_corners(int k) noexcept;
+  void match_corners_freely(int k) noexcept;
+  /// Aligns a rough match and keeps it if that succeeds and there is room.
+  void keep_free_match(const features::Patch& patch, const RoughMatch& rough, int k) noexcept;
   void match_all(std::span<const features::Corner> corners, bool exchanged) noexcept;
   /// Where camera k sits is known, if only roughly: before, its transform is the identity.
   [[nodiscard]] bool placed(int k) const noexcept { return k == 0 || rig_.T_camera_left[static_cast<std::size_t>(k)].t.squaredNorm() > 0; }
@@ -126,6 +131,7 @@ class FrontEnd {
   std::span<NewPoint> fresh_;
   std::span<features::Descriptor> described_;  // of the map's points in find_again(), of dense corners in match_free()
   BoundedVector<FreeMatch> free_matches_;
+  BlobMatcher blobs_;  // has no memory unless asked for
   double band_px_;
   float detect_ms_ = 0;
 };

@@ -5,8 +5,9 @@ namespace vergence {
 
 /// Every number a user may change in `odometry:`; the configuration's schema (app/config) has a row for each field.
 struct OdometryOptions {
-  int features = 400;              // tracked points per image aimed at, 50 … 1000
-  int pyramid_levels = 4;          // 2 … 6; each halves the image
+  int features = 400;      // tracked points per image aimed at, 50 … 1000
+  int first_pair = 0;      // what finds the transform of a rig that nobody has calibrated: 0 corners, 1 SURF-64 (docs/front_ends.md)
+  int pyramid_levels = 4;  // 2 … 6; each halves the image
   double min_corner_score = 15.0;  // least eigenvalue of the structure tensor's mean, grey levels² / px², > 0
   double nearest_baselines = 4.0;  // nearest depth looked for across, in baselines: sets the largest disparity, 1 … 50
   double band_px = 2.0;            // half width of the band about the epipolar line across, 0.5 … 20

@@ -34,7 +34,8 @@ namespace {
 
 using namespace vergence;
 
-constexpr double kNearLine = 1.0;  // px to the true epipolar line: a match this near counts as right
+constexpr int kManyCorners = 1000;  // the most that may be asked for
+constexpr double kNearLine = 1.0;   // px to the true epipolar line: a match this near counts as right
 
 struct Arguments {
   int pairs = 24;
@@ -58,8 +59,8 @@ using Matches = std::vector<odometry::FreeMatch>;
 /// Of the processor: other programs do not count.
 double milliseconds_since(std::clock_t start) { return 1e3 * static_cast<double>(std::clock() - start) / CLOCKS_PER_SEC; }
 
-/// Corners with binary descriptors, mutually best, then aligned: what the estimator uses.
-Matches match_corners(const ImagePair& pair, const OdometryOptions& options, double* ms) {
+/// What the estimator uses on the first pair: corners with binary descriptors, or upright SURF-64, mutually best, then aligned.
+Matches match_freely(const ImagePair& pair, const OdometryOptions& options, double* ms) {
   RigCalibration rig;
   rig.cameras = 2;
   rig.intrinsics[0] = pair.intrinsics[0];
@@ -150,12 +151,13 @@ Matches match_surf(const ImagePair& pair, const Arguments& a, bool upright, doub
   Matches matches;
   for (const features::SurfMatch& f : found) {
     const features::SurfPoint &p = points[0][f.left], &q = points[1][f.right];
+    const Vec2 left(static_cast<double>(p.x), static_cast<double>(p.y));
+    const Vec2 right(static_cast<double>(q.x), static_cast<double>(q.y));
+    const double sigma = kSigmaOfScale * static_cast<double>(std::max(p.scale, q.scale));
     odometry::FreeMatch m;
     double magnification = 1;
-    if (!lens[0].undistort({static_cast<double>(p.x), static_cast<double>(p.y)}, &m.left, &magnification) ||
-        !lens[1].undistort({static_cast<double>(q.x), static_cast<double>(q.y)}, &m.other, &magnification))
-      continue;
-    m.sigma = kSigmaOfScale * static_cast<double>(std::max(p.scale, q.scale)) * magnification;
+    if (!lens[0].undistort(left, &m.left, &magnification) || !lens[1].undistort(right, &m.other, &magnification)) continue;
+    m.sigma = sigma * magnification;
     matches.push_back(m);
   }
   *ms = milliseconds_since(start);
@@ -222,10 +224,15 @@ struct Row {
     return median(v, q);
   }
   [[nodiscard]] std::string line() const {
+    double right = 0, matches = 0;
+    for (const Measured& m : all) {
+      right += m.right;
+      matches += m.matches;
+    }
     return fmt::format("| {} | {} | {} | {:.0f} | {:.0f} % | {:.0f} | {:.2f} | {:.3f} / {:.3f} | {:.2f} / {:.2f} | {:.0f} |\n", data, task,
-                       front_end, at(&Measured::matches), 100 * at(&Measured::right) / std::max(1.0, at(&Measured::matches)),
-                       at(&Measured::inliers), at(&Measured::off_px), at(&Measured::turn_deg), at(&Measured::turn_deg, 0.9),
-                       at(&Measured::direction_deg), at(&Measured::direction_deg, 0.9), at(&Measured::ms));
+                       front_end, at(&Measured::matches), 100 * right / std::max(1.0, matches), at(&Measured::inliers),
+                       at(&Measured::off_px), at(&Measured::turn_deg), at(&Measured::turn_deg, 0.9), at(&Measured::direction_deg),
+                       at(&Measured::direction_deg, 0.9), at(&Measured::ms));
   }
 };
 
@@ -235,16 +242,23 @@ constexpr const char* kHeader =
 
 class Table {
  public:
-  explicit Table(const Arguments& a) : a_(a), odometry_(app::load_configuration(std::nullopt, a.set).odometry) {}
+  explicit Table(const Arguments& a)
+      : a_(a), odometry_(app::load_configuration(std::nullopt, a.set).odometry), many_(odometry_), blobs_(odometry_) {
+    odometry_.first_pair = many_.first_pair = 0;
+    blobs_.first_pair = 1;
+    many_.features = blobs_.features = kManyCorners;
+  }
 
   void add(const std::string& data, bool across, const ImagePair& pair) {
     double ms = 0;
     const std::string task = across ? "across" : "in time";
     const auto one = [&](const char* name, const Matches& matches) { row(data, task, name).all.push_back(measure(pair, matches, ms)); };
-    one("corners", match_corners(pair, odometry_, &ms));
+    one("corners", match_freely(pair, odometry_, &ms));
+    one("corners, 1000", match_freely(pair, many_, &ms));
     if (!across) one("corners followed", follow_corners(pair, odometry_, &ms));
-    one("SURF-64 upright", match_surf(pair, a_, true, &ms));
     one("SURF-64", match_surf(pair, a_, false, &ms));
+    one("SURF-64 upright", match_surf(pair, a_, true, &ms));
+    one("SURF-64 upright, aligned", match_freely(pair, blobs_, &ms));
   }
   [[nodiscard]] std::string text() const {
     std::string s = kHeader;
@@ -260,7 +274,7 @@ class Table {
     return rows_.back();
   }
   const Arguments& a_;
-  OdometryOptions odometry_;
+  OdometryOptions odometry_, many_, blobs_;
   std::vector<Row> rows_;
 };
 

@@ -1,0 +1,44 @@
+#pragma once
+#include <array>
+#include <cstddef>
+#include <span>
+
+#include "core/features/surf_match.hpp"
+#include "core/types/image.hpp"
+
+namespace vergence::odometry {
+
+/// Raw pixels of what seems to be one thing in two images.
+struct RoughMatch {
+  Vec2 left = Vec2::Zero(), other = Vec2::Zero();
+};
+
+inline constexpr std::size_t kMaxBlobs = 1500;  // of an image: about what a street shows above the default response
+
+/// SURF-64 across two images of which nothing is known: upright, mutually best. docs/front_ends.md says how it compares with corners.
+///
+/// Threads  One caller.
+/// Memory   From the arena at construction. Of more than kMaxBlobs blobs the weakest are dropped.
+/// Errors   Images that are empty or too large: no matches.
+class BlobMatcher {
+ public:
+  BlobMatcher() noexcept = default;
+  /// Images of at most this size.
+  BlobMatcher(int max_width, int max_height, Arena& arena);
+  [[nodiscard]] static std::size_t memory_needed(int max_width, int max_height) noexcept;
+
+  /// By the strength of the left blob, strongest first. Valid until the next call.
+  [[nodiscard]] std::span<const RoughMatch> match(const ImageView& left, const ImageView& other) noexcept;
+
+ private:
+  [[nodiscard]] features::SurfView describe(const ImageView& image, std::size_t k) noexcept;
+
+  features::Surf surf_;
+  features::SurfMatcher matcher_;
+  std::array<BoundedVector<features::SurfPoint>, 2> points_{};
+  std::array<std::span<features::SurfDescriptor>, 2> descriptors_{};
+  BoundedVector<features::SurfMatch> found_;
+  BoundedVector<RoughMatch> matches_;
+};
+
+}  // namespace vergence::odometry
