@@ -1,54 +1,11 @@
 #include <gtest/gtest.h>
 
-#include <algorithm>
-#include <stdexcept>
-
-#include "app/datasets/image_file.hpp"
-#include "app/datasets/stereo_sequence.hpp"
-#include "app/datasets/trajectory_files.hpp"
-#include "core/comparison/trajectory_metrics.hpp"
 #include "tests/support/shared_data.hpp"
 #include "tests/system/odometry/faults.hpp"
+#include "tests/system/odometry/recorded_drive.hpp"
 
 namespace vergence::test {
 namespace {
-
-struct Excerpt {
-  const char* name;
-  const char* folder;
-  app::SequenceFormat format;
-  std::size_t frames;           // all of them, or enough of them
-  std::size_t frames_of_a_gap;  // two seconds
-};
-constexpr Excerpt kKitti{"kitti", "data/kitti06_51", app::SequenceFormat::kitti, 51, 20};
-constexpr Excerpt kEuroc{"euroc", "data/euroc_mh01", app::SequenceFormat::euroc, 80, 40};
-
-Picture decode(const std::filesystem::path& file, const Intrinsics& camera) {
-  Picture p(camera.width, camera.height);
-  std::vector<std::uint8_t> bytes;
-  if (app::read_image_file(file, &bytes) != app::ImageFileStatus::ok ||
-      app::decode_grey(bytes, {p.width, p.height}, p.bytes.data(), static_cast<std::size_t>(p.stride)) != app::ImageFileStatus::ok)
-    throw std::runtime_error(file.string() + " cannot be decoded");
-  return p;
-}
-
-StereoDrive load(const Excerpt& excerpt, const std::filesystem::path& folder) {
-  const app::StereoSequence sequence = app::open_sequence(excerpt.format, folder);
-  const app::Trajectory truth = app::read_trajectory(folder);
-  StereoDrive drive;
-  drive.rig = sequence.calibration;
-  for (std::size_t i = 0; i < std::min(excerpt.frames, sequence.pairs.size()); ++i) {
-    const app::StereoPair& pair = sequence.pairs[i];
-    const std::vector<StampedPose> here{{pair.stamp, Transform{}}};
-    const MatchedTrajectories matched = associate(here, truth, {});
-    if (matched.reference.empty()) continue;
-    drive.stamps.push_back(pair.stamp);
-    drive.truth.push_back(matched.reference[0].T_world_body);
-    drive.pairs.push_back(
-        {decode(sequence.root / pair.file[0], drive.rig.intrinsics[0]), decode(sequence.root / pair.file[1], drive.rig.intrinsics[1])});
-  }
-  return drive;
-}
 
 class RecordedDrive : public testing::TestWithParam<Excerpt> {
  protected:

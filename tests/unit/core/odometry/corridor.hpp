@@ -55,9 +55,9 @@ class Corridor {
 
  private:
   static constexpr int kWidth = 320, kHeight = 240;
-  /// The nearest surface along a ray. Waves are 0.25 to 0.8 m long: 6 px at the end, more nearer by.
+  /// The nearest surface along a ray. Waves are 0.25 to 0.8 m long, 12 px at 6 m; at the end 0.7 to 2 m.
   [[nodiscard]] double shade(const Vec3& from, const Vec3& ray) const {
-    constexpr double kWall = 3.0, kFloor = 1.5, kCeiling = -2.5, kEnd = 12.0;
+    constexpr double kWall = 3.0, kFloor = 1.5, kCeiling = -2.5, kEnd = 24.0;
     double at = 1e9;
     std::size_t surface = 0;
     const auto meet = [&](double distance, double along, std::size_t which) {
@@ -76,7 +76,7 @@ class Corridor {
   }
   RigCalibration rig_;
   std::vector<features::test::Image> images_;
-  std::array<features::test::Texture, 5> textures_{features::test::Texture(11, 0.25, 0.8), features::test::Texture(12, 0.25, 0.8),
+  std::array<features::test::Texture, 5> textures_{features::test::Texture(11, 0.7, 2.0), features::test::Texture(12, 0.25, 0.8),
                                                    features::test::Texture(13, 0.25, 0.8), features::test::Texture(14, 0.25, 0.8),
                                                    features::test::Texture(15, 0.25, 0.8)};
 };

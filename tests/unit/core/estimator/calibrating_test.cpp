@@ -1,0 +1,234 @@
+// The estimator and its rig, on a corridor drawn ray by ray.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/estimator/estimator.hpp"
+#include "core/memory/allocation_guard.hpp"
+#include "tests/unit/core/odometry/corridor.hpp"
+
+namespace vergence {
+namespace {
+
+using odometry::test::Corridor;
+using Kind = EstimatorEvent::Kind;
+
+struct Drive {
+  Corridor corridor;
+  EstimatorOptions options;
+  RigCalibration given, nominal;
+  std::optional<Arena> arena;
+  SequentialRunner runner;
+  ImmediateRunner solver;
+  std::optional<Estimator> estimator;
+  std::vector<PoseSample> samples;
+  std::vector<EstimatorEvent> events;
+  std::vector<CalibrationDecision> decisions;
+
+  explicit Drive(CalibrationTrust trust) : given(corridor.rig()), nominal(given) {
+    options.trust = trust;
+    options.calibration.estimate_focal_lengths = 0;
+    // Pixels of 3.6 mrad instead of the paper's 0.8: what tracks can hold is as much less.
+    options.calibration.rotation_sigma_mrad = 1.0;
+    options.calibration.translation_sigma_mm = 30;
+    nominal.T_camera_left[1] = {Mat3::Identity(), {-given.baseline, 0, 0}};
+    if (trust == CalibrationTrust::none)
+      for (Transform& T : given.T_camera_left) T = {};
+    else
+      given.sigma_noise[1] = {2e-4, 4e-4, 2e-4, 1e-5, 2e-3, 4e-3};
+  }
+  void begin() {
+    arena.emplace(Estimator::memory_needed(options, given));
+    estimator.emplace(options, given, nominal, *arena, runner, solver);
+  }
+  void give(const RigFrame& frame) {
+    samples.push_back(estimator->process(frame));
+    note();
+  }
+  void note() {
+    events.insert(events.end(), estimator->events().begin(), estimator->events().end());
+    decisions.insert(decisions.end(), estimator->calibrations().begin(), estimator->calibrations().end());
+  }
+  void drive(int first, int last) {
+    for (int i = first; i < last; ++i) give(corridor.frame(i));
+  }
+  void drive(int first, int last, const std::array<Transform, kMaxCameras>& rig) {
+    for (int i = first; i < last; ++i) give(corridor.frame(i, rig));
+  }
+  [[nodiscard]] int count(Kind kind) const {
+    return static_cast<int>(std::count_if(events.begin(), events.end(), [kind](const EstimatorEvent& e) { return e.kind == kind; }));
+  }
+  /// State by state, as the events have it.
+  [[nodiscard]] std::vector<State> way() const {
+    std::vector<State> states;
+    for (const EstimatorEvent& e : events) {
+      if (e.kind != Kind::state) continue;
+      if (states.empty()) states.push_back(e.from);
+      EXPECT_EQ(states.back(), e.from) << "every transition begins where the last one ended";
+      states.push_back(e.to);
+    }
+    return states;
+  }
+  [[nodiscard]] std::string story() const {
+    std::string text;
+    for (const EstimatorEvent& e : events)
+      text += std::string(to_string(e.from)) + " → " + std::string(to_string(e.to)) + ": " + e.why + '\n';
+    for (const PoseSample& s : samples)
+      text += std::to_string(s.frame) + ' ' + std::string(to_string(s.status)) + ' ' + std::string(to_string(s.reason)) + '\n';
+    return text;
+  }
+};
+
+TEST(Calibrating, fromScratchGoesItsWayToStereoOdometry) {
+  Drive d(CalibrationTrust::none);
+  d.begin();
+  EXPECT_FALSE(d.estimator->calibrated());
+  d.drive(0, 62);
+  EXPECT_EQ(d.way(), (std::vector{State::initialising, State::parallel_monocular, State::calibrating, State::stereo_odometry}))
+      << d.story();
+  ASSERT_EQ(d.decisions.size(), 1U) << d.story();
+  const CalibrationDecision& decision = d.decisions[0];
+  EXPECT_TRUE(decision.accepted);
+  EXPECT_STREQ(decision.reason, "");
+  EXPECT_EQ(decision.cause, CalibrationCause::from_scratch);
+  EXPECT_EQ(decision.calibration.frames, 25);
+  EXPECT_GT(decision.held_out_after_px, 0);
+  EXPECT_EQ(decision.held_out_before_px, 0) << "there was none before";
+  EXPECT_TRUE(d.estimator->calibrated());
+  EXPECT_EQ(d.count(Kind::calibration_accepted), 1);
+  const Transform &found = d.estimator->calibration().T_camera_left[1], &truth = d.corridor.rig().T_camera_left[1];
+  const auto& sigma = d.estimator->calibration().sigma_noise[1];
+  const Vec3 turn = log_so3(found.R * truth.R.transpose()), shift = found.t - truth.t;
+  for (int i = 0; i < 3; ++i) EXPECT_LT(std::abs(turn[i]), 4 * sigma[static_cast<std::size_t>(i)]) << i;
+  for (int i = 1; i < 3; ++i) EXPECT_LT(std::abs(shift[i]), 4 * sigma[static_cast<std::size_t>(i + 3)]) << i;
+  // A pose on every frame, and ok only with a calibration.
+  for (const PoseSample& s : d.samples) {
+    EXPECT_NE(s.status, PoseStatus::lost) << d.story();
+    EXPECT_EQ(s.status == PoseStatus::ok && s.state != State::stereo_odometry, false) << d.story();
+  }
+  EXPECT_EQ(d.samples.back().status, PoseStatus::ok) << d.story();
+}
+
+TEST(Calibrating, adoptionIsSoManyFramesAfterTheSnapshot) {
+  std::uint64_t at[2];
+  for (const int later : {10, 20}) {
+    Drive d(CalibrationTrust::none);
+    d.options.calibration.adopt_after = later;
+    d.begin();
+    d.drive(0, 50);
+    ASSERT_EQ(d.decisions.size(), 1U) << d.story();
+    at[later / 10 - 1] = static_cast<std::uint64_t>((d.decisions[0].stamp.ns() - 1'000'000'000) / 50'000'000);
+  }
+  EXPECT_EQ(at[1] - at[0], 10U);
+}
+
+TEST(Calibrating, aFilesCalibrationIsUnconfirmedUntilThirtyFramesAgree) {
+  Drive d(CalibrationTrust::unconfirmed);
+  d.begin();
+  d.drive(0, 45);
+  int confirmed = -1;
+  for (const EstimatorEvent& e : d.events)
+    if (e.kind == Kind::calibration_confirmed) confirmed = static_cast<int>((e.stamp.ns() - 1'000'000'000) / 50'000'000);
+  ASSERT_GE(confirmed, 30) << d.story();
+  for (const PoseSample& s : d.samples) {
+    if (static_cast<int>(s.frame) < confirmed) {
+      EXPECT_EQ(s.status, PoseStatus::degraded) << s.frame;
+      EXPECT_EQ(s.reason, Reason::unconfirmed) << s.frame;
+    } else {
+      EXPECT_EQ(s.status, PoseStatus::ok) << s.frame << ' ' << to_string(s.reason);
+    }
+  }
+}
+
+TEST(Calibrating, onRequestANewOneIsSoughtAndTheOneInUseIsNoWorse) {
+  Drive d(CalibrationTrust::given);
+  d.begin();
+  d.drive(0, 5);
+  d.estimator->request_recalibration();
+  EXPECT_EQ(d.estimator->state(), State::stereo_odometry) << "it acts at the next frame";
+  d.drive(5, 66);
+  EXPECT_EQ(d.way(), (std::vector{State::initialising, State::stereo_odometry, State::recalibrating, State::stereo_odometry})) << d.story();
+  EXPECT_EQ(d.samples[6].state, State::recalibrating);
+  EXPECT_EQ(d.samples[6].status, PoseStatus::degraded);
+  EXPECT_EQ(d.samples[6].reason, Reason::recalibrating);
+  ASSERT_EQ(d.decisions.size(), 1U) << d.story();
+  EXPECT_EQ(d.decisions[0].cause, CalibrationCause::requested);
+  EXPECT_GT(d.decisions[0].held_out_before_px, 0);
+  // The one in use is the true one: a new one cannot fit better than by chance.
+  EXPECT_FALSE(d.decisions[0].accepted) << d.story();
+  EXPECT_EQ(d.estimator->calibration().T_camera_left[1].t, d.corridor.rig().T_camera_left[1].t);
+  for (const PoseSample& s : d.samples) EXPECT_NE(s.status, PoseStatus::lost);
+}
+
+TEST(Calibrating, aKnockIsMended) {
+  Drive d(CalibrationTrust::given);
+  d.begin();
+  std::array<Transform, kMaxCameras> knocked = d.corridor.rig().T_camera_left;
+  knocked[1] = perturbed(knocked[1], {0.012, 0, 0}, Vec3::Zero());  // 3.4 px of row
+  d.drive(0, 12);
+  d.drive(12, 85, knocked);
+  EXPECT_EQ(d.way(), (std::vector{State::initialising, State::stereo_odometry, State::recalibrating, State::stereo_odometry})) << d.story();
+  EXPECT_EQ(d.count(Kind::rig_changed), 1) << d.story();
+  ASSERT_EQ(d.decisions.size(), 1U) << d.story();
+  EXPECT_TRUE(d.decisions[0].accepted) << d.decisions[0].reason;
+  EXPECT_GE(d.decisions[0].onset_frame, 12U);
+  EXPECT_LT(d.decisions[0].held_out_after_px, d.decisions[0].held_out_before_px);
+  EXPECT_NEAR(log_so3(d.estimator->calibration().T_camera_left[1].R * knocked[1].R.transpose()).x(), 0.0, 1e-3);
+  for (const PoseSample& s : d.samples) EXPECT_NE(s.status, PoseStatus::lost) << d.story();
+}
+
+TEST(Calibrating, offlineTheCalibrationGivenIsUsedForEver) {
+  Drive d(CalibrationTrust::given);
+  d.options.online = false;
+  d.begin();
+  std::array<Transform, kMaxCameras> knocked = d.corridor.rig().T_camera_left;
+  knocked[1] = perturbed(knocked[1], {0.012, 0, 0}, Vec3::Zero());
+  d.drive(0, 5);
+  d.drive(5, 20, knocked);
+  d.estimator->request_recalibration();
+  d.drive(20, 25, knocked);
+  EXPECT_EQ(d.count(Kind::rig_changed), 0) << d.story();
+  EXPECT_EQ(d.estimator->state(), State::stereo_odometry);
+  EXPECT_TRUE(d.decisions.empty());
+}
+
+TEST(Calibrating, finishDecidesAboutWhatIsStillSought) {
+  Drive d(CalibrationTrust::none);
+  d.begin();
+  d.drive(0, 35);
+  EXPECT_TRUE(d.decisions.empty()) << d.story();
+  d.estimator->finish();
+  d.note();
+  ASSERT_EQ(d.decisions.size(), 1U) << d.story();
+  EXPECT_TRUE(d.decisions[0].accepted) << d.decisions[0].reason;
+  d.estimator->finish();
+  EXPECT_TRUE(d.estimator->calibrations().empty()) << "once";
+
+  Drive too_short(CalibrationTrust::none);
+  too_short.begin();
+  too_short.drive(0, 8);
+  too_short.estimator->finish();
+  EXPECT_TRUE(too_short.estimator->calibrations().empty());
+}
+
+TEST(Calibrating, fromScratchTheTransformHandedOverIsNotRead) {
+  Drive d(CalibrationTrust::none), other(CalibrationTrust::none);
+  other.given.T_camera_left[1] = {exp_so3({1, 2, 3}), {7, 8, 9}};
+  d.begin();
+  other.begin();
+  d.drive(0, 35);
+  other.drive(0, 35);
+  for (std::size_t i = 0; i < d.samples.size(); ++i) ASSERT_EQ(d.samples[i].T_world_left.t, other.samples[i].T_world_left.t) << i;
+}
+
+TEST(Calibrating, withoutABaselineThereIsNoScaleToFind) {
+  Drive d(CalibrationTrust::none);
+  d.given.baseline = 0;
+  EXPECT_THROW((void)Estimator::memory_needed(d.options, d.given), std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace vergence
