@@ -44,7 +44,7 @@ struct GateQuestion {
   const RigCalibration* nominal = nullptr;
   const RigCalibration* in_use = nullptr;  // null: there is none
   const TrackLog* log = nullptr;           // with the frames since the snapshot
-  bool window_full = false;                // max_frames were used: three times the sigmas are enough
+  bool window_full = false;                // max_frames were used, or no more will come: three times the sigmas are enough
 };
 
 /// METHOD §4: what stands between a solution and its use. Threads pure.

@@ -268,14 +268,14 @@ std::optional<CalibrationDecision> RigKeeper::decide(Stamp stamp, std::uint64_t 
   }
   solving_ = false;
   if (!seeking_) return std::nullopt;  // what this was for is no longer sought
-  return judge(stamp, number);
+  return judge(stamp, number, false);
 }
 
 std::optional<CalibrationDecision> RigKeeper::decide_now(Stamp stamp, std::uint64_t number) noexcept {
   if (!solving_) return std::nullopt;
   runner_.wait();
   solving_ = false;
-  return judge(stamp, number);
+  return judge(stamp, number, true);
 }
 
 bool RigKeeper::start_last_solve() noexcept {
@@ -284,14 +284,14 @@ bool RigKeeper::start_last_solve() noexcept {
   return true;
 }
 
-CalibrationDecision RigKeeper::judge(Stamp stamp, std::uint64_t number) noexcept {
+CalibrationDecision RigKeeper::judge(Stamp stamp, std::uint64_t number, bool last) noexcept {
   calibration::GateQuestion question;
   question.solution = &solution_;
   question.nominal = &nominal_;
   question.in_use = calibrated_ ? &rig_ : nullptr;
   question.log = &log_;
   const auto most = static_cast<std::size_t>(options_.calibration.max_frames);
-  question.window_full = static_cast<std::size_t>(solution_.frames) >= most;
+  question.window_full = last || static_cast<std::size_t>(solution_.frames) >= most;
   gate_ = calibration::ask_gates(question, options_.calibration);
 
   CalibrationDecision d;

@@ -71,7 +71,8 @@ class RigKeeper {
   /// A calibration that came without sigmas is a rough one: the monitor takes what it measures itself in the first frames that agree with
   /// it as what must not change. What they measure is too far from it: the verdict becomes a knock.
   void learn(int k, calibration::MonitorVerdict* verdict) noexcept;
-  [[nodiscard]] CalibrationDecision judge(Stamp stamp, std::uint64_t number) noexcept;
+  /// `last`: no more frames come that could make it better.
+  [[nodiscard]] CalibrationDecision judge(Stamp stamp, std::uint64_t number, bool last) noexcept;
   [[nodiscard]] double pixels_moved(const odometry::Map& map) const noexcept;
   [[nodiscard]] int expected_across(const odometry::Odometry& odometry, int k, const Transform& T_left_world) const noexcept;
 
