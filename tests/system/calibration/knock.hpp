@@ -7,7 +7,8 @@ namespace vergence::test {
 struct Knock {
   const char* name;
   Vec3 turn_deg, shift_mm;
-  int frames;  // within which it is noticed
+  int frames;           // within which it is noticed
+  bool matches = true;  // are left across; else the left camera goes on alone for a while, and the scale is remembered
 };
 
 /// A rig that knows its calibration is knocked on the way and mended.
