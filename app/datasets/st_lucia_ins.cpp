@@ -3,11 +3,11 @@
 #include <numbers>
 
 #include <fmt/format.h>
-#include <GeographicLib/LocalCartesian.hpp>
 
 #include "app/datasets/detail/st_lucia_logs.hpp"
 #include "app/datasets/st_lucia.hpp"
 #include "app/datasets/text_file.hpp"
+#include "core/comparison/geodesy.hpp"
 
 namespace vergence::app {
 namespace {
@@ -91,15 +91,10 @@ void check_places(const std::filesystem::path& log, std::vector<Line>* lines, st
   if (exchanged) remarks->push_back("longitude stands before latitude in the log of the INS");
 }
 
-GeographicLib::LocalCartesian plane_at(const Geodetic& g) { return {g.latitude_deg, g.longitude_deg, g.height_m}; }
-
 std::vector<Moving> motions(const std::vector<Line>& lines) {
-  const GeographicLib::LocalCartesian plane = plane_at(lines.front().place);
-  std::vector<Vec3> places(lines.size());
-  for (std::size_t i = 0; i < lines.size(); ++i) {
-    const Geodetic& g = lines[i].place;
-    plane.Forward(g.latitude_deg, g.longitude_deg, g.height_m, places[i].x(), places[i].y(), places[i].z());
-  }
+  const LocalTangentPlane plane(lines.front().place);
+  std::vector<Vec3> places;
+  for (const Line& line : lines) places.push_back(plane.to_enu(line.place));
   std::vector<Moving> out;
   std::size_t before = 0, after = 0;
   for (std::size_t i = 0; i < lines.size(); ++i) {
@@ -251,14 +246,12 @@ StLuciaIns read_st_lucia_ins(const std::filesystem::path& folder) {
 Trajectory st_lucia_reference(const StLuciaIns& ins, const Transform& T_ins_left) {
   Trajectory out;
   if (ins.samples.empty()) return out;
-  const GeographicLib::LocalCartesian plane = plane_at(ins.samples.front().position);
-  std::vector<double> rotation(9);  // v_enu = M · v_local, row-major
+  const LocalTangentPlane plane(ins.samples.front().position);
   for (const InsSample& s : ins.samples) {
     Transform T_enu_ins;
-    plane.Forward(s.position.latitude_deg, s.position.longitude_deg, s.position.height_m, T_enu_ins.t.x(), T_enu_ins.t.y(), T_enu_ins.t.z(),
-                  rotation);
+    T_enu_ins.t = plane.to_enu(s.position);
     const Eigen::Quaterniond q(s.q_enu_ins[3], s.q_enu_ins[0], s.q_enu_ins[1], s.q_enu_ins[2]);
-    T_enu_ins.R = Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(rotation.data()) * q.toRotationMatrix();
+    T_enu_ins.R = plane.rotation_from(s.position) * q.toRotationMatrix();
     out.push_back({s.stamp, T_enu_ins * T_ins_left});
   }
   return out;

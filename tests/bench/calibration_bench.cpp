@@ -23,6 +23,7 @@
 #include "app/runtime/thread_runner.hpp"
 #include "core/calibration/health.hpp"
 #include "core/estimator/estimator.hpp"
+#include "core/math/random.hpp"
 #include "core/math/so3.hpp"
 #include "tests/support/rendered_drive.hpp"
 #include "tests/support/shared_data.hpp"
@@ -36,6 +37,7 @@ struct Arguments {
   int starts = 20, first = 0, frames = 400;
   double from = -1;
   bool verbose = false;
+  bool wrong_intrinsics = false;
   std::vector<std::string> set;
 };
 
@@ -135,13 +137,24 @@ int run_mock(const Arguments& a) {
   mock::DriveOptions drive;
   std::vector<double> starts = a.from >= 0 ? std::vector<double>{a.from} : test::RenderedDrive::starts(drive, a.starts, 3.0, 5.0);
   std::array<double, 6> largest{}, squares{}, nees{};
-  int n = 0;
+  int n = 0, within = 0;
   for (std::size_t i = static_cast<std::size_t>(a.first); i < starts.size(); ++i) {
     test::RenderedDriveOptions o;
     o.drive = drive;
     o.from_s = starts[i];
     test::RenderedDrive rendered(o);
-    const Found f = calibrate(a, o.rig, [&](int k) { return &rendered.frame(static_cast<std::uint64_t>(k)); });
+    RigCalibration told = o.rig;
+    if (a.wrong_intrinsics) {
+      Random random(1000 + i);
+      for (std::size_t k = 0; k < 2; ++k) {
+        const double focal = 1 + 0.001 * random.normal();
+        told.intrinsics[k].fx *= focal;
+        told.intrinsics[k].fy *= focal;
+        told.intrinsics[k].cx += 0.5 * random.normal();
+        told.intrinsics[k].cy += 0.5 * random.normal();
+      }
+    }
+    const Found f = calibrate(a, told, [&](int k) { return &rendered.frame(static_cast<std::uint64_t>(k)); });
     const Errors e = errors_of(f.rig, o.rig.T_camera_left[1]);
     print(fmt::format("{:.2f} s", starts[i]), f, e);
     std::fflush(stdout);
@@ -150,10 +163,13 @@ int run_mock(const Arguments& a) {
     for (std::size_t k = 0; k < 6; ++k) {
       largest[k] = std::max(largest[k], std::abs(e.value[k]));
       squares[k] += e.value[k] * e.value[k];
-      nees[k] += e.value[k] * e.value[k] / (e.noise[k] * e.noise[k]);
+      const double sigma = a.wrong_intrinsics ? e.wide[k] : e.noise[k];
+      nees[k] += e.value[k] * e.value[k] / (sigma * sigma);
+      within += k != 3 && std::abs(e.value[k]) <= 2 * sigma ? 1 : 0;
     }
   }
-  fmt::print("{} calibrated of {}; mrad and mm\n", n, starts.size() - static_cast<std::size_t>(a.first));
+  fmt::print("{} calibrated of {}; mrad and mm; {} of {} single errors within two {} sigmas (t_x follows from the length)\n", n,
+             starts.size() - static_cast<std::size_t>(a.first), within, 5 * n, a.wrong_intrinsics ? "wide" : "noise");
   for (const auto& [name, row] : {std::pair("largest", &largest), std::pair("rms", &squares), std::pair("z rms", &nees)}) {
     fmt::print("{:10s}", name);
     for (const double v : *row) fmt::print(" {:8.4f}", name == std::string("largest") ? v : std::sqrt(v / std::max(1, n)));
@@ -289,6 +305,8 @@ int main(int argc, char** argv) {
       a.set.push_back(next());
     else if (word == "--verbose")
       a.verbose = true;
+    else if (word == "--wrong-intrinsics")
+      a.wrong_intrinsics = true;
     else
       a.what = word;
   }
