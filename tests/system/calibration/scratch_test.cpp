@@ -2,7 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <cstring>
+#include <numbers>
 
 #include "core/calibration/gates.hpp"
 #include "core/memory/allocation_guard.hpp"
@@ -224,7 +224,7 @@ TEST(StandingStill, fromScratchSaysThatItNeedsMotionAndAdoptsNothing) {
 TEST(StandingStill, aKnockIsNoticedAndWaitsForMotion) {
   const Standing before(standing_drive());
   RenderedDriveOptions knocked = standing_drive();
-  knocked.rig.T_camera_left[1] = perturbed(knocked.rig.T_camera_left[1], Vec3(0.5 * M_PI / 180, 0, 0), Vec3::Zero());
+  knocked.rig.T_camera_left[1] = perturbed(knocked.rig.T_camera_left[1], Vec3(0.5 * std::numbers::pi / 180, 0, 0), Vec3::Zero());
   const Standing after(knocked);
   Course course(with_calibration(before.still.rig));
   constexpr std::uint64_t kKnock = 40, kEnd = 100;

@@ -126,14 +126,22 @@ TEST(RigSolver, aRightCameraThatIsLateIsOutOfStep) {
   // Standing starts and stops: at one speed a lag is a transform like any other.
   drive.drive_s = 4;
   drive.stop_s = 0.2;
-  drive.lags = {{0, 1.0}};
+  drive.speed = 4;
+  drive.lags = {{0, 0.6}};
   CalibrationOptions o = held();
   o.max_frames = 110;
   SolverInArena s(o);
   FeatureDrive d(drive);
   log_drive(d, 110, kRough, s.solver.log());
   const RigSolution solution = s.solver.solve(rig_of(drive));
-  EXPECT_TRUE(solution.status != RigSolveStatus::ok || solution.out_of_step) << solution.lag_frames;
+  ASSERT_EQ(solution.status, RigSolveStatus::ok);
+  EXPECT_TRUE(solution.out_of_step);
+  EXPECT_NEAR(solution.lag_frames, 0.6, 0.2);
+  drive.lags.clear();
+  SolverInArena in_step(o);
+  FeatureDrive e(drive);
+  log_drive(e, 110, kRough, in_step.solver.log());
+  EXPECT_FALSE(in_step.solver.solve(rig_of(drive)).out_of_step);
 }
 
 TEST(RigSolver, whatHoldsNoTransformSaysSo) {
