@@ -97,7 +97,10 @@ TEST_F(IidcRig, TwoCamerasStreamEveryExposureInStep) {
     EXPECT_EQ(a.wrong, 0U);
     EXPECT_EQ(a.torn, 0U);
     check_account(k, report);
-    EXPECT_LE(s.lost, static_cast<std::uint64_t>(count_of(report, static_cast<int>(k), "overtaken"))) << report;
+    // A machine that keeps up loses nothing but what the emulator could not send.
+    if (s.underruns == 0) {
+      EXPECT_LE(s.lost, static_cast<std::uint64_t>(count_of(report, static_cast<int>(k), "overtaken"))) << report;
+    }
   }
   // Free-running cameras of one rate expose together.
   for (const std::int64_t m : taker_->account(0).middles) {
