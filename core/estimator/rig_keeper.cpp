@@ -19,9 +19,7 @@ constexpr double kImageMargin = 12.0;  // px: nearer to the edge a track need no
 // pair sees of them, and that is what a lens model's misfit looks like too.
 constexpr std::array kGivenAtFirst = {5e-4, 1e-2, 1e-3, 0.015, 0.01, 0.05};
 constexpr std::array kGiven = {5e-4, 2e-3, 1e-3, 0.015, 0.01, 0.03};
-// What a lens model's misfit makes of it from scene to scene.
-constexpr std::array kLearned = {5e-5, 2e-4, 1e-4, 0.002, 0.002, 0.005};
-constexpr double kLearnedCovariance = 4.0;  // times the monitor's own: the scene it was measured in was one
+constexpr double kLearnedCovariance = 1.5;  // times the monitor's own: the scene it was measured in was one
 constexpr int kGraceFrames = 5;             // after a new reference: the monitor does not yet know how far matches spread
 constexpr int kLearnFrames = 45;            // moving, in agreement
 constexpr int kStillFrames = 15;            // sought for so long without a new frame in the log: the rig stands
@@ -124,7 +122,7 @@ void RigKeeper::learn(int k, MonitorVerdict* verdict) noexcept {
   }
   Transform measured = perturbed(rig_.T_camera_left[c], verdict->offset.head<3>(), verdict->offset.tail<3>());
   measured.t *= length / measured.t.norm();
-  watch_against(k, measured, kLearnedCovariance * verdict->covariance + given_covariance(kLearned, length));
+  watch_against(k, measured, kLearnedCovariance * verdict->covariance);
 }
 
 void RigKeeper::scene_lost() noexcept {
