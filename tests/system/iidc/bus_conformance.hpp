@@ -17,7 +17,10 @@ class BusConformance final : public ConformanceRig {
     const bool none = await_cameras(driver_.get(), 0);  // those of the rig before
     emulator_ = std::make_unique<Emulator>(program, std::vector<std::string>{"--cameras", "1", "--trigger-hz", "20"});
     DeviceStatus status = DeviceStatus::not_found;
-    if (none && await_cameras(driver_.get(), 1)) camera_ = driver_->open("", &status);
+    // A node that was listed may be the one before, on its way out after a bus reset: looked for again.
+    const auto until = std::chrono::steady_clock::now() + std::chrono::seconds(15);
+    while (none && camera_ == nullptr && std::chrono::steady_clock::now() < until)
+      if (await_cameras(driver_.get(), 1)) camera_ = driver_->open("", &status);
     if (camera_ == nullptr) throw std::runtime_error("the emulated camera does not open: " + driver_->complaint());
   }
   CameraDevice& camera() override { return *camera_; }

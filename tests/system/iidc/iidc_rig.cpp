@@ -102,6 +102,11 @@ void Taker::drain(Duration quiet) {
 std::unique_ptr<CameraDevice> open_camera(CameraDriver* driver, unsigned camera, const CameraConfiguration& wanted) {
   DeviceStatus status = DeviceStatus::failed;
   auto device = driver->open(emulated_serial(camera), &status);
+  // After a bus reset the node that was listed may be on its way out: looked for again.
+  for (int attempt = 0; device == nullptr && attempt < 50; ++attempt) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(200));
+    device = driver->open(emulated_serial(camera), &status);
+  }
   EXPECT_EQ(status, DeviceStatus::ok) << driver->complaint();
   if (device == nullptr) return device;
   EXPECT_EQ(device->configure(wanted, nullptr), DeviceStatus::ok) << device->complaint();
