@@ -22,6 +22,7 @@ constexpr std::array kGiven = {5e-4, 2e-3, 1e-3, 0.015, 0.01, 0.03};
 constexpr double kLearnedCovariance = 1.5;  // times the monitor's own: the scene it was measured in was one
 constexpr int kGraceFrames = 5;             // after a new reference: the monitor does not yet know how far matches spread
 constexpr int kLearnFrames = 45;            // moving, in agreement
+constexpr int kLeastHeldOut = 10;           // frames after a snapshot, for the gates to have frames that were not in it
 constexpr int kStillFrames = 15;            // sought for so long without a new frame in the log: the rig stands
 constexpr std::size_t kNewFrames = 5;       // at least, between two solves
 constexpr int kMostDoublings = 4;           // of the frames between two solves
@@ -259,7 +260,7 @@ std::optional<CalibrationDecision> RigKeeper::decide(Stamp stamp, std::uint64_t 
   if (!solving_) return std::nullopt;
   ++frames_since_snapshot_;
   if (options_.adoption == Adoption::when_ready) {
-    if (runner_.busy()) return std::nullopt;
+    if (runner_.busy() || frames_since_snapshot_ < std::min(kLeastHeldOut, options_.calibration.adopt_after)) return std::nullopt;
   } else {
     if (frames_since_snapshot_ < options_.calibration.adopt_after) return std::nullopt;
     runner_.wait();
