@@ -122,6 +122,7 @@ struct Estimator::Parts {
   void follow(const odometry::FrameOutcome& out, const RigFrame& frame) noexcept;
   void tell_missing(Stamp stamp) noexcept;
   void grade(const odometry::FrameOutcome& out, PoseSample* sample) const noexcept;
+  [[nodiscard]] Reason why_uncalibrated() const noexcept;
 
   EstimatorOptions options;
   odometry::Odometry odometry;
@@ -137,8 +138,8 @@ struct Estimator::Parts {
   int unmatched_frames = 0;  // in a row
   Reason told_missing = Reason::none;
   std::atomic<bool> requested{false};
-  FixedVector<EstimatorEvent, 16> events;  // a frame raises at most eight
-  FixedVector<CalibrationDecision, 1> decisions;
+  FixedVector<EstimatorEvent, 16> events;         // a frame raises at most eight
+  FixedVector<CalibrationDecision, 2> decisions;  // two in finish() at most
 };
 
 void Estimator::Parts::doubt(CalibrationCause cause, std::uint64_t onset, const RigFrame& frame) noexcept {
@@ -262,12 +263,7 @@ void Estimator::Parts::follow(const odometry::FrameOutcome& out, const RigFrame&
 void Estimator::Parts::grade(const odometry::FrameOutcome& out, PoseSample* sample) const noexcept {
   sample->status = out.posed ? out.status : PoseStatus::lost;
   sample->reason = out.reason;
-  if (!out.posed) {
-    if (state == State::initialising && out.reason == Reason::uncalibrated && keeper.missing() != Reason::none)
-      sample->reason = keeper.missing();
-    return;
-  }
-  const bool only_uncalibrated = out.reason == Reason::uncalibrated;
+  if (!out.posed) return;
   if (sample->status == PoseStatus::ok && out_of_step > 0) {
     sample->status = PoseStatus::degraded;
     sample->reason = Reason::out_of_step;
@@ -277,12 +273,17 @@ void Estimator::Parts::grade(const odometry::FrameOutcome& out, PoseSample* samp
   } else if (sample->status == PoseStatus::ok && !confirmed) {
     sample->status = PoseStatus::degraded;
     sample->reason = Reason::unconfirmed;
-  } else if (only_uncalibrated) {
-    sample->reason = out_of_step > 0                    ? Reason::out_of_step
-                     : keeper.missing() != Reason::none ? keeper.missing()
-                     : state == State::recalibrating    ? Reason::recalibrating
-                                                        : Reason::uncalibrated;
+  } else if (out.reason == Reason::uncalibrated) {
+    sample->reason = why_uncalibrated();
   }
+}
+
+/// What a pose of cameras that are not linked says of its calibration: the most particular that is known.
+Reason Estimator::Parts::why_uncalibrated() const noexcept {
+  if (keeper.last_gate() == calibration::Gate::cameras_swapped) return Reason::cameras_swapped;
+  if (out_of_step > 0) return Reason::out_of_step;
+  if (keeper.missing() != Reason::none) return keeper.missing();
+  return state == State::parallel_monocular || state == State::calibrating ? Reason::uncalibrated : Reason::recalibrating;
 }
 
 std::size_t Estimator::memory_needed(const EstimatorOptions& options, const RigCalibration& rig) {
@@ -351,10 +352,12 @@ void Estimator::finish() noexcept {
   p.events.clear();
   p.decisions.clear();
   // One solve may be under way; what it lacked, the frames since then may give.
-  for (int attempt = 0; attempt < 2 && p.decisions.empty() && p.keeper.seeking(); ++attempt) {
-    if (!p.keeper.solving() && !p.keeper.start_last_solve()) return;
+  for (int attempt = 0; attempt < 2 && p.keeper.seeking(); ++attempt) {
+    if (!p.keeper.solving()) {
+      if (!p.keeper.start_last_solve()) return;
+      p.transition(Trigger::frames_enough, p.last);
+    }
     if (const auto decision = p.keeper.decide_now(p.last, p.last_number)) p.take(*decision, p.last);
-    if (!p.decisions.empty() && !p.decisions.back().accepted && attempt == 0) p.decisions.clear();
   }
 }
 

@@ -46,7 +46,7 @@ struct EstimatorEvent {
     time_gap,
     relocalised,
     dropped,
-    rig_changed,            // the monitor raised; value: frames since the onset
+    rig_changed,            // the monitor raised; value: frames since the onset, or the lag in frames of cameras out of step
     calibration_confirmed,  // a state file's calibration agrees; value: frames
     calibration_accepted,   // value: frames it was solved from
     calibration_rejected,   // why: the reason; value: frames

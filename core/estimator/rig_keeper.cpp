@@ -96,7 +96,6 @@ void RigKeeper::use(const RigCalibration& rig) noexcept {
   }
   any_ = false;
   seeking_ = false;
-  missing_ = Reason::none;
   log_.clear();
 }
 
@@ -235,10 +234,16 @@ void RigKeeper::seek(CalibrationCause cause, std::uint64_t onset, std::uint64_t 
   frames_still_ = 0;
   rejections_ = 0;
   gate_ = Gate::open;
-  missing_ = Reason::none;
+  stale_ = solving_;
   log_.drop_before(onset);
   logged_ = log_.size();
   wanted_ = static_cast<std::size_t>(options_.calibration.min_frames);
+}
+
+Reason RigKeeper::missing() const noexcept {
+  if (!seeking_) return Reason::none;
+  if (frames_still_ > kStillFrames || gate_ == Gate::needs_motion) return Reason::needs_motion;
+  return gate_ == Gate::needs_near_structure ? Reason::needs_near_structure : Reason::none;
 }
 
 bool RigKeeper::can_solve() const noexcept {
@@ -248,15 +253,12 @@ bool RigKeeper::can_solve() const noexcept {
 void RigKeeper::start_solve() noexcept {
   rig_solver_.log().copy(log_, log_.size());
   solving_ = true;
+  stale_ = false;
   frames_since_snapshot_ = 0;
   runner_.start(TaskRef(task_));
 }
 
 std::optional<CalibrationDecision> RigKeeper::decide(Stamp stamp, std::uint64_t number) noexcept {
-  if (seeking_ && frames_still_ > kStillFrames)
-    missing_ = Reason::needs_motion;
-  else if (missing_ == Reason::needs_motion)
-    missing_ = Reason::none;
   if (!solving_) return std::nullopt;
   ++frames_since_snapshot_;
   if (options_.adoption == Adoption::when_ready) {
@@ -266,7 +268,7 @@ std::optional<CalibrationDecision> RigKeeper::decide(Stamp stamp, std::uint64_t 
     runner_.wait();
   }
   solving_ = false;
-  if (!seeking_) return std::nullopt;  // what this was for is no longer sought
+  if (stale_) return std::nullopt;
   return judge(stamp, number, false);
 }
 
@@ -274,6 +276,7 @@ std::optional<CalibrationDecision> RigKeeper::decide_now(Stamp stamp, std::uint6
   if (!solving_) return std::nullopt;
   runner_.wait();
   solving_ = false;
+  if (stale_) return std::nullopt;
   return judge(stamp, number, true);
 }
 
@@ -315,8 +318,6 @@ CalibrationDecision RigKeeper::judge(Stamp stamp, std::uint64_t number, bool las
     wanted_ = logged_ - log_.size() + (static_cast<std::size_t>(options_.calibration.min_frames) << std::min(rejections_, kMostDoublings));
     ++rejections_;
   }
-  if (gate_ == Gate::needs_motion) missing_ = Reason::needs_motion;
-  if (gate_ == Gate::needs_near_structure) missing_ = Reason::needs_near_structure;
   return d;
 }
 

@@ -29,7 +29,8 @@ class RigKeeper {
   [[nodiscard]] calibration::MonitorVerdict watch(const odometry::Odometry& odometry, const odometry::FrameOutcome& outcome,
                                                   const RigFrame& frame) noexcept;
 
-  /// From now on a calibration is sought. Frames before `onset` belong to another rig and are forgotten.
+  /// From now on a calibration is sought. Frames before `onset` belong to another rig and are forgotten, and so is a solve of them that is
+  /// still under way.
   void seek(CalibrationCause cause, std::uint64_t onset, std::uint64_t now) noexcept;
   [[nodiscard]] bool seeking() const noexcept { return seeking_; }
   /// There are frames enough to solve from and no solve is under way.
@@ -45,8 +46,8 @@ class RigKeeper {
   [[nodiscard]] bool start_last_solve() noexcept;
   [[nodiscard]] calibration::Gate last_gate() const noexcept { return gate_; }
 
-  /// What is missing to calibrate: needs_motion, needs_near_structure, needs_texture; `none` if nothing is known to be.
-  [[nodiscard]] Reason missing() const noexcept { return missing_; }
+  /// What the calibration sought waits for: needs_motion, needs_near_structure; `none` if nothing is known to be missing.
+  [[nodiscard]] Reason missing() const noexcept;
 
   /// Waits for the solver's task, which writes into this.
   void finish() noexcept {
@@ -93,6 +94,7 @@ class RigKeeper {
 
   CalibrationCause cause_ = CalibrationCause::from_scratch;
   bool seeking_ = false, solving_ = false;
+  bool stale_ = false;                          // the solve under way is of frames that no longer count
   std::uint64_t sought_since_ = 0, onset_ = 0;  // frame numbers
   std::size_t logged_ = 0, wanted_ = 0;         // frames logged for what is sought; and how many the next solve needs
   int rejections_ = 0;                          // for other reasons than a want of frames
@@ -100,7 +102,6 @@ class RigKeeper {
   int frames_still_ = 0;  // since one was logged
   calibration::RigSolution solution_;
   calibration::Gate gate_ = calibration::Gate::open;
-  Reason missing_ = Reason::none;
 };
 
 }  // namespace vergence

@@ -132,7 +132,7 @@ PoseFit Odometry::track(const Transform& predicted, std::uint8_t structured, Fra
     doubtful = true;
   }
   const Transform coarse = fit.T_left_world;
-  if (link_ == Link::unlinked && recover_cameras(fit)) out->relocalised = false;
+  if (link_ == Link::unlinked) recover_cameras(fit);
   front_end_.follow_all(map_, coarse);
   clock.mark(Stage::track);
   fit = this->fit(coarse, false);
@@ -143,17 +143,14 @@ PoseFit Odometry::track(const Transform& predicted, std::uint8_t structured, Fra
   return fit;
 }
 
-bool Odometry::recover_cameras(const PoseFit& fit) noexcept {
-  bool any = false;
+void Odometry::recover_cameras(const PoseFit& fit) noexcept {
   for (int k = 1; k < rig_.cameras; ++k) {
     if (((fit.cameras >> static_cast<unsigned>(k)) & 1U) != 0 || front_end_.find_again(map_, k) < kRelocaliseInliers) continue;
     Transform& T_camera_left = rig_.T_camera_left[static_cast<std::size_t>(k)];
     Transform T_camera_world;
     if (!poses_.fit_camera(map_, k, T_camera_left * fit.T_left_world, true, &T_camera_world)) continue;
     T_camera_left = T_camera_world * fit.T_left_world.inverse();
-    any = true;
   }
-  return any;
 }
 
 int Odometry::points_in_view(const Transform& T_left_world) const noexcept {
@@ -392,7 +389,7 @@ void Odometry::begin_scene(const RigFrame& frame, const ImageCheck& images, cons
     PoseFit of_two;
     of_two.T_left_world = predicted;
     of_two.cameras = 0b11;
-    if (initialise && rig_.cameras > 2) (void)recover_cameras(of_two);
+    if (initialise && rig_.cameras > 2) recover_cameras(of_two);
     rig_known_ = true;
     out->status = PoseStatus::degraded;
     out->reason = Reason::uncalibrated;

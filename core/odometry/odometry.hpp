@@ -69,8 +69,8 @@ class Odometry {
   [[nodiscard]] PoseFit track(const Transform& predicted, std::uint8_t structured, FrameOutcome* out) noexcept;
   [[nodiscard]] int points_in_view(const Transform& T_left_world) const noexcept;
   [[nodiscard]] PoseFit relocalise(FrameOutcome* out) noexcept;
-  /// Cameras whose own pose was not found are sought by what the points look like. True: one was found.
-  [[nodiscard]] bool recover_cameras(const PoseFit& fit) noexcept;
+  /// Cameras whose own pose was not found are sought by what the points look like.
+  void recover_cameras(const PoseFit& fit) noexcept;
   void settle_points(const PoseFit& fit) noexcept;
   [[nodiscard]] bool wants_keyframe() const noexcept;
   void make_keyframe(const PoseFit& fit, Stamp stamp, FrameOutcome* out) noexcept;
