@@ -26,7 +26,13 @@ class SoftwareTrigger final : public TriggerDevice {
   DeviceStatus start(Notifier* ready) noexcept override;
   DeviceStatus wait(Duration limit, Pulse* pulse) noexcept override;
   void stop() noexcept override;
-  TriggerStatistics statistics() const noexcept override { return {pulses_.load(), 0, overruns_.load(), starts_.load()}; }
+  TriggerStatistics statistics() const noexcept override {
+    TriggerStatistics s;
+    s.pulses = pulses_.load();
+    s.overruns = overruns_.load();
+    s.starts = starts_.load();
+    return s;
+  }
 
  private:
   void pace();

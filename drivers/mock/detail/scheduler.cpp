@@ -94,7 +94,8 @@ void Scheduler::make_pulse(std::uint64_t pulse) {
   Parcel p;
   p.device = kTriggerDevice;
   p.arrival = jittered(host_of(pulse) + kReportLatency, 20, pulse);
-  p.pulse.value = {pulse, trigger_->clock().read(host_of(pulse), host_of(pulse) - start_, rig_.truth->faults()), {}};
+  p.pulse.value.number = pulse;
+  p.pulse.value.edge = trigger_->clock().read(host_of(pulse), host_of(pulse) - start_, rig_.truth->faults());
   post(p);
 }
 

@@ -1,6 +1,7 @@
 // From nothing but the baseline's length, on the paper's rig. One program: the cases share what is rendered.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 
@@ -149,6 +150,9 @@ TEST(FromScratch, exchangedCamerasAreNeverAdoptedAndItSaysWhy) {
   EXPECT_EQ(course.count_accepted(), 0) << course.story();
   EXPECT_TRUE(course.rejected_for(calibration::reason(calibration::Gate::cameras_swapped))) << course.story();
   EXPECT_EQ(count_ok(course.answers(), 0, street().size()), 0) << course.story();
+  EXPECT_TRUE(std::any_of(course.answers().begin(), course.answers().end(), [](const Answer& a) {
+    return a.sample.reason == Reason::cameras_swapped;
+  })) << course.story();
   EXPECT_FALSE(course.estimator().calibrated());
 }
 
