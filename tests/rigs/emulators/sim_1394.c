@@ -4,7 +4,8 @@
  *
  * Commands on standard input, one a line:
  *   plug N        N cameras on the bus from now on (0 to 3): a bus reset
- *   trigger       one external trigger pulse to all cameras
+ *   trigger [NS]  one external trigger pulse to all cameras, now or at that time of CLOCK_MONOTONIC, a moment ago
+ *   miss C N      the next N pulses do not reach camera C
  *   drop C N      the next N frames of camera C are exposed but lost on the wire
  *   tear C N      the next N frames of camera C lose one packet each, in the middle
  *   mute C 0|1    camera C stops sending / goes on
@@ -35,7 +36,7 @@ struct node {
   size_t bytes, sent;
   uint64_t next_cycle; /* of its next packet */
   struct iidc_sensor sensor;
-  unsigned drop, tear;
+  unsigned drop, tear, miss;
   bool muted, tearing;
   uint64_t exposed, transmitted, overtaken, dropped, torn;
 };
@@ -187,13 +188,18 @@ static size_t advance(struct node* n, uint64_t ns, uint64_t edge, uint8_t* batch
 
 static void command(const char* line, uint64_t* edge) {
   unsigned a = 0, b = 0;
+  unsigned long long at = 0;
   if (sscanf(line, "plug %u", &a) == 1 && a <= VB_MAX_NODES) {
     node_count = a;
     announce();
+  } else if (sscanf(line, "trigger %llu", &at) == 1) {
+    *edge = at;
   } else if (!strncmp(line, "trigger", 7)) {
     *edge = now_ns();
   } else if (sscanf(line, "drop %u %u", &a, &b) == 2 && a < VB_MAX_NODES) {
     nodes[a].drop = b;
+  } else if (sscanf(line, "miss %u %u", &a, &b) == 2 && a < VB_MAX_NODES) {
+    nodes[a].miss = b;
   } else if (sscanf(line, "tear %u %u", &a, &b) == 2 && a < VB_MAX_NODES) {
     nodes[a].tear = b;
   } else if (sscanf(line, "mute %u %u", &a, &b) == 2 && a < VB_MAX_NODES) {
@@ -287,7 +293,11 @@ int main(int argc, char** argv) {
       last_pulse = pulse;
     }
     size_t used = 0;
-    for (unsigned i = 0; i < node_count; i++) used += advance(&nodes[i], ns, edge, batch + used, MAX_BATCH - used);
+    for (unsigned i = 0; i < node_count; i++) {
+      bool missed = edge && nodes[i].miss;
+      nodes[i].miss -= missed;
+      used += advance(&nodes[i], ns, missed ? 0 : edge, batch + used, MAX_BATCH - used);
+    }
     send_records(batch, used);
     if (seconds > 0 && (double)(ns - start) > seconds * 1e9) break;
   }

@@ -29,7 +29,7 @@ struct unit {
   uint8_t* image;
   size_t bytes, sent;
   struct iidc_sensor sensor;
-  unsigned drop, tear;
+  unsigned drop, tear, miss;
   bool muted, gone, was_transmitting, tearing;
   uint64_t exposed, delivered, overtaken, dropped, torn;
 };
@@ -117,10 +117,15 @@ static void deliver(struct unit* u) {
 
 static void command(const char* line, uint64_t* edge) {
   unsigned a = 0, b = 0;
-  if (!strncmp(line, "trigger", 7)) {
+  unsigned long long at = 0;
+  if (sscanf(line, "trigger %llu", &at) == 1) {
+    *edge = at;
+  } else if (!strncmp(line, "trigger", 7)) {
     *edge = now_ns();
   } else if (sscanf(line, "drop %u %u", &a, &b) == 2 && a < count) {
     units[a].drop = b;
+  } else if (sscanf(line, "miss %u %u", &a, &b) == 2 && a < count) {
+    units[a].miss = b;
   } else if (sscanf(line, "tear %u %u", &a, &b) == 2 && a < count) {
     units[a].tear = b;
   } else if (sscanf(line, "mute %u %u", &a, &b) == 2 && a < count) {
@@ -226,7 +231,9 @@ int main(int argc, char** argv) {
     for (unsigned i = 0; i < count; i++) {
       if (units[i].gone) continue;
       usb_service(&units[i].usb);
-      expose(&units[i], ns, edge);
+      bool missed = edge && units[i].miss;
+      units[i].miss -= missed;
+      expose(&units[i], ns, missed ? 0 : edge);
       deliver(&units[i]);
     }
     if (seconds > 0 && (double)(ns - start) > seconds * 1e9) break;

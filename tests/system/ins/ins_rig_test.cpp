@@ -47,7 +47,7 @@ class InsRig : public ::testing::Test {
  protected:
   InsRig() : converter_("sim_ftdi", {"--wire", kWire}) {
     EXPECT_TRUE(within(10, [] { return std::filesystem::exists(kPort); }));
-    sensor_ = std::make_unique<test::XsensOnDescriptor>(::open(kWire, O_RDWR | O_NOCTTY | O_NONBLOCK), mock::XsensSimulatorOptions{});
+    sensor_ = std::make_unique<test::DeviceOnDescriptor>(::open(kWire, O_RDWR | O_NOCTTY | O_NONBLOCK), test::resting_xsens());
   }
   std::unique_ptr<InsDevice> open(std::uint32_t baud) {
     xsens::Options o;
@@ -64,7 +64,7 @@ class InsRig : public ::testing::Test {
   }
 
   test::Emulator converter_;
-  std::unique_ptr<test::XsensOnDescriptor> sensor_;
+  std::unique_ptr<test::DeviceOnDescriptor> sensor_;
 };
 
 TEST_F(InsRig, streamsThroughTheRealDriverWithEitherLatencyTimer) {

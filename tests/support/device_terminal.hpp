@@ -1,0 +1,68 @@
+#pragma once
+#include <fcntl.h>
+#include <poll.h>
+#include <stdlib.h>
+#include <time.h>
+#include <unistd.h>
+
+#include <array>
+#include <atomic>
+#include <memory>
+#include <span>
+#include <stdexcept>
+#include <string>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include "drivers/mock/simulators/device_model.hpp"
+
+namespace vergence::test {
+
+[[nodiscard]] inline HostStamp monotonic_now() {
+  timespec t{};
+  (void)::clock_gettime(CLOCK_MONOTONIC, &t);
+  return HostStamp(t.tv_sec * 1'000'000'000 + t.tv_nsec);
+}
+
+/// A simulated device in real time on a descriptor: the far end of a serial line.
+///
+/// Ownership  Takes the descriptor and the device. Threads: one of its own, on which alone the device is used, from construction to
+/// destruction.
+class DeviceOnDescriptor {
+ public:
+  DeviceOnDescriptor(int descriptor, std::unique_ptr<mock::DeviceModel> device) : descriptor_(descriptor), device_(std::move(device)) {
+    if (descriptor_ < 0) throw std::runtime_error("no terminal for the simulated device");
+    thread_ = std::thread([this] { work(); });
+  }
+  DeviceOnDescriptor(const DeviceOnDescriptor&) = delete;
+  DeviceOnDescriptor& operator=(const DeviceOnDescriptor&) = delete;
+  ~DeviceOnDescriptor() {
+    stop_ = true;
+    thread_.join();
+    ::close(descriptor_);
+  }
+
+ private:
+  void work() {
+    while (!stop_) {
+      std::vector<std::uint8_t> out;
+      for (auto next = device_->next(); next && *next <= monotonic_now(); next = device_->next()) device_->produce(monotonic_now(), &out);
+      if (!out.empty()) (void)!::write(descriptor_, out.data(), out.size());  // a line that nobody reads drops bytes
+      pollfd p{descriptor_, POLLIN, 0};
+      if (::poll(&p, 1, 1) <= 0) continue;
+      std::array<std::uint8_t, 512> in{};
+      const ssize_t n = ::read(descriptor_, in.data(), in.size());
+      if (n > 0)
+        device_->receive(std::span(in).first(static_cast<std::size_t>(n)), monotonic_now());
+      else
+        ::usleep(1000);  // nobody has the other end open: poll() does not wait
+    }
+  }
+  int descriptor_;
+  std::unique_ptr<mock::DeviceModel> device_;
+  std::atomic<bool> stop_{false};
+  std::thread thread_;
+};
+
+}  // namespace vergence::test
