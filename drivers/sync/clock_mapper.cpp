@@ -56,6 +56,16 @@ MappedStamp ClockMapper::map(DeviceStamp device, HostStamp arrival) noexcept {
   return {host_origin_ + rounded(at * (1 + slope_) + intercept_), error_at(at)};
 }
 
+void ClockMapper::ping(HostStamp t1, DeviceStamp t2, DeviceStamp t3, HostStamp t4) noexcept {
+  if (t4 < t1 || t3 < t2) return;
+  (void)map(t3, t4 + options_.least_delay);
+}
+
+MappedStamp ClockMapper::at(DeviceStamp device) const noexcept {
+  const double at = static_cast<double>((device - origin_).ns());
+  return {host_origin_ + rounded(at * (1 + slope_) + intercept_), error_at(at)};
+}
+
 void ClockMapper::take(const Point& p) noexcept {
   const auto bin = static_cast<std::int64_t>(std::floor(p.device / static_cast<double>(kBin.ns())));
   if (bin <= newest_bin_) {

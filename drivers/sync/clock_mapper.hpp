@@ -37,6 +37,14 @@ class ClockMapper {
   /// Takes a pair into the fit and says when the device measured. Pairs in the order of the device's stamps.
   [[nodiscard]] MappedStamp map(DeviceStamp device, HostStamp arrival) noexcept;
 
+  /// Takes a question and its answer into the fit: the host sent at t1, the device received at t2 and answered at t3, the host received
+  /// at t4. Bounds the offset from both sides; from the first one on map() takes nothing in any more, it only says what the fit does.
+  /// Of pings whose t4 < t1 or t3 < t2 nothing is believed.
+  void ping(HostStamp t1, DeviceStamp t2, DeviceStamp t3, HostStamp t4) noexcept;
+  /// The host's time of any stamp, without taking anything in. Precondition: known().
+  [[nodiscard]] MappedStamp at(DeviceStamp device) const noexcept;
+  [[nodiscard]] bool known() const noexcept { return count_ > 0; }
+
   /// Rate of the host's clock over the device's, minus 1; 0 before the second bin.
   [[nodiscard]] double drift() const noexcept { return slope_; }
   /// Times that the device's clock was found to have been set.

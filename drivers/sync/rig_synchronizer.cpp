@@ -6,27 +6,6 @@
 
 namespace vergence {
 
-const char* SyncOptions::validate() const noexcept {
-  if (cameras < 1 || cameras > kMaxCameras) return "a rig has one to four cameras";
-  if (interval <= Duration{}) return "the interval between two pulses must be positive";
-  if (hold <= Duration{}) return "the time a set waits for its images must be positive";
-  if (mode == SyncMode::software && (tolerance <= Duration{} || tolerance * 2 > interval))
-    return "the tolerance must be positive and at most half of the interval between two exposures";
-  return nullptr;
-}
-
-const char* to_string(SyncProof proof) noexcept {
-  switch (proof) {
-    case SyncProof::counted:
-      return "counted";
-    case SyncProof::unproven:
-      return "unproven";
-    case SyncProof::by_time:
-      return "by_time";
-  }
-  return "";
-}
-
 RigSynchronizer::RigSynchronizer(const SyncOptions& options) noexcept : options_(options) {
   assert(options.validate() == nullptr);
   for (Source& s : sources_) s.align = options.align_start;
@@ -214,6 +193,12 @@ void RigSynchronizer::lost(int camera, std::uint64_t counter) noexcept {
   source.newest = source.any ? std::max(source.newest, next) : next;
   source.any = true;
 }
+
+void RigSynchronizer::pulse(const Pulse&) noexcept {}
+
+std::uint32_t RigSynchronizer::wants_pause() noexcept { return 0; }
+
+bool RigSynchronizer::proven(int) const noexcept { return !proves_numbers(options_.mode); }
 
 void RigSynchronizer::absent(int camera) noexcept { sources_[static_cast<std::size_t>(camera)].here = false; }
 

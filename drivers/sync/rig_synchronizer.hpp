@@ -3,88 +3,24 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "core/memory/frame_pool.hpp"
-#include "core/types/calibration.hpp"
-#include "core/types/rig_frame.hpp"
-#include "drivers/sync/clock_mapper.hpp"
+#include "drivers/sync/sync_types.hpp"
+#include "drivers/trigger.hpp"
 
 namespace vergence {
 
-/// By what images are paired.
-enum class SyncMode : std::uint8_t {
-  counter,   // exposure n of every camera belongs to pulse n
-  software,  // what was exposed within `tolerance` belongs together: nothing makes the cameras expose at once
-};
-
-struct SyncOptions {
-  int cameras = 2;                              // 1 … kMaxCameras
-  Duration interval{};                          // between two pulses, > 0
-  Duration hold = Duration::milliseconds(100);  // an incomplete set waits so long, by the arrivals of others, for its missing images
-  SyncMode mode = SyncMode::counter;
-  Duration tolerance = Duration::milliseconds(2);  // software: between the middles of a set's exposures
-  /// counter: the pulses may have begun before the cameras, so each camera's first exposure is given its pulse by its stamp; and again
-  /// after kUnproven unproven sets in a row.
-  bool align_start = false;
-  /// Nothing wrong: nullptr; else a sentence.
-  [[nodiscard]] const char* validate() const noexcept;
-};
-
-/// One camera's frame on its way into a set.
-struct SyncFrame {
-  int camera = 0;
-  FrameSlot slot = 0;
-  std::uint64_t counter = 0;  // of Frame
-  MappedStamp middle{};       // of the exposure, host time
-  HostStamp arrival{};
-};
-
-/// How sure it is that a set's images were exposed together.
-enum class SyncProof : std::uint8_t {
-  counted,   // paired by counter, and the stamps agree within half an interval (also: one image only)
-  unproven,  // paired by counter, and the stamps do not agree: a pulse was missed, or a clock is wrong
-  by_time,   // paired by stamp
-};
-[[nodiscard]] const char* to_string(SyncProof) noexcept;
-
-/// The images of one pulse.
+/// Pairs the frames of a rig: by the pulses that made them, by their counters, or by their stamps (SyncMode).
 ///
-/// stamp   Camera 0's mid-exposure; without camera 0 the first one's that is there. `spread`: the largest distance of another's to it.
-struct SyncedSet {
-  std::uint64_t number = 0;  // of the pulse
-  HostStamp stamp{};
-  Duration error{};
-  Duration spread{};
-  HostStamp arrival{};  // of the last image
-  std::array<bool, kMaxCameras> present{};
-  std::array<FrameSlot, kMaxCameras> slots{};
-  bool complete = false;
-  SyncProof proof = SyncProof::counted;
-};
-
-enum class SyncVerdict : std::uint8_t {
-  taken,      // the slot comes out with its set
-  duplicate,  // that camera has given this pulse already; the slot stays the caller's
-  late,       // its set has gone out without it; the slot stays the caller's
-};
-
-/// Counters; all only grow.
-struct SyncCounters {
-  std::uint64_t complete = 0, incomplete = 0;       // sets that went out
-  std::uint64_t missed = 0;                         // pulses no camera gave an image of
-  std::array<std::uint64_t, kMaxCameras> lost{};    // sets without that camera while it was there
-  std::array<std::uint64_t, kMaxCameras> absent{};  // sets without that camera while it was gone
-  std::array<std::uint64_t, kMaxCameras> duplicate{};
-  std::array<std::uint64_t, kMaxCameras> late{};
-  std::uint64_t pushed_out = 0;  // of the incomplete: before their time, because more pulses were open than kOpen
-  std::uint64_t unproven = 0;    // sets whose stamps do not agree
-  std::uint64_t realigned = 0;   // times that all cameras' pulses were found by their stamps again
-};
-
-/// Pairs the frames of a rig: by their counters, or by their stamps.
+/// A set goes out as soon as every camera that is there has given its image, or has given a later one (its image is lost), and its
+/// pulse's report is here where there are pulses; or `hold` after the set's first image, by the arrivals of others. Sets go out in order
+/// of their numbers, each once. Determined by what is offered and in which order; no clock is read.
 ///
-/// A set goes out as soon as every camera that is there has given its image, or has given a later one (its image is lost), or an
-/// image of any camera has arrived `hold` after the set's first one. Sets go out in order of their numbers, each once.
-/// Determined by what is offered and in which order; no clock is read.
+/// Pulses     A camera is `acquiring` until its own intervals fit the pulses' at exactly one place; arrival never decides. Its frames are
+///            given back and counted meanwhile, those of the others go out without them. From then on every frame's pulse follows from its
+///            stamp (the camera's clock tied to the board's), and its counter must agree: more pulses than counts are missed triggers,
+///            counts without images are lost frames, anything else is a contradiction and it acquires again. A pulse that runs
+///            back in number or has another `boot` makes all acquire again. A frame that comes before its pulse's report is given the
+///            pulse's number all the same; the report then confirms it, or the set is `unproven`.
+/// A limit    A camera that hands out the image of one exposure under the stamp of the next cannot be told here.
 /// Ownership  A slot that is `taken` comes out of next() in exactly one set; then it is the caller's again.
 /// Threads    One caller. Memory: fixed, kOpen pulses. Time: constant a call.
 /// Errors     Nothing throws. What cannot be paired is told by the verdict and counted.
@@ -101,6 +37,15 @@ class RigSynchronizer {
   [[nodiscard]] SyncVerdict offer(const SyncFrame& frame) noexcept;
   /// The next set that is ready. Call until false.
   [[nodiscard]] bool next(SyncedSet* set) noexcept;
+
+  /// A pulse's report, in the order of arrival; in the modes board and ins_syncout (elsewhere it does nothing). next() as after offer().
+  /// Precondition: pulse.mapped.
+  void pulse(const Pulse& pulse) noexcept;
+  /// So many pulses should be left out, because the intervals prove nothing; mostly 0. Asked for once, and again when it did not help:
+  /// board: TriggerDevice::pause(); ins_syncout, master_strobe: stop the source and start it again.
+  [[nodiscard]] std::uint32_t wants_pause() noexcept;
+  /// Nothing is left to be proven of that camera's frames: always, where nothing can be.
+  [[nodiscard]] bool proven(int camera) const noexcept;
 
   /// That exposure of a camera gave no image that could be used: nobody waits for it. Else as offer(); only where counters pair.
   void lost(int camera, std::uint64_t counter) noexcept;
