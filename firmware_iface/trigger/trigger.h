@@ -9,7 +9,9 @@
  * Answers    The board answers every host message with the same sequence: HELLO by INFO, PING by PONG, the others by STATUS once they
  *            are in effect, or by ERROR. What it sends unasked (EVENT, PPS, INS, STATUS every second) counts its own sequence.
  * Boot       boot_id differs at every start of the board. Pulse numbers and ticks mean nothing across two boot_ids.
- * Ticks      64-bit microseconds of the board's clock since its start, taken by hardware at the edge.
+ * Ticks      64-bit microseconds of the board's clock since its start, taken by hardware at the edge. With PPS they are seconds of PPS
+ *            divided by a million; they never step, and after the first HELLO their rate moves by at most 1 ppm a second (or by a
+ *            sixteenth of what is missing, if that is more).
  * Memory     The caller's; no heap, no state but in TriggerDecoder. Threads: whatever the caller does with its own objects.
  * Errors     Closed enums; a call that is not ok has changed no output.
  */
@@ -65,11 +67,12 @@ typedef enum {
   trigger_error_unknown_type = 1,
   trigger_error_wrong_size = 2, /* a payload of another size than its type has */
   trigger_error_version = 3,
-  trigger_error_not_stopped = 4, /* CONFIG while pulses run */
+  trigger_error_not_stopped = 4, /* CONFIG while pulses run; START or STOP before the last STOP was answered */
   trigger_error_not_configured = 5,
-  trigger_error_rate = 6,  /* the timer cannot make this rate */
-  trigger_error_pulse = 7, /* pulse width 0 or not below the period */
-  trigger_error_line = 8   /* a line or input that the board does not have */
+  trigger_error_rate = 6,       /* the timer cannot make this rate */
+  trigger_error_pulse = 7,      /* pulse width 0 or not below the period */
+  trigger_error_line = 8,       /* a line or input that the board does not have, or no line at all */
+  trigger_error_not_running = 9 /* PAUSE while stopped */
 } TriggerErrorCode;
 
 /* INFO, 28 bytes: 0 version, 1..3 firmware, 4 boot_id, 8 tick_hz, 12 lines, 13 feedback_inputs, 14 has_pps, 15 has_ins, 16 serial */
@@ -92,13 +95,14 @@ typedef struct {
   uint32_t vary_us; /* 0: even intervals; else every interval is longer or shorter by this: trigger_interval_is_longer() */
   uint8_t lines;
   uint8_t active_low;
-  uint8_t feedback_inputs; /* exposure-active outputs of the cameras */
+  uint8_t feedback_inputs; /* exposure-active outputs of the cameras: input k is that of line k's camera */
   uint8_t feedback_active_low;
   uint8_t pps_edge; /* TriggerEdgeKind */
   uint8_t ins_edge;
 } TriggerConfig;
 
-/* PAUSE, 4 bytes: 0 pulses. So many pulses are left out, then they go on by themselves; their numbers are left out too. */
+/* PAUSE, 4 bytes: 0 pulses. So many pulses are left out after the one that the timer already holds, then they go on by themselves; their
+ * numbers are left out too. In a pause: so many from now on; 0 ends it. */
 typedef struct {
   uint32_t pulses;
 } TriggerPause;
@@ -123,13 +127,13 @@ typedef struct {
 #define TRIGGER_NOT_SEEN INT32_MIN
 
 /* EVENT, 50 bytes: 0 boot_id, 4 pulse, 8 tick, 16 lines, 17 flags, 18 + 8 k start_us and end_us of line k. Sent when the exposures are
- * over, at the latest just before the next pulse. */
+ * over, at the latest at the next pulse or, where none comes, an interval after its own. */
 typedef struct {
   uint32_t boot_id;
   uint32_t pulse; /* from 0 at every boot, one more a pulse, also for those a PAUSE left out */
   uint64_t tick;  /* of the pulse's active edge */
   uint8_t lines;  /* mask of the lines that were pulsed */
-  uint8_t flags;  /* bit 0: first after START or a pause; bit 1: the timer was late */
+  uint8_t flags;  /* bit 0: first after START or a pause; bit 1: the board was late, the edge is off the grid or numbers were left out */
   TriggerExposure exposure[trigger_max_lines];
 } TriggerEvent;
 
