@@ -316,8 +316,8 @@ static inline bool trigger_get_event(const uint8_t* p, size_t size, TriggerEvent
   m->lines = p[16];
   m->flags = p[17];
   for (int k = 0; k < trigger_max_lines; ++k) {
-    m->exposure[k].start_us = trigger_get_i32(p + 18 + 8 * k);
-    m->exposure[k].end_us = trigger_get_i32(p + 22 + 8 * k);
+    m->exposure[k].start_us = trigger_get_i32(p + 18U + 8U * (size_t)k);
+    m->exposure[k].end_us = trigger_get_i32(p + 22U + 8U * (size_t)k);
   }
   return true;
 }

@@ -2,7 +2,7 @@
 
 enum {
   slots_a_poll = 64,     /* left out at most in one call: a long pause is walked through in several */
-  start_lead_ms = 1,     /* from START to the first edge */
+  start_lead_us = 1000,  /* from START to the first edge */
   arm_ahead_divisor = 4, /* armed at most a quarter of a second ahead: half a turn of a 32-bit counter at 1 GHz is two */
   flag_first = 1,
   flag_late = 2
@@ -178,7 +178,7 @@ static void on_start(TriggerBoard* board, const TriggerFrame* frame, uint64_t no
     board->state = trigger_running;
     board->left_out = 0;
     board->first_pulse = true;
-    schedule_begin(&board->schedule, now + counts_of_us(board, start_lead_ms * 1000U));
+    schedule_begin(&board->schedule, now + counts_of_us(board, start_lead_us));
   }
   answer_status(board, now, frame->sequence);
 }
@@ -342,7 +342,7 @@ void board_poll(TriggerBoard* board, uint64_t now) {
 bool board_take_pulse(TriggerBoard* board, uint64_t now, BoardPulse* pulse) {
   const PulseSchedule* schedule = &board->schedule;
   const uint64_t earliest = now + counts_of_us(board, board_lead_us);
-  if (board->state != trigger_running || board->armed) return false;
+  if (board->state != trigger_running || board->armed || slot_is_over(board, now)) return false;
   if (schedule->due > now + board->description.counts_hz / arm_ahead_divisor) return false;
   const bool late = schedule->due < earliest;
   board->armed = true;

@@ -9,10 +9,11 @@ enum {
   pps_agree_us = 100,               /* receivers are right to 0.1 us, interrupts of a port without capture to some 10 us */
   pps_to_acquire = 4,
   pps_refused_limit = 3,
-  pps_lost_s = 4,
-  phase_limit_us = 1000 /* farther off after PPS was gone: a new phase instead of minutes of steering */
+  pps_lost_s = 4
 };
 
+/* 1 ms, 2^-8 us. Farther off after PPS was gone: a new phase instead of minutes of steering. */
+static const int64_t kPhaseLimit = 256000;
 static const uint64_t kFractionMask = (UINT64_C(1) << rate_bits) - 1U;
 
 /* counts * rate, split at the point. */
@@ -29,7 +30,7 @@ static uint64_t scaled(uint64_t counts, uint64_t rate, uint64_t* fraction) {
 }
 
 /* Rate at which `counts` are so many seconds (at most 16). */
-static uint64_t rate_of(uint64_t seconds, uint64_t counts) { return ((seconds * second_us) << rate_bits) / counts; }
+static uint64_t rate_of(uint64_t seconds, uint64_t counts) { return (((seconds * second_us) << rate_bits) + counts / 2U) / counts; }
 
 static TickSegment segment_at(const TickDiscipline* d, uint64_t count) {
   TickSegment at = count >= d->segment.count ? d->segment : d->before;
@@ -70,7 +71,10 @@ void tick_init(TickDiscipline* d, uint32_t counts_hz, uint32_t tolerance_ppm, ui
   d->before = d->segment;
 }
 
-uint64_t tick_of(const TickDiscipline* d, uint64_t count) { return segment_at(d, count).us; }
+uint64_t tick_of(const TickDiscipline* d, uint64_t count) {
+  const TickSegment at = segment_at(d, count);
+  return at.us + (at.fraction >> (rate_bits - 1U));
+}
 
 uint64_t tick_length(const TickDiscipline* d, uint64_t counts) {
   uint64_t fraction = 0;
@@ -130,7 +134,7 @@ static void steer(TickDiscipline* d, uint64_t edge, uint64_t now) {
   int64_t phase = d->aligned ? (int64_t)(tick - d->phase) % second : 0;
   if (phase > second / 2) phase -= second;
   const bool arrived = difference(d->estimate, d->segment.rate) <= (uint64_t)(2 * ppm);
-  if (arrived && (!d->aligned || phase > phase_limit_us * 256 || phase < -phase_limit_us * 256)) {
+  if (arrived && (!d->aligned || phase > kPhaseLimit || phase < -kPhaseLimit)) {
     d->phase = tick;
     d->aligned = true;
     phase = 0;

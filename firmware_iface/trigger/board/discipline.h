@@ -47,7 +47,7 @@ typedef struct {
 
 /* tolerance_ppm: how far the timer's crystal may be off; PPS farther off than that is not believed. */
 void tick_init(TickDiscipline* discipline, uint32_t counts_hz, uint32_t tolerance_ppm, uint64_t count);
-/* Tick of a count. */
+/* Tick of a count, rounded. */
 uint64_t tick_of(const TickDiscipline* discipline, uint64_t count);
 /* Length of a difference of counts, whole microseconds, rounded. */
 uint64_t tick_length(const TickDiscipline* discipline, uint64_t counts);

@@ -1,0 +1,148 @@
+// A bad line, a host that does not listen, one that sends rubbish.
+#include <gtest/gtest.h>
+
+#include "tests/unit/firmware_iface/trigger/board/virtual_board.hpp"
+
+namespace vergence {
+namespace {
+
+using Bytes = VirtualBoard::Bytes;
+
+struct Random {
+  std::uint32_t state;
+  std::uint32_t operator()() {
+    state = state * 1664525U + 1013904223U;
+    return state >> 8U;
+  }
+};
+
+TEST(BoardHostile, aMillionRandomBytesChangeNothingButCounters) {
+  VirtualBoard b;
+  Random random{4};
+  for (int i = 0; i < 1'000'000; ++i) {
+    board_receive(&b.board, b.now, b.now, static_cast<std::uint8_t>(random()));
+    b.now += 900;
+    if (i % 64 == 0) board_poll(&b.board, b.now), b.listen();
+  }
+  b.bytes({0});
+  b.frames.clear();
+  b.run_for_us(1'100'000);
+  const TriggerStatus s = b.status();
+  EXPECT_GT(s.frames_refused, 3'000U) << "one of 256 bytes ends a frame";
+  EXPECT_EQ(s.configuration, 0U);
+  EXPECT_EQ(s.state, trigger_stopped);
+  b.send(trigger_hello, {trigger_protocol_version});
+  EXPECT_EQ(b.take(trigger_info).size(), 1U);
+}
+
+TEST(BoardHostile, framesWithAGoodCrcAndRandomContentKeepEveryPromise) {
+  VirtualBoard b;
+  Random random{9};
+  std::uint32_t last_pulse = 0;
+  bool any = false;
+  for (int i = 0; i < 20'000; ++i) {
+    Bytes payload(random() % 3 == 0 ? random() % 65 : std::uint32_t{trigger_config_payload_size});
+    for (auto& byte : payload) byte = random() % 2 == 0 ? 0 : static_cast<std::uint8_t>(random());
+    const auto type = static_cast<std::uint8_t>(random() % 8);
+    if (type == trigger_config && random() % 2 == 0) {
+      TriggerConfig good = VirtualBoard::config(100'000 + random() % 800'000);
+      good.vary_us = random() % 200;
+      good.feedback_inputs = static_cast<std::uint8_t>(random() % 4);
+      payload.assign(trigger_config_payload_size, 0);
+      trigger_put_config(&good, payload.data());
+    }
+    if (type == trigger_start || type == trigger_stop) payload.clear();
+    if (type == trigger_pause || type == trigger_ping) payload.resize(4);
+    if (type == trigger_hello) payload.resize(1);
+    b.send(type, payload);
+    b.run_for_us(random() % 2000);
+    for (const TriggerEvent& e : b.events()) {
+      ASSERT_TRUE(!any || e.pulse > last_pulse) << "numbers only grow";
+      last_pulse = e.pulse;
+      any = true;
+    }
+    ASSERT_LE(b.board.outbox.used, outbox_capacity);
+  }
+  for (std::size_t i = 1; i < b.made.size(); ++i) ASSERT_GT(b.made[i].count, b.made[i - 1].count);
+  EXPECT_GT(b.made.size(), 100U);
+}
+
+TEST(BoardHostile, afterATruncatedFrameTheNextIsHeard) {
+  VirtualBoard b;
+  const Bytes whole = VirtualBoard::framed(trigger_ping, 1, {1, 2, 3, 4});
+  for (std::size_t cut = 1; cut < whole.size(); ++cut) {
+    Bytes bytes(whole.begin(), whole.begin() + static_cast<std::ptrdiff_t>(cut));
+    bytes.insert(bytes.end(), whole.begin(), whole.end());  // spoilt together with the cut one
+    bytes.insert(bytes.end(), whole.begin(), whole.end());
+    b.bytes(bytes);
+    EXPECT_GE(b.take(trigger_pong).size(), 1U) << cut;
+  }
+}
+
+TEST(BoardHostile, aHostThatDoesNotListenCostsMessagesWhichAreCountedAndThenItIsAnswered) {
+  VirtualBoard b;
+  b.configure(VirtualBoard::config(100'000));
+  b.send(trigger_start);
+  b.run_for_us(20'000);
+  b.frames.clear();
+  b.deaf = true;
+  b.run_for_us(1'000'000);
+  EXPECT_EQ(b.board.outbox.used, outbox_capacity - outbox_for_answers);
+  b.send(trigger_ping, {1, 0, 0, 0});
+  b.deaf = false;
+  b.listen();
+  EXPECT_EQ(b.take(trigger_pong).size(), 1U) << "answers have room of their own";
+  b.run_for_us(1'100'000);
+  const TriggerStatus s = b.status();
+  EXPECT_GT(s.events_dropped, 70U);
+  EXPECT_EQ(s.events_dropped, b.board.outbox.dropped);
+  EXPECT_GT(s.pulses, 190U) << "pulses go on";
+}
+
+TEST(BoardHostile, aFloodOfPingsDropsAnswersAndNothingElse) {
+  VirtualBoard b;
+  b.deaf = true;
+  for (int i = 0; i < 1000; ++i) b.send(trigger_ping, {1, 0, 0, 0});
+  b.deaf = false;
+  b.listen();
+  EXPECT_EQ(b.take(trigger_pong).size() + 1, std::size_t{outbox_capacity}) << "and the STATUS of the start";
+  EXPECT_EQ(b.board.outbox.dropped, 1000U - (outbox_capacity - 1));
+}
+
+TEST(BoardHostile, aRebootInMidFrameIsAnotherBootAndNumbersFromZero) {
+  VirtualBoard b;
+  b.configure(VirtualBoard::config(100'000));
+  b.send(trigger_start);
+  b.run_for_us(55'000);
+  std::uint8_t out[trigger_max_frame];
+  b.frames.clear();
+  const Bytes half = VirtualBoard::framed(trigger_config, 5, Bytes(trigger_config_payload_size, 3));
+  for (std::size_t i = 0; i < half.size() / 2; ++i) board_receive(&b.board, b.now, b.now, half[i]);
+  // The board's own frame is cut as well: the host's decoder has half of it when the new board speaks.
+  while (board_send(&b.board, b.now, out) > 0) {
+  }
+  TriggerFrame frame{};
+  for (int i = 0; i < 20; ++i) (void)trigger_decode(&b.host, static_cast<std::uint8_t>(7 + i), &frame);
+  const BoardDescription usual = VirtualBoard::usual();
+  board_init(&b.board, &usual, 0x12345678, b.now);
+  b.armed = false;
+  for (std::size_t i = half.size() / 2; i < half.size(); ++i) board_receive(&b.board, b.now, b.now, half[i]);
+  b.run_for_us(1'100'000);
+  const TriggerStatus s = b.status();
+  EXPECT_EQ(s.boot_id, 0x12345678U);
+  EXPECT_EQ(s.pulses, 0U);
+  EXPECT_EQ(s.configuration, 0U);
+  EXPECT_EQ(s.state, trigger_stopped);
+  EXPECT_EQ(s.frames_refused, 1U);
+  EXPECT_EQ(b.host.bad_coding + b.host.bad_length + b.host.bad_crc, 1U) << "the cut frame, and only it";
+}
+
+TEST(BoardHostile, edgesLostBeforeTheCoreAreInTheStatus) {
+  VirtualBoard b;
+  board_edges_lost(&b.board, 17);
+  b.run_for_us(1'100'000);
+  EXPECT_EQ(b.status().edges_dropped, 17U);
+}
+
+}  // namespace
+}  // namespace vergence

@@ -1,0 +1,213 @@
+// The board's microseconds: by the crystal, by PPS, and after PPS is gone.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+
+#include "tests/unit/firmware_iface/trigger/board/virtual_board.hpp"
+
+namespace vergence {
+namespace {
+
+constexpr double kHz = VirtualBoard::kHz;
+
+/// PPS on a crystal that is off by `ppm`, with a receiver's jitter of ±`jitter_us`; true second k is at count(k).
+struct Pps {
+  double ppm = 0, jitter_us = 0;
+  std::uint32_t random = 1;
+  [[nodiscard]] std::uint64_t count(double second) const {
+    return 1'000'000 + static_cast<std::uint64_t>(std::llround(second * kHz * (1 + ppm * 1e-6)));
+  }
+  std::uint64_t edge(std::uint64_t second) {
+    random = random * 1664525U + 1013904223U;
+    const double unit = static_cast<double>(random >> 8U) / (1 << 23) - 1;
+    return count(static_cast<double>(second) + unit * jitter_us * 1e-6);
+  }
+};
+
+/// A board whose host has said HELLO or not, with PPS from second `from` up to `to` (excluded).
+struct Disciplined : testing::Test {
+  VirtualBoard b;
+  Pps pps;
+  void begin(bool hello) {
+    if (hello) b.send(trigger_hello, {trigger_protocol_version});
+    TriggerConfig c = VirtualBoard::config(30'000);
+    c.pps_edge = trigger_edge_rising;
+    b.configure(c);
+  }
+  void feed(std::uint64_t from, std::uint64_t to) {
+    for (std::uint64_t k = from; k < to; ++k) {
+      const std::uint64_t at = pps.edge(k);
+      b.edge_at(at, board_input_pps, true);
+      b.edge_at(at + 8'400'000, board_input_pps, false);
+    }
+    b.run_until(pps.count(static_cast<double>(to) - 0.5));
+  }
+  /// Tick at a true second, less that second.
+  [[nodiscard]] double error_us(double second) const { return static_cast<double>(board_tick(&b.board, pps.count(second))) - second * 1e6; }
+};
+
+TEST(BoardTicks, withoutPpsTheyAreTheCrystals) {
+  VirtualBoard b;
+  for (const std::uint64_t s : {1ULL, 60ULL, 86'400ULL, 100'000ULL}) {
+    b.run_until(1'000'000 + s * VirtualBoard::kHz);
+    const auto off = static_cast<double>(board_tick(&b.board, b.now)) - static_cast<double>(s) * 1e6;
+    EXPECT_LE(std::abs(off), 0.5 + static_cast<double>(s) * 4e-5) << "the rate is held to 2^-41 us a count";
+  }
+}
+
+TEST_F(Disciplined, beforeTheHostCameTheRateIsTakenAtOnce) {
+  pps.ppm = 50;
+  begin(false);
+  feed(1, 7);
+  EXPECT_EQ(b.status().pps_locked, 1);
+  const double at_lock = error_us(6.2);
+  EXPECT_LT(std::abs(error_us(6.4) - at_lock), 2);
+  feed(7, 100);
+  EXPECT_LT(std::abs(error_us(99.4) - at_lock), 2) << "a tick is a second of PPS, whatever the crystal";
+}
+
+TEST_F(Disciplined, afterHelloItTakesAMinuteAndNoRateStepOfMoreThanTheStated) {
+  pps.ppm = 50;
+  begin(true);
+  auto rate_before = static_cast<double>(b.board.ticks.segment.rate);
+  std::uint64_t locked_at = 0;
+  for (std::uint64_t k = 1; k < 120; ++k) {
+    feed(k, k + 1);
+    const auto rate = static_cast<double>(b.board.ticks.segment.rate);
+    const double missing_ppm = (rate_before / static_cast<double>(b.board.ticks.estimate) - 1) * 1e6;
+    const double step_ppm = (rate / rate_before - 1) * 1e6;
+    ASSERT_LE(std::abs(step_ppm), std::max(1.001, std::abs(missing_ppm) / 16 + 0.001)) << "second " << k;
+    rate_before = rate;
+    if (locked_at == 0 && b.status().pps_locked == 1) locked_at = k;
+  }
+  EXPECT_GT(locked_at, 10U);
+  EXPECT_LT(locked_at, 60U);
+  const double kept = error_us(119.1);
+  feed(120, 400);
+  EXPECT_LT(std::abs(error_us(399.4) - kept), 2);
+}
+
+TEST_F(Disciplined, ticksNeverGoBackAndNeverStep) {
+  pps.ppm = -73;
+  pps.jitter_us = 30;
+  begin(true);
+  std::uint64_t count = b.now, tick = board_tick(&b.board, count);
+  for (std::uint64_t k = 1; k < 200; ++k) {
+    if (k % 50 < 40) feed(k, k + 1);  // with outages of ten seconds
+    const std::uint64_t until = pps.count(static_cast<double>(k) + 0.5);
+    while (count < until) {
+      count += 840'000;  // 10 ms
+      const std::uint64_t now_tick = board_tick(&b.board, count);
+      const auto step = static_cast<double>(now_tick - tick);
+      ASSERT_GE(now_tick, tick);
+      ASSERT_NEAR(step, 10'000, 3) << "second " << k;  // 100 ppm of 10 ms, and two roundings
+      tick = now_tick;
+    }
+    b.run_until(until);
+  }
+}
+
+TEST_F(Disciplined, jitterOfTheReceiverIsAveraged) {
+  pps.ppm = 20;
+  pps.jitter_us = 0.5;
+  begin(false);
+  feed(1, 60);
+  const double at = error_us(59.2);
+  double worst = 0;
+  for (std::uint64_t k = 60; k < 600; ++k) {
+    feed(k, k + 1);
+    worst = std::max(worst, std::abs(error_us(static_cast<double>(k) + 0.4) - at));
+  }
+  EXPECT_LT(worst, 3);
+}
+
+TEST_F(Disciplined, whenPpsIsGoneTheRateStays) {
+  pps.ppm = 50;
+  begin(false);
+  feed(1, 60);
+  const double before = error_us(59.4);
+  b.run_until(pps.count(65));
+  EXPECT_EQ(b.status().pps_locked, 0) << "said within five seconds";
+  b.run_until(pps.count(659));
+  const double after = error_us(659);
+  EXPECT_LT(std::abs(after - before), 600 * 0.02 + 2) << "0.02 ppm: a count in a second";
+  EXPECT_GE(b.status().pps_age_ms, 598'000U);
+  feed(660, 700);
+  EXPECT_EQ(b.status().pps_locked, 1);
+}
+
+TEST_F(Disciplined, edgesThatFitNothingAreReportedButNotFollowed) {
+  pps.ppm = 10;
+  begin(false);
+  feed(1, 30);
+  const double before = error_us(29.4);
+  for (std::uint64_t k = 30; k < 60; ++k)  // a spike between two seconds, every third
+    if (k % 3 == 0) b.edge_at(pps.count(static_cast<double>(k) + 0.3), board_input_pps, true);
+  b.frames.clear();
+  feed(30, 60);
+  std::size_t told = 0;
+  for (const TriggerFrame& f : b.frames) told += f.type == trigger_pps ? 1U : 0U;
+  EXPECT_EQ(told, 40U);
+  EXPECT_EQ(b.status().pps_locked, 1);
+  EXPECT_LT(std::abs(error_us(59.4) - before), 2);
+}
+
+TEST_F(Disciplined, aSignalThatIsNoPpsIsNeverLockedTo) {
+  begin(false);
+  for (const double period : {0.02, 0.9, 1.001, 0.999}) {
+    for (int k = 0; k < 20; ++k) b.edge_at(b.now + static_cast<std::uint64_t>((k + 1) * period * kHz), board_input_pps, true);
+    b.run_until(b.now + static_cast<std::uint64_t>(21 * period * kHz));
+    EXPECT_EQ(b.status().pps_locked, 0) << period;
+    b.run_for_us(20'000'000);
+  }
+  EXPECT_EQ(board_tick(&b.board, b.now), (b.now - 1'000'000 + 42) / 84) << "the crystal's ticks";
+}
+
+TEST_F(Disciplined, aSecondPhaseIsTakenOverAfterAFewSeconds) {
+  pps.ppm = 5;
+  begin(false);
+  feed(1, 30);
+  for (int k = 31; k < 90; ++k) b.edge_at(pps.count(k + 0.37), board_input_pps, true);  // another receiver
+  b.run_until(pps.count(36.9));
+  EXPECT_EQ(b.status().pps_locked, 1);
+  b.run_until(pps.count(90));
+  EXPECT_EQ(b.status().pps_locked, 1);
+}
+
+TEST_F(Disciplined, hostileStampsBreakNothing) {
+  begin(false);
+  std::uint64_t random = 88172645463325252ULL;
+  for (int i = 0; i < 100'000; ++i) {
+    random ^= random << 13U, random ^= random >> 7U, random ^= random << 17U;
+    const std::uint64_t edge = random % 4 == 0 ? random : b.now - random % 100'000'000 + 50'000'000;
+    const std::uint64_t before = board_tick(&b.board, b.now);
+    board_edge(&b.board, b.now, board_input_pps, true, edge);
+    ASSERT_GE(board_tick(&b.board, b.now), before);
+    b.now += random % 90'000'000;
+    board_poll(&b.board, b.now);
+    b.listen();
+    b.frames.clear();
+  }
+}
+
+TEST(BoardTicks, otherTimersToo) {
+  for (const std::uint32_t hz : {1'000'000U, 16'000'000U, 72'000'000U, 1'000'000'000U}) {
+    TickDiscipline d{};
+    tick_init(&d, hz, 100, 7);
+    std::uint64_t at = 7;
+    for (int k = 0; k < 100; ++k) {
+      at += hz + hz / 20'000;  // 50 ppm
+      EXPECT_TRUE(tick_pps(&d, at, at + 10));
+      tick_advance(&d, at + hz / 2);
+    }
+    EXPECT_TRUE(d.locked);
+    const auto second = static_cast<double>(tick_of(&d, at + hz + hz / 20'000) - tick_of(&d, at));
+    EXPECT_NEAR(second, 1e6, 1.01) << hz;
+    EXPECT_EQ(tick_length(&d, hz + hz / 20'000), 1'000'000U);
+  }
+}
+
+}  // namespace
+}  // namespace vergence
