@@ -2,65 +2,18 @@
 
 #include <algorithm>
 #include <cassert>
-#include <cmath>
 
 namespace vergence {
+namespace {
 
-RigSynchronizer::RigSynchronizer(const SyncOptions& options) noexcept : options_(options) {
+Duration magnitude(Duration d) noexcept { return d < Duration{} ? -d : d; }
+
+}  // namespace
+
+RigSynchronizer::RigSynchronizer(const SyncOptions& options) noexcept : options_(options), train_(options.interval) {
   assert(options.validate() == nullptr);
-  for (Source& s : sources_) s.align = options.align_start;
-}
-
-std::uint64_t RigSynchronizer::number_of(const SyncFrame& frame) noexcept {
-  constexpr std::uint64_t kLeap = 100'000;  // pulses: over an hour of silence; a counter that leaps further is broken
-  Source& source = sources_[static_cast<std::size_t>(frame.camera)];
-  const auto counted = static_cast<std::uint64_t>(source.base) + frame.counter;  // wraps where the base is negative
-  if (timed_ && counted > timed_number_ + kLeap) source.align = true;
-  if (source.align) {
-    source.align = false;
-    if (timed_) {
-      const double pulses = (frame.middle.host - timed_middle_).to_seconds() / options_.interval.to_seconds();
-      source.base = static_cast<std::int64_t>(timed_number_) + std::llround(pulses) - static_cast<std::int64_t>(frame.counter);
-    } else {
-      source.base = 0;
-    }
-  }
-  const std::int64_t number = source.base + static_cast<std::int64_t>(frame.counter);
-  return number < 0 ? 0 : static_cast<std::uint64_t>(number);
-}
-
-/// The number of the open set that it fits into, or a new one in the order of time; a number that is out already: too late.
-std::uint64_t RigSynchronizer::number_by_time(const SyncFrame& frame) noexcept {
-  const HostStamp middle = frame.middle.host;
-  const Open *best = nullptr, *newest = nullptr;
-  Duration nearest = options_.tolerance;
-  for (const Open& o : open_) {
-    if (!o.used) continue;
-    if (newest == nullptr || o.set.number > newest->set.number) newest = &o;
-    std::size_t first = 0;
-    while (!o.set.present[first]) ++first;
-    const Duration apart = middle - o.middles[first].host, distance = apart < Duration{} ? -apart : apart;
-    if (distance > nearest) continue;
-    nearest = distance;
-    best = &o;
-  }
-  if (best != nullptr) return best->set.number;
-  if (any_out_ && middle - last_middle_ <= options_.tolerance) return last_out_;
-  if (newest == nullptr && !any_out_) return 0;
-  std::uint64_t reference = last_out_;
-  HostStamp reference_middle = last_middle_;
-  if (newest != nullptr) {
-    std::size_t first = 0;
-    while (!newest->set.present[first]) ++first;
-    reference = newest->set.number;
-    reference_middle = newest->middles[first].host;
-  }
-  const std::int64_t steps = std::llround((middle - reference_middle).to_seconds() / options_.interval.to_seconds());
-  const bool after = middle > reference_middle;
-  const std::int64_t number =
-      static_cast<std::int64_t>(reference) + (after ? std::max<std::int64_t>(steps, 1) : std::min<std::int64_t>(steps, -1));
-  const bool taken = number < 0 || find(static_cast<std::uint64_t>(number)) != nullptr;
-  return taken ? last_out_ : static_cast<std::uint64_t>(number);
+  for (Source& s : sources_) s.align = options.align_start && options.mode == SyncMode::counter;
+  for (std::size_t k = 0; k < matchers_.size(); ++k) matchers_[k] = PulseMatcher(noise_of(k), options.interval);
 }
 
 RigSynchronizer::Open* RigSynchronizer::find(std::uint64_t number) noexcept {
@@ -80,17 +33,28 @@ SyncVerdict RigSynchronizer::offer(const SyncFrame& frame) noexcept {
   assert(frame.camera >= 0 && frame.camera < options_.cameras && open_count_ <= kOpen);
   const auto k = static_cast<std::size_t>(frame.camera);
   now_ = std::max(now_, frame.arrival);
-  const bool by_time = options_.mode == SyncMode::software;
-  const std::uint64_t number = by_time ? number_by_time(frame) : number_of(frame);
+  const bool by_time = pairs_by_time(options_.mode);
+  Image image{frame.middle, 0, {}, {}, frame.exposure};
+  std::uint64_t number = 0;
+  Step step = Step::numbered;
+  if (by_time) {
+    image.time = pairing_time(frame);
+    number = number_by_time(frame, image.time);
+  } else if (proves_numbers(options_.mode)) {
+    step = number_by_pulse(frame, &number, &image);
+  } else {
+    number = number_of(frame);
+  }
+  if (step == Step::acquiring) return SyncVerdict::acquiring;
   if (any_out_ && number <= last_out_) {
     const Gone& g = history_[number % kHistory];
-    const bool of_it = !by_time || frame.middle.host - last_middle_ >= -options_.tolerance;
-    const bool given = of_it && g.used && g.number == number && g.present[k];
+    const bool of_it = !by_time || image.time - last_time_ >= -options_.tolerance.ns();
+    const bool given = step == Step::again || (of_it && g.used && g.number == number && g.present[k]);
     ++(given ? counters_.duplicate : counters_.late)[k];
     return given ? SyncVerdict::duplicate : SyncVerdict::late;
   }
   Open* open = find(number);
-  if (open != nullptr && open->set.present[k]) {
+  if (step == Step::again || (open != nullptr && open->set.present[k])) {
     ++counters_.duplicate[k];
     return SyncVerdict::duplicate;
   }
@@ -105,7 +69,7 @@ SyncVerdict RigSynchronizer::offer(const SyncFrame& frame) noexcept {
   open->set.present[k] = true;
   open->set.slots[k] = frame.slot;
   open->set.arrival = std::max(open->set.arrival, frame.arrival);
-  open->middles[k] = frame.middle;
+  open->images[k] = image;
   Source& source = sources_[k];
   source.here = true;
   source.newest = source.any ? std::max(source.newest, number) : number;
@@ -118,12 +82,16 @@ SyncVerdict RigSynchronizer::offer(const SyncFrame& frame) noexcept {
   return SyncVerdict::taken;
 }
 
+bool RigSynchronizer::waited_for(std::size_t camera) const noexcept { return sources_[camera].here && proven(static_cast<int>(camera)); }
+
 bool RigSynchronizer::ready(const Open& open) const noexcept {
-  if (finishing_ || open_count_ > kOpen || now_ - open.first >= options_.hold) return true;
+  const std::uint64_t number = open.set.number;
+  if (finishing_ || open_count_ > kOpen || now_ - open.first >= options_.hold || number < flushed_) return true;
+  if (proves_numbers(options_.mode) && (train_.size() == 0 || train_.newest().number < number)) return false;
   for (std::size_t k = 0; k < static_cast<std::size_t>(options_.cameras); ++k) {
     const Source& s = sources_[k];
-    const bool passed = s.any && !s.align && s.newest > open.set.number;
-    if (s.here && !open.set.present[k] && !passed) return false;
+    const bool passed = s.any && !s.align && s.newest > number;
+    if (waited_for(k) && !open.set.present[k] && !passed) return false;
   }
   return true;
 }
@@ -135,40 +103,98 @@ bool RigSynchronizer::next(SyncedSet* set) noexcept {
   return true;
 }
 
-void RigSynchronizer::emit(Open* open, SyncedSet* set) noexcept {
-  *set = open->set;
-  const auto n = static_cast<std::size_t>(options_.cameras);
+/// Camera 0's middle, or that of the first camera that is there.
+void RigSynchronizer::stamp(const Open& open, SyncedSet* set) const noexcept {
   std::size_t base = 0;
   while (!set->present[base]) ++base;
-  set->stamp = open->middles[base].host;
-  set->error = open->middles[base].error;
+  set->stamp = open.images[base].middle.host;
+  set->error = open.images[base].middle.error;
+  for (std::size_t k = 0; k < static_cast<std::size_t>(options_.cameras); ++k)
+    if (set->present[k]) set->spread = std::max(set->spread, magnitude(open.images[k].middle.host - set->stamp));
+}
+
+/// The pulse's edge on the host's clock, and from it to the middles of the exposures, as they were fed back or as they were asked for.
+void RigSynchronizer::stamp_by_pulse(const Open& open, SyncedSet* set) const noexcept {
+  const PulseTrain::Entry* pulse = train_.find(set->number);
+  std::size_t base = 0;
+  while (!set->present[base]) ++base;
+  set->reported = pulse != nullptr;
+  MappedStamp edge{};
+  if (pulse != nullptr) {
+    edge = {pulse->host, pulse->host_error};
+  } else {
+    edge = train_.host_of(open.images[base].edge);
+    edge.error = edge.error + open.images[base].gate;
+  }
+  const auto middle = [&](std::size_t k) {
+    const bool fed_back = pulse != nullptr && pulse->exposure[k].seen;
+    return fed_back ? (pulse->exposure[k].start + pulse->exposure[k].end) / 2 : options_.camera[k].delay + open.images[k].exposure / 2;
+  };
+  set->stamp = edge.host + middle(base);
+  set->error = edge.error;
+  for (std::size_t k = 0; k < static_cast<std::size_t>(options_.cameras); ++k)
+    if (set->present[k]) set->spread = std::max(set->spread, magnitude(middle(k) - middle(base)));
+}
+
+void RigSynchronizer::emit(Open* open, SyncedSet* set) noexcept {
+  *set = open->set;
+  const bool numbered = proves_numbers(options_.mode);
+  // Pulses of a train that has ended are no longer known: their cameras' own stamps are.
+  const bool of_train = numbered && train_.size() > 0 && set->number >= flushed_;
+  if (of_train) {
+    stamp_by_pulse(*open, set);
+  } else {
+    stamp(*open, set);
+  }
+  counters_.unreported += numbered && !set->reported ? 1 : 0;
   set->complete = true;
-  for (std::size_t k = 0; k < n; ++k) {
-    if (set->present[k]) {
-      const Duration apart = open->middles[k].host - set->stamp;
-      set->spread = std::max(set->spread, apart < Duration{} ? -apart : apart);
-    } else {
-      set->complete = false;
-      ++(sources_[k].here ? counters_.lost : counters_.absent)[k];
+  for (std::size_t k = 0; k < static_cast<std::size_t>(options_.cameras); ++k) {
+    if (set->present[k]) continue;
+    set->complete = false;
+    if (!sources_[k].here) {
+      ++counters_.absent[k];
+    } else if (!numbered) {
+      ++counters_.lost[k];
     }
   }
-  prove(set);
+  prove(open, set);
   ++(set->complete ? counters_.complete : counters_.incomplete);
   if (!set->complete && open_count_ > kOpen) ++counters_.pushed_out;
-  counters_.missed += any_out_ ? set->number - last_out_ - 1 : set->number;
+  if (numbered) {
+    counters_.missed += any_out_ && last_out_ >= steady_from_ ? train_.between(last_out_, set->number) : 0;
+  } else {
+    counters_.missed += any_out_ ? set->number - last_out_ - 1 : set->number;
+  }
   history_[set->number % kHistory] = {set->number, set->present, true};
   any_out_ = true;
   last_out_ = set->number;
-  last_middle_ = set->stamp;
+  std::size_t base = 0;
+  while (!set->present[base]) ++base;
+  last_time_ = open->images[base].time;
   open->used = false;
   --open_count_;
 }
 
 /// What can be said of a set's togetherness, and whether the pulses have to be found anew.
-void RigSynchronizer::prove(SyncedSet* set) noexcept {
-  if (options_.mode == SyncMode::software) {
-    set->proof = SyncProof::by_time;
-    return;
+void RigSynchronizer::prove(Open* open, SyncedSet* set) noexcept {
+  switch (options_.mode) {
+    case SyncMode::software:
+      set->proof = SyncProof::by_time;
+      return;
+    case SyncMode::bus:
+    case SyncMode::ptp:
+      set->proof = SyncProof::common_clock;
+      return;
+    case SyncMode::board:
+    case SyncMode::ins_syncout:
+    case SyncMode::master_strobe:
+      set->proof = open->contradicted                         ? SyncProof::unproven
+                   : options_.mode == SyncMode::master_strobe ? SyncProof::master
+                                                              : SyncProof::numbered;
+      counters_.unproven += open->contradicted ? 1 : 0;
+      return;
+    case SyncMode::counter:
+      break;
   }
   const bool several = std::count(set->present.begin(), set->present.end(), true) > 1;
   if (!several) return;
@@ -184,29 +210,42 @@ void RigSynchronizer::prove(SyncedSet* set) noexcept {
   for (std::size_t k = 1; k < sources_.size(); ++k) sources_[k].align = true;  // to camera 0, whose numbers go on
 }
 
+SyncCounters RigSynchronizer::counters() const noexcept {
+  SyncCounters c = counters_;
+  for (std::size_t k = 0; k < matchers_.size(); ++k) {
+    c.acquisitions[k] = matchers_[k].acquisitions();
+    c.worst_acquisition = std::max(c.worst_acquisition, matchers_[k].worst_acquisition());
+  }
+  return c;
+}
+
 void RigSynchronizer::lost(int camera, std::uint64_t counter) noexcept {
-  Source& source = sources_[static_cast<std::size_t>(camera)];
-  if (options_.mode != SyncMode::counter || source.align) return;
-  const std::int64_t number = source.base + static_cast<std::int64_t>(counter);
-  if (number < 0) return;
-  const auto next = static_cast<std::uint64_t>(number) + 1;  // the first that is still waited for
+  const auto k = static_cast<std::size_t>(camera);
+  Source& source = sources_[k];
+  std::uint64_t next = 0;  // the first that is still waited for
+  if (options_.mode == SyncMode::counter && !source.align) {
+    const std::int64_t number = source.base + static_cast<std::int64_t>(counter);
+    if (number < 0) return;
+    next = static_cast<std::uint64_t>(number) + 1;
+  } else if (proves_numbers(options_.mode) && matchers_[k].proven()) {
+    next = matchers_[k].least_number(counter) + 1;
+  } else {
+    return;
+  }
   source.newest = source.any ? std::max(source.newest, next) : next;
   source.any = true;
 }
 
-void RigSynchronizer::pulse(const Pulse&) noexcept {}
-
-std::uint32_t RigSynchronizer::wants_pause() noexcept { return 0; }
-
-bool RigSynchronizer::proven(int) const noexcept { return !proves_numbers(options_.mode); }
-
 void RigSynchronizer::absent(int camera) noexcept { sources_[static_cast<std::size_t>(camera)].here = false; }
 
 void RigSynchronizer::restarted(int camera) noexcept {
-  Source& source = sources_[static_cast<std::size_t>(camera)];
+  const auto k = static_cast<std::size_t>(camera);
+  Source& source = sources_[k];
   source.here = true;
   source.any = false;
-  source.align = true;
+  source.align = options_.mode == SyncMode::counter;
+  matchers_[k].restart();
+  if (k == 0) master_.align = master_.known;
 }
 
 }  // namespace vergence

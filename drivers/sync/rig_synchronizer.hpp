@@ -3,6 +3,8 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "drivers/sync/pulse_matcher.hpp"
+#include "drivers/sync/pulse_train.hpp"
 #include "drivers/sync/sync_types.hpp"
 #include "drivers/trigger.hpp"
 
@@ -30,6 +32,8 @@ class RigSynchronizer {
   static constexpr std::size_t kHistory = 64;  // sets remembered, to tell a duplicate from a late frame
   static constexpr int kUnproven = 10;         // in a row: the pulses were not found rightly
 
+  static constexpr std::uint32_t kPause = 4;  // pulses left out: more than what a camera misses by itself
+
   /// Precondition: options.validate() == nullptr.
   explicit RigSynchronizer(const SyncOptions& options) noexcept;
 
@@ -56,7 +60,7 @@ class RigSynchronizer {
   /// No more frames will come: everything open goes out by next().
   void finish() noexcept { finishing_ = true; }
 
-  [[nodiscard]] const SyncCounters& counters() const noexcept { return counters_; }
+  [[nodiscard]] SyncCounters counters() const noexcept;
 
  private:
   struct Source {
@@ -66,10 +70,18 @@ class RigSynchronizer {
     bool any = false;
     std::uint64_t newest = 0;  // number
   };
+  struct Image {
+    MappedStamp middle{};
+    std::int64_t time = 0;  // ns, of the clock that pairs, where stamps do: middle of the exposure
+    DeviceStamp edge{};     // of the pulse by its source's clock, as this camera's stamp has it
+    Duration gate{};        // |true edge − edge| is below this
+    Duration exposure{};
+  };
   struct Open {
     bool used = false;
+    bool contradicted = false;  // its pulse's report does not agree with an image's stamp
     SyncedSet set{};
-    std::array<MappedStamp, kMaxCameras> middles{};
+    std::array<Image, kMaxCameras> images{};
     HostStamp first{};
   };
   struct Gone {
@@ -77,14 +89,37 @@ class RigSynchronizer {
     std::array<bool, kMaxCameras> present{};
     bool used = false;
   };
+  /// Camera 0 where its exposures are the pulses.
+  struct Master {
+    bool known = false;
+    bool align = false;      // it was started again: its count is another, its clock may go on
+    std::uint64_t base = 0;  // pulse number − counter, modulo 2^64
+    std::uint64_t counter = 0;
+    DeviceStamp stamp{};
+    std::uint32_t boot = 0;
+  };
+  enum class Step : std::uint8_t { numbered, again, acquiring };
 
+  // By counter, by time, by pulses: the number of a frame's set.
   [[nodiscard]] std::uint64_t number_of(const SyncFrame& frame) noexcept;
-  [[nodiscard]] std::uint64_t number_by_time(const SyncFrame& frame) noexcept;
-  void prove(SyncedSet* set) noexcept;
+  [[nodiscard]] std::int64_t pairing_time(const SyncFrame& frame) const noexcept;
+  [[nodiscard]] std::uint64_t number_by_time(const SyncFrame& frame, std::int64_t time) noexcept;
+  [[nodiscard]] bool ran_back(std::int64_t time) noexcept;
+  [[nodiscard]] Step number_by_pulse(const SyncFrame& frame, std::uint64_t* number, Image* image) noexcept;
+  [[nodiscard]] Step number_by_master(const SyncFrame& frame, std::uint64_t* number, Image* image) noexcept;
+  void take_pulse(const Pulse& pulse) noexcept;
+  void begin_anew() noexcept;
+  [[nodiscard]] std::uint64_t first_free() const noexcept;
+  [[nodiscard]] Duration noise_of(std::size_t camera) const noexcept;
+
+  void prove(Open* open, SyncedSet* set) noexcept;
   [[nodiscard]] Open* oldest() noexcept;
   [[nodiscard]] Open* find(std::uint64_t number) noexcept;
   [[nodiscard]] bool ready(const Open& open) const noexcept;
+  [[nodiscard]] bool waited_for(std::size_t camera) const noexcept;
   void emit(Open* open, SyncedSet* set) noexcept;
+  void stamp(const Open& open, SyncedSet* set) const noexcept;
+  void stamp_by_pulse(const Open& open, SyncedSet* set) const noexcept;
 
   SyncOptions options_;
   std::array<Source, kMaxCameras> sources_{};
@@ -93,11 +128,20 @@ class RigSynchronizer {
   std::array<Gone, kHistory> history_{};
   bool any_out_ = false;
   std::uint64_t last_out_ = 0;
-  HostStamp last_middle_{};  // of the set that went out last
+  std::int64_t last_time_ = 0;  // Image::time of the set that went out last
   int unproven_run_ = 0;
   bool timed_ = false;  // a number and its time, to find the pulse of a camera that came back
   std::uint64_t timed_number_ = 0;
   HostStamp timed_middle_{};
+  int back_ = 0;               // frames in a row whose common clock has run back
+  bool anew_ = false;          // … and was set: the next frame begins a new count of time
+  std::uint64_t flushed_ = 0;  // sets below this number wait for nobody
+  PulseTrain train_;
+  std::array<PulseMatcher, kMaxCameras> matchers_{};
+  Master master_{};
+  std::uint64_t steady_from_ = 0;  // number from which on every pulse without image is a missed one
+  std::uint64_t pulses_ = 0, asked_at_ = 0;
+  bool asked_ = false;
   HostStamp now_{};  // newest arrival
   bool finishing_ = false;
   SyncCounters counters_{};
