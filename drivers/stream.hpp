@@ -20,8 +20,8 @@ struct Delivery {
 
 /// From the thread of a driver to the consumer of its device.
 ///
-/// Threads  push(), full(), wait_for_room(): producer. start(), stop(): owner. take(): one consumer; with limit 0 it takes no lock.
-/// Full     push() refuses; the driver drops and counts, or, in virtual time, waits for room.
+/// Threads  push(), full(), empty(), wait_for_room(): producer. start(), stop(): owner. take(): one consumer; with limit 0 it takes no
+/// lock. Full     push() refuses; the driver drops and counts, or, in virtual time, waits for room.
 template <class T, std::size_t N>
 class Stream {
  public:
@@ -33,6 +33,8 @@ class Stream {
     return true;
   }
   [[nodiscard]] bool full() const noexcept { return ring_.full(); }
+  /// Everything pushed so far was taken.
+  [[nodiscard]] bool empty() const noexcept { return ring_.empty(); }
   /// Returns when there is room, or the device is stopped.
   void wait_for_room() const noexcept {
     for (;;) {
@@ -69,6 +71,12 @@ class Stream {
       notifier_ = nullptr;
     }
     filled_.notify_all();
+  }
+  /// Forgets what was not taken, and that the device was gone. Precondition: stopped, the producer's thread has ended, nobody
+  /// is in take().
+  void clear() noexcept {
+    for (Delivery<T> d; ring_.pop(&d);) ended_ = ended_ || d.what == Delivery<T>::What::end;
+    gone_ = false;
   }
 
   [[nodiscard]] DeviceStatus take(Duration limit, Delivery<T>* d) noexcept {

@@ -69,7 +69,8 @@ class SimulatedPlace::World {
     return n;
   }
   void send(std::span<const std::uint8_t> bytes) {
-    const HostStamp begin = std::max(now_ + options_.transfer, host_line_free_);
+    const HostStamp begin =
+        std::max(now_ + options_.transfer + late(options_.sent_late_fraction, options_.sent_late_mean), host_line_free_);
     host_line_free_ = begin + byte_time(host_baud_) * static_cast<std::int64_t>(bytes.size());
     to_device_.push_back({host_line_free_, {bytes.begin(), bytes.end()}});
   }
@@ -242,11 +243,13 @@ class SimulatedPlace::World {
   }
 
   void arrive(std::vector<std::uint8_t> bytes) {
-    HostStamp at = now_ + options_.transfer;
-    if (options_.late_fraction > 0 && random_.uniform() < options_.late_fraction)
-      at = at + Duration::nanoseconds(std::llround(-std::log(1 - random_.uniform()) * static_cast<double>(options_.late_mean.ns())));
-    last_arrival_ = std::max(last_arrival_, at);
+    last_arrival_ = std::max(last_arrival_, now_ + options_.transfer + late(options_.late_fraction, options_.late_mean));
     arriving_.push_back({last_arrival_, std::move(bytes)});
+  }
+
+  [[nodiscard]] Duration late(double fraction, Duration mean) noexcept {
+    if (!(fraction > 0 && random_.uniform() < fraction)) return {};
+    return Duration::nanoseconds(std::llround(-std::log(1 - random_.uniform()) * static_cast<double>(mean.ns())));
   }
 
   void garble(std::vector<std::uint8_t>* bytes) {

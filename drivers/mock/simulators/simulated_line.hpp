@@ -18,14 +18,16 @@ struct Outage {
 struct SimulatedLineOptions {
   bool converter = true;  // a USB converter of FTDI's kind; false: bytes go straight into the host
   Duration latency_timer = Duration::milliseconds(16);
-  double converter_clock_ppm = 20;                  // of its timer against the host's USB frames
-  Duration transfer = Duration::microseconds(125);  // from the USB frame to the reading program at best
-  double late_fraction = 0.01;                      // of the arrivals: the reading program is late …
-  Duration late_mean = Duration::milliseconds(4);   // … by an exponential time of this mean
-  double corrupt = 0;                               // of the bytes from the device: one bit flips
-  std::vector<Outage> outages{};                    // in order
-  HostStamp start{};                                // of virtual time
-  bool real_time = false;                           // the clock is the host's: reads wait
+  double converter_clock_ppm = 20;                      // of its timer against the host's USB frames
+  Duration transfer = Duration::microseconds(125);      // from the USB frame to the reading program at best
+  double late_fraction = 0.01;                          // of the arrivals: the reading program is late …
+  Duration late_mean = Duration::milliseconds(4);       // … by an exponential time of this mean
+  double sent_late_fraction = 0;                        // of what the host writes: it leaves late …
+  Duration sent_late_mean = Duration::milliseconds(4);  // … by an exponential time of this mean
+  double corrupt = 0;                                   // of the bytes from the device: one bit flips
+  std::vector<Outage> outages{};                        // in order
+  HostStamp start{};                                    // of virtual time
+  bool real_time = false;                               // the clock is the host's: reads wait
   std::uint64_t seed = 1;
 };
 

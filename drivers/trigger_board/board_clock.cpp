@@ -1,0 +1,107 @@
+#include "drivers/trigger_board/board_clock.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "drivers/trigger_board/pulse_account.hpp"
+
+namespace vergence::trigger_board {
+namespace {
+
+constexpr std::int64_t kPingBytes = trigger_ping_payload_size + trigger_overhead + 3;  // COBS byte, and a 00 at either end
+constexpr std::int64_t kPongBytes = trigger_pong_payload_size + trigger_overhead + 2;
+
+}  // namespace
+
+void BoardClock::restart(Duration spread) noexcept {
+  ClockMapperOptions o;
+  o.delay_spread = spread;
+  o.resolution = Duration::microseconds(1);  // a tick
+  resets_before_ += mapper_.resets();
+  mapper_ = ClockMapper(o);
+  forget();
+  reopen(wire_);
+}
+
+void BoardClock::forget() noexcept {
+  known_ = false;
+  newest_tick_ = 0;
+  backward_ = 0;
+}
+
+void BoardClock::reopen(Duration wire) noexcept {
+  wire_ = wire;
+  answers_ = 0;
+  for (Question& q : questions_) {
+    if (q.open) ++totals_.unanswered;
+    q.open = false;
+  }
+}
+
+std::uint32_t BoardClock::ask(HostStamp t1) noexcept {
+  const std::uint32_t token = next_token_++;
+  Question& q = questions_[token % kOpen];
+  if (q.open) ++totals_.unanswered;
+  q = {token, t1, true};
+  ++totals_.asked;
+  return token;
+}
+
+PongWord BoardClock::answer(const TriggerPong& pong, HostStamp t4) noexcept {
+  Question& q = questions_[pong.token % kOpen];
+  if (!q.open || q.token != pong.token) {
+    ++totals_.refused;
+    return PongWord::unasked;
+  }
+  q.open = false;
+  const HostStamp sent = q.sent + wire_ * kPingBytes;
+  const HostStamp here = t4 - wire_ * kPongBytes;
+  if (pong.sent < pong.received || pong.sent > kMostTicks) {
+    ++totals_.refused;
+    return PongWord::nonsense;
+  }
+  const Duration inside = Duration::microseconds(static_cast<std::int64_t>(pong.sent - pong.received));
+  const Duration rtt = (here - sent) - inside;
+  // A tick at either end, and the board's clock may be slow.
+  const Duration tolerance = Duration::microseconds(2) + inside / 1000;
+  if (rtt < -tolerance) {
+    ++totals_.refused;
+    return PongWord::nonsense;
+  }
+  if (pong.received < newest_tick_) {
+    ++totals_.refused;
+    if (++backward_ < kBackward) return PongWord::backward;
+    ++totals_.resets;
+    mapper_.restart();
+    forget();
+    return PongWord::backward;
+  }
+  backward_ = 0;
+  newest_tick_ = pong.sent;
+  mapper_.ping(sent, stamp_of_tick(pong.received), stamp_of_tick(pong.sent), std::max(here, sent + inside));
+  known_ = true;
+  ++answers_;
+  ++totals_.answered;
+  rtt_ns_[rtt_at_] = std::max<std::int64_t>(0, rtt.ns());
+  rtt_at_ = (rtt_at_ + 1) % kRemembered;
+  rtts_ = std::min(rtts_ + 1, kRemembered);
+  return PongWord::taken;
+}
+
+TimeQuality BoardClock::quality() const noexcept {
+  TimeQuality t = totals_;
+  t.resets += resets_before_ + mapper_.resets();
+  t.drift_ppm = mapper_.drift() * 1e6;
+  if (rtts_ > 0) {
+    std::array<std::int64_t, kRemembered> sorted = rtt_ns_;
+    const auto end = sorted.begin() + static_cast<std::ptrdiff_t>(rtts_), middle = sorted.begin() + static_cast<std::ptrdiff_t>(rtts_ / 2);
+    std::nth_element(sorted.begin(), middle, end);
+    t.rtt_median = Duration::nanoseconds(*middle);
+    t.rtt_least = Duration::nanoseconds(*std::min_element(sorted.begin(), middle + 1));
+    t.rtt_most = Duration::nanoseconds(*std::max_element(middle, end));
+  }
+  if (known_) t.error = mapper_.at(stamp_of_tick(newest_tick_)).error;
+  return t;
+}
+
+}  // namespace vergence::trigger_board

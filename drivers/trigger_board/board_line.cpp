@@ -1,0 +1,81 @@
+#include "drivers/trigger_board/board_line.hpp"
+
+#include <algorithm>
+#include <cstring>
+#include <string_view>
+
+namespace vergence::trigger_board {
+
+void BoardLine::attach(ByteLine* line) noexcept {
+  before_ = counters();
+  decoder_ = {};
+  line_ = line;
+  used_ = size_ = 0;
+  forget();
+}
+
+DeviceStatus BoardLine::send(std::uint8_t type, std::span<const std::uint8_t> payload, std::uint8_t* sequence) noexcept {
+  constexpr Duration kWrite = Duration::milliseconds(50);
+  if (sequence != nullptr) *sequence = sequence_;
+  // The 00 before it ends whatever an earlier program left half sent.
+  std::array<std::uint8_t, trigger_max_frame + 1> frame{};
+  const std::size_t size = trigger_write_frame(type, sequence_++, payload.data(), payload.size(), frame.data() + 1);
+  return line_->write(std::span(frame).first(size + 1), kWrite);
+}
+
+LineCounters BoardLine::counters() const noexcept {
+  LineCounters c = before_;
+  c.frames += decoder_.frames;
+  c.bad_coding += decoder_.bad_coding;
+  c.bad_length += decoder_.bad_length;
+  c.bad_crc += decoder_.bad_crc;
+  return c;
+}
+
+DeviceStatus BoardLine::next(HostStamp deadline, TriggerFrame* frame, HostStamp* arrival) noexcept {
+  for (bool last = false;;) {  // ends at the deadline, a read later at most
+    while (used_ < size_) {
+      if (trigger_decode(&decoder_, buffer_[used_++], frame) != trigger_frame_ready) continue;
+      ++frames_heard_;
+      *arrival = arrival_;
+      return DeviceStatus::ok;
+    }
+    if (last) return DeviceStatus::timeout;
+    const HostStamp now = line_->now();
+    last = now >= deadline;
+    const LineRead r = line_->read(buffer_, last ? Duration{} : deadline - now);
+    if (r.status != DeviceStatus::ok) return r.status;
+    used_ = 0;
+    size_ = r.size;
+    arrival_ = r.arrival;
+    remember();
+  }
+}
+
+void BoardLine::remember() noexcept {
+  const std::size_t n = std::min(size_, heard_.size() - heard_size_);
+  std::memcpy(heard_.data() + heard_size_, buffer_.data(), n);
+  heard_size_ += n;
+}
+
+void BoardLine::forget() noexcept {
+  heard_size_ = 0;
+  frames_heard_ = 0;
+}
+
+std::string BoardLine::heard_instead() const {
+  const std::string_view heard(heard_.data(), heard_size_);
+  if (heard.empty() || frames_heard_ > 0) return {};
+  if (heard.find("\xFA\xFF") != std::string_view::npos) return "it speaks Xbus, as an XSens INS does";
+  if (heard.find("$G") != std::string_view::npos) return "it speaks NMEA 0183, as a GNSS receiver does";
+  const auto printable = [](char c) { return (c >= ' ' && c <= '~') || c == '\r' || c == '\n' || c == '\t'; };
+  if (std::all_of(heard.begin(), heard.end(), printable)) {
+    std::string some(heard.substr(0, 40));
+    std::replace_if(
+        some.begin(), some.end(), [](char c) { return c < ' '; }, ' ');
+    return "it writes text (\"" + some + "\")";
+  }
+  return "its bytes are no frames of the trigger protocol";
+}
+
+}  // namespace vergence::trigger_board

@@ -1,0 +1,55 @@
+#pragma once
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <string>
+
+#include "drivers/serial/byte_line.hpp"
+#include "firmware_iface/trigger/trigger.h"
+
+namespace vergence::trigger_board {
+
+/// What was received that is no frame.
+struct LineCounters {
+  std::uint64_t frames = 0;
+  std::uint64_t bad_coding = 0, bad_length = 0, bad_crc = 0;
+  [[nodiscard]] std::uint64_t refused() const noexcept { return bad_coding + bad_length + bad_crc; }
+};
+
+/// Frames of the trigger protocol on a line. They come one after the other, whoever asks for them: an answer that was waited for and an
+/// event that came in the same read are both had.
+///
+/// Threads  One caller. Memory: in place. Errors: what is no frame is counted and passed over; the next 00 is a new beginning.
+class BoardLine {
+ public:
+  /// From another line, or the same anew: what was read before is forgotten, the counters go on. The line outlives its use.
+  void attach(ByteLine* line) noexcept;
+  [[nodiscard]] HostStamp now() const noexcept { return line_->now(); }
+  /// Sends a frame, `sequence` (may be null): the number that its answer has. → ok, timeout, gone, failed
+  [[nodiscard]] DeviceStatus send(std::uint8_t type, std::span<const std::uint8_t> payload, std::uint8_t* sequence) noexcept;
+  /// The next frame, reading until `deadline` of the line's clock; `arrival`: of the read that completed it.
+  /// → ok, timeout, stopped (woken), ended, gone, failed
+  [[nodiscard]] DeviceStatus next(HostStamp deadline, TriggerFrame* frame, HostStamp* arrival) noexcept;
+
+  [[nodiscard]] LineCounters counters() const noexcept;
+  /// What the first bytes look like when no frame has come since attach() or forget(). Empty: nothing was heard, or frames were.
+  [[nodiscard]] std::string heard_instead() const;
+  void forget() noexcept;
+
+ private:
+  void remember() noexcept;
+
+  ByteLine* line_ = nullptr;
+  std::uint8_t sequence_ = 0;
+  TriggerDecoder decoder_{};
+  LineCounters before_{};                    // of the decoders before this one
+  std::array<std::uint8_t, 1024> buffer_{};  // of one read
+  std::size_t used_ = 0, size_ = 0;
+  HostStamp arrival_{};
+  std::array<char, 256> heard_{};
+  std::size_t heard_size_ = 0;
+  std::uint64_t frames_heard_ = 0;
+};
+
+}  // namespace vergence::trigger_board

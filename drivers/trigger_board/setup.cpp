@@ -1,0 +1,216 @@
+#include "drivers/trigger_board/setup.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cstdio>
+
+namespace vergence::trigger_board {
+namespace {
+
+constexpr std::array<std::uint32_t, 3> kBauds{921600, 115200, 460800};
+constexpr Duration kHello = Duration::milliseconds(500);
+constexpr Duration kAnswer = Duration::seconds(1);
+constexpr Duration kAskAgain = Duration::milliseconds(150);
+constexpr int kTurns = 3;  // of a question whose answer is not yet what was asked for
+
+template <class... Args>
+std::string text(const char* format, Args... args) {
+  std::array<char, 320> buffer{};
+  (void)std::snprintf(buffer.data(), buffer.size(), format, args...);
+  return buffer.data();
+}
+
+const char* words_of(std::uint8_t type) noexcept {
+  switch (type) {
+    case trigger_hello:
+      return "who it is";
+    case trigger_config:
+      return "to take its configuration";
+    case trigger_start:
+      return "to start";
+    case trigger_stop:
+      return "to stop";
+    default:
+      return "something";
+  }
+}
+
+std::string words_of_error(std::uint8_t code) {
+  switch (code) {
+    case trigger_error_rate:
+      return "its timer cannot make this rate; choose another trigger.rate";
+    case trigger_error_pulse:
+      return "the pulse is not shorter than its period, or has no width; change trigger.width_us or trigger.vary_us";
+    case trigger_error_line:
+      return "it does not have all of these lines and inputs; change trigger.lines, trigger.feedback, trigger.pps or trigger.ins";
+    case trigger_error_version:
+      return text("it does not speak version %d of the trigger protocol, as this program does; flash this release's firmware",
+                  static_cast<int>(trigger_protocol_version));
+    case trigger_error_unknown_type:
+    case trigger_error_wrong_size:
+      return "it does not know the message; flash this release's firmware";
+    case trigger_error_not_running:
+      return "it makes no pulses";
+    case trigger_error_not_stopped:
+      return "it still makes pulses";
+    case trigger_error_not_configured:
+      return "it has lost its configuration";
+    default:
+      return text("it gives error %u, which is none of this protocol version", static_cast<unsigned>(code));
+  }
+}
+
+}  // namespace
+
+std::uint32_t mark_of(const TriggerConfig& config) noexcept {
+  std::array<std::uint8_t, trigger_config_payload_size> payload{};
+  trigger_put_config(&config, payload.data());
+  return trigger_crc32(payload.data(), payload.size());
+}
+
+Setup::Answer Setup::listen(std::uint8_t type, std::uint8_t first, std::uint8_t last, std::uint8_t wanted, HostStamp until) {
+  for (;;) {  // ends at `until`
+    if (stop_.load(std::memory_order_acquire)) return Answer::stopped;
+    TriggerFrame frame;
+    HostStamp arrival;
+    const DeviceStatus status = frames_.next(until, &frame, &arrival);
+    if (status == DeviceStatus::timeout) return Answer::silent;
+    if (status == DeviceStatus::stopped) continue;  // woken: perhaps to be told to stop
+    if (status != DeviceStatus::ok) return Answer::gone;
+    const bool mine = static_cast<std::uint8_t>(frame.sequence - first) <= static_cast<std::uint8_t>(last - first);
+    if (mine && frame.type == wanted) {
+      frame_ = frame;
+      return Answer::ok;
+    }
+    TriggerError error;
+    if (mine && frame.type == trigger_error && trigger_get_error(frame.payload, frame.size, &error) && error.refused == type) {
+      error_ = error.code;
+      return Answer::refused;
+    }
+    if (others_ != nullptr) others_->accept(frame, arrival);
+  }
+}
+
+Setup::Answer Setup::ask(std::uint8_t type, std::span<const std::uint8_t> payload, std::uint8_t wanted, Duration limit) {
+  const HostStamp end = frames_.now() + limit;
+  std::uint8_t first = 0, last = 0;
+  for (bool again = false;; again = true) {  // each turn listens for kAskAgain of the limit
+    const DeviceStatus sent = frames_.send(type, payload, &last);
+    if (sent == DeviceStatus::gone || sent == DeviceStatus::failed) return Answer::gone;
+    if (!again) first = last;
+    const Answer answer = listen(type, first, last, wanted, std::min(end, frames_.now() + kAskAgain));
+    if (answer != Answer::silent || frames_.now() >= end) return answer;
+  }
+}
+
+DeviceStatus Setup::verdict(Answer answer, std::uint8_t type) {
+  switch (answer) {
+    case Answer::ok:
+      return DeviceStatus::ok;
+    case Answer::stopped:
+      return DeviceStatus::stopped;
+    case Answer::refused:
+      complaint_ = text("the trigger board refuses %s: ", words_of(type)) + words_of_error(error_);
+      return error_ == trigger_error_not_stopped || error_ == trigger_error_not_configured ? DeviceStatus::failed
+                                                                                           : DeviceStatus::unsupported;
+    case Answer::silent:
+    case Answer::gone:
+      break;
+  }
+  complaint_ = text("the trigger board did not answer when asked %s; check its cable and supply", words_of(type));
+  return DeviceStatus::gone;
+}
+
+DeviceStatus Setup::hello(Duration limit, TriggerInfo* info) {
+  const std::array<std::uint8_t, 1> version{trigger_protocol_version};
+  const Answer answer = ask(trigger_hello, version, trigger_info, limit);
+  if (answer == Answer::silent) return DeviceStatus::timeout;
+  if (answer == Answer::refused && error_ == trigger_error_version) return name_version();
+  if (answer != Answer::ok) return verdict(answer, trigger_hello);
+  // The version is the first byte in every version; what comes after it, only in this one.
+  const unsigned theirs = frame_.size > 0 ? frame_.payload[0] : 0U;
+  if (theirs != trigger_protocol_version) return other_version(theirs);
+  if (trigger_get_info(frame_.payload, frame_.size, info)) return DeviceStatus::ok;
+  complaint_ = text("the trigger board tells %u bytes about itself, which are no INFO; flash this release's firmware",
+                    static_cast<unsigned>(frame_.size));
+  return DeviceStatus::unsupported;
+}
+
+DeviceStatus Setup::other_version(unsigned theirs) {
+  complaint_ = text("the trigger board speaks version %u of the protocol and this program version %d; flash this release's firmware",
+                    theirs, static_cast<int>(trigger_protocol_version));
+  return DeviceStatus::unsupported;
+}
+
+/// A board refuses every version but its own: the one that it does not refuse is its.
+DeviceStatus Setup::name_version() {
+  constexpr std::uint8_t kNewest = 32;
+  constexpr Duration kSoon = Duration::milliseconds(150);
+  for (std::uint8_t v = 0; v < kNewest; ++v) {
+    if (v == trigger_protocol_version) continue;
+    const std::array<std::uint8_t, 1> version{v};
+    const Answer answer = ask(trigger_hello, version, trigger_info, kSoon);
+    if (answer == Answer::ok) return other_version(v);
+    if (answer != Answer::refused) break;
+  }
+  complaint_ = text(
+      "the trigger board does not speak version %d of the protocol, as this program does, nor any below %d; flash this release's "
+      "firmware",
+      static_cast<int>(trigger_protocol_version), static_cast<int>(kNewest));
+  return DeviceStatus::unsupported;
+}
+
+DeviceStatus Setup::find(std::uint32_t baud, TriggerInfo* info) {
+  std::string heard;
+  // Twice round: boards that begin anew when their port is opened sleep through the first.
+  for (int round = 0; round < 2; ++round) {
+    for (const std::uint32_t candidate : kBauds) {
+      const std::uint32_t rate = baud != 0 ? baud : candidate;
+      if (line_.baud() != rate) {
+        if (const DeviceStatus s = line_.set_baud(rate); s != DeviceStatus::ok) {
+          complaint_ = text("the port cannot be set to %u baud", rate);
+          return s;
+        }
+        frames_.attach(&line_);
+      }
+      const DeviceStatus status = hello(kHello, info);
+      if (status != DeviceStatus::timeout) return status;
+      if (heard.empty()) heard = frames_.heard_instead();
+      if (baud != 0) break;
+    }
+  }
+  complaint_ = heard.empty() ? std::string("nothing there answers as a trigger board does; check its cable, supply and firmware")
+                             : "what is there is no trigger board: " + heard + "; name the board's port in trigger.port";
+  return DeviceStatus::not_found;
+}
+
+template <class Fits>
+DeviceStatus Setup::ask_status(std::uint8_t type, std::span<const std::uint8_t> payload, TriggerStatus* status, Fits fits) {
+  for (int turn = 0; turn < kTurns; ++turn) {
+    const DeviceStatus answered = verdict(ask(type, payload, trigger_status, kAnswer), type);
+    if (answered != DeviceStatus::ok) return answered;
+    // One that the board sent unasked may have our number by chance: it then tells the state before.
+    TriggerStatus s;
+    if (!trigger_get_status(frame_.payload, frame_.size, &s) || !fits(s)) continue;
+    *status = s;
+    return DeviceStatus::ok;
+  }
+  complaint_ = text("the trigger board answers when asked %s, and does not do it; switch it off and on", words_of(type));
+  return DeviceStatus::failed;
+}
+
+DeviceStatus Setup::halt(TriggerStatus* status) {
+  return ask_status(trigger_stop, {}, status, [](const TriggerStatus& s) { return s.state == trigger_stopped; });
+}
+
+DeviceStatus Setup::configure(const TriggerConfig& config, TriggerStatus* status) {
+  std::array<std::uint8_t, trigger_config_payload_size> payload{};
+  trigger_put_config(&config, payload.data());
+  return ask_status(trigger_config, payload, status, [&](const TriggerStatus& s) { return s.configuration == mark_of(config); });
+}
+
+DeviceStatus Setup::start(TriggerStatus* status) {
+  return ask_status(trigger_start, {}, status, [](const TriggerStatus& s) { return s.state != trigger_stopped; });
+}
+
+}  // namespace vergence::trigger_board

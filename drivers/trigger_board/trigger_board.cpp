@@ -1,0 +1,92 @@
+#include "drivers/trigger_board/trigger_board.hpp"
+
+#include <filesystem>
+#include <utility>
+
+namespace vergence::trigger_board {
+namespace {
+
+/// Converters that XSens builds into its own cables: an INS is behind them.
+bool of_xsens(const SerialPortInfo& port) noexcept {
+  constexpr std::uint16_t kFtdi = 0x0403, kXsens = 0x2639;
+  return port.usb_vendor == kXsens || (port.usb_vendor == kFtdi && port.usb_product >= 0xD388 && port.usb_product <= 0xD38F);
+}
+
+/// The board's own USB: its baud rate is a word without meaning.
+bool is_native(const std::string& port) {
+  std::error_code none;
+  const std::filesystem::path real = std::filesystem::canonical(port, none);
+  return (none ? std::filesystem::path(port) : real).filename().string().rfind("ttyACM", 0) == 0;
+}
+
+}  // namespace
+
+Driver::Driver(const Options& options)
+    : Driver(options, {list_serial_ports, [](const std::string& port) { return std::make_unique<SerialPort>(port); }}) {}
+
+std::vector<std::string> Driver::candidates() const {
+  std::vector<std::string> found;
+  for (const SerialPortInfo& port : ports_.list())
+    if (port.usb_vendor != 0 && !of_xsens(port)) found.push_back(port.port);
+  return found;
+}
+
+std::unique_ptr<Device> Driver::open_port(const std::string& port, DeviceStatus* status) {
+  Options options = options_;
+  options.native_usb = options.native_usb || is_native(port);
+  return open_on(ports_.at(port), options, status, &complaint_);
+}
+
+std::vector<DeviceInfo> Driver::enumerate() {
+  std::vector<DeviceInfo> found;
+  for (const std::string& port : candidates()) {
+    DeviceStatus status = DeviceStatus::ok;
+    if (const auto board = open_port(port, &status)) found.push_back(board->info());
+  }
+  return found;
+}
+
+std::unique_ptr<Device> Driver::look_for(std::string_view serial, DeviceStatus* status) {
+  std::unique_ptr<Device> chosen;
+  std::string others;
+  DeviceStatus trouble = DeviceStatus::not_found;
+  for (const std::string& port : candidates()) {
+    std::unique_ptr<Device> board = open_port(port, status);
+    if (board == nullptr) {
+      // A board that cannot be used is worth more words than a port without one.
+      if (*status != DeviceStatus::not_found && *status != DeviceStatus::gone) trouble = *status, others = complaint_;
+      continue;
+    }
+    if (!serial.empty() && board->info().serial != serial) continue;
+    if (chosen != nullptr) {
+      complaint_ = "there is more than one trigger board; name one's port or serial number in trigger.port";
+      *status = DeviceStatus::not_found;
+      return nullptr;
+    }
+    chosen = std::move(board);
+  }
+  *status = chosen != nullptr ? DeviceStatus::ok : trouble;
+  complaint_ = chosen != nullptr ? ""
+               : !others.empty() ? others
+               : serial.empty()
+                   ? "no trigger board answers on any USB port; plug it in, or name its port in trigger.port"
+                   : "no trigger board with serial number " + std::string(serial) + " answers; check trigger.port and its cable";
+  return chosen;
+}
+
+std::unique_ptr<Device> Driver::open_board(std::string_view where, DeviceStatus* status) {
+  complaint_.clear();
+  return where.find('/') != std::string_view::npos ? open_port(std::string(where), status) : look_for(where, status);
+}
+
+std::unique_ptr<TriggerDevice> Driver::open(std::string_view where, DeviceStatus* status) { return open_board(where, status); }
+
+std::unique_ptr<Device> open_on(std::unique_ptr<LinePlace> place, const Options& options, DeviceStatus* status, std::string* complaint) {
+  auto device = std::make_unique<Device>(std::move(place), options);
+  *status = device->connect();
+  if (*status == DeviceStatus::ok) return device;
+  *complaint = device->complaint();
+  return nullptr;
+}
+
+}  // namespace vergence::trigger_board
