@@ -70,6 +70,8 @@ void Progress::update(const ProgressState& state) {
   state_word_ = state.state;
   last_ = state;
   last_.state = state_word_;
+  words_ = state.words;
+  last_.words = words_;
   drawn_ = false;
   if (!started_) {
     started_ = true;
@@ -103,7 +105,10 @@ std::string Progress::line(HostStamp now) const {
   const auto part = [&text](const std::string& p) { text += (text.empty() ? "" : " · ") + p; };
   if (!s.state.empty()) part(std::string(s.state));
   part(s.frames > 0 ? fmt::format("frame {}/{}", s.frame, s.frames) : fmt::format("frame {}", s.frame));
-  part(fmt::format("{:.2f} km", s.path_m / 1000.0));
+  if (s.words.empty())
+    part(fmt::format("{:.2f} km", s.path_m / 1000.0));
+  else
+    part(std::string(s.words));
   if (s.inliers) part(fmt::format("{} inliers", *s.inliers));
   if (s.estimate_ms) part(fmt::format("{:.1f} ms", *s.estimate_ms));
   if (s.from_ins_m) part(fmt::format("{:.2f} m from INS", *s.from_ins_m));
