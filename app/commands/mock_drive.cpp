@@ -109,7 +109,10 @@ MockDrive make_mock_drive(const Configuration& c, const std::vector<std::string>
                                      camera.gain_db, CameraTrigger::hardware};
     configured(drive.rig->camera(k).configure(wanted, nullptr), fmt::format("cameras.{}", k));
   }
-  configured(drive.rig->trigger().configure({c.trigger.rate}, nullptr), "trigger");
+  TriggerConfiguration pulses;
+  pulses.rate_hz = c.trigger.rate;
+  pulses.lines = static_cast<std::uint8_t>((1U << static_cast<unsigned>(rig.cameras)) - 1U);
+  configured(drive.rig->trigger().configure(pulses, nullptr), "trigger");
   drive.has_ins = c.ins.driver == "mock";
   if (drive.has_ins) configured(drive.rig->ins().configure(c.ins.rate, nullptr), "ins");
   return drive;
@@ -134,11 +137,8 @@ ComparisonOptions comparison_options(const Configuration& c) {
 
 std::vector<StampedPose> true_trajectory(const mock::MockRig& rig, const Configuration& c, Stamp start) {
   std::vector<StampedPose> poses;
-  const std::uint64_t n = rig.pulses(c.trigger.rate);
-  poses.reserve(n);
-  for (std::uint64_t i = 0; i < n; ++i) {
-    const Duration middle =
-        Duration::seconds(static_cast<double>(i) / c.trigger.rate) + Duration::seconds(c.cameras[0].exposure_us * 0.5e-6);
+  for (const Duration pulse : rig.pulse_times()) {
+    const Duration middle = pulse + Duration::seconds(c.cameras[0].exposure_us * 0.5e-6);
     poses.push_back({start + middle, rig.truth().camera_in_enu(0, middle)});
   }
   return poses;

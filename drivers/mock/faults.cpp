@@ -39,6 +39,9 @@ constexpr FaultParameter kLose[] = {kCamera, kShare, kDuration};
 constexpr FaultParameter kLate[] = {kCamera, kShare, {"delay_s", 0.2, 0, 10, "later than usual by this"}, kDuration};
 constexpr FaultParameter kBreakPairs[] = {{"share", 1, 0, 1, "of the pulses, drawn at random"}, kDuration};
 constexpr FaultParameter kMissed[] = {kCamera1, {"pulses", 1, 1, 1e6, "one after the other"}};
+constexpr FaultParameter kBoardGone[] = {
+    kDuration, {"powered", 0, 0, 1, "1: it has a supply of its own and pulses on; 0: it stops with the line and starts anew"}};
+constexpr FaultParameter kReboot[] = {{"duration_s", 0.5, 0.01, kLongest, "until it pulses again"}};
 constexpr FaultParameter kInsGone[] = {kDuration};
 constexpr FaultParameter kPositionJump[] = {{"east_m", 100, -1e5, 1e5, "towards east"},
                                             {"north_m", 0, -1e5, 1e5, "towards north"},
@@ -64,6 +67,9 @@ constexpr FaultRow kRows[] = {
     {FaultKind::duplicate_frames, "duplicate_frames", "Frames arrive twice.", kLose},
     {FaultKind::break_pairs, "break_pairs", "Of a pulse one camera's image, drawn at random, never arrives.", kBreakPairs},
     {FaultKind::missed_trigger, "missed_trigger", "A camera does not see a pulse: it exposes nothing and does not count it.", kMissed},
+    {FaultKind::board_gone, "board_gone", "The line to the trigger board is unplugged.", kBoardGone},
+    {FaultKind::board_reboot, "board_reboot", "The trigger board starts anew: its pulses stop, then count from 0 again by a clock from 0.",
+     kReboot},
     {FaultKind::ins_gone, "ins_gone", "The INS is silent; at 0 it starts late.", kInsGone},
     {FaultKind::no_fix, "no_fix", "The satellite receiver has no position.", kInsGone},
     {FaultKind::position_jump, "position_jump", "The INS's position leaps.", kPositionJump},
@@ -104,6 +110,7 @@ void set(Fault* fault, std::string_view name, double value) {
   if (name == "delay_s") fault->delay = value;
   if (name == "jump_s") fault->jump = value;
   if (name == "pulses") fault->pulses = static_cast<int>(value);
+  if (name == "powered") fault->powered = value != 0;
 }
 
 std::string text_of(double value) {
@@ -137,7 +144,7 @@ Fault make_fault(const std::string& kind, double at_s, const std::vector<std::pa
     if (!(value >= known->least && value <= known->most))
       throw std::invalid_argument(kind + "'s " + name + " is " + text_of(value) + "; it must be in " + text_of(known->least) + " … " +
                                   text_of(known->most));
-    if ((name == "camera" || name == "pulses") && value != static_cast<int>(value))
+    if ((name == "camera" || name == "pulses" || name == "powered") && value != static_cast<int>(value))
       throw std::invalid_argument(kind + "'s " + name + " is not a whole number");
     set(&fault, name, value);
   }

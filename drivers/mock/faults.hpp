@@ -29,6 +29,8 @@ enum class FaultKind : std::uint8_t {
   duplicate_frames,
   break_pairs,
   missed_trigger,
+  board_gone,
+  board_reboot,
   ins_gone,
   no_fix,
   position_jump,
@@ -50,6 +52,7 @@ struct Fault {
   double delay = 0;           // s
   double jump = 0;            // s
   int pulses = 0;             // one after the other
+  bool powered = false;       // it has a supply of its own
 
   [[nodiscard]] bool active(Duration time) const noexcept { return time >= at && (duration <= Duration{} || time < at + duration); }
   [[nodiscard]] bool concerns(int k) const noexcept { return camera < 0 || camera == k; }

@@ -13,7 +13,7 @@ namespace vergence::mock {
 class MockRig::Impl {
  public:
   Impl(std::shared_ptr<const RigTruth> truth, const MockRigOptions& o)
-      : context{std::move(truth), o, {}}, ins(&context), scheduler(&context, &cameras, &ins), trigger(context, &scheduler) {
+      : context{std::move(truth), o, {}, {}}, ins(&context), scheduler(&context, &cameras, &ins), trigger(&context, &scheduler) {
     if (o.blur_samples < 1) throw std::invalid_argument("mock: blur_samples must be 1 or more");
     const int count = context.truth->mounted().cameras;
     for (int k = 0; k < count; ++k) cameras.push_back(std::make_unique<MockCamera>(&context, k));
@@ -46,6 +46,13 @@ std::size_t MockRig::image_bytes() const noexcept {
   return sum;
 }
 HostStamp MockRig::start() const noexcept { return impl_->scheduler.start(); }
+std::vector<Duration> MockRig::pulse_times() const {
+  const PulsePlan plan = impl_->scheduler.plan_of(impl_->trigger.configuration());
+  std::vector<Duration> times;
+  times.reserve(plan.size());
+  for (std::size_t i = 0; i < plan.size(); ++i) times.push_back(plan.at(i).time);
+  return times;
+}
 std::uint64_t MockRig::pulses(double rate_hz) const noexcept { return impl_->scheduler.pulses(rate_hz); }
 
 }  // namespace vergence::mock

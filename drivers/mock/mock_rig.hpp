@@ -1,7 +1,9 @@
 #pragma once
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <vector>
 
 #include "drivers/camera.hpp"
 #include "drivers/ins.hpp"
@@ -21,15 +23,21 @@ struct MockRigOptions {
   bool noise = true;                // shot and read noise of the sensors
   int blur_samples = 1;             // poses averaged over an exposure: 1 is none; the time to render grows with it
   bool ideal_ins = false;
-  double clock_drift_ppm = 30;  // largest of the devices' clocks; each has its own
-  bool jitter = true;           // of the arrivals
-  Duration duration{};          // of the drive; zero: all of it
+  double clock_drift_ppm = 30;                        // largest of the devices' clocks; each has its own
+  bool jitter = true;                                 // of the arrivals
+  Duration duration{};                                // of the drive; zero: all of it
+  std::array<Duration, kMaxCameras> trigger_delay{};  // from a pulse's edge to the start of the exposure, by camera
+  /// Virtual time: the consumer takes the board's reports, in the order of arrival. The board then runs no farther ahead of them than
+  /// what decides at which pulse a pause begins: the fourth after the newest report taken, on every run.
+  bool reports_taken = false;
 };
 
 /// A rig that does not exist: cameras, INS and trigger board behind the drivers' interfaces, on a vehicle driving through a world.
 ///
 /// The drive begins when the trigger is started (the cameras and the INS before it), with pulse 0 at the drive's time 0.
-/// Every device has a clock of its own, with offset and drift; arrivals have a least delay and a jitter above it.
+/// Every device has a clock of its own, with offset and drift; arrivals have a least delay and a jitter above it. Pulse n of a boot goes
+/// to every camera whose line is pulsed; a camera's exposure starts `trigger_delay` later. With feedback wired the report has every
+/// exposure in whole microseconds and comes after the last of them, or just before the next pulse where one never came.
 /// Ownership  The devices live in the rig; it outlives their use.
 /// Threads    Pictures are rendered on two threads of the rig's, one camera each; in real time another hands them out when they are due.
 /// Time       Virtual: arrivals are what they would be, nothing waits for a clock; items become visible in the order of their arrivals over
@@ -53,6 +61,8 @@ class MockRig {
 
   /// The host's time at the drive's start; known once the trigger was started (virtual time: always the same).
   [[nodiscard]] HostStamp start() const noexcept;
+  /// When the board pulses, pauses apart: since the drive's start, by the host's clock. After the trigger is configured.
+  [[nodiscard]] std::vector<Duration> pulse_times() const;
   /// Pulses of the whole drive at this rate.
   [[nodiscard]] std::uint64_t pulses(double rate_hz) const noexcept;
 

@@ -20,7 +20,8 @@ DeviceStatus MockCamera::configure(const CameraConfiguration& wanted, CameraConf
   if (!(wanted.rate_hz > 0) || wanted.exposure <= Duration{} || wanted.exposure.to_seconds() * wanted.rate_hz > 1)
     return DeviceStatus::bad_configuration;
   if (wanted.width != lens.width || wanted.height != lens.height) return DeviceStatus::unsupported;
-  if (stream.streaming()) return DeviceStatus::busy;
+  if (stream.streaming() || out_.load() > 0 || (rig_->pulsing.load() && !rig_->options.real_time)) return DeviceStatus::busy;
+  const std::unique_lock mine(memory);
   try {
     arena_ = std::make_unique<Arena>(FramePool::memory_needed(lens.width, lens.height, MockRig::kSlots) + kCacheLine);
     pool_ = std::make_unique<FramePool>(lens.width, lens.height, MockRig::kSlots, *arena_);
@@ -31,6 +32,7 @@ DeviceStatus MockCamera::configure(const CameraConfiguration& wanted, CameraConf
     return DeviceStatus::failed;
   }
   configuration_ = wanted;
+  generation_.fetch_add(1, std::memory_order_release);
   if (actual != nullptr) *actual = wanted;
   return DeviceStatus::ok;
 }
@@ -53,6 +55,7 @@ DeviceStatus MockCamera::wait(Duration limit, Frame* frame) noexcept {
     *frame = d.value;
     frame->arrival = d.arrival;
     delivered_.fetch_add(1, std::memory_order_relaxed);
+    out_.fetch_add(1);
     rig_->room.made();
   } else if (status == DeviceStatus::gone) {
     if (!gone_) frame->arrival = d.arrival;
@@ -63,6 +66,7 @@ DeviceStatus MockCamera::wait(Duration limit, Frame* frame) noexcept {
 
 void MockCamera::release(FrameSlot slot) noexcept {
   pool_->release(slot);
+  out_.fetch_sub(1);
   rig_->room.made();
 }
 
@@ -94,6 +98,7 @@ MockIns::MockIns(RigContext* rig) : rig_(rig), clock_(DeviceOscillator::of(rig->
 DeviceStatus MockIns::configure(double rate_hz, double* actual_hz) noexcept {
   if (!(rate_hz > 0)) return DeviceStatus::bad_configuration;
   if (rate_hz > 400) return DeviceStatus::unsupported;
+  if (rig_->pulsing.load()) return DeviceStatus::busy;
   rate_ = rate_hz;
   model_ = std::make_unique<InsModel>(InsModelOptions{rig_->options.ideal_ins, mixed(rig_->options.seed, 99), rate_hz}, *rig_->truth);
   if (actual_hz != nullptr) *actual_hz = rate_hz;
@@ -132,24 +137,30 @@ InsStatistics MockIns::statistics() const noexcept {
 
 // ---- trigger board ------------------------------------------------------------------------------------------------
 
-MockTrigger::MockTrigger(const RigContext& rig, PulseListener* listener)
-    : listener_(listener), clock_(DeviceOscillator::of(rig.options.seed, -2, rig.options.clock_drift_ppm)) {}
+MockTrigger::MockTrigger(RigContext* rig, PulseListener* listener)
+    : rig_(rig), listener_(listener), clock_(DeviceOscillator::of(rig->options.seed, -2, rig->options.clock_drift_ppm)) {}
 
 DeviceStatus MockTrigger::configure(const TriggerConfiguration& wanted, TriggerConfiguration* actual) noexcept {
-  if (!(wanted.rate_hz > 0)) return DeviceStatus::bad_configuration;
+  if (!(wanted.rate_hz > 0) || wanted.width <= Duration{} || wanted.vary < Duration{}) return DeviceStatus::bad_configuration;
   if (wanted.rate_hz > 200) return DeviceStatus::unsupported;
-  rate_ = wanted.rate_hz;
+  const Duration period = Duration::seconds(1 / wanted.rate_hz);
+  if (wanted.vary * 2 > period || wanted.width + wanted.vary >= period) return DeviceStatus::unsupported;
+  if (rig_->pulsing.load()) return DeviceStatus::busy;
+  configuration_ = wanted;
   if (actual != nullptr) *actual = wanted;
   return DeviceStatus::ok;
 }
 
 DeviceStatus MockTrigger::start(Notifier* ready) noexcept {
-  if (!(rate_ > 0)) return DeviceStatus::bad_configuration;
-  if (stream.streaming()) return DeviceStatus::ok;
+  if (!(configuration_.rate_hz > 0)) return DeviceStatus::bad_configuration;
+  const bool was = stream.streaming();
   const DeviceStatus status = stream.start(ready);
-  if (status != DeviceStatus::ok) return status;
+  if (status != DeviceStatus::ok || (was && !gone_)) return status;
+  starts_.fetch_add(1, std::memory_order_relaxed);
+  gone_ = false;
+  if (was) return status;  // it is back; its pulses go on by themselves
   try {
-    listener_->begin(rate_);
+    listener_->begin(configuration_);
   } catch (const std::exception&) {
     stream.stop();
     return DeviceStatus::failed;
@@ -158,25 +169,56 @@ DeviceStatus MockTrigger::start(Notifier* ready) noexcept {
 }
 
 DeviceStatus MockTrigger::wait(Duration limit, Pulse* pulse) noexcept {
-  Delivery<Pulse> d;
+  Delivery<BoardReport> d;
   const DeviceStatus status = stream.take(limit, &d);
+  if (status == DeviceStatus::gone) {
+    if (!gone_) pulse->arrival = d.arrival;
+    gone_ = true;
+    rig_->room.made();
+  }
   if (status != DeviceStatus::ok) return status;
-  *pulse = d.value;
+  *pulse = d.value.pulse;
   pulse->arrival = d.arrival;
   pulses_.fetch_add(1, std::memory_order_relaxed);
+  {
+    const std::lock_guard lock(asking_);
+    if (!any_) pause_boot_ = d.value.pulse.boot;  // of a pause that was asked for before the first report
+    any_ = true;
+    newest_ = d.value.slot;
+    boot_ = d.value.pulse.boot;
+  }
+  rig_->room.made();
   return status;
+}
+
+DeviceStatus MockTrigger::pause(std::uint32_t pulses) noexcept {
+  // A report is taken before the third pulse after it at the latest, see Scheduler: the fourth is not made yet, on any run.
+  constexpr std::uint64_t kAhead = 4;
+  if (!stream.streaming()) return DeviceStatus::stopped;
+  if (gone_) return DeviceStatus::gone;
+  const std::lock_guard lock(asking_);
+  const bool under_way = pause_end_ > 0 && pause_boot_ == boot_ && newest_ < pause_end_;
+  if (pulses == 0 || under_way) return DeviceStatus::ok;
+  const std::uint64_t from = any_ ? newest_ + kAhead : kAhead;
+  pause_end_ = from + pulses;
+  pause_boot_ = boot_;
+  listener_->leave_out(from, pulses, boot_);
+  return DeviceStatus::ok;
 }
 
 void MockTrigger::stop() noexcept {
   stream.stop();
+  rig_->room.made();
   listener_->halt();
 }
 
 TriggerStatistics MockTrigger::statistics() const noexcept {
   TriggerStatistics s;
   s.pulses = pulses_.load(std::memory_order_relaxed);
+  s.lost = lost.load(std::memory_order_relaxed);
+  s.reboots = reboots.load(std::memory_order_relaxed);
   s.overruns = overruns.load(std::memory_order_relaxed);
-  s.starts = 1;
+  s.starts = starts_.load(std::memory_order_relaxed);
   return s;
 }
 

@@ -2,6 +2,8 @@
 #include <atomic>
 #include <cstdint>
 #include <memory>
+#include <mutex>
+#include <shared_mutex>
 #include <vector>
 
 #include "core/memory/arena.hpp"
@@ -38,10 +40,12 @@ struct RigContext {
   std::shared_ptr<const RigTruth> truth;
   MockRigOptions options;
   Room room;
+  std::atomic<bool> pulsing{false};  // the scheduler's threads use the devices
 };
 
-inline constexpr Duration kTransfer = Duration::milliseconds(5);    // of an image over its bus
-inline constexpr Duration kInsLatency = Duration::milliseconds(4);  // filter and serial line
+inline constexpr Duration kTransfer = Duration::milliseconds(5);       // of an image over its bus
+inline constexpr Duration kInsLatency = Duration::milliseconds(4);     // filter and serial line
+inline constexpr Duration kReportLatency = Duration::milliseconds(1);  // of a pulse
 
 class MockCamera final : public CameraDevice {
  public:
@@ -50,7 +54,7 @@ class MockCamera final : public CameraDevice {
 
   const DeviceInfo& info() const noexcept override { return info_; }
   DeviceStatus configure(const CameraConfiguration& wanted, CameraConfiguration* actual) noexcept override;
-  DeviceTiming timing() const noexcept override { return {configuration_.exposure + kTransfer}; }
+  DeviceTiming timing() const noexcept override { return {trigger_delay() + configuration_.exposure + kTransfer}; }
   DeviceStatus start(Notifier* ready) noexcept override;
   DeviceStatus wait(Duration limit, Frame* frame) noexcept override;
   ImageView view(FrameSlot slot) const noexcept override { return pool_->view(slot); }
@@ -61,6 +65,12 @@ class MockCamera final : public CameraDevice {
   // The scheduler's side.
   Stream<Frame, 64> stream;
   std::atomic<std::uint64_t> underruns{0}, lost{0};
+  /// Held (shared) while pictures are planned, rendered and sent: configure() waits for it in real time.
+  std::shared_mutex memory;
+  /// Of the memory: frames of an older one are nobody's.
+  [[nodiscard]] std::uint32_t generation() const noexcept { return generation_.load(std::memory_order_acquire); }
+  /// From the edge of a pulse to the start of its exposure.
+  [[nodiscard]] Duration trigger_delay() const noexcept { return rig_->options.trigger_delay[static_cast<std::size_t>(k_)]; }
   [[nodiscard]] FramePool& pool() noexcept { return *pool_; }
   [[nodiscard]] const CameraConfiguration& configuration() const noexcept { return configuration_; }
   [[nodiscard]] const DeviceOscillator& clock() const noexcept { return clock_; }
@@ -80,7 +90,9 @@ class MockCamera final : public CameraDevice {
   std::unique_ptr<Renderer> renderer_;
   std::vector<std::uint8_t> mosaic_;  // empty: the renderer's picture is what is handed out
   std::atomic<std::uint64_t> delivered_{0}, starts_{0};
-  bool gone_ = false;  // the consumer's
+  std::atomic<std::uint32_t> generation_{0};
+  std::atomic<int> out_{0};  // slots the consumer holds
+  bool gone_ = false;        // the consumer's
 };
 
 class MockIns final : public InsDevice {
@@ -118,36 +130,56 @@ class PulseListener {
  public:
   virtual ~PulseListener() = default;
   /// Throws std::exception when that is not possible.
-  virtual void begin(double rate_hz) = 0;
+  virtual void begin(const TriggerConfiguration& c) = 0;
   /// Twice is harmless.
   virtual void halt() noexcept = 0;
+  /// So many slots of the plan, from that one on, are left out in this boot; slots that were made already are not.
+  virtual void leave_out(std::uint64_t from, std::uint32_t pulses, std::uint32_t boot) noexcept = 0;
+};
+
+/// A pulse and its place in the plan.
+struct BoardReport {
+  Pulse pulse{};
+  std::uint64_t slot = 0;
 };
 
 class MockTrigger final : public TriggerDevice {
  public:
   /// The listener outlives it.
-  MockTrigger(const RigContext& rig, PulseListener* listener);
+  MockTrigger(RigContext* rig, PulseListener* listener);
   ~MockTrigger() override { stop(); }
 
   const DeviceInfo& info() const noexcept override { return info_; }
   DeviceStatus configure(const TriggerConfiguration& wanted, TriggerConfiguration* actual) noexcept override;
+  DeviceTiming timing() const noexcept override { return {kReportLatency}; }
   DeviceStatus start(Notifier* ready) noexcept override;
   DeviceStatus wait(Duration limit, Pulse* pulse) noexcept override;
+  /// From the fourth slot after that of the newest report taken. One that is asked for before the last is over changes nothing.
+  DeviceStatus pause(std::uint32_t pulses) noexcept override;
   void stop() noexcept override;
   TriggerStatistics statistics() const noexcept override;
 
   // The scheduler's side.
   static constexpr std::size_t kRing = 64;
-  Stream<Pulse, kRing> stream;
-  std::atomic<std::uint64_t> overruns{0};
+  Stream<BoardReport, kRing> stream;
+  std::atomic<std::uint64_t> overruns{0}, lost{0}, reboots{0};
   [[nodiscard]] const DeviceOscillator& clock() const noexcept { return clock_; }
+  [[nodiscard]] const TriggerConfiguration& configuration() const noexcept { return configuration_; }
 
  private:
+  RigContext* rig_;
   PulseListener* listener_;
   DeviceInfo info_{"mock", "mock-board", "simulated trigger board", "world"};
   DeviceOscillator clock_;
-  double rate_ = 0;
-  std::atomic<std::uint64_t> pulses_{0};
+  TriggerConfiguration configuration_{};
+  std::atomic<bool> gone_{false};
+  std::atomic<std::uint64_t> pulses_{0}, starts_{0};
+  std::mutex asking_;  // of what follows
+  bool any_ = false;
+  std::uint64_t newest_ = 0;  // slot of the report taken last, and its boot
+  std::uint32_t boot_ = 0;
+  std::uint64_t pause_end_ = 0;  // slot after the pause asked for last
+  std::uint32_t pause_boot_ = 0;
 };
 
 }  // namespace vergence::mock

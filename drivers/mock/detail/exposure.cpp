@@ -14,7 +14,8 @@ void choose_image(const RigTruth& truth, const PulseAt& pulse, Exposure* e) noex
     if (f.kind == FaultKind::swap_cables && e->camera < 2) e->camera = 1 - e->camera;
   }
   if (!late) return;
-  e->time = pulse.time - pulse.period;
+  e->time =
+      pulse.time - (pulse.number == 0 ? pulse.plan->period() : pulse.plan->at(pulse.number).time - pulse.plan->at(pulse.number - 1).time);
   e->pulse = pulse.number - 1;
 }
 
@@ -40,7 +41,8 @@ Exposure exposure_of(const RigTruth& truth, std::uint64_t seed, const PulseAt& p
     if (f.kind == FaultKind::lose_frames && drawn) e.lost = true;
     if (f.kind == FaultKind::late_frames && drawn) e.delay = e.delay + Duration::seconds(f.delay);
     if (f.kind == FaultKind::duplicate_frames && drawn) e.twice = true;
-    if (f.kind == FaultKind::missed_trigger && pulse.time < f.at + pulse.period * f.pulses) e.missed = true;
+    if (f.kind == FaultKind::missed_trigger && pulse.number < pulse.plan->first_from(f.at) + static_cast<std::uint64_t>(f.pulses))
+      e.missed = true;
     if (f.kind == FaultKind::break_pairs) {
       Random together(of_pulse, kEveryCamera);
       const bool broken = together.uniform() < f.share;

@@ -1,15 +1,16 @@
 #pragma once
 #include <cstdint>
 
+#include "drivers/mock/detail/pulse_plan.hpp"
 #include "drivers/mock/rig_truth.hpp"
 
 namespace vergence::mock {
 
 /// One pulse as a camera's input meets it.
 struct PulseAt {
-  std::uint64_t number = 0;
-  Duration time{};    // since the drive's start
-  Duration period{};  // between two pulses
+  std::uint64_t number = 0;  // its slot in the plan
+  Duration time{};           // of the exposure's start, since the drive's start
+  const PulsePlan* plan = nullptr;
 };
 
 /// What becomes of one camera's image of one pulse, by the faults that are due.

@@ -12,7 +12,6 @@ namespace vergence::mock {
 namespace {
 
 constexpr Duration kNominalExposure = Duration::milliseconds(8);
-constexpr Duration kReportLatency = Duration::milliseconds(1);  // of a pulse
 constexpr Duration kJitterMean = Duration::microseconds(150);
 constexpr Duration kJitterMost = Duration::microseconds(1900);  // below DeviceTiming::delay_spread
 
@@ -24,13 +23,21 @@ HostStamp monotonic_now() noexcept {
 
 }  // namespace
 
-void Scheduler::begin(double rate_hz) {
+PulsePlan Scheduler::plan_of(const TriggerConfiguration& c) const {
+  Duration length = rig_.truth->drive().duration();
+  if (rig_.options.duration > Duration{}) length = std::min(length, rig_.options.duration);
+  return {c, length, rig_.truth->faults()};
+}
+
+void Scheduler::begin(const TriggerConfiguration& c) {
   halt();
-  rate_ = rate_hz;
+  board_ = c;
+  plan_ = plan_of(c);
   stop_ = false;
   finished_ = false;
   constexpr Duration kLead = Duration::milliseconds(100);  // the first pictures are rendered before they are due
   if (rig_.options.real_time) start_ = monotonic_now() + kLead;
+  rig_.pulsing = true;
   producer_ = std::thread([this] { produce(); });
   if (rig_.options.real_time) deliverer_ = std::thread([this] { hand_out_in_time(); });
 }
@@ -42,6 +49,13 @@ void Scheduler::halt() noexcept {
   posted_.notify_all();
   if (producer_.joinable()) producer_.join();
   if (deliverer_.joinable()) deliverer_.join();
+  rig_.pulsing = false;
+}
+
+void Scheduler::leave_out(std::uint64_t from, std::uint32_t pulses, std::uint32_t boot) noexcept {
+  const std::lock_guard lock(pausing_);
+  from = std::max(from, made_);
+  pause_ = {from, from + pulses, boot};
 }
 
 std::uint64_t Scheduler::pulses(double rate_hz) const noexcept {
@@ -61,10 +75,22 @@ HostStamp Scheduler::jittered(HostStamp least, std::uint64_t device, std::uint64
 
 void Scheduler::produce() {
   (void)pthread_setname_np(pthread_self(), "vergence-mock");
-  const std::uint64_t count = pulses(rate_);
+  const std::uint64_t count = plan_.size();
   for (std::uint64_t n = 0; n < count && !stopping(); ++n) {
+    while (rig_.options.reports_taken && !rig_.options.real_time && !stopping()) {
+      const std::uint32_t seen = rig_.room.look();
+      if (trigger_->stream.empty() || !trigger_->stream.streaming()) break;
+      rig_.room.wait(seen);
+    }
     make_readings(host_of(n + 4));
-    make_pulse(n);
+    make_link_events(n);
+    if (left_out(n)) {
+      for (Sender& s : senders_) ++s.counter_base;
+      resumed_ = true;
+      if (!rig_.options.real_time) deliver_until(host_of(n + 1));
+      continue;
+    }
+    make_report(n);
     if (rig_.options.real_time && !wait_for_its_turn(n)) {
       for (const auto& camera : cameras_) camera->lost.fetch_add(1, std::memory_order_relaxed);
       continue;
@@ -73,6 +99,7 @@ void Scheduler::produce() {
     // Whatever is made later was measured at the next pulse or after it.
     if (!rig_.options.real_time) deliver_until(host_of(n + 1));
   }
+  make_link_events(count);
   announce_end(host_of(count + 4) + Duration::seconds(11));
   if (!rig_.options.real_time) {
     deliver_until(HostStamp(INT64_MAX));
@@ -85,17 +112,85 @@ void Scheduler::produce() {
 
 /// Not further ahead than two pulses. False: the pulse is over before its pictures are begun.
 bool Scheduler::wait_for_its_turn(std::uint64_t pulse) {
-  const Duration period = Duration::seconds(1 / rate_);
+  const Duration period = plan_.period();
   while (monotonic_now() < host_of(pulse) - period * 2 && !stopping()) std::this_thread::sleep_for(std::chrono::milliseconds(1));
   return monotonic_now() <= host_of(pulse) + period;
 }
 
-void Scheduler::make_pulse(std::uint64_t pulse) {
+/// The line's going and coming until the next slot.
+void Scheduler::make_link_events(std::uint64_t pulse) {
+  const bool last = pulse + 1 >= plan_.size();
+  for (; link_events_ < plan_.link().size(); ++link_events_) {
+    const PulsePlan::LinkEvent& event = plan_.link()[link_events_];
+    if (!last && event.time >= plan_.at(pulse + 1).time) return;
+    Parcel p;
+    p.device = kTriggerDevice;
+    p.arrival = start_ + event.time;
+    p.report.what = event.gone ? Delivery<BoardReport>::What::gone : Delivery<BoardReport>::What::back;
+    post(p);
+  }
+}
+
+/// A pause that is due, in the boot that it was asked of.
+bool Scheduler::left_out(std::uint64_t pulse) {
+  const std::lock_guard lock(pausing_);
+  made_ = pulse + 1;
+  if (!pause_) return false;
+  const bool in_boot = pause_->boot == 0 || pause_->boot == boot_of(pulse);
+  if (!in_boot || pulse >= pause_->end) pause_.reset();
+  return pause_ && pulse >= pause_->from;
+}
+
+std::uint32_t Scheduler::boot_of(std::uint64_t pulse) const noexcept {
+  return static_cast<std::uint32_t>(mixed(rig_.options.seed, 5000U + plan_.at(pulse).boot)) | 1U;
+}
+
+PulseAt Scheduler::pulse_at(std::uint64_t pulse, int k) const noexcept {
+  return {pulse, plan_.at(pulse).time + cameras_[static_cast<std::size_t>(k)]->trigger_delay(), &plan_};
+}
+
+bool Scheduler::unplugged(std::uint64_t pulse, int k) const noexcept {
+  const Duration time = plan_.at(pulse).time;
+  return std::any_of(rig_.truth->faults().begin(), rig_.truth->faults().end(),
+                     [&](const Fault& f) { return f.kind == FaultKind::camera_gone && f.concerns(k) && f.active(time); });
+}
+
+PulseExposure Scheduler::feedback(std::uint64_t pulse, int k) const {
+  const MockCamera& camera = *cameras_[static_cast<std::size_t>(k)];
+  if (!pulsed(k) || unplugged(pulse, k) || !camera.stream.streaming()) return {};
+  if (exposure_of(*rig_.truth, rig_.options.seed, pulse_at(pulse, k), k).missed) return {};
+  const auto in_ticks = [](Duration d) { return Duration::microseconds((d.ns() + 500) / 1000); };
+  return {true, in_ticks(camera.trigger_delay()), in_ticks(camera.trigger_delay() + camera.configuration().exposure)};
+}
+
+void Scheduler::make_report(std::uint64_t pulse) {
+  const HostStamp edge = host_of(pulse);
+  const PulsePlan::Slot slot = plan_.at(pulse);
   Parcel p;
   p.device = kTriggerDevice;
-  p.arrival = jittered(host_of(pulse) + kReportLatency, 20, pulse);
-  p.pulse.value.number = pulse;
-  p.pulse.value.edge = trigger_->clock().read(host_of(pulse), host_of(pulse) - start_, rig_.truth->faults());
+  p.report.value.slot = pulse;
+  Pulse& report = p.report.value.pulse;
+  report.number = slot.number;
+  report.boot = boot_of(pulse);
+  report.resumed = resumed_ || slot.number == 0;
+  resumed_ = false;
+  // A boot's ticks begin with it; those of the first have been running for as long as the clock says.
+  const HostStamp booted = start_ + plan_.boot_time(slot.boot);
+  report.edge = trigger_->clock().read(edge, slot.time, rig_.truth->faults());
+  if (slot.boot > 0) report.edge = DeviceStamp((report.edge - trigger_->clock().read(booted, slot.time, rig_.truth->faults())).ns());
+  if (slot.boot > 0 && slot.number == 0) trigger_->reboots.fetch_add(1, std::memory_order_relaxed);
+  Duration told{};  // after the edge
+  for (int k = 0; k < static_cast<int>(cameras_.size()); ++k) {
+    if ((board_.feedback >> static_cast<unsigned>(k) & 1U) == 0) continue;
+    PulseExposure& e = report.exposure[static_cast<std::size_t>(k)];
+    e = feedback(pulse, k);
+    told = std::max(told, e.seen ? e.end : plan_.at(pulse + 1).time - slot.time - kReportLatency);
+  }
+  p.arrival = jittered(edge + std::max(told, Duration{}) + kReportLatency, 20, pulse);
+  if (plan_.link_down(slot.time) || plan_.link_down(p.arrival - start_)) {
+    trigger_->lost.fetch_add(1, std::memory_order_relaxed);
+    return;
+  }
   post(p);
 }
 
@@ -124,6 +219,8 @@ void Scheduler::make_readings(HostStamp until) {
 void Scheduler::make_frames(std::uint64_t pulse) {
   std::array<Shooting, kMaxCameras> shootings;
   std::size_t count = 0;
+  std::array<std::shared_lock<std::shared_mutex>, kMaxCameras> memories;
+  for (std::size_t k = 0; k < cameras_.size(); ++k) memories[k] = std::shared_lock(cameras_[k]->memory);
   for (int k = 0; k < static_cast<int>(cameras_.size()); ++k) {
     if (!present(pulse, k)) continue;
     if (const auto shooting = plan(pulse, k)) shootings[count++] = *shooting;
@@ -141,20 +238,17 @@ void Scheduler::make_frames(std::uint64_t pulse) {
 
 bool Scheduler::present(std::uint64_t pulse, int k) {
   Sender& sender = senders_[static_cast<std::size_t>(k)];
-  const Duration time = host_of(pulse) - start_;
-  bool unplugged = false;
-  for (const Fault& f : rig_.truth->faults())
-    unplugged = unplugged || (f.kind == FaultKind::camera_gone && f.concerns(k) && f.active(time));
-  if (unplugged != sender.unplugged) {
+  const bool gone = unplugged(pulse, k);
+  if (gone != sender.unplugged) {
     Parcel p;
     p.device = k;
     p.arrival = host_of(pulse) + kTransfer;  // after what was under way, before the next frame
-    p.frame.what = unplugged ? Delivery<Frame>::What::gone : Delivery<Frame>::What::back;
+    p.frame.what = gone ? Delivery<Frame>::What::gone : Delivery<Frame>::What::back;
     post(p);
-    sender.unplugged = unplugged;
+    sender.unplugged = gone;
     sender.counter_base = pulse;
   }
-  return !unplugged && cameras_[static_cast<std::size_t>(k)]->stream.streaming();
+  return !gone && pulsed(k) && cameras_[static_cast<std::size_t>(k)]->stream.streaming();
 }
 
 std::optional<FrameSlot> Scheduler::slot_of(int k) {
@@ -162,6 +256,16 @@ std::optional<FrameSlot> Scheduler::slot_of(int k) {
   for (;;) {
     const std::uint32_t seen = rig_.room.look();
     if (stopping()) return std::nullopt;
+    {
+      const std::lock_guard lock(mutex_);
+      Sender& sender = senders_[static_cast<std::size_t>(k)];
+      std::vector<FrameSlot>& spare = sender.spare;
+      if (!spare.empty() && sender.spare_generation == camera.generation()) {
+        const FrameSlot slot = spare.back();
+        spare.pop_back();
+        return slot;
+      }
+    }
     if (const auto slot = camera.pool().acquire()) return slot;
     // Slots that only time will free are not waited for: late frames hold them.
     const bool held_by_delay = senders_[static_cast<std::size_t>(k)].on_the_way.load() > static_cast<int>(MockRig::kSlots) / 2;
@@ -174,7 +278,7 @@ std::optional<Scheduler::Shooting> Scheduler::plan(std::uint64_t pulse, int k) {
   MockCamera& camera = *cameras_[static_cast<std::size_t>(k)];
   Shooting s;
   s.camera = k;
-  s.exposure = exposure_of(*rig_.truth, rig_.options.seed, {pulse, host_of(pulse) - start_, Duration::seconds(1 / rate_)}, k);
+  s.exposure = exposure_of(*rig_.truth, rig_.options.seed, pulse_at(pulse, k), k);
   if (s.exposure.missed) {
     ++senders_[static_cast<std::size_t>(k)].counter_base;
     return std::nullopt;
@@ -196,12 +300,13 @@ void Scheduler::send(std::uint64_t pulse, const Shooting& shooting) {
   const auto k = static_cast<std::size_t>(shooting.camera);
   MockCamera& camera = *cameras_[k];
   Sender& sender = senders_[k];
-  const Duration time = host_of(pulse) - start_;
   const Duration open = camera.configuration().exposure;
+  const HostStamp begins = host_of(pulse) + camera.trigger_delay();
   Parcel p;
   p.device = shooting.camera;
-  p.arrival = jittered(host_of(pulse) + open + kTransfer, k, pulse) + shooting.exposure.delay;
-  p.frame.value = {shooting.slot, pulse - sender.counter_base, camera.clock().read(host_of(pulse), time, rig_.truth->faults()), {},
+  p.generation = camera.generation();
+  p.arrival = jittered(begins + open + kTransfer, k, pulse) + shooting.exposure.delay;
+  p.frame.value = {shooting.slot, pulse - sender.counter_base, camera.clock().read(begins, plan_.at(pulse).time, rig_.truth->faults()), {},
                    open,          FrameStatus::complete};
   std::optional<FrameSlot> copy;
   if (shooting.exposure.twice) copy = camera.pool().acquire();
@@ -248,7 +353,7 @@ void Scheduler::announce_end(HostStamp at) {
     p.arrival = at;
     p.frame.what = Delivery<Frame>::What::end;
     p.reading.what = Delivery<InsReading>::What::end;
-    p.pulse.what = Delivery<Pulse>::What::end;
+    p.report.what = Delivery<BoardReport>::What::end;
     post(p);
   }
 }
@@ -293,19 +398,21 @@ void Scheduler::hand_out_in_time() {
 }
 
 template <class S, class D>
-void Scheduler::push_or_wait(S* stream, const D& delivery) {
+bool Scheduler::push_or_wait(S* stream, const D& delivery) {
   for (;;) {
     const std::uint32_t seen = rig_.room.look();
-    if (stopping() || !stream->streaming() || stream->push(delivery)) return;
-    if (rig_.options.real_time) return;
+    if (stopping() || !stream->streaming()) return false;
+    if (stream->push(delivery)) return true;
+    if (rig_.options.real_time) return false;
     rig_.room.wait(seen);
   }
 }
 
 void Scheduler::deliver(const Parcel& parcel, HostStamp arrival) {
   if (parcel.device == kTriggerDevice) {
-    Delivery<Pulse> d = parcel.pulse;
+    Delivery<BoardReport> d = parcel.report;
     d.arrival = arrival;
+    d.value.pulse.arrival = arrival;
     // Nobody needs to take the reports; the latest that find no room are counted.
     if (trigger_->stream.streaming() && !trigger_->stream.push(d)) trigger_->overruns.fetch_add(1, std::memory_order_relaxed);
     return;
@@ -314,14 +421,26 @@ void Scheduler::deliver(const Parcel& parcel, HostStamp arrival) {
     Delivery<InsReading> d = parcel.reading;
     d.arrival = arrival;
     if (rig_.options.real_time && ins_.stream.full()) ins_.overruns.fetch_add(1, std::memory_order_relaxed);
-    push_or_wait(&ins_.stream, d);
+    (void)push_or_wait(&ins_.stream, d);
     return;
   }
   Delivery<Frame> d = parcel.frame;
   d.arrival = arrival;
   const auto k = static_cast<std::size_t>(parcel.device);
-  if (d.what == Delivery<Frame>::What::item) senders_[k].on_the_way.fetch_sub(1);
-  push_or_wait(&cameras_[k]->stream, d);  // deeper than the slots: frames always find room
+  if (d.what != Delivery<Frame>::What::item) {
+    (void)push_or_wait(&cameras_[k]->stream, d);
+    return;
+  }
+  senders_[k].on_the_way.fetch_sub(1);
+  const std::shared_lock memory(cameras_[k]->memory);
+  if (parcel.generation != cameras_[k]->generation()) return;  // its memory is no more
+  // The stream is deeper than the slots: frames always find room while somebody takes them.
+  if (push_or_wait(&cameras_[k]->stream, d)) return;
+  const std::lock_guard lock(mutex_);
+  Sender& sender = senders_[k];
+  if (sender.spare_generation != parcel.generation) sender.spare.clear();
+  sender.spare_generation = parcel.generation;
+  sender.spare.push_back(d.value.slot);
 }
 
 }  // namespace vergence::mock

@@ -13,6 +13,7 @@
 
 #include "drivers/mock/detail/devices.hpp"
 #include "drivers/mock/detail/exposure.hpp"
+#include "drivers/mock/detail/pulse_plan.hpp"
 
 namespace vergence::mock {
 
@@ -22,6 +23,8 @@ namespace vergence::mock {
 ///          out what is due.
 /// Time     Virtual: what is made before the next pulse is delivered before it, and the producer waits for room. Real: a pulse that is
 ///          over before its pictures are begun has none.
+/// Pauses   Virtual, with reports_taken: slot n is made once every report that arrives before it was taken. Who asks at the report of slot
+///          m, before taking the next, finds slot m + 4 not made: the report of m + 1 is here within two periods of its pulse.
 class Scheduler final : public PulseListener {
  public:
   /// All of it outlives the scheduler; `trigger` is given by attach().
@@ -30,8 +33,10 @@ class Scheduler final : public PulseListener {
   ~Scheduler() override { halt(); }
   void attach(MockTrigger* trigger) noexcept { trigger_ = trigger; }
 
-  void begin(double rate_hz) override;
+  void begin(const TriggerConfiguration& c) override;
   void halt() noexcept override;
+  void leave_out(std::uint64_t from, std::uint32_t pulses, std::uint32_t boot) noexcept override;
+  [[nodiscard]] PulsePlan plan_of(const TriggerConfiguration& c) const;
   /// The host's time at the drive's start.
   [[nodiscard]] HostStamp start() const noexcept { return start_; }
   [[nodiscard]] std::uint64_t pulses(double rate_hz) const noexcept;
@@ -44,7 +49,8 @@ class Scheduler final : public PulseListener {
     int device = 0;
     Delivery<Frame> frame{};
     Delivery<InsReading> reading{};
-    Delivery<Pulse> pulse{};
+    Delivery<BoardReport> report{};
+    std::uint32_t generation = 0;                                   // of the camera's memory that the frame is in
     [[nodiscard]] bool operator<(const Parcel& o) const noexcept {  // the queue's top is the earliest
       return std::pair(arrival, order) > std::pair(o.arrival, o.order);
     }
@@ -52,20 +58,34 @@ class Scheduler final : public PulseListener {
   /// What the scheduler knows of a camera.
   struct Sender {
     bool unplugged = false;
-    std::uint64_t counter_base = 0;  // of the pulse's number less what the camera counts
+    std::uint64_t counter_base = 0;  // of the slot less what the camera counts
     std::atomic<int> on_the_way{0};  // frames in parcels_
+    std::vector<FrameSlot> spare;    // of frames nobody was there for, of that generation; under mutex_
+    std::uint32_t spare_generation = 0;
   };
   struct Shooting {
     int camera = 0;  // that sends it
     Exposure exposure{};
     FrameSlot slot = 0;
   };
+  struct Pause {
+    std::uint64_t from = 0, end = 0;  // slots
+    std::uint32_t boot = 0;           // of Pulse; 0: the first
+  };
   static constexpr int kInsDevice = -1, kTriggerDevice = -2;
   static constexpr HostStamp kVirtualStart{1'000'000'000'000};  // 1000 s after a machine's start, on every run
 
   void produce();
   [[nodiscard]] bool wait_for_its_turn(std::uint64_t pulse);
-  void make_pulse(std::uint64_t pulse);
+  void make_link_events(std::uint64_t pulse);
+  [[nodiscard]] bool left_out(std::uint64_t pulse);
+  void make_report(std::uint64_t pulse);
+  /// What the feedback line of camera k tells of this pulse.
+  [[nodiscard]] PulseExposure feedback(std::uint64_t pulse, int k) const;
+  [[nodiscard]] bool pulsed(int k) const noexcept { return (board_.lines >> static_cast<unsigned>(k) & 1U) != 0; }
+  [[nodiscard]] bool unplugged(std::uint64_t pulse, int k) const noexcept;
+  [[nodiscard]] PulseAt pulse_at(std::uint64_t pulse, int k) const noexcept;
+  [[nodiscard]] std::uint32_t boot_of(std::uint64_t pulse) const noexcept;
   void make_readings(HostStamp until);
   void make_frames(std::uint64_t pulse);
   /// Whether camera k is there at this pulse; posts its going and coming.
@@ -80,12 +100,10 @@ class Scheduler final : public PulseListener {
   void hand_out_in_time();
   void deliver(const Parcel& parcel, HostStamp arrival);
   template <class S, class D>
-  void push_or_wait(S* stream, const D& delivery);
+  [[nodiscard]] bool push_or_wait(S* stream, const D& delivery);  // false: nobody takes it
   [[nodiscard]] std::optional<FrameSlot> slot_of(int k);
   [[nodiscard]] HostStamp jittered(HostStamp least, std::uint64_t device, std::uint64_t number) const noexcept;
-  [[nodiscard]] HostStamp host_of(std::uint64_t pulse) const noexcept {
-    return start_ + Duration::seconds(static_cast<double>(pulse) / rate_);
-  }
+  [[nodiscard]] HostStamp host_of(std::uint64_t pulse) const noexcept { return start_ + plan_.at(pulse).time; }
   [[nodiscard]] bool stopping() const noexcept { return stop_.load(std::memory_order_acquire); }
 
   RigContext& rig_;
@@ -93,9 +111,15 @@ class Scheduler final : public PulseListener {
   MockIns& ins_;
   MockTrigger* trigger_ = nullptr;
 
-  double rate_ = 0;
+  TriggerConfiguration board_{};
+  PulsePlan plan_;
   HostStamp start_ = kVirtualStart;
   std::uint64_t readings_ = 0, orders_ = 0;
+  std::size_t link_events_ = 0;  // of the plan, posted
+  bool resumed_ = true;          // the next pulse is the first after a start or a pause
+  std::mutex pausing_;           // of what follows
+  std::optional<Pause> pause_;
+  std::uint64_t made_ = 0;  // slots
   std::array<Sender, kMaxCameras> senders_{};
   std::mutex mutex_;  // of parcels_, in real time
   std::condition_variable posted_;
