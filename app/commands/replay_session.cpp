@@ -15,6 +15,7 @@
 
 #include <fmt/format.h>
 
+#include "app/commands/camera_masks.hpp"
 #include "app/commands/drive_journal.hpp"
 #include "app/commands/mock_drive.hpp"
 #include "app/commands/session_files.hpp"
@@ -55,6 +56,7 @@ class Replay {
   const Trajectory truth_;
   const ReferenceTrack reference_;
   const std::size_t count_;  // frames of this replay
+  const CameraMasks masks_;
   const EstimatorOptions options_;
   Arena frames_arena_, estimator_arena_;
   FramePool pool_;
@@ -83,7 +85,8 @@ Replay::Replay(const ReplayRequest& request, StereoSequence sequence, StartingCa
       truth_(std::move(truth)),
       reference_(truth_),
       count_(std::min(request.frames.value_or(sequence_.pairs.size()), sequence_.pairs.size() - request.start)),
-      options_(estimator_options(request.configuration, begin_.trust, Adoption::after_fixed_frames)),
+      masks_(request.configuration, begin_.file.rig),
+      options_(estimator_options(request.configuration, begin_.trust, Adoption::after_fixed_frames, masks_.views())),
       frames_arena_(arena_size(FramePool::memory_needed(width_of(sequence_), height_of(sequence_), FrameDecoder::kSlots))),
       estimator_arena_(arena_size(Estimator::memory_needed(options_, begin_.file.rig))),
       pool_(width_of(sequence_), height_of(sequence_), FrameDecoder::kSlots, frames_arena_),

@@ -19,6 +19,7 @@
 
 #include <fmt/format.h>
 
+#include "app/commands/camera_masks.hpp"
 #include "app/commands/drive_devices.hpp"
 #include "app/commands/drive_journal.hpp"
 #include "app/commands/session_files.hpp"
@@ -79,6 +80,7 @@ class Drive {
   const Configuration& configuration_;
   DriveDevices devices_;
   const StartingCalibration begin_;
+  const CameraMasks masks_;
   const EstimatorOptions options_;
   ComparisonOptions comparison_options_;
   Arena arena_;
@@ -112,7 +114,9 @@ Drive::Drive(const RunRequest& request)
       configuration_(request.configuration),
       devices_(request.configuration, request.faults, request.fast, request.duration_s),
       begin_(starting_calibration(request.configuration, request.calibration, serials_of(devices_.cameras()))),
-      options_(estimator_options(request.configuration, begin_.trust, request.fast ? Adoption::after_fixed_frames : Adoption::when_ready)),
+      masks_(request.configuration, begin_.file.rig),
+      options_(estimator_options(request.configuration, begin_.trust, request.fast ? Adoption::after_fixed_frames : Adoption::when_ready,
+                                 masks_.views())),
       comparison_options_(comparison_options(request.configuration)),
       arena_(arena_size(Estimator::memory_needed(options_, begin_.file.rig)) + arena_size(Comparison::bytes_needed(comparison_options_))),
       runner_(make_runner(request.configuration.threads)),

@@ -119,7 +119,8 @@ StartingCalibration replayed_calibration(const Configuration& c, const StereoSeq
   return start;
 }
 
-EstimatorOptions estimator_options(const Configuration& c, CalibrationTrust trust, Adoption adoption) {
+EstimatorOptions estimator_options(const Configuration& c, CalibrationTrust trust, Adoption adoption,
+                                   const std::array<ImageView, kMaxCameras>& masks) {
   EstimatorOptions o;
   o.odometry = c.odometry;
   o.calibration = c.calibration;
@@ -127,6 +128,7 @@ EstimatorOptions estimator_options(const Configuration& c, CalibrationTrust trus
   o.trust = trust;
   o.adoption = adoption;
   o.online = c.online != 0;
+  o.masks = masks;
   return o;
 }
 

@@ -1,4 +1,5 @@
 #pragma once
+#include <array>
 #include <filesystem>
 #include <optional>
 #include <string>
@@ -43,6 +44,8 @@ struct StartingCalibration {
 [[nodiscard]] RigCalibration nominal_geometry(const RigCalibration& given, const RigCalibration& mounted,
                                               const calibration::CalibrationOptions& options);
 
-[[nodiscard]] EstimatorOptions estimator_options(const Configuration& configuration, CalibrationTrust trust, Adoption adoption);
+/// `masks` by camera, as EstimatorOptions has them.
+[[nodiscard]] EstimatorOptions estimator_options(const Configuration& configuration, CalibrationTrust trust, Adoption adoption,
+                                                 const std::array<ImageView, kMaxCameras>& masks = {});
 
 }  // namespace vergence::app

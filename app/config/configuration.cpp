@@ -233,7 +233,9 @@ Configuration load(const std::optional<YamlFile>& file, const std::vector<std::s
 }  // namespace
 
 Configuration load_configuration(const std::optional<std::filesystem::path>& file, const std::vector<std::string>& set) {
-  return load(file ? std::optional(YamlFile::read(*file)) : std::nullopt, set);
+  Configuration configuration = load(file ? std::optional(YamlFile::read(*file)) : std::nullopt, set);
+  if (file) configuration.folder = file->parent_path();
+  return configuration;
 }
 
 Configuration parse_configuration(std::string_view yaml, const std::string& name, const std::vector<std::string>& set) {

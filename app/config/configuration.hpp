@@ -33,6 +33,7 @@ struct CameraSettings {
   std::string options{};  // `NAME=VALUE …`, of the kind of camera
   double exposure_us = 8000;
   double gain_db = 0;
+  std::string mask{};                      // file; empty: none
   std::array<double, 4> intrinsics{};      // fx fy cx cy, px; fx 0: those of rig.nominal, distortion included
   std::array<double, 5> distortion{};      // k1 k2 p1 p2 k3
   std::array<double, 12> T_camera_left{};  // rows of [R t], m; zeros: as rig.nominal
@@ -115,7 +116,8 @@ struct Configuration {
   calibration::CalibrationOptions calibration{};
   int online = 1;  // calibration.online: 0: the calibration given is used for ever
   calibration::MonitorOptions monitor{};
-  int threads = 2;  // 1: both images on the estimator's thread
+  int threads = 2;                 // 1: both images on the estimator's thread
+  std::filesystem::path folder{};  // of the file it was read from: where its files are looked for; no key, empty without a file
 };
 
 /// Defaults, then the YAML file if one is given, then the `--set` arguments `KEY=VALUE` in order; the last one wins.

@@ -154,6 +154,9 @@ Group cameras() {
                   "What only this kind of camera has (docs/cameras): `NAME=VALUE …`, or a group: `{packet_size: 9000}`.")
             .number("exposure_us", &C::exposure_us, 10, 1e6, "µs", "Time of an exposure; 8000 is daylight in the mock's world.")
             .number("gain_db", &C::gain_db, 0, 40, "dB", "Gain of the sensor's amplifier.")
+            .text("mask", &C::mask, 400,
+                  "PNG or PGM of the image's size, 0 where nothing is to be looked for: the vehicle itself, dirt. A relative path begins "
+                  "at this file's folder.")
             .numbers("intrinsics", &C::intrinsics, 0, 20000, "px",
                      {"Focal length along x of this camera's lens; 0: the lens is that of `rig.nominal`.", "Focal length along y.",
                       "Principal point of that lens, x.", "Principal point of that lens, y."})

@@ -22,8 +22,9 @@ constexpr std::uint64_t kDriftFrames = 60;  // of a creeping rig that are taken 
 constexpr int kUnmatchedAfter = 15;         // frames with good images that no scene can be made of with the calibration in use
 constexpr int kInStepAfter = 60;            // frames without a sign of the cameras being out of step, before that is over
 
-/// What must be known of a rig. `known`: its transforms too.
-void check(const RigCalibration& rig, bool known) {
+/// What must be known of a rig.
+void check(const EstimatorOptions& options, const RigCalibration& rig) {
+  const bool known = options.trust != CalibrationTrust::none;
   if (rig.cameras < 2 || rig.cameras > kMaxCameras)
     throw std::invalid_argument("a rig of 2 to " + std::to_string(kMaxCameras) + " cameras is needed, this one has " +
                                 std::to_string(rig.cameras));
@@ -33,6 +34,11 @@ void check(const RigCalibration& rig, bool known) {
     if (c.width < 64 || c.height < 64 || !(c.fx > 0) || !(c.fy > 0))
       throw std::invalid_argument("camera " + std::to_string(k) +
                                   ": images of at least 64×64 pixels and positive focal lengths are needed");
+    const ImageView& mask = options.masks[i];
+    if (!mask.empty() && (mask.width != c.width || mask.height != c.height))
+      throw std::invalid_argument("camera " + std::to_string(k) + ": its mask is " + std::to_string(mask.width) + "×" +
+                                  std::to_string(mask.height) + " pixels, its images are " + std::to_string(c.width) + "×" +
+                                  std::to_string(c.height));
     if (k > 0 && known && !(rig.T_camera_left[i].t.norm() > 1e-3))
       throw std::invalid_argument("camera " + std::to_string(k) + ": its baseline is below a millimetre, no depth can be measured");
   }
@@ -89,7 +95,7 @@ struct Estimator::Parts {
   Parts(const EstimatorOptions& o, const RigCalibration& r, const RigCalibration& nominal, Arena& arena, PairRunner& runner,
         BackgroundRunner& solver)
       : options(o),
-        odometry(options.odometry, r, o.trust != CalibrationTrust::none, arena, runner),
+        odometry(options.odometry, r, o.trust != CalibrationTrust::none, arena, runner, o.masks),
         keeper(options, r, nominal, arena, solver),
         confirmed(o.trust != CalibrationTrust::unconfirmed) {}
 
@@ -287,13 +293,14 @@ Reason Estimator::Parts::why_uncalibrated() const noexcept {
 }
 
 std::size_t Estimator::memory_needed(const EstimatorOptions& options, const RigCalibration& rig) {
-  check(rig, options.trust != CalibrationTrust::none);
-  return odometry::Odometry::memory_needed(options.odometry, rig) + RigKeeper::memory_needed(options, rig) + sizeof(Parts) + 2 * kCacheLine;
+  check(options, rig);
+  return odometry::Odometry::memory_needed(options.odometry, rig, options.masks) + RigKeeper::memory_needed(options, rig) + sizeof(Parts) +
+         2 * kCacheLine;
 }
 
 Estimator::Estimator(const EstimatorOptions& options, const RigCalibration& rig, const RigCalibration& nominal, Arena& arena,
                      PairRunner& runner, BackgroundRunner& solver) {
-  check(rig, options.trust != CalibrationTrust::none);
+  check(options, rig);
   static_assert(alignof(Parts) <= kCacheLine);
   const auto bytes = arena.make<std::byte>(sizeof(Parts), "estimator");
   parts_ = new (bytes.data()) Parts(options, rig, nominal, arena, runner, solver);

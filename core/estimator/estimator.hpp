@@ -1,4 +1,5 @@
 #pragma once
+#include <array>
 #include <cstddef>
 #include <memory>
 #include <span>
@@ -34,7 +35,8 @@ struct EstimatorOptions {
   calibration::MonitorOptions monitor{};
   CalibrationTrust trust = CalibrationTrust::given;
   Adoption adoption = Adoption::after_fixed_frames;
-  bool online = true;  // watch the rig and calibrate it; false: the calibration given is used for ever
+  std::array<ImageView, kMaxCameras> masks{};  // by camera, of its images' size: where it is 0 nothing is looked for; empty: everywhere
+  bool online = true;                          // watch the rig and calibrate it; false: the calibration given is used for ever
 };
 
 /// Something worth a line in events.jsonl. `why` points to a constant.
@@ -60,7 +62,7 @@ struct EstimatorEvent {
 
 /// Rig frames in, a pose for each out: the front door of core.
 ///
-/// Ownership  Keeps references to the arena and the runners; images are read during process() only.
+/// Ownership  Keeps references to the arena and the runners; images are read during process() only, masks in the constructor only.
 /// Threads    One caller; process() uses `runner` for the other images' front end and `solver` for calibration, which runs beside the
 ///            frames. Same poses whatever the runners, with Adoption::after_fixed_frames. request_recalibration(): any thread.
 /// Memory     All of it from the arena in the constructor. process() allocates nothing, nor does the solver's task.

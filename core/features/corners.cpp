@@ -21,8 +21,9 @@ struct Grid {
   }
 };
 
-/// Best local maximum of the block's scores, leaving out its ring of one pixel; score 0 when there is none.
-Corner best_of(const float* score, int w, int h) noexcept {
+/// Best local maximum of the block's scores, leaving out its ring of one pixel and what the mask hides; score 0 when there is none.
+/// (x0, y0): the block's first pixel in the image.
+Corner best_of(const float* score, int x0, int y0, int w, int h, const Mask* mask) noexcept {
   Corner best;
   for (int y = 1; y < h - 1; ++y) {
     const float* s = score + y * detail::kMaxBlock;
@@ -32,7 +33,7 @@ Corner best_of(const float* score, int w, int h) noexcept {
       const float* up = s - detail::kMaxBlock;
       const float* down = s + detail::kMaxBlock;
       if (v >= s[x - 1] && v >= s[x + 1] && v >= up[x] && v >= down[x] && v >= up[x - 1] && v >= up[x + 1] && v >= down[x - 1] &&
-          v >= down[x + 1])
+          v >= down[x + 1] && (mask == nullptr || !mask->hides(x0 + x, y0 + y)))
         best = {static_cast<float>(x), static_cast<float>(y), v};
     }
   }
@@ -66,7 +67,7 @@ void scan_rows(const ImageView& image, const CornerOptions& options, const Grid&
       const int y1 = std::min((r + 1) * grid.cell, image.height - low) + 1;
       if (x1 - x0 < 4 || y1 - y0 < 4) continue;
       detail::corner_scores(image, x0, y0, x1 - x0, y1 - y0, score.data());
-      Corner best = best_of(score.data(), x1 - x0, y1 - y0);
+      Corner best = best_of(score.data(), x0, y0, x1 - x0, y1 - y0, options.mask);
       if (!(best.score > options.min_score)) continue;
       best.x += static_cast<float>(x0);
       best.y += static_cast<float>(y0);

@@ -1,6 +1,7 @@
 #pragma once
 #include <span>
 
+#include "core/features/mask.hpp"
 #include "core/memory/fixed_vector.hpp"
 #include "core/types/image.hpp"
 #include "core/types/parallel.hpp"
@@ -14,10 +15,11 @@ struct Corner {
 };
 
 struct CornerOptions {
-  int cell = 32;            // px: at most one corner a cell
-  int border = 16;          // px kept free at the image's edge
-  float min_score = 30.F;   // (grey levels / px)²
-  float min_distance = 12;  // px to a corner already taken
+  int cell = 32;               // px: at most one corner a cell
+  int border = 16;             // px kept free at the image's edge
+  float min_score = 30.F;      // (grey levels / px)²
+  float min_distance = 12;     // px to a corner already taken
+  const Mask* mask = nullptr;  // of the image searched; null: all of it is looked at
 };
 
 inline constexpr int kMaxCell = 128;        // px: sizes the working memory of a cell

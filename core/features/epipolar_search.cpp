@@ -86,6 +86,7 @@ SearchResult search_along(const Patch& patch, const Pyramid& image, const Epipol
     for (int b = -band; b <= band; ++b) {
       const int x = cx + (horizontal ? 0 : b), y = cy + (horizontal ? b : 0);
       if (x < kBlock / 2 || y < kBlock / 2 || x + kBlock / 2 > view.width || y + kBlock / 2 > view.height) continue;
+      if (options.mask != nullptr && options.mask->hides((Vec2(x, y) + anchor) / scale)) continue;
       offsets[static_cast<std::size_t>(n)] = static_cast<std::int32_t>((y - kBlock / 2) * view.stride + (x - kBlock / 2));
       step_of[static_cast<std::size_t>(n)] = static_cast<std::int16_t>(i);
       pixel_of[static_cast<std::size_t>(n)] = {static_cast<float>(x), static_cast<float>(y)};

@@ -1,5 +1,6 @@
 #pragma once
 #include "core/camera/camera.hpp"
+#include "core/features/mask.hpp"
 #include "core/features/patch.hpp"
 
 namespace vergence::features {
@@ -17,12 +18,13 @@ struct EpipolarCurve {
 };
 
 struct EpipolarSearchOptions {
-  int level = 1;           // pyramid level searched
-  double rho_first = 0.0;  // 1/m, start of the range; may be negative to ask for exchanged cameras
-  double rho_last = 1.0;   // 1/m, its end
-  int band = 1;            // px of the level to each side of the curve
-  float min_zncc = 0.7F;   // of the 8×8 px compared
-  float unique = 0.85F;    // (1 − best) / (1 − second best): above it the match is ambiguous
+  int level = 1;               // pyramid level searched
+  double rho_first = 0.0;      // 1/m, start of the range; may be negative to ask for exchanged cameras
+  double rho_last = 1.0;       // 1/m, its end
+  int band = 1;                // px of the level to each side of the curve
+  float min_zncc = 0.7F;       // of the 8×8 px compared
+  float unique = 0.85F;        // (1 − best) / (1 − second best): above it the match is ambiguous
+  const Mask* mask = nullptr;  // of the image searched: the patch is not there; null: it may be anywhere
 };
 
 enum class SearchStatus : std::uint8_t { ok, off_image, uncorrelated, ambiguous };

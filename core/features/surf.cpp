@@ -109,7 +109,7 @@ bool Surf::refine(const Octave& octave, int layer, int column, int row, SurfPoin
   return true;
 }
 
-int Surf::scan_octave(const Octave& octave, float min_response, BoundedVector<SurfPoint>* out) noexcept {
+int Surf::scan_octave(const Octave& octave, const SurfOptions& options, BoundedVector<SurfPoint>* out) noexcept {
   if (octave.columns < kRows) return 0;
   int found = 0;
   for (int row = 0; row < octave.rows; ++row) {
@@ -120,9 +120,10 @@ int Surf::scan_octave(const Octave& octave, float min_response, BoundedVector<Su
     for (int k = 1; k < kLayers - 1; ++k) {
       const float* r = responses(k, row - 1);
       for (int i = 1; i < octave.columns - 1; ++i) {
-        if (!(r[i] > min_response) || r[i] < r[i + 1] || r[i] <= r[i - 1]) continue;
+        if (!(r[i] > options.min_response) || r[i] < r[i + 1] || r[i] <= r[i - 1]) continue;
         SurfPoint p;
         if (!greatest(k, i, row - 1) || !refine(octave, k, i, row - 1, &p)) continue;
+        if (options.mask != nullptr && options.mask->hides({static_cast<double>(p.x), static_cast<double>(p.y)})) continue;
         ++found;
         offer(p, out);
       }
@@ -135,7 +136,7 @@ int Surf::detect(const SurfOptions& options, BoundedVector<SurfPoint>* out) noex
   out->clear();
   int found = 0;
   const int octaves = std::clamp(options.octaves, 1, kMaxSurfOctaves);
-  for (int o = 0; o < octaves; ++o) found += scan_octave(Octave(o, sums_.width(), sums_.height()), options.min_response, out);
+  for (int o = 0; o < octaves; ++o) found += scan_octave(Octave(o, sums_.width(), sums_.height()), options, out);
   std::sort(out->begin(), out->end(), stronger);
   return found;
 }

@@ -4,6 +4,7 @@
 #include <span>
 
 #include "core/features/detail/surf_integral.hpp"
+#include "core/features/mask.hpp"
 #include "core/memory/arena.hpp"
 #include "core/memory/fixed_vector.hpp"
 #include "core/types/image.hpp"
@@ -27,8 +28,9 @@ struct SurfDescriptor {
 inline constexpr int kMaxSurfOctaves = 4;
 
 struct SurfOptions {
-  int octaves = 3;         // 1 … kMaxSurfOctaves: scales up to 3, 6, 12, 24 px
-  float min_response = 4;  // grey levels²
+  int octaves = 3;             // 1 … kMaxSurfOctaves: scales up to 3, 6, 12, 24 px
+  float min_response = 4;      // grey levels²
+  const Mask* mask = nullptr;  // of the image; null: all of it is looked at
 };
 
 enum class SurfStatus : std::uint8_t {
@@ -73,7 +75,7 @@ class Surf {
   static constexpr int kRows = 3;    // neighbouring rows of each
 
   struct Octave;
-  int scan_octave(const Octave& octave, float min_response, BoundedVector<SurfPoint>* out) noexcept;
+  int scan_octave(const Octave& octave, const SurfOptions& options, BoundedVector<SurfPoint>* out) noexcept;
   [[nodiscard]] bool refine(const Octave& octave, int layer, int column, int row, SurfPoint* p) const noexcept;
   [[nodiscard]] bool greatest(int layer, int column, int row) const noexcept;
   [[nodiscard]] float* responses(int layer, int row) noexcept { return rows_.data() + offset(layer, row); }

@@ -28,10 +28,12 @@ class BlobMatcher {
   [[nodiscard]] static std::size_t memory_needed(int max_width, int max_height) noexcept;
 
   /// By the strength of the left blob, strongest first. Valid until the next call.
-  [[nodiscard]] std::span<const RoughMatch> match(const ImageView& left, const ImageView& other) noexcept;
+  /// A mask may be null.
+  [[nodiscard]] std::span<const RoughMatch> match(const ImageView& left, const features::Mask* left_mask, const ImageView& other,
+                                                  const features::Mask* other_mask) noexcept;
 
  private:
-  [[nodiscard]] features::SurfView describe(const ImageView& image, std::size_t k) noexcept;
+  [[nodiscard]] features::SurfView describe(const ImageView& image, const features::Mask* mask, std::size_t k) noexcept;
 
   features::Surf surf_;
   features::SurfMatcher matcher_;

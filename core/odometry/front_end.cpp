@@ -12,11 +12,12 @@ namespace {
 constexpr double kImageMargin = 9.0;      // px: a window's half and one
 constexpr float kMinStructure = 3.0F;     // grey levels, standard deviation of the coarsest level: a lens cap's noise stays below 2
 constexpr double kFarBaselines = 2000.0;  // depth given to a point whose disparity is within the noise of zero
-constexpr int kSmallestCell = 12;         // px: a window's side; nearer corners share their pixels
-constexpr double kDenseCells = 3500;      // of an image: below features::kMaxGridCells with their rounding
-constexpr int kMaxDistance = 64;          // bits of 256: unrelated patches lie at 128 ± 8
-constexpr double kDistinct = 0.8;         // of the second best's distance
-constexpr float kRoughSigma = 3.F;        // px: two corners found independently
+constexpr int kMaskMargin = features::kWindow / 2 + 1;  // px: no pixel that holds a feature is a masked one
+constexpr int kSmallestCell = 12;                       // px: a window's side; nearer corners share their pixels
+constexpr double kDenseCells = 3500;                    // of an image: below features::kMaxGridCells with their rounding
+constexpr int kMaxDistance = 64;                        // bits of 256: unrelated patches lie at 128 ± 8
+constexpr double kDistinct = 0.8;                       // of the second best's distance
+constexpr float kRoughSigma = 3.F;                      // px: two corners found independently
 
 /// Shape of a patch seen from elsewhere, as if its surface faced the camera it was cut in: ∂(pixel there)/∂(pixel here).
 /// X = T (z ray): moving the pixel moves the ray, the depth z stays.
@@ -61,8 +62,10 @@ int largest_height(const RigCalibration& rig) noexcept {
 
 }  // namespace
 
-std::size_t FrontEnd::memory_needed(const OdometryOptions& options, const RigCalibration& rig) noexcept {
+std::size_t FrontEnd::memory_needed(const OdometryOptions& options, const RigCalibration& rig, std::span<const ImageView> masks) noexcept {
   std::size_t bytes = 0;
+  for (const ImageView& mask : masks)
+    if (!mask.empty()) bytes += features::Mask::memory_needed(mask.width, mask.height);
   for (int k = 0; k < rig.cameras; ++k) {
     const Intrinsics& c = rig.intrinsics[static_cast<std::size_t>(k)];
     bytes += features::Pyramid::memory_needed(c.width, c.height, options.pyramid_levels) + kMaxPoints * sizeof(Followed) + 2 * kCacheLine;
@@ -73,7 +76,8 @@ std::size_t FrontEnd::memory_needed(const OdometryOptions& options, const RigCal
          kMaxPoints * (sizeof(features::Corner) + sizeof(features::Descriptor)) + 6 * kCacheLine;
 }
 
-FrontEnd::FrontEnd(const OdometryOptions& options, const RigCalibration& rig, Arena& arena, PairRunner& runner)
+FrontEnd::FrontEnd(const OdometryOptions& options, const RigCalibration& rig, Arena& arena, PairRunner& runner,
+                   std::span<const ImageView> masks)
     : options_(options), rig_(rig), runner_(runner), cameras_(rig.cameras), band_px_(options.band_px) {
   const auto n = static_cast<std::size_t>(options.features);
   for (int k = 0; k < cameras_; ++k) {
@@ -81,6 +85,7 @@ FrontEnd::FrontEnd(const OdometryOptions& options, const RigCalibration& rig, Ar
     const Intrinsics& c = rig.intrinsics[i];
     pyramids_[i] = features::Pyramid(c.width, c.height, options.pyramid_levels, arena);
     followed_[i] = arena.make<Followed>(kMaxPoints, "followed points");
+    if (i < masks.size()) masks_[i] = features::Mask(masks[i], kMaskMargin, arena);
   }
   corners_ = BoundedVector<features::Corner>(arena.make<features::Corner>(n, "corners"));
   taken_ = BoundedVector<features::Corner>(arena.make<features::Corner>(kMaxPoints, "taken corners"));
@@ -132,7 +137,7 @@ ImageCheck FrontEnd::begin(const RigFrame& frame) noexcept {
 bool FrontEnd::finish(int k, const Vec2& raw, double parallax, Followed* f) const noexcept {
   Vec2 ideal;
   double magnification = 1.0;
-  if (!lens(k).undistort(raw, &ideal, &magnification)) return false;
+  if (hides(k, raw) || !lens(k).undistort(raw, &ideal, &magnification)) return false;
   f->found = true;
   f->raw = raw.cast<float>();
   f->ideal = ideal.cast<float>();
@@ -208,7 +213,7 @@ void FrontEnd::follow_all(Map& map, const Transform& T_left_world) noexcept {
   follow_into_all(map, T_left_world, how, 1);
 }
 
-features::CornerOptions FrontEnd::corner_options() const noexcept {
+features::CornerOptions FrontEnd::corner_options(int k) const noexcept {
   // Half of the cells hold a corner that can be followed and matched: sky, road and the like fill the rest.
   constexpr double kCellsAPoint = 1.6;
   const Intrinsics& c = rig_.intrinsics[0];
@@ -217,11 +222,12 @@ features::CornerOptions FrontEnd::corner_options() const noexcept {
       std::clamp(static_cast<int>(std::sqrt(c.width * c.height / (kCellsAPoint * options_.features))), kSmallestCell, features::kMaxCell);
   how.min_score = static_cast<float>(options_.min_corner_score);
   how.min_distance = 0.5F * static_cast<float>(how.cell);
+  how.mask = mask(k);
   return how;
 }
 
 void FrontEnd::find_dense_corners(int k) noexcept {
-  features::CornerOptions how = corner_options();
+  features::CornerOptions how = corner_options(k);
   // A corner finds its partner if that is among the strongest of its cell; there is room for kMaxPoints of them.
   const Intrinsics& c = rig_.intrinsics[static_cast<std::size_t>(k)];
   const auto least = static_cast<int>(std::ceil(std::sqrt(static_cast<double>(c.width) * c.height / kDenseCells)));
@@ -273,7 +279,8 @@ std::span<const FreeMatch> FrontEnd::match_free(int k) noexcept {
     match_corners_freely(k);
   } else {
     features::Patch patch;
-    for (const RoughMatch& m : blobs_.match(pyramids_[0].level(0), pyramids_[static_cast<std::size_t>(k)].level(0)))
+    const ImageView& other = pyramids_[static_cast<std::size_t>(k)].level(0);
+    for (const RoughMatch& m : blobs_.match(pyramids_[0].level(0), mask(0), other, mask(k)))
       if (features::cut_patch(pyramids_[0], m.left, &patch)) keep_free_match(patch, m, k);
   }
   return free_matches_.span();
@@ -292,7 +299,7 @@ void FrontEnd::keep_free_match(const features::Patch& patch, const RoughMatch& r
 
 void FrontEnd::match_corners_freely(int k) noexcept {
   const auto c = static_cast<std::size_t>(k);
-  features::find_corners(pyramids_[0].level(0), corner_options(), {}, runner_, &corners_);
+  features::find_corners(pyramids_[0].level(0), corner_options(0), {}, runner_, &corners_);
   find_dense_corners(k);
   features::Patch patch;
   for (std::size_t j = 0; j < taken_.size(); ++j) {
@@ -353,6 +360,7 @@ void FrontEnd::match_across(const features::Corner& corner, bool exchanged, NewP
     features::EpipolarSearchOptions search;
     search.level = 1;
     search.band = std::max(1, static_cast<int>(std::lround(0.5 * band_px_)));
+    search.mask = mask(k);
     search.rho_last = (exchanged ? -1.0 : 1.0) / (options_.nearest_baselines * baseline);
     const features::SearchResult s = features::search_along(out->patch, pyramids_[i], curve, search);
     if (s.status != features::SearchStatus::ok) continue;
@@ -403,7 +411,7 @@ AcrossCount FrontEnd::add_points(Map& map, const Transform& T_left_world, PointS
   taken_.clear();
   for (const MapPoint& p : map.points())
     if (p.followed() && p.now.by(0)) (void)taken_.push({p.raw[0].x(), p.raw[0].y(), 0.F});
-  features::find_corners(pyramids_[0].level(0), corner_options(), taken_.span(), runner_, &corners_);
+  features::find_corners(pyramids_[0].level(0), corner_options(0), taken_.span(), runner_, &corners_);
   const auto room = static_cast<std::size_t>(std::max(0, options_.features - static_cast<int>(taken_.size())));
   if (corners_.size() > room) corners_.truncate(room);
   detect_ms_ = milliseconds_since(start);

@@ -5,6 +5,7 @@
 
 #include "core/features/corners.hpp"
 #include "core/features/descriptor.hpp"
+#include "core/features/mask.hpp"
 #include "core/features/pyramid.hpp"
 #include "core/odometry/blob_matcher.hpp"
 #include "core/odometry/lens.hpp"
@@ -39,6 +40,7 @@ struct FreeMatch {
 ///
 /// Ownership  Reads the frame's images until the next begin(). Options, rig and runner are the owner's.
 /// Threads    One caller; the runner takes the cameras but `left` to its other side. Results do not depend on it.
+/// Masks      Where one hides a pixel, or comes nearer than a window's half, nothing is found, followed or matched.
 /// Memory     From the arena at construction. When the map has no room for a new point, the weakest corners are dropped.
 class FrontEnd {
  public:
@@ -48,8 +50,11 @@ class FrontEnd {
     bool operator==(const Fingerprint&) const = default;
   };
 
-  FrontEnd(const OdometryOptions& options, const RigCalibration& rig, Arena& arena, PairRunner& runner);
-  [[nodiscard]] static std::size_t memory_needed(const OdometryOptions& options, const RigCalibration& rig) noexcept;
+  /// `masks` by camera, read here only: 0 is hidden; fewer than cameras, or empty ones: nothing is. Precondition: as large as the images.
+  FrontEnd(const OdometryOptions& options, const RigCalibration& rig, Arena& arena, PairRunner& runner,
+           std::span<const ImageView> masks = {});
+  [[nodiscard]] static std::size_t memory_needed(const OdometryOptions& options, const RigCalibration& rig,
+                                                 std::span<const ImageView> masks = {}) noexcept;
 
   /// Builds the pyramids of a frame's images.
   [[nodiscard]] ImageCheck begin(const RigFrame& frame) noexcept;
@@ -82,6 +87,8 @@ class FrontEnd {
   [[nodiscard]] int count_exchanged() noexcept;
 
   [[nodiscard]] const Lens& lens(int k) const noexcept { return lenses_[static_cast<std::size_t>(k)]; }
+  /// Nothing is looked for at this pixel of camera k.
+  [[nodiscard]] bool hides(int k, const Vec2& pixel) const noexcept { return masks_[static_cast<std::size_t>(k)].hides(pixel); }
   [[nodiscard]] float detect_ms() const noexcept { return detect_ms_; }
 
  private:
@@ -107,7 +114,7 @@ class FrontEnd {
   /// `parallax`: how far this camera stands from where the patch was cut, over the depth there: what its unknown slope can do.
   [[nodiscard]] bool finish(int k, const Vec2& raw, double parallax, Followed* f) const noexcept;
   void match_across(const features::Corner& corner, bool exchanged, NewPoint* out) const noexcept;
-  [[nodiscard]] features::CornerOptions corner_options() const noexcept;
+  [[nodiscard]] features::CornerOptions corner_options(int k) const noexcept;
   /// Corners of camera k four times as dense as points are: so that most of the other image's have their partner.
   void find_dense_corners(int k) noexcept;
   void match_corners_freely(int k) noexcept;
@@ -116,6 +123,11 @@ class FrontEnd {
   void match_all(std::span<const features::Corner> corners, bool exchanged) noexcept;
   /// Where camera k sits is known, if only roughly: before, its transform is the identity.
   [[nodiscard]] bool placed(int k) const noexcept { return k == 0 || rig_.T_camera_left[static_cast<std::size_t>(k)].t.squaredNorm() > 0; }
+  /// Null: camera k has none.
+  [[nodiscard]] const features::Mask* mask(int k) const noexcept {
+    const features::Mask& m = masks_[static_cast<std::size_t>(k)];
+    return m.empty() ? nullptr : &m;
+  }
   static void store(const Followed& f, int k, MapPoint* p) noexcept;
 
   const OdometryOptions& options_;
@@ -125,6 +137,7 @@ class FrontEnd {
   std::uint8_t structured_ = 0;
   std::array<Fingerprint, kMaxCameras> fingerprints_{};  // of the last images
   std::array<Lens, kMaxCameras> lenses_{};
+  std::array<features::Mask, kMaxCameras> masks_{};
   std::array<features::Pyramid, kMaxCameras> pyramids_{};
   std::array<std::span<Followed>, kMaxCameras> followed_{};
   BoundedVector<features::Corner> corners_, taken_;

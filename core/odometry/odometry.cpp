@@ -50,18 +50,19 @@ class StageClock {
 
 }  // namespace
 
-std::size_t Odometry::memory_needed(const OdometryOptions& options, const RigCalibration& rig) noexcept {
+std::size_t Odometry::memory_needed(const OdometryOptions& options, const RigCalibration& rig, std::span<const ImageView> masks) noexcept {
   const auto n = static_cast<std::size_t>(options.features);
-  return FrontEnd::memory_needed(options, rig) + Map::memory_needed() + WindowAdjuster::memory_needed(options, rig) +
+  return FrontEnd::memory_needed(options, rig, masks) + Map::memory_needed() + WindowAdjuster::memory_needed(options, rig) +
          PoseEstimator::memory_needed() + StereoMlesac::memory_needed(n) + 5 * (n * sizeof(double) + kCacheLine);
 }
 
-Odometry::Odometry(const OdometryOptions& options, const RigCalibration& rig, bool known, Arena& arena, PairRunner& runner)
+Odometry::Odometry(const OdometryOptions& options, const RigCalibration& rig, bool known, Arena& arena, PairRunner& runner,
+                   std::span<const ImageView> masks)
     : options_(options),
       rig_(rig),
       link_(known ? Link::linked : Link::unlinked),
       rig_known_(known),
-      front_end_(options, rig_, arena, runner),
+      front_end_(options, rig_, arena, runner, masks),
       map_(static_cast<std::size_t>(options.window_keyframes), arena),
       window_(options, rig_, arena),
       poses_(options, rig_, arena),
@@ -160,7 +161,7 @@ int Odometry::points_in_view(const Transform& T_left_world) const noexcept {
     Vec2 pixel;
     const Camera& camera = front_end_.lens(0).raw();
     if (p.stage == PointStage::active && camera.project(T_left_world * p.p_world, &pixel, nullptr) == ProjectStatus::ok &&
-        camera.inside(pixel, kBorder))
+        camera.inside(pixel, kBorder) && !front_end_.hides(0, pixel))
       ++n;
   }
   return n;

@@ -43,8 +43,11 @@ class Odometry {
  public:
   /// `known`: rig.T_camera_left is a calibration. False: of the rig only intrinsics and baseline are read; the first pair that allows it
   /// initialises the cameras, unlinked.
-  Odometry(const OdometryOptions& options, const RigCalibration& rig, bool known, Arena& arena, PairRunner& runner);
-  [[nodiscard]] static std::size_t memory_needed(const OdometryOptions& options, const RigCalibration& rig) noexcept;
+  /// `masks` as FrontEnd's.
+  Odometry(const OdometryOptions& options, const RigCalibration& rig, bool known, Arena& arena, PairRunner& runner,
+           std::span<const ImageView> masks = {});
+  [[nodiscard]] static std::size_t memory_needed(const OdometryOptions& options, const RigCalibration& rig,
+                                                 std::span<const ImageView> masks = {}) noexcept;
 
   [[nodiscard]] FrameOutcome process(const RigFrame& frame) noexcept;
 

@@ -81,6 +81,25 @@ class ReplayedFolder : public ::testing::Test {
 
 TemporaryFolder* ReplayedFolder::master_ = nullptr;
 
+TEST_F(ReplayedFolder, aMaskChangesWhatIsSeenAndOneOfAnotherSizeIsRefused) {
+  const std::string white(640 * 480, '\xff');
+  const fs::path bonnet = work_.write("bonnet.pgm", "P5 640 480 255\n" + white.substr(0, 640 * 400) + std::string(640 * 80, '\0'));
+  const fs::path small = work_.write("small.pgm", "P5 320 240 255\n" + white.substr(0, 320 * 240));
+  const Outcome o = replay("--set cameras.0.mask=" + bonnet.string() + " --set cameras.1.mask=" + bonnet.string());
+  ASSERT_EQ(o.code, 0) << o.err;
+  const std::string masked = read_file(session() / "poses.csv");
+  EXPECT_EQ(summary()["frames"]["posed"], kFrames);
+  fs::remove_all(session());
+  ASSERT_EQ(replay().code, 0);
+  EXPECT_NE(read_file(session() / "poses.csv"), masked);
+  fs::remove_all(session());
+  const Outcome refused = replay("--set cameras.1.mask=" + small.string());
+  EXPECT_EQ(refused.code, 2);
+  EXPECT_NE(refused.err.find("cameras.1.mask: " + small.string() + " is 320 × 240 px, the camera's images are 640 × 480"),
+            std::string::npos)
+      << refused.err;
+}
+
 TEST_F(ReplayedFolder, givesASessionWithAPoseForEveryFrame) {
   const Outcome o = replay();
   ASSERT_EQ(o.code, 0) << o.err;

@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <filesystem>
@@ -130,6 +131,28 @@ TEST(Run, withAnIdealInsTheReferenceIsTheTruthToAMillimetre) {
   // A stamp that is off by the clocks' 20 µs is 0.24 mm at 12 m/s, one of the INS's as much; straight lines between readings add 0.03 mm.
   EXPECT_LT(worst_m, 1e-3);
   EXPECT_LT(worst_rad, 0.001 * 3.14159265 / 180 * 2) << "twice a thousandth of a degree: the chosen start errs, too";
+}
+
+TEST(Run, aMaskIsHeldAgainstTheCamerasSizeAndItsSkyIsMissedByNobody) {
+  const TemporaryFolder folder;
+  const auto mask_of = [](int width, int height) {  // the upper third is sky, and hidden
+    std::string all = "P5\n" + std::to_string(width) + " " + std::to_string(height) + "\n255\n" +
+                      std::string(static_cast<std::size_t>(width * height), '\xff');
+    std::fill(all.end() - width * height, all.end() - width * (height - height / 3), '\0');
+    return all;
+  };
+  const auto large = folder.write("large.pgm", mask_of(640, 480)), small = folder.write("small.pgm", mask_of(320, 240));
+  const Outcome refused = drive(folder / "a", "--duration 2 --quiet" + kSmall + " --set cameras.1.mask=" + large.string());
+  EXPECT_EQ(refused.code, 2);
+  EXPECT_NE(refused.err.find("cameras.1.mask: " + large.string() + " is 640 × 480 px, the camera's images are 320 × 240"),
+            std::string::npos)
+      << refused.err;
+  EXPECT_FALSE(std::filesystem::exists(folder / "a")) << "nothing was begun";
+  const std::string masks = " --set cameras.0.mask=" + small.string() + " --set cameras.1.mask=" + small.string();
+  const Outcome o = drive(folder / "b", "--duration 6 --quiet" + kSmall + masks);
+  ASSERT_EQ(o.code, 0) << o.err;
+  EXPECT_EQ(summary_of(folder / "b")["frames"]["posed"], 121);
+  EXPECT_NEAR(summary_of(folder / "b")["truth"]["path_ratio"].get<double>(), 1, 0.02);
 }
 
 TEST(Run, faultsActAndTheDriveGoesOn) {

@@ -1,0 +1,47 @@
+#pragma once
+#include <cstdint>
+#include <span>
+
+#include "core/math/types.hpp"
+#include "core/memory/arena.hpp"
+#include "core/types/image.hpp"
+
+namespace vergence::features {
+
+/// Pixels where nothing may be looked for: the vehicle itself, dirt on the glass. One bit a pixel.
+///
+/// Ownership  The image it is made of is read in the constructor only.
+/// Threads    Read by any number.
+/// Memory     From the arena at construction: an eighth of the image.
+/// Errors     The constructor throws std::length_error when the arena is full.
+class Mask {
+ public:
+  /// Hides nothing.
+  Mask() noexcept = default;
+  /// Hides the pixels of `image` that are 0 and those within `margin` px of one, along x and along y. An empty image hides nothing.
+  Mask(const ImageView& image, int margin, Arena& arena);
+  [[nodiscard]] static std::size_t memory_needed(int width, int height) noexcept;
+
+  /// Pixels outside the image are not hidden: whoever asks knows its edge.
+  [[nodiscard]] bool hides(int x, int y) const noexcept {
+    if (bits_.empty() || x < 0 || y < 0 || x >= width_ || y >= height_) return false;
+    return (bits_[word(x, y)] >> (static_cast<unsigned>(x) % 64U) & 1U) != 0;
+  }
+  [[nodiscard]] bool hides(const Vec2& pixel) const noexcept;
+  [[nodiscard]] bool empty() const noexcept { return bits_.empty(); }
+  /// Hidden pixels.
+  [[nodiscard]] std::int64_t count() const noexcept;
+
+ private:
+  [[nodiscard]] std::size_t word(int x, int y) const noexcept {
+    return static_cast<std::size_t>(y) * words_a_row_ + static_cast<std::size_t>(x) / 64U;
+  }
+  /// Hides [first, last) of a row.
+  void hide(int first, int last, int y) noexcept;
+
+  int width_ = 0, height_ = 0;
+  std::size_t words_a_row_ = 0;
+  std::span<std::uint64_t> bits_;
+};
+
+}  // namespace vergence::features
