@@ -10,6 +10,7 @@ namespace {
 
 constexpr std::int64_t kPingBytes = trigger_ping_payload_size + trigger_overhead + 3;  // COBS byte, and a 00 at either end
 constexpr std::int64_t kPongBytes = trigger_pong_payload_size + trigger_overhead + 2;
+constexpr std::int64_t kEventBytes = trigger_event_payload_size + trigger_overhead + 2;
 
 }  // namespace
 
@@ -77,7 +78,7 @@ PongWord BoardClock::answer(const TriggerPong& pong, HostStamp t4) noexcept {
     return PongWord::backward;
   }
   backward_ = 0;
-  newest_tick_ = pong.sent;
+  newest_tick_ = pong.received;  // not `sent`: the next question may have come while this answer waited for the line
   mapper_.ping(sent, stamp_of_tick(pong.received), stamp_of_tick(pong.sent), std::max(here, sent + inside));
   known_ = true;
   ++answers_;
@@ -86,6 +87,12 @@ PongWord BoardClock::answer(const TriggerPong& pong, HostStamp t4) noexcept {
   rtt_at_ = (rtt_at_ + 1) % kRemembered;
   rtts_ = std::min(rtts_ + 1, kRemembered);
   return PongWord::taken;
+}
+
+MappedStamp BoardClock::map(DeviceStamp stamp, HostStamp arrival) noexcept {
+  MappedStamp m = mapper_.map(stamp, arrival - wire_ * kEventBytes);
+  if (!known_) m.error = m.error + kUnseen;
+  return m;
 }
 
 TimeQuality BoardClock::quality() const noexcept {

@@ -3,8 +3,9 @@
  *   sim_ftdi --wire PATH [--serial TEXT] [--product TEXT] [--seconds S] [--ready FILE]
  *
  * PATH becomes a link to a pseudo-terminal: the far end of the serial line, for a simulated instrument to open. Bytes
- * from there reach the host at the line rate the host has set, packed as the chip does it: at most 62 to a USB packet, a
- * short packet when the latency timer has run out. Commands on standard input: "unplug", "replug", "quit".
+ * from there reach the host at the line rate the host has set (and those of the host the far end), packed as the chip does
+ * it: at most 62 to a USB packet, a short packet when the latency timer has run out. Commands on standard input: "unplug",
+ * "replug", "quit".
  */
 #include <errno.h>
 #include <fcntl.h>
@@ -24,14 +25,21 @@
 #define MODEM 0x31u /* CTS and DSR on, in the layout of the chip's first status byte */
 #define LINE 0x60u  /* transmitter empty */
 
+/* One direction of the line: a byte that waits is through when its ten bits have passed, never sooner. */
+struct way {
+  uint8_t waiting[4096];
+  size_t used;
+  uint64_t free; /* when the bits of the last one are through */
+};
+
 static struct ftdi {
   struct usb_device usb;
   int wire;
   uint8_t fifo[FIFO];
   size_t used;
-  uint64_t oldest;    /* when the oldest byte of the buffer came */
-  uint64_t reported;  /* when the last packet went up */
-  uint64_t line_free; /* when the line can carry the next byte */
+  struct way from_wire, to_wire;
+  uint64_t oldest;   /* when the oldest byte of the buffer came */
+  uint64_t reported; /* when the last packet went up */
   unsigned latency_ms;
   double baud;
   unsigned long up, down, overrun;
@@ -90,34 +98,62 @@ static int control(void* self, const struct usb_setup* s, uint8_t* data) {
   }
 }
 
+/* How many of what waits are through, at most `most`; they are taken off by pass(). */
+static size_t through(const struct way* w, uint64_t ns, size_t most) {
+  double byte_ns = 1e10 / ftdi.baud; /* start, eight, stop */
+  size_t bytes = ns > w->free ? (size_t)((double)(ns - w->free) / byte_ns) : 0;
+  if (bytes > w->used) bytes = w->used;
+  return bytes > most ? most : bytes;
+}
+
+static void pass(struct way* w, size_t bytes) {
+  w->used -= bytes;
+  memmove(w->waiting, w->waiting + bytes, w->used);
+  w->free += (uint64_t)((double)bytes * 1e10 / ftdi.baud);
+}
+
+/* A line that was idle begins with the first byte. */
+static void begin(struct way* w, uint64_t ns) {
+  if (!w->used && w->free < ns) w->free = ns;
+}
+
 static void from_host(void* self, unsigned endpoint, const uint8_t* data, size_t bytes) {
+  struct way* w = &ftdi.to_wire;
   (void)self;
   (void)endpoint;
   ftdi.down += bytes;
-  while (bytes) {
-    ssize_t n = write(ftdi.wire, data, bytes);
-    if (n <= 0) break; /* nobody reads at the far end: a serial line does not wait */
-    data += n;
-    bytes -= (size_t)n;
+  begin(w, now_ns());
+  if (bytes > sizeof w->waiting - w->used) { /* the chip would make the host wait; nothing here sends that much */
+    ftdi.overrun += bytes - (sizeof w->waiting - w->used);
+    bytes = sizeof w->waiting - w->used;
   }
+  memcpy(w->waiting + w->used, data, bytes);
+  w->used += bytes;
+}
+
+static void give_to_wire(uint64_t ns) {
+  struct way* w = &ftdi.to_wire;
+  size_t bytes = through(w, ns, sizeof w->waiting);
+  if (!bytes) return;
+  if (write(ftdi.wire, w->waiting, bytes) < 0) ftdi.overrun += bytes; /* nobody reads at the far end: a serial line does not wait */
+  pass(w, bytes);
 }
 
 static void take_from_wire(uint64_t ns) {
-  uint8_t some[FIFO];
-  double byte_ns = 1e10 / ftdi.baud; /* start, eight, stop */
-  size_t allowed;
-
-  if (ftdi.line_free + 100000000 < ns) /* idle until now */
-    ftdi.line_free = ns - 1000000;
-  allowed = ns > ftdi.line_free ? (size_t)((double)(ns - ftdi.line_free) / byte_ns) : 0;
-  if (allowed > FIFO - ftdi.used) allowed = FIFO - ftdi.used;
-  if (!allowed) return;
-  ssize_t n = read(ftdi.wire, some, allowed);
-  if (n <= 0) return;
+  struct way* w = &ftdi.from_wire;
+  if (w->used < sizeof w->waiting) {
+    ssize_t n = read(ftdi.wire, w->waiting + w->used, sizeof w->waiting - w->used);
+    if (n > 0) {
+      begin(w, ns);
+      w->used += (size_t)n;
+    }
+  }
+  size_t bytes = through(w, ns, FIFO - ftdi.used);
+  if (!bytes) return;
   if (!ftdi.used) ftdi.oldest = ns;
-  memcpy(ftdi.fifo + ftdi.used, some, (size_t)n);
-  ftdi.used += (size_t)n;
-  ftdi.line_free += (uint64_t)((double)n * byte_ns);
+  memcpy(ftdi.fifo + ftdi.used, w->waiting, bytes);
+  ftdi.used += bytes;
+  pass(w, bytes);
 }
 
 /* Whole packets go at once; a part of one, or the bare status, when the latency timer has run out. */
@@ -223,6 +259,7 @@ int main(int argc, char** argv) {
     uint64_t ns = now_ns();
     usb_service(&ftdi.usb);
     if (ftdi.usb.configuration && ftdi.usb.fd >= 0) {
+      give_to_wire(ns);
       take_from_wire(ns);
       send_up(ns);
     }
@@ -230,6 +267,6 @@ int main(int argc, char** argv) {
   }
   usb_unplug(&ftdi.usb);
   unlink(wire);
-  printf("sim_ftdi: %lu bytes to the host, %lu from it\n", ftdi.up, ftdi.down);
+  printf("sim_ftdi: %lu bytes to the host, %lu from it, %lu found no room\n", ftdi.up, ftdi.down, ftdi.overrun);
   return 0;
 }

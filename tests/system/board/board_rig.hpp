@@ -1,0 +1,56 @@
+#pragma once
+#include <fcntl.h>
+
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "drivers/mock/simulators/board_simulator.hpp"
+#include "tests/rigs/emulator.hpp"
+#include "tests/support/device_terminal.hpp"
+
+namespace vergence::test {
+
+/// The simulated trigger board at the far end of an emulated FTDI converter, in real time inside the rig's kernel: the board's firmware
+/// state machine behind ftdi_sio.
+///
+/// Threads  pulses(): any. `told` is called on the board's own thread.
+class BoardBehindConverter {
+ public:
+  static constexpr const char* kWire = "/run/vergence-board";
+
+  /// `told`: of every pulse as it is made; returns what the cameras' exposure outputs do.
+  explicit BoardBehindConverter(mock::PulseSource told = {}, mock::BoardSimulatorOptions options = {})
+      : converter_("sim_ftdi", {"--wire", kWire, "--serial", "VGBOARD1"}), told_(std::move(told)) {
+    options.power_on = monotonic_now();
+    auto board = std::make_unique<mock::BoardSimulator>([this](const mock::SimulatedPulse& pulse) { return take(pulse); }, options);
+    board_ = std::make_unique<DeviceOnDescriptor>(::open(kWire, O_RDWR | O_NOCTTY | O_NONBLOCK), std::move(board));
+  }
+
+  [[nodiscard]] Emulator& converter() noexcept { return converter_; }
+  /// Every pulse that was made, with its true time.
+  [[nodiscard]] std::vector<mock::SimulatedPulse> pulses() const {
+    const std::lock_guard lock(mutex_);
+    return pulses_;
+  }
+
+ private:
+  mock::SimulatedExposures take(const mock::SimulatedPulse& pulse) {
+    {
+      const std::lock_guard lock(mutex_);
+      pulses_.push_back(pulse);
+    }
+    return told_ ? told_(pulse) : mock::SimulatedExposures{};
+  }
+
+  Emulator converter_;
+  mock::PulseSource told_;
+  mutable std::mutex mutex_;
+  std::vector<mock::SimulatedPulse> pulses_;
+  std::unique_ptr<DeviceOnDescriptor> board_;
+};
+
+}  // namespace vergence::test

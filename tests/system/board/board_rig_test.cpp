@@ -1,0 +1,111 @@
+// The trigger board's firmware, simulated, at the far end of an emulated FTDI converter: the driver on the kernel's ftdi_sio.
+#include <gtest/gtest.h>
+
+#include <chrono>
+#include <fstream>
+#include <map>
+#include <thread>
+
+#include "drivers/serial/serial.hpp"
+#include "drivers/trigger_board/trigger_board.hpp"
+#include "tests/system/board/board_rig.hpp"
+
+namespace vergence {
+namespace {
+
+template <class Condition>
+bool within(int seconds, const Condition& condition) {
+  for (int i = 0; i < 100 * seconds; ++i) {
+    if (condition()) return true;
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  }
+  return false;
+}
+
+TriggerConfiguration thirty_hertz() {
+  TriggerConfiguration c;
+  c.rate_hz = 30;
+  c.vary = Duration::milliseconds(1);
+  return c;
+}
+
+std::vector<Pulse> take(TriggerDevice& device, std::size_t most) {
+  std::vector<Pulse> all;
+  for (Pulse p; all.size() < most && device.wait(Duration::seconds(5), &p) == DeviceStatus::ok;) all.push_back(p);
+  return all;
+}
+
+class BoardRig : public ::testing::Test {
+ protected:
+  std::unique_ptr<trigger_board::Device> open() {
+    std::unique_ptr<trigger_board::Device> device;
+    EXPECT_TRUE(within(10, [&] {
+      DeviceStatus status = DeviceStatus::ok;
+      device = driver_.open_board("", &status);
+      return device != nullptr;
+    })) << driver_.complaint();
+    return device;
+  }
+  /// Every report against the pulse that was made: number, and the time of the edge within the bound that goes with it (half of the
+  /// shortest way there and back: the chip's latency timer is in it).
+  void expect_true_edges(const std::vector<Pulse>& told) {
+    std::map<std::uint64_t, HostStamp> made;
+    for (const mock::SimulatedPulse& p : board_.pulses()) made[p.number] = p.edge;
+    for (const Pulse& p : told) {
+      ASSERT_TRUE(made.contains(p.number)) << p.number;
+      ASSERT_TRUE(p.mapped);
+      const Duration off = p.host - made[p.number];
+      ASSERT_LE(std::abs(off.ns()), p.host_error.ns()) << "pulse " << p.number;
+    }
+  }
+
+  test::BoardBehindConverter board_;
+  trigger_board::Driver driver_;
+};
+
+TEST_F(BoardRig, reportsEveryPulseThroughTheRealDriverWithEitherLatencyTimer) {
+  for (const int timer : {16, 1}) {
+    auto device = open();
+    ASSERT_NE(device, nullptr);
+    std::ofstream("/sys/bus/usb-serial/devices/ttyUSB0/latency_timer") << timer << std::flush;
+    ASSERT_EQ(read_latency_timer_ms("/dev/ttyUSB0"), timer);
+    ASSERT_EQ(device->configure(thirty_hertz(), nullptr), DeviceStatus::ok) << device->complaint();
+    const std::uint64_t before = device->statistics().malformed;  // heard at other rates, when the board was looked for
+    ASSERT_EQ(device->start(nullptr), DeviceStatus::ok);
+    const auto told = take(*device, 90);
+    ASSERT_EQ(told.size(), 90U) << device->complaint();
+    for (std::size_t i = 1; i < told.size(); ++i) ASSERT_EQ(told[i].number, told[i - 1].number + 1) << "none is lost";
+    expect_true_edges(told);
+    EXPECT_LE(device->statistics().malformed, before + 1) << "but for what was under way when the line was taken over";
+    EXPECT_EQ(device->statistics().lost, 0U);
+    device->stop();
+  }
+}
+
+TEST_F(BoardRig, comesBackAfterItsConverterWasUnpluggedWithTheBoardsOwnNumbers) {
+  auto device = open();
+  ASSERT_NE(device, nullptr);
+  ASSERT_EQ(device->configure(thirty_hertz(), nullptr), DeviceStatus::ok) << device->complaint();
+  ASSERT_EQ(device->start(nullptr), DeviceStatus::ok);
+  const auto before = take(*device, 30);
+  ASSERT_EQ(before.size(), 30U);
+  board_.converter().command("unplug");
+  DeviceStatus status = DeviceStatus::ok;
+  Pulse p;
+  ASSERT_TRUE(within(10, [&] {
+    do status = device->wait(Duration{}, &p);
+    while (status == DeviceStatus::ok);
+    return status == DeviceStatus::gone;
+  }));
+  board_.converter().command("replug");
+  ASSERT_TRUE(within(30, [&] { return device->start(nullptr) == DeviceStatus::ok; }));
+  const auto after = take(*device, 30);
+  ASSERT_EQ(after.size(), 30U);
+  EXPECT_EQ(after.front().boot, before.front().boot) << "the board did not begin anew";
+  EXPECT_GT(after.front().number, before.back().number) << "it went on pulsing while nobody listened";
+  expect_true_edges(after);
+  device->stop();
+}
+
+}  // namespace
+}  // namespace vergence
