@@ -7,6 +7,7 @@ enum {
   second_us = 1000000,
   pps_seconds = tick_pps_edges - 1, /* 16 s of microseconds, 2^-40: just below 2^64 */
   pps_agree_us = 100,               /* receivers are right to 0.1 us, interrupts of a port without capture to some 10 us */
+  pps_wander = 20,                  /* an oscillator moves by less than a twentieth of its tolerance from one second to the next */
   pps_to_acquire = 4,
   pps_refused_limit = 3,
   pps_lost_s = 4
@@ -66,6 +67,8 @@ void tick_init(TickDiscipline* d, uint32_t counts_hz, uint32_t tolerance_ppm, ui
   memset(d, 0, sizeof *d);
   d->counts_hz = counts_hz;
   d->tolerance = (uint64_t)counts_hz * tolerance_ppm / second_us;
+  const uint64_t agree = d->counts_hz * pps_agree_us / second_us;
+  d->agree = d->tolerance / pps_wander > agree ? d->tolerance / pps_wander : agree;
   d->segment.count = count;
   d->segment.rate = rate_of(1, counts_hz);
   d->before = d->segment;
@@ -111,10 +114,9 @@ static uint64_t whole_seconds(const TickDiscipline* d, uint64_t counts) {
   const uint64_t second = d->acquired ? ((uint64_t)second_us << rate_bits) / d->estimate : d->counts_hz;
   const uint64_t seconds = (counts + second / 2U) / second;
   const uint64_t off = difference(counts, seconds * second);
-  const uint64_t agree = d->counts_hz * pps_agree_us / second_us;
   if (seconds == 0 || seconds > pps_seconds) return 0;
   if (!d->acquired) return seconds == 1 && off <= d->tolerance ? 1 : 0;
-  return off <= agree ? seconds : 0;
+  return off <= d->agree ? seconds : 0;
 }
 
 /* Moves the rate towards PPS', and once it is there keeps the edges' ticks whole seconds apart. */
@@ -164,7 +166,7 @@ bool tick_pps(TickDiscipline* d, uint64_t edge, uint64_t now) {
   uint64_t seconds = whole_seconds(d, since);
   if (seconds == 1 && !d->acquired && d->used >= 2) { /* as long as those before it */
     const uint64_t mean = (d->last_edge - oldest(d)) / (d->used - 1U);
-    if (difference(since, mean) > d->counts_hz * pps_agree_us / second_us) seconds = 0;
+    if (difference(since, mean) > d->agree) seconds = 0;
   }
   if (seconds == 0) {
     if (!d->acquired || ++d->refused >= pps_refused_limit) {

@@ -4,10 +4,10 @@
  * The board's ticks: microseconds since its start out of the counts of its timer, at the rate of PPS where there is one.
  *
  * Without PPS a tick is 10^-6 s by the crystal. The rate of PPS is the slope over the last 16 s of its edges; an edge counts when it lies
- * within 100 us of where the others say, and the first four must agree. Ticks never step, backwards or forwards: they are a continuous,
- * rising, piecewise linear function of counts. Until hold_rate() their rate takes PPS' at once; then it moves by at most 1 ppm a second
- * (or a sixteenth of what is missing, if that is more), so that a host that maps ticks to its own clock can follow. Once the rate is there
- * the ticks of PPS edges are held whole seconds apart. PPS gone: the last rate stays.
+ * within 100 us of where the others say (more for a bad oscillator), and the first four must agree. Ticks never step, backwards or
+ * forwards: they are a continuous, rising, piecewise linear function of counts. Until tick_hold_rate() their rate takes PPS' at once; then
+ * it moves by at most 1 ppm a second (or a sixteenth of what is missing, if that is more), so that a host that maps ticks to its own clock
+ * can follow. Once the rate is there the ticks of PPS edges are held whole seconds apart. PPS gone: the last rate stays.
  *
  * Memory     The caller's struct, nothing else. Threads: one at a time.
  * Time       Counts are 64-bit and never wrap; counts_hz 1 MHz .. 1 GHz. Every call is bounded by the ring of edges.
@@ -33,6 +33,7 @@ typedef struct {
   TickSegment segment, before; /* counts older than segment.count go by the one before */
   uint64_t counts_hz;
   uint64_t tolerance; /* counts in a second that the timer may be off */
+  uint64_t agree;     /* counts by which an edge may lie beside where the others say */
   uint64_t estimate;  /* rate by PPS; meaningful while acquired */
   uint64_t edges[tick_pps_edges];
   uint8_t first, used; /* in the ring `edges` */

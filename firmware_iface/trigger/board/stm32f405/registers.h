@@ -1,0 +1,77 @@
+#ifndef VERGENCE_FIRMWARE_IFACE_TRIGGER_BOARD_STM32F405_REGISTERS_H
+#define VERGENCE_FIRMWARE_IFACE_TRIGGER_BOARD_STM32F405_REGISTERS_H
+/*
+ * The registers that the port uses, by the chapters of the reference manual RM0090 (STM32F405/415…) and, for the core, of the Cortex-M4
+ * programming manual PM0214. Base addresses: RM0090 "Memory map".
+ */
+#include <stdint.h>
+
+typedef volatile uint32_t Register;
+
+/* "Reset and clock control (RCC)" */
+typedef struct {
+  Register cr, pllcfgr, cfgr, cir, ahb1rstr, ahb2rstr, ahb3rstr, reserved_1c, apb1rstr, apb2rstr, reserved_28[2], ahb1enr, ahb2enr, ahb3enr,
+      reserved_3c, apb1enr, apb2enr;
+} RccRegisters;
+
+/* "General-purpose I/Os (GPIO)" */
+typedef struct {
+  Register moder, otyper, ospeedr, pupdr, idr, odr, bsrr, lckr, afr[2];
+} GpioRegisters;
+
+/* "General-purpose timers (TIM2 to TIM5)" */
+typedef struct {
+  Register cr1, cr2, smcr, dier, sr, egr, ccmr[2], ccer, cnt, psc, arr, reserved_30, ccr[4];
+} TimerRegisters;
+
+/* "Universal synchronous asynchronous receiver transmitter (USART)" */
+typedef struct {
+  Register sr, dr, brr, cr1, cr2, cr3;
+} UsartRegisters;
+
+/* "Interrupts and events": EXTI */
+typedef struct {
+  Register imr, emr, rtsr, ftsr, swier, pr;
+} ExtiRegisters;
+
+/* "System configuration controller (SYSCFG)" */
+typedef struct {
+  Register memrmp, pmc, exticr[4];
+} SyscfgRegisters;
+
+/* "Independent watchdog (IWDG)" */
+typedef struct {
+  Register kr, pr, rlr, sr;
+} WatchdogRegisters;
+
+/* "Random number generator (RNG)" */
+typedef struct {
+  Register cr, sr, dr;
+} RandomRegisters;
+
+#define RCC ((RccRegisters*)0x40023800U)
+#define GPIOA ((GpioRegisters*)0x40020000U)
+#define GPIOB ((GpioRegisters*)0x40020400U)
+#define TIM2 ((TimerRegisters*)0x40000000U)
+#define TIM4 ((TimerRegisters*)0x40000800U)
+#define TIM5 ((TimerRegisters*)0x40000C00U)
+#define USART1 ((UsartRegisters*)0x40011000U)
+#define EXTI ((ExtiRegisters*)0x40013C00U)
+#define SYSCFG ((SyscfgRegisters*)0x40013800U)
+#define IWDG ((WatchdogRegisters*)0x40003000U)
+#define RNG ((RandomRegisters*)0x50060800U)
+#define FLASH_ACR (*(Register*)0x40023C00U) /* "Embedded Flash memory interface": access control */
+#define UNIQUE_ID 0x1FFF7A10U               /* "Device electronic signature": 96 bits */
+
+/* PM0214 "Nested vectored interrupt controller", "System control block" */
+#define NVIC_ISER ((Register*)0xE000E100U)
+#define NVIC_IPR ((volatile uint8_t*)0xE000E400U)
+#define SCB_VTOR (*(Register*)0xE000ED08U)
+#define SCB_AIRCR (*(Register*)0xE000ED0CU)
+#define SCB_SHCSR (*(Register*)0xE000ED24U)
+#define SCB_CFSR (*(Register*)0xE000ED28U)
+
+/* Positions in the vector table: RM0090 "Interrupts and events", vector table for STM32F405. */
+enum { irq_exti9_5 = 23, irq_tim2 = 28, irq_usart1 = 37, irq_tim5 = 50, irq_count = 82 };
+
+#endif
