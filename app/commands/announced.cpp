@@ -13,9 +13,6 @@ struct Announced {
 
 constexpr std::array kAnnounced{
     Announced{"calibrate", "Find intrinsics and the stereo transform with a checkerboard"},
-    Announced{"devices", "List the cameras, boards and sensors that are connected"},
-    Announced{"doctor", "Check this machine and its devices for what a drive needs"},
-    Announced{"snap", "Take one picture with every camera of a configuration"},
 };
 
 }  // namespace

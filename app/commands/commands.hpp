@@ -7,11 +7,14 @@
 /// runs the command from the subcommand's callback and sets *exit_code. InputError may leave the callback.
 namespace vergence::app {
 
+void add_devices(CLI::App& root, ExitCode* exit_code);
+void add_doctor(CLI::App& root, ExitCode* exit_code);
 void add_evaluate(CLI::App& root, ExitCode* exit_code);
 void add_replay(CLI::App& root, ExitCode* exit_code);
 void add_report(CLI::App& root, ExitCode* exit_code);
 void add_run(CLI::App& root, ExitCode* exit_code);
 void add_simulate(CLI::App& root, ExitCode* exit_code);
+void add_snap(CLI::App& root, ExitCode* exit_code);
 
 /// The words of the contract (DESIGN §6) that have no command behind them yet: whatever options they are given, they
 /// say so in one sentence and exit 2.

@@ -22,6 +22,8 @@ class DriveDevices {
   DriveDevices(const Configuration& configuration, const std::vector<std::string>& faults, bool fast, std::optional<double> duration_s);
 
   [[nodiscard]] const std::vector<CameraDevice*>& cameras() const noexcept { return cameras_; }
+  /// Real cameras with what they made of their configuration; empty: a mock's.
+  [[nodiscard]] const std::vector<OpenedCamera>& opened() const noexcept { return opened_; }
   [[nodiscard]] InsDevice* ins() const noexcept { return ins_; }              // null: none
   [[nodiscard]] TriggerDevice* trigger() const noexcept { return trigger_; }  // null: pulses come from elsewhere, or none
   [[nodiscard]] const SyncOptions& sync() const noexcept { return sync_; }

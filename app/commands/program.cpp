@@ -78,6 +78,9 @@ ExitCode parse_and_run(int argc, const char* const* argv) {
   add_evaluate(root, &exit_code);
   add_report(root, &exit_code);
   add_simulate(root, &exit_code);
+  add_devices(root, &exit_code);
+  add_doctor(root, &exit_code);
+  add_snap(root, &exit_code);
   add_announced(root, &exit_code);
   check_first_word(root, argc, argv);
   try {

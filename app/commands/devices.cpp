@@ -1,0 +1,65 @@
+#include <fstream>
+#include <iostream>
+#include <memory>
+#include <string>
+
+#include "app/commands/commands.hpp"
+#include "app/commands/devices_report.hpp"
+#include "app/doctor/udev_rules.hpp"
+
+namespace vergence::app {
+namespace {
+
+struct Arguments {
+  bool json = false, probe = false;
+  std::string rules;  // `-`: standard output
+};
+
+void write_rules(const std::string& file, const std::string& rules) {
+  std::ofstream out(file, std::ios::binary | std::ios::trunc);
+  out << rules;
+  out.close();
+  if (!out)
+    throw InputError(file + ": cannot be written; write to standard output and let sudo do it: vergence devices --write-udev | sudo tee " +
+                     file);
+  std::cerr << "vergence: " << file << " written; now: sudo udevadm control --reload && sudo udevadm trigger\n";
+}
+
+void list(const Arguments& a, bool rules_asked) {
+  InventoryOptions options;
+  options.probe = a.probe;
+  const Inventory inventory = take_inventory(Machine::here(), options);
+  const std::string rules = rules_asked ? udev_rules(inventory) : "";
+  const bool to_stdout = a.rules == "-";
+  if (rules_asked && !to_stdout) write_rules(a.rules, rules);
+  if (a.json)
+    std::cout << devices_json(inventory, to_stdout ? rules : "");
+  else if (rules_asked && to_stdout)
+    std::cout << rules;
+  else
+    std::cout << devices_text(inventory, Terminal::of_stdout());
+}
+
+}  // namespace
+
+void add_devices(CLI::App& root, ExitCode* exit_code) {
+  const auto a = std::make_shared<Arguments>();
+  CLI::App* command =
+      root.add_subcommand("devices", "List the cameras, sensors and boards that are connected, with what to paste into a configuration");
+  command->add_flag("--json", a->json, "For programs (docs/devices.md has the keys)");
+  command->add_flag("--probe", a->probe, "Open the serial ports on USB and ask who is there; some boards restart from that");
+  CLI::Option* rules = command
+                           ->add_option("--write-udev", a->rules,
+                                        "Write udev rules for what is plugged in, to FILE or to standard output: permissions, names that "
+                                        "stay, latency timer, ModemManager kept away")
+                           ->expected(0, 1)
+                           ->default_str("-")
+                           ->type_name("[FILE]");
+  command->callback([a, rules, exit_code] {
+    if (rules->count() > 0 && a->rules.empty()) a->rules = "-";
+    list(*a, rules->count() > 0);
+    *exit_code = ExitCode::done;
+  });
+}
+
+}  // namespace vergence::app

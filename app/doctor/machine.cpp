@@ -1,0 +1,197 @@
+#include "app/doctor/machine.hpp"
+
+#include <arpa/inet.h>
+#include <grp.h>
+#include <ifaddrs.h>
+#include <netinet/in.h>
+#include <pwd.h>
+#include <sys/stat.h>
+#include <sys/statvfs.h>
+#include <sys/timex.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <cstring>
+#include <fstream>
+#include <sstream>
+#include <string_view>
+#include <system_error>
+
+namespace vergence::app {
+namespace fs = std::filesystem;
+namespace {
+
+std::string_view trimmed(std::string_view s) {
+  const auto first = s.find_first_not_of(" \t\r\n");
+  if (first == std::string_view::npos) return {};
+  return s.substr(first, s.find_last_not_of(" \t\r\n") - first + 1);
+}
+
+template <class Integer>
+std::optional<Integer> whole_number(const std::optional<std::string>& text, int base) {
+  if (!text || text->empty()) return std::nullopt;
+  Integer value{};
+  const char* end = text->data() + text->size();
+  const auto [stop, error] = std::from_chars(text->data(), end, value, base);
+  if (error != std::errc() || stop != end) return std::nullopt;
+  return value;
+}
+
+std::vector<std::string> own_groups() {
+  std::vector<gid_t> ids(static_cast<std::size_t>(std::max(0, ::getgroups(0, nullptr))));
+  const int n = ::getgroups(static_cast<int>(ids.size()), ids.data());
+  ids.resize(static_cast<std::size_t>(std::max(0, n)));
+  ids.push_back(::getegid());
+  std::vector<std::string> names;
+  for (const gid_t id : ids)
+    if (const ::group* g = ::getgrgid(id); g != nullptr) names.emplace_back(g->gr_name);
+  std::sort(names.begin(), names.end());
+  names.erase(std::unique(names.begin(), names.end()), names.end());
+  return names;
+}
+
+std::vector<InterfaceAddress> own_addresses() {
+  std::vector<InterfaceAddress> all;
+  ifaddrs* list = nullptr;
+  if (::getifaddrs(&list) != 0) return all;
+  const auto host_order = [](const sockaddr* a) {
+    sockaddr_in in{};
+    if (a != nullptr) std::memcpy(&in, a, sizeof in);
+    return ntohl(in.sin_addr.s_addr);
+  };
+  for (const ifaddrs* i = list; i != nullptr; i = i->ifa_next)
+    if (i->ifa_addr != nullptr && i->ifa_addr->sa_family == AF_INET)
+      all.push_back({i->ifa_name, host_order(i->ifa_addr), host_order(i->ifa_netmask)});
+  ::freeifaddrs(list);
+  return all;
+}
+
+std::string group_of_node(const std::string& node) {
+  struct stat s {};
+  if (::stat(node.c_str(), &s) != 0) return {};
+  const ::group* g = ::getgrgid(s.st_gid);
+  return g == nullptr ? std::string() : g->gr_name;
+}
+
+std::optional<std::uint64_t> free_bytes_of(const fs::path& folder) {
+  // The folder may still have to be made: what counts is the disk that it will be on.
+  std::error_code error;
+  fs::path at = fs::absolute(folder, error);
+  while (!error && at.has_relative_path() && !fs::exists(at, error)) at = at.parent_path();
+  struct statvfs s {};
+  if (::statvfs(at.c_str(), &s) != 0) return std::nullopt;
+  return static_cast<std::uint64_t>(s.f_bavail) * s.f_frsize;
+}
+
+std::optional<bool> kernel_clock_synchronised() {
+  timex t{};
+  const int state = ::adjtimex(&t);
+  if (state < 0) return std::nullopt;
+  return state != TIME_ERROR && (t.status & STA_UNSYNC) == 0;
+}
+
+}  // namespace
+
+Machine Machine::here() {
+  Machine m;
+  if (const passwd* p = ::getpwuid(::getuid()); p != nullptr && p->pw_name != nullptr) m.user = p->pw_name;
+  m.groups = own_groups();
+  m.addresses = own_addresses();
+  m.may_use = [](const std::string& node) { return ::access(node.c_str(), R_OK | W_OK) == 0; };
+  m.group_of = group_of_node;
+  m.free_bytes = free_bytes_of;
+  m.clock_synchronised = kernel_clock_synchronised();
+  return m;
+}
+
+fs::path Machine::at(const std::string& path) const { return root / fs::path(path).relative_path(); }
+
+std::optional<std::string> Machine::text(const std::string& path) const {
+  std::error_code error;
+  if (!fs::is_regular_file(at(path), error)) return std::nullopt;  // a pipe would make us wait
+  std::ifstream in(at(path), std::ios::binary);
+  std::string all(kMostText, '\0');
+  if (!in.read(all.data(), static_cast<std::streamsize>(all.size())) && !in.eof()) return std::nullopt;
+  all.resize(static_cast<std::size_t>(in.gcount()));
+  return all;
+}
+
+std::optional<std::string> Machine::line(const std::string& path) const {
+  const std::optional<std::string> all = text(path);
+  if (!all) return std::nullopt;
+  std::string first(trimmed(std::string_view(*all).substr(0, all->find('\n'))));
+  std::replace_if(
+      first.begin(), first.end(), [](unsigned char c) { return c < 0x20 || c >= 0x7f; }, '?');
+  return first;
+}
+
+std::optional<std::int64_t> Machine::number(const std::string& path) const { return whole_number<std::int64_t>(line(path), 10); }
+
+std::optional<std::uint16_t> Machine::hex16(const std::string& path) const { return whole_number<std::uint16_t>(line(path), 16); }
+
+std::vector<std::string> Machine::names(const std::string& path) const {
+  std::vector<std::string> all;
+  std::error_code error;
+  for (fs::directory_iterator it(at(path), error), end; !error && it != end && all.size() < kMostNames; it.increment(error))
+    all.push_back(it->path().filename().string());
+  std::sort(all.begin(), all.end());
+  return all;
+}
+
+bool Machine::exists(const std::string& path) const {
+  std::error_code error;
+  return fs::exists(at(path), error);
+}
+
+bool Machine::runs(const std::string& name) const {
+  constexpr std::size_t kKept = 15;  // letters of a name that the kernel keeps
+  const std::string shown = name.substr(0, kKept);
+  for (const std::string& entry : names("/proc"))
+    if (entry.find_first_not_of("0123456789") == std::string::npos && line("/proc/" + entry + "/comm") == shown) return true;
+  return false;
+}
+
+bool Machine::has_capability(unsigned bit) const {
+  const std::optional<std::string> status = text("/proc/self/status");
+  if (!status || bit >= 64) return false;
+  constexpr std::string_view kKey = "CapEff:";
+  const auto where = status->find(kKey);
+  if (where == std::string::npos) return false;
+  const std::string_view rest = std::string_view(*status).substr(where + kKey.size());
+  const std::string hex(trimmed(rest.substr(0, rest.find('\n'))));
+  return (whole_number<std::uint64_t>(hex, 16).value_or(0) >> bit & 1U) != 0;
+}
+
+std::optional<std::int64_t> Machine::limit(const std::string& name) const {
+  const std::optional<std::string> limits = text("/proc/self/limits");
+  if (!limits) return std::nullopt;
+  std::istringstream lines(*limits);
+  for (std::string row; std::getline(lines, row);) {
+    if (!row.starts_with(name)) continue;
+    std::istringstream words(row.substr(name.size()));
+    std::string soft;
+    words >> soft;
+    if (soft == "unlimited") return -1;
+    return whole_number<std::int64_t>(soft, 10);
+  }
+  return std::nullopt;
+}
+
+bool Machine::in_group(const std::string& group) const { return std::find(groups.begin(), groups.end(), group) != groups.end(); }
+
+bool Machine::listed_in_group(const std::string& group) const {
+  const std::optional<std::string> file = text("/etc/group");
+  if (!file) return false;
+  std::istringstream lines(*file);
+  for (std::string row; std::getline(lines, row);) {
+    if (!row.starts_with(group + ":")) continue;
+    std::istringstream members(row.substr(row.rfind(':') + 1));
+    for (std::string member; std::getline(members, member, ',');)
+      if (trimmed(member) == user) return true;
+  }
+  return false;
+}
+
+}  // namespace vergence::app

@@ -1,0 +1,64 @@
+#include "app/doctor/needs.hpp"
+
+#include <algorithm>
+#include <cstdlib>
+
+#include <fmt/format.h>
+
+#include "app/commands/drive_devices.hpp"
+#include "app/commands/rig_settings.hpp"
+
+namespace vergence::app {
+namespace {
+
+/// Bytes of a pixel on its way, by the name of its format; where the driver chooses, what it chooses first.
+double bytes_per_pixel(const CameraSettings& s) {
+  const std::string& f = s.pixel_format;
+  const auto has = [&f](const char* part) { return f.find(part) != std::string::npos; };
+  if (f.empty()) return s.driver == "v4l2" ? 2 : 1;  // YUYV is what cameras of the USB video class have
+  if (has("10P") || has("10p")) return 1.25;
+  if (has("422") || has("YU") || has("VY") || has("16") || has("14") || has("12") || has("10")) return 2;
+  if (has("RGB8") || has("444")) return 3;
+  return 1;
+}
+
+}  // namespace
+
+double CameraNeed::option(const std::string& word, double fallback) const {
+  const auto it = options.find(word);
+  if (it == options.end()) return fallback;
+  char* end = nullptr;
+  const double value = std::strtod(it->second.c_str(), &end);
+  return end != it->second.c_str() && *end == '\0' && value > 0 ? value : fallback;
+}
+
+std::vector<CameraNeed> Needs::of(const std::string& driver) const {
+  std::vector<CameraNeed> some;
+  std::copy_if(cameras.begin(), cameras.end(), std::back_inserter(some), [&](const CameraNeed& c) { return c.driver == driver; });
+  return some;
+}
+
+Needs needs_of(const Configuration& c) {
+  Needs needs;
+  needs.given = true;
+  for (int k = 0; k < camera_count(c); ++k) {
+    const CameraSettings& s = c.cameras[static_cast<std::size_t>(k)];
+    CameraNeed n;
+    n.key = fmt::format("cameras.{}", k);
+    n.name = s.name;
+    n.driver = s.driver;
+    n.serial = s.serial;
+    n.width = s.width;
+    n.height = s.height;
+    n.bytes = bytes_per_pixel(s) * s.width * s.height;
+    n.options = parse_camera_options(n.key + ".options", s.options);
+    n.rate_hz = c.trigger.rate * n.option("thin", 1);
+    n.free = s.trigger == "free";
+    needs.cameras.push_back(std::move(n));
+  }
+  needs.ins_driver = c.ins.driver;
+  needs.ins_port = c.ins.port;
+  return needs;
+}
+
+}  // namespace vergence::app

@@ -1,0 +1,38 @@
+#pragma once
+#include <map>
+#include <string>
+#include <vector>
+
+#include "app/config/configuration.hpp"
+
+namespace vergence::app {
+
+/// One camera, as far as the machine below it is concerned.
+struct CameraNeed {
+  std::string key, name;  // `cameras.0`, `left`
+  std::string driver, serial;
+  double bytes = 0;  // of an image on its way
+  int width = 0, height = 0;
+  double rate_hz = 0;  // that the camera runs at, which may be more than the rig's
+  bool free = false;
+  std::map<std::string, std::string> options;
+
+  [[nodiscard]] double bytes_per_second() const noexcept { return bytes * rate_hz; }
+  /// A number among the options; `fallback` where there is none, or nonsense.
+  [[nodiscard]] double option(const std::string& word, double fallback) const;
+};
+
+/// What a drive with a configuration asks of the machine.
+struct Needs {
+  bool given = false;  // false: no configuration; then only what is plugged in is judged
+  std::vector<CameraNeed> cameras;
+  std::string ins_driver, ins_port;
+  int realtime_priority = 0;  // that threads ask for; 0: none does
+
+  [[nodiscard]] std::vector<CameraNeed> of(const std::string& driver) const;
+};
+
+/// InputError: a hole in the list of cameras, or options that cannot be read.
+[[nodiscard]] Needs needs_of(const Configuration& configuration);
+
+}  // namespace vergence::app

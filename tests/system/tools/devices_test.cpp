@@ -1,0 +1,62 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <string>
+
+#include <nlohmann/json.hpp>
+
+#include "tests/support/gige_camera.hpp"
+#include "tests/support/temporary_folder.hpp"
+#include "tests/unit/app/commands/run_vergence.hpp"
+
+namespace vergence {
+namespace {
+
+using nlohmann::json;
+using test::Outcome;
+using test::run_vergence;
+
+bool contains(const std::string& text, const std::string& part) { return text.find(part) != std::string::npos; }
+
+TEST(Devices, aCameraOnTheNetworkIsListedWithWhatToPaste) {
+  test::GigeCameraOptions o;
+  o.address = test::GigeCamera::address(60);
+  o.serial = "TOOL-60";
+  const test::GigeCamera camera(o);
+  const Outcome listed = run_vergence("devices");
+  EXPECT_EQ(listed.code, 0) << listed.err;
+  EXPECT_EQ(listed.err, "");
+  EXPECT_TRUE(contains(listed.out, "    - {driver: gige, serial: \"TOOL-60\"}\n")) << listed.out;
+  const Outcome for_programs = run_vergence("devices --json");
+  EXPECT_EQ(for_programs.code, 0);
+  const json all = json::parse(for_programs.out);
+  const auto found = std::find_if(all["cameras"].begin(), all["cameras"].end(), [](const json& c) { return c["serial"] == "TOOL-60"; });
+  ASSERT_NE(found, all["cameras"].end()) << for_programs.out;
+  EXPECT_EQ((*found)["place"], o.address);
+  EXPECT_EQ((*found)["driver"], "gige");
+  for (const char* key : {"driver", "serial", "model", "place", "also", "configuration"}) EXPECT_TRUE(found->contains(key)) << key;
+  ASSERT_EQ(all["drivers"].size(), 4U);
+  for (const json& d : all["drivers"]) EXPECT_EQ(d["answered"], true) << d;
+  EXPECT_TRUE(all["serial_ports"].is_array());
+  EXPECT_FALSE(all.contains("udev_rules"));
+}
+
+TEST(Devices, udevRulesGoWhereTheyAreAskedFor) {
+  const Outcome out = run_vergence("devices --write-udev");
+  EXPECT_EQ(out.code, 0);
+  EXPECT_TRUE(out.out.starts_with("# Devices of this rig")) << out.out;
+  const test::TemporaryFolder folder;
+  const auto file = folder / "98-rig.rules";
+  const Outcome written = run_vergence("devices --json --write-udev '" + file.string() + "'");
+  EXPECT_EQ(written.code, 0);
+  EXPECT_TRUE(contains(written.err, "udevadm control --reload")) << written.err;
+  EXPECT_EQ(test::read_file(file), out.out);
+  EXPECT_FALSE(json::parse(written.out).contains("udev_rules"));
+  EXPECT_EQ(json::parse(run_vergence("devices --write-udev --json").out)["udev_rules"], out.out);
+  const Outcome refused = run_vergence("devices --write-udev /no/such/folder/98.rules");
+  EXPECT_EQ(refused.code, 2);
+  EXPECT_TRUE(contains(refused.err, "sudo tee /no/such/folder/98.rules")) << refused.err;
+}
+
+}  // namespace
+}  // namespace vergence

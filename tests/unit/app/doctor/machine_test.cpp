@@ -1,0 +1,145 @@
+#include "app/doctor/machine.hpp"
+
+#include <gtest/gtest.h>
+#include <sys/stat.h>
+
+#include <string>
+
+#include "app/doctor/serial_kind.hpp"
+#include "app/doctor/usb_tree.hpp"
+#include "tests/unit/app/doctor/fake_machine.hpp"
+
+namespace vergence::app {
+namespace {
+
+using test::FakeMachine;
+
+TEST(Machine, aNumberIsANumberAndNothingElse) {
+  const FakeMachine f;
+  f.file("/sys/good", "  42\n");
+  f.file("/sys/negative", "-1\n");
+  f.file("/sys/words", "42 apples\n");
+  f.file("/sys/empty", "");
+  f.file("/sys/huge", "99999999999999999999999\n");
+  f.file("/sys/binary", std::string("\0\x01\xff\n42", 6));
+  EXPECT_EQ(f.machine.number("/sys/good"), 42);
+  EXPECT_EQ(f.machine.number("/sys/negative"), -1);
+  for (const char* name : {"/sys/words", "/sys/empty", "/sys/huge", "/sys/binary", "/sys/missing", "/sys"})
+    EXPECT_FALSE(f.machine.number(name)) << name;
+}
+
+TEST(Machine, whatCannotBePrintedIsNotHandedOn) {
+  const FakeMachine f;
+  f.file("/sys/serial", "A\033[2J\tB\xc3\xbc\n");
+  const auto line = f.machine.line("/sys/serial");
+  ASSERT_TRUE(line);
+  EXPECT_EQ(*line, "A?[2J?B??");
+}
+
+TEST(Machine, readsNoMoreThanAPage) {
+  const FakeMachine f;
+  f.file("/sys/long", std::string(1'000'000, 'x'));
+  EXPECT_EQ(f.machine.text("/sys/long")->size(), Machine::kMostText);
+}
+
+TEST(Machine, aPipeDoesNotMakeItWait) {
+  const FakeMachine f;
+  f.file("/sys/other", "1");
+  ASSERT_EQ(::mkfifo((f.folder / "sys/pipe").c_str(), 0600), 0);
+  EXPECT_FALSE(f.machine.text("/sys/pipe"));
+}
+
+TEST(Machine, knowsWhatRunsByTheFifteenLettersThatTheKernelKeeps) {
+  const FakeMachine f;
+  f.file("/proc/17/comm", "systemd-timesyn\n");
+  f.file("/proc/18/comm", "ModemManager\n");
+  f.file("/proc/self/comm", "chronyd\n");
+  EXPECT_TRUE(f.machine.runs("systemd-timesyncd"));
+  EXPECT_TRUE(f.machine.runs("ModemManager"));
+  EXPECT_FALSE(f.machine.runs("chronyd")) << "self is nobody's number";
+}
+
+TEST(Machine, readsLimitsAndCapabilitiesOfTheProcess) {
+  const FakeMachine f;
+  f.file("/proc/self/status", "Name:\tx\nCapPrm:\t0000000000000000\nCapEff:\t0000000000003000\n");
+  f.file("/proc/self/limits",
+         "Limit                     Soft Limit           Hard Limit           Units\n"
+         "Max locked memory         65536                unlimited            bytes\n"
+         "Max realtime priority     unlimited            0\n"
+         "Max nonsense              many                 0\n");
+  EXPECT_TRUE(f.machine.has_capability(12));
+  EXPECT_TRUE(f.machine.has_capability(13));
+  EXPECT_FALSE(f.machine.has_capability(14));
+  EXPECT_FALSE(f.machine.has_capability(64));
+  EXPECT_EQ(f.machine.limit("Max locked memory"), 65536);
+  EXPECT_EQ(f.machine.limit("Max realtime priority"), -1);
+  EXPECT_FALSE(f.machine.limit("Max nonsense"));
+  EXPECT_FALSE(f.machine.limit("Max absent"));
+}
+
+TEST(Machine, tellsMembershipFromAMerePlaceOnTheList) {
+  FakeMachine f;
+  f.machine.groups = {"video"};
+  f.file("/etc/group", "video:x:44:\ndialout:x:20:somebody, driver\ndialouts:x:21:driver\nplug:x:22:driverx\n");
+  EXPECT_TRUE(f.machine.in_group("video"));
+  EXPECT_FALSE(f.machine.in_group("dialout"));
+  EXPECT_TRUE(f.machine.listed_in_group("dialout"));
+  EXPECT_FALSE(f.machine.listed_in_group("plug"));
+  EXPECT_FALSE(f.machine.listed_in_group("video"));
+}
+
+TEST(Machine, theOneThisRunsOnAnswers) {
+  const Machine m = Machine::here();
+  EXPECT_FALSE(m.user.empty());
+  EXPECT_TRUE(m.limit("Max open files"));
+  EXPECT_TRUE(m.free_bytes("/there/is/no/such/folder")) << "the disk that it would be on";
+  EXPECT_TRUE(m.may_use("/dev/null"));
+  EXPECT_FALSE(m.may_use("/dev/there-is-no-such-node"));
+}
+
+TEST(UsbTree, listsDevicesAndPassesOverWhatMakesNoSense) {
+  const FakeMachine f;
+  f.usb("1-2", "1e10:2005", "12345");
+  f.file("/sys/bus/usb/devices/1-2/manufacturer", "Point Grey\n");
+  f.file("/sys/bus/usb/devices/1-2/product", "Chameleon\n");
+  f.file("/sys/bus/usb/devices/1-2/power/control", "auto\n");
+  f.usb("1-3", "046d:0825", "");
+  f.file("/sys/bus/usb/devices/1-3:1.0/video4linux", "not a folder");
+  f.usb("usb1", "1d6b:0002", "");
+  f.usb("1-4", "zzzz:0001", "");
+  f.file("/sys/bus/usb/devices/1-5/idVendor", "1e10\n");
+  f.file("/sys/bus/usb/devices/1-3/speed", "fast\n");
+  f.file("/sys/bus/usb/devices/1-3/devnum", "-7\n");
+  const auto all = list_usb_devices(f.machine);
+  ASSERT_EQ(all.size(), 2U);
+  EXPECT_EQ(all[0].title, "Point Grey Chameleon");
+  EXPECT_EQ(all[0].serial, "12345");
+  EXPECT_EQ(all[0].node(), "/dev/bus/usb/001/002");
+  EXPECT_EQ(all[0].control, "auto");
+  EXPECT_EQ(all[0].mbit, 480);
+  EXPECT_EQ(all[1].mbit, 0);
+  EXPECT_EQ(all[1].number, 0);
+}
+
+TEST(UsbTree, findsTheVideoNodesOfADevicesInterfaces) {
+  const FakeMachine f;
+  f.usb("1-2", "046d:0825", "");
+  f.file("/sys/bus/usb/devices/1-2/1-2:1.0/video4linux/video0/index", "0\n");
+  f.file("/sys/bus/usb/devices/1-2/1-2:1.2/video4linux/video2/index", "0\n");
+  const auto all = list_usb_devices(f.machine);
+  ASSERT_EQ(all.size(), 1U);
+  EXPECT_EQ(all[0].video, (std::vector<std::string>{"video0", "video2"}));
+}
+
+TEST(SerialKind, goesByWhatCarriesIt) {
+  EXPECT_EQ(serial_kind(0, 0), SerialKind::built_in);
+  EXPECT_EQ(serial_kind(0x2639, 0x0017), SerialKind::ins);
+  EXPECT_EQ(serial_kind(0x0403, 0xD38B), SerialKind::ins);
+  EXPECT_EQ(serial_kind(0x0403, 0x6001), SerialKind::ftdi);
+  EXPECT_EQ(serial_kind(0x10C4, 0xEA60), SerialKind::converter);
+  EXPECT_EQ(serial_kind(0x2341, 0x0043), SerialKind::board);
+  EXPECT_EQ(serial_kind(0x1234, 0x5678), SerialKind::unknown);
+}
+
+}  // namespace
+}  // namespace vergence::app

@@ -1,0 +1,121 @@
+#include "app/doctor/udev_rules.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+#include <cstring>
+#include <string>
+
+#include "tests/unit/app/doctor/fake_machine.hpp"
+
+namespace vergence::app {
+namespace {
+
+bool contains(const std::string& text, const std::string& part) { return text.find(part) != std::string::npos; }
+
+/// The house's own check of udev rules.
+testing::AssertionResult holds_as_rules(const std::string& rules) {
+  const test::TemporaryFolder folder;
+  const auto file = folder.write("98-rig.rules", rules);
+  const std::string command = "python3 '" VERGENCE_SOURCE_DIR "/tests/system/house/udev_rules.py' '" + file.string() + "' >'" +
+                              (folder / "said").string() + "' 2>&1";
+  if (std::system(command.c_str()) == 0) return testing::AssertionSuccess();
+  return testing::AssertionFailure() << test::read_file(folder / "said") << rules;
+}
+
+FoundPort port(std::uint16_t vendor, std::uint16_t product, const std::string& serial) {
+  FoundPort p;
+  p.info = {"/dev/ttyUSB0", "FT232R USB UART", vendor, product, serial, 16};
+  p.kind = serial_kind(vendor, product);
+  return p;
+}
+
+UsbDevice usb(std::uint16_t vendor, const std::string& serial, std::vector<std::string> video) {
+  UsbDevice d;
+  d.port = "1-2";
+  d.vendor = vendor;
+  d.product = 0x2005;
+  d.serial = serial;
+  d.title = "A camera";
+  d.video = std::move(video);
+  return d;
+}
+
+TEST(UdevRules, nothingPluggedInIsAFileWithoutRules) {
+  const std::string rules = udev_rules({});
+  EXPECT_TRUE(holds_as_rules(rules));
+  EXPECT_FALSE(contains(rules, "GROUP"));
+}
+
+TEST(UdevRules, everyDeviceIsNamedByItsSerial) {
+  Inventory i;
+  i.ports = {port(0x2639, 0x0300, "X07"), port(0x0403, 0x6001, "A1B2"), port(0x2341, 0x0043, "75")};
+  i.usb = {usb(0x1E10, "15021234", {}), usb(0x046D, "CAM", {"video0", "video1"}), usb(0x1234, "mouse", {})};
+  iidc::FirewireNode node;
+  node.device = "/dev/fw1";
+  node.rom.guid = 0x00B09D0100A1B2C3;
+  std::strcpy(node.rom.model.data(), "Flea2");
+  i.firewire = {node};
+  const std::string rules = udev_rules(i);
+  EXPECT_TRUE(holds_as_rules(rules));
+  for (const char* name : {"vergence/ins-X07", "vergence/serial-A1B2", "vergence/board-75", "vergence/camera-15021234",
+                           "vergence/camera-CAM", "vergence/camera-00b09d0100a1b2c3"})
+    EXPECT_TRUE(contains(rules, name)) << name;
+  EXPECT_TRUE(contains(rules, "ATTR{guid}==\"0x00b09d0100a1b2c3\""));
+  EXPECT_TRUE(contains(rules, "ATTRS{serial}==\"A1B2\", ATTR{latency_timer}=\"16\""));
+  EXPECT_TRUE(contains(rules, "ID_MM_DEVICE_IGNORE"));
+  EXPECT_TRUE(contains(rules, "ATTR{power/control}=\"on\""));
+  EXPECT_FALSE(contains(rules, "mouse"));
+}
+
+TEST(UdevRules, aBuiltInPortNeedsNone) {
+  Inventory i;
+  i.ports = {port(0, 0, "")};
+  EXPECT_FALSE(contains(udev_rules(i), "GROUP"));
+}
+
+TEST(UdevRules, whatADeviceSaysOfItselfCannotWriteRules) {
+  const std::string evil = "x\", RUN+=\"/bin/sh\n* ${env} $attr{x} %k ../../etc";
+  Inventory i;
+  i.ports = {port(0x0403, 0x6001, evil)};
+  i.ports[0].info.description = evil;
+  i.ports[0].device = evil;
+  i.usb = {usb(0x1E10, evil, {}), usb(0x046D, evil, {"video0"})};
+  i.usb[0].title = evil;
+  const std::string rules = udev_rules(i);
+  EXPECT_TRUE(holds_as_rules(rules));
+  for (std::size_t at = 0; at < rules.size();) {
+    const std::size_t end = rules.find('\n', at);
+    const std::string line = rules.substr(at, end - at);
+    at = end + 1;
+    if (line.starts_with("#")) continue;
+    EXPECT_FALSE(contains(line, "RUN+") || contains(line, "RUN=")) << line;
+    EXPECT_FALSE(contains(line, "$")) << line;
+    EXPECT_FALSE(contains(line, "*")) << line;
+    EXPECT_FALSE(contains(line, "/etc")) << line;
+  }
+}
+
+TEST(Inventory, nodesOfOneDeviceAreOneCameraAndTwoDevicesWithOneSerialAreTwo) {
+  const test::FakeMachine f;
+  UsbDevice first = usb(0x046D, "SN0001", {"video0", "video1"}), second = usb(0x046D, "SN0001", {"video2"});
+  second.port = "1-3";
+  const std::vector<DeviceInfo> found{{"v4l2", "SN0001", "Cam", "/dev/video0"},
+                                      {"v4l2", "SN0001#1", "Cam infrared", "/dev/video1"},
+                                      {"v4l2", "SN0001#2", "Cam", "/dev/video2"},
+                                      {"gige", "9", "Other", "10.0.0.2"}};
+  const auto all = one_entry_a_device(f.machine, {first, second}, found);
+  ASSERT_EQ(all.size(), 3U);
+  EXPECT_EQ(all[0].also, std::vector<std::string>{"SN0001#1"});
+  EXPECT_EQ(all[1].info.serial, "SN0001#2");
+  EXPECT_EQ(all[2].info.driver, "gige");
+}
+
+TEST(Inventory, aLineForTheConfigurationIsYamlWhateverTheSerial) {
+  EXPECT_EQ(camera_line({"gige", "15021234", "", ""}), "{driver: gige, serial: \"15021234\"}");
+  EXPECT_EQ(camera_line({"gige", "", "", "10.0.0.2"}), "{driver: gige, serial: \"10.0.0.2\"}");
+  EXPECT_EQ(camera_line({"v4l2", "a\"b\\\n\xff", "", ""}), "{driver: v4l2, serial: \"a\\\"b\\\\\\n\\ufffd\"}");
+}
+
+}  // namespace
+}  // namespace vergence::app
