@@ -14,12 +14,14 @@ constexpr std::int64_t kEventBytes = trigger_event_payload_size + trigger_overhe
 
 }  // namespace
 
-void BoardClock::restart(Duration spread) noexcept {
+void BoardClock::restart(Duration spread, bool pps) noexcept {
   ClockMapperOptions o;
   o.delay_spread = spread;
   o.resolution = Duration::microseconds(1);  // a tick
-  resets_before_ += mapper_.resets();
-  mapper_ = ClockMapper(o);
+  resets_before_ += mappers_[0].resets();
+  mappers_.fill(ClockMapper(o));
+  turns_ = moving_ = pps;
+  locked_ = false;
   forget();
   reopen(wire_);
 }
@@ -28,6 +30,27 @@ void BoardClock::forget() noexcept {
   known_ = false;
   newest_tick_ = 0;
   backward_ = 0;
+  used_ = 0;
+}
+
+void BoardClock::told_lock(bool locked, HostStamp now) noexcept {
+  if (locked && !locked_) lock_began_ = now;
+  locked_ = locked;
+  // What was mapped while it moved is in the older one for so long.
+  moving_ = turns_ && !(locked && now - lock_began_ > kTurn * 2);
+}
+
+void BoardClock::take_turns(HostStamp now) noexcept {
+  if (!known_) turn_began_ = now;
+  if (!turns_ || now - turn_began_ < kTurn) return;
+  turn_began_ = now;
+  mappers_[used_].restart();
+  used_ = 1 - used_;
+}
+
+MappedStamp BoardClock::with_room(MappedStamp m) const noexcept {
+  if (moving_) m.error = m.error + kMoving;
+  return m;
 }
 
 void BoardClock::reopen(Duration wire) noexcept {
@@ -73,13 +96,14 @@ PongWord BoardClock::answer(const TriggerPong& pong, HostStamp t4) noexcept {
     ++totals_.refused;
     if (++backward_ < kBackward) return PongWord::backward;
     ++totals_.resets;
-    mapper_.restart();
+    for (ClockMapper& m : mappers_) m.restart();
     forget();
     return PongWord::backward;
   }
   backward_ = 0;
   newest_tick_ = pong.received;  // not `sent`: the next question may have come while this answer waited for the line
-  mapper_.ping(sent, stamp_of_tick(pong.received), stamp_of_tick(pong.sent), std::max(here, sent + inside));
+  take_turns(t4);
+  for (ClockMapper& m : mappers_) m.ping(sent, stamp_of_tick(pong.received), stamp_of_tick(pong.sent), std::max(here, sent + inside));
   known_ = true;
   ++answers_;
   ++totals_.answered;
@@ -90,15 +114,15 @@ PongWord BoardClock::answer(const TriggerPong& pong, HostStamp t4) noexcept {
 }
 
 MappedStamp BoardClock::map(DeviceStamp stamp, HostStamp arrival) noexcept {
-  MappedStamp m = mapper_.map(stamp, arrival - wire_ * kEventBytes);
+  MappedStamp m = mappers_[used_].map(stamp, arrival - wire_ * kEventBytes);
   if (!known_) m.error = m.error + kUnseen;
-  return m;
+  return with_room(m);
 }
 
 TimeQuality BoardClock::quality() const noexcept {
   TimeQuality t = totals_;
-  t.resets += resets_before_ + mapper_.resets();
-  t.drift_ppm = mapper_.drift() * 1e6;
+  t.resets += resets_before_ + mappers_[0].resets();
+  t.drift_ppm = mappers_[used_].drift() * 1e6;
   if (rtts_ > 0) {
     std::array<std::int64_t, kRemembered> sorted = rtt_ns_;
     const auto end = sorted.begin() + static_cast<std::ptrdiff_t>(rtts_), middle = sorted.begin() + static_cast<std::ptrdiff_t>(rtts_ / 2);
@@ -107,7 +131,7 @@ TimeQuality BoardClock::quality() const noexcept {
     t.rtt_least = Duration::nanoseconds(*std::min_element(sorted.begin(), middle + 1));
     t.rtt_most = Duration::nanoseconds(*std::max_element(middle, end));
   }
-  if (known_) t.error = mapper_.at(stamp_of_tick(newest_tick_)).error;
+  if (known_) t.error = with_room(mappers_[used_].at(stamp_of_tick(newest_tick_))).error;
   return t;
 }
 

@@ -34,6 +34,8 @@ struct TimeQuality {
 /// Method   Every PING and its PONG give four stamps: t1 when it was handed to the line, t2 and t3 the board's ticks, t4 when its answer
 ///          was here. The ClockMapper makes of them a line and a bound that no asymmetry can break: rtt / 2 at worst.
 ///          What bytes take on the wire at the baud rate is known, and not the same both ways: it is taken out of t1 and t4.
+///          PPS moves the rate of the board's ticks, as no crystal does: then two mappers take turns, each used when it is kTurn to 2 kTurn
+///          old, and until the rate is there the bound has room for what it moves in that time (kMoving).
 /// Threads  One caller. Memory: fixed.
 /// Errors   PongWord. kBackward answers in a row from an earlier time than before are a clock that was set: the fit begins anew.
 class BoardClock {
@@ -41,11 +43,17 @@ class BoardClock {
   static constexpr std::size_t kOpen = 64;  // questions that may be under way: more than half a second of them
   static constexpr std::size_t kRemembered = 1024;
   static constexpr int kBackward = 3;
+  static constexpr Duration kUnseen = Duration::milliseconds(1);  // a USB frame
+  static constexpr Duration kTurn = Duration::seconds(6);
+  static constexpr Duration kMoving = Duration::microseconds(150);  // 8 ppm a second over 2 kTurn: an eighth of it times their square
 
-  BoardClock() noexcept : mapper_(ClockMapperOptions{}) {}
+  BoardClock() noexcept : mappers_{ClockMapper(ClockMapperOptions{}), ClockMapper(ClockMapperOptions{})} {}
 
   /// Another start of the board. `spread`: by how much the report of a stamp is late at worst, for stamps before the first answer.
-  void restart(Duration spread) noexcept;
+  /// `pps`: something disciplines its ticks.
+  void restart(Duration spread, bool pps) noexcept;
+  /// What the board says of PPS, about every second.
+  void told_lock(bool locked, HostStamp now) noexcept;
   /// The line was opened again: what was under way is not answered any more. The fit stays. `wire`: a byte's time on it, 0 where it has
   /// none.
   void reopen(Duration wire) noexcept;
@@ -58,8 +66,9 @@ class BoardClock {
   [[nodiscard]] bool known() const noexcept { return known_; }
   /// Answers since restart() or reopen().
   [[nodiscard]] std::uint64_t answers() const noexcept { return answers_; }
-  /// The host's time of a board's stamp, whose report was here at `arrival`. Before the first answer: from arrivals alone.
-  [[nodiscard]] MappedStamp map(DeviceStamp stamp, HostStamp arrival) noexcept { return mapper_.map(stamp, arrival); }
+  /// The host's time of an event, whose report was here at `arrival`. Before the first answer: from arrivals alone, which cannot tell the
+  /// least time that the way takes; kUnseen is allowed for it.
+  [[nodiscard]] MappedStamp map(DeviceStamp stamp, HostStamp arrival) noexcept;
 
   /// Times that answers showed a clock that was set back.
   [[nodiscard]] std::uint64_t resets_by_set_back() const noexcept { return totals_.resets; }
@@ -73,8 +82,15 @@ class BoardClock {
     bool open = false;
   };
   void forget() noexcept;
+  void take_turns(HostStamp now) noexcept;
+  [[nodiscard]] MappedStamp with_room(MappedStamp m) const noexcept;
 
-  ClockMapper mapper_;
+  std::array<ClockMapper, 2> mappers_;
+  std::size_t used_ = 0;
+  bool turns_ = false;   // they take turns
+  bool moving_ = false;  // the rate of the ticks may be on its way
+  HostStamp turn_began_{}, lock_began_{};
+  bool locked_ = false;
   Duration wire_{};
   std::array<Question, kOpen> questions_{};
   std::uint32_t next_token_ = 1;

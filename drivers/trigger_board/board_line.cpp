@@ -5,6 +5,24 @@
 #include <string_view>
 
 namespace vergence::trigger_board {
+namespace {
+
+constexpr std::size_t kTextAtLeast = 12;  // so many printable bytes in a row are no accident
+
+/// The first bytes may be the end of something, or of another baud rate.
+std::string_view longest_text(std::string_view heard) noexcept {
+  const auto printable = [](char c) { return (c >= ' ' && c <= '~') || c == '\r' || c == '\n' || c == '\t'; };
+  std::string_view best;
+  for (std::size_t from = 0; from < heard.size(); ++from) {
+    std::size_t to = from;
+    while (to < heard.size() && printable(heard[to])) ++to;
+    if (to - from > best.size()) best = heard.substr(from, to - from);
+    from = to;
+  }
+  return best;
+}
+
+}  // namespace
 
 void BoardLine::attach(ByteLine* line) noexcept {
   before_ = counters();
@@ -68,9 +86,8 @@ std::string BoardLine::heard_instead() const {
   if (heard.empty() || frames_heard_ > 0) return {};
   if (heard.find("\xFA\xFF") != std::string_view::npos) return "it speaks Xbus, as an XSens INS does";
   if (heard.find("$G") != std::string_view::npos) return "it speaks NMEA 0183, as a GNSS receiver does";
-  const auto printable = [](char c) { return (c >= ' ' && c <= '~') || c == '\r' || c == '\n' || c == '\t'; };
-  if (std::all_of(heard.begin(), heard.end(), printable)) {
-    std::string some(heard.substr(0, 40));
+  if (const std::string_view text = longest_text(heard); text.size() >= kTextAtLeast) {
+    std::string some(text.substr(0, 40));
     std::replace_if(
         some.begin(), some.end(), [](char c) { return c < ' '; }, ' ');
     return "it writes text (\"" + some + "\")";

@@ -83,7 +83,7 @@ DeviceStatus Device::begin_on(Setup* setup) {
     if (known_boot_) ++counted_.reboots;
     known_boot_ = true;
     account_.begin(who.boot_id, board.pulses);
-    clock_.restart(timing_.delay_spread);
+    clock_.restart(timing_.delay_spread, config_.pps_edge != trigger_edge_none);
     pause_.store(0, std::memory_order_relaxed);  // what was asked of the other start is past
   } else {
     account_.end(board.pulses);
@@ -272,6 +272,7 @@ void Device::take_pong(const TriggerPong& pong, HostStamp arrival) noexcept {
 
 void Device::take_status(const TriggerStatus& status) noexcept {
   counted_.board = status;
+  clock_.told_lock(status.pps_locked != 0, heard_);
   if (!streaming_ || !same_boot(status.boot_id)) return;
   if (status.state == trigger_stopped || status.configuration != mark_) seen_ = Seen::halted;
 }

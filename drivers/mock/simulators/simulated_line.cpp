@@ -201,10 +201,9 @@ class SimulatedPlace::World {
       chip_.push_back(value);
       return;
     }
-    // The UART's FIFO: an interrupt at fourteen bytes, or when the line falls idle.
+    // The UART's FIFO: an interrupt at so many bytes, or when the line falls idle.
     transfer_.push_back(value);
-    constexpr std::size_t kTrigger = 14;
-    if (transfer_.size() >= kTrigger || on_wire_.empty()) complete_transfer();
+    if (transfer_.size() >= options_.fifo || on_wire_.empty()) complete_transfer();
   }
 
   /// The latency timer has run out: what is there now goes with the next frame, what comes later does not.

@@ -18,7 +18,8 @@ struct Outage {
 struct SimulatedLineOptions {
   bool converter = true;  // a USB converter of FTDI's kind; false: bytes go straight into the host
   Duration latency_timer = Duration::milliseconds(16);
-  double converter_clock_ppm = 20;                      // of its timer against the host's USB frames
+  std::size_t fifo = 14;            // without a converter: bytes that come at once, at the latest; 64: packets of a device's own USB
+  double converter_clock_ppm = 20;  // of its timer against the host's USB frames
   Duration transfer = Duration::microseconds(125);      // from the USB frame to the reading program at best
   double late_fraction = 0.01;                          // of the arrivals: the reading program is late …
   Duration late_mean = Duration::milliseconds(4);       // … by an exponential time of this mean

@@ -1,0 +1,124 @@
+#include <gtest/gtest.h>
+
+#include "tests/unit/drivers/trigger_board/rig.hpp"
+
+namespace vergence::trigger_board {
+namespace {
+
+/// A machine with ports: at some of them boards, at the others nothing that answers.
+struct Machine {
+  struct Port {
+    SerialPortInfo info;
+    std::shared_ptr<mock::DeviceModel> device;
+    DeviceStatus trouble = DeviceStatus::ok;
+  };
+  std::vector<Port> ports;
+
+  class Silent final : public mock::DeviceModel {
+   public:
+    void receive(std::span<const std::uint8_t>, HostStamp) override {}
+    std::optional<HostStamp> next() const override { return std::nullopt; }
+    void produce(HostStamp, std::vector<std::uint8_t>*) override {}
+    std::uint32_t baud() const override { return 115200; }
+    void power_cycle(HostStamp) override {}
+  };
+  class Refusing final : public LinePlace {
+   public:
+    explicit Refusing(DeviceStatus status) : status_(status) {}
+    std::unique_ptr<ByteLine> open(const LineSettings&, DeviceStatus* status) override {
+      *status = status_;
+      return nullptr;
+    }
+    std::string name() const override { return "/dev/ttyUSB9"; }
+
+   private:
+    DeviceStatus status_;
+  };
+
+  std::shared_ptr<mock::BoardSimulator> add_board(const char* port, std::uint8_t last_of_serial) {
+    mock::BoardSimulatorOptions o;
+    o.serial[11] = last_of_serial;
+    o.baud = 115200;  // a board's own USB takes every rate; this one the first
+    auto board = std::make_shared<mock::BoardSimulator>(mock::PulseSource{}, o);
+    ports.push_back({{port, "", 0x0483, 0x5740, "", {}}, board});
+    return board;
+  }
+  void add(const char* port, std::uint16_t vendor, std::uint16_t product, DeviceStatus trouble = DeviceStatus::ok) {
+    ports.push_back({{port, "", vendor, product, "", {}}, std::make_shared<Silent>(), trouble});
+  }
+  std::vector<std::string> asked;
+  Driver driver() {
+    return Driver({}, {[this] {
+                         std::vector<SerialPortInfo> list;
+                         for (const Port& p : ports) list.push_back(p.info);
+                         return list;
+                       },
+                       [this](const std::string& name) -> std::unique_ptr<LinePlace> {
+                         asked.push_back(name);
+                         for (const Port& p : ports) {
+                           if (p.info.port != name) continue;
+                           if (p.trouble != DeviceStatus::ok) return std::make_unique<Refusing>(p.trouble);
+                           return std::make_unique<mock::SimulatedPlace>(p.device, test::direct_line());
+                         }
+                         return std::make_unique<Refusing>(DeviceStatus::not_found);
+                       }});
+  }
+};
+
+TEST(Driver, listsTheBoardsAndAsksNoIns) {
+  Machine m;
+  m.add("/dev/ttyS0", 0, 0);
+  m.add("/dev/ttyUSB0", 0x0403, 0xD388);
+  m.add("/dev/ttyUSB1", 0x2639, 0x0300);
+  m.add("/dev/ttyUSB2", 0x0403, 0x6001);
+  m.add_board("/dev/ttyACM0", 0xAA);
+  m.add_board("/dev/ttyACM1", 0xBB);
+  m.add("/dev/ttyUSB9", 0x0403, 0x6001, DeviceStatus::busy);
+  Driver driver = m.driver();
+  const auto found = driver.enumerate();
+  ASSERT_EQ(found.size(), 2U);
+  EXPECT_EQ(found[0].serial, "30002b000b513336343931aa");
+  EXPECT_EQ(found[1].serial, "30002b000b513336343931bb");
+  EXPECT_EQ(found[0].driver, "board");
+  EXPECT_EQ(m.asked, (std::vector<std::string>{"/dev/ttyUSB2", "/dev/ttyACM0", "/dev/ttyACM1", "/dev/ttyUSB9"}));
+}
+
+TEST(Driver, opensByPortBySerialNumberOrTheOnlyOne) {
+  Machine m;
+  m.add_board("/dev/ttyACM0", 0xAA);
+  Driver driver = m.driver();
+  DeviceStatus s = DeviceStatus::failed;
+  EXPECT_NE(driver.open("", &s), nullptr) << driver.complaint();
+  EXPECT_EQ(s, DeviceStatus::ok);
+  EXPECT_NE(driver.open("/dev/ttyACM0", &s), nullptr);
+  m.add_board("/dev/ttyACM1", 0xBB);
+  EXPECT_EQ(driver.open("", &s), nullptr);
+  EXPECT_EQ(s, DeviceStatus::not_found);
+  EXPECT_NE(driver.complaint().find("trigger.port"), std::string::npos);
+  const auto one = driver.open("30002b000b513336343931bb", &s);
+  ASSERT_NE(one, nullptr) << driver.complaint();
+  EXPECT_EQ(one->info().serial, "30002b000b513336343931bb");
+  EXPECT_EQ(driver.open("30002b000b513336343931cc", &s), nullptr);
+  EXPECT_EQ(s, DeviceStatus::not_found);
+  EXPECT_NE(driver.complaint().find("30002b000b513336343931cc"), std::string::npos);
+}
+
+TEST(Driver, saysWhyThereIsNone) {
+  Machine m;
+  Driver driver = m.driver();
+  DeviceStatus s = DeviceStatus::ok;
+  EXPECT_EQ(driver.open("", &s), nullptr);
+  EXPECT_EQ(s, DeviceStatus::not_found);
+  EXPECT_NE(driver.complaint().find("plug it in"), std::string::npos);
+  m.add("/dev/ttyUSB9", 0x0403, 0x6001, DeviceStatus::no_permission);
+  EXPECT_EQ(driver.open("", &s), nullptr);
+  EXPECT_EQ(s, DeviceStatus::no_permission);
+  EXPECT_EQ(driver.open("/dev/ttyUSB9", &s), nullptr);
+  EXPECT_EQ(s, DeviceStatus::no_permission);
+  EXPECT_EQ(driver.open("/dev/nothing", &s), nullptr);
+  EXPECT_EQ(s, DeviceStatus::not_found);
+  EXPECT_FALSE(driver.complaint().empty());
+}
+
+}  // namespace
+}  // namespace vergence::trigger_board

@@ -1,0 +1,144 @@
+#include "drivers/trigger_board/pulse_account.hpp"
+
+#include <gtest/gtest.h>
+
+namespace vergence::trigger_board {
+namespace {
+
+constexpr std::uint64_t kPeriod = 33'333;
+
+TriggerEvent event(std::uint32_t number, std::uint64_t tick, std::uint8_t flags = 0) {
+  TriggerEvent e{};
+  e.boot_id = 7;
+  e.pulse = number;
+  e.tick = tick;
+  e.flags = flags;
+  for (TriggerExposure& x : e.exposure) x = {TRIGGER_NOT_SEEN, TRIGGER_NOT_SEEN};
+  return e;
+}
+
+/// An account of a board at 30 Hz that has just started, with pulse 0 taken.
+struct Accounted : ::testing::Test {
+  Accounted() {
+    account.begin(7, 0);
+    account.set_intervals(30'000, 0);
+    EXPECT_TRUE(account.take(event(0, kPeriod, 1), &pulse));
+  }
+  bool take(std::uint32_t number, std::uint8_t flags = 0) { return account.take(event(number, kPeriod * (number + 1ULL), flags), &pulse); }
+  PulseAccount account;
+  Pulse pulse{};
+};
+
+TEST_F(Accounted, numbersThatNobodyToldOfAreLost) {
+  ASSERT_TRUE(take(1));
+  EXPECT_FALSE(pulse.resumed);
+  ASSERT_TRUE(take(5));
+  EXPECT_EQ(pulse.number, 5U);
+  EXPECT_EQ(pulse.edge, DeviceStamp(static_cast<std::int64_t>(6 * kPeriod) * 1000));
+  EXPECT_EQ(account.counters().lost, 3U);
+  EXPECT_EQ(account.counters().pulses, 3U);
+}
+
+TEST_F(Accounted, aPauseThatWasAskedForLosesNothing) {
+  account.expect_pause(4);
+  ASSERT_TRUE(take(1));
+  EXPECT_FALSE(pulse.resumed) << "it was in the timer already";
+  ASSERT_TRUE(take(6, 1));
+  EXPECT_TRUE(pulse.resumed);
+  EXPECT_EQ(account.counters().left_out, 4U);
+  EXPECT_EQ(account.counters().lost, 0U);
+  ASSERT_TRUE(take(8));
+  EXPECT_EQ(account.counters().lost, 1U) << "the pause is over";
+}
+
+TEST_F(Accounted, aPauseWhoseFirstReportIsLostIsStillAPause) {
+  account.expect_pause(4);
+  ASSERT_TRUE(take(1));
+  ASSERT_TRUE(take(7));
+  EXPECT_TRUE(pulse.resumed);
+  EXPECT_EQ(account.counters().left_out, 4U);
+  EXPECT_EQ(account.counters().lost, 1U);
+}
+
+TEST_F(Accounted, losesBeforeAPauseAreNotTakenForIt) {
+  account.expect_pause(4);
+  ASSERT_TRUE(take(3));
+  EXPECT_FALSE(pulse.resumed);
+  EXPECT_EQ(account.counters().lost, 2U);
+  ASSERT_TRUE(take(8, 1));
+  EXPECT_EQ(account.counters().left_out, 4U);
+  EXPECT_EQ(account.counters().lost, 2U);
+}
+
+TEST_F(Accounted, whatTheBoardLeftOutByItselfIsNotLost) {
+  ASSERT_TRUE(take(4, 2));
+  EXPECT_EQ(account.counters().skipped, 3U);
+  EXPECT_EQ(account.counters().late, 1U);
+  EXPECT_EQ(account.counters().lost, 0U);
+}
+
+TEST_F(Accounted, theEndTellsOfReportsThatNeverCame) {
+  ASSERT_TRUE(take(1));
+  account.end(2);
+  EXPECT_EQ(account.counters().lost, 0U);
+  account.end(5);
+  EXPECT_EQ(account.counters().lost, 3U);
+  ASSERT_TRUE(take(5, 1));
+  EXPECT_EQ(account.counters().lost, 3U);
+}
+
+TEST_F(Accounted, repeatedOldAndBackwardEventsAreRefusedByName) {
+  ASSERT_TRUE(take(1));
+  EXPECT_FALSE(take(1));
+  EXPECT_FALSE(take(0));
+  EXPECT_EQ(account.counters().repeated, 2U);
+  EXPECT_FALSE(account.take(event(2, kPeriod), &pulse));
+  EXPECT_FALSE(account.take(event(2, kMostTicks + 1), &pulse));
+  EXPECT_EQ(account.counters().backward, 2U);
+  EXPECT_FALSE(account.take(event(100'000, 3 * kPeriod), &pulse));
+  EXPECT_EQ(account.counters().too_many, 1U);
+  EXPECT_EQ(account.refused_in_row(), 5);
+  EXPECT_EQ(pulse.number, 1U) << "untouched";
+  EXPECT_TRUE(take(2));
+  EXPECT_EQ(account.refused_in_row(), 0);
+  EXPECT_EQ(account.counters().lost, 0U);
+}
+
+TEST_F(Accounted, aClockSetBackIsForgottenWhenToldSo) {
+  ASSERT_TRUE(take(1));
+  EXPECT_FALSE(account.take(event(2, 10), &pulse));
+  account.forget_time();
+  EXPECT_TRUE(account.take(event(2, 3 * kPeriod - 100), &pulse));
+}
+
+TEST(PulseAccount, numbersGoOnOverThirtyTwoBits) {
+  PulseAccount account;
+  account.set_intervals(30'000, 0);
+  account.begin(7, 0xFFFFFFFEU);
+  Pulse pulse;
+  const std::uint64_t years = 4'294'967'296ULL * kPeriod;
+  ASSERT_TRUE(account.take(event(0xFFFFFFFFU, years), &pulse));
+  EXPECT_EQ(account.counters().lost, 1U) << "the board said what its next number is";
+  ASSERT_TRUE(account.take(event(0, years + kPeriod), &pulse));
+  EXPECT_EQ(pulse.number, 0x100000000ULL);
+  ASSERT_TRUE(account.take(event(2, years + 3 * kPeriod), &pulse));
+  EXPECT_EQ(pulse.number, 0x100000002ULL);
+  EXPECT_EQ(account.counters().lost, 2U);
+}
+
+TEST_F(Accounted, exposuresThatCannotBeAreRefusedAndCounted) {
+  TriggerEvent e = event(1, 2 * kPeriod);
+  e.exposure[0] = {120, 8120};
+  e.exposure[1] = {-5, 100};
+  e.exposure[2] = {100, 50};
+  e.exposure[3] = {100, TRIGGER_NOT_SEEN};
+  ASSERT_TRUE(account.take(e, &pulse));
+  EXPECT_TRUE(pulse.exposure[0].seen);
+  EXPECT_EQ(pulse.exposure[0].start, Duration::microseconds(120));
+  EXPECT_EQ(pulse.exposure[0].end, Duration::microseconds(8120));
+  EXPECT_FALSE(pulse.exposure[1].seen || pulse.exposure[2].seen || pulse.exposure[3].seen);
+  EXPECT_EQ(account.counters().exposures_refused, 2U);
+}
+
+}  // namespace
+}  // namespace vergence::trigger_board

@@ -1,0 +1,111 @@
+#pragma once
+#include <algorithm>
+#include <functional>
+#include <map>
+#include <memory>
+#include <string>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include "drivers/mock/simulators/simulators.hpp"
+#include "drivers/trigger_board/trigger_board.hpp"
+
+namespace vergence::test {
+
+/// A board whose bytes somebody tampers with on their way to the host.
+class Tampered final : public mock::DeviceModel {
+ public:
+  using Tamper = std::function<void(HostStamp at, std::vector<std::uint8_t>* frame)>;  // a whole frame, its 00 included
+  Tampered(std::shared_ptr<mock::DeviceModel> device, Tamper tamper) : device_(std::move(device)), tamper_(std::move(tamper)) {}
+  void receive(std::span<const std::uint8_t> bytes, HostStamp at) override { device_->receive(bytes, at); }
+  std::optional<HostStamp> next() const override { return device_->next(); }
+  void produce(HostStamp at, std::vector<std::uint8_t>* out) override {
+    std::vector<std::uint8_t> frame;
+    device_->produce(at, &frame);
+    if (!frame.empty() && tamper_) tamper_(at, &frame);
+    out->insert(out->end(), frame.begin(), frame.end());
+  }
+  std::uint32_t baud() const override { return device_->baud(); }
+  void power_cycle(HostStamp at) override { device_->power_cycle(at); }
+  bool ended() const override { return device_->ended(); }
+
+ private:
+  std::shared_ptr<mock::DeviceModel> device_;
+  Tamper tamper_;
+};
+
+/// A frame taken apart; type 0: it is none.
+[[nodiscard]] inline TriggerFrame opened(const std::vector<std::uint8_t>& bytes) {
+  TriggerDecoder decoder{};
+  TriggerFrame frame{};
+  for (const std::uint8_t b : bytes)
+    if (trigger_decode(&decoder, b, &frame) == trigger_frame_ready) return frame;
+  return {};
+}
+[[nodiscard]] inline std::vector<std::uint8_t> closed(const TriggerFrame& frame) {
+  std::vector<std::uint8_t> bytes(trigger_max_frame);
+  bytes.resize(trigger_write_frame(frame.type, frame.sequence, frame.payload, frame.size, bytes.data()));
+  return bytes;
+}
+
+/// A line without a converter: the board's own USB, or a UART of the host.
+[[nodiscard]] inline mock::SimulatedLineOptions direct_line() {
+  mock::SimulatedLineOptions o;
+  o.converter = false;
+  return o;
+}
+[[nodiscard]] inline mock::BoardSimulatorOptions board_for(Duration duration) {
+  mock::BoardSimulatorOptions o;
+  o.duration = duration;
+  return o;
+}
+[[nodiscard]] inline TriggerConfiguration thirty_hertz() {
+  TriggerConfiguration c;
+  c.rate_hz = 30;
+  return c;
+}
+
+/// A driver's device on a simulated line to a simulated board, and what the board really did.
+struct BoardRig {
+  explicit BoardRig(const mock::BoardSimulatorOptions& board = {}, const mock::SimulatedLineOptions& line = {},
+                    const trigger_board::Options& options = {}, Tampered::Tamper tamper = {})
+      : simulator(std::make_shared<mock::BoardSimulator>(
+            [this](const mock::SimulatedPulse& p) {
+              edges[{p.boot, p.number}] = p.edge;
+              return exposures ? exposures(p) : mock::SimulatedExposures{};
+            },
+            board)) {
+    auto owned = std::make_unique<mock::SimulatedPlace>(std::make_shared<Tampered>(simulator, std::move(tamper)), line);
+    place = owned.get();
+    device = std::make_unique<trigger_board::Device>(std::move(owned), options);
+  }
+
+  std::map<std::pair<std::uint32_t, std::uint64_t>, HostStamp> edges;  // by boot and number; of the device's thread while it runs
+  mock::PulseSource exposures;
+  std::shared_ptr<mock::BoardSimulator> simulator;
+  mock::SimulatedPlace* place = nullptr;
+  std::unique_ptr<trigger_board::Device> device;
+  int times_gone = 0;
+
+  /// Pulses until the device has no more, or this many; `gone` is passed over, the device is asked to come back.
+  std::vector<Pulse> pulses(std::size_t most = SIZE_MAX) {
+    std::vector<Pulse> all;
+    while (all.size() < most) {
+      Pulse p;
+      const DeviceStatus s = device->wait(Duration::seconds(20), &p);
+      if (s == DeviceStatus::ok) {
+        all.push_back(p);
+      } else if (s == DeviceStatus::gone) {
+        ++times_gone;
+        while (device->start(nullptr) == DeviceStatus::gone) std::this_thread::yield();
+      } else {
+        break;
+      }
+    }
+    return all;
+  }
+  [[nodiscard]] HostStamp truth(const Pulse& p) const { return edges.at({p.boot, p.number}); }
+};
+
+}  // namespace vergence::test
