@@ -6,14 +6,14 @@
  * Frame      COBS(type u8, sequence u8, payload 0..64 bytes, CRC-32 of all before it) and one byte 00. 00 stands nowhere else, so a
  *            receiver that starts or stumbles anywhere is right again at the next 00. All numbers are little endian, without padding.
  * CRC        CRC-32 of IEEE 802.3: reflected polynomial EDB88320, start and final exclusive-or FFFFFFFF.
- * Answers    The board answers every host message with the same sequence: HELLO by INFO, PING by PONG, the others by STATUS once they
- *            are in effect, or by ERROR. What it sends unasked (EVENT, PPS, INS, STATUS every second) counts its own sequence.
- * Boot       boot_id differs at every start of the board. Pulse numbers and ticks mean nothing across two boot_ids.
- * Ticks      64-bit microseconds of the board's clock since its start, taken by hardware at the edge. With PPS they are seconds of PPS
- *            divided by a million; they never step, and after the first HELLO their rate moves by at most 1 ppm a second (or by a
- *            sixteenth of what is missing, if that is more).
- * Memory     The caller's; no heap, no state but in TriggerDecoder. Threads: whatever the caller does with its own objects.
- * Errors     Closed enums; a call that is not ok has changed no output.
+ * Answers    The host numbers its messages 0..127, and the board answers each with the same sequence: HELLO by INFO, PING by PONG, the
+ *            others by STATUS once they are in effect, or by ERROR. What the board sends unasked (EVENT, PPS, INS, STATUS every second and
+ *            when its state changes) has bit 7 set and counts in the others, so that it is never taken for an answer; a gap is a message
+ * lost. Boot       boot_id differs at every start of the board. Pulse numbers and ticks mean nothing across two boot_ids. Ticks      64-bit
+ * microseconds of the board's clock since its start, taken by hardware at the edge. With PPS they are seconds of PPS divided by a million;
+ * they never step, and after the first HELLO their rate moves by at most 1 ppm a second (or by a sixteenth of what is missing, if that is
+ * more). Memory     The caller's; no heap, no state but in TriggerDecoder. Threads: whatever the caller does with its own objects. Errors
+ * Closed enums; a call that is not ok has changed no output.
  */
 #include <stdbool.h>
 #include <stddef.h>
@@ -28,6 +28,7 @@ enum {
   trigger_protocol_version = 1, /* a board with another one is refused by name */
   trigger_max_lines = 4,
   trigger_max_payload = 64,
+  trigger_unasked = 0x80,                                    /* in a sequence: nobody asked */
   trigger_overhead = 6,                                      /* type, sequence, CRC */
   trigger_max_body = trigger_max_payload + trigger_overhead, /* < 254: COBS then adds exactly one byte */
   trigger_max_frame = trigger_max_body + 2,                  /* COBS byte and 00 */

@@ -127,6 +127,25 @@ TEST(BoardConfig, withoutPpsOrInsTheirEdgesAreRefused) {
   EXPECT_EQ(b.error(), trigger_error_line);
 }
 
+TEST(BoardTalk, whatNobodyAskedForHasNumbersOfItsOwn) {
+  VirtualBoard b;
+  b.deaf = true;
+  b.configure(VirtualBoard::config(100'000));
+  b.send(trigger_start);
+  b.run_for_us(500'000);  // more events than there is room for
+  b.deaf = false;
+  b.run_for_us(3'000'000);
+  std::uint8_t next = trigger_unasked;
+  unsigned missing = 0;
+  for (const TriggerFrame& f : b.frames) {
+    if (f.sequence < trigger_unasked) continue;
+    missing += static_cast<std::uint8_t>(f.sequence - next) % trigger_unasked;
+    next = static_cast<std::uint8_t>((f.sequence + 1) | trigger_unasked);
+  }
+  EXPECT_EQ(missing, b.board.outbox.dropped) << "every gap is a message that was dropped";
+  EXPECT_GT(missing, 20U);
+}
+
 TEST(BoardConfig, statusNamesItByItsCrc) {
   VirtualBoard b;
   const TriggerConfig c = VirtualBoard::config(12'345);

@@ -1,0 +1,208 @@
+#include "tests/unit/firmware_iface/trigger/board/qemu_board.hpp"
+
+#include <poll.h>
+#include <signal.h>
+#include <sys/prctl.h>
+#include <sys/socket.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <array>
+#include <cstring>
+#include <stdexcept>
+
+namespace vergence {
+namespace {
+
+constexpr auto kPatience = std::chrono::seconds(10);
+
+/// Both ends of a socket pair; ours is kept from the child, the child's is given a fixed number there.
+struct Ends {
+  int ours = -1, theirs = -1;
+};
+
+Ends make_ends() {
+  int ends[2];
+  if (socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, ends) != 0) throw std::runtime_error("socketpair");
+  return {ends[0], ends[1]};
+}
+
+void write_all(int fd, const void* data, std::size_t size) {
+  const auto* at = static_cast<const char*>(data);
+  while (size > 0) {
+    const ssize_t n = ::send(fd, at, size, MSG_NOSIGNAL);
+    if (n <= 0) throw std::runtime_error("the machine has gone");
+    at += n;
+    size -= static_cast<std::size_t>(n);
+  }
+}
+
+char read_one(int fd) {
+  pollfd ready{fd, POLLIN, 0};
+  char c = 0;
+  if (poll(&ready, 1, 10'000) != 1 || ::read(fd, &c, 1) != 1) throw std::runtime_error("the machine does not answer");
+  return c;
+}
+
+std::string read_text_line(int fd) {
+  std::string text;
+  for (char c = read_one(fd); c != '\n'; c = read_one(fd)) text += c;
+  return text;
+}
+
+}  // namespace
+
+std::string QemuBoard::missing() {
+  if (std::string(VERGENCE_BOARD_IMAGE).empty()) return "no image of the trigger board: gcc-arm-none-eabi was not there to build it";
+  if (std::string(VERGENCE_QEMU_ARM).empty()) return "no qemu-system-arm to run the trigger board's image in";
+  return {};
+}
+
+QemuBoard::QemuBoard(int icount_shift) {
+  constexpr int kFirst = 100;  // numbers of the child's ends
+  const std::array<Ends, 3> ends = {make_ends(), make_ends(), make_ends()};
+  std::vector<std::string> arguments = {VERGENCE_QEMU_ARM,
+                                        "-M",
+                                        "netduinoplus2",
+                                        "-display",
+                                        "none",
+                                        "-nodefaults",
+                                        "-kernel",
+                                        VERGENCE_BOARD_IMAGE,
+                                        "-serial",
+                                        "chardev:line",
+                                        "-qtest",
+                                        "chardev:qtest",
+                                        "-qtest-log",
+                                        "none",
+                                        "-mon",
+                                        "chardev=monitor,mode=control"};
+  const char* names[] = {"line", "qtest", "monitor"};
+  for (int i = 0; i < 3; ++i) {
+    arguments.emplace_back("-chardev");
+    arguments.push_back("socket,id=" + std::string(names[i]) + ",fd=" + std::to_string(kFirst + i));
+  }
+  if (icount_shift >= 0) arguments.insert(arguments.end(), {"-icount", "shift=" + std::to_string(icount_shift) + ",sleep=off"});
+  std::vector<char*> argv;
+  for (std::string& a : arguments) argv.push_back(a.data());
+  argv.push_back(nullptr);
+
+  const pid_t parent = getpid();
+  pid_ = fork();
+  if (pid_ < 0) throw std::runtime_error("fork");
+  if (pid_ == 0) {
+    prctl(PR_SET_PDEATHSIG, SIGKILL);
+    if (getppid() != parent) _exit(1);
+    for (int i = 0; i < 3; ++i) dup2(ends[static_cast<std::size_t>(i)].theirs, kFirst + i);
+    execv(argv[0], argv.data());
+    _exit(127);
+  }
+  for (const Ends& e : ends) ::close(e.theirs);
+  line_ = ends[0].ours;
+  qtest_ = ends[1].ours;
+  monitor_ = ends[2].ours;
+  reader_ = std::thread([this] { read_line(); });
+  (void)read_text_line(monitor_);  // its greeting
+  monitor("qmp_capabilities");
+  (void)wait(trigger_status);  // it listens now
+}
+
+QemuBoard::~QemuBoard() {
+  if (pid_ > 0) {
+    kill(pid_, SIGKILL);
+    waitpid(pid_, nullptr, 0);
+  }
+  ::shutdown(line_, SHUT_RDWR);
+  if (reader_.joinable()) reader_.join();
+  for (const int fd : {line_, qtest_, monitor_}) ::close(fd);
+}
+
+void QemuBoard::read_line() {
+  TriggerDecoder decoder{};
+  std::uint8_t buffer[4096];
+  for (ssize_t n = 0; (n = ::read(line_, buffer, sizeof buffer)) > 0;)
+    for (ssize_t i = 0; i < n; ++i) {
+      TriggerFrame frame{};
+      if (trigger_decode(&decoder, buffer[i], &frame) != trigger_frame_ready) continue;
+      const std::lock_guard lock(mutex_);
+      heard_.push_back({frame, std::chrono::steady_clock::now()});
+      heard_something_.notify_one();
+    }
+}
+
+void QemuBoard::bytes(const Bytes& sent) { write_all(line_, sent.data(), sent.size()); }
+
+std::uint8_t QemuBoard::send(std::uint8_t type, const Bytes& payload) {
+  Bytes frame(trigger_max_frame);
+  sequence_ = static_cast<std::uint8_t>((sequence_ + 1) % trigger_unasked);
+  frame.resize(trigger_write_frame(type, sequence_, payload.data(), payload.size(), frame.data()));
+  bytes(frame);
+  return sequence_;
+}
+
+TriggerFrame QemuBoard::wait(const Predicate& wanted) {
+  std::unique_lock lock(mutex_);
+  const auto deadline = std::chrono::steady_clock::now() + kPatience;
+  for (;;) {
+    while (looked_at_ < heard_.size()) {
+      const Heard& h = heard_[looked_at_++];
+      arrival_ = h.at;
+      if (wanted(h.frame)) return h.frame;
+    }
+    if (heard_something_.wait_until(lock, deadline) == std::cv_status::timeout)
+      throw std::runtime_error("the board said nothing of the kind");
+  }
+}
+
+TriggerFrame QemuBoard::ask(std::uint8_t type, const Bytes& payload) {
+  const std::uint8_t sequence = send(type, payload);
+  return wait([sequence](const TriggerFrame& f) { return f.sequence == sequence; });
+}
+
+std::vector<TriggerFrame> QemuBoard::drain() {
+  const std::lock_guard lock(mutex_);
+  std::vector<TriggerFrame> frames;
+  while (looked_at_ < heard_.size()) frames.push_back(heard_[looked_at_++].frame);
+  return frames;
+}
+
+std::string QemuBoard::qtest(const std::string& command) {
+  const std::string line = command + "\n";
+  write_all(qtest_, line.data(), line.size());
+  std::string answer = read_text_line(qtest_);
+  while (answer.rfind("IRQ", 0) == 0) answer = read_text_line(qtest_);
+  if (answer.rfind("OK", 0) != 0) throw std::runtime_error(command + ": " + answer);
+  return answer.size() > 3 ? answer.substr(3) : "";
+}
+
+void QemuBoard::set_exti(unsigned line, bool level) {
+  const std::string command = "exti unnamed-gpio-in " + std::to_string(line) + (level ? " 1" : " 0");
+  if (processor_.empty()) try {
+      (void)qtest("set_irq_in /machine/soc/" + command);
+      processor_ = "/machine/soc/";
+    } catch (const std::runtime_error&) {
+      processor_ = "/machine/unattached/device[0]/";  // older releases of the emulator have no name for it
+    }
+  (void)qtest("set_irq_in " + processor_ + command);
+}
+
+std::uint32_t QemuBoard::counter() { return static_cast<std::uint32_t>(std::stoull(qtest("readl 0x40000024"), nullptr, 16)); }
+
+void QemuBoard::set_counter(std::uint32_t count) { (void)qtest("writel 0x40000024 " + std::to_string(count)); }
+
+void QemuBoard::monitor(const std::string& command) {
+  const std::string line = "{\"execute\":\"" + command + "\"}\n";
+  write_all(monitor_, line.data(), line.size());
+  while (read_text_line(monitor_).find("\"return\"") == std::string::npos) {
+  }
+}
+
+void QemuBoard::halted(const std::function<void()>& deed) {
+  monitor("stop");
+  deed();
+  monitor("cont");
+}
+
+void QemuBoard::reset() { monitor("system_reset"); }
+
+}  // namespace vergence

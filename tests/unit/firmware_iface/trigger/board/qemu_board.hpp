@@ -1,0 +1,90 @@
+#pragma once
+#include <sys/types.h>
+
+#include <chrono>
+#include <condition_variable>
+#include <cstdint>
+#include <functional>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "firmware_iface/trigger/trigger.h"
+
+namespace vergence {
+
+/// The real image in qemu-system-arm -M netduinoplus2, its line to the host on a socket.
+///
+/// What the machine is: RCC reads 0, so that the image runs on the clock it falls back to, 16 MHz; the timers count 1 GHz of virtual time,
+/// so that a second of the board's is 16 ms; compare and capture units do nothing, so that pulses are forced by the main loop (late);
+/// GPIO is a stub; edges come in through EXTI. Virtual time is the host's (steady_clock), or it goes on by so many nanoseconds with every
+/// instruction: then nothing depends on how busy the host is.
+///
+/// Ownership  The process is killed by the destructor, and by the kernel when the test dies.
+/// Threads    One of its own reads the line: a machine whose line is full stands still.
+/// Errors     Throws std::runtime_error when the machine does not answer.
+class QemuBoard {
+ public:
+  struct Heard {
+    TriggerFrame frame{};
+    std::chrono::steady_clock::time_point at;
+  };
+  using Bytes = std::vector<std::uint8_t>;
+  using Predicate = std::function<bool(const TriggerFrame&)>;
+
+  /// Sentence why the image cannot be run here; empty: it can.
+  static std::string missing();
+
+  /// `icount_shift`: an instruction takes 2^icount_shift ns of virtual time; −1: virtual time is the host's.
+  explicit QemuBoard(int icount_shift = -1);
+  ~QemuBoard();
+  QemuBoard(const QemuBoard&) = delete;
+  QemuBoard& operator=(const QemuBoard&) = delete;
+
+  void bytes(const Bytes& sent);
+  /// Sends a message with the next sequence number. → that number
+  std::uint8_t send(std::uint8_t type, const Bytes& payload = {});
+  /// The next frame not yet looked at that `wanted` likes, waiting ten seconds; others before it are skipped.
+  TriggerFrame wait(const Predicate& wanted);
+  TriggerFrame wait(std::uint8_t type) {
+    return wait([type](const TriggerFrame& f) { return f.type == type; });
+  }
+  /// Sends and waits for the answer with its sequence number.
+  TriggerFrame ask(std::uint8_t type, const Bytes& payload = {});
+  /// When the frame that wait() gave last was here.
+  [[nodiscard]] std::chrono::steady_clock::time_point arrival() const { return arrival_; }
+  /// Frames not yet looked at; now they are.
+  std::vector<TriggerFrame> drain();
+
+  /// A command of QEMU's qtest protocol. → what follows "OK"
+  std::string qtest(const std::string& command);
+  /// Level at a line of EXTI: the port's PPS is 6, INS 7.
+  void set_exti(unsigned line, bool level);
+  /// The time base as it is now, low 32 bits.
+  std::uint32_t counter();
+  /// The machine stands still while `deed` is done to it.
+  void halted(const std::function<void()>& deed);
+  /// Sets the time base, as if so much time had passed in which the processor did nothing.
+  void set_counter(std::uint32_t count);
+  /// The machine's reset line.
+  void reset();
+
+ private:
+  void read_line();
+  void monitor(const std::string& command);
+
+  pid_t pid_ = -1;
+  int line_ = -1, qtest_ = -1, monitor_ = -1;
+  std::string processor_;  // the machine's name for it
+  std::uint8_t sequence_ = 0;
+  std::thread reader_;
+  std::mutex mutex_;
+  std::condition_variable heard_something_;
+  std::vector<Heard> heard_;
+  std::size_t looked_at_ = 0;
+  std::chrono::steady_clock::time_point arrival_;
+};
+
+}  // namespace vergence
