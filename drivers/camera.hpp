@@ -33,6 +33,13 @@ struct CameraConfiguration {
   int sharing = 1;  // cameras of the rig on this camera's link or bus, itself included: its share of the bandwidth
 };
 
+/// What brightness is set with while a camera streams.
+struct ExposureSetting {
+  Duration exposure{};
+  double gain_db = 0;
+  bool operator==(const ExposureSetting&) const = default;
+};
+
 enum class FrameStatus : std::uint8_t {
   complete,
   torn,  // parts of the image never came; their pixels mean nothing
@@ -46,6 +53,7 @@ struct Frame {
   HostStamp arrival{};           // when the last byte was here
   Duration exposure{};           // as this frame had it
   FrameStatus status = FrameStatus::complete;
+  double gain_db = 0;  // as this frame had it
 };
 
 /// Counters since open; all only grow.
@@ -62,7 +70,7 @@ struct CameraStatistics {
 /// Ownership  A slot belongs to the camera until wait() hands it out, then to the caller until release(). Slots are the transport's own
 ///            buffers or those of a FramePool; either way view() shows the pixels, without a copy.
 /// Threads    configure, start, stop: the owner's thread. wait: one consumer thread. release: one thread, the same or another. wait and
-///            release may overlap stop(). statistics: any.
+///            release may overlap stop(). set_exposure: one thread, may overlap everything but configure(). statistics: any.
 /// Memory     No allocation by the caller's thread between start() and stop(). Slots are fixed at configure().
 /// Time       exposure_start by the device's clock, arrival by the host's (or by virtual time, for a mock that runs faster).
 /// Pixels     8-bit grey, row 0 on top; rows as the transport brings them, or padded to cache lines where the driver converts.
@@ -93,6 +101,13 @@ class CameraDevice {
   virtual void stop() noexcept = 0;
   /// One exposure, with CameraTrigger::software and while streaming. → ok, unsupported, stopped, gone
   [[nodiscard]] virtual DeviceStatus trigger_once() noexcept { return DeviceStatus::unsupported; }
+  /// Exposure and gain from one of the next frames on, while streaming; those frames tell it, and a camera that comes back has it. Outside
+  /// of what the camera has the nearest is taken; *actual (may be null): what it took. Talks to the device: as long as that, never for
+  /// ever; not for a thread that has a frame to give. → ok, unsupported, bad_configuration (not positive, longer than the interval),
+  /// stopped, gone, failed
+  [[nodiscard]] virtual DeviceStatus set_exposure(const ExposureSetting& /*wanted*/, ExposureSetting* /*actual*/) noexcept {
+    return DeviceStatus::unsupported;
+  }
   /// One sentence about the last call that was not `ok`: what was refused, what the camera offers, what to do. Empty: the status says
   /// it all. Owner's thread; may allocate.
   [[nodiscard]] virtual std::string complaint() const { return {}; }

@@ -7,6 +7,7 @@
 
 #include <fmt/format.h>
 
+#include "app/commands/exposure_settings.hpp"
 #include "app/commands/simulated_ins.hpp"
 #include "app/runtime/errors.hpp"
 #include "app/runtime/nearest.hpp"
@@ -64,7 +65,8 @@ std::vector<CameraRequest> requests_of(const Configuration& c) {
     r.key = key;
     r.driver = s.driver;
     r.serial = s.serial;
-    r.configuration = {s.width, s.height, c.trigger.rate, Duration::seconds(s.exposure_us * 1e-6), s.gain_db, trigger_of(key, s.trigger)};
+    const ExposureSetting start = starting_exposure(c, static_cast<std::size_t>(k));
+    r.configuration = {s.width, s.height, c.trigger.rate, start.exposure, start.gain_db, trigger_of(key, s.trigger)};
     r.configuration.offset_x = s.offset_x;
     r.configuration.offset_y = s.offset_y;
     r.configuration.pixel_format = s.pixel_format;

@@ -7,6 +7,7 @@
 
 #include <fmt/format.h>
 
+#include "app/commands/exposure_settings.hpp"
 #include "app/runtime/errors.hpp"
 #include "app/runtime/nearest.hpp"
 
@@ -98,6 +99,7 @@ MockDrive make_mock_drive(const Configuration& c, const std::vector<std::string>
     o.blur_samples = c.mock.blur_samples;
     o.ideal_ins = c.mock.ins == "ideal";
     o.clock_drift_ppm = c.mock.clock_drift_ppm;
+    o.exposures_follow = exposes_by_itself(c);
     if (duration_s) o.duration = Duration::seconds(*duration_s);
     drive.rig = std::make_unique<mock::MockRig>(std::move(truth), o);
   } catch (const std::invalid_argument& e) {
@@ -105,8 +107,8 @@ MockDrive make_mock_drive(const Configuration& c, const std::vector<std::string>
   }
   for (int k = 0; k < rig.cameras; ++k) {
     const CameraSettings& camera = c.cameras[static_cast<std::size_t>(k)];
-    const CameraConfiguration wanted{camera.width,   camera.height,          c.trigger.rate, Duration::seconds(camera.exposure_us * 1e-6),
-                                     camera.gain_db, CameraTrigger::hardware};
+    const ExposureSetting start = starting_exposure(c, static_cast<std::size_t>(k));
+    const CameraConfiguration wanted{camera.width, camera.height, c.trigger.rate, start.exposure, start.gain_db, CameraTrigger::hardware};
     configured(drive.rig->camera(k).configure(wanted, nullptr), fmt::format("cameras.{}", k));
   }
   TriggerConfiguration pulses;

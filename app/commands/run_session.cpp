@@ -22,11 +22,13 @@
 #include "app/commands/camera_masks.hpp"
 #include "app/commands/drive_devices.hpp"
 #include "app/commands/drive_journal.hpp"
+#include "app/commands/exposure_settings.hpp"
 #include "app/commands/session_files.hpp"
 #include "app/datasets/decimal.hpp"
 #include "app/recorder/line_file.hpp"
 #include "app/recorder/recorder.hpp"
 #include "app/runtime/background_thread.hpp"
+#include "app/runtime/exposure_control.hpp"
 #include "app/runtime/live_source.hpp"
 #include "app/runtime/progress.hpp"
 #include "app/runtime/signals.hpp"
@@ -88,6 +90,7 @@ class Drive {
   BackgroundThread solver_;
   std::unique_ptr<Estimator> estimator_;
   std::unique_ptr<Comparison> comparison_;
+  std::unique_ptr<ExposureControl> exposure_;  // null: exposures are fixed
   std::unique_ptr<LiveSource> source_;
   std::unique_ptr<Recorder> recorder_;
   Stamp start_{};  // of the drive
@@ -129,7 +132,12 @@ Drive::Drive(const RunRequest& request)
   o.stamp_grid = stamp_grid(configuration_);
   o.tie_stamp = request.fast ? kVirtualEpoch : Stamp(clock_ns(CLOCK_REALTIME));
   o.tie_host = request.fast ? devices_.start() : HostStamp(clock_ns(CLOCK_MONOTONIC));
-  source_ = std::make_unique<LiveSource>(devices_.cameras(), devices_.ins(), devices_.trigger(), o);
+  if (exposes_by_itself(configuration_)) {
+    const CameraSettings& c = configuration_.cameras[0];
+    exposure_ = std::make_unique<ExposureControl>(devices_.cameras(), c.width, c.height, masks_.views()[0],
+                                                  exposure_options(configuration_), starting_exposure(configuration_, 0), request.fast);
+  }
+  source_ = std::make_unique<LiveSource>(exposure_ ? exposure_->cameras() : devices_.cameras(), devices_.ins(), devices_.trigger(), o);
   start_ = o.tie_stamp + (devices_.start() - o.tie_host);
 }
 
@@ -324,6 +332,15 @@ std::vector<std::pair<std::string, std::uint64_t>> Drive::device_counters() cons
                                                          {"sets_unproven", c.sync.unproven},
                                                          {"clock_resets", c.clock_resets},
                                                          {"worst_stamp_error_ns", static_cast<std::uint64_t>(c.worst_stamp_error_ns)}};
+  if (exposure_) {
+    const ExposureCounters e = exposure_->counters();
+    out.insert(out.end(), {{"exposure_changes", e.changes},
+                           {"exposure_refused", e.refused},
+                           {"exposure_unequal", e.unequal},
+                           {"exposure_again", e.again},
+                           {"exposure_last_us", static_cast<std::uint64_t>(e.newest.exposure.ns() / 1000)},
+                           {"gain_last_millidb", static_cast<std::uint64_t>(1000 * e.newest.gain_db)}});
+  }
   for (int k = 0; k < begin_.file.rig.cameras; ++k) {
     const auto i = static_cast<std::size_t>(k);
     const CameraStatistics s = devices_.cameras()[i]->statistics();
@@ -435,7 +452,10 @@ ExitCode Drive::run() {
   watch(&progress);
   estimating.join();
   source_->join();
+  if (exposure_) exposure_->settle();
   progress.finish();
+  if (exposure_ && exposure_->counters().unsupported)
+    progress.say("vergence: exposure.mode is auto, but a camera cannot change its exposure while it streams; set it to fixed");
 
   const auto totals = recorder_->close();
   const SummaryInput input = summary_input(*totals, AllocationGuard::allocations_after_seal() - allocations_before);

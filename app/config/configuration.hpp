@@ -39,6 +39,14 @@ struct CameraSettings {
   std::array<double, 12> T_camera_left{};  // rows of [R t], m; zeros: as rig.nominal
 };
 
+/// `exposure:` of all cameras.
+struct ExposureSettings {
+  int mode = 0;  // 0: fixed, as cameras[] says; 1: auto
+  double target = 90, saturated_percent = 5;
+  double min_us = 20, max_us = 8000, max_gain_db = 18;
+  int settle_frames = 5;
+};
+
 struct InsSettings {
   std::string driver = "none";
   std::string port{};      // empty: the only serial port on USB
@@ -106,6 +114,7 @@ inline constexpr std::size_t kMostFaults = 16;
 struct Configuration {
   RigSettings rig{};
   std::array<CameraSettings, kMaxCameras> cameras{};
+  ExposureSettings exposure{};
   InsSettings ins{};
   TriggerSettings trigger{};
   SyncSettings sync{};

@@ -181,6 +181,26 @@ Group cameras() {
   return all;
 }
 
+Group exposure() {
+  using E = ExposureSettings;
+  return Rows<E>(
+             "exposure", "Exposure and gain of all cameras together, while driving (docs/cameras.md).",
+             [](auto& c) -> auto& { return c.exposure; })
+      .choice(
+          "mode", &E::mode, {"fixed", "auto"},
+          "`fixed`: as `cameras` says. `auto`: by the brightness of camera 0's images, the same for all cameras; they begin with camera "
+          "0's.")
+      .number("target", &E::target, 20, 200, "grey levels", "Mean of the image aimed at, of what its mask shows.")
+      .number("saturated_percent", &E::saturated_percent, 0, 50, "%", "Share of the pixels that may be at the end of the scale.")
+      .number("min_us", &E::min_us, 5, 100000, "µs", "Shortest exposure.")
+      .number("max_us", &E::max_us, 10, 200000, "µs",
+              "Longest exposure, for the sake of motion blur; what is missing then comes from the gain.")
+      .number("max_gain_db", &E::max_gain_db, 0, 40, "dB", "Largest gain.")
+      .integer("settle_frames", &E::settle_frames, 2, 60, "frames",
+               "Images after a change until one is judged again: one more than the cameras take for it.")
+      .done();
+}
+
 Group ins() {
   using I = InsSettings;
   return Rows<I>(
@@ -420,8 +440,9 @@ Group monitor() {
 }  // namespace
 
 const std::vector<Group>& schema() {
-  static const std::vector<Group> groups{general(), rig(),        cameras(), ins(),   trigger(), sync(), odometry(), calibration_options(),
-                                         monitor(), comparison(), mock(),    faults()};
+  static const std::vector<Group> groups{
+      general(), rig(),        cameras(), exposure(), ins(), trigger(), sync(), odometry(), calibration_options(),
+      monitor(), comparison(), mock(),    faults()};
   return groups;
 }
 

@@ -225,7 +225,11 @@ void LiveSource::take_frame(std::size_t k) {
   in.camera = item.camera;
   in.slot = frame.slot;
   in.counter = frame.counter;
-  in.middle = clocks_[k].map(frame.exposure_start, frame.arrival);
+  // From the end of an exposure to the arrival is always as long, from its start not.
+  if (exposures_[k] == Duration{}) exposures_[k] = frame.exposure;
+  const Duration longer = frame.exposure - exposures_[k];
+  in.middle = clocks_[k].map(frame.exposure_start + longer, frame.arrival);
+  in.middle.host = in.middle.host - longer;
   in.middle.host = in.middle.host + frame.exposure / 2;
   in.arrival = frame.arrival;
   const bool torn = frame.status != FrameStatus::complete;

@@ -115,6 +115,7 @@ class LiveSource final : private Notifier {
   Options options_;
   RigSynchronizer sync_;
   std::vector<ClockMapper> clocks_;
+  std::array<Duration, kMaxCameras> exposures_{};  // of the first frames: what the mappers' least delays hold for
   std::vector<Head<Frame>> heads_;
   std::unique_ptr<ClockMapper> ins_clock_;
   Head<InsReading> ins_head_;

@@ -30,6 +30,11 @@ struct MockRigOptions {
   /// Virtual time: the consumer takes the board's reports, in the order of arrival. The board then runs no farther ahead of them than
   /// what decides at which pulse a pause begins: the fourth after the newest report taken, on every run.
   bool reports_taken = false;
+  /// Images from the one at which set_exposure() is called to the first that has it; later, where those are made already.
+  int exposure_latency = 2;
+  /// Virtual time: who waits for camera 0 asks for the next image once the last is done with, and may set the exposure before. No image is
+  /// then made while one is still looked at: set_exposure() acts at the same image on every run.
+  bool exposures_follow = false;
 };
 
 /// A rig that does not exist: cameras, INS and trigger board behind the drivers' interfaces, on a vehicle driving through a world.
@@ -37,7 +42,8 @@ struct MockRigOptions {
 /// The drive begins when the trigger is started (the cameras and the INS before it), with pulse 0 at the drive's time 0.
 /// Every device has a clock of its own, with offset and drift; arrivals have a least delay and a jitter above it. Pulse n of a boot goes
 /// to every camera whose line is pulsed; a camera's exposure starts `trigger_delay` later. With feedback wired the report has every
-/// exposure in whole microseconds and comes after the last of them, or just before the next pulse where one never came.
+/// exposure in whole microseconds, its edge on the host's clock to 20 µs, and comes after the last of them, or just before the next
+/// pulse where one never came.
 /// Ownership  The devices live in the rig; it outlives their use.
 /// Threads    Pictures are rendered on two threads of the rig's, one camera each; in real time another hands them out when they are due.
 /// Time       Virtual: arrivals are what they would be, nothing waits for a clock; items become visible in the order of their arrivals over

@@ -1,5 +1,6 @@
 #include "drivers/mock/detail/devices.hpp"
 
+#include <algorithm>
 #include <exception>
 #include <string>
 
@@ -32,9 +33,41 @@ DeviceStatus MockCamera::configure(const CameraConfiguration& wanted, CameraConf
     return DeviceStatus::failed;
   }
   configuration_ = wanted;
+  {
+    const std::lock_guard lock(setting_);
+    changes_ = {{0, {wanted.exposure, wanted.gain_db}}};
+  }
   generation_.fetch_add(1, std::memory_order_release);
   if (actual != nullptr) *actual = wanted;
   return DeviceStatus::ok;
+}
+
+DeviceStatus MockCamera::set_exposure(const ExposureSetting& wanted, ExposureSetting* actual) noexcept {
+  constexpr double kMostGain = 40;  // dB
+  if (!stream.streaming()) return DeviceStatus::stopped;
+  if (wanted.exposure <= Duration{} || wanted.exposure.to_seconds() * configuration_.rate_hz > 1) return DeviceStatus::bad_configuration;
+  const ExposureSetting taken{wanted.exposure, std::clamp(wanted.gain_db, 0.0, kMostGain)};
+  const auto latency = static_cast<std::uint64_t>(std::max(1, rig_->options.exposure_latency));
+  const std::uint64_t from = std::max(rig_->looked_at.load() + latency, rig_->planned.load());
+  try {
+    const std::lock_guard lock(setting_);
+    while (changes_.size() > 1 && changes_.back().from >= from) changes_.pop_back();
+    // Of what is past only the last is of use.
+    while (changes_.size() > 1 && changes_[1].from + MockRig::kSlots < rig_->planned.load()) changes_.erase(changes_.begin());
+    changes_.push_back({from, taken});
+  } catch (const std::exception&) {
+    return DeviceStatus::failed;
+  }
+  if (actual != nullptr) *actual = taken;
+  return DeviceStatus::ok;
+}
+
+ExposureSetting MockCamera::setting_at(std::uint64_t pulse) const {
+  const std::lock_guard lock(setting_);
+  ExposureSetting setting = changes_.front().setting;
+  for (const Change& c : changes_)
+    if (c.from <= pulse) setting = c.setting;
+  return setting;
 }
 
 DeviceStatus MockCamera::start(Notifier* ready) noexcept {
@@ -49,9 +82,15 @@ DeviceStatus MockCamera::start(Notifier* ready) noexcept {
 }
 
 DeviceStatus MockCamera::wait(Duration limit, Frame* frame) noexcept {
+  if (k_ == 0 && rig_->looking.exchange(false)) rig_->room.made();
   Delivery<Frame> d;
   const DeviceStatus status = stream.take(limit, &d);
   if (status == DeviceStatus::ok) {
+    if (k_ == 0) {
+      rig_->looked_at.store(pulse_of_[d.value.slot].load(std::memory_order_acquire));
+      rig_->looking.store(true);
+      rig_->unseen.fetch_sub(1);
+    }
     *frame = d.value;
     frame->arrival = d.arrival;
     delivered_.fetch_add(1, std::memory_order_relaxed);

@@ -1,4 +1,5 @@
 #pragma once
+#include <array>
 #include <atomic>
 #include <cstdint>
 #include <memory>
@@ -41,6 +42,12 @@ struct RigContext {
   MockRigOptions options;
   Room room;
   std::atomic<bool> pulsing{false};  // the scheduler's threads use the devices
+  // Of camera 0, for who sets exposures: the pulse of the image handed out last, and whether images wait for their consumer or he is at
+  // one.
+  std::atomic<std::uint64_t> looked_at{0};
+  std::atomic<int> unseen{0};
+  std::atomic<bool> looking{false};
+  std::atomic<std::uint64_t> planned{0};  // pulses whose exposures are settled
 };
 
 inline constexpr Duration kTransfer = Duration::milliseconds(5);       // of an image over its bus
@@ -54,6 +61,7 @@ class MockCamera final : public CameraDevice {
 
   const DeviceInfo& info() const noexcept override { return info_; }
   DeviceStatus configure(const CameraConfiguration& wanted, CameraConfiguration* actual) noexcept override;
+  DeviceStatus set_exposure(const ExposureSetting& wanted, ExposureSetting* actual) noexcept override;
   DeviceTiming timing() const noexcept override { return {trigger_delay() + configuration_.exposure + kTransfer}; }
   DeviceStatus start(Notifier* ready) noexcept override;
   DeviceStatus wait(Duration limit, Frame* frame) noexcept override;
@@ -72,6 +80,10 @@ class MockCamera final : public CameraDevice {
   /// From the edge of a pulse to the start of its exposure.
   [[nodiscard]] Duration trigger_delay() const noexcept { return rig_->options.trigger_delay[static_cast<std::size_t>(k_)]; }
   [[nodiscard]] FramePool& pool() noexcept { return *pool_; }
+  /// What an image of that pulse is taken with.
+  [[nodiscard]] ExposureSetting setting_at(std::uint64_t pulse) const;
+  /// Tells whose pulse the image in a slot is.
+  void label(FrameSlot slot, std::uint64_t pulse) noexcept { pulse_of_[slot].store(pulse, std::memory_order_release); }
   [[nodiscard]] const CameraConfiguration& configuration() const noexcept { return configuration_; }
   [[nodiscard]] const DeviceOscillator& clock() const noexcept { return clock_; }
   /// Image memory, bytes.
@@ -92,7 +104,14 @@ class MockCamera final : public CameraDevice {
   std::atomic<std::uint64_t> delivered_{0}, starts_{0};
   std::atomic<std::uint32_t> generation_{0};
   std::atomic<int> out_{0};  // slots the consumer holds
-  bool gone_ = false;        // the consumer's
+  std::array<std::atomic<std::uint64_t>, MockRig::kSlots> pulse_of_{};
+  struct Change {
+    std::uint64_t from = 0;  // pulse
+    ExposureSetting setting{};
+  };
+  mutable std::mutex setting_;   // of what follows
+  std::vector<Change> changes_;  // by pulse, the first is in force
+  bool gone_ = false;            // the consumer's
 };
 
 class MockIns final : public InsDevice {

@@ -82,6 +82,7 @@ void Scheduler::produce() {
       if (trigger_->stream.empty() || !trigger_->stream.streaming()) break;
       rig_.room.wait(seen);
     }
+    wait_for_exposures();
     make_readings(host_of(n + 4));
     make_link_events(n);
     if (left_out(n)) {
@@ -110,6 +111,15 @@ void Scheduler::produce() {
   }
 }
 
+/// Every image of camera 0 that has arrived was looked at, and what was asked for then is known.
+void Scheduler::wait_for_exposures() {
+  while (rig_.options.exposures_follow && !rig_.options.real_time && !stopping()) {
+    const std::uint32_t seen = rig_.room.look();
+    if ((rig_.unseen.load() == 0 && !rig_.looking.load()) || !cameras_[0]->stream.streaming()) break;
+    rig_.room.wait(seen);
+  }
+}
+
 /// Not further ahead than two pulses. False: the pulse is over before its pictures are begun.
 bool Scheduler::wait_for_its_turn(std::uint64_t pulse) {
   const Duration period = plan_.period();
@@ -135,6 +145,7 @@ void Scheduler::make_link_events(std::uint64_t pulse) {
 bool Scheduler::left_out(std::uint64_t pulse) {
   const std::lock_guard lock(pausing_);
   made_ = pulse + 1;
+  rig_.planned.store(pulse + 1);
   if (!pause_) return false;
   const bool in_boot = pause_->boot == 0 || pause_->boot == boot_of(pulse);
   if (!in_boot || pulse >= pause_->end) pause_.reset();
@@ -160,7 +171,7 @@ PulseExposure Scheduler::feedback(std::uint64_t pulse, int k) const {
   if (!pulsed(k) || unplugged(pulse, k) || !camera.stream.streaming()) return {};
   if (exposure_of(*rig_.truth, rig_.options.seed, pulse_at(pulse, k), k).missed) return {};
   const auto in_ticks = [](Duration d) { return Duration::microseconds((d.ns() + 500) / 1000); };
-  return {true, in_ticks(camera.trigger_delay()), in_ticks(camera.trigger_delay() + camera.configuration().exposure)};
+  return {true, in_ticks(camera.trigger_delay()), in_ticks(camera.trigger_delay() + camera.setting_at(pulse).exposure)};
 }
 
 void Scheduler::make_report(std::uint64_t pulse) {
@@ -187,6 +198,13 @@ void Scheduler::make_report(std::uint64_t pulse) {
     told = std::max(told, e.seen ? e.end : plan_.at(pulse + 1).time - slot.time - kReportLatency);
   }
   p.arrival = jittered(edge + std::max(told, Duration{}) + kReportLatency, 20, pulse);
+  if (board_.feedback != 0) {        // the report waits for exposures of any length, so the board is asked for its time
+    constexpr double kKnown = 20e3;  // ns
+    Random random(mixed(rig_.options.seed, pulse), 21);
+    report.mapped = true;
+    report.host = edge + Duration::nanoseconds(std::llround(random.uniform(-kKnown, kKnown)));
+    report.host_error = Duration::microseconds(50);
+  }
   if (plan_.link_down(slot.time) || plan_.link_down(p.arrival - start_)) {
     trigger_->lost.fetch_add(1, std::memory_order_relaxed);
     return;
@@ -293,6 +311,7 @@ std::optional<Scheduler::Shooting> Scheduler::plan(std::uint64_t pulse, int k) {
     return std::nullopt;
   }
   s.slot = *slot;
+  s.setting = camera.setting_at(pulse);
   return s;
 }
 
@@ -300,17 +319,20 @@ void Scheduler::send(std::uint64_t pulse, const Shooting& shooting) {
   const auto k = static_cast<std::size_t>(shooting.camera);
   MockCamera& camera = *cameras_[k];
   Sender& sender = senders_[k];
-  const Duration open = camera.configuration().exposure;
+  const Duration open = shooting.setting.exposure;
   const HostStamp begins = host_of(pulse) + camera.trigger_delay();
   Parcel p;
   p.device = shooting.camera;
   p.generation = camera.generation();
   p.arrival = jittered(begins + open + kTransfer, k, pulse) + shooting.exposure.delay;
-  p.frame.value = {shooting.slot, pulse - sender.counter_base, camera.clock().read(begins, plan_.at(pulse).time, rig_.truth->faults()), {},
-                   open,          FrameStatus::complete};
+  p.frame.value = {
+      shooting.slot,         pulse - sender.counter_base, camera.clock().read(begins, plan_.at(pulse).time, rig_.truth->faults()), {}, open,
+      FrameStatus::complete, shooting.setting.gain_db};
+  camera.label(shooting.slot, pulse);
   std::optional<FrameSlot> copy;
   if (shooting.exposure.twice) copy = camera.pool().acquire();
   if (copy) {
+    camera.label(*copy, pulse);
     const auto from = camera.pool().writable(shooting.slot), to = camera.pool().writable(*copy);
     std::memcpy(to.data(), from.data(), from.size());
     Parcel again = p;
@@ -326,7 +348,7 @@ void Scheduler::send(std::uint64_t pulse, const Shooting& shooting) {
 void Scheduler::render(const Shooting& shooting) {
   const Exposure& exposure = shooting.exposure;
   MockCamera& sender = *cameras_[static_cast<std::size_t>(shooting.camera)];
-  const CameraConfiguration& c = sender.configuration();
+  const ExposureSetting& c = shooting.setting;
   std::vector<Transform> way, bus;
   for (int i = 0; i < rig_.options.blur_samples; ++i) {
     const Duration at = exposure.time + Duration::seconds((i + 0.5) / rig_.options.blur_samples * c.exposure.to_seconds());
@@ -435,7 +457,9 @@ void Scheduler::deliver(const Parcel& parcel, HostStamp arrival) {
   const std::shared_lock memory(cameras_[k]->memory);
   if (parcel.generation != cameras_[k]->generation()) return;  // its memory is no more
   // The stream is deeper than the slots: frames always find room while somebody takes them.
+  if (k == 0) rig_.unseen.fetch_add(1);
   if (push_or_wait(&cameras_[k]->stream, d)) return;
+  if (k == 0) rig_.unseen.fetch_sub(1);
   const std::lock_guard lock(mutex_);
   Sender& sender = senders_[k];
   if (sender.spare_generation != parcel.generation) sender.spare.clear();

@@ -67,6 +67,7 @@ class Scheduler final : public PulseListener {
     int camera = 0;  // that sends it
     Exposure exposure{};
     FrameSlot slot = 0;
+    ExposureSetting setting{};
   };
   struct Pause {
     std::uint64_t from = 0, end = 0;  // slots
@@ -76,6 +77,7 @@ class Scheduler final : public PulseListener {
   static constexpr HostStamp kVirtualStart{1'000'000'000'000};  // 1000 s after a machine's start, on every run
 
   void produce();
+  void wait_for_exposures();
   [[nodiscard]] bool wait_for_its_turn(std::uint64_t pulse);
   void make_link_events(std::uint64_t pulse);
   [[nodiscard]] bool left_out(std::uint64_t pulse);

@@ -1,0 +1,68 @@
+#include "drivers/exposure/exposure_controller.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace vergence::exposure {
+namespace {
+
+constexpr double kDbAStop = 6.020599913279624;  // 20 log10 2
+constexpr double kDarkest = 1.0;                // grey level: below it the mean is noise
+
+double stops_of(const ExposureOptions& o, const ExposureSetting& s) noexcept {
+  return std::log2(static_cast<double>(s.exposure.ns()) / static_cast<double>(o.least.ns())) + s.gain_db / kDbAStop;
+}
+
+}  // namespace
+
+const char* ExposureOptions::validate() const noexcept {
+  if (least <= Duration{}) return "the shortest exposure must be positive";
+  if (most < least) return "the longest exposure is shorter than the shortest";
+  if (!(target >= 20 && target <= 200)) return "the target is a mean grey level of 20 to 200";
+  if (!(may_saturate >= 0 && may_saturate <= 0.5)) return "at most half of the pixels may saturate";
+  if (!(dead_band >= 0.05 && dead_band <= 1)) return "the dead band is 0.05 to 1 stops";
+  if (!(up_stops > 0 && up_stops <= 4 && down_stops > 0 && down_stops <= 4)) return "a change is at most 4 stops";
+  if (!(most_gain_db >= 0)) return "the gain is not negative";
+  if (settle_frames < 1) return "an image after a change is the least to judge by";
+  return nullptr;
+}
+
+ExposureSetting within(const ExposureOptions& o, const ExposureSetting& wanted) noexcept {
+  return {std::clamp(wanted.exposure, o.least, o.most), std::clamp(wanted.gain_db, 0.0, o.most_gain_db)};
+}
+
+ExposureController::ExposureController(const ExposureOptions& options, const ExposureSetting& start) noexcept
+    : options_(options), setting_(within(options, start)), stops_(stops_of(options_, setting_)), since_change_(options.settle_frames) {}
+
+double ExposureController::wanted_stops(const Brightness& image) const noexcept {
+  const double to_target = std::log2(options_.target / std::max(image.mean, kDarkest));
+  if (image.bright < kSaturated) return std::min(to_target, std::log2(kSaturated / std::max(image.bright, kDarkest)));
+  constexpr double kMostOfIt = 0.5;
+  return std::min(to_target, image.saturated > kMostOfIt ? -options_.down_stops : -0.5 * options_.down_stops);
+}
+
+ExposureSetting ExposureController::split(double stops) const noexcept {
+  const double longest = std::log2(static_cast<double>(options_.most.ns()) / static_cast<double>(options_.least.ns()));
+  const double exposure = std::clamp(stops, 0.0, longest);
+  const auto ns = std::llround(static_cast<double>(options_.least.ns()) * std::exp2(exposure));
+  return within(options_, {Duration::nanoseconds(ns), (stops - exposure) * kDbAStop});
+}
+
+std::optional<ExposureSetting> ExposureController::step(const Brightness& image) noexcept {
+  if (image.samples == 0) return std::nullopt;
+  if (since_change_ < options_.settle_frames) {
+    ++since_change_;
+    if (since_change_ < options_.settle_frames) return std::nullopt;
+  }
+  const double wanted = std::clamp(wanted_stops(image), -options_.down_stops, options_.up_stops);
+  if (std::abs(wanted) <= options_.dead_band) return std::nullopt;
+  const ExposureSetting next = split(stops_ + wanted);
+  const double stops = stops_of(options_, next);
+  if (std::abs(stops - stops_) < 0.5 * options_.dead_band) return std::nullopt;  // at a bound
+  stops_ = stops;
+  setting_ = next;
+  since_change_ = 0;
+  return setting_;
+}
+
+}  // namespace vergence::exposure
