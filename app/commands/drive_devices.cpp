@@ -3,12 +3,15 @@
 #include <time.h>
 
 #include <algorithm>
+#include <cmath>
 #include <sstream>
 
 #include <fmt/format.h>
 
+#include "app/commands/drive_sync.hpp"
 #include "app/commands/exposure_settings.hpp"
 #include "app/commands/simulated_ins.hpp"
+#include "app/commands/trigger_boards.hpp"
 #include "app/runtime/errors.hpp"
 #include "app/runtime/nearest.hpp"
 #include "app/runtime/software_trigger.hpp"
@@ -34,19 +37,16 @@ CameraTrigger trigger_of(const std::string& key, const std::string& word) {
                                did_you_mean(word, {"hardware", "software", "free"})));
 }
 
-SyncOptions sync_options(const Configuration& c, int cameras) {
-  SyncOptions o;
-  o.cameras = cameras;
-  o.interval = Duration::seconds(1 / c.trigger.rate);
-  o.hold = Duration::seconds(c.sync.hold_ms * 1e-3);
-  o.tolerance = Duration::seconds(c.sync.tolerance_ms * 1e-3);
-  if (c.sync.mode == "software")
-    o.mode = SyncMode::software;
-  else if (c.sync.mode != "counter")
-    throw InputError(fmt::format("sync.mode is \"{}\"{}; this version knows counter, software", c.sync.mode,
-                                 did_you_mean(c.sync.mode, {"counter", "software"})));
-  if (const char* sentence = o.validate()) throw InputError(std::string("sync: ") + sentence);
-  return o;
+/// The MTi-G-700/710 makes pulses of 400 Hz / n and marks the reading each left with; the MTi-G makes its own sample rate / n, unmarked.
+bool marks_sync_out(const DeviceInfo& ins) { return ins.model.find("7") != std::string::npos; }
+
+void check_sync_out(const Configuration& c, const DeviceInfo& ins) {
+  constexpr double kBase = 400;  // Hz
+  const double base = marks_sync_out(ins) ? kBase : c.ins.rate;
+  const double nearest = base / std::max(1.0, std::round(base / c.trigger.rate));
+  if (std::abs(nearest - c.trigger.rate) <= 1e-3 * c.trigger.rate) return;
+  throw InputError(fmt::format("trigger.rate is {}, and {} makes pulses of {:g} Hz / n: set trigger.rate and ins.sync_out_hz to {:.6g}",
+                               c.trigger.rate, ins_title(ins), base, nearest));
 }
 
 /// What real devices need of a configuration before any of them is opened.
@@ -71,20 +71,18 @@ std::vector<CameraRequest> requests_of(const Configuration& c) {
     r.configuration.offset_y = s.offset_y;
     r.configuration.pixel_format = s.pixel_format;
     r.configuration.options = parse_camera_options(key + ".options", s.options);
-    if (r.configuration.trigger != trigger_of("cameras.0", c.cameras[0].trigger))
+    if (c.sync.mode != "master_strobe" && r.configuration.trigger != trigger_of("cameras.0", c.cameras[0].trigger))
       throw InputError(fmt::format("{}.trigger is {}, that of camera 0 is {}; all cameras of a rig are triggered alike", key, s.trigger,
                                    c.cameras[0].trigger));
     requests.push_back(std::move(r));
   }
-  if (c.trigger.driver != "none")
+  if (c.trigger.driver != "none" && c.trigger.driver != "board")
+    throw InputError(fmt::format("trigger.driver is \"{}\"{}; with real cameras it is board, or none where something else pulses",
+                                 c.trigger.driver, did_you_mean(c.trigger.driver, {"board", "none"})));
+  if (c.trigger.driver == "board" && requests[0].configuration.trigger != CameraTrigger::hardware)
     throw InputError(
-        fmt::format("trigger.driver is \"{}\"; with real cameras this version knows none: pulses from elsewhere, "
-                    "cameras[].trigger: software, or free",
-                    c.trigger.driver));
-  if (requests[0].configuration.trigger == CameraTrigger::free && c.sync.mode == "counter")
-    throw InputError(
-        "cameras[].trigger is free: nothing makes the cameras expose together, so their counters cannot pair the images; "
-        "trigger them, or set sync.mode to software");
+        fmt::format("trigger.driver is board and cameras[].trigger {}; the board's pulses are for cameras with trigger: hardware",
+                    c.cameras[0].trigger));
   return requests;
 }
 
@@ -132,22 +130,28 @@ DriveDevices::DriveDevices(const Configuration& c, const std::vector<std::string
 void DriveDevices::open_real(const Configuration& c) {
   const std::vector<CameraRequest> requests = requests_of(c);
   sync_ = sync_options(c, static_cast<int>(requests.size()));
+  const TriggerConfiguration pulses = trigger_configuration(c, sync_.cameras);
   opened_ = open_cameras(requests, &remarks_);
   for (const OpenedCamera& camera : opened_) cameras_.push_back(camera.device.get());
   opened_ins_ = open_ins(ins_request(c.ins), &remarks_);
   ins_ = opened_ins_.get();
+  if (sync_.mode == SyncMode::ins_syncout) {
+    check_sync_out(c, ins_->info());
+    sync_out_marked_ = marks_sync_out(ins_->info());
+  }
+  if (c.trigger.driver == "board") {
+    board_ = open_trigger_board(c.trigger, pulses, &remarks_);
+    trigger_ = board_.get();
+  }
+  for (std::size_t k = 0; k < opened_.size(); ++k) sync_.camera[k].resolution = opened_[k].device->timing().resolution;
   const CameraTrigger trigger = requests[0].configuration.trigger;
-  sync_.align_start = trigger == CameraTrigger::hardware;  // the pulses do not wait for us
+  sync_.align_start =
+      trigger == CameraTrigger::hardware && sync_.mode == SyncMode::counter && trigger_ == nullptr;  // the pulses do not wait for us
   if (trigger == CameraTrigger::software) {
     software_ = std::make_unique<SoftwareTrigger>(cameras_);
-    if (software_->configure({c.trigger.rate}, nullptr) != DeviceStatus::ok) throw InputError("trigger.rate is not possible");
+    if (software_->configure(pulses, nullptr) != DeviceStatus::ok) throw InputError("trigger.rate is not possible");
     trigger_ = software_.get();
   }
-  if (sync_.mode == SyncMode::software)
-    remarks_.push_back(
-        fmt::format("sync.mode is software: images within {} ms are paired by their stamps; that they were exposed together is "
-                    "not known, and poses in motion suffer from it",
-                    c.sync.tolerance_ms));
   start_ = monotonic_now();
 }
 

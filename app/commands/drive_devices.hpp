@@ -10,6 +10,7 @@
 #include "app/runtime/camera_drivers.hpp"
 #include "app/runtime/ins_drivers.hpp"
 #include "drivers/sync/rig_synchronizer.hpp"
+#include "drivers/trigger_board/device.hpp"
 
 namespace vergence::app {
 
@@ -27,6 +28,12 @@ class DriveDevices {
   [[nodiscard]] InsDevice* ins() const noexcept { return ins_; }              // null: none
   [[nodiscard]] TriggerDevice* trigger() const noexcept { return trigger_; }  // null: pulses come from elsewhere, or none
   [[nodiscard]] const SyncOptions& sync() const noexcept { return sync_; }
+  /// LiveSource::Options::board_keeps_own_time.
+  [[nodiscard]] bool board_keeps_own_time() const noexcept { return board_keeps_own_time_; }
+  /// The INS marks the readings that a pulse left its SyncOut with.
+  [[nodiscard]] bool sync_out_marked() const noexcept { return sync_out_marked_; }
+  /// The board, where there is one on a line; null: a mock's, or none.
+  [[nodiscard]] const trigger_board::Device* board() const noexcept { return board_.get(); }
   /// Sentences about what works, but not as well as it should.
   [[nodiscard]] const std::vector<std::string>& remarks() const noexcept { return remarks_; }
 
@@ -48,10 +55,12 @@ class DriveDevices {
   std::vector<OpenedCamera> opened_;
   std::unique_ptr<InsDevice> opened_ins_;
   std::unique_ptr<TriggerDevice> software_;
+  std::unique_ptr<trigger_board::Device> board_;
   std::vector<CameraDevice*> cameras_;
   InsDevice* ins_ = nullptr;
   TriggerDevice* trigger_ = nullptr;
   SyncOptions sync_;
+  bool sync_out_marked_ = false, board_keeps_own_time_ = false;
   std::vector<std::string> remarks_;
   std::uint64_t frames_ = 0;
   HostStamp start_{};

@@ -7,6 +7,7 @@
 
 #include <fmt/format.h>
 
+#include "app/commands/drive_sync.hpp"
 #include "app/commands/exposure_settings.hpp"
 #include "app/runtime/errors.hpp"
 #include "app/runtime/nearest.hpp"
@@ -40,6 +41,10 @@ void configured(DeviceStatus status, const std::string& what) {
   if (status != DeviceStatus::ok) throw InputError(what + " is not possible: " + std::string(to_string(status)));
 }
 
+Duration trigger_delay(const Configuration& c, std::size_t k) {
+  return Duration::nanoseconds(std::llround(c.cameras[k].trigger_delay_us * 1e3));
+}
+
 Vec3 vec3(const std::array<double, 3>& v) { return {v[0], v[1], v[2]}; }
 
 }  // namespace
@@ -54,18 +59,17 @@ void check_drive(const Configuration& c) {
     if (camera.width != c.cameras[0].width || camera.height != c.cameras[0].height)
       throw InputError(fmt::format("cameras.{}.size is {} x {}, that of camera 0 is {} x {}; all cameras of a rig have one size", k,
                                    camera.width, camera.height, c.cameras[0].width, c.cameras[0].height));
-    if (camera.exposure_us * 1e-6 * c.trigger.rate > 1)
-      throw InputError(fmt::format("cameras.{}.exposure_us is {}, longer than the {:.0f} µs between two pulses (trigger.rate {})", k,
-                                   camera.exposure_us, 1e6 / c.trigger.rate, c.trigger.rate));
   }
   one_of("ins.driver", c.ins.driver, {"mock", "none"});
   one_of("trigger.driver", c.trigger.driver, {"mock"});
-  one_of("sync.mode", c.sync.mode, {"counter"});
+  (void)sync_options(c, n);
+  (void)trigger_configuration(c, n);
   one_of("mock.world", c.mock.world, {"suburb"});
   one_of("mock.drive", c.mock.drive, {"loop", "figure-eight", "straight", "brief", "still"});
   one_of("mock.pattern", c.mock.pattern, {"grey", "gbrg"});
   one_of("mock.ins", c.mock.ins, {"noisy", "ideal"});
   one_of("mock.ins_line", c.mock.ins_line, {"none", "mti-g", "mti-g-710"});
+  one_of("mock.board_line", c.mock.board_line, {"none", "usb", "ftdi"});
 }
 
 MockDrive make_mock_drive(const Configuration& c, const std::vector<std::string>& more_faults, bool real_time,
@@ -99,6 +103,8 @@ MockDrive make_mock_drive(const Configuration& c, const std::vector<std::string>
     o.blur_samples = c.mock.blur_samples;
     o.ideal_ins = c.mock.ins == "ideal";
     o.clock_drift_ppm = c.mock.clock_drift_ppm;
+    o.reports_taken = true;
+    for (std::size_t k = 0; k < static_cast<std::size_t>(rig.cameras); ++k) o.trigger_delay[k] = trigger_delay(c, k);
     o.exposures_follow = exposes_by_itself(c);
     if (duration_s) o.duration = Duration::seconds(*duration_s);
     drive.rig = std::make_unique<mock::MockRig>(std::move(truth), o);
@@ -111,10 +117,7 @@ MockDrive make_mock_drive(const Configuration& c, const std::vector<std::string>
     const CameraConfiguration wanted{camera.width, camera.height, c.trigger.rate, start.exposure, start.gain_db, CameraTrigger::hardware};
     configured(drive.rig->camera(k).configure(wanted, nullptr), fmt::format("cameras.{}", k));
   }
-  TriggerConfiguration pulses;
-  pulses.rate_hz = c.trigger.rate;
-  pulses.lines = static_cast<std::uint8_t>((1U << static_cast<unsigned>(rig.cameras)) - 1U);
-  configured(drive.rig->trigger().configure(pulses, nullptr), "trigger");
+  configured(drive.rig->trigger().configure(trigger_configuration(c, rig.cameras), nullptr), "trigger");
   drive.has_ins = c.ins.driver == "mock";
   if (drive.has_ins) configured(drive.rig->ins().configure(c.ins.rate, nullptr), "ins");
   return drive;
@@ -140,7 +143,7 @@ ComparisonOptions comparison_options(const Configuration& c) {
 std::vector<StampedPose> true_trajectory(const mock::MockRig& rig, const Configuration& c, Stamp start) {
   std::vector<StampedPose> poses;
   for (const Duration pulse : rig.pulse_times()) {
-    const Duration middle = pulse + Duration::seconds(c.cameras[0].exposure_us * 0.5e-6);
+    const Duration middle = pulse + trigger_delay(c, 0) + Duration::seconds(c.cameras[0].exposure_us * 0.5e-6);
     poses.push_back({start + middle, rig.truth().camera_in_enu(0, middle)});
   }
   return poses;

@@ -22,6 +22,8 @@
 #include "app/commands/camera_masks.hpp"
 #include "app/commands/drive_devices.hpp"
 #include "app/commands/drive_journal.hpp"
+#include "app/commands/drive_sync.hpp"
+#include "app/commands/drive_time.hpp"
 #include "app/commands/exposure_settings.hpp"
 #include "app/commands/session_files.hpp"
 #include "app/datasets/decimal.hpp"
@@ -62,6 +64,7 @@ class Drive {
   void begin();
   void estimate() noexcept;
   void handle_images(const LiveItem& item) noexcept;
+  void tell(Stamp stamp, const DriveTime::Sentence& sentence) noexcept;
   void drain_comparison() noexcept;
   void note_placement(Stamp stamp) noexcept;
   void note_ins(const ComparedPose& pose) noexcept;
@@ -98,6 +101,7 @@ class Drive {
 
   // Of the estimator's thread; read by others after it has joined.
   DriveJournal journal_;
+  DriveTime time_;
   std::uint64_t ins_matches_ = 0, jumps_ = 0, scale_disagreements_ = 0;
   bool scale_disagrees_ = false;
   std::uint32_t placement_revision_ = 0;
@@ -125,10 +129,13 @@ Drive::Drive(const RunRequest& request)
       runner_(make_runner(request.configuration.threads)),
       estimator_(std::make_unique<Estimator>(options_, begin_.file.rig, begin_.nominal, arena_, *runner_, solver_)),
       comparison_(std::make_unique<Comparison>(comparison_options_, arena_)),
+      time_(devices_.sync().mode, request.fast),
       fault_told_(devices_.faults().size(), false) {
   LiveSource::Options o;
   o.sync = devices_.sync();
   o.wait_when_full = request.fast;
+  o.board_keeps_own_time = devices_.board_keeps_own_time();
+  o.sync_out_marked = devices_.sync_out_marked();
   o.stamp_grid = stamp_grid(configuration_);
   o.tie_stamp = request.fast ? kVirtualEpoch : Stamp(clock_ns(CLOCK_REALTIME));
   o.tie_host = request.fast ? devices_.start() : HostStamp(clock_ns(CLOCK_MONOTONIC));
@@ -154,17 +161,10 @@ void Drive::estimate() noexcept {
       case LiveItem::Kind::reading:
         comparison_->add(item.sample);
         note_jump(item.stamp);
+        tell(item.stamp, time_.of_reading(item));
         break;
-      case LiveItem::Kind::device_gone:
-      case LiveItem::Kind::device_back: {
-        const bool gone = item.kind == LiveItem::Kind::device_gone;
-        std::array<char, 96> text{};
-        (void)std::snprintf(text.data(), text.size(), gone ? "camera %d is gone; the drive goes on without it" : "camera %d is back",
-                            item.camera);
-        journal_.tell(item.stamp, gone ? "camera_gone" : "camera_back", text.data(), true);
-        break;
-      }
-      case LiveItem::Kind::refused:
+      default:
+        tell(item.stamp, time_.of_device(item));
         break;
     }
     drain_comparison();
@@ -180,6 +180,10 @@ void Drive::estimate() noexcept {
   changed_.notify_one();
 }
 
+void Drive::tell(Stamp stamp, const DriveTime::Sentence& sentence) noexcept {
+  if (sentence.kind != nullptr) journal_.tell(stamp, sentence.kind, sentence.text.data(), sentence.aloud);
+}
+
 void Drive::handle_images(const LiveItem& item) noexcept {
   RigFrame frame;
   frame.number = item.set.number;
@@ -187,13 +191,23 @@ void Drive::handle_images(const LiveItem& item) noexcept {
   frame.stamp_error = item.set.error;
   frame.spread = item.set.spread;
   frame.cameras = begin_.file.rig.cameras;
-  for (int k = 0; k < frame.cameras; ++k) frame.images[static_cast<std::size_t>(k)] = source_->image(item.set, k);
+  tell(item.stamp, time_.of_set(item.set));
+  const bool contradicted = time_.contradicted(item.set);
+  for (int k = 0, used = 0; k < frame.cameras && !(contradicted && used > 0); ++k) {
+    frame.images[static_cast<std::size_t>(k)] = source_->image(item.set, k);
+    used += item.set.present[static_cast<std::size_t>(k)] ? 1 : 0;
+  }
   note_faults(item.stamp);
   if (calibration_asked_.exchange(false, std::memory_order_relaxed)) {
     estimator_->request_recalibration();
     journal_.tell(item.stamp, "recalibration_requested", "a new calibration was asked for by SIGUSR1", true);
   }
-  const PoseSample sample = estimator_->process(frame);
+  PoseSample sample = estimator_->process(frame);
+  if (contradicted && sample.status != PoseStatus::lost) {
+    sample.status = PoseStatus::degraded;
+    sample.reason = Reason::unproven_pairing;
+  }
+  time_.note_pose(item.set, sample.estimate_ms, request_.fast ? HostStamp{} : HostStamp(clock_ns(CLOCK_MONOTONIC)));
   source_->release(item.set);
   journal_.note(*estimator_);
   journal_.note(sample);
@@ -390,6 +404,7 @@ SummaryInput Drive::summary_input(const SessionTotals& totals, std::uint64_t all
                         {"pushed_out", k.pushed_out},
                         {"placements", comparison_->placement().revision},
                         {"scale_disagrees", scale_disagreements_}};
+  input.time = time_.figures(c, devices_);
   if (devices_.mock() != nullptr) input.truth = truth_figures(totals);
   return input;
 }
@@ -446,6 +461,9 @@ ExitCode Drive::run() {
     progress.say("vergence: " + remark);
     journal_.tell(start_, "device", remark, false);
   }
+  const SyncMode mode = devices_.sync().mode;
+  journal_.tell(start_, "pairing", proof_sentence(mode), false);
+  if (mode == SyncMode::software) progress.say(std::string("vergence: ") + proof_sentence(mode) + "; poses in motion suffer from it");
   begin();
   if (devices_.mock() != nullptr) write_truth(&faults);
   std::thread estimating([this] { estimate(); });

@@ -32,6 +32,8 @@ struct CameraSettings {
   std::string pixel_format{}, trigger = "hardware";
   std::string options{};  // `NAME=VALUE …`, of the kind of camera
   double exposure_us = 8000;
+  double trigger_delay_us = 0;  // from the pulse's edge to the exposure's start
+  double stamp_jitter_us = 0;   // 0: what the driver's kind of stamp has
   double gain_db = 0;
   std::string mask{};                      // file; empty: none
   std::array<double, 4> intrinsics{};      // fx fy cx cy, px; fx 0: those of rig.nominal, distortion included
@@ -62,7 +64,13 @@ struct InsSettings {
 
 struct TriggerSettings {
   std::string driver = "none";
-  double rate = 20;  // Hz
+  std::string port{};  // empty: the only board there is
+  int baud = 0;        // 0: found by asking
+  double rate = 20;    // Hz
+  double width_us = 200, vary_us = 0;
+  int lines = 0;  // masks, bit k for line k; 0: one line for each camera
+  int active_low = 0, feedback = 0, feedback_active_low = 0;
+  std::string pps = "none", ins = "none";  // edge of an input: none, rising, falling
 };
 
 struct SyncSettings {
@@ -97,6 +105,9 @@ struct MockSettings {
   std::string world = "suburb", drive = "loop", pattern = "grey", ins = "noisy", ins_line = "none";
   int ins_latency_timer_ms = 16;  // 0: no converter
   double ins_late_percent = 1, ins_late_ms = 4;
+  std::string board_line = "none";
+  int board_latency_timer_ms = 0;  // 0: the board's own USB
+  double board_late_percent = 1, board_late_ms = 2;
   std::int64_t seed = 1;
   int texture_detail = 1;
   int noise = 1;

@@ -153,6 +153,13 @@ Group cameras() {
             .text("options", &C::options, 400,
                   "What only this kind of camera has (docs/cameras): `NAME=VALUE …`, or a group: `{packet_size: 9000}`.")
             .number("exposure_us", &C::exposure_us, 10, 1e6, "µs", "Time of an exposure; 8000 is daylight in the mock's world.")
+            .number(
+                "trigger_delay_us", &C::trigger_delay_us, 0, 20000, "µs",
+                "From a pulse's edge to the start of the exposure: of the input (10 to 100 µs if it is opto-coupled) and of the camera. "
+                "It goes into every stamp, unless `trigger.feedback` measures it.")
+            .number("stamp_jitter_us", &C::stamp_jitter_us, 0, 5000, "µs",
+                    "By how much its stamps may be off the pulses; 0: what this driver's stamps have (20, of a camera that only the host "
+                    "stamps 1000). With more than half of `trigger.vary_us` only a pause proves the pairing.")
             .number("gain_db", &C::gain_db, 0, 40, "dB", "Gain of the sensor's amplifier.")
             .text("mask", &C::mask, 400,
                   "PNG or PGM of the image's size, 0 where nothing is to be looked for: the vehicle itself, dirt. A relative path begins "
@@ -229,8 +236,26 @@ Group trigger() {
   using T = TriggerSettings;
   return Rows<T>(
              "trigger", "What makes the cameras expose together.", [](auto& c) -> auto& { return c.trigger; })
-      .text("driver", &T::driver, 16, "What talks to the trigger board: `mock`, or `none`.")
+      .text("driver", &T::driver, 16,
+            "What makes the pulses: `board`, a trigger board on a serial port (docs/trigger_board.md); `mock`, with mock cameras; `none`: "
+            "something that reports nothing, or nothing at all.")
+      .text("port", &T::port, 200, "Serial port of the board, `/dev/ttyACM0`, or its serial number. Empty: the only board there is.")
+      .integer("baud", &T::baud, 0, 3000000, "baud", "Rate of that line where it has one; 0: found by asking.")
       .number("rate", &T::rate, 1, 200, "Hz", "Pulses, and so images of every camera, a second.")
+      .number("width_us", &T::width_us, 1, 100000, "µs", "Length of a pulse; what the cameras' inputs need.")
+      .number(
+          "vary_us", &T::vary_us, 0, 20000, "µs",
+          "Every interval is longer or shorter by this, in an order that does not repeat: the cameras' own stamps then prove at any time "
+          "which frame is of which pulse. 0: even intervals, a pause proves it.")
+      .integer("lines", &T::lines, 0, 15, "",
+               "Outputs that are pulsed, a mask: bit k is line k, wired to camera k. 0: one for each camera.")
+      .integer("active_low", &T::active_low, 0, 15, "", "Of these, the ones whose pulse is low: a mask.")
+      .integer(
+          "feedback", &T::feedback, 0, 15, "",
+          "Inputs that the cameras' exposure-active outputs are wired to, a mask: stamps are then the measured middle of the exposure.")
+      .integer("feedback_active_low", &T::feedback_active_low, 0, 15, "", "Of these, the ones that are low while a camera exposes.")
+      .text("pps", &T::pps, 8, "Edge of the GNSS receiver's pulse per second at the board: `none` is wired, `rising` or `falling`.")
+      .text("ins", &T::ins, 8, "Edge of the INS's SyncOut at the board: `none` is wired, `rising` or `falling`.")
       .done();
 }
 
@@ -238,11 +263,15 @@ Group sync() {
   using S = SyncSettings;
   return Rows<S>(
              "sync", "How images are paired.", [](auto& c) -> auto& { return c.sync; })
-      .text("mode", &S::mode, 16,
-            "By what images are paired: `counter`, exposure n of every camera belongs together; `software`, what was exposed within "
-            "`tolerance_ms`, for cameras that nothing triggers.")
+      .text(
+          "mode", &S::mode, 16,
+          "By what images are paired, and what proves it (docs/time.md). Proven: `board`, by a trigger board's pulses; `ins_syncout`, by "
+          "the INS's; `master_strobe`, camera 0 triggers the others; `bus`, stamps of one IEEE 1394 cycle timer; `ptp`, stamps of one PTP "
+          "clock. Not proven: `counter`, exposure n of every camera belongs together; `software`, what was exposed within "
+          "`tolerance_ms` by the host's clock, for cameras that nothing triggers.")
       .number("hold_ms", &S::hold_ms, 1, 10000, "ms", "How long the images of a pulse wait for one that is late.")
-      .number("tolerance_ms", &S::tolerance_ms, 0.01, 1000, "ms", "With `software`: the farthest that exposures of one set are apart.")
+      .number("tolerance_ms", &S::tolerance_ms, 0.01, 1000, "ms",
+              "With `software`, `bus` and `ptp`: the farthest that exposures of one set are apart.")
       .done();
 }
 
@@ -304,6 +333,13 @@ Group mock() {
                "Latency timer of that line's USB converter; 0: there is none.")
       .number("ins_late_percent", &M::ins_late_percent, 0, 100, "%", "Of its reads: they come late …")
       .number("ins_late_ms", &M::ins_late_ms, 0, 1000, "ms", "… by an exponential time of this mean.")
+      .text(
+          "board_line", &M::board_line, 8,
+          "With `--fast`: the trigger board as bytes on a simulated line, read by the real driver, its pulses trigger the cameras: `usb`, "
+          "or `ftdi` at 921600 baud; `none`.")
+      .integer("board_latency_timer_ms", &M::board_latency_timer_ms, 0, 255, "ms", "Latency timer of that line's USB converter.")
+      .number("board_late_percent", &M::board_late_percent, 0, 100, "%", "Of its reads: they come late …")
+      .number("board_late_ms", &M::board_late_ms, 0, 1000, "ms", "… by an exponential time of this mean.")
       .integer("texture_detail", &M::texture_detail, 0, 2, "", "Resolution of the facades: 4.7, 2.3 or 1.2 cm a texel (8, 32, 128 MB).")
       .integer("noise", &M::noise, 0, 1, "", "1: shot and read noise of the sensors; 0: none.")
       .integer("blur_samples", &M::blur_samples, 1, 16, "", "Poses averaged over an exposure: 1 is no motion blur; time grows with it.")
@@ -440,9 +476,8 @@ Group monitor() {
 }  // namespace
 
 const std::vector<Group>& schema() {
-  static const std::vector<Group> groups{
-      general(), rig(),        cameras(), exposure(), ins(), trigger(), sync(), odometry(), calibration_options(),
-      monitor(), comparison(), mock(),    faults()};
+  static const std::vector<Group> groups{general(), rig(),        cameras(), exposure(), ins(),   trigger(), sync(), odometry(), calibration_options(),
+                                         monitor(), comparison(), mock(),    faults()};
   return groups;
 }
 

@@ -21,6 +21,14 @@ class TimeHistogram {
     ++bins_[std::min(static_cast<std::size_t>(place), kBins - 1)];
   }
   [[nodiscard]] std::uint64_t count() const noexcept { return count_; }
+  /// How many were shorter than that, to the bin that it falls in.
+  [[nodiscard]] std::uint64_t below(double ms) const noexcept {
+    if (!(ms > kLeast)) return 0;
+    const auto end = std::min(static_cast<std::size_t>(std::log(ms / kLeast) / kLogStep + 0.5), kBins);
+    std::uint64_t seen = 0;
+    for (std::size_t i = 0; i < end; ++i) seen += bins_[i];
+    return seen;
+  }
   /// ms; 0 without a time.
   [[nodiscard]] double mean() const noexcept { return count_ == 0 ? 0 : sum_ / static_cast<double>(count_); }
   [[nodiscard]] double max() const noexcept { return max_; }

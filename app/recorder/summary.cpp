@@ -240,6 +240,7 @@ Json summary_json(const SessionTotals& totals, const SummaryInput& input) {
                    {"recorder_high_water", totals.ring_high_water}};
   json["devices"] = counters_json(input.devices);
   json["comparison"] = counters_json(input.comparison);
+  json["time"] = input.time ? time_json(*input.time) : Json();
   json["truth"] = truth_json(input.truth, input);
   json["version"] = std::string(version());
   json["configuration_hash"] = input.configuration_hash;

@@ -10,6 +10,7 @@
 #include <nlohmann/json_fwd.hpp>
 
 #include "app/recorder/recorder.hpp"
+#include "app/recorder/time_figures.hpp"
 #include "core/calibration/options.hpp"
 #include "core/comparison/trajectory_metrics.hpp"
 #include "core/types/calibration.hpp"
@@ -39,6 +40,7 @@ struct SummaryInput {
   std::vector<std::pair<std::string, std::uint64_t>> devices{};     // counters of the devices and of the pairing; none in a replay
   std::vector<std::pair<std::string, std::uint64_t>> comparison{};  // counters of the comparison with an INS
   std::optional<TruthFigures> truth{};
+  std::optional<TimeFigures> time{};  // none in a replay
 };
 
 /// What the metrics of summary.json are computed with: segments of 100–800 m (step 10), 10–50 m (step 1), and these once more after one

@@ -47,6 +47,8 @@ constexpr std::array kAdvice{
     Advice{"needs_motion", "The calibration could not be found standing still: drive some metres past things at the roadside."},
     Advice{"needs_near_structure", "The calibration could not be found with far things only: drive past houses, cars or trees."},
     Advice{"needs_texture", "The calibration could not be found for want of matches between the cameras: check lenses and exposure."},
+    Advice{"unproven_pairing",
+           "Pulses, counters and stamps contradicted each other: check trigger lines, exposure and the board; see the events."},
 };
 
 /// Collects reasons; the grade is that of the worst.

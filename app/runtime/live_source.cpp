@@ -37,6 +37,8 @@ LiveSource::LiveSource(std::vector<CameraDevice*> cameras, InsDevice* ins, Trigg
     : cameras_(std::move(cameras)), ins_(ins), trigger_(trigger), options_(options), sync_(options.sync), heads_(cameras_.size()) {
   for (const CameraDevice* camera : cameras_) clocks_.emplace_back(clock_options(camera->timing()));
   if (ins_ != nullptr) ins_clock_ = std::make_unique<ClockMapper>(clock_options(ins_->timing()));
+  if (trigger_ != nullptr) board_clock_ = std::make_unique<ClockMapper>(clock_options(trigger_->timing()));
+  if (options.sync.mode == SyncMode::ins_syncout) sync_out_.emplace(options.sync.interval, options.sync_out_marked);
 }
 
 LiveSource::~LiveSource() {
@@ -45,12 +47,15 @@ LiveSource::~LiveSource() {
 }
 
 void LiveSource::start() {
-  for (CameraDevice* camera : cameras_) {
-    const DeviceStatus status = camera->start(this);
-    check(status, camera->info(), camera->complaint());
-  }
-  if (ins_ != nullptr) check(ins_->start(this), ins_->info(), {});
-  if (trigger_ != nullptr) check(trigger_->start(this), trigger_->info(), {});
+  const auto start_camera = [this](std::size_t k) {
+    const DeviceStatus status = cameras_[k]->start(this);
+    check(status, cameras_[k]->info(), cameras_[k]->complaint());
+  };
+  const bool master = options_.sync.mode == SyncMode::master_strobe;
+  for (std::size_t k = master ? 1 : 0; k < cameras_.size(); ++k) start_camera(k);
+  if (ins_ != nullptr) check(ins_->start(this), ins_->info(), ins_->complaint());
+  if (trigger_ != nullptr) check(trigger_->start(this), trigger_->info(), trigger_->complaint());
+  if (master) start_camera(0);
   thread_ = std::thread([this] { work(); });
 }
 
@@ -67,9 +72,11 @@ void LiveSource::join() noexcept {
   if (ins_ != nullptr) ins_->stop();
   if (trigger_ != nullptr) trigger_->stop();
   counters_.sync = sync_.counters();
+  for (std::size_t k = 0; k < cameras_.size(); ++k) counters_.proven[k] = sync_.proven(static_cast<int>(k));
   counters_.dropped_sets = skipped_.load();
   counters_.clock_resets = ins_clock_ ? ins_clock_->resets() : 0;
   for (const ClockMapper& clock : clocks_) counters_.clock_resets += clock.resets();
+  if (board_clock_) counters_.clock_resets += board_clock_->resets();
 }
 
 bool LiveSource::next(LiveItem* item) noexcept {
@@ -106,20 +113,22 @@ Stamp LiveSource::stamp_of(HostStamp host) const noexcept {
 
 void LiveSource::work() {
   (void)pthread_setname_np(pthread_self(), "vergence-sync");
-  for (Pulse pulse; !stop_.load(std::memory_order_acquire);) {
+  while (!stop_.load(std::memory_order_acquire)) {
     const Doorbell::Rung seen = bell_.look();
-    while (trigger_ != nullptr && trigger_->wait(Duration{}, &pulse) == DeviceStatus::ok) ++counters_.pulses;
     // Twice: whatever arrived before an item of the first look is there at the second.
     for (int pass = 0; pass < 2; ++pass) {
       for (std::size_t k = 0; k < cameras_.size(); ++k) look(k);
       look_ins();
+      look_board();
     }
     const int device = earliest();
     if (device >= 0) {
       if (static_cast<std::size_t>(device) < cameras_.size())
         take_frame(static_cast<std::size_t>(device));
-      else
+      else if (device == ins_place())
         take_reading();
+      else
+        take_board();
       hand_out_sets();
       continue;
     }
@@ -172,6 +181,7 @@ void LiveSource::look_ins() {
     if (status != DeviceStatus::ok) return;
     ins_head_.gone = false;
     ins_clock_->restart();
+    if (sync_out_) sync_out_->restart();
   }
   DeviceStatus status = DeviceStatus::timeout;
   do {
@@ -183,6 +193,35 @@ void LiveSource::look_ins() {
   ins_head_.ended = status == DeviceStatus::ended || status == DeviceStatus::stopped;
 }
 
+void LiveSource::look_board() {
+  auto& head = board_head_;
+  if (trigger_ == nullptr) head.ended = true;
+  if (head.held || head.ended) return;
+  const bool own_time = options_.board_keeps_own_time;
+  if (head.gone) {
+    const std::int64_t now = steady_ns();
+    if (!options_.wait_when_full && now - head.asked_ns < kAskAgain) return;
+    head.asked_ns = now;
+    DeviceStatus status = trigger_->start(this);
+    while (status == DeviceStatus::gone && own_time && !stop_.load(std::memory_order_acquire)) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(1));
+      status = trigger_->start(this);
+    }
+    if (status == DeviceStatus::ended) head.ended = true;
+    if (status != DeviceStatus::ok) return;
+    head.gone = false;
+    head.back = true;
+  }
+  DeviceStatus status = DeviceStatus::timeout;
+  do {
+    constexpr Duration kLook = Duration::milliseconds(100);
+    status = trigger_->wait(own_time ? kLook : Duration{}, &head.value);
+  } while (status == DeviceStatus::timeout && own_time && !stop_.load(std::memory_order_acquire));
+  head.event = status == DeviceStatus::gone;
+  head.held = status == DeviceStatus::ok || head.event;
+  head.ended = status == DeviceStatus::ended || status == DeviceStatus::stopped;
+}
+
 int LiveSource::earliest() const {
   int device = -1;
   HostStamp first{};
@@ -191,12 +230,17 @@ int LiveSource::earliest() const {
       device = static_cast<int>(k);
       first = heads_[k].value.arrival;
     }
-  // An INS in a time of its own may be ahead of the cameras: until one of them has something, an earlier image may still come.
-  if (device < 0 && ins_ != nullptr && ins_->keeps_own_time() &&
-      std::any_of(heads_.begin(), heads_.end(), [](const auto& h) { return !h.ended && !h.gone; }))
-    return -1;
-  // At the same instant the INS goes first: the images may need it.
-  if (ins_head_.held && (device < 0 || ins_head_.value.arrival <= first)) device = static_cast<int>(heads_.size());
+  // What keeps a time of its own may be ahead of the cameras: until one of them has something, an earlier image may still come.
+  const bool images_may_come = device < 0 && std::any_of(heads_.begin(), heads_.end(), [](const auto& h) { return !h.ended && !h.gone; });
+  const bool any_camera = device >= 0;
+  // At the same instant pulses and then the INS go first: the images may need them.
+  const bool ins_waits = images_may_come && ins_ != nullptr && ins_->keeps_own_time();
+  if (ins_head_.held && !ins_waits && (!any_camera || ins_head_.value.arrival <= first)) {
+    device = ins_place();
+    first = ins_head_.value.arrival;
+  }
+  const bool board_waits = images_may_come && options_.board_keeps_own_time;
+  if (board_head_.held && !board_waits && (device < 0 || board_head_.value.arrival <= first)) device = ins_place() + 1;
   return device;
 }
 
@@ -216,6 +260,7 @@ void LiveSource::take_frame(std::size_t k) {
   if (head.back) {
     head.back = false;
     clocks_[k].restart();
+    proofs_[k] = {true, head.value.arrival};
     sync_.restarted(item.camera);
     item.kind = LiveItem::Kind::device_back;
     push(item);
@@ -230,12 +275,18 @@ void LiveSource::take_frame(std::size_t k) {
   const Duration longer = frame.exposure - exposures_[k];
   in.middle = clocks_[k].map(frame.exposure_start + longer, frame.arrival);
   in.middle.host = in.middle.host - longer;
+  counters_.cameras[k].note(frame.exposure_start, in.middle);
   in.middle.host = in.middle.host + frame.exposure / 2;
   in.arrival = frame.arrival;
+  in.exposure_start = frame.exposure_start;
+  in.exposure = frame.exposure;
   const bool torn = frame.status != FrameStatus::complete;
   counters_.torn += torn ? 1 : 0;
   if (torn) sync_.lost(in.camera, in.counter);
-  if (!torn && sync_.offer(in) == SyncVerdict::taken) return;
+  const bool taken = !torn && sync_.offer(in) == SyncVerdict::taken;
+  note_proofs(frame.arrival);
+  if (options_.sync.mode == SyncMode::master_strobe && k == 0) pause_pulses();
+  if (taken) return;
   item.kind = LiveItem::Kind::refused;
   item.set.present[k] = true;
   item.set.slots[k] = frame.slot;
@@ -251,7 +302,102 @@ void LiveSource::take_reading() {
   const MappedStamp at = r.mapped ? MappedStamp{r.host, r.host_error} : ins_clock_->map(r.measured, r.arrival);
   item.stamp = item.sample.stamp = stamp_of(at.host);
   item.sample.stamp_error = at.error;
+  item.quality = r.quality;
+  counters_.ins.note(r.measured, at);
   push(item);
+  if (!sync_out_) return;
+  if (const auto pulse = sync_out_->take(r, at)) {
+    take_pulse(*pulse);
+    pause_pulses();
+  }
+}
+
+void LiveSource::take_board() {
+  auto& head = board_head_;
+  head.held = false;
+  LiveItem item;
+  item.stamp = stamp_of(head.value.arrival);
+  if (head.event) {
+    head.gone = true;
+    item.kind = LiveItem::Kind::board_gone;
+    push(item);
+    return;
+  }
+  if (head.back) {
+    head.back = false;
+    item.kind = LiveItem::Kind::board_back;
+    push(item);
+  }
+  take_pulse(head.value);
+  if (options_.sync.mode == SyncMode::board) pause_pulses();
+}
+
+void LiveSource::take_pulse(const Pulse& reported) {
+  Pulse pulse = reported;
+  const bool rebooted = any_pulse_ && pulse.boot != boot_;
+  if (rebooted && !sync_out_) {
+    ++counters_.reboots;
+    LiveItem item;
+    item.kind = LiveItem::Kind::board_rebooted;
+    item.stamp = stamp_of(pulse.arrival);
+    push(item);
+  }
+  any_pulse_ = true;
+  boot_ = pulse.boot;
+  ++counters_.pulses;
+  if (!pulse.mapped) {
+    if (rebooted) board_clock_->restart();
+    const MappedStamp at = board_clock_->map(pulse.edge, pulse.arrival);
+    pulse.mapped = true;
+    pulse.host = at.host;
+    pulse.host_error = at.error;
+  }
+  if (!sync_out_) counters_.board.note(pulse.edge, {pulse.host, pulse.host_error});
+  if (!wants_pulses(options_.sync.mode)) return;
+  sync_.pulse(pulse);
+  note_proofs(pulse.arrival);
+}
+
+void LiveSource::pause_pulses() {
+  const std::uint32_t pulses = sync_.wants_pause();
+  if (pulses == 0) return;
+  ++counters_.pauses;
+  if (options_.sync.mode == SyncMode::board) {
+    if (trigger_->pause(pulses) != DeviceStatus::ok) ++counters_.pauses_refused;
+    return;
+  }
+  // No other way than to stop who makes the pulses; meanwhile nothing else comes that could not wait.
+  const bool master = options_.sync.mode == SyncMode::master_strobe;
+  if (master)
+    cameras_[0]->stop();
+  else
+    ins_->stop();
+  std::this_thread::sleep_for(std::chrono::nanoseconds((options_.sync.interval * (static_cast<std::int64_t>(pulses) + 1)).ns()));
+  const DeviceStatus status = master ? cameras_[0]->start(this) : ins_->start(this);
+  if (status != DeviceStatus::ok) ++counters_.pauses_refused;
+  if (master) {
+    sync_.restarted(0);
+    if (status != DeviceStatus::ok) heads_[0].gone = true;
+  } else {
+    ins_clock_->restart();
+    sync_out_->restart();
+    if (status != DeviceStatus::ok) ins_head_.gone = true;
+  }
+}
+
+void LiveSource::note_proofs(HostStamp now) {
+  for (std::size_t k = 0; k < cameras_.size(); ++k) {
+    Proof& proof = proofs_[k];
+    const bool proven = sync_.proven(static_cast<int>(k));
+    if (proven == proof.proven || heads_[k].gone) continue;
+    LiveItem item;
+    item.kind = proven ? LiveItem::Kind::proven : LiveItem::Kind::acquiring;
+    item.camera = static_cast<int>(k);
+    item.stamp = stamp_of(now);
+    item.seconds = proven ? (now - proof.since).to_seconds() : 0;
+    proof = {proven, now};
+    push(item);
+  }
 }
 
 void LiveSource::hand_out_sets() {

@@ -26,7 +26,7 @@ std::string_view to_string(PoseStatus s) noexcept {
 }
 
 std::string_view to_string(Reason r) noexcept {
-  static constexpr std::array<std::string_view, 21> names = {"",
+  static constexpr std::array<std::string_view, 22> names = {"",
                                                              "no_image",
                                                              "image_dark",
                                                              "image_repeated",
@@ -46,7 +46,8 @@ std::string_view to_string(Reason r) noexcept {
                                                              "out_of_step",
                                                              "needs_motion",
                                                              "needs_near_structure",
-                                                             "needs_texture"};
+                                                             "needs_texture",
+                                                             "unproven_pairing"};
   return name(names, r);
 }
 

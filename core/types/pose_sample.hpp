@@ -41,6 +41,7 @@ enum class Reason : std::uint8_t {
   needs_motion,          // the calibration has to be found and cannot be without driving
   needs_near_structure,  // the same, without points near the rig
   needs_texture,         // the same, without anything to match across
+  unproven_pairing,      // what proves that its images were exposed together has contradicted: one of them alone was used
 };
 
 [[nodiscard]] std::string_view to_string(State) noexcept;

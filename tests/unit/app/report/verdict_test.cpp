@@ -87,7 +87,7 @@ TEST(Verdict, theWorstReasonComesFirst) {
 }
 
 TEST(Verdict, everyReasonOfAPoseHasItsAdvice) {
-  for (int i = 1; i <= static_cast<int>(Reason::needs_texture); ++i) {
+  for (int i = 1; i <= static_cast<int>(Reason::unproven_pairing); ++i) {
     Case c;
     c.session.reasons.emplace_back(to_string(static_cast<Reason>(i)));
     c.analysis.by_reason = {0, 3};

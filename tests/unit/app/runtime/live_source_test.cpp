@@ -2,7 +2,11 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <array>
+#include <map>
 #include <memory>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -14,9 +18,46 @@ namespace {
 
 constexpr Stamp kStart{1'577'836'800'000'000'000};
 
+/// What a camera hands out, with the true pulse of every slot beside it: the mock's arrivals tell, within its jitter.
+class WatchedCamera final : public CameraDevice {
+ public:
+  explicit WatchedCamera(CameraDevice* camera) : camera_(camera) {}
+  const DeviceInfo& info() const noexcept override { return camera_->info(); }
+  DeviceStatus configure(const CameraConfiguration& c, CameraConfiguration* actual) noexcept override {
+    return camera_->configure(c, actual);
+  }
+  DeviceTiming timing() const noexcept override { return camera_->timing(); }
+  DeviceStatus start(Notifier* ready) noexcept override { return camera_->start(ready); }
+  DeviceStatus wait(Duration limit, Frame* frame) noexcept override {
+    const DeviceStatus status = camera_->wait(limit, frame);
+    if (status == DeviceStatus::ok) edge_of_slot[frame->slot] = frame->arrival - camera_->timing().least_delay;
+    return status;
+  }
+  ImageView view(FrameSlot slot) const noexcept override { return camera_->view(slot); }
+  void release(FrameSlot slot) noexcept override { camera_->release(slot); }
+  void stop() noexcept override { camera_->stop(); }
+  CameraStatistics statistics() const noexcept override { return camera_->statistics(); }
+
+  std::array<HostStamp, 64> edge_of_slot{};  // not before the true edge, and at most 1.9 ms after it
+
+ private:
+  CameraDevice* camera_;
+};
+
+struct BenchOptions {
+  bool real_time = false;
+  Duration grid = Duration::nanoseconds(1);
+  SyncMode mode = SyncMode::counter;
+  Duration vary{};
+  std::uint8_t feedback = 0;
+  double seconds = 4;
+};
+
 /// A mock rig with tiny pictures in an almost empty town, and the source on top of it.
 struct Bench {
-  explicit Bench(const std::vector<std::string>& faults, bool real_time = false, Duration grid = Duration::nanoseconds(1)) {
+  explicit Bench(const std::vector<std::string>& faults, const BenchOptions& b = {}) {
+    const bool real_time = b.real_time;
+    const Duration grid = b.grid;
     mock::WorldOptions town;
     town.texture_detail = 0;
     town.built_fraction = town.tree_fraction = town.car_fraction = 0;
@@ -36,8 +77,9 @@ struct Bench {
     mock::DriveOptions drive;
     drive.kind = mock::DriveKind::brief;
     mock::MockRigOptions o;
-    o.duration = Duration::seconds(4);
+    o.duration = Duration::seconds(b.seconds);
     o.real_time = real_time;
+    o.reports_taken = true;
     rig = std::make_unique<mock::MockRig>(
         std::make_shared<const mock::RigTruth>(std::make_shared<const mock::World>(town), drive, calibration, mock::default_T_body_left(),
                                                Transform{}, parsed),
@@ -45,32 +87,54 @@ struct Bench {
     for (int k = 0; k < 2; ++k)
       EXPECT_EQ(rig->camera(k).configure({64, 48, 20, Duration::milliseconds(8), 0, CameraTrigger::hardware}, nullptr), DeviceStatus::ok);
     EXPECT_EQ(rig->ins().configure(120, nullptr), DeviceStatus::ok);
-    EXPECT_EQ(rig->trigger().configure({20}, nullptr), DeviceStatus::ok);
+    TriggerConfiguration pulses;
+    pulses.rate_hz = 20;
+    pulses.vary = b.vary;
+    pulses.feedback = b.feedback;
+    EXPECT_EQ(rig->trigger().configure(pulses, nullptr), DeviceStatus::ok);
     LiveSource::Options options;
     options.sync.interval = Duration::milliseconds(50);
+    options.sync.mode = b.mode;
     options.wait_when_full = !real_time;
     options.tie_stamp = kStart;
     options.tie_host = rig->start();
     options.stamp_grid = grid;
+    for (int k = 0; k < 2; ++k) watched.push_back(std::make_unique<WatchedCamera>(&rig->camera(k)));
     source =
-        std::make_unique<LiveSource>(std::vector<CameraDevice*>{&rig->camera(0), &rig->camera(1)}, &rig->ins(), &rig->trigger(), options);
+        std::make_unique<LiveSource>(std::vector<CameraDevice*>{watched[0].get(), watched[1].get()}, &rig->ins(), &rig->trigger(), options);
+    times = rig->pulse_times();
+  }
+
+  /// The place in `times` of the pulse that this image truly is of.
+  [[nodiscard]] std::size_t true_pulse(const SyncedSet& set, std::size_t k) const {
+    const Duration edge = watched[k]->edge_of_slot[set.slots[k]] - rig->start();
+    const auto after = std::upper_bound(times.begin(), times.end(), edge);
+    EXPECT_LT(edge - *std::prev(after), Duration::milliseconds(2));
+    return static_cast<std::size_t>(std::prev(after) - times.begin());
   }
 
   /// The whole drive, on a sealed thread as the estimator's.
   std::vector<LiveItem> drive() {
     std::vector<LiveItem> items;
-    items.reserve(1024);
+    items.reserve(4096);
+    pulses_of.reserve(1024);
     source->start();
     const SealedScope sealed;
     for (LiveItem item; source->next(&item);) {
       items.push_back(item);
-      if (item.kind == LiveItem::Kind::images) source->release(item.set);
+      if (item.kind != LiveItem::Kind::images) continue;
+      pulses_of.push_back({});
+      for (std::size_t k = 0; k < 2; ++k) pulses_of.back()[k] = item.set.present[k] ? static_cast<int>(true_pulse(item.set, k)) : -1;
+      source->release(item.set);
     }
     source->join();
     return items;
   }
 
   std::unique_ptr<mock::MockRig> rig;
+  std::vector<std::unique_ptr<WatchedCamera>> watched;
+  std::vector<Duration> times;                  // of all pulses
+  std::vector<std::array<int, 2>> pulses_of{};  // of every set that came, by camera; −1: none
   std::unique_ptr<LiveSource> source;
 };
 
@@ -94,6 +158,7 @@ TEST(LiveSource, bringsEveryPulseAndReadingOnceInOrderAndWithinTheStampsOwnError
       EXPECT_LE(std::abs(error.ns()), item.set.error.ns()) << number;
       ++number;
     } else {
+      ASSERT_EQ(item.kind, LiveItem::Kind::reading);
       EXPECT_EQ(item.sample.number, reading);
       const Stamp truth = kStart + Duration::seconds(static_cast<double>(reading) / 120);
       EXPECT_LE(std::abs((item.sample.stamp - truth).ns()), item.sample.stamp_error.ns()) << reading;
@@ -117,7 +182,7 @@ TEST(LiveSource, twoRunsOfADriveInVirtualTimeAreTheSameItemByItem) {
 }
 
 TEST(LiveSource, stampsLieOnTheirGridAndNoFartherFromWhereTheyWereThanHalfOfIt) {
-  const auto fine = Bench({}).drive(), coarse = Bench({}, false, Duration::microseconds(1)).drive();
+  const auto fine = Bench({}).drive(), coarse = Bench({}, {.grid = Duration::microseconds(1)}).drive();
   ASSERT_EQ(fine.size(), coarse.size());
   int off = 0;
   for (std::size_t i = 0; i < fine.size(); ++i) {
@@ -152,6 +217,135 @@ TEST(LiveSource, everySlotComesBack) {
   EXPECT_GT(b.source->counters().sync.duplicate[0], 10U);
   // Kept slots would have stalled the drive: 81 frames and their doubles go through 24 of them.
   EXPECT_EQ(b.rig->camera(0).statistics().underruns, 0U);
+}
+
+// ---- with the board's pulses --------------------------------------------------------------------------------------
+
+constexpr BenchOptions kByPulses{.mode = SyncMode::board, .vary = Duration::milliseconds(2), .seconds = 8};
+
+/// Sets with both images, all of the same pulse, stamped at its middle within the error; the first of them after that time.
+void expect_right_pairs(const Bench& b, const std::vector<LiveItem>& items) {
+  std::size_t i = 0;
+  for (const LiveItem& item : items) {
+    if (item.kind != LiveItem::Kind::images) continue;
+    const auto& pulses = b.pulses_of[i++];
+    const int first = pulses[0] >= 0 ? pulses[0] : pulses[1];
+    if (pulses[0] >= 0 && pulses[1] >= 0) {
+      EXPECT_EQ(pulses[0], pulses[1]) << "a wrong pair, set " << item.set.number;
+    }
+    const Stamp truth = kStart + b.times[static_cast<std::size_t>(first)] + Duration::milliseconds(4);
+    EXPECT_LE(std::abs((item.stamp - truth).ns()), item.set.error.ns()) << item.set.number;
+    EXPECT_TRUE(item.set.proof == SyncProof::numbered) << to_string(item.set.proof) << " " << item.set.number;
+    EXPECT_EQ(item.set.spread, Duration{}) << "equal exposures of one pulse";
+  }
+  EXPECT_EQ(i, b.pulses_of.size());
+}
+
+double worst_acquisition(const std::vector<LiveItem>& items) {
+  double worst = 0;
+  for (const LiveItem& item : items)
+    if (item.kind == LiveItem::Kind::proven) worst = std::max(worst, item.seconds);
+  return worst;
+}
+
+TEST(LiveSource, byPulsesEveryPairIsProvenWithinASecondAndRight) {
+  Bench b({}, kByPulses);
+  const auto items = b.drive();
+  expect_right_pairs(b, items);
+  EXPECT_EQ(count(items, LiveItem::Kind::acquiring), 2);
+  EXPECT_EQ(count(items, LiveItem::Kind::proven), 2);
+  EXPECT_LE(worst_acquisition(items), 1);
+  const LiveCounters& c = b.source->counters();
+  EXPECT_EQ(c.pulses, b.times.size());
+  EXPECT_EQ(static_cast<std::uint64_t>(count(items, LiveItem::Kind::images)) + c.sync.acquiring[0], b.times.size());
+  EXPECT_EQ(c.sync.incomplete, 0U);
+  EXPECT_EQ(c.pauses, 0U) << "varied intervals prove it";
+}
+
+TEST(LiveSource, evenPulsesArePausedAtTheSamePulseOnEveryRunAndWhatComesOutIsRight) {
+  std::vector<std::vector<LiveItem>> runs;
+  for (int run = 0; run < 2; ++run) {
+    Bench b({}, {.mode = SyncMode::board, .seconds = 8});
+    runs.push_back(b.drive());
+    expect_right_pairs(b, runs.back());
+    EXPECT_GE(b.source->counters().pauses, 1U);
+    EXPECT_EQ(b.source->counters().pauses_refused, 0U);
+    EXPECT_LT(b.source->counters().pulses, b.times.size()) << "some were left out";
+  }
+  ASSERT_EQ(runs[0].size(), runs[1].size());
+  for (std::size_t i = 0; i < runs[0].size(); ++i) ASSERT_EQ(runs[0][i].stamp, runs[1][i].stamp) << i;
+}
+
+struct LossCase {
+  const char* name;
+  std::vector<std::string> faults;
+  int acquisitions;  // proven, in all
+  LiveItem::Kind kind;
+  int items;  // of that kind
+};
+class LiveSourceByPulses : public ::testing::TestWithParam<LossCase> {};
+
+TEST_P(LiveSourceByPulses, whateverIsLostNoPairIsWrongAndAllIsSaid) {
+  Bench b(GetParam().faults, kByPulses), again(GetParam().faults, kByPulses);
+  const auto items = b.drive(), same = again.drive();
+  expect_right_pairs(b, items);
+  EXPECT_EQ(count(items, LiveItem::Kind::proven), GetParam().acquisitions);
+  EXPECT_LE(worst_acquisition(items), 1);
+  EXPECT_EQ(count(items, GetParam().kind), GetParam().items);
+  EXPECT_GT(b.pulses_of.size(), 90U) << "of 160: it came back";
+  ASSERT_EQ(items.size(), same.size()) << "another run";
+  for (std::size_t i = 0; i < items.size(); ++i) {
+    ASSERT_EQ(items[i].kind, same[i].kind) << i;
+    ASSERT_EQ(items[i].stamp, same[i].stamp) << i;
+    ASSERT_EQ(items[i].set.number, same[i].set.number) << i;
+  }
+}
+
+using Kind = LiveItem::Kind;
+INSTANTIATE_TEST_SUITE_P(
+    Ways, LiveSourceByPulses,
+    ::testing::Values(LossCase{"camera", {"camera_gone@4 camera=1 duration_s=1"}, 3, Kind::device_back, 1},
+                      LossCase{"left", {"camera_gone@4 camera=0 duration_s=1"}, 3, Kind::device_back, 1},
+                      LossCase{"reboot", {"board_reboot@4 duration_s=0.5"}, 4, Kind::board_rebooted, 1},
+                      LossCase{"board", {"board_gone@4 duration_s=1"}, 4, Kind::board_back, 1},
+                      LossCase{"line", {"board_gone@4 duration_s=1 powered=1"}, 2, Kind::board_gone, 1},
+                      LossCase{"missed", {"missed_trigger@4 camera=1 pulses=2", "missed_trigger@6 camera=0"}, 2, Kind::acquiring, 2},
+                      LossCase{"frames", {"lose_frames@3 share=0.2 duration_s=0"}, 2, Kind::acquiring, 2},
+                      LossCase{"pairs", {"break_pairs@3 share=0.5 duration_s=0"}, 2, Kind::acquiring, 2},
+                      LossCase{"doubles", {"duplicate_frames@3 share=0.3 duration_s=0"}, 2, Kind::acquiring, 2}),
+    [](const auto& i) { return std::string(i.param.name); });
+
+TEST(LiveSource, everyLossHasItsOwnCounter) {
+  Bench b({"missed_trigger@4 camera=1 pulses=2", "lose_frames@5 camera=0 share=0.2 duration_s=2"}, kByPulses);
+  (void)b.drive();
+  const SyncCounters& c = b.source->counters().sync;
+  EXPECT_EQ(c.missed_trigger[1], 2U);
+  EXPECT_EQ(c.missed_trigger[0], 0U);
+  EXPECT_EQ(c.lost[0], b.rig->camera(0).statistics().lost);
+  EXPECT_GT(c.lost[0], 2U);
+  EXPECT_EQ(c.lost[1], 0U);
+}
+
+TEST(LiveSource, feedbackIsTakenForTheMiddleOfTheExposure) {
+  BenchOptions o = kByPulses;
+  o.feedback = 0b11;
+  Bench b({}, o);
+  const auto items = b.drive();
+  expect_right_pairs(b, items);
+  EXPECT_LE(worst_acquisition(items), 1);
+}
+
+TEST(LiveSource, theClocksOfADriveAreRecorded) {
+  Bench b({}, kByPulses);
+  (void)b.drive();
+  const LiveCounters& c = b.source->counters();
+  for (const ClockRecord* clock : {&c.cameras[0], &c.cameras[1], &c.board, &c.ins}) {
+    EXPECT_GT(clock->stamps(), 100U);
+    EXPECT_LE(std::abs(clock->drift_ppm()), 60) << "30 ppm at most, known to as much within eight seconds";
+    EXPECT_GT(clock->worst_error(), Duration{});
+    // The spread of the delays, and what a crystal may drift within the drive: tighter once the fit knows.
+    EXPECT_LE(clock->worst_error(), Duration::milliseconds(2) + Duration::microseconds(200) * 8);
+  }
 }
 
 TEST(LiveSource, stopEndsTheStreamAmidTheDrive) {

@@ -1,0 +1,205 @@
+#include "app/commands/drive_time.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "app/commands/drive_sync.hpp"
+
+namespace vergence::app {
+namespace {
+
+constexpr double kMicroseconds = 1e6;
+
+double us(Duration d) { return d.to_seconds() * kMicroseconds; }
+
+template <class... Arguments>
+DriveTime::Sentence sentence(const char* kind, bool aloud, const char* format, Arguments... arguments) noexcept {
+  DriveTime::Sentence s;
+  s.kind = kind;
+  s.aloud = aloud;
+  (void)std::snprintf(s.text.data(), s.text.size(), format, arguments...);
+  return s;
+}
+
+const char* word_of(FixStatus fix) noexcept {
+  switch (fix) {
+    case FixStatus::none:
+      return "no position";
+    case FixStatus::fix_2d:
+      return "a fix without height";
+    case FixStatus::fix_3d:
+      return "a fix";
+    case FixStatus::dead_reckoning:
+      return "dead reckoning";
+  }
+  return "";
+}
+
+ClockFigures clock_figures(std::string device, const ClockRecord& clock) {
+  ClockFigures f;
+  f.device = std::move(device);
+  f.stamps = clock.stamps();
+  f.drift_ppm = clock.drift_ppm();
+  f.error_us = us(clock.error());
+  f.worst_error_us = us(clock.worst_error());
+  return f;
+}
+
+ClockFigures::Pings pings_of(const trigger_board::TimeQuality& q) {
+  ClockFigures::Pings p;
+  p.asked = q.asked;
+  p.answered = q.answered;
+  p.rtt_least_us = us(q.rtt_least);
+  p.rtt_median_us = us(q.rtt_median);
+  p.rtt_most_us = us(q.rtt_most);
+  p.pps_locked = q.pps_locked;
+  p.pps_age_s = q.pps_age.to_seconds();
+  return p;
+}
+
+}  // namespace
+
+DriveTime::Sentence DriveTime::of_device(const LiveItem& item) const noexcept {
+  using Kind = LiveItem::Kind;
+  switch (item.kind) {
+    case Kind::device_gone:
+      return sentence("camera_gone", true, "camera %d is gone; the drive goes on without it", item.camera);
+    case Kind::device_back:
+      return sentence("camera_back", true, "camera %d is back", item.camera);
+    case Kind::board_gone:
+      return sentence("board_gone", true, "the trigger board is gone: check its cable; it is looked for every second");
+    case Kind::board_back:
+      return sentence("board_back", true, "the trigger board is back");
+    case Kind::board_rebooted:
+      return sentence("board_rebooted", true, "the trigger board has started anew: its pulses count from 0, the pairing is proven again");
+    case Kind::acquiring:
+      return sentence("acquiring", false, "nothing proves yet which pulses the images of camera %d are of; they are not used", item.camera);
+    case Kind::proven:
+      return sentence("pairing_proven", false, "the pairing of camera %d is proven after %.2f s", item.camera, item.seconds);
+    case Kind::images:
+    case Kind::reading:
+    case Kind::refused:
+      break;
+  }
+  return {};
+}
+
+bool DriveTime::contradicted(const SyncedSet& set) const noexcept { return proves_pairing(mode_) && set.proof == SyncProof::unproven; }
+
+DriveTime::Sentence DriveTime::of_set(const SyncedSet& set) noexcept {
+  const bool was = unproven_;
+  unproven_ = set.proof == SyncProof::unproven;
+  if (was || !unproven_) return {};
+  return sentence("pairing_unproven", true, "images do not belong together for sure: pulses, counters and stamps contradict each other%s",
+                  proves_pairing(mode_) ? "; one of them alone is used" : "");
+}
+
+DriveTime::Sentence DriveTime::of_reading(const LiveItem& item) noexcept {
+  constexpr int kMany = 3;  // satellites: one more or less is not worth a word
+  const InsQuality& q = item.quality;
+  ++satellites_.readings;
+  satellites_.without_fix += item.sample.fix == FixStatus::none ? 1 : 0;
+  const int count = q.satellites;
+  if (count > 0) {
+    satellites_.least = satellites_.most == 0 ? count : std::min(satellites_.least, count);
+    satellites_.most = std::max(satellites_.most, count);
+  }
+  const bool changed = !any_quality_ || q.filter_valid != quality_.filter_valid || item.sample.fix != fix_ ||
+                       std::abs(count - int{quality_.satellites}) >= kMany;
+  if (!changed) return of_utc(item);
+  any_quality_ = true;
+  quality_ = q;
+  fix_ = item.sample.fix;
+  return sentence("ins_status", false, "the INS has %s, %d satellites, its filter is %s", word_of(fix_), count,
+                  q.filter_valid ? "valid" : "not valid");
+}
+
+DriveTime::Sentence DriveTime::of_utc(const LiveItem& item) noexcept {
+  constexpr double kStep = 0.1;  // s: a clock that was set
+  if (!item.quality.utc_valid || item.quality.utc_ns == 0) return {};
+  const double ahead = static_cast<double>(item.sample.stamp.ns() - item.quality.utc_ns) * 1e-9;
+  utc_.least_s = utc_.readings == 0 ? ahead : std::min(utc_.least_s, ahead);
+  utc_.most_s = utc_.readings == 0 ? ahead : std::max(utc_.most_s, ahead);
+  ++utc_.readings;
+  sum_ahead_s_ += ahead;
+  if (told_utc_ && std::abs(ahead - told_ahead_s_) < kStep) return {};
+  told_utc_ = true;
+  told_ahead_s_ = ahead;
+  return sentence("utc", false, "the host's clock is %.4f s %s the INS's UTC; stamps are the host's", std::abs(ahead),
+                  ahead < 0 ? "behind" : "ahead of");
+}
+
+void DriveTime::note_pose(const SyncedSet& set, float estimate_ms, HostStamp now) noexcept {
+  const double ms =
+      virtual_ ? (set.arrival - set.stamp).to_seconds() * 1e3 + static_cast<double>(estimate_ms) : (now - set.stamp).to_seconds() * 1e3;
+  latency_.add(ms);
+}
+
+TimeFigures DriveTime::figures(const LiveCounters& c, const DriveDevices& devices) const {
+  TimeFigures f;
+  const auto cameras = devices.cameras().size();
+  for (std::size_t k = 0; k < cameras; ++k) f.clocks.push_back(clock_figures(fmt::format("camera {}", k), c.cameras[k]));
+  if (c.board.stamps() > 0) {
+    f.clocks.push_back(clock_figures("board", c.board));
+    if (devices.board() != nullptr) f.clocks.back().pings = pings_of(devices.board()->board_statistics().time);
+  }
+  if (devices.ins() != nullptr) {
+    f.clocks.push_back(clock_figures("INS", c.ins));
+    const InsStatistics s = devices.ins()->statistics();
+    f.ins = {
+        {"lost", s.lost}, {"malformed", s.malformed}, {"restarts", s.restarts}, {"overruns", s.overruns}, {"dropped", c.dropped_readings}};
+  }
+  if (devices.trigger() != nullptr) {
+    const TriggerStatistics s = devices.trigger()->statistics();
+    f.board = {{"pulses", s.pulses},     {"lost", s.lost},       {"malformed", s.malformed},
+               {"overruns", s.overruns}, {"reboots", c.reboots}, {"starts", s.starts}};
+  }
+  f.clock_resets = c.clock_resets;
+  f.worst_stamp_error_us = static_cast<double>(c.worst_stamp_error_ns) * 1e-3;
+  f.latency = latency_;
+  f.latency_is_virtual = virtual_;
+  f.utc = utc_;
+  if (utc_.readings > 0) f.utc.host_ahead_s = sum_ahead_s_ / static_cast<double>(utc_.readings);
+  f.satellites = satellites_;
+
+  PairingFigures& p = f.pairing;
+  p.mode = to_string(mode_);
+  p.sentence = proof_sentence(mode_);
+  p.can_be_proven = proves_pairing(mode_);
+  p.worst_acquisition_s = c.sync.worst_acquisition.to_seconds();
+  p.pauses = c.pauses;
+  p.pauses_refused = c.pauses_refused;
+  p.sets = {{"complete", c.sync.complete},
+            {"incomplete", c.sync.incomplete},
+            {"unproven", c.sync.unproven},
+            {"unreported", c.sync.unreported},
+            {"pulses", c.pulses},
+            {"pulses_missed", c.sync.missed},
+            {"pushed_out", c.sync.pushed_out},
+            {"overtaken", c.dropped_sets},
+            {"torn", c.torn}};
+  for (std::size_t k = 0; k < cameras; ++k) {
+    const CameraStatistics s = devices.cameras()[k]->statistics();
+    CameraPairing camera;
+    camera.proven = c.proven[k];
+    camera.acquisitions = c.sync.acquisitions[k];
+    camera.losses = {{"missed_trigger", c.sync.missed_trigger[k]},
+                     {"lost", c.sync.lost[k]},
+                     {"acquiring", c.sync.acquiring[k]},
+                     {"contradictions", c.sync.contradictions[k]},
+                     {"late", c.sync.late[k]},
+                     {"duplicate", c.sync.duplicate[k]},
+                     {"absent", c.sync.absent[k]},
+                     {"torn", s.torn},
+                     {"underruns", s.underruns}};
+    p.cameras.push_back(std::move(camera));
+  }
+  return f;
+}
+
+}  // namespace vergence::app
