@@ -37,7 +37,8 @@ DeviceStatus BoardLine::send(std::uint8_t type, std::span<const std::uint8_t> pa
   if (sequence != nullptr) *sequence = sequence_;
   // The 00 before it ends whatever an earlier program left half sent.
   std::array<std::uint8_t, trigger_max_frame + 1> frame{};
-  const std::size_t size = trigger_write_frame(type, sequence_++, payload.data(), payload.size(), frame.data() + 1);
+  const std::size_t size = trigger_write_frame(type, sequence_, payload.data(), payload.size(), frame.data() + 1);
+  sequence_ = static_cast<std::uint8_t>((sequence_ + 1U) % trigger_unasked);
   return line_->write(std::span(frame).first(size + 1), kWrite);
 }
 

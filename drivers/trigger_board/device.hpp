@@ -87,6 +87,7 @@ class Device final : public TriggerDevice, private FrameSink {
   void work() noexcept;
   [[nodiscard]] DeviceStatus begin() noexcept;
   [[nodiscard]] DeviceStatus begin_on(Setup* setup);
+  [[nodiscard]] DeviceStatus started() noexcept;
   [[nodiscard]] DeviceStatus tie_clocks() noexcept;
   [[nodiscard]] DeviceStatus read_on() noexcept;
   [[nodiscard]] DeviceStatus read_one(HostStamp deadline) noexcept;

@@ -72,7 +72,7 @@ DeviceStatus Device::begin_on(Setup* setup) {
     // Its pulses may have gone on while the line was away, or it has stopped by itself: it goes on, and what was missed counts.
     go_streaming(line_->now());
     status = setup->start(&board);
-    if (status == DeviceStatus::ok && board.configuration == mark_) return DeviceStatus::ok;
+    if (status == DeviceStatus::ok && board.configuration == mark_) return started();
     streaming_ = false;
     if (status != DeviceStatus::ok && status != DeviceStatus::failed) return status;
   }
@@ -93,7 +93,14 @@ DeviceStatus Device::begin_on(Setup* setup) {
   if (status != DeviceStatus::ok) return status;
   running_ = true;
   go_streaming(line_->now());
-  return setup->start(&board);
+  status = setup->start(&board);
+  return status == DeviceStatus::ok ? started() : status;
+}
+
+/// What the board said by itself while it was being started is past.
+DeviceStatus Device::started() noexcept {
+  if (seen_ == Seen::halted) seen_ = Seen::nothing;
+  return DeviceStatus::ok;
 }
 
 /// Before the first event is handed out.
@@ -185,6 +192,7 @@ void Device::halt_board() noexcept {
     Setup setup(*line_, frames_, kNever, this);
     TriggerStatus status;
     const DeviceStatus done = setup.halt(&status);
+    if (done == DeviceStatus::ok) counted_.board = status;
     if (done == DeviceStatus::ok && status.boot_id == account_.boot()) account_.end(status.pulses);
     if (done == DeviceStatus::gone) close_line();
   } catch (const std::exception&) {

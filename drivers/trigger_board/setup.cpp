@@ -20,6 +20,9 @@ std::string text(const char* format, Args... args) {
   return buffer.data();
 }
 
+/// From one sequence number of ours to another, forwards.
+int steps(std::uint8_t from, std::uint8_t to) noexcept { return (to + trigger_unasked - from) % trigger_unasked; }
+
 const char* words_of(std::uint8_t type) noexcept {
   switch (type) {
     case trigger_hello:
@@ -77,7 +80,7 @@ Setup::Answer Setup::listen(std::uint8_t type, std::uint8_t first, std::uint8_t 
     if (status == DeviceStatus::timeout) return Answer::silent;
     if (status == DeviceStatus::stopped) continue;  // woken: perhaps to be told to stop
     if (status != DeviceStatus::ok) return Answer::gone;
-    const bool mine = static_cast<std::uint8_t>(frame.sequence - first) <= static_cast<std::uint8_t>(last - first);
+    const bool mine = frame.sequence < trigger_unasked && steps(first, frame.sequence) <= steps(first, last);
     if (mine && frame.type == wanted) {
       frame_ = frame;
       return Answer::ok;
@@ -189,7 +192,7 @@ DeviceStatus Setup::ask_status(std::uint8_t type, std::span<const std::uint8_t> 
   for (int turn = 0; turn < kTurns; ++turn) {
     const DeviceStatus answered = verdict(ask(type, payload, trigger_status, kAnswer), type);
     if (answered != DeviceStatus::ok) return answered;
-    // One that the board sent unasked may have our number by chance: it then tells the state before.
+    // The answer to a question before this one, given up, may have come late: it tells the state before.
     TriggerStatus s;
     if (!trigger_get_status(frame_.payload, frame_.size, &s) || !fits(s)) continue;
     *status = s;
