@@ -71,7 +71,7 @@ typedef enum {
   trigger_error_not_stopped = 4, /* CONFIG while pulses run; START or STOP before the last STOP was answered */
   trigger_error_not_configured = 5,
   trigger_error_rate = 6,       /* the timer cannot make this rate */
-  trigger_error_pulse = 7,      /* pulse width 0 or not below the period */
+  trigger_error_pulse = 7,      /* pulse width 0, above a second or not below the shortest interval */
   trigger_error_line = 8,       /* a line or input that the board does not have, or no line at all */
   trigger_error_not_running = 9 /* PAUSE while stopped */
 } TriggerErrorCode;

@@ -141,7 +141,8 @@ static uint8_t refusal(const TriggerBoard* board, const TriggerConfig* config, P
   if (config->rate_millihertz == 0 || config->rate_millihertz > description->max_millihertz) return trigger_error_rate;
   schedule_set(schedule, description->counts_hz, config->rate_millihertz, config->vary_us);
   if (schedule_shortest(schedule) < (uint64_t)description->counts_hz * 1000U / description->max_millihertz) return trigger_error_rate;
-  if (config->pulse_us == 0 || counts_of_us(board, config->pulse_us) >= schedule_shortest(schedule)) return trigger_error_pulse;
+  if (config->pulse_us == 0 || config->pulse_us > board_max_pulse_us) return trigger_error_pulse;
+  if (counts_of_us(board, config->pulse_us) >= schedule_shortest(schedule)) return trigger_error_pulse;
   return 0;
 }
 

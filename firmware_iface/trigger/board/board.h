@@ -36,6 +36,7 @@ enum {
   board_firmware_major = 1,
   board_firmware_minor = 0,
   board_firmware_patch = 0,
+  board_max_pulse_us = 1000000,
   board_lead_us = 50 /* a pulse is armed at least so long before its edge */
 };
 

@@ -44,7 +44,7 @@ static void drive_pulses(Firmware* firmware) {
     firmware->applied = firmware->board.config_crc;
   }
   if (!board_take_pulse(&firmware->board, refresh(firmware), &pulse)) return;
-  if (!hal_arm((uint32_t)pulse.count, pulse.width < UINT32_MAX / 2U ? (uint32_t)pulse.width : UINT32_MAX / 2U, pulse.lines))
+  if (!hal_arm((uint32_t)pulse.count, (uint32_t)pulse.width, pulse.lines)) /* at most a second: it fits */
     board_pulse_refused(&firmware->board);
 }
 

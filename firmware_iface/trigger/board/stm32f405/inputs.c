@@ -56,6 +56,7 @@ static void configure_edge(unsigned channel, uint8_t edge) {
   EXTI->imr &= ~bit;
   EXTI->rtsr = (EXTI->rtsr & ~bit) | (edge == trigger_edge_rising ? bit : 0U);
   EXTI->ftsr = (EXTI->ftsr & ~bit) | (edge == trigger_edge_falling ? bit : 0U);
+  TIM4->sr = ~((2U << channel) | (0x200U << channel)); /* CCxIF, CCxOF of before */
   EXTI->pr = bit;
   if (edge != trigger_edge_none) EXTI->imr |= bit;
 }

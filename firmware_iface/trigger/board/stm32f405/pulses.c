@@ -71,9 +71,8 @@ static void begin_pulse(uint32_t count, bool late) {
 void pulses_start(void) {
   TIM2->arr = UINT32_MAX;
   TIM2->psc = 0;
-  TIM2->smcr = 1U << 7U; /* MSM: TIM4 and TIM5 start together with it */
-  TIM2->cr2 = 1U << 4U;  /* MMS = 001: its enable is their trigger */
-  TIM2->egr = 1;         /* UG: counter and prescaler to zero */
+  TIM2->cr2 = 1U << 4U; /* MMS = 001: its enable is the trigger of TIM4 and TIM5 */
+  TIM2->egr = 1;        /* UG: counter and prescaler to zero */
   TIM2->sr = 0;
   set_mode(0xF, mode_force_inactive);
   irq_enable(irq_tim2, 0x10);

@@ -230,6 +230,7 @@ struct TriggerBoardImagePps : TriggerBoardImage {
 TEST_F(TriggerBoardImagePps, ticksAreItsMicrosecondsOnceFourEdgesAgree) {
   begin(16e6 * 1.004);  // the internal oscillator may be off as much
   std::vector<std::uint64_t> ticks;
+  ticks.reserve(40);
   for (int k = 0; k < 40; ++k) ticks.push_back(tick());
   constexpr double kStamp = 10;  // us: an edge is stamped by the interrupt here, some hundred instructions at 1/16 us
   for (std::size_t k = 1; k < 4; ++k) EXPECT_NEAR(static_cast<double>(ticks[k] - ticks[k - 1]), 1'004'000, kStamp) << k;
@@ -243,6 +244,7 @@ TEST_F(TriggerBoardImagePps, afterHelloTheRateMovesSlowly) {
   begin(16e6 * 1.00002);
   (void)board->ask(trigger_hello, {trigger_protocol_version});
   std::vector<std::uint64_t> ticks;
+  ticks.reserve(60);
   for (int k = 0; k < 60; ++k) ticks.push_back(tick());
   constexpr double kStamp = 10;
   EXPECT_NEAR(static_cast<double>(ticks[3] - ticks[0]), 3'000'060, kStamp);

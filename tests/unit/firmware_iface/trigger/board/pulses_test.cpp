@@ -35,7 +35,7 @@ TEST(BoardSchedule, variedIntervalsFollowTheSharedBits) {
     const std::uint64_t from = s.due;
     ASSERT_EQ(s.next, k);
     schedule_advance(&s);
-    ASSERT_EQ(s.due - from, 2'800'000 + (trigger_interval_is_longer(k) ? 1500 * kUs : -1500 * kUs));
+    ASSERT_EQ(s.due - from, (trigger_interval_is_longer(k) ? 2'926'000U : 2'674'000U));
   }
 }
 
@@ -210,7 +210,7 @@ TEST_F(WithFeedback, theLastEventComesWithoutAnotherPulse) {
 TEST_F(WithFeedback, ofABouncingLineTheFirstStartAndTheFirstEndCount) {
   b.on_pulse = [this](const BoardPulse& p) {
     b.edge_at(p.count + 3 * kUs, input(0), false);
-    for (const std::uint64_t us : {10, 20, 5000, 5010}) b.edge_at(p.count + us * kUs, input(0), us != 5000 && us != 5010);
+    for (const std::uint64_t us : {10U, 20U, 5000U, 5010U}) b.edge_at(p.count + us * kUs, input(0), us != 5000 && us != 5010);
     exposure(1, p.count, 10, 6000);
     b.edge_at(p.count + 7000 * kUs, input(0), true);
     b.edge_at(p.count + 7100 * kUs, input(0), false);

@@ -84,6 +84,7 @@ QemuBoard::QemuBoard(int icount_shift) {
   }
   if (icount_shift >= 0) arguments.insert(arguments.end(), {"-icount", "shift=" + std::to_string(icount_shift) + ",sleep=off"});
   std::vector<char*> argv;
+  argv.reserve(arguments.size() + 1);
   for (std::string& a : arguments) argv.push_back(a.data());
   argv.push_back(nullptr);
 

@@ -56,7 +56,7 @@ TEST(BoardTalk, pingCarriesBothTicks) {
   const Bytes ping = VirtualBoard::framed(trigger_ping, 77, {4, 3, 2, 1});
   const std::uint64_t arrival = b.now;
   for (const std::uint8_t byte : ping) board_receive(&b.board, b.now, arrival, byte);
-  b.now += 84 * 150;  // the answer leaves 150 us later
+  b.now += 84ULL * 150;  // the answer leaves 150 us later
   b.listen();
   const auto pongs = b.take(trigger_pong);
   ASSERT_EQ(pongs.size(), 1U);
@@ -92,6 +92,7 @@ TEST(BoardConfig, isRefusedByCodeAndThenTheOldOneHolds) {
       {"no width", [](TriggerConfig* c) { c->pulse_us = 0; }, trigger_error_pulse},
       {"as wide as the interval", [](TriggerConfig* c) { c->pulse_us = 33'334; }, trigger_error_pulse},
       {"as wide as the shorter interval", [](TriggerConfig* c) { c->vary_us = 30'000, c->pulse_us = 3'334; }, trigger_error_pulse},
+      {"wider than a second", [](TriggerConfig* c) { c->rate_millihertz = 100, c->pulse_us = 1'000'001; }, trigger_error_pulse},
       {"the widest", [](TriggerConfig* c) { c->pulse_us = 0xFFFFFFFF; }, trigger_error_pulse},
   };
   VirtualBoard b;
