@@ -20,6 +20,7 @@ void PulseMatcher::restart() noexcept {
   recents_ = pendings_ = 0;
   begun_ = false;
   failures_ = 0;
+  doubt_ = 0;
 }
 
 std::uint64_t PulseMatcher::least_number(std::uint64_t counter) const noexcept {
@@ -41,12 +42,14 @@ std::optional<std::uint64_t> PulseMatcher::report(const PulseTrain& train, HostS
     return std::nullopt;
   }
   const PulseTrain::Entry& pulse = train.newest();
+  const std::uint64_t before = train.size() > 1 ? train[train.size() - 2].number : pulse.number;
   std::size_t kept = 0;
   std::optional<Seen> made;
   for (std::size_t i = 0; i < pendings_; ++i) {
     const Seen& frame = pending_[i];
     const bool at_edge = magnitude(pulse.edge - edge_of(frame.stamp)) <= gate(frame.stamp), numbered = frame.number == pulse.number;
-    if (at_edge != numbered) {
+    const bool in_pause = pulse.resumed && frame.number < pulse.number && frame.number > before;
+    if (at_edge != numbered || in_pause) {
       const std::uint64_t number = frame.number;
       restart();
       return number;
@@ -55,7 +58,10 @@ std::optional<std::uint64_t> PulseMatcher::report(const PulseTrain& train, HostS
     if (frame.number > pulse.number) pending_[kept++] = frame;  // reports come in order: one of an older will never come
   }
   pendings_ = kept;
-  if (made) tie(made->stamp, pulse.edge);
+  if (made) {
+    tie(made->stamp, pulse.edge);
+    settle(train, pulse.number);
+  }
   return std::nullopt;
 }
 
@@ -99,12 +105,21 @@ void PulseMatcher::acquire(const PulseTrain& train, HostStamp now) noexcept {
     strict = f == Fit::strict;
     found = place;
   }
-  const bool proven = fits == 1 && strict && !(open_ended && beyond + kNear >= found);
+  const bool proven = fits == 1 && strict && !(open_ended && beyond + kNear >= found) && believable(train, found, end);
   if (proven) {
     adopt(train, found, end, now);
   } else {
     ++failures_;
   }
+}
+
+/// The frame came no later than frames do, and every pulse that it might be of instead was tried.
+bool PulseMatcher::believable(const PulseTrain& train, std::size_t place, std::size_t end) const noexcept {
+  if (frames_[end - 1].arrival - train[place].host > latest_) return false;
+  const std::size_t from = place > kNear ? place - kNear : 1, until = std::min(train.size(), place + kNear + 1);
+  for (std::size_t i = from; i < until; ++i)
+    if (!train[i].resumed && train[i].number != train[i - 1].number + 1) return false;
+  return true;
 }
 
 /// Whether the run that ends before frame `end` fits with its last frame on the train's `place`.
@@ -113,7 +128,7 @@ PulseMatcher::Fit PulseMatcher::fit(const PulseTrain& train, std::size_t place, 
   const Seen& last = frames_[end - 1];
   std::size_t at = place;
   DeviceStamp edge = train[place].edge;
-  std::uint64_t number = train[place].number, skipped = train[place].skipped, missed = 0;
+  std::uint64_t number = train[place].number, skipped = train[place].skipped, odd = 0;
   bool strict = true;
   for (std::size_t i = end - 1; i-- > begin;) {
     const Duration since = frames_[i + 1].stamp - frames_[i].stamp;
@@ -129,9 +144,9 @@ PulseMatcher::Fit PulseMatcher::fit(const PulseTrain& train, std::size_t place, 
       const Duration apart = magnitude((train[place].edge - pulse.edge) - span);
       if (apart > along * 2) return Fit::none;
       strict = strict && off <= noise && apart <= along;
-      const std::uint64_t most = number - pulse.number, least = most - (skipped - pulse.skipped);
-      if (counted > most) return Fit::none;
-      missed += least > counted ? least - counted : 0;
+      const std::uint64_t least = PulseTrain::least(pulse.number, pulse.skipped, number, skipped);
+      if (counted > number - pulse.number) return Fit::none;
+      odd += least > counted ? least - counted : 0;
       edge = pulse.edge;
       number = pulse.number;
       skipped = pulse.skipped;
@@ -141,14 +156,16 @@ PulseMatcher::Fit PulseMatcher::fit(const PulseTrain& train, std::size_t place, 
       const auto unreported = train.place(target, Duration{});
       if (!unreported || unreported->number >= number) return Fit::none;
       if (counted > number - unreported->number) return Fit::none;
+      const std::uint64_t least = PulseTrain::least(unreported->number, unreported->skipped_with, number, skipped);
+      odd += (least > counted ? least - counted : 0) + (unreported->paused ? 1 : 0);
       strict = false;
       edge = target;
       number = unreported->number;
       skipped = unreported->skipped;
     }
   }
-  if (missed > kMissed) return Fit::none;
-  return strict && missed == 0 ? Fit::strict : Fit::loose;
+  if (odd > kOdd) return Fit::none;
+  return strict && odd == 0 ? Fit::strict : Fit::loose;
 }
 
 void PulseMatcher::adopt(const PulseTrain& train, std::size_t place, std::size_t end, HostStamp now) noexcept {
@@ -198,7 +215,8 @@ DeviceStamp PulseMatcher::edge_of(DeviceStamp stamp) const noexcept {
 Duration PulseMatcher::gate(DeviceStamp stamp) const noexcept {
   constexpr Duration kLeast = Duration::microseconds(50);
   constexpr double kWander = 30e-6;  // of the rate, where nothing was seen for a while
-  return noise_ * 4 + kLeast + scaled(magnitude(stamp - tie_stamp_), kWander);
+  const Duration near = std::min(noise_ * 4 + kLeast, interval_ / 5);
+  return near + scaled(magnitude(stamp - tie_stamp_), kWander);
 }
 
 void PulseMatcher::tie(DeviceStamp stamp, DeviceStamp edge) noexcept {
@@ -237,6 +255,31 @@ PulseMatcher::Match PulseMatcher::repeated(const Seen& seen) const noexcept {
   return m;
 }
 
+/// A frame of this reported pulse fits it within the gate. Had the clock been set instead of s triggers missed, its stamps would now follow
+/// the pulse s earlier, a constant time off: refuted where that time changes by more than two gates.
+void PulseMatcher::settle(const PulseTrain& train, std::uint64_t number) noexcept {
+  if (doubt_ == 0) return;
+  const PulseTrain::Entry* pulse = train.find(number);
+  bool all = true;
+  for (std::size_t s = 1; s <= doubt_; ++s) {
+    const std::size_t i = s - 1;
+    const PulseTrain::Entry* earlier = train.before(number, s);
+    if (!refuted_[i] && pulse != nullptr && earlier != nullptr) {
+      const Duration apart = pulse->edge - earlier->edge;
+      auto& [least, greatest] = apart_[i];
+      least = compared_[i] ? std::min(least, apart) : apart;
+      greatest = compared_[i] ? std::max(greatest, apart) : apart;
+      compared_[i] = true;
+      refuted_[i] = greatest - least > gate(tie_stamp_) * 2;
+    }
+    all = all && refuted_[i];
+  }
+  ++failures_;
+  if (!all) return;
+  doubt_ = 0;
+  failures_ = 0;
+}
+
 PulseMatcher::Match PulseMatcher::match(const PulseTrain& train, const Seen& seen) noexcept {
   const std::int64_t counted = advance(last_.counter, seen.counter);
   if (counted <= 0) {
@@ -246,11 +289,11 @@ PulseMatcher::Match PulseMatcher::match(const PulseTrain& train, const Seen& see
   Match m;
   m.edge = edge_of(seen.stamp);
   m.gate = gate(seen.stamp);
-  if (m.gate * 4 > interval_) return contradict(seen);  // nothing was seen for so long that the stamp no longer tells the pulse
+  if (m.gate * 3 > interval_) return contradict(seen);  // nothing was seen for so long that the stamp no longer tells the pulse
   const auto place = train.place(m.edge, m.gate);
-  if (!place || place->number <= last_.number) return contradict(seen);
+  if (!place || place->paused || place->number <= last_.number) return contradict(seen);
   const std::uint64_t most = place->number - last_.number;
-  const std::uint64_t left_out = std::min(most, place->skipped - std::min(place->skipped, last_skipped_)), least = most - left_out;
+  const std::uint64_t least = PulseTrain::least(last_.number, last_skipped_, place->number, place->skipped);
   const auto exposures = static_cast<std::uint64_t>(counted);
   if (exposures > most) return contradict(seen);
   m.missed = least > exposures ? least - exposures : 0;
@@ -260,15 +303,21 @@ PulseMatcher::Match PulseMatcher::match(const PulseTrain& train, const Seen& see
   const Duration delay = seen.arrival - host.host;
   if (delay < -host.error || (m.missed > 0 && delay + interval_ / 2 < least_delay_)) return contradict(seen);
   least_delay_ = std::min(least_delay_, delay);
+  if (m.missed > 0) {
+    doubt_ += m.missed;
+    if (doubt_ > kDoubted) return contradict(seen);
+    refuted_ = compared_ = {};
+  }
   m.outcome = Outcome::matched;
   m.number = place->number;
   last_ = seen;
   last_.number = m.number;
-  last_skipped_ = place->skipped;
+  last_skipped_ = place->skipped_with;
   recent_[recents_++ % kRecent] = last_;
   if (place->entry != nullptr) {
     pendings_ = 0;  // reports come in order: older ones never will
     tie(seen.stamp, place->entry->edge);
+    settle(train, m.number);
   } else if (train.newest().number < m.number) {
     if (pendings_ == kPending) {
       std::move(pending_.begin() + 1, pending_.end(), pending_.begin());
@@ -276,6 +325,7 @@ PulseMatcher::Match PulseMatcher::match(const PulseTrain& train, const Seen& see
     }
     pending_[pendings_++] = last_;
   }
+  m.doubtful = doubtful();
   return m;
 }
 

@@ -58,6 +58,17 @@ const PulseTrain::Entry* PulseTrain::find(std::uint64_t number) const noexcept {
   return nullptr;
 }
 
+const PulseTrain::Entry* PulseTrain::before(std::uint64_t number, std::uint64_t pulses) const noexcept {
+  for (std::size_t i = count_; i-- > pulses;) {
+    const Entry& e = (*this)[i];
+    if (e.number > number) continue;
+    if (e.number < number) return nullptr;
+    const Entry& earlier = (*this)[i - pulses];
+    return least(earlier.number, earlier.skipped, e.number, e.skipped) == pulses ? &earlier : nullptr;
+  }
+  return nullptr;
+}
+
 Duration PulseTrain::interval() const noexcept {
   constexpr std::size_t kEnough = 16;
   if (count_ < kEnough) return nominal_;
@@ -77,14 +88,16 @@ std::optional<PulseTrain::Place> PulseTrain::unreported(const Entry& before, con
   const std::int64_t steps = (passed + step / 2).ns() / step.ns();
   if (steps < 1 || static_cast<std::uint64_t>(steps) > room) return std::nullopt;
   if (magnitude(passed - step * steps) * 4 > step) return std::nullopt;
-  return Place{before.number + static_cast<std::uint64_t>(steps), before.skipped, nullptr};
+  const bool paused = after != nullptr && after->resumed;
+  const std::uint64_t skipped = before.skipped + (paused ? static_cast<std::uint64_t>(steps) - 1 : 0);
+  return Place{before.number + static_cast<std::uint64_t>(steps), skipped, skipped + (paused ? 1 : 0), nullptr, paused};
 }
 
 std::optional<PulseTrain::Place> PulseTrain::place(DeviceStamp edge, Duration gate) const noexcept {
   const Entry* after = nullptr;
   for (std::size_t i = count_; i-- > 0;) {
     const Entry& e = (*this)[i];
-    if (magnitude(e.edge - edge) <= gate) return Place{e.number, e.skipped, &e};
+    if (magnitude(e.edge - edge) <= gate) return Place{e.number, e.skipped, e.skipped, &e, false};
     if (e.edge < edge) return unreported(e, after, edge);
     after = &e;
   }

@@ -124,6 +124,18 @@ void RigSynchronizer::begin_anew() noexcept {
   for (PulseMatcher& m : matchers_) m.restart();
 }
 
+/// What was in doubt is so for good.
+void RigSynchronizer::contradicted(std::size_t camera) noexcept {
+  ++counters_.contradictions[camera];
+  for (Open& o : open_)
+    if (o.used && o.set.present[camera] && o.images[camera].doubtful) o.contradicted = true;
+}
+
+void RigSynchronizer::acquired(std::size_t camera) noexcept {
+  sources_[camera].from = any_out_ ? last_out_ + 1 : 0;
+  steady_from_ = std::max(steady_from_, first_free());
+}
+
 void RigSynchronizer::take_pulse(const Pulse& pulse) noexcept {
   const PulseTrain::Step step = train_.add(pulse, first_free());
   if (step == PulseTrain::Step::known) return;
@@ -132,12 +144,12 @@ void RigSynchronizer::take_pulse(const Pulse& pulse) noexcept {
   for (std::size_t k = 0; k < static_cast<std::size_t>(options_.cameras); ++k) {
     PulseMatcher& matcher = matchers_[k];
     const bool proven = matcher.proven();
-    if (const auto contradicted = matcher.report(train_, now_)) {
-      ++counters_.contradictions[k];
-      Open* open = find(*contradicted);
+    if (const auto number = matcher.report(train_, now_)) {
+      contradicted(k);
+      Open* open = find(*number);
       if (open != nullptr && open->set.present[k]) open->contradicted = true;
     }
-    if (proven != matcher.proven()) steady_from_ = std::max(steady_from_, first_free());
+    if (!proven && matcher.proven()) acquired(k);
   }
 }
 
@@ -146,7 +158,8 @@ std::uint32_t RigSynchronizer::wants_pause() noexcept {
   constexpr std::uint64_t kPatience = 3 * PulseMatcher::kRun;  // pulses, until a pause has been seen or has not helped
   if (!proves_numbers(options_.mode) || (asked_ && pulses_ < asked_at_ + kPatience)) return 0;
   for (std::size_t k = 0; k < static_cast<std::size_t>(options_.cameras); ++k) {
-    if (!sources_[k].here || proven(static_cast<int>(k)) || matchers_[k].failures() < kInVain) continue;
+    const bool settled = proven(static_cast<int>(k)) && !matchers_[k].doubtful();
+    if (!sources_[k].here || settled || matchers_[k].failures() < kInVain) continue;
     asked_ = true;
     asked_at_ = pulses_;
     return kPause;
@@ -170,11 +183,12 @@ RigSynchronizer::Step RigSynchronizer::number_by_pulse(const SyncFrame& frame, s
       *number = m.number;
       return Step::again;
     case PulseMatcher::Outcome::contradicted:
-      ++counters_.contradictions[k];
+      contradicted(k);
       [[fallthrough]];
     case PulseMatcher::Outcome::acquiring:
       ++counters_.acquiring[k];
       steady_from_ = std::max(steady_from_, first_free());
+      if (matchers_[k].proven()) acquired(k);
       return Step::acquiring;
   }
   counters_.missed_trigger[k] += m.missed;
@@ -182,6 +196,7 @@ RigSynchronizer::Step RigSynchronizer::number_by_pulse(const SyncFrame& frame, s
   *number = m.number;
   image->edge = m.edge;
   image->gate = m.gate;
+  image->doubtful = m.doubtful;
   return Step::numbered;
 }
 

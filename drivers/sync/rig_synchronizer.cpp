@@ -13,7 +13,7 @@ Duration magnitude(Duration d) noexcept { return d < Duration{} ? -d : d; }
 RigSynchronizer::RigSynchronizer(const SyncOptions& options) noexcept : options_(options), train_(options.interval) {
   assert(options.validate() == nullptr);
   for (Source& s : sources_) s.align = options.align_start && options.mode == SyncMode::counter;
-  for (std::size_t k = 0; k < matchers_.size(); ++k) matchers_[k] = PulseMatcher(noise_of(k), options.interval);
+  for (std::size_t k = 0; k < matchers_.size(); ++k) matchers_[k] = PulseMatcher(noise_of(k), options.interval, options.camera[k].latest);
 }
 
 RigSynchronizer::Open* RigSynchronizer::find(std::uint64_t number) noexcept {
@@ -46,6 +46,10 @@ SyncVerdict RigSynchronizer::offer(const SyncFrame& frame) noexcept {
     number = number_of(frame);
   }
   if (step == Step::acquiring) return SyncVerdict::acquiring;
+  if (any_out_ && number <= last_out_ && number < sources_[k].from) {
+    ++counters_.acquiring[k];
+    return SyncVerdict::acquiring;
+  }
   if (any_out_ && number <= last_out_) {
     const Gone& g = history_[number % kHistory];
     const bool of_it = !by_time || image.time - last_time_ >= -options_.tolerance.ns();
@@ -90,6 +94,7 @@ bool RigSynchronizer::ready(const Open& open) const noexcept {
   if (proves_numbers(options_.mode) && (train_.size() == 0 || train_.newest().number < number)) return false;
   for (std::size_t k = 0; k < static_cast<std::size_t>(options_.cameras); ++k) {
     const Source& s = sources_[k];
+    if (open.set.present[k] && open.images[k].doubtful && matchers_[k].doubtful()) return false;
     const bool passed = s.any && !s.align && s.newest > number;
     if (waited_for(k) && !open.set.present[k] && !passed) return false;
   }
@@ -188,10 +193,13 @@ void RigSynchronizer::prove(Open* open, SyncedSet* set) noexcept {
     case SyncMode::board:
     case SyncMode::ins_syncout:
     case SyncMode::master_strobe:
-      set->proof = open->contradicted                         ? SyncProof::unproven
-                   : options_.mode == SyncMode::master_strobe ? SyncProof::master
-                                                              : SyncProof::numbered;
-      counters_.unproven += open->contradicted ? 1 : 0;
+      for (std::size_t k = 0; k < matchers_.size(); ++k)
+        open->contradicted = open->contradicted || (set->present[k] && open->images[k].doubtful && matchers_[k].doubtful());
+      set->proof = options_.mode == SyncMode::master_strobe ? SyncProof::master : SyncProof::numbered;
+      if (open->contradicted) {
+        set->proof = SyncProof::unproven;
+        ++counters_.unproven;
+      }
       return;
     case SyncMode::counter:
       break;

@@ -19,9 +19,10 @@ namespace vergence {
 /// Pulses     A camera is `acquiring` until its own intervals fit the pulses' at exactly one place; arrival never decides. Its frames are
 ///            given back and counted meanwhile, those of the others go out without them. From then on every frame's pulse follows from its
 ///            stamp (the camera's clock tied to the board's), and its counter must agree: more pulses than counts are missed triggers,
-///            counts without images are lost frames, anything else is a contradiction and it acquires again. A pulse that runs
-///            back in number or has another `boot` makes all acquire again. A frame that comes before its pulse's report is given the
-///            pulse's number all the same; the report then confirms it, or the set is `unproven`.
+///            counts without images are lost frames, anything else is a contradiction and it acquires again. After a missed trigger sets
+///            are `unproven` until the intervals have shown that it was none of the clock's. A pulse that runs back in number or has
+///            another `boot` makes all acquire again. A frame that comes before its pulse's report is given the pulse's number all the
+///            same; the report then confirms it, or the set is `unproven`.
 /// A limit    A camera that hands out the image of one exposure under the stamp of the next cannot be told here.
 /// Ownership  A slot that is `taken` comes out of next() in exactly one set; then it is the caller's again.
 /// Threads    One caller. Memory: fixed, kOpen pulses. Time: constant a call.
@@ -69,6 +70,7 @@ class RigSynchronizer {
     std::int64_t base = 0;  // number − counter
     bool any = false;
     std::uint64_t newest = 0;  // number
+    std::uint64_t from = 0;    // number; sets below did not wait for it, as it was acquiring
   };
   struct Image {
     MappedStamp middle{};
@@ -76,6 +78,7 @@ class RigSynchronizer {
     DeviceStamp edge{};     // of the pulse by its source's clock, as this camera's stamp has it
     Duration gate{};        // |true edge − edge| is below this
     Duration exposure{};
+    bool doubtful = false;  // perhaps of an earlier pulse
   };
   struct Open {
     bool used = false;
@@ -108,6 +111,8 @@ class RigSynchronizer {
   [[nodiscard]] Step number_by_pulse(const SyncFrame& frame, std::uint64_t* number, Image* image) noexcept;
   [[nodiscard]] Step number_by_master(const SyncFrame& frame, std::uint64_t* number, Image* image) noexcept;
   void take_pulse(const Pulse& pulse) noexcept;
+  void contradicted(std::size_t camera) noexcept;
+  void acquired(std::size_t camera) noexcept;
   void begin_anew() noexcept;
   [[nodiscard]] std::uint64_t first_free() const noexcept;
   [[nodiscard]] Duration noise_of(std::size_t camera) const noexcept;

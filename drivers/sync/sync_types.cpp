@@ -65,6 +65,7 @@ const char* SyncOptions::validate() const noexcept {
     const SyncCameraOptions& c = camera[k];
     if (c.resolution < Duration{} || c.jitter < Duration{}) return "a camera's stamps cannot be better than exact";
     if ((c.resolution + c.jitter) * 8 > interval) return "a camera's stamps are too coarse to tell one pulse from the next";
+    if (c.latest <= Duration{}) return "a frame arrives after its pulse: the latest arrival must be positive";
     if (c.delay < Duration{} || c.delay >= interval) return "a line's delay must be at least 0 and below the interval of the pulses";
   }
   return nullptr;

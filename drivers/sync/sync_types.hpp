@@ -39,6 +39,8 @@ struct SyncCameraOptions {
   /// By how much a stamp may be off the edge plus a constant: tens of µs where the camera stamps, milliseconds (DeviceTiming::delay_spread)
   /// where its stamps are the host's. With more than half of what the intervals vary by only a pause proves.
   Duration jitter = Duration::microseconds(20);
+  /// From a pulse to the arrival of its frame at most, rather much than little: what would say more proves nothing.
+  Duration latest = Duration::milliseconds(500);
 };
 
 struct SyncOptions {

@@ -1,0 +1,156 @@
+#include <gtest/gtest.h>
+
+#include <string>
+
+#include "tests/unit/drivers/sync/pulse_rules.hpp"
+
+/// Whatever a rig does wrong, no pair is called proven that is not one; the rig knows which pulse made which frame.
+namespace vergence {
+namespace {
+
+using testing::PulseRig;
+using testing::PulseRigOptions;
+using testing::PulseRigTruth;
+
+SyncOptions board() {
+  SyncOptions o;
+  o.mode = SyncMode::board;
+  return o;
+}
+
+PulseRigTruth run(const PulseRigOptions& o, double seconds, SyncCounters* counters = nullptr, SyncOptions sync = board()) {
+  PulseRig rig(o, sync);
+  rig.run(seconds);
+  if (counters != nullptr) *counters = rig.counters();
+  EXPECT_EQ(rig.truth().broken, 0U);
+  EXPECT_EQ(rig.truth().wrong, 0U);
+  return rig.truth();
+}
+
+/// Sets of a good stretch that must have come out proven, whole.
+void expect_mostly_complete(const PulseRigTruth& t, double least) {
+  EXPECT_GE(static_cast<double>(t.complete), least * static_cast<double>(t.pulses));
+}
+
+TEST(PulseAdversary, aStaleImageInTheCamerasBuffersAtTheStartDoesNotShiftThePairs) {
+  for (std::uint64_t seed = 1; seed <= 50; ++seed) {
+    PulseRigOptions o;
+    o.seed = seed;
+    o.stale_first = true;
+    expect_mostly_complete(run(o, 10), 0.9);
+  }
+}
+
+TEST(PulseAdversary, aFirstTriggerThatIsIgnoredDoesNotShiftThePairs) {
+  PulseRigOptions o;
+  o.first_dropped = true;
+  expect_mostly_complete(run(o, 10), 0.9);
+}
+
+TEST(PulseAdversary, wherACounterBeginsDoesNotMatter) {
+  for (const std::uint64_t start : {std::uint64_t{0}, std::uint64_t{1}, std::uint64_t{0xFFFF'FFFF'FFFF'FFF0}}) {
+    PulseRigOptions o;
+    o.counter_start = start;
+    expect_mostly_complete(run(o, 10), 0.9);
+  }
+}
+
+TEST(PulseAdversary, aCameraThatArrivesAPulseLateForEverIsPairedByWhatItExposed) {
+  for (const int lag_ms : {20, 33, 50, 90}) {
+    PulseRigOptions o;
+    o.lag[1] = Duration::milliseconds(lag_ms);
+    SyncOptions sync = board();
+    sync.hold = Duration::milliseconds(150);
+    const PulseRigTruth t = run(o, 10, nullptr, sync);
+    expect_mostly_complete(t, 0.9);
+  }
+}
+
+TEST(PulseAdversary, reportsThatComeInBurstsAreWaitedFor) {
+  PulseRigOptions o;
+  o.bursts = 0.1;
+  SyncCounters c;
+  const PulseRigTruth t = run(o, 60, &c);
+  expect_mostly_complete(t, 0.97);
+  EXPECT_EQ(c.unreported, 0U);
+  EXPECT_EQ(c.contradictions[0] + c.contradictions[1], 0U);
+}
+
+TEST(PulseAdversary, reportsThatNeverComeCostNoPair) {
+  PulseRigOptions o;
+  o.unreported = 0.05;
+  SyncCounters c;
+  const PulseRigTruth t = run(o, 60, &c);
+  expect_mostly_complete(t, 0.95);
+  EXPECT_GT(c.unreported, 50U);
+  EXPECT_EQ(c.unreported, t.unreported);
+  EXPECT_EQ(t.outside, 0U) << "reckoned from the cameras' clocks, with a bound that holds";
+  EXPECT_EQ(c.missed_trigger[0] + c.missed_trigger[1] + c.lost[0] + c.lost[1], 0U);
+}
+
+TEST(PulseAdversary, aClockThatIsSetMakesItsCameraAcquireAgainAndOnlyIt) {
+  for (const double seconds : {0.003, 1.0 / 30, 2.0 / 30, -1.0 / 30, 5.0, -5.0, 4294.967296}) {
+    for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+      SCOPED_TRACE(std::to_string(seconds) + " s, seed " + std::to_string(seed));
+      PulseRigOptions o;
+      o.seed = seed;
+      o.jumps = {{1, 5, seconds}};
+      SyncCounters c;
+      const PulseRigTruth t = run(o, 10, &c);
+      EXPECT_EQ(c.contradictions[0], 0U);
+      EXPECT_GE(c.contradictions[1], 1U);
+      EXPECT_LE(c.contradictions[1], 2U);
+      EXPECT_EQ(c.acquisitions[0], 1U);
+      EXPECT_GE(c.acquisitions[1], 2U);
+      EXPECT_GE(t.sets + 40, t.pulses) << "the other camera goes on";
+    }
+  }
+}
+
+TEST(PulseAdversary, evenIntervalsProveNothingUntilAPauseDoes) {
+  PulseRigOptions o;
+  o.vary = Duration{};
+  o.stale_first = true;
+  {
+    PulseRig rig(o, board());
+    rig.pauses(false);
+    rig.run(20);
+    EXPECT_EQ(rig.truth().sets, 0U) << "nothing is proven, nothing goes out";
+    EXPECT_GT(rig.counters().acquiring[0], 500U);
+  }
+  PulseRig rig(o, board());
+  rig.run(20);
+  EXPECT_EQ(rig.truth().wrong, 0U);
+  EXPECT_EQ(rig.asked(), 1);
+  expect_mostly_complete(rig.truth(), 0.9);
+  EXPECT_LE(rig.truth().worst_acquisition_s, 2.0);
+  EXPECT_EQ(rig.counters().missed_trigger[0] + rig.counters().missed, 0U) << "what was left out was not missed";
+}
+
+TEST(PulseAdversary, stampsOfTheHostAreProvenByAPause) {
+  for (std::uint64_t seed = 1; seed <= 30; ++seed) {
+    PulseRigOptions o;
+    o.seed = seed;
+    o.stamp_noise_us = 1500;
+    o.lost = 0.002;
+    o.missed = 0.002;
+    SyncOptions sync = board();
+    for (SyncCameraOptions& c : sync.camera) c.jitter = Duration::microseconds(1600);
+    PulseRig rig(o, sync);
+    rig.run(60);
+    EXPECT_EQ(rig.truth().wrong, 0U);
+    EXPECT_GE(rig.asked(), 1);
+    expect_mostly_complete(rig.truth(), 0.8);
+    for (std::size_t k = 0; k < 2; ++k) {
+      EXPECT_EQ(rig.counters().missed_trigger[k], rig.truth().missed[k]);
+      EXPECT_EQ(rig.counters().lost[k], rig.truth().lost[k]);
+    }
+  }
+}
+
+TEST(PulseAdversary, noPairIsEverCalledProvenThatIsNone) {
+  for (std::uint64_t seed = 1; seed <= 60; ++seed) testing::expect_never_wrong(seed, 60);
+}
+
+}  // namespace
+}  // namespace vergence

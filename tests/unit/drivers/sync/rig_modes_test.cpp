@@ -1,0 +1,371 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "core/math/random.hpp"
+#include "drivers/sync/rig_synchronizer.hpp"
+#include "drivers/sync/sync_out_pulses.hpp"
+
+/// The modes beside `board`: a common clock, the INS's pulses, one camera that triggers the others.
+namespace vergence {
+namespace {
+
+constexpr Duration kInterval = Duration::milliseconds(40);
+constexpr Duration kExposure = Duration::milliseconds(6);
+
+struct Out {
+  std::vector<SyncedSet> sets;
+
+  void drain(RigSynchronizer* sync) {
+    for (SyncedSet set; sync->next(&set);) sets.push_back(set);
+  }
+  [[nodiscard]] std::size_t complete() const {
+    return static_cast<std::size_t>(std::count_if(sets.begin(), sets.end(), [](const SyncedSet& s) { return s.complete; }));
+  }
+  /// Slots carry the pulse in every test here.
+  void expect_pairs() const {
+    for (const SyncedSet& s : sets) {
+      if (s.present[0] && s.present[1]) {
+        EXPECT_EQ(s.slots[0], s.slots[1]) << s.number;
+      }
+    }
+  }
+};
+
+SyncFrame frame(int camera, int pulse, std::uint64_t counter, HostStamp start, DeviceStamp by_camera,
+                Duration delay = Duration::milliseconds(30)) {
+  SyncFrame f;
+  f.camera = camera;
+  f.slot = static_cast<FrameSlot>(pulse);
+  f.counter = counter;
+  f.exposure_start = by_camera;
+  f.exposure = kExposure;
+  f.middle = {start + kExposure / 2, Duration::microseconds(300)};
+  f.arrival = start + delay + Duration::microseconds(100 * camera);
+  return f;
+}
+
+HostStamp host_at(int pulse) { return HostStamp(77'000'000'000) + kInterval * pulse; }
+
+SyncOptions options(SyncMode mode) {
+  SyncOptions o;
+  o.mode = mode;
+  o.interval = kInterval;
+  return o;
+}
+
+// ---- one common clock ----
+
+struct CommonClock : ::testing::TestWithParam<SyncMode> {};
+
+TEST_P(CommonClock, pairsByItsOwnStampsWhateverTheHostsAre) {
+  RigSynchronizer sync(options(GetParam()));
+  Out out;
+  Random random(3);
+  for (int n = 0; n < 6000; ++n) {  // four minutes: the bus's clock wraps once
+    const DeviceStamp t(50'000'000'000 + (kInterval * n).ns());
+    // Counters mean nothing, and the host's stamps are off by half an interval and more.
+    for (int k = 0; k < 2; ++k) {
+      if (n == 100 && k == 1) continue;
+      SyncFrame f = frame(k, n, random.next(), host_at(n), t + Duration::microseconds(k * 80));
+      f.middle.host = f.middle.host + Duration::milliseconds(25 * k);
+      EXPECT_EQ(sync.offer(f), SyncVerdict::taken) << n;
+      out.drain(&sync);
+    }
+  }
+  sync.finish();
+  out.drain(&sync);
+  out.expect_pairs();
+  EXPECT_EQ(out.complete(), 5999U);
+  EXPECT_EQ(sync.counters().lost[1], 1U);
+  for (const SyncedSet& s : out.sets) EXPECT_EQ(s.proof, SyncProof::common_clock);
+  EXPECT_TRUE(sync.proven(0));
+}
+
+TEST_P(CommonClock, whatIsTooFarApartIsNotPaired) {
+  RigSynchronizer sync(options(GetParam()));
+  Out out;
+  for (int n = 0; n < 50; ++n)
+    for (int k = 0; k < 2; ++k) {
+      (void)sync.offer(frame(k, n, 0, host_at(n), DeviceStamp((kInterval * n).ns()) + Duration::milliseconds(15 * k)));
+      out.drain(&sync);
+    }
+  EXPECT_EQ(out.complete(), 0U);
+}
+
+TEST_P(CommonClock, thatIsSetBackIsFollowedAfterThreeFrames) {
+  RigSynchronizer sync(options(GetParam()));
+  Out out;
+  for (int n = 0; n < 400; ++n) {
+    const std::int64_t set = n < 200 ? 0 : -20'000'000'000;
+    for (int k = 0; k < 2; ++k) {
+      (void)sync.offer(frame(k, n, 0, host_at(n), DeviceStamp(90'000'000'000 + (kInterval * n).ns() + set)));
+      out.drain(&sync);
+    }
+  }
+  sync.finish();
+  out.drain(&sync);
+  out.expect_pairs();
+  EXPECT_GE(out.complete(), 397U);
+  EXPECT_EQ(sync.counters().contradictions[0] + sync.counters().contradictions[1], 1U);
+  for (std::size_t i = 1; i < out.sets.size(); ++i) EXPECT_GT(out.sets[i].number, out.sets[i - 1].number);
+}
+
+INSTANTIATE_TEST_SUITE_P(Modes, CommonClock, ::testing::Values(SyncMode::bus, SyncMode::ptp));
+
+TEST(RigModes, camerasOnABusThatUnwrappedItsClockDifferentlyArePairedModulo128Seconds) {
+  for (const std::int64_t wraps : {-3, -1, 1, 2}) {
+    RigSynchronizer sync(options(SyncMode::bus));
+    Out out;
+    for (int n = 0; n < 7000; ++n)
+      for (int k = 0; k < 2; ++k) {
+        const std::int64_t t = 120'000'000'000 + (kInterval * n).ns() + k * wraps * 128'000'000'000;
+        (void)sync.offer(frame(k, n, 0, host_at(n), DeviceStamp(t)));
+        out.drain(&sync);
+      }
+    out.expect_pairs();
+    EXPECT_GE(out.complete(), 6999U) << wraps;
+  }
+}
+
+// ---- the INS's SyncOut ----
+
+struct SyncOut : ::testing::TestWithParam<std::uint32_t> {};
+
+/// Cameras triggered by an INS at 100 Hz that sends a pulse every fourth sample. Even intervals: only a gap proves.
+TEST_P(SyncOut, isProvenByAGapBeforeTheDrive) {
+  const std::uint32_t divider = GetParam();
+  SyncOptions o = options(SyncMode::ins_syncout);
+  RigSynchronizer sync(o);
+  SyncOutPulses pulses(kInterval, divider);
+  Out out;
+  std::array<std::uint64_t, 2> counters{3, 900};
+  HostStamp t(50'000'000'000);
+  int pulse = 0;
+  bool asked = false;
+  for (int sample = 0; sample < 4000; ++sample, t = t + kInterval / 4) {
+    if (sync.wants_pause() > 0) {
+      EXPECT_FALSE(asked);
+      asked = true;
+      while (sample % 4 != 0) ++sample;
+      t = t + Duration::microseconds(313'700);  // GoToConfig, GoToMeasurement
+      pulses.restart();
+    }
+    const bool pulsed = sample % 4 == 0;
+    InsReading r;
+    r.measured = DeviceStamp(t.ns() + 123'456'789);
+    r.arrival = t + Duration::milliseconds(4);
+    r.quality.sync_out = pulsed && divider == 0;
+    if (sample % 97 != 0 || sample < 8) {  // some readings are lost
+      if (const auto p = pulses.reading(r, {t, Duration::microseconds(200)})) {
+        EXPECT_TRUE(pulsed) << sample;
+        sync.pulse(*p);
+        out.drain(&sync);
+      }
+    }
+    if (!pulsed) continue;
+    for (int k = 0; k < 2; ++k) {
+      const auto i = static_cast<std::size_t>(k);
+      (void)sync.offer(
+          frame(k, pulse, counters[i]++, t, DeviceStamp(t.ns() / (k + 1) * (k + 1) - 7'000'000 * k), Duration::milliseconds(9)));
+      out.drain(&sync);
+    }
+    ++pulse;
+  }
+  EXPECT_TRUE(asked);
+  out.expect_pairs();
+  EXPECT_GE(out.complete(), 900U);
+  for (const SyncedSet& s : out.sets) {
+    EXPECT_EQ(s.proof, SyncProof::numbered);
+    EXPECT_LE(s.spread, Duration{});
+  }
+  EXPECT_EQ(sync.counters().missed_trigger[0] + sync.counters().missed_trigger[1], 0U);
+  EXPECT_GT(sync.counters().unreported, 0U);
+}
+
+INSTANTIATE_TEST_SUITE_P(MarkedOrCounted, SyncOut, ::testing::Values(0U, 4U));
+
+// ---- one camera triggers the other ----
+
+struct MasterRig {
+  explicit MasterRig(std::uint64_t seed) : sync(options(SyncMode::master_strobe)), random(seed) {}
+
+  void pulse() {
+    const HostStamp start = HostStamp(9'000'000'000) + time;
+    const bool lost0 = lose && random.uniform() < 0.01, lost1 = lose && random.uniform() < 0.01, missed1 = std::exchange(miss, false);
+    lost[0] += lost0 ? 1 : 0;
+    if (!lost0) offer(frame(0, number, counters[0], start, DeviceStamp(start.ns() + 5'000'000'000)));
+    ++counters[0];
+    if (slave_here) {
+      missed[1] += missed1 ? 1 : 0;
+      if (!missed1) {
+        lost[1] += lost1 ? 1 : 0;
+        // 20 ppm faster.
+        if (!lost1) offer(frame(1, number, counters[1], start, DeviceStamp(start.ns() + start.ns() / 50'000 - slave_offset)));
+        ++counters[1];
+      }
+    }
+    ++number;
+    time = time + kInterval;
+  }
+  void offer(const SyncFrame& f) {
+    (void)sync.offer(f);
+    out.drain(&sync);
+    if (sync.wants_pause() == 0) return;
+    ++pauses;
+    // The master is stopped and started: its count begins anew, its clock goes on.
+    time = time + Duration::microseconds(233'400);
+    sync.absent(0);
+    sync.restarted(0);
+    counters[0] = static_cast<std::uint64_t>(-1);  // the pulse under way counts it to 0
+    out.drain(&sync);
+  }
+
+  RigSynchronizer sync;
+  Random random;
+  Out out;
+  Duration time{};
+  int number = 0, pauses = 0;
+  std::array<std::uint64_t, 2> counters{}, lost{}, missed{};
+  std::int64_t slave_offset = 777'000'000;
+  bool slave_here = true, lose = false, miss = false;
+};
+
+TEST(RigModes, aMasterThatStopsAndStartsProvesItsSlaves) {
+  for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+    SCOPED_TRACE("seed " + std::to_string(seed));
+    MasterRig rig(seed);
+    rig.counters = {0, 12};
+    for (int i = 0; i < 200; ++i) rig.pulse();
+    EXPECT_EQ(rig.pauses, 1);
+    EXPECT_TRUE(rig.sync.proven(1));
+    rig.lose = true;
+    for (int i = 0; i < 1000; ++i) rig.pulse();
+    rig.lose = false;
+    for (int i = 0; i < 100; ++i) rig.pulse();
+    EXPECT_EQ(rig.pauses, 1);
+    EXPECT_EQ(rig.sync.counters().unproven, 0U);
+    // At even intervals a trigger that is missed is in doubt until another gap.
+    rig.miss = true;
+    for (int i = 0; i < 100; ++i) rig.pulse();
+    EXPECT_EQ(rig.pauses, 2);
+    EXPECT_GT(rig.sync.counters().unproven, 5U);
+    EXPECT_LT(rig.sync.counters().unproven, 30U);
+    rig.sync.absent(1);
+    rig.slave_here = false;
+    for (int i = 0; i < 100; ++i) rig.pulse();
+    rig.sync.restarted(1);
+    rig.slave_here = true;
+    rig.slave_offset = -123'456'789'000;
+    rig.counters[1] = 1;
+    const auto before = rig.sync.counters();
+    for (int i = 0; i < 200; ++i) rig.pulse();
+    rig.out.expect_pairs();
+    const SyncCounters c = rig.sync.counters();
+    EXPECT_EQ(c.acquisitions[1] - before.acquisitions[1], 1U);
+    EXPECT_EQ(c.lost[0], rig.lost[0]);
+    EXPECT_EQ(c.lost[1], rig.lost[1]);
+    EXPECT_EQ(c.missed_trigger[1], rig.missed[1]);
+    EXPECT_GT(rig.out.complete(), 1200U);
+    for (const SyncedSet& s : rig.out.sets) EXPECT_TRUE(s.proof == SyncProof::master || s.proof == SyncProof::unproven);
+  }
+}
+
+// ---- what all with pulses share ----
+
+Pulse pulse_at(std::uint64_t number, HostStamp at) {
+  Pulse p;
+  p.number = number;
+  p.edge = DeviceStamp(at.ns() - 70'000'000'000);
+  p.arrival = at + Duration::milliseconds(2);
+  p.mapped = true;
+  p.host = at;
+  p.host_error = Duration::microseconds(15);
+  return p;
+}
+
+/// Varied by a millisecond, in an order of its own.
+Duration varied(std::uint64_t n) { return kInterval + Duration::milliseconds((n * n * 7 + n / 3) % 11 < 5 ? 1 : -1); }
+
+TEST(RigModes, oneStampForAllFromTheMeasuredExposureOrFromEdgeDelayAndExposure) {
+  SyncOptions o = options(SyncMode::board);
+  o.camera[0].delay = Duration::microseconds(30);
+  RigSynchronizer sync(o);
+  Out out;
+  HostStamp t(80'000'000'000);
+  std::vector<HostStamp> edges;
+  for (std::uint64_t n = 0; n < 60; ++n) {
+    Pulse p = pulse_at(n, t);
+    if (n >= 40) p.exposure[0] = {true, Duration::microseconds(50), Duration::microseconds(4050)};
+    edges.push_back(t);
+    sync.pulse(p);
+    out.drain(&sync);
+    for (int k = 0; k < 2; ++k) {
+      SyncFrame f = frame(k, static_cast<int>(n), n, t, DeviceStamp(t.ns() + k * 1'000'000'000));
+      if (k == 1) f.exposure = Duration::milliseconds(4);
+      (void)sync.offer(f);
+      out.drain(&sync);
+    }
+    t = t + varied(n);
+  }
+  ASSERT_GT(out.complete(), 35U);
+  for (const SyncedSet& s : out.sets) {
+    const HostStamp edge = edges[s.slots[0]];
+    const bool measured = s.slots[0] >= 40;
+    EXPECT_EQ(s.stamp - edge, measured ? Duration::microseconds(2050) : Duration::microseconds(3030));
+    EXPECT_EQ(s.spread, measured ? Duration::microseconds(50) : Duration::microseconds(1030)) << "unequal exposures";
+    EXPECT_EQ(s.error, Duration::microseconds(15));
+    EXPECT_TRUE(s.reported);
+  }
+}
+
+TEST(RigModes, aReportThatContradictsAFrameMakesItsSetUnproven) {
+  RigSynchronizer sync(options(SyncMode::board));
+  Out out;
+  HostStamp t(80'000'000'000);
+  for (std::uint64_t n = 0; n < 40; ++n) {
+    sync.pulse(pulse_at(n, t));
+    for (int k = 0; k < 2; ++k) (void)sync.offer(frame(k, static_cast<int>(n), n, t, DeviceStamp(t.ns()))), out.drain(&sync);
+    t = t + varied(n);
+  }
+  ASSERT_TRUE(sync.proven(0) && sync.proven(1));
+  // The frames come first; the report then says that the pulse went out 700 µs earlier than their stamps do.
+  for (int k = 0; k < 2; ++k) (void)sync.offer(frame(k, 40, 40, t, DeviceStamp(t.ns()))), out.drain(&sync);
+  const std::size_t before = out.sets.size();
+  sync.pulse(pulse_at(40, t - Duration::microseconds(700)));
+  out.drain(&sync);
+  ASSERT_EQ(out.sets.size(), before + 1);
+  EXPECT_EQ(out.sets.back().proof, SyncProof::unproven);
+  EXPECT_EQ(sync.counters().contradictions[0], 1U);
+  EXPECT_EQ(sync.counters().contradictions[1], 1U);
+  EXPECT_FALSE(sync.proven(0));
+}
+
+TEST(RigModes, modesHaveNamesAndNonsenseIsNamed) {
+  for (const SyncMode m : {SyncMode::counter, SyncMode::software, SyncMode::board, SyncMode::ins_syncout, SyncMode::master_strobe,
+                           SyncMode::bus, SyncMode::ptp}) {
+    EXPECT_EQ(sync_mode_of(to_string(m)), m);
+    EXPECT_EQ(options(m).validate(), nullptr);
+  }
+  EXPECT_FALSE(sync_mode_of("bored").has_value());
+  SyncOptions o = options(SyncMode::board);
+  o.camera[1].jitter = Duration::milliseconds(6);
+  EXPECT_NE(o.validate(), nullptr) << "an eighth of the interval and more";
+  o.camera[1].jitter = Duration::milliseconds(4);
+  EXPECT_EQ(o.validate(), nullptr);
+  o.camera[0].delay = Duration::milliseconds(40);
+  EXPECT_NE(o.validate(), nullptr);
+  o = options(SyncMode::bus);
+  o.tolerance = Duration::milliseconds(21);
+  EXPECT_NE(o.validate(), nullptr);
+  o = options(SyncMode::master_strobe);
+  o.cameras = 1;
+  EXPECT_NE(o.validate(), nullptr);
+}
+
+}  // namespace
+}  // namespace vergence
