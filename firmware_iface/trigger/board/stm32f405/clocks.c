@@ -35,7 +35,7 @@ enum {
   acr_caches = (1 << 8) | (1 << 9) | (1 << 10)
 };
 
-static bool wait_for(Register* at, uint32_t mask, uint32_t value) {
+static bool wait_for(const Register* at, uint32_t mask, uint32_t value) {
   for (unsigned i = 0; i < ready_loops; ++i)
     if ((*at & mask) == value) return true;
   return false;
