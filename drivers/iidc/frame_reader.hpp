@@ -35,6 +35,8 @@ class FrameReader {
  public:
   void begin(const CameraPlan& plan, bool isochronous, SharedClock* clock) noexcept;
   [[nodiscard]] ReadFrame read(const Arrival& arrival) noexcept;
+  /// What the next frame was exposed for: stamps of other instants are brought to its start.
+  void set_exposure(Duration exposure) noexcept { exposure_ = exposure; }
 
  private:
   struct Embedded {

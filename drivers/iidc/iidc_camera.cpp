@@ -1,5 +1,6 @@
 #include "drivers/iidc/iidc_camera.hpp"
 
+#include <algorithm>
 #include <chrono>
 #include <exception>
 #include <utility>
@@ -71,14 +72,18 @@ DeviceStatus IidcCamera::configure_or_throw(const CameraConfiguration& wanted, C
   return DeviceStatus::ok;
 }
 
+/// From one packet a cycle on 1394; on USB as fast as the wire at best.
+Duration IidcCamera::transfer_time() const noexcept {
+  const BusTraits& bus = bus_->traits();
+  if (bus.isochronous)
+    return Duration::seconds(static_cast<double>(packets_for(plan_.shape.frame_bytes, plan_.shape.packet_bytes)) / kCyclesPerSecond);
+  return Duration::seconds(static_cast<double>(plan_.shape.image_bytes) / bus.bytes_per_second);
+}
+
 DeviceTiming IidcCamera::timing() const noexcept {
   DeviceTiming t;
   const BusTraits& bus = bus_->traits();
-  // From one packet a cycle on 1394; on USB as fast as the wire at best.
-  const double transfer = bus.isochronous
-                              ? static_cast<double>(packets_for(plan_.shape.frame_bytes, plan_.shape.packet_bytes)) / kCyclesPerSecond
-                              : static_cast<double>(plan_.shape.image_bytes) / bus.bytes_per_second;
-  t.least_delay = plan_.exposure + Duration::seconds(transfer);
+  t.least_delay = plan_.exposure + transfer_time();
   const bool stamped = plan_.info.has(FrameInfoItem::time);
   t.resolution = stamped ? Duration::nanoseconds(kCycleNs / kTicksPerCycle + 1) : Duration::nanoseconds(kCycleNs);
   if (!stamped && !bus.isochronous) {  // the stamp is the arrival
@@ -92,6 +97,7 @@ DeviceStatus IidcCamera::start(Notifier* ready) noexcept {
   if (!configured_) return DeviceStatus::bad_configuration;
   if (streaming_.load(std::memory_order_acquire) && !lost_.load(std::memory_order_acquire)) return DeviceStatus::ok;
   const bool again = streaming_.load(std::memory_order_acquire);
+  const std::lock_guard lock(asking_);
   bus_->stop();
   notifier_.store(ready, std::memory_order_release);
   try {
@@ -138,6 +144,9 @@ DeviceStatus IidcCamera::begin() {
   plan_.info = plan.info;
   drain();
   reader_.begin(plan_, bus_->traits().isochronous, clock_.get());
+  exposures_.reset({plan_.exposure, plan_.gain_db});
+  exposure_now_ = plan_.exposure;
+  transfer_ = transfer_time();
   strays_ = 0;
   gone_.store(false, std::memory_order_release);
   streaming_.store(true, std::memory_order_release);
@@ -163,6 +172,7 @@ DeviceStatus IidcCamera::begin() {
 void IidcCamera::stop() noexcept {
   const bool was = streaming_.exchange(false, std::memory_order_acq_rel);
   if (was && !lost_.load(std::memory_order_acquire)) {
+    const std::lock_guard lock(asking_);
     registers_.transmit(false);
     if (registers_.take_status() == DeviceStatus::gone) lost_.store(true, std::memory_order_release);
   }
@@ -176,6 +186,7 @@ DeviceStatus IidcCamera::trigger_once() noexcept {
   if (!configured_ || plan_.trigger != CameraTrigger::software) return DeviceStatus::unsupported;
   if (!streaming_.load(std::memory_order_acquire)) return DeviceStatus::stopped;
   if (lost_.load(std::memory_order_acquire)) return DeviceStatus::gone;
+  const std::lock_guard lock(asking_);
   registers_.software_trigger();
   const DeviceStatus status = registers_.take_status();
   if (status == DeviceStatus::ok) return status;
@@ -185,6 +196,26 @@ DeviceStatus IidcCamera::trigger_once() noexcept {
     complaint_.clear();
   }
   return status;
+}
+
+DeviceStatus IidcCamera::set_exposure(const ExposureSetting& wanted, ExposureSetting* actual) noexcept {
+  if (!streaming_.load(std::memory_order_acquire)) return DeviceStatus::stopped;
+  if (lost_.load(std::memory_order_acquire)) return DeviceStatus::gone;
+  const std::lock_guard lock(asking_);
+  if (wanted.exposure <= Duration{} || wanted.exposure.to_seconds() * plan_.rate_hz > 1) return DeviceStatus::bad_configuration;
+  const auto nearest = [](const AbsoluteRange& r, double value) { return std::clamp(value, r.least, std::max(r.least, r.most)); };
+  ExposureSetting taken{plan_.exposure, plan_.gain_db};
+  if (const AbsoluteRange r = registers_.absolute_range(Feature::shutter); r.present)
+    taken.exposure = Duration::seconds(registers_.set_absolute(Feature::shutter, nearest(r, wanted.exposure.to_seconds())));
+  if (const AbsoluteRange r = registers_.absolute_range(Feature::gain); r.present)
+    taken.gain_db = registers_.set_absolute(Feature::gain, nearest(r, wanted.gain_db));
+  const DeviceStatus status = registers_.take_status();
+  if (status != DeviceStatus::ok) return status == DeviceStatus::gone ? status : DeviceStatus::failed;
+  plan_.exposure = taken.exposure;  // also after a stop or a replug
+  plan_.gain_db = taken.gain_db;
+  (void)exposures_.change(taken, monotonic_now());
+  if (actual != nullptr) *actual = taken;
+  return DeviceStatus::ok;
 }
 
 std::string IidcCamera::remark() const {
@@ -204,6 +235,9 @@ CameraStatistics IidcCamera::statistics() const noexcept {
 
 bool IidcCamera::frame(const Arrival& arrival) noexcept {
   if (lost_.load(std::memory_order_acquire)) return false;  // nothing follows a `gone`
+  const ExposureSetting& had = exposures_.at(arrival.at - transfer_ - exposure_now_);
+  exposure_now_ = had.exposure;
+  reader_.set_exposure(had.exposure);
   const ReadFrame read = reader_.read(arrival);
   if (!read.taken) {
     if (read.stray && ++strays_ == kStrays) gone(arrival.at);
@@ -212,7 +246,7 @@ bool IidcCamera::frame(const Arrival& arrival) noexcept {
   strays_ = 0;
   missing_.fetch_add(read.missing, std::memory_order_relaxed);
   Delivery d;
-  d.frame = {arrival.slot, read.counter, read.exposure_start, arrival.at, plan_.exposure, read.status};
+  d.frame = {arrival.slot, read.counter, read.exposure_start, arrival.at, had.exposure, read.status, had.gain_db};
   const bool convert = !plan_.grey.none();
   if (convert) {
     const auto slot = converted_.acquire();

@@ -8,6 +8,7 @@
 
 #include "core/memory/ring.hpp"
 #include "drivers/camera.hpp"
+#include "drivers/exposure/applied_exposure.hpp"
 #include "drivers/iidc/bus.hpp"
 #include "drivers/iidc/camera_plan.hpp"
 #include "drivers/iidc/frame_reader.hpp"
@@ -43,6 +44,7 @@ class IidcCamera final : public CameraDevice, private StreamSink {
   void release(FrameSlot slot) noexcept override;
   void stop() noexcept override;
   [[nodiscard]] DeviceStatus trigger_once() noexcept override;
+  [[nodiscard]] DeviceStatus set_exposure(const ExposureSetting& wanted, ExposureSetting* actual) noexcept override;
   [[nodiscard]] std::string complaint() const override { return complaint_; }
   [[nodiscard]] std::string remark() const override;
   [[nodiscard]] CameraStatistics statistics() const noexcept override;
@@ -60,20 +62,24 @@ class IidcCamera final : public CameraDevice, private StreamSink {
   void push(const Delivery& delivery) noexcept;
   [[nodiscard]] DeviceStatus configure_or_throw(const CameraConfiguration& wanted, CameraConfiguration* actual);
   [[nodiscard]] DeviceStatus begin();
+  [[nodiscard]] Duration transfer_time() const noexcept;
   void return_slot(FrameSlot slot) noexcept;
   void drain() noexcept;
   [[nodiscard]] DeviceStatus refused(DeviceStatus status, std::string why);
 
   std::unique_ptr<CameraBus> bus_;
   std::shared_ptr<SharedClock> clock_;
+  std::mutex asking_;  // of registers_ and plan_ between owner, trigger_once() and set_exposure()
   CameraRegisters registers_;
   CameraPlan plan_{};
   int sharing_ = 1;
   bool configured_ = false;
   std::string complaint_;
 
-  FrameReader reader_;    // the stream's thread
-  SlotMemory converted_;  // where the bus's buffers are not the image
+  FrameReader reader_;  // the stream's thread
+  exposure::AppliedExposure exposures_;
+  Duration transfer_{}, exposure_now_{};  // of a frame over the bus; of the last frame
+  SlotMemory converted_;                  // where the bus's buffers are not the image
   int strays_ = 0;
 
   Ring<Delivery, 128> ready_;  // more than there are slots

@@ -15,13 +15,13 @@ namespace {
 constexpr int kPollLimit_ms = 500;  // the longest look of the capture thread; nothing depends on it
 constexpr int kPollErrors = 20;     // looks in a row that end in an error without a frame: nothing comes any more
 
+}  // namespace
+
 HostStamp monotonic_now() noexcept {
   timespec t{};
   (void)::clock_gettime(CLOCK_MONOTONIC, &t);
   return HostStamp(static_cast<std::int64_t>(t.tv_sec) * 1'000'000'000 + t.tv_nsec);
 }
-
-}  // namespace
 
 void V4l2Camera::wake_capture() const noexcept {
   const std::uint64_t one = 1;
@@ -94,7 +94,10 @@ void V4l2Camera::handle(Filled filled) noexcept {
   if (filled.index >= slots_.buffers()) return;  // a driver that invents buffers
   Frame frame;
   frame.arrival = monotonic_now();
-  frame.exposure = s.actual.exposure;
+  const ExposureSetting& had = exposures_.at(frame.arrival - s.readout - exposure_now_);
+  exposure_now_ = had.exposure;
+  frame.exposure = had.exposure;
+  frame.gain_db = had.gain_db;
   const StampKind kind = stamp_kind(filled.flags, filled.stamp_ns);
   frame.exposure_start = exposure_start(kind, filled.stamp_ns, frame.arrival, frame.exposure, s.readout);
   const std::size_t needed = least_frame_bytes(s.format, s.actual.width, s.actual.height, s.stride);

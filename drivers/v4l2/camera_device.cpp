@@ -151,6 +151,7 @@ DeviceStatus V4l2Camera::start(Notifier* ready) noexcept {
   }
   if (!wanted_) return DeviceStatus::bad_configuration;
   try {
+    const std::lock_guard controlling(controlling_);
     end_thread();
     if (lost_node_) {
       if (const DeviceStatus status = open_again(); status != DeviceStatus::ok) return status;
@@ -167,6 +168,8 @@ DeviceStatus V4l2Camera::start(Notifier* ready) noexcept {
     raster_.reset();
     if (settings_->options.thin > 1) raster_.emplace(Duration::seconds(1 / settings_->actual.rate_hz));
     poll_errors_ = 0;
+    exposures_.reset({settings_->actual.exposure, settings_->actual.gain_db});
+    exposure_now_ = settings_->actual.exposure;
     {
       const std::lock_guard lock(mutex_);
       streaming_ = true;
@@ -233,6 +236,25 @@ void V4l2Camera::stop() noexcept {
   }
   changed_.notify_all();
   end_thread();
+}
+
+DeviceStatus V4l2Camera::set_exposure(const ExposureSetting& wanted, ExposureSetting* actual) noexcept {
+  const std::lock_guard controlling(controlling_);
+  {
+    const std::lock_guard lock(mutex_);
+    if (!streaming_) return DeviceStatus::stopped;
+    if (gone_) return DeviceStatus::gone;
+  }
+  if (wanted.exposure <= Duration{} || wanted.exposure.to_seconds() * settings_->actual.rate_hz > 1) return DeviceStatus::bad_configuration;
+  ExposureSetting taken;
+  if (const DeviceStatus status = change_exposure(controls_, *settings_, wanted, &taken); status != DeviceStatus::ok) return status;
+  wanted_->exposure = taken.exposure;  // also after it was unplugged
+  wanted_->gain_db = taken.gain_db;
+  settings_->actual.exposure = taken.exposure;
+  settings_->actual.gain_db = taken.gain_db;
+  (void)exposures_.change(taken, monotonic_now());
+  if (actual != nullptr) *actual = taken;
+  return DeviceStatus::ok;
 }
 
 // ---- the consumer's side ------------------------------------------------------------------------------------------

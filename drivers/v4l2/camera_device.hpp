@@ -9,6 +9,7 @@
 #include <thread>
 
 #include "drivers/camera.hpp"
+#include "drivers/exposure/applied_exposure.hpp"
 #include "drivers/v4l2/capture_queue.hpp"
 #include "drivers/v4l2/controls.hpp"
 #include "drivers/v4l2/node.hpp"
@@ -19,6 +20,9 @@
 namespace vergence::v4l2 {
 
 inline constexpr std::size_t kBufferReserve = 2;  // the kernel always has: with none it drops frames, and nobody knows how many
+
+/// CLOCK_MONOTONIC.
+[[nodiscard]] HostStamp monotonic_now() noexcept;
 
 /// A camera behind a video node: drivers/camera.hpp and v4l2.hpp have the contract.
 ///
@@ -38,6 +42,7 @@ class V4l2Camera final : public CameraDevice {
   ImageView view(FrameSlot slot) const noexcept override { return slots_.view(slot); }
   void release(FrameSlot slot) noexcept override;
   void stop() noexcept override;
+  DeviceStatus set_exposure(const ExposureSetting& wanted, ExposureSetting* actual) noexcept override;
   std::string complaint() const override { return complaint_; }
   std::string remark() const override { return settings_ ? settings_->remark : std::string(); }
   CameraStatistics statistics() const noexcept override;
@@ -64,6 +69,7 @@ class V4l2Camera final : public CameraDevice {
 
   DeviceInfo info_;
   Node node_;
+  std::mutex controlling_;  // of node, controls_ and settings_, between start() and set_exposure()
   UniqueFd fd_, subdevice_, wake_;
   Controls controls_;
   std::optional<CameraConfiguration> wanted_;
@@ -78,6 +84,8 @@ class V4l2Camera final : public CameraDevice {
   Notifier* notifier_ = nullptr;
   std::optional<SequenceCounter> counter_;
   std::optional<Raster> raster_;
+  exposure::AppliedExposure exposures_;
+  Duration exposure_now_{};      // of the last frame
   std::size_t with_kernel_ = 0;  // buffers
   int poll_errors_ = 0;
 

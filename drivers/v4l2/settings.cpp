@@ -250,6 +250,8 @@ class Applier {
                                                    " us; this camera offers " + number(static_cast<double>(c.least) * unit * 1e6) + " to " +
                                                    number(static_cast<double>(c.most) * unit * 1e6) + " us at this rate");
     if (const DeviceStatus status = set(c, value); status != DeviceStatus::ok) return status;
+    out_.exposure_id = c.id;
+    out_.exposure_unit_s = unit;
     out_.actual.exposure = Duration::seconds(static_cast<double>(value) * unit);
     if (out_.actual.exposure <= Duration{}) out_.actual.exposure = wanted_.exposure;
     return DeviceStatus::ok;
@@ -273,6 +275,8 @@ class Applier {
     if (value < c->least || value > c->most)
       return refuse(DeviceStatus::unsupported, "no gain of " + number(wanted_.gain_db) + " dB; this camera offers 0 to " +
                                                    number(static_cast<double>(c->most - c->least) * step));
+    out_.gain_id = c->id;
+    out_.gain_unit_db = options_.gain_step_db;
     out_.actual.gain_db = static_cast<double>(value - c->least) * options_.gain_step_db;
     return set(*c, clamped(*c, value));
   }
@@ -368,6 +372,24 @@ bool parse_options(const CameraConfiguration& wanted, Options* options, std::str
 DeviceStatus apply(int fd, std::uint32_t buffer_type, const Controls& controls, const CameraConfiguration& wanted, const Options& options,
                    Settings* settings, std::string* complaint) {
   return Applier(fd, buffer_type, controls, wanted, options, complaint).run(settings);
+}
+
+DeviceStatus change_exposure(const Controls& controls, const Settings& settings, const ExposureSetting& wanted,
+                             ExposureSetting* actual) noexcept {
+  const auto status_of = [](int error) {
+    return error == 0 ? DeviceStatus::ok : error == ENODEV ? DeviceStatus::gone : DeviceStatus::failed;
+  };
+  const Control* exposure = settings.exposure_id != 0 ? controls.find(settings.exposure_id) : nullptr;
+  if (exposure == nullptr) return DeviceStatus::unsupported;
+  const std::int64_t steps = clamped(*exposure, std::llround(wanted.exposure.to_seconds() / settings.exposure_unit_s));
+  if (const DeviceStatus s = status_of(write(*exposure, steps)); s != DeviceStatus::ok) return s;
+  *actual = {Duration::seconds(static_cast<double>(steps) * settings.exposure_unit_s), settings.actual.gain_db};
+  const Control* gain = settings.gain_id != 0 && settings.gain_unit_db > 0 ? controls.find(settings.gain_id) : nullptr;
+  if (gain == nullptr) return DeviceStatus::ok;
+  const std::int64_t level = clamped(*gain, gain->least + std::llround(wanted.gain_db / settings.gain_unit_db));
+  if (const DeviceStatus s = status_of(write(*gain, level)); s != DeviceStatus::ok) return s;
+  actual->gain_db = static_cast<double>(level - gain->least) * settings.gain_unit_db;
+  return DeviceStatus::ok;
 }
 
 }  // namespace vergence::v4l2

@@ -36,6 +36,8 @@ struct Settings {
   std::size_t stride = 0;      // bytes from a row to the next
   std::size_t image_size = 0;  // bytes of a buffer
   Duration readout{};
+  std::uint32_t exposure_id = 0, gain_id = 0;  // controls; 0: the camera has none that could be set in units
+  double exposure_unit_s = 0, gain_unit_db = 0;
   double camera_rate_hz = 0;  // of the exposures; with `thin` more than actual.rate_hz. 0: not known
   std::string remark;
 };
@@ -45,5 +47,9 @@ struct Settings {
 /// → ok, unsupported, busy, gone, failed; not `ok`: *complaint, and the camera may be somewhere in between.
 [[nodiscard]] DeviceStatus apply(int fd, std::uint32_t buffer_type, const Controls& controls, const CameraConfiguration& wanted,
                                  const Options& options, Settings* settings, std::string* complaint);
+
+/// The nearest exposure and gain that the camera has, also while it streams. *actual: what it took. → ok, unsupported, gone, failed
+[[nodiscard]] DeviceStatus change_exposure(const Controls& controls, const Settings& settings, const ExposureSetting& wanted,
+                                           ExposureSetting* actual) noexcept;
 
 }  // namespace vergence::v4l2

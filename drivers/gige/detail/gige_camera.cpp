@@ -71,6 +71,7 @@ DeviceStatus GigeCamera::configure(const CameraConfiguration& wanted, CameraConf
     wanted_ = wanted;
     options_ = options;
     applied_ = std::move(applied);
+    in_force_ = {applied_.actual.exposure, applied_.actual.gain_db};
     make_slots();
     configured_ = true;
     if (actual != nullptr) *actual = applied_.actual;
@@ -136,6 +137,7 @@ DeviceStatus GigeCamera::apply_again() {
   if (again.payload != applied_.payload || again.format != applied_.format)
     return refuse(DeviceStatus::gone, "the camera came back with frames of another size");
   applied_ = std::move(again);
+  in_force_ = {applied_.actual.exposure, applied_.actual.gain_db};
   stale_ = false;
   return DeviceStatus::ok;
 }
@@ -175,6 +177,8 @@ DeviceStatus GigeCamera::begin(Notifier* ready) {
     return refuse(s, session_->complaint());
   stream_ = session_->stream();
   blocks_.restart();
+  exposures_.reset(in_force_);
+  exposure_now_ = in_force_.exposure;
   wrong_sizes_ = 0;
   heard_ns_ = monotonic_now().ns();
   handover_.begin(ready);
@@ -209,19 +213,42 @@ void GigeCamera::stop() noexcept {
   stream_ = nullptr;
 }
 
+DeviceStatus GigeCamera::standing() const noexcept {
+  switch (handover_.state()) {
+    case Handover::State::stopped:
+      return DeviceStatus::stopped;
+    case Handover::State::streaming:
+      return DeviceStatus::ok;
+    default:
+      return DeviceStatus::gone;
+  }
+}
+
+DeviceStatus GigeCamera::set_exposure(const ExposureSetting& wanted, ExposureSetting* actual) noexcept {
+  try {
+    if (const DeviceStatus s = standing(); s != DeviceStatus::ok) return s;
+    if (wanted.exposure <= Duration{} || wanted.exposure.to_seconds() * wanted_.rate_hz > 1)
+      return refuse(DeviceStatus::bad_configuration, "the exposure must be positive, and shorter than the time between two images");
+    const std::lock_guard lock(device_);
+    if (session_ == nullptr || standing() != DeviceStatus::ok)
+      return standing() == DeviceStatus::stopped ? DeviceStatus::stopped : DeviceStatus::gone;
+    ExposureSetting taken;
+    if (const DeviceStatus s = session_->change_exposure(wanted, options_, &taken); s != DeviceStatus::ok)
+      return refuse(s, session_->complaint());
+    wanted_.exposure = taken.exposure;  // also after it was unplugged
+    wanted_.gain_db = taken.gain_db;
+    in_force_ = taken;
+    (void)exposures_.change(taken, monotonic_now());
+    if (actual != nullptr) *actual = taken;
+    return DeviceStatus::ok;
+  } catch (const std::exception&) {
+    return DeviceStatus::failed;
+  }
+}
+
 DeviceStatus GigeCamera::trigger_once() noexcept {
   if (!configured_ || wanted_.trigger != CameraTrigger::software) return DeviceStatus::unsupported;
   try {
-    const auto standing = [this] {
-      switch (handover_.state()) {
-        case Handover::State::stopped:
-          return DeviceStatus::stopped;
-        case Handover::State::streaming:
-          return DeviceStatus::ok;
-        default:
-          return DeviceStatus::gone;
-      }
-    };
     if (const DeviceStatus s = standing(); s != DeviceStatus::ok) return s;
     const std::lock_guard lock(device_);
     if (session_ == nullptr || standing() != DeviceStatus::ok)
@@ -293,12 +320,15 @@ bool GigeCamera::describe(ArvBuffer* buffer, HostStamp arrival, Frame* frame) no
   handover_.count_lost(step->missing);
   frame->counter = step->counter;
   frame->arrival = arrival;
-  frame->exposure = applied_.actual.exposure;
+  const ExposureSetting& had = exposures_.at(arrival - applied_.plan.transfer - exposure_now_);
+  exposure_now_ = had.exposure;
+  frame->exposure = had.exposure;
+  frame->gain_db = had.gain_db;
   frame->status = whole && right_size(buffer) ? FrameStatus::complete : FrameStatus::torn;
-  const Duration before = timing().least_delay;
+  const Duration before = applied_.plan.transfer + (options_.stamp_at_end ? Duration{} : had.exposure);
   frame->exposure_start = applied_.tick_frequency > 0 ? DeviceStamp(static_cast<std::int64_t>(arv_buffer_get_timestamp(buffer)))
                                                       : DeviceStamp(arrival.ns()) - before;
-  if (options_.stamp_at_end) frame->exposure_start = frame->exposure_start - applied_.actual.exposure;
+  if (options_.stamp_at_end) frame->exposure_start = frame->exposure_start - had.exposure;
   return true;
 }
 

@@ -9,6 +9,7 @@
 
 #include "core/memory/arena.hpp"
 #include "drivers/camera.hpp"
+#include "drivers/exposure/applied_exposure.hpp"
 #include "drivers/gige/detail/block_counter.hpp"
 #include "drivers/gige/detail/handover.hpp"
 #include "drivers/gige/detail/session.hpp"
@@ -41,12 +42,15 @@ class GigeCamera final : public CameraDevice {
   void release(FrameSlot slot) noexcept override { handover_.release(slot); }
   void stop() noexcept override;
   DeviceStatus trigger_once() noexcept override;
+  DeviceStatus set_exposure(const ExposureSetting& wanted, ExposureSetting* actual) noexcept override;
   std::string complaint() const override;
   std::string remark() const override;
   CameraStatistics statistics() const noexcept override { return handover_.statistics(); }
 
  private:
   [[nodiscard]] DeviceStatus refuse(DeviceStatus status, std::string sentence);
+  /// Whether the camera can be asked now. → ok, stopped, gone
+  [[nodiscard]] DeviceStatus standing() const noexcept;
   [[nodiscard]] DeviceStatus reach();
   [[nodiscard]] DeviceStatus apply_again();
   [[nodiscard]] DeviceStatus begin(Notifier* ready);
@@ -82,6 +86,7 @@ class GigeCamera final : public CameraDevice {
   CameraConfiguration wanted_{};
   Options options_{};
   Applied applied_{};
+  ExposureSetting in_force_{};               // what the camera's registers hold; under device_
   bool configured_ = false, stale_ = false;  // stale: the camera may hold what was refused
   std::unique_ptr<Arena> arena_;
   std::span<std::uint8_t> pixels_, wire_;  // slots; transport's buffers where they are not the slots
@@ -94,6 +99,8 @@ class GigeCamera final : public CameraDevice {
   // Of Aravis's thread while a stream is open.
   ArvStream* stream_ = nullptr;
   BlockCounter blocks_;
+  exposure::AppliedExposure exposures_;
+  Duration exposure_now_{};      // of the last frame
   std::vector<FrameSlot> free_;  // converting: slots that are the transport's
   std::atomic<std::int64_t> heard_ns_{0};
   std::atomic<int> wrong_sizes_{0};  // in a row

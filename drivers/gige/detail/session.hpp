@@ -57,6 +57,8 @@ class Session {
   /// Ends both; after it no callback comes. `reachable`: the camera is told, too.
   void close_stream(bool reachable) noexcept;
   [[nodiscard]] DeviceStatus trigger();
+  /// The nearest that the camera has, also while it streams. *actual: as read back. → ok, unsupported, gone
+  [[nodiscard]] DeviceStatus change_exposure(const ExposureSetting& wanted, const Options& options, ExposureSetting* actual);
 
   /// Asks the camera: it answers, and we are in control.
   [[nodiscard]] bool in_control();

@@ -5,6 +5,7 @@
 #include <chrono>
 #include <cmath>
 #include <cstdio>
+#include <string_view>
 #include <thread>
 #include <utility>
 
@@ -157,6 +158,29 @@ DeviceStatus Session::set_exposure(const CameraConfiguration& wanted, const Opti
     return DeviceStatus::ok;
   }
   if (!features_.set(gain, value, "dB", &a->actual.gain_db)) return refuse(DeviceStatus::unsupported, features_.complaint());
+  return DeviceStatus::ok;
+}
+
+DeviceStatus Session::change_exposure(const ExposureSetting& wanted, const Options& o, ExposureSetting* actual) {
+  const char* exposure = features_.find(Purpose::exposure);
+  if (o.exposure_mode == "trigger_width" || exposure == nullptr)
+    return refuse(DeviceStatus::unsupported, "the camera's exposure cannot be set");
+  const auto set_nearest = [this](const char* name, double value, const char* unit, double* taken) {
+    const auto limits = features_.bounds(name);
+    return features_.set(name, limits ? std::clamp(value, limits->least, std::max(limits->least, limits->most)) : value, unit, taken);
+  };
+  double us = 0;
+  *actual = wanted;
+  if (!set_nearest(exposure, wanted.exposure.to_seconds() * 1e6, "us", &us))
+    return refuse(in_control() ? DeviceStatus::unsupported : DeviceStatus::gone, features_.complaint());
+  actual->exposure = Duration::seconds(us * 1e-6);
+  const char* gain = features_.find(Purpose::gain);
+  if (gain == nullptr || std::string_view(gain) == "GainRaw") {  // none, or in no unit that could be reckoned with
+    actual->gain_db = 0;
+    return DeviceStatus::ok;
+  }
+  if (!set_nearest(gain, wanted.gain_db, "dB", &actual->gain_db))
+    return refuse(in_control() ? DeviceStatus::unsupported : DeviceStatus::gone, features_.complaint());
   return DeviceStatus::ok;
 }
 

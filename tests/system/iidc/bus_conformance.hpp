@@ -38,6 +38,7 @@ class BusConformance final : public ConformanceRig {
     region.height = 120;
     return {free, pulsed, asked, wide, region};
   }
+  std::vector<ExposureSetting> exposures() override { return {{Duration::milliseconds(2), 0}, {Duration::milliseconds(8), 6}}; }
   std::vector<CameraConfiguration> impossible() override {
     std::vector<CameraConfiguration> all(6, possible().front());
     all[0].width = 321;

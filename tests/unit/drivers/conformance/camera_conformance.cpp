@@ -181,6 +181,52 @@ TEST_F(CameraConformance, exposuresThatNeverArriveAreCounted) {
   EXPECT_EQ(after.lost - before.lost, 4U);
 }
 
+/// Frames until one has that setting; false: none of the next had.
+bool reaches(ConformanceRig& rig, const CameraConfiguration& c, const ExposureSetting& setting) {
+  constexpr int kFrames = 12;  // an exposure under way, buffers in the camera and on the way
+  for (int i = 0; i < kFrames; ++i) {
+    if (c.trigger == CameraTrigger::software) (void)rig.camera().trigger_once();
+    Frame frame;
+    if (rig.camera().wait(Duration::seconds(2), &frame) != DeviceStatus::ok) return false;
+    rig.camera().release(frame.slot);
+    if (frame.exposure == setting.exposure && frame.gain_db == setting.gain_db) return true;
+  }
+  return false;
+}
+
+TEST_F(CameraConformance, anExposureSetWhileStreamingIsToldByFramesAndKeptOverAStop) {
+  if (make(18) == nullptr) GTEST_SKIP() << why_;
+  CameraDevice& camera = rig_->camera();
+  const auto c = rig_->possible().front();
+  ASSERT_EQ(camera.configure(c, nullptr), DeviceStatus::ok) << camera.complaint();
+  const std::vector<ExposureSetting> settings = rig_->exposures();
+  ExposureSetting actual;
+  if (settings.empty()) {
+    ASSERT_EQ(camera.start(nullptr), DeviceStatus::ok) << camera.complaint();
+    EXPECT_EQ(camera.set_exposure({c.exposure, c.gain_db}, &actual), DeviceStatus::unsupported);
+    return;
+  }
+  EXPECT_EQ(camera.set_exposure(settings[0], &actual), DeviceStatus::stopped);
+  ASSERT_EQ(camera.start(nullptr), DeviceStatus::ok) << camera.complaint();
+  rig_->started();
+  EXPECT_TRUE(reaches(*rig_, c, {c.exposure, c.gain_db})) << "as configured";
+  EXPECT_EQ(camera.set_exposure({-c.exposure, 0}, &actual), DeviceStatus::bad_configuration);
+  EXPECT_EQ(camera.set_exposure({Duration::seconds(2 / c.rate_hz), 0}, &actual), DeviceStatus::bad_configuration);
+  for (const ExposureSetting& s : settings) {
+    ASSERT_EQ(camera.set_exposure(s, &actual), DeviceStatus::ok) << camera.complaint();
+    EXPECT_EQ(actual, s);
+    EXPECT_TRUE(reaches(*rig_, c, s));
+  }
+  // Beyond what it has: the nearest.
+  ASSERT_EQ(camera.set_exposure({settings[0].exposure, 1e6}, &actual), DeviceStatus::ok) << camera.complaint();
+  EXPECT_LT(actual.gain_db, 1e6);
+  EXPECT_TRUE(reaches(*rig_, c, actual));
+  camera.stop();
+  ASSERT_EQ(camera.start(nullptr), DeviceStatus::ok) << camera.complaint();
+  EXPECT_TRUE(reaches(*rig_, c, actual));
+  camera.stop();
+}
+
 TEST_F(CameraConformance, anUnpluggedCameraIsGoneAndComesBack) {
   if (make(16) == nullptr) GTEST_SKIP() << why_;
   ShadowCamera camera(rig_.get());

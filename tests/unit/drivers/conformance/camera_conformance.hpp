@@ -46,6 +46,8 @@ class ConformanceRig {
     (void)frame, (void)image;
     return true;
   }
+  /// Two exposures that the camera takes as they are while it streams in possible().front(). Empty: this camera cannot be asked.
+  [[nodiscard]] virtual std::vector<ExposureSetting> exposures() { return {}; }
   /// False: counters go on over a stop (a rig whose pulses go on).
   [[nodiscard]] virtual bool counts_from_start() const { return true; }
 };

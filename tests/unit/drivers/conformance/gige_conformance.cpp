@@ -43,6 +43,7 @@ class GigeConformance final : public ConformanceRig {
     all[3].gain_db = 90;
     return all;
   }
+  std::vector<ExposureSetting> exposures() override { return {{Duration::milliseconds(1), 0}, {Duration::milliseconds(8), 6}}; }
   bool unplug() override {
     simulator_.unplug();
     return true;

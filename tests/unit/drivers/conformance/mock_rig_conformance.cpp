@@ -44,6 +44,7 @@ class MockConformance final : public ConformanceRig {
     (void)rig_->trigger().configure({50}, nullptr);
     (void)rig_->trigger().start(nullptr);
   }
+  std::vector<ExposureSetting> exposures() override { return {{Duration::milliseconds(4), 0}, {Duration::milliseconds(8), 6}}; }
   bool counts_from_start() const override { return false; }
 
  private:

@@ -43,6 +43,7 @@ class ModelConformance final : public ConformanceRig {
     all[6].options["trigger_source"] = "many";
     return all;
   }
+  std::vector<ExposureSetting> exposures() override { return {{Duration::milliseconds(2), 0}, {Duration::milliseconds(8), 6}}; }
   bool unplug() override {
     bus_->unplug();
     return true;

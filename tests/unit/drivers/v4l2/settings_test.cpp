@@ -30,6 +30,16 @@ TEST(V4l2Settings, nonsenseIsNamed) {
   EXPECT_NE(nonsense([](auto* c) { c->gain_db = std::numeric_limits<double>::infinity(); }), "");
 }
 
+TEST(V4l2Settings, aCameraWithoutAnExposureInUnitsCannotBeAskedForAnother) {
+  ExposureSetting actual{Duration::milliseconds(3), 1};
+  EXPECT_EQ(change_exposure(Controls{}, Settings{}, {Duration::milliseconds(2), 0}, &actual), DeviceStatus::unsupported);
+  Settings lost;
+  lost.exposure_id = 0x009a0902;
+  lost.exposure_unit_s = 1e-4;
+  EXPECT_EQ(change_exposure(Controls{}, lost, {Duration::milliseconds(2), 0}, &actual), DeviceStatus::unsupported);
+  EXPECT_EQ(actual, (ExposureSetting{Duration::milliseconds(3), 1}));
+}
+
 TEST(V4l2Settings, optionsAreReadIntoTheirTypes) {
   CameraConfiguration c = sound();
   c.options = {{"readout_us", "12500.5"}, {"thin", "4"},
