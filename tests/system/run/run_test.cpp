@@ -155,6 +155,29 @@ TEST(Run, aMaskIsHeldAgainstTheCamerasSizeAndItsSkyIsMissedByNobody) {
   EXPECT_NEAR(summary_of(folder / "b")["truth"]["path_ratio"].get<double>(), 1, 0.02);
 }
 
+TEST(Run, atNightControlledExposuresKeepThePosesAndAreTheSameOnEveryRun) {
+  const TemporaryFolder folder;
+  const std::string night = "--duration 14 --quiet --set exposure.mode=auto --fault 'night@5 factor=0.05 duration_s=6'" + kSmall;
+  ASSERT_EQ(drive(folder / "a", night + " --threads 2").code, 0);
+  ASSERT_EQ(drive(folder / "b", night + " --threads 1").code, 0);
+  EXPECT_EQ(text_of(folder / "a" / "trajectory.tum"), text_of(folder / "b" / "trajectory.tum"));
+  const auto summary = summary_of(folder / "a");
+  const auto& devices = summary["devices"];
+  // A twentieth of the light is 4.3 stops: at a stop a change, six images apart, some of the first twenty have too little of it.
+  EXPECT_GE(summary["frames"]["posed"].get<int>(), 281 - 20);
+  EXPECT_GT(devices["exposure_changes"].get<int>(), 4);
+  EXPECT_EQ(devices["exposure_refused"].get<int>() + devices["exposure_unequal"].get<int>() + devices["exposure_again"].get<int>(), 0);
+  EXPECT_LE(devices["exposure_last_us"].get<int>(), 8000);
+  EXPECT_EQ(devices["gain_last_millidb"], 0) << "by day no gain is left";
+  EXPECT_EQ(summary["allocations_after_seal"], 0);
+  // Clocks are mapped by the ends of exposures: their changes do not shift the stamps.
+  EXPECT_NEAR(summary["truth"]["path_ratio"].get<double>(), 1, 0.02);
+  const Outcome o = drive(folder / "c", "--duration 2 --quiet --set exposure.mode=auto --set exposure.max_us=60000");
+  EXPECT_EQ(o.code, 2);
+  EXPECT_NE(o.err.find("exposure.max_us is 60000, longer than the 50000 µs between two pulses (trigger.rate 20)"), std::string::npos)
+      << o.err;
+}
+
 TEST(Run, faultsActAndTheDriveGoesOn) {
   const TemporaryFolder folder;
   const auto session = folder / "s";
