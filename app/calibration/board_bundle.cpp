@@ -13,7 +13,7 @@ namespace {
 
 constexpr int kMostSteps = 200;
 constexpr double kFirstDamping = 1e-4, kLeastDamping = 1e-12, kMostDamping = 1e12;
-constexpr double kSmallGain = 1e-14;  // relative decrease of the sum: the answer has stopped moving
+constexpr double kSmallGain = 1e-11;  // relative decrease of the sum: the last step was below 1e-4 sigma, for any number of corners here
 
 using Matrix = Eigen::MatrixXd;
 using Vector = Eigen::VectorXd;

@@ -36,7 +36,7 @@ double lens_value(const Intrinsics& lens, std::size_t i) {
 std::string lens_table(const BoardReport& r) {
   const auto cameras = static_cast<std::size_t>(r.file.rig.cameras);
   std::string text = fmt::format("{:<14}", "");
-  for (std::size_t k = 0; k < cameras; ++k) text += fmt::format("{:>28}", r.file.names[k]);
+  for (std::size_t k = 0; k < cameras; ++k) text += fmt::format("{:>36}", r.file.names[k]);
   text += "\n";
   const auto names = lens_numbers(r);
   for (std::size_t i = 0; i < names.size(); ++i) {
@@ -45,14 +45,14 @@ std::string lens_table(const BoardReport& r) {
       const Intrinsics& lens = r.file.rig.intrinsics[k];
       const double sigma = i < 4 ? lens.sigma[i] : r.found.cameras[k].distortion_sigma[i - 4];
       const int digits = digits_for(sigma);
-      text += fmt::format("{:>28}", fmt::format("{:.{}f} ± {:.{}f} ({:.{}f})", lens_value(lens, i), digits, sigma, digits,
+      text += fmt::format("{:>36}", fmt::format("{:.{}f} ± {:.{}f} ({:.{}f})", lens_value(lens, i), digits, sigma, digits,
                                                 r.found.cameras[k].between[i], digits));
     }
     text += "\n";
   }
   const auto row = [&](const char* name, auto&& value) {
     text += fmt::format("{:<14}", name);
-    for (std::size_t k = 0; k < cameras; ++k) text += fmt::format("{:>28}", value(k));
+    for (std::size_t k = 0; k < cameras; ++k) text += fmt::format("{:>36}", value(k));
     text += "\n";
   };
   row("rms, px", [&](std::size_t k) { return fmt::format("{:.4f}", r.found.cameras[k].rms_px); });
@@ -83,7 +83,7 @@ bool views_share_errors(const BoardReport& r) {
   int more = 0, all = 0;
   for (std::size_t k = 1; k < static_cast<std::size_t>(r.file.rig.cameras); ++k)
     for (std::size_t i = 0; i < 6; ++i, ++all) more += r.found.between[k][i] > kSharedErrors * r.file.rig.sigma_wide[k][i] ? 1 : 0;
-  return 2 * more > all;
+  return all > 0 && 2 * more >= all;
 }
 
 std::string baseline_sentence(const BoardReport& r) {

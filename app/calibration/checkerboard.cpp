@@ -18,6 +18,7 @@ constexpr double kSmallestSquare = 0.001, kLargest = 10.0;  // m
 constexpr int kLargeImage = 1200;                           // px: from this width on squares may be too large for the detector's windows
 constexpr int kNarrowestWindow = 2, kWidestWindow = 11;     // px, half windows
 constexpr double kWindowOfSquare = 0.3;                     // half window over the smallest distance of two corners
+constexpr double kBlur = 0.7;                               // px: the refinement's interpolation shifts corners of sharper images
 constexpr int kRefineSteps = 100;
 constexpr double kRefineTolerance = 1e-4;  // px
 
@@ -104,7 +105,9 @@ std::optional<std::vector<Vec2>> find_checkerboard(const ImageView& image, const
   std::vector<cv::Point2f> corners;
   if (!detect(pixels, board, search, &corners) || corners.size() != board.corners()) return std::nullopt;
   const int window = std::clamp(static_cast<int>(kWindowOfSquare * smallest_spacing(corners, board)), kNarrowestWindow, kWidestWindow);
-  cv::cornerSubPix(pixels, corners, {window, window}, {-1, -1},
+  cv::Mat soft;
+  cv::GaussianBlur(pixels, soft, {}, kBlur);
+  cv::cornerSubPix(soft, corners, {window, window}, {-1, -1},
                    {cv::TermCriteria::COUNT + cv::TermCriteria::EPS, kRefineSteps, kRefineTolerance});
   make_right_handed(board, &corners);
   if (board.tells_its_ends() && first_square_brighter(pixels, board, corners) < 0) std::reverse(corners.begin(), corners.end());

@@ -33,7 +33,7 @@ enum class BoardSearch : std::uint8_t {
   quick,     // live: gives up soon where no board is
 };
 
-/// The corners of the board in an image to a few hundredths of a pixel, row by row, in the order of Checkerboard::corner(); pixel centres
+/// The corners of the board in an image to about a tenth of a pixel, row by row, in the order of Checkerboard::corner(); pixel centres
 /// at integers. The corner from which the rows run to the right and down is found by the squares' colours where they tell, else it is
 /// the detector's choice: see same_way_up(). Nothing: not all of them are there.
 ///

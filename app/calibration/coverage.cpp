@@ -29,11 +29,13 @@ Coverage::Coverage(const Checkerboard& board, std::vector<std::string> names, st
 
 void Coverage::count(const BoardView& view, std::size_t camera, Seen* seen) const {
   const ImageSize size = sizes_[camera];
+  std::array<int, kParts> parts{};
   for (const Vec2& c : view.corners[camera]) {
     const double x = std::clamp(c.x() / size.width, 0.0, 0.999), y = std::clamp(c.y() / size.height, 0.0, 0.999);
     ++seen->cells[static_cast<std::size_t>(static_cast<int>(y * kRows) * kColumns + static_cast<int>(x * kColumns))];
-    ++seen->parts[static_cast<std::size_t>(part_of(y) * 3 + part_of(x))];
+    ++parts[static_cast<std::size_t>(part_of(y) * 3 + part_of(x))];
   }
+  for (std::size_t i = 0; i < kParts; ++i) seen->parts[i] = std::max(seen->parts[i], parts[i]);
 }
 
 Coverage::Stand Coverage::stand_of(const BoardView& view) const {

@@ -34,7 +34,7 @@ class Coverage {
   static constexpr std::size_t kParts = 9, kTilts = 4;
   struct Seen {
     std::array<int, kColumns * kRows> cells{};
-    std::array<int, kParts> parts{};
+    std::array<int, kParts> parts{};  // of the view that has most there
   };
   /// How the board stands before camera 0.
   struct Stand {
@@ -55,7 +55,7 @@ class Coverage {
 };
 
 inline constexpr std::size_t kEnoughViews = 12;
-inline constexpr int kEnoughCorners = 6;     // in a part
+inline constexpr int kEnoughCorners = 6;     // of one view in a part
 inline constexpr double kTilt = 0.26;        // rad, 15°
 inline constexpr double kNearExtent = 0.35;  // of the image
 inline constexpr double kFarOfNear = 0.75;   // extents, far over near

@@ -7,6 +7,7 @@
 /// runs the command from the subcommand's callback and sets *exit_code. InputError may leave the callback.
 namespace vergence::app {
 
+void add_calibrate(CLI::App& root, ExitCode* exit_code);
 void add_devices(CLI::App& root, ExitCode* exit_code);
 void add_doctor(CLI::App& root, ExitCode* exit_code);
 void add_evaluate(CLI::App& root, ExitCode* exit_code);
@@ -15,10 +16,6 @@ void add_report(CLI::App& root, ExitCode* exit_code);
 void add_run(CLI::App& root, ExitCode* exit_code);
 void add_simulate(CLI::App& root, ExitCode* exit_code);
 void add_snap(CLI::App& root, ExitCode* exit_code);
-
-/// The words of the contract (DESIGN §6) that have no command behind them yet: whatever options they are given, they
-/// say so in one sentence and exit 2.
-void add_announced(CLI::App& root, ExitCode* exit_code);
 
 /// The whole program: parses, runs one command, turns every exception into one sentence on stderr and an exit code.
 [[nodiscard]] ExitCode run_program(int argc, const char* const* argv) noexcept;

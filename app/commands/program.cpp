@@ -81,7 +81,7 @@ ExitCode parse_and_run(int argc, const char* const* argv) {
   add_devices(root, &exit_code);
   add_doctor(root, &exit_code);
   add_snap(root, &exit_code);
-  add_announced(root, &exit_code);
+  add_calibrate(root, &exit_code);
   check_first_word(root, argc, argv);
   try {
     root.parse(argc, argv);

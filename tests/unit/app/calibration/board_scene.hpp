@@ -44,6 +44,41 @@ inline Transform held_board(const app::Checkerboard& board, const Intrinsics& le
   return {R, centre - R * Vec3(0.5 * width, 0.5 * height, 0)};
 }
 
+/// Board poses as somebody shows them who reads what is missing: nine places, four tilts, near and far.
+inline std::vector<Transform> shown_around(const app::Checkerboard& board, const RigCalibration& rig) {
+  const Intrinsics& lens = rig.intrinsics[0];
+  const double width = board.square * (board.columns - 1), height = board.square * (board.rows - 1);
+  std::vector<Transform> poses;
+  for (int i = 0; i < 18; ++i) {
+    const double far = lens.fx * width / (lens.width * (i < 9 ? 0.28 : 0.42));
+    const double right = (i % 3 - 1) * (i < 9 ? 0.27 : 0.16), down = ((i / 3) % 3 - 1) * (i < 9 ? 0.28 : 0.22);
+    const Vec3 axis = i % 4 == 0 ? Vec3(0, 1, 0) : i % 4 == 1 ? Vec3(0, -1, 0) : i % 4 == 2 ? Vec3(1, 0, 0) : Vec3(-1, 0, 0);
+    const Mat3 R = exp_so3(0.4 * axis);
+    const double middle = rig.cameras > 1 ? 0.5 * rig.baseline : 0;
+    const Vec3 centre(middle + far * right * lens.width / lens.fx, far * down * lens.height / lens.fx, far);
+    poses.push_back({R, centre - R * Vec3(0.5 * width, 0.5 * height, 0)});
+  }
+  return poses;
+}
+
+/// Corners without noise; empty for a camera that does not have the whole board.
+inline app::BoardView seen_board(const RigCalibration& rig, const app::Checkerboard& board, const Transform& T_left_board) {
+  app::BoardView seen;
+  for (std::size_t k = 0; k < static_cast<std::size_t>(rig.cameras); ++k) {
+    const Camera camera(rig.intrinsics[k]);
+    for (std::size_t i = 0; i < board.corners(); ++i) {
+      Vec2 x;
+      if (camera.project(rig.T_camera_left[k] * (T_left_board * board.corner(i)), &x, nullptr) != ProjectStatus::ok ||
+          !camera.inside(x, 4)) {
+        seen.corners[k].clear();
+        break;
+      }
+      seen.corners[k].push_back(x);
+    }
+  }
+  return seen;
+}
+
 struct BoardScene {
   RigCalibration rig{};
   std::vector<Transform> T_left_board{};
@@ -57,17 +92,12 @@ inline BoardScene board_scene(const RigCalibration& rig, const app::Checkerboard
   Random poses(7, 1), noise(seed, 2);
   for (int view = 0; static_cast<int>(scene.views.size()) < count && view < 20 * count; ++view) {
     const Transform T = held_board(board, rig.intrinsics[0], view, poses);
-    app::BoardView seen;
+    app::BoardView seen = seen_board(rig, board, T);
     seen.name = "view" + std::to_string(view);
     bool whole = true;
     for (std::size_t k = 0; k < static_cast<std::size_t>(rig.cameras); ++k) {
-      const Camera camera(rig.intrinsics[k]);
-      for (std::size_t i = 0; i < board.corners(); ++i) {
-        Vec2 x;
-        whole =
-            whole && camera.project(rig.T_camera_left[k] * (T * board.corner(i)), &x, nullptr) == ProjectStatus::ok && camera.inside(x, 4);
-        seen.corners[k].push_back(x + noise_px * Vec2(noise.normal(), noise.normal()));
-      }
+      whole = whole && !seen.corners[k].empty();
+      for (Vec2& x : seen.corners[k]) x += noise_px * Vec2(noise.normal(), noise.normal());
     }
     if (!whole) continue;
     scene.views.push_back(seen);

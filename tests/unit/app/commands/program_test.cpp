@@ -70,12 +70,6 @@ TEST(Program, WrongValuesOfOptionsAreOneSentence) {
   EXPECT_TRUE(refused_in_one_sentence(run_vergence("replay")));
 }
 
-TEST(Program, CommandsThatAreNotThereYetSaySoWhateverTheyAreGiven) {
-  const Outcome outcome = run_vergence("calibrate --left 'l*.png' --right 'r*.png' --board 9x6 --square 0.1 --out f");
-  EXPECT_TRUE(refused_in_one_sentence(outcome));
-  EXPECT_TRUE(contains(outcome.err, "is not there yet")) << outcome.err;
-}
-
 TEST(Program, WordsOfTheUserCannotSteerTheTerminal) {
   const Outcome outcome = run_vergence("\"$(printf 'a\\033[2Jb\\nc')\"");
   EXPECT_TRUE(refused_in_one_sentence(outcome));

@@ -1,0 +1,206 @@
+#include <time.h>
+
+#include <atomic>
+#include <chrono>
+#include <condition_variable>
+#include <mutex>
+#include <thread>
+
+#include <fmt/format.h>
+#include <opencv2/imgcodecs.hpp>
+
+#include "app/calibration/view_collector.hpp"
+#include "app/commands/calibrate_session.hpp"
+#include "app/commands/drive_devices.hpp"
+#include "app/runtime/live_source.hpp"
+#include "app/runtime/signals.hpp"
+
+namespace vergence::app {
+namespace {
+
+namespace fs = std::filesystem;
+
+HostStamp monotonic_now() noexcept {
+  timespec t{};
+  (void)::clock_gettime(CLOCK_MONOTONIC, &t);
+  return HostStamp(static_cast<std::int64_t>(t.tv_sec) * 1'000'000'000 + t.tv_nsec);
+}
+
+const char* phrase(OfferVerdict verdict) {
+  switch (verdict) {
+    case OfferVerdict::taken:
+      return "taken";
+    case OfferVerdict::not_seen:
+      return "board not seen by both";
+    case OfferVerdict::moving:
+      return "hold it still";
+    case OfferVerdict::nothing_new:
+      return "seen that";
+  }
+  return "";
+}
+
+/// A folder that is there and has nothing in it yet.
+void make_empty_folder(const fs::path& folder) {
+  std::error_code error;
+  fs::create_directories(folder, error);
+  if (error || !fs::is_directory(folder, error))
+    throw InputError(folder.string() + ": cannot be made a folder; --keep-views takes one that is not there or empty");
+  if (!fs::is_empty(folder, error))
+    throw InputError(folder.string() + ": is not empty; --keep-views takes a folder that is not there or empty");
+}
+
+/// Sets of images from the cameras, the board in them, until nothing is missing. Its thread looks, the caller's watches.
+class Collection {
+ public:
+  Collection(const CalibrateRequest& request, const CalibratedRig& rig, double focal_px, LiveSource* source)
+      : request_(request),
+        rig_(rig),
+        source_(source),
+        collector_(Coverage(request.board, rig.names, rig.sizes, focal_px), rig.sizes[0].width) {}
+
+  /// Until the source ends, nothing is missing, or `stop` says so.
+  void run(const SignalGuard& signals, Progress* progress) {
+    std::thread looking([this] { look(); });
+    std::unique_lock lock(mutex_);
+    while (!changed_.wait_for(lock, std::chrono::milliseconds(50), [this] { return done_; })) {
+      if (signals.stop_requested()) source_->stop();
+      tell(progress);
+    }
+    tell(progress);
+    lock.unlock();
+    looking.join();
+  }
+  [[nodiscard]] const std::vector<BoardView>& views() const noexcept { return collector_.views(); }
+  [[nodiscard]] bool complete() const { return collector_.complete(); }
+
+ private:
+  void look() {
+    for (LiveItem item; source_->next(&item);) {
+      if (item.kind == LiveItem::Kind::device_gone || item.kind == LiveItem::Kind::device_back) {
+        const std::lock_guard lock(mutex_);
+        sentences_.push_back(
+            fmt::format("camera {} is {}", item.camera, item.kind == LiveItem::Kind::device_gone ? "gone; waiting for it" : "back"));
+      }
+      if (item.kind != LiveItem::Kind::images) continue;
+      offer(item.set);
+      source_->release(item.set);
+      if (complete_) source_->stop();
+    }
+    const std::lock_guard lock(mutex_);
+    done_ = true;
+    changed_.notify_one();
+  }
+
+  void offer(const SyncedSet& set) {
+    BoardView seen;
+    seen.name = fmt::format("view {}", collector_.views().size());
+    for (int k = 0; k < static_cast<int>(rig_.sizes.size()); ++k) {
+      const auto at = static_cast<std::size_t>(k);
+      auto corners = find_checkerboard(source_->image(set, k), request_.board, BoardSearch::quick);
+      if (!corners) continue;
+      if (!request_.board.tells_its_ends()) same_way_up(seen.corners[0], &*corners);
+      seen.corners[at] = std::move(*corners);
+    }
+    const std::size_t number = collector_.views().size();
+    const OfferVerdict verdict = collector_.offer(seen);
+    if (verdict == OfferVerdict::taken && request_.keep_views) keep(set, number);
+    const auto needs = collector_.coverage().needs();
+    complete_ = needs.empty();
+    const std::lock_guard lock(mutex_);
+    ++sets_;
+    words_ = fmt::format("{} views · {}{}", collector_.views().size(), phrase(verdict),
+                         needs.empty() ? "" : fmt::format(" · missing: {}", fmt::join(needs, "; ")));
+  }
+
+  void keep(const SyncedSet& set, std::size_t number) {
+    for (int k = 0; k < static_cast<int>(rig_.sizes.size()); ++k) {
+      const ImageView image = source_->image(set, k);
+      if (image.empty()) continue;
+      const fs::path file = *request_.keep_views / fmt::format("{}_{:03}.png", rig_.names[static_cast<std::size_t>(k)], number);
+      const cv::Mat pixels(image.height, image.width, CV_8U, const_cast<std::uint8_t*>(image.data), static_cast<std::size_t>(image.stride));
+      bool written = false;
+      try {
+        written = cv::imwrite(file.string(), pixels);
+      } catch (const cv::Exception&) {  // said below
+      }
+      if (written) continue;
+      const std::lock_guard lock(mutex_);
+      sentences_.push_back(file.string() + ": cannot be written; the view is used all the same");
+    }
+  }
+
+  /// Under the lock.
+  void tell(Progress* progress) {
+    for (const std::string& sentence : sentences_) progress->say("vergence: " + sentence);
+    sentences_.clear();
+    ProgressState state;
+    state.state = "calibrate";
+    state.frame = sets_;
+    state.words = words_;
+    progress->update(state);
+  }
+
+  const CalibrateRequest& request_;
+  const CalibratedRig& rig_;
+  LiveSource* source_;
+  ViewCollector collector_;  // of the looking thread, until it has ended
+  bool complete_ = false;    // likewise
+
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  bool done_ = false;
+  std::uint64_t sets_ = 0;
+  std::string words_ = "waiting for images";
+  std::vector<std::string> sentences_;
+};
+
+CalibratedRig rig_of(const Configuration& c, const DriveDevices& devices) {
+  constexpr std::array kNames{"left", "right", "camera2", "camera3"};
+  CalibratedRig rig;
+  rig.rig_name = c.rig.name;
+  for (std::size_t k = 0; k < devices.cameras().size(); ++k) {
+    const CameraSettings& s = c.cameras[k];
+    rig.names.push_back(s.name.empty() ? kNames[k] : s.name);
+    rig.serials.push_back(devices.cameras()[k]->info().serial);
+    rig.sizes.push_back({s.width, s.height});
+  }
+  return rig;
+}
+
+}  // namespace
+
+ExitCode calibrate_live(const CalibrateRequest& request, const Configuration& configuration) {
+  const SignalGuard signals;
+  if (request.keep_views) make_empty_folder(*request.keep_views);
+  Configuration c = configuration;
+  c.ins.driver = "none";
+  DriveDevices devices(c, {}, false, std::nullopt);
+  Progress progress = Progress::on_stderr(request.quiet);
+  for (const std::string& sentence : devices.remarks()) progress.say("vergence: " + sentence);
+  const CalibratedRig rig = rig_of(c, devices);
+  LiveSource::Options options;
+  options.sync = devices.sync();
+  options.tie_host = monotonic_now();
+  LiveSource source(devices.cameras(), nullptr, devices.trigger(), options);
+  Collection collection(request, rig, nominal_rig(c).intrinsics[0].fx, &source);
+  source.start();
+  collection.run(signals, &progress);
+  source.join();
+  progress.finish();
+  const auto stopped = signals.stop_code();
+  for (const int camera : source.missing())
+    progress.say(fmt::format("vergence: camera {} did not come back; look at its cable and power", camera));
+  if (collection.views().size() < kFewestViews) {
+    progress.say(
+        fmt::format("no calibration: {} views of the board were taken, {} are the least; is it {}x{} inner corners, whole and lit "
+                    "in every image?",
+                    collection.views().size(), kFewestViews, request.board.columns, request.board.rows));
+    return stopped.value_or(source.missing().empty() ? ExitCode::not_usable : ExitCode::device_failed);
+  }
+  const ExitCode code = conclude_calibration(request, rig, collection.views(), &progress);
+  if (!source.missing().empty() && !stopped) return ExitCode::device_failed;
+  return stopped.value_or(code);
+}
+
+}  // namespace vergence::app

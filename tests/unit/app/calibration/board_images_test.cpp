@@ -1,0 +1,46 @@
+#include "app/calibration/board_images.hpp"
+
+#include <gtest/gtest.h>
+
+#include "app/runtime/errors.hpp"
+#include "tests/support/temporary_folder.hpp"
+
+namespace vergence::app {
+namespace {
+
+using Paths = std::vector<std::filesystem::path>;
+
+TEST(BoardImages, patternsNameFilesInOrderAndOnce) {
+  const test::TemporaryFolder folder;
+  for (const char* name : {"left2.png", "left1.png", "right1.png"}) (void)folder.write(name, "x");
+  const std::string all = (folder / "left*.png").string(), one = (folder / "left1.png").string();
+  const Paths files = matching_files({all, one}, "--left");
+  EXPECT_EQ(files, (Paths{folder / "left1.png", folder / "left2.png"}));
+  EXPECT_THROW((void)matching_files({(folder / "none*.png").string()}, "--left"), InputError);
+}
+
+TEST(BoardImages, viewsArePairedByNumberWhereSomeAreMissingElseByOrder) {
+  std::vector<std::string> remarks;
+  auto views = group_views({{"left01.png", "left02.png", "left04.png"}, {"right01.png", "right03.png", "right04.png"}}, &remarks);
+  EXPECT_EQ(views, (std::vector<Paths>{{"left01.png", "right01.png"}, {"left04.png", "right04.png"}}));
+  EXPECT_EQ(remarks.size(), 2U);
+  remarks.clear();
+  views = group_views({{"a10.png", "a11.png"}, {"b20.png", "b21.png"}}, &remarks);
+  EXPECT_EQ(views, (std::vector<Paths>{{"a10.png", "b20.png"}, {"a11.png", "b21.png"}})) << "numbers that have nothing in common";
+  EXPECT_TRUE(remarks.empty());
+  views = group_views({{"a.png", "b.png"}, {"c.png", "d.png"}}, &remarks);
+  EXPECT_EQ(views[1], (Paths{"b.png", "d.png"}));
+  EXPECT_THROW((void)group_views({{"a.png", "b.png"}, {"c.png"}}, &remarks), InputError);
+}
+
+TEST(BoardImages, imagesThatCannotBeReadAreRemarks) {
+  const test::TemporaryFolder folder;
+  const Paths view{folder.write("left.png", "no image"), folder / "gone.png"};
+  const BoardImages images = read_board_images({view}, parse_checkerboard("9x6", 0.1), {});
+  EXPECT_TRUE(images.views.empty());
+  ASSERT_EQ(images.remarks.size(), 2U);
+  EXPECT_NE(images.remarks[1].find("gone.png is missing"), std::string::npos) << images.remarks[1];
+}
+
+}  // namespace
+}  // namespace vergence::app
