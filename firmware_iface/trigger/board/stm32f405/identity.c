@@ -42,6 +42,14 @@ void irq_enable(unsigned irq, uint8_t priority) {
   NVIC_ISER[irq / 32U] = 1U << (irq % 32U);
 }
 
+uint32_t irq_off(void) {
+  uint32_t primask = 0;
+  __asm volatile("mrs %0, primask\n cpsid i" : "=r"(primask)::"memory");
+  return primask;
+}
+
+void irq_restore(uint32_t primask) { __asm volatile("msr primask, %0" ::"r"(primask) : "memory"); }
+
 static void start_watchdog(void) {
   IWDG->kr = 0xCCCC; /* starts, on its own 32 kHz */
   IWDG->kr = 0x5555; /* opens the two registers below */

@@ -66,7 +66,7 @@ void hal_configure(const TriggerConfig* config) {
   TIM5->dier = 0;
   uint32_t ccer = 0, dier = 0;
   for (unsigned k = 0; k < feedback_count; ++k)
-    if (((config->feedback_inputs >> k) & 1U) != 0) {
+    if ((((unsigned)config->feedback_inputs >> k) & 1U) != 0) {
       ccer |= 0x31U << (8U * k); /* rising edge on the lower channel, falling on the upper */
       dier |= 6U << (2U * k);    /* CC1IE, CC2IE or CC3IE, CC4IE */
     }
@@ -94,10 +94,11 @@ void tim5_handler(void) {
   for (unsigned k = 0; k < feedback_count; ++k) {
     const bool rose = (status & (2U << (2U * k))) != 0;
     const bool fell = (status & (4U << (2U * k))) != 0;
-    count_overcapture(TIM5, status, 2U * k);
-    count_overcapture(TIM5, status, 2U * k + 1U);
-    const uint32_t rise = rose ? TIM5->ccr[2U * k] : 0; /* reading clears the flag */
-    const uint32_t fall = fell ? TIM5->ccr[2U * k + 1U] : 0;
+    const unsigned channel = 2U * k;
+    count_overcapture(TIM5, status, channel);
+    count_overcapture(TIM5, status, channel + 1U);
+    const uint32_t rise = rose ? TIM5->ccr[channel] : 0; /* reading clears the flag */
+    const uint32_t fall = fell ? TIM5->ccr[channel + 1U] : 0;
     const bool fall_first = rose && fell && (int32_t)(fall - rise) < 0;
     if (fell && fall_first) push_feedback(k, false, fall);
     if (rose) push_feedback(k, true, rise);

@@ -12,7 +12,7 @@ typedef struct {
   uint32_t ppm; /* that they may be off */
 } Clocks;
 
-/* identity.c: a word, or 0 and false where the bus has nothing there. */
+/* identity.c: the processor. A word, or 0 and false where the bus has nothing there. */
 bool probe_word(uint32_t address, uint32_t* word);
 void bus_fault_handler(void);
 
@@ -38,12 +38,8 @@ void restart(void) __attribute__((noreturn));
 
 void irq_enable(unsigned irq, uint8_t priority);
 
-static inline uint32_t irq_off(void) {
-  uint32_t primask = 0;
-  __asm volatile("mrs %0, primask\n cpsid i" : "=r"(primask)::"memory");
-  return primask;
-}
-
-static inline void irq_restore(uint32_t primask) { __asm volatile("msr primask, %0" ::"r"(primask) : "memory"); }
+/* Interrupts off; → what irq_restore() takes. */
+uint32_t irq_off(void);
+void irq_restore(uint32_t primask);
 
 #endif

@@ -37,9 +37,11 @@ static unsigned line_pin(unsigned line) {
   return kPins[line];
 }
 
+static bool has_line(uint8_t mask, unsigned line) { return (((unsigned)mask >> line) & 1U) != 0; }
+
 static void set_mode(uint8_t lines, uint32_t mode) {
   for (unsigned k = 0; k < line_count; ++k) {
-    if (((lines >> k) & 1U) == 0) continue;
+    if (!has_line(lines, k)) continue;
     const unsigned shift = 8U * (k % 2U) + 4U;
     TIM2->ccmr[k / 2U] = (TIM2->ccmr[k / 2U] & ~(7U << shift)) | (mode << shift);
   }
@@ -47,7 +49,7 @@ static void set_mode(uint8_t lines, uint32_t mode) {
 
 static void set_compare(uint8_t lines, uint32_t count) {
   for (unsigned k = 0; k < line_count; ++k)
-    if (((lines >> k) & 1U) != 0) TIM2->ccr[k] = count;
+    if (has_line(lines, k)) TIM2->ccr[k] = count;
 }
 
 static bool edge_was_made(void) { return (TIM2->sr & pulse.flag) != 0; }
@@ -88,9 +90,9 @@ void pulses_configure(uint8_t lines, uint8_t active_low) {
   pulse.phase = pulse_idle;
   uint32_t ccer = 0;
   for (unsigned k = 0; k < line_count; ++k)
-    if (((lines >> k) & 1U) != 0) ccer |= (1U | (((unsigned)active_low >> k & 1U) << 1U)) << (4U * k); /* CCxE, CCxP */
+    if (has_line(lines, k)) ccer |= (has_line(active_low, k) ? 3U : 1U) << (4U * k); /* CCxE, CCxP */
   TIM2->ccer = ccer;
-  for (unsigned k = 0; k < line_count; ++k) pin_set(line_port(k), line_pin(k), ((lines >> k) & 1U) != 0 ? pin_alternate : pin_input, 1);
+  for (unsigned k = 0; k < line_count; ++k) pin_set(line_port(k), line_pin(k), has_line(lines, k) ? pin_alternate : pin_input, 1);
   irq_restore(primask);
 }
 

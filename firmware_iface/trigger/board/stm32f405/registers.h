@@ -49,27 +49,27 @@ typedef struct {
   Register cr, sr, dr;
 } RandomRegisters;
 
-#define RCC ((RccRegisters*)0x40023800U)
-#define GPIOA ((GpioRegisters*)0x40020000U)
-#define GPIOB ((GpioRegisters*)0x40020400U)
-#define TIM2 ((TimerRegisters*)0x40000000U)
-#define TIM4 ((TimerRegisters*)0x40000800U)
-#define TIM5 ((TimerRegisters*)0x40000C00U)
-#define USART1 ((UsartRegisters*)0x40011000U)
-#define EXTI ((ExtiRegisters*)0x40013C00U)
-#define SYSCFG ((SyscfgRegisters*)0x40013800U)
-#define IWDG ((WatchdogRegisters*)0x40003000U)
-#define RNG ((RandomRegisters*)0x50060800U)
-#define FLASH_ACR (*(Register*)0x40023C00U) /* "Embedded Flash memory interface": access control */
-#define UNIQUE_ID 0x1FFF7A10U               /* "Device electronic signature": 96 bits */
+#define RCC ((RccRegisters*)0x40023800UL)
+#define GPIOA ((GpioRegisters*)0x40020000UL)
+#define GPIOB ((GpioRegisters*)0x40020400UL)
+#define TIM2 ((TimerRegisters*)0x40000000UL)
+#define TIM4 ((TimerRegisters*)0x40000800UL)
+#define TIM5 ((TimerRegisters*)0x40000C00UL)
+#define USART1 ((UsartRegisters*)0x40011000UL)
+#define EXTI ((ExtiRegisters*)0x40013C00UL)
+#define SYSCFG ((SyscfgRegisters*)0x40013800UL)
+#define IWDG ((WatchdogRegisters*)0x40003000UL)
+#define RNG ((RandomRegisters*)0x50060800UL)
+#define FLASH_ACR (*(Register*)0x40023C00UL) /* "Embedded Flash memory interface": access control */
+#define UNIQUE_ID 0x1FFF7A10U                /* "Device electronic signature": 96 bits */
 
 /* PM0214 "Nested vectored interrupt controller", "System control block" */
-#define NVIC_ISER ((Register*)0xE000E100U)
-#define NVIC_IPR ((volatile uint8_t*)0xE000E400U)
-#define SCB_VTOR (*(Register*)0xE000ED08U)
-#define SCB_AIRCR (*(Register*)0xE000ED0CU)
-#define SCB_SHCSR (*(Register*)0xE000ED24U)
-#define SCB_CFSR (*(Register*)0xE000ED28U)
+#define NVIC_ISER ((Register*)0xE000E100UL)
+#define NVIC_IPR ((volatile uint8_t*)0xE000E400UL)
+#define SCB_VTOR (*(Register*)0xE000ED08UL)
+#define SCB_AIRCR (*(Register*)0xE000ED0CUL)
+#define SCB_SHCSR (*(Register*)0xE000ED24UL)
+#define SCB_CFSR (*(Register*)0xE000ED28UL)
 
 /* Positions in the vector table: RM0090 "Interrupts and events", vector table for STM32F405. */
 enum { irq_exti9_5 = 23, irq_tim2 = 28, irq_usart1 = 37, irq_tim5 = 50, irq_count = 82 };
