@@ -51,14 +51,15 @@ std::shared_ptr<Search> begin_search(const CameraDriverRow& row) {
   return search;
 }
 
-/// What a node of /dev/videoN belongs to: the same text for nodes of one device.
-std::string owner_of(const Machine& machine, const std::vector<UsbDevice>& usb, const std::string& place) {
-  const std::string node = fs::path(place).filename();
+/// What a node of /dev/videoN belongs to: the same text for nodes of one device. Devices of one driver may have one parent, and cheap
+/// cameras one serial number; both are the same for nodes of one device only.
+std::string owner_of(const Machine& machine, const std::vector<UsbDevice>& usb, const DeviceInfo& info) {
+  const std::string node = fs::path(info.place).filename(), serial = info.serial.substr(0, info.serial.rfind('#'));
   for (const UsbDevice& d : usb)
-    if (std::find(d.video.begin(), d.video.end(), node) != d.video.end()) return "usb " + d.port;
+    if (std::find(d.video.begin(), d.video.end(), node) != d.video.end()) return d.port + " " + serial;
   std::error_code error;
   const fs::path device = fs::canonical(machine.root / ("sys/class/video4linux/" + node + "/device"), error);
-  return error ? place : device.string();
+  return (error ? info.place : device.string()) + " " + serial;
 }
 
 std::string link_to(const Machine& machine, const std::string& port) {
@@ -98,7 +99,7 @@ std::vector<FoundCamera> one_entry_a_device(const Machine& machine, const std::v
   std::vector<std::string> owners;
   for (const DeviceInfo& info : found) {
     const bool node = info.place.starts_with("/dev/video");
-    const std::string owner = node ? owner_of(machine, usb, info.place) : std::string();
+    const std::string owner = node ? owner_of(machine, usb, info) : std::string();
     const auto same = owner.empty() ? owners.end() : std::find(owners.begin(), owners.end(), owner);
     if (same != owners.end()) {
       all[static_cast<std::size_t>(same - owners.begin())].also.push_back(info.serial);
@@ -120,7 +121,7 @@ Inventory take_inventory(const Machine& machine, const InventoryOptions& options
   inventory.firewire = iidc::list_firewire_cameras(machine.root / "sys");
   inventory.ports = list_ports(machine);
   if (options.probe)
-    for (FoundPort& port : inventory.ports) probe(&port);
+    for (FoundPort& port : inventory.ports) probe(&port, all_askers());
 
   const auto until = std::chrono::steady_clock::now() + std::chrono::nanoseconds(options.limit.ns());
   for (const auto& [row, search] : searches) {

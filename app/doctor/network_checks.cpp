@@ -2,7 +2,6 @@
 #include <linux/capability.h>
 
 #include <algorithm>
-#include <cmath>
 #include <cstdint>
 #include <map>
 #include <optional>
@@ -10,7 +9,7 @@
 #include <fmt/format.h>
 
 #include "app/doctor/checks.hpp"
-#include "drivers/gige/detail/link.hpp"
+#include "drivers/gige/link_budget.hpp"
 
 namespace vergence::app {
 namespace {
@@ -22,6 +21,7 @@ constexpr std::int64_t kRecommendedBuffer = 10'485'760;
 constexpr int kJumbo = 9000, kStandard = 1500;  // bytes
 constexpr double kGigabit = 1e9;                // bit/s, where the system does not say
 constexpr double kMega = 1e6;
+constexpr double kMostOnLink = 16, kLargestPacket = 65'000, kMostMegabits = 1e6;
 
 std::optional<std::uint32_t> ipv4(const std::string& text) {
   in_addr a{};
@@ -208,28 +208,28 @@ void check_load(const Link& link, std::vector<Finding>* findings) {
          fmt::format("{} runs at {:.0f} Mbit/s; GigE cameras need a gigabit: look at cable and switch", link.name, link.speed / kMega),
          {}});
   if (link.needs.empty()) return;
-  double share = 0, megabytes = 0;
-  double highest = 1e9;
-  std::int64_t shown_speed = 0;
+  double used = 0, megabytes = 0, highest = 0, megabits = 0;
   for (const CameraNeed* n : link.needs) {
-    const auto speed = static_cast<std::int64_t>(n->option("link_mbps", slowest / kMega) * kMega);
-    const int on_link = static_cast<int>(n->option("link_cameras", static_cast<double>(link.needs.size())));
-    const gige::LinkLoad load{static_cast<std::int64_t>(n->bytes), n->rate_hz, std::max(1, on_link), false};
-    const int wished = static_cast<int>(std::min(65'000.0, n->option("packet_size", 0)));
-    const int packet = gige::choose_packet_size(wished, link.mtu, 576, kJumbo, 4);
-    share = std::max(share, gige::plan_link(load, packet, speed, Duration::nanoseconds(-1)).share);
-    highest = std::min(highest, gige::highest_rate(load, packet, speed));
+    gige::LinkDemand d;
+    d.image_bytes = static_cast<std::int64_t>(n->bytes);
+    d.rate_hz = n->rate_hz;
+    d.cameras =
+        std::clamp(static_cast<int>(std::min(kMostOnLink, n->option("link_cameras", static_cast<double>(link.needs.size())))), 1, 16);
+    d.mtu = link.mtu;
+    d.packet_size = static_cast<int>(std::min(kLargestPacket, n->option("packet_size", 0)));
+    megabits = std::clamp(n->option("link_mbps", slowest / kMega), 1.0, kMostMegabits);
+    d.speed = static_cast<std::int64_t>(megabits * kMega);
+    const gige::LinkBudget budget = gige::link_budget(d);
+    if (budget.used >= used) used = budget.used, highest = budget.highest_hz;
     megabytes += n->bytes_per_second() / kMega;
-    shown_speed = speed;
   }
   const std::string where = link.name.empty() ? "on a link that is not known" : link.name;
   Finding f{"link",
             FindingState::ok,
-            fmt::format("{}: {} camera{}, {:.0f} MB/s of images, {:.0f} % of what {} Mbit/s carry", where, link.needs.size(),
-                        link.needs.size() == 1 ? "" : "s", megabytes, 100 * share / gige::kMostOfPeriod,
-                        shown_speed / static_cast<std::int64_t>(kMega)),
+            fmt::format("{}: {} camera{}, {:.0f} MB/s of images, {:.0f} % of what {:.0f} Mbit/s carry", where, link.needs.size(),
+                        link.needs.size() == 1 ? "" : "s", megabytes, 100 * used, megabits),
             {}};
-  if (share > gige::kMostOfPeriod) {
+  if (used > 1) {
     f.state = FindingState::problem;
     f.sentence += fmt::format("; they fit up to {:.1f} Hz (trigger.rate), with smaller images, or on links of their own", highest);
   }

@@ -1,31 +1,44 @@
 #include "app/doctor/probe.hpp"
 
+#include <algorithm>
+#include <utility>
+
 #include <fmt/format.h>
 
 #include "app/runtime/ins_drivers.hpp"
+#include "drivers/trigger_board/trigger_board.hpp"
 
 namespace vergence::app {
-namespace {
 
-bool is_ins(FoundPort* port) {
-  for (const InsDriverRow& row : ins_driver_rows()) {
-    const auto driver = row.make(InsRequest{});
-    DeviceStatus status = DeviceStatus::ok;
-    const auto device = driver->open(port->info.port, &status);
-    if (device == nullptr) continue;
-    const DeviceInfo& who = device->info();
-    port->device = fmt::format("{} {}, {}", row.name, who.serial, who.model);
-    port->configuration = fmt::format("ins: {{driver: {}, port: {}}}", row.name, port->name());
-    return true;
-  }
-  return false;
+std::vector<Asker> all_askers() {
+  std::vector<Asker> askers;
+  for (const InsDriverRow& row : ins_driver_rows())
+    askers.push_back({"ins", row.name, [make = row.make](const std::string& port) -> std::optional<DeviceInfo> {
+                        DeviceStatus status = DeviceStatus::ok;
+                        const auto device = make(InsRequest{})->open(port, &status);
+                        return device == nullptr ? std::nullopt : std::optional(device->info());
+                      }});
+  askers.push_back({"trigger", "board", [](const std::string& port) -> std::optional<DeviceInfo> {
+                      DeviceStatus status = DeviceStatus::ok;
+                      const auto device = trigger_board::Driver().open(port, &status);
+                      return device == nullptr ? std::nullopt : std::optional(device->info());
+                    }});
+  return askers;
 }
 
-}  // namespace
-
-void probe(FoundPort* port) {
+void probe(FoundPort* port, const std::vector<Asker>& askers) {
   if (port->kind == SerialKind::built_in) return;
-  (void)is_ins(port);
+  const bool ins_first = port->kind == SerialKind::ins || port->kind == SerialKind::ftdi;
+  for (const bool first : {true, false})
+    for (const Asker& a : askers) {
+      const bool ins = a.group == "ins";
+      if ((ins == ins_first) != first || (!ins && port->kind == SerialKind::ins)) continue;
+      const std::optional<DeviceInfo> who = a.is_there(port->info.port);
+      if (!who) continue;
+      port->device = fmt::format("{}{}{}, {}", a.driver, who->serial.empty() ? "" : " ", who->serial, who->model);
+      port->configuration = fmt::format("{}: {{driver: {}, port: {}}}", a.group, a.driver, port->name());
+      return;
+    }
 }
 
 }  // namespace vergence::app

@@ -4,8 +4,12 @@
 
 #include <cstdlib>
 #include <cstring>
+#include <optional>
 #include <string>
+#include <utility>
+#include <vector>
 
+#include "app/doctor/probe.hpp"
 #include "tests/unit/app/doctor/fake_machine.hpp"
 
 namespace vergence::app {
@@ -111,10 +115,71 @@ TEST(Inventory, nodesOfOneDeviceAreOneCameraAndTwoDevicesWithOneSerialAreTwo) {
   EXPECT_EQ(all[2].info.driver, "gige");
 }
 
+TEST(Inventory, twoDevicesOfOneParentAreTwo) {
+  const test::FakeMachine f;
+  f.file("/sys/devices/platform/vivid.0/uevent", "");
+  for (const char* node : {"video0", "video1", "video2"}) {
+    const auto folder = f.folder / "sys/class/video4linux" / node;
+    std::filesystem::create_directories(folder);
+    std::filesystem::create_directory_symlink(f.folder / "sys/devices/platform/vivid.0", folder / "device");
+  }
+  const std::vector<DeviceInfo> found{{"v4l2", "platform:vivid-000", "vivid", "/dev/video0"},
+                                      {"v4l2", "platform:vivid-001", "vivid", "/dev/video1"},
+                                      {"v4l2", "platform:vivid-000#1", "vivid", "/dev/video2"}};
+  const auto all = one_entry_a_device(f.machine, {}, found);
+  ASSERT_EQ(all.size(), 2U);
+  EXPECT_EQ(all[0].also, std::vector<std::string>{"platform:vivid-000#1"});
+}
+
 TEST(Inventory, aLineForTheConfigurationIsYamlWhateverTheSerial) {
   EXPECT_EQ(camera_line({"gige", "15021234", "", ""}), "{driver: gige, serial: \"15021234\"}");
   EXPECT_EQ(camera_line({"gige", "", "", "10.0.0.2"}), "{driver: gige, serial: \"10.0.0.2\"}");
   EXPECT_EQ(camera_line({"v4l2", "a\"b\\\n\xff", "", ""}), "{driver: v4l2, serial: \"a\\\"b\\\\\\n\\ufffd\"}");
+}
+
+/// Notes who was asked; the one named `answers` says that its device is there.
+std::vector<Asker> listening(std::vector<std::string>* asked, const std::string& answers) {
+  std::vector<Asker> askers;
+  for (const auto& [group, driver] : {std::pair{"ins", "xsens"}, std::pair{"trigger", "board"}})
+    askers.push_back({group, driver, [asked, answers, name = std::string(driver)](const std::string&) -> std::optional<DeviceInfo> {
+                        asked->push_back(name);
+                        if (name != answers) return std::nullopt;
+                        return DeviceInfo{name, "42", "A model", ""};
+                      }});
+  return askers;
+}
+
+TEST(Probe, asksTheLikelyOneFirstAndNobodyAfterAnAnswer) {
+  std::vector<std::string> asked;
+  FoundPort p = port(0x0403, 0x6001, "A1");
+  probe(&p, listening(&asked, "xsens"));
+  EXPECT_EQ(asked, std::vector<std::string>{"xsens"});
+  EXPECT_EQ(p.device, "xsens 42, A model");
+  EXPECT_EQ(p.configuration, "ins: {driver: xsens, port: /dev/ttyUSB0}");
+  asked.clear();
+  p = port(0x2E8A, 0x000A, "B");
+  p.by_id = "/dev/serial/by-id/board";
+  probe(&p, listening(&asked, "board"));
+  EXPECT_EQ(asked, std::vector<std::string>{"board"});
+  EXPECT_EQ(p.configuration, "trigger: {driver: board, port: /dev/serial/by-id/board}");
+}
+
+TEST(Probe, whoDoesNotAnswerIsNobody) {
+  std::vector<std::string> asked;
+  FoundPort p = port(0x1234, 0x5678, "C");
+  probe(&p, listening(&asked, ""));
+  EXPECT_EQ(asked, (std::vector<std::string>{"board", "xsens"}));
+  EXPECT_EQ(p.device + p.configuration, "");
+}
+
+TEST(Probe, leavesAloneWhatCannotBeThatDevice) {
+  std::vector<std::string> asked;
+  FoundPort p = port(0, 0, "");
+  probe(&p, listening(&asked, "board"));
+  EXPECT_TRUE(asked.empty());
+  p = port(0x2639, 0x0300, "X");
+  probe(&p, listening(&asked, "board"));
+  EXPECT_EQ(asked, std::vector<std::string>{"xsens"});
 }
 
 }  // namespace
