@@ -93,6 +93,7 @@ class Device final : public TriggerDevice, private FrameSink {
   [[nodiscard]] DeviceStatus read_one(HostStamp deadline) noexcept;
   [[nodiscard]] bool come_back() noexcept;
   void halt_board() noexcept;
+  [[nodiscard]] std::uint32_t open_reports() const noexcept;
   void ping() noexcept;
   void send_pause() noexcept;
   void accept(const TriggerFrame& frame, HostStamp arrival) noexcept override;

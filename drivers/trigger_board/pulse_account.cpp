@@ -40,12 +40,13 @@ void PulseAccount::set_intervals(std::uint32_t rate_millihertz, std::uint32_t va
   shortest_us_ = std::max<std::uint64_t>(1, (period_us - std::min<std::uint64_t>(period_us, vary_us)) * 9 / 10);
 }
 
-void PulseAccount::end(std::uint32_t next) noexcept {
+void PulseAccount::end(std::uint32_t next, std::uint32_t to_come) noexcept {
   const std::int64_t missing = steps_from(next_, next);
   if (missing <= 0) return;
   const std::uint64_t left_out = std::min(asked_, static_cast<std::uint64_t>(missing));
   counters_.left_out += left_out;
-  counters_.lost += static_cast<std::uint64_t>(missing) - left_out;
+  const std::uint64_t rest = static_cast<std::uint64_t>(missing) - left_out;
+  counters_.lost += rest - std::min<std::uint64_t>(rest, to_come);
   next_ += static_cast<std::uint64_t>(missing);
   asked_ = 0;
 }

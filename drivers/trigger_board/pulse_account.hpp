@@ -36,8 +36,9 @@ class PulseAccount {
   void forget_pause() noexcept { asked_ = 0; }
   /// The board's clock was set back: the next event may be earlier than the last.
   void forget_time() noexcept { any_ = false, tick_ = 0; }
-  /// Pulses are over, the board says, and the next would have this number: what is missing was lost.
-  void end(std::uint32_t next) noexcept;
+  /// Pulses are over, the board says, and the next would have this number: what is missing was lost, but for so many whose reports are
+  /// still to come.
+  void end(std::uint32_t next, std::uint32_t to_come) noexcept;
   /// False: refused, *pulse is as it was. Sets all of it but the arrival and the host's time.
   [[nodiscard]] bool take(const TriggerEvent& event, Pulse* pulse) noexcept;
 

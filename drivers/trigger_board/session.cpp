@@ -31,10 +31,10 @@ void Device::work() noexcept {
       status = read_on();
       if (line_ != nullptr) when = line_->now();
     }
+    if (status == DeviceStatus::stopped) break;  // what still comes until it has stopped counts
     streaming_ = false;
     publish(false);
     if (status == DeviceStatus::ok) continue;  // it began anew: set it up
-    if (status == DeviceStatus::stopped) break;
     if (status == DeviceStatus::ended) {
       hand_out({Item::What::end, when, {}}, true);
       break;
@@ -86,7 +86,7 @@ DeviceStatus Device::begin_on(Setup* setup) {
     clock_.restart(timing_.delay_spread, config_.pps_edge != trigger_edge_none);
     pause_.store(0, std::memory_order_relaxed);  // what was asked of the other start is past
   } else {
-    account_.end(board.pulses);
+    account_.end(board.pulses, 0);
   }
   account_.set_intervals(config_.rate_millihertz, config_.vary_us);
   status = tie_clocks();
@@ -186,6 +186,9 @@ void Device::rest(Duration time) noexcept {
   (void)stopped_.wait_for(lock, std::chrono::nanoseconds(time.ns()), [this] { return stopping_.load(std::memory_order_acquire); });
 }
 
+/// With exposure feedback the last pulse's report comes after the answer to STOP, when its exposures are over; nobody waits for it.
+std::uint32_t Device::open_reports() const noexcept { return config_.feedback_inputs != 0 ? 1 : 0; }
+
 /// No pulse after it, and the last ones are counted.
 void Device::halt_board() noexcept {
   try {
@@ -193,12 +196,13 @@ void Device::halt_board() noexcept {
     TriggerStatus status;
     const DeviceStatus done = setup.halt(&status);
     if (done == DeviceStatus::ok) counted_.board = status;
-    if (done == DeviceStatus::ok && status.boot_id == account_.boot()) account_.end(status.pulses);
+    if (done == DeviceStatus::ok && status.boot_id == account_.boot()) account_.end(status.pulses, open_reports());
+    if (done != DeviceStatus::ok) (void)refuse(done, place_->name() + ": " + setup.complaint());
     if (done == DeviceStatus::gone) close_line();
   } catch (const std::exception&) {
     close_line();
   }
-  running_ = false;
+  running_ = streaming_ = false;
 }
 
 void Device::ping() noexcept {

@@ -263,6 +263,26 @@ TEST(Board, stopsAndStartsAgainAndNumbersGoOn) {
   EXPECT_EQ(rig.device->statistics().pulses, rig.simulator->pulses_made());
 }
 
+TEST(Board, theReportThatAStopLeavesBehindIsNotLost) {
+  BoardRig rig(board_for(Duration::seconds(200)), direct_line());
+  rig.exposures = [](const mock::SimulatedPulse& p) {
+    mock::SimulatedExposures e;
+    e[0] = {true, p.edge + Duration::microseconds(35), p.edge + Duration::milliseconds(30)};
+    return e;
+  };
+  TriggerConfiguration wanted = thirty_hertz();
+  wanted.feedback = 0x01;
+  ASSERT_EQ(rig.device->configure(wanted, nullptr), DeviceStatus::ok);
+  for (int i = 0; i < 20; ++i) {
+    ASSERT_EQ(rig.device->start(nullptr), DeviceStatus::ok);
+    const auto all = rig.pulses(3);
+    ASSERT_EQ(all.size(), 3U);
+    expect_gapless(all);
+    rig.device->stop();
+  }
+  EXPECT_EQ(rig.device->statistics().lost, 0U);
+}
+
 TEST(Board, oneThatRanBeforeTheProgramIsStoppedFirst) {
   BoardRig rig(board_for(Duration::seconds(100)), direct_line());
   ASSERT_EQ(rig.device->configure(thirty_hertz(), nullptr), DeviceStatus::ok);

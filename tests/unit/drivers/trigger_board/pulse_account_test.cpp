@@ -79,11 +79,11 @@ TEST_F(Accounted, whatTheBoardLeftOutByItselfIsNotLost) {
 
 TEST_F(Accounted, theEndTellsOfReportsThatNeverCame) {
   ASSERT_TRUE(take(1));
-  account.end(2);
+  account.end(2, 0);
   EXPECT_EQ(account.counters().lost, 0U);
-  account.end(5);
+  account.end(6, 1);
   EXPECT_EQ(account.counters().lost, 3U);
-  ASSERT_TRUE(take(5, 1));
+  ASSERT_TRUE(take(6, 1));
   EXPECT_EQ(account.counters().lost, 3U);
 }
 
