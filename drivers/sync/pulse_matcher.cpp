@@ -113,12 +113,15 @@ void PulseMatcher::acquire(const PulseTrain& train, HostStamp now) noexcept {
   }
 }
 
-/// The frame came no later than frames do, and every pulse that it might be of instead was tried.
+/// The frame came no later than frames do, every pulse that it might be of instead was tried, and a pause hides none.
 bool PulseMatcher::believable(const PulseTrain& train, std::size_t place, std::size_t end) const noexcept {
   if (frames_[end - 1].arrival - train[place].host > latest_) return false;
-  const std::size_t from = place > kNear ? place - kNear : 1, until = std::min(train.size(), place + kNear + 1);
-  for (std::size_t i = from; i < until; ++i)
-    if (!train[i].resumed && train[i].number != train[i - 1].number + 1) return false;
+  const std::size_t until = std::min(train.size(), place + kNear + 1);
+  for (std::size_t i = place > 2 * kRun ? place - 2 * kRun : 1; i < until; ++i) {
+    const std::uint64_t left_out = train[i].number - train[i - 1].number - 1;
+    const bool beside = i + kNear >= place, pause = train[i].resumed && (pause_ == 0 || left_out == pause_);
+    if (left_out > 0 && !pause && (beside || train[i].resumed)) return false;
+  }
   return true;
 }
 

@@ -18,7 +18,8 @@ namespace vergence {
 ///            pulse went out are tried, so that the true place is among them; for the same reason none is found beside a report that is
 ///            missing. Pulses at even intervals fit everywhere and prove nothing, until one of them is a pause.
 /// A limit    Where only a pause proves, a camera that misses as many triggers in a row as a pause leaves out, within kNear of one, is
-///            laid over it.
+///            laid over it. A camera's clock that is set back by as many intervals as triggers are missed at that moment goes unseen
+///            until the intervals differ.
 /// Proven     The camera's clock is tied to the source's: line over the matched pairs, expanding memory up to kMemory (g-h filter with the
 ///            gains of the least-squares line: g = 2(2n−1)/(n(n+1)), h = 6/(n(n+1))). A frame's pulse is where its stamp falls on the
 ///            train. The numbers are integers and are never averaged.
@@ -50,7 +51,9 @@ class PulseMatcher {
 
   PulseMatcher() noexcept = default;
   /// `noise`: by how much a stamp of this camera may be off the edge plus a constant. `latest`: SyncCameraOptions.
-  PulseMatcher(Duration noise, Duration interval, Duration latest) noexcept : noise_(noise), interval_(interval), latest_(latest) {}
+  /// `pause`: pulses that a pause leaves out; another number of them may hide a pulse whose report was lost. 0: any.
+  PulseMatcher(Duration noise, Duration interval, Duration latest, std::uint64_t pause) noexcept
+      : noise_(noise), interval_(interval), latest_(latest), pause_(pause) {}
 
   /// Frames in the order of arrival.
   [[nodiscard]] Match frame(const PulseTrain& train, std::uint64_t counter, DeviceStamp stamp, HostStamp arrival) noexcept;
@@ -100,6 +103,7 @@ class PulseMatcher {
   void tie(DeviceStamp stamp, DeviceStamp edge) noexcept;
 
   Duration noise_{}, interval_{}, latest_{};
+  std::uint64_t pause_ = 0;
   bool proven_ = false;
   // Acquiring.
   std::array<Seen, kFrames> frames_{};  // oldest first

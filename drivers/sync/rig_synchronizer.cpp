@@ -13,7 +13,9 @@ Duration magnitude(Duration d) noexcept { return d < Duration{} ? -d : d; }
 RigSynchronizer::RigSynchronizer(const SyncOptions& options) noexcept : options_(options), train_(options.interval) {
   assert(options.validate() == nullptr);
   for (Source& s : sources_) s.align = options.align_start && options.mode == SyncMode::counter;
-  for (std::size_t k = 0; k < matchers_.size(); ++k) matchers_[k] = PulseMatcher(noise_of(k), options.interval, options.camera[k].latest);
+  const std::uint64_t pause = options.mode == SyncMode::master_strobe ? 0 : kPause;
+  for (std::size_t k = 0; k < matchers_.size(); ++k)
+    matchers_[k] = PulseMatcher(noise_of(k), options.interval, options.camera[k].latest, pause);
 }
 
 RigSynchronizer::Open* RigSynchronizer::find(std::uint64_t number) noexcept {

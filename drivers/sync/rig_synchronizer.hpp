@@ -20,9 +20,9 @@ namespace vergence {
 ///            given back and counted meanwhile, those of the others go out without them. From then on every frame's pulse follows from its
 ///            stamp (the camera's clock tied to the board's), and its counter must agree: more pulses than counts are missed triggers,
 ///            counts without images are lost frames, anything else is a contradiction and it acquires again. After a missed trigger sets
-///            are `unproven` until the intervals have shown that it was none of the clock's. A pulse that runs back in number or has
-///            another `boot` makes all acquire again. A frame that comes before its pulse's report is given the pulse's number all the
-///            same; the report then confirms it, or the set is `unproven`.
+///            wait up to `hold` for the intervals to show that it was none of the clock's, else they are `unproven`. A pulse that runs back
+///            in number or has another `boot` makes all acquire again. A frame that comes before its pulse's report is given the pulse's
+///            number all the same; the report then confirms it, or the set is `unproven`.
 /// A limit    A camera that hands out the image of one exposure under the stamp of the next cannot be told here.
 /// Ownership  A slot that is `taken` comes out of next() in exactly one set; then it is the caller's again.
 /// Threads    One caller. Memory: fixed, kOpen pulses. Time: constant a call.
@@ -32,8 +32,7 @@ class RigSynchronizer {
   static constexpr std::size_t kOpen = 4;      // pulses waiting at most: bounds the latency and the slots held
   static constexpr std::size_t kHistory = 64;  // sets remembered, to tell a duplicate from a late frame
   static constexpr int kUnproven = 10;         // in a row: the pulses were not found rightly
-
-  static constexpr std::uint32_t kPause = 4;  // pulses left out: more than what a camera misses by itself
+  static constexpr std::uint32_t kPause = 4;   // pulses left out: more than what a camera misses by itself
 
   /// Precondition: options.validate() == nullptr.
   explicit RigSynchronizer(const SyncOptions& options) noexcept;
@@ -46,17 +45,19 @@ class RigSynchronizer {
   /// A pulse's report, in the order of arrival; in the modes board and ins_syncout (elsewhere it does nothing). next() as after offer().
   /// Precondition: pulse.mapped.
   void pulse(const Pulse& pulse) noexcept;
-  /// So many pulses should be left out, because the intervals prove nothing; mostly 0. Asked for once, and again when it did not help:
-  /// board: TriggerDevice::pause(); ins_syncout, master_strobe: stop the source and start it again.
+  /// So many pulses should be left out, because the intervals prove nothing; mostly 0. Asked for once, and again when it did not help.
+  /// board: TriggerDevice::pause() with just that number, another could hide a report that was lost. ins_syncout, master_strobe: stop the
+  /// source and start it again.
   [[nodiscard]] std::uint32_t wants_pause() noexcept;
   /// Nothing is left to be proven of that camera's frames: always, where nothing can be.
   [[nodiscard]] bool proven(int camera) const noexcept;
 
-  /// That exposure of a camera gave no image that could be used: nobody waits for it. Else as offer(); only where counters pair.
+  /// That exposure of a camera gave no image that could be used: nobody waits for it. Else as offer(); not where stamps pair.
   void lost(int camera, std::uint64_t counter) noexcept;
   /// A camera has gone: nobody waits for it.
   void absent(int camera) noexcept;
-  /// It has come back and counts from 0 again: its first frame joins the pulse nearest in time, the others follow by counter.
+  /// It has come back and counts anew. By counter: its first frame joins the pulse nearest in time, the others follow. With pulses: it
+  /// acquires, the others go on; a master's count goes on by its clock.
   void restarted(int camera) noexcept;
   /// No more frames will come: everything open goes out by next().
   void finish() noexcept { finishing_ = true; }

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstdint>
 #include <queue>
+#include <utility>
 #include <vector>
 
 #include "core/math/random.hpp"
@@ -78,6 +79,7 @@ class PulseRig {
         ++next_reboot;
         ++boot_;
         number_ = 0;
+        resumed_ = true;
         board_offset_ = -ns(t) + static_cast<std::int64_t>(random_.below(1'000'000)) * 1'000;
         t += 0.7;
         board_clock_.restart();
@@ -174,6 +176,11 @@ class PulseRig {
       if (s > g.from - o_.quiet && s < g.until + o_.quiet) return true;
     return std::any_of(o_.reboots.begin(), o_.reboots.end(), [&](double r) { return std::abs(s - r) < o_.quiet; });
   }
+  /// Its clock is set about now. A clock that goes back by as many pulses as are missed at that moment nobody could tell.
+  bool being_set(int k, std::int64_t at) const {
+    const double s = static_cast<double>(at) * 1e-9 - kStart;
+    return std::any_of(o_.jumps.begin(), o_.jumps.end(), [&](const auto& j) { return j.camera == k && std::abs(s - j.at) < 0.5; });
+  }
   void start_camera(int k) {
     Camera& c = cameras_[static_cast<std::size_t>(k)];
     c.offset = static_cast<std::int64_t>(random_.below(2'000'000'000)) * 1'000 - 1'000'000'000'000;
@@ -213,14 +220,14 @@ class PulseRig {
     const std::int64_t at = ns(t);
     ++truth_.pulses;
     for (double& since : waiting_since_) since = since == 0 ? t : since;
-    const bool calm = quiet(t);
+    const bool calm = quiet(t), resumed = std::exchange(resumed_, false);
     if (calm || random_.uniform() >= o_.unreported) {
       Event e;
       e.is_pulse = true;
       Pulse& p = e.pulse;
       p.number = number_;
       p.boot = boot_;
-      p.resumed = resumed_ || number_ == 0;
+      p.resumed = resumed;
       p.edge = board_time(at);
       p.mapped = true;
       p.host = HostStamp(at + std::llround(random_.uniform(-1, 1) * static_cast<double>(o_.host_noise.ns())));
@@ -233,7 +240,6 @@ class PulseRig {
       const std::int64_t delayed = at + o_.report_delay.ns() + ns(exponential(o_.report_jitter_ms * 1e-3));
       last_report_ = std::max({delayed, stalled_until_, last_report_ + 1});
       p.arrival = HostStamp(last_report_);
-      resumed_ = false;
       put(e, last_report_);
       if (random_.uniform() < o_.duplicated) put(e, last_report_ + 1);
     }
@@ -250,7 +256,7 @@ class PulseRig {
       if (o_.stale_first) frame(k, c.counter++, at - ns(random_.uniform(0.01, 0.5)), start, UINT64_MAX);
       if (o_.first_dropped) return;
     }
-    if (!calm && random_.uniform() < o_.missed) {
+    if (!calm && !being_set(k, at) && random_.uniform() < o_.missed) {
       ++truth_.missed[i];
       return;
     }

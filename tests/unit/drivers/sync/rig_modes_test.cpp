@@ -7,8 +7,10 @@
 #include <vector>
 
 #include "core/math/random.hpp"
+#include "core/memory/allocation_guard.hpp"
 #include "drivers/sync/rig_synchronizer.hpp"
 #include "drivers/sync/sync_out_pulses.hpp"
+#include "firmware_iface/trigger/trigger.h"
 
 /// The modes beside `board`: a common clock, the INS's pulses, one camera that triggers the others.
 namespace vergence {
@@ -288,8 +290,10 @@ Pulse pulse_at(std::uint64_t number, HostStamp at) {
   return p;
 }
 
-/// Varied by a millisecond, in an order of its own.
-Duration varied(std::uint64_t n) { return kInterval + Duration::milliseconds((n * n * 7 + n / 3) % 11 < 5 ? 1 : -1); }
+/// Varied by a millisecond, as the board does it.
+Duration varied(std::uint64_t n) {
+  return kInterval + Duration::milliseconds(trigger_interval_is_longer(static_cast<std::uint32_t>(n)) ? 1 : -1);
+}
 
 TEST(RigModes, oneStampForAllFromTheMeasuredExposureOrFromEdgeDelayAndExposure) {
   SyncOptions o = options(SyncMode::board);
@@ -343,6 +347,32 @@ TEST(RigModes, aReportThatContradictsAFrameMakesItsSetUnproven) {
   EXPECT_EQ(sync.counters().contradictions[0], 1U);
   EXPECT_EQ(sync.counters().contradictions[1], 1U);
   EXPECT_FALSE(sync.proven(0));
+}
+
+TEST(RigModes, nothingIsTakenFromTheHeap) {
+  if (!AllocationGuard::available()) GTEST_SKIP() << "a sanitizer brings its own heap";
+  RigSynchronizer sync(options(SyncMode::board));
+  ClockMapper clock{ClockMapperOptions{}};
+  const std::uint64_t before = AllocationGuard::allocations_after_seal();
+  HostStamp t(80'000'000'000);
+  std::uint64_t sets = 0;
+  {
+    const SealedScope sealed;
+    for (std::uint64_t n = 0; n < 500; ++n) {
+      clock.ping(t, DeviceStamp(t.ns() + 1000), DeviceStamp(t.ns() + 2000), t + Duration::microseconds(3));
+      (void)clock.at(DeviceStamp(t.ns()));
+      if (n == 200) sync.restarted(1);
+      sync.pulse(pulse_at(n, t));
+      for (int k = 0; k < 2; ++k) {
+        (void)sync.offer(frame(k, static_cast<int>(n), n, t, DeviceStamp(t.ns() * (n < 300 || k == 1 ? 1 : -1))));
+        for (SyncedSet set; sync.next(&set);) ++sets;
+      }
+      (void)sync.wants_pause();
+      t = t + varied(n);
+    }
+  }
+  EXPECT_EQ(AllocationGuard::allocations_after_seal(), before);
+  EXPECT_GT(sets, 400U);
 }
 
 TEST(RigModes, modesHaveNamesAndNonsenseIsNamed) {
