@@ -41,9 +41,13 @@ std::shared_ptr<const mock::World> world() {
 }  // namespace
 
 StereoDrive render_drive(const mock::DriveOptions& options, Duration from, std::size_t frames) {
+  return render_drive(options, from, frames, make_rig());
+}
+
+StereoDrive render_drive(const mock::DriveOptions& options, Duration from, std::size_t frames, const RigCalibration& rig) {
   const mock::Drive drive(options, *world());
   StereoDrive out;
-  out.rig = make_rig();
+  out.rig = rig;
   std::array<mock::Renderer, 2> renderers{mock::Renderer(world(), Camera(out.rig.intrinsics[0])),
                                           mock::Renderer(world(), Camera(out.rig.intrinsics[1]))};
   for (std::size_t i = 0; i < frames; ++i) {
@@ -51,7 +55,7 @@ StereoDrive render_drive(const mock::DriveOptions& options, Duration from, std::
     const Transform T_left_enu = mock::camera_pose(drive.at(from + since), mock::default_T_body_left());
     std::array<Picture, 2> pair;
     for (std::size_t k = 0; k < 2; ++k) {
-      pair[k] = Picture(kWidth, kHeight);
+      pair[k] = Picture(rig.intrinsics[k].width, rig.intrinsics[k].height);
       mock::Shot shot;
       shot.noise_seed = static_cast<std::uint32_t>(2 * i + k + 1);
       renderers[k].render(out.rig.T_camera_left[k] * T_left_enu, shot, pair[k].bytes.data(), pair[k].stride);
