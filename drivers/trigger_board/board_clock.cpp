@@ -9,7 +9,6 @@ namespace vergence::trigger_board {
 namespace {
 
 constexpr std::int64_t kPingBytes = trigger_ping_payload_size + trigger_overhead + 3;  // COBS byte, and a 00 at either end
-constexpr std::int64_t kPongBytes = trigger_pong_payload_size + trigger_overhead + 2;
 constexpr std::int64_t kEventBytes = trigger_event_payload_size + trigger_overhead + 2;
 
 }  // namespace
@@ -79,13 +78,12 @@ PongWord BoardClock::answer(const TriggerPong& pong, HostStamp t4) noexcept {
   }
   q.open = false;
   const HostStamp sent = q.sent + wire_ * kPingBytes;
-  const HostStamp here = t4 - wire_ * kPongBytes;
   if (pong.sent < pong.received || pong.sent > kMostTicks) {
     ++totals_.refused;
     return PongWord::nonsense;
   }
   const Duration inside = Duration::microseconds(static_cast<std::int64_t>(pong.sent - pong.received));
-  const Duration rtt = (here - sent) - inside;
+  const Duration rtt = (t4 - sent) - inside;
   // A tick at either end, and the board's clock may be slow.
   const Duration tolerance = Duration::microseconds(2) + inside / 1000;
   if (rtt < -tolerance) {
@@ -103,7 +101,7 @@ PongWord BoardClock::answer(const TriggerPong& pong, HostStamp t4) noexcept {
   backward_ = 0;
   newest_tick_ = pong.received;  // not `sent`: the next question may have come while this answer waited for the line
   take_turns(t4);
-  for (ClockMapper& m : mappers_) m.ping(sent, stamp_of_tick(pong.received), stamp_of_tick(pong.sent), std::max(here, sent + inside));
+  for (ClockMapper& m : mappers_) m.ping(sent, stamp_of_tick(pong.received), stamp_of_tick(pong.sent), std::max(t4, sent + inside));
   known_ = true;
   ++answers_;
   ++totals_.answered;

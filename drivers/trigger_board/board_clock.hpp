@@ -32,10 +32,10 @@ struct TimeQuality {
 /// The board's clock on the host's, from pings.
 ///
 /// Method   Every PING and its PONG give four stamps: t1 when it was handed to the line, t2 and t3 the board's ticks, t4 when its answer
-///          was here. The ClockMapper makes of them a line and a bound that no asymmetry can break: rtt / 2 at worst.
-///          What bytes take on the wire at the baud rate is known, and not the same both ways: it is taken out of t1 and t4.
-///          PPS moves the rate of the board's ticks, as no crystal does: then two mappers take turns, each used when it is kTurn to 2 kTurn
-///          old, and until the rate is there the bound has room for what it moves in that time (kMoving).
+///          left the board at the latest (BoardLine). The ClockMapper makes of them a line and a bound that no asymmetry can break: rtt / 2
+///          at worst. What bytes take on the wire at the baud rate is known, and not the same both ways: it is taken out of t1 here, of t4
+///          there. PPS moves the rate of the board's ticks, as no crystal does: then two mappers take turns, each used when it is kTurn to
+///          2 kTurn old, and until the rate is there the bound has room for what it moves in that time (kMoving).
 /// Threads  One caller. Memory: fixed.
 /// Errors   PongWord. kBackward answers in a row from an earlier time than before are a clock that was set: the fit begins anew.
 class BoardClock {
@@ -60,6 +60,7 @@ class BoardClock {
 
   /// A PING is being sent now: its token.
   [[nodiscard]] std::uint32_t ask(HostStamp t1) noexcept;
+  /// `t4`: BoardLine's departure.
   [[nodiscard]] PongWord answer(const TriggerPong& pong, HostStamp t4) noexcept;
 
   /// A ping has been answered since restart().

@@ -29,7 +29,22 @@ void BoardLine::attach(ByteLine* line) noexcept {
   decoder_ = {};
   line_ = line;
   used_ = size_ = 0;
+  into_frame_ = 0;
+  bounded_ = false;
   forget();
+}
+
+void BoardLine::note_byte(std::uint8_t byte) noexcept {
+  // The 00 belongs to the frame that it ends; one that stands alone to none.
+  if (byte != 0 || into_frame_ > 0) ++into_frame_;
+}
+
+/// Up to here the frame had been sent when this read was on its way.
+void BoardLine::note_end_of_read() noexcept {
+  if (into_frame_ == 0) return;
+  const HostStamp bound = arrival_ - byte_time_ * into_frame_;
+  departure_ = bounded_ ? std::min(departure_, bound) : bound;
+  bounded_ = true;
 }
 
 DeviceStatus BoardLine::send(std::uint8_t type, std::span<const std::uint8_t> payload, std::uint8_t* sequence) noexcept {
@@ -51,12 +66,21 @@ LineCounters BoardLine::counters() const noexcept {
   return c;
 }
 
-DeviceStatus BoardLine::next(HostStamp deadline, TriggerFrame* frame, HostStamp* arrival) noexcept {
+DeviceStatus BoardLine::next(HostStamp deadline, TriggerFrame* frame, Times* times) noexcept {
   for (bool last = false;;) {  // ends at the deadline, a read later at most
     while (used_ < size_) {
-      if (trigger_decode(&decoder_, buffer_[used_++], frame) != trigger_frame_ready) continue;
+      const std::uint8_t byte = buffer_[used_++];
+      const bool ready = trigger_decode(&decoder_, byte, frame) == trigger_frame_ready;
+      note_byte(byte);
+      if (used_ == size_ || ready) note_end_of_read();  // its end bounds a whole frame, wherever in the read it is
+      const HostStamp departure = departure_;
+      if (byte == 0) {
+        into_frame_ = 0;
+        bounded_ = false;
+      }
+      if (!ready) continue;
       ++frames_heard_;
-      *arrival = arrival_;
+      *times = {arrival_, departure};
       return DeviceStatus::ok;
     }
     if (last) return DeviceStatus::timeout;

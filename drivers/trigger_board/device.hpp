@@ -96,9 +96,9 @@ class Device final : public TriggerDevice, private FrameSink {
   [[nodiscard]] std::uint32_t open_reports() const noexcept;
   void ping() noexcept;
   void send_pause() noexcept;
-  void accept(const TriggerFrame& frame, HostStamp arrival) noexcept override;
+  void accept(const TriggerFrame& frame, const BoardLine::Times& times) noexcept override;
   void take_event(const TriggerEvent& event, HostStamp arrival) noexcept;
-  void take_pong(const TriggerPong& pong, HostStamp arrival) noexcept;
+  void take_pong(const TriggerPong& pong, HostStamp departure) noexcept;
   void take_status(const TriggerStatus& status) noexcept;
   [[nodiscard]] bool same_boot(std::uint32_t boot) noexcept;
   void hand_out(const Item& item, bool always) noexcept;

@@ -67,6 +67,7 @@ DeviceStatus Device::begin_on(Setup* setup) {
   DeviceStatus status = setup->find(line_->baud(), &who);
   if (status != DeviceStatus::ok) return status;
   clock_.reopen(byte_time());
+  frames_.set_byte_time(byte_time());
   TriggerStatus board{};
   if (running_ && who.boot_id == account_.boot()) {
     // Its pulses may have gone on while the line was away, or it has stopped by itself: it goes on, and what was missed counts.
@@ -159,9 +160,9 @@ DeviceStatus Device::read_on() noexcept {
 
 DeviceStatus Device::read_one(HostStamp deadline) noexcept {
   TriggerFrame frame;
-  HostStamp arrival;
-  const DeviceStatus status = frames_.next(deadline, &frame, &arrival);
-  if (status == DeviceStatus::ok) accept(frame, arrival);
+  BoardLine::Times times;
+  const DeviceStatus status = frames_.next(deadline, &frame, &times);
+  if (status == DeviceStatus::ok) accept(frame, times);
   return status;
 }
 
@@ -233,8 +234,8 @@ bool Device::same_boot(std::uint32_t boot) noexcept {
   return false;
 }
 
-void Device::accept(const TriggerFrame& frame, HostStamp arrival) noexcept {
-  heard_ = arrival;
+void Device::accept(const TriggerFrame& frame, const BoardLine::Times& times) noexcept {
+  heard_ = times.arrival;
   const auto size = static_cast<std::size_t>(frame.size);
   TriggerEvent event;
   TriggerPong pong;
@@ -243,9 +244,9 @@ void Device::accept(const TriggerFrame& frame, HostStamp arrival) noexcept {
   TriggerInfo info;
   TriggerError error;
   if (frame.type == trigger_event && trigger_get_event(frame.payload, size, &event)) {
-    take_event(event, arrival);
+    take_event(event, times.arrival);
   } else if (frame.type == trigger_pong && trigger_get_pong(frame.payload, size, &pong)) {
-    take_pong(pong, arrival);
+    take_pong(pong, times.departure);
   } else if (frame.type == trigger_status && trigger_get_status(frame.payload, size, &status)) {
     take_status(status);
   } else if (frame.type == trigger_pps && trigger_get_edge(frame.payload, size, &edge)) {
@@ -275,10 +276,10 @@ void Device::take_event(const TriggerEvent& event, HostStamp arrival) noexcept {
   hand_out({Item::What::item, arrival, pulse}, false);
 }
 
-void Device::take_pong(const TriggerPong& pong, HostStamp arrival) noexcept {
+void Device::take_pong(const TriggerPong& pong, HostStamp departure) noexcept {
   if (!same_boot(pong.boot_id)) return;
   const std::uint64_t resets = clock_.resets_by_set_back();
-  (void)clock_.answer(pong, arrival);
+  (void)clock_.answer(pong, departure);
   if (clock_.resets_by_set_back() != resets) account_.forget_time();
 }
 

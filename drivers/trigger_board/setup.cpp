@@ -75,8 +75,8 @@ Setup::Answer Setup::listen(std::uint8_t type, std::uint8_t first, std::uint8_t 
   for (;;) {  // ends at `until`
     if (stop_.load(std::memory_order_acquire)) return Answer::stopped;
     TriggerFrame frame;
-    HostStamp arrival;
-    const DeviceStatus status = frames_.next(until, &frame, &arrival);
+    BoardLine::Times times;
+    const DeviceStatus status = frames_.next(until, &frame, &times);
     if (status == DeviceStatus::timeout) return Answer::silent;
     if (status == DeviceStatus::stopped) continue;  // woken: perhaps to be told to stop
     if (status != DeviceStatus::ok) return Answer::gone;
@@ -90,7 +90,7 @@ Setup::Answer Setup::listen(std::uint8_t type, std::uint8_t first, std::uint8_t 
       error_ = error.code;
       return Answer::refused;
     }
-    if (others_ != nullptr) others_->accept(frame, arrival);
+    if (others_ != nullptr) others_->accept(frame, times);
   }
 }
 

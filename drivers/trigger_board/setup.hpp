@@ -13,7 +13,7 @@ namespace vergence::trigger_board {
 class FrameSink {
  public:
   virtual ~FrameSink() = default;
-  virtual void accept(const TriggerFrame& frame, HostStamp arrival) noexcept = 0;
+  virtual void accept(const TriggerFrame& frame, const BoardLine::Times& times) noexcept = 0;
 };
 
 /// Questions to a board, each with its answer: who it is, halt, configuration, start.

@@ -31,9 +31,9 @@ TEST(BoardClock, oneAnswerSaysTheTimeWithinHalfItsRoundTrip) {
 TEST(BoardClock, whatBytesTakeOnTheWireIsNoRoundTrip) {
   BoardClock clock;
   clock.reopen(Duration::microseconds(10));
-  // A PING of 13 bytes and a PONG of 32, with nothing else between.
+  // A PING of 13 bytes with nothing else between.
   const std::uint32_t token = clock.ask(host(1000));
-  ASSERT_EQ(clock.answer(pong(token, 1130, 1130), host(1450)), PongWord::taken);
+  ASSERT_EQ(clock.answer(pong(token, 1130, 1130), host(1130)), PongWord::taken);
   EXPECT_EQ(clock.quality().rtt_least, Duration{});
   EXPECT_LE(std::abs((clock.map(stamp_of_tick(1130), host(2000)).host - host(1130)).ns()), 1000);
 }
