@@ -47,7 +47,9 @@ TEST(BoardTalk, whatIsRefusedIsRefusedByName) {
   b.pause(3);
   EXPECT_EQ(b.error(), trigger_error_not_running);
   b.send(trigger_stop);
-  EXPECT_EQ(b.status().state, trigger_stopped);
+  const TriggerStatus s = b.status();
+  EXPECT_EQ(s.state, trigger_stopped);
+  EXPECT_EQ(s.frames_refused, 2U) << "the two of a wrong size";
 }
 
 TEST(BoardTalk, pingCarriesBothTicks) {

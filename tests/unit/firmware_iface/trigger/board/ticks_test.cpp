@@ -68,8 +68,11 @@ TEST_F(Disciplined, beforeTheHostCameTheRateIsTakenAtOnce) {
   EXPECT_LT(std::abs(error_us(99.4) - at_lock), 2) << "a tick is a second of PPS, whatever the crystal";
 }
 
-TEST_F(Disciplined, afterHelloItTakesAMinuteAndNoRateStepOfMoreThanTheStated) {
-  pps.ppm = 50;
+struct DisciplinedSlowly : Disciplined, testing::WithParamInterface<double> {};
+INSTANTIATE_TEST_SUITE_P(BothWays, DisciplinedSlowly, testing::Values(50.0, -50.0));
+
+TEST_P(DisciplinedSlowly, afterHelloItTakesAMinuteAndNoRateStepOfMoreThanTheStated) {
+  pps.ppm = GetParam();
   begin(true);
   auto rate_before = static_cast<double>(b.board.ticks.segment.rate);
   std::uint64_t locked_at = 0;
@@ -154,8 +157,70 @@ TEST_F(Disciplined, edgesThatFitNothingAreReportedButNotFollowed) {
   EXPECT_LT(std::abs(error_us(59.4) - before), 2);
 }
 
+TEST_F(Disciplined, anEdgeThatIsAlmostRightIsNotFollowedEither) {
+  pps.ppm = 10;
+  begin(false);
+  feed(1, 30);
+  const double before = error_us(29.4);
+  for (std::uint64_t k = 30; k < 90; ++k) {
+    if (k % 7 == 0)
+      b.edge_at(pps.count(static_cast<double>(k) + 400e-6), board_input_pps, true);
+    else
+      feed(k, k + 1);
+  }
+  EXPECT_EQ(b.status().pps_locked, 1);
+  EXPECT_LT(std::abs(error_us(89.4) - before), 2);
+}
+
+TEST_F(Disciplined, thePhaseIsBroughtBackAndWhatSteeredItEndsWithPps) {
+  pps.ppm = 30;
+  begin(false);
+  feed(1, 30);
+  b.send(trigger_hello, {trigger_protocol_version});
+  feed(30, 32);
+  const double before = error_us(31.4);
+  constexpr double kMoved = 60e-6;  // the receiver moves its pulse by as much
+  const auto feed_moved = [this](int from, int to) {
+    for (int k = from; k < to; ++k) b.edge_at(pps.count(k + kMoved), board_input_pps, true);
+    b.run_until(pps.count(to - 0.5));
+  };
+  feed_moved(32, 300);
+  EXPECT_LT(std::abs(error_us(299.4) - before + kMoved * 1e6), 2) << "whole seconds at the moved edges";
+  // Back again, for 20 s: the slope sees it no more, the phase is still being steered, and then PPS is gone.
+  feed(300, 320);
+  EXPECT_GT(std::abs(static_cast<double>(b.board.ticks.segment.rate) / static_cast<double>(b.board.ticks.estimate) - 1), 0.1e-6);
+  b.run_until(pps.count(326));
+  EXPECT_EQ(b.status().pps_locked, 0);
+  EXPECT_EQ(b.board.ticks.segment.rate, b.board.ticks.estimate) << "nothing steers any more";
+  const double gone = error_us(326);
+  feed(400, 500);
+  EXPECT_EQ(b.status().pps_locked, 1);
+  EXPECT_LT(std::abs(error_us(499.4) - before), 2);
+  EXPECT_LT(std::abs(gone - before), 60);
+}
+
+TEST(BoardTicks, whatWasStampedBeforeARateChangedKeepsItsTick) {
+  TickDiscipline d{};
+  tick_init(&d, 84'000'000, 200, 0);
+  const std::uint64_t second = 84'000'000 + 12'600;  // 150 ppm
+  for (std::uint64_t k = 1; k < 4; ++k) EXPECT_TRUE(tick_pps(&d, k * second, k * second + 100));
+  const std::uint64_t edge = 4 * second, told = edge + 42'000'000;  // told half a second later
+  const std::uint64_t between = edge + 40'000'000;
+  const std::uint64_t tick = tick_of(&d, between), at_told = tick_of(&d, told);
+  EXPECT_TRUE(tick_pps(&d, edge, told));
+  EXPECT_TRUE(d.locked);
+  EXPECT_EQ(tick_of(&d, between), tick);
+  EXPECT_EQ(tick_of(&d, told), at_told);
+  EXPECT_EQ(tick_of(&d, told + second) - at_told, 1'000'000U);
+}
+
 TEST_F(Disciplined, aSignalThatIsNoPpsIsNeverLockedTo) {
   begin(false);
+  for (int k = 1; k < 40; ++k)  // each second by itself is within the crystal's 200 ppm, but they do not agree
+    b.edge_at(b.now + static_cast<std::uint64_t>((k + (k % 2) * 150e-6) * kHz), board_input_pps, true);
+  b.run_until(b.now + static_cast<std::uint64_t>(40 * kHz));
+  EXPECT_EQ(b.status().pps_locked, 0);
+  b.run_for_us(20'000'000);
   for (const double period : {0.02, 0.9, 1.001, 0.999}) {
     for (int k = 0; k < 20; ++k) b.edge_at(b.now + static_cast<std::uint64_t>((k + 1) * period * kHz), board_input_pps, true);
     b.run_until(b.now + static_cast<std::uint64_t>(21 * period * kHz));
@@ -170,6 +235,8 @@ TEST_F(Disciplined, aSecondPhaseIsTakenOverAfterAFewSeconds) {
   begin(false);
   feed(1, 30);
   for (int k = 31; k < 90; ++k) b.edge_at(pps.count(k + 0.37), board_input_pps, true);  // another receiver
+  b.run_until(pps.count(33.9));
+  EXPECT_EQ(b.status().pps_locked, 0) << "three in a row did not fit";
   b.run_until(pps.count(36.9));
   EXPECT_EQ(b.status().pps_locked, 1);
   b.run_until(pps.count(90));
