@@ -75,9 +75,18 @@ void clocks_start(Clocks* clocks) {
   clocks->usart1_hz = fast ? system_hz / 2 : internal_hz;
   clocks->ppm = fast ? crystal_ppm : internal_ppm;
 
-  RCC->ahb1enr |= (1U << 0U) | (1U << 1U);              /* GPIOA, GPIOB */
-  RCC->ahb2enr |= 1U << 6U;                             /* RNG */
-  RCC->apb1enr |= (1U << 0U) | (1U << 2U) | (1U << 3U); /* TIM2, TIM4, TIM5 */
-  RCC->apb2enr |= (1U << 4U) | (1U << 14U);             /* USART1, SYSCFG */
-  (void)RCC->apb2enr;                                   /* errata "delay after an RCC peripheral clock enabling" */
+  const uint32_t ahb1 = (1U << 0U) | (1U << 1U);              /* GPIOA, GPIOB */
+  const uint32_t apb1 = (1U << 0U) | (1U << 2U) | (1U << 3U); /* TIM2, TIM4, TIM5 */
+  const uint32_t apb2 = (1U << 4U) | (1U << 14U);             /* USART1, SYSCFG */
+  RCC->ahb1enr |= ahb1;
+  RCC->ahb2enr |= 1U << 6U; /* RNG */
+  RCC->apb1enr |= apb1;
+  RCC->apb2enr |= apb2;
+  (void)RCC->apb2enr;   /* errata "delay after an RCC peripheral clock enabling" */
+  RCC->ahb1rstr = ahb1; /* all as after power-up, whatever a boot loader did with them */
+  RCC->apb1rstr = apb1;
+  RCC->apb2rstr = apb2;
+  RCC->ahb1rstr = 0;
+  RCC->apb1rstr = 0;
+  RCC->apb2rstr = 0;
 }

@@ -65,7 +65,10 @@ typedef struct {
 
 /* PM0214 "Nested vectored interrupt controller", "System control block" */
 #define NVIC_ISER ((Register*)0xE000E100UL)
+#define NVIC_ICER ((Register*)0xE000E180UL)
+#define NVIC_ICPR ((Register*)0xE000E280UL)
 #define NVIC_IPR ((volatile uint8_t*)0xE000E400UL)
+#define SYSTICK_CTRL (*(Register*)0xE000E010UL)
 #define SCB_VTOR (*(Register*)0xE000ED08UL)
 #define SCB_AIRCR (*(Register*)0xE000ED0CUL)
 #define SCB_SHCSR (*(Register*)0xE000ED24UL)

@@ -43,8 +43,15 @@ void reset_handler(void) {
   const uint32_t* from = &data_load;
   for (uint32_t* to = &data_begin; to < &data_end;) *to++ = *from++;
   for (uint32_t* to = &bss_begin; to < &bss_end;) *to++ = 0;
-  SCB_VTOR = (uint32_t)kVectors; /* a boot loader may have left its own */
-  SCB_SHCSR |= 1U << 17U;        /* BUSFAULTENA, for probe_word() */
+  /* What a boot loader may have left: its interrupts, its vectors. */
+  SYSTICK_CTRL = 0;
+  for (unsigned i = 0; i <= irq_count / 32U; ++i) {
+    NVIC_ICER[i] = UINT32_MAX;
+    NVIC_ICPR[i] = UINT32_MAX;
+  }
+  SCB_VTOR = (uint32_t)kVectors;
+  SCB_SHCSR |= 1U << 17U; /* BUSFAULTENA, for probe_word() */
+  irq_restore(0);
   firmware_main();
   restart();
 }
