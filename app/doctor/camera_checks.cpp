@@ -92,14 +92,18 @@ void check_answers(const Patient& p, std::vector<Finding>* findings) {
     if (!d.answered) findings->push_back({"cameras", FindingState::problem, d.name + ": " + d.note, {"sudo dmesg | tail -30"}});
 }
 
-/// Nodes of everything that looks like a camera, asked or not.
+/// Nodes of everything that looks like a camera of a kind that is asked for; without a configuration of every kind.
 std::vector<std::string> camera_nodes(const Patient& p) {
+  const auto asked = [&p](const char* driver) { return !p.needs.given || !p.needs.of(driver).empty(); };
   std::vector<std::string> nodes;
-  for (const std::string& name : p.machine.names("/sys/class/video4linux"))
-    if (name.starts_with("video") && p.machine.exists("/dev/" + name)) nodes.push_back("/dev/" + name);
-  for (const UsbDevice& d : p.inventory.usb)
-    if (d.vendor == kPointGrey) nodes.push_back(d.node());
-  for (const iidc::FirewireNode& n : p.inventory.firewire) nodes.push_back(n.device);
+  if (asked("v4l2"))
+    for (const std::string& name : p.machine.names("/sys/class/video4linux"))
+      if (name.starts_with("video") && p.machine.exists("/dev/" + name)) nodes.push_back("/dev/" + name);
+  if (asked("iidc-usb"))
+    for (const UsbDevice& d : p.inventory.usb)
+      if (d.vendor == kPointGrey) nodes.push_back(d.node());
+  if (asked("iidc-1394"))
+    for (const iidc::FirewireNode& n : p.inventory.firewire) nodes.push_back(n.device);
   return nodes;
 }
 

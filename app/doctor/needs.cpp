@@ -58,6 +58,8 @@ Needs needs_of(const Configuration& c) {
   }
   needs.ins_driver = c.ins.driver;
   needs.ins_port = c.ins.port;
+  needs.trigger_driver = c.trigger.driver;
+  needs.trigger_port = c.trigger.port;
   return needs;
 }
 

@@ -27,6 +27,7 @@ struct Needs {
   bool given = false;  // false: no configuration; then only what is plugged in is judged
   std::vector<CameraNeed> cameras;
   std::string ins_driver, ins_port;
+  std::string trigger_driver, trigger_port;
   int realtime_priority = 0;  // that threads ask for; 0: none does
 
   [[nodiscard]] std::vector<CameraNeed> of(const std::string& driver) const;

@@ -11,37 +11,52 @@ namespace {
 
 constexpr int kAdvisedLatency = 16;  // ms: docs/ins.md
 
-bool is_ins_port(const Patient& p, const FoundPort& port) {
-  return !p.needs.ins_port.empty() &&
-         (p.needs.ins_port == port.info.port || p.needs.ins_port == port.by_id ||
-          std::filesystem::path(p.needs.ins_port).filename() == std::filesystem::path(port.info.port).filename());
+bool is_real(const std::string& driver) { return !driver.empty() && driver != "none" && driver != "mock"; }
+
+/// Whether a key of the configuration means this port; empty: any on USB.
+bool means(const std::string& key, const FoundPort& port) {
+  if (key.empty()) return port.info.usb_vendor != 0;
+  return key == port.by_id || std::filesystem::path(key).filename() == std::filesystem::path(port.info.port).filename();
+}
+bool may_be_ins(const Patient& p, const FoundPort& port) { return is_real(p.needs.ins_driver) && means(p.needs.ins_port, port); }
+
+/// Ports that anybody here cares about: those of the configuration, without one all on USB.
+std::vector<const FoundPort*> ports_of(const Patient& p) {
+  std::vector<const FoundPort*> some;
+  for (const FoundPort& port : p.inventory.ports) {
+    const bool trigger = is_real(p.needs.trigger_driver) && means(p.needs.trigger_port, port);
+    if (p.needs.given ? may_be_ins(p, port) || trigger : port.info.usb_vendor != 0) some.push_back(&port);
+  }
+  return some;
 }
 
-void check_presence(const Patient& p, std::vector<Finding>* findings) {
-  if (!p.needs.given || p.needs.ins_driver == "none" || p.needs.ins_driver == "mock") return;
+/// A configured port is there; without one there is any.
+void check_presence(const Patient& p, const std::string& group, const std::string& driver, const std::string& port,
+                    std::vector<Finding>* findings) {
+  if (!is_real(driver)) return;
+  if (!port.empty()) {
+    if (!p.machine.exists(port))
+      findings->push_back(
+          {group, FindingState::problem, fmt::format("{}.port: {} is not there; `vergence devices` lists the ports", group, port), {}});
+    return;
+  }
   const auto on_usb =
       std::count_if(p.inventory.ports.begin(), p.inventory.ports.end(), [](const auto& f) { return f.info.usb_vendor != 0; });
-  if (!p.needs.ins_port.empty()) {
-    if (!p.machine.exists(p.needs.ins_port))
-      findings->push_back({"ins",
-                           FindingState::problem,
-                           fmt::format("ins.port: {} is not there; `vergence devices` lists the ports", p.needs.ins_port),
-                           {}});
-  } else if (on_usb != 1) {
-    findings->push_back({"ins",
-                         FindingState::problem,
-                         on_usb == 0 ? std::string("the INS's converter is not there: no serial port on USB")
-                                     : fmt::format("there are {} serial ports on USB; name the INS's in ins.port", on_usb),
-                         {}});
-  }
+  if (on_usb == 0)
+    findings->push_back({group, FindingState::problem, fmt::format("{}: no serial port on USB is there; plug it in", group), {}});
+  else if (group == "ins" && on_usb > 1)
+    findings->push_back(
+        {group,
+         FindingState::problem,
+         fmt::format("there are {} serial ports on USB; name the INS's in ins.port (`vergence devices --probe` asks)", on_usb),
+         {}});
 }
 
 void check_latency(const Patient& p, std::vector<Finding>* findings) {
-  for (const FoundPort& port : p.inventory.ports) {
-    if (!port.info.latency_timer_ms) continue;
-    // Of a converter that is somebody else's business nothing is said.
-    const bool ours = port.kind == SerialKind::ins || is_ins_port(p, port) || (p.needs.ins_port.empty() && port.kind == SerialKind::ftdi);
-    if (!ours) continue;
+  for (const FoundPort* found : ports_of(p)) {
+    const FoundPort& port = *found;
+    const bool ins = port.kind == SerialKind::ins || port.kind == SerialKind::ftdi;
+    if (!port.info.latency_timer_ms || !ins || (p.needs.given && !may_be_ins(p, port))) continue;
     const int ms = *port.info.latency_timer_ms;
     Finding f{"latency_timer", FindingState::ok, fmt::format("{}: the converter's latency timer is {} ms", port.info.port, ms), {}};
     if (ms != kAdvisedLatency) {
@@ -66,10 +81,10 @@ bool is_ignored_by_modem_manager(const Machine& m, const std::string& port) {
 void check_modem_manager(const Patient& p, std::vector<Finding>* findings) {
   std::vector<std::string> exposed;
   bool any = false;
-  for (const FoundPort& port : p.inventory.ports) {
-    if (port.info.usb_vendor == 0) continue;
+  for (const FoundPort* port : ports_of(p)) {
+    if (port->info.usb_vendor == 0) continue;
     any = true;
-    if (!is_ignored_by_modem_manager(p.machine, port.info.port)) exposed.push_back(port.info.port);
+    if (!is_ignored_by_modem_manager(p.machine, port->info.port)) exposed.push_back(port->info.port);
   }
   if (!any || !p.machine.runs("ModemManager")) return;
   if (exposed.empty()) {
@@ -89,9 +104,9 @@ void check_modem_manager(const Patient& p, std::vector<Finding>* findings) {
 
 void check_serial(const Patient& p, std::vector<Finding>* findings) {
   NodesToOpen nodes{"serial_permission", "dialout", {}};
-  for (const FoundPort& port : p.inventory.ports)
-    if (port.info.usb_vendor != 0 || is_ins_port(p, port)) nodes.nodes.push_back(port.info.port);
-  check_presence(p, findings);
+  for (const FoundPort* port : ports_of(p)) nodes.nodes.push_back(port->info.port);
+  check_presence(p, "ins", p.needs.ins_driver, p.needs.ins_port, findings);
+  check_presence(p, "trigger", p.needs.trigger_driver, p.needs.trigger_port, findings);
   check_nodes(p, nodes, findings);
   check_latency(p, findings);
   check_modem_manager(p, findings);

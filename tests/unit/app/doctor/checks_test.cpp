@@ -188,6 +188,17 @@ TEST(DoctorCameras, permissionsSayWhichOfThreeThingsIsMissing) {
   EXPECT_TRUE(mends_with(found[0], "vergence devices --write-udev"));
 }
 
+TEST(DoctorCameras, nodesThatNobodyAsksForAreNobodysProblem) {
+  FakeMachine f;
+  f.file("/sys/class/video4linux/video0/index", "0");
+  f.file("/dev/video0", "");
+  f.closed = {"/dev/video0"};
+  f.need("mock", "", 640, 480, 20);
+  EXPECT_TRUE(f.of("camera_permission").empty()) << "a laptop's own camera";
+  f.need("v4l2", "", 640, 480, 20);
+  EXPECT_FALSE(f.of("camera_permission").empty());
+}
+
 TEST(DoctorCameras, aMediaControllersAdviceBecomesCommands) {
   FakeMachine f;
   f.camera("v4l2", "platform:unicam", "/dev/video0");
@@ -253,13 +264,17 @@ TEST(DoctorUsb, camerasMustNotSleep) {
 TEST(DoctorFirewire, theBudgetIsTheDriversOwn) {
   FakeMachine f;
   f.file("/sys/bus/firewire/devices/fw0/guid", "0x1");
-  for (int k = 0; k < 2; ++k) f.need("iidc-1394", "", 1280, 960, 15);
+  for (int k = 0; k < 2; ++k) f.need("iidc-1394", "", 1280, 960, 20);
   ASSERT_EQ(f.of("firewire_bus").size(), 1U);
-  EXPECT_EQ(f.of("firewire_bus")[0].state, FindingState::problem) << "2 x 2572 units at S400";
+  EXPECT_EQ(f.of("firewire_bus")[0].state, FindingState::problem) << "3076 bytes a packet at least: 2 x 3088 units at S400";
   EXPECT_TRUE(contains(f.of("firewire_bus")[0].sentence, "4915"));
+  for (CameraNeed& n : f.needs.cameras) n.rate_hz = 15;
+  EXPECT_EQ(f.of("firewire_bus")[0].state, FindingState::ok) << "2 x 2572 units in the fixed mode are too many, Format 7 does with less";
+  EXPECT_TRUE(contains(f.of("firewire_bus")[0].sentence, "Format 7"));
   for (CameraNeed& n : f.needs.cameras) n.options["speed"] = "800";
   EXPECT_EQ(f.of("firewire_bus")[0].state, FindingState::ok);
   EXPECT_TRUE(contains(f.of("firewire_bus")[0].sentence, "2572 of the bus's 4915"));
+  EXPECT_FALSE(contains(f.of("firewire_bus")[0].sentence, "Format 7"));
   EXPECT_TRUE(f.of("firewire").empty());
 }
 
@@ -328,6 +343,21 @@ TEST(DoctorSerial, permissionIsByGroupDialout) {
   f.inventory.ports = {ftdi("/dev/ttyUSB0", 16)};
   f.closed = {"/dev/ttyUSB0"};
   EXPECT_TRUE(mends_with(f.of("serial_permission")[0], "sudo usermod -aG dialout driver"));
+}
+
+TEST(DoctorSerial, portsThatNobodyAsksForAreNobodysProblem) {
+  FakeMachine f;
+  f.inventory.ports = {ftdi("/dev/ttyUSB0", 1)};
+  f.closed = {"/dev/ttyUSB0"};
+  f.file("/proc/9/comm", "ModemManager\n");
+  f.needs.given = true;
+  for (const char* check : {"serial_permission", "latency_timer", "modem_manager"}) EXPECT_TRUE(f.of(check).empty()) << check;
+  f.needs.trigger_driver = "board";
+  EXPECT_FALSE(f.of("serial_permission").empty());
+  EXPECT_TRUE(f.of("latency_timer").empty()) << "a board's stamps do not rest on it";
+  f.needs.ins_driver = "xsens";
+  f.needs.ins_port = "/dev/serial/by-id/usb-FTDI_FT232R_USB_UART_A1-if00-port0";
+  EXPECT_FALSE(f.of("latency_timer").empty());
 }
 
 TEST(DoctorSystem, aGovernorThatKeepsProcessorsSlowIsTold) {
