@@ -50,7 +50,7 @@ class Calibrator {
   }
   /// Leaves out what is beyond `ratio` times the median; `rms` one a view in use. False: nothing was.
   bool refuse(const std::vector<double>& rms, double ratio) {
-    const double limit = ratio * median(rms);
+    const double limit = std::max(kNeverRefused, ratio * median(rms));
     std::vector<std::size_t> kept;
     for (std::size_t i = 0; i < used_.size(); ++i) {
       result_.views[used_[i]].rms_px = rms[i];
@@ -105,7 +105,7 @@ bool Calibrator::start_each() {
       result_.rig.intrinsics[k] = start->lens;
       result_.cameras[k].alone_rms_px = start->rms_all_px;
       for (std::size_t i = 0; i < which.size(); ++i) T_camera_board_[k][which[i]] = start->T_camera_board[i];
-      const double limit = kRefusedRatio * median(start->rms_px);
+      const double limit = std::max(kNeverRefused, kRefusedRatio * median(start->rms_px));
       const auto before = used_.size();
       for (std::size_t i = 0; i < which.size(); ++i) {
         if (start->rms_px[i] <= limit) continue;

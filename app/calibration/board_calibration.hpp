@@ -19,7 +19,7 @@ struct BoardCalibrationOptions {
 struct BoardViewResult {
   std::string name{};
   double rms_px = 0;  // over the corners of all its images, norm of both coordinates
-  bool used = false;  // else refused: more than kRefusedRatio times the median
+  bool used = false;  // else refused: more than kRefusedRatio times the median, and kNeverRefused
 };
 
 struct BoardCameraResult {
@@ -44,6 +44,7 @@ struct BoardCalibration {
 };
 
 inline constexpr double kRefusedRatio = 3;      // of the median over the views
+inline constexpr double kNeverRefused = 0.25;   // px rms: as good as the detector gets on real images; nothing is wrong with such a view
 inline constexpr std::size_t kFewestViews = 3;  // of a camera; less leaves focal length and centre open
 
 /// Every camera for itself (start_camera()), bad views refused, then everything together (solve_boards()).

@@ -1,0 +1,182 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+#include <opencv2/imgcodecs.hpp>
+
+#include "app/config/calibration_file.hpp"
+#include "tests/support/temporary_folder.hpp"
+#include "tests/unit/app/calibration/board_picture.hpp"
+#include "tests/unit/app/calibration/board_scene.hpp"
+#include "tests/unit/app/commands/run_vergence.hpp"
+
+namespace vergence::test {
+namespace {
+
+namespace fs = std::filesystem;
+
+const app::Checkerboard kBoard = app::parse_checkerboard("9x6", 0.04);
+constexpr const char* kArguments = " --board 9x6 --square 0.04";
+
+/// Fourteen pairs of drawn boards as left/NN.png and right/NN.png, the layout of a folder that `replay` takes.
+class Calibrate : public ::testing::Test {
+ protected:
+  static void SetUpTestSuite() {
+    folder_ = new TemporaryFolder;
+    const RigCalibration rig = known_rig(2, CameraModelKind::pinhole_radtan);
+    const auto poses = shown_around(kBoard, rig);
+    std::string times;
+    for (std::size_t k = 0; k < 2; ++k) {
+      const BoardPainter painter(rig.intrinsics[k]);
+      fs::create_directories(*folder_ / (k == 0 ? "left" : "right"));
+      for (std::size_t i = 0; i < 14; ++i) {
+        auto pixels = painter.paint(kBoard, rig.T_camera_left[k] * poses[i]);
+        const cv::Mat image(480, 640, CV_8U, pixels.data());
+        ASSERT_TRUE(cv::imwrite((*folder_ / fmt::format("{}/{:02}.png", k == 0 ? "left" : "right", i)).string(), image));
+        if (k == 0) times += fmt::format("{}\n", 1'000'000'000 + 50'000'000 * i);
+      }
+    }
+    (void)folder_->write("times.txt", times);
+  }
+  static void TearDownTestSuite() { delete folder_; }
+
+  static std::string images() { return fmt::format(" --left '{0}/left/*.png' --right '{0}/right/*.png'", folder_->path().string()); }
+  static fs::path file(const std::string& name) { return *folder_ / name; }
+
+  static inline TemporaryFolder* folder_ = nullptr;
+};
+
+std::size_t sentences(const std::string& text) {
+  std::size_t n = 0;
+  for (std::size_t at = 0; (at = text.find("vergence: ", at)) != std::string::npos; at += 10) ++n;
+  return n;
+}
+
+TEST_F(Calibrate, aPairOfCamerasIsCalibratedFromFilesAndTheFileServesAReplay) {
+  const fs::path out = file("calibration.yaml");
+  const Outcome o = run_vergence("calibrate --quiet --json --baseline 0.121" + images() + kArguments + " --out '" + out.string() + "'");
+  ASSERT_EQ(o.code, 0) << o.err;
+  const auto json = nlohmann::json::parse(o.out);
+  EXPECT_EQ(json["views"].size(), 14U);
+  EXPECT_EQ(json["baseline"]["measured_m"], 0.121);
+  ASSERT_EQ(json["cameras"].size(), 2U);
+  EXPECT_EQ(json["cameras"][1]["place"]["rotation_deg"].size(), 3U);
+
+  const app::CalibrationFile c = app::read_calibration(out);
+  const RigCalibration truth = known_rig(2, CameraModelKind::pinhole_radtan);
+  EXPECT_EQ(c.source, "checkerboard");
+  EXPECT_EQ(c.rig.frames, 14);
+  // The detector's bias in drawn images, some hundredths of a pixel, is no noise: its sigmas are not held against it.
+  EXPECT_LT(c.rig.reprojection_px, 0.1);
+  for (std::size_t k = 0; k < 2; ++k) {
+    EXPECT_NEAR(c.rig.intrinsics[k].fx / truth.intrinsics[k].fx, 1, 0.003);
+    EXPECT_GT(c.rig.intrinsics[k].sigma[0], 0);
+  }
+  const Vec6 off = place_error(c.rig.T_camera_left[1], truth.T_camera_left[1]);
+  EXPECT_LT(off.head<3>().norm(), 0.15 * M_PI / 180);
+  EXPECT_LT(off.tail<3>().norm(), 0.0005) << "m";
+  for (std::size_t i = 0; i < 6; ++i) {
+    EXPECT_GT(c.rig.sigma_wide[1][i], c.rig.sigma_noise[1][i]);
+    EXPECT_NEAR(std::sqrt(c.rig.covariance_wide[1](static_cast<int>(i), static_cast<int>(i))) / c.rig.sigma_wide[1][i], 1, 1e-9);
+  }
+
+  const Outcome replay = run_vergence("replay '" + folder_->path().string() + "' --format folder --quiet --calibration '" + out.string() +
+                                      "' --out '" + file("session").string() + "'");
+  EXPECT_NE(replay.code, 2) << replay.err;  // boards that leap make no drive, but the calibration is taken
+  EXPECT_TRUE(fs::exists(file("session") / "summary.json")) << replay.err;
+}
+
+TEST_F(Calibrate, theTableSaysWhatAPersonWantsToKnow) {
+  const Outcome o = run_vergence("calibrate" + images() + kArguments + " --out '" + file("t.yaml").string() + "'");
+  ASSERT_EQ(o.code, 0) << o.err;
+  for (const char* part : {"14 views of a 9x6 board with squares of 40 mm: 14 used, 0 refused", "reprojection ", "rotation x, °", "t_x, mm",
+                           "X_right = R X_left + t", "baseline 120.", "corners a cell", "lenses held", "between views"})
+    EXPECT_NE(o.out.find(part), std::string::npos) << part << " in\n" << o.out;
+  EXPECT_NE(o.err.find("t.yaml: written"), std::string::npos);
+  EXPECT_EQ(o.out.find("Still missing: left"), std::string::npos) << "the boards were all over the images:\n" << o.out;
+}
+
+TEST_F(Calibrate, oneCameraAlone) {
+  const fs::path out = file("one.yaml");
+  const Outcome o =
+      run_vergence("calibrate --quiet --left '" + file("left").string() + "/*.png'" + kArguments + " --out '" + out.string() + "'");
+  ASSERT_EQ(o.code, 0) << o.err;
+  EXPECT_NE(read_file(out).find("intrinsics: ["), std::string::npos);
+  EXPECT_NE(o.err.find("one camera makes no rig"), std::string::npos) << o.err;
+}
+
+TEST_F(Calibrate, viewsWithoutABoardAreSaidAndSkipped) {
+  const fs::path odd = file("odd");
+  fs::create_directories(odd);
+  for (const char* side : {"left", "right"})
+    for (int i = 0; i < 6; ++i) fs::copy_file(file(fmt::format("{}/{:02}.png", side, i)), odd / fmt::format("{}{}.png", side, i));
+  const cv::Mat grey(480, 640, CV_8U, cv::Scalar(90));
+  ASSERT_TRUE(cv::imwrite((odd / "right3.png").string(), grey));
+  fs::remove(odd / "right5.png");
+  const Outcome o = run_vergence(
+      fmt::format("calibrate --quiet --left '{0}/left*.png' --right '{0}/right*.png'{1} --out '{0}/c.yaml'", odd.string(), kArguments));
+  ASSERT_EQ(o.code, 0) << o.err;
+  EXPECT_NE(o.err.find("no board of 9x6 in " + (odd / "right3.png").string()), std::string::npos) << o.err;
+  EXPECT_NE(o.err.find("left5.png: skipped, not every camera has an image of that number"), std::string::npos) << o.err;
+  EXPECT_EQ(app::read_calibration(odd / "c.yaml").rig.frames, 4);
+}
+
+TEST_F(Calibrate, exchangedCamerasAreNotUsableAndNothingIsWritten) {
+  const Outcome o = run_vergence(fmt::format("calibrate --quiet --left '{0}/right/*.png' --right '{0}/left/*.png'{1} --out '{0}/x.yaml'",
+                                             folder_->path().string(), kArguments));
+  EXPECT_EQ(o.code, 1);
+  EXPECT_NE(o.err.find("left and right seem exchanged"), std::string::npos) << o.err;
+  EXPECT_FALSE(fs::exists(file("x.yaml")));
+}
+
+TEST_F(Calibrate, badArgumentsAreOneSentence) {
+  const std::string good = images() + kArguments, out = " --out '" + file("n.yaml").string() + "'";
+  for (const std::string& bad :
+       {std::string(""), good, images() + out, good + out + " --baseline -1", good + " --out /proc/none/x.yaml",
+        images() + " --board 9 --square 0.04" + out, images() + " --board 9x6 --square 0" + out,
+        " --left '/none/*.png'" + std::string(kArguments) + out, good + out + " --model omni", good + out + " --model equidistant --k3",
+        good + out + " --convert a b", std::string(" --convert onlyone"),
+        " --convert '" + file("left/00.png").string() + "' '" + file("b.yaml").string() + "'", good + out + " --keep-views d",
+        std::string(" config.yaml --left x"), " --left '" + file("left/00.png").string() + "'" + kArguments + out}) {
+    const Outcome o = run_vergence("calibrate --quiet " + bad);
+    EXPECT_EQ(o.code, 2) << bad << "\n" << o.err;
+    EXPECT_EQ(sentences(o.err), 1U) << bad << "\n" << o.err;
+    EXPECT_EQ(o.out, "") << bad;
+  }
+}
+
+TEST_F(Calibrate, conversionsGoThroughAllFormatsAndSayWhatTheyLeaveOut) {
+  const std::string f = folder_->path().string();
+  app::CalibrationFile c;
+  c.rig = known_rig(2, CameraModelKind::pinhole_equidistant);
+  c.serials = {"15021234", "15021235", "", ""};
+  app::write_calibration(file("ours.yaml"), c);
+  Outcome o = run_vergence(fmt::format("calibrate --convert '{0}/ours.yaml' '{0}/camchain.yaml'", f));
+  ASSERT_EQ(o.code, 0) << o.err;
+  EXPECT_NE(o.err.find("vergence: a camchain has no place for serials"), std::string::npos) << o.err;
+  EXPECT_EQ(o.out, "");
+  EXPECT_EQ(run_vergence(fmt::format("calibrate --convert '{0}/camchain.yaml' '{0}/l.yaml,{0}/r.yaml'", f)).code, 0);
+  EXPECT_EQ(run_vergence(fmt::format("calibrate --convert '{0}/l.yaml,{0}/r.yaml' '{0}/stereo.yml'", f)).code, 0);
+  o = run_vergence(fmt::format("calibrate --convert '{0}/stereo.yml' '{0}/back.txt' --format vergence", f));
+  ASSERT_EQ(o.code, 0) << o.err;
+  const RigCalibration back = app::read_calibration(file("back.txt")).rig;
+  EXPECT_NEAR(place_error(back.T_camera_left[1], c.rig.T_camera_left[1]).norm(), 0, 1e-12);
+  EXPECT_EQ(back.intrinsics[1].kind, CameraModelKind::pinhole_equidistant);
+}
+
+TEST_F(Calibrate, viewsNeverGoIntoAFolderThatHasSomething) {
+  const Outcome o = run_vergence(fmt::format(
+      "calibrate '{}/app/config/mock.yaml' --quiet --board 9x6 --square 0.04 --out '{}' --set mock.texture_detail=0 --set mock.drive=brief "
+      "--set cameras.0.size=[160,120] --set cameras.1.size=[160,120] --keep-views '{}' --set mock.stop_s=1",
+      VERGENCE_SOURCE_DIR, file("m.yaml").string(), file("left").string()));
+  EXPECT_EQ(o.code, 2) << o.err;
+  EXPECT_NE(o.err.find("is not empty"), std::string::npos) << o.err;
+}
+
+}  // namespace
+}  // namespace vergence::test

@@ -1,0 +1,87 @@
+// `vergence calibrate CONFIG` on real GigE Vision over the loopback: a drawn board before two simulated cameras.
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <chrono>
+#include <filesystem>
+#include <memory>
+#include <thread>
+
+#include <fmt/format.h>
+
+#include "app/config/calibration_file.hpp"
+#include "tests/support/gige_camera.hpp"
+#include "tests/support/temporary_folder.hpp"
+#include "tests/system/gige/pairs.hpp"
+#include "tests/unit/app/calibration/board_picture.hpp"
+#include "tests/unit/app/calibration/board_scene.hpp"
+#include "tests/unit/app/commands/run_vergence.hpp"
+
+namespace vergence::test {
+namespace {
+
+const app::Checkerboard kBoard = app::parse_checkerboard("9x6", 0.04);
+constexpr double kRate = 5;            // Hz
+constexpr std::uint64_t kHeldFor = 8;  // images of one pose: time to find the board twice on a busy machine
+
+TEST(CalibrateLive, aBoardCarriedAroundIsCollectedUntilNothingIsMissing) {
+  if (const std::string why = socket_buffer_obstacle(); !why.empty()) GTEST_SKIP() << why;
+  const RigCalibration truth = known_rig(2, CameraModelKind::pinhole_radtan);
+  const auto poses = shown_around(kBoard, truth);
+  std::vector<std::vector<std::uint8_t>> images[2];
+  for (std::size_t k = 0; k < 2; ++k) {
+    const BoardPainter painter(truth.intrinsics[k]);
+    for (const Transform& T : poses) images[k].push_back(painter.paint(kBoard, truth.T_camera_left[k] * T));
+  }
+  std::vector<std::unique_ptr<GigeCamera>> cameras;
+  std::string settings = fmt::format(" --set trigger.rate={} --set rig.nominal.baseline_m=0.12 --set rig.nominal.focal_px=520", kRate);
+  for (int k = 0; k < 2; ++k) {
+    GigeCameraOptions o;
+    o.address = GigeCamera::address(k);
+    o.serial = "BOARD-" + std::to_string(k);
+    o.sensor_width = 640;
+    o.sensor_height = 480;
+    o.number_images = false;
+    o.discoverable = false;
+    o.images = [&images, k](std::uint64_t n) { return images[k][(n / kHeldFor) % images[k].size()].data(); };
+    cameras.push_back(std::make_unique<GigeCamera>(o));
+    settings += fmt::format(" --set cameras.{0}.serial={1} --set cameras.{0}.size=[640,480]", k, o.address);
+  }
+  std::atomic<bool> over{false};
+  std::thread pulses([&] {
+    const auto give_up = std::chrono::steady_clock::now() + std::chrono::seconds(120);
+    while (!over && !(cameras[0]->acquiring() && cameras[1]->acquiring()) && std::chrono::steady_clock::now() < give_up)
+      std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    std::this_thread::sleep_for(std::chrono::milliseconds(300));
+    for (std::uint64_t n = 0; !over && std::chrono::steady_clock::now() < give_up; ++n) {
+      const HostStamp now(std::chrono::steady_clock::now().time_since_epoch().count());
+      for (const auto& camera : cameras) camera->pulse(n, now);
+      std::this_thread::sleep_for(std::chrono::duration<double>(1 / kRate));
+    }
+  });
+  const TemporaryFolder folder;
+  const auto out = folder / "calibration.yaml", views = folder / "views";
+  const Outcome o = run_vergence(fmt::format("calibrate '{}/app/config/gige.yaml' --board 9x6 --square 0.04 --out '{}' --keep-views '{}'{}",
+                                             VERGENCE_SOURCE_DIR, out.string(), views.string(), settings));
+  over = true;
+  pulses.join();
+  ASSERT_EQ(o.code, 0) << o.err;
+  EXPECT_NE(o.out.find("Nothing is missing"), std::string::npos) << o.out;
+  const app::CalibrationFile c = app::read_calibration(out);
+  EXPECT_EQ(c.serials[0], "BOARD-0");
+  EXPECT_GE(c.rig.frames, 12);
+  const Vec6 off = place_error(c.rig.T_camera_left[1], truth.T_camera_left[1]);
+  EXPECT_LT(off.head<3>().norm(), 0.15 * M_PI / 180);
+  EXPECT_LT(off.tail<3>().norm(), 0.0005) << "m";
+
+  // What was kept gives the same calibration again.
+  const Outcome again =
+      run_vergence(fmt::format("calibrate --quiet --left '{0}/left_*.png' --right '{0}/right_*.png' --board 9x6 --square 0.04 --out '{1}'",
+                               views.string(), (folder / "again.yaml").string()));
+  ASSERT_EQ(again.code, 0) << again.err;
+  const app::CalibrationFile same = app::read_calibration(folder / "again.yaml");
+  EXPECT_LT(place_error(same.rig.T_camera_left[1], c.rig.T_camera_left[1]).norm(), 1e-4);
+}
+
+}  // namespace
+}  // namespace vergence::test
