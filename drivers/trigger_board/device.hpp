@@ -75,6 +75,12 @@ class Device final : public TriggerDevice, private FrameSink {
  private:
   static constexpr std::size_t kRing = 256;  // pulses: eight seconds at 30 Hz
   using Item = Delivery<Pulse>;
+  struct AskedPause {
+    std::uint32_t pulses = 0;  // 0: none is waiting for its answer
+    std::uint8_t sequence = 0;
+    int turns = 0;
+    HostStamp again{};
+  };
   enum class Seen : std::uint8_t { nothing, reboot, halted, nonsense };  // what makes the thread stop reading and set the board up
 
   [[nodiscard]] DeviceStatus open();
@@ -95,7 +101,7 @@ class Device final : public TriggerDevice, private FrameSink {
   void halt_board() noexcept;
   [[nodiscard]] std::uint32_t open_reports() const noexcept;
   void ping() noexcept;
-  void send_pause() noexcept;
+  void send_pause(HostStamp now) noexcept;
   void accept(const TriggerFrame& frame, const BoardLine::Times& times) noexcept override;
   void take_event(const TriggerEvent& event, HostStamp arrival) noexcept;
   void take_pong(const TriggerPong& pong, HostStamp departure) noexcept;
@@ -126,6 +132,7 @@ class Device final : public TriggerDevice, private FrameSink {
   BoardClock clock_;
   BoardStatistics counted_{};
   Random dither_{1, 63};
+  AskedPause asked_pause_{};
   Seen seen_ = Seen::nothing;
   bool known_boot_ = false;  // account_.boot() is one
   bool running_ = false;     // it was started and makes pulses, as far as we know

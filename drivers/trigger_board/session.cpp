@@ -17,6 +17,9 @@ constexpr Duration kAgain = Duration::milliseconds(500);     // between attempts
 constexpr Duration kPublish = Duration::milliseconds(100);   // statistics are as old as this at most
 constexpr Duration kFirstPong = Duration::milliseconds(50);  // the first pings wait for their answers
 
+constexpr Duration kPauseAgain = Duration::milliseconds(300);  // without an answer
+constexpr int kPauseTurns = 3;
+
 /// Nobody tells the last question to end: it is short.
 const std::atomic<bool> kNever{false};
 
@@ -86,6 +89,7 @@ DeviceStatus Device::begin_on(Setup* setup) {
     account_.begin(who.boot_id, board.pulses);
     clock_.restart(timing_.delay_spread, config_.pps_edge != trigger_edge_none);
     pause_.store(0, std::memory_order_relaxed);  // what was asked of the other start is past
+    asked_pause_ = {};
   } else {
     account_.end(board.pulses, 0);
   }
@@ -132,8 +136,8 @@ DeviceStatus Device::read_on() noexcept {
   HostStamp next_ping = line_->now();
   while (seen_ == Seen::nothing) {
     if (stopping_.load(std::memory_order_acquire)) return DeviceStatus::stopped;
-    send_pause();
     const HostStamp now = line_->now();
+    send_pause(now);
     if (now - heard_ > kSilent) return DeviceStatus::gone;
     if (now >= next_ping) {
       ping();
@@ -213,14 +217,25 @@ void Device::ping() noexcept {
   if (frames_.send(trigger_ping, payload, nullptr) != DeviceStatus::ok) ++counted_.writes_refused;
 }
 
-void Device::send_pause() noexcept {
-  const std::uint32_t pulses = pause_.exchange(0, std::memory_order_acq_rel);
-  if (pulses == 0) return;
+/// Sends what was asked for, and again where no answer comes. One that was heard and whose answer was lost makes another pause: a gap more,
+/// which its numbers tell.
+void Device::send_pause(HostStamp now) noexcept {
+  const std::uint32_t fresh = pause_.exchange(0, std::memory_order_acq_rel);
+  if (fresh > 0)
+    asked_pause_ = {asked_pause_.pulses + fresh, 0, 0, {}};
+  else if (asked_pause_.pulses == 0 || now < asked_pause_.again)
+    return;
+  if (asked_pause_.turns == kPauseTurns) {
+    asked_pause_ = {};
+    return;
+  }
   std::array<std::uint8_t, trigger_pause_payload_size> payload{};
-  const TriggerPause message{pulses};
+  const TriggerPause message{asked_pause_.pulses};
   trigger_put_pause(&message, payload.data());
-  if (frames_.send(trigger_pause, payload, nullptr) == DeviceStatus::ok)
-    account_.expect_pause(pulses);
+  ++asked_pause_.turns;
+  asked_pause_.again = now + kPauseAgain;
+  if (frames_.send(trigger_pause, payload, &asked_pause_.sequence) == DeviceStatus::ok)
+    account_.expect_pause(asked_pause_.pulses);
   else
     ++counted_.writes_refused;
 }
@@ -248,6 +263,7 @@ void Device::accept(const TriggerFrame& frame, const BoardLine::Times& times) no
   } else if (frame.type == trigger_pong && trigger_get_pong(frame.payload, size, &pong)) {
     take_pong(pong, times.departure);
   } else if (frame.type == trigger_status && trigger_get_status(frame.payload, size, &status)) {
+    if (asked_pause_.turns > 0 && frame.sequence == asked_pause_.sequence) asked_pause_ = {};
     take_status(status);
   } else if (frame.type == trigger_pps && trigger_get_edge(frame.payload, size, &edge)) {
     if (same_boot(edge.boot_id)) ++counted_.pps_edges;
@@ -255,7 +271,10 @@ void Device::accept(const TriggerFrame& frame, const BoardLine::Times& times) no
     if (same_boot(edge.boot_id)) ++counted_.ins_edges;
   } else if (frame.type == trigger_error && trigger_get_error(frame.payload, size, &error)) {
     ++counted_.errors;
-    if (error.refused == trigger_pause) account_.forget_pause();
+    if (error.refused == trigger_pause) {
+      asked_pause_ = {};
+      account_.forget_pause();
+    }
   } else if (frame.type != trigger_info || !trigger_get_info(frame.payload, size, &info)) {  // an INFO answers a question given up
     ++counted_.frames_unknown;
   }

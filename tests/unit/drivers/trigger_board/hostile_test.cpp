@@ -251,6 +251,37 @@ TEST(Hostile, ofABoardThatDoesNotPingTheArrivalsTellTheTime) {
   EXPECT_GT(rig.device->board_statistics().time.unanswered, 2000U);
 }
 
+TEST(Hostile, aPauseThatIsLostOnTheWayIsAskedForAgain) {
+  BoardRig rig(board_for(Duration::seconds(30)), direct_line());
+  int asked = 0;
+  rig.between->lose([&](HostStamp, std::span<const std::uint8_t> bytes) {
+    return opened({bytes.begin(), bytes.end()}).type == trigger_pause && ++asked < 3;
+  });
+  ASSERT_EQ(rig.device->configure(thirty_hertz(), nullptr), DeviceStatus::ok);
+  ASSERT_EQ(rig.device->start(nullptr), DeviceStatus::ok);
+  (void)rig.pulses(10);
+  ASSERT_EQ(rig.device->pause(4), DeviceStatus::ok);
+  (void)rig.pulses();
+  EXPECT_EQ(asked, 3);
+  const BoardStatistics s = rig.device->board_statistics();
+  EXPECT_EQ(s.pulses.left_out, 4U);
+  EXPECT_EQ(s.pulses.lost, 0U);
+}
+
+TEST(Hostile, questionsThatAreLostOnTheWayAreAskedAgain) {
+  Random random(17);
+  BoardRig rig(board_for(Duration::seconds(30)), direct_line());
+  rig.between->lose([&](HostStamp, std::span<const std::uint8_t>) { return random.uniform() < 0.3; });
+  ASSERT_EQ(rig.device->configure(thirty_hertz(), nullptr), DeviceStatus::ok) << rig.device->complaint();
+  ASSERT_EQ(rig.device->start(nullptr), DeviceStatus::ok);
+  const auto all = rig.pulses();
+  EXPECT_EQ(rig.times_gone, 0);
+  ASSERT_GT(all.size(), 830U);
+  for (const Pulse& p : all) ASSERT_LE(std::abs((p.host - rig.truth(p)).ns()), p.host_error.ns()) << p.number;
+  EXPECT_EQ(rig.device->statistics().lost, 0U);
+  EXPECT_GT(rig.device->board_statistics().time.unanswered, 500U);
+}
+
 // ---- who is there -----------------------------------------------------------------------------------------------------
 
 /// Something else on the port: says the same every 200 ms, and answers a frame as it is told.

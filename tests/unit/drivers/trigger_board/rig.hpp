@@ -18,7 +18,12 @@ class Tampered final : public mock::DeviceModel {
  public:
   using Tamper = std::function<void(HostStamp at, std::vector<std::uint8_t>* frame)>;  // a whole frame, its 00 included
   Tampered(std::shared_ptr<mock::DeviceModel> device, Tamper tamper) : device_(std::move(device)), tamper_(std::move(tamper)) {}
-  void receive(std::span<const std::uint8_t> bytes, HostStamp at) override { device_->receive(bytes, at); }
+  /// Of what the host sends; true: it is lost on the way.
+  using Loss = std::function<bool(HostStamp at, std::span<const std::uint8_t> bytes)>;
+  void lose(Loss loss) { loss_ = std::move(loss); }
+  void receive(std::span<const std::uint8_t> bytes, HostStamp at) override {
+    if (!loss_ || !loss_(at, bytes)) device_->receive(bytes, at);
+  }
   std::optional<HostStamp> next() const override { return device_->next(); }
   void produce(HostStamp at, std::vector<std::uint8_t>* out) override {
     std::vector<std::uint8_t> frame;
@@ -33,6 +38,7 @@ class Tampered final : public mock::DeviceModel {
  private:
   std::shared_ptr<mock::DeviceModel> device_;
   Tamper tamper_;
+  Loss loss_;
 };
 
 /// A frame taken apart; type 0: it is none.
@@ -76,7 +82,8 @@ struct BoardRig {
               return exposures ? exposures(p) : mock::SimulatedExposures{};
             },
             board)) {
-    auto owned = std::make_unique<mock::SimulatedPlace>(std::make_shared<Tampered>(simulator, std::move(tamper)), line);
+    between = std::make_shared<Tampered>(simulator, std::move(tamper));
+    auto owned = std::make_unique<mock::SimulatedPlace>(between, line);
     place = owned.get();
     device = std::make_unique<trigger_board::Device>(std::move(owned), options);
   }
@@ -84,6 +91,7 @@ struct BoardRig {
   std::map<std::pair<std::uint32_t, std::uint64_t>, HostStamp> edges;  // by boot and number; of the device's thread while it runs
   mock::PulseSource exposures;
   std::shared_ptr<mock::BoardSimulator> simulator;
+  std::shared_ptr<Tampered> between;
   mock::SimulatedPlace* place = nullptr;
   std::unique_ptr<trigger_board::Device> device;
   int times_gone = 0;
