@@ -448,6 +448,12 @@ ExitCode Drive::run() {
   to_record.when_full = request_.fast ? Recorder::WhenFull::wait : Recorder::WhenFull::drop;
   to_record.expected_frames = frames;
   to_record.keep = calibration_keeper(request_.out, begin_.file, begin_.state);
+  const auto scheduled = devices_.faults();
+  const auto is_full = [](const mock::Fault& f) { return f.kind == mock::FaultKind::disk_full; };
+  if (std::any_of(scheduled.begin(), scheduled.end(), is_full))
+    to_record.disk_full = [this, scheduled, is_full](Stamp stamp) {
+      return std::any_of(scheduled.begin(), scheduled.end(), [&](const mock::Fault& f) { return is_full(f) && f.active(stamp - start_); });
+    };
   recorder_ = std::make_unique<Recorder>(request_.out, to_record);
   journal_.open(recorder_.get(), start_);
   std::vector<std::string> faults;

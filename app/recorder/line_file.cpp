@@ -28,7 +28,7 @@ bool LineFile::append(std::string_view line) {
 
 bool LineFile::flush() {
   std::size_t done = 0;
-  int error = 0;
+  int error = pretend_full_ && !waiting_.empty() ? ENOSPC : 0;
   while (done < waiting_.size() && error == 0) {
     const ssize_t n = ::write(fd_, waiting_.data() + done, waiting_.size() - done);
     if (n > 0)

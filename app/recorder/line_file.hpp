@@ -31,6 +31,9 @@ class LineFile {
   /// flush(), then asks the system to put it on the disk, and closes. Twice is harmless.
   bool close();
 
+  /// From now on, or no longer, as if the disk had no room: for drives that test it.
+  void pretend_full(bool full) noexcept { pretend_full_ = full; }
+
   /// errno of the last failure; 0 when none is standing, that is when all has been written since.
   [[nodiscard]] int fault() const noexcept { return fault_; }
   [[nodiscard]] std::uint64_t lost_lines() const noexcept { return lost_lines_; }
@@ -40,6 +43,7 @@ class LineFile {
   std::filesystem::path path_;
   int fd_ = -1;
   int fault_ = 0;
+  bool pretend_full_ = false;
   std::uint64_t lost_lines_ = 0;
   std::string waiting_;
 };

@@ -132,6 +132,8 @@ void Recorder::work() {
 }
 
 void Recorder::write(const PoseRecord& p) {
+  newest_ = p.stamp;
+  if (options_.disk_full) pretend(p.stamp);
   ++totals_->read;
   ++(p.status == PoseStatus::ok ? totals_->ok : p.status == PoseStatus::degraded ? totals_->degraded : totals_->lost);
   totals_->estimate.add(static_cast<double>(p.estimate_ms));
@@ -268,6 +270,39 @@ void Recorder::flush() {
       complain(*files[i]);
     }
   }
+  note_disk(pretended_ || std::any_of(files.begin(), files.end(), [](const LineFile* f) { return f->fault() != 0; }));
+}
+
+void Recorder::pretend(Stamp stamp) {
+  const bool full = options_.disk_full(stamp);
+  if (full == pretended_) return;
+  if (full) flush();  // what came before has found room
+  pretended_ = full;
+  for (LineFile* file : files_->all()) file->pretend_full(full);
+  if (full) {
+    const std::lock_guard lock(complaints_mutex_);
+    complaints_.push_back(files_->poses.path().parent_path().string() +
+                          ": the disk has no room, as the drive's faults want it; the session goes on, lines wait in memory");
+  }
+  flush();
+}
+
+/// An event where the disk begins to refuse, and where it takes lines again.
+void Recorder::note_disk(bool full) {
+  if (full == disk_full_) return;
+  disk_full_ = full;
+  EventRecord event;
+  event.stamp = newest_;
+  event.kind = full ? "disk_full" : "disk_room";
+  event.set_sentence(full ? "the disk of the session has no room: lines wait in memory"
+                          : fmt::format("the disk takes lines again; {} were lost", lost_lines()));
+  write(event);
+}
+
+std::uint64_t Recorder::lost_lines() const {
+  std::uint64_t lines = 0;
+  for (const LineFile* file : files_->all()) lines += file->lost_lines();
+  return lines;
 }
 
 void Recorder::complain(const LineFile& file) {
@@ -290,8 +325,8 @@ std::unique_ptr<SessionTotals> Recorder::close() {
       totals_->faults.push_back(file->path().string() + ": is not complete (" + std::strerror(file->fault()) +
                                 "); make room on that disk and repeat the drive");
     else if (file->lost_lines() > 0)
-      totals_->faults.push_back(file->path().string() + ": lacks " + std::to_string(file->lost_lines()) +
-                                " lines that found no room on the disk in time");
+      complaints_.push_back(file->path().string() + ": lacks " + std::to_string(file->lost_lines()) +
+                            " lines that found no room on the disk in time; the others are all there");
   }
   totals_->dropped_records = dropped_.load(std::memory_order_relaxed);
   totals_->ring_high_water = high_water_;

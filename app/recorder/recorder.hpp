@@ -77,7 +77,9 @@ struct Kept {
 /// Threads  post(): one producer. take_complaints(): any. close(): the owner's, after the last post().
 /// Memory   post() takes none. With keep_trajectory a pose of some 100 bytes is kept for every frame.
 /// Full     wait: the producer waits (replay). drop: the record is dropped and counted (live).
-/// Errors   The constructor throws InputError. A disk that takes no more: a complaint, the session goes on, see LineFile.
+/// Errors   The constructor throws InputError. A disk that takes no more: a complaint and an event `disk_full`, the session goes on, see
+///          LineFile; an event `disk_room` when it takes lines again says what was lost. Lines lost in between leave the session usable and
+///          are a complaint of close(); a file that could not be ended is a fault of its totals.
 class Recorder {
  public:
   enum class WhenFull : std::uint8_t { wait, drop };
@@ -87,6 +89,9 @@ class Recorder {
     std::size_t expected_frames = 0;  // memory taken beforehand for the trajectory
     /// Called on the recorder's thread with every calibration that was accepted while driving: files may be written there. May be empty.
     std::function<Kept(const RigCalibration&)> keep{};
+    /// Whether the disk is to be taken for full at this time of the drive, which a mock's fault says. Called on the recorder's thread with
+    /// the stamp of every pose. May be empty.
+    std::function<bool(Stamp)> disk_full{};
   };
 
   /// `folder` exists: make_session_folder().
@@ -110,6 +115,9 @@ class Recorder {
   void write(const CalibrationRecord& calibration);
   void note(const CalibrationRecord& calibration);
   void flush();
+  void pretend(Stamp stamp);
+  void note_disk(bool full);
+  [[nodiscard]] std::uint64_t lost_lines() const;
   void stop_and_join() noexcept;
   void complain(const LineFile& file);
 
@@ -120,6 +128,8 @@ class Recorder {
   PoseNumbers last_pose_{};
   bool have_last_pose_ = false;
   std::string line_;  // being formatted
+  Stamp newest_{};    // of the poses
+  bool disk_full_ = false, pretended_ = false;
 
   Ring<Record, kRing> ring_;
   Doorbell filled_, freed_;

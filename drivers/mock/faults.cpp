@@ -74,7 +74,8 @@ constexpr FaultRow kRows[] = {
     {FaultKind::no_fix, "no_fix", "The satellite receiver has no position.", kInsGone},
     {FaultKind::position_jump, "position_jump", "The INS's position leaps.", kPositionJump},
     {FaultKind::time_jump, "time_jump", "A device's clock is set.", kTimeJump},
-    {FaultKind::disk_full, "disk_full", "The disk of the session has no room; nothing happens to the devices.", kInsGone},
+    {FaultKind::disk_full, "disk_full",
+     "The disk of the session takes nothing: lines wait in memory, up to 1 MB a file; nothing happens to the devices.", kInsGone},
 };
 
 double number(std::string_view text, const std::string& what) {

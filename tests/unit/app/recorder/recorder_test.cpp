@@ -323,6 +323,76 @@ TEST(Recorder, aFullDiskIsASentenceAndTheOtherFilesAreWhole) {
   EXPECT_EQ(totals->read, 10U);
 }
 
+/// Sentences of the events of one kind.
+std::vector<std::string> told(const std::filesystem::path& folder, const std::string& kind) {
+  std::vector<std::string> sentences;
+  for (const std::string& line : lines_of(folder / "events.jsonl")) {
+    const auto event = nlohmann::json::parse(line);
+    if (event["kind"] == kind) sentences.push_back(event["sentence"]);
+  }
+  return sentences;
+}
+
+/// Frames [first, last) of a drive find the disk full.
+std::function<bool(Stamp)> full_from_to(std::uint64_t first, std::uint64_t last) {
+  return [=](Stamp s) {
+    return s >= Stamp(kStamp + static_cast<std::int64_t>(first) * 50'000'000) &&
+           s < Stamp(kStamp + static_cast<std::int64_t>(last) * 50'000'000);
+  };
+}
+
+TEST(Recorder, aDiskThatIsFullForAWhileCostsNothingThatMemoryHolds) {
+  const test::TemporaryFolder folder;
+  Recorder::Options options;
+  options.disk_full = full_from_to(20, 40);
+  Recorder recorder(folder.path(), options);
+  for (std::uint64_t i = 0; i < 100; ++i) recorder.post(pose(i, PoseStatus::ok, 0.1 * static_cast<double>(i)));
+  const auto totals = recorder.close();
+  EXPECT_TRUE(totals->faults.empty());
+  EXPECT_EQ(totals->lost_lines, 0U);
+  EXPECT_EQ(lines_of(folder / "trajectory.tum").size(), 100U);
+  EXPECT_EQ(lines_of(folder / "poses.csv").size(), 101U);
+  EXPECT_EQ(told(folder.path(), "disk_full"), std::vector<std::string>{"the disk of the session has no room: lines wait in memory"});
+  EXPECT_EQ(told(folder.path(), "disk_room"), std::vector<std::string>{"the disk takes lines again; 0 were lost"});
+  const auto full = nlohmann::json::parse(lines_of(folder / "events.jsonl").front());
+  EXPECT_EQ(full["stamp_ns"], kStamp + 20 * std::int64_t{50'000'000});
+  const auto complaints = recorder.take_complaints();
+  EXPECT_TRUE(std::any_of(complaints.begin(), complaints.end(), [](const std::string& c) {
+    return c.find("the disk has no room, as the drive's faults want it; the session goes on") != std::string::npos;
+  }));
+}
+
+TEST(Recorder, aDiskThatIsFullForLongLosesWholeLinesAndSaysHowMany) {
+  const test::TemporaryFolder folder;
+  constexpr std::uint64_t kFrames = 14'000;  // 170 bytes each in poses.csv: twice what memory holds
+  Recorder::Options options;
+  options.disk_full = full_from_to(10, kFrames - 10);
+  Recorder recorder(folder.path(), options);
+  for (std::uint64_t i = 0; i < kFrames; ++i) recorder.post(pose(i, PoseStatus::ok, 0.1 * static_cast<double>(i)));
+  const auto totals = recorder.close();
+  EXPECT_TRUE(totals->faults.empty()) << "the files end whole: the session is usable";
+  ASSERT_GT(totals->lost_lines, 1000U);
+  const std::size_t written = lines_of(folder / "trajectory.tum").size() + lines_of(folder / "poses.csv").size() - 1;
+  EXPECT_EQ(written + totals->lost_lines, 2 * kFrames);
+  EXPECT_EQ(told(folder.path(), "disk_room"),
+            std::vector<std::string>{"the disk takes lines again; " + std::to_string(totals->lost_lines) + " were lost"});
+  const auto complaints = recorder.take_complaints();
+  EXPECT_TRUE(std::any_of(complaints.begin(), complaints.end(), [](const std::string& c) {
+    return c.find("lines that found no room on the disk in time; the others are all there") != std::string::npos;
+  }));
+}
+
+TEST(Recorder, aDiskThatIsFullToTheEndLeavesFilesThatAreNotWholeAndNamesThem) {
+  const test::TemporaryFolder folder;
+  Recorder::Options options;
+  options.disk_full = full_from_to(10, 1'000'000);
+  Recorder recorder(folder.path(), options);
+  for (std::uint64_t i = 0; i < 100; ++i) recorder.post(pose(i, PoseStatus::ok, 0.1 * static_cast<double>(i)));
+  const auto totals = recorder.close();
+  EXPECT_GE(totals->faults.size(), 2U);
+  EXPECT_EQ(lines_of(folder / "trajectory.tum").size(), 10U);
+}
+
 TEST(Recorder, aFolderThatCannotBeWrittenIsNamed) {
   const test::TemporaryFolder folder;
   EXPECT_THROW(Recorder(folder / "none", {}), InputError);
