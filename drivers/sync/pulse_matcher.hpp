@@ -17,9 +17,9 @@ namespace vergence {
 ///            taken as fitting and those before the first report as possible. Only runs whose last frame had arrived when the newest
 ///            pulse went out are tried, so that the true place is among them; for the same reason none is found beside a report that is
 ///            missing. Pulses at even intervals fit everywhere and prove nothing, until one of them is a pause.
-/// A limit    Where only a pause proves, a camera that misses as many triggers in a row as a pause leaves out, within kNear of one, is
-///            laid over it. A camera's clock that is set back by as many intervals as triggers are missed at that moment goes unseen
-///            until the intervals differ.
+/// Limits     Where only a pause proves, a camera that misses as many triggers in a row as a pause leaves out, within `latest` after one,
+///            is laid over it. A clock that is set back by as many intervals as triggers are missed at that moment goes unseen until the
+///            intervals differ.
 /// Proven     The camera's clock is tied to the source's: line over the matched pairs, expanding memory up to kMemory (g-h filter with the
 ///            gains of the least-squares line: g = 2(2n−1)/(n(n+1)), h = 6/(n(n+1))). A frame's pulse is where its stamp falls on the
 ///            train. The numbers are integers and are never averaged.

@@ -121,12 +121,14 @@ void RigSynchronizer::pulse(const Pulse& pulse) noexcept {
 void RigSynchronizer::begin_anew() noexcept {
   ++counters_.reboots;
   flushed_ = first_free();
-  for (PulseMatcher& m : matchers_) m.restart();
+  for (std::size_t k = 0; k < matchers_.size(); ++k) {
+    distrust(k);
+    matchers_[k].restart();
+  }
 }
 
-/// What was in doubt is so for good.
-void RigSynchronizer::contradicted(std::size_t camera) noexcept {
-  ++counters_.contradictions[camera];
+/// That camera's proof begins anew: what was in doubt is so for good.
+void RigSynchronizer::distrust(std::size_t camera) noexcept {
   for (Open& o : open_)
     if (o.used && o.set.present[camera] && o.images[camera].doubtful) o.contradicted = true;
 }
@@ -145,7 +147,8 @@ void RigSynchronizer::take_pulse(const Pulse& pulse) noexcept {
     PulseMatcher& matcher = matchers_[k];
     const bool proven = matcher.proven();
     if (const auto number = matcher.report(train_, now_)) {
-      contradicted(k);
+      ++counters_.contradictions[k];
+      distrust(k);
       Open* open = find(*number);
       if (open != nullptr && open->set.present[k]) open->contradicted = true;
     }
@@ -183,7 +186,8 @@ RigSynchronizer::Step RigSynchronizer::number_by_pulse(const SyncFrame& frame, s
       *number = m.number;
       return Step::again;
     case PulseMatcher::Outcome::contradicted:
-      contradicted(k);
+      ++counters_.contradictions[k];
+      distrust(k);
       [[fallthrough]];
     case PulseMatcher::Outcome::acquiring:
       ++counters_.acquiring[k];

@@ -254,6 +254,7 @@ void RigSynchronizer::restarted(int camera) noexcept {
   source.here = true;
   source.any = false;
   source.align = options_.mode == SyncMode::counter;
+  distrust(k);
   matchers_[k].restart();
   if (k == 0) master_.align = master_.known;
 }

@@ -112,7 +112,7 @@ class RigSynchronizer {
   [[nodiscard]] Step number_by_pulse(const SyncFrame& frame, std::uint64_t* number, Image* image) noexcept;
   [[nodiscard]] Step number_by_master(const SyncFrame& frame, std::uint64_t* number, Image* image) noexcept;
   void take_pulse(const Pulse& pulse) noexcept;
-  void contradicted(std::size_t camera) noexcept;
+  void distrust(std::size_t camera) noexcept;
   void acquired(std::size_t camera) noexcept;
   void begin_anew() noexcept;
   [[nodiscard]] std::uint64_t first_free() const noexcept;
