@@ -10,6 +10,7 @@
 
 #include "app/commands/drive_sync.hpp"
 #include "app/commands/exposure_settings.hpp"
+#include "app/commands/simulated_board.hpp"
 #include "app/commands/simulated_ins.hpp"
 #include "app/commands/trigger_boards.hpp"
 #include "app/runtime/errors.hpp"
@@ -123,6 +124,13 @@ DriveDevices::DriveDevices(const Configuration& c, const std::vector<std::string
     ins_ = opened_ins_.get();
   }
   trigger_ = &mock_.rig->trigger();
+  if (c.mock.board_line != "none") {
+    if (!fast)
+      throw InputError("mock.board_line is \"" + c.mock.board_line + "\", a line in virtual time; run with --fast, or set it to none");
+    simulated_board_ = make_simulated_board(c, mock_.rig.get(), &board_driver_, &remarks_);
+    trigger_ = simulated_board_.get();
+    board_keeps_own_time_ = true;
+  }
   sync_ = sync_options(c, mock_.rig->cameras());
   frames_ = mock_.rig->pulses(c.trigger.rate);
 }
@@ -142,6 +150,7 @@ void DriveDevices::open_real(const Configuration& c) {
   if (c.trigger.driver == "board") {
     board_ = open_trigger_board(c.trigger, pulses, &remarks_);
     trigger_ = board_.get();
+    board_driver_ = board_.get();
   }
   for (std::size_t k = 0; k < opened_.size(); ++k) sync_.camera[k].resolution = opened_[k].device->timing().resolution;
   const CameraTrigger trigger = requests[0].configuration.trigger;

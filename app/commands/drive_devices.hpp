@@ -32,8 +32,8 @@ class DriveDevices {
   [[nodiscard]] bool board_keeps_own_time() const noexcept { return board_keeps_own_time_; }
   /// The INS marks the readings that a pulse left its SyncOut with.
   [[nodiscard]] bool sync_out_marked() const noexcept { return sync_out_marked_; }
-  /// The board, where there is one on a line; null: a mock's, or none.
-  [[nodiscard]] const trigger_board::Device* board() const noexcept { return board_.get(); }
+  /// The driver of a board on a line, simulated or not; null: there is none.
+  [[nodiscard]] const trigger_board::Device* board() const noexcept { return board_driver_; }
   /// Sentences about what works, but not as well as it should.
   [[nodiscard]] const std::vector<std::string>& remarks() const noexcept { return remarks_; }
 
@@ -56,6 +56,8 @@ class DriveDevices {
   std::unique_ptr<InsDevice> opened_ins_;
   std::unique_ptr<TriggerDevice> software_;
   std::unique_ptr<trigger_board::Device> board_;
+  std::unique_ptr<TriggerDevice> simulated_board_;
+  const trigger_board::Device* board_driver_ = nullptr;
   std::vector<CameraDevice*> cameras_;
   InsDevice* ins_ = nullptr;
   TriggerDevice* trigger_ = nullptr;

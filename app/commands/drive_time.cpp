@@ -115,8 +115,13 @@ DriveTime::Sentence DriveTime::of_reading(const LiveItem& item) noexcept {
   any_quality_ = true;
   quality_ = q;
   fix_ = item.sample.fix;
-  return sentence("ins_status", false, "the INS has %s, %d satellites, its filter is %s", word_of(fix_), count,
-                  q.filter_valid ? "valid" : "not valid");
+  std::array<char, 32> satellites{};
+  if (count > 0) (void)std::snprintf(satellites.data(), satellites.size(), ", %d satellites", count);
+  const bool told = q.status != 0 || q.filter_valid;  // a device that says nothing of its filter has no status either
+  return sentence("ins_status", false, "the INS has %s%s%s", word_of(fix_), satellites.data(),
+                  !told            ? ""
+                  : q.filter_valid ? ", its filter is valid"
+                                   : ", its filter is not valid");
 }
 
 DriveTime::Sentence DriveTime::of_utc(const LiveItem& item) noexcept {

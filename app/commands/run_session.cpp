@@ -384,7 +384,9 @@ TruthFigures Drive::truth_figures(const SessionTotals& totals) const {
 SummaryInput Drive::summary_input(const SessionTotals& totals, std::uint64_t allocations) const {
   SummaryInput input;
   const LiveCounters& c = source_->counters();
-  input.skipped = c.dropped_sets + c.sync.missed;
+  // Pulses whose images nobody estimated from: of some no set came, because nothing proved yet which images were theirs.
+  const auto acquiring = std::min_element(c.sync.acquiring.begin(), c.sync.acquiring.begin() + begin_.file.rig.cameras);
+  input.skipped = c.dropped_sets + c.sync.missed + *acquiring;
   input.dropped_by_estimator = journal_.dropped();
   if (!totals.reference.empty() && !totals.trajectory.empty())
     input.evaluation = evaluate(totals.trajectory, totals.reference, summary_evaluation_options());
@@ -471,11 +473,15 @@ ExitCode Drive::run() {
   journal_.tell(start_, "pairing", proof_sentence(mode), false);
   if (mode == SyncMode::software) progress.say(std::string("vergence: ") + proof_sentence(mode) + "; poses in motion suffer from it");
   begin();
-  if (devices_.mock() != nullptr) write_truth(&faults);
+  if (!truth_.empty()) write_truth(&faults);
   std::thread estimating([this] { estimate(); });
   watch(&progress);
   estimating.join();
   source_->join();
+  if (devices_.mock() != nullptr && devices_.board_keeps_own_time()) {  // whose pulses nobody knew before they were made
+    truth_ = true_trajectory(*devices_.mock(), configuration_, start_);
+    write_truth(&faults);
+  }
   if (exposure_) exposure_->settle();
   progress.finish();
   if (exposure_ && exposure_->counters().unsupported)
@@ -498,7 +504,7 @@ void Drive::begin() {
   const HostStamp assumed = devices_.start();
   source_->start();
   start_ = start_ + (devices_.start() - assumed);  // a mock in real time knows it only now
-  if (devices_.mock() != nullptr) truth_ = true_trajectory(*devices_.mock(), configuration_, start_);
+  if (devices_.mock() != nullptr && !devices_.board_keeps_own_time()) truth_ = true_trajectory(*devices_.mock(), configuration_, start_);
 }
 
 }  // namespace

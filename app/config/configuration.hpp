@@ -106,7 +106,7 @@ struct MockSettings {
   int ins_latency_timer_ms = 16;  // 0: no converter
   double ins_late_percent = 1, ins_late_ms = 4;
   std::string board_line = "none";
-  int board_latency_timer_ms = 0;  // 0: the board's own USB
+  int board_latency_timer_ms = 1;  // of `ftdi`
   double board_late_percent = 1, board_late_ms = 2;
   std::int64_t seed = 1;
   int texture_detail = 1;

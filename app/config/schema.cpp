@@ -336,8 +336,9 @@ Group mock() {
       .text(
           "board_line", &M::board_line, 8,
           "With `--fast`: the trigger board as bytes on a simulated line, read by the real driver, its pulses trigger the cameras: `usb`, "
-          "or `ftdi` at 921600 baud; `none`.")
-      .integer("board_latency_timer_ms", &M::board_latency_timer_ms, 0, 255, "ms", "Latency timer of that line's USB converter.")
+          "packets as they are full, or `ftdi`, a converter with a latency timer; `none`.")
+      .integer("board_latency_timer_ms", &M::board_latency_timer_ms, 0, 255, "ms",
+               "With `ftdi`: latency timer of that line's USB converter.")
       .number("board_late_percent", &M::board_late_percent, 0, 100, "%", "Of its reads: they come late …")
       .number("board_late_ms", &M::board_late_ms, 0, 1000, "ms", "… by an exponential time of this mean.")
       .integer("texture_detail", &M::texture_detail, 0, 2, "", "Resolution of the facades: 4.7, 2.3 or 1.2 cm a texel (8, 32, 128 MB).")
@@ -476,8 +477,9 @@ Group monitor() {
 }  // namespace
 
 const std::vector<Group>& schema() {
-  static const std::vector<Group> groups{general(), rig(),        cameras(), exposure(), ins(),   trigger(), sync(), odometry(), calibration_options(),
-                                         monitor(), comparison(), mock(),    faults()};
+  static const std::vector<Group> groups{
+      general(), rig(),        cameras(), exposure(), ins(), trigger(), sync(), odometry(), calibration_options(),
+      monitor(), comparison(), mock(),    faults()};
   return groups;
 }
 

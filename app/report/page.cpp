@@ -13,6 +13,7 @@
 #include "app/report/style.hpp"
 #include "app/report/svg.hpp"
 #include "app/report/tables.hpp"
+#include "app/report/time_section.hpp"
 
 namespace vergence::app::report {
 namespace {
@@ -209,6 +210,9 @@ std::string page_html(const Session& session, const Analysis& analysis, const Ve
   out += running + errors_head(analysis);
   if (analysis.source != ErrorSource::none) error_plots(session, analysis, &out);
   calibration_sections(session, analysis, &out);
+  const TimeSection time = time_section(session);
+  if (!time.body.empty()) out += section("", "Time", time.body);
+  if (!time.latency.empty()) out += figure(time.caption, time.latency);
   out += section("wide long", "Events", session.events.empty() ? "<p>None was recorded.</p>" : events_table(session));
   out += section("wide long", "Figures", "<div class=\"two\">" + figures_table(session, analysis, timing) + "</div>");
   out += "</div>\n" + footer(session) + "</main></body></html>\n";

@@ -39,6 +39,9 @@ class ClockRecord {
     ++stamps_;
   }
 
+  /// The device was restarted: its stamps so far say nothing of those to come.
+  void restart() noexcept { any_ = false; }
+
   [[nodiscard]] std::uint64_t stamps() const noexcept { return stamps_; }
   /// Of the host's clock against the device's, ppm; 0 where nothing is known.
   [[nodiscard]] double drift_ppm() const noexcept { return drift_ppm_; }

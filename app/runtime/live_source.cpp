@@ -260,7 +260,8 @@ void LiveSource::take_frame(std::size_t k) {
   if (head.back) {
     head.back = false;
     clocks_[k].restart();
-    proofs_[k] = {true, head.value.arrival};
+    counters_.cameras[k].restart();
+    proofs_[k] = {};
     sync_.restarted(item.camera);
     item.kind = LiveItem::Kind::device_back;
     push(item);
@@ -284,6 +285,7 @@ void LiveSource::take_frame(std::size_t k) {
   counters_.torn += torn ? 1 : 0;
   if (torn) sync_.lost(in.camera, in.counter);
   const bool taken = !torn && sync_.offer(in) == SyncVerdict::taken;
+  proofs_[k].any = true;
   note_proofs(frame.arrival);
   if (options_.sync.mode == SyncMode::master_strobe && k == 0) pause_pulses();
   if (taken) return;
@@ -346,7 +348,10 @@ void LiveSource::take_pulse(const Pulse& reported) {
   boot_ = pulse.boot;
   ++counters_.pulses;
   if (!pulse.mapped) {
-    if (rebooted) board_clock_->restart();
+    if (rebooted) {
+      board_clock_->restart();
+      counters_.board.restart();
+    }
     const MappedStamp at = board_clock_->map(pulse.edge, pulse.arrival);
     pulse.mapped = true;
     pulse.host = at.host;
@@ -389,13 +394,13 @@ void LiveSource::note_proofs(HostStamp now) {
   for (std::size_t k = 0; k < cameras_.size(); ++k) {
     Proof& proof = proofs_[k];
     const bool proven = sync_.proven(static_cast<int>(k));
-    if (proven == proof.proven || heads_[k].gone) continue;
+    if (proven == proof.proven || heads_[k].gone || !proof.any) continue;
     LiveItem item;
     item.kind = proven ? LiveItem::Kind::proven : LiveItem::Kind::acquiring;
     item.camera = static_cast<int>(k);
     item.stamp = stamp_of(now);
     item.seconds = proven ? (now - proof.since).to_seconds() : 0;
-    proof = {proven, now};
+    proof = {true, proven, now};
     push(item);
   }
 }

@@ -158,6 +158,7 @@ class LiveSource final : private Notifier {
   bool any_pulse_ = false;
   std::uint32_t boot_ = 0;  // of the newest pulse
   struct Proof {
+    bool any = false;  // a frame has come since it was started
     bool proven = true;
     HostStamp since{};  // of the first frame without
   };

@@ -23,16 +23,62 @@ HostStamp monotonic_now() noexcept {
 
 }  // namespace
 
-PulsePlan Scheduler::plan_of(const TriggerConfiguration& c) const {
-  Duration length = rig_.truth->drive().duration();
-  if (rig_.options.duration > Duration{}) length = std::min(length, rig_.options.duration);
-  return {c, length, rig_.truth->faults()};
+Duration Scheduler::length() const noexcept {
+  const Duration all = rig_.truth->drive().duration();
+  return rig_.options.duration > Duration{} ? std::min(all, rig_.options.duration) : all;
+}
+
+PulsePlan Scheduler::plan_of(const TriggerConfiguration& c) const { return {c, length(), rig_.truth->faults()}; }
+
+std::array<PulseExposure, kMaxCameras> Scheduler::feed(HostStamp edge) {
+  std::array<PulseExposure, kMaxCameras> exposures{};
+  const Duration time = edge - start_;
+  if (time < Duration{}) return exposures;
+  if (time > length()) {
+    end_feed();
+    return exposures;
+  }
+  fed_.append(time);
+  const std::uint64_t slot = fed_.size() - 1;
+  for (int k = 0; k < static_cast<int>(cameras_.size()); ++k) {
+    const MockCamera& camera = *cameras_[static_cast<std::size_t>(k)];
+    if (!pulsed(k) || unplugged_at(time, k) || !camera.stream.streaming()) continue;
+    const Duration begins = camera.trigger_delay();
+    if (exposure_of(*rig_.truth, rig_.options.seed, {slot, time + begins, &fed_}, k).missed) continue;
+    exposures[static_cast<std::size_t>(k)] = {true, begins, begins + camera.configuration().exposure};
+  }
+  {
+    const std::lock_guard lock(feeding_);
+    if (!feed_over_) feed_.push(time);
+  }
+  fed_more_.notify_all();
+  return exposures;
+}
+
+void Scheduler::end_feed() noexcept {
+  {
+    const std::lock_guard lock(feeding_);
+    feed_over_ = true;
+  }
+  fed_more_.notify_all();
+}
+
+bool Scheduler::has_slot(std::uint64_t n) {
+  while (rig_.options.fed && plan_.size() < n + 2) {
+    std::unique_lock lock(feeding_);
+    fed_more_.wait(lock, [this] { return !feed_.empty() || feed_over_ || stopping(); });
+    if (feed_.empty() || stopping()) break;
+    plan_.append(feed_.front());
+    feed_.pop();
+  }
+  return n < plan_.size();
 }
 
 void Scheduler::begin(const TriggerConfiguration& c) {
   halt();
   board_ = c;
-  plan_ = plan_of(c);
+  plan_ = rig_.options.fed ? PulsePlan(Duration::seconds(1 / c.rate_hz)) : plan_of(c);
+  fed_ = plan_;
   stop_ = false;
   finished_ = false;
   constexpr Duration kLead = Duration::milliseconds(100);  // the first pictures are rendered before they are due
@@ -46,7 +92,9 @@ void Scheduler::halt() noexcept {
   stop_.store(true, std::memory_order_release);
   rig_.room.made();
   { const std::lock_guard lock(mutex_); }
+  { const std::lock_guard lock(feeding_); }
   posted_.notify_all();
+  fed_more_.notify_all();
   if (producer_.joinable()) producer_.join();
   if (deliverer_.joinable()) deliverer_.join();
   rig_.pulsing = false;
@@ -58,11 +106,7 @@ void Scheduler::leave_out(std::uint64_t from, std::uint32_t pulses, std::uint32_
   pause_ = {from, from + pulses, boot};
 }
 
-std::uint64_t Scheduler::pulses(double rate_hz) const noexcept {
-  Duration length = rig_.truth->drive().duration();
-  if (rig_.options.duration > Duration{}) length = std::min(length, rig_.options.duration);
-  return static_cast<std::uint64_t>(length.to_seconds() * rate_hz) + 1;
-}
+std::uint64_t Scheduler::pulses(double rate_hz) const noexcept { return static_cast<std::uint64_t>(length().to_seconds() * rate_hz) + 1; }
 
 HostStamp Scheduler::jittered(HostStamp least, std::uint64_t device, std::uint64_t number) const noexcept {
   if (!rig_.options.jitter) return least;
@@ -75,8 +119,7 @@ HostStamp Scheduler::jittered(HostStamp least, std::uint64_t device, std::uint64
 
 void Scheduler::produce() {
   (void)pthread_setname_np(pthread_self(), "vergence-mock");
-  const std::uint64_t count = plan_.size();
-  for (std::uint64_t n = 0; n < count && !stopping(); ++n) {
+  for (std::uint64_t n = 0; !stopping() && has_slot(n); ++n) {
     while (rig_.options.reports_taken && !rig_.options.real_time && !stopping()) {
       const std::uint32_t seen = rig_.room.look();
       if (trigger_->stream.empty() || !trigger_->stream.streaming()) break;
@@ -91,7 +134,7 @@ void Scheduler::produce() {
       if (!rig_.options.real_time) deliver_until(host_of(n + 1));
       continue;
     }
-    make_report(n);
+    if (!rig_.options.fed) make_report(n);
     if (rig_.options.real_time && !wait_for_its_turn(n)) {
       for (const auto& camera : cameras_) camera->lost.fetch_add(1, std::memory_order_relaxed);
       continue;
@@ -100,6 +143,7 @@ void Scheduler::produce() {
     // Whatever is made later was measured at the next pulse or after it.
     if (!rig_.options.real_time) deliver_until(host_of(n + 1));
   }
+  const std::uint64_t count = plan_.size();
   make_link_events(count);
   announce_end(host_of(count + 4) + Duration::seconds(11));
   if (!rig_.options.real_time) {
@@ -160,15 +204,14 @@ PulseAt Scheduler::pulse_at(std::uint64_t pulse, int k) const noexcept {
   return {pulse, plan_.at(pulse).time + cameras_[static_cast<std::size_t>(k)]->trigger_delay(), &plan_};
 }
 
-bool Scheduler::unplugged(std::uint64_t pulse, int k) const noexcept {
-  const Duration time = plan_.at(pulse).time;
+bool Scheduler::unplugged_at(Duration time, int k) const noexcept {
   return std::any_of(rig_.truth->faults().begin(), rig_.truth->faults().end(),
                      [&](const Fault& f) { return f.kind == FaultKind::camera_gone && f.concerns(k) && f.active(time); });
 }
 
 PulseExposure Scheduler::feedback(std::uint64_t pulse, int k) const {
   const MockCamera& camera = *cameras_[static_cast<std::size_t>(k)];
-  if (!pulsed(k) || unplugged(pulse, k) || !camera.stream.streaming()) return {};
+  if (!pulsed(k) || unplugged_at(plan_.at(pulse).time, k) || !camera.stream.streaming()) return {};
   if (exposure_of(*rig_.truth, rig_.options.seed, pulse_at(pulse, k), k).missed) return {};
   const auto in_ticks = [](Duration d) { return Duration::microseconds((d.ns() + 500) / 1000); };
   return {true, in_ticks(camera.trigger_delay()), in_ticks(camera.trigger_delay() + camera.setting_at(pulse).exposure)};
@@ -256,7 +299,7 @@ void Scheduler::make_frames(std::uint64_t pulse) {
 
 bool Scheduler::present(std::uint64_t pulse, int k) {
   Sender& sender = senders_[static_cast<std::size_t>(k)];
-  const bool gone = unplugged(pulse, k);
+  const bool gone = unplugged_at(plan_.at(pulse).time, k);
   if (gone != sender.unplugged) {
     Parcel p;
     p.device = k;

@@ -36,6 +36,10 @@ class Scheduler final : public PulseListener {
   void begin(const TriggerConfiguration& c) override;
   void halt() noexcept override;
   void leave_out(std::uint64_t from, std::uint32_t pulses, std::uint32_t boot) noexcept override;
+  [[nodiscard]] std::array<PulseExposure, kMaxCameras> feed(HostStamp edge);
+  void end_feed() noexcept;
+  /// After the drive.
+  [[nodiscard]] const PulsePlan& fed_plan() const noexcept { return fed_; }
   [[nodiscard]] PulsePlan plan_of(const TriggerConfiguration& c) const;
   /// The host's time at the drive's start.
   [[nodiscard]] HostStamp start() const noexcept { return start_; }
@@ -77,6 +81,9 @@ class Scheduler final : public PulseListener {
   static constexpr HostStamp kVirtualStart{1'000'000'000'000};  // 1000 s after a machine's start, on every run
 
   void produce();
+  /// Whether there is a slot n. Fed: once the one after it is known too, or that there is none.
+  [[nodiscard]] bool has_slot(std::uint64_t n);
+  [[nodiscard]] Duration length() const noexcept;
   void wait_for_exposures();
   [[nodiscard]] bool wait_for_its_turn(std::uint64_t pulse);
   void make_link_events(std::uint64_t pulse);
@@ -85,7 +92,7 @@ class Scheduler final : public PulseListener {
   /// What the feedback line of camera k tells of this pulse.
   [[nodiscard]] PulseExposure feedback(std::uint64_t pulse, int k) const;
   [[nodiscard]] bool pulsed(int k) const noexcept { return (board_.lines >> static_cast<unsigned>(k) & 1U) != 0; }
-  [[nodiscard]] bool unplugged(std::uint64_t pulse, int k) const noexcept;
+  [[nodiscard]] bool unplugged_at(Duration time, int k) const noexcept;
   [[nodiscard]] PulseAt pulse_at(std::uint64_t pulse, int k) const noexcept;
   [[nodiscard]] std::uint32_t boot_of(std::uint64_t pulse) const noexcept;
   void make_readings(HostStamp until);
@@ -122,6 +129,11 @@ class Scheduler final : public PulseListener {
   std::mutex pausing_;           // of what follows
   std::optional<Pause> pause_;
   std::uint64_t made_ = 0;  // slots
+  PulsePlan fed_;           // of who feeds
+  std::mutex feeding_;      // of what follows
+  std::condition_variable fed_more_;
+  std::queue<Duration> feed_;
+  bool feed_over_ = false;
   std::array<Sender, kMaxCameras> senders_{};
   std::mutex mutex_;  // of parcels_, in real time
   std::condition_variable posted_;

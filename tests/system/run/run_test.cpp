@@ -274,7 +274,7 @@ INSTANTIATE_TEST_SUITE_P(
                       BadCase{"--set cameras.0.exposure_us=60000", "longer than the 50000 µs between two pulses"},
                       BadCase{"--set cameras.0.driver=gige", "--fast is virtual time"},
                       BadCase{"--set cameras.1.driver=", "one camera alone has no scale"},
-                      BadCase{"--set sync.mode=board", "sync.mode is \"board\""}, BadCase{"--set mock.drive=lop", "did you mean \"loop\"?"},
+                      BadCase{"--set sync.mode=bord", "did you mean \"board\"?"}, BadCase{"--set mock.drive=lop", "did you mean \"loop\"?"},
                       BadCase{"--set rig.nominal.focal_px=3", "rig.nominal"}, BadCase{"--fault knok@3", "there is no fault \"knok\""},
                       BadCase{"--fault 'cover@1 camera=3'", "there is no camera 3"},
                       BadCase{"--set 'faults.0=drift@x'", "faults.0: the time of drift is \"x\""},

@@ -224,8 +224,9 @@ TEST(LiveSource, everySlotComesBack) {
 constexpr BenchOptions kByPulses{.mode = SyncMode::board, .vary = Duration::milliseconds(2), .seconds = 8};
 
 /// Sets with both images, all of the same pulse, stamped at its middle within the error; the first of them after that time.
-void expect_right_pairs(const Bench& b, const std::vector<LiveItem>& items) {
+void expect_right_pairs(const Bench& b, const std::vector<LiveItem>& items, int most_unproven = 0) {
   std::size_t i = 0;
+  int unproven = 0;
   for (const LiveItem& item : items) {
     if (item.kind != LiveItem::Kind::images) continue;
     const auto& pulses = b.pulses_of[i++];
@@ -235,10 +236,13 @@ void expect_right_pairs(const Bench& b, const std::vector<LiveItem>& items) {
     }
     const Stamp truth = kStart + b.times[static_cast<std::size_t>(first)] + Duration::milliseconds(4);
     EXPECT_LE(std::abs((item.stamp - truth).ns()), item.set.error.ns()) << item.set.number;
-    EXPECT_TRUE(item.set.proof == SyncProof::numbered) << to_string(item.set.proof) << " " << item.set.number;
+    // One that is not proven for the while says so, and is right all the same.
+    unproven += item.set.proof == SyncProof::unproven ? 1 : 0;
+    EXPECT_TRUE(item.set.proof == SyncProof::numbered || item.set.proof == SyncProof::unproven) << to_string(item.set.proof);
     EXPECT_EQ(item.set.spread, Duration{}) << "equal exposures of one pulse";
   }
   EXPECT_EQ(i, b.pulses_of.size());
+  EXPECT_LE(unproven, most_unproven);
 }
 
 double worst_acquisition(const std::vector<LiveItem>& items) {
@@ -288,7 +292,7 @@ class LiveSourceByPulses : public ::testing::TestWithParam<LossCase> {};
 TEST_P(LiveSourceByPulses, whateverIsLostNoPairIsWrongAndAllIsSaid) {
   Bench b(GetParam().faults, kByPulses), again(GetParam().faults, kByPulses);
   const auto items = b.drive(), same = again.drive();
-  expect_right_pairs(b, items);
+  expect_right_pairs(b, items, 2);
   EXPECT_EQ(count(items, LiveItem::Kind::proven), GetParam().acquisitions);
   EXPECT_LE(worst_acquisition(items), 1);
   EXPECT_EQ(count(items, GetParam().kind), GetParam().items);
