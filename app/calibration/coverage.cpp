@@ -103,7 +103,10 @@ std::vector<std::string> Coverage::needs() const {
   std::vector<std::string> edges;
   for (std::size_t i = 0; i < kTilts; ++i)
     if (!tilted_[i]) edges.emplace_back(kTiltNames[i]);
-  if (!edges.empty()) needs.push_back(fmt::format("tilted, the {} edge nearer", edges.size() > 1 ? listed(edges) + " in turn" : edges[0]));
+  if (edges.size() == kTilts)
+    needs.emplace_back("tilted, each edge nearer in turn");
+  else if (!edges.empty())
+    needs.push_back(fmt::format("tilted, the {} {}", listed(edges), edges.size() == 1 ? "edge nearer" : "edges nearer in turn"));
   if (nearest_ < kNearExtent)
     needs.emplace_back("nearer");
   else if (farthest_ > kFarOfNear * nearest_)

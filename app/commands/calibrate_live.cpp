@@ -192,10 +192,10 @@ ExitCode calibrate_live(const CalibrateRequest& request, const Configuration& co
   for (const int camera : source.missing())
     progress.say(fmt::format("vergence: camera {} did not come back; look at its cable and power", camera));
   if (collection.views().size() < kFewestViews) {
-    progress.say(
-        fmt::format("no calibration: {} views of the board were taken, {} are the least; is it {}x{} inner corners, whole and lit "
-                    "in every image?",
-                    collection.views().size(), kFewestViews, request.board.columns, request.board.rows));
+    progress.say(fmt::format(
+        "vergence: no calibration: {} views of the board were taken, {} are the least; is it {}x{} inner corners, whole and lit "
+        "in every image?",
+        collection.views().size(), kFewestViews, request.board.columns, request.board.rows));
     return stopped.value_or(source.missing().empty() ? ExitCode::not_usable : ExitCode::device_failed);
   }
   const ExitCode code = conclude_calibration(request, rig, collection.views(), &progress);

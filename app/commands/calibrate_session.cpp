@@ -87,6 +87,10 @@ ExitCode calibrate_images(const CalibrateRequest& request, const std::vector<std
   });
   progress.finish();
   for (const std::string& sentence : remarks) progress.say("vergence: " + sentence);
+  if (images.views.empty())  // a sentence a view would only hide the one that helps
+    throw InputError(fmt::format("no view has the board of {}x{} inner corners{}; count them where four squares meet ({})",
+                                 request.board.columns, request.board.rows, patterns.size() > 1 ? " in two cameras" : "",
+                                 images.remarks.empty() ? "there are no images" : images.remarks.front()));
   for (const std::string& sentence : images.remarks) progress.say("vergence: " + sentence);
   CalibratedRig rig;
   rig.sizes = images.sizes;

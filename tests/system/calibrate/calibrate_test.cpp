@@ -126,6 +126,13 @@ TEST_F(Calibrate, viewsWithoutABoardAreSaidAndSkipped) {
   EXPECT_EQ(app::read_calibration(odd / "c.yaml").rig.frames, 4);
 }
 
+TEST_F(Calibrate, anotherBoardIsSaidOnceAndNotForEveryView) {
+  const Outcome o = run_vergence("calibrate --quiet" + images() + " --board 8x5 --square 0.04 --out '" + file("b.yaml").string() + "'");
+  EXPECT_EQ(o.code, 2);
+  EXPECT_EQ(sentences(o.err), 1U) << o.err;
+  EXPECT_NE(o.err.find("no view has the board of 8x5 inner corners"), std::string::npos) << o.err;
+}
+
 TEST_F(Calibrate, exchangedCamerasAreNotUsableAndNothingIsWritten) {
   const Outcome o = run_vergence(fmt::format("calibrate --quiet --left '{0}/right/*.png' --right '{0}/left/*.png'{1} --out '{0}/x.yaml'",
                                              folder_->path().string(), kArguments));

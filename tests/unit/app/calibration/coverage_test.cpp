@@ -43,22 +43,22 @@ TEST(Coverage, saysWhichPartsTiltsAndSizesAreMissing) {
   Coverage c = nothing_yet(rig);
   EXPECT_TRUE(contains(all(c.needs()), "left: every part of the image"));
   c.add(seen_board(rig, kBoard, flat(rig, 0.06, 0, 0.3)));
-  std::string needs = all(c.needs());
+  const std::string needs = all(c.needs());
   EXPECT_TRUE(contains(needs, "top left")) << needs;
   EXPECT_FALSE(contains(needs, "the middle")) << needs;
   EXPECT_TRUE(contains(needs, "nearer\n")) << needs;
-  EXPECT_TRUE(contains(needs, "the right, left, bottom and top in turn edge nearer")) << needs;
+  EXPECT_TRUE(contains(needs, "tilted, each edge nearer in turn")) << needs;
   EXPECT_TRUE(contains(needs, "11 more views")) << needs;
 
-  // Turned about the vertical axis (y down) by a positive angle the right edge goes away: the left one is the nearer.
-  c.add(seen_board(rig, kBoard, flat(rig, 0.06, 0, 0.3, Vec3(0, 0.4, 0))));
-  c.add(seen_board(rig, kBoard, flat(rig, 0.06, 0, 0.3, Vec3(0.4, 0, 0))));
-  needs = all(c.needs());
-  const Transform left_near = flat(rig, 0.06, 0, 0.3, Vec3(0, 0.4, 0)), top_near = flat(rig, 0.06, 0, 0.3, Vec3(0.4, 0, 0));
-  EXPECT_EQ((left_near * kBoard.corner(0)).z() < (left_near * kBoard.corner(8)).z(),
-            !contains(needs, "left and") && !contains(needs, "left edge"))
-      << needs;
-  EXPECT_EQ((top_near * kBoard.corner(0)).z() < (top_near * kBoard.corner(45)).z(), contains(needs, "bottom")) << needs;
+  // Which edge is the nearer one is asked of the board's own corners.
+  const Transform turned = flat(rig, 0.06, 0, 0.3, Vec3(0, 0.4, 0)), tipped = flat(rig, 0.06, 0, 0.3, Vec3(0.4, 0, 0));
+  c.add(seen_board(rig, kBoard, turned));
+  c.add(seen_board(rig, kBoard, tipped));
+  const bool left_nearer = (turned * kBoard.corner(0)).z() < (turned * kBoard.corner(8)).z();
+  const bool top_nearer = (tipped * kBoard.corner(0)).z() < (tipped * kBoard.corner(45)).z();
+  EXPECT_TRUE(contains(all(c.needs()), std::string("tilted, the ") + (left_nearer ? "right" : "left") + " and " +
+                                           (top_nearer ? "bottom" : "top") + " edges nearer in turn"))
+      << all(c.needs());
   c.add(seen_board(rig, kBoard, flat(rig, 0.06, 0, 0.45)));
   const auto last = c.needs();
   EXPECT_EQ(std::count(last.begin(), last.end(), "nearer") + std::count(last.begin(), last.end(), "farther"), 0) << all(last);
