@@ -1,37 +1,41 @@
 #include "drivers/sync/sync_out_pulses.hpp"
 
-#include <algorithm>
-
 namespace vergence {
 
-bool SyncOutPulses::pulsed(const InsReading& reading) noexcept {
-  if (divider_ == 0) return reading.quality.sync_out;
-  if (fresh_) first_ = reading.measured;
-  const Duration sample = interval_ / divider_;
-  const std::int64_t count = (reading.measured - first_ + sample / 2).ns() / sample.ns();
-  return count % divider_ == 0;
-}
-
 std::optional<Pulse> SyncOutPulses::reading(const InsReading& reading, MappedStamp at) noexcept {
-  const Duration passed = reading.measured - last_;
-  if (any_ && passed <= Duration{}) {
+  const bool marked = divider_ == 0;
+  if (marked && !reading.quality.sync_out) return std::nullopt;
+  if (any_ && reading.measured <= last_) {
     ++boot_;
     fresh_ = true;
   }
-  if (!pulsed(reading)) return std::nullopt;
-  Pulse p;
-  p.resumed = fresh_;
-  const std::int64_t steps = any_ && !fresh_ ? (passed + interval_ / 2).ns() / interval_.ns() : 1;
-  number_ += any_ ? static_cast<std::uint64_t>(std::max<std::int64_t>(steps, 1)) : 0;
+  const bool begins = fresh_;
+  if (begins) {
+    first_ = reading.measured;
+    base_ = any_ ? number_ + 1 : 0;
+    fresh_ = false;
+  }
   any_ = true;
-  fresh_ = false;
   last_ = reading.measured;
-  p.number = number_;
-  p.edge = reading.measured;
+  const Duration since = reading.measured - first_;
+  const std::int64_t steps = (since + interval_ / 2).ns() / interval_.ns();
+  Duration off = since - interval_ * steps;
+  if (marked && off < Duration{}) {
+    first_ = first_ + off;
+    off = {};
+  }
+  const bool of_pulse = marked || ((off < Duration{} ? -off : off) * 2 * divider_ < interval_);
+  const std::uint64_t number = base_ + static_cast<std::uint64_t>(steps);
+  if (!of_pulse || (!begins && number <= number_)) return std::nullopt;
+  number_ = number;
+  Pulse p;
+  p.number = number;
+  p.edge = reading.measured - off;
   p.arrival = reading.arrival;
   p.boot = boot_;
+  p.resumed = begins;
   p.mapped = true;
-  p.host = at.host;
+  p.host = at.host - off;
   p.host_error = at.error;
   return p;
 }

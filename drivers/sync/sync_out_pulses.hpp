@@ -10,10 +10,14 @@ namespace vergence {
 
 /// The pulses of an INS's SyncOut, from its readings: for the mode ins_syncout.
 ///
-/// Numbers  Marked readings (InsQuality::sync_out) are pulses. Where the device marks none, every `divider`-th reading since restart() is
-///          one, readings counted by their own clock, so that a lost one is counted too. Pulses whose readings were lost are left out of
-///          the numbers; a gap made on purpose must be told by restart().
+/// Numbers  Intervals of the INS's own clock, which makes the pulses too; a reading that was lost loses no number. A gap made on purpose
+/// must
+///          be told by restart(): numbers go on after it, for it is the gap between pulses of one boot that proves.
+/// Marked   A device that marks its pulses (InsQuality::sync_out) does so on the sample after the pulse: edges are multiples of the
+/// interval
+///          from the earliest mark. One that does not pulses with every `divider`-th sample from its first since restart().
 /// Threads  One caller. Memory: in place. Errors: none; a clock that runs back is another boot.
+/// A limit  The INS's clock must go on over the gap: one that is continued by the host's time only proves nothing.
 class SyncOutPulses {
  public:
   /// `interval`: between two pulses. `divider`: readings a pulse where none are marked; 0: they are marked.
@@ -25,14 +29,12 @@ class SyncOutPulses {
   void restart() noexcept { fresh_ = true; }
 
  private:
-  [[nodiscard]] bool pulsed(const InsReading& reading) noexcept;
-
   Duration interval_;
   std::uint32_t divider_;
   bool any_ = false, fresh_ = true;
-  DeviceStamp first_{};  // reading since the gap
-  DeviceStamp last_{};   // pulse
-  std::uint64_t number_ = 0;
+  DeviceStamp first_{};  // of the pulses since the gap, numbered base_
+  DeviceStamp last_{};   // reading that was looked at
+  std::uint64_t base_ = 0, number_ = 0;
   std::uint32_t boot_ = 0;
 };
 

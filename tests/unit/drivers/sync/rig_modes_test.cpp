@@ -191,6 +191,27 @@ TEST_P(SyncOut, isProvenByAGapBeforeTheDrive) {
 
 INSTANTIATE_TEST_SUITE_P(MarkedOrCounted, SyncOut, ::testing::Values(0U, 4U));
 
+TEST(RigModes, marksOnTheSampleAfterThePulseAreReckonedFromTheEarliest) {
+  // Pulses every 40 ms, samples every 15: a mark is up to 15 ms late, and once in three exact.
+  SyncOutPulses pulses(kInterval, 0);
+  int exact = 0;
+  for (int n = 0; n < 300; ++n) {
+    if (n % 50 == 17) continue;  // its reading was lost
+    const std::int64_t pulse_ms = 1000 + 40 * n, sample_ms = (pulse_ms + 14) / 15 * 15;
+    InsReading r;
+    r.measured = DeviceStamp(sample_ms * 1'000'000);
+    r.quality.sync_out = true;
+    const auto p = pulses.reading(r, {HostStamp(r.measured.ns() + 5), Duration::microseconds(9)});
+    if (n < 3) continue;  // by then the exact one was there
+    ASSERT_TRUE(p.has_value()) << n;
+    EXPECT_EQ(p->number, static_cast<std::uint64_t>(n));
+    EXPECT_EQ(p->edge, DeviceStamp(pulse_ms * 1'000'000));
+    EXPECT_EQ(p->host, HostStamp(pulse_ms * 1'000'000 + 5));
+    ++exact;
+  }
+  EXPECT_EQ(exact, 291);
+}
+
 // ---- one camera triggers the other ----
 
 struct MasterRig {
