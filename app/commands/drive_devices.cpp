@@ -145,7 +145,7 @@ void DriveDevices::open_real(const Configuration& c) {
   ins_ = opened_ins_.get();
   if (sync_.mode == SyncMode::ins_syncout) {
     check_sync_out(c, ins_->info());
-    sync_out_marked_ = marks_sync_out(ins_->info());
+    if (!marks_sync_out(ins_->info())) sync_out_divider_ = static_cast<std::uint32_t>(std::lround(c.ins.rate / c.trigger.rate));
   }
   if (c.trigger.driver == "board") {
     board_ = open_trigger_board(c.trigger, pulses, &remarks_);

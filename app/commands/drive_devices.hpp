@@ -30,8 +30,8 @@ class DriveDevices {
   [[nodiscard]] const SyncOptions& sync() const noexcept { return sync_; }
   /// LiveSource::Options::board_keeps_own_time.
   [[nodiscard]] bool board_keeps_own_time() const noexcept { return board_keeps_own_time_; }
-  /// The INS marks the readings that a pulse left its SyncOut with.
-  [[nodiscard]] bool sync_out_marked() const noexcept { return sync_out_marked_; }
+  /// LiveSource::Options::sync_out_divider.
+  [[nodiscard]] std::uint32_t sync_out_divider() const noexcept { return sync_out_divider_; }
   /// The driver of a board on a line, simulated or not; null: there is none.
   [[nodiscard]] const trigger_board::Device* board() const noexcept { return board_driver_; }
   /// Sentences about what works, but not as well as it should.
@@ -62,7 +62,8 @@ class DriveDevices {
   InsDevice* ins_ = nullptr;
   TriggerDevice* trigger_ = nullptr;
   SyncOptions sync_;
-  bool sync_out_marked_ = false, board_keeps_own_time_ = false;
+  std::uint32_t sync_out_divider_ = 0;
+  bool board_keeps_own_time_ = false;
   std::vector<std::string> remarks_;
   std::uint64_t frames_ = 0;
   HostStamp start_{};

@@ -135,7 +135,7 @@ Drive::Drive(const RunRequest& request)
   o.sync = devices_.sync();
   o.wait_when_full = request.fast;
   o.board_keeps_own_time = devices_.board_keeps_own_time();
-  o.sync_out_marked = devices_.sync_out_marked();
+  o.sync_out_divider = devices_.sync_out_divider();
   o.stamp_grid = stamp_grid(configuration_);
   o.tie_stamp = request.fast ? kVirtualEpoch : Stamp(clock_ns(CLOCK_REALTIME));
   o.tie_host = request.fast ? devices_.start() : HostStamp(clock_ns(CLOCK_MONOTONIC));

@@ -76,7 +76,7 @@ std::string clocks_table(const Json& time) {
   const bool pings = std::any_of(clocks->begin(), clocks->end(), [](const Json& c) { return part_of(c, "pings") != nullptr; });
   std::vector<std::string> names{"clock", "drift", "error bound, end", "worst"};
   if (pings) names.insert(names.end(), {"round trip", "PPS"});
-  std::string table = "<h3>Clocks against the host's</h3><table>" + head(names);
+  std::string table = "<h3>Clocks against the host's</h3><table class=\"clocks\">" + head(names);
   for (std::size_t i = 0; i < std::min(clocks->size(), kMostRows); ++i) {
     const Json& c = (*clocks)[i];
     const auto drift = number_at(c, "drift_ppm");
@@ -126,7 +126,8 @@ std::string losses_table(const Json& pairing) {
     if (sum > 0) rows += cells(row);
   }
   if (rows.empty()) return "<p>No frame was lost, late, doubled or without its pulse.</p>\n";
-  return "<h3>Frames that are in no set, or came otherwise than they should</h3><table>" + head(names) + rows + "</table>\n";
+  return "<h3>Frames that are in no set, or came otherwise than they should</h3><table class=\"clocks\">" + head(names) + rows +
+         "</table>\n";
 }
 
 /// What was lost on a device's line; nothing when nothing was.

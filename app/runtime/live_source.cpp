@@ -38,7 +38,7 @@ LiveSource::LiveSource(std::vector<CameraDevice*> cameras, InsDevice* ins, Trigg
   for (const CameraDevice* camera : cameras_) clocks_.emplace_back(clock_options(camera->timing()));
   if (ins_ != nullptr) ins_clock_ = std::make_unique<ClockMapper>(clock_options(ins_->timing()));
   if (trigger_ != nullptr) board_clock_ = std::make_unique<ClockMapper>(clock_options(trigger_->timing()));
-  if (options.sync.mode == SyncMode::ins_syncout) sync_out_.emplace(options.sync.interval, options.sync_out_marked);
+  if (options.sync.mode == SyncMode::ins_syncout) sync_out_.emplace(options.sync.interval, options.sync_out_divider);
 }
 
 LiveSource::~LiveSource() {
@@ -308,7 +308,7 @@ void LiveSource::take_reading() {
   counters_.ins.note(r.measured, at);
   push(item);
   if (!sync_out_) return;
-  if (const auto pulse = sync_out_->take(r, at)) {
+  if (const auto pulse = sync_out_->reading(r, at)) {
     take_pulse(*pulse);
     pause_pulses();
   }

@@ -10,11 +10,11 @@
 
 #include "app/runtime/clock_record.hpp"
 #include "app/runtime/doorbell.hpp"
-#include "app/runtime/sync_out_pulses.hpp"
 #include "core/memory/ring.hpp"
 #include "drivers/camera.hpp"
 #include "drivers/ins.hpp"
 #include "drivers/sync/rig_synchronizer.hpp"
+#include "drivers/sync/sync_out_pulses.hpp"
 #include "drivers/trigger.hpp"
 
 namespace vergence::app {
@@ -85,7 +85,7 @@ class LiveSource final : private Notifier {
     Duration stamp_grid = Duration::nanoseconds(1);  // stamps are whole multiples of it, rounded to the nearest; > 0
     /// The board lives in a virtual time of its own, beside the other devices: its next report is there for the waiting.
     bool board_keeps_own_time = false;
-    bool sync_out_marked = false;  // ins_syncout: the INS marks the readings that a pulse left with
+    std::uint32_t sync_out_divider = 0;  // ins_syncout: readings a pulse, where the INS does not mark those that one left with
   };
 
   /// `ins` may be null. The cameras in the order of the rig, camera 0 first.
