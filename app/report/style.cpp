@@ -50,7 +50,8 @@ th{font-weight:400;color:var(--soft)}
 th[scope=row]{min-width:8.5em}
 td.n,th.n{text-align:right;font-variant-numeric:tabular-nums;padding-right:0}
 td.k{min-width:6.4em}
-.clocks td.n,.clocks th.n{padding-left:14px}
+.clocks td.n,.clocks th.n{padding-left:10px;overflow-wrap:normal}
+.clocks td.n{white-space:nowrap}
 .clocks{margin-bottom:8px}
 .health{max-width:640px;margin-bottom:4px}
 td.t{white-space:nowrap;font-variant-numeric:tabular-nums}
