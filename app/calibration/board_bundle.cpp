@@ -73,15 +73,15 @@ ViewNormal linearise(const BoardProblem& b, const BoardParameters& layout, const
     for (std::size_t i = 0; i < corners.size(); ++i) {
       const Vec3 in_board = T_b.R * b.board.corner(i), X_left = in_board + T_b.t, turned = T_k.R * X_left, X = turned + T_k.t;
       Vec2 x;
-      Mat23 d_x_d_X;
-      if (cameras[at].project(X, &x, &d_x_d_X) != ProjectStatus::ok) continue;  // the sum is infinite there, so no step leads here
+      Mat23 J_point;
+      if (cameras[at].project(X, &x, &J_point) != ProjectStatus::ok) continue;  // the sum is infinite there, so no step leads here
       J.leftCols(lens) = cameras[at].intrinsics_jacobian(X).leftCols(lens);
       if (k > 0) {
-        J.middleCols<3>(lens) = -d_x_d_X * skew(turned);
-        J.middleCols<3>(lens + 3) = d_x_d_X;
+        J.middleCols<3>(lens) = -J_point * skew(turned);
+        J.middleCols<3>(lens + 3) = J_point;
       }
       Mat26 J_pose;
-      J_pose << -d_x_d_X * T_k.R * skew(in_board), d_x_d_X * T_k.R;
+      J_pose << -J_point * T_k.R * skew(in_board), J_point * T_k.R;
       const Vec2 r = x - corners[i];
       ss.noalias() += J.transpose() * J;
       sp.noalias() += J.transpose() * J_pose;

@@ -80,6 +80,7 @@ std::vector<fs::path> matching_files(const std::vector<std::string>& patterns, c
 
 std::vector<std::vector<fs::path>> group_views(const std::vector<std::vector<fs::path>>& cameras, std::vector<std::string>* remarks) {
   std::vector<Numbered> numbers;
+  numbers.reserve(cameras.size());
   for (const auto& files : cameras) numbers.push_back(numbered(files));
   const bool told = std::none_of(numbers.begin(), numbers.end(), [](const Numbered& n) { return n.empty(); });
   std::vector<std::vector<fs::path>> views;

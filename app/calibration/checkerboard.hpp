@@ -18,7 +18,8 @@ struct Checkerboard {
   [[nodiscard]] std::size_t corners() const noexcept { return static_cast<std::size_t>(columns) * static_cast<std::size_t>(rows); }
   [[nodiscard]] Vec3 corner(std::size_t i) const noexcept {
     const auto n = static_cast<std::size_t>(columns);
-    return {square * static_cast<double>(i % n), square * static_cast<double>(i / n), 0};
+    const std::size_t row = i / n, column = i % n;
+    return {square * static_cast<double>(column), square * static_cast<double>(row), 0};
   }
   /// Turned by half a turn the colours are exchanged: an image alone tells which corner is the first.
   [[nodiscard]] bool tells_its_ends() const noexcept { return (columns + rows) % 2 == 1; }

@@ -13,7 +13,7 @@ constexpr std::array kPartNames{"top left", "top", "top right", "left", "the mid
 constexpr std::array kTiltNames{"right", "left", "bottom", "top"};
 constexpr int kFewCorners = 10, kManyCorners = 40;  // a cell, in the grid's characters
 
-int part_of(double share) { return share < 1.0 / 3 ? 0 : share < 2.0 / 3 ? 1 : 2; }
+std::size_t part_of(double share) { return share < 1.0 / 3 ? 0 : share < 2.0 / 3 ? 1 : 2; }
 
 /// "a, b and c".
 std::string listed(const std::vector<std::string>& words) {
@@ -32,8 +32,8 @@ void Coverage::count(const BoardView& view, std::size_t camera, Seen* seen) cons
   std::array<int, kParts> parts{};
   for (const Vec2& c : view.corners[camera]) {
     const double x = std::clamp(c.x() / size.width, 0.0, 0.999), y = std::clamp(c.y() / size.height, 0.0, 0.999);
-    ++seen->cells[static_cast<std::size_t>(static_cast<int>(y * kRows) * kColumns + static_cast<int>(x * kColumns))];
-    ++parts[static_cast<std::size_t>(part_of(y) * 3 + part_of(x))];
+    ++seen->cells[static_cast<std::size_t>(y * kRows) * kColumns + static_cast<std::size_t>(x * kColumns)];
+    ++parts[part_of(y) * 3 + part_of(x)];
   }
   for (std::size_t i = 0; i < kParts; ++i) seen->parts[i] = std::max(seen->parts[i], parts[i]);
 }
@@ -120,12 +120,12 @@ std::string Coverage::grid() const {
   for (const std::string& name : names_) text += fmt::format("{:<{}}", name, 2 * kColumns + 3);
   text.erase(text.find_last_not_of(' ') + 1);
   text += '\n';
-  for (int row = 0; row < kRows; ++row) {
+  for (std::size_t row = 0; row < kRows; ++row) {
     std::string line;
     for (std::size_t k = 0; k < seen_.size(); ++k) {
       if (k > 0) line += "    ";
-      for (int column = 0; column < kColumns; ++column) {
-        const int n = seen_[k].cells[static_cast<std::size_t>(row * kColumns + column)];
+      for (std::size_t column = 0; column < kColumns; ++column) {
+        const int n = seen_[k].cells[row * kColumns + column];
         line += column > 0 ? " " : "";
         line += n == 0 ? "·" : n < kFewCorners ? "-" : n < kManyCorners ? "+" : "#";
       }

@@ -16,7 +16,7 @@ namespace vergence::app {
 /// Sizes    Once as near as both cameras let it come, once clearly farther.
 class Coverage {
  public:
-  static constexpr int kColumns = 12, kRows = 8;  // cells of the grid that is shown
+  static constexpr std::size_t kColumns = 12, kRows = 8;  // cells of the grid that is shown
 
   /// `names` and `sizes` one a camera; `focal_px` of camera 0, roughly: it only serves the tilts.
   Coverage(const Checkerboard& board, std::vector<std::string> names, std::vector<ImageSize> sizes, double focal_px);
