@@ -199,10 +199,10 @@ Group exposure() {
           "0's.")
       .number("target", &E::target, 20, 200, "grey levels", "Mean of the image aimed at, of what its mask shows.")
       .number("saturated_percent", &E::saturated_percent, 0, 50, "%", "Share of the pixels that may be at the end of the scale.")
-      .number("min_us", &E::min_us, 5, 100000, "µs", "Shortest exposure.")
+      .number("min_us", &E::min_us, 5, 100000, "µs", "Shortest exposure that is chosen.")
       .number("max_us", &E::max_us, 10, 200000, "µs",
               "Longest exposure, for the sake of motion blur; what is missing then comes from the gain.")
-      .number("max_gain_db", &E::max_gain_db, 0, 40, "dB", "Largest gain.")
+      .number("max_gain_db", &E::max_gain_db, 0, 40, "dB", "Largest gain that is chosen.")
       .integer("settle_frames", &E::settle_frames, 2, 60, "frames",
                "Images after a change until one is judged again: one more than the cameras take for it.")
       .done();

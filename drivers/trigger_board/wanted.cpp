@@ -14,7 +14,8 @@ std::string text(const char* format, Args... args) {
   return buffer.data();
 }
 
-constexpr double kFastest = 2000;  // Hz: two events a millisecond are more than a line carries
+constexpr double kFastest = 2000;            // Hz: two events a millisecond are more than a line carries
+constexpr std::int64_t kWidest = 1'000'000;  // µs, of a pulse: the board's own limit
 
 std::uint8_t edge_kind(Edge edge) noexcept {
   return static_cast<std::uint8_t>(edge == Edge::none     ? trigger_edge_none
@@ -41,6 +42,8 @@ DeviceStatus wire_configuration(const TriggerConfiguration& wanted, const Option
   const auto millihertz = static_cast<std::uint32_t>(std::llround(wanted.rate_hz * 1000));
   const std::int64_t period_us = 1'000'000'000 / millihertz, width_us = wanted.width.ns() / 1000, vary_us = wanted.vary.ns() / 1000;
   if (width_us < 1) return bad("a pulse needs a width: set trigger.width_us to 1 or more");
+  if (width_us > kWidest)
+    return bad(text("a pulse of %lld µs is longer than a second; lower trigger.width_us", static_cast<long long>(width_us)));
   if (vary_us < 0 || vary_us >= period_us)
     return bad(text("trigger.vary_us is %lld and the period %lld µs; it must lie between 0 and that", static_cast<long long>(vary_us),
                     static_cast<long long>(period_us)));

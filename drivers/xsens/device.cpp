@@ -128,6 +128,7 @@ DeviceTiming Device::timing() const noexcept {
 DeviceStatus Device::start(Notifier* ready) noexcept {
   if (!configured_) return DeviceStatus::bad_configuration;
   if (thread_.joinable()) return out_.start(ready);  // streaming, or gone and perhaps back
+  out_.clear();                                      // of the start before: its readings are past
   const DeviceStatus status = out_.start(ready);
   if (status != DeviceStatus::ok) return status;
   try {

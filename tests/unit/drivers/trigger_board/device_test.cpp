@@ -394,6 +394,12 @@ INSTANTIATE_TEST_SUITE_P(
         Refusal{"notANumber", [](TriggerConfiguration* c) { c->rate_hz = NAN; }, DeviceStatus::bad_configuration, "trigger.rate"},
         Refusal{"fasterThanItsTimer", [](TriggerConfiguration* c) { c->rate_hz = 1500; }, DeviceStatus::unsupported, "trigger.rate"},
         Refusal{"noWidth", [](TriggerConfiguration* c) { c->width = {}; }, DeviceStatus::bad_configuration, "trigger.width_us"},
+        Refusal{"longerThanASecond",
+                [](TriggerConfiguration* c) {
+                  c->rate_hz = 0.1;
+                  c->width = Duration::seconds(2);
+                },
+                DeviceStatus::bad_configuration, "trigger.width_us"},
         Refusal{"longerThanThePeriod", [](TriggerConfiguration* c) { c->width = Duration::milliseconds(40); },
                 DeviceStatus::bad_configuration, "trigger.width_us"},
         Refusal{"variedByAll", [](TriggerConfiguration* c) { c->vary = Duration::milliseconds(34); }, DeviceStatus::bad_configuration,

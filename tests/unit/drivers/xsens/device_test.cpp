@@ -177,6 +177,26 @@ TEST_P(BothGenerations, comesBackAfterItWasUnplugged) {
   }
 }
 
+TEST_P(BothGenerations, stoppedWhileGoneItStartsAnew) {
+  mock::XsensSimulatorOptions sensor = simulated(GetParam());
+  sensor.duration = Duration::seconds(30);
+  mock::SimulatedLineOptions line;
+  line.outages = {{HostStamp(10'000'000'000), HostStamp(13'000'000'000), true}};
+  XsensRig rig(sensor, line);
+  ASSERT_EQ(rig.device->configure(100, nullptr), DeviceStatus::ok) << rig.device->complaint();
+  ASSERT_EQ(rig.device->start(nullptr), DeviceStatus::ok);
+  InsReading r;
+  DeviceStatus status = DeviceStatus::ok;
+  while (status == DeviceStatus::ok) status = rig.device->wait(Duration::seconds(20), &r);
+  ASSERT_EQ(status, DeviceStatus::gone);
+  rig.device->stop();
+  ASSERT_EQ(rig.device->start(nullptr), DeviceStatus::ok);
+  const auto all = rig.readings();
+  ASSERT_FALSE(all.empty());
+  EXPECT_GT(all.front().arrival, HostStamp(13'000'000'000)) << "nothing of the first start";
+  EXPECT_GT(all.back().arrival, HostStamp(29'500'000'000)) << "it measures to the end";
+}
+
 TEST_P(BothGenerations, goesOnByItselfAfterTheSupplyDipped) {
   mock::XsensSimulatorOptions sensor = simulated(GetParam());
   sensor.duration = Duration::seconds(20);
