@@ -1,15 +1,20 @@
 // `vergence run` on emulated IIDC cameras that look at a rendered drive: what the example configurations do on real stacks.
 #include <gtest/gtest.h>
 
+#include <atomic>
+#include <chrono>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <sstream>
+#include <thread>
 
 #include "drivers/iidc/iidc.hpp"
 #include "tests/rigs/film.hpp"
+#include "tests/support/xsens_terminal.hpp"
+#include "tests/system/board/board_rig.hpp"
 #include "tests/system/iidc/iidc_rig.hpp"
 
 namespace vergence::test {
@@ -71,6 +76,29 @@ double worst_error(const std::map<std::uint64_t, Pose>& poses, const Film& film)
   return best;
 }
 
+/// `vergence run` for nine seconds of the film; `settings`: --set KEY=VALUE. → the session's folder.
+std::filesystem::path run_nine_seconds(const std::string& name, const std::string& configuration,
+                                       const std::vector<std::string>& settings) {
+  const std::filesystem::path out = std::filesystem::absolute("session-" + name);
+  std::filesystem::remove_all(out);
+  std::string command = std::string(VERGENCE_PROGRAM) + " run " + VERGENCE_SOURCE_FOLDER + "/app/config/" + configuration + " --out " +
+                        out.string() + " --duration 9 --quiet --set rig.state_dir=none";
+  for (const std::string& setting : settings) command += " --set " + setting;
+  EXPECT_EQ(std::system(command.c_str()), 0) << command;
+  return out;
+}
+
+/// What every drive on the film must be: all pairs posed, nothing allocated, the way right.
+void expect_a_drive(const std::filesystem::path& session, const nlohmann::json& summary, const Film& film) {
+  const auto& frames = summary.at("frames");
+  const auto& devices = summary.at("devices");
+  EXPECT_GE(frames.at("read").get<int>(), 60) << "of 90 at 10 Hz";
+  EXPECT_GE(frames.at("posed").get<int>(), devices.at("sets_complete").get<int>()) << "every pair that came gets a pose";
+  EXPECT_GE(frames.at("ok").get<int>(), 15) << "until a calibration is found the poses are degraded";
+  EXPECT_EQ(summary.at("allocations_after_seal").get<int>(), 0);
+  EXPECT_LT(worst_error(read_poses(session / "poses.csv"), film), 0.03);
+}
+
 struct Bus {
   const char *name, *emulator, *configuration;
   bool pulses;
@@ -88,25 +116,16 @@ TEST_P(IidcRun, TheExampleConfigurationDrivesOnWhatTheCamerasSend) {
   Emulator emulator(GetParam().emulator, arguments);
   ASSERT_TRUE(await_cameras(driver.get(), 2));
 
-  const std::filesystem::path out = std::filesystem::absolute(std::string("session-") + GetParam().name);
-  std::filesystem::remove_all(out);
-  const std::string command = std::string(VERGENCE_PROGRAM) + " run " + VERGENCE_SOURCE_FOLDER + "/app/config/" + GetParam().configuration +
-                              " --out " + out.string() + " --duration 9 --quiet --set rig.state_dir=none";
-  const int status = std::system(command.c_str());
-  ASSERT_EQ(status, 0) << command;
+  const auto out = run_nine_seconds(GetParam().name, GetParam().configuration, {});
   const std::string report = emulator.finish();
-
   const auto summary = nlohmann::json::parse(std::ifstream(out / "summary.json"));
   const auto& frames = summary.at("frames");
   const auto& devices = summary.at("devices");
   SCOPED_TRACE(summary.dump(1) + report);
-  EXPECT_GE(frames.at("read").get<int>(), 60) << "of 90 at 10 Hz";
+  expect_a_drive(out, summary, film);
   // The cameras start one after the other: the first exposures of one may be without their pair.
   EXPECT_LE(frames.at("lost").get<int>(), devices.at("sets_incomplete").get<int>());
   EXPECT_LE(devices.at("sets_incomplete").get<int>(), 3);
-  EXPECT_GE(frames.at("posed").get<int>(), devices.at("sets_complete").get<int>()) << "every pair that came gets a pose";
-  EXPECT_GE(frames.at("ok").get<int>(), 15) << "until a calibration is found the poses are degraded";
-  EXPECT_EQ(summary.at("allocations_after_seal").get<int>(), 0);
   for (int k = 0; k < 2; ++k) {
     const std::string name = "camera" + std::to_string(k) + "_";
     const auto delivered = devices.at(name + "delivered").get<std::int64_t>();
@@ -117,8 +136,42 @@ TEST_P(IidcRun, TheExampleConfigurationDrivesOnWhatTheCamerasSend) {
     EXPECT_GE(delivered + lost + underruns + 4, count_of(report, k, "exposed"));
     EXPECT_LE(lost, count_of(report, k, "overtaken"));
   }
-  const auto poses = read_poses(out / "poses.csv");
-  EXPECT_LT(worst_error(poses, film), 0.03);
+}
+
+TEST(BoardRun, ABoardsPulsesCamerasAndAnInsAllOnEmulatedLinesMakeOneDrive) {
+  const char* film_folder = std::getenv("VERGENCE_FILM");
+  if (!inside_rig() || film_folder == nullptr) GTEST_SKIP() << "this test runs inside the rig's kernel: ctest -L rig";
+  const Film film(film_folder);
+  auto driver = iidc::make_usb_driver();
+  Emulator cameras("sim_usb_iidc", {"--cameras", "2", "--film", film_folder, "--film-hz", "10"});
+  ASSERT_TRUE(await_cameras(driver.get(), 2));
+  std::atomic<bool> wired{true};
+  BoardBehindConverter board([&](const mock::SimulatedPulse& pulse) {
+    if (wired) cameras.command("trigger " + std::to_string(pulse.edge.ns()));
+    return mock::SimulatedExposures{};
+  });
+  const auto await_port = [](const char* port) {
+    for (int i = 0; i < 1000 && !std::filesystem::exists(port); ++i) std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    return std::filesystem::exists(port);
+  };
+  ASSERT_TRUE(await_port("/dev/ttyUSB0"));
+  constexpr const char* kInsWire = "/run/vergence-wire";
+  Emulator converter("sim_ftdi", {"--wire", kInsWire});
+  DeviceOnDescriptor sensor(::open(kInsWire, O_RDWR | O_NOCTTY | O_NONBLOCK), resting_xsens());
+  ASSERT_TRUE(await_port("/dev/ttyUSB1"));
+
+  const auto out = run_nine_seconds("board", "iidc_usb.yaml",
+                                    {"sync.mode=board", "trigger.driver=board", "trigger.port=/dev/ttyUSB0", "trigger.vary_us=2000",
+                                     "ins.driver=xsens", "ins.port=/dev/ttyUSB1", "ins.baud=115200", "ins.rate=50"});
+  wired = false;
+  const std::string report = cameras.finish();
+  const auto summary = nlohmann::json::parse(std::ifstream(out / "summary.json"));
+  SCOPED_TRACE(summary.dump(1) + report);
+  expect_a_drive(out, summary, film);
+  const auto& pairing = summary.at("time").at("pairing");
+  EXPECT_TRUE(pairing.at("proven").get<bool>());
+  EXPECT_EQ(pairing.at("sets").at("unproven").get<int>(), 0);
+  for (const auto& camera : pairing.at("cameras")) EXPECT_EQ(camera.at("acquisitions").get<int>(), 1);
 }
 
 INSTANTIATE_TEST_SUITE_P(Buses, IidcRun,
