@@ -1,8 +1,10 @@
 #include <cmath>
+#include <filesystem>
 #include <iostream>
 #include <memory>
 #include <string>
 #include <string_view>
+#include <system_error>
 #include <vector>
 
 #include <nlohmann/json.hpp>
@@ -12,6 +14,7 @@
 #include "app/commands/mount_report.hpp"
 #include "app/datasets/text_file.hpp"
 #include "app/datasets/trajectory_files.hpp"
+#include "app/recorder/ins_file.hpp"
 
 namespace vergence::app {
 namespace {
@@ -57,15 +60,47 @@ EvaluationOptions options_of(const Arguments& a) {
   return options;
 }
 
+/// Where the reference is.
+struct Reference {
+  std::filesystem::path path{};
+  bool is_ins = false;  // readings of an INS; else poses
+};
+
+Reference reference_of(const Arguments& a) {
+  if (a.reference.empty() && !a.estimate_mount)
+    throw InputError("REFERENCE is missing; name a trajectory, or with --estimate-mount a session folder that has an ins.csv");
+  // A session folder stands for its poses, but where a mount is asked for: that is the INS's.
+  const std::filesystem::path path = a.reference.empty() ? a.estimate : a.reference;
+  std::error_code ignored;
+  const bool poses = !a.estimate_mount && std::filesystem::is_directory(path, ignored);
+  const std::filesystem::path ins = poses ? std::filesystem::path{} : find_ins_file(path);
+  if (!ins.empty()) return {ins, true};
+  if (a.reference.empty()) throw InputError(a.estimate + ": is no session folder with an ins.csv; name a REFERENCE");
+  return {path, false};
+}
+
+/// The reference's poses, brought to the estimate's body if that is asked for; *mount then tells how.
+Trajectory read_reference(const Arguments& a, const Reference& from, const Trajectory& estimate, FoundMount* mount) {
+  Trajectory reference;
+  if (from.is_ins) {
+    const std::vector<MountReference> moments = ins_moments(read_ins_file(from.path));
+    if (moments.empty()) throw InputError(from.path.string() + ": has no reading with an attitude and a satellites' fix");
+    reference = poses_of(moments);
+    if (a.estimate_mount) *mount = find_ins_mount(estimate, moments);
+  } else {
+    reference = read_trajectory(from.path);
+    if (a.estimate_mount) *mount = find_mount(estimate, reference);
+  }
+  if (a.estimate_mount && mount->status == MountStatus::ok) reference = brought_over(reference, mount->mount);
+  return reference;
+}
+
 ExitCode run(const Arguments& a) {
   const EvaluationOptions options = options_of(a);
+  const Reference from = reference_of(a);
   const Trajectory estimate = read_trajectory(a.estimate);
-  Trajectory reference = read_trajectory(a.reference);
   FoundMount mount;
-  if (a.estimate_mount) {
-    mount = find_mount(estimate, reference);
-    if (mount.status == MountStatus::ok) reference = brought_over(reference, mount.mount);
-  }
+  const Trajectory reference = read_reference(a, from, estimate, &mount);
   const TrajectoryEvaluation evaluation = evaluate(estimate, reference, options);
   if (a.json) {
     nlohmann::ordered_json out = evaluation_json(evaluation, options);
@@ -75,7 +110,7 @@ ExitCode run(const Arguments& a) {
     std::cout << (a.estimate_mount ? mount_text(mount) : "") << evaluation_text(evaluation, options);
   }
   if (evaluation.status == EvaluationStatus::ok) return ExitCode::done;
-  std::cerr << "vergence: " << a.estimate << " against " << a.reference << ": " << evaluation_problem(evaluation, options) << '\n';
+  std::cerr << "vergence: " << a.estimate << " against " << from.path.string() << ": " << evaluation_problem(evaluation, options) << '\n';
   return ExitCode::not_usable;
 }
 
@@ -85,7 +120,7 @@ void add_evaluate(CLI::App& root, ExitCode* exit_code) {
   const auto a = std::make_shared<Arguments>();
   CLI::App* command = root.add_subcommand("evaluate", "Compare a trajectory with a reference");
   command->add_option("ESTIMATE", a->estimate, "TUM file, session folder, or data set")->required();
-  command->add_option("REFERENCE", a->reference, "TUM file, KITTI or EuRoC data-set folder, or its truth file")->required();
+  command->add_option("REFERENCE", a->reference, "TUM file, KITTI or EuRoC data-set folder, or its truth file; ins.csv of a session");
   command->add_flag("--json", a->json, "The figures as JSON");
   command->add_option("--lengths", a->lengths, "Lengths of the segments, m")->capture_default_str();
   command->add_option("--step", a->step, "A segment begins at every so many poses")->capture_default_str();
@@ -97,7 +132,8 @@ void add_evaluate(CLI::App& root, ExitCode* exit_code) {
   command->add_option("--axes", a->axes, "Axes of the body: camera (z forward) or flu (x forward, y left, z up)")
       ->check(CLI::IsMember({"camera", "flu"}))
       ->capture_default_str();
-  command->add_flag("--estimate-mount", a->estimate_mount, "Find how the two bodies sit to one another; compare at the estimate's");
+  command->add_flag("--estimate-mount", a->estimate_mount,
+                    "Find how the two bodies sit to one another; compare at the estimate's. Without REFERENCE: the session's own INS");
   command->callback([a, exit_code] { *exit_code = run(*a); });
 }
 

@@ -1,14 +1,18 @@
 #include "app/commands/mount_report.hpp"
 
+#include <algorithm>
 #include <array>
+#include <cmath>
 #include <iterator>
 #include <numbers>
+#include <optional>
 #include <vector>
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
 #include "core/comparison/comparison.hpp"
+#include "core/comparison/geodesy.hpp"
 #include "core/math/so3.hpp"
 
 namespace vergence::app {
@@ -41,7 +45,52 @@ const char* problem(MountStatus status) {
   return "";
 }
 
+/// What `ins.boresight_deg` would be: roll, pitch, yaw. Nothing: it is no INS's mount, or a part of it does not show.
+std::optional<std::array<double, 3>> boresight_deg(const FoundMount& found) {
+  const auto& r = found.mount.rotation;
+  if (!found.of_ins || !std::all_of(r.begin(), r.end(), [](const MountValue& v) { return v.observable; })) return std::nullopt;
+  const Mat3 R = found.mount.T_ref_est.R * found.nominal.transpose();  // yaw, pitch, roll: as mount_of() makes it
+  return std::array{std::atan2(R(2, 1), R(2, 2)) * kDegrees, std::atan2(-R(2, 0), std::hypot(R(2, 1), R(2, 2))) * kDegrees,
+                    std::atan2(R(1, 0), R(0, 0)) * kDegrees};
+}
+
 }  // namespace
+
+std::vector<MountReference> ins_moments(std::span<const InsRecord> readings) {
+  const auto placed = [](const InsRecord& r) {
+    return r.sample.attitude_valid && (r.sample.fix == FixStatus::fix_2d || r.sample.fix == FixStatus::fix_3d);
+  };
+  std::vector<MountReference> moments;
+  const auto first = std::find_if(readings.begin(), readings.end(), placed);
+  if (first == readings.end()) return moments;
+  const LocalTangentPlane plane(first->sample.position);
+  moments.reserve(readings.size());
+  for (const InsRecord& r : readings) {
+    if (!placed(r)) continue;
+    const InsSample& s = r.sample;
+    const auto& [x, y, z, w] = s.q_enu_ins;
+    const Mat3 R_enu_local = plane.rotation_from(s.position);
+    const Transform T_enu_ins{R_enu_local * Eigen::Quaterniond(w, x, y, z).normalized().toRotationMatrix(), plane.to_enu(s.position)};
+    const auto& [east, north, up] = s.velocity_enu;
+    moments.push_back({s.stamp, T_enu_ins, R_enu_local * Vec3(east, north, up), s.velocity_valid});
+  }
+  return moments;
+}
+
+FoundMount find_ins_mount(const Trajectory& estimate, std::span<const MountReference> moments) {
+  FoundMount found;
+  found.of_ins = true;
+  found.nominal = mount_of(Vec3::Zero(), Vec3::Zero()).R;
+  found.status = estimate_mount(estimate, moments, found.nominal, {}, &found.mount);
+  return found;
+}
+
+Trajectory poses_of(std::span<const MountReference> moments) {
+  Trajectory poses;
+  poses.reserve(moments.size());
+  for (const MountReference& m : moments) poses.push_back({m.stamp, m.T_enu_ref});
+  return poses;
+}
 
 FoundMount find_mount(const Trajectory& estimate, const Trajectory& reference) {
   std::vector<MountReference> readings;
@@ -84,6 +133,7 @@ Json mount_json(const FoundMount& found) {
     out["lever_arm_m"][kAxes[k]] = value_json(m.lever_arm[k], 1);
   }
   out["clock_offset_s"] = value_json(m.clock_offset, 1);
+  if (const auto boresight = boresight_deg(found)) out["boresight_deg"] = *boresight;
   out["moments"] = m.moments;
   out["residual_rotation_deg"] = m.residual_rotation * kDegrees;
   out["residual_position_m"] = m.residual_position;
@@ -93,8 +143,9 @@ Json mount_json(const FoundMount& found) {
 std::string mount_text(const FoundMount& found) {
   if (found.status != MountStatus::ok) return fmt::format("mount: {}\n\n", problem(found.status));
   const Mount& m = found.mount;
-  std::string out = fmt::format("mount of the estimate's body in the reference's, from {} moments (residuals {:.3f} deg, {:.3f} m)\n",
-                                m.moments, m.residual_rotation * kDegrees, m.residual_position);
+  std::string out = fmt::format("mount of the {}, from {} moments (residuals {:.3f} deg, {:.3f} m)\n",
+                                found.of_ins ? "left camera in the INS's body" : "estimate's body in the reference's", m.moments,
+                                m.residual_rotation * kDegrees, m.residual_position);
   out += row("turn about the reference's x", m.rotation[0], kDegrees, "deg");
   out += row("turn about its y", m.rotation[1], kDegrees, "deg");
   out += row("turn about its z", m.rotation[2], kDegrees, "deg");
@@ -102,6 +153,8 @@ std::string mount_text(const FoundMount& found) {
   out += row("lever arm along y", m.lever_arm[1], 1, "m");
   out += row("lever arm along z", m.lever_arm[2], 1, "m");
   out += row("reference's stamps are late by", m.clock_offset, 1e3, "ms (told, not applied)");
+  if (const auto b = boresight_deg(found))
+    out += fmt::format("  as the configuration has it: ins.boresight_deg: [{:.2f}, {:.2f}, {:.2f}]\n", (*b)[0], (*b)[1], (*b)[2]);
   return out + "\n";
 }
 

@@ -1,9 +1,12 @@
 #pragma once
+#include <span>
 #include <string>
+#include <vector>
 
 #include <nlohmann/json_fwd.hpp>
 
 #include "app/datasets/trajectory_files.hpp"
+#include "app/recorder/ins_file.hpp"
 #include "core/comparison/mount.hpp"
 
 namespace vergence::app {
@@ -14,8 +17,17 @@ struct FoundMount {
   MountStatus status = MountStatus::too_few;
   Mount mount{};
   Mat3 nominal = Mat3::Identity();
+  bool of_ins = false;  // the reference is an INS and the estimate a camera: what is found is what the configuration calls the mount
 };
 [[nodiscard]] FoundMount find_mount(const Trajectory& estimate, const Trajectory& reference);
+
+/// The readings of an INS in the east-north-up axes at the first place among them: those with an attitude and a place that satellites
+/// gave, velocities where told.
+[[nodiscard]] std::vector<MountReference> ins_moments(std::span<const InsRecord> readings);
+/// The mount of the left camera in an INS's body, told against a camera that looks along the INS's x with its x to the right.
+[[nodiscard]] FoundMount find_ins_mount(const Trajectory& estimate, std::span<const MountReference> moments);
+/// The poses of the moments.
+[[nodiscard]] Trajectory poses_of(std::span<const MountReference> moments);
 
 /// The reference brought to the estimate's body by what is observable of the mount, the rest by the drawing. Stamps stay: the clock offset
 /// is told, not applied.

@@ -159,6 +159,7 @@ void Drive::estimate() noexcept {
         handle_images(item);
         break;
       case LiveItem::Kind::reading:
+        recorder_->post(InsRecord{item.sample, item.quality});
         comparison_->add(item.sample);
         note_jump(item.stamp);
         tell(item.stamp, time_.of_reading(item));
@@ -449,6 +450,7 @@ ExitCode Drive::run() {
   Recorder::Options to_record;
   to_record.when_full = request_.fast ? Recorder::WhenFull::wait : Recorder::WhenFull::drop;
   to_record.expected_frames = frames;
+  to_record.ins = devices_.ins() != nullptr;
   to_record.keep = calibration_keeper(request_.out, begin_.file, begin_.state);
   const auto scheduled = devices_.faults();
   const auto is_full = [](const mock::Fault& f) { return f.kind == mock::FaultKind::disk_full; };

@@ -10,15 +10,15 @@
 
 namespace vergence::app {
 
-LineFile::LineFile(const std::filesystem::path& file)
-    : path_(file), fd_(::open(file.c_str(), O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0644)) {
+LineFile::LineFile(const std::filesystem::path& file, std::size_t pending)
+    : path_(file), pending_(pending), fd_(::open(file.c_str(), O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0644)) {
   if (fd_ < 0) throw InputError(file.string() + ": cannot be written (" + std::strerror(errno) + "): check the folder's permissions");
 }
 
 LineFile::~LineFile() { close(); }
 
 bool LineFile::append(std::string_view line) {
-  if (waiting_.size() + line.size() > kPending) {
+  if (waiting_.size() + line.size() > pending_) {
     ++lost_lines_;
     return false;
   }

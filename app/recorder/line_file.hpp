@@ -9,8 +9,8 @@ namespace vergence::app {
 
 /// A file that grows by whole lines and survives a full disk.
 ///
-/// What the system does not take stays in memory and is tried again with the next flush(); when kPending bytes wait, new lines
-/// are refused and counted. So a file never holds a line that lacks its end in the middle, and goes on when room comes back.
+/// What the system does not take stays in memory and is tried again with the next flush(); when as many bytes wait as it may keep, new
+/// lines are refused and counted. So a file never holds a line that lacks its end in the middle, and goes on when room comes back.
 ///
 /// Threads  One. Memory  Its buffer.
 /// Errors   The constructor throws InputError. Afterwards nothing throws: a failure is kept in fault().
@@ -18,8 +18,8 @@ class LineFile {
  public:
   static constexpr std::size_t kPending = std::size_t{1} << 20;  // bytes: minutes of poses
 
-  /// Opens for appending; made when it is not there.
-  explicit LineFile(const std::filesystem::path& file);
+  /// Opens for appending; made when it is not there. `pending`: bytes that may wait.
+  explicit LineFile(const std::filesystem::path& file, std::size_t pending = kPending);
   ~LineFile();
   LineFile(const LineFile&) = delete;
   LineFile& operator=(const LineFile&) = delete;
@@ -41,6 +41,7 @@ class LineFile {
 
  private:
   std::filesystem::path path_;
+  std::size_t pending_ = kPending;
   int fd_ = -1;
   int fault_ = 0;
   bool pretend_full_ = false;

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <cstring>
 #include <iterator>
+#include <optional>
 #include <system_error>
 #include <type_traits>
 
@@ -19,18 +20,24 @@
 
 namespace vergence::app {
 
-static_assert(std::is_trivially_copyable_v<Record>);
+static_assert(std::is_trivially_copyable_v<Record> && std::is_trivially_copyable_v<InsRecord>);
 
 struct Recorder::Files {
-  explicit Files(const std::filesystem::path& folder)
+  Files(const std::filesystem::path& folder, bool with_ins)
       : trajectory(folder / "trajectory.tum"),
         reference(folder / "reference.tum"),
         poses(folder / "poses.csv"),
         calibrations(folder / "calibrations.csv"),
-        events(folder / "events.jsonl") {}
+        events(folder / "events.jsonl"),
+        all{&trajectory, &reference, &poses, &calibrations, &events} {
+    constexpr std::size_t kMinutes = std::size_t{16} << 20;  // bytes: readings are many
+    if (with_ins) all.push_back(&ins.emplace(folder / "ins.csv", kMinutes));
+    told.resize(all.size());
+  }
   LineFile trajectory, reference, poses, calibrations, events;
-  std::array<int, 5> told{};  // errno that was complained about, by all()
-  [[nodiscard]] std::array<LineFile*, 5> all() noexcept { return {&trajectory, &reference, &poses, &calibrations, &events}; }
+  std::optional<LineFile> ins{};
+  std::vector<LineFile*> all;
+  std::vector<int> told{};  // errno that was complained about, by all
 };
 
 namespace {
@@ -74,10 +81,11 @@ void make_session_folder(const std::filesystem::path& folder) {
 }
 
 Recorder::Recorder(const std::filesystem::path& folder, const Options& options)
-    : options_(options), files_(std::make_unique<Files>(folder)), totals_(std::make_unique<SessionTotals>()) {
+    : options_(options), files_(std::make_unique<Files>(folder, options.ins)), totals_(std::make_unique<SessionTotals>()) {
   if (options.keep_trajectory) totals_->trajectory.reserve(options.expected_frames), totals_->reference.reserve(options.expected_frames);
   files_->poses.append(std::string(kPosesHeader) + "\n");
   files_->calibrations.append(std::string(kCalibrationsHeader) + "\n");
+  if (files_->ins) files_->ins->append(std::string(kInsHeader) + "\n");
   thread_ = std::thread([this] { work(); });
 }
 
@@ -90,19 +98,26 @@ void Recorder::stop_and_join() noexcept {
   thread_.join();
 }
 
-void Recorder::post(const Record& record) noexcept {
+template <class Value, std::size_t N>
+bool Recorder::push(Ring<Value, N>* ring, std::atomic<std::uint64_t>* dropped, const Value& value) noexcept {
   for (;;) {
     const Doorbell::Rung seen = freed_.look();
-    if (ring_.push(record)) break;
+    if (ring->push(value)) break;
     if (options_.when_full == WhenFull::drop) {
-      dropped_.fetch_add(1, std::memory_order_relaxed);
-      return;
+      dropped->fetch_add(1, std::memory_order_relaxed);
+      return false;
     }
     freed_.wait(seen);
   }
-  high_water_ = std::max(high_water_, ring_.size());
   filled_.ring();
+  return true;
 }
+
+void Recorder::post(const Record& record) noexcept {
+  if (push(&ring_, &dropped_, record)) high_water_ = std::max(high_water_, ring_.size());
+}
+
+void Recorder::post(const InsRecord& reading) noexcept { (void)push(&readings_, &dropped_readings_, reading); }
 
 void Recorder::work() {
   (void)pthread_setname_np(pthread_self(), "vergence-record");
@@ -110,13 +125,10 @@ void Recorder::work() {
   constexpr std::chrono::seconds kFlushAtLeast{1};
   auto flushed = Clock::now();
   flush();  // the heads of the tables
-  Record record;
   for (;;) {
     const Doorbell::Rung seen = filled_.look();
     const bool stopping = stop_.load(std::memory_order_acquire);  // before the ring: what was posted before is still found
-    if (ring_.pop(&record)) {
-      freed_.ring();
-      std::visit([this](const auto& r) { write(r); }, record);
+    if (take()) {
       if (Clock::now() - flushed < kFlushAtLeast) continue;
     } else if (stopping) {
       break;
@@ -129,6 +141,23 @@ void Recorder::work() {
     flush();
     flushed = Clock::now();
   }
+}
+
+/// The oldest of both rings, as far as there are any. False: there were none.
+bool Recorder::take() {
+  Record record;
+  InsRecord reading;
+  const bool one = ring_.pop(&record), other = readings_.pop(&reading);
+  if (!one && !other) return false;
+  freed_.ring();
+  if (one) std::visit([this](const auto& r) { write(r); }, record);
+  if (other) write(reading);
+  return true;
+}
+
+void Recorder::write(const InsRecord& reading) {
+  format_ins_record(reading, &line_);
+  files_->ins->append(line_);
 }
 
 void Recorder::write(const PoseRecord& p) {
@@ -261,7 +290,7 @@ void Recorder::note(const CalibrationRecord& c) {
 }
 
 void Recorder::flush() {
-  const auto files = files_->all();
+  const auto& files = files_->all;
   for (std::size_t i = 0; i < files.size(); ++i) {
     if (files[i]->flush())
       files_->told[i] = 0;
@@ -278,7 +307,7 @@ void Recorder::pretend(Stamp stamp) {
   if (full == pretended_) return;
   if (full) flush();  // what came before has found room
   pretended_ = full;
-  for (LineFile* file : files_->all()) file->pretend_full(full);
+  for (LineFile* file : files_->all) file->pretend_full(full);
   if (full) {
     const std::lock_guard lock(complaints_mutex_);
     complaints_.push_back(files_->poses.path().parent_path().string() +
@@ -301,7 +330,7 @@ void Recorder::note_disk(bool full) {
 
 std::uint64_t Recorder::lost_lines() const {
   std::uint64_t lines = 0;
-  for (const LineFile* file : files_->all()) lines += file->lost_lines();
+  for (const LineFile* file : files_->all) lines += file->lost_lines();
   return lines;
 }
 
@@ -318,7 +347,7 @@ std::vector<std::string> Recorder::take_complaints() {
 
 std::unique_ptr<SessionTotals> Recorder::close() {
   stop_and_join();
-  for (LineFile* file : files_->all()) {
+  for (LineFile* file : files_->all) {
     const bool good = file->close();
     totals_->lost_lines += file->lost_lines();
     if (!good)
@@ -329,6 +358,7 @@ std::unique_ptr<SessionTotals> Recorder::close() {
                             " lines that found no room on the disk in time; the others are all there");
   }
   totals_->dropped_records = dropped_.load(std::memory_order_relaxed);
+  totals_->dropped_readings = dropped_readings_.load(std::memory_order_relaxed);
   totals_->ring_high_water = high_water_;
   return std::move(totals_);
 }

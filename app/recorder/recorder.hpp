@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "app/recorder/histogram.hpp"
+#include "app/recorder/ins_file.hpp"
 #include "app/recorder/records.hpp"
 #include "app/runtime/doorbell.hpp"
 #include "core/memory/ring.hpp"
@@ -56,6 +57,7 @@ struct SessionTotals {
   std::vector<StampedPose> trajectory;       // if asked for: the poses of trajectory.tum
   std::vector<StampedPose> reference;        // if asked for: of reference.tum, in its own frame
   std::uint64_t dropped_records = 0;         // the ring was full (live only)
+  std::uint64_t dropped_readings = 0;        // theirs was
   std::uint64_t lost_lines = 0;              // the disk took no more
   std::size_t ring_high_water = 0;
   std::vector<std::string> faults;  // a sentence for each file that is not whole
@@ -69,14 +71,15 @@ struct Kept {
   std::string sentence{};  // empty: nothing to tell
 };
 
-/// Writes trajectory.tum, reference.tum, poses.csv, calibrations.csv and events.jsonl of a session as it goes on, on a thread of
-/// its own: the estimator never waits for a disk.
+/// Writes trajectory.tum, reference.tum, poses.csv, calibrations.csv, events.jsonl and, with an INS, ins.csv of a session as it goes on,
+/// on a thread of its own: the estimator never waits for a disk.
 ///
 /// What has been posted is in the files as soon as the thread comes to it, at the latest after a second, so a killed session keeps its
 /// lines. Stamps are printed from their integers. The same records give the same bytes.
 /// Threads  post(): one producer. take_complaints(): any. close(): the owner's, after the last post().
 /// Memory   post() takes none. With keep_trajectory a pose of some 100 bytes is kept for every frame.
-/// Full     wait: the producer waits (replay). drop: the record is dropped and counted (live).
+/// Full     wait: the producer waits (replay). drop: the record is dropped and counted (live). Readings have a ring of their own: they
+///          never push out a pose.
 /// Errors   The constructor throws InputError. A disk that takes no more: a complaint and an event `disk_full`, the session goes on, see
 ///          LineFile; an event `disk_room` when it takes lines again says what was lost. Lines lost in between leave the session usable and
 ///          are a complaint of close(); a file that could not be ended is a fault of its totals.
@@ -87,6 +90,7 @@ class Recorder {
     WhenFull when_full = WhenFull::wait;
     bool keep_trajectory = true;
     std::size_t expected_frames = 0;  // memory taken beforehand for the trajectory
+    bool ins = false;                 // readings are posted: ins.csv is there
     /// Called on the recorder's thread with every calibration that was accepted while driving: files may be written there. May be empty.
     std::function<Kept(const RigCalibration&)> keep{};
     /// Whether the disk is to be taken for full at this time of the drive, which a mock's fault says. Called on the recorder's thread with
@@ -101,18 +105,25 @@ class Recorder {
   Recorder& operator=(const Recorder&) = delete;
 
   void post(const Record& record) noexcept;
+  /// Precondition: Options::ins.
+  void post(const InsRecord& reading) noexcept;
   /// Sentences about the disk since the last call.
   [[nodiscard]] std::vector<std::string> take_complaints();
   /// Writes what is waiting, closes the files. Once.
   [[nodiscard]] std::unique_ptr<SessionTotals> close();
 
  private:
-  static constexpr std::size_t kRing = 128;  // records: seconds of frames with their events
+  static constexpr std::size_t kRing = 128;       // records: seconds of frames with their events
+  static constexpr std::size_t kReadings = 1024;  // 2.5 s of the fastest INS
 
+  template <class Value, std::size_t N>
+  bool push(Ring<Value, N>* ring, std::atomic<std::uint64_t>* dropped, const Value& value) noexcept;
   void work();
+  bool take();
   void write(const PoseRecord& pose);
   void write(const EventRecord& event);
   void write(const CalibrationRecord& calibration);
+  void write(const InsRecord& reading);
   void note(const CalibrationRecord& calibration);
   void flush();
   void pretend(Stamp stamp);
@@ -132,9 +143,10 @@ class Recorder {
   bool disk_full_ = false, pretended_ = false;
 
   Ring<Record, kRing> ring_;
+  Ring<InsRecord, kReadings> readings_;
   Doorbell filled_, freed_;
   std::atomic<bool> stop_{false};
-  std::atomic<std::uint64_t> dropped_{0};
+  std::atomic<std::uint64_t> dropped_{0}, dropped_readings_{0};
   std::size_t high_water_ = 0;  // the producer's
   std::mutex complaints_mutex_;
   std::vector<std::string> complaints_;

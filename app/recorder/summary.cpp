@@ -236,6 +236,7 @@ Json summary_json(const SessionTotals& totals, const SummaryInput& input) {
   json["drops"] = {{"frames", input.skipped},
                    {"estimator", input.dropped_by_estimator},
                    {"records", totals.dropped_records},
+                   {"readings", totals.dropped_readings},
                    {"lines", totals.lost_lines},
                    {"recorder_high_water", totals.ring_high_water}};
   json["devices"] = counters_json(input.devices);

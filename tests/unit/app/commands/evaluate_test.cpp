@@ -11,6 +11,9 @@
 
 #include "app/commands/commands.hpp"
 #include "app/commands/evaluation_report.hpp"
+#include "app/recorder/ins_file.hpp"
+#include "core/comparison/comparison.hpp"
+#include "core/comparison/geodesy.hpp"
 #include "core/math/se3.hpp"
 #include "tests/support/shared_data.hpp"
 #include "tests/support/temporary_folder.hpp"
@@ -172,6 +175,89 @@ TEST(EvaluateCommand, estimatesTheMountBetweenTwoBodies) {
   EXPECT_LT(mount["lever_arm_m"]["x"]["sigma"].get<double>(), 0.1);
   const Outcome table = evaluate_command({a, b, "--axes", "flu", "--estimate-mount"});
   EXPECT_NE(table.out.find("told, not applied"), std::string::npos) << table.out;
+}
+
+/// A session of a drive round corners on rolling ground with its INS: the left camera 0.9 m forward and 0.4 m left of it, turned by 2°
+/// of yaw, the INS's stamps 12 ms late.
+std::string session_with_ins(const test::TemporaryFolder& folder, const std::string& name) {
+  const LocalTangentPlane plane({-27.5, 153, 60});
+  Transform T_ins_left = mount_of({0.9, 0.4, 0}, {0, 0, 2 * M_PI / 180});
+  std::string ours, readings = std::string(kInsHeader) + "\n", line;
+  const auto T_enu_ins = [](double t) {
+    Transform T;
+    T.R = exp_so3(Vec3(0, 0, 0.9 * std::sin(0.15 * t) + 0.4 * std::sin(0.6 * t))) *
+          exp_so3(Vec3(0.06 * std::sin(0.9 * t), 0.08 * std::sin(0.7 * t), 0));
+    T.t = {6 * t, 25 * std::sin(0.15 * t), std::sin(0.7 * t)};
+    return T;
+  };
+  const Transform T_world_enu = (T_enu_ins(0) * T_ins_left).inverse();  // the odometry begins where it is
+  for (int i = 0; i < 4800; ++i) {
+    const double t = 0.025 * i;
+    const Transform T = T_enu_ins(t);
+    if (i % 2 == 0) {
+      const Transform left = T_world_enu * T * T_ins_left;
+      const Eigen::Quaterniond q(left.R);
+      ours += fmt::format("{:.9f} {:.9f} {:.9f} {:.9f} {:.12f} {:.12f} {:.12f} {:.12f}\n", 1000 + t, left.t.x(), left.t.y(), left.t.z(),
+                          q.x(), q.y(), q.z(), q.w());
+    }
+    InsRecord r;
+    r.sample.stamp = Stamp(1'000'012'000'000 + i * 25'000'000LL);
+    r.sample.fix = FixStatus::fix_3d;
+    r.sample.position = plane.to_geodetic(T.t);
+    const Mat3 R_local_enu = plane.rotation_from(r.sample.position).transpose();
+    const Eigen::Quaterniond q(R_local_enu * T.R);
+    r.sample.attitude_valid = r.sample.velocity_valid = true;
+    r.sample.q_enu_ins = {q.x(), q.y(), q.z(), q.w()};
+    const Vec3 v = R_local_enu * (T_enu_ins(t + 1e-4).t - T_enu_ins(t - 1e-4).t) / 2e-4;
+    r.sample.velocity_enu = {v.x(), v.y(), v.z()};
+    format_ins_record(r, &line);
+    readings += line;
+  }
+  folder.write(name + "/trajectory.tum", ours);
+  return folder.write(name + "/ins.csv", readings).parent_path().string();
+}
+
+TEST(EvaluateCommand, aSessionsOwnInsGivesTheMountOfTheCamera) {
+  const test::TemporaryFolder folder;
+  const std::string session = session_with_ins(folder, "s");
+  const Outcome alone = evaluate_command({session, "--estimate-mount", "--json"});
+  ASSERT_EQ(alone.code, ExitCode::done) << alone.err;
+  const auto mount = nlohmann::json::parse(alone.out).at("mount");
+  EXPECT_NEAR(mount["rotation_deg"]["z"]["value"].get<double>(), 2, 0.02);
+  EXPECT_NEAR(mount["boresight_deg"][2].get<double>(), 2, 0.02);
+  EXPECT_NEAR(mount["boresight_deg"][0].get<double>(), 0, 0.05);
+  EXPECT_NEAR(mount["lever_arm_m"]["x"]["value"].get<double>(), 0.9, 0.02);
+  EXPECT_NEAR(mount["lever_arm_m"]["y"]["value"].get<double>(), 0.4, 0.02);
+  EXPECT_NEAR(mount["clock_offset_s"]["value"].get<double>(), 0.012, 1e-3);
+  // However the INS is named.
+  for (const std::string& reference : {session, session + "/ins.csv"})
+    EXPECT_EQ(evaluate_command({session, reference, "--estimate-mount", "--json"}).out, alone.out) << reference;
+  const Outcome table = evaluate_command({session, "--estimate-mount"});
+  EXPECT_NE(table.out.find("mount of the left camera in the INS's body"), std::string::npos) << table.out;
+  EXPECT_NE(table.out.find("ins.boresight_deg: ["), std::string::npos) << table.out;
+  // Without a mount a session folder stands for its poses, its ins.csv for the INS's.
+  EXPECT_LT(nlohmann::json::parse(evaluate_command({session, session, "--json"}).out)["ate_se3_m"]["max"].get<double>(), 1e-9);
+  EXPECT_GT(nlohmann::json::parse(evaluate_command({session, session + "/ins.csv", "--json"}).out)["ate_se3_m"]["max"].get<double>(), 0.1);
+}
+
+TEST(EvaluateCommand, saysWhatAMountLacks) {
+  const test::TemporaryFolder folder;
+  const auto refused = [](const std::vector<std::string>& words, const std::string& part) {
+    const Outcome o = evaluate_command(words);
+    EXPECT_EQ(o.code, ExitCode::bad_input);
+    EXPECT_NE(o.err.find(part), std::string::npos) << o.err;
+  };
+  const std::string tum = folder.write("s/trajectory.tum", "1 0 0 0 0 0 0 1\n2 1 0 0 0 0 0 1\n").string();
+  refused({tum}, "REFERENCE is missing");
+  refused({(folder / "s").string()}, "REFERENCE is missing");
+  refused({(folder / "s").string(), "--estimate-mount"}, "is no session folder with an ins.csv; name a REFERENCE");
+  InsRecord bare;
+  std::string line;
+  format_ins_record(bare, &line);
+  folder.write("s/ins.csv", std::string(kInsHeader) + "\n" + line);
+  refused({(folder / "s").string(), "--estimate-mount"}, "has no reading with an attitude and a satellites' fix");
+  folder.write("s/ins.csv", std::string(kInsHeader) + "\nnonsense\n");
+  refused({(folder / "s").string(), "--estimate-mount"}, "ins.csv:2: has 1 columns");
 }
 
 TEST(EvaluateCommand, refusesArgumentsThatMakeNoSense) {
