@@ -14,6 +14,7 @@
 #include <condition_variable>
 #include <cstring>
 #include <deque>
+#include <map>
 #include <stdexcept>
 #include <thread>
 #include <tuple>
@@ -32,6 +33,9 @@ constexpr std::uint32_t kMemory = 0x40000, kDescription = 0x20000;  // bytes; ad
 constexpr std::uint32_t kHeartbeat = 0x938, kTicksHigh = 0x93C, kTicksLow = 0x940, kLatch = 0x944, kLatchedHigh = 0x948, kControl = 0xA00,
                         kStreamPort = 0xD00, kPacketSize = 0xD04, kPacketDelay = 0xD08, kStreamTarget = 0xD18;
 constexpr std::uint32_t kFireTest = 1U << 31U;
+// Chunks: their numbers, and their places in ChunkSelector.
+constexpr std::uint32_t kImageChunk = 0xA5A50001, kExposureChunk = 0xA5A50002, kTimestampChunk = 0xA5A50003;
+constexpr std::uint32_t kSelectExposure = 1, kSelectTimestamp = 2;
 // Status codes of GVCP.
 constexpr std::uint32_t kOk = 0, kNotImplemented = 0x8001, kInvalidParameter = 0x8002, kInvalidAddress = 0x8003, kDenied = 0x8006;
 
@@ -94,7 +98,8 @@ class GigeCamera::Impl {
   mutable std::mutex mutex_;
   std::condition_variable changed_;
   bool silent_ = false;
-  int lose_ = 0, tear_ = 0, delay_ = 0;
+  int lose_ = 0, tear_ = 0, delay_ = 0, garble_ = 0;
+  std::map<std::uint64_t, double> exposed_;  // µs, by image
   int lie_width_ = 0, lie_height_ = 0;
   std::uint64_t ignored_ = 0, starts_ = 0;
 
@@ -106,13 +111,19 @@ class GigeCamera::Impl {
   bool value_fits(std::uint32_t address, std::uint32_t value) const;
   void expose();
   GvspFrame make_frame(std::uint64_t number, HostStamp when);
+  void append_chunks(GvspFrame* frame);
+  [[nodiscard]] double exposure_of(std::uint64_t number) const;
+  [[nodiscard]] bool has_chunk(std::uint32_t selected) const { return (chunks_enabled_ >> selected & 1U) != 0; }
   void follow_registers();
   [[nodiscard]] bool may_write(const sockaddr_in& from, std::uint32_t address) const;
   [[nodiscard]] std::uint32_t word(std::uint32_t address) const { return address + 4 <= kMemory ? from_wire(&memory_[address]) : 0; }
   [[nodiscard]] float real(std::uint32_t address) const { return std::bit_cast<float>(word(address)); }
   [[nodiscard]] std::uint32_t payload() const {
-    return from_wire(&memory_[width]) * from_wire(&memory_[height]) * (from_wire(&memory_[pixel_format]) >> 16U & 0xFFU) / 8;
+    const std::uint32_t pixels = word(width) * word(height) * (word(pixel_format) >> 16U & 0xFFU) / 8;
+    if (word(chunk_mode) == 0) return pixels;
+    return pixels + 8 + (has_chunk(kSelectExposure) ? exposure_bytes() + 8 : 0) + (has_chunk(kSelectTimestamp) ? 16 : 0);
   }
+  [[nodiscard]] std::uint32_t exposure_bytes() const { return options.old_names ? 4 : 8; }  // a float or a double
   void put(std::uint32_t address, std::uint32_t value) {
     for (std::uint32_t i = 0; i < 4; ++i) memory_[address + i] = static_cast<std::uint8_t>(value >> (24U - 8U * i));
   }
@@ -130,6 +141,7 @@ class GigeCamera::Impl {
   std::deque<std::pair<std::uint64_t, HostStamp>> pulses_;  // triggers not yet served: the image's number, and when
   std::uint64_t triggered_ = 0;                             // by software
   std::uint64_t block_ = 0;
+  std::uint32_t chunks_enabled_ = 1;  // bits by ChunkSelector; the image always is
   std::thread answering_, exposing_;
 };
 
@@ -212,6 +224,8 @@ void GigeCamera::Impl::reset() {
   put(exposure_auto, 2);  // as many cameras come: on
   put(gain_auto, 2);
   put(line_selector, 1);
+  chunks_enabled_ = 1;
+  put(chunk_enable, 1);
   put(ptp_status, 3);
   acquiring_ = false;
   controller_ = {};
@@ -390,6 +404,14 @@ std::uint32_t GigeCamera::Impl::store(std::uint32_t address, std::uint32_t value
     case ptp_enable:
       put(ptp_status, value != 0 ? 9 : 3);
       break;
+    case chunk_selector:
+      put(chunk_enable, has_chunk(value & 31U) ? 1 : 0);
+      break;
+    case chunk_enable: {
+      const std::uint32_t bit = 1U << (word(chunk_selector) & 31U);
+      chunks_enabled_ = (value != 0 ? chunks_enabled_ | bit : chunks_enabled_ & ~bit) | 1U;
+      break;
+    }
     case kPacketSize:
       put(address, value & ~kFireTest);
       follow_registers();
@@ -450,7 +472,43 @@ GvspFrame GigeCamera::Impl::make_frame(std::uint64_t number, HostStamp when) {
   }
   if (options.number_images)
     for (std::size_t i = 0; i < 8; ++i) f.pixels[i] = static_cast<std::uint8_t>(number >> (8 * i));
+  if (word(chunk_mode) != 0) append_chunks(&f);
   return f;
+}
+
+/// Precondition: mutex_ held, the exposure is known.
+void GigeCamera::Impl::append_chunks(GvspFrame* f) {
+  f->payload_type = options.chunk_payload;
+  const std::size_t pixels = f->pixels.size();
+  Wire w;
+  w.u32(kImageChunk).u32(static_cast<std::uint32_t>(pixels));
+  if (has_chunk(kSelectTimestamp)) w.u64(f->ticks).u32(kTimestampChunk).u32(8);
+  if (has_chunk(kSelectExposure)) {
+    const double us = exposed_[f->number];
+    if (options.old_names) {
+      const auto bits = std::bit_cast<std::uint32_t>(static_cast<float>(us));  // little endian
+      for (std::uint32_t i = 0; i < 4; ++i) w.u8(bits >> (8 * i) & 0xFFU);
+    } else {
+      w.u64(std::bit_cast<std::uint64_t>(us));
+    }
+    w.u32(kExposureChunk).u32(exposure_bytes());
+  }
+  f->pixels.insert(f->pixels.end(), w.bytes().begin(), w.bytes().end());
+  if (garble_ > 0) {
+    --garble_;
+    std::uint32_t noise = static_cast<std::uint32_t>(f->number) * 2654435761U;
+    for (std::size_t i = pixels; i < f->pixels.size(); ++i) {
+      noise = noise * 1664525U + 1013904223U;
+      f->pixels[i] = static_cast<std::uint8_t>(noise >> 24U);
+    }
+  }
+}
+
+/// µs, as the wire has it. Precondition: mutex_ held.
+double GigeCamera::Impl::exposure_of(std::uint64_t number) const {
+  const auto set = static_cast<double>(real(exposure_time));
+  const double us = options.exposures ? options.exposures(number, set) : set;
+  return options.old_names ? static_cast<double>(static_cast<float>(us)) : us;
 }
 
 void GigeCamera::Impl::expose() {
@@ -477,8 +535,10 @@ void GigeCamera::Impl::expose() {
       when = HostStamp(static_cast<std::int64_t>(number) * period);
       last = when;
     }
+    const double us = exposure_of(number);
+    exposed_[number] = us;
     lock.unlock();
-    sleep_until(when + exposure);
+    sleep_until(when + Duration::seconds(us * 1e-6));
     lock.lock();
     if (triggered && !pulses_.empty()) pulses_.pop_front();
     if (!acquiring_ || !powered_ || silent_) continue;
@@ -530,6 +590,15 @@ void GigeCamera::delay_frames(int exposures, Duration by) {
   impl_->delay_ += exposures;
 }
 void GigeCamera::set_loss(double share) { impl_->sender.set_loss(share); }
+void GigeCamera::garble_chunks(int exposures) {
+  const std::lock_guard lock(impl_->mutex_);
+  impl_->garble_ += exposures;
+}
+double GigeCamera::exposed(std::uint64_t number) const {
+  const std::lock_guard lock(impl_->mutex_);
+  const auto at = impl_->exposed_.find(number);
+  return at == impl_->exposed_.end() ? 0 : at->second;
+}
 void GigeCamera::lie_about_size(int width, int height) {
   const std::lock_guard lock(impl_->mutex_);
   impl_->lie_width_ = width;

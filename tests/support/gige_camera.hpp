@@ -26,7 +26,12 @@ struct GigeCameraOptions {
   std::uint64_t seed = 1;              // of the loss
   std::uint32_t heartbeat_ms = 3000;
   std::uint32_t smallest_packet = 576, largest_packet = 16'000;  // bytes, of GevSCPSPacketSize
-  bool number_images = true;                                     // the first 8 bytes of an image are its number, little endian
+  bool chunks = false;                                           // has chunk data: the exposure, the time stamp
+  std::uint32_t chunk_payload = 0x4001;  // payload type then: image with chunks; 5: extended chunk data; 4: chunk data
+  bool chunk_formula = false;            // the description has the chunk's exposure behind a formula
+  /// How long image `number` was really exposed, µs, of what the registers say; empty: as they say.
+  std::function<double(std::uint64_t number, double us)> exposures{};
+  bool number_images = true;  // the first 8 bytes of an image are its number, little endian
   /// Pixels of image `number`, width × height bytes that stay valid; empty: a pattern of the simulator's own.
   std::function<const std::uint8_t*(std::uint64_t number)> images{};
 };
@@ -66,6 +71,7 @@ class GigeCamera {
   void tear_frames(int exposures);                // of the next ones one packet of data is not sent and not sent again
   void delay_frames(int exposures, Duration by);  // the last half of each is sent so much later, after what comes between
   void set_loss(double share);
+  void garble_chunks(int exposures);           // the next ones have nonsense behind their pixels
   void lie_about_size(int width, int height);  // sends this size, whatever the registers say; 0: honest again
   /// A pulse at Line1: one exposure of image `number` where the camera waits for one. `when`: its time; 0: now.
   void pulse(std::uint64_t number, HostStamp when = {});
@@ -80,6 +86,8 @@ class GigeCamera {
   void write(std::uint32_t address, std::uint32_t value);
   /// When the last packet of image `number` was handed to the system; 0: not one of the newest.
   [[nodiscard]] HostStamp sent(std::uint64_t number) const;
+  /// How long image `number` was exposed, µs, as its chunk data say where it has them; 0: there is no such image.
+  [[nodiscard]] double exposed(std::uint64_t number) const;
   /// The device clock at a time of the host's, in its ticks.
   [[nodiscard]] std::uint64_t ticks(HostStamp host) const;
   [[nodiscard]] bool acquiring() const;
@@ -99,7 +107,8 @@ inline constexpr std::uint32_t width = 0x10000, height = 0x10004, offset_x = 0x1
                                trigger_overlap = 0x10040, trigger_delay = 0x10044, trigger_software = 0x10048, exposure_mode = 0x1004C,
                                exposure_auto = 0x10050, gain_auto = 0x10054, payload_size = 0x10058, locked = 0x1005C, ptp_enable = 0x10060,
                                ptp_status = 0x10064, gain_raw = 0x10068, sensor_width = 0x1006C, sensor_height = 0x10070,
-                               line_selector = 0x10074, line_mode = 0x10078, line_source = 0x1007C;
+                               line_selector = 0x10074, line_mode = 0x10078, line_source = 0x1007C, chunk_mode = 0x10080,
+                               chunk_selector = 0x10084, chunk_enable = 0x10088;
 }  // namespace gige_register
 
 /// The GenICam description of such a camera.

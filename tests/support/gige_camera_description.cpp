@@ -60,6 +60,19 @@ class Description {
         "<StringReg Name=\"{}\"><Address>{}</Address><Length>{}</Length><AccessMode>RO</AccessMode><pPort>Device</pPort></StringReg>\n",
         name, address, length);
   }
+  /// A number in the chunk `id` (hexadecimal).
+  void chunk(const char* name, const char* id, int length, const char* endianness, bool formula) {
+    feature(name);
+    const std::string reg = fmt::format("{}Reg", name);
+    text_ += formula
+                 ? fmt::format("<SwissKnife Name=\"{}\"><pVariable Name=\"RAW\">{}</pVariable><Formula>RAW*1.5</Formula></SwissKnife>\n",
+                               name, reg)
+                 : fmt::format("<Float Name=\"{}\"><pValue>{}</pValue><Unit>us</Unit></Float>\n", name, reg);
+    text_ += fmt::format(
+        "<FloatReg Name=\"{0}\"><Address>0</Address><Length>{1}</Length><AccessMode>RO</AccessMode><pPort>{0}Port</pPort>"
+        "<Cachable>NoCache</Cachable><Endianess>{2}</Endianess></FloatReg>\n<Port Name=\"{0}Port\"><ChunkID>{3}</ChunkID></Port>\n",
+        reg, length, endianness, id);
+  }
   [[nodiscard]] std::string done() const {
     return "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n"
            "<RegisterDescription ModelName=\"Simulator\" VendorName=\"Vergence\" StandardNameSpace=\"GEV\" SchemaMajorVersion=\"1\" "
@@ -129,6 +142,13 @@ std::string gige_description(const GigeCameraOptions& o) {
   if (!o.old_names) {
     d.boolean("PtpEnable", ptp_enable);
     d.choice("PtpStatus", ptp_status, {{"Initializing", 1}, {"Disabled", 3}, {"Listening", 4}, {"Master", 6}, {"Slave", 9}});
+  }
+  if (o.chunks) {
+    d.boolean("ChunkModeActive", chunk_mode);
+    d.choice("ChunkSelector", chunk_selector, {{"Image", 0}, {"ExposureTime", 1}, {"Timestamp", 2}});
+    d.boolean("ChunkEnable", chunk_enable);
+    d.chunk(o.old_names ? "ChunkExposureTimeAbs" : "ChunkExposureTime", "A5A50002", o.old_names ? 4 : 8,
+            o.old_names ? "LittleEndian" : "BigEndian", o.chunk_formula);
   }
   // Of the bootstrap registers; bit 0 is the most significant one.
   d.bits("GevSCPSPacketSize", 0xD04, 31, 16, fmt::format("<Min>{}</Min><Max>{}</Max><Inc>4</Inc>", o.smallest_packet, o.largest_packet));

@@ -93,12 +93,20 @@ void GvspSender::packet(const Record& record, std::uint32_t id, bool again) {
   const GvspFrame& f = record.frame;
   if (id == 0) {
     Wire w = header(f.block, kLeader, id, 0);
-    w.u16(0).u16(1).u64(f.ticks).u32(f.pixel_format).u32(static_cast<std::uint32_t>(f.width)).u32(static_cast<std::uint32_t>(f.height));
-    w.u32(static_cast<std::uint32_t>(f.offset_x)).u32(static_cast<std::uint32_t>(f.offset_y)).u16(0).u16(0);
+    w.u16(0).u16(f.payload_type).u64(f.ticks);
+    if (f.payload_type != 4)
+      w.u32(f.pixel_format)
+          .u32(static_cast<std::uint32_t>(f.width))
+          .u32(static_cast<std::uint32_t>(f.height))
+          .u32(static_cast<std::uint32_t>(f.offset_x))
+          .u32(static_cast<std::uint32_t>(f.offset_y))
+          .u16(0)
+          .u16(0);
     transmit(w.bytes(), {});
   } else if (id + 1 == record.packets) {
     Wire w = header(f.block, kTrailer, id, 0);
-    w.u32(1).u32(static_cast<std::uint32_t>(f.height));
+    w.u32(f.payload_type);
+    if (f.payload_type != 4) w.u32(static_cast<std::uint32_t>(f.height));
     transmit(w.bytes(), {});
   } else {
     const std::size_t begin = static_cast<std::size_t>(id - 1) * record.data_bytes;

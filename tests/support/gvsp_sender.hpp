@@ -34,9 +34,10 @@ class Wire {
 /// One frame to be sent.
 struct GvspFrame {
   std::uint64_t number = 0, block = 0, ticks = 0;
+  std::uint32_t payload_type = 1;  // 4: the leader does not tell what image it is
   std::uint32_t pixel_format = 0;
   int width = 0, height = 0, offset_x = 0, offset_y = 0;
-  std::vector<std::uint8_t> pixels;
+  std::vector<std::uint8_t> pixels;  // and the chunk data behind them
 };
 
 /// The stream channel of the simulated camera: packets, their loss, what is sent again, and the accounts of it all.

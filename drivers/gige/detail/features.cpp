@@ -21,6 +21,8 @@ constexpr std::array kNames{
     Names{Purpose::ptp_enable, {"PtpEnable", "GevIEEE1588", nullptr, nullptr}},
     Names{Purpose::ptp_status, {"PtpStatus", "GevIEEE1588Status", nullptr, nullptr}},
     Names{Purpose::ptp_latch, {"PtpDataSetLatch", "GevIEEE1588DataSetLatch", nullptr, nullptr}},
+    Names{Purpose::chunk_mode, {"ChunkModeActive", "ChunkMode", nullptr, nullptr}},
+    Names{Purpose::chunk_exposure, {"ChunkExposureTime", "ChunkExposureTimeAbs", "ChunkExposure", nullptr}},
 };
 
 std::string shown(double v) {

@@ -17,6 +17,8 @@ enum class Purpose : std::uint8_t {
   ptp_enable,
   ptp_status,
   ptp_latch,
+  chunk_mode,      // whether frames have chunk data at all
+  chunk_exposure,  // in a frame's chunk data; µs
 };
 
 /// The GenICam features of an open camera, with sentences for what it does not have.

@@ -45,7 +45,10 @@ std::string GigeCamera::complaint() const {
 
 std::string GigeCamera::remark() const {
   const std::lock_guard lock(words_);
-  return remark_;
+  const std::uint64_t untold = untold_.load(std::memory_order_relaxed);
+  if (untold == 0) return remark_;
+  return remark_ + (remark_.empty() ? "" : "; ") + std::to_string(untold) +
+         " images came without their exposure in the chunk data: it was reckoned; if that is most of them, set the option chunks to off";
 }
 
 // ---- the owner ------------------------------------------------------------------------------------------------------
@@ -72,6 +75,7 @@ DeviceStatus GigeCamera::configure(const CameraConfiguration& wanted, CameraConf
     options_ = options;
     applied_ = std::move(applied);
     in_force_ = {applied_.actual.exposure, applied_.actual.gain_db};
+    untold_.store(0, std::memory_order_relaxed);
     make_slots();
     configured_ = true;
     if (actual != nullptr) *actual = applied_.actual;
@@ -321,23 +325,39 @@ bool GigeCamera::describe(ArvBuffer* buffer, HostStamp arrival, Frame* frame) no
   frame->counter = step->counter;
   frame->arrival = arrival;
   const ExposureSetting& had = exposures_.at(arrival - applied_.plan.transfer - exposure_now_);
-  exposure_now_ = had.exposure;
-  frame->exposure = had.exposure;
+  const auto told = whole ? told_exposure(buffer) : std::nullopt;
+  frame->status = whole && right_size(buffer, told.has_value()) ? FrameStatus::complete : FrameStatus::torn;
+  const bool complete = frame->status == FrameStatus::complete;
+  if (complete && !told && applied_.exposure_chunk) untold_.fetch_add(1, std::memory_order_relaxed);
+  frame->exposure = complete && told ? *told : had.exposure;
   frame->gain_db = had.gain_db;
-  frame->status = whole && right_size(buffer) ? FrameStatus::complete : FrameStatus::torn;
-  const Duration before = applied_.plan.transfer + (options_.stamp_at_end ? Duration{} : had.exposure);
+  exposure_now_ = frame->exposure;
+  const Duration before = applied_.plan.transfer + (options_.stamp_at_end ? Duration{} : frame->exposure);
   frame->exposure_start = applied_.tick_frequency > 0 ? DeviceStamp(static_cast<std::int64_t>(arv_buffer_get_timestamp(buffer)))
                                                       : DeviceStamp(arrival.ns()) - before;
-  if (options_.stamp_at_end) frame->exposure_start = frame->exposure_start - had.exposure;
+  if (options_.stamp_at_end) frame->exposure_start = frame->exposure_start - frame->exposure;
   return true;
 }
 
+/// Precondition: the frame came whole.
+std::optional<Duration> GigeCamera::told_exposure(ArvBuffer* buffer) const noexcept {
+  if (!applied_.exposure_chunk) return std::nullopt;
+  std::size_t bytes = 0;
+  const auto* data = static_cast<const std::uint8_t*>(arv_buffer_get_data(buffer, &bytes));
+  return exposure_in_chunks(std::span(data, bytes).subspan(std::min(applied_.pixels, bytes)), *applied_.exposure_chunk);
+}
+
 /// A frame that came whole may still be another than the one that was asked for.
-bool GigeCamera::right_size(ArvBuffer* buffer) noexcept {
+bool GigeCamera::right_size(ArvBuffer* buffer, bool chunks_in_place) noexcept {
   gint x = 0, y = 0, width = 0, height = 0;
-  arv_buffer_get_image_region(buffer, &x, &y, &width, &height);
   std::size_t bytes = 0;
   (void)arv_buffer_get_data(buffer, &bytes);
+  if (arv_buffer_get_payload_type(buffer) != ARV_BUFFER_PAYLOAD_TYPE_CHUNK_DATA) {
+    arv_buffer_get_image_region(buffer, &x, &y, &width, &height);
+  } else if (chunks_in_place) {  // such a leader does not tell; what is where it has to be behind the pixels does
+    width = wanted_.width;
+    height = wanted_.height;
+  }
   if (width == wanted_.width && height == wanted_.height && bytes >= applied_.payload) {
     wrong_sizes_.store(0, std::memory_order_relaxed);
     return true;

@@ -3,6 +3,7 @@
 #include <condition_variable>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <string>
 #include <thread>
 #include <vector>
@@ -61,7 +62,8 @@ class GigeCamera final : public CameraDevice {
   static void called(void* self, ArvStreamCallbackType type, ArvBuffer* buffer);
   void take(ArvBuffer* buffer) noexcept;
   [[nodiscard]] bool describe(ArvBuffer* buffer, HostStamp arrival, Frame* frame) noexcept;
-  [[nodiscard]] bool right_size(ArvBuffer* buffer) noexcept;
+  [[nodiscard]] bool right_size(ArvBuffer* buffer, bool chunks_in_place) noexcept;
+  [[nodiscard]] std::optional<Duration> told_exposure(ArvBuffer* buffer) const noexcept;
   void recycle() noexcept;
 
   // The supervisor.
@@ -105,6 +107,7 @@ class GigeCamera final : public CameraDevice {
   std::atomic<std::int64_t> heard_ns_{0};
   std::atomic<int> wrong_sizes_{0};  // in a row
   std::atomic<int> seen_width_{0}, seen_height_{0};
+  std::atomic<std::uint64_t> untold_{0};  // whole frames since configure() whose chunk data did not have the exposure
 
   std::mutex supervisor_;
   std::condition_variable wake_;

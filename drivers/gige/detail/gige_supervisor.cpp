@@ -54,8 +54,8 @@ void GigeCamera::supervise() {
 GigeCamera::Trouble GigeCamera::what_is_wrong(HostStamp at, HostStamp* asked) {
   static const Trouble kSilent{"the camera does not answer any more", false};
   if (wrong_sizes_.load(std::memory_order_relaxed) >= kWrongSizes)
-    return {"the camera sends " + size_text(seen_width_, seen_height_) + " where " + size_text(wanted_.width, wanted_.height) +
-            " was configured; power it off and on"};
+    return {"the camera sends " + (seen_width_ > 0 ? size_text(seen_width_, seen_height_) : "images that do not tell their size") +
+            " where " + size_text(wanted_.width, wanted_.height) + " was configured; power it off and on"};
   const std::lock_guard lock(device_);
   if (session_ == nullptr || handover_.state() != Handover::State::streaming) return {};
   if (session_->lost()) return kSilent;

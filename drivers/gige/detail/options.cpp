@@ -62,6 +62,7 @@ constexpr std::array kRows{
     OptionRow{"exposure_line", "a name of the camera", "none", "Output that is high during the exposure."},
     OptionRow{"stamp_at", "start, end", "start", "What the camera's time stamp is of: the exposure's start or its end."},
     OptionRow{"ptp", "on, off", "off", "The camera's clock follows the network's (IEEE 1588)."},
+    OptionRow{"chunks", "auto, off", "auto", "Each frame tells its exposure itself, where the camera can (chunk data)."},
     OptionRow{"heartbeat_ms", "ms, 500 to 60000", "the camera's",
               "After so long without a word from us the camera gives up its controller."},
     OptionRow{"feature.NAME", "a value", "", "Any feature of the camera by its own name, set after everything else."},
@@ -121,6 +122,10 @@ constexpr std::array<Taker, kRows.size() - 1> kTakers{
       return t == "start" || t == "end";
     },
     [](const std::string& t, Options* o) { return on_off(t, &o->ptp); },
+    [](const std::string& t, Options* o) {
+      o->chunks = t == "auto";
+      return t == "auto" || t == "off";
+    },
     [](const std::string& t, Options* o) { return integer(t, 500, 60'000, &o->heartbeat_ms); },
 };
 

@@ -24,6 +24,7 @@ struct Options {
   std::string exposure_mode = "timed", exposure_line;
   bool stamp_at_end = false;
   bool ptp = false;
+  bool chunks = true;                                         // where the camera has them
   int heartbeat_ms = 0;                                       // 0: the camera's own
   std::vector<std::pair<std::string, std::string>> features;  // of the camera, by its own names, last
 };

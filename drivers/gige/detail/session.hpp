@@ -1,11 +1,13 @@
 #pragma once
 #include <atomic>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
 
 #include "drivers/camera.hpp"
+#include "drivers/gige/detail/chunks.hpp"
 #include "drivers/gige/detail/features.hpp"
 #include "drivers/gige/detail/glib.hpp"
 #include "drivers/gige/detail/grey.hpp"
@@ -27,8 +29,10 @@ struct Applied {
   CameraConfiguration actual{};
   Options options{};
   const GreyFormat* format = nullptr;
-  std::size_t payload = 0;           // bytes a frame on the wire
-  std::uint64_t tick_frequency = 0;  // Hz; 0: the camera has no clock
+  std::size_t payload = 0;                     // bytes a frame on the wire, chunk data among them
+  std::size_t pixels = 0;                      // of these, in front
+  std::optional<ChunkField> exposure_chunk{};  // frames say their exposure there
+  std::uint64_t tick_frequency = 0;            // Hz; 0: the camera has no clock
   LinkPlan plan{};
   Interface link{};
 };
@@ -78,6 +82,8 @@ class Session {
   [[nodiscard]] DeviceStatus set_rate(const CameraConfiguration& wanted, Applied* applied);
   [[nodiscard]] DeviceStatus set_packets(const CameraConfiguration& wanted, const Options& options, Applied* applied);
   [[nodiscard]] DeviceStatus set_clock(const Options& options, Applied* applied);
+  void set_chunks(const Options& options, Applied* applied);
+  [[nodiscard]] bool ask_for_exposures(const char* mode, Applied* applied);
   void enlarge_socket_buffer(const Applied& applied);
   void note(const std::string& sentence) { remark_ += (remark_.empty() ? "" : "; ") + sentence; }
 

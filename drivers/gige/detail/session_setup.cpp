@@ -38,13 +38,15 @@ DeviceStatus Session::apply(const CameraConfiguration& wanted, const Options& op
   if (status == DeviceStatus::ok) status = set_rate(wanted, &a);
   if (status == DeviceStatus::ok) status = set_clock(options, &a);
   if (status != DeviceStatus::ok) return status;
+  set_chunks(options, &a);
   for (const auto& [name, value] : options.features)
     if (!features_.set_text(name, value)) return refuse(DeviceStatus::unsupported, features_.complaint());
   const auto payload = features_.number("PayloadSize");
   if (!payload || *payload < 1) return refuse(DeviceStatus::unsupported, "the camera does not say how large a frame is (PayloadSize)");
   a.payload = static_cast<std::size_t>(*payload);
-  const std::size_t pixels = static_cast<std::size_t>(wanted.width) * static_cast<std::size_t>(wanted.height);
-  if (a.payload < pixels * (a.format->how == GreyFormat::How::words ? 2 : 1))
+  a.pixels =
+      static_cast<std::size_t>(wanted.width) * static_cast<std::size_t>(wanted.height) * (a.format->how == GreyFormat::How::words ? 2 : 1);
+  if (a.payload < a.pixels)
     return refuse(DeviceStatus::unsupported, "the camera's frames of " + std::to_string(a.payload) + " bytes are smaller than the image");
   status = set_packets(wanted, options, &a);
   if (status == DeviceStatus::ok) *applied = std::move(a);
@@ -221,6 +223,31 @@ DeviceStatus Session::set_clock(const Options& o, Applied* a) {
   if (word != "Slave")
     note("the camera's clock does not follow the network's yet (PTP is " + (word.empty() ? "silent" : word) + "); is there a master?");
   return DeviceStatus::ok;
+}
+
+/// Which exposure a frame had is best known by the camera. One that cannot say is no trouble: it is reckoned, then.
+void Session::set_chunks(const Options& o, Applied* a) {
+  const char* mode = features_.find(Purpose::chunk_mode);
+  if (mode == nullptr) return;
+  if (o.chunks && ask_for_exposures(mode, a)) return;
+  (void)features_.switch_on(mode, false);  // what another program left on
+}
+
+bool Session::ask_for_exposures(const char* mode, Applied* a) {
+  if (!features_.switch_on(mode, true)) return false;
+  // Cameras before GigE Vision 2.0: only then the leader still tells the image's size.
+  if (features_.has("GevSCCFGExtendedChunkData")) (void)features_.switch_on("GevSCCFGExtendedChunkData", true);
+  const auto offered = features_.choices("ChunkSelector");
+  bool enabled = false;
+  for (const char* name : {"ExposureTime", "ExposureTimeAbs", "Exposure"}) {
+    if (enabled || std::find(offered.begin(), offered.end(), name) == offered.end()) continue;
+    enabled = features_.choose("ChunkSelector", name) && features_.switch_on("ChunkEnable", true);
+  }
+  if (!enabled) return false;
+  const char* exposure = features_.find(Purpose::chunk_exposure);
+  if (exposure != nullptr) a->exposure_chunk = find_chunk_field(device_.get(), exposure);
+  if (!a->exposure_chunk) note("the camera's chunk data has the exposure in a way that is not known here: it is reckoned");
+  return a->exposure_chunk.has_value();
 }
 
 DeviceStatus Session::set_packets(const CameraConfiguration& wanted, const Options& o, Applied* a) {

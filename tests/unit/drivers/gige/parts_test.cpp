@@ -125,6 +125,7 @@ TEST(GigeOptions, everyRowOfTheTableIsUnderstood) {
                                                {"exposure_line", "Line3"},
                                                {"stamp_at", "end"},
                                                {"ptp", "on"},
+                                               {"chunks", "off"},
                                                {"heartbeat_ms", "5000"},
                                                {"feature.BlackLevel", "3"}};
   EXPECT_EQ(all.size(), option_rows().size());
@@ -135,7 +136,7 @@ TEST(GigeOptions, everyRowOfTheTableIsUnderstood) {
   EXPECT_EQ(o.link_speed, kGigabit);
   EXPECT_EQ(o.resend, Options::Resend::off);
   EXPECT_EQ(o.socket_buffer, 8192 * 1024);
-  EXPECT_TRUE(o.packet_socket && o.ptp && o.stamp_at_end);
+  EXPECT_TRUE(o.packet_socket && o.ptp && o.stamp_at_end && !o.chunks);
   ASSERT_EQ(o.features.size(), 1U);
   EXPECT_EQ(o.features[0].first, "BlackLevel");
 }
@@ -149,6 +150,7 @@ TEST(GigeOptions, whatIsNotUnderstoodIsNamedWithWhatThereIs) {
                                                                       {"heartbeat_ms", "1e9"},
                                                                       {"link_cameras", "1.5"},
                                                                       {"resend", "perhaps"},
+                                                                      {"chunks", "on"},
                                                                       {"trigger_edge", ""},
                                                                       {"feature.", "1"}})
     EXPECT_NE(parse_options({{name, value}}, &o).find(name), std::string::npos) << name;
