@@ -109,6 +109,11 @@ ExitCode run(const Arguments& a) {
   } else {
     std::cout << (a.estimate_mount ? mount_text(mount) : "") << evaluation_text(evaluation, options);
   }
+  if (a.estimate_mount && mount.status != MountStatus::ok) {
+    std::cerr << "vergence: no mount between " << a.estimate << " and " << from.path.string() << ": "
+              << mount_json(mount)["status"].get<std::string>() << '\n';
+    return ExitCode::not_usable;
+  }
   if (evaluation.status == EvaluationStatus::ok) return ExitCode::done;
   std::cerr << "vergence: " << a.estimate << " against " << from.path.string() << ": " << evaluation_problem(evaluation, options) << '\n';
   return ExitCode::not_usable;

@@ -105,7 +105,7 @@ TEST(Run, theSameDriveGivesTheSameBytesWhateverTheThreads) {
   const TemporaryFolder folder;
   ASSERT_EQ(drive(folder / "a", "--duration 6 --threads 2 --quiet" + kSmall).code, 0);
   ASSERT_EQ(drive(folder / "b", "--duration 6 --threads 1 --quiet" + kSmall).code, 0);
-  for (const char* name : {"trajectory.tum", "reference.tum", "truth.tum", "events.jsonl"})
+  for (const char* name : {"trajectory.tum", "reference.tum", "truth.tum", "events.jsonl", "ins.csv"})
     EXPECT_EQ(text_of(folder / "a" / name), text_of(folder / "b" / name)) << name;
 }
 

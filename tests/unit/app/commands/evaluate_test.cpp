@@ -249,6 +249,10 @@ TEST(EvaluateCommand, saysWhatAMountLacks) {
   };
   const std::string tum = folder.write("s/trajectory.tum", "1 0 0 0 0 0 0 1\n2 1 0 0 0 0 0 1\n").string();
   refused({tum}, "REFERENCE is missing");
+  const Outcome brief = evaluate_command({tum, tum, "--estimate-mount"});
+  EXPECT_EQ(brief.code, ExitCode::not_usable);
+  EXPECT_NE(brief.err.find("no mount between"), std::string::npos) << brief.err;
+  EXPECT_NE(brief.err.find("fewer than 20 moments in common"), std::string::npos) << brief.err;
   refused({(folder / "s").string()}, "REFERENCE is missing");
   refused({(folder / "s").string(), "--estimate-mount"}, "is no session folder with an ins.csv; name a REFERENCE");
   InsRecord bare;
