@@ -233,12 +233,9 @@ Json summary_json(const SessionTotals& totals, const SummaryInput& input) {
   }
   memory["sum_bytes"] = sum;
   json["memory"] = memory;
-  json["drops"] = {{"frames", input.skipped},
-                   {"estimator", input.dropped_by_estimator},
-                   {"records", totals.dropped_records},
-                   {"readings", totals.dropped_readings},
-                   {"lines", totals.lost_lines},
-                   {"recorder_high_water", totals.ring_high_water}};
+  json["drops"] = {{"frames", input.skipped},           {"estimator", input.dropped_by_estimator},
+                   {"records", totals.dropped_records}, {"readings", totals.dropped_readings},
+                   {"lines", totals.lost_lines},        {"recorder_high_water", totals.ring_high_water}};
   json["devices"] = counters_json(input.devices);
   json["comparison"] = counters_json(input.comparison);
   json["time"] = input.time ? time_json(*input.time) : Json();
