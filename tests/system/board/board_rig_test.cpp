@@ -8,19 +8,13 @@
 
 #include "drivers/serial/serial.hpp"
 #include "drivers/trigger_board/trigger_board.hpp"
+#include "tests/support/within.hpp"
 #include "tests/system/board/board_rig.hpp"
 
 namespace vergence {
 namespace {
 
-template <class Condition>
-bool within(int seconds, const Condition& condition) {
-  for (int i = 0; i < 100 * seconds; ++i) {
-    if (condition()) return true;
-    std::this_thread::sleep_for(std::chrono::milliseconds(10));
-  }
-  return false;
-}
+using test::within;
 
 TriggerConfiguration thirty_hertz() {
   TriggerConfiguration c;

@@ -10,22 +10,16 @@
 #include "drivers/serial/serial.hpp"
 #include "drivers/xsens/xsens.hpp"
 #include "tests/rigs/emulator.hpp"
+#include "tests/support/within.hpp"
 #include "tests/support/xsens_terminal.hpp"
 
 namespace vergence {
 namespace {
 
+using test::within;
+
 constexpr const char* kPort = "/dev/ttyUSB0";
 constexpr const char* kWire = "/run/vergence-wire";
-
-template <class Condition>
-bool within(int seconds, const Condition& condition) {
-  for (int i = 0; i < 100 * seconds; ++i) {
-    if (condition()) return true;
-    std::this_thread::sleep_for(std::chrono::milliseconds(10));
-  }
-  return false;
-}
 
 std::vector<InsReading> readings(InsDevice& device, std::size_t most) {
   std::vector<InsReading> all;

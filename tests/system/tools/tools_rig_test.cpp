@@ -16,6 +16,7 @@
 
 #include "tests/rigs/emulator.hpp"
 #include "tests/support/temporary_folder.hpp"
+#include "tests/support/within.hpp"
 #include "tests/support/xsens_terminal.hpp"
 #include "tests/unit/app/commands/run_vergence.hpp"
 
@@ -57,15 +58,6 @@ void mend(const json& f) {
   std::string command = f["mend"].at(0);
   for (auto at = command.find("sudo "); at != std::string::npos; at = command.find("sudo ")) command.erase(at, 5);
   EXPECT_EQ(std::system((command + " >/dev/null").c_str()), 0) << command;
-}
-
-template <class Condition>
-bool within(int seconds, const Condition& condition) {
-  for (int i = 0; i < 100 * seconds; ++i) {
-    if (condition()) return true;
-    std::this_thread::sleep_for(std::chrono::milliseconds(10));
-  }
-  return false;
 }
 
 class ToolsRig : public ::testing::Test {

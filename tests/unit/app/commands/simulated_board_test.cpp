@@ -11,9 +11,12 @@
 #include "app/commands/drive_devices.hpp"
 #include "app/runtime/errors.hpp"
 #include "app/runtime/live_source.hpp"
+#include "tests/support/watched_camera.hpp"
 
 namespace vergence::app {
 namespace {
+
+using test::WatchedCamera;
 
 constexpr Stamp kEpoch{1'577'836'800'000'000'000};
 constexpr double kSeconds = 10;
@@ -28,31 +31,6 @@ mock: {drive: brief, texture_detail: 0, ins: ideal, board_line: ftdi, ins_line: 
 )",
                              "test", more);
 }
-
-/// Hands out a camera's frames and knows when each slot's was exposed: the mock's arrivals tell, within its jitter.
-class WatchedCamera final : public CameraDevice {
- public:
-  explicit WatchedCamera(CameraDevice* camera) : camera_(camera) {}
-  const DeviceInfo& info() const noexcept override { return camera_->info(); }
-  DeviceStatus configure(const CameraConfiguration& c, CameraConfiguration* actual) noexcept override {
-    return camera_->configure(c, actual);
-  }
-  DeviceTiming timing() const noexcept override { return camera_->timing(); }
-  DeviceStatus start(Notifier* ready) noexcept override { return camera_->start(ready); }
-  DeviceStatus wait(Duration limit, Frame* frame) noexcept override {
-    const DeviceStatus status = camera_->wait(limit, frame);
-    if (status == DeviceStatus::ok) edge_of_slot[frame->slot] = frame->arrival - camera_->timing().least_delay;
-    return status;
-  }
-  ImageView view(FrameSlot slot) const noexcept override { return camera_->view(slot); }
-  void release(FrameSlot slot) noexcept override { camera_->release(slot); }
-  void stop() noexcept override { camera_->stop(); }
-  CameraStatistics statistics() const noexcept override { return camera_->statistics(); }
-  std::array<HostStamp, 64> edge_of_slot{};
-
- private:
-  CameraDevice* camera_;
-};
 
 struct Set {
   SyncedSet set{};

@@ -12,37 +12,14 @@
 
 #include "core/memory/allocation_guard.hpp"
 #include "drivers/mock/mock_rig.hpp"
+#include "tests/support/watched_camera.hpp"
 
 namespace vergence::app {
 namespace {
 
+using test::WatchedCamera;
+
 constexpr Stamp kStart{1'577'836'800'000'000'000};
-
-/// What a camera hands out, with the true pulse of every slot beside it: the mock's arrivals tell, within its jitter.
-class WatchedCamera final : public CameraDevice {
- public:
-  explicit WatchedCamera(CameraDevice* camera) : camera_(camera) {}
-  const DeviceInfo& info() const noexcept override { return camera_->info(); }
-  DeviceStatus configure(const CameraConfiguration& c, CameraConfiguration* actual) noexcept override {
-    return camera_->configure(c, actual);
-  }
-  DeviceTiming timing() const noexcept override { return camera_->timing(); }
-  DeviceStatus start(Notifier* ready) noexcept override { return camera_->start(ready); }
-  DeviceStatus wait(Duration limit, Frame* frame) noexcept override {
-    const DeviceStatus status = camera_->wait(limit, frame);
-    if (status == DeviceStatus::ok) edge_of_slot[frame->slot] = frame->arrival - camera_->timing().least_delay;
-    return status;
-  }
-  ImageView view(FrameSlot slot) const noexcept override { return camera_->view(slot); }
-  void release(FrameSlot slot) noexcept override { camera_->release(slot); }
-  void stop() noexcept override { camera_->stop(); }
-  CameraStatistics statistics() const noexcept override { return camera_->statistics(); }
-
-  std::array<HostStamp, 64> edge_of_slot{};  // not before the true edge, and at most 1.9 ms after it
-
- private:
-  CameraDevice* camera_;
-};
 
 struct BenchOptions {
   bool real_time = false;
