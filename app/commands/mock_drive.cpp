@@ -104,7 +104,7 @@ MockDrive make_mock_drive(const Configuration& c, const std::vector<std::string>
     o.ideal_ins = c.mock.ins == "ideal";
     o.clock_drift_ppm = c.mock.clock_drift_ppm;
     o.fed = c.mock.board_line != "none";
-    o.reports_taken = !o.fed;
+    o.reports_taken = !o.fed && c.sync.mode == "board";  // else nobody asks for a pause, nor need take them
     for (std::size_t k = 0; k < static_cast<std::size_t>(rig.cameras); ++k) o.trigger_delay[k] = trigger_delay(c, k);
     o.exposures_follow = exposes_by_itself(c);
     if (duration_s) o.duration = Duration::seconds(*duration_s);
