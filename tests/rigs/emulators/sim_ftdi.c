@@ -27,7 +27,7 @@
 
 /* One direction of the line: a byte that waits is through when its ten bits have passed, never sooner. */
 struct way {
-  uint8_t waiting[4096];
+  uint8_t waiting[65536];
   size_t used;
   uint64_t free; /* when the bits of the last one are through */
 };
@@ -135,8 +135,12 @@ static void give_to_wire(uint64_t ns) {
   struct way* w = &ftdi.to_wire;
   size_t bytes = through(w, ns, sizeof w->waiting);
   if (!bytes) return;
-  if (write(ftdi.wire, w->waiting, bytes) < 0) ftdi.overrun += bytes; /* nobody reads at the far end: a serial line does not wait */
-  pass(w, bytes);
+  ssize_t taken = write(ftdi.wire, w->waiting, bytes);
+  if (taken < 0) { /* nobody reads at the far end: a serial line does not wait */
+    ftdi.overrun += bytes;
+    taken = (ssize_t)bytes;
+  }
+  pass(w, (size_t)taken);
 }
 
 static void take_from_wire(uint64_t ns) {
