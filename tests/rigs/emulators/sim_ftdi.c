@@ -145,19 +145,19 @@ static void give_to_wire(uint64_t ns) {
 
 static void take_from_wire(uint64_t ns) {
   struct way* w = &ftdi.from_wire;
-  if (w->used < sizeof w->waiting) {
-    ssize_t n = read(ftdi.wire, w->waiting + w->used, sizeof w->waiting - w->used);
-    if (n > 0) {
-      begin(w, ns);
-      w->used += (size_t)n;
-    }
-  }
   size_t bytes = through(w, ns, FIFO - ftdi.used);
-  if (!bytes) return;
-  if (!ftdi.used) ftdi.oldest = ns;
-  memcpy(ftdi.fifo + ftdi.used, w->waiting, bytes);
-  ftdi.used += bytes;
-  pass(w, bytes);
+  if (bytes) {
+    if (!ftdi.used) ftdi.oldest = ns;
+    memcpy(ftdi.fifo + ftdi.used, w->waiting, bytes);
+    ftdi.used += bytes;
+    pass(w, bytes);
+  }
+  /* after that: what is found now was not on the line while this program was held up */
+  if (w->used == sizeof w->waiting) return;
+  ssize_t n = read(ftdi.wire, w->waiting + w->used, sizeof w->waiting - w->used);
+  if (n <= 0) return;
+  begin(w, ns);
+  w->used += (size_t)n;
 }
 
 /* Whole packets go at once; a part of one, or the bare status, when the latency timer has run out. */
