@@ -117,20 +117,6 @@ static void begin(struct way* w, uint64_t ns) {
   if (!w->used && w->free < ns) w->free = ns;
 }
 
-static void from_host(void* self, unsigned endpoint, const uint8_t* data, size_t bytes) {
-  struct way* w = &ftdi.to_wire;
-  (void)self;
-  (void)endpoint;
-  ftdi.down += bytes;
-  begin(w, now_ns());
-  if (bytes > sizeof w->waiting - w->used) { /* the chip would make the host wait; nothing here sends that much */
-    ftdi.overrun += bytes - (sizeof w->waiting - w->used);
-    bytes = sizeof w->waiting - w->used;
-  }
-  memcpy(w->waiting + w->used, data, bytes);
-  w->used += bytes;
-}
-
 static void give_to_wire(uint64_t ns) {
   struct way* w = &ftdi.to_wire;
   size_t bytes = through(w, ns, sizeof w->waiting);
@@ -141,6 +127,22 @@ static void give_to_wire(uint64_t ns) {
     taken = (ssize_t)bytes;
   }
   pass(w, (size_t)taken);
+}
+
+static void from_host(void* self, unsigned endpoint, const uint8_t* data, size_t bytes) {
+  struct way* w = &ftdi.to_wire;
+  (void)self;
+  (void)endpoint;
+  ftdi.down += bytes;
+  uint64_t ns = now_ns();
+  give_to_wire(ns); /* what was there before has had its time, these bytes have not */
+  begin(w, ns);
+  if (bytes > sizeof w->waiting - w->used) { /* the chip would make the host wait; nothing here sends that much */
+    ftdi.overrun += bytes - (sizeof w->waiting - w->used);
+    bytes = sizeof w->waiting - w->used;
+  }
+  memcpy(w->waiting + w->used, data, bytes);
+  w->used += bytes;
 }
 
 static void take_from_wire(uint64_t ns) {
