@@ -9,6 +9,7 @@
 
 #include "drivers/mock/simulators/simulators.hpp"
 #include "drivers/xsens/device.hpp"
+#include "tests/support/xsens_terminal.hpp"
 
 namespace {
 
@@ -25,15 +26,6 @@ struct Errors {
   std::vector<double> stamp_ms, delay_ms;
 };
 
-InsSample still(std::uint64_t number, Duration /*time*/) {
-  InsSample s;
-  s.number = number;
-  s.fix = FixStatus::fix_3d;
-  s.attitude_valid = s.velocity_valid = true;
-  s.position = {-27.4975, 153.0137, 60};
-  return s;
-}
-
 bool run(const Case& c, std::uint64_t seed, Errors* errors) {
   constexpr Duration kSettled = Duration::seconds(20);
   mock::XsensSimulatorOptions sensor;
@@ -47,7 +39,7 @@ bool run(const Case& c, std::uint64_t seed, Errors* errors) {
   line.latency_timer = Duration::milliseconds(c.latency_ms);
   line.converter_clock_ppm = seed % 4 < 2 ? 20 : -20;
   line.seed = seed;
-  auto simulator = std::make_shared<mock::XsensSimulator>(still, sensor);
+  auto simulator = std::make_shared<mock::XsensSimulator>(test::resting_sample, sensor);
   xsens::Options options;
   options.baud = c.baud;
   xsens::Device device(std::make_unique<mock::SimulatedPlace>(simulator, line), options);

@@ -8,19 +8,20 @@
 
 namespace vergence::test {
 
-/// A simulated XSens INS that stands still, with a fix, from now on.
+/// A reading of an INS that stands still in Brisbane, with a fix.
+[[nodiscard]] inline InsSample resting_sample(std::uint64_t number, Duration /*time*/) {
+  InsSample s;
+  s.number = number;
+  s.fix = FixStatus::fix_3d;
+  s.attitude_valid = s.velocity_valid = true;
+  s.position = {-27.4975, 153.0137, 60};
+  return s;
+}
+
+/// A simulated XSens INS that rests so, from now on.
 [[nodiscard]] inline std::unique_ptr<mock::XsensSimulator> resting_xsens(mock::XsensSimulatorOptions options = {}) {
   options.power_on = monotonic_now();
-  return std::make_unique<mock::XsensSimulator>(
-      [](std::uint64_t number, Duration /*time*/) {
-        InsSample s;
-        s.number = number;
-        s.fix = FixStatus::fix_3d;
-        s.attitude_valid = s.velocity_valid = true;
-        s.position = {-27.4975, 153.0137, 60};
-        return s;
-      },
-      options);
+  return std::make_unique<mock::XsensSimulator>(resting_sample, options);
 }
 
 /// The same behind a pseudo-terminal: port() is what a driver opens.

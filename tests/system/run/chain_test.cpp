@@ -13,37 +13,23 @@
 
 #include "app/datasets/trajectory_files.hpp"
 #include "tests/support/temporary_folder.hpp"
+#include "tests/system/run/session.hpp"
 #include "tests/unit/app/commands/run_vergence.hpp"
 
 namespace vergence {
 namespace {
 
+using test::events;
+using test::kSmall;
 using test::Outcome;
 using test::run_vergence;
+using test::summary_of;
 using test::TemporaryFolder;
-
-// A quarter of the pixels: the same rig and drive in a quarter of the time.
-const std::string kSmall = " --set cameras.0.size=[320,240] --set cameras.1.size=[320,240] --set mock.texture_detail=0 --quiet";
+using test::text_of;
 
 Outcome drive(const std::string& configuration, const std::filesystem::path& session, const std::string& more) {
   return run_vergence("run '" + std::string(VERGENCE_SOURCE_DIR) + "/app/config/" + configuration + "' --fast --out '" + session.string() +
-                      "' " + more + kSmall);
-}
-
-std::string text_of(const std::filesystem::path& file) {
-  std::ifstream in(file, std::ios::binary);
-  std::ostringstream all;
-  all << in.rdbuf();
-  return all.str();
-}
-
-nlohmann::json summary_of(const std::filesystem::path& session) { return nlohmann::json::parse(text_of(session / "summary.json")); }
-
-int events(const std::filesystem::path& session, const std::string& kind) {
-  std::istringstream in(text_of(session / "events.jsonl"));
-  int found = 0;
-  for (std::string line; std::getline(in, line);) found += nlohmann::json::parse(line)["kind"] == kind ? 1 : 0;
-  return found;
+                      "' " + more + kSmall + " --quiet");
 }
 
 /// Every pose's stamp is a true mid-exposure to that many microseconds; from the first second on.

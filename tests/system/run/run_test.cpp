@@ -13,41 +13,23 @@
 
 #include "app/datasets/trajectory_files.hpp"
 #include "tests/support/temporary_folder.hpp"
+#include "tests/system/run/session.hpp"
 #include "tests/unit/app/commands/run_vergence.hpp"
 
 namespace vergence {
 namespace {
 
+using test::events;
+using test::kSmall;
 using test::Outcome;
 using test::run_vergence;
+using test::summary_of;
 using test::TemporaryFolder;
+using test::text_of;
 
 const std::string kMock = std::string(VERGENCE_SOURCE_DIR) + "/app/config/mock.yaml";
-// A quarter of the pixels: the same rig and drive in a quarter of the time.
-const std::string kSmall = " --set cameras.0.size=[320,240] --set cameras.1.size=[320,240] --set mock.texture_detail=0";
-
 Outcome drive(const std::filesystem::path& session, const std::string& more) {
   return run_vergence("run '" + kMock + "' --fast --out '" + session.string() + "' " + more);
-}
-
-std::string text_of(const std::filesystem::path& file) {
-  std::ifstream in(file, std::ios::binary);
-  std::ostringstream all;
-  all << in.rdbuf();
-  return all.str();
-}
-
-nlohmann::json summary_of(const std::filesystem::path& session) { return nlohmann::json::parse(text_of(session / "summary.json")); }
-
-/// Sentences of the events of one kind.
-std::vector<std::string> events(const std::filesystem::path& session, const std::string& kind) {
-  std::istringstream in(text_of(session / "events.jsonl"));
-  std::vector<std::string> found;
-  for (std::string line; std::getline(in, line);) {
-    const auto event = nlohmann::json::parse(line);
-    if (event["kind"] == kind) found.push_back(event["sentence"]);
-  }
-  return found;
 }
 
 TEST(Run, aMockDrivePosesEveryFrameNearTheTruthWithoutAllocating) {
