@@ -11,7 +11,7 @@ namespace {
 /// What a user wants to hear of at once.
 bool aloud(EstimatorEvent::Kind kind) noexcept {
   using Kind = EstimatorEvent::Kind;
-  return kind == Kind::rig_changed || kind == Kind::calibration_confirmed || kind == Kind::calibration_accepted ||
+  return kind == Kind::rig_changed || kind == Kind::calibration_confirmed || kind == Kind::calibration_contradicted || kind == Kind::calibration_accepted ||
          kind == Kind::calibration_rejected || kind == Kind::calibration_waits;
 }
 

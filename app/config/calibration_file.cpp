@@ -84,6 +84,10 @@ Intrinsics read_intrinsics(const YamlFile& file, const Section& camera) {
     std::copy(d.begin(), d.end(), k.distortion.begin());
   }
   camera.optional_numbers("intrinsics_sigma", &k.sigma);
+  if (camera.has("distortion_sigma")) {
+    const auto sigma = camera.numbers("distortion_sigma", 4, k.distortion_sigma.size());
+    std::copy(sigma.begin(), sigma.end(), k.distortion_sigma.begin());
+  }
   return k;
 }
 
@@ -106,7 +110,7 @@ Mat6 read_covariance(const Section& camera) {
 }
 
 void read_camera(const YamlFile& file, const YAML::Node& node, std::size_t k, const CalibrationUse& use, CalibrationFile* calibration) {
-  std::vector<std::string> known{"name", "serial", "size", "model", "intrinsics", "distortion", "intrinsics_sigma"};
+  std::vector<std::string> known{"name", "serial", "size", "model", "intrinsics", "distortion", "intrinsics_sigma", "distortion_sigma"};
   if (k > 0) known.insert(known.end(), {"T_camera_left", "sigma_noise", "sigma_wide", "covariance_wide"});
   const Section camera(file, node, fmt::format("cameras.{}", k), known);
   RigCalibration& rig = calibration->rig;
@@ -214,6 +218,7 @@ std::string format_camera(const CalibrationFile& calibration, std::size_t k) {
   text += "    intrinsics: " + list(std::array{i.fx, i.fy, i.cx, i.cy}) + "\n";
   text += "    distortion: " + list(std::span(i.distortion).first(coefficients)) + "\n";
   if (any(i.sigma)) text += "    intrinsics_sigma: " + list(i.sigma) + "\n";
+  if (any(i.distortion_sigma)) text += "    distortion_sigma: " + list(std::span(i.distortion_sigma).first(coefficients)) + "\n";
   return text;
 }
 

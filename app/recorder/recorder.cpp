@@ -236,6 +236,14 @@ void append_sigmas(std::string* line, const std::array<double, N>& values) {
       *line += ',';
 }
 
+/// The first four coefficients and their sigmas.
+void append_distortion(std::string* line, const Intrinsics& lens) {
+  std::array<double, 4> sigma{};
+  std::copy_n(lens.distortion_sigma.begin(), sigma.size(), sigma.begin());
+  for (std::size_t i = 0; i < sigma.size(); ++i) fmt::format_to(std::back_inserter(*line), ",{:.9f}", lens.distortion[i]);
+  append_sigmas(line, sigma);
+}
+
 /// A word or sentence as one field.
 std::string field(const char* text) {
   std::string f = text;
@@ -251,7 +259,7 @@ void Recorder::write(const CalibrationRecord& c) {
   for (std::size_t k = 1; k < static_cast<std::size_t>(rig.cameras); ++k) {
     line_.clear();
     const auto out = std::back_inserter(line_);
-    fmt::format_to(out, "{},{},{},{},{}", c.stamp.ns(), c.accepted ? "accepted" : "rejected", field(c.cause), field(c.reason), rig.frames);
+    fmt::format_to(out, "{},{},{},{},{}", c.stamp.ns(), c.accepted ? "accepted" : c.learnt ? "kept" : "rejected", field(c.cause), field(c.reason), rig.frames);
     if (c.decided)
       fmt::format_to(out, ",{},{},{:.4f},{:.4f},{:.4f},{:.6f}", c.latency_frames, c.onset_frame, rig.reprojection_px, c.held_out_before_px,
                      c.held_out_after_px, rig.scale_sigma);
@@ -266,6 +274,13 @@ void Recorder::write(const CalibrationRecord& c) {
     const Intrinsics& lens = rig.intrinsics[k];
     fmt::format_to(out, ",{:.5f},{:.5f},{:.5f},{:.5f}", lens.fx, lens.fy, lens.cx, lens.cy);
     append_sigmas(&line_, lens.sigma);
+    append_distortion(&line_, lens);
+    append_distortion(&line_, rig.intrinsics[0]);
+    if (c.decided && c.judged_depth_m > 0)
+      fmt::format_to(out, ",{:.2f},{:.4f},{:.4f},{:d},{:d}", c.judged_depth_m, c.depth_sigma_percent, c.depth_difference_percent,
+                     c.verified, c.lenses);
+    else
+      line_ += ",,,,,";
     line_ += '\n';
     files_->calibrations.append(line_);
   }
@@ -273,6 +288,8 @@ void Recorder::write(const CalibrationRecord& c) {
 }
 
 void Recorder::note(const CalibrationRecord& c) {
+  totals_->verified = c.verified;
+  if (c.learnt && !c.accepted) return;  // the drive goes on: nothing was attempted
   ++(c.accepted ? totals_->accepted : totals_->rejected);
   if (totals_->attempts.size() == kMostAttempts) totals_->attempts.erase(totals_->attempts.begin());
   totals_->attempts.push_back({c.stamp, c.cause, c.reason, c.accepted, c.latency_frames, c.rig.frames, c.solve_ms});

@@ -27,11 +27,15 @@ inline constexpr const char* kPosesHeader =
     "ins_east,ins_north,ins_up,ins_latitude_deg,ins_longitude_deg,ins_height_m,ins_heading_deg,"
     "error_east_m,error_north_m,error_up_m,error_heading_deg,inliers,reprojection_px,estimate_ms";
 /// What calibrations.csv has: rotation vectors and their sigmas in rad, lengths in m, `sigma_` by noise alone, `wide_` with uncertain
-/// intrinsics, pixels. Latency in frames since the alarm, the request or the start; held-out errors are medians before and after.
+/// intrinsics, pixels; d0 … d3 are k1 k2 p1 p2, or k1 … k4 of an equidistant lens. Latency in frames since the alarm, the request or the
+/// start; held-out errors are medians before and after. `kept`: what the drive measured is no better than what is in use. The last five are
+/// those of CalibrationDecision.
 inline constexpr const char* kCalibrationsHeader =
     "stamp_ns,outcome,cause,reason,frames,latency_frames,onset_frame,reprojection_px,held_out_before_px,held_out_after_px,scale_sigma,"
     "camera,rx,ry,rz,tx,ty,tz,sigma_rx,sigma_ry,sigma_rz,sigma_tx,sigma_ty,sigma_tz,wide_rx,wide_ry,wide_rz,wide_tx,wide_ty,wide_tz,"
-    "fx,fy,cx,cy,sigma_fx,sigma_fy,sigma_cx,sigma_cy";
+    "fx,fy,cx,cy,sigma_fx,sigma_fy,sigma_cx,sigma_cy,d0,d1,d2,d3,sigma_d0,sigma_d1,sigma_d2,sigma_d3,"
+    "left_d0,left_d1,left_d2,left_d3,sigma_left_d0,sigma_left_d1,sigma_left_d2,sigma_left_d3,"
+    "judged_depth_m,depth_sigma_percent,depth_difference_percent,verified,lenses";
 
 /// Makes the folder of a session. InputError: it exists and is not empty, is no folder, or cannot be made.
 void make_session_folder(const std::filesystem::path& folder);
@@ -53,6 +57,7 @@ struct SessionTotals {
   std::array<TimeHistogram, kStages> stages;
   std::vector<CalibrationAttempt> attempts;  // the newest kMostAttempts
   std::uint64_t accepted = 0, rejected = 0;  // of all of them
+  bool verified = false;                     // the calibration in use at the end: the drive itself has confirmed it
   double path_m = 0;                         // sum of the steps between successive poses
   std::vector<StampedPose> trajectory;       // if asked for: the poses of trajectory.tum
   std::vector<StampedPose> reference;        // if asked for: of reference.tum, in its own frame

@@ -24,6 +24,8 @@ const char* kind_word(EstimatorEvent::Kind kind) noexcept {
       return "rig_changed";
     case EstimatorEvent::Kind::calibration_confirmed:
       return "calibration_confirmed";
+    case EstimatorEvent::Kind::calibration_contradicted:
+      return "calibration_contradicted";
     case EstimatorEvent::Kind::calibration_accepted:
       return "calibration_accepted";
     case EstimatorEvent::Kind::calibration_rejected:
@@ -43,8 +45,6 @@ const char* opening(EstimatorEvent::Kind kind) noexcept {
       return "a calibration was rejected";
     case EstimatorEvent::Kind::calibration_waits:
       return "the calibration waits";
-    case EstimatorEvent::Kind::calibration_confirmed:
-      return "the calibration of the state file is confirmed";
     default:
       return "";
   }
@@ -120,10 +120,12 @@ EventRecord EventRecord::of(const EstimatorEvent& event) noexcept {
     r.fields[1] = {"to", to.data()};
   } else {
     const char* begin = opening(event.kind);
-    const bool said = event.kind == EstimatorEvent::Kind::calibration_accepted || event.kind == EstimatorEvent::Kind::calibration_confirmed;
-    const char* why = said ? "" : event.why;
+    const char* why = event.kind == EstimatorEvent::Kind::calibration_accepted ? "" : event.why;
     std::array<char, 256> text{};
-    (void)std::snprintf(text.data(), text.size(), "%s%s%s", begin, *begin != 0 && *why != 0 ? ": " : "", why);
+    if (event.kind == EstimatorEvent::Kind::calibration_contradicted)
+      (void)std::snprintf(text.data(), text.size(), "%s: its depths are off by %.1f %%", why, event.value);
+    else
+      (void)std::snprintf(text.data(), text.size(), "%s%s%s", begin, *begin != 0 && *why != 0 ? ": " : "", why);
     r.set_sentence(text.data());
     r.fields[0] = {"value", event.value};
   }
@@ -152,6 +154,8 @@ RigNumbers RigNumbers::of(const RigCalibration& rig) noexcept {
   n.frames = rig.frames;
   n.reprojection_px = rig.reprojection_px;
   n.scale_sigma = rig.scale_sigma;
+  n.inflation = rig.inflation;
+  n.covariance = rig.covariance;
   return n;
 }
 
@@ -175,6 +179,8 @@ RigCalibration RigNumbers::rig() const noexcept {
   r.frames = frames;
   r.reprojection_px = reprojection_px;
   r.scale_sigma = scale_sigma;
+  r.inflation = inflation;
+  r.covariance = covariance;
   return r;
 }
 
@@ -190,6 +196,12 @@ CalibrationRecord CalibrationRecord::of(const CalibrationDecision& d) noexcept {
   r.held_out_before_px = d.held_out_before_px;
   r.held_out_after_px = d.held_out_after_px;
   r.solve_ms = d.solve_ms;
+  r.learnt = d.cause == CalibrationCause::refinement || d.cause == CalibrationCause::contradicted;
+  r.judged_depth_m = d.judged_depth_m;
+  r.depth_sigma_percent = d.depth_sigma_percent;
+  r.depth_difference_percent = d.depth_difference_percent;
+  r.verified = d.verified;
+  r.lenses = d.lenses;
   r.rig = RigNumbers::of(d.calibration);
   return r;
 }

@@ -85,7 +85,8 @@ struct RigNumbers {
   double baseline = 0, baseline_sigma = 0;
   Stamp found{};
   int frames = 0;
-  double reprojection_px = 0, scale_sigma = 0;
+  double reprojection_px = 0, scale_sigma = 0, inflation = 0;
+  RigCovariance covariance{};
 
   [[nodiscard]] static RigNumbers of(const RigCalibration& rig) noexcept;
   [[nodiscard]] RigCalibration rig() const noexcept;
@@ -102,6 +103,9 @@ struct CalibrationRecord {
   std::uint64_t onset_frame = 0;
   double held_out_before_px = 0, held_out_after_px = 0;
   double solve_ms = 0;
+  bool learnt = false;  // what the drive measured while it went on: not accepted is no rejection, the one in use fits as well
+  double judged_depth_m = 0, depth_sigma_percent = 0, depth_difference_percent = 0;  // as CalibrationDecision has them
+  bool verified = false, lenses = false;
   RigNumbers rig{};
 
   [[nodiscard]] static CalibrationRecord of(const CalibrationDecision& decision) noexcept;

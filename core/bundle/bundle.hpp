@@ -69,8 +69,6 @@ struct BundleLengthConstraint {
   double sigma = 0;   // m, > 0, with `measured`
 };
 
-inline constexpr int kIntrinsicsSize = 9;  // fx fy cx cy d0 … d4, the order of Camera::intrinsics_jacobian
-
 /// One camera's intrinsics in the adjustment (stereo_calibration only).
 struct BundleIntrinsics {
   std::uint16_t free = 0;                             // bit i: parameter i is estimated
@@ -81,10 +79,18 @@ struct BundleIntrinsics {
                                        // negative: the default, 0.1 % of a focal length and 0.5 px of a principal point
 };
 
+/// What is known of θ_S from earlier solves (stereo_calibration only): ½ weight δᵀ C⁻¹ δ over the parameters that are free here.
+struct BundleSharedPrior {
+  const RigCalibration* rig = nullptr;  // mean and `covariance`; null: nothing is known. Rows without a variance: nothing is known of them
+  double weight = 1;  // how much more a solve believes its tracks than it may: what is known weighs as much more, > 0
+};
+
 struct BundleOptions {
   BundleConfiguration configuration = BundleConfiguration::stereo_odometry;
   std::array<BundleLengthConstraint, kMaxCameras> length{};  // [k] of camera k ≥ 1; read in stereo_calibration
   std::array<BundleIntrinsics, kMaxCameras> intrinsics{};    // read in stereo_calibration
+  BundleSharedPrior shared_prior{};
+  double shared_errors = 1;  // times the clusters' variance: what tracks of one surface share and a cluster a track does not see, > 0
   BundleLoss loss = BundleLoss::none;
   double loss_threshold = 2.0;      // sigmas, > 0; Huber: where it turns linear; Cauchy: scale
   int max_steps = 30;               // solver steps tried, accepted or not, 1 … 1000
@@ -149,9 +155,11 @@ struct BundleResult {
   bool has_covariance = false;                       // asked for, and the undamped system is positive definite
   double sigma0_squared = 0;                         // Σ w |ε|²/σ² over the degrees of freedom: 1 if inverse_sigma is true
   std::array<Mat6, kMaxCameras> covariance_white{};  // [k] of T_camera_left[k]: σ̂² H⁻¹
-  std::array<Mat6, kMaxCameras> covariance_noise{};  // cluster-robust, one cluster a track
+  std::array<Mat6, kMaxCameras> covariance_noise{};  // cluster-robust, one cluster a track, times shared_errors; priors as they are
   std::array<Mat6, kMaxCameras> covariance_wide{};   // covariance_noise + what the held intrinsics may be off by
-  std::array<std::array<double, kIntrinsicsSize>, kMaxCameras> intrinsics_sigma{};  // of the free ones, from the white covariance
+  std::array<std::array<double, kIntrinsicsSize>, kMaxCameras> intrinsics_sigma{};  // of the free ones, from covariance_noise
+  RigCovariance covariance{};  // covariance_wide of all of θ_S together, with what is held but uncertain
+  double inflation = 1;        // mean over θ_S of the variance by clusters over the one that the solve itself believes (H⁻¹)
 
   bool has_pose_covariance = false;
   std::uint16_t pose = 0;               // whose

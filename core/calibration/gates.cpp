@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "core/calibration/health.hpp"
 #include "core/camera/camera.hpp"
 #include "core/geometry/epipolar.hpp"
 #include "core/math/so3.hpp"
@@ -16,6 +17,7 @@ constexpr double kBaselineOfSigmas = 0.75;  // m, for which the wanted sigma of 
 constexpr int kFewestHeldOut = 3;           // frames that say anything
 constexpr double kChance = 2.0;             // standard errors
 constexpr double kWorstFit = 1.5;           // px: matches of frames not in the solve, median
+constexpr double kCertain = 3.0;            // sigmas of depth by which a calibration is contradicted
 constexpr double kNeedsBaselines = 3.0;     // travelled, besides needs_motion_m
 
 /// Median distance to the epipolar lines of one frame's matches, px; negative: hardly a match.
@@ -81,6 +83,27 @@ bool fits_better(const TrackLog& log, std::uint64_t after, const RigCalibration&
   return mean > kChance * std::sqrt(variance / (n - 1));
 }
 
+Assessment assess(const RigCalibration& measured, const RigCalibration& claimed, const TrackLog& log, std::uint64_t after,
+                  const CalibrationOptions& o, double pixel_sigma) noexcept {
+  Assessment a;
+  double worst = -1;
+  for (int k = 1; k < measured.cameras; ++k) {
+    const double depth = judged_depth_m(measured, k, o, pixel_sigma);
+    const double sigma = depth_error_percent(measured, k, depth), difference = depth_difference_percent(measured, claimed, k, depth);
+    const double all = std::hypot(sigma, difference);
+    if (all <= worst) continue;
+    worst = all;
+    a.depth_m = depth;
+    a.sigma_percent = sigma;
+    a.difference_percent = difference;
+  }
+  a.better = fits_better(log, after, measured, claimed);
+  a.worse = fits_better(log, after, claimed, measured);
+  a.confirmed = worst <= o.tolerated_depth_percent;
+  a.contradicted = a.difference_percent > o.tolerated_depth_percent && a.difference_percent > kCertain * a.sigma_percent;
+  return a;
+}
+
 const char* reason(Gate gate) noexcept {
   switch (gate) {
     case Gate::open:
@@ -105,6 +128,8 @@ const char* reason(Gate gate) noexcept {
       return "frames that were not used contradict it";
     case Gate::no_better:
       return "the calibration in use fits as well";
+    case Gate::depth_unknown:
+      return "the tracks do not hold the depth well enough yet";
   }
   return "";
 }
@@ -121,7 +146,10 @@ double sigma_excess(const RigCalibration& rig, const CalibrationOptions& o) noex
   return worst;
 }
 
-Gate ask_gates(const GateQuestion& q, const CalibrationOptions& o) noexcept {
+namespace {
+
+/// What has to be so whatever was estimated.
+Gate ask_common_gates(const GateQuestion& q, const CalibrationOptions& o) noexcept {
   constexpr double kDegree = std::numbers::pi / 180.0;
   const RigSolution& s = *q.solution;
   if (s.status != RigSolveStatus::ok) return Gate::not_solved;
@@ -136,10 +164,24 @@ Gate ask_gates(const GateQuestion& q, const CalibrationOptions& o) noexcept {
   }
   if (s.travelled_m < std::max(o.needs_motion_m, kNeedsBaselines * s.rig.baseline)) return Gate::needs_motion;
   if (s.near < o.needs_near_points) return Gate::needs_near_structure;
-  if (sigma_excess(s.rig, o) > (q.window_full ? kFullWindow : 1.0)) return Gate::sigmas_too_large;
+  return Gate::open;
+}
+
+}  // namespace
+
+Gate ask_gates(const GateQuestion& q, const CalibrationOptions& o) noexcept {
+  const RigSolution& s = *q.solution;
+  const Gate common = ask_common_gates(q, o);
+  if (common != Gate::open) return common;
+  if (q.lenses) {
+    for (int k = 1; k < s.rig.cameras; ++k)
+      if (depth_error_percent(s.rig, k, judged_depth_m(s.rig, k, o, q.pixel_sigma)) > o.usable_depth_percent) return Gate::depth_unknown;
+  } else if (sigma_excess(s.rig, o) > (q.window_full ? kFullWindow : 1.0)) {
+    return Gate::sigmas_too_large;
+  }
   const HeldOut fit = held_out(*q.log, s.newest, s.rig);
   if (fit.frames >= kFewestHeldOut && fit.median_px > kWorstFit) return Gate::does_not_fit;
-  if (q.in_use != nullptr && !fits_better(*q.log, s.newest, s.rig, *q.in_use)) return Gate::no_better;
+  if (q.in_use != nullptr && q.must_be_better && !fits_better(*q.log, s.newest, s.rig, *q.in_use)) return Gate::no_better;
   return Gate::open;
 }
 

@@ -23,6 +23,21 @@ inline constexpr std::size_t kHeldOutFrames = 12, kHeldOutMatches = 150;
 [[nodiscard]] bool fits_better(const TrackLog& log, std::uint64_t after, const RigCalibration& better,
                                const RigCalibration& worse) noexcept;
 
+/// What a drive's own measurement of the rig says of the calibration in use (METHOD §6.4).
+struct Assessment {
+  double depth_m = 0;             // where it is judged: judged_depth_m()
+  double sigma_percent = 0;       // of the measured calibration's depth there, 1 sigma
+  double difference_percent = 0;  // of the claimed one from the measured, root mean over the image
+  bool better = false;            // the measured one fits frames that were not used better, by more than chance
+  bool worse = false;             // or worse
+  bool confirmed = false;         // the claim holds to the tolerated depth error
+  bool contradicted = false;      // it certainly does not
+};
+
+/// The worst of the rig's further cameras. `log` with frames after `after` that `measured` does not rest on. Threads pure.
+[[nodiscard]] Assessment assess(const RigCalibration& measured, const RigCalibration& claimed, const TrackLog& log, std::uint64_t after,
+                                const CalibrationOptions& options, double pixel_sigma) noexcept;
+
 enum class Gate : std::uint8_t {
   open,
   not_solved,
@@ -35,6 +50,7 @@ enum class Gate : std::uint8_t {
   out_of_step,
   does_not_fit,  // frames not in the solve contradict it
   no_better,     // than the calibration in use: that one is kept
+  depth_unknown,  // with the lenses free the tracks do not hold the depth yet
 };
 /// The sentence for events and calibrations.csv; empty for `open`.
 [[nodiscard]] const char* reason(Gate gate) noexcept;
@@ -44,6 +60,9 @@ struct GateQuestion {
   const RigCalibration* nominal = nullptr;
   const RigCalibration* in_use = nullptr;  // null: there is none
   const TrackLog* log = nullptr;           // with the frames since the snapshot
+  bool lenses = false;                     // they were free: depth is judged by their joint covariance, not the transform's single sigmas
+  double pixel_sigma = 0.15;               // px, of a tracked corner: judged_depth_m()
+  bool must_be_better = true;              // than `in_use`, on frames that were not used
   bool window_full = false;                // max_frames were used, or no more will come: three times the sigmas are enough
 };
 

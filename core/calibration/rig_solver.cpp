@@ -20,10 +20,18 @@ constexpr double kFirstCut = 6.0, kLastCut = 4.0;  // residual scales beyond whi
 // Tracks on one surface share errors that a cluster a track does not see: variance of the transforms found on rendered drives over the
 // one by clusters (docs/calibration.md).
 constexpr double kSharedErrors = 2.5;
+constexpr double kUsualInflation = 6;  // of a calibration that does not say its own
 constexpr double kMedianOfTwo = 1.1774;  // median length of a vector of two standard normal numbers
 
 double milliseconds_since(std::chrono::steady_clock::time_point start) noexcept {
   return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
+}
+
+/// A lens with the sigmas of what was estimated; of the rest it keeps its own.
+Intrinsics with_sigmas(Intrinsics lens, const std::array<double, kIntrinsicsSize>& sigma) noexcept {
+  for (std::size_t i = 0; i < sigma.size(); ++i)
+    if (sigma[i] > 0) (i < 4 ? lens.sigma[i] : lens.distortion_sigma[i - 4]) = sigma[i];
+  return lens;
 }
 
 Vec2 pixel_of(const LoggedSighting& s, int k) noexcept { return s.raw[static_cast<std::size_t>(k)].cast<double>(); }
@@ -70,7 +78,7 @@ RigSolver::RigSolver(const CalibrationOptions& options, const MonitorOptions& mo
   across_ = BoundedVector<AcrossSighting>(arena.make<AcrossSighting>(features, "calibration matches"));
 }
 
-bool RigSolver::choose_candidate(RigSolution* s) noexcept {
+bool RigSolver::choose_candidate(const RigCalibration& rig) noexcept {
   const LoggedFrame* best = nullptr;
   for (std::size_t i = 0; i < log_.size(); ++i) {
     const LoggedFrame& f = log_.frame(i);
@@ -85,10 +93,30 @@ bool RigSolver::choose_candidate(RigSolution* s) noexcept {
     if (!T_camera_left_[c].finite() || !(T_camera_left_[c].t.norm() > 0)) return false;
   }
   // The known length is camera 1's; what the others were measured to goes with it.
-  const double factor = s->rig.baseline / T_camera_left_[1].t.norm();
+  const double factor = rig.baseline / T_camera_left_[1].t.norm();
   for (int k = 1; k < count_; ++k) T_camera_left_[static_cast<std::size_t>(k)].t *= factor;
   T_camera_left_[0] = {};
   return true;
+}
+
+bool RigSolver::begin_with(const RigSolveRequest& request) noexcept {
+  if (log_.empty()) return false;
+  if (!request.from_rig) return choose_candidate(request.rig);
+  T_camera_left_ = request.rig.T_camera_left;
+  return T_camera_left_[1].t.norm() > 0;
+}
+
+/// As many of the logged frames as there is room for, counted from the newest, so that it is in.
+void RigSolver::choose_frames() noexcept {
+  std::size_t sightings = 0;
+  for (std::size_t i = 0; i < log_.size(); ++i) sightings += log_.frame(i).sightings.size();
+  const std::size_t step = 1 + sightings * static_cast<std::size_t>(count_) / kMostObservations;
+  poses_.clear();
+  logged_.clear();
+  for (std::size_t i = (log_.size() - 1) % step; i < log_.size(); i += step) {
+    (void)poses_.push(log_.frame(i).T_left_world);
+    (void)logged_.push(static_cast<std::uint16_t>(i));
+  }
 }
 
 void RigSolver::sort_tracks() noexcept {
@@ -168,24 +196,48 @@ void RigSolver::make_points() noexcept {
   }
 }
 
-BundleOptions RigSolver::options_of(const RigCalibration& rig) const noexcept {
-  constexpr std::uint16_t kFocal = 0b0011, kAll = 0b1111;
+BundleOptions RigSolver::options_of(const RigSolveRequest& request) const noexcept {
+  constexpr std::uint16_t kFocal = 0b0011, kPinhole = 0b1111, kFourCoefficients = 0b1111'0000;  // k1 k2 p1 p2, or k1 … k4
+  const RigCalibration& rig = request.rig;
+  const bool lenses = request.freedom == RigFreedom::lenses;
   BundleOptions how;
   how.configuration = BundleConfiguration::stereo_calibration;
+  how.shared_errors = kSharedErrors;
   how.length[1] = {BundleLength::exact, rig.baseline, 0};
   for (int k = 2; k < count_; ++k) how.length[static_cast<std::size_t>(k)].kind = BundleLength::free;
   for (int k = 0; k < count_; ++k) {
     const auto c = static_cast<std::size_t>(k);
     const Intrinsics& lens = rig.intrinsics[c];
-    const std::array value = {lens.fx, lens.fy, lens.cx, lens.cy};
     BundleIntrinsics& out = how.intrinsics[c];
-    out.free = options_.refine_intrinsics != 0 ? kAll : k > 0 && options_.estimate_focal_lengths != 0 ? kFocal : std::uint16_t{0};
+    if (options_.refine_intrinsics != 0)
+      out.free = kPinhole;
+    else if (k > 0)
+      out.free = lenses ? kPinhole : options_.estimate_focal_lengths != 0 ? kFocal : std::uint16_t{0};
+    if (lenses) out.free = static_cast<std::uint16_t>(out.free | kFourCoefficients);
+    const std::array value = {lens.fx, lens.fy, lens.cx, lens.cy};
     for (std::size_t i = 0; i < 4; ++i) {
-      const double usual = i < 2 ? 0.01 * options_.focal_sigma_percent * value[i] : options_.principal_point_sigma_px;
+      const bool focal = i < 2;
+      const double usual = focal ? 0.01 * options_.focal_sigma_percent * value[i]
+                           : lenses && k > 0 ? options_.lens_centre_sigma_px
+                                             : options_.principal_point_sigma_px;
       out.prior_mean[i] = value[i];
       out.prior_sigma[i] = out.held_sigma[i] = lens.sigma[i] > 0 ? lens.sigma[i] : usual;
     }
+    for (std::size_t i = 0; i < 4; ++i) {
+      const bool tangential = lens.kind == CameraModelKind::pinhole_radtan && i >= 2;
+      const double given = lens.distortion_sigma[i];
+      out.prior_mean[4 + i] = lens.distortion[i];
+      out.prior_sigma[4 + i] = given > 0 ? given : tangential ? options_.tangential_sigma : options_.distortion_sigma;
+      out.held_sigma[4 + i] = given;
+    }
+    out.prior_mean[8] = lens.distortion[4];
+    if (request.known == nullptr) continue;
+    // What is known of the lenses already holds what a prior would add.
+    for (std::size_t i = 0; i < 8; ++i)
+      if (request.known->covariance.known(intrinsic_row(k) + static_cast<int>(i))) out.prior_sigma[i] = 0;
   }
+  if (request.known != nullptr)
+    how.shared_prior = {request.known, request.known->inflation > 0 ? request.known->inflation : kUsualInflation};
   return how;
 }
 
@@ -246,18 +298,17 @@ void RigSolver::write_result(const BundleResult& r, RigSolution* s) const noexce
   for (int k = 0; k < count_; ++k) {
     const auto c = static_cast<std::size_t>(k);
     const Intrinsics& lens = cameras_[c].intrinsics();
-    rig.intrinsics[c] = lens;
-    for (std::size_t i = 0; i < 4; ++i)
-      if (r.intrinsics_sigma[c][i] > 0) rig.intrinsics[c].sigma[i] = r.intrinsics_sigma[c][i];
+    rig.intrinsics[c] = with_sigmas(lens, r.intrinsics_sigma[c]);
     if (k == 0) continue;
     rig.T_camera_left[c] = {normalised(T_camera_left_[c].R), T_camera_left_[c].t};
-    const Mat6 noise = kSharedErrors * r.covariance_noise[c];
-    rig.covariance_wide[c] = noise + (r.covariance_wide[c] - r.covariance_noise[c]);
+    rig.covariance_wide[c] = r.covariance_wide[c];
     for (int i = 0; i < 6; ++i) {
-      rig.sigma_noise[c][static_cast<std::size_t>(i)] = std::sqrt(std::max(0.0, noise(i, i)));
-      rig.sigma_wide[c][static_cast<std::size_t>(i)] = std::sqrt(std::max(0.0, rig.covariance_wide[c](i, i)));
+      rig.sigma_noise[c][static_cast<std::size_t>(i)] = std::sqrt(std::max(0.0, r.covariance_noise[c](i, i)));
+      rig.sigma_wide[c][static_cast<std::size_t>(i)] = std::sqrt(std::max(0.0, r.covariance_wide[c](i, i)));
     }
   }
+  rig.covariance = r.covariance;
+  rig.inflation = r.inflation;
   rig.frames = s->frames;
   rig.found = log_.frame(log_.size() - 1).stamp;
   rig.reprojection_px = r.rms_px;
@@ -296,40 +347,16 @@ void RigSolver::look_for_lag(RigSolution* s) noexcept {
   }
 }
 
-RigSolution RigSolver::solve(const RigCalibration& rig) noexcept {
-  const auto start = std::chrono::steady_clock::now();
-  RigSolution s;
-  s.rig = rig;
-  for (int k = 0; k < count_; ++k) cameras_[static_cast<std::size_t>(k)] = Camera(rig.intrinsics[static_cast<std::size_t>(k)]);
-  if (log_.empty() || !choose_candidate(&s)) {
-    s.status = RigSolveStatus::no_candidate;
-    return s;
-  }
-  std::size_t sightings = 0;
-  for (std::size_t i = 0; i < log_.size(); ++i) sightings += log_.frame(i).sightings.size();
-  const std::size_t step = 1 + sightings * static_cast<std::size_t>(count_) / kMostObservations;
-  poses_.clear();
-  logged_.clear();
-  // Counted from the newest, so that it is in.
-  for (std::size_t i = (log_.size() - 1) % step; i < log_.size(); i += step) {
-    (void)poses_.push(log_.frame(i).T_left_world);
-    (void)logged_.push(static_cast<std::uint16_t>(i));
-  }
-  s.frames = static_cast<int>(poses_.size());
-  s.newest = log_.frame(log_.size() - 1).number;
-  make_points();
-  if (points_.size() < static_cast<std::size_t>(kLeastTracks)) return s;
-
-  BundleOptions how = options_of(rig);
+/// Huber, then Cauchy twice, each time without what lies beyond some scales of the residuals; covariances with the last.
+BundleResult RigSolver::adjust_robustly(BundleOptions how, RigSolution* s) noexcept {
   how.loss = BundleLoss::huber;
   how.loss_threshold = kHuber;
   how.max_steps = 12;
   how.cost_tolerance = 1e-3;
   BundleResult r = adjust(how);
-  s.steps = r.steps;
-  s.status = RigSolveStatus::not_converged;
+  s->steps = r.steps;
   for (const double cut : {kFirstCut, kLastCut}) {
-    if (!r.usable()) return s;
+    if (!r.usable()) return r;
     const double scale = residual_scale();
     drop_outliers(cut * scale);
     how.loss = BundleLoss::cauchy;
@@ -339,13 +366,36 @@ RigSolution RigSolver::solve(const RigCalibration& rig) noexcept {
     how.cost_tolerance = last ? 3e-6 : 1e-4;
     how.covariance = how.pose_covariance = last;
     r = adjust(how);
-    s.steps += r.steps;
+    s->steps += r.steps;
   }
+  return r;
+}
+
+RigSolution RigSolver::solve(const RigSolveRequest& request) noexcept {
+  const auto start = std::chrono::steady_clock::now();
+  RigSolution s;
+  s.rig = request.rig;
+  for (int k = 0; k < count_; ++k) {
+    const auto c = static_cast<std::size_t>(k);
+    cameras_[c] = Camera(request.rig.intrinsics[c]);
+  }
+  if (!begin_with(request)) {
+    s.status = RigSolveStatus::no_candidate;
+    return s;
+  }
+  choose_frames();
+  s.frames = static_cast<int>(poses_.size());
+  s.newest = log_.frame(log_.size() - 1).number;
+  make_points();
+  if (points_.size() < static_cast<std::size_t>(kLeastTracks)) return s;
+  s.status = RigSolveStatus::not_converged;
+  const BundleResult r = adjust_robustly(options_of(request), &s);
   if (!r.converged()) return s;
   describe(&s);
   s.status = r.has_covariance ? RigSolveStatus::ok : RigSolveStatus::not_observable;
   if (s.status == RigSolveStatus::ok) {
     write_result(r, &s);
+    if (request.known != nullptr) s.rig.frames += request.known->frames;
     look_for_lag(&s);
   }
   s.solve_ms = milliseconds_since(start);

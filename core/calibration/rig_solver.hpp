@@ -16,6 +16,20 @@ enum class RigSolveStatus : std::uint8_t {
   not_observable,  // converged, but the tracks leave some direction of the transform open
 };
 
+/// What a solve may move.
+enum class RigFreedom : std::uint8_t {
+  transforms,  // and further cameras' focal lengths, as the options say; lenses are taken as they are
+  lenses,      // also further cameras' intrinsics and distortion, and the left one's distortion (METHOD §6.1)
+};
+
+/// What to solve for and where to begin.
+struct RigSolveRequest {
+  RigCalibration rig{};  // cameras, intrinsics, baseline; T_camera_left with from_rig
+  RigFreedom freedom = RigFreedom::transforms;
+  bool from_rig = false;                  // begin with T_camera_left of `rig`; false: with those of the logged frame that fits best
+  const RigCalibration* known = nullptr;  // what earlier frames told, with its covariance; null: nothing
+};
+
 struct RigSolution {
   RigSolveStatus status = RigSolveStatus::too_few_tracks;
   RigCalibration rig{};      // the result: transforms, sigmas, intrinsics where they were estimated, frames, rms, scale_sigma
@@ -44,8 +58,8 @@ class RigSolver {
                                                  std::size_t features) noexcept;
 
   [[nodiscard]] TrackLog& log() noexcept { return log_; }
-  /// Of `rig` are read: cameras, intrinsics and baseline.
-  [[nodiscard]] RigSolution solve(const RigCalibration& rig) noexcept;
+  [[nodiscard]] RigSolution solve(const RigSolveRequest& request) noexcept;
+  [[nodiscard]] RigSolution solve(const RigCalibration& rig) noexcept { return solve(RigSolveRequest{rig}); }
 
  private:
   struct Reference {
@@ -54,11 +68,14 @@ class RigSolver {
     std::uint16_t sighting;
   };
   [[nodiscard]] static BundleCapacities capacities(const CalibrationOptions& options, int cameras, std::size_t features) noexcept;
-  [[nodiscard]] bool choose_candidate(RigSolution* s) noexcept;
+  [[nodiscard]] bool choose_candidate(const RigCalibration& rig) noexcept;
+  [[nodiscard]] bool begin_with(const RigSolveRequest& request) noexcept;
+  void choose_frames() noexcept;
   void sort_tracks() noexcept;
   void make_points() noexcept;
   [[nodiscard]] bool add_point(std::span<const Reference> track) noexcept;
-  [[nodiscard]] BundleOptions options_of(const RigCalibration& rig) const noexcept;
+  [[nodiscard]] BundleOptions options_of(const RigSolveRequest& request) const noexcept;
+  [[nodiscard]] BundleResult adjust_robustly(BundleOptions how, RigSolution* s) noexcept;
   [[nodiscard]] BundleResult adjust(const BundleOptions& how) noexcept;
   [[nodiscard]] double residual_scale() noexcept;
   void drop_outliers(double limit) noexcept;

@@ -7,7 +7,7 @@
 #include <stdexcept>
 #include <string>
 
-#include "core/estimator/rig_keeper.hpp"
+#include "core/estimator/online_calibrator.hpp"
 #include "core/estimator/transitions.hpp"
 #include "core/memory/fixed_vector.hpp"
 #include "core/odometry/odometry.hpp"
@@ -17,7 +17,6 @@ namespace {
 
 constexpr int kLostAfter = 3;  // frames without a pose in a row before the state says so
 
-constexpr int kConfirmedAfter = 30;         // frames that agree with a calibration from a file
 constexpr std::uint64_t kDriftFrames = 60;  // of a creeping rig that are taken for one
 constexpr int kUnmatchedAfter = 15;         // frames with good images that no scene can be made of with the calibration in use
 constexpr int kInStepAfter = 60;            // frames without a sign of the cameras being out of step, before that is over
@@ -85,6 +84,9 @@ const char* sentence_of(CalibrationCause cause) noexcept {
       return "the cameras' images are not of the same instant";
     case CalibrationCause::requested:
       return "a new calibration is asked for";
+    case CalibrationCause::refinement:
+    case CalibrationCause::contradicted:
+      break;  // no reason to seek one
   }
   return "";
 }
@@ -96,8 +98,8 @@ struct Estimator::Parts {
         BackgroundRunner& solver)
       : options(o),
         odometry(options.odometry, r, o.trust != CalibrationTrust::none, arena, runner, o.masks),
-        keeper(options, r, nominal, arena, solver),
-        confirmed(o.trust != CalibrationTrust::unconfirmed) {}
+        calibrator(options, r, nominal, arena, solver),
+        unconfirmed(o.trust == CalibrationTrust::unconfirmed) {}
 
   void transition(Trigger trigger, Stamp stamp) noexcept {
     const Transition* t = find_transition(state, trigger);
@@ -125,6 +127,8 @@ struct Estimator::Parts {
   void watch(const odometry::FrameOutcome& out, const RigFrame& frame) noexcept;
   void calibrate(const RigFrame& frame) noexcept;
   void take(const CalibrationDecision& decision, Stamp stamp) noexcept;
+  void take_learnt(const CalibrationDecision& decision, bool was_verified, Stamp stamp) noexcept;
+  void tell_verified(bool was_verified, const CalibrationDecision& decision, Stamp stamp) noexcept;
   void follow(const odometry::FrameOutcome& out, const RigFrame& frame) noexcept;
   void tell_missing(Stamp stamp) noexcept;
   void grade(const odometry::FrameOutcome& out, PoseSample* sample) const noexcept;
@@ -132,34 +136,36 @@ struct Estimator::Parts {
 
   EstimatorOptions options;
   odometry::Odometry odometry;
-  RigKeeper keeper;
+  OnlineCalibrator calibrator;
   State state = State::initialising;
   Stamp last{};
   std::uint64_t last_number = 0;
   bool any = false;
-  bool confirmed;          // the calibration in use is more than a file's word
+  bool unconfirmed;        // the calibration in use is the last drive's
   bool undecided = false;  // something is wrong with the rig, and not yet told what
+  bool verified = false;   // the calibration in use, when last decided about
   int out_of_step = 0;     // frames for which that is still believed
   int without_pose = 0;
   int unmatched_frames = 0;  // in a row
   Reason told_missing = Reason::none;
   std::atomic<bool> requested{false};
   FixedVector<EstimatorEvent, 16> events;         // a frame raises at most eight
-  FixedVector<CalibrationDecision, 2> decisions;  // two in finish() at most
+  FixedVector<CalibrationDecision, 3> decisions;  // three in finish() at most
 };
 
 void Estimator::Parts::doubt(CalibrationCause cause, std::uint64_t onset, const RigFrame& frame) noexcept {
   note(EstimatorEvent::Kind::rig_changed, frame.stamp, sentence_of(cause),
        static_cast<double>(frame.number - std::min(onset, frame.number)));
   transition(cause == CalibrationCause::requested ? Trigger::requested : Trigger::rig_changed, frame.stamp);
-  keeper.seek(cause, onset, frame.number);
+  calibrator.seek(cause, onset, frame.number);
+  verified = false;
   odometry.unlink();
 }
 
 /// What the monitors say of a frame posed with the calibration in use.
 void Estimator::Parts::watch(const odometry::FrameOutcome& out, const RigFrame& frame) noexcept {
   using K = calibration::MonitorVerdict::Kind;
-  const calibration::MonitorVerdict v = keeper.watch(odometry, out, frame);
+  const calibration::MonitorVerdict v = calibrator.watch(odometry, out, frame);
   undecided = v.undecided;
   if (v.kind == K::out_of_step) {
     if (out_of_step == 0) note(EstimatorEvent::Kind::rig_changed, frame.stamp, sentence_of(CalibrationCause::out_of_step), v.lag_frames);
@@ -174,38 +180,60 @@ void Estimator::Parts::watch(const odometry::FrameOutcome& out, const RigFrame& 
   }
   if (v.kind != K::quiet) {
     doubt(cause_of(v.kind), first_frame_of_use(v, frame.number), frame);
-  } else if (!confirmed && keeper.frames_agreed() >= kConfirmedAfter) {
-    confirmed = true;
-    note(EstimatorEvent::Kind::calibration_confirmed, frame.stamp, "the calibration of the last drive still fits", kConfirmedAfter);
   }
 }
 
-/// A calibration is sought: solves are started and decided.
+/// Solves are started and decided.
 void Estimator::Parts::calibrate(const RigFrame& frame) noexcept {
-  if (const auto decision = keeper.decide(frame.stamp, frame.number)) take(*decision, frame.stamp);
-  if ((state == State::parallel_monocular || state == State::recalibrating) && keeper.can_solve()) {
-    keeper.start_solve();
-    transition(Trigger::frames_enough, frame.stamp);
+  if (const auto decision = calibrator.decide(frame.stamp, frame.number)) take(*decision, frame.stamp);
+  const bool solves = state == State::parallel_monocular || state == State::recalibrating || state == State::stereo_odometry;
+  if (solves && calibrator.can_solve()) {
+    calibrator.start_solve();
+    if (calibrator.seeking()) transition(Trigger::frames_enough, frame.stamp);
   }
   tell_missing(frame.stamp);
 }
 
+/// What the drive has measured of the rig while it went on.
+void Estimator::Parts::take_learnt(const CalibrationDecision& decision, bool was_verified, Stamp stamp) noexcept {
+  if (decision.cause == CalibrationCause::contradicted && !was_verified)
+    note(EstimatorEvent::Kind::calibration_contradicted, stamp, "the calibration in use is not that of the rig",
+         decision.depth_difference_percent);
+  if (decision.accepted) {
+    note(EstimatorEvent::Kind::calibration_accepted, stamp, "a better calibration is adopted", decision.calibration.frames);
+    calibrator.refine(decision.calibration);
+    odometry.link(decision.calibration);
+    undecided = false;
+  }
+  tell_verified(was_verified, decision, stamp);
+}
+
+void Estimator::Parts::tell_verified(bool was_verified, const CalibrationDecision& decision, Stamp stamp) noexcept {
+  if (!calibrator.verified() || was_verified) return;
+  unconfirmed = false;
+  note(EstimatorEvent::Kind::calibration_confirmed, stamp, "the drive confirms the calibration in use", decision.depth_sigma_percent);
+}
+
 void Estimator::Parts::take(const CalibrationDecision& decision, Stamp stamp) noexcept {
   (void)decisions.push(decision);
+  const bool was_verified = verified;
+  verified = calibrator.verified();
+  if (decision.cause == CalibrationCause::refinement || decision.cause == CalibrationCause::contradicted)
+    return take_learnt(decision, was_verified, stamp);
   if (decision.accepted) {
     note(EstimatorEvent::Kind::calibration_accepted, stamp, "a calibration is accepted", decision.calibration.frames);
-    keeper.use(decision.calibration);
+    calibrator.use(decision.calibration, decision.lenses);
     odometry.link(decision.calibration);
-    confirmed = true;
     undecided = false;
     transition(Trigger::calibration_accepted, stamp);
+    tell_verified(was_verified, decision, stamp);
     return;
   }
   note(EstimatorEvent::Kind::calibration_rejected, stamp, decision.reason, decision.calibration.frames);
-  switch (keeper.last_gate()) {
+  switch (calibrator.last_gate()) {
     case calibration::Gate::no_better:
-      keeper.use(keeper.in_use());
-      odometry.link(keeper.in_use());
+      calibrator.keep();
+      odometry.link(calibrator.in_use());
       transition(Trigger::calibration_kept, stamp);
       break;
     case calibration::Gate::out_of_step:
@@ -217,7 +245,7 @@ void Estimator::Parts::take(const CalibrationDecision& decision, Stamp stamp) no
 }
 
 void Estimator::Parts::tell_missing(Stamp stamp) noexcept {
-  const Reason missing = keeper.missing();
+  const Reason missing = calibrator.missing();
   if (missing == told_missing) return;
   told_missing = missing;
   if (missing == Reason::needs_motion)
@@ -236,31 +264,31 @@ void Estimator::Parts::follow(const odometry::FrameOutcome& out, const RigFrame&
     unmatched_frames = 0;
     // Good images of which no scene can be made: then it is the rig that does not fit.
     note(EstimatorEvent::Kind::rig_changed, frame.stamp, sentence_of(CalibrationCause::collapse), kUnmatchedAfter);
-    keeper.seek(CalibrationCause::collapse, frame.number, frame.number);
+    calibrator.seek(CalibrationCause::collapse, frame.number, frame.number);
     odometry.unlink();
     odometry.forget_rig();
   }
   if (!out.posed) {
     if (++without_pose == kLostAfter) {
       transition(Trigger::pose_lost, frame.stamp);
-      keeper.scene_lost();
+      calibrator.scene_lost();
     }
     return;
   }
   without_pose = 0;
   if (state == State::lost)
     transition(odometry.linked() == odometry::Link::linked ? Trigger::pose_found
-               : keeper.calibrated()                       ? Trigger::pose_found_doubtful
+               : calibrator.calibrated()                       ? Trigger::pose_found_doubtful
                                                            : Trigger::pose_found_uncalibrated,
                frame.stamp);
   if (state == State::initialising) {
     transition(Trigger::pair_found, frame.stamp);
-    keeper.seek(CalibrationCause::from_scratch, 0, frame.number);
+    calibrator.seek(CalibrationCause::from_scratch, 0, frame.number);
   }
   if (out.restarted) {
     note(EstimatorEvent::Kind::scene_restarted, frame.stamp, "the scene was built anew; the way since the last pose is extrapolated",
          out.gap_s);
-    keeper.scene_lost();
+    calibrator.scene_lost();
   }
   if (out.relocalised) note(EstimatorEvent::Kind::relocalised, frame.stamp, "found again among the window's points", 0);
 }
@@ -276,9 +304,9 @@ void Estimator::Parts::grade(const odometry::FrameOutcome& out, PoseSample* samp
   } else if (sample->status == PoseStatus::ok && (undecided || state == State::recalibrating)) {
     sample->status = PoseStatus::degraded;
     sample->reason = Reason::recalibrating;
-  } else if (sample->status == PoseStatus::ok && !confirmed) {
+  } else if (sample->status == PoseStatus::ok && options.online && !calibrator.verified()) {
     sample->status = PoseStatus::degraded;
-    sample->reason = Reason::unconfirmed;
+    sample->reason = unconfirmed ? Reason::unconfirmed : Reason::unverified_calibration;
   } else if (out.reason == Reason::uncalibrated) {
     sample->reason = why_uncalibrated();
   }
@@ -286,15 +314,15 @@ void Estimator::Parts::grade(const odometry::FrameOutcome& out, PoseSample* samp
 
 /// What a pose of cameras that are not linked says of its calibration: the most particular that is known.
 Reason Estimator::Parts::why_uncalibrated() const noexcept {
-  if (keeper.last_gate() == calibration::Gate::cameras_swapped) return Reason::cameras_swapped;
+  if (calibrator.last_gate() == calibration::Gate::cameras_swapped) return Reason::cameras_swapped;
   if (out_of_step > 0) return Reason::out_of_step;
-  if (keeper.missing() != Reason::none) return keeper.missing();
+  if (calibrator.missing() != Reason::none) return calibrator.missing();
   return state == State::parallel_monocular || state == State::calibrating ? Reason::uncalibrated : Reason::recalibrating;
 }
 
 std::size_t Estimator::memory_needed(const EstimatorOptions& options, const RigCalibration& rig) {
   check(options, rig);
-  return odometry::Odometry::memory_needed(options.odometry, rig, options.masks) + RigKeeper::memory_needed(options, rig) + sizeof(Parts) +
+  return odometry::Odometry::memory_needed(options.odometry, rig, options.masks) + OnlineCalibrator::memory_needed(options, rig) + sizeof(Parts) +
          2 * kCacheLine;
 }
 
@@ -307,7 +335,7 @@ Estimator::Estimator(const EstimatorOptions& options, const RigCalibration& rig,
 }
 
 Estimator::~Estimator() {
-  parts_->keeper.finish();
+  parts_->calibrator.finish();
   parts_->~Parts();
 }
 
@@ -328,7 +356,7 @@ PoseSample Estimator::process(const RigFrame& frame) noexcept {
   p.any = true;
   p.last = frame.stamp;
   p.last_number = frame.number;
-  if (p.state == State::initialising && p.keeper.calibrated()) p.transition(Trigger::calibration_given, frame.stamp);
+  if (p.state == State::initialising && p.calibrator.calibrated()) p.transition(Trigger::calibration_given, frame.stamp);
   if (p.requested.exchange(false, std::memory_order_relaxed) && p.state == State::stereo_odometry && p.options.online)
     p.doubt(CalibrationCause::requested, frame.number, frame);
 
@@ -338,9 +366,9 @@ PoseSample Estimator::process(const RigFrame& frame) noexcept {
     if (out.posed) {
       const bool linked = p.odometry.linked() == odometry::Link::linked;
       if (linked && p.state == State::stereo_odometry && !out.restarted) p.watch(out, frame);
-      p.keeper.log(p.odometry, out, frame);
+      p.calibrator.log(p.odometry, out, frame);
     }
-    if (p.keeper.seeking()) p.calibrate(frame);
+    p.calibrate(frame);
   }
   sample.state = p.state;
   p.grade(out, &sample);
@@ -358,13 +386,15 @@ void Estimator::finish() noexcept {
   Parts& p = *parts_;
   p.events.clear();
   p.decisions.clear();
-  // One solve may be under way; what it lacked, the frames since then may give.
-  for (int attempt = 0; attempt < 2 && p.keeper.seeking(); ++attempt) {
-    if (!p.keeper.solving()) {
-      if (!p.keeper.start_last_solve()) return;
-      p.transition(Trigger::frames_enough, p.last);
+  if (!p.options.online) return;
+  // One solve may be under way, what it lacked the frames since then may give, and what is known by then all frames can make better.
+  constexpr int kLastSolves = 3;
+  for (int attempt = 0; attempt < kLastSolves; ++attempt) {
+    if (!p.calibrator.solving()) {
+      if (!p.calibrator.start_last_solve()) return;
+      if (p.calibrator.seeking()) p.transition(Trigger::frames_enough, p.last);
     }
-    if (const auto decision = p.keeper.decide_now(p.last, p.last_number)) p.take(*decision, p.last);
+    if (const auto decision = p.calibrator.decide_now(p.last, p.last_number)) p.take(*decision, p.last);
   }
 }
 
@@ -372,7 +402,9 @@ std::span<const EstimatorEvent> Estimator::events() const noexcept { return part
 std::span<const CalibrationDecision> Estimator::calibrations() const noexcept { return parts_->decisions.span(); }
 void Estimator::request_recalibration() noexcept { parts_->requested.store(true, std::memory_order_relaxed); }
 State Estimator::state() const noexcept { return parts_->state; }
-const RigCalibration& Estimator::calibration() const noexcept { return parts_->keeper.in_use(); }
-bool Estimator::calibrated() const noexcept { return parts_->keeper.calibrated(); }
+const RigCalibration& Estimator::calibration() const noexcept { return parts_->calibrator.in_use(); }
+bool Estimator::verified() const noexcept { return parts_->calibrator.verified(); }
+const calibration::TrackLog& Estimator::tracks() const noexcept { return parts_->calibrator.tracks(); }
+bool Estimator::calibrated() const noexcept { return parts_->calibrator.calibrated(); }
 
 }  // namespace vergence

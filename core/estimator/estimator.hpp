@@ -6,6 +6,7 @@
 
 #include "core/calibration/monitor.hpp"
 #include "core/calibration/options.hpp"
+#include "core/calibration/track_log.hpp"
 #include "core/memory/arena.hpp"
 #include "core/odometry/options.hpp"
 #include "core/types/calibration.hpp"
@@ -18,8 +19,8 @@ namespace vergence {
 
 /// What the calibration handed to the estimator is worth (METHOD §3).
 enum class CalibrationTrust : std::uint8_t {
-  given,        // in use from the first frame
-  unconfirmed,  // of a state file: in use, poses `degraded: unconfirmed` until the monitor has seen 30 frames that agree
+  given,        // in use from the first frame, poses `degraded: unverified_calibration` until the drive has confirmed it
+  unconfirmed,  // of a state file: the same, `degraded: unconfirmed`
   none,         // from scratch: of the rig only the intrinsics and the baseline length are read
 };
 
@@ -49,7 +50,8 @@ struct EstimatorEvent {
     relocalised,
     dropped,
     rig_changed,            // the monitor raised; value: frames since the onset, or the lag in frames of cameras out of step
-    calibration_confirmed,  // a state file's calibration agrees; value: frames
+    calibration_confirmed,     // the drive has confirmed the calibration in use; value: its depth error, %
+    calibration_contradicted,  // the drive has shown that it is not the rig's; value: how far off its depths are, %
     calibration_accepted,   // value: frames it was solved from
     calibration_rejected,   // why: the reason; value: frames
     calibration_waits,      // why: what is missing to calibrate
@@ -101,6 +103,10 @@ class Estimator {
   /// The calibration in use; before there is one, the rig given, without T_camera_left.
   [[nodiscard]] const RigCalibration& calibration() const noexcept;
   [[nodiscard]] bool calibrated() const noexcept;
+  /// The drive itself has confirmed the calibration in use to the tolerated depth error (METHOD §6.4).
+  [[nodiscard]] bool verified() const noexcept;
+  /// The newest moving frames with their tracks; empty without `online`. Valid until the next process().
+  [[nodiscard]] const calibration::TrackLog& tracks() const noexcept;
 
  private:
   struct Parts;

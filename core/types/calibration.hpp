@@ -1,5 +1,6 @@
 #pragma once
 #include <array>
+#include <cstddef>
 #include <cstdint>
 
 #include "core/math/se3.hpp"
@@ -23,12 +24,42 @@ struct Intrinsics {
   double fx = 0, fy = 0, cx = 0, cy = 0;  // px
   std::array<double, 5> distortion{};     // radtan: k1 k2 p1 p2 k3; equidistant: k1 k2 k3 k4, 0
   std::array<double, 4> sigma{};          // of fx fy cx cy, px; 0: not given
+  std::array<double, 5> distortion_sigma{};  // of the coefficients; 0: not given
 
   [[nodiscard]] bool has_distortion() const noexcept {
     for (const double d : distortion)
       if (d != 0.0) return true;
     return kind != CameraModelKind::pinhole_radtan;
   }
+};
+
+inline constexpr int kIntrinsicsSize = 9;                                          // fx fy cx cy d0 … d4
+inline constexpr int kExtrinsicsSize = 6 * (kMaxCameras - 1);                      // φ, τ of every further camera
+inline constexpr int kRigSize = kExtrinsicsSize + kIntrinsicsSize * kMaxCameras;  // all that a calibration may estimate
+
+/// First row of camera k's transform (k ≥ 1) and of its intrinsics among a rig's parameters.
+[[nodiscard]] constexpr int extrinsic_row(int k) noexcept { return 6 * (k - 1); }
+[[nodiscard]] constexpr int intrinsic_row(int k) noexcept { return kExtrinsicsSize + kIntrinsicsSize * k; }
+
+/// Covariance of all of a rig's parameters together: transforms as left perturbations (φ rad, τ m), then fx fy cx cy (px) and distortion
+/// of each camera. Zero rows: held, or not known. Symmetric; the lower triangle is kept.
+class RigCovariance {
+ public:
+  [[nodiscard]] double operator()(int row, int column) const noexcept { return packed_[place(row, column)]; }
+  void set(int row, int column, double value) noexcept { packed_[place(row, column)] = value; }
+  [[nodiscard]] bool known(int row) const noexcept { return (*this)(row, row) > 0; }
+  [[nodiscard]] bool empty() const noexcept {
+    for (int i = 0; i < kRigSize; ++i)
+      if (known(i)) return false;
+    return true;
+  }
+
+ private:
+  [[nodiscard]] static constexpr std::size_t place(int row, int column) noexcept {
+    const int r = row < column ? column : row, c = row < column ? row : column;
+    return static_cast<std::size_t>(r * (r + 1) / 2 + c);
+  }
+  std::array<double, kRigSize*(kRigSize + 1) / 2> packed_{};
 };
 
 /// A rig: intrinsics of every camera and where each sits relative to camera 0 (`left`).
@@ -43,13 +74,15 @@ struct RigCalibration {
   std::array<std::array<double, 6>, kMaxCameras> sigma_wide{};   // the same with uncertain intrinsics
   // zero: not given (Eigen leaves a Mat6 without initialiser undefined)
   std::array<Mat6, kMaxCameras> covariance_wide{Mat6::Zero(), Mat6::Zero(), Mat6::Zero(), Mat6::Zero()};
+  RigCovariance covariance{};  // of all parameters together, wide: what a depth is off by follows from it; empty: not given
   double baseline = 0;        // m, |t| of camera 1 as measured once
   double baseline_sigma = 0;  // m; 0: exact
 
   Stamp found{};               // when the stereo transform was found; 0: given
-  int frames = 0;              // rig frames it was found from
+  int frames = 0;              // rig frames it was found from, all that its information is of
   double reprojection_px = 0;  // root mean square of that solve
   double scale_sigma = 0;      // relative, of the odometry's scale
+  double inflation = 0;        // variance of what was found over what its solve believes: weighs it as the next one's prior; 0: not known
 };
 
 }  // namespace vergence

@@ -26,7 +26,7 @@ std::string_view to_string(PoseStatus s) noexcept {
 }
 
 std::string_view to_string(Reason r) noexcept {
-  static constexpr std::array<std::string_view, 22> names = {"",
+  static constexpr std::array<std::string_view, 23> names = {"",
                                                              "no_image",
                                                              "image_dark",
                                                              "image_repeated",
@@ -41,6 +41,7 @@ std::string_view to_string(Reason r) noexcept {
                                                              "weak_geometry",
                                                              "moving_scene",
                                                              "unconfirmed",
+                                                             "unverified_calibration",
                                                              "recalibrating",
                                                              "uncalibrated",
                                                              "out_of_step",

@@ -34,7 +34,8 @@ enum class Reason : std::uint8_t {
   scene_restarted,       // the map was rebuilt; the way across the gap was extrapolated
   weak_geometry,         // the points do not hold the pose well in some direction
   moving_scene,          // more outliers than a rigid scene has
-  unconfirmed,           // calibration from a state file that the monitor has not confirmed
+  unconfirmed,           // calibration from a state file that the drive has not confirmed yet
+  unverified_calibration,  // the drive has not yet confirmed the calibration that the pose stands on
   recalibrating,         // the rig no longer fits its calibration
   uncalibrated,          // no calibration yet: each camera's pose is found for itself, the scale is the last pair's
   out_of_step,           // a camera's images are of another instant than the others'

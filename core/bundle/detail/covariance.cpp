@@ -1,5 +1,6 @@
 #include "core/bundle/detail/covariance.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 #include <Eigen/Cholesky>
@@ -9,8 +10,7 @@
 namespace vergence::detail {
 namespace {
 
-using Shared = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::ColMajor, kMaxShared, kMaxShared>;
-using SharedVector = Eigen::Matrix<double, Eigen::Dynamic, 1, Eigen::ColMajor, kMaxShared, 1>;
+using Shared = SharedMatrix;
 using Index = Eigen::Index;
 
 constexpr double kPivotTolerance = 1e-12;
@@ -142,35 +142,67 @@ class TrackGradient {
   std::size_t cameras_, first_, ld_;
 };
 
-/// What is known beside the tracks counts as clusters of its own, with the variance it claims.
-void add_prior_clusters(const SharedLayout& s, const BundleProblem& problem, const BundleOptions& options, const BundleState& state,
-                        Shared* meat) noexcept {
+/// What is known beside the tracks: its information in H, and the variance that it brings into the gradient (clusters of their own).
+struct KnownBeside {
+  Shared information, variance;
+};
+
+KnownBeside known_beside(const SharedLayout& s, const BundleProblem& problem, const BundleOptions& options, const BundleState& state,
+                         const System& system) noexcept {
+  KnownBeside known{Shared::Zero(s.size, s.size), Shared::Zero(s.size, s.size)};
   for (std::size_t k = 0; k < problem.cameras.size(); ++k) {
     if (s.extrinsic[k] >= 0 && options.length[k].kind == BundleLength::measured) {
       const Transform& T = state.T_camera_left[k];
       const Vec3 j = T.R.transpose() * T.t.normalized() / options.length[k].sigma;
-      meat->block<3, 3>(s.extrinsic[k], s.extrinsic[k]) += j * j.transpose();
+      known.information.block<3, 3>(s.extrinsic[k], s.extrinsic[k]) += j * j.transpose();
     }
     for (int i = 0; i < s.intrinsic_count[k]; ++i) {
       const std::size_t parameter = s.intrinsic_index[k][i];
       const double sigma = options.intrinsics[k].prior_sigma[parameter];
       if (((options.intrinsics[k].free >> parameter) & 1U) != 0 && sigma > 0)
-        (*meat)(s.intrinsic[k] + i, s.intrinsic[k] + i) += 1.0 / (sigma * sigma);
+        known.information(s.intrinsic[k] + i, s.intrinsic[k] + i) += 1.0 / (sigma * sigma);
     }
   }
+  known.variance = known.information;
+  if (system.shared_prior().used()) {
+    known.information += system.shared_prior().information();
+    known.variance += system.shared_prior().weight() * system.shared_prior().information();
+  }
+  return known;
 }
 
-/// From the rows of camera k to (φ, τ) of the left perturbation R ← Exp(φ) R, t ← t + τ.
+/// From the rows of camera k to (φ, τ) of the left perturbation R ← Exp(φ) R, t ← t + τ; its first columns are the rows that there are.
+Mat6 to_published(const SharedLayout& s, const KernelCamera& camera, const Transform& T, int k) noexcept {
+  Mat6 turn = Mat6::Zero();
+  turn.topRightCorner<3, 3>() = T.R;
+  turn.bottomLeftCorner<3, 3>() = T.R;
+  return turn * extrinsic_basis(s, camera, k);
+}
+
 Mat6 published(const Shared& estimated, const SharedLayout& s, const KernelCamera& camera, const Transform& T, int k) noexcept {
   const int size = s.exact[k] ? 5 : 6;
   Mat6 rows = Mat6::Zero();
   rows.topLeftCorner(size, size) = estimated.block(s.extrinsic[k], s.extrinsic[k], size, size);
-  const Mat6 J = extrinsic_basis(s, camera, k);
-  Mat6 turn = Mat6::Zero();
-  turn.topRightCorner<3, 3>() = T.R;
-  turn.bottomLeftCorner<3, 3>() = T.R;
-  const Mat6 to = turn * J;
+  const Mat6 to = to_published(s, camera, T, k);
   return to * rows * to.transpose();
+}
+
+/// A row of θ_S as rows of RigCovariance with their factors.
+struct PublishedRow {
+  int first = 0, count = 0;
+  double factor[6]{};
+};
+
+/// The joint covariance of what is estimated and what is held, in RigCovariance's order.
+void publish_all(const Shared& joint, const PublishedRow* rows, RigCovariance* out) noexcept {
+  const auto n = static_cast<int>(joint.rows());
+  for (int a = 0; a < n; ++a)
+    for (int b = 0; b < n; ++b)
+      for (int i = 0; i < rows[a].count; ++i)
+        for (int j = 0; j < rows[b].count; ++j) {
+          const int r = rows[a].first + i, c = rows[b].first + j;
+          if (c <= r) out->set(r, c, (*out)(r, c) + rows[a].factor[i] * rows[b].factor[j] * joint(a, b));
+        }
 }
 
 /// Σ w|ε|²/σ² over what is left after the parameters.
@@ -217,21 +249,35 @@ void shared_covariance(BundleWorkspace& w, const BundleProblem& problem, const B
     const SharedVector s = gradient(problem, i);
     meat.noalias() += s.lazyProduct(s.transpose());
   }
-  add_prior_clusters(layout, problem, options, state, &meat);
+  const KnownBeside known = known_beside(layout, problem, options, state, system);
   Shared own_meat(p.estimated_count, p.estimated_count);
+  double clustered = 0, believed = 0;
   for (int r = 0; r < p.estimated_count; ++r)
-    for (int c = 0; c < p.estimated_count; ++c) own_meat(r, c) = meat(p.estimated[r], p.estimated[c]);
+    for (int c = 0; c < p.estimated_count; ++c) {
+      const int row = p.estimated[r], column = p.estimated[c];
+      const double of_tracks = options.shared_errors * meat(row, column);
+      own_meat(r, c) = of_tracks + known.variance(row, column);
+      clustered += inverse(r, c) * of_tracks;
+      believed += inverse(r, c) * (inner(r, c) - known.information(row, column));
+    }
+  result->inflation = believed > 0 ? clustered / believed : options.shared_errors;
 
   result->sigma0_squared = residual_variance(w, problem, p, system.weighted());
   const Shared white = result->sigma0_squared * inverse;
   const Shared noise = inverse.lazyProduct(Shared(own_meat.lazyProduct(inverse)));
   Shared wide = noise;
+  const int all = p.estimated_count + p.held_count;
+  Shared joint = Shared::Zero(all, all);
   if (p.held_count > 0) {
     const Shared D = inverse.lazyProduct(cross);
     Shared scaled = D;
     for (int c = 0; c < p.held_count; ++c) scaled.col(c) *= p.held_variance[c];
     wide += scaled.lazyProduct(D.transpose());
+    joint.topRightCorner(p.estimated_count, p.held_count) = -scaled;
+    joint.bottomLeftCorner(p.held_count, p.estimated_count) = -scaled.transpose();
+    for (int c = 0; c < p.held_count; ++c) joint(p.estimated_count + c, p.estimated_count + c) = p.held_variance[c];
   }
+  joint.topLeftCorner(p.estimated_count, p.estimated_count) = wide;
   // Extrinsics are the first rows of θ_S and of the estimated ones alike; intrinsics are found by their place in the partition.
   for (std::size_t k = 1; k < problem.cameras.size(); ++k) {
     const int number = static_cast<int>(k);
@@ -241,12 +287,31 @@ void shared_covariance(BundleWorkspace& w, const BundleProblem& problem, const B
     result->covariance_noise[k] = published(noise, layout, camera, T, number);
     result->covariance_wide[k] = published(wide, layout, camera, T, number);
   }
-  for (int i = 0; i < p.estimated_count; ++i)
-    for (std::size_t k = 0; k < problem.cameras.size(); ++k) {
-      const int place = p.estimated[i] - layout.intrinsic[k];
-      if (layout.intrinsic_count[k] > 0 && place >= 0 && place < layout.intrinsic_count[k])
-        result->intrinsics_sigma[k][layout.intrinsic_index[k][place]] = std::sqrt(white(i, i));
+  PublishedRow rows[kMaxShared];
+  for (std::size_t k = 1; k < problem.cameras.size(); ++k) {
+    const int number = static_cast<int>(k);
+    const Mat6 to = to_published(layout, system.job().cameras[k], state.T_camera_left[k], number);
+    for (int i = 0; i < (layout.exact[k] ? 5 : 6); ++i) {
+      PublishedRow& row = rows[layout.extrinsic[k] + i];
+      row.first = extrinsic_row(number);
+      row.count = 6;
+      for (int j = 0; j < 6; ++j) row.factor[j] = to(j, i);
     }
+  }
+  for (int i = 0; i < all; ++i) {
+    const bool estimated = i < p.estimated_count;
+    const int row = estimated ? p.estimated[i] : p.held[i - p.estimated_count];
+    for (std::size_t k = 0; k < problem.cameras.size(); ++k) {
+      const int place = row - layout.intrinsic[k];
+      if (layout.intrinsic_count[k] == 0 || place < 0 || place >= layout.intrinsic_count[k]) continue;
+      const int parameter = layout.intrinsic_index[k][place];
+      rows[i].first = intrinsic_row(static_cast<int>(k)) + parameter;
+      rows[i].count = 1;
+      rows[i].factor[0] = 1;
+      if (estimated) result->intrinsics_sigma[k][static_cast<std::size_t>(parameter)] = std::sqrt(std::max(0.0, noise(i, i)));
+    }
+  }
+  publish_all(joint, rows, &result->covariance);
   result->has_covariance = true;
 }
 

@@ -18,18 +18,6 @@ void row_major(const Mat3& R, double out[9]) noexcept {
     for (int c = 0; c < 3; ++c) out[3 * r + c] = R(r, c);
 }
 
-/// Two unit vectors across u, in the base camera's axes: τ = basis β keeps |t_k| to first order.
-void tangent_basis(const Vec3& u, double basis[6]) noexcept {
-  int least = 0;
-  (void)u.cwiseAbs().minCoeff(&least);
-  const Vec3 a = u.cross(Vec3::Unit(least)).normalized();
-  const Vec3 b = u.cross(a);
-  for (int r = 0; r < 3; ++r) {
-    basis[2 * r] = a[r];
-    basis[2 * r + 1] = b[r];
-  }
-}
-
 double lane_sum(const double* lanes) noexcept {
   double s = 0;
   for (int i = 0; i < kBatch; ++i) s += lanes[i];
@@ -64,6 +52,17 @@ void prior_residual(const BundlePosePrior& prior, const Transform& T, Vec6* delt
 
 }  // namespace
 
+void tangent_basis(const Vec3& u, double basis[6]) noexcept {
+  int least = 0;
+  (void)u.cwiseAbs().minCoeff(&least);
+  const Vec3 a = u.cross(Vec3::Unit(least)).normalized();
+  const Vec3 b = u.cross(a);
+  for (int r = 0; r < 3; ++r) {
+    basis[2 * r] = a[r];
+    basis[2 * r + 1] = b[r];
+  }
+}
+
 Row6 extrinsic_basis(const SharedLayout& shared, const KernelCamera& camera, int k) noexcept {
   Row6 J = Row6::Zero();
   if (!shared.exact[k]) return Row6::Identity();
@@ -97,6 +96,9 @@ System::System(BundleWorkspace& workspace, const BundleProblem& problem, const B
 
 void System::use(const SharedLayout& shared) noexcept {
   job_.shared = shared;
+  shared_prior_ = options_.configuration == BundleConfiguration::stereo_calibration
+                      ? SharedPrior(options_.shared_prior, options_, shared, problem_.cameras.size())
+                      : SharedPrior();
   first_shared_ = static_cast<std::size_t>(w_.free_poses) * kBlock;
   rows_ = first_shared_ + static_cast<std::size_t>(shared.blocks) * kBlock;
   ld_ = (rows_ + kBatch - 1) / kBatch * kBatch;
@@ -337,6 +339,16 @@ void System::add_priors(const BundleState& state) noexcept {
       add_information(row, row, information);
     }
   }
+  if (!shared_prior_.used()) return;
+  const SharedMatrix J = shared_prior_.jacobian(state, job_);
+  const SharedMatrix JtL = J.transpose().lazyProduct(shared_prior_.information());
+  const SharedMatrix H = JtL.lazyProduct(J);
+  const SharedVector e = JtL.lazyProduct(shared_prior_.residual(state));
+  for (int r = 0; r < job_.shared.size; ++r) {
+    const std::size_t row = first_shared_ + static_cast<std::size_t>(r);
+    w_.rhs[row] -= e[r];
+    for (int c = 0; c <= r; ++c) add_information(row, first_shared_ + static_cast<std::size_t>(c), H(r, c));
+  }
 }
 
 double System::prior_cost(const BundleState& state) const noexcept {
@@ -361,6 +373,10 @@ double System::prior_cost(const BundleState& state) const noexcept {
       const double r = (given.prior_mean[parameter] - values[parameter]) / given.prior_sigma[parameter];
       cost += 0.5 * r * r;
     }
+  }
+  if (shared_prior_.used()) {
+    const SharedVector d = shared_prior_.residual(state);
+    cost += 0.5 * d.dot(SharedVector(shared_prior_.information().lazyProduct(d)));
   }
   return cost;
 }

@@ -1,5 +1,6 @@
 #pragma once
 #include "core/bundle/detail/kernels.hpp"
+#include "core/bundle/detail/shared_prior.hpp"
 #include "core/bundle/detail/workspace.hpp"
 
 namespace vergence::detail {
@@ -31,6 +32,7 @@ class System {
   [[nodiscard]] double update_squared() const noexcept { return update_; }  // of the last move(): |δ|², |θ|²
   [[nodiscard]] double norm_squared() const noexcept { return norm_; }
   [[nodiscard]] const KernelJob& job() const noexcept { return job_; }
+  [[nodiscard]] const SharedPrior& shared_prior() const noexcept { return shared_prior_; }
 
  private:
   void prepare(const BundleState& state) noexcept;
@@ -47,10 +49,14 @@ class System {
   const BundleProblem& problem_;
   const BundleOptions& options_;
   KernelJob job_;
+  SharedPrior shared_prior_{};
   bool use_jets_ = false;
   std::size_t rows_ = 0, ld_ = 0, first_shared_ = 0;
   double cost_ = 0, update_ = 0, norm_ = 0;
 };
+
+/// Two unit vectors across u, in the base camera's axes: τ = basis β keeps |t_k| to first order.
+void tangent_basis(const Vec3& u, double basis[6]) noexcept;
 
 /// J (6 × size, row-major): how (τ, φ) of camera k follows from its rows of θ_S.
 [[nodiscard]] Eigen::Matrix<double, 6, 6> extrinsic_basis(const SharedLayout& shared, const KernelCamera& camera, int k) noexcept;

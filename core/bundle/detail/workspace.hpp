@@ -61,6 +61,9 @@ struct SharedLayout {
   std::uint8_t intrinsic_index[kMaxCameras][kIntrinsicsSize] = {};
 };
 
+using SharedMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::ColMajor, kMaxShared, kMaxShared>;
+using SharedVector = Eigen::Matrix<double, Eigen::Dynamic, 1, Eigen::ColMajor, kMaxShared, 1>;
+
 /// Everything a kernel reads and writes; pointers into the adjuster's arena. Lane arrays are [rows][kBatch].
 struct KernelJob {
   const Batch* batches = nullptr;

@@ -12,18 +12,24 @@
 
 namespace vergence {
 
-/// Keeps the rig's calibration: logs the tracks, watches that they fit, has a new calibration solved beside the frames and decides
-/// about it. The estimator tells it what was posed and follows its advice; states are the estimator's.
+/// The rig's calibration while it drives (METHOD §3, §6): logs the tracks, watches that they fit, has calibrations solved beside the frames
+/// and decides about them. The estimator tells it what was posed and follows its advice; states are the estimator's.
+///
+/// Two things are solved for. *Seeking*: there is no calibration, or the one in use is doubted; frames since the onset, until one passes the
+/// gates. *Learning*: all the time else; what the drive itself measures, lenses free, confirms the calibration in use, or contradicts it, or
+/// refines it. Learning grows a segment of frames, solving again and again; a full segment is closed, and what it told is the next one's
+/// prior.
 ///
 /// Threads one, but for the solver's task. Memory from the arena at construction.
-class RigKeeper {
+class OnlineCalibrator {
  public:
-  RigKeeper(const EstimatorOptions& options, const RigCalibration& rig, const RigCalibration& nominal, Arena& arena,
-            BackgroundRunner& solver);
+  OnlineCalibrator(const EstimatorOptions& options, const RigCalibration& rig, const RigCalibration& nominal, Arena& arena,
+                   BackgroundRunner& solver);
   [[nodiscard]] static std::size_t memory_needed(const EstimatorOptions& options, const RigCalibration& rig) noexcept;
 
   /// What a posed frame saw goes into the log, if the rig has moved since the last one that did.
   void log(odometry::Odometry& odometry, const odometry::FrameOutcome& outcome, const RigFrame& frame) noexcept;
+  [[nodiscard]] const calibration::TrackLog& tracks() const noexcept { return log_; }
 
   /// The worst verdict of the further cameras' monitors on a posed frame; linked odometry only.
   [[nodiscard]] calibration::MonitorVerdict watch(const odometry::Odometry& odometry, const odometry::FrameOutcome& outcome,
@@ -55,31 +61,53 @@ class RigKeeper {
   }
   /// The scene was lost: what is logged does not go on.
   void scene_lost() noexcept;
-  /// The calibration in use is this one.
-  void use(const RigCalibration& rig) noexcept;
+  /// The calibration in use is this one, which the drive has found; `lenses`: with them.
+  void use(const RigCalibration& rig, bool lenses) noexcept;
+  /// The same while learning goes on: the frames stay.
+  void refine(const RigCalibration& rig) noexcept;
+  /// The one in use goes on: what was sought is no better.
+  void keep() noexcept;
   [[nodiscard]] const RigCalibration& in_use() const noexcept { return rig_; }
   [[nodiscard]] bool calibrated() const noexcept { return calibrated_; }
+  /// The drive itself has confirmed the calibration in use (METHOD §6.4).
+  [[nodiscard]] bool verified() const noexcept { return verified_; }
   /// Frames in a row that agree with the calibration in use.
   [[nodiscard]] int frames_agreed() const noexcept;
 
  private:
   struct SolveTask {
-    RigKeeper* keeper;
+    OnlineCalibrator* calibrator;
     void operator()() const noexcept;
+  };
+  /// The solutions of one snapshot: with the lenses as they are, and with the lenses free.
+  struct Solved {
+    calibration::RigSolution transforms, lenses;
   };
   /// The monitor of camera k watches this transform from now on.
   void watch_against(int k, const Transform& T_camera_left, const Mat6& covariance) noexcept;
-  /// A calibration that came without sigmas is a rough one: the monitor takes what it measures itself in the first frames that agree with
-  /// it as what must not change. What they measure is too far from it: the verdict becomes a knock.
-  void learn(int k, calibration::MonitorVerdict* verdict) noexcept;
+  void watch_calibration() noexcept;
+  /// What cannot be told from a claim is told by the monitor's own measurement: it takes what it sees in the first frames that agree with each
+  /// other as what must not change.
+  void learn_reference(int k, const calibration::MonitorVerdict& verdict) noexcept;
+  [[nodiscard]] CalibrationDecision begin_decision(Stamp stamp, std::uint64_t number, const calibration::RigSolution& found) const noexcept;
+  [[nodiscard]] calibration::GateQuestion question(const calibration::RigSolution& found, bool last) const noexcept;
   /// `last`: no more frames come that could make it better.
-  [[nodiscard]] CalibrationDecision judge(Stamp stamp, std::uint64_t number, bool last) noexcept;
+  [[nodiscard]] CalibrationDecision judge_sought(Stamp stamp, std::uint64_t number, bool last) noexcept;
+  [[nodiscard]] CalibrationDecision judge_learnt(Stamp stamp, std::uint64_t number, bool last) noexcept;
+  void assess_lenses(const RigCalibration& in_use_then, std::uint64_t newest, CalibrationDecision* d) const noexcept;
+  [[nodiscard]] bool lenses_are_off(bool last) const noexcept;
+  [[nodiscard]] std::optional<CalibrationDecision> judge(Stamp stamp, std::uint64_t number, bool last) noexcept;
+  void begin_segment() noexcept;
   [[nodiscard]] double pixels_moved(const odometry::Map& map) const noexcept;
   [[nodiscard]] int expected_across(const odometry::Odometry& odometry, int k, const Transform& T_left_world) const noexcept;
 
   const EstimatorOptions& options_;
   RigCalibration rig_, nominal_;
   bool calibrated_;
+  bool verified_ = false;
+  bool found_with_lenses_ = false;
+  RigCalibration learnt_{};      // what closed segments tell, with the lenses free
+  bool any_learnt_ = false;
   calibration::TrackLog log_;
   calibration::RigSolver rig_solver_;
   BackgroundRunner& runner_;
@@ -96,11 +124,14 @@ class RigKeeper {
   bool seeking_ = false, solving_ = false;
   bool stale_ = false;                          // the solve under way is of frames that no longer count
   std::uint64_t sought_since_ = 0, onset_ = 0;  // frame numbers
-  std::size_t logged_ = 0, wanted_ = 0;         // frames logged for what is sought; and how many the next solve needs
+  std::size_t logged_ = 0, wanted_ = 0;         // frames logged for what is sought or learnt; and how many the next solve needs
+  std::size_t solved_frames_ = 0;               // of the segment, in the newest solve
   int rejections_ = 0;                          // for other reasons than a want of frames
   int frames_since_snapshot_ = 0;
   int frames_still_ = 0;  // since one was logged
-  calibration::RigSolution solution_;
+  RigCalibration asked_{}, prior_{};  // of the solve under way
+  bool from_rig_ = false, has_prior_ = false, sought_ = false;
+  Solved solved_;
   calibration::Gate gate_ = calibration::Gate::open;
 };
 

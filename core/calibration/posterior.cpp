@@ -1,0 +1,48 @@
+#include "core/calibration/posterior.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace vergence::calibration {
+namespace {
+
+constexpr double kAnyRotation = 0.2;   // rad, sigma of what may be anything
+constexpr double kAnyDirection = 0.2;  // of t, in baselines
+// What a lens wanders against the rig's own drift: heat moves both.
+constexpr double kFocalOfDrift = 0.3, kCentreOfDrift = 0.3, kDistortionOfDrift = 1.0;
+
+void widen(RigCovariance* C, int row, double sigma) noexcept {
+  if (C->known(row)) C->set(row, row, (*C)(row, row) + sigma * sigma);
+}
+
+}  // namespace
+
+void let_drift(double hours, const CalibrationOptions& options, RigCalibration* rig) noexcept {
+  const double angle = 1e-3 * options.drift_mrad * std::sqrt(std::max(0.0, hours));
+  for (int k = 0; k < rig->cameras; ++k) {
+    const auto c = static_cast<std::size_t>(k);
+    if (k > 0) {
+      for (int i = 0; i < 3; ++i) widen(&rig->covariance, extrinsic_row(k) + i, angle);
+      for (int i = 3; i < 6; ++i) widen(&rig->covariance, extrinsic_row(k) + i, angle * rig->T_camera_left[c].t.norm());
+    }
+    const int first = intrinsic_row(k);
+    const double fx = rig->intrinsics[c].fx;
+    for (int i = 0; i < 2; ++i) widen(&rig->covariance, first + i, kFocalOfDrift * angle * fx);
+    for (int i = 2; i < 4; ++i) widen(&rig->covariance, first + i, kCentreOfDrift * angle * fx);
+    for (int i = 4; i < kIntrinsicsSize; ++i) widen(&rig->covariance, first + i, kDistortionOfDrift * angle);
+  }
+}
+
+void forget_transforms(RigCalibration* rig) noexcept {
+  for (int k = 1; k < rig->cameras; ++k) {
+    const double length = rig->T_camera_left[static_cast<std::size_t>(k)].t.norm();
+    for (int i = 0; i < 6; ++i) {
+      const int row = extrinsic_row(k) + i;
+      for (int other = 0; other < kRigSize; ++other) rig->covariance.set(row, other, 0);
+      const double sigma = i < 3 ? kAnyRotation : kAnyDirection * length;
+      rig->covariance.set(row, row, sigma * sigma);
+    }
+  }
+}
+
+}  // namespace vergence::calibration

@@ -1,0 +1,455 @@
+#include "core/estimator/online_calibrator.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+
+#include "core/calibration/posterior.hpp"
+
+namespace vergence {
+namespace {
+
+using calibration::Gate;
+using calibration::MonitorVerdict;
+using odometry::MapPoint;
+
+constexpr double kMovedPixels = 1.0;   // px, mean of the tracks since the last logged frame: less repeats the same errors
+constexpr double kImageMargin = 12.0;  // px: nearer to the edge a track need not be found
+// Sigmas of the reference while a calibration is a claim: of rotation (rad), and of t in baselines. What is off from the first frame is a
+// calibration that does not fit, no knock; only a change is one.
+constexpr std::array kClaimed = {0.05, 0.05, 0.05, 0.1, 0.1, 0.1};
+constexpr double kLearnedCovariance = 1.5;  // times the monitor's own: the scene it was measured in was one
+constexpr int kGraceFrames = 5;             // after a new reference: the monitor does not yet know how far matches spread
+constexpr int kLearnFrames = 45;            // moving, in agreement
+constexpr int kLeastHeldOut = 12;           // frames after a snapshot, for the gates to have frames that were not in it
+constexpr int kStillFrames = 15;            // sought for so long without a new frame in the log: the rig stands
+constexpr std::size_t kNewFrames = 5;       // at least, between two solves
+constexpr int kMostDoublings = 4;           // of the frames between two solves
+constexpr double kGrow = 1.3;               // at least, of the frames between two solves
+
+std::size_t most_tracks(const EstimatorOptions& o) noexcept { return static_cast<std::size_t>(o.odometry.features); }
+
+Mat6 claimed_covariance(double baseline) noexcept {
+  Vec6 spread = Eigen::Map<const Vec6>(kClaimed.data());
+  spread.tail<3>() *= baseline;
+  return spread.cwiseAbs2().asDiagonal();
+}
+
+int rank(MonitorVerdict::Kind kind) noexcept {
+  using K = MonitorVerdict::Kind;
+  switch (kind) {
+    case K::quiet:
+      return 0;
+    case K::out_of_step:
+      return 1;
+    case K::drift:
+      return 2;
+    case K::knock:
+      return 3;
+    case K::collapse:
+      return 4;
+  }
+  return 0;
+}
+
+}  // namespace
+
+void OnlineCalibrator::SolveTask::operator()() const noexcept {
+  OnlineCalibrator& c = *calibrator;
+  calibration::RigSolveRequest request;
+  request.rig = c.asked_;
+  request.from_rig = c.from_rig_;
+  c.solved_ = {};
+  if (c.sought_ || c.options_.calibration.estimate_lenses == 0) {
+    c.solved_.transforms = c.rig_solver_.solve(request);
+    if (c.solved_.transforms.status == calibration::RigSolveStatus::ok) {
+      request.rig.T_camera_left = c.solved_.transforms.rig.T_camera_left;
+      request.from_rig = true;
+    }
+  }
+  if (c.options_.calibration.estimate_lenses == 0) return;
+  request.freedom = calibration::RigFreedom::lenses;
+  request.known = c.has_prior_ ? &c.prior_ : nullptr;
+  c.solved_.lenses = c.rig_solver_.solve(request);
+}
+
+std::size_t OnlineCalibrator::memory_needed(const EstimatorOptions& o, const RigCalibration& rig) noexcept {
+  const auto further = static_cast<std::size_t>(rig.cameras - 1);
+  return calibration::TrackLog::memory_needed(static_cast<std::size_t>(o.calibration.max_frames), most_tracks(o)) +
+         calibration::RigSolver::memory_needed(o.calibration, o.monitor, rig.cameras, most_tracks(o)) +
+         further * (calibration::Monitor::memory_needed(o.monitor) + calibration::MonitorFeed::memory_needed(most_tracks(o))) +
+         most_tracks(o) * sizeof(calibration::AcrossSighting) + 2 * kCacheLine;
+}
+
+OnlineCalibrator::OnlineCalibrator(const EstimatorOptions& options, const RigCalibration& rig, const RigCalibration& nominal, Arena& arena,
+                     BackgroundRunner& solver)
+    : options_(options),
+      rig_(rig),
+      nominal_(nominal),
+      calibrated_(options.trust != CalibrationTrust::none),
+      log_(static_cast<std::size_t>(options.calibration.max_frames), most_tracks(options), arena),
+      rig_solver_(options.calibration, options.monitor, rig.cameras, most_tracks(options), arena),
+      runner_(solver),
+      task_{this} {
+  for (int k = 1; k < rig.cameras; ++k) {
+    monitors_[static_cast<std::size_t>(k)].emplace(options.monitor, arena);
+    feeds_[static_cast<std::size_t>(k)].emplace(most_tracks(options), arena);
+  }
+  across_ = BoundedVector<calibration::AcrossSighting>(arena.make<calibration::AcrossSighting>(most_tracks(options), "monitored matches"));
+  if (!calibrated_) return;
+  watch_calibration();
+  begin_segment();
+}
+
+void OnlineCalibrator::use(const RigCalibration& rig, bool lenses) noexcept {
+  rig_ = rig;
+  calibrated_ = true;
+  found_with_lenses_ = lenses;
+  keep();
+}
+
+void OnlineCalibrator::keep() noexcept {
+  watch_calibration();
+  any_ = false;
+  seeking_ = false;
+  begin_segment();
+}
+
+void OnlineCalibrator::refine(const RigCalibration& rig) noexcept {
+  rig_ = rig;
+  found_with_lenses_ = options_.calibration.estimate_lenses != 0;
+  watch_calibration();
+}
+
+void OnlineCalibrator::begin_segment() noexcept {
+  solved_frames_ = 0;
+  logged_ = log_.size();
+  wanted_ = static_cast<std::size_t>(options_.calibration.min_frames);
+}
+
+void OnlineCalibrator::watch_calibration() noexcept {
+  for (int k = 1; k < rig_.cameras; ++k) {
+    const auto c = static_cast<std::size_t>(k);
+    learning_[c] = true;
+    watch_against(k, rig_.T_camera_left[c], claimed_covariance(rig_.T_camera_left[c].t.norm()));
+  }
+}
+
+void OnlineCalibrator::watch_against(int k, const Transform& T_camera_left, const Mat6& covariance) noexcept {
+  const auto pinhole = [&](std::size_t c) {
+    const Intrinsics& lens = rig_.intrinsics[c];
+    return Pinhole{lens.fx, lens.fy, lens.cx, lens.cy};
+  };
+  const auto c = static_cast<std::size_t>(k);
+  (void)monitors_[c]->set_reference(T_camera_left, pinhole(0), pinhole(c), covariance);
+  feeds_[c]->reset();
+  grace_[c] = kGraceFrames;
+}
+
+void OnlineCalibrator::learn_reference(int k, const MonitorVerdict& verdict) noexcept {
+  const auto c = static_cast<std::size_t>(k);
+  if (!learning_[c] || verdict.kind != MonitorVerdict::Kind::quiet || monitors_[c]->frames_agreed() < kLearnFrames) return;
+  learning_[c] = false;
+  const double length = rig_.T_camera_left[c].t.norm();
+  Transform measured = perturbed(rig_.T_camera_left[c], verdict.offset.head<3>(), verdict.offset.tail<3>());
+  measured.t *= length / measured.t.norm();
+  watch_against(k, measured, kLearnedCovariance * verdict.covariance);
+}
+
+void OnlineCalibrator::scene_lost() noexcept {
+  any_ = false;
+  log_.clear();
+  for (auto& m : monitors_)
+    if (m) m->reset();
+  for (auto& f : feeds_)
+    if (f) f->reset();
+}
+
+int OnlineCalibrator::frames_agreed() const noexcept {
+  int least = std::numeric_limits<int>::max();
+  for (int k = 1; k < rig_.cameras; ++k) least = std::min(least, monitors_[static_cast<std::size_t>(k)]->frames_agreed());
+  return least;
+}
+
+double OnlineCalibrator::pixels_moved(const odometry::Map& map) const noexcept {
+  double sum = 0;
+  int n = 0;
+  for (const MapPoint& p : map.points()) {
+    if (!p.followed() || !p.logged || !p.now.by(0)) continue;
+    sum += static_cast<double>((p.raw[0] - p.logged_at).norm());
+    ++n;
+  }
+  constexpr int kEnough = 10;
+  return n < kEnough ? std::numeric_limits<double>::infinity() : sum / n;
+}
+
+void OnlineCalibrator::log(odometry::Odometry& odometry, const odometry::FrameOutcome& outcome, const RigFrame& frame) noexcept {
+  if (outcome.scale != 1.0) log_.scale_about(outcome.T_left_world.centre(), outcome.scale);
+  ++frames_still_;
+  if (!outcome.images_good || pixels_moved(odometry.map()) < kMovedPixels) return;
+  calibration::LoggedFrame f;
+  f.number = frame.number;
+  f.stamp = frame.stamp;
+  f.T_left_world = outcome.T_left_world;
+  f.T_camera_left = odometry.rig().T_camera_left;
+  f.unlinked = odometry.linked() == odometry::Link::unlinked;
+  f.reprojection_px = outcome.reprojection_px;
+  f.across = outcome.stereo_inliers;
+  log_.begin(f);
+  for (MapPoint& p : odometry.map().points()) {
+    // A track is taken by what the left camera's pose says of it. Linked, the others' sightings are taken as they were found: the
+    // calibration in use must not choose its own witnesses.
+    if (!p.followed() || !p.now.by(0)) continue;
+    calibration::LoggedSighting s;
+    s.track = p.id;
+    s.cameras = f.unlinked ? p.now.cameras : p.in_images;
+    s.sigma = p.now.sigma[0];
+    s.raw = p.raw;
+    log_.push(s);
+    p.logged = true;
+    p.logged_at = p.raw[0];
+  }
+  ++logged_;
+  frames_still_ = 0;
+}
+
+int OnlineCalibrator::expected_across(const odometry::Odometry& odometry, int k, const Transform& T_left_world) const noexcept {
+  const Transform T = rig_.T_camera_left[static_cast<std::size_t>(k)] * T_left_world;
+  const Camera& camera = odometry.front_end().lens(k).raw();
+  int n = 0;
+  for (const MapPoint& p : odometry.map().points()) {
+    Vec2 at;
+    if (p.stage == odometry::PointStage::active && p.now.by(0) && camera.project(T * p.p_world, &at, nullptr) == ProjectStatus::ok &&
+        camera.inside(at, kImageMargin))
+      ++n;
+  }
+  return n;
+}
+
+MonitorVerdict OnlineCalibrator::watch(const odometry::Odometry& odometry, const odometry::FrameOutcome& outcome, const RigFrame& frame) noexcept {
+  MonitorVerdict worst;
+  const Transform step = any_ ? outcome.T_left_world * T_left_world_.inverse() : Transform{};
+  T_left_world_ = outcome.T_left_world;
+  any_ = true;
+  for (int k = 1; k < rig_.cameras; ++k) {
+    const auto c = static_cast<std::size_t>(k);
+    across_.clear();
+    int found = 0;
+    for (const MapPoint& p : odometry.map().points()) {
+      // A point made in this frame was sought in the band of the calibration in use: it is no witness.
+      if (!p.followed() || p.found < 2 || !p.now.by(0)) continue;
+      if (((p.in_images >> static_cast<unsigned>(k)) & 1U) == 0) continue;
+      if (p.stage == odometry::PointStage::active) ++found;
+      (void)across_.push({p.now.pixel[0].cast<double>(), p.now.pixel[c].cast<double>(),
+                          static_cast<double>(std::max(p.now.sigma[0], p.now.sigma[c])), p.id});
+    }
+    calibration::MonitorFrame f = feeds_[c]->next(frame.stamp, frame.number, across_.span(), step);
+    f.expected_across = outcome.images_good ? expected_across(odometry, k, outcome.T_left_world) : 0;
+    f.found_across = found;
+    MonitorVerdict v = monitors_[c]->look(f);
+    if (grace_[c] > 0) {
+      --grace_[c];
+      v = MonitorVerdict{};
+    }
+    learn_reference(k, v);
+    if (rank(v.kind) > rank(worst.kind) || (rank(v.kind) == rank(worst.kind) && (v.undecided || v.statistic > worst.statistic))) worst = v;
+  }
+  return worst;
+}
+
+void OnlineCalibrator::seek(CalibrationCause cause, std::uint64_t onset, std::uint64_t now) noexcept {
+  cause_ = cause;
+  onset_ = onset;
+  sought_since_ = now;
+  seeking_ = true;
+  verified_ = false;
+  frames_still_ = 0;
+  rejections_ = 0;
+  gate_ = Gate::open;
+  stale_ = solving_;
+  log_.drop_before(onset);
+  begin_segment();
+}
+
+Reason OnlineCalibrator::missing() const noexcept {
+  if (!seeking_) return Reason::none;
+  if (frames_still_ > kStillFrames || gate_ == Gate::needs_motion) return Reason::needs_motion;
+  return gate_ == Gate::needs_near_structure ? Reason::needs_near_structure : Reason::none;
+}
+
+bool OnlineCalibrator::can_solve() const noexcept {
+  return (seeking_ || calibrated_) && !solving_ && logged_ >= wanted_ &&
+         log_.size() >= static_cast<std::size_t>(options_.calibration.min_frames);
+}
+
+void OnlineCalibrator::start_solve() noexcept {
+  rig_solver_.log().copy(log_, log_.size());
+  solving_ = true;
+  stale_ = false;
+  sought_ = seeking_;
+  frames_since_snapshot_ = 0;
+  solved_frames_ = log_.size();
+  asked_ = rig_;
+  from_rig_ = !seeking_;
+  has_prior_ = any_learnt_;
+  if (any_learnt_) {
+    prior_ = learnt_;
+    const double hours = (log_.frame(log_.size() - 1).stamp - learnt_.found).to_seconds() / 3600.0;
+    if (sought_)
+      calibration::forget_transforms(&prior_);
+    else
+      calibration::let_drift(hours, options_.calibration, &prior_);
+  }
+  runner_.start(TaskRef(task_));
+}
+
+std::optional<CalibrationDecision> OnlineCalibrator::decide(Stamp stamp, std::uint64_t number) noexcept {
+  if (!solving_) return std::nullopt;
+  ++frames_since_snapshot_;
+  const int least = std::min(kLeastHeldOut, options_.calibration.adopt_after);
+  if (options_.adoption == Adoption::when_ready) {
+    if (runner_.busy() || frames_since_snapshot_ < least) return std::nullopt;
+  } else {
+    // What is learnt beside a calibration in use waits for the frames that judge it, no longer: until then no pose is `ok`.
+    if (frames_since_snapshot_ < (sought_ ? options_.calibration.adopt_after : least)) return std::nullopt;
+    runner_.wait();
+  }
+  return judge(stamp, number, false);
+}
+
+std::optional<CalibrationDecision> OnlineCalibrator::decide_now(Stamp stamp, std::uint64_t number) noexcept {
+  if (!solving_) return std::nullopt;
+  runner_.wait();
+  return judge(stamp, number, true);
+}
+
+bool OnlineCalibrator::start_last_solve() noexcept {
+  const bool more = seeking_ || log_.size() >= solved_frames_ + kNewFrames;
+  if (solving_ || !more || log_.size() < static_cast<std::size_t>(options_.calibration.min_frames)) return false;
+  start_solve();
+  return true;
+}
+
+std::optional<CalibrationDecision> OnlineCalibrator::judge(Stamp stamp, std::uint64_t number, bool last) noexcept {
+  solving_ = false;
+  if (stale_ || sought_ != seeking_) return std::nullopt;
+  return sought_ ? judge_sought(stamp, number, last) : judge_learnt(stamp, number, last);
+}
+
+calibration::GateQuestion OnlineCalibrator::question(const calibration::RigSolution& found, bool last) const noexcept {
+  calibration::GateQuestion q;
+  q.solution = &found;
+  q.nominal = &nominal_;
+  q.in_use = calibrated_ ? &rig_ : nullptr;
+  q.log = &log_;
+  q.lenses = &found == &solved_.lenses;
+  q.pixel_sigma = options_.odometry.pixel_sigma;
+  q.window_full = last || static_cast<std::size_t>(found.frames) >= static_cast<std::size_t>(options_.calibration.max_frames);
+  return q;
+}
+
+CalibrationDecision OnlineCalibrator::begin_decision(Stamp stamp, std::uint64_t number, const calibration::RigSolution& found) const noexcept {
+  CalibrationDecision d;
+  d.stamp = stamp;
+  d.cause = cause_;
+  d.calibration = found.rig;
+  d.latency_frames = static_cast<int>(number - sought_since_);
+  d.onset_frame = onset_;
+  d.lenses = &found == &solved_.lenses;
+  d.held_out_after_px = calibration::held_out(log_, found.newest, found.rig).median_px;
+  if (calibrated_) d.held_out_before_px = calibration::held_out(log_, found.newest, rig_).median_px;
+  d.solve_ms = solved_.transforms.solve_ms + solved_.lenses.solve_ms;
+  return d;
+}
+
+CalibrationDecision OnlineCalibrator::judge_sought(Stamp stamp, std::uint64_t number, bool last) noexcept {
+  const auto most = static_cast<std::size_t>(options_.calibration.max_frames);
+  // Lenses are taken from the drive where it shows that the ones in use are off, and holds them well enough; else transforms alone.
+  const calibration::RigSolution& found = lenses_are_off(last) ? solved_.lenses : solved_.transforms;
+  gate_ = calibration::ask_gates(question(found, last), options_.calibration);
+  CalibrationDecision d = begin_decision(stamp, number, found);
+  d.accepted = gate_ == Gate::open;
+  d.reason = calibration::reason(gate_);
+  assess_lenses(found.rig, found.newest, &d);
+  if (gate_ == Gate::open) {
+    verified_ = d.verified;
+  } else if (gate_ == Gate::sigmas_too_large || gate_ == Gate::needs_motion || gate_ == Gate::needs_near_structure) {
+    // More of the same helps: sigmas fall with the root of the number of frames.
+    const double excess = gate_ == Gate::sigmas_too_large ? calibration::sigma_excess(found.rig, options_.calibration) : 1.0;
+    const double grow = std::clamp(excess * excess, kGrow, 4.0);
+    wanted_ = std::max(std::min(most, static_cast<std::size_t>(std::ceil(grow * found.frames))), logged_ + kNewFrames);
+  } else {
+    // The same frames would say the same again; and what is rejected again and again is asked about less and less often.
+    log_.drop_before(found.newest + 1);
+    wanted_ = logged_ - log_.size() + (static_cast<std::size_t>(options_.calibration.min_frames) << std::min(rejections_, kMostDoublings));
+    ++rejections_;
+  }
+  return d;
+}
+
+/// The drive's own measurement of the rig, against what will be in use after this decision.
+void OnlineCalibrator::assess_lenses(const RigCalibration& in_use_then, std::uint64_t newest, CalibrationDecision* d) const noexcept {
+  const calibration::RigSolution& measured = solved_.lenses;
+  if (measured.status != calibration::RigSolveStatus::ok) return;
+  const calibration::Assessment then =
+      calibration::assess(measured.rig, in_use_then, log_, newest, options_.calibration, options_.odometry.pixel_sigma);
+  d->judged_depth_m = then.depth_m;
+  d->depth_sigma_percent = then.sigma_percent;
+  d->verified = then.confirmed;
+  if (!calibrated_) return;
+  d->depth_difference_percent =
+      calibration::assess(measured.rig, rig_, log_, newest, options_.calibration, options_.odometry.pixel_sigma).difference_percent;
+}
+
+bool OnlineCalibrator::lenses_are_off(bool last) const noexcept {
+  const calibration::RigSolution &free = solved_.lenses, &held = solved_.transforms;
+  if (free.status != calibration::RigSolveStatus::ok) return false;
+  calibration::GateQuestion q = question(free, last);
+  q.must_be_better = false;
+  if (calibration::ask_gates(q, options_.calibration) != Gate::open) return false;
+  return held.status != calibration::RigSolveStatus::ok || calibration::fits_better(log_, free.newest, free.rig, held.rig);
+}
+
+CalibrationDecision OnlineCalibrator::judge_learnt(Stamp stamp, std::uint64_t number, bool last) noexcept {
+  const auto most = static_cast<std::size_t>(options_.calibration.max_frames);
+  const bool lenses = options_.calibration.estimate_lenses != 0;
+  const calibration::RigSolution& found = lenses ? solved_.lenses : solved_.transforms;
+  calibration::GateQuestion q = question(found, last);
+  q.must_be_better = false;
+  gate_ = calibration::ask_gates(q, options_.calibration);
+  CalibrationDecision d = begin_decision(stamp, number, found);
+  d.cause = CalibrationCause::refinement;
+  if (found.status == calibration::RigSolveStatus::ok) {
+    const calibration::Assessment a =
+        calibration::assess(found.rig, rig_, log_, found.newest, options_.calibration, options_.odometry.pixel_sigma);
+    d.judged_depth_m = a.depth_m;
+    d.depth_sigma_percent = a.sigma_percent;
+    d.depth_difference_percent = a.difference_percent;
+    if (a.contradicted) d.cause = CalibrationCause::contradicted;
+    // Without a frame that was not used, more frames of the same kind are better and another kind is not.
+    const bool better = last && log_.frame(log_.size() - 1).number == found.newest ? found_with_lenses_ == d.lenses : a.better;
+    if (gate_ == Gate::open && !better && !(a.contradicted && !a.worse)) gate_ = Gate::no_better;
+    d.verified = gate_ == Gate::open ? a.sigma_percent <= options_.calibration.tolerated_depth_percent : a.confirmed;
+    if (d.verified || a.contradicted) verified_ = d.verified;
+  }
+  d.accepted = gate_ == Gate::open;
+  d.reason = calibration::reason(gate_);
+  // A full segment is closed: what it told is the next one's prior.
+  const bool usable = gate_ == Gate::open || gate_ == Gate::no_better;
+  if (static_cast<std::size_t>(found.frames) >= most || found.status != calibration::RigSolveStatus::ok) {
+    if (usable) {
+      learnt_ = found.rig;
+      any_learnt_ = true;
+    }
+    log_.drop_before(found.newest + 1);
+    begin_segment();
+    wanted_ = most;
+  } else {
+    wanted_ = std::min(most, std::max(static_cast<std::size_t>(found.frames) + static_cast<std::size_t>(options_.calibration.min_frames),
+                                      logged_));
+  }
+  return d;
+}
+
+}  // namespace vergence
