@@ -162,7 +162,9 @@ Gate ask_common_gates(const GateQuestion& q, const CalibrationOptions& o) noexce
     if (q.in_use != nullptr && log_so3(found.R * nominal.R.transpose()).norm() > o.max_rotation_deg * kDegree)
       return Gate::implausible_rotation;
   }
-  if (s.travelled_m < std::max(o.needs_motion_m, kNeedsBaselines * s.rig.baseline)) return Gate::needs_motion;
+  // With the lenses free, the depth's own sigma says whether the way was long enough.
+  const double least = q.lenses ? 0.0 : o.needs_motion_m;
+  if (s.travelled_m < std::max(least, kNeedsBaselines * s.rig.baseline)) return Gate::needs_motion;
   if (s.near < o.needs_near_points) return Gate::needs_near_structure;
   return Gate::open;
 }

@@ -139,8 +139,9 @@ double depth_difference_percent(const RigCalibration& measured, const RigCalibra
 
 double judged_depth_m(const RigCalibration& rig, int k, const CalibrationOptions& options, double pixel_sigma) noexcept {
   const auto c = static_cast<std::size_t>(k);
-  const double reach = rig.intrinsics[0].fx * rig.T_camera_left[c].t.norm() * 0.01 * options.tolerated_depth_percent;
-  return std::min(options.tolerated_depth_m, reach / (std::sqrt(2.0) * pixel_sigma));
+  constexpr double kOfTolerance = 0.5;  // the share of it that a single match's noise takes
+  const double tolerated_px = std::sqrt(2.0) * pixel_sigma / (kOfTolerance * 0.01 * options.tolerated_depth_percent);
+  return std::min(options.tolerated_depth_m, rig.intrinsics[0].fx * rig.T_camera_left[c].t.norm() / tolerated_px);
 }
 
 double depth_error_percent(const RigCalibration& rig, double depth_m) noexcept {

@@ -24,8 +24,8 @@ inline constexpr std::array kHealthDepths = {1.0, 5.0, 10.0, 20.0, 50.0};  // m
 [[nodiscard]] double depth_difference_percent(const RigCalibration& measured, const RigCalibration& claimed, int k,
                                               double depth_m) noexcept;
 
-/// Where a calibration has to be good to `tolerated_depth_percent`: at tolerated_depth_m, or nearer, where one match of that pixel sigma is
-/// itself no better. m.
+/// Where a calibration has to be good to `tolerated_depth_percent`: at tolerated_depth_m, or nearer, where the noise of one match, of
+/// that pixel sigma, is half of it: there short baselines can reach it. m.
 [[nodiscard]] double judged_depth_m(const RigCalibration& rig, int k, const CalibrationOptions& options, double pixel_sigma) noexcept;
 
 /// The same for the whole rig: its best pair, as a depth is measured with.

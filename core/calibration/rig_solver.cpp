@@ -14,6 +14,7 @@ constexpr std::size_t kFramesATrack = 3;            // at least, on average: siz
 constexpr std::size_t kMostViews = 12;              // of a track that its point is triangulated from
 constexpr double kWildResidual = 40.0;              // px at the start: not the same point
 constexpr int kLeastTracks = 60;
+constexpr int kLeastTies = 10;  // points that tie a frame to those before it
 constexpr int kLeastCandidateMatches = 40;         // across, of the frame whose own transform begins the solve
 constexpr double kHuber = 2.0, kCauchy = 2.5;      // residual scales
 constexpr double kFirstCut = 6.0, kLastCut = 4.0;  // residual scales beyond which a sighting is left out
@@ -54,9 +55,9 @@ std::size_t RigSolver::memory_needed(const CalibrationOptions& options, const Mo
   const BundleCapacities c = capacities(options, cameras, features);
   const auto frames = static_cast<std::size_t>(options.max_frames);
   return TrackLog::memory_needed(frames, features) + BundleAdjuster::memory_needed(c) + Monitor::memory_needed(monitor) +
-         MonitorFeed::memory_needed(features) + c.poses * (sizeof(Transform) + sizeof(std::uint16_t)) + c.points * sizeof(Vec3) +
+         MonitorFeed::memory_needed(features) + c.poses * (sizeof(Transform) + sizeof(std::uint16_t) + sizeof(std::uint8_t)) + (c.poses + 1) * sizeof(int) + c.points * sizeof(Vec3) +
          c.observations * (sizeof(BundleObservation) + 2 * sizeof(float)) + frames * features * sizeof(Reference) +
-         features * sizeof(AcrossSighting) + 10 * kCacheLine;
+         features * sizeof(AcrossSighting) + 12 * kCacheLine;
 }
 
 RigSolver::RigSolver(const CalibrationOptions& options, const MonitorOptions& monitor, int cameras, std::size_t features, Arena& arena)
@@ -69,6 +70,8 @@ RigSolver::RigSolver(const CalibrationOptions& options, const MonitorOptions& mo
       count_(cameras) {
   const BundleCapacities c = capacities(options, cameras, features);
   poses_ = BoundedVector<Transform>(arena.make<Transform>(c.poses, "calibration poses"));
+  held_ = BoundedVector<std::uint8_t>(arena.make<std::uint8_t>(c.poses, "calibration poses"));
+  ties_ = arena.make<int>(c.poses + 1, "calibration poses");
   logged_ = BoundedVector<std::uint16_t>(arena.make<std::uint16_t>(c.poses, "calibration poses"));
   points_ = BoundedVector<Vec3>(arena.make<Vec3>(c.points, "calibration points"));
   observations_ = BoundedVector<BundleObservation>(arena.make<BundleObservation>(c.observations, "calibration observations"));
@@ -196,6 +199,28 @@ void RigSolver::make_points() noexcept {
   }
 }
 
+/// A frame that hardly a track ties to the ones before it (the scene was built anew there) begins a piece of its own: its pose is held, as
+/// the first one is, for nothing else would.
+void RigSolver::hold_pieces() noexcept {
+  held_.clear();
+  for (std::size_t i = 0; i < poses_.size(); ++i) (void)held_.push(0);
+  // Points that are seen on both sides of a frame's beginning: +1 after the first of its frames, −1 after the last.
+  std::fill_n(ties_.begin(), poses_.size() + 1, 0);
+  for (std::size_t i = 0; i < observations_.size();) {
+    const BundleObservation& first = observations_[i];
+    std::size_t last = i;
+    while (last + 1 < observations_.size() && observations_[last + 1].point == first.point) ++last;
+    ++ties_[first.pose + std::size_t{1}];
+    --ties_[observations_[last].pose + std::size_t{1}];
+    i = last + 1;
+  }
+  int ties = 0;
+  for (std::size_t i = 0; i < held_.size(); ++i) {
+    ties += ties_[i];
+    held_[i] = ties < kLeastTies ? 1 : 0;
+  }
+}
+
 BundleOptions RigSolver::options_of(const RigSolveRequest& request) const noexcept {
   constexpr std::uint16_t kFocal = 0b0011, kPinhole = 0b1111, kFourCoefficients = 0b1111'0000;  // k1 k2 p1 p2, or k1 … k4
   const RigCalibration& rig = request.rig;
@@ -207,7 +232,7 @@ BundleOptions RigSolver::options_of(const RigSolveRequest& request) const noexce
   for (int k = 2; k < count_; ++k) how.length[static_cast<std::size_t>(k)].kind = BundleLength::free;
   for (int k = 0; k < count_; ++k) {
     const auto c = static_cast<std::size_t>(k);
-    const Intrinsics& lens = rig.intrinsics[c];
+    const Intrinsics& lens = (request.told != nullptr && lenses ? *request.told : rig).intrinsics[c];
     BundleIntrinsics& out = how.intrinsics[c];
     if (options_.refine_intrinsics != 0)
       out.free = kPinhole;
@@ -247,6 +272,7 @@ BundleResult RigSolver::adjust(const BundleOptions& how) noexcept {
   problem.cameras = std::span(cameras_).first(n);
   problem.T_camera_left = std::span(T_camera_left_).first(n);
   problem.T_left_world = poses_.span();
+  problem.pose_constant = held_.span();
   problem.points = points_.span();
   problem.observations = observations_.span();
   problem.squared_residuals = residuals_.first(observations_.size());
@@ -388,6 +414,7 @@ RigSolution RigSolver::solve(const RigSolveRequest& request) noexcept {
   s.newest = log_.frame(log_.size() - 1).number;
   make_points();
   if (points_.size() < static_cast<std::size_t>(kLeastTracks)) return s;
+  hold_pieces();
   s.status = RigSolveStatus::not_converged;
   const BundleResult r = adjust_robustly(options_of(request), &s);
   if (!r.converged()) return s;

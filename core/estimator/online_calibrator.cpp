@@ -70,6 +70,7 @@ void OnlineCalibrator::SolveTask::operator()() const noexcept {
   }
   if (c.options_.calibration.estimate_lenses == 0) return;
   request.freedom = calibration::RigFreedom::lenses;
+  request.told = &c.told_;  // what the frames have shown since must not be its own witness
   request.known = c.has_prior_ ? &c.prior_ : nullptr;
   c.solved_.lenses = c.rig_solver_.solve(request);
 }
@@ -87,6 +88,7 @@ OnlineCalibrator::OnlineCalibrator(const EstimatorOptions& options, const RigCal
     : options_(options),
       rig_(rig),
       nominal_(nominal),
+      told_(rig),
       calibrated_(options.trust != CalibrationTrust::none),
       log_(static_cast<std::size_t>(options.calibration.max_frames), most_tracks(options), arena),
       rig_solver_(options.calibration, options.monitor, rig.cameras, most_tracks(options), arena),
@@ -437,7 +439,7 @@ CalibrationDecision OnlineCalibrator::judge_learnt(Stamp stamp, std::uint64_t nu
   d.reason = calibration::reason(gate_);
   // A full segment is closed: what it told is the next one's prior.
   const bool usable = gate_ == Gate::open || gate_ == Gate::no_better;
-  if (static_cast<std::size_t>(found.frames) >= most || found.status != calibration::RigSolveStatus::ok) {
+  if (solved_frames_ >= most) {
     if (usable) {
       learnt_ = found.rig;
       any_learnt_ = true;
@@ -446,8 +448,7 @@ CalibrationDecision OnlineCalibrator::judge_learnt(Stamp stamp, std::uint64_t nu
     begin_segment();
     wanted_ = most;
   } else {
-    wanted_ = std::min(most, std::max(static_cast<std::size_t>(found.frames) + static_cast<std::size_t>(options_.calibration.min_frames),
-                                      logged_));
+    wanted_ = std::min(most, std::max(solved_frames_ + static_cast<std::size_t>(options_.calibration.min_frames), logged_));
   }
   return d;
 }

@@ -103,6 +103,7 @@ class OnlineCalibrator {
 
   const EstimatorOptions& options_;
   RigCalibration rig_, nominal_;
+  const RigCalibration told_;  // the drive began with
   bool calibrated_;
   bool verified_ = false;
   bool found_with_lenses_ = false;
