@@ -27,6 +27,8 @@ void check(bool good, const char* name, const char* range) {
 void validate(const MonitorOptions& o) {
   check(o.threshold >= 20 && o.threshold <= 500, "threshold", "20 … 500");
   check(o.bias_px >= 0 && o.bias_px <= 1, "bias_px", "0 … 1");
+  check(o.found_bias_px >= 0 && o.found_bias_px <= 2, "found_bias_px", "0 … 2");
+  check(o.claimed_bias_px >= 0 && o.claimed_bias_px <= 5, "claimed_bias_px", "0 … 5");
   check(o.min_matches >= 12 && o.min_matches <= 1000, "min_matches", "12 … 1000");
   check(o.short_window >= 1 && o.short_window <= 10, "short_window", "1 … 10");
   check(o.long_window >= 60 && o.long_window <= 1800, "long_window", "60 … 1800");
@@ -91,6 +93,8 @@ bool Monitor::set_reference(const Transform& T_camera_left, const Pinhole& left,
   p.forget();
   return p.valid;
 }
+
+void Monitor::expect_scatter(double bias_px) noexcept { parts_->windows.expect_scatter(bias_px); }
 
 void Monitor::reset() noexcept { parts_->forget(); }
 

@@ -12,7 +12,9 @@ namespace vergence::calibration {
 /// What the defaults reach, and the commands that measured it: docs/monitor.md.
 struct MonitorOptions {
   double threshold = 45.0;  // of the statistic that raises a knock or a drift; ≥ 80 h between false alarms, 20 … 500
-  double bias_px = 0.02;    // px rms over the image: slow error of vertical differences that intrinsics leave, to be overlooked, 0 … 1
+  double bias_px = 0.02;    // px rms over the image: slow error of vertical differences that is overlooked at least, 0 … 1
+  double found_bias_px = 0.1;    // expected of lenses that the drive has confirmed, until it is measured, 0 … 2
+  double claimed_bias_px = 0.3;  // and of a calibration that it has not, 0 … 5
   int min_matches = 30;     // matches across under which a frame measures nothing (`needs_texture`), 12 … 1000
   int short_window = 3;     // moving frames of the shortest window: large knocks, 1 … 10
   int long_window = 300;    // moving frames of the longest window: drift, 60 … 1800
@@ -105,6 +107,10 @@ class Monitor {
   /// what uncertain intrinsics do to a calibration shows in no residual, so the wide one would make the monitor blind.
   /// False: |t| is zero or something is not finite; then every look() is quiet.
   bool set_reference(const Transform& T_camera_left, const Pinhole& left, const Pinhole& right, const Mat6& covariance) noexcept;
+
+  /// How much stretches of a drive are expected to disagree, px rms over the image, until that is measured: what the lenses in use leave.
+  /// Outlives set_reference() and reset(), as what was measured does; monitor.bias_px is the least.
+  void expect_scatter(double bias_px) noexcept;
 
   [[nodiscard]] MonitorVerdict look(const MonitorFrame& frame) noexcept;
 

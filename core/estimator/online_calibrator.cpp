@@ -19,6 +19,8 @@ constexpr double kImageMargin = 12.0;  // px: nearer to the edge a track need no
 // Sigmas of the reference while a calibration is a claim: of rotation (rad), and of t in baselines. What is off from the first frame is a
 // calibration that does not fit, no knock; only a change is one.
 constexpr std::array kClaimed = {0.05, 0.05, 0.05, 0.1, 0.1, 0.1};
+// And of one that the drive has confirmed, until the monitor has measured its own: what the lens model leaves in one stretch.
+constexpr std::array kConfirmed = {2e-4, 5e-4, 3e-4, 0.005, 0.005, 0.01};
 constexpr double kLearnedCovariance = 1.5;  // times the monitor's own: the scene it was measured in was one
 constexpr int kGraceFrames = 5;             // after a new reference: the monitor does not yet know how far matches spread
 constexpr int kLearnFrames = 45;            // moving, in agreement
@@ -30,8 +32,8 @@ constexpr double kGrow = 1.3;               // at least, of the frames between t
 
 std::size_t most_tracks(const EstimatorOptions& o) noexcept { return static_cast<std::size_t>(o.odometry.features); }
 
-Mat6 claimed_covariance(double baseline) noexcept {
-  Vec6 spread = Eigen::Map<const Vec6>(kClaimed.data());
+Mat6 reference_covariance(const std::array<double, 6>& sigma, double baseline) noexcept {
+  Vec6 spread = Eigen::Map<const Vec6>(sigma.data());
   spread.tail<3>() *= baseline;
   return spread.cwiseAbs2().asDiagonal();
 }
@@ -134,7 +136,9 @@ void OnlineCalibrator::watch_calibration() noexcept {
   for (int k = 1; k < rig_.cameras; ++k) {
     const auto c = static_cast<std::size_t>(k);
     learning_[c] = true;
-    watch_against(k, rig_.T_camera_left[c], claimed_covariance(rig_.T_camera_left[c].t.norm()));
+    monitors_[c]->expect_scatter(verified_ ? options_.monitor.found_bias_px : options_.monitor.claimed_bias_px);
+    watch_against(k, rig_.T_camera_left[c],
+                  reference_covariance(verified_ ? kConfirmed : kClaimed, rig_.T_camera_left[c].t.norm()));
   }
 }
 
@@ -413,6 +417,13 @@ bool OnlineCalibrator::lenses_are_off(bool last) const noexcept {
   return held.status != calibration::RigSolveStatus::ok || calibration::fits_better(log_, free.newest, free.rig, held.rig);
 }
 
+/// The claim in use is confirmed, or is no more: the monitor expects as much of it.
+void OnlineCalibrator::set_verified(bool verified) noexcept {
+  if (verified == verified_) return;
+  verified_ = verified;
+  watch_calibration();
+}
+
 CalibrationDecision OnlineCalibrator::judge_learnt(Stamp stamp, std::uint64_t number, bool last) noexcept {
   const auto most = static_cast<std::size_t>(options_.calibration.max_frames);
   const bool lenses = options_.calibration.estimate_lenses != 0;
@@ -433,7 +444,7 @@ CalibrationDecision OnlineCalibrator::judge_learnt(Stamp stamp, std::uint64_t nu
     const bool better = last && log_.frame(log_.size() - 1).number == found.newest ? found_with_lenses_ == d.lenses : a.better;
     if (gate_ == Gate::open && !better && !(a.contradicted && !a.worse)) gate_ = Gate::no_better;
     d.verified = gate_ == Gate::open ? a.sigma_percent <= options_.calibration.tolerated_depth_percent : a.confirmed;
-    if (d.verified || a.contradicted) verified_ = d.verified;
+    if (d.verified || a.contradicted) set_verified(d.verified);
   }
   d.accepted = gate_ == Gate::open;
   d.reason = calibration::reason(gate_);

@@ -86,6 +86,7 @@ class OnlineCalibrator {
   /// The monitor of camera k watches this transform from now on.
   void watch_against(int k, const Transform& T_camera_left, const Mat6& covariance) noexcept;
   void watch_calibration() noexcept;
+  void set_verified(bool verified) noexcept;
   /// What cannot be told from a claim is told by the monitor's own measurement: it takes what it sees in the first frames that agree with each
   /// other as what must not change.
   void learn_reference(int k, const calibration::MonitorVerdict& verdict) noexcept;

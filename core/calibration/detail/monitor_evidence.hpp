@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <limits>
 
+#include "core/geometry/epipolar.hpp"
 #include "core/math/types.hpp"
 
 namespace vergence::calibration::detail {
@@ -32,6 +33,13 @@ struct Evidence {
     n += scale * e.n;
   }
 };
+
+[[nodiscard]] inline Mat5 fixed_block(const Evidence& e) noexcept {
+  Mat5 A;
+  for (int i = 0; i < kFixed; ++i)
+    for (int j = 0; j <= i; ++j) A(i, j) = A(j, i) = e.A[lower(i, j)];
+  return A;
+}
 
 /// The two kinds apart: their errors are of different makings, so each has its own inflation.
 struct TwoEvidences {

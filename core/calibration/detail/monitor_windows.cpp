@@ -16,7 +16,8 @@ constexpr double kForgetAcross = 1.0 / 300, kForgetFast = 1.0 / 10, kForgetMotio
 constexpr double kLeastInflation = 0.3, kMostInflation = 200;  // below: sigmas claimed far too large; above: not a spread any more
 constexpr double kSpreadOutlier = 5;  // times the inflation: what one frame may count for at most, else one frame blinds the monitor
 // Windows that are also held against what was seen before them: a knock smaller than the reference's own error shows so, and only so.
-constexpr std::size_t kLearnWindow = 30, kLearnLongest = 150;
+constexpr std::size_t kLearnWindow = 10, kLearnLongest = 150;
+constexpr std::size_t kScatterBlocks = 10;  // before a block, that it is held against: longer ago a rig may have crept
 // Of the blocks older than so many only every fourth is asked whether it is the onset: a search every frame of an alarm costs little then.
 constexpr std::size_t kFineBlocks = 24, kCoarse = 4;
 constexpr double kPriorSigma = 0.2;   // rad: of directions nothing was seen of
@@ -31,19 +32,12 @@ constexpr double kLagExplains = 0.6;  // share of the gain from which a lag alon
 constexpr int kLagFrames = 8;         // and the least frames it must have lasted
 constexpr int kLagPatience = 30;      // frames a verdict waits for the rivals to part
 
-Mat5 fixed_block(const Evidence& e) noexcept {
-  Mat5 A;
-  for (int i = 0; i < kFixed; ++i)
-    for (int j = 0; j <= i; ++j) A(i, j) = A(j, i) = e.A[lower(i, j)];
-  return A;
-}
-
 }  // namespace
 
 void Windows::reset(const MonitorOptions& options, const Mat5& covariance) noexcept {
   options_ = options;
   covariance_ = covariance;
-  bias2_ = options.bias_px * options.bias_px / kFixed;  // of all five together
+  renew_floor();
   window_count_ = 0;
   for (const int frames : {options.short_window, 10, 30, 75, 150, options.long_window}) {
     const auto n = static_cast<std::size_t>(frames);
@@ -56,6 +50,22 @@ void Windows::reset(const MonitorOptions& options, const Mat5& covariance) noexc
   lambda_across_ = lambda_motion_ = now_fast_ = now_slow_ = life_slow_ = 0;
   looks_ = 0;
   over_ = 0;
+}
+
+void Windows::expect_scatter(double bias_px) noexcept {
+  scatter_.expect(std::max(bias_px, options_.bias_px));
+  renew_floor();
+}
+
+void Windows::renew_floor() noexcept { bias2_ = std::max(options_.bias_px * options_.bias_px / kFixed, scatter_.variance()); }
+
+/// The block just closed against those before it.
+void Windows::measure_scatter() noexcept {
+  if (over_ > 0 || closed_ == 0) return;
+  Evidence past;
+  for (std::size_t i = 0; i < std::min<std::size_t>({closed_, kScatterBlocks, kBlocks}); ++i) past.add(block(i).evidence.across);
+  scatter_.add(open_.evidence.across, past, lambda_across_);
+  renew_floor();
 }
 
 void Windows::follow_spread(const FrameEvidence& e) noexcept {
@@ -94,6 +104,7 @@ void Windows::push(const FrameEvidence& e) noexcept {
   open_.evidence.add(e.evidence);
   ++count_;
   if (count_ % kBlock == 0) {
+    measure_scatter();
     if (closed_ >= kBlocks) total_.add(blocks_[closed_ % kBlocks].evidence, -1.0);
     total_.add(open_.evidence);
     blocks_[closed_ % kBlocks] = open_;

@@ -3,6 +3,7 @@
 #include <cstdint>
 
 #include "core/calibration/detail/monitor_evidence.hpp"
+#include "core/calibration/detail/monitor_scatter.hpp"
 #include "core/calibration/monitor.hpp"
 #include "core/geometry/epipolar.hpp"
 
@@ -36,6 +37,8 @@ class Windows {
  public:
   /// covariance: of θ's first five at the reference.
   void reset(const MonitorOptions& options, const Mat5& covariance) noexcept;
+  /// How much stretches of the drive are expected to disagree until that is measured; outlives reset(), as what was measured does.
+  void expect_scatter(double bias_px) noexcept;
   void push(const FrameEvidence& e) noexcept;
   [[nodiscard]] Decision decide() noexcept;
   /// The statistic of one frame by itself, `spread` its own λ: what a standing camera allows.
@@ -68,6 +71,8 @@ class Windows {
   };
 
   void follow_spread(const FrameEvidence& e) noexcept;
+  void measure_scatter() noexcept;
+  void renew_floor() noexcept;
   [[nodiscard]] Evidence effective(const TwoEvidences& sum) const noexcept;
   [[nodiscard]] static double statistic(const Evidence& e, const Vec5& mean, const Mat5& covariance) noexcept;
   void learn(const TwoEvidences& window, Vec5* mean, Mat5* covariance) const noexcept;
@@ -83,7 +88,8 @@ class Windows {
 
   MonitorOptions options_{};
   Mat5 covariance_ = Mat5::Zero();
-  double bias2_ = 0;  // px², of a mode
+  double bias2_ = 0;  // px², of a mode: the floor
+  BlockScatter scatter_{};
   std::array<std::size_t, 6> windows_{};
   std::size_t window_count_ = 0;
   std::uint64_t count_ = 0, closed_ = 0;  // frames, full blocks

@@ -1,0 +1,36 @@
+#pragma once
+#include <algorithm>
+#include <cstdint>
+
+#include "core/calibration/detail/monitor_evidence.hpp"
+
+namespace vergence::calibration::detail {
+
+/// How much successive stretches of a drive disagree beyond the noise of their tracks: what a lens model leaves shows as an offset that goes
+/// with where the structure is, and differs from stretch to stretch (METHOD §6.3).
+///
+/// A running mean of (dᵀ A d − expected by noise) / (5 n) over blocks of frames, d a block's own offset from the blocks before it; begins
+/// with an expectation that weighs some blocks. A value.
+class BlockScatter {
+ public:
+  /// Before anything was measured: px rms over the image.
+  void expect(double bias_px) noexcept {
+    expected2_ = bias_px * bias_px / kFixed;
+    sum_ = 0;
+    blocks_ = 0;
+  }
+  /// `lambda`: the inflation of both. Blocks that see next to nothing of some direction say nothing.
+  void add(const Evidence& block, const Evidence& past, double lambda) noexcept;
+
+  /// px² of a mode.
+  [[nodiscard]] double variance() const noexcept {
+    return std::max(0.0, (kExpectedBlocks * expected2_ + sum_) / (kExpectedBlocks + static_cast<double>(blocks_)));
+  }
+
+ private:
+  static constexpr double kExpectedBlocks = 4;  // that the expectation weighs
+  double expected2_ = 0, sum_ = 0;
+  std::uint64_t blocks_ = 0;
+};
+
+}  // namespace vergence::calibration::detail
