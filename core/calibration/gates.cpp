@@ -181,6 +181,7 @@ Gate ask_gates(const GateQuestion& q, const CalibrationOptions& o) noexcept {
   } else if (sigma_excess(s.rig, o) > (q.window_full ? kFullWindow : 1.0)) {
     return Gate::sigmas_too_large;
   }
+  if (q.log == nullptr) return Gate::open;
   const HeldOut fit = held_out(*q.log, s.newest, s.rig);
   if (fit.frames >= kFewestHeldOut && fit.median_px > kWorstFit) return Gate::does_not_fit;
   if (q.in_use != nullptr && q.must_be_better && !fits_better(*q.log, s.newest, s.rig, *q.in_use)) return Gate::no_better;

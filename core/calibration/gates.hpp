@@ -59,7 +59,7 @@ struct GateQuestion {
   const RigSolution* solution = nullptr;
   const RigCalibration* nominal = nullptr;
   const RigCalibration* in_use = nullptr;  // null: there is none
-  const TrackLog* log = nullptr;           // with the frames since the snapshot
+  const TrackLog* log = nullptr;           // with the frames since the snapshot; null: there are none to hold it against
   bool lenses = false;                     // they were free: depth is judged by their joint covariance, not the transform's single sigmas
   double pixel_sigma = 0.15;               // px, of a tracked corner: judged_depth_m()
   bool must_be_better = true;              // than `in_use`, on frames that were not used

@@ -54,13 +54,14 @@ void TrackLog::copy(const TrackLog& from, std::size_t frames) noexcept {
   clear();
   first_ = 0;
   const std::size_t n = std::min({frames, from.size(), frames_.size()});
-  for (std::size_t i = from.size() - n; i < from.size(); ++i) {
-    const LoggedFrame& source = from.frame(i);
-    begin(source);
-    const std::size_t at = slot(size_ - 1), count = std::min(source.sightings.size(), capacity_);
-    std::copy_n(source.sightings.begin(), count, sightings_.begin() + static_cast<std::ptrdiff_t>(at * capacity_));
-    frames_[at].sightings = sightings_.subspan(at * capacity_, count);
-  }
+  for (std::size_t i = from.size() - n; i < from.size(); ++i) append(from.frame(i));
+}
+
+void TrackLog::append(const LoggedFrame& frame) noexcept {
+  begin(frame);
+  const std::size_t at = slot(size_ - 1), count = std::min(frame.sightings.size(), capacity_);
+  std::copy_n(frame.sightings.begin(), count, sightings_.begin() + static_cast<std::ptrdiff_t>(at * capacity_));
+  frames_[at].sightings = sightings_.subspan(at * capacity_, count);
 }
 
 }  // namespace vergence::calibration

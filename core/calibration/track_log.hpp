@@ -50,6 +50,8 @@ class TrackLog {
   void drop_before(std::uint64_t number) noexcept;
   /// The world was scaled about a place: the poses follow.
   void scale_about(const Vec3& centre, double factor) noexcept;
+  /// A frame of another log with its sightings.
+  void append(const LoggedFrame& frame) noexcept;
   /// The newest `frames` of another log with its sightings, in place of what is here.
   void copy(const TrackLog& from, std::size_t frames) noexcept;
 

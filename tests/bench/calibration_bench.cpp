@@ -2,6 +2,8 @@
 //
 //   calibration_bench mock [--starts N] [--first K] [--from SECONDS] [--frames N] [--set KEY=VALUE]…    the paper's rig on the mock's
 //   streets calibration_bench euroc|kitti [--set …]                                              recorded excerpts, images as they are
+//   calibration_bench drives|stretches [--only NAME] [--set …]    every recorded drive: calibration given, wrong, found, knocked;
+//   how far disjoint stretches of it agree
 //
 // One line a calibration, then the largest errors and their root means. `--verbose`: every event and the poses' status.
 #include <algorithm>
@@ -25,6 +27,7 @@
 #include "core/estimator/estimator.hpp"
 #include "core/math/random.hpp"
 #include "core/math/so3.hpp"
+#include "tests/bench/calibration_drives.hpp"
 #include "tests/support/rendered_drive.hpp"
 #include "tests/support/shared_data.hpp"
 
@@ -33,7 +36,7 @@ namespace {
 using namespace vergence;
 
 struct Arguments {
-  std::string what;
+  std::string what, only;
   int starts = 20, first = 0, frames = 400;
   double from = -1;
   bool verbose = false;
@@ -303,6 +306,8 @@ int main(int argc, char** argv) {
       a.frames = std::stoi(next());
     else if (word == "--set")
       a.set.push_back(next());
+    else if (word == "--only")
+      a.only = next();
     else if (word == "--verbose")
       a.verbose = true;
     else if (word == "--wrong-intrinsics")
@@ -313,11 +318,13 @@ int main(int argc, char** argv) {
   try {
     if (a.what == "mock") return run_mock(a);
     if (a.what == "knock") return run_knocks(a);
+    if (a.what == "drives") return bench::run_drives(a.set, a.only);
+    if (a.what == "stretches") return bench::run_stretches(a.set, a.only);
     if (a.what == "euroc" || a.what == "kitti") return run_recorded(a);
   } catch (const std::exception& e) {
     fmt::print(stderr, "calibration_bench: {}\n", e.what());
     return 2;
   }
-  fmt::print(stderr, "calibration_bench: mock, euroc or kitti is wanted\n");
+  fmt::print(stderr, "calibration_bench: drives, stretches, mock, knock, euroc or kitti is wanted\n");
   return 2;
 }

@@ -1,0 +1,76 @@
+#pragma once
+#include <array>
+
+#include "core/camera/camera.hpp"
+#include "core/types/calibration.hpp"
+
+namespace vergence::calibration::detail {
+
+inline constexpr int kDepthGrid = 7;  // places a side of the image
+
+/// A place of the left image, a depth, and what camera k of a rig makes of the point there.
+struct SeenByBoth {
+  const Camera* left = nullptr;
+  const Camera* right = nullptr;
+  double depth_m = 0;
+  Vec2 pixel = Vec2::Zero();     // left
+  Vec3 ray = Vec3::Zero();       // left, (x, y, 1)
+  Vec3 X = Vec3::Zero();         // the point in camera k, m
+  Vec2 at = Vec2::Zero();        // right pixel
+  Mat23 G = Mat23::Zero();       // ∂at/∂X
+  Vec2 by_depth = Vec2::Zero();  // ∂at/∂depth, px/m
+};
+
+/// Calls each(place) for a grid of places that both cameras see at a depth.
+template <class Each>
+void for_places(const RigCalibration& rig, int k, double depth_m, Each each) noexcept {
+  const auto c = static_cast<std::size_t>(k);
+  const Transform& T = rig.T_camera_left[c];
+  const Camera left(rig.intrinsics[0]), right(rig.intrinsics[c]);
+  for (int row = 0; row < kDepthGrid; ++row) {
+    for (int column = 0; column < kDepthGrid; ++column) {
+      SeenByBoth p;
+      p.left = &left;
+      p.right = &right;
+      p.depth_m = depth_m;
+      p.pixel = {(column + 0.5) / kDepthGrid * rig.intrinsics[0].width, (row + 0.5) / kDepthGrid * rig.intrinsics[0].height};
+      if (!left.unproject(p.pixel, &p.ray)) continue;
+      p.X = T * (p.ray * depth_m);
+      if (right.project(p.X, &p.at, &p.G) != ProjectStatus::ok || !right.inside(p.at, 0.0)) continue;
+      p.by_depth = p.G * (T.R * p.ray);
+      if (p.by_depth.squaredNorm() > 0) each(p);
+    }
+  }
+}
+
+/// Derivatives of a relative depth by a rig's parameters: the rows of RigCovariance that it has and their factors.
+struct DepthGradient {
+  std::array<int, 6 + 2 * kIntrinsicsSize> row;
+  std::array<double, 6 + 2 * kIntrinsicsSize> by;
+  int count = 0;
+
+  void add(int r, double value) noexcept {
+    row[static_cast<std::size_t>(count)] = r;
+    by[static_cast<std::size_t>(count++)] = value;
+  }
+};
+
+/// `lenses`: theirs too, else the transform's alone.
+[[nodiscard]] DepthGradient depth_gradient(const SeenByBoth& place, const Transform& T_camera_left, int k, bool lenses) noexcept;
+
+/// Variance of the relative depth; without `joint` that of the transform alone, by covariance_wide or the wide sigmas.
+[[nodiscard]] double variance_of(const RigCalibration& rig, int k, const DepthGradient& g, bool joint) noexcept;
+
+/// The depths that a rig gives to pairs of pixels.
+class DepthReader {
+ public:
+  DepthReader(const RigCalibration& rig, int k) noexcept;
+  /// How much larger the inverse depth is that this rig gives to the place's two pixels, relative. False: outside its lenses' models.
+  [[nodiscard]] bool difference(const SeenByBoth& place, double* relative) const noexcept;
+
+ private:
+  Camera left_, right_;
+  Transform T_;
+};
+
+}  // namespace vergence::calibration::detail

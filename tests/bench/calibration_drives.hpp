@@ -1,0 +1,14 @@
+#pragma once
+#include <string>
+#include <vector>
+
+namespace vergence::bench {
+
+/// `calibration_bench drives`: every recorded drive, its calibration given, wrong, found; knocks on real images. → exit code.
+int run_drives(const std::vector<std::string>& set, const std::string& only);
+
+/// `calibration_bench stretches DATA…`: normalised squared differences of disjoint stretches (METHOD §6.5), of recorded drives and of a
+/// rendered one. → exit code.
+int run_stretches(const std::vector<std::string>& set, const std::string& only);
+
+}  // namespace vergence::bench
