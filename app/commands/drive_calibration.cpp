@@ -15,7 +15,7 @@
 namespace vergence::app {
 namespace {
 
-constexpr std::size_t kAloneFrames = 75;  // of a stretch by itself, about: half of what a joined one has, so that also short drives have two
+constexpr std::size_t kAloneFrames = 40;  // of a stretch by itself, at most about: short drives, too, are to have two
 
 calibration::GateQuestion question_of(const calibration::RigSolution& s, const StartingCalibration& told, const Configuration& c) {
   calibration::GateQuestion q;

@@ -122,7 +122,7 @@ EventRecord EventRecord::of(const EstimatorEvent& event) noexcept {
     const char* begin = opening(event.kind);
     const char* why = event.kind == EstimatorEvent::Kind::calibration_accepted ? "" : event.why;
     std::array<char, 256> text{};
-    if (event.kind == EstimatorEvent::Kind::calibration_contradicted)
+    if (event.kind == EstimatorEvent::Kind::calibration_contradicted && event.value > 0)
       (void)std::snprintf(text.data(), text.size(), "%s: its depths are off by %.1f %%", why, event.value);
     else
       (void)std::snprintf(text.data(), text.size(), "%s%s%s", begin, *begin != 0 && *why != 0 ? ": " : "", why);
@@ -196,7 +196,7 @@ CalibrationRecord CalibrationRecord::of(const CalibrationDecision& d) noexcept {
   r.held_out_before_px = d.held_out_before_px;
   r.held_out_after_px = d.held_out_after_px;
   r.solve_ms = d.solve_ms;
-  r.learnt = d.cause == CalibrationCause::refinement || d.cause == CalibrationCause::contradicted;
+  r.learnt = d.learnt;
   r.judged_depth_m = d.judged_depth_m;
   r.depth_sigma_percent = d.depth_sigma_percent;
   r.depth_difference_percent = d.depth_difference_percent;

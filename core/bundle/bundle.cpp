@@ -277,6 +277,7 @@ const char* BundleOptions::validate() const noexcept {
     if (l.kind == BundleLength::measured && (!(l.sigma > 0) || !(l.metres > 0)))
       return "length: a measured length needs metres and sigma above 0";
   }
+  if (cells < 0 || cells > detail::kMostCells) return "cells is not in 0 … 8";
   if (!(shared_errors > 0) || !std::isfinite(shared_errors)) return "shared_errors is not above 0";
   if (!(shared_prior.weight > 0) || !std::isfinite(shared_prior.weight)) return "shared_prior: weight is not above 0";
   for (const BundleIntrinsics& i : intrinsics)

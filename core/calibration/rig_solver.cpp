@@ -18,9 +18,10 @@ constexpr int kLeastTies = 10;  // points that tie a frame to those before it
 constexpr int kLeastCandidateMatches = 40;         // across, of the frame whose own transform begins the solve
 constexpr double kHuber = 2.0, kCauchy = 2.5;      // residual scales
 constexpr double kFirstCut = 6.0, kLastCut = 4.0;  // residual scales beyond which a sighting is left out
-// Tracks on one surface share errors that a cluster a track does not see: variance of the transforms found on rendered drives over the
-// one by clusters (docs/calibration.md).
-constexpr double kSharedErrors = 2.5;
+// Tracks share errors that a cluster a track does not see: clusters are cells of the image and blocks of frames. What is left, variance of
+// the transforms found on recorded and rendered drives over the one by clusters (docs/calibration.md).
+constexpr int kCells = 6;
+constexpr double kSharedErrors = 3.5;
 constexpr double kUsualInflation = 6;  // of a calibration that does not say its own
 constexpr double kMedianOfTwo = 1.1774;  // median length of a vector of two standard normal numbers
 
@@ -228,6 +229,7 @@ BundleOptions RigSolver::options_of(const RigSolveRequest& request) const noexce
   BundleOptions how;
   how.configuration = BundleConfiguration::stereo_calibration;
   how.shared_errors = kSharedErrors;
+  how.cells = kCells;
   how.length[1] = {BundleLength::exact, rig.baseline, 0};
   for (int k = 2; k < count_; ++k) how.length[static_cast<std::size_t>(k)].kind = BundleLength::free;
   for (int k = 0; k < count_; ++k) {

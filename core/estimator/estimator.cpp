@@ -84,8 +84,9 @@ const char* sentence_of(CalibrationCause cause) noexcept {
       return "the cameras' images are not of the same instant";
     case CalibrationCause::requested:
       return "a new calibration is asked for";
-    case CalibrationCause::refinement:
     case CalibrationCause::contradicted:
+      return "left and right hardly match with the calibration in use: it is not that of the rig";
+    case CalibrationCause::refinement:
       break;  // no reason to seek one
   }
   return "";
@@ -124,6 +125,7 @@ struct Estimator::Parts {
   }
 
   void doubt(CalibrationCause cause, std::uint64_t onset, const RigFrame& frame) noexcept;
+  void give_up_calibration(const RigFrame& frame, double frames) noexcept;
   void watch(const odometry::FrameOutcome& out, const RigFrame& frame) noexcept;
   void calibrate(const RigFrame& frame) noexcept;
   void take(const CalibrationDecision& decision, Stamp stamp) noexcept;
@@ -162,6 +164,20 @@ void Estimator::Parts::doubt(CalibrationCause cause, std::uint64_t onset, const 
   odometry.unlink();
 }
 
+/// Left and right hardly match with the calibration in use. One that the drive never confirmed was not the rig's from the start; one that it
+/// did was knocked away.
+void Estimator::Parts::give_up_calibration(const RigFrame& frame, double frames) noexcept {
+  const CalibrationCause cause = calibrator.ever_verified() ? CalibrationCause::collapse : CalibrationCause::contradicted;
+  if (cause == CalibrationCause::collapse)
+    note(EstimatorEvent::Kind::rig_changed, frame.stamp, sentence_of(cause), frames);
+  else
+    note(EstimatorEvent::Kind::calibration_contradicted, frame.stamp, sentence_of(cause), 0);
+  transition(Trigger::rig_changed, frame.stamp);
+  calibrator.seek(cause, frame.number, frame.number);
+  verified = false;
+  odometry.unlink();
+}
+
 /// What the monitors say of a frame posed with the calibration in use.
 void Estimator::Parts::watch(const odometry::FrameOutcome& out, const RigFrame& frame) noexcept {
   using K = calibration::MonitorVerdict::Kind;
@@ -178,7 +194,9 @@ void Estimator::Parts::watch(const odometry::FrameOutcome& out, const RigFrame& 
       note(EstimatorEvent::Kind::calibration_confirmed, frame.stamp, "the cameras are in step again", 0);
     return;
   }
-  if (v.kind != K::quiet) {
+  if (v.kind == K::collapse) {
+    give_up_calibration(frame, static_cast<double>(frame.number - std::min(v.onset_frame, frame.number)));
+  } else if (v.kind != K::quiet) {
     doubt(cause_of(v.kind), first_frame_of_use(v, frame.number), frame);
   }
 }
@@ -218,8 +236,7 @@ void Estimator::Parts::take(const CalibrationDecision& decision, Stamp stamp) no
   (void)decisions.push(decision);
   const bool was_verified = verified;
   verified = calibrator.verified();
-  if (decision.cause == CalibrationCause::refinement || decision.cause == CalibrationCause::contradicted)
-    return take_learnt(decision, was_verified, stamp);
+  if (decision.learnt) return take_learnt(decision, was_verified, stamp);
   if (decision.accepted) {
     note(EstimatorEvent::Kind::calibration_accepted, stamp, "a calibration is accepted", decision.calibration.frames);
     calibrator.use(decision.calibration, decision.lenses);
@@ -263,9 +280,7 @@ void Estimator::Parts::follow(const odometry::FrameOutcome& out, const RigFrame&
   if (options.online && unmatched_frames == kUnmatchedAfter) {
     unmatched_frames = 0;
     // Good images of which no scene can be made: then it is the rig that does not fit.
-    note(EstimatorEvent::Kind::rig_changed, frame.stamp, sentence_of(CalibrationCause::collapse), kUnmatchedAfter);
-    calibrator.seek(CalibrationCause::collapse, frame.number, frame.number);
-    odometry.unlink();
+    give_up_calibration(frame, kUnmatchedAfter);
     odometry.forget_rig();
   }
   if (!out.posed) {

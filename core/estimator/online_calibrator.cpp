@@ -380,6 +380,7 @@ CalibrationDecision OnlineCalibrator::judge_sought(Stamp stamp, std::uint64_t nu
   assess_lenses(found.rig, found.newest, &d);
   if (gate_ == Gate::open) {
     verified_ = d.verified;
+    ever_verified_ = ever_verified_ || verified_;
   } else if (gate_ == Gate::sigmas_too_large || gate_ == Gate::needs_motion || gate_ == Gate::needs_near_structure) {
     // More of the same helps: sigmas fall with the root of the number of frames.
     const double excess = gate_ == Gate::sigmas_too_large ? calibration::sigma_excess(found.rig, options_.calibration) : 1.0;
@@ -421,6 +422,7 @@ bool OnlineCalibrator::lenses_are_off(bool last) const noexcept {
 void OnlineCalibrator::set_verified(bool verified) noexcept {
   if (verified == verified_) return;
   verified_ = verified;
+  ever_verified_ = ever_verified_ || verified;
   watch_calibration();
 }
 
@@ -433,6 +435,7 @@ CalibrationDecision OnlineCalibrator::judge_learnt(Stamp stamp, std::uint64_t nu
   gate_ = calibration::ask_gates(q, options_.calibration);
   CalibrationDecision d = begin_decision(stamp, number, found);
   d.cause = CalibrationCause::refinement;
+  d.learnt = true;
   if (found.status == calibration::RigSolveStatus::ok) {
     const calibration::Assessment a =
         calibration::assess(found.rig, rig_, log_, found.newest, options_.calibration, options_.odometry.pixel_sigma);

@@ -71,6 +71,8 @@ class OnlineCalibrator {
   [[nodiscard]] bool calibrated() const noexcept { return calibrated_; }
   /// The drive itself has confirmed the calibration in use (METHOD §6.4).
   [[nodiscard]] bool verified() const noexcept { return verified_; }
+  /// It has confirmed one before: what does not fit since then is a change of the rig.
+  [[nodiscard]] bool ever_verified() const noexcept { return ever_verified_; }
   /// Frames in a row that agree with the calibration in use.
   [[nodiscard]] int frames_agreed() const noexcept;
 
@@ -106,7 +108,7 @@ class OnlineCalibrator {
   RigCalibration rig_, nominal_;
   const RigCalibration told_;  // the drive began with
   bool calibrated_;
-  bool verified_ = false;
+  bool verified_ = false, ever_verified_ = false;
   bool found_with_lenses_ = false;
   RigCalibration learnt_{};      // what closed segments tell, with the lenses free
   bool any_learnt_ = false;

@@ -24,6 +24,7 @@ struct CalibrationDecision {
   Stamp stamp{};  // of the frame it was decided at
   CalibrationCause cause = CalibrationCause::from_scratch;
   bool accepted = false;
+  bool learnt = false;  // measured while the drive went on: not accepted is no rejection, what is in use fits as well
   const char* reason = "";        // why it was rejected, a constant sentence without commas; empty when accepted
   RigCalibration calibration{};   // the one found, also when rejected
   int latency_frames = 0;         // from the alarm (or the start, or the request) to here

@@ -204,10 +204,10 @@ int run_stretches(const std::vector<std::string>& set, const std::string& only) 
       const Vec3 t = 1e3 * s.rig.T_camera_left[1].t;
       const auto& n = s.rig.sigma_noise[1];
       fmt::print("  rotation {:8.3f} ({:.3f}) {:8.3f} ({:.3f}) {:8.3f} ({:.3f}) mrad  t_y {:7.3f} ({:.3f}) t_z {:7.3f} ({:.3f}) mm  cx {:.2f} "
-                 "({:.2f}) cy {:.2f} ({:.2f}) px  {:.0f} ms inflation {:.1f}\n",
+                 "({:.2f}) cy {:.2f} ({:.2f}) px  {:.0f} ms inflation {:.1f} lag {:.4f}\n",
                  phi.x(), 1e3 * n[0], phi.y(), 1e3 * n[1], phi.z(), 1e3 * n[2], t.y(), 1e3 * n[4], t.z(), 1e3 * n[5],
                  s.rig.intrinsics[1].cx, s.rig.intrinsics[1].sigma[2], s.rig.intrinsics[1].cy, s.rig.intrinsics[1].sigma[3], s.solve_ms,
-                 s.rig.inflation);
+                 s.rig.inflation, s.lag_frames);
     }
     double transform = 0, intrinsics = 0;
     std::array<double, calibration::Agreement::kDepths> depth{}, percent{};

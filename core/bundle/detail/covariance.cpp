@@ -1,6 +1,7 @@
 #include "core/bundle/detail/covariance.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include <Eigen/Cholesky>
@@ -14,6 +15,8 @@ using Shared = SharedMatrix;
 using Index = Eigen::Index;
 
 constexpr double kPivotTolerance = 1e-12;
+constexpr std::size_t kBlockFrames = 8;  // at least, of a cluster in time
+constexpr double kMostFewClusters = 4;  // times the variance, for there being few of them
 
 /// Rows of θ_S that are estimated, and those that are held but uncertain.
 struct Partition {
@@ -171,6 +174,68 @@ KnownBeside known_beside(const SharedLayout& s, const BundleProblem& problem, co
   return known;
 }
 
+/// Σ_j s_j s_jᵀ, a cluster a track.
+Shared variance_by_tracks(const BundleWorkspace& w, const BundleProblem& problem, TrackGradient& gradient, int size) noexcept {
+  Shared meat = Shared::Zero(size, size);
+  for (std::size_t i = 0; i < w.point_count; ++i) {
+    const SharedVector s = gradient(problem, i);
+    meat.noalias() += s.lazyProduct(s.transpose());
+  }
+  return meat;
+}
+
+/// Sums of gradients by cluster.
+class Clusters {
+ public:
+  explicit Clusters(int size) noexcept : size_(size) {}
+  void add(std::size_t cluster, const SharedVector& s) noexcept {
+    if (any_[cluster])
+      sums_[cluster] += s;
+    else
+      sums_[cluster] = s;
+    any_[cluster] = true;
+  }
+  /// Σ s sᵀ, made up for there being few: a mean over n clusters has taken up one of them, and `parameters` each one more.
+  [[nodiscard]] Shared variance(int parameters) const noexcept {
+    Shared meat = Shared::Zero(size_, size_);
+    int n = 0;
+    for (std::size_t c = 0; c < sums_.size(); ++c) {
+      if (!any_[c]) continue;
+      ++n;
+      meat.noalias() += sums_[c].lazyProduct(sums_[c].transpose());
+    }
+    if (n <= 1) return Shared::Zero(size_, size_);
+    return meat * std::min(kMostFewClusters, n / std::max(1.0, static_cast<double>(n - parameters)));
+  }
+
+ private:
+  int size_;
+  std::array<SharedVector, static_cast<std::size_t>(kMostCells* kMostCells)> sums_;
+  std::array<bool, static_cast<std::size_t>(kMostCells* kMostCells)> any_{};
+};
+
+/// The same with larger clusters, of two kinds, since tracks share errors in both ways: a cell of the left image (what a lens model leaves
+/// is a field over the image, common to all tracks there), and a block of frames (what a scene does to it). Under independent errors each
+/// gives the variance by tracks; the mean of both is taken.
+Shared variance_by_cells(const BundleWorkspace& w, const BundleProblem& problem, int cells, TrackGradient& gradient, int size) noexcept {
+  Clusters by_cell(size), by_block(size);
+  const Intrinsics& lens = problem.cameras[0].intrinsics();
+  const auto cell_of = [&](double at, int length) { return std::clamp(static_cast<int>(at * cells / length), 0, cells - 1); };
+  const std::size_t poses = problem.T_left_world.size();
+  const std::size_t blocks = std::clamp<std::size_t>(poses / kBlockFrames, 1, static_cast<std::size_t>(kMostCells));
+  for (std::size_t i = 0; i < w.point_count; ++i) {
+    const auto point = static_cast<std::uint32_t>(w.order[i]);
+    const std::uint32_t begin = w.first_observation[point], end = w.first_observation[point + 1];
+    // In the middle of its life; any image does, for the fields of all are fields over the direction.
+    const BundleObservation& middle = problem.observations[begin + (end - begin) / 2];
+    const SharedVector s = gradient(problem, i);
+    by_cell.add(static_cast<std::size_t>(cell_of(middle.y, lens.height) * cells + cell_of(middle.x, lens.width)), s);
+    by_block.add(middle.pose * blocks / poses, s);
+  }
+  const Shared cell = by_cell.variance(size);
+  return blocks > 1 ? Shared(0.5 * (cell + by_block.variance(1))) : cell;
+}
+
 /// From the rows of camera k to (φ, τ) of the left perturbation R ← Exp(φ) R, t ← t + τ; its first columns are the rows that there are.
 Mat6 to_published(const SharedLayout& s, const KernelCamera& camera, const Transform& T, int k) noexcept {
   Mat6 turn = Mat6::Zero();
@@ -243,12 +308,9 @@ void shared_covariance(BundleWorkspace& w, const BundleProblem& problem, const B
   if (!inverse.allFinite()) return;
 
   poses_to_shared(A, ld, first, size);
-  Shared meat = Shared::Zero(layout.size, layout.size);
   TrackGradient gradient(w, options, state, system, problem.cameras.size());
-  for (std::size_t i = 0; i < w.point_count; ++i) {
-    const SharedVector s = gradient(problem, i);
-    meat.noalias() += s.lazyProduct(s.transpose());
-  }
+  const Shared meat = options.cells > 0 ? variance_by_cells(w, problem, options.cells, gradient, layout.size)
+                                        : variance_by_tracks(w, problem, gradient, layout.size);
   const KnownBeside known = known_beside(layout, problem, options, state, system);
   Shared own_meat(p.estimated_count, p.estimated_count);
   double clustered = 0, believed = 0;
