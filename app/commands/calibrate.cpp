@@ -12,6 +12,8 @@
 #include "app/commands/calibrate_session.hpp"
 #include "app/commands/commands.hpp"
 #include "app/commands/common_options.hpp"
+#include "app/commands/drive_calibration.hpp"
+#include "app/commands/replay_session.hpp"
 
 namespace vergence::app {
 namespace {
@@ -19,7 +21,8 @@ namespace {
 /// The words as given; checked when the command runs.
 struct Arguments {
   CommonOptions common;
-  std::string configuration, board, out, model = "radtan", format, size;
+  std::string configuration, board, out, model = "radtan", format, size, drive;
+  std::optional<std::string> calibration;
   std::vector<std::string> left, right, convert;
   std::vector<std::string> more_cameras;  // one pattern each
   std::optional<std::string> keep_views;
@@ -69,9 +72,41 @@ ExitCode convert(const Arguments& a) {
   return ExitCode::done;
 }
 
+/// An ordinary drive instead of a board.
+ExitCode calibrate_from_drive(const Arguments& a) {
+  if (a.out.empty()) throw InputError("--out is missing: the calibration.yaml to write");
+  if (a.format.empty()) throw InputError("--format is missing: the layout of --drive's folder, as replay has it");
+  check_writable(a.out);
+  const Configuration c = a.common.configuration(std::nullopt);
+  std::optional<std::filesystem::path> file;
+  if (a.calibration) file = *a.calibration;
+  // Of what the drive comes with only lenses and length are read: how its cameras sit need not be known.
+  const StereoSequence sequence = open_sequence(sequence_format(a.format), a.drive, file, {true, a.baseline.value_or(0)});
+  check_image_sizes(sequence, 0, sequence.pairs.size());
+  const StartingCalibration told = replayed_calibration(c, sequence, true);
+  Progress progress = Progress::on_stderr(a.common.quiet);
+  const DriveCalibration found = calibrate_with_progress({sequence, c, 0, sequence.pairs.size(), {}, {}}, told, &progress);
+  if (!found.rig) {
+    progress.say(fmt::format("vergence: {}: no calibration was found, nothing is written: {}", a.drive, found.why));
+    return ExitCode::not_usable;
+  }
+  CalibrationFile written = told.file;
+  written.rig = *found.rig;
+  written.source = "drive";
+  write_calibration(a.out, written);
+  std::cout << describe(found);
+  if (!found.verified)
+    progress.say("vergence: the depth is not known well enough: a longer drive with turns, past things near the road, would help");
+  progress.say(a.out + ": written");
+  return found.verified ? ExitCode::done : ExitCode::not_usable;
+}
+
 ExitCode run(const Arguments& a) {
-  const int ways = (a.configuration.empty() ? 0 : 1) + (a.left.empty() ? 0 : 1) + (a.convert.empty() ? 0 : 1);
-  if (ways != 1) throw InputError("calibrate: give image files (--left, --right), a CONFIG with cameras, or --convert IN OUT; one of them");
+  const int ways = (a.configuration.empty() ? 0 : 1) + (a.left.empty() ? 0 : 1) + (a.convert.empty() ? 0 : 1) + (a.drive.empty() ? 0 : 1);
+  if (ways != 1)
+    throw InputError(
+        "calibrate: give image files (--left, --right), a CONFIG with cameras, --drive DATA, or --convert IN OUT; one of them");
+  if (!a.drive.empty()) return calibrate_from_drive(a);
   if (!a.convert.empty()) return convert(a);
   if (a.configuration.empty() && a.keep_views) throw InputError("--keep-views is for live views; image files are kept as they are");
   if (!a.configuration.empty()) {
@@ -98,6 +133,10 @@ void add_calibrate(CLI::App& root, ExitCode* exit_code) {
   command->add_option("--left", a->left, "Images of the left camera, a pattern in quotes; alone: one camera's lens")->type_name("GLOB");
   command->add_option("--right", a->right, "Images of the right camera, paired by number or order of name")->type_name("GLOB");
   command->add_option("--camera", a->more_cameras, "Images of a third and a fourth camera")->type_name("GLOB")->allow_extra_args(false);
+  command->add_option("--drive", a->drive, "An ordinary recorded drive instead of a board: lenses and places of the cameras")
+      ->type_name("DATA");
+  command->add_option("--calibration", a->calibration, "--drive: lenses and length to begin with, instead of the data set's own")
+      ->type_name("FILE");
   command->add_option("--board", a->board, "Inner corners along and down")->type_name("9x6");
   command->add_option("--square", a->square, "Side of a square, m")->type_name("M");
   command->add_option("--out", a->out, "calibration.yaml to write")->type_name("F");
@@ -105,7 +144,10 @@ void add_calibrate(CLI::App& root, ExitCode* exit_code) {
       ->check(CLI::IsMember({"radtan", "equidistant"}))
       ->capture_default_str();
   command->add_flag("--k3", a->sixth_order, "radtan: estimate k3, too");
-  command->add_option("--baseline", a->baseline, "Distance of left and right as somebody measured it, m: reported against")->type_name("M");
+  command
+      ->add_option("--baseline", a->baseline,
+                   "Distance of left and right as somebody measured it, m: reported against; --drive: instead of the file's")
+      ->type_name("M");
   command->add_flag("--json", a->json, "Print JSON instead of tables");
   command->add_option("--keep-views", a->keep_views, "Live: keep the images of the views taken, in a new folder")->type_name("DIR");
   command
@@ -115,7 +157,10 @@ void add_calibrate(CLI::App& root, ExitCode* exit_code) {
           "OpenCV stereo YAML (one file, or intrinsics.yml,extrinsics.yml)")
       ->expected(2)
       ->type_name("IN OUT");
-  command->add_option("--format", a->format, "--convert: what OUT is, where its name does not tell: vergence, kalibr, ros, opencv")
+  command
+      ->add_option("--format", a->format,
+                   "--drive: the layout of DATA, as replay has it; --convert: what OUT is, where its name does not tell: "
+                   "vergence, kalibr, ros, opencv")
       ->type_name("WORD");
   command->add_option("--size", a->size, "--convert: image size of an OpenCV file that has none")->type_name("WxH");
   a->common.declare(*command);

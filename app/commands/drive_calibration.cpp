@@ -1,21 +1,30 @@
 #include "app/commands/drive_calibration.hpp"
 
 #include <algorithm>
+#include <cmath>
+#include <iterator>
 #include <memory>
+#include <numbers>
+
+#include <fmt/format.h>
 
 #include "app/commands/camera_masks.hpp"
 #include "app/commands/session_files.hpp"
 #include "app/datasets/frame_decoder.hpp"
 #include "app/runtime/background_thread.hpp"
+#include "app/runtime/signals.hpp"
 #include "core/calibration/gates.hpp"
 #include "core/calibration/health.hpp"
 #include "core/calibration/stretches.hpp"
 #include "core/estimator/estimator.hpp"
+#include "core/math/so3.hpp"
 
 namespace vergence::app {
 namespace {
 
-constexpr std::size_t kAloneFrames = 40;  // of a stretch by itself, at most about: short drives, too, are to have two
+constexpr std::size_t kMiddleDepth = 2;                 // of Agreement::depth_m: 20 m
+constexpr int kMoreFeatures = 2, kMostFeatures = 1000;  // of a drive's own: nobody waits for a pose here
+constexpr std::size_t kAloneFrames = 40;                // of a stretch by itself, at most about: short drives, too, are to have two
 
 calibration::GateQuestion question_of(const calibration::RigSolution& s, const StartingCalibration& told, const Configuration& c) {
   calibration::GateQuestion q;
@@ -48,6 +57,7 @@ std::optional<RigCalibration> drive_once(const DrivePass& pass, const StartingCa
   Estimator estimator(options, rig, begin.nominal, estimator_arena, *runner, solver);
   FrameDecoder decoder(pass.sequence, pass.start, pass.count, pool);
   std::size_t done = 0;
+  bool stopped = false;
   for (DecodedPair pair; decoder.next(&pair);) {
     if (pair.decoded) {
       RigFrame frame;
@@ -60,16 +70,23 @@ std::optional<RigCalibration> drive_once(const DrivePass& pass, const StartingCa
       decoder.release(pair);
     }
     if (pass.progress) pass.progress(++done);
-    if (pass.stopped && pass.stopped()) decoder.stop();
+    if (pass.stopped && pass.stopped()) {
+      decoder.stop();
+      stopped = true;
+    }
   }
   estimator.finish();
-  if (!estimator.calibrated()) return std::nullopt;
+  if (stopped || !estimator.calibrated()) return std::nullopt;
   return estimator.calibration();
 }
 
-DriveCalibration calibrate_drive(const DrivePass& pass, const StartingCalibration& told) {
+DriveCalibration calibrate_drive(const DrivePass& drive, const StartingCalibration& told) {
   using calibration::Stretches;
   DriveCalibration result;
+  Configuration c = drive.configuration;
+  c.odometry.features = std::max(c.odometry.features, std::min(kMoreFeatures * c.odometry.features, kMostFeatures));
+  c.online = 1;
+  const DrivePass pass{drive.sequence, c, drive.start, drive.count, drive.stopped, drive.progress};
   StartingCalibration blank = told;
   apply_use({.length_only = true}, &blank.file.rig);
   blank.trust = CalibrationTrust::none;
@@ -88,7 +105,6 @@ DriveCalibration calibrate_drive(const DrivePass& pass, const StartingCalibratio
   found.file.rig = *first;
   found.trust = CalibrationTrust::given;
 
-  const Configuration& c = pass.configuration;
   const auto features = static_cast<std::size_t>(c.odometry.features);
   Arena arena(arena_size(2 * Stretches::memory_needed(c.calibration, c.monitor, told.file.rig.cameras, features)));
   Stretches joined(Stretches::Kind::joined, blank.file.rig, *first,
@@ -108,10 +124,14 @@ DriveCalibration calibrate_drive(const DrivePass& pass, const StartingCalibratio
   const auto note = [&](const std::optional<calibration::RigSolution>& s) {
     if (s && s->status == calibration::RigSolveStatus::ok) result.stretches.push_back(*s);
   };
-  (void)drive_once(pass, found, [&](const Estimator& e, const PoseSample& /*sample*/) {
+  const auto second = drive_once(pass, found, [&](const Estimator& e, const PoseSample& /*sample*/) {
     keep(joined.take(e.tracks()));
     note(alone.take(e.tracks()));
   });
+  if (!second) {
+    result.why = "it was interrupted";
+    return result;
+  }
   keep(joined.end());
   note(alone.end());
   for (std::size_t i = 1; i < result.stretches.size(); ++i)
@@ -128,6 +148,61 @@ DriveCalibration calibrate_drive(const DrivePass& pass, const StartingCalibratio
   }
   result.verified = result.depth_sigma_percent <= c.calibration.tolerated_depth_percent;
   return result;
+}
+
+DriveCalibration calibrate_with_progress(const DrivePass& pass, const StartingCalibration& told, Progress* progress) {
+  constexpr std::size_t kPasses = 2;
+  const SignalGuard signals;
+  std::size_t before = 0, last = 0;
+  DrivePass watched = pass;
+  watched.stopped = [&] { return signals.stop_requested(); };
+  watched.progress = [&](std::size_t done) {
+    if (done < last) before += last;  // the next pass
+    last = done;
+    ProgressState state;
+    state.state = "calibrating from the drive";
+    state.frame = before + done;
+    state.frames = kPasses * pass.count;
+    progress->update(state);
+  };
+  DriveCalibration found = calibrate_drive(watched, told);
+  progress->finish();
+  return found;
+}
+
+std::string describe(const DriveCalibration& found) {
+  std::string text;
+  const auto out = std::back_inserter(text);
+  const RigCalibration& rig = *found.rig;
+  for (std::size_t k = 0; k < static_cast<std::size_t>(rig.cameras); ++k) {
+    const Intrinsics& lens = rig.intrinsics[k];
+    fmt::format_to(out, "camera {}  fx {:.3f} ± {:.3f}  fy {:.3f} ± {:.3f}  cx {:.3f} ± {:.3f}  cy {:.3f} ± {:.3f} px\n", k, lens.fx,
+                   lens.sigma[0], lens.fy, lens.sigma[1], lens.cx, lens.sigma[2], lens.cy, lens.sigma[3]);
+    fmt::format_to(out, "          distortion");
+    for (std::size_t i = 0; i < 4; ++i) fmt::format_to(out, " {:.5f} ± {:.5f}", lens.distortion[i], lens.distortion_sigma[i]);
+    text += '\n';
+    if (k == 0) continue;
+    const Vec3 turn = log_so3(rig.T_camera_left[k].R) * (180 / std::numbers::pi);
+    const Vec3& t = rig.T_camera_left[k].t;
+    const auto& sigma = rig.sigma_wide[k];
+    fmt::format_to(out, "          rotation {:.4f} ± {:.4f}, {:.4f} ± {:.4f}, {:.4f} ± {:.4f} deg\n", turn.x(),
+                   sigma[0] * 180 / std::numbers::pi, turn.y(), sigma[1] * 180 / std::numbers::pi, turn.z(),
+                   sigma[2] * 180 / std::numbers::pi);
+    fmt::format_to(out, "          t {:.3f} ± {:.3f}, {:.3f} ± {:.3f}, {:.3f} ± {:.3f} mm\n", 1e3 * t.x(), 1e3 * sigma[3], 1e3 * t.y(),
+                   1e3 * sigma[4], 1e3 * t.z(), 1e3 * sigma[5]);
+  }
+  fmt::format_to(out, "depths at {:.1f} m are good to {:.2f} % (1 sigma), from {} moving frames\n", found.depth_m,
+                 found.depth_sigma_percent, rig.frames);
+  if (found.agreements.empty()) return text;
+  double sigmas = 0, percent = 0;
+  for (const calibration::Agreement& a : found.agreements) {
+    sigmas += a.transform / static_cast<double>(found.agreements.size());
+    percent = std::max(percent, a.depth_percent[kMiddleDepth]);
+  }
+  fmt::format_to(out,
+                 "{} stretches solved by themselves: transforms differ by {:.1f} of their sigmas, depths at {:g} m by {:.2f} % at most\n",
+                 found.stretches.size(), std::sqrt(sigmas), calibration::Agreement::depth_m[kMiddleDepth], percent);
+  return text;
 }
 
 }  // namespace vergence::app

@@ -19,10 +19,12 @@ struct Arguments {
   std::int64_t start = 0;
   std::optional<std::int64_t> frames;
   std::optional<double> baseline;
-  bool from_scratch = false, memory = false;
+  bool from_scratch = false, calibrate_first = false, memory = false;
 };
 
-SequenceFormat format_of(const std::string& word) {
+}  // namespace
+
+SequenceFormat sequence_format(const std::string& word) {
   if (word == "kitti") return SequenceFormat::kitti;
   if (word == "euroc") return SequenceFormat::euroc;
   if (word == "folder") return SequenceFormat::folder;
@@ -32,6 +34,8 @@ SequenceFormat format_of(const std::string& word) {
                    "; kitti, euroc, folder and st-lucia are what can be read");
 }
 
+namespace {
+
 ReplayRequest request_of(const Arguments& a) {
   if (a.baseline && !(*a.baseline >= 0.005 && *a.baseline <= 20))
     throw InputError("--baseline is the distance of the two cameras in metres, 0.005 to 20");
@@ -39,11 +43,14 @@ ReplayRequest request_of(const Arguments& a) {
   if (a.frames && *a.frames < 1) throw InputError("--frames needs at least 1");
   ReplayRequest r;
   r.data = a.data;
-  r.format = format_of(a.format);
+  r.format = sequence_format(a.format);
+  if (a.calibrate_first && a.from_scratch)
+    throw InputError("--calibrate-first begins from scratch, and drives with what it finds; leave --from-scratch away");
   r.out = a.out;
   if (a.calibration) r.calibration = *a.calibration;
   r.baseline = a.baseline;
   r.from_scratch = a.from_scratch;
+  r.calibrate_first = a.calibrate_first;
   r.start = static_cast<std::size_t>(a.start);
   if (a.frames) r.frames = static_cast<std::size_t>(*a.frames);
   r.configuration = a.common.configuration(std::nullopt);
@@ -68,6 +75,8 @@ void add_replay(CLI::App& root, ExitCode* exit_code) {
   command->add_option("--baseline", a->baseline, "Distance of the two cameras in metres, instead of the calibration's")->type_name("M");
   command->add_flag("--from-scratch", a->from_scratch,
                     "Find the calibration from the drive itself: only intrinsics and the baseline's length are read");
+  command->add_flag("--calibrate-first", a->calibrate_first,
+                    "Calibrate from the whole drive, lenses included, then drive with what was found (twice the drive more)");
   command->add_flag("--memory", a->memory, "Print what memory is held, by whom");
   a->common.declare(*command);
   command->callback([a, exit_code] { *exit_code = run_replay(request_of(*a)); });

@@ -16,6 +16,7 @@
 #include <fmt/format.h>
 
 #include "app/commands/camera_masks.hpp"
+#include "app/commands/drive_calibration.hpp"
 #include "app/commands/drive_journal.hpp"
 #include "app/commands/mock_drive.hpp"
 #include "app/commands/session_files.hpp"
@@ -242,6 +243,22 @@ Trajectory read_reference(const ReplayRequest& request, const StereoSequence& se
   return read_kitti(files->poses, times);
 }
 
+/// What the drive itself says of its rig, in the place of what it came with; where nothing is found that stays, and the user hears why.
+void calibrate_first(const ReplayRequest& request, const StereoSequence& sequence, StartingCalibration* begin) {
+  Progress progress = Progress::on_stderr(request.quiet);
+  const std::size_t count = std::min(request.frames.value_or(sequence.pairs.size()), sequence.pairs.size() - request.start);
+  const DriveCalibration found =
+      calibrate_with_progress({sequence, request.configuration, request.start, count, {}, {}}, *begin, &progress);
+  if (!found.rig) {
+    progress.say("vergence: the drive gives no calibration: " + found.why);
+    return;
+  }
+  if (!request.quiet) progress.say(describe(found));
+  begin->file.rig = *found.rig;
+  begin->file.source = begin->source = "the drive itself";
+  begin->cause = "whole_drive";
+}
+
 }  // namespace
 
 ExitCode run_replay(const ReplayRequest& request) {
@@ -253,6 +270,7 @@ ExitCode run_replay(const ReplayRequest& request) {
   check_image_sizes(sequence, request.start, request.frames.value_or(sequence.pairs.size()));
   StartingCalibration begin = replayed_calibration(request.configuration, sequence, request.from_scratch);
   Trajectory truth = read_reference(request, sequence);
+  if (request.calibrate_first) calibrate_first(request, sequence, &begin);
   std::unique_ptr<Replay> replay;
   try {
     replay = std::make_unique<Replay>(request, std::move(sequence), std::move(begin), std::move(truth));

@@ -18,12 +18,16 @@ struct ReplayRequest {
   std::optional<std::filesystem::path> calibration;  // instead of the data set's own
   std::optional<double> baseline;                    // m: instead of the calibration's length
   bool from_scratch = false;                         // of the calibration only intrinsics and length are read
+  bool calibrate_first = false;                      // from the whole drive, then drive with what was found
   std::size_t start = 0;                             // first frame
   std::optional<std::size_t> frames;                 // at most so many; all when not set
   Configuration configuration;
   bool quiet = false;
   bool print_memory = false;  // a table of what is held, on stdout
 };
+
+/// A word of --format. InputError: none that is known.
+[[nodiscard]] SequenceFormat sequence_format(const std::string& word);
 
 /// Reads a recorded drive, estimates a pose for every frame, writes the session folder of DESIGN §6 and the figures against the data
 /// set's truth.

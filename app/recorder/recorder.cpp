@@ -259,7 +259,11 @@ void Recorder::write(const CalibrationRecord& c) {
   for (std::size_t k = 1; k < static_cast<std::size_t>(rig.cameras); ++k) {
     line_.clear();
     const auto out = std::back_inserter(line_);
-    fmt::format_to(out, "{},{},{},{},{}", c.stamp.ns(), c.accepted ? "accepted" : c.learnt ? "kept" : "rejected", field(c.cause), field(c.reason), rig.frames);
+    fmt::format_to(out, "{},{},{},{},{}", c.stamp.ns(),
+                   c.accepted ? "accepted"
+                   : c.learnt ? "kept"
+                              : "rejected",
+                   field(c.cause), field(c.reason), rig.frames);
     if (c.decided)
       fmt::format_to(out, ",{},{},{:.4f},{:.4f},{:.4f},{:.6f}", c.latency_frames, c.onset_frame, rig.reprojection_px, c.held_out_before_px,
                      c.held_out_after_px, rig.scale_sigma);

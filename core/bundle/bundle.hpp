@@ -82,7 +82,7 @@ struct BundleIntrinsics {
 /// What is known of θ_S from earlier solves (stereo_calibration only): ½ weight δᵀ C⁻¹ δ over the parameters that are free here.
 struct BundleSharedPrior {
   const RigCalibration* rig = nullptr;  // mean and `covariance`; null: nothing is known. Rows without a variance: nothing is known of them
-  double weight = 1;  // how much more a solve believes its tracks than it may: what is known weighs as much more, > 0
+  double weight = 1;                    // how much more a solve believes its tracks than it may: what is known weighs as much more, > 0
 };
 
 struct BundleOptions {
@@ -90,7 +90,7 @@ struct BundleOptions {
   std::array<BundleLengthConstraint, kMaxCameras> length{};  // [k] of camera k ≥ 1; read in stereo_calibration
   std::array<BundleIntrinsics, kMaxCameras> intrinsics{};    // read in stereo_calibration
   BundleSharedPrior shared_prior{};
-  int cells = 0;             // covariance: clusters are so many cells a side of the image, and blocks of frames; 0 … 8, 0: each track is one
+  int cells = 0;  // covariance: clusters are so many cells a side of the image, and blocks of frames; 0 … 8, 0: each track is one
   double shared_errors = 1;  // times the clusters' variance: what tracks of one surface share and a cluster a track does not see, > 0
   BundleLoss loss = BundleLoss::none;
   double loss_threshold = 2.0;      // sigmas, > 0; Huber: where it turns linear; Cauchy: scale

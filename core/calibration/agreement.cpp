@@ -54,7 +54,8 @@ Agreement agreement(const RigCalibration& a, const RigCalibration& b, int k) noe
   Mat6 C;
   for (int i = 0; i < 6; ++i)
     for (int j = 0; j < 6; ++j)
-      C(i, j) = first.covariance(extrinsic_row(k) + i, extrinsic_row(k) + j) + second.covariance(extrinsic_row(k) + i, extrinsic_row(k) + j);
+      C(i, j) =
+          first.covariance(extrinsic_row(k) + i, extrinsic_row(k) + j) + second.covariance(extrinsic_row(k) + i, extrinsic_row(k) + j);
   const Mat5 own = basis.transpose() * C * basis;
   const Vec5 d = basis.transpose() * way;
   result.transform = d.dot(own.ldlt().solve(d)) / 5;
@@ -63,7 +64,8 @@ Agreement agreement(const RigCalibration& a, const RigCalibration& b, int k) noe
   for (int i = 0; i < 4; ++i) {
     const int row = intrinsic_row(k) + i;
     const double variance = first.covariance(row, row) + second.covariance(row, row);
-    if (variance > 0) result.intrinsics += 0.25 * difference[static_cast<std::size_t>(i)] * difference[static_cast<std::size_t>(i)] / variance;
+    if (variance > 0)
+      result.intrinsics += 0.25 * difference[static_cast<std::size_t>(i)] * difference[static_cast<std::size_t>(i)] / variance;
   }
   return result;
 }

@@ -11,10 +11,10 @@ namespace vergence::calibration {
 struct Agreement {
   static constexpr std::size_t kDepths = 4;
   static constexpr std::array<double, kDepths> depth_m = {5, 10, 20, 50};
-  std::array<double, kDepths> depth{};            // mean over the image of (difference / sigma)², of the inverse depth
-  std::array<double, kDepths> depth_percent{};    // root mean square difference, percent
-  double transform = 0;                           // of the five parameters of the transform together, over five
-  double intrinsics = 0;                          // mean of fx fy cx cy of camera k, each by itself
+  std::array<double, kDepths> depth{};          // mean over the image of (difference / sigma)², of the inverse depth
+  std::array<double, kDepths> depth_percent{};  // root mean square difference, percent
+  double transform = 0;                         // of the five parameters of the transform together, over five
+  double intrinsics = 0;                        // mean of fx fy cx cy of camera k, each by itself
 };
 
 /// Sigmas are those of noise alone: what held intrinsics are off by is the same in both. `k`: of camera k ≥ 1. Both with their joint

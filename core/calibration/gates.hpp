@@ -48,8 +48,8 @@ enum class Gate : std::uint8_t {
   implausible_direction,
   implausible_rotation,
   out_of_step,
-  does_not_fit,  // frames not in the solve contradict it
-  no_better,     // than the calibration in use: that one is kept
+  does_not_fit,   // frames not in the solve contradict it
+  no_better,      // than the calibration in use: that one is kept
   depth_unknown,  // with the lenses free the tracks do not hold the depth yet
 };
 /// The sentence for events and calibrations.csv; empty for `open`.

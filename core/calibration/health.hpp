@@ -16,7 +16,8 @@ inline constexpr std::array kHealthDepths = {1.0, 5.0, 10.0, 20.0, 50.0};  // m
 /// What a calibration's uncertainty does to a depth measured with camera 0 and camera `k`, 1 sigma, percent of the depth.
 ///
 /// The root mean over a grid of directions that both cameras see of the relative depth's gradient propagated through `covariance`, lenses
-/// included; without one, that of the transform through covariance_wide; without that, through the sigmas; without those 0. Matching noise is not in it: this is what stays however well a point is found. Threads pure.
+/// included; without one, that of the transform through covariance_wide; without that, through the sigmas; without those 0. Matching noise
+/// is not in it: this is what stays however well a point is found. Threads pure.
 [[nodiscard]] double depth_error_percent(const RigCalibration& rig, int k, double depth_m) noexcept;
 
 /// How far apart the depths are that two calibrations give to the same pairs of pixels, at a depth by `measured`: root mean over the image,

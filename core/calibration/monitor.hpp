@@ -11,18 +11,18 @@ namespace vergence::calibration {
 /// Every number a user may change in `monitor:`; the configuration's schema has a row for each field.
 /// What the defaults reach, and the commands that measured it: docs/monitor.md.
 struct MonitorOptions {
-  double threshold = 45.0;  // of the statistic that raises a knock or a drift; ≥ 80 h between false alarms, 20 … 500
-  double bias_px = 0.02;    // px rms over the image: slow error of vertical differences that is overlooked at least, 0 … 1
+  double threshold = 45.0;       // of the statistic that raises a knock or a drift; ≥ 80 h between false alarms, 20 … 500
+  double bias_px = 0.02;         // px rms over the image: slow error of vertical differences that is overlooked at least, 0 … 1
   double found_bias_px = 0.1;    // expected of lenses that the drive has confirmed, until it is measured, 0 … 2
   double claimed_bias_px = 0.3;  // and of a calibration that it has not, 0 … 5
-  int min_matches = 30;     // matches across under which a frame measures nothing (`needs_texture`), 12 … 1000
-  int short_window = 3;     // moving frames of the shortest window: large knocks, 1 … 10
-  int long_window = 300;    // moving frames of the longest window: drift, 60 … 1800
-  double lag_frames = 0.3;  // frames: smallest lag of a camera that is called one, 0.1 … 1
-  double lag_sigmas = 5.0;  // and how many sigmas it must stand out from every fixed transform, 3 … 20
-  int collapse_frames = 5;  // frames in a row without the expected matches that raise `collapse`, 2 … 60
-  double collapse_share = 0.2;  // of the expected matches: fewer found is a collapse, 0.01 … 0.9
-  int collapse_expected = 40;   // matches that must be expected before their absence says anything, 10 … 1000
+  int min_matches = 30;          // matches across under which a frame measures nothing (`needs_texture`), 12 … 1000
+  int short_window = 3;          // moving frames of the shortest window: large knocks, 1 … 10
+  int long_window = 300;         // moving frames of the longest window: drift, 60 … 1800
+  double lag_frames = 0.3;       // frames: smallest lag of a camera that is called one, 0.1 … 1
+  double lag_sigmas = 5.0;       // and how many sigmas it must stand out from every fixed transform, 3 … 20
+  int collapse_frames = 5;       // frames in a row without the expected matches that raise `collapse`, 2 … 60
+  double collapse_share = 0.2;   // of the expected matches: fewer found is a collapse, 0.01 … 0.9
+  int collapse_expected = 40;    // matches that must be expected before their absence says anything, 10 … 1000
 };
 
 /// A point seen by the left camera and by camera k in one frame. Ideal pinhole pixels (distortion removed), each camera's own K.

@@ -14,7 +14,7 @@ constexpr std::size_t kFramesATrack = 3;            // at least, on average: siz
 constexpr std::size_t kMostViews = 12;              // of a track that its point is triangulated from
 constexpr double kWildResidual = 40.0;              // px at the start: not the same point
 constexpr int kLeastTracks = 60;
-constexpr int kLeastTies = 10;  // points that tie a frame to those before it
+constexpr int kLeastTies = 10;                     // points that tie a frame to those before it
 constexpr int kLeastCandidateMatches = 40;         // across, of the frame whose own transform begins the solve
 constexpr double kHuber = 2.0, kCauchy = 2.5;      // residual scales
 constexpr double kFirstCut = 6.0, kLastCut = 4.0;  // residual scales beyond which a sighting is left out
@@ -22,7 +22,7 @@ constexpr double kFirstCut = 6.0, kLastCut = 4.0;  // residual scales beyond whi
 // the transforms found on recorded and rendered drives over the one by clusters (docs/calibration.md).
 constexpr int kCells = 6;
 constexpr double kSharedErrors = 3.5;
-constexpr double kUsualInflation = 6;  // of a calibration that does not say its own
+constexpr double kUsualInflation = 6;    // of a calibration that does not say its own
 constexpr double kMedianOfTwo = 1.1774;  // median length of a vector of two standard normal numbers
 
 double milliseconds_since(std::chrono::steady_clock::time_point start) noexcept {
@@ -56,9 +56,9 @@ std::size_t RigSolver::memory_needed(const CalibrationOptions& options, const Mo
   const BundleCapacities c = capacities(options, cameras, features);
   const auto frames = static_cast<std::size_t>(options.max_frames);
   return TrackLog::memory_needed(frames, features) + BundleAdjuster::memory_needed(c) + Monitor::memory_needed(monitor) +
-         MonitorFeed::memory_needed(features) + c.poses * (sizeof(Transform) + sizeof(std::uint16_t) + sizeof(std::uint8_t)) + (c.poses + 1) * sizeof(int) + c.points * sizeof(Vec3) +
-         c.observations * (sizeof(BundleObservation) + 2 * sizeof(float)) + frames * features * sizeof(Reference) +
-         features * sizeof(AcrossSighting) + 12 * kCacheLine;
+         MonitorFeed::memory_needed(features) + c.poses * (sizeof(Transform) + sizeof(std::uint16_t) + sizeof(std::uint8_t)) +
+         (c.poses + 1) * sizeof(int) + c.points * sizeof(Vec3) + c.observations * (sizeof(BundleObservation) + 2 * sizeof(float)) +
+         frames * features * sizeof(Reference) + features * sizeof(AcrossSighting) + 12 * kCacheLine;
 }
 
 RigSolver::RigSolver(const CalibrationOptions& options, const MonitorOptions& monitor, int cameras, std::size_t features, Arena& arena)
@@ -244,7 +244,7 @@ BundleOptions RigSolver::options_of(const RigSolveRequest& request) const noexce
     const std::array value = {lens.fx, lens.fy, lens.cx, lens.cy};
     for (std::size_t i = 0; i < 4; ++i) {
       const bool focal = i < 2;
-      const double usual = focal ? 0.01 * options_.focal_sigma_percent * value[i]
+      const double usual = focal             ? 0.01 * options_.focal_sigma_percent * value[i]
                            : lenses && k > 0 ? options_.lens_centre_sigma_px
                                              : options_.principal_point_sigma_px;
       out.prior_mean[i] = value[i];

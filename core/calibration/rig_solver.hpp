@@ -28,7 +28,7 @@ struct RigSolveRequest {
   RigFreedom freedom = RigFreedom::transforms;
   bool from_rig = false;                  // begin with T_camera_left of `rig`; false: with those of the logged frame that fits best
   const RigCalibration* known = nullptr;  // what earlier frames told, with its covariance; null: nothing
-  const RigCalibration* told = nullptr;  // whose lenses and sigmas are the priors where nothing is known; null: those of `rig`
+  const RigCalibration* told = nullptr;   // whose lenses and sigmas are the priors where nothing is known; null: those of `rig`
 };
 
 struct RigSolution {
@@ -95,8 +95,8 @@ class RigSolver {
   std::array<Transform, kMaxCameras> T_camera_left_{};
   int count_ = 0;  // cameras
   BoundedVector<Transform> poses_;
-  BoundedVector<std::uint8_t> held_;  // 1: the pose begins a piece that no track ties to the rest
-  std::span<int> ties_;               // scratch of hold_pieces()
+  BoundedVector<std::uint8_t> held_;     // 1: the pose begins a piece that no track ties to the rest
+  std::span<int> ties_;                  // scratch of hold_pieces()
   BoundedVector<std::uint16_t> logged_;  // index in the log of each pose
   BoundedVector<Vec3> points_;
   BoundedVector<BundleObservation> observations_;

@@ -164,8 +164,8 @@ void Estimator::Parts::doubt(CalibrationCause cause, std::uint64_t onset, const 
   odometry.unlink();
 }
 
-/// Left and right hardly match with the calibration in use. One that the drive never confirmed was not the rig's from the start; one that it
-/// did was knocked away.
+/// Left and right hardly match with the calibration in use. One that the drive never confirmed was not the rig's from the start; one that
+/// it did was knocked away.
 void Estimator::Parts::give_up_calibration(const RigFrame& frame, double frames) noexcept {
   const CalibrationCause cause = calibrator.ever_verified() ? CalibrationCause::collapse : CalibrationCause::contradicted;
   if (cause == CalibrationCause::collapse)
@@ -293,7 +293,7 @@ void Estimator::Parts::follow(const odometry::FrameOutcome& out, const RigFrame&
   without_pose = 0;
   if (state == State::lost)
     transition(odometry.linked() == odometry::Link::linked ? Trigger::pose_found
-               : calibrator.calibrated()                       ? Trigger::pose_found_doubtful
+               : calibrator.calibrated()                   ? Trigger::pose_found_doubtful
                                                            : Trigger::pose_found_uncalibrated,
                frame.stamp);
   if (state == State::initialising) {
@@ -337,8 +337,8 @@ Reason Estimator::Parts::why_uncalibrated() const noexcept {
 
 std::size_t Estimator::memory_needed(const EstimatorOptions& options, const RigCalibration& rig) {
   check(options, rig);
-  return odometry::Odometry::memory_needed(options.odometry, rig, options.masks) + OnlineCalibrator::memory_needed(options, rig) + sizeof(Parts) +
-         2 * kCacheLine;
+  return odometry::Odometry::memory_needed(options.odometry, rig, options.masks) + OnlineCalibrator::memory_needed(options, rig) +
+         sizeof(Parts) + 2 * kCacheLine;
 }
 
 Estimator::Estimator(const EstimatorOptions& options, const RigCalibration& rig, const RigCalibration& nominal, Arena& arena,

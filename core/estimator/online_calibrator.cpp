@@ -86,7 +86,7 @@ std::size_t OnlineCalibrator::memory_needed(const EstimatorOptions& o, const Rig
 }
 
 OnlineCalibrator::OnlineCalibrator(const EstimatorOptions& options, const RigCalibration& rig, const RigCalibration& nominal, Arena& arena,
-                     BackgroundRunner& solver)
+                                   BackgroundRunner& solver)
     : options_(options),
       rig_(rig),
       nominal_(nominal),
@@ -137,8 +137,7 @@ void OnlineCalibrator::watch_calibration() noexcept {
     const auto c = static_cast<std::size_t>(k);
     learning_[c] = true;
     monitors_[c]->expect_scatter(verified_ ? options_.monitor.found_bias_px : options_.monitor.claimed_bias_px);
-    watch_against(k, rig_.T_camera_left[c],
-                  reference_covariance(verified_ ? kConfirmed : kClaimed, rig_.T_camera_left[c].t.norm()));
+    watch_against(k, rig_.T_camera_left[c], reference_covariance(verified_ ? kConfirmed : kClaimed, rig_.T_camera_left[c].t.norm()));
   }
 }
 
@@ -233,7 +232,8 @@ int OnlineCalibrator::expected_across(const odometry::Odometry& odometry, int k,
   return n;
 }
 
-MonitorVerdict OnlineCalibrator::watch(const odometry::Odometry& odometry, const odometry::FrameOutcome& outcome, const RigFrame& frame) noexcept {
+MonitorVerdict OnlineCalibrator::watch(const odometry::Odometry& odometry, const odometry::FrameOutcome& outcome,
+                                       const RigFrame& frame) noexcept {
   MonitorVerdict worst;
   const Transform step = any_ ? outcome.T_left_world * T_left_world_.inverse() : Transform{};
   T_left_world_ = outcome.T_left_world;
@@ -355,7 +355,8 @@ calibration::GateQuestion OnlineCalibrator::question(const calibration::RigSolut
   return q;
 }
 
-CalibrationDecision OnlineCalibrator::begin_decision(Stamp stamp, std::uint64_t number, const calibration::RigSolution& found) const noexcept {
+CalibrationDecision OnlineCalibrator::begin_decision(Stamp stamp, std::uint64_t number,
+                                                     const calibration::RigSolution& found) const noexcept {
   CalibrationDecision d;
   d.stamp = stamp;
   d.cause = cause_;

@@ -15,10 +15,10 @@ namespace vergence {
 /// The rig's calibration while it drives (METHOD §3, §6): logs the tracks, watches that they fit, has calibrations solved beside the frames
 /// and decides about them. The estimator tells it what was posed and follows its advice; states are the estimator's.
 ///
-/// Two things are solved for. *Seeking*: there is no calibration, or the one in use is doubted; frames since the onset, until one passes the
-/// gates. *Learning*: all the time else; what the drive itself measures, lenses free, confirms the calibration in use, or contradicts it, or
-/// refines it. Learning grows a segment of frames, solving again and again; a full segment is closed, and what it told is the next one's
-/// prior.
+/// Two things are solved for. *Seeking*: there is no calibration, or the one in use is doubted; frames since the onset, until one passes
+/// the gates. *Learning*: all the time else; what the drive itself measures, lenses free, confirms the calibration in use, or contradicts
+/// it, or refines it. Learning grows a segment of frames, solving again and again; a full segment is closed, and what it told is the next
+/// one's prior.
 ///
 /// Threads one, but for the solver's task. Memory from the arena at construction.
 class OnlineCalibrator {
@@ -89,8 +89,8 @@ class OnlineCalibrator {
   void watch_against(int k, const Transform& T_camera_left, const Mat6& covariance) noexcept;
   void watch_calibration() noexcept;
   void set_verified(bool verified) noexcept;
-  /// What cannot be told from a claim is told by the monitor's own measurement: it takes what it sees in the first frames that agree with each
-  /// other as what must not change.
+  /// What cannot be told from a claim is told by the monitor's own measurement: it takes what it sees in the first frames that agree with
+  /// each other as what must not change.
   void learn_reference(int k, const calibration::MonitorVerdict& verdict) noexcept;
   [[nodiscard]] CalibrationDecision begin_decision(Stamp stamp, std::uint64_t number, const calibration::RigSolution& found) const noexcept;
   [[nodiscard]] calibration::GateQuestion question(const calibration::RigSolution& found, bool last) const noexcept;
@@ -110,7 +110,7 @@ class OnlineCalibrator {
   bool calibrated_;
   bool verified_ = false, ever_verified_ = false;
   bool found_with_lenses_ = false;
-  RigCalibration learnt_{};      // what closed segments tell, with the lenses free
+  RigCalibration learnt_{};  // what closed segments tell, with the lenses free
   bool any_learnt_ = false;
   calibration::TrackLog log_;
   calibration::RigSolver rig_solver_;
@@ -132,7 +132,7 @@ class OnlineCalibrator {
   std::size_t solved_frames_ = 0;               // of the segment, in the newest solve
   int rejections_ = 0;                          // for other reasons than a want of frames
   int frames_since_snapshot_ = 0;
-  int frames_still_ = 0;  // since one was logged
+  int frames_still_ = 0;              // since one was logged
   RigCalibration asked_{}, prior_{};  // of the solve under way
   bool from_rig_ = false, has_prior_ = false, sought_ = false;
   Solved solved_;

@@ -19,11 +19,11 @@ enum class CameraModelKind : std::uint8_t {
 /// One camera's image formation: x = K d(X/Z), pixels; pixel centres at integer coordinates.
 struct Intrinsics {
   CameraModelKind kind = CameraModelKind::pinhole_radtan;
-  int width = 0;                          // px
-  int height = 0;                         // px
-  double fx = 0, fy = 0, cx = 0, cy = 0;  // px
-  std::array<double, 5> distortion{};     // radtan: k1 k2 p1 p2 k3; equidistant: k1 k2 k3 k4, 0
-  std::array<double, 4> sigma{};          // of fx fy cx cy, px; 0: not given
+  int width = 0;                             // px
+  int height = 0;                            // px
+  double fx = 0, fy = 0, cx = 0, cy = 0;     // px
+  std::array<double, 5> distortion{};        // radtan: k1 k2 p1 p2 k3; equidistant: k1 k2 k3 k4, 0
+  std::array<double, 4> sigma{};             // of fx fy cx cy, px; 0: not given
   std::array<double, 5> distortion_sigma{};  // of the coefficients; 0: not given
 
   [[nodiscard]] bool has_distortion() const noexcept {
@@ -33,8 +33,8 @@ struct Intrinsics {
   }
 };
 
-inline constexpr int kIntrinsicsSize = 9;                                          // fx fy cx cy d0 … d4
-inline constexpr int kExtrinsicsSize = 6 * (kMaxCameras - 1);                      // φ, τ of every further camera
+inline constexpr int kIntrinsicsSize = 9;                                         // fx fy cx cy d0 … d4
+inline constexpr int kExtrinsicsSize = 6 * (kMaxCameras - 1);                     // φ, τ of every further camera
 inline constexpr int kRigSize = kExtrinsicsSize + kIntrinsicsSize * kMaxCameras;  // all that a calibration may estimate
 
 /// First row of camera k's transform (k ≥ 1) and of its intrinsics among a rig's parameters.
@@ -75,8 +75,8 @@ struct RigCalibration {
   // zero: not given (Eigen leaves a Mat6 without initialiser undefined)
   std::array<Mat6, kMaxCameras> covariance_wide{Mat6::Zero(), Mat6::Zero(), Mat6::Zero(), Mat6::Zero()};
   RigCovariance covariance{};  // of all parameters together, wide: what a depth is off by follows from it; empty: not given
-  double baseline = 0;        // m, |t| of camera 1 as measured once
-  double baseline_sigma = 0;  // m; 0: exact
+  double baseline = 0;         // m, |t| of camera 1 as measured once
+  double baseline_sigma = 0;   // m; 0: exact
 
   Stamp found{};               // when the stereo transform was found; 0: given
   int frames = 0;              // rig frames it was found from, all that its information is of

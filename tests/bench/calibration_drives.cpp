@@ -1,5 +1,5 @@
-// Calibration on recorded drives: what comes of a nominal calibration, of a wrong one, of none; whether anything is told that was not there;
-// and knocks made on real images by turning the right ones.
+// Calibration on recorded drives: what comes of a nominal calibration, of a wrong one, of none; whether anything is told that was not
+// there; and knocks made on real images by turning the right ones.
 #include "tests/bench/calibration_drives.hpp"
 
 #include <cmath>
@@ -144,8 +144,8 @@ void run_drive(const Drive& d, const app::Configuration& c) {
   StartingCalibration first = given;
   first.file.rig = *found.rig;
   print(d.name, "calibrated first", drive(d, d.sequence, c, first));
-  fmt::print("{:12s}   found from {} frames: depth at {:.1f} m known to {:.2f} %, rms {:.3f} px\n", d.name, found.rig->frames, found.depth_m,
-             found.depth_sigma_percent, found.rig->reprojection_px);
+  fmt::print("{:12s}   found from {} frames: depth at {:.1f} m known to {:.2f} %, rms {:.3f} px\n", d.name, found.rig->frames,
+             found.depth_m, found.depth_sigma_percent, found.rig->reprojection_px);
 
   // Turned images are not the raw ones: a homography knows no distortion.
   if (d.sequence.calibration.intrinsics[1].has_distortion()) return;
@@ -203,11 +203,11 @@ int run_stretches(const std::vector<std::string>& set, const std::string& only) 
       const Vec3 phi = 1e3 * log_so3(s.rig.T_camera_left[1].R);
       const Vec3 t = 1e3 * s.rig.T_camera_left[1].t;
       const auto& n = s.rig.sigma_noise[1];
-      fmt::print("  rotation {:8.3f} ({:.3f}) {:8.3f} ({:.3f}) {:8.3f} ({:.3f}) mrad  t_y {:7.3f} ({:.3f}) t_z {:7.3f} ({:.3f}) mm  cx {:.2f} "
-                 "({:.2f}) cy {:.2f} ({:.2f}) px  {:.0f} ms inflation {:.1f} lag {:.4f}\n",
-                 phi.x(), 1e3 * n[0], phi.y(), 1e3 * n[1], phi.z(), 1e3 * n[2], t.y(), 1e3 * n[4], t.z(), 1e3 * n[5],
-                 s.rig.intrinsics[1].cx, s.rig.intrinsics[1].sigma[2], s.rig.intrinsics[1].cy, s.rig.intrinsics[1].sigma[3], s.solve_ms,
-                 s.rig.inflation, s.lag_frames);
+      fmt::print(
+          "  rotation {:8.3f} ({:.3f}) {:8.3f} ({:.3f}) {:8.3f} ({:.3f}) mrad  t_y {:7.3f} ({:.3f}) t_z {:7.3f} ({:.3f}) mm  cx {:.2f} "
+          "({:.2f}) cy {:.2f} ({:.2f}) px  {:.0f} ms inflation {:.1f} lag {:.4f}\n",
+          phi.x(), 1e3 * n[0], phi.y(), 1e3 * n[1], phi.z(), 1e3 * n[2], t.y(), 1e3 * n[4], t.z(), 1e3 * n[5], s.rig.intrinsics[1].cx,
+          s.rig.intrinsics[1].sigma[2], s.rig.intrinsics[1].cy, s.rig.intrinsics[1].sigma[3], s.solve_ms, s.rig.inflation, s.lag_frames);
     }
     double transform = 0, intrinsics = 0;
     std::array<double, calibration::Agreement::kDepths> depth{}, percent{};

@@ -16,7 +16,7 @@ using Index = Eigen::Index;
 
 constexpr double kPivotTolerance = 1e-12;
 constexpr std::size_t kBlockFrames = 8;  // at least, of a cluster in time
-constexpr double kMostFewClusters = 4;  // times the variance, for there being few of them
+constexpr double kMostFewClusters = 4;   // times the variance, for there being few of them
 
 /// Rows of θ_S that are estimated, and those that are held but uncertain.
 struct Partition {

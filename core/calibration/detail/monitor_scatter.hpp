@@ -6,8 +6,8 @@
 
 namespace vergence::calibration::detail {
 
-/// How much successive stretches of a drive disagree beyond the noise of their tracks: what a lens model leaves shows as an offset that goes
-/// with where the structure is, and differs from stretch to stretch (METHOD §6.3).
+/// How much successive stretches of a drive disagree beyond the noise of their tracks: what a lens model leaves shows as an offset that
+/// goes with where the structure is, and differs from stretch to stretch (METHOD §6.3).
 ///
 /// A running mean of (dᵀ A d − expected by noise) / (5 n) over blocks of frames, d a block's own offset from the blocks before it; begins
 /// with an expectation that weighs some blocks. A value.
