@@ -24,6 +24,7 @@ namespace {
 
 constexpr std::size_t kMiddleDepth = 2;                 // of Agreement::depth_m: 20 m
 constexpr int kMoreFeatures = 2, kMostFeatures = 1000;  // of a drive's own: nobody waits for a pose here
+constexpr int kObservations = 240'000;  // of a solve that nobody waits for
 constexpr std::size_t kAloneFrames = 40;                // of a stretch by itself, at most about: short drives, too, are to have two
 
 calibration::GateQuestion question_of(const calibration::RigSolution& s, const StartingCalibration& told, const Configuration& c) {
@@ -85,6 +86,7 @@ DriveCalibration calibrate_drive(const DrivePass& drive, const StartingCalibrati
   DriveCalibration result;
   Configuration c = drive.configuration;
   c.odometry.features = std::max(c.odometry.features, std::min(kMoreFeatures * c.odometry.features, kMostFeatures));
+  c.calibration.max_observations = std::max(c.calibration.max_observations, kObservations);
   c.online = 1;
   const DrivePass pass{drive.sequence, c, drive.start, drive.count, drive.stopped, drive.progress};
   StartingCalibration blank = told;

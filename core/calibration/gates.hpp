@@ -50,6 +50,7 @@ enum class Gate : std::uint8_t {
   out_of_step,
   does_not_fit,   // frames not in the solve contradict it
   no_better,      // than the calibration in use: that one is kept
+  rig_changed,    // among the very frames it was solved from
   depth_unknown,  // with the lenses free the tracks do not hold the depth yet
 };
 /// The sentence for events and calibrations.csv; empty for `open`.

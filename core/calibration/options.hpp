@@ -7,6 +7,7 @@ namespace vergence::calibration {
 struct CalibrationOptions {
   int min_frames = 25;                    // moving rig frames before a solve is tried, 5 … 150
   int max_frames = 150;                   // of which the newest so many are kept and solved, 10 … 150
+  int max_observations = 100'000;         // of one solve: beyond it frames are taken at wider steps, 10'000 … 1'000'000
   double rotation_sigma_mrad = 0.15;      // enough: noise-only sigma of each axis, 0.001 … 10
   double translation_sigma_mm = 4.0;      // enough: of t_y and t_z, for a baseline of 0.75 m, in proportion to it, 0.01 … 1000
   int adopt_after = 30;                   // frames from a snapshot to its adoption in replay and --fast, 0 … 1000

@@ -9,10 +9,10 @@
 namespace vergence::calibration {
 namespace {
 
-constexpr std::size_t kMostObservations = 100'000;  // in one solve: beyond it frames are taken at wider steps
-constexpr std::size_t kFramesATrack = 3;            // at least, on average: sizes the points
-constexpr std::size_t kMostViews = 12;              // of a track that its point is triangulated from
-constexpr double kWildResidual = 40.0;              // px at the start: not the same point
+constexpr std::size_t kFramesATrack = 3;  // at least, on average: sizes the points
+constexpr std::size_t kMostViews = 12;    // of a track that its point is triangulated from
+constexpr double kWildResidual = 40.0;    // px at the start: not the same point
+constexpr double kCertainChange = 2;      // of the monitor's threshold: the frames have been used to find what they are held against
 constexpr int kLeastTracks = 60;
 constexpr int kLeastTies = 10;                     // points that tie a frame to those before it
 constexpr int kLeastCandidateMatches = 40;         // across, of the frame whose own transform begins the solve
@@ -44,7 +44,7 @@ BundleCapacities RigSolver::capacities(const CalibrationOptions& options, int ca
   BundleCapacities c;
   c.cameras = static_cast<std::size_t>(cameras);
   c.poses = static_cast<std::size_t>(options.max_frames);
-  c.observations = std::min(kMostObservations, c.poses * features * c.cameras);
+  c.observations = std::min(static_cast<std::size_t>(options.max_observations), c.poses * features * c.cameras);
   c.points = c.observations / (kFramesATrack * c.cameras);
   c.blocks = c.observations / c.cameras;
   c.shared = true;
@@ -66,6 +66,7 @@ RigSolver::RigSolver(const CalibrationOptions& options, const MonitorOptions& mo
       log_(static_cast<std::size_t>(options.max_frames), features, arena),
       adjuster_(capacities(options, cameras, features), arena),
       monitor_(monitor, arena),
+      expected_scatter_px_(monitor.found_bias_px),
       feed_(features, arena),
       most_frames_(static_cast<std::size_t>(options.max_frames)),
       count_(cameras) {
@@ -114,7 +115,7 @@ bool RigSolver::begin_with(const RigSolveRequest& request) noexcept {
 void RigSolver::choose_frames() noexcept {
   std::size_t sightings = 0;
   for (std::size_t i = 0; i < log_.size(); ++i) sightings += log_.frame(i).sightings.size();
-  const std::size_t step = 1 + sightings * static_cast<std::size_t>(count_) / kMostObservations;
+  const std::size_t step = 1 + sightings * static_cast<std::size_t>(count_) / static_cast<std::size_t>(options_.max_observations);
   poses_.clear();
   logged_.clear();
   for (std::size_t i = (log_.size() - 1) % step; i < log_.size(); i += step) {
@@ -351,10 +352,12 @@ void RigSolver::write_result(const BundleResult& r, RigSolution* s) const noexce
   rig.scale_sigma = std::hypot(noise, std::hypot(kScaleByFocal * focal, kScaleByRadian * centre));
 }
 
-void RigSolver::look_for_lag(RigSolution* s) noexcept {
+/// What the monitor would have said on the way, had it known the result: a camera out of step, or two rigs in one solve.
+void RigSolver::watch_frames(RigSolution* s) noexcept {
   const Intrinsics &a = cameras_[0].intrinsics(), &b = cameras_[1].intrinsics();
   const Pinhole left{a.fx, a.fy, a.cx, a.cy}, right{b.fx, b.fy, b.cx, b.cy};
   if (!monitor_.set_reference(s->rig.T_camera_left[1], left, right, s->rig.covariance_wide[1])) return;
+  monitor_.expect_scatter(expected_scatter_px_);
   feed_.reset();
   for (std::size_t i = 0; i < poses_.size(); ++i) {
     const LoggedFrame& f = log_.frame(logged_[i]);
@@ -372,6 +375,7 @@ void RigSolver::look_for_lag(RigSolution* s) noexcept {
     const MonitorVerdict v = monitor_.look(feed_.next(f.stamp, f.number, across_.span(), step));
     s->lag_frames = v.lag_frames;
     if (v.kind == MonitorVerdict::Kind::out_of_step) s->out_of_step = true;
+    if (v.kind == MonitorVerdict::Kind::knock && v.statistic > kCertainChange * v.threshold) s->changed_at = v.onset_frame;
   }
 }
 
@@ -425,7 +429,7 @@ RigSolution RigSolver::solve(const RigSolveRequest& request) noexcept {
   if (s.status == RigSolveStatus::ok) {
     write_result(r, &s);
     if (request.known != nullptr) s.rig.frames += request.known->frames;
-    look_for_lag(&s);
+    watch_frames(&s);
   }
   s.solve_ms = milliseconds_since(start);
   return s;

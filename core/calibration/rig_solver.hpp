@@ -39,11 +39,12 @@ struct RigSolution {
   int tracks = 0;
   int observations = 0;
   int steps = 0;
-  int near = 0;              // tracks nearer than CalibrationOptions::near_baselines
-  double travelled_m = 0;    // along the frames used
-  double lag_frames = 0;     // of camera 1, by the monitor over the frames used
-  bool out_of_step = false;  // and it is significant
-  double solve_ms = 0;       // wall time
+  int near = 0;                  // tracks nearer than CalibrationOptions::near_baselines
+  double travelled_m = 0;        // along the frames used
+  double lag_frames = 0;         // of camera 1, by the monitor over the frames used
+  bool out_of_step = false;      // and it is significant
+  std::uint64_t changed_at = 0;  // frame since which the tracks are of another transform than before; 0: they are of one
+  double solve_ms = 0;           // wall time
 };
 
 /// The stereo calibration adjustment of METHOD §3 over a snapshot of the track log: candidate pair, right cameras re-initialised through
@@ -83,12 +84,13 @@ class RigSolver {
   void drop_outliers(double limit) noexcept;
   void write_result(const BundleResult& r, RigSolution* s) const noexcept;
   void describe(RigSolution* s) const noexcept;
-  void look_for_lag(RigSolution* s) noexcept;
+  void watch_frames(RigSolution* s) noexcept;
 
   const CalibrationOptions& options_;
   TrackLog log_;
   BundleAdjuster adjuster_;
   Monitor monitor_;
+  double expected_scatter_px_;
   MonitorFeed feed_;
   std::size_t most_frames_;
   std::array<Camera, kMaxCameras> cameras_{};

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <chrono>
 #include <cmath>
 #include <limits>
 
@@ -22,6 +23,7 @@ constexpr std::array kClaimed = {0.05, 0.05, 0.05, 0.1, 0.1, 0.1};
 // And of one that the drive has confirmed, until the monitor has measured its own: what the lens model leaves in one stretch.
 constexpr std::array kConfirmed = {2e-4, 5e-4, 3e-4, 0.005, 0.005, 0.01};
 constexpr double kLearnedCovariance = 1.5;  // times the monitor's own: the scene it was measured in was one
+constexpr int kWatchedAgain = 10;           // moving frames that agree, after an outage in which the rig may have been knocked
 constexpr int kGraceFrames = 5;             // after a new reference: the monitor does not yet know how far matches spread
 constexpr int kLearnFrames = 45;            // moving, in agreement
 constexpr int kLeastHeldOut = 12;           // frames after a snapshot, for the gates to have frames that were not in it
@@ -115,6 +117,7 @@ void OnlineCalibrator::use(const RigCalibration& rig, bool lenses) noexcept {
 
 void OnlineCalibrator::keep() noexcept {
   watch_calibration();
+  watched_ = true;
   any_ = false;
   seeking_ = false;
   begin_segment();
@@ -164,6 +167,7 @@ void OnlineCalibrator::learn_reference(int k, const MonitorVerdict& verdict) noe
 
 void OnlineCalibrator::scene_lost() noexcept {
   any_ = false;
+  watched_ = false;
   log_.clear();
   for (auto& m : monitors_)
     if (m) m->reset();
@@ -261,6 +265,7 @@ MonitorVerdict OnlineCalibrator::watch(const odometry::Odometry& odometry, const
     learn_reference(k, v);
     if (rank(v.kind) > rank(worst.kind) || (rank(v.kind) == rank(worst.kind) && (v.undecided || v.statistic > worst.statistic))) worst = v;
   }
+  watched_ = watched_ || frames_agreed() >= kWatchedAgain;
   return worst;
 }
 
@@ -311,6 +316,7 @@ void OnlineCalibrator::start_solve() noexcept {
 }
 
 std::optional<CalibrationDecision> OnlineCalibrator::decide(Stamp stamp, std::uint64_t number) noexcept {
+  waited_ms_ = 0;
   if (!solving_) return std::nullopt;
   ++frames_since_snapshot_;
   const int least = std::min(kLeastHeldOut, options_.calibration.adopt_after);
@@ -319,7 +325,9 @@ std::optional<CalibrationDecision> OnlineCalibrator::decide(Stamp stamp, std::ui
   } else {
     // What is learnt beside a calibration in use waits for the frames that judge it, no longer: until then no pose is `ok`.
     if (frames_since_snapshot_ < (sought_ ? options_.calibration.adopt_after : least)) return std::nullopt;
+    const auto start = std::chrono::steady_clock::now();
     runner_.wait();
+    waited_ms_ = std::chrono::duration<float, std::milli>(std::chrono::steady_clock::now() - start).count();
   }
   return judge(stamp, number, false);
 }
@@ -387,6 +395,10 @@ CalibrationDecision OnlineCalibrator::judge_sought(Stamp stamp, std::uint64_t nu
     const double excess = gate_ == Gate::sigmas_too_large ? calibration::sigma_excess(found.rig, options_.calibration) : 1.0;
     const double grow = std::clamp(excess * excess, kGrow, 4.0);
     wanted_ = std::max(std::min(most, static_cast<std::size_t>(std::ceil(grow * found.frames))), logged_ + kNewFrames);
+  } else if (gate_ == Gate::rig_changed) {
+    log_.drop_before(found.changed_at);
+    onset_ = found.changed_at;
+    begin_segment();
   } else {
     // The same frames would say the same again; and what is rejected again and again is asked about less and less often.
     log_.drop_before(found.newest + 1);

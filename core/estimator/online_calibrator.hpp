@@ -46,6 +46,8 @@ class OnlineCalibrator {
   [[nodiscard]] bool solving() const noexcept { return solving_; }
   /// After every frame. A value: the solve is over and decided.
   [[nodiscard]] std::optional<CalibrationDecision> decide(Stamp stamp, std::uint64_t number) noexcept;
+  /// How long the last decide() waited for the solver: with Adoption::after_fixed_frames only, a live drive never does.
+  [[nodiscard]] float waited_ms() const noexcept { return waited_ms_; }
   /// No more frames come: waits for the solve under way and decides.
   [[nodiscard]] std::optional<CalibrationDecision> decide_now(Stamp stamp, std::uint64_t number) noexcept;
   /// And this begins one with whatever is logged; false: that is too little.
@@ -70,7 +72,8 @@ class OnlineCalibrator {
   [[nodiscard]] const RigCalibration& in_use() const noexcept { return rig_; }
   [[nodiscard]] bool calibrated() const noexcept { return calibrated_; }
   /// The drive itself has confirmed the calibration in use (METHOD §6.4).
-  [[nodiscard]] bool verified() const noexcept { return verified_; }
+  /// After an outage the monitor first has to see that it still is so.
+  [[nodiscard]] bool verified() const noexcept { return verified_ && watched_; }
   /// It has confirmed one before: what does not fit since then is a change of the rig.
   [[nodiscard]] bool ever_verified() const noexcept { return ever_verified_; }
   /// Frames in a row that agree with the calibration in use.
@@ -109,6 +112,7 @@ class OnlineCalibrator {
   const RigCalibration told_;  // the drive began with
   bool calibrated_;
   bool verified_ = false, ever_verified_ = false;
+  bool watched_ = true;  // the monitor has seen the rig all the time, or has made sure since
   bool found_with_lenses_ = false;
   RigCalibration learnt_{};  // what closed segments tell, with the lenses free
   bool any_learnt_ = false;
@@ -132,6 +136,7 @@ class OnlineCalibrator {
   std::size_t solved_frames_ = 0;               // of the segment, in the newest solve
   int rejections_ = 0;                          // for other reasons than a want of frames
   int frames_since_snapshot_ = 0;
+  float waited_ms_ = 0;
   int frames_still_ = 0;              // since one was logged
   RigCalibration asked_{}, prior_{};  // of the solve under way
   bool from_rig_ = false, has_prior_ = false, sought_ = false;

@@ -104,6 +104,7 @@ DecodedDrive load(const Excerpt& excerpt, const std::filesystem::path& folder) {
 Replay replay(const DecodedDrive& d, const app::Configuration& configuration, int threads, std::FILE* frames) {
   EstimatorOptions options;
   options.odometry = configuration.odometry;
+  options.online = false;  // the odometry by itself: calibrations are solved by calibration_bench
   Arena arena(Estimator::memory_needed(options, d.sequence.calibration));
   SequentialRunner one;
   std::optional<app::ThreadRunner> two;

@@ -42,12 +42,11 @@ double covariance_of(const RigCovariance& C, const Combination& a, const Combina
 
 }  // namespace
 
-SharedPrior::SharedPrior(const BundleSharedPrior& prior, const BundleOptions& options, const SharedLayout& layout,
-                         std::size_t cameras) noexcept
+SharedPrior::SharedPrior(const BundleSharedPrior& prior, const SharedLayout& layout, std::size_t cameras) noexcept
     : layout_(layout), cameras_(cameras), weight_(prior.weight) {
   if (prior.rig == nullptr || layout.size == 0) return;
   Combination rows[kMaxShared];
-  int place[kMaxShared];  // in the layout, −1: held
+  int place[kMaxShared];  // in the layout, −1: not there
   int n = 0;
   for (std::size_t k = 1; k < cameras; ++k) {
     const int number = static_cast<int>(k);
@@ -70,8 +69,7 @@ SharedPrior::SharedPrior(const BundleSharedPrior& prior, const BundleOptions& op
       rows[n].factor[0] = 1;
       place[n] = -1;
       for (int j = 0; j < layout.intrinsic_count[k]; ++j)
-        if (layout.intrinsic_index[k][j] == i && ((options.intrinsics[k].free >> static_cast<unsigned>(i)) & 1U) != 0)
-          place[n] = layout.intrinsic[k] + j;
+        if (layout.intrinsic_index[k][j] == i) place[n] = layout.intrinsic[k] + j;
       ++n;
     }
   SharedMatrix C(n, n);

@@ -5,12 +5,12 @@ namespace vergence::detail {
 
 /// BundleSharedPrior in the rows of one layout: ½ δᵀ Λ δ, δ the way from the prior's mean in the rows' own coordinates there.
 ///
-/// The covariance is of more parameters than may be free; those that are held are where the prior has them: Λ is the block of the joint
-/// information that belongs to the free rows.
+/// The covariance is of more parameters than a layout has; the others are where the prior has them: Λ is the block of the joint information
+/// that belongs to the layout's rows.
 class SharedPrior {
  public:
   SharedPrior() noexcept = default;
-  SharedPrior(const BundleSharedPrior& prior, const BundleOptions& options, const SharedLayout& layout, std::size_t cameras) noexcept;
+  SharedPrior(const BundleSharedPrior& prior, const SharedLayout& layout, std::size_t cameras) noexcept;
 
   [[nodiscard]] bool used() const noexcept { return rig_ != nullptr; }
   /// Weighted; symmetric, layout.size rows.

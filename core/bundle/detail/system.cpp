@@ -97,7 +97,7 @@ System::System(BundleWorkspace& workspace, const BundleProblem& problem, const B
 void System::use(const SharedLayout& shared) noexcept {
   job_.shared = shared;
   shared_prior_ = options_.configuration == BundleConfiguration::stereo_calibration
-                      ? SharedPrior(options_.shared_prior, options_, shared, problem_.cameras.size())
+                      ? SharedPrior(options_.shared_prior, shared, problem_.cameras.size())
                       : SharedPrior();
   first_shared_ = static_cast<std::size_t>(w_.free_poses) * kBlock;
   rows_ = first_shared_ + static_cast<std::size_t>(shared.blocks) * kBlock;
