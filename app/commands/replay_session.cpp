@@ -149,7 +149,7 @@ SummaryInput Replay::summary_input(const SessionTotals& totals, std::uint64_t al
   input.skipped = skipped_;
   input.dropped_by_estimator = journal_.dropped();
   if (!truth_.empty() && !totals.trajectory.empty()) input.evaluation = evaluate(totals.trajectory, truth_, summary_evaluation_options());
-  describe_calibration(*estimator_, begin_, totals, options_.calibration, &input);
+  describe_calibration(*estimator_, begin_, totals, options_, &input);
   input.allocations_after_seal = allocations;
   input.memory = memory();
   input.configuration_hash = configuration_hash(request_.configuration);
@@ -168,6 +168,7 @@ void Replay::tell(const SessionTotals& totals, const SummaryInput& input, Progre
       fmt::format("session {}: {} frames, {} posed ({} degraded), {} lost, {} skipped; {:.2f} m; {:.1f} ms a frame, {:.1f} at p99",
                   request_.out.string(), totals.read, posed, totals.degraded, totals.lost, skipped_, totals.path_m, totals.estimate.mean(),
                   totals.estimate.percentile(0.99)));
+  if (const std::string sentence = verification_sentence(input); !sentence.empty()) progress->say(sentence);
   if (input.evaluation && input.evaluation->status == EvaluationStatus::ok) {
     const TrajectoryEvaluation& e = *input.evaluation;
     const SegmentErrors& near = e.segments[1];

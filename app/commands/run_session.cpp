@@ -391,7 +391,7 @@ SummaryInput Drive::summary_input(const SessionTotals& totals, std::uint64_t all
   input.dropped_by_estimator = journal_.dropped();
   if (!totals.reference.empty() && !totals.trajectory.empty())
     input.evaluation = evaluate(totals.trajectory, totals.reference, summary_evaluation_options());
-  describe_calibration(*estimator_, begin_, totals, options_.calibration, &input);
+  describe_calibration(*estimator_, begin_, totals, options_, &input);
   input.allocations_after_seal = allocations;
   input.memory = memory();
   input.configuration_hash = configuration_hash(configuration_);
@@ -417,6 +417,7 @@ void Drive::tell(const SessionTotals& totals, const SummaryInput& input, Progres
       fmt::format("session {}: {} frames, {} posed ({} degraded), {} lost, {} dropped; {:.2f} m; {:.1f} ms a frame, {:.1f} at p99",
                   request_.out.string(), totals.read, totals.ok + totals.degraded, totals.degraded, totals.lost, input.skipped,
                   totals.path_m, totals.estimate.mean(), totals.estimate.percentile(0.99)));
+  if (const std::string sentence = verification_sentence(input); !sentence.empty()) progress->say(sentence);
   if (!input.truth || !input.truth->evaluation || input.truth->evaluation->status != EvaluationStatus::ok) return;
   const TrajectoryEvaluation& e = *input.truth->evaluation;
   const SegmentErrors &far = e.segments[0], &near = e.segments[1];

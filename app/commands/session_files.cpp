@@ -58,12 +58,20 @@ void begin_session(const std::filesystem::path& session, const StartingCalibrati
 }
 
 void describe_calibration(const Estimator& estimator, const StartingCalibration& begin, const SessionTotals& totals,
-                          const calibration::CalibrationOptions& options, SummaryInput* input) {
+                          const EstimatorOptions& options, SummaryInput* input) {
   input->calibrated = estimator.calibrated();
+  input->online = options.online;
+  input->verified = options.online && estimator.verified();
   input->calibration = estimator.calibration();
   input->calibration_source = totals.accepted > 0 ? "online" : begin.source;
   if (begin.trust != CalibrationTrust::none) input->before = begin.file.rig;
-  input->options = options;
+  input->options = options.calibration;
+}
+
+std::string verification_sentence(const SummaryInput& input) {
+  if (input.verified || !input.calibrated) return "";
+  if (!input.online) return "the calibration is not verified: nothing watched it (calibration.online: off)";
+  return "the drive has not confirmed its calibration; what would: turns, near structure at the roadside, tracks in the images' corners";
 }
 
 void end_session(const std::filesystem::path& session, const StartingCalibration& begin, const SummaryInput& input,

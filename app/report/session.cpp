@@ -209,6 +209,14 @@ bool read_six(const CsvRows& rows, const char* prefix, std::array<double, 6>* ou
   return true;
 }
 
+void read_lens(const CsvRows& rows, CalibrationRow* c) {
+  constexpr std::array<const char*, 8> kNames{"fx", "fy", "cx", "cy", "d0", "d1", "d2", "d3"};
+  for (std::size_t i = 0; i < kNames.size(); ++i) {
+    c->lens[i] = rows.number(rows.column(kNames[i])).value_or(kNone);
+    c->lens_sigma[i] = rows.number(rows.column(std::string("sigma_") + kNames[i])).value_or(kNone);
+  }
+}
+
 void read_calibrations(const fs::path& folder, Session* session) {
   const auto text = read_part(folder / "calibrations.csv", std::size_t{256} << 20U, "how the calibration changed is not known", session);
   if (!text) return;
@@ -226,6 +234,7 @@ void read_calibrations(const fs::path& folder, Session* session) {
     c.stamp = Stamp(*stamp);
     c.camera = static_cast<int>(*camera);
     c.accepted = rows.text(rows.column("outcome")) == "accepted";
+    c.kept = rows.text(rows.column("outcome")) == "kept";
     c.cause = rows.text(rows.column("cause")).substr(0, kLongestText);
     c.reason = rows.text(rows.column("reason")).substr(0, kLongestText);
     c.frames = rows.integer(rows.column("frames")).value_or(0);
@@ -233,8 +242,10 @@ void read_calibrations(const fs::path& folder, Session* session) {
     c.decided = std::isfinite(c.latency_frames);
     c.held_out_before_px = rows.number(rows.column("held_out_before_px")).value_or(kNone);
     c.held_out_after_px = rows.number(rows.column("held_out_after_px")).value_or(kNone);
-    c.focal_px = rows.number(rows.column("fx")).value_or(kNone);
-    c.focal_sigma_px = rows.number(rows.column("sigma_fx")).value_or(kNone);
+    read_lens(rows, &c);
+    c.judged_depth_m = rows.number(rows.column("judged_depth_m")).value_or(kNone);
+    c.depth_sigma_percent = rows.number(rows.column("depth_sigma_percent")).value_or(kNone);
+    c.depth_difference_percent = rows.number(rows.column("depth_difference_percent")).value_or(kNone);
     c.has_sigma = read_six(rows, "wide_", &c.sigma) || read_six(rows, "sigma_", &c.sigma);
     session->calibrations.push_back(std::move(c));
   }
@@ -321,6 +332,11 @@ std::optional<double> number_at(const nlohmann::json& json, std::string_view pat
   if (at == nullptr || !at->is_number()) return std::nullopt;
   const auto value = at->get<double>();
   return std::isfinite(value) ? std::optional(value) : std::nullopt;
+}
+
+std::optional<bool> flag_at(const nlohmann::json& json, std::string_view path) {
+  const nlohmann::json* at = find_path(json, path);
+  return at != nullptr && at->is_boolean() ? std::optional(at->get<bool>()) : std::nullopt;
 }
 
 std::string text_at(const nlohmann::json& json, std::string_view path) {

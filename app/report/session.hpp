@@ -43,6 +43,7 @@ struct Frame {
 struct CalibrationRow {
   Stamp stamp{};
   bool accepted = false;
+  bool kept = false;     // a measurement of the drive that is no better than what is in use: no rejection
   bool decided = false;  // while driving; else the drive began with it
   std::string cause{}, reason{};
   std::int64_t frames = 0;
@@ -51,7 +52,10 @@ struct CalibrationRow {
   std::array<double, 6> value{};  // rotation vector, rad; translation, m
   std::array<double, 6> sigma{};  // the wide one, else the noise's; meaningless without has_sigma
   bool has_sigma = false;
-  double focal_px = kNone, focal_sigma_px = kNone;  // along x
+  std::array<double, 8> lens{kNone, kNone, kNone, kNone, kNone, kNone, kNone, kNone};        // fx fy cx cy, px; four of distortion
+  std::array<double, 8> lens_sigma{kNone, kNone, kNone, kNone, kNone, kNone, kNone, kNone};  // of these
+  // What the drive had measured of the depth by then: at which distance, its sigma, and how far off what was in use is by it.
+  double judged_depth_m = kNone, depth_sigma_percent = kNone, depth_difference_percent = kNone;
 };
 
 struct Event {
@@ -83,6 +87,8 @@ inline constexpr std::size_t kLongestText = 300;  // characters kept of a word o
 
 /// A finite number of summary.json by its path, `metrics.ate_m`. Nothing: not there, null, no number.
 [[nodiscard]] std::optional<double> number_at(const nlohmann::json& json, std::string_view path);
+/// The same for true and false.
+[[nodiscard]] std::optional<bool> flag_at(const nlohmann::json& json, std::string_view path);
 /// The same for texts, cut at kLongestText.
 [[nodiscard]] std::string text_at(const nlohmann::json& json, std::string_view path);
 

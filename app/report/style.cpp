@@ -28,6 +28,7 @@ figure{margin:0}
 svg{display:block;width:100%;height:auto}
 svg text{font-size:13px;fill:var(--soft);font-family:inherit;font-variant-numeric:tabular-nums}
 svg text.strong{fill:var(--ink)}
+svg text.good{fill:var(--good)}
 path,line,polyline{fill:none}
 .axis{stroke:var(--frame);stroke-width:1}
 .tick{stroke:var(--frame);stroke-width:1;opacity:.28}
@@ -37,6 +38,9 @@ path,line,polyline{fill:none}
 .f-ours{fill:var(--ours)}.f-theirs{fill:var(--theirs)}.f-good{fill:var(--good)}.f-care{fill:var(--care)}.f-bad{fill:var(--bad)}
 .f-third{fill:var(--third)}.f-fourth{fill:var(--fourth)}.f-soft{fill:var(--soft)}.f-ink{fill:var(--ink)}
 .hollow{fill:var(--panel);stroke:var(--bad);stroke-width:1.6}
+.seen{fill:var(--panel);stroke:var(--soft);stroke-width:1.4}
+.whisker{stroke:var(--soft);stroke-width:1.2}
+.confirmed{stroke:var(--good);stroke-width:1.4;stroke-dasharray:3 3}
 .band{fill:var(--ours);opacity:.2;stroke:none}
 .hole{fill:var(--bad);opacity:.14}
 .track{fill:var(--frame);opacity:.16}
