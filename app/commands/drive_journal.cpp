@@ -44,7 +44,18 @@ void DriveJournal::note(const Estimator& estimator) noexcept {
     recorder_->post(record);
     if (aloud(event.kind)) (void)notices_.push(record);
   }
-  for (const CalibrationDecision& decision : estimator.calibrations()) recorder_->post(CalibrationRecord::of(decision));
+  for (const CalibrationDecision& decision : estimator.calibrations()) {
+    recorder_->post(CalibrationRecord::of(decision));
+    note_change(decision);
+  }
+  matches_.take(estimator.tracks());
+}
+
+/// A rig that was knocked fits no match from before: a calibration is looked at with those of its own rig only.
+void DriveJournal::note_change(const CalibrationDecision& decision) noexcept {
+  using Cause = CalibrationCause;
+  const bool changed = decision.cause == Cause::knock || decision.cause == Cause::drift || decision.cause == Cause::collapse;
+  if (decision.accepted && changed) matches_.rig_changed(decision.onset_frame);
 }
 
 void DriveJournal::note(const PoseSample& sample) noexcept {

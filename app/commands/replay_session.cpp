@@ -206,7 +206,7 @@ ExitCode Replay::run() {
 
   const auto totals = recorder_->close();
   const SummaryInput input = summary_input(*totals, AllocationGuard::allocations_after_seal() - allocations_before);
-  if (faults.empty()) end_session(request_.out, begin_, input, *totals, &faults);
+  if (faults.empty()) end_session(request_.out, begin_, input, *totals, journal_.matches(), &faults);
   write_session_summary(request_.out, *totals, input, &faults);
   faults.insert(faults.end(), totals->faults.begin(), totals->faults.end());
   for (const std::string& sentence : recorder_->take_complaints()) progress.say("vergence: " + sentence);
