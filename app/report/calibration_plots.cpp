@@ -69,8 +69,11 @@ void fit_calibration(const CalibrationCurve& curve, PlotBox* box) {
     const double s = std::isfinite(h.two_sigma) ? h.two_sigma : 0;
     include(h.value - s), include(h.value + s);
   }
-  for (const auto* marks : {&curve.rejected, &curve.measured})
-    for (const Mark& m : *marks) include(m.value);
+  for (const Mark& m : curve.rejected) include(m.value);
+  for (const Mark& m : curve.measured) {
+    const double s = std::isfinite(m.two_sigma) ? m.two_sigma : 0;
+    include(m.value - s), include(m.value + s);
+  }
   box->fit_y(low, high, false);
 }
 
@@ -90,8 +93,7 @@ void draw_held(const CalibrationCurve& curve, const PlotBox& box, Svg* svg) {
 void draw_marks(const CalibrationCurve& curve, const PlotBox& box, Svg* svg) {
   for (const Mark& m : curve.measured) {
     const double x = box.x(m.at);
-    if (m.two_sigma > 0)
-      svg->line("whisker", x, std::max(box.top, box.y(m.value + m.two_sigma)), x, std::min(box.bottom, box.y(m.value - m.two_sigma)));
+    if (m.two_sigma > 0) svg->line("whisker", x, box.y(m.value + m.two_sigma), x, box.y(m.value - m.two_sigma));
     svg->circle("seen", x, box.y(m.value), 2.8);
   }
   for (const Mark& m : curve.rejected) svg->circle("hollow", box.x(m.at), box.y(m.value), 3.2);

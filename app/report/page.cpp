@@ -10,6 +10,7 @@
 #include <fmt/format.h>
 
 #include "app/report/plots.hpp"
+#include "app/report/residual_section.hpp"
 #include "app/report/style.hpp"
 #include "app/report/svg.hpp"
 #include "app/report/tables.hpp"
@@ -200,7 +201,7 @@ void calibration_sections(const Session& s, const Analysis& a, std::string* out)
         "<p class=\"soft\">Where the other cameras sit relative to the left one, as it was in use; the band is ± 2 σ (wide, with uncertain "
         "intrinsics). Hollow red marks were rejected; hollow grey ones are what the drive measured while it kept what was in use.</p>" +
         calibrations_table(s);
-  *out += section("wide long", "Calibration", body) + plots;
+  *out += section("wide long", "Calibration", body) + plots + residual_section(s);
 }
 
 std::string footer(const Session& s) {

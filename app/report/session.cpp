@@ -252,6 +252,42 @@ void read_calibrations(const fs::path& folder, Session* session) {
   tell_torn("calibrations.csv", rows.torn_rows() + unreadable, whole.size() != text->size(), 0, session);
 }
 
+/// Nothing: a number is missing or makes no rectangle of an image.
+std::optional<ResidualRow> parse_residual(const CsvRows& rows) {
+  ResidualRow r;
+  r.at_the_end = rows.text(rows.column("calibration")) == "end";
+  const auto camera = rows.integer(rows.column("camera"));
+  const auto left = rows.number(rows.column("left_px")), top = rows.number(rows.column("top_px"));
+  const auto width = rows.number(rows.column("width_px")), height = rows.number(rows.column("height_px"));
+  const auto mean = rows.number(rows.column("mean_px"));
+  if (!camera || *camera < 1 || *camera >= kMaxCameras || !left || !top || !width || !height || !mean) return std::nullopt;
+  constexpr double kLargest = 1e5;  // px
+  const bool inside = *left >= 0 && *top >= 0 && *width > 0 && *height > 0 && *left + *width <= kLargest && *top + *height <= kLargest;
+  if (!inside || !(std::abs(*mean) <= kLargest)) return std::nullopt;
+  r.camera = static_cast<int>(*camera);
+  r.left = *left, r.top = *top, r.width = *width, r.height = *height;
+  r.mean_px = *mean;
+  return r;
+}
+
+/// Sessions that ended without matches, were cut off or are older have no such file.
+void read_residuals(const fs::path& folder, Session* session) {
+  std::error_code error;
+  if (!fs::exists(folder / "residuals.csv", error)) return;
+  const auto text = read_part(folder / "residuals.csv", std::size_t{4} << 20U, "how the calibration fits the images is not known", session);
+  if (!text) return;
+  const std::string_view whole = whole_lines(*text);
+  CsvRows rows(whole);
+  std::size_t unreadable = 0;
+  while (rows.next() && session->residuals.size() < kMostResiduals) {
+    if (const auto row = parse_residual(rows))
+      session->residuals.push_back(*row);
+    else
+      ++unreadable;
+  }
+  tell_torn("residuals.csv", rows.torn_rows() + unreadable, whole.size() != text->size(), 0, session);
+}
+
 std::optional<Event> parse_event(std::string_view line) {
   if (line.size() > kLongestEventLine) return std::nullopt;
   const auto json = nlohmann::json::parse(line, nullptr, false);
@@ -358,6 +394,7 @@ Session read_session(const fs::path& folder) {
   session.reference = read_trajectory_part(folder, "reference.tum", "there is nothing to compare the trajectory with", &session);
   read_calibrations(folder, &session);
   read_calibration_file(folder, &session);
+  read_residuals(folder, &session);
   read_events(folder, &session);
   return session;
 }

@@ -242,11 +242,11 @@ std::string held_out_text(const CalibrationRow& c) {
   return fmt::format("{:.2f} → {:.2f} px", c.held_out_before_px, c.held_out_after_px);
 }
 
-/// `± 0.26 % at 20 m, was off by 1.4 %`; empty where nothing was measured.
+/// `± 0.26 % at 20 m, was off 1.4 %`, with spaces that do not break; empty where nothing was measured.
 std::string depth_text(const CalibrationRow& c) {
   if (!(c.judged_depth_m > 0) || !std::isfinite(c.depth_sigma_percent)) return "";
-  const std::string sigma = fmt::format("± {:.2f} % at {:.0f} m", c.depth_sigma_percent, c.judged_depth_m);
-  return c.depth_difference_percent > 0 ? fmt::format("{}, was off by {:.2f} %", sigma, c.depth_difference_percent) : sigma;
+  const std::string sigma = fmt::format("± {:.2f} % at {:.0f} m", c.depth_sigma_percent, c.judged_depth_m);
+  return c.depth_difference_percent > 0 ? fmt::format("{}, was off {:.2f} %", sigma, c.depth_difference_percent) : sigma;
 }
 
 }  // namespace
@@ -280,8 +280,10 @@ std::string calibrations_table(const Session& session) {
     const std::string from = c.frames > 0 ? fmt::format("from {} frames", c.frames) : "";
     const std::string why = from.empty() || c.reason.empty() ? from + c.reason : from + "; " + c.reason;
     const char* outcome = c.accepted ? "accepted" : c.kept ? "kept" : "rejected";
-    out += fmt::format("<tr><td class=\"t\">{}</td><td class=\"k\">{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td></tr>\n",
-                       event_time(session, c.stamp), outcome, escape(cause, 60), after, held_out_text(c), depth_text(c), escape(why));
+    out += fmt::format(
+        "<tr><td class=\"t\">{}</td><td class=\"k\">{}</td><td class=\"w\">{}</td><td class=\"w\">{}</td><td "
+        "class=\"w\">{}</td><td>{}</td><td>{}</td></tr>\n",
+        event_time(session, c.stamp), outcome, escape(cause, 60), after, held_out_text(c), depth_text(c), escape(why));
   }
   return out + "</table>\n";
 }
