@@ -245,7 +245,7 @@ std::string held_out_text(const CalibrationRow& c) {
 /// `± 0.26 % at 20 m, was off 1.4 %`, with spaces that do not break; empty where nothing was measured.
 std::string depth_text(const CalibrationRow& c) {
   if (!(c.judged_depth_m > 0) || !std::isfinite(c.depth_sigma_percent)) return "";
-  const std::string sigma = fmt::format("± {:.2f} % at {:.0f} m", c.depth_sigma_percent, c.judged_depth_m);
+  const std::string sigma = fmt::format("± {:.2f} % at {:.0f} m", c.depth_sigma_percent, c.judged_depth_m);
   return c.depth_difference_percent > 0 ? fmt::format("{}, was off {:.2f} %", sigma, c.depth_difference_percent) : sigma;
 }
 

@@ -63,7 +63,7 @@ TEST(Page, ofAWholeSessionShowsEverythingAndLoadsNothing) {
                            ">verified</text>",
                            "class=\"seen\"",
                            ">kept</td>",
-                           "± 0.10 % at 20 m, was off 0.24 %",
+                           "± 0.10 % at 20 m, was off 0.24 %",
                            "first verified after",
                            "can be improved",
                            "9.1 %",
