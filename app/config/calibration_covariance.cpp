@@ -67,6 +67,7 @@ std::vector<NamedRow> read_rows(const YamlFile& file, const YAML::Node& list, co
     known.insert(known.begin(), named.begin(), named.end());
   }
   std::vector<std::string> names;
+  names.reserve(known.size());
   for (const NamedRow& row : known) names.push_back(row.name);
 
   if (!list.IsSequence() || list.size() == 0) file.fail(list, field + " is not a list of parameters, like right.rx or left.k1");

@@ -48,7 +48,7 @@ class Field {
         left_(rig.intrinsics[0]),
         other_(rig.intrinsics[static_cast<std::size_t>(camera)]),
         geometry_(rig.T_camera_left[static_cast<std::size_t>(camera)]),
-        cells_(static_cast<std::size_t>(kColumns * kRows)) {}
+        cells_(std::size_t{kColumns} * kRows) {}
 
   void add(const RawMatch& m) {
     Vec3 a, b;
@@ -60,7 +60,7 @@ class Field {
     const Intrinsics& k = left_.intrinsics();
     const int column = std::clamp(static_cast<int>(kColumns * left.x() / k.width), 0, kColumns - 1);
     const int row = std::clamp(static_cast<int>(kRows * left.y() / k.height), 0, kRows - 1);
-    cells_[static_cast<std::size_t>(row * kColumns + column)].push_back(d * other_.intrinsics().fx);
+    cell_at(row, column).push_back(d * other_.intrinsics().fx);
   }
 
   void append_to(std::vector<ResidualCell>* out) {
@@ -68,7 +68,7 @@ class Field {
     const double width = static_cast<double>(k.width) / kColumns, height = static_cast<double>(k.height) / kRows;
     for (int row = 0; row < kRows; ++row)
       for (int column = 0; column < kColumns; ++column) {
-        std::vector<double>& values = cells_[static_cast<std::size_t>(row * kColumns + column)];
+        std::vector<double>& values = cell_at(row, column);
         if (values.size() < kFewest) continue;
         ResidualCell cell{camera_, column * width, row * height, width, height};
         summarise(std::move(values), &cell);
@@ -77,6 +77,10 @@ class Field {
   }
 
  private:
+  [[nodiscard]] std::vector<double>& cell_at(int row, int column) {
+    return cells_[static_cast<std::size_t>(row) * kColumns + static_cast<std::size_t>(column)];
+  }
+
   int camera_;
   Camera left_, other_;
   EpipolarGeometry geometry_;
