@@ -65,11 +65,12 @@ void remark_lost(const CalibrationFile& calibration, const char* format, bool na
   bool sigmas = false, serials = false;
   for (std::size_t k = 0; k < static_cast<std::size_t>(rig.cameras); ++k) {
     const auto given = [](const auto& values) { return std::any_of(values.begin(), values.end(), [](double v) { return v != 0; }); };
-    sigmas = sigmas || given(rig.intrinsics[k].sigma) || given(rig.sigma_noise[k]) || given(rig.sigma_wide[k]) ||
-             !rig.covariance_wide[k].isZero(0);
+    sigmas = sigmas || given(rig.intrinsics[k].sigma) || given(rig.intrinsics[k].distortion_sigma) || given(rig.sigma_noise[k]) ||
+             given(rig.sigma_wide[k]) || !rig.covariance_wide[k].isZero(0);
     serials = serials || !calibration.serials[k].empty();
   }
   if (sigmas || rig.baseline_sigma != 0) lost.emplace_back("sigmas");
+  if (!rig.covariance.empty()) lost.emplace_back("the covariance");
   if (serials) lost.emplace_back("serials");
   if (names) lost.emplace_back("names");
   if (!calibration.rig_name.empty()) lost.emplace_back("the rig's name");

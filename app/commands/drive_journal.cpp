@@ -11,8 +11,8 @@ namespace {
 /// What a user wants to hear of at once.
 bool aloud(EstimatorEvent::Kind kind) noexcept {
   using Kind = EstimatorEvent::Kind;
-  return kind == Kind::rig_changed || kind == Kind::calibration_confirmed || kind == Kind::calibration_contradicted || kind == Kind::calibration_accepted ||
-         kind == Kind::calibration_rejected || kind == Kind::calibration_waits;
+  return kind == Kind::rig_changed || kind == Kind::calibration_confirmed || kind == Kind::calibration_contradicted ||
+         kind == Kind::calibration_accepted || kind == Kind::calibration_rejected || kind == Kind::calibration_waits;
 }
 
 std::string words(std::string_view name) {
@@ -21,9 +21,10 @@ std::string words(std::string_view name) {
   return text;
 }
 
-/// `stereo`, `parallel monocular`, `parallel monocular, needs motion`.
+/// `stereo`, `stereo, verifying the calibration`, `parallel monocular, needs motion`.
 std::string state_words(State state, Reason reason) {
   std::string text = state == State::stereo_odometry ? "stereo" : words(to_string(state));
+  if (reason == Reason::unverified_calibration || reason == Reason::unconfirmed) text += ", verifying the calibration";
   if (reason == Reason::needs_motion || reason == Reason::needs_near_structure || reason == Reason::needs_texture)
     text += ", " + words(to_string(reason));
   return text;
@@ -43,7 +44,18 @@ void DriveJournal::note(const Estimator& estimator) noexcept {
     recorder_->post(record);
     if (aloud(event.kind)) (void)notices_.push(record);
   }
-  for (const CalibrationDecision& decision : estimator.calibrations()) recorder_->post(CalibrationRecord::of(decision));
+  for (const CalibrationDecision& decision : estimator.calibrations()) {
+    recorder_->post(CalibrationRecord::of(decision));
+    note_change(decision);
+  }
+  matches_.take(estimator.tracks());
+}
+
+/// A rig that was knocked fits no match from before: a calibration is looked at with those of its own rig only.
+void DriveJournal::note_change(const CalibrationDecision& decision) noexcept {
+  using Cause = CalibrationCause;
+  const bool changed = decision.cause == Cause::knock || decision.cause == Cause::drift || decision.cause == Cause::collapse;
+  if (decision.accepted && changed) matches_.rig_changed(decision.onset_frame);
 }
 
 void DriveJournal::note(const PoseSample& sample) noexcept {

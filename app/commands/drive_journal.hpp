@@ -2,6 +2,7 @@
 #include <cstdint>
 #include <string_view>
 
+#include "app/recorder/match_sample.hpp"
 #include "app/recorder/recorder.hpp"
 #include "app/runtime/progress.hpp"
 #include "core/estimator/estimator.hpp"
@@ -10,10 +11,11 @@
 namespace vergence::app {
 
 /// What becomes of each frame beside its line in poses.csv: events and calibrations for the recorder, the state of things for the progress
-/// line, sentences for the user.
+/// line, sentences for the user, a sample of the matches across.
 ///
 /// Threads  note…(), tell(): the estimator's, sealed. show(): the caller's. After the estimator's thread has joined all is anyone's.
-/// Memory   Fixed. Full: of the states for the line the newest are lost, the next one tells the same and more; of the sentences too, and
+/// Memory   Fixed, most of it the sample of matches: not for a stack. Full: of the states for the line the newest are lost, the next one
+/// tells the same and more; of the sentences too, and
 ///          events.jsonl has them.
 class DriveJournal {
  public:
@@ -30,6 +32,8 @@ class DriveJournal {
   /// An event of the session's own. `kind` points to a constant. `aloud`: on stderr, too.
   void tell(Stamp stamp, const char* kind, std::string_view sentence, bool aloud) noexcept;
 
+  /// Matches of the drive so far. Before the estimator's thread has joined they are its own.
+  [[nodiscard]] const MatchSample& matches() const noexcept { return matches_; }
   /// Points and observations over the estimator's capacity.
   [[nodiscard]] std::uint64_t dropped() const noexcept { return dropped_; }
 
@@ -47,12 +51,15 @@ class DriveJournal {
     double from_ins_m = -1;  // negative: not compared
   };
 
+  void note_change(const CalibrationDecision& decision) noexcept;
+
   Recorder* recorder_ = nullptr;
   Stamp first_{};
   Glimpse now_{};
   std::uint64_t dropped_ = 0;
   Vec3 last_position_ = Vec3::Zero();
   bool posed_ = false;
+  MatchSample matches_;
   Ring<Glimpse, 64> glimpses_;
   Ring<EventRecord, 32> notices_;
 };

@@ -150,7 +150,7 @@ SummaryInput Replay::summary_input(const SessionTotals& totals, std::uint64_t al
   input.skipped = skipped_;
   input.dropped_by_estimator = journal_.dropped();
   if (!truth_.empty() && !totals.trajectory.empty()) input.evaluation = evaluate(totals.trajectory, truth_, summary_evaluation_options());
-  describe_calibration(*estimator_, begin_, totals, options_.calibration, &input);
+  describe_calibration(*estimator_, begin_, totals, options_, &input);
   input.allocations_after_seal = allocations;
   input.memory = memory();
   input.configuration_hash = configuration_hash(request_.configuration);
@@ -169,6 +169,7 @@ void Replay::tell(const SessionTotals& totals, const SummaryInput& input, Progre
       fmt::format("session {}: {} frames, {} posed ({} degraded), {} lost, {} skipped; {:.2f} m; {:.1f} ms a frame, {:.1f} at p99",
                   request_.out.string(), totals.read, posed, totals.degraded, totals.lost, skipped_, totals.path_m, totals.estimate.mean(),
                   totals.estimate.percentile(0.99)));
+  if (const std::string sentence = verification_sentence(input); !sentence.empty()) progress->say(sentence);
   if (input.evaluation && input.evaluation->status == EvaluationStatus::ok) {
     const TrajectoryEvaluation& e = *input.evaluation;
     const SegmentErrors& near = e.segments[1];
@@ -206,7 +207,7 @@ ExitCode Replay::run() {
 
   const auto totals = recorder_->close();
   const SummaryInput input = summary_input(*totals, AllocationGuard::allocations_after_seal() - allocations_before);
-  if (faults.empty()) end_session(request_.out, begin_, input, *totals, &faults);
+  if (faults.empty()) end_session(request_.out, begin_, input, *totals, journal_.matches(), &faults);
   write_session_summary(request_.out, *totals, input, &faults);
   faults.insert(faults.end(), totals->faults.begin(), totals->faults.end());
   for (const std::string& sentence : recorder_->take_complaints()) progress.say("vergence: " + sentence);

@@ -391,7 +391,7 @@ SummaryInput Drive::summary_input(const SessionTotals& totals, std::uint64_t all
   input.dropped_by_estimator = journal_.dropped();
   if (!totals.reference.empty() && !totals.trajectory.empty())
     input.evaluation = evaluate(totals.trajectory, totals.reference, summary_evaluation_options());
-  describe_calibration(*estimator_, begin_, totals, options_.calibration, &input);
+  describe_calibration(*estimator_, begin_, totals, options_, &input);
   input.allocations_after_seal = allocations;
   input.memory = memory();
   input.configuration_hash = configuration_hash(configuration_);
@@ -417,6 +417,7 @@ void Drive::tell(const SessionTotals& totals, const SummaryInput& input, Progres
       fmt::format("session {}: {} frames, {} posed ({} degraded), {} lost, {} dropped; {:.2f} m; {:.1f} ms a frame, {:.1f} at p99",
                   request_.out.string(), totals.read, totals.ok + totals.degraded, totals.degraded, totals.lost, input.skipped,
                   totals.path_m, totals.estimate.mean(), totals.estimate.percentile(0.99)));
+  if (const std::string sentence = verification_sentence(input); !sentence.empty()) progress->say(sentence);
   if (!input.truth || !input.truth->evaluation || input.truth->evaluation->status != EvaluationStatus::ok) return;
   const TrajectoryEvaluation& e = *input.truth->evaluation;
   const SegmentErrors &far = e.segments[0], &near = e.segments[1];
@@ -491,7 +492,7 @@ ExitCode Drive::run() {
 
   const auto totals = recorder_->close();
   const SummaryInput input = summary_input(*totals, AllocationGuard::allocations_after_seal() - allocations_before);
-  if (faults.empty()) end_session(request_.out, begin_, input, *totals, &faults);
+  if (faults.empty()) end_session(request_.out, begin_, input, *totals, journal_.matches(), &faults);
   write_session_summary(request_.out, *totals, input, &faults);
   faults.insert(faults.end(), totals->faults.begin(), totals->faults.end());
   for (const std::string& sentence : recorder_->take_complaints()) progress.say("vergence: " + sentence);

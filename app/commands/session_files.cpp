@@ -2,6 +2,7 @@
 
 #include <cstring>
 #include <iostream>
+#include <limits>
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
@@ -9,7 +10,9 @@
 #include "app/config/calibration_file.hpp"
 #include "app/config/calibration_state.hpp"
 #include "app/recorder/line_file.hpp"
+#include "app/recorder/residual_field.hpp"
 #include "app/report/report.hpp"
+#include "app/runtime/durable_file.hpp"
 #include "app/runtime/errors.hpp"
 #include "app/runtime/thread_runner.hpp"
 
@@ -50,6 +53,26 @@ std::function<Kept(const RigCalibration&)> calibration_keeper(const std::filesys
   };
 }
 
+namespace {
+
+/// residuals.csv, where there are matches.
+void write_residuals(const std::filesystem::path& session, const std::optional<RigCalibration>& before, const RigCalibration& at_the_end,
+                     const MatchSample& sample, std::vector<std::string>* faults) {
+  const auto field = [&sample](const RigCalibration& rig, std::uint64_t from, std::uint64_t until) {
+    return residual_field(sample.matches(), rig, from, until);
+  };
+  const std::vector<ResidualCell> end = field(at_the_end, sample.last_change(), std::numeric_limits<std::uint64_t>::max());
+  if (end.empty()) return;
+  const std::vector<ResidualCell> begin = before ? field(*before, 0, sample.first_change()) : std::vector<ResidualCell>{};
+  try {
+    replace_durably(session / "residuals.csv", format_residuals(begin, end));
+  } catch (const InputError& e) {
+    faults->emplace_back(e.what());
+  }
+}
+
+}  // namespace
+
 void begin_session(const std::filesystem::path& session, const StartingCalibration& begin, Stamp stamp, Recorder* recorder,
                    std::vector<std::string>* faults) {
   if (begin.trust == CalibrationTrust::none) return;
@@ -58,21 +81,31 @@ void begin_session(const std::filesystem::path& session, const StartingCalibrati
 }
 
 void describe_calibration(const Estimator& estimator, const StartingCalibration& begin, const SessionTotals& totals,
-                          const calibration::CalibrationOptions& options, SummaryInput* input) {
+                          const EstimatorOptions& options, SummaryInput* input) {
   input->calibrated = estimator.calibrated();
+  input->online = options.online;
+  input->verified = options.online && estimator.verified();
   input->calibration = estimator.calibration();
   input->calibration_source = totals.accepted > 0 ? "online" : begin.source;
   if (begin.trust != CalibrationTrust::none) input->before = begin.file.rig;
-  input->options = options;
+  input->options = options.calibration;
+}
+
+std::string verification_sentence(const SummaryInput& input) {
+  if (input.verified || !input.calibrated) return "";
+  if (!input.online) return "the calibration is not verified: nothing watched it (calibration.online: off)";
+  return "the drive has not confirmed its calibration; what would: turns, near structure at the roadside, tracks in the images' corners";
 }
 
 void end_session(const std::filesystem::path& session, const StartingCalibration& begin, const SummaryInput& input,
-                 const SessionTotals& totals, std::vector<std::string>* faults) {
+                 const SessionTotals& totals, const MatchSample& matches, std::vector<std::string>* faults) {
   if (!input.calibrated) return;
   CalibrationFile file = begin.file;
   file.rig = input.calibration;
   if (totals.accepted > 0) file.source = "online";
   write_session_calibration(session, file, faults);
+  // With one calibration throughout there is nothing to compare.
+  write_residuals(session, totals.accepted > 0 ? input.before : std::nullopt, input.calibration, matches, faults);
 }
 
 void write_session_summary(const std::filesystem::path& session, const SessionTotals& totals, const SummaryInput& input,

@@ -10,6 +10,7 @@
 
 #include "app/commands/starting_calibration.hpp"
 #include "app/config/calibration_file.hpp"
+#include "app/recorder/match_sample.hpp"
 #include "app/recorder/summary.hpp"
 #include "app/runtime/progress.hpp"
 #include "core/types/parallel.hpp"
@@ -38,11 +39,14 @@ void begin_session(const std::filesystem::path& session, const StartingCalibrati
 
 /// The calibration's part of the summary.
 void describe_calibration(const Estimator& estimator, const StartingCalibration& begin, const SessionTotals& totals,
-                          const calibration::CalibrationOptions& options, SummaryInput* input);
+                          const EstimatorOptions& options, SummaryInput* input);
 
-/// calibration.yaml as it is in use at the end, if there is one.
+/// What is to be said of a calibration that the drive has not confirmed; empty: it has, or there is none.
+[[nodiscard]] std::string verification_sentence(const SummaryInput& input);
+
+/// calibration.yaml as it is in use at the end, if there is one, and residuals.csv, if there are matches to look at it with.
 void end_session(const std::filesystem::path& session, const StartingCalibration& begin, const SummaryInput& input,
-                 const SessionTotals& totals, std::vector<std::string>* faults);
+                 const SessionTotals& totals, const MatchSample& matches, std::vector<std::string>* faults);
 
 /// summary.json of the session; what goes wrong becomes a sentence of *faults.
 void write_session_summary(const std::filesystem::path& session, const SessionTotals& totals, const SummaryInput& input,

@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 #include <Eigen/SVD>
 
+#include "app/config/calibration_covariance.hpp"
 #include "app/config/calibration_file.hpp"
 
 namespace vergence::app {
@@ -71,7 +72,8 @@ Finding check_intrinsics(const Intrinsics& k, const std::string& camera) {
     return finding(camera + "distortion", fmt::format("would move a corner of the image by {:.3g} of its distance from the centre; "
                                                       "up to {} is expected (radtan: k1, k2, p1, p2[, k3]; equidistant: k1 to k4)",
                                                       shift, kLargestDistortion));
-  return check_sigmas(k.sigma, camera + "intrinsics_sigma");
+  if (auto bad = check_sigmas(k.sigma, camera + "intrinsics_sigma")) return bad;
+  return check_sigmas(k.distortion_sigma, camera + "distortion_sigma");
 }
 
 Finding check_rotation(Mat3* R, const std::string& field) {
@@ -125,7 +127,9 @@ Finding check_covariance(const Mat6& covariance, const std::string& field) {
 Finding check_found(const RigCalibration& rig) {
   if (rig.frames < 0) return finding("found.frames", "is negative");
   if (auto bad = check_sigmas(std::array{rig.reprojection_px}, "found.reprojection_px")) return bad;
-  return check_sigmas(std::array{rig.scale_sigma}, "found.scale_sigma");
+  if (auto bad = check_sigmas(std::array{rig.scale_sigma}, "found.scale_sigma")) return bad;
+  if (!std::isfinite(rig.inflation) || rig.inflation < 0) return finding("found.inflation", "must be a number from 0 on");
+  return std::nullopt;
 }
 
 }  // namespace
@@ -143,6 +147,7 @@ std::optional<Implausible> find_implausible(RigCalibration* rig) {
     if (auto bad = check_sigmas(rig->sigma_wide[i], camera + "sigma_wide")) return bad;
     if (auto bad = check_covariance(rig->covariance_wide[i], camera + "covariance_wide")) return bad;
   }
+  if (const auto flaw = find_flaw(rig->covariance)) return finding("covariance", *flaw);
   if (auto bad = check_baseline(*rig)) return bad;
   return check_found(*rig);
 }

@@ -9,6 +9,7 @@
 #include <fmt/format.h>
 #include <yaml-cpp/yaml.h>
 
+#include "app/config/calibration_covariance.hpp"
 #include "app/config/yaml_file.hpp"
 #include "app/runtime/durable_file.hpp"
 #include "app/runtime/errors.hpp"
@@ -62,6 +63,8 @@ class Section {
   std::string name_;
 };
 
+std::size_t most_coefficients(const Intrinsics& k) { return k.kind == CameraModelKind::pinhole_radtan ? 5 : 4; }
+
 Intrinsics read_intrinsics(const YamlFile& file, const Section& camera) {
   constexpr std::int64_t kAnySize = std::numeric_limits<int>::max();  // what a size may be is checked with the rest
   Intrinsics k;
@@ -80,12 +83,12 @@ Intrinsics read_intrinsics(const YamlFile& file, const Section& camera) {
   const auto f = camera.numbers("intrinsics", 4, 4);
   k.fx = f[0], k.fy = f[1], k.cx = f[2], k.cy = f[3];
   if (camera.has("distortion") && camera.need("distortion").size() > 0) {  // [] or nothing: none
-    const auto d = camera.numbers("distortion", 4, k.kind == CameraModelKind::pinhole_radtan ? 5 : 4);
+    const auto d = camera.numbers("distortion", 4, most_coefficients(k));
     std::copy(d.begin(), d.end(), k.distortion.begin());
   }
   camera.optional_numbers("intrinsics_sigma", &k.sigma);
   if (camera.has("distortion_sigma")) {
-    const auto sigma = camera.numbers("distortion_sigma", 4, k.distortion_sigma.size());
+    const auto sigma = camera.numbers("distortion_sigma", 4, most_coefficients(k));
     std::copy(sigma.begin(), sigma.end(), k.distortion_sigma.begin());
   }
   return k;
@@ -99,7 +102,7 @@ Transform read_transform(const Section& camera) {
   return T;
 }
 
-Mat6 read_covariance(const Section& camera) {
+Mat6 read_wide_covariance(const Section& camera) {
   Mat6 covariance = Mat6::Zero();
   if (!camera.has("covariance_wide")) return covariance;
   const auto n = camera.numbers("covariance_wide", kTriangle, kTriangle);
@@ -121,17 +124,18 @@ void read_camera(const YamlFile& file, const YAML::Node& node, std::size_t k, co
   rig.T_camera_left[k] = read_transform(camera);
   camera.optional_numbers("sigma_noise", &rig.sigma_noise[k]);
   camera.optional_numbers("sigma_wide", &rig.sigma_wide[k]);
-  rig.covariance_wide[k] = read_covariance(camera);
+  rig.covariance_wide[k] = read_wide_covariance(camera);
 }
 
 void read_found(const YamlFile& file, const YAML::Node& node, CalibrationFile* calibration) {
-  const Section found(file, node, "found", {"stamp", "source", "frames", "reprojection_px", "scale_sigma"});
+  const Section found(file, node, "found", {"stamp", "source", "frames", "reprojection_px", "scale_sigma", "inflation"});
   RigCalibration& rig = calibration->rig;
   rig.found = Stamp(found.integer("stamp", 0, std::numeric_limits<std::int64_t>::max()));
   calibration->source = found.text("source", "");
   rig.frames = static_cast<int>(found.integer("frames", 0, std::numeric_limits<int>::max()));
   rig.reprojection_px = found.number("reprojection_px", 0);
   rig.scale_sigma = found.number("scale_sigma", 0);
+  rig.inflation = found.number("inflation", 0);
 }
 
 /// The node that a dotted field names, or the nearest one above it that is there.
@@ -151,7 +155,7 @@ YAML::Node locate(const YAML::Node& root, const std::string& field) {
 
 CalibrationFile read_file(const YamlFile& file, const CalibrationUse& use) {
   if (file.root().IsNull()) throw InputError(file.name() + ": is empty; a calibration is expected");
-  const Section top(file, file.root(), "", {"version", "rig", "cameras", "found"});
+  const Section top(file, file.root(), "", {"version", "rig", "cameras", "covariance", "found"});
   if (const auto version = file.integer(top.need("version"), "version", 1, 1'000'000); version != kVersion)
     file.fail(top.need("version"), fmt::format("version is {}; this program reads version {}", version, kVersion));
 
@@ -163,6 +167,8 @@ CalibrationFile read_file(const YamlFile& file, const CalibrationUse& use) {
     file.fail(cameras, fmt::format("cameras lists {}; a rig has 2 to {}", cameras.size(), kMaxCameras));
   rig.cameras = static_cast<int>(cameras.size());
   for (std::size_t k = 0; k < cameras.size(); ++k) read_camera(file, cameras[k], k, use, &calibration);
+
+  if (top.has("covariance")) read_covariance(file, top.need("covariance"), &calibration);
 
   rig.baseline = rig.T_camera_left[1].t.norm();
   if (top.has("rig")) {
@@ -211,7 +217,7 @@ bool any(std::span<const double> values) {
 std::string format_camera(const CalibrationFile& calibration, std::size_t k) {
   const Intrinsics& i = calibration.rig.intrinsics[k];
   const bool radtan = i.kind == CameraModelKind::pinhole_radtan;
-  const std::size_t coefficients = radtan && i.distortion[4] != 0 ? 5 : 4;
+  const std::size_t coefficients = radtan && (i.distortion[4] != 0 || i.distortion_sigma[4] != 0) ? 5 : 4;
   std::string text = fmt::format("  - name: {}\n", scalar(calibration.names[k]));
   if (!calibration.serials[k].empty()) text += fmt::format("    serial: {}\n", scalar(calibration.serials[k]));
   text += fmt::format("    size: [{}, {}]\n    model: {}\n", i.width, i.height, radtan ? kRadtan : kEquidistant);
@@ -263,6 +269,7 @@ void apply_use(const CalibrationUse& use, RigCalibration* rig) {
       rig->covariance_wide[k].rightCols<3>() *= factor;
       rig->covariance_wide[k].bottomRows<3>() *= factor;
     }
+    scale_lengths(factor, &rig->covariance);
     rig->baseline = use.baseline;
   }
   if (!use.length_only) return;
@@ -270,9 +277,10 @@ void apply_use(const CalibrationUse& use, RigCalibration* rig) {
   for (auto& sigmas : rig->sigma_noise) sigmas.fill(0);
   for (auto& sigmas : rig->sigma_wide) sigmas.fill(0);
   for (Mat6& covariance : rig->covariance_wide) covariance.setZero();
+  clear_places(&rig->covariance);
   rig->found = Stamp();
   rig->frames = 0;
-  rig->reprojection_px = rig->scale_sigma = 0;
+  rig->reprojection_px = rig->scale_sigma = rig->inflation = 0;
 }
 
 std::string format_calibration(const CalibrationFile& calibration) {
@@ -285,9 +293,11 @@ std::string format_calibration(const CalibrationFile& calibration) {
     text += format_camera(calibration, k);
     if (k > 0) text += format_extrinsics(rig, k);
   }
-  text += fmt::format("found: {{stamp: {}, source: {}, frames: {}, reprojection_px: {}, scale_sigma: {}}}\n", rig.found.ns(),
+  text += format_covariance(calibration);
+  text += fmt::format("found: {{stamp: {}, source: {}, frames: {}, reprojection_px: {}, scale_sigma: {}", rig.found.ns(),
                       scalar(calibration.source), rig.frames, rig.reprojection_px, rig.scale_sigma);
-  return text;
+  if (rig.inflation != 0) text += fmt::format(", inflation: {}", rig.inflation);
+  return text + "}\n";
 }
 
 void write_calibration(const std::filesystem::path& path, const CalibrationFile& calibration) {

@@ -32,7 +32,7 @@ struct Implausible {
 };
 
 /// Looks whether a rig can be real: sizes, focal lengths, principal points, distortion, rotations, baseline, side of camera 1,
-/// finite numbers. The first thing found; nothing when all is well.
+/// covariances, finite numbers. The first thing found; nothing when all is well.
 ///
 /// For calibrations from other files (data sets): `if (auto bad = find_implausible(rig)) throw InputError(file + ": " + bad->sentence);`
 /// A rotation off by 1e-6 to 1e-3 (largest entry of RᵀR − I) is replaced by the nearest one; beyond, it is reported.
@@ -44,7 +44,8 @@ struct Implausible {
 [[nodiscard]] CalibrationFile parse_calibration(std::string_view yaml, const std::string& name, const CalibrationUse& use = {});
 
 /// The same for a calibration of another file. With a baseline all lengths are scaled by one factor; with length_only the cameras
-/// become parallel, one baseline apart, and what belonged to their places (sigmas, when it was found) is gone.
+/// become parallel, one baseline apart, and what belonged to their places (sigmas, when it was found) is gone; what is known of the lenses
+/// stays.
 void apply_use(const CalibrationUse& use, RigCalibration* rig);
 
 /// Cameras that look the same way, each a baseline to the right of the one before: X_k = X − (k L, 0, 0).

@@ -431,8 +431,17 @@ Group calibration_options() {
               "`estimate`: the focal length of each further camera is found with the transform, by its prior; `hold`: it is believed.")
       .choice("intrinsics", &C::refine_intrinsics, {"hold", "refine"},
               "`refine`: focal lengths and principal points of all cameras are found, too, by their priors.")
+      .choice("lenses", &C::estimate_lenses, {"hold", "estimate"},
+              "`estimate`: focal lengths, principal points and distortion are part of what the drive measures, and are taken from it where "
+              "it shows that those given are off; `hold`: they are believed.")
       .number("focal_sigma_percent", &C::focal_sigma_percent, 0.001, 10, "%", "Prior sigma of a focal length.")
-      .number("principal_point_sigma_px", &C::principal_point_sigma_px, 0.01, 50, "px", "Prior sigma of a principal point's coordinate.")
+      .number("principal_point_sigma_px", &C::principal_point_sigma_px, 0.01, 50, "px",
+              "What a coordinate of a principal point that is held may be off by; with `intrinsics: refine` its prior sigma.")
+      .number("lens_centre_sigma_px", &C::lens_centre_sigma_px, 0.01, 100, "px",
+              "Prior sigma of a further camera's principal point with `lenses: estimate`; one in calibration.yaml goes before it.")
+      .number("distortion_sigma", &C::distortion_sigma, 1e-5, 1, "",
+              "The same of a radial coefficient (k1, k2), of an equidistant lens k1 to k4.")
+      .number("tangential_sigma", &C::tangential_sigma, 1e-6, 0.1, "", "The same of a tangential coefficient (p1, p2).")
       .number("max_direction_deg", &C::max_direction_deg, 0.1, 180, "°",
               "A calibration whose translation points farther from the nominal one is rejected.")
       .number("max_rotation_deg", &C::max_rotation_deg, 0.1, 180, "°",
@@ -442,6 +451,12 @@ Group calibration_options() {
       .integer("needs_near_points", &C::needs_near_points, 0, 1000, "points",
                "Near points among those gathered below which the reason is `needs_near_structure`.")
       .number("near_baselines", &C::near_baselines, 5, 500, "baselines", "Nearer than this a point is near.")
+      .number("drift_mrad", &C::drift_mrad, 0, 100, "mrad/√h",
+              "How far a rig that nobody touches wanders in an hour, as a random walk: what is known of it grows old by this.")
+      .number("tolerated_depth_percent", &C::tolerated_depth_percent, 0.1, 50, "%",
+              "Depth error up to which the drive has confirmed a calibration; until then poses are `degraded: unverified_calibration`.")
+      .number("tolerated_depth_m", &C::tolerated_depth_m, 0.5, 500, "m",
+              "The depth at which that is asked; on a short baseline nearer, where a single match is no better than that.")
       .number("good_depth_percent", &C::good_depth_percent, 0.01, 100, "%",
               "Predicted depth error at 20 m up to which a calibration is called `good`.")
       .number("usable_depth_percent", &C::usable_depth_percent, 0.01, 100, "%",
@@ -460,7 +475,11 @@ Group monitor() {
              "monitor", "What watches whether the calibration in use is still true.", [](auto& c) -> auto& { return c.monitor; })
       .number("threshold", &M::threshold, 20, 500, "",
               "Statistic that raises a knock or a drift: higher for fewer false alarms, lower for smaller knocks found sooner.")
-      .number("bias_px", &M::bias_px, 0, 1, "px", "Slow error that imperfect intrinsics leave in the matches across and that is no knock.")
+      .number("bias_px", &M::bias_px, 0, 1, "px",
+              "Slow error that imperfect intrinsics leave in the matches across and that is no knock, at least.")
+      .number("found_bias_px", &M::found_bias_px, 0, 2, "px",
+              "The same for lenses that the drive has confirmed, expected until the monitor has measured it.")
+      .number("claimed_bias_px", &M::claimed_bias_px, 0, 5, "px", "The same for a calibration that the drive has not confirmed yet.")
       .integer("min_matches", &M::min_matches, 12, 1000, "matches", "A frame with fewer matches across measures nothing.")
       .integer("short_window", &M::short_window, 1, 10, "frames", "Shortest window of moving frames that is tested: for large knocks.")
       .integer("long_window", &M::long_window, 60, 1800, "frames", "Longest window of moving frames that is tested: for drift.")

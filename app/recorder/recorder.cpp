@@ -8,6 +8,7 @@
 #include <cstring>
 #include <iterator>
 #include <optional>
+#include <string_view>
 #include <system_error>
 #include <type_traits>
 
@@ -162,8 +163,10 @@ void Recorder::write(const InsRecord& reading) {
 
 void Recorder::write(const PoseRecord& p) {
   newest_ = p.stamp;
+  newest_frame_ = p.frame;
   if (options_.disk_full) pretend(p.stamp);
   ++totals_->read;
+  match_confirmed();
   ++(p.status == PoseStatus::ok ? totals_->ok : p.status == PoseStatus::degraded ? totals_->degraded : totals_->lost);
   totals_->estimate.add(static_cast<double>(p.estimate_ms));
   if (p.state != State::stereo_odometry && p.state != State::lost) totals_->calibrating.add(static_cast<double>(p.estimate_ms));
@@ -211,7 +214,24 @@ void Recorder::write(const PoseRecord& p) {
   if (options_.keep_trajectory) totals_->trajectory.push_back({p.stamp, p.world_left.transform()});
 }
 
+/// An event comes before the pose of its frame, or after the last one.
+void Recorder::match_confirmed() {
+  if (totals_->confirmed == newest_ && !totals_->confirmed_frame && totals_->read > 0) totals_->confirmed_frame = newest_frame_;
+}
+
+void Recorder::note(const EventRecord& e) {
+  const std::string_view kind = e.kind;
+  if (kind == "calibration_confirmed" && !totals_->confirmed) {
+    totals_->confirmed = e.stamp;
+    match_confirmed();
+  } else if (kind == "calibration_contradicted" && !totals_->contradicted) {
+    const double* percent = std::get_if<double>(&e.fields[0].value);
+    totals_->contradicted = {e.stamp, percent != nullptr ? *percent : 0.0};
+  }
+}
+
 void Recorder::write(const EventRecord& e) {
+  note(e);
   nlohmann::ordered_json object;
   object["stamp_ns"] = e.stamp.ns();
   object["kind"] = e.kind;
@@ -292,7 +312,6 @@ void Recorder::write(const CalibrationRecord& c) {
 }
 
 void Recorder::note(const CalibrationRecord& c) {
-  totals_->verified = c.verified;
   if (c.learnt && !c.accepted) return;  // the drive goes on: nothing was attempted
   ++(c.accepted ? totals_->accepted : totals_->rejected);
   if (totals_->attempts.size() == kMostAttempts) totals_->attempts.erase(totals_->attempts.begin());

@@ -7,6 +7,7 @@
 #include <functional>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <string>
 #include <thread>
 #include <vector>
@@ -49,21 +50,29 @@ struct CalibrationAttempt {
   double solve_ms = 0;
 };
 
+/// The calibration in use was not that of the rig.
+struct Contradiction {
+  Stamp stamp{};
+  double depth_percent = 0;  // by which its depths were off
+};
+
 /// What a session has come to: for summary.json.
 struct SessionTotals {
   std::uint64_t read = 0, ok = 0, degraded = 0, lost = 0;  // frames
   TimeHistogram estimate, decode;                          // ms
   TimeHistogram calibrating;                               // ms, of the frames in other states than stereo_odometry and lost
   std::array<TimeHistogram, kStages> stages;
-  std::vector<CalibrationAttempt> attempts;  // the newest kMostAttempts
-  std::uint64_t accepted = 0, rejected = 0;  // of all of them
-  bool verified = false;                     // the calibration in use at the end: the drive itself has confirmed it
-  double path_m = 0;                         // sum of the steps between successive poses
-  std::vector<StampedPose> trajectory;       // if asked for: the poses of trajectory.tum
-  std::vector<StampedPose> reference;        // if asked for: of reference.tum, in its own frame
-  std::uint64_t dropped_records = 0;         // the ring was full (live only)
-  std::uint64_t dropped_readings = 0;        // theirs was
-  std::uint64_t lost_lines = 0;              // the disk took no more
+  std::vector<CalibrationAttempt> attempts;        // the newest kMostAttempts
+  std::uint64_t accepted = 0, rejected = 0;        // of all of them
+  std::optional<Stamp> confirmed{};                // when the drive first confirmed the calibration in use
+  std::optional<std::uint64_t> confirmed_frame{};  // the frame of that stamp
+  std::optional<Contradiction> contradicted{};     // the first time that it showed another one than was in use
+  double path_m = 0;                               // sum of the steps between successive poses
+  std::vector<StampedPose> trajectory;             // if asked for: the poses of trajectory.tum
+  std::vector<StampedPose> reference;              // if asked for: of reference.tum, in its own frame
+  std::uint64_t dropped_records = 0;               // the ring was full (live only)
+  std::uint64_t dropped_readings = 0;              // theirs was
+  std::uint64_t lost_lines = 0;                    // the disk took no more
   std::size_t ring_high_water = 0;
   std::vector<std::string> faults;  // a sentence for each file that is not whole
 };
@@ -130,6 +139,8 @@ class Recorder {
   void write(const CalibrationRecord& calibration);
   void write(const InsRecord& reading);
   void note(const CalibrationRecord& calibration);
+  void note(const EventRecord& event);
+  void match_confirmed();
   void flush();
   void pretend(Stamp stamp);
   void note_disk(bool full);
@@ -145,6 +156,7 @@ class Recorder {
   bool have_last_pose_ = false;
   std::string line_;  // being formatted
   Stamp newest_{};    // of the poses
+  std::uint64_t newest_frame_ = 0;
   bool disk_full_ = false, pretended_ = false;
 
   Ring<Record, kRing> ring_;

@@ -89,6 +89,7 @@ Json limited_by(const RigCalibration& rig) {
   RigCalibration noise = rig;
   noise.sigma_wide = rig.sigma_noise;  // without their correlations: no less than it is
   for (Mat6& covariance : noise.covariance_wide) covariance.setZero();
+  noise.covariance = {};
   const double wide = calibration::depth_error_percent(rig, 1, kDepth), by_noise = calibration::depth_error_percent(noise, 1, kDepth);
   return by_noise * by_noise < 0.5 * wide * wide ? "intrinsics" : "noise";
 }
@@ -133,6 +134,13 @@ Json calibration_json(const SessionTotals& totals, const SummaryInput& input) {
   const Json health = health_json(rig, input.options);
   for (const auto& [key, value] : health.items()) json[key] = value;
   json["limited_by"] = limited_by(rig);
+  json["online"] = input.online;
+  json["verified"] = input.verified;
+  json["verified_frame"] = totals.confirmed_frame ? Json(*totals.confirmed_frame) : Json();
+  json["verified_stamp_ns"] = totals.confirmed ? Json(totals.confirmed->ns()) : Json();
+  json["contradicted"] = totals.contradicted
+                             ? Json{{"stamp_ns", totals.contradicted->stamp.ns()}, {"depth_percent", totals.contradicted->depth_percent}}
+                             : Json();
   json["before"] = input.before ? health_json(*input.before, input.options) : Json();
   json["from_scratch"] = from_scratch_json(totals);
   json["accepted"] = totals.accepted;

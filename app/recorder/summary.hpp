@@ -32,6 +32,8 @@ struct SummaryInput {
   bool calibrated = true;                          // false: no calibration has been found
   RigCalibration calibration;                      // in use at the end
   std::string calibration_source;                  // where it comes from
+  bool online = true;                              // the rig was watched; false: nothing could confirm a calibration
+  bool verified = false;                           // the drive itself has confirmed the calibration in use at the end
   std::optional<RigCalibration> before{};          // the drive began with it; none: from scratch
   calibration::CalibrationOptions options{};       // what its words mean
   std::uint64_t allocations_after_seal = 0;

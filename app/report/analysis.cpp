@@ -45,6 +45,28 @@ void measure_distance(const Session& s, Analysis* a) {
   }
 }
 
+/// The first time that the drive confirmed the calibration in use.
+const Event* first_confirmation(const Session& s) {
+  const auto found = std::find_if(s.events.begin(), s.events.end(), [](const Event& e) { return e.kind == "calibration_confirmed"; });
+  return found == s.events.end() ? nullptr : &*found;
+}
+
+/// Frames that only waited for that. What is not confirmed later on, after a knock, is held against the drive.
+void count_waiting(const Session& s, Analysis* a) {
+  a->waited_by_reason.assign(s.reasons.size(), 0);
+  const Event* confirmed = first_confirmation(s);
+  if (confirmed != nullptr && !s.frames.empty())
+    a->confirmed_s =
+        std::clamp(seconds_between(s.frames.front().stamp, std::max(s.frames.front().stamp, confirmed->stamp)), 0.0, a->duration_s);
+  for (const Frame& f : s.frames) {
+    if (f.status != PoseStatus::degraded || (confirmed != nullptr && f.stamp > confirmed->stamp)) continue;
+    const std::string& reason = s.reasons[f.reason];
+    if (reason != to_string(Reason::unverified_calibration) && reason != to_string(Reason::unconfirmed)) continue;
+    ++a->waited;
+    ++a->waited_by_reason[f.reason];
+  }
+}
+
 void count_frames(const Session& s, Analysis* a) {
   a->by_reason.assign(s.reasons.size(), 0);
   a->read = s.frames.size();
@@ -300,6 +322,7 @@ Analysis analyse(const Session& session) {
   measure_time(session, &a);
   measure_distance(session, &a);
   count_frames(session, &a);
+  count_waiting(session, &a);
   compare(session, &a);
   a.horizontal = spread_of(a.horizontal_m);
   a.vertical = spread_of(a.vertical_m);

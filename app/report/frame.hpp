@@ -18,4 +18,7 @@ struct PlotBox {
   void fit_y(double low, double high, bool from_zero);
 };
 
+/// From the first frame to the last along x.
+[[nodiscard]] PlotBox time_box(const Analysis& analysis);
+
 }  // namespace vergence::app::report

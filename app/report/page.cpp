@@ -10,6 +10,7 @@
 #include <fmt/format.h>
 
 #include "app/report/plots.hpp"
+#include "app/report/residual_section.hpp"
 #include "app/report/style.hpp"
 #include "app/report/svg.hpp"
 #include "app/report/tables.hpp"
@@ -73,9 +74,10 @@ std::string ok_card(const Analysis& a) {
   // Rounded down: 100 % is said of nothing less.
   const double percent = std::floor(*a.ok_share * 1000) / 10;
   const std::string skipped = a.skipped > 0 ? fmt::format(", {} skipped", grouped(a.skipped)) : "";
+  const std::string waited = a.waited > 0 ? fmt::format(" ({} until the calibration was confirmed)", grouped(a.waited)) : "";
   return number_card(
       fmt::format("{:.{}f} %", percent, percent == 100 ? 0 : 1), "Frames ok",
-      fmt::format("of {}: {} degraded, {} lost{}", grouped(a.read + a.skipped), grouped(a.degraded), grouped(a.lost), skipped));
+      fmt::format("of {}: {} degraded{}, {} lost{}", grouped(a.read + a.skipped), grouped(a.degraded), waited, grouped(a.lost), skipped));
 }
 
 std::string verdict_section(const Analysis& a, const Verdict& v) {
@@ -149,14 +151,33 @@ bool changed(const Session& s, int camera) {
                      [camera](const CalibrationRow& c) { return c.camera == camera && c.decided; });
 }
 
-bool focal_length_changed(const Session& s, int camera) {
+/// A number of the lens that was held throughout is no curve either.
+bool lens_changed(const Session& s, int camera, std::size_t number) {
   double first = kNone;
   for (const CalibrationRow& c : s.calibrations) {
-    if (c.camera != camera || !std::isfinite(c.focal_px)) continue;
-    if (std::isfinite(first) ? c.focal_px != first : c.focal_sigma_px > 0) return true;
-    first = c.focal_px;
+    const double value = c.lens[number];
+    if (c.camera != camera || !std::isfinite(value)) continue;
+    if (std::isfinite(first) ? value != first : c.decided && c.lens_sigma[number] > 0) return true;
+    first = value;
   }
   return false;
+}
+
+void lens_plots(const Session& s, const Analysis& a, int camera, const std::string& whose, std::string* out) {
+  const bool radtan =
+      !s.calibration || s.calibration->rig.intrinsics[static_cast<std::size_t>(camera)].kind == CameraModelKind::pinhole_radtan;
+  const std::array<const char*, 8> names{"focal length x, px",
+                                         "focal length y, px",
+                                         "principal point x, px",
+                                         "principal point y, px",
+                                         "distortion k1",
+                                         "distortion k2",
+                                         radtan ? "distortion p1" : "distortion k3",
+                                         radtan ? "distortion p2" : "distortion k4"};
+  constexpr int kFirst = 6;  // of calibration_plot()
+  for (std::size_t i = 0; i < names.size(); ++i)
+    if (lens_changed(s, camera, i))
+      *out += figure(fmt::format("{}: {}", whose, names[i]), calibration_plot(s, a, camera, kFirst + static_cast<int>(i)));
 }
 
 void calibration_sections(const Session& s, const Analysis& a, std::string* out) {
@@ -168,7 +189,7 @@ void calibration_sections(const Session& s, const Analysis& a, std::string* out)
     const std::string whose = camera == 1 ? "Right camera" : fmt::format("Camera {}", camera);
     for (const int component : {0, 3, 1, 4, 2, 5})  // rotation and translation side by side
       plots += figure(fmt::format("{}: {}", whose, kNames[static_cast<std::size_t>(component)]), calibration_plot(s, a, camera, component));
-    if (focal_length_changed(s, camera)) plots += figure(whose + ": focal length, px", calibration_plot(s, a, camera, 6));
+    lens_plots(s, a, camera, whose, &plots);
   }
   std::string body = health_table(s);
   if (s.calibrations.empty())
@@ -178,9 +199,9 @@ void calibration_sections(const Session& s, const Analysis& a, std::string* out)
   else
     body +=
         "<p class=\"soft\">Where the other cameras sit relative to the left one, as it was in use; the band is ± 2 σ (wide, with uncertain "
-        "intrinsics). Hollow red marks were rejected.</p>" +
+        "intrinsics). Hollow red marks were rejected; hollow grey ones are what the drive measured while it kept what was in use.</p>" +
         calibrations_table(s);
-  *out += section("wide long", "Calibration", body) + plots;
+  *out += section("wide long", "Calibration", body) + plots + residual_section(s);
 }
 
 std::string footer(const Session& s) {

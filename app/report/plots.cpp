@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <numbers>
 #include <optional>
 
 #include <fmt/format.h>
@@ -16,19 +15,11 @@ namespace vergence::app::report {
 namespace {
 
 constexpr int kColumns = 740;  // of a curve, two a unit of the paper: sharp on a fine screen
-constexpr double kDegrees = 180.0 / std::numbers::pi;
-constexpr double kMillimetres = 1e3;
 
 /// An axis from the first to the last value, never empty.
 void fit_x(PlotBox* box, double low, double high) {
   box->x0 = low;
   box->x1 = high > low ? high : low + 1;
-}
-
-PlotBox time_box(const Analysis& a) {
-  PlotBox box;
-  fit_x(&box, 0, a.duration_s);
-  return box;
 }
 
 std::vector<Line> on_paper(const PlotBox& box, const std::vector<Line>& lines) {
@@ -55,6 +46,12 @@ void draw_holes(const PlotBox& box, std::span<const double> time, std::span<cons
 }
 
 }  // namespace
+
+PlotBox time_box(const Analysis& a) {
+  PlotBox box;
+  fit_x(&box, 0, a.duration_s);
+  return box;
+}
 
 Line PlotBox::line(const Line& data) const {
   Line placed;
@@ -272,85 +269,6 @@ TimingPicture timing_picture(const Session& session, const Analysis& analysis) {
   if (budget > 0 && budget <= box.x1) svg.line("budget", box.x(budget), box.top, box.x(budget), box.bottom);
   picture.svg = std::move(svg).finish();
   return picture;
-}
-
-// ---- calibration ------------------------------------------------------------------------------------------------------------------
-
-namespace {
-
-struct Held {  // a value that held for a while
-  double from = 0, to = 0, value = 0, two_sigma = kNone;
-};
-
-struct CalibrationCurve {
-  std::vector<Held> held;
-  std::vector<Point> rejected;
-};
-
-struct Component {
-  double value = kNone, sigma = kNone;
-};
-
-/// A number of a row in the unit it is shown in.
-Component component_of(const CalibrationRow& c, int component) {
-  if (component == 6) return {c.focal_px, c.focal_sigma_px};
-  const double unit = component < 3 ? kDegrees : kMillimetres;
-  const auto k = static_cast<std::size_t>(component);
-  return {c.value[k] * unit, c.has_sigma ? c.sigma[k] * unit : kNone};
-}
-
-CalibrationCurve calibration_curve(const Session& s, const Analysis& a, int camera, int component) {
-  CalibrationCurve curve;
-  for (const CalibrationRow& c : s.calibrations) {
-    const Component number = component_of(c, component);
-    if (c.camera != camera || !std::isfinite(number.value)) continue;
-    const double since =
-        s.frames.empty() ? 0 : (static_cast<double>(c.stamp.ns()) - static_cast<double>(s.frames.front().stamp.ns())) * 1e-9;
-    const double at = std::clamp(since, 0.0, a.duration_s);
-    if (!c.accepted) {
-      curve.rejected.push_back({at, number.value});
-      continue;
-    }
-    if (!curve.held.empty()) curve.held.back().to = at;
-    curve.held.push_back({at, a.duration_s, number.value, 2 * number.sigma});
-  }
-  return curve;
-}
-
-void fit_calibration(const CalibrationCurve& curve, PlotBox* box) {
-  double low = 1e300, high = -1e300;
-  const auto include = [&](double v) { low = std::min(low, v), high = std::max(high, v); };
-  for (const Held& h : curve.held) {
-    const double s = std::isfinite(h.two_sigma) ? h.two_sigma : 0;
-    include(h.value - s), include(h.value + s);
-  }
-  for (const Point& p : curve.rejected) include(p.y);
-  box->fit_y(low, high, false);
-}
-
-}  // namespace
-
-std::string calibration_plot(const Session& session, const Analysis& analysis, int camera, int component) {
-  const CalibrationCurve curve = calibration_curve(session, analysis, camera, component);
-  if (curve.held.empty() && curve.rejected.empty()) return {};
-  PlotBox box = time_box(analysis);
-  box.left = 74;  // four decimals
-  fit_calibration(curve, &box);
-  Svg svg(kPlotWidth, kPlotHeight, "A number of the calibration over time with two sigmas");
-  box.draw_x_axis(&svg, XAxis::time_s);
-  box.draw_y_axis(&svg);
-  Line steps;
-  for (const Held& h : curve.held) {
-    if (h.two_sigma > 0)
-      svg.rect("band", box.x(h.from), box.y(h.value + h.two_sigma), box.x(h.to) - box.x(h.from),
-               box.y(h.value - h.two_sigma) - box.y(h.value + h.two_sigma));
-    steps.push_back({box.x(h.from), box.y(h.value)});
-    steps.push_back({box.x(h.to), box.y(h.value)});
-  }
-  if (!steps.empty()) svg.lines("curve s-ours", {steps});
-  for (const Held& h : curve.held) svg.circle("f-ours", box.x(h.from), box.y(h.value), 2.6);
-  for (const Point& p : curve.rejected) svg.circle("hollow", box.x(p.x), box.y(p.y), 3.2);
-  return std::move(svg).finish();
 }
 
 }  // namespace vergence::app::report

@@ -39,8 +39,9 @@ struct TimingPicture {
 };
 [[nodiscard]] TimingPicture timing_picture(const Session& session, const Analysis& analysis);
 
-/// One number of a camera's calibration as it held over the drive, with a band of ± 2 sigma; hollow marks are rejected ones.
-/// `component`: 0–2 rotation vector, shown in degrees; 3–5 translation, in millimetres; 6 focal length along x, in pixels. Empty when
+/// One number of a camera's calibration as it held over the drive, with a band of ± 2 sigma; hollow red marks are rejected ones, hollow
+/// grey ones what the drive measured beside one that was kept. A dashed line: the drive confirmed it there first. `component`: 0–2 rotation
+/// vector, shown in degrees; 3–5 translation, in millimetres; 6–9 fx, fy, cx, cy, in pixels; 10–13 coefficients of distortion. Empty when
 /// no row has it.
 [[nodiscard]] std::string calibration_plot(const Session& session, const Analysis& analysis, int camera, int component);
 

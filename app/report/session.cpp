@@ -209,6 +209,14 @@ bool read_six(const CsvRows& rows, const char* prefix, std::array<double, 6>* ou
   return true;
 }
 
+void read_lens(const CsvRows& rows, CalibrationRow* c) {
+  constexpr std::array<const char*, 8> kNames{"fx", "fy", "cx", "cy", "d0", "d1", "d2", "d3"};
+  for (std::size_t i = 0; i < kNames.size(); ++i) {
+    c->lens[i] = rows.number(rows.column(kNames[i])).value_or(kNone);
+    c->lens_sigma[i] = rows.number(rows.column(std::string("sigma_") + kNames[i])).value_or(kNone);
+  }
+}
+
 void read_calibrations(const fs::path& folder, Session* session) {
   const auto text = read_part(folder / "calibrations.csv", std::size_t{256} << 20U, "how the calibration changed is not known", session);
   if (!text) return;
@@ -226,6 +234,7 @@ void read_calibrations(const fs::path& folder, Session* session) {
     c.stamp = Stamp(*stamp);
     c.camera = static_cast<int>(*camera);
     c.accepted = rows.text(rows.column("outcome")) == "accepted";
+    c.kept = rows.text(rows.column("outcome")) == "kept";
     c.cause = rows.text(rows.column("cause")).substr(0, kLongestText);
     c.reason = rows.text(rows.column("reason")).substr(0, kLongestText);
     c.frames = rows.integer(rows.column("frames")).value_or(0);
@@ -233,12 +242,50 @@ void read_calibrations(const fs::path& folder, Session* session) {
     c.decided = std::isfinite(c.latency_frames);
     c.held_out_before_px = rows.number(rows.column("held_out_before_px")).value_or(kNone);
     c.held_out_after_px = rows.number(rows.column("held_out_after_px")).value_or(kNone);
-    c.focal_px = rows.number(rows.column("fx")).value_or(kNone);
-    c.focal_sigma_px = rows.number(rows.column("sigma_fx")).value_or(kNone);
+    read_lens(rows, &c);
+    c.judged_depth_m = rows.number(rows.column("judged_depth_m")).value_or(kNone);
+    c.depth_sigma_percent = rows.number(rows.column("depth_sigma_percent")).value_or(kNone);
+    c.depth_difference_percent = rows.number(rows.column("depth_difference_percent")).value_or(kNone);
     c.has_sigma = read_six(rows, "wide_", &c.sigma) || read_six(rows, "sigma_", &c.sigma);
     session->calibrations.push_back(std::move(c));
   }
   tell_torn("calibrations.csv", rows.torn_rows() + unreadable, whole.size() != text->size(), 0, session);
+}
+
+/// Nothing: a number is missing or makes no rectangle of an image.
+std::optional<ResidualRow> parse_residual(const CsvRows& rows) {
+  ResidualRow r;
+  r.at_the_end = rows.text(rows.column("calibration")) == "end";
+  const auto camera = rows.integer(rows.column("camera"));
+  const auto left = rows.number(rows.column("left_px")), top = rows.number(rows.column("top_px"));
+  const auto width = rows.number(rows.column("width_px")), height = rows.number(rows.column("height_px"));
+  const auto mean = rows.number(rows.column("mean_px"));
+  if (!camera || *camera < 1 || *camera >= kMaxCameras || !left || !top || !width || !height || !mean) return std::nullopt;
+  constexpr double kLargest = 1e5;  // px
+  const bool inside = *left >= 0 && *top >= 0 && *width > 0 && *height > 0 && *left + *width <= kLargest && *top + *height <= kLargest;
+  if (!inside || !(std::abs(*mean) <= kLargest)) return std::nullopt;
+  r.camera = static_cast<int>(*camera);
+  r.left = *left, r.top = *top, r.width = *width, r.height = *height;
+  r.mean_px = *mean;
+  return r;
+}
+
+/// Sessions that ended without matches, were cut off or are older have no such file.
+void read_residuals(const fs::path& folder, Session* session) {
+  std::error_code error;
+  if (!fs::exists(folder / "residuals.csv", error)) return;
+  const auto text = read_part(folder / "residuals.csv", std::size_t{4} << 20U, "how the calibration fits the images is not known", session);
+  if (!text) return;
+  const std::string_view whole = whole_lines(*text);
+  CsvRows rows(whole);
+  std::size_t unreadable = 0;
+  while (rows.next() && session->residuals.size() < kMostResiduals) {
+    if (const auto row = parse_residual(rows))
+      session->residuals.push_back(*row);
+    else
+      ++unreadable;
+  }
+  tell_torn("residuals.csv", rows.torn_rows() + unreadable, whole.size() != text->size(), 0, session);
 }
 
 std::optional<Event> parse_event(std::string_view line) {
@@ -323,6 +370,11 @@ std::optional<double> number_at(const nlohmann::json& json, std::string_view pat
   return std::isfinite(value) ? std::optional(value) : std::nullopt;
 }
 
+std::optional<bool> flag_at(const nlohmann::json& json, std::string_view path) {
+  const nlohmann::json* at = find_path(json, path);
+  return at != nullptr && at->is_boolean() ? std::optional(at->get<bool>()) : std::nullopt;
+}
+
 std::string text_at(const nlohmann::json& json, std::string_view path) {
   const nlohmann::json* at = find_path(json, path);
   return at != nullptr && at->is_string() ? at->get_ref<const std::string&>().substr(0, kLongestText) : std::string();
@@ -342,6 +394,7 @@ Session read_session(const fs::path& folder) {
   session.reference = read_trajectory_part(folder, "reference.tum", "there is nothing to compare the trajectory with", &session);
   read_calibrations(folder, &session);
   read_calibration_file(folder, &session);
+  read_residuals(folder, &session);
   read_events(folder, &session);
   return session;
 }

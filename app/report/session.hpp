@@ -43,6 +43,7 @@ struct Frame {
 struct CalibrationRow {
   Stamp stamp{};
   bool accepted = false;
+  bool kept = false;     // a measurement of the drive that is no better than what is in use: no rejection
   bool decided = false;  // while driving; else the drive began with it
   std::string cause{}, reason{};
   std::int64_t frames = 0;
@@ -51,7 +52,18 @@ struct CalibrationRow {
   std::array<double, 6> value{};  // rotation vector, rad; translation, m
   std::array<double, 6> sigma{};  // the wide one, else the noise's; meaningless without has_sigma
   bool has_sigma = false;
-  double focal_px = kNone, focal_sigma_px = kNone;  // along x
+  std::array<double, 8> lens{kNone, kNone, kNone, kNone, kNone, kNone, kNone, kNone};        // fx fy cx cy, px; four of distortion
+  std::array<double, 8> lens_sigma{kNone, kNone, kNone, kNone, kNone, kNone, kNone, kNone};  // of these
+  // What the drive had measured of the depth by then: at which distance, its sigma, and how far off what was in use is by it.
+  double judged_depth_m = kNone, depth_sigma_percent = kNone, depth_difference_percent = kNone;
+};
+
+/// A line of residuals.csv: a part of the left image.
+struct ResidualRow {
+  bool at_the_end = false;  // with the calibration in use there; else with the one that the drive began with
+  int camera = 1;
+  double left = 0, top = 0, width = 0, height = 0;  // px
+  double mean_px = 0;
 };
 
 struct Event {
@@ -66,6 +78,7 @@ struct Session {
   std::vector<std::string> reasons{""};  // words of poses.csv, the empty one first
   std::vector<StampedPose> reference{};  // reference.tum
   std::vector<CalibrationRow> calibrations{};
+  std::vector<ResidualRow> residuals{};  // empty: not known, which is no fault of a session
   std::vector<Event> events{};
   std::size_t events_dropped = 0;  // beyond kMostEvents
   nlohmann::json summary{};        // null when it is missing or no JSON
@@ -76,6 +89,7 @@ struct Session {
 inline constexpr std::size_t kMostFrames = 4'000'000;  // 37 hours at 30 Hz; further ones are left out and told
 inline constexpr std::size_t kMostEvents = 200'000;
 inline constexpr std::size_t kMostCalibrations = 20'000;
+inline constexpr std::size_t kMostResiduals = 4'000;
 inline constexpr std::size_t kLongestText = 300;  // characters kept of a word or sentence from outside
 
 /// Reads what is there. Errors  InputError: `folder` is no folder, or none of a session's files is in it.
@@ -83,6 +97,8 @@ inline constexpr std::size_t kLongestText = 300;  // characters kept of a word o
 
 /// A finite number of summary.json by its path, `metrics.ate_m`. Nothing: not there, null, no number.
 [[nodiscard]] std::optional<double> number_at(const nlohmann::json& json, std::string_view path);
+/// The same for true and false.
+[[nodiscard]] std::optional<bool> flag_at(const nlohmann::json& json, std::string_view path);
 /// The same for texts, cut at kLongestText.
 [[nodiscard]] std::string text_at(const nlohmann::json& json, std::string_view path);
 

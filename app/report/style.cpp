@@ -28,6 +28,8 @@ figure{margin:0}
 svg{display:block;width:100%;height:auto}
 svg text{font-size:13px;fill:var(--soft);font-family:inherit;font-variant-numeric:tabular-nums}
 svg text.strong{fill:var(--ink)}
+svg text.good{fill:var(--good);paint-order:stroke;stroke:var(--panel);stroke-width:3px}
+svg text.cell{fill:var(--ink);font-size:11px}
 path,line,polyline{fill:none}
 .axis{stroke:var(--frame);stroke-width:1}
 .tick{stroke:var(--frame);stroke-width:1;opacity:.28}
@@ -36,7 +38,12 @@ path,line,polyline{fill:none}
 .map-ours{stroke-width:2.2}.map-theirs{stroke-width:5;opacity:.5}
 .f-ours{fill:var(--ours)}.f-theirs{fill:var(--theirs)}.f-good{fill:var(--good)}.f-care{fill:var(--care)}.f-bad{fill:var(--bad)}
 .f-third{fill:var(--third)}.f-fourth{fill:var(--fourth)}.f-soft{fill:var(--soft)}.f-ink{fill:var(--ink)}
+.o1{opacity:.12}.o2{opacity:.22}.o3{opacity:.32}.o4{opacity:.42}.o5{opacity:.54}
+.sheet{fill:none;stroke:var(--frame);stroke-width:1;opacity:.5}
 .hollow{fill:var(--panel);stroke:var(--bad);stroke-width:1.6}
+.seen{fill:var(--panel);stroke:var(--soft);stroke-width:1.4}
+.whisker{stroke:var(--soft);stroke-width:1.2}
+.confirmed{stroke:var(--good);stroke-width:1.4;stroke-dasharray:3 3}
 .band{fill:var(--ours);opacity:.2;stroke:none}
 .hole{fill:var(--bad);opacity:.14}
 .track{fill:var(--frame);opacity:.16}
@@ -50,6 +57,7 @@ th{font-weight:400;color:var(--soft)}
 th[scope=row]{min-width:8.5em}
 td.n,th.n{text-align:right;font-variant-numeric:tabular-nums;padding-right:0}
 td.k{min-width:6.4em}
+td.w{white-space:nowrap}
 .clocks td.n,.clocks th.n{padding-left:10px;overflow-wrap:normal}
 .clocks td.n{white-space:nowrap}
 .clocks{margin-bottom:8px}

@@ -78,7 +78,20 @@ void timing_group(const Session& s, const TimingPicture& timing, Figures* f) {
   if (timing.frames > 0) f->row("frames over the frame interval", grouped(timing.over_budget));
 }
 
-void calibration_group(const Session& s, Figures* f) {
+/// What the drive itself has measured of the calibration in use.
+void verification_rows(const Session& s, const Analysis& a, Figures* f) {
+  if (const auto verified = flag_at(s.summary, "calibration.verified")) f->row("verified by the drive", *verified ? "yes" : "not verified");
+  if (a.confirmed_s) f->row("first verified after", time_label(*a.confirmed_s, 0.1) + (*a.confirmed_s < 60 ? " s" : ""));
+  f->row("contradicted: depths were off by", number_at(s.summary, "calibration.contradicted.depth_percent"), "{:.1f} %");
+  const auto newest = std::find_if(s.calibrations.rbegin(), s.calibrations.rend(),
+                                   [](const CalibrationRow& c) { return std::isfinite(c.depth_sigma_percent); });
+  if (newest == s.calibrations.rend()) return;
+  const std::string at = fmt::format(" at {:.0f} m, newest measurement", newest->judged_depth_m);
+  f->row("depth sigma" + at, newest->depth_sigma_percent, "{:.2f} %");
+  if (newest->depth_difference_percent > 0) f->row("what was in use differs" + at, newest->depth_difference_percent, "{:.2f} %");
+}
+
+void calibration_group(const Session& s, const Analysis& a, Figures* f) {
   f->group("Calibration at the end");
   if (const std::string source = text_at(s.summary, "calibration.source"); !source.empty()) f->row("from", source);
   if (s.calibration) {
@@ -92,6 +105,7 @@ void calibration_group(const Session& s, Figures* f) {
   }
   if (const std::string word = text_at(s.summary, "calibration.word"); !word.empty()) f->row("health", word);
   if (const std::string by = text_at(s.summary, "calibration.limited_by"); !by.empty()) f->row("limited by", by);
+  verification_rows(s, a, f);
   for (const char* z : {"1", "5", "10", "20", "50"})
     f->row(std::string("depth error at ") + z + " m", number_at(s.summary, std::string("calibration.depth_error_percent.") + z),
            "{:.1f} %");
@@ -200,7 +214,7 @@ std::string figures_table(const Session& session, const Analysis& analysis, cons
   frames_group(session, analysis, &f);
   if (analysis.source != ErrorSource::none) error_group(analysis, &f);
   timing_group(session, timing, &f);
-  calibration_group(session, &f);
+  calibration_group(session, analysis, &f);
   block_group(session, "truth", "Against the truth of the mock drive (metres, radians)", &f);
   block_group(session, "devices", "Devices", &f);
   block_group(session, "comparison", "Comparison with the INS", &f);
@@ -228,6 +242,13 @@ std::string held_out_text(const CalibrationRow& c) {
   return fmt::format("{:.2f} → {:.2f} px", c.held_out_before_px, c.held_out_after_px);
 }
 
+/// `± 0.26 % at 20 m, was off 1.4 %`, with spaces that do not break; empty where nothing was measured.
+std::string depth_text(const CalibrationRow& c) {
+  if (!(c.judged_depth_m > 0) || !std::isfinite(c.depth_sigma_percent)) return "";
+  const std::string sigma = fmt::format("± {:.2f} % at {:.0f} m", c.depth_sigma_percent, c.judged_depth_m);
+  return c.depth_difference_percent > 0 ? fmt::format("{}, was off {:.2f} %", sigma, c.depth_difference_percent) : sigma;
+}
+
 }  // namespace
 
 std::string health_table(const Session& session) {
@@ -244,12 +265,13 @@ std::string health_table(const Session& session) {
 std::string calibrations_table(const Session& session) {
   constexpr std::size_t kMost = 60;
   std::string out =
-      "<table class=\"stack\"><tr><th>time</th><th>outcome</th><th>cause</th><th>after</th><th>held-out error</th><th>why</th></tr>\n";
+      "<table class=\"stack\"><tr><th>time</th><th>outcome</th><th>cause</th><th>after</th><th>held-out "
+      "error</th><th>depth</th><th>why</th></tr>\n";
   std::vector<const CalibrationRow*> rows;  // one for all cameras: they are decided together
   for (const CalibrationRow& c : session.calibrations)
     if (c.camera == 1) rows.push_back(&c);
   const std::size_t n = rows.size();
-  if (n > kMost) out += fmt::format("<tr><td colspan=\"6\">{} earlier ones are in calibrations.csv</td></tr>", grouped(n - kMost));
+  if (n > kMost) out += fmt::format("<tr><td colspan=\"7\">{} earlier ones are in calibrations.csv</td></tr>", grouped(n - kMost));
   for (std::size_t i = n > kMost ? n - kMost : 0; i < n; ++i) {
     const CalibrationRow& c = *rows[i];
     std::string cause = c.cause;
@@ -257,9 +279,11 @@ std::string calibrations_table(const Session& session) {
     const std::string after = c.decided ? fmt::format("{:.0f} frames", c.latency_frames) : "";
     const std::string from = c.frames > 0 ? fmt::format("from {} frames", c.frames) : "";
     const std::string why = from.empty() || c.reason.empty() ? from + c.reason : from + "; " + c.reason;
-    out += fmt::format("<tr><td class=\"t\">{}</td><td class=\"k\">{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td></tr>\n",
-                       event_time(session, c.stamp), c.accepted ? "accepted" : "rejected", escape(cause, 60), after, held_out_text(c),
-                       escape(why));
+    const char* outcome = c.accepted ? "accepted" : c.kept ? "kept" : "rejected";
+    out += fmt::format(
+        "<tr><td class=\"t\">{}</td><td class=\"k\">{}</td><td class=\"w\">{}</td><td class=\"w\">{}</td><td "
+        "class=\"w\">{}</td><td>{}</td><td>{}</td></tr>\n",
+        event_time(session, c.stamp), outcome, escape(cause, 60), after, held_out_text(c), depth_text(c), escape(why));
   }
   return out + "</table>\n";
 }

@@ -14,7 +14,8 @@ namespace vergence::app::report {
 /// The word for the calibration and the depth errors it predicts, at the start and at the end. Empty when the summary has neither.
 [[nodiscard]] std::string health_table(const Session& session);
 
-/// The calibrations accepted and rejected, the newest sixty of them: why they were sought, how long it took, how held-out frames fit.
+/// The calibrations accepted, rejected and measured, the newest sixty of them: why they were sought, how long it took, how held-out frames
+/// fit, what was known of the depth.
 [[nodiscard]] std::string calibrations_table(const Session& session);
 
 /// Events in their order, successive ones of one kind and sentence as one row with a count; of very many the first and the last.

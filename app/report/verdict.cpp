@@ -41,6 +41,8 @@ constexpr std::array kAdvice{
     Advice{"weak_geometry", "The points did not hold the pose well in some direction: expect it in tunnels, open fields and beside walls."},
     Advice{"moving_scene", "Much of the picture moved by itself, as behind a bus: compare those stretches with the map before use."},
     Advice{"unconfirmed", "The calibration from the last drive was not confirmed: drive on until it is, or give one with --calibration."},
+    Advice{"unverified_calibration",
+           "The calibration in use was no longer, or not yet, confirmed by the drive: turns and near things at the roadside confirm it."},
     Advice{"recalibrating", "The rig no longer fitted its calibration: look for a camera that was knocked or is loose on its mount."},
     Advice{"uncalibrated", "No calibration had been found yet: these poses only bridge the time until there is one."},
     Advice{"out_of_step", "A camera's images were of another instant: check trigger lines and exposure, and restart the cameras together."},
@@ -88,7 +90,7 @@ void judge_frames(const Session& s, const Analysis& a, Judge* j) {
     return;
   }
   const auto all = static_cast<double>(a.read + a.skipped);
-  const double lost = static_cast<double>(a.lost + a.skipped) / all, degraded = static_cast<double>(a.degraded) / all;
+  const double lost = static_cast<double>(a.lost + a.skipped) / all, degraded = static_cast<double>(a.degraded - a.waited) / all;
   if (lost > kFewLost) j->find(lost > kManyLost ? Grade::bad : Grade::care, fmt::format("{} of the frames have no pose", percent(lost)));
   if (degraded > kFewDegraded) j->find(Grade::care, fmt::format("{} of the frames are degraded", percent(degraded)));
 }
@@ -109,6 +111,23 @@ void judge_drift(const Analysis& a, Judge* j) {
             fmt::format("lengths come out {} too {}", percent(off), *a.scale < 1 ? "long" : "short"));
     j->advise("Lengths disagree with the reference: measure the baseline again, then calibrate again.");
   }
+}
+
+/// Whether the drive itself has confirmed what its poses stand on.
+void judge_verification(const Session& s, const Analysis& a, Judge* j) {
+  if (std::none_of(s.calibrations.begin(), s.calibrations.end(), [](const CalibrationRow& c) { return c.accepted; })) return;
+  const std::optional<bool> verified = flag_at(s.summary, "calibration.verified");
+  const bool waited_in_vain = !s.summary.is_object() && a.waited > 0 && !a.confirmed_s;  // the summary of a torn session says nothing
+  if (verified.value_or(!waited_in_vain)) return;
+  if (flag_at(s.summary, "calibration.online") == false) {
+    j->find(Grade::care, "the calibration is not verified, nothing watched it");
+    j->advise("Nothing watched the rig: with calibration.online: on the drive itself confirms the calibration, or says that it is wrong.");
+    return;
+  }
+  j->find(Grade::care, a.confirmed_s ? "the calibration in use at the end is not verified" : "the drive has not confirmed its calibration");
+  j->advise(
+      "The drive did not show that its calibration is right: drive turns, past near things at the roadside, and look whether corners of "
+      "the image stay without tracks (dirt, a bonnet, sky only).");
 }
 
 /// Rejected because the one in use is as good: no reason for doubt.
@@ -137,6 +156,8 @@ void advise_on_events(const Session& s, Judge* j) {
   };
   if (const auto event = told("calibration_not_kept"); event != s.events.end())
     j->advise("A calibration was not kept: " + event->sentence + ".");
+  if (const auto event = told("calibration_contradicted"); event != s.events.end())
+    j->advise("On the way " + event->sentence + ": keep the calibration.yaml of this session, if the drive has confirmed it.");
   if (const auto event = told("scale_disagrees"); event != s.events.end()) {
     j->find(Grade::care, "lengths disagree with the INS");
     j->advise("At some time " + event->sentence + ".");
@@ -160,9 +181,13 @@ void judge_calibration(const Session& s, Judge* j) {
   if (std::none_of(s.calibrations.begin(), s.calibrations.end(), [](const CalibrationRow& c) { return c.accepted; })) {
     j->find(Grade::care, "no calibration was found");
     j->advise("No calibration was found: drive past things at the roadside, near and far; calibrations.csv says what each attempt lacked.");
-  } else if (const CalibrationRow& last = s.calibrations.back(); !last.accepted && !fits_as_well(last)) {
-    j->find(Grade::care, "the last calibration was rejected");
-    if (!last.reason.empty()) j->advise("The last calibration was rejected: " + last.reason + ".");
+  } else {
+    // What the drive measured while it went on was no attempt to replace the one in use.
+    const auto last = std::find_if(s.calibrations.rbegin(), s.calibrations.rend(), [](const CalibrationRow& c) { return !c.kept; });
+    if (last != s.calibrations.rend() && !last->accepted && !fits_as_well(*last)) {
+      j->find(Grade::care, "the last calibration was rejected");
+      if (!last->reason.empty()) j->advise("The last calibration was rejected: " + last->reason + ".");
+    }
   }
   advise_on_causes(s, j);
 }
@@ -191,7 +216,8 @@ void advise_by_reasons(const Session& s, const Analysis& a, Judge* j) {
   for (const Advice& advice : kAdvice) {
     const auto found = std::find(s.reasons.begin(), s.reasons.end(), advice.word);
     if (found == s.reasons.end()) continue;
-    const std::size_t frames = a.by_reason[static_cast<std::size_t>(found - s.reasons.begin())];
+    const auto i = static_cast<std::size_t>(found - s.reasons.begin());
+    const std::size_t frames = a.by_reason[i] - (i < a.waited_by_reason.size() ? a.waited_by_reason[i] : 0);
     if (frames > 0) j->advise(fmt::format("{} ({} frame{}): {}", advice.word, frames, frames == 1 ? "" : "s", advice.sentence));
   }
 }
@@ -215,14 +241,17 @@ Verdict judge(const Session& session, const Analysis& analysis) {
   judge_frames(session, analysis, &j);
   judge_drift(analysis, &j);
   judge_calibration(session, &j);
+  judge_verification(session, analysis, &j);
   advise_on_events(session, &j);
   judge_session(session, analysis, &j);
   advise_by_reasons(session, analysis, &j);
   Verdict v = j.finish();
   for (const std::string& reason : v.reasons) v.sentence += (v.sentence.empty() ? "" : "; ") + reason;
   if (v.reasons.empty())
-    v.sentence = fmt::format("every check passed: drift of {} on a drive of {:.0f} m, {} of {} frames ok",
-                             percent(analysis.drift.value_or(0)), analysis.path_m, analysis.ok, analysis.read + analysis.skipped);
+    v.sentence =
+        fmt::format("every check passed: drift of {} on a drive of {:.0f} m, {} of {} frames ok{}", percent(analysis.drift.value_or(0)),
+                    analysis.path_m, analysis.ok, analysis.read + analysis.skipped,
+                    analysis.waited > 0 ? fmt::format(", {} before the drive had confirmed its calibration", analysis.waited) : "");
   v.sentence.front() = static_cast<char>(std::toupper(static_cast<unsigned char>(v.sentence.front())));
   v.sentence += '.';
   return v;

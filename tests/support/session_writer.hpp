@@ -28,6 +28,7 @@ struct SessionWriter {
     write_calibrations(folder);
     write_events(folder);
     write_summary(folder);
+    write_residuals(folder);
     std::ofstream(folder / "calibration.yaml")
         << "version: 1\nrig: {name: demo, baseline: 0.75}\ncameras:\n"
            "  - {name: left, size: [640, 480], model: pinhole-radtan, intrinsics: [450, 450, 320, 240], distortion: [0, 0, 0, 0]}\n"
@@ -122,18 +123,31 @@ struct SessionWriter {
     out << "stamp_ns,outcome,cause,reason,frames,latency_frames,onset_frame,reprojection_px,held_out_before_px,held_out_after_px,scale_"
            "sigma,"
            "camera,rx,ry,rz,tx,ty,tz,sigma_rx,sigma_ry,sigma_rz,sigma_tx,sigma_ty,sigma_tz,wide_rx,wide_ry,wide_rz,wide_tx,wide_ty,wide_tz,"
-           "fx,fy,cx,cy,sigma_fx,sigma_fy,sigma_cx,sigma_cy\n";
+           "fx,fy,cx,cy,sigma_fx,sigma_fy,sigma_cx,sigma_cy,d0,d1,d2,d3,sigma_d0,sigma_d1,sigma_d2,sigma_d3,"
+           "judged_depth_m,depth_sigma_percent,depth_difference_percent,verified,lenses\n";
     const auto row = [&](double share, const char* outcome, const char* cause, const char* reason, double off, double sigma) {
       out << fmt::format("{},{},{},{},60,75,{},0.2,0.9,0.21,0.002,1,{:.6f},{:.6f},{:.6f},{:.6f},{:.6f},{:.6f}", stamp(part(share)), outcome,
                          cause, reason, part(share) - 75, 0.011 + off, -0.004 + off, 0.002 - off, -0.75 + off, 0.001 + off, 0.003 - off);
       for (const double scale : {1.0, 2.0})
         for (int k = 0; k < 6; ++k) out << fmt::format(",{:.6f}", scale * sigma * (k < 3 ? 1.0 : 2.0));
-      out << fmt::format(",{:.3f},450,320,240,{:.3f},{:.3f},0,0\n", 450 + 100 * off, 300 * sigma, 300 * sigma);
+      out << fmt::format(",{:.3f},450,{:.3f},240,{:.3f},{:.3f},{:.3f},0", 450 + 100 * off, 318 + 900 * off, 300 * sigma, 300 * sigma,
+                         900 * sigma);
+      out << fmt::format(",{:.6f},0,0,0,{:.6f},0,0,0,20,{:.4f},{:.4f},1,1\n", 2 * off, sigma, 500 * sigma, 300 * off);
     };
     row(0.08, "accepted", "from_scratch", "", 0.0006, 0.0009);
     if (faults) row(0.3, "rejected", "drift", "too little motion", 0.0020, 0.0015);
     row(0.45, "accepted", "requested", "", 0.0001, 0.0003);
     row(0.7, "accepted", "knock", "", 0.0009, 0.0003);
+    row(0.8, "kept", "refinement", "the calibration in use fits as well", 0.0008, 0.0002);
+  }
+
+  /// A turn about the axis of view, and what is left after it was found; a corner without tracks.
+  static void write_residuals(const std::filesystem::path& folder) {
+    std::ofstream out(folder / "residuals.csv");
+    out << "calibration,camera,left_px,top_px,width_px,height_px,matches,mean_px,scatter_px\n";
+    for (const auto& [when, size] : {std::pair{"begin", 1.4}, std::pair{"end", 0.03}})
+      for (int i = 0; i < 47; ++i)
+        out << fmt::format("{},1,{},{},80,80,40,{:.4f},0.25\n", when, i % 8 * 80, i / 8 * 80, size * (i % 8 - 3.5) / 3.5);
   }
 
   void write_events(const std::filesystem::path& folder) const {
@@ -143,6 +157,7 @@ struct SessionWriter {
     };
     event(0, "state", "initialising to parallel_monocular: enough points and parallax");
     event(0.08, "state", "calibrating to stereo_odometry: the calibration passed its gates");
+    event(0.085, "calibration_confirmed", "the drive confirms the calibration in use");
     event(0.09, "placement", "placed on the earth over 100 m; heading known to 1.2 degrees");
     for (int i = 0; faults && i < 20; ++i) event(0.6 + 0.001 * i, "dropped", "points beyond the window's capacity were dropped");
     if (faults) event(0.62, "state", "stereo_odometry to lost: no pose for ten frames");
@@ -161,7 +176,7 @@ struct SessionWriter {
   "timing_ms": {{"mean": 14.2, "p50": 13.9, "p99": 21.0, "p99_9": 57.1, "max": 61.4, "stages": {{"decode": 3.1, "pyramid": 0.6, "detect": 1.4,
     "track": 5.5, "match": 4.1, "pose": 0.2, "window": 1.1}}}},
   "metrics": {},
-  "calibration": {{"source": "online", "baseline_m": 0.75, "word": "good", "depth_error_percent": {{"1": 0.06, "5": 0.3, "10": 0.6, "20": 1.2, "50": 3.1}},
+  "calibration": {{"source": "online", "baseline_m": 0.75, "word": "good", "online": true, "verified": true, "depth_error_percent": {{"1": 0.06, "5": 0.3, "10": 0.6, "20": 1.2, "50": 3.1}},
     "before": {{"word": "can be improved", "depth_error_percent": {{"1": 0.2, "5": 0.9, "10": 1.8, "20": 3.6, "50": 9.1}}}}}},
   "recalibrations": [], "allocations_after_seal": 0,
   "memory": {{"estimator_bytes": 15957952, "images_bytes": 9472064, "rings_bytes": 87168, "sum_bytes": 25517184}},

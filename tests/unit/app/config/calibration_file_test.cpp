@@ -106,6 +106,7 @@ CalibrationFile awkward() {
     i.cy = 384 + number(1);
     for (std::size_t d = 0; d < (k == 0 ? 5U : 4U); ++d) i.distortion[d] = number(0.1);
     i.sigma = {number(1) + 1, 1e-300, 1.0 / 3.0, 0.1};
+    for (std::size_t d = 0; d < (k == 0 ? 5U : 4U); ++d) i.distortion_sigma[d] = number(0.01) + 0.01;
     if (k == 0) continue;
     c.rig.T_camera_left[k] = {exp_so3(Vec3(number(0.2), number(0.2), number(0.2))), Vec3(-0.75 + number(0.1), number(0.1), number(0.1))};
     for (std::size_t j = 0; j < 6; ++j) c.rig.sigma_noise[k][j] = (c.rig.sigma_wide[k][j] = number(1e-3) + 1e-3) / 3.0;
@@ -121,6 +122,7 @@ CalibrationFile awkward() {
   c.rig.frames = 61;
   c.rig.reprojection_px = 0.1 + 0.2;
   c.rig.scale_sigma = 2.1e-3 / 3.0;
+  c.rig.inflation = 7.0 / 3.0;
   return c;
 }
 
@@ -143,6 +145,7 @@ TEST(CalibrationFile, WhatIsWrittenReadsBackToTheSameDoubles) {
     EXPECT_EQ((std::array{a.fx, a.fy, a.cx, a.cy}), (std::array{b.fx, b.fy, b.cx, b.cy}));
     EXPECT_EQ(a.distortion, b.distortion);
     EXPECT_EQ(a.sigma, b.sigma);
+    EXPECT_EQ(a.distortion_sigma, b.distortion_sigma);
     EXPECT_EQ(after.rig.T_camera_left[k].R, before.rig.T_camera_left[k].R);
     EXPECT_EQ(after.rig.T_camera_left[k].t, before.rig.T_camera_left[k].t);
     EXPECT_EQ(after.rig.sigma_noise[k], before.rig.sigma_noise[k]);
@@ -155,6 +158,7 @@ TEST(CalibrationFile, WhatIsWrittenReadsBackToTheSameDoubles) {
   EXPECT_EQ(after.rig.frames, before.rig.frames);
   EXPECT_EQ(after.rig.reprojection_px, before.rig.reprojection_px);
   EXPECT_EQ(after.rig.scale_sigma, before.rig.scale_sigma);
+  EXPECT_EQ(after.rig.inflation, before.rig.inflation);
   EXPECT_EQ(format_calibration(after), format_calibration(before));
 }
 
@@ -191,6 +195,20 @@ TEST(CalibrationPlausibility, Distortion) {
   EXPECT_TRUE(refused(with("[-0.28, 0.07, 1e-4, 2e-5, 0.01]", "[-0.28]"), "c.yaml:9: cameras.1.distortion", "4 to 5"));
   std::string fisheye = with("model: pinhole-radtan\n", "model: pinhole-equidistant\n");
   EXPECT_TRUE(refused(fisheye, "c.yaml:9: cameras.1.distortion", "5 numbers")) << "equidistant has four";
+}
+
+TEST(CalibrationPlausibility, SigmasOfDistortion) {
+  const std::string sigmas = "    distortion_sigma: [1e-3, 1e-3, 1e-4, 1e-4, 1e-2]\n    T_camera_left";
+  EXPECT_EQ(refusal(with("    T_camera_left", sigmas)), "");
+  EXPECT_EQ(refusal(with("    T_camera_left", "    distortion_sigma: [1e-3, 1e-3, 1e-4, 1e-4]\n    T_camera_left")), "");
+  EXPECT_TRUE(refused(with("    T_camera_left", "    distortion_sigma: [1e-3]\n    T_camera_left"),
+                      "c.yaml:10: cameras.1.distortion_sigma has 1 numbers", "4 to 5"));
+  EXPECT_TRUE(refused(with("    T_camera_left", "    distortion_sigma: [1e-3, -1e-3, 0, 0]\n    T_camera_left"),
+                      "c.yaml:10: cameras.1.distortion_sigma", "negative"));
+  std::string fisheye = with("    T_camera_left", sigmas);
+  fisheye.replace(fisheye.find("model: pinhole-radtan\n"), 21, "model: pinhole-equidistant");
+  fisheye.replace(fisheye.find(", 2e-5, 0.01]"), 13, ", 2e-5]");
+  EXPECT_TRUE(refused(fisheye, "c.yaml:10: cameras.1.distortion_sigma has 5 numbers", ""));
 }
 
 TEST(CalibrationPlausibility, RealLensesPass) {
@@ -285,6 +303,15 @@ TEST(CalibrationPlausibility, EveryNumberOfARigInMemoryIsCheckedToo) {
   r = good;
   r.covariance_wide[1](2, 2) = -1;
   EXPECT_EQ(field(r), "cameras.1.covariance_wide");
+  r = good;
+  r.intrinsics[3].distortion_sigma[1] = nan;
+  EXPECT_EQ(field(r), "cameras.3.distortion_sigma");
+  r = good;
+  r.covariance.set(0, 0, nan);
+  EXPECT_EQ(field(r), "covariance");
+  r = good;
+  r.inflation = -1;
+  EXPECT_EQ(field(r), "found.inflation");
   r = good;
   r.baseline = nan;
   EXPECT_EQ(field(r), "rig.baseline");

@@ -143,7 +143,7 @@ void expect_rows_for(const std::map<std::string, std::string>& declared, const s
 TEST(Schema, EveryOptionOfTheCoreCanBeSetInTheRangeItsHeaderStates) {
   expect_rows_for(declared_fields("core/odometry/options.hpp", "OdometryOptions"), "odometry");
   expect_rows_for(declared_fields("core/calibration/options.hpp", "CalibrationOptions"), "calibration",
-                  {{"estimate_focal_lengths", "focal_lengths"}, {"refine_intrinsics", "intrinsics"}});
+                  {{"estimate_focal_lengths", "focal_lengths"}, {"refine_intrinsics", "intrinsics"}, {"estimate_lenses", "lenses"}});
   expect_rows_for(declared_fields("core/calibration/monitor.hpp", "MonitorOptions"), "monitor");
 }
 
@@ -152,6 +152,7 @@ TEST(Schema, AKeyOfAFewWordsTakesTheseOnly) {
       parse_configuration("calibration: {focal_lengths: hold, intrinsics: refine, online: off}", "", {}).calibration.estimate_focal_lengths,
       0);
   EXPECT_EQ(parse_configuration("calibration: {intrinsics: refine}", "", {}).calibration.refine_intrinsics, 1);
+  EXPECT_EQ(parse_configuration("calibration: {lenses: hold}", "", {}).calibration.estimate_lenses, 0);
   EXPECT_EQ(parse_configuration("calibration: {online: off}", "", {}).online, 0);
   try {
     static_cast<void>(parse_configuration("calibration: {focal_lengths: holds}", "drive.yaml", {}));

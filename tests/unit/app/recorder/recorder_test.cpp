@@ -171,9 +171,11 @@ TEST(Recorder, calibrationsCarryTheirNumbersAndEmptyFieldsWhereNothingIsGiven) {
   const std::string numbers =
       ",1,0.000000000,0.000000000,0.000000000,-0.500000000,0.000000000,0.250000000,"
       "0.000100000,0.000200000,0.000300000,0.001000000,0.002000000,0.003000000,,,,,,,460.00000,461.00000,320.00000,240.00000,";
-  EXPECT_EQ(lines[1], "1403636584763555584,accepted,given,of a; file,0,,,0.0000,,,0.000000" + numbers + ",,,");
+  const std::string distortion = ",0.000000000,0.000000000,0.000000000,0.000000000,,,,";
+  EXPECT_EQ(lines[1],
+            "1403636584763555584,accepted,given,of a; file,0,,,0.0000,,,0.000000" + numbers + ",,," + distortion + distortion + ",,,,,");
   EXPECT_EQ(lines[2], "1403636584763555584,accepted,knock,,60,71,840,0.1800,1.5000,0.1250,0.002000" + numbers +
-                          "0.200000000,0.300000000,0.000000000,0.000000000");
+                          "0.200000000,0.300000000,0.000000000,0.000000000" + distortion + distortion + ",,,,,");
   EXPECT_EQ(lines[3].substr(0, 71), "1403636584763555584,rejected,knock,held-out frames do not fit better,60");
   for (const std::string& line : lines)
     EXPECT_EQ(std::count(lines[0].begin(), lines[0].end(), ','), std::count(line.begin(), line.end(), ',')) << line;
@@ -184,6 +186,57 @@ TEST(Recorder, calibrationsCarryTheirNumbersAndEmptyFieldsWhereNothingIsGiven) {
   EXPECT_EQ(totals->attempts[0].cause, "knock");
   EXPECT_EQ(totals->attempts[0].latency_frames, 71);
   EXPECT_EQ(totals->attempts[1].reason, "held-out frames do not fit better");
+}
+
+TEST(Recorder, whatTheDriveMeasuredWhileItWentOnIsKeptAndNoAttempt) {
+  const test::TemporaryFolder folder;
+  Recorder recorder(folder.path(), {});
+  CalibrationDecision measured = decision(false);
+  measured.cause = CalibrationCause::refinement;
+  measured.judged_depth_m = 20;
+  measured.depth_sigma_percent = 0.25;
+  measured.depth_difference_percent = 1.5;
+  measured.verified = measured.lenses = true;
+  recorder.post(CalibrationRecord::of(measured));
+  const auto totals = recorder.close();
+  const auto lines = lines_of(folder / "calibrations.csv");
+  ASSERT_EQ(lines.size(), 2U);
+  EXPECT_EQ(lines[1].substr(0, 40), "1403636584763555584,kept,refinement,held");
+  EXPECT_TRUE(lines[1].ends_with(",20.00,0.2500,1.5000,1,1")) << lines[1];
+  EXPECT_EQ(totals->rejected, 0U);
+  EXPECT_TRUE(totals->attempts.empty());
+}
+
+EventRecord event_at(std::int64_t ns, EstimatorEvent::Kind kind, double value) {
+  EstimatorEvent event;
+  event.stamp = Stamp(ns);
+  event.kind = kind;
+  event.value = value;
+  return EventRecord::of(event);
+}
+
+TEST(Recorder, theFirstConfirmationAndTheFirstContradictionAreInTheTotals) {
+  using Kind = EstimatorEvent::Kind;
+  for (const bool after_the_pose : {false, true}) {  // at the end of a drive the event comes after the last pose
+    const test::TemporaryFolder folder;
+    Recorder recorder(folder.path(), {});
+    PoseSample sample;
+    sample.frame = 7, sample.stamp = Stamp(700);
+    recorder.post(event_at(700, Kind::calibration_contradicted, 6.5));
+    if (after_the_pose) recorder.post(PoseRecord::of(sample, 0, std::nullopt));
+    recorder.post(event_at(700, Kind::calibration_confirmed, 0.3));
+    if (!after_the_pose) recorder.post(PoseRecord::of(sample, 0, std::nullopt));
+    recorder.post(event_at(900, Kind::calibration_contradicted, 1.0));
+    recorder.post(event_at(900, Kind::calibration_confirmed, 0.3));
+    sample.frame = 9, sample.stamp = Stamp(900);
+    recorder.post(PoseRecord::of(sample, 0, std::nullopt));
+    const auto totals = recorder.close();
+    EXPECT_EQ(totals->confirmed, Stamp(700));
+    EXPECT_EQ(totals->confirmed_frame, 7U);
+    ASSERT_TRUE(totals->contradicted);
+    EXPECT_EQ(totals->contradicted->stamp, Stamp(700));
+    EXPECT_EQ(totals->contradicted->depth_percent, 6.5);
+  }
 }
 
 TEST(RigNumbers, thereAndBackAreTheSameDoubles) {
@@ -239,8 +292,12 @@ TEST(EventRecord, whatHappensToACalibrationIsAWholeSentence) {
   event.why = "too little motion";
   EXPECT_STREQ(EventRecord::of(event).sentence.data(), "a calibration was rejected: too little motion");
   event.kind = EstimatorEvent::Kind::calibration_confirmed;
-  event.why = "frames agree";
-  EXPECT_STREQ(EventRecord::of(event).sentence.data(), "the calibration of the state file is confirmed");
+  event.why = "the drive confirms it";
+  EXPECT_STREQ(EventRecord::of(event).sentence.data(), "the drive confirms it");
+  event.kind = EstimatorEvent::Kind::calibration_contradicted;
+  event.why = "it is not that of the rig";
+  event.value = 6.54;
+  EXPECT_STREQ(EventRecord::of(event).sentence.data(), "it is not that of the rig: its depths are off by 6.5 %");
   event.kind = EstimatorEvent::Kind::rig_changed;
   event.why = "the rig no longer fits";
   EXPECT_STREQ(EventRecord::of(event).sentence.data(), "the rig no longer fits");

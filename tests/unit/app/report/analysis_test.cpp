@@ -62,6 +62,36 @@ TEST(Analysis, driftAfterTheFirstHundredMetresShowsInFullAndWithItsSign) {
   EXPECT_NEAR(a.vertical.end, 2, 1e-9);
 }
 
+/// The first `waiting` frames say that the calibration was not confirmed, frame 300 says it again.
+Session unverified_drive(std::size_t waiting) {
+  Session s = bent_drive(600);
+  s.reasons = {"", "unverified_calibration", "few_inliers"};
+  const auto degrade = [&s](std::size_t i, std::uint16_t reason) {
+    s.frames[i].status = PoseStatus::degraded;
+    s.frames[i].reason = reason;
+  };
+  for (std::size_t i = 0; i < waiting; ++i) degrade(i, i == 7 ? 2 : 1);
+  degrade(300, 1);
+  return s;
+}
+
+TEST(Analysis, framesThatOnlyWaitedForTheCalibrationAreCountedApart) {
+  Session s = unverified_drive(100);
+  s.events = {{s.frames[100].stamp, "calibration_confirmed", ""}, {s.frames[400].stamp, "calibration_confirmed", ""}};
+  const Analysis a = analyse(s);
+  EXPECT_EQ(a.degraded, 101U);
+  EXPECT_EQ(a.waited, 99U) << "neither the one with another fault nor the one after the first confirmation";
+  EXPECT_EQ(a.waited_by_reason, (std::vector<std::size_t>{0, 99, 0}));
+  ASSERT_TRUE(a.confirmed_s);
+  EXPECT_NEAR(*a.confirmed_s, 10, 1e-9);
+}
+
+TEST(Analysis, aDriveThatNeverConfirmedItsCalibrationWaitedToItsEnd) {
+  const Analysis a = analyse(unverified_drive(100));
+  EXPECT_EQ(a.waited, 100U);
+  EXPECT_FALSE(a.confirmed_s);
+}
+
 TEST(Analysis, aStraightWayIsLaidByAttitudesAndKeepsItsVerticalError) {
   Session s;
   for (int i = 0; i < 120; ++i) {

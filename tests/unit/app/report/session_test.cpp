@@ -57,15 +57,27 @@ TEST(ReadSession, aWholeOneHasNothingMissing) {
   EXPECT_EQ(s.frames[250].status, PoseStatus::lost);  // 62 to 64 %
   EXPECT_FALSE(s.frames[250].posed);
   EXPECT_TRUE(s.frames[399].compared && s.frames[399].placed && s.frames[399].has_ins && s.frames[399].posed);
-  EXPECT_EQ(s.calibrations.size(), 4U);
+  ASSERT_EQ(s.calibrations.size(), 5U);
   EXPECT_FALSE(s.calibrations[1].accepted);
   EXPECT_NEAR(s.calibrations[0].sigma[0], 2 * 0.0009, 1e-9) << "the wide sigma goes before the noise's";
   EXPECT_EQ(s.calibrations[3].cause, "knock");
   EXPECT_TRUE(s.calibrations[3].decided);
   EXPECT_EQ(s.calibrations[3].latency_frames, 75);
   EXPECT_EQ(s.calibrations[3].held_out_after_px, 0.21);
-  EXPECT_NEAR(s.calibrations[3].focal_px, 450.09, 1e-9);
+  EXPECT_NEAR(s.calibrations[3].lens[0], 450.09, 1e-9);
+  EXPECT_NEAR(s.calibrations[3].lens_sigma[2], 0.27, 1e-9);
+  EXPECT_NEAR(s.calibrations[3].lens[4], 0.0018, 1e-9);
+  EXPECT_TRUE(s.calibrations[4].kept && !s.calibrations[4].accepted);
+  EXPECT_FALSE(s.calibrations[1].kept);
+  EXPECT_EQ(s.calibrations[4].judged_depth_m, 20);
+  EXPECT_NEAR(s.calibrations[4].depth_sigma_percent, 0.1, 1e-9);
+  EXPECT_NEAR(s.calibrations[4].depth_difference_percent, 0.24, 1e-9);
   EXPECT_EQ(s.reference.size(), 392U);
+  ASSERT_EQ(s.residuals.size(), 94U);
+  EXPECT_FALSE(s.residuals[0].at_the_end);
+  EXPECT_EQ(s.residuals[0].mean_px, -1.4);
+  EXPECT_TRUE(s.residuals[93].at_the_end);
+  EXPECT_EQ(s.residuals[93].left, 480);
   EXPECT_TRUE(s.calibration.has_value());
   EXPECT_EQ(number_at(s.summary, "timing_ms.stages.track"), 5.5);
 }
@@ -139,12 +151,33 @@ TEST(ReadSession, tornJsonIsSaidAndNeverHalfTaken) {
   EXPECT_EQ(s.events[1].kind, "") << "a kind that is no text";
 }
 
+TEST(ReadSession, residualsThatAreNoPlaceOfAnImageAreLeftOut) {
+  const test::TemporaryFolder folder;
+  folder.write("trajectory.tum", "1.5 0 0 0 0 0 0 1\n");
+  const std::string head = "calibration,camera,left_px,top_px,width_px,height_px,matches,mean_px,scatter_px\n";
+  folder.write("residuals.csv", head +
+                                    "end,1,0,0,80,80,40,0.5,0.25\n"
+                                    "end,9,0,0,80,80,40,0.5,0.25\n"
+                                    "end,1,-5,0,80,80,40,0.5,0.25\n"
+                                    "end,1,0,0,0,80,40,0.5,0.25\n"
+                                    "end,1,0,0,80,1e300,40,0.5,0.25\n"
+                                    "end,1,0,0,80,80,40,nan,0.25\n"
+                                    "end,1,0,0,80,80,40\n"
+                                    "end,1,0,0,80,80,40,0.5,0.2");
+  const Session s = read_session(folder.path());
+  EXPECT_EQ(s.residuals.size(), 1U);
+  EXPECT_TRUE(says(s, "residuals.csv: 6 damaged lines"));
+  EXPECT_TRUE(says(s, "residuals.csv: the last line is torn"));
+}
+
 TEST(NumberAt, isNothingWhereThereIsNoFiniteNumber) {
   const auto json = nlohmann::json::parse(R"({"a": {"b": 1.5, "c": null, "d": "7", "e": [1]}})");
   EXPECT_EQ(number_at(json, "a.b"), 1.5);
   for (const char* path : {"a.c", "a.d", "a.e", "a", "b", "a.b.c", ""}) EXPECT_FALSE(number_at(json, path)) << path;
   EXPECT_FALSE(number_at(nlohmann::json(), "a"));
   EXPECT_EQ(text_at(json, "a.d"), "7");
+  EXPECT_EQ(flag_at(nlohmann::json::parse(R"({"a": {"b": false, "c": 0}})"), "a.b"), false);
+  EXPECT_FALSE(flag_at(nlohmann::json::parse(R"({"a": {"b": false, "c": 0}})"), "a.c"));
 }
 
 }  // namespace

@@ -131,6 +131,57 @@ TEST(Verdict, aRejectedCalibrationIsADoubtUnlessTheOneInUseFitsAsWell) {
   EXPECT_EQ(c.verdict().grade, Grade::good);
 }
 
+TEST(Verdict, aMeasurementThatWasNotTakenIsNoRejection) {
+  Case c;
+  c.session.calibrations = {attempt(true, "given", 0, 0), attempt(false, "refinement", 1.4, 0.2)};
+  c.session.calibrations.back().kept = true;
+  EXPECT_EQ(c.verdict().grade, Grade::good);
+}
+
+TEST(Verdict, theWaitForTheFirstConfirmationIsNotHeldAgainstTheDrive) {
+  Case c;
+  c.session.reasons.emplace_back("unverified_calibration");
+  c.analysis.ok = 600, c.analysis.degraded = 400;
+  c.analysis.by_reason = {0, 400}, c.analysis.waited_by_reason = {0, 400};
+  c.analysis.waited = 400;
+  c.analysis.confirmed_s = 20;
+  c.session.calibrations = {attempt(true, "given", 0, 0)};
+  c.session.summary["calibration"]["verified"] = true;
+  const Verdict v = c.verdict();
+  EXPECT_EQ(v.grade, Grade::good);
+  EXPECT_TRUE(v.advice.empty());
+  EXPECT_NE(v.sentence.find("400 before the drive had confirmed"), std::string::npos);
+}
+
+TEST(Verdict, aDriveThatEndsWithoutVerificationSaysWhatWouldHelp) {
+  Case c;
+  c.session.calibrations = {attempt(true, "given", 0, 0)};
+  c.session.summary["calibration"]["verified"] = false;
+  EXPECT_EQ(c.verdict().grade, Grade::care);
+  EXPECT_TRUE(any_has(c.verdict().reasons, "has not confirmed its calibration"));
+  for (const char* help : {"turns", "near things at the roadside", "corners of the image"}) EXPECT_TRUE(any_has(c.verdict().advice, help));
+  c.analysis.confirmed_s = 20;
+  EXPECT_TRUE(any_has(c.verdict().reasons, "at the end is not verified"));
+  c.session.summary["calibration"]["online"] = false;
+  EXPECT_TRUE(any_has(c.verdict().reasons, "is not verified, nothing watched it"));
+}
+
+TEST(Verdict, aTornSessionThatWaitedInVainSaysSo) {
+  Case c;
+  c.session.summary = nullptr;
+  c.session.calibrations = {attempt(true, "given", 0, 0)};
+  EXPECT_FALSE(any_has(c.verdict().reasons, "confirmed"));
+  c.analysis.degraded = c.analysis.waited = 1000, c.analysis.ok = 0;
+  EXPECT_TRUE(any_has(c.verdict().reasons, "has not confirmed its calibration"));
+}
+
+TEST(Verdict, aContradictedCalibrationIsTold) {
+  Case c;
+  c.session.calibrations = {attempt(true, "given", 0, 0)};
+  c.session.events = {{Stamp(), "calibration_contradicted", "the calibration in use is not that of the rig: its depths are off by 6.1 %"}};
+  EXPECT_TRUE(any_has(c.verdict().advice, "off by 6.1 %"));
+}
+
 TEST(Verdict, neverACalibrationSaysHowToGetOne) {
   Case c;
   c.session.calibrations = {attempt(false, "from_scratch", 0, 0.9)};

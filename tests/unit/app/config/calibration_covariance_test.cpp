@@ -1,0 +1,190 @@
+#include "app/config/calibration_covariance.hpp"
+
+#include <cmath>
+#include <limits>
+#include <string>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "app/runtime/errors.hpp"
+#include "core/math/random.hpp"
+
+namespace vergence::app {
+namespace {
+
+const std::string kRig = R"(version: 1
+rig: {name: demo, baseline: 0.75}
+cameras:
+  - {name: left, size: [1024, 768], model: pinhole-radtan, intrinsics: [980, 981, 512, 384]}
+  - {name: right, size: [1024, 768], model: pinhole-equidistant, intrinsics: [982, 983, 510, 380], T_camera_left: [1, 0, 0, -0.75, 0, 1, 0, 0, 0, 0, 1, 0]}
+)";
+
+std::string with_block(const std::string& parameters, const std::string& upper) {
+  return kRig + "covariance:\n  parameters: " + parameters + "\n  upper: " + upper + "\n";
+}
+
+std::string refusal(const std::string& yaml) {
+  try {
+    static_cast<void>(parse_calibration(yaml, "c.yaml"));
+  } catch (const InputError& error) {
+    return error.what();
+  }
+  return "";
+}
+
+testing::AssertionResult refused(const std::string& yaml, const std::string& beginning, const std::string& part) {
+  const std::string sentence = refusal(yaml);
+  if (sentence.rfind(beginning, 0) == 0 && sentence.find(part) != std::string::npos) return testing::AssertionSuccess();
+  return testing::AssertionFailure() << "the sentence is: " << sentence;
+}
+
+/// Rows of both cameras that a drive estimates, one combination of them exactly known, as with a baseline of known length.
+RigCovariance singular(const std::vector<int>& rows) {
+  Random random(5);
+  const auto n = static_cast<Eigen::Index>(rows.size());
+  Eigen::MatrixXd root(n, n - 1);
+  for (Eigen::Index i = 0; i < n; ++i)
+    for (Eigen::Index j = 0; j < n - 1; ++j) root(i, j) = std::pow(10.0, -static_cast<double>(i % 6)) * (random.uniform() - 0.5);
+  const Eigen::MatrixXd C = root * root.transpose();
+  RigCovariance covariance;
+  for (Eigen::Index i = 0; i < n; ++i)
+    for (Eigen::Index j = 0; j <= i; ++j) covariance.set(rows[static_cast<std::size_t>(i)], rows[static_cast<std::size_t>(j)], C(i, j));
+  return covariance;
+}
+
+CalibrationFile example() {
+  CalibrationFile c = parse_calibration(kRig, "c.yaml");
+  c.rig.covariance = singular({extrinsic_row(1), extrinsic_row(1) + 3, extrinsic_row(1) + 5, intrinsic_row(0) + 4, intrinsic_row(0) + 8,
+                               intrinsic_row(1), intrinsic_row(1) + 2, intrinsic_row(1) + 7});
+  return c;
+}
+
+void expect_same(const RigCovariance& a, const RigCovariance& b) {
+  for (int i = 0; i < kRigSize; ++i)
+    for (int j = 0; j <= i; ++j) EXPECT_EQ(a(i, j), b(i, j)) << i << " " << j;
+}
+
+TEST(CalibrationCovariance, RowsGoByCameraAndParameter) {
+  const RigCalibration rig =
+      parse_calibration(with_block("[left.k1, right.rx, right.k4, left.k3]", "[4e-4, 1e-6, 0, 0, 1e-6, 0, 0, 9e-4, 0, 1e-4]"), "c.yaml")
+          .rig;
+  EXPECT_EQ(rig.covariance(intrinsic_row(0) + 4, intrinsic_row(0) + 4), 4e-4);
+  EXPECT_EQ(rig.covariance(extrinsic_row(1), intrinsic_row(0) + 4), 1e-6);
+  EXPECT_EQ(rig.covariance(intrinsic_row(1) + 7, intrinsic_row(1) + 7), 9e-4) << "k4 of an equidistant lens";
+  EXPECT_EQ(rig.covariance(intrinsic_row(0) + 8, intrinsic_row(0) + 8), 1e-4) << "k3 of a radtan one";
+  EXPECT_FALSE(rig.covariance.known(extrinsic_row(1) + 1));
+}
+
+TEST(CalibrationCovariance, WhatIsWrittenReadsBackToTheSameDoublesAndStaysACovariance) {
+  const CalibrationFile before = example();
+  const std::string text = format_calibration(before);
+  EXPECT_NE(text.find("parameters: [right.rx, right.tx, right.tz, left.k1, left.k3, right.fx, right.cx, right.k4]"), std::string::npos);
+  expect_same(parse_calibration(text, "c.yaml").rig.covariance, before.rig.covariance);
+  EXPECT_EQ(format_calibration(parse_calibration(text, "c.yaml")), text);
+}
+
+TEST(CalibrationCovariance, CamerasThatNamesDoNotTellApartGoByIndex) {
+  for (const auto& names : {std::pair{"left", "left"}, std::pair{"1", "0"}, std::pair{"", "right"}, std::pair{"a.rx", "a"}}) {
+    CalibrationFile c = example();
+    c.names[0] = names.first, c.names[1] = names.second;
+    const std::string text = format_calibration(c);
+    EXPECT_NE(text.find("parameters: [1.rx, 1.tx, 1.tz, 0.k1, "), std::string::npos) << text;
+    expect_same(parse_calibration(text, "c.yaml").rig.covariance, c.rig.covariance);
+  }
+  EXPECT_EQ(refusal(with_block("[1.rx, left.k1]", "[1e-6, 0, 1e-4]")), "") << "an index is understood beside names";
+}
+
+TEST(CalibrationCovariance, NothingKnownIsNoBlock) {
+  EXPECT_EQ(format_covariance(parse_calibration(kRig, "c.yaml")), "");
+  EXPECT_TRUE(parse_calibration(kRig, "c.yaml").rig.covariance.empty());
+}
+
+TEST(CalibrationCovariance, WhatIsWrongIsSaidInOneSentence) {
+  EXPECT_TRUE(refused(with_block("[right.rx, rihgt.ry]", "[1, 0, 1]"), "c.yaml:7: covariance.parameters has \"rihgt.ry\"",
+                      "did you mean \"right.ry\"?"));
+  EXPECT_TRUE(refused(with_block("[left.rx]", "[1]"), "c.yaml:7: covariance.parameters has \"left.rx\"", "no parameter"))
+      << "left sits still";
+  EXPECT_TRUE(refused(with_block("[right.p1]", "[1]"), "c.yaml:7: covariance.parameters", "no parameter"))
+      << "an equidistant lens has none";
+  EXPECT_TRUE(refused(with_block("[right.rx, 1.rx]", "[1, 0, 1]"), "c.yaml:7: covariance.parameters has 1.rx twice", ""));
+  EXPECT_TRUE(refused(with_block("[]", "[]"), "c.yaml:7: covariance.parameters is not a list of parameters", ""));
+  EXPECT_TRUE(refused(with_block("right.rx", "[1]"), "c.yaml:7: covariance.parameters is not a list of parameters", ""));
+  EXPECT_TRUE(refused(with_block("[[right.rx]]", "[1]"), "c.yaml:7: covariance.parameters is not a text", ""));
+  EXPECT_TRUE(refused(with_block("[right.rx, right.ry]", "[1, 0]"), "c.yaml:8: covariance.upper has 2 numbers; it needs 3", ""));
+  EXPECT_TRUE(refused(with_block("[right.rx, right.ry]", "[1, .nan, 1]"), "c.yaml:8: covariance.upper", "finite"));
+  EXPECT_TRUE(
+      refused(with_block("[right.rx, right.ry]", "[1, 0, -1]"), "c.yaml:8: covariance.upper has -1 as the variance of right.ry", ""));
+  EXPECT_TRUE(refused(with_block("[right.rx, right.ry]", "[1, 0, 0]"), "c.yaml:8: covariance.upper has 0 as the variance of right.ry", ""));
+  EXPECT_TRUE(refused(with_block("[right.rx, right.ry]", "[1, 1.1, 1]"), "c.yaml:7: covariance has a correlation beyond 1", ""));
+  EXPECT_TRUE(
+      refused(with_block("[right.rx, right.ry, right.rz]", "[1, 0.9, -0.9, 1, 0.9, 1]"), "c.yaml:7: covariance is not positive", ""));
+  EXPECT_TRUE(refused(kRig + "covariance: {parameters: [right.rx]}\n", "c.yaml:6: covariance.upper is missing", ""));
+  EXPECT_TRUE(refused(kRig + "covariance: 3\n", "c.yaml:6: covariance is not a group", ""));
+  EXPECT_TRUE(refused(kRig + "covariance: {parameter: [right.rx], upper: [1]}\n", "c.yaml:6: covariance has the unknown key", ""));
+}
+
+TEST(CalibrationCovariance, FlawsInMemoryAreFoundToo) {
+  RigCovariance covariance;
+  EXPECT_FALSE(find_flaw(covariance));
+  covariance.set(3, 3, -1);
+  EXPECT_TRUE(find_flaw(covariance));
+  covariance.set(3, 3, 0);
+  covariance.set(3, 4, 1e-9);
+  EXPECT_TRUE(find_flaw(covariance)) << "tied to nothing";
+  covariance.set(3, 4, std::numeric_limits<double>::infinity());
+  EXPECT_TRUE(find_flaw(covariance));
+  EXPECT_FALSE(find_flaw(example().rig.covariance));
+}
+
+TEST(CalibrationCovariance, NineDigitsAreEnough) {
+  RigCovariance rounded = example().rig.covariance;
+  for (int i = 0; i < kRigSize; ++i)
+    for (int j = 0; j <= i; ++j) {
+      const double value = rounded(i, j), unit = value == 0 ? 1 : std::pow(10.0, std::floor(std::log10(std::abs(value))) - 8);
+      rounded.set(i, j, std::round(value / unit) * unit);
+    }
+  EXPECT_FALSE(find_flaw(rounded));
+}
+
+TEST(CalibrationCovariance, AGivenBaselineScalesIt) {
+  const RigCalibration before = example().rig;
+  RigCalibration rig = before;
+  apply_use({.baseline = 1.5}, &rig);
+  const int rx = extrinsic_row(1), tx = rx + 3, k1 = intrinsic_row(0) + 4;
+  EXPECT_EQ(rig.covariance(rx, rx), before.covariance(rx, rx));
+  EXPECT_EQ(rig.covariance(tx, rx), 2 * before.covariance(tx, rx));
+  EXPECT_EQ(rig.covariance(tx, tx), 4 * before.covariance(tx, tx));
+  EXPECT_EQ(rig.covariance(tx, k1), 2 * before.covariance(tx, k1));
+  EXPECT_FALSE(find_flaw(rig.covariance));
+}
+
+TEST(CalibrationCovariance, FromScratchTheLensesStayAndThePlacesGo) {
+  const RigCalibration before = example().rig;
+  RigCalibration rig = before;
+  rig.inflation = 3;
+  apply_use({.length_only = true}, &rig);
+  const int rx = extrinsic_row(1), k1 = intrinsic_row(0) + 4, fx = intrinsic_row(1);
+  EXPECT_FALSE(rig.covariance.known(rx));
+  EXPECT_EQ(rig.covariance(rx, fx), 0);
+  EXPECT_EQ(rig.covariance(k1, fx), before.covariance(k1, fx));
+  EXPECT_EQ(rig.inflation, 0);
+  EXPECT_FALSE(find_flaw(rig.covariance));
+}
+
+/// No cut and no changed byte may do anything but be read or be refused.
+TEST(CalibrationCovariance, TornAndGarbledBlocksNeverEscapeAsAnythingElse) {
+  const std::string good = format_calibration(example());
+  const std::size_t begin = good.find("covariance:");
+  Random random(13);
+  for (std::size_t length = begin; length < good.size(); length += 7) static_cast<void>(refusal(good.substr(0, length)));
+  for (int i = 0; i < 500; ++i) {
+    std::string text = good;
+    const auto at = begin + static_cast<std::size_t>(random.uniform() * static_cast<double>(text.size() - begin));
+    text[at] = static_cast<char>(random.uniform() * 256.0);
+    static_cast<void>(refusal(text));
+  }
+}
+
+}  // namespace
+}  // namespace vergence::app

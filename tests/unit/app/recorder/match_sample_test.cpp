@@ -1,0 +1,96 @@
+#include "app/recorder/match_sample.hpp"
+
+#include <gtest/gtest.h>
+
+#include <memory>
+#include <vector>
+
+#include "core/memory/arena.hpp"
+
+namespace vergence::app {
+namespace {
+
+/// A log whose every frame has so many sightings; the left pixel counts them all.
+class Drive {
+ public:
+  explicit Drive(std::size_t sightings)
+      : sightings_(sightings), arena_(calibration::TrackLog::memory_needed(3, sightings) + 64), log_(3, sightings, arena_) {}
+
+  void frame(std::uint64_t number, unsigned cameras) {
+    calibration::LoggedFrame f;
+    f.number = number;
+    log_.begin(f);
+    for (std::size_t i = 0; i < sightings_; ++i) {
+      calibration::LoggedSighting s;
+      s.cameras = static_cast<std::uint8_t>(cameras);
+      s.raw[0] = {static_cast<float>(count_++), 0};
+      log_.push(s);
+    }
+  }
+  [[nodiscard]] const calibration::TrackLog& log() const { return log_; }
+
+ private:
+  std::size_t sightings_, count_ = 0;
+  Arena arena_;
+  calibration::TrackLog log_;
+};
+
+std::vector<double> lefts(const MatchSample& sample) {
+  std::vector<double> values;
+  for (const RawMatch& m : sample.matches()) values.push_back(m.left[0]);
+  return values;
+}
+
+TEST(MatchSample, takesEveryNewFrameOnce) {
+  const auto sample = std::make_unique<MatchSample>();
+  Drive drive(2);
+  sample->take(drive.log());
+  EXPECT_TRUE(sample->matches().empty());
+  drive.frame(4, 3);
+  sample->take(drive.log());
+  sample->take(drive.log());
+  drive.frame(9, 3);
+  sample->take(drive.log());
+  EXPECT_EQ(lefts(*sample), (std::vector<double>{0, 1, 2, 3}));
+  EXPECT_EQ(sample->matches()[1].frame, 4U);
+  EXPECT_EQ(sample->matches()[2].frame, 9U);
+}
+
+TEST(MatchSample, onlyWhatBothCamerasSeeIsAMatch) {
+  const auto sample = std::make_unique<MatchSample>();
+  Drive drive(1);
+  for (const unsigned cameras : {1U, 2U, 6U}) {
+    drive.frame(cameras, cameras);
+    sample->take(drive.log());
+  }
+  EXPECT_TRUE(sample->matches().empty());
+  drive.frame(7, 1U | 4U | 8U);
+  sample->take(drive.log());
+  ASSERT_EQ(sample->matches().size(), 2U);
+  EXPECT_EQ(sample->matches()[0].camera, 2);
+  EXPECT_EQ(sample->matches()[1].camera, 3);
+}
+
+TEST(MatchSample, aLongDriveIsSampledThinnerAndEvenly) {
+  const auto sample = std::make_unique<MatchSample>();
+  Drive drive(777);
+  for (std::uint64_t i = 0; i < 130; ++i) {  // 101 010 matches: every eighth
+    drive.frame(i, 3);
+    sample->take(drive.log());
+  }
+  const std::vector<double> values = lefts(*sample);
+  ASSERT_EQ(values.size(), 12'627U);
+  for (std::size_t i = 0; i < values.size(); ++i) ASSERT_EQ(values[i], 8.0 * static_cast<double>(i));
+}
+
+TEST(MatchSample, remembersBetweenWhichFramesTheRigWasWhich) {
+  const auto sample = std::make_unique<MatchSample>();
+  EXPECT_EQ(sample->last_change(), 0U);
+  EXPECT_GT(sample->first_change(), 1'000'000'000U);
+  for (const std::uint64_t frame : {700U, 300U, 500U}) sample->rig_changed(frame);
+  EXPECT_EQ(sample->first_change(), 300U);
+  EXPECT_EQ(sample->last_change(), 700U);
+}
+
+}  // namespace
+}  // namespace vergence::app
