@@ -427,6 +427,8 @@ Group calibration_options() {
       .integer(
           "adopt_after", &C::adopt_after, 0, 1000, "frames",
           "In a replay and with `--fast` a result is adopted so many frames after its snapshot, on every machine alike; live when ready.")
+      .integer("max_observations", &C::max_observations, 10'000, 1'000'000, "",
+               "Sightings that one solve takes; of more, frames are taken at wider steps: time and memory.")
       .choice("focal_lengths", &C::estimate_focal_lengths, {"hold", "estimate"},
               "`estimate`: the focal length of each further camera is found with the transform, by its prior; `hold`: it is believed.")
       .choice("intrinsics", &C::refine_intrinsics, {"hold", "refine"},

@@ -4,6 +4,7 @@
 //   streets calibration_bench euroc|kitti [--set …]                                              recorded excerpts, images as they are
 //   calibration_bench drives|stretches [--only NAME] [--set …]    every recorded drive: calibration given, wrong, found, knocked;
 //   how far disjoint stretches of it agree
+//   calibration_bench learning [--starts N]                       one drive N times to and fro: what is known after every solve
 //
 // One line a calibration, then the largest errors and their root means. `--verbose`: every event and the poses' status.
 #include <algorithm>
@@ -319,12 +320,13 @@ int main(int argc, char** argv) {
     if (a.what == "mock") return run_mock(a);
     if (a.what == "knock") return run_knocks(a);
     if (a.what == "drives") return bench::run_drives(a.set, a.only);
+    if (a.what == "learning") return bench::run_learning(a.set, a.starts);
     if (a.what == "stretches") return bench::run_stretches(a.set, a.only);
     if (a.what == "euroc" || a.what == "kitti") return run_recorded(a);
   } catch (const std::exception& e) {
     fmt::print(stderr, "calibration_bench: {}\n", e.what());
     return 2;
   }
-  fmt::print(stderr, "calibration_bench: drives, stretches, mock, knock, euroc or kitti is wanted\n");
+  fmt::print(stderr, "calibration_bench: drives, stretches, learning, mock, knock, euroc or kitti is wanted\n");
   return 2;
 }

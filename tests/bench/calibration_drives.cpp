@@ -15,9 +15,12 @@
 #include "app/commands/drive_calibration.hpp"
 #include "app/datasets/trajectory_files.hpp"
 #include "app/recorder/summary.hpp"
+#include "app/runtime/thread_runner.hpp"
+#include "core/calibration/stretches.hpp"
 #include "core/comparison/trajectory_metrics.hpp"
 #include "core/estimator/estimator.hpp"
 #include "core/math/so3.hpp"
+#include "tests/support/rendered_drive.hpp"
 #include "tests/support/shared_data.hpp"
 #include "tests/support/temporary_folder.hpp"
 
@@ -161,7 +164,7 @@ void run_drive(const Drive& d, const app::Configuration& c) {
     if (mended.rig) then.file.rig = *mended.rig;
     print(d.name, words + ", first", drive(d, s, c, then));
   }
-  const std::size_t at = d.sequence.pairs.size() / 2 + 20;
+  const std::size_t at = d.sequence.pairs.size() / 2;
   if (d.sequence.pairs.size() < 100) return;
   for (const Vec3& turn : {Vec3(0.1, 0, 0), Vec3(0, 0, 0.2), Vec3(0, 0.3, 0), Vec3(2, 0, 0)}) {
     const StereoSequence s = turned(d, turn, at, folder / fmt::format("knock{}", index++));
@@ -171,6 +174,60 @@ void run_drive(const Drive& d, const app::Configuration& c) {
                r.mended_at < 0 ? -1 : r.mended_at - static_cast<int>(at), r.ok_before_mended, r.knocks);
     std::fflush(stdout);
   }
+}
+
+void print_stretches(const std::string& name, const std::vector<calibration::RigSolution>& stretches) {
+  fmt::print("{}: {} stretches of some {} frames\n", name, stretches.size(), stretches.empty() ? 0 : stretches.front().frames);
+  calibration::Agreement mean;
+  std::size_t n = 0;
+  for (std::size_t i = 0; i < stretches.size(); ++i) {
+    const calibration::RigSolution& s = stretches[i];
+    const Vec3 phi = 1e3 * log_so3(s.rig.T_camera_left[1].R), t = 1e3 * s.rig.T_camera_left[1].t;
+    const auto& sigma = s.rig.sigma_noise[1];
+    fmt::print("  rotation {:8.3f} ({:.3f}) {:8.3f} ({:.3f}) {:8.3f} ({:.3f}) mrad  t_y {:7.3f} ({:.3f}) t_z {:7.3f} ({:.3f}) mm", phi.x(),
+               1e3 * sigma[0], phi.y(), 1e3 * sigma[1], phi.z(), 1e3 * sigma[2], t.y(), 1e3 * sigma[4], t.z(), 1e3 * sigma[5]);
+    fmt::print("  cx {:.2f} ({:.2f}) cy {:.2f} ({:.2f}) px  {:.0f} ms, inflation {:.1f}\n", s.rig.intrinsics[1].cx,
+               s.rig.intrinsics[1].sigma[2], s.rig.intrinsics[1].cy, s.rig.intrinsics[1].sigma[3], s.solve_ms, s.rig.inflation);
+    if (i == 0) continue;
+    const calibration::Agreement a = calibration::agreement(stretches[i - 1].rig, s.rig, 1);
+    ++n;
+    mean.transform += a.transform;
+    mean.intrinsics += a.intrinsics;
+    for (std::size_t k = 0; k < a.depth.size(); ++k) mean.depth[k] += a.depth[k], mean.depth_percent[k] += a.depth_percent[k];
+  }
+  if (n == 0) return;
+  const auto by = static_cast<double>(n);
+  fmt::print("  NEES a dimension: transform {:.2f}, intrinsics {:.2f}, depth", mean.transform / by, mean.intrinsics / by);
+  for (std::size_t k = 0; k < mean.depth.size(); ++k)
+    fmt::print(" {:g} m {:.2f} ({:.2f} %)", calibration::Agreement::depth_m[k], mean.depth[k] / by, mean.depth_percent[k] / by);
+  fmt::print("\n");
+  std::fflush(stdout);
+}
+
+/// The paper's rig on the mock's streets, its true calibration in use.
+void rendered_stretches(const app::Configuration& c) {
+  constexpr std::uint64_t kFrames = 240;
+  constexpr std::size_t kStretch = 40;
+  test::RenderedDriveOptions o;
+  o.from_s = 20;
+  test::RenderedDrive rendered(o);
+  EstimatorOptions options;
+  options.odometry = c.odometry;
+  options.calibration = c.calibration;
+  options.monitor = c.monitor;
+  const auto features = static_cast<std::size_t>(c.odometry.features);
+  Arena arena(Estimator::memory_needed(options, o.rig) + calibration::Stretches::memory_needed(c.calibration, c.monitor, 2, features));
+  app::ThreadRunner two;
+  ImmediateRunner solver;
+  Estimator estimator(options, o.rig, o.rig, arena, two, solver);
+  calibration::Stretches alone(calibration::Stretches::Kind::alone, o.rig, o.rig, kStretch, c.calibration, c.monitor, features, arena);
+  std::vector<calibration::RigSolution> stretches;
+  for (std::uint64_t i = 0; i < kFrames; ++i) {
+    (void)estimator.process(rendered.frame(i));
+    const auto solved = alone.take(estimator.tracks());
+    if (solved && solved->status == calibration::RigSolveStatus::ok) stretches.push_back(*solved);
+  }
+  print_stretches("mock", stretches);
 }
 
 int for_drives(const std::vector<std::string>& set, const std::string& only,
@@ -193,36 +250,64 @@ int for_drives(const std::vector<std::string>& set, const std::string& only,
 
 int run_drives(const std::vector<std::string>& set, const std::string& only) { return for_drives(set, only, run_drive); }
 
+int run_learning(const std::vector<std::string>& set, int times) {
+  const app::Configuration c = app::load_configuration(std::nullopt, set);
+  const auto d = open_drive("kitti00_151", false);
+  if (!d) {
+    fmt::print(stderr, "calibration_bench: no recorded drives; set VERGENCE_SHARED to the folder that holds data/\n");
+    return 2;
+  }
+  // To and fro over the same road: the speed changes its sign at the ends, the rig stays what it is.
+  StereoSequence s = d->sequence;
+  const std::size_t n = d->sequence.pairs.size();
+  const Duration step = d->sequence.pairs[1].stamp - d->sequence.pairs[0].stamp;
+  s.pairs.clear();
+  for (int time = 0; time < times; ++time)
+    for (std::size_t i = time == 0 ? 0 : 1; i < n; ++i) {
+      app::StereoPair pair = d->sequence.pairs[time % 2 == 0 ? i : n - 1 - i];
+      pair.stamp = s.pairs.empty() ? d->sequence.pairs[0].stamp : s.pairs.back().stamp + step;
+      s.pairs.push_back(pair);
+    }
+  StartingCalibration scratch = app::replayed_calibration(c, s, false);
+  app::apply_use({.length_only = true}, &scratch.file.rig);
+  scratch.trust = CalibrationTrust::none;
+  int knocks = 0;
+  const auto rig = app::drive_once({s, c, 0, s.pairs.size(), {}, {}}, scratch, [&](const Estimator& e, const PoseSample& sample) {
+    for (const EstimatorEvent& event : e.events()) knocks += event.kind == EstimatorEvent::Kind::rig_changed ? 1 : 0;
+    for (const CalibrationDecision& decision : e.calibrations()) {
+      const RigCalibration& r = decision.calibration;
+      const Vec3 phi = 1e3 * log_so3(r.T_camera_left[1].R), t = 1e3 * r.T_camera_left[1].t;
+      fmt::print(
+          "frame {:5d} {:8s} {:4d} frames  yaw {:.3f} ({:.3f}) mrad  t_y {:.2f} t_z {:.2f} mm  cx {:.2f} ({:.2f})  depth ± {:.2f} %  held "
+          "out {:.4f} px  {:.0f} ms\n",
+          sample.frame,
+          decision.accepted ? "adopted"
+          : decision.learnt ? "kept"
+                            : "rejected",
+          r.frames, phi.y(), 1e3 * r.sigma_noise[1][1], t.y(), t.z(), r.intrinsics[1].cx, r.intrinsics[1].sigma[2],
+          decision.depth_sigma_percent, decision.held_out_after_px, decision.solve_ms);
+      std::fflush(stdout);
+    }
+  });
+  fmt::print("{} knocks told\n", knocks);
+  if (!rig) return 1;
+  StartingCalibration learnt = app::replayed_calibration(c, d->sequence, false);
+  learnt.file.rig = *rig;
+  print(d->name, "with what was learnt", drive(*d, d->sequence, c, learnt));
+  return 0;
+}
+
 int run_stretches(const std::vector<std::string>& set, const std::string& only) {
-  return for_drives(set, only, [](const Drive& d, const app::Configuration& c) {
+  const int recorded = for_drives(set, only, [](const Drive& d, const app::Configuration& c) {
     const StartingCalibration given = app::replayed_calibration(c, d.sequence, false);
     const app::DriveCalibration found = app::calibrate_drive({d.sequence, c, 0, d.sequence.pairs.size(), {}, {}}, given);
-    fmt::print("{}: {} stretches of some {} frames\n", d.name, found.stretches.size(),
-               found.stretches.empty() ? 0 : found.stretches.front().frames);
-    for (const calibration::RigSolution& s : found.stretches) {
-      const Vec3 phi = 1e3 * log_so3(s.rig.T_camera_left[1].R);
-      const Vec3 t = 1e3 * s.rig.T_camera_left[1].t;
-      const auto& n = s.rig.sigma_noise[1];
-      fmt::print(
-          "  rotation {:8.3f} ({:.3f}) {:8.3f} ({:.3f}) {:8.3f} ({:.3f}) mrad  t_y {:7.3f} ({:.3f}) t_z {:7.3f} ({:.3f}) mm  cx {:.2f} "
-          "({:.2f}) cy {:.2f} ({:.2f}) px  {:.0f} ms inflation {:.1f} lag {:.4f}\n",
-          phi.x(), 1e3 * n[0], phi.y(), 1e3 * n[1], phi.z(), 1e3 * n[2], t.y(), 1e3 * n[4], t.z(), 1e3 * n[5], s.rig.intrinsics[1].cx,
-          s.rig.intrinsics[1].sigma[2], s.rig.intrinsics[1].cy, s.rig.intrinsics[1].sigma[3], s.solve_ms, s.rig.inflation, s.lag_frames);
-    }
-    double transform = 0, intrinsics = 0;
-    std::array<double, calibration::Agreement::kDepths> depth{}, percent{};
-    const double n = static_cast<double>(found.agreements.size());
-    for (const calibration::Agreement& a : found.agreements) {
-      transform += a.transform / n;
-      intrinsics += a.intrinsics / n;
-      for (std::size_t i = 0; i < depth.size(); ++i) depth[i] += a.depth[i] / n, percent[i] += a.depth_percent[i] / n;
-    }
-    fmt::print("  NEES a dimension: transform {:.2f}, intrinsics {:.2f}, depth", transform, intrinsics);
-    for (std::size_t i = 0; i < depth.size(); ++i)
-      fmt::print(" {:g} m {:.2f} ({:.2f} %)", calibration::Agreement::depth_m[i], depth[i], percent[i]);
-    fmt::print("\n");
-    std::fflush(stdout);
+    print_stretches(d.name, found.stretches);
   });
+  if (only.empty() || only == "mock") {
+    rendered_stretches(app::load_configuration(std::nullopt, set));
+    return 0;
+  }
+  return recorded;
 }
 
 }  // namespace vergence::bench

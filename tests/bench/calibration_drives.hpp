@@ -11,4 +11,7 @@ int run_drives(const std::vector<std::string>& set, const std::string& only);
 /// rendered one. → exit code.
 int run_stretches(const std::vector<std::string>& set, const std::string& only);
 
+/// `calibration_bench learning`: KITTI 00 so many times to and fro, from scratch; what is known after every solve. → exit code.
+int run_learning(const std::vector<std::string>& set, int times);
+
 }  // namespace vergence::bench
