@@ -109,7 +109,7 @@ std::string format_covariance(const CalibrationFile& calibration) {
     upper += i == 0 ? "\n    " : ",\n    ";
     for (std::size_t j = i; j < rows.size(); ++j) upper += fmt::format("{}{}", j == i ? "" : ", ", C(rows[i].row, rows[j].row));
   }
-  return fmt::format("covariance:  # of all that was estimated, wide; rad, m, px\n  parameters: [{}]\n  upper: [{}]\n",
+  return fmt::format("covariance:  # of all parameters together, wide; rad, m, px\n  parameters: [{}]\n  upper: [{}]\n",
                      fmt::join(names, ", "), upper);
 }
 

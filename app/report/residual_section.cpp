@@ -72,8 +72,8 @@ std::string picture(const Field& field, double scale) {
   for (const ResidualRow& r : field) {
     const double x = left + r.left * unit, y = r.top * unit, w = r.width * unit, h = r.height * unit;
     svg.rect(shade(r.mean_px, scale), x, y, w - 1, h - 1);
-    constexpr double kReadable = 34, kTall = 13;  // room for a number
-    if (w >= kReadable && h >= kTall) svg.text("cell", Anchor::middle, x + w / 2, y + h / 2 + 4, signed_px(r.mean_px));
+    constexpr double kReadable = 42, kTall = 15;  // room for a number
+    if (w >= kReadable && h >= kTall) svg.text("cell", Anchor::middle, x + w / 2, y + h / 2 + 4.5, signed_px(r.mean_px));
   }
   draw_scale(scale, height * unit + 18, &svg);
   return std::move(svg).finish();

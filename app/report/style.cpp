@@ -29,7 +29,7 @@ svg{display:block;width:100%;height:auto}
 svg text{font-size:13px;fill:var(--soft);font-family:inherit;font-variant-numeric:tabular-nums}
 svg text.strong{fill:var(--ink)}
 svg text.good{fill:var(--good);paint-order:stroke;stroke:var(--panel);stroke-width:3px}
-svg text.cell{fill:var(--ink);font-size:11px}
+svg text.cell{fill:var(--ink)}
 path,line,polyline{fill:none}
 .axis{stroke:var(--frame);stroke-width:1}
 .tick{stroke:var(--frame);stroke-width:1;opacity:.28}

@@ -123,7 +123,7 @@ TEST_F(CalibrationCli, aStateFileThatCannotBeWrittenIsAnEventAndASentenceAndNoEn
 TEST_F(CalibrationCli, theSameDecisionsWhateverTheThreads) {
   for (const char* threads : {"1", "2"})
     ASSERT_EQ(drive(threads, fmt::format("--from-scratch {} --threads {} --set rig.state_dir=none", kLongEnough, threads)).code, 0);
-  for (const char* file : {"trajectory.tum", "calibrations.csv", "calibration.yaml", "events.jsonl"})
+  for (const char* file : {"trajectory.tum", "calibrations.csv", "calibration.yaml", "events.jsonl", "residuals.csv"})
     EXPECT_EQ(read_file(session("1") / file), read_file(session("2") / file)) << file;
 }
 

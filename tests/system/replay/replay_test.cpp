@@ -107,10 +107,28 @@ TEST_F(ReplayedFolder, givesASessionWithAPoseForEveryFrame) {
        {"trajectory.tum", "poses.csv", "calibration.yaml", "calibrations.csv", "events.jsonl", "summary.json", "report.html"})
     EXPECT_TRUE(fs::exists(session() / file)) << file;
   const auto s = summary();
-  EXPECT_EQ(s["frames"]["ok"], kFrames);
+  EXPECT_EQ(s["frames"]["posed"], kFrames);
   EXPECT_EQ(s["frames"]["skipped"], 0);
   EXPECT_EQ(s["allocations_after_seal"], 0);
   EXPECT_TRUE(s["metrics"].is_null());  // a plain folder has no truth
+}
+
+TEST_F(ReplayedFolder, aDriveTooShortToConfirmItsCalibrationSaysSo) {
+  const Outcome o = run_vergence("replay '" + data().string() + "' --format folder --out '" + session().string() + "'");
+  ASSERT_EQ(o.code, 0) << o.err;
+  EXPECT_EQ(summary()["calibration"]["verified"], false);
+  EXPECT_TRUE(summary()["calibration"]["verified_frame"].is_null());
+  EXPECT_NE(o.err.find("the drive has not confirmed its calibration"), std::string::npos) << o.err;
+  EXPECT_NE(read_file(session() / "poses.csv").find("degraded,unverified_calibration"), std::string::npos);
+  EXPECT_NE(read_file(session() / "report.html").find("not verified"), std::string::npos);
+}
+
+TEST_F(ReplayedFolder, whereNothingWatchesTheRigPosesAreOkAndTheCalibrationIsNotVerified) {
+  ASSERT_EQ(replay("--set calibration.online=off").code, 0);
+  EXPECT_EQ(summary()["frames"]["ok"], kFrames);
+  EXPECT_EQ(summary()["calibration"]["verified"], false);
+  EXPECT_EQ(summary()["calibration"]["online"], false);
+  EXPECT_FALSE(fs::exists(session() / "residuals.csv")) << "nothing was tracked for it";
 }
 
 TEST_F(ReplayedFolder, theSameBytesWithOneThreadAndTwo) {
