@@ -56,8 +56,8 @@ class RigCovariance {
 
  private:
   [[nodiscard]] static constexpr std::size_t place(int row, int column) noexcept {
-    const int r = row < column ? column : row, c = row < column ? row : column;
-    return static_cast<std::size_t>(r * (r + 1) / 2 + c);
+    const auto r = static_cast<std::size_t>(row < column ? column : row), c = static_cast<std::size_t>(row < column ? row : column);
+    return r * (r + 1) / 2 + c;
   }
   std::array<double, kRigSize*(kRigSize + 1) / 2> packed_{};
 };
