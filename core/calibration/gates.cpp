@@ -15,7 +15,6 @@ namespace {
 constexpr double kFullWindow = 3.0;         // times the wanted sigmas, at max_frames
 constexpr double kBaselineOfSigmas = 0.75;  // m, for which the wanted sigma of t is given
 constexpr int kFewestHeldOut = 3;           // frames that say anything
-constexpr double kChance = 2.0;             // standard errors
 constexpr double kWorstFit = 1.5;           // px: matches of frames not in the solve, median
 constexpr double kCertain = 3.0;            // sigmas of depth by which a calibration is contradicted
 constexpr double kNeedsBaselines = 3.0;     // travelled, besides needs_motion_m
@@ -67,7 +66,8 @@ HeldOut held_out(const TrackLog& log, std::uint64_t after, const RigCalibration&
   return h;
 }
 
-bool fits_better(const TrackLog& log, std::uint64_t after, const RigCalibration& better, const RigCalibration& worse) noexcept {
+bool fits_better(const TrackLog& log, std::uint64_t after, const RigCalibration& better, const RigCalibration& worse,
+                 double chance) noexcept {
   double sum = 0, squares = 0;
   int n = 0;
   for_held_out(log, after, [&](const LoggedFrame& f) noexcept {
@@ -80,7 +80,7 @@ bool fits_better(const TrackLog& log, std::uint64_t after, const RigCalibration&
   });
   if (n < kFewestHeldOut) return true;
   const double mean = sum / n, variance = std::max(0.0, squares / n - mean * mean);
-  return mean > kChance * std::sqrt(variance / (n - 1));
+  return mean > chance * std::sqrt(variance / (n - 1));
 }
 
 Assessment assess(const RigCalibration& measured, const RigCalibration& claimed, const TrackLog& log, std::uint64_t after,
@@ -97,7 +97,7 @@ Assessment assess(const RigCalibration& measured, const RigCalibration& claimed,
     a.sigma_percent = sigma;
     a.difference_percent = difference;
   }
-  a.better = fits_better(log, after, measured, claimed);
+  a.better = fits_better(log, after, measured, claimed, kRareChance);
   a.worse = fits_better(log, after, claimed, measured);
   a.confirmed = worst <= o.tolerated_depth_percent;
   a.contradicted = a.difference_percent > o.tolerated_depth_percent && a.difference_percent > kCertain * a.sigma_percent;

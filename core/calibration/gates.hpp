@@ -19,9 +19,10 @@ inline constexpr std::size_t kHeldOutFrames = 12, kHeldOutMatches = 150;
 [[nodiscard]] HeldOut held_out(const TrackLog& log, std::uint64_t after, const RigCalibration& rig) noexcept;
 
 /// Whether `better` fits those frames better than `worse` by more than chance: mean over frames of the difference of medians against twice
-/// its standard error.
-[[nodiscard]] bool fits_better(const TrackLog& log, std::uint64_t after, const RigCalibration& better,
-                               const RigCalibration& worse) noexcept;
+/// its standard error; `chance`: so many of them. Threads pure.
+inline constexpr double kChance = 2.0, kRareChance = 3.0;  // of a question asked once; of one that is asked all the time
+[[nodiscard]] bool fits_better(const TrackLog& log, std::uint64_t after, const RigCalibration& better, const RigCalibration& worse,
+                               double chance = kChance) noexcept;
 
 /// What a drive's own measurement of the rig says of the calibration in use (METHOD §6.4).
 struct Assessment {

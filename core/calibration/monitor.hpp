@@ -109,7 +109,7 @@ class Monitor {
   bool set_reference(const Transform& T_camera_left, const Pinhole& left, const Pinhole& right, const Mat6& covariance) noexcept;
 
   /// How much stretches of a drive are expected to disagree, px rms over the image, until that is measured: what the lenses in use leave.
-  /// Outlives set_reference() and reset(), as what was measured does; monitor.bias_px is the least.
+  /// Outlives set_reference() and reset(), as what was measured does; monitor.bias_px is the least, and all there is without this call.
   void expect_scatter(double bias_px) noexcept;
 
   [[nodiscard]] MonitorVerdict look(const MonitorFrame& frame) noexcept;

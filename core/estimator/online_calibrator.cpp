@@ -408,9 +408,10 @@ CalibrationDecision OnlineCalibrator::judge_sought(Stamp stamp, std::uint64_t nu
   return d;
 }
 
-/// The drive's own measurement of the rig, against what will be in use after this decision.
+/// The drive's own measurement of the rig, with the lenses free where they are not believed, against what will be in use after this
+/// decision.
 void OnlineCalibrator::assess_lenses(const RigCalibration& in_use_then, std::uint64_t newest, CalibrationDecision* d) const noexcept {
-  const calibration::RigSolution& measured = solved_.lenses;
+  const calibration::RigSolution& measured = options_.calibration.estimate_lenses != 0 ? solved_.lenses : solved_.transforms;
   if (measured.status != calibration::RigSolveStatus::ok) return;
   const calibration::Assessment then =
       calibration::assess(measured.rig, in_use_then, log_, newest, options_.calibration, options_.odometry.pixel_sigma);
@@ -428,7 +429,8 @@ bool OnlineCalibrator::lenses_are_off(bool last) const noexcept {
   calibration::GateQuestion q = question(free, last);
   q.must_be_better = false;
   if (calibration::ask_gates(q, options_.calibration) != Gate::open) return false;
-  return held.status != calibration::RigSolveStatus::ok || calibration::fits_better(log_, free.newest, free.rig, held.rig);
+  return held.status != calibration::RigSolveStatus::ok ||
+         calibration::fits_better(log_, free.newest, free.rig, held.rig, calibration::kRareChance);
 }
 
 /// The claim in use is confirmed, or is no more: the monitor expects as much of it.

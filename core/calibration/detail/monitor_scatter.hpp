@@ -18,12 +18,14 @@ class BlockScatter {
     expected2_ = bias_px * bias_px / kFixed;
     sum_ = 0;
     blocks_ = 0;
+    used_ = true;
   }
   /// `lambda`: the inflation of both. Blocks that see next to nothing of some direction say nothing.
   void add(const Evidence& block, const Evidence& past, double lambda) noexcept;
 
-  /// px² of a mode.
+  /// px² of a mode; 0 where nothing was ever expected.
   [[nodiscard]] double variance() const noexcept {
+    if (!used_) return 0;
     return std::max(0.0, (kExpectedBlocks * expected2_ + sum_) / (kExpectedBlocks + static_cast<double>(blocks_)));
   }
 
@@ -31,6 +33,7 @@ class BlockScatter {
   static constexpr double kExpectedBlocks = 4;  // that the expectation weighs
   double expected2_ = 0, sum_ = 0;
   std::uint64_t blocks_ = 0;
+  bool used_ = false;
 };
 
 }  // namespace vergence::calibration::detail
