@@ -1,0 +1,131 @@
+#include "tests/support/recorded_sequence.hpp"
+
+#include <functional>
+#include <numbers>
+#include <vector>
+
+#include <fmt/format.h>
+#include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
+
+#include "app/commands/drive_calibration.hpp"
+#include "app/recorder/summary.hpp"
+#include "core/comparison/trajectory_metrics.hpp"
+#include "core/estimator/estimator.hpp"
+#include "core/math/so3.hpp"
+#include "tests/support/shared_data.hpp"
+
+namespace vergence::test {
+
+using app::StartingCalibration;
+using app::StereoSequence;
+
+namespace {
+
+/// The sequence with its right images from a frame on replaced by what `change` makes of them.
+StereoSequence with_right_changed(const RecordedSequence& drive, std::size_t from, const std::filesystem::path& folder,
+                                  const std::function<cv::Mat(const cv::Mat&)>& change) {
+  StereoSequence s = drive.sequence;
+  std::filesystem::create_directories(folder);
+  for (std::size_t i = from; i < s.pairs.size(); ++i) {
+    const cv::Mat image = cv::imread((s.root / s.pairs[i].file[1]).string(), cv::IMREAD_GRAYSCALE);
+    const std::filesystem::path file = folder / fmt::format("{:06d}.png", i);
+    cv::imwrite(file.string(), change(image), {cv::IMWRITE_PNG_COMPRESSION, 1});
+    s.pairs[i].file[1] = file.string();
+  }
+  return s;
+}
+
+}  // namespace
+
+std::optional<RecordedSequence> open_recorded(const std::string& name) {
+  const auto folder = shared_data("data/" + name);
+  if (!folder) return std::nullopt;
+  const bool euroc = name.starts_with("euroc");
+  RecordedSequence d{name, app::open_sequence(euroc ? app::SequenceFormat::euroc : app::SequenceFormat::kitti, *folder), {}};
+  const auto truth = app::find_truth(*folder);
+  if (truth && truth->kind != app::TruthFiles::Kind::kitti) {
+    d.truth = app::read_truth(*truth);
+  } else if (truth) {
+    std::vector<Stamp> times;
+    for (const app::StereoPair& pair : d.sequence.pairs) times.push_back(pair.stamp);
+    d.truth = app::read_kitti(truth->poses, times);
+  }
+  return d;
+}
+
+StereoSequence with_right_turned(const RecordedSequence& drive, const Vec3& degrees, std::size_t from,
+                                 const std::filesystem::path& folder) {
+  const Intrinsics& lens = drive.sequence.calibration.intrinsics[1];
+  Mat3 K;
+  K << lens.fx, 0, lens.cx, 0, lens.fy, lens.cy, 0, 0, 1;
+  const Mat3 H = K * exp_so3(degrees * std::numbers::pi / 180) * K.inverse();
+  cv::Mat h(3, 3, CV_64F);
+  for (int r = 0; r < 3; ++r)
+    for (int c = 0; c < 3; ++c) h.at<double>(r, c) = H(r, c);
+  return with_right_changed(drive, from, folder, [&](const cv::Mat& image) {
+    cv::Mat out;
+    cv::warpPerspective(image, out, h, image.size(), cv::INTER_CUBIC, cv::BORDER_CONSTANT);
+    return out;
+  });
+}
+
+StereoSequence with_right_mirrored(const RecordedSequence& drive, const std::filesystem::path& folder) {
+  return with_right_changed(drive, 0, folder, [](const cv::Mat& image) {
+    cv::Mat out;
+    cv::flip(image, out, 1);
+    return out;
+  });
+}
+
+StartingCalibration blank(const StartingCalibration& given) {
+  StartingCalibration scratch = given;
+  app::apply_use({.length_only = true}, &scratch.file.rig);
+  scratch.trust = CalibrationTrust::none;
+  return scratch;
+}
+
+DriveOutcome drive_recorded(const RecordedSequence& d, const StereoSequence& sequence, const app::Configuration& c,
+                            const StartingCalibration& begin, std::size_t knock_at) {
+  DriveOutcome row;
+  std::vector<StampedPose> poses;
+  const app::DrivePass pass{sequence, c, 0, sequence.pairs.size(), {}, {}};
+  row.rig = app::drive_once(pass, begin, [&](const Estimator& e, const PoseSample& s) {
+    const auto at = static_cast<int>(s.frame);
+    const bool knocked = s.frame >= knock_at;
+    ++row.frames;
+    if (s.status != PoseStatus::lost) poses.push_back({s.stamp, s.T_world_left});
+    for (const EstimatorEvent& event : e.events()) {
+      using Kind = EstimatorEvent::Kind;
+      if (event.kind == Kind::rig_changed) {
+        if (knocked && row.told_at < 0) row.told_at = at;
+        if (!knocked) ++row.knocks;
+      }
+      if (event.kind == Kind::calibration_confirmed && row.verified_at < 0) row.verified_at = at;
+      if (event.kind == Kind::calibration_contradicted && row.contradicted_at < 0) {
+        row.contradicted_at = at;
+        row.contradicted_percent = event.value;
+      }
+    }
+    for (const CalibrationDecision& decision : e.calibrations()) {
+      if (knocked && row.told_at >= 0 && decision.accepted && row.mended_at < 0) row.mended_at = at;
+      if (decision.held_out_after_px > 0) row.held_out_px = decision.held_out_after_px;
+    }
+    if (row.verified_at < 0 && s.status == PoseStatus::ok) ++row.ok_before_verified;
+    if (knocked && row.mended_at < 0 && s.status == PoseStatus::ok) ++row.ok_before_mended;
+    if (row.verified_at >= 0) ++row.since_verified;
+    (s.status == PoseStatus::ok ? row.ok : s.status == PoseStatus::degraded ? row.degraded : row.lost)++;
+    if (row.verified_at >= 0 && s.status == PoseStatus::ok) ++row.ok_since_verified;
+  });
+  if (!d.truth.empty() && poses.size() > 3) {
+    const TrajectoryEvaluation e = evaluate(poses, d.truth, app::summary_evaluation_options());
+    if (e.status == EvaluationStatus::ok) {
+      row.ate_m = e.ate_se3.rmse;
+      row.scale = e.sim3.scale;
+      if (e.segments[1].count > 0) row.segments_percent = 100 * e.segments[1].translation;
+    }
+  }
+  return row;
+}
+
+}  // namespace vergence::test

@@ -1,0 +1,52 @@
+#pragma once
+#include <array>
+#include <filesystem>
+#include <optional>
+#include <string>
+
+#include "app/commands/starting_calibration.hpp"
+#include "app/config/configuration.hpp"
+#include "app/datasets/stereo_sequence.hpp"
+#include "app/datasets/trajectory_files.hpp"
+
+namespace vergence::test {
+
+/// A recorded drive of the shared data with its truth.
+struct RecordedSequence {
+  std::string name;
+  app::StereoSequence sequence;
+  app::Trajectory truth;
+};
+
+inline constexpr std::array kRecordedSequences = {"kitti06_51", "kitti01_51", "kitti00_151", "euroc_mh01"};
+/// By the name of its folder below data/; empty: it is not there.
+[[nodiscard]] std::optional<RecordedSequence> open_recorded(const std::string& name);
+
+/// The right camera turned about its centre from a frame on, its images written into `folder`: by a homography, which is exact for a lens
+/// without distortion.
+[[nodiscard]] app::StereoSequence with_right_turned(const RecordedSequence& drive, const Vec3& degrees, std::size_t from,
+                                                    const std::filesystem::path& folder);
+/// The right images left for right: no lens model makes that fit.
+[[nodiscard]] app::StereoSequence with_right_mirrored(const RecordedSequence& drive, const std::filesystem::path& folder);
+
+/// Of the drive's calibration only lenses and length are read.
+[[nodiscard]] app::StartingCalibration blank(const app::StartingCalibration& given);
+
+/// What came of one pass. Frames count from 0; −1: never.
+struct DriveOutcome {
+  int frames = 0, ok = 0, degraded = 0, lost = 0;
+  int knocks = 0;  // told before `knock_at`
+  int verified_at = -1, since_verified = 0, ok_since_verified = 0;
+  int contradicted_at = -1, ok_before_verified = 0;
+  int told_at = -1, mended_at = -1, ok_before_mended = 0;  // of a knock
+  double contradicted_percent = 0;
+  double ate_m = 0, scale = 1, segments_percent = -1;  // −1: too short for segments of 10 to 50 m
+  double held_out_px = 0;                              // of the last decision that had frames held out
+  std::optional<RigCalibration> rig;                   // in use at the end
+};
+
+/// `knock_at`: the frame from which on the images are of a turned camera, if any.
+[[nodiscard]] DriveOutcome drive_recorded(const RecordedSequence& drive, const app::StereoSequence& sequence, const app::Configuration& c,
+                                          const app::StartingCalibration& begin, std::size_t knock_at = ~std::size_t{0});
+
+}  // namespace vergence::test

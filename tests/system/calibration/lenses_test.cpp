@@ -1,0 +1,145 @@
+// Recorded drives: what comes of a nominal calibration, of a wrong one, of none. `calibration_bench drives` prints all figures.
+#include <gtest/gtest.h>
+
+#include "app/commands/drive_calibration.hpp"
+#include "core/math/so3.hpp"
+#include "tests/support/recorded_sequence.hpp"
+#include "tests/support/shared_data.hpp"
+#include "tests/support/temporary_folder.hpp"
+
+namespace vergence::test {
+namespace {
+
+using app::StartingCalibration;
+using app::StereoSequence;
+
+const app::Configuration& configuration() {
+  static const app::Configuration c = app::load_configuration(std::nullopt, {});
+  return c;
+}
+
+std::string missing(const std::string& name) { return shared_data_missing("data/" + name); }
+
+app::DriveCalibration calibrated(const StereoSequence& s) {
+  return app::calibrate_drive({s, configuration(), 0, s.pairs.size(), {}, {}}, app::replayed_calibration(configuration(), s, false));
+}
+
+/// The drive with what its own images say of its rig.
+DriveOutcome calibrated_first(const RecordedSequence& d, const StereoSequence& s) {
+  const app::DriveCalibration found = calibrated(s);
+  EXPECT_TRUE(found.rig) << found.why;
+  StartingCalibration begin = app::replayed_calibration(configuration(), s, false);
+  if (found.rig) begin.file.rig = *found.rig;
+  return drive_recorded(d, s, configuration(), begin);
+}
+
+struct Reach {
+  const char* name;
+  double segments_percent, ate_m, scale;  // at most; off from 1 at most
+};
+
+class RecordedLenses : public testing::TestWithParam<Reach> {};
+
+// Figures of calibration_bench with a fifth of margin: the bounds are what a regression would break, not what is reached.
+TEST_P(RecordedLenses, aDriveCalibratedFromItselfIsRightInScaleAndTellsNoKnock) {
+  const Reach& reach = GetParam();
+  const auto d = open_recorded(reach.name);
+  if (!d) GTEST_SKIP() << missing(reach.name);
+  const DriveOutcome o = calibrated_first(*d, d->sequence);
+  std::printf("%s: segments %.3f %%, ATE %.4f m, scale %.4f, verified at %d\n", reach.name, o.segments_percent, o.ate_m, o.scale,
+              o.verified_at);
+  EXPECT_LE(o.segments_percent, reach.segments_percent);
+  EXPECT_LE(o.ate_m, reach.ate_m);
+  EXPECT_NEAR(o.scale, 1, reach.scale);
+  EXPECT_EQ(o.knocks, 0);
+  EXPECT_EQ(o.contradicted_at, -1);
+  EXPECT_EQ(o.lost, 0);
+  EXPECT_GE(o.verified_at, 0);
+  EXPECT_LE(o.verified_at, 60);
+  EXPECT_EQ(o.ok_before_verified, 0);
+  EXPECT_GE(o.ok_since_verified, 0.95 * o.since_verified);
+  if (o.scale != 1 && o.segments_percent > 0) EXPECT_LE(o.held_out_px, 0.2);
+}
+
+INSTANTIATE_TEST_SUITE_P(Drives, RecordedLenses,
+                         testing::Values(Reach{"kitti06_51", 0.60, 0.030, 0.002}, Reach{"kitti01_51", 1.2, 0.065, 0.003},
+                                         Reach{"kitti00_151", 1.9, 0.33, 0.009}, Reach{"euroc_mh01", 0, 0.0041, 0.008}),
+                         [](const auto& info) { return std::string(info.param.name); });
+
+TEST(RecordedClaims, aNominalCalibrationThatIsWrongIsNeverOkAndMended) {
+  const auto d = open_recorded("kitti01_51");
+  if (!d) GTEST_SKIP() << missing("kitti01_51");
+  const DriveOutcome o = drive_recorded(*d, d->sequence, configuration(), app::replayed_calibration(configuration(), d->sequence, false));
+  ASSERT_GE(o.contradicted_at, 0);
+  EXPECT_GT(o.contradicted_percent, 4);  // its path is 6 % off
+  EXPECT_EQ(o.ok_before_verified, 0);
+  EXPECT_EQ(o.knocks, 0) << "what is off from the first frame is no knock";
+  ASSERT_TRUE(o.rig);
+  EXPECT_NEAR(log_so3(o.rig->T_camera_left[1].R).y(), 26.8e-3, 1e-3);  // what six drives of that car agree on: 25.7 to 27.2 mrad
+}
+
+TEST(RecordedClaims, aCameraTurnedFromTheStartIsNoKnock) {
+  const auto d = open_recorded("kitti06_51");
+  if (!d) GTEST_SKIP() << missing("kitti06_51");
+  const TemporaryFolder folder;
+  int n = 0;
+  for (const Vec3& degrees : {Vec3(0, 0.3, 0), Vec3(0.3, 0.2, 0.25)}) {
+    const StereoSequence s = with_right_turned(*d, degrees, 0, folder / std::to_string(n++));
+    const DriveOutcome o = drive_recorded(*d, s, configuration(), app::replayed_calibration(configuration(), s, false));
+    EXPECT_GE(o.contradicted_at, 0) << degrees.transpose();
+    EXPECT_EQ(o.ok_before_verified, 0) << degrees.transpose();
+    EXPECT_EQ(o.knocks, 0) << degrees.transpose();
+  }
+}
+
+TEST(RecordedKnocks, onRealImagesAreToldAndMended) {
+  const auto d = open_recorded("kitti00_151");
+  if (!d) GTEST_SKIP() << missing("kitti00_151");
+  const app::DriveCalibration found = calibrated(d->sequence);
+  ASSERT_TRUE(found.rig) << found.why;
+  StartingCalibration begin = app::replayed_calibration(configuration(), d->sequence, false);
+  begin.file.rig = *found.rig;
+  const TemporaryFolder folder;
+  constexpr std::size_t kAt = 75;
+  int n = 0;
+  for (const Vec3& degrees : {Vec3(0.1, 0, 0), Vec3(0, 0, 0.2), Vec3(0, 0.3, 0)}) {
+    const StereoSequence s = with_right_turned(*d, degrees, kAt, folder / std::to_string(n++));
+    const DriveOutcome o = drive_recorded(*d, s, configuration(), begin, kAt);
+    EXPECT_EQ(o.knocks, 0) << "before it";
+    ASSERT_GE(o.told_at, 0) << degrees.transpose();
+    EXPECT_LE(o.told_at, static_cast<int>(kAt) + 3) << degrees.transpose();
+    EXPECT_GE(o.mended_at, 0) << degrees.transpose();
+    EXPECT_LE(o.ok_before_mended, 3) << degrees.transpose();
+  }
+}
+
+TEST(RecordedStretches, agreeWithinTheirSigmas) {
+  const auto d = open_recorded("kitti00_151");
+  if (!d) GTEST_SKIP() << missing("kitti00_151");
+  const app::DriveCalibration found = calibrated(d->sequence);
+  ASSERT_GE(found.agreements.size(), 2U);
+  double transform = 0, depth = 0;
+  for (const calibration::Agreement& a : found.agreements) {
+    transform += a.transform / static_cast<double>(found.agreements.size());
+    depth += a.depth[2] / static_cast<double>(found.agreements.size());
+  }
+  // 1 on average; three differences of some five degrees of freedom each spread by half of that.
+  EXPECT_LT(transform, 3);
+  EXPECT_LT(depth, 3);
+}
+
+TEST(RecordedBadInput, rightImagesLeftForRightAreNeverOk) {
+  const auto d = open_recorded("kitti06_51");
+  if (!d) GTEST_SKIP() << missing("kitti06_51");
+  const TemporaryFolder folder;
+  const StereoSequence s = with_right_mirrored(*d, folder / "mirrored");
+  const StartingCalibration given = app::replayed_calibration(configuration(), s, false);
+  EXPECT_EQ(drive_recorded(*d, s, configuration(), given).ok, 0);
+  EXPECT_EQ(drive_recorded(*d, s, configuration(), blank(given)).ok, 0);
+  const app::DriveCalibration found = calibrated(s);
+  EXPECT_FALSE(found.rig);
+  EXPECT_FALSE(found.why.empty());
+}
+
+}  // namespace
+}  // namespace vergence::test
