@@ -33,14 +33,16 @@ struct Driven {
   Stretches stretches;
   std::vector<RigSolution> solved;
 
-  static CalibrationOptions small() {
+  static CalibrationOptions small(double drift_mrad) {
     CalibrationOptions o;
     o.max_frames = static_cast<int>(kStretch);
+    o.drift_mrad = drift_mrad;
     return o;
   }
-  Driven(const FeatureDriveOptions& o, Stretches::Kind kind, const RigCalibration& told, const RigCalibration& start)
+  Driven(const FeatureDriveOptions& o, Stretches::Kind kind, const RigCalibration& told, const RigCalibration& start,
+         double drift_mrad = 0.3)
       : drive(o),
-        options(small()),
+        options(small(drift_mrad)),
         arena(Stretches::memory_needed(options, monitor, 2, kFeatures)),
         stretches(kind, told, start, kStretch, options, monitor, kFeatures, arena) {}
   void go(int frames) {
@@ -173,6 +175,35 @@ TEST(Stretches, whatWasToldLongAgoCountsForLess) {
     sigma[later ? 1 : 0] = std::sqrt(s->rig.covariance(extrinsic_row(1) + 1, extrinsic_row(1) + 1));
   }
   EXPECT_GT(sigma[1], sigma[0]);
+}
+
+// What was known grows old by the time that has passed since, once, whether or not somebody tried to add to it.
+TEST(Stretches, oneThatFailsLeavesNoTraceInTheNext) {
+  const FeatureDriveOptions o = little_noise();
+  const RigCalibration told = rig_of(o, {o.left, o.right}, kNotGiven);
+  RigSolution third[2];
+  for (const bool tried : {false, true}) {
+    Driven d(o, Stretches::Kind::joined, told, told, 10);
+    d.go(30);
+    for (std::size_t i = 0; i < kStretch; ++i) {
+      d.drive.next();
+      LoggedFrame f;
+      f.number = d.drive.frame();
+      f.stamp = d.drive.stamp();
+      if (tried) d.log.begin(f);
+    }
+    if (tried) {
+      const auto s = d.stretches.take(d.log);
+      ASSERT_TRUE(s.has_value());
+      EXPECT_NE(s->status, RigSolveStatus::ok) << "nothing was seen";
+    }
+    log_drive(d.drive, 30, {}, d.log);
+    const auto s = d.stretches.take(d.log);
+    ASSERT_TRUE(s.has_value() && s->status == RigSolveStatus::ok);
+    third[tried ? 1 : 0] = *s;
+  }
+  EXPECT_EQ(third[0].rig.T_camera_left[1].t, third[1].rig.T_camera_left[1].t);
+  EXPECT_EQ(third[0].rig.sigma_noise[1], third[1].rig.sigma_noise[1]);
 }
 
 TEST(TrackLogAppend, aFrameOfAnotherLogComesWithItsSightings) {
