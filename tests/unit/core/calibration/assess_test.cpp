@@ -110,7 +110,7 @@ RigSolution solve_with(const std::vector<test::RigChange>& changes, std::uint64_
 
 // 0.2° are 4.4 px; a solve over both rigs ends between them.
 TEST(GateRigChanged, aCameraThatIsTurnedOnTheWayIsDated) {
-  for (const Vec3& axis : {Vec3(1, 0, 0), Vec3(0, 0, 1), Vec3(0.6, 0.6, 0.5)}) {
+  for (const Vec3& axis : {Vec3(1, 0, 0), Vec3(0, 0, 1), Vec3(0, 1, 0), Vec3(0.6, 0.6, 0.5)}) {
     RigCalibration nominal;
     const RigSolution s = solve_with({{30, 0.2 * kDegree * axis, Vec3::Zero(), 0}}, 11, &nominal);
     ASSERT_EQ(s.status, RigSolveStatus::ok);
