@@ -96,6 +96,25 @@ TEST(Agreement, theConditionalCovarianceHoldsNothingOfWhatIsHeld) {
     for (int i = 0; i < kRigSize; ++i) EXPECT_NEAR(left(i, intrinsic_row(0) + j), 0, 1e-15) << i << ' ' << j;
 }
 
+// Where the lenses of all cameras are estimated, camera 0's go with each other.
+TEST(Agreement, theConditionalCovarianceTakesWhatGoesTogetherOnce) {
+  Random random(86);
+  using All = Eigen::Matrix<double, kFree + 4, kFree + 4>;
+  All root;
+  for (int i = 0; i < kFree + 4; ++i)
+    for (int j = 0; j < kFree + 4; ++j) root(i, j) = random.normal();
+  const All C = root * root.transpose();
+  const auto row = [](int i) { return i < kFree ? row_of(i) : intrinsic_row(0) + i - kFree; };
+  RigCovariance wide;
+  for (int i = 0; i < kFree + 4; ++i)
+    for (int j = 0; j <= i; ++j) wide.set(row(i), row(j), C(i, j));
+  const Eigen::Matrix<double, kFree, 4> cross = C.topRightCorner<kFree, 4>();
+  const Free given = C.topLeftCorner<kFree, kFree>() - cross * C.bottomRightCorner<4, 4>().ldlt().solve(cross.transpose());
+  const RigCovariance left = noise_only(wide);
+  for (int i = 0; i < kFree; ++i)
+    for (int j = 0; j <= i; ++j) EXPECT_NEAR(left(row_of(i), row_of(j)), given(i, j), 1e-10) << i << ' ' << j;  // of numbers near 20
+}
+
 TEST(Agreement, whatIsNotHeldStaysAsItIs) {
   Random random(83);
   const RigCovariance noise = published(covariance_of_noise(random)), left = noise_only(noise);
