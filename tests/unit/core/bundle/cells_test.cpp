@@ -33,7 +33,8 @@ SimulatedRig small_motion(int poses, int life, Random& random, const std::functi
     const double x = random.uniform(-0.55, 0.55), y = random.uniform(-0.4, 0.4);
     rig.true_points.emplace_back(Vec3(x, y, 1) * random.uniform(6, 30));
     const auto first = std::min(static_cast<int>(random.uniform(0, poses - life + 1)), poses - life);
-    for (auto i = static_cast<std::uint16_t>(first); i < first + life; ++i)
+    const auto last = static_cast<std::uint16_t>(first + life);
+    for (auto i = static_cast<std::uint16_t>(first); i < last; ++i)
       for (std::uint8_t k = 0; k < 2; ++k) {
         Vec2 at;
         if (rig.cameras[k].project(rig.true_T_camera_left[k] * (rig.true_T_left_world[i] * rig.true_points[j]), &at, nullptr) !=

@@ -36,7 +36,7 @@ Free covariance_of_noise(Random& random) {
   Free root = Free::Identity();
   for (int i = 0; i < kFree; ++i)
     for (int j = 0; j < i; ++j) root(i, j) = 0.4 * random.normal();
-  const Free C = sigma.asDiagonal() * root * root.transpose() * sigma.asDiagonal();
+  Free C = sigma.asDiagonal() * root * root.transpose() * sigma.asDiagonal();
   return C;
 }
 
