@@ -24,7 +24,7 @@ namespace {
 
 constexpr std::size_t kMiddleDepth = 2;                 // of Agreement::depth_m: 20 m
 constexpr int kMoreFeatures = 2, kMostFeatures = 1000;  // of a drive's own: nobody waits for a pose here
-constexpr int kObservations = 240'000;  // of a solve that nobody waits for
+constexpr int kObservations = 240'000;                  // of a solve that nobody waits for
 constexpr std::size_t kAloneFrames = 40;                // of a stretch by itself, at most about: short drives, too, are to have two
 
 calibration::GateQuestion question_of(const calibration::RigSolution& s, const StartingCalibration& told, const Configuration& c) {

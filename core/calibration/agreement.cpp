@@ -1,5 +1,6 @@
 #include "core/calibration/agreement.hpp"
 
+#include <array>
 #include <cmath>
 
 #include <Eigen/Cholesky>
@@ -11,11 +12,16 @@
 namespace vergence::calibration {
 
 RigCovariance noise_only(const RigCovariance& wide) noexcept {
+  constexpr double kNothingLeft = 1e-12;  // of a variance, given those before it
   RigCovariance noise = wide;
   for (int held = intrinsic_row(0); held < intrinsic_row(0) + 4; ++held) {
-    if (!wide.known(held)) continue;
+    const double variance = noise(held, held);
+    if (!wide.known(held) || !(variance > kNothingLeft * wide(held, held))) continue;
+    std::array<double, kRigSize> with_held;
+    for (int r = 0; r < kRigSize; ++r) with_held[static_cast<std::size_t>(r)] = noise(r, held);
     for (int r = 0; r < kRigSize; ++r)
-      for (int c = 0; c <= r; ++c) noise.set(r, c, noise(r, c) - wide(r, held) * wide(held, c) / wide(held, held));
+      for (int c = 0; c <= r; ++c)
+        noise.set(r, c, noise(r, c) - with_held[static_cast<std::size_t>(r)] * with_held[static_cast<std::size_t>(c)] / variance);
   }
   return noise;
 }

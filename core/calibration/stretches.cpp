@@ -46,9 +46,10 @@ std::optional<RigSolution> Stretches::solve() noexcept {
   request.from_rig = true;
   request.told = &told_;
   const Stamp newest = solver_.log().frame(solver_.log().size() - 1).stamp;
+  RigCalibration known = known_;  // as old as it is now: a solve that fails must not age it for the next
   if (any_known_) {
-    let_drift((newest - known_.found).to_seconds() / 3600.0, options_, &known_);
-    request.known = &known_;
+    let_drift((newest - known.found).to_seconds() / 3600.0, options_, &known);
+    request.known = &known;
   }
   RigSolution s = solver_.solve(request);
   solver_.log().clear();

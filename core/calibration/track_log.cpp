@@ -62,6 +62,7 @@ void TrackLog::append(const LoggedFrame& frame) noexcept {
   const std::size_t at = slot(size_ - 1), count = std::min(frame.sightings.size(), capacity_);
   std::copy_n(frame.sightings.begin(), count, sightings_.begin() + static_cast<std::ptrdiff_t>(at * capacity_));
   frames_[at].sightings = sightings_.subspan(at * capacity_, count);
+  left_out_ += frame.sightings.size() - count;
 }
 
 }  // namespace vergence::calibration

@@ -195,6 +195,8 @@ class Clusters {
       sums_[cluster] = s;
     any_[cluster] = true;
   }
+  /// A single cluster's gradient is zero at the minimum, whatever its errors: it says nothing.
+  [[nodiscard]] bool enough() const noexcept { return std::count(any_.begin(), any_.end(), true) > 1; }
   /// Σ s sᵀ, made up for there being few: a mean over n clusters has taken up one of them, and `parameters` each one more.
   [[nodiscard]] Shared variance(int parameters) const noexcept {
     Shared meat = Shared::Zero(size_, size_);
@@ -204,7 +206,6 @@ class Clusters {
       ++n;
       meat.noalias() += sums_[c].lazyProduct(sums_[c].transpose());
     }
-    if (n <= 1) return Shared::Zero(size_, size_);
     return meat * std::min(kMostFewClusters, n / std::max(1.0, static_cast<double>(n - parameters)));
   }
 
@@ -216,7 +217,8 @@ class Clusters {
 
 /// The same with larger clusters, of two kinds, since tracks share errors in both ways: a cell of the left image (what a lens model leaves
 /// is a field over the image, common to all tracks there), and a block of frames (what a scene does to it). Under independent errors each
-/// gives the variance by tracks; the mean of both is taken.
+/// gives the variance by tracks; the mean of both is taken. Where all tracks are in one cell, or in the middle of their lives in one block,
+/// the other kind is left, or the tracks.
 Shared variance_by_cells(const BundleWorkspace& w, const BundleProblem& problem, int cells, TrackGradient& gradient, int size) noexcept {
   Clusters by_cell(size), by_block(size);
   const Intrinsics& lens = problem.cameras[0].intrinsics();
@@ -232,8 +234,9 @@ Shared variance_by_cells(const BundleWorkspace& w, const BundleProblem& problem,
     by_cell.add(static_cast<std::size_t>(cell_of(middle.y, lens.height) * cells + cell_of(middle.x, lens.width)), s);
     by_block.add(middle.pose * blocks / poses, s);
   }
+  if (!by_cell.enough()) return by_block.enough() ? by_block.variance(1) : variance_by_tracks(w, problem, gradient, size);
   const Shared cell = by_cell.variance(size);
-  return blocks > 1 ? Shared(0.5 * (cell + by_block.variance(1))) : cell;
+  return by_block.enough() ? Shared(0.5 * (cell + by_block.variance(1))) : cell;
 }
 
 /// From the rows of camera k to (φ, τ) of the left perturbation R ← Exp(φ) R, t ← t + τ; its first columns are the rows that there are.

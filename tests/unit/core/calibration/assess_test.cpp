@@ -1,0 +1,142 @@
+// What a measured rig says of the one in use, and rigs that change among the frames of one solve.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+
+#include "core/calibration/gates.hpp"
+#include "tests/unit/core/calibration/feature_log.hpp"
+
+namespace vergence::calibration {
+namespace {
+
+constexpr double kDegree = std::numbers::pi / 180, kPixelSigma = 0.15;
+
+/// A measured rig that is the true one, and frames that it does not rest on.
+struct Measured {
+  test::FeatureDriveOptions drive;
+  Arena arena{TrackLog::memory_needed(20, 300)};
+  TrackLog log{20, 300, arena};
+  CalibrationOptions options;
+  RigCalibration measured = test::rig_of(drive), claimed = measured;
+
+  /// `sigma`: of its yaw, rad.
+  explicit Measured(double sigma) {
+    test::FeatureDrive d(drive);
+    test::log_drive(d, 20, {}, log);
+    const int yaw = extrinsic_row(1) + 1;
+    measured.covariance.set(yaw, yaw, sigma * sigma);
+  }
+  [[nodiscard]] Assessment of(const Vec3& turned) {
+    claimed = measured;
+    claimed.T_camera_left[1].R = exp_so3(turned) * measured.T_camera_left[1].R;
+    return assess(measured, claimed, log, 5, options, kPixelSigma);
+  }
+};
+
+// At 20 m and 0.75 m of baseline a yaw ψ is 26.7 ψ of the depth: 2 % are 0.75 mrad.
+TEST(Assessment, theSameRigIsConfirmedByASmallSigma) {
+  Measured m(1e-4);
+  const Assessment a = m.of(Vec3::Zero());
+  EXPECT_EQ(a.depth_m, 20);
+  EXPECT_LT(a.difference_percent, 1e-8);
+  EXPECT_NEAR(a.sigma_percent, 0.267, 0.03);
+  EXPECT_TRUE(a.confirmed);
+  EXPECT_FALSE(a.contradicted);
+  EXPECT_FALSE(a.better);
+  EXPECT_FALSE(a.worse);
+}
+
+TEST(Assessment, aYawThatIsOffIsContradicted) {
+  for (const double yaw : {1.5e-3, -1.5e-3, 5e-3}) {
+    Measured m(1e-4);
+    const Assessment a = m.of({0, yaw, 0});
+    EXPECT_NEAR(a.difference_percent, 100 * 20 * std::abs(yaw) / 0.75, 0.1 * 100 * 20 * std::abs(yaw) / 0.75);
+    EXPECT_TRUE(a.contradicted) << yaw;
+    EXPECT_FALSE(a.confirmed) << yaw;
+    EXPECT_FALSE(a.worse) << yaw;
+  }
+}
+
+TEST(Assessment, aYawWithinWhatIsToleratedIsConfirmed) {
+  Measured m(1e-4);
+  const Assessment a = m.of({0, 0.5e-3, 0});  // 1.3 %
+  EXPECT_TRUE(a.confirmed);
+  EXPECT_FALSE(a.contradicted);
+  // Neither where difference and sigma are more than that only together.
+  Measured half(0.6e-3);  // 1.6 %
+  const Assessment b = half.of({0, 0.6e-3, 0});
+  EXPECT_FALSE(b.confirmed);
+  EXPECT_FALSE(b.contradicted);
+}
+
+TEST(Assessment, aLargeSigmaSaysNeither) {
+  for (const double yaw : {0.0, 1.5e-3, 5e-3}) {
+    Measured m(2e-3);  // 5.3 %
+    const Assessment a = m.of({0, yaw, 0});
+    EXPECT_FALSE(a.confirmed) << yaw;
+    EXPECT_FALSE(a.contradicted) << yaw;
+  }
+}
+
+TEST(Assessment, aPitchIsSeenOnFramesThatWereNotUsed) {
+  Measured m(1e-4);
+  const Assessment a = m.of({1e-3, 0, 0});  // 1.2 px of row, hardly anything of depth
+  EXPECT_TRUE(a.better);
+  EXPECT_FALSE(a.worse);
+  EXPECT_FALSE(a.contradicted);
+  // And the other way round.
+  const Assessment b = assess(m.claimed, m.measured, m.log, 5, m.options, kPixelSigma);
+  EXPECT_FALSE(b.better);
+  EXPECT_TRUE(b.worse);
+}
+
+RigSolution solve_with(const std::vector<test::RigChange>& changes, std::uint64_t seed, RigCalibration* nominal) {
+  test::FeatureDriveOptions o;
+  o.seed = seed;
+  o.changes = changes;
+  CalibrationOptions held;
+  held.max_frames = 60;
+  held.estimate_focal_lengths = 0;
+  test::SolverInArena s(held);
+  test::FeatureDrive drive(o);
+  test::log_drive(drive, 60, {}, s.solver.log());
+  *nominal = test::rig_of(o);
+  RigSolveRequest request;
+  request.rig = *nominal;
+  request.from_rig = true;
+  return s.solver.solve(request);
+}
+
+// 0.2° are 4.4 px; a solve over both rigs ends between them.
+TEST(GateRigChanged, aCameraThatIsTurnedOnTheWayIsDated) {
+  for (const Vec3& axis : {Vec3(1, 0, 0), Vec3(0, 0, 1), Vec3(0, 1, 0), Vec3(0.6, 0.6, 0.5)}) {
+    RigCalibration nominal;
+    const RigSolution s = solve_with({{30, 0.2 * kDegree * axis, Vec3::Zero(), 0}}, 11, &nominal);
+    ASSERT_EQ(s.status, RigSolveStatus::ok);
+    EXPECT_GE(s.changed_at, 20U) << axis.transpose();
+    EXPECT_LE(s.changed_at, 40U) << axis.transpose();
+    GateQuestion q;
+    q.solution = &s;
+    q.nominal = &nominal;
+    EXPECT_EQ(ask_gates(q, {}), Gate::rig_changed) << axis.transpose();
+    q.lenses = true;
+    EXPECT_EQ(ask_gates(q, {}), Gate::rig_changed) << axis.transpose();
+  }
+}
+
+TEST(GateRigChanged, oneRigIsOne) {
+  for (const std::uint64_t seed : {11U, 12U, 13U, 14U}) {
+    RigCalibration nominal;
+    const RigSolution s = solve_with({}, seed, &nominal);
+    ASSERT_EQ(s.status, RigSolveStatus::ok);
+    EXPECT_EQ(s.changed_at, 0U) << seed;
+    GateQuestion q;
+    q.solution = &s;
+    q.nominal = &nominal;
+    EXPECT_NE(ask_gates(q, {}), Gate::rig_changed) << seed;
+  }
+}
+
+}  // namespace
+}  // namespace vergence::calibration
