@@ -134,7 +134,7 @@ void rendered_stretches(const app::Configuration& c) {
 }
 
 int for_drives(const std::vector<std::string>& set, const std::string& only,
-               const std::function<void(const Drive&, const app::Configuration&)>& each) {
+               const std::function<void(const RecordedSequence&, const app::Configuration&)>& each) {
   const app::Configuration c = app::load_configuration(std::nullopt, set);
   int n = 0;
   for (const char* name : test::kRecordedSequences) {

@@ -68,7 +68,8 @@ const Estimator& Course::estimator() const noexcept { return *parts_->estimator;
 
 void Course::note(std::uint64_t frame) {
   for (const EstimatorEvent& e : parts_->estimator->events()) events_.push_back({frame, e});
-  for (const CalibrationDecision& d : parts_->estimator->calibrations()) decisions_.push_back({frame, d});
+  for (const CalibrationDecision& d : parts_->estimator->calibrations())
+    if (!d.learnt) decisions_.push_back({frame, d});
 }
 
 void Course::give(const RigFrame& frame, const Transform& T_reference_left) {

@@ -46,6 +46,7 @@ class Course {
   void finish();
 
   [[nodiscard]] const std::vector<Answer>& answers() const noexcept { return answers_; }
+  /// About calibrations that were sought; not what the drive measured while it went on.
   [[nodiscard]] const std::vector<Decided>& decisions() const noexcept { return decisions_; }
   [[nodiscard]] const std::vector<Told>& events() const noexcept { return events_; }
   [[nodiscard]] const CalibrationDecision* accepted() const noexcept;  // the last one; null: none

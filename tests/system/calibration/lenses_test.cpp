@@ -58,13 +58,13 @@ TEST_P(RecordedLenses, aDriveCalibratedFromItselfIsRightInScaleAndTellsNoKnock) 
   EXPECT_LE(o.verified_at, 60);
   EXPECT_EQ(o.ok_before_verified, 0);
   EXPECT_GE(o.ok_since_verified, 0.95 * o.since_verified);
-  if (o.scale != 1 && o.segments_percent > 0) EXPECT_LE(o.held_out_px, 0.2);
+  EXPECT_LE(o.held_out_px, 0.25);
 }
 
 INSTANTIATE_TEST_SUITE_P(Drives, RecordedLenses,
                          testing::Values(Reach{"kitti06_51", 0.60, 0.030, 0.002}, Reach{"kitti01_51", 1.2, 0.065, 0.003},
                                          Reach{"kitti00_151", 1.9, 0.33, 0.009}, Reach{"euroc_mh01", 0, 0.0041, 0.008}),
-                         [](const auto& info) { return std::string(info.param.name); });
+                         [](const auto& drive) { return std::string(drive.param.name); });
 
 TEST(RecordedClaims, aNominalCalibrationThatIsWrongIsNeverOkAndMended) {
   const auto d = open_recorded("kitti01_51");

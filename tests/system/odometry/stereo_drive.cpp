@@ -63,7 +63,7 @@ std::string wrong_ok(const std::vector<Answer>& answers, const OkBound& bound) {
   double way = 0;
   for (const Answer& a : answers) {
     if (a.restarted) first = nullptr;
-    if (a.sample.status != PoseStatus::ok) continue;
+    if (!good(a.sample)) continue;
     if (first == nullptr) {
       first = previous = &a;
       way = 0;
@@ -83,7 +83,7 @@ std::string wrong_ok(const std::vector<Answer>& answers, const OkBound& bound) {
 
 int count_ok(const std::vector<Answer>& answers, std::size_t first, std::size_t last) {
   int n = 0;
-  for (const Answer& a : answers) n += a.sample.frame >= first && a.sample.frame < last && a.sample.status == PoseStatus::ok ? 1 : 0;
+  for (const Answer& a : answers) n += a.sample.frame >= first && a.sample.frame < last && good(a.sample) ? 1 : 0;
   return n;
 }
 

@@ -48,6 +48,11 @@ struct Replay {
   std::uint64_t allocations = 0;  // on sealed threads, from the first frame to the last
 };
 
+/// `ok`, or nothing stands against it but that the drive has not confirmed its calibration yet: what is asked of the odometry itself.
+[[nodiscard]] inline bool good(const PoseSample& s) noexcept {
+  return s.status == PoseStatus::ok || (s.status == PoseStatus::degraded && s.reason == Reason::unverified_calibration);
+}
+
 /// Every frame of the drive through a new estimator. `threads`: 1 or 2. `online`: it may find the rig's calibration anew.
 [[nodiscard]] Replay replay(const StereoDrive& drive, const Edit& edit = {}, int threads = 1, bool online = true);
 

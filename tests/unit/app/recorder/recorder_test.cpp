@@ -193,6 +193,7 @@ TEST(Recorder, whatTheDriveMeasuredWhileItWentOnIsKeptAndNoAttempt) {
   Recorder recorder(folder.path(), {});
   CalibrationDecision measured = decision(false);
   measured.cause = CalibrationCause::refinement;
+  measured.learnt = true;
   measured.judged_depth_m = 20;
   measured.depth_sigma_percent = 0.25;
   measured.depth_difference_percent = 1.5;
