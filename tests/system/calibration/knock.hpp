@@ -14,4 +14,8 @@ struct Knock {
 /// A rig that knows its calibration is knocked on the way and mended.
 void expect_noticed_and_mended(const Knock& knock);
 
+/// The same of one that is too small to be told, a depth error of less than half a percent: what the drive learns takes it up within
+/// `frames`, and no pose is wrong meanwhile.
+void expect_taken_up(const Knock& knock);
+
 }  // namespace vergence::test
