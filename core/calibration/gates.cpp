@@ -160,7 +160,7 @@ Gate ask_common_gates(const GateQuestion& q, const CalibrationOptions& o) noexce
     const Transform &found = s.rig.T_camera_left[c], &nominal = q.nominal->T_camera_left[c];
     if (found.t.dot(nominal.t) < 0) return Gate::cameras_swapped;
     if (s.out_of_step) return Gate::out_of_step;
-    if (s.changed_at > 0) return Gate::rig_changed;
+    if (q.may_have_changed && s.changed_at > 0) return Gate::rig_changed;
     if (angle_between(found.t, nominal.t) > o.max_direction_deg * kDegree) return Gate::implausible_direction;
     if (q.in_use != nullptr && log_so3(found.R * nominal.R.transpose()).norm() > o.max_rotation_deg * kDegree)
       return Gate::implausible_rotation;

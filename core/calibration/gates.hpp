@@ -64,6 +64,7 @@ struct GateQuestion {
   const TrackLog* log = nullptr;           // with the frames since the snapshot; null: there are none to hold it against
   bool lenses = false;                     // they were free: depth is judged by their joint covariance, not the transform's single sigmas
   double pixel_sigma = 0.15;               // px, of a tracked corner: judged_depth_m()
+  bool may_have_changed = true;            // a change of the rig among the frames used is believed
   bool must_be_better = true;              // than `in_use`, on frames that were not used
   bool window_full = false;                // max_frames were used, or no more will come: three times the sigmas are enough
 };

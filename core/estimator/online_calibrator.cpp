@@ -21,7 +21,7 @@ constexpr double kImageMargin = 12.0;  // px: nearer to the edge a track need no
 // calibration that does not fit, no knock; only a change is one.
 constexpr std::array kClaimed = {0.05, 0.05, 0.05, 0.1, 0.1, 0.1};
 // And of one that the drive has confirmed, until the monitor has measured its own: what the lens model leaves in one stretch.
-constexpr std::array kConfirmed = {1.5e-4, 3e-4, 1.5e-4, 0.002, 0.003, 0.006};
+constexpr std::array kConfirmed = {1.5e-4, 3e-4, 1.5e-4, 0.002, 0.002, 0.004};
 constexpr double kLearnedCovariance = 1.5;  // times the monitor's own: the scene it was measured in was one
 constexpr int kWatchedAgain = 10;           // moving frames that agree, after an outage in which the rig may have been knocked
 constexpr int kGraceFrames = 5;             // after a new reference: the monitor does not yet know how far matches spread
@@ -279,6 +279,7 @@ void OnlineCalibrator::seek(CalibrationCause cause, std::uint64_t onset, std::ui
   rejections_ = 0;
   gate_ = Gate::open;
   stale_ = solving_;
+  change_believed_ = false;
   log_.drop_before(onset);
   begin_segment();
 }
@@ -359,6 +360,7 @@ calibration::GateQuestion OnlineCalibrator::question(const calibration::RigSolut
   q.log = &log_;
   q.lenses = &found == &solved_.lenses;
   q.pixel_sigma = options_.odometry.pixel_sigma;
+  q.may_have_changed = !change_believed_;
   q.window_full = last || static_cast<std::size_t>(found.frames) >= static_cast<std::size_t>(options_.calibration.max_frames);
   return q;
 }
@@ -398,6 +400,7 @@ CalibrationDecision OnlineCalibrator::judge_sought(Stamp stamp, std::uint64_t nu
   } else if (gate_ == Gate::rig_changed) {
     log_.drop_before(found.changed_at);
     onset_ = found.changed_at;
+    change_believed_ = true;
     begin_segment();
   } else {
     // The same frames would say the same again; and what is rejected again and again is asked about less and less often.

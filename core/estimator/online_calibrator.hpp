@@ -134,6 +134,7 @@ class OnlineCalibrator {
   std::uint64_t sought_since_ = 0, onset_ = 0;  // frame numbers
   std::size_t logged_ = 0, wanted_ = 0;         // frames logged for what is sought or learnt; and how many the next solve needs
   std::size_t solved_frames_ = 0;               // of the segment, in the newest solve
+  bool change_believed_ = false;                // frames were left out for a change once: the rest are taken for one rig
   int rejections_ = 0;                          // for other reasons than a want of frames
   int frames_since_snapshot_ = 0;
   float waited_ms_ = 0;

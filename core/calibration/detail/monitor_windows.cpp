@@ -50,6 +50,7 @@ void Windows::reset(const MonitorOptions& options, const Mat5& covariance) noexc
   lambda_across_ = lambda_motion_ = now_fast_ = now_slow_ = life_slow_ = 0;
   looks_ = 0;
   over_ = 0;
+  newest_statistic_ = 0;
 }
 
 void Windows::expect_scatter(double bias_px) noexcept {
@@ -61,7 +62,8 @@ void Windows::renew_floor() noexcept { bias2_ = std::max(options_.bias_px * opti
 
 /// The block just closed against those before it.
 void Windows::measure_scatter() noexcept {
-  if (over_ > 0 || closed_ == 0) return;
+  // What may be a change of the rig is no scatter.
+  if (closed_ == 0 || newest_statistic_ > kRelease * options_.threshold) return;
   Evidence past;
   for (std::size_t i = 0; i < std::min<std::size_t>({closed_, kScatterBlocks, kBlocks}); ++i) past.add(block(i).evidence.across);
   scatter_.add(open_.evidence.across, past, lambda_across_);
@@ -207,6 +209,7 @@ Decision Windows::decide() noexcept {
     d.lag_sigma = solved.lag_sigma();
     lagging = lagging || stands_out(solved);
   }
+  newest_statistic_ = d.statistic;
   estimate(longest, &d.theta, &d.covariance);
   d.yaw_sigma = std::sqrt(d.covariance(kYaw, kYaw));
   const double limit = over_ > 0 ? kRelease * options_.threshold : options_.threshold;

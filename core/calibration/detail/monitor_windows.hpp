@@ -100,7 +100,8 @@ class Windows {
   double lambda_across_ = 0, lambda_motion_ = 0;
   double now_fast_ = 0, now_slow_ = 0, life_slow_ = 0;  // running means of the spreads
   std::uint64_t looks_ = 0;
-  int over_ = 0;  // frames in a row over the threshold
+  double newest_statistic_ = 0;  // of the last decide()
+  int over_ = 0;                 // frames in a row over the threshold
 };
 
 }  // namespace vergence::calibration::detail
