@@ -21,7 +21,7 @@ constexpr double kImageMargin = 12.0;  // px: nearer to the edge a track need no
 // calibration that does not fit, no knock; only a change is one.
 constexpr std::array kClaimed = {0.05, 0.05, 0.05, 0.1, 0.1, 0.1};
 // And of one that the drive has confirmed, until the monitor has measured its own: what the lens model leaves in one stretch.
-constexpr std::array kConfirmed = {1.5e-4, 3e-4, 1.5e-4, 0.002, 0.002, 0.004};
+constexpr std::array kConfirmed = {2e-4, 5e-4, 2e-4, 0.003, 0.003, 0.006};
 constexpr double kLearnedCovariance = 1.5;  // times the monitor's own: the scene it was measured in was one
 constexpr int kWatchedAgain = 10;           // moving frames that agree, after an outage in which the rig may have been knocked
 constexpr int kGraceFrames = 5;             // after a new reference: the monitor does not yet know how far matches spread
