@@ -156,7 +156,7 @@ struct BundleResult {
   bool has_covariance = false;                       // asked for, and the undamped system is positive definite
   double sigma0_squared = 0;                         // Σ w |ε|²/σ² over the degrees of freedom: 1 if inverse_sigma is true
   std::array<Mat6, kMaxCameras> covariance_white{};  // [k] of T_camera_left[k]: σ̂² H⁻¹
-  std::array<Mat6, kMaxCameras> covariance_noise{};  // cluster-robust, one cluster a track, times shared_errors; priors as they are
+  std::array<Mat6, kMaxCameras> covariance_noise{};  // cluster-robust (`cells`), times shared_errors; priors as they are
   std::array<Mat6, kMaxCameras> covariance_wide{};   // covariance_noise + what the held intrinsics may be off by
   std::array<std::array<double, kIntrinsicsSize>, kMaxCameras> intrinsics_sigma{};  // of the free ones, from covariance_noise
   RigCovariance covariance{};  // covariance_wide of all of θ_S together, with what is held but uncertain

@@ -18,8 +18,8 @@ struct HeldOut {
 inline constexpr std::size_t kHeldOutFrames = 12, kHeldOutMatches = 150;
 [[nodiscard]] HeldOut held_out(const TrackLog& log, std::uint64_t after, const RigCalibration& rig) noexcept;
 
-/// Whether `better` fits those frames better than `worse` by more than chance: mean over frames of the difference of medians against twice
-/// its standard error; `chance`: so many of them. Threads pure.
+/// Whether `better` fits those frames better than `worse` by more than chance: mean over frames of the difference of medians against
+/// `chance` of its standard errors; true, too, where hardly a frame can say. Threads pure.
 inline constexpr double kChance = 2.0, kRareChance = 3.0;  // of a question asked once; of one that is asked all the time
 [[nodiscard]] bool fits_better(const TrackLog& log, std::uint64_t after, const RigCalibration& better, const RigCalibration& worse,
                                double chance = kChance) noexcept;
@@ -64,7 +64,7 @@ struct GateQuestion {
   const TrackLog* log = nullptr;           // with the frames since the snapshot; null: there are none to hold it against
   bool lenses = false;                     // they were free: depth is judged by their joint covariance, not the transform's single sigmas
   double pixel_sigma = 0.15;               // px, of a tracked corner: judged_depth_m()
-  bool may_have_changed = true;            // a change of the rig among the frames used is believed
+  bool may_have_changed = true;            // a change of the rig among the frames used closes the gate; once, or a wrong one would for ever
   bool must_be_better = true;              // than `in_use`, on frames that were not used
   bool window_full = false;                // max_frames were used, or no more will come: three times the sigmas are enough
 };

@@ -22,7 +22,7 @@ enum class RigFreedom : std::uint8_t {
   lenses,      // also further cameras' intrinsics and distortion, and the left one's distortion (METHOD §6.1)
 };
 
-/// What to solve for and where to begin.
+/// What to solve for and where to begin. `known` and `told` are read during solve() only.
 struct RigSolveRequest {
   RigCalibration rig{};  // cameras, intrinsics, baseline; T_camera_left with from_rig
   RigFreedom freedom = RigFreedom::transforms;

@@ -61,13 +61,11 @@ void poses_to_shared(double* A, std::size_t ld, std::size_t first, std::size_t s
 /// The gradients of one lane's observations, straight from the camera model, and the robust weight of each.
 class TrackGradient {
  public:
-  TrackGradient(const BundleWorkspace& w, const BundleOptions& options, const BundleState& state, const System& system,
-                std::size_t cameras) noexcept
+  TrackGradient(const BundleWorkspace& w, const BundleOptions& options, const BundleState& state, const System& system) noexcept
       : w_(w),
         options_(options),
         state_(state),
         job_(system.job()),
-        cameras_(cameras),
         first_(static_cast<std::size_t>(w.free_poses) * kBlock),
         ld_(system.ld()) {}
 
@@ -142,7 +140,7 @@ class TrackGradient {
   const BundleOptions& options_;
   const BundleState& state_;
   const KernelJob& job_;
-  std::size_t cameras_, first_, ld_;
+  std::size_t first_, ld_;
 };
 
 /// What is known beside the tracks: its information in H, and the variance that it brings into the gradient (clusters of their own).
@@ -311,7 +309,7 @@ void shared_covariance(BundleWorkspace& w, const BundleProblem& problem, const B
   if (!inverse.allFinite()) return;
 
   poses_to_shared(A, ld, first, size);
-  TrackGradient gradient(w, options, state, system, problem.cameras.size());
+  TrackGradient gradient(w, options, state, system);
   const Shared meat = options.cells > 0 ? variance_by_cells(w, problem, options.cells, gradient, layout.size)
                                         : variance_by_tracks(w, problem, gradient, layout.size);
   const KnownBeside known = known_beside(layout, problem, options, state, system);
