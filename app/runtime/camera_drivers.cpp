@@ -88,7 +88,8 @@ class Openings {
  private:
   /// The serial of the next camera that nobody has or names.
   std::string next(const CameraRequest& request, CameraDriver& driver) {
-    for (const DeviceInfo& d : driver.enumerate()) {
+    const std::vector<DeviceInfo> found = driver.enumerate();
+    for (const DeviceInfo& d : found) {
       const std::pair who(request.driver, d.serial);
       if (std::find(taken_.begin(), taken_.end(), who) != taken_.end()) continue;
       taken_.push_back(who);
@@ -96,7 +97,7 @@ class Openings {
     }
     const std::string said = driver.complaint();
     throw InputError(fmt::format("{}: no {} camera is left to be it; {}; check cable and power{}", request.key, request.driver,
-                                 list_of(driver.enumerate()), said.empty() ? "" : ": " + said));
+                                 list_of(found), said.empty() ? "" : ": " + said));
   }
 
   std::map<std::string, std::unique_ptr<CameraDriver>> drivers_;

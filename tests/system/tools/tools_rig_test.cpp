@@ -150,6 +150,10 @@ TEST_F(ToolsRig, whatTheDoctorPrintsMends) {
 }
 
 TEST_F(ToolsRig, aPictureOfEachCameraOfEveryKind) {
+  // An emulated camera is plugged in when its emulator starts; it is there when the bus has found it.
+  const auto until_there = [](const char* driver, std::size_t count) {
+    return within(20, [&] { return cameras_of(devices(), driver) == count; });
+  };
   const auto snapped = [](const std::string& configuration, const std::string& more) {
     const TemporaryFolder folder;
     const Outcome o =
@@ -160,10 +164,12 @@ TEST_F(ToolsRig, aPictureOfEachCameraOfEveryKind) {
   };
   {
     Emulator usb("sim_usb_iidc", {"--cameras", "2", "--trigger-hz", "10"});
+    ASSERT_TRUE(until_there("iidc-usb", 2));
     snapped("iidc_usb.yaml", "");
   }
   {
     Emulator firewire("sim_1394", {"--cameras", "2"});
+    ASSERT_TRUE(until_there("iidc-1394", 2));
     std::this_thread::sleep_for(std::chrono::seconds(3));  // bus resets
     snapped("iidc_1394.yaml", "");
   }
