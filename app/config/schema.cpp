@@ -397,6 +397,10 @@ Group odometry() {
           "Added to it (in quadrature) for a patch seen from one depth further to the side than where it was cut: its slope is unknown.")
       .number("huber", &O::huber, 1, 10, "sigmas", "Residuals beyond this count less and less (Huber's weight).")
       .integer("window_keyframes", &O::window_keyframes, 3, 20, "keyframes", "Keyframes that are adjusted together with their points.")
+      .number(
+          "rig_turn_sigma", &O::rig_turn_sigma, 0, 0.05, "rad",
+          "What the turn between two cameras that shifts all disparities alike may be off by, where their calibration does not say less: "
+          "it is estimated with every window. 0: the calibration is held as exact.")
       .integer("window_steps", &O::window_steps, 1, 30, "steps", "Most solver steps of one such adjustment.")
       .number("keyframe_parallax", &O::keyframe_parallax, 0.005, 0.3, "rad",
               "Median turn of the rays to the points since the last keyframe that makes a new one.")

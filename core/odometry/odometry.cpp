@@ -7,11 +7,13 @@
 namespace vergence::odometry {
 namespace {
 
-constexpr int kSample = 100;                // points followed from far away: enough for MLESAC, a third of the work
-constexpr int kSampleInliers = 12;          // of the sample, below which the prediction was wrong
-constexpr double kSampleShare = 0.3;        // and of those found, which must agree
-constexpr int kRelocaliseInliers = 15;      // that agree on one pose: by chance of rough matches 8 do
-constexpr double kRecognisedShare = 0.5;    // of the points in view that must be found again where the way to a place was not followed
+constexpr int kSample = 100;               // points followed from far away: enough for MLESAC, a third of the work
+constexpr int kSampleInliers = 12;         // of the sample, below which the prediction was wrong
+constexpr double kSampleShare = 0.3;       // and of those found, which must agree
+constexpr double kLeastSampleShare = 0.2;  // where no start does better: a calibration that does not fit leaves a quarter of the far points
+constexpr double kSampleResidual = 3.0;    // px: worse than that is no agreement, however many take part in it
+constexpr int kRelocaliseInliers = 15;     // that agree on one pose: by chance of rough matches 8 do
+constexpr double kRecognisedShare = 0.5;   // of the points in view that must be found again where the way to a place was not followed
 constexpr std::uint8_t kMissesAllowed = 2;  // frames a point may be hidden
 constexpr std::uint16_t kFoundEnough = 2;   // rig frames, so four images, before a point holds a pose
 constexpr double kOutlier = 9.21;           // squared sigmas, two coordinates at 99 %
@@ -32,6 +34,11 @@ constexpr double kUnlinkedBand = 4.0;    // px: this frame's transform between t
 constexpr double kFreeMatchSigma = 2.0;  // sigmas of a tracked corner: patches are aligned without their shape being known
 constexpr double kWorstDirection = 0.1;  // rad, of t, to start from
 constexpr double kWorstRotation = 0.01;  // rad
+
+/// A pose of the sample that all points may be followed from.
+bool sample_agrees(const PoseFit& fit, double share) noexcept {
+  return fit.inliers >= kSampleInliers && fit.inliers > share * fit.given && fit.rms_px < kSampleResidual;
+}
 
 class StageClock {
  public:
@@ -119,15 +126,18 @@ PoseFit Odometry::track(const Transform& predicted, std::uint8_t structured, Fra
     const Transform* start;
     int coarsest;
   };
+  PoseFit best;
   for (const Attempt& a : {Attempt{&predicted, 2}, Attempt{&predicted, 3}, Attempt{&T_left_world_, 3}}) {
     front_end_.follow_sample(map_, *a.start, kSample, a.coarsest);
     clock.mark(Stage::track);
     fit = this->fit(*a.start, true);
     clock.mark(Stage::pose);
-    if (fit.inliers >= kSampleInliers && fit.inliers > kSampleShare * fit.given) break;
+    if (sample_agrees(fit, kLeastSampleShare) && fit.inliers > best.inliers) best = fit;
+    if (sample_agrees(fit, kSampleShare)) break;
   }
+  fit = best;
   bool doubtful = frames_lost_ > 0 || out->gap_s > 0;
-  if (fit.inliers < kSampleInliers || fit.inliers <= kSampleShare * fit.given) {
+  if (!sample_agrees(fit, kLeastSampleShare)) {
     fit = relocalise(out);
     if (!fit.found) return fit;
     doubtful = true;
@@ -253,7 +263,7 @@ void Odometry::make_keyframe(const PoseFit& fit, Stamp stamp, FrameOutcome* out)
   for (MapPoint& p : map_.points())
     if (p.followed()) p.seen[slot] = p.now;
   if (link_ == Link::linked) {
-    (void)window_.adjust(map_);
+    if (window_.adjust(map_).usable) std::copy_n(window_.T_camera_left().begin(), rig_.cameras, rig_.T_camera_left.begin());
   } else {
     (void)window_.adjust_unlinked(map_);
     out->scale = renew_scale(slot);
@@ -424,7 +434,7 @@ void Odometry::take_up_link() noexcept {
   rig_known_ = true;
   front_end_.rebuild_lenses();
   front_end_.set_band(options_.band_px);
-  window_.rebuild_cameras();
+  window_.take_up_rig();
 }
 
 FrameOutcome Odometry::process(const RigFrame& frame) noexcept {

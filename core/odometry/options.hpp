@@ -16,7 +16,9 @@ struct OdometryOptions {
   double parallax_sigma = 0.8;  // px more, in quadrature, for a patch seen from one depth further to the side: its slope is unknown, 0 … 10
   double huber = 2.0;           // robust threshold in sigmas, 1 … 10
   int window_keyframes = 10;    // poses in the adjusted window, 3 … 20
-  int window_steps = 5;         // solver steps a keyframe at most, 1 … 30
+  double rig_turn_sigma =
+      0.001;  // rad: what the turn between two cameras may be off by where their calibration does not say less, 0 … 0.05; 0: held as exact
+  int window_steps = 5;             // solver steps a keyframe at most, 1 … 30
   double keyframe_parallax = 0.03;  // rad: median turn of the rays since the last keyframe that makes a new one, 0.005 … 0.3
   double keyframe_tracked = 0.8;    // share of the last keyframe's points still tracked below which a new one is made, 0.1 … 1
   int min_inliers = 20;             // points under which a pose is not believed (`lost`), 6 … 200

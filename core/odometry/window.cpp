@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "core/calibration/health.hpp"
 #include "core/odometry/lens.hpp"
 
 namespace vergence::odometry {
@@ -12,6 +13,10 @@ constexpr std::size_t kSightingsAPoint = 10;  // on average, of all cameras; mor
 constexpr float kOutlier = 16.F;              // squared whitened residual, 2 degrees of freedom: 3e-4 of Gaussian errors
 constexpr int kSightingsOfPose = 3;           // that hold six degrees of freedom
 constexpr double kMinDepthOfPoint = 0.05;     // m in front of every camera that sees it
+constexpr double kJudgedDepth = 20.0;         // m, where a calibration is asked for its depth error
+constexpr double kHeldSigma = 1e-6;           // rad and m, of what a window does not estimate of a rig
+constexpr double kInflation =
+    100.0;  // of a variance: a lens field of 0.03 px that no model has does not average out over 2000 observations of 0.15 px
 
 }  // namespace
 
@@ -21,7 +26,7 @@ BundleCapacities WindowAdjuster::capacities(const OdometryOptions& options, cons
   c.poses = static_cast<std::size_t>(options.window_keyframes * rig.cameras);
   c.points = kMaxWindowPoints;
   c.observations = kMaxWindowPoints * kSightingsAPoint;
-  c.shared = false;
+  c.shared = options.rig_turn_sigma > 0;
   return c;
 }
 
@@ -38,11 +43,37 @@ WindowAdjuster::WindowAdjuster(const OdometryOptions& options, const RigCalibrat
   owner_ = BoundedVector<std::uint16_t>(arena.make<std::uint16_t>(c.points, "window points"));
   observations_ = BoundedVector<BundleObservation>(arena.make<BundleObservation>(c.observations, "window observations"));
   residuals_ = arena.make<float>(c.observations, "window residuals");
-  rebuild_cameras();
+  take_up_rig();
 }
 
-void WindowAdjuster::rebuild_cameras() noexcept {
+void WindowAdjuster::take_up_rig() noexcept {
   for (int k = 0; k < rig_.cameras; ++k) cameras_[static_cast<std::size_t>(k)] = Lens(rig_.intrinsics[static_cast<std::size_t>(k)]).ideal();
+  T_camera_left_ = rig_.T_camera_left;
+  doubt_rig();
+}
+
+void WindowAdjuster::doubt_rig() noexcept {
+  doubted_ = options_.rig_turn_sigma > 0;
+  if (!doubted_) return;
+  claimed_ = rig_;
+  claimed_.covariance = {};
+  for (int k = 1; k < rig_.cameras; ++k) {
+    const Vec3& t = rig_.T_camera_left[static_cast<std::size_t>(k)].t;
+    // The axis across baseline and view: a turn about it shifts all disparities alike.
+    const Vec3 axis = Vec3::UnitZ().cross(t);
+    if (!(axis.norm() > kHeldSigma)) {
+      doubted_ = false;
+      return;
+    }
+    // A turn of σ is a disparity of f σ, so a relative depth of z σ / b.
+    const double known = 0.01 * calibration::depth_error_percent(rig_, k, kJudgedDepth) * t.norm() / kJudgedDepth;
+    const double sigma = known > 0 ? std::min(known, options_.rig_turn_sigma) : options_.rig_turn_sigma;
+    const Mat3 turn = sigma * sigma * axis.normalized() * axis.normalized().transpose() + kHeldSigma * kHeldSigma * Mat3::Identity();
+    for (int i = 0; i < 3; ++i) {
+      for (int j = 0; j <= i; ++j) claimed_.covariance.set(extrinsic_row(k) + i, extrinsic_row(k) + j, turn(i, j));
+      claimed_.covariance.set(extrinsic_row(k) + 3 + i, extrinsic_row(k) + 3 + i, kHeldSigma * kHeldSigma);
+    }
+  }
 }
 
 void WindowAdjuster::gather(Map& map, bool linked) noexcept {
@@ -120,6 +151,7 @@ WindowOutcome WindowAdjuster::solve(BundleConfiguration configuration) noexcept 
   outcome.observations = static_cast<int>(observations_.size());
   if (poses_.size() < 2 || points_.empty()) return outcome;
   T_camera_left_ = rig_.T_camera_left;
+  if (configuration == BundleConfiguration::stereo_odometry && doubted_) configuration = BundleConfiguration::stereo_calibration;
 
   const auto n = static_cast<std::size_t>(rig_.cameras);
   BundleProblem problem;
@@ -136,6 +168,7 @@ WindowOutcome WindowAdjuster::solve(BundleConfiguration configuration) noexcept 
   how.loss_threshold = options_.huber;
   how.max_steps = options_.window_steps;
   how.cost_tolerance = 1e-4;
+  if (configuration == BundleConfiguration::stereo_calibration) how.shared_prior = {&claimed_, kInflation};
   const BundleResult result = adjuster_.solve(problem, how);
   outcome.termination = result.termination;
   outcome.usable = result.usable();

@@ -28,8 +28,8 @@ using test::RecordedSequence;
 using test::with_right_turned;
 
 void print(const std::string& drive_name, const std::string& what, const DriveOutcome& r) {
-  fmt::print("{:12s} {:34s} seg {:6.3f} %  ATE {:7.4f} m  scale {:.4f}  ok {:3d} of {:3d}", drive_name, what, r.segments_percent, r.ate_m,
-             r.scale, r.ok, r.frames);
+  fmt::print("{:12s} {:34s} seg {:6.3f} %  ATE {:7.4f} m, {:7.4f} m after a scale of {:.4f}  ok {:3d} of {:3d}", drive_name, what,
+             r.segments_percent, r.ate_m, r.ate_scaled_m, r.scale, r.ok, r.frames);
   fmt::print("  knocks told {}  verified at {:3d} ({:3.0f} % ok since)", r.knocks, r.verified_at,
              r.since_verified > 0 ? 100.0 * r.ok_since_verified / r.since_verified : 0.0);
   if (r.contradicted_at >= 0) fmt::print("  contradicted at {} by {:.1f} %", r.contradicted_at, r.contradicted_percent);
@@ -41,6 +41,9 @@ void print(const std::string& drive_name, const std::string& what, const DriveOu
 void run_drive(const RecordedSequence& d, const app::Configuration& c) {
   const StartingCalibration given = app::replayed_calibration(c, d.sequence, false);
   print(d.name, "from scratch, one pass", drive_recorded(d, d.sequence, c, test::blank(given)));
+  app::Configuration held = c;
+  held.online = 0;
+  print(d.name, "own calibration, held", drive_recorded(d, d.sequence, held, given));
   print(d.name, "own calibration, one pass", drive_recorded(d, d.sequence, c, given));
   const app::DriveCalibration found = app::calibrate_drive({d.sequence, c, 0, d.sequence.pairs.size(), {}, {}}, given);
   if (!found.rig) {

@@ -121,6 +121,7 @@ DriveOutcome drive_recorded(const RecordedSequence& d, const StereoSequence& seq
     const TrajectoryEvaluation e = evaluate(poses, d.truth, app::summary_evaluation_options());
     if (e.status == EvaluationStatus::ok) {
       row.ate_m = e.ate_se3.rmse;
+      row.ate_scaled_m = e.ate_sim3.rmse;
       row.scale = e.sim3.scale;
       if (e.segments[1].count > 0) row.segments_percent = 100 * e.segments[1].translation;
     }

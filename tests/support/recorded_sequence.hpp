@@ -40,9 +40,10 @@ struct DriveOutcome {
   int contradicted_at = -1, ok_before_verified = 0;
   int told_at = -1, mended_at = -1, ok_before_mended = 0;  // of a knock
   double contradicted_percent = 0;
-  double ate_m = 0, scale = 1, segments_percent = -1;  // −1: too short for segments of 10 to 50 m
-  double held_out_px = 0;                              // of the last decision that had frames held out
-  std::optional<RigCalibration> rig;                   // in use at the end
+  double ate_m = 0, ate_scaled_m = 0, scale = 1;  // ate_scaled_m: after one scale
+  double segments_percent = -1;                   // −1: too short for segments of 10 to 50 m
+  double held_out_px = 0;                         // of the last decision that had frames held out
+  std::optional<RigCalibration> rig;              // in use at the end
 };
 
 /// `knock_at`: the frame from which on the images are of a turned camera, if any.

@@ -12,6 +12,9 @@ namespace {
 // What correlated tracks bring in over their life, until it is measured: times the spread of the first frame, of the first look;
 // and the frames (looks) that guess weighs.
 constexpr double kFirstLife = 6.5, kFirstMotion = 2.0, kGuessFrames = 30, kGuessLooks = 4;
+// Of the slow error's variance, in looks at motion: two instants have it each, and along the baseline, where no epipolar line measures it,
+// real lenses leave more of it than across.
+constexpr double kMotionBias = 4;
 constexpr double kForgetAcross = 1.0 / 300, kForgetFast = 1.0 / 10, kForgetMotion = 1.0 / 40;  // a frame, a frame, a look
 constexpr double kLeastInflation = 0.3, kMostInflation = 200;  // below: sigmas claimed far too large; above: not a spread any more
 constexpr double kSpreadOutlier = 5;  // times the inflation: what one frame may count for at most, else one frame blinds the monitor
@@ -118,7 +121,7 @@ void Windows::push(const FrameEvidence& e) noexcept {
 Evidence Windows::effective(const TwoEvidences& sum) const noexcept {
   Evidence e;
   e.add(sum.across, 1.0 / (lambda_across_ + bias2_ * sum.across.n));
-  if (sum.motion.n > 0) e.add(sum.motion, 1.0 / (lambda_motion_ + bias2_ * sum.motion.n));
+  if (sum.motion.n > 0) e.add(sum.motion, 1.0 / (lambda_motion_ + kMotionBias * bias2_ * sum.motion.n));
   return e;
 }
 
