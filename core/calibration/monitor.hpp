@@ -88,7 +88,7 @@ struct MonitorVerdict {
 /// of the sightings that speaks of the epipolar distance is not used again. Over a window of frames
 ///
 ///     A = Σ A_f/μ,  g = Σ g_f/μ,  μ = λ + n b²/5σ²     λ: spread of whole tracks over the white one, measured; b: MonitorOptions::bias_px
-///                             (the floor n b²/5σ² four times in looks at motion: two instants, and along the baseline)
+///                             (what is measured of b² counts four times in looks at motion: two instants, along the baseline)
 ///     statistic = gᵀ (A + A C A)⁻¹ g                    C: covariance of the reference; κ held at 0
 ///
 /// The same against what the two minutes before the window have shown, whose covariance is smaller than the reference's: small knocks.

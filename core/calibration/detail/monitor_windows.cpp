@@ -12,7 +12,7 @@ namespace {
 // What correlated tracks bring in over their life, until it is measured: times the spread of the first frame, of the first look;
 // and the frames (looks) that guess weighs.
 constexpr double kFirstLife = 6.5, kFirstMotion = 2.0, kGuessFrames = 30, kGuessLooks = 4;
-// Of the slow error's variance, in looks at motion: two instants have it each, and along the baseline, where no epipolar line measures it,
+// Of the scatter's variance, in looks at motion: two instants have it each, and along the baseline, where no epipolar line measures it,
 // real lenses leave more of it than across.
 constexpr double kMotionBias = 4;
 constexpr double kForgetAcross = 1.0 / 300, kForgetFast = 1.0 / 10, kForgetMotion = 1.0 / 40;  // a frame, a frame, a look
@@ -61,7 +61,11 @@ void Windows::expect_scatter(double bias_px) noexcept {
   renew_floor();
 }
 
-void Windows::renew_floor() noexcept { bias2_ = std::max(options_.bias_px * options_.bias_px / kFixed, scatter_.variance()); }
+void Windows::renew_floor() noexcept {
+  const double least = options_.bias_px * options_.bias_px / kFixed;
+  bias2_ = std::max(least, scatter_.variance());
+  motion_bias2_ = std::max(least, kMotionBias * scatter_.variance());
+}
 
 /// The block just closed against those before it.
 void Windows::measure_scatter() noexcept {
@@ -121,7 +125,7 @@ void Windows::push(const FrameEvidence& e) noexcept {
 Evidence Windows::effective(const TwoEvidences& sum) const noexcept {
   Evidence e;
   e.add(sum.across, 1.0 / (lambda_across_ + bias2_ * sum.across.n));
-  if (sum.motion.n > 0) e.add(sum.motion, 1.0 / (lambda_motion_ + kMotionBias * bias2_ * sum.motion.n));
+  if (sum.motion.n > 0) e.add(sum.motion, 1.0 / (lambda_motion_ + motion_bias2_ * sum.motion.n));
   return e;
 }
 

@@ -88,7 +88,8 @@ class Windows {
 
   MonitorOptions options_{};
   Mat5 covariance_ = Mat5::Zero();
-  double bias2_ = 0;  // px², of a mode: the floor
+  double bias2_ = 0;         // px², of a mode: the floor
+  double motion_bias2_ = 0;  // and that of looks at motion
   BlockScatter scatter_{};
   std::array<std::size_t, 6> windows_{};
   std::size_t window_count_ = 0;
