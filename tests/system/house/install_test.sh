@@ -14,14 +14,16 @@ fail() {
 cmake --install "$build" --prefix "$work/usr" --component program >"$work/log" 2>&1 || fail "$(cat "$work/log")"
 program="$work/usr/bin/vergence"
 "$program" --version || fail "the installed program does not run"
-"$program" run "$work/usr/share/vergence/config/mock.yaml" --fast --duration 1 --quiet --out "$work/session" \
-  --set state_dir=none 2>"$work/err" || [ "$?" -le 1 ] || fail "$(cat "$work/err")"
+"$program" run "$work/usr/share/vergence/config/mock.yaml" --fast --duration 1 --quiet --out "$work/session" 2>"$work/err" ||
+  [ "$?" -le 1 ] || fail "$(cat "$work/err")"
 [ -f "$work/session/summary.json" ] || fail "the example left no session"
 [ -f "$work/usr/lib/udev/rules.d/99-vergence.rules" ] || fail "no udev rules"
 
 status=0
 "$program" calibrate --convert "$work/session/calibration.yaml" "$work/camchain.yaml" 2>"$work/err" || status=$?
-[ "$status" -eq 2 ] && grep -q 'the package vergence-checkerboard' "$work/err" || fail "without the tool: exit $status, $(cat "$work/err")"
+if [ "$status" -ne 2 ] || ! grep -q 'the package vergence-checkerboard' "$work/err"; then
+  fail "without the tool: exit $status, $(cat "$work/err")"
+fi
 cmake --install "$build" --prefix "$work/usr" --component checkerboard >"$work/log" 2>&1 || fail "$(cat "$work/log")"
 [ -x "$work/usr/libexec/vergence/vergence-checkerboard" ] || fail "the checkerboard tool is not installed"
 "$program" calibrate --convert "$work/session/calibration.yaml" "$work/camchain.yaml" || fail "the program does not find the tool it is installed with"
