@@ -2,8 +2,9 @@
 
 add_library(vergence_options INTERFACE)
 target_include_directories(vergence_options INTERFACE ${PROJECT_SOURCE_DIR})
+# United files shadow each other's names, which says nothing about either.
 target_compile_options(vergence_options INTERFACE
-  -Wall -Wextra -Wshadow $<$<COMPILE_LANGUAGE:CXX>:-Wconversion> $<$<COMPILE_LANGUAGE:C>:-Wconversion> -Werror)
+  -Wall -Wextra $<$<NOT:$<BOOL:${VERGENCE_UNITY}>>:-Wshadow> $<$<COMPILE_LANGUAGE:CXX>:-Wconversion> $<$<COMPILE_LANGUAGE:C>:-Wconversion> -Werror)
 # The same bits on every machine: no fused multiply-add behind our back on targets that have it.
 target_compile_options(vergence_options INTERFACE -ffp-contract=off)
 if(VERGENCE_SANITIZE)
