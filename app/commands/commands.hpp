@@ -1,13 +1,15 @@
 #pragma once
 #include <CLI/App.hpp>
 
+#include "app/commands/program.hpp"
 #include "app/runtime/errors.hpp"
 
 /// Every word of the command line: each function declares its options on `root` and, when its word was given,
 /// runs the command from the subcommand's callback and sets *exit_code. InputError may leave the callback.
 namespace vergence::app {
 
-void add_calibrate(CLI::App& root, ExitCode* exit_code);
+/// `words`: what the checkerboard tool is started with.
+void add_calibrate(CLI::App& root, const ProgramWords& words, ExitCode* exit_code);
 void add_devices(CLI::App& root, ExitCode* exit_code);
 void add_doctor(CLI::App& root, ExitCode* exit_code);
 void add_evaluate(CLI::App& root, ExitCode* exit_code);
@@ -17,7 +19,7 @@ void add_run(CLI::App& root, ExitCode* exit_code);
 void add_simulate(CLI::App& root, ExitCode* exit_code);
 void add_snap(CLI::App& root, ExitCode* exit_code);
 
-/// The whole program: parses, runs one command, turns every exception into one sentence on stderr and an exit code.
-[[nodiscard]] ExitCode run_program(int argc, const char* const* argv) noexcept;
+/// All of them: what `vergence` is made of.
+void add_all_commands(CLI::App& root, const ProgramWords& words, ExitCode* exit_code);
 
 }  // namespace vergence::app

@@ -1,3 +1,5 @@
+#include "app/commands/program.hpp"
+
 #include <algorithm>
 #include <cstdio>
 #include <exception>
@@ -6,7 +8,6 @@
 #include <string_view>
 #include <vector>
 
-#include "app/commands/commands.hpp"
 #include "app/runtime/nearest.hpp"
 #include "app/runtime/version.hpp"
 
@@ -68,20 +69,12 @@ void check_first_word(CLI::App& root, int argc, const char* const* argv) {
     throw InputError("unknown command \"" + word + "\"" + did_you_mean(word, words) + " ('vergence --help' lists the commands)");
 }
 
-ExitCode parse_and_run(int argc, const char* const* argv) {
+ExitCode parse_and_run(int argc, const char* const* argv, AddCommands add_commands) {
   CLI::App root("Stereo odometry that finds and keeps its own calibration", "vergence");
   ExitCode exit_code = ExitCode::done;
   root.set_version_flag("--version", "vergence " + std::string(version()));
   root.require_subcommand(1);
-  add_run(root, &exit_code);
-  add_replay(root, &exit_code);
-  add_evaluate(root, &exit_code);
-  add_report(root, &exit_code);
-  add_simulate(root, &exit_code);
-  add_devices(root, &exit_code);
-  add_doctor(root, &exit_code);
-  add_snap(root, &exit_code);
-  add_calibrate(root, &exit_code);
+  add_commands(root, {argv, static_cast<std::size_t>(argc)}, &exit_code);
   check_first_word(root, argc, argv);
   try {
     root.parse(argc, argv);
@@ -96,9 +89,9 @@ ExitCode parse_and_run(int argc, const char* const* argv) {
 
 }  // namespace
 
-ExitCode run_program(int argc, const char* const* argv) noexcept {
+ExitCode run_program(int argc, const char* const* argv, AddCommands add_commands) noexcept {
   try {
-    const ExitCode code = parse_and_run(argc, argv);
+    const ExitCode code = parse_and_run(argc, argv, add_commands);
     std::cout.flush();
     if (!std::cout) throw InputError("standard output cannot be written; is the disk full?");
     return code;

@@ -15,6 +15,7 @@
 #include "app/commands/drive_devices.hpp"
 #include "app/commands/rig_settings.hpp"
 #include "app/commands/terminal_text.hpp"
+#include "app/datasets/image_writer.hpp"
 #include "app/recorder/recorder.hpp"
 #include "app/runtime/signals.hpp"
 #include "app/runtime/version.hpp"

@@ -45,7 +45,8 @@ FrameDecoder::FrameDecoder(const StereoSequence& sequence, std::size_t first, st
       end_(next_index_ + std::min(count, sequence.pairs.size() - next_index_)),
       pool_(pool) {
   assert(pool.width() == sequence.calibration.intrinsics[0].width && pool.height() == sequence.calibration.intrinsics[0].height);
-  if (sequence.bayer) mosaic_.resize(FramePool::stride(pool.width()) * static_cast<std::size_t>(pool.height()));
+  if (sequence.bayer)
+    for (Workspace& work : workspaces_) work.mosaic.resize(FramePool::stride(pool.width()) * static_cast<std::size_t>(pool.height()));
   thread_ = std::thread([this] { work(); });
 }
 
@@ -108,11 +109,14 @@ DecodedPair FrameDecoder::decode(std::size_t index) {
   }
   newest_ = listed.stamp;
   any_ = true;
+  std::array<ImageFileStatus, 2> status{};
+  auto left = [&] { status[0] = load(listed.file[0], own_[0], &workspaces_[0]); };
+  auto right = [&] { status[1] = load(listed.file[1], own_[1], &workspaces_[1]); };
+  both_.run(TaskRef(left), TaskRef(right));
   for (std::size_t k = 0; k < 2; ++k) {
-    const ImageFileStatus status = load(listed.file[k], own_[k]);
-    if (status == ImageFileStatus::ok) continue;
+    if (status[k] == ImageFileStatus::ok) continue;
     const std::string name = !listed.file[k].empty() ? listed.file[k] : k == 0 ? "the left image" : "the right image";
-    note(&pair, kind_of(status), fmt::format("frame {} skipped: {} {}", index, name, to_phrase(status)));
+    note(&pair, kind_of(status[k]), fmt::format("frame {} skipped: {} {}", index, name, to_phrase(status[k])));
     return pair;
   }
   pair.slots = own_;
@@ -122,20 +126,20 @@ DecodedPair FrameDecoder::decode(std::size_t index) {
   return pair;
 }
 
-ImageFileStatus FrameDecoder::load(const std::string& name, FrameSlot slot) {
+ImageFileStatus FrameDecoder::load(const std::string& name, FrameSlot slot, Workspace* work) {
   if (name.empty()) return ImageFileStatus::missing;
   try {
-    if (const auto status = read_image_file(sequence_.root / name, &bytes_); status != ImageFileStatus::ok) return status;
+    if (const auto status = read_image_file(sequence_.root / name, &work->bytes); status != ImageFileStatus::ok) return status;
   } catch (const std::bad_alloc&) {  // a file too long for this machine's memory
     return ImageFileStatus::unreadable;
   }
   const ImageSize size{pool_.width(), pool_.height()};
   const std::size_t stride = FramePool::stride(size.width);
   std::uint8_t* out = pool_.writable(slot).data();
-  if (!sequence_.bayer) return decode_grey(bytes_, size, out, stride);
-  const ImageFileStatus status = decode_grey(bytes_, size, mosaic_.data(), stride);
+  if (!sequence_.bayer) return decode_grey(work->bytes, size, out, stride);
+  const ImageFileStatus status = decode_grey(work->bytes, size, work->mosaic.data(), stride);
   const auto step = static_cast<std::ptrdiff_t>(stride);
-  if (status == ImageFileStatus::ok) bayer_to_grey(mosaic_.data(), step, size.width, size.height, out, step);
+  if (status == ImageFileStatus::ok) bayer_to_grey(work->mosaic.data(), step, size.width, size.height, out, step);
   return status;
 }
 

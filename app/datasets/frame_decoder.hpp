@@ -9,6 +9,7 @@
 #include "app/datasets/image_file.hpp"
 #include "app/datasets/stereo_sequence.hpp"
 #include "app/runtime/doorbell.hpp"
+#include "app/runtime/thread_runner.hpp"
 #include "core/memory/frame_pool.hpp"
 #include "core/memory/ring.hpp"
 
@@ -25,7 +26,7 @@ struct DecodedPair {
   std::array<char, 256> note{};      // sentence, ends with 0
 };
 
-/// Reads and decodes the images of a sequence on a thread of its own, ahead of whoever consumes them.
+/// Reads and decodes the images of a sequence ahead of whoever consumes them, the two of a pair side by side on two threads of its own.
 ///
 /// A frame is skipped when an image is missing, unreadable or torn, when its size has changed since it was checked, or when its
 /// stamp is not later than every stamp before it. Skipped frames come through the ring in their turn, so events stay in order.
@@ -56,8 +57,13 @@ class FrameDecoder {
  private:
   void work();
   [[nodiscard]] DecodedPair decode(std::size_t index);
-  /// One image into the slot.
-  [[nodiscard]] ImageFileStatus load(const std::string& name, FrameSlot slot);
+  /// What one image takes on its way into a slot.
+  struct Workspace {
+    std::vector<std::uint8_t> bytes;   // of the file
+    std::vector<std::uint8_t> mosaic;  // of a raw sequence, rows as the pool's
+  };
+  /// One image into the slot. Two at once are fine, each with a workspace of its own.
+  [[nodiscard]] ImageFileStatus load(const std::string& name, FrameSlot slot, Workspace* work);
   /// Waits for a slot. False: stopped.
   [[nodiscard]] bool wait_for_slot(FrameSlot* slot) noexcept;
   /// Hands the pair over, waiting for room. False: stopped.
@@ -66,9 +72,8 @@ class FrameDecoder {
   const StereoSequence& sequence_;
   std::size_t next_index_, end_;
   FramePool& pool_;
-  std::vector<std::uint8_t> bytes_;   // of the file being decoded
-  std::vector<std::uint8_t> mosaic_;  // of a raw sequence, rows as the pool's
-  std::array<FrameSlot, 2> own_{};    // slots in hand: those of a skipped pair serve the next one
+  std::array<Workspace, 2> workspaces_;
+  std::array<FrameSlot, 2> own_{};  // slots in hand: those of a skipped pair serve the next one
   std::size_t own_count_ = 0;
   Stamp newest_{};
   bool any_ = false;  // newest_ means something
@@ -78,6 +83,7 @@ class FrameDecoder {
   Doorbell freed_;   // rung by the consumer: room in the ring, slots in the pool
   std::atomic<bool> stop_{false};
   std::atomic<bool> finished_{false};
+  ThreadRunner both_{ThreadRunner::Worker::of_reader};
   std::thread thread_;
 };
 

@@ -12,7 +12,7 @@ enum class ImageFileStatus : std::uint8_t {
   ok,
   missing,       // there is no such file
   unreadable,    // the system refuses to read it
-  not_an_image,  // no PNG, JPEG or BMP
+  not_an_image,  // no PNG, JPEG or BMP, or one that claims more pixels than any camera has
   torn,          // begins as an image and ends before it is complete, or its check sums fail
   undecodable,   // complete, and yet the decoder refuses it
   wrong_size,    // another width or height than asked for
@@ -37,8 +37,9 @@ struct ImageSize {
 /// its rows. → ok, not_an_image, torn
 [[nodiscard]] ImageFileStatus check_image(std::span<const std::uint8_t> bytes, ImageSize* size) noexcept;
 
-/// PNG or JPEG of any depth and colour, or 8-bit grey BMP → 8-bit grey, into size.height rows of `stride` bytes at `out`; no other copy is
-/// made. Not `ok`: content of `out` undefined. Throws nothing. → ok, not_an_image, torn, undecodable, wrong_size
+/// PNG of any depth and colour, JPEG of grey or three colours, or 8-bit grey BMP → 8-bit grey, into size.height rows of `stride` bytes at
+/// `out`; no other copy is made. Any number of threads at once. Not `ok`: content of `out` undefined. Throws nothing.
+/// → ok, not_an_image, torn, undecodable, wrong_size
 [[nodiscard]] ImageFileStatus decode_grey(std::span<const std::uint8_t> bytes, ImageSize size, std::uint8_t* out,
                                           std::size_t stride) noexcept;
 

@@ -34,7 +34,7 @@ void await_change(const std::atomic<std::uint32_t>& counter, std::uint32_t old) 
 
 }  // namespace
 
-ThreadRunner::ThreadRunner() : worker_([this] { work(); }) {}
+ThreadRunner::ThreadRunner(Worker worker) : worker_([this, worker] { work(worker); }) {}
 
 ThreadRunner::~ThreadRunner() {
   stop_ = true;
@@ -52,9 +52,9 @@ void ThreadRunner::run(TaskRef here, TaskRef there) noexcept {
   await_change(done_, before);
 }
 
-void ThreadRunner::work() noexcept {
-  (void)pthread_setname_np(pthread_self(), "vergence-front");
-  AllocationGuard::seal_thread();
+void ThreadRunner::work(Worker worker) noexcept {
+  (void)pthread_setname_np(pthread_self(), worker == Worker::of_estimator ? "vergence-front" : "vergence-right");
+  if (worker == Worker::of_estimator) AllocationGuard::seal_thread();
   for (std::uint32_t answered = 0;; ++answered) {
     await_change(asked_, answered);
     if (stop_) return;

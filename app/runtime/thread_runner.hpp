@@ -11,11 +11,13 @@ namespace vergence::app {
 ///
 /// Threads  run() from one thread. Both sides spin for kSpin before they sleep in the kernel: the two halves of a front end
 ///          end within microseconds of each other, and waking a sleeper costs more than that.
-/// Memory   None after construction; the worker is sealed (AllocationGuard).
+/// Memory   None after construction; an estimator's worker is sealed (AllocationGuard), a reader's is not: its tasks read files.
 /// Errors   The constructor throws std::system_error when no thread can be had. The destructor joins.
 class ThreadRunner final : public PairRunner {
  public:
-  ThreadRunner();
+  enum class Worker : std::uint8_t { of_estimator, of_reader };
+
+  explicit ThreadRunner(Worker worker = Worker::of_estimator);
   ~ThreadRunner() override;
   ThreadRunner(const ThreadRunner&) = delete;
   ThreadRunner& operator=(const ThreadRunner&) = delete;
@@ -23,7 +25,7 @@ class ThreadRunner final : public PairRunner {
   void run(TaskRef here, TaskRef there) noexcept override;
 
  private:
-  void work() noexcept;
+  void work(Worker worker) noexcept;
 
   const TaskRef* task_ = nullptr;        // of the run() in progress; published by asked_
   bool stop_ = false;                    // published by asked_

@@ -2,13 +2,6 @@
 
 #include <algorithm>
 #include <cctype>
-#include <cstdint>
-#include <fstream>
-
-#include <opencv2/core.hpp>
-#include <opencv2/imgcodecs.hpp>
-
-#include "app/runtime/errors.hpp"
 
 namespace vergence::app {
 
@@ -23,19 +16,6 @@ std::vector<std::string> camera_names(const Configuration& c, int cameras) {
     names.push_back(std::move(name));
   }
   return names;
-}
-
-void write_png(const std::filesystem::path& file, const ImageView& image) {
-  // imencode() only reads; cv::Mat has no const form.
-  const cv::Mat pixels(image.height, image.width, CV_8U, const_cast<std::uint8_t*>(image.data), static_cast<std::size_t>(image.stride));
-  std::vector<std::uint8_t> png;
-  constexpr int kQuick = 1;  // compression: images come several times a second
-  if (!cv::imencode(".png", pixels, png, {cv::IMWRITE_PNG_COMPRESSION, kQuick}))
-    throw InputError(file.string() + ": this image cannot be made a PNG");
-  std::ofstream out(file, std::ios::binary);
-  out.write(reinterpret_cast<const char*>(png.data()), static_cast<std::streamsize>(png.size()));
-  out.close();
-  if (!out) throw InputError(file.string() + ": cannot be written; is the disk full?");
 }
 
 }  // namespace vergence::app

@@ -2,8 +2,9 @@
 
 add_library(vergence_options INTERFACE)
 target_include_directories(vergence_options INTERFACE ${PROJECT_SOURCE_DIR})
+# United files shadow each other's names, which says nothing about either.
 target_compile_options(vergence_options INTERFACE
-  -Wall -Wextra -Wshadow $<$<COMPILE_LANGUAGE:CXX>:-Wconversion> $<$<COMPILE_LANGUAGE:C>:-Wconversion> -Werror)
+  -Wall -Wextra $<$<NOT:$<BOOL:${VERGENCE_UNITY}>>:-Wshadow> $<$<COMPILE_LANGUAGE:CXX>:-Wconversion> $<$<COMPILE_LANGUAGE:C>:-Wconversion> -Werror)
 # The same bits on every machine: no fused multiply-add behind our back on targets that have it.
 target_compile_options(vergence_options INTERFACE -ffp-contract=off)
 if(VERGENCE_SANITIZE)
@@ -11,13 +12,32 @@ if(VERGENCE_SANITIZE)
   target_link_options(vergence_options INTERFACE -fsanitize=${VERGENCE_SANITIZE})
 endif()
 
-# vergence_library(NAME SOURCES a.cpp b.cpp [DEPENDS targets…]): the library of one room.
-# Without sources it is a header-only room.
+# Reading headers is most of what a file costs to compile: several files at once read them once. Kernels that Highway compiles for many
+# instruction sets include themselves, and stay alone.
+function(vergence_unite name alone)
+  set_target_properties(${name} PROPERTIES UNITY_BUILD ON UNITY_BUILD_BATCH_SIZE 10)
+  foreach(source IN LISTS ARGN)
+    set(kernel)
+    if(NOT IS_ABSOLUTE ${source})
+      file(STRINGS ${CMAKE_CURRENT_SOURCE_DIR}/${source} kernel REGEX "hwy/foreach_target.h" LIMIT_COUNT 1)
+    endif()
+    if(kernel OR source IN_LIST alone OR IS_ABSOLUTE ${source})
+      set_source_files_properties(${source} PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON)
+    endif()
+  endforeach()
+endfunction()
+
+# vergence_library(NAME [UNITY] SOURCES a.cpp b.cpp [ALONE b.cpp …] [DEPENDS targets…]): the library of one room.
+# Without sources it is a header-only room. UNITY: with VERGENCE_UNITY its files are compiled together, but for those that are ALONE because
+# they use a name of another's unnamed namespace (a test finds them).
 function(vergence_library name)
-  cmake_parse_arguments(ARG "" "" "SOURCES;DEPENDS" ${ARGN})
+  cmake_parse_arguments(ARG "UNITY" "" "SOURCES;ALONE;DEPENDS" ${ARGN})
   if(ARG_SOURCES)
     add_library(${name} STATIC ${ARG_SOURCES})
     target_link_libraries(${name} PUBLIC vergence_options ${ARG_DEPENDS})
+    if(ARG_UNITY AND VERGENCE_UNITY)
+      vergence_unite(${name} "${ARG_ALONE}" ${ARG_SOURCES})
+    endif()
   else()
     add_library(${name} INTERFACE)
     target_link_libraries(${name} INTERFACE vergence_options ${ARG_DEPENDS})

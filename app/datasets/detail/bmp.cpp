@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "app/datasets/detail/image_size.hpp"
+
 namespace vergence::app::detail {
 namespace {
 
@@ -10,7 +12,6 @@ using Bytes = std::span<const std::uint8_t>;
 // Where things stand: the file header of 14 bytes, then the information header.
 constexpr std::size_t kPixelsAt = 10, kHeaderSize = 14, kWidth = 18, kHeight = 22, kBits = 28, kCompression = 30, kColours = 46;
 constexpr std::size_t kFileHeader = 14, kLeastHeader = 40, kWholeHead = kFileHeader + kLeastHeader;
-constexpr std::uint32_t kMaxSide = 1U << 15;  // px
 
 std::uint32_t u16(Bytes b, std::size_t at) noexcept { return b[at] | std::uint32_t{b[at + 1]} << 8U; }
 std::uint32_t u32(Bytes b, std::size_t at) noexcept { return u16(b, at) | u16(b, at + 2) << 16U; }
@@ -38,9 +39,7 @@ ImageFileStatus bmp_size(Bytes b, ImageSize* size) noexcept {
   if (b.size() < kBmpHead) return ImageFileStatus::torn;
   if (u32(b, kHeaderSize) < kLeastHeader) return ImageFileStatus::not_an_image;  // an older kind, or no BMP at all
   const std::uint32_t width = u32(b, kWidth), height = top_down(b) ? 0U - u32(b, kHeight) : u32(b, kHeight);
-  if (width == 0 || height == 0 || width > kMaxSide || height > kMaxSide) return ImageFileStatus::not_an_image;
-  *size = {static_cast<int>(width), static_cast<int>(height)};
-  return ImageFileStatus::ok;
+  return accept_size(width, height, size);
 }
 
 ImageFileStatus check_bmp(Bytes b) noexcept {

@@ -1,8 +1,13 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstdlib>
 #include <filesystem>
+#include <fstream>
+#include <iterator>
 #include <string>
+#include <tuple>
+#include <utility>
 #include <vector>
 
 #include <fmt/format.h>
@@ -183,6 +188,23 @@ TEST_F(Calibrate, viewsNeverGoIntoAFolderThatHasSomething) {
       VERGENCE_SOURCE_DIR, file("m.yaml").string(), file("left").string()));
   EXPECT_EQ(o.code, 2) << o.err;
   EXPECT_NE(o.err.find("is not empty"), std::string::npos) << o.err;
+}
+
+TEST_F(Calibrate, withoutTheToolTheSentenceNamesItsPackageAndADriveNeedsNone) {
+  fs::copy_file(VERGENCE_PROGRAM, file("alone"));
+  const auto alone = [](const std::string& arguments) {
+    const std::string command = fmt::format("'{}' {} >'{}' 2>&1 </dev/null", file("alone").string(), arguments, file("said").string());
+    const int status = std::system(command.c_str());
+    std::ifstream in(file("said"));
+    return std::pair(WIFEXITED(status) ? WEXITSTATUS(status) : -1, std::string(std::istreambuf_iterator<char>(in), {}));
+  };
+  auto [code, said] = alone("calibrate --quiet" + images() + kArguments + " --out '" + file("none.yaml").string() + "'");
+  EXPECT_EQ(code, 2);
+  EXPECT_EQ(sentences(said), 1U) << said;
+  EXPECT_NE(said.find("the package vergence-checkerboard"), std::string::npos) << said;
+  std::tie(code, said) = alone("calibrate --drive nowhere --format folder --out '" + file("none.yaml").string() + "'");
+  EXPECT_EQ(code, 2);
+  EXPECT_EQ(said.find("vergence-checkerboard"), std::string::npos) << said;
 }
 
 }  // namespace

@@ -37,8 +37,10 @@ WORLDS_OF_THEIR_OWN = ("firmware_iface/trigger/board/", "tests/rigs/kernel/")
 
 # Libraries (the include's first folder) → where they may be used.
 LIBRARIES = {
-    "opencv2": ("app/", "tests/"),
-    "opencv": ("app/", "tests/"),
+    "opencv2": ("app/calibration/", "tests/"),  # the checkerboard tool; the program needs none of it
+    "opencv": ("app/calibration/", "tests/"),
+    "png.h": ("app/datasets/", "tests/"),
+    "jpeglib.h": ("app/datasets/", "tests/"),
     "Eigen": ("app/", "core/", "drivers/", "tests/"),
     "hwy": ("core/", "drivers/mock/", "tests/"),
     "GeographicLib": ("core/comparison/", "drivers/mock/", "tests/"),
@@ -228,7 +230,10 @@ def self_test():
         ("tests/rigs/kernel/a.c", '#include "core.h"', False),
         ("tests/rigs/emulators/a.c", '#include "core.h"', True),
         ("app/report/a.cpp", '#include "core/estimator/estimator.hpp"', False),
-        ("app/report/a.cpp", "#include <opencv2/core.hpp>", False),
+        ("app/calibration/a.cpp", "#include <opencv2/core.hpp>", False),
+        ("app/report/a.cpp", "#include <opencv2/core.hpp>", True),
+        ("app/datasets/a.cpp", "#include <png.h>", False),
+        ("app/report/a.cpp", "#include <png.h>", True),
         ("app/report/a.cpp", '#include "tests/support/shared_data.hpp"', True),
         ("tests/unit/core/a.cpp", '#include "core/b/detail/inner.hpp"', False),
         ("tests/unit/core/a.cpp", "#include <ceres/ceres.h>", False),

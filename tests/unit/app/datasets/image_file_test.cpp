@@ -5,6 +5,8 @@
 #include <fstream>
 #include <opencv2/imgproc.hpp>
 
+#include "app/datasets/image_writer.hpp"
+#include "app/runtime/errors.hpp"
 #include "tests/unit/app/datasets/tiny_drive.hpp"
 
 namespace vergence::app {
@@ -161,6 +163,20 @@ TEST_F(ImageFile, theHeadTellsTheSizeOfPngAndJpeg) {
     ASSERT_EQ(read_image_size(write(name), &size), ImageFileStatus::ok) << name;
     EXPECT_EQ(size, kSize) << name;
   }
+}
+
+TEST_F(ImageFile, aPngThatIsWrittenHoldsExactlyThePixelsAndNoPadding) {
+  std::vector<std::uint8_t> pixels(kStride * kTinyHeight, 77);
+  for (int y = 0; y < kTinyHeight; ++y)
+    for (int x = 0; x < kTinyWidth; ++x)
+      pixels[static_cast<std::size_t>(y) * kStride + static_cast<std::size_t>(x)] = test::tiny_pixel(x, y, 9);
+  const ImageView image{pixels.data(), kTinyWidth, kTinyHeight, static_cast<std::ptrdiff_t>(kStride)};
+  write_png(folder_ / "w.png", image);
+  std::vector<std::uint8_t> out(kStride * kTinyHeight, 77);
+  ASSERT_EQ(decode_grey(bytes_of(folder_ / "w.png"), kSize, out.data(), kStride), ImageFileStatus::ok);
+  EXPECT_EQ(out, pixels);
+  EXPECT_THROW(write_png(folder_ / "no such folder/w.png", image), InputError);
+  EXPECT_THROW(write_png("/dev/full", image), InputError);
 }
 
 }  // namespace

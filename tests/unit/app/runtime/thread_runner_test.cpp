@@ -4,6 +4,7 @@
 
 #include <chrono>
 #include <thread>
+#include <vector>
 
 #include "core/memory/allocation_guard.hpp"
 
@@ -71,6 +72,18 @@ TEST(ThreadRunner, allocatesNothingPerRunAndSealsItsWorker) {
     for (int i = 0; i < 1000; ++i) runner.run(TaskRef(nothing), TaskRef(look));
   }
   EXPECT_TRUE(worker_sealed);
+  EXPECT_EQ(AllocationGuard::allocations_after_seal(), before);
+}
+
+TEST(ThreadRunner, theWorkerOfAReaderMayAllocate) {
+  if (!AllocationGuard::available()) GTEST_SKIP() << "needs the allocation hooks, which sanitizer builds leave out";
+  ThreadRunner runner(ThreadRunner::Worker::of_reader);
+  const auto before = AllocationGuard::allocations_after_seal();
+  std::vector<int> grown;
+  auto here = [] {};
+  auto there = [&] { grown.resize(100); };
+  runner.run(TaskRef(here), TaskRef(there));
+  EXPECT_EQ(grown.size(), 100U);
   EXPECT_EQ(AllocationGuard::allocations_after_seal(), before);
 }
 

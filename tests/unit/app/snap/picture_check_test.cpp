@@ -6,11 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "app/datasets/image_file.hpp"
-#include "app/runtime/errors.hpp"
 #include "app/snap/picture_files.hpp"
 #include "core/math/random.hpp"
-#include "tests/support/temporary_folder.hpp"
 
 namespace vergence::app {
 namespace {
@@ -152,18 +149,6 @@ TEST(Exchange, nothingIsSaidWithoutEnoughToGoBy) {
   EXPECT_FALSE(look_exchanged(horizontal_shift(one.view(), one.view())));
   EXPECT_FALSE(look_exchanged(horizontal_shift(Picture(8, 8, 9).view(), Picture(8, 8, 9).view()))) << "smaller than a patch";
   EXPECT_FALSE(look_exchanged(horizontal_shift(Picture(1, 1, 9).view(), Picture(1, 1, 9).view())));
-}
-
-TEST(PictureFiles, aPngHoldsExactlyThePixels) {
-  const test::TemporaryFolder folder;
-  const Picture p = squares(320, 240, 5, [](int) { return 0; });
-  write_png(folder / "a.png", p.view());
-  std::vector<std::uint8_t> bytes, pixels(320 * 240);
-  ASSERT_EQ(read_image_file(folder / "a.png", &bytes), ImageFileStatus::ok);
-  ASSERT_EQ(decode_grey(bytes, {320, 240}, pixels.data(), 320), ImageFileStatus::ok);
-  for (int y = 0; y < 240; ++y)
-    for (int x = 0; x < 320; ++x) ASSERT_EQ(pixels[static_cast<std::size_t>(y * 320 + x)], p.view().at(x, y));
-  EXPECT_THROW(write_png(folder / "no such folder/a.png", p.view()), InputError);
 }
 
 TEST(PictureFiles, namesOfCamerasAreNamesOfFiles) {

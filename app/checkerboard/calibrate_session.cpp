@@ -1,4 +1,4 @@
-#include "app/commands/calibrate_session.hpp"
+#include "app/checkerboard/calibrate_session.hpp"
 
 #include <chrono>
 #include <iostream>

@@ -7,11 +7,11 @@
 #include <thread>
 
 #include <fmt/format.h>
-#include <opencv2/imgcodecs.hpp>
 
 #include "app/calibration/view_collector.hpp"
-#include "app/commands/calibrate_session.hpp"
+#include "app/checkerboard/calibrate_session.hpp"
 #include "app/commands/drive_devices.hpp"
+#include "app/datasets/image_writer.hpp"
 #include "app/runtime/live_source.hpp"
 #include "app/runtime/signals.hpp"
 
@@ -118,13 +118,11 @@ class Collection {
       const ImageView image = source_->image(set, k);
       if (image.empty()) continue;
       const fs::path file = *request_.keep_views / fmt::format("{}_{:03}.png", rig_.names[static_cast<std::size_t>(k)], number);
-      const cv::Mat pixels(image.height, image.width, CV_8U, const_cast<std::uint8_t*>(image.data), static_cast<std::size_t>(image.stride));
-      bool written = false;
       try {
-        written = cv::imwrite(file.string(), pixels);
-      } catch (const cv::Exception&) {  // said below
+        write_png(file, image);
+        continue;
+      } catch (const InputError&) {  // said below
       }
-      if (written) continue;
       const std::lock_guard lock(mutex_);
       sentences_.push_back(file.string() + ": cannot be written; the view is used all the same");
     }

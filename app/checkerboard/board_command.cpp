@@ -1,0 +1,86 @@
+#include "app/checkerboard/board_command.hpp"
+
+#include <iostream>
+#include <memory>
+
+#include <fmt/format.h>
+
+#include "app/calibration/conversion.hpp"
+#include "app/checkerboard/calibrate_session.hpp"
+#include "app/commands/calibrate_options.hpp"
+
+namespace vergence::app {
+namespace {
+
+CameraModelKind parse_model(const std::string& word) {
+  return word == "equidistant" ? CameraModelKind::pinhole_equidistant : CameraModelKind::pinhole_radtan;
+}
+
+CalibrateRequest request_of(const CalibrateOptions& a) {
+  if (a.board.empty()) throw InputError("--board is missing: the board's inner corners along and down, like 9x6");
+  if (!a.square) throw InputError("--square is missing: the side of a square in metres, like 0.025");
+  if (a.out.empty()) throw InputError("--out is missing: the calibration.yaml to write");
+  if (a.baseline && !(*a.baseline > 0 && *a.baseline < 100)) throw InputError("--baseline needs metres, more than 0 and less than 100");
+  if (a.sixth_order && a.model == "equidistant") throw InputError("--k3 belongs to radtan; equidistant has k1 to k4");
+  CalibrateRequest r;
+  r.board = parse_checkerboard(a.board, *a.square);
+  r.model = parse_model(a.model);
+  r.sixth_order = a.sixth_order;
+  r.out = a.out;
+  r.measured_baseline = a.baseline;
+  if (a.keep_views) r.keep_views = *a.keep_views;
+  r.json = a.json;
+  r.quiet = a.common.quiet;
+  check_writable(r.out);
+  return r;
+}
+
+ExitCode convert(const CalibrateOptions& a) {
+  ConversionRequest r;
+  r.in = a.convert[0];
+  r.out = a.convert[1];
+  if (!a.format.empty()) r.format = parse_format(a.format);
+  if (!a.size.empty()) r.size = parse_size(a.size);
+  for (const std::string& sentence : convert_calibration(r)) std::cerr << "vergence: " << sentence << '\n';
+  return ExitCode::done;
+}
+
+ExitCode calibrate_board_live(const CalibrateOptions& a) {
+  if (!a.right.empty() || !a.more_cameras.empty())
+    throw InputError("calibrate: a CONFIG has its cameras; --right and --camera go with --left");
+  return calibrate_live(request_of(a), a.common.configuration(a.configuration));
+}
+
+ExitCode calibrate_board_images(const CalibrateOptions& a) {
+  if (a.keep_views) throw InputError("--keep-views is for live views; image files are kept as they are");
+  if (a.right.empty() && !a.more_cameras.empty()) throw InputError("--camera is for a third and fourth camera; --right comes first");
+  std::vector<std::vector<std::string>> patterns{a.left};
+  if (!a.right.empty()) patterns.push_back(a.right);
+  for (const std::string& pattern : a.more_cameras) patterns.push_back({pattern});
+  if (patterns.size() > kMaxCameras)
+    throw InputError(fmt::format("a rig has up to {} cameras, {} are given", kMaxCameras, patterns.size()));
+  return calibrate_images(request_of(a), patterns);
+}
+
+ExitCode run(const CalibrateOptions& a) {
+  switch (a.way()) {
+    case CalibrateWay::board_images:
+      return calibrate_board_images(a);
+    case CalibrateWay::board_live:
+      return calibrate_board_live(a);
+    case CalibrateWay::convert:
+      return convert(a);
+    case CalibrateWay::drive:
+      break;
+  }
+  throw InputError("calibrate --drive needs no board: 'vergence calibrate' does it");
+}
+
+}  // namespace
+
+void add_board_calibration(CLI::App& root, ExitCode* exit_code) {
+  const auto a = std::make_shared<CalibrateOptions>();
+  a->declare(root)->callback([a, exit_code] { *exit_code = run(*a); });
+}
+
+}  // namespace vergence::app

@@ -1,0 +1,121 @@
+#include "app/datasets/detail/jpeg.hpp"
+
+#include <algorithm>
+#include <csetjmp>
+#include <cstdio>  // jpeglib.h leans on it
+
+#include <jpeglib.h>
+
+#include <jerror.h>
+
+#include "app/datasets/detail/image_size.hpp"
+
+namespace vergence::app::detail {
+namespace {
+
+using Bytes = std::span<const std::uint8_t>;
+
+constexpr int kMostScans = 100;  // a progressive image has ten; each costs a pass over all of it
+
+std::uint32_t u16(Bytes b, std::size_t at) noexcept { return (std::uint32_t{b[at]} << 8U) | b[at + 1]; }
+
+bool is_frame_header(std::uint8_t marker) noexcept {  // SOF0 … SOF15 without DHT, JPG, DAC
+  return marker >= 0xc0 && marker <= 0xcf && marker != 0xc4 && marker != 0xc8 && marker != 0xcc;
+}
+
+/// libjpeg's error handler and progress monitor, and where they leave to.
+struct Decoder {
+  jpeg_decompress_struct jpeg{};
+  jpeg_error_mgr errors{};
+  jpeg_progress_mgr progress{};
+  std::jmp_buf leave{};
+  bool damaged = false;
+};
+
+Decoder* decoder_of(j_common_ptr jpeg) noexcept { return static_cast<Decoder*>(jpeg->client_data); }
+
+[[noreturn]] void fail(j_common_ptr jpeg) { std::longjmp(decoder_of(jpeg)->leave, 1); }
+
+/// The decoder goes on after these with grey blocks, or blocks in the wrong place.
+bool is_damage(int code) noexcept {
+  switch (code) {
+    case JWRN_HIT_MARKER:
+    case JWRN_HUFF_BAD_CODE:
+    case JWRN_ARITH_BAD_CODE:
+    case JWRN_JPEG_EOF:
+    case JWRN_MUST_RESYNC:
+    case JWRN_NOT_SEQUENTIAL:
+    case JWRN_BOGUS_PROGRESSION:
+      return true;
+    default:
+      return false;
+  }
+}
+
+void listen(j_common_ptr jpeg, int level) {
+  if (level >= 0 || !is_damage(jpeg->err->msg_code)) return;
+  decoder_of(jpeg)->damaged = true;
+  fail(jpeg);
+}
+
+void count_scans(j_common_ptr jpeg) {
+  if (decoder_of(jpeg)->jpeg.input_scan_number > kMostScans) fail(jpeg);
+}
+
+/// Between setjmp and the handlers' longjmp nothing may stand that has a destructor.
+bool read_rows(Decoder* d, Bytes bytes, ImageSize size, std::uint8_t* out, std::size_t stride) noexcept {
+  if (setjmp(d->leave) != 0) return false;
+  jpeg_create_decompress(&d->jpeg);
+  d->jpeg.client_data = d;
+  d->jpeg.progress = &d->progress;
+  jpeg_mem_src(&d->jpeg, bytes.data(), bytes.size());
+  if (jpeg_read_header(&d->jpeg, TRUE) != JPEG_HEADER_OK) return false;
+  const auto width = static_cast<JDIMENSION>(size.width), height = static_cast<JDIMENSION>(size.height);
+  if (d->jpeg.image_width != width || d->jpeg.image_height != height) return false;
+  d->jpeg.out_color_space = JCS_GRAYSCALE;
+  (void)jpeg_start_decompress(&d->jpeg);
+  if (d->jpeg.output_components != 1 || d->jpeg.output_width != width || d->jpeg.output_height != height) return false;
+  while (d->jpeg.output_scanline < height) {
+    JSAMPROW row = out + d->jpeg.output_scanline * stride;
+    (void)jpeg_read_scanlines(&d->jpeg, &row, 1);
+  }
+  return true;
+}
+
+}  // namespace
+
+bool is_jpeg(Bytes b) noexcept { return b.size() >= 3 && b[0] == 0xff && b[1] == 0xd8 && b[2] == 0xff; }
+
+ImageFileStatus jpeg_size(Bytes b, ImageSize* size) noexcept {
+  std::size_t at = 2;
+  while (at + 9 <= b.size()) {
+    if (b[at] != 0xff) return ImageFileStatus::torn;
+    if (b[at + 1] == 0xff) {  // fill byte
+      ++at;
+      continue;
+    }
+    if (is_frame_header(b[at + 1])) return accept_size(u16(b, at + 7), u16(b, at + 5), size);
+    at += 2 + std::max<std::size_t>(2, u16(b, at + 2));
+  }
+  return ImageFileStatus::torn;
+}
+
+ImageFileStatus check_jpeg(Bytes b) noexcept {
+  std::size_t end = b.size();
+  while (end > 2 && b[end - 1] == 0) --end;
+  return b[end - 2] == 0xff && b[end - 1] == 0xd9 ? ImageFileStatus::ok : ImageFileStatus::torn;
+}
+
+ImageFileStatus decode_jpeg(Bytes bytes, ImageSize size, std::uint8_t* out, std::size_t stride) noexcept {
+  Decoder decoder;
+  decoder.jpeg.err = jpeg_std_error(&decoder.errors);
+  decoder.jpeg.client_data = &decoder;  // jpeg_create_decompress() keeps it
+  decoder.errors.error_exit = fail;
+  decoder.errors.emit_message = listen;
+  decoder.progress.progress_monitor = count_scans;
+  const bool done = read_rows(&decoder, bytes, size, out, stride);
+  jpeg_destroy_decompress(&decoder.jpeg);
+  return done ? ImageFileStatus::ok : decoder.damaged ? ImageFileStatus::torn : ImageFileStatus::undecodable;
+}
+
+}  // namespace vergence::app::detail

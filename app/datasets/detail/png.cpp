@@ -1,0 +1,120 @@
+#include "app/datasets/detail/png.hpp"
+
+#include <png.h>
+#include <zlib.h>
+
+#include <algorithm>
+#include <array>
+#include <csetjmp>
+#include <cstring>
+
+#include "app/datasets/detail/image_size.hpp"
+
+namespace vergence::app::detail {
+namespace {
+
+using Bytes = std::span<const std::uint8_t>;
+
+constexpr std::array<std::uint8_t, 8> kSignature{0x89, 'P', 'N', 'G', '\r', '\n', 0x1a, '\n'};
+
+std::uint32_t u32(Bytes b, std::size_t at) noexcept {
+  return (std::uint32_t{b[at]} << 24U) | (std::uint32_t{b[at + 1]} << 16U) | (std::uint32_t{b[at + 2]} << 8U) | b[at + 3];
+}
+
+struct Source {
+  Bytes bytes;
+  std::size_t at = 0;
+};
+
+void read_on(png_structp png, png_bytep to, std::size_t n) {
+  auto* source = static_cast<Source*>(png_get_io_ptr(png));
+  if (n > source->bytes.size() - source->at) png_error(png, "ends");
+  std::memcpy(to, &source->bytes[source->at], n);
+  source->at += n;
+}
+
+[[noreturn]] void fail(png_structp png, png_const_charp /*what*/) { png_longjmp(png, 1); }
+void ignore(png_structp /*png*/, png_const_charp /*what*/) noexcept {}
+
+/// libpng's two structures, released together.
+struct Reader {
+  png_structp png = nullptr;
+  png_infop info = nullptr;
+
+  Reader() noexcept : png(png_create_read_struct(PNG_LIBPNG_VER_STRING, nullptr, fail, ignore)) {
+    if (png != nullptr) info = png_create_info_struct(png);
+  }
+  ~Reader() { png_destroy_read_struct(&png, &info, nullptr); }
+  Reader(const Reader&) = delete;
+  Reader& operator=(const Reader&) = delete;
+};
+
+/// Everything to 8-bit grey.
+void ask_for_grey(png_structp png, png_infop info) {
+  const int colours = png_get_color_type(png, info), depth = png_get_bit_depth(png, info);
+  if (depth == 16) png_set_strip_16(png);
+  png_set_strip_alpha(png);
+  if (colours == PNG_COLOR_TYPE_PALETTE) png_set_palette_to_rgb(png);
+  if ((colours & PNG_COLOR_MASK_COLOR) != 0)
+    png_set_rgb_to_gray(png, PNG_ERROR_ACTION_NONE, 0.299, 0.587);
+  else if (depth < 8)
+    png_set_expand_gray_1_2_4_to_8(png);
+}
+
+/// Between setjmp and libpng's longjmp nothing may stand that has a destructor: all of it is the caller's.
+bool read_rows(const Reader& reader, Source* source, ImageSize size, std::uint8_t* out, std::size_t stride) noexcept {
+  png_structp png = reader.png;
+  png_infop info = reader.info;
+  if (setjmp(png_jmpbuf(png)) != 0) return false;
+  png_set_read_fn(png, source, read_on);
+  png_set_crc_action(png, PNG_CRC_QUIET_USE, PNG_CRC_QUIET_USE);  // check_png() has them behind it
+  constexpr std::array<png_byte, 15> kTexts{'t', 'E', 'X', 't', 0, 'z', 'T', 'X', 't', 0, 'i', 'T', 'X', 't', 0};
+  png_set_keep_unknown_chunks(png, PNG_HANDLE_CHUNK_NEVER, kTexts.data(), 3);
+  png_read_info(png, info);
+  ask_for_grey(png, info);
+  const int passes = png_set_interlace_handling(png);
+  png_read_update_info(png, info);
+  const auto width = static_cast<std::uint32_t>(size.width), height = static_cast<std::uint32_t>(size.height);
+  if (png_get_image_width(png, info) != width || png_get_image_height(png, info) != height || png_get_rowbytes(png, info) != width)
+    return false;
+  for (int pass = 0; pass < passes; ++pass)
+    for (std::uint32_t y = 0; y < height; ++y) png_read_row(png, out + y * stride, nullptr);
+  return true;
+}
+
+}  // namespace
+
+bool is_png(Bytes b) noexcept { return b.size() >= kSignature.size() && std::equal(kSignature.begin(), kSignature.end(), b.begin()); }
+
+bool may_become_png(Bytes b) noexcept { return b.size() < kSignature.size() && std::equal(b.begin(), b.end(), kSignature.begin()); }
+
+ImageFileStatus png_size(Bytes b, ImageSize* size) noexcept {
+  if (b.size() < kPngHead) return ImageFileStatus::torn;
+  if (std::memcmp(&b[12], "IHDR", 4) != 0) return ImageFileStatus::torn;
+  return accept_size(u32(b, 16), u32(b, 20), size);
+}
+
+ImageFileStatus check_png(Bytes b) noexcept {
+  constexpr std::size_t kFrame = 12;  // length, type, check sum
+  std::size_t at = kSignature.size();
+  bool pixels = false;
+  while (b.size() - at >= kFrame) {
+    const std::size_t length = u32(b, at);
+    if (length > b.size() - at - kFrame) return ImageFileStatus::torn;
+    const auto sum = crc32(0, &b[at + 4], static_cast<uInt>(length + 4));
+    if (sum != u32(b, at + 8 + length)) return ImageFileStatus::torn;
+    if (std::memcmp(&b[at + 4], "IDAT", 4) == 0) pixels = true;
+    if (std::memcmp(&b[at + 4], "IEND", 4) == 0) return pixels ? ImageFileStatus::ok : ImageFileStatus::torn;
+    at += length + kFrame;
+  }
+  return ImageFileStatus::torn;
+}
+
+ImageFileStatus decode_png(Bytes bytes, ImageSize size, std::uint8_t* out, std::size_t stride) noexcept {
+  const Reader reader;
+  if (reader.info == nullptr) return ImageFileStatus::undecodable;  // no memory
+  Source source{bytes};
+  return read_rows(reader, &source, size, out, stride) ? ImageFileStatus::ok : ImageFileStatus::undecodable;
+}
+
+}  // namespace vergence::app::detail

@@ -1,0 +1,30 @@
+#!/usr/bin/env bash
+# What `cmake --install` puts down is complete: the program runs from there, finds the checkerboard tool and drives an example.
+#   install_test.sh BUILD
+set -euo pipefail
+build="$1"
+work="$(mktemp -d)"
+trap 'rm -rf "$work"' EXIT
+
+fail() {
+  echo "$1"
+  exit 1
+}
+
+cmake --install "$build" --prefix "$work/usr" --component program >"$work/log" 2>&1 || fail "$(cat "$work/log")"
+program="$work/usr/bin/vergence"
+"$program" --version || fail "the installed program does not run"
+"$program" run "$work/usr/share/vergence/config/mock.yaml" --fast --duration 1 --quiet --out "$work/session" 2>"$work/err" ||
+  [ "$?" -le 1 ] || fail "$(cat "$work/err")"
+[ -f "$work/session/summary.json" ] || fail "the example left no session"
+[ -f "$work/usr/lib/udev/rules.d/99-vergence.rules" ] || fail "no udev rules"
+
+status=0
+"$program" calibrate --convert "$work/session/calibration.yaml" "$work/camchain.yaml" 2>"$work/err" || status=$?
+if [ "$status" -ne 2 ] || ! grep -q 'the package vergence-checkerboard' "$work/err"; then
+  fail "without the tool: exit $status, $(cat "$work/err")"
+fi
+cmake --install "$build" --prefix "$work/usr" --component checkerboard >"$work/log" 2>&1 || fail "$(cat "$work/log")"
+[ -x "$work/usr/libexec/vergence/vergence-checkerboard" ] || fail "the checkerboard tool is not installed"
+"$program" calibrate --convert "$work/session/calibration.yaml" "$work/camchain.yaml" || fail "the program does not find the tool it is installed with"
+[ -s "$work/camchain.yaml" ] || fail "nothing was converted"
