@@ -41,11 +41,25 @@ const char* ComparisonOptions::validate() const noexcept {
   return nullptr;
 }
 
+namespace {
+
+/// Forward-left-up from right-down-forward.
+Mat3 body_from_camera() noexcept {
+  Mat3 R;
+  R << 0, 0, 1, -1, 0, 0, 0, -1, 0;
+  return R;
+}
+
+}  // namespace
+
 Transform mount_of(const Vec3& lever_arm_m, const Vec3& boresight_rad) noexcept {
-  Mat3 R_body_camera;  // forward-left-up from right-down-forward
-  R_body_camera << 0, 0, 1, -1, 0, 0, 0, -1, 0;
   const Mat3 turned = exp_so3({0, 0, boresight_rad.z()}) * exp_so3({0, boresight_rad.y(), 0}) * exp_so3({boresight_rad.x(), 0, 0});
-  return {turned * R_body_camera, lever_arm_m};
+  return {turned * body_from_camera(), lever_arm_m};
+}
+
+Vec3 boresight_of(const Mat3& R_ins_left) noexcept {
+  const Mat3 R = R_ins_left * body_from_camera().transpose();
+  return {std::atan2(R(2, 1), R(2, 2)), std::atan2(-R(2, 0), std::hypot(R(2, 1), R(2, 2))), std::atan2(R(1, 0), R(0, 0))};
 }
 
 const char* to_string(InsMatch m) noexcept {

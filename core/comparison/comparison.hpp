@@ -45,6 +45,9 @@ struct ComparisonOptions {
 /// against the INS's (roll, pitch, yaw, rad: R = Rz(yaw) Ry(pitch) Rx(roll)). All zero: they look the same way.
 [[nodiscard]] Transform mount_of(const Vec3& lever_arm_m, const Vec3& boresight_rad) noexcept;
 
+/// The boresight that mount_of() makes this rotation of. At a pitch of ±90° roll and yaw are one turn: roll is then the rounding's.
+[[nodiscard]] Vec3 boresight_of(const Mat3& R_ins_left) noexcept;
+
 /// What the INS had to say at a frame's stamp.
 enum class InsMatch : std::uint8_t {
   ok,
