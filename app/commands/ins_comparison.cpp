@@ -7,10 +7,10 @@
 
 namespace vergence::app {
 
-InsComparison::InsComparison(const ComparisonOptions& options, bool told, Arena& arena, DriveJournal& journal)
+InsComparison::InsComparison(const ComparisonOptions& options, Source source, Arena& arena, DriveJournal& journal)
     : T_ins_left_(options.T_ins_left),
       scale_stretch_m_(options.scale_stretch_m),
-      told_(told),
+      source_(source),
       comparison_(options, arena),
       journal_(journal) {}
 
@@ -33,7 +33,7 @@ void InsComparison::drain() noexcept {
     measure(pose);
     journal_.note_distance_from_ins(pose.compared ? pose.error_enu.norm() : -1);
     note_placement(pose.pose.stamp);
-    if (told_) note_ins(pose);
+    if (source_ != Source::none) note_ins(pose);
     note_scale(pose);
   }
 }
@@ -114,18 +114,25 @@ void InsComparison::note_ins(const ComparedPose& pose) noexcept {
   match_run_ = pose.ins == last_match_ ? match_run_ + 1 : 1;
   last_match_ = pose.ins;
   if (match_run_ != kSettled) return;
+  const bool recorded = source_ == Source::recording;
   switch (pose.ins) {
     case InsMatch::ok:
       if (matches_ > kSettled) journal_.tell(pose.pose.stamp, "ins_ok", "the INS has a position again; the comparison goes on", false);
       break;
     case InsMatch::none:
-      journal_.tell(pose.pose.stamp, "ins_silent", "the INS is silent: the drive goes on without it; check its cable and its rate", true);
+      journal_.tell(pose.pose.stamp, "ins_silent",
+                    recorded ? "the recording has no reading of the INS here: these poses are not compared"
+                             : "the INS is silent: the drive goes on without it; check its cable and its rate",
+                    true);
       break;
     case InsMatch::gap:
       journal_.tell(pose.pose.stamp, "ins_gap", "readings of the INS are missing: these poses are not compared", true);
       break;
     case InsMatch::no_fix:
-      journal_.tell(pose.pose.stamp, "ins_no_fix", "the INS has no position: the comparison pauses; check its antenna", true);
+      journal_.tell(
+          pose.pose.stamp, "ins_no_fix",
+          recorded ? "the INS had no position: the comparison pauses" : "the INS has no position: the comparison pauses; check its antenna",
+          true);
       break;
     case InsMatch::jump:  // told with the reading: it may fall between two frames
       break;

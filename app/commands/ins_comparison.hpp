@@ -22,10 +22,12 @@ class InsComparison {
  public:
   static constexpr std::size_t kMostPlacements = 64;  // that are kept; later ones count
 
-  /// `told`: whether there is an INS to tell of; without one poses go through and nothing is said. `journal` outlives it.
-  InsComparison(const ComparisonOptions& options, bool told, Arena& arena, DriveJournal& journal);
+  enum class Source : std::uint8_t { none, device, recording };
 
-  /// Before the first add(). `recorder` outlives the last one; with `told` it takes readings (Recorder::Options::ins).
+  /// Without a source poses go through and nothing is said. `journal` outlives it.
+  InsComparison(const ComparisonOptions& options, Source source, Arena& arena, DriveJournal& journal);
+
+  /// Before the first add(). `recorder` outlives the last one; with a source it takes readings (Recorder::Options::ins).
   void open(Recorder* recorder) noexcept { recorder_ = recorder; }
   void add(const InsRecord& reading) noexcept;
   /// `decode_ms` of its images goes with the pose.
@@ -50,7 +52,7 @@ class InsComparison {
 
   const Transform T_ins_left_;
   const double scale_stretch_m_;
-  const bool told_;
+  const Source source_;
   Comparison comparison_;
   DriveJournal& journal_;
   Recorder* recorder_ = nullptr;

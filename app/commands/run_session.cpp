@@ -118,7 +118,8 @@ Drive::Drive(const RunRequest& request)
       arena_(arena_size(Estimator::memory_needed(options_, begin_.file.rig)) + arena_size(Comparison::bytes_needed(comparison_options_))),
       runner_(make_runner(request.configuration.threads)),
       estimator_(std::make_unique<Estimator>(options_, begin_.file.rig, begin_.nominal, arena_, *runner_, solver_)),
-      comparison_(std::make_unique<InsComparison>(comparison_options_, devices_.ins() != nullptr, arena_, journal_)),
+      comparison_(std::make_unique<InsComparison>(
+          comparison_options_, devices_.ins() != nullptr ? InsComparison::Source::device : InsComparison::Source::none, arena_, journal_)),
       time_(devices_.sync().mode, request.fast),
       fault_told_(devices_.faults().size(), false) {
   LiveSource::Options o;
@@ -408,6 +409,9 @@ ExitCode Drive::run() {
   if (faults.empty()) end_session(request_.out, begin_, input, *totals, journal_.matches(), &faults);
   write_session_summary(request_.out, *totals, input, &faults);
   faults.insert(faults.end(), totals->faults.begin(), totals->faults.end());
+  for (const std::string& sentence :
+       write_other_formats(request_.out, request_.also, *totals, input.earth.value_or(EarthFigures{}), &faults))
+    progress.say("vergence: " + sentence);
   for (const std::string& sentence : recorder_->take_complaints()) progress.say("vergence: " + sentence);
   for (const std::string& sentence : faults) progress.say("vergence: " + sentence);
   if (!request_.quiet) tell(*totals, input, &progress);

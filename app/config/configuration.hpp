@@ -88,6 +88,11 @@ struct ComparisonSettings {
   double scale_tolerance = 0.02;
 };
 
+/// `kitti_raw:` which of its four cameras are taken.
+struct KittiRawSettings {
+  int left = 0, right = 1;
+};
+
 /// What the intrinsics handed to the estimator are off by, sigmas.
 struct IntrinsicsErrorSettings {
   double principal_point_px = 0, focal_percent = 0;
@@ -130,6 +135,7 @@ struct Configuration {
   TriggerSettings trigger{};
   SyncSettings sync{};
   ComparisonSettings comparison{};
+  KittiRawSettings kitti_raw{};
   MockSettings mock{};
   std::array<std::string, kMostFaults> faults{};  // `KIND@SECONDS NAME=NUMBER …`; empty: none
   OdometryOptions odometry{};

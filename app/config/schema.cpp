@@ -289,6 +289,15 @@ Group comparison() {
       .done();
 }
 
+Group kitti_raw() {
+  using K = KittiRawSettings;
+  return Rows<K>(
+             "kitti_raw", "Replays of KITTI raw drives.", [](auto& c) -> auto& { return c.kitti_raw; })
+      .integer("left", &K::left, 0, 3, "", "Left camera of a drive, `image_NN`: 0 grey, 2 colour.")
+      .integer("right", &K::right, 0, 3, "", "Right camera: 1 grey, 3 colour.")
+      .done();
+}
+
 Group intrinsics_error() {
   using E = IntrinsicsErrorSettings;
   constexpr std::int64_t kLargestSeed = std::numeric_limits<std::int64_t>::max();
@@ -499,8 +508,8 @@ Group monitor() {
 
 const std::vector<Group>& schema() {
   static const std::vector<Group> groups{
-      general(), rig(),        cameras(), exposure(), ins(), trigger(), sync(), odometry(), calibration_options(),
-      monitor(), comparison(), mock(),    faults()};
+      general(), rig(),        cameras(),   exposure(), ins(),   trigger(), sync(), odometry(), calibration_options(),
+      monitor(), comparison(), kitti_raw(), mock(),     faults()};
   return groups;
 }
 
@@ -514,6 +523,8 @@ std::string find_contradiction(const Configuration& c) {
   if (c.calibration.usable_depth_percent < c.calibration.good_depth_percent)
     return fmt::format("calibration.usable_depth_percent ({}) is below calibration.good_depth_percent ({})",
                        c.calibration.usable_depth_percent, c.calibration.good_depth_percent);
+  if (c.kitti_raw.left == c.kitti_raw.right)
+    return fmt::format("kitti_raw.left and kitti_raw.right are both camera {}; two cameras make a rig", c.kitti_raw.left);
   return {};
 }
 
