@@ -11,7 +11,7 @@ void CommonOptions::declare(CLI::App& command) {
   command.add_flag("--quiet", quiet, "No progress line");
 }
 
-void declare_also(CLI::App& command, std::string* words) {
+void declare_also(CLI::App& command, std::optional<std::string>* words) {
   command.add_option("--also", *words, "The drive in other forms as well, e.g. kitti,enu,geojson,kml (docs/session.md)")
       ->type_name("WORDS");
 }

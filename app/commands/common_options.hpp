@@ -25,6 +25,6 @@ struct CommonOptions {
 };
 
 /// `--also WORDS` of the commands that write a session: parse_other_formats() reads it.
-void declare_also(CLI::App& command, std::string* words);
+void declare_also(CLI::App& command, std::optional<std::string>* words);
 
 }  // namespace vergence::app

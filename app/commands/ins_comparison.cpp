@@ -44,12 +44,10 @@ void InsComparison::finish() noexcept {
   note_placement(newest_stamp_);
 }
 
-/// The way is summed in steps that are none of the receiver's noise at a standstill.
+/// The way is summed in steps that are none of the receiver's noise at a standstill, straight across holes.
 void InsComparison::measure(const ComparedPose& pose) noexcept {
   constexpr double kLeastStep = 0.5;  // m
-  if (!pose.ins_valid) {
-    on_way_ = false;
-  } else {
+  if (pose.ins_valid) {
     const Vec3& place = pose.reference.T_enu_left.t;
     const double step = on_way_ ? (place - last_place_).norm() : 0;
     if (step >= kLeastStep) errors_.way_m += step;

@@ -14,8 +14,8 @@ namespace {
 /// The words as given; checked when the command runs.
 struct Arguments {
   CommonOptions common;
-  std::string data, format, out, also;
-  std::optional<std::string> calibration;
+  std::string data, format, out;
+  std::optional<std::string> calibration, also;
   std::int64_t start = 0;
   std::optional<std::int64_t> frames;
   std::optional<double> baseline;
@@ -58,7 +58,7 @@ ReplayRequest request_of(const Arguments& a) {
   if (a.frames) r.frames = static_cast<std::size_t>(*a.frames);
   r.configuration = a.common.configuration(std::nullopt);
   r.quiet = a.common.quiet;
-  r.also = parse_other_formats(a.also);
+  if (a.also) r.also = parse_other_formats(*a.also);
   r.print_memory = a.memory;
   return r;
 }

@@ -13,9 +13,9 @@ namespace {
 /// The words as given; checked when the command runs.
 struct Arguments {
   CommonOptions common;
-  std::string configuration, out, also;
+  std::string configuration, out;
   std::vector<std::string> faults;
-  std::optional<std::string> calibration;
+  std::optional<std::string> calibration, also;
   std::optional<double> duration_s;
   bool fast = false, from_scratch = false, memory = false;
 };
@@ -32,7 +32,7 @@ RunRequest request_of(const Arguments& a) {
   r.duration_s = a.duration_s;
   r.fast = a.fast;
   r.quiet = a.common.quiet;
-  r.also = parse_other_formats(a.also);
+  if (a.also) r.also = parse_other_formats(*a.also);
   r.print_memory = a.memory;
   return r;
 }

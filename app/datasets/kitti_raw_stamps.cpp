@@ -84,7 +84,7 @@ std::vector<std::size_t> ascending(std::span<const Stamp> stamps) {
     before[i] = place == ends.begin() ? i : *(place - 1);
     if (place == ends.end())
       ends.push_back(i);
-    else
+    else if (stamps[i] < stamps[*place])  // of equal ones the first stays
       *place = i;
   }
   std::vector<std::size_t> kept(ends.size());
