@@ -14,6 +14,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
+constexpr const char* kCalibration = "calib_cam_to_cam.txt";
 constexpr std::size_t kMostDrives = 8;      // that are named in a refusal
 constexpr std::size_t kMostFolders = 1000;  // that are looked into for a drive
 // Cameras expose together; their stamps are of the arrival and up to some milliseconds apart. A quarter of the interval is far from both
@@ -204,9 +205,12 @@ KittiRawFolders find_kitti_raw(const fs::path& folder) {
   KittiRawFolders out;
   out.drive = found[0];
   std::error_code ignored;
-  const fs::path whole =
-      fs::weakly_canonical(out.drive, ignored);  // of `.` and of a name that ends in a slash the folder above is there, too
-  out.calibration = fs::exists(out.drive / "calib_cam_to_cam.txt", ignored) || whole.empty() ? out.drive : whole.parent_path();
+  fs::path lexical = fs::absolute(out.drive, ignored).lexically_normal();  // `.` and a name that ends in a slash have a folder above, too
+  if (!lexical.has_filename()) lexical = lexical.parent_path();
+  // A drive may be a link to where it is kept, its calibration beside the one or the other.
+  out.calibration = lexical.parent_path();
+  for (const fs::path& other : {out.drive, fs::weakly_canonical(out.drive, ignored).parent_path()})
+    if (!fs::exists(out.calibration / kCalibration, ignored) && fs::exists(other / kCalibration, ignored)) out.calibration = other;
   return out;
 }
 
@@ -216,10 +220,10 @@ StereoSequence open_kitti_raw(const fs::path& folder, bool given, const std::arr
   sequence.root = folders.drive;
   list_pairs(folders.drive, cameras, &sequence);
   if (given) return sequence;
-  const KittiRawRig rig = read_kitti_raw_rig(folders.calibration / "calib_cam_to_cam.txt", cameras, first_image_size(sequence, 0),
-                                             folders.drive.filename().string());
+  const KittiRawRig rig =
+      read_kitti_raw_rig(folders.calibration / kCalibration, cameras, first_image_size(sequence, 0), folders.drive.filename().string());
   sequence.calibration = rig.rig;
-  sequence.calibration_source = "calib_cam_to_cam.txt";
+  sequence.calibration_source = kCalibration;
   return sequence;
 }
 

@@ -132,6 +132,16 @@ TEST_F(KittiRaw, pairsRawImagesWithTheLeftCamerasStampsAndFiveCoefficients) {
   }
 }
 
+TEST_F(KittiRaw, aDriveThatIsALinkTakesTheCalibrationBesideTheLink) {
+  fs::create_directories(folder_ / "elsewhere");
+  const fs::path link = folder_ / "elsewhere/2011_09_26_drive_0001_extract";
+  fs::create_directory_symlink(folder_ / kDrive, link);
+  EXPECT_EQ(open_sequence(SequenceFormat::kitti_raw, link).calibration.intrinsics[0].cx, 35) << "there is none beside it";
+  std::string text = cameras_text();
+  folder_.write("elsewhere/calib_cam_to_cam.txt", text.replace(text.find("60 0 35"), 7, "60 0 36"));
+  EXPECT_EQ(open_sequence(SequenceFormat::kitti_raw, link).calibration.intrinsics[0].cx, 36);
+}
+
 TEST_F(KittiRaw, imagesOfTheRectifiedSizeTakeTheRectifiedCalibration) {
   for (int k = 0; k < 2; ++k)
     for (int i = 0; i < kFrames; ++i) test::write_tiny_image(image(k, i), test::tiny_seed(i, k), 64, 40);
