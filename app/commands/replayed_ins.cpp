@@ -12,7 +12,9 @@ namespace vergence::app {
 namespace {
 
 constexpr Duration kAround = Duration::seconds(1);  // readings before the first frame and after the last that are kept
-constexpr double kMostOfInterval = 1.5;             // one reading late by half an interval is no hole, one that is missing is
+constexpr double kPublishedHeading =
+    0.3 * std::numbers::pi / 180;        // a mount from a calibration of three sensors, a lens whose centre is 5 px off
+constexpr double kMostOfInterval = 1.5;  // one reading late by half an interval is no hole, one that is missing is
 
 bool says_mount(const InsSettings& ins) {
   const auto zero = [](double v) { return v == 0; };
@@ -67,6 +69,7 @@ ReplayedIns replayed_ins(const ReplayRequest& request, const StereoSequence& seq
   out.mount_source = says_mount(c.ins) ? "the configuration" : "nobody: ins.lever_arm_m and ins.boresight_deg are zero";
   if (recorded.T_ins_left) {
     out.options.T_ins_left = *recorded.T_ins_left;
+    if (out.options.heading_sigma_rad == 0) out.options.heading_sigma_rad = kPublishedHeading;
     out.mount_source = recorded.mount_source;
   }
   out.remarks.push_back(mount_sentence(out.options.T_ins_left, out.mount_source));

@@ -82,6 +82,7 @@ struct SyncSettings {
 struct ComparisonSettings {
   double placement_m = 100;
   double correlation_s = 10;
+  double heading_sigma_deg = 0;
   double max_gap_ms = 100;
   double max_wait_ms = 500;
   double jump_m = 20;

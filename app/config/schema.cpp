@@ -282,6 +282,10 @@ Group comparison() {
       .number("placement_m", &C::placement_m, 1, 100000, "m",
               "Distance driven with a valid fix after which the path is placed on the earth.")
       .number("correlation_s", &C::correlation_s, 0.1, 3600, "s", "For so long the INS's position errors resemble one another.")
+      .number("heading_sigma_deg", &C::heading_sigma_deg, 0, 180, "°",
+              "Of the INS's heading as the camera has it, mount included: so it weighs in the placement. 0: not at all, or with a mount "
+              "published by a data set "
+              "0.3°.")
       .number("max_gap_ms", &C::max_gap_ms, 1, 10000, "ms", "Readings farther apart than this are not interpolated between.")
       .number("max_wait_ms", &C::max_wait_ms, 1, 3000, "ms", "A pose waits so long for the reading after it.")
       .number("jump_m", &C::jump_m, 0.1, 1e6, "m", "A step of the INS's position beyond this (and 60 m/s) is a jump.")

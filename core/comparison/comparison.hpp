@@ -25,6 +25,9 @@ struct ComparisonOptions {
   double position_sigma_m = 2.5;
   double height_sigma_m = 5.0;
   double tilt_sigma_rad = 0.0087;  // half a degree
+  /// Of the INS's heading with all that lies between it and the camera's axes, for the placement; 0: the heading is the positions' alone,
+  /// as it must be where nobody knows the mount to a degree.
+  double heading_sigma_rad = 0;
   /// Two samples farther apart than this are not interpolated between.
   Duration max_gap = Duration::milliseconds(100);
   /// A pose waits so long for the INS sample after it, by the stamps of the poses that follow; then it goes out without.
