@@ -23,10 +23,12 @@ ExitCode calibrate_from_drive(const CalibrateOptions& a) {
   std::optional<std::filesystem::path> file;
   if (a.calibration) file = *a.calibration;
   // Of what the drive comes with only lenses and length are read: how its cameras sit need not be known.
-  const StereoSequence sequence = open_sequence(sequence_format(a.format), a.drive, file, {true, a.baseline.value_or(0)});
+  const StereoSequence sequence =
+      open_sequence(sequence_format(a.format), a.drive, file, {true, a.baseline.value_or(0)}, {c.kitti_raw.left, c.kitti_raw.right});
   check_image_sizes(sequence, 0, sequence.pairs.size());
   const StartingCalibration told = replayed_calibration(c, sequence, true);
   Progress progress = Progress::on_stderr(a.common.quiet);
+  for (const std::string& sentence : sequence.remarks) progress.say("vergence: " + sentence);
   const DriveCalibration found = calibrate_with_progress({sequence, c, 0, sequence.pairs.size(), {}, {}}, told, &progress);
   if (!found.rig) {
     progress.say(fmt::format("vergence: {}: no calibration was found, nothing is written: {}", a.drive, found.why));

@@ -11,6 +11,11 @@ void CommonOptions::declare(CLI::App& command) {
   command.add_flag("--quiet", quiet, "No progress line");
 }
 
+void declare_also(CLI::App& command, std::optional<std::string>* words) {
+  command.add_option("--also", *words, "The drive in other forms as well, e.g. kitti,enu,geojson,kml (docs/session.md)")
+      ->type_name("WORDS");
+}
+
 Configuration CommonOptions::configuration(const std::optional<std::filesystem::path>& file) const {
   std::vector<std::string> all = set;
   if (threads) all.push_back("threads=" + std::to_string(*threads));

@@ -24,4 +24,7 @@ struct CommonOptions {
   [[nodiscard]] Configuration configuration(const std::optional<std::filesystem::path>& file) const;
 };
 
+/// `--also WORDS` of the commands that write a session: parse_other_formats() reads it.
+void declare_also(CLI::App& command, std::optional<std::string>* words);
+
 }  // namespace vergence::app

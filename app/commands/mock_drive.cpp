@@ -133,6 +133,7 @@ ComparisonOptions comparison_options(const Configuration& c) {
   o.T_ins_left = mount_of(vec3(c.ins.lever_arm_m), vec3(c.ins.boresight_deg) * (std::numbers::pi / 180));
   o.placement_m = c.comparison.placement_m;
   o.correlation_s = c.comparison.correlation_s;
+  o.heading_sigma_rad = c.comparison.heading_sigma_deg * (std::numbers::pi / 180);
   o.max_gap = Duration::seconds(c.comparison.max_gap_ms * 1e-3);
   o.max_wait = Duration::seconds(c.comparison.max_wait_ms * 1e-3);
   o.jump_m = c.comparison.jump_m;

@@ -49,9 +49,8 @@ const char* problem(MountStatus status) {
 std::optional<std::array<double, 3>> boresight_deg(const FoundMount& found) {
   const auto& r = found.mount.rotation;
   if (!found.of_ins || !std::all_of(r.begin(), r.end(), [](const MountValue& v) { return v.observable; })) return std::nullopt;
-  const Mat3 R = found.mount.T_ref_est.R * found.nominal.transpose();  // yaw, pitch, roll: as mount_of() makes it
-  return std::array{std::atan2(R(2, 1), R(2, 2)) * kDegrees, std::atan2(-R(2, 0), std::hypot(R(2, 1), R(2, 2))) * kDegrees,
-                    std::atan2(R(1, 0), R(0, 0)) * kDegrees};
+  const Vec3 turn = boresight_of(found.mount.T_ref_est.R) * kDegrees;
+  return std::array{turn.x(), turn.y(), turn.z()};
 }
 
 }  // namespace

@@ -15,7 +15,7 @@ namespace {
 struct Arguments {
   CommonOptions common;
   std::string data, format, out;
-  std::optional<std::string> calibration;
+  std::optional<std::string> calibration, also;
   std::int64_t start = 0;
   std::optional<std::int64_t> frames;
   std::optional<double> baseline;
@@ -26,12 +26,15 @@ struct Arguments {
 
 SequenceFormat sequence_format(const std::string& word) {
   if (word == "kitti") return SequenceFormat::kitti;
+  if (word == "kitti-raw") return SequenceFormat::kitti_raw;
   if (word == "euroc") return SequenceFormat::euroc;
   if (word == "folder") return SequenceFormat::folder;
   if (word == "st-lucia") return SequenceFormat::st_lucia;
-  if (word == "session") throw InputError("--format session is not there yet in this version; kitti, euroc, folder and st-lucia are");
-  throw InputError("--format \"" + word + "\" is not known" + did_you_mean(word, {"kitti", "euroc", "folder", "st-lucia", "session"}) +
-                   "; kitti, euroc, folder and st-lucia are what can be read");
+  if (word == "session")
+    throw InputError("--format session is not there yet in this version; kitti, kitti-raw, euroc, folder and st-lucia are");
+  throw InputError("--format \"" + word + "\" is not known" +
+                   did_you_mean(word, {"kitti", "kitti-raw", "euroc", "folder", "st-lucia", "session"}) +
+                   "; kitti, kitti-raw, euroc, folder and st-lucia are what can be read");
 }
 
 namespace {
@@ -55,6 +58,7 @@ ReplayRequest request_of(const Arguments& a) {
   if (a.frames) r.frames = static_cast<std::size_t>(*a.frames);
   r.configuration = a.common.configuration(std::nullopt);
   r.quiet = a.common.quiet;
+  if (a.also) r.also = parse_other_formats(*a.also);
   r.print_memory = a.memory;
   return r;
 }
@@ -65,7 +69,7 @@ void add_replay(CLI::App& root, ExitCode* exit_code) {
   const auto a = std::make_shared<Arguments>();
   CLI::App* command = root.add_subcommand("replay", "Run a recorded drive through the estimator and write a session folder");
   command->add_option("DATA", a->data, "Folder of the data set")->required();
-  command->add_option("--format", a->format, "Layout of DATA: kitti, euroc, folder, st-lucia (session comes later)")
+  command->add_option("--format", a->format, "Layout of DATA: kitti, kitti-raw, euroc, folder, st-lucia (session comes later)")
       ->required()
       ->type_name("NAME");
   command->add_option("--out", a->out, "Session folder; must not exist or be empty")->required()->type_name("DIR");
@@ -77,6 +81,7 @@ void add_replay(CLI::App& root, ExitCode* exit_code) {
                     "Find the calibration from the drive itself: only intrinsics and the baseline's length are read");
   command->add_flag("--calibrate-first", a->calibrate_first,
                     "Calibrate from the whole drive, lenses included, then drive with what was found (twice the drive more)");
+  declare_also(*command, &a->also);
   command->add_flag("--memory", a->memory, "Print what memory is held, by whom");
   a->common.declare(*command);
   command->callback([a, exit_code] { *exit_code = run_replay(request_of(*a)); });

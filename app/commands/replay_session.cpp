@@ -6,6 +6,7 @@
 #include <atomic>
 #include <chrono>
 #include <condition_variable>
+#include <limits>
 #include <memory>
 #include <mutex>
 #include <stdexcept>
@@ -18,12 +19,12 @@
 #include "app/commands/camera_masks.hpp"
 #include "app/commands/drive_calibration.hpp"
 #include "app/commands/drive_journal.hpp"
-#include "app/commands/mock_drive.hpp"
+#include "app/commands/ins_comparison.hpp"
+#include "app/commands/replayed_ins.hpp"
 #include "app/commands/session_files.hpp"
 #include "app/commands/starting_calibration.hpp"
 #include "app/datasets/frame_decoder.hpp"
 #include "app/datasets/reference_track.hpp"
-#include "app/datasets/st_lucia.hpp"
 #include "app/datasets/trajectory_files.hpp"
 #include "app/recorder/recorder.hpp"
 #include "app/recorder/summary.hpp"
@@ -39,16 +40,19 @@ namespace {
 /// Everything that is set up before the first frame and torn down after the last, in the order of its members.
 class Replay {
  public:
-  Replay(const ReplayRequest& request, StereoSequence sequence, StartingCalibration begin, Trajectory truth);
+  Replay(const ReplayRequest& request, StereoSequence sequence, StartingCalibration begin, Trajectory truth, ReplayedIns ins);
 
   [[nodiscard]] ExitCode run();
 
  private:
   void estimate() noexcept;
   void handle(const DecodedPair& pair) noexcept;
+  void give_readings(Stamp until) noexcept;
+  void compare(const PoseSample& sample, float decode_ms) noexcept;
   void watch(const SignalGuard& signals, Progress* progress);
   [[nodiscard]] SummaryInput summary_input(const SessionTotals& totals, std::uint64_t allocations) const;
   void tell(const SessionTotals& totals, const SummaryInput& input, Progress* progress) const;
+  void tell_earth(const EarthFigures& earth, Progress* progress) const;
   [[nodiscard]] std::vector<std::pair<std::string, std::size_t>> memory() const;
 
   const ReplayRequest& request_;
@@ -56,10 +60,11 @@ class Replay {
   const StartingCalibration begin_;
   const Trajectory truth_;
   const ReferenceTrack reference_;
+  const ReplayedIns ins_;
   const std::size_t count_;  // frames of this replay
   const CameraMasks masks_;
   const EstimatorOptions options_;
-  Arena frames_arena_, estimator_arena_;
+  Arena frames_arena_, estimator_arena_, comparison_arena_;
   FramePool pool_;
   std::unique_ptr<PairRunner> runner_;
   BackgroundThread solver_;
@@ -69,6 +74,8 @@ class Replay {
 
   // Of the estimator's thread; read by others after it has joined.
   DriveJournal journal_;
+  std::unique_ptr<InsComparison> comparison_;  // null: no INS was recorded
+  std::size_t next_reading_ = 0;
   std::uint64_t skipped_ = 0;
 
   std::mutex mutex_;  // with done_, for the caller's thread that waits
@@ -79,20 +86,26 @@ class Replay {
 int width_of(const StereoSequence& s) { return s.calibration.intrinsics[0].width; }
 int height_of(const StereoSequence& s) { return s.calibration.intrinsics[0].height; }
 
-Replay::Replay(const ReplayRequest& request, StereoSequence sequence, StartingCalibration begin, Trajectory truth)
+Replay::Replay(const ReplayRequest& request, StereoSequence sequence, StartingCalibration begin, Trajectory truth, ReplayedIns ins)
     : request_(request),
       sequence_(std::move(sequence)),
       begin_(std::move(begin)),
       truth_(std::move(truth)),
       reference_(truth_),
+      ins_(std::move(ins)),
       count_(std::min(request.frames.value_or(sequence_.pairs.size()), sequence_.pairs.size() - request.start)),
       masks_(request.configuration, begin_.file.rig),
       options_(estimator_options(request.configuration, begin_.trust, Adoption::after_fixed_frames, masks_.views())),
       frames_arena_(arena_size(FramePool::memory_needed(width_of(sequence_), height_of(sequence_), FrameDecoder::kSlots))),
       estimator_arena_(arena_size(Estimator::memory_needed(options_, begin_.file.rig))),
+      comparison_arena_(arena_size(ins_.readings.empty() ? 0 : Comparison::bytes_needed(ins_.options))),
       pool_(width_of(sequence_), height_of(sequence_), FrameDecoder::kSlots, frames_arena_),
       runner_(make_runner(request.configuration.threads)),
-      estimator_(std::make_unique<Estimator>(options_, begin_.file.rig, begin_.nominal, estimator_arena_, *runner_, solver_)) {}
+      estimator_(std::make_unique<Estimator>(options_, begin_.file.rig, begin_.nominal, estimator_arena_, *runner_, solver_)),
+      skipped_(sequence_.left_out) {
+  if (ins_.readings.empty()) return;
+  comparison_ = std::make_unique<InsComparison>(ins_.options, InsComparison::Source::recording, comparison_arena_, journal_);
+}
 
 void Replay::estimate() noexcept {
   (void)pthread_setname_np(pthread_self(), "vergence-estim");
@@ -103,6 +116,10 @@ void Replay::estimate() noexcept {
   }
   estimator_->finish();
   journal_.note(*estimator_);
+  if (comparison_) {
+    give_readings(Stamp(std::numeric_limits<std::int64_t>::max()));
+    comparison_->finish();
+  }
   AllocationGuard::unseal_thread();
   const std::lock_guard lock(mutex_);
   done_ = true;
@@ -129,7 +146,24 @@ void Replay::handle(const DecodedPair& pair) noexcept {
   const PoseSample sample = estimator_->process(frame);
   journal_.note(*estimator_);
   journal_.note(sample);
-  recorder_->post(PoseRecord::of(sample, pair.decode_ms, reference_.at(sample.stamp)));
+  compare(sample, pair.decode_ms);
+}
+
+void Replay::give_readings(Stamp until) noexcept {
+  for (; next_reading_ < ins_.readings.size() && ins_.readings[next_reading_].sample.stamp <= until; ++next_reading_) {
+    comparison_->add({ins_.readings[next_reading_].sample, ins_.readings[next_reading_].quality});
+    comparison_->drain();
+  }
+}
+
+void Replay::compare(const PoseSample& sample, float decode_ms) noexcept {
+  if (!comparison_) {
+    recorder_->post(PoseRecord::of(sample, decode_ms, reference_.at(sample.stamp)));
+    return;
+  }
+  give_readings(sample.stamp);
+  comparison_->add(sample, decode_ms);
+  comparison_->drain();
 }
 
 void Replay::watch(const SignalGuard& signals, Progress* progress) {
@@ -149,7 +183,13 @@ SummaryInput Replay::summary_input(const SessionTotals& totals, std::uint64_t al
   SummaryInput input;
   input.skipped = skipped_;
   input.dropped_by_estimator = journal_.dropped();
-  if (!truth_.empty() && !totals.trajectory.empty()) input.evaluation = evaluate(totals.trajectory, truth_, summary_evaluation_options());
+  const Trajectory& reference = comparison_ ? totals.reference : truth_;
+  if (!reference.empty() && !totals.trajectory.empty())
+    input.evaluation = evaluate(totals.trajectory, reference, summary_evaluation_options());
+  if (comparison_) {
+    input.comparison = comparison_->counters();
+    input.earth = comparison_->earth(ins_.mount_source);
+  }
   describe_calibration(*estimator_, begin_, totals, options_, &input);
   input.allocations_after_seal = allocations;
   input.memory = memory();
@@ -159,6 +199,7 @@ SummaryInput Replay::summary_input(const SessionTotals& totals, std::uint64_t al
 
 std::vector<std::pair<std::string, std::size_t>> Replay::memory() const {
   return {{"estimator_bytes", estimator_arena_.capacity()},
+          {"comparison_bytes", comparison_arena_.capacity() + ins_.readings.capacity() * sizeof(RecordedReading)},
           {"images_bytes", frames_arena_.capacity()},
           {"rings_bytes", sizeof(Recorder) + sizeof(FrameDecoder) + sizeof(DriveJournal)}};
 }
@@ -176,11 +217,26 @@ void Replay::tell(const SessionTotals& totals, const SummaryInput& input, Progre
     const std::string segments = near.count > 0 ? fmt::format("; segments of 10 to 50 m {:.2f} %", 100 * near.translation) : "";
     progress->say(fmt::format("against the reference over {:.2f} m: ATE {:.4f} m, {:.4f} m after a scale of {:.4f}{}", e.path_reference,
                               e.ate_se3.rmse, e.ate_sim3.rmse, e.sim3.scale, segments));
-    progress->say(fmt::format("next: vergence evaluate {} {}", (request_.out / "trajectory.tum").string(), request_.data.string()));
-  } else {
+    if (!comparison_)
+      progress->say(fmt::format("next: vergence evaluate {} {}", (request_.out / "trajectory.tum").string(), request_.data.string()));
+  } else if (!comparison_) {
     progress->say(fmt::format("there is no reference to compare with; next: vergence evaluate {} REFERENCE",
                               (request_.out / "trajectory.tum").string()));
   }
+  if (comparison_) tell_earth(*input.earth, progress);
+}
+
+void Replay::tell_earth(const EarthFigures& earth, Progress* progress) const {
+  const EarthErrors& e = earth.errors;
+  if (e.poses > 0)
+    progress->say(
+        fmt::format("beside the INS after the placement: {:.2f} m at the end, {:.2f} % of {:.1f} m; at most {:.2f} m; heading off by "
+                    "{:.2f} deg rms, {:.2f} deg at the end",
+                    e.horizontal_end_m, e.way_m > 0 ? 100 * e.horizontal_end_m / e.way_m : 0, e.way_m, e.horizontal_most_m,
+                    e.heading_rms_deg, e.heading_end_deg));
+  else
+    progress->say(fmt::format("nothing is compared after the placement: it takes {:g} m with a fix (comparison.placement_m)",
+                              request_.configuration.comparison.placement_m));
 }
 
 ExitCode Replay::run() {
@@ -188,15 +244,22 @@ ExitCode Replay::run() {
   make_session_folder(request_.out);
   Recorder::Options to_record;
   to_record.expected_frames = count_;
+  to_record.ins = comparison_ != nullptr;
   to_record.keep = calibration_keeper(request_.out, begin_.file, std::nullopt);
   recorder_ = std::make_unique<Recorder>(request_.out, to_record);
   const Stamp first = sequence_.pairs[request_.start].stamp;
   journal_.open(recorder_.get(), first);
+  if (comparison_) comparison_->open(recorder_.get());
   std::vector<std::string> faults;
   begin_session(request_.out, begin_, first, recorder_.get(), &faults);
   if (request_.print_memory) print_memory_table(memory());
 
   Progress progress = Progress::on_stderr(request_.quiet);
+  for (const std::vector<std::string>* remarks : {&sequence_.remarks, &ins_.remarks})
+    for (const std::string& sentence : *remarks) {
+      if (!request_.quiet) progress.say("vergence: " + sentence);
+      journal_.tell(first, "data", sentence, false);
+    }
   decoder_ = std::make_unique<FrameDecoder>(sequence_, request_.start, count_, pool_);
   const auto allocations_before = AllocationGuard::allocations_after_seal();
   std::thread estimating([this] { estimate(); });
@@ -210,6 +273,9 @@ ExitCode Replay::run() {
   if (faults.empty()) end_session(request_.out, begin_, input, *totals, journal_.matches(), &faults);
   write_session_summary(request_.out, *totals, input, &faults);
   faults.insert(faults.end(), totals->faults.begin(), totals->faults.end());
+  for (const std::string& sentence :
+       write_other_formats(request_.out, request_.also, *totals, input.earth.value_or(EarthFigures{}), &faults))
+    progress.say("vergence: " + sentence);
   for (const std::string& sentence : recorder_->take_complaints()) progress.say("vergence: " + sentence);
   for (const std::string& sentence : faults) progress.say("vergence: " + sentence);
   if (!request_.quiet) tell(*totals, input, &progress);
@@ -220,21 +286,16 @@ ExitCode Replay::run() {
     progress.say("vergence: there never was a pose; events.jsonl and poses.csv in " + request_.out.string() + " say why");
     return ExitCode::not_usable;
   }
+  if (comparison_ && comparison_->matches() == 0) {
+    progress.say("vergence: the INS never had a position for a frame: nothing is compared; the poses are there");
+    return ExitCode::not_usable;
+  }
   return faults.empty() ? ExitCode::done : ExitCode::not_usable;
-}
-
-/// The way of the INS of a St Lucia drive; what its log had to be taken for is said.
-Trajectory read_ins_reference(const ReplayRequest& request) {
-  const StLuciaIns ins = read_st_lucia_ins(request.data);
-  if (!request.quiet)
-    for (const std::string& sentence : ins.remarks) fmt::print(stderr, "vergence: {}\n", sentence);
-  return st_lucia_reference(ins, comparison_options(request.configuration).T_ins_left);
 }
 
 /// The truth that lies with the data set, for the stamps that its frames have; empty when there is none.
 Trajectory read_reference(const ReplayRequest& request, const StereoSequence& sequence) {
-  if (request.format == SequenceFormat::folder) return {};  // its layout has no truth
-  if (request.format == SequenceFormat::st_lucia) return read_ins_reference(request);
+  if (request.format != SequenceFormat::kitti && request.format != SequenceFormat::euroc) return {};  // their layouts have no truth
   const auto files = find_truth(request.data);
   if (!files) return {};
   if (files->kind != TruthFiles::Kind::kitti) return read_truth(*files);
@@ -264,17 +325,19 @@ void calibrate_first(const ReplayRequest& request, const StereoSequence& sequenc
 
 ExitCode run_replay(const ReplayRequest& request) {
   StereoSequence sequence =
-      open_sequence(request.format, request.data, request.calibration, {request.from_scratch, request.baseline.value_or(0)});
+      open_sequence(request.format, request.data, request.calibration, {request.from_scratch, request.baseline.value_or(0)},
+                    {request.configuration.kitti_raw.left, request.configuration.kitti_raw.right});
   if (request.start >= sequence.pairs.size())
     throw InputError(
         fmt::format("--start {} is beyond the drive: {} has {} frames", request.start, request.data.string(), sequence.pairs.size()));
   check_image_sizes(sequence, request.start, request.frames.value_or(sequence.pairs.size()));
   StartingCalibration begin = replayed_calibration(request.configuration, sequence, request.from_scratch);
   Trajectory truth = read_reference(request, sequence);
+  ReplayedIns ins = replayed_ins(request, sequence);
   if (request.calibrate_first) calibrate_first(request, sequence, &begin);
   std::unique_ptr<Replay> replay;
   try {
-    replay = std::make_unique<Replay>(request, std::move(sequence), std::move(begin), std::move(truth));
+    replay = std::make_unique<Replay>(request, std::move(sequence), std::move(begin), std::move(truth), std::move(ins));
   } catch (const std::invalid_argument& e) {  // options and rig do not go together
     throw InputError(e.what());
   } catch (const std::length_error& e) {

@@ -3,9 +3,11 @@
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "app/config/configuration.hpp"
 #include "app/datasets/stereo_sequence.hpp"
+#include "app/recorder/other_formats.hpp"
 #include "app/runtime/errors.hpp"
 
 namespace vergence::app {
@@ -22,6 +24,7 @@ struct ReplayRequest {
   std::size_t start = 0;                             // first frame
   std::optional<std::size_t> frames;                 // at most so many; all when not set
   Configuration configuration;
+  std::vector<OtherFormat> also{};  // written beside the session's own files
   bool quiet = false;
   bool print_memory = false;  // a table of what is held, on stdout
 };

@@ -15,7 +15,7 @@ struct Arguments {
   CommonOptions common;
   std::string configuration, out;
   std::vector<std::string> faults;
-  std::optional<std::string> calibration;
+  std::optional<std::string> calibration, also;
   std::optional<double> duration_s;
   bool fast = false, from_scratch = false, memory = false;
 };
@@ -32,6 +32,7 @@ RunRequest request_of(const Arguments& a) {
   r.duration_s = a.duration_s;
   r.fast = a.fast;
   r.quiet = a.common.quiet;
+  if (a.also) r.also = parse_other_formats(*a.also);
   r.print_memory = a.memory;
   return r;
 }
@@ -56,6 +57,7 @@ void add_run(CLI::App& root, ExitCode* exit_code) {
           "--calibration", a->calibration,
           "calibration.yaml to begin with, instead of the state file's and the configuration's; SIGUSR1 asks for a new one on the way")
       ->type_name("FILE");
+  declare_also(*command, &a->also);
   command->add_flag("--memory", a->memory, "Print what memory is held, by whom");
   a->common.declare(*command);
   command->callback([a, exit_code] { *exit_code = run_drive(request_of(*a)); });

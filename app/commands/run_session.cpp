@@ -25,6 +25,7 @@
 #include "app/commands/drive_sync.hpp"
 #include "app/commands/drive_time.hpp"
 #include "app/commands/exposure_settings.hpp"
+#include "app/commands/ins_comparison.hpp"
 #include "app/commands/session_files.hpp"
 #include "app/datasets/decimal.hpp"
 #include "app/recorder/line_file.hpp"
@@ -65,12 +66,7 @@ class Drive {
   void estimate() noexcept;
   void handle_images(const LiveItem& item) noexcept;
   void tell(Stamp stamp, const DriveTime::Sentence& sentence) noexcept;
-  void drain_comparison() noexcept;
-  void note_placement(Stamp stamp) noexcept;
-  void note_ins(const ComparedPose& pose) noexcept;
-  void note_jump(Stamp stamp) noexcept;
   void note_faults(Stamp stamp) noexcept;
-  void note_scale(const ComparedPose& pose) noexcept;
   void watch(Progress* progress);
   void write_truth(std::vector<std::string>* faults) const;
   [[nodiscard]] SummaryInput summary_input(const SessionTotals& totals, std::uint64_t allocations) const;
@@ -92,7 +88,8 @@ class Drive {
   std::unique_ptr<PairRunner> runner_;
   BackgroundThread solver_;
   std::unique_ptr<Estimator> estimator_;
-  std::unique_ptr<Comparison> comparison_;
+  DriveJournal journal_;  // of the estimator's thread, as all after recorder_
+  std::unique_ptr<InsComparison> comparison_;
   std::unique_ptr<ExposureControl> exposure_;  // null: exposures are fixed
   std::unique_ptr<LiveSource> source_;
   std::unique_ptr<Recorder> recorder_;
@@ -100,14 +97,7 @@ class Drive {
   std::vector<StampedPose> truth_;
 
   // Of the estimator's thread; read by others after it has joined.
-  DriveJournal journal_;
   DriveTime time_;
-  std::uint64_t ins_matches_ = 0, jumps_ = 0, scale_disagreements_ = 0;
-  bool scale_disagrees_ = false;
-  std::uint32_t placement_revision_ = 0;
-  InsMatch last_match_ = InsMatch::ok;
-  std::uint64_t match_run_ = 0;  // poses in a row with that
-  Stamp newest_stamp_{};
   std::vector<bool> fault_told_;
 
   std::atomic<bool> calibration_asked_{false};  // by the caller's thread, for the estimator's
@@ -128,7 +118,8 @@ Drive::Drive(const RunRequest& request)
       arena_(arena_size(Estimator::memory_needed(options_, begin_.file.rig)) + arena_size(Comparison::bytes_needed(comparison_options_))),
       runner_(make_runner(request.configuration.threads)),
       estimator_(std::make_unique<Estimator>(options_, begin_.file.rig, begin_.nominal, arena_, *runner_, solver_)),
-      comparison_(std::make_unique<Comparison>(comparison_options_, arena_)),
+      comparison_(std::make_unique<InsComparison>(
+          comparison_options_, devices_.ins() != nullptr ? InsComparison::Source::device : InsComparison::Source::none, arena_, journal_)),
       time_(devices_.sync().mode, request.fast),
       fault_told_(devices_.faults().size(), false) {
   LiveSource::Options o;
@@ -159,22 +150,18 @@ void Drive::estimate() noexcept {
         handle_images(item);
         break;
       case LiveItem::Kind::reading:
-        recorder_->post(InsRecord{item.sample, item.quality});
-        comparison_->add(item.sample);
-        note_jump(item.stamp);
+        comparison_->add({item.sample, item.quality});
         tell(item.stamp, time_.of_reading(item));
         break;
       default:
         tell(item.stamp, time_.of_device(item));
         break;
     }
-    drain_comparison();
+    comparison_->drain();
   }
   estimator_->finish();
   journal_.note(*estimator_);
   comparison_->finish();
-  drain_comparison();
-  note_placement(newest_stamp_);
   AllocationGuard::unseal_thread();
   const std::lock_guard lock(mutex_);
   done_ = true;
@@ -212,60 +199,7 @@ void Drive::handle_images(const LiveItem& item) noexcept {
   source_->release(item.set);
   journal_.note(*estimator_);
   journal_.note(sample);
-  newest_stamp_ = item.stamp;
-  comparison_->add(sample);
-}
-
-void Drive::drain_comparison() noexcept {
-  for (ComparedPose pose; comparison_->next(&pose);) {
-    recorder_->post(PoseRecord::of(pose, 0.0F));
-    if (pose.ins_valid) ++ins_matches_;
-    journal_.note_distance_from_ins(pose.compared ? pose.error_enu.norm() : -1);
-    note_placement(pose.pose.stamp);
-    if (devices_.ins() != nullptr) note_ins(pose);
-    note_scale(pose);
-  }
-}
-
-void Drive::note_placement(Stamp stamp) noexcept {
-  const Placement& p = comparison_->placement();
-  if (p.revision == placement_revision_) return;
-  placement_revision_ = p.revision;
-  std::array<char, 160> text{};
-  constexpr double kDegrees = 180.0 / std::numbers::pi;
-  (void)std::snprintf(text.data(), text.size(), "placed on the earth after %.1f m: heading to %.2f deg, residual %.2f m", p.distance,
-                      p.rotation_sigma.z() * kDegrees, p.residual);
-  journal_.tell(stamp, "placement", text.data(), false);
-}
-
-void Drive::note_ins(const ComparedPose& pose) noexcept {
-  constexpr std::uint64_t kSettled = 3;  // poses: one missed reading is no event
-  match_run_ = pose.ins == last_match_ ? match_run_ + 1 : 1;
-  last_match_ = pose.ins;
-  if (match_run_ != kSettled) return;
-  switch (pose.ins) {
-    case InsMatch::ok:
-      if (ins_matches_ > kSettled) journal_.tell(pose.pose.stamp, "ins_ok", "the INS has a position again; the comparison goes on", false);
-      break;
-    case InsMatch::none:
-      journal_.tell(pose.pose.stamp, "ins_silent", "the INS is silent: the drive goes on without it; check its cable and its rate", true);
-      break;
-    case InsMatch::gap:
-      journal_.tell(pose.pose.stamp, "ins_gap", "readings of the INS are missing: these poses are not compared", true);
-      break;
-    case InsMatch::no_fix:
-      journal_.tell(pose.pose.stamp, "ins_no_fix", "the INS has no position: the comparison pauses; check its antenna", true);
-      break;
-    case InsMatch::jump:  // told with the reading: it may fall between two frames
-      break;
-  }
-}
-
-void Drive::note_jump(Stamp stamp) noexcept {
-  const std::uint64_t jumps = comparison_->counters().jumps;
-  if (jumps == jumps_) return;
-  jumps_ = jumps;
-  journal_.tell(stamp, "ins_jump", "the INS's position leapt: not interpolated across, errors from here on contain the leap", true);
+  comparison_->add(sample, 0.0F);
 }
 
 void Drive::note_faults(Stamp stamp) noexcept {
@@ -279,20 +213,6 @@ void Drive::note_faults(Stamp stamp) noexcept {
     (void)std::snprintf(text.data(), text.size(), "%.*s, as scheduled", static_cast<int>(kind.size()), kind.data());
     journal_.tell(start_ + faults[i].at, "fault", text.data(), false);
   }
-}
-
-void Drive::note_scale(const ComparedPose& pose) noexcept {
-  if (pose.scale_disagrees) ++scale_disagreements_;
-  if (pose.scale_disagrees == scale_disagrees_) return;
-  scale_disagrees_ = pose.scale_disagrees;
-  std::array<char, 200> text{};
-  if (scale_disagrees_)
-    (void)std::snprintf(
-        text.data(), text.size(), "the way comes out %.1f %% %s than the INS's over %.0f m: images cannot tell, measure the baseline again",
-        100 * std::abs(pose.path_ratio - 1), pose.path_ratio > 1 ? "longer" : "shorter", comparison_options_.scale_stretch_m);
-  else
-    (void)std::snprintf(text.data(), text.size(), "the way is as long as the INS's again");
-  journal_.tell(pose.pose.stamp, scale_disagrees_ ? "scale_disagrees" : "scale_agrees", text.data(), scale_disagrees_);
 }
 
 // ---- the caller's thread ------------------------------------------------------------------------------------------
@@ -396,17 +316,10 @@ SummaryInput Drive::summary_input(const SessionTotals& totals, std::uint64_t all
   input.memory = memory();
   input.configuration_hash = configuration_hash(configuration_);
   input.devices = device_counters();
-  const ComparisonCounters& k = comparison_->counters();
-  if (devices_.ins() != nullptr)
-    input.comparison = {{"ins_samples", k.ins_samples},
-                        {"ins_refused", k.ins_refused},
-                        {"ins_restarts", k.ins_restarts},
-                        {"jumps", k.jumps},
-                        {"compared", k.compared},
-                        {"without_ins", k.without_ins},
-                        {"pushed_out", k.pushed_out},
-                        {"placements", comparison_->placement().revision},
-                        {"scale_disagrees", scale_disagreements_}};
+  if (devices_.ins() != nullptr) {
+    input.comparison = comparison_->counters();
+    input.earth = comparison_->earth("the configuration");
+  }
   input.time = time_.figures(c, devices_);
   if (devices_.mock() != nullptr) input.truth = truth_figures(totals);
   return input;
@@ -436,7 +349,7 @@ ExitCode Drive::verdict(const SessionTotals& totals, const std::vector<std::stri
     progress->say(fmt::format("vergence: camera {} was gone at the end; check its cable and power", fmt::join(source_->missing(), ", ")));
     return ExitCode::device_failed;
   }
-  if (devices_.ins() != nullptr && ins_matches_ == 0) {
+  if (devices_.ins() != nullptr && comparison_->matches() == 0) {
     progress->say("vergence: the INS never had a position for a frame: nothing is compared; the poses are there");
     return ExitCode::not_usable;
   }
@@ -461,6 +374,7 @@ ExitCode Drive::run() {
     };
   recorder_ = std::make_unique<Recorder>(request_.out, to_record);
   journal_.open(recorder_.get(), start_);
+  comparison_->open(recorder_.get());
   std::vector<std::string> faults;
   begin_session(request_.out, begin_, start_, recorder_.get(), &faults);
   if (request_.print_memory) print_memory_table(memory());
@@ -495,6 +409,9 @@ ExitCode Drive::run() {
   if (faults.empty()) end_session(request_.out, begin_, input, *totals, journal_.matches(), &faults);
   write_session_summary(request_.out, *totals, input, &faults);
   faults.insert(faults.end(), totals->faults.begin(), totals->faults.end());
+  for (const std::string& sentence :
+       write_other_formats(request_.out, request_.also, *totals, input.earth.value_or(EarthFigures{}), &faults))
+    progress.say("vergence: " + sentence);
   for (const std::string& sentence : recorder_->take_complaints()) progress.say("vergence: " + sentence);
   for (const std::string& sentence : faults) progress.say("vergence: " + sentence);
   if (!request_.quiet) tell(*totals, input, &progress);

@@ -6,6 +6,7 @@
 
 #include "app/commands/starting_calibration.hpp"
 #include "app/config/configuration.hpp"
+#include "app/recorder/other_formats.hpp"
 #include "app/runtime/errors.hpp"
 
 namespace vergence::app {
@@ -18,6 +19,7 @@ struct RunRequest {
   std::vector<std::string> faults;   // of the command line, beside the configuration's
   std::optional<double> duration_s;  // all of the drive when not set
   bool fast = false;                 // virtual time: nothing is dropped for time
+  std::vector<OtherFormat> also{};   // written beside the session's own files
   bool quiet = false;
   bool print_memory = false;
 };

@@ -82,10 +82,16 @@ struct SyncSettings {
 struct ComparisonSettings {
   double placement_m = 100;
   double correlation_s = 10;
+  double heading_sigma_deg = 0;
   double max_gap_ms = 100;
   double max_wait_ms = 500;
   double jump_m = 20;
   double scale_tolerance = 0.02;
+};
+
+/// `kitti_raw:` which of its four cameras are taken.
+struct KittiRawSettings {
+  int left = 0, right = 1;
 };
 
 /// What the intrinsics handed to the estimator are off by, sigmas.
@@ -130,6 +136,7 @@ struct Configuration {
   TriggerSettings trigger{};
   SyncSettings sync{};
   ComparisonSettings comparison{};
+  KittiRawSettings kitti_raw{};
   MockSettings mock{};
   std::array<std::string, kMostFaults> faults{};  // `KIND@SECONDS NAME=NUMBER …`; empty: none
   OdometryOptions odometry{};

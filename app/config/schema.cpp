@@ -282,10 +282,23 @@ Group comparison() {
       .number("placement_m", &C::placement_m, 1, 100000, "m",
               "Distance driven with a valid fix after which the path is placed on the earth.")
       .number("correlation_s", &C::correlation_s, 0.1, 3600, "s", "For so long the INS's position errors resemble one another.")
+      .number("heading_sigma_deg", &C::heading_sigma_deg, 0, 180, "°",
+              "Of the INS's heading as the camera has it, mount included: so it weighs in the placement. 0: not at all, or with a mount "
+              "published by a data set "
+              "0.3°.")
       .number("max_gap_ms", &C::max_gap_ms, 1, 10000, "ms", "Readings farther apart than this are not interpolated between.")
       .number("max_wait_ms", &C::max_wait_ms, 1, 3000, "ms", "A pose waits so long for the reading after it.")
       .number("jump_m", &C::jump_m, 0.1, 1e6, "m", "A step of the INS's position beyond this (and 60 m/s) is a jump.")
       .number("scale_tolerance", &C::scale_tolerance, 0.001, 1, "", "Relative difference of the path lengths that is told.")
+      .done();
+}
+
+Group kitti_raw() {
+  using K = KittiRawSettings;
+  return Rows<K>(
+             "kitti_raw", "Replays of KITTI raw drives.", [](auto& c) -> auto& { return c.kitti_raw; })
+      .integer("left", &K::left, 0, 3, "", "Left camera of a drive, `image_NN`: 0 grey, 2 colour.")
+      .integer("right", &K::right, 0, 3, "", "Right camera: 1 grey, 3 colour.")
       .done();
 }
 
@@ -503,8 +516,8 @@ Group monitor() {
 
 const std::vector<Group>& schema() {
   static const std::vector<Group> groups{
-      general(), rig(),        cameras(), exposure(), ins(), trigger(), sync(), odometry(), calibration_options(),
-      monitor(), comparison(), mock(),    faults()};
+      general(), rig(),        cameras(),   exposure(), ins(),   trigger(), sync(), odometry(), calibration_options(),
+      monitor(), comparison(), kitti_raw(), mock(),     faults()};
   return groups;
 }
 
@@ -518,6 +531,8 @@ std::string find_contradiction(const Configuration& c) {
   if (c.calibration.usable_depth_percent < c.calibration.good_depth_percent)
     return fmt::format("calibration.usable_depth_percent ({}) is below calibration.good_depth_percent ({})",
                        c.calibration.usable_depth_percent, c.calibration.good_depth_percent);
+  if (c.kitti_raw.left == c.kitti_raw.right)
+    return fmt::format("kitti_raw.left and kitti_raw.right are both camera {}; two cameras make a rig", c.kitti_raw.left);
   return {};
 }
 

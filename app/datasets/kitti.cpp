@@ -9,8 +9,6 @@
 namespace vergence::app::detail {
 namespace {
 
-using Projection = std::array<double, 12>;  // 3×4, row-major: P = K [I | t], pixels and metres
-
 std::vector<Stamp> read_times(const std::filesystem::path& file) {
   const std::string text = read_text(file);
   Lines lines(text);
@@ -24,18 +22,6 @@ std::vector<Stamp> read_times(const std::filesystem::path& file) {
   return times;
 }
 
-/// The camera that a rectified projection describes, and where it sits: X_k = X_rectified + t.
-Intrinsics camera_of(const Projection& P, Vec3* t, const std::filesystem::path& file, std::size_t line) {
-  Intrinsics k;
-  k.fx = P[0], k.fy = P[5], k.cx = P[2], k.cy = P[6];
-  if (!(k.fx > 0 && k.fy > 0)) refuse(file, line, "has a focal length that is not positive");
-  if (P[1] != 0 || P[4] != 0 || P[8] != 0 || P[9] != 0 || P[10] != 1)
-    refuse(file, line, "is not the projection of a rectified camera: [fx 0 cx .; 0 fy cy .; 0 0 1 .] is expected");
-  const double z = P[11];
-  *t = {(P[3] - k.cx * z) / k.fx, (P[7] - k.cy * z) / k.fy, z};
-  return k;
-}
-
 RigCalibration read_calibration_of(const std::filesystem::path& file) {
   const std::string text = read_text(file);
   Lines lines(text);
@@ -45,14 +31,14 @@ RigCalibration read_calibration_of(const std::filesystem::path& file) {
     const bool left = line.starts_with("P0:"), right = line.starts_with("P1:");
     if (!left && !right) continue;
     std::array<std::string_view, 12> fields;
-    Projection P{};
+    std::array<double, 12> P{};
     if (split(line.substr(3), ' ', fields) != fields.size())
       refuse(file, lines.number(), "does not have the 12 numbers of a projection matrix");
     for (std::size_t i = 0; i < fields.size(); ++i)
       if (!parse_number(fields[i], &P[i]))
         refuse(file, lines.number(), "`" + std::string(fields[i].substr(0, 40)) + "` is not a finite number");
     const std::size_t k = left ? 0 : 1;
-    cameras[k] = camera_of(P, &t[k], file, lines.number());
+    cameras[k] = rectified_camera(P, &t[k], file, lines.number());
   }
   for (std::size_t k = 0; k < 2; ++k)
     if (!cameras[k]) refuse(file, 0, std::string("has no line ") + (k == 0 ? "P0:" : "P1:") + " with the projection of that camera");
@@ -77,6 +63,17 @@ std::size_t index_of(const std::filesystem::path& root, const std::string& name,
 }
 
 }  // namespace
+
+Intrinsics rectified_camera(const std::array<double, 12>& P, Vec3* t, const std::filesystem::path& file, std::size_t line) {
+  Intrinsics k;
+  k.fx = P[0], k.fy = P[5], k.cx = P[2], k.cy = P[6];
+  if (!(k.fx > 0 && k.fy > 0)) refuse(file, line, "has a focal length that is not positive");
+  if (P[1] != 0 || P[4] != 0 || P[8] != 0 || P[9] != 0 || P[10] != 1)
+    refuse(file, line, "is not the projection of a rectified camera: [fx 0 cx .; 0 fy cy .; 0 0 1 .] is expected");
+  const double z = P[11];
+  *t = {(P[3] - k.cx * z) / k.fx, (P[7] - k.cy * z) / k.fy, z};
+  return k;
+}
 
 StereoSequence open_kitti(const std::filesystem::path& folder, bool given) {
   StereoSequence sequence;

@@ -1,12 +1,8 @@
 #pragma once
-#include <array>
-#include <cstddef>
 #include <filesystem>
 #include <string>
 #include <vector>
 
-#include "app/datasets/trajectory_files.hpp"
-#include "core/math/se3.hpp"
 #include "core/types/ins_sample.hpp"
 
 /// The INS of the UQ St Lucia stereo vehicular data set (Warren et al. 2010); its images come through open_sequence().
@@ -35,8 +31,5 @@ struct StLuciaIns {
 /// Without a log there are no samples, and a remark. InputError: several logs, more than one line in a hundred broken, positions that
 /// are no places.
 [[nodiscard]] StLuciaIns read_st_lucia_ins(const std::filesystem::path& folder);
-
-/// The left camera's way in the east-north-up axes at the first sample. p_ins = T_ins_left · p_left.
-[[nodiscard]] Trajectory st_lucia_reference(const StLuciaIns& ins, const Transform& T_ins_left);
 
 }  // namespace vergence::app

@@ -243,18 +243,4 @@ StLuciaIns read_st_lucia_ins(const std::filesystem::path& folder) {
   return ins;
 }
 
-Trajectory st_lucia_reference(const StLuciaIns& ins, const Transform& T_ins_left) {
-  Trajectory out;
-  if (ins.samples.empty()) return out;
-  const LocalTangentPlane plane(ins.samples.front().position);
-  for (const InsSample& s : ins.samples) {
-    Transform T_enu_ins;
-    T_enu_ins.t = plane.to_enu(s.position);
-    const Eigen::Quaterniond q(s.q_enu_ins[3], s.q_enu_ins[0], s.q_enu_ins[1], s.q_enu_ins[2]);
-    T_enu_ins.R = plane.rotation_from(s.position) * q.toRotationMatrix();
-    out.push_back({s.stamp, T_enu_ins * T_ins_left});
-  }
-  return out;
-}
-
 }  // namespace vergence::app

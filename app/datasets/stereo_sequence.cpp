@@ -12,10 +12,13 @@ namespace {
 
 std::string text(ImageSize s) { return std::to_string(s.width) + "x" + std::to_string(s.height); }
 
-StereoSequence open_by_format(SequenceFormat format, const std::filesystem::path& folder, bool given, const CalibrationUse& use) {
+StereoSequence open_by_format(SequenceFormat format, const std::filesystem::path& folder, bool given, const CalibrationUse& use,
+                              const std::array<int, 2>& cameras) {
   switch (format) {
     case SequenceFormat::kitti:
       return detail::open_kitti(folder, given);
+    case SequenceFormat::kitti_raw:
+      return detail::open_kitti_raw(folder, given, cameras);
     case SequenceFormat::euroc:
       return detail::open_euroc(folder, given);
     case SequenceFormat::folder:
@@ -29,9 +32,10 @@ StereoSequence open_by_format(SequenceFormat format, const std::filesystem::path
 }  // namespace
 
 StereoSequence open_sequence(SequenceFormat format, const std::filesystem::path& folder,
-                             const std::optional<std::filesystem::path>& calibration, const CalibrationUse& use) {
+                             const std::optional<std::filesystem::path>& calibration, const CalibrationUse& use,
+                             const std::array<int, 2>& cameras) {
   detail::require_folder(folder, "a drive");
-  StereoSequence sequence = open_by_format(format, folder, calibration.has_value(), use);
+  StereoSequence sequence = open_by_format(format, folder, calibration.has_value(), use, cameras);
   if (calibration) {
     sequence.calibration = read_calibration(*calibration, use).rig;
     sequence.calibration_source = calibration->filename().string();

@@ -15,7 +15,7 @@
 /// Recorded stereo drives as lists of image files with stamps: what a replay reads, whatever the data set's own layout.
 namespace vergence::app {
 
-enum class SequenceFormat : std::uint8_t { kitti, euroc, folder, st_lucia };
+enum class SequenceFormat : std::uint8_t { kitti, kitti_raw, euroc, folder, st_lucia };
 
 /// One frame as the data set lists it.
 struct StereoPair {
@@ -32,25 +32,29 @@ struct StereoSequence {
   std::filesystem::path root;
   std::vector<StereoPair> pairs;
   RigCalibration calibration;
-  std::string calibration_source;  // the file's name, for calibrations.csv
-  bool bayer = false;              // images are raw mosaics: grey is made of them (core/types/bayer.hpp)
+  std::string calibration_source;      // the file's name, for calibrations.csv
+  bool bayer = false;                  // images are raw mosaics: grey is made of them (core/types/bayer.hpp)
+  std::size_t left_out = 0;            // frames that are none of `pairs`: no stamp, no partner, out of order
+  std::vector<std::string> remarks{};  // what was left out or taken on trust: a sentence each
 };
 
 /// A drive of the given format. `calibration`: a calibration.yaml that is used instead of the data set's own.
 ///
 ///   kitti   calib.txt (P0, P1), times.txt (seconds), image_0/, image_1/ with NNNNNN.png: image N belongs to line N of times.txt
+///   kitti_raw  DATE_drive_NNNN_sync or _extract with image_NN/data and image_NN/timestamps.txt, the date's calib_*.txt above it; paired by
+///           stamps, that of the left camera counts; raw or rectified images, told by their size. `folder` is the drive, its date, or above
 ///   euroc   mav0/cam0, mav0/cam1 with data.csv and sensor.yaml, or that mav0 itself; paired by equal stamps; raw images
 ///   folder  left/, right/ paired in order of name, times.txt (a line a pair: integer nanoseconds, or seconds if it has a
 ///           point), calibration.yaml. Where one side lacks images that the other has, pairing goes by equal names.
 ///   st_lucia  PREFIX_MultiCamera0.log names the images in PREFIX_MultiCamera0/; paired by line, stamp of the left camera; raw Bayer BMP;
 ///           the calibration published with the data set
 ///
-/// `use`: what of the calibration is wanted, whichever it is.
+/// `use`: what of the calibration is wanted, whichever it is. `cameras`: left and right of a data set that has more than two (kitti_raw).
 /// InputError (file, line, what): folders or files that are not there, no images, numbers of images and times that do not go
 /// together, times that are no numbers, a calibration that makes no rig, images of another size than the calibration.
 [[nodiscard]] StereoSequence open_sequence(SequenceFormat format, const std::filesystem::path& folder,
                                            const std::optional<std::filesystem::path>& calibration = std::nullopt,
-                                           const CalibrationUse& use = {});
+                                           const CalibrationUse& use = {}, const std::array<int, 2>& cameras = {0, 1});
 
 /// Looks at the head of every image of pairs [first, first + count): InputError names the first that has another size than the
 /// calibration. Missing and unreadable files pass: their frames are skipped when they come. Some 10 µs an image.

@@ -83,7 +83,11 @@ void make_session_folder(const std::filesystem::path& folder) {
 
 Recorder::Recorder(const std::filesystem::path& folder, const Options& options)
     : options_(options), files_(std::make_unique<Files>(folder, options.ins)), totals_(std::make_unique<SessionTotals>()) {
-  if (options.keep_trajectory) totals_->trajectory.reserve(options.expected_frames), totals_->reference.reserve(options.expected_frames);
+  if (options.keep_trajectory) {
+    totals_->trajectory.reserve(options.expected_frames);
+    totals_->reference.reserve(options.expected_frames);
+    totals_->statuses.reserve(options.expected_frames);
+  }
   files_->poses.append(std::string(kPosesHeader) + "\n");
   files_->calibrations.append(std::string(kCalibrationsHeader) + "\n");
   if (files_->ins) files_->ins->append(std::string(kInsHeader) + "\n");
@@ -167,6 +171,7 @@ void Recorder::write(const PoseRecord& p) {
   if (options_.disk_full) pretend(p.stamp);
   ++totals_->read;
   match_confirmed();
+  if (options_.keep_trajectory) totals_->statuses.push_back(p.status);
   ++(p.status == PoseStatus::ok ? totals_->ok : p.status == PoseStatus::degraded ? totals_->degraded : totals_->lost);
   totals_->estimate.add(static_cast<double>(p.estimate_ms));
   if (p.state != State::stereo_odometry && p.state != State::lost) totals_->calibrating.add(static_cast<double>(p.estimate_ms));

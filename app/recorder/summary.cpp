@@ -246,6 +246,7 @@ Json summary_json(const SessionTotals& totals, const SummaryInput& input) {
                    {"lines", totals.lost_lines},        {"recorder_high_water", totals.ring_high_water}};
   json["devices"] = counters_json(input.devices);
   json["comparison"] = counters_json(input.comparison);
+  json["earth"] = input.earth ? earth_json(*input.earth) : Json();
   json["time"] = input.time ? time_json(*input.time) : Json();
   json["truth"] = truth_json(input.truth, input);
   json["version"] = std::string(version());

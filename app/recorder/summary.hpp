@@ -9,6 +9,7 @@
 
 #include <nlohmann/json_fwd.hpp>
 
+#include "app/recorder/earth_figures.hpp"
 #include "app/recorder/recorder.hpp"
 #include "app/recorder/time_figures.hpp"
 #include "core/calibration/options.hpp"
@@ -41,6 +42,7 @@ struct SummaryInput {
   std::string configuration_hash;
   std::vector<std::pair<std::string, std::uint64_t>> devices{};     // counters of the devices and of the pairing; none in a replay
   std::vector<std::pair<std::string, std::uint64_t>> comparison{};  // counters of the comparison with an INS
+  std::optional<EarthFigures> earth{};                              // with an INS
   std::optional<TruthFigures> truth{};
   std::optional<TimeFigures> time{};  // none in a replay
 };

@@ -34,6 +34,7 @@ const char* ComparisonOptions::validate() const noexcept {
   if (!positive(placement_m)) return "placement_m must be more than 0 m";
   if (!positive(correlation_s)) return "correlation_s must be more than 0 s";
   if (!positive(position_sigma_m) || !positive(height_sigma_m) || !positive(tilt_sigma_rad)) return "every sigma must be more than 0";
+  if (!(heading_sigma_rad >= 0)) return "heading_sigma must be 0 or more";
   if (max_gap <= Duration{} || max_wait <= Duration{}) return "max_gap and max_wait must be more than 0 s";
   if (!positive(jump_m)) return "jump_m must be more than 0 m";
   if (!positive(scale_stretch_m) || !positive(scale_tolerance)) return "scale_stretch_m and scale_tolerance must be more than 0";
@@ -41,11 +42,25 @@ const char* ComparisonOptions::validate() const noexcept {
   return nullptr;
 }
 
+namespace {
+
+/// Forward-left-up from right-down-forward.
+Mat3 body_from_camera() noexcept {
+  Mat3 R;
+  R << 0, 0, 1, -1, 0, 0, 0, -1, 0;
+  return R;
+}
+
+}  // namespace
+
 Transform mount_of(const Vec3& lever_arm_m, const Vec3& boresight_rad) noexcept {
-  Mat3 R_body_camera;  // forward-left-up from right-down-forward
-  R_body_camera << 0, 0, 1, -1, 0, 0, 0, -1, 0;
   const Mat3 turned = exp_so3({0, 0, boresight_rad.z()}) * exp_so3({0, boresight_rad.y(), 0}) * exp_so3({boresight_rad.x(), 0, 0});
-  return {turned * R_body_camera, lever_arm_m};
+  return {turned * body_from_camera(), lever_arm_m};
+}
+
+Vec3 boresight_of(const Mat3& R_ins_left) noexcept {
+  const Mat3 R = R_ins_left * body_from_camera().transpose();
+  return {std::atan2(R(2, 1), R(2, 2)), std::atan2(-R(2, 0), std::hypot(R(2, 1), R(2, 2))), std::atan2(R(1, 0), R(0, 0))};
 }
 
 const char* to_string(InsMatch m) noexcept {
@@ -162,7 +177,7 @@ void Comparison::collect(const ComparedPose& c, const Reading& sigmas) noexcept 
   if (driven_ >= next_pair_at_) {
     const PlacementPair pair{
         c.pose.stamp,          T_world_left.t,      c.reference.T_enu_left.t, c.reference.T_enu_left.R * T_world_left.R.transpose(),
-        sigmas.position_sigma, sigmas.height_sigma, sigmas.tilt_sigma};
+        sigmas.position_sigma, sigmas.height_sigma, sigmas.tilt_sigma,        options_.heading_sigma_rad};
     if (!pairs_.push(pair)) pairs_.back() = pair;  // full: the newest is the farthest, it holds the heading best
     next_pair_at_ = driven_ + options_.placement_m / static_cast<double>(kPlacementPairs);
   }

@@ -25,6 +25,9 @@ struct ComparisonOptions {
   double position_sigma_m = 2.5;
   double height_sigma_m = 5.0;
   double tilt_sigma_rad = 0.0087;  // half a degree
+  /// Of the INS's heading with all that lies between it and the camera's axes, for the placement; 0: the heading is the positions' alone,
+  /// as it must be where nobody knows the mount to a degree.
+  double heading_sigma_rad = 0;
   /// Two samples farther apart than this are not interpolated between.
   Duration max_gap = Duration::milliseconds(100);
   /// A pose waits so long for the INS sample after it, by the stamps of the poses that follow; then it goes out without.
@@ -44,6 +47,9 @@ struct ComparisonOptions {
 /// From where the left camera sits in the body of the INS (forward, left, up; m) and how the rig's forward-left-up axes are turned
 /// against the INS's (roll, pitch, yaw, rad: R = Rz(yaw) Ry(pitch) Rx(roll)). All zero: they look the same way.
 [[nodiscard]] Transform mount_of(const Vec3& lever_arm_m, const Vec3& boresight_rad) noexcept;
+
+/// The boresight that mount_of() makes this rotation of. At a pitch of ±90° roll and yaw are one turn: roll is then the rounding's.
+[[nodiscard]] Vec3 boresight_of(const Mat3& R_ins_left) noexcept;
 
 /// What the INS had to say at a frame's stamp.
 enum class InsMatch : std::uint8_t {

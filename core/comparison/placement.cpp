@@ -10,6 +10,7 @@ namespace {
 
 // rad: a heading known worse than this is no heading (a standing rig, or a way far shorter than the receiver's error).
 constexpr double kWorstHeading = 1.0;
+constexpr double kNoMount = 0.1;     // rad: no mount that was measured is off by six degrees
 constexpr double kConverged = 1e-9;  // rad and m: a thousandth of what any receiver or reader can tell
 
 /// Mean of what the attitudes say, then turned about up to the heading that the positions say, whatever the INS's heading was.
@@ -62,6 +63,13 @@ Normal normal_equations(std::span<const PlacementPair> pairs, const Mat3& R, con
     const double w_tilt = 1.0 / (n * p.tilt_sigma * p.tilt_sigma);
     out.H.topLeftCorner<3, 3>() += w_tilt * J_tilt.transpose() * J_tilt;
     out.g.head<3>() -= w_tilt * J_tilt.transpose() * up.head<2>();
+
+    // The rest of what the attitude says is a turn about up: r(φ) = turn − φ_z. A turn of many sigmas is a mount that nobody knows.
+    const double turn = log_so3(p.R_enu_world * R.transpose()).z();
+    if (!(p.heading_sigma > 0) || std::abs(turn) > kNoMount) continue;
+    const double w_heading = 1.0 / (n * p.heading_sigma * p.heading_sigma);
+    out.H(2, 2) += w_heading;
+    out.g[2] -= w_heading * turn;
   }
   return out;
 }

@@ -241,17 +241,5 @@ TEST(StLuciaIns, whatIsNoSuchLogIsRefused) {
   EXPECT_TRUE(says(none, "holds no file that ends in _Ins0.log"));
 }
 
-TEST(StLuciaIns, theReferenceIsTheLeftCamerasWayFromTheFirstPlace) {
-  const Transform T_ins_left{Mat3::Identity(), {1, 0.5, 0.25}};
-  const Trajectory path = st_lucia_reference(read(ins_lines({})), T_ins_left);
-  ASSERT_EQ(path.size(), 800U);
-  EXPECT_LT((path[0].T_world_body.t - Way::R(0) * T_ins_left.t).norm(), 1e-6);
-  Vec3 way = Vec3::Zero();
-  for (int i = 0; i < 4000; ++i) way += 0.005 * Way::velocity(0.005 * (i + 0.5));  // 20 s
-  const Vec3 expected = way + Way::R(20) * T_ins_left.t;
-  // The axes at the place there, 150 m on, lean by that over the earth's radius; the midpoint sum is good to 0.1 mm.
-  EXPECT_LT((path[400].T_world_body.t - expected).norm(), 1e-3);
-}
-
 }  // namespace
 }  // namespace vergence::app

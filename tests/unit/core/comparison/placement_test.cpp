@@ -56,6 +56,27 @@ TEST(FitPlacement, headingOfTheInsIsNotUsed) {
   }
 }
 
+TEST(FitPlacement, headingWithASigmaSharesWithThePositions) {
+  const double wrong = 0.01;
+  const auto turned = [&](double heading_sigma, double by) {
+    auto pairs = drive(100, 0.0, 200);
+    for (PlacementPair& p : pairs) {
+      p.R_enu_world = exp_so3({0, 0, by}) * p.R_enu_world;
+      p.heading_sigma = heading_sigma;
+    }
+    Placement placement;
+    EXPECT_EQ(fit_placement(pairs, kCorrelation, &placement), PlacementStatus::ok);
+    return placement;
+  };
+  EXPECT_LT(rotation_error(turned(10.0, wrong)), 1e-3 * wrong);
+  EXPECT_GT(rotation_error(turned(1e-5, wrong)), 0.98 * wrong);
+  // As for the pitch: two independent places over 100 m hold the heading to σ √12 / (L √2).
+  const double sigma = 2.5 * std::sqrt(12.0) / (100.0 * std::sqrt(2.0));
+  EXPECT_NEAR(rotation_error(turned(sigma, wrong)), 0.5 * wrong, 0.02 * wrong);
+  EXPECT_NEAR(turned(sigma, wrong).rotation_sigma.z(), sigma / std::sqrt(2.0), 0.02 * sigma);
+  EXPECT_LT(rotation_error(turned(1e-5, 1.0)), 1e-6) << "a mount that is no mount is not taken";
+}
+
 TEST(FitPlacement, aStraightRoadTakesItsRollFromTheAttitude) {
   Placement placement;
   ASSERT_EQ(fit_placement(drive(100, 0.0, 200), kCorrelation, &placement), PlacementStatus::ok);
