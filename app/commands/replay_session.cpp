@@ -213,14 +213,14 @@ ExitCode Replay::run() {
   for (const std::string& sentence : recorder_->take_complaints()) progress.say("vergence: " + sentence);
   for (const std::string& sentence : faults) progress.say("vergence: " + sentence);
   if (!request_.quiet) tell(*totals, input, &progress);
-  write_session_report(request_.out, request_.quiet, &progress);
+  const bool usable = write_session_report(request_.out, request_.quiet, &progress);
 
   if (const auto stopped = signals.stop_code()) return *stopped;
   if (totals->ok + totals->degraded == 0) {
     progress.say("vergence: there never was a pose; events.jsonl and poses.csv in " + request_.out.string() + " say why");
     return ExitCode::not_usable;
   }
-  return faults.empty() ? ExitCode::done : ExitCode::not_usable;
+  return usable && faults.empty() ? ExitCode::done : ExitCode::not_usable;
 }
 
 /// The way of the INS of a St Lucia drive; what its log had to be taken for is said.

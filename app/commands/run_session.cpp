@@ -498,8 +498,9 @@ ExitCode Drive::run() {
   for (const std::string& sentence : recorder_->take_complaints()) progress.say("vergence: " + sentence);
   for (const std::string& sentence : faults) progress.say("vergence: " + sentence);
   if (!request_.quiet) tell(*totals, input, &progress);
-  write_session_report(request_.out, request_.quiet, &progress);
-  const ExitCode code = verdict(*totals, faults, &progress);
+  const bool usable = write_session_report(request_.out, request_.quiet, &progress);
+  ExitCode code = verdict(*totals, faults, &progress);
+  if (code == ExitCode::done && !usable) code = ExitCode::not_usable;
   return signals_.stop_code().value_or(code);
 }
 

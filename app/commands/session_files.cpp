@@ -120,12 +120,15 @@ void write_session_summary(const std::filesystem::path& session, const SessionTo
   }
 }
 
-void write_session_report(const std::filesystem::path& session, bool quiet, Progress* progress) {
+bool write_session_report(const std::filesystem::path& session, bool quiet, Progress* progress) {
   try {
     const ReportOutcome outcome = write_report(session);
     if (!quiet) progress->say(fmt::format("report {}: {}", outcome.page.string(), outcome.headline));
+    if (!outcome.usable) progress->say("vergence: do not use these poses: " + outcome.main_reason);
+    return outcome.usable;
   } catch (const InputError& e) {
     progress->say(std::string("vergence: ") + e.what());
+    return true;  // nobody knows better
   }
 }
 

@@ -1,0 +1,74 @@
+#include "app/report/usability.hpp"
+
+#include <algorithm>
+#include <array>
+#include <string_view>
+
+#include <fmt/format.h>
+
+#include "app/report/advice.hpp"
+
+namespace vergence::app::report {
+namespace {
+
+/// Reasons that time alone may end.
+bool is_waiting(std::string_view reason) {
+  constexpr std::array kWaiting{"unverified_calibration", "unconfirmed",          "uncalibrated",
+                                "needs_motion",           "needs_near_structure", "needs_texture"};
+  return std::find(kWaiting.begin(), kWaiting.end(), reason) != kWaiting.end();
+}
+
+struct Main {
+  std::string_view word;
+  std::size_t frames = 0;
+};
+
+/// The reason of most frames that are not ok; of frames that were not read, the kind of most events.
+Main main_reason(const Session& s, const Analysis& a) {
+  Main main;
+  for (std::size_t i = 0; i < std::min(s.reasons.size(), a.by_reason.size()); ++i)
+    if (!s.reasons[i].empty() && a.by_reason[i] > main.frames) main = {s.reasons[i], a.by_reason[i]};
+  for (const Advice& skip : skip_advice()) {
+    const auto count =
+        static_cast<std::size_t>(std::count_if(s.events.begin(), s.events.end(), [&skip](const Event& e) { return e.kind == skip.word; }));
+    if (count > main.frames) main = {skip.word, count};
+  }
+  return main;
+}
+
+/// Why no calibration was taken, where the drive sought one in vain.
+std::string_view rejection(const Session& s) {
+  std::string_view why;
+  for (const CalibrationRow& row : s.calibrations) {
+    if (row.accepted) return {};
+    if (!row.kept && !row.reason.empty()) why = row.reason;
+  }
+  return why;
+}
+
+}  // namespace
+
+Usability usability_of(const Session& s, const Analysis& a) {
+  if (!a.ok_share || a.ok > 0) return {};
+  std::size_t waiting = 0;
+  for (const Frame& f : s.frames)
+    if (f.status == PoseStatus::degraded && is_waiting(s.reasons[f.reason])) ++waiting;
+  const std::string_view rejected = rejection(s);
+  if (waiting > 0 && waiting == a.degraded && a.read < kFramesToConfirm && a.lost + a.skipped <= a.read / 10)
+    return {Use::unverified,
+            fmt::format("unverified: the drive ended after {} frames, before it could confirm its calibration, which takes some {}", a.read,
+                        kFramesToConfirm),
+            std::string(rejected)};
+  const Main main = main_reason(s, a);
+  const bool posed = a.degraded > 0;
+  Usability u{Use::nothing, "", std::string(advice_for(main.word))};
+  u.reason = posed ? fmt::format("not one of {} frames is ok", a.read + a.skipped) : "there never was a pose";
+  if (main.frames > 0) u.reason += fmt::format(": {} ({} of {} frames)", main.word, main.frames, a.read + a.skipped);
+  if (!rejected.empty()) {
+    u.reason += fmt::format("; no calibration was found: {}", rejected);
+    u.advice = "";
+  }
+  return u;
+}
+
+}  // namespace vergence::app::report
