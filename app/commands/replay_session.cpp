@@ -150,7 +150,7 @@ SummaryInput Replay::summary_input(const SessionTotals& totals, std::uint64_t al
   input.skipped = skipped_;
   input.dropped_by_estimator = journal_.dropped();
   if (!truth_.empty() && !totals.trajectory.empty()) input.evaluation = evaluate(totals.trajectory, truth_, summary_evaluation_options());
-  describe_calibration(*estimator_, begin_, totals, options_, &input);
+  describe_calibration(*estimator_, begin_, totals, options_, journal_.matches(), &input);
   input.allocations_after_seal = allocations;
   input.memory = memory();
   input.configuration_hash = configuration_hash(request_.configuration);

@@ -391,7 +391,7 @@ SummaryInput Drive::summary_input(const SessionTotals& totals, std::uint64_t all
   input.dropped_by_estimator = journal_.dropped();
   if (!totals.reference.empty() && !totals.trajectory.empty())
     input.evaluation = evaluate(totals.trajectory, totals.reference, summary_evaluation_options());
-  describe_calibration(*estimator_, begin_, totals, options_, &input);
+  describe_calibration(*estimator_, begin_, totals, options_, journal_.matches(), &input);
   input.allocations_after_seal = allocations;
   input.memory = memory();
   input.configuration_hash = configuration_hash(configuration_);

@@ -39,7 +39,7 @@ void begin_session(const std::filesystem::path& session, const StartingCalibrati
 
 /// The calibration's part of the summary.
 void describe_calibration(const Estimator& estimator, const StartingCalibration& begin, const SessionTotals& totals,
-                          const EstimatorOptions& options, SummaryInput* input);
+                          const EstimatorOptions& options, const MatchSample& matches, SummaryInput* input);
 
 /// What is to be said of a calibration that the drive has not confirmed; empty: it has, or there is none.
 [[nodiscard]] std::string verification_sentence(const SummaryInput& input);

@@ -87,6 +87,28 @@ void judge_drift(const Analysis& a, Judge* j) {
   }
 }
 
+/// A calibration written down in a way that the matches give away.
+void judge_mistake(const Session& s, const Analysis& a, Judge* j) {
+  struct Mistake {
+    std::string_view word;
+    const char *reason, *advice;
+  };
+  constexpr std::array kMistakes{
+      Mistake{
+          "rotation_transposed", "T_camera_left is inverted: the images fit its rotation transposed",
+          "T_camera_left takes points of the left camera to the other one, X_camera = R X_left + t; give R transposed and -R^T t of what "
+          "stands there now."},
+      Mistake{"already_rectified", "distortion is given for images that have none: they are rectified already",
+              "Give distortion: [0, 0, 0, 0] for rectified images, with the focal length and principal point of the rectification."}};
+  const std::string word = text_at(s.summary, "calibration.mistake");
+  for (const Mistake& m : kMistakes) {
+    if (word != m.word) continue;
+    j->find(a.ok > 0 ? Grade::care : Grade::bad, m.reason);
+    j->advise(m.advice);
+    if (a.ok == 0) j->give_up(std::string(m.reason), m.advice);
+  }
+}
+
 /// What matches far from their epipolar lines near the image's edges tell of the lenses.
 void judge_lenses(const Session& s, const Analysis& a, Judge* j) {
   const Fit begin = fit_of(s, false), end = fit_of(s, true);
@@ -258,13 +280,15 @@ const char* to_words(Grade grade) noexcept {
 Verdict judge(const Session& session, const Analysis& analysis) {
   Judge j;
   const Usability use = usability_of(session, analysis);
+  judge_mistake(session, analysis, &j);
   judge_frames(session, analysis, use, &j);
-  judge_drift(analysis, &j);
+  if (analysis.source != ErrorSource::none) judge_drift(analysis, &j);
   judge_calibration(session, use, &j);
   judge_lenses(session, analysis, &j);
   judge_verification(session, analysis, use, &j);
   advise_on_events(session, &j);
   judge_session(session, analysis, &j);
+  if (analysis.source == ErrorSource::none) judge_drift(analysis, &j);
   advise_by_reasons(session, analysis, &j);
   Verdict v = j.finish();
   for (const std::string& reason : v.reasons) v.sentence += (v.sentence.empty() ? "" : "; ") + reason;
