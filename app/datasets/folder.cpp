@@ -1,4 +1,6 @@
 #include <algorithm>
+#include <array>
+#include <span>
 
 #include "app/config/calibration_file.hpp"
 #include "app/datasets/decimal.hpp"
@@ -8,16 +10,44 @@
 namespace vergence::app::detail {
 namespace {
 
-std::vector<Stamp> read_times(const std::filesystem::path& file) {
+/// A line of times.txt: `stamp`, `stamp,file` (of that name on both sides) or `stamp,left file,right file`.
+struct Line {
+  Stamp stamp{};
+  std::array<std::string, 2> name{};  // empty: by order
+};
+
+std::array<std::string, 2> names_of(const std::filesystem::path& file, std::size_t line, std::span<const std::string_view> fields) {
+  std::array<std::string, 2> names;
+  for (std::size_t k = 0; k < 2; ++k) {
+    const std::string_view name = fields[std::min(k + 1, fields.size() - 1)];
+    if (name.empty() || name == "." || name == ".." || name.find('/') != std::string_view::npos)
+      refuse(file, line, "`" + std::string(name.substr(0, 40)) + "` is no name of an image in left/ and right/");
+    names[k] = (k == 0 ? "left/" : "right/") + std::string(name);
+  }
+  return names;
+}
+
+std::vector<Line> read_times(const std::filesystem::path& file) {
   const std::string text = read_text(file);
   Lines lines(text);
-  std::vector<Stamp> times;
+  std::vector<Line> times;
   for (std::string_view line; lines.next(&line);) {
-    const auto ns = line.find('.') != std::string_view::npos ? parse_seconds_ns(line) : parse_integer(line);
+    std::array<std::string_view, 3> fields;
+    const std::size_t count = split(line, ',', fields);
+    if (count > fields.size())
+      refuse(file, lines.number(), "has " + std::to_string(count) + " columns; stamp[,file[,right file]] is expected");
+    const auto ns = fields[0].find('.') != std::string_view::npos ? parse_seconds_ns(fields[0]) : parse_integer(fields[0]);
     if (!ns)
-      refuse(file, lines.number(), "`" + std::string(line.substr(0, 40)) + "` is neither integer nanoseconds nor seconds with a point");
-    times.emplace_back(*ns);
+      refuse(file, lines.number(),
+             "`" + std::string(fields[0].substr(0, 40)) + "` is neither integer nanoseconds nor seconds with a point" +
+                 (lines.number() == 1 && count > 1 ? "; begin a line of headings with #" : ""));
+    Line entry{Stamp(*ns), {}};
+    if (count > 1) entry.name = names_of(file, lines.number(), std::span(fields).first(count));
+    if (!times.empty() && times.front().name[0].empty() != entry.name[0].empty())
+      refuse(file, lines.number(), "names an image where other lines do not, or the other way round; every line is of the same kind");
+    times.push_back(std::move(entry));
   }
+  if (times.empty()) refuse(file, 0, "holds no times; one line a pair is expected");
   return times;
 }
 
@@ -46,21 +76,40 @@ std::vector<StereoPair> pair_in_order(const std::vector<std::string>& left, cons
   return pairs;
 }
 
+/// Images as times.txt names them; some may be missing, but not all of a side.
+std::vector<StereoPair> pair_as_named(const std::filesystem::path& folder, const std::vector<Line>& times,
+                                      const std::array<std::vector<std::string>, 2>& there) {
+  std::vector<StereoPair> pairs(times.size());
+  for (std::size_t i = 0; i < times.size(); ++i) pairs[i] = {times[i].stamp, times[i].name};
+  for (std::size_t k = 0; k < 2; ++k)
+    if (std::none_of(times.begin(), times.end(),
+                     [&](const Line& line) { return std::binary_search(there[k].begin(), there[k].end(), line.name[k]); }))
+      refuse(folder / "times.txt", 0,
+             "names no image that is there: the first is " + times.front().name[k] + ", the folder has " + there[k].front());
+  return pairs;
+}
+
 }  // namespace
 
 StereoSequence open_folder(const std::filesystem::path& folder, bool given, const CalibrationUse& use) {
   StereoSequence sequence;
   sequence.root = folder;
   const auto left = list_images(folder, "left"), right = list_images(folder, "right");
-  const auto times = read_times(folder / "times.txt");
-  // In order of name as long as the numbers agree; else a name that only one side has is an image that the other lost.
-  const bool in_order = left.size() == right.size() && left.size() == times.size();
-  sequence.pairs = in_order ? pair_in_order(left, right) : pair_by_name(left, right);
-  if (sequence.pairs.size() != times.size())
-    refuse(folder, 0,
-           "has " + std::to_string(left.size()) + " images in left/, " + std::to_string(right.size()) + " in right/ and " +
-               std::to_string(times.size()) + " lines in times.txt; one of each a pair is expected");
-  for (std::size_t i = 0; i < times.size(); ++i) sequence.pairs[i].stamp = times[i];
+  sequence.times = folder / "times.txt";
+  const std::vector<Line> times = read_times(sequence.times);
+  if (!times.front().name[0].empty()) {
+    sequence.pairs = pair_as_named(folder, times, {left, right});
+  } else {
+    // In order of name as long as the numbers agree; else a name that only one side has is an image that the other lost.
+    const bool in_order = left.size() == right.size() && left.size() == times.size();
+    sequence.pairs = in_order ? pair_in_order(left, right) : pair_by_name(left, right);
+    if (sequence.pairs.size() != times.size())
+      refuse(folder, 0,
+             "has " + std::to_string(left.size()) + " images in left/, " + std::to_string(right.size()) + " in right/ and " +
+                 std::to_string(times.size()) +
+                 " lines in times.txt; one of each a pair is expected (a line may name its image: stamp,file)");
+    for (std::size_t i = 0; i < times.size(); ++i) sequence.pairs[i].stamp = times[i].stamp;
+  }
   if (given) return sequence;
   sequence.calibration = read_calibration(folder / "calibration.yaml", use).rig;
   sequence.calibration_source = "calibration.yaml";

@@ -81,7 +81,8 @@ std::size_t index_of(const std::filesystem::path& root, const std::string& name,
 StereoSequence open_kitti(const std::filesystem::path& folder, bool given) {
   StereoSequence sequence;
   sequence.root = folder;
-  const std::vector<Stamp> times = read_times(folder / "times.txt");
+  sequence.times = folder / "times.txt";
+  const std::vector<Stamp> times = read_times(sequence.times);
   sequence.pairs.resize(times.size());
   for (std::size_t i = 0; i < times.size(); ++i) sequence.pairs[i].stamp = times[i];
   for (std::size_t k = 0; k < 2; ++k) {

@@ -36,6 +36,7 @@ StereoSequence open_sequence(SequenceFormat format, const std::filesystem::path&
     sequence.calibration = read_calibration(*calibration, use).rig;
     sequence.calibration_source = calibration->filename().string();
   }
+  check_times(sequence);
   apply_use(use, &sequence.calibration);
   const std::filesystem::path source = calibration.value_or(sequence.root / sequence.calibration_source);
   if (const auto bad = find_implausible(&sequence.calibration)) refuse(source, 0, bad->sentence);

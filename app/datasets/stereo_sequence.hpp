@@ -33,6 +33,7 @@ struct StereoSequence {
   std::vector<StereoPair> pairs;
   RigCalibration calibration;
   std::string calibration_source;  // the file's name, for calibrations.csv
+  std::filesystem::path times;     // the file that the stamps are from, for sentences about them
   bool bayer = false;              // images are raw mosaics: grey is made of them (core/types/bayer.hpp)
 };
 
@@ -41,16 +42,22 @@ struct StereoSequence {
 ///   kitti   calib.txt (P0, P1), times.txt (seconds), image_0/, image_1/ with NNNNNN.png: image N belongs to line N of times.txt
 ///   euroc   mav0/cam0, mav0/cam1 with data.csv and sensor.yaml, or that mav0 itself; paired by equal stamps; raw images
 ///   folder  left/, right/ paired in order of name, times.txt (a line a pair: integer nanoseconds, or seconds if it has a
-///           point), calibration.yaml. Where one side lacks images that the other has, pairing goes by equal names.
+///           point), calibration.yaml. Where one side lacks images that the other has, pairing goes by equal names; where the lines of
+///           times.txt name their images, `stamp,file` or `stamp,left file,right file`, by these.
 ///   st_lucia  PREFIX_MultiCamera0.log names the images in PREFIX_MultiCamera0/; paired by line, stamp of the left camera; raw Bayer BMP;
 ///           the calibration published with the data set
 ///
 /// `use`: what of the calibration is wanted, whichever it is.
 /// InputError (file, line, what): folders or files that are not there, no images, numbers of images and times that do not go
-/// together, times that are no numbers, a calibration that makes no rig, images of another size than the calibration.
+/// together, times that are no numbers, times in another unit or running backwards (check_times()), a calibration that makes no rig, images
+/// of another size than the calibration.
 [[nodiscard]] StereoSequence open_sequence(SequenceFormat format, const std::filesystem::path& folder,
                                            const std::optional<std::filesystem::path>& calibration = std::nullopt,
                                            const CalibrationUse& use = {});
+
+/// InputError where the stamps cannot be those of a drive: most do not go forward, or the median step between pairs is below 1 ms or above
+/// 10 s. The sentence asks for the unit that would make them one.
+void check_times(const StereoSequence& sequence);
 
 /// Looks at the head of every image of pairs [first, first + count): InputError names the first that has another size than the
 /// calibration. Missing and unreadable files pass: their frames are skipped when they come. Some 10 µs an image.

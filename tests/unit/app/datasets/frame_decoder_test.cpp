@@ -94,7 +94,7 @@ TEST_F(Decoder, missingTornAndForeignImagesSkipTheirFrameAndNoOther) {
 
 TEST_F(Decoder, timesThatDoNotGoForwardsSkipTheirFrame) {
   open(5);
-  folder_.write("times.txt", "100\n300\n200\n300\n301\n");
+  folder_.write("times.txt", "0.1\n0.3\n0.2\n0.3\n0.31\n");
   reopen();
   const auto seen = drain(0, 5);
   ASSERT_EQ(seen.size(), 5U);
@@ -102,7 +102,7 @@ TEST_F(Decoder, timesThatDoNotGoForwardsSkipTheirFrame) {
   for (std::size_t i = 0; i < 5; ++i) EXPECT_EQ(seen[i].pair.decoded, decoded[i]) << i;
   EXPECT_STREQ(seen[2].pair.kind, "time_backwards");
   EXPECT_EQ(std::string(seen[2].pair.note.data()),
-            "frame 2 skipped: its time 0.000000200 is not later than 0.000000300, the latest before it");
+            "frame 2 skipped: its time 0.200000000 is not later than 0.300000000, the latest before it");
 }
 
 TEST_F(Decoder, aLongNameIsCutNotOverrun) {
