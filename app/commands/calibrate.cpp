@@ -13,6 +13,7 @@
 #include "app/commands/commands.hpp"
 #include "app/commands/common_options.hpp"
 #include "app/commands/drive_calibration.hpp"
+#include "app/commands/given_calibration.hpp"
 #include "app/commands/replay_session.hpp"
 
 namespace vergence::app {
@@ -75,13 +76,15 @@ ExitCode convert(const Arguments& a) {
 /// An ordinary drive instead of a board.
 ExitCode calibrate_from_drive(const Arguments& a) {
   if (a.out.empty()) throw InputError("--out is missing: the calibration.yaml to write");
-  if (a.format.empty()) throw InputError("--format is missing: the layout of --drive's folder, as replay has it");
   check_writable(a.out);
   const Configuration c = a.common.configuration(std::nullopt);
-  std::optional<std::filesystem::path> file;
-  if (a.calibration) file = *a.calibration;
+  const SequenceFormat format = sequence_format(a.format.empty() ? "auto" : a.format, a.drive);
+  const CalibrationUse use{true, a.baseline.value_or(0)};
+  std::vector<std::string> remarks;
   // Of what the drive comes with only lenses and length are read: how its cameras sit need not be known.
-  const StereoSequence sequence = open_sequence(sequence_format(a.format), a.drive, file, {true, a.baseline.value_or(0)});
+  const StereoSequence sequence = a.calibration ? open_sequence(format, a.drive, calibration_source(*a.calibration, use, &remarks), use)
+                                                : open_sequence(format, a.drive, std::nullopt, use);
+  for (const std::string& sentence : remarks) std::cerr << "vergence: " << sentence << '\n';
   check_image_sizes(sequence, 0, sequence.pairs.size());
   const StartingCalibration told = replayed_calibration(c, sequence, true);
   Progress progress = Progress::on_stderr(a.common.quiet);

@@ -51,6 +51,15 @@ std::vector<Line> read_times(const std::filesystem::path& file) {
   return times;
 }
 
+/// Where nobody wrote down when: motion is predicted by frames, so a rate that is wrong spoils no pose, but every stamp.
+std::vector<Line> assumed_times(std::size_t count, std::string* remark) {
+  constexpr std::int64_t kStep = 100'000'000;  // ns
+  std::vector<Line> times(count);
+  for (std::size_t i = 0; i < count; ++i) times[i].stamp = Stamp(static_cast<std::int64_t>(i) * kStep);
+  *remark = "there is no times.txt: pairs are taken to be 0.1 s apart; write one line a pair, seconds with a point or whole nanoseconds";
+  return times;
+}
+
 std::string stem(const std::string& name) { return std::filesystem::path(name).stem().string(); }
 
 /// Both lists sorted; equal stems meet, the others stand alone. A side that has no image gets the name it should have had.
@@ -96,7 +105,9 @@ StereoSequence open_folder(const std::filesystem::path& folder, bool given, cons
   sequence.root = folder;
   const auto left = list_images(folder, "left"), right = list_images(folder, "right");
   sequence.times = folder / "times.txt";
-  const std::vector<Line> times = read_times(sequence.times);
+  const std::vector<Line> times = std::filesystem::exists(sequence.times)
+                                      ? read_times(sequence.times)
+                                      : assumed_times(std::max(left.size(), right.size()), &sequence.remark);
   if (!times.front().name[0].empty()) {
     sequence.pairs = pair_as_named(folder, times, {left, right});
   } else {

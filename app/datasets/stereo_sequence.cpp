@@ -26,19 +26,37 @@ StereoSequence open_by_format(SequenceFormat format, const std::filesystem::path
   refuse(folder, 0, "has no reader for its format");
 }
 
+/// What all formats have to hold, whoever gave the calibration. `source`: the file it is from.
+StereoSequence checked(StereoSequence sequence, const std::filesystem::path& source, const CalibrationUse& use);
+
 }  // namespace
 
 StereoSequence open_sequence(SequenceFormat format, const std::filesystem::path& folder,
                              const std::optional<std::filesystem::path>& calibration, const CalibrationUse& use) {
+  if (calibration)
+    return open_sequence(
+        format, folder,
+        CalibrationSource{calibration->string(), [&](const StereoSequence&) { return read_calibration(*calibration, use); }}, use);
   detail::require_folder(folder, "a drive");
-  StereoSequence sequence = open_by_format(format, folder, calibration.has_value(), use);
-  if (calibration) {
-    sequence.calibration = read_calibration(*calibration, use).rig;
-    sequence.calibration_source = calibration->filename().string();
-  }
+  StereoSequence sequence = open_by_format(format, folder, false, use);
+  const std::filesystem::path source = sequence.root / sequence.calibration_source;
+  return checked(std::move(sequence), source, use);
+}
+
+StereoSequence open_sequence(SequenceFormat format, const std::filesystem::path& folder, const CalibrationSource& calibration,
+                             const CalibrationUse& use) {
+  detail::require_folder(folder, "a drive");
+  StereoSequence sequence = open_by_format(format, folder, true, use);
+  sequence.calibration = calibration.read(sequence).rig;
+  sequence.calibration_source = std::filesystem::path(calibration.name).filename().string();
+  return checked(std::move(sequence), calibration.name, use);
+}
+
+namespace {
+
+StereoSequence checked(StereoSequence sequence, const std::filesystem::path& source, const CalibrationUse& use) {
   check_times(sequence);
   apply_use(use, &sequence.calibration);
-  const std::filesystem::path source = calibration.value_or(sequence.root / sequence.calibration_source);
   if (const auto bad = find_implausible(&sequence.calibration)) refuse(source, 0, bad->sentence);
   if (sequence.calibration.cameras != 2)
     refuse(source, 0, "describes " + std::to_string(sequence.calibration.cameras) + " cameras; a stereo drive has two");
@@ -49,6 +67,26 @@ StereoSequence open_sequence(SequenceFormat format, const std::filesystem::path&
                "; both have to be of one size");
   check_image_sizes(sequence, 0, std::min<std::size_t>(1, sequence.pairs.size()));
   return sequence;
+}
+
+}  // namespace
+
+std::optional<SequenceFormat> find_format(const std::filesystem::path& folder) {
+  std::error_code ignored;
+  const auto has = [&](const char* name) { return std::filesystem::exists(folder / name, ignored); };
+  if (has("mav0") || (has("cam0") && has("cam1"))) return SequenceFormat::euroc;
+  if (has("image_0") && has("image_1")) return SequenceFormat::kitti;
+  if (has("left") && has("right")) return SequenceFormat::folder;
+  for (std::filesystem::directory_iterator it(folder, ignored), end; !ignored && it != end; it.increment(ignored))
+    if (it->path().filename().string().ends_with("_MultiCamera0.log")) return SequenceFormat::st_lucia;
+  return std::nullopt;
+}
+
+ImageSize first_image_size(const StereoSequence& sequence, std::size_t camera) {
+  ImageSize size;
+  for (const StereoPair& pair : sequence.pairs)
+    if (!pair.file[camera].empty() && read_image_size(sequence.root / pair.file[camera], &size) == ImageFileStatus::ok) return size;
+  refuse(sequence.root, 0, std::string("has no readable image of the ") + (camera == 0 ? "left" : "right") + " camera");
 }
 
 void check_image_sizes(const StereoSequence& sequence, std::size_t first, std::size_t count) {
@@ -93,13 +131,6 @@ std::vector<std::string> list_images(const std::filesystem::path& root, const st
   if (names.empty()) refuse(folder, 0, "holds no PNG or JPEG image");
   std::sort(names.begin(), names.end());
   return names;
-}
-
-ImageSize first_image_size(const StereoSequence& sequence, std::size_t camera) {
-  ImageSize size;
-  for (const StereoPair& pair : sequence.pairs)
-    if (!pair.file[camera].empty() && read_image_size(sequence.root / pair.file[camera], &size) == ImageFileStatus::ok) return size;
-  refuse(sequence.root, 0, std::string("has no readable image of the ") + (camera == 0 ? "left" : "right") + " camera");
 }
 
 }  // namespace detail

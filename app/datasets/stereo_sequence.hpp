@@ -3,12 +3,14 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "app/config/calibration_file.hpp"
+#include "app/datasets/image_file.hpp"
 #include "core/types/calibration.hpp"
 #include "core/types/time.hpp"
 
@@ -34,8 +36,18 @@ struct StereoSequence {
   RigCalibration calibration;
   std::string calibration_source;  // the file's name, for calibrations.csv
   std::filesystem::path times;     // the file that the stamps are from, for sentences about them
+  std::string remark{};            // what had to be assumed, a sentence for the user; empty: nothing
   bool bayer = false;              // images are raw mosaics: grey is made of them (core/types/bayer.hpp)
 };
+
+/// A calibration that is used instead of the data set's own: where it is from, and how to have it, given the images that are there.
+struct CalibrationSource {
+  std::string name;
+  std::function<CalibrationFile(const StereoSequence& images)> read;
+};
+
+/// The format of a folder by what is in it; nothing: none that is known.
+[[nodiscard]] std::optional<SequenceFormat> find_format(const std::filesystem::path& folder);
 
 /// A drive of the given format. `calibration`: a calibration.yaml that is used instead of the data set's own.
 ///
@@ -43,7 +55,8 @@ struct StereoSequence {
 ///   euroc   mav0/cam0, mav0/cam1 with data.csv and sensor.yaml, or that mav0 itself; paired by equal stamps; raw images
 ///   folder  left/, right/ paired in order of name, times.txt (a line a pair: integer nanoseconds, or seconds if it has a
 ///           point), calibration.yaml. Where one side lacks images that the other has, pairing goes by equal names; where the lines of
-///           times.txt name their images, `stamp,file` or `stamp,left file,right file`, by these.
+///           times.txt name their images, `stamp,file` or `stamp,left file,right file`, by these. Without times.txt
+///           pairs are taken to be 0.1 s apart, which is a remark.
 ///   st_lucia  PREFIX_MultiCamera0.log names the images in PREFIX_MultiCamera0/; paired by line, stamp of the left camera; raw Bayer BMP;
 ///           the calibration published with the data set
 ///
@@ -54,6 +67,11 @@ struct StereoSequence {
 [[nodiscard]] StereoSequence open_sequence(SequenceFormat format, const std::filesystem::path& folder,
                                            const std::optional<std::filesystem::path>& calibration = std::nullopt,
                                            const CalibrationUse& use = {});
+[[nodiscard]] StereoSequence open_sequence(SequenceFormat format, const std::filesystem::path& folder, const CalibrationSource& calibration,
+                                           const CalibrationUse& use);
+
+/// Size of the first image of camera `camera` whose head can be read. InputError when there is none.
+[[nodiscard]] ImageSize first_image_size(const StereoSequence& sequence, std::size_t camera);
 
 /// InputError where the stamps cannot be those of a drive: most do not go forward, or the median step between pairs is below 1 ms or above
 /// 10 s. The sentence asks for the unit that would make them one.

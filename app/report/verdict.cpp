@@ -190,11 +190,13 @@ void advise_on_events(const Session& s, Judge* j) {
   }
 }
 
-/// The last calibration accepted that the drive held against the depth where a rig of that baseline is judged, if it is known well there.
+/// The last measurement by which the drive confirmed its calibration at the depth where a rig of that baseline is judged, if it is known
+/// well there.
 const CalibrationRow* known_well_near(const Session& s) {
   constexpr double kKnown = 2.0;  // %, the word `good`
   constexpr double kFar = 20;     // m, where the word is found
-  const auto last = std::find_if(s.calibrations.rbegin(), s.calibrations.rend(), [](const CalibrationRow& c) { return c.accepted; });
+  const auto last = std::find_if(s.calibrations.rbegin(), s.calibrations.rend(),
+                                 [](const CalibrationRow& c) { return (c.accepted || c.kept) && std::isfinite(c.judged_depth_m); });
   if (last == s.calibrations.rend() || !(last->judged_depth_m < kFar) || !(last->depth_sigma_percent <= kKnown)) return nullptr;
   return &*last;
 }
