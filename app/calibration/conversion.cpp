@@ -31,6 +31,11 @@ bool is_folder(const std::string& text) {
   return text.ends_with('/') || fs::is_directory(text, ignored);
 }
 
+/// ROS has a file a camera: OUT is a folder for both unless it names two.
+bool is_ros_folder(const std::string& out, CalibrationFormat format) {
+  return format == CalibrationFormat::ros && out.find(',') == std::string::npos;
+}
+
 bool has(const YamlFile& file, const char* key) { return file.root().IsMap() && file.root()[key]; }
 
 /// By what only one of them has.
@@ -90,8 +95,8 @@ CalibrationFormat parse_format(const std::string& word) {
   static const std::vector<std::string> kWords{"vergence", "kalibr", "ros", "opencv"};
   const auto at = std::find(kWords.begin(), kWords.end(), word);
   if (at == kWords.end())
-    throw InputError(
-        fmt::format("--format is \"{}\"{}; it is one of {}", word.substr(0, 60), did_you_mean(word, kWords), fmt::join(kWords, ", ")));
+    throw InputError(fmt::format("\"{}\" is no form of a calibration{}; it is one of {}", word.substr(0, 60), did_you_mean(word, kWords),
+                                 fmt::join(kWords, ", ")));
   return static_cast<CalibrationFormat>(at - kWords.begin());
 }
 
@@ -114,7 +119,7 @@ CalibrationFormat format_of_name(const std::string& out) {
   if (files.front().filename().string().find("camchain") != std::string::npos) return CalibrationFormat::kalibr;
   if (extension == ".yml") return CalibrationFormat::opencv;
   if (extension == ".yaml") return CalibrationFormat::vergence;
-  throw InputError(out + ": its name does not tell what it is to be; add --format vergence, kalibr, ros or opencv");
+  throw InputError(out + ": its name does not tell what it is to be; add --to vergence, kalibr, ros or opencv");
 }
 
 CalibrationFile read_any_calibration(const std::string& in, const std::optional<ImageSize>& size, Remarks* remarks) {
@@ -146,8 +151,24 @@ CalibrationFile read_any_calibration(const std::string& in, const std::optional<
   return read_opencv(files, size, remarks);
 }
 
+std::vector<fs::path> files_written(const std::string& out, CalibrationFormat format) { return files_of(out, is_ros_folder(out, format)); }
+
+const char* describe(CalibrationFormat format) noexcept {
+  switch (format) {
+    case CalibrationFormat::vergence:
+      return "calibration.yaml of this program";
+    case CalibrationFormat::kalibr:
+      return "a Kalibr camchain";
+    case CalibrationFormat::ros:
+      return "camera_info of ROS, left and right";
+    case CalibrationFormat::opencv:
+      return "stereo calibration of OpenCV";
+  }
+  return "";
+}
+
 void write_any_calibration(const std::string& out, CalibrationFormat format, const CalibrationFile& calibration, Remarks* remarks) {
-  const bool folder = format == CalibrationFormat::ros && out.find(',') == std::string::npos;
+  const bool folder = is_ros_folder(out, format);
   const std::vector<fs::path> files = files_of(out, folder);
   const auto one_file = [&](const char* what) {
     if (files.size() != 1) throw InputError(fmt::format("{}: {} is one file", out, what));

@@ -1,6 +1,7 @@
 #pragma once
 #include <array>
 #include <cstdint>
+#include <filesystem>
 #include <optional>
 #include <string>
 #include <vector>
@@ -20,6 +21,11 @@ enum class CalibrationFormat : std::uint8_t { vergence, kalibr, ros, opencv };
 /// What a file is to be by its name: a folder or two `.yaml` with a comma: ros; a name with `camchain`: kalibr; `.yml`, one or two: opencv;
 /// any other `.yaml`: vergence. InputError: the name does not tell.
 [[nodiscard]] CalibrationFormat format_of_name(const std::string& out);
+
+/// The files that writing `out` in that format makes.
+[[nodiscard]] std::vector<std::filesystem::path> files_written(const std::string& out, CalibrationFormat format);
+/// `a Kalibr camchain`.
+[[nodiscard]] const char* describe(CalibrationFormat format) noexcept;
 
 struct ConversionRequest {
   std::string in{}, out{};                    // a file, two with a comma between, or a folder with left.yaml and right.yaml

@@ -28,7 +28,8 @@ struct Arguments {
   std::vector<std::string> more_cameras;  // one pattern each
   std::optional<std::string> keep_views;
   std::optional<double> square, baseline;
-  bool sixth_order = false, json = false;
+  std::string to;
+  bool sixth_order = false, json = false, force = false;
 };
 
 CameraModelKind parse_model(const std::string& word) {
@@ -36,10 +37,12 @@ CameraModelKind parse_model(const std::string& word) {
 }
 
 /// Before the board is carried around for half an hour, not after it.
-void check_writable(const std::filesystem::path& file) {
+void check_writable(const std::filesystem::path& file, bool force) {
   const std::filesystem::path folder = file.has_parent_path() ? file.parent_path() : ".";
   if (std::filesystem::is_directory(file))
     throw InputError(file.string() + ": is a folder; --out takes the file to write, calibration.yaml");
+  if (std::filesystem::exists(file) && !force)
+    throw InputError(file.string() + ": is there already, and nothing is overwritten; add --force, or name another file");
   if (::access(folder.c_str(), W_OK) != 0)
     throw InputError(folder.string() + ": cannot be written to; --out takes a file in a folder that is there");
 }
@@ -59,7 +62,7 @@ CalibrateRequest request_of(const Arguments& a) {
   if (a.keep_views) r.keep_views = *a.keep_views;
   r.json = a.json;
   r.quiet = a.common.quiet;
-  check_writable(r.out);
+  check_writable(r.out, a.force);
   return r;
 }
 
@@ -67,16 +70,24 @@ ExitCode convert(const Arguments& a) {
   ConversionRequest r;
   r.in = a.convert[0];
   r.out = a.convert[1];
-  if (!a.format.empty()) r.format = parse_format(a.format);
+  if (!a.to.empty() && !a.format.empty()) throw InputError("--to and --format both say what OUT is to be; give --to");
+  if (!a.to.empty() || !a.format.empty()) r.format = parse_format(a.to.empty() ? a.format : a.to);
+  const CalibrationFormat format = r.format ? *r.format : format_of_name(r.out);
+  for (const std::filesystem::path& file : files_written(r.out, format))
+    if (std::filesystem::exists(file) && !a.force)
+      throw InputError(file.string() + ": is there already, and nothing is overwritten; add --force, or name another file");
   if (!a.size.empty()) r.size = parse_size(a.size);
   for (const std::string& sentence : convert_calibration(r)) std::cerr << "vergence: " << sentence << '\n';
+  std::vector<std::string> written;
+  for (const std::filesystem::path& file : files_written(r.out, format)) written.push_back(file.string());
+  std::cerr << fmt::format("{}: written as {}\n", fmt::join(written, ", "), describe(format));
   return ExitCode::done;
 }
 
 /// An ordinary drive instead of a board.
 ExitCode calibrate_from_drive(const Arguments& a) {
   if (a.out.empty()) throw InputError("--out is missing: the calibration.yaml to write");
-  check_writable(a.out);
+  check_writable(a.out, a.force);
   const Configuration c = a.common.configuration(std::nullopt);
   const SequenceFormat format = sequence_format(a.format.empty() ? "auto" : a.format, a.drive);
   const CalibrationUse use{true, a.baseline.value_or(0)};
@@ -160,11 +171,11 @@ void add_calibrate(CLI::App& root, ExitCode* exit_code) {
           "OpenCV stereo YAML (one file, or intrinsics.yml,extrinsics.yml)")
       ->expected(2)
       ->type_name("IN OUT");
-  command
-      ->add_option("--format", a->format,
-                   "--drive: the layout of DATA, as replay has it; --convert: what OUT is, where its name does not tell: "
-                   "vergence, kalibr, ros, opencv")
+  command->add_option("--format", a->format, "--drive: the layout of DATA, as replay has it [auto]; --convert: the same as --to")
       ->type_name("WORD");
+  command->add_option("--to", a->to, "--convert: what OUT is to be, where its name does not tell: vergence, kalibr, ros, opencv")
+      ->type_name("WORD");
+  command->add_flag("--force", a->force, "Overwrite a file that is there already");
   command->add_option("--size", a->size, "--convert: image size of an OpenCV file that has none")->type_name("WxH");
   a->common.declare(*command);
   command->callback([a, exit_code] { *exit_code = run(*a); });

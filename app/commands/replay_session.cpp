@@ -233,9 +233,12 @@ Trajectory read_ins_reference(const ReplayRequest& request) {
 
 /// The truth that lies with the data set, for the stamps that its frames have; empty when there is none.
 Trajectory read_reference(const ReplayRequest& request, const StereoSequence& sequence) {
-  if (request.format == SequenceFormat::folder) return {};  // its layout has no truth
   if (request.format == SequenceFormat::st_lucia) return read_ins_reference(request);
-  const auto files = find_truth(request.data);
+  const bool plain = request.format == SequenceFormat::folder;
+  std::error_code ignored;
+  if (plain && std::filesystem::exists(request.data / "truth.tum", ignored)) return read_tum(request.data / "truth.tum");
+  if (plain && !std::filesystem::exists(request.data / "poses.txt", ignored)) return {};
+  const auto files = plain ? std::optional(TruthFiles{TruthFiles::Kind::kitti, request.data / "poses.txt", {}}) : find_truth(request.data);
   if (!files) return {};
   if (files->kind != TruthFiles::Kind::kitti) return read_truth(*files);
   std::vector<Stamp> times;

@@ -424,7 +424,8 @@ void Drive::tell(const SessionTotals& totals, const SummaryInput& input, Progres
   const std::string segments = far.count > 0    ? fmt::format("; segments of 100 to 800 m {:.3f} %", 100 * far.translation)
                                : near.count > 0 ? fmt::format("; segments of 10 to 50 m {:.3f} %", 100 * near.translation)
                                                 : "";
-  progress->say(fmt::format("against the truth over {:.1f} m: ATE {:.3f} m{}", e.path_reference, e.ate_se3.rmse, segments));
+  progress->say(fmt::format("against the mock's truth over {:.1f} m: ATE {:.3f} m{}{}", e.path_reference, e.ate_se3.rmse, segments,
+                            devices_.ins() != nullptr ? " (the report compares with the INS, whose own errors are in its figures)" : ""));
 }
 
 ExitCode Drive::verdict(const SessionTotals& totals, const std::vector<std::string>& faults, Progress* progress) const {

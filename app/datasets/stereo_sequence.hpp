@@ -55,7 +55,8 @@ struct CalibrationSource {
 ///   euroc   mav0/cam0, mav0/cam1 with data.csv and sensor.yaml, or that mav0 itself; paired by equal stamps; raw images
 ///   folder  left/, right/ paired in order of name, times.txt (a line a pair: integer nanoseconds, or seconds if it has a
 ///           point), calibration.yaml. Where one side lacks images that the other has, pairing goes by equal names; where the lines of
-///           times.txt name their images, `stamp,file` or `stamp,left file,right file`, by these. Without times.txt
+///           times.txt name their images, `stamp,file` or `stamp,left file,right file`, by these. An optional reference lies beside them: truth.tum, or poses.txt as KITTI has it, a
+///           line a pair (the left camera's; replay reads it). Without times.txt
 ///           pairs are taken to be 0.1 s apart, which is a remark.
 ///   st_lucia  PREFIX_MultiCamera0.log names the images in PREFIX_MultiCamera0/; paired by line, stamp of the left camera; raw Bayer BMP;
 ///           the calibration published with the data set

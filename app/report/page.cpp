@@ -58,9 +58,12 @@ std::string number_card(const std::string& value, const std::string& name, const
 }
 
 std::string drift_card(const Analysis& a) {
-  if (a.drift) return number_card(fmt::format("{:.2f} %", *a.drift * 100), "Drift", a.drift_sentence);
-  if (a.source == ErrorSource::none) return number_card("not known", "Drift", "no reference");
-  return number_card("not known", "Drift", "the drive is too short");
+  const char* name = a.source == ErrorSource::ins         ? "Drift against the INS"
+                     : a.source == ErrorSource::reference ? "Drift against the reference"
+                                                          : "Drift";
+  if (a.drift) return number_card(fmt::format("{:.2f} %", *a.drift * 100), name, a.drift_sentence);
+  if (a.source == ErrorSource::none) return number_card("not known", name, "no reference");
+  return number_card("not known", name, "the drive is too short");
 }
 
 std::string error_card(const Analysis& a) {

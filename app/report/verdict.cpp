@@ -78,7 +78,8 @@ void judge_drift(const Analysis& a, Judge* j) {
   if (!a.drift)
     j->find(Grade::care, "the drive is too short to tell its drift");
   else if (*a.drift > kGoodDrift)
-    j->find(*a.drift > kWorstDrift ? Grade::bad : Grade::care, fmt::format("it drifts by {} of the way", percent(*a.drift)));
+    j->find(*a.drift > kWorstDrift ? Grade::bad : Grade::care,
+            fmt::format("it drifts by {} of the way{}", percent(*a.drift), a.source == ErrorSource::ins ? " against the INS" : ""));
   const double off = a.scale ? std::abs(*a.scale - 1) : 0;
   if (off > kGoodScale) {
     j->find(off > kWorstScale ? Grade::bad : Grade::care,
