@@ -93,7 +93,7 @@ std::string manual_page(CLI::App& root, const std::string& word) {
     page += fmt::format(".SH SYNOPSIS\n\\fBvergence {}\\fR [\\fIOPTIONS\\fR]", plain(word));
     for (const CLI::Option* option : command->get_options())
       if (option->get_lnames().empty() && option->get_snames().empty())
-        page += fmt::format(option->get_required() ? " \\fI{}\\fR" : " [\\fI{}\\fR]", plain(option->get_name(true)));
+        page += (option->get_required() ? " \\fI" : " [\\fI") + plain(option->get_name(true)) + (option->get_required() ? "\\fR" : "\\fR]");
     page += "\n";
     describe_options(*command, &page);
     return page + kExit + ".SH SEE ALSO\nvergence(1)\n";

@@ -9,6 +9,7 @@
 #include <fmt/chrono.h>
 #include <fmt/format.h>
 
+#include "app/report/happenings.hpp"
 #include "app/report/plots.hpp"
 #include "app/report/residual_section.hpp"
 #include "app/report/style.hpp"
@@ -226,6 +227,9 @@ std::string page_html(const Session& session, const Analysis& analysis, const Ve
       "<link rel=\"icon\" href=\"data:,\"/><title>" +
       title + "</title><style>" + style_sheet() + "</style></head><body><main>\n";
   out += "<h1>" + title + "</h1>\n" + verdict_section(analysis, verdict) + "<div class=\"grid\">\n";
+  if (verdict.grade != Grade::good)
+    if (const std::string happened = happenings_table(session, analysis); !happened.empty())
+      out += section("wide", "What happened", happened);
   if (!verdict.advice.empty()) out += section("wide", "What to do next", list(verdict.advice));
   if (!session.missing.empty()) out += section("wide", "What is missing in this session", list(session.missing));
   out += map_section(session, analysis);

@@ -255,11 +255,13 @@ std::string health_table(const Session& session) {
   const std::string rows =
       health_row(session.summary, "at the start", "calibration.before.") + health_row(session.summary, "at the end", "calibration.");
   if (rows.empty()) return "";
-  return "<table class=\"health\"><tr><th></th><th>calibration</th><th class=\"n\">1 m</th><th class=\"n\">5 m</th><th class=\"n\">10 "
+  return "<div class=\"scroll\"><table class=\"health\"><tr><th></th><th>calibration</th><th class=\"n\">1 m</th><th class=\"n\">5 "
+         "m</th><th class=\"n\">10 "
          "m</th>"
          "<th class=\"n\">20 m</th><th class=\"n\">50 m</th></tr>\n" +
          rows +
-         "</table>\n<p class=\"soft\">Predicted error of a depth at that distance, one sigma, from what the calibration leaves open.</p>\n";
+         "</table></div>\n<p class=\"soft\">Predicted error of a depth at that distance, one sigma, from what the calibration leaves "
+         "open.</p>\n";
 }
 
 std::string calibrations_table(const Session& session) {

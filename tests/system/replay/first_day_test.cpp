@@ -1,47 +1,18 @@
-// What somebody does on the first day with the program, on recorded images: mistakes, and a first drive without any calibration.
+// Mistakes of the first day with the program, on recorded images.
 #include <gtest/gtest.h>
 
 #include <filesystem>
 #include <string>
 
 #include <fmt/format.h>
-#include <nlohmann/json.hpp>
 
-#include "app/config/calibration_file.hpp"
 #include "tests/support/shared_data.hpp"
-#include "tests/support/temporary_folder.hpp"
-#include "tests/unit/app/commands/run_vergence.hpp"
+#include "tests/system/replay/first_day.hpp"
 
 namespace vergence::test {
 namespace {
 
-namespace fs = std::filesystem;
-
 constexpr const char* kRaw = "data/kitti_raw_0039_20/2011_09_26/2011_09_26_drive_0039_extract";
-
-class FirstDay : public ::testing::Test {
- protected:
-  [[nodiscard]] Outcome replay(const fs::path& data, const std::string& more) const {
-    return run_vergence("replay '" + data.string() + "' --quiet --out '" + session().string() + "' " + more);
-  }
-  [[nodiscard]] fs::path session() const { return work_ / "session"; }
-  [[nodiscard]] nlohmann::json summary() const { return nlohmann::json::parse(read_file(session() / "summary.json")); }
-  [[nodiscard]] std::string report() const { return read_file(session() / "report.html"); }
-
-  /// A plain folder of the images of two others.
-  [[nodiscard]] fs::path plain(const fs::path& left, const fs::path& right, const std::string& times,
-                               const std::string& calibration) const {
-    const fs::path folder = work_ / "data";
-    fs::create_directories(folder);
-    fs::create_directory_symlink(left, folder / "left");
-    fs::create_directory_symlink(right, folder / "right");
-    (void)work_.write("data/times.txt", times);
-    (void)work_.write("data/calibration.yaml", calibration);
-    return folder;
-  }
-
-  TemporaryFolder work_;
-};
 
 std::string times_at_ten_hertz(int count) {
   std::string times;
@@ -102,31 +73,6 @@ TEST_F(FirstDay, aTransformGivenAsItsInverseIsRefused) {
   const Outcome o = replay(data, "");
   EXPECT_EQ(o.code, 2) << o.err;
   EXPECT_NE(o.err.find("left and right are swapped, or the transform is given as its inverse"), std::string::npos) << o.err;
-}
-
-TEST_F(FirstDay, focalLengthAndBaselineAreEnoughOnKitti) {
-  const auto folder = shared_data("data/kitti00_151");
-  if (!folder) GTEST_SKIP() << shared_data_missing("data/kitti00_151");
-  const Outcome o = replay(*folder, "--focal 718.9 --baseline 0.537");
-  ASSERT_EQ(o.code, 0) << o.err;
-  EXPECT_GT(summary()["frames"]["ok"], 100);
-  const double drift = summary()["metrics"]["segment_error_short_percent"];
-  std::printf("kitti 00 from focal length and baseline: segments of 10 to 50 m %.2f %%\n", drift);
-  EXPECT_LT(drift, 2.5) << "2.0 % with the data set's own calibration (docs/calibration.md)";
-  EXPECT_NO_THROW((void)app::read_calibration(session() / "calibration.yaml"));
-}
-
-TEST_F(FirstDay, focalLengthAndBaselineAreEnoughOnEurocsDistortedImages) {
-  const auto folder = shared_data("data/euroc_mh01");
-  if (!folder) GTEST_SKIP() << shared_data_missing("data/euroc_mh01");
-  const Outcome o = replay(*folder, "--focal 460 --baseline 0.11");
-  ASSERT_EQ(o.code, 0) << o.err;
-  EXPECT_GT(summary()["frames"]["ok"], 50);
-  const double ate = summary()["metrics"]["ate_m"];
-  std::printf("euroc from focal length and baseline: ATE %.1f mm\n", 1e3 * ate);
-  EXPECT_LT(ate, 0.006) << "4 mm with the data set's own calibration";
-  const app::CalibrationFile found = app::read_calibration(session() / "calibration.yaml");
-  EXPECT_NEAR(found.rig.intrinsics[0].distortion[0], -0.283, 0.02) << "which nobody had told";
 }
 
 }  // namespace
