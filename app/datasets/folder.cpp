@@ -5,6 +5,7 @@
 #include "app/config/calibration_file.hpp"
 #include "app/datasets/decimal.hpp"
 #include "app/datasets/detail/formats.hpp"
+#include "app/datasets/exif.hpp"
 #include "app/datasets/text_file.hpp"
 
 namespace vergence::app::detail {
@@ -22,7 +23,7 @@ std::array<std::string, 2> names_of(const std::filesystem::path& file, std::size
     const std::string_view name = fields[std::min(k + 1, fields.size() - 1)];
     if (name.empty() || name == "." || name == ".." || name.find('/') != std::string_view::npos)
       refuse(file, line, "`" + std::string(name.substr(0, 40)) + "` is no name of an image in left/ and right/");
-    names[k] = (k == 0 ? "left/" : "right/") + std::string(name);
+    names[k] = name;
   }
   return names;
 }
@@ -85,17 +86,34 @@ std::vector<StereoPair> pair_in_order(const std::vector<std::string>& left, cons
   return pairs;
 }
 
+std::array<std::string, 2> in_folders(const std::array<std::string, 2>& names, bool side_by_side) {
+  if (side_by_side) return {"both/" + names[0], "both/" + names[0]};
+  return {"left/" + names[0], "right/" + names[1]};
+}
+
 /// Images as times.txt names them; some may be missing, but not all of a side.
 std::vector<StereoPair> pair_as_named(const std::filesystem::path& folder, const std::vector<Line>& times,
-                                      const std::array<std::vector<std::string>, 2>& there) {
+                                      const std::array<std::vector<std::string>, 2>& there, bool side_by_side) {
   std::vector<StereoPair> pairs(times.size());
-  for (std::size_t i = 0; i < times.size(); ++i) pairs[i] = {times[i].stamp, times[i].name};
+  for (std::size_t i = 0; i < times.size(); ++i) pairs[i] = {times[i].stamp, in_folders(times[i].name, side_by_side)};
   for (std::size_t k = 0; k < 2; ++k)
-    if (std::none_of(times.begin(), times.end(),
-                     [&](const Line& line) { return std::binary_search(there[k].begin(), there[k].end(), line.name[k]); }))
+    if (std::none_of(times.begin(), times.end(), [&](const Line& line) {
+          return std::binary_search(there[k].begin(), there[k].end(), in_folders(line.name, side_by_side)[k]);
+        }))
       refuse(folder / "times.txt", 0,
-             "names no image that is there: the first is " + times.front().name[k] + ", the folder has " + there[k].front());
+             "names no image that is there: the first is " + in_folders(times.front().name, side_by_side)[k] + ", the folder has " +
+                 there[k].front());
   return pairs;
+}
+
+/// What is said where images ask to be turned.
+std::string orientation_remark(const std::filesystem::path& file) {
+  std::vector<std::uint8_t> bytes;
+  if (read_image_file(file, &bytes) != ImageFileStatus::ok) return "";
+  const auto orientation = exif_orientation(bytes);
+  if (!orientation || *orientation == 1) return "";
+  return file.string() + " asks viewers to turn it (EXIF orientation " + std::to_string(*orientation) +
+         "), which is ignored: pixels are taken as the camera wrote them, and so has to be its calibration";
 }
 
 }  // namespace
@@ -103,13 +121,16 @@ std::vector<StereoPair> pair_as_named(const std::filesystem::path& folder, const
 StereoSequence open_folder(const std::filesystem::path& folder, bool given, const CalibrationUse& use) {
   StereoSequence sequence;
   sequence.root = folder;
-  const auto left = list_images(folder, "left"), right = list_images(folder, "right");
+  std::error_code ignored;
+  sequence.side_by_side = !std::filesystem::exists(folder / "left", ignored) && std::filesystem::exists(folder / "both", ignored);
+  const auto left = list_images(folder, sequence.side_by_side ? "both" : "left");
+  const auto right = sequence.side_by_side ? left : list_images(folder, "right");
   sequence.times = folder / "times.txt";
   const std::vector<Line> times = std::filesystem::exists(sequence.times)
                                       ? read_times(sequence.times)
                                       : assumed_times(std::max(left.size(), right.size()), &sequence.remark);
   if (!times.front().name[0].empty()) {
-    sequence.pairs = pair_as_named(folder, times, {left, right});
+    sequence.pairs = pair_as_named(folder, times, {left, right}, sequence.side_by_side);
   } else {
     // In order of name as long as the numbers agree; else a name that only one side has is an image that the other lost.
     const bool in_order = left.size() == right.size() && left.size() == times.size();
@@ -121,6 +142,8 @@ StereoSequence open_folder(const std::filesystem::path& folder, bool given, cons
                  " lines in times.txt; one of each a pair is expected (a line may name its image: stamp,file)");
     for (std::size_t i = 0; i < times.size(); ++i) sequence.pairs[i].stamp = times[i].stamp;
   }
+  if (const std::string turned = orientation_remark(folder / left.front()); !turned.empty())
+    sequence.remark += (sequence.remark.empty() ? "" : "; ") + turned;
   if (given) return sequence;
   sequence.calibration = read_calibration(folder / "calibration.yaml", use).rig;
   sequence.calibration_source = "calibration.yaml";

@@ -46,6 +46,7 @@ FrameDecoder::FrameDecoder(const StereoSequence& sequence, std::size_t first, st
       pool_(pool) {
   assert(pool.width() == sequence.calibration.intrinsics[0].width && pool.height() == sequence.calibration.intrinsics[0].height);
   if (sequence.bayer) mosaic_.resize(FramePool::stride(pool.width()) * static_cast<std::size_t>(pool.height()));
+  if (sequence.side_by_side) mosaic_.resize(FramePool::stride(2 * pool.width()) * static_cast<std::size_t>(pool.height()));
   thread_ = std::thread([this] { work(); });
 }
 
@@ -108,8 +109,8 @@ DecodedPair FrameDecoder::decode(std::size_t index) {
   }
   newest_ = listed.stamp;
   any_ = true;
-  for (std::size_t k = 0; k < 2; ++k) {
-    const ImageFileStatus status = load(listed.file[k], own_[k]);
+  for (std::size_t k = 0; k < (sequence_.side_by_side ? 1 : 2); ++k) {
+    const ImageFileStatus status = sequence_.side_by_side ? load_both(listed.file[0]) : load(listed.file[k], own_[k]);
     if (status == ImageFileStatus::ok) continue;
     const std::string name = !listed.file[k].empty() ? listed.file[k] : k == 0 ? "the left image" : "the right image";
     note(&pair, kind_of(status), fmt::format("frame {} skipped: {} {}", index, name, to_phrase(status)));
@@ -137,6 +138,24 @@ ImageFileStatus FrameDecoder::load(const std::string& name, FrameSlot slot) {
   const auto step = static_cast<std::ptrdiff_t>(stride);
   if (status == ImageFileStatus::ok) bayer_to_grey(mosaic_.data(), step, size.width, size.height, out, step);
   return status;
+}
+
+ImageFileStatus FrameDecoder::load_both(const std::string& name) {
+  if (name.empty()) return ImageFileStatus::missing;
+  try {
+    if (const auto status = read_image_file(sequence_.root / name, &bytes_); status != ImageFileStatus::ok) return status;
+  } catch (const std::bad_alloc&) {  // a file too long for this machine's memory
+    return ImageFileStatus::unreadable;
+  }
+  const int width = pool_.width(), height = pool_.height();
+  const std::size_t stride = FramePool::stride(width), wide = FramePool::stride(2 * width);
+  if (const auto status = decode_grey(bytes_, {2 * width, height}, mosaic_.data(), wide); status != ImageFileStatus::ok) return status;
+  for (std::size_t k = 0; k < 2; ++k) {
+    std::uint8_t* out = pool_.writable(own_[k]).data();
+    const std::uint8_t* from = mosaic_.data() + k * static_cast<std::size_t>(width);
+    for (std::size_t y = 0; y < static_cast<std::size_t>(height); ++y) std::copy_n(from + y * wide, width, out + y * stride);
+  }
+  return ImageFileStatus::ok;
 }
 
 bool FrameDecoder::wait_for_slot(FrameSlot* slot) noexcept {

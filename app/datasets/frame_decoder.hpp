@@ -58,6 +58,8 @@ class FrameDecoder {
   [[nodiscard]] DecodedPair decode(std::size_t index);
   /// One image into the slot.
   [[nodiscard]] ImageFileStatus load(const std::string& name, FrameSlot slot);
+  /// A file with both images side by side, into the two slots in hand.
+  [[nodiscard]] ImageFileStatus load_both(const std::string& name);
   /// Waits for a slot. False: stopped.
   [[nodiscard]] bool wait_for_slot(FrameSlot* slot) noexcept;
   /// Hands the pair over, waiting for room. False: stopped.
@@ -67,7 +69,7 @@ class FrameDecoder {
   std::size_t next_index_, end_;
   FramePool& pool_;
   std::vector<std::uint8_t> bytes_;   // of the file being decoded
-  std::vector<std::uint8_t> mosaic_;  // of a raw sequence, rows as the pool's
+  std::vector<std::uint8_t> mosaic_;  // of a raw sequence, rows as the pool's; of one side by side, both images
   std::array<FrameSlot, 2> own_{};    // slots in hand: those of a skipped pair serve the next one
   std::size_t own_count_ = 0;
   Stamp newest_{};

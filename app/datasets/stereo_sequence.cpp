@@ -76,7 +76,7 @@ std::optional<SequenceFormat> find_format(const std::filesystem::path& folder) {
   const auto has = [&](const char* name) { return std::filesystem::exists(folder / name, ignored); };
   if (has("mav0") || (has("cam0") && has("cam1"))) return SequenceFormat::euroc;
   if (has("image_0") && has("image_1")) return SequenceFormat::kitti;
-  if (has("left") && has("right")) return SequenceFormat::folder;
+  if ((has("left") && has("right")) || has("both")) return SequenceFormat::folder;
   for (std::filesystem::directory_iterator it(folder, ignored), end; !ignored && it != end; it.increment(ignored))
     if (it->path().filename().string().ends_with("_MultiCamera0.log")) return SequenceFormat::st_lucia;
   return std::nullopt;
@@ -85,7 +85,8 @@ std::optional<SequenceFormat> find_format(const std::filesystem::path& folder) {
 ImageSize first_image_size(const StereoSequence& sequence, std::size_t camera) {
   ImageSize size;
   for (const StereoPair& pair : sequence.pairs)
-    if (!pair.file[camera].empty() && read_image_size(sequence.root / pair.file[camera], &size) == ImageFileStatus::ok) return size;
+    if (!pair.file[camera].empty() && read_image_size(sequence.root / pair.file[camera], &size) == ImageFileStatus::ok)
+      return {sequence.side_by_side ? size.width / 2 : size.width, size.height};
   refuse(sequence.root, 0, std::string("has no readable image of the ") + (camera == 0 ? "left" : "right") + " camera");
 }
 
@@ -98,11 +99,12 @@ void check_image_sizes(const StereoSequence& sequence, std::size_t first, std::s
       ImageSize size;
       if (read_image_size(sequence.root / name, &size) != ImageFileStatus::ok) continue;
       const Intrinsics& camera = sequence.calibration.intrinsics[k];
-      const ImageSize wanted{camera.width, camera.height};
+      const ImageSize wanted{(sequence.side_by_side ? 2 : 1) * camera.width, camera.height};
       if (size != wanted)
         refuse(sequence.root / name, 0,
                "is " + text(size) + " pixels, but the calibration of this camera (" + sequence.calibration_source + ") is for " +
-                   text(wanted) + "; use the calibration that belongs to these images");
+                   text(wanted) + (sequence.side_by_side ? " (twice its width, side by side)" : "") +
+                   "; use the calibration that belongs to these images");
     }
 }
 

@@ -37,6 +37,7 @@ struct StereoSequence {
   std::string calibration_source;  // the file's name, for calibrations.csv
   std::filesystem::path times;     // the file that the stamps are from, for sentences about them
   std::string remark{};            // what had to be assumed, a sentence for the user; empty: nothing
+  bool side_by_side = false;       // a file holds both images, the left one's columns first; file[0] and file[1] are the same
   bool bayer = false;              // images are raw mosaics: grey is made of them (core/types/bayer.hpp)
 };
 
@@ -53,11 +54,12 @@ struct CalibrationSource {
 ///
 ///   kitti   calib.txt (P0, P1), times.txt (seconds), image_0/, image_1/ with NNNNNN.png: image N belongs to line N of times.txt
 ///   euroc   mav0/cam0, mav0/cam1 with data.csv and sensor.yaml, or that mav0 itself; paired by equal stamps; raw images
-///   folder  left/, right/ paired in order of name, times.txt (a line a pair: integer nanoseconds, or seconds if it has a
+///   folder  left/, right/ paired in order of name (or both/ with both images in each file, side by side), times.txt (a line a pair:
+///   integer nanoseconds, or seconds if it has a
 ///           point), calibration.yaml. Where one side lacks images that the other has, pairing goes by equal names; where the lines of
-///           times.txt name their images, `stamp,file` or `stamp,left file,right file`, by these. An optional reference lies beside them: truth.tum, or poses.txt as KITTI has it, a
-///           line a pair (the left camera's; replay reads it). Without times.txt
-///           pairs are taken to be 0.1 s apart, which is a remark.
+///           times.txt name their images, `stamp,file` or `stamp,left file,right file`, by these. An optional reference lies beside them:
+///           truth.tum, or poses.txt as KITTI has it, a line a pair (the left camera's; replay reads it). Without times.txt pairs are taken
+///           to be 0.1 s apart, which is a remark.
 ///   st_lucia  PREFIX_MultiCamera0.log names the images in PREFIX_MultiCamera0/; paired by line, stamp of the left camera; raw Bayer BMP;
 ///           the calibration published with the data set
 ///

@@ -61,7 +61,7 @@ th{font-weight:400;color:var(--soft)}
 th[scope=row]{min-width:8.5em}
 td.n,th.n{text-align:right;font-variant-numeric:tabular-nums;padding-right:0}
 td.k{min-width:6.4em}
-td.w{white-space:nowrap}
+td.w,span.w{white-space:nowrap}
 .clocks td.n,.clocks th.n{padding-left:10px;overflow-wrap:normal}
 .clocks td.n{white-space:nowrap}
 .clocks{margin-bottom:8px}

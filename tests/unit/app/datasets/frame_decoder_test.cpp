@@ -7,6 +7,10 @@
 #include <thread>
 #include <vector>
 
+#include <fmt/format.h>
+#include <opencv2/core.hpp>
+#include <opencv2/imgcodecs.hpp>
+
 #include "core/memory/allocation_guard.hpp"
 #include "tests/unit/app/datasets/tiny_drive.hpp"
 
@@ -50,6 +54,27 @@ class Decoder : public testing::Test {
   Arena arena_{FramePool::memory_needed(test::kTinyWidth, test::kTinyHeight, FrameDecoder::kSlots) + kCacheLine};
   FramePool pool_{test::kTinyWidth, test::kTinyHeight, FrameDecoder::kSlots, arena_};
 };
+
+TEST_F(Decoder, imagesSideBySideAreTakenApart) {
+  test::write_tiny_folder(folder_, 3);
+  for (int i = 0; i < 3; ++i) {
+    cv::Mat both;
+    cv::hconcat(cv::imread((folder_ / test::folder_name(0, i)).string(), cv::IMREAD_GRAYSCALE),
+                cv::imread((folder_ / test::folder_name(1, i)).string(), cv::IMREAD_GRAYSCALE), both);
+    std::filesystem::create_directories(folder_ / "both");
+    ASSERT_TRUE(cv::imwrite((folder_ / fmt::format("both/{:03d}.png", i)).string(), both));
+  }
+  for (const char* side : {"left", "right"}) std::filesystem::remove_all(folder_ / side);
+  ASSERT_EQ(find_format(folder_.path()), SequenceFormat::folder);
+  reopen();
+  EXPECT_TRUE(sequence_.side_by_side);
+  EXPECT_EQ(first_image_size(sequence_, 1), (ImageSize{test::kTinyWidth, test::kTinyHeight}));
+  const auto seen = drain(0, 3);
+  ASSERT_EQ(seen.size(), 3U);
+  for (const Seen& s : seen) EXPECT_TRUE(s.right_pixels) << s.pair.frame << s.pair.note.data();
+  test::write_tiny_image(folder_ / "both/001.png", 0, test::kTinyWidth, test::kTinyHeight);
+  EXPECT_STREQ(drain(0, 3)[1].pair.kind, "image_size") << "half of a pair";
+}
 
 TEST_F(Decoder, everyPairComesInOrderWithItsPixelsThoughFarMoreThanSlots) {
   constexpr int kPairs = 60;
