@@ -40,6 +40,17 @@ Main main_reason(const Session& s, const Analysis& a) {
   return main;
 }
 
+/// Frames that a calibration can be confirmed from: those that moved. A vehicle that stands tells nothing of its rig.
+std::size_t moving_frames(const Session& s, const Analysis& a) {
+  constexpr double kStep = 0.1;  // of the baseline; EuRoC's excerpt moves by 0.12 a frame
+  const double least = kStep * number_at(s.summary, "calibration.baseline_m").value_or(0);
+  if (!(least > 0)) return a.read;
+  std::size_t count = 0;
+  for (std::size_t i = 1; i < a.distance_m.size(); ++i)
+    if (a.distance_m[i] - a.distance_m[i - 1] >= least) ++count;
+  return count;
+}
+
 /// Why no calibration was taken, where the drive sought one in vain.
 std::string_view rejection(const Session& s) {
   std::string_view why;
@@ -58,11 +69,12 @@ Usability usability_of(const Session& s, const Analysis& a) {
   for (const Frame& f : s.frames)
     if (f.status == PoseStatus::degraded && is_waiting(s.reasons[f.reason])) ++waiting;
   const std::string_view rejected = rejection(s);
-  if (waiting > 0 && waiting == a.degraded && a.read < kFramesToConfirm && a.lost + a.skipped <= a.read / 10)
-    return {Use::unverified,
-            fmt::format("unverified: the drive ended after {} frames, before it could confirm its calibration, which takes some {}", a.read,
-                        kFramesToConfirm),
-            std::string(rejected)};
+  if (waiting > 0 && waiting == a.degraded && moving_frames(s, a) < kFramesToConfirm && a.lost + a.skipped <= a.read / 10)
+    return {
+        Use::unverified,
+        fmt::format("unverified: the drive ended after {} frames, before it could confirm its calibration, which takes some {} in motion",
+                    a.read, kFramesToConfirm),
+        std::string(rejected)};
   const Main main = main_reason(s, a);
   const bool posed = a.degraded > 0;
   Usability u{Use::nothing, "", std::string(advice_for(main.word))};

@@ -61,6 +61,15 @@ TEST(Usability, aShortDriveThatCouldNotConfirmYetIsUnverifiedAndNoMore) {
   EXPECT_FALSE(verdict_of(drive(30, "unverified_calibration", 10)).usable) << "a third has no pose";
 }
 
+TEST(Usability, framesThatStandStillConfirmNothing) {
+  Session s = drive(100, "unverified_calibration");
+  s.summary = {{"calibration", {{"baseline_m", 0.5}}}};
+  for (std::size_t i = 0; i < s.frames.size(); ++i) s.frames[i].T_world_left.t.z() = i < 50 ? 0 : 0.2 * static_cast<double>(i - 50);
+  EXPECT_TRUE(verdict_of(s).usable) << "fifty moved";
+  for (std::size_t i = 0; i < s.frames.size(); ++i) s.frames[i].T_world_left.t.z() = 0.2 * static_cast<double>(i);
+  EXPECT_FALSE(verdict_of(s).usable);
+}
+
 TEST(Usability, neverAPoseSaysOfWhat) {
   const Verdict v = verdict_of(drive(40, "cameras_swapped", 40));
   EXPECT_FALSE(v.usable);
