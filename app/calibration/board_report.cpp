@@ -102,6 +102,20 @@ std::string baseline_sentence(const BoardReport& r) {
   return text + "\n";
 }
 
+/// Where to look first: the views that fit least of those used.
+std::string worst_views(const BoardReport& r) {
+  constexpr std::size_t kShown = 5;
+  std::vector<const BoardViewResult*> used;
+  for (const BoardViewResult& v : r.found.views)
+    if (v.used) used.push_back(&v);
+  const std::size_t shown = std::min(kShown, used.size());
+  std::partial_sort(used.begin(), used.begin() + static_cast<std::ptrdiff_t>(shown), used.end(),
+                    [](const BoardViewResult* a, const BoardViewResult* b) { return a->rms_px > b->rms_px; });
+  std::string text = "worst views used:";
+  for (std::size_t i = 0; i < shown; ++i) text += fmt::format("{} {} {:.3f} px", i == 0 ? "" : ",", used[i]->name, used[i]->rms_px);
+  return shown == 0 ? "" : text + "\n";
+}
+
 }  // namespace
 
 std::string format_report(const BoardReport& r) {
@@ -111,6 +125,7 @@ std::string format_report(const BoardReport& r) {
                                  r.board.columns, r.board.rows, 1e3 * r.board.square, rig.frames, refused);
   for (const BoardViewResult& v : r.found.views)
     if (!v.used) text += fmt::format("  refused: {}, {:.3g} px rms\n", v.name, v.rms_px);
+  text += worst_views(r);
   text += fmt::format("reprojection {:.4f} px rms, {:.3f} px a coordinate\n\n", rig.reprojection_px, r.found.corner_sigma_px);
   text += lens_table(r) + "± 1 σ by noise, in brackets between views\n\n";
   for (std::size_t k = 1; k < static_cast<std::size_t>(rig.cameras); ++k) text += place_table(r, k) + "\n";

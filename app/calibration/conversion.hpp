@@ -1,16 +1,13 @@
 #pragma once
-#include <array>
-#include <cstdint>
+#include <filesystem>
 #include <optional>
 #include <string>
 #include <vector>
 
-#include "app/calibration/foreign_formats.hpp"
+#include "app/conversion/reading.hpp"
 
 /// `vergence calibrate --convert IN OUT`.
 namespace vergence::app {
-
-enum class CalibrationFormat : std::uint8_t { vergence, kalibr, ros, opencv };
 
 /// `vergence`, `kalibr`, `ros`, `opencv`. InputError: another word, with the nearest.
 [[nodiscard]] CalibrationFormat parse_format(const std::string& word);
@@ -21,14 +18,17 @@ enum class CalibrationFormat : std::uint8_t { vergence, kalibr, ros, opencv };
 /// any other `.yaml`: vergence. InputError: the name does not tell.
 [[nodiscard]] CalibrationFormat format_of_name(const std::string& out);
 
+/// The files that writing `out` in that format makes.
+[[nodiscard]] std::vector<std::filesystem::path> files_written(const std::string& out, CalibrationFormat format);
+/// `a Kalibr camchain`.
+[[nodiscard]] const char* describe(CalibrationFormat format) noexcept;
+
 struct ConversionRequest {
   std::string in{}, out{};                    // a file, two with a comma between, or a folder with left.yaml and right.yaml
   std::optional<CalibrationFormat> format{};  // of `out`; nothing: by its name
   std::optional<ImageSize> size{};            // where an OpenCV file has none
 };
 
-/// Reads any of the formats, told by content.
-[[nodiscard]] CalibrationFile read_any_calibration(const std::string& in, const std::optional<ImageSize>& size, Remarks* remarks);
 /// Each file whole or not at all.
 void write_any_calibration(const std::string& out, CalibrationFormat format, const CalibrationFile& calibration, Remarks* remarks);
 

@@ -31,7 +31,7 @@ CalibrateRequest request_of(const CalibrateOptions& a) {
   if (a.keep_views) r.keep_views = *a.keep_views;
   r.json = a.json;
   r.quiet = a.common.quiet;
-  check_writable(r.out);
+  check_writable(r.out, a.force);
   return r;
 }
 
@@ -39,9 +39,17 @@ ExitCode convert(const CalibrateOptions& a) {
   ConversionRequest r;
   r.in = a.convert[0];
   r.out = a.convert[1];
-  if (!a.format.empty()) r.format = parse_format(a.format);
+  if (!a.to.empty() && !a.format.empty()) throw InputError("--to and --format both say what OUT is to be; give --to");
+  if (!a.to.empty() || !a.format.empty()) r.format = parse_format(a.to.empty() ? a.format : a.to);
+  const CalibrationFormat format = r.format ? *r.format : format_of_name(r.out);
+  for (const std::filesystem::path& file : files_written(r.out, format))
+    if (std::filesystem::exists(file) && !a.force)
+      throw InputError(file.string() + ": is there already, and nothing is overwritten; add --force, or name another file");
   if (!a.size.empty()) r.size = parse_size(a.size);
   for (const std::string& sentence : convert_calibration(r)) std::cerr << "vergence: " << sentence << '\n';
+  std::vector<std::string> written;
+  for (const std::filesystem::path& file : files_written(r.out, format)) written.push_back(file.string());
+  std::cerr << fmt::format("{}: written as {}\n", fmt::join(written, ", "), describe(format));
   return ExitCode::done;
 }
 

@@ -1,6 +1,7 @@
 #include "app/checkerboard/calibrate_session.hpp"
 
 #include <chrono>
+#include <cmath>
 #include <iostream>
 
 #include <fmt/format.h>
@@ -13,7 +14,8 @@
 namespace vergence::app {
 namespace {
 
-constexpr double kVagueFocal = 0.01;  // sigma over focal length
+constexpr double kSquarePixels = 0.03;  // fx over fy from 1
+constexpr double kVagueFocal = 0.01;    // sigma over focal length
 
 Coverage coverage_of(const CalibrateRequest& request, const CalibrationFile& file, const std::vector<ImageSize>& sizes,
                      const std::vector<BoardView>& views, const BoardCalibration& found) {
@@ -32,6 +34,12 @@ void remark(const CalibrationFile& file, Progress* progress) {
       progress->say(
           fmt::format("vergence: {}: the focal length is only known to {:.1f} %; tilt the board more, and show it nearer and farther",
                       file.names[k], 100 * lens.sigma[0] / lens.fx));
+    if (const double differ = std::abs(lens.fx / lens.fy - 1); differ > kSquarePixels)
+      progress->say(
+          fmt::format("vergence: {}: fx and fy differ by {:.1f} %, pixels of cameras are square: look whether --board has its corners the "
+                      "right way round "
+                      "(9x6 or 6x9), whether images were stretched, and show the board tilted both ways",
+                      file.names[k], 100 * differ));
   }
 }
 

@@ -9,6 +9,7 @@
 #include "app/commands/checkerboard_tool.hpp"
 #include "app/commands/commands.hpp"
 #include "app/commands/drive_calibration.hpp"
+#include "app/commands/given_calibration.hpp"
 #include "app/commands/replay_session.hpp"
 
 namespace vergence::app {
@@ -17,14 +18,17 @@ namespace {
 /// An ordinary drive instead of a board.
 ExitCode calibrate_from_drive(const CalibrateOptions& a) {
   if (a.out.empty()) throw InputError("--out is missing: the calibration.yaml to write");
-  if (a.format.empty()) throw InputError("--format is missing: the layout of --drive's folder, as replay has it");
-  check_writable(a.out);
+  check_writable(a.out, a.force);
   const Configuration c = a.common.configuration(std::nullopt);
-  std::optional<std::filesystem::path> file;
-  if (a.calibration) file = *a.calibration;
+  const SequenceFormat format = sequence_format(a.format.empty() ? "auto" : a.format, a.drive);
+  const CalibrationUse use{true, a.baseline.value_or(0)};
+  std::vector<std::string> remarks;
   // Of what the drive comes with only lenses and length are read: how its cameras sit need not be known.
-  const StereoSequence sequence =
-      open_sequence(sequence_format(a.format), a.drive, file, {true, a.baseline.value_or(0)}, {c.kitti_raw.left, c.kitti_raw.right});
+  const std::array cameras{c.kitti_raw.left, c.kitti_raw.right};
+  const StereoSequence sequence = a.calibration
+                                      ? open_sequence(format, a.drive, calibration_source(*a.calibration, use, &remarks), use, cameras)
+                                      : open_sequence(format, a.drive, std::nullopt, use, cameras);
+  for (const std::string& sentence : remarks) std::cerr << "vergence: " << sentence << '\n';
   check_image_sizes(sequence, 0, sequence.pairs.size());
   const StartingCalibration told = replayed_calibration(c, sequence, true);
   Progress progress = Progress::on_stderr(a.common.quiet);

@@ -40,11 +40,11 @@ CLI::App* CalibrateOptions::declare(CLI::App& root) {
           "OpenCV stereo YAML (one file, or intrinsics.yml,extrinsics.yml)")
       ->expected(2)
       ->type_name("IN OUT");
-  command
-      ->add_option("--format", format,
-                   "--drive: the layout of DATA, as replay has it; --convert: what OUT is, where its name does not tell: "
-                   "vergence, kalibr, ros, opencv")
+  command->add_option("--format", format, "--drive: the layout of DATA, as replay has it [auto]; --convert: the same as --to")
       ->type_name("WORD");
+  command->add_option("--to", to, "--convert: what OUT is to be, where its name does not tell: vergence, kalibr, ros, opencv")
+      ->type_name("WORD");
+  command->add_flag("--force", force, "Overwrite a file that is there already");
   command->add_option("--size", size, "--convert: image size of an OpenCV file that has none")->type_name("WxH");
   common.declare(*command);
   return command;
@@ -60,10 +60,12 @@ CalibrateWay CalibrateOptions::way() const {
   return configuration.empty() ? CalibrateWay::board_images : CalibrateWay::board_live;
 }
 
-void check_writable(const std::filesystem::path& file) {
+void check_writable(const std::filesystem::path& file, bool force) {
   const std::filesystem::path folder = file.has_parent_path() ? file.parent_path() : ".";
   if (std::filesystem::is_directory(file))
     throw InputError(file.string() + ": is a folder; --out takes the file to write, calibration.yaml");
+  if (std::filesystem::exists(file) && !force)
+    throw InputError(file.string() + ": is there already, and nothing is overwritten; add --force, or name another file");
   if (::access(folder.c_str(), W_OK) != 0)
     throw InputError(folder.string() + ": cannot be written to; --out takes a file in a folder that is there");
 }

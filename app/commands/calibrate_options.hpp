@@ -23,7 +23,8 @@ struct CalibrateOptions {
   std::vector<std::string> more_cameras{};  // one pattern each
   std::optional<std::string> keep_views{};
   std::optional<double> square{}, baseline{};
-  bool sixth_order = false, json = false;
+  std::string to{};
+  bool sixth_order = false, json = false, force = false;
 
   /// The subcommand with its options; `this` outlives its parsing.
   CLI::App* declare(CLI::App& root);
@@ -31,7 +32,8 @@ struct CalibrateOptions {
   [[nodiscard]] CalibrateWay way() const;
 };
 
-/// Before the board is carried around for half an hour, not after it: InputError unless a file can be written there.
-void check_writable(const std::filesystem::path& file);
+/// Before the board is carried around for half an hour, not after it: InputError unless a file can be written there. One that is there
+/// already is overwritten with `force` only.
+void check_writable(const std::filesystem::path& file, bool force);
 
 }  // namespace vergence::app

@@ -1,5 +1,7 @@
 #include "app/commands/commands.hpp"
 
+#include "app/commands/manual.hpp"
+
 namespace vergence::app {
 
 void add_all_commands(CLI::App& root, const ProgramWords& words, ExitCode* exit_code) {
@@ -12,6 +14,7 @@ void add_all_commands(CLI::App& root, const ProgramWords& words, ExitCode* exit_
   add_doctor(root, exit_code);
   add_snap(root, exit_code);
   add_calibrate(root, words, exit_code);
+  add_manual(root);
 }
 
 }  // namespace vergence::app

@@ -2,6 +2,7 @@
 #include <filesystem>
 #include <iostream>
 #include <memory>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <system_error>
@@ -23,8 +24,8 @@ namespace {
 struct Arguments {
   std::string estimate, reference;
   bool json = false, estimate_mount = false;
-  std::string lengths = "100,200,300,400,500,600,700,800";  // m
-  int step = 10;
+  std::optional<std::string> lengths;  // m
+  std::optional<int> step;
   std::string associate = "interpolate";
   double max_gap = 0.2;           // s
   double max_difference = 0.005;  // s
@@ -49,15 +50,36 @@ Duration parse_duration(const char* option, double seconds) {
   return Duration::seconds(seconds);
 }
 
+/// KITTI's lengths, and shorter ones for drives that are too short for these.
+std::vector<SegmentOptions> usual_segments(const std::optional<int>& step) {
+  return {{{100, 200, 300, 400, 500, 600, 700, 800}, step.value_or(10), false},
+          {{10, 20, 30, 40, 50}, step.value_or(1), false},
+          {{1, 2, 3, 4, 5}, step.value_or(1), false},
+          {{0.1, 0.2, 0.3, 0.4, 0.5}, step.value_or(1), false}};
+}
+
 EvaluationOptions options_of(const Arguments& a) {
   EvaluationOptions options;
   options.association = a.associate == "nearest" ? Association::nearest : Association::interpolate;
   options.max_gap = parse_duration("--max-gap", a.max_gap);
   options.max_difference = parse_duration("--max-difference", a.max_difference);
   options.axes = a.axes == "flu" ? BodyAxes::forward_left_up : BodyAxes::camera;
-  if (a.step < 1) throw InputError("--step needs a whole number of poses, 1 or more");
-  options.segments = {{parse_lengths(a.lengths), a.step, false}};
+  if (a.step && *a.step < 1) throw InputError("--step needs a whole number of poses, 1 or more");
+  if (a.lengths)
+    options.segments = {{parse_lengths(*a.lengths), a.step.value_or(10), false}};
+  else
+    for (const SegmentOptions& usual : usual_segments(a.step)) options.segments.push_back(usual);
   return options;
+}
+
+/// Of the usual lengths those that the path is long enough for; KITTI's where it is for none.
+void keep_longest(TrajectoryEvaluation* e, EvaluationOptions* options) {
+  if (e->segments.size() < 2) return;
+  std::size_t kept = 0;
+  for (std::size_t i = e->segments.size(); i-- > 0;)
+    if (e->segments[i].count > 0) kept = i;
+  e->segments = {e->segments[kept]};
+  options->segments = {options->segments[kept]};
 }
 
 /// Where the reference is.
@@ -96,12 +118,13 @@ Trajectory read_reference(const Arguments& a, const Reference& from, const Traje
 }
 
 ExitCode run(const Arguments& a) {
-  const EvaluationOptions options = options_of(a);
+  EvaluationOptions options = options_of(a);
   const Reference from = reference_of(a);
   const Trajectory estimate = read_trajectory(a.estimate);
   FoundMount mount;
   const Trajectory reference = read_reference(a, from, estimate, &mount);
-  const TrajectoryEvaluation evaluation = evaluate(estimate, reference, options);
+  TrajectoryEvaluation evaluation = evaluate(estimate, reference, options);
+  if (!a.lengths) keep_longest(&evaluation, &options);
   if (a.json) {
     nlohmann::ordered_json out = evaluation_json(evaluation, options);
     if (a.estimate_mount) out["mount"] = mount_json(mount);
@@ -127,8 +150,9 @@ void add_evaluate(CLI::App& root, ExitCode* exit_code) {
   command->add_option("ESTIMATE", a->estimate, "TUM file, session folder, or data set")->required();
   command->add_option("REFERENCE", a->reference, "TUM file, KITTI or EuRoC data-set folder, or its truth file; ins.csv of a session");
   command->add_flag("--json", a->json, "The figures as JSON");
-  command->add_option("--lengths", a->lengths, "Lengths of the segments, m")->capture_default_str();
-  command->add_option("--step", a->step, "A segment begins at every so many poses")->capture_default_str();
+  command->add_option("--lengths", a->lengths,
+                      "Lengths of the segments, m [100,200 … 800, on a shorter drive 10 … 50, 1 … 5 or 0.1 … 0.5]");
+  command->add_option("--step", a->step, "A segment begins at every so many poses [10; with shorter lengths 1]");
   command->add_option("--associate", a->associate, "How a reference is found for a pose")
       ->check(CLI::IsMember({"interpolate", "nearest"}))
       ->capture_default_str();

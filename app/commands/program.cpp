@@ -64,17 +64,34 @@ void check_first_word(CLI::App& root, int argc, const char* const* argv) {
   if (argc < 2) throw InputError("no command given; 'vergence --help' lists them");
   const std::string word = argv[1];
   if (!word.empty() && word.front() == '-') return;
-  const auto words = command_words(root);
+  auto words = command_words(root);
+  words.insert(words.end(), {"help", "version"});
   if (std::find(words.begin(), words.end(), word) == words.end())
     throw InputError("unknown command \"" + word + "\"" + did_you_mean(word, words) + " ('vergence --help' lists the commands)");
 }
 
-ExitCode parse_and_run(int argc, const char* const* argv, AddCommands add_commands) {
+/// `help`, `help COMMAND` and `version` as the options that they stand for.
+std::vector<const char*> without_words_for_options(int argc, const char* const* argv) {
+  std::vector<const char*> words(argv, argv + argc);
+  if (argc < 2) return words;
+  const std::string_view first = argv[1];
+  if (first == "version") words[1] = "--version";
+  if (first != "help") return words;
+  words.erase(words.begin() + 1);
+  words.resize(std::min<std::size_t>(words.size(), 2));
+  words.push_back("--help");
+  return words;
+}
+
+ExitCode parse_and_run(int given, const char* const* given_argv, AddCommands add_commands) {
+  const std::vector<const char*> words = without_words_for_options(given, given_argv);
+  const int argc = static_cast<int>(words.size());
+  const char* const* argv = words.data();
   CLI::App root("Stereo odometry that finds and keeps its own calibration", "vergence");
   ExitCode exit_code = ExitCode::done;
   root.set_version_flag("--version", "vergence " + std::string(version()));
   root.require_subcommand(1);
-  add_commands(root, {argv, static_cast<std::size_t>(argc)}, &exit_code);
+  add_commands(root, {given_argv, static_cast<std::size_t>(given)}, &exit_code);
   check_first_word(root, argc, argv);
   try {
     root.parse(argc, argv);

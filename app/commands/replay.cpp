@@ -1,4 +1,5 @@
 #include <cstdint>
+#include <filesystem>
 #include <memory>
 #include <optional>
 #include <string>
@@ -14,17 +15,23 @@ namespace {
 /// The words as given; checked when the command runs.
 struct Arguments {
   CommonOptions common;
-  std::string data, format, out;
+  std::string data, format = "auto", out, model = "radtan";
   std::optional<std::string> calibration, also;
   std::int64_t start = 0;
   std::optional<std::int64_t> frames;
-  std::optional<double> baseline;
+  std::optional<double> baseline, focal;
+  std::optional<std::string> distortion;
   bool from_scratch = false, calibrate_first = false, memory = false;
 };
 
 }  // namespace
 
-SequenceFormat sequence_format(const std::string& word) {
+SequenceFormat sequence_format(const std::string& word, const std::filesystem::path& folder) {
+  constexpr const char* kLayouts =
+      "KITTI (image_0, image_1, calib.txt, times.txt), KITTI raw (image_00, image_01, calib_*.txt above), EuRoC (mav0), plain (left, "
+      "right, times.txt, calibration.yaml) and UQ St Lucia are "
+      "what "
+      "can be read";
   if (word == "kitti") return SequenceFormat::kitti;
   if (word == "kitti-raw") return SequenceFormat::kitti_raw;
   if (word == "euroc") return SequenceFormat::euroc;
@@ -32,12 +39,36 @@ SequenceFormat sequence_format(const std::string& word) {
   if (word == "st-lucia") return SequenceFormat::st_lucia;
   if (word == "session")
     throw InputError("--format session is not there yet in this version; kitti, kitti-raw, euroc, folder and st-lucia are");
-  throw InputError("--format \"" + word + "\" is not known" +
-                   did_you_mean(word, {"kitti", "kitti-raw", "euroc", "folder", "st-lucia", "session"}) +
-                   "; kitti, kitti-raw, euroc, folder and st-lucia are what can be read");
+  if (word != "auto")
+    throw InputError("--format \"" + word + "\" is not known" +
+                     did_you_mean(word, {"auto", "kitti", "kitti-raw", "euroc", "folder", "st-lucia", "session"}) +
+                     "; kitti, kitti-raw, euroc, folder and st-lucia are what can be read, and auto finds out which it is");
+  std::error_code ignored;
+  if (!std::filesystem::is_directory(folder, ignored))
+    throw InputError(folder.string() + ": is no folder; a folder with a drive is expected");
+  if (const auto found = find_format(folder)) return *found;
+  throw InputError(folder.string() + ": holds no drive that is known: " + kLayouts);
 }
 
 namespace {
+
+std::optional<KnownNumbers> known_numbers(const Arguments& a) {
+  if (!a.focal) {
+    if (a.distortion) throw InputError("--distortion goes with --focal; a calibration.yaml has its own");
+    return std::nullopt;
+  }
+  if (a.calibration) throw InputError("--focal stands for a calibration that nobody has; leave it or --calibration away");
+  if (!a.baseline) throw InputError("--focal needs --baseline, the distance of the two cameras in metres, which images cannot tell");
+  if (!(*a.focal >= 10 && *a.focal <= 1e5)) throw InputError("--focal is the focal length in pixels, 10 to 100000");
+  KnownNumbers known;
+  known.focal = *a.focal;
+  known.baseline = *a.baseline;
+  known.model = a.model == "equidistant" ? CameraModelKind::pinhole_equidistant : CameraModelKind::pinhole_radtan;
+  if (a.distortion) known.distortion = parse_distortion(*a.distortion);
+  if (known.distortion.size() > 4 && known.model == CameraModelKind::pinhole_equidistant)
+    throw InputError("--distortion: an equidistant lens has k1,k2,k3,k4");
+  return known;
+}
 
 ReplayRequest request_of(const Arguments& a) {
   if (a.baseline && !(*a.baseline >= 0.005 && *a.baseline <= 20))
@@ -46,14 +77,15 @@ ReplayRequest request_of(const Arguments& a) {
   if (a.frames && *a.frames < 1) throw InputError("--frames needs at least 1");
   ReplayRequest r;
   r.data = a.data;
-  r.format = sequence_format(a.format);
+  r.format = sequence_format(a.format, r.data);
+  r.known = known_numbers(a);
   if (a.calibrate_first && a.from_scratch)
     throw InputError("--calibrate-first begins from scratch, and drives with what it finds; leave --from-scratch away");
   r.out = a.out;
   if (a.calibration) r.calibration = *a.calibration;
   r.baseline = a.baseline;
   r.from_scratch = a.from_scratch;
-  r.calibrate_first = a.calibrate_first;
+  r.calibrate_first = a.calibrate_first || (r.known && !a.from_scratch);
   r.start = static_cast<std::size_t>(a.start);
   if (a.frames) r.frames = static_cast<std::size_t>(*a.frames);
   r.configuration = a.common.configuration(std::nullopt);
@@ -69,14 +101,27 @@ void add_replay(CLI::App& root, ExitCode* exit_code) {
   const auto a = std::make_shared<Arguments>();
   CLI::App* command = root.add_subcommand("replay", "Run a recorded drive through the estimator and write a session folder");
   command->add_option("DATA", a->data, "Folder of the data set")->required();
-  command->add_option("--format", a->format, "Layout of DATA: kitti, kitti-raw, euroc, folder, st-lucia (session comes later)")
-      ->required()
-      ->type_name("NAME");
+  command->add_option("--format", a->format, "Layout of DATA: kitti, kitti-raw, euroc, folder, st-lucia; auto: by what is in it")
+      ->type_name("NAME")
+      ->capture_default_str();
   command->add_option("--out", a->out, "Session folder; must not exist or be empty")->required()->type_name("DIR");
-  command->add_option("--calibration", a->calibration, "calibration.yaml to use instead of the data set's own")->type_name("FILE");
+  command
+      ->add_option("--calibration", a->calibration, "calibration.yaml, or a file of Kalibr, ROS or OpenCV, instead of the data set's own")
+      ->type_name("FILE");
   command->add_option("--start", a->start, "First frame, from 0")->type_name("K");
   command->add_option("--frames", a->frames, "At most so many frames")->type_name("N");
   command->add_option("--baseline", a->baseline, "Distance of the two cameras in metres, instead of the calibration's")->type_name("M");
+  command
+      ->add_option("--focal", a->focal,
+                   "Focal length in pixels, for images without any calibration: with --baseline, both cameras alike; the rest is found "
+                   "from the whole drive first, "
+                   "or with --from-scratch on the way, and written")
+      ->type_name("PX");
+  command->add_option("--distortion", a->distortion, "--focal: the lenses' coefficients, as far as somebody knows")
+      ->type_name("K1,K2,P1,P2");
+  command->add_option("--model", a->model, "--focal: radtan, or equidistant for fisheye lenses")
+      ->check(CLI::IsMember({"radtan", "equidistant"}))
+      ->capture_default_str();
   command->add_flag("--from-scratch", a->from_scratch,
                     "Find the calibration from the drive itself: only intrinsics and the baseline's length are read");
   command->add_flag("--calibrate-first", a->calibrate_first,

@@ -190,7 +190,7 @@ SummaryInput Replay::summary_input(const SessionTotals& totals, std::uint64_t al
     input.comparison = comparison_->counters();
     input.earth = comparison_->earth(ins_.mount_source);
   }
-  describe_calibration(*estimator_, begin_, totals, options_, &input);
+  describe_calibration(*estimator_, begin_, totals, options_, journal_.matches(), &input);
   input.allocations_after_seal = allocations;
   input.memory = memory();
   input.configuration_hash = configuration_hash(request_.configuration);
@@ -279,7 +279,7 @@ ExitCode Replay::run() {
   for (const std::string& sentence : recorder_->take_complaints()) progress.say("vergence: " + sentence);
   for (const std::string& sentence : faults) progress.say("vergence: " + sentence);
   if (!request_.quiet) tell(*totals, input, &progress);
-  write_session_report(request_.out, request_.quiet, &progress);
+  const bool usable = write_session_report(request_.out, request_.quiet, &progress);
 
   if (const auto stopped = signals.stop_code()) return *stopped;
   if (totals->ok + totals->degraded == 0) {
@@ -290,13 +290,17 @@ ExitCode Replay::run() {
     progress.say("vergence: the INS never had a position for a frame: nothing is compared; the poses are there");
     return ExitCode::not_usable;
   }
-  return faults.empty() ? ExitCode::done : ExitCode::not_usable;
+  return usable && faults.empty() ? ExitCode::done : ExitCode::not_usable;
 }
 
 /// The truth that lies with the data set, for the stamps that its frames have; empty when there is none.
 Trajectory read_reference(const ReplayRequest& request, const StereoSequence& sequence) {
-  if (request.format != SequenceFormat::kitti && request.format != SequenceFormat::euroc) return {};  // their layouts have no truth
-  const auto files = find_truth(request.data);
+  if (request.format == SequenceFormat::kitti_raw || request.format == SequenceFormat::st_lucia) return {};  // their layouts have no truth
+  const bool plain = request.format == SequenceFormat::folder;
+  std::error_code ignored;
+  if (plain && std::filesystem::exists(request.data / "truth.tum", ignored)) return read_tum(request.data / "truth.tum");
+  if (plain && !std::filesystem::exists(request.data / "poses.txt", ignored)) return {};
+  const auto files = plain ? std::optional(TruthFiles{TruthFiles::Kind::kitti, request.data / "poses.txt", {}}) : find_truth(request.data);
   if (!files) return {};
   if (files->kind != TruthFiles::Kind::kitti) return read_truth(*files);
   std::vector<Stamp> times;
@@ -305,36 +309,67 @@ Trajectory read_reference(const ReplayRequest& request, const StereoSequence& se
   return read_kitti(files->poses, times);
 }
 
+/// The drive, with the calibration that the user names, if any; remarks are said.
+StereoSequence open_drive(const ReplayRequest& request) {
+  const CalibrationUse use{request.from_scratch || request.known, request.baseline.value_or(0)};
+  const std::array cameras{request.configuration.kitti_raw.left, request.configuration.kitti_raw.right};
+  std::vector<std::string> remarks;
+  StereoSequence sequence;
+  if (request.known)
+    sequence = open_sequence(request.format, request.data, calibration_source(*request.known), use, cameras);
+  else if (request.calibration)
+    sequence = open_sequence(request.format, request.data, calibration_source(*request.calibration, use, &remarks), use, cameras);
+  else
+    sequence = open_sequence(request.format, request.data, std::nullopt, use, cameras);
+  if (!request.quiet)
+    for (const std::string& sentence : remarks) fmt::print(stderr, "vergence: {}\n", sentence);
+  return sequence;
+}
+
 /// What the drive itself says of its rig, in the place of what it came with; where nothing is found that stays, and the user hears why.
-void calibrate_first(const ReplayRequest& request, const StereoSequence& sequence, StartingCalibration* begin) {
+bool calibrate_first(const ReplayRequest& request, const StereoSequence& sequence, StartingCalibration* begin) {
   Progress progress = Progress::on_stderr(request.quiet);
   const std::size_t count = std::min(request.frames.value_or(sequence.pairs.size()), sequence.pairs.size() - request.start);
   const DriveCalibration found =
       calibrate_with_progress({sequence, request.configuration, request.start, count, {}, {}}, *begin, &progress);
   if (!found.rig) {
     progress.say("vergence: the drive gives no calibration: " + found.why);
-    return;
+    return false;
   }
   if (!request.quiet) progress.say(describe(found));
   begin->file.rig = *found.rig;
   begin->file.source = begin->source = "the drive itself";
   begin->cause = "whole_drive";
+  begin->trust = CalibrationTrust::given;
+  return true;
+}
+
+/// Lenses are found from a beginning that is near enough. Of one that nobody knows anything of: no distortion, then that of a usual lens of
+/// 80 to 100 degrees.
+void calibrate_unknown(ReplayRequest request, StereoSequence* sequence, StartingCalibration* begin) {
+  if (calibrate_first(request, *sequence, begin)) return;
+  if (!request.known || !request.known->distortion.empty() || request.known->model != CameraModelKind::pinhole_radtan) return;
+  if (!request.quiet) fmt::print(stderr, "vergence: once more, with the distortion of a wide lens to begin with\n");
+  request.known->distortion = {-0.28, 0.07, 0, 0};
+  StereoSequence wide = open_drive(request);
+  StartingCalibration other = replayed_calibration(request.configuration, wide, true);
+  if (!calibrate_first(request, wide, &other)) return;
+  *sequence = std::move(wide);
+  *begin = std::move(other);
 }
 
 }  // namespace
 
 ExitCode run_replay(const ReplayRequest& request) {
-  StereoSequence sequence =
-      open_sequence(request.format, request.data, request.calibration, {request.from_scratch, request.baseline.value_or(0)},
-                    {request.configuration.kitti_raw.left, request.configuration.kitti_raw.right});
+  StereoSequence sequence = open_drive(request);
   if (request.start >= sequence.pairs.size())
     throw InputError(
         fmt::format("--start {} is beyond the drive: {} has {} frames", request.start, request.data.string(), sequence.pairs.size()));
   check_image_sizes(sequence, request.start, request.frames.value_or(sequence.pairs.size()));
-  StartingCalibration begin = replayed_calibration(request.configuration, sequence, request.from_scratch);
+  StartingCalibration begin = replayed_calibration(request.configuration, sequence, request.from_scratch || request.known);
   Trajectory truth = read_reference(request, sequence);
   ReplayedIns ins = replayed_ins(request, sequence);
-  if (request.calibrate_first) calibrate_first(request, sequence, &begin);
+  if (request.calibrate_first) calibrate_unknown(request, &sequence, &begin);
   std::unique_ptr<Replay> replay;
   try {
     replay = std::make_unique<Replay>(request, std::move(sequence), std::move(begin), std::move(truth), std::move(ins));

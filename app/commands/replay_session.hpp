@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "app/commands/given_calibration.hpp"
 #include "app/config/configuration.hpp"
 #include "app/datasets/stereo_sequence.hpp"
 #include "app/recorder/other_formats.hpp"
@@ -17,20 +18,21 @@ struct ReplayRequest {
   std::filesystem::path data;
   SequenceFormat format = SequenceFormat::kitti;
   std::filesystem::path out;
-  std::optional<std::filesystem::path> calibration;  // instead of the data set's own
-  std::optional<double> baseline;                    // m: instead of the calibration's length
-  bool from_scratch = false;                         // of the calibration only intrinsics and length are read
-  bool calibrate_first = false;                      // from the whole drive, then drive with what was found
-  std::size_t start = 0;                             // first frame
-  std::optional<std::size_t> frames;                 // at most so many; all when not set
+  std::optional<std::string> calibration;  // a file of any program, instead of the data set's own
+  std::optional<KnownNumbers> known;       // instead of any calibration
+  std::optional<double> baseline;          // m: instead of the calibration's length
+  bool from_scratch = false;               // of the calibration only intrinsics and length are read
+  bool calibrate_first = false;            // from the whole drive, then drive with what was found
+  std::size_t start = 0;                   // first frame
+  std::optional<std::size_t> frames;       // at most so many; all when not set
   Configuration configuration;
   std::vector<OtherFormat> also{};  // written beside the session's own files
   bool quiet = false;
   bool print_memory = false;  // a table of what is held, on stdout
 };
 
-/// A word of --format. InputError: none that is known.
-[[nodiscard]] SequenceFormat sequence_format(const std::string& word);
+/// A word of --format, or with `auto` what `folder` holds. InputError: none that is known.
+[[nodiscard]] SequenceFormat sequence_format(const std::string& word, const std::filesystem::path& folder);
 
 /// Reads a recorded drive, estimates a pose for every frame, writes the session folder of DESIGN §6 and the figures against the data
 /// set's truth.

@@ -41,7 +41,8 @@ RunRequest request_of(const Arguments& a) {
 
 void add_run(CLI::App& root, ExitCode* exit_code) {
   const auto a = std::make_shared<Arguments>();
-  CLI::App* command = root.add_subcommand("run", "Drive: cameras, trigger board and INS of a configuration; in this version the mock's");
+  CLI::App* command =
+      root.add_subcommand("run", "Drive: with the cameras, the trigger board and the INS of a configuration, real or rendered");
   command->add_option("CONFIG", a->configuration, "Configuration (docs/configuration.md), e.g. app/config/mock.yaml")->required();
   command->add_option("--out", a->out, "Session folder; must not exist or be empty")->required()->type_name("DIR");
   command->add_flag("--fast", a->fast, "Mock: virtual time, as fast as this machine allows; nothing is dropped");
@@ -53,9 +54,9 @@ void add_run(CLI::App& root, ExitCode* exit_code) {
   command->add_flag("--from-scratch", a->from_scratch,
                     "Find the calibration from the drive itself: only intrinsics and the baseline's length are read");
   command
-      ->add_option(
-          "--calibration", a->calibration,
-          "calibration.yaml to begin with, instead of the state file's and the configuration's; SIGUSR1 asks for a new one on the way")
+      ->add_option("--calibration", a->calibration,
+                   "calibration.yaml, or a file of Kalibr, ROS or OpenCV, to begin with, instead of the state file's and the "
+                   "configuration's; SIGUSR1 asks for a new one on the way")
       ->type_name("FILE");
   declare_also(*command, &a->also);
   command->add_flag("--memory", a->memory, "Print what memory is held, by whom");

@@ -311,7 +311,7 @@ SummaryInput Drive::summary_input(const SessionTotals& totals, std::uint64_t all
   input.dropped_by_estimator = journal_.dropped();
   if (!totals.reference.empty() && !totals.trajectory.empty())
     input.evaluation = evaluate(totals.trajectory, totals.reference, summary_evaluation_options());
-  describe_calibration(*estimator_, begin_, totals, options_, &input);
+  describe_calibration(*estimator_, begin_, totals, options_, journal_.matches(), &input);
   input.allocations_after_seal = allocations;
   input.memory = memory();
   input.configuration_hash = configuration_hash(configuration_);
@@ -337,7 +337,8 @@ void Drive::tell(const SessionTotals& totals, const SummaryInput& input, Progres
   const std::string segments = far.count > 0    ? fmt::format("; segments of 100 to 800 m {:.3f} %", 100 * far.translation)
                                : near.count > 0 ? fmt::format("; segments of 10 to 50 m {:.3f} %", 100 * near.translation)
                                                 : "";
-  progress->say(fmt::format("against the truth over {:.1f} m: ATE {:.3f} m{}", e.path_reference, e.ate_se3.rmse, segments));
+  progress->say(fmt::format("against the mock's truth over {:.1f} m: ATE {:.3f} m{}{}", e.path_reference, e.ate_se3.rmse, segments,
+                            devices_.ins() != nullptr ? " (the report compares with the INS, whose own errors are in its figures)" : ""));
 }
 
 ExitCode Drive::verdict(const SessionTotals& totals, const std::vector<std::string>& faults, Progress* progress) const {
@@ -415,8 +416,9 @@ ExitCode Drive::run() {
   for (const std::string& sentence : recorder_->take_complaints()) progress.say("vergence: " + sentence);
   for (const std::string& sentence : faults) progress.say("vergence: " + sentence);
   if (!request_.quiet) tell(*totals, input, &progress);
-  write_session_report(request_.out, request_.quiet, &progress);
-  const ExitCode code = verdict(*totals, faults, &progress);
+  const bool usable = write_session_report(request_.out, request_.quiet, &progress);
+  ExitCode code = verdict(*totals, faults, &progress);
+  if (code == ExitCode::done && !usable) code = ExitCode::not_usable;
   return signals_.stop_code().value_or(code);
 }
 

@@ -81,13 +81,14 @@ void begin_session(const std::filesystem::path& session, const StartingCalibrati
 }
 
 void describe_calibration(const Estimator& estimator, const StartingCalibration& begin, const SessionTotals& totals,
-                          const EstimatorOptions& options, SummaryInput* input) {
+                          const EstimatorOptions& options, const MatchSample& matches, SummaryInput* input) {
   input->calibrated = estimator.calibrated();
   input->online = options.online;
   input->verified = options.online && estimator.verified();
   input->calibration = estimator.calibration();
   input->calibration_source = totals.accepted > 0 ? "online" : begin.source;
   if (begin.trust != CalibrationTrust::none) input->before = begin.file.rig;
+  if (input->before) input->mistake = find_mistake(matches.matches(), *input->before, matches.first_change());
   input->options = options.calibration;
 }
 
@@ -120,12 +121,15 @@ void write_session_summary(const std::filesystem::path& session, const SessionTo
   }
 }
 
-void write_session_report(const std::filesystem::path& session, bool quiet, Progress* progress) {
+bool write_session_report(const std::filesystem::path& session, bool quiet, Progress* progress) {
   try {
     const ReportOutcome outcome = write_report(session);
     if (!quiet) progress->say(fmt::format("report {}: {}", outcome.page.string(), outcome.headline));
+    if (!outcome.usable) progress->say("vergence: do not use these poses: " + outcome.main_reason);
+    return outcome.usable;
   } catch (const InputError& e) {
     progress->say(std::string("vergence: ") + e.what());
+    return true;  // nobody knows better
   }
 }
 

@@ -39,7 +39,7 @@ void begin_session(const std::filesystem::path& session, const StartingCalibrati
 
 /// The calibration's part of the summary.
 void describe_calibration(const Estimator& estimator, const StartingCalibration& begin, const SessionTotals& totals,
-                          const EstimatorOptions& options, SummaryInput* input);
+                          const EstimatorOptions& options, const MatchSample& matches, SummaryInput* input);
 
 /// What is to be said of a calibration that the drive has not confirmed; empty: it has, or there is none.
 [[nodiscard]] std::string verification_sentence(const SummaryInput& input);
@@ -52,8 +52,9 @@ void end_session(const std::filesystem::path& session, const StartingCalibration
 void write_session_summary(const std::filesystem::path& session, const SessionTotals& totals, const SummaryInput& input,
                            std::vector<std::string>* faults);
 
-/// report.html of the session, and a line that says where it is and what it says; what goes wrong is said, too.
-void write_session_report(const std::filesystem::path& session, bool quiet, Progress* progress);
+/// report.html of the session, and a line that says where it is and what it says; what goes wrong is said, too. → false: no pose of the
+/// session can be relied on, which is said with the main reason, quiet or not
+[[nodiscard]] bool write_session_report(const std::filesystem::path& session, bool quiet, Progress* progress);
 
 /// The table of --memory, on stdout.
 void print_memory_table(const std::vector<std::pair<std::string, std::size_t>>& memory);

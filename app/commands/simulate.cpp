@@ -211,6 +211,7 @@ ExitCode run(const Arguments& given) {
 void add_simulate(CLI::App& root, ExitCode* exit_code) {
   const auto a = std::make_shared<Arguments>();
   CLI::App* command = root.add_subcommand("simulate", "Repeat the calibration experiment on simulated point clouds");
+  command->group("Research");
   SimulationOptions& s = a->simulation;
   command->add_option("--points", s.points, "Points of the cloud")->capture_default_str();
   command->add_option("--radius", s.radius, "Radius of the cloud, m")->capture_default_str();

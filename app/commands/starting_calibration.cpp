@@ -6,6 +6,7 @@
 
 #include <fmt/format.h>
 
+#include "app/commands/given_calibration.hpp"
 #include "app/commands/rig_settings.hpp"
 #include "app/config/calibration_state.hpp"
 #include "app/runtime/errors.hpp"
@@ -83,7 +84,8 @@ StartingCalibration starting_calibration(const Configuration& c, const Calibrati
 
   const bool from_scratch = wish.from_scratch || (!wish.file && !placed_by_configuration(c, configured.rig.cameras));
   if (wish.file) {
-    start.file = read_calibration(*wish.file, {.length_only = wish.from_scratch});
+    const ImageSize size{configured.rig.intrinsics[0].width, configured.rig.intrinsics[0].height};
+    start.file = read_given_calibration(wish.file->string(), {.length_only = wish.from_scratch}, size, &start.remarks);
     check_same_rig(wish.file->string(), start.file, configured, &start.remarks);
     name_cameras(c, serials, &start.file);
     start.source = wish.file->filename().string();

@@ -111,10 +111,11 @@ Finding check_baseline(const RigCalibration& rig) {
     return finding("rig.baseline", fmt::format("is {:g} m, but cameras.1.T_camera_left has a translation of {:g} m; one of them is wrong",
                                                rig.baseline, t.norm()));
   if (t.x() > 0.5 * t.norm())
-    return finding("cameras.1.T_camera_left",
-                   fmt::format("has t1 = {:g} m, which puts camera 1 to the left of camera 0: left and right seem "
-                               "exchanged (X_camera = R X_left + t, so a camera on the right has t1 < 0)",
-                               t.x()));
+    return finding(
+        "cameras.1.T_camera_left",
+        fmt::format("has t1 = {:g} m, which puts camera 1 to the left of camera 0: left and right are "
+                    "swapped, or the transform is given as its inverse (X_camera = R X_left + t, so a camera on the right has t1 < 0)",
+                    t.x()));
   return std::nullopt;
 }
 

@@ -112,15 +112,37 @@ Mat6 read_wide_covariance(const Section& camera) {
   return covariance;
 }
 
+/// Transforms as other programs write them: refused with what would be the same here.
+void refuse_other_transforms(const YamlFile& file, const YAML::Node& node, const std::string& camera) {
+  struct Other {
+    const char *key, *sentence;
+  };
+  constexpr std::array kOthers{
+      Other{"T_left_camera", "is the inverse of what is read: give T_camera_left, X_camera = R X_left + t, which is [R^T, -R^T t] of it"},
+      Other{"T_left_right", "is the inverse of what is read: give T_camera_left, X_camera = R X_left + t, which is [R^T, -R^T t] of it"},
+      Other{"T_right_left", "is called T_camera_left here: X_camera = R X_left + t"},
+      Other{"T_cn_cnm1",
+            "is Kalibr's: give the camchain itself with --calibration, or convert it with vergence calibrate --convert IN OUT"},
+      Other{"T_BS", "is of EuRoC's sensor.yaml: T_camera_left = T_BS(camera)^-1 T_BS(left)"},
+      Other{"extrinsics", "is called T_camera_left here: twelve numbers, rows of [R t], X_camera = R X_left + t"}};
+  if (!node.IsMap()) return;
+  for (const Other& other : kOthers)
+    if (const YAML::Node given = node[other.key]) file.fail(given, camera + "." + other.key + " " + other.sentence);
+}
+
 void read_camera(const YamlFile& file, const YAML::Node& node, std::size_t k, const CalibrationUse& use, CalibrationFile* calibration) {
   std::vector<std::string> known{"name", "serial", "size", "model", "intrinsics", "distortion", "intrinsics_sigma", "distortion_sigma"};
   if (k > 0) known.insert(known.end(), {"T_camera_left", "sigma_noise", "sigma_wide", "covariance_wide"});
+  refuse_other_transforms(file, node, fmt::format("cameras.{}", k));
   const Section camera(file, node, fmt::format("cameras.{}", k), known);
   RigCalibration& rig = calibration->rig;
   calibration->names[k] = camera.text("name", calibration->names[k]);
   calibration->serials[k] = camera.text("serial", "");
   rig.intrinsics[k] = read_intrinsics(file, camera);
   if (k == 0 || (use.length_only && !camera.has("T_camera_left"))) return;
+  if (!camera.has("T_camera_left"))
+    file.fail(node,
+              camera.field("T_camera_left") + " is missing; --from-scratch finds it from the drive, a file without it is enough there");
   rig.T_camera_left[k] = read_transform(camera);
   camera.optional_numbers("sigma_noise", &rig.sigma_noise[k]);
   camera.optional_numbers("sigma_wide", &rig.sigma_wide[k]);

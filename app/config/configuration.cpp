@@ -135,6 +135,18 @@ Number parse_number(const Entry& entry, const Key& key, const char* kind) {
   return value;
 }
 
+/// What YAML 1.1 and people call on and off, as the words that a key has.
+std::string as_switch(const std::string& value, const std::vector<std::string>& words) {
+  const auto is_word = [&words](const char* word) { return std::find(words.begin(), words.end(), word) != words.end(); };
+  if (!is_word("on") || !is_word("off")) return value;
+  std::string lower = value;
+  std::transform(lower.begin(), lower.end(), lower.begin(),
+                 [](char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c; });
+  if (lower == "true" || lower == "yes" || lower == "on") return "on";
+  if (lower == "false" || lower == "no" || lower == "off") return "off";
+  return value;
+}
+
 void apply(const Entry& entry, Configuration* configuration) {
   if (is_group(entry.name)) {
     if (entry.scalar && !entry.value.empty()) throw InputError(entry.origin + ": " + entry.name + " is a group of keys, not a value");
@@ -152,10 +164,11 @@ void apply(const Entry& entry, Configuration* configuration) {
       break;
     case KeyType::text:
       if (!key->words.empty()) {
-        if (std::find(key->words.begin(), key->words.end(), entry.value) == key->words.end())
+        const std::string value = as_switch(entry.value, key->words);
+        if (std::find(key->words.begin(), key->words.end(), value) == key->words.end())
           throw InputError(fmt::format("{}: {} is \"{}\"{}; it is one of {}", entry.origin, key->name, entry.value.substr(0, 60),
                                        did_you_mean(entry.value, key->words), range_text(*key)));
-        key->set(*configuration, entry.value);
+        key->set(*configuration, value);
         break;
       }
       if (static_cast<double>(entry.value.size()) > key->most)

@@ -97,6 +97,7 @@ StereoSequence open_euroc(const std::filesystem::path& folder, bool given) {
   StereoSequence sequence;
   std::error_code ignored;
   sequence.root = std::filesystem::is_directory(folder / "mav0", ignored) ? folder / "mav0" : folder;
+  sequence.times = sequence.root / "cam0" / "data.csv";
   for (const char* camera : {"cam0", "cam1"}) require_folder(sequence.root / camera, "data.csv, sensor.yaml and data/ of that camera");
   sequence.pairs = pair_by_stamp(read_index(sequence.root, "cam0"), read_index(sequence.root, "cam1"));
   if (std::none_of(sequence.pairs.begin(), sequence.pairs.end(),

@@ -47,6 +47,7 @@ FrameDecoder::FrameDecoder(const StereoSequence& sequence, std::size_t first, st
   assert(pool.width() == sequence.calibration.intrinsics[0].width && pool.height() == sequence.calibration.intrinsics[0].height);
   if (sequence.bayer)
     for (Workspace& work : workspaces_) work.mosaic.resize(FramePool::stride(pool.width()) * static_cast<std::size_t>(pool.height()));
+  if (sequence.side_by_side) workspaces_[0].mosaic.resize(FramePool::stride(2 * pool.width()) * static_cast<std::size_t>(pool.height()));
   thread_ = std::thread([this] { work(); });
 }
 
@@ -110,9 +111,13 @@ DecodedPair FrameDecoder::decode(std::size_t index) {
   newest_ = listed.stamp;
   any_ = true;
   std::array<ImageFileStatus, 2> status{};
-  auto left = [&] { status[0] = load(listed.file[0], own_[0], &workspaces_[0]); };
-  auto right = [&] { status[1] = load(listed.file[1], own_[1], &workspaces_[1]); };
-  both_.run(TaskRef(left), TaskRef(right));
+  if (sequence_.side_by_side) {
+    status[0] = load_both(listed.file[0], &workspaces_[0]);
+  } else {
+    auto left = [&] { status[0] = load(listed.file[0], own_[0], &workspaces_[0]); };
+    auto right = [&] { status[1] = load(listed.file[1], own_[1], &workspaces_[1]); };
+    both_.run(TaskRef(left), TaskRef(right));
+  }
   for (std::size_t k = 0; k < 2; ++k) {
     if (status[k] == ImageFileStatus::ok) continue;
     const std::string name = !listed.file[k].empty() ? listed.file[k] : k == 0 ? "the left image" : "the right image";
@@ -141,6 +146,25 @@ ImageFileStatus FrameDecoder::load(const std::string& name, FrameSlot slot, Work
   const auto step = static_cast<std::ptrdiff_t>(stride);
   if (status == ImageFileStatus::ok) bayer_to_grey(work->mosaic.data(), step, size.width, size.height, out, step);
   return status;
+}
+
+ImageFileStatus FrameDecoder::load_both(const std::string& name, Workspace* work) {
+  if (name.empty()) return ImageFileStatus::missing;
+  try {
+    if (const auto status = read_image_file(sequence_.root / name, &work->bytes); status != ImageFileStatus::ok) return status;
+  } catch (const std::bad_alloc&) {  // a file too long for this machine's memory
+    return ImageFileStatus::unreadable;
+  }
+  const int width = pool_.width(), height = pool_.height();
+  const std::size_t stride = FramePool::stride(width), wide = FramePool::stride(2 * width);
+  if (const auto status = decode_grey(work->bytes, {2 * width, height}, work->mosaic.data(), wide); status != ImageFileStatus::ok)
+    return status;
+  for (std::size_t k = 0; k < 2; ++k) {
+    std::uint8_t* out = pool_.writable(own_[k]).data();
+    const std::uint8_t* from = work->mosaic.data() + k * static_cast<std::size_t>(width);
+    for (std::size_t y = 0; y < static_cast<std::size_t>(height); ++y) std::copy_n(from + y * wide, width, out + y * stride);
+  }
+  return ImageFileStatus::ok;
 }
 
 bool FrameDecoder::wait_for_slot(FrameSlot* slot) noexcept {

@@ -60,10 +60,12 @@ class FrameDecoder {
   /// What one image takes on its way into a slot.
   struct Workspace {
     std::vector<std::uint8_t> bytes;   // of the file
-    std::vector<std::uint8_t> mosaic;  // of a raw sequence, rows as the pool's
+    std::vector<std::uint8_t> mosaic;  // of a raw sequence, rows as the pool's; of one side by side, both images
   };
   /// One image into the slot. Two at once are fine, each with a workspace of its own.
   [[nodiscard]] ImageFileStatus load(const std::string& name, FrameSlot slot, Workspace* work);
+  /// A file with both images side by side, into the two slots in hand.
+  [[nodiscard]] ImageFileStatus load_both(const std::string& name, Workspace* work);
   /// Waits for a slot. False: stopped.
   [[nodiscard]] bool wait_for_slot(FrameSlot* slot) noexcept;
   /// Hands the pair over, waiting for room. False: stopped.

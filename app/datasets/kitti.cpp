@@ -78,7 +78,8 @@ Intrinsics rectified_camera(const std::array<double, 12>& P, Vec3* t, const std:
 StereoSequence open_kitti(const std::filesystem::path& folder, bool given) {
   StereoSequence sequence;
   sequence.root = folder;
-  const std::vector<Stamp> times = read_times(folder / "times.txt");
+  sequence.times = folder / "times.txt";
+  const std::vector<Stamp> times = read_times(sequence.times);
   sequence.pairs.resize(times.size());
   for (std::size_t i = 0; i < times.size(); ++i) sequence.pairs[i].stamp = times[i];
   for (std::size_t k = 0; k < 2; ++k) {

@@ -29,19 +29,38 @@ StereoSequence open_by_format(SequenceFormat format, const std::filesystem::path
   refuse(folder, 0, "has no reader for its format");
 }
 
+/// What all formats have to hold, whoever gave the calibration. `source`: the file it is from.
+StereoSequence checked(StereoSequence sequence, const std::filesystem::path& source, const CalibrationUse& use);
+
 }  // namespace
 
 StereoSequence open_sequence(SequenceFormat format, const std::filesystem::path& folder,
                              const std::optional<std::filesystem::path>& calibration, const CalibrationUse& use,
                              const std::array<int, 2>& cameras) {
+  if (calibration)
+    return open_sequence(
+        format, folder,
+        CalibrationSource{calibration->string(), [&](const StereoSequence&) { return read_calibration(*calibration, use); }}, use, cameras);
   detail::require_folder(folder, "a drive");
-  StereoSequence sequence = open_by_format(format, folder, calibration.has_value(), use, cameras);
-  if (calibration) {
-    sequence.calibration = read_calibration(*calibration, use).rig;
-    sequence.calibration_source = calibration->filename().string();
-  }
+  StereoSequence sequence = open_by_format(format, folder, false, use, cameras);
+  const std::filesystem::path source = sequence.root / sequence.calibration_source;
+  return checked(std::move(sequence), source, use);
+}
+
+StereoSequence open_sequence(SequenceFormat format, const std::filesystem::path& folder, const CalibrationSource& calibration,
+                             const CalibrationUse& use, const std::array<int, 2>& cameras) {
+  detail::require_folder(folder, "a drive");
+  StereoSequence sequence = open_by_format(format, folder, true, use, cameras);
+  sequence.calibration = calibration.read(sequence).rig;
+  sequence.calibration_source = std::filesystem::path(calibration.name).filename().string();
+  return checked(std::move(sequence), calibration.name, use);
+}
+
+namespace {
+
+StereoSequence checked(StereoSequence sequence, const std::filesystem::path& source, const CalibrationUse& use) {
+  check_times(sequence);
   apply_use(use, &sequence.calibration);
-  const std::filesystem::path source = calibration.value_or(sequence.root / sequence.calibration_source);
   if (const auto bad = find_implausible(&sequence.calibration)) refuse(source, 0, bad->sentence);
   if (sequence.calibration.cameras != 2)
     refuse(source, 0, "describes " + std::to_string(sequence.calibration.cameras) + " cameras; a stereo drive has two");
@@ -54,6 +73,28 @@ StereoSequence open_sequence(SequenceFormat format, const std::filesystem::path&
   return sequence;
 }
 
+}  // namespace
+
+std::optional<SequenceFormat> find_format(const std::filesystem::path& folder) {
+  std::error_code ignored;
+  const auto has = [&](const char* name) { return std::filesystem::exists(folder / name, ignored); };
+  if (has("mav0") || (has("cam0") && has("cam1"))) return SequenceFormat::euroc;
+  if (has("image_0") && has("image_1")) return SequenceFormat::kitti;
+  if (has("image_00") && has("image_01")) return SequenceFormat::kitti_raw;
+  if ((has("left") && has("right")) || has("both")) return SequenceFormat::folder;
+  for (std::filesystem::directory_iterator it(folder, ignored), end; !ignored && it != end; it.increment(ignored))
+    if (it->path().filename().string().ends_with("_MultiCamera0.log")) return SequenceFormat::st_lucia;
+  return std::nullopt;
+}
+
+ImageSize first_image_size(const StereoSequence& sequence, std::size_t camera) {
+  ImageSize size;
+  for (const StereoPair& pair : sequence.pairs)
+    if (!pair.file[camera].empty() && read_image_size(sequence.root / pair.file[camera], &size) == ImageFileStatus::ok)
+      return {sequence.side_by_side ? size.width / 2 : size.width, size.height};
+  refuse(sequence.root, 0, std::string("has no readable image of the ") + (camera == 0 ? "left" : "right") + " camera");
+}
+
 void check_image_sizes(const StereoSequence& sequence, std::size_t first, std::size_t count) {
   const std::size_t end = first + std::min(count, sequence.pairs.size() - std::min(first, sequence.pairs.size()));
   for (std::size_t i = first; i < end; ++i)
@@ -63,11 +104,12 @@ void check_image_sizes(const StereoSequence& sequence, std::size_t first, std::s
       ImageSize size;
       if (read_image_size(sequence.root / name, &size) != ImageFileStatus::ok) continue;
       const Intrinsics& camera = sequence.calibration.intrinsics[k];
-      const ImageSize wanted{camera.width, camera.height};
+      const ImageSize wanted{(sequence.side_by_side ? 2 : 1) * camera.width, camera.height};
       if (size != wanted)
         refuse(sequence.root / name, 0,
                "is " + text(size) + " pixels, but the calibration of this camera (" + sequence.calibration_source + ") is for " +
-                   text(wanted) + "; use the calibration that belongs to these images");
+                   text(wanted) + (sequence.side_by_side ? " (twice its width, side by side)" : "") +
+                   "; use the calibration that belongs to these images");
     }
 }
 
@@ -96,13 +138,6 @@ std::vector<std::string> list_images(const std::filesystem::path& root, const st
   if (names.empty()) refuse(folder, 0, "holds no PNG or JPEG image");
   std::sort(names.begin(), names.end());
   return names;
-}
-
-ImageSize first_image_size(const StereoSequence& sequence, std::size_t camera) {
-  ImageSize size;
-  for (const StereoPair& pair : sequence.pairs)
-    if (!pair.file[camera].empty() && read_image_size(sequence.root / pair.file[camera], &size) == ImageFileStatus::ok) return size;
-  refuse(sequence.root, 0, std::string("has no readable image of the ") + (camera == 0 ? "left" : "right") + " camera");
 }
 
 }  // namespace detail

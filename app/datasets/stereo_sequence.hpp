@@ -3,12 +3,14 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "app/config/calibration_file.hpp"
+#include "app/datasets/image_file.hpp"
 #include "core/types/calibration.hpp"
 #include "core/types/time.hpp"
 
@@ -33,10 +35,21 @@ struct StereoSequence {
   std::vector<StereoPair> pairs;
   RigCalibration calibration;
   std::string calibration_source;      // the file's name, for calibrations.csv
-  bool bayer = false;                  // images are raw mosaics: grey is made of them (core/types/bayer.hpp)
+  std::filesystem::path times;         // the file that the stamps are from, for sentences about them
   std::size_t left_out = 0;            // frames that are none of `pairs`: no stamp, no partner, out of order
-  std::vector<std::string> remarks{};  // what was left out or taken on trust: a sentence each
+  std::vector<std::string> remarks{};  // what was left out, taken on trust or assumed: a sentence each
+  bool side_by_side = false;           // a file holds both images, the left one's columns first; file[0] and file[1] are the same
+  bool bayer = false;                  // images are raw mosaics: grey is made of them (core/types/bayer.hpp)
 };
+
+/// A calibration that is used instead of the data set's own: where it is from, and how to have it, given the images that are there.
+struct CalibrationSource {
+  std::string name;
+  std::function<CalibrationFile(const StereoSequence& images)> read;
+};
+
+/// The format of a folder by what is in it; nothing: none that is known.
+[[nodiscard]] std::optional<SequenceFormat> find_format(const std::filesystem::path& folder);
 
 /// A drive of the given format. `calibration`: a calibration.yaml that is used instead of the data set's own.
 ///
@@ -44,17 +57,31 @@ struct StereoSequence {
 ///   kitti_raw  DATE_drive_NNNN_sync or _extract with image_NN/data and image_NN/timestamps.txt, the date's calib_*.txt above it; paired by
 ///           stamps, that of the left camera counts; raw or rectified images, told by their size. `folder` is the drive, its date, or above
 ///   euroc   mav0/cam0, mav0/cam1 with data.csv and sensor.yaml, or that mav0 itself; paired by equal stamps; raw images
-///   folder  left/, right/ paired in order of name, times.txt (a line a pair: integer nanoseconds, or seconds if it has a
-///           point), calibration.yaml. Where one side lacks images that the other has, pairing goes by equal names.
+///   folder  left/, right/ paired in order of name (or both/ with both images in each file, side by side), times.txt (a line a pair:
+///   integer nanoseconds, or seconds if it has a
+///           point), calibration.yaml. Where one side lacks images that the other has, pairing goes by equal names; where the lines of
+///           times.txt name their images, `stamp,file` or `stamp,left file,right file`, by these. An optional reference lies beside them:
+///           truth.tum, or poses.txt as KITTI has it, a line a pair (the left camera's; replay reads it). Without times.txt pairs are taken
+///           to be 0.1 s apart, which is a remark.
 ///   st_lucia  PREFIX_MultiCamera0.log names the images in PREFIX_MultiCamera0/; paired by line, stamp of the left camera; raw Bayer BMP;
 ///           the calibration published with the data set
 ///
 /// `use`: what of the calibration is wanted, whichever it is. `cameras`: left and right of a data set that has more than two (kitti_raw).
 /// InputError (file, line, what): folders or files that are not there, no images, numbers of images and times that do not go
-/// together, times that are no numbers, a calibration that makes no rig, images of another size than the calibration.
+/// together, times that are no numbers, times in another unit or running backwards (check_times()), a calibration that makes no rig, images
+/// of another size than the calibration.
 [[nodiscard]] StereoSequence open_sequence(SequenceFormat format, const std::filesystem::path& folder,
                                            const std::optional<std::filesystem::path>& calibration = std::nullopt,
                                            const CalibrationUse& use = {}, const std::array<int, 2>& cameras = {0, 1});
+[[nodiscard]] StereoSequence open_sequence(SequenceFormat format, const std::filesystem::path& folder, const CalibrationSource& calibration,
+                                           const CalibrationUse& use, const std::array<int, 2>& cameras = {0, 1});
+
+/// Size of the first image of camera `camera` whose head can be read. InputError when there is none.
+[[nodiscard]] ImageSize first_image_size(const StereoSequence& sequence, std::size_t camera);
+
+/// InputError where the stamps cannot be those of a drive: most do not go forward, or the median step between pairs is below 1 ms or above
+/// 10 s. The sentence asks for the unit that would make them one.
+void check_times(const StereoSequence& sequence);
 
 /// Looks at the head of every image of pairs [first, first + count): InputError names the first that has another size than the
 /// calibration. Missing and unreadable files pass: their frames are skipped when they come. Some 10 µs an image.

@@ -209,6 +209,7 @@ void Recorder::write(const PoseRecord& p) {
   if (p.has_reference) {
     append_tum(&line_, p.stamp, p.reference_left);
     files_->reference.append(line_);
+    any_reference_ = true;
     if (options_.keep_trajectory) totals_->reference.push_back({p.stamp, p.reference_left.transform()});
   }
   if (have_last_pose_)
@@ -402,6 +403,9 @@ std::unique_ptr<SessionTotals> Recorder::close() {
       complaints_.push_back(file->path().string() + ": lacks " + std::to_string(file->lost_lines()) +
                             " lines that found no room on the disk in time; the others are all there");
   }
+  // A file that says nothing would look like a reference that was lost.
+  std::error_code ignored;
+  if (!any_reference_) std::filesystem::remove(files_->reference.path(), ignored);
   totals_->dropped_records = dropped_.load(std::memory_order_relaxed);
   totals_->dropped_readings = dropped_readings_.load(std::memory_order_relaxed);
   totals_->ring_high_water = high_water_;

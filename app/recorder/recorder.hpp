@@ -86,8 +86,8 @@ struct Kept {
   std::string sentence{};  // empty: nothing to tell
 };
 
-/// Writes trajectory.tum, reference.tum, poses.csv, calibrations.csv, events.jsonl and, with an INS, ins.csv of a session as it goes on,
-/// on a thread of its own: the estimator never waits for a disk.
+/// Writes trajectory.tum, reference.tum (gone at the end if there was no reference), poses.csv, calibrations.csv, events.jsonl and, with an
+/// INS, ins.csv of a session as it goes on, on a thread of its own: the estimator never waits for a disk.
 ///
 /// What has been posted is in the files as soon as the thread comes to it, at the latest after a second, so a killed session keeps its
 /// lines. Stamps are printed from their integers. The same records give the same bytes.
@@ -154,7 +154,7 @@ class Recorder {
   std::unique_ptr<Files> files_;
   std::unique_ptr<SessionTotals> totals_;
   PoseNumbers last_pose_{};
-  bool have_last_pose_ = false;
+  bool have_last_pose_ = false, any_reference_ = false;
   std::string line_;  // being formatted
   Stamp newest_{};    // of the poses
   std::uint64_t newest_frame_ = 0;

@@ -141,6 +141,7 @@ Json calibration_json(const SessionTotals& totals, const SummaryInput& input) {
   json["contradicted"] = totals.contradicted
                              ? Json{{"stamp_ns", totals.contradicted->stamp.ns()}, {"depth_percent", totals.contradicted->depth_percent}}
                              : Json();
+  json["mistake"] = input.mistake != CalibrationMistake::none ? Json(std::string(to_string(input.mistake))) : Json();
   json["before"] = input.before ? health_json(*input.before, input.options) : Json();
   json["from_scratch"] = from_scratch_json(totals);
   json["accepted"] = totals.accepted;

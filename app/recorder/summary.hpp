@@ -9,6 +9,7 @@
 
 #include <nlohmann/json_fwd.hpp>
 
+#include "app/recorder/calibration_mistake.hpp"
 #include "app/recorder/earth_figures.hpp"
 #include "app/recorder/recorder.hpp"
 #include "app/recorder/time_figures.hpp"
@@ -36,6 +37,7 @@ struct SummaryInput {
   bool online = true;                              // the rig was watched; false: nothing could confirm a calibration
   bool verified = false;                           // the drive itself has confirmed the calibration in use at the end
   std::optional<RigCalibration> before{};          // the drive began with it; none: from scratch
+  CalibrationMistake mistake{};                    // that `before` shows
   calibration::CalibrationOptions options{};       // what its words mean
   std::uint64_t allocations_after_seal = 0;
   std::vector<std::pair<std::string, std::size_t>> memory;  // bytes by what holds them

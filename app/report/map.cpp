@@ -72,7 +72,7 @@ void draw_degraded(const Analysis& a, std::span<const Frame> frames, const MapSc
   std::vector<double> x = a.ours_x;
   for (std::size_t i = 0; i < x.size(); ++i)
     if (frames[i].status != PoseStatus::degraded) x[i] = kNone;
-  draw_path("curve map-ours s-care", x, a.ours_y, a, s, svg);
+  draw_path("curve map-care s-care", x, a.ours_y, a, s, svg);
 }
 
 void draw_ends(const Analysis& a, const MapScale& s, Svg* svg) {

@@ -9,6 +9,7 @@
 #include <fmt/chrono.h>
 #include <fmt/format.h>
 
+#include "app/report/happenings.hpp"
 #include "app/report/plots.hpp"
 #include "app/report/residual_section.hpp"
 #include "app/report/style.hpp"
@@ -58,9 +59,12 @@ std::string number_card(const std::string& value, const std::string& name, const
 }
 
 std::string drift_card(const Analysis& a) {
-  if (a.drift) return number_card(fmt::format("{:.2f} %", *a.drift * 100), "Drift", a.drift_sentence);
-  if (a.source == ErrorSource::none) return number_card("not known", "Drift", "no reference");
-  return number_card("not known", "Drift", "the drive is too short");
+  const char* name = a.source == ErrorSource::ins         ? "Drift against the INS"
+                     : a.source == ErrorSource::reference ? "Drift against the reference"
+                                                          : "Drift";
+  if (a.drift) return number_card(fmt::format("{:.2f} %", *a.drift * 100), name, a.drift_sentence);
+  if (a.source == ErrorSource::none) return number_card("not known", name, "no reference");
+  return number_card("not known", name, "the drive is too short");
 }
 
 std::string error_card(const Analysis& a) {
@@ -223,6 +227,9 @@ std::string page_html(const Session& session, const Analysis& analysis, const Ve
       "<link rel=\"icon\" href=\"data:,\"/><title>" +
       title + "</title><style>" + style_sheet() + "</style></head><body><main>\n";
   out += "<h1>" + title + "</h1>\n" + verdict_section(analysis, verdict) + "<div class=\"grid\">\n";
+  if (verdict.grade != Grade::good)
+    if (const std::string happened = happenings_table(session, analysis); !happened.empty())
+      out += section("wide", "What happened", happened);
   if (!verdict.advice.empty()) out += section("wide", "What to do next", list(verdict.advice));
   if (!session.missing.empty()) out += section("wide", "What is missing in this session", list(session.missing));
   out += map_section(session, analysis);

@@ -16,6 +16,8 @@ ReportOutcome write_report(const std::filesystem::path& session_folder) {
   outcome.page = session_folder / "report.html";
   replace_durably(outcome.page, report::page_html(session, analysis, verdict));
   outcome.headline = std::string(report::to_words(verdict.grade)) + ": " + verdict.sentence;
+  outcome.usable = verdict.usable;
+  outcome.main_reason = verdict.main_reason;
   outcome.missing = std::move(session.missing);
   return outcome;
 }

@@ -9,6 +9,8 @@ namespace vergence::app {
 struct ReportOutcome {
   std::filesystem::path page;          // SESSION/report.html
   std::string headline;                // "Good", "Usable with care", "Do not use", and why, in one sentence
+  bool usable = true;                  // false: no pose can be relied on
+  std::string main_reason{};           // then: why, with counts, and what to do
   std::vector<std::string> missing{};  // sentences: files or lines that were not there or not whole
 };
 

@@ -267,6 +267,8 @@ std::optional<ResidualRow> parse_residual(const CsvRows& rows) {
   r.camera = static_cast<int>(*camera);
   r.left = *left, r.top = *top, r.width = *width, r.height = *height;
   r.mean_px = *mean;
+  r.matches = std::clamp(rows.number(rows.column("matches")).value_or(0.0), 0.0, 1e9);
+  r.scatter_px = std::clamp(rows.number(rows.column("scatter_px")).value_or(0.0), 0.0, kLargest);
   return r;
 }
 
@@ -329,7 +331,15 @@ void read_summary(const fs::path& folder, Session* session) {
   session->missing.emplace_back("summary.json is torn; figures are reckoned again from the other files");
 }
 
+/// A drive that never found a calibration has none to write; its calibrations.csv and its summary say so.
+bool without_calibration(const Session& session) {
+  return session.summary.is_object() &&
+         std::none_of(session.calibrations.begin(), session.calibrations.end(), [](const CalibrationRow& c) { return c.accepted; });
+}
+
 void read_calibration_file(const fs::path& folder, Session* session) {
+  std::error_code error;
+  if (!fs::exists(folder / "calibration.yaml", error) && without_calibration(*session)) return;
   const auto text =
       read_part(folder / "calibration.yaml", std::size_t{1} << 20U, "the calibration in use at the end is not known", session);
   if (!text) return;
@@ -391,7 +401,9 @@ Session read_session(const fs::path& folder) {
   session.name = fs::weakly_canonical(folder, error).filename().string();
   read_summary(folder, &session);
   if (!read_poses(folder, &session) || session.frames.empty()) frames_from_trajectory(folder, &session);
-  session.reference = read_trajectory_part(folder, "reference.tum", "there is nothing to compare the trajectory with", &session);
+  // Where there was nothing to compare with there is no such file.
+  if (fs::exists(folder / "reference.tum", error) || number_at(session.summary, "metrics.ate_m"))
+    session.reference = read_trajectory_part(folder, "reference.tum", "there is nothing to compare the trajectory with", &session);
   read_calibrations(folder, &session);
   read_calibration_file(folder, &session);
   read_residuals(folder, &session);

@@ -64,6 +64,7 @@ struct ResidualRow {
   int camera = 1;
   double left = 0, top = 0, width = 0, height = 0;  // px
   double mean_px = 0;
+  double matches = 0, scatter_px = 0;  // 0: an older session does not say
 };
 
 struct Event {

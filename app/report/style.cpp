@@ -35,7 +35,9 @@ path,line,polyline{fill:none}
 .tick{stroke:var(--frame);stroke-width:1;opacity:.28}
 .curve{stroke-width:1.6;stroke-linecap:round;stroke-linejoin:round}
 .s-ours{stroke:var(--ours)}.s-theirs{stroke:var(--theirs)}.s-third{stroke:var(--third)}.s-bad{stroke:var(--bad)}.s-ink{stroke:var(--ink)}.s-care{stroke:var(--care)}
-.map-ours{stroke-width:2.2}.map-theirs{stroke-width:5;opacity:.5}
+.map-ours{stroke-width:2.2}
+.map-theirs{stroke-width:3.4;stroke-dasharray:11 6;stroke-linecap:butt}
+.map-care{stroke-width:4.4;stroke-dasharray:3 4;stroke-linecap:butt}
 .f-ours{fill:var(--ours)}.f-theirs{fill:var(--theirs)}.f-good{fill:var(--good)}.f-care{fill:var(--care)}.f-bad{fill:var(--bad)}
 .f-third{fill:var(--third)}.f-fourth{fill:var(--fourth)}.f-soft{fill:var(--soft)}.f-ink{fill:var(--ink)}
 .o1{opacity:.12}.o2{opacity:.22}.o3{opacity:.32}.o4{opacity:.42}.o5{opacity:.54}
@@ -49,7 +51,9 @@ path,line,polyline{fill:none}
 .track{fill:var(--frame);opacity:.16}
 .budget{stroke:var(--bad);stroke-width:1.6;stroke-dasharray:6 4}
 .key{display:inline-block;width:1.5em;height:.34em;border-radius:2px;vertical-align:middle;margin:0 .35em 0 0}
-.k-ours{background:var(--ours)}.k-theirs{background:var(--theirs)}.k-care{background:var(--care)}
+.k-ours{background:var(--ours)}
+.k-theirs{background:repeating-linear-gradient(90deg,var(--theirs) 0 7px,transparent 7px 11px)}
+.k-care{background:repeating-linear-gradient(90deg,var(--care) 0 3px,transparent 3px 6px)}
 .legend span{margin-right:1.1em;white-space:nowrap}
 table{border-collapse:collapse;width:100%;font-size:.9rem}
 th,td{text-align:left;padding:3px 8px 3px 0;vertical-align:top;border-bottom:1px solid color-mix(in srgb,var(--frame) 30%,transparent);overflow-wrap:anywhere}
@@ -57,14 +61,19 @@ th{font-weight:400;color:var(--soft)}
 th[scope=row]{min-width:8.5em}
 td.n,th.n{text-align:right;font-variant-numeric:tabular-nums;padding-right:0}
 td.k{min-width:6.4em}
-td.w{white-space:nowrap}
+td.w,span.w{white-space:nowrap}
 .clocks td.n,.clocks th.n{padding-left:10px;overflow-wrap:normal}
 .clocks td.n{white-space:nowrap}
 .clocks{margin-bottom:8px}
 .health{max-width:640px;margin-bottom:4px}
+.health td.n,.health th.n{white-space:nowrap;overflow-wrap:normal;padding-left:8px}
+.scroll{overflow-x:auto}
 td.t{white-space:nowrap;font-variant-numeric:tabular-nums}
 tr.group th{color:var(--ink);font-weight:600;padding-top:9px}
 @media screen and (max-width:560px){
+.health{font-size:.8rem}
+.health th[scope=row],.health td.k{min-width:0}
+.health td.n,.health th.n{padding-left:5px}
 .stack tr{display:block;border-bottom:1px solid color-mix(in srgb,var(--frame) 30%,transparent);padding:3px 0}
 .stack tr:first-child{display:none}
 .stack td{display:inline;border:0;padding:0 .7em 0 0}

@@ -17,8 +17,8 @@ inline constexpr Colour kPanel{"panel", "#ffffff", "#181e25", false};
 inline constexpr std::array kColours{
     Colour{"ink", "#17202a", "#e6ebf0", true},    Colour{"soft", "#4d5b69", "#a6b3c0", true},
     Colour{"frame", "#7c8896", "#73808d", false}, Colour{"ours", "#0b5cc4", "#6fb1ff", true},
-    Colour{"theirs", "#a34a00", "#f0a35e", true}, Colour{"good", "#1a6e34", "#58c878", true},
-    Colour{"care", "#875b00", "#e0b03c", true},   Colour{"bad", "#b3202c", "#ff8078", true},
+    Colour{"theirs", "#8a1266", "#f5a8dc", true}, Colour{"good", "#007561", "#6ee7c8", true},
+    Colour{"care", "#875b00", "#e0b03c", true},   Colour{"bad", "#a3001e", "#ff7a70", true},
     Colour{"third", "#7a3fb0", "#c79bf2", true},  Colour{"fourth", "#00707a", "#4fc7d1", true},
 };
 

@@ -242,11 +242,14 @@ std::string held_out_text(const CalibrationRow& c) {
   return fmt::format("{:.2f} → {:.2f} px", c.held_out_before_px, c.held_out_after_px);
 }
 
-/// `± 0.26 % at 20 m, was off 1.4 %`, with spaces that do not break; empty where nothing was measured.
+/// `± 0.26 % at 20 m, was off 1.4 %` as parts that no line breaks; empty where nothing was measured.
 std::string depth_text(const CalibrationRow& c) {
   if (!(c.judged_depth_m > 0) || !std::isfinite(c.depth_sigma_percent)) return "";
-  const std::string sigma = fmt::format("± {:.2f} % at {:.0f} m", c.depth_sigma_percent, c.judged_depth_m);
-  return c.depth_difference_percent > 0 ? fmt::format("{}, was off {:.2f} %", sigma, c.depth_difference_percent) : sigma;
+  const bool off = c.depth_difference_percent > 0;
+  std::string text =
+      fmt::format("<span class=\"w\">± {:.2f} % at {:.0f} m{}</span>", c.depth_sigma_percent, c.judged_depth_m, off ? "," : "");
+  if (off) text += fmt::format(" <span class=\"w\">was off {:.2f} %</span>", c.depth_difference_percent);
+  return text;
 }
 
 }  // namespace
@@ -255,11 +258,13 @@ std::string health_table(const Session& session) {
   const std::string rows =
       health_row(session.summary, "at the start", "calibration.before.") + health_row(session.summary, "at the end", "calibration.");
   if (rows.empty()) return "";
-  return "<table class=\"health\"><tr><th></th><th>calibration</th><th class=\"n\">1 m</th><th class=\"n\">5 m</th><th class=\"n\">10 "
+  return "<div class=\"scroll\"><table class=\"health\"><tr><th></th><th>calibration</th><th class=\"n\">1 m</th><th class=\"n\">5 "
+         "m</th><th class=\"n\">10 "
          "m</th>"
          "<th class=\"n\">20 m</th><th class=\"n\">50 m</th></tr>\n" +
          rows +
-         "</table>\n<p class=\"soft\">Predicted error of a depth at that distance, one sigma, from what the calibration leaves open.</p>\n";
+         "</table></div>\n<p class=\"soft\">Predicted error of a depth at that distance, one sigma, from what the calibration leaves "
+         "open.</p>\n";
 }
 
 std::string calibrations_table(const Session& session) {

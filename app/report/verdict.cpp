@@ -7,6 +7,10 @@
 
 #include <fmt/format.h>
 
+#include "app/report/advice.hpp"
+#include "app/report/fit_pattern.hpp"
+#include "app/report/usability.hpp"
+
 namespace vergence::app::report {
 namespace {
 
@@ -20,39 +24,6 @@ constexpr double kFewDegraded = 0.05;
 constexpr double kFewOverBudget = 0.01;  // the 99th percentile is what the summary keeps
 constexpr double kPercent = 100.0;
 
-struct Advice {
-  std::string_view word;  // of poses.csv
-  const char* sentence;
-};
-
-constexpr std::array kAdvice{
-    Advice{"no_image", "A camera delivered no image: check its cable, its power and the trigger line."},
-    Advice{"image_dark", "Images carried no structure: clean the lenses, take covers off, set exposure and gain for the light."},
-    Advice{"image_repeated", "A camera gave an older image again: check its link, its buffers and the trigger rate it is set to."},
-    Advice{"few_features", "There was too little texture: raise the exposure, look for fog, rain or dirt on the lenses."},
-    Advice{"no_stereo_matches",
-           "Left and right do not fit this calibration: calibrate again, and check that both cameras expose at the same time."},
-    Advice{"cameras_swapped", "Left and right seem to be exchanged: swap the two cables or the cameras' order in the configuration."},
-    Advice{"few_inliers", "Poses rested on few points: look at the images of those moments for dirt, blur or a covered lens."},
-    Advice{"one_camera", "One camera did not support the pose: look at its images for dirt, blur or a wrong exposure."},
-    Advice{"no_pose", "Tracking failed: look at the images of those moments; shorter exposure or a higher frame rate helps in fast turns."},
-    Advice{"time_gap", "Frames are missing: check cables, trigger and the disk's speed; see the events for when."},
-    Advice{"scene_restarted", "After a gap the way across was extrapolated: do not use distances that span it."},
-    Advice{"weak_geometry", "The points did not hold the pose well in some direction: expect it in tunnels, open fields and beside walls."},
-    Advice{"moving_scene", "Much of the picture moved by itself, as behind a bus: compare those stretches with the map before use."},
-    Advice{"unconfirmed", "The calibration from the last drive was not confirmed: drive on until it is, or give one with --calibration."},
-    Advice{"unverified_calibration",
-           "The calibration in use was no longer, or not yet, confirmed by the drive: turns and near things at the roadside confirm it."},
-    Advice{"recalibrating", "The rig no longer fitted its calibration: look for a camera that was knocked or is loose on its mount."},
-    Advice{"uncalibrated", "No calibration had been found yet: these poses only bridge the time until there is one."},
-    Advice{"out_of_step", "A camera's images were of another instant: check trigger lines and exposure, and restart the cameras together."},
-    Advice{"needs_motion", "The calibration could not be found standing still: drive some metres past things at the roadside."},
-    Advice{"needs_near_structure", "The calibration could not be found with far things only: drive past houses, cars or trees."},
-    Advice{"needs_texture", "The calibration could not be found for want of matches between the cameras: check lenses and exposure."},
-    Advice{"unproven_pairing",
-           "Pulses, counters and stamps contradicted each other: check trigger lines, exposure and the board; see the events."},
-};
-
 /// Collects reasons; the grade is that of the worst.
 class Judge {
  public:
@@ -61,6 +32,11 @@ class Judge {
     verdict_.grade = std::max(verdict_.grade, grade);
   }
   void advise(std::string sentence) { verdict_.advice.push_back(std::move(sentence)); }
+  /// No pose can be relied on; the first reason stands.
+  void give_up(const std::string& reason, const std::string& advice) {
+    verdict_.usable = false;
+    if (verdict_.main_reason.empty()) verdict_.main_reason = reason + (advice.empty() ? "" : ". " + advice);
+  }
   [[nodiscard]] Verdict finish() {
     std::stable_sort(found_.begin(), found_.end(), [](const Found& a, const Found& b) { return a.grade > b.grade; });
     for (Found& f : found_) verdict_.reasons.push_back(std::move(f.reason));
@@ -78,18 +54,16 @@ class Judge {
 
 std::string percent(double share) { return fmt::format("{:.{}f} %", share * kPercent, share < 0.0995 ? 1 : 0); }
 
-void judge_frames(const Session& s, const Analysis& a, Judge* j) {
-  const std::size_t posed =
-      static_cast<std::size_t>(std::count_if(s.frames.begin(), s.frames.end(), [](const Frame& f) { return f.posed; }));
-  if (posed == 0) {
-    j->find(Grade::bad, "there never was a pose");
-    return;
-  }
-  if (!a.ok_share) {
-    j->find(Grade::care, "the status of the frames is not known");
-    return;
+void judge_frames(const Session& s, const Analysis& a, const Usability& use, Judge* j) {
+  const bool posed = std::any_of(s.frames.begin(), s.frames.end(), [](const Frame& f) { return f.posed; });
+  if (!posed && (!a.ok_share || a.ok > 0)) return j->find(Grade::bad, "there never was a pose");
+  if (!a.ok_share) return j->find(Grade::care, "the status of the frames is not known");
+  if (use.use != Use::ok) {
+    j->find(use.use == Use::unverified ? Grade::care : Grade::bad, use.reason);
+    if (use.use == Use::nothing) return j->give_up(use.reason, use.advice);
   }
   const auto all = static_cast<double>(a.read + a.skipped);
+  if (use.use == Use::unverified) return;  // all there is to say of its frames
   const double lost = static_cast<double>(a.lost + a.skipped) / all, degraded = static_cast<double>(a.degraded - a.waited) / all;
   if (lost > kFewLost) j->find(lost > kManyLost ? Grade::bad : Grade::care, fmt::format("{} of the frames have no pose", percent(lost)));
   if (degraded > kFewDegraded) j->find(Grade::care, fmt::format("{} of the frames are degraded", percent(degraded)));
@@ -104,7 +78,8 @@ void judge_drift(const Analysis& a, Judge* j) {
   if (!a.drift)
     j->find(Grade::care, "the drive is too short to tell its drift");
   else if (*a.drift > kGoodDrift)
-    j->find(*a.drift > kWorstDrift ? Grade::bad : Grade::care, fmt::format("it drifts by {} of the way", percent(*a.drift)));
+    j->find(*a.drift > kWorstDrift ? Grade::bad : Grade::care,
+            fmt::format("it drifts by {} of the way{}", percent(*a.drift), a.source == ErrorSource::ins ? " against the INS" : ""));
   const double off = a.scale ? std::abs(*a.scale - 1) : 0;
   if (off > kGoodScale) {
     j->find(off > kWorstScale ? Grade::bad : Grade::care,
@@ -113,8 +88,56 @@ void judge_drift(const Analysis& a, Judge* j) {
   }
 }
 
+/// A calibration written down in a way that the matches give away.
+void judge_mistake(const Session& s, const Analysis& a, Judge* j) {
+  struct Mistake {
+    std::string_view word;
+    const char *reason, *advice;
+  };
+  constexpr std::array kMistakes{
+      Mistake{
+          "rotation_transposed", "T_camera_left is inverted: the images fit its rotation transposed",
+          "T_camera_left takes points of the left camera to the other one, X_camera = R X_left + t; give R transposed and -R^T t of what "
+          "stands there now."},
+      Mistake{"already_rectified", "distortion is given for images that have none: they are rectified already",
+              "Give distortion: [0, 0, 0, 0] for rectified images, with the focal length and principal point of the rectification."}};
+  const std::string word = text_at(s.summary, "calibration.mistake");
+  for (const Mistake& m : kMistakes) {
+    if (word != m.word) continue;
+    j->find(a.ok > 0 ? Grade::care : Grade::bad, m.reason);
+    j->advise(m.advice);
+    if (a.ok == 0) j->give_up(std::string(m.reason), m.advice);
+  }
+}
+
+/// What matches far from their epipolar lines near the image's edges tell of the lenses.
+void judge_lenses(const Session& s, const Analysis& a, Judge* j) {
+  const Fit begin = fit_of(s, false), end = fit_of(s, true);
+  const bool verified = flag_at(s.summary, "calibration.verified").value_or(false);
+  const bool found_others = begin.pattern == FitPattern::lens && a.ok > 0;  // the lens of the beginning; the poses since stand on another
+  const Fit& fit = begin.pattern == FitPattern::lens ? begin : end;
+  if (fit.pattern == FitPattern::fine || fit.pattern == FitPattern::unknown || (verified && &fit == &end)) return;
+  const std::string grows =
+      fmt::format("residuals grow towards the edges of the image, from {:.1f} px in the middle to {:.1f} px", fit.middle_px, fit.edge_px);
+  constexpr const char* kHelp =
+      "Lens numbers: rectified images have distortion [0, 0, 0, 0], raw ones never; look whether model, order and image size are those of "
+      "this lens. --calibrate-first finds the lens from the drive, vergence calibrate from a checkerboard.";
+  if (fit.pattern == FitPattern::turned) {
+    j->find(Grade::care, grows + ": a turn between the cameras, or the lens");
+    return j->advise("The calibration does not fit the images' edges: --calibrate-first finds a better one from the whole drive.");
+  }
+  j->advise(kHelp);
+  if (found_others) {
+    j->find(Grade::care, fmt::format("the lens numbers given are wrong ({}); the drive found others{}", grows,
+                                     a.confirmed_s ? fmt::format(" and confirmed them at {:.1f} s", *a.confirmed_s) : ""));
+    return;
+  }
+  j->find(Grade::bad, grows + ": the lens");
+  j->give_up(grows + ": the lens", kHelp);
+}
+
 /// Whether the drive itself has confirmed what its poses stand on.
-void judge_verification(const Session& s, const Analysis& a, Judge* j) {
+void judge_verification(const Session& s, const Analysis& a, const Usability& use, Judge* j) {
   if (std::none_of(s.calibrations.begin(), s.calibrations.end(), [](const CalibrationRow& c) { return c.accepted; })) return;
   const std::optional<bool> verified = flag_at(s.summary, "calibration.verified");
   const bool waited_in_vain = !s.summary.is_object() && a.waited > 0 && !a.confirmed_s;  // the summary of a torn session says nothing
@@ -124,7 +147,9 @@ void judge_verification(const Session& s, const Analysis& a, Judge* j) {
     j->advise("Nothing watched the rig: with calibration.online: on the drive itself confirms the calibration, or says that it is wrong.");
     return;
   }
-  j->find(Grade::care, a.confirmed_s ? "the calibration in use at the end is not verified" : "the drive has not confirmed its calibration");
+  if (use.use != Use::unverified)
+    j->find(Grade::care,
+            a.confirmed_s ? "the calibration in use at the end is not verified" : "the drive has not confirmed its calibration");
   j->advise(
       "The drive did not show that its calibration is right: drive turns, past near things at the roadside, and look whether corners of "
       "the image stay without tracks (dirt, a bonnet, sky only).");
@@ -156,17 +181,33 @@ void advise_on_events(const Session& s, Judge* j) {
   };
   if (const auto event = told("calibration_not_kept"); event != s.events.end())
     j->advise("A calibration was not kept: " + event->sentence + ".");
-  if (const auto event = told("calibration_contradicted"); event != s.events.end())
+  if (const auto event = told("calibration_contradicted"); event != s.events.end()) {
+    j->find(Grade::care, "the calibration given is not that of the rig");
     j->advise("On the way " + event->sentence + ": keep the calibration.yaml of this session, if the drive has confirmed it.");
+  }
   if (const auto event = told("scale_disagrees"); event != s.events.end()) {
     j->find(Grade::care, "lengths disagree with the INS");
     j->advise("At some time " + event->sentence + ".");
   }
 }
 
-void judge_calibration(const Session& s, Judge* j) {
+/// The last measurement by which the drive confirmed its calibration at the depth where a rig of that baseline is judged, if it is known
+/// well there.
+const CalibrationRow* known_well_near(const Session& s) {
+  constexpr double kKnown = 2.0;  // %, the word `good`
+  constexpr double kFar = 20;     // m, where the word is found
+  const auto last = std::find_if(s.calibrations.rbegin(), s.calibrations.rend(),
+                                 [](const CalibrationRow& c) { return (c.accepted || c.kept) && std::isfinite(c.judged_depth_m); });
+  if (last == s.calibrations.rend() || !(last->judged_depth_m < kFar) || !(last->depth_sigma_percent <= kKnown)) return nullptr;
+  return &*last;
+}
+
+void judge_calibration(const Session& s, const Usability& use, Judge* j) {
   const std::string word = text_at(s.summary, "calibration.word");
-  if (word == "recalibrate") {
+  if (const CalibrationRow* near = known_well_near(s); near != nullptr && word == "recalibrate") {
+    j->find(Grade::care, fmt::format("the baseline is short: depths are known to {:.1f} % at {:.1f} m, but not at 20 m",
+                                     near->depth_sigma_percent, near->judged_depth_m));
+  } else if (word == "recalibrate") {
     j->find(Grade::bad, "the calibration is too uncertain for depths");
     j->advise(text_at(s.summary, "calibration.limited_by") == "intrinsics"
                   ? "The calibration is weak because focal lengths or principal points are not known better: calibrate the lenses on a "
@@ -179,7 +220,7 @@ void judge_calibration(const Session& s, Judge* j) {
   // A drive that begins with a calibration has a row of it; a session of another make has no count.
   if (s.calibrations.empty() && !number_at(s.summary, "calibration.accepted")) return;
   if (std::none_of(s.calibrations.begin(), s.calibrations.end(), [](const CalibrationRow& c) { return c.accepted; })) {
-    j->find(Grade::care, "no calibration was found");
+    if (use.use == Use::ok) j->find(Grade::care, "no calibration was found");
     j->advise("No calibration was found: drive past things at the roadside, near and far; calibrations.csv says what each attempt lacked.");
   } else {
     // What the drive measured while it went on was no attempt to replace the one in use.
@@ -213,7 +254,10 @@ void judge_session(const Session& s, const Analysis& a, Judge* j) {
 }
 
 void advise_by_reasons(const Session& s, const Analysis& a, Judge* j) {
-  for (const Advice& advice : kAdvice) {
+  for (const Advice& skip : skip_advice())
+    if (const auto n = std::count_if(s.events.begin(), s.events.end(), [&skip](const Event& e) { return e.kind == skip.word; }); n > 0)
+      j->advise(fmt::format("{} ({} frame{} skipped): {}", skip.word, n, n == 1 ? "" : "s", skip.sentence));
+  for (const Advice& advice : pose_advice()) {
     const auto found = std::find(s.reasons.begin(), s.reasons.end(), advice.word);
     if (found == s.reasons.end()) continue;
     const auto i = static_cast<std::size_t>(found - s.reasons.begin());
@@ -238,12 +282,16 @@ const char* to_words(Grade grade) noexcept {
 
 Verdict judge(const Session& session, const Analysis& analysis) {
   Judge j;
-  judge_frames(session, analysis, &j);
-  judge_drift(analysis, &j);
-  judge_calibration(session, &j);
-  judge_verification(session, analysis, &j);
+  const Usability use = usability_of(session, analysis);
+  judge_mistake(session, analysis, &j);
+  judge_frames(session, analysis, use, &j);
+  if (analysis.source != ErrorSource::none) judge_drift(analysis, &j);
+  judge_calibration(session, use, &j);
+  judge_lenses(session, analysis, &j);
+  judge_verification(session, analysis, use, &j);
   advise_on_events(session, &j);
   judge_session(session, analysis, &j);
+  if (analysis.source == ErrorSource::none) judge_drift(analysis, &j);
   advise_by_reasons(session, analysis, &j);
   Verdict v = j.finish();
   for (const std::string& reason : v.reasons) v.sentence += (v.sentence.empty() ? "" : "; ") + reason;

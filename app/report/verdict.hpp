@@ -17,6 +17,8 @@ struct Verdict {
   std::string sentence{};              // why, in one sentence
   std::vector<std::string> reasons{};  // half sentences
   std::vector<std::string> advice{};   // what to do next, whole sentences
+  bool usable = true;                  // false: no pose can be relied on, exit code 1
+  std::string main_reason{};           // then: why, with counts, and what to do
 };
 
 [[nodiscard]] Verdict judge(const Session& session, const Analysis& analysis);

@@ -31,9 +31,6 @@ namespace vergence::app::detail {
 /// Names of the PNG and JPEG files in root/below, sorted, as root-relative paths. InputError: no such folder, no image in it.
 [[nodiscard]] std::vector<std::string> list_images(const std::filesystem::path& root, const std::string& below);
 
-/// Size of the first image of camera `camera` whose head can be read. InputError when there is none.
-[[nodiscard]] ImageSize first_image_size(const StereoSequence& sequence, std::size_t camera);
-
 /// InputError unless the path is a folder.
 void require_folder(const std::filesystem::path& folder, const char* what_it_should_hold);
 

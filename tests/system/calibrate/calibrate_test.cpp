@@ -99,8 +99,9 @@ TEST_F(Calibrate, aPairOfCamerasIsCalibratedFromFilesAndTheFileServesAReplay) {
 TEST_F(Calibrate, theTableSaysWhatAPersonWantsToKnow) {
   const Outcome o = run_vergence("calibrate" + images() + kArguments + " --out '" + file("t.yaml").string() + "'");
   ASSERT_EQ(o.code, 0) << o.err;
-  for (const char* part : {"14 views of a 9x6 board with squares of 40 mm: 14 used, 0 refused", "reprojection ", "rotation x, °", "t_x, mm",
-                           "X_right = R X_left + t", "baseline 120.", "corners a cell", "lenses held", "between views"})
+  for (const char* part :
+       {"14 views of a 9x6 board with squares of 40 mm: 14 used, 0 refused", "worst views used: ", "reprojection ", "rotation x, °",
+        "t_x, mm", "X_right = R X_left + t", "baseline 120.", "corners a cell", "lenses held", "between views"})
     EXPECT_NE(o.out.find(part), std::string::npos) << part << " in\n" << o.out;
   EXPECT_NE(o.err.find("t.yaml: written"), std::string::npos);
   EXPECT_EQ(o.out.find("Still missing: left"), std::string::npos) << "the boards were all over the images:\n" << o.out;
@@ -142,7 +143,7 @@ TEST_F(Calibrate, exchangedCamerasAreNotUsableAndNothingIsWritten) {
   const Outcome o = run_vergence(fmt::format("calibrate --quiet --left '{0}/right/*.png' --right '{0}/left/*.png'{1} --out '{0}/x.yaml'",
                                              folder_->path().string(), kArguments));
   EXPECT_EQ(o.code, 1);
-  EXPECT_NE(o.err.find("left and right seem exchanged"), std::string::npos) << o.err;
+  EXPECT_NE(o.err.find("left and right are swapped"), std::string::npos) << o.err;
   EXPECT_FALSE(fs::exists(file("x.yaml")));
 }
 
@@ -179,6 +180,29 @@ TEST_F(Calibrate, conversionsGoThroughAllFormatsAndSayWhatTheyLeaveOut) {
   const RigCalibration back = app::read_calibration(file("back.txt")).rig;
   EXPECT_NEAR(place_error(back.T_camera_left[1], c.rig.T_camera_left[1]).norm(), 0, 1e-12);
   EXPECT_EQ(back.intrinsics[1].kind, CameraModelKind::pinhole_equidistant);
+  EXPECT_NE(o.err.find("back.txt: written as calibration.yaml of this program"), std::string::npos) << o.err;
+
+  const std::string once_more = fmt::format("calibrate --convert '{0}/stereo.yml' '{0}/back.txt' --to kalibr", f);
+  o = run_vergence(once_more);
+  EXPECT_EQ(o.code, 2) << "it is there already";
+  EXPECT_NE(o.err.find("--force"), std::string::npos) << o.err;
+  EXPECT_NO_THROW((void)app::read_calibration(file("back.txt")));
+  o = run_vergence(once_more + " --force");
+  EXPECT_EQ(o.code, 0) << o.err;
+  EXPECT_NE(o.err.find("back.txt: written as a Kalibr camchain"), std::string::npos) << o.err;
+  EXPECT_NE(read_file(file("back.txt")).find("cam0:"), std::string::npos);
+  EXPECT_EQ(run_vergence(once_more + " --format ros").code, 2) << "two words for one thing";
+}
+
+TEST_F(Calibrate, aFileThatIsThereIsNotOverwrittenUnasked) {
+  (void)folder_->write("precious.yaml", "mine");
+  const std::string command = "calibrate --quiet" + images() + kArguments + " --out '" + file("precious.yaml").string() + "'";
+  const Outcome o = run_vergence(command);
+  EXPECT_EQ(o.code, 2);
+  EXPECT_NE(o.err.find("precious.yaml: is there already"), std::string::npos) << o.err;
+  EXPECT_EQ(read_file(file("precious.yaml")), "mine");
+  EXPECT_EQ(run_vergence(command + " --force").code, 0);
+  EXPECT_NO_THROW((void)app::read_calibration(file("precious.yaml")));
 }
 
 TEST_F(Calibrate, viewsNeverGoIntoAFolderThatHasSomething) {

@@ -145,7 +145,7 @@ TEST_F(CalibrationCli, aGivenFileGoesBeforeTheStateAndOneOfAnotherRigIsRefused) 
 
 TEST_F(CalibrationCli, aScheduledWishRecalibrates) {
   const Outcome o = drive("s", "--duration 9 --fault recalibrate@4");
-  ASSERT_EQ(o.code, 0) << o.err;
+  ASSERT_EQ(o.code, 1) << "asked before the drive had confirmed what it had, so no frame was ok: " << o.err;
   const auto attempts = summary("s")["recalibrations"];
   ASSERT_GE(attempts.size(), 1U);
   EXPECT_EQ(attempts[0]["reason"], "requested");
@@ -164,7 +164,7 @@ TEST_F(CalibrationCli, sigusr1AsksARunningDriveForANewCalibration) {
   folder_.write("drive.sh", script);
   const int status = std::system(("sh '" + file.string() + "' >/dev/null 2>&1 </dev/null").c_str());
   ASSERT_TRUE(WIFEXITED(status));
-  EXPECT_EQ(WEXITSTATUS(status), 0);
+  EXPECT_LE(WEXITSTATUS(status), 1) << "no frame need be ok so soon";
   EXPECT_EQ(events("s", "recalibration_requested").size(), 1U);
   EXPECT_GT(frames_with("s", "recalibrating"), 0U);
 }

@@ -153,6 +153,103 @@ TEST_F(ReplayedFolder, fromScratchIntrinsicsAndALengthAreEnough) {
   EXPECT_TRUE(summary()["calibration"]["before"].is_null());
 }
 
+TEST_F(ReplayedFolder, whatIsMissingNamesTheWayOut) {
+  std::string text = read_file(data() / "calibration.yaml");
+  const auto at = text.find("    T_camera_left: [");
+  text.erase(at, text.find('\n', at) + 1 - at);
+  write("calibration.yaml", text);
+  expect_refused("--from-scratch");
+  fs::remove_all(session());
+  write("calibration.yaml", text + "\n");
+  text.insert(at, "    T_left_camera: [1, 0, 0, 0.5, 0, 1, 0, 0, 0, 0, 1, 0]\n");
+  write("calibration.yaml", text);
+  expect_refused("T_left_camera is the inverse of what is read: give T_camera_left");
+}
+
+TEST_F(ReplayedFolder, theLayoutIsFoundOut) {
+  const Outcome o = run_vergence("replay '" + data().string() + "' --quiet --out '" + session().string() + "'");
+  ASSERT_EQ(o.code, 0) << o.err;
+  EXPECT_EQ(summary()["frames"]["posed"], kFrames);
+  const Outcome none = run_vergence("replay '" + work_.path().string() + "' --out x");
+  EXPECT_EQ(none.code, 2);
+  EXPECT_NE(none.err.find("holds no drive that is known: KITTI (image_0"), std::string::npos) << none.err;
+}
+
+TEST_F(ReplayedFolder, aCamchainIsReadAsItIs) {
+  const std::string camchain = (work_ / "camchain.yaml").string();
+  ASSERT_EQ(run_vergence("calibrate --convert '" + (data() / "calibration.yaml").string() + "' '" + camchain + "'").code, 0);
+  ASSERT_EQ(replay().code, 0);
+  const std::string same = read_file(session() / "trajectory.tum");
+  fs::remove_all(session());
+  fs::remove(data() / "calibration.yaml");
+  const Outcome o = replay("--calibration '" + camchain + "'");
+  ASSERT_EQ(o.code, 0) << o.err;
+  // The last digit of a matrix product may differ, which decides no inlier here.
+  EXPECT_EQ(read_file(session() / "trajectory.tum").size(), same.size());
+  EXPECT_EQ(summary()["frames"]["posed"], kFrames);
+}
+
+TEST_F(ReplayedFolder, swappedFoldersAreNotToBeUsedAndSaySo) {
+  fs::rename(data() / "left", data() / "other");
+  fs::rename(data() / "right", data() / "left");
+  fs::rename(data() / "other", data() / "right");
+  const Outcome o = replay();
+  EXPECT_EQ(o.code, 1) << o.err;
+  EXPECT_NE(o.err.find("do not use these poses: "), std::string::npos) << o.err;
+  EXPECT_NE(o.err.find("of 24 frames)"), std::string::npos) << o.err;
+  EXPECT_NE(read_file(session() / "report.html").find("Do not use"), std::string::npos);
+  EXPECT_EQ(read_file(session() / "report.html").find("is missing"), std::string::npos) << "nothing is, but what is so by design";
+}
+
+TEST_F(ReplayedFolder, timesOfAnotherUnitAndReversedOnesAreRefused) {
+  const std::string times = read_file(data() / "times.txt");
+  std::string milliseconds, reversed;
+  std::istringstream lines(times);
+  for (std::string line; std::getline(lines, line);) {
+    milliseconds += std::to_string(std::stoll(line) / 1'000'000) + "\n";
+    reversed = line + "\n" + reversed;
+  }
+  write("times.txt", milliseconds);
+  expect_refused("are these milliseconds?");
+  write("times.txt", reversed);
+  expect_refused("times that do not go forward");
+}
+
+TEST_F(ReplayedFolder, aReferenceBesideTheImagesIsComparedWith) {
+  ASSERT_EQ(replay().code, 0);
+  EXPECT_FALSE(fs::exists(session() / "reference.tum")) << "there was none";
+  fs::copy(session() / "trajectory.tum", data() / "truth.tum");
+  fs::remove_all(session());
+  ASSERT_EQ(replay().code, 0);
+  EXPECT_LT(summary()["metrics"]["ate_m"].get<double>(), 1e-6);
+  EXPECT_TRUE(fs::exists(session() / "reference.tum"));
+}
+
+TEST_F(ReplayedFolder, trueAndFalseAreOnAndOff) {
+  ASSERT_EQ(replay("--set calibration.online=false").code, 0);
+  EXPECT_EQ(summary()["calibration"]["online"], false);
+  fs::remove_all(session());
+  ASSERT_EQ(replay("--set calibration.online=true").code, 0);
+  EXPECT_EQ(summary()["calibration"]["online"], true);
+}
+
+TEST_F(ReplayedFolder, imagesWithoutTimesAreTakenAtTenHertzAndThatIsSaid) {
+  fs::remove(data() / "times.txt");
+  const Outcome o = run_vergence("replay '" + data().string() + "' --out '" + session().string() + "'");
+  ASSERT_EQ(o.code, 0) << o.err;
+  EXPECT_NE(o.err.find("there is no times.txt: pairs are taken to be 0.1 s apart"), std::string::npos) << o.err;
+}
+
+TEST_F(ReplayedFolder, focalLengthAndBaselineNeedEachOther) {
+  for (const char* bad : {"--focal 500", "--focal 5 --baseline 0.5", "--distortion 0,0,0,0", "--focal 500 --baseline 0.5 --distortion 1,2",
+                          "--focal 500 --baseline 0.5 --calibration c.yaml"}) {
+    const Outcome o = replay(bad);
+    EXPECT_EQ(o.code, 2) << bad << o.err;
+    EXPECT_NE(o.err.find("--"), std::string::npos) << bad;
+    EXPECT_FALSE(fs::exists(session())) << bad;
+  }
+}
+
 TEST_F(ReplayedFolder, aBaselineGivenScalesTheWay) {
   ASSERT_EQ(replay().code, 0);
   const double way = summary()["path_m"], length = summary()["calibration"]["baseline_m"];

@@ -147,7 +147,7 @@ TEST(BoardCalibration, exchangedCamerasAreNoRig) {
   BoardScene scene = board_scene(truth, kBoard, 10, kNoise, 11);
   for (BoardView& v : scene.views) std::swap(v.corners[0], v.corners[1]);
   const BoardCalibration c = calibrate_boards(scene.views, board_options(truth, kBoard));
-  EXPECT_NE(c.complaint.find("left and right seem exchanged"), std::string::npos) << c.complaint;
+  EXPECT_NE(c.complaint.find("left and right are swapped"), std::string::npos) << c.complaint;
 }
 
 TEST(BoardCalibration, viewsThatDetermineNothingAreSaidToBeThat) {

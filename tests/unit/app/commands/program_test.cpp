@@ -1,9 +1,12 @@
 #include <algorithm>
+#include <sstream>
 #include <string>
+#include <vector>
 
 #include <gtest/gtest.h>
 
 #include "app/runtime/version.hpp"
+#include "tests/support/temporary_folder.hpp"
 #include "tests/unit/app/commands/run_vergence.hpp"
 
 namespace vergence::app {
@@ -41,6 +44,59 @@ TEST(Program, EveryCommandHasItsHelp) {
     EXPECT_TRUE(contains(help.out, std::string("vergence ") + word)) << help.out;
     EXPECT_EQ(help.err, "") << word;
   }
+}
+
+TEST(Program, HelpAndVersionAreWordsToo) {
+  EXPECT_EQ(run_vergence("help").out, run_vergence("--help").out);
+  EXPECT_EQ(run_vergence("help replay").out, run_vergence("replay --help").out);
+  EXPECT_EQ(run_vergence("version").out, run_vergence("--version").out);
+  EXPECT_TRUE(contains(run_vergence("hlep").err, "did you mean \"help\"?"));
+  EXPECT_TRUE(refused_in_one_sentence(run_vergence("help nothing")));
+}
+
+/// Every `--option` that a help text declares, one a line.
+std::vector<std::string> options_of(const std::string& help) {
+  std::vector<std::string> options;
+  std::istringstream lines(help);
+  for (std::string line; std::getline(lines, line);) {
+    const auto at = line.find("--");
+    if (!line.starts_with("  -") || at == std::string::npos) continue;
+    options.push_back(line.substr(at, line.find_first_of(" ,=[", at) - at));
+  }
+  return options;
+}
+
+TEST(Program, ManualAndCompletionHaveEveryCommandAndOption) {
+  const std::string completion = run_vergence("completion").out, whole = run_vergence("manual").out;
+  std::size_t count = 0;
+  for (const char* word : {"run", "replay", "evaluate", "simulate", "calibrate", "devices", "doctor", "snap", "report"}) {
+    const std::string page = run_vergence(std::string("manual ") + word).out;
+    EXPECT_TRUE(contains(whole, std::string("\\fB") + word + "\\fR")) << word;
+    const auto at = completion.find(std::string("    ") + word + ") options=");
+    ASSERT_NE(at, std::string::npos) << word;
+    const std::string row = completion.substr(at, completion.find('\n', at) - at);
+    for (const std::string& option : options_of(run_vergence(std::string(word) + " --help").out)) {
+      std::string escaped;
+      for (const char c : option) escaped += c == '-' ? std::string("\\-") : std::string(1, c);
+      EXPECT_TRUE(contains(page, escaped)) << word << " " << option;
+      EXPECT_TRUE(contains(row, option)) << word << " " << option;
+      ++count;
+    }
+  }
+  EXPECT_GT(count, 60U);
+  EXPECT_TRUE(refused_in_one_sentence(run_vergence("manual nothing")));
+}
+
+TEST(Program, BashCompletesCommandsAndOptions) {
+  const test::TemporaryFolder folder;
+  folder.write("completion", run_vergence("completion").out);
+  const std::string script = "source '" + (folder / "completion").string() +
+                             "'; COMP_WORDS=(vergence rep); COMP_CWORD=1; _vergence; echo \"${COMPREPLY[@]}\"; "
+                             "COMP_WORDS=(vergence replay x --from); COMP_CWORD=3; _vergence; echo \"${COMPREPLY[@]}\"";
+  folder.write("script", script);
+  const std::string command = "bash '" + (folder / "script").string() + "' > '" + (folder / "out").string() + "'";
+  ASSERT_EQ(std::system(command.c_str()), 0);
+  EXPECT_EQ(test::read_file(folder / "out"), "replay report\n--from-scratch\n");
 }
 
 TEST(Program, AnUnknownCommandNamesTheNearest) {

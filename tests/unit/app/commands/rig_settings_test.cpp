@@ -110,7 +110,7 @@ TEST(RigSettings, whatIsRenderedAndWhatTheTruthComparesWithHasNoErrors) {
 TEST(RigSettings, impossibleRigsAreRefusedByTheirKeys) {
   EXPECT_NE(refusal({"cameras.1.T_camera_left.3=0.75", "cameras.1.T_camera_left.0=1", "cameras.1.T_camera_left.5=1",
                      "cameras.1.T_camera_left.10=1"})
-                .find("left and right seem exchanged"),
+                .find("left and right are swapped"),
             std::string::npos);
   EXPECT_NE(refusal({"cameras.1.intrinsics=[500, 0, 322, 241]"}).find("cameras.1.intrinsics"), std::string::npos);
   EXPECT_NE(refusal({"mock.calibration_error.x_m=0.3"}).find("mock.calibration_error"), std::string::npos);

@@ -7,6 +7,10 @@
 #include <thread>
 #include <vector>
 
+#include <fmt/format.h>
+#include <opencv2/core.hpp>
+#include <opencv2/imgcodecs.hpp>
+
 #include "core/memory/allocation_guard.hpp"
 #include "tests/unit/app/datasets/tiny_drive.hpp"
 
@@ -51,6 +55,27 @@ class Decoder : public testing::Test {
   FramePool pool_{test::kTinyWidth, test::kTinyHeight, FrameDecoder::kSlots, arena_};
 };
 
+TEST_F(Decoder, imagesSideBySideAreTakenApart) {
+  test::write_tiny_folder(folder_, 3);
+  for (int i = 0; i < 3; ++i) {
+    cv::Mat both;
+    cv::hconcat(cv::imread((folder_ / test::folder_name(0, i)).string(), cv::IMREAD_GRAYSCALE),
+                cv::imread((folder_ / test::folder_name(1, i)).string(), cv::IMREAD_GRAYSCALE), both);
+    std::filesystem::create_directories(folder_ / "both");
+    ASSERT_TRUE(cv::imwrite((folder_ / fmt::format("both/{:03d}.png", i)).string(), both));
+  }
+  for (const char* side : {"left", "right"}) std::filesystem::remove_all(folder_ / side);
+  ASSERT_EQ(find_format(folder_.path()), SequenceFormat::folder);
+  reopen();
+  EXPECT_TRUE(sequence_.side_by_side);
+  EXPECT_EQ(first_image_size(sequence_, 1), (ImageSize{test::kTinyWidth, test::kTinyHeight}));
+  const auto seen = drain(0, 3);
+  ASSERT_EQ(seen.size(), 3U);
+  for (const Seen& s : seen) EXPECT_TRUE(s.right_pixels) << s.pair.frame << s.pair.note.data();
+  test::write_tiny_image(folder_ / "both/001.png", 0, test::kTinyWidth, test::kTinyHeight);
+  EXPECT_STREQ(drain(0, 3)[1].pair.kind, "image_size") << "half of a pair";
+}
+
 TEST_F(Decoder, everyPairComesInOrderWithItsPixelsThoughFarMoreThanSlots) {
   constexpr int kPairs = 60;
   open(kPairs);
@@ -94,7 +119,7 @@ TEST_F(Decoder, missingTornAndForeignImagesSkipTheirFrameAndNoOther) {
 
 TEST_F(Decoder, timesThatDoNotGoForwardsSkipTheirFrame) {
   open(5);
-  folder_.write("times.txt", "100\n300\n200\n300\n301\n");
+  folder_.write("times.txt", "0.1\n0.3\n0.2\n0.3\n0.31\n");
   reopen();
   const auto seen = drain(0, 5);
   ASSERT_EQ(seen.size(), 5U);
@@ -102,7 +127,7 @@ TEST_F(Decoder, timesThatDoNotGoForwardsSkipTheirFrame) {
   for (std::size_t i = 0; i < 5; ++i) EXPECT_EQ(seen[i].pair.decoded, decoded[i]) << i;
   EXPECT_STREQ(seen[2].pair.kind, "time_backwards");
   EXPECT_EQ(std::string(seen[2].pair.note.data()),
-            "frame 2 skipped: its time 0.000000200 is not later than 0.000000300, the latest before it");
+            "frame 2 skipped: its time 0.200000000 is not later than 0.300000000, the latest before it");
 }
 
 TEST_F(Decoder, aLongNameIsCutNotOverrun) {

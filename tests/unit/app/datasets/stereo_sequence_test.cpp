@@ -60,7 +60,7 @@ TEST_F(Sequence, kittiSaysWhatIsWrong) {
   folder_.write("calib.txt", "P0: 60 0 35 0 0 60 24 0 0 0 1 0\nP1: 60 0 35 -30 0 60 24 0 0 0 1\n");
   EXPECT_TRUE(says(refusal(SequenceFormat::kitti, folder_.path()), {"calib.txt:2", "12 numbers"}));
   folder_.write("calib.txt", "P0: 60 0 35 0 0 60 24 0 0 0 1 0\nP1: 60 0 35 30 0 60 24 0 0 0 1 0\n");
-  EXPECT_TRUE(says(refusal(SequenceFormat::kitti, folder_.path()), {"calib.txt", "exchanged"}));
+  EXPECT_TRUE(says(refusal(SequenceFormat::kitti, folder_.path()), {"calib.txt", "swapped"}));
   folder_.write("calib.txt", "P0: 60 0 35 0 0 60 24 0 0 0 1 0\nP1: 60 0 35 nan 0 60 24 0 0 0 1 0\n");
   EXPECT_TRUE(says(refusal(SequenceFormat::kitti, folder_.path()), {"calib.txt:2", "nan"}));
 }
@@ -138,6 +138,66 @@ TEST_F(Sequence, folderPairsInOrderOfNameAndReadsBothKindsOfTime) {
   EXPECT_EQ(s.pairs[1].stamp.ns(), 1500000000);
   EXPECT_EQ(s.pairs[1].file[0], "left/001.png");
   EXPECT_EQ(s.pairs[1].file[1], "right/zz.png");
+}
+
+TEST_F(Sequence, folderWhoseTimesNameTheirImages) {
+  test::write_tiny_folder(folder_, 4);
+  folder_.write("times.txt", "# stamp,file\n0.0,000.png\n0.1,003.png\n0.2,001.png,002.png\n0.3,gone.png\n");
+  const auto s = open_sequence(SequenceFormat::folder, folder_.path());
+  ASSERT_EQ(s.pairs.size(), 4U);
+  EXPECT_EQ(s.pairs[1].file[1], "right/003.png");
+  EXPECT_EQ(s.pairs[2].file[0], "left/001.png");
+  EXPECT_EQ(s.pairs[2].file[1], "right/002.png");
+  EXPECT_EQ(s.pairs[3].file[0], "left/gone.png") << "a frame that is skipped when it comes";
+  folder_.write("times.txt", "0.0,000.png\n0.1\n");
+  EXPECT_TRUE(says(refusal(SequenceFormat::folder, folder_.path()), {"times.txt:2", "same kind"}));
+  folder_.write("times.txt", "0.0,../000.png\n");
+  EXPECT_TRUE(says(refusal(SequenceFormat::folder, folder_.path()), {"times.txt:1", "../000.png"}));
+  folder_.write("times.txt", "stamp,file\n0.0,000.png\n");
+  EXPECT_TRUE(says(refusal(SequenceFormat::folder, folder_.path()), {"times.txt:1", "begin a line of headings with #"}));
+  folder_.write("times.txt", "0.0,a.png\n0.1,b.png\n");
+  EXPECT_TRUE(says(refusal(SequenceFormat::folder, folder_.path()), {"times.txt", "left/a.png", "left/000.png"}));
+  folder_.write("times.txt", "0.0,a,b,c\n");
+  EXPECT_TRUE(says(refusal(SequenceFormat::folder, folder_.path()), {"4 columns"}));
+}
+
+/// times.txt of pairs that are `step` of the file's own units apart.
+std::string times_of(const char* format, double step, int pairs) {
+  std::string text;
+  for (int i = 0; i < pairs; ++i) text += fmt::format(fmt::runtime(format), step * i) + "\n";
+  return text;
+}
+
+TEST_F(Sequence, timesInAnotherUnitAreRefusedWithTheUnitTheySeemToHave) {
+  test::write_tiny_folder(folder_, 5);
+  struct Case {
+    const char* format;
+    double step;
+    const char* unit;
+  };
+  for (const Case& c : {Case{"{:.0f}", 104, "milliseconds?"}, Case{"{:.0f}", 50, "milliseconds?"}, Case{"{:.0f}", 103700, "microseconds?"},
+                        Case{"{:.0f}", 33333, "microseconds?"}, Case{"{:.0f}", 1, "seconds?"}, Case{"{:.1f}", 103.7, "milliseconds?"},
+                        Case{"{:.1f}", 103700.5, "microseconds?"}, Case{"{:.1f}", 5e7, "nanoseconds?"}}) {
+    folder_.write("times.txt", times_of(c.format, c.step, 5));
+    const std::string sentence = refusal(SequenceFormat::folder, folder_.path());
+    EXPECT_TRUE(says(sentence, {"times.txt", "are these ", c.unit})) << c.format << " " << c.step;
+  }
+  for (const double ns : {5e6, 5e7, 1e9}) {
+    folder_.write("times.txt", times_of("{:.0f}", ns, 5));
+    EXPECT_NO_THROW((void)open_sequence(SequenceFormat::folder, folder_.path())) << ns;
+  }
+  folder_.write("times.txt", "0.0\n0.1\n0.2\n500.0\n500.1\n");
+  EXPECT_NO_THROW((void)open_sequence(SequenceFormat::folder, folder_.path())) << "a gap is no unit";
+}
+
+TEST_F(Sequence, timesThatRunBackwardsAreRefused) {
+  test::write_tiny_folder(folder_, 5);
+  folder_.write("times.txt", "0.5\n0.4\n0.3\n0.2\n0.1\n");
+  EXPECT_TRUE(says(refusal(SequenceFormat::folder, folder_.path()), {"times.txt", "of 4 steps", "4 go back", "oldest first"}));
+  folder_.write("times.txt", "0.5\n0.5\n0.5\n0.5\n0.5\n");
+  EXPECT_TRUE(says(refusal(SequenceFormat::folder, folder_.path()), {"0 go back and 4 stand still"}));
+  folder_.write("times.txt", "0.1\n0.2\n0.15\n0.3\n0.4\n");
+  EXPECT_NO_THROW((void)open_sequence(SequenceFormat::folder, folder_.path())) << "one frame is skipped when it comes";
 }
 
 TEST_F(Sequence, folderWithALostImagePairsTheRestByName) {

@@ -92,8 +92,19 @@ TEST(ReadSession, aFolderThatIsNoSessionIsRefused) {
 TEST(ReadSession, everyFileThatIsMissingIsSaid) {
   const Session s = with_poses(std::string(kShortHead) + "0,1000,stereo_odometry,ok,,1,2,3,0,0,0,1,100,5\n");
   ASSERT_EQ(s.frames.size(), 1U);
-  for (const char* file : {"summary.json", "reference.tum", "calibrations.csv", "calibration.yaml", "events.jsonl"})
-    EXPECT_TRUE(says(s, file)) << file;
+  for (const char* file : {"summary.json", "calibrations.csv", "calibration.yaml", "events.jsonl"}) EXPECT_TRUE(says(s, file)) << file;
+}
+
+TEST(ReadSession, whatIsNotThereByDesignIsNotMissing) {
+  const test::TemporaryFolder folder;
+  folder.write("poses.csv", std::string(kShortHead) + "0,1000,stereo_odometry,degraded,uncalibrated,1,2,3,0,0,0,1,100,5\n");
+  folder.write("calibrations.csv", "stamp_ns,outcome,cause,reason,camera\n");
+  folder.write("events.jsonl", "");
+  folder.write("summary.json", R"({"metrics": null})");
+  const Session s = read_session(folder.path());
+  EXPECT_TRUE(s.missing.empty()) << s.missing.front();
+  folder.write("summary.json", R"({"metrics": {"ate_m": 0.1}})");
+  EXPECT_TRUE(says(read_session(folder.path()), "reference.tum")) << "its figures stand in the summary";
 }
 
 TEST(ReadSession, aTornLastLineIsLeftOutEvenWhenItLooksWhole) {

@@ -114,6 +114,19 @@ TEST(Verdict, aWeakCalibrationSaysWhatWouldHelp) {
   EXPECT_TRUE(any_has(c.verdict().advice, "near and far structure"));
 }
 
+TEST(Verdict, aShortBaselineIsJudgedWhereItCanSee) {
+  Case c;
+  c.session.summary["calibration"]["word"] = "recalibrate";
+  c.session.calibrations = {attempt(true, "refinement", 1, 0.2)};
+  EXPECT_EQ(c.verdict().grade, Grade::bad);
+  c.session.calibrations.back().judged_depth_m = 2.4;
+  c.session.calibrations.back().depth_sigma_percent = 1.0;
+  EXPECT_EQ(c.verdict().grade, Grade::care);
+  EXPECT_TRUE(any_has(c.verdict().reasons, "1.0 % at 2.4 m"));
+  c.session.calibrations.back().depth_sigma_percent = 3.0;
+  EXPECT_EQ(c.verdict().grade, Grade::bad);
+}
+
 TEST(Verdict, aKnockThatWasMendedIsAdviceAndNoGrade) {
   Case c;
   c.session.calibrations = {attempt(true, "knock", 1.4, 0.2)};

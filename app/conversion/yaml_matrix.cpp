@@ -1,4 +1,4 @@
-#include "app/calibration/yaml_matrix.hpp"
+#include "app/conversion/yaml_matrix.hpp"
 
 #include <limits>
 

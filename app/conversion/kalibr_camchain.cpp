@@ -3,8 +3,8 @@
 #include <fmt/format.h>
 #include <yaml-cpp/yaml.h>
 
-#include "app/calibration/foreign_formats.hpp"
-#include "app/calibration/yaml_matrix.hpp"
+#include "app/conversion/foreign_formats.hpp"
+#include "app/conversion/yaml_matrix.hpp"
 #include "app/runtime/errors.hpp"
 
 namespace vergence::app {
