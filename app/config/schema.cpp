@@ -531,8 +531,6 @@ std::string find_contradiction(const Configuration& c) {
   if (c.calibration.usable_depth_percent < c.calibration.good_depth_percent)
     return fmt::format("calibration.usable_depth_percent ({}) is below calibration.good_depth_percent ({})",
                        c.calibration.usable_depth_percent, c.calibration.good_depth_percent);
-  if (c.kitti_raw.left == c.kitti_raw.right)
-    return fmt::format("kitti_raw.left and kitti_raw.right are both camera {}; two cameras make a rig", c.kitti_raw.left);
   return {};
 }
 

@@ -215,6 +215,8 @@ KittiRawFolders find_kitti_raw(const fs::path& folder) {
 }
 
 StereoSequence open_kitti_raw(const fs::path& folder, bool given, const std::array<int, 2>& cameras) {
+  if (cameras[0] == cameras[1])
+    refuse(folder, 0, fmt::format("kitti_raw.left and kitti_raw.right are both camera {}; two cameras make a rig", cameras[0]));
   const KittiRawFolders folders = find_kitti_raw(folder);
   StereoSequence sequence;
   sequence.root = folders.drive;

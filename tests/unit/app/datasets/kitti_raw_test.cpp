@@ -167,6 +167,10 @@ TEST_F(KittiRaw, theColourCamerasByKey) {
   const StereoSequence s = open_sequence(SequenceFormat::kitti_raw, folder_ / kDrive, std::nullopt, {}, {2, 3});
   EXPECT_EQ(s.pairs.size(), static_cast<std::size_t>(kFrames));
   EXPECT_NEAR(s.calibration.T_camera_left[1].t.x(), -0.56, 1e-12);
+  EXPECT_NE(sentence_of<InputError>([&] {
+              (void)open_sequence(SequenceFormat::kitti_raw, folder_ / kDrive, std::nullopt, {}, {2, 2});
+            }).find("are both camera 2"),
+            std::string::npos);
   // The left one is 6 cm to the left of camera 00.
   const auto at = [&](int left, int right) {
     return *read_recorded_ins(SequenceFormat::kitti_raw, folder_ / kDrive, {left, right}, true).T_ins_left;
