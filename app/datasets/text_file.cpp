@@ -70,7 +70,9 @@ std::size_t split(std::string_view line, char separator, std::span<std::string_v
     ++count;
   };
   if (separator == ' ') {
-    for (line = trimmed(line); !line.empty(); line = trimmed(line)) {
+    // One set of blanks for what is passed over and for what ends a field: else a field could be empty and nothing be left behind.
+    for (std::size_t at = line.find_first_not_of(kBlanks); at != std::string_view::npos; at = line.find_first_not_of(kBlanks)) {
+      line.remove_prefix(at);
       const std::string_view field = line.substr(0, line.find_first_of(kBlanks));
       store(field);
       line.remove_prefix(field.size());

@@ -123,7 +123,7 @@ std::string happenings_table(const Session& session, const Analysis& analysis) {
     const std::string often = r.frames       ? grouped(r.count) + (r.count == 1 ? " frame" : " frames")
                               : r.count == 1 ? "once"
                                              : grouped(r.count) + " times";
-    out += fmt::format("<tr><td>{}</td><td class=\"w\">{}</td><td class=\"w\">{}</td></tr>\n", escape(r.what), often, when(r));
+    out += fmt::format("<tr><td>{}</td> <td class=\"w\">{}</td> <td class=\"w\">{}</td></tr>\n", escape(r.what), often, when(r));
   }
   return out + "</table>\n";
 }

@@ -286,8 +286,8 @@ std::string calibrations_table(const Session& session) {
     const std::string why = from.empty() || c.reason.empty() ? from + c.reason : from + "; " + c.reason;
     const char* outcome = c.accepted ? "accepted" : c.kept ? "kept" : "rejected";
     out += fmt::format(
-        "<tr><td class=\"t\">{}</td><td class=\"k\">{}</td><td class=\"w\">{}</td><td class=\"w\">{}</td><td "
-        "class=\"w\">{}</td><td>{}</td><td>{}</td></tr>\n",
+        "<tr><td class=\"t\">{}</td> <td class=\"k\">{}</td> <td class=\"w\">{}</td> <td class=\"w\">{}</td> <td "
+        "class=\"w\">{}</td> <td>{}</td> <td>{}</td></tr>\n",
         event_time(session, c.stamp), outcome, escape(cause, 60), after, held_out_text(c), depth_text(c), escape(why));
   }
   return out + "</table>\n";

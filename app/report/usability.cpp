@@ -69,7 +69,7 @@ Usability usability_of(const Session& s, const Analysis& a) {
   for (const Frame& f : s.frames)
     if (f.status == PoseStatus::degraded && is_waiting(s.reasons[f.reason])) ++waiting;
   const std::string_view rejected = rejection(s);
-  if (waiting > 0 && waiting == a.degraded && moving_frames(s, a) < kFramesToConfirm && a.lost + a.skipped <= a.read / 10)
+  if (waiting > 0 && waiting == a.degraded && moving_frames(s, a) < kFramesToConfirm && a.lost <= a.read / 10 && a.skipped <= a.read)
     return {
         Use::unverified,
         fmt::format("unverified: the drive ended after {} frames, before it could confirm its calibration, which takes some {} in motion",

@@ -63,10 +63,9 @@ void judge_frames(const Session& s, const Analysis& a, const Usability& use, Jud
     if (use.use == Use::nothing) return j->give_up(use.reason, use.advice);
   }
   const auto all = static_cast<double>(a.read + a.skipped);
-  if (use.use == Use::unverified) return;  // all there is to say of its frames
   const double lost = static_cast<double>(a.lost + a.skipped) / all, degraded = static_cast<double>(a.degraded - a.waited) / all;
   if (lost > kFewLost) j->find(lost > kManyLost ? Grade::bad : Grade::care, fmt::format("{} of the frames have no pose", percent(lost)));
-  if (degraded > kFewDegraded) j->find(Grade::care, fmt::format("{} of the frames are degraded", percent(degraded)));
+  if (use.use == Use::ok && degraded > kFewDegraded) j->find(Grade::care, fmt::format("{} of the frames are degraded", percent(degraded)));
 }
 
 void judge_drift(const Analysis& a, Judge* j) {

@@ -261,8 +261,8 @@ TEST(CalibrationPlausibility, BaselineAgainstTheTranslation) {
 }
 
 TEST(CalibrationPlausibility, ALeftCameraOnTheRightIsNoticed) {
-  EXPECT_TRUE(
-      refused(with("-0.75, 0, 1, 0, 0.01", "0.75, 0, 1, 0, 0.01"), "c.yaml:10: cameras.1.T_camera_left", "left and right are swapped, or the transform is given as its inverse"));
+  EXPECT_TRUE(refused(with("-0.75, 0, 1, 0, 0.01", "0.75, 0, 1, 0, 0.01"), "c.yaml:10: cameras.1.T_camera_left",
+                      "left and right are swapped, or the transform is given as its inverse"));
 }
 
 TEST(CalibrationPlausibility, OneCameraAboveTheOtherIsARigToo) {

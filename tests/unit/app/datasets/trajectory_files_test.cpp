@@ -1,5 +1,10 @@
 #include "app/datasets/trajectory_files.hpp"
 
+#include <array>
+#include <string_view>
+
+#include "app/datasets/text_file.hpp"
+
 #include <gtest/gtest.h>
 
 #include <cstdlib>
@@ -45,6 +50,14 @@ constexpr const char* kSensor =
     "%YAML:1.0\nsensor_type: camera\nT_BS:\n  cols: 4\n  rows: 4\n  data: [0.0, -1.0, 0.0, 0.1,\n         1.0, 0.0, 0.0, 0.2,\n         "
     "0.0, 0.0, "
     "1.0, 0.3,\n         0.0, 0.0, 0.0, 1.0]\n";
+
+TEST(Split, everyByteEndsAFieldOrBelongsToOne) {
+  for (int byte = 0; byte < 256; ++byte) {
+    const std::string line = std::string("1 2") + static_cast<char>(byte) + "3 " + static_cast<char>(byte);
+    std::array<std::string_view, 8> fields;
+    EXPECT_LE(split(line, ' ', fields), 4U) << byte;  // and it comes back
+  }
+}
 
 TEST(Tum, readsStampsAsIntegersAndQuaternionsWithWLast) {
   const test::TemporaryFolder folder;
