@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "app/conversion/reading.hpp"
+#include "app/foreign_calibration/foreign_calibration.hpp"
 
 /// `vergence calibrate --convert IN OUT`.
 namespace vergence::app {

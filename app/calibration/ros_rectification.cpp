@@ -1,11 +1,11 @@
-// camera_info holds a rectification: writing it is OpenCV's work, reading it is not (app/conversion/ros_camera_info.cpp).
+// camera_info holds a rectification: writing it is OpenCV's work, reading it is not (app/foreign_calibration/ros_camera_info.cpp).
 #include <algorithm>
 
 #include <fmt/format.h>
 #include <opencv2/calib3d.hpp>
 
-#include "app/conversion/foreign_formats.hpp"
-#include "app/conversion/yaml_matrix.hpp"
+#include "app/foreign_calibration/foreign_formats.hpp"
+#include "app/foreign_calibration/yaml_matrix.hpp"
 #include "app/runtime/errors.hpp"
 
 namespace vergence::app {

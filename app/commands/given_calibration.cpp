@@ -4,8 +4,8 @@
 #include <string_view>
 #include <system_error>
 
-#include "app/conversion/reading.hpp"
 #include "app/datasets/text_file.hpp"
+#include "app/foreign_calibration/foreign_calibration.hpp"
 #include "app/runtime/errors.hpp"
 
 namespace vergence::app {

@@ -1,4 +1,4 @@
-#include "app/conversion/yaml_matrix.hpp"
+#include "app/foreign_calibration/yaml_matrix.hpp"
 
 #include <limits>
 

@@ -1,4 +1,4 @@
-#include "app/conversion/reading.hpp"
+#include "app/foreign_calibration/foreign_calibration.hpp"
 
 #include <algorithm>
 

@@ -4,8 +4,8 @@
 #include <fmt/format.h>
 #include <yaml-cpp/yaml.h>
 
-#include "app/conversion/foreign_formats.hpp"
-#include "app/conversion/yaml_matrix.hpp"
+#include "app/foreign_calibration/foreign_formats.hpp"
+#include "app/foreign_calibration/yaml_matrix.hpp"
 #include "app/runtime/errors.hpp"
 
 namespace vergence::app {

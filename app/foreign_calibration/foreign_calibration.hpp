@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "app/conversion/foreign_formats.hpp"
+#include "app/foreign_calibration/foreign_formats.hpp"
 
 /// A calibration from whatever program it is of.
 namespace vergence::app {
