@@ -43,6 +43,15 @@ void find_drives(const fs::path& folder, int depth, std::vector<fs::path>* found
   if (error) refuse(folder, 0, "cannot be listed (" + error.message() + "): check its permissions");
 }
 
+/// The folder itself, or what lies one or two folders below.
+std::vector<fs::path> drives_in(const fs::path& folder) {
+  if (is_drive(folder)) return {folder};
+  std::vector<fs::path> found;
+  std::size_t looked = 0;
+  find_drives(folder, 2, &found, &looked);
+  return found;
+}
+
 /// The images of one camera that have a stamp, in the order of their names.
 struct CameraFiles {
   std::vector<Stamp> stamps{};
@@ -187,13 +196,10 @@ void list_pairs(const fs::path& drive, const std::array<int, 2>& cameras, Stereo
 
 std::string kitti_raw_camera(int camera) { return fmt::format("image_{:02d}", camera); }
 
+bool holds_kitti_raw(const fs::path& folder) { return !drives_in(folder).empty(); }
+
 KittiRawFolders find_kitti_raw(const fs::path& folder) {
-  std::vector<fs::path> found;
-  std::size_t looked = 0;
-  if (is_drive(folder))
-    found = {folder};
-  else
-    find_drives(folder, 2, &found, &looked);
+  std::vector<fs::path> found = drives_in(folder);
   if (found.empty()) refuse(folder, 0, "holds no KITTI raw drive: a folder with image_00, image_01 and oxts is expected");
   if (found.size() > 1) {
     std::sort(found.begin(), found.end());

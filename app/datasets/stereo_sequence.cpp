@@ -5,6 +5,7 @@
 
 #include "app/config/calibration_file.hpp"
 #include "app/datasets/detail/formats.hpp"
+#include "app/datasets/detail/kitti_raw.hpp"
 #include "app/datasets/text_file.hpp"
 
 namespace vergence::app {
@@ -80,10 +81,10 @@ std::optional<SequenceFormat> find_format(const std::filesystem::path& folder) {
   const auto has = [&](const char* name) { return std::filesystem::exists(folder / name, ignored); };
   if (has("mav0") || (has("cam0") && has("cam1"))) return SequenceFormat::euroc;
   if (has("image_0") && has("image_1")) return SequenceFormat::kitti;
-  if (has("image_00") && has("image_01")) return SequenceFormat::kitti_raw;
   if ((has("left") && has("right")) || has("both")) return SequenceFormat::folder;
   for (std::filesystem::directory_iterator it(folder, ignored), end; !ignored && it != end; it.increment(ignored))
     if (it->path().filename().string().ends_with("_MultiCamera0.log")) return SequenceFormat::st_lucia;
+  if (detail::holds_kitti_raw(folder)) return SequenceFormat::kitti_raw;
   return std::nullopt;
 }
 

@@ -22,6 +22,9 @@ struct KittiRawFolders {
   std::filesystem::path calibration{};  // holds calib_*.txt: the drive's date, or the drive itself
 };
 
+/// A drive lies in `folder`, in its date's folder or one above. InputError: it cannot be listed.
+[[nodiscard]] bool holds_kitti_raw(const std::filesystem::path& folder);
+
 /// `folder`: the drive, its date, or what the date lies in. InputError: no drive in it, or several.
 [[nodiscard]] KittiRawFolders find_kitti_raw(const std::filesystem::path& folder);
 

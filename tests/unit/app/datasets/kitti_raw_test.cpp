@@ -119,6 +119,7 @@ class KittiRaw : public testing::Test {
 
 TEST_F(KittiRaw, pairsRawImagesWithTheLeftCamerasStampsAndFiveCoefficients) {
   for (const fs::path& folder : {folder_ / kDrive, folder_ / "2011_09_26", folder_.path(), folder_ / (kDrive + "/")}) {
+    EXPECT_EQ(find_format(folder), SequenceFormat::kitti_raw) << folder;
     const StereoSequence s = open_sequence(SequenceFormat::kitti_raw, folder);
     ASSERT_EQ(s.pairs.size(), static_cast<std::size_t>(kFrames)) << folder;
     EXPECT_EQ(s.pairs[0].stamp.ns(), kStart);
