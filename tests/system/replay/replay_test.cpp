@@ -118,7 +118,7 @@ TEST_F(ReplayedFolder, aBagGivesThePosesOfTheSameImages) {
   ASSERT_EQ(pair, kFrames);
   const fs::path file = work_.write("drive.mcap", bag.bytes());
   const fs::path other = work_ / "of_bag";
-  const Outcome o = run_vergence("replay '" + file.string() + "' --quiet --out '" + other.string() + "' --calibration '" +
+  const Outcome o = run_vergence("replay '" + file.string() + "' --out '" + other.string() + "' --calibration '" +
                                  (data() / "calibration.yaml").string() + "'");
   ASSERT_EQ(o.code, 0) << o.err;
   EXPECT_NE(o.err.find("drive.mcap is unfinished"), std::string::npos) << o.err;
