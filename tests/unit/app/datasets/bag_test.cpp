@@ -136,6 +136,16 @@ TEST_F(Bag, CameraInfoOfAnotherModelIsRefused) {
   EXPECT_NE(refusal().find("/left/camera_info: d is of the model \"fov\""), std::string::npos);
 }
 
+TEST_F(Bag, CameraInfoOfAnotherSizeIsRefused) {
+  writer_.message(1, kStart, image(kStart, true, kWidth - 2));
+  writer_.message(2, kStart, image(kStart, true, kWidth - 2));
+  const std::string said = refusal();
+  EXPECT_NE(said.find("left/image_raw#0"), std::string::npos) << said;
+  EXPECT_NE(said.find("is 68x48 pixels, but the calibration of this camera (CameraInfo of /left and /right) is for 70x48"),
+            std::string::npos)
+      << said;
+}
+
 TEST_F(Bag, CutAnywhereIsReadOrRefused) {
   for (std::int64_t i = 0; i < 2; ++i) {
     frame(i);
