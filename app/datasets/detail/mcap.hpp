@@ -85,9 +85,9 @@ struct McapScan {
   std::uint64_t end = 0;                        // offset behind the last whole record
 };
 
-/// Hands every message to `each`, in the file's order. Content that is not all there is not handed over. Unpacked chunks of one kind only
-/// are read through: those without compression are read where they lie, 9 bytes a record.
-/// Memory  Two times kMostChunk at most.  InputError  The file does not begin as MCAP.
+/// Hands every message to `each`, in the file's order; content that is not all there is not handed over. Chunks without compression are
+/// read where they lie, 9 bytes a record and 22 a message, whatever their length; their check sums are not looked at. Memory  Two times
+/// kMostChunk at most.  InputError  The file does not begin as MCAP.
 [[nodiscard]] McapScan scan_mcap(const FileBytes& file, const std::function<void(const McapMessage&)>& each);
 
 /// Unpacks the chunk at `offset` of the file into *records. False: it is not as the scan found it; *records undefined.
