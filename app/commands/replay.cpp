@@ -17,6 +17,7 @@ struct Arguments {
   CommonOptions common;
   std::string data, format = "auto", out, model = "radtan";
   std::optional<std::string> calibration, also;
+  BagTopics topics;
   std::int64_t start = 0;
   std::optional<std::int64_t> frames;
   std::optional<double> baseline, focal;
@@ -29,21 +30,21 @@ struct Arguments {
 SequenceFormat sequence_format(const std::string& word, const std::filesystem::path& folder) {
   constexpr const char* kLayouts =
       "KITTI (image_0, image_1, calib.txt, times.txt), KITTI raw (image_00, image_01, calib_*.txt above), EuRoC (mav0), plain (left, "
-      "right, times.txt, calibration.yaml) and UQ St Lucia are "
-      "what "
-      "can be read";
+      "right, times.txt, calibration.yaml), UQ St Lucia and ROS 2 bags (.mcap) are what can be read";
   if (word == "kitti") return SequenceFormat::kitti;
   if (word == "kitti-raw") return SequenceFormat::kitti_raw;
   if (word == "euroc") return SequenceFormat::euroc;
   if (word == "folder") return SequenceFormat::folder;
   if (word == "st-lucia") return SequenceFormat::st_lucia;
+  if (word == "mcap") return SequenceFormat::mcap;
   if (word == "session")
-    throw InputError("--format session is not there yet in this version; kitti, kitti-raw, euroc, folder and st-lucia are");
+    throw InputError("--format session is not there yet in this version; kitti, kitti-raw, euroc, folder, st-lucia and mcap are");
   if (word != "auto")
     throw InputError("--format \"" + word + "\" is not known" +
-                     did_you_mean(word, {"auto", "kitti", "kitti-raw", "euroc", "folder", "st-lucia", "session"}) +
-                     "; kitti, kitti-raw, euroc, folder and st-lucia are what can be read, and auto finds out which it is");
+                     did_you_mean(word, {"auto", "kitti", "kitti-raw", "euroc", "folder", "st-lucia", "mcap", "session"}) +
+                     "; kitti, kitti-raw, euroc, folder, st-lucia and mcap are what can be read, and auto finds out which it is");
   std::error_code ignored;
+  if (folder.extension() == ".mcap") return SequenceFormat::mcap;
   if (!std::filesystem::is_directory(folder, ignored))
     throw InputError(folder.string() + ": is no folder; a folder with a drive is expected");
   if (const auto found = find_format(folder)) return *found;
@@ -78,6 +79,9 @@ ReplayRequest request_of(const Arguments& a) {
   ReplayRequest r;
   r.data = a.data;
   r.format = sequence_format(a.format, r.data);
+  r.topics = a.topics;
+  if (r.format != SequenceFormat::mcap && !(a.topics.left + a.topics.right).empty())
+    throw InputError("--left-topic and --right-topic are of ROS 2 bags (--format mcap)");
   r.known = known_numbers(a);
   if (a.calibrate_first && a.from_scratch)
     throw InputError("--calibrate-first begins from scratch, and drives with what it finds; leave --from-scratch away");
@@ -100,14 +104,16 @@ ReplayRequest request_of(const Arguments& a) {
 void add_replay(CLI::App& root, ExitCode* exit_code) {
   const auto a = std::make_shared<Arguments>();
   CLI::App* command = root.add_subcommand("replay", "Run a recorded drive through the estimator and write a session folder");
-  command->add_option("DATA", a->data, "Folder of the data set")->required();
-  command->add_option("--format", a->format, "Layout of DATA: kitti, kitti-raw, euroc, folder, st-lucia; auto: by what is in it")
+  command->add_option("DATA", a->data, "Folder of the data set, or a .mcap file")->required();
+  command->add_option("--format", a->format, "Layout of DATA: kitti, kitti-raw, euroc, folder, st-lucia, mcap; auto: by what is in it")
       ->type_name("NAME")
       ->capture_default_str();
   command->add_option("--out", a->out, "Session folder; must not exist or be empty")->required()->type_name("DIR");
   command
       ->add_option("--calibration", a->calibration, "calibration.yaml, or a file of Kalibr, ROS or OpenCV, instead of the data set's own")
       ->type_name("FILE");
+  command->add_option("--left-topic", a->topics.left, "Of a bag: topic of the left images, where names do not tell")->type_name("TOPIC");
+  command->add_option("--right-topic", a->topics.right, "Of a bag: topic of the right images")->type_name("TOPIC");
   command->add_option("--start", a->start, "First frame, from 0")->type_name("K");
   command->add_option("--frames", a->frames, "At most so many frames")->type_name("N");
   command->add_option("--baseline", a->baseline, "Distance of the two cameras in metres, instead of the calibration's")->type_name("M");

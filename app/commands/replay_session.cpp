@@ -295,7 +295,8 @@ ExitCode Replay::run() {
 
 /// The truth that lies with the data set, for the stamps that its frames have; empty when there is none.
 Trajectory read_reference(const ReplayRequest& request, const StereoSequence& sequence) {
-  if (request.format == SequenceFormat::kitti_raw || request.format == SequenceFormat::st_lucia) return {};  // their layouts have no truth
+  if (request.format == SequenceFormat::kitti_raw || request.format == SequenceFormat::st_lucia || request.format == SequenceFormat::mcap)
+    return {};  // their layouts have no truth
   const bool plain = request.format == SequenceFormat::folder;
   std::error_code ignored;
   if (plain && std::filesystem::exists(request.data / "truth.tum", ignored)) return read_tum(request.data / "truth.tum");
@@ -316,11 +317,12 @@ StereoSequence open_drive(const ReplayRequest& request) {
   std::vector<std::string> remarks;
   StereoSequence sequence;
   if (request.known)
-    sequence = open_sequence(request.format, request.data, calibration_source(*request.known), use, cameras);
+    sequence = open_sequence(request.format, request.data, calibration_source(*request.known), use, cameras, request.topics);
   else if (request.calibration)
-    sequence = open_sequence(request.format, request.data, calibration_source(*request.calibration, use, &remarks), use, cameras);
+    sequence =
+        open_sequence(request.format, request.data, calibration_source(*request.calibration, use, &remarks), use, cameras, request.topics);
   else
-    sequence = open_sequence(request.format, request.data, std::nullopt, use, cameras);
+    sequence = open_sequence(request.format, request.data, std::nullopt, use, cameras, request.topics);
   if (!request.quiet)
     for (const std::string& sentence : remarks) fmt::print(stderr, "vergence: {}\n", sentence);
   return sequence;

@@ -17,6 +17,7 @@ namespace vergence::app {
 struct ReplayRequest {
   std::filesystem::path data;
   SequenceFormat format = SequenceFormat::kitti;
+  BagTopics topics{};  // of a bag
   std::filesystem::path out;
   std::optional<std::string> calibration;  // a file of any program, instead of the data set's own
   std::optional<KnownNumbers> known;       // instead of any calibration

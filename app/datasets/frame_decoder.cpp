@@ -133,14 +133,15 @@ DecodedPair FrameDecoder::decode(std::size_t index) {
 
 ImageFileStatus FrameDecoder::load(const std::string& name, FrameSlot slot, Workspace* work) {
   if (name.empty()) return ImageFileStatus::missing;
+  const ImageSize size{pool_.width(), pool_.height()};
+  const std::size_t stride = FramePool::stride(size.width);
+  std::uint8_t* out = pool_.writable(slot).data();
   try {
+    if (sequence_.store) return sequence_.store->decode(name, size, out, stride, &work->bytes);
     if (const auto status = read_image_file(sequence_.root / name, &work->bytes); status != ImageFileStatus::ok) return status;
   } catch (const std::bad_alloc&) {  // a file too long for this machine's memory
     return ImageFileStatus::unreadable;
   }
-  const ImageSize size{pool_.width(), pool_.height()};
-  const std::size_t stride = FramePool::stride(size.width);
-  std::uint8_t* out = pool_.writable(slot).data();
   if (!sequence_.bayer) return decode_grey(work->bytes, size, out, stride);
   const ImageFileStatus status = decode_grey(work->bytes, size, work->mosaic.data(), stride);
   const auto step = static_cast<std::ptrdiff_t>(stride);

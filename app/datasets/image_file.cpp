@@ -94,6 +94,8 @@ ImageFileStatus read_image_size(const std::filesystem::path& file, ImageSize* si
   return size_of(head, size);
 }
 
+ImageFileStatus read_image_size(std::span<const std::uint8_t> head, ImageSize* size) noexcept { return size_of(head, size); }
+
 ImageFileStatus check_image(std::span<const std::uint8_t> bytes, ImageSize* size) noexcept {
   if (const auto status = size_of(bytes, size); status != ImageFileStatus::ok) return status;
   if (detail::is_bmp(bytes)) return detail::check_bmp(bytes);

@@ -32,6 +32,9 @@ struct ImageSize {
 /// Size from the head of a PNG, JPEG or BMP file; the rest is not looked at. → ok, missing, unreadable, not_an_image, torn
 [[nodiscard]] ImageFileStatus read_image_size(const std::filesystem::path& file, ImageSize* size);
 
+/// The same of the first bytes of such a file. → ok, not_an_image, torn
+[[nodiscard]] ImageFileStatus read_image_size(std::span<const std::uint8_t> head, ImageSize* size) noexcept;
+
 /// Whether a PNG, JPEG or BMP is all there. Decoders fill what is missing with grey and say nothing, and a half-grey image would be
 /// tracked as if it were the world: PNG chunks are walked to IEND with their check sums, JPEG has to end with its end marker, BMP to hold
 /// its rows. → ok, not_an_image, torn

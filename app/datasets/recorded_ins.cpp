@@ -31,6 +31,7 @@ RecordedIns read_recorded_ins(SequenceFormat format, const std::filesystem::path
     case SequenceFormat::kitti:
     case SequenceFormat::euroc:
     case SequenceFormat::folder:
+    case SequenceFormat::mcap:
       break;
   }
   return {};

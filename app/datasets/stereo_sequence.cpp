@@ -14,7 +14,7 @@ namespace {
 std::string text(ImageSize s) { return std::to_string(s.width) + "x" + std::to_string(s.height); }
 
 StereoSequence open_by_format(SequenceFormat format, const std::filesystem::path& folder, bool given, const CalibrationUse& use,
-                              const std::array<int, 2>& cameras) {
+                              const std::array<int, 2>& cameras, const BagTopics& topics) {
   switch (format) {
     case SequenceFormat::kitti:
       return detail::open_kitti(folder, given);
@@ -26,6 +26,8 @@ StereoSequence open_by_format(SequenceFormat format, const std::filesystem::path
       return detail::open_folder(folder, given, use);
     case SequenceFormat::st_lucia:
       return detail::open_st_lucia(folder, given);
+    case SequenceFormat::mcap:
+      return detail::open_bag(folder, given, topics);
   }
   refuse(folder, 0, "has no reader for its format");
 }
@@ -37,21 +39,22 @@ StereoSequence checked(StereoSequence sequence, const std::filesystem::path& sou
 
 StereoSequence open_sequence(SequenceFormat format, const std::filesystem::path& folder,
                              const std::optional<std::filesystem::path>& calibration, const CalibrationUse& use,
-                             const std::array<int, 2>& cameras) {
+                             const std::array<int, 2>& cameras, const BagTopics& topics) {
   if (calibration)
     return open_sequence(
         format, folder,
-        CalibrationSource{calibration->string(), [&](const StereoSequence&) { return read_calibration(*calibration, use); }}, use, cameras);
-  detail::require_folder(folder, "a drive");
-  StereoSequence sequence = open_by_format(format, folder, false, use, cameras);
+        CalibrationSource{calibration->string(), [&](const StereoSequence&) { return read_calibration(*calibration, use); }}, use, cameras,
+        topics);
+  if (format != SequenceFormat::mcap) detail::require_folder(folder, "a drive");
+  StereoSequence sequence = open_by_format(format, folder, false, use, cameras, topics);
   const std::filesystem::path source = sequence.root / sequence.calibration_source;
   return checked(std::move(sequence), source, use);
 }
 
 StereoSequence open_sequence(SequenceFormat format, const std::filesystem::path& folder, const CalibrationSource& calibration,
-                             const CalibrationUse& use, const std::array<int, 2>& cameras) {
-  detail::require_folder(folder, "a drive");
-  StereoSequence sequence = open_by_format(format, folder, true, use, cameras);
+                             const CalibrationUse& use, const std::array<int, 2>& cameras, const BagTopics& topics) {
+  if (format != SequenceFormat::mcap) detail::require_folder(folder, "a drive");
+  StereoSequence sequence = open_by_format(format, folder, true, use, cameras, topics);
   sequence.calibration = calibration.read(sequence).rig;
   sequence.calibration_source = std::filesystem::path(calibration.name).filename().string();
   return checked(std::move(sequence), calibration.name, use);
@@ -78,20 +81,27 @@ StereoSequence checked(StereoSequence sequence, const std::filesystem::path& sou
 
 std::optional<SequenceFormat> find_format(const std::filesystem::path& folder) {
   std::error_code ignored;
+  if (folder.extension() == ".mcap" && std::filesystem::is_regular_file(folder, ignored)) return SequenceFormat::mcap;
   const auto has = [&](const char* name) { return std::filesystem::exists(folder / name, ignored); };
   if (has("mav0") || (has("cam0") && has("cam1"))) return SequenceFormat::euroc;
   if (has("image_0") && has("image_1")) return SequenceFormat::kitti;
   if ((has("left") && has("right")) || has("both")) return SequenceFormat::folder;
   for (std::filesystem::directory_iterator it(folder, ignored), end; !ignored && it != end; it.increment(ignored))
     if (it->path().filename().string().ends_with("_MultiCamera0.log")) return SequenceFormat::st_lucia;
+  for (std::filesystem::directory_iterator it(folder, ignored), end; !ignored && it != end; it.increment(ignored))
+    if (it->path().extension() == ".mcap") return SequenceFormat::mcap;
   if (detail::holds_kitti_raw(folder)) return SequenceFormat::kitti_raw;
   return std::nullopt;
+}
+
+ImageFileStatus image_size(const StereoSequence& sequence, const std::string& name, ImageSize* size) {
+  return sequence.store ? sequence.store->size(name, size) : read_image_size(sequence.root / name, size);
 }
 
 ImageSize first_image_size(const StereoSequence& sequence, std::size_t camera) {
   ImageSize size;
   for (const StereoPair& pair : sequence.pairs)
-    if (!pair.file[camera].empty() && read_image_size(sequence.root / pair.file[camera], &size) == ImageFileStatus::ok)
+    if (!pair.file[camera].empty() && image_size(sequence, pair.file[camera], &size) == ImageFileStatus::ok)
       return {sequence.side_by_side ? size.width / 2 : size.width, size.height};
   refuse(sequence.root, 0, std::string("has no readable image of the ") + (camera == 0 ? "left" : "right") + " camera");
 }
@@ -103,7 +113,7 @@ void check_image_sizes(const StereoSequence& sequence, std::size_t first, std::s
       const std::string& name = sequence.pairs[i].file[k];
       if (name.empty()) continue;
       ImageSize size;
-      if (read_image_size(sequence.root / name, &size) != ImageFileStatus::ok) continue;
+      if (image_size(sequence, name, &size) != ImageFileStatus::ok) continue;
       const Intrinsics& camera = sequence.calibration.intrinsics[k];
       const ImageSize wanted{(sequence.side_by_side ? 2 : 1) * camera.width, camera.height};
       if (size != wanted)

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <functional>
+#include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -11,18 +12,19 @@
 
 #include "app/config/calibration_file.hpp"
 #include "app/datasets/image_file.hpp"
+#include "app/datasets/image_store.hpp"
 #include "core/types/calibration.hpp"
 #include "core/types/time.hpp"
 
 /// Recorded stereo drives as lists of image files with stamps: what a replay reads, whatever the data set's own layout.
 namespace vergence::app {
 
-enum class SequenceFormat : std::uint8_t { kitti, kitti_raw, euroc, folder, st_lucia };
+enum class SequenceFormat : std::uint8_t { kitti, kitti_raw, euroc, folder, st_lucia, mcap };
 
 /// One frame as the data set lists it.
 struct StereoPair {
   Stamp stamp{};
-  std::array<std::string, 2> file;  // left, right: relative to StereoSequence::root; empty: the data set lists none
+  std::array<std::string, 2> file;  // left, right: relative to StereoSequence::root, or names in its store; empty: the data set lists none
 };
 
 /// A whole drive but its pixels.
@@ -34,12 +36,13 @@ struct StereoSequence {
   std::filesystem::path root;
   std::vector<StereoPair> pairs;
   RigCalibration calibration;
-  std::string calibration_source;      // the file's name, for calibrations.csv
-  std::filesystem::path times;         // the file that the stamps are from, for sentences about them
-  std::size_t left_out = 0;            // frames that are none of `pairs`: no stamp, no partner, out of order
-  std::vector<std::string> remarks{};  // what was left out, taken on trust or assumed: a sentence each
-  bool side_by_side = false;           // a file holds both images, the left one's columns first; file[0] and file[1] are the same
-  bool bayer = false;                  // images are raw mosaics: grey is made of them (core/types/bayer.hpp)
+  std::string calibration_source;             // the file's name, for calibrations.csv
+  std::filesystem::path times;                // the file that the stamps are from, for sentences about them
+  std::size_t left_out = 0;                   // frames that are none of `pairs`: no stamp, no partner, out of order
+  std::vector<std::string> remarks{};         // what was left out, taken on trust or assumed: a sentence each
+  bool side_by_side = false;                  // a file holds both images, the left one's columns first; file[0] and file[1] are the same
+  std::shared_ptr<const ImageStore> store{};  // has the images; nothing: they are files below root
+  bool bayer = false;                         // images are raw mosaics: grey is made of them (core/types/bayer.hpp)
 };
 
 /// A calibration that is used instead of the data set's own: where it is from, and how to have it, given the images that are there.
@@ -48,7 +51,12 @@ struct CalibrationSource {
   std::function<CalibrationFile(const StereoSequence& images)> read;
 };
 
-/// The format of a folder by what is in it; nothing: none that is known.
+/// Which topics of a bag are wanted, in full; empty: the only ones of their types, or those named left and right.
+struct BagTopics {
+  std::string left{}, right{};
+};
+
+/// The format of a folder (or a .mcap file) by what is in it; nothing: none that is known.
 [[nodiscard]] std::optional<SequenceFormat> find_format(const std::filesystem::path& folder);
 
 /// A drive of the given format. `calibration`: a calibration.yaml that is used instead of the data set's own.
@@ -65,16 +73,23 @@ struct CalibrationSource {
 ///           to be 0.1 s apart, which is a remark.
 ///   st_lucia  PREFIX_MultiCamera0.log names the images in PREFIX_MultiCamera0/; paired by line, stamp of the left camera; raw Bayer BMP;
 ///           the calibration published with the data set
+///   mcap    a .mcap file, or a folder with some: a ROS 2 bag (docs/bags.md); paired by the nearest header.stamp, that of the left camera
+///           counts; CameraInfo beside the images
 ///
 /// `use`: what of the calibration is wanted, whichever it is. `cameras`: left and right of a data set that has more than two (kitti_raw).
-/// InputError (file, line, what): folders or files that are not there, no images, numbers of images and times that do not go
-/// together, times that are no numbers, times in another unit or running backwards (check_times()), a calibration that makes no rig, images
-/// of another size than the calibration.
+/// `topics`: of a bag. InputError (file, line, what): folders or files that are not there, no images, numbers of images and times that do
+/// not go together, times that are no numbers, times in another unit or running backwards (check_times()), a calibration that makes no rig,
+/// images of another size than the calibration.
 [[nodiscard]] StereoSequence open_sequence(SequenceFormat format, const std::filesystem::path& folder,
                                            const std::optional<std::filesystem::path>& calibration = std::nullopt,
-                                           const CalibrationUse& use = {}, const std::array<int, 2>& cameras = {0, 1});
+                                           const CalibrationUse& use = {}, const std::array<int, 2>& cameras = {0, 1},
+                                           const BagTopics& topics = {});
 [[nodiscard]] StereoSequence open_sequence(SequenceFormat format, const std::filesystem::path& folder, const CalibrationSource& calibration,
-                                           const CalibrationUse& use, const std::array<int, 2>& cameras = {0, 1});
+                                           const CalibrationUse& use, const std::array<int, 2>& cameras = {0, 1},
+                                           const BagTopics& topics = {});
+
+/// Size of an image of the sequence, from its head. → as read_image_size()
+[[nodiscard]] ImageFileStatus image_size(const StereoSequence& sequence, const std::string& name, ImageSize* size);
 
 /// Size of the first image of camera `camera` whose head can be read. InputError when there is none.
 [[nodiscard]] ImageSize first_image_size(const StereoSequence& sequence, std::size_t camera);

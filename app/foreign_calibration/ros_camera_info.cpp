@@ -1,9 +1,9 @@
-#include <algorithm>
-#include <cmath>
+#include <array>
 
 #include <fmt/format.h>
 #include <yaml-cpp/yaml.h>
 
+#include "app/datasets/ros_camera.hpp"
 #include "app/foreign_calibration/foreign_formats.hpp"
 #include "app/foreign_calibration/yaml_matrix.hpp"
 #include "app/runtime/errors.hpp"
@@ -11,13 +11,8 @@
 namespace vergence::app {
 namespace {
 
-constexpr double kSameRectification = 1e-6;  // relative: focal lengths of the two projection matrices
-
-struct CameraInfo {
+struct CameraInfo : RosCamera {
   std::string name;
-  Intrinsics lens;
-  Mat3 R;   // rectification
-  Mat34 P;  // of rectified images
 };
 
 Intrinsics read_lens(const YamlFile& file) {
@@ -32,22 +27,12 @@ Intrinsics read_lens(const YamlFile& file) {
   const YAML::Node model = need(file, root, "distortion_model", "distortion_model");
   const std::string word = file.text(model, "distortion_model");
   const YAML::Node node = need(file, root, "distortion_coefficients", "distortion_coefficients");
-  if (word == "plumb_bob" || word == "rational_polynomial") {
-    const auto d = read_vector(file, node, "distortion_coefficients", 0, 8);
-    if (std::any_of(d.begin() + std::min<std::ptrdiff_t>(5, static_cast<std::ptrdiff_t>(d.size())), d.end(),
-                    [](double v) { return v != 0; }))
-      file.fail(
-          node,
-          "distortion_coefficients has k4 to k6 of a rational polynomial, which this program's radtan has not; calibrate as plumb_bob");
-    std::copy_n(d.begin(), std::min<std::size_t>(5, d.size()), lens.distortion.begin());
-  } else if (word == "equidistant") {
-    lens.kind = CameraModelKind::pinhole_equidistant;
-    const auto d = read_vector(file, node, "distortion_coefficients", 4, 4);
-    std::copy(d.begin(), d.end(), lens.distortion.begin());
-  } else {
+  if (word != "equidistant" && word != "plumb_bob" && word != "rational_polynomial")
     file.fail(model,
               fmt::format("distortion_model is \"{}\"; plumb_bob, equidistant and rational_polynomial are known", word.substr(0, 60)));
-  }
+  const bool equidistant = word == "equidistant";
+  const auto d = read_vector(file, node, "distortion_coefficients", equidistant ? 4 : 0, equidistant ? 4 : 8);
+  if (const std::string fault = set_ros_distortion(word, d, &lens); !fault.empty()) file.fail(node, "distortion_coefficients " + fault);
   return lens;
 }
 
@@ -73,22 +58,10 @@ CameraInfo read_info(const YamlFile& file) {
 CalibrationFile read_ros(const YamlFile& left, const YamlFile& right, Remarks* /*remarks*/) {
   const std::array info{read_info(left), read_info(right)};
   CalibrationFile calibration;
-  RigCalibration& rig = calibration.rig;
-  rig.cameras = 2;
-  for (std::size_t k = 0; k < 2; ++k) {
-    rig.intrinsics[k] = info[k].lens;
+  for (std::size_t k = 0; k < 2; ++k)
     if (!info[k].name.empty()) calibration.names[k] = info[k].name;
-  }
-  const auto fail = [&](const std::string& sentence) { right.fail(right.root()["projection_matrix"], sentence); };
-  const Mat34 &P_l = info[0].P, &P_r = info[1].P;
-  if (std::abs(P_l(0, 0) - P_r(0, 0)) > kSameRectification * P_l(0, 0) || std::abs(P_l(1, 1) - P_r(1, 1)) > kSameRectification * P_l(1, 1))
-    fail(fmt::format("projection_matrix has the focal length {}, that of {} {}: they are not of one stereo calibration", P_r(0, 0),
-                     left.name(), P_l(0, 0)));
-  const Vec3 apart((P_r(0, 3) - P_l(0, 3)) / P_r(0, 0), (P_r(1, 3) - P_l(1, 3)) / P_r(1, 1), 0);
-  if (apart.norm() == 0) fail("projection_matrix has no baseline: the fourth number of its first row is −fx·B in a stereo calibration");
-  Transform& T = rig.T_camera_left[1];
-  T.R = info[1].R.transpose() * info[0].R;
-  T.t = info[1].R.transpose() * apart;
+  if (const std::string fault = set_ros_rig(info[0], info[1], &calibration.rig); !fault.empty())
+    right.fail(right.root()["projection_matrix"], "projection_matrix " + fault + " (" + left.name() + " is the left camera's)");
   detail::check_read(right.name(), &calibration);
   return calibration;
 }

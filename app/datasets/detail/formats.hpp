@@ -19,6 +19,7 @@ namespace vergence::app::detail {
 [[nodiscard]] StereoSequence open_euroc(const std::filesystem::path& folder, bool given);
 [[nodiscard]] StereoSequence open_folder(const std::filesystem::path& folder, bool given, const CalibrationUse& use);
 [[nodiscard]] StereoSequence open_st_lucia(const std::filesystem::path& folder, bool given);
+[[nodiscard]] StereoSequence open_bag(const std::filesystem::path& bag, bool given, const BagTopics& topics);
 
 /// The packets of oxts/ of a KITTI raw drive as INS samples (docs/kitti_raw.md); what is missing, broken or out of order is left out and
 /// told. InputError: files that are not there, no packet that is whole, a calibration that is none.

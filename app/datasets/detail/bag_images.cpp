@@ -1,0 +1,93 @@
+#include "app/datasets/detail/bag_images.hpp"
+
+#include <algorithm>
+#include <charconv>
+
+#include "core/types/bayer.hpp"
+
+namespace vergence::app::detail {
+namespace {
+
+/// Luminance of ITU-R BT.601 in 8 bits, as JPEG has it. `red`, `blue`: place of the colours in a pixel.
+void colour_to_grey(const std::uint8_t* row, int width, std::size_t red, std::size_t blue, std::uint8_t* out) noexcept {
+  for (int x = 0; x < width; ++x, row += 3)
+    out[x] = static_cast<std::uint8_t>((77U * row[red] + 150U * row[1] + 29U * row[blue] + 128U) >> 8U);
+}
+
+}  // namespace
+
+BagImages::BagImages(std::vector<std::unique_ptr<FileBytes>> files, std::array<std::string, 2> topics,
+                     std::array<std::vector<BagImage>, 2> images) noexcept
+    : files_(std::move(files)), topics_(std::move(topics)), images_(std::move(images)) {}
+
+std::string BagImages::name(std::size_t camera, std::size_t index) const {
+  const std::string& topic = topics_[camera];
+  return topic.substr(topic.starts_with('/') ? 1 : 0) + "#" + std::to_string(index);
+}
+
+const BagImage* BagImages::find(const std::string& name, std::size_t* camera) const noexcept {
+  const std::size_t mark = name.rfind('#');
+  if (mark == std::string::npos) return nullptr;
+  std::size_t index = 0;
+  if (std::from_chars(name.data() + mark + 1, name.data() + name.size(), index).ec != std::errc{}) return nullptr;
+  for (*camera = 0; *camera < 2; ++*camera) {
+    std::string_view topic = topics_[*camera];
+    if (topic.starts_with('/')) topic.remove_prefix(1);
+    if (topic == std::string_view(name).substr(0, mark)) return index < images_[*camera].size() ? &images_[*camera][index] : nullptr;
+  }
+  return nullptr;
+}
+
+ImageFileStatus BagImages::size(const std::string& name, ImageSize* size) const {
+  std::size_t camera = 0;
+  const BagImage* entry = find(name, &camera);
+  if (entry == nullptr) return ImageFileStatus::missing;
+  *size = entry->image.size;
+  return ImageFileStatus::ok;
+}
+
+bool BagImages::load(const BagImage& entry, Unpacked* unpacked, std::vector<std::uint8_t>* data) const {
+  const FileBytes& file = *files_[entry.file];
+  data->resize(entry.image.bytes);
+  const std::uint64_t offset = entry.place.offset + entry.image.offset;
+  if (entry.place.chunk == McapPlace::kNoChunk) return file.read(offset, *data);
+  const std::lock_guard lock(unpacked->one_at_a_time);
+  if (unpacked->chunk != entry.place.chunk || unpacked->file != entry.file) {
+    unpacked->chunk = McapPlace::kNoChunk;  // until it is whole
+    if (!unpack_chunk(file, entry.place.chunk, &unpacked->records)) return false;
+    unpacked->chunk = entry.place.chunk;
+    unpacked->file = entry.file;
+  }
+  return MemoryBytes(unpacked->records).read(offset, *data);
+}
+
+ImageFileStatus BagImages::decode(const std::string& name, ImageSize size, std::uint8_t* out, std::size_t stride,
+                                  std::vector<std::uint8_t>* work) const {
+  std::size_t camera = 0;
+  const BagImage* entry = find(name, &camera);
+  if (entry == nullptr) return ImageFileStatus::missing;
+  const RosImage& image = entry->image;
+  if (image.size != size) return ImageFileStatus::wrong_size;
+  if (!load(*entry, &unpacked_[camera], work)) return ImageFileStatus::unreadable;
+  const std::uint8_t* in = work->data();
+  switch (image.layout) {
+    case PixelLayout::encoded:
+      return decode_grey(*work, size, out, stride);
+    case PixelLayout::bayer:
+      bayer_to_grey(in, image.step, size.width, size.height, out, static_cast<std::ptrdiff_t>(stride));
+      return ImageFileStatus::ok;
+    case PixelLayout::grey:
+    case PixelLayout::rgb:
+    case PixelLayout::bgr:
+      break;
+  }
+  for (int y = 0; y < size.height; ++y, in += image.step, out += stride) {
+    if (image.layout == PixelLayout::grey)
+      std::copy_n(in, size.width, out);
+    else
+      colour_to_grey(in, size.width, image.layout == PixelLayout::rgb ? 0 : 2, image.layout == PixelLayout::rgb ? 2 : 0, out);
+  }
+  return ImageFileStatus::ok;
+}
+
+}  // namespace vergence::app::detail
