@@ -218,16 +218,7 @@ std::string scalar(const std::string& text) {
   const bool letter_first = !text.empty() && std::isalpha(static_cast<unsigned char>(text.front())) != 0;
   if (letter_first && std::all_of(text.begin(), text.end(), plain) && std::find(kWords.begin(), kWords.end(), lower) == kWords.end())
     return text;
-  std::string quoted = "\"";
-  for (const char c : text) {
-    if (c == '"' || c == '\\')
-      quoted += std::string("\\") + c;
-    else if (static_cast<unsigned char>(c) < 0x20 || c == 0x7f)
-      quoted += fmt::format("\\x{:02x}", static_cast<unsigned char>(c));
-    else
-      quoted += c;
-  }
-  return quoted + "\"";
+  return double_quoted(text);
 }
 
 std::string list(std::span<const double> values) { return fmt::format("[{}]", fmt::join(values, ", ")); }

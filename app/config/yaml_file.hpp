@@ -44,4 +44,7 @@ class YamlFile {
 
 inline constexpr std::uintmax_t kLargestYaml = 1U << 20;  // bytes: hundreds of times a long configuration
 
+/// A text in double quotes, whatever is in it.
+[[nodiscard]] std::string double_quoted(std::string_view text);
+
 }  // namespace vergence::app

@@ -76,17 +76,4 @@ int read_side(const YamlFile& file, const YAML::Node& node, const std::string& f
 
 std::string number_list(std::span<const double> values) { return fmt::format("[{}]", fmt::join(values, ", ")); }
 
-std::string double_quoted(std::string_view text) {
-  std::string out = "\"";
-  for (const char c : text) {
-    if (c == '"' || c == '\\')
-      out += std::string("\\") + c;
-    else if (static_cast<unsigned char>(c) < 0x20 || c == 0x7f)
-      out += fmt::format("\\x{:02x}", static_cast<unsigned char>(c));
-    else
-      out += c;
-  }
-  return out + "\"";
-}
-
 }  // namespace vergence::app

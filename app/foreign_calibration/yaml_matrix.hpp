@@ -25,7 +25,5 @@ namespace vergence::app {
 
 /// `[a, b, c]` with as many digits as give the same doubles again.
 [[nodiscard]] std::string number_list(std::span<const double> values);
-/// A text in double quotes, whatever is in it.
-[[nodiscard]] std::string double_quoted(std::string_view text);
 
 }  // namespace vergence::app

@@ -12,19 +12,17 @@
 #include <fmt/format.h>
 #include <opencv2/imgcodecs.hpp>
 
-#include "app/commands/mock_drive.hpp"
 #include "app/commands/rig_settings.hpp"
-#include "app/runtime/live_source.hpp"
 #include "core/comparison/geodesy.hpp"
 #include "core/math/random.hpp"
 #include "core/math/so3.hpp"
+#include "tests/support/mock_source.hpp"
 
 namespace vergence::test {
 namespace {
 
 namespace fs = std::filesystem;
 
-constexpr Stamp kVirtualEpoch{1'577'836'800'000'000'000};  // of vergence run --fast: 2020-01-01
 const std::string kDate = "2020_01_01";
 constexpr Duration kRightIsEarly = Duration::microseconds(1300);
 constexpr double kDegree = std::numbers::pi / 180;
@@ -140,15 +138,8 @@ void write_images(const app::LiveSource& source, const app::LiveItem& item, Writ
 
 fs::path write_kitti_raw(const app::Configuration& c, double duration_s, const KittiRawForm& form, const fs::path& folder) {
   const app::MockDrive drive = app::make_mock_drive(c, {}, false, duration_s, false);
-  app::LiveSource::Options o;
-  o.sync.cameras = 2;
-  o.sync.interval = Duration::seconds(1 / c.trigger.rate);
-  o.sync.hold = Duration::seconds(c.sync.hold_ms * 1e-3);
-  o.wait_when_full = true;
-  o.tie_stamp = kVirtualEpoch;
-  o.tie_host = drive.rig->start();
-  o.stamp_grid = app::stamp_grid(c);
-  app::LiveSource source({&drive.rig->camera(0), &drive.rig->camera(1)}, &drive.rig->ins(), &drive.rig->trigger(), o);
+  app::LiveSource source({&drive.rig->camera(0), &drive.rig->camera(1)}, &drive.rig->ins(), &drive.rig->trigger(),
+                         mock_source_options(c, drive));
 
   Written w;
   w.drive = folder / kDate / (kDate + "_drive_0001_" + (form.rectified ? "sync" : "extract"));

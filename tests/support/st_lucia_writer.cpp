@@ -8,14 +8,12 @@
 
 #include <fmt/format.h>
 
-#include "app/commands/mock_drive.hpp"
-#include "app/runtime/live_source.hpp"
+#include "tests/support/mock_source.hpp"
 
 namespace vergence::test {
 namespace {
 
-constexpr Stamp kVirtualEpoch{1'577'836'800'000'000'000};  // of vergence run --fast
-const std::string kPrefix = "200101_100000_";              // that in Brisbane
+const std::string kPrefix = "200101_100000_";  // that in Brisbane
 const std::string kImages = kPrefix + "MultiCamera0";
 
 std::string stamp_text(Stamp stamp) { return fmt::format("{} {}", stamp.ns() / 1'000'000'000, stamp.ns() % 1'000'000'000 / 1'000); }
@@ -70,16 +68,8 @@ void write_bytes(const std::filesystem::path& file, const std::vector<std::uint8
 
 void write_st_lucia(const app::Configuration& c, double duration_s, const std::filesystem::path& folder) {
   const app::MockDrive drive = app::make_mock_drive(c, {}, false, duration_s, true);
-  app::LiveSource::Options o;
-  o.sync.cameras = 2;
-  o.sync.interval = Duration::seconds(1 / c.trigger.rate);
-  o.sync.hold = Duration::seconds(c.sync.hold_ms * 1e-3);
-  o.wait_when_full = true;
-  o.tie_stamp = kVirtualEpoch;
-  o.tie_host = drive.rig->start();
-  o.stamp_grid = app::stamp_grid(c);
   app::LiveSource source({&drive.rig->camera(0), &drive.rig->camera(1)}, drive.has_ins ? &drive.rig->ins() : nullptr, &drive.rig->trigger(),
-                         o);
+                         mock_source_options(c, drive));
 
   std::filesystem::create_directories(folder / kImages);
   std::ofstream images(folder / (kImages + ".log")), ins(folder / (kPrefix + "Ins0.log"));
