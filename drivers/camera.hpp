@@ -28,9 +28,13 @@ struct CameraConfiguration {
   CameraTrigger trigger = CameraTrigger::hardware;
   int offset_x = 0;            // px, of the region read out, on the sensor
   int offset_y = 0;            // px
-  std::string pixel_format{};  // the device's own name (Mono8, BayerGB8, GREY …); empty: the driver takes the cheapest that gives grey
-  std::map<std::string, std::string> options{};  // what only this kind of camera has (docs/cameras.md); an unknown name is unsupported
-  int sharing = 1;  // cameras of the rig on this camera's link or bus, itself included: its share of the bandwidth
+  std::string pixel_format{};  // the device's own name (Mono8, BayerGB8, GREY …); empty: the driver
+                               // takes the cheapest that gives grey
+  std::map<std::string, std::string>
+      options{};    // what only this kind of camera has (docs/cameras.md); an unknown name is
+                    // unsupported
+  int sharing = 1;  // cameras of the rig on this camera's link or bus, itself included: its share
+                    // of the bandwidth
 };
 
 /// What brightness is set with while a camera streams.
@@ -48,7 +52,8 @@ enum class FrameStatus : std::uint8_t {
 /// One exposure, handed out by wait().
 struct Frame {
   FrameSlot slot = 0;
-  std::uint64_t counter = 0;     // exposures since start(), the first is 0, unwrapped; gaps are frames that never came
+  std::uint64_t counter =
+      0;  // exposures since start(), the first is 0, unwrapped; gaps are frames that never came
   DeviceStamp exposure_start{};  // by the camera's clock
   HostStamp arrival{};           // when the last byte was here
   Duration exposure{};           // as this frame had it
@@ -67,52 +72,65 @@ struct CameraStatistics {
 
 /// One opened camera: gige, iidc, v4l2 and mock, all behind this.
 ///
-/// Ownership  A slot belongs to the camera until wait() hands it out, then to the caller until release(). Slots are the transport's own
-///            buffers or those of a FramePool; either way view() shows the pixels, without a copy.
-/// Threads    configure, start, stop: the owner's thread. wait: one consumer thread. release: one thread, the same or another. wait and
-///            release may overlap stop(). set_exposure: one thread, may overlap everything but configure(). statistics: any.
-/// Memory     No allocation by the caller's thread between start() and stop(). Slots are fixed at configure().
-/// Time       exposure_start by the device's clock, arrival by the host's (or by virtual time, for a mock that runs faster).
-/// Pixels     8-bit grey, row 0 on top; rows as the transport brings them, or padded to cache lines where the driver converts.
-///            The padding is not initialised.
-/// Full       With no slot free the newest exposure is dropped and counted (`underruns`); a mock in virtual time waits instead.
-/// Errors     Nothing throws. A call that is not `ok` has changed nothing but the counters and *arrival.
+/// Ownership  A slot belongs to the camera until wait() hands it out, then to the caller until
+///            release(). Slots are the transport's own buffers or those of a FramePool; either way
+///            view() shows the pixels, without a copy.
+/// Threads    configure, start, stop: the owner's thread. wait: one consumer thread. release: one
+///            thread, the same or another. wait and release may overlap stop(). set_exposure: one
+///            thread, may overlap everything but configure(). statistics: any.
+/// Memory     No allocation by the caller's thread between start() and stop(). Slots are fixed at
+///            configure().
+/// Time       exposure_start by the device's clock, arrival by the host's (or by virtual time, for
+///            a mock that runs faster).
+/// Pixels     8-bit grey, row 0 on top; rows as the transport brings them, or padded to cache lines
+///            where the driver converts. The padding is not initialised.
+/// Full       With no slot free the newest exposure is dropped and counted (`underruns`); a mock in
+///            virtual time waits instead.
+/// Errors     Nothing throws. A call that is not `ok` has changed nothing but the counters and
+///            *arrival.
 class CameraDevice {
  public:
   virtual ~CameraDevice() = default;  // stops
 
   [[nodiscard]] virtual const DeviceInfo& info() const noexcept = 0;
-  /// While not streaming and with every slot released, else `busy`. *actual (may be null): what the camera will do, rounded to what it
-  /// can. → ok, unsupported, bad_configuration, busy, gone
-  [[nodiscard]] virtual DeviceStatus configure(const CameraConfiguration& wanted, CameraConfiguration* actual) noexcept = 0;
+  /// While not streaming and with every slot released, else `busy`. *actual (may be null): what the
+  /// camera will do, rounded to what it can. → ok, unsupported, bad_configuration, busy, gone
+  [[nodiscard]] virtual DeviceStatus configure(const CameraConfiguration& wanted,
+                                               CameraConfiguration* actual) noexcept = 0;
   /// From the start of an exposure to its arrival. Precondition: configured.
   [[nodiscard]] virtual DeviceTiming timing() const noexcept = 0;
-  /// Starts streaming, also again after `gone`; while streaming it does nothing. `ready` (may be null) is told of every frame and of the
-  /// device's going. → ok, gone, ended, no_permission, no_bandwidth, bad_configuration (not configured)
+  /// Starts streaming, also again after `gone`; while streaming it does nothing. `ready` (may be
+  /// null) is told of every frame and of the device's going. → ok, gone, ended, no_permission,
+  /// no_bandwidth, bad_configuration (not configured)
   [[nodiscard]] virtual DeviceStatus start(Notifier* ready) noexcept = 0;
-  /// Oldest frame not yet handed out, waiting at most `limit` (0: look once). `ok`: frame->slot is the caller's. `gone`: frame->arrival
-  /// says when it was noticed. → ok, timeout, stopped, ended, gone
+  /// Oldest frame not yet handed out, waiting at most `limit` (0: look once). `ok`: frame->slot is
+  /// the caller's. `gone`: frame->arrival says when it was noticed. → ok, timeout, stopped, ended,
+  /// gone
   [[nodiscard]] virtual DeviceStatus wait(Duration limit, Frame* frame) noexcept = 0;
   /// Precondition: the slot was handed out and not yet released.
   [[nodiscard]] virtual ImageView view(FrameSlot slot) const noexcept = 0;
   /// Gives a slot back, in any order. Precondition as view().
   virtual void release(FrameSlot slot) noexcept = 0;
-  /// Wakes wait() with `stopped`; no device access and no notify() after it returns. Twice is harmless.
+  /// Wakes wait() with `stopped`; no device access and no notify() after it returns. Twice is
+  /// harmless.
   virtual void stop() noexcept = 0;
-  /// One exposure, with CameraTrigger::software and while streaming. → ok, unsupported, stopped, gone
+  /// One exposure, with CameraTrigger::software and while streaming. → ok, unsupported, stopped,
+  /// gone
   [[nodiscard]] virtual DeviceStatus trigger_once() noexcept { return DeviceStatus::unsupported; }
-  /// Exposure and gain from one of the next frames on, while streaming; those frames tell it, and a camera that comes back has it. Outside
-  /// of what the camera has the nearest is taken; *actual (may be null): what it took. Talks to the device: as long as that, never for
-  /// ever; not for a thread that has a frame to give. → ok, unsupported, bad_configuration (not positive, longer than the interval),
-  /// stopped, gone, failed
-  [[nodiscard]] virtual DeviceStatus set_exposure(const ExposureSetting& /*wanted*/, ExposureSetting* /*actual*/) noexcept {
+  /// Exposure and gain from one of the next frames on, while streaming; those frames tell it, and a
+  /// camera that comes back has it. Outside of what the camera has the nearest is taken; *actual
+  /// (may be null): what it took. Talks to the device: as long as that, never for ever; not for a
+  /// thread that has a frame to give. → ok, unsupported, bad_configuration (not positive, longer
+  /// than the interval), stopped, gone, failed
+  [[nodiscard]] virtual DeviceStatus set_exposure(const ExposureSetting& /*wanted*/,
+                                                  ExposureSetting* /*actual*/) noexcept {
     return DeviceStatus::unsupported;
   }
-  /// One sentence about the last call that was not `ok`: what was refused, what the camera offers, what to do. Empty: the status says
-  /// it all. Owner's thread; may allocate.
+  /// One sentence about the last call that was not `ok`: what was refused, what the camera offers,
+  /// what to do. Empty: the status says it all. Owner's thread; may allocate.
   [[nodiscard]] virtual std::string complaint() const { return {}; }
-  /// One sentence about what works, but not as well as it should (a buffer the system made smaller): what, and what to do. Empty: nothing.
-  /// Owner's thread; may allocate.
+  /// One sentence about what works, but not as well as it should (a buffer the system made
+  /// smaller): what, and what to do. Empty: nothing. Owner's thread; may allocate.
   [[nodiscard]] virtual std::string remark() const { return {}; }
   [[nodiscard]] virtual CameraStatistics statistics() const noexcept = 0;
 };
@@ -125,9 +143,12 @@ class CameraDriver {
  public:
   virtual ~CameraDriver() = default;
   [[nodiscard]] virtual std::vector<DeviceInfo> enumerate() = 0;
-  /// `serial` empty: the first. Null: *status says why. → ok, not_found, no_permission, busy, failed
-  [[nodiscard]] virtual std::unique_ptr<CameraDevice> open(std::string_view serial, DeviceStatus* status) = 0;
-  /// One sentence about the last open() that gave nothing, or enumerate() that found nothing. Empty: the status says it all.
+  /// `serial` empty: the first. Null: *status says why. → ok, not_found, no_permission, busy,
+  /// failed
+  [[nodiscard]] virtual std::unique_ptr<CameraDevice> open(std::string_view serial,
+                                                           DeviceStatus* status) = 0;
+  /// One sentence about the last open() that gave nothing, or enumerate() that found nothing.
+  /// Empty: the status says it all.
   [[nodiscard]] virtual std::string complaint() const { return {}; }
 };
 

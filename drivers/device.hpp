@@ -8,7 +8,8 @@
 /// What cameras, INS and trigger boards have in common.
 namespace vergence {
 
-/// Nanoseconds of a device's own clock, unwrapped by its driver. Origin and rate are the device's: a ClockMapper ties it to the host.
+/// Nanoseconds of a device's own clock, unwrapped by its driver. Origin and rate are the device's:
+/// a ClockMapper ties it to the host.
 using DeviceStamp = Instant<struct DeviceClock>;
 
 enum class DeviceStatus : std::uint8_t {
@@ -35,16 +36,18 @@ struct DeviceInfo {
   std::string place;  // address, port, bus path
 };
 
-/// What a driver knows about the way from the measurement to the host, for the configuration in force.
+/// What a driver knows about the way from the measurement to the host, for the configuration in
+/// force.
 struct DeviceTiming {
-  Duration least_delay{};                             // from the stamped instant to the arrival, at best
+  Duration least_delay{};  // from the stamped instant to the arrival, at best
   Duration delay_spread = Duration::milliseconds(2);  // by how much a delay usually exceeds it
   Duration resolution = Duration::microseconds(1);    // of the device's stamps
 };
 
 /// Told by a driver that something can be taken. One may serve several devices.
 ///
-/// Threads  notify() from the driver's threads, at any time between start() and the return of stop(); it neither blocks nor calls back.
+/// Threads  notify() from the driver's threads, at any time between start() and the return of
+///          stop(); it neither blocks nor calls back.
 class Notifier {
  public:
   virtual ~Notifier() = default;

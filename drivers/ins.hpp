@@ -21,13 +21,15 @@ struct InsQuality {
   bool sync_out = false;  // a pulse left SyncOut with this sample
 };
 
-/// One reading as it came. `sample.stamp` and `sample.stamp_error` are not set yet: the host's clock is tied to Unix time elsewhere.
+/// One reading as it came. `sample.stamp` and `sample.stamp_error` are not set yet: the host's
+/// clock is tied to Unix time elsewhere.
 struct InsReading {
   InsSample sample{};
   InsQuality quality{};
   DeviceStamp measured{};  // by the INS's clock, unwrapped; grows while the device is not gone
   HostStamp arrival{};     // when the last byte was here
-  // A driver that knows how bytes travel (when each was on the wire) maps the stamp itself; else a ClockMapper does, from `arrival`.
+  // A driver that knows how bytes travel (when each was on the wire) maps the stamp itself; else a
+  // ClockMapper does, from `arrival`.
   bool mapped = false;
   HostStamp host{};       // `measured` on the host's clock
   Duration host_error{};  // |true − host| is below this
@@ -46,31 +48,36 @@ struct InsStatistics {
 /// One opened inertial navigation system with satellite receiver.
 ///
 /// Ownership  Values; nothing to give back.
-/// Threads    configure, start, stop: the owner's thread. wait: one consumer thread; it may overlap stop(). statistics: any.
+/// Threads    configure, start, stop: the owner's thread. wait: one consumer thread; it may overlap
+///            stop(). statistics: any.
 /// Memory     No allocation by the caller's thread between start() and stop().
-/// Full       A reading that finds no room is dropped and counted; a mock in virtual time waits instead.
-/// Errors     Nothing throws. A call that is not `ok` has changed nothing but the counters and reading->arrival.
+/// Full       A reading that finds no room is dropped and counted; a mock in virtual time waits
+///            instead.
+/// Errors     Nothing throws. A call that is not `ok` has changed nothing but the counters and
+///            reading->arrival.
 class InsDevice {
  public:
   virtual ~InsDevice() = default;  // stops
 
   [[nodiscard]] virtual const DeviceInfo& info() const noexcept = 0;
-  /// Readings a second. *actual_hz (may be null): what it will do. → ok, unsupported, bad_configuration, gone
+  /// Readings a second. *actual_hz (may be null): what it will do. → ok, unsupported,
+  /// bad_configuration, gone
   [[nodiscard]] virtual DeviceStatus configure(double rate_hz, double* actual_hz) noexcept = 0;
   /// From the measurement to its arrival. Precondition: configured.
   [[nodiscard]] virtual DeviceTiming timing() const noexcept = 0;
   /// As CameraDevice::start().
   [[nodiscard]] virtual DeviceStatus start(Notifier* ready) noexcept = 0;
-  /// Oldest reading not yet taken, in the order of measurement, waiting at most `limit` (0: look once). `gone`: reading->arrival says when
-  /// it was noticed. → ok, timeout, stopped, ended, gone
+  /// Oldest reading not yet taken, in the order of measurement, waiting at most `limit` (0: look
+  /// once). `gone`: reading->arrival says when it was noticed. → ok, timeout, stopped, ended, gone
   [[nodiscard]] virtual DeviceStatus wait(Duration limit, InsReading* reading) noexcept = 0;
   virtual void stop() noexcept = 0;
-  /// One sentence about the last call that was not `ok`: what was refused, what to do. Empty: the status says it all. Owner's thread; may
-  /// allocate.
+  /// One sentence about the last call that was not `ok`: what was refused, what to do. Empty: the
+  /// status says it all. Owner's thread; may allocate.
   [[nodiscard]] virtual std::string complaint() const { return {}; }
   /// One sentence about what works, but not as asked. Empty: nothing. As complaint().
   [[nodiscard]] virtual std::string remark() const { return {}; }
-  /// It lives in a virtual time of its own, beside the other devices: its next reading is there for the waiting, whatever they do.
+  /// It lives in a virtual time of its own, beside the other devices: its next reading is there for
+  /// the waiting, whatever they do.
   [[nodiscard]] virtual bool keeps_own_time() const noexcept { return false; }
   [[nodiscard]] virtual InsStatistics statistics() const noexcept = 0;
 };
@@ -80,7 +87,8 @@ class InsDriver {
  public:
   virtual ~InsDriver() = default;
   [[nodiscard]] virtual std::vector<DeviceInfo> enumerate() = 0;
-  [[nodiscard]] virtual std::unique_ptr<InsDevice> open(std::string_view serial, DeviceStatus* status) = 0;
+  [[nodiscard]] virtual std::unique_ptr<InsDevice> open(std::string_view serial,
+                                                        DeviceStatus* status) = 0;
   /// One sentence about the last open() that gave nothing. Empty: the status says it all.
   [[nodiscard]] virtual std::string complaint() const { return {}; }
 };

@@ -20,14 +20,16 @@ struct Delivery {
 
 /// From the thread of a driver to the consumer of its device.
 ///
-/// Threads  push(), full(), empty(), wait_for_room(): producer. start(), stop(): owner. take(): one consumer; with limit 0 it takes no
+/// Threads  push(), full(), empty(), wait_for_room(): producer. start(), stop(): owner. take(): one
+///          consumer; with limit 0 it takes no
 /// lock. Full     push() refuses; the driver drops and counts, or, in virtual time, waits for room.
 template <class T, std::size_t N>
 class Stream {
  public:
   [[nodiscard]] bool push(const Delivery<T>& d) noexcept {
     if (!ring_.push(d)) return false;
-    const std::lock_guard lock(mutex_);  // stop() waits for it: nobody is told after it has returned
+    const std::lock_guard lock(
+        mutex_);  // stop() waits for it: nobody is told after it has returned
     filled_.notify_one();
     if (notifier_ != nullptr) notifier_->notify();
     return true;
@@ -43,7 +45,9 @@ class Stream {
       taken_.wait(seen, std::memory_order_acquire);
     }
   }
-  [[nodiscard]] bool streaming() const noexcept { return streaming_.load(std::memory_order_acquire); }
+  [[nodiscard]] bool streaming() const noexcept {
+    return streaming_.load(std::memory_order_acquire);
+  }
 
   /// While gone: whether it has come back.
   [[nodiscard]] DeviceStatus start(Notifier* notifier) noexcept {
@@ -72,8 +76,8 @@ class Stream {
     }
     filled_.notify_all();
   }
-  /// Forgets what was not taken, and that the device was gone. Precondition: stopped, the producer's thread has ended, nobody
-  /// is in take().
+  /// Forgets what was not taken, and that the device was gone. Precondition: stopped, the
+  /// producer's thread has ended, nobody is in take().
   void clear() noexcept {
     for (Delivery<T> d; ring_.pop(&d);) ended_ = ended_ || d.what == Delivery<T>::What::end;
     gone_ = false;
@@ -86,7 +90,8 @@ class Stream {
     if (!ring_.pop(d)) {
       if (limit <= Duration{}) return DeviceStatus::timeout;
       std::unique_lock lock(mutex_);
-      (void)filled_.wait_for(lock, std::chrono::nanoseconds(limit.ns()), [this] { return !ring_.empty() || !streaming(); });
+      (void)filled_.wait_for(lock, std::chrono::nanoseconds(limit.ns()),
+                             [this] { return !ring_.empty() || !streaming(); });
       if (!streaming()) return DeviceStatus::stopped;
       if (!ring_.pop(d)) return DeviceStatus::timeout;
     }

@@ -11,7 +11,8 @@
 
 namespace vergence {
 
-/// One camera's exposure as its feedback line told it, after the edge of its pulse. Not seen: not wired, or no exposure happened.
+/// One camera's exposure as its feedback line told it, after the edge of its pulse. Not seen: not
+/// wired, or no exposure happened.
 struct PulseExposure {
   bool seen = false;
   Duration start{}, end{};
@@ -19,13 +20,15 @@ struct PulseExposure {
 
 /// One pulse that went out to the cameras.
 struct Pulse {
-  std::uint64_t number = 0;  // grows by one a pulse, also for those that a pause left out; from 0 again with another `boot`
+  std::uint64_t number = 0;  // grows by one a pulse, also for those that a pause left out; from 0
+                             // again with another `boot`
   DeviceStamp edge{};        // by the board's clock
   HostStamp arrival{};       // when its report was here
   std::uint32_t boot = 0;    // of the board's start: numbers and edges mean nothing across two
   bool resumed = false;      // the first after a start or a pause
   std::array<PulseExposure, kMaxCameras> exposure{};  // by camera
-  // A driver that asks the board for its time maps the edge itself; else a ClockMapper does, from `arrival`.
+  // A driver that asks the board for its time maps the edge itself; else a ClockMapper does, from
+  // `arrival`.
   bool mapped = false;
   HostStamp host{};       // `edge` on the host's clock
   Duration host_error{};  // |true − host| is below this
@@ -35,8 +38,8 @@ struct Pulse {
 struct TriggerConfiguration {
   double rate_hz = 0;
   Duration width = Duration::microseconds(200);  // of a pulse
-  /// 0: even intervals. Else every interval is longer or shorter by this, in an order that does not repeat, so that the cameras' own
-  /// stamps prove which frame belongs to which pulse.
+  /// 0: even intervals. Else every interval is longer or shorter by this, in an order that does not
+  /// repeat, so that the cameras' own stamps prove which frame belongs to which pulse.
   Duration vary{};
   std::uint8_t lines = 0x03;    // mask of the outputs that are pulsed; line k is camera k
   std::uint8_t active_low = 0;  // mask
@@ -63,16 +66,21 @@ class TriggerDevice {
 
   [[nodiscard]] virtual const DeviceInfo& info() const noexcept = 0;
   /// → ok, unsupported, bad_configuration, gone
-  [[nodiscard]] virtual DeviceStatus configure(const TriggerConfiguration& wanted, TriggerConfiguration* actual) noexcept = 0;
+  [[nodiscard]] virtual DeviceStatus configure(const TriggerConfiguration& wanted,
+                                               TriggerConfiguration* actual) noexcept = 0;
   /// From the edge to the arrival of its report. Precondition: configured.
   [[nodiscard]] virtual DeviceTiming timing() const noexcept { return {}; }
   /// The first pulse goes out after this. As CameraDevice::start().
   [[nodiscard]] virtual DeviceStatus start(Notifier* ready) noexcept = 0;
-  /// Oldest report not yet taken, waiting at most `limit` (0: look once). → ok, timeout, stopped, ended, gone
+  /// Oldest report not yet taken, waiting at most `limit` (0: look once). → ok, timeout, stopped,
+  /// ended, gone
   [[nodiscard]] virtual DeviceStatus wait(Duration limit, Pulse* pulse) noexcept = 0;
-  /// Leaves so many pulses out, as soon as it can, then goes on by itself: a gap that every camera shows. While streaming; does not wait
-  /// for the board. Any one thread. → ok, unsupported, stopped, gone
-  [[nodiscard]] virtual DeviceStatus pause(std::uint32_t /*pulses*/) noexcept { return DeviceStatus::unsupported; }
+  /// Leaves so many pulses out, as soon as it can, then goes on by itself: a gap that every camera
+  /// shows. While streaming; does not wait for the board. Any one thread. → ok, unsupported,
+  /// stopped, gone
+  [[nodiscard]] virtual DeviceStatus pause(std::uint32_t /*pulses*/) noexcept {
+    return DeviceStatus::unsupported;
+  }
   /// No pulse after it returns.
   virtual void stop() noexcept = 0;
   /// As those of InsDevice.
@@ -86,7 +94,8 @@ class TriggerDriver {
  public:
   virtual ~TriggerDriver() = default;
   [[nodiscard]] virtual std::vector<DeviceInfo> enumerate() = 0;
-  [[nodiscard]] virtual std::unique_ptr<TriggerDevice> open(std::string_view serial, DeviceStatus* status) = 0;
+  [[nodiscard]] virtual std::unique_ptr<TriggerDevice> open(std::string_view serial,
+                                                            DeviceStatus* status) = 0;
   /// As InsDriver::complaint().
   [[nodiscard]] virtual std::string complaint() const { return {}; }
 };

@@ -13,7 +13,8 @@ namespace {
 
 constexpr int kMostSteps = 200;
 constexpr double kFirstDamping = 1e-4, kLeastDamping = 1e-12, kMostDamping = 1e12;
-constexpr double kSmallGain = 1e-11;  // relative decrease of the sum: the last step was below 1e-4 sigma, for any number of corners here
+constexpr double kSmallGain = 1e-11;  // relative decrease of the sum: the last step was below 1e-4
+                                      // sigma, for any number of corners here
 
 using Matrix = Eigen::MatrixXd;
 using Vector = Eigen::VectorXd;
@@ -29,14 +30,16 @@ struct ViewNormal {
 };
 
 /// Sum of squares; infinite where a corner does not project.
-double squared_sum(const BoardProblem& b, const std::array<Camera, kMaxCameras>& cameras, std::size_t v) {
+double squared_sum(const BoardProblem& b, const std::array<Camera, kMaxCameras>& cameras,
+                   std::size_t v) {
   double sum = 0;
   for (std::size_t k = 0; k < static_cast<std::size_t>(b.rig.cameras); ++k) {
     const auto& corners = b.views[v].corners[k];
     const Transform T = b.rig.T_camera_left[k] * b.T_left_board[v];
     for (std::size_t i = 0; i < corners.size(); ++i) {
       Vec2 x;
-      if (cameras[k].project(T * b.board.corner(i), &x, nullptr) != ProjectStatus::ok) return std::numeric_limits<double>::infinity();
+      if (cameras[k].project(T * b.board.corner(i), &x, nullptr) != ProjectStatus::ok)
+        return std::numeric_limits<double>::infinity();
       sum += (x - corners[i]).squaredNorm();
     }
   }
@@ -45,7 +48,8 @@ double squared_sum(const BoardProblem& b, const std::array<Camera, kMaxCameras>&
 
 std::array<Camera, kMaxCameras> lenses(const RigCalibration& rig) {
   std::array<Camera, kMaxCameras> cameras;
-  for (std::size_t k = 0; k < static_cast<std::size_t>(rig.cameras); ++k) cameras[k] = Camera(rig.intrinsics[k]);
+  for (std::size_t k = 0; k < static_cast<std::size_t>(rig.cameras); ++k)
+    cameras[k] = Camera(rig.intrinsics[k]);
   return cameras;
 }
 
@@ -56,10 +60,13 @@ double total(const BoardProblem& b) {
   return sum;
 }
 
-/// r = x − corner;  X_k = R_k X_left + t_k:  ∂X_k/∂(φ_k, τ_k) = (−[R_k X_left]×, I),  ∂X_k/∂(φ_b, τ_b) = R_k (−[R_b X]×, I).
-ViewNormal linearise(const BoardProblem& b, const BoardParameters& layout, const std::array<Camera, kMaxCameras>& cameras, std::size_t v) {
+/// r = x − corner;  X_k = R_k X_left + t_k:  ∂X_k/∂(φ_k, τ_k) = (−[R_k X_left]×, I),  ∂X_k/∂(φ_b,
+/// τ_b) = R_k (−[R_b X]×, I).
+ViewNormal linearise(const BoardProblem& b, const BoardParameters& layout,
+                     const std::array<Camera, kMaxCameras>& cameras, std::size_t v) {
   const int n = layout.size(), lens = layout.lens_size();
-  ViewNormal normal{Matrix::Zero(n, n), Side::Zero(n, 6), Mat6::Zero(), Vector::Zero(n), Vec6::Zero()};
+  ViewNormal normal{Matrix::Zero(n, n), Side::Zero(n, 6), Mat6::Zero(), Vector::Zero(n),
+                    Vec6::Zero()};
   const Transform& T_b = b.T_left_board[v];
   for (int k = 0; k < layout.cameras(); ++k) {
     const auto at = static_cast<std::size_t>(k);
@@ -71,10 +78,12 @@ ViewNormal linearise(const BoardProblem& b, const BoardParameters& layout, const
     Side sp = Side::Zero(width, 6);
     Vector s = Vector::Zero(width);
     for (std::size_t i = 0; i < corners.size(); ++i) {
-      const Vec3 in_board = T_b.R * b.board.corner(i), X_left = in_board + T_b.t, turned = T_k.R * X_left, X = turned + T_k.t;
+      const Vec3 in_board = T_b.R * b.board.corner(i), X_left = in_board + T_b.t,
+                 turned = T_k.R * X_left, X = turned + T_k.t;
       Vec2 x;
       Mat23 J_point;
-      if (cameras[at].project(X, &x, &J_point) != ProjectStatus::ok) continue;  // the sum is infinite there, so no step leads here
+      if (cameras[at].project(X, &x, &J_point) != ProjectStatus::ok)
+        continue;  // the sum is infinite there, so no step leads here
       J.leftCols(lens) = cameras[at].intrinsics_jacobian(X).leftCols(lens);
       if (k > 0) {
         J.middleCols<3>(lens) = -J_point * skew(turned);
@@ -108,8 +117,10 @@ void move(const BoardParameters& layout, const Vector& step, RigCalibration* rig
     const auto at = static_cast<std::size_t>(k);
     Intrinsics& lens = rig->intrinsics[at];
     const int from = layout.lens(k);
-    lens.fx += step(from), lens.fy += step(from + 1), lens.cx += step(from + 2), lens.cy += step(from + 3);
-    for (int i = 4; i < layout.lens_size(); ++i) lens.distortion[static_cast<std::size_t>(i - 4)] += step(from + i);
+    lens.fx += step(from), lens.fy += step(from + 1), lens.cx += step(from + 2),
+        lens.cy += step(from + 3);
+    for (int i = 4; i < layout.lens_size(); ++i)
+      lens.distortion[static_cast<std::size_t>(i - 4)] += step(from + i);
     if (k > 0) {
       Transform& T = rig->T_camera_left[at];
       T = perturbed(T, step.segment<3>(layout.place(k)), step.segment<3>(layout.place(k) + 3));
@@ -118,8 +129,8 @@ void move(const BoardParameters& layout, const Vector& step, RigCalibration* rig
 }
 
 /// One damped step. False: the equations are singular.
-bool try_step(const BoardProblem& b, const BoardParameters& layout, const std::vector<ViewNormal>& views, double damping,
-              BoardProblem* moved) {
+bool try_step(const BoardProblem& b, const BoardParameters& layout,
+              const std::vector<ViewNormal>& views, double damping, BoardProblem* moved) {
   const int n = layout.size();
   Matrix S = Matrix::Zero(n, n);
   Vector g = Vector::Zero(n);
@@ -151,11 +162,14 @@ std::vector<ViewNormal> linearise_all(const BoardProblem& b, const BoardParamete
   const auto cameras = lenses(b.rig);
   std::vector<ViewNormal> views;
   views.reserve(b.views.size());
-  for (std::size_t v = 0; v < b.views.size(); ++v) views.push_back(linearise(b, layout, cameras, v));
+  for (std::size_t v = 0; v < b.views.size(); ++v)
+    views.push_back(linearise(b, layout, cameras, v));
   return views;
 }
 
-Matrix inverse(const Matrix& m) { return Eigen::LDLT<Matrix>(m).solve(Matrix::Identity(m.rows(), m.cols())); }
+Matrix inverse(const Matrix& m) {
+  return Eigen::LDLT<Matrix>(m).solve(Matrix::Identity(m.rows(), m.cols()));
+}
 
 /// Covariances and the effect of each view, from the undamped equations at the answer.
 void spread(const BoardProblem& b, const BoardParameters& layout, BoardSolution* solution) {
@@ -171,10 +185,12 @@ void spread(const BoardProblem& b, const BoardParameters& layout, BoardSolution*
   }
   solution->covariance = solution->variance_px2 * inverse(S);
   const int places = n - layout.places();
-  solution->places_given_lenses = solution->variance_px2 * inverse(S.bottomRightCorner(places, places));
+  solution->places_given_lenses =
+      solution->variance_px2 * inverse(S.bottomRightCorner(places, places));
   solution->without.resize(static_cast<Eigen::Index>(reduced.size()), n);
   for (std::size_t v = 0; v < reduced.size(); ++v)
-    solution->without.row(static_cast<Eigen::Index>(v)) = Eigen::LDLT<Matrix>(S - reduced[v]).solve(gradient[v]).transpose();
+    solution->without.row(static_cast<Eigen::Index>(v)) =
+        Eigen::LDLT<Matrix>(S - reduced[v]).solve(gradient[v]).transpose();
 }
 
 }  // namespace
@@ -198,7 +214,9 @@ BoardSolution solve_boards(BoardProblem* problem, const BoardParameters& paramet
   std::vector<ViewNormal> views = linearise_all(*problem, parameters);
   while (!solution.converged && solution.steps < kMostSteps && damping < kMostDamping) {
     ++solution.steps;
-    const double next = try_step(*problem, parameters, views, damping, &moved) ? total(moved) : std::numeric_limits<double>::infinity();
+    const double next = try_step(*problem, parameters, views, damping, &moved)
+                            ? total(moved)
+                            : std::numeric_limits<double>::infinity();
     if (!(next <= sum)) {
       // A step that changes nothing but the last digit is the end, too.
       solution.converged = std::isfinite(next) && next - sum <= kSmallGain * sum;
@@ -213,7 +231,8 @@ BoardSolution solve_boards(BoardProblem* problem, const BoardParameters& paramet
     damping = std::max(kLeastDamping, damping * 0.1);
   }
   solution.squared_px2 = sum;
-  const double spare = 2.0 * static_cast<double>(solution.corners) - parameters.size() - 6.0 * static_cast<double>(problem->views.size());
+  const double spare = 2.0 * static_cast<double>(solution.corners) - parameters.size() -
+                       6.0 * static_cast<double>(problem->views.size());
   if (!(spare > 0)) {
     solution.converged = false;
     return solution;

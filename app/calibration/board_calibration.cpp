@@ -12,9 +12,11 @@
 namespace vergence::app {
 namespace {
 
-constexpr int kRounds = 8;               // of refusing: each refuses at least one view
-constexpr double kOtherBoardRatio = 10;  // of the median: images that do not belong together, before anything is adjusted
-constexpr double kCappedDistance = 0.1;  // rad, and of the board's distance: candidates farther apart all count alike
+constexpr int kRounds = 8;  // of refusing: each refuses at least one view
+constexpr double kOtherBoardRatio =
+    10;  // of the median: images that do not belong together, before anything is adjusted
+constexpr double kCappedDistance =
+    0.1;  // rad, and of the board's distance: candidates farther apart all count alike
 
 double median(std::vector<double> values) {
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
@@ -48,7 +50,8 @@ class Calibrator {
     result_.complaint = std::move(complaint);
     return false;
   }
-  /// Leaves out what is beyond `ratio` times the median; `rms` one a view in use. False: nothing was.
+  /// Leaves out what is beyond `ratio` times the median; `rms` one a view in use. False: nothing
+  /// was.
   bool refuse(const std::vector<double>& rms, double ratio) {
     const double limit = std::max(kNeverRefused, ratio * median(rms));
     std::vector<std::size_t> kept;
@@ -75,13 +78,16 @@ class Calibrator {
     for (std::size_t v = 0; v < p.views.size(); ++v) rms.push_back(view_rms(p, v));
     return rms;
   }
-  [[nodiscard]] int distortion_count() const { return options_.model == CameraModelKind::pinhole_radtan && options_.sixth_order ? 5 : 4; }
+  [[nodiscard]] int distortion_count() const {
+    return options_.model == CameraModelKind::pinhole_radtan && options_.sixth_order ? 5 : 4;
+  }
 
   const std::vector<BoardView>& given_;
   const BoardCalibrationOptions& options_;
   std::size_t cameras_;
   std::vector<std::size_t> used_{};
-  std::array<std::vector<Transform>, kMaxCameras> T_camera_board_{};  // of every view given; of those the camera has
+  std::array<std::vector<Transform>, kMaxCameras>
+      T_camera_board_{};  // of every view given; of those the camera has
   BoardCalibration result_{};
 };
 
@@ -98,13 +104,17 @@ bool Calibrator::start_each() {
         images.push_back(&given_[v].corners[k]);
       }
       if (images.size() < kFewestViews)
-        throw InputError(fmt::format("camera {} has the board in {} usable views; {} are the least, 15 good ones are enough", k,
-                                     images.size(), kFewestViews));
+        throw InputError(fmt::format(
+            "camera {} has the board in {} usable views; {} are the least, 15 good ones are enough",
+            k, images.size(), kFewestViews));
       const auto start = start_camera(images, options_, options_.sizes[k]);
-      if (!start) return fail(fmt::format("the lens of camera {} does not come out of these views: are some of them tilted?", k));
+      if (!start)
+        return fail(fmt::format(
+            "the lens of camera {} does not come out of these views: are some of them tilted?", k));
       result_.rig.intrinsics[k] = start->lens;
       result_.cameras[k].alone_rms_px = start->rms_all_px;
-      for (std::size_t i = 0; i < which.size(); ++i) T_camera_board_[k][which[i]] = start->T_camera_board[i];
+      for (std::size_t i = 0; i < which.size(); ++i)
+        T_camera_board_[k][which[i]] = start->T_camera_board[i];
       const double limit = std::max(kNeverRefused, kRefusedRatio * median(start->rms_px));
       const auto before = used_.size();
       for (std::size_t i = 0; i < which.size(); ++i) {
@@ -118,7 +128,8 @@ bool Calibrator::start_each() {
   return true;
 }
 
-/// Of all views' T_camera_left the one that most others are near to: one pair of images that do not belong together is outvoted.
+/// Of all views' T_camera_left the one that most others are near to: one pair of images that do not
+/// belong together is outvoted.
 bool Calibrator::start_together() {
   for (const std::size_t v : used_) result_.T_left_board[v] = T_camera_board_[0][v];
   if (cameras_ == 1) return true;
@@ -132,13 +143,15 @@ bool Calibrator::start_together() {
     }
     if (candidates.size() < kFewestViews)
       throw InputError(
-          fmt::format("cameras 0 and {} see the board together in {} views; {} are the least", k, candidates.size(), kFewestViews));
+          fmt::format("cameras 0 and {} see the board together in {} views; {} are the least", k,
+                      candidates.size(), kFewestViews));
     const double depth = median(depths);
     double best = std::numeric_limits<double>::infinity();
     for (const Transform& a : candidates) {
       double sum = 0;
       for (const Transform& b : candidates)
-        sum += std::min(kCappedDistance, rotation_angle(a.R * b.R.transpose())) + std::min(kCappedDistance, (a.t - b.t).norm() / depth);
+        sum += std::min(kCappedDistance, rotation_angle(a.R * b.R.transpose())) +
+               std::min(kCappedDistance, (a.t - b.t).norm() / depth);
       if (sum < best) best = sum, result_.rig.T_camera_left[k] = a;
     }
   }
@@ -150,19 +163,25 @@ bool Calibrator::adjust() {
   const BoardParameters layout(static_cast<int>(cameras_), distortion_count());
   for (int round = 0;; ++round) {
     for (std::size_t k = 0; k < cameras_; ++k) {
-      const auto has = std::count_if(used_.begin(), used_.end(), [&](std::size_t v) { return !given_[v].corners[k].empty(); });
+      const auto has = std::count_if(used_.begin(), used_.end(),
+                                     [&](std::size_t v) { return !given_[v].corners[k].empty(); });
       if (has < static_cast<std::ptrdiff_t>(kFewestViews))
-        return fail(fmt::format("of camera {} only {} views are left that agree with each other: do the images belong together?", k, has));
+        return fail(
+            fmt::format("of camera {} only {} views are left that agree with each other: do the "
+                        "images belong together?",
+                        k, has));
     }
     BoardProblem p = problem();
     const BoardSolution s = solve_boards(&p, layout);
     if (!s.converged || !s.covariance.allFinite())
       return fail("the views do not determine lenses and places: more of them, tilted, are needed");
     result_.rig = p.rig;
-    for (std::size_t i = 0; i < used_.size(); ++i) result_.T_left_board[used_[i]] = p.T_left_board[i];
+    for (std::size_t i = 0; i < used_.size(); ++i)
+      result_.T_left_board[used_[i]] = p.T_left_board[i];
     const auto rms = rms_of(p);
     if (round < kRounds && refuse(rms, kRefusedRatio)) continue;
-    for (std::size_t i = 0; i < used_.size(); ++i) result_.views[used_[i]].rms_px = rms[i], result_.views[used_[i]].used = true;
+    for (std::size_t i = 0; i < used_.size(); ++i)
+      result_.views[used_[i]].rms_px = rms[i], result_.views[used_[i]].used = true;
     result_.corner_sigma_px = std::sqrt(s.variance_px2);
     result_.rig.reprojection_px = std::sqrt(s.squared_px2 / static_cast<double>(s.corners));
     result_.rig.frames = static_cast<int>(used_.size());
@@ -170,7 +189,9 @@ bool Calibrator::adjust() {
     // Jackknife: (n − 1)/n Σ (δ_v − mean)².
     const auto views = static_cast<double>(s.without.rows());
     const Eigen::MatrixXd centred = s.without.rowwise() - s.without.colwise().mean();
-    const auto between = [&](const Eigen::VectorXd& direction) { return std::sqrt((views - 1) / views) * (centred * direction).norm(); };
+    const auto between = [&](const Eigen::VectorXd& direction) {
+      return std::sqrt((views - 1) / views) * (centred * direction).norm();
+    };
     const int n = layout.size();
     const auto unit = [n](int i) { return Eigen::VectorXd(Eigen::VectorXd::Unit(n, i)); };
     for (std::size_t k = 0; k < cameras_; ++k) {
@@ -192,7 +213,8 @@ bool Calibrator::adjust() {
         const auto at = static_cast<std::size_t>(i);
         const int held = place - layout.places() + i;
         result_.rig.sigma_wide[k][at] = std::sqrt(variance(place + i));
-        result_.rig.sigma_noise[k][at] = std::sqrt(std::max(0.0, s.places_given_lenses(held, held)));
+        result_.rig.sigma_noise[k][at] =
+            std::sqrt(std::max(0.0, s.places_given_lenses(held, held)));
         result_.between[k][at] = between(unit(place + i));
       }
     }
@@ -226,12 +248,14 @@ void Calibrator::conclude() {
   }
   if (cameras_ == 1) return;
   rig.baseline = rig.T_camera_left[1].t.norm();
-  if (const auto bad = find_implausible(&rig)) result_.complaint = "what comes out cannot be a rig: " + bad->sentence;
+  if (const auto bad = find_implausible(&rig))
+    result_.complaint = "what comes out cannot be a rig: " + bad->sentence;
 }
 
 }  // namespace
 
-BoardCalibration calibrate_boards(const std::vector<BoardView>& views, const BoardCalibrationOptions& options) {
+BoardCalibration calibrate_boards(const std::vector<BoardView>& views,
+                                  const BoardCalibrationOptions& options) {
   return Calibrator(views, options).run();
 }
 

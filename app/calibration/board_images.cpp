@@ -52,8 +52,10 @@ struct Grey {
 
 ImageFileStatus read_grey(const fs::path& file, Grey* grey) {
   std::vector<std::uint8_t> bytes;
-  if (const auto status = read_image_file(file, &bytes); status != ImageFileStatus::ok) return status;
-  if (const auto status = check_image(bytes, &grey->size); status != ImageFileStatus::ok) return status;
+  if (const auto status = read_image_file(file, &bytes); status != ImageFileStatus::ok)
+    return status;
+  if (const auto status = check_image(bytes, &grey->size); status != ImageFileStatus::ok)
+    return status;
   const auto width = static_cast<std::size_t>(grey->size.width);
   grey->pixels.resize(width * static_cast<std::size_t>(grey->size.height));
   return decode_grey(bytes, grey->size, grey->pixels.data(), width);
@@ -61,7 +63,8 @@ ImageFileStatus read_grey(const fs::path& file, Grey* grey) {
 
 }  // namespace
 
-std::vector<fs::path> matching_files(const std::vector<std::string>& patterns, const std::string& option) {
+std::vector<fs::path> matching_files(const std::vector<std::string>& patterns,
+                                     const std::string& option) {
   std::set<fs::path> files;
   for (const std::string& pattern : patterns) {
     glob_t found{};
@@ -70,19 +73,23 @@ std::vector<fs::path> matching_files(const std::vector<std::string>& patterns, c
     ::globfree(&found);
     if (status != 0)
       throw InputError(
-          fmt::format("{} \"{}\": no such files; a pattern stands in quotes, '{} \"left*.png\"'", option, pattern.substr(0, 200), option));
+          fmt::format("{} \"{}\": no such files; a pattern stands in quotes, '{} \"left*.png\"'",
+                      option, pattern.substr(0, 200), option));
   }
   std::vector<fs::path> sorted(files.begin(), files.end());
-  std::sort(sorted.begin(), sorted.end(),
-            [](const fs::path& a, const fs::path& b) { return a.filename() != b.filename() ? a.filename() < b.filename() : a < b; });
+  std::sort(sorted.begin(), sorted.end(), [](const fs::path& a, const fs::path& b) {
+    return a.filename() != b.filename() ? a.filename() < b.filename() : a < b;
+  });
   return sorted;
 }
 
-std::vector<std::vector<fs::path>> group_views(const std::vector<std::vector<fs::path>>& cameras, std::vector<std::string>* remarks) {
+std::vector<std::vector<fs::path>> group_views(const std::vector<std::vector<fs::path>>& cameras,
+                                               std::vector<std::string>* remarks) {
   std::vector<Numbered> numbers;
   numbers.reserve(cameras.size());
   for (const auto& files : cameras) numbers.push_back(numbered(files));
-  const bool told = std::none_of(numbers.begin(), numbers.end(), [](const Numbered& n) { return n.empty(); });
+  const bool told =
+      std::none_of(numbers.begin(), numbers.end(), [](const Numbered& n) { return n.empty(); });
   std::vector<std::vector<fs::path>> views;
   std::vector<fs::path> alone;
   if (told) {
@@ -99,20 +106,27 @@ std::vector<std::vector<fs::path>> group_views(const std::vector<std::vector<fs:
       for (const auto& [number, file] : numbers[k])
         if (numbers[0].find(number) == numbers[0].end()) alone.push_back(file);
   }
-  const bool same_length =
-      std::all_of(cameras.begin(), cameras.end(), [&](const auto& files) { return files.size() == cameras[0].size(); });
-  if (same_length && (alone.empty() || 2 * views.size() < cameras[0].size())) return by_order(cameras);
+  const bool same_length = std::all_of(cameras.begin(), cameras.end(), [&](const auto& files) {
+    return files.size() == cameras[0].size();
+  });
+  if (same_length && (alone.empty() || 2 * views.size() < cameras[0].size()))
+    return by_order(cameras);
   if (views.empty()) {
     std::string counts;
-    for (const auto& files : cameras) counts += (counts.empty() ? "" : ", ") + std::to_string(files.size());
-    throw InputError(fmt::format("the cameras have {} images, and numbers in their names do not say which belong together", counts));
+    for (const auto& files : cameras)
+      counts += (counts.empty() ? "" : ", ") + std::to_string(files.size());
+    throw InputError(fmt::format(
+        "the cameras have {} images, and numbers in their names do not say which belong together",
+        counts));
   }
   for (const fs::path& file : alone)
-    remarks->push_back(fmt::format("{}: skipped, not every camera has an image of that number", file.string()));
+    remarks->push_back(
+        fmt::format("{}: skipped, not every camera has an image of that number", file.string()));
   return views;
 }
 
-BoardImages read_board_images(const std::vector<std::vector<fs::path>>& views, const Checkerboard& board,
+BoardImages read_board_images(const std::vector<std::vector<fs::path>>& views,
+                              const Checkerboard& board,
                               const std::function<void(std::size_t, std::size_t)>& told) {
   const std::size_t cameras = views.empty() ? 0 : views.front().size();
   BoardImages images;
@@ -131,20 +145,26 @@ BoardImages read_board_images(const std::vector<std::vector<fs::path>>& views, c
       ImageSize& size = images.sizes[k];
       if (size.width == 0) size = grey.size;
       if (grey.size != size)
-        throw InputError(fmt::format("{}: has {} x {} pixels, the images before it {} x {}; one camera has one size", file.string(),
-                                     grey.size.width, grey.size.height, size.width, size.height));
+        throw InputError(fmt::format(
+            "{}: has {} x {} pixels, the images before it {} x {}; one camera has one size",
+            file.string(), grey.size.width, grey.size.height, size.width, size.height));
       const ImageView pixels{grey.pixels.data(), size.width, size.height, size.width};
       if (auto corners = find_checkerboard(pixels, board, BoardSearch::thorough)) {
         if (!board.tells_its_ends()) same_way_up(view.corners[0], &*corners);
         view.corners[k] = std::move(*corners);
       } else {
-        without.push_back(fmt::format("no board of {}x{} in {}", board.columns, board.rows, file.string()));
+        without.push_back(
+            fmt::format("no board of {}x{} in {}", board.columns, board.rows, file.string()));
       }
     }
-    const auto with = std::count_if(view.corners.begin(), view.corners.end(), [](const auto& c) { return !c.empty(); });
+    const auto with = std::count_if(view.corners.begin(), view.corners.end(),
+                                    [](const auto& c) { return !c.empty(); });
     const bool usable = !view.corners[0].empty() && with >= (cameras > 1 ? 2 : 1);
     for (const std::string& sentence : without)
-      images.remarks.push_back(sentence + (usable ? "" : cameras > 1 ? "; the views of the other cameras are skipped, too" : "; skipped"));
+      images.remarks.push_back(sentence + (usable ? ""
+                                           : cameras > 1
+                                               ? "; the views of the other cameras are skipped, too"
+                                               : "; skipped"));
     if (usable) images.views.push_back(std::move(view));
     if (told) told(v + 1, images.views.size());
   }

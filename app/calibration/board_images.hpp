@@ -10,15 +10,19 @@
 /// Views of a checkerboard from image files.
 namespace vergence::app {
 
-/// Files that a shell's pattern names (`left*.jpg`), or the file itself; several are put together. In order of name, none twice.
+/// Files that a shell's pattern names (`left*.jpg`), or the file itself; several are put together.
+/// In order of name, none twice.
 /// InputError: there is none. `option` names whose patterns they are: `--left`.
-[[nodiscard]] std::vector<std::filesystem::path> matching_files(const std::vector<std::string>& patterns, const std::string& option);
+[[nodiscard]] std::vector<std::filesystem::path> matching_files(
+    const std::vector<std::string>& patterns, const std::string& option);
 
-/// One list of files a camera → one list of files a view, in order of name. Where the last numbers in the names tell them apart and not
-/// every camera has the same ones, views are those that all have; the others are said in *remarks.
+/// One list of files a camera → one list of files a view, in order of name. Where the last numbers
+/// in the names tell them apart and not every camera has the same ones, views are those that all
+/// have; the others are said in *remarks.
 /// InputError: lists of different length that numbers do not put together.
-[[nodiscard]] std::vector<std::vector<std::filesystem::path>> group_views(const std::vector<std::vector<std::filesystem::path>>& cameras,
-                                                                          std::vector<std::string>* remarks);
+[[nodiscard]] std::vector<std::vector<std::filesystem::path>> group_views(
+    const std::vector<std::vector<std::filesystem::path>>& cameras,
+    std::vector<std::string>* remarks);
 
 struct BoardImages {
   std::vector<BoardView> views{};      // of several cameras: those that camera 0 and another have
@@ -26,9 +30,12 @@ struct BoardImages {
   std::vector<std::string> remarks{};  // a sentence for every view that is skipped
 };
 
-/// Finds the board in all of them. `told` (may be empty) hears of every view: how many are done, how many of them have the board.
-/// InputError: no image can be read, or images of one camera differ in size. An image that cannot be read is a remark.
-[[nodiscard]] BoardImages read_board_images(const std::vector<std::vector<std::filesystem::path>>& views, const Checkerboard& board,
-                                            const std::function<void(std::size_t done, std::size_t found)>& told);
+/// Finds the board in all of them. `told` (may be empty) hears of every view: how many are done,
+/// how many of them have the board.
+/// InputError: no image can be read, or images of one camera differ in size. An image that cannot
+/// be read is a remark.
+[[nodiscard]] BoardImages read_board_images(
+    const std::vector<std::vector<std::filesystem::path>>& views, const Checkerboard& board,
+    const std::function<void(std::size_t done, std::size_t found)>& told);
 
 }  // namespace vergence::app

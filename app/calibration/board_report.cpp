@@ -15,7 +15,9 @@ namespace {
 constexpr double kDegrees = 180 / std::numbers::pi;
 constexpr double kSharedErrors = 1.5;  // between over wide: from here on noise is not all there is
 
-int digits_for(double sigma) { return sigma > 0 ? std::clamp(static_cast<int>(std::ceil(1 - std::log10(sigma))), 1, 7) : 5; }
+int digits_for(double sigma) {
+  return sigma > 0 ? std::clamp(static_cast<int>(std::ceil(1 - std::log10(sigma))), 1, 7) : 5;
+}
 
 std::vector<std::string> lens_numbers(const BoardReport& r) {
   const bool radtan = r.file.rig.intrinsics[0].kind == CameraModelKind::pinhole_radtan;
@@ -45,8 +47,9 @@ std::string lens_table(const BoardReport& r) {
       const Intrinsics& lens = r.file.rig.intrinsics[k];
       const double sigma = i < 4 ? lens.sigma[i] : r.found.cameras[k].distortion_sigma[i - 4];
       const int digits = digits_for(sigma);
-      text += fmt::format("{:>36}", fmt::format("{:.{}f} ± {:.{}f} ({:.{}f})", lens_value(lens, i), digits, sigma, digits,
-                                                r.found.cameras[k].between[i], digits));
+      text += fmt::format(
+          "{:>36}", fmt::format("{:.{}f} ± {:.{}f} ({:.{}f})", lens_value(lens, i), digits, sigma,
+                                digits, r.found.cameras[k].between[i], digits));
     }
     text += "\n";
   }
@@ -56,7 +59,9 @@ std::string lens_table(const BoardReport& r) {
     text += "\n";
   };
   row("rms, px", [&](std::size_t k) { return fmt::format("{:.4f}", r.found.cameras[k].rms_px); });
-  if (cameras > 1) row("rms alone, px", [&](std::size_t k) { return fmt::format("{:.4f}", r.found.cameras[k].alone_rms_px); });
+  if (cameras > 1)
+    row("rms alone, px",
+        [&](std::size_t k) { return fmt::format("{:.4f}", r.found.cameras[k].alone_rms_px); });
   row("images", [&](std::size_t k) { return std::to_string(r.found.cameras[k].images); });
   return text;
 }
@@ -64,16 +69,20 @@ std::string lens_table(const BoardReport& r) {
 std::string place_table(const BoardReport& r, std::size_t k) {
   const RigCalibration& rig = r.file.rig;
   const Vec3 turn = log_so3(rig.T_camera_left[k].R) * kDegrees, t = rig.T_camera_left[k].t * 1e3;
-  constexpr std::array kNames{"rotation x, °", "rotation y, °", "rotation z, °", "t_x, mm", "t_y, mm", "t_z, mm"};
-  std::string text = fmt::format("{} from {}: X_{} = R X_{} + t\n", r.file.names[k], r.file.names[0], r.file.names[k], r.file.names[0]);
-  text += fmt::format("{:<16}{:>12}{:>12}{:>14}{:>16}\n", "", "", "1 σ", "lenses held", "between views");
+  constexpr std::array kNames{"rotation x, °", "rotation y, °", "rotation z, °",
+                              "t_x, mm",       "t_y, mm",       "t_z, mm"};
+  std::string text = fmt::format("{} from {}: X_{} = R X_{} + t\n", r.file.names[k],
+                                 r.file.names[0], r.file.names[k], r.file.names[0]);
+  text += fmt::format("{:<16}{:>12}{:>12}{:>14}{:>16}\n", "", "", "1 σ", "lenses held",
+                      "between views");
   for (std::size_t i = 0; i < 6; ++i) {
     const double unit = i < 3 ? kDegrees : 1e3;
     const double sigma = unit * rig.sigma_wide[k][i];
     const int digits = std::max(digits_for(sigma), i < 3 ? 4 : 3);
     const auto at = static_cast<Eigen::Index>(i % 3);
     // ° is one column and two bytes: fmt counts columns.
-    text += fmt::format("{:<16}{:>12.{}f}{:>12.{}f}{:>14.{}f}{:>16.{}f}\n", kNames[i], i < 3 ? turn(at) : t(at), digits, sigma, digits,
+    text += fmt::format("{:<16}{:>12.{}f}{:>12.{}f}{:>14.{}f}{:>16.{}f}\n", kNames[i],
+                        i < 3 ? turn(at) : t(at), digits, sigma, digits,
                         unit * rig.sigma_noise[k][i], digits, unit * r.found.between[k][i], digits);
   }
   return text;
@@ -82,22 +91,26 @@ std::string place_table(const BoardReport& r, std::size_t k) {
 bool views_share_errors(const BoardReport& r) {
   int more = 0, all = 0;
   for (std::size_t k = 1; k < static_cast<std::size_t>(r.file.rig.cameras); ++k)
-    for (std::size_t i = 0; i < 6; ++i, ++all) more += r.found.between[k][i] > kSharedErrors * r.file.rig.sigma_wide[k][i] ? 1 : 0;
+    for (std::size_t i = 0; i < 6; ++i, ++all)
+      more += r.found.between[k][i] > kSharedErrors * r.file.rig.sigma_wide[k][i] ? 1 : 0;
   return all > 0 && 2 * more >= all;
 }
 
 std::string baseline_sentence(const BoardReport& r) {
   const RigCalibration& rig = r.file.rig;
-  std::string text = fmt::format("baseline {:.3f} ± {:.3f} mm (between views {:.3f} mm)", 1e3 * rig.T_camera_left[1].t.norm(),
-                                 1e3 * rig.baseline_sigma, 1e3 * r.found.length_between);
+  std::string text = fmt::format("baseline {:.3f} ± {:.3f} mm (between views {:.3f} mm)",
+                                 1e3 * rig.T_camera_left[1].t.norm(), 1e3 * rig.baseline_sigma,
+                                 1e3 * r.found.length_between);
   if (r.measured_baseline) {
     const double off = rig.T_camera_left[1].t.norm() - *r.measured_baseline;
-    text += fmt::format("; measured {:.3f} mm, {:+.3f} mm ({:+.2f} %) off", 1e3 * *r.measured_baseline, 1e3 * off,
-                        100 * off / *r.measured_baseline);
+    text += fmt::format("; measured {:.3f} mm, {:+.3f} mm ({:+.2f} %) off",
+                        1e3 * *r.measured_baseline, 1e3 * off, 100 * off / *r.measured_baseline);
     const double sigma = std::max(rig.baseline_sigma, r.found.length_between);
     if (std::abs(off) > 3 * sigma)
-      text += fmt::format(", more than 3 sigma: squares of {:.4g} mm would agree; measure the board over all its squares",
-                          1e3 * r.board.square * *r.measured_baseline / rig.T_camera_left[1].t.norm());
+      text += fmt::format(
+          ", more than 3 sigma: squares of {:.4g} mm would agree; measure the board over all its "
+          "squares",
+          1e3 * r.board.square * *r.measured_baseline / rig.T_camera_left[1].t.norm());
   }
   return text + "\n";
 }
@@ -109,10 +122,12 @@ std::string worst_views(const BoardReport& r) {
   for (const BoardViewResult& v : r.found.views)
     if (v.used) used.push_back(&v);
   const std::size_t shown = std::min(kShown, used.size());
-  std::partial_sort(used.begin(), used.begin() + static_cast<std::ptrdiff_t>(shown), used.end(),
-                    [](const BoardViewResult* a, const BoardViewResult* b) { return a->rms_px > b->rms_px; });
+  std::partial_sort(
+      used.begin(), used.begin() + static_cast<std::ptrdiff_t>(shown), used.end(),
+      [](const BoardViewResult* a, const BoardViewResult* b) { return a->rms_px > b->rms_px; });
   std::string text = "worst views used:";
-  for (std::size_t i = 0; i < shown; ++i) text += fmt::format("{} {} {:.3f} px", i == 0 ? "" : ",", used[i]->name, used[i]->rms_px);
+  for (std::size_t i = 0; i < shown; ++i)
+    text += fmt::format("{} {} {:.3f} px", i == 0 ? "" : ",", used[i]->name, used[i]->rms_px);
   return shown == 0 ? "" : text + "\n";
 }
 
@@ -120,19 +135,25 @@ std::string worst_views(const BoardReport& r) {
 
 std::string format_report(const BoardReport& r) {
   const RigCalibration& rig = r.file.rig;
-  const auto refused = std::count_if(r.found.views.begin(), r.found.views.end(), [](const BoardViewResult& v) { return !v.used; });
-  std::string text = fmt::format("{} views of a {}x{} board with squares of {:g} mm: {} used, {} refused\n", r.found.views.size(),
-                                 r.board.columns, r.board.rows, 1e3 * r.board.square, rig.frames, refused);
+  const auto refused = std::count_if(r.found.views.begin(), r.found.views.end(),
+                                     [](const BoardViewResult& v) { return !v.used; });
+  std::string text =
+      fmt::format("{} views of a {}x{} board with squares of {:g} mm: {} used, {} refused\n",
+                  r.found.views.size(), r.board.columns, r.board.rows, 1e3 * r.board.square,
+                  rig.frames, refused);
   for (const BoardViewResult& v : r.found.views)
     if (!v.used) text += fmt::format("  refused: {}, {:.3g} px rms\n", v.name, v.rms_px);
   text += worst_views(r);
-  text += fmt::format("reprojection {:.4f} px rms, {:.3f} px a coordinate\n\n", rig.reprojection_px, r.found.corner_sigma_px);
+  text += fmt::format("reprojection {:.4f} px rms, {:.3f} px a coordinate\n\n", rig.reprojection_px,
+                      r.found.corner_sigma_px);
   text += lens_table(r) + "± 1 σ by noise, in brackets between views\n\n";
-  for (std::size_t k = 1; k < static_cast<std::size_t>(rig.cameras); ++k) text += place_table(r, k) + "\n";
+  for (std::size_t k = 1; k < static_cast<std::size_t>(rig.cameras); ++k)
+    text += place_table(r, k) + "\n";
   if (rig.cameras > 1) text += baseline_sentence(r) + "\n";
   if (views_share_errors(r))
     text +=
-        "The views differ by more than noise: the board is not flat, the exposures were not simultaneous, or the model does not fit the "
+        "The views differ by more than noise: the board is not flat, the exposures were not "
+        "simultaneous, or the model does not fit the "
         "lens.\n\n";
   text += r.coverage.grid() + "corners a cell: · none, - up to 9, + up to 39, # more\n";
   const auto needs = r.coverage.needs();
@@ -144,30 +165,34 @@ std::string format_report(const BoardReport& r) {
 nlohmann::ordered_json json_report(const BoardReport& r) {
   using Json = nlohmann::ordered_json;
   const RigCalibration& rig = r.file.rig;
-  Json json{{"board", {{"columns", r.board.columns}, {"rows", r.board.rows}, {"square_m", r.board.square}}},
+  Json json{{"board",
+             {{"columns", r.board.columns}, {"rows", r.board.rows}, {"square_m", r.board.square}}},
             {"reprojection_px", rig.reprojection_px},
             {"corner_sigma_px", r.found.corner_sigma_px}};
   for (std::size_t k = 0; k < static_cast<std::size_t>(rig.cameras); ++k) {
     const Intrinsics& lens = rig.intrinsics[k];
     const BoardCameraResult& c = r.found.cameras[k];
-    Json camera{{"name", r.file.names[k]},
-                {"size", {lens.width, lens.height}},
-                {"model", lens.kind == CameraModelKind::pinhole_radtan ? "pinhole-radtan" : "pinhole-equidistant"},
-                {"images", c.images},
-                {"rms_px", c.rms_px},
-                {"alone_rms_px", c.alone_rms_px},
-                {"intrinsics", {lens.fx, lens.fy, lens.cx, lens.cy}},
-                {"intrinsics_sigma", lens.sigma},
-                {"intrinsics_between", std::array{c.between[0], c.between[1], c.between[2], c.between[3]}},
-                {"distortion", lens.distortion},
-                {"distortion_sigma", c.distortion_sigma}};
+    Json camera{
+        {"name", r.file.names[k]},
+        {"size", {lens.width, lens.height}},
+        {"model",
+         lens.kind == CameraModelKind::pinhole_radtan ? "pinhole-radtan" : "pinhole-equidistant"},
+        {"images", c.images},
+        {"rms_px", c.rms_px},
+        {"alone_rms_px", c.alone_rms_px},
+        {"intrinsics", {lens.fx, lens.fy, lens.cx, lens.cy}},
+        {"intrinsics_sigma", lens.sigma},
+        {"intrinsics_between", std::array{c.between[0], c.between[1], c.between[2], c.between[3]}},
+        {"distortion", lens.distortion},
+        {"distortion_sigma", c.distortion_sigma}};
     if (k > 0) {
       const Transform& T = rig.T_camera_left[k];
       const Vec3 turn = log_so3(T.R) * kDegrees;
       std::array<double, 6> sigma{}, held{}, between{};
       for (std::size_t i = 0; i < 6; ++i) {
         const double unit = i < 3 ? kDegrees : 1e3;
-        sigma[i] = unit * rig.sigma_wide[k][i], held[i] = unit * rig.sigma_noise[k][i], between[i] = unit * r.found.between[k][i];
+        sigma[i] = unit * rig.sigma_wide[k][i], held[i] = unit * rig.sigma_noise[k][i],
+        between[i] = unit * r.found.between[k][i];
       }
       camera["place"] = {{"rotation_deg", {turn.x(), turn.y(), turn.z()}},
                          {"t_mm", {1e3 * T.t.x(), 1e3 * T.t.y(), 1e3 * T.t.z()}},
@@ -178,7 +203,9 @@ nlohmann::ordered_json json_report(const BoardReport& r) {
     json["cameras"].push_back(camera);
   }
   if (rig.cameras > 1) {
-    json["baseline"] = {{"m", rig.T_camera_left[1].t.norm()}, {"sigma_m", rig.baseline_sigma}, {"between_views_m", r.found.length_between}};
+    json["baseline"] = {{"m", rig.T_camera_left[1].t.norm()},
+                        {"sigma_m", rig.baseline_sigma},
+                        {"between_views_m", r.found.length_between}};
     if (r.measured_baseline) json["baseline"]["measured_m"] = *r.measured_baseline;
   }
   for (const BoardViewResult& v : r.found.views) {

@@ -19,7 +19,8 @@ struct BoardReport {
   std::optional<double> measured_baseline{};  // m
 };
 
-/// Tables for a terminal: lenses, places with their sigmas, views refused, coverage and what it lacks.
+/// Tables for a terminal: lenses, places with their sigmas, views refused, coverage and what it
+/// lacks.
 [[nodiscard]] std::string format_report(const BoardReport& report);
 /// The same for programs; every key with its unit. docs/checkerboard.md.
 [[nodiscard]] nlohmann::ordered_json json_report(const BoardReport& report);

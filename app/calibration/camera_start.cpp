@@ -26,27 +26,35 @@ std::vector<cv::Point3f> object_points(const Checkerboard& board) {
   return points;
 }
 
-/// OpenCV's calibrateCamera. It takes single precision; the adjustment goes on from the corners as they are.
+/// OpenCV's calibrateCamera. It takes single precision; the adjustment goes on from the corners as
+/// they are.
 bool start_perspective(BoardProblem* alone, bool sixth_order) {
   Intrinsics& lens = alone->rig.intrinsics[0];
-  const std::vector<std::vector<cv::Point3f>> object(alone->views.size(), object_points(alone->board));
+  const std::vector<std::vector<cv::Point3f>> object(alone->views.size(),
+                                                     object_points(alone->board));
   std::vector<std::vector<cv::Point2f>> image;
   for (const BoardView& v : alone->views) {
     image.emplace_back();
-    for (const Vec2& c : v.corners[0]) image.back().emplace_back(static_cast<float>(c.x()), static_cast<float>(c.y()));
+    for (const Vec2& c : v.corners[0])
+      image.back().emplace_back(static_cast<float>(c.x()), static_cast<float>(c.y()));
   }
   cv::Mat K, D;
   std::vector<cv::Mat> turns, places;
-  cv::calibrateCamera(object, image, {lens.width, lens.height}, K, D, turns, places, sixth_order ? 0 : cv::CALIB_FIX_K3,
+  cv::calibrateCamera(object, image, {lens.width, lens.height}, K, D, turns, places,
+                      sixth_order ? 0 : cv::CALIB_FIX_K3,
                       {cv::TermCriteria::COUNT + cv::TermCriteria::EPS, kSteps, kTolerance});
   if (!cv::checkRange(K) || !cv::checkRange(D)) return false;
-  lens.fx = K.at<double>(0, 0), lens.fy = K.at<double>(1, 1), lens.cx = K.at<double>(0, 2), lens.cy = K.at<double>(1, 2);
-  for (std::size_t i = 0; i < (sixth_order ? 5U : 4U); ++i) lens.distortion[i] = D.at<double>(static_cast<int>(i));
-  for (std::size_t v = 0; v < alone->views.size(); ++v) alone->T_left_board[v] = {exp_so3(vector_of(turns[v])), vector_of(places[v])};
+  lens.fx = K.at<double>(0, 0), lens.fy = K.at<double>(1, 1), lens.cx = K.at<double>(0, 2),
+  lens.cy = K.at<double>(1, 2);
+  for (std::size_t i = 0; i < (sixth_order ? 5U : 4U); ++i)
+    lens.distortion[i] = D.at<double>(static_cast<int>(i));
+  for (std::size_t v = 0; v < alone->views.size(); ++v)
+    alone->T_left_board[v] = {exp_so3(vector_of(turns[v])), vector_of(places[v])};
   return true;
 }
 
-/// A fisheye lens without distortion and with this focal length: board poses by OpenCV's solvePnP from its rays.
+/// A fisheye lens without distortion and with this focal length: board poses by OpenCV's solvePnP
+/// from its rays.
 bool start_equidistant(BoardProblem* alone, double focal) {
   constexpr double kWidest = 1.4;  // rad: a ray farther from the axis has no place on a plane
   Intrinsics& lens = alone->rig.intrinsics[0];
@@ -64,7 +72,8 @@ bool start_equidistant(BoardProblem* alone, double focal) {
       rays.emplace_back(stretch * angle.x(), stretch * angle.y());
     }
     cv::Mat turn, place;
-    if (!cv::solvePnP(object, rays, cv::Mat::eye(3, 3, CV_64F), cv::noArray(), turn, place)) return false;
+    if (!cv::solvePnP(object, rays, cv::Mat::eye(3, 3, CV_64F), cv::noArray(), turn, place))
+      return false;
     alone->T_left_board[v] = {exp_so3(vector_of(turn)), vector_of(place)};
   }
   return true;
@@ -84,8 +93,8 @@ std::optional<CameraStart> adjusted(BoardProblem alone, int coefficients) {
 
 }  // namespace
 
-std::optional<CameraStart> start_camera(const std::vector<const std::vector<Vec2>*>& images, const BoardCalibrationOptions& options,
-                                        ImageSize size) {
+std::optional<CameraStart> start_camera(const std::vector<const std::vector<Vec2>*>& images,
+                                        const BoardCalibrationOptions& options, ImageSize size) {
   BoardProblem alone;
   alone.board = options.board;
   alone.rig.cameras = 1;
@@ -96,8 +105,11 @@ std::optional<CameraStart> start_camera(const std::vector<const std::vector<Vec2
   alone.T_left_board.resize(images.size());
   try {
     if (options.model == CameraModelKind::pinhole_radtan)
-      return start_perspective(&alone, options.sixth_order) ? adjusted(std::move(alone), options.sixth_order ? 5 : 4) : std::nullopt;
-    // From the focal length of another lens the adjustment may end elsewhere: the best of a few starts.
+      return start_perspective(&alone, options.sixth_order)
+                 ? adjusted(std::move(alone), options.sixth_order ? 5 : 4)
+                 : std::nullopt;
+    // From the focal length of another lens the adjustment may end elsewhere: the best of a few
+    // starts.
     std::optional<CameraStart> best;
     for (const double part : {0.3, 0.45, 0.65, 1.0, 1.5}) {
       if (!start_equidistant(&alone, part * size.width)) continue;

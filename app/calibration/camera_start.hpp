@@ -14,9 +14,11 @@ struct CameraStart {
   double rms_all_px = 0;
 };
 
-/// radtan from OpenCV's calibrateCamera, equidistant from the best of several focal lengths (OpenCV's fisheye::calibrate ends in wrong
-/// minima), then adjusted. Nothing: it does not converge.
-[[nodiscard]] std::optional<CameraStart> start_camera(const std::vector<const std::vector<Vec2>*>& images,
-                                                      const BoardCalibrationOptions& options, ImageSize size);
+/// radtan from OpenCV's calibrateCamera, equidistant from the best of several focal lengths
+/// (OpenCV's fisheye::calibrate ends in wrong minima), then adjusted. Nothing: it does not
+/// converge.
+[[nodiscard]] std::optional<CameraStart> start_camera(
+    const std::vector<const std::vector<Vec2>*>& images, const BoardCalibrationOptions& options,
+    ImageSize size);
 
 }  // namespace vergence::app

@@ -15,10 +15,12 @@ namespace {
 
 constexpr int kFewest = 3, kMost = 100;                     // inner corners a side
 constexpr double kSmallestSquare = 0.001, kLargest = 10.0;  // m
-constexpr int kLargeImage = 1200;                           // px: from this width on squares may be too large for the detector's windows
-constexpr int kNarrowestWindow = 2, kWidestWindow = 11;     // px, half windows
-constexpr double kWindowOfSquare = 0.3;                     // half window over the smallest distance of two corners
-constexpr double kBlur = 0.7;                               // px: the refinement's interpolation shifts corners of sharper images
+constexpr int kLargeImage =
+    1200;  // px: from this width on squares may be too large for the detector's windows
+constexpr int kNarrowestWindow = 2, kWidestWindow = 11;  // px, half windows
+constexpr double kWindowOfSquare = 0.3;  // half window over the smallest distance of two corners
+constexpr double kBlur =
+    0.7;  // px: the refinement's interpolation shifts corners of sharper images
 constexpr int kRefineSteps = 100;
 constexpr double kRefineTolerance = 1e-4;  // px
 
@@ -29,7 +31,8 @@ bool parse_whole(std::string_view text, int* value) {
 
 cv::Mat matrix_of(const ImageView& image) {
   // cv::Mat has no view of constant pixels; nothing below writes them.
-  return {image.height, image.width, CV_8U, const_cast<std::uint8_t*>(image.data), static_cast<std::size_t>(image.stride)};
+  return {image.height, image.width, CV_8U, const_cast<std::uint8_t*>(image.data),
+          static_cast<std::size_t>(image.stride)};
 }
 
 double smallest_spacing(const std::vector<cv::Point2f>& corners, const Checkerboard& board) {
@@ -42,15 +45,17 @@ double smallest_spacing(const std::vector<cv::Point2f>& corners, const Checkerbo
   return least;
 }
 
-bool detect(const cv::Mat& image, const Checkerboard& board, BoardSearch search, std::vector<cv::Point2f>* corners) {
-  const int flags =
-      cv::CALIB_CB_ADAPTIVE_THRESH | cv::CALIB_CB_NORMALIZE_IMAGE | (search == BoardSearch::quick ? cv::CALIB_CB_FAST_CHECK : 0);
+bool detect(const cv::Mat& image, const Checkerboard& board, BoardSearch search,
+            std::vector<cv::Point2f>* corners) {
+  const int flags = cv::CALIB_CB_ADAPTIVE_THRESH | cv::CALIB_CB_NORMALIZE_IMAGE |
+                    (search == BoardSearch::quick ? cv::CALIB_CB_FAST_CHECK : 0);
   const cv::Size size(board.columns, board.rows);
   if (image.cols < kLargeImage) return cv::findChessboardCorners(image, size, *corners, flags);
   cv::Mat half;
   cv::resize(image, half, {}, 0.5, 0.5, cv::INTER_AREA);
   if (cv::findChessboardCorners(half, size, *corners, flags)) {
-    for (cv::Point2f& c : *corners) c = 2 * c + cv::Point2f(0.5F, 0.5F);  // centres of pixels at integers
+    for (cv::Point2f& c : *corners)
+      c = 2 * c + cv::Point2f(0.5F, 0.5F);  // centres of pixels at integers
     return true;
   }
   return search == BoardSearch::thorough && cv::findChessboardCorners(image, size, *corners, flags);
@@ -60,19 +65,22 @@ bool detect(const cv::Mat& image, const Checkerboard& board, BoardSearch search,
 void make_right_handed(const Checkerboard& board, std::vector<cv::Point2f>* corners) {
   const auto n = static_cast<std::ptrdiff_t>(board.columns);
   const cv::Point2f along = corners->at(static_cast<std::size_t>(n - 1)) - corners->front();
-  const cv::Point2f down = corners->at(corners->size() - static_cast<std::size_t>(n)) - corners->front();
+  const cv::Point2f down =
+      corners->at(corners->size() - static_cast<std::size_t>(n)) - corners->front();
   if (along.cross(down) > 0) return;
   for (auto row = corners->begin(); row != corners->end(); row += n) std::reverse(row, row + n);
 }
 
 /// Positive where the square right and below of the first corner is brighter than its neighbours.
-double first_square_brighter(const cv::Mat& image, const Checkerboard& board, const std::vector<cv::Point2f>& corners) {
+double first_square_brighter(const cv::Mat& image, const Checkerboard& board,
+                             const std::vector<cv::Point2f>& corners) {
   const auto n = static_cast<std::size_t>(board.columns);
   double sum = 0;
   for (std::size_t row = 0; row + 1 < static_cast<std::size_t>(board.rows); ++row)
     for (std::size_t col = 0; col + 1 < n; ++col) {
       const std::size_t i = row * n + col;
-      const cv::Point2f c = 0.25F * (corners[i] + corners[i + 1] + corners[i + n] + corners[i + n + 1]);
+      const cv::Point2f c =
+          0.25F * (corners[i] + corners[i + 1] + corners[i + n] + corners[i + n + 1]);
       const int x = std::clamp(static_cast<int>(std::lround(c.x)), 0, image.cols - 1);
       const int y = std::clamp(static_cast<int>(std::lround(c.y)), 0, image.rows - 1);
       sum += ((row + col) % 2 == 0 ? 1.0 : -1.0) * image.at<std::uint8_t>(y, x);
@@ -86,31 +94,43 @@ Checkerboard parse_checkerboard(const std::string& inner_corners, double square)
   Checkerboard board;
   const std::size_t x = inner_corners.find('x');
   const std::string_view text = inner_corners;
-  if (x == std::string::npos || !parse_whole(text.substr(0, x), &board.columns) || !parse_whole(text.substr(x + 1), &board.rows) ||
+  if (x == std::string::npos || !parse_whole(text.substr(0, x), &board.columns) ||
+      !parse_whole(text.substr(x + 1), &board.rows) ||
       std::min(board.columns, board.rows) < kFewest || std::max(board.columns, board.rows) > kMost)
-    throw InputError(fmt::format("--board is \"{}\"; it takes the inner corners along and down, {} to {}, like 9x6",
-                                 inner_corners.substr(0, 60), kFewest, kMost));
+    throw InputError(fmt::format(
+        "--board is \"{}\"; it takes the inner corners along and down, {} to {}, like 9x6",
+        inner_corners.substr(0, 60), kFewest, kMost));
   if (board.columns == board.rows)
-    throw InputError(fmt::format("--board {}: a board with as many corners along as down looks the same after a quarter turn; take another",
-                                 inner_corners));
+    throw InputError(
+        fmt::format("--board {}: a board with as many corners along as down looks the same after a "
+                    "quarter turn; take another",
+                    inner_corners));
   if (!(square >= kSmallestSquare && square <= kLargest))
-    throw InputError(fmt::format("--square is {}; it takes the side of a square in metres, {} to {}", square, kSmallestSquare, kLargest));
+    throw InputError(
+        fmt::format("--square is {}; it takes the side of a square in metres, {} to {}", square,
+                    kSmallestSquare, kLargest));
   board.square = square;
   return board;
 }
 
-std::optional<std::vector<Vec2>> find_checkerboard(const ImageView& image, const Checkerboard& board, BoardSearch search) {
+std::optional<std::vector<Vec2>> find_checkerboard(const ImageView& image,
+                                                   const Checkerboard& board, BoardSearch search) {
   if (image.empty()) return std::nullopt;
   const cv::Mat pixels = matrix_of(image);
   std::vector<cv::Point2f> corners;
-  if (!detect(pixels, board, search, &corners) || corners.size() != board.corners()) return std::nullopt;
-  const int window = std::clamp(static_cast<int>(kWindowOfSquare * smallest_spacing(corners, board)), kNarrowestWindow, kWidestWindow);
+  if (!detect(pixels, board, search, &corners) || corners.size() != board.corners())
+    return std::nullopt;
+  const int window =
+      std::clamp(static_cast<int>(kWindowOfSquare * smallest_spacing(corners, board)),
+                 kNarrowestWindow, kWidestWindow);
   cv::Mat soft;
   cv::GaussianBlur(pixels, soft, {}, kBlur);
-  cv::cornerSubPix(soft, corners, {window, window}, {-1, -1},
-                   {cv::TermCriteria::COUNT + cv::TermCriteria::EPS, kRefineSteps, kRefineTolerance});
+  cv::cornerSubPix(
+      soft, corners, {window, window}, {-1, -1},
+      {cv::TermCriteria::COUNT + cv::TermCriteria::EPS, kRefineSteps, kRefineTolerance});
   make_right_handed(board, &corners);
-  if (board.tells_its_ends() && first_square_brighter(pixels, board, corners) < 0) std::reverse(corners.begin(), corners.end());
+  if (board.tells_its_ends() && first_square_brighter(pixels, board, corners) < 0)
+    std::reverse(corners.begin(), corners.end());
   std::vector<Vec2> found;
   found.reserve(corners.size());
   for (const cv::Point2f& c : corners) found.emplace_back(c.x, c.y);
@@ -119,7 +139,8 @@ std::optional<std::vector<Vec2>> find_checkerboard(const ImageView& image, const
 
 void same_way_up(const std::vector<Vec2>& reference, std::vector<Vec2>* corners) {
   if (reference.empty() || corners->empty()) return;
-  const Vec2 there = reference.back() - reference.front(), here = corners->back() - corners->front();
+  const Vec2 there = reference.back() - reference.front(),
+             here = corners->back() - corners->front();
   if (there.dot(here) < 0) std::reverse(corners->begin(), corners->end());
 }
 

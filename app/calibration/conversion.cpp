@@ -33,7 +33,8 @@ CalibrationFormat parse_format(const std::string& word) {
   static const std::vector<std::string> kWords{"vergence", "kalibr", "ros", "opencv"};
   const auto at = std::find(kWords.begin(), kWords.end(), word);
   if (at == kWords.end())
-    throw InputError(fmt::format("\"{}\" is no form of a calibration{}; it is one of {}", word.substr(0, 60), did_you_mean(word, kWords),
+    throw InputError(fmt::format("\"{}\" is no form of a calibration{}; it is one of {}",
+                                 word.substr(0, 60), did_you_mean(word, kWords),
                                  fmt::join(kWords, ", ")));
   return static_cast<CalibrationFormat>(at - kWords.begin());
 }
@@ -45,7 +46,8 @@ ImageSize parse_size(const std::string& text) {
   const bool cross = width.ec == std::errc() && width.ptr != end && *width.ptr == 'x';
   const auto height = cross ? std::from_chars(width.ptr + 1, end, size.height) : width;
   if (!cross || height.ec != std::errc() || height.ptr != end || size.width < 1 || size.height < 1)
-    throw InputError("--size is \"" + text.substr(0, 60) + "\"; it takes the image's width and height in pixels, like 640x480");
+    throw InputError("--size is \"" + text.substr(0, 60) +
+                     "\"; it takes the image's width and height in pixels, like 640x480");
   return size;
 }
 
@@ -53,11 +55,14 @@ CalibrationFormat format_of_name(const std::string& out) {
   if (is_folder(out)) return CalibrationFormat::ros;
   const std::vector<fs::path> files = detail::files_of(out, false);
   const fs::path extension = files.front().extension();
-  if (files.size() == 2) return extension == ".yml" ? CalibrationFormat::opencv : CalibrationFormat::ros;
-  if (files.front().filename().string().find("camchain") != std::string::npos) return CalibrationFormat::kalibr;
+  if (files.size() == 2)
+    return extension == ".yml" ? CalibrationFormat::opencv : CalibrationFormat::ros;
+  if (files.front().filename().string().find("camchain") != std::string::npos)
+    return CalibrationFormat::kalibr;
   if (extension == ".yml") return CalibrationFormat::opencv;
   if (extension == ".yaml") return CalibrationFormat::vergence;
-  throw InputError(out + ": its name does not tell what it is to be; add --to vergence, kalibr, ros or opencv");
+  throw InputError(
+      out + ": its name does not tell what it is to be; add --to vergence, kalibr, ros or opencv");
 }
 
 std::vector<fs::path> files_written(const std::string& out, CalibrationFormat format) {
@@ -78,7 +83,8 @@ const char* describe(CalibrationFormat format) noexcept {
   return "";
 }
 
-void write_any_calibration(const std::string& out, CalibrationFormat format, const CalibrationFile& calibration, Remarks* remarks) {
+void write_any_calibration(const std::string& out, CalibrationFormat format,
+                           const CalibrationFile& calibration, Remarks* remarks) {
   const bool folder = is_ros_folder(out, format);
   const std::vector<fs::path> files = detail::files_of(out, folder);
   const auto one_file = [&](const char* what) {
@@ -101,15 +107,17 @@ void write_any_calibration(const std::string& out, CalibrationFormat format, con
     }
     case CalibrationFormat::opencv: {
       const auto parts = format_opencv(calibration, remarks);
-      texts =
-          files.size() == 1 ? std::vector{kOpenCvHead + parts[0] + parts[1]} : std::vector{kOpenCvHead + parts[0], kOpenCvHead + parts[1]};
+      texts = files.size() == 1 ? std::vector{kOpenCvHead + parts[0] + parts[1]}
+                                : std::vector{kOpenCvHead + parts[0], kOpenCvHead + parts[1]};
       break;
     }
   }
   if (folder) {
     std::error_code error;
     fs::create_directories(out, error);
-    if (error) throw InputError(out + ": cannot be made a folder for left.yaml and right.yaml: " + error.message());
+    if (error)
+      throw InputError(
+          out + ": cannot be made a folder for left.yaml and right.yaml: " + error.message());
   }
   for (std::size_t i = 0; i < files.size(); ++i) replace_durably(files[i], texts[i]);
 }

@@ -9,7 +9,8 @@
 namespace vergence::app {
 namespace {
 
-constexpr std::array kPartNames{"top left", "top", "top right", "left", "the middle", "right", "bottom left", "bottom", "bottom right"};
+constexpr std::array kPartNames{"top left", "top",         "top right", "left",        "the middle",
+                                "right",    "bottom left", "bottom",    "bottom right"};
 constexpr std::array kTiltNames{"right", "left", "bottom", "top"};
 constexpr int kFewCorners = 10, kManyCorners = 40;  // a cell, in the grid's characters
 
@@ -24,15 +25,22 @@ std::string listed(const std::vector<std::string>& words) {
 
 }  // namespace
 
-Coverage::Coverage(const Checkerboard& board, std::vector<std::string> names, std::vector<ImageSize> sizes, double focal_px)
-    : board_(board), names_(std::move(names)), sizes_(std::move(sizes)), focal_px_(focal_px), seen_(sizes_.size()) {}
+Coverage::Coverage(const Checkerboard& board, std::vector<std::string> names,
+                   std::vector<ImageSize> sizes, double focal_px)
+    : board_(board),
+      names_(std::move(names)),
+      sizes_(std::move(sizes)),
+      focal_px_(focal_px),
+      seen_(sizes_.size()) {}
 
 void Coverage::count(const BoardView& view, std::size_t camera, Seen* seen) const {
   const ImageSize size = sizes_[camera];
   std::array<int, kParts> parts{};
   for (const Vec2& c : view.corners[camera]) {
-    const double x = std::clamp(c.x() / size.width, 0.0, 0.999), y = std::clamp(c.y() / size.height, 0.0, 0.999);
-    ++seen->cells[static_cast<std::size_t>(y * kRows) * kColumns + static_cast<std::size_t>(x * kColumns)];
+    const double x = std::clamp(c.x() / size.width, 0.0, 0.999),
+                 y = std::clamp(c.y() / size.height, 0.0, 0.999);
+    ++seen->cells[static_cast<std::size_t>(y * kRows) * kColumns +
+                  static_cast<std::size_t>(x * kColumns)];
     ++parts[part_of(y) * 3 + part_of(x)];
   }
   for (std::size_t i = 0; i < kParts; ++i) seen->parts[i] = std::max(seen->parts[i], parts[i]);
@@ -52,13 +60,15 @@ Coverage::Stand Coverage::stand_of(const BoardView& view) const {
     least = least.cwiseMin(corners[i]);
     most = most.cwiseMax(corners[i]);
   }
-  stand.extent = std::max((most.x() - least.x()) / sizes_[0].width, (most.y() - least.y()) / sizes_[0].height);
-  const cv::Mat K =
-      (cv::Mat_<double>(3, 3) << focal_px_, 0, 0.5 * (sizes_[0].width - 1), 0, focal_px_, 0.5 * (sizes_[0].height - 1), 0, 0, 1);
+  stand.extent =
+      std::max((most.x() - least.x()) / sizes_[0].width, (most.y() - least.y()) / sizes_[0].height);
+  const cv::Mat K = (cv::Mat_<double>(3, 3) << focal_px_, 0, 0.5 * (sizes_[0].width - 1), 0,
+                     focal_px_, 0.5 * (sizes_[0].height - 1), 0, 0, 1);
   cv::Mat turn, place, R;
   if (!cv::solvePnP(object, image, K, cv::noArray(), turn, place)) return stand;
   cv::Rodrigues(turn, R);
-  // The board's normal away from the camera: where it leans to the right, the right edge is the nearer one.
+  // The board's normal away from the camera: where it leans to the right, the right edge is the
+  // nearer one.
   const double along = R.at<double>(2, 2) < 0 ? -1 : 1;
   const double right = std::atan2(along * R.at<double>(0, 2), along * R.at<double>(2, 2));
   const double down = std::atan2(along * R.at<double>(1, 2), along * R.at<double>(2, 2));
@@ -106,12 +116,15 @@ std::vector<std::string> Coverage::needs() const {
   if (edges.size() == kTilts)
     needs.emplace_back("tilted, each edge nearer in turn");
   else if (!edges.empty())
-    needs.push_back(fmt::format("tilted, the {} {}", listed(edges), edges.size() == 1 ? "edge nearer" : "edges nearer in turn"));
+    needs.push_back(fmt::format("tilted, the {} {}", listed(edges),
+                                edges.size() == 1 ? "edge nearer" : "edges nearer in turn"));
   if (nearest_ < kNearExtent)
     needs.emplace_back("nearer");
   else if (farthest_ > kFarOfNear * nearest_)
     needs.emplace_back("farther");
-  if (views_ < kEnoughViews) needs.push_back(fmt::format("{} more view{}", kEnoughViews - views_, kEnoughViews - views_ == 1 ? "" : "s"));
+  if (views_ < kEnoughViews)
+    needs.push_back(fmt::format("{} more view{}", kEnoughViews - views_,
+                                kEnoughViews - views_ == 1 ? "" : "s"));
   return needs;
 }
 

@@ -9,22 +9,27 @@
 
 namespace vergence::app {
 
-/// What views of a checkerboard have shown so far, and what a good calibration still lacks: parts of each image, tilts, sizes, a number.
+/// What views of a checkerboard have shown so far, and what a good calibration still lacks: parts
+/// of each image, tilts, sizes, a number.
 ///
-/// Parts    Nine of each image, the outer ones a third wide: distortion is determined where the corners are, and nowhere else.
-/// Tilts    Four, kTilt and more: without them focal length and distance cannot be told apart. Of camera 0, as it sees the board.
+/// Parts    Nine of each image, the outer ones a third wide: distortion is determined where the
+///          corners are, and nowhere else.
+/// Tilts    Four, kTilt and more: without them focal length and distance cannot be told apart. Of
+///          camera 0, as it sees the board.
 /// Sizes    Once as near as both cameras let it come, once clearly farther.
 class Coverage {
  public:
   static constexpr std::size_t kColumns = 12, kRows = 8;  // cells of the grid that is shown
 
   /// `names` and `sizes` one a camera; `focal_px` of camera 0, roughly: it only serves the tilts.
-  Coverage(const Checkerboard& board, std::vector<std::string> names, std::vector<ImageSize> sizes, double focal_px);
+  Coverage(const Checkerboard& board, std::vector<std::string> names, std::vector<ImageSize> sizes,
+           double focal_px);
 
   void add(const BoardView& view);
   /// Whether a view brings a part, a tilt or a size that is still missing.
   [[nodiscard]] bool brings_something(const BoardView& view) const;
-  /// What is missing in words, the most useful first: "left: top right and bottom", "the board's left edge nearer", "5 more views".
+  /// What is missing in words, the most useful first: "left: top right and bottom", "the board's
+  /// left edge nearer", "5 more views".
   [[nodiscard]] std::vector<std::string> needs() const;
   [[nodiscard]] std::size_t views() const noexcept { return views_; }
   /// Corners a cell, the cameras side by side, each line with its end.
@@ -38,7 +43,7 @@ class Coverage {
   };
   /// How the board stands before camera 0.
   struct Stand {
-    double extent = 0;                  // of the image's width or height, whichever it fills more of
+    double extent = 0;  // of the image's width or height, whichever it fills more of
     std::array<bool, kTilts> tilted{};  // right, left, bottom, top edge nearer
   };
   [[nodiscard]] Stand stand_of(const BoardView& view) const;

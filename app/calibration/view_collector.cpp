@@ -14,28 +14,35 @@ double mean_distance(const std::vector<Vec2>& a, const std::vector<Vec2>& b) {
 }  // namespace
 
 ViewCollector::ViewCollector(Coverage coverage, double image_width_px)
-    : coverage_(std::move(coverage)), still_px_(kStillOfWidth * image_width_px), elsewhere_px_(kElsewhereOfWidth * image_width_px) {}
+    : coverage_(std::move(coverage)),
+      still_px_(kStillOfWidth * image_width_px),
+      elsewhere_px_(kElsewhereOfWidth * image_width_px) {}
 
 bool ViewCollector::still(const BoardView& seen) const {
   for (std::size_t k = 0; k < seen.corners.size(); ++k) {
     if (seen.corners[k].empty()) continue;
-    if (last_.corners[k].size() != seen.corners[k].size() || mean_distance(last_.corners[k], seen.corners[k]) > still_px_) return false;
+    if (last_.corners[k].size() != seen.corners[k].size() ||
+        mean_distance(last_.corners[k], seen.corners[k]) > still_px_)
+      return false;
   }
   return true;
 }
 
 bool ViewCollector::elsewhere(const BoardView& seen) const {
-  return std::all_of(views_.begin(), views_.end(),
-                     [&](const BoardView& v) { return mean_distance(v.corners[0], seen.corners[0]) > elsewhere_px_; });
+  return std::all_of(views_.begin(), views_.end(), [&](const BoardView& v) {
+    return mean_distance(v.corners[0], seen.corners[0]) > elsewhere_px_;
+  });
 }
 
 OfferVerdict ViewCollector::offer(const BoardView& seen) {
-  const auto others = std::count_if(seen.corners.begin() + 1, seen.corners.end(), [](const auto& c) { return !c.empty(); });
+  const auto others = std::count_if(seen.corners.begin() + 1, seen.corners.end(),
+                                    [](const auto& c) { return !c.empty(); });
   const bool held = still(seen);
   last_ = seen;
   if (seen.corners[0].empty() || others == 0) return OfferVerdict::not_seen;
   if (!held) return OfferVerdict::moving;
-  if (!coverage_.brings_something(seen) && !(coverage_.views() < kEnoughViews && elsewhere(seen))) return OfferVerdict::nothing_new;
+  if (!coverage_.brings_something(seen) && !(coverage_.views() < kEnoughViews && elsewhere(seen)))
+    return OfferVerdict::nothing_new;
   coverage_.add(seen);
   views_.push_back(seen);
   return OfferVerdict::taken;

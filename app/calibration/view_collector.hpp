@@ -9,7 +9,8 @@ namespace vergence::app {
 enum class OfferVerdict : std::uint8_t {
   taken,
   not_seen,     // camera 0, or every other camera, does not have the whole board
-  moving,       // the board is not where it was a moment ago, or was not seen then: exposures that differ would make it bend
+  moving,       // the board is not where it was a moment ago, or was not seen then: exposures that
+                // differ would make it bend
   nothing_new,  // all of this has been seen
 };
 
@@ -37,7 +38,9 @@ class ViewCollector {
   std::vector<BoardView> views_{};
 };
 
-inline constexpr double kStillOfWidth = 0.0015;    // mean motion of the corners between two sets: 1 px of 640
-inline constexpr double kElsewhereOfWidth = 0.05;  // mean distance of the corners to those of every view taken
+inline constexpr double kStillOfWidth =
+    0.0015;  // mean motion of the corners between two sets: 1 px of 640
+inline constexpr double kElsewhereOfWidth =
+    0.05;  // mean distance of the corners to those of every view taken
 
 }  // namespace vergence::app

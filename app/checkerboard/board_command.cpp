@@ -13,15 +13,20 @@ namespace vergence::app {
 namespace {
 
 CameraModelKind parse_model(const std::string& word) {
-  return word == "equidistant" ? CameraModelKind::pinhole_equidistant : CameraModelKind::pinhole_radtan;
+  return word == "equidistant" ? CameraModelKind::pinhole_equidistant
+                               : CameraModelKind::pinhole_radtan;
 }
 
 CalibrateRequest request_of(const CalibrateOptions& a) {
-  if (a.board.empty()) throw InputError("--board is missing: the board's inner corners along and down, like 9x6");
-  if (!a.square) throw InputError("--square is missing: the side of a square in metres, like 0.025");
+  if (a.board.empty())
+    throw InputError("--board is missing: the board's inner corners along and down, like 9x6");
+  if (!a.square)
+    throw InputError("--square is missing: the side of a square in metres, like 0.025");
   if (a.out.empty()) throw InputError("--out is missing: the calibration.yaml to write");
-  if (a.baseline && !(*a.baseline > 0 && *a.baseline < 100)) throw InputError("--baseline needs metres, more than 0 and less than 100");
-  if (a.sixth_order && a.model == "equidistant") throw InputError("--k3 belongs to radtan; equidistant has k1 to k4");
+  if (a.baseline && !(*a.baseline > 0 && *a.baseline < 100))
+    throw InputError("--baseline needs metres, more than 0 and less than 100");
+  if (a.sixth_order && a.model == "equidistant")
+    throw InputError("--k3 belongs to radtan; equidistant has k1 to k4");
   CalibrateRequest r;
   r.board = parse_checkerboard(a.board, *a.square);
   r.model = parse_model(a.model);
@@ -39,16 +44,21 @@ ExitCode convert(const CalibrateOptions& a) {
   ConversionRequest r;
   r.in = a.convert[0];
   r.out = a.convert[1];
-  if (!a.to.empty() && !a.format.empty()) throw InputError("--to and --format both say what OUT is to be; give --to");
+  if (!a.to.empty() && !a.format.empty())
+    throw InputError("--to and --format both say what OUT is to be; give --to");
   if (!a.to.empty() || !a.format.empty()) r.format = parse_format(a.to.empty() ? a.format : a.to);
   const CalibrationFormat format = r.format ? *r.format : format_of_name(r.out);
   for (const std::filesystem::path& file : files_written(r.out, format))
     if (std::filesystem::exists(file) && !a.force)
-      throw InputError(file.string() + ": is there already, and nothing is overwritten; add --force, or name another file");
+      throw InputError(
+          file.string() +
+          ": is there already, and nothing is overwritten; add --force, or name another file");
   if (!a.size.empty()) r.size = parse_size(a.size);
-  for (const std::string& sentence : convert_calibration(r)) std::cerr << "vergence: " << sentence << '\n';
+  for (const std::string& sentence : convert_calibration(r))
+    std::cerr << "vergence: " << sentence << '\n';
   std::vector<std::string> written;
-  for (const std::filesystem::path& file : files_written(r.out, format)) written.push_back(file.string());
+  for (const std::filesystem::path& file : files_written(r.out, format))
+    written.push_back(file.string());
   std::cerr << fmt::format("{}: written as {}\n", fmt::join(written, ", "), describe(format));
   return ExitCode::done;
 }
@@ -60,13 +70,16 @@ ExitCode calibrate_board_live(const CalibrateOptions& a) {
 }
 
 ExitCode calibrate_board_images(const CalibrateOptions& a) {
-  if (a.keep_views) throw InputError("--keep-views is for live views; image files are kept as they are");
-  if (a.right.empty() && !a.more_cameras.empty()) throw InputError("--camera is for a third and fourth camera; --right comes first");
+  if (a.keep_views)
+    throw InputError("--keep-views is for live views; image files are kept as they are");
+  if (a.right.empty() && !a.more_cameras.empty())
+    throw InputError("--camera is for a third and fourth camera; --right comes first");
   std::vector<std::vector<std::string>> patterns{a.left};
   if (!a.right.empty()) patterns.push_back(a.right);
   for (const std::string& pattern : a.more_cameras) patterns.push_back({pattern});
   if (patterns.size() > kMaxCameras)
-    throw InputError(fmt::format("a rig has up to {} cameras, {} are given", kMaxCameras, patterns.size()));
+    throw InputError(
+        fmt::format("a rig has up to {} cameras, {} are given", kMaxCameras, patterns.size()));
   return calibrate_images(request_of(a), patterns);
 }
 

@@ -45,15 +45,20 @@ void make_empty_folder(const fs::path& folder) {
   std::error_code error;
   fs::create_directories(folder, error);
   if (error || !fs::is_directory(folder, error))
-    throw InputError(folder.string() + ": cannot be made a folder; --keep-views takes one that is not there or empty");
+    throw InputError(
+        folder.string() +
+        ": cannot be made a folder; --keep-views takes one that is not there or empty");
   if (!fs::is_empty(folder, error))
-    throw InputError(folder.string() + ": is not empty; --keep-views takes a folder that is not there or empty");
+    throw InputError(folder.string() +
+                     ": is not empty; --keep-views takes a folder that is not there or empty");
 }
 
-/// Sets of images from the cameras, the board in them, until nothing is missing. Its thread looks, the caller's watches.
+/// Sets of images from the cameras, the board in them, until nothing is missing. Its thread looks,
+/// the caller's watches.
 class Collection {
  public:
-  Collection(const CalibrateRequest& request, const CalibratedRig& rig, double focal_px, LiveSource* source)
+  Collection(const CalibrateRequest& request, const CalibratedRig& rig, double focal_px,
+             LiveSource* source)
       : request_(request),
         rig_(rig),
         source_(source),
@@ -79,8 +84,9 @@ class Collection {
     for (LiveItem item; source_->next(&item);) {
       if (item.kind == LiveItem::Kind::device_gone || item.kind == LiveItem::Kind::device_back) {
         const std::lock_guard lock(mutex_);
-        sentences_.push_back(
-            fmt::format("camera {} is {}", item.camera, item.kind == LiveItem::Kind::device_gone ? "gone; waiting for it" : "back"));
+        sentences_.push_back(fmt::format(
+            "camera {} is {}", item.camera,
+            item.kind == LiveItem::Kind::device_gone ? "gone; waiting for it" : "back"));
       }
       if (item.kind != LiveItem::Kind::images) continue;
       offer(item.set);
@@ -109,15 +115,18 @@ class Collection {
     complete_ = needs.empty();
     const std::lock_guard lock(mutex_);
     ++sets_;
-    words_ = fmt::format("{} views · {}{}", collector_.views().size(), phrase(verdict),
-                         needs.empty() ? "" : fmt::format(" · missing: {}", fmt::join(needs, "; ")));
+    words_ =
+        fmt::format("{} views · {}{}", collector_.views().size(), phrase(verdict),
+                    needs.empty() ? "" : fmt::format(" · missing: {}", fmt::join(needs, "; ")));
   }
 
   void keep(const SyncedSet& set, std::size_t number) {
     for (int k = 0; k < static_cast<int>(rig_.sizes.size()); ++k) {
       const ImageView image = source_->image(set, k);
       if (image.empty()) continue;
-      const fs::path file = *request_.keep_views / fmt::format("{}_{:03}.png", rig_.names[static_cast<std::size_t>(k)], number);
+      const fs::path file =
+          *request_.keep_views /
+          fmt::format("{}_{:03}.png", rig_.names[static_cast<std::size_t>(k)], number);
       try {
         write_png(file, image);
         continue;
@@ -188,13 +197,16 @@ ExitCode calibrate_live(const CalibrateRequest& request, const Configuration& co
   progress.finish();
   const auto stopped = signals.stop_code();
   for (const int camera : source.missing())
-    progress.say(fmt::format("vergence: camera {} did not come back; look at its cable and power", camera));
+    progress.say(
+        fmt::format("vergence: camera {} did not come back; look at its cable and power", camera));
   if (collection.views().size() < kFewestViews) {
     progress.say(fmt::format(
-        "vergence: no calibration: {} views of the board were taken, {} are the least; is it {}x{} inner corners, whole and lit "
+        "vergence: no calibration: {} views of the board were taken, {} are the least; is it {}x{} "
+        "inner corners, whole and lit "
         "in every image?",
         collection.views().size(), kFewestViews, request.board.columns, request.board.rows));
-    return stopped.value_or(source.missing().empty() ? ExitCode::not_usable : ExitCode::device_failed);
+    return stopped.value_or(source.missing().empty() ? ExitCode::not_usable
+                                                     : ExitCode::device_failed);
   }
   const ExitCode code = conclude_calibration(request, rig, collection.views(), &progress);
   if (!source.missing().empty() && !stopped) return ExitCode::device_failed;

@@ -9,24 +9,28 @@
 #include "app/runtime/errors.hpp"
 #include "app/runtime/progress.hpp"
 
-/// `vergence calibrate` with a checkerboard. All of it throws InputError where arguments, images or devices cannot be used.
+/// `vergence calibrate` with a checkerboard. All of it throws InputError where arguments, images or
+/// devices cannot be used.
 namespace vergence::app {
 
 struct CalibrateRequest {
   Checkerboard board{};
   CameraModelKind model = CameraModelKind::pinhole_radtan;
-  bool sixth_order = false;                           // k3 of radtan
-  std::filesystem::path out{};                        // calibration.yaml
-  std::optional<double> measured_baseline{};          // m, to report against
-  std::optional<std::filesystem::path> keep_views{};  // live: a folder for the images of the views taken
+  bool sixth_order = false;                   // k3 of radtan
+  std::filesystem::path out{};                // calibration.yaml
+  std::optional<double> measured_baseline{};  // m, to report against
+  std::optional<std::filesystem::path>
+      keep_views{};  // live: a folder for the images of the views taken
   bool json = false, quiet = false;
 };
 
 /// From image files: patterns of each camera, camera 0 first.
-[[nodiscard]] ExitCode calibrate_images(const CalibrateRequest& request, const std::vector<std::vector<std::string>>& patterns);
+[[nodiscard]] ExitCode calibrate_images(const CalibrateRequest& request,
+                                        const std::vector<std::vector<std::string>>& patterns);
 
 /// From the cameras of a configuration, until nothing is missing or a signal comes.
-[[nodiscard]] ExitCode calibrate_live(const CalibrateRequest& request, const Configuration& configuration);
+[[nodiscard]] ExitCode calibrate_live(const CalibrateRequest& request,
+                                      const Configuration& configuration);
 
 /// What is known of a rig beside what its views tell.
 struct CalibratedRig {
@@ -35,8 +39,11 @@ struct CalibratedRig {
   std::vector<ImageSize> sizes{};
 };
 
-/// Calibrates, prints the report on standard output and writes the file; sentences go through *progress. → done, not_usable
-[[nodiscard]] ExitCode conclude_calibration(const CalibrateRequest& request, const CalibratedRig& rig, const std::vector<BoardView>& views,
+/// Calibrates, prints the report on standard output and writes the file; sentences go through
+/// *progress. → done, not_usable
+[[nodiscard]] ExitCode conclude_calibration(const CalibrateRequest& request,
+                                            const CalibratedRig& rig,
+                                            const std::vector<BoardView>& views,
                                             Progress* progress);
 
 }  // namespace vergence::app

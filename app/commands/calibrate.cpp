@@ -23,19 +23,23 @@ ExitCode calibrate_from_drive(const CalibrateOptions& a) {
   const SequenceFormat format = sequence_format(a.format.empty() ? "auto" : a.format, a.drive);
   const CalibrationUse use{true, a.baseline.value_or(0)};
   std::vector<std::string> remarks;
-  // Of what the drive comes with only lenses and length are read: how its cameras sit need not be known.
+  // Of what the drive comes with only lenses and length are read: how its cameras sit need not be
+  // known.
   const std::array cameras{c.kitti_raw.left, c.kitti_raw.right};
-  const StereoSequence sequence = a.calibration
-                                      ? open_sequence(format, a.drive, calibration_source(*a.calibration, use, &remarks), use, cameras)
-                                      : open_sequence(format, a.drive, std::nullopt, use, cameras);
+  const StereoSequence sequence =
+      a.calibration ? open_sequence(format, a.drive,
+                                    calibration_source(*a.calibration, use, &remarks), use, cameras)
+                    : open_sequence(format, a.drive, std::nullopt, use, cameras);
   for (const std::string& sentence : remarks) std::cerr << "vergence: " << sentence << '\n';
   check_image_sizes(sequence, 0, sequence.pairs.size());
   const StartingCalibration told = replayed_calibration(c, sequence, true);
   Progress progress = Progress::on_stderr(a.common.quiet);
   for (const std::string& sentence : sequence.remarks) progress.say("vergence: " + sentence);
-  const DriveCalibration found = calibrate_with_progress({sequence, c, 0, sequence.pairs.size(), {}, {}}, told, &progress);
+  const DriveCalibration found =
+      calibrate_with_progress({sequence, c, 0, sequence.pairs.size(), {}, {}}, told, &progress);
   if (!found.rig) {
-    progress.say(fmt::format("vergence: {}: no calibration was found, nothing is written: {}", a.drive, found.why));
+    progress.say(fmt::format("vergence: {}: no calibration was found, nothing is written: {}",
+                             a.drive, found.why));
     return ExitCode::not_usable;
   }
   CalibrationFile written = told.file;
@@ -44,7 +48,9 @@ ExitCode calibrate_from_drive(const CalibrateOptions& a) {
   write_calibration(a.out, written);
   std::cout << describe(found);
   if (!found.verified)
-    progress.say("vergence: the depth is not known well enough: a longer drive with turns, past things near the road, would help");
+    progress.say(
+        "vergence: the depth is not known well enough: a longer drive with turns, past things near "
+        "the road, would help");
   progress.say(a.out + ": written");
   return found.verified ? ExitCode::done : ExitCode::not_usable;
 }
@@ -53,8 +59,10 @@ ExitCode calibrate_from_drive(const CalibrateOptions& a) {
 
 void add_calibrate(CLI::App& root, const ProgramWords& words, ExitCode* exit_code) {
   const auto a = std::make_shared<CalibrateOptions>();
-  a->declare(root)->callback(
-      [a, words, exit_code] { *exit_code = a->way() == CalibrateWay::drive ? calibrate_from_drive(*a) : run_checkerboard_tool(words); });
+  a->declare(root)->callback([a, words, exit_code] {
+    *exit_code =
+        a->way() == CalibrateWay::drive ? calibrate_from_drive(*a) : run_checkerboard_tool(words);
+  });
 }
 
 }  // namespace vergence::app

@@ -14,8 +14,8 @@ namespace vergence::app {
 /// What `vergence calibrate` is asked to look at.
 enum class CalibrateWay : std::uint8_t { board_images, board_live, drive, convert };
 
-/// The command line of `vergence calibrate`, the words as given: the program declares it, and the checkerboard tool, which the program
-/// starts with the same words.
+/// The command line of `vergence calibrate`, the words as given: the program declares it, and the
+/// checkerboard tool, which the program starts with the same words.
 struct CalibrateOptions {
   CommonOptions common{};
   std::string configuration{}, board{}, out{}, model = "radtan", format{}, size{}, drive{};
@@ -33,8 +33,8 @@ struct CalibrateOptions {
   [[nodiscard]] CalibrateWay way() const;
 };
 
-/// Before the board is carried around for half an hour, not after it: InputError unless a file can be written there. One that is there
-/// already is overwritten with `force` only.
+/// Before the board is carried around for half an hour, not after it: InputError unless a file can
+/// be written there. One that is there already is overwritten with `force` only.
 void check_writable(const std::filesystem::path& file, bool force);
 
 }  // namespace vergence::app

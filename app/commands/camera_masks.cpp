@@ -19,7 +19,8 @@ using Bytes = std::span<const std::uint8_t>;
 std::filesystem::path find_beside(const std::filesystem::path& folder, const std::string& name) {
   const std::filesystem::path path(name);
   std::error_code none;
-  if (path.is_absolute() || folder.empty() || !std::filesystem::exists(folder / path, none)) return path;
+  if (path.is_absolute() || folder.empty() || !std::filesystem::exists(folder / path, none))
+    return path;
   return folder / path;
 }
 
@@ -29,9 +30,12 @@ struct PgmHead {
   std::size_t pixels = 0;
 };
 
-bool is_pgm(Bytes b) noexcept { return b.size() > 2 && b[0] == 'P' && b[1] == '5' && std::isspace(b[2]) != 0; }
+bool is_pgm(Bytes b) noexcept {
+  return b.size() > 2 && b[0] == 'P' && b[1] == '5' && std::isspace(b[2]) != 0;
+}
 
-/// Width, height and white after "P5", apart by white space, in which `#` begins a remark. False: not that.
+/// Width, height and white after "P5", apart by white space, in which `#` begins a remark. False:
+/// not that.
 bool read_pgm_head(Bytes b, PgmHead* head) noexcept {
   constexpr int kMost = 1 << 15;
   std::size_t at = 2;
@@ -40,7 +44,8 @@ bool read_pgm_head(Bytes b, PgmHead* head) noexcept {
       if (b[at] == '#')
         while (at + 1 < b.size() && b[at] != '\n') ++at;
     const std::size_t first = at;
-    for (; at < b.size() && std::isdigit(b[at]) != 0 && *number <= kMost; ++at) *number = 10 * *number + (b[at] - '0');
+    for (; at < b.size() && std::isdigit(b[at]) != 0 && *number <= kMost; ++at)
+      *number = 10 * *number + (b[at] - '0');
     if (at == first || *number < 1 || *number > kMost) return false;
   }
   head->pixels = at + 1;
@@ -61,24 +66,31 @@ ImageFileStatus read_pgm(Bytes b, ImageSize wanted, ImageSize* size, std::uint8_
 ImageFileStatus read_png(Bytes b, ImageSize wanted, ImageSize* size, std::uint8_t* out) noexcept {
   constexpr std::array<std::uint8_t, 4> kPng{0x89, 'P', 'N', 'G'};
   // A JPEG's zeros are not zero: its compression leaves ripples about every edge.
-  if (b.size() < kPng.size() || !std::equal(kPng.begin(), kPng.end(), b.begin())) return ImageFileStatus::not_an_image;
+  if (b.size() < kPng.size() || !std::equal(kPng.begin(), kPng.end(), b.begin()))
+    return ImageFileStatus::not_an_image;
   const ImageFileStatus status = check_image(b, size);
   if (status != ImageFileStatus::ok) return status;
   return decode_grey(b, wanted, out, static_cast<std::size_t>(wanted.width));
 }
 
-std::vector<std::uint8_t> read_mask(const std::string& key, const std::filesystem::path& file, ImageSize wanted) {
-  const auto fail = [&](const std::string& what) { throw InputError(fmt::format("{}: {} {}", key, file.string(), what)); };
+std::vector<std::uint8_t> read_mask(const std::string& key, const std::filesystem::path& file,
+                                    ImageSize wanted) {
+  const auto fail = [&](const std::string& what) {
+    throw InputError(fmt::format("{}: {} {}", key, file.string(), what));
+  };
   std::vector<std::uint8_t> bytes;
-  std::vector<std::uint8_t> pixels(static_cast<std::size_t>(wanted.width) * static_cast<std::size_t>(wanted.height));
+  std::vector<std::uint8_t> pixels(static_cast<std::size_t>(wanted.width) *
+                                   static_cast<std::size_t>(wanted.height));
   ImageSize size;
   ImageFileStatus status = read_image_file(file, &bytes);
   if (status == ImageFileStatus::ok)
-    status = is_pgm(bytes) ? read_pgm(bytes, wanted, &size, pixels.data()) : read_png(bytes, wanted, &size, pixels.data());
-  if (status == ImageFileStatus::not_an_image) fail("is no mask; a PNG or a binary PGM is, 0 where nothing is to be looked for");
+    status = is_pgm(bytes) ? read_pgm(bytes, wanted, &size, pixels.data())
+                           : read_png(bytes, wanted, &size, pixels.data());
+  if (status == ImageFileStatus::not_an_image)
+    fail("is no mask; a PNG or a binary PGM is, 0 where nothing is to be looked for");
   if (status == ImageFileStatus::wrong_size)
-    fail(fmt::format("is {} × {} px, the camera's images are {} × {}; draw it on one of them", size.width, size.height, wanted.width,
-                     wanted.height));
+    fail(fmt::format("is {} × {} px, the camera's images are {} × {}; draw it on one of them",
+                     size.width, size.height, wanted.width, wanted.height));
   if (status != ImageFileStatus::ok) fail(to_phrase(status));
   if (std::all_of(pixels.begin(), pixels.end(), [](std::uint8_t v) { return v == 0; }))
     fail("is 0 everywhere: nothing of the image is left; 0 hides, any other value shows");
@@ -91,18 +103,21 @@ CameraMasks::CameraMasks(const Configuration& c, const RigCalibration& rig) {
   for (std::size_t k = 0; k < kMaxCameras; ++k) {
     if (c.cameras[k].mask.empty()) continue;
     const std::string key = fmt::format("cameras.{}.mask", k);
-    if (static_cast<int>(k) >= rig.cameras) throw InputError(fmt::format("{}: the rig has {} cameras, the first is 0", key, rig.cameras));
+    if (static_cast<int>(k) >= rig.cameras)
+      throw InputError(fmt::format("{}: the rig has {} cameras, the first is 0", key, rig.cameras));
     Image& image = images_[k];
     image.width = rig.intrinsics[k].width;
     image.height = rig.intrinsics[k].height;
-    image.pixels = read_mask(key, find_beside(c.folder, c.cameras[k].mask), {image.width, image.height});
+    image.pixels =
+        read_mask(key, find_beside(c.folder, c.cameras[k].mask), {image.width, image.height});
   }
 }
 
 std::array<ImageView, kMaxCameras> CameraMasks::views() const noexcept {
   std::array<ImageView, kMaxCameras> views{};
   for (std::size_t k = 0; k < kMaxCameras; ++k)
-    if (!images_[k].pixels.empty()) views[k] = {images_[k].pixels.data(), images_[k].width, images_[k].height, images_[k].width};
+    if (!images_[k].pixels.empty())
+      views[k] = {images_[k].pixels.data(), images_[k].width, images_[k].height, images_[k].width};
   return views;
 }
 

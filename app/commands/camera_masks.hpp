@@ -11,11 +11,14 @@
 
 namespace vergence::app {
 
-/// The masks of a rig's cameras, `cameras.N.mask`: what of the vehicle or of dirt stands in the picture.
+/// The masks of a rig's cameras, `cameras.N.mask`: what of the vehicle or of dirt stands in the
+/// picture.
 ///
-/// A relative path begins at the configuration file's folder; is there nothing, or is there no such file, at the working directory.
+/// A relative path begins at the configuration file's folder; is there nothing, or is there no such
+/// file, at the working directory.
 /// Ownership  Owns the pixels of views(). Threads: one caller.
-/// Errors     InputError names key and file: one that is missing, damaged, of another size than the camera's images, or hides all of them.
+/// Errors     InputError names key and file: one that is missing, damaged, of another size than the
+///            camera's images, or hides all of them.
 class CameraMasks {
  public:
   CameraMasks(const Configuration& configuration, const RigCalibration& rig);

@@ -4,8 +4,9 @@
 #include "app/commands/program.hpp"
 #include "app/runtime/errors.hpp"
 
-/// Every word of the command line: each function declares its options on `root` and, when its word was given,
-/// runs the command from the subcommand's callback and sets *exit_code. InputError may leave the callback.
+/// Every word of the command line: each function declares its options on `root` and, when its word
+/// was given, runs the command from the subcommand's callback and sets *exit_code. InputError may
+/// leave the callback.
 namespace vergence::app {
 
 /// `words`: what the checkerboard tool is started with.

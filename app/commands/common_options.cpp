@@ -3,16 +3,23 @@
 namespace vergence::app {
 
 void CommonOptions::declare(CLI::App& command) {
-  command.add_option("--set", set, "Set a key of the configuration (docs/configuration.md); as often as needed")
+  command
+      .add_option("--set", set,
+                  "Set a key of the configuration (docs/configuration.md); as often as needed")
       ->type_name("KEY=VALUE")
       ->allow_extra_args(false);  // one argument each: the next word is not another KEY=VALUE
-  command.add_option("--threads", threads, "Threads of the estimator, 1 or 2; the poses are the same")->type_name("N");
-  command.add_option("--seed", seed, "Seed of the random sampling; same seed, same poses")->type_name("N");
+  command
+      .add_option("--threads", threads, "Threads of the estimator, 1 or 2; the poses are the same")
+      ->type_name("N");
+  command.add_option("--seed", seed, "Seed of the random sampling; same seed, same poses")
+      ->type_name("N");
   command.add_flag("--quiet", quiet, "No progress line");
 }
 
 void declare_also(CLI::App& command, std::optional<std::string>* words) {
-  command.add_option("--also", *words, "The drive in other forms as well, e.g. kitti,enu,geojson,kml (docs/session.md)")
+  command
+      .add_option("--also", *words,
+                  "The drive in other forms as well, e.g. kitti,enu,geojson,kml (docs/session.md)")
       ->type_name("WORDS");
 }
 

@@ -11,7 +11,8 @@
 
 namespace vergence::app {
 
-/// What every command that runs understands: `--set KEY=VALUE` (any number of times), `--threads N`, `--seed N`, `--quiet`.
+/// What every command that runs understands: `--set KEY=VALUE` (any number of times), `--threads
+/// N`, `--seed N`, `--quiet`.
 struct CommonOptions {
   std::vector<std::string> set{};
   std::optional<int> threads{};

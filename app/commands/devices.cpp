@@ -20,9 +20,12 @@ void write_rules(const std::string& file, const std::string& rules) {
   out << rules;
   out.close();
   if (!out)
-    throw InputError(file + ": cannot be written; write to standard output and let sudo do it: vergence devices --write-udev | sudo tee " +
+    throw InputError(file +
+                     ": cannot be written; write to standard output and let sudo do it: vergence "
+                     "devices --write-udev | sudo tee " +
                      file);
-  std::cerr << "vergence: " << file << " written; now: sudo udevadm control --reload && sudo udevadm trigger\n";
+  std::cerr << "vergence: " << file
+            << " written; now: sudo udevadm control --reload && sudo udevadm trigger\n";
 }
 
 void list(const Arguments& a, bool rules_asked) {
@@ -44,13 +47,17 @@ void list(const Arguments& a, bool rules_asked) {
 
 void add_devices(CLI::App& root, ExitCode* exit_code) {
   const auto a = std::make_shared<Arguments>();
-  CLI::App* command =
-      root.add_subcommand("devices", "List the cameras, sensors and boards that are connected, with what to paste into a configuration");
+  CLI::App* command = root.add_subcommand("devices",
+                                          "List the cameras, sensors and boards that are "
+                                          "connected, with what to paste into a configuration");
   command->add_flag("--json", a->json, "For programs (docs/devices.md has the keys)");
-  command->add_flag("--probe", a->probe, "Open the serial ports on USB and ask who is there; some boards restart from that");
+  command->add_flag(
+      "--probe", a->probe,
+      "Open the serial ports on USB and ask who is there; some boards restart from that");
   CLI::Option* rules = command
                            ->add_option("--write-udev", a->rules,
-                                        "Write udev rules for what is plugged in, to FILE or to standard output: permissions, names that "
+                                        "Write udev rules for what is plugged in, to FILE or to "
+                                        "standard output: permissions, names that "
                                         "stay, latency timer, ModemManager kept away")
                            ->expected(0, 1)
                            ->default_str("-")

@@ -31,7 +31,8 @@ std::string table(const std::vector<Row>& rows) {
 }
 
 std::string usb_ids(const SerialPortInfo& info) {
-  return info.usb_vendor == 0 ? "" : fmt::format("{:04x}:{:04x}", info.usb_vendor, info.usb_product);
+  return info.usb_vendor == 0 ? ""
+                              : fmt::format("{:04x}:{:04x}", info.usb_vendor, info.usb_product);
 }
 
 std::string cameras_text(const Inventory& inventory, const Terminal& t) {
@@ -40,8 +41,12 @@ std::string cameras_text(const Inventory& inventory, const Terminal& t) {
   for (const DriverFindings& d : inventory.drivers)
     for (const FoundCamera& c : d.cameras) {
       const std::string model =
-          harmless(c.info.model) + (c.also.empty() ? "" : fmt::format(" (also {})", harmless(fmt::format("{}", fmt::join(c.also, ", ")))));
-      rows.push_back({d.name, c.info.serial.empty() ? "?" : harmless(c.info.serial), model, harmless(c.info.place)});
+          harmless(c.info.model) +
+          (c.also.empty()
+               ? ""
+               : fmt::format(" (also {})", harmless(fmt::format("{}", fmt::join(c.also, ", ")))));
+      rows.push_back({d.name, c.info.serial.empty() ? "?" : harmless(c.info.serial), model,
+                      harmless(c.info.place)});
     }
   return t.in(Terminal::Ink::bold, "Cameras") + "\n" + table(rows) + "\n";
 }
@@ -50,8 +55,11 @@ std::string ports_text(const Inventory& inventory, const Terminal& t) {
   if (inventory.ports.empty()) return {};
   std::vector<Row> rows;
   for (const FoundPort& p : inventory.ports)
-    rows.push_back({p.info.port, usb_ids(p.info), harmless(p.info.usb_serial), p.device.empty() ? to_phrase(p.kind) : harmless(p.device),
-                    p.info.latency_timer_ms ? fmt::format("latency timer {} ms", *p.info.latency_timer_ms) : ""});
+    rows.push_back({p.info.port, usb_ids(p.info), harmless(p.info.usb_serial),
+                    p.device.empty() ? to_phrase(p.kind) : harmless(p.device),
+                    p.info.latency_timer_ms
+                        ? fmt::format("latency timer {} ms", *p.info.latency_timer_ms)
+                        : ""});
   return t.in(Terminal::Ink::bold, "Serial ports") + "\n" + table(rows) + "\n";
 }
 
@@ -63,7 +71,8 @@ std::string paste_text(const Inventory& inventory, const Terminal& t) {
   if (!text.empty()) text = "  cameras:\n" + text;
   for (const FoundPort& p : inventory.ports)
     if (!p.configuration.empty()) text += "  " + p.configuration + "\n";
-  return text.empty() ? "" : t.in(Terminal::Ink::bold, "For the configuration") + "\n" + text + "\n";
+  return text.empty() ? ""
+                      : t.in(Terminal::Ink::bold, "For the configuration") + "\n" + text + "\n";
 }
 
 /// One line a driver, its sentence beside it.
@@ -90,7 +99,8 @@ Json number_or_null(const std::optional<int>& n) { return n ? Json(*n) : Json(nu
 }  // namespace
 
 std::string devices_text(const Inventory& inventory, const Terminal& t) {
-  std::string text = cameras_text(inventory, t) + ports_text(inventory, t) + paste_text(inventory, t) + notes_text(inventory, t);
+  std::string text = cameras_text(inventory, t) + ports_text(inventory, t) +
+                     paste_text(inventory, t) + notes_text(inventory, t);
   while (text.ends_with("\n\n")) text.pop_back();
   return text;
 }
@@ -98,7 +108,11 @@ std::string devices_text(const Inventory& inventory, const Terminal& t) {
 std::string devices_json(const Inventory& inventory, const std::string& rules) {
   Json cameras = Json::array(), drivers = Json::array(), ports = Json::array();
   for (const DriverFindings& d : inventory.drivers) {
-    drivers.push_back({{"name", d.name}, {"meaning", d.meaning}, {"found", d.cameras.size()}, {"answered", d.answered}, {"note", d.note}});
+    drivers.push_back({{"name", d.name},
+                       {"meaning", d.meaning},
+                       {"found", d.cameras.size()},
+                       {"answered", d.answered},
+                       {"note", d.note}});
     for (const FoundCamera& c : d.cameras)
       cameras.push_back({{"driver", d.name},
                          {"serial", c.info.serial},

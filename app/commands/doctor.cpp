@@ -21,12 +21,15 @@ ExitCode examine_machine(const Arguments& a) {
   Needs needs;
   if (!a.configuration.empty()) needs = needs_of(load_configuration(a.configuration, a.set));
   InventoryOptions options;
-  for (const CameraNeed& n : needs.cameras) options.drivers.push_back(n.driver);  // without a configuration: all
+  for (const CameraNeed& n : needs.cameras)
+    options.drivers.push_back(n.driver);  // without a configuration: all
   const Machine machine = Machine::here();
   const Inventory inventory = take_inventory(machine, options);
   const std::vector<Finding> findings = examine({machine, inventory, needs, a.out});
-  std::cout << (a.json ? doctor_json(findings) : doctor_text(findings, needs.given, Terminal::of_stdout()));
-  const bool any = std::any_of(findings.begin(), findings.end(), [](const Finding& f) { return f.state == FindingState::problem; });
+  std::cout << (a.json ? doctor_json(findings)
+                       : doctor_text(findings, needs.given, Terminal::of_stdout()));
+  const bool any = std::any_of(findings.begin(), findings.end(),
+                               [](const Finding& f) { return f.state == FindingState::problem; });
   return any ? ExitCode::not_usable : ExitCode::done;
 }
 
@@ -34,13 +37,17 @@ ExitCode examine_machine(const Arguments& a) {
 
 void add_doctor(CLI::App& root, ExitCode* exit_code) {
   const auto a = std::make_shared<Arguments>();
-  CLI::App* command =
-      root.add_subcommand("doctor", "Check this machine and its devices for what a drive needs; says the command that mends");
-  command->add_option("CONFIG", a->configuration, "Configuration whose drive is planned; without one what is plugged in is checked");
+  CLI::App* command = root.add_subcommand(
+      "doctor",
+      "Check this machine and its devices for what a drive needs; says the command that mends");
+  command->add_option(
+      "CONFIG", a->configuration,
+      "Configuration whose drive is planned; without one what is plugged in is checked");
   command->add_option("--set", a->set, "Set a key of the configuration; as often as needed")
       ->type_name("KEY=VALUE")
       ->allow_extra_args(false);
-  command->add_option("--out", a->out, "Where sessions will be written: is there room?")->type_name("DIR");
+  command->add_option("--out", a->out, "Where sessions will be written: is there room?")
+      ->type_name("DIR");
   command->add_flag("--json", a->json, "For programs (docs/doctor.md has the keys)");
   command->footer("Exit code: 0 no problem, 1 at least one, 2 the configuration cannot be read.");
   command->callback([a, exit_code] {

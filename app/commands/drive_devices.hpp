@@ -16,17 +16,21 @@ namespace vergence::app {
 
 /// The devices of a drive, configured and ready to start: a mock's rig, or cameras that exist.
 ///
-/// Ownership  Cameras, INS and trigger live in it and outlive the LiveSource that uses them. Threads: one caller.
+/// Ownership  Cameras, INS and trigger live in it and outlive the LiveSource that uses them.
+///            Threads: one caller.
 class DriveDevices {
  public:
   /// InputError names the key, or the device and what it offers. `fast`: virtual time, mock only.
-  DriveDevices(const Configuration& configuration, const std::vector<std::string>& faults, bool fast, std::optional<double> duration_s);
+  DriveDevices(const Configuration& configuration, const std::vector<std::string>& faults,
+               bool fast, std::optional<double> duration_s);
 
   [[nodiscard]] const std::vector<CameraDevice*>& cameras() const noexcept { return cameras_; }
   /// Real cameras with what they made of their configuration; empty: a mock's.
   [[nodiscard]] const std::vector<OpenedCamera>& opened() const noexcept { return opened_; }
-  [[nodiscard]] InsDevice* ins() const noexcept { return ins_; }              // null: none
-  [[nodiscard]] TriggerDevice* trigger() const noexcept { return trigger_; }  // null: pulses come from elsewhere, or none
+  [[nodiscard]] InsDevice* ins() const noexcept { return ins_; }  // null: none
+  [[nodiscard]] TriggerDevice* trigger() const noexcept {
+    return trigger_;
+  }  // null: pulses come from elsewhere, or none
   [[nodiscard]] const SyncOptions& sync() const noexcept { return sync_; }
   /// LiveSource::Options::board_keeps_own_time.
   [[nodiscard]] bool board_keeps_own_time() const noexcept { return board_keeps_own_time_; }
@@ -46,7 +50,9 @@ class DriveDevices {
   /// Rig frames of the whole drive; 0: nobody knows.
   [[nodiscard]] std::uint64_t frames() const noexcept { return frames_; }
   /// Of a mock; real cameras do not tell.
-  [[nodiscard]] std::size_t image_bytes() const noexcept { return mock_.rig ? mock_.rig->image_bytes() : 0; }
+  [[nodiscard]] std::size_t image_bytes() const noexcept {
+    return mock_.rig ? mock_.rig->image_bytes() : 0;
+  }
 
  private:
   void open_real(const Configuration& configuration);
@@ -70,6 +76,7 @@ class DriveDevices {
 };
 
 /// `NAME=VALUE NAME=VALUE …` of `cameras.N.options`. InputError names the key.
-[[nodiscard]] std::map<std::string, std::string> parse_camera_options(const std::string& key, const std::string& text);
+[[nodiscard]] std::map<std::string, std::string> parse_camera_options(const std::string& key,
+                                                                      const std::string& text);
 
 }  // namespace vergence::app

@@ -11,8 +11,9 @@ namespace {
 /// What a user wants to hear of at once.
 bool aloud(EstimatorEvent::Kind kind) noexcept {
   using Kind = EstimatorEvent::Kind;
-  return kind == Kind::rig_changed || kind == Kind::calibration_confirmed || kind == Kind::calibration_contradicted ||
-         kind == Kind::calibration_accepted || kind == Kind::calibration_rejected || kind == Kind::calibration_waits;
+  return kind == Kind::rig_changed || kind == Kind::calibration_confirmed ||
+         kind == Kind::calibration_contradicted || kind == Kind::calibration_accepted ||
+         kind == Kind::calibration_rejected || kind == Kind::calibration_waits;
 }
 
 std::string words(std::string_view name) {
@@ -24,8 +25,10 @@ std::string words(std::string_view name) {
 /// `stereo`, `stereo, verifying the calibration`, `parallel monocular, needs motion`.
 std::string state_words(State state, Reason reason) {
   std::string text = state == State::stereo_odometry ? "stereo" : words(to_string(state));
-  if (reason == Reason::unverified_calibration || reason == Reason::unconfirmed) text += ", verifying the calibration";
-  if (reason == Reason::needs_motion || reason == Reason::needs_near_structure || reason == Reason::needs_texture)
+  if (reason == Reason::unverified_calibration || reason == Reason::unconfirmed)
+    text += ", verifying the calibration";
+  if (reason == Reason::needs_motion || reason == Reason::needs_near_structure ||
+      reason == Reason::needs_texture)
     text += ", " + words(to_string(reason));
   return text;
 }
@@ -39,7 +42,8 @@ void DriveJournal::open(Recorder* recorder, Stamp first) noexcept {
 
 void DriveJournal::note(const Estimator& estimator) noexcept {
   for (const EstimatorEvent& event : estimator.events()) {
-    if (event.kind == EstimatorEvent::Kind::dropped) dropped_ += static_cast<std::uint64_t>(std::max(0.0, event.value));
+    if (event.kind == EstimatorEvent::Kind::dropped)
+      dropped_ += static_cast<std::uint64_t>(std::max(0.0, event.value));
     const EventRecord record = EventRecord::of(event);
     recorder_->post(record);
     if (aloud(event.kind)) (void)notices_.push(record);
@@ -51,10 +55,12 @@ void DriveJournal::note(const Estimator& estimator) noexcept {
   matches_.take(estimator.tracks());
 }
 
-/// A rig that was knocked fits no match from before: a calibration is looked at with those of its own rig only.
+/// A rig that was knocked fits no match from before: a calibration is looked at with those of its
+/// own rig only.
 void DriveJournal::note_change(const CalibrationDecision& decision) noexcept {
   using Cause = CalibrationCause;
-  const bool changed = decision.cause == Cause::knock || decision.cause == Cause::drift || decision.cause == Cause::collapse;
+  const bool changed = decision.cause == Cause::knock || decision.cause == Cause::drift ||
+                       decision.cause == Cause::collapse;
   if (decision.accepted && changed) matches_.rig_changed(decision.onset_frame);
 }
 
@@ -77,7 +83,8 @@ void DriveJournal::note_skipped() noexcept {
   (void)glimpses_.push(now_);
 }
 
-void DriveJournal::tell(Stamp stamp, const char* kind, std::string_view sentence, bool to_user) noexcept {
+void DriveJournal::tell(Stamp stamp, const char* kind, std::string_view sentence,
+                        bool to_user) noexcept {
   EventRecord event;
   event.stamp = stamp;
   event.kind = kind;
@@ -88,8 +95,10 @@ void DriveJournal::tell(Stamp stamp, const char* kind, std::string_view sentence
 
 void DriveJournal::show(Progress* progress, std::uint64_t frames) {
   for (EventRecord notice; notices_.pop(&notice);)
-    progress->say(fmt::format("vergence: at {:.1f} s {}", (notice.stamp - first_).to_seconds(), notice.sentence.data()));
-  for (const std::string& sentence : recorder_->take_complaints()) progress->say("vergence: " + sentence);
+    progress->say(fmt::format("vergence: at {:.1f} s {}", (notice.stamp - first_).to_seconds(),
+                              notice.sentence.data()));
+  for (const std::string& sentence : recorder_->take_complaints())
+    progress->say("vergence: " + sentence);
   Glimpse newest;
   bool any = false;
   while (glimpses_.pop(&newest)) any = true;

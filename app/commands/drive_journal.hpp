@@ -10,11 +10,14 @@
 
 namespace vergence::app {
 
-/// What becomes of each frame beside its line in poses.csv: events and calibrations for the recorder, the state of things for the progress
-/// line, sentences for the user, a sample of the matches across.
+/// What becomes of each frame beside its line in poses.csv: events and calibrations for the
+/// recorder, the state of things for the progress line, sentences for the user, a sample of the
+/// matches across.
 ///
-/// Threads  note…(), tell(): the estimator's, sealed. show(): the caller's. After the estimator's thread has joined all is anyone's.
-/// Memory   Fixed, most of it the sample of matches: not for a stack. Full: of the states for the line the newest are lost, the next one
+/// Threads  note…(), tell(): the estimator's, sealed. show(): the caller's. After the estimator's
+///          thread has joined all is anyone's.
+/// Memory   Fixed, most of it the sample of matches: not for a stack. Full: of the states for the
+///          line the newest are lost, the next one
 /// tells the same and more; of the sentences too, and
 ///          events.jsonl has them.
 class DriveJournal {

@@ -3,17 +3,22 @@
 #include "drivers/sync/sync_types.hpp"
 #include "drivers/trigger.hpp"
 
-/// From the configuration to how pulses are made and images paired. All of it throws InputError naming the key and what to do.
+/// From the configuration to how pulses are made and images paired. All of it throws InputError
+/// naming the key and what to do.
 namespace vergence::app {
 
-/// How the images are paired. Checks that the devices of the configuration can do what `sync.mode` needs.
+/// How the images are paired. Checks that the devices of the configuration can do what `sync.mode`
+/// needs.
 [[nodiscard]] SyncOptions sync_options(const Configuration& configuration, int cameras);
 
 /// What the board is asked for.
-[[nodiscard]] TriggerConfiguration trigger_configuration(const Configuration& configuration, int cameras);
+[[nodiscard]] TriggerConfiguration trigger_configuration(const Configuration& configuration,
+                                                         int cameras);
 
 /// Whether something proves the pairing in that mode.
-[[nodiscard]] constexpr bool proves_pairing(SyncMode mode) noexcept { return mode != SyncMode::counter && mode != SyncMode::software; }
+[[nodiscard]] constexpr bool proves_pairing(SyncMode mode) noexcept {
+  return mode != SyncMode::counter && mode != SyncMode::software;
+}
 
 /// What proves the pairing, or that nothing does: for events and reports.
 [[nodiscard]] const char* proof_sentence(SyncMode mode) noexcept;

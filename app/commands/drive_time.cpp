@@ -18,7 +18,8 @@ constexpr double kMicroseconds = 1e6;
 double us(Duration d) { return d.to_seconds() * kMicroseconds; }
 
 template <class... Arguments>
-DriveTime::Sentence sentence(const char* kind, bool aloud, const char* format, Arguments... arguments) noexcept {
+DriveTime::Sentence sentence(const char* kind, bool aloud, const char* format,
+                             Arguments... arguments) noexcept {
   DriveTime::Sentence s;
   s.kind = kind;
   s.aloud = aloud;
@@ -68,19 +69,27 @@ DriveTime::Sentence DriveTime::of_device(const LiveItem& item) const noexcept {
   using Kind = LiveItem::Kind;
   switch (item.kind) {
     case Kind::device_gone:
-      return sentence("camera_gone", true, "camera %d is gone; the drive goes on without it", item.camera);
+      return sentence("camera_gone", true, "camera %d is gone; the drive goes on without it",
+                      item.camera);
     case Kind::device_back:
       return sentence("camera_back", true, "camera %d is back", item.camera);
     case Kind::board_gone:
-      return sentence("board_gone", true, "the trigger board is gone: check its cable; it is looked for every second");
+      return sentence("board_gone", true,
+                      "the trigger board is gone: check its cable; it is looked for every second");
     case Kind::board_back:
       return sentence("board_back", true, "the trigger board is back");
     case Kind::board_rebooted:
-      return sentence("board_rebooted", true, "the trigger board has started anew: its pulses count from 0, the pairing is proven again");
+      return sentence("board_rebooted", true,
+                      "the trigger board has started anew: its pulses count from 0, the pairing is "
+                      "proven again");
     case Kind::acquiring:
-      return sentence("acquiring", false, "nothing proves yet which pulses the images of camera %d are of; they are not used", item.camera);
+      return sentence(
+          "acquiring", false,
+          "nothing proves yet which pulses the images of camera %d are of; they are not used",
+          item.camera);
     case Kind::proven:
-      return sentence("pairing_proven", false, "the pairing of camera %d is proven after %.2f s", item.camera, item.seconds);
+      return sentence("pairing_proven", false, "the pairing of camera %d is proven after %.2f s",
+                      item.camera, item.seconds);
     case Kind::images:
     case Kind::reading:
     case Kind::refused:
@@ -89,14 +98,18 @@ DriveTime::Sentence DriveTime::of_device(const LiveItem& item) const noexcept {
   return {};
 }
 
-bool DriveTime::contradicted(const SyncedSet& set) const noexcept { return proves_pairing(mode_) && set.proof == SyncProof::unproven; }
+bool DriveTime::contradicted(const SyncedSet& set) const noexcept {
+  return proves_pairing(mode_) && set.proof == SyncProof::unproven;
+}
 
 DriveTime::Sentence DriveTime::of_set(const SyncedSet& set) noexcept {
   const bool was = unproven_;
   unproven_ = set.proof == SyncProof::unproven;
   if (was || !unproven_) return {};
-  return sentence("pairing_unproven", true, "images do not belong together for sure: pulses, counters and stamps contradict each other%s",
-                  proves_pairing(mode_) ? "; one of them alone is used" : "");
+  return sentence(
+      "pairing_unproven", true,
+      "images do not belong together for sure: pulses, counters and stamps contradict each other%s",
+      proves_pairing(mode_) ? "; one of them alone is used" : "");
 }
 
 DriveTime::Sentence DriveTime::of_reading(const LiveItem& item) noexcept {
@@ -109,15 +122,19 @@ DriveTime::Sentence DriveTime::of_reading(const LiveItem& item) noexcept {
     satellites_.least = satellites_.most == 0 ? count : std::min(satellites_.least, count);
     satellites_.most = std::max(satellites_.most, count);
   }
-  const bool changed = !any_quality_ || q.filter_valid != quality_.filter_valid || item.sample.fix != fix_ ||
+  const bool changed = !any_quality_ || q.filter_valid != quality_.filter_valid ||
+                       item.sample.fix != fix_ ||
                        std::abs(count - int{quality_.satellites}) >= kMany;
   if (!changed) return of_utc(item);
   any_quality_ = true;
   quality_ = q;
   fix_ = item.sample.fix;
   std::array<char, 32> satellites{};
-  if (count > 0) (void)std::snprintf(satellites.data(), satellites.size(), ", %d satellites", count);
-  const bool told = q.status != 0 || q.filter_valid;  // a device that says nothing of its filter has no status either
+  if (count > 0)
+    (void)std::snprintf(satellites.data(), satellites.size(), ", %d satellites", count);
+  const bool told =
+      q.status != 0 ||
+      q.filter_valid;  // a device that says nothing of its filter has no status either
   return sentence("ins_status", false, "the INS has %s%s%s", word_of(fix_), satellites.data(),
                   !told            ? ""
                   : q.filter_valid ? ", its filter is valid"
@@ -135,29 +152,36 @@ DriveTime::Sentence DriveTime::of_utc(const LiveItem& item) noexcept {
   if (told_utc_ && std::abs(ahead - told_ahead_s_) < kStep) return {};
   told_utc_ = true;
   told_ahead_s_ = ahead;
-  return sentence("utc", false, "the host's clock is %.4f s %s the INS's UTC; stamps are the host's", std::abs(ahead),
-                  ahead < 0 ? "behind" : "ahead of");
+  return sentence("utc", false,
+                  "the host's clock is %.4f s %s the INS's UTC; stamps are the host's",
+                  std::abs(ahead), ahead < 0 ? "behind" : "ahead of");
 }
 
 void DriveTime::note_pose(const SyncedSet& set, float estimate_ms, HostStamp now) noexcept {
   const double ms =
-      virtual_ ? (set.arrival - set.stamp).to_seconds() * 1e3 + static_cast<double>(estimate_ms) : (now - set.stamp).to_seconds() * 1e3;
+      virtual_ ? (set.arrival - set.stamp).to_seconds() * 1e3 + static_cast<double>(estimate_ms)
+               : (now - set.stamp).to_seconds() * 1e3;
   latency_.add(ms);
 }
 
 TimeFigures DriveTime::figures(const LiveCounters& c, const DriveDevices& devices) const {
   TimeFigures f;
   const auto cameras = devices.cameras().size();
-  for (std::size_t k = 0; k < cameras; ++k) f.clocks.push_back(clock_figures(fmt::format("camera {}", k), c.cameras[k]));
+  for (std::size_t k = 0; k < cameras; ++k)
+    f.clocks.push_back(clock_figures(fmt::format("camera {}", k), c.cameras[k]));
   if (c.board.stamps() > 0) {
     f.clocks.push_back(clock_figures("board", c.board));
-    if (devices.board() != nullptr) f.clocks.back().pings = pings_of(devices.board()->board_statistics().time);
+    if (devices.board() != nullptr)
+      f.clocks.back().pings = pings_of(devices.board()->board_statistics().time);
   }
   if (devices.ins() != nullptr) {
     f.clocks.push_back(clock_figures("INS", c.ins));
     const InsStatistics s = devices.ins()->statistics();
-    f.ins = {
-        {"lost", s.lost}, {"malformed", s.malformed}, {"restarts", s.restarts}, {"overruns", s.overruns}, {"dropped", c.dropped_readings}};
+    f.ins = {{"lost", s.lost},
+             {"malformed", s.malformed},
+             {"restarts", s.restarts},
+             {"overruns", s.overruns},
+             {"dropped", c.dropped_readings}};
   }
   if (devices.trigger() != nullptr) {
     const TriggerStatistics s = devices.trigger()->statistics();

@@ -8,9 +8,11 @@
 
 namespace vergence::app {
 
-/// What a drive tells of time: clocks, pairing, latencies, the INS's UTC. Events as sentences, figures for summary.json.
+/// What a drive tells of time: clocks, pairing, latencies, the INS's UTC. Events as sentences,
+/// figures for summary.json.
 ///
-/// Threads  note…(): the estimator's, sealed. figures(): any, after that has joined. Memory: fixed; sentences are in place.
+/// Threads  note…(): the estimator's, sealed. figures(): any, after that has joined. Memory: fixed;
+///          sentences are in place.
 class DriveTime {
  public:
   struct Sentence {
@@ -25,15 +27,18 @@ class DriveTime {
   [[nodiscard]] Sentence of_device(const LiveItem& item) const noexcept;
   /// A set that was handed out: tells when a run of unproven ones begins.
   [[nodiscard]] Sentence of_set(const SyncedSet& set) noexcept;
-  /// A reading: tells when what the receiver and the filter say has changed, and of the host's clock against UTC.
+  /// A reading: tells when what the receiver and the filter say has changed, and of the host's
+  /// clock against UTC.
   [[nodiscard]] Sentence of_reading(const LiveItem& item) noexcept;
   /// Nothing of these images may be taken for granted but that each is one.
   [[nodiscard]] bool contradicted(const SyncedSet& set) const noexcept;
 
-  /// A pose of these images has gone out. `estimate_ms`: what it took; `now`: by the host's clock, meaningless in virtual time.
+  /// A pose of these images has gone out. `estimate_ms`: what it took; `now`: by the host's clock,
+  /// meaningless in virtual time.
   void note_pose(const SyncedSet& set, float estimate_ms, HostStamp now) noexcept;
 
-  [[nodiscard]] TimeFigures figures(const LiveCounters& counters, const DriveDevices& devices) const;
+  [[nodiscard]] TimeFigures figures(const LiveCounters& counters,
+                                    const DriveDevices& devices) const;
 
  private:
   [[nodiscard]] Sentence of_utc(const LiveItem& item) noexcept;

@@ -36,17 +36,20 @@ std::vector<double> parse_lengths(const std::string& text) {
   constexpr std::size_t kMost = 1000;
   std::vector<std::string_view> fields(kMost);
   const std::size_t count = split(text, ',', fields);
-  if (count > kMost) throw InputError("--lengths has more than " + std::to_string(kMost) + " lengths");
+  if (count > kMost)
+    throw InputError("--lengths has more than " + std::to_string(kMost) + " lengths");
   std::vector<double> lengths(count);
   for (std::size_t i = 0; i < count; ++i)
     if (!parse_number(fields[i], &lengths[i]) || !(lengths[i] > 0))
-      throw InputError("--lengths: `" + std::string(fields[i]) + "` is not a length in metres; give them like 100,200,300");
+      throw InputError("--lengths: `" + std::string(fields[i]) +
+                       "` is not a length in metres; give them like 100,200,300");
   return lengths;
 }
 
 Duration parse_duration(const char* option, double seconds) {
   constexpr double kLongest = 1e6;  // s: eleven days, longer than a drive
-  if (!(seconds >= 0) || seconds > kLongest) throw InputError(std::string(option) + " needs seconds between 0 and 1e6");
+  if (!(seconds >= 0) || seconds > kLongest)
+    throw InputError(std::string(option) + " needs seconds between 0 and 1e6");
   return Duration::seconds(seconds);
 }
 
@@ -90,30 +93,38 @@ struct Reference {
 
 Reference reference_of(const Arguments& a) {
   if (a.reference.empty() && !a.estimate_mount)
-    throw InputError("REFERENCE is missing; name a trajectory, or with --estimate-mount a session folder that has an ins.csv");
+    throw InputError(
+        "REFERENCE is missing; name a trajectory, or with --estimate-mount a session folder that "
+        "has an ins.csv");
   // A session folder stands for its poses, but where a mount is asked for: that is the INS's.
   const std::filesystem::path path = a.reference.empty() ? a.estimate : a.reference;
   std::error_code ignored;
   const bool poses = !a.estimate_mount && std::filesystem::is_directory(path, ignored);
   const std::filesystem::path ins = poses ? std::filesystem::path{} : find_ins_file(path);
   if (!ins.empty()) return {ins, true};
-  if (a.reference.empty()) throw InputError(a.estimate + ": is no session folder with an ins.csv; name a REFERENCE");
+  if (a.reference.empty())
+    throw InputError(a.estimate + ": is no session folder with an ins.csv; name a REFERENCE");
   return {path, false};
 }
 
-/// The reference's poses, brought to the estimate's body if that is asked for; *mount then tells how.
-Trajectory read_reference(const Arguments& a, const Reference& from, const Trajectory& estimate, FoundMount* mount) {
+/// The reference's poses, brought to the estimate's body if that is asked for; *mount then tells
+/// how.
+Trajectory read_reference(const Arguments& a, const Reference& from, const Trajectory& estimate,
+                          FoundMount* mount) {
   Trajectory reference;
   if (from.is_ins) {
     const std::vector<MountReference> moments = ins_moments(read_ins_file(from.path));
-    if (moments.empty()) throw InputError(from.path.string() + ": has no reading with an attitude and a satellites' fix");
+    if (moments.empty())
+      throw InputError(from.path.string() +
+                       ": has no reading with an attitude and a satellites' fix");
     reference = poses_of(moments);
     if (a.estimate_mount) *mount = find_ins_mount(estimate, moments);
   } else {
     reference = read_trajectory(from.path);
     if (a.estimate_mount) *mount = find_mount(estimate, reference);
   }
-  if (a.estimate_mount && mount->status == MountStatus::ok) reference = brought_over(reference, mount->mount);
+  if (a.estimate_mount && mount->status == MountStatus::ok)
+    reference = brought_over(reference, mount->mount);
   return reference;
 }
 
@@ -130,15 +141,17 @@ ExitCode run(const Arguments& a) {
     if (a.estimate_mount) out["mount"] = mount_json(mount);
     std::cout << out.dump(1) << '\n';
   } else {
-    std::cout << (a.estimate_mount ? mount_text(mount) : "") << evaluation_text(evaluation, options);
+    std::cout << (a.estimate_mount ? mount_text(mount) : "")
+              << evaluation_text(evaluation, options);
   }
   if (a.estimate_mount && mount.status != MountStatus::ok) {
-    std::cerr << "vergence: no mount between " << a.estimate << " and " << from.path.string() << ": "
-              << mount_json(mount)["status"].get<std::string>() << '\n';
+    std::cerr << "vergence: no mount between " << a.estimate << " and " << from.path.string()
+              << ": " << mount_json(mount)["status"].get<std::string>() << '\n';
     return ExitCode::not_usable;
   }
   if (evaluation.status == EvaluationStatus::ok) return ExitCode::done;
-  std::cerr << "vergence: " << a.estimate << " against " << from.path.string() << ": " << evaluation_problem(evaluation, options) << '\n';
+  std::cerr << "vergence: " << a.estimate << " against " << from.path.string() << ": "
+            << evaluation_problem(evaluation, options) << '\n';
   return ExitCode::not_usable;
 }
 
@@ -148,21 +161,34 @@ void add_evaluate(CLI::App& root, ExitCode* exit_code) {
   const auto a = std::make_shared<Arguments>();
   CLI::App* command = root.add_subcommand("evaluate", "Compare a trajectory with a reference");
   command->add_option("ESTIMATE", a->estimate, "TUM file, session folder, or data set")->required();
-  command->add_option("REFERENCE", a->reference, "TUM file, KITTI or EuRoC data-set folder, or its truth file; ins.csv of a session");
+  command->add_option(
+      "REFERENCE", a->reference,
+      "TUM file, KITTI or EuRoC data-set folder, or its truth file; ins.csv of a session");
   command->add_flag("--json", a->json, "The figures as JSON");
-  command->add_option("--lengths", a->lengths,
-                      "Lengths of the segments, m [100,200 … 800, on a shorter drive 10 … 50, 1 … 5 or 0.1 … 0.5]");
-  command->add_option("--step", a->step, "A segment begins at every so many poses [10; with shorter lengths 1]");
+  command->add_option(
+      "--lengths", a->lengths,
+      "Lengths of the segments, m [100,200 … 800, on a shorter drive 10 … 50, 1 … 5 or 0.1 … 0.5]");
+  command->add_option("--step", a->step,
+                      "A segment begins at every so many poses [10; with shorter lengths 1]");
   command->add_option("--associate", a->associate, "How a reference is found for a pose")
       ->check(CLI::IsMember({"interpolate", "nearest"}))
       ->capture_default_str();
-  command->add_option("--max-gap", a->max_gap, "interpolate: widest hole of the reference to bridge, s")->capture_default_str();
-  command->add_option("--max-difference", a->max_difference, "nearest: largest difference of stamps, s")->capture_default_str();
-  command->add_option("--axes", a->axes, "Axes of the body: camera (z forward) or flu (x forward, y left, z up)")
+  command
+      ->add_option("--max-gap", a->max_gap,
+                   "interpolate: widest hole of the reference to bridge, s")
+      ->capture_default_str();
+  command
+      ->add_option("--max-difference", a->max_difference,
+                   "nearest: largest difference of stamps, s")
+      ->capture_default_str();
+  command
+      ->add_option("--axes", a->axes,
+                   "Axes of the body: camera (z forward) or flu (x forward, y left, z up)")
       ->check(CLI::IsMember({"camera", "flu"}))
       ->capture_default_str();
   command->add_flag("--estimate-mount", a->estimate_mount,
-                    "Find how the two bodies sit to one another; compare at the estimate's. Without REFERENCE: the session's own INS");
+                    "Find how the two bodies sit to one another; compare at the estimate's. "
+                    "Without REFERENCE: the session's own INS");
   command->callback([a, exit_code] { *exit_code = run(*a); });
 }
 

@@ -23,8 +23,9 @@ exposure::ExposureOptions exposure_options(const Configuration& c) {
   o.settle_frames = c.exposure.settle_frames;
   if (const char* sentence = o.validate()) throw InputError(std::string("exposure: ") + sentence);
   if (c.exposure.max_us * 1e-6 * c.trigger.rate > 1)
-    throw InputError(fmt::format("exposure.max_us is {}, longer than the {:.0f} µs between two pulses (trigger.rate {})", c.exposure.max_us,
-                                 1e6 / c.trigger.rate, c.trigger.rate));
+    throw InputError(fmt::format(
+        "exposure.max_us is {}, longer than the {:.0f} µs between two pulses (trigger.rate {})",
+        c.exposure.max_us, 1e6 / c.trigger.rate, c.trigger.rate));
   return o;
 }
 

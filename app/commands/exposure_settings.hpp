@@ -13,7 +13,8 @@ namespace vergence::app {
 /// `exposure:` as the controller takes it. InputError names the keys that do not go together.
 [[nodiscard]] exposure::ExposureOptions exposure_options(const Configuration& configuration);
 
-/// What camera k begins with: its own; where exposures are controlled camera 0's, inside the bounds, for all alike.
+/// What camera k begins with: its own; where exposures are controlled camera 0's, inside the
+/// bounds, for all alike.
 [[nodiscard]] ExposureSetting starting_exposure(const Configuration& configuration, std::size_t k);
 
 }  // namespace vergence::app

@@ -13,14 +13,18 @@ namespace {
 
 constexpr std::size_t kLargestFile = std::size_t{1} << 20U;
 
-/// Whether another program's format is to be looked for: a pair of files, a folder, or words that calibration.yaml does not have.
+/// Whether another program's format is to be looked for: a pair of files, a folder, or words that
+/// calibration.yaml does not have.
 bool is_foreign(const std::string& in) {
   std::error_code ignored;
   if (in.find(',') != std::string::npos || std::filesystem::is_directory(in, ignored)) return true;
   const std::string text = read_text(in, kLargestFile);
   if (text.find("\ncameras:") != std::string::npos || text.starts_with("cameras:")) return false;
-  constexpr std::array<std::string_view, 5> kWords{"cam0:", "camera_matrix", "%YAML:", "M1:", "K1:"};
-  return std::any_of(kWords.begin(), kWords.end(), [&text](std::string_view word) { return text.find(word) != std::string::npos; });
+  constexpr std::array<std::string_view, 5> kWords{"cam0:", "camera_matrix",
+                                                   "%YAML:", "M1:", "K1:"};
+  return std::any_of(kWords.begin(), kWords.end(), [&text](std::string_view word) {
+    return text.find(word) != std::string::npos;
+  });
 }
 
 }  // namespace
@@ -30,22 +34,27 @@ std::vector<double> parse_distortion(const std::string& text) {
   const std::size_t count = split(text, ',', fields);
   std::vector<double> values(std::min(count, fields.size()));
   bool numbers = count == 4 || count == 5;
-  for (std::size_t i = 0; numbers && i < values.size(); ++i) numbers = parse_number(fields[i], &values[i]);
+  for (std::size_t i = 0; numbers && i < values.size(); ++i)
+    numbers = parse_number(fields[i], &values[i]);
   if (!numbers)
-    throw InputError("--distortion is \"" + text.substr(0, 60) +
-                     "\"; it takes k1,k2,p1,p2[,k3] of a radtan lens or k1,k2,k3,k4 of an equidistant one");
+    throw InputError(
+        "--distortion is \"" + text.substr(0, 60) +
+        "\"; it takes k1,k2,p1,p2[,k3] of a radtan lens or k1,k2,k3,k4 of an equidistant one");
   return values;
 }
 
-CalibrationFile read_given_calibration(const std::string& in, const CalibrationUse& use, const std::optional<ImageSize>& size,
+CalibrationFile read_given_calibration(const std::string& in, const CalibrationUse& use,
+                                       const std::optional<ImageSize>& size,
                                        std::vector<std::string>* remarks) {
   return is_foreign(in) ? read_any_calibration(in, size, remarks) : read_calibration(in, use);
 }
 
-CalibrationSource calibration_source(const std::string& in, const CalibrationUse& use, std::vector<std::string>* remarks) {
+CalibrationSource calibration_source(const std::string& in, const CalibrationUse& use,
+                                     std::vector<std::string>* remarks) {
   return {in, [in, use, remarks](const StereoSequence& sequence) {
             // The images are only looked at for a file that may lack their size.
-            const std::optional<ImageSize> size = is_foreign(in) ? std::optional(first_image_size(sequence, 0)) : std::nullopt;
+            const std::optional<ImageSize> size =
+                is_foreign(in) ? std::optional(first_image_size(sequence, 0)) : std::nullopt;
             return read_given_calibration(in, use, size, remarks);
           }};
 }

@@ -8,10 +8,12 @@
 #include "app/config/calibration_file.hpp"
 #include "app/datasets/stereo_sequence.hpp"
 
-/// The calibration that a command line names: a file of any program, or the few numbers that somebody knows.
+/// The calibration that a command line names: a file of any program, or the few numbers that
+/// somebody knows.
 namespace vergence::app {
 
-/// What is known of a rig without a calibration: both cameras alike, principal points in the middle of the images.
+/// What is known of a rig without a calibration: both cameras alike, principal points in the middle
+/// of the images.
 struct KnownNumbers {
   double focal = 0;     // px
   double baseline = 0;  // m
@@ -22,13 +24,18 @@ struct KnownNumbers {
 /// `--distortion k1,k2,p1,p2`. InputError: no such list.
 [[nodiscard]] std::vector<double> parse_distortion(const std::string& text);
 
-/// calibration.yaml, a Kalibr camchain, ROS camera_info (left.yaml,right.yaml or a folder with them) or OpenCV stereo YAML, told by
-/// content. `size`: of the images, where a file has none. What a format did not carry over is a sentence of *remarks. Errors  InputError
-[[nodiscard]] CalibrationFile read_given_calibration(const std::string& in, const CalibrationUse& use, const std::optional<ImageSize>& size,
+/// calibration.yaml, a Kalibr camchain, ROS camera_info (left.yaml,right.yaml or a folder with
+/// them) or OpenCV stereo YAML, told by
+/// content. `size`: of the images, where a file has none. What a format did not carry over is a
+/// sentence of *remarks. Errors  InputError
+[[nodiscard]] CalibrationFile read_given_calibration(const std::string& in,
+                                                     const CalibrationUse& use,
+                                                     const std::optional<ImageSize>& size,
                                                      std::vector<std::string>* remarks);
 
 /// For open_sequence().
-[[nodiscard]] CalibrationSource calibration_source(const std::string& in, const CalibrationUse& use, std::vector<std::string>* remarks);
+[[nodiscard]] CalibrationSource calibration_source(const std::string& in, const CalibrationUse& use,
+                                                   std::vector<std::string>* remarks);
 [[nodiscard]] CalibrationSource calibration_source(const KnownNumbers& known);
 
 }  // namespace vergence::app

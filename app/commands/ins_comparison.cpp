@@ -7,7 +7,8 @@
 
 namespace vergence::app {
 
-InsComparison::InsComparison(const ComparisonOptions& options, Source source, Arena& arena, DriveJournal& journal)
+InsComparison::InsComparison(const ComparisonOptions& options, Source source, Arena& arena,
+                             DriveJournal& journal)
     : T_ins_left_(options.T_ins_left),
       scale_stretch_m_(options.scale_stretch_m),
       source_(source),
@@ -28,7 +29,8 @@ void InsComparison::add(const PoseSample& pose, float decode_ms) noexcept {
 
 void InsComparison::drain() noexcept {
   for (ComparedPose pose; comparison_.next(&pose);) {
-    recorder_->post(PoseRecord::of(pose, decode_ms_[static_cast<std::size_t>(drained_++ % decode_ms_.size())]));
+    recorder_->post(
+        PoseRecord::of(pose, decode_ms_[static_cast<std::size_t>(drained_++ % decode_ms_.size())]));
     if (pose.ins_valid) ++matches_;
     measure(pose);
     journal_.note_distance_from_ins(pose.compared ? pose.error_enu.norm() : -1);
@@ -44,7 +46,8 @@ void InsComparison::finish() noexcept {
   note_placement(newest_stamp_);
 }
 
-/// The way is summed in steps that are none of the receiver's noise at a standstill, straight across holes.
+/// The way is summed in steps that are none of the receiver's noise at a standstill, straight
+/// across holes.
 void InsComparison::measure(const ComparedPose& pose) noexcept {
   constexpr double kLeastStep = 0.5;  // m
   if (pose.ins_valid) {
@@ -75,7 +78,8 @@ EarthFigures InsComparison::earth(const std::string& mount_source) const {
   figures.placements.assign(placements_.begin(), placements_.end());
   figures.errors = errors_;
   const double n = std::max(1.0, static_cast<double>(errors_.poses));
-  for (double* squares : {&figures.errors.horizontal_rms_m, &figures.errors.up_rms_m, &figures.errors.heading_rms_deg})
+  for (double* squares : {&figures.errors.horizontal_rms_m, &figures.errors.up_rms_m,
+                          &figures.errors.heading_rms_deg})
     *squares = std::sqrt(*squares / n);
   figures.T_ins_left = T_ins_left_;
   figures.mount_source = mount_source;
@@ -102,8 +106,9 @@ void InsComparison::note_placement(Stamp stamp) noexcept {
   (void)placements_.push({stamp, p});  // full: the count goes on
   std::array<char, 160> text{};
   constexpr double kDegrees = 180.0 / std::numbers::pi;
-  (void)std::snprintf(text.data(), text.size(), "placed on the earth after %.1f m: heading to %.2f deg, residual %.2f m", p.distance,
-                      p.rotation_sigma.z() * kDegrees, p.residual);
+  (void)std::snprintf(text.data(), text.size(),
+                      "placed on the earth after %.1f m: heading to %.2f deg, residual %.2f m",
+                      p.distance, p.rotation_sigma.z() * kDegrees, p.residual);
   journal_.tell(stamp, "placement", text.data(), false);
 }
 
@@ -115,22 +120,27 @@ void InsComparison::note_ins(const ComparedPose& pose) noexcept {
   const bool recorded = source_ == Source::recording;
   switch (pose.ins) {
     case InsMatch::ok:
-      if (matches_ > kSettled) journal_.tell(pose.pose.stamp, "ins_ok", "the INS has a position again; the comparison goes on", false);
+      if (matches_ > kSettled)
+        journal_.tell(pose.pose.stamp, "ins_ok",
+                      "the INS has a position again; the comparison goes on", false);
       break;
     case InsMatch::none:
-      journal_.tell(pose.pose.stamp, "ins_silent",
-                    recorded ? "the recording has no reading of the INS here: these poses are not compared"
-                             : "the INS is silent: the drive goes on without it; check its cable and its rate",
-                    true);
+      journal_.tell(
+          pose.pose.stamp, "ins_silent",
+          recorded
+              ? "the recording has no reading of the INS here: these poses are not compared"
+              : "the INS is silent: the drive goes on without it; check its cable and its rate",
+          true);
       break;
     case InsMatch::gap:
-      journal_.tell(pose.pose.stamp, "ins_gap", "readings of the INS are missing: these poses are not compared", true);
+      journal_.tell(pose.pose.stamp, "ins_gap",
+                    "readings of the INS are missing: these poses are not compared", true);
       break;
     case InsMatch::no_fix:
-      journal_.tell(
-          pose.pose.stamp, "ins_no_fix",
-          recorded ? "the INS had no position: the comparison pauses" : "the INS has no position: the comparison pauses; check its antenna",
-          true);
+      journal_.tell(pose.pose.stamp, "ins_no_fix",
+                    recorded ? "the INS had no position: the comparison pauses"
+                             : "the INS has no position: the comparison pauses; check its antenna",
+                    true);
       break;
     case InsMatch::jump:  // told with the reading: it may fall between two frames
       break;
@@ -141,7 +151,10 @@ void InsComparison::note_jump(Stamp stamp) noexcept {
   const std::uint64_t jumps = comparison_.counters().jumps;
   if (jumps == jumps_) return;
   jumps_ = jumps;
-  journal_.tell(stamp, "ins_jump", "the INS's position leapt: not interpolated across, errors from here on contain the leap", true);
+  journal_.tell(
+      stamp, "ins_jump",
+      "the INS's position leapt: not interpolated across, errors from here on contain the leap",
+      true);
 }
 
 void InsComparison::note_scale(const ComparedPose& pose) noexcept {
@@ -151,11 +164,14 @@ void InsComparison::note_scale(const ComparedPose& pose) noexcept {
   std::array<char, 200> text{};
   if (scale_disagrees_)
     (void)std::snprintf(text.data(), text.size(),
-                        "the way comes out %.1f %% %s than the INS's over %.0f m: images cannot tell, measure the baseline again",
-                        100 * std::abs(pose.path_ratio - 1), pose.path_ratio > 1 ? "longer" : "shorter", scale_stretch_m_);
+                        "the way comes out %.1f %% %s than the INS's over %.0f m: images cannot "
+                        "tell, measure the baseline again",
+                        100 * std::abs(pose.path_ratio - 1),
+                        pose.path_ratio > 1 ? "longer" : "shorter", scale_stretch_m_);
   else
     (void)std::snprintf(text.data(), text.size(), "the way is as long as the INS's again");
-  journal_.tell(pose.pose.stamp, scale_disagrees_ ? "scale_disagrees" : "scale_agrees", text.data(), scale_disagrees_);
+  journal_.tell(pose.pose.stamp, scale_disagrees_ ? "scale_disagrees" : "scale_agrees", text.data(),
+                scale_disagrees_);
 }
 
 }  // namespace vergence::app

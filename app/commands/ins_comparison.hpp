@@ -14,10 +14,12 @@
 
 namespace vergence::app {
 
-/// What a drive does with its INS, live or recorded alike: the comparison pose by pose into the recorder, and what there is to tell of it.
+/// What a drive does with its INS, live or recorded alike: the comparison pose by pose into the
+/// recorder, and what there is to tell of it.
 ///
-/// Threads  The estimator's, sealed; after it has joined all is anyone's. Memory  The comparison's, from the arena.
-/// Order    Readings and poses as they come; every add() of a pose is followed by drain().
+/// Threads  The estimator's, sealed; after it has joined all is anyone's. Memory  The comparison's,
+/// from the arena. Order    Readings and poses as they come; every add() of a pose is followed by
+/// drain().
 class InsComparison {
  public:
   static constexpr std::size_t kMostPlacements = 64;  // that are kept; later ones count
@@ -25,9 +27,11 @@ class InsComparison {
   enum class Source : std::uint8_t { none, device, recording };
 
   /// Without a source poses go through and nothing is said. `journal` outlives it.
-  InsComparison(const ComparisonOptions& options, Source source, Arena& arena, DriveJournal& journal);
+  InsComparison(const ComparisonOptions& options, Source source, Arena& arena,
+                DriveJournal& journal);
 
-  /// Before the first add(). `recorder` outlives the last one; with a source it takes readings (Recorder::Options::ins).
+  /// Before the first add(). `recorder` outlives the last one; with a source it takes readings
+  /// (Recorder::Options::ins).
   void open(Recorder* recorder) noexcept { recorder_ = recorder; }
   void add(const InsRecord& reading) noexcept;
   /// `decode_ms` of its images goes with the pose.

@@ -16,10 +16,12 @@ namespace vergence::app {
 namespace {
 
 /// Checks a key that takes one of a few words.
-void one_of(const std::string& key, const std::string& value, const std::vector<std::string>& words) {
+void one_of(const std::string& key, const std::string& value,
+            const std::vector<std::string>& words) {
   for (const std::string& word : words)
     if (value == word) return;
-  throw InputError(fmt::format("{} is \"{}\"{}; this version knows {}", key, value, did_you_mean(value, words), fmt::join(words, ", ")));
+  throw InputError(fmt::format("{} is \"{}\"{}; this version knows {}", key, value,
+                               did_you_mean(value, words), fmt::join(words, ", ")));
 }
 
 std::vector<mock::Fault> all_faults(const Configuration& c, const std::vector<std::string>& more) {
@@ -38,7 +40,8 @@ std::vector<mock::Fault> all_faults(const Configuration& c, const std::vector<st
 }
 
 void configured(DeviceStatus status, const std::string& what) {
-  if (status != DeviceStatus::ok) throw InputError(what + " is not possible: " + std::string(to_string(status)));
+  if (status != DeviceStatus::ok)
+    throw InputError(what + " is not possible: " + std::string(to_string(status)));
 }
 
 Duration trigger_delay(const Configuration& c, std::size_t k) {
@@ -51,14 +54,22 @@ Vec3 vec3(const std::array<double, 3>& v) { return {v[0], v[1], v[2]}; }
 
 void check_drive(const Configuration& c) {
   const int n = camera_count(c);
-  if (n == 0) throw InputError("the configuration names no camera; cameras: [{driver: mock}, {driver: mock}] is the least");
-  if (n < 2) throw InputError("one camera alone has no scale; two are the least, cameras: [{driver: mock}, {driver: mock}]");
+  if (n == 0)
+    throw InputError(
+        "the configuration names no camera; cameras: [{driver: mock}, {driver: mock}] is the "
+        "least");
+  if (n < 2)
+    throw InputError(
+        "one camera alone has no scale; two are the least, cameras: [{driver: mock}, {driver: "
+        "mock}]");
   for (int k = 0; k < n; ++k) {
     const CameraSettings& camera = c.cameras[static_cast<std::size_t>(k)];
     one_of(fmt::format("cameras.{}.driver", k), camera.driver, {"mock"});
     if (camera.width != c.cameras[0].width || camera.height != c.cameras[0].height)
-      throw InputError(fmt::format("cameras.{}.size is {} x {}, that of camera 0 is {} x {}; all cameras of a rig have one size", k,
-                                   camera.width, camera.height, c.cameras[0].width, c.cameras[0].height));
+      throw InputError(
+          fmt::format("cameras.{}.size is {} x {}, that of camera 0 is {} x {}; all cameras of a "
+                      "rig have one size",
+                      k, camera.width, camera.height, c.cameras[0].width, c.cameras[0].height));
   }
   one_of("ins.driver", c.ins.driver, {"mock", "none"});
   one_of("trigger.driver", c.trigger.driver, {"mock"});
@@ -72,8 +83,8 @@ void check_drive(const Configuration& c) {
   one_of("mock.board_line", c.mock.board_line, {"none", "usb", "ftdi"});
 }
 
-MockDrive make_mock_drive(const Configuration& c, const std::vector<std::string>& more_faults, bool real_time,
-                          std::optional<double> duration_s, bool raw) {
+MockDrive make_mock_drive(const Configuration& c, const std::vector<std::string>& more_faults,
+                          bool real_time, std::optional<double> duration_s, bool raw) {
   MockDrive drive;
   const RigCalibration rig = mounted_rig(c);
   const std::vector<mock::Fault> faults = all_faults(c, more_faults);
@@ -92,8 +103,8 @@ MockDrive make_mock_drive(const Configuration& c, const std::vector<std::string>
     // The INS sits where the configuration says: p_ins = T_ins_left p_left.
     const Transform T_body_left = mock::default_T_body_left();
     const Transform T_body_ins = T_body_left * comparison_options(c).T_ins_left.inverse();
-    auto truth =
-        std::make_shared<const mock::RigTruth>(std::make_shared<const mock::World>(world), way, rig, T_body_left, T_body_ins, faults);
+    auto truth = std::make_shared<const mock::RigTruth>(std::make_shared<const mock::World>(world),
+                                                        way, rig, T_body_left, T_body_ins, faults);
     mock::MockRigOptions o;
     o.real_time = real_time;
     o.seed = world.seed;
@@ -104,8 +115,10 @@ MockDrive make_mock_drive(const Configuration& c, const std::vector<std::string>
     o.ideal_ins = c.mock.ins == "ideal";
     o.clock_drift_ppm = c.mock.clock_drift_ppm;
     o.fed = c.mock.board_line != "none";
-    o.reports_taken = !o.fed && c.sync.mode == "board";  // else nobody asks for a pause, nor need take them
-    for (std::size_t k = 0; k < static_cast<std::size_t>(rig.cameras); ++k) o.trigger_delay[k] = trigger_delay(c, k);
+    o.reports_taken =
+        !o.fed && c.sync.mode == "board";  // else nobody asks for a pause, nor need take them
+    for (std::size_t k = 0; k < static_cast<std::size_t>(rig.cameras); ++k)
+      o.trigger_delay[k] = trigger_delay(c, k);
     o.exposures_follow = exposes_by_itself(c);
     if (duration_s) o.duration = Duration::seconds(*duration_s);
     drive.rig = std::make_unique<mock::MockRig>(std::move(truth), o);
@@ -115,10 +128,12 @@ MockDrive make_mock_drive(const Configuration& c, const std::vector<std::string>
   for (int k = 0; k < rig.cameras; ++k) {
     const CameraSettings& camera = c.cameras[static_cast<std::size_t>(k)];
     const ExposureSetting start = starting_exposure(c, static_cast<std::size_t>(k));
-    const CameraConfiguration wanted{camera.width, camera.height, c.trigger.rate, start.exposure, start.gain_db, CameraTrigger::hardware};
+    const CameraConfiguration wanted{camera.width,   camera.height, c.trigger.rate,
+                                     start.exposure, start.gain_db, CameraTrigger::hardware};
     configured(drive.rig->camera(k).configure(wanted, nullptr), fmt::format("cameras.{}", k));
   }
-  configured(drive.rig->trigger().configure(trigger_configuration(c, rig.cameras), nullptr), "trigger");
+  configured(drive.rig->trigger().configure(trigger_configuration(c, rig.cameras), nullptr),
+             "trigger");
   drive.has_ins = c.ins.driver == "mock";
   if (drive.has_ins) configured(drive.rig->ins().configure(c.ins.rate, nullptr), "ins");
   return drive;
@@ -130,7 +145,8 @@ Duration stamp_grid(const Configuration& c) noexcept {
 
 ComparisonOptions comparison_options(const Configuration& c) {
   ComparisonOptions o;
-  o.T_ins_left = mount_of(vec3(c.ins.lever_arm_m), vec3(c.ins.boresight_deg) * (std::numbers::pi / 180));
+  o.T_ins_left =
+      mount_of(vec3(c.ins.lever_arm_m), vec3(c.ins.boresight_deg) * (std::numbers::pi / 180));
   o.placement_m = c.comparison.placement_m;
   o.correlation_s = c.comparison.correlation_s;
   o.heading_sigma_rad = c.comparison.heading_sigma_deg * (std::numbers::pi / 180);
@@ -142,10 +158,12 @@ ComparisonOptions comparison_options(const Configuration& c) {
   return o;
 }
 
-std::vector<StampedPose> true_trajectory(const mock::MockRig& rig, const Configuration& c, Stamp start) {
+std::vector<StampedPose> true_trajectory(const mock::MockRig& rig, const Configuration& c,
+                                         Stamp start) {
   std::vector<StampedPose> poses;
   for (const Duration pulse : rig.pulse_times()) {
-    const Duration middle = pulse + trigger_delay(c, 0) + Duration::seconds(c.cameras[0].exposure_us * 0.5e-6);
+    const Duration middle =
+        pulse + trigger_delay(c, 0) + Duration::seconds(c.cameras[0].exposure_us * 0.5e-6);
     poses.push_back({start + middle, rig.truth().camera_in_enu(0, middle)});
   }
   return poses;

@@ -20,17 +20,22 @@ struct MockDrive {
   std::unique_ptr<mock::MockRig> rig;
   bool has_ins = false;
 };
-/// World, drive and devices, configured and ready to start. `faults` are added to the configuration's. `raw`: cameras of a Bayer
-/// pattern hand out the mosaic itself.
-[[nodiscard]] MockDrive make_mock_drive(const Configuration& configuration, const std::vector<std::string>& faults, bool real_time,
+/// World, drive and devices, configured and ready to start. `faults` are added to the
+/// configuration's. `raw`: cameras of a Bayer pattern hand out the mosaic itself.
+[[nodiscard]] MockDrive make_mock_drive(const Configuration& configuration,
+                                        const std::vector<std::string>& faults, bool real_time,
                                         std::optional<double> duration_s, bool raw = false);
 
-/// What the stamps of the drive are multiples of: with `mock.pattern: gbrg` whole microseconds, which a St Lucia log can hold.
+/// What the stamps of the drive are multiples of: with `mock.pattern: gbrg` whole microseconds,
+/// which a St Lucia log can hold.
 [[nodiscard]] Duration stamp_grid(const Configuration& configuration) noexcept;
 
 [[nodiscard]] ComparisonOptions comparison_options(const Configuration& configuration);
 
-/// The left camera's true pose in enu at every pulse's mid-exposure. `start`: the stamp of the drive's time 0.
-[[nodiscard]] std::vector<StampedPose> true_trajectory(const mock::MockRig& rig, const Configuration& configuration, Stamp start);
+/// The left camera's true pose in enu at every pulse's mid-exposure. `start`: the stamp of the
+/// drive's time 0.
+[[nodiscard]] std::vector<StampedPose> true_trajectory(const mock::MockRig& rig,
+                                                       const Configuration& configuration,
+                                                       Stamp start);
 
 }  // namespace vergence::app

@@ -11,26 +11,29 @@
 
 namespace vergence::app {
 
-/// The mount between two trajectories' bodies; the drawing it is told against is the nearest of: the same axes, forward-left-up against a
-/// camera's, and the reverse. Not ok: a status only.
+/// The mount between two trajectories' bodies; the drawing it is told against is the nearest of:
+/// the same axes, forward-left-up against a camera's, and the reverse. Not ok: a status only.
 struct FoundMount {
   MountStatus status = MountStatus::too_few;
   Mount mount{};
   Mat3 nominal = Mat3::Identity();
-  bool of_ins = false;  // the reference is an INS and the estimate a camera: what is found is what the configuration calls the mount
+  bool of_ins = false;  // the reference is an INS and the estimate a camera: what is found is what
+                        // the configuration calls the mount
 };
 [[nodiscard]] FoundMount find_mount(const Trajectory& estimate, const Trajectory& reference);
 
-/// The readings of an INS in the east-north-up axes at the first place among them: those with an attitude and a place that satellites
-/// gave, velocities where told.
+/// The readings of an INS in the east-north-up axes at the first place among them: those with an
+/// attitude and a place that satellites gave, velocities where told.
 [[nodiscard]] std::vector<MountReference> ins_moments(std::span<const InsRecord> readings);
-/// The mount of the left camera in an INS's body, told against a camera that looks along the INS's x with its x to the right.
-[[nodiscard]] FoundMount find_ins_mount(const Trajectory& estimate, std::span<const MountReference> moments);
+/// The mount of the left camera in an INS's body, told against a camera that looks along the INS's
+/// x with its x to the right.
+[[nodiscard]] FoundMount find_ins_mount(const Trajectory& estimate,
+                                        std::span<const MountReference> moments);
 /// The poses of the moments.
 [[nodiscard]] Trajectory poses_of(std::span<const MountReference> moments);
 
-/// The reference brought to the estimate's body by what is observable of the mount, the rest by the drawing. Stamps stay: the clock offset
-/// is told, not applied.
+/// The reference brought to the estimate's body by what is observable of the mount, the rest by the
+/// drawing. Stamps stay: the clock offset is told, not applied.
 [[nodiscard]] Trajectory brought_over(const Trajectory& reference, const Mount& mount);
 
 /// For a machine; what is not observable is null, with its sigma beside it.

@@ -17,7 +17,8 @@
 namespace vergence::app {
 namespace {
 
-/// One sentence on one line of stderr. Words of the user's may stand in it: nothing in them may steer a terminal.
+/// One sentence on one line of stderr. Words of the user's may stand in it: nothing in them may
+/// steer a terminal.
 void complain(std::string sentence) {
   std::replace_if(
       sentence.begin(), sentence.end(), [](unsigned char c) { return c < 0x20 || c == 0x7f; }, ' ');
@@ -54,7 +55,8 @@ std::string sentence_for(const CLI::ParseError& error, CLI::App& root) {
     const std::string name = first.substr(0, first.find('='));
     const bool option = name.size() > 1 && name.front() == '-';
     return who + (option ? "unknown option " : "unexpected argument ") + "\"" + name + "\"" +
-           (option ? did_you_mean(name, option_names(command)) : "") + " (" + help_hint(command) + " understood)";
+           (option ? did_you_mean(name, option_names(command)) : "") + " (" + help_hint(command) +
+           " understood)";
   }
   return who + error.what() + " (" + help_hint(command) + " expected)";
 }
@@ -67,7 +69,8 @@ void check_first_word(CLI::App& root, int argc, const char* const* argv) {
   auto words = command_words(root);
   words.insert(words.end(), {"help", "version"});
   if (std::find(words.begin(), words.end(), word) == words.end())
-    throw InputError("unknown command \"" + word + "\"" + did_you_mean(word, words) + " ('vergence --help' lists the commands)");
+    throw InputError("unknown command \"" + word + "\"" + did_you_mean(word, words) +
+                     " ('vergence --help' lists the commands)");
 }
 
 /// `help`, `help COMMAND` and `version` as the options that they stand for.
@@ -115,7 +118,8 @@ ExitCode run_program(int argc, const char* const* argv, AddCommands add_commands
   } catch (const InputError& error) {
     complain(error.what());
   } catch (const std::bad_alloc&) {
-    std::fputs("vergence: not enough memory; close other programs or choose smaller capacities\n", stderr);
+    std::fputs("vergence: not enough memory; close other programs or choose smaller capacities\n",
+               stderr);
   } catch (const std::exception& error) {
     complain(std::string("stopped by an error nobody foresaw: ") + error.what());
   }

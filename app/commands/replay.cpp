@@ -29,8 +29,10 @@ struct Arguments {
 
 SequenceFormat sequence_format(const std::string& word, const std::filesystem::path& folder) {
   constexpr const char* kLayouts =
-      "KITTI (image_0, image_1, calib.txt, times.txt), KITTI raw (image_00, image_01, calib_*.txt above), EuRoC (mav0), plain (left, "
-      "right, times.txt, calibration.yaml), UQ St Lucia and ROS 2 bags (.mcap) are what can be read";
+      "KITTI (image_0, image_1, calib.txt, times.txt), KITTI raw (image_00, image_01, calib_*.txt "
+      "above), EuRoC (mav0), plain (left, "
+      "right, times.txt, calibration.yaml), UQ St Lucia and ROS 2 bags (.mcap) are what can be "
+      "read";
   if (word == "kitti") return SequenceFormat::kitti;
   if (word == "kitti-raw") return SequenceFormat::kitti_raw;
   if (word == "euroc") return SequenceFormat::euroc;
@@ -38,11 +40,15 @@ SequenceFormat sequence_format(const std::string& word, const std::filesystem::p
   if (word == "st-lucia") return SequenceFormat::st_lucia;
   if (word == "mcap") return SequenceFormat::mcap;
   if (word == "session")
-    throw InputError("--format session is not there yet in this version; kitti, kitti-raw, euroc, folder, st-lucia and mcap are");
+    throw InputError(
+        "--format session is not there yet in this version; kitti, kitti-raw, euroc, folder, "
+        "st-lucia and mcap are");
   if (word != "auto")
     throw InputError("--format \"" + word + "\" is not known" +
-                     did_you_mean(word, {"auto", "kitti", "kitti-raw", "euroc", "folder", "st-lucia", "mcap", "session"}) +
-                     "; kitti, kitti-raw, euroc, folder, st-lucia and mcap are what can be read, and auto finds out which it is");
+                     did_you_mean(word, {"auto", "kitti", "kitti-raw", "euroc", "folder",
+                                         "st-lucia", "mcap", "session"}) +
+                     "; kitti, kitti-raw, euroc, folder, st-lucia and mcap are what can be read, "
+                     "and auto finds out which it is");
   std::error_code ignored;
   if (folder.extension() == ".mcap") return SequenceFormat::mcap;
   if (!std::filesystem::is_directory(folder, ignored))
@@ -55,16 +61,24 @@ namespace {
 
 std::optional<KnownNumbers> known_numbers(const Arguments& a) {
   if (!a.focal) {
-    if (a.distortion) throw InputError("--distortion goes with --focal; a calibration.yaml has its own");
+    if (a.distortion)
+      throw InputError("--distortion goes with --focal; a calibration.yaml has its own");
     return std::nullopt;
   }
-  if (a.calibration) throw InputError("--focal stands for a calibration that nobody has; leave it or --calibration away");
-  if (!a.baseline) throw InputError("--focal needs --baseline, the distance of the two cameras in metres, which images cannot tell");
-  if (!(*a.focal >= 10 && *a.focal <= 1e5)) throw InputError("--focal is the focal length in pixels, 10 to 100000");
+  if (a.calibration)
+    throw InputError(
+        "--focal stands for a calibration that nobody has; leave it or --calibration away");
+  if (!a.baseline)
+    throw InputError(
+        "--focal needs --baseline, the distance of the two cameras in metres, which images cannot "
+        "tell");
+  if (!(*a.focal >= 10 && *a.focal <= 1e5))
+    throw InputError("--focal is the focal length in pixels, 10 to 100000");
   KnownNumbers known;
   known.focal = *a.focal;
   known.baseline = *a.baseline;
-  known.model = a.model == "equidistant" ? CameraModelKind::pinhole_equidistant : CameraModelKind::pinhole_radtan;
+  known.model = a.model == "equidistant" ? CameraModelKind::pinhole_equidistant
+                                         : CameraModelKind::pinhole_radtan;
   if (a.distortion) known.distortion = parse_distortion(*a.distortion);
   if (known.distortion.size() > 4 && known.model == CameraModelKind::pinhole_equidistant)
     throw InputError("--distortion: an equidistant lens has k1,k2,k3,k4");
@@ -84,7 +98,9 @@ ReplayRequest request_of(const Arguments& a) {
     throw InputError("--left-topic and --right-topic are of ROS 2 bags (--format mcap)");
   r.known = known_numbers(a);
   if (a.calibrate_first && a.from_scratch)
-    throw InputError("--calibrate-first begins from scratch, and drives with what it finds; leave --from-scratch away");
+    throw InputError(
+        "--calibrate-first begins from scratch, and drives with what it finds; leave "
+        "--from-scratch away");
   r.out = a.out;
   if (a.calibration) r.calibration = *a.calibration;
   r.baseline = a.baseline;
@@ -103,35 +119,55 @@ ReplayRequest request_of(const Arguments& a) {
 
 void add_replay(CLI::App& root, ExitCode* exit_code) {
   const auto a = std::make_shared<Arguments>();
-  CLI::App* command = root.add_subcommand("replay", "Run a recorded drive through the estimator and write a session folder");
+  CLI::App* command = root.add_subcommand(
+      "replay", "Run a recorded drive through the estimator and write a session folder");
   command->add_option("DATA", a->data, "Folder of the data set, or a .mcap file")->required();
-  command->add_option("--format", a->format, "Layout of DATA: kitti, kitti-raw, euroc, folder, st-lucia, mcap; auto: by what is in it")
+  command
+      ->add_option(
+          "--format", a->format,
+          "Layout of DATA: kitti, kitti-raw, euroc, folder, st-lucia, mcap; auto: by what is in it")
       ->type_name("NAME")
       ->capture_default_str();
-  command->add_option("--out", a->out, "Session folder; must not exist or be empty")->required()->type_name("DIR");
+  command->add_option("--out", a->out, "Session folder; must not exist or be empty")
+      ->required()
+      ->type_name("DIR");
   command
-      ->add_option("--calibration", a->calibration, "calibration.yaml, or a file of Kalibr, ROS or OpenCV, instead of the data set's own")
+      ->add_option(
+          "--calibration", a->calibration,
+          "calibration.yaml, or a file of Kalibr, ROS or OpenCV, instead of the data set's own")
       ->type_name("FILE");
-  command->add_option("--left-topic", a->topics.left, "Of a bag: topic of the left images, where names do not tell")->type_name("TOPIC");
-  command->add_option("--right-topic", a->topics.right, "Of a bag: topic of the right images")->type_name("TOPIC");
+  command
+      ->add_option("--left-topic", a->topics.left,
+                   "Of a bag: topic of the left images, where names do not tell")
+      ->type_name("TOPIC");
+  command->add_option("--right-topic", a->topics.right, "Of a bag: topic of the right images")
+      ->type_name("TOPIC");
   command->add_option("--start", a->start, "First frame, from 0")->type_name("K");
   command->add_option("--frames", a->frames, "At most so many frames")->type_name("N");
-  command->add_option("--baseline", a->baseline, "Distance of the two cameras in metres, instead of the calibration's")->type_name("M");
+  command
+      ->add_option("--baseline", a->baseline,
+                   "Distance of the two cameras in metres, instead of the calibration's")
+      ->type_name("M");
   command
       ->add_option("--focal", a->focal,
-                   "Focal length in pixels, for images without any calibration: with --baseline, both cameras alike; the rest is found "
+                   "Focal length in pixels, for images without any calibration: with --baseline, "
+                   "both cameras alike; the rest is found "
                    "from the whole drive first, "
                    "or with --from-scratch on the way, and written")
       ->type_name("PX");
-  command->add_option("--distortion", a->distortion, "--focal: the lenses' coefficients, as far as somebody knows")
+  command
+      ->add_option("--distortion", a->distortion,
+                   "--focal: the lenses' coefficients, as far as somebody knows")
       ->type_name("K1,K2,P1,P2");
   command->add_option("--model", a->model, "--focal: radtan, or equidistant for fisheye lenses")
       ->check(CLI::IsMember({"radtan", "equidistant"}))
       ->capture_default_str();
   command->add_flag("--from-scratch", a->from_scratch,
-                    "Find the calibration from the drive itself: only intrinsics and the baseline's length are read");
+                    "Find the calibration from the drive itself: only intrinsics and the "
+                    "baseline's length are read");
   command->add_flag("--calibrate-first", a->calibrate_first,
-                    "Calibrate from the whole drive, lenses included, then drive with what was found (twice the drive more)");
+                    "Calibrate from the whole drive, lenses included, then drive with what was "
+                    "found (twice the drive more)");
   declare_also(*command, &a->also);
   command->add_flag("--memory", a->memory, "Print what memory is held, by whom");
   a->common.declare(*command);

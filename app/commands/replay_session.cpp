@@ -37,10 +37,12 @@
 namespace vergence::app {
 namespace {
 
-/// Everything that is set up before the first frame and torn down after the last, in the order of its members.
+/// Everything that is set up before the first frame and torn down after the last, in the order of
+/// its members.
 class Replay {
  public:
-  Replay(const ReplayRequest& request, StereoSequence sequence, StartingCalibration begin, Trajectory truth, ReplayedIns ins);
+  Replay(const ReplayRequest& request, StereoSequence sequence, StartingCalibration begin,
+         Trajectory truth, ReplayedIns ins);
 
   [[nodiscard]] ExitCode run();
 
@@ -50,7 +52,8 @@ class Replay {
   void give_readings(Stamp until) noexcept;
   void compare(const PoseSample& sample, float decode_ms) noexcept;
   void watch(const SignalGuard& signals, Progress* progress);
-  [[nodiscard]] SummaryInput summary_input(const SessionTotals& totals, std::uint64_t allocations) const;
+  [[nodiscard]] SummaryInput summary_input(const SessionTotals& totals,
+                                           std::uint64_t allocations) const;
   void tell(const SessionTotals& totals, const SummaryInput& input, Progress* progress) const;
   void tell_earth(const EarthFigures& earth, Progress* progress) const;
   [[nodiscard]] std::vector<std::pair<std::string, std::size_t>> memory() const;
@@ -86,25 +89,32 @@ class Replay {
 int width_of(const StereoSequence& s) { return s.calibration.intrinsics[0].width; }
 int height_of(const StereoSequence& s) { return s.calibration.intrinsics[0].height; }
 
-Replay::Replay(const ReplayRequest& request, StereoSequence sequence, StartingCalibration begin, Trajectory truth, ReplayedIns ins)
+Replay::Replay(const ReplayRequest& request, StereoSequence sequence, StartingCalibration begin,
+               Trajectory truth, ReplayedIns ins)
     : request_(request),
       sequence_(std::move(sequence)),
       begin_(std::move(begin)),
       truth_(std::move(truth)),
       reference_(truth_),
       ins_(std::move(ins)),
-      count_(std::min(request.frames.value_or(sequence_.pairs.size()), sequence_.pairs.size() - request.start)),
+      count_(std::min(request.frames.value_or(sequence_.pairs.size()),
+                      sequence_.pairs.size() - request.start)),
       masks_(request.configuration, begin_.file.rig),
-      options_(estimator_options(request.configuration, begin_.trust, Adoption::after_fixed_frames, masks_.views())),
-      frames_arena_(arena_size(FramePool::memory_needed(width_of(sequence_), height_of(sequence_), FrameDecoder::kSlots))),
+      options_(estimator_options(request.configuration, begin_.trust, Adoption::after_fixed_frames,
+                                 masks_.views())),
+      frames_arena_(arena_size(FramePool::memory_needed(width_of(sequence_), height_of(sequence_),
+                                                        FrameDecoder::kSlots))),
       estimator_arena_(arena_size(Estimator::memory_needed(options_, begin_.file.rig))),
-      comparison_arena_(arena_size(ins_.readings.empty() ? 0 : Comparison::bytes_needed(ins_.options))),
+      comparison_arena_(
+          arena_size(ins_.readings.empty() ? 0 : Comparison::bytes_needed(ins_.options))),
       pool_(width_of(sequence_), height_of(sequence_), FrameDecoder::kSlots, frames_arena_),
       runner_(make_runner(request.configuration.threads)),
-      estimator_(std::make_unique<Estimator>(options_, begin_.file.rig, begin_.nominal, estimator_arena_, *runner_, solver_)),
+      estimator_(std::make_unique<Estimator>(options_, begin_.file.rig, begin_.nominal,
+                                             estimator_arena_, *runner_, solver_)),
       skipped_(sequence_.left_out) {
   if (ins_.readings.empty()) return;
-  comparison_ = std::make_unique<InsComparison>(ins_.options, InsComparison::Source::recording, comparison_arena_, journal_);
+  comparison_ = std::make_unique<InsComparison>(ins_.options, InsComparison::Source::recording,
+                                                comparison_arena_, journal_);
 }
 
 void Replay::estimate() noexcept {
@@ -150,7 +160,8 @@ void Replay::handle(const DecodedPair& pair) noexcept {
 }
 
 void Replay::give_readings(Stamp until) noexcept {
-  for (; next_reading_ < ins_.readings.size() && ins_.readings[next_reading_].sample.stamp <= until; ++next_reading_) {
+  for (; next_reading_ < ins_.readings.size() && ins_.readings[next_reading_].sample.stamp <= until;
+       ++next_reading_) {
     comparison_->add({ins_.readings[next_reading_].sample, ins_.readings[next_reading_].quality});
     comparison_->drain();
   }
@@ -199,29 +210,39 @@ SummaryInput Replay::summary_input(const SessionTotals& totals, std::uint64_t al
 
 std::vector<std::pair<std::string, std::size_t>> Replay::memory() const {
   return {{"estimator_bytes", estimator_arena_.capacity()},
-          {"comparison_bytes", comparison_arena_.capacity() + ins_.readings.capacity() * sizeof(RecordedReading)},
+          {"comparison_bytes",
+           comparison_arena_.capacity() + ins_.readings.capacity() * sizeof(RecordedReading)},
           {"images_bytes", frames_arena_.capacity()},
           {"rings_bytes", sizeof(Recorder) + sizeof(FrameDecoder) + sizeof(DriveJournal)}};
 }
 
-void Replay::tell(const SessionTotals& totals, const SummaryInput& input, Progress* progress) const {
+void Replay::tell(const SessionTotals& totals, const SummaryInput& input,
+                  Progress* progress) const {
   const std::uint64_t posed = totals.ok + totals.degraded;
   progress->say(
-      fmt::format("session {}: {} frames, {} posed ({} degraded), {} lost, {} skipped; {:.2f} m; {:.1f} ms a frame, {:.1f} at p99",
-                  request_.out.string(), totals.read, posed, totals.degraded, totals.lost, skipped_, totals.path_m, totals.estimate.mean(),
-                  totals.estimate.percentile(0.99)));
-  if (const std::string sentence = verification_sentence(input); !sentence.empty()) progress->say(sentence);
+      fmt::format("session {}: {} frames, {} posed ({} degraded), {} lost, {} skipped; {:.2f} m; "
+                  "{:.1f} ms a frame, {:.1f} at p99",
+                  request_.out.string(), totals.read, posed, totals.degraded, totals.lost, skipped_,
+                  totals.path_m, totals.estimate.mean(), totals.estimate.percentile(0.99)));
+  if (const std::string sentence = verification_sentence(input); !sentence.empty())
+    progress->say(sentence);
   if (input.evaluation && input.evaluation->status == EvaluationStatus::ok) {
     const TrajectoryEvaluation& e = *input.evaluation;
     const SegmentErrors& near = e.segments[1];
-    const std::string segments = near.count > 0 ? fmt::format("; segments of 10 to 50 m {:.2f} %", 100 * near.translation) : "";
-    progress->say(fmt::format("against the reference over {:.2f} m: ATE {:.4f} m, {:.4f} m after a scale of {:.4f}{}", e.path_reference,
-                              e.ate_se3.rmse, e.ate_sim3.rmse, e.sim3.scale, segments));
+    const std::string segments =
+        near.count > 0 ? fmt::format("; segments of 10 to 50 m {:.2f} %", 100 * near.translation)
+                       : "";
+    progress->say(fmt::format(
+        "against the reference over {:.2f} m: ATE {:.4f} m, {:.4f} m after a scale of {:.4f}{}",
+        e.path_reference, e.ate_se3.rmse, e.ate_sim3.rmse, e.sim3.scale, segments));
     if (!comparison_)
-      progress->say(fmt::format("next: vergence evaluate {} {}", (request_.out / "trajectory.tum").string(), request_.data.string()));
+      progress->say(fmt::format("next: vergence evaluate {} {}",
+                                (request_.out / "trajectory.tum").string(),
+                                request_.data.string()));
   } else if (!comparison_) {
-    progress->say(fmt::format("there is no reference to compare with; next: vergence evaluate {} REFERENCE",
-                              (request_.out / "trajectory.tum").string()));
+    progress->say(
+        fmt::format("there is no reference to compare with; next: vergence evaluate {} REFERENCE",
+                    (request_.out / "trajectory.tum").string()));
   }
   if (comparison_) tell_earth(*input.earth, progress);
 }
@@ -230,13 +251,16 @@ void Replay::tell_earth(const EarthFigures& earth, Progress* progress) const {
   const EarthErrors& e = earth.errors;
   if (e.poses > 0)
     progress->say(
-        fmt::format("beside the INS after the placement: {:.2f} m at the end, {:.2f} % of {:.1f} m; at most {:.2f} m; heading off by "
+        fmt::format("beside the INS after the placement: {:.2f} m at the end, {:.2f} % of {:.1f} "
+                    "m; at most {:.2f} m; heading off by "
                     "{:.2f} deg rms, {:.2f} deg at the end",
-                    e.horizontal_end_m, e.way_m > 0 ? 100 * e.horizontal_end_m / e.way_m : 0, e.way_m, e.horizontal_most_m,
-                    e.heading_rms_deg, e.heading_end_deg));
+                    e.horizontal_end_m, e.way_m > 0 ? 100 * e.horizontal_end_m / e.way_m : 0,
+                    e.way_m, e.horizontal_most_m, e.heading_rms_deg, e.heading_end_deg));
   else
-    progress->say(fmt::format("nothing is compared after the placement: it takes {:g} m with a fix (comparison.placement_m)",
-                              request_.configuration.comparison.placement_m));
+    progress->say(
+        fmt::format("nothing is compared after the placement: it takes {:g} m with a fix "
+                    "(comparison.placement_m)",
+                    request_.configuration.comparison.placement_m));
 }
 
 ExitCode Replay::run() {
@@ -269,39 +293,50 @@ ExitCode Replay::run() {
   progress.finish();
 
   const auto totals = recorder_->close();
-  const SummaryInput input = summary_input(*totals, AllocationGuard::allocations_after_seal() - allocations_before);
-  if (faults.empty()) end_session(request_.out, begin_, input, *totals, journal_.matches(), &faults);
+  const SummaryInput input =
+      summary_input(*totals, AllocationGuard::allocations_after_seal() - allocations_before);
+  if (faults.empty())
+    end_session(request_.out, begin_, input, *totals, journal_.matches(), &faults);
   write_session_summary(request_.out, *totals, input, &faults);
   faults.insert(faults.end(), totals->faults.begin(), totals->faults.end());
-  for (const std::string& sentence :
-       write_other_formats(request_.out, request_.also, *totals, input.earth.value_or(EarthFigures{}), &faults))
+  for (const std::string& sentence : write_other_formats(
+           request_.out, request_.also, *totals, input.earth.value_or(EarthFigures{}), &faults))
     progress.say("vergence: " + sentence);
-  for (const std::string& sentence : recorder_->take_complaints()) progress.say("vergence: " + sentence);
+  for (const std::string& sentence : recorder_->take_complaints())
+    progress.say("vergence: " + sentence);
   for (const std::string& sentence : faults) progress.say("vergence: " + sentence);
   if (!request_.quiet) tell(*totals, input, &progress);
   const bool usable = write_session_report(request_.out, request_.quiet, &progress);
 
   if (const auto stopped = signals.stop_code()) return *stopped;
   if (totals->ok + totals->degraded == 0) {
-    progress.say("vergence: there never was a pose; events.jsonl and poses.csv in " + request_.out.string() + " say why");
+    progress.say("vergence: there never was a pose; events.jsonl and poses.csv in " +
+                 request_.out.string() + " say why");
     return ExitCode::not_usable;
   }
   if (comparison_ && comparison_->matches() == 0) {
-    progress.say("vergence: the INS never had a position for a frame: nothing is compared; the poses are there");
+    progress.say(
+        "vergence: the INS never had a position for a frame: nothing is compared; the poses are "
+        "there");
     return ExitCode::not_usable;
   }
   return usable && faults.empty() ? ExitCode::done : ExitCode::not_usable;
 }
 
-/// The truth that lies with the data set, for the stamps that its frames have; empty when there is none.
+/// The truth that lies with the data set, for the stamps that its frames have; empty when there is
+/// none.
 Trajectory read_reference(const ReplayRequest& request, const StereoSequence& sequence) {
-  if (request.format == SequenceFormat::kitti_raw || request.format == SequenceFormat::st_lucia || request.format == SequenceFormat::mcap)
+  if (request.format == SequenceFormat::kitti_raw || request.format == SequenceFormat::st_lucia ||
+      request.format == SequenceFormat::mcap)
     return {};  // their layouts have no truth
   const bool plain = request.format == SequenceFormat::folder;
   std::error_code ignored;
-  if (plain && std::filesystem::exists(request.data / "truth.tum", ignored)) return read_tum(request.data / "truth.tum");
+  if (plain && std::filesystem::exists(request.data / "truth.tum", ignored))
+    return read_tum(request.data / "truth.tum");
   if (plain && !std::filesystem::exists(request.data / "poses.txt", ignored)) return {};
-  const auto files = plain ? std::optional(TruthFiles{TruthFiles::Kind::kitti, request.data / "poses.txt", {}}) : find_truth(request.data);
+  const auto files =
+      plain ? std::optional(TruthFiles{TruthFiles::Kind::kitti, request.data / "poses.txt", {}})
+            : find_truth(request.data);
   if (!files) return {};
   if (files->kind != TruthFiles::Kind::kitti) return read_truth(*files);
   std::vector<Stamp> times;
@@ -313,27 +348,34 @@ Trajectory read_reference(const ReplayRequest& request, const StereoSequence& se
 /// The drive, with the calibration that the user names, if any; remarks are said.
 StereoSequence open_drive(const ReplayRequest& request) {
   const CalibrationUse use{request.from_scratch || request.known, request.baseline.value_or(0)};
-  const std::array cameras{request.configuration.kitti_raw.left, request.configuration.kitti_raw.right};
+  const std::array cameras{request.configuration.kitti_raw.left,
+                           request.configuration.kitti_raw.right};
   std::vector<std::string> remarks;
   StereoSequence sequence;
   if (request.known)
-    sequence = open_sequence(request.format, request.data, calibration_source(*request.known), use, cameras, request.topics);
+    sequence = open_sequence(request.format, request.data, calibration_source(*request.known), use,
+                             cameras, request.topics);
   else if (request.calibration)
-    sequence =
-        open_sequence(request.format, request.data, calibration_source(*request.calibration, use, &remarks), use, cameras, request.topics);
+    sequence = open_sequence(request.format, request.data,
+                             calibration_source(*request.calibration, use, &remarks), use, cameras,
+                             request.topics);
   else
-    sequence = open_sequence(request.format, request.data, std::nullopt, use, cameras, request.topics);
+    sequence =
+        open_sequence(request.format, request.data, std::nullopt, use, cameras, request.topics);
   if (!request.quiet)
     for (const std::string& sentence : remarks) fmt::print(stderr, "vergence: {}\n", sentence);
   return sequence;
 }
 
-/// What the drive itself says of its rig, in the place of what it came with; where nothing is found that stays, and the user hears why.
-bool calibrate_first(const ReplayRequest& request, const StereoSequence& sequence, StartingCalibration* begin) {
+/// What the drive itself says of its rig, in the place of what it came with; where nothing is found
+/// that stays, and the user hears why.
+bool calibrate_first(const ReplayRequest& request, const StereoSequence& sequence,
+                     StartingCalibration* begin) {
   Progress progress = Progress::on_stderr(request.quiet);
-  const std::size_t count = std::min(request.frames.value_or(sequence.pairs.size()), sequence.pairs.size() - request.start);
-  const DriveCalibration found =
-      calibrate_with_progress({sequence, request.configuration, request.start, count, {}, {}}, *begin, &progress);
+  const std::size_t count = std::min(request.frames.value_or(sequence.pairs.size()),
+                                     sequence.pairs.size() - request.start);
+  const DriveCalibration found = calibrate_with_progress(
+      {sequence, request.configuration, request.start, count, {}, {}}, *begin, &progress);
   if (!found.rig) {
     progress.say("vergence: the drive gives no calibration: " + found.why);
     return false;
@@ -346,12 +388,16 @@ bool calibrate_first(const ReplayRequest& request, const StereoSequence& sequenc
   return true;
 }
 
-/// Lenses are found from a beginning that is near enough. Of one that nobody knows anything of: no distortion, then that of a usual lens of
-/// 80 to 100 degrees.
-void calibrate_unknown(ReplayRequest request, StereoSequence* sequence, StartingCalibration* begin) {
+/// Lenses are found from a beginning that is near enough. Of one that nobody knows anything of: no
+/// distortion, then that of a usual lens of 80 to 100 degrees.
+void calibrate_unknown(ReplayRequest request, StereoSequence* sequence,
+                       StartingCalibration* begin) {
   if (calibrate_first(request, *sequence, begin)) return;
-  if (!request.known || !request.known->distortion.empty() || request.known->model != CameraModelKind::pinhole_radtan) return;
-  if (!request.quiet) fmt::print(stderr, "vergence: once more, with the distortion of a wide lens to begin with\n");
+  if (!request.known || !request.known->distortion.empty() ||
+      request.known->model != CameraModelKind::pinhole_radtan)
+    return;
+  if (!request.quiet)
+    fmt::print(stderr, "vergence: once more, with the distortion of a wide lens to begin with\n");
   request.known->distortion = {-0.28, 0.07, 0, 0};
   StereoSequence wide = open_drive(request);
   StartingCalibration other = replayed_calibration(request.configuration, wide, true);
@@ -365,16 +411,18 @@ void calibrate_unknown(ReplayRequest request, StereoSequence* sequence, Starting
 ExitCode run_replay(const ReplayRequest& request) {
   StereoSequence sequence = open_drive(request);
   if (request.start >= sequence.pairs.size())
-    throw InputError(
-        fmt::format("--start {} is beyond the drive: {} has {} frames", request.start, request.data.string(), sequence.pairs.size()));
+    throw InputError(fmt::format("--start {} is beyond the drive: {} has {} frames", request.start,
+                                 request.data.string(), sequence.pairs.size()));
   check_image_sizes(sequence, request.start, request.frames.value_or(sequence.pairs.size()));
-  StartingCalibration begin = replayed_calibration(request.configuration, sequence, request.from_scratch || request.known);
+  StartingCalibration begin =
+      replayed_calibration(request.configuration, sequence, request.from_scratch || request.known);
   Trajectory truth = read_reference(request, sequence);
   ReplayedIns ins = replayed_ins(request, sequence);
   if (request.calibrate_first) calibrate_unknown(request, &sequence, &begin);
   std::unique_ptr<Replay> replay;
   try {
-    replay = std::make_unique<Replay>(request, std::move(sequence), std::move(begin), std::move(truth), std::move(ins));
+    replay = std::make_unique<Replay>(request, std::move(sequence), std::move(begin),
+                                      std::move(truth), std::move(ins));
   } catch (const std::invalid_argument& e) {  // options and rig do not go together
     throw InputError(e.what());
   } catch (const std::length_error& e) {

@@ -33,14 +33,17 @@ struct ReplayRequest {
 };
 
 /// A word of --format, or with `auto` what `folder` holds. InputError: none that is known.
-[[nodiscard]] SequenceFormat sequence_format(const std::string& word, const std::filesystem::path& folder);
+[[nodiscard]] SequenceFormat sequence_format(const std::string& word,
+                                             const std::filesystem::path& folder);
 
-/// Reads a recorded drive, estimates a pose for every frame, writes the session folder of DESIGN §6 and the figures against the data
-/// set's truth.
+/// Reads a recorded drive, estimates a pose for every frame, writes the session folder of DESIGN §6
+/// and the figures against the data set's truth.
 ///
-/// Threads  Decoder, estimator (sealed), its worker, the calibration solver (sealed, too), recorder; the caller's thread draws the progress
-/// line and watches for signals. Errors   InputError before the session folder is made, for all that can be known by then. Afterwards
-/// sentences on stderr. → done, not_usable (there never was a pose, or a file of the session is not whole), interrupted, terminated
+/// Threads  Decoder, estimator (sealed), its worker, the calibration solver (sealed, too),
+///          recorder; the caller's thread draws the progress
+/// line and watches for signals. Errors   InputError before the session folder is made, for all
+/// that can be known by then. Afterwards sentences on stderr. → done, not_usable (there never was a
+/// pose, or a file of the session is not whole), interrupted, terminated
 [[nodiscard]] ExitCode run_replay(const ReplayRequest& request);
 
 }  // namespace vergence::app

@@ -19,7 +19,8 @@ void make_report(const std::string& session) {
 
 void add_report(CLI::App& root, ExitCode* exit_code) {
   const auto session = std::make_shared<std::string>();
-  CLI::App* command = root.add_subcommand("report", "Write report.html of a session again, also of one that was cut off");
+  CLI::App* command = root.add_subcommand(
+      "report", "Write report.html of a session again, also of one that was cut off");
   command->add_option("SESSION", *session, "Session folder, as --out named it")->required();
   command->callback([session, exit_code] {
     make_report(*session);

@@ -13,7 +13,8 @@
 namespace vergence::app {
 namespace {
 
-constexpr double kFocalOfWidth = 0.72;  // of the image's width: 70° across, what machine-vision rigs on cars have
+constexpr double kFocalOfWidth =
+    0.72;  // of the image's width: 70° across, what machine-vision rigs on cars have
 
 Intrinsics lens_of(const Configuration& c, const CameraSettings& camera) {
   Intrinsics lens;
@@ -61,9 +62,11 @@ void add_intrinsics_error(const IntrinsicsErrorSettings& e, RigCalibration* rig)
 
 void add_calibration_error(const CalibrationErrorSettings& e, RigCalibration* rig) {
   const Vec3 turn = Vec3(e.pitch_deg, e.yaw_deg, e.roll_deg) * (std::numbers::pi / 180);
-  rig->T_camera_left[1] = Transform{exp_so3(turn), Vec3(e.x_m, e.y_m, e.z_m)} * rig->T_camera_left[1];
+  rig->T_camera_left[1] =
+      Transform{exp_so3(turn), Vec3(e.x_m, e.y_m, e.z_m)} * rig->T_camera_left[1];
   const double longer = 1 + 0.01 * e.length_percent;
-  for (int k = 1; k < rig->cameras; ++k) rig->T_camera_left[static_cast<std::size_t>(k)].t *= longer;
+  for (int k = 1; k < rig->cameras; ++k)
+    rig->T_camera_left[static_cast<std::size_t>(k)].t *= longer;
   rig->baseline *= longer;
 }
 
@@ -74,7 +77,9 @@ int camera_count(const Configuration& c) {
   for (std::size_t k = 0; k < c.cameras.size(); ++k) {
     if (c.cameras[k].driver.empty()) continue;
     if (static_cast<int>(k) != n)
-      throw InputError(fmt::format("cameras.{} has a driver, cameras.{} before it has none; the list has no holes", k, k - 1));
+      throw InputError(fmt::format(
+          "cameras.{} has a driver, cameras.{} before it has none; the list has no holes", k,
+          k - 1));
     ++n;
   }
   return n;
@@ -88,7 +93,8 @@ RigCalibration mounted_rig(const Configuration& c) {
     if (k > 0) rig.T_camera_left[k] = place_of(c, k);
   }
   rig.baseline = rig.T_camera_left[1].t.norm();
-  if (const auto bad = find_implausible(&rig)) throw InputError("rig.nominal and cameras: " + bad->sentence);
+  if (const auto bad = find_implausible(&rig))
+    throw InputError("rig.nominal and cameras: " + bad->sentence);
   return rig;
 }
 
@@ -97,7 +103,8 @@ RigCalibration nominal_rig(const Configuration& c) {
   if (c.cameras[0].driver != "mock") return rig;
   add_intrinsics_error(c.mock.intrinsics_error, &rig);
   add_calibration_error(c.mock.calibration_error, &rig);
-  if (const auto bad = find_implausible(&rig)) throw InputError("mock.calibration_error and intrinsics_error: " + bad->sentence);
+  if (const auto bad = find_implausible(&rig))
+    throw InputError("mock.calibration_error and intrinsics_error: " + bad->sentence);
   return rig;
 }
 

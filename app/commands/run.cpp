@@ -41,21 +41,33 @@ RunRequest request_of(const Arguments& a) {
 
 void add_run(CLI::App& root, ExitCode* exit_code) {
   const auto a = std::make_shared<Arguments>();
-  CLI::App* command =
-      root.add_subcommand("run", "Drive: with the cameras, the trigger board and the INS of a configuration, real or rendered");
-  command->add_option("CONFIG", a->configuration, "Configuration (docs/configuration.md), e.g. app/config/mock.yaml")->required();
-  command->add_option("--out", a->out, "Session folder; must not exist or be empty")->required()->type_name("DIR");
-  command->add_flag("--fast", a->fast, "Mock: virtual time, as fast as this machine allows; nothing is dropped");
+  CLI::App* command = root.add_subcommand("run",
+                                          "Drive: with the cameras, the trigger board and the INS "
+                                          "of a configuration, real or rendered");
   command
-      ->add_option("--fault", a->faults, "Mock: something that goes wrong, as in \"knock@42 camera=1 pitch_deg=0.2\"; as often as needed")
+      ->add_option("CONFIG", a->configuration,
+                   "Configuration (docs/configuration.md), e.g. app/config/mock.yaml")
+      ->required();
+  command->add_option("--out", a->out, "Session folder; must not exist or be empty")
+      ->required()
+      ->type_name("DIR");
+  command->add_flag("--fast", a->fast,
+                    "Mock: virtual time, as fast as this machine allows; nothing is dropped");
+  command
+      ->add_option("--fault", a->faults,
+                   "Mock: something that goes wrong, as in \"knock@42 camera=1 pitch_deg=0.2\"; as "
+                   "often as needed")
       ->type_name("\"KIND@SECONDS …\"")
       ->allow_extra_args(false);
-  command->add_option("--duration", a->duration_s, "End the drive after so many seconds")->type_name("S");
+  command->add_option("--duration", a->duration_s, "End the drive after so many seconds")
+      ->type_name("S");
   command->add_flag("--from-scratch", a->from_scratch,
-                    "Find the calibration from the drive itself: only intrinsics and the baseline's length are read");
+                    "Find the calibration from the drive itself: only intrinsics and the "
+                    "baseline's length are read");
   command
       ->add_option("--calibration", a->calibration,
-                   "calibration.yaml, or a file of Kalibr, ROS or OpenCV, to begin with, instead of the state file's and the "
+                   "calibration.yaml, or a file of Kalibr, ROS or OpenCV, to begin with, instead "
+                   "of the state file's and the "
                    "configuration's; SIGUSR1 asks for a new one on the way")
       ->type_name("FILE");
   declare_also(*command, &a->also);

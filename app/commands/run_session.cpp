@@ -41,7 +41,9 @@
 namespace vergence::app {
 namespace {
 
-constexpr Stamp kVirtualEpoch{1'577'836'800'000'000'000};  // 2020-01-01 00:00 UTC: a drive in virtual time has the same stamps on every run
+constexpr Stamp kVirtualEpoch{
+    1'577'836'800'000'000'000};  // 2020-01-01 00:00 UTC: a drive in virtual time has the same
+                                 // stamps on every run
 
 std::int64_t clock_ns(clockid_t clock) {
   timespec t{};
@@ -55,7 +57,8 @@ std::vector<std::string> serials_of(const std::vector<CameraDevice*>& cameras) {
   return serials;
 }
 
-/// Everything that is set up before the first frame and torn down after the last, in the order of its members.
+/// Everything that is set up before the first frame and torn down after the last, in the order of
+/// its members.
 class Drive {
  public:
   explicit Drive(const RunRequest& request);
@@ -69,14 +72,17 @@ class Drive {
   void note_faults(Stamp stamp) noexcept;
   void watch(Progress* progress);
   void write_truth(std::vector<std::string>* faults) const;
-  [[nodiscard]] SummaryInput summary_input(const SessionTotals& totals, std::uint64_t allocations) const;
+  [[nodiscard]] SummaryInput summary_input(const SessionTotals& totals,
+                                           std::uint64_t allocations) const;
   [[nodiscard]] TruthFigures truth_figures(const SessionTotals& totals) const;
   void tell(const SessionTotals& totals, const SummaryInput& input, Progress* progress) const;
-  [[nodiscard]] ExitCode verdict(const SessionTotals& totals, const std::vector<std::string>& faults, Progress* progress) const;
+  [[nodiscard]] ExitCode verdict(const SessionTotals& totals,
+                                 const std::vector<std::string>& faults, Progress* progress) const;
   [[nodiscard]] std::vector<std::pair<std::string, std::size_t>> memory() const;
   [[nodiscard]] std::vector<std::pair<std::string, std::uint64_t>> device_counters() const;
 
-  const SignalGuard signals_;  // before the world is built, which takes seconds: an impatient user's signal is heard
+  const SignalGuard signals_;  // before the world is built, which takes seconds: an impatient
+                               // user's signal is heard
   const RunRequest& request_;
   const Configuration& configuration_;
   DriveDevices devices_;
@@ -110,16 +116,22 @@ Drive::Drive(const RunRequest& request)
     : request_(request),
       configuration_(request.configuration),
       devices_(request.configuration, request.faults, request.fast, request.duration_s),
-      begin_(starting_calibration(request.configuration, request.calibration, serials_of(devices_.cameras()))),
+      begin_(starting_calibration(request.configuration, request.calibration,
+                                  serials_of(devices_.cameras()))),
       masks_(request.configuration, begin_.file.rig),
-      options_(estimator_options(request.configuration, begin_.trust, request.fast ? Adoption::after_fixed_frames : Adoption::when_ready,
+      options_(estimator_options(request.configuration, begin_.trust,
+                                 request.fast ? Adoption::after_fixed_frames : Adoption::when_ready,
                                  masks_.views())),
       comparison_options_(comparison_options(request.configuration)),
-      arena_(arena_size(Estimator::memory_needed(options_, begin_.file.rig)) + arena_size(Comparison::bytes_needed(comparison_options_))),
+      arena_(arena_size(Estimator::memory_needed(options_, begin_.file.rig)) +
+             arena_size(Comparison::bytes_needed(comparison_options_))),
       runner_(make_runner(request.configuration.threads)),
-      estimator_(std::make_unique<Estimator>(options_, begin_.file.rig, begin_.nominal, arena_, *runner_, solver_)),
+      estimator_(std::make_unique<Estimator>(options_, begin_.file.rig, begin_.nominal, arena_,
+                                             *runner_, solver_)),
       comparison_(std::make_unique<InsComparison>(
-          comparison_options_, devices_.ins() != nullptr ? InsComparison::Source::device : InsComparison::Source::none, arena_, journal_)),
+          comparison_options_,
+          devices_.ins() != nullptr ? InsComparison::Source::device : InsComparison::Source::none,
+          arena_, journal_)),
       time_(devices_.sync().mode, request.fast),
       fault_told_(devices_.faults().size(), false) {
   LiveSource::Options o;
@@ -132,14 +144,17 @@ Drive::Drive(const RunRequest& request)
   o.tie_host = request.fast ? devices_.start() : HostStamp(clock_ns(CLOCK_MONOTONIC));
   if (exposes_by_itself(configuration_)) {
     const CameraSettings& c = configuration_.cameras[0];
-    exposure_ = std::make_unique<ExposureControl>(devices_.cameras(), c.width, c.height, masks_.views()[0],
-                                                  exposure_options(configuration_), starting_exposure(configuration_, 0), request.fast);
+    exposure_ = std::make_unique<ExposureControl>(
+        devices_.cameras(), c.width, c.height, masks_.views()[0], exposure_options(configuration_),
+        starting_exposure(configuration_, 0), request.fast);
   }
-  source_ = std::make_unique<LiveSource>(exposure_ ? exposure_->cameras() : devices_.cameras(), devices_.ins(), devices_.trigger(), o);
+  source_ = std::make_unique<LiveSource>(exposure_ ? exposure_->cameras() : devices_.cameras(),
+                                         devices_.ins(), devices_.trigger(), o);
   start_ = o.tie_stamp + (devices_.start() - o.tie_host);
 }
 
-// ---- the estimator's thread ---------------------------------------------------------------------------------------
+// ---- the estimator's thread
+// ---------------------------------------------------------------------------------------
 
 void Drive::estimate() noexcept {
   (void)pthread_setname_np(pthread_self(), "vergence-estim");
@@ -169,7 +184,8 @@ void Drive::estimate() noexcept {
 }
 
 void Drive::tell(Stamp stamp, const DriveTime::Sentence& sentence) noexcept {
-  if (sentence.kind != nullptr) journal_.tell(stamp, sentence.kind, sentence.text.data(), sentence.aloud);
+  if (sentence.kind != nullptr)
+    journal_.tell(stamp, sentence.kind, sentence.text.data(), sentence.aloud);
 }
 
 void Drive::handle_images(const LiveItem& item) noexcept {
@@ -188,14 +204,16 @@ void Drive::handle_images(const LiveItem& item) noexcept {
   note_faults(item.stamp);
   if (calibration_asked_.exchange(false, std::memory_order_relaxed)) {
     estimator_->request_recalibration();
-    journal_.tell(item.stamp, "recalibration_requested", "a new calibration was asked for by SIGUSR1", true);
+    journal_.tell(item.stamp, "recalibration_requested",
+                  "a new calibration was asked for by SIGUSR1", true);
   }
   PoseSample sample = estimator_->process(frame);
   if (contradicted && sample.status != PoseStatus::lost) {
     sample.status = PoseStatus::degraded;
     sample.reason = Reason::unproven_pairing;
   }
-  time_.note_pose(item.set, sample.estimate_ms, request_.fast ? HostStamp{} : HostStamp(clock_ns(CLOCK_MONOTONIC)));
+  time_.note_pose(item.set, sample.estimate_ms,
+                  request_.fast ? HostStamp{} : HostStamp(clock_ns(CLOCK_MONOTONIC)));
   source_->release(item.set);
   journal_.note(*estimator_);
   journal_.note(sample);
@@ -210,24 +228,28 @@ void Drive::note_faults(Stamp stamp) noexcept {
     std::array<char, 96> text{};
     const std::string_view kind = mock::to_string(faults[i].kind);
     if (faults[i].kind == mock::FaultKind::recalibrate) estimator_->request_recalibration();
-    (void)std::snprintf(text.data(), text.size(), "%.*s, as scheduled", static_cast<int>(kind.size()), kind.data());
+    (void)std::snprintf(text.data(), text.size(), "%.*s, as scheduled",
+                        static_cast<int>(kind.size()), kind.data());
     journal_.tell(start_ + faults[i].at, "fault", text.data(), false);
   }
 }
 
-// ---- the caller's thread ------------------------------------------------------------------------------------------
+// ---- the caller's thread
+// ------------------------------------------------------------------------------------------
 
 void Drive::watch(Progress* progress) {
   constexpr std::chrono::milliseconds kLook{50};
   const auto begun = std::chrono::steady_clock::now();
   const auto over = [&] {  // real cameras do not end by themselves
     return devices_.mock() == nullptr && request_.duration_s &&
-           std::chrono::steady_clock::now() - begun > std::chrono::duration<double>(*request_.duration_s);
+           std::chrono::steady_clock::now() - begun >
+               std::chrono::duration<double>(*request_.duration_s);
   };
   std::unique_lock lock(mutex_);
   while (!changed_.wait_for(lock, kLook, [this] { return done_; })) {
     if (signals_.stop_requested() || over()) source_->stop();
-    if (signals_.take_calibration_request()) calibration_asked_.store(true, std::memory_order_relaxed);
+    if (signals_.take_calibration_request())
+      calibration_asked_.store(true, std::memory_order_relaxed);
     lock.unlock();
     journal_.show(progress, devices_.frames());
     lock.lock();
@@ -241,10 +263,12 @@ void Drive::write_truth(std::vector<std::string>* faults) const {
     LineFile file(request_.out / "truth.tum");
     for (const StampedPose& pose : truth_) {
       const PoseNumbers n = PoseNumbers::of(pose.T_world_body);
-      (void)file.append(fmt::format("{} {:.9f} {:.9f} {:.9f} {:.9f} {:.9f} {:.9f} {:.9f}\n", format_seconds(pose.stamp.ns()), n.t[0],
-                                    n.t[1], n.t[2], n.q[0], n.q[1], n.q[2], n.q[3]));
+      (void)file.append(fmt::format("{} {:.9f} {:.9f} {:.9f} {:.9f} {:.9f} {:.9f} {:.9f}\n",
+                                    format_seconds(pose.stamp.ns()), n.t[0], n.t[1], n.t[2], n.q[0],
+                                    n.q[1], n.q[2], n.q[3]));
     }
-    if (!file.close()) faults->push_back(file.path().string() + ": is not complete; make room on that disk");
+    if (!file.close())
+      faults->push_back(file.path().string() + ": is not complete; make room on that disk");
   } catch (const InputError& e) {
     faults->emplace_back(e.what());
   }
@@ -258,23 +282,25 @@ std::vector<std::pair<std::string, std::size_t>> Drive::memory() const {
 
 std::vector<std::pair<std::string, std::uint64_t>> Drive::device_counters() const {
   const LiveCounters& c = source_->counters();
-  std::vector<std::pair<std::string, std::uint64_t>> out{{"sets_complete", c.sync.complete},
-                                                         {"sets_incomplete", c.sync.incomplete},
-                                                         {"pulses_missed", c.sync.missed},
-                                                         {"sets_overtaken", c.dropped_sets},
-                                                         {"readings_dropped", c.dropped_readings},
-                                                         {"frames_torn", c.torn},
-                                                         {"sets_unproven", c.sync.unproven},
-                                                         {"clock_resets", c.clock_resets},
-                                                         {"worst_stamp_error_ns", static_cast<std::uint64_t>(c.worst_stamp_error_ns)}};
+  std::vector<std::pair<std::string, std::uint64_t>> out{
+      {"sets_complete", c.sync.complete},
+      {"sets_incomplete", c.sync.incomplete},
+      {"pulses_missed", c.sync.missed},
+      {"sets_overtaken", c.dropped_sets},
+      {"readings_dropped", c.dropped_readings},
+      {"frames_torn", c.torn},
+      {"sets_unproven", c.sync.unproven},
+      {"clock_resets", c.clock_resets},
+      {"worst_stamp_error_ns", static_cast<std::uint64_t>(c.worst_stamp_error_ns)}};
   if (exposure_) {
     const ExposureCounters e = exposure_->counters();
-    out.insert(out.end(), {{"exposure_changes", e.changes},
-                           {"exposure_refused", e.refused},
-                           {"exposure_unequal", e.unequal},
-                           {"exposure_again", e.again},
-                           {"exposure_last_us", static_cast<std::uint64_t>(e.newest.exposure.ns() / 1000)},
-                           {"gain_last_millidb", static_cast<std::uint64_t>(1000 * e.newest.gain_db)}});
+    out.insert(out.end(),
+               {{"exposure_changes", e.changes},
+                {"exposure_refused", e.refused},
+                {"exposure_unequal", e.unequal},
+                {"exposure_again", e.again},
+                {"exposure_last_us", static_cast<std::uint64_t>(e.newest.exposure.ns() / 1000)},
+                {"gain_last_millidb", static_cast<std::uint64_t>(1000 * e.newest.gain_db)}});
   }
   for (int k = 0; k < begin_.file.rig.cameras; ++k) {
     const auto i = static_cast<std::size_t>(k);
@@ -297,16 +323,19 @@ TruthFigures Drive::truth_figures(const SessionTotals& totals) const {
   if (totals.trajectory.empty() || devices_.mock() == nullptr) return figures;
   figures.evaluation = evaluate(totals.trajectory, truth_, summary_evaluation_options());
   if (estimator_->calibrated())
-    figures.calibration_error =
-        calibration_errors(estimator_->calibration(), devices_.mock()->truth().calibration(totals.trajectory.back().stamp - start_));
+    figures.calibration_error = calibration_errors(
+        estimator_->calibration(),
+        devices_.mock()->truth().calibration(totals.trajectory.back().stamp - start_));
   return figures;
 }
 
 SummaryInput Drive::summary_input(const SessionTotals& totals, std::uint64_t allocations) const {
   SummaryInput input;
   const LiveCounters& c = source_->counters();
-  // Pulses whose images nobody estimated from: of some no set came, because nothing proved yet which images were theirs.
-  const auto acquiring = std::min_element(c.sync.acquiring.begin(), c.sync.acquiring.begin() + begin_.file.rig.cameras);
+  // Pulses whose images nobody estimated from: of some no set came, because nothing proved yet
+  // which images were theirs.
+  const auto acquiring = std::min_element(c.sync.acquiring.begin(),
+                                          c.sync.acquiring.begin() + begin_.file.rig.cameras);
   input.skipped = c.dropped_sets + c.sync.missed + *acquiring;
   input.dropped_by_estimator = journal_.dropped();
   if (!totals.reference.empty() && !totals.trajectory.empty())
@@ -326,32 +355,46 @@ SummaryInput Drive::summary_input(const SessionTotals& totals, std::uint64_t all
 }
 
 void Drive::tell(const SessionTotals& totals, const SummaryInput& input, Progress* progress) const {
-  progress->say(
-      fmt::format("session {}: {} frames, {} posed ({} degraded), {} lost, {} dropped; {:.2f} m; {:.1f} ms a frame, {:.1f} at p99",
-                  request_.out.string(), totals.read, totals.ok + totals.degraded, totals.degraded, totals.lost, input.skipped,
-                  totals.path_m, totals.estimate.mean(), totals.estimate.percentile(0.99)));
-  if (const std::string sentence = verification_sentence(input); !sentence.empty()) progress->say(sentence);
-  if (!input.truth || !input.truth->evaluation || input.truth->evaluation->status != EvaluationStatus::ok) return;
+  progress->say(fmt::format(
+      "session {}: {} frames, {} posed ({} degraded), {} lost, {} dropped; {:.2f} m; {:.1f} ms a "
+      "frame, {:.1f} at p99",
+      request_.out.string(), totals.read, totals.ok + totals.degraded, totals.degraded, totals.lost,
+      input.skipped, totals.path_m, totals.estimate.mean(), totals.estimate.percentile(0.99)));
+  if (const std::string sentence = verification_sentence(input); !sentence.empty())
+    progress->say(sentence);
+  if (!input.truth || !input.truth->evaluation ||
+      input.truth->evaluation->status != EvaluationStatus::ok)
+    return;
   const TrajectoryEvaluation& e = *input.truth->evaluation;
   const SegmentErrors &far = e.segments[0], &near = e.segments[1];
-  const std::string segments = far.count > 0    ? fmt::format("; segments of 100 to 800 m {:.3f} %", 100 * far.translation)
-                               : near.count > 0 ? fmt::format("; segments of 10 to 50 m {:.3f} %", 100 * near.translation)
-                                                : "";
-  progress->say(fmt::format("against the mock's truth over {:.1f} m: ATE {:.3f} m{}{}", e.path_reference, e.ate_se3.rmse, segments,
-                            devices_.ins() != nullptr ? " (the report compares with the INS, whose own errors are in its figures)" : ""));
+  const std::string segments =
+      far.count > 0    ? fmt::format("; segments of 100 to 800 m {:.3f} %", 100 * far.translation)
+      : near.count > 0 ? fmt::format("; segments of 10 to 50 m {:.3f} %", 100 * near.translation)
+                       : "";
+  progress->say(
+      fmt::format("against the mock's truth over {:.1f} m: ATE {:.3f} m{}{}", e.path_reference,
+                  e.ate_se3.rmse, segments,
+                  devices_.ins() != nullptr
+                      ? " (the report compares with the INS, whose own errors are in its figures)"
+                      : ""));
 }
 
-ExitCode Drive::verdict(const SessionTotals& totals, const std::vector<std::string>& faults, Progress* progress) const {
+ExitCode Drive::verdict(const SessionTotals& totals, const std::vector<std::string>& faults,
+                        Progress* progress) const {
   if (totals.ok + totals.degraded == 0) {
-    progress->say("vergence: there never was a pose; events.jsonl and poses.csv in " + request_.out.string() + " say why");
+    progress->say("vergence: there never was a pose; events.jsonl and poses.csv in " +
+                  request_.out.string() + " say why");
     return ExitCode::not_usable;
   }
   if (!source_->missing().empty()) {
-    progress->say(fmt::format("vergence: camera {} was gone at the end; check its cable and power", fmt::join(source_->missing(), ", ")));
+    progress->say(fmt::format("vergence: camera {} was gone at the end; check its cable and power",
+                              fmt::join(source_->missing(), ", ")));
     return ExitCode::device_failed;
   }
   if (devices_.ins() != nullptr && comparison_->matches() == 0) {
-    progress->say("vergence: the INS never had a position for a frame: nothing is compared; the poses are there");
+    progress->say(
+        "vergence: the INS never had a position for a frame: nothing is compared; the poses are "
+        "there");
     return ExitCode::not_usable;
   }
   return faults.empty() ? ExitCode::done : ExitCode::not_usable;
@@ -361,7 +404,8 @@ ExitCode Drive::run() {
   make_session_folder(request_.out);
   constexpr double kUnknownDrive = 3600;  // s, memory for as long where nobody knows how long it is
   const std::size_t frames =
-      devices_.frames() > 0 ? devices_.frames() : static_cast<std::size_t>(kUnknownDrive * configuration_.trigger.rate);
+      devices_.frames() > 0 ? devices_.frames()
+                            : static_cast<std::size_t>(kUnknownDrive * configuration_.trigger.rate);
   Recorder::Options to_record;
   to_record.when_full = request_.fast ? Recorder::WhenFull::wait : Recorder::WhenFull::drop;
   to_record.expected_frames = frames;
@@ -371,7 +415,9 @@ ExitCode Drive::run() {
   const auto is_full = [](const mock::Fault& f) { return f.kind == mock::FaultKind::disk_full; };
   if (std::any_of(scheduled.begin(), scheduled.end(), is_full))
     to_record.disk_full = [this, scheduled, is_full](Stamp stamp) {
-      return std::any_of(scheduled.begin(), scheduled.end(), [&](const mock::Fault& f) { return is_full(f) && f.active(stamp - start_); });
+      return std::any_of(scheduled.begin(), scheduled.end(), [&](const mock::Fault& f) {
+        return is_full(f) && f.active(stamp - start_);
+      });
     };
   recorder_ = std::make_unique<Recorder>(request_.out, to_record);
   journal_.open(recorder_.get(), start_);
@@ -389,31 +435,39 @@ ExitCode Drive::run() {
   }
   const SyncMode mode = devices_.sync().mode;
   journal_.tell(start_, "pairing", proof_sentence(mode), false);
-  if (mode == SyncMode::software) progress.say(std::string("vergence: ") + proof_sentence(mode) + "; poses in motion suffer from it");
+  if (mode == SyncMode::software)
+    progress.say(std::string("vergence: ") + proof_sentence(mode) +
+                 "; poses in motion suffer from it");
   begin();
   if (!truth_.empty()) write_truth(&faults);
   std::thread estimating([this] { estimate(); });
   watch(&progress);
   estimating.join();
   source_->join();
-  if (devices_.mock() != nullptr && devices_.board_keeps_own_time()) {  // whose pulses nobody knew before they were made
+  if (devices_.mock() != nullptr &&
+      devices_.board_keeps_own_time()) {  // whose pulses nobody knew before they were made
     truth_ = true_trajectory(*devices_.mock(), configuration_, start_);
     write_truth(&faults);
   }
   if (exposure_) exposure_->settle();
   progress.finish();
   if (exposure_ && exposure_->counters().unsupported)
-    progress.say("vergence: exposure.mode is auto, but a camera cannot change its exposure while it streams; set it to fixed");
+    progress.say(
+        "vergence: exposure.mode is auto, but a camera cannot change its exposure while it "
+        "streams; set it to fixed");
 
   const auto totals = recorder_->close();
-  const SummaryInput input = summary_input(*totals, AllocationGuard::allocations_after_seal() - allocations_before);
-  if (faults.empty()) end_session(request_.out, begin_, input, *totals, journal_.matches(), &faults);
+  const SummaryInput input =
+      summary_input(*totals, AllocationGuard::allocations_after_seal() - allocations_before);
+  if (faults.empty())
+    end_session(request_.out, begin_, input, *totals, journal_.matches(), &faults);
   write_session_summary(request_.out, *totals, input, &faults);
   faults.insert(faults.end(), totals->faults.begin(), totals->faults.end());
-  for (const std::string& sentence :
-       write_other_formats(request_.out, request_.also, *totals, input.earth.value_or(EarthFigures{}), &faults))
+  for (const std::string& sentence : write_other_formats(
+           request_.out, request_.also, *totals, input.earth.value_or(EarthFigures{}), &faults))
     progress.say("vergence: " + sentence);
-  for (const std::string& sentence : recorder_->take_complaints()) progress.say("vergence: " + sentence);
+  for (const std::string& sentence : recorder_->take_complaints())
+    progress.say("vergence: " + sentence);
   for (const std::string& sentence : faults) progress.say("vergence: " + sentence);
   if (!request_.quiet) tell(*totals, input, &progress);
   const bool usable = write_session_report(request_.out, request_.quiet, &progress);
@@ -426,7 +480,8 @@ void Drive::begin() {
   const HostStamp assumed = devices_.start();
   source_->start();
   start_ = start_ + (devices_.start() - assumed);  // a mock in real time knows it only now
-  if (devices_.mock() != nullptr && !devices_.board_keeps_own_time()) truth_ = true_trajectory(*devices_.mock(), configuration_, start_);
+  if (devices_.mock() != nullptr && !devices_.board_keeps_own_time())
+    truth_ = true_trajectory(*devices_.mock(), configuration_, start_);
 }
 
 }  // namespace

@@ -24,14 +24,16 @@ struct RunRequest {
   bool print_memory = false;
 };
 
-/// Drives: cameras, INS and board of the configuration through pairing, estimator and comparison into a session folder (DESIGN §6).
+/// Drives: cameras, INS and board of the configuration through pairing, estimator and comparison
+/// into a session folder (DESIGN §6).
 ///
-/// Threads  The devices' own, the synchroniser's, the estimator (sealed, with the comparison), its worker, the calibration
-///          solver's (sealed, too), the recorder; the caller's
-///          thread draws the progress line and watches for signals.
-/// Errors   InputError before the session folder is made, for all that can be known by then. Afterwards sentences on stderr.
-/// → done, not_usable (never a pose, an INS that never had a fix, a file that is not whole), device_failed (gone at the end),
-///   interrupted, terminated
+/// Threads  The devices' own, the synchroniser's, the estimator (sealed, with the comparison), its
+///          worker, the calibration solver's (sealed, too), the recorder; the caller's thread draws
+///          the progress line and watches for signals.
+/// Errors   InputError before the session folder is made, for all that can be known by then.
+///          Afterwards sentences on stderr.
+/// → done, not_usable (never a pose, an INS that never had a fix, a file that is not whole),
+///   device_failed (gone at the end), interrupted, terminated
 [[nodiscard]] ExitCode run_drive(const RunRequest& request);
 
 }  // namespace vergence::app

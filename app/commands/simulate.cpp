@@ -21,8 +21,9 @@ namespace vergence::app {
 namespace {
 
 constexpr double kMeasuredSigma = 1e-3;  // m: of the given length with `--length measured`
-constexpr double kFailedRatio = 1.2;     // rms above so many times what the noise explains is a failed run
-constexpr double kFailedExact = 1e-6;    // px: mean reprojection error of a failed run without noise
+constexpr double kFailedRatio =
+    1.2;  // rms above so many times what the noise explains is a failed run
+constexpr double kFailedExact = 1e-6;  // px: mean reprojection error of a failed run without noise
 
 /// The words as given; checked when the command runs.
 struct Arguments {
@@ -69,14 +70,16 @@ std::vector<double> parse_noise(const std::string& text) {
   std::vector<double> levels(count);
   for (std::size_t i = 0; i < count; ++i)
     if (!parse_number(fields[i], &levels[i]) || !(levels[i] >= 0) || levels[i] > kLargest)
-      throw InputError("--noise: `" + std::string(fields[i]) + "` is not a noise between 0 and 100 pixels; give them like 0,0.1,0.2");
+      throw InputError("--noise: `" + std::string(fields[i]) +
+                       "` is not a noise between 0 and 100 pixels; give them like 0,0.1,0.2");
   return levels;
 }
 
 void check(const Arguments& a) {
   const SimulationOptions& s = a.simulation;
   const auto within = [](const char* option, double value, double least, double most) {
-    if (!(value >= least && value <= most)) throw InputError(fmt::format("{} needs a number between {} and {}", option, least, most));
+    if (!(value >= least && value <= most))
+      throw InputError(fmt::format("{} needs a number between {} and {}", option, least, most));
   };
   within("--points", s.points, 5, 100000);
   within("--cameras", s.cameras, 2, kMaxCameras);
@@ -88,40 +91,51 @@ void check(const Arguments& a) {
 }
 
 /// Solves one problem and books what came out.
-void run_once(BundleAdjuster& adjuster, const Arguments& a, const SimulationOptions& s, std::uint64_t run, Level* level) {
+void run_once(BundleAdjuster& adjuster, const Arguments& a, const SimulationOptions& s,
+              std::uint64_t run, Level* level) {
   Random random(a.seed, run + 1);  // a stream a run: the same geometry at every noise level
   SimulatedRig rig = simulate_rig(s, random);
   BundleOptions options;
   options.configuration = BundleConfiguration::stereo_calibration;
   if (a.length == "measured")
     for (std::size_t k = 1; k < rig.cameras.size(); ++k)
-      options.length[k] = {BundleLength::measured, rig.true_T_camera_left[k].t.norm() + kMeasuredSigma * random.normal(), kMeasuredSigma};
+      options.length[k] = {BundleLength::measured,
+                           rig.true_T_camera_left[k].t.norm() + kMeasuredSigma * random.normal(),
+                           kMeasuredSigma};
   std::vector<float> squared(rig.observations.size());
   BundleProblem problem = rig.problem();
   problem.squared_residuals = squared;
 
   const auto start = std::chrono::steady_clock::now();
   const BundleResult result = adjuster.solve(problem, options);
-  level->ms.add(std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count());
+  level->ms.add(
+      std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count());
 
   double reprojection = 0;
   for (std::size_t i = 0; i < squared.size(); ++i)
-    reprojection += std::sqrt(static_cast<double>(squared[i])) / static_cast<double>(rig.observations[i].inverse_sigma) /
+    reprojection += std::sqrt(static_cast<double>(squared[i])) /
+                    static_cast<double>(rig.observations[i].inverse_sigma) /
                     static_cast<double>(squared.size());
   const double parameters = 3.0 * s.points + 6.0 * (s.poses - 1) + 5.0 * (s.cameras - 1);
-  const double expected = s.noise * std::sqrt(2.0 * std::max(0.0, 1.0 - parameters / (2.0 * static_cast<double>(squared.size()))));
+  const double expected =
+      s.noise *
+      std::sqrt(2.0 *
+                std::max(0.0, 1.0 - parameters / (2.0 * static_cast<double>(squared.size()))));
   ++level->runs;
-  if (!result.converged() || (s.noise > 0 ? result.rms_px > kFailedRatio * expected : reprojection > kFailedExact)) {
+  if (!result.converged() ||
+      (s.noise > 0 ? result.rms_px > kFailedRatio * expected : reprojection > kFailedExact)) {
     ++level->failed;
     return;
   }
   double rotation = 0, translation = 0, pose = 0;
   for (std::size_t k = 1; k < rig.cameras.size(); ++k) {
-    rotation += rotation_angle(rig.T_camera_left[k].R * rig.true_T_camera_left[k].R.transpose()) / (s.cameras - 1);
+    rotation += rotation_angle(rig.T_camera_left[k].R * rig.true_T_camera_left[k].R.transpose()) /
+                (s.cameras - 1);
     translation += (rig.T_camera_left[k].t - rig.true_T_camera_left[k].t).norm() / (s.cameras - 1);
   }
   for (std::size_t i = 1; i < rig.T_left_world.size(); ++i)
-    pose += (rig.T_left_world[i].centre() - rig.true_T_left_world[i].centre()).norm() / (s.poses - 1);
+    pose +=
+        (rig.T_left_world[i].centre() - rig.true_T_left_world[i].centre()).norm() / (s.poses - 1);
   level->reprojection_px.add(reprojection);
   level->pose_m.add(pose);
   level->rotation_rad.add(rotation);
@@ -150,14 +164,20 @@ nlohmann::ordered_json json_of(const std::vector<Level>& levels) {
 
 void print_table(const Arguments& a, const std::vector<Level>& levels) {
   const SimulationOptions& s = a.simulation;
-  std::cout << fmt::format("{} points in a {} of {} m, {} cameras, generator {}, length {} ({} free parameters a camera), mean | median\n",
-                           s.points, a.shape, s.radius, s.cameras, a.generator, a.length, a.length == "exact" ? 5 : 6);
-  std::cout << fmt::format("{:>8} {:>7} {:>6} {:>19} {:>19} {:>19} {:>19} {:>6} {:>9}\n", "noise px", "runs", "failed", "reprojection px",
-                           "pose m", "rotation rad", "translation m", "steps", "ms median");
-  const auto pair = [](const Figure& f) { return fmt::format("{:.2e} | {:.2e}", f.mean(), f.median()); };
+  std::cout << fmt::format(
+      "{} points in a {} of {} m, {} cameras, generator {}, length {} ({} free parameters a "
+      "camera), mean | median\n",
+      s.points, a.shape, s.radius, s.cameras, a.generator, a.length, a.length == "exact" ? 5 : 6);
+  std::cout << fmt::format("{:>8} {:>7} {:>6} {:>19} {:>19} {:>19} {:>19} {:>6} {:>9}\n",
+                           "noise px", "runs", "failed", "reprojection px", "pose m",
+                           "rotation rad", "translation m", "steps", "ms median");
+  const auto pair = [](const Figure& f) {
+    return fmt::format("{:.2e} | {:.2e}", f.mean(), f.median());
+  };
   for (const Level& l : levels)
-    std::cout << fmt::format("{:>8} {:>7} {:>6} {:>19} {:>19} {:>19} {:>19} {:>6.1f} {:>9.3f}\n", l.noise, l.runs, l.failed,
-                             pair(l.reprojection_px), pair(l.pose_m), pair(l.rotation_rad), pair(l.translation_m), l.steps.mean(),
+    std::cout << fmt::format("{:>8} {:>7} {:>6} {:>19} {:>19} {:>19} {:>19} {:>6.1f} {:>9.3f}\n",
+                             l.noise, l.runs, l.failed, pair(l.reprojection_px), pair(l.pose_m),
+                             pair(l.rotation_rad), pair(l.translation_m), l.steps.mean(),
                              l.ms.median());
 }
 
@@ -166,8 +186,10 @@ ExitCode run(const Arguments& given) {
   Arguments a = given;
   const std::vector<double> noise = parse_noise(a.noise);
   a.simulation.shape = a.shape == "shell" ? SimulationShape::shell : SimulationShape::ball;
-  a.simulation.generator = a.generator == "tight" ? SimulationGenerator::tight : SimulationGenerator::ring;
-  if (a.simulation.generator == SimulationGenerator::tight) a.simulation.start_points = -1;  // triangulated
+  a.simulation.generator =
+      a.generator == "tight" ? SimulationGenerator::tight : SimulationGenerator::ring;
+  if (a.simulation.generator == SimulationGenerator::tight)
+    a.simulation.start_points = -1;  // triangulated
   std::ofstream json;
   if (!a.json.empty()) {  // before the work, not after it
     json.open(a.json);
@@ -201,7 +223,8 @@ ExitCode run(const Arguments& given) {
   if (json.is_open()) {
     json << json_of(levels).dump(1) << '\n';
     json.close();
-    if (!json) throw InputError("--json: " + a.json + " could not be written to its end; is the disk full?");
+    if (!json)
+      throw InputError("--json: " + a.json + " could not be written to its end; is the disk full?");
   }
   return ExitCode::done;
 }
@@ -210,7 +233,8 @@ ExitCode run(const Arguments& given) {
 
 void add_simulate(CLI::App& root, ExitCode* exit_code) {
   const auto a = std::make_shared<Arguments>();
-  CLI::App* command = root.add_subcommand("simulate", "Repeat the calibration experiment on simulated point clouds");
+  CLI::App* command = root.add_subcommand(
+      "simulate", "Repeat the calibration experiment on simulated point clouds");
   command->group("Research");
   SimulationOptions& s = a->simulation;
   command->add_option("--points", s.points, "Points of the cloud")->capture_default_str();
@@ -218,21 +242,31 @@ void add_simulate(CLI::App& root, ExitCode* exit_code) {
   command->add_option("--shape", a->shape, "Points fill a ball or lie on its shell")
       ->check(CLI::IsMember({"ball", "shell"}))
       ->capture_default_str();
-  command->add_option("--noise", a->noise, "Noise levels, px of each coordinate")->capture_default_str();
+  command->add_option("--noise", a->noise, "Noise levels, px of each coordinate")
+      ->capture_default_str();
   command->add_option("--runs", a->runs, "Random problems a level")->capture_default_str();
   command->add_option("--seed", a->seed, "Of the random problems")->capture_default_str();
   command
       ->add_option("--generator", a->generator,
-                   "ring: rigs 20 to 25 m away; tight: as near as all points stay in view, points triangulated")
+                   "ring: rigs 20 to 25 m away; tight: as near as all points stay in view, points "
+                   "triangulated")
       ->check(CLI::IsMember({"ring", "tight"}))
       ->capture_default_str();
-  command->add_option("--start-position", s.start_position, "Start of the rigs' positions off by up to ±, m an axis")
+  command
+      ->add_option("--start-position", s.start_position,
+                   "Start of the rigs' positions off by up to ±, m an axis")
       ->capture_default_str();
-  command->add_option("--start-rotation", s.start_rotation, "Start of the stereo rotation off by up to ±, rad an axis")
+  command
+      ->add_option("--start-rotation", s.start_rotation,
+                   "Start of the stereo rotation off by up to ±, rad an axis")
       ->capture_default_str();
-  command->add_option("--start-translation", s.start_translation, "Start of the stereo translation off by up to ±, m an axis")
+  command
+      ->add_option("--start-translation", s.start_translation,
+                   "Start of the stereo translation off by up to ±, m an axis")
       ->capture_default_str();
-  command->add_option("--length", a->length, "The baseline's length is known exactly, or measured to 1 mm")
+  command
+      ->add_option("--length", a->length,
+                   "The baseline's length is known exactly, or measured to 1 mm")
       ->check(CLI::IsMember({"exact", "measured"}))
       ->capture_default_str();
   command->add_option("--cameras", s.cameras, "Cameras of the rig, 2 to 4")->capture_default_str();

@@ -13,17 +13,21 @@
 namespace vergence::app {
 namespace {
 
-constexpr Duration kBefore = Duration::seconds(3);  // from power to the drive's start: finding and setting the board fit
-constexpr Duration kAfter = Duration::seconds(8);   // a board that was away to the end is found and set once more, which ends the drive
+constexpr Duration kBefore =
+    Duration::seconds(3);  // from power to the drive's start: finding and setting the board fit
+constexpr Duration kAfter = Duration::seconds(
+    8);  // a board that was away to the end is found and set once more, which ends the drive
 
 /// The driver on its line, with the rig's cameras on the board's.
 class SimulatedBoard final : public TriggerDevice {
  public:
-  SimulatedBoard(mock::MockRig* rig, std::unique_ptr<trigger_board::Device> board) : rig_(rig), board_(std::move(board)) {}
+  SimulatedBoard(mock::MockRig* rig, std::unique_ptr<trigger_board::Device> board)
+      : rig_(rig), board_(std::move(board)) {}
   ~SimulatedBoard() override { stop(); }
 
   const DeviceInfo& info() const noexcept override { return board_->info(); }
-  DeviceStatus configure(const TriggerConfiguration& c, TriggerConfiguration* actual) noexcept override {
+  DeviceStatus configure(const TriggerConfiguration& c,
+                         TriggerConfiguration* actual) noexcept override {
     return board_->configure(c, actual);
   }
   DeviceTiming timing() const noexcept override { return board_->timing(); }
@@ -34,7 +38,9 @@ class SimulatedBoard final : public TriggerDevice {
     }
     return over(board_->start(ready));
   }
-  DeviceStatus wait(Duration limit, Pulse* pulse) noexcept override { return over(board_->wait(limit, pulse)); }
+  DeviceStatus wait(Duration limit, Pulse* pulse) noexcept override {
+    return over(board_->wait(limit, pulse));
+  }
   DeviceStatus pause(std::uint32_t pulses) noexcept override { return board_->pause(pulses); }
   void stop() noexcept override {
     board_->stop();
@@ -87,14 +93,17 @@ mock::SimulatedLineOptions line_of(const Configuration& c, const mock::MockRig& 
   o.seed = static_cast<std::uint64_t>(c.mock.seed) + 1;
   for (const mock::Fault& f : rig.truth().faults()) {
     if (f.kind != mock::FaultKind::board_gone) continue;
-    const HostStamp from = rig.start() + f.at, never = rig.start() + length_of(c, rig) + Duration::seconds(1);
+    const HostStamp from = rig.start() + f.at,
+                    never = rig.start() + length_of(c, rig) + Duration::seconds(1);
     o.outages.push_back({from, f.duration == Duration{} ? never : from + f.duration, f.powered});
   }
-  std::sort(o.outages.begin(), o.outages.end(), [](const mock::Outage& a, const mock::Outage& b) { return a.from < b.from; });
+  std::sort(o.outages.begin(), o.outages.end(),
+            [](const mock::Outage& a, const mock::Outage& b) { return a.from < b.from; });
   return o;
 }
 
-/// The simulated board pulses on while its line is away and starts anew with it: what one without a supply would not do meanwhile.
+/// The simulated board pulses on while its line is away and starts anew with it: what one without a
+/// supply would not do meanwhile.
 bool is_off(const mock::MockRig& rig, HostStamp at) noexcept {
   const auto& faults = rig.truth().faults();
   return std::any_of(faults.begin(), faults.end(), [&](const mock::Fault& f) {
@@ -105,28 +114,34 @@ bool is_off(const mock::MockRig& rig, HostStamp at) noexcept {
 mock::PulseSource cameras_of(mock::MockRig* rig, HostStamp end) {
   return [rig, end](const mock::SimulatedPulse& pulse) {
     mock::SimulatedExposures out{};
-    if (pulse.edge <= end && is_off(*rig, pulse.edge)) return out;  // one after the end ends the drive
+    if (pulse.edge <= end && is_off(*rig, pulse.edge))
+      return out;  // one after the end ends the drive
     const auto exposures = rig->feed(pulse.edge);
     for (std::size_t k = 0; k < std::min(out.size(), exposures.size()); ++k)
-      if (exposures[k].seen) out[k] = {true, pulse.edge + exposures[k].start, pulse.edge + exposures[k].end};
+      if (exposures[k].seen)
+        out[k] = {true, pulse.edge + exposures[k].start, pulse.edge + exposures[k].end};
     return out;
   };
 }
 
 }  // namespace
 
-std::unique_ptr<TriggerDevice> make_simulated_board(const Configuration& c, mock::MockRig* rig, const trigger_board::Device** driver,
+std::unique_ptr<TriggerDevice> make_simulated_board(const Configuration& c, mock::MockRig* rig,
+                                                    const trigger_board::Device** driver,
                                                     std::vector<std::string>* remarks) {
-  auto simulator = std::make_shared<mock::BoardSimulator>(cameras_of(rig, rig->start() + length_of(c, *rig)), board_of(c, *rig));
+  auto simulator = std::make_shared<mock::BoardSimulator>(
+      cameras_of(rig, rig->start() + length_of(c, *rig)), board_of(c, *rig));
   trigger_board::Options options = trigger_board_options(c.trigger);
   DeviceStatus status = DeviceStatus::ok;
   std::string complaint;
-  auto board =
-      trigger_board::open_on(std::make_unique<mock::SimulatedPlace>(std::move(simulator), line_of(c, *rig)), options, &status, &complaint);
+  auto board = trigger_board::open_on(
+      std::make_unique<mock::SimulatedPlace>(std::move(simulator), line_of(c, *rig)), options,
+      &status, &complaint);
   if (board == nullptr) throw InputError("trigger: " + complaint);
   if (board->configure(trigger_configuration(c, rig->cameras()), nullptr) != DeviceStatus::ok)
     throw InputError(board_title(board->info()) + ": " + board->complaint());
-  if (const std::string remark = board->remark(); !remark.empty()) remarks->push_back(board_title(board->info()) + ": " + remark);
+  if (const std::string remark = board->remark(); !remark.empty())
+    remarks->push_back(board_title(board->info()) + ": " + remark);
   *driver = board.get();
   return std::make_unique<SimulatedBoard>(rig, std::move(board));
 }

@@ -13,11 +13,14 @@ struct SnapRequest {
   double wait_s = 5;          // for a set
 };
 
-/// Opens the configured cameras, takes `count` synchronised sets, writes their pictures and snap.json into the folder, a table to standard
-/// output and what strikes the eye to standard error.
+/// Opens the configured cameras, takes `count` synchronised sets, writes their pictures and
+/// snap.json into the folder, a table to standard output and what strikes the eye to standard
+/// error.
 ///
-/// Cameras that wait for a pulse which does not come are asked by command, and where they have no such command run freely; it says so.
-/// → done, not_usable (pictures are there and no good), device_failed (a camera sent nothing), interrupted, terminated
+/// Cameras that wait for a pulse which does not come are asked by command, and where they have no
+/// such command run freely; it says so.
+/// → done, not_usable (pictures are there and no good), device_failed (a camera sent nothing),
+///   interrupted, terminated
 /// Errors  InputError: configuration, devices that are not there, folder.
 [[nodiscard]] ExitCode take_pictures(const SnapRequest& request);
 

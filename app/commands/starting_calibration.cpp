@@ -16,7 +16,8 @@ namespace vergence::app {
 namespace {
 
 /// The configuration's words around the numbers.
-void name_cameras(const Configuration& c, const std::vector<std::string>& serials, CalibrationFile* file) {
+void name_cameras(const Configuration& c, const std::vector<std::string>& serials,
+                  CalibrationFile* file) {
   if (!c.rig.name.empty()) file->rig_name = c.rig.name;
   for (std::size_t k = 0; k < static_cast<std::size_t>(file->rig.cameras); ++k) {
     if (!c.cameras[k].name.empty()) file->names[k] = c.cameras[k].name;
@@ -27,32 +28,42 @@ void name_cameras(const Configuration& c, const std::vector<std::string>& serial
   }
 }
 
-/// Whether the configuration says where the cameras sit. The mock's rig is what it says, also when it says nothing.
+/// Whether the configuration says where the cameras sit. The mock's rig is what it says, also when
+/// it says nothing.
 bool placed_by_configuration(const Configuration& c, int cameras) {
   for (std::size_t k = 1; k < static_cast<std::size_t>(cameras); ++k) {
     const auto& T = c.cameras[k].T_camera_left;
-    if (c.cameras[k].driver != "mock" && std::all_of(T.begin(), T.end(), [](double v) { return v == 0; })) return false;
+    if (c.cameras[k].driver != "mock" &&
+        std::all_of(T.begin(), T.end(), [](double v) { return v == 0; }))
+      return false;
   }
   return true;
 }
 
-/// Refuses a calibration of other cameras; of other serials it is a remark, for a camera may have been replaced by its like.
-void check_same_rig(const std::string& name, const CalibrationFile& file, const CalibrationFile& configured,
-                    std::vector<std::string>* remarks) {
+/// Refuses a calibration of other cameras; of other serials it is a remark, for a camera may have
+/// been replaced by its like.
+void check_same_rig(const std::string& name, const CalibrationFile& file,
+                    const CalibrationFile& configured, std::vector<std::string>* remarks) {
   if (file.rig.cameras != configured.rig.cameras)
-    throw InputError(fmt::format("{}: is of {} cameras, the configuration has {}", name, file.rig.cameras, configured.rig.cameras));
+    throw InputError(fmt::format("{}: is of {} cameras, the configuration has {}", name,
+                                 file.rig.cameras, configured.rig.cameras));
   for (std::size_t k = 0; k < static_cast<std::size_t>(file.rig.cameras); ++k) {
     const Intrinsics &theirs = file.rig.intrinsics[k], &ours = configured.rig.intrinsics[k];
     if (theirs.width != ours.width || theirs.height != ours.height)
-      throw InputError(fmt::format("{}: is for images of {} x {} pixels, cameras.{}.size is {} x {}", name, theirs.width, theirs.height, k,
-                                   ours.width, ours.height));
-    if (!file.serials[k].empty() && !configured.serials[k].empty() && file.serials[k] != configured.serials[k])
-      remarks->push_back(fmt::format("{}: is of a camera {} with the serial \"{}\"; the configuration's is \"{}\"", name, k,
-                                     file.serials[k], configured.serials[k]));
+      throw InputError(
+          fmt::format("{}: is for images of {} x {} pixels, cameras.{}.size is {} x {}", name,
+                      theirs.width, theirs.height, k, ours.width, ours.height));
+    if (!file.serials[k].empty() && !configured.serials[k].empty() &&
+        file.serials[k] != configured.serials[k])
+      remarks->push_back(
+          fmt::format("{}: is of a camera {} with the serial \"{}\"; the configuration's is \"{}\"",
+                      name, k, file.serials[k], configured.serials[k]));
   }
 }
 
-double angle_between(const Vec3& a, const Vec3& b) { return std::atan2(a.cross(b).norm(), a.dot(b)); }
+double angle_between(const Vec3& a, const Vec3& b) {
+  return std::atan2(a.cross(b).norm(), a.dot(b));
+}
 
 }  // namespace
 
@@ -62,7 +73,8 @@ RigCalibration nominal_geometry(const RigCalibration& given, const RigCalibratio
   RigCalibration nominal = given;
   apply_use({.length_only = true}, &nominal);
   const double length = mounted.T_camera_left[1].t.norm();
-  const double factor = length > 0 ? given.baseline / length : 1;  // somebody may have measured another length
+  const double factor =
+      length > 0 ? given.baseline / length : 1;  // somebody may have measured another length
   for (std::size_t k = 1; k < static_cast<std::size_t>(nominal.cameras); ++k) {
     const Transform& T = mounted.T_camera_left[k];
     if (log_so3(T.R).norm() > options.max_rotation_deg * kRadians ||
@@ -72,7 +84,8 @@ RigCalibration nominal_geometry(const RigCalibration& given, const RigCalibratio
   return nominal;
 }
 
-StartingCalibration starting_calibration(const Configuration& c, const CalibrationWish& wish, const std::vector<std::string>& serials) {
+StartingCalibration starting_calibration(const Configuration& c, const CalibrationWish& wish,
+                                         const std::vector<std::string>& serials) {
   StartingCalibration start;
   CalibrationFile configured;
   configured.rig = nominal_rig(c);
@@ -82,10 +95,12 @@ StartingCalibration starting_calibration(const Configuration& c, const Calibrati
   start.source = "the configuration";
   start.state = state_file(c.rig);
 
-  const bool from_scratch = wish.from_scratch || (!wish.file && !placed_by_configuration(c, configured.rig.cameras));
+  const bool from_scratch =
+      wish.from_scratch || (!wish.file && !placed_by_configuration(c, configured.rig.cameras));
   if (wish.file) {
     const ImageSize size{configured.rig.intrinsics[0].width, configured.rig.intrinsics[0].height};
-    start.file = read_given_calibration(wish.file->string(), {.length_only = wish.from_scratch}, size, &start.remarks);
+    start.file = read_given_calibration(wish.file->string(), {.length_only = wish.from_scratch},
+                                        size, &start.remarks);
     check_same_rig(wish.file->string(), start.file, configured, &start.remarks);
     name_cameras(c, serials, &start.file);
     start.source = wish.file->filename().string();
@@ -109,7 +124,8 @@ StartingCalibration starting_calibration(const Configuration& c, const Calibrati
   return start;
 }
 
-StartingCalibration replayed_calibration(const Configuration& c, const StereoSequence& sequence, bool from_scratch) {
+StartingCalibration replayed_calibration(const Configuration& c, const StereoSequence& sequence,
+                                         bool from_scratch) {
   StartingCalibration start;
   start.file.rig = sequence.calibration;
   start.file.rig_name = c.rig.name;
@@ -121,7 +137,8 @@ StartingCalibration replayed_calibration(const Configuration& c, const StereoSeq
   return start;
 }
 
-EstimatorOptions estimator_options(const Configuration& c, CalibrationTrust trust, Adoption adoption,
+EstimatorOptions estimator_options(const Configuration& c, CalibrationTrust trust,
+                                   Adoption adoption,
                                    const std::array<ImageView, kMaxCameras>& masks) {
   EstimatorOptions o;
   o.odometry = c.odometry;

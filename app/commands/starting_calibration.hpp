@@ -10,17 +10,20 @@
 #include "app/datasets/stereo_sequence.hpp"
 #include "core/estimator/estimator.hpp"
 
-/// What a drive begins with: --from-scratch before --calibration FILE before the state file before the configuration (METHOD §3).
+/// What a drive begins with: --from-scratch before --calibration FILE before the state file before
+/// the configuration (METHOD §3).
 namespace vergence::app {
 
 /// What the command line says about it.
 struct CalibrationWish {
   bool from_scratch = false;
-  std::optional<std::filesystem::path> file{};  // --calibration; with from_scratch its intrinsics and its length only
+  std::optional<std::filesystem::path>
+      file{};  // --calibration; with from_scratch its intrinsics and its length only
 };
 
 struct StartingCalibration {
-  CalibrationFile file{};    // what the estimator is given, with the cameras' names and serials; from scratch T_camera_left is parallel
+  CalibrationFile file{};  // what the estimator is given, with the cameras' names and serials; from
+                           // scratch T_camera_left is parallel
   RigCalibration nominal{};  // what the gates compare with
   CalibrationTrust trust = CalibrationTrust::given;
   const char* cause = "given";                   // of calibrations.csv
@@ -29,23 +32,29 @@ struct StartingCalibration {
   std::optional<std::filesystem::path> state{};  // where an accepted one is kept; nothing: nowhere
 };
 
-/// Of a drive. `serials`: of the cameras that are there, for those that the configuration does not name. From scratch, too, where the
-/// cameras are real and neither a file nor the configuration says where they sit. Errors  InputError: a file that is damaged or of another
-/// rig. A state file that is not used is a remark.
-[[nodiscard]] StartingCalibration starting_calibration(const Configuration& configuration, const CalibrationWish& wish,
+/// Of a drive. `serials`: of the cameras that are there, for those that the configuration does
+/// not name. From scratch, too, where the
+/// cameras are real and neither a file nor the configuration says where they sit. Errors
+/// InputError: a file that is damaged or of another rig. A state file that is not used is a remark.
+[[nodiscard]] StartingCalibration starting_calibration(const Configuration& configuration,
+                                                       const CalibrationWish& wish,
                                                        const std::vector<std::string>& serials);
 
-/// Of a replay; the sequence was opened with the same from_scratch. State files are neither read nor written.
-[[nodiscard]] StartingCalibration replayed_calibration(const Configuration& configuration, const StereoSequence& sequence,
+/// Of a replay; the sequence was opened with the same from_scratch. State files are neither read
+/// nor written.
+[[nodiscard]] StartingCalibration replayed_calibration(const Configuration& configuration,
+                                                       const StereoSequence& sequence,
                                                        bool from_scratch);
 
-/// What the gates compare with: parallel cameras a baseline apart; of a camera that is mounted farther from there than the gates let
-/// through, its place in `mounted`.
-[[nodiscard]] RigCalibration nominal_geometry(const RigCalibration& given, const RigCalibration& mounted,
+/// What the gates compare with: parallel cameras a baseline apart; of a camera that is mounted
+/// farther from there than the gates let through, its place in `mounted`.
+[[nodiscard]] RigCalibration nominal_geometry(const RigCalibration& given,
+                                              const RigCalibration& mounted,
                                               const calibration::CalibrationOptions& options);
 
 /// `masks` by camera, as EstimatorOptions has them.
-[[nodiscard]] EstimatorOptions estimator_options(const Configuration& configuration, CalibrationTrust trust, Adoption adoption,
-                                                 const std::array<ImageView, kMaxCameras>& masks = {});
+[[nodiscard]] EstimatorOptions estimator_options(
+    const Configuration& configuration, CalibrationTrust trust, Adoption adoption,
+    const std::array<ImageView, kMaxCameras>& masks = {});
 
 }  // namespace vergence::app

@@ -9,8 +9,9 @@
 namespace vergence::app {
 
 std::size_t columns(std::string_view utf8) noexcept {
-  return static_cast<std::size_t>(
-      std::count_if(utf8.begin(), utf8.end(), [](char c) { return (static_cast<unsigned char>(c) & 0xC0U) != 0x80U; }));
+  return static_cast<std::size_t>(std::count_if(utf8.begin(), utf8.end(), [](char c) {
+    return (static_cast<unsigned char>(c) & 0xC0U) != 0x80U;
+  }));
 }
 
 std::string padded(std::string_view text, std::size_t width) {
@@ -41,15 +42,21 @@ Terminal Terminal::of_stdout() {
   Terminal t;
   if (::isatty(STDOUT_FILENO) == 0) return t;
   winsize size{};
-  if (::ioctl(STDOUT_FILENO, TIOCGWINSZ, &size) == 0 && size.ws_col > 0) t.width = std::clamp<std::size_t>(size.ws_col, kLeast, kMost);
+  if (::ioctl(STDOUT_FILENO, TIOCGWINSZ, &size) == 0 && size.ws_col > 0)
+    t.width = std::clamp<std::size_t>(size.ws_col, kLeast, kMost);
   const char* kind = std::getenv("TERM");
-  t.colours = kind != nullptr && std::string_view(kind) != "dumb" && std::getenv("NO_COLOR") == nullptr;
+  t.colours =
+      kind != nullptr && std::string_view(kind) != "dumb" && std::getenv("NO_COLOR") == nullptr;
   return t;
 }
 
 std::string Terminal::in(Ink ink, std::string_view text) const {
   if (!colours) return std::string(text);
-  const char* code = ink == Ink::red ? "31;1" : ink == Ink::yellow ? "33;1" : ink == Ink::green ? "32" : ink == Ink::bold ? "1" : "2";
+  const char* code = ink == Ink::red      ? "31;1"
+                     : ink == Ink::yellow ? "33;1"
+                     : ink == Ink::green  ? "32"
+                     : ink == Ink::bold   ? "1"
+                                          : "2";
   return std::string("\033[") + code + "m" + std::string(text) + "\033[0m";
 }
 

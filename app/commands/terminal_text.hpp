@@ -11,11 +11,12 @@ namespace vergence::app {
 [[nodiscard]] std::size_t columns(std::string_view utf8) noexcept;
 /// The text and blanks up to `width` columns; longer texts stay as they are.
 [[nodiscard]] std::string padded(std::string_view text, std::size_t width);
-/// Lines of at most `width` columns, broken at blanks; a longer word gets a line of its own. At least one line.
+/// Lines of at most `width` columns, broken at blanks; a longer word gets a line of its own. At
+/// least one line.
 [[nodiscard]] std::vector<std::string> wrapped(std::string_view text, std::size_t width);
 
-/// Standard output: its width (100 where it is no terminal, at least 60), and whether colours are welcome (a terminal that can, NO_COLOR
-/// unset).
+/// Standard output: its width (100 where it is no terminal, at least 60), and whether colours are
+/// welcome (a terminal that can, NO_COLOR unset).
 struct Terminal {
   std::size_t width = 100;
   bool colours = false;
@@ -25,7 +26,8 @@ struct Terminal {
   [[nodiscard]] std::string in(Ink ink, std::string_view text) const;
 };
 
-/// Whatever is not printable becomes a blank: texts of devices must not steer a terminal. UTF-8 stays.
+/// Whatever is not printable becomes a blank: texts of devices must not steer a terminal. UTF-8
+/// stays.
 [[nodiscard]] std::string harmless(std::string_view text);
 
 }  // namespace vergence::app

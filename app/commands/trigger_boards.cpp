@@ -13,20 +13,27 @@ trigger_board::Edge edge_of(const std::string& key, const std::string& word) {
   if (word == "none") return trigger_board::Edge::none;
   if (word == "rising") return trigger_board::Edge::rising;
   if (word == "falling") return trigger_board::Edge::falling;
-  throw InputError(
-      fmt::format("{} is \"{}\"{}; it is one of none, rising, falling", key, word, did_you_mean(word, {"none", "rising", "falling"})));
+  throw InputError(fmt::format("{} is \"{}\"{}; it is one of none, rising, falling", key, word,
+                               did_you_mean(word, {"none", "rising", "falling"})));
 }
 
 /// The sentence for an open() that gave nothing.
 std::string refusal(const TriggerSettings& settings, const std::string& said, DeviceStatus status) {
-  const std::string who = fmt::format("trigger: the board{}", settings.port.empty() ? "" : " on " + settings.port);
+  const std::string who =
+      fmt::format("trigger: the board{}", settings.port.empty() ? "" : " on " + settings.port);
   switch (status) {
     case DeviceStatus::busy:
-      return fmt::format("{} is in use by another program; end that one (ModemManager opens new ports: tell it not to)", who);
+      return fmt::format(
+          "{} is in use by another program; end that one (ModemManager opens new ports: tell it "
+          "not to)",
+          who);
     case DeviceStatus::no_permission:
-      return fmt::format("{} cannot be opened without permission; add the user to group dialout, and log in again", who);
+      return fmt::format(
+          "{} cannot be opened without permission; add the user to group dialout, and log in again",
+          who);
     default:
-      return fmt::format("{} cannot be used: {}", who, said.empty() ? std::string(to_string(status)) : said);
+      return fmt::format("{} cannot be used: {}", who,
+                         said.empty() ? std::string(to_string(status)) : said);
   }
 }
 
@@ -40,9 +47,12 @@ trigger_board::Options trigger_board_options(const TriggerSettings& settings) {
   return o;
 }
 
-std::string board_title(const DeviceInfo& info) { return fmt::format("trigger ({} {}, {})", info.driver, info.serial, info.place); }
+std::string board_title(const DeviceInfo& info) {
+  return fmt::format("trigger ({} {}, {})", info.driver, info.serial, info.place);
+}
 
-std::unique_ptr<trigger_board::Device> open_trigger_board(const TriggerSettings& settings, const TriggerConfiguration& pulses,
+std::unique_ptr<trigger_board::Device> open_trigger_board(const TriggerSettings& settings,
+                                                          const TriggerConfiguration& pulses,
                                                           std::vector<std::string>* remarks) {
   trigger_board::Driver driver(trigger_board_options(settings));
   DeviceStatus status = DeviceStatus::ok;
@@ -51,10 +61,12 @@ std::unique_ptr<trigger_board::Device> open_trigger_board(const TriggerSettings&
   status = board->configure(pulses, nullptr);
   if (status != DeviceStatus::ok) {
     const std::string said = board->complaint();
-    throw InputError(fmt::format("{}: {}", board_title(board->info()),
-                                 said.empty() ? fmt::format("cannot do what is asked: {}", to_string(status)) : said));
+    throw InputError(fmt::format(
+        "{}: {}", board_title(board->info()),
+        said.empty() ? fmt::format("cannot do what is asked: {}", to_string(status)) : said));
   }
-  if (const std::string remark = board->remark(); !remark.empty()) remarks->push_back(board_title(board->info()) + ": " + remark);
+  if (const std::string remark = board->remark(); !remark.empty())
+    remarks->push_back(board_title(board->info()) + ": " + remark);
   return board;
 }
 

@@ -12,8 +12,9 @@ namespace vergence::app {
 ///
 /// Errors  InputError, one sentence: the key, what was found, what to do. Nothing stays open then.
 /// `remarks`: sentences about what works, but not as asked.
-[[nodiscard]] std::unique_ptr<trigger_board::Device> open_trigger_board(const TriggerSettings& settings, const TriggerConfiguration& pulses,
-                                                                        std::vector<std::string>* remarks);
+[[nodiscard]] std::unique_ptr<trigger_board::Device> open_trigger_board(
+    const TriggerSettings& settings, const TriggerConfiguration& pulses,
+    std::vector<std::string>* remarks);
 
 /// What the driver needs to know of a board of this configuration.
 [[nodiscard]] trigger_board::Options trigger_board_options(const TriggerSettings& settings);

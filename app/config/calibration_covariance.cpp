@@ -16,7 +16,8 @@
 namespace vergence::app {
 namespace {
 
-constexpr double kRounding = 1e-6;  // of a correlation, and of the least eigenvalue of their matrix: what nine digits a number leave
+constexpr double kRounding = 1e-6;  // of a correlation, and of the least eigenvalue of their
+                                    // matrix: what nine digits a number leave
 constexpr std::array kPlaceNames{"rx", "ry", "rz", "tx", "ty", "tz"};
 constexpr std::array kRadtanNames{"fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2", "k3"};
 constexpr std::array kEquidistantNames{"fx", "fy", "cx", "cy", "k1", "k2", "k3", "k4"};
@@ -28,27 +29,36 @@ struct NamedRow {
 
 /// Names that tell the cameras apart and cannot be mistaken for an index.
 bool names_tell(const CalibrationFile& c) {
-  const auto plain = [](unsigned char letter) { return std::isalnum(letter) != 0 || letter == '_' || letter == '-'; };
+  const auto plain = [](unsigned char letter) {
+    return std::isalnum(letter) != 0 || letter == '_' || letter == '-';
+  };
   const auto names = std::span(c.names).first(static_cast<std::size_t>(c.rig.cameras));
   for (std::size_t k = 0; k < names.size(); ++k) {
     const std::string& name = names[k];
-    if (name.empty() || std::isalpha(static_cast<unsigned char>(name.front())) == 0 || !std::all_of(name.begin(), name.end(), plain) ||
-        std::find(names.begin(), names.begin() + static_cast<std::ptrdiff_t>(k), name) != names.begin() + static_cast<std::ptrdiff_t>(k))
+    if (name.empty() || std::isalpha(static_cast<unsigned char>(name.front())) == 0 ||
+        !std::all_of(name.begin(), name.end(), plain) ||
+        std::find(names.begin(), names.begin() + static_cast<std::ptrdiff_t>(k), name) !=
+            names.begin() + static_cast<std::ptrdiff_t>(k))
       return false;
   }
   return true;
 }
 
 template <std::size_t N>
-void append_rows(const std::string& camera, const std::array<const char*, N>& names, int first, std::vector<NamedRow>* rows) {
-  for (std::size_t i = 0; i < N; ++i) rows->push_back({camera + "." + names[i], first + static_cast<int>(i)});
+void append_rows(const std::string& camera, const std::array<const char*, N>& names, int first,
+                 std::vector<NamedRow>* rows) {
+  for (std::size_t i = 0; i < N; ++i)
+    rows->push_back({camera + "." + names[i], first + static_cast<int>(i)});
 }
 
 /// Every parameter of the rig, in the order of the rows.
 std::vector<NamedRow> rows_of(const CalibrationFile& c, bool by_name) {
-  const auto camera = [&](int k) { return by_name ? c.names[static_cast<std::size_t>(k)] : std::to_string(k); };
+  const auto camera = [&](int k) {
+    return by_name ? c.names[static_cast<std::size_t>(k)] : std::to_string(k);
+  };
   std::vector<NamedRow> rows;
-  for (int k = 1; k < c.rig.cameras; ++k) append_rows(camera(k), kPlaceNames, extrinsic_row(k), &rows);
+  for (int k = 1; k < c.rig.cameras; ++k)
+    append_rows(camera(k), kPlaceNames, extrinsic_row(k), &rows);
   for (int k = 0; k < c.rig.cameras; ++k) {
     if (c.rig.intrinsics[static_cast<std::size_t>(k)].kind == CameraModelKind::pinhole_radtan)
       append_rows(camera(k), kRadtanNames, intrinsic_row(k), &rows);
@@ -59,7 +69,8 @@ std::vector<NamedRow> rows_of(const CalibrationFile& c, bool by_name) {
 }
 
 /// The rows that a list of names stands for.
-std::vector<NamedRow> read_rows(const YamlFile& file, const YAML::Node& list, const CalibrationFile& calibration) {
+std::vector<NamedRow> read_rows(const YamlFile& file, const YAML::Node& list,
+                                const CalibrationFile& calibration) {
   const std::string field = "covariance.parameters";
   std::vector<NamedRow> known = rows_of(calibration, false);
   if (names_tell(calibration)) {
@@ -70,14 +81,15 @@ std::vector<NamedRow> read_rows(const YamlFile& file, const YAML::Node& list, co
   names.reserve(known.size());
   for (const NamedRow& row : known) names.push_back(row.name);
 
-  if (!list.IsSequence() || list.size() == 0) file.fail(list, field + " is not a list of parameters, like right.rx or left.k1");
+  if (!list.IsSequence() || list.size() == 0)
+    file.fail(list, field + " is not a list of parameters, like right.rx or left.k1");
   std::vector<NamedRow> rows;
   for (const auto& item : list) {
     const std::string name = file.text(item, field);
     const auto found = std::find(names.begin(), names.end(), name);
     if (found == names.end())
-      file.fail(item,
-                fmt::format("{} has \"{}\", which is no parameter of this rig{}", field, name.substr(0, 60), did_you_mean(name, names)));
+      file.fail(item, fmt::format("{} has \"{}\", which is no parameter of this rig{}", field,
+                                  name.substr(0, 60), did_you_mean(name, names)));
     const int row = known[static_cast<std::size_t>(found - names.begin())].row;
     if (std::any_of(rows.begin(), rows.end(), [row](const NamedRow& r) { return r.row == row; }))
       file.fail(item, fmt::format("{} has {} twice", field, name));
@@ -107,10 +119,13 @@ std::string format_covariance(const CalibrationFile& calibration) {
     names.push_back(rows[i].name);
     // A line a row: a person finds the variance of a parameter at the start of its own.
     upper += i == 0 ? "\n    " : ",\n    ";
-    for (std::size_t j = i; j < rows.size(); ++j) upper += fmt::format("{}{}", j == i ? "" : ", ", C(rows[i].row, rows[j].row));
+    for (std::size_t j = i; j < rows.size(); ++j)
+      upper += fmt::format("{}{}", j == i ? "" : ", ", C(rows[i].row, rows[j].row));
   }
-  return fmt::format("covariance:  # of all parameters together, wide; rad, m, px\n  parameters: [{}]\n  upper: [{}]\n",
-                     fmt::join(names, ", "), upper);
+  return fmt::format(
+      "covariance:  # of all parameters together, wide; rad, m, px\n  parameters: [{}]\n  upper: "
+      "[{}]\n",
+      fmt::join(names, ", "), upper);
 }
 
 void read_covariance(const YamlFile& file, const YAML::Node& group, CalibrationFile* calibration) {
@@ -123,10 +138,11 @@ void read_covariance(const YamlFile& file, const YAML::Node& group, CalibrationF
   auto next = upper.begin();
   for (std::size_t i = 0; i < n; ++i) {
     if (!(*next > 0))
-      file.fail(group["upper"],
-                fmt::format("covariance.upper has {:g} as the variance of {}; it must be positive (upper triangle, row by row)", *next,
-                            rows[i].name));
-    for (std::size_t j = i; j < n; ++j) calibration->rig.covariance.set(rows[i].row, rows[j].row, *next++);
+      file.fail(group["upper"], fmt::format("covariance.upper has {:g} as the variance of {}; it "
+                                            "must be positive (upper triangle, row by row)",
+                                            *next, rows[i].name));
+    for (std::size_t j = i; j < n; ++j)
+      calibration->rig.covariance.set(rows[i].row, rows[j].row, *next++);
   }
 }
 
@@ -136,7 +152,8 @@ std::optional<std::string> find_flaw(const RigCovariance& covariance) {
       const double value = covariance(i, j);
       if (!std::isfinite(value)) return "holds a number that is not finite";
       if (i == j && value < 0) return "has a negative variance";
-      if (value != 0 && !(covariance.known(i) && covariance.known(j))) return "ties a parameter to another that has no variance";
+      if (value != 0 && !(covariance.known(i) && covariance.known(j)))
+        return "ties a parameter to another that has no variance";
     }
   const std::vector<int> rows = known_rows(covariance);
   const auto n = static_cast<Eigen::Index>(rows.size());
@@ -146,12 +163,15 @@ std::optional<std::string> find_flaw(const RigCovariance& covariance) {
   for (Eigen::Index i = 0; i < n; ++i)
     for (Eigen::Index j = 0; j < n; ++j) {
       const int a = rows[static_cast<std::size_t>(i)], b = rows[static_cast<std::size_t>(j)];
-      correlation(i, j) = i == j ? 1.0 : covariance(a, b) / std::sqrt(covariance(a, a)) / std::sqrt(covariance(b, b));
+      correlation(i, j) =
+          i == j ? 1.0
+                 : covariance(a, b) / std::sqrt(covariance(a, a)) / std::sqrt(covariance(b, b));
       if (!(std::abs(correlation(i, j)) <= 1 + kRounding)) return "has a correlation beyond 1";
     }
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver(correlation, Eigen::EigenvaluesOnly);
   if (!(solver.eigenvalues()(0) >= -kRounding))
-    return "is not positive semidefinite: some combination of its parameters has a negative variance";
+    return "is not positive semidefinite: some combination of its parameters has a negative "
+           "variance";
   return std::nullopt;
 }
 
@@ -161,7 +181,9 @@ void scale_lengths(double factor, RigCovariance* covariance) {
   for (int k = 1; k < kMaxCameras; ++k) std::fill_n(by.begin() + extrinsic_row(k) + 3, 3, factor);
   for (int i = 0; i < kRigSize; ++i)
     for (int j = 0; j <= i; ++j)
-      covariance->set(i, j, (*covariance)(i, j) * by[static_cast<std::size_t>(i)] * by[static_cast<std::size_t>(j)]);
+      covariance->set(
+          i, j,
+          (*covariance)(i, j) * by[static_cast<std::size_t>(i)] * by[static_cast<std::size_t>(j)]);
 }
 
 void clear_places(RigCovariance* covariance) {

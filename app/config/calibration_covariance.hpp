@@ -5,9 +5,10 @@
 #include "app/config/calibration_file.hpp"
 #include "app/config/yaml_file.hpp"
 
-/// The group `covariance` of calibration.yaml: what of a rig's parameters trades against what. `parameters` names the rows by camera and
-/// number (`right.rx`, `left.k1`), `upper` has the upper triangle row by row. Cameras go by their names, or by their index where names
-/// do not tell them apart. Rotation in rad, translation in m, as left perturbations; lenses in px and without unit.
+/// The group `covariance` of calibration.yaml: what of a rig's parameters trades against what.
+/// `parameters` names the rows by camera and number (`right.rx`, `left.k1`), `upper` has the upper
+/// triangle row by row. Cameras go by their names, or by their index where names do not tell them
+/// apart. Rotation in rad, translation in m, as left perturbations; lenses in px and without unit.
 namespace vergence::app {
 
 /// Empty: nothing is known.
@@ -16,8 +17,8 @@ namespace vergence::app {
 /// Names, lens models and the number of cameras are read already. Errors  InputError.
 void read_covariance(const YamlFile& file, const YAML::Node& group, CalibrationFile* calibration);
 
-/// Half a sentence about why this cannot be a covariance: a number that is not finite, a negative variance, or not positive semidefinite
-/// beyond what nine digits leave.
+/// Half a sentence about why this cannot be a covariance: a number that is not finite, a negative
+/// variance, or not positive semidefinite beyond what nine digits leave.
 [[nodiscard]] std::optional<std::string> find_flaw(const RigCovariance& covariance);
 
 /// Lengths grow by a factor: rows and columns of translations do.

@@ -25,13 +25,16 @@ constexpr std::size_t kTriangle = 21;  // numbers in the upper triangle of a 6×
 /// One group of the file: its node, its name in sentences, its fields by name.
 class Section {
  public:
-  Section(const YamlFile& file, const YAML::Node& node, std::string name, const std::vector<std::string>& known)
+  Section(const YamlFile& file, const YAML::Node& node, std::string name,
+          const std::vector<std::string>& known)
       : file_(file), node_(node), name_(std::move(name)) {
     file_.check_keys(node_, name_.empty() ? "the calibration" : name_, known);
   }
 
   [[nodiscard]] bool has(const char* key) const { return static_cast<bool>(node_[key]); }
-  [[nodiscard]] std::string field(const char* key) const { return name_.empty() ? key : name_ + "." + key; }
+  [[nodiscard]] std::string field(const char* key) const {
+    return name_.empty() ? key : name_ + "." + key;
+  }
   [[nodiscard]] YAML::Node need(const char* key) const {
     const YAML::Node node = node_[key];
     if (!node) file_.fail(node_, field(key) + " is missing");
@@ -43,10 +46,12 @@ class Section {
   [[nodiscard]] std::string text(const char* key, const std::string& otherwise) const {
     return has(key) ? file_.text(node_[key], field(key)) : otherwise;
   }
-  [[nodiscard]] std::int64_t integer(const char* key, std::int64_t otherwise, std::int64_t most) const {
+  [[nodiscard]] std::int64_t integer(const char* key, std::int64_t otherwise,
+                                     std::int64_t most) const {
     return has(key) ? file_.integer(node_[key], field(key), 0, most) : otherwise;
   }
-  [[nodiscard]] std::vector<double> numbers(const char* key, std::size_t least, std::size_t most) const {
+  [[nodiscard]] std::vector<double> numbers(const char* key, std::size_t least,
+                                            std::size_t most) const {
     return file_.numbers(need(key), field(key), least, most);
   }
   /// A list that may be left out, then zeros.
@@ -63,13 +68,17 @@ class Section {
   std::string name_;
 };
 
-std::size_t most_coefficients(const Intrinsics& k) { return k.kind == CameraModelKind::pinhole_radtan ? 5 : 4; }
+std::size_t most_coefficients(const Intrinsics& k) {
+  return k.kind == CameraModelKind::pinhole_radtan ? 5 : 4;
+}
 
 Intrinsics read_intrinsics(const YamlFile& file, const Section& camera) {
-  constexpr std::int64_t kAnySize = std::numeric_limits<int>::max();  // what a size may be is checked with the rest
+  constexpr std::int64_t kAnySize =
+      std::numeric_limits<int>::max();  // what a size may be is checked with the rest
   Intrinsics k;
   const YAML::Node size = camera.need("size");
-  if (!size.IsSequence() || size.size() != 2) file.fail(size, camera.field("size") + " is not [width, height]");
+  if (!size.IsSequence() || size.size() != 2)
+    file.fail(size, camera.field("size") + " is not [width, height]");
   k.width = static_cast<int>(file.integer(size[0], camera.field("size"), -kAnySize, kAnySize));
   k.height = static_cast<int>(file.integer(size[1], camera.field("size"), -kAnySize, kAnySize));
 
@@ -78,7 +87,8 @@ Intrinsics read_intrinsics(const YamlFile& file, const Section& camera) {
   if (word == kEquidistant)
     k.kind = CameraModelKind::pinhole_equidistant;
   else if (word != kRadtan)
-    file.fail(model, fmt::format("{} is \"{}\"; {} and {} are known", camera.field("model"), word.substr(0, 60), kRadtan, kEquidistant));
+    file.fail(model, fmt::format("{} is \"{}\"; {} and {} are known", camera.field("model"),
+                                 word.substr(0, 60), kRadtan, kEquidistant));
 
   const auto f = camera.numbers("intrinsics", 4, 4);
   k.fx = f[0], k.fy = f[1], k.cx = f[2], k.cy = f[3];
@@ -113,26 +123,44 @@ Mat6 read_wide_covariance(const Section& camera) {
 }
 
 /// Transforms as other programs write them: refused with what would be the same here.
-void refuse_other_transforms(const YamlFile& file, const YAML::Node& node, const std::string& camera) {
+void refuse_other_transforms(const YamlFile& file, const YAML::Node& node,
+                             const std::string& camera) {
   struct Other {
     const char *key, *sentence;
   };
   constexpr std::array kOthers{
-      Other{"T_left_camera", "is the inverse of what is read: give T_camera_left, X_camera = R X_left + t, which is [R^T, -R^T t] of it"},
-      Other{"T_left_right", "is the inverse of what is read: give T_camera_left, X_camera = R X_left + t, which is [R^T, -R^T t] of it"},
+      Other{"T_left_camera",
+            "is the inverse of what is read: give T_camera_left, X_camera = R X_left + t, which is "
+            "[R^T, -R^T t] of it"},
+      Other{"T_left_right",
+            "is the inverse of what is read: give T_camera_left, X_camera = R X_left + t, which is "
+            "[R^T, -R^T t] of it"},
       Other{"T_right_left", "is called T_camera_left here: X_camera = R X_left + t"},
       Other{"T_cn_cnm1",
-            "is Kalibr's: give the camchain itself with --calibration, or convert it with vergence calibrate --convert IN OUT"},
+            "is Kalibr's: give the camchain itself with --calibration, or convert it with vergence "
+            "calibrate --convert IN OUT"},
       Other{"T_BS", "is of EuRoC's sensor.yaml: T_camera_left = T_BS(camera)^-1 T_BS(left)"},
-      Other{"extrinsics", "is called T_camera_left here: twelve numbers, rows of [R t], X_camera = R X_left + t"}};
+      Other{
+          "extrinsics",
+          "is called T_camera_left here: twelve numbers, rows of [R t], X_camera = R X_left + t"}};
   if (!node.IsMap()) return;
   for (const Other& other : kOthers)
-    if (const YAML::Node given = node[other.key]) file.fail(given, camera + "." + other.key + " " + other.sentence);
+    if (const YAML::Node given = node[other.key])
+      file.fail(given, camera + "." + other.key + " " + other.sentence);
 }
 
-void read_camera(const YamlFile& file, const YAML::Node& node, std::size_t k, const CalibrationUse& use, CalibrationFile* calibration) {
-  std::vector<std::string> known{"name", "serial", "size", "model", "intrinsics", "distortion", "intrinsics_sigma", "distortion_sigma"};
-  if (k > 0) known.insert(known.end(), {"T_camera_left", "sigma_noise", "sigma_wide", "covariance_wide"});
+void read_camera(const YamlFile& file, const YAML::Node& node, std::size_t k,
+                 const CalibrationUse& use, CalibrationFile* calibration) {
+  std::vector<std::string> known{"name",
+                                 "serial",
+                                 "size",
+                                 "model",
+                                 "intrinsics",
+                                 "distortion",
+                                 "intrinsics_sigma",
+                                 "distortion_sigma"};
+  if (k > 0)
+    known.insert(known.end(), {"T_camera_left", "sigma_noise", "sigma_wide", "covariance_wide"});
   refuse_other_transforms(file, node, fmt::format("cameras.{}", k));
   const Section camera(file, node, fmt::format("cameras.{}", k), known);
   RigCalibration& rig = calibration->rig;
@@ -141,8 +169,9 @@ void read_camera(const YamlFile& file, const YAML::Node& node, std::size_t k, co
   rig.intrinsics[k] = read_intrinsics(file, camera);
   if (k == 0 || (use.length_only && !camera.has("T_camera_left"))) return;
   if (!camera.has("T_camera_left"))
-    file.fail(node,
-              camera.field("T_camera_left") + " is missing; --from-scratch finds it from the drive, a file without it is enough there");
+    file.fail(node, camera.field("T_camera_left") +
+                        " is missing; --from-scratch finds it from the drive, a file without it is "
+                        "enough there");
   rig.T_camera_left[k] = read_transform(camera);
   camera.optional_numbers("sigma_noise", &rig.sigma_noise[k]);
   camera.optional_numbers("sigma_wide", &rig.sigma_wide[k]);
@@ -150,7 +179,8 @@ void read_camera(const YamlFile& file, const YAML::Node& node, std::size_t k, co
 }
 
 void read_found(const YamlFile& file, const YAML::Node& node, CalibrationFile* calibration) {
-  const Section found(file, node, "found", {"stamp", "source", "frames", "reprojection_px", "scale_sigma", "inflation"});
+  const Section found(file, node, "found",
+                      {"stamp", "source", "frames", "reprojection_px", "scale_sigma", "inflation"});
   RigCalibration& rig = calibration->rig;
   rig.found = Stamp(found.integer("stamp", 0, std::numeric_limits<std::int64_t>::max()));
   calibration->source = found.text("source", "");
@@ -178,17 +208,21 @@ YAML::Node locate(const YAML::Node& root, const std::string& field) {
 CalibrationFile read_file(const YamlFile& file, const CalibrationUse& use) {
   if (file.root().IsNull()) throw InputError(file.name() + ": is empty; a calibration is expected");
   const Section top(file, file.root(), "", {"version", "rig", "cameras", "covariance", "found"});
-  if (const auto version = file.integer(top.need("version"), "version", 1, 1'000'000); version != kVersion)
-    file.fail(top.need("version"), fmt::format("version is {}; this program reads version {}", version, kVersion));
+  if (const auto version = file.integer(top.need("version"), "version", 1, 1'000'000);
+      version != kVersion)
+    file.fail(top.need("version"),
+              fmt::format("version is {}; this program reads version {}", version, kVersion));
 
   CalibrationFile calibration;
   RigCalibration& rig = calibration.rig;
   const YAML::Node cameras = top.need("cameras");
   if (!cameras.IsSequence()) file.fail(cameras, "cameras is not a list");
   if (cameras.size() < 2 || cameras.size() > kMaxCameras)
-    file.fail(cameras, fmt::format("cameras lists {}; a rig has 2 to {}", cameras.size(), kMaxCameras));
+    file.fail(cameras,
+              fmt::format("cameras lists {}; a rig has 2 to {}", cameras.size(), kMaxCameras));
   rig.cameras = static_cast<int>(cameras.size());
-  for (std::size_t k = 0; k < cameras.size(); ++k) read_camera(file, cameras[k], k, use, &calibration);
+  for (std::size_t k = 0; k < cameras.size(); ++k)
+    read_camera(file, cameras[k], k, use, &calibration);
 
   if (top.has("covariance")) read_covariance(file, top.need("covariance"), &calibration);
 
@@ -203,25 +237,34 @@ CalibrationFile read_file(const YamlFile& file, const CalibrationUse& use) {
   }
   if (top.has("found")) read_found(file, top.need("found"), &calibration);
   if (use.length_only && !(use.baseline > 0) && !(rig.baseline > 0))
-    file.fail(file.root(), "tells no length of the baseline (rig.baseline), which images alone cannot; give it with --baseline M");
+    file.fail(file.root(),
+              "tells no length of the baseline (rig.baseline), which images alone cannot; give it "
+              "with --baseline M");
   apply_use(use, &rig);
-  if (const auto bad = find_implausible(&rig)) file.fail(locate(file.root(), bad->field), bad->sentence);
+  if (const auto bad = find_implausible(&rig))
+    file.fail(locate(file.root(), bad->field), bad->sentence);
   return calibration;
 }
 
-/// A text as a YAML scalar: plain where no reader could take it for anything else, else in double quotes.
+/// A text as a YAML scalar: plain where no reader could take it for anything else, else in double
+/// quotes.
 std::string scalar(const std::string& text) {
   const auto plain = [](unsigned char c) { return std::isalnum(c) != 0 || c == '_' || c == '-'; };
-  static const std::vector<std::string> kWords{"true", "false", "yes", "no", "on", "off", "null", "y", "n"};
+  static const std::vector<std::string> kWords{"true", "false", "yes", "no", "on",
+                                               "off",  "null",  "y",   "n"};
   std::string lower;
   for (const char c : text) lower += static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-  const bool letter_first = !text.empty() && std::isalpha(static_cast<unsigned char>(text.front())) != 0;
-  if (letter_first && std::all_of(text.begin(), text.end(), plain) && std::find(kWords.begin(), kWords.end(), lower) == kWords.end())
+  const bool letter_first =
+      !text.empty() && std::isalpha(static_cast<unsigned char>(text.front())) != 0;
+  if (letter_first && std::all_of(text.begin(), text.end(), plain) &&
+      std::find(kWords.begin(), kWords.end(), lower) == kWords.end())
     return text;
   return double_quoted(text);
 }
 
-std::string list(std::span<const double> values) { return fmt::format("[{}]", fmt::join(values, ", ")); }
+std::string list(std::span<const double> values) {
+  return fmt::format("[{}]", fmt::join(values, ", "));
+}
 
 bool any(std::span<const double> values) {
   return std::any_of(values.begin(), values.end(), [](double v) { return v != 0; });
@@ -230,23 +273,31 @@ bool any(std::span<const double> values) {
 std::string format_camera(const CalibrationFile& calibration, std::size_t k) {
   const Intrinsics& i = calibration.rig.intrinsics[k];
   const bool radtan = i.kind == CameraModelKind::pinhole_radtan;
-  const std::size_t coefficients = radtan && (i.distortion[4] != 0 || i.distortion_sigma[4] != 0) ? 5 : 4;
+  const std::size_t coefficients =
+      radtan && (i.distortion[4] != 0 || i.distortion_sigma[4] != 0) ? 5 : 4;
   std::string text = fmt::format("  - name: {}\n", scalar(calibration.names[k]));
-  if (!calibration.serials[k].empty()) text += fmt::format("    serial: {}\n", scalar(calibration.serials[k]));
-  text += fmt::format("    size: [{}, {}]\n    model: {}\n", i.width, i.height, radtan ? kRadtan : kEquidistant);
+  if (!calibration.serials[k].empty())
+    text += fmt::format("    serial: {}\n", scalar(calibration.serials[k]));
+  text += fmt::format("    size: [{}, {}]\n    model: {}\n", i.width, i.height,
+                      radtan ? kRadtan : kEquidistant);
   text += "    intrinsics: " + list(std::array{i.fx, i.fy, i.cx, i.cy}) + "\n";
   text += "    distortion: " + list(std::span(i.distortion).first(coefficients)) + "\n";
   if (any(i.sigma)) text += "    intrinsics_sigma: " + list(i.sigma) + "\n";
-  if (any(i.distortion_sigma)) text += "    distortion_sigma: " + list(std::span(i.distortion_sigma).first(coefficients)) + "\n";
+  if (any(i.distortion_sigma))
+    text +=
+        "    distortion_sigma: " + list(std::span(i.distortion_sigma).first(coefficients)) + "\n";
   return text;
 }
 
 std::string format_extrinsics(const RigCalibration& rig, std::size_t k) {
   const Transform& T = rig.T_camera_left[k];
   std::vector<double> numbers;
-  for (int row = 0; row < 3; ++row) numbers.insert(numbers.end(), {T.R(row, 0), T.R(row, 1), T.R(row, 2), T.t(row)});
-  std::string text = "    T_camera_left: " + list(numbers) + "  # X_camera = R X_left + t, rows of [R t], m\n";
-  if (any(rig.sigma_noise[k])) text += "    sigma_noise: " + list(rig.sigma_noise[k]) + "  # rad, m\n";
+  for (int row = 0; row < 3; ++row)
+    numbers.insert(numbers.end(), {T.R(row, 0), T.R(row, 1), T.R(row, 2), T.t(row)});
+  std::string text =
+      "    T_camera_left: " + list(numbers) + "  # X_camera = R X_left + t, rows of [R t], m\n";
+  if (any(rig.sigma_noise[k]))
+    text += "    sigma_noise: " + list(rig.sigma_noise[k]) + "  # rad, m\n";
   if (any(rig.sigma_wide[k])) text += "    sigma_wide: " + list(rig.sigma_wide[k]) + "\n";
   if (!rig.covariance_wide[k].isZero(0)) {
     std::vector<double> triangle;
@@ -263,7 +314,8 @@ CalibrationFile read_calibration(const std::filesystem::path& path, const Calibr
   return read_file(YamlFile::read(path), use);
 }
 
-CalibrationFile parse_calibration(std::string_view yaml, const std::string& name, const CalibrationUse& use) {
+CalibrationFile parse_calibration(std::string_view yaml, const std::string& name,
+                                  const CalibrationUse& use) {
   return read_file(YamlFile::parse(yaml, name), use);
 }
 
@@ -278,7 +330,8 @@ void apply_use(const CalibrationUse& use, RigCalibration* rig) {
     const double factor = had > 0 ? use.baseline / had : 1;
     for (std::size_t k = 1; k < static_cast<std::size_t>(rig->cameras); ++k) {
       rig->T_camera_left[k].t *= factor;
-      for (std::size_t i = 3; i < 6; ++i) rig->sigma_noise[k][i] *= factor, rig->sigma_wide[k][i] *= factor;
+      for (std::size_t i = 3; i < 6; ++i)
+        rig->sigma_noise[k][i] *= factor, rig->sigma_wide[k][i] *= factor;
       rig->covariance_wide[k].rightCols<3>() *= factor;
       rig->covariance_wide[k].bottomRows<3>() *= factor;
     }
@@ -299,7 +352,8 @@ void apply_use(const CalibrationUse& use, RigCalibration* rig) {
 std::string format_calibration(const CalibrationFile& calibration) {
   const RigCalibration& rig = calibration.rig;
   const double baseline = rig.baseline > 0 ? rig.baseline : rig.T_camera_left[1].t.norm();
-  std::string text = fmt::format("version: {}\nrig: {{name: {}, baseline: {}", kVersion, scalar(calibration.rig_name), baseline);
+  std::string text = fmt::format("version: {}\nrig: {{name: {}, baseline: {}", kVersion,
+                                 scalar(calibration.rig_name), baseline);
   if (rig.baseline_sigma != 0) text += fmt::format(", baseline_sigma: {}", rig.baseline_sigma);
   text += "}\ncameras:\n";
   for (std::size_t k = 0; k < static_cast<std::size_t>(rig.cameras); ++k) {
@@ -307,8 +361,9 @@ std::string format_calibration(const CalibrationFile& calibration) {
     if (k > 0) text += format_extrinsics(rig, k);
   }
   text += format_covariance(calibration);
-  text += fmt::format("found: {{stamp: {}, source: {}, frames: {}, reprojection_px: {}, scale_sigma: {}", rig.found.ns(),
-                      scalar(calibration.source), rig.frames, rig.reprojection_px, rig.scale_sigma);
+  text += fmt::format(
+      "found: {{stamp: {}, source: {}, frames: {}, reprojection_px: {}, scale_sigma: {}",
+      rig.found.ns(), scalar(calibration.source), rig.frames, rig.reprojection_px, rig.scale_sigma);
   if (rig.inflation != 0) text += fmt::format(", inflation: {}", rig.inflation);
   return text + "}\n";
 }

@@ -15,43 +15,51 @@ struct CalibrationFile {
   std::string rig_name{};
   std::array<std::string, kMaxCameras> names{"left", "right", "camera2", "camera3"};
   std::array<std::string, kMaxCameras> serials{};  // empty: not known
-  std::string source{};                            // what found it: `given`, `online`, `checkerboard`; empty: not said
+  std::string source{};  // what found it: `given`, `online`, `checkerboard`; empty: not said
 };
 
 /// What of a calibration is wanted.
 struct CalibrationUse {
-  bool length_only = false;  // from scratch: intrinsics and the baseline's length; where the cameras sit is not read, nor has to be there
+  bool length_only = false;  // from scratch: intrinsics and the baseline's length; where the
+                             // cameras sit is not read, nor has to be there
   double baseline = 0;       // m: instead of the file's; 0: the file's
 };
 
-/// What is wrong with a calibration: the field as it stands in calibration.yaml (`cameras.1.T_camera_left`) and half a sentence
-/// that begins with it.
+/// What is wrong with a calibration: the field as it stands in calibration.yaml
+/// (`cameras.1.T_camera_left`) and half a sentence that begins with it.
 struct Implausible {
   std::string field;
   std::string sentence;
 };
 
-/// Looks whether a rig can be real: sizes, focal lengths, principal points, distortion, rotations, baseline, side of camera 1,
-/// covariances, finite numbers. The first thing found; nothing when all is well.
+/// Looks whether a rig can be real: sizes, focal lengths, principal points, distortion, rotations,
+/// baseline, side of camera 1, covariances, finite numbers. The first thing found; nothing when all
+/// is well.
 ///
-/// For calibrations from other files (data sets): `if (auto bad = find_implausible(rig)) throw InputError(file + ": " + bad->sentence);`
-/// A rotation off by 1e-6 to 1e-3 (largest entry of RᵀR − I) is replaced by the nearest one; beyond, it is reported.
+/// For calibrations from other files (data sets): `if (auto bad = find_implausible(rig)) throw
+/// InputError(file + ": " + bad->sentence);` A rotation off by 1e-6 to 1e-3 (largest entry of RᵀR −
+/// I) is replaced by the nearest one; beyond, it is reported.
 [[nodiscard]] std::optional<Implausible> find_implausible(RigCalibration* rig);
 
-/// Errors  InputError with file:line and the field's name: unreadable, unknown key, missing or malformed field, implausible.
-[[nodiscard]] CalibrationFile read_calibration(const std::filesystem::path& path, const CalibrationUse& use = {});
+/// Errors  InputError with file:line and the field's name: unreadable, unknown key, missing or
+///         malformed field, implausible.
+[[nodiscard]] CalibrationFile read_calibration(const std::filesystem::path& path,
+                                               const CalibrationUse& use = {});
 /// `name` stands for the file in error messages.
-[[nodiscard]] CalibrationFile parse_calibration(std::string_view yaml, const std::string& name, const CalibrationUse& use = {});
+[[nodiscard]] CalibrationFile parse_calibration(std::string_view yaml, const std::string& name,
+                                                const CalibrationUse& use = {});
 
-/// The same for a calibration of another file. With a baseline all lengths are scaled by one factor; with length_only the cameras
-/// become parallel, one baseline apart, and what belonged to their places (sigmas, when it was found) is gone; what is known of the lenses
-/// stays.
+/// The same for a calibration of another file. With a baseline all lengths are scaled by one
+/// factor; with length_only the cameras become parallel, one baseline apart, and what belonged to
+/// their places (sigmas, when it was found) is gone; what is known of the lenses stays.
 void apply_use(const CalibrationUse& use, RigCalibration* rig);
 
-/// Cameras that look the same way, each a baseline to the right of the one before: X_k = X − (k L, 0, 0).
+/// Cameras that look the same way, each a baseline to the right of the one before: X_k = X − (k L,
+/// 0, 0).
 void make_parallel(RigCalibration* rig);
 
-/// read(write(c)) has the same doubles. Whole or not at all, see replace_durably(). Errors  InputError when it cannot be written.
+/// read(write(c)) has the same doubles. Whole or not at all, see replace_durably(). Errors
+/// InputError when it cannot be written.
 void write_calibration(const std::filesystem::path& path, const CalibrationFile& calibration);
 [[nodiscard]] std::string format_calibration(const CalibrationFile& calibration);
 

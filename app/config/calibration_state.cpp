@@ -19,7 +19,8 @@ constexpr double kSameLength = 1e-3;  // relative: beyond, somebody has measured
 std::string folder_name(const std::string& rig_name) {
   std::string name = rig_name.empty() ? "rig" : rig_name;
   for (char& c : name)
-    if (std::isalnum(static_cast<unsigned char>(c)) == 0 && c != '-' && c != '_' && c != '.') c = '_';
+    if (std::isalnum(static_cast<unsigned char>(c)) == 0 && c != '-' && c != '_' && c != '.')
+      c = '_';
   if (name.front() == '.') name.front() = '_';
   return name;
 }
@@ -34,17 +35,22 @@ std::optional<std::filesystem::path> folder_of(const char* variable) {
 /// Why a calibration is not of this rig; empty: it is.
 std::string mismatch(const CalibrationFile& found, const CalibrationFile& expected) {
   const RigCalibration &a = found.rig, &b = expected.rig;
-  if (a.cameras != b.cameras) return fmt::format("it is of {} cameras, the configuration has {}", a.cameras, b.cameras);
+  if (a.cameras != b.cameras)
+    return fmt::format("it is of {} cameras, the configuration has {}", a.cameras, b.cameras);
   for (std::size_t k = 0; k < static_cast<std::size_t>(a.cameras); ++k) {
     if (found.serials[k] != expected.serials[k])
-      return fmt::format("its camera {} has the serial \"{}\", the configuration's \"{}\"", k, found.serials[k], expected.serials[k]);
+      return fmt::format("its camera {} has the serial \"{}\", the configuration's \"{}\"", k,
+                         found.serials[k], expected.serials[k]);
     const Intrinsics &x = a.intrinsics[k], &y = b.intrinsics[k];
     if (x.width != y.width || x.height != y.height)
-      return fmt::format("its camera {} has {} x {} pixels, the configuration's {} x {}", k, x.width, x.height, y.width, y.height);
-    if (x.kind != y.kind) return fmt::format("its camera {} has another lens model than the configuration's", k);
+      return fmt::format("its camera {} has {} x {} pixels, the configuration's {} x {}", k,
+                         x.width, x.height, y.width, y.height);
+    if (x.kind != y.kind)
+      return fmt::format("its camera {} has another lens model than the configuration's", k);
   }
   if (!(std::abs(a.baseline - b.baseline) <= kSameLength * b.baseline))
-    return fmt::format("it was found with a baseline of {:g} m, the configuration says {:g} m", a.baseline, b.baseline);
+    return fmt::format("it was found with a baseline of {:g} m, the configuration says {:g} m",
+                       a.baseline, b.baseline);
   return "";
 }
 
@@ -53,7 +59,8 @@ std::string mismatch(const CalibrationFile& found, const CalibrationFile& expect
 std::optional<std::filesystem::path> state_file(const RigSettings& rig) {
   if (rig.state_dir == "none") return std::nullopt;
   if (!rig.state_dir.empty()) return std::filesystem::path(rig.state_dir) / kFileName;
-  const std::filesystem::path below = std::filesystem::path("vergence") / folder_name(rig.name) / kFileName;
+  const std::filesystem::path below =
+      std::filesystem::path("vergence") / folder_name(rig.name) / kFileName;
   if (const auto state = folder_of("XDG_STATE_HOME")) return *state / below;
   if (const auto home = folder_of("HOME")) return *home / ".local" / "state" / below;
   return std::nullopt;
@@ -63,7 +70,9 @@ CalibrationState read_state(const std::filesystem::path& file, const Calibration
   CalibrationState state;
   std::error_code error;
   if (!std::filesystem::exists(file, error)) {
-    if (error) state.sentence = file.string() + ": cannot be looked at (" + error.message() + "); the drive begins without it";
+    if (error)
+      state.sentence = file.string() + ": cannot be looked at (" + error.message() +
+                       "); the drive begins without it";
     return state;
   }
   try {

@@ -9,20 +9,25 @@
 /// The state file (DESIGN §6): the last calibration a drive accepted, where the next one begins.
 namespace vergence::app {
 
-/// Where the state file of this rig lies: `calibration_state.yaml` in `rig.state_dir`, or in $XDG_STATE_HOME/vergence/NAME, or in
-/// ~/.local/state/vergence/NAME. Nothing: `rig.state_dir` is `none`, or the user has no home.
-/// Characters of the rig's name that a folder's should not have become `_`; a rig without a name is `rig`.
+/// Where the state file of this rig lies: `calibration_state.yaml` in `rig.state_dir`, or in
+/// $XDG_STATE_HOME/vergence/NAME, or in ~/.local/state/vergence/NAME. Nothing: `rig.state_dir` is
+/// `none`, or the user has no home. Characters of the rig's name that a folder's should not have
+/// become `_`; a rig without a name is `rig`.
 [[nodiscard]] std::optional<std::filesystem::path> state_file(const RigSettings& rig);
 
 /// What a state file came to.
 struct CalibrationState {
   std::optional<CalibrationFile> calibration{};  // fits the rig that is there
-  std::string sentence{};                        // why a file that is there is not used; empty: none is there, or it is used
+  std::string
+      sentence{};  // why a file that is there is not used; empty: none is there, or it is used
 };
 
-/// Reads the file if there is one. It is used for the rig it was found on: as many cameras of the same sizes and lens models, the same
-/// serials in the same order, the same measured length of the baseline (to a thousandth). Errors  None: a sentence.
-[[nodiscard]] CalibrationState read_state(const std::filesystem::path& file, const CalibrationFile& expected);
+/// Reads the file if there is one. It is used for the rig it was found on: as many cameras of the
+/// same sizes and lens models, the same
+/// serials in the same order, the same measured length of the baseline (to a thousandth). Errors
+/// None: a sentence.
+[[nodiscard]] CalibrationState read_state(const std::filesystem::path& file,
+                                          const CalibrationFile& expected);
 
 /// Makes the folder if need be and replaces the file durably. Errors  InputError.
 void write_state(const std::filesystem::path& file, const CalibrationFile& calibration);

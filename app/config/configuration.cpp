@@ -34,18 +34,24 @@ class Flattener {
   explicit Flattener(std::vector<Entry>* entries) : entries_(entries) {}
 
   /// `origin`: for every entry instead of its file:line; empty: by file and line.
-  void add(const YamlFile& file, const YAML::Node& node, const std::string& name, const std::string& origin, int depth = 0) {
+  void add(const YamlFile& file, const YAML::Node& node, const std::string& name,
+           const std::string& origin, int depth = 0) {
     const std::string here = origin.empty() ? file.at(node) : origin;
-    if (depth > kDeepest) throw InputError(here + ": \"" + name.substr(0, 60) + "\" is nested too deeply; no key is");
-    if (entries_->size() >= kMostEntries) throw InputError(here + ": more values than any configuration has; is it the right file?");
+    if (depth > kDeepest)
+      throw InputError(here + ": \"" + name.substr(0, 60) + "\" is nested too deeply; no key is");
+    if (entries_->size() >= kMostEntries)
+      throw InputError(here + ": more values than any configuration has; is it the right file?");
     if (node.IsMap() && node.size() > 0) {
       for (const auto& item : node) {
         if (!item.first.IsScalar()) throw InputError(here + ": a key that is not a word");
-        add(file, item.second, name.empty() ? item.first.Scalar() : name + "." + item.first.Scalar(), origin, depth + 1);
+        add(file, item.second,
+            name.empty() ? item.first.Scalar() : name + "." + item.first.Scalar(), origin,
+            depth + 1);
       }
     } else if (node.IsSequence() && node.size() > 0) {
       std::size_t index = 0;
-      for (const auto& item : node) add(file, item, name + "." + std::to_string(index++), origin, depth + 1);
+      for (const auto& item : node)
+        add(file, item, name + "." + std::to_string(index++), origin, depth + 1);
     } else {
       const bool scalar = node.IsScalar() || node.IsNull();
       entries_->push_back({name, node.IsScalar() ? node.Scalar() : std::string(), scalar, here});
@@ -58,20 +64,26 @@ class Flattener {
 
 void add_file(const YamlFile& file, std::vector<Entry>* entries) {
   if (file.root().IsNull()) return;
-  if (!file.root().IsMap()) file.fail(file.root(), "is not a configuration: groups of `key: value` are expected");
+  if (!file.root().IsMap())
+    file.fail(file.root(), "is not a configuration: groups of `key: value` are expected");
   Flattener(entries).add(file, file.root(), "", "");
   std::set<std::string_view> names;
   for (const Entry& entry : *entries)
-    if (!names.insert(entry.name).second) throw InputError(entry.origin + ": the key \"" + entry.name.substr(0, 120) + "\" stands twice");
+    if (!names.insert(entry.name).second)
+      throw InputError(entry.origin + ": the key \"" + entry.name.substr(0, 120) +
+                       "\" stands twice");
 }
 
-/// A list, a group or a quoted text is YAML; any other value is taken as it stands, so that nothing in it needs quoting twice.
+/// A list, a group or a quoted text is YAML; any other value is taken as it stands, so that nothing
+/// in it needs quoting twice.
 void add_argument(const std::string& argument, std::vector<Entry>* entries) {
   const auto equals = argument.find('=');
   const std::string origin = "--set " + argument.substr(0, 120);
-  if (equals == std::string::npos || equals == 0) throw InputError(origin + ": KEY=VALUE is expected, as in --set odometry.features=400");
+  if (equals == std::string::npos || equals == 0)
+    throw InputError(origin + ": KEY=VALUE is expected, as in --set odometry.features=400");
   const std::string name = argument.substr(0, equals), value = argument.substr(equals + 1);
-  const bool yaml = !value.empty() && std::string_view("[{\"'").find(value.front()) != std::string_view::npos;
+  const bool yaml =
+      !value.empty() && std::string_view("[{\"'").find(value.front()) != std::string_view::npos;
   if (!yaml) {
     entries->push_back({name, value, true, origin});
     return;
@@ -82,7 +94,8 @@ void add_argument(const std::string& argument, std::vector<Entry>* entries) {
 
 bool is_group(const std::string& name) {
   const auto& groups = schema();
-  return std::any_of(groups.begin(), groups.end(), [&](const Group& g) { return !g.name.empty() && g.name == name; });
+  return std::any_of(groups.begin(), groups.end(),
+                     [&](const Group& g) { return !g.name.empty() && g.name == name; });
 }
 
 const Key* find_key(const std::string& name) {
@@ -94,7 +107,8 @@ const Key* find_key(const std::string& name) {
 
 std::string last_part(const std::string& name) { return name.substr(name.rfind('.') + 1); }
 
-/// The nearest known key by its whole name; else the one whose last part is nearest (the group was forgotten).
+/// The nearest known key by its whole name; else the one whose last part is nearest (the group was
+/// forgotten).
 std::string suggestion(const std::string& name) {
   std::vector<std::string> names, last_parts;
   for (const Group& group : schema())
@@ -112,9 +126,11 @@ std::string suggestion(const std::string& name) {
 
 [[noreturn]] void refuse_unknown(const Entry& entry) {
   const std::string shown = entry.name.substr(0, 120);
-  for (auto dot = entry.name.find('.'); dot != std::string::npos; dot = entry.name.find('.', dot + 1))
+  for (auto dot = entry.name.find('.'); dot != std::string::npos;
+       dot = entry.name.find('.', dot + 1))
     if (find_key(entry.name.substr(0, dot)) != nullptr)
-      throw InputError(entry.origin + ": " + entry.name.substr(0, dot) + " takes one value, not a group or a list");
+      throw InputError(entry.origin + ": " + entry.name.substr(0, dot) +
+                       " takes one value, not a group or a list");
   throw InputError(entry.origin + ": there is no key \"" + shown + "\"" + suggestion(entry.name));
 }
 
@@ -126,22 +142,26 @@ Number parse_number(const Entry& entry, const Key& key, const char* kind) {
   const char* end = entry.value.data() + entry.value.size();
   const auto [stop, error] = std::from_chars(entry.value.data(), end, value);
   if (error != std::errc() || stop != end)
-    throw InputError(fmt::format("{}: {} is \"{}\", not {}; it must be in {}{}", entry.origin, key.name, entry.value.substr(0, 60), kind,
-                                 range_text(key), with_unit(key)));
+    throw InputError(fmt::format("{}: {} is \"{}\", not {}; it must be in {}{}", entry.origin,
+                                 key.name, entry.value.substr(0, 60), kind, range_text(key),
+                                 with_unit(key)));
   // Written so that a NaN is refused.
   if (!(static_cast<double>(value) >= key.least && static_cast<double>(value) <= key.most))
-    throw InputError(fmt::format("{}: {} is {}; it must be in {}{}", entry.origin, key.name, entry.value.substr(0, 60), range_text(key),
-                                 with_unit(key)));
+    throw InputError(fmt::format("{}: {} is {}; it must be in {}{}", entry.origin, key.name,
+                                 entry.value.substr(0, 60), range_text(key), with_unit(key)));
   return value;
 }
 
 /// What YAML 1.1 and people call on and off, as the words that a key has.
 std::string as_switch(const std::string& value, const std::vector<std::string>& words) {
-  const auto is_word = [&words](const char* word) { return std::find(words.begin(), words.end(), word) != words.end(); };
+  const auto is_word = [&words](const char* word) {
+    return std::find(words.begin(), words.end(), word) != words.end();
+  };
   if (!is_word("on") || !is_word("off")) return value;
   std::string lower = value;
-  std::transform(lower.begin(), lower.end(), lower.begin(),
-                 [](char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c; });
+  std::transform(lower.begin(), lower.end(), lower.begin(), [](char c) {
+    return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
+  });
   if (lower == "true" || lower == "yes" || lower == "on") return "on";
   if (lower == "false" || lower == "no" || lower == "off") return "off";
   return value;
@@ -149,12 +169,14 @@ std::string as_switch(const std::string& value, const std::vector<std::string>& 
 
 void apply(const Entry& entry, Configuration* configuration) {
   if (is_group(entry.name)) {
-    if (entry.scalar && !entry.value.empty()) throw InputError(entry.origin + ": " + entry.name + " is a group of keys, not a value");
+    if (entry.scalar && !entry.value.empty())
+      throw InputError(entry.origin + ": " + entry.name + " is a group of keys, not a value");
     return;  // an empty group
   }
   const Key* key = find_key(entry.name);
   if (key == nullptr) refuse_unknown(entry);
-  if (!entry.scalar) throw InputError(entry.origin + ": " + entry.name + " takes one value, not a group or a list");
+  if (!entry.scalar)
+    throw InputError(entry.origin + ": " + entry.name + " takes one value, not a group or a list");
   switch (key->type) {
     case KeyType::integer:
       key->set(*configuration, parse_number<std::int64_t>(entry, *key, "an integer"));
@@ -166,36 +188,43 @@ void apply(const Entry& entry, Configuration* configuration) {
       if (!key->words.empty()) {
         const std::string value = as_switch(entry.value, key->words);
         if (std::find(key->words.begin(), key->words.end(), value) == key->words.end())
-          throw InputError(fmt::format("{}: {} is \"{}\"{}; it is one of {}", entry.origin, key->name, entry.value.substr(0, 60),
+          throw InputError(fmt::format("{}: {} is \"{}\"{}; it is one of {}", entry.origin,
+                                       key->name, entry.value.substr(0, 60),
                                        did_you_mean(entry.value, key->words), range_text(*key)));
         key->set(*configuration, value);
         break;
       }
       if (static_cast<double>(entry.value.size()) > key->most)
-        throw InputError(fmt::format("{}: {} is longer than {} bytes", entry.origin, key->name, key->most));
+        throw InputError(
+            fmt::format("{}: {} is longer than {} bytes", entry.origin, key->name, key->most));
       key->set(*configuration, entry.value);
       break;
   }
 }
 
-/// The faults that stand as groups, `faults.N.NAME`, become texts of one line: `KIND@SECONDS NAME=NUMBER …`.
+/// The faults that stand as groups, `faults.N.NAME`, become texts of one line: `KIND@SECONDS
+/// NAME=NUMBER …`.
 std::vector<Entry> with_faults_as_text(const std::vector<Entry>& entries) {
   std::vector<Entry> out;
-  std::map<std::string, std::map<std::string, Entry>> faults;  // by `faults.N`, then by name; the last one wins
+  std::map<std::string, std::map<std::string, Entry>>
+      faults;  // by `faults.N`, then by name; the last one wins
   for (const Entry& entry : entries) {
     const auto dot = entry.name.find('.', 7);
     if (!entry.name.starts_with("faults.") || dot == std::string::npos) {
       out.push_back(entry);
     } else {
       if (!entry.scalar || entry.value.find_first_of(" =@") != std::string::npos)
-        throw InputError(entry.origin + ": " + entry.name.substr(0, 120) + " takes one number or word");
+        throw InputError(entry.origin + ": " + entry.name.substr(0, 120) +
+                         " takes one number or word");
       faults[entry.name.substr(0, dot)].insert_or_assign(entry.name.substr(dot + 1), entry);
     }
   }
   for (const auto& [name, parts] : faults) {
     const std::string& origin = parts.begin()->second.origin;
     if (!parts.contains("kind") || !parts.contains("at"))
-      throw InputError(origin + ": " + name + " needs `kind` and `at`, as in {at: 42, kind: knock, camera: 1, pitch_deg: 0.2}");
+      throw InputError(
+          origin + ": " + name +
+          " needs `kind` and `at`, as in {at: 42, kind: knock, camera: 1, pitch_deg: 0.2}");
     std::string text = parts.at("kind").value + "@" + parts.at("at").value;
     for (const auto& [key, entry] : parts)
       if (key != "kind" && key != "at") text += " " + key + "=" + entry.value;
@@ -204,25 +233,30 @@ std::vector<Entry> with_faults_as_text(const std::vector<Entry>& entries) {
   return out;
 }
 
-/// Camera options that stand as groups, `cameras.N.options.NAME`, become texts of one line: `NAME=VALUE …`.
+/// Camera options that stand as groups, `cameras.N.options.NAME`, become texts of one line:
+/// `NAME=VALUE …`.
 std::vector<Entry> with_options_as_text(const std::vector<Entry>& entries) {
   constexpr std::string_view kGroup = ".options.";
   std::vector<Entry> out;
-  std::map<std::string, std::map<std::string, Entry>> options;  // by `cameras.N.options`, then by name; the last one wins
+  std::map<std::string, std::map<std::string, Entry>>
+      options;  // by `cameras.N.options`, then by name; the last one wins
   for (const Entry& entry : entries) {
     const auto at = entry.name.find(kGroup);
     if (!entry.name.starts_with("cameras.") || at == std::string::npos) {
       out.push_back(entry);
       continue;
     }
-    if (!entry.scalar || entry.value.empty() || entry.value.find_first_of(" =") != std::string::npos)
-      throw InputError(entry.origin + ": " + entry.name.substr(0, 120) + " takes one number or word");
+    if (!entry.scalar || entry.value.empty() ||
+        entry.value.find_first_of(" =") != std::string::npos)
+      throw InputError(entry.origin + ": " + entry.name.substr(0, 120) +
+                       " takes one number or word");
     const auto list = at + kGroup.size() - 1;
     options[entry.name.substr(0, list)].insert_or_assign(entry.name.substr(list + 1), entry);
   }
   for (const auto& [name, parts] : options) {
     std::string text;
-    for (const auto& [key, entry] : parts) text += (text.empty() ? "" : " ") + key + "=" + entry.value;
+    for (const auto& [key, entry] : parts)
+      text += (text.empty() ? "" : " ") + key + "=" + entry.value;
     out.push_back({name, text, true, parts.begin()->second.origin});
   }
   return out;
@@ -232,7 +266,8 @@ Configuration from_entries(const std::vector<Entry>& given, const std::string& n
   const std::vector<Entry> entries = with_options_as_text(with_faults_as_text(given));
   Configuration configuration;
   for (const Entry& entry : entries) apply(entry, &configuration);
-  if (const std::string sentence = find_contradiction(configuration); !sentence.empty()) throw InputError(name + ": " + sentence);
+  if (const std::string sentence = find_contradiction(configuration); !sentence.empty())
+    throw InputError(name + ": " + sentence);
   return configuration;
 }
 
@@ -245,20 +280,24 @@ Configuration load(const std::optional<YamlFile>& file, const std::vector<std::s
 
 }  // namespace
 
-Configuration load_configuration(const std::optional<std::filesystem::path>& file, const std::vector<std::string>& set) {
-  Configuration configuration = load(file ? std::optional(YamlFile::read(*file)) : std::nullopt, set);
+Configuration load_configuration(const std::optional<std::filesystem::path>& file,
+                                 const std::vector<std::string>& set) {
+  Configuration configuration =
+      load(file ? std::optional(YamlFile::read(*file)) : std::nullopt, set);
   if (file) configuration.folder = file->parent_path();
   return configuration;
 }
 
-Configuration parse_configuration(std::string_view yaml, const std::string& name, const std::vector<std::string>& set) {
+Configuration parse_configuration(std::string_view yaml, const std::string& name,
+                                  const std::vector<std::string>& set) {
   return load(YamlFile::parse(yaml, name), set);
 }
 
 std::string canonical_text(const Configuration& configuration) {
   std::vector<std::string> lines;
   for (const Group& group : schema())
-    for (const Key& key : group.keys) lines.push_back(key.name + "=" + to_text(key.get(configuration)) + "\n");
+    for (const Key& key : group.keys)
+      lines.push_back(key.name + "=" + to_text(key.get(configuration)) + "\n");
   std::sort(lines.begin(), lines.end());
   std::string text;
   for (const std::string& line : lines) text += line;
@@ -267,7 +306,8 @@ std::string canonical_text(const Configuration& configuration) {
 
 std::string configuration_hash(const Configuration& configuration) {
   std::uint64_t hash = 0xcbf29ce484222325U;  // FNV-1a, 64 bit: offset basis and prime
-  for (const char c : canonical_text(configuration)) hash = (hash ^ static_cast<unsigned char>(c)) * 0x100000001b3U;
+  for (const char c : canonical_text(configuration))
+    hash = (hash ^ static_cast<unsigned char>(c)) * 0x100000001b3U;
   return fmt::format("{:016x}", hash);
 }
 

@@ -21,7 +21,8 @@ struct RigSettings {
   double baseline_m = 0.75;
   double focal_px = 0;  // 0: 0.72 of the image's width
   double k1 = 0, k2 = 0;
-  std::string state_dir{};  // of the state file; empty: the user's folder for such things; `none`: no state file
+  std::string state_dir{};  // of the state file; empty: the user's folder for such things; `none`:
+                            // no state file
 };
 
 /// One entry of `cameras:`. Without a driver there is no such camera.
@@ -35,8 +36,9 @@ struct CameraSettings {
   double trigger_delay_us = 0;  // from the pulse's edge to the exposure's start
   double stamp_jitter_us = 0;   // 0: what the driver's kind of stamp has
   double gain_db = 0;
-  std::string mask{};                      // file; empty: none
-  std::array<double, 4> intrinsics{};      // fx fy cx cy, px; fx 0: those of rig.nominal, distortion included
+  std::string mask{};  // file; empty: none
+  std::array<double, 4>
+      intrinsics{};  // fx fy cx cy, px; fx 0: those of rig.nominal, distortion included
   std::array<double, 5> distortion{};      // k1 k2 p1 p2 k3
   std::array<double, 12> T_camera_left{};  // rows of [R t], m; zeros: as rig.nominal
 };
@@ -100,7 +102,8 @@ struct IntrinsicsErrorSettings {
   std::int64_t seed = 1;
 };
 
-/// What the stereo transform handed to the estimator is off by: camera 1 as if it had been knocked, then all lengths.
+/// What the stereo transform handed to the estimator is off by: camera 1 as if it had been knocked,
+/// then all lengths.
 struct CalibrationErrorSettings {
   double pitch_deg = 0, yaw_deg = 0, roll_deg = 0;
   double x_m = 0, y_m = 0, z_m = 0;
@@ -126,8 +129,8 @@ struct MockSettings {
 
 inline constexpr std::size_t kMostFaults = 16;
 
-/// Everything a user may change, with its defaults. Each member is bound to a row of the schema (app/config/schema.hpp),
-/// which is where its unit, range and meaning stand.
+/// Everything a user may change, with its defaults. Each member is bound to a row of the schema
+/// (app/config/schema.hpp), which is where its unit, range and meaning stand.
 struct Configuration {
   RigSettings rig{};
   std::array<CameraSettings, kMaxCameras> cameras{};
@@ -144,23 +147,30 @@ struct Configuration {
   int online = 1;  // calibration.online: 0: the calibration given is used for ever
   calibration::MonitorOptions monitor{};
   int threads = 2;                 // 1: both images on the estimator's thread
-  std::filesystem::path folder{};  // of the file it was read from: where its files are looked for; no key, empty without a file
+  std::filesystem::path folder{};  // of the file it was read from: where its files are looked for;
+                                   // no key, empty without a file
 };
 
-/// Defaults, then the YAML file if one is given, then the `--set` arguments `KEY=VALUE` in order; the last one wins.
+/// Defaults, then the YAML file if one is given, then the `--set` arguments `KEY=VALUE` in order;
+/// the last one wins.
 ///
 /// KEY is dotted, with numbers for list items; VALUE is YAML (`0.4`, `text`, `[1, 2]`).
-/// Errors  InputError with file:line (or the --set argument): unreadable file, unknown key (with the nearest known one),
-///         a key that stands twice, wrong type, outside the range, values that contradict each other.
-[[nodiscard]] Configuration load_configuration(const std::optional<std::filesystem::path>& file, const std::vector<std::string>& set);
+/// Errors  InputError with file:line (or the --set argument): unreadable file, unknown key (with
+///         the nearest known one), a key that stands twice, wrong type, outside the range, values
+///         that contradict each other.
+[[nodiscard]] Configuration load_configuration(const std::optional<std::filesystem::path>& file,
+                                               const std::vector<std::string>& set);
 
 /// The same from text; `name` stands for the file in error messages.
-[[nodiscard]] Configuration parse_configuration(std::string_view yaml, const std::string& name, const std::vector<std::string>& set);
+[[nodiscard]] Configuration parse_configuration(std::string_view yaml, const std::string& name,
+                                                const std::vector<std::string>& set);
 
-/// Every key and its value, one `key=value` a line, ordered by key, numbers in the shortest form that reads back the same.
+/// Every key and its value, one `key=value` a line, ordered by key, numbers in the shortest form
+/// that reads back the same.
 [[nodiscard]] std::string canonical_text(const Configuration& configuration);
 
-/// 16 hexadecimal digits (FNV-1a, 64 bit) of canonical_text(): equal for equal configurations, however they were written.
+/// 16 hexadecimal digits (FNV-1a, 64 bit) of canonical_text(): equal for equal configurations,
+/// however they were written.
 [[nodiscard]] std::string configuration_hash(const Configuration& configuration);
 
 }  // namespace vergence::app

@@ -61,7 +61,8 @@ std::string_view type_text(KeyType type) {
 std::string documented_name(const Group& group, const Key& key) {
   if (group.list.empty()) return key.name;
   const std::string first = group.list + "0";
-  return key.name.starts_with(first) ? group.list + "N" + key.name.substr(first.size()) : std::string();
+  return key.name.starts_with(first) ? group.list + "N" + key.name.substr(first.size())
+                                     : std::string();
 }
 
 }  // namespace
@@ -69,14 +70,15 @@ std::string documented_name(const Group& group, const Key& key) {
 std::string configuration_document() {
   std::string page(kOpening);
   for (const Group& group : schema()) {
-    page += group.name.empty() ? std::string("\n## Without a group\n\n") : "\n## `" + group.name + "`\n\n";
+    page += group.name.empty() ? std::string("\n## Without a group\n\n")
+                               : "\n## `" + group.name + "`\n\n";
     page += group.meaning + "\n\n";
     page += "| key | default | type | unit | range | meaning |\n|---|---|---|---|---|---|\n";
     for (const Key& key : group.keys) {
       const std::string name = documented_name(group, key);
       if (name.empty()) continue;
-      page += fmt::format("| `{}` | {} | {} | {} | {} | {} |\n", name, default_text(key), type_text(key.type), cell(key.unit),
-                          range_text(key), key.meaning);
+      page += fmt::format("| `{}` | {} | {} | {} | {} | {} |\n", name, default_text(key),
+                          type_text(key.type), cell(key.unit), range_text(key), key.meaning);
     }
   }
   return page;

@@ -14,7 +14,8 @@ enum class KeyType : std::uint8_t { integer, number, text };
 
 using KeyValue = std::variant<std::int64_t, double, std::string>;  // by KeyType, in its order
 
-/// One key of the configuration: what the parser checks, the hash covers and docs/configuration.md shows.
+/// One key of the configuration: what the parser checks, the hash covers and docs/configuration.md
+/// shows.
 struct Key {
   std::string name;  // dotted: odometry.features
   KeyType type = KeyType::integer;
@@ -26,18 +27,22 @@ struct Key {
   std::vector<std::string> words{};  // of a text that is one of a few; empty: any
 };
 
-/// A group of keys (the part of the name before the first dot), or the keys without a group (empty name).
+/// A group of keys (the part of the name before the first dot), or the keys without a group (empty
+/// name).
 struct Group {
   std::string name;
   std::string meaning;
   std::vector<Key> keys;
-  std::string list{};  // `cameras.`: keys go on with the item's number; the documentation shows item 0 as N. Empty: no list
+  std::string list{};  // `cameras.`: keys go on with the item's number; the documentation shows
+                       // item 0 as N. Empty: no list
 };
 
-/// All groups in the order of the documentation. A new group is a member of Configuration and a table in schema.cpp.
+/// All groups in the order of the documentation. A new group is a member of Configuration and a
+/// table in schema.cpp.
 [[nodiscard]] const std::vector<Group>& schema();
 
-/// What no single row can say (two keys that contradict each other): the sentence, empty when all is well.
+/// What no single row can say (two keys that contradict each other): the sentence, empty when all
+/// is well.
 [[nodiscard]] std::string find_contradiction(const Configuration& configuration);
 
 /// The shortest text that reads back as the same value.

@@ -21,7 +21,8 @@ std::string contents(const std::filesystem::path& path) {
   std::error_code error;
   const auto status = std::filesystem::status(path, error);
   if (!std::filesystem::exists(status)) throw InputError(path.string() + ": there is no such file");
-  if (std::filesystem::is_directory(status)) throw InputError(path.string() + ": is a folder, not a YAML file");
+  if (std::filesystem::is_directory(status))
+    throw InputError(path.string() + ": is a folder, not a YAML file");
   errno = 0;
   std::ifstream in(path, std::ios::binary);
   if (!in) throw InputError(path.string() + ": cannot be opened: " + std::strerror(errno));
@@ -30,7 +31,8 @@ std::string contents(const std::filesystem::path& path) {
   if (in.bad()) throw InputError(path.string() + ": cannot be read: " + std::strerror(errno));
   text.resize(static_cast<std::size_t>(in.gcount()));
   if (text.size() > kLargestYaml)
-    throw InputError(fmt::format("{}: is larger than {} bytes; is it the right file?", path.string(), kLargestYaml));
+    throw InputError(fmt::format("{}: is larger than {} bytes; is it the right file?",
+                                 path.string(), kLargestYaml));
   return text;
 }
 
@@ -49,14 +51,18 @@ bool parse_whole(const std::string& text, Number* value) {
 
 }  // namespace
 
-YamlFile YamlFile::read(const std::filesystem::path& path) { return parse(contents(path), path.string()); }
+YamlFile YamlFile::read(const std::filesystem::path& path) {
+  return parse(contents(path), path.string());
+}
 
 YamlFile YamlFile::parse(std::string_view text, std::string name) {
   YamlFile file;
   file.name_ = std::move(name);
   try {
     const auto documents = YAML::LoadAll(std::string(text));
-    if (documents.size() > 1) throw InputError(file.name_ + ": holds several YAML documents (lines of ---); one is expected");
+    if (documents.size() > 1)
+      throw InputError(file.name_ +
+                       ": holds several YAML documents (lines of ---); one is expected");
     if (!documents.empty()) file.root_.reset(documents.front());
   } catch (const YAML::Exception& error) {
     const std::string line = error.mark.is_null() ? "" : ":" + std::to_string(error.mark.line + 1);
@@ -70,17 +76,22 @@ std::string YamlFile::at(const YAML::Node& node) const {
   return mark.is_null() ? name_ : name_ + ":" + std::to_string(mark.line + 1);
 }
 
-void YamlFile::fail(const YAML::Node& node, const std::string& sentence) const { throw InputError(at(node) + ": " + sentence); }
+void YamlFile::fail(const YAML::Node& node, const std::string& sentence) const {
+  throw InputError(at(node) + ": " + sentence);
+}
 
-void YamlFile::check_keys(const YAML::Node& map, const std::string& what, const std::vector<std::string>& known) const {
+void YamlFile::check_keys(const YAML::Node& map, const std::string& what,
+                          const std::vector<std::string>& known) const {
   if (!map.IsMap()) fail(map, what + " is not a group of keys (`key: value`)");
   std::vector<std::string> seen;
   for (const auto& item : map) {
     if (!item.first.IsScalar()) fail(item.first, what + " has a key that is not a word");
     const std::string& key = item.first.Scalar();
     if (std::find(known.begin(), known.end(), key) == known.end())
-      fail(item.first, fmt::format("{} has the unknown key \"{}\"{}", what, shown(key), did_you_mean(key, known)));
-    if (std::find(seen.begin(), seen.end(), key) != seen.end()) fail(item.first, fmt::format("{} has the key \"{}\" twice", what, key));
+      fail(item.first, fmt::format("{} has the unknown key \"{}\"{}", what, shown(key),
+                                   did_you_mean(key, known)));
+    if (std::find(seen.begin(), seen.end(), key) != seen.end())
+      fail(item.first, fmt::format("{} has the key \"{}\" twice", what, key));
     seen.push_back(key);
   }
 }
@@ -88,21 +99,27 @@ void YamlFile::check_keys(const YAML::Node& map, const std::string& what, const 
 double YamlFile::number(const YAML::Node& node, const std::string& field) const {
   double value = 0;
   if (!node.IsScalar() || !parse_whole(node.Scalar(), &value)) {
-    // What YAML calls .nan and .inf is a number to the writer, so the sentence says what is wrong with it.
+    // What YAML calls .nan and .inf is a number to the writer, so the sentence says what is wrong
+    // with it.
     double special = 0;
     if (node.IsScalar() && YAML::convert<double>::decode(node, special) && !std::isfinite(special))
       fail(node, field + " is \"" + shown(node.Scalar()) + "\", not a finite number");
-    fail(node, field + (node.IsScalar() ? " is \"" + shown(node.Scalar()) + "\", not a number" : " is not a number"));
+    fail(node, field + (node.IsScalar() ? " is \"" + shown(node.Scalar()) + "\", not a number"
+                                        : " is not a number"));
   }
-  if (!std::isfinite(value)) fail(node, field + " is \"" + shown(node.Scalar()) + "\", not a finite number");
+  if (!std::isfinite(value))
+    fail(node, field + " is \"" + shown(node.Scalar()) + "\", not a finite number");
   return value;
 }
 
-std::int64_t YamlFile::integer(const YAML::Node& node, const std::string& field, std::int64_t least, std::int64_t most) const {
+std::int64_t YamlFile::integer(const YAML::Node& node, const std::string& field, std::int64_t least,
+                               std::int64_t most) const {
   std::int64_t value = 0;
   if (!node.IsScalar() || !parse_whole(node.Scalar(), &value))
-    fail(node, field + (node.IsScalar() ? " is \"" + shown(node.Scalar()) + "\", not an integer" : " is not an integer"));
-  if (value < least || value > most) fail(node, fmt::format("{} is {}; it must be in {} … {}", field, value, least, most));
+    fail(node, field + (node.IsScalar() ? " is \"" + shown(node.Scalar()) + "\", not an integer"
+                                        : " is not an integer"));
+  if (value < least || value > most)
+    fail(node, fmt::format("{} is {}; it must be in {} … {}", field, value, least, most));
   return value;
 }
 
@@ -112,10 +129,13 @@ std::string YamlFile::text(const YAML::Node& node, const std::string& field) con
   return node.Scalar();
 }
 
-std::vector<double> YamlFile::numbers(const YAML::Node& node, const std::string& field, std::size_t least, std::size_t most) const {
-  const std::string wanted = least == most ? std::to_string(least) : fmt::format("{} to {}", least, most);
+std::vector<double> YamlFile::numbers(const YAML::Node& node, const std::string& field,
+                                      std::size_t least, std::size_t most) const {
+  const std::string wanted =
+      least == most ? std::to_string(least) : fmt::format("{} to {}", least, most);
   if (!node.IsSequence()) fail(node, fmt::format("{} is not a list of {} numbers", field, wanted));
-  if (node.size() < least || node.size() > most) fail(node, fmt::format("{} has {} numbers; it needs {}", field, node.size(), wanted));
+  if (node.size() < least || node.size() > most)
+    fail(node, fmt::format("{} has {} numbers; it needs {}", field, node.size(), wanted));
   std::vector<double> values;
   values.reserve(node.size());
   for (const auto& item : node) values.push_back(number(item, field));

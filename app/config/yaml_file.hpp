@@ -11,7 +11,8 @@ namespace vergence::app {
 
 /// One YAML document from outside, and the sentences about it.
 ///
-/// Errors  InputError with file:line: not readable, larger than kLargestYaml, not YAML, more than one document.
+/// Errors  InputError with file:line: not readable, larger than kLargestYaml, not YAML, more than
+///         one document.
 class YamlFile {
  public:
   [[nodiscard]] static YamlFile read(const std::filesystem::path& path);
@@ -26,23 +27,27 @@ class YamlFile {
   /// Throws InputError: `file:line: sentence`.
   [[noreturn]] void fail(const YAML::Node& node, const std::string& sentence) const;
 
-  /// Refuses what is no map, a key that stands twice and a key that is not known, naming the nearest known one.
-  /// `what` says whose keys they are: `camera 1`.
-  void check_keys(const YAML::Node& map, const std::string& what, const std::vector<std::string>& known) const;
+  /// Refuses what is no map, a key that stands twice and a key that is not known, naming the
+  /// nearest known one. `what` says whose keys they are: `camera 1`.
+  void check_keys(const YAML::Node& map, const std::string& what,
+                  const std::vector<std::string>& known) const;
 
   // The value of a node; `field` names it in the sentence when it is no such thing.
   [[nodiscard]] double number(const YAML::Node& node, const std::string& field) const;  // finite
-  [[nodiscard]] std::int64_t integer(const YAML::Node& node, const std::string& field, std::int64_t least, std::int64_t most) const;
+  [[nodiscard]] std::int64_t integer(const YAML::Node& node, const std::string& field,
+                                     std::int64_t least, std::int64_t most) const;
   [[nodiscard]] std::string text(const YAML::Node& node, const std::string& field) const;
   /// A list of finite numbers whose count is in [least, most].
-  [[nodiscard]] std::vector<double> numbers(const YAML::Node& node, const std::string& field, std::size_t least, std::size_t most) const;
+  [[nodiscard]] std::vector<double> numbers(const YAML::Node& node, const std::string& field,
+                                            std::size_t least, std::size_t most) const;
 
  private:
   YAML::Node root_;
   std::string name_;
 };
 
-inline constexpr std::uintmax_t kLargestYaml = 1U << 20;  // bytes: hundreds of times a long configuration
+inline constexpr std::uintmax_t kLargestYaml =
+    1U << 20;  // bytes: hundreds of times a long configuration
 
 /// A text in double quotes, whatever is in it.
 [[nodiscard]] std::string double_quoted(std::string_view text);

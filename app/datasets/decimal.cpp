@@ -6,8 +6,9 @@
 namespace vergence::app {
 namespace {
 
-constexpr int kDecimals = 9;          // of a second in nanoseconds
-constexpr int kMaxExponent = 100;     // of a number as written; beyond, it is 0 or no time of this universe
+constexpr int kDecimals = 9;  // of a second in nanoseconds
+constexpr int kMaxExponent =
+    100;  // of a number as written; beyond, it is 0 or no time of this universe
 constexpr std::size_t kMaxText = 64;  // longer is no number anybody wrote
 
 bool is_digit(char c) noexcept { return c >= '0' && c <= '9'; }
@@ -48,7 +49,9 @@ std::optional<Digits> read_digits(std::string_view text) noexcept {
   if (i + 1 < text.size() && text[i] == '+' && is_digit(text[i + 1])) ++i;
   int exponent = 0;
   const auto [end, error] = std::from_chars(text.data() + i, text.data() + text.size(), exponent);
-  if (error != std::errc{} || end != text.data() + text.size() || exponent > kMaxExponent || exponent < -kMaxExponent) return std::nullopt;
+  if (error != std::errc{} || end != text.data() + text.size() || exponent > kMaxExponent ||
+      exponent < -kMaxExponent)
+    return std::nullopt;
   d.point += exponent;
   return d;
 }
@@ -84,7 +87,8 @@ std::optional<std::int64_t> parse_integer(std::string_view text) noexcept {
 std::string format_seconds(std::int64_t ns) {
   const bool negative = ns < 0;
   // The magnitude in unsigned arithmetic: that of the least integer does not fit a signed one.
-  const std::uint64_t magnitude = negative ? 0 - static_cast<std::uint64_t>(ns) : static_cast<std::uint64_t>(ns);
+  const std::uint64_t magnitude =
+      negative ? 0 - static_cast<std::uint64_t>(ns) : static_cast<std::uint64_t>(ns);
   std::string decimals = std::to_string(magnitude % 1'000'000'000U);
   decimals.insert(0, static_cast<std::size_t>(kDecimals) - decimals.size(), '0');
   return (negative ? "-" : "") + std::to_string(magnitude / 1'000'000'000U) + "." + decimals;

@@ -6,14 +6,16 @@
 
 namespace vergence::app {
 
-/// A decimal number of seconds (`12`, `-0.5`, `1.044989e-01`) → nanoseconds, exact: no double in between. Digits beyond the
-/// ninth decimal round half away from zero. Nothing: not a number (blanks included), or beyond what 64 bits hold.
+/// A decimal number of seconds (`12`, `-0.5`, `1.044989e-01`) → nanoseconds, exact: no double in
+/// between. Digits beyond the ninth decimal round half away from zero. Nothing: not a number
+/// (blanks included), or beyond what 64 bits hold.
 [[nodiscard]] std::optional<std::int64_t> parse_seconds_ns(std::string_view text) noexcept;
 
 /// The whole text as a decimal integer. Nothing: anything else.
 [[nodiscard]] std::optional<std::int64_t> parse_integer(std::string_view text) noexcept;
 
-/// Nanoseconds as seconds with nine decimals, `-0.000000001`: the integer's digits, nothing rounded.
+/// Nanoseconds as seconds with nine decimals, `-0.000000001`: the integer's digits, nothing
+/// rounded.
 [[nodiscard]] std::string format_seconds(std::int64_t ns);
 
 /// Without blanks, tabs and carriage returns at both ends.

@@ -12,12 +12,14 @@ using Bytes = std::span<const std::uint8_t>;
 /// Numbers of a TIFF block in its own order of bytes; nothing beyond its end.
 class Tiff {
  public:
-  explicit Tiff(Bytes bytes) : bytes_(bytes), big_(bytes.size() > 1 && bytes[0] == 'M' && bytes[1] == 'M') {}
+  explicit Tiff(Bytes bytes)
+      : bytes_(bytes), big_(bytes.size() > 1 && bytes[0] == 'M' && bytes[1] == 'M') {}
 
   [[nodiscard]] std::optional<std::uint32_t> number(std::size_t at, std::size_t size) const {
     if (at > bytes_.size() || size > bytes_.size() - at) return std::nullopt;
     std::uint32_t value = 0;
-    for (std::size_t i = 0; i < size; ++i) value = value << 8U | bytes_[at + (big_ ? i : size - 1 - i)];
+    for (std::size_t i = 0; i < size; ++i)
+      value = value << 8U | bytes_[at + (big_ ? i : size - 1 - i)];
     return value;
   }
 
@@ -39,7 +41,8 @@ std::optional<int> orientation_of(Bytes block) {
     if (!tag) return std::nullopt;
     if (*tag != kOrientation) continue;
     const auto value = tiff.number(at + kValue, 2);
-    return value && *value >= 1 && *value <= 8 ? std::optional(static_cast<int>(*value)) : std::nullopt;
+    return value && *value >= 1 && *value <= 8 ? std::optional(static_cast<int>(*value))
+                                               : std::nullopt;
   }
   return std::nullopt;
 }
@@ -55,7 +58,8 @@ std::optional<int> exif_orientation(Bytes jpeg) noexcept {
     const std::size_t length = static_cast<std::size_t>(jpeg[at + 2]) << 8U | jpeg[at + 3];
     if (kind == kScan || length < 2 || length > jpeg.size() - at - 2) return std::nullopt;
     const Bytes body = jpeg.subspan(at + 4, length - 2);
-    if (kind == kApp1 && body.size() > kExif.size() && std::equal(kExif.begin(), kExif.end(), body.begin()))
+    if (kind == kApp1 && body.size() > kExif.size() &&
+        std::equal(kExif.begin(), kExif.end(), body.begin()))
       return orientation_of(body.subspan(kExif.size()));
     at += 2 + length;
   }

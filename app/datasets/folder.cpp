@@ -11,18 +11,22 @@
 namespace vergence::app::detail {
 namespace {
 
-/// A line of times.txt: `stamp`, `stamp,file` (of that name on both sides) or `stamp,left file,right file`.
+/// A line of times.txt: `stamp`, `stamp,file` (of that name on both sides) or `stamp,left
+/// file,right file`.
 struct Line {
   Stamp stamp{};
   std::array<std::string, 2> name{};  // empty: by order
 };
 
-std::array<std::string, 2> names_of(const std::filesystem::path& file, std::size_t line, std::span<const std::string_view> fields) {
+std::array<std::string, 2> names_of(const std::filesystem::path& file, std::size_t line,
+                                    std::span<const std::string_view> fields) {
   std::array<std::string, 2> names;
   for (std::size_t k = 0; k < 2; ++k) {
     const std::string_view name = fields[std::min(k + 1, fields.size() - 1)];
     if (name.empty() || name == "." || name == ".." || name.find('/') != std::string_view::npos)
-      refuse(file, line, "`" + std::string(name.substr(0, 40)) + "` is no name of an image in left/ and right/");
+      refuse(
+          file, line,
+          "`" + std::string(name.substr(0, 40)) + "` is no name of an image in left/ and right/");
     names[k] = name;
   }
   return names;
@@ -36,44 +40,58 @@ std::vector<Line> read_times(const std::filesystem::path& file) {
     std::array<std::string_view, 3> fields;
     const std::size_t count = split(line, ',', fields);
     if (count > fields.size())
-      refuse(file, lines.number(), "has " + std::to_string(count) + " columns; stamp[,file[,right file]] is expected");
-    const auto ns = fields[0].find('.') != std::string_view::npos ? parse_seconds_ns(fields[0]) : parse_integer(fields[0]);
+      refuse(file, lines.number(),
+             "has " + std::to_string(count) + " columns; stamp[,file[,right file]] is expected");
+    const auto ns = fields[0].find('.') != std::string_view::npos ? parse_seconds_ns(fields[0])
+                                                                  : parse_integer(fields[0]);
     if (!ns)
       refuse(file, lines.number(),
-             "`" + std::string(fields[0].substr(0, 40)) + "` is neither integer nanoseconds nor seconds with a point" +
+             "`" + std::string(fields[0].substr(0, 40)) +
+                 "` is neither integer nanoseconds nor seconds with a point" +
                  (lines.number() == 1 && count > 1 ? "; begin a line of headings with #" : ""));
     Line entry{Stamp(*ns), {}};
     if (count > 1) entry.name = names_of(file, lines.number(), std::span(fields).first(count));
     if (!times.empty() && times.front().name[0].empty() != entry.name[0].empty())
-      refuse(file, lines.number(), "names an image where other lines do not, or the other way round; every line is of the same kind");
+      refuse(file, lines.number(),
+             "names an image where other lines do not, or the other way round; every line is of "
+             "the same kind");
     times.push_back(std::move(entry));
   }
   if (times.empty()) refuse(file, 0, "holds no times; one line a pair is expected");
   return times;
 }
 
-/// Where nobody wrote down when: motion is predicted by frames, so a rate that is wrong spoils no pose, but every stamp.
+/// Where nobody wrote down when: motion is predicted by frames, so a rate that is wrong spoils no
+/// pose, but every stamp.
 std::vector<Line> assumed_times(std::size_t count, std::vector<std::string>* remarks) {
   constexpr std::int64_t kStep = 100'000'000;  // ns
   std::vector<Line> times(count);
-  for (std::size_t i = 0; i < count; ++i) times[i].stamp = Stamp(static_cast<std::int64_t>(i) * kStep);
+  for (std::size_t i = 0; i < count; ++i)
+    times[i].stamp = Stamp(static_cast<std::int64_t>(i) * kStep);
   remarks->emplace_back(
-      "there is no times.txt: pairs are taken to be 0.1 s apart; write one line a pair, seconds with a point or whole nanoseconds");
+      "there is no times.txt: pairs are taken to be 0.1 s apart; write one line a pair, seconds "
+      "with a point or whole nanoseconds");
   return times;
 }
 
 std::string stem(const std::string& name) { return std::filesystem::path(name).stem().string(); }
 
-/// Both lists sorted; equal stems meet, the others stand alone. A side that has no image gets the name it should have had.
-std::vector<StereoPair> pair_by_name(const std::vector<std::string>& left, const std::vector<std::string>& right) {
+/// Both lists sorted; equal stems meet, the others stand alone. A side that has no image gets the
+/// name it should have had.
+std::vector<StereoPair> pair_by_name(const std::vector<std::string>& left,
+                                     const std::vector<std::string>& right) {
   std::vector<StereoPair> pairs;
   std::size_t l = 0, r = 0;
   while (l < left.size() || r < right.size()) {
-    const bool have_left = l < left.size() && (r == right.size() || stem(left[l]) <= stem(right[r]));
-    const bool have_right = r < right.size() && (l == left.size() || stem(right[r]) <= stem(left[l]));
+    const bool have_left =
+        l < left.size() && (r == right.size() || stem(left[l]) <= stem(right[r]));
+    const bool have_right =
+        r < right.size() && (l == left.size() || stem(right[r]) <= stem(left[l]));
     StereoPair pair;
-    pair.file[0] = have_left ? left[l] : "left/" + std::filesystem::path(right[r]).filename().string();
-    pair.file[1] = have_right ? right[r] : "right/" + std::filesystem::path(left[l]).filename().string();
+    pair.file[0] =
+        have_left ? left[l] : "left/" + std::filesystem::path(right[r]).filename().string();
+    pair.file[1] =
+        have_right ? right[r] : "right/" + std::filesystem::path(left[l]).filename().string();
     l += have_left ? 1 : 0;
     r += have_right ? 1 : 0;
     pairs.push_back(std::move(pair));
@@ -81,7 +99,8 @@ std::vector<StereoPair> pair_by_name(const std::vector<std::string>& left, const
   return pairs;
 }
 
-std::vector<StereoPair> pair_in_order(const std::vector<std::string>& left, const std::vector<std::string>& right) {
+std::vector<StereoPair> pair_in_order(const std::vector<std::string>& left,
+                                      const std::vector<std::string>& right) {
   std::vector<StereoPair> pairs(left.size());
   for (std::size_t i = 0; i < pairs.size(); ++i) pairs[i].file = {left[i], right[i]};
   return pairs;
@@ -93,16 +112,21 @@ std::array<std::string, 2> in_folders(const std::array<std::string, 2>& names, b
 }
 
 /// Images as times.txt names them; some may be missing, but not all of a side.
-std::vector<StereoPair> pair_as_named(const std::filesystem::path& folder, const std::vector<Line>& times,
-                                      const std::array<std::vector<std::string>, 2>& there, bool side_by_side) {
+std::vector<StereoPair> pair_as_named(const std::filesystem::path& folder,
+                                      const std::vector<Line>& times,
+                                      const std::array<std::vector<std::string>, 2>& there,
+                                      bool side_by_side) {
   std::vector<StereoPair> pairs(times.size());
-  for (std::size_t i = 0; i < times.size(); ++i) pairs[i] = {times[i].stamp, in_folders(times[i].name, side_by_side)};
+  for (std::size_t i = 0; i < times.size(); ++i)
+    pairs[i] = {times[i].stamp, in_folders(times[i].name, side_by_side)};
   for (std::size_t k = 0; k < 2; ++k)
     if (std::none_of(times.begin(), times.end(), [&](const Line& line) {
-          return std::binary_search(there[k].begin(), there[k].end(), in_folders(line.name, side_by_side)[k]);
+          return std::binary_search(there[k].begin(), there[k].end(),
+                                    in_folders(line.name, side_by_side)[k]);
         }))
       refuse(folder / "times.txt", 0,
-             "names no image that is there: the first is " + in_folders(times.front().name, side_by_side)[k] + ", the folder has " +
+             "names no image that is there: the first is " +
+                 in_folders(times.front().name, side_by_side)[k] + ", the folder has " +
                  there[k].front());
   return pairs;
 }
@@ -113,37 +137,45 @@ std::string orientation_remark(const std::filesystem::path& file) {
   if (read_image_file(file, &bytes) != ImageFileStatus::ok) return "";
   const auto orientation = exif_orientation(bytes);
   if (!orientation || *orientation == 1) return "";
-  return file.string() + " asks viewers to turn it (EXIF orientation " + std::to_string(*orientation) +
-         "), which is ignored: pixels are taken as the camera wrote them, and so has to be its calibration";
+  return file.string() + " asks viewers to turn it (EXIF orientation " +
+         std::to_string(*orientation) +
+         "), which is ignored: pixels are taken as the camera wrote them, and so has to be its "
+         "calibration";
 }
 
 }  // namespace
 
-StereoSequence open_folder(const std::filesystem::path& folder, bool given, const CalibrationUse& use) {
+StereoSequence open_folder(const std::filesystem::path& folder, bool given,
+                           const CalibrationUse& use) {
   StereoSequence sequence;
   sequence.root = folder;
   std::error_code ignored;
-  sequence.side_by_side = !std::filesystem::exists(folder / "left", ignored) && std::filesystem::exists(folder / "both", ignored);
+  sequence.side_by_side = !std::filesystem::exists(folder / "left", ignored) &&
+                          std::filesystem::exists(folder / "both", ignored);
   const auto left = list_images(folder, sequence.side_by_side ? "both" : "left");
   const auto right = sequence.side_by_side ? left : list_images(folder, "right");
   sequence.times = folder / "times.txt";
-  const std::vector<Line> times = std::filesystem::exists(sequence.times)
-                                      ? read_times(sequence.times)
-                                      : assumed_times(std::max(left.size(), right.size()), &sequence.remarks);
+  const std::vector<Line> times =
+      std::filesystem::exists(sequence.times)
+          ? read_times(sequence.times)
+          : assumed_times(std::max(left.size(), right.size()), &sequence.remarks);
   if (!times.front().name[0].empty()) {
     sequence.pairs = pair_as_named(folder, times, {left, right}, sequence.side_by_side);
   } else {
-    // In order of name as long as the numbers agree; else a name that only one side has is an image that the other lost.
+    // In order of name as long as the numbers agree; else a name that only one side has is an image
+    // that the other lost.
     const bool in_order = left.size() == right.size() && left.size() == times.size();
     sequence.pairs = in_order ? pair_in_order(left, right) : pair_by_name(left, right);
     if (sequence.pairs.size() != times.size())
       refuse(folder, 0,
-             "has " + std::to_string(left.size()) + " images in left/, " + std::to_string(right.size()) + " in right/ and " +
-                 std::to_string(times.size()) +
-                 " lines in times.txt; one of each a pair is expected (a line may name its image: stamp,file)");
+             "has " + std::to_string(left.size()) + " images in left/, " +
+                 std::to_string(right.size()) + " in right/ and " + std::to_string(times.size()) +
+                 " lines in times.txt; one of each a pair is expected (a line may name its image: "
+                 "stamp,file)");
     for (std::size_t i = 0; i < times.size(); ++i) sequence.pairs[i].stamp = times[i].stamp;
   }
-  if (std::string turned = orientation_remark(folder / left.front()); !turned.empty()) sequence.remarks.push_back(std::move(turned));
+  if (std::string turned = orientation_remark(folder / left.front()); !turned.empty())
+    sequence.remarks.push_back(std::move(turned));
   if (given) return sequence;
   sequence.calibration = read_calibration(folder / "calibration.yaml", use).rig;
   sequence.calibration_source = "calibration.yaml";

@@ -39,15 +39,20 @@ void note(DecodedPair* pair, const char* kind, const std::string& sentence) {
 
 }  // namespace
 
-FrameDecoder::FrameDecoder(const StereoSequence& sequence, std::size_t first, std::size_t count, FramePool& pool)
+FrameDecoder::FrameDecoder(const StereoSequence& sequence, std::size_t first, std::size_t count,
+                           FramePool& pool)
     : sequence_(sequence),
       next_index_(std::min(first, sequence.pairs.size())),
       end_(next_index_ + std::min(count, sequence.pairs.size() - next_index_)),
       pool_(pool) {
-  assert(pool.width() == sequence.calibration.intrinsics[0].width && pool.height() == sequence.calibration.intrinsics[0].height);
+  assert(pool.width() == sequence.calibration.intrinsics[0].width &&
+         pool.height() == sequence.calibration.intrinsics[0].height);
   if (sequence.bayer)
-    for (Workspace& work : workspaces_) work.mosaic.resize(FramePool::stride(pool.width()) * static_cast<std::size_t>(pool.height()));
-  if (sequence.side_by_side) workspaces_[0].mosaic.resize(FramePool::stride(2 * pool.width()) * static_cast<std::size_t>(pool.height()));
+    for (Workspace& work : workspaces_)
+      work.mosaic.resize(FramePool::stride(pool.width()) * static_cast<std::size_t>(pool.height()));
+  if (sequence.side_by_side)
+    workspaces_[0].mosaic.resize(FramePool::stride(2 * pool.width()) *
+                                 static_cast<std::size_t>(pool.height()));
   thread_ = std::thread([this] { work(); });
 }
 
@@ -104,8 +109,8 @@ DecodedPair FrameDecoder::decode(std::size_t index) {
   pair.stamp = listed.stamp;
   if (any_ && listed.stamp <= newest_) {
     note(&pair, "time_backwards",
-         fmt::format("frame {} skipped: its time {} is not later than {}, the latest before it", index, format_seconds(listed.stamp.ns()),
-                     format_seconds(newest_.ns())));
+         fmt::format("frame {} skipped: its time {} is not later than {}, the latest before it",
+                     index, format_seconds(listed.stamp.ns()), format_seconds(newest_.ns())));
     return pair;
   }
   newest_ = listed.stamp;
@@ -120,8 +125,11 @@ DecodedPair FrameDecoder::decode(std::size_t index) {
   }
   for (std::size_t k = 0; k < 2; ++k) {
     if (status[k] == ImageFileStatus::ok) continue;
-    const std::string name = !listed.file[k].empty() ? listed.file[k] : k == 0 ? "the left image" : "the right image";
-    note(&pair, kind_of(status[k]), fmt::format("frame {} skipped: {} {}", index, name, to_phrase(status[k])));
+    const std::string name = !listed.file[k].empty() ? listed.file[k]
+                             : k == 0                ? "the left image"
+                                                     : "the right image";
+    note(&pair, kind_of(status[k]),
+         fmt::format("frame {} skipped: {} {}", index, name, to_phrase(status[k])));
     return pair;
   }
   pair.slots = own_;
@@ -138,32 +146,39 @@ ImageFileStatus FrameDecoder::load(const std::string& name, FrameSlot slot, Work
   std::uint8_t* out = pool_.writable(slot).data();
   try {
     if (sequence_.store) return sequence_.store->decode(name, size, out, stride, &work->bytes);
-    if (const auto status = read_image_file(sequence_.root / name, &work->bytes); status != ImageFileStatus::ok) return status;
+    if (const auto status = read_image_file(sequence_.root / name, &work->bytes);
+        status != ImageFileStatus::ok)
+      return status;
   } catch (const std::bad_alloc&) {  // a file too long for this machine's memory
     return ImageFileStatus::unreadable;
   }
   if (!sequence_.bayer) return decode_grey(work->bytes, size, out, stride);
   const ImageFileStatus status = decode_grey(work->bytes, size, work->mosaic.data(), stride);
   const auto step = static_cast<std::ptrdiff_t>(stride);
-  if (status == ImageFileStatus::ok) bayer_to_grey(work->mosaic.data(), step, size.width, size.height, out, step);
+  if (status == ImageFileStatus::ok)
+    bayer_to_grey(work->mosaic.data(), step, size.width, size.height, out, step);
   return status;
 }
 
 ImageFileStatus FrameDecoder::load_both(const std::string& name, Workspace* work) {
   if (name.empty()) return ImageFileStatus::missing;
   try {
-    if (const auto status = read_image_file(sequence_.root / name, &work->bytes); status != ImageFileStatus::ok) return status;
+    if (const auto status = read_image_file(sequence_.root / name, &work->bytes);
+        status != ImageFileStatus::ok)
+      return status;
   } catch (const std::bad_alloc&) {  // a file too long for this machine's memory
     return ImageFileStatus::unreadable;
   }
   const int width = pool_.width(), height = pool_.height();
   const std::size_t stride = FramePool::stride(width), wide = FramePool::stride(2 * width);
-  if (const auto status = decode_grey(work->bytes, {2 * width, height}, work->mosaic.data(), wide); status != ImageFileStatus::ok)
+  if (const auto status = decode_grey(work->bytes, {2 * width, height}, work->mosaic.data(), wide);
+      status != ImageFileStatus::ok)
     return status;
   for (std::size_t k = 0; k < 2; ++k) {
     std::uint8_t* out = pool_.writable(own_[k]).data();
     const std::uint8_t* from = work->mosaic.data() + k * static_cast<std::size_t>(width);
-    for (std::size_t y = 0; y < static_cast<std::size_t>(height); ++y) std::copy_n(from + y * wide, width, out + y * stride);
+    for (std::size_t y = 0; y < static_cast<std::size_t>(height); ++y)
+      std::copy_n(from + y * wide, width, out + y * stride);
   }
   return ImageFileStatus::ok;
 }

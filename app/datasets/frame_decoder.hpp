@@ -26,23 +26,30 @@ struct DecodedPair {
   std::array<char, 256> note{};      // sentence, ends with 0
 };
 
-/// Reads and decodes the images of a sequence ahead of whoever consumes them, the two of a pair side by side on two threads of its own.
+/// Reads and decodes the images of a sequence ahead of whoever consumes them, the two of a pair
+/// side by side on two threads of its own.
 ///
-/// A frame is skipped when an image is missing, unreadable or torn, when its size has changed since it was checked, or when its
-/// stamp is not later than every stamp before it. Skipped frames come through the ring in their turn, so events stay in order.
+/// A frame is skipped when an image is missing, unreadable or torn, when its size has changed since
+/// it was checked, or when its stamp is not later than every stamp before it. Skipped frames come
+/// through the ring in their turn, so events stay in order.
 ///
-/// Ownership  A decoded pair's slots are the consumer's until release(). Sequence and pool outlive the decoder.
-/// Threads    next(), release(), one consumer. stop() from any thread; the destructor stops and joins.
-/// Full       Nothing is dropped: with kAhead pairs waiting, or no slot free, the decoder's thread waits.
-/// Errors     The constructor throws std::system_error when no thread can be had; next() and release() throw nothing.
+/// Ownership  A decoded pair's slots are the consumer's until release(). Sequence and pool outlive
+///            the decoder.
+/// Threads    next(), release(), one consumer. stop() from any thread; the destructor stops and
+///            joins.
+/// Full       Nothing is dropped: with kAhead pairs waiting, or no slot free, the decoder's thread
+///            waits.
+/// Errors     The constructor throws std::system_error when no thread can be had; next() and
+///            release() throw nothing.
 class FrameDecoder {
  public:
-  static constexpr std::size_t kAhead = 8;                 // pairs: evens out a slow disk; more is only memory
+  static constexpr std::size_t kAhead = 8;  // pairs: evens out a slow disk; more is only memory
   static constexpr std::size_t kSlots = 2 * (kAhead + 2);  // waiting, being decoded, being consumed
 
-  /// Pairs [first, first + count) of the sequence, cut at its end. Precondition: the pool's images have the calibration's size;
-  /// both cameras' are the same.
-  FrameDecoder(const StereoSequence& sequence, std::size_t first, std::size_t count, FramePool& pool);
+  /// Pairs [first, first + count) of the sequence, cut at its end. Precondition: the pool's images
+  /// have the calibration's size; both cameras' are the same.
+  FrameDecoder(const StereoSequence& sequence, std::size_t first, std::size_t count,
+               FramePool& pool);
   ~FrameDecoder();
   FrameDecoder(const FrameDecoder&) = delete;
   FrameDecoder& operator=(const FrameDecoder&) = delete;
@@ -59,8 +66,9 @@ class FrameDecoder {
   [[nodiscard]] DecodedPair decode(std::size_t index);
   /// What one image takes on its way into a slot.
   struct Workspace {
-    std::vector<std::uint8_t> bytes;   // of the file
-    std::vector<std::uint8_t> mosaic;  // of a raw sequence, rows as the pool's; of one side by side, both images
+    std::vector<std::uint8_t> bytes;  // of the file
+    std::vector<std::uint8_t>
+        mosaic;  // of a raw sequence, rows as the pool's; of one side by side, both images
   };
   /// One image into the slot. Two at once are fine, each with a workspace of its own.
   [[nodiscard]] ImageFileStatus load(const std::string& name, FrameSlot slot, Workspace* work);

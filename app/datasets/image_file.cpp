@@ -16,13 +16,15 @@ namespace {
 
 using Bytes = std::span<const std::uint8_t>;
 
-constexpr off_t kMaxFile = off_t{256} << 20;  // bytes; a 100-megapixel grey PNG that does not compress is less
+constexpr off_t kMaxFile = off_t{256}
+                           << 20;  // bytes; a 100-megapixel grey PNG that does not compress is less
 
 ImageFileStatus size_of(Bytes b, ImageSize* size) noexcept {
   if (detail::is_png(b)) return detail::png_size(b, size);
   if (detail::is_jpeg(b)) return detail::jpeg_size(b, size);
   if (detail::is_bmp(b)) return detail::bmp_size(b, size);
-  // A file of nothing, or of the first bytes of a signature, is a torn write; another content is another kind of file.
+  // A file of nothing, or of the first bytes of a signature, is a torn write; another content is
+  // another kind of file.
   return detail::may_become_png(b) ? ImageFileStatus::torn : ImageFileStatus::not_an_image;
 }
 
@@ -42,11 +44,15 @@ class OpenFile {
 };
 
 /// Up to `limit` bytes from the file's start.
-ImageFileStatus read_bytes(const std::filesystem::path& file, std::size_t limit, std::vector<std::uint8_t>* bytes) {
+ImageFileStatus read_bytes(const std::filesystem::path& file, std::size_t limit,
+                           std::vector<std::uint8_t>* bytes) {
   const OpenFile in(file.c_str());
-  if (in.fd() < 0) return errno == ENOENT || errno == ENOTDIR ? ImageFileStatus::missing : ImageFileStatus::unreadable;
+  if (in.fd() < 0)
+    return errno == ENOENT || errno == ENOTDIR ? ImageFileStatus::missing
+                                               : ImageFileStatus::unreadable;
   struct stat about {};
-  if (::fstat(in.fd(), &about) != 0 || !S_ISREG(about.st_mode) || about.st_size > kMaxFile) return ImageFileStatus::unreadable;
+  if (::fstat(in.fd(), &about) != 0 || !S_ISREG(about.st_mode) || about.st_size > kMaxFile)
+    return ImageFileStatus::unreadable;
   bytes->resize(std::min(limit, static_cast<std::size_t>(about.st_size)));
   std::size_t got = 0;
   while (got < bytes->size()) {
@@ -75,26 +81,33 @@ const char* to_phrase(ImageFileStatus status) noexcept {
     case ImageFileStatus::torn:
       return "is torn: it ends before the image is complete, or its check sums fail";
     case ImageFileStatus::undecodable:
-      return "cannot be decoded: PNG of every kind, JPEG of 8-bit grey or three colours and BMP of 8-bit grey can";
+      return "cannot be decoded: PNG of every kind, JPEG of 8-bit grey or three colours and BMP of "
+             "8-bit grey can";
     case ImageFileStatus::wrong_size:
       return "has another size than the calibration";
   }
   return "";
 }
 
-ImageFileStatus read_image_file(const std::filesystem::path& file, std::vector<std::uint8_t>* bytes) {
+ImageFileStatus read_image_file(const std::filesystem::path& file,
+                                std::vector<std::uint8_t>* bytes) {
   return read_bytes(file, static_cast<std::size_t>(kMaxFile), bytes);
 }
 
 ImageFileStatus read_image_size(const std::filesystem::path& file, ImageSize* size) {
   std::vector<std::uint8_t> head;
-  if (const auto status = read_bytes(file, detail::kPngHead, &head); status != ImageFileStatus::ok) return status;
+  if (const auto status = read_bytes(file, detail::kPngHead, &head); status != ImageFileStatus::ok)
+    return status;
   if (detail::is_jpeg(head))
-    if (const auto status = read_bytes(file, detail::kJpegHead, &head); status != ImageFileStatus::ok) return status;
+    if (const auto status = read_bytes(file, detail::kJpegHead, &head);
+        status != ImageFileStatus::ok)
+      return status;
   return size_of(head, size);
 }
 
-ImageFileStatus read_image_size(std::span<const std::uint8_t> head, ImageSize* size) noexcept { return size_of(head, size); }
+ImageFileStatus read_image_size(std::span<const std::uint8_t> head, ImageSize* size) noexcept {
+  return size_of(head, size);
+}
 
 ImageFileStatus check_image(std::span<const std::uint8_t> bytes, ImageSize* size) noexcept {
   if (const auto status = size_of(bytes, size); status != ImageFileStatus::ok) return status;
@@ -102,12 +115,14 @@ ImageFileStatus check_image(std::span<const std::uint8_t> bytes, ImageSize* size
   return detail::is_png(bytes) ? detail::check_png(bytes) : detail::check_jpeg(bytes);
 }
 
-ImageFileStatus decode_grey(std::span<const std::uint8_t> bytes, ImageSize size, std::uint8_t* out, std::size_t stride) noexcept {
+ImageFileStatus decode_grey(std::span<const std::uint8_t> bytes, ImageSize size, std::uint8_t* out,
+                            std::size_t stride) noexcept {
   ImageSize found;
   if (const auto status = check_image(bytes, &found); status != ImageFileStatus::ok) return status;
   if (found != size) return ImageFileStatus::wrong_size;
   if (detail::is_bmp(bytes)) return detail::decode_bmp(bytes, size, out, stride);
-  return detail::is_png(bytes) ? detail::decode_png(bytes, size, out, stride) : detail::decode_jpeg(bytes, size, out, stride);
+  return detail::is_png(bytes) ? detail::decode_png(bytes, size, out, stride)
+                               : detail::decode_jpeg(bytes, size, out, stride);
 }
 
 }  // namespace vergence::app

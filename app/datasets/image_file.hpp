@@ -18,7 +18,8 @@ enum class ImageFileStatus : std::uint8_t {
   wrong_size,    // another width or height than asked for
 };
 
-/// The rest of a sentence that begins with the file's name: "is missing", "ends before the image is complete".
+/// The rest of a sentence that begins with the file's name: "is missing", "ends before the image is
+/// complete".
 [[nodiscard]] const char* to_phrase(ImageFileStatus status) noexcept;
 
 struct ImageSize {
@@ -27,23 +28,29 @@ struct ImageSize {
 };
 
 /// Whole file into *bytes (its capacity is reused). → ok, missing, unreadable
-[[nodiscard]] ImageFileStatus read_image_file(const std::filesystem::path& file, std::vector<std::uint8_t>* bytes);
+[[nodiscard]] ImageFileStatus read_image_file(const std::filesystem::path& file,
+                                              std::vector<std::uint8_t>* bytes);
 
-/// Size from the head of a PNG, JPEG or BMP file; the rest is not looked at. → ok, missing, unreadable, not_an_image, torn
+/// Size from the head of a PNG, JPEG or BMP file; the rest is not looked at. → ok, missing,
+/// unreadable, not_an_image, torn
 [[nodiscard]] ImageFileStatus read_image_size(const std::filesystem::path& file, ImageSize* size);
 
 /// The same of the first bytes of such a file. → ok, not_an_image, torn
-[[nodiscard]] ImageFileStatus read_image_size(std::span<const std::uint8_t> head, ImageSize* size) noexcept;
+[[nodiscard]] ImageFileStatus read_image_size(std::span<const std::uint8_t> head,
+                                              ImageSize* size) noexcept;
 
-/// Whether a PNG, JPEG or BMP is all there. Decoders fill what is missing with grey and say nothing, and a half-grey image would be
-/// tracked as if it were the world: PNG chunks are walked to IEND with their check sums, JPEG has to end with its end marker, BMP to hold
-/// its rows. → ok, not_an_image, torn
-[[nodiscard]] ImageFileStatus check_image(std::span<const std::uint8_t> bytes, ImageSize* size) noexcept;
+/// Whether a PNG, JPEG or BMP is all there. Decoders fill what is missing with grey and say
+/// nothing, and a half-grey image would be tracked as if it were the world: PNG chunks are walked
+/// to IEND with their check sums, JPEG has to end with its end marker, BMP to hold its rows. → ok,
+/// not_an_image, torn
+[[nodiscard]] ImageFileStatus check_image(std::span<const std::uint8_t> bytes,
+                                          ImageSize* size) noexcept;
 
-/// PNG of any depth and colour, JPEG of grey or three colours, or 8-bit grey BMP → 8-bit grey, into size.height rows of `stride` bytes at
-/// `out`; no other copy is made. Any number of threads at once. Not `ok`: content of `out` undefined. Throws nothing.
+/// PNG of any depth and colour, JPEG of grey or three colours, or 8-bit grey BMP → 8-bit grey, into
+/// size.height rows of `stride` bytes at `out`; no other copy is made. Any number of threads at
+/// once. Not `ok`: content of `out` undefined. Throws nothing.
 /// → ok, not_an_image, torn, undecodable, wrong_size
-[[nodiscard]] ImageFileStatus decode_grey(std::span<const std::uint8_t> bytes, ImageSize size, std::uint8_t* out,
-                                          std::size_t stride) noexcept;
+[[nodiscard]] ImageFileStatus decode_grey(std::span<const std::uint8_t> bytes, ImageSize size,
+                                          std::uint8_t* out, std::size_t stride) noexcept;
 
 }  // namespace vergence::app

@@ -9,14 +9,16 @@
 namespace vergence::app {
 
 /// Images that are no files of their own, by the names that a sequence gives them.
-/// Threads  Any number at once, each with a workspace of its own.  Errors  As of image_file.hpp; std::bad_alloc.
+/// Threads  Any number at once, each with a workspace of its own.  Errors  As of image_file.hpp;
+/// std::bad_alloc.
 class ImageStore {
  public:
   virtual ~ImageStore() = default;
   /// → ok, missing
   [[nodiscard]] virtual ImageFileStatus size(const std::string& name, ImageSize* size) const = 0;
   /// As decode_grey(); *work: room that is used again.
-  [[nodiscard]] virtual ImageFileStatus decode(const std::string& name, ImageSize size, std::uint8_t* out, std::size_t stride,
+  [[nodiscard]] virtual ImageFileStatus decode(const std::string& name, ImageSize size,
+                                               std::uint8_t* out, std::size_t stride,
                                                std::vector<std::uint8_t>* work) const = 0;
 };
 

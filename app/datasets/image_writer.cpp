@@ -25,7 +25,8 @@ struct Writer {
   Writer& operator=(const Writer&) = delete;
 };
 
-/// Between setjmp and libpng's longjmp nothing may stand that has a destructor: all of it is the caller's.
+/// Between setjmp and libpng's longjmp nothing may stand that has a destructor: all of it is the
+/// caller's.
 bool write_rows(const Writer& writer, std::FILE* file, const ImageView& image) noexcept {
   constexpr int kQuick = 1;  // compression, of 9
   png_structp png = writer.png;
@@ -34,8 +35,9 @@ bool write_rows(const Writer& writer, std::FILE* file, const ImageView& image) n
   png_init_io(png, file);
   png_set_compression_level(png, kQuick);
   png_set_filter(png, PNG_FILTER_TYPE_BASE, PNG_FILTER_SUB);
-  png_set_IHDR(png, info, static_cast<png_uint_32>(image.width), static_cast<png_uint_32>(image.height), 8, PNG_COLOR_TYPE_GRAY,
-               PNG_INTERLACE_NONE, PNG_COMPRESSION_TYPE_DEFAULT, PNG_FILTER_TYPE_DEFAULT);
+  png_set_IHDR(png, info, static_cast<png_uint_32>(image.width),
+               static_cast<png_uint_32>(image.height), 8, PNG_COLOR_TYPE_GRAY, PNG_INTERLACE_NONE,
+               PNG_COMPRESSION_TYPE_DEFAULT, PNG_FILTER_TYPE_DEFAULT);
   png_write_info(png, info);
   for (int y = 0; y < image.height; ++y) png_write_row(png, image.row(y));
   png_write_end(png, nullptr);
@@ -48,7 +50,8 @@ void write_png(const std::filesystem::path& file, const ImageView& image) {
   std::FILE* out = std::fopen(file.c_str(), "wbe");
   const bool written = out != nullptr && write_rows(Writer(), out, image);
   const bool closed = out != nullptr && std::fclose(out) == 0;
-  if (!written || !closed) throw InputError(file.string() + ": cannot be written; is the disk full?");
+  if (!written || !closed)
+    throw InputError(file.string() + ": cannot be written; is the disk full?");
 }
 
 }  // namespace vergence::app

@@ -15,7 +15,9 @@ std::vector<Stamp> read_times(const std::filesystem::path& file) {
   std::vector<Stamp> times;
   for (std::string_view line; lines.next(&line);) {
     const auto ns = parse_seconds_ns(line);
-    if (!ns) refuse(file, lines.number(), "`" + std::string(line.substr(0, 40)) + "` is not a time in seconds");
+    if (!ns)
+      refuse(file, lines.number(),
+             "`" + std::string(line.substr(0, 40)) + "` is not a time in seconds");
     times.emplace_back(*ns);
   }
   if (times.empty()) refuse(file, 0, "holds no times; one line a frame is expected");
@@ -36,12 +38,16 @@ RigCalibration read_calibration_of(const std::filesystem::path& file) {
       refuse(file, lines.number(), "does not have the 12 numbers of a projection matrix");
     for (std::size_t i = 0; i < fields.size(); ++i)
       if (!parse_number(fields[i], &P[i]))
-        refuse(file, lines.number(), "`" + std::string(fields[i].substr(0, 40)) + "` is not a finite number");
+        refuse(file, lines.number(),
+               "`" + std::string(fields[i].substr(0, 40)) + "` is not a finite number");
     const std::size_t k = left ? 0 : 1;
     cameras[k] = rectified_camera(P, &t[k], file, lines.number());
   }
   for (std::size_t k = 0; k < 2; ++k)
-    if (!cameras[k]) refuse(file, 0, std::string("has no line ") + (k == 0 ? "P0:" : "P1:") + " with the projection of that camera");
+    if (!cameras[k])
+      refuse(file, 0,
+             std::string("has no line ") + (k == 0 ? "P0:" : "P1:") +
+                 " with the projection of that camera");
   RigCalibration rig;
   rig.cameras = 2;
   rig.intrinsics = {*cameras[0], *cameras[1]};
@@ -51,25 +57,30 @@ RigCalibration read_calibration_of(const std::filesystem::path& file) {
 }
 
 /// Frame of an image by its name, `000123.png`.
-std::size_t index_of(const std::filesystem::path& root, const std::string& name, std::size_t count) {
+std::size_t index_of(const std::filesystem::path& root, const std::string& name,
+                     std::size_t count) {
   const std::string stem = std::filesystem::path(name).stem().string();
   const auto index = parse_integer(stem);
   if (!index || *index < 0) refuse(root / name, 0, "is not named by its frame, like 000000.png");
   const auto i = static_cast<std::size_t>(*index);
   if (i >= count)
     refuse(root / name, 0,
-           "has no line in times.txt, which ends with frame " + std::to_string(count - 1) + "; the two do not belong together");
+           "has no line in times.txt, which ends with frame " + std::to_string(count - 1) +
+               "; the two do not belong together");
   return i;
 }
 
 }  // namespace
 
-Intrinsics rectified_camera(const std::array<double, 12>& P, Vec3* t, const std::filesystem::path& file, std::size_t line) {
+Intrinsics rectified_camera(const std::array<double, 12>& P, Vec3* t,
+                            const std::filesystem::path& file, std::size_t line) {
   Intrinsics k;
   k.fx = P[0], k.fy = P[5], k.cx = P[2], k.cy = P[6];
   if (!(k.fx > 0 && k.fy > 0)) refuse(file, line, "has a focal length that is not positive");
   if (P[1] != 0 || P[4] != 0 || P[8] != 0 || P[9] != 0 || P[10] != 1)
-    refuse(file, line, "is not the projection of a rectified camera: [fx 0 cx .; 0 fy cy .; 0 0 1 .] is expected");
+    refuse(
+        file, line,
+        "is not the projection of a rectified camera: [fx 0 cx .; 0 fy cy .; 0 0 1 .] is expected");
   const double z = P[11];
   *t = {(P[3] - k.cx * z) / k.fx, (P[7] - k.cy * z) / k.fy, z};
   return k;
@@ -84,11 +95,14 @@ StereoSequence open_kitti(const std::filesystem::path& folder, bool given) {
   for (std::size_t i = 0; i < times.size(); ++i) sequence.pairs[i].stamp = times[i];
   for (std::size_t k = 0; k < 2; ++k) {
     const std::string below = k == 0 ? "image_0" : "image_1";
-    for (const std::string& name : list_images(folder, below)) sequence.pairs[index_of(folder, name, times.size())].file[k] = name;
-    for (std::size_t i = 0; i < times.size(); ++i)  // a file that is missing still has a name to be missed by
+    for (const std::string& name : list_images(folder, below))
+      sequence.pairs[index_of(folder, name, times.size())].file[k] = name;
+    for (std::size_t i = 0; i < times.size();
+         ++i)  // a file that is missing still has a name to be missed by
       if (std::string& file = sequence.pairs[i].file[k]; file.empty()) {
         const std::string digits = std::to_string(i);
-        file = below + "/" + std::string(6 - std::min<std::size_t>(6, digits.size()), '0') + digits + ".png";
+        file = below + "/" + std::string(6 - std::min<std::size_t>(6, digits.size()), '0') +
+               digits + ".png";
       }
   }
   if (given) return sequence;

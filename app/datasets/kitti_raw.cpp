@@ -17,10 +17,11 @@ namespace fs = std::filesystem;
 constexpr const char* kCalibration = "calib_cam_to_cam.txt";
 constexpr std::size_t kMostDrives = 8;      // that are named in a refusal
 constexpr std::size_t kMostFolders = 1000;  // that are looked into for a drive
-// Cameras expose together; their stamps are of the arrival and up to some milliseconds apart. A quarter of the interval is far from both
-// neighbours.
+// Cameras expose together; their stamps are of the arrival and up to some milliseconds apart. A
+// quarter of the interval is far from both neighbours.
 constexpr double kTogether = 0.25;
-constexpr std::size_t kLook = 48;  // frames that one camera may lack in a row where the other goes on, and pairing by stamps still finds on
+constexpr std::size_t kLook = 48;  // frames that one camera may lack in a row where the other goes
+                                   // on, and pairing by stamps still finds on
 
 bool is_drive(const fs::path& folder) {
   std::error_code ignored;
@@ -29,7 +30,8 @@ bool is_drive(const fs::path& folder) {
   return false;
 }
 
-void find_drives(const fs::path& folder, int depth, std::vector<fs::path>* found, std::size_t* looked) {
+void find_drives(const fs::path& folder, int depth, std::vector<fs::path>* found,
+                 std::size_t* looked) {
   std::error_code error;
   for (fs::directory_iterator it(folder, error), end; !error && it != end; it.increment(error)) {
     std::error_code ignored;
@@ -37,7 +39,8 @@ void find_drives(const fs::path& folder, int depth, std::vector<fs::path>* found
     if (is_drive(it->path()))
       found->push_back(it->path());
     else if (depth > 1)
-      for (fs::directory_iterator below(it->path(), ignored), none; !ignored && below != none; below.increment(ignored))
+      for (fs::directory_iterator below(it->path(), ignored), none; !ignored && below != none;
+           below.increment(ignored))
         if (++*looked <= kMostFolders && is_drive(below->path())) found->push_back(below->path());
   }
   if (error) refuse(folder, 0, "cannot be listed (" + error.message() + "): check its permissions");
@@ -82,17 +85,24 @@ CameraFiles list_camera(const fs::path& drive, int camera, std::vector<std::stri
   }
   for (std::size_t i = 0; i < end; ++i) {
     if (!stamps.lines[i]) continue;
-    out.stamps.push_back(*stamps.lines[i]);  // an image that is missing is missed when its frame comes
+    out.stamps.push_back(
+        *stamps.lines[i]);  // an image that is missing is missed when its frame comes
     out.index.push_back(i);
   }
-  if (out.stamps.empty()) refuse(drive / name, 0, "has no image that a line of its timestamps.txt is of");
-  if (odd > 0) remarks->push_back(fmt::format("{}: {} images that are not named by their number are left out", name, odd));
+  if (out.stamps.empty())
+    refuse(drive / name, 0, "has no image that a line of its timestamps.txt is of");
+  if (odd > 0)
+    remarks->push_back(
+        fmt::format("{}: {} images that are not named by their number are left out", name, odd));
   if (out.without_stamp > 0)
-    remarks->push_back(fmt::format("{}: {} images have no stamp and are left out: timestamps.txt has {} lines, {} of them broken{}", name,
-                                   out.without_stamp, stamps.lines.size(), stamps.broken,
-                                   stamps.broken > 0 ? fmt::format(", the first is line {}", stamps.first_broken) : ""));
+    remarks->push_back(fmt::format(
+        "{}: {} images have no stamp and are left out: timestamps.txt has {} lines, {} of them "
+        "broken{}",
+        name, out.without_stamp, stamps.lines.size(), stamps.broken,
+        stamps.broken > 0 ? fmt::format(", the first is line {}", stamps.first_broken) : ""));
   if (end < stamps.lines.size())
-    remarks->push_back(fmt::format("{}: timestamps.txt goes on for {} lines after the last image", name, stamps.lines.size() - end));
+    remarks->push_back(fmt::format("{}: timestamps.txt goes on for {} lines after the last image",
+                                   name, stamps.lines.size() - end));
   return out;
 }
 
@@ -114,14 +124,18 @@ struct Pairing {
 
 Duration apart(Stamp a, Stamp b) { return a < b ? b - a : a - b; }
 
-/// How many of both to pass over until two belong together again, the fewest first. False: not within kLook.
-bool find_on(const std::array<const CameraFiles*, 2>& c, std::array<std::size_t, 2> at, Duration together,
-             std::array<std::size_t, 2>* skip) {
+/// How many of both to pass over until two belong together again, the fewest first. False: not
+/// within kLook.
+bool find_on(const std::array<const CameraFiles*, 2>& c, std::array<std::size_t, 2> at,
+             Duration together, std::array<std::size_t, 2>* skip) {
   for (std::size_t most = 1; most <= kLook; ++most)
     for (std::size_t least = 0; least <= most; ++least)
-      for (const std::array<std::size_t, 2>& s : {std::array{most, least}, std::array{least, most}}) {
+      for (const std::array<std::size_t, 2>& s :
+           {std::array{most, least}, std::array{least, most}}) {
         const std::size_t l = at[0] + s[0], r = at[1] + s[1];
-        if (l >= c[0]->stamps.size() || r >= c[1]->stamps.size() || apart(c[0]->stamps[l], c[1]->stamps[r]) > together) continue;
+        if (l >= c[0]->stamps.size() || r >= c[1]->stamps.size() ||
+            apart(c[0]->stamps[l], c[1]->stamps[r]) > together)
+          continue;
         *skip = s;
         return true;
       }
@@ -134,7 +148,8 @@ Pairing pair_by_stamps(const CameraFiles& left, const CameraFiles& right) {
   const Duration together = Duration::seconds(kTogether * usual_interval(left.stamps).to_seconds());
   Pairing out;
   std::array<std::size_t, 2> at{}, skip{};
-  std::size_t blind = 0;  // steps until the next look ahead: what was in vain a moment ago would be again
+  std::size_t blind =
+      0;  // steps until the next look ahead: what was in vain a moment ago would be again
   while (at[0] < left.stamps.size() && at[1] < right.stamps.size()) {
     const Stamp l = left.stamps[at[0]], r = right.stamps[at[1]];
     if (const Duration d = apart(l, r); d <= together) {
@@ -159,37 +174,46 @@ std::string file_name(int camera, std::size_t index, const std::string& extensio
   return fmt::format("{}/data/{:010d}{}", kitti_raw_camera(camera), index, extension);
 }
 
-void list_pairs(const fs::path& drive, const std::array<int, 2>& cameras, StereoSequence* sequence) {
-  const CameraFiles left = list_camera(drive, cameras[0], &sequence->remarks), right = list_camera(drive, cameras[1], &sequence->remarks);
+void list_pairs(const fs::path& drive, const std::array<int, 2>& cameras,
+                StereoSequence* sequence) {
+  const CameraFiles left = list_camera(drive, cameras[0], &sequence->remarks),
+                    right = list_camera(drive, cameras[1], &sequence->remarks);
   const Pairing pairing = pair_by_stamps(left, right);
   if (pairing.pairs.empty())
-    refuse(drive, 0,
-           fmt::format("the stamps of {} and {} never agree: images that belong together have nearly the same",
-                       kitti_raw_camera(cameras[0]), kitti_raw_camera(cameras[1])));
+    refuse(
+        drive, 0,
+        fmt::format(
+            "the stamps of {} and {} never agree: images that belong together have nearly the same",
+            kitti_raw_camera(cameras[0]), kitti_raw_camera(cameras[1])));
   std::vector<Stamp> stamps;
   stamps.reserve(pairing.pairs.size());
   for (const auto& p : pairing.pairs) stamps.push_back(left.stamps[p[0]]);
   const std::vector<std::size_t> kept = ascending(stamps);
   sequence->pairs.reserve(kept.size());
   for (const std::size_t i : kept)
-    sequence->pairs.push_back({stamps[i],
-                               {file_name(cameras[0], left.index[pairing.pairs[i][0]], left.extension),
-                                file_name(cameras[1], right.index[pairing.pairs[i][1]], right.extension)}});
+    sequence->pairs.push_back(
+        {stamps[i],
+         {file_name(cameras[0], left.index[pairing.pairs[i][0]], left.extension),
+          file_name(cameras[1], right.index[pairing.pairs[i][1]], right.extension)}});
 
   const std::size_t disordered = stamps.size() - kept.size();
-  sequence->left_out = std::max(pairing.alone[0] + left.without_stamp, pairing.alone[1] + right.without_stamp) + disordered;
+  sequence->left_out =
+      std::max(pairing.alone[0] + left.without_stamp, pairing.alone[1] + right.without_stamp) +
+      disordered;
   auto& remarks = sequence->remarks;
   for (std::size_t k = 0; k < 2; ++k)
     if (pairing.alone[k] > 0)
-      remarks.push_back(fmt::format("{}: {} images have no partner of {} by their stamps and are left out", kitti_raw_camera(cameras[k]),
-                                    pairing.alone[k], kitti_raw_camera(cameras[1 - k])));
+      remarks.push_back(fmt::format(
+          "{}: {} images have no partner of {} by their stamps and are left out",
+          kitti_raw_camera(cameras[k]), pairing.alone[k], kitti_raw_camera(cameras[1 - k])));
   if (disordered > 0)
-    remarks.push_back(
-        fmt::format("{}: {} stamps go back or repeat one; their frames are left out", kitti_raw_camera(cameras[0]), disordered));
+    remarks.push_back(fmt::format("{}: {} stamps go back or repeat one; their frames are left out",
+                                  kitti_raw_camera(cameras[0]), disordered));
   constexpr Duration kTold = Duration::milliseconds(5);
   if (pairing.farthest > kTold)
-    remarks.push_back(fmt::format("the stamps of a pair are up to {:.1f} ms apart; that of {} counts", 1e3 * pairing.farthest.to_seconds(),
-                                  kitti_raw_camera(cameras[0])));
+    remarks.push_back(
+        fmt::format("the stamps of a pair are up to {:.1f} ms apart; that of {} counts",
+                    1e3 * pairing.farthest.to_seconds(), kitti_raw_camera(cameras[0])));
 }
 
 }  // namespace
@@ -200,36 +224,49 @@ bool holds_kitti_raw(const fs::path& folder) { return !drives_in(folder).empty()
 
 KittiRawFolders find_kitti_raw(const fs::path& folder) {
   std::vector<fs::path> found = drives_in(folder);
-  if (found.empty()) refuse(folder, 0, "holds no KITTI raw drive: a folder with image_00, image_01 and oxts is expected");
+  if (found.empty())
+    refuse(folder, 0,
+           "holds no KITTI raw drive: a folder with image_00, image_01 and oxts is expected");
   if (found.size() > 1) {
     std::sort(found.begin(), found.end());
     std::string names;
-    for (std::size_t i = 0; i < std::min(kMostDrives, found.size()); ++i) names += (i > 0 ? ", " : "") + found[i].filename().string();
+    for (std::size_t i = 0; i < std::min(kMostDrives, found.size()); ++i)
+      names += (i > 0 ? ", " : "") + found[i].filename().string();
     refuse(folder, 0,
-           fmt::format("holds {} drives ({}{}): name one of them", found.size(), names, found.size() > kMostDrives ? ", …" : ""));
+           fmt::format("holds {} drives ({}{}): name one of them", found.size(), names,
+                       found.size() > kMostDrives ? ", …" : ""));
   }
   KittiRawFolders out;
   out.drive = found[0];
   std::error_code ignored;
-  fs::path lexical = fs::absolute(out.drive, ignored).lexically_normal();  // `.` and a name that ends in a slash have a folder above, too
+  fs::path lexical =
+      fs::absolute(out.drive, ignored)
+          .lexically_normal();  // `.` and a name that ends in a slash have a folder above, too
   if (!lexical.has_filename()) lexical = lexical.parent_path();
   // A drive may be a link to where it is kept, its calibration beside the one or the other.
   out.calibration = lexical.parent_path();
   for (const fs::path& other : {out.drive, fs::weakly_canonical(out.drive, ignored).parent_path()})
-    if (!fs::exists(out.calibration / kCalibration, ignored) && fs::exists(other / kCalibration, ignored)) out.calibration = other;
+    if (!fs::exists(out.calibration / kCalibration, ignored) &&
+        fs::exists(other / kCalibration, ignored))
+      out.calibration = other;
   return out;
 }
 
-StereoSequence open_kitti_raw(const fs::path& folder, bool given, const std::array<int, 2>& cameras) {
+StereoSequence open_kitti_raw(const fs::path& folder, bool given,
+                              const std::array<int, 2>& cameras) {
   if (cameras[0] == cameras[1])
-    refuse(folder, 0, fmt::format("kitti_raw.left and kitti_raw.right are both camera {}; two cameras make a rig", cameras[0]));
+    refuse(
+        folder, 0,
+        fmt::format("kitti_raw.left and kitti_raw.right are both camera {}; two cameras make a rig",
+                    cameras[0]));
   const KittiRawFolders folders = find_kitti_raw(folder);
   StereoSequence sequence;
   sequence.root = folders.drive;
   list_pairs(folders.drive, cameras, &sequence);
   if (given) return sequence;
   const KittiRawRig rig =
-      read_kitti_raw_rig(folders.calibration / kCalibration, cameras, first_image_size(sequence, 0), folders.drive.filename().string());
+      read_kitti_raw_rig(folders.calibration / kCalibration, cameras, first_image_size(sequence, 0),
+                         folders.drive.filename().string());
   sequence.calibration = rig.rig;
   sequence.calibration_source = kCalibration;
   return sequence;

@@ -19,30 +19,38 @@ class CalibrationText {
  public:
   CalibrationText(const std::filesystem::path& file, const char* without) : file_(file) {
     std::error_code ignored;
-    if (!std::filesystem::exists(file, ignored)) refuse(file, 0, fmt::format("is missing: unpack the date's calibration there{}", without));
+    if (!std::filesystem::exists(file, ignored))
+      refuse(file, 0, fmt::format("is missing: unpack the date's calibration there{}", without));
     text_ = read_text(file, kLargest);
     Lines lines(text_);
     for (std::string_view line; lines.next(&line);)
       if (const std::size_t colon = line.find(':'); colon != std::string_view::npos)
-        found_.insert_or_assign(line.substr(0, colon), Line{line.substr(colon + 1), lines.number()});
+        found_.insert_or_assign(line.substr(0, colon),
+                                Line{line.substr(colon + 1), lines.number()});
   }
 
   /// All of `values`. InputError: no such key, another count, no numbers.
   template <std::size_t N>
   void read(const std::string& key, std::array<double, N>* values) const {
     const auto found = found_.find(key);
-    if (found == found_.end()) refuse(file_, 0, fmt::format("has no line `{}:`, {} numbers are expected there", key, N));
+    if (found == found_.end())
+      refuse(file_, 0, fmt::format("has no line `{}:`, {} numbers are expected there", key, N));
     std::array<std::string_view, N> fields;
     const std::size_t count = split(found->second.rest, ' ', fields);
-    if (count != N) refuse(file_, found->second.number, fmt::format("{}: has {} numbers where {} are expected", key, count, N));
+    if (count != N)
+      refuse(file_, found->second.number,
+             fmt::format("{}: has {} numbers where {} are expected", key, count, N));
     for (std::size_t i = 0; i < N; ++i)
       if (!parse_number(fields[i], &(*values)[i]))
-        refuse(file_, found->second.number, fmt::format("{}: `{}` is not a finite number", key, fields[i].substr(0, 40)));
+        refuse(file_, found->second.number,
+               fmt::format("{}: `{}` is not a finite number", key, fields[i].substr(0, 40)));
   }
   [[nodiscard]] Mat3 rotation(const std::string& key) const {
     const Mat3 written = matrix(key);
     Mat3 R;
-    if (!accept_rotation(written, &R)) refuse(file_, line_of(key), key + ": is no rotation, it is off orthonormal by more than 1e-4");
+    if (!accept_rotation(written, &R))
+      refuse(file_, line_of(key),
+             key + ": is no rotation, it is off orthonormal by more than 1e-4");
     return R;
   }
   [[nodiscard]] Mat3 matrix(const std::string& key) const {
@@ -58,7 +66,8 @@ class CalibrationText {
   [[nodiscard]] ImageSize size(const std::string& key) const {
     std::array<double, 2> v{};
     read(key, &v);
-    if (!(v[0] >= 1 && v[0] <= kWidest && v[1] >= 1 && v[1] <= kWidest)) refuse(file_, line_of(key), key + ": is no size of an image");
+    if (!(v[0] >= 1 && v[0] <= kWidest && v[1] >= 1 && v[1] <= kWidest))
+      refuse(file_, line_of(key), key + ": is no size of an image");
     return {static_cast<int>(v[0]), static_cast<int>(v[1])};
   }
   [[nodiscard]] std::size_t line_of(const std::string& key) const { return found_.at(key).number; }
@@ -106,27 +115,31 @@ Camera camera_of(const CalibrationText& text, int number, bool rectified) {
   std::array<double, 12> P{};
   text.read(name, &P);
   c.lens = rectified_camera(P, &c.T_camera_camera0.t, text.file(), text.line_of(name));
-  c.T_camera_camera0.R = text.rotation(key("R_rect", 0));  // all were turned into the axes of camera 00 as it became
+  c.T_camera_camera0.R =
+      text.rotation(key("R_rect", 0));  // all were turned into the axes of camera 00 as it became
   return c;
 }
 
 Transform rigid_of(const std::filesystem::path& file) {
-  const CalibrationText text(file, ", or say by `--set ins.lever_arm_m=[…]` where the left camera sits in the INS's body");
+  const CalibrationText text(
+      file, ", or say by `--set ins.lever_arm_m=[…]` where the left camera sits in the INS's body");
   return {text.rotation("R"), text.vector("T")};
 }
 
 }  // namespace
 
-KittiRawRig read_kitti_raw_rig(const std::filesystem::path& file, const std::array<int, 2>& cameras, ImageSize images,
-                               const std::string& drive_name) {
+KittiRawRig read_kitti_raw_rig(const std::filesystem::path& file, const std::array<int, 2>& cameras,
+                               ImageSize images, const std::string& drive_name) {
   const CalibrationText text(file, ", or give one with --calibration");
   KittiRawRig out;
-  const ImageSize raw = text.size(key("S", cameras[0])), rectified = text.size(key("S_rect", cameras[0]));
+  const ImageSize raw = text.size(key("S", cameras[0])),
+                  rectified = text.size(key("S_rect", cameras[0]));
   if (images != raw && images != rectified)
-    refuse(
-        file, text.line_of(key("S", cameras[0])),
-        fmt::format("is for images of {}x{} pixels, or {}x{} rectified, but those of the drive have {}x{}; use the calibration of its date",
-                    raw.width, raw.height, rectified.width, rectified.height, images.width, images.height));
+    refuse(file, text.line_of(key("S", cameras[0])),
+           fmt::format("is for images of {}x{} pixels, or {}x{} rectified, but those of the drive "
+                       "have {}x{}; use the calibration of its date",
+                       raw.width, raw.height, rectified.width, rectified.height, images.width,
+                       images.height));
   out.rectified = images == rectified && (images != raw || drive_name.ends_with("_sync"));
   std::array<Camera, 2> both;
   for (std::size_t k = 0; k < 2; ++k) {
@@ -138,7 +151,8 @@ KittiRawRig read_kitti_raw_rig(const std::filesystem::path& file, const std::arr
   out.rig.cameras = 2;
   out.rig.intrinsics = {both[0].lens, both[1].lens};
   out.rig.T_camera_left[1] = both[1].T_camera_camera0 * both[0].T_camera_camera0.inverse();
-  if (out.rectified) out.rig.T_camera_left[1].R = Mat3::Identity();  // without the rounding of a product
+  if (out.rectified)
+    out.rig.T_camera_left[1].R = Mat3::Identity();  // without the rounding of a product
   out.rig.baseline = out.rig.T_camera_left[1].t.norm();
   if (const auto bad = find_implausible(&out.rig)) refuse(file, 0, bad->sentence);
   return out;

@@ -33,15 +33,20 @@ std::optional<Stamp> parse_kitti_stamp(std::string_view text) noexcept {
   if (text.size() < kForm.size() || text.size() > 40) return std::nullopt;
   for (std::size_t i = 0; i < kForm.size(); ++i)
     if (kForm[i] != '0' && text[i] != kForm[i]) return std::nullopt;
-  const int year = digits(text.substr(0, 4), 2200), month = digits(text.substr(5, 2), 12), day = digits(text.substr(8, 2), 31);
-  const int hour = digits(text.substr(11, 2), 23), minute = digits(text.substr(14, 2), 59), second = digits(text.substr(17, 2), 60);
-  if (year < 1970 || month < 1 || day < 1 || hour < 0 || minute < 0 || second < 0) return std::nullopt;
-  const std::chrono::year_month_day date{std::chrono::year(year), std::chrono::month(static_cast<unsigned>(month)),
+  const int year = digits(text.substr(0, 4), 2200), month = digits(text.substr(5, 2), 12),
+            day = digits(text.substr(8, 2), 31);
+  const int hour = digits(text.substr(11, 2), 23), minute = digits(text.substr(14, 2), 59),
+            second = digits(text.substr(17, 2), 60);
+  if (year < 1970 || month < 1 || day < 1 || hour < 0 || minute < 0 || second < 0)
+    return std::nullopt;
+  const std::chrono::year_month_day date{std::chrono::year(year),
+                                         std::chrono::month(static_cast<unsigned>(month)),
                                          std::chrono::day(static_cast<unsigned>(day))};
   if (!date.ok()) return std::nullopt;
   std::int64_t ns = 0;
   if (const std::string_view rest = text.substr(kForm.size()); !rest.empty()) {
-    if (rest.size() < 2 || rest[0] != '.' || digits(rest.substr(1, 9), 999'999'999) < 0) return std::nullopt;
+    if (rest.size() < 2 || rest[0] != '.' || digits(rest.substr(1, 9), 999'999'999) < 0)
+      return std::nullopt;
     const auto fraction = parse_seconds_ns(rest);
     if (!fraction) return std::nullopt;
     ns = *fraction;
@@ -61,7 +66,9 @@ KittiStamps read_kitti_stamps(const std::filesystem::path& file) {
     const bool cut = end == std::string_view::npos;
     rest.remove_prefix(cut ? rest.size() : end + 1);
     if (stamps.lines.size() == kMostReadings)
-      refuse(file, stamps.lines.size(), "and there are more lines: more than any drive has, so this is not the file that is meant");
+      refuse(file, stamps.lines.size(),
+             "and there are more lines: more than any drive has, so this is not the file that is "
+             "meant");
     std::optional<Stamp> stamp = parse_kitti_stamp(line);
     if (stamp && cut && good > 0 && decimals(line) < last_decimals) stamp.reset();
     stamps.lines.push_back(stamp);
@@ -72,7 +79,9 @@ KittiStamps read_kitti_stamps(const std::filesystem::path& file) {
       stamps.first_broken = stamps.lines.size();
     }
   }
-  if (good == 0) refuse(file, stamps.first_broken, "has no stamp like 2011-09-26 14:05:35.500923136; one a line and file is expected");
+  if (good == 0)
+    refuse(file, stamps.first_broken,
+           "has no stamp like 2011-09-26 14:05:35.500923136; one a line and file is expected");
   return stamps;
 }
 
@@ -80,7 +89,8 @@ KittiStamps read_kitti_stamps(const std::filesystem::path& file) {
 std::vector<std::size_t> ascending(std::span<const Stamp> stamps) {
   std::vector<std::size_t> ends, before(stamps.size());
   for (std::size_t i = 0; i < stamps.size(); ++i) {
-    const auto place = std::lower_bound(ends.begin(), ends.end(), stamps[i], [&](std::size_t e, Stamp s) { return stamps[e] < s; });
+    const auto place = std::lower_bound(ends.begin(), ends.end(), stamps[i],
+                                        [&](std::size_t e, Stamp s) { return stamps[e] < s; });
     before[i] = place == ends.begin() ? i : *(place - 1);
     if (place == ends.end())
       ends.push_back(i);

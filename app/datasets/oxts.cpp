@@ -21,7 +21,8 @@ constexpr std::size_t kFields = 30;
 constexpr std::size_t kLongestPacket = std::size_t{1} << 16U;  // bytes
 constexpr double kDegree = std::numbers::pi / 180;
 
-/// The columns of a packet that are read; order and units are those of the development kit (its dataformat.txt).
+/// The columns of a packet that are read; order and units are those of the development kit (its
+/// dataformat.txt).
 enum Column : std::size_t {
   latitude,                // deg
   longitude,               // deg
@@ -39,14 +40,18 @@ enum Column : std::size_t {
   position_mode = 27,
 };
 
-// What the unit, an RT3003 with two antennas, is specified to: its packets have accuracies of place and velocity alone.
+// What the unit, an RT3003 with two antennas, is specified to: its packets have accuracies of place
+// and velocity alone.
 constexpr double kTiltSigma = 0.03 * kDegree, kHeadingSigma = 0.1 * kDegree;
-constexpr double kHeightOverPlace = 2;  // a receiver's height is about so much less accurate than its place
+constexpr double kHeightOverPlace =
+    2;  // a receiver's height is about so much less accurate than its place
 
-constexpr int kLocked = 4;  // navigation status of a unit whose figures are valid; below it is starting
+constexpr int kLocked =
+    4;  // navigation status of a unit whose figures are valid; below it is starting
 
-/// Position modes of the unit's protocol (NCOM): 3 single point, 4 differential, 5 and 6 real-time kinematic, 7 to 9 and 13 to 18 further
-/// corrections. 0 none, 1 searching, 2 and 12 Doppler alone, 10 no data, 11 blanked: carried on by inertia.
+/// Position modes of the unit's protocol (NCOM): 3 single point, 4 differential, 5 and 6 real-time
+/// kinematic, 7 to 9 and 13 to 18 further corrections. 0 none, 1 searching, 2 and 12 Doppler alone,
+/// 10 no data, 11 blanked: carried on by inertia.
 bool has_position(int mode) noexcept { return (mode >= 3 && mode <= 9) || mode >= 13; }
 
 FixStatus fix_of(int status, int satellites_used, int mode) noexcept {
@@ -69,12 +74,15 @@ std::optional<RecordedReading> parse_packet(std::string_view text) noexcept {
   InsSample& s = r.sample;
   s.position = {v[latitude], v[longitude], v[altitude]};
   const double largest = std::max({std::abs(v[roll]), std::abs(v[pitch]), std::abs(v[yaw])});
-  if (!s.position.plausible() || largest > 3 * std::numbers::pi) return std::nullopt;  // degrees, or other columns
-  const int used = whole(v[satellites]), status = whole(v[navigation_status]), mode = whole(v[position_mode]);
+  if (!s.position.plausible() || largest > 3 * std::numbers::pi)
+    return std::nullopt;  // degrees, or other columns
+  const int used = whole(v[satellites]), status = whole(v[navigation_status]),
+            mode = whole(v[position_mode]);
   s.fix = fix_of(status, used, mode);
   s.attitude_valid = s.velocity_valid = status == kLocked;
   s.velocity_enu = {v[to_east], v[to_north], v[upward]};
-  const Mat3 R = exp_so3(Vec3(0, 0, v[yaw])) * exp_so3(Vec3(0, v[pitch], 0)) * exp_so3(Vec3(v[roll], 0, 0));
+  const Mat3 R =
+      exp_so3(Vec3(0, 0, v[yaw])) * exp_so3(Vec3(0, v[pitch], 0)) * exp_so3(Vec3(v[roll], 0, 0));
   const Eigen::Quaterniond q = quaternion(R);
   s.q_enu_ins = {q.x(), q.y(), q.z(), q.w()};
   s.position_sigma = std::max(0.0, v[position_accuracy]);
@@ -82,7 +90,8 @@ std::optional<RecordedReading> parse_packet(std::string_view text) noexcept {
   s.velocity_sigma = std::max(0.0, v[velocity_accuracy]);
   s.tilt_sigma = kTiltSigma;
   s.heading_sigma = kHeadingSigma;
-  r.quality.status = static_cast<std::uint32_t>(std::clamp(status, 0, 255)) << 8U | static_cast<std::uint32_t>(std::clamp(mode, 0, 255));
+  r.quality.status = static_cast<std::uint32_t>(std::clamp(status, 0, 255)) << 8U |
+                     static_cast<std::uint32_t>(std::clamp(mode, 0, 255));
   r.quality.satellites = static_cast<std::uint8_t>(std::clamp(used, 0, 255));
   r.quality.filter_valid = status == kLocked;
   return r;
@@ -129,29 +138,38 @@ std::size_t beyond(const fs::path& data, std::size_t lines) {
   std::error_code error;
   for (fs::directory_iterator it(data, error), end; !error && it != end; it.increment(error)) {
     const auto index = parse_integer(it->path().stem().string());
-    if (it->path().extension() == ".txt" && index && *index >= 0 && static_cast<std::size_t>(*index) >= lines) ++n;
+    if (it->path().extension() == ".txt" && index && *index >= 0 &&
+        static_cast<std::size_t>(*index) >= lines)
+      ++n;
   }
   return n;
 }
 
-void tell(const Packets& packets, const KittiStamps& stamps, std::size_t without_stamp, std::size_t disordered, RecordedIns* ins) {
+void tell(const Packets& packets, const KittiStamps& stamps, std::size_t without_stamp,
+          std::size_t disordered, RecordedIns* ins) {
   const auto say = [ins](std::size_t n, const std::string& what) {
     if (n > 0) ins->remarks.push_back(fmt::format("oxts: {} {}", n, what));
   };
-  say(packets.missing, fmt::format("packets are missing, the first is {}", packets.first_missing.filename().string()));
-  say(packets.broken, fmt::format("packets are not the {} numbers of one and are left out, the first is {}", kFields,
-                                  packets.first_broken.filename().string()));
-  say(stamps.broken, fmt::format("lines of timestamps.txt are no stamps, the first is line {}", stamps.first_broken));
+  say(packets.missing, fmt::format("packets are missing, the first is {}",
+                                   packets.first_missing.filename().string()));
+  say(packets.broken,
+      fmt::format("packets are not the {} numbers of one and are left out, the first is {}",
+                  kFields, packets.first_broken.filename().string()));
+  say(stamps.broken, fmt::format("lines of timestamps.txt are no stamps, the first is line {}",
+                                 stamps.first_broken));
   say(without_stamp, "packets have no line in timestamps.txt and are left out");
   say(disordered, "stamps go back or repeat one; their packets are left out");
   const auto fixed = [](const RecordedReading& r) { return r.sample.fix == FixStatus::fix_3d; };
-  say(ins->readings.size() - static_cast<std::size_t>(std::count_if(ins->readings.begin(), ins->readings.end(), fixed)),
-      fmt::format("of {} packets have no satellites' fix: nothing is compared there", ins->readings.size()));
+  say(ins->readings.size() - static_cast<std::size_t>(
+                                 std::count_if(ins->readings.begin(), ins->readings.end(), fixed)),
+      fmt::format("of {} packets have no satellites' fix: nothing is compared there",
+                  ins->readings.size()));
 }
 
 }  // namespace
 
-RecordedIns read_oxts(const fs::path& folder, const std::array<int, 2>& cameras, bool mount_wanted) {
+RecordedIns read_oxts(const fs::path& folder, const std::array<int, 2>& cameras,
+                      bool mount_wanted) {
   const KittiRawFolders folders = find_kitti_raw(folder);
   RecordedIns ins;
   const fs::path oxts = folders.drive / "oxts", data = oxts / "data";
@@ -170,12 +188,14 @@ RecordedIns read_oxts(const fs::path& folder, const std::array<int, 2>& cameras,
   const std::vector<std::size_t> kept = ascending(packets.stamps);
   ins.readings.reserve(kept.size());
   for (const std::size_t i : kept) ins.readings.push_back(packets.readings[i]);
-  tell(packets, stamps, beyond(data, stamps.lines.size()), packets.readings.size() - kept.size(), &ins);
+  tell(packets, stamps, beyond(data, stamps.lines.size()), packets.readings.size() - kept.size(),
+       &ins);
   if (!mount_wanted) return ins;
 
   const StereoSequence images = open_kitti_raw(folder, true, cameras);
-  const KittiRawRig rig = read_kitti_raw_rig(folders.calibration / "calib_cam_to_cam.txt", cameras, first_image_size(images, 0),
-                                             folders.drive.filename().string());
+  const KittiRawRig rig =
+      read_kitti_raw_rig(folders.calibration / "calib_cam_to_cam.txt", cameras,
+                         first_image_size(images, 0), folders.drive.filename().string());
   ins.T_ins_left = (rig.T_left_camera0 * read_kitti_raw_mount(folders.calibration)).inverse();
   ins.mount_source = "calib_imu_to_velo.txt, calib_velo_to_cam.txt and calib_cam_to_cam.txt";
   return ins;

@@ -21,8 +21,8 @@ RecordedIns of_st_lucia(const std::filesystem::path& folder) {
 
 }  // namespace
 
-RecordedIns read_recorded_ins(SequenceFormat format, const std::filesystem::path& folder, const std::array<int, 2>& cameras,
-                              bool mount_wanted) {
+RecordedIns read_recorded_ins(SequenceFormat format, const std::filesystem::path& folder,
+                              const std::array<int, 2>& cameras, bool mount_wanted) {
   switch (format) {
     case SequenceFormat::kitti_raw:
       return detail::read_oxts(folder, cameras, mount_wanted);

@@ -10,7 +10,8 @@
 #include "core/types/ins_sample.hpp"
 #include "drivers/ins.hpp"
 
-/// The INS that was recorded with a drive, whatever the data set's own form: what a replay compares its poses with.
+/// The INS that was recorded with a drive, whatever the data set's own form: what a replay compares
+/// its poses with.
 namespace vergence::app {
 
 struct RecordedReading {
@@ -20,17 +21,21 @@ struct RecordedReading {
 
 struct RecordedIns {
   std::vector<RecordedReading> readings{};  // stamps strictly ascending, on the clock of the images
-  std::optional<Transform> T_ins_left{};    // p_ins = T_ins_left · p_left as published with the data set; nothing: it is not
-  std::string mount_source{};               // the files that say so
-  std::vector<std::string> remarks{};       // what was left out or taken on trust: a sentence each
+  std::optional<Transform> T_ins_left{};  // p_ins = T_ins_left · p_left as published with the data
+                                          // set; nothing: it is not
+  std::string mount_source{};             // the files that say so
+  std::vector<std::string> remarks{};     // what was left out or taken on trust: a sentence each
 };
 
-/// The INS of the drive that open_sequence() opens with the same arguments. No readings: the data set has none, or none lie with the drive.
-/// `mount_wanted`: the published mount is read, where the data set publishes one; else somebody knows better.
-/// Memory  Some 250 bytes a reading, at most kMostReadings.  InputError  As the data set's reader says: files that are not there or no such
-/// files, no reading that is whole.
-[[nodiscard]] RecordedIns read_recorded_ins(SequenceFormat format, const std::filesystem::path& folder, const std::array<int, 2>& cameras,
-                                            bool mount_wanted);
+/// The INS of the drive that open_sequence() opens with the same arguments. No readings: the data
+/// set has none, or none lie with the drive.
+/// `mount_wanted`: the published mount is read, where the data set publishes one; else somebody
+/// knows better.
+/// Memory  Some 250 bytes a reading, at most kMostReadings.  InputError  As the data set's reader
+/// says: files that are not there or no such files, no reading that is whole.
+[[nodiscard]] RecordedIns read_recorded_ins(SequenceFormat format,
+                                            const std::filesystem::path& folder,
+                                            const std::array<int, 2>& cameras, bool mount_wanted);
 
 inline constexpr std::size_t kMostReadings = 2'000'000;  // five hours at 100 Hz
 

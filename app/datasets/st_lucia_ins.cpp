@@ -66,27 +66,38 @@ std::vector<Line> read_lines(const std::filesystem::path& log, std::vector<std::
   }
   if (out.empty() || broken > 1 + out.size() / kMostBroken)
     refuse(log, first_broken,
-           fmt::format("and {} more lines are not twelve numbers; this is not the log of the INS", broken > 0 ? broken - 1 : 0));
+           fmt::format("and {} more lines are not twelve numbers; this is not the log of the INS",
+                       broken > 0 ? broken - 1 : 0));
   if (broken > 0)
-    remarks->push_back(fmt::format("{}: {} lines that are not twelve numbers were left out", log.filename().string(), broken));
-  const bool ordered = std::is_sorted(out.begin(), out.end(), [](const Line& a, const Line& b) { return a.stamp < b.stamp; });
-  std::stable_sort(out.begin(), out.end(), [](const Line& a, const Line& b) { return a.stamp < b.stamp; });
-  const auto twice = std::unique(out.begin(), out.end(), [](const Line& a, const Line& b) { return a.stamp == b.stamp; });
+    remarks->push_back(fmt::format("{}: {} lines that are not twelve numbers were left out",
+                                   log.filename().string(), broken));
+  const bool ordered = std::is_sorted(
+      out.begin(), out.end(), [](const Line& a, const Line& b) { return a.stamp < b.stamp; });
+  std::stable_sort(out.begin(), out.end(),
+                   [](const Line& a, const Line& b) { return a.stamp < b.stamp; });
+  const auto twice = std::unique(out.begin(), out.end(),
+                                 [](const Line& a, const Line& b) { return a.stamp == b.stamp; });
   if (!ordered) remarks->push_back("the samples of the INS were not in the order of their stamps");
   if (twice != out.end())
-    remarks->push_back(fmt::format("{} samples of the INS had the stamp of another and were left out", out.end() - twice));
+    remarks->push_back(fmt::format(
+        "{} samples of the INS had the stamp of another and were left out", out.end() - twice));
   out.erase(twice, out.end());
   return out;
 }
 
-/// Latitude is the field that stays within 90; south and east of Brisbane both columns are places of their own only one way round.
-void check_places(const std::filesystem::path& log, std::vector<Line>* lines, std::vector<std::string>* remarks) {
-  const bool exchanged = std::all_of(lines->begin(), lines->end(), [](const Line& l) { return std::abs(l.place.latitude_deg) > 90; });
+/// Latitude is the field that stays within 90; south and east of Brisbane both columns are places
+/// of their own only one way round.
+void check_places(const std::filesystem::path& log, std::vector<Line>* lines,
+                  std::vector<std::string>* remarks) {
+  const bool exchanged = std::all_of(lines->begin(), lines->end(), [](const Line& l) {
+    return std::abs(l.place.latitude_deg) > 90;
+  });
   for (Line& line : *lines) {
     if (exchanged) std::swap(line.place.latitude_deg, line.place.longitude_deg);
     if (!line.place.plausible())
       refuse(log, 0,
-             fmt::format("has a place that is none: {} {} {}", line.place.latitude_deg, line.place.longitude_deg, line.place.height_m));
+             fmt::format("has a place that is none: {} {} {}", line.place.latitude_deg,
+                         line.place.longitude_deg, line.place.height_m));
   }
   if (exchanged) remarks->push_back("longitude stands before latitude in the log of the INS");
 }
@@ -99,9 +110,12 @@ std::vector<Moving> motions(const std::vector<Line>& lines) {
   std::size_t before = 0, after = 0;
   for (std::size_t i = 0; i < lines.size(); ++i) {
     while ((lines[i].stamp - lines[before].stamp).to_seconds() > kApart / 2) ++before;
-    while (after + 1 < lines.size() && (lines[after].stamp - lines[i].stamp).to_seconds() < kApart / 2) ++after;
+    while (after + 1 < lines.size() &&
+           (lines[after].stamp - lines[i].stamp).to_seconds() < kApart / 2)
+      ++after;
     const double span = (lines[after].stamp - lines[before].stamp).to_seconds();
-    if (span > 0.9 * kApart && span < 1.5 * kApart) out.push_back({&lines[i], (places[after] - places[before]) / span});
+    if (span > 0.9 * kApart && span < 1.5 * kApart)
+      out.push_back({&lines[i], (places[after] - places[before]) / span});
   }
   return out;
 }
@@ -133,28 +147,33 @@ double yaw_in_enu(double angle, Yaw yaw) noexcept {
 /// The axes in which the velocities are nearest to how the position moves.
 void decide_velocity(const std::vector<Moving>& moving, StLuciaConventions* c) {
   double least = 1e300;
-  for (const Velocity axes : {Velocity::north_west_up, Velocity::north_east_down, Velocity::east_north_up}) {
+  for (const Velocity axes :
+       {Velocity::north_west_up, Velocity::north_east_down, Velocity::east_north_up}) {
     double sum = 0;
-    for (const Moving& m : moving) sum += (in_enu(m.line->velocity, axes) - m.motion).head<2>().squaredNorm();
+    for (const Moving& m : moving)
+      sum += (in_enu(m.line->velocity, axes) - m.motion).head<2>().squaredNorm();
     if (sum >= least) continue;
     least = sum;
     c->velocity = axes;
   }
 }
 
-/// The yaw that points where the vehicle goes; it goes backwards now and then, so the mean of the cosines counts.
+/// The yaw that points where the vehicle goes; it goes backwards now and then, so the mean of the
+/// cosines counts.
 void decide_yaw(const std::vector<Moving>& fast, StLuciaConventions* c) {
   double most = -1e300;
   for (const Yaw yaw : {Yaw::north_to_west, Yaw::north_to_east, Yaw::east_to_north}) {
     double sum = 0;
-    for (const Moving& m : fast) sum += std::cos(yaw_in_enu(m.line->angles.z(), yaw) - std::atan2(m.motion.y(), m.motion.x()));
+    for (const Moving& m : fast)
+      sum += std::cos(yaw_in_enu(m.line->angles.z(), yaw) - std::atan2(m.motion.y(), m.motion.x()));
     if (sum <= most) continue;
     most = sum;
     c->yaw = yaw;
   }
 }
 
-double correlation(const std::vector<Moving>& fast, const std::vector<double>& slopes, Eigen::Index field) {
+double correlation(const std::vector<Moving>& fast, const std::vector<double>& slopes,
+                   Eigen::Index field) {
   const double n = static_cast<double>(fast.size());
   double x = 0, y = 0, xx = 0, yy = 0, xy = 0;
   for (std::size_t i = 0; i < fast.size(); ++i) {
@@ -180,7 +199,9 @@ bool decide_pitch(const std::vector<Moving>& fast, StLuciaConventions* c) {
 }
 
 const char* to_phrase(Velocity v) noexcept {
-  return v == Velocity::east_north_up ? "east, north, up" : v == Velocity::north_east_down ? "north, east, down" : "north, west, up";
+  return v == Velocity::east_north_up     ? "east, north, up"
+         : v == Velocity::north_east_down ? "north, east, down"
+                                          : "north, west, up";
 }
 const char* to_phrase(Yaw y) noexcept {
   return y == Yaw::north_to_west   ? "from north counter-clockwise"
@@ -196,15 +217,18 @@ StLuciaConventions decide(const std::vector<Line>& lines, std::vector<std::strin
     if (m.motion.head<2>().norm() > kFast) fast.push_back(m);
   if (fast.size() < kEnough) {
     remarks->push_back(
-        "the drive is too slow or too short to show the INS's axes: north, west, up and yaw from north counter-clockwise are taken");
+        "the drive is too slow or too short to show the INS's axes: north, west, up and yaw from "
+        "north counter-clockwise are taken");
     return c;
   }
   decide_velocity(moving, &c);
   decide_yaw(fast, &c);
   const bool slope = decide_pitch(fast, &c);
-  remarks->push_back(fmt::format("the INS's velocity is along {}, its yaw {}, its pitch field {}, {} with the nose up{}",
-                                 to_phrase(c.velocity), to_phrase(c.yaw), c.pitch_first ? 10 : 11,
-                                 c.nose_up_positive ? "positive" : "negative", slope ? "" : " (taken: the drive is too level to show it)"));
+  remarks->push_back(fmt::format(
+      "the INS's velocity is along {}, its yaw {}, its pitch field {}, {} with the nose up{}",
+      to_phrase(c.velocity), to_phrase(c.yaw), c.pitch_first ? 10 : 11,
+      c.nose_up_positive ? "positive" : "negative",
+      slope ? "" : " (taken: the drive is too level to show it)"));
   return c;
 }
 
@@ -217,8 +241,10 @@ InsSample sample_of(const Line& line, const StLuciaConventions& c, std::uint64_t
   s.position = line.place;
   const Vec3 v = in_enu(line.velocity, c.velocity);
   s.velocity_enu = {v.x(), v.y(), v.z()};
-  const double roll = line.angles[c.pitch_first ? 1 : 0], pitch = line.angles[c.pitch_first ? 0 : 1];
-  const Mat3 R = exp_so3(Vec3(0, 0, yaw_in_enu(line.angles.z(), c.yaw))) * exp_so3(Vec3(0, c.nose_up_positive ? -pitch : pitch, 0)) *
+  const double roll = line.angles[c.pitch_first ? 1 : 0],
+               pitch = line.angles[c.pitch_first ? 0 : 1];
+  const Mat3 R = exp_so3(Vec3(0, 0, yaw_in_enu(line.angles.z(), c.yaw))) *
+                 exp_so3(Vec3(0, c.nose_up_positive ? -pitch : pitch, 0)) *
                  exp_so3(Vec3(roll, 0, 0));
   const Eigen::Quaterniond q = quaternion(R);
   s.q_enu_ins = {q.x(), q.y(), q.z(), q.w()};
@@ -231,7 +257,9 @@ StLuciaIns read_st_lucia_ins(const std::filesystem::path& folder) {
   StLuciaIns ins;
   const auto found = detail::find_st_lucia_log(folder, "_Ins0.log");
   if (!found) {
-    ins.remarks.push_back(folder.string() + ": holds no file that ends in _Ins0.log; there is no INS to compare with");
+    ins.remarks.push_back(
+        folder.string() +
+        ": holds no file that ends in _Ins0.log; there is no INS to compare with");
     return ins;
   }
   const std::filesystem::path& log = *found;
@@ -239,7 +267,8 @@ StLuciaIns read_st_lucia_ins(const std::filesystem::path& folder) {
   check_places(log, &lines, &ins.remarks);
   ins.conventions = decide(lines, &ins.remarks);
   ins.samples.reserve(lines.size());
-  for (const Line& line : lines) ins.samples.push_back(sample_of(line, ins.conventions, ins.samples.size()));
+  for (const Line& line : lines)
+    ins.samples.push_back(sample_of(line, ins.conventions, ins.samples.size()));
   return ins;
 }
 

@@ -13,7 +13,8 @@ namespace {
 
 std::string text(ImageSize s) { return std::to_string(s.width) + "x" + std::to_string(s.height); }
 
-StereoSequence open_by_format(SequenceFormat format, const std::filesystem::path& folder, bool given, const CalibrationUse& use,
+StereoSequence open_by_format(SequenceFormat format, const std::filesystem::path& folder,
+                              bool given, const CalibrationUse& use,
                               const std::array<int, 2>& cameras, const BagTopics& topics) {
   switch (format) {
     case SequenceFormat::kitti:
@@ -33,26 +34,31 @@ StereoSequence open_by_format(SequenceFormat format, const std::filesystem::path
 }
 
 /// What all formats have to hold, whoever gave the calibration. `source`: the file it is from.
-StereoSequence checked(StereoSequence sequence, const std::filesystem::path& source, const CalibrationUse& use);
+StereoSequence checked(StereoSequence sequence, const std::filesystem::path& source,
+                       const CalibrationUse& use);
 
 }  // namespace
 
 StereoSequence open_sequence(SequenceFormat format, const std::filesystem::path& folder,
-                             const std::optional<std::filesystem::path>& calibration, const CalibrationUse& use,
-                             const std::array<int, 2>& cameras, const BagTopics& topics) {
+                             const std::optional<std::filesystem::path>& calibration,
+                             const CalibrationUse& use, const std::array<int, 2>& cameras,
+                             const BagTopics& topics) {
   if (calibration)
-    return open_sequence(
-        format, folder,
-        CalibrationSource{calibration->string(), [&](const StereoSequence&) { return read_calibration(*calibration, use); }}, use, cameras,
-        topics);
+    return open_sequence(format, folder,
+                         CalibrationSource{calibration->string(),
+                                           [&](const StereoSequence&) {
+                                             return read_calibration(*calibration, use);
+                                           }},
+                         use, cameras, topics);
   if (format != SequenceFormat::mcap) detail::require_folder(folder, "a drive");
   StereoSequence sequence = open_by_format(format, folder, false, use, cameras, topics);
   const std::filesystem::path source = sequence.root / sequence.calibration_source;
   return checked(std::move(sequence), source, use);
 }
 
-StereoSequence open_sequence(SequenceFormat format, const std::filesystem::path& folder, const CalibrationSource& calibration,
-                             const CalibrationUse& use, const std::array<int, 2>& cameras, const BagTopics& topics) {
+StereoSequence open_sequence(SequenceFormat format, const std::filesystem::path& folder,
+                             const CalibrationSource& calibration, const CalibrationUse& use,
+                             const std::array<int, 2>& cameras, const BagTopics& topics) {
   if (format != SequenceFormat::mcap) detail::require_folder(folder, "a drive");
   StereoSequence sequence = open_by_format(format, folder, true, use, cameras, topics);
   sequence.calibration = calibration.read(sequence).rig;
@@ -62,16 +68,21 @@ StereoSequence open_sequence(SequenceFormat format, const std::filesystem::path&
 
 namespace {
 
-StereoSequence checked(StereoSequence sequence, const std::filesystem::path& source, const CalibrationUse& use) {
+StereoSequence checked(StereoSequence sequence, const std::filesystem::path& source,
+                       const CalibrationUse& use) {
   check_times(sequence);
   apply_use(use, &sequence.calibration);
   if (const auto bad = find_implausible(&sequence.calibration)) refuse(source, 0, bad->sentence);
   if (sequence.calibration.cameras != 2)
-    refuse(source, 0, "describes " + std::to_string(sequence.calibration.cameras) + " cameras; a stereo drive has two");
-  const Intrinsics &left = sequence.calibration.intrinsics[0], &right = sequence.calibration.intrinsics[1];
+    refuse(source, 0,
+           "describes " + std::to_string(sequence.calibration.cameras) +
+               " cameras; a stereo drive has two");
+  const Intrinsics &left = sequence.calibration.intrinsics[0],
+                   &right = sequence.calibration.intrinsics[1];
   if (left.width != right.width || left.height != right.height)
     refuse(source, 0,
-           "gives the left camera " + text({left.width, left.height}) + " pixels and the right one " + text({right.width, right.height}) +
+           "gives the left camera " + text({left.width, left.height}) +
+               " pixels and the right one " + text({right.width, right.height}) +
                "; both have to be of one size");
   check_image_sizes(sequence, 0, std::min<std::size_t>(1, sequence.pairs.size()));
   return sequence;
@@ -81,33 +92,45 @@ StereoSequence checked(StereoSequence sequence, const std::filesystem::path& sou
 
 std::optional<SequenceFormat> find_format(const std::filesystem::path& folder) {
   std::error_code ignored;
-  if (folder.extension() == ".mcap" && std::filesystem::is_regular_file(folder, ignored)) return SequenceFormat::mcap;
-  const auto has = [&](const char* name) { return std::filesystem::exists(folder / name, ignored); };
+  if (folder.extension() == ".mcap" && std::filesystem::is_regular_file(folder, ignored))
+    return SequenceFormat::mcap;
+  const auto has = [&](const char* name) {
+    return std::filesystem::exists(folder / name, ignored);
+  };
   if (has("mav0") || (has("cam0") && has("cam1"))) return SequenceFormat::euroc;
   if (has("image_0") && has("image_1")) return SequenceFormat::kitti;
   if ((has("left") && has("right")) || has("both")) return SequenceFormat::folder;
-  for (std::filesystem::directory_iterator it(folder, ignored), end; !ignored && it != end; it.increment(ignored))
-    if (it->path().filename().string().ends_with("_MultiCamera0.log")) return SequenceFormat::st_lucia;
-  for (std::filesystem::directory_iterator it(folder, ignored), end; !ignored && it != end; it.increment(ignored))
+  for (std::filesystem::directory_iterator it(folder, ignored), end; !ignored && it != end;
+       it.increment(ignored))
+    if (it->path().filename().string().ends_with("_MultiCamera0.log"))
+      return SequenceFormat::st_lucia;
+  for (std::filesystem::directory_iterator it(folder, ignored), end; !ignored && it != end;
+       it.increment(ignored))
     if (it->path().extension() == ".mcap") return SequenceFormat::mcap;
   if (detail::holds_kitti_raw(folder)) return SequenceFormat::kitti_raw;
   return std::nullopt;
 }
 
-ImageFileStatus image_size(const StereoSequence& sequence, const std::string& name, ImageSize* size) {
-  return sequence.store ? sequence.store->size(name, size) : read_image_size(sequence.root / name, size);
+ImageFileStatus image_size(const StereoSequence& sequence, const std::string& name,
+                           ImageSize* size) {
+  return sequence.store ? sequence.store->size(name, size)
+                        : read_image_size(sequence.root / name, size);
 }
 
 ImageSize first_image_size(const StereoSequence& sequence, std::size_t camera) {
   ImageSize size;
   for (const StereoPair& pair : sequence.pairs)
-    if (!pair.file[camera].empty() && image_size(sequence, pair.file[camera], &size) == ImageFileStatus::ok)
+    if (!pair.file[camera].empty() &&
+        image_size(sequence, pair.file[camera], &size) == ImageFileStatus::ok)
       return {sequence.side_by_side ? size.width / 2 : size.width, size.height};
-  refuse(sequence.root, 0, std::string("has no readable image of the ") + (camera == 0 ? "left" : "right") + " camera");
+  refuse(
+      sequence.root, 0,
+      std::string("has no readable image of the ") + (camera == 0 ? "left" : "right") + " camera");
 }
 
 void check_image_sizes(const StereoSequence& sequence, std::size_t first, std::size_t count) {
-  const std::size_t end = first + std::min(count, sequence.pairs.size() - std::min(first, sequence.pairs.size()));
+  const std::size_t end =
+      first + std::min(count, sequence.pairs.size() - std::min(first, sequence.pairs.size()));
   for (std::size_t i = first; i < end; ++i)
     for (std::size_t k = 0; k < 2; ++k) {
       const std::string& name = sequence.pairs[i].file[k];
@@ -118,8 +141,9 @@ void check_image_sizes(const StereoSequence& sequence, std::size_t first, std::s
       const ImageSize wanted{(sequence.side_by_side ? 2 : 1) * camera.width, camera.height};
       if (size != wanted)
         refuse(sequence.root / name, 0,
-               "is " + text(size) + " pixels, but the calibration of this camera (" + sequence.calibration_source + ") is for " +
-                   text(wanted) + (sequence.side_by_side ? " (twice its width, side by side)" : "") +
+               "is " + text(size) + " pixels, but the calibration of this camera (" +
+                   sequence.calibration_source + ") is for " + text(wanted) +
+                   (sequence.side_by_side ? " (twice its width, side by side)" : "") +
                    "; use the calibration that belongs to these images");
     }
 }
@@ -129,9 +153,11 @@ namespace detail {
 void require_folder(const std::filesystem::path& folder, const char* what_it_should_hold) {
   std::error_code error;
   if (std::filesystem::is_directory(folder, error)) return;
-  refuse(folder, 0,
-         std::filesystem::exists(folder, error) ? std::string("is not a folder; a folder with ") + what_it_should_hold + " is expected"
-                                                : std::string("does not exist; a folder with ") + what_it_should_hold + " is expected");
+  refuse(
+      folder, 0,
+      std::filesystem::exists(folder, error)
+          ? std::string("is not a folder; a folder with ") + what_it_should_hold + " is expected"
+          : std::string("does not exist; a folder with ") + what_it_should_hold + " is expected");
 }
 
 std::vector<std::string> list_images(const std::filesystem::path& root, const std::string& below) {
@@ -139,11 +165,14 @@ std::vector<std::string> list_images(const std::filesystem::path& root, const st
   require_folder(folder, "PNG or JPEG images");
   std::vector<std::string> names;
   std::error_code error;
-  for (std::filesystem::directory_iterator it(folder, error), end; !error && it != end; it.increment(error)) {
+  for (std::filesystem::directory_iterator it(folder, error), end; !error && it != end;
+       it.increment(error)) {
     std::string extension = it->path().extension().string();
-    std::transform(extension.begin(), extension.end(), extension.begin(),
-                   [](char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c; });
-    if (extension == ".png" || extension == ".jpg" || extension == ".jpeg") names.push_back(below + "/" + it->path().filename().string());
+    std::transform(extension.begin(), extension.end(), extension.begin(), [](char c) {
+      return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
+    });
+    if (extension == ".png" || extension == ".jpg" || extension == ".jpeg")
+      names.push_back(below + "/" + it->path().filename().string());
   }
   if (error) refuse(folder, 0, "cannot be listed (" + error.message() + "): check its permissions");
   if (names.empty()) refuse(folder, 0, "holds no PNG or JPEG image");

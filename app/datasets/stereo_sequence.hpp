@@ -16,7 +16,8 @@
 #include "core/types/calibration.hpp"
 #include "core/types/time.hpp"
 
-/// Recorded stereo drives as lists of image files with stamps: what a replay reads, whatever the data set's own layout.
+/// Recorded stereo drives as lists of image files with stamps: what a replay reads, whatever the
+/// data set's own layout.
 namespace vergence::app {
 
 enum class SequenceFormat : std::uint8_t { kitti, kitti_raw, euroc, folder, st_lucia, mcap };
@@ -24,34 +25,40 @@ enum class SequenceFormat : std::uint8_t { kitti, kitti_raw, euroc, folder, st_l
 /// One frame as the data set lists it.
 struct StereoPair {
   Stamp stamp{};
-  std::array<std::string, 2> file;  // left, right: relative to StereoSequence::root, or names in its store; empty: the data set lists none
+  std::array<std::string, 2> file;  // left, right: relative to StereoSequence::root, or names in
+                                    // its store; empty: the data set lists none
 };
 
 /// A whole drive but its pixels.
 ///
-/// pairs        In the order of the data set; stamps as they are, so they may go backwards. Files may be missing or torn:
+/// pairs        In the order of the data set; stamps as they are, so they may go backwards. Files
+/// may be missing or torn:
 ///              who decodes them finds out, skips the frame and says so.
 /// calibration  Two cameras; from the data set's own files unless one was given.
 struct StereoSequence {
   std::filesystem::path root;
   std::vector<StereoPair> pairs;
   RigCalibration calibration;
-  std::string calibration_source;             // the file's name, for calibrations.csv
-  std::filesystem::path times;                // the file that the stamps are from, for sentences about them
-  std::size_t left_out = 0;                   // frames that are none of `pairs`: no stamp, no partner, out of order
-  std::vector<std::string> remarks{};         // what was left out, taken on trust or assumed: a sentence each
-  bool side_by_side = false;                  // a file holds both images, the left one's columns first; file[0] and file[1] are the same
+  std::string calibration_source;  // the file's name, for calibrations.csv
+  std::filesystem::path times;     // the file that the stamps are from, for sentences about them
+  std::size_t left_out = 0;  // frames that are none of `pairs`: no stamp, no partner, out of order
+  std::vector<std::string>
+      remarks{};              // what was left out, taken on trust or assumed: a sentence each
+  bool side_by_side = false;  // a file holds both images, the left one's columns first; file[0] and
+                              // file[1] are the same
   std::shared_ptr<const ImageStore> store{};  // has the images; nothing: they are files below root
-  bool bayer = false;                         // images are raw mosaics: grey is made of them (core/types/bayer.hpp)
+  bool bayer = false;  // images are raw mosaics: grey is made of them (core/types/bayer.hpp)
 };
 
-/// A calibration that is used instead of the data set's own: where it is from, and how to have it, given the images that are there.
+/// A calibration that is used instead of the data set's own: where it is from, and how to have it,
+/// given the images that are there.
 struct CalibrationSource {
   std::string name;
   std::function<CalibrationFile(const StereoSequence& images)> read;
 };
 
-/// Which topics of a bag are wanted, in full; empty: the only ones of their types, or those named left and right.
+/// Which topics of a bag are wanted, in full; empty: the only ones of their types, or those named
+/// left and right.
 struct BagTopics {
   std::string left{}, right{};
 };
@@ -59,47 +66,64 @@ struct BagTopics {
 /// The format of a folder (or a .mcap file) by what is in it; nothing: none that is known.
 [[nodiscard]] std::optional<SequenceFormat> find_format(const std::filesystem::path& folder);
 
-/// A drive of the given format. `calibration`: a calibration.yaml that is used instead of the data set's own.
+/// A drive of the given format. `calibration`: a calibration.yaml that is used instead of the data
+/// set's own.
 ///
-///   kitti   calib.txt (P0, P1), times.txt (seconds), image_0/, image_1/ with NNNNNN.png: image N belongs to line N of times.txt
-///   kitti_raw  DATE_drive_NNNN_sync or _extract with image_NN/data and image_NN/timestamps.txt, the date's calib_*.txt above it; paired by
-///           stamps, that of the left camera counts; raw or rectified images, told by their size. `folder` is the drive, its date, or above
-///   euroc   mav0/cam0, mav0/cam1 with data.csv and sensor.yaml, or that mav0 itself; paired by equal stamps; raw images
-///   folder  left/, right/ paired in order of name (or both/ with both images in each file, side by side), times.txt (a line a pair:
-///   integer nanoseconds, or seconds if it has a
-///           point), calibration.yaml. Where one side lacks images that the other has, pairing goes by equal names; where the lines of
-///           times.txt name their images, `stamp,file` or `stamp,left file,right file`, by these. An optional reference lies beside them:
-///           truth.tum, or poses.txt as KITTI has it, a line a pair (the left camera's; replay reads it). Without times.txt pairs are taken
-///           to be 0.1 s apart, which is a remark.
-///   st_lucia  PREFIX_MultiCamera0.log names the images in PREFIX_MultiCamera0/; paired by line, stamp of the left camera; raw Bayer BMP;
+///   kitti   calib.txt (P0, P1), times.txt (seconds), image_0/, image_1/ with NNNNNN.png: image N
+///   belongs to line N of times.txt kitti_raw  DATE_drive_NNNN_sync or _extract with image_NN/data
+///   and image_NN/timestamps.txt, the date's calib_*.txt above it; paired by
+///           stamps, that of the left camera counts; raw or rectified images, told by their size.
+///           `folder` is the drive, its date, or above
+///   euroc   mav0/cam0, mav0/cam1 with data.csv and sensor.yaml, or that mav0 itself; paired by
+///   equal stamps; raw images folder  left/, right/ paired in order of name (or both/ with both
+///   images in each file, side by side), times.txt (a line a pair: integer nanoseconds, or seconds
+///   if it has a
+///           point), calibration.yaml. Where one side lacks images that the other has, pairing goes
+///           by equal names; where the lines of times.txt name their images, `stamp,file` or
+///           `stamp,left file,right file`, by these. An optional reference lies beside them:
+///           truth.tum, or poses.txt as KITTI has it, a line a pair (the left camera's; replay
+///           reads it). Without times.txt pairs are taken to be 0.1 s apart, which is a remark.
+///   st_lucia  PREFIX_MultiCamera0.log names the images in PREFIX_MultiCamera0/; paired by line,
+///   stamp of the left camera; raw Bayer BMP;
 ///           the calibration published with the data set
-///   mcap    a .mcap file, or a folder with some: a ROS 2 bag (docs/bags.md); paired by the nearest header.stamp, that of the left camera
+///   mcap    a .mcap file, or a folder with some: a ROS 2 bag (docs/bags.md); paired by the nearest
+///   header.stamp, that of the left camera
 ///           counts; CameraInfo beside the images
 ///
-/// `use`: what of the calibration is wanted, whichever it is. `cameras`: left and right of a data set that has more than two (kitti_raw).
-/// `topics`: of a bag. InputError (file, line, what): folders or files that are not there, no images, numbers of images and times that do
-/// not go together, times that are no numbers, times in another unit or running backwards (check_times()), a calibration that makes no rig,
-/// images of another size than the calibration.
-[[nodiscard]] StereoSequence open_sequence(SequenceFormat format, const std::filesystem::path& folder,
-                                           const std::optional<std::filesystem::path>& calibration = std::nullopt,
-                                           const CalibrationUse& use = {}, const std::array<int, 2>& cameras = {0, 1},
-                                           const BagTopics& topics = {});
-[[nodiscard]] StereoSequence open_sequence(SequenceFormat format, const std::filesystem::path& folder, const CalibrationSource& calibration,
-                                           const CalibrationUse& use, const std::array<int, 2>& cameras = {0, 1},
+/// `use`: what of the calibration is wanted, whichever it is. `cameras`: left and right of a data
+/// set that has more than two (kitti_raw).
+/// `topics`: of a bag. InputError (file, line, what): folders or files that are not there, no
+/// images, numbers of images and times that do not go together, times that are no numbers, times in
+/// another unit or running backwards (check_times()), a calibration that makes no rig, images of
+/// another size than the calibration.
+[[nodiscard]] StereoSequence open_sequence(
+    SequenceFormat format, const std::filesystem::path& folder,
+    const std::optional<std::filesystem::path>& calibration = std::nullopt,
+    const CalibrationUse& use = {}, const std::array<int, 2>& cameras = {0, 1},
+    const BagTopics& topics = {});
+[[nodiscard]] StereoSequence open_sequence(SequenceFormat format,
+                                           const std::filesystem::path& folder,
+                                           const CalibrationSource& calibration,
+                                           const CalibrationUse& use,
+                                           const std::array<int, 2>& cameras = {0, 1},
                                            const BagTopics& topics = {});
 
 /// Size of an image of the sequence, from its head. → as read_image_size()
-[[nodiscard]] ImageFileStatus image_size(const StereoSequence& sequence, const std::string& name, ImageSize* size);
+[[nodiscard]] ImageFileStatus image_size(const StereoSequence& sequence, const std::string& name,
+                                         ImageSize* size);
 
-/// Size of the first image of camera `camera` whose head can be read. InputError when there is none.
+/// Size of the first image of camera `camera` whose head can be read. InputError when there is
+/// none.
 [[nodiscard]] ImageSize first_image_size(const StereoSequence& sequence, std::size_t camera);
 
-/// InputError where the stamps cannot be those of a drive: most do not go forward, or the median step between pairs is below 1 ms or above
-/// 10 s. The sentence asks for the unit that would make them one.
+/// InputError where the stamps cannot be those of a drive: most do not go forward, or the median
+/// step between pairs is below 1 ms or above 10 s. The sentence asks for the unit that would make
+/// them one.
 void check_times(const StereoSequence& sequence);
 
-/// Looks at the head of every image of pairs [first, first + count): InputError names the first that has another size than the
-/// calibration. Missing and unreadable files pass: their frames are skipped when they come. Some 10 µs an image.
+/// Looks at the head of every image of pairs [first, first + count): InputError names the first
+/// that has another size than the calibration. Missing and unreadable files pass: their frames are
+/// skipped when they come. Some 10 µs an image.
 void check_image_sizes(const StereoSequence& sequence, std::size_t first, std::size_t count);
 
 }  // namespace vergence::app

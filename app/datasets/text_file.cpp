@@ -29,17 +29,23 @@ void refuse(const std::filesystem::path& file, std::size_t line, std::string_vie
 
 std::string read_text(const std::filesystem::path& file, std::size_t limit) {
   std::error_code ignored;
-  if (std::filesystem::is_directory(file, ignored)) refuse(file, 0, "is a folder where a file is expected");
+  if (std::filesystem::is_directory(file, ignored))
+    refuse(file, 0, "is a folder where a file is expected");
   std::ifstream in(file, std::ios::binary);
   if (!in) {
     const int e = errno;
-    refuse(file, 0, std::string("cannot be opened (") + std::strerror(e) + "): check the path and its permissions");
+    refuse(file, 0,
+           std::string("cannot be opened (") + std::strerror(e) +
+               "): check the path and its permissions");
   }
   std::string text;
   std::array<char, 1U << 16U> block;
   while (in.read(block.data(), block.size()) || in.gcount() > 0) {
     text.append(block.data(), static_cast<std::size_t>(in.gcount()));
-    if (text.size() > limit) refuse(file, 0, "is longer than " + std::to_string(limit) + " bytes: this is not the file that is meant");
+    if (text.size() > limit)
+      refuse(
+          file, 0,
+          "is longer than " + std::to_string(limit) + " bytes: this is not the file that is meant");
   }
   if (in.bad()) refuse(file, 0, "reading it failed half way");
   return text;
@@ -63,15 +69,18 @@ bool Lines::next(std::string_view* line) noexcept {
   return false;
 }
 
-std::size_t split(std::string_view line, char separator, std::span<std::string_view> fields) noexcept {
+std::size_t split(std::string_view line, char separator,
+                  std::span<std::string_view> fields) noexcept {
   std::size_t count = 0;
   const auto store = [&](std::string_view field) {
     if (count < fields.size()) fields[count] = field;
     ++count;
   };
   if (separator == ' ') {
-    // One set of blanks for what is passed over and for what ends a field: else a field could be empty and nothing be left behind.
-    for (std::size_t at = line.find_first_not_of(kBlanks); at != std::string_view::npos; at = line.find_first_not_of(kBlanks)) {
+    // One set of blanks for what is passed over and for what ends a field: else a field could be
+    // empty and nothing be left behind.
+    for (std::size_t at = line.find_first_not_of(kBlanks); at != std::string_view::npos;
+         at = line.find_first_not_of(kBlanks)) {
       line.remove_prefix(at);
       const std::string_view field = line.substr(0, line.find_first_of(kBlanks));
       store(field);

@@ -9,12 +9,16 @@
 namespace vergence::app {
 
 /// "FILE:LINE: WHAT" as an InputError; without a line when `line` is 0.
-[[noreturn]] void refuse(const std::filesystem::path& file, std::size_t line, std::string_view what);
+[[noreturn]] void refuse(const std::filesystem::path& file, std::size_t line,
+                         std::string_view what);
 
-/// All bytes of a file (a pipe will do). InputError: not there, a folder, not readable, longer than `limit` bytes.
-[[nodiscard]] std::string read_text(const std::filesystem::path& file, std::size_t limit = std::size_t{1} << 30U);
+/// All bytes of a file (a pipe will do). InputError: not there, a folder, not readable, longer than
+/// `limit` bytes.
+[[nodiscard]] std::string read_text(const std::filesystem::path& file,
+                                    std::size_t limit = std::size_t{1} << 30U);
 
-/// The lines of a text one after the other, ends LF or CR LF, a byte order mark skipped. Views into `text`, which must outlive it.
+/// The lines of a text one after the other, ends LF or CR LF, a byte order mark skipped. Views into
+/// `text`, which must outlive it.
 class Lines {
  public:
   explicit Lines(std::string_view text) noexcept;
@@ -28,9 +32,10 @@ class Lines {
   std::size_t number_ = 0;
 };
 
-/// Splits at the separator (' ' stands for any run of blanks and tabs). Returns how many fields there are; at most fields.size() are
-/// stored.
-[[nodiscard]] std::size_t split(std::string_view line, char separator, std::span<std::string_view> fields) noexcept;
+/// Splits at the separator (' ' stands for any run of blanks and tabs). Returns how many fields
+/// there are; at most fields.size() are stored.
+[[nodiscard]] std::size_t split(std::string_view line, char separator,
+                                std::span<std::string_view> fields) noexcept;
 
 /// The whole field is one finite number. False: *value as it was.
 [[nodiscard]] bool parse_number(std::string_view field, double* value) noexcept;

@@ -24,7 +24,9 @@ const DriverFindings* findings_of(const Inventory& inventory, const std::string&
 
 bool same_hex(const std::string& a, const std::string& b) {
   return a.size() == b.size() &&
-         std::equal(a.begin(), a.end(), b.begin(), [](unsigned char x, unsigned char y) { return std::tolower(x) == std::tolower(y); });
+         std::equal(a.begin(), a.end(), b.begin(), [](unsigned char x, unsigned char y) {
+           return std::tolower(x) == std::tolower(y);
+         });
 }
 
 bool means(const std::string& wanted, const FoundCamera& camera) {
@@ -35,26 +37,32 @@ bool means(const std::string& wanted, const FoundCamera& camera) {
 /// Names under /dev/v4l that lead to the node.
 bool leads_to(const Machine& machine, const std::string& wanted, const std::string& place) {
   std::error_code error;
-  const auto real = std::filesystem::canonical(machine.root / std::filesystem::path(wanted).relative_path(), error);
-  return !error && wanted.starts_with("/dev/") && real.filename() == std::filesystem::path(place).filename();
+  const auto real = std::filesystem::canonical(
+      machine.root / std::filesystem::path(wanted).relative_path(), error);
+  return !error && wanted.starts_with("/dev/") &&
+         real.filename() == std::filesystem::path(place).filename();
 }
 
 std::string list_of(const DriverFindings& d) {
   if (d.cameras.empty()) return d.note.empty() ? "none is there" : "none is there: " + d.note;
   std::string text = "there:";
   for (const FoundCamera& c : d.cameras)
-    text += fmt::format("{} {}", &c == d.cameras.data() ? "" : ",", c.info.serial.empty() ? c.info.place : c.info.serial);
+    text += fmt::format("{} {}", &c == d.cameras.data() ? "" : ",",
+                        c.info.serial.empty() ? c.info.place : c.info.serial);
   return text;
 }
 
 /// `the gige camera "123"`, or just of which kind where no serial is asked for.
-std::string wanted_camera(const CameraNeed& n) { return "the " + n.driver + " camera" + (n.serial.empty() ? "" : " " + quoted(n.serial)); }
+std::string wanted_camera(const CameraNeed& n) {
+  return "the " + n.driver + " camera" + (n.serial.empty() ? "" : " " + quoted(n.serial));
+}
 
 Finding missing_at_address(const CameraNeed& n, const std::string& who) {
   return {"cameras",
           FindingState::advice,
-          fmt::format("{}: no camera at {} answers a broadcast; behind a router that is so, else check cable, power and address", who,
-                      n.serial),
+          fmt::format("{}: no camera at {} answers a broadcast; behind a router that is so, else "
+                      "check cable, power and address",
+                      who, n.serial),
           {"ping -c 3 " + n.serial}};
 }
 
@@ -68,7 +76,8 @@ void check_presence(const Patient& p, std::vector<Finding>* findings) {
     if (n.driver == "mock") continue;
     const std::string who = fmt::format("{}{}", n.key, n.name.empty() ? "" : " (" + n.name + ")");
     if (matched[k] != nullptr) {
-      present += fmt::format("{}{} is {} {}", present.empty() ? "" : ", ", who, n.driver, matched[k]->info.serial);
+      present += fmt::format("{}{} is {} {}", present.empty() ? "" : ", ", who, n.driver,
+                             matched[k]->info.serial);
     } else if (n.driver == "gige" && std::count(n.serial.begin(), n.serial.end(), '.') == 3) {
       findings->push_back(missing_at_address(n, who));
     } else {
@@ -78,27 +87,33 @@ void check_presence(const Patient& p, std::vector<Finding>* findings) {
   }
   for (const auto& [driver, list] : missing) {
     const DriverFindings* d = findings_of(p.inventory, driver);
-    findings->push_back(
-        {"cameras",
-         FindingState::problem,
-         fmt::format("not there: {} ({}); check cable, power and serial", list, d == nullptr ? "no such driver" : list_of(*d)),
-         {}});
+    findings->push_back({"cameras",
+                         FindingState::problem,
+                         fmt::format("not there: {} ({}); check cable, power and serial", list,
+                                     d == nullptr ? "no such driver" : list_of(*d)),
+                         {}});
   }
   if (!present.empty()) findings->push_back({"cameras", FindingState::ok, present, {}});
 }
 
 void check_answers(const Patient& p, std::vector<Finding>* findings) {
   for (const DriverFindings& d : p.inventory.drivers)
-    if (!d.answered) findings->push_back({"cameras", FindingState::problem, d.name + ": " + d.note, {"sudo dmesg | tail -30"}});
+    if (!d.answered)
+      findings->push_back(
+          {"cameras", FindingState::problem, d.name + ": " + d.note, {"sudo dmesg | tail -30"}});
 }
 
-/// Nodes of everything that looks like a camera of a kind that is asked for; without a configuration of every kind.
+/// Nodes of everything that looks like a camera of a kind that is asked for; without a
+/// configuration of every kind.
 std::vector<std::string> camera_nodes(const Patient& p) {
-  const auto asked = [&p](const char* driver) { return !p.needs.given || !p.needs.of(driver).empty(); };
+  const auto asked = [&p](const char* driver) {
+    return !p.needs.given || !p.needs.of(driver).empty();
+  };
   std::vector<std::string> nodes;
   if (asked("v4l2"))
     for (const std::string& name : p.machine.names("/sys/class/video4linux"))
-      if (name.starts_with("video") && p.machine.exists("/dev/" + name)) nodes.push_back("/dev/" + name);
+      if (name.starts_with("video") && p.machine.exists("/dev/" + name))
+        nodes.push_back("/dev/" + name);
   if (asked("iidc-usb"))
     for (const UsbDevice& d : p.inventory.usb)
       if (d.vendor == kPointGrey) nodes.push_back(d.node());
@@ -107,7 +122,8 @@ std::vector<std::string> camera_nodes(const Patient& p) {
   return nodes;
 }
 
-/// The text of media_advice(): the chain in its first line, then what is wrong with it, each as `WHAT: media-ctl …`.
+/// The text of media_advice(): the chain in its first line, then what is wrong with it, each as
+/// `WHAT: media-ctl …`.
 Finding finding_of_media(const std::string& advice, FindingState when_wrong) {
   std::istringstream lines(advice);
   Finding f{"media_chain", FindingState::ok, {}, {}};
@@ -130,7 +146,8 @@ void check_media(const Patient& p, std::vector<Finding>* findings) {
     for (const FoundCamera& c : d.cameras) {
       if (c.media.empty()) continue;
       const bool wanted = std::find(matched.begin(), matched.end(), &c) != matched.end();
-      findings->push_back(finding_of_media(c.media, wanted ? FindingState::problem : FindingState::advice));
+      findings->push_back(
+          finding_of_media(c.media, wanted ? FindingState::problem : FindingState::advice));
     }
 }
 
@@ -138,14 +155,17 @@ void check_media(const Patient& p, std::vector<Finding>* findings) {
 
 std::vector<const FoundCamera*> match_cameras(const Patient& p) {
   std::vector<const FoundCamera*> matched(p.needs.cameras.size(), nullptr);
-  const auto taken = [&](const FoundCamera* c) { return std::find(matched.begin(), matched.end(), c) != matched.end(); };
+  const auto taken = [&](const FoundCamera* c) {
+    return std::find(matched.begin(), matched.end(), c) != matched.end();
+  };
   for (const bool named : {true, false})  // those that name one first: the others take what is left
     for (std::size_t k = 0; k < matched.size(); ++k) {
       const CameraNeed& n = p.needs.cameras[k];
       const DriverFindings* d = findings_of(p.inventory, n.driver);
       if (d == nullptr || n.serial.empty() == named) continue;
       for (const FoundCamera& c : d->cameras)
-        if (!taken(&c) && (!named || means(n.serial, c) || leads_to(p.machine, n.serial, c.info.place))) {
+        if (!taken(&c) &&
+            (!named || means(n.serial, c) || leads_to(p.machine, n.serial, c.info.place))) {
           matched[k] = &c;
           break;
         }

@@ -7,7 +7,8 @@
 #include "app/doctor/machine.hpp"
 #include "app/doctor/needs.hpp"
 
-/// What `vergence doctor` looks at. Every check is a function of what it is given and of the machine's files.
+/// What `vergence doctor` looks at. Every check is a function of what it is given and of the
+/// machine's files.
 namespace vergence::app {
 
 enum class FindingState : std::uint8_t {
@@ -21,7 +22,8 @@ struct Finding {
   std::string check;  // which, as in docs/doctor.md
   FindingState state = FindingState::ok;
   std::string sentence;
-  std::vector<std::string> mend;  // commands as they are typed, the lasting one last; empty: none, or nothing to mend
+  std::vector<std::string>
+      mend;  // commands as they are typed, the lasting one last; empty: none, or nothing to mend
 };
 
 /// What the checks look at.
@@ -32,19 +34,24 @@ struct Patient {
   std::filesystem::path out = ".";  // where sessions go
 };
 
-/// All checks; those about devices that neither are there nor are asked for say nothing. Problems first, then advice, then what is well.
+/// All checks; those about devices that neither are there nor are asked for say nothing. Problems
+/// first, then advice, then what is well.
 [[nodiscard]] std::vector<Finding> examine(const Patient& patient);
 
 // The checks by what they are about; each appends its findings in any order.
-void check_cameras(const Patient& patient, std::vector<Finding>* findings);   // asked for and there, permissions, media controllers
-void check_network(const Patient& patient, std::vector<Finding>* findings);   // GigE Vision
-void check_usb(const Patient& patient, std::vector<Finding>* findings);       // memory, budget, sleep
+void check_cameras(
+    const Patient& patient,
+    std::vector<Finding>* findings);  // asked for and there, permissions, media controllers
+void check_network(const Patient& patient, std::vector<Finding>* findings);  // GigE Vision
+void check_usb(const Patient& patient, std::vector<Finding>* findings);  // memory, budget, sleep
 void check_firewire(const Patient& patient, std::vector<Finding>* findings);  // stack, budget
-void check_serial(const Patient& patient, std::vector<Finding>* findings);    // permissions, latency timer, ModemManager
-void check_system(const Patient& patient, std::vector<Finding>* findings);    // limits, governor, clocks, disk
+void check_serial(const Patient& patient,
+                  std::vector<Finding>* findings);  // permissions, latency timer, ModemManager
+void check_system(const Patient& patient,
+                  std::vector<Finding>* findings);  // limits, governor, clocks, disk
 
-/// The found camera that a configuration means: by serial or place; an empty serial is the next that no other entry names. Null: none.
-/// One entry for each of needs.cameras.
+/// The found camera that a configuration means: by serial or place; an empty serial is the next
+/// that no other entry names. Null: none. One entry for each of needs.cameras.
 [[nodiscard]] std::vector<const FoundCamera*> match_cameras(const Patient& patient);
 
 }  // namespace vergence::app

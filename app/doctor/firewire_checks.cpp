@@ -23,8 +23,9 @@ struct Share {
   bool format7 = false;
 };
 
-/// What a camera will ask of its bus, as far as it can be told without asking the camera: Mono8, a fixed mode where the standard has one
-/// of that size and all cameras of the rig can send its packets, else a region of Format 7.
+/// What a camera will ask of its bus, as far as it can be told without asking the camera: Mono8, a
+/// fixed mode where the standard has one of that size and all cameras of the rig can send its
+/// packets, else a region of Format 7.
 Share share_of(const CameraNeed& n, std::size_t sharing) {
   Share share;
   iidc::BusShare& bus = share.bus;
@@ -41,12 +42,15 @@ Share share_of(const CameraNeed& n, std::size_t sharing) {
       bus.packet_bytes = iidc::fixed_packet_bytes(m, *code);
   if (bus.packet_bytes > most) bus.packet_bytes = 0;
   const auto cameras = static_cast<unsigned>(std::clamp<std::size_t>(sharing, 1, kMaxCameras));
-  if (bus.packet_bytes != 0 && iidc::bandwidth_units(bus.packet_bytes, bus.speed) * cameras <= iidc::kBandwidthUnits) return share;
+  if (bus.packet_bytes != 0 &&
+      iidc::bandwidth_units(bus.packet_bytes, bus.speed) * cameras <= iidc::kBandwidthUnits)
+    return share;
   const std::size_t fair = iidc::packet_for_units(iidc::kBandwidthUnits / cameras, bus.speed);
   const std::size_t fits = iidc::packet_for_rate(bus.image_bytes, n.rate_hz, 4, fair);
   share.format7 = fits != 0;
   if (fits != 0) bus.packet_bytes = fits;
-  if (bus.packet_bytes == 0) bus.packet_bytes = iidc::packet_for_rate(bus.image_bytes, n.rate_hz, 4, most);
+  if (bus.packet_bytes == 0)
+    bus.packet_bytes = iidc::packet_for_rate(bus.image_bytes, n.rate_hz, 4, most);
   return share;
 }
 
@@ -82,18 +86,22 @@ std::map<std::string, Demand> demands(const Patient& p) {
 Finding judged(const Demand& demand) {
   for (const iidc::BusShare& s : demand.shares)
     if (s.packet_bytes == 0)
-      return {"firewire_bus",
-              FindingState::problem,
-              fmt::format("IEEE 1394: an image of {} bytes does not pass at this rate even alone at {}", s.image_bytes, to_string(s.speed)),
-              {}};
+      return {
+          "firewire_bus",
+          FindingState::problem,
+          fmt::format("IEEE 1394: an image of {} bytes does not pass at this rate even alone at {}",
+                      s.image_bytes, to_string(s.speed)),
+          {}};
   if (const std::string complaint = iidc::budget_complaint(demand.shares); !complaint.empty())
     return {"firewire_bus", FindingState::problem, "IEEE 1394: " + complaint, {}};
-  return {"firewire_bus",
-          FindingState::ok,
-          fmt::format("IEEE 1394: {} camera{} need {} of the bus's {} bandwidth units{}", demand.shares.size(),
-                      demand.shares.size() == 1 ? "" : "s", iidc::total_units(demand.shares), iidc::kBandwidthUnits,
-                      demand.format7 ? ", with regions of Format 7, which the cameras must have" : ""),
-          {}};
+  return {
+      "firewire_bus",
+      FindingState::ok,
+      fmt::format("IEEE 1394: {} camera{} need {} of the bus's {} bandwidth units{}",
+                  demand.shares.size(), demand.shares.size() == 1 ? "" : "s",
+                  iidc::total_units(demand.shares), iidc::kBandwidthUnits,
+                  demand.format7 ? ", with regions of Format 7, which the cameras must have" : ""),
+      {}};
 }
 
 }  // namespace
@@ -101,10 +109,12 @@ Finding judged(const Demand& demand) {
 void check_firewire(const Patient& p, std::vector<Finding>* findings) {
   const bool wanted = !p.needs.of("iidc-1394").empty();
   if (wanted && !p.machine.exists("/sys/bus/firewire/devices")) {
-    findings->push_back({"firewire",
-                         FindingState::problem,
-                         "this kernel has no FireWire stack; with an adapter card it comes with its driver",
-                         {"sudo modprobe firewire-ohci", "echo firewire-ohci | sudo tee /etc/modules-load.d/vergence.conf"}});
+    findings->push_back(
+        {"firewire",
+         FindingState::problem,
+         "this kernel has no FireWire stack; with an adapter card it comes with its driver",
+         {"sudo modprobe firewire-ohci",
+          "echo firewire-ohci | sudo tee /etc/modules-load.d/vergence.conf"}});
   } else if (wanted && p.machine.names("/sys/bus/firewire/devices").empty()) {
     findings->push_back({"firewire",
                          FindingState::problem,

@@ -51,14 +51,19 @@ std::shared_ptr<Search> begin_search(const CameraDriverRow& row) {
   return search;
 }
 
-/// What a node of /dev/videoN belongs to: the same text for nodes of one device. Devices of one driver may have one parent, and cheap
-/// cameras one serial number; both are the same for nodes of one device only.
-std::string owner_of(const Machine& machine, const std::vector<UsbDevice>& usb, const DeviceInfo& info) {
-  const std::string node = fs::path(info.place).filename(), serial = info.serial.substr(0, info.serial.rfind('#'));
+/// What a node of /dev/videoN belongs to: the same text for nodes of one device. Devices of one
+/// driver may have one parent, and cheap cameras one serial number; both are the same for nodes of
+/// one device only.
+std::string owner_of(const Machine& machine, const std::vector<UsbDevice>& usb,
+                     const DeviceInfo& info) {
+  const std::string node = fs::path(info.place).filename(),
+                    serial = info.serial.substr(0, info.serial.rfind('#'));
   for (const UsbDevice& d : usb)
-    if (std::find(d.video.begin(), d.video.end(), node) != d.video.end()) return d.port + " " + serial;
+    if (std::find(d.video.begin(), d.video.end(), node) != d.video.end())
+      return d.port + " " + serial;
   std::error_code error;
-  const fs::path device = fs::canonical(machine.root / ("sys/class/video4linux/" + node + "/device"), error);
+  const fs::path device =
+      fs::canonical(machine.root / ("sys/class/video4linux/" + node + "/device"), error);
   return (error ? info.place : device.string()) + " " + serial;
 }
 
@@ -66,7 +71,8 @@ std::string link_to(const Machine& machine, const std::string& port) {
   constexpr const char* kLinks = "/dev/serial/by-id/";
   for (const std::string& name : machine.names(kLinks)) {
     std::error_code error;
-    const fs::path target = fs::read_symlink(machine.root / (std::string(kLinks + 1) + name), error);
+    const fs::path target =
+        fs::read_symlink(machine.root / (std::string(kLinks + 1) + name), error);
     if (!error && target.filename() == fs::path(port).filename()) return kLinks + name;
   }
   return {};
@@ -93,7 +99,8 @@ std::size_t Inventory::cameras() const noexcept {
   return n;
 }
 
-std::vector<FoundCamera> one_entry_a_device(const Machine& machine, const std::vector<UsbDevice>& usb,
+std::vector<FoundCamera> one_entry_a_device(const Machine& machine,
+                                            const std::vector<UsbDevice>& usb,
                                             const std::vector<DeviceInfo>& found) {
   std::vector<FoundCamera> all;
   std::vector<std::string> owners;
@@ -115,7 +122,8 @@ Inventory take_inventory(const Machine& machine, const InventoryOptions& options
   Inventory inventory;
   std::vector<std::pair<const CameraDriverRow*, std::shared_ptr<Search>>> searches;
   for (const CameraDriverRow& row : camera_driver_rows())
-    if (options.drivers.empty() || std::find(options.drivers.begin(), options.drivers.end(), row.name) != options.drivers.end())
+    if (options.drivers.empty() || std::find(options.drivers.begin(), options.drivers.end(),
+                                             row.name) != options.drivers.end())
       searches.emplace_back(&row, begin_search(row));
   inventory.usb = list_usb_devices(machine);
   inventory.firewire = iidc::list_firewire_cameras(machine.root / "sys");
@@ -123,7 +131,8 @@ Inventory take_inventory(const Machine& machine, const InventoryOptions& options
   if (options.probe)
     for (FoundPort& port : inventory.ports) probe(&port, all_askers());
 
-  const auto until = std::chrono::steady_clock::now() + std::chrono::nanoseconds(options.limit.ns());
+  const auto until =
+      std::chrono::steady_clock::now() + std::chrono::nanoseconds(options.limit.ns());
   for (const auto& [row, search] : searches) {
     DriverFindings d;
     d.name = row->name;
@@ -136,15 +145,19 @@ Inventory take_inventory(const Machine& machine, const InventoryOptions& options
       for (FoundCamera& c : d.cameras)
         if (c.info.driver == "v4l2") c.media = v4l2::media_advice(c.info.place);
     } else {
-      d.note = fmt::format("no answer within {:.0f} s: a device or its kernel driver hangs; unplug it, and look at dmesg",
-                           options.limit.to_seconds());
+      d.note = fmt::format(
+          "no answer within {:.0f} s: a device or its kernel driver hangs; unplug it, and look at "
+          "dmesg",
+          options.limit.to_seconds());
     }
     inventory.drivers.push_back(std::move(d));
   }
   return inventory;
 }
 
-std::string quoted(const std::string& text) { return nlohmann::json(text).dump(-1, ' ', true, nlohmann::json::error_handler_t::replace); }
+std::string quoted(const std::string& text) {
+  return nlohmann::json(text).dump(-1, ' ', true, nlohmann::json::error_handler_t::replace);
+}
 
 std::string camera_line(const DeviceInfo& info) {
   const std::string& name = info.serial.empty() && info.driver == "gige" ? info.place : info.serial;

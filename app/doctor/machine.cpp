@@ -96,7 +96,8 @@ std::optional<bool> kernel_clock_synchronised() {
 
 Machine Machine::here() {
   Machine m;
-  if (const passwd* p = ::getpwuid(::getuid()); p != nullptr && p->pw_name != nullptr) m.user = p->pw_name;
+  if (const passwd* p = ::getpwuid(::getuid()); p != nullptr && p->pw_name != nullptr)
+    m.user = p->pw_name;
   m.groups = own_groups();
   m.addresses = own_addresses();
   m.may_use = [](const std::string& node) { return ::access(node.c_str(), R_OK | W_OK) == 0; };
@@ -106,14 +107,17 @@ Machine Machine::here() {
   return m;
 }
 
-fs::path Machine::at(const std::string& path) const { return root / fs::path(path).relative_path(); }
+fs::path Machine::at(const std::string& path) const {
+  return root / fs::path(path).relative_path();
+}
 
 std::optional<std::string> Machine::text(const std::string& path) const {
   std::error_code error;
   if (!fs::is_regular_file(at(path), error)) return std::nullopt;  // a pipe would make us wait
   std::ifstream in(at(path), std::ios::binary);
   std::string all(kMostText, '\0');
-  if (!in.read(all.data(), static_cast<std::streamsize>(all.size())) && !in.eof()) return std::nullopt;
+  if (!in.read(all.data(), static_cast<std::streamsize>(all.size())) && !in.eof())
+    return std::nullopt;
   all.resize(static_cast<std::size_t>(in.gcount()));
   return all;
 }
@@ -127,14 +131,19 @@ std::optional<std::string> Machine::line(const std::string& path) const {
   return first;
 }
 
-std::optional<std::int64_t> Machine::number(const std::string& path) const { return whole_number<std::int64_t>(line(path), 10); }
+std::optional<std::int64_t> Machine::number(const std::string& path) const {
+  return whole_number<std::int64_t>(line(path), 10);
+}
 
-std::optional<std::uint16_t> Machine::hex16(const std::string& path) const { return whole_number<std::uint16_t>(line(path), 16); }
+std::optional<std::uint16_t> Machine::hex16(const std::string& path) const {
+  return whole_number<std::uint16_t>(line(path), 16);
+}
 
 std::vector<std::string> Machine::names(const std::string& path) const {
   std::vector<std::string> all;
   std::error_code error;
-  for (fs::directory_iterator it(at(path), error), end; !error && it != end && all.size() < kMostNames; it.increment(error))
+  for (fs::directory_iterator it(at(path), error), end;
+       !error && it != end && all.size() < kMostNames; it.increment(error))
     all.push_back(it->path().filename().string());
   std::sort(all.begin(), all.end());
   return all;
@@ -149,7 +158,9 @@ bool Machine::runs(const std::string& name) const {
   constexpr std::size_t kKept = 15;  // letters of a name that the kernel keeps
   const std::string shown = name.substr(0, kKept);
   for (const std::string& entry : names("/proc"))
-    if (entry.find_first_not_of("0123456789") == std::string::npos && line("/proc/" + entry + "/comm") == shown) return true;
+    if (entry.find_first_not_of("0123456789") == std::string::npos &&
+        line("/proc/" + entry + "/comm") == shown)
+      return true;
   return false;
 }
 
@@ -179,7 +190,9 @@ std::optional<std::int64_t> Machine::limit(const std::string& name) const {
   return std::nullopt;
 }
 
-bool Machine::in_group(const std::string& group) const { return std::find(groups.begin(), groups.end(), group) != groups.end(); }
+bool Machine::in_group(const std::string& group) const {
+  return std::find(groups.begin(), groups.end(), group) != groups.end();
+}
 
 bool Machine::listed_in_group(const std::string& group) const {
   const std::optional<std::string> file = text("/etc/group");

@@ -14,22 +14,25 @@ struct InterfaceAddress {
   std::uint32_t address = 0, mask = 0;
 };
 
-/// A machine as its own files tell it, and what this process may do on it. Everything that `doctor` judges is read through this, so that a
-/// folder of small files stands for any machine in tests.
+/// A machine as its own files tell it, and what this process may do on it. Everything that `doctor`
+/// judges is read through this, so that a folder of small files stands for any machine in tests.
 ///
 /// Threads  Const calls: any. Memory: ordinary.
-/// Errors   Nothing throws. A file that is missing, refuses to be read, is no regular file or holds nonsense is `nullopt`.
+/// Errors   Nothing throws. A file that is missing, refuses to be read, is no regular file or holds
+///          nonsense is `nullopt`.
 struct Machine {
-  static constexpr std::size_t kMostText = 4096;  // bytes that are read of a file: those under /sys hold a page
+  static constexpr std::size_t kMostText =
+      4096;  // bytes that are read of a file: those under /sys hold a page
 
   std::filesystem::path root = "/";  // /sys, /proc, /dev and /etc are looked for below it
   std::string user = "$USER";        // for commands
   std::vector<std::string> groups;   // of this process, by name
   std::vector<InterfaceAddress> addresses;
-  std::function<bool(const std::string& node)> may_use;                                         // may this process read and write it?
-  std::function<std::string(const std::string& node)> group_of;                                 // of a node; empty: not known
-  std::function<std::optional<std::uint64_t>(const std::filesystem::path& folder)> free_bytes;  // for this user
-  std::optional<bool> clock_synchronised;                                                       // as the kernel was told
+  std::function<bool(const std::string& node)> may_use;  // may this process read and write it?
+  std::function<std::string(const std::string& node)> group_of;  // of a node; empty: not known
+  std::function<std::optional<std::uint64_t>(const std::filesystem::path& folder)>
+      free_bytes;                          // for this user
+  std::optional<bool> clock_synchronised;  // as the kernel was told
 
   /// The one that this runs on.
   [[nodiscard]] static Machine here();

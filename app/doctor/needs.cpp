@@ -11,13 +11,16 @@
 namespace vergence::app {
 namespace {
 
-/// Bytes of a pixel on its way, by the name of its format; where the driver chooses, what it chooses first.
+/// Bytes of a pixel on its way, by the name of its format; where the driver chooses, what it
+/// chooses first.
 double bytes_per_pixel(const CameraSettings& s) {
   const std::string& f = s.pixel_format;
   const auto has = [&f](const char* part) { return f.find(part) != std::string::npos; };
-  if (f.empty()) return s.driver == "v4l2" ? 2 : 1;  // YUYV is what cameras of the USB video class have
+  if (f.empty())
+    return s.driver == "v4l2" ? 2 : 1;  // YUYV is what cameras of the USB video class have
   if (has("10P") || has("10p")) return 1.25;
-  if (has("422") || has("YU") || has("VY") || has("16") || has("14") || has("12") || has("10")) return 2;
+  if (has("422") || has("YU") || has("VY") || has("16") || has("14") || has("12") || has("10"))
+    return 2;
   if (has("RGB8") || has("444")) return 3;
   return 1;
 }
@@ -34,7 +37,8 @@ double CameraNeed::option(const std::string& word, double fallback) const {
 
 std::vector<CameraNeed> Needs::of(const std::string& driver) const {
   std::vector<CameraNeed> some;
-  std::copy_if(cameras.begin(), cameras.end(), std::back_inserter(some), [&](const CameraNeed& c) { return c.driver == driver; });
+  std::copy_if(cameras.begin(), cameras.end(), std::back_inserter(some),
+               [&](const CameraNeed& c) { return c.driver == driver; });
   return some;
 }
 

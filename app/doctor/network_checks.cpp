@@ -14,7 +14,8 @@
 namespace vergence::app {
 namespace {
 
-// As the driver asks for its sockets: eight images, 4 MiB at least; with less than two, images are lost.
+// As the driver asks for its sockets: eight images, 4 MiB at least; with less than two, images are
+// lost.
 constexpr double kBufferedImages = 8, kLeastImages = 2;
 constexpr std::int64_t kLeastBuffer = std::int64_t{4} << 20;
 constexpr std::int64_t kRecommendedBuffer = 10'485'760;
@@ -29,7 +30,9 @@ std::optional<std::uint32_t> ipv4(const std::string& text) {
   return ntohl(a.s_addr);
 }
 
-std::string dotted(std::uint32_t a) { return fmt::format("{}.{}.{}.{}", a >> 24U, a >> 16U & 255U, a >> 8U & 255U, a & 255U); }
+std::string dotted(std::uint32_t a) {
+  return fmt::format("{}.{}.{}.{}", a >> 24U, a >> 16U & 255U, a >> 8U & 255U, a & 255U);
+}
 
 int prefix(std::uint32_t mask) {
   int n = 0;
@@ -37,13 +40,16 @@ int prefix(std::uint32_t mask) {
   return n;
 }
 
-std::string shown(const InterfaceAddress& a) { return fmt::format("{} {}/{}", a.name, dotted(a.address), prefix(a.mask)); }
+std::string shown(const InterfaceAddress& a) {
+  return fmt::format("{} {}/{}", a.name, dotted(a.address), prefix(a.mask));
+}
 
 /// The interface through which an address is reached: the longest mask that fits.
 const InterfaceAddress* way_to(const Machine& m, std::uint32_t address) {
   const InterfaceAddress* best = nullptr;
   for (const InterfaceAddress& a : m.addresses)
-    if (((a.address ^ address) & a.mask) == 0 && (best == nullptr || a.mask > best->mask)) best = &a;
+    if (((a.address ^ address) & a.mask) == 0 && (best == nullptr || a.mask > best->mask))
+      best = &a;
   return best;
 }
 
@@ -66,7 +72,8 @@ std::vector<Reached> gige_cameras(const Patient& p) {
     for (const FoundCamera& c : d.cameras) {
       Reached r{&c, nullptr, nullptr};
       const auto at = std::find(matched.begin(), matched.end(), &c);
-      if (at != matched.end()) r.need = &p.needs.cameras[static_cast<std::size_t>(at - matched.begin())];
+      if (at != matched.end())
+        r.need = &p.needs.cameras[static_cast<std::size_t>(at - matched.begin())];
       if (const auto a = ipv4(c.info.place)) r.through = way_to(p.machine, *a);
       all.push_back(r);
     }
@@ -88,12 +95,16 @@ void check_receive_buffer(const Patient& p, std::vector<Finding>* findings) {
   for (const CameraNeed& n : p.needs.of("gige")) image = std::max(image, n.bytes);
   const auto wanted = std::max(kLeastBuffer, static_cast<std::int64_t>(kBufferedImages * image));
   const std::int64_t advised = std::max(kRecommendedBuffer, wanted);
-  const std::string holds = image > 0 ? fmt::format(", {:.1f} images of this configuration", static_cast<double>(*limit) / image) : "";
-  Finding f{"receive_buffer",
-            FindingState::ok,
-            fmt::format("net.core.rmem_max is {} KiB{}; the receive buffer of a GigE camera should have {} KiB", *limit / 1024, holds,
-                        wanted / 1024),
-            {}};
+  const std::string holds = image > 0 ? fmt::format(", {:.1f} images of this configuration",
+                                                    static_cast<double>(*limit) / image)
+                                      : "";
+  Finding f{
+      "receive_buffer",
+      FindingState::ok,
+      fmt::format(
+          "net.core.rmem_max is {} KiB{}; the receive buffer of a GigE camera should have {} KiB",
+          *limit / 1024, holds, wanted / 1024),
+      {}};
   if (*limit < wanted) {
     const bool lost = image > 0 && static_cast<double>(*limit) < kLeastImages * image;
     f.state = lost ? FindingState::problem : FindingState::advice;
@@ -102,8 +113,10 @@ void check_receive_buffer(const Patient& p, std::vector<Finding>* findings) {
       f.state = FindingState::ok;
       f.sentence += "; this user may go beyond it";
     } else {
-      f.mend = {fmt::format("sudo sysctl -w net.core.rmem_max={}", advised),
-                fmt::format("echo net.core.rmem_max={} | sudo tee /etc/sysctl.d/60-vergence-rmem.conf", advised)};
+      f.mend = {
+          fmt::format("sudo sysctl -w net.core.rmem_max={}", advised),
+          fmt::format("echo net.core.rmem_max={} | sudo tee /etc/sysctl.d/60-vergence-rmem.conf",
+                      advised)};
     }
   }
   findings->push_back(std::move(f));
@@ -113,15 +126,18 @@ std::vector<std::string> commands_for_network(const Machine& m, std::uint32_t ca
   // Wired interfaces with a cable in: one of them it is.
   std::vector<std::string> wired;
   for (const std::string& name : m.names("/sys/class/net"))
-    if (m.exists("/sys/class/net/" + name + "/device") && !m.exists("/sys/class/net/" + name + "/wireless") &&
+    if (m.exists("/sys/class/net/" + name + "/device") &&
+        !m.exists("/sys/class/net/" + name + "/wireless") &&
         m.number("/sys/class/net/" + name + "/carrier").value_or(0) == 1)
       wired.push_back(name);
   const bool link_local = camera >> 16U == 0xA9FEU;
   const std::uint32_t own = (camera & ~255U) | ((camera & 255U) == 1 ? 2U : 1U);
-  return {fmt::format("sudo ip addr add {}/{} dev {}", dotted(own), link_local ? 16 : 24, wired.size() == 1 ? wired.front() : "INTERFACE")};
+  return {fmt::format("sudo ip addr add {}/{} dev {}", dotted(own), link_local ? 16 : 24,
+                      wired.size() == 1 ? wired.front() : "INTERFACE")};
 }
 
-void check_reach(const Patient& p, const std::vector<Reached>& cameras, std::vector<Finding>* findings) {
+void check_reach(const Patient& p, const std::vector<Reached>& cameras,
+                 std::vector<Finding>* findings) {
   std::string fine;
   for (const Reached& r : cameras) {
     const std::string place = r.camera != nullptr ? r.camera->info.place : r.need->serial;
@@ -134,22 +150,28 @@ void check_reach(const Patient& p, const std::vector<Reached>& cameras, std::vec
     std::vector<std::string> own;
     for (const InterfaceAddress& a : p.machine.addresses)
       if (a.address >> 24U != 127) own.push_back(shown(a));
-    findings->push_back({"camera_network", r.camera != nullptr ? FindingState::problem : FindingState::advice,
-                         fmt::format("the camera at {} is in no network of this host ({}): it {}", place,
-                                     own.empty() ? "no address" : fmt::format("{}", fmt::join(own, ", ")),
-                                     r.camera != nullptr ? "answers broadcasts and nothing else" : "is reached through a router, or not"),
-                         commands_for_network(p.machine, *address)});
+    findings->push_back(
+        {"camera_network", r.camera != nullptr ? FindingState::problem : FindingState::advice,
+         fmt::format("the camera at {} is in no network of this host ({}): it {}", place,
+                     own.empty() ? "no address" : fmt::format("{}", fmt::join(own, ", ")),
+                     r.camera != nullptr ? "answers broadcasts and nothing else"
+                                         : "is reached through a router, or not"),
+         commands_for_network(p.machine, *address)});
   }
   if (!fine.empty()) findings->push_back({"camera_network", FindingState::ok, fine, {}});
-  if (!cameras.empty() && std::all_of(cameras.begin(), cameras.end(), [](const Reached& r) { return r.camera == nullptr; }))
+  if (!cameras.empty() && std::all_of(cameras.begin(), cameras.end(),
+                                      [](const Reached& r) { return r.camera == nullptr; }))
     for (const std::string& name : p.machine.names("/sys/class/net")) {
       const std::string folder = "/sys/class/net/" + name;
-      const bool wired = p.machine.exists(folder + "/device") && !p.machine.exists(folder + "/wireless");
-      const bool named = std::any_of(p.machine.addresses.begin(), p.machine.addresses.end(), [&](const auto& a) { return a.name == name; });
+      const bool wired =
+          p.machine.exists(folder + "/device") && !p.machine.exists(folder + "/wireless");
+      const bool named = std::any_of(p.machine.addresses.begin(), p.machine.addresses.end(),
+                                     [&](const auto& a) { return a.name == name; });
       if (wired && !named && p.machine.number(folder + "/carrier").value_or(0) == 1)
         findings->push_back({"camera_network",
                              FindingState::advice,
-                             fmt::format("{} has a cable and no address; cameras without a fixed one take one of 169.254.0.0/16, which "
+                             fmt::format("{} has a cable and no address; cameras without a fixed "
+                                         "one take one of 169.254.0.0/16, which "
                                          "this host must have, too",
                                          name),
                              {fmt::format("sudo ip addr add 169.254.1.1/16 dev {}", name),
@@ -174,7 +196,8 @@ std::vector<Link> links_of(const Machine& m, const std::vector<Reached>& cameras
     if (r.need != nullptr) link.needs.push_back(r.need);
     if (r.through == nullptr) continue;
     link.name = r.through->name;
-    link.mtu = static_cast<int>(std::clamp<std::int64_t>(m.number("/sys/class/net/" + link.name + "/mtu").value_or(kStandard), 68, 65536));
+    link.mtu = static_cast<int>(std::clamp<std::int64_t>(
+        m.number("/sys/class/net/" + link.name + "/mtu").value_or(kStandard), 68, 65536));
     const std::int64_t megabits = m.number("/sys/class/net/" + link.name + "/speed").value_or(0);
     link.speed = megabits > 0 ? static_cast<double>(megabits) * kMega : 0;
   }
@@ -187,16 +210,21 @@ void check_mtu(const Link& link, std::vector<Finding>* findings) {
   if (link.name.empty()) return;
   if (link.mtu >= kJumbo) {
     findings->push_back(
-        {"mtu", FindingState::ok, fmt::format("{} carries packets of {} bytes", link.name, std::min(link.mtu, kJumbo)), {}});
+        {"mtu",
+         FindingState::ok,
+         fmt::format("{} carries packets of {} bytes", link.name, std::min(link.mtu, kJumbo)),
+         {}});
     return;
   }
-  findings->push_back({"mtu",
-                       FindingState::advice,
-                       fmt::format("{} has an MTU of {}: with {} (interface, and every switch on the way) a camera takes a quarter of the "
-                                   "processor's time",
-                                   link.name, link.mtu, kJumbo),
-                       {fmt::format("sudo ip link set dev {} mtu {}", link.name, kJumbo),
-                        fmt::format("sudo nmcli con mod {} 802-3-ethernet.mtu {}", link.name, kJumbo)}});
+  findings->push_back(
+      {"mtu",
+       FindingState::advice,
+       fmt::format("{} has an MTU of {}: with {} (interface, and every switch on the way) a camera "
+                   "takes a quarter of the "
+                   "processor's time",
+                   link.name, link.mtu, kJumbo),
+       {fmt::format("sudo ip link set dev {} mtu {}", link.name, kJumbo),
+        fmt::format("sudo nmcli con mod {} 802-3-ethernet.mtu {}", link.name, kJumbo)}});
 }
 
 void check_load(const Link& link, std::vector<Finding>* findings) {
@@ -205,7 +233,9 @@ void check_load(const Link& link, std::vector<Finding>* findings) {
     findings->push_back(
         {"link",
          FindingState::advice,
-         fmt::format("{} runs at {:.0f} Mbit/s; GigE cameras need a gigabit: look at cable and switch", link.name, link.speed / kMega),
+         fmt::format(
+             "{} runs at {:.0f} Mbit/s; GigE cameras need a gigabit: look at cable and switch",
+             link.name, link.speed / kMega),
          {}});
   if (link.needs.empty()) return;
   double used = 0, megabytes = 0, highest = 0, megabits = 0;
@@ -213,8 +243,10 @@ void check_load(const Link& link, std::vector<Finding>* findings) {
     gige::LinkDemand d;
     d.image_bytes = static_cast<std::int64_t>(n->bytes);
     d.rate_hz = n->rate_hz;
-    d.cameras =
-        std::clamp(static_cast<int>(std::min(kMostOnLink, n->option("link_cameras", static_cast<double>(link.needs.size())))), 1, 16);
+    d.cameras = std::clamp(
+        static_cast<int>(std::min(
+            kMostOnLink, n->option("link_cameras", static_cast<double>(link.needs.size())))),
+        1, 16);
     d.mtu = link.mtu;
     d.packet_size = static_cast<int>(std::min(kLargestPacket, n->option("packet_size", 0)));
     megabits = std::clamp(n->option("link_mbps", slowest / kMega), 1.0, kMostMegabits);
@@ -224,37 +256,47 @@ void check_load(const Link& link, std::vector<Finding>* findings) {
     megabytes += n->bytes_per_second() / kMega;
   }
   const std::string where = link.name.empty() ? "on a link that is not known" : link.name;
-  Finding f{"link",
-            FindingState::ok,
-            fmt::format("{}: {} camera{}, {:.0f} MB/s of images, {:.0f} % of what {:.0f} Mbit/s carry", where, link.needs.size(),
-                        link.needs.size() == 1 ? "" : "s", megabytes, 100 * used, megabits),
-            {}};
+  Finding f{
+      "link",
+      FindingState::ok,
+      fmt::format("{}: {} camera{}, {:.0f} MB/s of images, {:.0f} % of what {:.0f} Mbit/s carry",
+                  where, link.needs.size(), link.needs.size() == 1 ? "" : "s", megabytes,
+                  100 * used, megabits),
+      {}};
   if (used > 1) {
     f.state = FindingState::problem;
-    f.sentence += fmt::format("; they fit up to {:.1f} Hz (trigger.rate), with smaller images, or on links of their own", highest);
+    f.sentence += fmt::format(
+        "; they fit up to {:.1f} Hz (trigger.rate), with smaller images, or on links of their own",
+        highest);
   }
   findings->push_back(std::move(f));
 }
 
-void check_rp_filter(const Patient& p, const std::vector<Reached>& cameras, std::vector<Finding>* findings) {
+void check_rp_filter(const Patient& p, const std::vector<Reached>& cameras,
+                     std::vector<Finding>* findings) {
   std::vector<std::string> told;
   const auto filter = [&](const std::string& name) {
     return p.machine.number("/proc/sys/net/ipv4/conf/" + name + "/rp_filter").value_or(0);
   };
   for (const Reached& r : cameras) {
-    if (r.through == nullptr || std::find(told.begin(), told.end(), r.through->name) != told.end()) continue;
-    const auto other =
-        std::find_if(p.machine.addresses.begin(), p.machine.addresses.end(), [&](const auto& a) { return overlap(*r.through, a); });
+    if (r.through == nullptr || std::find(told.begin(), told.end(), r.through->name) != told.end())
+      continue;
+    const auto other = std::find_if(p.machine.addresses.begin(), p.machine.addresses.end(),
+                                    [&](const auto& a) { return overlap(*r.through, a); });
     if (other == p.machine.addresses.end()) continue;
     told.push_back(r.through->name);
     const bool strict = std::max(filter("all"), filter(r.through->name)) == 1;
     findings->push_back(
         {"rp_filter", strict ? FindingState::problem : FindingState::advice,
-         fmt::format("{} and {} are in one network: the kernel sends through one of them{}; give each a network of its own{}",
-                     shown(*r.through), shown(*other), strict ? " and drops what comes in by the other (rp_filter 1)" : "",
+         fmt::format("{} and {} are in one network: the kernel sends through one of them{}; give "
+                     "each a network of its own{}",
+                     shown(*r.through), shown(*other),
+                     strict ? " and drops what comes in by the other (rp_filter 1)" : "",
                      strict ? ", or loosen the filter" : ""),
-         strict ? std::vector{fmt::format("sudo sysctl -w net.ipv4.conf.{}.rp_filter=2", r.through->name),
-                              fmt::format("echo net.ipv4.conf.{}.rp_filter=2 | sudo tee /etc/sysctl.d/60-vergence-rp-filter.conf",
+         strict ? std::vector{fmt::format("sudo sysctl -w net.ipv4.conf.{}.rp_filter=2",
+                                          r.through->name),
+                              fmt::format("echo net.ipv4.conf.{}.rp_filter=2 | sudo tee "
+                                          "/etc/sysctl.d/60-vergence-rp-filter.conf",
                                           r.through->name)}
                 : std::vector<std::string>{}});
   }
@@ -268,9 +310,11 @@ void check_packet_socket(const Patient& p, std::vector<Finding>* findings) {
     findings->push_back(
         {"packet_socket", may ? FindingState::ok : FindingState::problem,
          may ? "packet_socket is on, and this user may have one (CAP_NET_RAW)"
-             : n.key + ".options.packet_socket is on, which needs CAP_NET_RAW: give it to the program, or leave the option out",
+             : n.key + ".options.packet_socket is on, which needs CAP_NET_RAW: give it to the "
+                       "program, or leave the option out",
          may ? std::vector<std::string>{}
-             : std::vector<std::string>{"sudo setcap cap_net_raw+ep \"$(readlink -f \"$(command -v vergence)\")\""}});
+             : std::vector<std::string>{
+                   "sudo setcap cap_net_raw+ep \"$(readlink -f \"$(command -v vergence)\")\""}});
     return;
   }
 }

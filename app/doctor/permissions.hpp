@@ -11,7 +11,8 @@ struct NodesToOpen {
   std::string check, group;
   std::vector<std::string> nodes;
 };
-/// Whether this user may read and write them, and if not by what: another login, membership, or a rule that gives the node to the group.
+/// Whether this user may read and write them, and if not by what: another login, membership, or a
+/// rule that gives the node to the group.
 void check_nodes(const Patient& patient, const NodesToOpen& what, std::vector<Finding>* findings);
 
 /// Installs the rules that `vergence devices` writes.

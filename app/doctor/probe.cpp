@@ -13,11 +13,12 @@ namespace vergence::app {
 std::vector<Asker> all_askers() {
   std::vector<Asker> askers;
   for (const InsDriverRow& row : ins_driver_rows())
-    askers.push_back({"ins", row.name, [make = row.make](const std::string& port) -> std::optional<DeviceInfo> {
-                        DeviceStatus status = DeviceStatus::ok;
-                        const auto device = make(InsRequest{})->open(port, &status);
-                        return device == nullptr ? std::nullopt : std::optional(device->info());
-                      }});
+    askers.push_back(
+        {"ins", row.name, [make = row.make](const std::string& port) -> std::optional<DeviceInfo> {
+           DeviceStatus status = DeviceStatus::ok;
+           const auto device = make(InsRequest{})->open(port, &status);
+           return device == nullptr ? std::nullopt : std::optional(device->info());
+         }});
   askers.push_back({"trigger", "board", [](const std::string& port) -> std::optional<DeviceInfo> {
                       DeviceStatus status = DeviceStatus::ok;
                       const auto device = trigger_board::Driver().open(port, &status);
@@ -35,8 +36,10 @@ void probe(FoundPort* port, const std::vector<Asker>& askers) {
       if ((ins == ins_first) != first || (!ins && port->kind == SerialKind::ins)) continue;
       const std::optional<DeviceInfo> who = a.is_there(port->info.port);
       if (!who) continue;
-      port->device = fmt::format("{}{}{}, {}", a.driver, who->serial.empty() ? "" : " ", who->serial, who->model);
-      port->configuration = fmt::format("{}: {{driver: {}, port: {}}}", a.group, a.driver, port->name());
+      port->device = fmt::format("{}{}{}, {}", a.driver, who->serial.empty() ? "" : " ",
+                                 who->serial, who->model);
+      port->configuration =
+          fmt::format("{}: {{driver: {}, port: {}}}", a.group, a.driver, port->name());
       return;
     }
 }

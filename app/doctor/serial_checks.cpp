@@ -11,45 +11,58 @@ namespace {
 
 constexpr int kAdvisedLatency = 16;  // ms: docs/ins.md
 
-bool is_real(const std::string& driver) { return !driver.empty() && driver != "none" && driver != "mock"; }
+bool is_real(const std::string& driver) {
+  return !driver.empty() && driver != "none" && driver != "mock";
+}
 
 /// Whether a key of the configuration means this port; empty: any on USB.
 bool means(const std::string& key, const FoundPort& port) {
   if (key.empty()) return port.info.usb_vendor != 0;
-  return key == port.by_id || std::filesystem::path(key).filename() == std::filesystem::path(port.info.port).filename();
+  return key == port.by_id ||
+         std::filesystem::path(key).filename() == std::filesystem::path(port.info.port).filename();
 }
-bool may_be_ins(const Patient& p, const FoundPort& port) { return is_real(p.needs.ins_driver) && means(p.needs.ins_port, port); }
+bool may_be_ins(const Patient& p, const FoundPort& port) {
+  return is_real(p.needs.ins_driver) && means(p.needs.ins_port, port);
+}
 
 /// Ports that anybody here cares about: those of the configuration, without one all on USB.
 std::vector<const FoundPort*> ports_of(const Patient& p) {
   std::vector<const FoundPort*> some;
   for (const FoundPort& port : p.inventory.ports) {
     const bool trigger = is_real(p.needs.trigger_driver) && means(p.needs.trigger_port, port);
-    if (p.needs.given ? may_be_ins(p, port) || trigger : port.info.usb_vendor != 0) some.push_back(&port);
+    if (p.needs.given ? may_be_ins(p, port) || trigger : port.info.usb_vendor != 0)
+      some.push_back(&port);
   }
   return some;
 }
 
 /// A configured port is there; without one there is any.
-void check_presence(const Patient& p, const std::string& group, const std::string& driver, const std::string& port,
-                    std::vector<Finding>* findings) {
+void check_presence(const Patient& p, const std::string& group, const std::string& driver,
+                    const std::string& port, std::vector<Finding>* findings) {
   if (!is_real(driver)) return;
   if (!port.empty()) {
     if (!p.machine.exists(port))
       findings->push_back(
-          {group, FindingState::problem, fmt::format("{}.port: {} is not there; `vergence devices` lists the ports", group, port), {}});
+          {group,
+           FindingState::problem,
+           fmt::format("{}.port: {} is not there; `vergence devices` lists the ports", group, port),
+           {}});
     return;
   }
-  const auto on_usb =
-      std::count_if(p.inventory.ports.begin(), p.inventory.ports.end(), [](const auto& f) { return f.info.usb_vendor != 0; });
+  const auto on_usb = std::count_if(p.inventory.ports.begin(), p.inventory.ports.end(),
+                                    [](const auto& f) { return f.info.usb_vendor != 0; });
   if (on_usb == 0)
-    findings->push_back({group, FindingState::problem, fmt::format("{}: no serial port on USB is there; plug it in", group), {}});
+    findings->push_back({group,
+                         FindingState::problem,
+                         fmt::format("{}: no serial port on USB is there; plug it in", group),
+                         {}});
   else if (group == "ins" && on_usb > 1)
-    findings->push_back(
-        {group,
-         FindingState::problem,
-         fmt::format("there are {} serial ports on USB; name the INS's in ins.port (`vergence devices --probe` asks)", on_usb),
-         {}});
+    findings->push_back({group,
+                         FindingState::problem,
+                         fmt::format("there are {} serial ports on USB; name the INS's in ins.port "
+                                     "(`vergence devices --probe` asks)",
+                                     on_usb),
+                         {}});
 }
 
 void check_latency(const Patient& p, std::vector<Finding>* findings) {
@@ -58,13 +71,18 @@ void check_latency(const Patient& p, std::vector<Finding>* findings) {
     const bool ins = port.kind == SerialKind::ins || port.kind == SerialKind::ftdi;
     if (!port.info.latency_timer_ms || !ins || (p.needs.given && !may_be_ins(p, port))) continue;
     const int ms = *port.info.latency_timer_ms;
-    Finding f{"latency_timer", FindingState::ok, fmt::format("{}: the converter's latency timer is {} ms", port.info.port, ms), {}};
+    Finding f{"latency_timer",
+              FindingState::ok,
+              fmt::format("{}: the converter's latency timer is {} ms", port.info.port, ms),
+              {}};
     if (ms != kAdvisedLatency) {
       f.state = FindingState::advice;
-      f.sentence += fmt::format("; the INS's stamps are best with {} ms (docs/ins.md)", kAdvisedLatency);
-      f.mend = {fmt::format("echo {} | sudo tee /sys/bus/usb-serial/devices/{}/latency_timer", kAdvisedLatency,
-                            std::filesystem::path(port.info.port).filename().string()),
-                commands_to_install_rules().front()};
+      f.sentence +=
+          fmt::format("; the INS's stamps are best with {} ms (docs/ins.md)", kAdvisedLatency);
+      f.mend = {
+          fmt::format("echo {} | sudo tee /sys/bus/usb-serial/devices/{}/latency_timer",
+                      kAdvisedLatency, std::filesystem::path(port.info.port).filename().string()),
+          commands_to_install_rules().front()};
     }
     findings->push_back(std::move(f));
   }
@@ -72,10 +90,12 @@ void check_latency(const Patient& p, std::vector<Finding>* findings) {
 
 /// What udev noted for the port: the rule that keeps ModemManager away leaves its mark there.
 bool is_ignored_by_modem_manager(const Machine& m, const std::string& port) {
-  const auto number = m.line("/sys/class/tty/" + std::filesystem::path(port).filename().string() + "/dev");
+  const auto number =
+      m.line("/sys/class/tty/" + std::filesystem::path(port).filename().string() + "/dev");
   if (!number || number->find_first_not_of("0123456789:") != std::string::npos) return false;
   const auto notes = m.text("/run/udev/data/c" + *number);
-  return notes && (notes->find("ID_MM_DEVICE_IGNORE=1") != std::string::npos || notes->find("ID_MM_PORT_IGNORE=1") != std::string::npos);
+  return notes && (notes->find("ID_MM_DEVICE_IGNORE=1") != std::string::npos ||
+                   notes->find("ID_MM_PORT_IGNORE=1") != std::string::npos);
 }
 
 void check_modem_manager(const Patient& p, std::vector<Finding>* findings) {
@@ -84,17 +104,22 @@ void check_modem_manager(const Patient& p, std::vector<Finding>* findings) {
   for (const FoundPort* port : ports_of(p)) {
     if (port->info.usb_vendor == 0) continue;
     any = true;
-    if (!is_ignored_by_modem_manager(p.machine, port->info.port)) exposed.push_back(port->info.port);
+    if (!is_ignored_by_modem_manager(p.machine, port->info.port))
+      exposed.push_back(port->info.port);
   }
   if (!any || !p.machine.runs("ModemManager")) return;
   if (exposed.empty()) {
-    findings->push_back({"modem_manager", FindingState::ok, "ModemManager runs and leaves the serial ports alone", {}});
+    findings->push_back({"modem_manager",
+                         FindingState::ok,
+                         "ModemManager runs and leaves the serial ports alone",
+                         {}});
     return;
   }
   std::vector<std::string> mend = commands_to_install_rules();
   mend.emplace_back("sudo systemctl disable --now ModemManager");
   findings->push_back({"modem_manager", FindingState::advice,
-                       fmt::format("ModemManager runs and may write to {} when it is plugged in, which confuses an INS: keep it away by "
+                       fmt::format("ModemManager runs and may write to {} when it is plugged in, "
+                                   "which confuses an INS: keep it away by "
                                    "udev rules, or, where there is no modem, switch it off",
                                    fmt::join(exposed, ", ")),
                        std::move(mend)});

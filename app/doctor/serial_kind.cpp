@@ -9,7 +9,9 @@ namespace {
 constexpr std::uint16_t kFtdi = 0x0403, kXsens = 0x2639;
 
 /// XSens' products under FTDI's vendor id, as in udev/99-vergence.rules.
-constexpr bool is_xsens_of_ftdi(std::uint16_t product) noexcept { return product >= 0xD388 && product <= 0xD38F; }
+constexpr bool is_xsens_of_ftdi(std::uint16_t product) noexcept {
+  return product >= 0xD388 && product <= 0xD38F;
+}
 
 constexpr std::array<std::uint16_t, 2> kConverterMakers{0x10C4, 0x067B};  // Silicon Labs, Prolific
 
@@ -68,13 +70,16 @@ SerialKind serial_kind(std::uint16_t vendor, std::uint16_t product) noexcept {
   if (vendor == 0) return SerialKind::built_in;
   if (vendor == kXsens || (vendor == kFtdi && is_xsens_of_ftdi(product))) return SerialKind::ins;
   if (vendor == kFtdi) return SerialKind::ftdi;
-  if (std::find(kConverterMakers.begin(), kConverterMakers.end(), vendor) != kConverterMakers.end()) return SerialKind::converter;
-  if (std::find(kBoardMakers.begin(), kBoardMakers.end(), vendor) != kBoardMakers.end()) return SerialKind::board;
+  if (std::find(kConverterMakers.begin(), kConverterMakers.end(), vendor) != kConverterMakers.end())
+    return SerialKind::converter;
+  if (std::find(kBoardMakers.begin(), kBoardMakers.end(), vendor) != kBoardMakers.end())
+    return SerialKind::board;
   return SerialKind::unknown;
 }
 
 bool is_ftdi(std::uint16_t vendor, std::uint16_t product) noexcept {
-  return vendor == kFtdi || (vendor == kXsens && (product == 0x0300 || product == 0x0301 || product == 0xD00D));
+  return vendor == kFtdi ||
+         (vendor == kXsens && (product == 0x0300 || product == 0x0301 || product == 0xD00D));
 }
 
 }  // namespace vergence::app

@@ -4,7 +4,8 @@
 
 namespace vergence::app {
 
-/// What is likely to be at a serial port, by the USB ids of what carries it. Asked is nobody: opening a port resets many a board.
+/// What is likely to be at a serial port, by the USB ids of what carries it. Asked is nobody:
+/// opening a port resets many a board.
 enum class SerialKind : std::uint8_t {
   ins,        // XSens' own converter, or an MTi with USB
   ftdi,       // an FTDI converter: whatever is wired to it, an MTi often

@@ -21,11 +21,13 @@ double speed_of(const Machine& m, const std::string& path) {
   return mbit > 0 && mbit < 1e6 ? mbit : 0;
 }
 
-std::vector<std::string> video_nodes(const Machine& m, const std::string& folder, const std::string& port) {
+std::vector<std::string> video_nodes(const Machine& m, const std::string& folder,
+                                     const std::string& port) {
   std::vector<std::string> nodes;
   for (const std::string& entry : m.names(folder))
     if (entry.starts_with(port + ":"))
-      for (const std::string& node : m.names(folder + "/" + entry + "/video4linux")) nodes.push_back(node);
+      for (const std::string& node : m.names(folder + "/" + entry + "/video4linux"))
+        nodes.push_back(node);
   return nodes;
 }
 
@@ -46,8 +48,11 @@ std::vector<UsbDevice> list_usb_devices(const Machine& m) {
     d.vendor = *vendor;
     d.product = *product;
     d.serial = m.line(folder + "/serial").value_or("");
-    const std::string maker = m.line(folder + "/manufacturer").value_or(""), what = m.line(folder + "/product").value_or("");
-    d.title = maker.empty() || what.starts_with(maker) ? what : what.empty() ? maker : maker + " " + what;
+    const std::string maker = m.line(folder + "/manufacturer").value_or(""),
+                      what = m.line(folder + "/product").value_or("");
+    d.title = maker.empty() || what.starts_with(maker) ? what
+              : what.empty()                           ? maker
+                                                       : maker + " " + what;
     d.bus = small_number(m, folder + "/busnum");
     d.number = small_number(m, folder + "/devnum");
     d.mbit = speed_of(m, folder + "/speed");

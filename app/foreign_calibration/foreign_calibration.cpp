@@ -20,15 +20,20 @@ CalibrationFormat format_of_content(const std::vector<YamlFile>& files, bool ope
   const YamlFile& first = files.front();
   if (has(first, "cam0")) return CalibrationFormat::kalibr;
   if (has(first, "cameras")) return CalibrationFormat::vergence;
-  if (has(first, "rectification_matrix") || has(first, "projection_matrix")) return CalibrationFormat::ros;
-  if (opencv_head || has(first, "M1") || has(first, "K1") || has(first, "R")) return CalibrationFormat::opencv;
+  if (has(first, "rectification_matrix") || has(first, "projection_matrix"))
+    return CalibrationFormat::ros;
+  if (opencv_head || has(first, "M1") || has(first, "K1") || has(first, "R"))
+    return CalibrationFormat::opencv;
   if (has(first, "camera_matrix")) return CalibrationFormat::ros;
   throw InputError(first.name() +
-                   ": is no calibration that this program knows: calibration.yaml (cameras), Kalibr camchain (cam0), ROS camera_info "
+                   ": is no calibration that this program knows: calibration.yaml (cameras), "
+                   "Kalibr camchain (cam0), ROS camera_info "
                    "(camera_matrix), OpenCV stereo (M1, D1, M2, D2, R, T)");
 }
 
-void refuse_number_of_files(const std::string& in, const char* what) { throw InputError(fmt::format("{}: {}", in, what)); }
+void refuse_number_of_files(const std::string& in, const char* what) {
+  throw InputError(fmt::format("{}: {}", in, what));
+}
 
 }  // namespace
 
@@ -36,7 +41,8 @@ namespace detail {
 
 std::vector<std::filesystem::path> files_of(const std::string& text, bool folder) {
   if (folder) return {fs::path(text) / "left.yaml", fs::path(text) / "right.yaml"};
-  if (const auto comma = text.find(','); comma != std::string::npos) return {text.substr(0, comma), text.substr(comma + 1)};
+  if (const auto comma = text.find(','); comma != std::string::npos)
+    return {text.substr(0, comma), text.substr(comma + 1)};
   return {text};
 }
 
@@ -47,13 +53,17 @@ void check_read(const std::string& name, CalibrationFile* calibration) {
     throw InputError(fmt::format("{}: in the words of calibration.yaml, {}", name, bad->sentence));
 }
 
-void remark_lost(const CalibrationFile& calibration, const char* format, bool names, Remarks* remarks) {
+void remark_lost(const CalibrationFile& calibration, const char* format, bool names,
+                 Remarks* remarks) {
   const RigCalibration& rig = calibration.rig;
   std::vector<std::string> lost;
   bool sigmas = false, serials = false;
   for (std::size_t k = 0; k < static_cast<std::size_t>(rig.cameras); ++k) {
-    const auto given = [](const auto& values) { return std::any_of(values.begin(), values.end(), [](double v) { return v != 0; }); };
-    sigmas = sigmas || given(rig.intrinsics[k].sigma) || given(rig.intrinsics[k].distortion_sigma) || given(rig.sigma_noise[k]) ||
+    const auto given = [](const auto& values) {
+      return std::any_of(values.begin(), values.end(), [](double v) { return v != 0; });
+    };
+    sigmas = sigmas || given(rig.intrinsics[k].sigma) ||
+             given(rig.intrinsics[k].distortion_sigma) || given(rig.sigma_noise[k]) ||
              given(rig.sigma_wide[k]) || !rig.covariance_wide[k].isZero(0);
     serials = serials || !calibration.serials[k].empty();
   }
@@ -63,18 +73,21 @@ void remark_lost(const CalibrationFile& calibration, const char* format, bool na
   if (names) lost.emplace_back("names");
   if (!calibration.rig_name.empty()) lost.emplace_back("the rig's name");
   if (rig.found != Stamp() || rig.frames != 0) lost.emplace_back("when it was found and from what");
-  if (!lost.empty()) remarks->push_back(fmt::format("{} has no place for {}; left out", format, fmt::join(lost, ", ")));
+  if (!lost.empty())
+    remarks->push_back(
+        fmt::format("{} has no place for {}; left out", format, fmt::join(lost, ", ")));
 }
 
 void remark_more_cameras(const CalibrationFile& calibration, const char* format, Remarks* remarks) {
   if (calibration.rig.cameras > 2)
-    remarks->push_back(
-        fmt::format("{} holds two cameras; {} of {} are left out", format, calibration.rig.cameras - 2, calibration.rig.cameras));
+    remarks->push_back(fmt::format("{} holds two cameras; {} of {} are left out", format,
+                                   calibration.rig.cameras - 2, calibration.rig.cameras));
 }
 
 }  // namespace detail
 
-CalibrationFile read_any_calibration(const std::string& in, const std::optional<ImageSize>& size, Remarks* remarks) {
+CalibrationFile read_any_calibration(const std::string& in, const std::optional<ImageSize>& size,
+                                     Remarks* remarks) {
   std::vector<YamlFile> files;
   bool opencv_head = false;
   std::error_code ignored;
@@ -82,9 +95,11 @@ CalibrationFile read_any_calibration(const std::string& in, const std::optional<
     std::string text = read_text(path, kLargestYaml);
     opencv_head = opencv_head || text.starts_with("%YAML:");
     files.push_back(parse_opencv_yaml(std::move(text), path.string()));
-    if (files.back().root().IsNull()) throw InputError(path.string() + ": is empty; a calibration is expected");
+    if (files.back().root().IsNull())
+      throw InputError(path.string() + ": is empty; a calibration is expected");
     if (!files.back().root().IsMap())
-      throw InputError(path.string() + ": is not a group of keys (`key: value`); a calibration is expected");
+      throw InputError(path.string() +
+                       ": is not a group of keys (`key: value`); a calibration is expected");
   }
   switch (format_of_content(files, opencv_head)) {
     case CalibrationFormat::vergence:
@@ -95,7 +110,9 @@ CalibrationFile read_any_calibration(const std::string& in, const std::optional<
       return read_kalibr(files.front(), remarks);
     case CalibrationFormat::ros:
       if (files.size() != 2)
-        refuse_number_of_files(in, "camera_info of one camera makes no rig; give left.yaml,right.yaml or a folder with them");
+        refuse_number_of_files(in,
+                               "camera_info of one camera makes no rig; give left.yaml,right.yaml "
+                               "or a folder with them");
       return read_ros(files[0], files[1], remarks);
     case CalibrationFormat::opencv:
       break;

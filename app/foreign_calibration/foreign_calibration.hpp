@@ -12,9 +12,12 @@ namespace vergence::app {
 
 enum class CalibrationFormat : std::uint8_t { vergence, kalibr, ros, opencv };
 
-/// Reads any of the formats, told by content. `in`: a file, two with a comma between, or a folder with left.yaml and right.yaml; `size`:
-/// where an OpenCV file has none. InputError as read_kalibr() and the others.
-[[nodiscard]] CalibrationFile read_any_calibration(const std::string& in, const std::optional<ImageSize>& size, Remarks* remarks);
+/// Reads any of the formats, told by content. `in`: a file, two with a comma between, or a folder
+/// with left.yaml and right.yaml; `size`: where an OpenCV file has none. InputError as
+/// read_kalibr() and the others.
+[[nodiscard]] CalibrationFile read_any_calibration(const std::string& in,
+                                                   const std::optional<ImageSize>& size,
+                                                   Remarks* remarks);
 
 namespace detail {
 /// The files that IN or OUT stand for; a folder stands for left.yaml and right.yaml in it.

@@ -12,10 +12,22 @@ namespace vergence::app {
 namespace {
 
 /// Names that programs around OpenCV give the same thing; the first is that of its own sample.
-constexpr std::array kMatrix1{
-    "M1", "K1", "cameraMatrix1", "camera_matrix1", "camera_matrix_1", "cameraMatrixL", "CM1", "left_camera_matrix"};
-constexpr std::array kMatrix2{
-    "M2", "K2", "cameraMatrix2", "camera_matrix2", "camera_matrix_2", "cameraMatrixR", "CM2", "right_camera_matrix"};
+constexpr std::array kMatrix1{"M1",
+                              "K1",
+                              "cameraMatrix1",
+                              "camera_matrix1",
+                              "camera_matrix_1",
+                              "cameraMatrixL",
+                              "CM1",
+                              "left_camera_matrix"};
+constexpr std::array kMatrix2{"M2",
+                              "K2",
+                              "cameraMatrix2",
+                              "camera_matrix2",
+                              "camera_matrix_2",
+                              "cameraMatrixR",
+                              "CM2",
+                              "right_camera_matrix"};
 constexpr std::array kDistortion1{"D1",
                                   "distCoeffs1",
                                   "dist_coeffs1",
@@ -55,28 +67,32 @@ std::optional<Entry> find(const std::vector<YamlFile>& files, std::span<const ch
   return std::nullopt;
 }
 
-Entry need_entry(const std::vector<YamlFile>& files, std::span<const char* const> keys, const char* what) {
+Entry need_entry(const std::vector<YamlFile>& files, std::span<const char* const> keys,
+                 const char* what) {
   if (auto entry = find(files, keys)) return *entry;
   std::string names;
   for (const YamlFile& file : files) names += (names.empty() ? "" : ", ") + file.name();
   throw InputError(fmt::format("{}: {} is missing ({} or {})", names, what, keys[0], keys[1]));
 }
 
-void read_lens(const std::vector<YamlFile>& files, std::span<const char* const> matrix, std::span<const char* const> distortion,
-               bool fisheye, Intrinsics* lens) {
+void read_lens(const std::vector<YamlFile>& files, std::span<const char* const> matrix,
+               std::span<const char* const> distortion, bool fisheye, Intrinsics* lens) {
   const Entry m = need_entry(files, matrix, "a camera matrix");
   const auto K = read_matrix(*m.file, m.node, m.key, 3, 3);
-  if (K[1] != 0 || K[3] != 0 || K[6] != 0 || K[7] != 0 || K[8] != 1) m.file->fail(m.node, m.key + " is not [fx 0 cx; 0 fy cy; 0 0 1]");
+  if (K[1] != 0 || K[3] != 0 || K[6] != 0 || K[7] != 0 || K[8] != 1)
+    m.file->fail(m.node, m.key + " is not [fx 0 cx; 0 fy cy; 0 0 1]");
   lens->fx = K[0], lens->fy = K[4], lens->cx = K[2], lens->cy = K[5];
   const Entry d = need_entry(files, distortion, "a list of distortion coefficients");
   constexpr std::size_t kModelled = 5, kMostOfOpenCv = 14;
-  const auto values = fisheye ? read_vector(*d.file, d.node, d.key, 4, 4) : read_vector(*d.file, d.node, d.key, 0, kMostOfOpenCv);
+  const auto values = fisheye ? read_vector(*d.file, d.node, d.key, 4, 4)
+                              : read_vector(*d.file, d.node, d.key, 0, kMostOfOpenCv);
   if (fisheye) lens->kind = CameraModelKind::pinhole_equidistant;
   for (std::size_t i = 0; i < values.size(); ++i) {
     if (i < kModelled)
       lens->distortion[i] = values[i];
     else if (values[i] != 0)
-      d.file->fail(d.node, fmt::format("{} has a sixth or later coefficient (rational, thin prism or tilted model), which this program's "
+      d.file->fail(d.node, fmt::format("{} has a sixth or later coefficient (rational, thin prism "
+                                       "or tilted model), which this program's "
                                        "radtan has not; calibrate with k1 k2 p1 p2 k3",
                                        d.key));
   }
@@ -84,12 +100,19 @@ void read_lens(const std::vector<YamlFile>& files, std::span<const char* const> 
 
 ImageSize read_size(const std::vector<YamlFile>& files, const std::optional<ImageSize>& given) {
   const auto width = find(files, kWidth), height = find(files, kHeight);
-  if (width && height) return {read_side(*width->file, width->node, width->key), read_side(*height->file, height->node, height->key)};
+  if (width && height)
+    return {read_side(*width->file, width->node, width->key),
+            read_side(*height->file, height->node, height->key)};
   if (const auto size = find(files, kSize)) {
-    if (!size->node.IsSequence() || size->node.size() != 2) size->file->fail(size->node, size->key + " is not [width, height]");
-    return {read_side(*size->file, size->node[0], size->key), read_side(*size->file, size->node[1], size->key)};
+    if (!size->node.IsSequence() || size->node.size() != 2)
+      size->file->fail(size->node, size->key + " is not [width, height]");
+    return {read_side(*size->file, size->node[0], size->key),
+            read_side(*size->file, size->node[1], size->key)};
   }
-  if (!given) throw InputError(files.front().name() + ": holds no image size, as OpenCV's sample writes none; add --size WIDTHxHEIGHT");
+  if (!given)
+    throw InputError(
+        files.front().name() +
+        ": holds no image size, as OpenCV's sample writes none; add --size WIDTHxHEIGHT");
   return *given;
 }
 
@@ -100,18 +123,22 @@ bool is_fisheye(const std::vector<YamlFile>& files) {
 }
 
 std::string format_matrix(const char* key, int rows, int columns, std::span<const double> values) {
-  return fmt::format("{}: !!opencv-matrix\n   rows: {}\n   cols: {}\n   dt: d\n   data: {}\n", key, rows, columns, number_list(values));
+  return fmt::format("{}: !!opencv-matrix\n   rows: {}\n   cols: {}\n   dt: d\n   data: {}\n", key,
+                     rows, columns, number_list(values));
 }
 
 }  // namespace
 
 YamlFile parse_opencv_yaml(std::string text, const std::string& name) {
   if (text.starts_with("%YAML:"))
-    std::fill(text.begin(), text.begin() + static_cast<std::ptrdiff_t>(std::min(text.find('\n'), text.size())), ' ');
+    std::fill(text.begin(),
+              text.begin() + static_cast<std::ptrdiff_t>(std::min(text.find('\n'), text.size())),
+              ' ');
   return YamlFile::parse(text, name);
 }
 
-CalibrationFile read_opencv(const std::vector<YamlFile>& files, const std::optional<ImageSize>& size, Remarks* /*remarks*/) {
+CalibrationFile read_opencv(const std::vector<YamlFile>& files,
+                            const std::optional<ImageSize>& size, Remarks* /*remarks*/) {
   CalibrationFile calibration;
   RigCalibration& rig = calibration.rig;
   rig.cameras = 2;
@@ -125,7 +152,8 @@ CalibrationFile read_opencv(const std::vector<YamlFile>& files, const std::optio
   rig.T_camera_left[1].R << r[0], r[1], r[2], r[3], r[4], r[5], r[6], r[7], r[8];
   rig.T_camera_left[1].t << t[0], t[1], t[2];
   const ImageSize pixels = read_size(files, size);
-  for (std::size_t k = 0; k < 2; ++k) rig.intrinsics[k].width = pixels.width, rig.intrinsics[k].height = pixels.height;
+  for (std::size_t k = 0; k < 2; ++k)
+    rig.intrinsics[k].width = pixels.width, rig.intrinsics[k].height = pixels.height;
   detail::check_read(T.file->name(), &calibration);
   return calibration;
 }
@@ -133,22 +161,29 @@ CalibrationFile read_opencv(const std::vector<YamlFile>& files, const std::optio
 std::array<std::string, 2> format_opencv(const CalibrationFile& calibration, Remarks* remarks) {
   const RigCalibration& rig = calibration.rig;
   const Intrinsics &l = rig.intrinsics[0], &r = rig.intrinsics[1];
-  if (l.kind != r.kind) throw InputError("cameras.1.model is not that of camera 0; an OpenCV stereo file has one model");
+  if (l.kind != r.kind)
+    throw InputError(
+        "cameras.1.model is not that of camera 0; an OpenCV stereo file has one model");
   if (l.width != r.width || l.height != r.height)
     throw InputError("cameras.1.size is not that of camera 0; an OpenCV stereo file has one size");
   const bool fisheye = l.kind == CameraModelKind::pinhole_equidistant;
-  std::string lenses = fmt::format("image_width: {}\nimage_height: {}\nfisheye_model: {}\n", l.width, l.height, fisheye ? 1 : 0);
+  std::string lenses = fmt::format("image_width: {}\nimage_height: {}\nfisheye_model: {}\n",
+                                   l.width, l.height, fisheye ? 1 : 0);
   for (std::size_t k = 0; k < 2; ++k) {
     const Intrinsics& lens = rig.intrinsics[k];
     const std::size_t coefficients = fisheye ? 4 : 5;
-    lenses += format_matrix(k == 0 ? "M1" : "M2", 3, 3, std::array{lens.fx, 0.0, lens.cx, 0.0, lens.fy, lens.cy, 0.0, 0.0, 1.0});
-    lenses += format_matrix(k == 0 ? "D1" : "D2", fisheye ? 4 : 1, fisheye ? 1 : 5, std::span(lens.distortion).first(coefficients));
+    lenses +=
+        format_matrix(k == 0 ? "M1" : "M2", 3, 3,
+                      std::array{lens.fx, 0.0, lens.cx, 0.0, lens.fy, lens.cy, 0.0, 0.0, 1.0});
+    lenses += format_matrix(k == 0 ? "D1" : "D2", fisheye ? 4 : 1, fisheye ? 1 : 5,
+                            std::span(lens.distortion).first(coefficients));
   }
   const Transform& T = rig.T_camera_left[1];
   const Eigen::Matrix<double, 3, 3, Eigen::RowMajor> R = T.R;
   detail::remark_more_cameras(calibration, "an OpenCV stereo file", remarks);
   detail::remark_lost(calibration, "an OpenCV stereo file", true, remarks);
-  return {lenses, format_matrix("R", 3, 3, std::span(R.data(), 9)) + format_matrix("T", 3, 1, std::span(T.t.data(), 3))};
+  return {lenses, format_matrix("R", 3, 3, std::span(R.data(), 9)) +
+                      format_matrix("T", 3, 1, std::span(T.t.data(), 3))};
 }
 
 }  // namespace vergence::app

@@ -22,17 +22,23 @@ Intrinsics read_lens(const YamlFile& file) {
   lens.height = read_side(file, need(file, root, "image_height", "image_height"), "image_height");
   const YAML::Node matrix = need(file, root, "camera_matrix", "camera_matrix");
   const auto K = read_matrix(file, matrix, "camera_matrix", 3, 3);
-  if (K[1] != 0 || K[3] != 0 || K[6] != 0 || K[7] != 0 || K[8] != 1) file.fail(matrix, "camera_matrix is not [fx 0 cx; 0 fy cy; 0 0 1]");
+  if (K[1] != 0 || K[3] != 0 || K[6] != 0 || K[7] != 0 || K[8] != 1)
+    file.fail(matrix, "camera_matrix is not [fx 0 cx; 0 fy cy; 0 0 1]");
   lens.fx = K[0], lens.fy = K[4], lens.cx = K[2], lens.cy = K[5];
   const YAML::Node model = need(file, root, "distortion_model", "distortion_model");
   const std::string word = file.text(model, "distortion_model");
   const YAML::Node node = need(file, root, "distortion_coefficients", "distortion_coefficients");
   if (word != "equidistant" && word != "plumb_bob" && word != "rational_polynomial")
-    file.fail(model,
-              fmt::format("distortion_model is \"{}\"; plumb_bob, equidistant and rational_polynomial are known", word.substr(0, 60)));
+    file.fail(
+        model,
+        fmt::format(
+            "distortion_model is \"{}\"; plumb_bob, equidistant and rational_polynomial are known",
+            word.substr(0, 60)));
   const bool equidistant = word == "equidistant";
-  const auto d = read_vector(file, node, "distortion_coefficients", equidistant ? 4 : 0, equidistant ? 4 : 8);
-  if (const std::string fault = set_ros_distortion(word, d, &lens); !fault.empty()) file.fail(node, "distortion_coefficients " + fault);
+  const auto d =
+      read_vector(file, node, "distortion_coefficients", equidistant ? 4 : 0, equidistant ? 4 : 8);
+  if (const std::string fault = set_ros_distortion(word, d, &lens); !fault.empty())
+    file.fail(node, "distortion_coefficients " + fault);
   return lens;
 }
 
@@ -49,7 +55,8 @@ CameraInfo read_info(const YamlFile& file) {
   const YAML::Node projection = need(file, root, "projection_matrix", "projection_matrix");
   const auto p = read_matrix(file, projection, "projection_matrix", 3, 4);
   info.P << p[0], p[1], p[2], p[3], p[4], p[5], p[6], p[7], p[8], p[9], p[10], p[11];
-  if (!(info.P(0, 0) > 0 && info.P(1, 1) > 0)) file.fail(projection, "projection_matrix has no positive focal lengths");
+  if (!(info.P(0, 0) > 0 && info.P(1, 1) > 0))
+    file.fail(projection, "projection_matrix has no positive focal lengths");
   return info;
 }
 
@@ -61,7 +68,8 @@ CalibrationFile read_ros(const YamlFile& left, const YamlFile& right, Remarks* /
   for (std::size_t k = 0; k < 2; ++k)
     if (!info[k].name.empty()) calibration.names[k] = info[k].name;
   if (const std::string fault = set_ros_rig(info[0], info[1], &calibration.rig); !fault.empty())
-    right.fail(right.root()["projection_matrix"], "projection_matrix " + fault + " (" + left.name() + " is the left camera's)");
+    right.fail(right.root()["projection_matrix"],
+               "projection_matrix " + fault + " (" + left.name() + " is the left camera's)");
   detail::check_read(right.name(), &calibration);
   return calibration;
 }

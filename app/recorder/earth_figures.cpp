@@ -30,25 +30,28 @@ Json placement_json(const PlacementRecord& record) {
 
 Json errors_json(const EarthErrors& e) {
   if (e.poses == 0) return nullptr;
-  return {{"poses", e.poses},
-          {"horizontal_rms_m", e.horizontal_rms_m},
-          {"horizontal_max_m", e.horizontal_most_m},
-          {"horizontal_end_m", e.horizontal_end_m},
-          {"horizontal_end_percent", e.way_m > 0 ? Json(100 * e.horizontal_end_m / e.way_m) : Json()},
-          {"up_rms_m", e.up_rms_m},
-          {"up_end_m", e.up_end_m},
-          {"heading_rms_deg", e.heading_rms_deg},
-          {"heading_max_deg", e.heading_most_deg},
-          {"heading_end_deg", e.heading_end_deg}};
+  return {
+      {"poses", e.poses},
+      {"horizontal_rms_m", e.horizontal_rms_m},
+      {"horizontal_max_m", e.horizontal_most_m},
+      {"horizontal_end_m", e.horizontal_end_m},
+      {"horizontal_end_percent", e.way_m > 0 ? Json(100 * e.horizontal_end_m / e.way_m) : Json()},
+      {"up_rms_m", e.up_rms_m},
+      {"up_end_m", e.up_end_m},
+      {"heading_rms_deg", e.heading_rms_deg},
+      {"heading_max_deg", e.heading_most_deg},
+      {"heading_end_deg", e.heading_end_deg}};
 }
 
 }  // namespace
 
 const Transform* placement_at(std::span<const PlacementRecord> placements, Stamp stamp) noexcept {
   if (placements.empty()) return nullptr;
-  const auto after = std::upper_bound(placements.begin(), placements.end(), stamp,
-                                      [](Stamp s, const PlacementRecord& record) { return s < record.stamp; });
-  return after == placements.begin() ? &after->placement.T_enu_world : &(after - 1)->placement.T_enu_world;
+  const auto after =
+      std::upper_bound(placements.begin(), placements.end(), stamp,
+                       [](Stamp s, const PlacementRecord& record) { return s < record.stamp; });
+  return after == placements.begin() ? &after->placement.T_enu_world
+                                     : &(after - 1)->placement.T_enu_world;
 }
 
 Json earth_json(const EarthFigures& figures) {
@@ -56,17 +59,19 @@ Json earth_json(const EarthFigures& figures) {
   const Vec3 turn = boresight_of(figures.T_ins_left.R) * kDegrees;
   const Vec3& arm = figures.T_ins_left.t;
   Json placements = Json::array();
-  for (const PlacementRecord& record : figures.placements) placements.push_back(placement_json(record));
-  return {
-      {"origin",
-       {{"latitude_deg", figures.origin->latitude_deg},
-        {"longitude_deg", figures.origin->longitude_deg},
-        {"height_m", figures.origin->height_m}}},
-      {"mount",
-       {{"lever_arm_m", {arm.x(), arm.y(), arm.z()}}, {"boresight_deg", {turn.x(), turn.y(), turn.z()}}, {"source", figures.mount_source}}},
-      {"placements", placements},
-      {"way_m", figures.errors.way_m},
-      {"errors", errors_json(figures.errors)}};
+  for (const PlacementRecord& record : figures.placements)
+    placements.push_back(placement_json(record));
+  return {{"origin",
+           {{"latitude_deg", figures.origin->latitude_deg},
+            {"longitude_deg", figures.origin->longitude_deg},
+            {"height_m", figures.origin->height_m}}},
+          {"mount",
+           {{"lever_arm_m", {arm.x(), arm.y(), arm.z()}},
+            {"boresight_deg", {turn.x(), turn.y(), turn.z()}},
+            {"source", figures.mount_source}}},
+          {"placements", placements},
+          {"way_m", figures.errors.way_m},
+          {"errors", errors_json(figures.errors)}};
 }
 
 }  // namespace vergence::app

@@ -38,9 +38,10 @@ struct EarthFigures {
   std::string mount_source{};  // where it is from
 };
 
-/// The transform that holds at a stamp: that of the newest placement by then, before the first one that of the first. Nullptr: there is
-/// none.
-[[nodiscard]] const Transform* placement_at(std::span<const PlacementRecord> placements, Stamp stamp) noexcept;
+/// The transform that holds at a stamp: that of the newest placement by then, before the first one
+/// that of the first. Nullptr: there is none.
+[[nodiscard]] const Transform* placement_at(std::span<const PlacementRecord> placements,
+                                            Stamp stamp) noexcept;
 
 /// Null without an origin.
 [[nodiscard]] nlohmann::ordered_json earth_json(const EarthFigures& figures);

@@ -24,22 +24,28 @@ class TimeHistogram {
   /// How many were shorter than that, to the bin that it falls in.
   [[nodiscard]] std::uint64_t below(double ms) const noexcept {
     if (!(ms > kLeast)) return 0;
-    const auto end = std::min(static_cast<std::size_t>(std::log(ms / kLeast) / kLogStep + 0.5), kBins);
+    const auto end =
+        std::min(static_cast<std::size_t>(std::log(ms / kLeast) / kLogStep + 0.5), kBins);
     std::uint64_t seen = 0;
     for (std::size_t i = 0; i < end; ++i) seen += bins_[i];
     return seen;
   }
   /// ms; 0 without a time.
-  [[nodiscard]] double mean() const noexcept { return count_ == 0 ? 0 : sum_ / static_cast<double>(count_); }
+  [[nodiscard]] double mean() const noexcept {
+    return count_ == 0 ? 0 : sum_ / static_cast<double>(count_);
+  }
   [[nodiscard]] double max() const noexcept { return max_; }
-  /// The least time that at least the share q of all does not exceed: the middle of its bin, at most max(). 0 without a time.
+  /// The least time that at least the share q of all does not exceed: the middle of its bin, at
+  /// most max(). 0 without a time.
   [[nodiscard]] double percentile(double q) const noexcept {
     if (count_ == 0) return 0;
-    const auto wanted = std::max<std::uint64_t>(1, static_cast<std::uint64_t>(std::ceil(q * static_cast<double>(count_))));
+    const auto wanted = std::max<std::uint64_t>(
+        1, static_cast<std::uint64_t>(std::ceil(q * static_cast<double>(count_))));
     std::uint64_t seen = 0;
     for (std::size_t i = 0; i < kBins; ++i) {
       seen += bins_[i];
-      if (seen >= wanted) return std::min(max_, kLeast * std::exp((static_cast<double>(i) + 0.5) * kLogStep));
+      if (seen >= wanted)
+        return std::min(max_, kLeast * std::exp((static_cast<double>(i) + 0.5) * kLogStep));
     }
     return max_;
   }

@@ -21,7 +21,8 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr double kDegrees = 180.0 / std::numbers::pi;
-constexpr double kQuaternionLength = 0.02;  // how far from 1: nine decimals keep it far closer, other columns rarely do
+constexpr double kQuaternionLength =
+    0.02;  // how far from 1: nine decimals keep it far closer, other columns rarely do
 constexpr std::array<std::string_view, 4> kFixes{"none", "dead_reckoning", "fix_2d", "fix_3d"};
 constexpr std::size_t kColumns = 23;
 static_assert(std::count(kInsHeader.begin(), kInsHeader.end(), ',') + 1 == kColumns);
@@ -33,13 +34,15 @@ bool finite(const std::array<double, N>& values) {
 
 void append_sigma(std::string* line, double sigma, double unit) {
   *line += ',';
-  if (sigma > 0 && std::isfinite(sigma)) fmt::format_to(std::back_inserter(*line), "{:.6g}", sigma * unit);
+  if (sigma > 0 && std::isfinite(sigma))
+    fmt::format_to(std::back_inserter(*line), "{:.6g}", sigma * unit);
 }
 
 /// One line on its way in: its columns one after the other, each refused with file:line.
 class Columns {
  public:
-  Columns(const fs::path& file, std::size_t line, std::span<const std::string_view> fields) : file_(file), line_(line), fields_(fields) {}
+  Columns(const fs::path& file, std::size_t line, std::span<const std::string_view> fields)
+      : file_(file), line_(line), fields_(fields) {}
 
   [[nodiscard]] std::int64_t integer(const char* what, std::int64_t least, std::int64_t most) {
     const std::string_view field = fields_[next_++];
@@ -47,7 +50,8 @@ class Columns {
     if (!value || *value < least || *value > most) refuse(field, what);
     return *value;
   }
-  [[nodiscard]] std::int64_t integer_or_nothing(const char* what, std::int64_t least, std::int64_t most) {
+  [[nodiscard]] std::int64_t integer_or_nothing(const char* what, std::int64_t least,
+                                                std::int64_t most) {
     if (!fields_[next_].empty()) return integer(what, least, most);
     ++next_;
     return 0;
@@ -57,7 +61,8 @@ class Columns {
   [[nodiscard]] bool numbers(const char* what, std::array<double, N>* values) {
     const auto mine = fields_.subspan(next_, N);
     next_ += N;
-    if (std::all_of(mine.begin(), mine.end(), [](std::string_view f) { return f.empty(); })) return false;
+    if (std::all_of(mine.begin(), mine.end(), [](std::string_view f) { return f.empty(); }))
+      return false;
     for (std::size_t i = 0; i < N; ++i)
       if (!parse_number(mine[i], &(*values)[i])) refuse(mine[i], what);
     return true;
@@ -75,7 +80,9 @@ class Columns {
   [[noreturn]] void refuse(std::string_view field, const char* what) const {
     app::refuse(file_, line_, "`" + std::string(field.substr(0, 40)) + "` is not " + what);
   }
-  [[noreturn]] void refuse(const std::string& sentence) const { app::refuse(file_, line_, sentence); }
+  [[noreturn]] void refuse(const std::string& sentence) const {
+    app::refuse(file_, line_, sentence);
+  }
 
  private:
   const fs::path& file_;
@@ -103,14 +110,17 @@ InsRecord parse(Columns columns) {
   s.attitude_valid = columns.numbers("a part of a quaternion", &s.q_enu_ins);
   const auto& q = s.q_enu_ins;
   const double length = std::hypot(std::hypot(q[0], q[1]), std::hypot(q[2], q[3]));
-  if (!(std::abs(length - 1) <= kQuaternionLength)) columns.refuse(fmt::format("the quaternion has length {:.3g} and not 1", length));
+  if (!(std::abs(length - 1) <= kQuaternionLength))
+    columns.refuse(fmt::format("the quaternion has length {:.3g} and not 1", length));
   s.position_sigma = columns.sigma();
   s.height_sigma = columns.sigma();
   s.velocity_sigma = columns.sigma();
   s.tilt_sigma = columns.sigma() / kDegrees;
   s.heading_sigma = columns.sigma() / kDegrees;
-  r.quality.status = static_cast<std::uint32_t>(columns.integer("a status word", 0, std::numeric_limits<std::uint32_t>::max()));
-  r.quality.satellites = static_cast<std::uint8_t>(columns.integer_or_nothing("a number of satellites", 0, 255));
+  r.quality.status = static_cast<std::uint32_t>(
+      columns.integer("a status word", 0, std::numeric_limits<std::uint32_t>::max()));
+  r.quality.satellites =
+      static_cast<std::uint8_t>(columns.integer_or_nothing("a number of satellites", 0, 255));
   r.quality.filter_valid = columns.integer("0 or 1", 0, 1) != 0;
   r.quality.utc_ns = columns.integer_or_nothing("a time in whole nanoseconds", 0, kMost);
   r.quality.utc_valid = r.quality.utc_ns != 0;
@@ -124,14 +134,19 @@ void format_ins_record(const InsRecord& record, std::string* line) {
   const InsQuality& q = record.quality;
   line->clear();
   const auto out = std::back_inserter(*line);
-  fmt::format_to(out, "{},{},{},{}", s.stamp.ns(), s.stamp_error.ns(), s.number, kFixes[static_cast<std::size_t>(s.fix)]);
+  fmt::format_to(out, "{},{},{},{}", s.stamp.ns(), s.stamp_error.ns(), s.number,
+                 kFixes[static_cast<std::size_t>(s.fix)]);
   if (s.fix != FixStatus::none && s.position.plausible())
-    fmt::format_to(out, ",{:.10f},{:.10f},{:.5f}", s.position.latitude_deg, s.position.longitude_deg, s.position.height_m);
+    fmt::format_to(out, ",{:.10f},{:.10f},{:.5f}", s.position.latitude_deg,
+                   s.position.longitude_deg, s.position.height_m);
   else
     *line += ",,,";
-  const bool velocity = s.velocity_valid && finite(s.velocity_enu), attitude = s.attitude_valid && finite(s.q_enu_ins);
-  for (const double v : s.velocity_enu) velocity ? fmt::format_to(out, ",{:.6f}", v) : fmt::format_to(out, ",");
-  for (const double v : s.q_enu_ins) attitude ? fmt::format_to(out, ",{:.9f}", v) : fmt::format_to(out, ",");
+  const bool velocity = s.velocity_valid && finite(s.velocity_enu),
+             attitude = s.attitude_valid && finite(s.q_enu_ins);
+  for (const double v : s.velocity_enu)
+    velocity ? fmt::format_to(out, ",{:.6f}", v) : fmt::format_to(out, ",");
+  for (const double v : s.q_enu_ins)
+    attitude ? fmt::format_to(out, ",{:.9f}", v) : fmt::format_to(out, ",");
   append_sigma(line, s.position_sigma, 1);
   append_sigma(line, s.height_sigma, 1);
   append_sigma(line, s.velocity_sigma, 1);
@@ -159,14 +174,18 @@ std::vector<InsRecord> read_ins_file(const fs::path& file) {
   text.resize(text.rfind('\n') + 1);  // npos + 1 is 0
   Lines lines(text);
   std::string_view line;
-  if (!lines.next(&line) || line != kInsHeader) refuse(file, 1, "is not the head of an ins.csv as `vergence run` writes it");
+  if (!lines.next(&line) || line != kInsHeader)
+    refuse(file, 1, "is not the head of an ins.csv as `vergence run` writes it");
   std::vector<InsRecord> records;
   while (lines.next(&line)) {
     std::array<std::string_view, kColumns> fields;
     const std::size_t count = split(line, ',', fields);
-    if (count != kColumns) refuse(file, lines.number(), fmt::format("has {} columns where a reading has {}", count, kColumns));
+    if (count != kColumns)
+      refuse(file, lines.number(),
+             fmt::format("has {} columns where a reading has {}", count, kColumns));
     const InsRecord record = parse(Columns(file, lines.number(), fields));
-    if (records.empty() || records.back().sample.stamp < record.sample.stamp) records.push_back(record);
+    if (records.empty() || records.back().sample.stamp < record.sample.stamp)
+      records.push_back(record);
   }
   if (records.empty()) refuse(file, 0, "has no reading in it");
   return records;

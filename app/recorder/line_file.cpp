@@ -11,8 +11,12 @@
 namespace vergence::app {
 
 LineFile::LineFile(const std::filesystem::path& file, std::size_t pending)
-    : path_(file), pending_(pending), fd_(::open(file.c_str(), O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0644)) {
-  if (fd_ < 0) throw InputError(file.string() + ": cannot be written (" + std::strerror(errno) + "): check the folder's permissions");
+    : path_(file),
+      pending_(pending),
+      fd_(::open(file.c_str(), O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0644)) {
+  if (fd_ < 0)
+    throw InputError(file.string() + ": cannot be written (" + std::strerror(errno) +
+                     "): check the folder's permissions");
 }
 
 LineFile::~LineFile() { close(); }

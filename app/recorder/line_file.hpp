@@ -9,11 +9,13 @@ namespace vergence::app {
 
 /// A file that grows by whole lines and survives a full disk.
 ///
-/// What the system does not take stays in memory and is tried again with the next flush(); when as many bytes wait as it may keep, new
-/// lines are refused and counted. So a file never holds a line that lacks its end in the middle, and goes on when room comes back.
+/// What the system does not take stays in memory and is tried again with the next flush(); when as
+/// many bytes wait as it may keep, new lines are refused and counted. So a file never holds a line
+/// that lacks its end in the middle, and goes on when room comes back.
 ///
 /// Threads  One. Memory  Its buffer.
-/// Errors   The constructor throws InputError. Afterwards nothing throws: a failure is kept in fault().
+/// Errors   The constructor throws InputError. Afterwards nothing throws: a failure is kept in
+///          fault().
 class LineFile {
  public:
   static constexpr std::size_t kPending = std::size_t{1} << 20;  // bytes: minutes of poses
@@ -24,7 +26,8 @@ class LineFile {
   LineFile(const LineFile&) = delete;
   LineFile& operator=(const LineFile&) = delete;
 
-  /// Takes a line, end of line included; nothing is written yet. False: too much is waiting already; the line is lost and counted.
+  /// Takes a line, end of line included; nothing is written yet. False: too much is waiting
+  /// already; the line is lost and counted.
   bool append(std::string_view line);
   /// Hands the system what is waiting. False: not all was taken; fault() says why.
   bool flush();

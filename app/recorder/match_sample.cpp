@@ -14,14 +14,18 @@ void MatchSample::take(const calibration::TrackLog& log) noexcept {
     for (int k = 1; s.by(0) && k < kMaxCameras; ++k) {
       if (!s.by(k)) continue;
       const auto &left = s.raw[0], &other = s.raw[static_cast<std::size_t>(k)];
-      push({{left.x(), left.y()}, {other.x(), other.y()}, frame.number, static_cast<std::uint8_t>(k)});
+      push({{left.x(), left.y()},
+            {other.x(), other.y()},
+            frame.number,
+            static_cast<std::uint8_t>(k)});
     }
 }
 
 void MatchSample::push(const RawMatch& match) noexcept {
   if (seen_++ % step_ != 0) return;
   if (size_ == kMost) {
-    // What is kept are the matches 0, step, 2 step …: without every second one they are those of the doubled step.
+    // What is kept are the matches 0, step, 2 step …: without every second one they are those of
+    // the doubled step.
     for (std::size_t i = 0; i < kMost / 2; ++i) matches_[i] = matches_[2 * i];
     size_ = kMost / 2;
     step_ *= 2;

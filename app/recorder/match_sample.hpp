@@ -16,10 +16,12 @@ struct RawMatch {
   std::uint8_t camera = 1;
 };
 
-/// An even sample of a drive's matches across, for a look at how a calibration fits them all over the image.
+/// An even sample of a drive's matches across, for a look at how a calibration fits them all over
+/// the image.
 ///
-/// Every n-th match is kept; when there is no room for more, every second one goes and n doubles: a long drive is sampled thinner, from
-/// its start to its end alike. The same drive gives the same sample.
+/// Every n-th match is kept; when there is no room for more, every second one goes and n doubles: a
+/// long drive is sampled thinner, from its start to its end alike. The same drive gives the same
+/// sample.
 /// Threads  One. Memory  Its own array: make it where there is room for 640 kB.
 class MatchSample {
  public:
@@ -30,7 +32,9 @@ class MatchSample {
   /// From this frame on the rig is another one.
   void rig_changed(std::uint64_t frame) noexcept;
 
-  [[nodiscard]] std::span<const RawMatch> matches() const noexcept { return std::span(matches_).first(size_); }
+  [[nodiscard]] std::span<const RawMatch> matches() const noexcept {
+    return std::span(matches_).first(size_);
+  }
   /// Frames before this one saw the rig that the drive began with.
   [[nodiscard]] std::uint64_t first_change() const noexcept { return first_change_; }
   /// Frames from this one on saw the rig as it is at the end.

@@ -21,10 +21,13 @@ enum class OtherFormat : std::uint8_t {
 /// Words with commas between them. InputError: a word that is none, or none at all.
 [[nodiscard]] std::vector<OtherFormat> parse_other_formats(std::string_view words);
 
-/// Writes them into the session's folder from the totals' trajectory and statuses. All but `kitti` need a placement: without one nothing is
-/// written and a sentence says so. → sentences for the user; what could not be written is a fault.
-[[nodiscard]] std::vector<std::string> write_other_formats(const std::filesystem::path& session, const std::vector<OtherFormat>& formats,
-                                                           const SessionTotals& totals, const EarthFigures& earth,
+/// Writes them into the session's folder from the totals' trajectory and statuses. All but `kitti`
+/// need a placement: without one nothing is written and a sentence says so. → sentences for the
+/// user; what could not be written is a fault.
+[[nodiscard]] std::vector<std::string> write_other_formats(const std::filesystem::path& session,
+                                                           const std::vector<OtherFormat>& formats,
+                                                           const SessionTotals& totals,
+                                                           const EarthFigures& earth,
                                                            std::vector<std::string>* faults);
 
 }  // namespace vergence::app

@@ -59,8 +59,8 @@ void append_earth(std::string* line, bool valid, const EarthNumbers& e) {
   const auto out = std::back_inserter(*line);
   for (const double v : e.enu) fmt::format_to(out, ",{:.4f}", v);
   // 1e-9 degrees are a tenth of a millimetre.
-  fmt::format_to(out, ",{:.9f},{:.9f},{:.4f},{:.4f}", e.position.latitude_deg, e.position.longitude_deg, e.position.height_m,
-                 e.heading_deg);
+  fmt::format_to(out, ",{:.9f},{:.9f},{:.4f},{:.4f}", e.position.latitude_deg,
+                 e.position.longitude_deg, e.position.height_m, e.heading_deg);
 }
 
 }  // namespace
@@ -71,18 +71,29 @@ void make_session_folder(const std::filesystem::path& folder) {
   if (name.empty()) throw InputError("--out is empty; name a folder for the session");
   std::error_code error;
   if (fs::exists(folder, error)) {
-    if (!fs::is_directory(folder, error)) throw InputError(name + ": is not a folder; name a new or empty one for the session with --out");
+    if (!fs::is_directory(folder, error))
+      throw InputError(name +
+                       ": is not a folder; name a new or empty one for the session with --out");
     const bool empty = fs::is_empty(folder, error);
-    if (error) throw InputError(name + ": cannot be looked into (" + error.message() + "): check its permissions");
-    if (!empty) throw InputError(name + ": is not empty, and nothing is ever overwritten; name a new or empty folder with --out");
+    if (error)
+      throw InputError(name + ": cannot be looked into (" + error.message() +
+                       "): check its permissions");
+    if (!empty)
+      throw InputError(
+          name +
+          ": is not empty, and nothing is ever overwritten; name a new or empty folder with --out");
     return;
   }
   fs::create_directories(folder, error);
-  if (error) throw InputError(name + ": cannot be made (" + error.message() + "): check the folder above it");
+  if (error)
+    throw InputError(name + ": cannot be made (" + error.message() +
+                     "): check the folder above it");
 }
 
 Recorder::Recorder(const std::filesystem::path& folder, const Options& options)
-    : options_(options), files_(std::make_unique<Files>(folder, options.ins)), totals_(std::make_unique<SessionTotals>()) {
+    : options_(options),
+      files_(std::make_unique<Files>(folder, options.ins)),
+      totals_(std::make_unique<SessionTotals>()) {
   if (options.keep_trajectory) {
     totals_->trajectory.reserve(options.expected_frames);
     totals_->reference.reserve(options.expected_frames);
@@ -104,7 +115,8 @@ void Recorder::stop_and_join() noexcept {
 }
 
 template <class Value, std::size_t N>
-bool Recorder::push(Ring<Value, N>* ring, std::atomic<std::uint64_t>* dropped, const Value& value) noexcept {
+bool Recorder::push(Ring<Value, N>* ring, std::atomic<std::uint64_t>* dropped,
+                    const Value& value) noexcept {
   for (;;) {
     const Doorbell::Rung seen = freed_.look();
     if (ring->push(value)) break;
@@ -122,7 +134,9 @@ void Recorder::post(const Record& record) noexcept {
   if (push(&ring_, &dropped_, record)) high_water_ = std::max(high_water_, ring_.size());
 }
 
-void Recorder::post(const InsRecord& reading) noexcept { (void)push(&readings_, &dropped_readings_, reading); }
+void Recorder::post(const InsRecord& reading) noexcept {
+  (void)push(&readings_, &dropped_readings_, reading);
+}
 
 void Recorder::work() {
   (void)pthread_setname_np(pthread_self(), "vergence-record");
@@ -132,7 +146,8 @@ void Recorder::work() {
   flush();  // the heads of the tables
   for (;;) {
     const Doorbell::Rung seen = filled_.look();
-    const bool stopping = stop_.load(std::memory_order_acquire);  // before the ring: what was posted before is still found
+    const bool stopping = stop_.load(
+        std::memory_order_acquire);  // before the ring: what was posted before is still found
     if (take()) {
       if (Clock::now() - flushed < kFlushAtLeast) continue;
     } else if (stopping) {
@@ -172,16 +187,21 @@ void Recorder::write(const PoseRecord& p) {
   ++totals_->read;
   match_confirmed();
   if (options_.keep_trajectory) totals_->statuses.push_back(p.status);
-  ++(p.status == PoseStatus::ok ? totals_->ok : p.status == PoseStatus::degraded ? totals_->degraded : totals_->lost);
+  ++(p.status == PoseStatus::ok         ? totals_->ok
+     : p.status == PoseStatus::degraded ? totals_->degraded
+                                        : totals_->lost);
   totals_->estimate.add(static_cast<double>(p.estimate_ms));
-  if (p.state != State::stereo_odometry && p.state != State::lost) totals_->calibrating.add(static_cast<double>(p.estimate_ms));
+  if (p.state != State::stereo_odometry && p.state != State::lost)
+    totals_->calibrating.add(static_cast<double>(p.estimate_ms));
   totals_->decode.add(static_cast<double>(p.decode_ms));
-  for (std::size_t i = 0; i < p.stage_ms.size(); ++i) totals_->stages[i].add(static_cast<double>(p.stage_ms[i]));
+  for (std::size_t i = 0; i < p.stage_ms.size(); ++i)
+    totals_->stages[i].add(static_cast<double>(p.stage_ms[i]));
 
   const bool posed = p.status != PoseStatus::lost;
   line_.clear();
   const auto out = std::back_inserter(line_);
-  fmt::format_to(out, "{},{},{},{},{}", p.frame, p.stamp.ns(), to_string(p.state), to_string(p.status), to_string(p.reason));
+  fmt::format_to(out, "{},{},{},{},{}", p.frame, p.stamp.ns(), to_string(p.state),
+                 to_string(p.status), to_string(p.reason));
   if (posed) {
     for (const double v : p.world_left.t) fmt::format_to(out, ",{:.9f}", v);
     for (const double v : p.world_left.q) fmt::format_to(out, ",{:.9f}", v);
@@ -210,11 +230,13 @@ void Recorder::write(const PoseRecord& p) {
     append_tum(&line_, p.stamp, p.reference_left);
     files_->reference.append(line_);
     any_reference_ = true;
-    if (options_.keep_trajectory) totals_->reference.push_back({p.stamp, p.reference_left.transform()});
+    if (options_.keep_trajectory)
+      totals_->reference.push_back({p.stamp, p.reference_left.transform()});
   }
   if (have_last_pose_)
     totals_->path_m +=
-        std::hypot(p.world_left.t[0] - last_pose_.t[0], p.world_left.t[1] - last_pose_.t[1], p.world_left.t[2] - last_pose_.t[2]);
+        std::hypot(p.world_left.t[0] - last_pose_.t[0], p.world_left.t[1] - last_pose_.t[1],
+                   p.world_left.t[2] - last_pose_.t[2]);
   last_pose_ = p.world_left;
   have_last_pose_ = true;
   if (options_.keep_trajectory) totals_->trajectory.push_back({p.stamp, p.world_left.transform()});
@@ -222,7 +244,8 @@ void Recorder::write(const PoseRecord& p) {
 
 /// An event comes before the pose of its frame, or after the last one.
 void Recorder::match_confirmed() {
-  if (totals_->confirmed == newest_ && !totals_->confirmed_frame && totals_->read > 0) totals_->confirmed_frame = newest_frame_;
+  if (totals_->confirmed == newest_ && !totals_->confirmed_frame && totals_->read > 0)
+    totals_->confirmed_frame = newest_frame_;
 }
 
 void Recorder::note(const EventRecord& e) {
@@ -246,7 +269,8 @@ void Recorder::write(const EventRecord& e) {
   for (const EventField& f : e.fields)
     if (f.name != nullptr) std::visit([&](auto value) { fields[f.name] = value; }, f.value);
   // File names may hold any bytes; the line stays JSON.
-  files_->events.append(object.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n");
+  files_->events.append(
+      object.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n");
 }
 
 namespace {
@@ -266,7 +290,8 @@ void append_sigmas(std::string* line, const std::array<double, N>& values) {
 void append_distortion(std::string* line, const Intrinsics& lens) {
   std::array<double, 4> sigma{};
   std::copy_n(lens.distortion_sigma.begin(), sigma.size(), sigma.begin());
-  for (std::size_t i = 0; i < sigma.size(); ++i) fmt::format_to(std::back_inserter(*line), ",{:.9f}", lens.distortion[i]);
+  for (std::size_t i = 0; i < sigma.size(); ++i)
+    fmt::format_to(std::back_inserter(*line), ",{:.9f}", lens.distortion[i]);
   append_sigmas(line, sigma);
 }
 
@@ -291,14 +316,16 @@ void Recorder::write(const CalibrationRecord& c) {
                               : "rejected",
                    field(c.cause), field(c.reason), rig.frames);
     if (c.decided)
-      fmt::format_to(out, ",{},{},{:.4f},{:.4f},{:.4f},{:.6f}", c.latency_frames, c.onset_frame, rig.reprojection_px, c.held_out_before_px,
-                     c.held_out_after_px, rig.scale_sigma);
+      fmt::format_to(out, ",{},{},{:.4f},{:.4f},{:.4f},{:.6f}", c.latency_frames, c.onset_frame,
+                     rig.reprojection_px, c.held_out_before_px, c.held_out_after_px,
+                     rig.scale_sigma);
     else
       fmt::format_to(out, ",,,{:.4f},,,{:.6f}", rig.reprojection_px, rig.scale_sigma);
     const Transform& T = rig.T_camera_left[k];
     const Vec3 phi = log_so3(T.R);
     fmt::format_to(out, ",{}", k);
-    for (const double v : {phi.x(), phi.y(), phi.z(), T.t.x(), T.t.y(), T.t.z()}) fmt::format_to(out, ",{:.9f}", v);
+    for (const double v : {phi.x(), phi.y(), phi.z(), T.t.x(), T.t.y(), T.t.z()})
+      fmt::format_to(out, ",{:.9f}", v);
     append_sigmas(&line_, rig.sigma_noise[k]);
     append_sigmas(&line_, rig.sigma_wide[k]);
     const Intrinsics& lens = rig.intrinsics[k];
@@ -307,8 +334,8 @@ void Recorder::write(const CalibrationRecord& c) {
     append_distortion(&line_, lens);
     append_distortion(&line_, rig.intrinsics[0]);
     if (c.decided && c.judged_depth_m > 0)
-      fmt::format_to(out, ",{:.2f},{:.4f},{:.4f},{:d},{:d}", c.judged_depth_m, c.depth_sigma_percent, c.depth_difference_percent,
-                     c.verified, c.lenses);
+      fmt::format_to(out, ",{:.2f},{:.4f},{:.4f},{:d},{:d}", c.judged_depth_m,
+                     c.depth_sigma_percent, c.depth_difference_percent, c.verified, c.lenses);
     else
       line_ += ",,,,,";
     line_ += '\n';
@@ -321,7 +348,8 @@ void Recorder::note(const CalibrationRecord& c) {
   if (c.learnt && !c.accepted) return;  // the drive goes on: nothing was attempted
   ++(c.accepted ? totals_->accepted : totals_->rejected);
   if (totals_->attempts.size() == kMostAttempts) totals_->attempts.erase(totals_->attempts.begin());
-  totals_->attempts.push_back({c.stamp, c.cause, c.reason, c.accepted, c.latency_frames, c.rig.frames, c.solve_ms});
+  totals_->attempts.push_back(
+      {c.stamp, c.cause, c.reason, c.accepted, c.latency_frames, c.rig.frames, c.solve_ms});
   if (!c.accepted || !options_.keep) return;
   const Kept kept = options_.keep(c.rig.rig());
   if (kept.sentence.empty()) return;
@@ -345,7 +373,8 @@ void Recorder::flush() {
       complain(*files[i]);
     }
   }
-  note_disk(pretended_ || std::any_of(files.begin(), files.end(), [](const LineFile* f) { return f->fault() != 0; }));
+  note_disk(pretended_ || std::any_of(files.begin(), files.end(),
+                                      [](const LineFile* f) { return f->fault() != 0; }));
 }
 
 void Recorder::pretend(Stamp stamp) {
@@ -357,7 +386,8 @@ void Recorder::pretend(Stamp stamp) {
   if (full) {
     const std::lock_guard lock(complaints_mutex_);
     complaints_.push_back(files_->poses.path().parent_path().string() +
-                          ": the disk has no room, as the drive's faults want it; the session goes on, lines wait in memory");
+                          ": the disk has no room, as the drive's faults want it; the session goes "
+                          "on, lines wait in memory");
   }
   flush();
 }
@@ -382,7 +412,8 @@ std::uint64_t Recorder::lost_lines() const {
 
 void Recorder::complain(const LineFile& file) {
   const std::lock_guard lock(complaints_mutex_);
-  complaints_.push_back(file.path().string() + ": cannot be written (" + std::strerror(file.fault()) +
+  complaints_.push_back(file.path().string() + ": cannot be written (" +
+                        std::strerror(file.fault()) +
                         "); the session goes on, lines wait in memory: make room on that disk");
 }
 
@@ -397,11 +428,13 @@ std::unique_ptr<SessionTotals> Recorder::close() {
     const bool good = file->close();
     totals_->lost_lines += file->lost_lines();
     if (!good)
-      totals_->faults.push_back(file->path().string() + ": is not complete (" + std::strerror(file->fault()) +
+      totals_->faults.push_back(file->path().string() + ": is not complete (" +
+                                std::strerror(file->fault()) +
                                 "); make room on that disk and repeat the drive");
     else if (file->lost_lines() > 0)
-      complaints_.push_back(file->path().string() + ": lacks " + std::to_string(file->lost_lines()) +
-                            " lines that found no room on the disk in time; the others are all there");
+      complaints_.push_back(
+          file->path().string() + ": lacks " + std::to_string(file->lost_lines()) +
+          " lines that found no room on the disk in time; the others are all there");
   }
   // A file that says nothing would look like a reference that was lost.
   std::error_code ignored;

@@ -24,21 +24,27 @@ class LineFile;
 
 /// What poses.csv has, in this order (DESIGN §6).
 inline constexpr const char* kPosesHeader =
-    "frame,stamp_ns,state,status,reason,x,y,z,qx,qy,qz,qw,east,north,up,latitude_deg,longitude_deg,height_m,heading_deg,"
+    "frame,stamp_ns,state,status,reason,x,y,z,qx,qy,qz,qw,east,north,up,latitude_deg,longitude_deg,"
+    "height_m,heading_deg,"
     "ins_east,ins_north,ins_up,ins_latitude_deg,ins_longitude_deg,ins_height_m,ins_heading_deg,"
     "error_east_m,error_north_m,error_up_m,error_heading_deg,inliers,reprojection_px,estimate_ms";
-/// What calibrations.csv has: rotation vectors and their sigmas in rad, lengths in m, `sigma_` by noise alone, `wide_` with uncertain
-/// intrinsics, pixels; d0 … d3 are k1 k2 p1 p2, or k1 … k4 of an equidistant lens. Latency in frames since the alarm, the request or the
-/// start; held-out errors are medians before and after. `kept`: what the drive measured is no better than what is in use. The last five are
-/// those of CalibrationDecision.
+/// What calibrations.csv has: rotation vectors and their sigmas in rad, lengths in m, `sigma_` by
+/// noise alone, `wide_` with uncertain intrinsics, pixels; d0 … d3 are k1 k2 p1 p2, or k1 … k4 of
+/// an equidistant lens. Latency in frames since the alarm, the request or the start; held-out
+/// errors are medians before and after. `kept`: what the drive measured is no better than what is
+/// in use. The last five are those of CalibrationDecision.
 inline constexpr const char* kCalibrationsHeader =
-    "stamp_ns,outcome,cause,reason,frames,latency_frames,onset_frame,reprojection_px,held_out_before_px,held_out_after_px,scale_sigma,"
-    "camera,rx,ry,rz,tx,ty,tz,sigma_rx,sigma_ry,sigma_rz,sigma_tx,sigma_ty,sigma_tz,wide_rx,wide_ry,wide_rz,wide_tx,wide_ty,wide_tz,"
-    "fx,fy,cx,cy,sigma_fx,sigma_fy,sigma_cx,sigma_cy,d0,d1,d2,d3,sigma_d0,sigma_d1,sigma_d2,sigma_d3,"
+    "stamp_ns,outcome,cause,reason,frames,latency_frames,onset_frame,reprojection_px,held_out_"
+    "before_px,held_out_after_px,scale_sigma,"
+    "camera,rx,ry,rz,tx,ty,tz,sigma_rx,sigma_ry,sigma_rz,sigma_tx,sigma_ty,sigma_tz,wide_rx,wide_"
+    "ry,wide_rz,wide_tx,wide_ty,wide_tz,"
+    "fx,fy,cx,cy,sigma_fx,sigma_fy,sigma_cx,sigma_cy,d0,d1,d2,d3,sigma_d0,sigma_d1,sigma_d2,sigma_"
+    "d3,"
     "left_d0,left_d1,left_d2,left_d3,sigma_left_d0,sigma_left_d1,sigma_left_d2,sigma_left_d3,"
     "judged_depth_m,depth_sigma_percent,depth_difference_percent,verified,lenses";
 
-/// Makes the folder of a session. InputError: it exists and is not empty, is no folder, or cannot be made.
+/// Makes the folder of a session. InputError: it exists and is not empty, is no folder, or cannot
+/// be made.
 void make_session_folder(const std::filesystem::path& folder);
 
 /// One attempt to calibrate while driving.
@@ -60,17 +66,19 @@ struct Contradiction {
 struct SessionTotals {
   std::uint64_t read = 0, ok = 0, degraded = 0, lost = 0;  // frames
   TimeHistogram estimate, decode;                          // ms
-  TimeHistogram calibrating;                               // ms, of the frames in other states than stereo_odometry and lost
+  TimeHistogram calibrating;  // ms, of the frames in other states than stereo_odometry and lost
   std::array<TimeHistogram, kStages> stages;
-  std::vector<CalibrationAttempt> attempts;        // the newest kMostAttempts
-  std::uint64_t accepted = 0, rejected = 0;        // of all of them
-  std::optional<Stamp> confirmed{};                // when the drive first confirmed the calibration in use
+  std::vector<CalibrationAttempt> attempts;  // the newest kMostAttempts
+  std::uint64_t accepted = 0, rejected = 0;  // of all of them
+  std::optional<Stamp> confirmed{};  // when the drive first confirmed the calibration in use
   std::optional<std::uint64_t> confirmed_frame{};  // the frame of that stamp
-  std::optional<Contradiction> contradicted{};     // the first time that it showed another one than was in use
-  double path_m = 0;                               // sum of the steps between successive poses
-  std::vector<StampedPose> trajectory;             // if asked for: the poses of trajectory.tum
-  std::vector<StampedPose> reference;              // if asked for: of reference.tum, in its own frame
-  std::vector<PoseStatus> statuses;    // if asked for: of every frame read; those that are not lost have their pose in trajectory
+  std::optional<Contradiction>
+      contradicted{};                   // the first time that it showed another one than was in use
+  double path_m = 0;                    // sum of the steps between successive poses
+  std::vector<StampedPose> trajectory;  // if asked for: the poses of trajectory.tum
+  std::vector<StampedPose> reference;   // if asked for: of reference.tum, in its own frame
+  std::vector<PoseStatus> statuses;    // if asked for: of every frame read; those that are not lost
+                                       // have their pose in trajectory
   std::uint64_t dropped_records = 0;   // the ring was full (live only)
   std::uint64_t dropped_readings = 0;  // theirs was
   std::uint64_t lost_lines = 0;        // the disk took no more
@@ -80,24 +88,30 @@ struct SessionTotals {
 
 inline constexpr std::size_t kMostAttempts = 1000;  // in summary.json; calibrations.csv has all
 
-/// What became of a calibration that was to be kept: a line of events.jsonl, a complaint as well when it failed.
+/// What became of a calibration that was to be kept: a line of events.jsonl, a complaint as well
+/// when it failed.
 struct Kept {
   bool failed = false;
   std::string sentence{};  // empty: nothing to tell
 };
 
-/// Writes trajectory.tum, reference.tum (gone at the end if there was no reference), poses.csv, calibrations.csv, events.jsonl and, with an
-/// INS, ins.csv of a session as it goes on, on a thread of its own: the estimator never waits for a disk.
+/// Writes trajectory.tum, reference.tum (gone at the end if there was no reference), poses.csv,
+/// calibrations.csv, events.jsonl and, with an INS, ins.csv of a session as it goes on, on a thread
+/// of its own: the estimator never waits for a disk.
 ///
-/// What has been posted is in the files as soon as the thread comes to it, at the latest after a second, so a killed session keeps its
-/// lines. Stamps are printed from their integers. The same records give the same bytes.
-/// Threads  post(): one producer. take_complaints(): any. close(): the owner's, after the last post().
-/// Memory   post() takes none. With keep_trajectory a pose of some 100 bytes is kept for every frame.
-/// Full     wait: the producer waits (replay). drop: the record is dropped and counted (live). Readings have a ring of their own: they
-///          never push out a pose.
-/// Errors   The constructor throws InputError. A disk that takes no more: a complaint and an event `disk_full`, the session goes on, see
-///          LineFile; an event `disk_room` when it takes lines again says what was lost. Lines lost in between leave the session usable and
-///          are a complaint of close(); a file that could not be ended is a fault of its totals.
+/// What has been posted is in the files as soon as the thread comes to it, at the latest after a
+/// second, so a killed session keeps its lines. Stamps are printed from their integers. The same
+/// records give the same bytes.
+/// Threads  post(): one producer. take_complaints(): any. close(): the owner's, after the last
+///          post().
+/// Memory   post() takes none. With keep_trajectory a pose of some 100 bytes is kept for every
+///          frame.
+/// Full     wait: the producer waits (replay). drop: the record is dropped and counted (live).
+///          Readings have a ring of their own: they never push out a pose.
+/// Errors   The constructor throws InputError. A disk that takes no more: a complaint and an event
+///          `disk_full`, the session goes on, see LineFile; an event `disk_room` when it takes
+///          lines again says what was lost. Lines lost in between leave the session usable and are
+///          a complaint of close(); a file that could not be ended is a fault of its totals.
 class Recorder {
  public:
   enum class WhenFull : std::uint8_t { wait, drop };
@@ -106,10 +120,11 @@ class Recorder {
     bool keep_trajectory = true;
     std::size_t expected_frames = 0;  // memory taken beforehand for the trajectory
     bool ins = false;                 // readings are posted: ins.csv is there
-    /// Called on the recorder's thread with every calibration that was accepted while driving: files may be written there. May be empty.
+    /// Called on the recorder's thread with every calibration that was accepted while driving:
+    /// files may be written there. May be empty.
     std::function<Kept(const RigCalibration&)> keep{};
-    /// Whether the disk is to be taken for full at this time of the drive, which a mock's fault says. Called on the recorder's thread with
-    /// the stamp of every pose. May be empty.
+    /// Whether the disk is to be taken for full at this time of the drive, which a mock's fault
+    /// says. Called on the recorder's thread with the stamp of every pose. May be empty.
     std::function<bool(Stamp)> disk_full{};
   };
 

@@ -61,7 +61,8 @@ Transform PoseNumbers::transform() const noexcept {
   return {Eigen::Quaterniond(q[3], q[0], q[1], q[2]).toRotationMatrix(), Vec3(t[0], t[1], t[2])};
 }
 
-PoseRecord PoseRecord::of(const PoseSample& sample, float decode_ms, const std::optional<Transform>& T_reference_left) noexcept {
+PoseRecord PoseRecord::of(const PoseSample& sample, float decode_ms,
+                          const std::optional<Transform>& T_reference_left) noexcept {
   PoseRecord r;
   r.frame = sample.frame;
   r.stamp = sample.stamp;
@@ -85,14 +86,16 @@ EarthNumbers EarthNumbers::of(const EarthPose& pose) noexcept {
 }
 
 PoseRecord PoseRecord::of(const ComparedPose& pose, float decode_ms) noexcept {
-  PoseRecord r = of(pose.pose, decode_ms, pose.ins_valid ? std::optional(pose.reference.T_enu_left) : std::nullopt);
+  PoseRecord r = of(pose.pose, decode_ms,
+                    pose.ins_valid ? std::optional(pose.reference.T_enu_left) : std::nullopt);
   r.placed = pose.placed;
   r.ins_valid = pose.ins_valid;
   r.compared = pose.compared;
   if (pose.placed) r.ours = EarthNumbers::of(pose.ours);
   if (pose.ins_valid) r.ins = EarthNumbers::of(pose.reference);
   // A compass counts clockwise, a yaw the other way.
-  r.error = {pose.error_enu.x(), pose.error_enu.y(), pose.error_enu.z(), -pose.error_yaw * (180.0 / std::numbers::pi)};
+  r.error = {pose.error_enu.x(), pose.error_enu.y(), pose.error_enu.z(),
+             -pose.error_yaw * (180.0 / std::numbers::pi)};
   return r;
 }
 
@@ -112,8 +115,8 @@ EventRecord EventRecord::of(const EstimatorEvent& event) noexcept {
   if (state) {
     std::array<char, 256> text{};
     const auto from = to_string(event.from), to = to_string(event.to);
-    std::snprintf(text.data(), text.size(), "%.*s to %.*s: %s", static_cast<int>(from.size()), from.data(), static_cast<int>(to.size()),
-                  to.data(), event.why);
+    std::snprintf(text.data(), text.size(), "%.*s to %.*s: %s", static_cast<int>(from.size()),
+                  from.data(), static_cast<int>(to.size()), to.data(), event.why);
     r.set_sentence(text.data());
     // The words are string literals: views of them end with 0.
     r.fields[0] = {"from", from.data()};
@@ -123,9 +126,11 @@ EventRecord EventRecord::of(const EstimatorEvent& event) noexcept {
     const char* why = event.kind == EstimatorEvent::Kind::calibration_accepted ? "" : event.why;
     std::array<char, 256> text{};
     if (event.kind == EstimatorEvent::Kind::calibration_contradicted && event.value > 0)
-      (void)std::snprintf(text.data(), text.size(), "%s: its depths are off by %.1f %%", why, event.value);
+      (void)std::snprintf(text.data(), text.size(), "%s: its depths are off by %.1f %%", why,
+                          event.value);
     else
-      (void)std::snprintf(text.data(), text.size(), "%s%s%s", begin, *begin != 0 && *why != 0 ? ": " : "", why);
+      (void)std::snprintf(text.data(), text.size(), "%s%s%s", begin,
+                          *begin != 0 && *why != 0 ? ": " : "", why);
     r.set_sentence(text.data());
     r.fields[0] = {"value", event.value};
   }
@@ -141,7 +146,8 @@ RigNumbers RigNumbers::of(const RigCalibration& rig) noexcept {
   for (std::size_t k = 0; k < static_cast<std::size_t>(rig.cameras); ++k) {
     const Transform& T = rig.T_camera_left[k];
     for (int row = 0; row < 3; ++row) {
-      for (int column = 0; column < 3; ++column) n.T_camera_left[k][static_cast<std::size_t>(4 * row + column)] = T.R(row, column);
+      for (int column = 0; column < 3; ++column)
+        n.T_camera_left[k][static_cast<std::size_t>(4 * row + column)] = T.R(row, column);
       n.T_camera_left[k][static_cast<std::size_t>(4 * row + 3)] = T.t(row);
     }
     auto next = n.covariance_wide[k].begin();
@@ -206,7 +212,8 @@ CalibrationRecord CalibrationRecord::of(const CalibrationDecision& d) noexcept {
   return r;
 }
 
-CalibrationRecord CalibrationRecord::begin(const RigCalibration& rig, Stamp stamp, const char* cause, const char* reason) noexcept {
+CalibrationRecord CalibrationRecord::begin(const RigCalibration& rig, Stamp stamp,
+                                           const char* cause, const char* reason) noexcept {
   CalibrationRecord r;
   r.stamp = stamp;
   r.cause = cause;

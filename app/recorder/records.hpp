@@ -12,7 +12,8 @@
 #include "core/types/pose_sample.hpp"
 #include "core/types/stamped_pose.hpp"
 
-/// What goes through the recorder's ring: plain values of fixed size, made on the estimator's thread without heap.
+/// What goes through the recorder's ring: plain values of fixed size, made on the estimator's
+/// thread without heap.
 namespace vergence::app {
 
 /// A rigid transform as numbers.
@@ -42,8 +43,9 @@ struct PoseRecord {
   Reason reason = Reason::none;
   PoseNumbers world_left{};
   bool has_reference = false;
-  PoseNumbers reference_left{};                              // in the reference's own frame; meaningful with has_reference
-  bool placed = false, ins_valid = false, compared = false;  // as in ComparedPose: whether the next three mean something
+  PoseNumbers reference_left{};  // in the reference's own frame; meaningful with has_reference
+  bool placed = false, ins_valid = false,
+       compared = false;  // as in ComparedPose: whether the next three mean something
   EarthNumbers ours{}, ins{};
   std::array<double, 4> error{};  // ours − INS: east, north, up, m; heading, deg clockwise
   int inliers = 0;
@@ -52,7 +54,8 @@ struct PoseRecord {
   float estimate_ms = 0;
   float decode_ms = 0;
 
-  [[nodiscard]] static PoseRecord of(const PoseSample& sample, float decode_ms, const std::optional<Transform>& T_reference_left) noexcept;
+  [[nodiscard]] static PoseRecord of(const PoseSample& sample, float decode_ms,
+                                     const std::optional<Transform>& T_reference_left) noexcept;
   /// With the INS as the reference.
   [[nodiscard]] static PoseRecord of(const ComparedPose& pose, float decode_ms) noexcept;
 };
@@ -92,25 +95,30 @@ struct RigNumbers {
   [[nodiscard]] RigCalibration rig() const noexcept;
 };
 
-/// A calibration that was accepted or rejected, or that the drive began with: a line of calibrations.csv for every camera but the left one.
+/// A calibration that was accepted or rejected, or that the drive began with: a line of
+/// calibrations.csv for every camera but the left one.
 struct CalibrationRecord {
   Stamp stamp{};
   bool decided = false;  // while driving; false: the drive began with it
   bool accepted = true;
-  const char* cause = "";  // of a decision the word of its CalibrationCause, else `given`, `state_file`
+  const char* cause =
+      "";  // of a decision the word of its CalibrationCause, else `given`, `state_file`
   const char* reason = "";
   int latency_frames = 0;
   std::uint64_t onset_frame = 0;
   double held_out_before_px = 0, held_out_after_px = 0;
   double solve_ms = 0;
-  bool learnt = false;  // what the drive measured while it went on: not accepted is no rejection, the one in use fits as well
-  double judged_depth_m = 0, depth_sigma_percent = 0, depth_difference_percent = 0;  // as CalibrationDecision has them
+  bool learnt = false;  // what the drive measured while it went on: not accepted is no rejection,
+                        // the one in use fits as well
+  double judged_depth_m = 0, depth_sigma_percent = 0,
+         depth_difference_percent = 0;  // as CalibrationDecision has them
   bool verified = false, lenses = false;
   RigNumbers rig{};
 
   [[nodiscard]] static CalibrationRecord of(const CalibrationDecision& decision) noexcept;
   /// What the drive begins with.
-  [[nodiscard]] static CalibrationRecord begin(const RigCalibration& rig, Stamp stamp, const char* cause, const char* reason) noexcept;
+  [[nodiscard]] static CalibrationRecord begin(const RigCalibration& rig, Stamp stamp,
+                                               const char* cause, const char* reason) noexcept;
 };
 
 using Record = std::variant<PoseRecord, EventRecord, CalibrationRecord>;

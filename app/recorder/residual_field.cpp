@@ -55,7 +55,8 @@ class Field {
     double d = 0;
     const Vec2 left(m.left[0], m.left[1]), other(m.other[0], m.other[1]);
     if (!left_.inside(left, 0) || !left_.unproject(left, &a) || !other_.unproject(other, &b) ||
-        geometry_.to_line(a.head<2>() / a.z(), b.head<2>() / b.z(), &d, nullptr) != EpipolarStatus::ok)
+        geometry_.to_line(a.head<2>() / a.z(), b.head<2>() / b.z(), &d, nullptr) !=
+            EpipolarStatus::ok)
       return;
     const Intrinsics& k = left_.intrinsics();
     const int column = std::clamp(static_cast<int>(kColumns * left.x() / k.width), 0, kColumns - 1);
@@ -65,7 +66,8 @@ class Field {
 
   void append_to(std::vector<ResidualCell>* out) {
     const Intrinsics& k = left_.intrinsics();
-    const double width = static_cast<double>(k.width) / kColumns, height = static_cast<double>(k.height) / kRows;
+    const double width = static_cast<double>(k.width) / kColumns,
+                 height = static_cast<double>(k.height) / kRows;
     for (int row = 0; row < kRows; ++row)
       for (int column = 0; column < kColumns; ++column) {
         std::vector<double>& values = cell_at(row, column);
@@ -89,13 +91,15 @@ class Field {
 
 void append_rows(const char* when, const std::vector<ResidualCell>& cells, std::string* out) {
   for (const ResidualCell& c : cells)
-    fmt::format_to(std::back_inserter(*out), "{},{},{:.2f},{:.2f},{:.2f},{:.2f},{},{:.4f},{:.4f}\n", when, c.camera, c.left, c.top, c.width,
-                   c.height, c.matches, c.mean_px, c.scatter_px);
+    fmt::format_to(std::back_inserter(*out), "{},{},{:.2f},{:.2f},{:.2f},{:.2f},{},{:.4f},{:.4f}\n",
+                   when, c.camera, c.left, c.top, c.width, c.height, c.matches, c.mean_px,
+                   c.scatter_px);
 }
 
 }  // namespace
 
-std::vector<ResidualCell> residual_field(std::span<const RawMatch> matches, const RigCalibration& rig, std::uint64_t from,
+std::vector<ResidualCell> residual_field(std::span<const RawMatch> matches,
+                                         const RigCalibration& rig, std::uint64_t from,
                                          std::uint64_t before) {
   std::vector<ResidualCell> cells;
   for (int k = 1; k < rig.cameras; ++k) {
@@ -107,8 +111,10 @@ std::vector<ResidualCell> residual_field(std::span<const RawMatch> matches, cons
   return cells;
 }
 
-std::string format_residuals(const std::vector<ResidualCell>& begin, const std::vector<ResidualCell>& end) {
-  std::string text = "calibration,camera,left_px,top_px,width_px,height_px,matches,mean_px,scatter_px\n";
+std::string format_residuals(const std::vector<ResidualCell>& begin,
+                             const std::vector<ResidualCell>& end) {
+  std::string text =
+      "calibration,camera,left_px,top_px,width_px,height_px,matches,mean_px,scatter_px\n";
   append_rows("begin", begin, &text);
   append_rows("end", end, &text);
   return text;

@@ -24,7 +24,8 @@ double ms(double value) { return std::round(value * 1e3) / 1e3; }
 
 Json timing_json(const SessionTotals& t) {
   Json stages = {{"decode", ms(t.decode.mean())}};
-  for (std::size_t i = 0; i < t.stages.size(); ++i) stages[std::string(to_string(static_cast<Stage>(i)))] = ms(t.stages[i].mean());
+  for (std::size_t i = 0; i < t.stages.size(); ++i)
+    stages[std::string(to_string(static_cast<Stage>(i)))] = ms(t.stages[i].mean());
   Json calibrating;
   if (t.calibrating.count() > 0)
     calibrating = {{"frames", t.calibrating.count()},
@@ -66,23 +67,29 @@ bool given(const std::array<double, 6>& sigmas) {
 /// Whether every further camera comes with what its uncertainty is; else nothing can be predicted.
 bool has_sigmas(const RigCalibration& rig) {
   for (std::size_t k = 1; k < static_cast<std::size_t>(rig.cameras); ++k)
-    if (!given(rig.sigma_wide[k]) && !(rig.covariance_wide[k].diagonal().maxCoeff() > 0)) return false;
+    if (!given(rig.sigma_wide[k]) && !(rig.covariance_wide[k].diagonal().maxCoeff() > 0))
+      return false;
   return rig.cameras > 1;
 }
 
-/// The word and the predicted depth errors, of the best pair at each depth; null where the calibration brings no sigmas.
+/// The word and the predicted depth errors, of the best pair at each depth; null where the
+/// calibration brings no sigmas.
 Json health_json(const RigCalibration& rig, const calibration::CalibrationOptions& options) {
   const bool known = has_sigmas(rig);
   Json depth = Json::object();
   for (const double z : calibration::kHealthDepths) {
     const double percent = known ? calibration::depth_error_percent(rig, z) : 0.0;
-    depth[fmt::format("{:g}", z)] = percent > 0 ? Json(percent) : Json();  // 0: so near that no point is seen by both
+    depth[fmt::format("{:g}", z)] =
+        percent > 0 ? Json(percent) : Json();  // 0: so near that no point is seen by both
   }
-  return {{"word", known ? Json(std::string(to_string(calibration::health(rig, options)))) : Json()}, {"depth_error_percent", depth}};
+  return {
+      {"word", known ? Json(std::string(to_string(calibration::health(rig, options)))) : Json()},
+      {"depth_error_percent", depth}};
 }
 
-/// What most of the depth error at 20 m is from: the noise of the images that the calibration was found from, which more driving lessens,
-/// or intrinsics that are not known better. Null without sigmas.
+/// What most of the depth error at 20 m is from: the noise of the images that the calibration was
+/// found from, which more driving lessens, or intrinsics that are not known better. Null without
+/// sigmas.
 Json limited_by(const RigCalibration& rig) {
   if (!has_sigmas(rig) || !given(rig.sigma_noise[1])) return nullptr;
   constexpr double kDepth = 20;  // m: where the word is found
@@ -90,7 +97,8 @@ Json limited_by(const RigCalibration& rig) {
   noise.sigma_wide = rig.sigma_noise;  // without their correlations: no less than it is
   for (Mat6& covariance : noise.covariance_wide) covariance.setZero();
   noise.covariance = {};
-  const double wide = calibration::depth_error_percent(rig, 1, kDepth), by_noise = calibration::depth_error_percent(noise, 1, kDepth);
+  const double wide = calibration::depth_error_percent(rig, 1, kDepth),
+               by_noise = calibration::depth_error_percent(noise, 1, kDepth);
   return by_noise * by_noise < 0.5 * wide * wide ? "intrinsics" : "noise";
 }
 
@@ -103,7 +111,9 @@ Json matrix_json(const Transform& T) {
   return matrix;
 }
 
-Json sigmas_json(const std::array<double, 6>& sigmas) { return given(sigmas) ? Json(sigmas) : Json(); }
+Json sigmas_json(const std::array<double, 6>& sigmas) {
+  return given(sigmas) ? Json(sigmas) : Json();
+}
 
 /// The attempt by which a drive from scratch found its first calibration.
 Json from_scratch_json(const SessionTotals& totals) {
@@ -139,9 +149,12 @@ Json calibration_json(const SessionTotals& totals, const SummaryInput& input) {
   json["verified_frame"] = totals.confirmed_frame ? Json(*totals.confirmed_frame) : Json();
   json["verified_stamp_ns"] = totals.confirmed ? Json(totals.confirmed->ns()) : Json();
   json["contradicted"] = totals.contradicted
-                             ? Json{{"stamp_ns", totals.contradicted->stamp.ns()}, {"depth_percent", totals.contradicted->depth_percent}}
+                             ? Json{{"stamp_ns", totals.contradicted->stamp.ns()},
+                                    {"depth_percent", totals.contradicted->depth_percent}}
                              : Json();
-  json["mistake"] = input.mistake != CalibrationMistake::none ? Json(std::string(to_string(input.mistake))) : Json();
+  json["mistake"] = input.mistake != CalibrationMistake::none
+                        ? Json(std::string(to_string(input.mistake)))
+                        : Json();
   json["before"] = input.before ? health_json(*input.before, input.options) : Json();
   json["from_scratch"] = from_scratch_json(totals);
   json["accepted"] = totals.accepted;
@@ -149,7 +162,8 @@ Json calibration_json(const SessionTotals& totals, const SummaryInput& input) {
   return json;
 }
 
-/// What became of alarms and requests; the first calibration of a drive from scratch is none of them.
+/// What became of alarms and requests; the first calibration of a drive from scratch is none of
+/// them.
 Json recalibrations_json(const SessionTotals& totals) {
   Json json = Json::array();
   for (const CalibrationAttempt& a : totals.attempts) {
@@ -172,11 +186,13 @@ Json counters_json(const std::vector<std::pair<std::string, std::uint64_t>>& cou
   return json;
 }
 
-/// Errors over sigmas; null without sigmas. A sigma of zero is of a direction that was held: its error is in no sigmas.
+/// Errors over sigmas; null without sigmas. A sigma of zero is of a direction that was held: its
+/// error is in no sigmas.
 Json in_sigmas(const std::array<double, 6>& error, const std::array<double, 6>& sigmas) {
   if (!given(sigmas)) return nullptr;
   Json json = Json::array();
-  for (std::size_t i = 0; i < 6; ++i) json.push_back(sigmas[i] > 0 ? Json(error[i] / sigmas[i]) : Json());
+  for (std::size_t i = 0; i < 6; ++i)
+    json.push_back(sigmas[i] > 0 ? Json(error[i] / sigmas[i]) : Json());
   return json;
 }
 
@@ -186,7 +202,8 @@ Json truth_json(const std::optional<TruthFigures>& truth, const SummaryInput& in
   Json json = metrics_json(truth->evaluation);
   if (json.is_null()) json = Json::object();
   if (!input.calibrated || truth->calibration_error.empty()) {
-    for (const char* key : {"calibration_error", "calibration_error_sigmas", "calibration"}) json[key] = nullptr;
+    for (const char* key : {"calibration_error", "calibration_error_sigmas", "calibration"})
+      json[key] = nullptr;
     return json;
   }
   json["calibration_error"] = truth->calibration_error[0];
@@ -213,9 +230,11 @@ EvaluationOptions summary_evaluation_options() {
   return options;
 }
 
-std::vector<std::array<double, 6>> calibration_errors(const RigCalibration& ours, const RigCalibration& truth) {
+std::vector<std::array<double, 6>> calibration_errors(const RigCalibration& ours,
+                                                      const RigCalibration& truth) {
   std::vector<std::array<double, 6>> errors;
-  for (std::size_t k = 1; k < static_cast<std::size_t>(std::min(ours.cameras, truth.cameras)); ++k) {
+  for (std::size_t k = 1; k < static_cast<std::size_t>(std::min(ours.cameras, truth.cameras));
+       ++k) {
     const Transform &a = ours.T_camera_left[k], &b = truth.T_camera_left[k];
     const Vec3 turn = log_so3(a.R * b.R.transpose()), shift = a.t - b.t;
     errors.push_back({turn.x(), turn.y(), turn.z(), shift.x(), shift.y(), shift.z()});
@@ -242,9 +261,10 @@ Json summary_json(const SessionTotals& totals, const SummaryInput& input) {
   }
   memory["sum_bytes"] = sum;
   json["memory"] = memory;
-  json["drops"] = {{"frames", input.skipped},           {"estimator", input.dropped_by_estimator},
-                   {"records", totals.dropped_records}, {"readings", totals.dropped_readings},
-                   {"lines", totals.lost_lines},        {"recorder_high_water", totals.ring_high_water}};
+  json["drops"] = {
+      {"frames", input.skipped},           {"estimator", input.dropped_by_estimator},
+      {"records", totals.dropped_records}, {"readings", totals.dropped_readings},
+      {"lines", totals.lost_lines},        {"recorder_high_water", totals.ring_high_water}};
   json["devices"] = counters_json(input.devices);
   json["comparison"] = counters_json(input.comparison);
   json["earth"] = input.earth ? earth_json(*input.earth) : Json();

@@ -42,7 +42,9 @@ Json pairing_json(const PairingFigures& p) {
   bool all = p.can_be_proven;
   for (const CameraPairing& c : p.cameras) {
     all = all && c.proven;
-    cameras.push_back({{"proven", p.can_be_proven && c.proven}, {"acquisitions", c.acquisitions}, {"losses", counters(c.losses)}});
+    cameras.push_back({{"proven", p.can_be_proven && c.proven},
+                       {"acquisitions", c.acquisitions},
+                       {"losses", counters(c.losses)}});
   }
   return {{"mode", p.mode},
           {"sentence", p.sentence},
@@ -57,7 +59,8 @@ Json pairing_json(const PairingFigures& p) {
 
 Json latency_json(const TimeFigures& f) {
   if (f.latency.count() == 0) return nullptr;
-  constexpr std::array<double, 16> kEdges{1, 2, 3, 5, 7, 10, 15, 20, 30, 50, 70, 100, 150, 200, 500, 1000};  // ms
+  constexpr std::array<double, 16> kEdges{1,  2,  3,  5,   7,   10,  15,  20,
+                                          30, 50, 70, 100, 150, 200, 500, 1000};  // ms
   Json edges = Json::array(), counts = Json::array();
   std::uint64_t below = 0;
   for (const double edge : kEdges) {
@@ -84,7 +87,10 @@ nlohmann::ordered_json time_json(const TimeFigures& f) {
   for (const ClockFigures& c : f.clocks) clocks.push_back(clock_json(c));
   Json utc, satellites;
   if (f.utc.readings > 0)
-    utc = {{"readings", f.utc.readings}, {"host_ahead_s", f.utc.host_ahead_s}, {"least_s", f.utc.least_s}, {"most_s", f.utc.most_s}};
+    utc = {{"readings", f.utc.readings},
+           {"host_ahead_s", f.utc.host_ahead_s},
+           {"least_s", f.utc.least_s},
+           {"most_s", f.utc.most_s}};
   if (f.satellites.readings > 0)
     satellites = {{"readings", f.satellites.readings},
                   {"without_fix", f.satellites.without_fix},

@@ -43,7 +43,8 @@ struct PairingFigures {
   double worst_acquisition_s = 0;
   std::uint64_t pauses = 0, pauses_refused = 0;
   std::vector<CameraPairing> cameras{};
-  std::vector<std::pair<const char*, std::uint64_t>> sets{};  // that went out, and pulses, each class under its name
+  std::vector<std::pair<const char*, std::uint64_t>>
+      sets{};  // that went out, and pulses, each class under its name
 };
 
 /// The INS's UTC against the host's, and what it said of itself.
@@ -63,8 +64,9 @@ struct TimeFigures {
   PairingFigures pairing{};
   std::vector<std::pair<const char*, std::uint64_t>> board{}, ins{};  // losses on their lines
   double worst_stamp_error_us = 0;                                    // of the sets' stamps
-  TimeHistogram latency{};                                            // ms, from the middle of the exposure to the pose
-  bool latency_is_virtual = false;  // --fast: the devices' part is what it would be, the estimator's what it was
+  TimeHistogram latency{};  // ms, from the middle of the exposure to the pose
+  bool latency_is_virtual =
+      false;  // --fast: the devices' part is what it would be, the estimator's what it was
   UtcFigures utc{};
   SatelliteFigures satellites{};
 };

@@ -4,7 +4,8 @@
 
 namespace vergence::app::report {
 
-/// What the word of a pose's reason, or the kind of an event of a frame that was skipped, asks of the user.
+/// What the word of a pose's reason, or the kind of an event of a frame that was skipped, asks of
+/// the user.
 struct Advice {
   std::string_view word;  // of poses.csv or events.jsonl
   const char* sentence;

@@ -14,10 +14,12 @@ namespace vergence::app::report {
 namespace {
 
 constexpr double kDegrees = 180.0 / std::numbers::pi;
-constexpr double kPlacement = 100.0;  // m: the stretch that lays the trajectory on its reference, as with the INS
+constexpr double kPlacement =
+    100.0;  // m: the stretch that lays the trajectory on its reference, as with the INS
 constexpr double kPercent = 100.0;
-constexpr double kWideGap = 4.0;                 // frame intervals: nothing is drawn across more
-constexpr std::size_t kMostEvaluated = 200'000;  // poses: the figures of a longer torn session are left out, not waited for
+constexpr double kWideGap = 4.0;  // frame intervals: nothing is drawn across more
+constexpr std::size_t kMostEvaluated =
+    200'000;  // poses: the figures of a longer torn session are left out, not waited for
 
 void measure_time(const Session& s, Analysis* a) {
   std::vector<double> steps;
@@ -31,7 +33,8 @@ void measure_time(const Session& s, Analysis* a) {
   const auto middle = steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2);
   std::nth_element(steps.begin(), middle, steps.end());
   a->interval_s = *middle;
-  for (std::size_t i = 1; i < s.frames.size(); ++i) a->breaks[i] = a->time_s[i] - a->time_s[i - 1] > kWideGap * a->interval_s ? 1 : 0;
+  for (std::size_t i = 1; i < s.frames.size(); ++i)
+    a->breaks[i] = a->time_s[i] - a->time_s[i - 1] > kWideGap * a->interval_s ? 1 : 0;
 }
 
 void measure_distance(const Session& s, Analysis* a) {
@@ -47,21 +50,27 @@ void measure_distance(const Session& s, Analysis* a) {
 
 /// The first time that the drive confirmed the calibration in use.
 const Event* first_confirmation(const Session& s) {
-  const auto found = std::find_if(s.events.begin(), s.events.end(), [](const Event& e) { return e.kind == "calibration_confirmed"; });
+  const auto found = std::find_if(s.events.begin(), s.events.end(),
+                                  [](const Event& e) { return e.kind == "calibration_confirmed"; });
   return found == s.events.end() ? nullptr : &*found;
 }
 
-/// Frames that only waited for that. What is not confirmed later on, after a knock, is held against the drive.
+/// Frames that only waited for that. What is not confirmed later on, after a knock, is held against
+/// the drive.
 void count_waiting(const Session& s, Analysis* a) {
   a->waited_by_reason.assign(s.reasons.size(), 0);
   const Event* confirmed = first_confirmation(s);
   if (confirmed != nullptr && !s.frames.empty())
-    a->confirmed_s =
-        std::clamp(seconds_between(s.frames.front().stamp, std::max(s.frames.front().stamp, confirmed->stamp)), 0.0, a->duration_s);
+    a->confirmed_s = std::clamp(
+        seconds_between(s.frames.front().stamp, std::max(s.frames.front().stamp, confirmed->stamp)),
+        0.0, a->duration_s);
   for (const Frame& f : s.frames) {
-    if (f.status != PoseStatus::degraded || (confirmed != nullptr && f.stamp > confirmed->stamp)) continue;
+    if (f.status != PoseStatus::degraded || (confirmed != nullptr && f.stamp > confirmed->stamp))
+      continue;
     const std::string& reason = s.reasons[f.reason];
-    if (reason != to_string(Reason::unverified_calibration) && reason != to_string(Reason::unconfirmed)) continue;
+    if (reason != to_string(Reason::unverified_calibration) &&
+        reason != to_string(Reason::unconfirmed))
+      continue;
     ++a->waited;
     ++a->waited_by_reason[f.reason];
   }
@@ -74,11 +83,15 @@ void count_frames(const Session& s, Analysis* a) {
     if (!f.status)
       ++a->unknown;
     else
-      ++(*f.status == PoseStatus::ok ? a->ok : *f.status == PoseStatus::degraded ? a->degraded : a->lost);
+      ++(*f.status == PoseStatus::ok         ? a->ok
+         : *f.status == PoseStatus::degraded ? a->degraded
+                                             : a->lost);
     if (f.status && *f.status != PoseStatus::ok) ++a->by_reason[f.reason];
   }
-  a->skipped = static_cast<std::size_t>(std::clamp(number_at(s.summary, "frames.skipped").value_or(0.0), 0.0, 1e12));
-  if (a->read > a->unknown) a->ok_share = static_cast<double>(a->ok) / static_cast<double>(a->read + a->skipped);
+  a->skipped = static_cast<std::size_t>(
+      std::clamp(number_at(s.summary, "frames.skipped").value_or(0.0), 0.0, 1e12));
+  if (a->read > a->unknown)
+    a->ok_share = static_cast<double>(a->ok) / static_cast<double>(a->read + a->skipped);
 }
 
 std::vector<StampedPose> posed_frames(const Session& s) {
@@ -88,12 +101,13 @@ std::vector<StampedPose> posed_frames(const Session& s) {
   return poses;
 }
 
-/// The rotation that turns the estimate's bodies onto the reference's, on average: the quaternion of the summed products, which lie
-/// close together at the start of a drive.
+/// The rotation that turns the estimate's bodies onto the reference's, on average: the quaternion
+/// of the summed products, which lie close together at the start of a drive.
 Mat3 mean_rotation(std::span<const StampedPose> estimate, std::span<const StampedPose> reference) {
   Eigen::Vector4d sum = Eigen::Vector4d::Zero();
   for (std::size_t i = 0; i < estimate.size(); ++i) {
-    const Eigen::Vector4d q = quaternion(reference[i].T_world_body.R * estimate[i].T_world_body.R.transpose()).coeffs();
+    const Eigen::Vector4d q =
+        quaternion(reference[i].T_world_body.R * estimate[i].T_world_body.R.transpose()).coeffs();
     sum += q.dot(sum) < 0 ? Eigen::Vector4d(-q) : q;
   }
   return Eigen::Quaterniond(sum).normalized().toRotationMatrix();
@@ -120,13 +134,17 @@ Laid lay_on(const MatchedTrajectories& m) {
   if (!laid.by_rotations) return laid;
   const Mat3 R = mean_rotation(estimate, reference);
   Vec3 shift = Vec3::Zero();
-  for (std::size_t i = 0; i < n; ++i) shift += reference[i].T_world_body.t - R * estimate[i].T_world_body.t;
+  for (std::size_t i = 0; i < n; ++i)
+    shift += reference[i].T_world_body.t - R * estimate[i].T_world_body.t;
   laid.T_reference_world = {R, shift / static_cast<double>(n)};
   return laid;
 }
 
-/// Axes of the picture for a world whose up is +z, or for a camera's, whose up is −y: x to the right both times.
-Point on_map(const Vec3& p, bool up_is_z) { return up_is_z ? Point{p.x(), p.y()} : Point{p.x(), p.z()}; }
+/// Axes of the picture for a world whose up is +z, or for a camera's, whose up is −y: x to the
+/// right both times.
+Point on_map(const Vec3& p, bool up_is_z) {
+  return up_is_z ? Point{p.x(), p.y()} : Point{p.x(), p.z()};
+}
 
 /// Direction of view in the map, rad, counter-clockwise from the right.
 double view_angle(const Mat3& R, bool up_is_z) {
@@ -134,7 +152,8 @@ double view_angle(const Mat3& R, bool up_is_z) {
   return std::atan2(v.y, v.x);
 }
 
-void compare_with_reference(const Session& s, const MatchedTrajectories& m, const Laid& laid, bool up_is_z, Analysis* a) {
+void compare_with_reference(const Session& s, const MatchedTrajectories& m, const Laid& laid,
+                            bool up_is_z, Analysis* a) {
   std::size_t k = 0;
   for (std::size_t i = 0; i < s.frames.size(); ++i) {
     const Frame& f = s.frames[i];
@@ -149,24 +168,33 @@ void compare_with_reference(const Session& s, const MatchedTrajectories& m, cons
     a->theirs_x[i] = theirs.x, a->theirs_y[i] = theirs.y;
     a->horizontal_m[i] = std::hypot(ours.x - theirs.x, ours.y - theirs.y);
     a->vertical_m[i] = up_is_z ? T.t.z() - R.t.z() : R.t.y() - T.t.y();
-    a->heading_deg[i] = std::remainder(view_angle(T.R, up_is_z) - view_angle(R.R, up_is_z), 2 * std::numbers::pi) * kDegrees;
+    a->heading_deg[i] =
+        std::remainder(view_angle(T.R, up_is_z) - view_angle(R.R, up_is_z), 2 * std::numbers::pi) *
+        kDegrees;
   }
 }
 
 void take_reference(const Session& s, Analysis* a) {
   const std::vector<StampedPose> ours = posed_frames(s);
-  const MatchedTrajectories m = ours.empty() ? MatchedTrajectories{} : associate(ours, s.reference, EvaluationOptions{});
+  const MatchedTrajectories m =
+      ours.empty() ? MatchedTrajectories{} : associate(ours, s.reference, EvaluationOptions{});
   if (m.estimate.empty()) {
-    a->source_sentence = "reference.tum has no pose at the times of ours: there is nothing to compare, so no errors are shown.";
+    a->source_sentence =
+        "reference.tum has no pose at the times of ours: there is nothing to compare, so no errors "
+        "are shown.";
     return;
   }
   const Laid laid = lay_on(m);
   const bool up_is_z = world_up(m.reference, BodyAxes::camera).z() > 0.5;
   a->source = ErrorSource::reference;
   a->source_sentence = fmt::format(
-      "Errors against the reference trajectory. Ours was laid on it once, rigidly and without scale, over the first {:.0f} m ({}); what "
+      "Errors against the reference trajectory. Ours was laid on it once, rigidly and without "
+      "scale, over the first {:.0f} m ({}); what "
       "grows after that is drift.",
-      laid.stretch, laid.by_rotations ? "by attitudes and mean position: the way is too straight for positions alone" : "by positions");
+      laid.stretch,
+      laid.by_rotations
+          ? "by attitudes and mean position: the way is too straight for positions alone"
+          : "by positions");
   compare_with_reference(s, m, laid, up_is_z, a);
 }
 
@@ -184,12 +212,14 @@ void take_ins(const Session& s, Analysis* a) {
     a->heading_deg[i] = f.error_heading_deg;
   }
   if (!compared) {
-    a->source_sentence = "There was an INS, but never a frame that could be compared with it: no errors are shown.";
+    a->source_sentence =
+        "There was an INS, but never a frame that could be compared with it: no errors are shown.";
     return;
   }
   a->source = ErrorSource::ins;
   a->source_sentence =
-      "Errors against the INS after the placement on the earth, which was fitted at the start and then frozen; they hold the INS's own "
+      "Errors against the INS after the placement on the earth, which was fitted at the start and "
+      "then frozen; they hold the INS's own "
       "errors, too.";
 }
 
@@ -202,19 +232,26 @@ void take_world(const Session& s, Analysis* a) {
 }
 
 void compare(const Session& s, Analysis* a) {
-  for (auto* curve : {&a->horizontal_m, &a->vertical_m, &a->heading_deg, &a->ours_x, &a->ours_y, &a->theirs_x, &a->theirs_y})
+  for (auto* curve : {&a->horizontal_m, &a->vertical_m, &a->heading_deg, &a->ours_x, &a->ours_y,
+                      &a->theirs_x, &a->theirs_y})
     curve->assign(s.frames.size(), kNone);
-  const bool placed = std::any_of(s.frames.begin(), s.frames.end(), [](const Frame& f) { return f.placed; });
-  const bool ins = std::any_of(s.frames.begin(), s.frames.end(), [](const Frame& f) { return f.has_ins; });
+  const bool placed =
+      std::any_of(s.frames.begin(), s.frames.end(), [](const Frame& f) { return f.placed; });
+  const bool ins =
+      std::any_of(s.frames.begin(), s.frames.end(), [](const Frame& f) { return f.has_ins; });
   if (placed) return take_ins(s, a);
   if (ins) {
-    a->source_sentence = "There was an INS, but the drive could not be placed on the earth with it: no errors are shown.";
+    a->source_sentence =
+        "There was an INS, but the drive could not be placed on the earth with it: no errors are "
+        "shown.";
     return take_world(s, a);
   }
   if (!s.reference.empty()) take_reference(s, a);
   if (a->source != ErrorSource::none) return;
   if (a->source_sentence.empty())
-    a->source_sentence = "There was no reference: how far the trajectory drifted is not known, so no errors are shown.";
+    a->source_sentence =
+        "There was no reference: how far the trajectory drifted is not known, so no errors are "
+        "shown.";
   take_world(s, a);
 }
 
@@ -234,18 +271,25 @@ Analysis::Spread spread_of(const std::vector<double>& values) {
 }
 
 void take_metrics(const Session& s, Analysis* a) {
-  const auto metric = [&s](const char* name) { return number_at(s.summary, std::string("metrics.") + name); };
-  a->scale = metric("scale"), a->ate_m = metric("ate_m"), a->rotation_deg_per_m = metric("rotation_error_deg_per_m");
+  const auto metric = [&s](const char* name) {
+    return number_at(s.summary, std::string("metrics.") + name);
+  };
+  a->scale = metric("scale"), a->ate_m = metric("ate_m"),
+  a->rotation_deg_per_m = metric("rotation_error_deg_per_m");
   if (const auto e = metric("end_error_percent")) a->end_error = *e / kPercent;
   const auto far = metric("segment_error_percent"), near = metric("segment_error_short_percent");
   if (far || near) a->drift = far.value_or(near.value_or(0)) / kPercent;
-  a->drift_sentence = far ? "mean of all segments of 100 to 800 m" : near ? "mean of all segments of 10 to 50 m" : "";
+  a->drift_sentence = far    ? "mean of all segments of 100 to 800 m"
+                      : near ? "mean of all segments of 10 to 50 m"
+                             : "";
 }
 
 /// What summary.json would have said.
 void reckon_metrics(const Session& s, Analysis* a) {
   const std::vector<StampedPose> ours = posed_frames(s);
-  if (ours.size() > kMostEvaluated || s.reference.size() > kMostEvaluated || ours.size() < 3 || s.reference.empty()) return;
+  if (ours.size() > kMostEvaluated || s.reference.size() > kMostEvaluated || ours.size() < 3 ||
+      s.reference.empty())
+    return;
   EvaluationOptions options;
   constexpr int kNearStep = 10;  // poses: a tenth of the segments gives the mean as well
   options.segments = {SegmentOptions{}, {{10, 20, 30, 40, 50}, kNearStep, false}};
@@ -257,7 +301,8 @@ void reckon_metrics(const Session& s, Analysis* a) {
   if (used.count == 0) return;
   a->drift = used.translation;
   a->rotation_deg_per_m = used.rotation * kDegrees;
-  a->drift_sentence = far ? "mean of all segments of 100 to 800 m" : "mean of segments of 10 to 50 m";
+  a->drift_sentence =
+      far ? "mean of all segments of 100 to 800 m" : "mean of segments of 10 to 50 m";
 }
 
 /// Positions of both at the frames that have both, the INS's in enu.
@@ -274,24 +319,27 @@ MatchedTrajectories positions_with_ins(const Session& s) {
   return m;
 }
 
-/// Mean horizontal difference of the two ways over segments of one length, m; nothing when none is that long.
-std::optional<double> mean_difference(const MatchedTrajectories& m, const Mat3& R, const std::vector<double>& driven, double length) {
+/// Mean horizontal difference of the two ways over segments of one length, m; nothing when none is
+/// that long.
+std::optional<double> mean_difference(const MatchedTrajectories& m, const Mat3& R,
+                                      const std::vector<double>& driven, double length) {
   constexpr std::size_t kStep = 10;
   double sum = 0;
   std::size_t count = 0;
   for (std::size_t i = 0, j = 0; i < driven.size(); i += kStep) {
     while (j < driven.size() && driven[j] < driven[i] + length) ++j;
     if (j == driven.size()) break;
-    const Vec3 d =
-        R * (m.estimate[j].T_world_body.t - m.estimate[i].T_world_body.t) - (m.reference[j].T_world_body.t - m.reference[i].T_world_body.t);
+    const Vec3 d = R * (m.estimate[j].T_world_body.t - m.estimate[i].T_world_body.t) -
+                   (m.reference[j].T_world_body.t - m.reference[i].T_world_body.t);
     sum += std::hypot(d.x(), d.y());
     ++count;
   }
   return count > 0 ? std::optional(sum / static_cast<double>(count)) : std::nullopt;
 }
 
-/// Drift against an INS by positions alone, over the longest segments there are. KITTI's figure would turn each segment by the INS's
-/// attitude at its start, whose degree of error alone is 1.7 % of the way; a receiver's metres weigh least on the longest.
+/// Drift against an INS by positions alone, over the longest segments there are. KITTI's figure
+/// would turn each segment by the INS's attitude at its start, whose degree of error alone is 1.7 %
+/// of the way; a receiver's metres weigh least on the longest.
 void drift_by_positions(const Session& s, Analysis* a) {
   a->segment_error = a->drift;
   a->drift.reset();
@@ -300,12 +348,14 @@ void drift_by_positions(const Session& s, Analysis* a) {
   const Mat3 R = align(m.estimate, m.reference, AlignmentScale::one).R_reference_estimate;
   std::vector<double> driven{0};
   for (std::size_t i = 1; i < m.estimate.size(); ++i)
-    driven.push_back(driven.back() + (m.estimate[i].T_world_body.t - m.estimate[i - 1].T_world_body.t).norm());
+    driven.push_back(driven.back() +
+                     (m.estimate[i].T_world_body.t - m.estimate[i - 1].T_world_body.t).norm());
   for (const double length : {800.0, 700.0, 600.0, 500.0, 400.0, 300.0, 200.0, 100.0}) {
     const auto difference = mean_difference(m, R, driven, length);
     if (!difference) continue;
     a->drift = *difference / length;
-    a->drift_sentence = fmt::format("horizontal, over segments of {:.0f} m; the INS's own errors are in it", length);
+    a->drift_sentence = fmt::format(
+        "horizontal, over segments of {:.0f} m; the INS's own errors are in it", length);
     return;
   }
 }
@@ -314,7 +364,9 @@ void drift_by_positions(const Session& s, Analysis* a) {
 
 double seconds_between(Stamp from, Stamp to) noexcept {
   // Unsigned, because the difference of two signed stamps need not fit.
-  return static_cast<double>(static_cast<std::uint64_t>(to.ns()) - static_cast<std::uint64_t>(from.ns())) * 1e-9;
+  return static_cast<double>(static_cast<std::uint64_t>(to.ns()) -
+                             static_cast<std::uint64_t>(from.ns())) *
+         1e-9;
 }
 
 Analysis analyse(const Session& session) {

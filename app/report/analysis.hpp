@@ -18,14 +18,16 @@ enum class ErrorSource : std::uint8_t {
 
 /// Curves and counts of a session, one value a frame; kNone where there is none.
 struct Analysis {
-  std::vector<double> time_s;        // since the first frame
-  std::vector<double> distance_m;    // driven up to the frame
-  std::vector<std::uint8_t> breaks;  // frames are missing before this one: nothing may be drawn across
-  double interval_s = 0;             // median between frames; 0: fewer than two
+  std::vector<double> time_s;      // since the first frame
+  std::vector<double> distance_m;  // driven up to the frame
+  std::vector<std::uint8_t>
+      breaks;             // frames are missing before this one: nothing may be drawn across
+  double interval_s = 0;  // median between frames; 0: fewer than two
   double duration_s = 0;
 
   ErrorSource source = ErrorSource::none;
-  std::string source_sentence;  // what was compared with what, and how the two were laid on each other
+  std::string
+      source_sentence;  // what was compared with what, and how the two were laid on each other
   std::vector<double> horizontal_m, vertical_m, heading_deg;
   struct Spread {
     double rms = kNone, max = kNone, end = kNone;
@@ -36,22 +38,24 @@ struct Analysis {
   std::vector<double> ours_x, ours_y, theirs_x, theirs_y;  // m
 
   std::size_t read = 0, ok = 0, degraded = 0, lost = 0, unknown = 0, skipped = 0;  // frames
-  std::vector<std::size_t> by_reason;                                              // frames that were not ok, by Session::reasons
-  // Of the degraded ones, and of by_reason: without another fault than that the drive had not yet confirmed its calibration. A drive is
-  // not judged by that wait.
+  std::vector<std::size_t> by_reason;  // frames that were not ok, by Session::reasons
+  // Of the degraded ones, and of by_reason: without another fault than that the drive had not yet
+  // confirmed its calibration. A drive is not judged by that wait.
   std::size_t waited = 0;
   std::vector<std::size_t> waited_by_reason;
-  std::optional<double> confirmed_s;  // when the drive first confirmed the calibration in use, since the first frame
-  std::optional<double> ok_share;     // of the frames read and skipped; nothing: status is not known
+  std::optional<double>
+      confirmed_s;  // when the drive first confirmed the calibration in use, since the first frame
+  std::optional<double> ok_share;  // of the frames read and skipped; nothing: status is not known
   double path_m = 0;
 
-  std::optional<double> drift;          // ratio: mean translation error of segments over their length
-  std::string drift_sentence;           // which segments
+  std::optional<double> drift;  // ratio: mean translation error of segments over their length
+  std::string drift_sentence;   // which segments
   std::optional<double> segment_error;  // KITTI's, as in summary.json, where `drift` is another
   std::optional<double> scale, ate_m, rotation_deg_per_m, end_error;
 };
 
-/// Seconds from one stamp to a later one; exact to the nanosecond for drives of days, whatever the stamps.
+/// Seconds from one stamp to a later one; exact to the nanosecond for drives of days, whatever the
+/// stamps.
 [[nodiscard]] double seconds_between(Stamp from, Stamp to) noexcept;
 
 [[nodiscard]] Analysis analyse(const Session& session);

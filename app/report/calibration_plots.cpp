@@ -47,8 +47,10 @@ CalibrationCurve calibration_curve(const Session& s, const Analysis& a, int came
   for (const CalibrationRow& c : s.calibrations) {
     const Component number = component_of(c, component);
     if (c.camera != camera || !std::isfinite(number.value)) continue;
-    const double since =
-        s.frames.empty() ? 0 : (static_cast<double>(c.stamp.ns()) - static_cast<double>(s.frames.front().stamp.ns())) * 1e-9;
+    const double since = s.frames.empty() ? 0
+                                          : (static_cast<double>(c.stamp.ns()) -
+                                             static_cast<double>(s.frames.front().stamp.ns())) *
+                                                1e-9;
     const double at = std::clamp(since, 0.0, a.duration_s);
     if (c.accepted) {
       if (!curve.held.empty()) curve.held.back().to = at;
@@ -93,7 +95,8 @@ void draw_held(const CalibrationCurve& curve, const PlotBox& box, Svg* svg) {
 void draw_marks(const CalibrationCurve& curve, const PlotBox& box, Svg* svg) {
   for (const Mark& m : curve.measured) {
     const double x = box.x(m.at);
-    if (m.two_sigma > 0) svg->line("whisker", x, box.y(m.value + m.two_sigma), x, box.y(m.value - m.two_sigma));
+    if (m.two_sigma > 0)
+      svg->line("whisker", x, box.y(m.value + m.two_sigma), x, box.y(m.value - m.two_sigma));
     svg->circle("seen", x, box.y(m.value), 2.8);
   }
   for (const Mark& m : curve.rejected) svg->circle("hollow", box.x(m.at), box.y(m.value), 3.2);
@@ -103,12 +106,14 @@ void draw_confirmation(double at_s, const PlotBox& box, Svg* svg) {
   const double x = box.x(at_s);
   svg->line("confirmed", x, box.top, x, box.bottom);
   const bool near_the_end = x > box.right - 60;
-  svg->text("good", near_the_end ? Anchor::end : Anchor::start, x + (near_the_end ? -5 : 5), box.top + 11, "verified");
+  svg->text("good", near_the_end ? Anchor::end : Anchor::start, x + (near_the_end ? -5 : 5),
+            box.top + 11, "verified");
 }
 
 }  // namespace
 
-std::string calibration_plot(const Session& session, const Analysis& analysis, int camera, int component) {
+std::string calibration_plot(const Session& session, const Analysis& analysis, int camera,
+                             int component) {
   const CalibrationCurve curve = calibration_curve(session, analysis, camera, component);
   if (curve.empty()) return {};
   PlotBox box = time_box(analysis);

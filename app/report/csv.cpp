@@ -34,7 +34,9 @@ bool CsvRows::next() {
   return false;
 }
 
-std::string_view CsvRows::text(std::optional<std::size_t> column) const noexcept { return column ? fields_[*column] : std::string_view{}; }
+std::string_view CsvRows::text(std::optional<std::size_t> column) const noexcept {
+  return column ? fields_[*column] : std::string_view{};
+}
 
 std::optional<double> CsvRows::number(std::optional<std::size_t> column) const noexcept {
   double value = 0;
@@ -42,6 +44,8 @@ std::optional<double> CsvRows::number(std::optional<std::size_t> column) const n
   return value;
 }
 
-std::optional<std::int64_t> CsvRows::integer(std::optional<std::size_t> column) const noexcept { return parse_integer(text(column)); }
+std::optional<std::int64_t> CsvRows::integer(std::optional<std::size_t> column) const noexcept {
+  return parse_integer(text(column));
+}
 
 }  // namespace vergence::app::report

@@ -9,10 +9,12 @@
 
 namespace vergence::app::report {
 
-/// The part of a text that ends with a line's end. A killed writer leaves the rest; a number cut in the middle looks like another one.
+/// The part of a text that ends with a line's end. A killed writer leaves the rest; a number cut in
+/// the middle looks like another one.
 [[nodiscard]] std::string_view whole_lines(std::string_view text) noexcept;
 
-/// Rows of a table whose first line names the columns, commas between, nothing quoted: what the recorder writes.
+/// Rows of a table whose first line names the columns, commas between, nothing quoted: what the
+/// recorder writes.
 ///
 /// Ownership  Views into the text, which outlives it.
 /// Errors     A row with another number of fields than the head is passed over and counted.
@@ -28,7 +30,8 @@ class CsvRows {
   [[nodiscard]] std::string_view text(std::optional<std::size_t> column) const noexcept;
   /// Nothing: empty, or not one finite number.
   [[nodiscard]] std::optional<double> number(std::optional<std::size_t> column) const noexcept;
-  [[nodiscard]] std::optional<std::int64_t> integer(std::optional<std::size_t> column) const noexcept;
+  [[nodiscard]] std::optional<std::int64_t> integer(
+      std::optional<std::size_t> column) const noexcept;
 
   [[nodiscard]] bool has_head() const noexcept { return !names_.empty(); }
   [[nodiscard]] std::size_t torn_rows() const noexcept { return torn_; }

@@ -13,7 +13,8 @@ struct Piece {
   std::size_t begin = 0, end = 0;
 };
 
-std::vector<Piece> pieces_of(std::span<const double> x, std::span<const double> y, std::span<const std::uint8_t> breaks) {
+std::vector<Piece> pieces_of(std::span<const double> x, std::span<const double> y,
+                             std::span<const std::uint8_t> breaks) {
   std::vector<Piece> pieces;
   bool open = false;
   for (std::size_t i = 0; i < y.size(); ++i) {
@@ -29,7 +30,8 @@ std::vector<Piece> pieces_of(std::span<const double> x, std::span<const double> 
 }
 
 /// Indices of what stays of the values [begin, end) that share a column.
-void keep_extremes(std::span<const double> x, std::span<const double> y, std::size_t begin, std::size_t end, Line* line) {
+void keep_extremes(std::span<const double> x, std::span<const double> y, std::size_t begin,
+                   std::size_t end, Line* line) {
   std::size_t low = begin, high = begin;
   for (std::size_t i = begin; i < end; ++i) {
     if (y[i] < y[low]) low = i;
@@ -40,12 +42,14 @@ void keep_extremes(std::span<const double> x, std::span<const double> y, std::si
   for (auto k = kept.begin(); k != last; ++k) line->push_back({x[*k], y[*k]});
 }
 
-std::vector<Line> thinned(std::span<const double> x, std::span<const double> y, const std::vector<Piece>& pieces, double step) {
+std::vector<Line> thinned(std::span<const double> x, std::span<const double> y,
+                          const std::vector<Piece>& pieces, double step) {
   std::vector<Line> lines;
   for (const Piece& piece : pieces) {
     Line line{{x[piece.begin], y[piece.begin]}};
     for (std::size_t i = piece.begin + 1; i < piece.end; ++i)
-      if (i + 1 == piece.end || std::hypot(x[i] - line.back().x, y[i] - line.back().y) >= step) line.push_back({x[i], y[i]});
+      if (i + 1 == piece.end || std::hypot(x[i] - line.back().x, y[i] - line.back().y) >= step)
+        line.push_back({x[i], y[i]});
     lines.push_back(std::move(line));
   }
   return lines;
@@ -59,11 +63,15 @@ std::size_t points_in(const std::vector<Line>& lines) {
 
 }  // namespace
 
-std::vector<Line> decimate(std::span<const double> x, std::span<const double> y, std::span<const std::uint8_t> breaks, double x0, double x1,
+std::vector<Line> decimate(std::span<const double> x, std::span<const double> y,
+                           std::span<const std::uint8_t> breaks, double x0, double x1,
                            int columns) {
-  assert(x.size() == y.size() && (breaks.empty() || breaks.size() == y.size()) && x0 < x1 && columns > 0);
+  assert(x.size() == y.size() && (breaks.empty() || breaks.size() == y.size()) && x0 < x1 &&
+         columns > 0);
   const double per_column = columns / (x1 - x0);
-  const auto column = [&](double at) { return std::floor(std::clamp((at - x0) * per_column, -1.0, columns + 1.0)); };
+  const auto column = [&](double at) {
+    return std::floor(std::clamp((at - x0) * per_column, -1.0, columns + 1.0));
+  };
   std::vector<Line> lines;
   for (const Piece& piece : pieces_of(x, y, breaks)) {
     Line line;
@@ -78,13 +86,14 @@ std::vector<Line> decimate(std::span<const double> x, std::span<const double> y,
   return lines;
 }
 
-std::vector<Line> thin(std::span<const double> x, std::span<const double> y, std::span<const std::uint8_t> breaks, double step,
-                       std::size_t most) {
+std::vector<Line> thin(std::span<const double> x, std::span<const double> y,
+                       std::span<const std::uint8_t> breaks, double step, std::size_t most) {
   assert(x.size() == y.size() && (breaks.empty() || breaks.size() == y.size()) && step > 0);
   constexpr int kDoublings = 40;  // 10¹² times the first step: wider than any map
   const std::vector<Piece> pieces = pieces_of(x, y, breaks);
   std::vector<Line> lines = thinned(x, y, pieces, step);
-  for (int i = 0; i < kDoublings && points_in(lines) > most; ++i) lines = thinned(x, y, pieces, step *= 2);
+  for (int i = 0; i < kDoublings && points_in(lines) > most; ++i)
+    lines = thinned(x, y, pieces, step *= 2);
   return lines;
 }
 

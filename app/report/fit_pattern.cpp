@@ -9,7 +9,8 @@ namespace {
 constexpr double kFewestMatches = 150;  // of either part of the image
 constexpr double kEdge = 0.9;           // px
 constexpr double kGrowth = 1.3;         // edge over middle
-constexpr double kScatter = 0.4;        // px: a turn between the cameras moves near and far points alike and leaves the images' noise
+constexpr double kScatter = 0.4;  // px: a turn between the cameras moves near and far points alike
+                                  // and leaves the images' noise
 
 struct Sum {
   double matches = 0, means = 0, scatters = 0;  // squares, weighted by matches
@@ -25,13 +26,17 @@ struct Sum {
 }  // namespace
 
 Fit fit_of(const Session& session, bool at_the_end) {
-  const auto wanted = [at_the_end](const ResidualRow& r) { return r.camera == 1 && r.at_the_end == at_the_end && r.matches > 0; };
+  const auto wanted = [at_the_end](const ResidualRow& r) {
+    return r.camera == 1 && r.at_the_end == at_the_end && r.matches > 0;
+  };
   double width = 0, height = 0;
-  for (const ResidualRow& r : session.residuals) width = std::max(width, r.left + r.width), height = std::max(height, r.top + r.height);
+  for (const ResidualRow& r : session.residuals)
+    width = std::max(width, r.left + r.width), height = std::max(height, r.top + r.height);
   Sum middle, edge;
   for (const ResidualRow& r : session.residuals) {
     if (!wanted(r)) continue;
-    const double from_centre = std::hypot(r.left + (r.width - width) / 2, r.top + (r.height - height) / 2);
+    const double from_centre =
+        std::hypot(r.left + (r.width - width) / 2, r.top + (r.height - height) / 2);
     (from_centre < std::hypot(width, height) / 4 ? middle : edge).add(r);
   }
   Fit fit;

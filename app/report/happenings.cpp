@@ -51,8 +51,12 @@ constexpr std::array kSaid{
 };
 
 /// Events of which one is worth a row.
-constexpr std::array<std::string_view, 6> kTold{
-    "rig_changed", "calibration_contradicted", "calibration_rejected", "scale_disagrees", "ins_jump", "disk_full"};
+constexpr std::array<std::string_view, 6> kTold{"rig_changed",
+                                                "calibration_contradicted",
+                                                "calibration_rejected",
+                                                "scale_disagrees",
+                                                "ins_jump",
+                                                "disk_full"};
 
 struct Row {
   std::string what;
@@ -70,7 +74,9 @@ std::string said(std::string_view word) {
 }
 
 double since_start(const Session& s, Stamp stamp) {
-  return s.frames.empty() || stamp < s.frames.front().stamp ? 0 : seconds_between(s.frames.front().stamp, stamp);
+  return s.frames.empty() || stamp < s.frames.front().stamp
+             ? 0
+             : seconds_between(s.frames.front().stamp, stamp);
 }
 
 std::vector<Row> rows_of_frames(const Session& s, const Analysis& a) {
@@ -113,17 +119,20 @@ std::string happenings_table(const Session& session, const Analysis& analysis) {
   std::vector<Row> rows = rows_of_frames(session, analysis);
   for (const Advice& skip : skip_advice()) rows.push_back(row_of_events(session, skip.word, false));
   std::erase_if(rows, [](const Row& r) { return r.count == 0; });
-  std::stable_sort(rows.begin(), rows.end(), [](const Row& a, const Row& b) { return a.count > b.count; });
+  std::stable_sort(rows.begin(), rows.end(),
+                   [](const Row& a, const Row& b) { return a.count > b.count; });
   for (const std::string_view kind : kTold) rows.push_back(row_of_events(session, kind, true));
   std::erase_if(rows, [](const Row& r) { return r.count == 0; });
   if (rows.empty()) return "";
-  std::string out = "<table class=\"stack\"><tr><th>what</th><th>how often</th><th>when</th></tr>\n";
+  std::string out =
+      "<table class=\"stack\"><tr><th>what</th><th>how often</th><th>when</th></tr>\n";
   for (std::size_t i = 0; i < std::min(kMost, rows.size()); ++i) {
     const Row& r = rows[i];
-    const std::string often = r.frames       ? grouped(r.count) + (r.count == 1 ? " frame" : " frames")
+    const std::string often = r.frames ? grouped(r.count) + (r.count == 1 ? " frame" : " frames")
                               : r.count == 1 ? "once"
                                              : grouped(r.count) + " times";
-    out += fmt::format("<tr><td>{}</td> <td class=\"w\">{}</td> <td class=\"w\">{}</td></tr>\n", escape(r.what), often, when(r));
+    out += fmt::format("<tr><td>{}</td> <td class=\"w\">{}</td> <td class=\"w\">{}</td></tr>\n",
+                       escape(r.what), often, when(r));
   }
   return out + "</table>\n";
 }

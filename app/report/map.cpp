@@ -10,8 +10,9 @@
 namespace vergence::app::report {
 namespace {
 
-constexpr double kMargin = 16, kFoot = 38, kLeast = 190, kMost = 420;  // of the paper; kFoot: room for the scale bar
-constexpr double kThin = 0.4;                                          // of the paper: finer than the line is wide
+constexpr double kMargin = 16, kFoot = 38, kLeast = 190,
+                 kMost = 420;  // of the paper; kFoot: room for the scale bar
+constexpr double kThin = 0.4;  // of the paper: finer than the line is wide
 constexpr std::size_t kMostPoints = 20'000;
 
 struct Bounds {
@@ -28,11 +29,14 @@ struct Bounds {
 struct MapScale {
   double per_metre = 1, x_middle = 0, y_middle = 0, height = kLeast;
   [[nodiscard]] double x(double v) const { return kPlotWidth / 2 + (v - x_middle) * per_metre; }
-  [[nodiscard]] double y(double v) const { return kMargin + (height - kMargin - kFoot) / 2 - (v - y_middle) * per_metre; }
+  [[nodiscard]] double y(double v) const {
+    return kMargin + (height - kMargin - kFoot) / 2 - (v - y_middle) * per_metre;
+  }
 };
 
 MapScale scale_for(const Bounds& b) {
-  constexpr double kSmallest = 1;  // m: a vehicle that stands still is a dot, not its noise enlarged
+  constexpr double kSmallest =
+      1;  // m: a vehicle that stands still is a dot, not its noise enlarged
   const double width = std::max(b.x1 - b.x0, kSmallest), depth = std::max(b.y1 - b.y0, kSmallest);
   MapScale s;
   s.per_metre = std::min((kPlotWidth - 2 * kMargin) / width, (kMost - kMargin - kFoot) / depth);
@@ -43,12 +47,13 @@ MapScale scale_for(const Bounds& b) {
 
 std::vector<double> placed(const std::vector<double>& values, const MapScale& s, bool vertical) {
   std::vector<double> out(values.size());
-  for (std::size_t i = 0; i < values.size(); ++i) out[i] = vertical ? s.y(values[i]) : s.x(values[i]);
+  for (std::size_t i = 0; i < values.size(); ++i)
+    out[i] = vertical ? s.y(values[i]) : s.x(values[i]);
   return out;
 }
 
-void draw_path(const char* css, const std::vector<double>& x, const std::vector<double>& y, const Analysis& a, const MapScale& s,
-               Svg* svg) {
+void draw_path(const char* css, const std::vector<double>& x, const std::vector<double>& y,
+               const Analysis& a, const MapScale& s, Svg* svg) {
   const std::vector<double> on_x = placed(x, s, false), on_y = placed(y, s, true);
   svg->lines(css, thin(on_x, on_y, a.breaks, kThin, kMostPoints));
 }
@@ -58,11 +63,13 @@ void draw_breaks(const Analysis& a, const MapScale& s, Svg* svg) {
   constexpr double kApart = 6;  // of the paper: marks nearer than that say the same
   Point last{-1e9, -1e9};
   for (std::size_t i = 1; i < a.ours_x.size(); ++i) {
-    const bool ends = std::isfinite(a.ours_x[i - 1]) && (!std::isfinite(a.ours_x[i]) || a.breaks[i] != 0);
+    const bool ends =
+        std::isfinite(a.ours_x[i - 1]) && (!std::isfinite(a.ours_x[i]) || a.breaks[i] != 0);
     if (!ends) continue;
     const Point p{s.x(a.ours_x[i - 1]), s.y(a.ours_y[i - 1])};
     if (std::hypot(p.x - last.x, p.y - last.y) < kApart) continue;
-    svg->lines("curve s-bad", {{{p.x - 4, p.y - 4}, {p.x + 4, p.y + 4}}, {{p.x - 4, p.y + 4}, {p.x + 4, p.y - 4}}});
+    svg->lines("curve s-bad", {{{p.x - 4, p.y - 4}, {p.x + 4, p.y + 4}},
+                               {{p.x - 4, p.y + 4}, {p.x + 4, p.y - 4}}});
     last = p;
   }
 }
@@ -90,8 +97,10 @@ void draw_scale_bar(const MapScale& s, Svg* svg) {
   const auto ticks = nice_ticks(0, 150 / s.per_metre, 2);
   const double metres = ticks.size() > 1 ? ticks[1] : 1;
   const double y = s.height - 14, length = metres * s.per_metre;
-  svg->lines("curve s-ink", {{{kMargin, y - 5}, {kMargin, y}, {kMargin + length, y}, {kMargin + length, y - 5}}});
-  const std::string words = metres >= 1000 ? fmt::format("{:g} km", metres / 1000) : fmt::format("{:g} m", metres);
+  svg->lines("curve s-ink",
+             {{{kMargin, y - 5}, {kMargin, y}, {kMargin + length, y}, {kMargin + length, y - 5}}});
+  const std::string words =
+      metres >= 1000 ? fmt::format("{:g} km", metres / 1000) : fmt::format("{:g} m", metres);
   svg->text("strong", Anchor::start, kMargin + length + 8, y + 1, words);
 }
 
@@ -112,7 +121,8 @@ std::string map_picture(const Analysis& analysis, std::span<const Frame> frames)
   if (!bounds.any) return {};
   const MapScale scale = scale_for(bounds);
   Svg svg(kPlotWidth, scale.height, "The drive from above");
-  draw_path("curve map-theirs s-theirs", analysis.theirs_x, analysis.theirs_y, analysis, scale, &svg);
+  draw_path("curve map-theirs s-theirs", analysis.theirs_x, analysis.theirs_y, analysis, scale,
+            &svg);
   draw_path("curve map-ours s-ours", analysis.ours_x, analysis.ours_y, analysis, scale, &svg);
   draw_degraded(analysis, frames, scale, &svg);
   draw_breaks(analysis, scale, &svg);

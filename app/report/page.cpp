@@ -31,8 +31,10 @@ std::string section(std::string_view css, std::string_view head, const std::stri
 std::string list(const std::vector<std::string>& sentences) {
   constexpr std::size_t kMost = 30;
   std::string out = "<ul>";
-  for (std::size_t i = 0; i < std::min(sentences.size(), kMost); ++i) out += "<li>" + escape(sentences[i], 500) + "</li>\n";
-  if (sentences.size() > kMost) out += fmt::format("<li>… and {} more</li>", sentences.size() - kMost);
+  for (std::size_t i = 0; i < std::min(sentences.size(), kMost); ++i)
+    out += "<li>" + escape(sentences[i], 500) + "</li>\n";
+  if (sentences.size() > kMost)
+    out += fmt::format("<li>… and {} more</li>", sentences.size() - kMost);
   return out + "</ul>";
 }
 
@@ -47,15 +49,20 @@ std::string date_of(Stamp stamp) {
 std::string title_line(const Session& s, const Analysis& a) {
   std::string line = "Session " + s.name;
   if (!s.frames.empty())
-    if (const std::string date = date_of(s.frames.front().stamp); !date.empty()) line += " · " + date;
-  line += a.path_m >= 1000 ? fmt::format(" · {:.2f} km", a.path_m / 1000) : fmt::format(" · {:.0f} m", a.path_m);
-  if (a.duration_s > 0) line += fmt::format(" in {}{}", time_label(a.duration_s, 1), a.duration_s < 60 ? " s" : " min");
+    if (const std::string date = date_of(s.frames.front().stamp); !date.empty())
+      line += " · " + date;
+  line += a.path_m >= 1000 ? fmt::format(" · {:.2f} km", a.path_m / 1000)
+                           : fmt::format(" · {:.0f} m", a.path_m);
+  if (a.duration_s > 0)
+    line += fmt::format(" in {}{}", time_label(a.duration_s, 1), a.duration_s < 60 ? " s" : " min");
   return line;
 }
 
-std::string number_card(const std::string& value, const std::string& name, const std::string& note) {
-  return fmt::format("<div class=\"number\"><span>{}</span><b>{}</b><span class=\"soft\">{}</span></div>\n", name, escape(value),
-                     escape(note));
+std::string number_card(const std::string& value, const std::string& name,
+                        const std::string& note) {
+  return fmt::format(
+      "<div class=\"number\"><span>{}</span><b>{}</b><span class=\"soft\">{}</span></div>\n", name,
+      escape(value), escape(note));
 }
 
 std::string drift_card(const Analysis& a) {
@@ -68,9 +75,11 @@ std::string drift_card(const Analysis& a) {
 }
 
 std::string error_card(const Analysis& a) {
-  const std::string name = a.source == ErrorSource::ins ? "Error to the INS" : "Error to the reference";
+  const std::string name =
+      a.source == ErrorSource::ins ? "Error to the INS" : "Error to the reference";
   if (a.source == ErrorSource::none) return number_card("not known", name, "no reference");
-  return number_card(metres(a.horizontal.rms), name, "horizontal, rms; " + metres(a.horizontal.max) + " at most");
+  return number_card(metres(a.horizontal.rms), name,
+                     "horizontal, rms; " + metres(a.horizontal.max) + " at most");
 }
 
 std::string ok_card(const Analysis& a) {
@@ -78,26 +87,35 @@ std::string ok_card(const Analysis& a) {
   // Rounded down: 100 % is said of nothing less.
   const double percent = std::floor(*a.ok_share * 1000) / 10;
   const std::string skipped = a.skipped > 0 ? fmt::format(", {} skipped", grouped(a.skipped)) : "";
-  const std::string waited = a.waited > 0 ? fmt::format(" ({} until the calibration was confirmed)", grouped(a.waited)) : "";
-  return number_card(
-      fmt::format("{:.{}f} %", percent, percent == 100 ? 0 : 1), "Frames ok",
-      fmt::format("of {}: {} degraded{}, {} lost{}", grouped(a.read + a.skipped), grouped(a.degraded), waited, grouped(a.lost), skipped));
+  const std::string waited =
+      a.waited > 0 ? fmt::format(" ({} until the calibration was confirmed)", grouped(a.waited))
+                   : "";
+  return number_card(fmt::format("{:.{}f} %", percent, percent == 100 ? 0 : 1), "Frames ok",
+                     fmt::format("of {}: {} degraded{}, {} lost{}", grouped(a.read + a.skipped),
+                                 grouped(a.degraded), waited, grouped(a.lost), skipped));
 }
 
 std::string verdict_section(const Analysis& a, const Verdict& v) {
   constexpr std::array<const char*, 3> kTones{"tone-good", "tone-care", "tone-bad"};
   constexpr std::array<const char*, 3> kMarks{"✔", "!", "✖"};
   const auto i = static_cast<std::size_t>(v.grade);
-  return fmt::format("<section class=\"verdict {}\"><p class=\"word\">{} {}</p><p>{}</p><div class=\"numbers\">{}{}{}</div></section>\n",
-                     kTones[i], kMarks[i], to_words(v.grade), escape(v.sentence, 600), drift_card(a), error_card(a), ok_card(a));
+  return fmt::format(
+      "<section class=\"verdict {}\"><p class=\"word\">{} {}</p><p>{}</p><div "
+      "class=\"numbers\">{}{}{}</div></section>\n",
+      kTones[i], kMarks[i], to_words(v.grade), escape(v.sentence, 600), drift_card(a),
+      error_card(a), ok_card(a));
 }
 
 std::string map_section(const Session& s, const Analysis& a) {
   const std::string map = map_picture(a, s.frames);
   if (map.empty()) return section("", "Map", "<p>There is no pose to draw.</p>");
-  const bool theirs = std::any_of(a.theirs_x.begin(), a.theirs_x.end(), [](double v) { return std::isfinite(v); });
-  std::string legend = "<p class=\"soft legend\"><span><i class=\"key k-ours\"></i>ours (● start, ■ end)</span>";
-  if (theirs) legend += fmt::format("<span><i class=\"key k-theirs\"></i>{}</span>", a.map_is_enu ? "INS" : "reference");
+  const bool theirs =
+      std::any_of(a.theirs_x.begin(), a.theirs_x.end(), [](double v) { return std::isfinite(v); });
+  std::string legend =
+      "<p class=\"soft legend\"><span><i class=\"key k-ours\"></i>ours (● start, ■ end)</span>";
+  if (theirs)
+    legend += fmt::format("<span><i class=\"key k-theirs\"></i>{}</span>",
+                          a.map_is_enu ? "INS" : "reference");
   if (a.degraded > 0) legend += "<span><i class=\"key k-care\"></i>ours, degraded</span>";
   if (a.lost > 0) legend += "<span>× no pose from here</span>";
   if (a.map_is_enu) legend += "<br/>Ours begins where the drive was placed on the earth.";
@@ -111,15 +129,19 @@ void error_plots(const Session& s, const Analysis& a, std::string* out) {
     const char* css;
     bool from_zero;
   };
-  const std::array kinds{Kind{"Horizontal error, m", &a.horizontal_m, "curve s-ours", true},
-                         Kind{"Vertical error, m (ours above is positive)", &a.vertical_m, "curve s-theirs", false},
-                         Kind{"Heading error, degrees", &a.heading_deg, "curve s-third", false}};
+  const std::array kinds{
+      Kind{"Horizontal error, m", &a.horizontal_m, "curve s-ours", true},
+      Kind{"Vertical error, m (ours above is positive)", &a.vertical_m, "curve s-theirs", false},
+      Kind{"Heading error, degrees", &a.heading_deg, "curve s-third", false}};
   for (const Kind& k : kinds) {
-    const std::string over_time = curve_plot({k.caption, XAxis::time_s, a.time_s, *k.values, a.breaks, k.css, k.from_zero}, a, s.frames);
+    const std::string over_time = curve_plot(
+        {k.caption, XAxis::time_s, a.time_s, *k.values, a.breaks, k.css, k.from_zero}, a, s.frames);
     if (over_time.empty()) continue;
     *out += figure(std::string(k.caption) + " · over time", over_time);
     *out += figure(std::string(k.caption) + " · over the way",
-                   curve_plot({k.caption, XAxis::distance_m, a.distance_m, *k.values, a.breaks, k.css, k.from_zero}, a, s.frames));
+                   curve_plot({k.caption, XAxis::distance_m, a.distance_m, *k.values, a.breaks,
+                               k.css, k.from_zero},
+                              a, s.frames));
   }
 }
 
@@ -127,26 +149,33 @@ std::string errors_head(const Analysis& a) {
   return section("wide", "Errors",
                  "<p>" + escape(a.source_sentence, 500) + "</p>" +
                      (a.lost > 0 && a.source != ErrorSource::none
-                          ? "<p class=\"soft\">Red stripes: frames without a pose. Curves stop there and are not carried across.</p>"
+                          ? "<p class=\"soft\">Red stripes: frames without a pose. Curves stop "
+                            "there and are not carried across.</p>"
                           : ""));
 }
 
-void running_plots(const Session& s, const Analysis& a, const TimingPicture& timing, std::string* out) {
-  if (const std::string bands = bands_picture(s, a); !bands.empty()) *out += figure("Status and state · over time", bands);
+void running_plots(const Session& s, const Analysis& a, const TimingPicture& timing,
+                   std::string* out) {
+  if (const std::string bands = bands_picture(s, a); !bands.empty())
+    *out += figure("Status and state · over time", bands);
   std::vector<double> inliers;
   for (const Frame& f : s.frames) inliers.push_back(f.inliers >= 0 && f.posed ? f.inliers : kNone);
   const std::string caption = "Inliers (points that hold the pose)";
-  if (const std::string plot = curve_plot({caption, XAxis::time_s, a.time_s, inliers, a.breaks, "curve s-ours", true}, a, s.frames);
+  if (const std::string plot = curve_plot(
+          {caption, XAxis::time_s, a.time_s, inliers, a.breaks, "curve s-ours", true}, a, s.frames);
       !plot.empty())
     *out += figure(caption + " · over time", plot);
   if (timing.svg.empty()) return;
-  *out += figure(fmt::format("Time a frame · {} of {} over the frame interval of {:.0f} ms (dashed)", grouped(timing.over_budget),
-                             grouped(timing.frames), a.interval_s * 1e3),
-                 timing.svg);
+  *out +=
+      figure(fmt::format("Time a frame · {} of {} over the frame interval of {:.0f} ms (dashed)",
+                         grouped(timing.over_budget), grouped(timing.frames), a.interval_s * 1e3),
+             timing.svg);
   std::vector<double> times;
   for (const Frame& f : s.frames) times.push_back(f.estimate_ms);
-  *out += figure("Time a frame, ms · over time",
-                 curve_plot({"Time a frame", XAxis::time_s, a.time_s, times, a.breaks, "curve s-ours", true}, a, s.frames));
+  *out += figure(
+      "Time a frame, ms · over time",
+      curve_plot({"Time a frame", XAxis::time_s, a.time_s, times, a.breaks, "curve s-ours", true},
+                 a, s.frames));
 }
 
 /// A single one that the drive began with is no curve.
@@ -167,9 +196,11 @@ bool lens_changed(const Session& s, int camera, std::size_t number) {
   return false;
 }
 
-void lens_plots(const Session& s, const Analysis& a, int camera, const std::string& whose, std::string* out) {
+void lens_plots(const Session& s, const Analysis& a, int camera, const std::string& whose,
+                std::string* out) {
   const bool radtan =
-      !s.calibration || s.calibration->rig.intrinsics[static_cast<std::size_t>(camera)].kind == CameraModelKind::pinhole_radtan;
+      !s.calibration || s.calibration->rig.intrinsics[static_cast<std::size_t>(camera)].kind ==
+                            CameraModelKind::pinhole_radtan;
   const std::array<const char*, 8> names{"focal length x, px",
                                          "focal length y, px",
                                          "principal point x, px",
@@ -181,18 +212,21 @@ void lens_plots(const Session& s, const Analysis& a, int camera, const std::stri
   constexpr int kFirst = 6;  // of calibration_plot()
   for (std::size_t i = 0; i < names.size(); ++i)
     if (lens_changed(s, camera, i))
-      *out += figure(fmt::format("{}: {}", whose, names[i]), calibration_plot(s, a, camera, kFirst + static_cast<int>(i)));
+      *out += figure(fmt::format("{}: {}", whose, names[i]),
+                     calibration_plot(s, a, camera, kFirst + static_cast<int>(i)));
 }
 
 void calibration_sections(const Session& s, const Analysis& a, std::string* out) {
-  constexpr std::array<const char*, 6> kNames{"rotation x, degrees", "rotation y, degrees", "rotation z, degrees",
-                                              "translation x, mm",   "translation y, mm",   "translation z, mm"};
+  constexpr std::array<const char*, 6> kNames{"rotation x, degrees", "rotation y, degrees",
+                                              "rotation z, degrees", "translation x, mm",
+                                              "translation y, mm",   "translation z, mm"};
   std::string plots;
   for (int camera = 1; camera < kMaxCameras; ++camera) {
     if (!changed(s, camera)) continue;
     const std::string whose = camera == 1 ? "Right camera" : fmt::format("Camera {}", camera);
     for (const int component : {0, 3, 1, 4, 2, 5})  // rotation and translation side by side
-      plots += figure(fmt::format("{}: {}", whose, kNames[static_cast<std::size_t>(component)]), calibration_plot(s, a, camera, component));
+      plots += figure(fmt::format("{}: {}", whose, kNames[static_cast<std::size_t>(component)]),
+                      calibration_plot(s, a, camera, component));
     lens_plots(s, a, camera, whose, &plots);
   }
   std::string body = health_table(s);
@@ -202,15 +236,20 @@ void calibration_sections(const Session& s, const Analysis& a, std::string* out)
     body += "<p>One calibration throughout; it did not change.</p>" + calibrations_table(s);
   else
     body +=
-        "<p class=\"soft\">Where the other cameras sit relative to the left one, as it was in use; the band is ± 2 σ (wide, with uncertain "
-        "intrinsics). Hollow red marks were rejected; hollow grey ones are what the drive measured while it kept what was in use.</p>" +
+        "<p class=\"soft\">Where the other cameras sit relative to the left one, as it was in use; "
+        "the band is ± 2 σ (wide, with uncertain "
+        "intrinsics). Hollow red marks were rejected; hollow grey ones are what the drive measured "
+        "while it kept what was in use.</p>" +
         calibrations_table(s);
   *out += section("wide long", "Calibration", body) + plots + residual_section(s);
 }
 
 std::string footer(const Session& s) {
-  const std::string version = text_at(s.summary, "version"), hash = text_at(s.summary, "configuration_hash");
-  std::string line = "Made by vergence from the session's own files; <code>vergence report SESSION</code> makes it again.";
+  const std::string version = text_at(s.summary, "version"),
+                    hash = text_at(s.summary, "configuration_hash");
+  std::string line =
+      "Made by vergence from the session's own files; <code>vergence report SESSION</code> makes "
+      "it again.";
   if (!version.empty()) line += " Recorded with version " + escape(version, 60) + ".";
   if (!hash.empty()) line += " Configuration " + escape(hash, 60) + ".";
   return "<p class=\"soft\" style=\"margin-top:12px\">" + line + "</p>\n";
@@ -231,7 +270,8 @@ std::string page_html(const Session& session, const Analysis& analysis, const Ve
     if (const std::string happened = happenings_table(session, analysis); !happened.empty())
       out += section("wide", "What happened", happened);
   if (!verdict.advice.empty()) out += section("wide", "What to do next", list(verdict.advice));
-  if (!session.missing.empty()) out += section("wide", "What is missing in this session", list(session.missing));
+  if (!session.missing.empty())
+    out += section("wide", "What is missing in this session", list(session.missing));
   out += map_section(session, analysis);
   std::string running;
   running_plots(session, analysis, timing, &running);
@@ -241,8 +281,10 @@ std::string page_html(const Session& session, const Analysis& analysis, const Ve
   const TimeSection time = time_section(session);
   if (!time.body.empty()) out += section("", "Time", time.body);
   if (!time.latency.empty()) out += figure(time.caption, time.latency);
-  out += section("wide long", "Events", session.events.empty() ? "<p>None was recorded.</p>" : events_table(session));
-  out += section("wide long", "Figures", "<div class=\"two\">" + figures_table(session, analysis, timing) + "</div>");
+  out += section("wide long", "Events",
+                 session.events.empty() ? "<p>None was recorded.</p>" : events_table(session));
+  out += section("wide long", "Figures",
+                 "<div class=\"two\">" + figures_table(session, analysis, timing) + "</div>");
   out += "</div>\n" + footer(session) + "</main></body></html>\n";
   return out;
 }

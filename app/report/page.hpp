@@ -7,7 +7,9 @@
 
 namespace vergence::app::report {
 
-/// The whole of report.html: one document, well-formed as XML, too; no script, nothing loaded from anywhere.
-[[nodiscard]] std::string page_html(const Session& session, const Analysis& analysis, const Verdict& verdict);
+/// The whole of report.html: one document, well-formed as XML, too; no script, nothing loaded from
+/// anywhere.
+[[nodiscard]] std::string page_html(const Session& session, const Analysis& analysis,
+                                    const Verdict& verdict);
 
 }  // namespace vergence::app::report

@@ -28,8 +28,10 @@ std::vector<Line> on_paper(const PlotBox& box, const std::vector<Line>& lines) {
   return placed;
 }
 
-/// Runs of frames without a pose as stripes behind a curve over time; runs in one pixel column become one.
-void draw_holes(const PlotBox& box, std::span<const double> time, std::span<const Frame> frames, Svg* svg) {
+/// Runs of frames without a pose as stripes behind a curve over time; runs in one pixel column
+/// become one.
+void draw_holes(const PlotBox& box, std::span<const double> time, std::span<const Frame> frames,
+                Svg* svg) {
   double drawn_to = -1;
   for (std::size_t i = 0; i < frames.size();) {
     if (frames[i].posed) {
@@ -38,7 +40,8 @@ void draw_holes(const PlotBox& box, std::span<const double> time, std::span<cons
     }
     const std::size_t begin = i;
     while (i < frames.size() && !frames[i].posed) ++i;
-    const double from = std::max(box.x(time[begin]), drawn_to), to = std::max(box.x(time[std::min(i, frames.size() - 1)]), from + 1);
+    const double from = std::max(box.x(time[begin]), drawn_to),
+                 to = std::max(box.x(time[std::min(i, frames.size() - 1)]), from + 1);
     if (to <= drawn_to + 0.5) continue;
     svg->rect("hole", from, box.top, to - from, box.bottom - box.top);
     drawn_to = to;
@@ -62,7 +65,8 @@ Line PlotBox::line(const Line& data) const {
 
 void PlotBox::fit_y(double low, double high, bool from_zero) {
   if (from_zero) low = std::min(0.0, low);
-  const double least = std::max({std::abs(low), std::abs(high), 1e-6}) * 1e-6;  // what doubles can show apart
+  const double least =
+      std::max({std::abs(low), std::abs(high), 1e-6}) * 1e-6;  // what doubles can show apart
   const double air = std::max(0.06 * (high - low), least);
   y0 = from_zero && low == 0.0 ? 0.0 : low - air;
   y1 = high + air;
@@ -72,7 +76,8 @@ void PlotBox::draw_x_axis(Svg* svg, XAxis axis) const {
   constexpr int kMost = 6;
   const bool kilometres = axis == XAxis::distance_m && x1 - x0 >= 3000;
   const double unit = kilometres ? 1000.0 : 1.0;
-  const auto ticks = axis == XAxis::time_s ? time_ticks(x0, x1, kMost) : nice_ticks(x0 / unit, x1 / unit, kMost);
+  const auto ticks =
+      axis == XAxis::time_s ? time_ticks(x0, x1, kMost) : nice_ticks(x0 / unit, x1 / unit, kMost);
   const double step = ticks.size() > 1 ? ticks[1] - ticks[0] : 1;
   for (const double t : ticks) {
     const double at = x(t * unit);
@@ -87,7 +92,10 @@ void PlotBox::draw_x_axis(Svg* svg, XAxis axis) const {
               first ? left - 3 : std::min(at, right + 10), bottom + 16, label);
   }
   svg->line("axis", left, bottom, right, bottom);
-  const char* words = kilometres ? "driven, km" : axis == XAxis::distance_m ? "driven, m" : x1 - x0 > 60 ? "time, min:s" : "time, s";
+  const char* words = kilometres                  ? "driven, km"
+                      : axis == XAxis::distance_m ? "driven, m"
+                      : x1 - x0 > 60              ? "time, min:s"
+                                                  : "time, s";
   svg->text("", Anchor::middle, (left + right) / 2, bottom + 32, words);
 }
 
@@ -101,7 +109,8 @@ void PlotBox::draw_y_axis(Svg* svg) const {
   svg->line("axis", left, top, left, bottom);
 }
 
-std::string curve_plot(const CurvePlot& plot, const Analysis& analysis, std::span<const Frame> frames) {
+std::string curve_plot(const CurvePlot& plot, const Analysis& analysis,
+                       std::span<const Frame> frames) {
   PlotBox box;
   double low = 0, high = 0;
   bool any = false;
@@ -118,11 +127,13 @@ std::string curve_plot(const CurvePlot& plot, const Analysis& analysis, std::spa
   if (plot.axis == XAxis::time_s) draw_holes(box, analysis.time_s, frames, &svg);
   box.draw_x_axis(&svg, plot.axis);
   box.draw_y_axis(&svg);
-  svg.lines(plot.css, on_paper(box, decimate(plot.x, plot.y, plot.breaks, box.x0, box.x1, kColumns)));
+  svg.lines(plot.css,
+            on_paper(box, decimate(plot.x, plot.y, plot.breaks, box.x0, box.x1, kColumns)));
   return std::move(svg).finish();
 }
 
-// ---- bands ----------------------------------------------------------------------------------------------------------------------
+// ---- bands
+// ----------------------------------------------------------------------------------------------------------------------
 
 namespace {
 
@@ -143,8 +154,8 @@ void mark(Lane* lane, const PlotBox& box, const Analysis& a, std::size_t i) {
   const double scale = 1 / (box.right - box.left) * (last + 1);
   const double begin = std::clamp(std::floor((box.x(from) - box.left) * scale), 0.0, last);
   const double end = std::clamp(std::ceil((box.x(to) - box.left) * scale), begin + 1, last + 1);
-  std::fill(lane->columns.begin() + static_cast<std::ptrdiff_t>(begin), lane->columns.begin() + static_cast<std::ptrdiff_t>(end),
-            std::uint8_t{1});
+  std::fill(lane->columns.begin() + static_cast<std::ptrdiff_t>(begin),
+            lane->columns.begin() + static_cast<std::ptrdiff_t>(end), std::uint8_t{1});
 }
 
 void draw_lane(const Lane& lane, const PlotBox& box, double top, Svg* svg) {
@@ -155,13 +166,14 @@ void draw_lane(const Lane& lane, const PlotBox& box, double top, Svg* svg) {
     const std::size_t begin = i;
     while (i < lane.columns.size() && lane.columns[i] == lane.columns[begin]) ++i;
     if (lane.columns[begin] == 0) continue;
-    svg->rect(lane.css, box.left + unit * static_cast<double>(begin), top + 3, std::max(1.0, unit * static_cast<double>(i - begin)),
-              kLaneHeight - 7);
+    svg->rect(lane.css, box.left + unit * static_cast<double>(begin), top + 3,
+              std::max(1.0, unit * static_cast<double>(i - begin)), kLaneHeight - 7);
   }
 }
 
 constexpr std::array<const char*, 3> kStatusCss{"f-good", "f-care", "f-bad"};
-constexpr std::array<const char*, 6> kStateCss{"f-care", "f-third", "f-theirs", "f-ours", "f-fourth", "f-bad"};
+constexpr std::array<const char*, 6> kStateCss{"f-care", "f-third",  "f-theirs",
+                                               "f-ours", "f-fourth", "f-bad"};
 
 std::vector<Lane> lanes_of(const Session& s, const Analysis& a, const PlotBox& box) {
   const auto columns = static_cast<std::size_t>(box.right - box.left) * 2;
@@ -169,12 +181,14 @@ std::vector<Lane> lanes_of(const Session& s, const Analysis& a, const PlotBox& b
     return Lane{std::string(name), css, std::vector<std::uint8_t>(columns, 0)};
   };
   std::vector<Lane> lanes;
-  for (std::size_t i = 0; i < 3; ++i) lanes.push_back(empty(to_string(static_cast<PoseStatus>(i)), kStatusCss[i]));
+  for (std::size_t i = 0; i < 3; ++i)
+    lanes.push_back(empty(to_string(static_cast<PoseStatus>(i)), kStatusCss[i]));
   std::array<std::optional<Lane>, 6> states;
   for (std::size_t i = 0; i < s.frames.size(); ++i) {
     const Frame& f = s.frames[i];
     if (f.status) mark(&lanes[static_cast<std::size_t>(*f.status)], box, a, i);
-    if (!f.state || f.state == State::lost) continue;  // that state and that status are the same frames
+    if (!f.state || f.state == State::lost)
+      continue;  // that state and that status are the same frames
     auto& lane = states[static_cast<std::size_t>(*f.state)];
     if (!lane) {
       std::string name(to_string(*f.state));
@@ -193,7 +207,8 @@ void draw_events(const Session& s, const PlotBox& box, double top, Svg* svg) {
   svg->rect("track", box.left, top + 3, box.right - box.left, kLaneHeight - 7);
   double last = -1;
   for (const Event& e : s.events) {
-    if (s.frames.empty() || e.stamp < s.frames.front().stamp || e.stamp > s.frames.back().stamp) continue;
+    if (s.frames.empty() || e.stamp < s.frames.front().stamp || e.stamp > s.frames.back().stamp)
+      continue;
     const double at = box.x(seconds_between(s.frames.front().stamp, e.stamp));
     if (std::abs(at - last) < 1) continue;
     svg->rect("f-ink", std::clamp(at - 1, box.left, box.right - 2), top + 3, 2, kLaneHeight - 7);
@@ -213,15 +228,18 @@ std::string bands_picture(const Session& session, const Analysis& analysis) {
   constexpr double kApart = 8;  // between statuses, states and events
   const double events_top = box.top + kLaneHeight * static_cast<double>(lanes.size()) + 2 * kApart;
   box.bottom = events_top + kLaneHeight;
-  Svg svg(kPlotWidth, box.bottom + 36, "Status of the frames, state of the system and events over time");
+  Svg svg(kPlotWidth, box.bottom + 36,
+          "Status of the frames, state of the system and events over time");
   for (std::size_t i = 0; i < lanes.size(); ++i)
-    draw_lane(lanes[i], box, box.top + kLaneHeight * static_cast<double>(i) + (i >= kStatuses ? kApart : 0), &svg);
+    draw_lane(lanes[i], box,
+              box.top + kLaneHeight * static_cast<double>(i) + (i >= kStatuses ? kApart : 0), &svg);
   draw_events(session, box, events_top, &svg);
   box.draw_x_axis(&svg, XAxis::time_s);
   return std::move(svg).finish();
 }
 
-// ---- timing -----------------------------------------------------------------------------------------------------------------------
+// ---- timing
+// -----------------------------------------------------------------------------------------------------------------------
 
 namespace {
 
@@ -241,32 +259,40 @@ TimingPicture timing_picture(const Session& session, const Analysis& analysis) {
   picture.frames = times.size();
   if (times.empty()) return picture;
   const double budget = analysis.interval_s * 1e3;
-  picture.over_budget = budget > 0 ? static_cast<std::size_t>(times.end() - std::upper_bound(times.begin(), times.end(), budget)) : 0;
-  // The axis reaches to the budget and to nearly all frames; what is slower than its end stands in the last bar.
+  picture.over_budget =
+      budget > 0 ? static_cast<std::size_t>(times.end() -
+                                            std::upper_bound(times.begin(), times.end(), budget))
+                 : 0;
+  // The axis reaches to the budget and to nearly all frames; what is slower than its end stands in
+  // the last bar.
   const double most = times[std::min(times.size() - 1, times.size() * 999 / 1000)];
   constexpr int kBars = 60;
   PlotBox box;
   box.x0 = 0;
   box.x1 = std::max({most, budget > 20 * most ? 0.0 : budget, 1e-3}) * 1.08;
   std::array<std::size_t, kBars> bars{};
-  for (const double t : times) ++bars[static_cast<std::size_t>(std::min(t / box.x1 * kBars, kBars - 1.0))];
+  for (const double t : times)
+    ++bars[static_cast<std::size_t>(std::min(t / box.x1 * kBars, kBars - 1.0))];
   box.fit_y(0, static_cast<double>(*std::max_element(bars.begin(), bars.end())), true);
   Svg svg(kPlotWidth, kPlotHeight, "How many frames took how many milliseconds");
   box.draw_y_axis(&svg);
   const auto ticks = nice_ticks(box.x0, box.x1, 6);
   for (const double t : ticks)
-    svg.text("", t == 0.0 ? Anchor::start : Anchor::middle, box.x(t) - (t == 0.0 ? 3 : 0), box.bottom + 16,
-             tick_label(t, ticks.size() > 1 ? ticks[1] - ticks[0] : 1));
-  svg.text("", Anchor::middle, (box.left + box.right) / 2, box.bottom + 32, "from the images to the pose, ms");
+    svg.text("", t == 0.0 ? Anchor::start : Anchor::middle, box.x(t) - (t == 0.0 ? 3 : 0),
+             box.bottom + 16, tick_label(t, ticks.size() > 1 ? ticks[1] - ticks[0] : 1));
+  svg.text("", Anchor::middle, (box.left + box.right) / 2, box.bottom + 32,
+           "from the images to the pose, ms");
   const double width = (box.right - box.left) / kBars;
   for (int i = 0; i < kBars; ++i) {
     const auto n = static_cast<double>(bars[static_cast<std::size_t>(i)]);
     if (n <= 0) continue;
-    const double height = std::max(1.0, box.bottom - box.y(n));  // a single frame among thousands still shows
+    const double height =
+        std::max(1.0, box.bottom - box.y(n));  // a single frame among thousands still shows
     svg.rect("f-ours", box.left + width * i + 0.5, box.bottom - height, width - 1, height);
   }
   svg.line("axis", box.left, box.bottom, box.right, box.bottom);
-  if (budget > 0 && budget <= box.x1) svg.line("budget", box.x(budget), box.top, box.x(budget), box.bottom);
+  if (budget > 0 && budget <= box.x1)
+    svg.line("budget", box.x(budget), box.top, box.x(budget), box.bottom);
   picture.svg = std::move(svg).finish();
   return picture;
 }

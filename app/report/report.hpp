@@ -7,19 +7,22 @@ namespace vergence::app {
 
 /// What became of a page.
 struct ReportOutcome {
-  std::filesystem::path page;          // SESSION/report.html
-  std::string headline;                // "Good", "Usable with care", "Do not use", and why, in one sentence
-  bool usable = true;                  // false: no pose can be relied on
-  std::string main_reason{};           // then: why, with counts, and what to do
+  std::filesystem::path page;  // SESSION/report.html
+  std::string headline;        // "Good", "Usable with care", "Do not use", and why, in one sentence
+  bool usable = true;          // false: no pose can be relied on
+  std::string main_reason{};   // then: why, with counts, and what to do
   std::vector<std::string> missing{};  // sentences: files or lines that were not there or not whole
 };
 
-/// Writes SESSION/report.html from the session's other files (DESIGN §6): one self-contained page, inline SVG, no script.
+/// Writes SESSION/report.html from the session's other files (DESIGN §6): one self-contained page,
+/// inline SVG, no script.
 ///
-/// A torn session (killed, disk full) gives a page, too: what is missing is said on it and in the outcome. Text from the files is
-/// escaped and bounded; a drive of any length gives a page of at most some 3 MB.
+/// A torn session (killed, disk full) gives a page, too: what is missing is said on it and in the
+/// outcome. Text from the files is escaped and bounded; a drive of any length gives a page of at
+/// most some 3 MB.
 /// Threads  Any; nothing is shared. Memory  Some 400 bytes a frame. Time  Linear in the frames.
-/// Errors   InputError: no folder, nothing of a session in it, or the page cannot be written (an older one is left as it was).
+/// Errors   InputError: no folder, nothing of a session in it, or the page cannot be written (an
+///          older one is left as it was).
 ReportOutcome write_report(const std::filesystem::path& session);
 
 }  // namespace vergence::app

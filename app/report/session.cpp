@@ -23,10 +23,12 @@ constexpr std::size_t kMostReasons = 64;
 constexpr double kFarthest = 1e7;  // m: beyond, a coordinate is damage and would flatten every plot
 
 /// What a file says, or a sentence in `missing`. `consequence`: what the page lacks without it.
-std::optional<std::string> read_part(const fs::path& file, std::size_t limit, const char* consequence, Session* session) {
+std::optional<std::string> read_part(const fs::path& file, std::size_t limit,
+                                     const char* consequence, Session* session) {
   std::error_code error;
   if (!fs::exists(file, error)) {
-    session->missing.push_back(fmt::format("{} is missing: {}", file.filename().string(), consequence));
+    session->missing.push_back(
+        fmt::format("{} is missing: {}", file.filename().string(), consequence));
     return std::nullopt;
   }
   try {
@@ -37,12 +39,18 @@ std::optional<std::string> read_part(const fs::path& file, std::size_t limit, co
   }
 }
 
-void tell_torn(const char* file, std::size_t rows, bool tail, std::size_t disordered, Session* session) {
-  if (rows > 0) session->missing.push_back(fmt::format("{}: {} damaged line{} left out", file, rows, rows == 1 ? "" : "s"));
-  if (tail) session->missing.push_back(fmt::format("{}: the last line is torn and was left out; the session was not closed", file));
+void tell_torn(const char* file, std::size_t rows, bool tail, std::size_t disordered,
+               Session* session) {
+  if (rows > 0)
+    session->missing.push_back(
+        fmt::format("{}: {} damaged line{} left out", file, rows, rows == 1 ? "" : "s"));
+  if (tail)
+    session->missing.push_back(fmt::format(
+        "{}: the last line is torn and was left out; the session was not closed", file));
   if (disordered > 0)
     session->missing.push_back(
-        fmt::format("{}: {} line{} left out whose stamp is not later than the one before", file, disordered, disordered == 1 ? "" : "s"));
+        fmt::format("{}: {} line{} left out whose stamp is not later than the one before", file,
+                    disordered, disordered == 1 ? "" : "s"));
 }
 
 /// Index of a word among an enum's words, the first `count` of them.
@@ -55,14 +63,16 @@ std::optional<Enum> word_to_enum(std::string_view word, int count) {
 
 std::uint16_t reason_index(std::string_view word, Session* session) {
   const auto found = std::find(session->reasons.begin(), session->reasons.end(), word);
-  if (found != session->reasons.end()) return static_cast<std::uint16_t>(found - session->reasons.begin());
+  if (found != session->reasons.end())
+    return static_cast<std::uint16_t>(found - session->reasons.begin());
   if (session->reasons.size() >= kMostReasons) return 0;
   session->reasons.emplace_back(word.substr(0, kLongestText));
   return static_cast<std::uint16_t>(session->reasons.size() - 1);
 }
 
 bool near_enough(std::span<const double> numbers) {
-  return std::all_of(numbers.begin(), numbers.end(), [](double v) { return std::abs(v) <= kFarthest; });
+  return std::all_of(numbers.begin(), numbers.end(),
+                     [](double v) { return std::abs(v) <= kFarthest; });
 }
 
 /// The columns of poses.csv that the page needs.
@@ -70,8 +80,10 @@ class PoseColumns {
  public:
   explicit PoseColumns(const CsvRows& rows) {
     const auto find = [&rows](const char* name) { return rows.column(name); };
-    stamp_ = find("stamp_ns"), frame_ = find("frame"), state_ = find("state"), status_ = find("status"), reason_ = find("reason");
-    inliers_ = find("inliers"), estimate_ms_ = find("estimate_ms"), error_heading_ = find("error_heading_deg");
+    stamp_ = find("stamp_ns"), frame_ = find("frame"), state_ = find("state"),
+    status_ = find("status"), reason_ = find("reason");
+    inliers_ = find("inliers"), estimate_ms_ = find("estimate_ms"),
+    error_heading_ = find("error_heading_deg");
     world_ = {find("x"), find("y"), find("z"), find("qx"), find("qy"), find("qz"), find("qw")};
     enu_ = {find("east"), find("north"), find("up")};
     ins_ = {find("ins_east"), find("ins_north"), find("ins_up")};
@@ -89,7 +101,8 @@ class PoseColumns {
     f.status = word_to_enum<PoseStatus>(rows.text(status_), 3);
     f.reason = reason_index(rows.text(reason_), session);
     std::array<double, 7> world{};
-    f.posed = numbers(rows, world_, &world) && f.status != PoseStatus::lost && set_pose(world, &f.T_world_left);
+    f.posed = numbers(rows, world_, &world) && f.status != PoseStatus::lost &&
+              set_pose(world, &f.T_world_left);
     f.placed = numbers(rows, enu_, &f.enu);
     f.has_ins = numbers(rows, ins_, &f.ins);
     f.compared = numbers(rows, error_, &f.error);
@@ -109,7 +122,8 @@ class PoseColumns {
  private:
   using Column = std::optional<std::size_t>;
   template <std::size_t N>
-  [[nodiscard]] static bool numbers(const CsvRows& rows, const std::array<Column, N>& columns, std::array<double, N>* out) {
+  [[nodiscard]] static bool numbers(const CsvRows& rows, const std::array<Column, N>& columns,
+                                    std::array<double, N>* out) {
     std::array<double, N> values{};
     for (std::size_t i = 0; i < N; ++i) {
       const auto v = rows.number(columns[i]);
@@ -127,13 +141,15 @@ class PoseColumns {
 };
 
 bool read_poses(const fs::path& folder, Session* session) {
-  const auto text =
-      read_part(folder / "poses.csv", std::size_t{2} << 30U, "status, inliers and times of the frames are not known", session);
+  const auto text = read_part(folder / "poses.csv", std::size_t{2} << 30U,
+                              "status, inliers and times of the frames are not known", session);
   if (!text) return false;
   const std::string_view whole = whole_lines(*text);
   CsvRows rows(whole);
   if (!rows.column("stamp_ns")) {
-    session->missing.emplace_back("poses.csv has no head that names its columns: status, inliers and times of the frames are not known");
+    session->missing.emplace_back(
+        "poses.csv has no head that names its columns: status, inliers and times of the frames are "
+        "not known");
     return false;
   }
   const PoseColumns columns(rows);
@@ -141,7 +157,8 @@ bool read_poses(const fs::path& folder, Session* session) {
   session->frames.reserve(std::min(kMostFrames, whole.size() / 200));
   while (rows.next()) {
     if (session->frames.size() == kMostFrames) {
-      session->missing.push_back(fmt::format("poses.csv has more than {} lines; the rest is left out", kMostFrames));
+      session->missing.push_back(
+          fmt::format("poses.csv has more than {} lines; the rest is left out", kMostFrames));
       break;
     }
     const auto frame = columns.read(rows, session);
@@ -152,7 +169,8 @@ bool read_poses(const fs::path& folder, Session* session) {
     else
       session->frames.push_back(*frame);
   }
-  tell_torn("poses.csv", rows.torn_rows() + unreadable, whole.size() != text->size(), disordered, session);
+  tell_torn("poses.csv", rows.torn_rows() + unreadable, whole.size() != text->size(), disordered,
+            session);
   return true;
 }
 
@@ -169,7 +187,8 @@ std::optional<StampedPose> tum_pose(std::string_view line) {
   return pose;
 }
 
-std::vector<StampedPose> read_trajectory_part(const fs::path& folder, const char* name, const char* consequence, Session* session) {
+std::vector<StampedPose> read_trajectory_part(const fs::path& folder, const char* name,
+                                              const char* consequence, Session* session) {
   std::vector<StampedPose> poses;
   const auto text = read_part(folder / name, std::size_t{1} << 30U, consequence, session);
   if (!text) return poses;
@@ -190,7 +209,8 @@ std::vector<StampedPose> read_trajectory_part(const fs::path& folder, const char
 }
 
 void frames_from_trajectory(const fs::path& folder, Session* session) {
-  for (const StampedPose& p : read_trajectory_part(folder, "trajectory.tum", "there is no trajectory", session)) {
+  for (const StampedPose& p :
+       read_trajectory_part(folder, "trajectory.tum", "there is no trajectory", session)) {
     Frame f;
     f.stamp = p.stamp;
     f.posed = true;
@@ -218,7 +238,8 @@ void read_lens(const CsvRows& rows, CalibrationRow* c) {
 }
 
 void read_calibrations(const fs::path& folder, Session* session) {
-  const auto text = read_part(folder / "calibrations.csv", std::size_t{256} << 20U, "how the calibration changed is not known", session);
+  const auto text = read_part(folder / "calibrations.csv", std::size_t{256} << 20U,
+                              "how the calibration changed is not known", session);
   if (!text) return;
   const std::string_view whole = whole_lines(*text);
   CsvRows rows(whole);
@@ -227,7 +248,8 @@ void read_calibrations(const fs::path& folder, Session* session) {
     CalibrationRow c;
     const auto stamp = rows.integer(rows.column("stamp_ns"));
     const auto camera = rows.integer(rows.column("camera"));
-    if (!stamp || !camera || *camera < 1 || *camera >= kMaxCameras || !read_six(rows, "", &c.value)) {
+    if (!stamp || !camera || *camera < 1 || *camera >= kMaxCameras ||
+        !read_six(rows, "", &c.value)) {
       ++unreadable;
       continue;
     }
@@ -245,11 +267,13 @@ void read_calibrations(const fs::path& folder, Session* session) {
     read_lens(rows, &c);
     c.judged_depth_m = rows.number(rows.column("judged_depth_m")).value_or(kNone);
     c.depth_sigma_percent = rows.number(rows.column("depth_sigma_percent")).value_or(kNone);
-    c.depth_difference_percent = rows.number(rows.column("depth_difference_percent")).value_or(kNone);
+    c.depth_difference_percent =
+        rows.number(rows.column("depth_difference_percent")).value_or(kNone);
     c.has_sigma = read_six(rows, "wide_", &c.sigma) || read_six(rows, "sigma_", &c.sigma);
     session->calibrations.push_back(std::move(c));
   }
-  tell_torn("calibrations.csv", rows.torn_rows() + unreadable, whole.size() != text->size(), 0, session);
+  tell_torn("calibrations.csv", rows.torn_rows() + unreadable, whole.size() != text->size(), 0,
+            session);
 }
 
 /// Nothing: a number is missing or makes no rectangle of an image.
@@ -258,11 +282,15 @@ std::optional<ResidualRow> parse_residual(const CsvRows& rows) {
   r.at_the_end = rows.text(rows.column("calibration")) == "end";
   const auto camera = rows.integer(rows.column("camera"));
   const auto left = rows.number(rows.column("left_px")), top = rows.number(rows.column("top_px"));
-  const auto width = rows.number(rows.column("width_px")), height = rows.number(rows.column("height_px"));
+  const auto width = rows.number(rows.column("width_px")),
+             height = rows.number(rows.column("height_px"));
   const auto mean = rows.number(rows.column("mean_px"));
-  if (!camera || *camera < 1 || *camera >= kMaxCameras || !left || !top || !width || !height || !mean) return std::nullopt;
+  if (!camera || *camera < 1 || *camera >= kMaxCameras || !left || !top || !width || !height ||
+      !mean)
+    return std::nullopt;
   constexpr double kLargest = 1e5;  // px
-  const bool inside = *left >= 0 && *top >= 0 && *width > 0 && *height > 0 && *left + *width <= kLargest && *top + *height <= kLargest;
+  const bool inside = *left >= 0 && *top >= 0 && *width > 0 && *height > 0 &&
+                      *left + *width <= kLargest && *top + *height <= kLargest;
   if (!inside || !(std::abs(*mean) <= kLargest)) return std::nullopt;
   r.camera = static_cast<int>(*camera);
   r.left = *left, r.top = *top, r.width = *width, r.height = *height;
@@ -276,7 +304,8 @@ std::optional<ResidualRow> parse_residual(const CsvRows& rows) {
 void read_residuals(const fs::path& folder, Session* session) {
   std::error_code error;
   if (!fs::exists(folder / "residuals.csv", error)) return;
-  const auto text = read_part(folder / "residuals.csv", std::size_t{4} << 20U, "how the calibration fits the images is not known", session);
+  const auto text = read_part(folder / "residuals.csv", std::size_t{4} << 20U,
+                              "how the calibration fits the images is not known", session);
   if (!text) return;
   const std::string_view whole = whole_lines(*text);
   CsvRows rows(whole);
@@ -287,7 +316,8 @@ void read_residuals(const fs::path& folder, Session* session) {
     else
       ++unreadable;
   }
-  tell_torn("residuals.csv", rows.torn_rows() + unreadable, whole.size() != text->size(), 0, session);
+  tell_torn("residuals.csv", rows.torn_rows() + unreadable, whole.size() != text->size(), 0,
+            session);
 }
 
 std::optional<Event> parse_event(std::string_view line) {
@@ -303,7 +333,8 @@ std::optional<Event> parse_event(std::string_view line) {
 }
 
 void read_events(const fs::path& folder, Session* session) {
-  const auto text = read_part(folder / "events.jsonl", std::size_t{1} << 30U, "what happened on the way is not known", session);
+  const auto text = read_part(folder / "events.jsonl", std::size_t{1} << 30U,
+                              "what happened on the way is not known", session);
   if (!text) return;
   const std::string_view whole = whole_lines(*text);
   Lines lines(whole);
@@ -321,32 +352,37 @@ void read_events(const fs::path& folder, Session* session) {
 }
 
 void read_summary(const fs::path& folder, Session* session) {
-  const auto text =
-      read_part(folder / "summary.json", kLargestSummary,
-                "the session was not closed (killed, or the power went); figures are reckoned again from the other files", session);
+  const auto text = read_part(folder / "summary.json", kLargestSummary,
+                              "the session was not closed (killed, or the power went); figures are "
+                              "reckoned again from the other files",
+                              session);
   if (!text) return;
   session->summary = nlohmann::json::parse(*text, nullptr, false);
   if (session->summary.is_object()) return;
   session->summary = nullptr;
-  session->missing.emplace_back("summary.json is torn; figures are reckoned again from the other files");
+  session->missing.emplace_back(
+      "summary.json is torn; figures are reckoned again from the other files");
 }
 
-/// A drive that never found a calibration has none to write; its calibrations.csv and its summary say so.
+/// A drive that never found a calibration has none to write; its calibrations.csv and its summary
+/// say so.
 bool without_calibration(const Session& session) {
   return session.summary.is_object() &&
-         std::none_of(session.calibrations.begin(), session.calibrations.end(), [](const CalibrationRow& c) { return c.accepted; });
+         std::none_of(session.calibrations.begin(), session.calibrations.end(),
+                      [](const CalibrationRow& c) { return c.accepted; });
 }
 
 void read_calibration_file(const fs::path& folder, Session* session) {
   std::error_code error;
   if (!fs::exists(folder / "calibration.yaml", error) && without_calibration(*session)) return;
-  const auto text =
-      read_part(folder / "calibration.yaml", std::size_t{1} << 20U, "the calibration in use at the end is not known", session);
+  const auto text = read_part(folder / "calibration.yaml", std::size_t{1} << 20U,
+                              "the calibration in use at the end is not known", session);
   if (!text) return;
   try {
     session->calibration = parse_calibration(*text, "calibration.yaml");
   } catch (const InputError& e) {
-    session->missing.push_back(fmt::format("{}; the calibration in use at the end is not known", e.what()));
+    session->missing.push_back(
+        fmt::format("{}; the calibration in use at the end is not known", e.what()));
   }
 }
 
@@ -387,23 +423,31 @@ std::optional<bool> flag_at(const nlohmann::json& json, std::string_view path) {
 
 std::string text_at(const nlohmann::json& json, std::string_view path) {
   const nlohmann::json* at = find_path(json, path);
-  return at != nullptr && at->is_string() ? at->get_ref<const std::string&>().substr(0, kLongestText) : std::string();
+  return at != nullptr && at->is_string()
+             ? at->get_ref<const std::string&>().substr(0, kLongestText)
+             : std::string();
 }
 
 Session read_session(const fs::path& folder) {
   std::error_code error;
   if (!fs::is_directory(folder, error))
-    throw InputError(folder.string() + ": is no folder; give the session folder that --out named when it was recorded");
+    throw InputError(
+        folder.string() +
+        ": is no folder; give the session folder that --out named when it was recorded");
   if (!looks_like_a_session(folder))
-    throw InputError(folder.string() + ": has none of a session's files (poses.csv, trajectory.tum, summary.json, events.jsonl); " +
+    throw InputError(folder.string() +
+                     ": has none of a session's files (poses.csv, trajectory.tum, summary.json, "
+                     "events.jsonl); " +
                      "give the folder that --out named when it was recorded");
   Session session;
   session.name = fs::weakly_canonical(folder, error).filename().string();
   read_summary(folder, &session);
-  if (!read_poses(folder, &session) || session.frames.empty()) frames_from_trajectory(folder, &session);
+  if (!read_poses(folder, &session) || session.frames.empty())
+    frames_from_trajectory(folder, &session);
   // Where there was nothing to compare with there is no such file.
   if (fs::exists(folder / "reference.tum", error) || number_at(session.summary, "metrics.ate_m"))
-    session.reference = read_trajectory_part(folder, "reference.tum", "there is nothing to compare the trajectory with", &session);
+    session.reference = read_trajectory_part(
+        folder, "reference.tum", "there is nothing to compare the trajectory with", &session);
   read_calibrations(folder, &session);
   read_calibration_file(folder, &session);
   read_residuals(folder, &session);

@@ -18,9 +18,11 @@
 /// A session folder as it was found, whole or torn.
 namespace vergence::app::report {
 
-inline constexpr double kNone = std::numeric_limits<double>::quiet_NaN();  // a number that is not there
+inline constexpr double kNone =
+    std::numeric_limits<double>::quiet_NaN();  // a number that is not there
 
-/// A line of poses.csv, or of trajectory.tum where poses.csv is lost (then state and status are not known).
+/// A line of poses.csv, or of trajectory.tum where poses.csv is lost (then state and status are not
+/// known).
 struct Frame {
   Stamp stamp{};
   std::int64_t number = -1;
@@ -43,7 +45,8 @@ struct Frame {
 struct CalibrationRow {
   Stamp stamp{};
   bool accepted = false;
-  bool kept = false;     // a measurement of the drive that is no better than what is in use: no rejection
+  bool kept =
+      false;  // a measurement of the drive that is no better than what is in use: no rejection
   bool decided = false;  // while driving; else the drive began with it
   std::string cause{}, reason{};
   std::int64_t frames = 0;
@@ -52,15 +55,19 @@ struct CalibrationRow {
   std::array<double, 6> value{};  // rotation vector, rad; translation, m
   std::array<double, 6> sigma{};  // the wide one, else the noise's; meaningless without has_sigma
   bool has_sigma = false;
-  std::array<double, 8> lens{kNone, kNone, kNone, kNone, kNone, kNone, kNone, kNone};        // fx fy cx cy, px; four of distortion
-  std::array<double, 8> lens_sigma{kNone, kNone, kNone, kNone, kNone, kNone, kNone, kNone};  // of these
-  // What the drive had measured of the depth by then: at which distance, its sigma, and how far off what was in use is by it.
+  std::array<double, 8> lens{kNone, kNone, kNone, kNone,
+                             kNone, kNone, kNone, kNone};  // fx fy cx cy, px; four of distortion
+  std::array<double, 8> lens_sigma{kNone, kNone, kNone, kNone,
+                                   kNone, kNone, kNone, kNone};  // of these
+  // What the drive had measured of the depth by then: at which distance, its sigma, and how far off
+  // what was in use is by it.
   double judged_depth_m = kNone, depth_sigma_percent = kNone, depth_difference_percent = kNone;
 };
 
 /// A line of residuals.csv: a part of the left image.
 struct ResidualRow {
-  bool at_the_end = false;  // with the calibration in use there; else with the one that the drive began with
+  bool at_the_end =
+      false;  // with the calibration in use there; else with the one that the drive began with
   int camera = 1;
   double left = 0, top = 0, width = 0, height = 0;  // px
   double mean_px = 0;
@@ -72,7 +79,8 @@ struct Event {
   std::string kind{}, sentence{};
 };
 
-/// Stamps of `frames` and of `reference` ascend strictly; rows that break this are left out and told in `missing`.
+/// Stamps of `frames` and of `reference` ascend strictly; rows that break this are left out and
+/// told in `missing`.
 struct Session {
   std::string name{};
   std::vector<Frame> frames{};
@@ -87,16 +95,20 @@ struct Session {
   std::vector<std::string> missing{};  // sentences
 };
 
-inline constexpr std::size_t kMostFrames = 4'000'000;  // 37 hours at 30 Hz; further ones are left out and told
+inline constexpr std::size_t kMostFrames =
+    4'000'000;  // 37 hours at 30 Hz; further ones are left out and told
 inline constexpr std::size_t kMostEvents = 200'000;
 inline constexpr std::size_t kMostCalibrations = 20'000;
 inline constexpr std::size_t kMostResiduals = 4'000;
-inline constexpr std::size_t kLongestText = 300;  // characters kept of a word or sentence from outside
+inline constexpr std::size_t kLongestText =
+    300;  // characters kept of a word or sentence from outside
 
-/// Reads what is there. Errors  InputError: `folder` is no folder, or none of a session's files is in it.
+/// Reads what is there. Errors  InputError: `folder` is no folder, or none of a session's files is
+/// in it.
 [[nodiscard]] Session read_session(const std::filesystem::path& folder);
 
-/// A finite number of summary.json by its path, `metrics.ate_m`. Nothing: not there, null, no number.
+/// A finite number of summary.json by its path, `metrics.ate_m`. Nothing: not there, null, no
+/// number.
 [[nodiscard]] std::optional<double> number_at(const nlohmann::json& json, std::string_view path);
 /// The same for true and false.
 [[nodiscard]] std::optional<bool> flag_at(const nlohmann::json& json, std::string_view path);

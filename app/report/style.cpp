@@ -93,7 +93,9 @@ section.long{break-inside:auto}
 
 std::string variables(bool dark) {
   std::string css;
-  const auto add = [&](const Colour& c) { css += std::string("--") + c.name + ":" + (dark ? c.dark : c.light) + ";"; };
+  const auto add = [&](const Colour& c) {
+    css += std::string("--") + c.name + ":" + (dark ? c.dark : c.light) + ";";
+  };
   add(kPage);
   add(kPanel);
   for (const Colour& c : kColours) add(c);
@@ -104,8 +106,9 @@ std::string variables(bool dark) {
 
 std::string style_sheet() {
   // Paper is light whatever the screen's theme.
-  return ":root{color-scheme:light dark;" + variables(false) + "}\n@media screen and (prefers-color-scheme:dark){:root{" + variables(true) +
-         "}}" + kRules;
+  return ":root{color-scheme:light dark;" + variables(false) +
+         "}\n@media screen and (prefers-color-scheme:dark){:root{" + variables(true) + "}}" +
+         kRules;
 }
 
 }  // namespace vergence::app::report

@@ -18,7 +18,10 @@ bool continues(std::string_view text, std::size_t at) {
 std::size_t utf8_length(std::string_view text) {
   const auto first = static_cast<unsigned char>(text[0]);
   if (first < 0x80) return 1;
-  const std::size_t n = first >= 0xc2 && first < 0xe0 ? 2 : first >= 0xe0 && first < 0xf0 ? 3 : first >= 0xf0 && first < 0xf5 ? 4 : 0;
+  const std::size_t n = first >= 0xc2 && first < 0xe0   ? 2
+                        : first >= 0xe0 && first < 0xf0 ? 3
+                        : first >= 0xf0 && first < 0xf5 ? 4
+                                                        : 0;
   for (std::size_t i = 1; i < n; ++i)
     if (!continues(text, i)) return 0;
   if (n < 3) return n;
@@ -26,7 +29,8 @@ std::size_t utf8_length(std::string_view text) {
   const bool overlong = (first == 0xe0 && second < 0xa0) || (first == 0xf0 && second < 0x90);
   const bool surrogate = first == 0xed && second >= 0xa0;
   const bool beyond = first == 0xf4 && second >= 0x90;
-  const bool nonce = first == 0xef && second == 0xbf && static_cast<unsigned char>(text[2]) >= 0xbe;  // U+FFFE, U+FFFF are no XML
+  const bool nonce = first == 0xef && second == 0xbf &&
+                     static_cast<unsigned char>(text[2]) >= 0xbe;  // U+FFFE, U+FFFF are no XML
   return overlong || surrogate || beyond || nonce ? 0 : n;
 }
 
@@ -105,7 +109,9 @@ std::string escape(std::string_view text, std::size_t most) {
 
 std::string coordinate(double value) {
   if (!std::isfinite(value)) return "0";
-  const double v = std::round(std::clamp(value, -kLargestCoordinate, kLargestCoordinate) * 10) / 10 + 0.0;  // + 0.0: no negative zero
+  const double v =
+      std::round(std::clamp(value, -kLargestCoordinate, kLargestCoordinate) * 10) / 10 +
+      0.0;  // + 0.0: no negative zero
   return v == std::floor(v) ? fmt::format("{:.0f}", v) : fmt::format("{:.1f}", v);
 }
 
@@ -115,20 +121,25 @@ std::vector<double> nice_ticks(double low, double high, int most) {
 }
 
 std::vector<double> time_ticks(double low, double high, int most) {
-  constexpr std::array kSteps{60.0, 120.0, 300.0, 600.0, 900.0, 1800.0, 3600.0, 7200.0, 14400.0, 21600.0, 43200.0, 86400.0};
+  constexpr std::array kSteps{60.0,   120.0,  300.0,   600.0,   900.0,   1800.0,
+                              3600.0, 7200.0, 14400.0, 21600.0, 43200.0, 86400.0};
   constexpr std::array kShort{1.0, 2.0, 5.0, 10.0, 15.0, 30.0, 60.0};
   const double span = high - low;
-  if (span / kShort.front() < most || span / kSteps.back() > most) return nice_ticks(low, high, most);
-  const double step = span / kShort.back() <= most ? step_of(kShort, span, most) : step_of(kSteps, span, most);
+  if (span / kShort.front() < most || span / kSteps.back() > most)
+    return nice_ticks(low, high, most);
+  const double step =
+      span / kShort.back() <= most ? step_of(kShort, span, most) : step_of(kSteps, span, most);
   return multiples(low, high, step, most);
 }
 
 std::string tick_label(double value, double step) {
   const double v = value + 0.0;
   if (std::abs(v) >= 1e6 || (step < 1e-6 && step > 0)) return fmt::format("{:.3g}", v);
-  const int decimals = step > 0 ? std::clamp(static_cast<int>(std::ceil(-std::log10(step) - 1e-9)), 0, 6) : 2;
+  const int decimals =
+      step > 0 ? std::clamp(static_cast<int>(std::ceil(-std::log10(step) - 1e-9)), 0, 6) : 2;
   const std::string text = fmt::format("{:.{}f}", std::abs(v) < step * 1e-6 ? 0.0 : v, decimals);
-  return v < 0 && text.front() == '-' ? "−" + text.substr(1) : text;  // a minus sign of a digit's width
+  return v < 0 && text.front() == '-' ? "−" + text.substr(1)
+                                      : text;  // a minus sign of a digit's width
 }
 
 std::string time_label(double seconds, double step) {
@@ -141,22 +152,25 @@ std::string time_label(double seconds, double step) {
 }
 
 Svg::Svg(double width, double height, std::string_view description) {
-  out_ = fmt::format(R"(<svg viewBox="0 0 {} {}" role="img" aria-label="{}">)", coordinate(width), coordinate(height), escape(description));
+  out_ = fmt::format(R"(<svg viewBox="0 0 {} {}" role="img" aria-label="{}">)", coordinate(width),
+                     coordinate(height), escape(description));
 }
 
 void Svg::line(const char* css, double x1, double y1, double x2, double y2) {
-  fmt::format_to(std::back_inserter(out_), R"(<line class="{}" x1="{}" y1="{}" x2="{}" y2="{}"/>)", css, coordinate(x1), coordinate(y1),
-                 coordinate(x2), coordinate(y2));
+  fmt::format_to(std::back_inserter(out_), R"(<line class="{}" x1="{}" y1="{}" x2="{}" y2="{}"/>)",
+                 css, coordinate(x1), coordinate(y1), coordinate(x2), coordinate(y2));
 }
 
 void Svg::rect(const char* css, double x, double y, double width, double height) {
-  fmt::format_to(std::back_inserter(out_), R"(<rect class="{}" x="{}" y="{}" width="{}" height="{}"/>)", css, coordinate(x), coordinate(y),
-                 coordinate(std::max(0.0, width)), coordinate(std::max(0.0, height)));
+  fmt::format_to(std::back_inserter(out_),
+                 R"(<rect class="{}" x="{}" y="{}" width="{}" height="{}"/>)", css, coordinate(x),
+                 coordinate(y), coordinate(std::max(0.0, width)),
+                 coordinate(std::max(0.0, height)));
 }
 
 void Svg::circle(const char* css, double x, double y, double radius) {
-  fmt::format_to(std::back_inserter(out_), R"(<circle class="{}" cx="{}" cy="{}" r="{}"/>)", css, coordinate(x), coordinate(y),
-                 coordinate(radius));
+  fmt::format_to(std::back_inserter(out_), R"(<circle class="{}" cx="{}" cy="{}" r="{}"/>)", css,
+                 coordinate(x), coordinate(y), coordinate(radius));
 }
 
 void Svg::lines(const char* css, const std::vector<Line>& lines) {
@@ -181,9 +195,12 @@ void Svg::polygon(const char* css, const Line& corners) {
 }
 
 void Svg::text(const char* css, Anchor anchor, double x, double y, std::string_view words) {
-  const char* name = anchor == Anchor::start ? "start" : anchor == Anchor::middle ? "middle" : "end";
-  fmt::format_to(std::back_inserter(out_), R"(<text class="{}" text-anchor="{}" x="{}" y="{}">{}</text>)", css, name, coordinate(x),
-                 coordinate(y), escape(words));
+  const char* name = anchor == Anchor::start    ? "start"
+                     : anchor == Anchor::middle ? "middle"
+                                                : "end";
+  fmt::format_to(std::back_inserter(out_),
+                 R"(<text class="{}" text-anchor="{}" x="{}" y="{}">{}</text>)", css, name,
+                 coordinate(x), coordinate(y), escape(words));
 }
 
 std::string Svg::finish() && {

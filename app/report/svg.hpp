@@ -7,17 +7,19 @@
 
 #include "app/report/decimation.hpp"
 
-/// The few shapes the page is drawn with. Everything that goes in is numbers of ours, class names of ours, or escaped text.
+/// The few shapes the page is drawn with. Everything that goes in is numbers of ours, class names
+/// of ours, or escaped text.
 namespace vergence::app::report {
 
-/// Text from outside for HTML and SVG, in elements and in quoted attributes: markup escaped, control characters and broken UTF-8
-/// replaced, cut with an ellipsis after `most` bytes.
+/// Text from outside for HTML and SVG, in elements and in quoted attributes: markup escaped,
+/// control characters and broken UTF-8 replaced, cut with an ellipsis after `most` bytes.
 [[nodiscard]] std::string escape(std::string_view text, std::size_t most = 300);
 
 /// A coordinate: one decimal, no negative zero. What is not finite becomes 0.
 [[nodiscard]] std::string coordinate(double value);
 
-/// Places on an axis: multiples of 1, 2 or 5 times a power of ten, at most `most` of them, all within [low, high].
+/// Places on an axis: multiples of 1, 2 or 5 times a power of ten, at most `most` of them, all
+/// within [low, high].
 [[nodiscard]] std::vector<double> nice_ticks(double low, double high, int most);
 /// The same for seconds: steps of whole minutes and hours beyond a minute.
 [[nodiscard]] std::vector<double> time_ticks(double low, double high, int most);

@@ -23,9 +23,12 @@ class Figures {
  public:
   void group(const char* head) { pending_ = head; }
   void row(std::string_view name, const std::string& value) {
-    if (!pending_.empty()) out_ += fmt::format(R"(<tr class="group"><th colspan="2" scope="colgroup">{}</th></tr>)", pending_);
+    if (!pending_.empty())
+      out_ += fmt::format(R"(<tr class="group"><th colspan="2" scope="colgroup">{}</th></tr>)",
+                          pending_);
     pending_.clear();
-    out_ += fmt::format(R"(<tr><th scope="row">{}</th><td class="n">{}</td></tr>)", escape(name), escape(value));
+    out_ += fmt::format(R"(<tr><th scope="row">{}</th><td class="n">{}</td></tr>)", escape(name),
+                        escape(value));
     out_ += '\n';
   }
   void row(std::string_view name, std::optional<double> value, const char* format) {
@@ -37,7 +40,9 @@ class Figures {
   std::string out_, pending_;
 };
 
-std::optional<double> times(std::optional<double> value, double factor) { return value ? std::optional(*value * factor) : std::nullopt; }
+std::optional<double> times(std::optional<double> value, double factor) {
+  return value ? std::optional(*value * factor) : std::nullopt;
+}
 
 void frames_group(const Session& s, const Analysis& a, Figures* f) {
   f->group("Frames");
@@ -70,45 +75,60 @@ void error_group(const Analysis& a, Figures* f) {
 
 void timing_group(const Session& s, const TimingPicture& timing, Figures* f) {
   f->group("Time a frame, ms");
-  constexpr std::array<std::array<const char*, 2>, 5> kRows{
-      {{"mean", "mean"}, {"median", "p50"}, {"99 of 100 within", "p99"}, {"999 of 1000 within", "p99_9"}, {"longest", "max"}}};
-  for (const auto& [name, key] : kRows) f->row(name, number_at(s.summary, std::string("timing_ms.") + key), "{:.1f}");
+  constexpr std::array<std::array<const char*, 2>, 5> kRows{{{"mean", "mean"},
+                                                             {"median", "p50"},
+                                                             {"99 of 100 within", "p99"},
+                                                             {"999 of 1000 within", "p99_9"},
+                                                             {"longest", "max"}}};
+  for (const auto& [name, key] : kRows)
+    f->row(name, number_at(s.summary, std::string("timing_ms.") + key), "{:.1f}");
   for (const char* stage : {"decode", "pyramid", "detect", "track", "match", "pose", "window"})
-    f->row(std::string(stage) + ", mean", number_at(s.summary, std::string("timing_ms.stages.") + stage), "{:.2f}");
+    f->row(std::string(stage) + ", mean",
+           number_at(s.summary, std::string("timing_ms.stages.") + stage), "{:.2f}");
   if (timing.frames > 0) f->row("frames over the frame interval", grouped(timing.over_budget));
 }
 
 /// What the drive itself has measured of the calibration in use.
 void verification_rows(const Session& s, const Analysis& a, Figures* f) {
-  if (const auto verified = flag_at(s.summary, "calibration.verified")) f->row("verified by the drive", *verified ? "yes" : "not verified");
-  if (a.confirmed_s) f->row("first verified after", time_label(*a.confirmed_s, 0.1) + (*a.confirmed_s < 60 ? " s" : ""));
-  f->row("contradicted: depths were off by", number_at(s.summary, "calibration.contradicted.depth_percent"), "{:.1f} %");
-  const auto newest = std::find_if(s.calibrations.rbegin(), s.calibrations.rend(),
-                                   [](const CalibrationRow& c) { return std::isfinite(c.depth_sigma_percent); });
+  if (const auto verified = flag_at(s.summary, "calibration.verified"))
+    f->row("verified by the drive", *verified ? "yes" : "not verified");
+  if (a.confirmed_s)
+    f->row("first verified after",
+           time_label(*a.confirmed_s, 0.1) + (*a.confirmed_s < 60 ? " s" : ""));
+  f->row("contradicted: depths were off by",
+         number_at(s.summary, "calibration.contradicted.depth_percent"), "{:.1f} %");
+  const auto newest =
+      std::find_if(s.calibrations.rbegin(), s.calibrations.rend(),
+                   [](const CalibrationRow& c) { return std::isfinite(c.depth_sigma_percent); });
   if (newest == s.calibrations.rend()) return;
   const std::string at = fmt::format(" at {:.0f} m, newest measurement", newest->judged_depth_m);
   f->row("depth sigma" + at, newest->depth_sigma_percent, "{:.2f} %");
-  if (newest->depth_difference_percent > 0) f->row("what was in use differs" + at, newest->depth_difference_percent, "{:.2f} %");
+  if (newest->depth_difference_percent > 0)
+    f->row("what was in use differs" + at, newest->depth_difference_percent, "{:.2f} %");
 }
 
 void calibration_group(const Session& s, const Analysis& a, Figures* f) {
   f->group("Calibration at the end");
-  if (const std::string source = text_at(s.summary, "calibration.source"); !source.empty()) f->row("from", source);
+  if (const std::string source = text_at(s.summary, "calibration.source"); !source.empty())
+    f->row("from", source);
   if (s.calibration) {
     const RigCalibration& rig = s.calibration->rig;
     for (std::size_t k = 1; k < static_cast<std::size_t>(rig.cameras); ++k) {
       const Vec3 phi = log_so3(rig.T_camera_left[k].R) * kDegrees;
       const std::string camera = rig.cameras > 2 ? s.calibration->names[k] + ": " : "";
       f->row(camera + "baseline", fmt::format("{:.2f} mm", rig.T_camera_left[k].t.norm() * 1e3));
-      f->row(camera + "rotation x, y, z", fmt::format("{:.4f}°, {:.4f}°, {:.4f}°", phi.x() + 0.0, phi.y() + 0.0, phi.z() + 0.0));
+      f->row(camera + "rotation x, y, z",
+             fmt::format("{:.4f}°, {:.4f}°, {:.4f}°", phi.x() + 0.0, phi.y() + 0.0, phi.z() + 0.0));
     }
   }
-  if (const std::string word = text_at(s.summary, "calibration.word"); !word.empty()) f->row("health", word);
-  if (const std::string by = text_at(s.summary, "calibration.limited_by"); !by.empty()) f->row("limited by", by);
+  if (const std::string word = text_at(s.summary, "calibration.word"); !word.empty())
+    f->row("health", word);
+  if (const std::string by = text_at(s.summary, "calibration.limited_by"); !by.empty())
+    f->row("limited by", by);
   verification_rows(s, a, f);
   for (const char* z : {"1", "5", "10", "20", "50"})
-    f->row(std::string("depth error at ") + z + " m", number_at(s.summary, std::string("calibration.depth_error_percent.") + z),
-           "{:.1f} %");
+    f->row(std::string("depth error at ") + z + " m",
+           number_at(s.summary, std::string("calibration.depth_error_percent.") + z), "{:.1f} %");
 }
 
 /// `1.2, -0.3, 4`; empty for anything but a short row of numbers.
@@ -125,7 +145,8 @@ std::string numbers_text(const nlohmann::json& value) {
 }
 
 /// Numbers below an object, its keys as names; for blocks whose keys are not fixed.
-void flatten(const nlohmann::json& json, const std::string& prefix, int depth, std::size_t* rows, Figures* f) {
+void flatten(const nlohmann::json& json, const std::string& prefix, int depth, std::size_t* rows,
+             Figures* f) {
   constexpr int kDeepest = 3;
   if (!json.is_object() || depth > kDeepest) return;
   for (const auto& [key, value] : json.items()) {
@@ -151,10 +172,13 @@ void block_group(const Session& s, const char* key, const char* head, Figures* f
 void memory_group(const Session& s, Figures* f) {
   f->group("Memory and drops");
   constexpr double kMegabyte = 1e6;
-  if (const auto bytes = number_at(s.summary, "memory.sum_bytes")) f->row("memory held", fmt::format("{:.1f} MB", *bytes / kMegabyte));
-  for (const auto& [key, name] :
-       {std::pair{"estimator_bytes", "of these the estimator"}, {"images_bytes", "images"}, {"rings_bytes", "rings"}})
-    if (const auto bytes = number_at(s.summary, std::string("memory.") + key)) f->row(name, fmt::format("{:.1f} MB", *bytes / kMegabyte));
+  if (const auto bytes = number_at(s.summary, "memory.sum_bytes"))
+    f->row("memory held", fmt::format("{:.1f} MB", *bytes / kMegabyte));
+  for (const auto& [key, name] : {std::pair{"estimator_bytes", "of these the estimator"},
+                                  {"images_bytes", "images"},
+                                  {"rings_bytes", "rings"}})
+    if (const auto bytes = number_at(s.summary, std::string("memory.") + key))
+      f->row(name, fmt::format("{:.1f} MB", *bytes / kMegabyte));
   f->row("allocations after the seal", number_at(s.summary, "allocations_after_seal"), "{:.0f}");
   for (const auto& [key, name] : {std::pair{"frames", "frames dropped"},
                                   {"estimator", "points over capacity"},
@@ -166,7 +190,8 @@ void memory_group(const Session& s, Figures* f) {
 std::string event_time(const Session& s, Stamp stamp) {
   if (s.frames.empty()) return "";
   const Stamp first = s.frames.front().stamp;
-  return stamp >= first ? time_label(seconds_between(first, stamp), 0.1) : "−" + time_label(seconds_between(stamp, first), 0.1);
+  return stamp >= first ? time_label(seconds_between(first, stamp), 0.1)
+                        : "−" + time_label(seconds_between(stamp, first), 0.1);
 }
 
 struct EventRun {
@@ -178,7 +203,8 @@ struct EventRun {
 std::vector<EventRun> condensed(const std::vector<Event>& events) {
   std::vector<EventRun> runs;
   for (const Event& e : events) {
-    if (!runs.empty() && runs.back().first->kind == e.kind && runs.back().first->sentence == e.sentence) {
+    if (!runs.empty() && runs.back().first->kind == e.kind &&
+        runs.back().first->sentence == e.sentence) {
       ++runs.back().count;
       runs.back().last = e.stamp;
     } else {
@@ -192,24 +218,28 @@ std::string event_row(const Session& s, const EventRun& run) {
   std::string when = event_time(s, run.first->stamp);
   if (run.count > 1) when += " … " + event_time(s, run.last);
   const std::string many = run.count > 1 ? " (" + grouped(run.count) + " times)" : "";
-  return fmt::format("<tr><td class=\"t\">{}</td><td class=\"k\">{}</td><td>{}{}</td></tr>\n", when, escape(run.first->kind, 60),
-                     escape(run.first->sentence), many);
+  return fmt::format("<tr><td class=\"t\">{}</td><td class=\"k\">{}</td><td>{}{}</td></tr>\n", when,
+                     escape(run.first->kind, 60), escape(run.first->sentence), many);
 }
 
 }  // namespace
 
 std::string grouped(std::size_t count) {
   std::string text = std::to_string(count);
-  for (std::size_t i = text.size(); i > 3; i -= 3) text.insert(i - 3, " ");  // narrow no-break space
+  for (std::size_t i = text.size(); i > 3; i -= 3)
+    text.insert(i - 3, " ");  // narrow no-break space
   return text;
 }
 
 std::string metres(double value) { return fmt::format("{:.{}f} m", value, value < 0.0995 ? 3 : 2); }
 
-std::string figures_table(const Session& session, const Analysis& analysis, const TimingPicture& timing) {
+std::string figures_table(const Session& session, const Analysis& analysis,
+                          const TimingPicture& timing) {
   Figures f;
   f.group("Drive");
-  if (analysis.duration_s > 0) f.row("duration", time_label(analysis.duration_s, 0.1) + (analysis.duration_s < 60 ? " s" : ""));
+  if (analysis.duration_s > 0)
+    f.row("duration",
+          time_label(analysis.duration_s, 0.1) + (analysis.duration_s < 60 ? " s" : ""));
   f.row("way", fmt::format("{:.1f} m", analysis.path_m));
   frames_group(session, analysis, &f);
   if (analysis.source != ErrorSource::none) error_group(analysis, &f);
@@ -228,10 +258,13 @@ namespace {
 std::string health_row(const nlohmann::json& summary, const char* name, const std::string& path) {
   const std::string word = text_at(summary, path + "word");
   if (word.empty()) return "";
-  std::string row = fmt::format("<tr><th scope=\"row\">{}</th><td class=\"k\">{}</td>", name, escape(word, 60));
+  std::string row =
+      fmt::format("<tr><th scope=\"row\">{}</th><td class=\"k\">{}</td>", name, escape(word, 60));
   for (const char* z : {"1", "5", "10", "20", "50"}) {
     const auto percent = number_at(summary, path + "depth_error_percent." + z);
-    row += percent ? fmt::format("<td class=\"n\">{:.{}f} %</td>", *percent, *percent < 0.995 ? 2 : 1) : "<td></td>";
+    row += percent
+               ? fmt::format("<td class=\"n\">{:.{}f} %</td>", *percent, *percent < 0.995 ? 2 : 1)
+               : "<td></td>";
   }
   return row + "</tr>\n";
 }
@@ -242,53 +275,63 @@ std::string held_out_text(const CalibrationRow& c) {
   return fmt::format("{:.2f} → {:.2f} px", c.held_out_before_px, c.held_out_after_px);
 }
 
-/// `± 0.26 % at 20 m, was off 1.4 %` as parts that no line breaks; empty where nothing was measured.
+/// `± 0.26 % at 20 m, was off 1.4 %` as parts that no line breaks; empty where nothing was
+/// measured.
 std::string depth_text(const CalibrationRow& c) {
   if (!(c.judged_depth_m > 0) || !std::isfinite(c.depth_sigma_percent)) return "";
   const bool off = c.depth_difference_percent > 0;
-  std::string text =
-      fmt::format("<span class=\"w\">± {:.2f} % at {:.0f} m{}</span>", c.depth_sigma_percent, c.judged_depth_m, off ? "," : "");
-  if (off) text += fmt::format(" <span class=\"w\">was off {:.2f} %</span>", c.depth_difference_percent);
+  std::string text = fmt::format("<span class=\"w\">± {:.2f} % at {:.0f} m{}</span>",
+                                 c.depth_sigma_percent, c.judged_depth_m, off ? "," : "");
+  if (off)
+    text += fmt::format(" <span class=\"w\">was off {:.2f} %</span>", c.depth_difference_percent);
   return text;
 }
 
 }  // namespace
 
 std::string health_table(const Session& session) {
-  const std::string rows =
-      health_row(session.summary, "at the start", "calibration.before.") + health_row(session.summary, "at the end", "calibration.");
+  const std::string rows = health_row(session.summary, "at the start", "calibration.before.") +
+                           health_row(session.summary, "at the end", "calibration.");
   if (rows.empty()) return "";
-  return "<div class=\"scroll\"><table class=\"health\"><tr><th></th><th>calibration</th><th class=\"n\">1 m</th><th class=\"n\">5 "
+  return "<div class=\"scroll\"><table class=\"health\"><tr><th></th><th>calibration</th><th "
+         "class=\"n\">1 m</th><th class=\"n\">5 "
          "m</th><th class=\"n\">10 "
          "m</th>"
          "<th class=\"n\">20 m</th><th class=\"n\">50 m</th></tr>\n" +
          rows +
-         "</table></div>\n<p class=\"soft\">Predicted error of a depth at that distance, one sigma, from what the calibration leaves "
+         "</table></div>\n<p class=\"soft\">Predicted error of a depth at that distance, one "
+         "sigma, from what the calibration leaves "
          "open.</p>\n";
 }
 
 std::string calibrations_table(const Session& session) {
   constexpr std::size_t kMost = 60;
   std::string out =
-      "<table class=\"stack\"><tr><th>time</th><th>outcome</th><th>cause</th><th>after</th><th>held-out "
+      "<table "
+      "class=\"stack\"><tr><th>time</th><th>outcome</th><th>cause</th><th>after</th><th>held-out "
       "error</th><th>depth</th><th>why</th></tr>\n";
   std::vector<const CalibrationRow*> rows;  // one for all cameras: they are decided together
   for (const CalibrationRow& c : session.calibrations)
     if (c.camera == 1) rows.push_back(&c);
   const std::size_t n = rows.size();
-  if (n > kMost) out += fmt::format("<tr><td colspan=\"7\">{} earlier ones are in calibrations.csv</td></tr>", grouped(n - kMost));
+  if (n > kMost)
+    out += fmt::format("<tr><td colspan=\"7\">{} earlier ones are in calibrations.csv</td></tr>",
+                       grouped(n - kMost));
   for (std::size_t i = n > kMost ? n - kMost : 0; i < n; ++i) {
     const CalibrationRow& c = *rows[i];
     std::string cause = c.cause;
     std::replace(cause.begin(), cause.end(), '_', ' ');
     const std::string after = c.decided ? fmt::format("{:.0f} frames", c.latency_frames) : "";
     const std::string from = c.frames > 0 ? fmt::format("from {} frames", c.frames) : "";
-    const std::string why = from.empty() || c.reason.empty() ? from + c.reason : from + "; " + c.reason;
+    const std::string why =
+        from.empty() || c.reason.empty() ? from + c.reason : from + "; " + c.reason;
     const char* outcome = c.accepted ? "accepted" : c.kept ? "kept" : "rejected";
     out += fmt::format(
-        "<tr><td class=\"t\">{}</td> <td class=\"k\">{}</td> <td class=\"w\">{}</td> <td class=\"w\">{}</td> <td "
+        "<tr><td class=\"t\">{}</td> <td class=\"k\">{}</td> <td class=\"w\">{}</td> <td "
+        "class=\"w\">{}</td> <td "
         "class=\"w\">{}</td> <td>{}</td> <td>{}</td></tr>\n",
-        event_time(session, c.stamp), outcome, escape(cause, 60), after, held_out_text(c), depth_text(c), escape(why));
+        event_time(session, c.stamp), outcome, escape(cause, 60), after, held_out_text(c),
+        depth_text(c), escape(why));
   }
   return out + "</table>\n";
 }
@@ -301,13 +344,17 @@ std::string events_table(const Session& session) {
     const bool many = runs.size() > 2 * kEachEnd;
     if (many && i == kEachEnd) {
       const std::size_t left_out = runs.size() - 2 * kEachEnd;
-      out += fmt::format("<tr><td></td><td></td><td>… {} rows are left out here; events.jsonl has them …</td></tr>\n", grouped(left_out));
+      out += fmt::format(
+          "<tr><td></td><td></td><td>… {} rows are left out here; events.jsonl has them "
+          "…</td></tr>\n",
+          grouped(left_out));
       i += left_out;
     }
     out += event_row(session, runs[i]);
   }
   if (session.events_dropped > 0)
-    out += fmt::format("<tr><td></td><td></td><td>… and {} more in events.jsonl</td></tr>\n", grouped(session.events_dropped));
+    out += fmt::format("<tr><td></td><td></td><td>… and {} more in events.jsonl</td></tr>\n",
+                       grouped(session.events_dropped));
   return out + "</table>\n";
 }
 

@@ -7,8 +7,10 @@
 namespace vergence::app::report {
 
 struct TimeSection {
-  std::string body{};     // what proves the pairs, clocks, losses; empty where the session has no such block
-  std::string latency{};  // how long poses took from the exposure on, a whole <svg>; empty where none is known
+  std::string
+      body{};  // what proves the pairs, clocks, losses; empty where the session has no such block
+  std::string latency{};  // how long poses took from the exposure on, a whole <svg>; empty where
+                          // none is known
   std::string caption{};  // of that
 };
 

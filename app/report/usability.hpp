@@ -20,7 +20,8 @@ struct Usability {
   std::string advice;  // what to do about the main reason; may be empty
 };
 
-/// A drive of so many moving frames can confirm its calibration: 36 with a calibration given, 54 from scratch (docs/calibration.md).
+/// A drive of so many moving frames can confirm its calibration: 36 with a calibration given, 54
+/// from scratch (docs/calibration.md).
 inline constexpr std::size_t kFramesToConfirm = 60;
 
 [[nodiscard]] Usability usability_of(const Session& session, const Analysis& analysis);

@@ -11,7 +11,8 @@ namespace vergence::app::report {
 enum class Grade : std::uint8_t { good, care, bad };
 [[nodiscard]] const char* to_words(Grade) noexcept;  // "Good", "Usable with care", "Do not use"
 
-/// What a field engineer reads first. Every reason that moved the grade is there, the worst first; a session without any is good.
+/// What a field engineer reads first. Every reason that moved the grade is there, the worst first;
+/// a session without any is good.
 struct Verdict {
   Grade grade = Grade::good;
   std::string sentence{};              // why, in one sentence

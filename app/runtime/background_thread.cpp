@@ -11,10 +11,14 @@
 namespace vergence::app {
 namespace {
 
-constexpr int kNice = 5;  // a third of the share of a thread at 0: poses come first, and the solver still ends
+constexpr int kNice =
+    5;  // a third of the share of a thread at 0: poses come first, and the solver still ends
 
-/// On Linux the priority is the calling thread's own, in spite of the name. A refusal costs nothing but that share.
-void yield_to_others() noexcept { (void)::setpriority(PRIO_PROCESS, static_cast<id_t>(::gettid()), kNice); }
+/// On Linux the priority is the calling thread's own, in spite of the name. A refusal costs nothing
+/// but that share.
+void yield_to_others() noexcept {
+  (void)::setpriority(PRIO_PROCESS, static_cast<id_t>(::gettid()), kNice);
+}
 
 }  // namespace
 
@@ -35,11 +39,14 @@ void BackgroundThread::start(TaskRef task) noexcept {
   asked_.notify_one();
 }
 
-bool BackgroundThread::busy() noexcept { return done_.load(std::memory_order_acquire) != asked_.load(std::memory_order_relaxed); }
+bool BackgroundThread::busy() noexcept {
+  return done_.load(std::memory_order_acquire) != asked_.load(std::memory_order_relaxed);
+}
 
 void BackgroundThread::wait() noexcept {
   const std::uint32_t asked = asked_.load(std::memory_order_relaxed);
-  for (std::uint32_t done = done_.load(std::memory_order_acquire); done != asked; done = done_.load(std::memory_order_acquire))
+  for (std::uint32_t done = done_.load(std::memory_order_acquire); done != asked;
+       done = done_.load(std::memory_order_acquire))
     done_.wait(done, std::memory_order_acquire);
 }
 

@@ -8,11 +8,15 @@
 
 namespace vergence::app {
 
-/// A BackgroundRunner on a thread of its own, made with it: the calibration solver's, beside the estimator's.
+/// A BackgroundRunner on a thread of its own, made with it: the calibration solver's, beside the
+/// estimator's.
 ///
-/// Threads  start(), busy(), wait(): one thread. The task runs on the other, which yields to the estimator's where a core is short.
-/// Memory   None after construction; the thread is sealed (AllocationGuard). No lock: start() and busy() never wait.
-/// Errors   The constructor throws std::system_error when no thread can be had. The destructor waits for the task.
+/// Threads  start(), busy(), wait(): one thread. The task runs on the other, which yields to the
+///          estimator's where a core is short.
+/// Memory   None after construction; the thread is sealed (AllocationGuard). No lock: start() and
+///          busy() never wait.
+/// Errors   The constructor throws std::system_error when no thread can be had. The destructor
+///          waits for the task.
 class BackgroundThread final : public BackgroundRunner {
  public:
   BackgroundThread();

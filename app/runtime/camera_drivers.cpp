@@ -20,34 +20,39 @@ const CameraDriverRow& row_of(const CameraRequest& request) {
   for (const CameraDriverRow& row : camera_driver_rows())
     if (request.driver == row.name) return row;
   const auto names = camera_driver_names();
-  throw InputError(fmt::format("{}.driver is \"{}\"{}; this version knows {}", request.key, request.driver,
-                               did_you_mean(request.driver, names), fmt::join(names, ", ")));
+  throw InputError(fmt::format("{}.driver is \"{}\"{}; this version knows {}", request.key,
+                               request.driver, did_you_mean(request.driver, names),
+                               fmt::join(names, ", ")));
 }
 
 std::string list_of(const std::vector<DeviceInfo>& found) {
   if (found.empty()) return "none was found";
   std::string text = "found:";
   for (const DeviceInfo& d : found)
-    text +=
-        fmt::format("{} {} ({}, {})", &d == found.data() ? "" : ",", d.serial.empty() ? "without a serial" : d.serial, d.model, d.place);
+    text += fmt::format("{} {} ({}, {})", &d == found.data() ? "" : ",",
+                        d.serial.empty() ? "without a serial" : d.serial, d.model, d.place);
   return text;
 }
 
 /// The sentence for an open() that gave nothing.
-std::string refusal(const CameraRequest& request, const std::string& serial, const CameraDriverRow& row, CameraDriver& driver,
-                    DeviceStatus status) {
-  const std::string who = fmt::format("{}: the {} camera {}", request.key, row.name, serial.empty() ? "" : "\"" + serial + "\" ");
+std::string refusal(const CameraRequest& request, const std::string& serial,
+                    const CameraDriverRow& row, CameraDriver& driver, DeviceStatus status) {
+  const std::string who = fmt::format("{}: the {} camera {}", request.key, row.name,
+                                      serial.empty() ? "" : "\"" + serial + "\" ");
   std::string said = driver.complaint();
   switch (status) {
     case DeviceStatus::not_found:
-      return fmt::format("{}was not found; {}; check cable, power and {}.serial{}", who, list_of(driver.enumerate()), request.key,
-                         said.empty() ? "" : ": " + said);
+      return fmt::format("{}was not found; {}; check cable, power and {}.serial{}", who,
+                         list_of(driver.enumerate()), request.key, said.empty() ? "" : ": " + said);
     case DeviceStatus::busy:
-      return fmt::format("{}is in use by another program; end that one{}", who, said.empty() ? "" : ": " + said);
+      return fmt::format("{}is in use by another program; end that one{}", who,
+                         said.empty() ? "" : ": " + said);
     case DeviceStatus::no_permission:
-      return fmt::format("{}cannot be opened without permission; {}", who, said.empty() ? row.permission : said);
+      return fmt::format("{}cannot be opened without permission; {}", who,
+                         said.empty() ? row.permission : said);
     default:
-      return fmt::format("{}cannot be opened: {}", who, said.empty() ? std::string(to_string(status)) : said);
+      return fmt::format("{}cannot be opened: {}", who,
+                         said.empty() ? std::string(to_string(status)) : said);
   }
 }
 
@@ -61,7 +66,8 @@ class Openings {
     }
     for (const auto& [name, serial] : taken_)
       if (std::count(taken_.begin(), taken_.end(), std::pair(name, serial)) > 1)
-        throw InputError(fmt::format("two entries of cameras have the serial \"{}\"; each camera can be one only", serial));
+        throw InputError(fmt::format(
+            "two entries of cameras have the serial \"{}\"; each camera can be one only", serial));
   }
 
   OpenedCamera open(const CameraRequest& request) {
@@ -79,8 +85,9 @@ class Openings {
     status = opened.device->configure(wanted, &opened.actual);
     if (status != DeviceStatus::ok) {
       const std::string said = opened.device->complaint();
-      throw InputError(fmt::format("{}: {}", camera_title(request.key, opened.device->info()),
-                                   said.empty() ? fmt::format("cannot do what is asked: {}", to_string(status)) : said));
+      throw InputError(fmt::format(
+          "{}: {}", camera_title(request.key, opened.device->info()),
+          said.empty() ? fmt::format("cannot do what is asked: {}", to_string(status)) : said));
     }
     return opened;
   }
@@ -96,8 +103,9 @@ class Openings {
       return d.serial;
     }
     const std::string said = driver.complaint();
-    throw InputError(fmt::format("{}: no {} camera is left to be it; {}; check cable and power{}", request.key, request.driver,
-                                 list_of(found), said.empty() ? "" : ": " + said));
+    throw InputError(fmt::format("{}: no {} camera is left to be it; {}; check cable and power{}",
+                                 request.key, request.driver, list_of(found),
+                                 said.empty() ? "" : ": " + said));
   }
 
   std::map<std::string, std::unique_ptr<CameraDriver>> drivers_;
@@ -111,10 +119,12 @@ const std::vector<CameraDriverRow>& camera_driver_rows() {
   // One row a driver: {name, meaning, its make_driver, what to do without permission}.
   static const std::vector<CameraDriverRow> rows{
       {"gige", "GigE Vision cameras", gige::make_driver, "run `vergence doctor`"},
-      {"iidc-usb", "IIDC cameras on USB (Point Grey's Firefly, Chameleon, Flea3, Grasshopper3)", iidc::make_usb_driver,
+      {"iidc-usb", "IIDC cameras on USB (Point Grey's Firefly, Chameleon, Flea3, Grasshopper3)",
+       iidc::make_usb_driver,
        "install the udev rules: vergence devices --write-udev, then plug the camera in again"},
       {"iidc-1394", "IIDC cameras on IEEE 1394", iidc::make_1394_driver,
-       "install the udev rules, and add the user to the group video: sudo usermod -aG video $USER, then log in again"},
+       "install the udev rules, and add the user to the group video: sudo usermod -aG video $USER, "
+       "then log in again"},
       {"v4l2", "Video4Linux: USB video class, sensors of a board, capture cards", v4l2::make_driver,
        "add the user to the group video: sudo usermod -aG video $USER, then log in again"},
   };
@@ -131,13 +141,15 @@ std::string camera_title(const std::string& key, const DeviceInfo& info) {
   return fmt::format("{} ({} {})", key, info.driver, info.serial);
 }
 
-std::vector<OpenedCamera> open_cameras(const std::vector<CameraRequest>& requests, std::vector<std::string>* remarks) {
+std::vector<OpenedCamera> open_cameras(const std::vector<CameraRequest>& requests,
+                                       std::vector<std::string>* remarks) {
   Openings openings(requests);
   std::vector<OpenedCamera> cameras;
   for (const CameraRequest& request : requests) {
     cameras.push_back(openings.open(request));
     const std::string remark = cameras.back().device->remark();
-    if (!remark.empty()) remarks->push_back(camera_title(request.key, cameras.back().device->info()) + ": " + remark);
+    if (!remark.empty())
+      remarks->push_back(camera_title(request.key, cameras.back().device->info()) + ": " + remark);
   }
   return cameras;
 }

@@ -15,7 +15,8 @@ struct CameraDriverRow {
   const char* permission;  // what to do where the system does not let us
 };
 
-/// The table of drivers for real cameras: everything that talks to one is chosen here. The mock's cameras come from its rig.
+/// The table of drivers for real cameras: everything that talks to one is chosen here. The mock's
+/// cameras come from its rig.
 [[nodiscard]] const std::vector<CameraDriverRow>& camera_driver_rows();
 [[nodiscard]] std::vector<std::string> camera_driver_names();
 
@@ -32,11 +33,14 @@ struct OpenedCamera {
   CameraConfiguration actual;
 };
 
-/// Opens and configures them in order. An empty serial takes the next camera that no other request names.
+/// Opens and configures them in order. An empty serial takes the next camera that no other request
+/// names.
 ///
-/// Errors  InputError, one sentence: the key, what was found or what the camera offers, what to do. Nothing stays open then.
+/// Errors  InputError, one sentence: the key, what was found or what the camera offers, what to do.
+///         Nothing stays open then.
 /// `remarks`: sentences about what works, but not as well as it should.
-[[nodiscard]] std::vector<OpenedCamera> open_cameras(const std::vector<CameraRequest>& requests, std::vector<std::string>* remarks);
+[[nodiscard]] std::vector<OpenedCamera> open_cameras(const std::vector<CameraRequest>& requests,
+                                                     std::vector<std::string>* remarks);
 
 /// A camera for a sentence: `cameras.0 (gige 15021234)`.
 [[nodiscard]] std::string camera_title(const std::string& key, const DeviceInfo& info);

@@ -13,12 +13,13 @@ namespace vergence::app {
 class ClockRecord {
  public:
   void note(DeviceStamp device, const MappedStamp& mapped) noexcept {
-    constexpr std::uint64_t kSettled = 60;              // stamps after which a clock is known: seconds
-    constexpr std::int64_t kOddDrift = 2'000;           // ppm, no crystal: the clock was set
+    constexpr std::uint64_t kSettled = 60;     // stamps after which a clock is known: seconds
+    constexpr std::int64_t kOddDrift = 2'000;  // ppm, no crystal: the clock was set
     constexpr Duration kEnough = Duration::seconds(5);  // for a drift that means something
     error_ = mapped.error;
     if (any_ && device > last_device_) {
-      const double step = static_cast<double>((device - last_device_).ns()), host = static_cast<double>((mapped.host - last_host_).ns());
+      const double step = static_cast<double>((device - last_device_).ns()),
+                   host = static_cast<double>((mapped.host - last_host_).ns());
       if (std::abs(host - step) > 1e-6 * kOddDrift * step + 20e6) any_ = false;
     } else {
       any_ = false;
@@ -35,7 +36,9 @@ class ClockRecord {
     if (since_ > kSettled) worst_ = std::max(worst_, mapped.error);
     const Duration span = last_device_ - first_device_;
     if (since_ > kSettled && span >= kEnough)
-      drift_ppm_ = 1e6 * (static_cast<double>((last_host_ - first_host_).ns()) / static_cast<double>(span.ns()) - 1);
+      drift_ppm_ = 1e6 * (static_cast<double>((last_host_ - first_host_).ns()) /
+                              static_cast<double>(span.ns()) -
+                          1);
     ++stamps_;
   }
 
@@ -45,8 +48,10 @@ class ClockRecord {
   [[nodiscard]] std::uint64_t stamps() const noexcept { return stamps_; }
   /// Of the host's clock against the device's, ppm; 0 where nothing is known.
   [[nodiscard]] double drift_ppm() const noexcept { return drift_ppm_; }
-  [[nodiscard]] Duration error() const noexcept { return error_; }        // of the newest stamp
-  [[nodiscard]] Duration worst_error() const noexcept { return worst_; }  // once the clock was known
+  [[nodiscard]] Duration error() const noexcept { return error_; }  // of the newest stamp
+  [[nodiscard]] Duration worst_error() const noexcept {
+    return worst_;
+  }  // once the clock was known
 
  private:
   bool any_ = false;

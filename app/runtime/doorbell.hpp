@@ -4,16 +4,16 @@
 
 namespace vergence::app {
 
-/// Wakes a thread that waits for something to change elsewhere (a ring that was empty or full). Not for the real-time path:
-/// wait() sleeps in the kernel.
+/// Wakes a thread that waits for something to change elsewhere (a ring that was empty or full). Not
+/// for the real-time path: wait() sleeps in the kernel.
 ///
 ///     for (;;) {
-///       const Doorbell::Rung seen = bell.look();   // before the look at the ring: a ring in between is not missed
-///       if (ring.pop(&item)) break;
-///       bell.wait(seen);
+///       const Doorbell::Rung seen = bell.look();   // before the look at the ring: a ring in
+///       between is not missed if (ring.pop(&item)) break; bell.wait(seen);
 ///     }
 ///
-/// Threads  Everything from any thread. No heap; ring() makes a system call only when somebody waits.
+/// Threads  Everything from any thread. No heap; ring() makes a system call only when somebody
+///          waits.
 class Doorbell {
  public:
   using Rung = std::uint32_t;  // the width a futex has: waiting needs no proxy

@@ -48,9 +48,11 @@ int write_whole(const std::filesystem::path& file, std::string_view text) {
   return out.close() == 0 ? 0 : errno;
 }
 
-/// The new name is on the disk only with the folder. File systems that cannot do that say EINVAL; that is no loss.
+/// The new name is on the disk only with the folder. File systems that cannot do that say EINVAL;
+/// that is no loss.
 int synchronise_folder(const std::filesystem::path& folder) {
-  const Descriptor at(::open(folder.empty() ? "." : folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
+  const Descriptor at(
+      ::open(folder.empty() ? "." : folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
   if (at.get() < 0) return errno;
   return ::fsync(at.get()) == 0 || errno == EINVAL ? 0 : errno;
 }
@@ -59,8 +61,10 @@ int synchronise_folder(const std::filesystem::path& folder) {
 
 void replace_durably(const std::filesystem::path& file, std::string_view text) {
   struct stat old {};
-  if (::stat(file.c_str(), &old) == 0 && !S_ISREG(old.st_mode))  // a device in whose place a file came would be gone for all
-    throw InputError(file.string() + ": cannot be replaced: it is no ordinary file; give another name");
+  if (::stat(file.c_str(), &old) == 0 &&
+      !S_ISREG(old.st_mode))  // a device in whose place a file came would be gone for all
+    throw InputError(file.string() +
+                     ": cannot be replaced: it is no ordinary file; give another name");
   std::filesystem::path fresh = file;
   fresh += ".new";
   int error = write_whole(fresh, text);
@@ -72,11 +76,13 @@ void replace_durably(const std::filesystem::path& file, std::string_view text) {
   if (std::rename(fresh.c_str(), file.c_str()) != 0) {
     error = errno;
     (void)::unlink(fresh.c_str());
-    throw InputError(file.string() + ": cannot be replaced (" + std::strerror(error) + "): check the folder's permissions");
+    throw InputError(file.string() + ": cannot be replaced (" + std::strerror(error) +
+                     "): check the folder's permissions");
   }
   error = synchronise_folder(file.parent_path());
   if (error != 0)
-    throw InputError(file.string() + ": is written, but may not outlast a power cut (" + std::strerror(error) + "): check the disk");
+    throw InputError(file.string() + ": is written, but may not outlast a power cut (" +
+                     std::strerror(error) + "): check the disk");
 }
 
 }  // namespace vergence::app

@@ -5,10 +5,18 @@
 namespace vergence::app {
 
 /// What the program exits with (DESIGN §6).
-enum class ExitCode : int { done = 0, not_usable = 1, bad_input = 2, device_failed = 3, interrupted = 130, terminated = 143 };
+enum class ExitCode : int {
+  done = 0,
+  not_usable = 1,
+  bad_input = 2,
+  device_failed = 3,
+  interrupted = 130,
+  terminated = 143
+};
 
-/// Arguments, configuration or input that cannot be used. The text is the whole sentence for the user:
-/// which file (with its line) or key, what is wrong, what to do. Caught in main(), exit code 2.
+/// Arguments, configuration or input that cannot be used. The text is the whole sentence for the
+/// user: which file (with its line) or key, what is wrong, what to do. Caught in main(), exit code
+/// 2.
 class InputError : public std::runtime_error {
  public:
   explicit InputError(const std::string& sentence) : std::runtime_error(sentence) {}

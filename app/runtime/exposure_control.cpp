@@ -13,7 +13,8 @@ constexpr double kAlike = 0.02;      // of an exposure: what cameras round by
 constexpr double kAlikeGain = 0.15;  // dB
 
 bool alike(const Duration& a, const Duration& b) noexcept {
-  return std::abs(static_cast<double>((a - b).ns())) <= kAlike * static_cast<double>(std::max(a, b).ns());
+  return std::abs(static_cast<double>((a - b).ns())) <=
+         kAlike * static_cast<double>(std::max(a, b).ns());
 }
 
 }  // namespace
@@ -21,24 +22,28 @@ bool alike(const Duration& a, const Duration& b) noexcept {
 /// A camera whose frames are looked at as they are handed out.
 class ExposureControl::Watched final : public CameraDevice {
  public:
-  Watched(ExposureControl* owner, std::size_t k, CameraDevice* camera) : owner_(owner), k_(k), camera_(camera) {}
+  Watched(ExposureControl* owner, std::size_t k, CameraDevice* camera)
+      : owner_(owner), k_(k), camera_(camera) {}
 
   const DeviceInfo& info() const noexcept override { return camera_->info(); }
-  DeviceStatus configure(const CameraConfiguration& wanted, CameraConfiguration* actual) noexcept override {
+  DeviceStatus configure(const CameraConfiguration& wanted,
+                         CameraConfiguration* actual) noexcept override {
     return camera_->configure(wanted, actual);
   }
   DeviceTiming timing() const noexcept override { return camera_->timing(); }
   DeviceStatus start(Notifier* ready) noexcept override { return camera_->start(ready); }
   DeviceStatus wait(Duration limit, Frame* frame) noexcept override {
     const DeviceStatus status = camera_->wait(limit, frame);
-    if (status == DeviceStatus::ok && frame->status == FrameStatus::complete) owner_->look(k_, *frame, camera_->view(frame->slot));
+    if (status == DeviceStatus::ok && frame->status == FrameStatus::complete)
+      owner_->look(k_, *frame, camera_->view(frame->slot));
     return status;
   }
   ImageView view(FrameSlot slot) const noexcept override { return camera_->view(slot); }
   void release(FrameSlot slot) noexcept override { camera_->release(slot); }
   void stop() noexcept override { camera_->stop(); }
   DeviceStatus trigger_once() noexcept override { return camera_->trigger_once(); }
-  DeviceStatus set_exposure(const ExposureSetting& wanted, ExposureSetting* actual) noexcept override {
+  DeviceStatus set_exposure(const ExposureSetting& wanted,
+                            ExposureSetting* actual) noexcept override {
     return camera_->set_exposure(wanted, actual);
   }
   std::string complaint() const override { return camera_->complaint(); }
@@ -51,10 +56,15 @@ class ExposureControl::Watched final : public CameraDevice {
   CameraDevice* camera_;
 };
 
-ExposureControl::ExposureControl(const std::vector<CameraDevice*>& cameras, int width, int height, const ImageView& mask,
-                                 const exposure::ExposureOptions& options, const ExposureSetting& start, bool at_once)
-    : meter_(width, height, mask), options_(options), controller_(options, start), at_once_(at_once) {
-  for (CameraDevice* camera : cameras) watched_.push_back(std::make_unique<Watched>(this, watched_.size(), camera));
+ExposureControl::ExposureControl(const std::vector<CameraDevice*>& cameras, int width, int height,
+                                 const ImageView& mask, const exposure::ExposureOptions& options,
+                                 const ExposureSetting& start, bool at_once)
+    : meter_(width, height, mask),
+      options_(options),
+      controller_(options, start),
+      at_once_(at_once) {
+  for (CameraDevice* camera : cameras)
+    watched_.push_back(std::make_unique<Watched>(this, watched_.size(), camera));
   taken_.fill(start);
   if (!at_once_) thread_ = std::thread([this] { work(); });
 }
@@ -85,7 +95,8 @@ ExposureCounters ExposureControl::counters() const noexcept {
 }
 
 void ExposureControl::look(std::size_t k, const Frame& frame, const ImageView& image) noexcept {
-  if (unsupported_.load(std::memory_order_relaxed) || under_way_.load(std::memory_order_acquire)) return;
+  if (unsupported_.load(std::memory_order_relaxed) || under_way_.load(std::memory_order_acquire))
+    return;
   if (asked_) {  // it is done: from here on images may have it
     asked_ = false;
     controller_.restart_settling();
@@ -135,7 +146,8 @@ void ExposureControl::set_all(const ExposureSetting& wanted) noexcept {
       continue;
     }
     taken_[k] = actual;
-    unequal = unequal || !alike(actual.exposure, taken_[0].exposure) || std::abs(actual.gain_db - taken_[0].gain_db) > kAlikeGain;
+    unequal = unequal || !alike(actual.exposure, taken_[0].exposure) ||
+              std::abs(actual.gain_db - taken_[0].gain_db) > kAlikeGain;
   }
   if (unequal) unequal_.fetch_add(1, std::memory_order_relaxed);
 }

@@ -14,8 +14,8 @@ xsens::SyncIn sync_in_of(const std::string& word) {
   if (word == "off") return xsens::SyncIn::off;
   if (word == "rising") return xsens::SyncIn::rising;
   if (word == "falling") return xsens::SyncIn::falling;
-  throw InputError(fmt::format("ins.sync_in is \"{}\"{}; it is one of leave, off, rising, falling", word,
-                               did_you_mean(word, {"leave", "off", "rising", "falling"})));
+  throw InputError(fmt::format("ins.sync_in is \"{}\"{}; it is one of leave, off, rising, falling",
+                               word, did_you_mean(word, {"leave", "off", "rising", "falling"})));
 }
 
 std::unique_ptr<InsDriver> make_xsens(const InsRequest& request) {
@@ -32,21 +32,28 @@ const InsDriverRow& row_of(const InsRequest& request) {
   for (const InsDriverRow& row : ins_driver_rows())
     if (request.driver == row.name) return row;
   const auto names = ins_driver_names();
-  throw InputError(fmt::format("ins.driver is \"{}\"{}; this version knows {}, mock (with mock cameras) and none", request.driver,
-                               did_you_mean(request.driver, names), fmt::join(names, ", ")));
+  throw InputError(fmt::format(
+      "ins.driver is \"{}\"{}; this version knows {}, mock (with mock cameras) and none",
+      request.driver, did_you_mean(request.driver, names), fmt::join(names, ", ")));
 }
 
 /// The sentence for an open() that gave nothing.
-std::string refusal(const InsRequest& request, const InsDriverRow& row, const InsDriver& driver, DeviceStatus status) {
-  const std::string who = fmt::format("ins: the {} INS{}", row.name, request.port.empty() ? "" : " on " + request.port);
+std::string refusal(const InsRequest& request, const InsDriverRow& row, const InsDriver& driver,
+                    DeviceStatus status) {
+  const std::string who =
+      fmt::format("ins: the {} INS{}", row.name, request.port.empty() ? "" : " on " + request.port);
   const std::string said = driver.complaint();
   switch (status) {
     case DeviceStatus::busy:
-      return fmt::format("{} is in use by another program; end that one (ModemManager opens new ports: tell it not to)", who);
+      return fmt::format(
+          "{} is in use by another program; end that one (ModemManager opens new ports: tell it "
+          "not to)",
+          who);
     case DeviceStatus::no_permission:
       return fmt::format("{} cannot be opened without permission; {}", who, row.permission);
     default:
-      return fmt::format("{} cannot be used: {}", who, said.empty() ? std::string(to_string(status)) : said);
+      return fmt::format("{} cannot be used: {}", who,
+                         said.empty() ? std::string(to_string(status)) : said);
   }
 }
 
@@ -54,7 +61,8 @@ std::string refusal(const InsRequest& request, const InsDriverRow& row, const In
 
 const std::vector<InsDriverRow>& ins_driver_rows() {
   static const std::vector<InsDriverRow> rows{
-      {"xsens", "XSens MTi-G or MTi-G-700/710 on a serial port", &make_xsens, "add the user to group dialout, and log in again"},
+      {"xsens", "XSens MTi-G or MTi-G-700/710 on a serial port", &make_xsens,
+       "add the user to group dialout, and log in again"},
   };
   return rows;
 }
@@ -79,10 +87,12 @@ std::unique_ptr<InsDevice> open_ins(const InsRequest& request, std::vector<std::
   status = device->configure(request.rate_hz, nullptr);
   if (status != DeviceStatus::ok) {
     const std::string said = device->complaint();
-    throw InputError(fmt::format("{}: {}", ins_title(device->info()),
-                                 said.empty() ? fmt::format("cannot do what is asked: {}", to_string(status)) : said));
+    throw InputError(fmt::format(
+        "{}: {}", ins_title(device->info()),
+        said.empty() ? fmt::format("cannot do what is asked: {}", to_string(status)) : said));
   }
-  if (const std::string remark = device->remark(); !remark.empty()) remarks->push_back(ins_title(device->info()) + ": " + remark);
+  if (const std::string remark = device->remark(); !remark.empty())
+    remarks->push_back(ins_title(device->info()) + ": " + remark);
   return device;
 }
 

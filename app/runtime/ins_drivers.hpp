@@ -27,7 +27,8 @@ struct InsDriverRow {
   const char* permission;  // what to do where the system does not let us
 };
 
-/// The table of drivers for real INS: everything that talks to one is chosen here. The mock's INS comes from its rig.
+/// The table of drivers for real INS: everything that talks to one is chosen here. The mock's INS
+/// comes from its rig.
 [[nodiscard]] const std::vector<InsDriverRow>& ins_driver_rows();
 [[nodiscard]] std::vector<std::string> ins_driver_names();
 
@@ -35,7 +36,8 @@ struct InsDriverRow {
 ///
 /// Errors  InputError, one sentence: the key, what was found, what to do. Nothing stays open then.
 /// `remarks`: sentences about what works, but not as asked.
-[[nodiscard]] std::unique_ptr<InsDevice> open_ins(const InsRequest& request, std::vector<std::string>* remarks);
+[[nodiscard]] std::unique_ptr<InsDevice> open_ins(const InsRequest& request,
+                                                  std::vector<std::string>* remarks);
 
 /// An INS for a sentence: `ins (xsens 07701234, MTI-G-710 on /dev/ttyUSB0)`.
 [[nodiscard]] std::string ins_title(const DeviceInfo& info);

@@ -12,9 +12,12 @@
 namespace vergence::app {
 namespace {
 
-constexpr std::int64_t kAskAgain = 1'000'000'000;  // ns: opening a bus device takes a while, a second more is no loss
+constexpr std::int64_t kAskAgain =
+    1'000'000'000;  // ns: opening a bus device takes a while, a second more is no loss
 
-std::int64_t steady_ns() noexcept { return std::chrono::steady_clock::now().time_since_epoch().count(); }
+std::int64_t steady_ns() noexcept {
+  return std::chrono::steady_clock::now().time_since_epoch().count();
+}
 
 ClockMapperOptions clock_options(const DeviceTiming& t) noexcept {
   ClockMapperOptions o;
@@ -26,19 +29,29 @@ ClockMapperOptions clock_options(const DeviceTiming& t) noexcept {
 
 void check(DeviceStatus status, const DeviceInfo& who, const std::string& complaint) {
   if (status == DeviceStatus::ok) return;
-  const std::string why =
-      complaint.empty() ? std::string(to_string(status)) + "; check its cable and its section of the configuration" : complaint;
+  const std::string why = complaint.empty()
+                              ? std::string(to_string(status)) +
+                                    "; check its cable and its section of the configuration"
+                              : complaint;
   throw InputError(who.driver + " " + who.serial + " cannot be started: " + why);
 }
 
 }  // namespace
 
-LiveSource::LiveSource(std::vector<CameraDevice*> cameras, InsDevice* ins, TriggerDevice* trigger, const Options& options)
-    : cameras_(std::move(cameras)), ins_(ins), trigger_(trigger), options_(options), sync_(options.sync), heads_(cameras_.size()) {
+LiveSource::LiveSource(std::vector<CameraDevice*> cameras, InsDevice* ins, TriggerDevice* trigger,
+                       const Options& options)
+    : cameras_(std::move(cameras)),
+      ins_(ins),
+      trigger_(trigger),
+      options_(options),
+      sync_(options.sync),
+      heads_(cameras_.size()) {
   for (const CameraDevice* camera : cameras_) clocks_.emplace_back(clock_options(camera->timing()));
   if (ins_ != nullptr) ins_clock_ = std::make_unique<ClockMapper>(clock_options(ins_->timing()));
-  if (trigger_ != nullptr) board_clock_ = std::make_unique<ClockMapper>(clock_options(trigger_->timing()));
-  if (options.sync.mode == SyncMode::ins_syncout) sync_out_.emplace(options.sync.interval, options.sync_out_divider);
+  if (trigger_ != nullptr)
+    board_clock_ = std::make_unique<ClockMapper>(clock_options(trigger_->timing()));
+  if (options.sync.mode == SyncMode::ins_syncout)
+    sync_out_.emplace(options.sync.interval, options.sync_out_divider);
 }
 
 LiveSource::~LiveSource() {
@@ -72,7 +85,8 @@ void LiveSource::join() noexcept {
   if (ins_ != nullptr) ins_->stop();
   if (trigger_ != nullptr) trigger_->stop();
   counters_.sync = sync_.counters();
-  for (std::size_t k = 0; k < cameras_.size(); ++k) counters_.proven[k] = sync_.proven(static_cast<int>(k));
+  for (std::size_t k = 0; k < cameras_.size(); ++k)
+    counters_.proven[k] = sync_.proven(static_cast<int>(k));
   counters_.dropped_sets = skipped_.load();
   counters_.clock_resets = ins_clock_ ? ins_clock_->resets() : 0;
   for (const ClockMapper& clock : clocks_) counters_.clock_resets += clock.resets();
@@ -82,7 +96,8 @@ void LiveSource::join() noexcept {
 bool LiveSource::next(LiveItem* item) noexcept {
   for (;;) {
     const Doorbell::Rung seen = filled_.look();
-    const bool finished = finished_.load(std::memory_order_acquire);  // before the ring: what was pushed before is still found
+    const bool finished = finished_.load(
+        std::memory_order_acquire);  // before the ring: what was pushed before is still found
     if (ring_.pop(item)) {
       freed_.ring();
       if (item->kind == LiveItem::Kind::refused) {
@@ -107,7 +122,8 @@ void LiveSource::release(const SyncedSet& set) noexcept {
 }
 
 Stamp LiveSource::stamp_of(HostStamp host) const noexcept {
-  const std::int64_t ns = (options_.tie_stamp + (host - options_.tie_host)).ns(), grid = options_.stamp_grid.ns();
+  const std::int64_t ns = (options_.tie_stamp + (host - options_.tie_host)).ns(),
+                     grid = options_.stamp_grid.ns();
   return Stamp((ns + grid / 2) / grid * grid);  // after 1970
 }
 
@@ -132,7 +148,9 @@ void LiveSource::work() {
       hand_out_sets();
       continue;
     }
-    const bool over = std::all_of(heads_.begin(), heads_.end(), [](const auto& h) { return h.ended; }) && ins_head_.ended;
+    const bool over =
+        std::all_of(heads_.begin(), heads_.end(), [](const auto& h) { return h.ended; }) &&
+        ins_head_.ended;
     if (over) break;
     bell_.wait(seen);
   }
@@ -173,7 +191,8 @@ void LiveSource::look_ins() {
     ins_head_.asked_ns = now;
     DeviceStatus status = ins_->start(this);
     // Its time passes by itself: as long as it is not back, nothing says what else may go on.
-    while (status == DeviceStatus::gone && ins_->keeps_own_time() && !stop_.load(std::memory_order_acquire)) {
+    while (status == DeviceStatus::gone && ins_->keeps_own_time() &&
+           !stop_.load(std::memory_order_acquire)) {
       std::this_thread::sleep_for(std::chrono::milliseconds(1));
       status = ins_->start(this);
     }
@@ -187,7 +206,8 @@ void LiveSource::look_ins() {
   do {
     constexpr Duration kLook = Duration::milliseconds(100);
     status = ins_->wait(ins_->keeps_own_time() ? kLook : Duration{}, &ins_head_.value);
-  } while (status == DeviceStatus::timeout && ins_->keeps_own_time() && !stop_.load(std::memory_order_acquire));
+  } while (status == DeviceStatus::timeout && ins_->keeps_own_time() &&
+           !stop_.load(std::memory_order_acquire));
   ins_head_.gone = status == DeviceStatus::gone;
   ins_head_.held = status == DeviceStatus::ok;
   ins_head_.ended = status == DeviceStatus::ended || status == DeviceStatus::stopped;
@@ -230,8 +250,11 @@ int LiveSource::earliest() const {
       device = static_cast<int>(k);
       first = heads_[k].value.arrival;
     }
-  // What keeps a time of its own may be ahead of the cameras: until one of them has something, an earlier image may still come.
-  const bool images_may_come = device < 0 && std::any_of(heads_.begin(), heads_.end(), [](const auto& h) { return !h.ended && !h.gone; });
+  // What keeps a time of its own may be ahead of the cameras: until one of them has something, an
+  // earlier image may still come.
+  const bool images_may_come =
+      device < 0 &&
+      std::any_of(heads_.begin(), heads_.end(), [](const auto& h) { return !h.ended && !h.gone; });
   const bool any_camera = device >= 0;
   // At the same instant pulses and then the INS go first: the images may need them.
   const bool ins_waits = images_may_come && ins_ != nullptr && ins_->keeps_own_time();
@@ -240,7 +263,8 @@ int LiveSource::earliest() const {
     first = ins_head_.value.arrival;
   }
   const bool board_waits = images_may_come && options_.board_keeps_own_time;
-  if (board_head_.held && !board_waits && (device < 0 || board_head_.value.arrival <= first)) device = ins_place() + 1;
+  if (board_head_.held && !board_waits && (device < 0 || board_head_.value.arrival <= first))
+    device = ins_place() + 1;
   return device;
 }
 
@@ -301,7 +325,8 @@ void LiveSource::take_reading() {
   item.kind = LiveItem::Kind::reading;
   item.sample = ins_head_.value.sample;
   const InsReading& r = ins_head_.value;
-  const MappedStamp at = r.mapped ? MappedStamp{r.host, r.host_error} : ins_clock_->map(r.measured, r.arrival);
+  const MappedStamp at =
+      r.mapped ? MappedStamp{r.host, r.host_error} : ins_clock_->map(r.measured, r.arrival);
   item.stamp = item.sample.stamp = stamp_of(at.host);
   item.sample.stamp_error = at.error;
   item.quality = r.quality;
@@ -371,13 +396,15 @@ void LiveSource::pause_pulses() {
     if (trigger_->pause(pulses) != DeviceStatus::ok) ++counters_.pauses_refused;
     return;
   }
-  // No other way than to stop who makes the pulses; meanwhile nothing else comes that could not wait.
+  // No other way than to stop who makes the pulses; meanwhile nothing else comes that could not
+  // wait.
   const bool master = options_.sync.mode == SyncMode::master_strobe;
   if (master)
     cameras_[0]->stop();
   else
     ins_->stop();
-  std::this_thread::sleep_for(std::chrono::nanoseconds((options_.sync.interval * (static_cast<std::int64_t>(pulses) + 1)).ns()));
+  std::this_thread::sleep_for(std::chrono::nanoseconds(
+      (options_.sync.interval * (static_cast<std::int64_t>(pulses) + 1)).ns()));
   const DeviceStatus status = master ? cameras_[0]->start(this) : ins_->start(this);
   if (status != DeviceStatus::ok) ++counters_.pauses_refused;
   if (master) {
@@ -411,7 +438,9 @@ void LiveSource::hand_out_sets() {
   item.kind = LiveItem::Kind::images;
   while (sync_.next(&item.set)) {
     item.stamp = stamp_of(item.set.stamp);
-    if (item.set.number > kSettled) counters_.worst_stamp_error_ns = std::max(counters_.worst_stamp_error_ns, item.set.error.ns());
+    if (item.set.number > kSettled)
+      counters_.worst_stamp_error_ns =
+          std::max(counters_.worst_stamp_error_ns, item.set.error.ns());
     push(item);
   }
 }

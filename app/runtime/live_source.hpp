@@ -61,38 +61,49 @@ struct LiveCounters {
 
 /// Cameras, INS and board into one stream of rig frames and INS samples on the host's clock.
 ///
-/// The drivers' threads ring a bell; one thread here takes what they have in the order of arrival, maps the stamps, pairs the images
-/// and puts both into a ring for the estimator's thread. Merged by arrival: a mock in virtual time gives the same stream on every run.
-/// Pulses     Their reports go into the synchroniser in the order of arrival among the frames; what the driver has not mapped is mapped
+/// The drivers' threads ring a bell; one thread here takes what they have in the order of arrival,
+/// maps the stamps, pairs the images and puts both into a ring for the estimator's thread. Merged
+/// by arrival: a mock in virtual time gives the same stream on every run.
+/// Pulses     Their reports go into the synchroniser in the order of arrival among the frames; what
+///            the driver has not mapped is mapped
 /// here,
-///            with a new fit for every boot. A pause that the synchroniser wants is asked for when a report is taken: in virtual time
-///            always at the same one. With `ins_syncout` the INS's readings tell of the pulses; where a gap is wanted its stream is stopped
-///            for as long, as camera 0's is with `master_strobe`.
-/// Ownership  Devices are configured and outlive it. Slots of a set are the consumer's until release(). All slots go back to their cameras
-///            on the consumer's thread.
-/// Threads    next(), release(): one consumer, which may be sealed. stop(): any. The rest: the owner.
-/// Full       wait_when_full (virtual time): the devices wait. Else the consumer skips to the newest images, readings that find the ring
+///            with a new fit for every boot. A pause that the synchroniser wants is asked for when
+///            a report is taken: in virtual time always at the same one. With `ins_syncout` the
+///            INS's readings tell of the pulses; where a gap is wanted its stream is stopped for as
+///            long, as camera 0's is with `master_strobe`.
+/// Ownership  Devices are configured and outlive it. Slots of a set are the consumer's until
+///            release(). All slots go back to their cameras on the consumer's thread.
+/// Threads    next(), release(): one consumer, which may be sealed. stop(): any. The rest: the
+///            owner.
+/// Full       wait_when_full (virtual time): the devices wait. Else the consumer skips to the
+///            newest images, readings that find the ring
 /// full
 ///            are dropped; counted.
-/// Errors     start() throws InputError naming the device. A device that goes is told by an item and asked again every second.
+/// Errors     start() throws InputError naming the device. A device that goes is told by an item
+///            and asked again every second.
 class LiveSource final : private Notifier {
  public:
   struct Options {
     SyncOptions sync{};
     bool wait_when_full = false;
-    Stamp tie_stamp{};                               // this stamp …
-    HostStamp tie_host{};                            // … was this time of the host's clock
-    Duration stamp_grid = Duration::nanoseconds(1);  // stamps are whole multiples of it, rounded to the nearest; > 0
-    /// The board lives in a virtual time of its own, beside the other devices: its next report is there for the waiting.
+    Stamp tie_stamp{};     // this stamp …
+    HostStamp tie_host{};  // … was this time of the host's clock
+    Duration stamp_grid =
+        Duration::nanoseconds(1);  // stamps are whole multiples of it, rounded to the nearest; > 0
+    /// The board lives in a virtual time of its own, beside the other devices: its next report is
+    /// there for the waiting.
     bool board_keeps_own_time = false;
-    std::uint32_t sync_out_divider = 0;  // ins_syncout: readings a pulse, where the INS does not mark those that one left with
+    std::uint32_t sync_out_divider =
+        0;  // ins_syncout: readings a pulse, where the INS does not mark those that one left with
   };
 
   /// `ins` may be null. The cameras in the order of the rig, camera 0 first.
-  LiveSource(std::vector<CameraDevice*> cameras, InsDevice* ins, TriggerDevice* trigger, const Options& options);
+  LiveSource(std::vector<CameraDevice*> cameras, InsDevice* ins, TriggerDevice* trigger,
+             const Options& options);
   ~LiveSource();
 
-  /// Who waits for pulses first, who makes them last: the board, the INS with `ins_syncout`, camera 0 with `master_strobe`.
+  /// Who waits for pulses first, who makes them last: the board, the INS with `ins_syncout`, camera
+  /// 0 with `master_strobe`.
   void start();
   /// False: the drive is over, or stop() was called.
   [[nodiscard]] bool next(LiveItem* item) noexcept;
@@ -119,7 +130,8 @@ class LiveSource final : private Notifier {
     T value{};
   };
   static constexpr std::size_t kRing = 256;
-  // Live: sets that may wait for the estimator before the oldest is skipped; when an image was lost so many come at once.
+  // Live: sets that may wait for the estimator before the oldest is skipped; when an image was lost
+  // so many come at once.
   static constexpr int kMostWaiting = static_cast<int>(RigSynchronizer::kOpen);
 
   void notify() noexcept override { bell_.ring(); }
@@ -127,7 +139,8 @@ class LiveSource final : private Notifier {
   void look(std::size_t k);
   void look_ins();
   void look_board();
-  /// Which device's oldest item arrived first: a camera, or after those the INS, the board. −1: none.
+  /// Which device's oldest item arrived first: a camera, or after those the INS, the board. −1:
+  /// none.
   [[nodiscard]] int earliest() const;
   [[nodiscard]] int ins_place() const noexcept { return static_cast<int>(heads_.size()); }
   void take_frame(std::size_t k);
@@ -148,7 +161,8 @@ class LiveSource final : private Notifier {
   Options options_;
   RigSynchronizer sync_;
   std::vector<ClockMapper> clocks_;
-  std::array<Duration, kMaxCameras> exposures_{};  // of the first frames: what the mappers' least delays hold for
+  std::array<Duration, kMaxCameras>
+      exposures_{};  // of the first frames: what the mappers' least delays hold for
   std::vector<Head<Frame>> heads_;
   std::unique_ptr<ClockMapper> ins_clock_;
   Head<InsReading> ins_head_;

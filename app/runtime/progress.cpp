@@ -17,9 +17,10 @@ constexpr Duration kBetweenRedraws = Duration::milliseconds(100);
 constexpr Duration kBetweenLines = Duration::seconds(10);
 constexpr Duration kFirstEstimate = Duration::seconds(1);  // sooner the rate is that of the start
 constexpr int kUnknownWidth = 80;                          // columns
-constexpr double kLongestLeft = 360'000;                   // s, 100 hours: longer estimates tell nothing
+constexpr double kLongestLeft = 360'000;  // s, 100 hours: longer estimates tell nothing
 
-/// A code point of UTF-8 starts at every byte that does not continue one. Each takes one column here: the line holds no others.
+/// A code point of UTF-8 starts at every byte that does not continue one. Each takes one column
+/// here: the line holds no others.
 bool starts_code_point(char c) { return (static_cast<unsigned char>(c) & 0xC0U) != 0x80U; }
 
 std::size_t columns_of(std::string_view text) {
@@ -45,7 +46,9 @@ int width_of_stderr() {
 }
 
 HostStamp monotonic_now() {
-  return HostStamp(std::chrono::duration_cast<std::chrono::nanoseconds>(std::chrono::steady_clock::now().time_since_epoch()).count());
+  return HostStamp(std::chrono::duration_cast<std::chrono::nanoseconds>(
+                       std::chrono::steady_clock::now().time_since_epoch())
+                       .count());
 }
 
 Progress::Mode mode_of_stderr(bool quiet) {
@@ -57,10 +60,13 @@ Progress::Mode mode_of_stderr(bool quiet) {
 
 }  // namespace
 
-Progress::Progress(std::ostream& out, Mode mode, std::function<HostStamp()> clock, std::function<int()> width)
+Progress::Progress(std::ostream& out, Mode mode, std::function<HostStamp()> clock,
+                   std::function<int()> width)
     : out_(out), mode_(mode), clock_(std::move(clock)), width_(std::move(width)) {}
 
-Progress Progress::on_stderr(bool quiet) { return {std::cerr, mode_of_stderr(quiet), monotonic_now, width_of_stderr}; }
+Progress Progress::on_stderr(bool quiet) {
+  return {std::cerr, mode_of_stderr(quiet), monotonic_now, width_of_stderr};
+}
 
 Progress::~Progress() { finish(); }
 
@@ -104,7 +110,8 @@ std::string Progress::line(HostStamp now) const {
   std::string text;
   const auto part = [&text](const std::string& p) { text += (text.empty() ? "" : " · ") + p; };
   if (!s.state.empty()) part(std::string(s.state));
-  part(s.frames > 0 ? fmt::format("frame {}/{}", s.frame, s.frames) : fmt::format("frame {}", s.frame));
+  part(s.frames > 0 ? fmt::format("frame {}/{}", s.frame, s.frames)
+                    : fmt::format("frame {}", s.frame));
   if (s.words.empty())
     part(fmt::format("{:.2f} km", s.path_m / 1000.0));
   else
@@ -130,11 +137,14 @@ void Progress::draw(HostStamp now) {
     return;
   }
   const int width = width_();
-  // One column stays free: a terminal that has just filled its last one may already have begun the next line.
+  // One column stays free: a terminal that has just filled its last one may already have begun the
+  // next line.
   const auto room = static_cast<std::size_t>(std::max(1, (width < 1 ? kUnknownWidth : width) - 1));
   const std::string_view shown = cut(whole, room);
   const std::size_t columns = columns_of(shown);
-  out_ << '\r' << shown << std::string(columns_ > columns ? std::min(columns_, room) - columns : 0, ' ') << std::flush;
+  out_ << '\r' << shown
+       << std::string(columns_ > columns ? std::min(columns_, room) - columns : 0, ' ')
+       << std::flush;
   columns_ = columns;
 }
 

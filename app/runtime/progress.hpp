@@ -20,7 +20,8 @@ struct ProgressState {
   std::optional<int> inliers{};         // of the last pose
   std::optional<double> estimate_ms{};  // of the last frame
   std::optional<double> from_ins_m{};   // distance to the INS
-  std::string_view words{};             // instead of way and figures, where there are none: `calibrate · frame 7/26 · 5 with the board`
+  std::string_view words{};  // instead of way and figures, where there are none: `calibrate · frame
+                             // 7/26 · 5 with the board`
 };
 
 /// `stereo · frame 1204/33000 · 0.62 km · 318 inliers · 7.9 ms · 0.42 m from INS · 03:12 left`
@@ -28,13 +29,15 @@ struct ProgressState {
 /// terminal  one line, redrawn at most 10 times a second, cut to the terminal's width
 /// lines     one line every 10 s, the last one at finish(): for files and pipes
 /// quiet     nothing
-/// Threads   One caller. Time  Monotonic, from the clock handed in. Errors  A stream that fails is ignored.
+/// Threads   One caller. Time  Monotonic, from the clock handed in. Errors  A stream that fails is
+/// ignored.
 class Progress {
  public:
   enum class Mode : std::uint8_t { terminal, lines, quiet };
 
   /// `width` in columns is asked at every redraw, as a terminal may be resized; < 1: not known, 80.
-  Progress(std::ostream& out, Mode mode, std::function<HostStamp()> clock, std::function<int()> width);
+  Progress(std::ostream& out, Mode mode, std::function<HostStamp()> clock,
+           std::function<int()> width);
   /// On standard error with the machine's clock: terminal or lines by what standard error is.
   [[nodiscard]] static Progress on_stderr(bool quiet);
   /// Ends the line as finish() does.
@@ -42,7 +45,8 @@ class Progress {
   Progress(const Progress&) = delete;
   Progress& operator=(const Progress&) = delete;
 
-  /// Called as often as wanted; draws when it is time. The clock of the rate starts with the first call.
+  /// Called as often as wanted; draws when it is time. The clock of the rate starts with the first
+  /// call.
   void update(const ProgressState& state);
   /// A sentence for the user between the redraws, on a line of its own; also with `quiet`.
   void say(std::string_view sentence);

@@ -16,12 +16,14 @@ extern "C" void note_signal(int number) {
 
 extern "C" void note_calibration_request(int /*number*/) { calibration_asked.store(true); }
 
-/// Restart: a signal must not turn a write of the session into an error. `once`: the second one acts as it would by default.
+/// Restart: a signal must not turn a write of the session into an error. `once`: the second one
+/// acts as it would by default.
 void install(int number, void (*handler)(int), bool once, struct sigaction* former) {
   struct sigaction action {};
   action.sa_handler = handler;
   sigemptyset(&action.sa_mask);
-  action.sa_flags = static_cast<int>(static_cast<unsigned>(SA_RESTART) | (once ? static_cast<unsigned>(SA_RESETHAND) : 0U));
+  action.sa_flags = static_cast<int>(static_cast<unsigned>(SA_RESTART) |
+                                     (once ? static_cast<unsigned>(SA_RESETHAND) : 0U));
   sigaction(number, &action, former);  // fails only for numbers that cannot be caught
 }
 
@@ -41,9 +43,13 @@ SignalGuard::~SignalGuard() {
   sigaction(SIGUSR1, &former_user_, nullptr);
 }
 
-bool SignalGuard::stop_requested() const noexcept { return caught.load(std::memory_order_relaxed) != 0; }
+bool SignalGuard::stop_requested() const noexcept {
+  return caught.load(std::memory_order_relaxed) != 0;
+}
 
-bool SignalGuard::take_calibration_request() const noexcept { return calibration_asked.exchange(false); }
+bool SignalGuard::take_calibration_request() const noexcept {
+  return calibration_asked.exchange(false);
+}
 
 std::optional<ExitCode> SignalGuard::stop_code() const noexcept {
   switch (caught.load(std::memory_order_relaxed)) {

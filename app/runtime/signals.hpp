@@ -7,12 +7,14 @@
 
 namespace vergence::app {
 
-/// SIGINT and SIGTERM become a flag that a command looks at between frames: it stops, closes its session and
-/// returns stop_code(). SIGUSR1 asks for a new calibration; a command that has none to make takes no notice.
+/// SIGINT and SIGTERM become a flag that a command looks at between frames: it stops, closes its
+/// session and returns stop_code(). SIGUSR1 asks for a new calibration; a command that has none to
+/// make takes no notice.
 ///
 /// Ownership  One at a time in a program; the destructor puts the former handlers back.
 /// Threads    stop_requested(), stop_code() and take_calibration_request() from any thread.
-/// Errors     A second signal of the same kind ends the program at once, as it would without this: the way out of a hang.
+/// Errors     A second signal of the same kind ends the program at once, as it would without this:
+///            the way out of a hang.
 class SignalGuard {
  public:
   SignalGuard();
@@ -21,7 +23,8 @@ class SignalGuard {
   SignalGuard& operator=(const SignalGuard&) = delete;
 
   [[nodiscard]] bool stop_requested() const noexcept;
-  /// `interrupted` (130) or `terminated` (143) by the first signal that came; nothing when none did.
+  /// `interrupted` (130) or `terminated` (143) by the first signal that came; nothing when none
+  /// did.
   [[nodiscard]] std::optional<ExitCode> stop_code() const noexcept;
   /// Whether SIGUSR1 has come since the last call, however often.
   [[nodiscard]] bool take_calibration_request() const noexcept;

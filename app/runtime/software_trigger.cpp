@@ -9,7 +9,8 @@ namespace vergence::app {
 
 using std::chrono::steady_clock;
 
-DeviceStatus SoftwareTrigger::configure(const TriggerConfiguration& wanted, TriggerConfiguration* actual) noexcept {
+DeviceStatus SoftwareTrigger::configure(const TriggerConfiguration& wanted,
+                                        TriggerConfiguration* actual) noexcept {
   if (!(wanted.rate_hz > 0)) return DeviceStatus::bad_configuration;
   if (wanted.rate_hz > 1000) return DeviceStatus::unsupported;
   rate_ = wanted.rate_hz;
@@ -41,7 +42,8 @@ DeviceStatus SoftwareTrigger::wait(Duration limit, Pulse* pulse) noexcept {
   if (!running_) return DeviceStatus::stopped;
   if (limit <= Duration{}) return DeviceStatus::timeout;
   std::unique_lock lock(mutex_);
-  (void)changed_.wait_for(lock, std::chrono::nanoseconds(limit.ns()), [this] { return !ring_.empty() || stop_; });
+  (void)changed_.wait_for(lock, std::chrono::nanoseconds(limit.ns()),
+                          [this] { return !ring_.empty() || stop_; });
   if (ring_.pop(pulse)) return DeviceStatus::ok;
   return stop_ ? DeviceStatus::stopped : DeviceStatus::timeout;
 }

@@ -11,10 +11,13 @@
 
 namespace vergence::app {
 
-/// A trigger board made of software: asks every camera for an exposure at the rate, one after the other.
+/// A trigger board made of software: asks every camera for an exposure at the rate, one after the
+/// other.
 ///
-/// The cameras expose as far apart as a command takes; their stamps tell. A camera that is gone is passed over.
-/// Ownership  The cameras outlive it and are started before it. Threads: one of its own between start() and stop().
+/// The cameras expose as far apart as a command takes; their stamps tell. A camera that is gone is
+/// passed over.
+/// Ownership  The cameras outlive it and are started before it. Threads: one of its own between
+///            start() and stop().
 /// Errors     start(): failed, when no thread can be had.
 class SoftwareTrigger final : public TriggerDevice {
  public:
@@ -22,7 +25,8 @@ class SoftwareTrigger final : public TriggerDevice {
   ~SoftwareTrigger() override { stop(); }
 
   const DeviceInfo& info() const noexcept override { return info_; }
-  DeviceStatus configure(const TriggerConfiguration& wanted, TriggerConfiguration* actual) noexcept override;
+  DeviceStatus configure(const TriggerConfiguration& wanted,
+                         TriggerConfiguration* actual) noexcept override;
   DeviceStatus start(Notifier* ready) noexcept override;
   DeviceStatus wait(Duration limit, Pulse* pulse) noexcept override;
   void stop() noexcept override;

@@ -53,7 +53,8 @@ void ThreadRunner::run(TaskRef here, TaskRef there) noexcept {
 }
 
 void ThreadRunner::work(Worker worker) noexcept {
-  (void)pthread_setname_np(pthread_self(), worker == Worker::of_estimator ? "vergence-front" : "vergence-right");
+  (void)pthread_setname_np(pthread_self(),
+                           worker == Worker::of_estimator ? "vergence-front" : "vergence-right");
   if (worker == Worker::of_estimator) AllocationGuard::seal_thread();
   for (std::uint32_t answered = 0;; ++answered) {
     await_change(asked_, answered);

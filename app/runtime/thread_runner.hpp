@@ -7,12 +7,16 @@
 
 namespace vergence::app {
 
-/// A PairRunner with one worker thread: `here` on the caller, `there` on the worker, at the same time.
+/// A PairRunner with one worker thread: `here` on the caller, `there` on the worker, at the same
+/// time.
 ///
-/// Threads  run() from one thread. Both sides spin for kSpin before they sleep in the kernel: the two halves of a front end
-///          end within microseconds of each other, and waking a sleeper costs more than that.
-/// Memory   None after construction; an estimator's worker is sealed (AllocationGuard), a reader's is not: its tasks read files.
-/// Errors   The constructor throws std::system_error when no thread can be had. The destructor joins.
+/// Threads  run() from one thread. Both sides spin for kSpin before they sleep in the kernel: the
+///          two halves of a front end end within microseconds of each other, and waking a sleeper
+///          costs more than that.
+/// Memory   None after construction; an estimator's worker is sealed (AllocationGuard), a reader's
+///          is not: its tasks read files.
+/// Errors   The constructor throws std::system_error when no thread can be had. The destructor
+///          joins.
 class ThreadRunner final : public PairRunner {
  public:
   enum class Worker : std::uint8_t { of_estimator, of_reader };

@@ -11,18 +11,20 @@
 namespace vergence::app {
 namespace {
 
-constexpr int kSaturated = 254, kDark = 4;   // grey levels
-constexpr double kMuch = 0.5, kSome = 0.05;  // shares of an image: nothing left to see, a sky that may be lost
-constexpr double kBlack = 6, kDim = 30;      // mean, grey levels
-constexpr double kFlat = 1.5;                // contrast, grey levels: less is noise
-constexpr double kBlurred = 0.2;             // of the sharpest camera's sharpness
+constexpr int kSaturated = 254, kDark = 4;  // grey levels
+constexpr double kMuch = 0.5,
+                 kSome = 0.05;  // shares of an image: nothing left to see, a sky that may be lost
+constexpr double kBlack = 6, kDim = 30;  // mean, grey levels
+constexpr double kFlat = 1.5;            // contrast, grey levels: less is noise
+constexpr double kBlurred = 0.2;         // of the sharpest camera's sharpness
 
 /// A grey picture of float pixels, small enough to be searched through.
 struct Small {
   int width = 0, height = 0;
   std::vector<float> pixels;
   [[nodiscard]] float at(int x, int y) const {
-    return pixels[static_cast<std::size_t>(y) * static_cast<std::size_t>(width) + static_cast<std::size_t>(x)];
+    return pixels[static_cast<std::size_t>(y) * static_cast<std::size_t>(width) +
+                  static_cast<std::size_t>(x)];
   }
 };
 
@@ -42,8 +44,8 @@ Small shrunk(const ImageView& image) {
       int sum = 0;
       for (int v = 0; v < factor; ++v)
         for (int u = 0; u < factor; ++u) sum += image.at(x * factor + u, y * factor + v);
-      s.pixels[static_cast<std::size_t>(y) * static_cast<std::size_t>(s.width) + static_cast<std::size_t>(x)] =
-          static_cast<float>(sum) * scale;
+      s.pixels[static_cast<std::size_t>(y) * static_cast<std::size_t>(s.width) +
+               static_cast<std::size_t>(x)] = static_cast<float>(sum) * scale;
     }
   return s;
 }
@@ -70,7 +72,8 @@ float correlation(const std::array<float, kPatch>& a, const std::array<float, kP
   return sum;
 }
 
-/// Where the patch around (x, y) of the first picture is in the second: by how much further left. False: nowhere, or at several places.
+/// Where the patch around (x, y) of the first picture is in the second: by how much further left.
+/// False: nowhere, or at several places.
 bool find_shift(const Small& first, const Small& second, int x, int y, int* shift) {
   std::array<float, kPatch> wanted{}, seen{};
   if (!cut(first, x, y, &wanted)) return false;
@@ -78,7 +81,8 @@ bool find_shift(const Small& first, const Small& second, int x, int y, int* shif
   constexpr float kAlike = 0.85F, kSecondBest = 0.92F;
   float best = 0, second_best = 0;
   int where = 0;
-  for (int u = std::max(kRadius, x - reach); u <= std::min(second.width - 1 - kRadius, x + reach); ++u) {
+  for (int u = std::max(kRadius, x - reach); u <= std::min(second.width - 1 - kRadius, x + reach);
+       ++u) {
     float here = 0;  // of this column
     for (int v = std::max(kRadius, y - up); v <= std::min(second.height - 1 - kRadius, y + up); ++v)
       if (cut(second, u, v, &seen)) here = std::max(here, correlation(wanted, seen));
@@ -94,7 +98,9 @@ bool find_shift(const Small& first, const Small& second, int x, int y, int* shif
   return best > kAlike && second_best < kSecondBest * best;
 }
 
-PictureRemark remark(bool unusable, std::string sentence) { return {unusable, std::move(sentence)}; }
+PictureRemark remark(bool unusable, std::string sentence) {
+  return {unusable, std::move(sentence)};
+}
 
 }  // namespace
 
@@ -125,7 +131,8 @@ PictureFigures figures_of(const ImageView& image) noexcept {
   return f;
 }
 
-std::vector<PictureRemark> judge_pictures(std::span<const std::string> names, std::span<const PictureFigures> figures) {
+std::vector<PictureRemark> judge_pictures(std::span<const std::string> names,
+                                          std::span<const PictureFigures> figures) {
   std::vector<PictureRemark> remarks;
   double sharpest = 0;
   std::size_t sharpest_at = 0;
@@ -135,29 +142,36 @@ std::vector<PictureRemark> judge_pictures(std::span<const std::string> names, st
     const PictureFigures& f = figures[k];
     const std::string& who = names[k];
     const bool told = [&] {
-      if (f.mean < kBlack) return remarks.push_back(remark(true, who + " is black: a cap on the lens, no light, or no exposure")), true;
+      if (f.mean < kBlack)
+        return remarks.push_back(
+                   remark(true, who + " is black: a cap on the lens, no light, or no exposure")),
+               true;
       if (f.saturated > kMuch)
-        return remarks.push_back(remark(true, fmt::format("{} is overexposed: {:.0f} % of it is white; lower exposure_us, then gain_db",
+        return remarks.push_back(remark(true, fmt::format("{} is overexposed: {:.0f} % of it is "
+                                                          "white; lower exposure_us, then gain_db",
                                                           who, 100 * f.saturated))),
                true;
       if (f.contrast < kFlat)
-        return remarks.push_back(remark(true, who + " shows nothing: one grey all over; a cap, fog on the glass, or no sensor signal")),
+        return remarks.push_back(remark(true, who + " shows nothing: one grey all over; a cap, fog "
+                                                    "on the glass, or no sensor signal")),
                true;
       return false;
     }();
     if (told) continue;
     if (f.saturated > kSome)
-      remarks.push_back(
-          remark(false, fmt::format("{}: {:.0f} % of it is white, where nothing can be tracked; a shorter exposure_us may help", who,
-                                    100 * f.saturated)));
+      remarks.push_back(remark(false, fmt::format("{}: {:.0f} % of it is white, where nothing can "
+                                                  "be tracked; a shorter exposure_us may help",
+                                                  who, 100 * f.saturated)));
     if (f.mean < kDim)
-      remarks.push_back(remark(
-          false,
-          fmt::format("{} is underexposed (mean {:.0f} of 255); raise exposure_us up to what motion allows, then gain_db", who, f.mean)));
+      remarks.push_back(
+          remark(false, fmt::format("{} is underexposed (mean {:.0f} of 255); raise exposure_us up "
+                                    "to what motion allows, then gain_db",
+                                    who, f.mean)));
     if (k != sharpest_at && f.sharpness < kBlurred * sharpest)
       remarks.push_back(
-          remark(false, fmt::format("{} is much less sharp than {} ({:.0f} against {:.0f}): focus, dirt, or something near before it", who,
-                                    names[sharpest_at], f.sharpness, sharpest)));
+          remark(false, fmt::format("{} is much less sharp than {} ({:.0f} against {:.0f}): focus, "
+                                    "dirt, or something near before it",
+                                    who, names[sharpest_at], f.sharpness, sharpest)));
   }
   return remarks;
 }
@@ -179,12 +193,16 @@ HorizontalShift horizontal_shift(const ImageView& first, const ImageView& second
       const int x = kRadius + (a.width - 2 * kRadius - 1) * (2 * i + 1) / (2 * kColumns);
       const int y = kRadius + (a.height - 2 * kRadius - 1) * (2 * j + 1) / (2 * kRows);
       int shift = 0;
-      if (x < a.width - kRadius && y < a.height - kRadius && find_shift(a, b, x, y, &shift)) shifts.push_back(shift);
+      if (x < a.width - kRadius && y < a.height - kRadius && find_shift(a, b, x, y, &shift))
+        shifts.push_back(shift);
     }
   if (shifts.empty()) return result;
   result.patches = static_cast<int>(shifts.size());
-  result.negative = static_cast<double>(std::count_if(shifts.begin(), shifts.end(), [](int s) { return s < 0; })) / result.patches;
-  std::nth_element(shifts.begin(), shifts.begin() + static_cast<std::ptrdiff_t>(shifts.size() / 2), shifts.end());
+  result.negative = static_cast<double>(
+                        std::count_if(shifts.begin(), shifts.end(), [](int s) { return s < 0; })) /
+                    result.patches;
+  std::nth_element(shifts.begin(), shifts.begin() + static_cast<std::ptrdiff_t>(shifts.size() / 2),
+                   shifts.end());
   result.median = static_cast<double>(shifts[shifts.size() / 2]) / a.width;
   return result;
 }

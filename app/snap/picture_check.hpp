@@ -13,7 +13,8 @@ struct PictureFigures {
   double contrast = 0;   // standard deviation, grey levels
   double saturated = 0;  // share of pixels at 254 and above
   double dark = 0;       // share of pixels at 4 and below
-  double sharpness = 0;  // mean squared gradient (central differences), (grey levels / px)²: falls with blur, rises with noise
+  double sharpness = 0;  // mean squared gradient (central differences), (grey levels / px)²: falls
+                         // with blur, rises with noise
 };
 /// Precondition: not empty. Images of one row or column have no sharpness.
 [[nodiscard]] PictureFigures figures_of(const ImageView& image) noexcept;
@@ -25,22 +26,27 @@ struct PictureRemark {
 };
 
 /// Exposure of each picture, and sharpness of each against the sharpest.
-[[nodiscard]] std::vector<PictureRemark> judge_pictures(std::span<const std::string> names, std::span<const PictureFigures> figures);
+[[nodiscard]] std::vector<PictureRemark> judge_pictures(std::span<const std::string> names,
+                                                        std::span<const PictureFigures> figures);
 
-/// Whether two pictures are the same pixel for pixel: one camera twice. Flat ones (a lens cap) are not called that.
+/// Whether two pictures are the same pixel for pixel: one camera twice. Flat ones (a lens cap) are
+/// not called that.
 [[nodiscard]] bool are_identical(const ImageView& a, const ImageView& b) noexcept;
 
 /// How much further left things are in the second picture than in the first.
 struct HorizontalShift {
   int patches = 0;      // that were found in both
-  double median = 0;    // of their shift, as a share of the image's width; with a left and a right picture positive
+  double median = 0;    // of their shift, as a share of the image's width; with a left and a right
+                        // picture positive
   double negative = 0;  // share of the patches that shift the other way
 };
-/// By normalised correlation of patches between the pictures at an eighth to a half of their size; some milliseconds. For cameras that look
-/// about the same way, one beside the other: it allows for 6 % of the height between them.
+/// By normalised correlation of patches between the pictures at an eighth to a half of their size;
+/// some milliseconds. For cameras that look about the same way, one beside the other: it allows for
+/// 6 % of the height between them.
 /// Precondition: of one size.
 [[nodiscard]] HorizontalShift horizontal_shift(const ImageView& first, const ImageView& second);
-/// Enough patches, and most of them shifted the wrong way by more than rotations of a degree or two would make of it.
+/// Enough patches, and most of them shifted the wrong way by more than rotations of a degree or two
+/// would make of it.
 [[nodiscard]] bool look_exchanged(const HorizontalShift& shift) noexcept;
 
 }  // namespace vergence::app

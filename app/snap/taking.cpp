@@ -20,9 +20,11 @@ std::int64_t clock_ns(clockid_t clock) {
 class Watchdog {
  public:
   Watchdog(LiveSource* source, Duration limit, const SignalGuard& signals)
-      : source_(source), limit_(limit.ns()), signals_(signals), until_(std::chrono::steady_clock::now() + limit_), thread_([this] {
-          watch();
-        }) {}
+      : source_(source),
+        limit_(limit.ns()),
+        signals_(signals),
+        until_(std::chrono::steady_clock::now() + limit_),
+        thread_([this] { watch(); }) {}
   ~Watchdog() {
     {
       const std::lock_guard lock(mutex_);
@@ -43,7 +45,8 @@ class Watchdog {
   void watch() {
     constexpr auto kLook = std::chrono::milliseconds(50);
     std::unique_lock lock(mutex_);
-    while (!quit_ && !signals_.stop_requested() && std::chrono::steady_clock::now() < until_) changed_.wait_for(lock, kLook);
+    while (!quit_ && !signals_.stop_requested() && std::chrono::steady_clock::now() < until_)
+      changed_.wait_for(lock, kLook);
     source_->stop();
   }
 
@@ -83,7 +86,8 @@ Taking take_sets(DriveDevices& devices, const TakingOptions& options, const Sign
       for (std::size_t i = 0; i < n; ++i) taking.delivered[i] += item.set.present[i] ? 1 : 0;
       if (item.set.complete && passed++ >= options.skip) {
         TakenSet set{taking.sets, item.stamp, item.set.error, item.set.spread, item.set.proof, {}};
-        for (std::size_t i = 0; i < n; ++i) set.images.push_back(source.image(item.set, static_cast<int>(i)));
+        for (std::size_t i = 0; i < n; ++i)
+          set.images.push_back(source.image(item.set, static_cast<int>(i)));
         use(set);
         ++taking.sets;
         watchdog.feed();

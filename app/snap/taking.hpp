@@ -29,15 +29,18 @@ struct Taking {
 
 struct TakingOptions {
   int count = 1;
-  int skip = 0;                           // complete sets passed over first: the first exposures after a start may be another's, or dark
+  int skip = 0;  // complete sets passed over first: the first exposures after a start may be
+                 // another's, or dark
   Duration limit = Duration::seconds(5);  // for the first set, and between two
 };
 
 /// Starts the devices and hands on complete sets. The devices are stopped when it returns.
 ///
-/// Threads  `use` on the caller's. Time: `limit` a set, and what starting and stopping take. Errors: InputError as LiveSource::start(), and
+/// Threads  `use` on the caller's. Time: `limit` a set, and what starting and stopping take.
+///          Errors: InputError as LiveSource::start(), and
 /// what `use` throws.
-[[nodiscard]] Taking take_sets(DriveDevices& devices, const TakingOptions& options, const SignalGuard& signals,
+[[nodiscard]] Taking take_sets(DriveDevices& devices, const TakingOptions& options,
+                               const SignalGuard& signals,
                                const std::function<void(const TakenSet&)>& use);
 
 }  // namespace vergence::app

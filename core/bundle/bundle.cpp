@@ -20,10 +20,12 @@ using detail::System;
 constexpr double kLeastDamping = 1e-12;      // below it the damping is lost in rounding
 constexpr double kLeastGaugeDamping = 1e-9;  // where the scale is free the damping alone holds it
 constexpr double kLargestDamping = 1e10;     // steps are then shorter than any tolerance
-constexpr double kPivotTolerance = 1e-14;    // relative pivot of the damped system below which it counts as singular
-constexpr double kRankTolerance = 1e-11;     // of the undamped one
+constexpr double kPivotTolerance =
+    1e-14;  // relative pivot of the damped system below which it counts as singular
+constexpr double kRankTolerance = 1e-11;  // of the undamped one
 
-/// Takes storage for every array of a workspace from `take`, which either hands out arena memory or only counts.
+/// Takes storage for every array of a workspace from `take`, which either hands out arena memory or
+/// only counts.
 template <class Take>
 void lay_out(BundleWorkspace& w, const BundleCapacities& c, Take& take) {
   using namespace detail;
@@ -31,7 +33,8 @@ void lay_out(BundleWorkspace& w, const BundleCapacities& c, Take& take) {
   const std::size_t batches = (c.points + kBatch - 1) / kBatch;
   w.block_capacity = c.blocks > 0 ? c.blocks : std::min(batches * c.poses, c.observations);
   w.slot_capacity = std::min(w.block_capacity * c.cameras, c.observations);
-  const std::size_t shared_rows = c.shared ? kBlock * (c.cameras - 1) + kIntrinsicsSize * c.cameras : 0;
+  const std::size_t shared_rows =
+      c.shared ? kBlock * (c.cameras - 1) + kIntrinsicsSize * c.cameras : 0;
   const std::size_t shared_blocks = (shared_rows + kBlock - 1) / kBlock;
   w.reduced_capacity = (c.poses + shared_blocks) * kBlock;
   const std::size_t ld = (w.reduced_capacity + kBatch - 1) / kBatch * kBatch;
@@ -50,8 +53,11 @@ void lay_out(BundleWorkspace& w, const BundleCapacities& c, Take& take) {
   take(w.y_shared, batches * shared_blocks * kYSize, "bundle: Y of shared parameters");
   take(w.factors, batches * kFactorRows * kBatch, "bundle: point factors");
   take(w.sums, c.poses * c.cameras * kPoseSums * kBatch, "bundle: sums of poses");
-  take(w.intrinsic_sums, c.shared ? c.poses * kMaxCameras * kIntrinsicsSize * 6 * kBatch : 0, "bundle: sums of intrinsics");
-  take(w.intrinsic_own, c.shared ? kMaxCameras * kIntrinsicsSize * (kIntrinsicsSize + 1) * kBatch : 0, "bundle: intrinsics");
+  take(w.intrinsic_sums, c.shared ? c.poses * kMaxCameras * kIntrinsicsSize * 6 * kBatch : 0,
+       "bundle: sums of intrinsics");
+  take(w.intrinsic_own,
+       c.shared ? kMaxCameras * kIntrinsicsSize * (kIntrinsicsSize + 1) * kBatch : 0,
+       "bundle: intrinsics");
   take(w.reduced, w.reduced_capacity * kBatch, "bundle: reduced gradient");
   take(w.jets, std::min(c.poses * c.cameras, w.slot_capacity) * kJetRows * kBatch, "bundle: jets");
   take(w.A, ld * w.reduced_capacity, "bundle: reduced system");
@@ -83,9 +89,11 @@ struct Count {
 /// One solve(): the loop of Levenberg and Marquardt and what comes after it.
 class Solve {
  public:
-  Solve(BundleWorkspace& w, const BundleProblem& problem, const BundleOptions& options, BundleResult& result) noexcept
+  Solve(BundleWorkspace& w, const BundleProblem& problem, const BundleOptions& options,
+        BundleResult& result) noexcept
       : w_(w), problem_(problem), options_(options), result_(result), system_(w, problem, options) {
-    if (options.configuration == BundleConfiguration::parallel_monocular) least_damping_ = kLeastGaugeDamping;
+    if (options.configuration == BundleConfiguration::parallel_monocular)
+      least_damping_ = kLeastGaugeDamping;
   }
 
   void run() noexcept {
@@ -97,7 +105,8 @@ class Solve {
     cost_ = result_.initial_cost = system_.cost();
     squared_px_ = system_.squared_px();
     iterate();
-    if (rank_suspicious_ && result_.termination != BundleTermination::rank_deficient && rank_deficient())
+    if (rank_suspicious_ && result_.termination != BundleTermination::rank_deficient &&
+        rank_deficient())
       result_.termination = BundleTermination::rank_deficient;
     if (options_.pose_covariance) pose_covariance();
     if (options_.covariance && options_.configuration == BundleConfiguration::stereo_calibration)
@@ -115,7 +124,8 @@ class Solve {
       if (gradient() <= options_.gradient_tolerance) return end(BundleTermination::small_gradient);
       ++result_.steps;
       std::copy_n(w_.rhs.begin(), system_.rows(), w_.delta.begin());
-      pivots_ = detail::cholesky(w_.A.data(), system_.rows(), system_.rows(), system_.ld(), kPivotTolerance);
+      pivots_ = detail::cholesky(w_.A.data(), system_.rows(), system_.rows(), system_.ld(),
+                                 kPivotTolerance);
       if (pivots_.small > 0) {
         if (!retreat()) return end(BundleTermination::rank_deficient);
         continue;
@@ -126,11 +136,14 @@ class Solve {
       for (std::size_t i = 0; i < system_.rows(); ++i) decrement += w_.delta[i] * w_.rhs[i];
       system_.move(best(), w_.delta.data(), &other());
       const double tolerance = options_.update_tolerance;
-      const bool small = std::sqrt(system_.update_squared()) <= tolerance * (std::sqrt(system_.norm_squared()) + tolerance);
-      const bool expected_last = 0.5 * decrement <= options_.cost_tolerance * cost_ || small || result_.steps == options_.max_steps;
+      const bool small = std::sqrt(system_.update_squared()) <=
+                         tolerance * (std::sqrt(system_.norm_squared()) + tolerance);
+      const bool expected_last = 0.5 * decrement <= options_.cost_tolerance * cost_ || small ||
+                                 result_.steps == options_.max_steps;
       const double next_damping = std::max(damping_ * 0.1, least_damping_);
       const bool valid = std::isfinite(system_.update_squared()) &&
-                         (expected_last ? system_.evaluate(other(), false) : system_.linearise(other(), next_damping));
+                         (expected_last ? system_.evaluate(other(), false)
+                                        : system_.linearise(other(), next_damping));
       if (valid && system_.cost() <= cost_) {
         const double change = cost_ - system_.cost();
         best_ = 1 - best_;
@@ -139,13 +152,16 @@ class Solve {
         damping_ = next_damping;
         ++result_.accepted;
         if (small) return end(BundleTermination::small_update);
-        if (change <= options_.cost_tolerance * cost_) return end(BundleTermination::small_cost_change);
-        if (expected_last && result_.steps < options_.max_steps && !system_.linearise(best(), damping_))
+        if (change <= options_.cost_tolerance * cost_)
+          return end(BundleTermination::small_cost_change);
+        if (expected_last && result_.steps < options_.max_steps &&
+            !system_.linearise(best(), damping_))
           return end(BundleTermination::diverged);
         continue;
       }
       if (small) return end(BundleTermination::small_update);
-      if (0.5 * decrement <= options_.cost_tolerance * cost_) return end(BundleTermination::small_cost_change);
+      if (0.5 * decrement <= options_.cost_tolerance * cost_)
+        return end(BundleTermination::small_cost_change);
       if (!retreat()) return end(BundleTermination::diverged);
     }
   }
@@ -169,14 +185,19 @@ class Solve {
     return std::max(largest, std::sqrt(system_.rows() > 0 ? 0.0 : system_.point_decrement()));
   }
 
-  /// A free scale has one direction that nothing sees: in parallel_monocular that is as it should be.
-  int free_directions() const noexcept { return options_.configuration == BundleConfiguration::parallel_monocular ? 1 : 0; }
+  /// A free scale has one direction that nothing sees: in parallel_monocular that is as it should
+  /// be.
+  int free_directions() const noexcept {
+    return options_.configuration == BundleConfiguration::parallel_monocular ? 1 : 0;
+  }
 
-  /// A direction that only the damping holds: its pivot falls with λ, that of a seen one stays. One factorisation cannot tell them apart.
+  /// A direction that only the damping holds: its pivot falls with λ, that of a seen one stays. One
+  /// factorisation cannot tell them apart.
   void watch_rank() noexcept {
     constexpr double kFell = 0.3;  // of the ratio, when λ fell to a tenth
     const double ratio = free_directions() == 0 ? pivots_.least_ratio : pivots_.second_ratio;
-    if (watched_damping_ > 0 && damping_ < 0.5 * watched_damping_) rank_suspicious_ = ratio < kFell * watched_ratio_;
+    if (watched_damping_ > 0 && damping_ < 0.5 * watched_damping_)
+      rank_suspicious_ = ratio < kFell * watched_ratio_;
     rank_suspicious_ = rank_suspicious_ || ratio < kRankTolerance;
     watched_damping_ = damping_;
     watched_ratio_ = ratio;
@@ -184,19 +205,23 @@ class Solve {
 
   bool rank_deficient() noexcept {
     if (system_.rows() == 0 || !system_.linearise(best(), 0.0)) return false;
-    return detail::cholesky(w_.A.data(), system_.rows(), system_.rows(), system_.ld(), kRankTolerance).small > free_directions();
+    return detail::cholesky(w_.A.data(), system_.rows(), system_.rows(), system_.ld(),
+                            kRankTolerance)
+               .small > free_directions();
   }
 
   void pose_covariance() noexcept {
     const std::size_t rows = system_.rows();
-    if (w_.free_poses == 0 || system_.job().shared.blocks > 0 || !system_.linearise(best(), 0.0)) return;
+    if (w_.free_poses == 0 || system_.job().shared.blocks > 0 || !system_.linearise(best(), 0.0))
+      return;
     const std::size_t before = rows - detail::kBlock;
     if (detail::cholesky(w_.A.data(), rows, before, system_.ld(), kRankTolerance).small > 0) return;
     Mat6 information;  // (τ, φ)
     for (std::size_t r = 0; r < detail::kBlock; ++r)
       for (std::size_t c = 0; c <= r; ++c) {
         double v = w_.A[(before + c) * system_.ld() + before + r];
-        for (std::size_t k = 0; k < before; ++k) v -= w_.A[k * system_.ld() + before + r] * w_.A[k * system_.ld() + before + c];
+        for (std::size_t k = 0; k < before; ++k)
+          v -= w_.A[k * system_.ld() + before + r] * w_.A[k * system_.ld() + before + c];
         information(static_cast<Eigen::Index>(r), static_cast<Eigen::Index>(c)) =
             information(static_cast<Eigen::Index>(c), static_cast<Eigen::Index>(r)) = v;
       }
@@ -204,7 +229,8 @@ class Solve {
     if (factor.info() != Eigen::Success) return;
     const Mat6 covariance = factor.solve(Mat6::Identity());
     if (!covariance.allFinite()) return;
-    result_.pose_covariance << covariance.bottomRightCorner<3, 3>(), covariance.bottomLeftCorner<3, 3>(), covariance.topRightCorner<3, 3>(),
+    result_.pose_covariance << covariance.bottomRightCorner<3, 3>(),
+        covariance.bottomLeftCorner<3, 3>(), covariance.topRightCorner<3, 3>(),
         covariance.topLeftCorner<3, 3>();
     for (std::size_t i = 0; i < problem_.T_left_world.size(); ++i)
       if (w_.poses[i].block == w_.free_poses - 1) result_.pose = static_cast<std::uint16_t>(i);
@@ -218,7 +244,8 @@ class Solve {
     for (std::size_t i = 0; i < problem_.observations.size(); ++i) {
       const BundleObservation& o = problem_.observations[i];
       Vec2 pixel;
-      const Vec3 p = best().T_camera_left[o.camera] * (best().poses[o.pose] * problem_.points[o.point]);
+      const Vec3 p =
+          best().T_camera_left[o.camera] * (best().poses[o.pose] * problem_.points[o.point]);
       if (best().cameras[o.camera].project(p, &pixel, nullptr) == ProjectStatus::ok) continue;
       result_.defect = BundleDefect::behind;
       result_.defect_index = static_cast<std::uint32_t>(i);
@@ -230,9 +257,13 @@ class Solve {
     const BundleState& s = best();
     result_.final_cost = cost_;
     result_.damping = damping_;
-    result_.rms_px = problem_.observations.empty() ? 0 : std::sqrt(squared_px_ / static_cast<double>(problem_.observations.size()));
+    result_.rms_px =
+        problem_.observations.empty()
+            ? 0
+            : std::sqrt(squared_px_ / static_cast<double>(problem_.observations.size()));
     if (!problem_.squared_residuals.empty() && system_.evaluate(s, true))
-      for (std::size_t i = 0; i < problem_.observations.size(); ++i) problem_.squared_residuals[i] = w_.squared[w_.observation_lane[i]];
+      for (std::size_t i = 0; i < problem_.observations.size(); ++i)
+        problem_.squared_residuals[i] = w_.squared[w_.observation_lane[i]];
     for (std::size_t i = 0; i < problem_.T_left_world.size(); ++i)
       if (w_.poses[i].block >= 0) problem_.T_left_world[i] = s.poses[i];
     for (std::size_t i = 0; i < w_.point_count; ++i) {
@@ -266,25 +297,31 @@ class Solve {
 const char* BundleOptions::validate() const noexcept {
   constexpr int kMostSteps = 1000;
   constexpr double kMostDamping = 1e6;
-  if (!(loss_threshold > 0) || !std::isfinite(loss_threshold)) return "loss_threshold is not above 0";
+  if (!(loss_threshold > 0) || !std::isfinite(loss_threshold))
+    return "loss_threshold is not above 0";
   if (max_steps < 1 || max_steps > kMostSteps) return "max_steps is not in 1 … 1000";
   if (!(cost_tolerance >= 0)) return "cost_tolerance is negative";
   if (!(update_tolerance >= 0)) return "update_tolerance is negative";
   if (!(gradient_tolerance >= 0)) return "gradient_tolerance is negative";
-  if (!(initial_damping > 0) || initial_damping > kMostDamping) return "initial_damping is not in (0, 1e6]";
+  if (!(initial_damping > 0) || initial_damping > kMostDamping)
+    return "initial_damping is not in (0, 1e6]";
   for (const BundleLengthConstraint& l : length) {
-    if (!(l.metres >= 0) || !std::isfinite(l.metres)) return "length: metres is negative or not a number";
+    if (!(l.metres >= 0) || !std::isfinite(l.metres))
+      return "length: metres is negative or not a number";
     if (l.kind == BundleLength::measured && (!(l.sigma > 0) || !(l.metres > 0)))
       return "length: a measured length needs metres and sigma above 0";
   }
   if (cells < 0 || cells > detail::kMostCells) return "cells is not in 0 … 8";
   if (!(shared_errors > 0) || !std::isfinite(shared_errors)) return "shared_errors is not above 0";
-  if (!(shared_prior.weight > 0) || !std::isfinite(shared_prior.weight)) return "shared_prior: weight is not above 0";
+  if (!(shared_prior.weight > 0) || !std::isfinite(shared_prior.weight))
+    return "shared_prior: weight is not above 0";
   for (const BundleIntrinsics& i : intrinsics)
     for (std::size_t k = 0; k < kIntrinsicsSize; ++k) {
-      if (!(i.prior_sigma[k] >= 0) || !std::isfinite(i.prior_mean[k])) return "intrinsics: a prior is not a number";
+      if (!(i.prior_sigma[k] >= 0) || !std::isfinite(i.prior_mean[k]))
+        return "intrinsics: a prior is not a number";
       if (std::isnan(i.held_sigma[k])) return "intrinsics: held_sigma is not a number";
-      if (i.free >> kIntrinsicsSize != 0) return "intrinsics: free has bits beyond the nine parameters";
+      if (i.free >> kIntrinsicsSize != 0)
+        return "intrinsics: free has bits beyond the nine parameters";
     }
   return "";
 }
@@ -346,17 +383,20 @@ std::size_t BundleAdjuster::memory_needed(const BundleCapacities& capacities) no
 
 BundleAdjuster::BundleAdjuster(const BundleCapacities& c, Arena& arena) : workspace_(nullptr) {
   constexpr std::size_t kMostPoses = 65535, kMostObservations = 1U << 28U;  // what the indices hold
-  if (c.cameras == 0 || c.cameras > kMaxCameras || c.poses == 0 || c.poses > kMostPoses || c.points > kMostObservations ||
-      c.observations > kMostObservations)
-    throw std::invalid_argument("bundle adjustment: capacities out of range (cameras 1 … 4, poses 1 … 65535)");
+  if (c.cameras == 0 || c.cameras > kMaxCameras || c.poses == 0 || c.poses > kMostPoses ||
+      c.points > kMostObservations || c.observations > kMostObservations)
+    throw std::invalid_argument(
+        "bundle adjustment: capacities out of range (cameras 1 … 4, poses 1 … 65535)");
   workspace_ = arena.make<BundleWorkspace>(1, "bundle: workspace").data();
   TakeFromArena take{arena};
   lay_out(*workspace_, c, take);
 }
 
-BundleResult BundleAdjuster::solve(const BundleProblem& problem, const BundleOptions& options) noexcept {
+BundleResult BundleAdjuster::solve(const BundleProblem& problem,
+                                   const BundleOptions& options) noexcept {
   BundleResult result;
-  if (detail::set_up(*workspace_, problem, options, &result)) Solve(*workspace_, problem, options, result).run();
+  if (detail::set_up(*workspace_, problem, options, &result))
+    Solve(*workspace_, problem, options, result).run();
   return result;
 }
 

@@ -10,18 +10,25 @@
 
 namespace vergence {
 
-/// Which blocks of θ = [θ_S | θ_I | θ_P] are free (METHOD §2). One code; the configuration is the choice of partition.
+/// Which blocks of θ = [θ_S | θ_I | θ_P] are free (METHOD §2). One code; the configuration is the
+/// choice of partition.
 enum class BundleConfiguration : std::uint8_t {
-  stereo_calibration,  // θ_S: T_camera_left of every camera but 0, and intrinsics if asked; θ_I: one pose a rig frame
-  stereo_odometry,     // θ_S empty: T_camera_left and intrinsics are constant;              θ_I: one pose a rig frame
-  parallel_monocular,  // θ_S empty, T_camera_left is not read;                              θ_I: one pose an image
+  stereo_calibration,  // θ_S: T_camera_left of every camera but 0, and intrinsics if asked; θ_I:
+                       // one pose a rig frame
+  stereo_odometry,  // θ_S empty: T_camera_left and intrinsics are constant;              θ_I: one
+                    // pose a rig frame
+  parallel_monocular,  // θ_S empty, T_camera_left is not read;                              θ_I:
+                       // one pose an image
 };
 
-/// One feature in one image. `x`, `y` in pixels of camera `camera`, through that camera's distortion.
+/// One feature in one image. `x`, `y` in pixels of camera `camera`, through that camera's
+/// distortion.
 ///
-/// stereo_*: `pose` is the rig frame and `camera` the camera of the rig: X_camera = T_camera_left[camera] * T_left_world[pose] * X.
-/// parallel_monocular: `pose` is the image (left and right images of one rig frame have poses of their own, `T_camera_world`),
-/// `camera` only chooses the intrinsics: X_camera = T_left_world[pose] * X.
+/// stereo_*: `pose` is the rig frame and `camera` the camera of the rig: X_camera =
+/// T_camera_left[camera] * T_left_world[pose] * X.
+/// parallel_monocular: `pose` is the image (left and right images of one rig frame have poses of
+/// their own, `T_camera_world`), `camera` only chooses the intrinsics: X_camera =
+/// T_left_world[pose] * X.
 struct BundleObservation {
   std::uint32_t point = 0;
   std::uint16_t pose = 0;
@@ -30,8 +37,9 @@ struct BundleObservation {
   double x = 0, y = 0;         // px; double, because float resolves only 6e-5 px at 1000 px
 };
 
-/// What is known of a pose from elsewhere: `information` (rotation, then translation) of the perturbation δ = (φ, τ) that takes the
-/// prior's transform to the pose: R = Exp(φ) R₀, t = Exp(φ) t₀ + τ. Adds ½ δᵀ Λ δ to the cost.
+/// What is known of a pose from elsewhere: `information` (rotation, then translation) of the
+/// perturbation δ = (φ, τ) that takes the prior's transform to the pose: R = Exp(φ) R₀, t = Exp(φ)
+/// t₀ + τ. Adds ½ δᵀ Λ δ to the cost.
 struct BundlePosePrior {
   std::uint16_t pose = 0;
   Transform T_left_world{};
@@ -40,25 +48,30 @@ struct BundlePosePrior {
 
 /// A problem in the caller's arrays; solve() reads them all and writes those marked in/out.
 ///
-/// Order  Observations are sorted by (point, pose, camera), strictly: a feature appears once. Points without observations are left alone.
+/// Order  Observations are sorted by (point, pose, camera), strictly: a feature appears once.
+///        Points without observations are left alone.
 struct BundleProblem {
   std::span<Camera> cameras;  // 1 … kMaxCameras; in/out where intrinsics are free, else read only
-  std::span<Transform>
-      T_camera_left;  // as many as cameras, [0] the identity; in/out in stereo_calibration; may be empty in parallel_monocular
-  std::span<Transform> T_left_world;             // poses, in/out
-  std::span<const std::uint8_t> pose_constant;   // 1: not changed. As many as poses, or empty: only pose 0 is constant
-  std::span<Vec3> points;                        // world, metres, in/out
-  std::span<const std::uint8_t> point_constant;  // 1: not changed. As many as points, or empty: none
+  std::span<Transform> T_camera_left;  // as many as cameras, [0] the identity; in/out in
+                                       // stereo_calibration; may be empty in parallel_monocular
+  std::span<Transform> T_left_world;   // poses, in/out
+  std::span<const std::uint8_t>
+      pose_constant;       // 1: not changed. As many as poses, or empty: only pose 0 is constant
+  std::span<Vec3> points;  // world, metres, in/out
+  std::span<const std::uint8_t>
+      point_constant;  // 1: not changed. As many as points, or empty: none
   std::span<const BundleObservation> observations;
   std::span<const BundlePosePrior> pose_priors;  // of free poses; may be empty
-  std::span<float> squared_residuals;  // out: |ε|² inverse_sigma² of each observation at the result; as many as observations, or empty
+  std::span<float> squared_residuals;  // out: |ε|² inverse_sigma² of each observation at the
+                                       // result; as many as observations, or empty
 };
 
 enum class BundleLoss : std::uint8_t { none, huber, cauchy };
 
 /// How the length of T_camera_left[k].t is known: it is the scale of everything.
 enum class BundleLength : std::uint8_t {
-  exact,     // t_k = metres · u, u on the sphere: 5 free parameters for that camera; the input's t_k is brought to that length
+  exact,  // t_k = metres · u, u on the sphere: 5 free parameters for that camera; the input's t_k
+          // is brought to that length
   measured,  // residual (|t_k| − metres)/sigma: 6 free parameters
   free,      // nothing: 6 free parameters; some other camera must fix the scale
 };
@@ -76,32 +89,42 @@ struct BundleIntrinsics {
   std::array<double, kIntrinsicsSize> prior_sigma{};  // 0: no prior
   std::array<double, kIntrinsicsSize> held_sigma{
       -1, -1, -1, -1, 0, 0, 0, 0, 0};  // of what is held, for the wide covariance;
-                                       // negative: the default, 0.1 % of a focal length and 0.5 px of a principal point
+                                       // negative: the default, 0.1 % of a focal length and 0.5 px
+                                       // of a principal point
 };
 
-/// What is known of θ_S from earlier solves (stereo_calibration only): ½ weight δᵀ C⁻¹ δ over the parameters that are free here.
+/// What is known of θ_S from earlier solves (stereo_calibration only): ½ weight δᵀ C⁻¹ δ over the
+/// parameters that are free here.
 struct BundleSharedPrior {
-  const RigCalibration* rig = nullptr;  // mean and `covariance`; null: nothing is known. Rows without a variance: nothing is known of them
-  double weight = 1;                    // how much more a solve believes its tracks than it may: what is known weighs as much more, > 0
+  const RigCalibration* rig = nullptr;  // mean and `covariance`; null: nothing is known. Rows
+                                        // without a variance: nothing is known of them
+  double weight = 1;  // how much more a solve believes its tracks than it may: what is known weighs
+                      // as much more, > 0
 };
 
 struct BundleOptions {
   BundleConfiguration configuration = BundleConfiguration::stereo_odometry;
-  std::array<BundleLengthConstraint, kMaxCameras> length{};  // [k] of camera k ≥ 1; read in stereo_calibration
-  std::array<BundleIntrinsics, kMaxCameras> intrinsics{};    // read in stereo_calibration
+  std::array<BundleLengthConstraint, kMaxCameras>
+      length{};  // [k] of camera k ≥ 1; read in stereo_calibration
+  std::array<BundleIntrinsics, kMaxCameras> intrinsics{};  // read in stereo_calibration
   BundleSharedPrior shared_prior{};
-  int cells = 0;  // covariance: clusters are so many cells a side of the image, and blocks of frames; 0 … 8, 0: each track is one
-  double shared_errors = 1;  // times the clusters' variance: what tracks of one surface share and a cluster a track does not see, > 0
+  int cells = 0;  // covariance: clusters are so many cells a side of the image, and blocks of
+                  // frames; 0 … 8, 0: each track is one
+  double shared_errors = 1;  // times the clusters' variance: what tracks of one surface share and a
+                             // cluster a track does not see, > 0
   BundleLoss loss = BundleLoss::none;
-  double loss_threshold = 2.0;      // sigmas, > 0; Huber: where it turns linear; Cauchy: scale
-  int max_steps = 30;               // solver steps tried, accepted or not, 1 … 1000
-  double cost_tolerance = 1e-6;     // stop when a step changes the cost by less than this share of it, ≥ 0
+  double loss_threshold = 2.0;  // sigmas, > 0; Huber: where it turns linear; Cauchy: scale
+  int max_steps = 30;           // solver steps tried, accepted or not, 1 … 1000
+  double cost_tolerance =
+      1e-6;  // stop when a step changes the cost by less than this share of it, ≥ 0
   double update_tolerance = 1e-10;  // stop when |δ| ≤ tolerance · (|θ| + tolerance), ≥ 0
-  double gradient_tolerance =
-      0;  // stop when the largest component of the reduced gradient, each over the root of its diagonal, is below, ≥ 0
-  double initial_damping = 1e-4;  // λ of the first step; diagonals × (1 + λ), ÷ 10 after a success, × 10 after a failure, in (0, 1e6]
-  bool covariance = false;        // fill BundleResult's covariances of θ_S (stereo_calibration)
-  bool pose_covariance = false;   // fill BundleResult::pose_covariance, of the free pose with the highest index
+  double gradient_tolerance = 0;    // stop when the largest component of the reduced gradient, each
+                                    // over the root of its diagonal, is below, ≥ 0
+  double initial_damping = 1e-4;  // λ of the first step; diagonals × (1 + λ), ÷ 10 after a success,
+                                  // × 10 after a failure, in (0, 1e6]
+  bool covariance = false;  // fill BundleResult's covariances of θ_S (stereo_calibration)
+  bool pose_covariance =
+      false;  // fill BundleResult::pose_covariance, of the free pose with the highest index
 
   /// Empty when every field is in its range, else one sentence naming the field.
   [[nodiscard]] const char* validate() const noexcept;
@@ -114,29 +137,33 @@ enum class BundleTermination : std::uint8_t {
   max_steps,          // stopped on the way; the result is the best so far
   diverged,           // no damping up to the largest lowers the cost; the result is the best so far
   invalid_input,      // see BundleResult::defect; nothing was changed
-  rank_deficient,     // the observations do not determine the parameters; unchanged if found before the first step, else the best so far
+  rank_deficient,     // the observations do not determine the parameters; unchanged if found before
+                      // the first step, else the best so far
   capacity,           // more of something than the adjuster was built for; nothing was changed
 };
 
-/// Why a problem was refused (`invalid_input`, `rank_deficient` before the first step); the offender is in BundleResult::defect_index.
+/// Why a problem was refused (`invalid_input`, `rank_deficient` before the first step); the
+/// offender is in BundleResult::defect_index.
 enum class BundleDefect : std::uint8_t {
   none,
-  options,                    // BundleOptions::validate() has the sentence
-  sizes,                      // spans whose lengths do not go together, no camera, no pose, no constant pose
-  index,                      // an observation (index given) or a prior points outside its array
-  order,                      // observation not in the required order, or twice
-  not_finite,                 // observation, sigma not > 0
-  state_not_finite,           // a start value: point, pose, camera (in that order of search); rotation far from orthonormal
-  behind,                     // observation of a point that is behind its camera, or outside its lens model, at the start
-  seen_once,                  // free point with one observation
+  options,           // BundleOptions::validate() has the sentence
+  sizes,             // spans whose lengths do not go together, no camera, no pose, no constant pose
+  index,             // an observation (index given) or a prior points outside its array
+  order,             // observation not in the required order, or twice
+  not_finite,        // observation, sigma not > 0
+  state_not_finite,  // a start value: point, pose, camera (in that order of search); rotation far
+                     // from orthonormal
+  behind,     // observation of a point that is behind its camera, or outside its lens model, at the
+              // start
+  seen_once,  // free point with one observation
   pose_without_observations,  // free pose that nothing determines
 };
 
 [[nodiscard]] const char* to_string(BundleTermination) noexcept;
 [[nodiscard]] const char* to_string(BundleDefect) noexcept;
 
-/// Covariances are of the left perturbation (rotation rad, then translation m), R ← Exp(φ) R, t ← t + τ, as in RigCalibration;
-/// with an exact length the 6×6 has rank 5.
+/// Covariances are of the left perturbation (rotation rad, then translation m), R ← Exp(φ) R, t ← t
+/// + τ, as in RigCalibration; with an exact length the 6×6 has rank 5.
 struct BundleResult {
   BundleResult() noexcept {  // Eigen leaves a matrix as it finds the memory
     for (auto* all : {&covariance_white, &covariance_noise, &covariance_wide})
@@ -150,24 +177,33 @@ struct BundleResult {
   int accepted = 0;         // of these
   double initial_cost = 0;  // ½ Σ ρ(|ε|²/σ²) + priors
   double final_cost = 0;
-  double rms_px = 0;   // root mean of |ε|² over observations, px, both coordinates together, unweighted
+  double rms_px =
+      0;  // root mean of |ε|² over observations, px, both coordinates together, unweighted
   double damping = 0;  // λ at the end
 
-  bool has_covariance = false;                       // asked for, and the undamped system is positive definite
-  double sigma0_squared = 0;                         // Σ w |ε|²/σ² over the degrees of freedom: 1 if inverse_sigma is true
+  bool has_covariance = false;  // asked for, and the undamped system is positive definite
+  double sigma0_squared = 0;  // Σ w |ε|²/σ² over the degrees of freedom: 1 if inverse_sigma is true
   std::array<Mat6, kMaxCameras> covariance_white{};  // [k] of T_camera_left[k]: σ̂² H⁻¹
-  std::array<Mat6, kMaxCameras> covariance_noise{};  // cluster-robust (`cells`), times shared_errors; priors as they are
-  std::array<Mat6, kMaxCameras> covariance_wide{};   // covariance_noise + what the held intrinsics may be off by
-  std::array<std::array<double, kIntrinsicsSize>, kMaxCameras> intrinsics_sigma{};  // of the free ones, from covariance_noise
-  RigCovariance covariance{};  // covariance_wide of all of θ_S together, with what is held but uncertain
-  double inflation = 1;        // mean over θ_S of the variance by clusters over the one that the solve itself believes (H⁻¹)
+  std::array<Mat6, kMaxCameras>
+      covariance_noise{};  // cluster-robust (`cells`), times shared_errors; priors as they are
+  std::array<Mat6, kMaxCameras>
+      covariance_wide{};  // covariance_noise + what the held intrinsics may be off by
+  std::array<std::array<double, kIntrinsicsSize>, kMaxCameras>
+      intrinsics_sigma{};  // of the free ones, from covariance_noise
+  RigCovariance
+      covariance{};      // covariance_wide of all of θ_S together, with what is held but uncertain
+  double inflation = 1;  // mean over θ_S of the variance by clusters over the one that the solve
+                         // itself believes (H⁻¹)
 
   bool has_pose_covariance = false;
-  std::uint16_t pose = 0;               // whose
-  Mat6 pose_covariance = Mat6::Zero();  // H⁻¹ (inverse_sigma taken as true), of R ← Exp(φ) R, t ← Exp(φ) t + τ
+  std::uint16_t pose = 0;  // whose
+  Mat6 pose_covariance =
+      Mat6::Zero();  // H⁻¹ (inverse_sigma taken as true), of R ← Exp(φ) R, t ← Exp(φ) t + τ
 
   /// The parameters are at a minimum, as far as the tolerances say.
-  [[nodiscard]] bool converged() const noexcept { return termination <= BundleTermination::small_cost_change; }
+  [[nodiscard]] bool converged() const noexcept {
+    return termination <= BundleTermination::small_cost_change;
+  }
   /// The caller's arrays hold a finite result no worse than the start.
   [[nodiscard]] bool usable() const noexcept { return termination <= BundleTermination::diverged; }
 };
@@ -177,31 +213,37 @@ struct BundleCapacities {
   std::size_t poses = 12;
   std::size_t points = 500;
   std::size_t observations = 8000;
-  bool shared = true;      // room for θ_S; false: stereo_calibration is refused with `capacity`
-  std::size_t blocks = 0;  // pairs (eight points | pose) with an observation; 0: the worst case of the sizes above
+  bool shared = true;  // room for θ_S; false: stereo_calibration is refused with `capacity`
+  std::size_t blocks =
+      0;  // pairs (eight points | pose) with an observation; 0: the worst case of the sizes above
 };
 
 namespace detail {
 struct BundleWorkspace;
 }
 
-/// The partitioned bundle adjustment of METHOD §2: Levenberg–Marquardt on U − W P⁻¹ Wᵀ, poses and shared parameters dense.
+/// The partitioned bundle adjustment of METHOD §2: Levenberg–Marquardt on U − W P⁻¹ Wᵀ, poses and
+/// shared parameters dense.
 ///
-/// Parametrisation  pose: R ← Exp(φ) R, t ← Exp(φ) t + τ (about the camera, so that a far-away world origin costs no digits);
-///            camera k: R_k ← R_k Exp(φ), t_k ← t_k + R_k τ, with `exact` t_k kept at its length. Points: X ← X + δ, |δ| at most 0.8 of
-///            the point's least depth, so that no point passes through a camera.
+/// Parametrisation  pose: R ← Exp(φ) R, t ← Exp(φ) t + τ (about the camera, so that a far-away
+///            world origin costs no digits); camera k: R_k ← R_k Exp(φ), t_k ← t_k + R_k τ, with
+///            `exact` t_k kept at its length. Points: X ← X + δ, |δ| at most 0.8 of the point's
+///            least depth, so that no point passes through a camera.
 /// Ownership  The problem's arrays are the caller's; nothing of them is kept after solve().
 /// Threads    solve() by one thread at a time; adjusters are independent of each other.
 /// Memory     memory_needed() bytes of the arena at construction, nothing in solve().
-/// Time       One pass over the observations a step; bounded by max_steps. Deterministic on one machine; between SIMD targets results
-///            agree to the rounding of sums.
-/// Errors     solve() never throws and never leaves a NaN; the status says what was changed. The constructor throws std::length_error if
-///            the arena is too small and std::invalid_argument for impossible capacities.
-/// Source     Warren, McKinnon, Upcroft, ICRA 2013, with the corrected order of transforms (METHOD §1).
+/// Time       One pass over the observations a step; bounded by max_steps. Deterministic on one
+///            machine; between SIMD targets results agree to the rounding of sums.
+/// Errors     solve() never throws and never leaves a NaN; the status says what was changed. The
+///            constructor throws std::length_error if the arena is too small and
+///            std::invalid_argument for impossible capacities.
+/// Source     Warren, McKinnon, Upcroft, ICRA 2013, with the corrected order of transforms (METHOD
+///            §1).
 class BundleAdjuster {
  public:
   BundleAdjuster(const BundleCapacities& capacities, Arena& arena);
-  [[nodiscard]] BundleResult solve(const BundleProblem& problem, const BundleOptions& options) noexcept;
+  [[nodiscard]] BundleResult solve(const BundleProblem& problem,
+                                   const BundleOptions& options) noexcept;
   [[nodiscard]] static std::size_t memory_needed(const BundleCapacities& capacities) noexcept;
 
  private:

@@ -30,13 +30,15 @@ Vec3 direction(Random& random) {
 }
 
 Vec3 box(Random& random, double half) {
-  const double x = random.uniform(-half, half), y = random.uniform(-half, half), z = random.uniform(-half, half);
+  const double x = random.uniform(-half, half), y = random.uniform(-half, half),
+               z = random.uniform(-half, half);
   return {x, y, z};
 }
 
 /// Rows x, y, z of a camera that looks along `axis`, rolled by `roll`.
 Mat3 looking_along(const Vec3& axis, double roll) {
-  const Vec3 side = (std::abs(axis.z()) < 0.9 ? Vec3::UnitZ() : Vec3::UnitX()).cross(axis).normalized();
+  const Vec3 side =
+      (std::abs(axis.z()) < 0.9 ? Vec3::UnitZ() : Vec3::UnitX()).cross(axis).normalized();
   Mat3 R;
   R.row(0) = side;
   R.row(1) = axis.cross(side);
@@ -53,7 +55,9 @@ std::vector<Transform> draw_cameras(const SimulationOptions& o, Random& random) 
       const Mat3 R = exp_so3(direction(random) * random.uniform(0, 0.02));
       cameras.push_back({R, -(R * (baseline * along))});
     } else {
-      const Vec3 t = (-along + (Mat3::Identity() - along * along.transpose()) * box(random, 0.05)).normalized() * baseline;
+      const Vec3 t = (-along + (Mat3::Identity() - along * along.transpose()) * box(random, 0.05))
+                         .normalized() *
+                     baseline;
       cameras.push_back({exp_so3(box(random, 0.05)), t});
     }
   }
@@ -65,7 +69,9 @@ bool sees_all(const SimulatedRig& rig, const Transform& T_left_world) {
     const Transform T = rig.true_T_camera_left[k] * T_left_world;
     for (const Vec3& p : rig.true_points) {
       Vec2 pixel;
-      if (rig.cameras[k].project(T * p, &pixel, nullptr) != ProjectStatus::ok || !rig.cameras[k].inside(pixel, 0)) return false;
+      if (rig.cameras[k].project(T * p, &pixel, nullptr) != ProjectStatus::ok ||
+          !rig.cameras[k].inside(pixel, 0))
+        return false;
     }
   }
   return true;
@@ -81,8 +87,11 @@ Transform draw_pose(const SimulatedRig& rig, const SimulationOptions& o, Random&
       if (sees_all(rig, T)) return T;
       continue;
     }
-    // Left camera so that the middle of the baseline to camera 1 sits on the axis through the centre.
-    const Vec3 middle = rig.true_T_camera_left.size() > 1 ? Vec3(0.5 * rig.true_T_camera_left[1].centre()) : Vec3::Zero();
+    // Left camera so that the middle of the baseline to camera 1 sits on the axis through the
+    // centre.
+    const Vec3 middle = rig.true_T_camera_left.size() > 1
+                            ? Vec3(0.5 * rig.true_T_camera_left[1].centre())
+                            : Vec3::Zero();
     double distance = 1.02 * o.radius;
     for (int step = 0; step < 400; ++step, distance *= 1.02) {
       const Vec3 centre = outward * distance - R.transpose() * middle;
@@ -94,7 +103,8 @@ Transform draw_pose(const SimulatedRig& rig, const SimulationOptions& o, Random&
 }
 
 /// The point nearest to all rays of a track, least squares, from the start's cameras.
-Vec3 triangulate(const SimulatedRig& rig, const BundleObservation* first, const BundleObservation* last) {
+Vec3 triangulate(const SimulatedRig& rig, const BundleObservation* first,
+                 const BundleObservation* last) {
   Mat3 A = Mat3::Zero();
   Vec3 b = Vec3::Zero();
   for (const BundleObservation* o = first; o != last; ++o) {
@@ -121,13 +131,15 @@ BundleProblem SimulatedRig::problem() noexcept {
   return p;
 }
 
-BundleProblem SimulatedRig::monocular_problem(std::vector<Transform>* images, std::vector<BundleObservation>* per_image,
+BundleProblem SimulatedRig::monocular_problem(std::vector<Transform>* images,
+                                              std::vector<BundleObservation>* per_image,
                                               std::vector<std::uint8_t>* constant) {
   images->clear();
   for (const Transform& T : T_left_world)
     for (const Transform& camera : T_camera_left) images->push_back(camera * T);
   *per_image = observations;
-  for (BundleObservation& o : *per_image) o.pose = static_cast<std::uint16_t>(o.pose * cameras.size() + o.camera);
+  for (BundleObservation& o : *per_image)
+    o.pose = static_cast<std::uint16_t>(o.pose * cameras.size() + o.camera);
   constant->assign(images->size(), 0);
   (*constant)[0] = 1;
   BundleProblem p = problem();
@@ -152,12 +164,14 @@ SimulatedRig simulate_rig(const SimulationOptions& o, Random& random) {
     for (std::uint16_t i = 0; i < rig.true_T_left_world.size(); ++i)
       for (std::uint8_t k = 0; k < rig.cameras.size(); ++k) {
         Vec2 pixel;
-        if (rig.cameras[k].project(rig.true_T_camera_left[k] * (rig.true_T_left_world[i] * rig.true_points[j]), &pixel, nullptr) !=
-            ProjectStatus::ok)
+        if (rig.cameras[k].project(
+                rig.true_T_camera_left[k] * (rig.true_T_left_world[i] * rig.true_points[j]), &pixel,
+                nullptr) != ProjectStatus::ok)
           continue;
         const double dx = random.normal(), dy = random.normal();
         const float inverse_sigma = o.noise > 0 ? static_cast<float>(1.0 / o.noise) : 1.0F;
-        rig.observations.push_back({j, i, k, inverse_sigma, pixel.x() + o.noise * dx, pixel.y() + o.noise * dy});
+        rig.observations.push_back(
+            {j, i, k, inverse_sigma, pixel.x() + o.noise * dx, pixel.y() + o.noise * dy});
       }
   perturb_start(rig, o, random);
   return rig;
@@ -184,8 +198,11 @@ void perturb_start(SimulatedRig& rig, const SimulationOptions& o, Random& random
   }
   for (std::size_t first = 0; first < rig.observations.size();) {
     std::size_t last = first;
-    while (last < rig.observations.size() && rig.observations[last].point == rig.observations[first].point) ++last;
-    rig.points[rig.observations[first].point] = triangulate(rig, rig.observations.data() + first, rig.observations.data() + last);
+    while (last < rig.observations.size() &&
+           rig.observations[last].point == rig.observations[first].point)
+      ++last;
+    rig.points[rig.observations[first].point] =
+        triangulate(rig, rig.observations.data() + first, rig.observations.data() + last);
     first = last;
   }
 }

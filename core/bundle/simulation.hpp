@@ -8,27 +8,33 @@
 namespace vergence {
 
 enum class SimulationGenerator : std::uint8_t {
-  ring,   // rigs 20 … 25 m from the cloud's centre, left camera looking exactly at it, right camera on its x axis
-  tight,  // rigs as near as all points stay in view, the middle of the baseline looking at the centre, baseline slightly askew
+  ring,  // rigs 20 … 25 m from the cloud's centre, left camera looking exactly at it, right camera
+         // on its x axis
+  tight,  // rigs as near as all points stay in view, the middle of the baseline looking at the
+          // centre, baseline slightly askew
 };
 enum class SimulationShape : std::uint8_t { ball, shell };
 
-/// The paper's simulated rig (Sec. V-A): a cloud of points round the origin, snapshots of a rig all round it, every point in every image.
+/// The paper's simulated rig (Sec. V-A): a cloud of points round the origin, snapshots of a rig all
+/// round it, every point in every image.
 struct SimulationOptions {
   SimulationGenerator generator = SimulationGenerator::ring;
   SimulationShape shape = SimulationShape::ball;
   int cameras = 2;  // 1 … kMaxCameras
   int poses = 10;   // rig snapshots; the first is known
   int points = 100;
-  double radius = 7;                // m, of the cloud
-  double noise = 0.1;               // px, Gaussian, of each coordinate
-  double start_position = 0.1;      // m, uniform ±, an axis: centres of the rigs but the first
-  double start_rotation = 0.1;      // rad, uniform ±, an axis: R_k
-  double start_translation = 0.05;  // m, uniform ±, an axis: centre of camera k, brought back to the true length
-  double start_points = 0.1;        // m, uniform ±, an axis; negative: triangulated from the perturbed cameras
+  double radius = 7;            // m, of the cloud
+  double noise = 0.1;           // px, Gaussian, of each coordinate
+  double start_position = 0.1;  // m, uniform ±, an axis: centres of the rigs but the first
+  double start_rotation = 0.1;  // rad, uniform ±, an axis: R_k
+  double start_translation =
+      0.05;  // m, uniform ±, an axis: centre of camera k, brought back to the true length
+  double start_points =
+      0.1;  // m, uniform ±, an axis; negative: triangulated from the perturbed cameras
 };
 
-/// One simulated problem: truth, measurements and a start. Plain memory of its own; not for the real-time path.
+/// One simulated problem: truth, measurements and a start. Plain memory of its own; not for the
+/// real-time path.
 struct SimulatedRig {
   std::vector<Camera> cameras;
   std::vector<Transform> true_T_camera_left, true_T_left_world, T_camera_left, T_left_world;
@@ -37,12 +43,15 @@ struct SimulatedRig {
 
   /// The start as a problem in these arrays; the first pose constant.
   [[nodiscard]] BundleProblem problem() noexcept;
-  /// The same as parallel_monocular: a pose an image, image = pose · cameras + camera; `images` keeps the poses.
-  [[nodiscard]] BundleProblem monocular_problem(std::vector<Transform>* images, std::vector<BundleObservation>* per_image,
+  /// The same as parallel_monocular: a pose an image, image = pose · cameras + camera; `images`
+  /// keeps the poses.
+  [[nodiscard]] BundleProblem monocular_problem(std::vector<Transform>* images,
+                                                std::vector<BundleObservation>* per_image,
                                                 std::vector<std::uint8_t>* constant);
 };
 
-/// Draws a problem. Throws std::runtime_error if no view of the whole cloud is found (impossible options).
+/// Draws a problem. Throws std::runtime_error if no view of the whole cloud is found (impossible
+/// options).
 [[nodiscard]] SimulatedRig simulate_rig(const SimulationOptions& options, Random& random);
 
 /// Moves the start (not the truth) as the options say; called by simulate_rig.

@@ -21,7 +21,9 @@ RigCovariance noise_only(const RigCovariance& wide) noexcept {
     for (int r = 0; r < kRigSize; ++r) with_held[static_cast<std::size_t>(r)] = noise(r, held);
     for (int r = 0; r < kRigSize; ++r)
       for (int c = 0; c <= r; ++c)
-        noise.set(r, c, noise(r, c) - with_held[static_cast<std::size_t>(r)] * with_held[static_cast<std::size_t>(c)] / variance);
+        noise.set(r, c,
+                  noise(r, c) - with_held[static_cast<std::size_t>(r)] *
+                                    with_held[static_cast<std::size_t>(c)] / variance);
   }
   return noise;
 }
@@ -40,7 +42,8 @@ Agreement agreement(const RigCalibration& a, const RigCalibration& b, int k) noe
       double relative = 0;
       if (!reader.difference(p, &relative)) return;
       const detail::DepthGradient g = detail::depth_gradient(p, a.T_camera_left[c], k, true);
-      const double variance = detail::variance_of(first, k, g, true) + detail::variance_of(second, k, g, true);
+      const double variance =
+          detail::variance_of(first, k, g, true) + detail::variance_of(second, k, g, true);
       if (!(variance > 0)) return;
       normalised += relative * relative / variance;
       squared += relative * relative;
@@ -60,8 +63,8 @@ Agreement agreement(const RigCalibration& a, const RigCalibration& b, int k) noe
   Mat6 C;
   for (int i = 0; i < 6; ++i)
     for (int j = 0; j < 6; ++j)
-      C(i, j) =
-          first.covariance(extrinsic_row(k) + i, extrinsic_row(k) + j) + second.covariance(extrinsic_row(k) + i, extrinsic_row(k) + j);
+      C(i, j) = first.covariance(extrinsic_row(k) + i, extrinsic_row(k) + j) +
+                second.covariance(extrinsic_row(k) + i, extrinsic_row(k) + j);
   const Mat5 own = basis.transpose() * C * basis;
   const Vec5 d = basis.transpose() * way;
   result.transform = d.dot(own.ldlt().solve(d)) / 5;
@@ -71,7 +74,8 @@ Agreement agreement(const RigCalibration& a, const RigCalibration& b, int k) noe
     const int row = intrinsic_row(k) + i;
     const double variance = first.covariance(row, row) + second.covariance(row, row);
     if (variance > 0)
-      result.intrinsics += 0.25 * difference[static_cast<std::size_t>(i)] * difference[static_cast<std::size_t>(i)] / variance;
+      result.intrinsics += 0.25 * difference[static_cast<std::size_t>(i)] *
+                           difference[static_cast<std::size_t>(i)] / variance;
   }
   return result;
 }

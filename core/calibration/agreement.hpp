@@ -6,22 +6,24 @@
 
 namespace vergence::calibration {
 
-/// Normalised squared differences of two calibrations found from disjoint stretches of one drive (METHOD §6.5): 1 on average where their
-/// sigmas are true, and no truth is needed to see it.
+/// Normalised squared differences of two calibrations found from disjoint stretches of one drive
+/// (METHOD §6.5): 1 on average where their sigmas are true, and no truth is needed to see it.
 struct Agreement {
   static constexpr std::size_t kDepths = 4;
   static constexpr std::array<double, kDepths> depth_m = {5, 10, 20, 50};
-  std::array<double, kDepths> depth{};          // mean over the image of (difference / sigma)², of the inverse depth
+  std::array<double, kDepths>
+      depth{};  // mean over the image of (difference / sigma)², of the inverse depth
   std::array<double, kDepths> depth_percent{};  // root mean square difference, percent
-  double transform = 0;                         // of the five parameters of the transform together, over five
-  double intrinsics = 0;                        // mean of fx fy cx cy of camera k, each by itself
+  double transform = 0;   // of the five parameters of the transform together, over five
+  double intrinsics = 0;  // mean of fx fy cx cy of camera k, each by itself
 };
 
-/// Sigmas are those of noise alone: what held intrinsics are off by is the same in both. `k`: of camera k ≥ 1. Both with their joint
-/// covariance. Threads pure.
+/// Sigmas are those of noise alone: what held intrinsics are off by is the same in both. `k`: of
+/// camera k ≥ 1. Both with their joint covariance. Threads pure.
 [[nodiscard]] Agreement agreement(const RigCalibration& a, const RigCalibration& b, int k) noexcept;
 
-/// The joint covariance given that camera 0's focal lengths and centre, which solves hold, are as they are. Threads pure.
+/// The joint covariance given that camera 0's focal lengths and centre, which solves hold, are as
+/// they are. Threads pure.
 [[nodiscard]] RigCovariance noise_only(const RigCovariance& wide) noexcept;
 
 }  // namespace vergence::calibration

@@ -16,8 +16,8 @@ constexpr double kFullWindow = 3.0;         // times the wanted sigmas, at max_f
 constexpr double kBaselineOfSigmas = 0.75;  // m, for which the wanted sigma of t is given
 constexpr int kFewestHeldOut = 3;           // frames that say anything
 constexpr double kWorstFit = 1.5;           // px: matches of frames not in the solve, median
-constexpr double kCertain = 3.0;            // sigmas of depth by which a calibration is contradicted
-constexpr double kNeedsBaselines = 3.0;     // travelled, besides needs_motion_m
+constexpr double kCertain = 3.0;         // sigmas of depth by which a calibration is contradicted
+constexpr double kNeedsBaselines = 3.0;  // travelled, besides needs_motion_m
 
 /// Median distance to the epipolar lines of one frame's matches, px; negative: hardly a match.
 double median_distance(const LoggedFrame& frame, const RigCalibration& rig) noexcept {
@@ -30,8 +30,10 @@ double median_distance(const LoggedFrame& frame, const RigCalibration& rig) noex
     const LoggedSighting& s = frame.sightings[i];
     Vec3 a, b;
     double d = 0;
-    if (!s.by(0) || !s.by(1) || !left.unproject(s.raw[0].cast<double>(), &a) || !right.unproject(s.raw[1].cast<double>(), &b) ||
-        geometry.to_line(a.head<2>() / a.z(), b.head<2>() / b.z(), &d, nullptr) != EpipolarStatus::ok)
+    if (!s.by(0) || !s.by(1) || !left.unproject(s.raw[0].cast<double>(), &a) ||
+        !right.unproject(s.raw[1].cast<double>(), &b) ||
+        geometry.to_line(a.head<2>() / a.z(), b.head<2>() / b.z(), &d, nullptr) !=
+            EpipolarStatus::ok)
       continue;
     distance[n++] = std::abs(d) * rig.intrinsics[1].fx;
   }
@@ -45,10 +47,14 @@ double median_distance(const LoggedFrame& frame, const RigCalibration& rig) noex
 template <class Each>
 void for_held_out(const TrackLog& log, std::uint64_t after, Each each) noexcept {
   std::size_t n = 0;
-  for (std::size_t i = log.size(); i-- > 0 && n < kHeldOutFrames && log.frame(i).number > after; ++n) each(log.frame(i));
+  for (std::size_t i = log.size(); i-- > 0 && n < kHeldOutFrames && log.frame(i).number > after;
+       ++n)
+    each(log.frame(i));
 }
 
-double angle_between(const Vec3& a, const Vec3& b) noexcept { return std::atan2(a.cross(b).norm(), a.dot(b)); }
+double angle_between(const Vec3& a, const Vec3& b) noexcept {
+  return std::atan2(a.cross(b).norm(), a.dot(b));
+}
 
 }  // namespace
 
@@ -66,13 +72,14 @@ HeldOut held_out(const TrackLog& log, std::uint64_t after, const RigCalibration&
   return h;
 }
 
-bool fits_better(const TrackLog& log, std::uint64_t after, const RigCalibration& better, const RigCalibration& worse,
-                 double chance) noexcept {
+bool fits_better(const TrackLog& log, std::uint64_t after, const RigCalibration& better,
+                 const RigCalibration& worse, double chance) noexcept {
   double sum = 0, squares = 0;
   int n = 0;
   for_held_out(log, after, [&](const LoggedFrame& f) noexcept {
     const double a = median_distance(f, worse), b = median_distance(f, better);
-    // Without a match by which to tell: the one that was searched with the other's band is no witness.
+    // Without a match by which to tell: the one that was searched with the other's band is no
+    // witness.
     if (a < 0 || b < 0) return;
     sum += a - b;
     squares += (a - b) * (a - b);
@@ -83,13 +90,15 @@ bool fits_better(const TrackLog& log, std::uint64_t after, const RigCalibration&
   return mean > chance * std::sqrt(variance / (n - 1));
 }
 
-Assessment assess(const RigCalibration& measured, const RigCalibration& claimed, const TrackLog& log, std::uint64_t after,
-                  const CalibrationOptions& o, double pixel_sigma) noexcept {
+Assessment assess(const RigCalibration& measured, const RigCalibration& claimed,
+                  const TrackLog& log, std::uint64_t after, const CalibrationOptions& o,
+                  double pixel_sigma) noexcept {
   Assessment a;
   double worst = -1;
   for (int k = 1; k < measured.cameras; ++k) {
     const double depth = judged_depth_m(measured, k, o, pixel_sigma);
-    const double sigma = depth_error_percent(measured, k, depth), difference = depth_difference_percent(measured, claimed, k, depth);
+    const double sigma = depth_error_percent(measured, k, depth),
+                 difference = depth_difference_percent(measured, claimed, k, depth);
     const double all = std::hypot(sigma, difference);
     if (all <= worst) continue;
     worst = all;
@@ -100,7 +109,8 @@ Assessment assess(const RigCalibration& measured, const RigCalibration& claimed,
   a.better = fits_better(log, after, measured, claimed, kRareChance);
   a.worse = fits_better(log, after, claimed, measured);
   a.confirmed = worst <= o.tolerated_depth_percent;
-  a.contradicted = a.difference_percent > o.tolerated_depth_percent && a.difference_percent > kCertain * a.sigma_percent;
+  a.contradicted = a.difference_percent > o.tolerated_depth_percent &&
+                   a.difference_percent > kCertain * a.sigma_percent;
   return a;
 }
 
@@ -117,7 +127,8 @@ const char* reason(Gate gate) noexcept {
     case Gate::needs_near_structure:
       return "too few near points were seen";
     case Gate::cameras_swapped:
-      return "the right camera is on the left: cables or their order in the configuration are exchanged";
+      return "the right camera is on the left: cables or their order in the configuration are "
+             "exchanged";
     case Gate::implausible_direction:
       return "the direction between the cameras is far from the configured one";
     case Gate::implausible_rotation:
@@ -140,10 +151,12 @@ double sigma_excess(const RigCalibration& rig, const CalibrationOptions& o) noex
   double worst = 0;
   for (int k = 1; k < rig.cameras; ++k) {
     const auto& sigma = rig.sigma_noise[static_cast<std::size_t>(k)];
-    for (std::size_t i = 0; i < 3; ++i) worst = std::max(worst, sigma[i] / (1e-3 * o.rotation_sigma_mrad));
+    for (std::size_t i = 0; i < 3; ++i)
+      worst = std::max(worst, sigma[i] / (1e-3 * o.rotation_sigma_mrad));
     for (std::size_t i = 4; i < 6; ++i)
-      worst = std::max(
-          worst, sigma[i] / (1e-3 * o.translation_sigma_mm * rig.T_camera_left[static_cast<std::size_t>(k)].t.norm() / kBaselineOfSigmas));
+      worst = std::max(worst, sigma[i] / (1e-3 * o.translation_sigma_mm *
+                                          rig.T_camera_left[static_cast<std::size_t>(k)].t.norm() /
+                                          kBaselineOfSigmas));
   }
   return worst;
 }
@@ -161,8 +174,10 @@ Gate ask_common_gates(const GateQuestion& q, const CalibrationOptions& o) noexce
     if (found.t.dot(nominal.t) < 0) return Gate::cameras_swapped;
     if (s.out_of_step) return Gate::out_of_step;
     if (q.may_have_changed && s.changed_at > 0) return Gate::rig_changed;
-    if (angle_between(found.t, nominal.t) > o.max_direction_deg * kDegree) return Gate::implausible_direction;
-    if (q.in_use != nullptr && log_so3(found.R * nominal.R.transpose()).norm() > o.max_rotation_deg * kDegree)
+    if (angle_between(found.t, nominal.t) > o.max_direction_deg * kDegree)
+      return Gate::implausible_direction;
+    if (q.in_use != nullptr &&
+        log_so3(found.R * nominal.R.transpose()).norm() > o.max_rotation_deg * kDegree)
       return Gate::implausible_rotation;
   }
   // With the lenses free, the depth's own sigma says whether the way was long enough.
@@ -180,14 +195,17 @@ Gate ask_gates(const GateQuestion& q, const CalibrationOptions& o) noexcept {
   if (common != Gate::open) return common;
   if (q.lenses) {
     for (int k = 1; k < s.rig.cameras; ++k)
-      if (depth_error_percent(s.rig, k, judged_depth_m(s.rig, k, o, q.pixel_sigma)) > o.usable_depth_percent) return Gate::depth_unknown;
+      if (depth_error_percent(s.rig, k, judged_depth_m(s.rig, k, o, q.pixel_sigma)) >
+          o.usable_depth_percent)
+        return Gate::depth_unknown;
   } else if (sigma_excess(s.rig, o) > (q.window_full ? kFullWindow : 1.0)) {
     return Gate::sigmas_too_large;
   }
   if (q.log == nullptr) return Gate::open;
   const HeldOut fit = held_out(*q.log, s.newest, s.rig);
   if (fit.frames >= kFewestHeldOut && fit.median_px > kWorstFit) return Gate::does_not_fit;
-  if (q.in_use != nullptr && q.must_be_better && !fits_better(*q.log, s.newest, s.rig, *q.in_use)) return Gate::no_better;
+  if (q.in_use != nullptr && q.must_be_better && !fits_better(*q.log, s.newest, s.rig, *q.in_use))
+    return Gate::no_better;
   return Gate::open;
 }
 

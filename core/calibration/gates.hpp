@@ -8,20 +8,27 @@
 
 namespace vergence::calibration {
 
-/// How well a calibration fits frames that it was not solved from: distances of matches across to their epipolar lines.
+/// How well a calibration fits frames that it was not solved from: distances of matches across to
+/// their epipolar lines.
 struct HeldOut {
   int frames = 0;
   double median_px = 0;  // of the frames' medians
 };
 
-/// Frames newer than `after`. At most the newest kHeldOutFrames, and of each at most kHeldOutMatches. Threads pure.
+/// Frames newer than `after`. At most the newest kHeldOutFrames, and of each at most
+/// kHeldOutMatches. Threads pure.
 inline constexpr std::size_t kHeldOutFrames = 12, kHeldOutMatches = 150;
-[[nodiscard]] HeldOut held_out(const TrackLog& log, std::uint64_t after, const RigCalibration& rig) noexcept;
+[[nodiscard]] HeldOut held_out(const TrackLog& log, std::uint64_t after,
+                               const RigCalibration& rig) noexcept;
 
-/// Whether `better` fits those frames better than `worse` by more than chance: mean over frames of the difference of medians against
-/// `chance` of its standard errors; true, too, where hardly a frame can say. Threads pure.
-inline constexpr double kChance = 2.0, kRareChance = 3.0;  // of a question asked once; of one that is asked all the time
-[[nodiscard]] bool fits_better(const TrackLog& log, std::uint64_t after, const RigCalibration& better, const RigCalibration& worse,
+/// Whether `better` fits those frames better than `worse` by more than chance: mean over frames of
+/// the difference of medians against `chance` of its standard errors; true, too, where hardly a
+/// frame can say. Threads pure.
+inline constexpr double kChance = 2.0,
+                        kRareChance =
+                            3.0;  // of a question asked once; of one that is asked all the time
+[[nodiscard]] bool fits_better(const TrackLog& log, std::uint64_t after,
+                               const RigCalibration& better, const RigCalibration& worse,
                                double chance = kChance) noexcept;
 
 /// What a drive's own measurement of the rig says of the calibration in use (METHOD §6.4).
@@ -29,14 +36,17 @@ struct Assessment {
   double depth_m = 0;             // where it is judged: judged_depth_m()
   double sigma_percent = 0;       // of the measured calibration's depth there, 1 sigma
   double difference_percent = 0;  // of the claimed one from the measured, root mean over the image
-  bool better = false;            // the measured one fits frames that were not used better, by more than chance
-  bool worse = false;             // or worse
-  bool confirmed = false;         // the claim holds to the tolerated depth error
-  bool contradicted = false;      // it certainly does not
+  bool better =
+      false;  // the measured one fits frames that were not used better, by more than chance
+  bool worse = false;         // or worse
+  bool confirmed = false;     // the claim holds to the tolerated depth error
+  bool contradicted = false;  // it certainly does not
 };
 
-/// The worst of the rig's further cameras. `log` with frames after `after` that `measured` does not rest on. Threads pure.
-[[nodiscard]] Assessment assess(const RigCalibration& measured, const RigCalibration& claimed, const TrackLog& log, std::uint64_t after,
+/// The worst of the rig's further cameras. `log` with frames after `after` that `measured` does not
+/// rest on. Threads pure.
+[[nodiscard]] Assessment assess(const RigCalibration& measured, const RigCalibration& claimed,
+                                const TrackLog& log, std::uint64_t after,
                                 const CalibrationOptions& options, double pixel_sigma) noexcept;
 
 enum class Gate : std::uint8_t {
@@ -61,18 +71,24 @@ struct GateQuestion {
   const RigSolution* solution = nullptr;
   const RigCalibration* nominal = nullptr;
   const RigCalibration* in_use = nullptr;  // null: there is none
-  const TrackLog* log = nullptr;           // with the frames since the snapshot; null: there are none to hold it against
-  bool lenses = false;                     // they were free: depth is judged by their joint covariance, not the transform's single sigmas
-  double pixel_sigma = 0.15;               // px, of a tracked corner: judged_depth_m()
-  bool may_have_changed = true;            // a change of the rig among the frames used closes the gate; once, or a wrong one would for ever
-  bool must_be_better = true;              // than `in_use`, on frames that were not used
-  bool window_full = false;                // max_frames were used, or no more will come: three times the sigmas are enough
+  const TrackLog* log =
+      nullptr;  // with the frames since the snapshot; null: there are none to hold it against
+  bool lenses = false;        // they were free: depth is judged by their joint covariance, not the
+                              // transform's single sigmas
+  double pixel_sigma = 0.15;  // px, of a tracked corner: judged_depth_m()
+  bool may_have_changed = true;  // a change of the rig among the frames used closes the gate; once,
+                                 // or a wrong one would for ever
+  bool must_be_better = true;    // than `in_use`, on frames that were not used
+  bool window_full =
+      false;  // max_frames were used, or no more will come: three times the sigmas are enough
 };
 
 /// METHOD §4: what stands between a solution and its use. Threads pure.
-[[nodiscard]] Gate ask_gates(const GateQuestion& question, const CalibrationOptions& options) noexcept;
+[[nodiscard]] Gate ask_gates(const GateQuestion& question,
+                             const CalibrationOptions& options) noexcept;
 
 /// How many times the wanted sigmas the worst of the solution is; ≤ 1: enough.
-[[nodiscard]] double sigma_excess(const RigCalibration& rig, const CalibrationOptions& options) noexcept;
+[[nodiscard]] double sigma_excess(const RigCalibration& rig,
+                                  const CalibrationOptions& options) noexcept;
 
 }  // namespace vergence::calibration

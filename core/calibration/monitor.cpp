@@ -15,13 +15,16 @@ namespace {
 using Kind = MonitorVerdict::Kind;
 
 constexpr double kYawKnown = 0.1 * std::numbers::pi / 180;  // rad: less is `needs_motion`
-constexpr int kPoorFrames = 30;                             // without enough matches that make `needs_texture`
-constexpr int kStandingFrames = 3;                          // in a row over the threshold while standing
-constexpr double kStandingFactor = 1.5;  // of the threshold: one frame's few hundred errors are less normal than the sum of many frames'
+constexpr int kPoorFrames = 30;          // without enough matches that make `needs_texture`
+constexpr int kStandingFrames = 3;       // in a row over the threshold while standing
+constexpr double kStandingFactor = 1.5;  // of the threshold: one frame's few hundred errors are
+                                         // less normal than the sum of many frames'
 constexpr double kAgrees = 0.5;          // of the threshold: below, a frame agrees
 
 void check(bool good, const char* name, const char* range) {
-  if (!good) throw std::invalid_argument(std::string("monitor.") + name + " is out of range: allowed is " + range);
+  if (!good)
+    throw std::invalid_argument(std::string("monitor.") + name + " is out of range: allowed is " +
+                                range);
 }
 
 void validate(const MonitorOptions& o) {
@@ -45,7 +48,8 @@ struct Monitor::Parts {
   MonitorOptions options{};
   bool valid = false;
   detail::Reference reference{};
-  Eigen::Matrix<double, 6, 5> d_offset_d_theta = Eigen::Matrix<double, 6, 5>::Zero();  // (φ, τ) by (φ, α, β)
+  Eigen::Matrix<double, 6, 5> d_offset_d_theta =
+      Eigen::Matrix<double, 6, 5>::Zero();  // (φ, τ) by (φ, α, β)
   Mat5 covariance = Mat5::Zero();
   detail::Looks looks{};
   detail::Windows windows{};
@@ -65,7 +69,9 @@ struct Monitor::Parts {
   void watch_standing(const MonitorFrame& frame, const detail::AcrossLook& look) noexcept;
 };
 
-std::size_t Monitor::memory_needed(const MonitorOptions&) noexcept { return sizeof(Parts) + kCacheLine; }
+std::size_t Monitor::memory_needed(const MonitorOptions&) noexcept {
+  return sizeof(Parts) + kCacheLine;
+}
 
 Monitor::Monitor(const MonitorOptions& options, Arena& arena) {
   validate(options);
@@ -74,11 +80,15 @@ Monitor::Monitor(const MonitorOptions& options, Arena& arena) {
   parts_->forget();
 }
 
-bool Monitor::set_reference(const Transform& T_camera_left, const Pinhole& left, const Pinhole& right, const Mat6& covariance) noexcept {
+bool Monitor::set_reference(const Transform& T_camera_left, const Pinhole& left,
+                            const Pinhole& right, const Mat6& covariance) noexcept {
   Parts& p = *parts_;
   const double length = T_camera_left.t.norm();
-  const auto good = [](const Pinhole& k) { return k.fx > 0 && k.fy > 0 && std::isfinite(k.fx + k.fy + k.cx + k.cy); };
-  p.valid = T_camera_left.finite() && length > 0 && good(left) && good(right) && covariance.allFinite();
+  const auto good = [](const Pinhole& k) {
+    return k.fx > 0 && k.fy > 0 && std::isfinite(k.fx + k.fy + k.cx + k.cy);
+  };
+  p.valid =
+      T_camera_left.finite() && length > 0 && good(left) && good(right) && covariance.allFinite();
   if (p.valid) {
     const Mat32 B = tangent_basis(T_camera_left.t / length);
     p.reference = {T_camera_left, EpipolarGeometry(T_camera_left), B, length, left, right};
@@ -101,8 +111,8 @@ void Monitor::reset() noexcept { parts_->forget(); }
 int Monitor::frames_agreed() const noexcept { return parts_->agreed; }
 
 void Monitor::Parts::watch_collapse(const MonitorFrame& frame) noexcept {
-  const bool missing =
-      frame.expected_across >= options.collapse_expected && frame.found_across < options.collapse_share * frame.expected_across;
+  const bool missing = frame.expected_across >= options.collapse_expected &&
+                       frame.found_across < options.collapse_share * frame.expected_across;
   if (missing && collapsed == 0) collapsed_from = frame.frame;
   // A frame that expects nothing (night, a covered lens) neither adds nor takes away.
   if (missing)
@@ -114,7 +124,8 @@ void Monitor::Parts::watch_collapse(const MonitorFrame& frame) noexcept {
 void Monitor::Parts::watch_matches(const MonitorFrame& frame) noexcept {
   // Of a pair that mostly finds nothing, what is found is chance.
   const detail::AcrossLook across =
-      collapsed > 0 ? detail::AcrossLook{} : looks.across(reference, frame, options.min_matches, frame.moving);
+      collapsed > 0 ? detail::AcrossLook{}
+                    : looks.across(reference, frame, options.min_matches, frame.moving);
   poor = across.usable ? 0 : poor + 1;
   if (!across.usable) return;
   if (!frame.moving) {
@@ -135,11 +146,15 @@ void Monitor::Parts::watch_matches(const MonitorFrame& frame) noexcept {
   windows.push(e);
   latest = windows.decide();
   const bool measured = windows.frames() >= static_cast<std::uint64_t>(options.short_window);
-  agreed = measured && latest.kind == Kind::quiet && latest.statistic < kAgrees * options.threshold ? agreed + 1 : 0;
+  agreed = measured && latest.kind == Kind::quiet && latest.statistic < kAgrees * options.threshold
+               ? agreed + 1
+               : 0;
 }
 
-void Monitor::Parts::watch_standing(const MonitorFrame& frame, const detail::AcrossLook& look) noexcept {
-  if (latest.kind != Kind::quiet && standing_over < kStandingFrames) return;  // what moving frames have found stands
+void Monitor::Parts::watch_standing(const MonitorFrame& frame,
+                                    const detail::AcrossLook& look) noexcept {
+  if (latest.kind != Kind::quiet && standing_over < kStandingFrames)
+    return;  // what moving frames have found stands
   latest.statistic = windows.single(look.evidence, look.spread_now) / kStandingFactor;
   if (latest.statistic > options.threshold) {
     if (standing_over++ == 0) standing_from = frame.frame;

@@ -6,9 +6,11 @@
 namespace vergence::calibration {
 namespace {
 
-constexpr double kTravel = 3.0;       // m since the earlier frame that make a look: what a street's depths want
+constexpr double kTravel =
+    3.0;  // m since the earlier frame that make a look: what a street's depths want
 constexpr double kLeastTravel = 0.3;  // m under which a pair of frames says nothing of yaw
-constexpr double kSurvivors = 0.4;    // of the earlier frame's tracks: fewer, and there is no use in waiting
+constexpr double kSurvivors =
+    0.4;  // of the earlier frame's tracks: fewer, and there is no use in waiting
 constexpr double kMovingSpeed = 0.5;  // m/s: slower, and neighbouring images are nearly the same
 constexpr std::size_t kProbes = 16;   // of the table, at most half full
 
@@ -40,7 +42,8 @@ struct MonitorFeed::Parts {
     }
     return nullptr;
   }
-  void remember(std::uint64_t frame, std::span<const AcrossSighting> across, const Transform& T_now_previous) noexcept {
+  void remember(std::uint64_t frame, std::span<const AcrossSighting> across,
+                const Transform& T_now_previous) noexcept {
     earlier = frame;
     for (Slot& s : slots) s.used = false;
     stored = 0;
@@ -61,19 +64,23 @@ struct MonitorFeed::Parts {
 };
 
 std::size_t MonitorFeed::memory_needed(std::size_t capacity) noexcept {
-  return sizeof(Parts) + std::bit_ceil(2 * std::max<std::size_t>(capacity, 1)) * sizeof(Parts::Slot) + capacity * sizeof(MotionTrack) +
-         3 * kCacheLine;
+  return sizeof(Parts) +
+         std::bit_ceil(2 * std::max<std::size_t>(capacity, 1)) * sizeof(Parts::Slot) +
+         capacity * sizeof(MotionTrack) + 3 * kCacheLine;
 }
 
-MonitorFeed::MonitorFeed(std::size_t capacity, Arena& arena) : parts_(arena.make<Parts>(1, "monitor feed").data()) {
+MonitorFeed::MonitorFeed(std::size_t capacity, Arena& arena)
+    : parts_(arena.make<Parts>(1, "monitor feed").data()) {
   parts_->capacity = capacity;
-  parts_->slots = arena.make<Parts::Slot>(std::bit_ceil(2 * std::max<std::size_t>(capacity, 1)), "monitor feed: sightings");
+  parts_->slots = arena.make<Parts::Slot>(std::bit_ceil(2 * std::max<std::size_t>(capacity, 1)),
+                                          "monitor feed: sightings");
   parts_->motion = arena.make<MotionTrack>(capacity, "monitor feed: tracks");
 }
 
 void MonitorFeed::reset() noexcept { parts_->has_earlier = parts_->has_stamp = false; }
 
-MonitorFrame MonitorFeed::next(Stamp stamp, std::uint64_t frame, std::span<const AcrossSighting> across,
+MonitorFrame MonitorFeed::next(Stamp stamp, std::uint64_t frame,
+                               std::span<const AcrossSighting> across,
                                const Transform& T_now_previous) noexcept {
   Parts& p = *parts_;
   MonitorFrame out;
@@ -82,7 +89,8 @@ MonitorFrame MonitorFeed::next(Stamp stamp, std::uint64_t frame, std::span<const
   out.across = across;
   out.found_across = static_cast<int>(across.size());
   out.T_now_previous = T_now_previous;
-  const double step = T_now_previous.t.norm(), seconds = p.has_stamp ? (stamp - p.last).to_seconds() : 0;
+  const double step = T_now_previous.t.norm(),
+               seconds = p.has_stamp ? (stamp - p.last).to_seconds() : 0;
   out.moving = seconds > 0 && step > kMovingSpeed * seconds;
   p.last = stamp;
   p.has_stamp = true;
@@ -97,7 +105,9 @@ MonitorFrame MonitorFeed::next(Stamp stamp, std::uint64_t frame, std::span<const
     if (n == p.motion.size()) break;
     const AcrossSighting* before = p.find(s.track);
     if (before == nullptr) continue;
-    p.motion[n++] = {before->left, before->right, s.left, s.right, std::max(before->sigma_px, s.sigma_px), s.track};
+    p.motion[n++] = {
+        before->left, before->right, s.left, s.right, std::max(before->sigma_px, s.sigma_px),
+        s.track};
   }
   const bool few = static_cast<double>(n) < kSurvivors * static_cast<double>(p.stored);
   if (!few && p.travelled < kTravel) return out;

@@ -23,13 +23,15 @@ void let_drift(double hours, const CalibrationOptions& options, RigCalibration* 
     const auto c = static_cast<std::size_t>(k);
     if (k > 0) {
       for (int i = 0; i < 3; ++i) widen(&rig->covariance, extrinsic_row(k) + i, angle);
-      for (int i = 3; i < 6; ++i) widen(&rig->covariance, extrinsic_row(k) + i, angle * rig->T_camera_left[c].t.norm());
+      for (int i = 3; i < 6; ++i)
+        widen(&rig->covariance, extrinsic_row(k) + i, angle * rig->T_camera_left[c].t.norm());
     }
     const int first = intrinsic_row(k);
     const double fx = rig->intrinsics[c].fx;
     for (int i = 0; i < 2; ++i) widen(&rig->covariance, first + i, kFocalOfDrift * angle * fx);
     for (int i = 2; i < 4; ++i) widen(&rig->covariance, first + i, kCentreOfDrift * angle * fx);
-    for (int i = 4; i < kIntrinsicsSize; ++i) widen(&rig->covariance, first + i, kDistortionOfDrift * angle);
+    for (int i = 4; i < kIntrinsicsSize; ++i)
+      widen(&rig->covariance, first + i, kDistortionOfDrift * angle);
   }
 }
 

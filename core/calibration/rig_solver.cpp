@@ -12,21 +12,26 @@ namespace {
 constexpr std::size_t kFramesATrack = 3;  // at least, on average: sizes the points
 constexpr std::size_t kMostViews = 12;    // of a track that its point is triangulated from
 constexpr double kWildResidual = 40.0;    // px at the start: not the same point
-constexpr double kCertainChange = 2;      // of the monitor's threshold: the frames have been used to find what they are held against
+constexpr double kCertainChange =
+    2;  // of the monitor's threshold: the frames have been used to find what they are held against
 constexpr int kLeastTracks = 60;
-constexpr int kLeastTies = 10;                     // points that tie a frame to those before it
-constexpr int kLeastCandidateMatches = 40;         // across, of the frame whose own transform begins the solve
-constexpr double kHuber = 2.0, kCauchy = 2.5;      // residual scales
-constexpr double kFirstCut = 6.0, kLastCut = 4.0;  // residual scales beyond which a sighting is left out
-// Tracks share errors that a cluster a track does not see: clusters are cells of the image and blocks of frames. What is left, variance of
-// the transforms found on recorded and rendered drives over the one by clusters (docs/calibration.md).
+constexpr int kLeastTies = 10;  // points that tie a frame to those before it
+constexpr int kLeastCandidateMatches =
+    40;  // across, of the frame whose own transform begins the solve
+constexpr double kHuber = 2.0, kCauchy = 2.5;  // residual scales
+constexpr double kFirstCut = 6.0,
+                 kLastCut = 4.0;  // residual scales beyond which a sighting is left out
+// Tracks share errors that a cluster a track does not see: clusters are cells of the image and
+// blocks of frames. What is left, variance of the transforms found on recorded and rendered drives
+// over the one by clusters (docs/calibration.md).
 constexpr int kCells = 6;
 constexpr double kSharedErrors = 3.5;
 constexpr double kUsualInflation = 6;    // of a calibration that does not say its own
 constexpr double kMedianOfTwo = 1.1774;  // median length of a vector of two standard normal numbers
 
 double milliseconds_since(std::chrono::steady_clock::time_point start) noexcept {
-  return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
+  return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start)
+      .count();
 }
 
 /// A lens with the sigmas of what was estimated; of the rest it keeps its own.
@@ -36,32 +41,41 @@ Intrinsics with_sigmas(Intrinsics lens, const std::array<double, kIntrinsicsSize
   return lens;
 }
 
-Vec2 pixel_of(const LoggedSighting& s, int k) noexcept { return s.raw[static_cast<std::size_t>(k)].cast<double>(); }
+Vec2 pixel_of(const LoggedSighting& s, int k) noexcept {
+  return s.raw[static_cast<std::size_t>(k)].cast<double>();
+}
 
 }  // namespace
 
-BundleCapacities RigSolver::capacities(const CalibrationOptions& options, int cameras, std::size_t features) noexcept {
+BundleCapacities RigSolver::capacities(const CalibrationOptions& options, int cameras,
+                                       std::size_t features) noexcept {
   BundleCapacities c;
   c.cameras = static_cast<std::size_t>(cameras);
   c.poses = static_cast<std::size_t>(options.max_frames);
-  c.observations = std::min(static_cast<std::size_t>(options.max_observations), c.poses * features * c.cameras);
+  c.observations =
+      std::min(static_cast<std::size_t>(options.max_observations), c.poses * features * c.cameras);
   c.points = c.observations / (kFramesATrack * c.cameras);
   c.blocks = c.observations / c.cameras;
   c.shared = true;
   return c;
 }
 
-std::size_t RigSolver::memory_needed(const CalibrationOptions& options, const MonitorOptions& monitor, int cameras,
+std::size_t RigSolver::memory_needed(const CalibrationOptions& options,
+                                     const MonitorOptions& monitor, int cameras,
                                      std::size_t features) noexcept {
   const BundleCapacities c = capacities(options, cameras, features);
   const auto frames = static_cast<std::size_t>(options.max_frames);
-  return TrackLog::memory_needed(frames, features) + BundleAdjuster::memory_needed(c) + Monitor::memory_needed(monitor) +
-         MonitorFeed::memory_needed(features) + c.poses * (sizeof(Transform) + sizeof(std::uint16_t) + sizeof(std::uint8_t)) +
-         (c.poses + 1) * sizeof(int) + c.points * sizeof(Vec3) + c.observations * (sizeof(BundleObservation) + 2 * sizeof(float)) +
-         frames * features * sizeof(Reference) + features * sizeof(AcrossSighting) + 12 * kCacheLine;
+  return TrackLog::memory_needed(frames, features) + BundleAdjuster::memory_needed(c) +
+         Monitor::memory_needed(monitor) + MonitorFeed::memory_needed(features) +
+         c.poses * (sizeof(Transform) + sizeof(std::uint16_t) + sizeof(std::uint8_t)) +
+         (c.poses + 1) * sizeof(int) + c.points * sizeof(Vec3) +
+         c.observations * (sizeof(BundleObservation) + 2 * sizeof(float)) +
+         frames * features * sizeof(Reference) + features * sizeof(AcrossSighting) +
+         12 * kCacheLine;
 }
 
-RigSolver::RigSolver(const CalibrationOptions& options, const MonitorOptions& monitor, int cameras, std::size_t features, Arena& arena)
+RigSolver::RigSolver(const CalibrationOptions& options, const MonitorOptions& monitor, int cameras,
+                     std::size_t features, Arena& arena)
     : options_(options),
       log_(static_cast<std::size_t>(options.max_frames), features, arena),
       adjuster_(capacities(options, cameras, features), arena),
@@ -76,11 +90,14 @@ RigSolver::RigSolver(const CalibrationOptions& options, const MonitorOptions& mo
   ties_ = arena.make<int>(c.poses + 1, "calibration poses");
   logged_ = BoundedVector<std::uint16_t>(arena.make<std::uint16_t>(c.poses, "calibration poses"));
   points_ = BoundedVector<Vec3>(arena.make<Vec3>(c.points, "calibration points"));
-  observations_ = BoundedVector<BundleObservation>(arena.make<BundleObservation>(c.observations, "calibration observations"));
+  observations_ = BoundedVector<BundleObservation>(
+      arena.make<BundleObservation>(c.observations, "calibration observations"));
   residuals_ = arena.make<float>(c.observations, "calibration residuals");
   sorted_ = arena.make<float>(c.observations, "calibration residuals");
-  references_ = BoundedVector<Reference>(arena.make<Reference>(most_frames_ * features, "calibration tracks"));
-  across_ = BoundedVector<AcrossSighting>(arena.make<AcrossSighting>(features, "calibration matches"));
+  references_ = BoundedVector<Reference>(
+      arena.make<Reference>(most_frames_ * features, "calibration tracks"));
+  across_ =
+      BoundedVector<AcrossSighting>(arena.make<AcrossSighting>(features, "calibration matches"));
 }
 
 bool RigSolver::choose_candidate(const RigCalibration& rig) noexcept {
@@ -115,7 +132,8 @@ bool RigSolver::begin_with(const RigSolveRequest& request) noexcept {
 void RigSolver::choose_frames() noexcept {
   std::size_t sightings = 0;
   for (std::size_t i = 0; i < log_.size(); ++i) sightings += log_.frame(i).sightings.size();
-  const std::size_t step = 1 + sightings * static_cast<std::size_t>(count_) / static_cast<std::size_t>(options_.max_observations);
+  const std::size_t step = 1 + sightings * static_cast<std::size_t>(count_) /
+                                   static_cast<std::size_t>(options_.max_observations);
   poses_.clear();
   logged_.clear();
   for (std::size_t i = (log_.size() - 1) % step; i < log_.size(); i += step) {
@@ -129,16 +147,21 @@ void RigSolver::sort_tracks() noexcept {
   for (std::size_t i = 0; i < logged_.size(); ++i) {
     const LoggedFrame& f = log_.frame(logged_[i]);
     for (std::size_t j = 0; j < f.sightings.size(); ++j)
-      (void)references_.push({f.sightings[j].track, static_cast<std::uint16_t>(i), static_cast<std::uint16_t>(j)});
+      (void)references_.push(
+          {f.sightings[j].track, static_cast<std::uint16_t>(i), static_cast<std::uint16_t>(j)});
   }
-  std::sort(references_.begin(), references_.end(),
-            [](const Reference& a, const Reference& b) { return a.track != b.track ? a.track < b.track : a.frame < b.frame; });
+  std::sort(references_.begin(), references_.end(), [](const Reference& a, const Reference& b) {
+    return a.track != b.track ? a.track < b.track : a.frame < b.frame;
+  });
 }
 
 bool RigSolver::add_point(std::span<const Reference> track) noexcept {
-  const auto sighting = [&](const Reference& r) -> const LoggedSighting& { return log_.frame(logged_[r.frame]).sightings[r.sighting]; };
+  const auto sighting = [&](const Reference& r) -> const LoggedSighting& {
+    return log_.frame(logged_[r.frame]).sightings[r.sighting];
+  };
   int pairs = 0;
-  for (const Reference& r : track) pairs += (sighting(r).cameras & 1U) != 0 && (sighting(r).cameras & ~1U) != 0 ? 1 : 0;
+  for (const Reference& r : track)
+    pairs += (sighting(r).cameras & 1U) != 0 && (sighting(r).cameras & ~1U) != 0 ? 1 : 0;
   if (pairs < 2 || points_.full()) return true;  // four images see it, or it is none (METHOD §3)
 
   std::array<RayView, kMostViews * kMaxCameras> views;
@@ -165,7 +188,8 @@ bool RigSolver::add_point(std::span<const Reference> track) noexcept {
       const auto c = static_cast<std::size_t>(k);
       const Vec2 seen = pixel_of(s, k);
       Vec2 at;
-      if (cameras_[c].project(T_camera_left_[c] * (poses_[r.frame] * p.p_world), &at, nullptr) != ProjectStatus::ok ||
+      if (cameras_[c].project(T_camera_left_[c] * (poses_[r.frame] * p.p_world), &at, nullptr) !=
+              ProjectStatus::ok ||
           !((at - seen).norm() < kWildResidual))
         continue;
       BundleObservation o;
@@ -201,12 +225,13 @@ void RigSolver::make_points() noexcept {
   }
 }
 
-/// A frame that hardly a track ties to the ones before it (the scene was built anew there) begins a piece of its own: its pose is held, as
-/// the first one is, for nothing else would.
+/// A frame that hardly a track ties to the ones before it (the scene was built anew there) begins a
+/// piece of its own: its pose is held, as the first one is, for nothing else would.
 void RigSolver::hold_pieces() noexcept {
   held_.clear();
   for (std::size_t i = 0; i < poses_.size(); ++i) (void)held_.push(0);
-  // Points that are seen on both sides of a frame's beginning: +1 after the first of its frames, −1 after the last.
+  // Points that are seen on both sides of a frame's beginning: +1 after the first of its frames, −1
+  // after the last.
   std::fill_n(ties_.begin(), poses_.size() + 1, 0);
   for (std::size_t i = 0; i < observations_.size();) {
     const BundleObservation& first = observations_[i];
@@ -224,7 +249,8 @@ void RigSolver::hold_pieces() noexcept {
 }
 
 BundleOptions RigSolver::options_of(const RigSolveRequest& request) const noexcept {
-  constexpr std::uint16_t kFocal = 0b0011, kPinhole = 0b1111, kFourCoefficients = 0b1111'0000;  // k1 k2 p1 p2, or k1 … k4
+  constexpr std::uint16_t kFocal = 0b0011, kPinhole = 0b1111,
+                          kFourCoefficients = 0b1111'0000;  // k1 k2 p1 p2, or k1 … k4
   const RigCalibration& rig = request.rig;
   const bool lenses = request.freedom == RigFreedom::lenses;
   BundleOptions how;
@@ -232,15 +258,19 @@ BundleOptions RigSolver::options_of(const RigSolveRequest& request) const noexce
   how.shared_errors = kSharedErrors;
   how.cells = kCells;
   how.length[1] = {BundleLength::exact, rig.baseline, 0};
-  for (int k = 2; k < count_; ++k) how.length[static_cast<std::size_t>(k)].kind = BundleLength::free;
+  for (int k = 2; k < count_; ++k)
+    how.length[static_cast<std::size_t>(k)].kind = BundleLength::free;
   for (int k = 0; k < count_; ++k) {
     const auto c = static_cast<std::size_t>(k);
-    const Intrinsics& lens = (request.told != nullptr && lenses ? *request.told : rig).intrinsics[c];
+    const Intrinsics& lens =
+        (request.told != nullptr && lenses ? *request.told : rig).intrinsics[c];
     BundleIntrinsics& out = how.intrinsics[c];
     if (options_.refine_intrinsics != 0)
       out.free = kPinhole;
     else if (k > 0)
-      out.free = lenses ? kPinhole : options_.estimate_focal_lengths != 0 ? kFocal : std::uint16_t{0};
+      out.free = lenses                                 ? kPinhole
+                 : options_.estimate_focal_lengths != 0 ? kFocal
+                                                        : std::uint16_t{0};
     if (lenses) out.free = static_cast<std::uint16_t>(out.free | kFourCoefficients);
     const std::array value = {lens.fx, lens.fy, lens.cx, lens.cy};
     for (std::size_t i = 0; i < 4; ++i) {
@@ -255,17 +285,21 @@ BundleOptions RigSolver::options_of(const RigSolveRequest& request) const noexce
       const bool tangential = lens.kind == CameraModelKind::pinhole_radtan && i >= 2;
       const double given = lens.distortion_sigma[i];
       out.prior_mean[4 + i] = lens.distortion[i];
-      out.prior_sigma[4 + i] = given > 0 ? given : tangential ? options_.tangential_sigma : options_.distortion_sigma;
+      out.prior_sigma[4 + i] = given > 0    ? given
+                               : tangential ? options_.tangential_sigma
+                                            : options_.distortion_sigma;
       out.held_sigma[4 + i] = given;
     }
     out.prior_mean[8] = lens.distortion[4];
     if (request.known == nullptr) continue;
     // What is known of the lenses already holds what a prior would add.
     for (std::size_t i = 0; i < 8; ++i)
-      if (request.known->covariance.known(intrinsic_row(k) + static_cast<int>(i))) out.prior_sigma[i] = 0;
+      if (request.known->covariance.known(intrinsic_row(k) + static_cast<int>(i)))
+        out.prior_sigma[i] = 0;
   }
   if (request.known != nullptr)
-    how.shared_prior = {request.known, request.known->inflation > 0 ? request.known->inflation : kUsualInflation};
+    how.shared_prior = {request.known,
+                        request.known->inflation > 0 ? request.known->inflation : kUsualInflation};
   return how;
 }
 
@@ -297,7 +331,8 @@ void RigSolver::drop_outliers(double limit) noexcept {
     const std::size_t first = kept;
     std::size_t i = begin;
     for (; i < observations_.size() && observations_[i].point == point; ++i)
-      if (static_cast<double>(residuals_[i]) < limit * limit) observations_[kept++] = observations_[i];
+      if (static_cast<double>(residuals_[i]) < limit * limit)
+        observations_[kept++] = observations_[i];
     // What is left of a point has to hold it, and say something about the rig.
     unsigned cameras = 0;
     for (std::size_t j = first; j < kept; ++j) cameras |= 1U << observations_[j].camera;
@@ -308,20 +343,22 @@ void RigSolver::drop_outliers(double limit) noexcept {
 }
 
 void RigSolver::describe(RigSolution* s) const noexcept {
-  for (std::size_t i = 1; i < poses_.size(); ++i) s->travelled_m += (poses_[i].centre() - poses_[i - 1].centre()).norm();
+  for (std::size_t i = 1; i < poses_.size(); ++i)
+    s->travelled_m += (poses_[i].centre() - poses_[i - 1].centre()).norm();
   std::uint32_t last = ~0U;
   for (const BundleObservation& o : observations_) {
     if (o.point == last) continue;
     last = o.point;
     ++s->tracks;
-    if ((poses_[o.pose] * points_[o.point]).z() < options_.near_baselines * s->rig.baseline) ++s->near;
+    if ((poses_[o.pose] * points_[o.point]).z() < options_.near_baselines * s->rig.baseline)
+      ++s->near;
   }
   s->observations = static_cast<int>(observations_.size());
 }
 
 void RigSolver::write_result(const BundleResult& r, RigSolution* s) const noexcept {
-  // What uncertain intrinsics do to the scale of the path (METHOD's numbers, §3.3 and §5): half of what the focal lengths are off, and
-  // 0.31 % for each mrad that the principal points are off.
+  // What uncertain intrinsics do to the scale of the path (METHOD's numbers, §3.3 and §5): half of
+  // what the focal lengths are off, and 0.31 % for each mrad that the principal points are off.
   constexpr double kScaleByFocal = 0.5, kScaleByRadian = 3.1;
   RigCalibration& rig = s->rig;
   for (int k = 0; k < count_; ++k) {
@@ -332,8 +369,10 @@ void RigSolver::write_result(const BundleResult& r, RigSolution* s) const noexce
     rig.T_camera_left[c] = {normalised(T_camera_left_[c].R), T_camera_left_[c].t};
     rig.covariance_wide[c] = r.covariance_wide[c];
     for (int i = 0; i < 6; ++i) {
-      rig.sigma_noise[c][static_cast<std::size_t>(i)] = std::sqrt(std::max(0.0, r.covariance_noise[c](i, i)));
-      rig.sigma_wide[c][static_cast<std::size_t>(i)] = std::sqrt(std::max(0.0, r.covariance_wide[c](i, i)));
+      rig.sigma_noise[c][static_cast<std::size_t>(i)] =
+          std::sqrt(std::max(0.0, r.covariance_noise[c](i, i)));
+      rig.sigma_wide[c][static_cast<std::size_t>(i)] =
+          std::sqrt(std::max(0.0, r.covariance_wide[c](i, i)));
     }
   }
   rig.covariance = r.covariance;
@@ -341,22 +380,27 @@ void RigSolver::write_result(const BundleResult& r, RigSolution* s) const noexce
   rig.frames = s->frames;
   rig.found = log_.frame(log_.size() - 1).stamp;
   rig.reprojection_px = r.rms_px;
-  const double focal = options_.focal_sigma_percent * 0.01, centre = options_.principal_point_sigma_px / rig.intrinsics[0].fx;
+  const double focal = options_.focal_sigma_percent * 0.01,
+               centre = options_.principal_point_sigma_px / rig.intrinsics[0].fx;
   double noise = 0;
   if (r.has_pose_covariance && s->travelled_m > 0) {
     const Vec3 way = poses_.back().t.normalized();
     const double white = r.covariance_white[1](1, 1), clustered = r.covariance_noise[1](1, 1);
     const double inflation = white > 0 ? std::max(1.0, clustered / white) : 1.0;
-    noise = std::sqrt(std::max(0.0, way.dot(r.pose_covariance.bottomRightCorner<3, 3>() * way)) * inflation) / s->travelled_m;
+    noise = std::sqrt(std::max(0.0, way.dot(r.pose_covariance.bottomRightCorner<3, 3>() * way)) *
+                      inflation) /
+            s->travelled_m;
   }
   rig.scale_sigma = std::hypot(noise, std::hypot(kScaleByFocal * focal, kScaleByRadian * centre));
 }
 
-/// What the monitor would have said on the way, had it known the result: a camera out of step, or two rigs in one solve.
+/// What the monitor would have said on the way, had it known the result: a camera out of step, or
+/// two rigs in one solve.
 void RigSolver::watch_frames(RigSolution* s) noexcept {
   const Intrinsics &a = cameras_[0].intrinsics(), &b = cameras_[1].intrinsics();
   const Pinhole left{a.fx, a.fy, a.cx, a.cy}, right{b.fx, b.fy, b.cx, b.cy};
-  if (!monitor_.set_reference(s->rig.T_camera_left[1], left, right, s->rig.covariance_wide[1])) return;
+  if (!monitor_.set_reference(s->rig.T_camera_left[1], left, right, s->rig.covariance_wide[1]))
+    return;
   monitor_.expect_scatter(expected_scatter_px_);
   feed_.reset();
   for (std::size_t i = 0; i < poses_.size(); ++i) {
@@ -367,19 +411,22 @@ void RigSolver::watch_frames(RigSolution* s) noexcept {
       if (!sighting.by(0) || !sighting.by(1) || !cameras_[0].unproject(pixel_of(sighting, 0), &l) ||
           !cameras_[1].unproject(pixel_of(sighting, 1), &r))
         continue;
-      (void)across_.push({Vec2(left.fx * l.x() / l.z() + left.cx, left.fy * l.y() / l.z() + left.cy),
-                          Vec2(right.fx * r.x() / r.z() + right.cx, right.fy * r.y() / r.z() + right.cy),
-                          static_cast<double>(sighting.sigma), sighting.track});
+      (void)across_.push(
+          {Vec2(left.fx * l.x() / l.z() + left.cx, left.fy * l.y() / l.z() + left.cy),
+           Vec2(right.fx * r.x() / r.z() + right.cx, right.fy * r.y() / r.z() + right.cy),
+           static_cast<double>(sighting.sigma), sighting.track});
     }
     const Transform step = i == 0 ? Transform{} : poses_[i] * poses_[i - 1].inverse();
     const MonitorVerdict v = monitor_.look(feed_.next(f.stamp, f.number, across_.span(), step));
     s->lag_frames = v.lag_frames;
     if (v.kind == MonitorVerdict::Kind::out_of_step) s->out_of_step = true;
-    if (v.kind == MonitorVerdict::Kind::knock && v.statistic > kCertainChange * v.threshold) s->changed_at = v.onset_frame;
+    if (v.kind == MonitorVerdict::Kind::knock && v.statistic > kCertainChange * v.threshold)
+      s->changed_at = v.onset_frame;
   }
 }
 
-/// Huber, then Cauchy twice, each time without what lies beyond some scales of the residuals; covariances with the last.
+/// Huber, then Cauchy twice, each time without what lies beyond some scales of the residuals;
+/// covariances with the last.
 BundleResult RigSolver::adjust_robustly(BundleOptions how, RigSolution* s) noexcept {
   how.loss = BundleLoss::huber;
   how.loss_threshold = kHuber;

@@ -18,50 +18,64 @@ enum class RigSolveStatus : std::uint8_t {
 
 /// What a solve may move.
 enum class RigFreedom : std::uint8_t {
-  transforms,  // and further cameras' focal lengths, as the options say; lenses are taken as they are
-  lenses,      // also further cameras' intrinsics and distortion, and the left one's distortion (METHOD §6.1)
+  transforms,  // and further cameras' focal lengths, as the options say; lenses are taken as they
+               // are
+  lenses,  // also further cameras' intrinsics and distortion, and the left one's distortion (METHOD
+           // §6.1)
 };
 
 /// What to solve for and where to begin. `known` and `told` are read during solve() only.
 struct RigSolveRequest {
   RigCalibration rig{};  // cameras, intrinsics, baseline; T_camera_left with from_rig
   RigFreedom freedom = RigFreedom::transforms;
-  bool from_rig = false;                  // begin with T_camera_left of `rig`; false: with those of the logged frame that fits best
-  const RigCalibration* known = nullptr;  // what earlier frames told, with its covariance; null: nothing
-  const RigCalibration* told = nullptr;   // whose lenses and sigmas are the priors where nothing is known; null: those of `rig`
+  bool from_rig = false;  // begin with T_camera_left of `rig`; false: with those of the logged
+                          // frame that fits best
+  const RigCalibration* known =
+      nullptr;  // what earlier frames told, with its covariance; null: nothing
+  const RigCalibration* told = nullptr;  // whose lenses and sigmas are the priors where nothing is
+                                         // known; null: those of `rig`
 };
 
 struct RigSolution {
   RigSolveStatus status = RigSolveStatus::too_few_tracks;
-  RigCalibration rig{};      // the result: transforms, sigmas, intrinsics where they were estimated, frames, rms, scale_sigma
+  RigCalibration rig{};  // the result: transforms, sigmas, intrinsics where they were estimated,
+                         // frames, rms, scale_sigma
   std::uint64_t newest = 0;  // number of the newest frame used
   int frames = 0;
   int tracks = 0;
   int observations = 0;
   int steps = 0;
-  int near = 0;                  // tracks nearer than CalibrationOptions::near_baselines
-  double travelled_m = 0;        // along the frames used
-  double lag_frames = 0;         // of camera 1, by the monitor over the frames used
-  bool out_of_step = false;      // and it is significant
-  std::uint64_t changed_at = 0;  // frame since which the tracks are of another transform than before; 0: they are of one
-  double solve_ms = 0;           // wall time
+  int near = 0;              // tracks nearer than CalibrationOptions::near_baselines
+  double travelled_m = 0;    // along the frames used
+  double lag_frames = 0;     // of camera 1, by the monitor over the frames used
+  bool out_of_step = false;  // and it is significant
+  std::uint64_t changed_at =
+      0;  // frame since which the tracks are of another transform than before; 0: they are of one
+  double solve_ms = 0;  // wall time
 };
 
-/// The stereo calibration adjustment of METHOD §3 over a snapshot of the track log: candidate pair, right cameras re-initialised through
-/// it, points triangulated, all adjusted with the shared transform; sigmas noise-only and wide.
+/// The stereo calibration adjustment of METHOD §3 over a snapshot of the track log: candidate pair,
+/// right cameras re-initialised through it, points triangulated, all adjusted with the shared
+/// transform; sigmas noise-only and wide.
 ///
-/// Threads  log() is filled by the estimator's thread while no solve runs; solve() runs on the solver's.
-/// Memory   All from the arena at construction. Time: bounded; some hundred milliseconds for 60 frames of 500 tracks.
+/// Threads  log() is filled by the estimator's thread while no solve runs; solve() runs on the
+///          solver's.
+/// Memory   All from the arena at construction. Time: bounded; some hundred milliseconds for 60
+///          frames of 500 tracks.
 /// Errors   By status; a solution that is not `ok` has no calibration to use.
 class RigSolver {
  public:
-  RigSolver(const CalibrationOptions& options, const MonitorOptions& monitor, int cameras, std::size_t features, Arena& arena);
-  [[nodiscard]] static std::size_t memory_needed(const CalibrationOptions& options, const MonitorOptions& monitor, int cameras,
+  RigSolver(const CalibrationOptions& options, const MonitorOptions& monitor, int cameras,
+            std::size_t features, Arena& arena);
+  [[nodiscard]] static std::size_t memory_needed(const CalibrationOptions& options,
+                                                 const MonitorOptions& monitor, int cameras,
                                                  std::size_t features) noexcept;
 
   [[nodiscard]] TrackLog& log() noexcept { return log_; }
   [[nodiscard]] RigSolution solve(const RigSolveRequest& request) noexcept;
-  [[nodiscard]] RigSolution solve(const RigCalibration& rig) noexcept { return solve(RigSolveRequest{rig}); }
+  [[nodiscard]] RigSolution solve(const RigCalibration& rig) noexcept {
+    return solve(RigSolveRequest{rig});
+  }
 
  private:
   struct Reference {
@@ -69,7 +83,8 @@ class RigSolver {
     std::uint16_t frame;
     std::uint16_t sighting;
   };
-  [[nodiscard]] static BundleCapacities capacities(const CalibrationOptions& options, int cameras, std::size_t features) noexcept;
+  [[nodiscard]] static BundleCapacities capacities(const CalibrationOptions& options, int cameras,
+                                                   std::size_t features) noexcept;
   [[nodiscard]] bool choose_candidate(const RigCalibration& rig) noexcept;
   [[nodiscard]] bool begin_with(const RigSolveRequest& request) noexcept;
   void choose_frames() noexcept;
@@ -97,8 +112,8 @@ class RigSolver {
   std::array<Transform, kMaxCameras> T_camera_left_{};
   int count_ = 0;  // cameras
   BoundedVector<Transform> poses_;
-  BoundedVector<std::uint8_t> held_;     // 1: the pose begins a piece that no track ties to the rest
-  std::span<int> ties_;                  // scratch of hold_pieces()
+  BoundedVector<std::uint8_t> held_;  // 1: the pose begins a piece that no track ties to the rest
+  std::span<int> ties_;               // scratch of hold_pieces()
   BoundedVector<std::uint16_t> logged_;  // index in the log of each pose
   BoundedVector<Vec3> points_;
   BoundedVector<BundleObservation> observations_;

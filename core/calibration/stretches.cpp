@@ -6,16 +6,19 @@
 
 namespace vergence::calibration {
 
-Stretches::Stretches(Kind kind, const RigCalibration& told, const RigCalibration& start, std::size_t frames,
-                     const CalibrationOptions& options, const MonitorOptions& monitor, std::size_t features, Arena& arena)
+Stretches::Stretches(Kind kind, const RigCalibration& told, const RigCalibration& start,
+                     std::size_t frames, const CalibrationOptions& options,
+                     const MonitorOptions& monitor, std::size_t features, Arena& arena)
     : kind_(kind),
       options_(options),
       told_(told),
       start_(start),
-      frames_(std::clamp(frames, static_cast<std::size_t>(options.min_frames), static_cast<std::size_t>(options.max_frames))),
+      frames_(std::clamp(frames, static_cast<std::size_t>(options.min_frames),
+                         static_cast<std::size_t>(options.max_frames))),
       solver_(options_, monitor, told.cameras, features, arena) {}
 
-std::size_t Stretches::memory_needed(const CalibrationOptions& options, const MonitorOptions& monitor, int cameras,
+std::size_t Stretches::memory_needed(const CalibrationOptions& options,
+                                     const MonitorOptions& monitor, int cameras,
                                      std::size_t features) noexcept {
   return RigSolver::memory_needed(options, monitor, cameras, features);
 }
@@ -46,7 +49,8 @@ std::optional<RigSolution> Stretches::solve() noexcept {
   request.from_rig = true;
   request.told = &told_;
   const Stamp newest = solver_.log().frame(solver_.log().size() - 1).stamp;
-  RigCalibration known = known_;  // as old as it is now: a solve that fails must not age it for the next
+  RigCalibration known =
+      known_;  // as old as it is now: a solve that fails must not age it for the next
   if (any_known_) {
     let_drift((newest - known.found).to_seconds() / 3600.0, options_, &known);
     request.known = &known;

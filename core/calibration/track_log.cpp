@@ -60,7 +60,8 @@ void TrackLog::copy(const TrackLog& from, std::size_t frames) noexcept {
 void TrackLog::append(const LoggedFrame& frame) noexcept {
   begin(frame);
   const std::size_t at = slot(size_ - 1), count = std::min(frame.sightings.size(), capacity_);
-  std::copy_n(frame.sightings.begin(), count, sightings_.begin() + static_cast<std::ptrdiff_t>(at * capacity_));
+  std::copy_n(frame.sightings.begin(), count,
+              sightings_.begin() + static_cast<std::ptrdiff_t>(at * capacity_));
   frames_[at].sightings = sightings_.subspan(at * capacity_, count);
   left_out_ += frame.sightings.size() - count;
 }

@@ -17,10 +17,13 @@ struct LoggedSighting {
   float sigma = 0;           // px, of one coordinate
   std::array<Eigen::Vector2f, kMaxCameras> raw{};
 
-  [[nodiscard]] bool by(int k) const noexcept { return ((cameras >> static_cast<unsigned>(k)) & 1U) != 0; }
+  [[nodiscard]] bool by(int k) const noexcept {
+    return ((cameras >> static_cast<unsigned>(k)) & 1U) != 0;
+  }
 };
 
-/// One rig frame of the log. `T_camera_left`: as the cameras' own poses had it (unlinked) or the calibration in use (linked).
+/// One rig frame of the log. `T_camera_left`: as the cameras' own poses had it (unlinked) or the
+/// calibration in use (linked).
 struct LoggedFrame {
   std::uint64_t number = 0;
   Stamp stamp{};
@@ -34,12 +37,13 @@ struct LoggedFrame {
 
 /// The newest moving rig frames with their tracks: what a calibration is found from.
 ///
-/// Policies when full  Frames: the oldest goes. Sightings of a frame: the rest is left out and counted.
-/// Threads one. Memory from the arena at construction.
+/// Policies when full  Frames: the oldest goes. Sightings of a frame: the rest is left out and
+/// counted. Threads one. Memory from the arena at construction.
 class TrackLog {
  public:
   TrackLog(std::size_t frames, std::size_t sightings, Arena& arena);
-  [[nodiscard]] static std::size_t memory_needed(std::size_t frames, std::size_t sightings) noexcept;
+  [[nodiscard]] static std::size_t memory_needed(std::size_t frames,
+                                                 std::size_t sightings) noexcept;
 
   /// A new frame; push() then fills it.
   void begin(const LoggedFrame& frame) noexcept;
@@ -63,7 +67,9 @@ class TrackLog {
   [[nodiscard]] std::uint64_t left_out() const noexcept { return left_out_; }
 
  private:
-  [[nodiscard]] std::size_t slot(std::size_t i) const noexcept { return (first_ + i) % frames_.size(); }
+  [[nodiscard]] std::size_t slot(std::size_t i) const noexcept {
+    return (first_ + i) % frames_.size();
+  }
 
   std::span<LoggedFrame> frames_;
   std::span<LoggedSighting> sightings_;  // as many a frame as capacity_

@@ -31,13 +31,15 @@ Equidistant equidistant_angle(const std::array<double, 5>& d, double theta) noex
           1.0 + t2 * (3.0 * d[0] + t2 * (5.0 * d[1] + t2 * (7.0 * d[2] + t2 * 9.0 * d[3])))};
 }
 
-/// Radius (squared) up to which the distorted radius grows with the undistorted one: beyond it the model folds back.
+/// Radius (squared) up to which the distorted radius grows with the undistorted one: beyond it the
+/// model folds back.
 double monotonic_radius2(const Intrinsics& k) noexcept {
   constexpr int kSteps = 400;
   for (int i = 1; i <= kSteps; ++i) {
     const double r = kMaxRadius * i / kSteps;
     const double slope = k.kind == CameraModelKind::pinhole_radtan
-                             ? radtan_radial(k.distortion, r * r).factor + 2.0 * r * r * radtan_radial(k.distortion, r * r).derivative
+                             ? radtan_radial(k.distortion, r * r).factor +
+                                   2.0 * r * r * radtan_radial(k.distortion, r * r).derivative
                              : equidistant_angle(k.distortion, std::atan(r)).derivative;
     if (!(slope > 0.05)) return std::pow(kMaxRadius * (i - 1) / kSteps, 2);
   }
@@ -47,7 +49,9 @@ double monotonic_radius2(const Intrinsics& k) noexcept {
 }  // namespace
 
 Camera::Camera(const Intrinsics& k) noexcept
-    : k_(k), distorted_(k.has_distortion()), max_radius2_(k.has_distortion() ? monotonic_radius2(k) : 1e12) {}
+    : k_(k),
+      distorted_(k.has_distortion()),
+      max_radius2_(k.has_distortion() ? monotonic_radius2(k) : 1e12) {}
 
 bool Camera::distort(const Vec2& n, Vec2* out, Mat2* J) const noexcept {
   const double x = n.x(), y = n.y(), r2 = n.squaredNorm();
@@ -56,10 +60,12 @@ bool Camera::distort(const Vec2& n, Vec2* out, Mat2* J) const noexcept {
   if (k_.kind == CameraModelKind::pinhole_radtan) {
     const auto [f, df] = radtan_radial(d, r2);
     const double p1 = d[2], p2 = d[3];
-    *out = {x * f + 2 * p1 * x * y + p2 * (r2 + 2 * x * x), y * f + p1 * (r2 + 2 * y * y) + 2 * p2 * x * y};
+    *out = {x * f + 2 * p1 * x * y + p2 * (r2 + 2 * x * x),
+            y * f + p1 * (r2 + 2 * y * y) + 2 * p2 * x * y};
     if (J != nullptr) {
       const double cross = 2 * x * y * df + 2 * p1 * x + 2 * p2 * y;
-      *J << f + 2 * x * x * df + 2 * p1 * y + 6 * p2 * x, cross, cross, f + 2 * y * y * df + 6 * p1 * y + 2 * p2 * x;
+      *J << f + 2 * x * x * df + 2 * p1 * y + 6 * p2 * x, cross, cross,
+          f + 2 * y * y * df + 6 * p1 * y + 2 * p2 * x;
     }
     return true;
   }
@@ -83,7 +89,8 @@ ProjectStatus Camera::project(const Vec3& p, Vec2* pixel, Mat23* J) const noexce
   if (!(p.z() >= kMinDepth)) return ProjectStatus::behind;  // also refuses NaN
   const double iz = 1.0 / p.z();
   const Vec2 n(p.x() * iz, p.y() * iz);
-  if (!(n.squaredNorm() <= max_radius2_)) return ProjectStatus::folded;  // also where x or y is not a number
+  if (!(n.squaredNorm() <= max_radius2_))
+    return ProjectStatus::folded;  // also where x or y is not a number
   Vec2 d = n;
   Mat2 D = Mat2::Identity();
   if (distorted_ && !distort(n, &d, J != nullptr ? &D : nullptr)) return ProjectStatus::folded;
@@ -103,7 +110,8 @@ bool Camera::unproject(const Vec2& pixel, Vec3* ray) const noexcept {
     *ray = {target.x(), target.y(), 1.0};
     return true;
   }
-  // The equidistant model maps a half plane into a disc: start where the angle, not the tangent, is the radius.
+  // The equidistant model maps a half plane into a disc: start where the angle, not the tangent, is
+  // the radius.
   Vec2 n = target;
   if (k_.kind == CameraModelKind::pinhole_equidistant) {
     const double radius = target.norm();
@@ -112,7 +120,9 @@ bool Camera::unproject(const Vec2& pixel, Vec3* ray) const noexcept {
   for (int i = 0; i < kUnprojectSteps; ++i) {
     Vec2 d;
     Mat2 J;
-    while (!distort(n, &d, &J)) {  // a step left the monotonic range: come back; ends because each turn shrinks n
+    while (!distort(
+        n, &d,
+        &J)) {  // a step left the monotonic range: come back; ends because each turn shrinks n
       n *= 0.8;
       if (n.squaredNorm() < 1e-12) return false;
     }
@@ -137,7 +147,8 @@ Eigen::Matrix<double, 2, 9> Camera::intrinsics_jacobian(const Vec3& p) const noe
   J(0, 2) = 1;
   J(1, 3) = 1;
   const double r2 = n.squaredNorm();
-  Eigen::Matrix<double, 2, 5> by_coefficient = Eigen::Matrix<double, 2, 5>::Zero();  // of the normalised distorted point
+  Eigen::Matrix<double, 2, 5> by_coefficient =
+      Eigen::Matrix<double, 2, 5>::Zero();  // of the normalised distorted point
   if (k_.kind == CameraModelKind::pinhole_radtan) {
     by_coefficient.col(0) = n * r2;
     by_coefficient.col(1) = n * (r2 * r2);

@@ -6,17 +6,18 @@ namespace vergence {
 enum class ProjectStatus : std::uint8_t {
   ok,
   behind,  // depth under kMinDepth, or not a number
-  folded,  // beyond the angle where the distortion model stops being monotonic, or x or y not a number: no image there
+  folded,  // beyond the angle where the distortion model stops being monotonic, or x or y not a
+           // number: no image there
 };
 
 inline constexpr double kMinDepth = 1e-3;  // m: nearer than any lens
 
 /// One camera's projection with derivatives; a value, cheap to copy, fixed memory.
 ///
-/// radtan       x_d = x (1 + k1 r² + k2 r⁴ + k3 r⁶) + 2 p1 x y + p2 (r² + 2x²), likewise y; r² = x² + y², (x, y) = (X, Y)/Z
-/// equidistant  θ = atan r, θ_d = θ (1 + k1 θ² + k2 θ⁴ + k3 θ⁶ + k4 θ⁸), (x_d, y_d) = (x, y) θ_d / r
-/// pixel        (fx x_d + cx, fy y_d + cy)
-/// Threads      Const after construction.
+/// radtan       x_d = x (1 + k1 r² + k2 r⁴ + k3 r⁶) + 2 p1 x y + p2 (r² + 2x²), likewise y; r² = x²
+/// + y², (x, y) = (X, Y)/Z equidistant  θ = atan r, θ_d = θ (1 + k1 θ² + k2 θ⁴ + k3 θ⁶ + k4 θ⁸),
+/// (x_d, y_d) = (x, y) θ_d / r pixel        (fx x_d + cx, fy y_d + cy) Threads      Const after
+/// construction.
 class Camera {
  public:
   Camera() noexcept = default;
@@ -26,7 +27,8 @@ class Camera {
   /// Not `ok`: pixel and J untouched.
   [[nodiscard]] ProjectStatus project(const Vec3& p, Vec2* pixel, Mat23* J) const noexcept;
 
-  /// Pixel → ray (x, y, 1) with (x, y) undistorted, by Newton from the distorted point, at most kUnprojectSteps.
+  /// Pixel → ray (x, y, 1) with (x, y) undistorted, by Newton from the distorted point, at most
+  /// kUnprojectSteps.
   /// False: no convergence, or outside the model's monotonic range; *ray untouched.
   [[nodiscard]] bool unproject(const Vec2& pixel, Vec3* ray) const noexcept;
 
@@ -36,7 +38,8 @@ class Camera {
   [[nodiscard]] const Intrinsics& intrinsics() const noexcept { return k_; }
   /// Inside the image with a border of `margin` px.
   [[nodiscard]] bool inside(const Vec2& pixel, double margin) const noexcept {
-    return pixel.x() >= margin && pixel.y() >= margin && pixel.x() <= k_.width - 1 - margin && pixel.y() <= k_.height - 1 - margin;
+    return pixel.x() >= margin && pixel.y() >= margin && pixel.x() <= k_.width - 1 - margin &&
+           pixel.y() <= k_.height - 1 - margin;
   }
 
  private:
@@ -48,6 +51,7 @@ class Camera {
   double max_radius2_ = 0;  // of the undistorted normalised point: the model is monotonic inside
 };
 
-inline constexpr int kUnprojectSteps = 12;  // Newton converges quadratically; 4 to 6 are used in a strongly distorted corner
+inline constexpr int kUnprojectSteps =
+    12;  // Newton converges quadratically; 4 to 6 are used in a strongly distorted corner
 
 }  // namespace vergence

@@ -8,9 +8,11 @@
 namespace vergence {
 namespace {
 
-constexpr double kFastest = 60.0;       // m/s: no vehicle that carries this rig
-constexpr double kLeastStep = 0.05;     // m: smaller steps are the odometry's noise at a standstill, not a way
-constexpr int kBackwardsForGood = 120;  // samples in a row: a second of an INS whose clock has gone back and stays there
+constexpr double kFastest = 60.0;  // m/s: no vehicle that carries this rig
+constexpr double kLeastStep =
+    0.05;  // m: smaller steps are the odometry's noise at a standstill, not a way
+constexpr int kBackwardsForGood =
+    120;  // samples in a row: a second of an INS whose clock has gone back and stays there
 constexpr double kQuaternionLength = 0.1;
 constexpr double kSigmas = 4.0;  // of the path ratio, before scale_disagrees is said
 
@@ -23,7 +25,9 @@ bool attitude_of(const InsSample& s, Mat3* R) noexcept {
   return true;
 }
 
-double or_default(double sigma, double fallback) noexcept { return positive(sigma) ? sigma : fallback; }
+double or_default(double sigma, double fallback) noexcept {
+  return positive(sigma) ? sigma : fallback;
+}
 
 double wrapped(double angle) noexcept { return std::remainder(angle, 2.0 * std::numbers::pi); }
 
@@ -33,12 +37,16 @@ const char* ComparisonOptions::validate() const noexcept {
   if (!T_ins_left.finite()) return "the lever arm or the boresight is not a number";
   if (!positive(placement_m)) return "placement_m must be more than 0 m";
   if (!positive(correlation_s)) return "correlation_s must be more than 0 s";
-  if (!positive(position_sigma_m) || !positive(height_sigma_m) || !positive(tilt_sigma_rad)) return "every sigma must be more than 0";
+  if (!positive(position_sigma_m) || !positive(height_sigma_m) || !positive(tilt_sigma_rad))
+    return "every sigma must be more than 0";
   if (!(heading_sigma_rad >= 0)) return "heading_sigma must be 0 or more";
-  if (max_gap <= Duration{} || max_wait <= Duration{}) return "max_gap and max_wait must be more than 0 s";
+  if (max_gap <= Duration{} || max_wait <= Duration{})
+    return "max_gap and max_wait must be more than 0 s";
   if (!positive(jump_m)) return "jump_m must be more than 0 m";
-  if (!positive(scale_stretch_m) || !positive(scale_tolerance)) return "scale_stretch_m and scale_tolerance must be more than 0";
-  if (!std::has_single_bit(ins_capacity) || ins_capacity < 16) return "ins_capacity must be a power of two, 16 or more";
+  if (!positive(scale_stretch_m) || !positive(scale_tolerance))
+    return "scale_stretch_m and scale_tolerance must be more than 0";
+  if (!std::has_single_bit(ins_capacity) || ins_capacity < 16)
+    return "ins_capacity must be a power of two, 16 or more";
   return nullptr;
 }
 
@@ -54,13 +62,15 @@ Mat3 body_from_camera() noexcept {
 }  // namespace
 
 Transform mount_of(const Vec3& lever_arm_m, const Vec3& boresight_rad) noexcept {
-  const Mat3 turned = exp_so3({0, 0, boresight_rad.z()}) * exp_so3({0, boresight_rad.y(), 0}) * exp_so3({boresight_rad.x(), 0, 0});
+  const Mat3 turned = exp_so3({0, 0, boresight_rad.z()}) * exp_so3({0, boresight_rad.y(), 0}) *
+                      exp_so3({boresight_rad.x(), 0, 0});
   return {turned * body_from_camera(), lever_arm_m};
 }
 
 Vec3 boresight_of(const Mat3& R_ins_left) noexcept {
   const Mat3 R = R_ins_left * body_from_camera().transpose();
-  return {std::atan2(R(2, 1), R(2, 2)), std::atan2(-R(2, 0), std::hypot(R(2, 1), R(2, 2))), std::atan2(R(1, 0), R(0, 0))};
+  return {std::atan2(R(2, 1), R(2, 2)), std::atan2(-R(2, 0), std::hypot(R(2, 1), R(2, 2))),
+          std::atan2(R(1, 0), R(0, 0))};
 }
 
 const char* to_string(InsMatch m) noexcept {
@@ -76,7 +86,8 @@ Comparison::Comparison(const ComparisonOptions& options, Arena& arena)
 }
 
 std::size_t Comparison::bytes_needed(const ComparisonOptions& options) noexcept {
-  return options.ins_capacity * sizeof(Reading) + kPlacementPairs * sizeof(PlacementPair) + 2 * kCacheLine;
+  return options.ins_capacity * sizeof(Reading) + kPlacementPairs * sizeof(PlacementPair) +
+         2 * kCacheLine;
 }
 
 void Comparison::add(const InsSample& sample) noexcept {
@@ -131,12 +142,16 @@ void Comparison::add(const PoseSample& pose) noexcept {
 bool Comparison::ready(const PoseSample& pose) const noexcept {
   if (finishing_ || pending_end_ - pending_begin_ == kPending) return true;
   if (end_ > begin_ && reading(end_ - 1).stamp >= pose.stamp) return true;
-  return pending_[static_cast<std::size_t>((pending_end_ - 1) % kPending)].stamp - pose.stamp > options_.max_wait;
+  return pending_[static_cast<std::size_t>((pending_end_ - 1) % kPending)].stamp - pose.stamp >
+         options_.max_wait;
 }
 
 InsMatch Comparison::reference_at(Stamp stamp, ComparedPose* out, Reading* sigmas) const noexcept {
-  if (end_ == begin_ || reading(end_ - 1).stamp < stamp || reading(begin_).stamp > stamp) return InsMatch::none;
-  std::uint64_t low = begin_, high = end_ - 1;  // the first reading not before the stamp; at most log2(capacity) turns
+  if (end_ == begin_ || reading(end_ - 1).stamp < stamp || reading(begin_).stamp > stamp)
+    return InsMatch::none;
+  std::uint64_t low = begin_,
+                high = end_ -
+                       1;  // the first reading not before the stamp; at most log2(capacity) turns
   while (low < high) {
     const std::uint64_t middle = low + (high - low) / 2;
     if (reading(middle).stamp < stamp)
@@ -150,8 +165,11 @@ InsMatch Comparison::reference_at(Stamp stamp, ComparedPose* out, Reading* sigma
   if (!a.valid || !b.valid) return InsMatch::no_fix;
   if (&a != &b && b.jumped) return InsMatch::jump;
   const Duration interval = b.stamp - a.stamp;
-  const double s = interval.ns() > 0 ? static_cast<double>((stamp - a.stamp).ns()) / static_cast<double>(interval.ns()) : 0.0;
-  const Transform T_enu_ins = interpolate({a.R_enu_ins, a.p_enu_ins}, {b.R_enu_ins, b.p_enu_ins}, s);
+  const double s = interval.ns() > 0 ? static_cast<double>((stamp - a.stamp).ns()) /
+                                           static_cast<double>(interval.ns())
+                                     : 0.0;
+  const Transform T_enu_ins =
+      interpolate({a.R_enu_ins, a.p_enu_ins}, {b.R_enu_ins, b.p_enu_ins}, s);
   out->reference = on_earth(T_enu_ins * options_.T_ins_left);
   out->ins_stamp_error = std::max(a.stamp_error, b.stamp_error);
   sigmas->position_sigma = std::max(a.position_sigma, b.position_sigma);
@@ -175,15 +193,22 @@ void Comparison::collect(const ComparedPose& c, const Reading& sigmas) noexcept 
   last_world_ = T_world_left.t;
   has_last_ = true;
   if (driven_ >= next_pair_at_) {
-    const PlacementPair pair{
-        c.pose.stamp,          T_world_left.t,      c.reference.T_enu_left.t, c.reference.T_enu_left.R * T_world_left.R.transpose(),
-        sigmas.position_sigma, sigmas.height_sigma, sigmas.tilt_sigma,        options_.heading_sigma_rad};
-    if (!pairs_.push(pair)) pairs_.back() = pair;  // full: the newest is the farthest, it holds the heading best
+    const PlacementPair pair{c.pose.stamp,
+                             T_world_left.t,
+                             c.reference.T_enu_left.t,
+                             c.reference.T_enu_left.R * T_world_left.R.transpose(),
+                             sigmas.position_sigma,
+                             sigmas.height_sigma,
+                             sigmas.tilt_sigma,
+                             options_.heading_sigma_rad};
+    if (!pairs_.push(pair))
+      pairs_.back() = pair;  // full: the newest is the farthest, it holds the heading best
     next_pair_at_ = driven_ + options_.placement_m / static_cast<double>(kPlacementPairs);
   }
   if (driven_ < options_.placement_m) return;
   place();
-  if (placement_status_ != PlacementStatus::ok) begin_collecting();  // a way that holds no heading: the next one may
+  if (placement_status_ != PlacementStatus::ok)
+    begin_collecting();  // a way that holds no heading: the next one may
 }
 
 void Comparison::begin_collecting() noexcept {
@@ -195,7 +220,8 @@ void Comparison::begin_collecting() noexcept {
 }
 
 void Comparison::place() noexcept {
-  placement_status_ = fit_placement(pairs_.span(), Duration::seconds(options_.correlation_s), &placement_);
+  placement_status_ =
+      fit_placement(pairs_.span(), Duration::seconds(options_.correlation_s), &placement_);
   if (placement_status_ != PlacementStatus::ok) return;
   placement_.distance = driven_;
   collecting_ = false;
@@ -209,7 +235,8 @@ void Comparison::measure_scale(const Reading& sigmas, ComparedPose* c) noexcept 
     anchor_ours_ = ours;
     anchor_ins_ = ins;
   } else if ((ours - anchor_ours_).norm() >= options_.scale_stretch_m / kChords) {
-    chords_[static_cast<std::size_t>(chord_count_ % kChords)] = {(ours - anchor_ours_).norm(), (ins - anchor_ins_).norm()};
+    chords_[static_cast<std::size_t>(chord_count_ % kChords)] = {(ours - anchor_ours_).norm(),
+                                                                 (ins - anchor_ins_).norm()};
     ++chord_count_;
     anchor_ours_ = ours;
     anchor_ins_ = ins;
@@ -220,9 +247,11 @@ void Comparison::measure_scale(const Reading& sigmas, ComparedPose* c) noexcept 
         sum.ins += chord.ins;
       }
       ratio_ = sum.ins > 0 ? sum.ours / sum.ins : 0.0;
-      // Errors of neighbouring fixes go together: what remains over the stretch is the difference of its two ends.
+      // Errors of neighbouring fixes go together: what remains over the stretch is the difference
+      // of its two ends.
       const double sigma = std::numbers::sqrt2 * sigmas.position_sigma / options_.scale_stretch_m;
-      disagrees_ = ratio_ > 0 && std::abs(ratio_ - 1.0) > std::max(options_.scale_tolerance, kSigmas * sigma);
+      disagrees_ = ratio_ > 0 &&
+                   std::abs(ratio_ - 1.0) > std::max(options_.scale_tolerance, kSigmas * sigma);
     }
   }
 }
@@ -242,7 +271,8 @@ bool Comparison::next(ComparedPose* out) noexcept {
   c.ins = reference_at(pose.stamp, &c, &sigmas);
   c.ins_valid = c.ins == InsMatch::ok;
   if (!c.ins_valid) ++counters_.without_ins;
-  // What was before a leap and what comes after do not fit together, also when no frame fell between the two readings.
+  // What was before a leap and what comes after do not fit together, also when no frame fell
+  // between the two readings.
   if (leapt_ && pose.stamp >= leapt_at_) {
     leapt_ = false;
     has_anchor_ = false;

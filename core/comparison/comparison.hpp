@@ -15,7 +15,8 @@
 namespace vergence {
 
 struct ComparisonOptions {
-  /// p_ins = T_ins_left * p_left; made by mount_of() from the configuration's lever arm and boresight.
+  /// p_ins = T_ins_left * p_left; made by mount_of() from the configuration's lever arm and
+  /// boresight.
   Transform T_ins_left{};
   /// m driven with a valid fix, after which the placement is fitted and frozen. > 0
   double placement_m = 100.0;
@@ -25,30 +26,36 @@ struct ComparisonOptions {
   double position_sigma_m = 2.5;
   double height_sigma_m = 5.0;
   double tilt_sigma_rad = 0.0087;  // half a degree
-  /// Of the INS's heading with all that lies between it and the camera's axes, for the placement; 0: the heading is the positions' alone,
-  /// as it must be where nobody knows the mount to a degree.
+  /// Of the INS's heading with all that lies between it and the camera's axes, for the placement;
+  /// 0: the heading is the positions' alone, as it must be where nobody knows the mount to a
+  /// degree.
   double heading_sigma_rad = 0;
   /// Two samples farther apart than this are not interpolated between.
   Duration max_gap = Duration::milliseconds(100);
-  /// A pose waits so long for the INS sample after it, by the stamps of the poses that follow; then it goes out without.
+  /// A pose waits so long for the INS sample after it, by the stamps of the poses that follow; then
+  /// it goes out without.
   Duration max_wait = Duration::milliseconds(500);
   /// m: a step from sample to sample beyond this and 60 m/s is a jump: not interpolated across.
   double jump_m = 20.0;
-  /// m: path lengths are compared over the newest stretch of this length; `scale_disagrees` beyond `scale_tolerance` and 4 sigma.
+  /// m: path lengths are compared over the newest stretch of this length; `scale_disagrees` beyond
+  /// `scale_tolerance` and 4 sigma.
   double scale_stretch_m = 200.0;
   double scale_tolerance = 0.02;
-  /// INS samples held; the oldest goes. 8192 are 68 s at 120 Hz, far more than any pose waits. Power of two.
+  /// INS samples held; the oldest goes. 8192 are 68 s at 120 Hz, far more than any pose waits.
+  /// Power of two.
   std::size_t ins_capacity = 8192;
 
   /// Nothing wrong: nullptr; else a sentence.
   [[nodiscard]] const char* validate() const noexcept;
 };
 
-/// From where the left camera sits in the body of the INS (forward, left, up; m) and how the rig's forward-left-up axes are turned
-/// against the INS's (roll, pitch, yaw, rad: R = Rz(yaw) Ry(pitch) Rx(roll)). All zero: they look the same way.
+/// From where the left camera sits in the body of the INS (forward, left, up; m) and how the rig's
+/// forward-left-up axes are turned against the INS's (roll, pitch, yaw, rad: R = Rz(yaw) Ry(pitch)
+/// Rx(roll)). All zero: they look the same way.
 [[nodiscard]] Transform mount_of(const Vec3& lever_arm_m, const Vec3& boresight_rad) noexcept;
 
-/// The boresight that mount_of() makes this rotation of. At a pitch of ±90° roll and yaw are one turn: roll is then the rounding's.
+/// The boresight that mount_of() makes this rotation of. At a pitch of ±90° roll and yaw are one
+/// turn: roll is then the rounding's.
 [[nodiscard]] Vec3 boresight_of(const Mat3& R_ins_left) noexcept;
 
 /// What the INS had to say at a frame's stamp.
@@ -68,7 +75,8 @@ struct EarthPose {
   double yaw = 0;  // rad, of the camera's view in the horizontal plane, counter-clockwise from east
 };
 
-/// One frame with both. What is not there (`placed` or `ins_valid` false) is zero and means nothing.
+/// One frame with both. What is not there (`placed` or `ins_valid` false) is zero and means
+/// nothing.
 struct ComparedPose {
   PoseSample pose{};
   InsMatch ins = InsMatch::none;
@@ -88,21 +96,25 @@ struct ComparedPose {
 /// Counters; all only grow.
 struct ComparisonCounters {
   std::uint64_t ins_samples = 0;
-  std::uint64_t ins_refused = 0;   // out of order, not a number, not a place on the earth
-  std::uint64_t ins_restarts = 0;  // the INS's stamps went back for good: its history was begun anew
+  std::uint64_t ins_refused = 0;  // out of order, not a number, not a place on the earth
+  std::uint64_t ins_restarts =
+      0;  // the INS's stamps went back for good: its history was begun anew
   std::uint64_t jumps = 0;
   std::uint64_t compared = 0;
   std::uint64_t without_ins = 0;  // poses that went out with an InsMatch other than ok
-  std::uint64_t pushed_out = 0;   // poses that went out before their time because the queue was full
+  std::uint64_t pushed_out = 0;  // poses that went out before their time because the queue was full
 };
 
-/// Our poses against a geodetic INS, frame by frame: interpolation, placement on the earth, errors, scale (DESIGN §6).
+/// Our poses against a geodetic INS, frame by frame: interpolation, placement on the earth, errors,
+/// scale (DESIGN §6).
 ///
-/// Ownership  Memory comes from the arena given at construction; nothing is taken later. Values in, values out.
+/// Ownership  Memory comes from the arena given at construction; nothing is taken later. Values in,
+///            values out.
 /// Threads    One thread calls everything. Rings bring samples and poses to it.
-/// Memory     ins_capacity samples (the oldest goes), kPending poses (the oldest goes out at once, counted), a fixed number of
-///            placement pairs. An hour or a year makes no difference.
-/// Time       Constant a call, but for the call that fits the placement (linear in kPlacementPairs, well under a millisecond).
+/// Memory     ins_capacity samples (the oldest goes), kPending poses (the oldest goes out at once,
+///            counted), a fixed number of placement pairs. An hour or a year makes no difference.
+/// Time       Constant a call, but for the call that fits the placement (linear in kPlacementPairs,
+///            well under a millisecond).
 /// Frames     `enu` has its origin at the first valid fix. `world` is the odometry's.
 /// Errors     Nothing throws after construction. What is missing is said in each ComparedPose.
 class Comparison {
@@ -117,17 +129,20 @@ class Comparison {
 
   /// Samples in order of their stamps; others are refused and counted.
   void add(const InsSample& sample) noexcept;
-  /// Poses in order of their stamps, lost ones too. Precondition: next() was called until false since the last one, so there is room.
+  /// Poses in order of their stamps, lost ones too. Precondition: next() was called until false
+  /// since the last one, so there is room.
   void add(const PoseSample& pose) noexcept;
-  /// The next pose that has met its INS samples, or will not any more. False: none yet, *out as it was. Call until false.
+  /// The next pose that has met its INS samples, or will not any more. False: none yet, *out as it
+  /// was. Call until false.
   [[nodiscard]] bool next(ComparedPose* out) noexcept;
-  /// No more samples will come: everything pending goes out by next(), and a drive too short for the placement is placed with what
-  /// there is once the last has gone.
+  /// No more samples will come: everything pending goes out by next(), and a drive too short for
+  /// the placement is placed with what there is once the last has gone.
   void finish() noexcept { finishing_ = true; }
 
   /// revision 0: none yet.
   [[nodiscard]] const Placement& placement() const noexcept { return placement_; }
-  /// Why the last attempt gave none, while the drive is too short or its way does not hold a heading.
+  /// Why the last attempt gave none, while the drive is too short or its way does not hold a
+  /// heading.
   [[nodiscard]] PlacementStatus placement_status() const noexcept { return placement_status_; }
   [[nodiscard]] bool has_origin() const noexcept { return has_origin_; }
   [[nodiscard]] const LocalTangentPlane& plane() const noexcept { return plane_; }
@@ -152,7 +167,8 @@ class Comparison {
     return readings_[static_cast<std::size_t>(i) & (readings_.size() - 1)];
   }
   [[nodiscard]] bool ready(const PoseSample& pose) const noexcept;
-  [[nodiscard]] InsMatch reference_at(Stamp stamp, ComparedPose* out, Reading* sigmas) const noexcept;
+  [[nodiscard]] InsMatch reference_at(Stamp stamp, ComparedPose* out,
+                                      Reading* sigmas) const noexcept;
   [[nodiscard]] EarthPose on_earth(const Transform& T_enu_left) const;
   void collect(const ComparedPose& c, const Reading& sigmas) noexcept;
   void begin_collecting() noexcept;

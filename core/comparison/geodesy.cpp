@@ -5,7 +5,8 @@ namespace {
 
 /// Columns: east, north, up at a place, in earth-centred axes. Up is the ellipsoid's normal.
 Mat3 earth_axes(const Geodetic& place) noexcept {
-  const double phi = place.latitude_deg * (std::numbers::pi / 180.0), lambda = place.longitude_deg * (std::numbers::pi / 180.0);
+  const double phi = place.latitude_deg * (std::numbers::pi / 180.0),
+               lambda = place.longitude_deg * (std::numbers::pi / 180.0);
   const double sp = std::sin(phi), cp = std::cos(phi), sl = std::sin(lambda), cl = std::cos(lambda);
   Mat3 R;
   R << -sl, -sp * cl, cp * cl, cl, -sp * sl, cp * sl, 0, cp, sp;
@@ -25,10 +26,13 @@ Vec3 LocalTangentPlane::to_enu(const Geodetic& place) const {
 
 Geodetic LocalTangentPlane::to_geodetic(const Vec3& p_enu) const {
   Geodetic place;
-  plane_.Reverse(p_enu.x(), p_enu.y(), p_enu.z(), place.latitude_deg, place.longitude_deg, place.height_m);
+  plane_.Reverse(p_enu.x(), p_enu.y(), p_enu.z(), place.latitude_deg, place.longitude_deg,
+                 place.height_m);
   return place;
 }
 
-Mat3 LocalTangentPlane::rotation_from(const Geodetic& place) const noexcept { return earth_axes(origin_).transpose() * earth_axes(place); }
+Mat3 LocalTangentPlane::rotation_from(const Geodetic& place) const noexcept {
+  return earth_axes(origin_).transpose() * earth_axes(place);
+}
 
 }  // namespace vergence

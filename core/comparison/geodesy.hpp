@@ -6,10 +6,12 @@
 
 namespace vergence {
 
-/// East, north, up at a fixed point of WGS84: exact Cartesian axes, no projection (DESIGN §3, `enu`).
+/// East, north, up at a fixed point of WGS84: exact Cartesian axes, no projection (DESIGN §3,
+/// `enu`).
 ///
 /// Threads  Const calls may overlap. Memory: none. Units: metres, degrees in Geodetic.
-/// Errors   None; a place that is not plausible gives numbers that mean nothing: the caller asks Geodetic::plausible() first.
+/// Errors   None; a place that is not plausible gives numbers that mean nothing: the caller asks
+///          Geodetic::plausible() first.
 class LocalTangentPlane {
  public:
   LocalTangentPlane() noexcept = default;
@@ -18,7 +20,8 @@ class LocalTangentPlane {
   [[nodiscard]] const Geodetic& origin() const noexcept { return origin_; }
   [[nodiscard]] Vec3 to_enu(const Geodetic& place) const;
   [[nodiscard]] Geodetic to_geodetic(const Vec3& p_enu) const;
-  /// v_enu = R_enu_local * v_local, from the east-north-up axes at a place to those at the origin. 1 km away they differ by 1.6e-4 rad.
+  /// v_enu = R_enu_local * v_local, from the east-north-up axes at a place to those at the origin.
+  /// 1 km away they differ by 1.6e-4 rad.
   [[nodiscard]] Mat3 rotation_from(const Geodetic& place) const noexcept;
 
  private:

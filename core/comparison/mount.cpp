@@ -13,7 +13,13 @@ namespace {
 
 // Parameters: R_m and R_enu_world as left perturbations, lever arm, translation, clock offset.
 constexpr int kParameters = 13;
-enum Index : int { mount_rotation = 0, lever = 3, clock = 6, world_rotation = 7, world_translation = 10 };
+enum Index : int {
+  mount_rotation = 0,
+  lever = 3,
+  clock = 6,
+  world_rotation = 7,
+  world_translation = 10
+};
 // Errors of a moment: tilt x y, heading, place x y, height, velocity x y z.
 constexpr int kErrors = 9;
 constexpr std::array<int, kErrors> kChannel{0, 0, 1, 2, 2, 3, 4, 4, 4};
@@ -23,8 +29,9 @@ using Parameters = Eigen::Matrix<double, kParameters, 1>;
 using Information = Eigen::Matrix<double, kParameters, kParameters>;
 using Errors = Eigen::Matrix<double, kErrors, 1>;
 
-/// A reading of the reference, at its own stamp: interpolating it would calm its noise by where between two readings a stamp falls, and the
-/// clock offset would be drawn to the middle. The estimate, which has next to no noise, is interpolated instead.
+/// A reading of the reference, at its own stamp: interpolating it would calm its noise by where
+/// between two readings a stamp falls, and the clock offset would be drawn to the middle. The
+/// estimate, which has next to no noise, is interpolated instead.
 struct Moment {
   MountReference reference{};
   bool follows = false;  // one step after the moment before it
@@ -46,9 +53,11 @@ State moved(const State& s, const Parameters& d) {
   return out;
 }
 
-/// Change an interval from its two neighbours', at one of its ends: the mean weighted so that a parabola is met.
+/// Change an interval from its two neighbours', at one of its ends: the mean weighted so that a
+/// parabola is met.
 Vec3 slope(const Vec3& before, double span_before, const Vec3& after, double span_after) {
-  return (span_after / span_before * before + span_before / span_after * after) / (span_before + span_after);
+  return (span_after / span_before * before + span_before / span_after * after) /
+         (span_before + span_after);
 }
 
 /// Cubic Hermite from 0 at u = 0 to `whole` at u = 1, with the slopes there, of one interval.
@@ -57,17 +66,21 @@ Vec3 hermite(double u, const Vec3& whole, const Vec3& slope_begin, const Vec3& s
   return u * v * v * slope_begin - u * u * v * slope_end + u * u * (3 - 2 * u) * whole;
 }
 
-/// The estimate at a time, by cubics through four poses where there are four, else straight: between poses a tenth of a second apart a car
-/// that brakes or turns is some millimetres from the straight line. False: none there.
-bool estimate_at(std::span<const StampedPose> estimate, Stamp at, Duration max_gap, Transform* out) {
-  const auto after = std::lower_bound(estimate.begin(), estimate.end(), at, [](const StampedPose& e, Stamp t) { return e.stamp < t; });
+/// The estimate at a time, by cubics through four poses where there are four, else straight:
+/// between poses a tenth of a second apart a car that brakes or turns is some millimetres from the
+/// straight line. False: none there.
+bool estimate_at(std::span<const StampedPose> estimate, Stamp at, Duration max_gap,
+                 Transform* out) {
+  const auto after = std::lower_bound(estimate.begin(), estimate.end(), at,
+                                      [](const StampedPose& e, Stamp t) { return e.stamp < t; });
   if (after == estimate.end() || after == estimate.begin()) return false;
   const StampedPose &a = *(after - 1), &b = *after;
   const Duration span = b.stamp - a.stamp;
   if (span > max_gap) return false;
   const double h = span.to_seconds(), u = (at - a.stamp).to_seconds() / h;
   const Mat3& R_a = a.T_world_body.R;
-  const Vec3 step = b.T_world_body.t - a.T_world_body.t, turn = log_so3(R_a.transpose() * b.T_world_body.R);
+  const Vec3 step = b.T_world_body.t - a.T_world_body.t,
+             turn = log_so3(R_a.transpose() * b.T_world_body.R);
   Vec3 step_begin = step, step_end = step, turn_begin = turn, turn_end = turn;
   if (after - 1 != estimate.begin() && a.stamp - (after - 2)->stamp <= max_gap) {
     const StampedPose& p = *(after - 2);
@@ -87,17 +100,20 @@ bool estimate_at(std::span<const StampedPose> estimate, Stamp at, Duration max_g
 }
 
 /// Readings a step apart, with an estimate around each.
-std::vector<Moment> moments_of(std::span<const StampedPose> estimate, std::span<const MountReference> reference, const MountOptions& o) {
+std::vector<Moment> moments_of(std::span<const StampedPose> estimate,
+                               std::span<const MountReference> reference, const MountOptions& o) {
   constexpr Duration kRoom = Duration::milliseconds(500);  // for the clock offset
   std::vector<Moment> moments;
   Transform unused;
   Stamp next = reference.front().stamp;
   for (const MountReference& r : reference) {
     if (r.stamp < next) continue;
-    if (!estimate_at(estimate, r.stamp - kRoom, o.max_gap, &unused) || !estimate_at(estimate, r.stamp, o.max_gap, &unused) ||
+    if (!estimate_at(estimate, r.stamp - kRoom, o.max_gap, &unused) ||
+        !estimate_at(estimate, r.stamp, o.max_gap, &unused) ||
         !estimate_at(estimate, r.stamp + kRoom, o.max_gap, &unused))
       continue;
-    moments.push_back({r, !moments.empty() && r.stamp - moments.back().reference.stamp < o.step * 3 / 2});
+    moments.push_back(
+        {r, !moments.empty() && r.stamp - moments.back().reference.stamp < o.step * 3 / 2});
     next = r.stamp + o.step;
   }
   return moments;
@@ -105,7 +121,8 @@ std::vector<Moment> moments_of(std::span<const StampedPose> estimate, std::span<
 
 class Fit {
  public:
-  Fit(std::vector<Moment> moments, std::span<const StampedPose> estimate, const MountOptions& options)
+  Fit(std::vector<Moment> moments, std::span<const StampedPose> estimate,
+      const MountOptions& options)
       : moments_(std::move(moments)), estimate_(estimate), options_(options) {}
 
   [[nodiscard]] MountStatus run(const Mat3& nominal, Mount* mount);
@@ -144,10 +161,12 @@ bool Fit::errors_at(const State& s, const Moment& m, Errors* e) const {
   e->segment<3>(3) = r.T_enu_ref.t + R * s.lever - s.R_enu_world * here.t - s.translation;
   e->segment<3>(6).setZero();
   if (velocity_) {
-    if (!estimate_at(estimate_, at - kAround, options_.max_gap, &before) || !estimate_at(estimate_, at + kAround, options_.max_gap, &after))
+    if (!estimate_at(estimate_, at - kAround, options_.max_gap, &before) ||
+        !estimate_at(estimate_, at + kAround, options_.max_gap, &after))
       return false;
     const double span = 2 * kAround.to_seconds();
-    const Vec3 velocity = (after.t - before.t) / span, rate = log_so3(before.R.transpose() * after.R) / span;
+    const Vec3 velocity = (after.t - before.t) / span,
+               rate = log_so3(before.R.transpose() * after.R) / span;
     e->segment<3>(6) = r.v_enu_ref + R * (s.R_m * rate).cross(s.lever) - s.R_enu_world * velocity;
   }
   return e->allFinite();
@@ -169,11 +188,16 @@ bool Fit::start(const Mat3& nominal) {
     const MountReference &r0 = moments_[i - 1].reference, &r1 = moments_[i].reference;
     velocity_ = velocity_ && r0.has_velocity && r1.has_velocity;
     if (!moments_[i].follows) continue;
-    if (!estimate_at(estimate_, r0.stamp, options_.max_gap, &e0) || !estimate_at(estimate_, r1.stamp, options_.max_gap, &e1)) return false;
+    if (!estimate_at(estimate_, r0.stamp, options_.max_gap, &e0) ||
+        !estimate_at(estimate_, r1.stamp, options_.max_gap, &e1))
+      return false;
     const Mat3 R_ref_enu = r0.T_enu_ref.R.transpose();
-    const Vec3 turn_ref = log_so3(R_ref_enu * r1.T_enu_ref.R), turn_est = log_so3(e0.R.transpose() * e1.R);
-    const Vec3 way_est = e0.R.transpose() * (e1.t - e0.t), way_ref = R_ref_enu * (r1.T_enu_ref.t - r0.T_enu_ref.t);
-    B += 20 * turn_ref * turn_est.transpose() + way_ref * way_est.transpose();  // a radian weighs as 20 m
+    const Vec3 turn_ref = log_so3(R_ref_enu * r1.T_enu_ref.R),
+               turn_est = log_so3(e0.R.transpose() * e1.R);
+    const Vec3 way_est = e0.R.transpose() * (e1.t - e0.t),
+               way_ref = R_ref_enu * (r1.T_enu_ref.t - r0.T_enu_ref.t);
+    B += 20 * turn_ref * turn_est.transpose() +
+         way_ref * way_est.transpose();  // a radian weighs as 20 m
     way += way_est.norm();
   }
   constexpr double kLeastWay = 10;  // m
@@ -193,7 +217,8 @@ bool Fit::start(const Mat3& nominal) {
   state_.R_enu_world = rotation_of(sum);
   for (const Moment& m : moments_) {
     (void)estimate_at(estimate_, m.reference.stamp, options_.max_gap, &e0);
-    state_.translation += (m.reference.T_enu_ref.t - state_.R_enu_world * e0.t) / static_cast<double>(moments_.size());
+    state_.translation += (m.reference.T_enu_ref.t - state_.R_enu_world * e0.t) /
+                          static_cast<double>(moments_.size());
   }
   return true;
 }
@@ -210,20 +235,28 @@ void Fit::learn_noise(const std::vector<Errors>& all) {
         n += 1;
       }
     }
-    constexpr double kMost = 0.998;  // a random walk as good as: beyond it the mean is lost to rounding
+    constexpr double kMost =
+        0.998;  // a random walk as good as: beyond it the mean is lost to rounding
     double memory = now > 0 ? lagged / now : 0;
-    // A short series seems to forget faster than it does (Kendall 1954), and fitted parameters have taken their share.
-    memory = std::clamp(memory + (1 + 3 * memory) / std::max(8.0, static_cast<double>(all.size())), 0.0, kMost);
+    // A short series seems to forget faster than it does (Kendall 1954), and fitted parameters have
+    // taken their share.
+    memory = std::clamp(memory + (1 + 3 * memory) / std::max(8.0, static_cast<double>(all.size())),
+                        0.0, kMost);
     constexpr int kVelocity = 4;
-    if (c != kVelocity) memory = std::max(memory, std::exp(-options_.step.to_seconds() / options_.least_correlation.to_seconds()));
+    if (c != kVelocity)
+      memory = std::max(
+          memory, std::exp(-options_.step.to_seconds() / options_.least_correlation.to_seconds()));
     double white = 0;
     for (std::size_t i = 1; i < all.size(); ++i) {
       if (!moments_[i].follows) continue;
       for (int k = 0; k < kErrors; ++k)
-        if (kChannel[static_cast<std::size_t>(k)] == c) white += std::pow(all[i][k] - memory * all[i - 1][k], 2) / n;
+        if (kChannel[static_cast<std::size_t>(k)] == c)
+          white += std::pow(all[i][k] - memory * all[i - 1][k], 2) / n;
     }
-    constexpr std::array<double, kChannels> kLeast{1e-5, 1e-5, 1e-4, 1e-4, 1e-4};  // rad, m, m/s: an ideal reference has some noise, too
-    noise_[static_cast<std::size_t>(c)] = {memory, std::max(std::sqrt(white), kLeast[static_cast<std::size_t>(c)])};
+    constexpr std::array<double, kChannels> kLeast{
+        1e-5, 1e-5, 1e-4, 1e-4, 1e-4};  // rad, m, m/s: an ideal reference has some noise, too
+    noise_[static_cast<std::size_t>(c)] = {
+        memory, std::max(std::sqrt(white), kLeast[static_cast<std::size_t>(c)])};
   }
 }
 
@@ -232,20 +265,24 @@ bool Fit::step(Parameters* d) {
   std::vector<Errors> at;
   if (!all_errors(state_, &at)) return false;
   learn_noise(at);
-  constexpr std::array<double, kParameters> kDelta{1e-5, 1e-5, 1e-5, 1e-4, 1e-4, 1e-4, 1e-4, 1e-5, 1e-5, 1e-5, 1e-3, 1e-3, 1e-3};
+  constexpr std::array<double, kParameters> kDelta{1e-5, 1e-5, 1e-5, 1e-4, 1e-4, 1e-4, 1e-4,
+                                                   1e-5, 1e-5, 1e-5, 1e-3, 1e-3, 1e-3};
   std::vector<std::vector<Errors>> columns(kParameters);
   for (int p = 0; p < kParameters; ++p) {
     Parameters small = Parameters::Zero();
     const double h = kDelta[static_cast<std::size_t>(p)];
     small[p] = h;
     std::vector<Errors> minus;
-    if (!all_errors(moved(state_, small), &columns[static_cast<std::size_t>(p)]) || !all_errors(moved(state_, -small), &minus))
+    if (!all_errors(moved(state_, small), &columns[static_cast<std::size_t>(p)]) ||
+        !all_errors(moved(state_, -small), &minus))
       return false;
     for (std::size_t i = 0; i < minus.size(); ++i)
-      columns[static_cast<std::size_t>(p)][i] = (columns[static_cast<std::size_t>(p)][i] - minus[i]) / (2 * h);
+      columns[static_cast<std::size_t>(p)][i] =
+          (columns[static_cast<std::size_t>(p)][i] - minus[i]) / (2 * h);
   }
   // Next to nothing, so that a drive that shows nothing of a parameter leaves it where it is.
-  constexpr std::array<double, kParameters> kPrior{1, 1, 1, 100, 100, 100, 0.3, 4, 4, 4, 1e6, 1e6, 1e6};
+  constexpr std::array<double, kParameters> kPrior{1, 1, 1, 100, 100, 100, 0.3,
+                                                   4, 4, 4, 1e6, 1e6, 1e6};
   Information H = Information::Zero();
   Parameters g = Parameters::Zero();
   for (int p = 0; p < kParameters; ++p) H(p, p) = std::pow(kPrior[static_cast<std::size_t>(p)], -2);
@@ -257,7 +294,8 @@ bool Fit::step(Parameters* d) {
       const Noise& noise = noise_[static_cast<std::size_t>(kChannel[static_cast<std::size_t>(k)])];
       const bool chained = moments_[i].follows;
       const double memory = chained ? noise.memory : 0;
-      const double weight = 1 / (chained ? noise.white : noise.white / std::sqrt(1 - noise.memory * noise.memory));
+      const double weight =
+          1 / (chained ? noise.white : noise.white / std::sqrt(1 - noise.memory * noise.memory));
       Parameters row;
       for (int p = 0; p < kParameters; ++p) {
         const auto& column = columns[static_cast<std::size_t>(p)];
@@ -281,13 +319,15 @@ void Fit::tell(const Mat3& nominal, Mount* mount) const {
   Vec3 seen = Vec3::Zero();
   for (int k = 0; k < 3; ++k) {
     const auto i = static_cast<std::size_t>(k);
-    m.rotation[i] = {sigma(mount_rotation + k) <= options_.rotation_sigma, turn[k], sigma(mount_rotation + k)};
+    m.rotation[i] = {sigma(mount_rotation + k) <= options_.rotation_sigma, turn[k],
+                     sigma(mount_rotation + k)};
     m.lever_arm[i] = {sigma(lever + k) <= options_.lever_sigma, state_.lever[k], sigma(lever + k)};
     if (m.rotation[i].observable) seen[k] = turn[k];
     if (m.lever_arm[i].observable) m.T_ref_est.t[k] = state_.lever[k];
   }
   m.T_ref_est.R = exp_so3(seen) * nominal;
-  m.clock_offset = {sigma(clock) <= options_.offset_sigma.to_seconds(), state_.offset, sigma(clock)};
+  m.clock_offset = {sigma(clock) <= options_.offset_sigma.to_seconds(), state_.offset,
+                    sigma(clock)};
   m.moments = moments_.size();
   std::vector<Errors> all;
   if (all_errors(state_, &all)) {
@@ -320,7 +360,8 @@ MountStatus Fit::run(const Mat3& nominal, Mount* mount) {
 
 }  // namespace
 
-MountStatus estimate_mount(std::span<const StampedPose> estimate, std::span<const MountReference> reference, const Mat3& nominal,
+MountStatus estimate_mount(std::span<const StampedPose> estimate,
+                           std::span<const MountReference> reference, const Mat3& nominal,
                            const MountOptions& options, Mount* mount) {
   if (estimate.size() < kMountMoments || reference.size() < 2) return MountStatus::too_few;
   std::vector<Moment> moments = moments_of(estimate, reference, options);

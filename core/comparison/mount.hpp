@@ -8,16 +8,19 @@
 #include "core/types/stamped_pose.hpp"
 #include "core/types/time.hpp"
 
-/// How the body of a reference (an INS) and the body of an estimate (the left camera) sit to one another, from a drive: hand-eye
-/// calibration with a clock offset.
+/// How the body of a reference (an INS) and the body of an estimate (the left camera) sit to one
+/// another, from a drive: hand-eye calibration with a clock offset.
 ///
-/// Model     With T_ref_est = (R_m, l), the estimate's body in the reference's, and T_enu_world, the estimate's world on the earth:
+/// Model     With T_ref_est = (R_m, l), the estimate's body in the reference's, and T_enu_world,
+/// the estimate's world on the earth:
 ///               R_enu_ref R_m        = Exp(e_R) R_enu_world R_world_est
 ///               p_enu_ref + R_enu_ref l = R_enu_world p_world_est + t + e_p
 ///               v_enu_ref + R_enu_ref (R_m ω × l) = R_enu_world v_world_est + e_v
-///           the estimate taken at the reference's stamp − `clock_offset`. A reference's errors wander: e of tilt, heading, horizontal and
-///           vertical place and velocity are each first-order Gauss–Markov, their correlation and size found from the residuals
-///           (feasible generalised least squares), so that a sigma tells what the drive can tell, not what its many samples seem to.
+///           the estimate taken at the reference's stamp − `clock_offset`. A reference's errors
+///           wander: e of tilt, heading, horizontal and vertical place and velocity are each
+///           first-order Gauss–Markov, their correlation and size found from the residuals
+///           (feasible generalised least squares), so that a sigma tells what the drive can tell,
+///           not what its many samples seem to.
 /// Sources   Wahba's problem for the start; Cochrane and Orcutt 1949 for the whitening.
 namespace vergence {
 
@@ -30,9 +33,10 @@ struct MountReference {
 };
 
 struct MountOptions {
-  Duration step = Duration::milliseconds(500);         // between the moments that are compared
-  Duration max_gap = Duration::milliseconds(200);      // of the estimate, that is bridged
-  Duration least_correlation = Duration::seconds(60);  // of attitude and place: a drive is too short to tell how slowly they wander
+  Duration step = Duration::milliseconds(500);     // between the moments that are compared
+  Duration max_gap = Duration::milliseconds(200);  // of the estimate, that is bridged
+  Duration least_correlation = Duration::seconds(
+      60);  // of attitude and place: a drive is too short to tell how slowly they wander
   // A parameter whose sigma is above this is `not_observable`.
   double rotation_sigma = 0.035;  // rad, two degrees: as much as the drawing knows
   double lever_sigma = 0.5;       // m
@@ -55,9 +59,11 @@ enum class MountStatus : std::uint8_t {
 inline constexpr std::size_t kMountMoments = 20;
 
 struct Mount {
-  /// What was found, with zero where it is not observable: of rotation about the start's axes, of the lever arm.
+  /// What was found, with zero where it is not observable: of rotation about the start's axes, of
+  /// the lever arm.
   Transform T_ref_est{};
-  std::array<MountValue, 3> rotation{};   // rad: x, y, z of the left perturbation of `nominal`, in the reference's axes
+  std::array<MountValue, 3>
+      rotation{};  // rad: x, y, z of the left perturbation of `nominal`, in the reference's axes
   std::array<MountValue, 3> lever_arm{};  // m, in the reference's axes
   MountValue clock_offset{};              // s: the reference's stamps are late by it
   std::size_t moments = 0;
@@ -65,11 +71,13 @@ struct Mount {
   double residual_position = 0;  // m, of e_p
 };
 
-/// `nominal`: how the bodies are turned by the drawing; rotations are told against it, and it stands where the drive tells none.
-/// Stamps ascend (precondition). Memory: the heap; not for the real-time path. Time: linear in the moments, kMountRounds rounds.
-/// Not `ok`: *mount untouched.
-[[nodiscard]] MountStatus estimate_mount(std::span<const StampedPose> estimate, std::span<const MountReference> reference,
-                                         const Mat3& nominal, const MountOptions& options, Mount* mount);
+/// `nominal`: how the bodies are turned by the drawing; rotations are told against it, and it
+/// stands where the drive tells none. Stamps ascend (precondition). Memory: the heap; not for the
+/// real-time path. Time: linear in the moments, kMountRounds rounds. Not `ok`: *mount untouched.
+[[nodiscard]] MountStatus estimate_mount(std::span<const StampedPose> estimate,
+                                         std::span<const MountReference> reference,
+                                         const Mat3& nominal, const MountOptions& options,
+                                         Mount* mount);
 
 inline constexpr int kMountRounds = 12;  // of whitening; the correlations settle within six
 

@@ -8,13 +8,17 @@
 namespace vergence {
 namespace {
 
-// rad: a heading known worse than this is no heading (a standing rig, or a way far shorter than the receiver's error).
+// rad: a heading known worse than this is no heading (a standing rig, or a way far shorter than the
+// receiver's error).
 constexpr double kWorstHeading = 1.0;
-constexpr double kNoMount = 0.1;     // rad: no mount that was measured is off by six degrees
-constexpr double kConverged = 1e-9;  // rad and m: a thousandth of what any receiver or reader can tell
+constexpr double kNoMount = 0.1;  // rad: no mount that was measured is off by six degrees
+constexpr double kConverged =
+    1e-9;  // rad and m: a thousandth of what any receiver or reader can tell
 
-/// Mean of what the attitudes say, then turned about up to the heading that the positions say, whatever the INS's heading was.
-Mat3 start(std::span<const PlacementPair> pairs, const Vec3& middle_world, const Vec3& middle_enu) noexcept {
+/// Mean of what the attitudes say, then turned about up to the heading that the positions say,
+/// whatever the INS's heading was.
+Mat3 start(std::span<const PlacementPair> pairs, const Vec3& middle_world,
+           const Vec3& middle_enu) noexcept {
   const Eigen::Quaterniond first(pairs.front().R_enu_world);
   Vec4 sum = Vec4::Zero();
   for (const PlacementPair& p : pairs) {
@@ -40,7 +44,8 @@ struct Normal {
   double weighted = 0;  // the same over their variances
 };
 
-Normal normal_equations(std::span<const PlacementPair> pairs, const Mat3& R, const Vec3& middle_world, const Vec3& middle_enu,
+Normal normal_equations(std::span<const PlacementPair> pairs, const Mat3& R,
+                        const Vec3& middle_world, const Vec3& middle_enu,
                         double independent) noexcept {
   Normal out;
   const auto n = static_cast<double>(pairs.size());
@@ -57,14 +62,16 @@ Normal normal_equations(std::span<const PlacementPair> pairs, const Mat3& R, con
     out.squares += r.squaredNorm();
     out.weighted += r.cwiseAbs2().dot(sigma.cwiseAbs2().cwiseInverse());
 
-    // Up of the world as the INS's attitude has it; under the placement it must point up: r = (ẑ − R v) in east and north.
+    // Up of the world as the INS's attitude has it; under the placement it must point up: r = (ẑ −
+    // R v) in east and north.
     const Vec3 up = R * (p.R_enu_world.transpose() * Vec3::UnitZ());
     const Eigen::Matrix<double, 2, 3> J_tilt = skew(up).topRows<2>();
     const double w_tilt = 1.0 / (n * p.tilt_sigma * p.tilt_sigma);
     out.H.topLeftCorner<3, 3>() += w_tilt * J_tilt.transpose() * J_tilt;
     out.g.head<3>() -= w_tilt * J_tilt.transpose() * up.head<2>();
 
-    // The rest of what the attitude says is a turn about up: r(φ) = turn − φ_z. A turn of many sigmas is a mount that nobody knows.
+    // The rest of what the attitude says is a turn about up: r(φ) = turn − φ_z. A turn of many
+    // sigmas is a mount that nobody knows.
     const double turn = log_so3(p.R_enu_world * R.transpose()).z();
     if (!(p.heading_sigma > 0) || std::abs(turn) > kNoMount) continue;
     const double w_heading = 1.0 / (n * p.heading_sigma * p.heading_sigma);
@@ -76,7 +83,8 @@ Normal normal_equations(std::span<const PlacementPair> pairs, const Mat3& R, con
 
 }  // namespace
 
-PlacementStatus fit_placement(std::span<const PlacementPair> pairs, Duration correlation, Placement* placement) noexcept {
+PlacementStatus fit_placement(std::span<const PlacementPair> pairs, Duration correlation,
+                              Placement* placement) noexcept {
   if (pairs.size() < 3) return PlacementStatus::too_few;
   const auto n = static_cast<double>(pairs.size());
   Vec3 middle_world = Vec3::Zero(), middle_enu = Vec3::Zero();
@@ -100,7 +108,8 @@ PlacementStatus fit_placement(std::span<const PlacementPair> pairs, Duration cor
     if (delta.norm() < kConverged) break;
   }
 
-  // Residuals larger than the sigmas say make the result worse by as much; smaller ones do not make it better: they share their error.
+  // Residuals larger than the sigmas say make the result worse by as much; smaller ones do not make
+  // it better: they share their error.
   const double excess = std::max(1.0, normal.weighted / (3.0 * n));
   const Mat6 covariance = excess * normal.H.ldlt().solve(Mat6::Identity());
   const Vec6 sigma = covariance.diagonal().cwiseSqrt();

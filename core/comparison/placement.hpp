@@ -7,17 +7,20 @@
 
 namespace vergence {
 
-/// One moment at which both are known: the odometry in its world, the INS (brought to the left camera) in enu.
+/// One moment at which both are known: the odometry in its world, the INS (brought to the left
+/// camera) in enu.
 struct PlacementPair {
   Stamp stamp{};
   Vec3 p_world_left = Vec3::Zero();  // m
   Vec3 p_enu_left = Vec3::Zero();    // m
-  /// What the INS's attitude alone says: R_enu_left · R_left_world. Its roll and pitch are used, its heading where it has a sigma.
+  /// What the INS's attitude alone says: R_enu_left · R_left_world. Its roll and pitch are used,
+  /// its heading where it has a sigma.
   Mat3 R_enu_world = Mat3::Identity();
   double position_sigma = 0;  // m, horizontal, each axis; > 0
   double height_sigma = 0;    // m; > 0
   double tilt_sigma = 0;      // rad; > 0
-  double heading_sigma = 0;   // rad, of the INS and of how the camera is turned against it; 0: its heading is not used
+  double heading_sigma =
+      0;  // rad, of the INS and of how the camera is turned against it; 0: its heading is not used
 };
 
 /// Where the odometry's world lies on the earth (DESIGN §6). Rigid, no scale.
@@ -38,13 +41,16 @@ enum class PlacementStatus : std::uint8_t {
   not_held,  // the way is too short to hold a heading
 };
 
-/// Least squares for T_enu_world on positions, with the INS's roll and pitch, and its heading where it has a sigma, as one more
-/// measurement.
+/// Least squares for T_enu_world on positions, with the INS's roll and pitch, and its heading where
+/// it has a sigma, as one more measurement.
 ///
-/// An INS's errors wander slowly: neighbouring samples repeat one another. `correlation` says for how long; n pairs over a time T
-/// count as 1 + T / correlation independent ones, the attitude as one. So the sigma is what 100 m with such a receiver can tell.
-/// Memory: none. Time: linear in the pairs, at most kPlacementSteps passes. Not `ok`: *placement as it was.
-[[nodiscard]] PlacementStatus fit_placement(std::span<const PlacementPair> pairs, Duration correlation, Placement* placement) noexcept;
+/// An INS's errors wander slowly: neighbouring samples repeat one another. `correlation` says for
+/// how long; n pairs over a time T count as 1 + T / correlation independent ones, the attitude as
+/// one. So the sigma is what 100 m with such a receiver can tell.
+/// Memory: none. Time: linear in the pairs, at most kPlacementSteps passes. Not `ok`: *placement as
+/// it was.
+[[nodiscard]] PlacementStatus fit_placement(std::span<const PlacementPair> pairs,
+                                            Duration correlation, Placement* placement) noexcept;
 
 inline constexpr int kPlacementSteps = 20;  // Gauss–Newton from the closed-form start takes four
 

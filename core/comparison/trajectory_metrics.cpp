@@ -9,20 +9,24 @@
 namespace vergence {
 namespace {
 
-// rad: a rotation about the direction of travel that the positions leave this uncertain is not worth comparing.
+// rad: a rotation about the direction of travel that the positions leave this uncertain is not
+// worth comparing.
 constexpr double kMaxRollUncertainty = 0.1;
 // Ratio of extents: straighter than this is rounding, whatever the residuals.
 constexpr double kStraight = 1e-6;
 
 [[maybe_unused]] bool ascending(std::span<const StampedPose> poses) {
-  return std::adjacent_find(poses.begin(), poses.end(), [](const StampedPose& a, const StampedPose& b) { return !(a.stamp < b.stamp); }) ==
-         poses.end();
+  return std::adjacent_find(poses.begin(), poses.end(),
+                            [](const StampedPose& a, const StampedPose& b) {
+                              return !(a.stamp < b.stamp);
+                            }) == poses.end();
 }
 
 bool earlier(Stamp stamp, const StampedPose& pose) { return stamp < pose.stamp; }
 
 /// The reference at a stamp within its span; false: in a hole.
-bool reference_at(Stamp stamp, std::span<const StampedPose> reference, const EvaluationOptions& options, Transform* T) {
+bool reference_at(Stamp stamp, std::span<const StampedPose> reference,
+                  const EvaluationOptions& options, Transform* T) {
   const auto next = std::upper_bound(reference.begin(), reference.end(), stamp, earlier);
   const StampedPose& left = *(next - 1);
   if (options.association == Association::interpolate) {
@@ -32,7 +36,8 @@ bool reference_at(Stamp stamp, std::span<const StampedPose> reference, const Eva
     }
     const Duration interval = next->stamp - left.stamp;
     if (interval > options.max_gap) return false;
-    const double s = static_cast<double>((stamp - left.stamp).ns()) / static_cast<double>(interval.ns());
+    const double s =
+        static_cast<double>((stamp - left.stamp).ns()) / static_cast<double>(interval.ns());
     *T = interpolate(left.T_world_body, next->T_world_body, s);
     return true;
   }
@@ -63,20 +68,23 @@ ErrorStatistics statistics(std::vector<double> errors) {
 std::vector<double> position_errors(const MatchedTrajectories& m, const Alignment& a) {
   std::vector<double> errors(m.estimate.size());
   for (std::size_t i = 0; i < errors.size(); ++i) {
-    const Vec3 aligned = a.scale * (a.R_reference_estimate * m.estimate[i].T_world_body.t) + a.t_reference_estimate;
+    const Vec3 aligned =
+        a.scale * (a.R_reference_estimate * m.estimate[i].T_world_body.t) + a.t_reference_estimate;
     errors[i] = (m.reference[i].T_world_body.t - aligned).norm();
   }
   return errors;
 }
 
-HeadingErrors heading_errors(const MatchedTrajectories& m, const Mat3& R, BodyAxes axes, const Vec3& up) {
+HeadingErrors heading_errors(const MatchedTrajectories& m, const Mat3& R, BodyAxes axes,
+                             const Vec3& up) {
   const Vec3 forward = axes == BodyAxes::camera ? Vec3(Vec3::UnitZ()) : Vec3(Vec3::UnitX());
   HeadingErrors h;
   double sum = 0, squares = 0;
   for (std::size_t i = 0; i < m.estimate.size(); ++i) {
     const Vec3 f_estimate = R * (m.estimate[i].T_world_body.R * forward);
     const Vec3 f_reference = m.reference[i].T_world_body.R * forward;
-    // Both directions projected to the plane across `up`; the signed angle from one to the other is in (−π, π] by itself.
+    // Both directions projected to the plane across `up`; the signed angle from one to the other is
+    // in (−π, π] by itself.
     const Vec3 e = f_estimate - up.dot(f_estimate) * up;
     const Vec3 r = f_reference - up.dot(f_reference) * up;
     const double error = std::atan2(up.dot(r.cross(e)), r.dot(e));
@@ -94,13 +102,16 @@ HeadingErrors heading_errors(const MatchedTrajectories& m, const Mat3& R, BodyAx
 ErrorStatistics rotation_errors(const MatchedTrajectories& m, const Mat3& R) {
   std::vector<double> errors(m.estimate.size());
   for (std::size_t i = 0; i < errors.size(); ++i)
-    errors[i] = rotation_angle(m.reference[i].T_world_body.R.transpose() * R * m.estimate[i].T_world_body.R);
+    errors[i] = rotation_angle(m.reference[i].T_world_body.R.transpose() * R *
+                               m.estimate[i].T_world_body.R);
   return statistics(std::move(errors));
 }
 
 void end_errors(const MatchedTrajectories& m, TrajectoryEvaluation* out) {
-  const Transform relative_reference = m.reference.front().T_world_body.inverse() * m.reference.back().T_world_body;
-  const Transform relative_estimate = m.estimate.front().T_world_body.inverse() * m.estimate.back().T_world_body;
+  const Transform relative_reference =
+      m.reference.front().T_world_body.inverse() * m.reference.back().T_world_body;
+  const Transform relative_estimate =
+      m.estimate.front().T_world_body.inverse() * m.estimate.back().T_world_body;
   const Transform E = relative_reference.inverse() * relative_estimate;
   out->end_error_start_aligned = E.t.norm();
   out->end_error_ratio = out->end_error_start_aligned / out->path_reference;
@@ -108,12 +119,15 @@ void end_errors(const MatchedTrajectories& m, TrajectoryEvaluation* out) {
 }
 
 bool moves(std::span<const StampedPose> poses) {
-  return std::any_of(poses.begin(), poses.end(), [&](const StampedPose& p) { return p.T_world_body.t != poses.front().T_world_body.t; });
+  return std::any_of(poses.begin(), poses.end(), [&](const StampedPose& p) {
+    return p.T_world_body.t != poses.front().T_world_body.t;
+  });
 }
 
 }  // namespace
 
-MatchedTrajectories associate(std::span<const StampedPose> estimate, std::span<const StampedPose> reference,
+MatchedTrajectories associate(std::span<const StampedPose> estimate,
+                              std::span<const StampedPose> reference,
                               const EvaluationOptions& options) {
   assert(ascending(estimate) && ascending(reference));
   MatchedTrajectories m;
@@ -122,7 +136,8 @@ MatchedTrajectories associate(std::span<const StampedPose> estimate, std::span<c
   m.reference.reserve(estimate.size());
   const Stamp first = reference.front().stamp, last = reference.back().stamp;
   // A reference pose within max_difference is a match also just outside the reference's span.
-  const Duration margin = options.association == Association::nearest ? options.max_difference : Duration{};
+  const Duration margin =
+      options.association == Association::nearest ? options.max_difference : Duration{};
   for (const StampedPose& pose : estimate) {
     if (pose.stamp < first - margin) {
       ++m.before;
@@ -141,7 +156,8 @@ MatchedTrajectories associate(std::span<const StampedPose> estimate, std::span<c
   return m;
 }
 
-Alignment align(std::span<const StampedPose> estimate, std::span<const StampedPose> reference, AlignmentScale scale) {
+Alignment align(std::span<const StampedPose> estimate, std::span<const StampedPose> reference,
+                AlignmentScale scale) {
   assert(estimate.size() == reference.size() && !estimate.empty());
   const std::size_t count = estimate.size();
   const auto n = static_cast<double>(count);
@@ -167,14 +183,15 @@ Alignment align(std::span<const StampedPose> estimate, std::span<const StampedPo
   Alignment a;
   if (variance_e > 0 && variance_r > 0) {
     const Eigen::JacobiSVD<Mat3> svd(covariance, Eigen::ComputeFullU | Eigen::ComputeFullV);
-    Vec3 sign = Vec3::Ones();  // the reflection of a best fit with det −1 is undone on the weakest direction
+    Vec3 sign = Vec3::Ones();  // the reflection of a best fit with det −1 is undone on the weakest
+                               // direction
     if (svd.matrixU().determinant() * svd.matrixV().determinant() < 0) sign.z() = -1.0;
     a.R_reference_estimate = svd.matrixU() * sign.asDiagonal() * svd.matrixV().transpose();
     const double trace = svd.singularValues().dot(sign);
     if (scale == AlignmentScale::free) a.scale = trace / variance_e;
     a.lateral_extent = std::sqrt(svd.singularValues()[1]);
-    // A roll about the main direction moves what is off it along the second into the third. What the fit leaves there, against
-    // the lever arm, is about how far the roll may be wrong.
+    // A roll about the main direction moves what is off it along the second into the third. What
+    // the fit leaves there, against the lever arm, is about how far the roll may be wrong.
     const Vec3 third = svd.matrixU().col(2);
     double squares = 0;
     for (std::size_t i = 0; i < count; ++i) {
@@ -183,7 +200,8 @@ Alignment align(std::span<const StampedPose> estimate, std::span<const StampedPo
       squares += residual * residual;
     }
     const double main_extent = std::sqrt(svd.singularValues()[0]);
-    a.roll_unobservable = !(std::sqrt(squares / n) < kMaxRollUncertainty * a.lateral_extent && a.lateral_extent > kStraight * main_extent);
+    a.roll_unobservable = !(std::sqrt(squares / n) < kMaxRollUncertainty * a.lateral_extent &&
+                            a.lateral_extent > kStraight * main_extent);
   } else {
     a.roll_unobservable = true;
   }
@@ -193,18 +211,21 @@ Alignment align(std::span<const StampedPose> estimate, std::span<const StampedPo
 
 double path_length(std::span<const StampedPose> trajectory) {
   double length = 0;
-  for (std::size_t i = 1; i < trajectory.size(); ++i) length += (trajectory[i].T_world_body.t - trajectory[i - 1].T_world_body.t).norm();
+  for (std::size_t i = 1; i < trajectory.size(); ++i)
+    length += (trajectory[i].T_world_body.t - trajectory[i - 1].T_world_body.t).norm();
   return length;
 }
 
 Vec3 world_up(std::span<const StampedPose> reference, BodyAxes axes) {
   Vec3 mean = Vec3::Zero();
   for (const StampedPose& pose : reference)
-    mean += axes == BodyAxes::camera ? Vec3(-pose.T_world_body.R.col(1)) : Vec3(pose.T_world_body.R.col(2));
+    mean += axes == BodyAxes::camera ? Vec3(-pose.T_world_body.R.col(1))
+                                     : Vec3(pose.T_world_body.R.col(2));
   return -mean.y() > mean.z() ? Vec3(-Vec3::UnitY()) : Vec3(Vec3::UnitZ());
 }
 
-TrajectoryEvaluation evaluate(std::span<const StampedPose> estimate, std::span<const StampedPose> reference,
+TrajectoryEvaluation evaluate(std::span<const StampedPose> estimate,
+                              std::span<const StampedPose> reference,
                               const EvaluationOptions& options) {
   const MatchedTrajectories m = associate(estimate, reference, options);
   TrajectoryEvaluation out;
@@ -232,14 +253,16 @@ TrajectoryEvaluation evaluate(std::span<const StampedPose> estimate, std::span<c
   out.ate_unaligned = statistics(position_errors(m, Alignment{}));
 
   out.up_world = world_up(m.reference, options.axes);
-  const Mat3 R_start = m.reference.front().T_world_body.R * m.estimate.front().T_world_body.R.transpose();
+  const Mat3 R_start =
+      m.reference.front().T_world_body.R * m.estimate.front().T_world_body.R.transpose();
   out.heading_start_aligned = heading_errors(m, R_start, options.axes, out.up_world);
   out.heading_se3 = heading_errors(m, out.se3.R_reference_estimate, options.axes, out.up_world);
   out.rotation_se3 = rotation_errors(m, out.se3.R_reference_estimate);
   end_errors(m, &out);
 
   for (const SegmentOptions& segments : options.segments)
-    out.segments.push_back(segment_errors(m.estimate, m.reference, segments, segments.scaled ? out.sim3.scale : 1.0));
+    out.segments.push_back(
+        segment_errors(m.estimate, m.reference, segments, segments.scaled ? out.sim3.scale : 1.0));
   return out;
 }
 

@@ -11,12 +11,16 @@
 
 /// How far an estimated trajectory is from a reference: the figures the literature compares by.
 ///
-/// Trajectories  Strictly ascending stamps, finite poses (precondition, asserted; the readers refuse other files). Body of estimate and
-///               reference is the same point and the same axes; their worlds may differ by a rigid motion.
+/// Trajectories  Strictly ascending stamps, finite poses (precondition, asserted; the readers
+///               refuse other files). Body of estimate and reference is the same point and the same
+///               axes; their worlds may differ by a rigid motion.
 /// Threads       Pure functions. Memory: the heap; this is not for the real-time path.
-/// Units         Metres, radians, ratios (1 is 100 %). Scale is reported, never applied but where an option says so.
-/// Errors        A status by value. A figure that does not exist (no segment of that length) is NaN, never zero.
-/// Sources       Umeyama 1991 (alignment); Sturm et al. 2012 (ATE); the KITTI odometry devkit (segments).
+/// Units         Metres, radians, ratios (1 is 100 %). Scale is reported, never applied but where
+///               an option says so.
+/// Errors        A status by value. A figure that does not exist (no segment of that length) is
+///               NaN, never zero.
+/// Sources       Umeyama 1991 (alignment); Sturm et al. 2012 (ATE); the KITTI odometry devkit
+///               (segments).
 namespace vergence {
 
 enum class Association : std::uint8_t {
@@ -33,19 +37,22 @@ enum class BodyAxes : std::uint8_t {
 /// One table of KITTI segment errors.
 struct SegmentOptions {
   std::vector<double> lengths{100, 200, 300, 400, 500, 600, 700, 800};  // m, > 0
-  int step = 10;                                                        // a segment begins at every step-th matched pose; > 0
-  bool scaled = false;                                                  // multiply the estimate's positions by the Sim(3) scale first
+  int step = 10;        // a segment begins at every step-th matched pose; > 0
+  bool scaled = false;  // multiply the estimate's positions by the Sim(3) scale first
 };
 
 struct EvaluationOptions {
   Association association = Association::interpolate;
-  Duration max_gap = Duration::milliseconds(200);       // interpolate: the widest hole of the reference that is bridged
-  Duration max_difference = Duration::milliseconds(5);  // nearest: the largest difference of stamps that is a match
+  Duration max_gap =
+      Duration::milliseconds(200);  // interpolate: the widest hole of the reference that is bridged
+  Duration max_difference =
+      Duration::milliseconds(5);  // nearest: the largest difference of stamps that is a match
   BodyAxes axes = BodyAxes::camera;
   std::vector<SegmentOptions> segments{SegmentOptions{}};
 };
 
-/// Poses of both at the same times, in order: estimate[i] belongs to reference[i]. The stamps are the estimate's.
+/// Poses of both at the same times, in order: estimate[i] belongs to reference[i]. The stamps are
+/// the estimate's.
 struct MatchedTrajectories {
   std::vector<StampedPose> estimate;
   std::vector<StampedPose> reference;
@@ -59,17 +66,21 @@ struct Alignment {
   Mat3 R_reference_estimate = Mat3::Identity();
   Vec3 t_reference_estimate = Vec3::Zero();  // m
   double scale = 1.0;
-  /// Root mean square extent, m, of the path across its main direction: √ of the second singular value of the cross-covariance.
+  /// Root mean square extent, m, of the path across its main direction: √ of the second singular
+  /// value of the cross-covariance.
   double lateral_extent = 0.0;
-  /// The path is so straight that positions do not hold the rotation about it: rotation and heading after this fit mean nothing.
+  /// The path is so straight that positions do not hold the rotation about it: rotation and heading
+  /// after this fit mean nothing.
   bool roll_unobservable = false;
 };
 
 struct ErrorStatistics {
-  double rmse = 0, mean = 0, median = 0, max = 0;  // the median of an even number is the mean of the middle two
+  double rmse = 0, mean = 0, median = 0,
+         max = 0;  // the median of an even number is the mean of the middle two
 };
 
-/// Signed heading errors, estimate − reference, counter-clockwise from above positive, each in (−π, π].
+/// Signed heading errors, estimate − reference, counter-clockwise from above positive, each in (−π,
+/// π].
 struct HeadingErrors {
   double rms = 0, mean = 0, max_abs = 0, last = 0;  // rad
 };
@@ -83,9 +94,10 @@ struct LengthError {
 
 struct SegmentErrors {
   int step = 0;
-  std::vector<LengthError> per_length;                            // in the order of the option
-  std::size_t count = 0;                                          // of all lengths together; 0: the path is shorter than every length
-  double translation = std::numeric_limits<double>::quiet_NaN();  // mean over all segments, not over the lengths' means
+  std::vector<LengthError> per_length;  // in the order of the option
+  std::size_t count = 0;  // of all lengths together; 0: the path is shorter than every length
+  double translation = std::numeric_limits<double>::quiet_NaN();  // mean over all segments, not
+                                                                  // over the lengths' means
   double rotation = std::numeric_limits<double>::quiet_NaN();     // rad/m
 };
 
@@ -96,7 +108,8 @@ enum class EvaluationStatus : std::uint8_t {
   no_motion,  // the matched positions of one of the two are all the same: nothing to align
 };
 
-/// Everything `evaluate` and summary.json say. Unless `status` is ok only the counts mean something.
+/// Everything `evaluate` and summary.json say. Unless `status` is ok only the counts mean
+/// something.
 struct TrajectoryEvaluation {
   EvaluationStatus status = EvaluationStatus::no_match;
   std::size_t matched = 0;
@@ -114,7 +127,8 @@ struct TrajectoryEvaluation {
 
   Vec3 up_world = Vec3::UnitZ();        // up of the reference's world that headings are taken about
   HeadingErrors heading_se3;            // the estimate's rotations turned by se3
-  HeadingErrors heading_start_aligned;  // the estimate moved so that its first matched pose is the reference's
+  HeadingErrors heading_start_aligned;  // the estimate moved so that its first matched pose is the
+                                        // reference's
   ErrorStatistics rotation_se3;         // rad, whole rotation
 
   double end_error_se3 = 0;               // m, of the last matched pose
@@ -126,27 +140,35 @@ struct TrajectoryEvaluation {
 };
 
 /// All of it. Two trajectories without overlap are a status, not an error.
-[[nodiscard]] TrajectoryEvaluation evaluate(std::span<const StampedPose> estimate, std::span<const StampedPose> reference,
+[[nodiscard]] TrajectoryEvaluation evaluate(std::span<const StampedPose> estimate,
+                                            std::span<const StampedPose> reference,
                                             const EvaluationOptions& options);
 
 /// The parts, for whoever needs one of them.
 
-[[nodiscard]] MatchedTrajectories associate(std::span<const StampedPose> estimate, std::span<const StampedPose> reference,
+[[nodiscard]] MatchedTrajectories associate(std::span<const StampedPose> estimate,
+                                            std::span<const StampedPose> reference,
                                             const EvaluationOptions& options);
 
 enum class AlignmentScale : std::uint8_t { one, free };
 
-/// Closed form of Horn and Umeyama. Precondition: as many estimates as references, at least one. Points that all coincide leave R = I.
-[[nodiscard]] Alignment align(std::span<const StampedPose> estimate, std::span<const StampedPose> reference, AlignmentScale scale);
+/// Closed form of Horn and Umeyama. Precondition: as many estimates as references, at least one.
+/// Points that all coincide leave R = I.
+[[nodiscard]] Alignment align(std::span<const StampedPose> estimate,
+                              std::span<const StampedPose> reference, AlignmentScale scale);
 
 /// Σ‖x_(i+1) − x_i‖, metres.
 [[nodiscard]] double path_length(std::span<const StampedPose> trajectory);
 
-/// `estimate_scale` multiplies the estimate's translations. Precondition: matched, i.e. of equal size.
-[[nodiscard]] SegmentErrors segment_errors(std::span<const StampedPose> estimate, std::span<const StampedPose> reference,
-                                           const SegmentOptions& options, double estimate_scale = 1.0);
+/// `estimate_scale` multiplies the estimate's translations. Precondition: matched, i.e. of equal
+/// size.
+[[nodiscard]] SegmentErrors segment_errors(std::span<const StampedPose> estimate,
+                                           std::span<const StampedPose> reference,
+                                           const SegmentOptions& options,
+                                           double estimate_scale = 1.0);
 
-/// Up of the world a body moves in: +z (enu, laser trackers) or −y (a camera's world), whichever the body's mean up is nearer to.
+/// Up of the world a body moves in: +z (enu, laser trackers) or −y (a camera's world), whichever
+/// the body's mean up is nearer to.
 [[nodiscard]] Vec3 world_up(std::span<const StampedPose> reference, BodyAxes axes);
 
 }  // namespace vergence

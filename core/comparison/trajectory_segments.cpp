@@ -32,12 +32,14 @@ Transform relative(const Transform& from, const Transform& to, double scale) {
 
 }  // namespace
 
-SegmentErrors segment_errors(std::span<const StampedPose> estimate, std::span<const StampedPose> reference, const SegmentOptions& options,
+SegmentErrors segment_errors(std::span<const StampedPose> estimate,
+                             std::span<const StampedPose> reference, const SegmentOptions& options,
                              double estimate_scale) {
   assert(estimate.size() == reference.size() && options.step > 0);
   std::vector<double> distance(reference.size(), 0.0);  // m, along the reference
   for (std::size_t i = 1; i < distance.size(); ++i)
-    distance[i] = distance[i - 1] + (reference[i].T_world_body.t - reference[i - 1].T_world_body.t).norm();
+    distance[i] =
+        distance[i - 1] + (reference[i].T_world_body.t - reference[i - 1].T_world_body.t).norm();
 
   SegmentErrors out;
   out.step = options.step;
@@ -45,13 +47,18 @@ SegmentErrors segment_errors(std::span<const StampedPose> estimate, std::span<co
   for (const double length : options.lengths) {
     assert(length > 0);
     Sum sum;
-    for (std::size_t first = 0; first < distance.size(); first += static_cast<std::size_t>(options.step)) {
-      // Strictly longer than the nominal length, as the devkit takes it; dividing by the nominal length is the devkit's, too.
-      const auto end = std::upper_bound(distance.begin() + static_cast<std::ptrdiff_t>(first), distance.end(), distance[first] + length);
+    for (std::size_t first = 0; first < distance.size();
+         first += static_cast<std::size_t>(options.step)) {
+      // Strictly longer than the nominal length, as the devkit takes it; dividing by the nominal
+      // length is the devkit's, too.
+      const auto end = std::upper_bound(distance.begin() + static_cast<std::ptrdiff_t>(first),
+                                        distance.end(), distance[first] + length);
       if (end == distance.end()) break;  // later starts have even less way left
       const auto last = static_cast<std::size_t>(end - distance.begin());
-      const Transform R = relative(reference[first].T_world_body, reference[last].T_world_body, 1.0);
-      const Transform P = relative(estimate[first].T_world_body, estimate[last].T_world_body, estimate_scale);
+      const Transform R =
+          relative(reference[first].T_world_body, reference[last].T_world_body, 1.0);
+      const Transform P =
+          relative(estimate[first].T_world_body, estimate[last].T_world_body, estimate_scale);
       const Transform E = P.inverse() * R;
       const double translation = E.t.norm() / length, rotation = rotation_angle(E.R) / length;
       sum.add(translation, rotation);

@@ -18,31 +18,38 @@ namespace {
 constexpr int kLostAfter = 3;  // frames without a pose in a row before the state says so
 
 constexpr std::uint64_t kDriftFrames = 60;  // of a creeping rig that are taken for one
-constexpr int kUnmatchedAfter = 15;         // frames with good images that no scene can be made of with the calibration in use
-constexpr int kInStepAfter = 60;            // frames without a sign of the cameras being out of step, before that is over
+constexpr int kUnmatchedAfter =
+    15;  // frames with good images that no scene can be made of with the calibration in use
+constexpr int kInStepAfter =
+    60;  // frames without a sign of the cameras being out of step, before that is over
 
 /// What must be known of a rig.
 void check(const EstimatorOptions& options, const RigCalibration& rig) {
   const bool known = options.trust != CalibrationTrust::none;
   if (rig.cameras < 2 || rig.cameras > kMaxCameras)
-    throw std::invalid_argument("a rig of 2 to " + std::to_string(kMaxCameras) + " cameras is needed, this one has " +
-                                std::to_string(rig.cameras));
+    throw std::invalid_argument("a rig of 2 to " + std::to_string(kMaxCameras) +
+                                " cameras is needed, this one has " + std::to_string(rig.cameras));
   for (int k = 0; k < rig.cameras; ++k) {
     const auto i = static_cast<std::size_t>(k);
     const Intrinsics& c = rig.intrinsics[i];
     if (c.width < 64 || c.height < 64 || !(c.fx > 0) || !(c.fy > 0))
-      throw std::invalid_argument("camera " + std::to_string(k) +
-                                  ": images of at least 64×64 pixels and positive focal lengths are needed");
+      throw std::invalid_argument(
+          "camera " + std::to_string(k) +
+          ": images of at least 64×64 pixels and positive focal lengths are needed");
     const ImageView& mask = options.masks[i];
     if (!mask.empty() && (mask.width != c.width || mask.height != c.height))
-      throw std::invalid_argument("camera " + std::to_string(k) + ": its mask is " + std::to_string(mask.width) + "×" +
-                                  std::to_string(mask.height) + " pixels, its images are " + std::to_string(c.width) + "×" +
+      throw std::invalid_argument("camera " + std::to_string(k) + ": its mask is " +
+                                  std::to_string(mask.width) + "×" + std::to_string(mask.height) +
+                                  " pixels, its images are " + std::to_string(c.width) + "×" +
                                   std::to_string(c.height));
     if (k > 0 && known && !(rig.T_camera_left[i].t.norm() > 1e-3))
-      throw std::invalid_argument("camera " + std::to_string(k) + ": its baseline is below a millimetre, no depth can be measured");
+      throw std::invalid_argument("camera " + std::to_string(k) +
+                                  ": its baseline is below a millimetre, no depth can be measured");
   }
   if (!known && !(rig.baseline > 1e-3))
-    throw std::invalid_argument("the length of the baseline is needed to calibrate from scratch: it sets the scale of everything");
+    throw std::invalid_argument(
+        "the length of the baseline is needed to calibrate from scratch: it sets the scale of "
+        "everything");
 }
 
 /// From which frame on the tracks tell of the rig as it is now.
@@ -79,7 +86,8 @@ const char* sentence_of(CalibrationCause cause) noexcept {
     case CalibrationCause::drift:
       return "the rig is creeping away from its calibration";
     case CalibrationCause::collapse:
-      return "left and right hardly match any more: a camera was knocked far off or is out of focus";
+      return "left and right hardly match any more: a camera was knocked far off or is out of "
+             "focus";
     case CalibrationCause::out_of_step:
       return "the cameras' images are not of the same instant";
     case CalibrationCause::requested:
@@ -95,8 +103,8 @@ const char* sentence_of(CalibrationCause cause) noexcept {
 }  // namespace
 
 struct Estimator::Parts {
-  Parts(const EstimatorOptions& o, const RigCalibration& r, const RigCalibration& nominal, Arena& arena, PairRunner& runner,
-        BackgroundRunner& solver)
+  Parts(const EstimatorOptions& o, const RigCalibration& r, const RigCalibration& nominal,
+        Arena& arena, PairRunner& runner, BackgroundRunner& solver)
       : options(o),
         odometry(options.odometry, r, o.trust != CalibrationTrust::none, arena, runner, o.masks),
         calibrator(options, r, nominal, arena, solver),
@@ -155,19 +163,22 @@ struct Estimator::Parts {
   FixedVector<CalibrationDecision, 3> decisions;  // three in finish() at most
 };
 
-void Estimator::Parts::doubt(CalibrationCause cause, std::uint64_t onset, const RigFrame& frame) noexcept {
+void Estimator::Parts::doubt(CalibrationCause cause, std::uint64_t onset,
+                             const RigFrame& frame) noexcept {
   note(EstimatorEvent::Kind::rig_changed, frame.stamp, sentence_of(cause),
        static_cast<double>(frame.number - std::min(onset, frame.number)));
-  transition(cause == CalibrationCause::requested ? Trigger::requested : Trigger::rig_changed, frame.stamp);
+  transition(cause == CalibrationCause::requested ? Trigger::requested : Trigger::rig_changed,
+             frame.stamp);
   calibrator.seek(cause, onset, frame.number);
   verified = false;
   odometry.unlink();
 }
 
-/// Left and right hardly match with the calibration in use. One that the drive never confirmed was not the rig's from the start; one that
-/// it did was knocked away.
+/// Left and right hardly match with the calibration in use. One that the drive never confirmed was
+/// not the rig's from the start; one that it did was knocked away.
 void Estimator::Parts::give_up_calibration(const RigFrame& frame, double frames) noexcept {
-  const CalibrationCause cause = calibrator.ever_verified() ? CalibrationCause::collapse : CalibrationCause::contradicted;
+  const CalibrationCause cause =
+      calibrator.ever_verified() ? CalibrationCause::collapse : CalibrationCause::contradicted;
   if (cause == CalibrationCause::collapse)
     note(EstimatorEvent::Kind::rig_changed, frame.stamp, sentence_of(cause), frames);
   else
@@ -184,18 +195,23 @@ void Estimator::Parts::watch(const odometry::FrameOutcome& out, const RigFrame& 
   const calibration::MonitorVerdict v = calibrator.watch(odometry, out, frame);
   undecided = v.undecided;
   if (v.kind == K::out_of_step) {
-    if (out_of_step == 0) note(EstimatorEvent::Kind::rig_changed, frame.stamp, sentence_of(CalibrationCause::out_of_step), v.lag_frames);
+    if (out_of_step == 0)
+      note(EstimatorEvent::Kind::rig_changed, frame.stamp,
+           sentence_of(CalibrationCause::out_of_step), v.lag_frames);
     out_of_step = kInStepAfter;
     return;
   }
   if (out_of_step > 0) {
-    // A rig out of step fits no calibration: what else the monitor says is of no use until that is over.
+    // A rig out of step fits no calibration: what else the monitor says is of no use until that is
+    // over.
     if (v.kind == K::quiet && !v.undecided && --out_of_step == 0)
-      note(EstimatorEvent::Kind::calibration_confirmed, frame.stamp, "the cameras are in step again", 0);
+      note(EstimatorEvent::Kind::calibration_confirmed, frame.stamp,
+           "the cameras are in step again", 0);
     return;
   }
   if (v.kind == K::collapse) {
-    give_up_calibration(frame, static_cast<double>(frame.number - std::min(v.onset_frame, frame.number)));
+    give_up_calibration(frame,
+                        static_cast<double>(frame.number - std::min(v.onset_frame, frame.number)));
   } else if (v.kind != K::quiet) {
     doubt(cause_of(v.kind), first_frame_of_use(v, frame.number), frame);
   }
@@ -203,8 +219,10 @@ void Estimator::Parts::watch(const odometry::FrameOutcome& out, const RigFrame& 
 
 /// Solves are started and decided.
 void Estimator::Parts::calibrate(const RigFrame& frame) noexcept {
-  if (const auto decision = calibrator.decide(frame.stamp, frame.number)) take(*decision, frame.stamp);
-  const bool solves = state == State::parallel_monocular || state == State::recalibrating || state == State::stereo_odometry;
+  if (const auto decision = calibrator.decide(frame.stamp, frame.number))
+    take(*decision, frame.stamp);
+  const bool solves = state == State::parallel_monocular || state == State::recalibrating ||
+                      state == State::stereo_odometry;
   if (solves && calibrator.can_solve()) {
     calibrator.start_solve();
     if (calibrator.seeking()) transition(Trigger::frames_enough, frame.stamp);
@@ -213,12 +231,14 @@ void Estimator::Parts::calibrate(const RigFrame& frame) noexcept {
 }
 
 /// What the drive has measured of the rig while it went on.
-void Estimator::Parts::take_learnt(const CalibrationDecision& decision, bool was_verified, Stamp stamp) noexcept {
+void Estimator::Parts::take_learnt(const CalibrationDecision& decision, bool was_verified,
+                                   Stamp stamp) noexcept {
   if (decision.cause == CalibrationCause::contradicted && !was_verified)
-    note(EstimatorEvent::Kind::calibration_contradicted, stamp, "the calibration in use is not that of the rig",
-         decision.depth_difference_percent);
+    note(EstimatorEvent::Kind::calibration_contradicted, stamp,
+         "the calibration in use is not that of the rig", decision.depth_difference_percent);
   if (decision.accepted) {
-    note(EstimatorEvent::Kind::calibration_accepted, stamp, "a better calibration is adopted", decision.calibration.frames);
+    note(EstimatorEvent::Kind::calibration_accepted, stamp, "a better calibration is adopted",
+         decision.calibration.frames);
     calibrator.refine(decision.calibration);
     odometry.link(decision.calibration);
     undecided = false;
@@ -226,10 +246,12 @@ void Estimator::Parts::take_learnt(const CalibrationDecision& decision, bool was
   tell_verified(was_verified, decision, stamp);
 }
 
-void Estimator::Parts::tell_verified(bool was_verified, const CalibrationDecision& decision, Stamp stamp) noexcept {
+void Estimator::Parts::tell_verified(bool was_verified, const CalibrationDecision& decision,
+                                     Stamp stamp) noexcept {
   if (!calibrator.verified() || was_verified) return;
   unconfirmed = false;
-  note(EstimatorEvent::Kind::calibration_confirmed, stamp, "the drive confirms the calibration in use", decision.depth_sigma_percent);
+  note(EstimatorEvent::Kind::calibration_confirmed, stamp,
+       "the drive confirms the calibration in use", decision.depth_sigma_percent);
 }
 
 void Estimator::Parts::take(const CalibrationDecision& decision, Stamp stamp) noexcept {
@@ -238,7 +260,8 @@ void Estimator::Parts::take(const CalibrationDecision& decision, Stamp stamp) no
   verified = calibrator.verified();
   if (decision.learnt) return take_learnt(decision, was_verified, stamp);
   if (decision.accepted) {
-    note(EstimatorEvent::Kind::calibration_accepted, stamp, "a calibration is accepted", decision.calibration.frames);
+    note(EstimatorEvent::Kind::calibration_accepted, stamp, "a calibration is accepted",
+         decision.calibration.frames);
     calibrator.use(decision.calibration, decision.lenses);
     odometry.link(decision.calibration);
     undecided = false;
@@ -246,7 +269,8 @@ void Estimator::Parts::take(const CalibrationDecision& decision, Stamp stamp) no
     tell_verified(was_verified, decision, stamp);
     return;
   }
-  note(EstimatorEvent::Kind::calibration_rejected, stamp, decision.reason, decision.calibration.frames);
+  note(EstimatorEvent::Kind::calibration_rejected, stamp, decision.reason,
+       decision.calibration.frames);
   switch (calibrator.last_gate()) {
     case calibration::Gate::no_better:
       calibrator.keep();
@@ -266,16 +290,20 @@ void Estimator::Parts::tell_missing(Stamp stamp) noexcept {
   if (missing == told_missing) return;
   told_missing = missing;
   if (missing == Reason::needs_motion)
-    note(EstimatorEvent::Kind::calibration_waits, stamp, "the rig has to move before it can be calibrated", 0);
+    note(EstimatorEvent::Kind::calibration_waits, stamp,
+         "the rig has to move before it can be calibrated", 0);
   else if (missing == Reason::needs_near_structure)
-    note(EstimatorEvent::Kind::calibration_waits, stamp, "nearer things have to be seen before the rig can be calibrated", 0);
+    note(EstimatorEvent::Kind::calibration_waits, stamp,
+         "nearer things have to be seen before the rig can be calibrated", 0);
 }
 
 /// States that follow from whether there is a pose.
 void Estimator::Parts::follow(const odometry::FrameOutcome& out, const RigFrame& frame) noexcept {
-  if (out.gap_s > 0) note(EstimatorEvent::Kind::time_gap, frame.stamp, "no frame for longer than motion can be predicted", out.gap_s);
-  const bool unmatched =
-      !out.posed && out.images_good && out.reason == Reason::no_stereo_matches && odometry.linked() == odometry::Link::linked;
+  if (out.gap_s > 0)
+    note(EstimatorEvent::Kind::time_gap, frame.stamp,
+         "no frame for longer than motion can be predicted", out.gap_s);
+  const bool unmatched = !out.posed && out.images_good && out.reason == Reason::no_stereo_matches &&
+                         odometry.linked() == odometry::Link::linked;
   unmatched_frames = unmatched ? unmatched_frames + 1 : 0;
   if (options.online && unmatched_frames == kUnmatchedAfter) {
     unmatched_frames = 0;
@@ -301,11 +329,13 @@ void Estimator::Parts::follow(const odometry::FrameOutcome& out, const RigFrame&
     calibrator.seek(CalibrationCause::from_scratch, 0, frame.number);
   }
   if (out.restarted) {
-    note(EstimatorEvent::Kind::scene_restarted, frame.stamp, "the scene was built anew; the way since the last pose is extrapolated",
-         out.gap_s);
+    note(EstimatorEvent::Kind::scene_restarted, frame.stamp,
+         "the scene was built anew; the way since the last pose is extrapolated", out.gap_s);
     calibrator.scene_lost();
   }
-  if (out.relocalised) note(EstimatorEvent::Kind::relocalised, frame.stamp, "found again among the window's points", 0);
+  if (out.relocalised)
+    note(EstimatorEvent::Kind::relocalised, frame.stamp, "found again among the window's points",
+         0);
 }
 
 /// What the state of the calibration makes of a pose's status.
@@ -327,22 +357,25 @@ void Estimator::Parts::grade(const odometry::FrameOutcome& out, PoseSample* samp
   }
 }
 
-/// What a pose of cameras that are not linked says of its calibration: the most particular that is known.
+/// What a pose of cameras that are not linked says of its calibration: the most particular that is
+/// known.
 Reason Estimator::Parts::why_uncalibrated() const noexcept {
   if (calibrator.last_gate() == calibration::Gate::cameras_swapped) return Reason::cameras_swapped;
   if (out_of_step > 0) return Reason::out_of_step;
   if (calibrator.missing() != Reason::none) return calibrator.missing();
-  return state == State::parallel_monocular || state == State::calibrating ? Reason::uncalibrated : Reason::recalibrating;
+  return state == State::parallel_monocular || state == State::calibrating ? Reason::uncalibrated
+                                                                           : Reason::recalibrating;
 }
 
 std::size_t Estimator::memory_needed(const EstimatorOptions& options, const RigCalibration& rig) {
   check(options, rig);
-  return odometry::Odometry::memory_needed(options.odometry, rig, options.masks) + OnlineCalibrator::memory_needed(options, rig) +
-         sizeof(Parts) + 2 * kCacheLine;
+  return odometry::Odometry::memory_needed(options.odometry, rig, options.masks) +
+         OnlineCalibrator::memory_needed(options, rig) + sizeof(Parts) + 2 * kCacheLine;
 }
 
-Estimator::Estimator(const EstimatorOptions& options, const RigCalibration& rig, const RigCalibration& nominal, Arena& arena,
-                     PairRunner& runner, BackgroundRunner& solver) {
+Estimator::Estimator(const EstimatorOptions& options, const RigCalibration& rig,
+                     const RigCalibration& nominal, Arena& arena, PairRunner& runner,
+                     BackgroundRunner& solver) {
   check(options, rig);
   static_assert(alignof(Parts) <= kCacheLine);
   const auto bytes = arena.make<std::byte>(sizeof(Parts), "estimator");
@@ -365,14 +398,17 @@ PoseSample Estimator::process(const RigFrame& frame) noexcept {
   sample.state = p.state;
   if (p.any && !(frame.stamp > p.last)) {
     sample.reason = Reason::time_gap;
-    p.note(EstimatorEvent::Kind::dropped, frame.stamp, "the frame is not newer than the one before", (p.last - frame.stamp).to_seconds());
+    p.note(EstimatorEvent::Kind::dropped, frame.stamp, "the frame is not newer than the one before",
+           (p.last - frame.stamp).to_seconds());
     return sample;
   }
   p.any = true;
   p.last = frame.stamp;
   p.last_number = frame.number;
-  if (p.state == State::initialising && p.calibrator.calibrated()) p.transition(Trigger::calibration_given, frame.stamp);
-  if (p.requested.exchange(false, std::memory_order_relaxed) && p.state == State::stereo_odometry && p.options.online)
+  if (p.state == State::initialising && p.calibrator.calibrated())
+    p.transition(Trigger::calibration_given, frame.stamp);
+  if (p.requested.exchange(false, std::memory_order_relaxed) && p.state == State::stereo_odometry &&
+      p.options.online)
     p.doubt(CalibrationCause::requested, frame.number, frame);
 
   const odometry::FrameOutcome out = p.odometry.process(frame);
@@ -393,9 +429,11 @@ PoseSample Estimator::process(const RigFrame& frame) noexcept {
   sample.reprojection_px = out.reprojection_px;
   sample.keyframe = out.keyframe;
   sample.stage_ms = out.stage_ms;
-  // Waiting for the solver makes a replay the same on every machine; it is no part of a frame's work.
+  // Waiting for the solver makes a replay the same on every machine; it is no part of a frame's
+  // work.
   sample.estimate_ms =
-      std::chrono::duration<float, std::milli>(std::chrono::steady_clock::now() - start).count() - p.calibrator.waited_ms();
+      std::chrono::duration<float, std::milli>(std::chrono::steady_clock::now() - start).count() -
+      p.calibrator.waited_ms();
   return sample;
 }
 
@@ -404,24 +442,34 @@ void Estimator::finish() noexcept {
   p.events.clear();
   p.decisions.clear();
   if (!p.options.online) return;
-  // One solve may be under way, what it lacked the frames since then may give, and what is known by then all frames can make better.
+  // One solve may be under way, what it lacked the frames since then may give, and what is known by
+  // then all frames can make better.
   constexpr int kLastSolves = 3;
   for (int attempt = 0; attempt < kLastSolves; ++attempt) {
     if (!p.calibrator.solving()) {
       if (!p.calibrator.start_last_solve()) return;
       if (p.calibrator.seeking()) p.transition(Trigger::frames_enough, p.last);
     }
-    if (const auto decision = p.calibrator.decide_now(p.last, p.last_number)) p.take(*decision, p.last);
+    if (const auto decision = p.calibrator.decide_now(p.last, p.last_number))
+      p.take(*decision, p.last);
   }
 }
 
 std::span<const EstimatorEvent> Estimator::events() const noexcept { return parts_->events.span(); }
-std::span<const CalibrationDecision> Estimator::calibrations() const noexcept { return parts_->decisions.span(); }
-void Estimator::request_recalibration() noexcept { parts_->requested.store(true, std::memory_order_relaxed); }
+std::span<const CalibrationDecision> Estimator::calibrations() const noexcept {
+  return parts_->decisions.span();
+}
+void Estimator::request_recalibration() noexcept {
+  parts_->requested.store(true, std::memory_order_relaxed);
+}
 State Estimator::state() const noexcept { return parts_->state; }
-const RigCalibration& Estimator::calibration() const noexcept { return parts_->calibrator.in_use(); }
+const RigCalibration& Estimator::calibration() const noexcept {
+  return parts_->calibrator.in_use();
+}
 bool Estimator::verified() const noexcept { return parts_->calibrator.verified(); }
-const calibration::TrackLog& Estimator::tracks() const noexcept { return parts_->calibrator.tracks(); }
+const calibration::TrackLog& Estimator::tracks() const noexcept {
+  return parts_->calibrator.tracks();
+}
 bool Estimator::calibrated() const noexcept { return parts_->calibrator.calibrated(); }
 
 }  // namespace vergence

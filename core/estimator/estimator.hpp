@@ -19,14 +19,16 @@ namespace vergence {
 
 /// What the calibration handed to the estimator is worth (METHOD §3).
 enum class CalibrationTrust : std::uint8_t {
-  given,        // in use from the first frame, poses `degraded: unverified_calibration` until the drive has confirmed it
+  given,  // in use from the first frame, poses `degraded: unverified_calibration` until the drive
+          // has confirmed it
   unconfirmed,  // of a state file: the same, `degraded: unconfirmed`
   none,         // from scratch: of the rig only the intrinsics and the baseline length are read
 };
 
 /// When a solved calibration is adopted.
 enum class Adoption : std::uint8_t {
-  after_fixed_frames,  // CalibrationOptions::adopt_after frames after its snapshot; the estimator waits for the solver there: deterministic
+  after_fixed_frames,  // CalibrationOptions::adopt_after frames after its snapshot; the estimator
+                       // waits for the solver there: deterministic
   when_ready,          // live: at the first frame after the solver is done
 };
 
@@ -36,8 +38,10 @@ struct EstimatorOptions {
   calibration::MonitorOptions monitor{};
   CalibrationTrust trust = CalibrationTrust::given;
   Adoption adoption = Adoption::after_fixed_frames;
-  std::array<ImageView, kMaxCameras> masks{};  // by camera, of its images' size: where it is 0 nothing is looked for; empty: everywhere
-  bool online = true;                          // watch the rig and calibrate it; false: the calibration given is used for ever
+  std::array<ImageView, kMaxCameras> masks{};  // by camera, of its images' size: where it is 0
+                                               // nothing is looked for; empty: everywhere
+  bool online =
+      true;  // watch the rig and calibrate it; false: the calibration given is used for ever
 };
 
 /// Something worth a line in events.jsonl. `why` points to a constant.
@@ -49,9 +53,12 @@ struct EstimatorEvent {
     time_gap,
     relocalised,
     dropped,
-    rig_changed,               // the monitor raised; value: frames since the onset, or the lag in frames of cameras out of step
-    calibration_confirmed,     // the drive has confirmed the calibration in use; value: its depth error, %
-    calibration_contradicted,  // the drive has shown that it is not the rig's; value: how far off its depths are, %
+    rig_changed,  // the monitor raised; value: frames since the onset, or the lag in frames of
+                  // cameras out of step
+    calibration_confirmed,     // the drive has confirmed the calibration in use; value: its depth
+                               // error, %
+    calibration_contradicted,  // the drive has shown that it is not the rig's; value: how far off
+                               // its depths are, %
     calibration_accepted,      // value: frames it was solved from
     calibration_rejected,      // why: the reason; value: frames
     calibration_waits,         // why: what is missing to calibrate
@@ -59,53 +66,64 @@ struct EstimatorEvent {
   State from = State::initialising;
   State to = State::initialising;
   const char* why = "";
-  double value = 0;  // seconds of a gap, count of what was dropped, frames; 0 where nothing is counted
+  double value =
+      0;  // seconds of a gap, count of what was dropped, frames; 0 where nothing is counted
 };
 
 /// Rig frames in, a pose for each out: the front door of core.
 ///
-/// Ownership  Keeps references to the arena and the runners; images are read during process() only, masks in the constructor only.
-/// Threads    One caller; process() uses `runner` for the other images' front end and `solver` for calibration, which runs beside the
-///            frames. Same poses whatever the runners, with Adoption::after_fixed_frames. request_recalibration(): any thread.
-/// Memory     All of it from the arena in the constructor. process() allocates nothing, nor does the solver's task.
-/// Errors     The constructor throws (std::invalid_argument with a sentence, std::length_error). process() never does.
+/// Ownership  Keeps references to the arena and the runners; images are read during process() only,
+///            masks in the constructor only.
+/// Threads    One caller; process() uses `runner` for the other images' front end and `solver` for
+///            calibration, which runs beside the frames. Same poses whatever the runners, with
+///            Adoption::after_fixed_frames. request_recalibration(): any thread.
+/// Memory     All of it from the arena in the constructor. process() allocates nothing, nor does
+///            the solver's task.
+/// Errors     The constructor throws (std::invalid_argument with a sentence, std::length_error).
+///            process() never does.
 class Estimator {
  public:
   /// What the arena must offer for these options and this rig, bytes.
-  [[nodiscard]] static std::size_t memory_needed(const EstimatorOptions& options, const RigCalibration& rig);
+  [[nodiscard]] static std::size_t memory_needed(const EstimatorOptions& options,
+                                                 const RigCalibration& rig);
 
-  /// `rig`: intrinsics, baseline length and, but for CalibrationTrust::none, T_camera_left. `nominal`: what the gates compare a new
-  /// calibration with (rig.nominal of the configuration).
-  Estimator(const EstimatorOptions& options, const RigCalibration& rig, const RigCalibration& nominal, Arena& arena, PairRunner& runner,
+  /// `rig`: intrinsics, baseline length and, but for CalibrationTrust::none, T_camera_left.
+  /// `nominal`: what the gates compare a new calibration with (rig.nominal of the configuration).
+  Estimator(const EstimatorOptions& options, const RigCalibration& rig,
+            const RigCalibration& nominal, Arena& arena, PairRunner& runner,
             BackgroundRunner& solver);
   ~Estimator();
   Estimator(const Estimator&) = delete;
   Estimator& operator=(const Estimator&) = delete;
 
-  /// One frame, stamps strictly increasing (a frame that is not newer is answered `lost`, reason time_gap, and changes nothing).
-  /// An empty image is a camera that gave none. T_world_left never jumps but across a marked gap.
+  /// One frame, stamps strictly increasing (a frame that is not newer is answered `lost`, reason
+  /// time_gap, and changes nothing). An empty image is a camera that gave none. T_world_left never
+  /// jumps but across a marked gap.
   [[nodiscard]] PoseSample process(const RigFrame& frame) noexcept;
 
-  /// No more frames will come. A calibration still sought is solved and decided from what there is; events() and calibrations() tell of it.
-  /// Waits for the solver.
+  /// No more frames will come. A calibration still sought is solved and decided from what there is;
+  /// events() and calibrations() tell of it. Waits for the solver.
   void finish() noexcept;
 
-  /// A new calibration is wanted, whatever the monitor says; acts at the next frame. Async-signal-safe.
+  /// A new calibration is wanted, whatever the monitor says; acts at the next frame.
+  /// Async-signal-safe.
   void request_recalibration() noexcept;
 
   /// Of the last process() call, oldest first; valid until the next.
   [[nodiscard]] std::span<const EstimatorEvent> events() const noexcept;
-  /// Calibrations decided about in the last process() call: each a line of calibrations.csv; an accepted one is in use, and wants the
-  /// state file written.
+  /// Calibrations decided about in the last process() call: each a line of calibrations.csv; an
+  /// accepted one is in use, and wants the state file written.
   [[nodiscard]] std::span<const CalibrationDecision> calibrations() const noexcept;
 
   [[nodiscard]] State state() const noexcept;
   /// The calibration in use; before there is one, the rig given, without T_camera_left.
   [[nodiscard]] const RigCalibration& calibration() const noexcept;
   [[nodiscard]] bool calibrated() const noexcept;
-  /// The drive itself has confirmed the calibration in use to the tolerated depth error (METHOD §6.4).
+  /// The drive itself has confirmed the calibration in use to the tolerated depth error (METHOD
+  /// §6.4).
   [[nodiscard]] bool verified() const noexcept;
-  /// The newest moving frames with their tracks; empty without `online`. Valid until the next process().
+  /// The newest moving frames with their tracks; empty without `online`. Valid until the next
+  /// process().
   [[nodiscard]] const calibration::TrackLog& tracks() const noexcept;
 
  private:

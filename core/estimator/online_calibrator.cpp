@@ -15,24 +15,34 @@ using calibration::Gate;
 using calibration::MonitorVerdict;
 using odometry::MapPoint;
 
-constexpr double kMovedPixels = 1.0;   // px, mean of the tracks since the last logged frame: less repeats the same errors
+constexpr double kMovedPixels =
+    1.0;  // px, mean of the tracks since the last logged frame: less repeats the same errors
 constexpr double kImageMargin = 12.0;  // px: nearer to the edge a track need not be found
-// Sigmas of the reference while a calibration is a claim: of rotation (rad), and of t in baselines. What is off from the first frame is a
-// calibration that does not fit, no knock; only a change is one.
+// Sigmas of the reference while a calibration is a claim: of rotation (rad), and of t in baselines.
+// What is off from the first frame is a calibration that does not fit, no knock; only a change is
+// one.
 constexpr std::array kClaimed = {0.05, 0.05, 0.05, 0.1, 0.1, 0.1};
-// And of one that the drive has confirmed, until the monitor has measured its own: what the lens model leaves in one stretch.
+// And of one that the drive has confirmed, until the monitor has measured its own: what the lens
+// model leaves in one stretch.
 constexpr std::array kConfirmed = {2e-4, 5e-4, 2e-4, 0.003, 0.003, 0.006};
-constexpr double kLearnedCovariance = 1.5;  // times the monitor's own: the scene it was measured in was one
-constexpr int kWatchedAgain = 10;           // moving frames that agree, after an outage in which the rig may have been knocked
-constexpr int kGraceFrames = 5;             // after a new reference: the monitor does not yet know how far matches spread
-constexpr int kLearnFrames = 45;            // moving, in agreement
-constexpr int kLeastHeldOut = 12;           // frames after a snapshot, for the gates to have frames that were not in it
-constexpr int kStillFrames = 15;            // sought for so long without a new frame in the log: the rig stands
-constexpr std::size_t kNewFrames = 5;       // at least, between two solves
-constexpr int kMostDoublings = 4;           // of the frames between two solves
-constexpr double kGrow = 1.3;               // at least, of the frames between two solves
+constexpr double kLearnedCovariance =
+    1.5;  // times the monitor's own: the scene it was measured in was one
+constexpr int kWatchedAgain =
+    10;  // moving frames that agree, after an outage in which the rig may have been knocked
+constexpr int kGraceFrames =
+    5;  // after a new reference: the monitor does not yet know how far matches spread
+constexpr int kLearnFrames = 45;  // moving, in agreement
+constexpr int kLeastHeldOut =
+    12;  // frames after a snapshot, for the gates to have frames that were not in it
+constexpr int kStillFrames =
+    15;  // sought for so long without a new frame in the log: the rig stands
+constexpr std::size_t kNewFrames = 5;  // at least, between two solves
+constexpr int kMostDoublings = 4;      // of the frames between two solves
+constexpr double kGrow = 1.3;          // at least, of the frames between two solves
 
-std::size_t most_tracks(const EstimatorOptions& o) noexcept { return static_cast<std::size_t>(o.odometry.features); }
+std::size_t most_tracks(const EstimatorOptions& o) noexcept {
+  return static_cast<std::size_t>(o.odometry.features);
+}
 
 Mat6 reference_covariance(const std::array<double, 6>& sigma, double baseline) noexcept {
   Vec6 spread = Eigen::Map<const Vec6>(sigma.data());
@@ -79,15 +89,20 @@ void OnlineCalibrator::SolveTask::operator()() const noexcept {
   c.solved_.lenses = c.rig_solver_.solve(request);
 }
 
-std::size_t OnlineCalibrator::memory_needed(const EstimatorOptions& o, const RigCalibration& rig) noexcept {
+std::size_t OnlineCalibrator::memory_needed(const EstimatorOptions& o,
+                                            const RigCalibration& rig) noexcept {
   const auto further = static_cast<std::size_t>(rig.cameras - 1);
-  return calibration::TrackLog::memory_needed(static_cast<std::size_t>(o.calibration.max_frames), most_tracks(o)) +
-         calibration::RigSolver::memory_needed(o.calibration, o.monitor, rig.cameras, most_tracks(o)) +
-         further * (calibration::Monitor::memory_needed(o.monitor) + calibration::MonitorFeed::memory_needed(most_tracks(o))) +
+  return calibration::TrackLog::memory_needed(static_cast<std::size_t>(o.calibration.max_frames),
+                                              most_tracks(o)) +
+         calibration::RigSolver::memory_needed(o.calibration, o.monitor, rig.cameras,
+                                               most_tracks(o)) +
+         further * (calibration::Monitor::memory_needed(o.monitor) +
+                    calibration::MonitorFeed::memory_needed(most_tracks(o))) +
          most_tracks(o) * sizeof(calibration::AcrossSighting) + 2 * kCacheLine;
 }
 
-OnlineCalibrator::OnlineCalibrator(const EstimatorOptions& options, const RigCalibration& rig, const RigCalibration& nominal, Arena& arena,
+OnlineCalibrator::OnlineCalibrator(const EstimatorOptions& options, const RigCalibration& rig,
+                                   const RigCalibration& nominal, Arena& arena,
                                    BackgroundRunner& solver)
     : options_(options),
       rig_(rig),
@@ -102,7 +117,8 @@ OnlineCalibrator::OnlineCalibrator(const EstimatorOptions& options, const RigCal
     monitors_[static_cast<std::size_t>(k)].emplace(options.monitor, arena);
     feeds_[static_cast<std::size_t>(k)].emplace(most_tracks(options), arena);
   }
-  across_ = BoundedVector<calibration::AcrossSighting>(arena.make<calibration::AcrossSighting>(most_tracks(options), "monitored matches"));
+  across_ = BoundedVector<calibration::AcrossSighting>(
+      arena.make<calibration::AcrossSighting>(most_tracks(options), "monitored matches"));
   if (!calibrated_) return;
   watch_calibration();
   begin_segment();
@@ -139,12 +155,16 @@ void OnlineCalibrator::watch_calibration() noexcept {
   for (int k = 1; k < rig_.cameras; ++k) {
     const auto c = static_cast<std::size_t>(k);
     learning_[c] = true;
-    monitors_[c]->expect_scatter(verified_ ? options_.monitor.found_bias_px : options_.monitor.claimed_bias_px);
-    watch_against(k, rig_.T_camera_left[c], reference_covariance(verified_ ? kConfirmed : kClaimed, rig_.T_camera_left[c].t.norm()));
+    monitors_[c]->expect_scatter(verified_ ? options_.monitor.found_bias_px
+                                           : options_.monitor.claimed_bias_px);
+    watch_against(
+        k, rig_.T_camera_left[c],
+        reference_covariance(verified_ ? kConfirmed : kClaimed, rig_.T_camera_left[c].t.norm()));
   }
 }
 
-void OnlineCalibrator::watch_against(int k, const Transform& T_camera_left, const Mat6& covariance) noexcept {
+void OnlineCalibrator::watch_against(int k, const Transform& T_camera_left,
+                                     const Mat6& covariance) noexcept {
   const auto pinhole = [&](std::size_t c) {
     const Intrinsics& lens = rig_.intrinsics[c];
     return Pinhole{lens.fx, lens.fy, lens.cx, lens.cy};
@@ -157,10 +177,13 @@ void OnlineCalibrator::watch_against(int k, const Transform& T_camera_left, cons
 
 void OnlineCalibrator::learn_reference(int k, const MonitorVerdict& verdict) noexcept {
   const auto c = static_cast<std::size_t>(k);
-  if (!learning_[c] || verdict.kind != MonitorVerdict::Kind::quiet || monitors_[c]->frames_agreed() < kLearnFrames) return;
+  if (!learning_[c] || verdict.kind != MonitorVerdict::Kind::quiet ||
+      monitors_[c]->frames_agreed() < kLearnFrames)
+    return;
   learning_[c] = false;
   const double length = rig_.T_camera_left[c].t.norm();
-  Transform measured = perturbed(rig_.T_camera_left[c], verdict.offset.head<3>(), verdict.offset.tail<3>());
+  Transform measured =
+      perturbed(rig_.T_camera_left[c], verdict.offset.head<3>(), verdict.offset.tail<3>());
   measured.t *= length / measured.t.norm();
   watch_against(k, measured, kLearnedCovariance * verdict.covariance);
 }
@@ -177,7 +200,8 @@ void OnlineCalibrator::scene_lost() noexcept {
 
 int OnlineCalibrator::frames_agreed() const noexcept {
   int least = std::numeric_limits<int>::max();
-  for (int k = 1; k < rig_.cameras; ++k) least = std::min(least, monitors_[static_cast<std::size_t>(k)]->frames_agreed());
+  for (int k = 1; k < rig_.cameras; ++k)
+    least = std::min(least, monitors_[static_cast<std::size_t>(k)]->frames_agreed());
   return least;
 }
 
@@ -193,7 +217,8 @@ double OnlineCalibrator::pixels_moved(const odometry::Map& map) const noexcept {
   return n < kEnough ? std::numeric_limits<double>::infinity() : sum / n;
 }
 
-void OnlineCalibrator::log(odometry::Odometry& odometry, const odometry::FrameOutcome& outcome, const RigFrame& frame) noexcept {
+void OnlineCalibrator::log(odometry::Odometry& odometry, const odometry::FrameOutcome& outcome,
+                           const RigFrame& frame) noexcept {
   if (outcome.scale != 1.0) log_.scale_about(outcome.T_left_world.centre(), outcome.scale);
   ++frames_still_;
   if (!outcome.images_good || pixels_moved(odometry.map()) < kMovedPixels) return;
@@ -207,8 +232,8 @@ void OnlineCalibrator::log(odometry::Odometry& odometry, const odometry::FrameOu
   f.across = outcome.stereo_inliers;
   log_.begin(f);
   for (MapPoint& p : odometry.map().points()) {
-    // A track is taken by what the left camera's pose says of it. Linked, the others' sightings are taken as they were found: the
-    // calibration in use must not choose its own witnesses.
+    // A track is taken by what the left camera's pose says of it. Linked, the others' sightings are
+    // taken as they were found: the calibration in use must not choose its own witnesses.
     if (!p.followed() || !p.now.by(0)) continue;
     calibration::LoggedSighting s;
     s.track = p.id;
@@ -223,20 +248,23 @@ void OnlineCalibrator::log(odometry::Odometry& odometry, const odometry::FrameOu
   frames_still_ = 0;
 }
 
-int OnlineCalibrator::expected_across(const odometry::Odometry& odometry, int k, const Transform& T_left_world) const noexcept {
+int OnlineCalibrator::expected_across(const odometry::Odometry& odometry, int k,
+                                      const Transform& T_left_world) const noexcept {
   const Transform T = rig_.T_camera_left[static_cast<std::size_t>(k)] * T_left_world;
   const Camera& camera = odometry.front_end().lens(k).raw();
   int n = 0;
   for (const MapPoint& p : odometry.map().points()) {
     Vec2 at;
-    if (p.stage == odometry::PointStage::active && p.now.by(0) && camera.project(T * p.p_world, &at, nullptr) == ProjectStatus::ok &&
+    if (p.stage == odometry::PointStage::active && p.now.by(0) &&
+        camera.project(T * p.p_world, &at, nullptr) == ProjectStatus::ok &&
         camera.inside(at, kImageMargin))
       ++n;
   }
   return n;
 }
 
-MonitorVerdict OnlineCalibrator::watch(const odometry::Odometry& odometry, const odometry::FrameOutcome& outcome,
+MonitorVerdict OnlineCalibrator::watch(const odometry::Odometry& odometry,
+                                       const odometry::FrameOutcome& outcome,
                                        const RigFrame& frame) noexcept {
   MonitorVerdict worst;
   const Transform step = any_ ? outcome.T_left_world * T_left_world_.inverse() : Transform{};
@@ -247,7 +275,8 @@ MonitorVerdict OnlineCalibrator::watch(const odometry::Odometry& odometry, const
     across_.clear();
     int found = 0;
     for (const MapPoint& p : odometry.map().points()) {
-      // A point made in this frame was sought in the band of the calibration in use: it is no witness.
+      // A point made in this frame was sought in the band of the calibration in use: it is no
+      // witness.
       if (!p.followed() || p.found < 2 || !p.now.by(0)) continue;
       if (((p.in_images >> static_cast<unsigned>(k)) & 1U) == 0) continue;
       if (p.stage == odometry::PointStage::active) ++found;
@@ -255,7 +284,8 @@ MonitorVerdict OnlineCalibrator::watch(const odometry::Odometry& odometry, const
                           static_cast<double>(std::max(p.now.sigma[0], p.now.sigma[c])), p.id});
     }
     calibration::MonitorFrame f = feeds_[c]->next(frame.stamp, frame.number, across_.span(), step);
-    f.expected_across = outcome.images_good ? expected_across(odometry, k, outcome.T_left_world) : 0;
+    f.expected_across =
+        outcome.images_good ? expected_across(odometry, k, outcome.T_left_world) : 0;
     f.found_across = found;
     MonitorVerdict v = monitors_[c]->look(f);
     if (grace_[c] > 0) {
@@ -263,13 +293,16 @@ MonitorVerdict OnlineCalibrator::watch(const odometry::Odometry& odometry, const
       v = MonitorVerdict{};
     }
     learn_reference(k, v);
-    if (rank(v.kind) > rank(worst.kind) || (rank(v.kind) == rank(worst.kind) && (v.undecided || v.statistic > worst.statistic))) worst = v;
+    if (rank(v.kind) > rank(worst.kind) ||
+        (rank(v.kind) == rank(worst.kind) && (v.undecided || v.statistic > worst.statistic)))
+      worst = v;
   }
   watched_ = watched_ || frames_agreed() >= kWatchedAgain;
   return worst;
 }
 
-void OnlineCalibrator::seek(CalibrationCause cause, std::uint64_t onset, std::uint64_t now) noexcept {
+void OnlineCalibrator::seek(CalibrationCause cause, std::uint64_t onset,
+                            std::uint64_t now) noexcept {
   cause_ = cause;
   onset_ = onset;
   sought_since_ = now;
@@ -316,7 +349,8 @@ void OnlineCalibrator::start_solve() noexcept {
   runner_.start(TaskRef(task_));
 }
 
-std::optional<CalibrationDecision> OnlineCalibrator::decide(Stamp stamp, std::uint64_t number) noexcept {
+std::optional<CalibrationDecision> OnlineCalibrator::decide(Stamp stamp,
+                                                            std::uint64_t number) noexcept {
   waited_ms_ = 0;
   if (!solving_) return std::nullopt;
   ++frames_since_snapshot_;
@@ -324,16 +358,20 @@ std::optional<CalibrationDecision> OnlineCalibrator::decide(Stamp stamp, std::ui
   if (options_.adoption == Adoption::when_ready) {
     if (runner_.busy() || frames_since_snapshot_ < least) return std::nullopt;
   } else {
-    // What is learnt beside a calibration in use waits for the frames that judge it, no longer: until then no pose is `ok`.
-    if (frames_since_snapshot_ < (sought_ ? options_.calibration.adopt_after : least)) return std::nullopt;
+    // What is learnt beside a calibration in use waits for the frames that judge it, no longer:
+    // until then no pose is `ok`.
+    if (frames_since_snapshot_ < (sought_ ? options_.calibration.adopt_after : least))
+      return std::nullopt;
     const auto start = std::chrono::steady_clock::now();
     runner_.wait();
-    waited_ms_ = std::chrono::duration<float, std::milli>(std::chrono::steady_clock::now() - start).count();
+    waited_ms_ =
+        std::chrono::duration<float, std::milli>(std::chrono::steady_clock::now() - start).count();
   }
   return judge(stamp, number, false);
 }
 
-std::optional<CalibrationDecision> OnlineCalibrator::decide_now(Stamp stamp, std::uint64_t number) noexcept {
+std::optional<CalibrationDecision> OnlineCalibrator::decide_now(Stamp stamp,
+                                                                std::uint64_t number) noexcept {
   if (!solving_) return std::nullopt;
   runner_.wait();
   return judge(stamp, number, true);
@@ -341,18 +379,21 @@ std::optional<CalibrationDecision> OnlineCalibrator::decide_now(Stamp stamp, std
 
 bool OnlineCalibrator::start_last_solve() noexcept {
   const bool more = seeking_ || log_.size() >= solved_frames_ + kNewFrames;
-  if (solving_ || !more || log_.size() < static_cast<std::size_t>(options_.calibration.min_frames)) return false;
+  if (solving_ || !more || log_.size() < static_cast<std::size_t>(options_.calibration.min_frames))
+    return false;
   start_solve();
   return true;
 }
 
-std::optional<CalibrationDecision> OnlineCalibrator::judge(Stamp stamp, std::uint64_t number, bool last) noexcept {
+std::optional<CalibrationDecision> OnlineCalibrator::judge(Stamp stamp, std::uint64_t number,
+                                                           bool last) noexcept {
   solving_ = false;
   if (stale_ || sought_ != seeking_) return std::nullopt;
   return sought_ ? judge_sought(stamp, number, last) : judge_learnt(stamp, number, last);
 }
 
-calibration::GateQuestion OnlineCalibrator::question(const calibration::RigSolution& found, bool last) const noexcept {
+calibration::GateQuestion OnlineCalibrator::question(const calibration::RigSolution& found,
+                                                     bool last) const noexcept {
   calibration::GateQuestion q;
   q.solution = &found;
   q.nominal = &nominal_;
@@ -361,12 +402,13 @@ calibration::GateQuestion OnlineCalibrator::question(const calibration::RigSolut
   q.lenses = &found == &solved_.lenses;
   q.pixel_sigma = options_.odometry.pixel_sigma;
   q.may_have_changed = !change_believed_;
-  q.window_full = last || static_cast<std::size_t>(found.frames) >= static_cast<std::size_t>(options_.calibration.max_frames);
+  q.window_full = last || static_cast<std::size_t>(found.frames) >=
+                              static_cast<std::size_t>(options_.calibration.max_frames);
   return q;
 }
 
-CalibrationDecision OnlineCalibrator::begin_decision(Stamp stamp, std::uint64_t number,
-                                                     const calibration::RigSolution& found) const noexcept {
+CalibrationDecision OnlineCalibrator::begin_decision(
+    Stamp stamp, std::uint64_t number, const calibration::RigSolution& found) const noexcept {
   CalibrationDecision d;
   d.stamp = stamp;
   d.cause = cause_;
@@ -380,10 +422,13 @@ CalibrationDecision OnlineCalibrator::begin_decision(Stamp stamp, std::uint64_t 
   return d;
 }
 
-CalibrationDecision OnlineCalibrator::judge_sought(Stamp stamp, std::uint64_t number, bool last) noexcept {
+CalibrationDecision OnlineCalibrator::judge_sought(Stamp stamp, std::uint64_t number,
+                                                   bool last) noexcept {
   const auto most = static_cast<std::size_t>(options_.calibration.max_frames);
-  // Lenses are taken from the drive where it shows that the ones in use are off, and holds them well enough; else transforms alone.
-  const calibration::RigSolution& found = lenses_are_off(last) ? solved_.lenses : solved_.transforms;
+  // Lenses are taken from the drive where it shows that the ones in use are off, and holds them
+  // well enough; else transforms alone.
+  const calibration::RigSolution& found =
+      lenses_are_off(last) ? solved_.lenses : solved_.transforms;
   gate_ = calibration::ask_gates(question(found, last), options_.calibration);
   CalibrationDecision d = begin_decision(stamp, number, found);
   d.accepted = gate_ == Gate::open;
@@ -392,38 +437,49 @@ CalibrationDecision OnlineCalibrator::judge_sought(Stamp stamp, std::uint64_t nu
   if (gate_ == Gate::open) {
     verified_ = d.verified;
     ever_verified_ = ever_verified_ || verified_;
-  } else if (gate_ == Gate::sigmas_too_large || gate_ == Gate::needs_motion || gate_ == Gate::needs_near_structure) {
+  } else if (gate_ == Gate::sigmas_too_large || gate_ == Gate::needs_motion ||
+             gate_ == Gate::needs_near_structure) {
     // More of the same helps: sigmas fall with the root of the number of frames.
-    const double excess = gate_ == Gate::sigmas_too_large ? calibration::sigma_excess(found.rig, options_.calibration) : 1.0;
+    const double excess = gate_ == Gate::sigmas_too_large
+                              ? calibration::sigma_excess(found.rig, options_.calibration)
+                              : 1.0;
     const double grow = std::clamp(excess * excess, kGrow, 4.0);
-    wanted_ = std::max(std::min(most, static_cast<std::size_t>(std::ceil(grow * found.frames))), logged_ + kNewFrames);
+    wanted_ = std::max(std::min(most, static_cast<std::size_t>(std::ceil(grow * found.frames))),
+                       logged_ + kNewFrames);
   } else if (gate_ == Gate::rig_changed) {
     log_.drop_before(found.changed_at);
     onset_ = found.changed_at;
     change_believed_ = true;
     begin_segment();
   } else {
-    // The same frames would say the same again; and what is rejected again and again is asked about less and less often.
+    // The same frames would say the same again; and what is rejected again and again is asked about
+    // less and less often.
     log_.drop_before(found.newest + 1);
-    wanted_ = logged_ - log_.size() + (static_cast<std::size_t>(options_.calibration.min_frames) << std::min(rejections_, kMostDoublings));
+    wanted_ = logged_ - log_.size() +
+              (static_cast<std::size_t>(options_.calibration.min_frames)
+               << std::min(rejections_, kMostDoublings));
     ++rejections_;
   }
   return d;
 }
 
-/// The drive's own measurement of the rig, with the lenses free where they are not believed, against what will be in use after this
-/// decision.
-void OnlineCalibrator::assess_lenses(const RigCalibration& in_use_then, std::uint64_t newest, CalibrationDecision* d) const noexcept {
-  const calibration::RigSolution& measured = options_.calibration.estimate_lenses != 0 ? solved_.lenses : solved_.transforms;
+/// The drive's own measurement of the rig, with the lenses free where they are not believed,
+/// against what will be in use after this decision.
+void OnlineCalibrator::assess_lenses(const RigCalibration& in_use_then, std::uint64_t newest,
+                                     CalibrationDecision* d) const noexcept {
+  const calibration::RigSolution& measured =
+      options_.calibration.estimate_lenses != 0 ? solved_.lenses : solved_.transforms;
   if (measured.status != calibration::RigSolveStatus::ok) return;
-  const calibration::Assessment then =
-      calibration::assess(measured.rig, in_use_then, log_, newest, options_.calibration, options_.odometry.pixel_sigma);
+  const calibration::Assessment then = calibration::assess(
+      measured.rig, in_use_then, log_, newest, options_.calibration, options_.odometry.pixel_sigma);
   d->judged_depth_m = then.depth_m;
   d->depth_sigma_percent = then.sigma_percent;
   d->verified = then.confirmed;
   if (!calibrated_) return;
   d->depth_difference_percent =
-      calibration::assess(measured.rig, rig_, log_, newest, options_.calibration, options_.odometry.pixel_sigma).difference_percent;
+      calibration::assess(measured.rig, rig_, log_, newest, options_.calibration,
+                          options_.odometry.pixel_sigma)
+          .difference_percent;
 }
 
 bool OnlineCalibrator::lenses_are_off(bool last) const noexcept {
@@ -432,7 +488,8 @@ bool OnlineCalibrator::lenses_are_off(bool last) const noexcept {
   calibration::GateQuestion q = question(free, last);
   q.must_be_better = false;
   if (calibration::ask_gates(q, options_.calibration) != Gate::open) return false;
-  return held.status != calibration::RigSolveStatus::ok || calibration::fits_better(log_, free.newest, free.rig, held.rig);
+  return held.status != calibration::RigSolveStatus::ok ||
+         calibration::fits_better(log_, free.newest, free.rig, held.rig);
 }
 
 /// The claim in use is confirmed, or is no more: the monitor expects as much of it.
@@ -443,7 +500,8 @@ void OnlineCalibrator::set_verified(bool verified) noexcept {
   watch_calibration();
 }
 
-CalibrationDecision OnlineCalibrator::judge_learnt(Stamp stamp, std::uint64_t number, bool last) noexcept {
+CalibrationDecision OnlineCalibrator::judge_learnt(Stamp stamp, std::uint64_t number,
+                                                   bool last) noexcept {
   const auto most = static_cast<std::size_t>(options_.calibration.max_frames);
   const bool lenses = options_.calibration.estimate_lenses != 0;
   const calibration::RigSolution& found = lenses ? solved_.lenses : solved_.transforms;
@@ -454,16 +512,21 @@ CalibrationDecision OnlineCalibrator::judge_learnt(Stamp stamp, std::uint64_t nu
   d.cause = CalibrationCause::refinement;
   d.learnt = true;
   if (found.status == calibration::RigSolveStatus::ok) {
-    const calibration::Assessment a =
-        calibration::assess(found.rig, rig_, log_, found.newest, options_.calibration, options_.odometry.pixel_sigma);
+    const calibration::Assessment a = calibration::assess(
+        found.rig, rig_, log_, found.newest, options_.calibration, options_.odometry.pixel_sigma);
     d.judged_depth_m = a.depth_m;
     d.depth_sigma_percent = a.sigma_percent;
     d.depth_difference_percent = a.difference_percent;
     if (a.contradicted) d.cause = CalibrationCause::contradicted;
-    // Without a frame that was not used, more frames of the same kind are better and another kind is not.
-    const bool better = last && log_.frame(log_.size() - 1).number == found.newest ? found_with_lenses_ == d.lenses : a.better;
+    // Without a frame that was not used, more frames of the same kind are better and another kind
+    // is not.
+    const bool better = last && log_.frame(log_.size() - 1).number == found.newest
+                            ? found_with_lenses_ == d.lenses
+                            : a.better;
     if (gate_ == Gate::open && !better && !(a.contradicted && !a.worse)) gate_ = Gate::no_better;
-    d.verified = gate_ == Gate::open ? a.sigma_percent <= options_.calibration.tolerated_depth_percent : a.confirmed;
+    d.verified = gate_ == Gate::open
+                     ? a.sigma_percent <= options_.calibration.tolerated_depth_percent
+                     : a.confirmed;
     if (d.verified || a.contradicted) set_verified(d.verified);
   }
   d.accepted = gate_ == Gate::open;
@@ -479,7 +542,9 @@ CalibrationDecision OnlineCalibrator::judge_learnt(Stamp stamp, std::uint64_t nu
     begin_segment();
     wanted_ = most;
   } else {
-    wanted_ = std::min(most, std::max(solved_frames_ + static_cast<std::size_t>(options_.calibration.min_frames), logged_));
+    wanted_ = std::min(
+        most, std::max(solved_frames_ + static_cast<std::size_t>(options_.calibration.min_frames),
+                       logged_));
   }
   return d;
 }

@@ -12,31 +12,36 @@
 
 namespace vergence {
 
-/// The rig's calibration while it drives (METHOD §3, §6): logs the tracks, watches that they fit, has calibrations solved beside the frames
-/// and decides about them. The estimator tells it what was posed and follows its advice; states are the estimator's.
+/// The rig's calibration while it drives (METHOD §3, §6): logs the tracks, watches that they fit,
+/// has calibrations solved beside the frames and decides about them. The estimator tells it what
+/// was posed and follows its advice; states are the estimator's.
 ///
-/// Two things are solved for. *Seeking*: there is no calibration, or the one in use is doubted; frames since the onset, until one passes
-/// the gates. *Learning*: all the time else; what the drive itself measures, lenses free, confirms the calibration in use, or contradicts
-/// it, or refines it. Learning grows a segment of frames, solving again and again; a full segment is closed, and what it told is the next
-/// one's prior.
+/// Two things are solved for. *Seeking*: there is no calibration, or the one in use is doubted;
+/// frames since the onset, until one passes the gates. *Learning*: all the time else; what the
+/// drive itself measures, lenses free, confirms the calibration in use, or contradicts it, or
+/// refines it. Learning grows a segment of frames, solving again and again; a full segment is
+/// closed, and what it told is the next one's prior.
 ///
 /// Threads one, but for the solver's task. Memory from the arena at construction.
 class OnlineCalibrator {
  public:
-  OnlineCalibrator(const EstimatorOptions& options, const RigCalibration& rig, const RigCalibration& nominal, Arena& arena,
-                   BackgroundRunner& solver);
-  [[nodiscard]] static std::size_t memory_needed(const EstimatorOptions& options, const RigCalibration& rig) noexcept;
+  OnlineCalibrator(const EstimatorOptions& options, const RigCalibration& rig,
+                   const RigCalibration& nominal, Arena& arena, BackgroundRunner& solver);
+  [[nodiscard]] static std::size_t memory_needed(const EstimatorOptions& options,
+                                                 const RigCalibration& rig) noexcept;
 
   /// What a posed frame saw goes into the log, if the rig has moved since the last one that did.
-  void log(odometry::Odometry& odometry, const odometry::FrameOutcome& outcome, const RigFrame& frame) noexcept;
+  void log(odometry::Odometry& odometry, const odometry::FrameOutcome& outcome,
+           const RigFrame& frame) noexcept;
   [[nodiscard]] const calibration::TrackLog& tracks() const noexcept { return log_; }
 
   /// The worst verdict of the further cameras' monitors on a posed frame; linked odometry only.
-  [[nodiscard]] calibration::MonitorVerdict watch(const odometry::Odometry& odometry, const odometry::FrameOutcome& outcome,
+  [[nodiscard]] calibration::MonitorVerdict watch(const odometry::Odometry& odometry,
+                                                  const odometry::FrameOutcome& outcome,
                                                   const RigFrame& frame) noexcept;
 
-  /// From now on a calibration is sought. Frames before `onset` belong to another rig and are forgotten, and so is a solve of them that is
-  /// still under way.
+  /// From now on a calibration is sought. Frames before `onset` belong to another rig and are
+  /// forgotten, and so is a solve of them that is still under way.
   void seek(CalibrationCause cause, std::uint64_t onset, std::uint64_t now) noexcept;
   [[nodiscard]] bool seeking() const noexcept { return seeking_; }
   /// There are frames enough to solve from and no solve is under way.
@@ -45,16 +50,20 @@ class OnlineCalibrator {
   void start_solve() noexcept;
   [[nodiscard]] bool solving() const noexcept { return solving_; }
   /// After every frame. A value: the solve is over and decided.
-  [[nodiscard]] std::optional<CalibrationDecision> decide(Stamp stamp, std::uint64_t number) noexcept;
-  /// How long the last decide() waited for the solver: with Adoption::after_fixed_frames only, a live drive never does.
+  [[nodiscard]] std::optional<CalibrationDecision> decide(Stamp stamp,
+                                                          std::uint64_t number) noexcept;
+  /// How long the last decide() waited for the solver: with Adoption::after_fixed_frames only, a
+  /// live drive never does.
   [[nodiscard]] float waited_ms() const noexcept { return waited_ms_; }
   /// No more frames come: waits for the solve under way and decides.
-  [[nodiscard]] std::optional<CalibrationDecision> decide_now(Stamp stamp, std::uint64_t number) noexcept;
+  [[nodiscard]] std::optional<CalibrationDecision> decide_now(Stamp stamp,
+                                                              std::uint64_t number) noexcept;
   /// And this begins one with whatever is logged; false: that is too little.
   [[nodiscard]] bool start_last_solve() noexcept;
   [[nodiscard]] calibration::Gate last_gate() const noexcept { return gate_; }
 
-  /// What the calibration sought waits for: needs_motion, needs_near_structure; `none` if nothing is known to be missing.
+  /// What the calibration sought waits for: needs_motion, needs_near_structure; `none` if nothing
+  /// is known to be missing.
   [[nodiscard]] Reason missing() const noexcept;
 
   /// Waits for the solver's task, which writes into this.
@@ -92,20 +101,27 @@ class OnlineCalibrator {
   void watch_against(int k, const Transform& T_camera_left, const Mat6& covariance) noexcept;
   void watch_calibration() noexcept;
   void set_verified(bool verified) noexcept;
-  /// What cannot be told from a claim is told by the monitor's own measurement: it takes what it sees in the first frames that agree with
-  /// each other as what must not change.
+  /// What cannot be told from a claim is told by the monitor's own measurement: it takes what it
+  /// sees in the first frames that agree with each other as what must not change.
   void learn_reference(int k, const calibration::MonitorVerdict& verdict) noexcept;
-  [[nodiscard]] CalibrationDecision begin_decision(Stamp stamp, std::uint64_t number, const calibration::RigSolution& found) const noexcept;
-  [[nodiscard]] calibration::GateQuestion question(const calibration::RigSolution& found, bool last) const noexcept;
+  [[nodiscard]] CalibrationDecision begin_decision(
+      Stamp stamp, std::uint64_t number, const calibration::RigSolution& found) const noexcept;
+  [[nodiscard]] calibration::GateQuestion question(const calibration::RigSolution& found,
+                                                   bool last) const noexcept;
   /// `last`: no more frames come that could make it better.
-  [[nodiscard]] CalibrationDecision judge_sought(Stamp stamp, std::uint64_t number, bool last) noexcept;
-  [[nodiscard]] CalibrationDecision judge_learnt(Stamp stamp, std::uint64_t number, bool last) noexcept;
-  void assess_lenses(const RigCalibration& in_use_then, std::uint64_t newest, CalibrationDecision* d) const noexcept;
+  [[nodiscard]] CalibrationDecision judge_sought(Stamp stamp, std::uint64_t number,
+                                                 bool last) noexcept;
+  [[nodiscard]] CalibrationDecision judge_learnt(Stamp stamp, std::uint64_t number,
+                                                 bool last) noexcept;
+  void assess_lenses(const RigCalibration& in_use_then, std::uint64_t newest,
+                     CalibrationDecision* d) const noexcept;
   [[nodiscard]] bool lenses_are_off(bool last) const noexcept;
-  [[nodiscard]] std::optional<CalibrationDecision> judge(Stamp stamp, std::uint64_t number, bool last) noexcept;
+  [[nodiscard]] std::optional<CalibrationDecision> judge(Stamp stamp, std::uint64_t number,
+                                                         bool last) noexcept;
   void begin_segment() noexcept;
   [[nodiscard]] double pixels_moved(const odometry::Map& map) const noexcept;
-  [[nodiscard]] int expected_across(const odometry::Odometry& odometry, int k, const Transform& T_left_world) const noexcept;
+  [[nodiscard]] int expected_across(const odometry::Odometry& odometry, int k,
+                                    const Transform& T_left_world) const noexcept;
 
   const EstimatorOptions& options_;
   RigCalibration rig_, nominal_;
@@ -130,12 +146,15 @@ class OnlineCalibrator {
 
   CalibrationCause cause_ = CalibrationCause::from_scratch;
   bool seeking_ = false, solving_ = false;
-  bool stale_ = false;                          // the solve under way is of frames that no longer count
+  bool stale_ = false;  // the solve under way is of frames that no longer count
   std::uint64_t sought_since_ = 0, onset_ = 0;  // frame numbers
-  std::size_t logged_ = 0, wanted_ = 0;         // frames logged for what is sought or learnt; and how many the next solve needs
-  std::size_t solved_frames_ = 0;               // of the segment, in the newest solve
-  bool change_believed_ = false;                // frames were left out for a change once: the rest are taken for one rig
-  int rejections_ = 0;                          // for other reasons than a want of frames
+  std::size_t
+      logged_ = 0,
+      wanted_ = 0;  // frames logged for what is sought or learnt; and how many the next solve needs
+  std::size_t solved_frames_ = 0;  // of the segment, in the newest solve
+  bool change_believed_ =
+      false;            // frames were left out for a change once: the rest are taken for one rig
+  int rejections_ = 0;  // for other reasons than a want of frames
   int frames_since_snapshot_ = 0;
   float waited_ms_ = 0;
   int frames_still_ = 0;              // since one was logged

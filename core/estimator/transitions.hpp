@@ -31,22 +31,34 @@ struct Transition {
 
 /// All edges there are.
 inline constexpr std::array kTransitions = {
-    Transition{State::initialising, Trigger::calibration_given, State::stereo_odometry, "a calibration is given"},
-    Transition{State::initialising, Trigger::pair_found, State::parallel_monocular, "the first pair gave a transform between the cameras"},
-    Transition{State::parallel_monocular, Trigger::frames_enough, State::calibrating, "there are frames enough to calibrate from"},
-    Transition{State::parallel_monocular, Trigger::pose_lost, State::lost, "no pose for three frames"},
-    Transition{State::calibrating, Trigger::calibration_accepted, State::stereo_odometry, "the calibration is accepted"},
-    Transition{State::calibrating, Trigger::calibration_rejected, State::parallel_monocular, "the calibration is rejected"},
+    Transition{State::initialising, Trigger::calibration_given, State::stereo_odometry,
+               "a calibration is given"},
+    Transition{State::initialising, Trigger::pair_found, State::parallel_monocular,
+               "the first pair gave a transform between the cameras"},
+    Transition{State::parallel_monocular, Trigger::frames_enough, State::calibrating,
+               "there are frames enough to calibrate from"},
+    Transition{State::parallel_monocular, Trigger::pose_lost, State::lost,
+               "no pose for three frames"},
+    Transition{State::calibrating, Trigger::calibration_accepted, State::stereo_odometry,
+               "the calibration is accepted"},
+    Transition{State::calibrating, Trigger::calibration_rejected, State::parallel_monocular,
+               "the calibration is rejected"},
     Transition{State::calibrating, Trigger::pose_lost, State::lost, "no pose for three frames"},
-    Transition{State::stereo_odometry, Trigger::rig_changed, State::recalibrating, "the rig no longer fits its calibration"},
-    Transition{State::stereo_odometry, Trigger::requested, State::recalibrating, "a new calibration is asked for"},
+    Transition{State::stereo_odometry, Trigger::rig_changed, State::recalibrating,
+               "the rig no longer fits its calibration"},
+    Transition{State::stereo_odometry, Trigger::requested, State::recalibrating,
+               "a new calibration is asked for"},
     Transition{State::stereo_odometry, Trigger::pose_lost, State::lost, "no pose for three frames"},
-    Transition{State::recalibrating, Trigger::calibration_accepted, State::stereo_odometry, "the new calibration is accepted"},
-    Transition{State::recalibrating, Trigger::calibration_kept, State::stereo_odometry, "the calibration in use fits as well as a new one"},
+    Transition{State::recalibrating, Trigger::calibration_accepted, State::stereo_odometry,
+               "the new calibration is accepted"},
+    Transition{State::recalibrating, Trigger::calibration_kept, State::stereo_odometry,
+               "the calibration in use fits as well as a new one"},
     Transition{State::recalibrating, Trigger::pose_lost, State::lost, "no pose for three frames"},
     Transition{State::lost, Trigger::pose_found, State::stereo_odometry, "a pose again"},
-    Transition{State::lost, Trigger::pose_found_doubtful, State::recalibrating, "a pose again, the rig still in doubt"},
-    Transition{State::lost, Trigger::pose_found_uncalibrated, State::initialising, "a pose again, without a calibration"},
+    Transition{State::lost, Trigger::pose_found_doubtful, State::recalibrating,
+               "a pose again, the rig still in doubt"},
+    Transition{State::lost, Trigger::pose_found_uncalibrated, State::initialising,
+               "a pose again, without a calibration"},
 };
 
 /// The row that fires, or nullptr: the trigger means nothing in this state and nothing happens.
@@ -61,6 +73,7 @@ consteval bool transitions_are_deterministic() {
     if (find_transition(t.from, t.on) != &t) return false;
   return true;
 }
-static_assert(transitions_are_deterministic(), "a row hides another with the same state and trigger");
+static_assert(transitions_are_deterministic(),
+              "a row hides another with the same state and trigger");
 
 }  // namespace vergence

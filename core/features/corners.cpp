@@ -21,8 +21,8 @@ struct Grid {
   }
 };
 
-/// Best local maximum of the block's scores, leaving out its ring of one pixel and what the mask hides; score 0 when there is none.
-/// (x0, y0): the block's first pixel in the image.
+/// Best local maximum of the block's scores, leaving out its ring of one pixel and what the mask
+/// hides; score 0 when there is none. (x0, y0): the block's first pixel in the image.
 Corner best_of(const float* score, int x0, int y0, int w, int h, const Mask* mask) noexcept {
   Corner best;
   for (int y = 1; y < h - 1; ++y) {
@@ -32,8 +32,9 @@ Corner best_of(const float* score, int x0, int y0, int w, int h, const Mask* mas
       if (!(v > best.score)) continue;
       const float* up = s - detail::kMaxBlock;
       const float* down = s + detail::kMaxBlock;
-      if (v >= s[x - 1] && v >= s[x + 1] && v >= up[x] && v >= down[x] && v >= up[x - 1] && v >= up[x + 1] && v >= down[x - 1] &&
-          v >= down[x + 1] && (mask == nullptr || !mask->hides(x0 + x, y0 + y)))
+      if (v >= s[x - 1] && v >= s[x + 1] && v >= up[x] && v >= down[x] && v >= up[x - 1] &&
+          v >= up[x + 1] && v >= down[x - 1] && v >= down[x + 1] &&
+          (mask == nullptr || !mask->hides(x0 + x, y0 + y)))
         best = {static_cast<float>(x), static_cast<float>(y), v};
     }
   }
@@ -52,9 +53,10 @@ bool crowded(const Corner& c, std::span<const Corner> others, float distance) no
   });
 }
 
-/// The best corner of each free cell in rows [first, last) of the grid, at found[cell]; score 0 where there is none.
-void scan_rows(const ImageView& image, const CornerOptions& options, const Grid& grid, const bool* occupied, int first, int last,
-               Corner* found) noexcept {
+/// The best corner of each free cell in rows [first, last) of the grid, at found[cell]; score 0
+/// where there is none.
+void scan_rows(const ImageView& image, const CornerOptions& options, const Grid& grid,
+               const bool* occupied, int first, int last, Corner* found) noexcept {
   alignas(64) std::array<float, detail::kMaxBlock * detail::kMaxBlock> score;
   const int low = std::max(options.border, detail::kTensorRadius + 2);
   for (int r = first; r < last; ++r) {
@@ -78,7 +80,8 @@ void scan_rows(const ImageView& image, const CornerOptions& options, const Grid&
 
 }  // namespace
 
-void find_corners(const ImageView& image, const CornerOptions& options, std::span<const Corner> taken, PairRunner& runner,
+void find_corners(const ImageView& image, const CornerOptions& options,
+                  std::span<const Corner> taken, PairRunner& runner,
                   BoundedVector<Corner>* out) noexcept {
   out->clear();
   const int cell = std::clamp(options.cell, 8, kMaxCell);
@@ -89,14 +92,21 @@ void find_corners(const ImageView& image, const CornerOptions& options, std::spa
   for (const Corner& c : taken) occupied[static_cast<std::size_t>(grid.index(c.x, c.y))] = true;
 
   std::array<Corner, kMaxGridCells> found;
-  auto upper = [&]() noexcept { scan_rows(image, options, grid, occupied.data(), 0, grid.rows / 2, found.data()); };
-  auto lower = [&]() noexcept { scan_rows(image, options, grid, occupied.data(), grid.rows / 2, grid.rows, found.data()); };
+  auto upper = [&]() noexcept {
+    scan_rows(image, options, grid, occupied.data(), 0, grid.rows / 2, found.data());
+  };
+  auto lower = [&]() noexcept {
+    scan_rows(image, options, grid, occupied.data(), grid.rows / 2, grid.rows, found.data());
+  };
   runner.run(TaskRef(upper), TaskRef(lower));
 
-  const auto end = std::remove_if(found.begin(), found.begin() + cells, [](const Corner& c) { return !(c.score > 0.F); });
+  const auto end = std::remove_if(found.begin(), found.begin() + cells,
+                                  [](const Corner& c) { return !(c.score > 0.F); });
   std::sort(found.begin(), end, stronger);
   for (auto it = found.begin(); it != end && !out->full(); ++it)
-    if (!crowded(*it, taken, options.min_distance) && !crowded(*it, out->span(), options.min_distance)) (void)out->push(*it);
+    if (!crowded(*it, taken, options.min_distance) &&
+        !crowded(*it, out->span(), options.min_distance))
+      (void)out->push(*it);
 }
 
 }  // namespace vergence::features

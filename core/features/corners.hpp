@@ -11,7 +11,8 @@ namespace vergence::features {
 /// A pixel worth following.
 struct Corner {
   float x = 0, y = 0;  // px of the image searched
-  float score = 0;     // least eigenvalue of the structure tensor's mean over 7×7 px, (grey levels / px)² (Shi & Tomasi 1994)
+  float score = 0;  // least eigenvalue of the structure tensor's mean over 7×7 px, (grey levels /
+                    // px)² (Shi & Tomasi 1994)
 };
 
 struct CornerOptions {
@@ -25,11 +26,15 @@ struct CornerOptions {
 inline constexpr int kMaxCell = 128;        // px: sizes the working memory of a cell
 inline constexpr int kMaxGridCells = 4096;  // of an image
 
-/// The strongest corner of every grid cell that holds none of `taken`, strongest first, as many as `out` has room for.
+/// The strongest corner of every grid cell that holds none of `taken`, strongest first, as many as
+/// `out` has room for.
 ///
-/// Threads  The runner takes the lower half of the grid to its other side; the result does not depend on it.
-/// Memory   On the stacks, bounded by kMaxCell and kMaxGridCells. Corners that find no room are dropped, weakest first.
-void find_corners(const ImageView& image, const CornerOptions& options, std::span<const Corner> taken, PairRunner& runner,
+/// Threads  The runner takes the lower half of the grid to its other side; the result does not
+///          depend on it.
+/// Memory   On the stacks, bounded by kMaxCell and kMaxGridCells. Corners that find no room are
+///          dropped, weakest first.
+void find_corners(const ImageView& image, const CornerOptions& options,
+                  std::span<const Corner> taken, PairRunner& runner,
                   BoundedVector<Corner>* out) noexcept;
 
 }  // namespace vergence::features

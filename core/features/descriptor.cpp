@@ -22,7 +22,9 @@ std::array<Pair, 256> make_pattern() noexcept {
   // Normal about the middle with a fifth of the side, as the paper found best.
   const auto place = [&random]() noexcept {
     const auto one = [&random]() noexcept {
-      return std::clamp(static_cast<int>(std::lround(random.normal() * kPatchSide / 5.0)), -kReach, kReach) + kPatchSide / 2;
+      return std::clamp(static_cast<int>(std::lround(random.normal() * kPatchSide / 5.0)), -kReach,
+                        kReach) +
+             kPatchSide / 2;
     };
     const int y = one(), x = one();
     return static_cast<std::int16_t>(y * kPatchSide + x);
@@ -40,20 +42,23 @@ const std::array<Pair, 256> kPattern = make_pattern();
 }  // namespace
 
 Descriptor describe(const Patch& patch) noexcept {
-  const auto level = static_cast<std::size_t>(std::clamp(kDescriptorLevel, 0, std::max(0, patch.levels - 1)));
+  const auto level =
+      static_cast<std::size_t>(std::clamp(kDescriptorLevel, 0, std::max(0, patch.levels - 1)));
   const auto& pixels = patch.pixels[level];
   std::array<std::uint16_t, kPatchSide * kPatchSide> smooth{};
   for (int y = kSmooth; y < kPatchSide - kSmooth; ++y) {
     for (int x = kSmooth; x < kPatchSide - kSmooth; ++x) {
       int sum = 0;
       for (int dy = -kSmooth; dy <= kSmooth; ++dy)
-        for (int dx = -kSmooth; dx <= kSmooth; ++dx) sum += pixels[static_cast<std::size_t>((y + dy) * kPatchSide + x + dx)];
+        for (int dx = -kSmooth; dx <= kSmooth; ++dx)
+          sum += pixels[static_cast<std::size_t>((y + dy) * kPatchSide + x + dx)];
       smooth[static_cast<std::size_t>(y * kPatchSide + x)] = static_cast<std::uint16_t>(sum);
     }
   }
   Descriptor d;
   for (std::size_t i = 0; i < kPattern.size(); ++i) {
-    const bool less = smooth[static_cast<std::size_t>(kPattern[i].a)] < smooth[static_cast<std::size_t>(kPattern[i].b)];
+    const bool less = smooth[static_cast<std::size_t>(kPattern[i].a)] <
+                      smooth[static_cast<std::size_t>(kPattern[i].b)];
     d.bits[i / 64] |= static_cast<std::uint64_t>(less) << (i % 64);
   }
   return d;

@@ -6,13 +6,15 @@
 
 namespace vergence::features {
 
-/// 256 comparisons of smoothed grey values at fixed places of a patch (Calonder et al., "BRIEF", ECCV 2010): for finding a
-/// point again after tracking was lost. Stands a turn of some 20° and a change of size of some 20 %.
+/// 256 comparisons of smoothed grey values at fixed places of a patch (Calonder et al., "BRIEF",
+/// ECCV 2010): for finding a point again after tracking was lost. Stands a turn of some 20° and a
+/// change of size of some 20 %.
 struct Descriptor {
   std::array<std::uint64_t, 4> bits{};
 };
 
-inline constexpr int kDescriptorLevel = 1;  // of the pyramid: less noise, and a neighbourhood of 56 px
+inline constexpr int kDescriptorLevel =
+    1;  // of the pyramid: less noise, and a neighbourhood of 56 px
 
 /// Of the patch's level kDescriptorLevel, or its coarsest below that.
 [[nodiscard]] Descriptor describe(const Patch& patch) noexcept;

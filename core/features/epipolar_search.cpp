@@ -27,7 +27,8 @@ Block middle_of(const Patch& patch, int level) noexcept {
   constexpr int kFirst = kPatchSide / 2 - kBlock / 2;
   float square = 0;
   for (int r = 0; r < kBlock; ++r) {
-    std::memcpy(b.pixels.data() + r * kBlock, from.data() + (kFirst + r) * kPatchSide + kFirst, kBlock);
+    std::memcpy(b.pixels.data() + r * kBlock, from.data() + (kFirst + r) * kPatchSide + kFirst,
+                kBlock);
     for (int c = 0; c < kBlock; ++c) {
       const float v = b.pixels[static_cast<std::size_t>(r * kBlock + c)];
       b.sum += v;
@@ -65,12 +66,14 @@ SearchResult search_along(const Patch& patch, const Pyramid& image, const Epipol
     rho_last = options.rho_first + 0.6 * (rho_last - options.rho_first);
   if (halvings > kHalvings) return result;
 
-  const int steps = std::clamp(static_cast<int>(std::ceil((last - first).norm() * scale)), 1, kMaxSearchSteps - 1);
+  const int steps = std::clamp(static_cast<int>(std::ceil((last - first).norm() * scale)), 1,
+                               kMaxSearchSteps - 1);
   const Vec2 along = (last - first).normalized();
   const bool horizontal = std::abs(along.x()) >= std::abs(along.y());
   const int band = std::clamp(options.band, 0, kMaxBand);
   const Block block = middle_of(patch, level);
-  // The block's first pixel stands kBlock/2 before the pixel searched for; the anchor's offset in its pixel moves with it.
+  // The block's first pixel stands kBlock/2 before the pixel searched for; the anchor's offset in
+  // its pixel moves with it.
   const Vec2 anchor = patch.offset[static_cast<std::size_t>(level)].cast<double>();
 
   std::array<std::int32_t, kPlaces> offsets;
@@ -85,9 +88,12 @@ SearchResult search_along(const Patch& patch, const Pyramid& image, const Epipol
               cy = static_cast<int>(std::lround(p.y() * scale - anchor.y()));
     for (int b = -band; b <= band; ++b) {
       const int x = cx + (horizontal ? 0 : b), y = cy + (horizontal ? b : 0);
-      if (x < kBlock / 2 || y < kBlock / 2 || x + kBlock / 2 > view.width || y + kBlock / 2 > view.height) continue;
+      if (x < kBlock / 2 || y < kBlock / 2 || x + kBlock / 2 > view.width ||
+          y + kBlock / 2 > view.height)
+        continue;
       if (options.mask != nullptr && options.mask->hides((Vec2(x, y) + anchor) / scale)) continue;
-      offsets[static_cast<std::size_t>(n)] = static_cast<std::int32_t>((y - kBlock / 2) * view.stride + (x - kBlock / 2));
+      offsets[static_cast<std::size_t>(n)] =
+          static_cast<std::int32_t>((y - kBlock / 2) * view.stride + (x - kBlock / 2));
       step_of[static_cast<std::size_t>(n)] = static_cast<std::int16_t>(i);
       pixel_of[static_cast<std::size_t>(n)] = {static_cast<float>(x), static_cast<float>(y)};
       ++n;
@@ -114,7 +120,8 @@ SearchResult search_along(const Patch& patch, const Pyramid& image, const Epipol
   float second = -1.F;
   constexpr int kNeighbourhood = 3;  // px of the level: the same peak
   for (int i = 0; i <= steps; ++i)
-    if (std::abs(i - best_step) > kNeighbourhood) second = std::max(second, best_of_step[static_cast<std::size_t>(i)]);
+    if (std::abs(i - best_step) > kNeighbourhood)
+      second = std::max(second, best_of_step[static_cast<std::size_t>(i)]);
   result.zncc = best_score;
   result.rho = options.rho_first + (rho_last - options.rho_first) * best_step / steps;
   result.pixel = (pixel_of[static_cast<std::size_t>(best)].cast<double>() + anchor) / scale;
@@ -127,8 +134,10 @@ SearchResult search_along(const Patch& patch, const Pyramid& image, const Epipol
   return result;
 }
 
-double fit_inverse_depth(const EpipolarCurve& curve, const Vec2& observed, double* rho, double* sigma_rho_per_px) noexcept {
-  constexpr int kSteps = 4;  // nearly linear in inverse depth: two suffice, lens distortion asks for a third
+double fit_inverse_depth(const EpipolarCurve& curve, const Vec2& observed, double* rho,
+                         double* sigma_rho_per_px) noexcept {
+  constexpr int kSteps =
+      4;  // nearly linear in inverse depth: two suffice, lens distortion asks for a third
   double value = *rho;
   for (int i = 0; i < kSteps; ++i) {
     Vec2 p;

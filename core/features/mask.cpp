@@ -7,12 +7,15 @@
 namespace vergence::features {
 namespace {
 
-std::size_t words_of(int width) noexcept { return (static_cast<std::size_t>(std::max(0, width)) + 63U) / 64U; }
+std::size_t words_of(int width) noexcept {
+  return (static_cast<std::size_t>(std::max(0, width)) + 63U) / 64U;
+}
 
 }  // namespace
 
 std::size_t Mask::memory_needed(int width, int height) noexcept {
-  return words_of(width) * static_cast<std::size_t>(std::max(0, height)) * sizeof(std::uint64_t) + kCacheLine;
+  return words_of(width) * static_cast<std::size_t>(std::max(0, height)) * sizeof(std::uint64_t) +
+         kCacheLine;
 }
 
 Mask::Mask(const ImageView& image, int margin, Arena& arena) {

@@ -18,7 +18,8 @@ class Mask {
  public:
   /// Hides nothing.
   Mask() noexcept = default;
-  /// Hides the pixels of `image` that are 0 and those within `margin` px of one, along x and along y. An empty image hides nothing.
+  /// Hides the pixels of `image` that are 0 and those within `margin` px of one, along x and along
+  /// y. An empty image hides nothing.
   Mask(const ImageView& image, int margin, Arena& arena);
   [[nodiscard]] static std::size_t memory_needed(int width, int height) noexcept;
 

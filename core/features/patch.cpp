@@ -14,7 +14,8 @@ namespace {
 constexpr int kHalf = kPatchSide / 2;  // the middle pixel's index
 constexpr float kSettled = 0.01F;      // px of the level: a tenth of what noise leaves
 constexpr float kMinContrast = 2.0F;   // grey levels, standard deviation of the window
-constexpr float kMinHessian = 1.0F;    // grey levels² / px², least eigenvalue over the window's pixels
+constexpr float kMinHessian =
+    1.0F;  // grey levels² / px², least eigenvalue over the window's pixels
 
 struct LevelOutcome {
   AlignStatus status;
@@ -24,22 +25,26 @@ struct LevelOutcome {
   int steps;
 };
 
-LevelOutcome align_level(const detail::Window& w, const ImageView& image, float x, float y, float max_shift, int max_steps) noexcept {
+LevelOutcome align_level(const detail::Window& w, const ImageView& image, float x, float y,
+                         float max_shift, int max_steps) noexcept {
   constexpr float kPixels = kWindow * kWindow;
   constexpr float kHalfWindow = 0.5F * static_cast<float>(kWindow - 1);
   LevelOutcome out{AlignStatus::diverged, x, y, 0.F, 0.F, 0};
   const float trace = 0.5F * (w.hxx + w.hyy);
   const float det = w.hxx * w.hyy - w.hxy * w.hxy;
   const float least = trace - std::sqrt(std::max(0.F, trace * trace - det));
-  if (!(w.variance_sum > kMinContrast * kMinContrast * kPixels) || !(least > kMinHessian * kPixels)) {
+  if (!(w.variance_sum > kMinContrast * kMinContrast * kPixels) ||
+      !(least > kMinHessian * kPixels)) {
     out.status = AlignStatus::flat;
     return out;
   }
   out.sigma = 1.F / std::sqrt(least);
   const float ixx = w.hyy / det, ixy = -w.hxy / det, iyy = w.hxx / det;
   const float start_x = x, start_y = y;
-  // Vector loads read kWindowStride + 1 pixels of a row: the last rows of an image must not be read past their end.
-  const float last_x = static_cast<float>(image.width - kWindowStride - 2), last_y = static_cast<float>(image.height - kWindow - 2);
+  // Vector loads read kWindowStride + 1 pixels of a row: the last rows of an image must not be read
+  // past their end.
+  const float last_x = static_cast<float>(image.width - kWindowStride - 2),
+              last_y = static_cast<float>(image.height - kWindow - 2);
   for (out.steps = 1; out.steps <= max_steps; ++out.steps) {
     const float left = out.x - kHalfWindow, top = out.y - kHalfWindow;
     if (!(left >= 0.F && top >= 0.F && left <= last_x && top <= last_y)) {
@@ -48,13 +53,16 @@ LevelOutcome align_level(const detail::Window& w, const ImageView& image, float 
     }
     const int ix = static_cast<int>(left), iy = static_cast<int>(top);
     detail::WindowSums s{};
-    detail::window_sums(w, image.data + iy * image.stride + ix, image.stride, left - static_cast<float>(ix), top - static_cast<float>(iy),
-                        &s);
+    detail::window_sums(w, image.data + iy * image.stride + ix, image.stride,
+                        left - static_cast<float>(ix), top - static_cast<float>(iy), &s);
     const float image_variance = s.square - s.sum * s.sum / kPixels;
     const float norm = w.variance_sum * image_variance;
     out.zncc = norm > 1.F ? s.value / std::sqrt(norm) : 0.F;
-    // A gain near zero or negative means nothing here resembles the window: a step from it would be noise.
-    const float gain = std::max(s.value / w.variance_sum, 0.3F * std::sqrt(std::max(image_variance, 0.F) / w.variance_sum) + 1e-3F);
+    // A gain near zero or negative means nothing here resembles the window: a step from it would be
+    // noise.
+    const float gain =
+        std::max(s.value / w.variance_sum,
+                 0.3F * std::sqrt(std::max(image_variance, 0.F) / w.variance_sum) + 1e-3F);
     float dx = (ixx * s.steep_x + ixy * s.steep_y) / gain;
     float dy = (ixy * s.steep_x + iyy * s.steep_y) / gain;
     const float length = std::sqrt(dx * dx + dy * dy);
@@ -72,7 +80,8 @@ LevelOutcome align_level(const detail::Window& w, const ImageView& image, float 
       return out;
     }
   }
-  // Not settled to kSettled, but no longer moving much: the next finer level or the residual test decides.
+  // Not settled to kSettled, but no longer moving much: the next finer level or the residual test
+  // decides.
   out.status = AlignStatus::ok;
   return out;
 }
@@ -89,14 +98,16 @@ bool cut_patch(const Pyramid& pyramid, const Vec2& at, Patch* patch) noexcept {
     if (ix < kHalf || iy < kHalf || ix + kHalf > image.width || iy + kHalf > image.height) break;
     const auto i = static_cast<std::size_t>(l);
     for (int r = 0; r < kPatchSide; ++r)
-      std::memcpy(patch->pixels[i].data() + r * kPatchSide, image.row(iy - kHalf + r) + ix - kHalf, kPatchSide);
+      std::memcpy(patch->pixels[i].data() + r * kPatchSide, image.row(iy - kHalf + r) + ix - kHalf,
+                  kPatchSide);
     patch->offset[i] = {static_cast<float>(c.x() - ix), static_cast<float>(c.y() - iy)};
     ++patch->levels;
   }
   return patch->levels > 0;
 }
 
-AlignResult align(const Patch& patch, const Pyramid& image, const Vec2& predicted, const Mat2& A, const AlignOptions& options) noexcept {
+AlignResult align(const Patch& patch, const Pyramid& image, const Vec2& predicted, const Mat2& A,
+                  const AlignOptions& options) noexcept {
   AlignResult result;
   const double det = A.determinant();
   if (!(std::abs(det) > 0.05 && std::abs(det) < 20.0)) {
@@ -104,8 +115,8 @@ AlignResult align(const Patch& patch, const Pyramid& image, const Vec2& predicte
     return result;
   }
   const Mat2 inverse = A.inverse();
-  const float B[4] = {static_cast<float>(inverse(0, 0)), static_cast<float>(inverse(0, 1)), static_cast<float>(inverse(1, 0)),
-                      static_cast<float>(inverse(1, 1))};
+  const float B[4] = {static_cast<float>(inverse(0, 0)), static_cast<float>(inverse(0, 1)),
+                      static_cast<float>(inverse(1, 0)), static_cast<float>(inverse(1, 1))};
   const int coarsest = std::min({options.coarsest, patch.levels - 1, image.levels() - 1});
   Vec2 pixel = predicted;
   for (int l = std::max(coarsest, options.finest); l >= options.finest; --l) {
@@ -115,7 +126,8 @@ AlignResult align(const Patch& patch, const Pyramid& image, const Vec2& predicte
                         static_cast<float>(kHalf) + patch.offset[i].y(), B, &window);
     const double scale = std::ldexp(1.0, l);
     const LevelOutcome out =
-        align_level(window, image.level(l), static_cast<float>(pixel.x() / scale), static_cast<float>(pixel.y() / scale),
+        align_level(window, image.level(l), static_cast<float>(pixel.x() / scale),
+                    static_cast<float>(pixel.y() / scale),
                     options.max_shift / static_cast<float>(scale), options.max_steps);
     result.steps += out.steps;
     // A coarse level may be flat or cut off at the border where a finer one is not.

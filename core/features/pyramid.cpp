@@ -23,7 +23,9 @@ int usable_levels(int width, int height, int levels) noexcept {
   return n;
 }
 
-std::size_t padded_stride(int width) noexcept { return (static_cast<std::size_t>(width) + kCacheLine - 1) / kCacheLine * kCacheLine; }
+std::size_t padded_stride(int width) noexcept {
+  return (static_cast<std::size_t>(width) + kCacheLine - 1) / kCacheLine * kCacheLine;
+}
 
 }  // namespace
 
@@ -38,7 +40,8 @@ std::size_t Pyramid::memory_needed(int width, int height, int levels) noexcept {
   return bytes;
 }
 
-Pyramid::Pyramid(int width, int height, int levels, Arena& arena) : levels_(usable_levels(width, height, levels)) {
+Pyramid::Pyramid(int width, int height, int levels, Arena& arena)
+    : levels_(usable_levels(width, height, levels)) {
   assert(levels >= 1 && levels <= kMaxPyramidLevels);
   Size s{width, height};
   views_[0] = {nullptr, width, height, 0};
@@ -46,7 +49,8 @@ Pyramid::Pyramid(int width, int height, int levels, Arena& arena) : levels_(usab
     s = {(s.width + 1) / 2, (s.height + 1) / 2};
     const std::size_t stride = padded_stride(s.width);
     // One cache line more: vector loads of the last row may touch the bytes behind it.
-    const auto bytes = arena.make<std::uint8_t>(stride * static_cast<std::size_t>(s.height) + kCacheLine, "pyramid");
+    const auto bytes = arena.make<std::uint8_t>(
+        stride * static_cast<std::size_t>(s.height) + kCacheLine, "pyramid");
     const auto i = static_cast<std::size_t>(l);
     storage_[i] = bytes.data();
     views_[i] = {bytes.data(), s.width, s.height, static_cast<std::ptrdiff_t>(stride)};

@@ -15,7 +15,8 @@ namespace vergence::features {
 namespace {
 
 constexpr float kSigmaOfSize = 1.2F / 9.F;  // px a px: boxes of 9 px stand for a Gaussian of 1.2 px
-constexpr double kMaxOffset = 1.0;          // places or sizes: a parabola that tops further away is no maximum here
+constexpr double kMaxOffset =
+    1.0;  // places or sizes: a parabola that tops further away is no maximum here
 
 /// Stronger first; one order, whatever the heap does with equals.
 bool stronger(const SurfPoint& a, const SurfPoint& b) noexcept {
@@ -54,14 +55,16 @@ struct Surf::Octave {
 
 std::size_t Surf::memory_needed(int max_width, int max_height) noexcept {
   return detail::IntegralImage::memory_needed(max_width, max_height) +
-         static_cast<std::size_t>(std::max(0, max_width)) * kLayers * kRows * sizeof(float) + 2 * kCacheLine;
+         static_cast<std::size_t>(std::max(0, max_width)) * kLayers * kRows * sizeof(float) +
+         2 * kCacheLine;
 }
 
 Surf::Surf(int max_width, int max_height, Arena& arena)
     : max_width_(std::max(0, max_width)),
       max_height_(std::max(0, max_height)),
       sums_(max_width, max_height, arena),
-      rows_(arena.make<float>(static_cast<std::size_t>(max_width_) * kLayers * kRows, "rows of blob responses")) {}
+      rows_(arena.make<float>(static_cast<std::size_t>(max_width_) * kLayers * kRows,
+                              "rows of blob responses")) {}
 
 SurfStatus Surf::set_image(const ImageView& image) noexcept {
   sums_.clear();
@@ -87,19 +90,25 @@ bool Surf::greatest(int layer, int column, int row) const noexcept {
   return true;
 }
 
-bool Surf::refine(const Octave& octave, int layer, int column, int row, SurfPoint* p) const noexcept {
-  const auto at = [&](int k, int j, int i) noexcept { return static_cast<double>(responses(layer + k, row + j)[column + i]); };
+bool Surf::refine(const Octave& octave, int layer, int column, int row,
+                  SurfPoint* p) const noexcept {
+  const auto at = [&](int k, int j, int i) noexcept {
+    return static_cast<double>(responses(layer + k, row + j)[column + i]);
+  };
   const double centre = at(0, 0, 0);
   const Vec2 gradient = 0.5 * Vec2(at(0, 0, 1) - at(0, 0, -1), at(0, 1, 0) - at(0, -1, 0));
   Mat2 curvature;
   curvature(0, 0) = at(0, 0, 1) - 2 * centre + at(0, 0, -1);
   curvature(1, 1) = at(0, 1, 0) - 2 * centre + at(0, -1, 0);
-  curvature(0, 1) = curvature(1, 0) = 0.25 * (at(0, 1, 1) - at(0, 1, -1) - at(0, -1, 1) + at(0, -1, -1));
+  curvature(0, 1) = curvature(1, 0) =
+      0.25 * (at(0, 1, 1) - at(0, 1, -1) - at(0, -1, 1) + at(0, -1, -1));
   const Vec2 top = -(curvature.inverse() * gradient);
-  const double size_top = -0.5 * (at(1, 0, 0) - at(-1, 0, 0)) / (at(1, 0, 0) - 2 * centre + at(-1, 0, 0));
+  const double size_top =
+      -0.5 * (at(1, 0, 0) - at(-1, 0, 0)) / (at(1, 0, 0) - 2 * centre + at(-1, 0, 0));
   // Negated: refuses what is not a number, from a curvature that is none.
   if (!(top.cwiseAbs().maxCoeff() <= kMaxOffset && std::abs(size_top) <= kMaxOffset)) return false;
-  const int x = octave.first + column * octave.step, y = octave.first + row * octave.step, size = octave.size(layer);
+  const int x = octave.first + column * octave.step, y = octave.first + row * octave.step,
+            size = octave.size(layer);
   p->x = static_cast<float>(x + top.x() * octave.step);
   p->y = static_cast<float>(y + top.y() * octave.step);
   p->scale = kSigmaOfSize * static_cast<float>(size + size_top * octave.size_step());
@@ -109,13 +118,14 @@ bool Surf::refine(const Octave& octave, int layer, int column, int row, SurfPoin
   return true;
 }
 
-int Surf::scan_octave(const Octave& octave, const SurfOptions& options, BoundedVector<SurfPoint>* out) noexcept {
+int Surf::scan_octave(const Octave& octave, const SurfOptions& options,
+                      BoundedVector<SurfPoint>* out) noexcept {
   if (octave.columns < kRows) return 0;
   int found = 0;
   for (int row = 0; row < octave.rows; ++row) {
     for (int k = 0; k < kLayers; ++k)
-      detail::determinant_row(sums_, octave.first, octave.first + row * octave.step, octave.size(k), octave.step, octave.columns,
-                              responses(k, row));
+      detail::determinant_row(sums_, octave.first, octave.first + row * octave.step, octave.size(k),
+                              octave.step, octave.columns, responses(k, row));
     if (row < 2) continue;
     for (int k = 1; k < kLayers - 1; ++k) {
       const float* r = responses(k, row - 1);
@@ -123,7 +133,9 @@ int Surf::scan_octave(const Octave& octave, const SurfOptions& options, BoundedV
         if (!(r[i] > options.min_response) || r[i] < r[i + 1] || r[i] <= r[i - 1]) continue;
         SurfPoint p;
         if (!greatest(k, i, row - 1) || !refine(octave, k, i, row - 1, &p)) continue;
-        if (options.mask != nullptr && options.mask->hides({static_cast<double>(p.x), static_cast<double>(p.y)})) continue;
+        if (options.mask != nullptr &&
+            options.mask->hides({static_cast<double>(p.x), static_cast<double>(p.y)}))
+          continue;
         ++found;
         offer(p, out);
       }
@@ -136,7 +148,8 @@ int Surf::detect(const SurfOptions& options, BoundedVector<SurfPoint>* out) noex
   out->clear();
   int found = 0;
   const int octaves = std::clamp(options.octaves, 1, kMaxSurfOctaves);
-  for (int o = 0; o < octaves; ++o) found += scan_octave(Octave(o, sums_.width(), sums_.height()), options, out);
+  for (int o = 0; o < octaves; ++o)
+    found += scan_octave(Octave(o, sums_.width(), sums_.height()), options, out);
   std::sort(out->begin(), out->end(), stronger);
   return found;
 }
@@ -145,9 +158,11 @@ void Surf::orient(std::span<SurfPoint> points) const noexcept {
   for (SurfPoint& p : points) p.angle = detail::surf_orientation(sums_, p.x, p.y, p.scale);
 }
 
-void Surf::describe(std::span<const SurfPoint> points, std::span<SurfDescriptor> out) const noexcept {
+void Surf::describe(std::span<const SurfPoint> points,
+                    std::span<SurfDescriptor> out) const noexcept {
   assert(points.size() == out.size());
-  for (std::size_t i = 0; i < points.size(); ++i) out[i] = detail::surf_descriptor(sums_, points[i]);
+  for (std::size_t i = 0; i < points.size(); ++i)
+    out[i] = detail::surf_descriptor(sums_, points[i]);
 }
 
 }  // namespace vergence::features

@@ -39,17 +39,23 @@ enum class SurfStatus : std::uint8_t {
   too_large,      // larger than the constructor was told
 };
 
-/// Speeded-up robust features: blobs by the determinant of a Hessian of boxes, sums of Haar wavelets as their description.
+/// Speeded-up robust features: blobs by the determinant of a Hessian of boxes, sums of Haar
+/// wavelets as their description.
 ///
-/// Source     Bay, Ess, Tuytelaars, Van Gool, "Speeded-Up Robust Features", CVIU 110 (2008). Boxes of 3 (k 2^o + 1) px in octave
-///            o = 1, 2, … with k = 1 … 4, sampled every 2^(o−1) px; maxima of the two inner sizes, refined by a parabola in x and y and one
-///            in size: the joint one of the paper leans where size and place of the top both lie between samples, by up to a tenth of a
-///            step.
-/// Ownership  Nothing of the image is kept but sums over it. The caller owns points and descriptors.
+/// Source     Bay, Ess, Tuytelaars, Van Gool, "Speeded-Up Robust Features", CVIU 110 (2008). Boxes
+///            of 3 (k 2^o + 1) px in octave o = 1, 2, … with k = 1 … 4, sampled every 2^(o−1) px;
+///            maxima of the two inner sizes, refined by a parabola in x and y and one in size: the
+///            joint one of the paper leans where size and place of the top both lie between
+///            samples, by up to a tenth of a step.
+/// Ownership  Nothing of the image is kept but sums over it. The caller owns points and
+///            descriptors.
 /// Threads    set_image() and detect() by one thread; describe() is const.
-/// Memory     From the arena at construction: 4 bytes a pixel and twelve rows. Points that find no room are dropped, weakest first.
-/// Time       O(pixels · octaves) to detect, O(1) a point to describe; no bound on pixels but the constructor's.
-/// Errors     Nothing throws after construction. Without a valid image there are no points and descriptors are zero.
+/// Memory     From the arena at construction: 4 bytes a pixel and twelve rows. Points that find no
+///            room are dropped, weakest first.
+/// Time       O(pixels · octaves) to detect, O(1) a point to describe; no bound on pixels but the
+///            constructor's.
+/// Errors     Nothing throws after construction. Without a valid image there are no points and
+///            descriptors are zero.
 class Surf {
  public:
   Surf() noexcept = default;
@@ -60,11 +66,12 @@ class Surf {
   /// Not `ok`: there is no image any more.
   [[nodiscard]] SurfStatus set_image(const ImageView& image) noexcept;
 
-  /// Points of the image, strongest first, upright. Returns how many there are: more than out->size() when some found no room.
+  /// Points of the image, strongest first, upright. Returns how many there are: more than
+  /// out->size() when some found no room.
   int detect(const SurfOptions& options, BoundedVector<SurfPoint>* out) noexcept;
 
-  /// Gives each point the direction of its neighbourhood. Without it they stay upright: more distinct and faster, for cameras that
-  /// roll less than some 15°.
+  /// Gives each point the direction of its neighbourhood. Without it they stay upright: more
+  /// distinct and faster, for cameras that roll less than some 15°.
   void orient(std::span<SurfPoint> points) const noexcept;
 
   /// Precondition: as many descriptors as points.
@@ -75,13 +82,20 @@ class Surf {
   static constexpr int kRows = 3;    // neighbouring rows of each
 
   struct Octave;
-  int scan_octave(const Octave& octave, const SurfOptions& options, BoundedVector<SurfPoint>* out) noexcept;
-  [[nodiscard]] bool refine(const Octave& octave, int layer, int column, int row, SurfPoint* p) const noexcept;
+  int scan_octave(const Octave& octave, const SurfOptions& options,
+                  BoundedVector<SurfPoint>* out) noexcept;
+  [[nodiscard]] bool refine(const Octave& octave, int layer, int column, int row,
+                            SurfPoint* p) const noexcept;
   [[nodiscard]] bool greatest(int layer, int column, int row) const noexcept;
-  [[nodiscard]] float* responses(int layer, int row) noexcept { return rows_.data() + offset(layer, row); }
-  [[nodiscard]] const float* responses(int layer, int row) const noexcept { return rows_.data() + offset(layer, row); }
+  [[nodiscard]] float* responses(int layer, int row) noexcept {
+    return rows_.data() + offset(layer, row);
+  }
+  [[nodiscard]] const float* responses(int layer, int row) const noexcept {
+    return rows_.data() + offset(layer, row);
+  }
   [[nodiscard]] std::size_t offset(int layer, int row) const noexcept {
-    return static_cast<std::size_t>(row % kRows * kLayers + layer) * static_cast<std::size_t>(max_width_);
+    return static_cast<std::size_t>(row % kRows * kLayers + layer) *
+           static_cast<std::size_t>(max_width_);
   }
 
   int max_width_ = 0, max_height_ = 0;

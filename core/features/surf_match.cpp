@@ -14,7 +14,8 @@ constexpr float kNone = std::numeric_limits<float>::infinity();
 /// Points of flat neighbourhoods have a descriptor of zeros, which resembles every other such.
 bool described(const SurfDescriptor& d) noexcept { return detail::squared_distance(d, {}) > 0.5F; }
 
-/// The epipolar line of a left point, a x + b y + c = 0 with a² + b² = 1; all zero where it has no direction: every point lies on it.
+/// The epipolar line of a left point, a x + b y + c = 0 with a² + b² = 1; all zero where it has no
+/// direction: every point lies on it.
 Vec3 epipolar_line(const EpipolarBand* band, const SurfPoint& p) noexcept {
   if (band == nullptr) return Vec3::Zero();
   const Vec3 line = band->F * Vec3(static_cast<double>(p.x), static_cast<double>(p.y), 1.0);
@@ -24,13 +25,18 @@ Vec3 epipolar_line(const EpipolarBand* band, const SurfPoint& p) noexcept {
 
 }  // namespace
 
-std::size_t SurfMatcher::memory_needed(std::size_t capacity) noexcept { return 2 * (capacity * sizeof(Best) + kCacheLine); }
+std::size_t SurfMatcher::memory_needed(std::size_t capacity) noexcept {
+  return 2 * (capacity * sizeof(Best) + kCacheLine);
+}
 
 SurfMatcher::SurfMatcher(std::size_t capacity, Arena& arena)
-    : left_(arena.make<Best>(capacity, "matches of left blobs")), right_(arena.make<Best>(capacity, "matches of right blobs")) {}
+    : left_(arena.make<Best>(capacity, "matches of left blobs")),
+      right_(arena.make<Best>(capacity, "matches of right blobs")) {}
 
-void SurfMatcher::compare(const SurfView& left, const SurfView& right, const EpipolarBand* band) noexcept {
-  for (std::size_t j = 0; j < right.points.size(); ++j) right_[j] = {0, kNone, kNone, described(right.descriptors[j])};
+void SurfMatcher::compare(const SurfView& left, const SurfView& right,
+                          const EpipolarBand* band) noexcept {
+  for (std::size_t j = 0; j < right.points.size(); ++j)
+    right_[j] = {0, kNone, kNone, described(right.descriptors[j])};
   for (std::size_t i = 0; i < left.points.size(); ++i) {
     const SurfPoint& p = left.points[i];
     Best& mine = left_[i];
@@ -39,7 +45,8 @@ void SurfMatcher::compare(const SurfView& left, const SurfView& right, const Epi
     const Vec3 line = epipolar_line(band, p);
     const auto far = [&](const SurfPoint& q) noexcept {
       return band != nullptr &&
-             !(std::abs(line.x() * static_cast<double>(q.x) + line.y() * static_cast<double>(q.y) + line.z()) <= band->px);
+             !(std::abs(line.x() * static_cast<double>(q.x) + line.y() * static_cast<double>(q.y) +
+                        line.z()) <= band->px);
     };
     for (std::size_t j = 0; j < right.points.size(); ++j) {
       Best& yours = right_[j];
@@ -60,18 +67,24 @@ void SurfMatcher::compare(const SurfView& left, const SurfView& right, const Epi
   }
 }
 
-SurfMatchStatus SurfMatcher::match(const SurfView& left, const SurfView& right, const SurfMatchOptions& options, const EpipolarBand* band,
+SurfMatchStatus SurfMatcher::match(const SurfView& left, const SurfView& right,
+                                   const SurfMatchOptions& options, const EpipolarBand* band,
                                    BoundedVector<SurfMatch>* out) noexcept {
   out->clear();
-  if (left.points.size() != left.descriptors.size() || right.points.size() != right.descriptors.size())
+  if (left.points.size() != left.descriptors.size() ||
+      right.points.size() != right.descriptors.size())
     return SurfMatchStatus::invalid_input;
-  if (left.points.size() > left_.size() || right.points.size() > right_.size()) return SurfMatchStatus::capacity;
+  if (left.points.size() > left_.size() || right.points.size() > right_.size())
+    return SurfMatchStatus::capacity;
   compare(left, right, band);
-  const float most = options.max_distance * options.max_distance, ratio = options.ratio * options.ratio;
+  const float most = options.max_distance * options.max_distance,
+              ratio = options.ratio * options.ratio;
   for (std::size_t i = 0; i < left.points.size() && !out->full(); ++i) {
     const Best& mine = left_[i];
     // The negated comparisons refuse infinities and what is not a number.
-    if (!(mine.square <= most) || !(mine.square < ratio * mine.second) || right_[mine.partner].partner != i) continue;
+    if (!(mine.square <= most) || !(mine.square < ratio * mine.second) ||
+        right_[mine.partner].partner != i)
+      continue;
     (void)out->push({static_cast<std::uint32_t>(i), mine.partner, std::sqrt(mine.square)});
   }
   return SurfMatchStatus::ok;

@@ -18,8 +18,8 @@ struct SurfMatch {
   float distance = 0;                 // Euclidean, of unit vectors: 0 … 2
 };
 
-/// Where a left point's partner may lie: within `px` of its epipolar line, pixel_rightᵀ F pixel_left = 0.
-/// F is of pixels as the points are; a lens that distorts asks for a wider band.
+/// Where a left point's partner may lie: within `px` of its epipolar line, pixel_rightᵀ F
+/// pixel_left = 0. F is of pixels as the points are; a lens that distorts asks for a wider band.
 struct EpipolarBand {
   Mat3 F = Mat3::Zero();
   double px = 0;  // half width
@@ -38,9 +38,11 @@ enum class SurfMatchStatus : std::uint8_t {
 
 /// Mutually best partners among blobs of the same sign.
 ///
-/// Source     Nearest neighbour and its ratio to the second: Bay et al. 2008, Lowe 2004; mutual: best in both directions.
+/// Source     Nearest neighbour and its ratio to the second: Bay et al. 2008, Lowe 2004; mutual:
+///            best in both directions.
 /// Threads    One at a time.
-/// Memory     From the arena at construction. Matches that find no room are dropped: those of the last left points.
+/// Memory     From the arena at construction. Matches that find no room are dropped: those of the
+///            last left points.
 /// Time       Some 64 multiplications a pair of points of equal sign (inside the band).
 /// Errors     Not `ok`: *out is empty.
 class SurfMatcher {
@@ -51,8 +53,9 @@ class SurfMatcher {
   [[nodiscard]] static std::size_t memory_needed(std::size_t capacity) noexcept;
 
   /// In the order of the left points. `band` may be null.
-  [[nodiscard]] SurfMatchStatus match(const SurfView& left, const SurfView& right, const SurfMatchOptions& options,
-                                      const EpipolarBand* band, BoundedVector<SurfMatch>* out) noexcept;
+  [[nodiscard]] SurfMatchStatus match(const SurfView& left, const SurfView& right,
+                                      const SurfMatchOptions& options, const EpipolarBand* band,
+                                      BoundedVector<SurfMatch>* out) noexcept;
 
  private:
   struct Best {

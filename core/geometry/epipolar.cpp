@@ -5,14 +5,17 @@
 namespace vergence {
 namespace {
 
-constexpr double kMinGradient2 = 1e-20;  // squared length of the line's normal: within 1e-10 of the epipole
-constexpr double kMinSine2 = 1e-20;      // between two rays: parallel to what double can tell
+constexpr double kMinGradient2 =
+    1e-20;  // squared length of the line's normal: within 1e-10 of the epipole
+constexpr double kMinSine2 = 1e-20;  // between two rays: parallel to what double can tell
 
 }  // namespace
 
 Mat32 tangent_basis(const Vec3& unit) noexcept {
   const Vec3 a = unit.cwiseAbs();
-  const Vec3 axis = a.x() <= a.y() && a.x() <= a.z() ? Vec3::UnitX() : a.y() <= a.z() ? Vec3::UnitY() : Vec3::UnitZ();
+  const Vec3 axis = a.x() <= a.y() && a.x() <= a.z() ? Vec3::UnitX()
+                    : a.y() <= a.z()                 ? Vec3::UnitY()
+                                                     : Vec3::UnitZ();
   Mat32 B;
   B.col(0) = unit.cross(axis).normalized();
   B.col(1) = unit.cross(B.col(0));
@@ -22,7 +25,8 @@ Mat32 tangent_basis(const Vec3& unit) noexcept {
 Transform moved_on_sphere(const Transform& T, const Vec5& delta) noexcept {
   const double length = T.t.norm();
   const Vec3 unit = T.t / length;
-  return {normalised(exp_so3(delta.head<3>()) * T.R), length * (unit + tangent_basis(unit) * delta.tail<2>()).normalized()};
+  return {normalised(exp_so3(delta.head<3>()) * T.R),
+          length * (unit + tangent_basis(unit) * delta.tail<2>()).normalized()};
 }
 
 Mat3 essential_matrix(const Transform& T) noexcept {
@@ -30,7 +34,8 @@ Mat3 essential_matrix(const Transform& T) noexcept {
   return length > 0 ? Mat3(skew(T.t / length) * T.R) : Mat3(Mat3::Zero());
 }
 
-EpipolarGeometry::EpipolarGeometry(const Transform& T) noexcept : R_(T.R), E_(essential_matrix(T)), t_(Vec3::UnitX()), B_(Mat32::Zero()) {
+EpipolarGeometry::EpipolarGeometry(const Transform& T) noexcept
+    : R_(T.R), E_(essential_matrix(T)), t_(Vec3::UnitX()), B_(Mat32::Zero()) {
   const double length = T.t.norm();
   valid_ = length > 0 && T.finite();
   if (valid_) {
@@ -40,7 +45,8 @@ EpipolarGeometry::EpipolarGeometry(const Transform& T) noexcept : R_(T.R), E_(es
 }
 
 template <bool kBothImages>
-EpipolarStatus EpipolarGeometry::distance(const Vec2& left, const Vec2& right, double* value, Vec5* J) const noexcept {
+EpipolarStatus EpipolarGeometry::distance(const Vec2& left, const Vec2& right, double* value,
+                                          Vec5* J) const noexcept {
   if (!valid_) return EpipolarStatus::no_baseline;
   const Vec3 x1 = left.homogeneous(), x2 = right.homogeneous();
   const Vec3 turned = R_ * x1;
@@ -54,7 +60,8 @@ EpipolarStatus EpipolarGeometry::distance(const Vec2& left, const Vec2& right, d
   const double i = 1.0 / std::sqrt(s);
   *value = n * i;
   if (J == nullptr) return EpipolarStatus::ok;
-  // l = t × (R x): ∂/∂φ = −[t]× [R x]×, ∂/∂(α, β) = −[R x]× B.   k = Rᵀ (x' × t): ∂/∂φ = Rᵀ [w]×, ∂/∂(α, β) = Rᵀ [x']× B.
+  // l = t × (R x): ∂/∂φ = −[t]× [R x]×, ∂/∂(α, β) = −[R x]× B.   k = Rᵀ (x' × t): ∂/∂φ = Rᵀ [w]×,
+  // ∂/∂(α, β) = Rᵀ [x']× B.
   Eigen::Matrix<double, 3, 5> dl;
   const Mat3 Y = skew(turned);
   dl.leftCols<3>() = -skew(t_) * Y;
@@ -70,15 +77,18 @@ EpipolarStatus EpipolarGeometry::distance(const Vec2& left, const Vec2& right, d
   return EpipolarStatus::ok;
 }
 
-EpipolarStatus EpipolarGeometry::sampson(const Vec2& left, const Vec2& right, double* value, Vec5* J) const noexcept {
+EpipolarStatus EpipolarGeometry::sampson(const Vec2& left, const Vec2& right, double* value,
+                                         Vec5* J) const noexcept {
   return distance<true>(left, right, value, J);
 }
 
-EpipolarStatus EpipolarGeometry::to_line(const Vec2& left, const Vec2& right, double* value, Vec5* J) const noexcept {
+EpipolarStatus EpipolarGeometry::to_line(const Vec2& left, const Vec2& right, double* value,
+                                         Vec5* J) const noexcept {
   return distance<false>(left, right, value, J);
 }
 
-bool match_depths(const Transform& T, const Vec2& left, const Vec2& right, double* depth_left, double* depth_right) noexcept {
+bool match_depths(const Transform& T, const Vec2& left, const Vec2& right, double* depth_left,
+                  double* depth_right) noexcept {
   const Vec3 a = T.R * left.homogeneous(), b = right.homogeneous();
   const Vec3 c = a.cross(b);
   const double c2 = c.squaredNorm();

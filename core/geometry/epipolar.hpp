@@ -14,11 +14,13 @@ enum class EpipolarStatus : std::uint8_t {
   no_baseline,  // |t| = 0 or not a number
 };
 
-/// Two unit vectors that span the plane perpendicular to a unit vector; the same for the same input.
+/// Two unit vectors that span the plane perpendicular to a unit vector; the same for the same
+/// input.
 [[nodiscard]] Mat32 tangent_basis(const Vec3& unit) noexcept;
 
-/// The stereo transform moved by δ = (φ, α, β), rad: R ← Exp(φ) R, t ← |t| · normalised(t/|t| + B (α, β)), B the tangent
-/// basis of t/|t|. The length stays: two cameras do not see it. Precondition: |t| > 0.
+/// The stereo transform moved by δ = (φ, α, β), rad: R ← Exp(φ) R, t ← |t| · normalised(t/|t| + B
+/// (α, β)), B the tangent basis of t/|t|. The length stays: two cameras do not see it.
+/// Precondition: |t| > 0.
 [[nodiscard]] Transform moved_on_sphere(const Transform& T_right_left, const Vec5& delta) noexcept;
 
 /// E = [t/|t|]× R: ray_rightᵀ E ray_left = 0. Zero where |t| is.
@@ -28,23 +30,28 @@ enum class EpipolarStatus : std::uint8_t {
 ///
 /// With rays x = (x, y, 1) of the left and x' of the right camera, l = E x, k = Eᵀ x', n = x'ᵀ E x:
 ///
-///     Sampson distance   n / √(l_x² + l_y² + k_x² + k_y²)   (P. Sampson 1982; first order of the reprojection error)
-///     to the line        n / √(l_x² + l_y²)                 (the right point's distance from the left one's epipolar line)
+///     Sampson distance   n / √(l_x² + l_y² + k_x² + k_y²)   (P. Sampson 1982; first order of the
+///     reprojection error) to the line        n / √(l_x² + l_y²)                 (the right point's
+///     distance from the left one's epipolar line)
 ///
-/// Both are signed, in normalised units (times the focal length: px). J: derivative by δ of moved_on_sphere().
+/// Both are signed, in normalised units (times the focal length: px). J: derivative by δ of
+/// moved_on_sphere().
 /// Threads  Const after construction.
 class EpipolarGeometry {
  public:
   explicit EpipolarGeometry(const Transform& T_right_left) noexcept;
 
   /// Not `ok`: *value and *J untouched. J may be null.
-  [[nodiscard]] EpipolarStatus sampson(const Vec2& left, const Vec2& right, double* value, Vec5* J) const noexcept;
-  [[nodiscard]] EpipolarStatus to_line(const Vec2& left, const Vec2& right, double* value, Vec5* J) const noexcept;
+  [[nodiscard]] EpipolarStatus sampson(const Vec2& left, const Vec2& right, double* value,
+                                       Vec5* J) const noexcept;
+  [[nodiscard]] EpipolarStatus to_line(const Vec2& left, const Vec2& right, double* value,
+                                       Vec5* J) const noexcept;
   [[nodiscard]] const Mat3& E() const noexcept { return E_; }
 
  private:
   template <bool kBothImages>
-  [[nodiscard]] EpipolarStatus distance(const Vec2& left, const Vec2& right, double* value, Vec5* J) const noexcept;
+  [[nodiscard]] EpipolarStatus distance(const Vec2& left, const Vec2& right, double* value,
+                                        Vec5* J) const noexcept;
 
   Mat3 R_, E_;
   Vec3 t_;   // unit
@@ -52,9 +59,10 @@ class EpipolarGeometry {
   bool valid_;
 };
 
-/// Depths along (x, y, 1) of a match by the two rays' nearest points: depth_right · right = R (depth_left · left) + t.
+/// Depths along (x, y, 1) of a match by the two rays' nearest points: depth_right · right = R
+/// (depth_left · left) + t.
 /// False: the rays are parallel; nothing written.
-[[nodiscard]] bool match_depths(const Transform& T_right_left, const Vec2& left, const Vec2& right, double* depth_left,
-                                double* depth_right) noexcept;
+[[nodiscard]] bool match_depths(const Transform& T_right_left, const Vec2& left, const Vec2& right,
+                                double* depth_left, double* depth_right) noexcept;
 
 }  // namespace vergence

@@ -23,8 +23,9 @@ using Mat10x20 = Eigen::Matrix<double, 10, 20>;
 using Vec10 = Eigen::Matrix<double, 10, 1>;
 using Vec20 = Eigen::Matrix<double, 20, 1>;
 
-// Polynomials in (x, y, z) by their coefficients. Linear: x y z 1. Quadratic: x² xy xz x y² yz y z² z 1.
-// Cubic, in the order of the elimination: x³ y³ x²y xy² x²z x² y²z y² xyz xy | xz² xz x yz² yz y z³ z² z 1.
+// Polynomials in (x, y, z) by their coefficients. Linear: x y z 1. Quadratic: x² xy xz x y² yz y z²
+// z 1. Cubic, in the order of the elimination: x³ y³ x²y xy² x²z x² y²z y² xyz xy | xz² xz x yz² yz
+// y z³ z² z 1.
 using Linear = std::array<double, 4>;
 using Quadratic = std::array<double, 10>;
 
@@ -33,16 +34,26 @@ struct Exponents {
   constexpr bool operator==(const Exponents&) const = default;
 };
 constexpr std::array<Exponents, 4> kLinear = {{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}, {0, 0, 0}}};
-constexpr std::array<Exponents, 10> kQuadratic = {
-    {{2, 0, 0}, {1, 1, 0}, {1, 0, 1}, {1, 0, 0}, {0, 2, 0}, {0, 1, 1}, {0, 1, 0}, {0, 0, 2}, {0, 0, 1}, {0, 0, 0}}};
-constexpr std::array<Exponents, 20> kCubic = {{{3, 0, 0}, {0, 3, 0}, {2, 1, 0}, {1, 2, 0}, {2, 0, 1}, {2, 0, 0}, {0, 2, 1},
-                                               {0, 2, 0}, {1, 1, 1}, {1, 1, 0}, {1, 0, 2}, {1, 0, 1}, {1, 0, 0}, {0, 1, 2},
-                                               {0, 1, 1}, {0, 1, 0}, {0, 0, 3}, {0, 0, 2}, {0, 0, 1}, {0, 0, 0}}};
+constexpr std::array<Exponents, 10> kQuadratic = {{{2, 0, 0},
+                                                   {1, 1, 0},
+                                                   {1, 0, 1},
+                                                   {1, 0, 0},
+                                                   {0, 2, 0},
+                                                   {0, 1, 1},
+                                                   {0, 1, 0},
+                                                   {0, 0, 2},
+                                                   {0, 0, 1},
+                                                   {0, 0, 0}}};
+constexpr std::array<Exponents, 20> kCubic = {
+    {{3, 0, 0}, {0, 3, 0}, {2, 1, 0}, {1, 2, 0}, {2, 0, 1}, {2, 0, 0}, {0, 2, 1},
+     {0, 2, 0}, {1, 1, 1}, {1, 1, 0}, {1, 0, 2}, {1, 0, 1}, {1, 0, 0}, {0, 1, 2},
+     {0, 1, 1}, {0, 1, 0}, {0, 0, 3}, {0, 0, 2}, {0, 0, 1}, {0, 0, 0}}};
 
 /// Where the product of monomial i of A and j of B stands in C.
 template <std::size_t A, std::size_t B, std::size_t C>
-consteval std::array<std::array<std::size_t, B>, A> product_table(const std::array<Exponents, A>& a, const std::array<Exponents, B>& b,
-                                                                  const std::array<Exponents, C>& c) {
+consteval std::array<std::array<std::size_t, B>, A> product_table(
+    const std::array<Exponents, A>& a, const std::array<Exponents, B>& b,
+    const std::array<Exponents, C>& c) {
   std::array<std::array<std::size_t, B>, A> table{};
   for (std::size_t i = 0; i < A; ++i)
     for (std::size_t j = 0; j < B; ++j) {
@@ -62,7 +73,8 @@ void add_product(const Linear& a, const Linear& b, double s, Quadratic* out) noe
 
 void add_product(const Quadratic& a, const Linear& b, Mat10x20* M, int row) noexcept {
   for (std::size_t i = 0; i < 10; ++i)
-    for (std::size_t j = 0; j < 4; ++j) (*M)(row, static_cast<int>(kQuadraticLinear[i][j])) += a[i] * b[j];
+    for (std::size_t j = 0; j < 4; ++j)
+      (*M)(row, static_cast<int>(kQuadraticLinear[i][j])) += a[i] * b[j];
 }
 
 using Basis = std::array<Mat3, 4>;  // X Y Z W
@@ -72,7 +84,8 @@ using Basis = std::array<Mat3, 4>;  // X Y Z W
   std::array<std::array<Linear, 3>, 3> E;
   for (std::size_t r = 0; r < 3; ++r)
     for (std::size_t c = 0; c < 3; ++c)
-      for (std::size_t k = 0; k < 4; ++k) E[r][c][k] = basis[k](static_cast<int>(r), static_cast<int>(c));
+      for (std::size_t k = 0; k < 4; ++k)
+        E[r][c][k] = basis[k](static_cast<int>(r), static_cast<int>(c));
   Mat10x20 M = Mat10x20::Zero();
   for (std::size_t c = 0; c < 3; ++c) {  // expansion along the first row
     const std::size_t a = (c + 1) % 3, b = (c + 2) % 3;
@@ -88,20 +101,24 @@ using Basis = std::array<Mat3, 4>;  // X Y Z W
       EEt[c][r] = EEt[r][c];
     }
   Quadratic half_trace;
-  for (std::size_t i = 0; i < 10; ++i) half_trace[i] = 0.5 * (EEt[0][0][i] + EEt[1][1][i] + EEt[2][2][i]);
+  for (std::size_t i = 0; i < 10; ++i)
+    half_trace[i] = 0.5 * (EEt[0][0][i] + EEt[1][1][i] + EEt[2][2][i]);
   for (std::size_t r = 0; r < 3; ++r)
     for (std::size_t i = 0; i < 10; ++i) EEt[r][r][i] -= half_trace[i];
   for (std::size_t r = 0; r < 3; ++r)
     for (std::size_t c = 0; c < 3; ++c)
-      for (std::size_t k = 0; k < 3; ++k) add_product(EEt[r][k], E[k][c], &M, static_cast<int>(1 + 3 * r + c));
+      for (std::size_t k = 0; k < 3; ++k)
+        add_product(EEt[r][k], E[k][c], &M, static_cast<int>(1 + 3 * r + c));
   return M;
 }
 
 /// Null space of the five equations as four matrices, orthonormal.
-[[nodiscard]] bool null_space(const std::array<Vec2, 5>& left, const std::array<Vec2, 5>& right, Basis* basis) noexcept {
+[[nodiscard]] bool null_space(const std::array<Vec2, 5>& left, const std::array<Vec2, 5>& right,
+                              Basis* basis) noexcept {
   Eigen::Matrix<double, 9, 5> A;  // columns: the equations
   for (int i = 0; i < 5; ++i) {
-    const Vec3 x = left[static_cast<std::size_t>(i)].homogeneous(), y = right[static_cast<std::size_t>(i)].homogeneous();
+    const Vec3 x = left[static_cast<std::size_t>(i)].homogeneous(),
+               y = right[static_cast<std::size_t>(i)].homogeneous();
     for (int r = 0; r < 3; ++r)
       for (int c = 0; c < 3; ++c) A(3 * r + c, i) = y[r] * x[c];
     A.col(i).normalize();
@@ -121,7 +138,8 @@ struct EliminatedRow {
   std::array<double, 5> one;
 };
 
-/// upper − z · lower for two rows of the reduced system, of which only the right ten columns are left.
+/// upper − z · lower for two rows of the reduced system, of which only the right ten columns are
+/// left.
 [[nodiscard]] EliminatedRow eliminate(const Vec10& upper, const Vec10& lower) noexcept {
   return {{upper[2], upper[1] - lower[2], upper[0] - lower[1], -lower[0]},
           {upper[5], upper[4] - lower[5], upper[3] - lower[4], -lower[3]},
@@ -129,7 +147,8 @@ struct EliminatedRow {
 }
 
 template <std::size_t A, std::size_t B>
-[[nodiscard]] std::array<double, A + B - 1> product(const std::array<double, A>& a, const std::array<double, B>& b) noexcept {
+[[nodiscard]] std::array<double, A + B - 1> product(const std::array<double, A>& a,
+                                                    const std::array<double, B>& b) noexcept {
   std::array<double, A + B - 1> out{};
   for (std::size_t i = 0; i < A; ++i)
     for (std::size_t j = 0; j < B; ++j) out[i + j] += a[i] * b[j];
@@ -137,7 +156,8 @@ template <std::size_t A, std::size_t B>
 }
 
 template <std::size_t N>
-[[nodiscard]] std::array<double, N> difference(std::array<double, N> a, const std::array<double, N>& b) noexcept {
+[[nodiscard]] std::array<double, N> difference(std::array<double, N> a,
+                                               const std::array<double, N>& b) noexcept {
   for (std::size_t i = 0; i < N; ++i) a[i] -= b[i];
   return a;
 }
@@ -163,10 +183,13 @@ template <std::size_t N>
 /// (x, y) with B(z) (x, y, 1)ᵀ = 0 by the longest cross product of two rows.
 [[nodiscard]] bool x_and_y(const std::array<EliminatedRow, 3>& B, double z, Vec3* xyz) noexcept {
   std::array<Vec3, 3> rows;
-  for (std::size_t r = 0; r < 3; ++r) rows[r] = Vec3(value(B[r].x, z), value(B[r].y, z), value(B[r].one, z)).normalized();
-  const std::array<Vec3, 3> crosses = {rows[0].cross(rows[1]), rows[0].cross(rows[2]), rows[1].cross(rows[2])};
-  const Vec3& v = *std::max_element(crosses.begin(), crosses.end(),
-                                    [](const Vec3& a, const Vec3& b) noexcept { return a.squaredNorm() < b.squaredNorm(); });
+  for (std::size_t r = 0; r < 3; ++r)
+    rows[r] = Vec3(value(B[r].x, z), value(B[r].y, z), value(B[r].one, z)).normalized();
+  const std::array<Vec3, 3> crosses = {rows[0].cross(rows[1]), rows[0].cross(rows[2]),
+                                       rows[1].cross(rows[2])};
+  const Vec3& v = *std::max_element(
+      crosses.begin(), crosses.end(),
+      [](const Vec3& a, const Vec3& b) noexcept { return a.squaredNorm() < b.squaredNorm(); });
   *xyz = Vec3(v.x() / v.z(), v.y() / v.z(), z);
   return xyz->allFinite();
 }
@@ -179,7 +202,8 @@ void cubics_at(const Mat3& E, Vec10* f) noexcept {
   for (int i = 0; i < 9; ++i) (*f)[1 + i] = T(i / 3, i % 3);
 }
 
-/// Gauss–Newton on the ten cubics over the unit sphere of the null space: E = Σ q_k basis_k, |q| = 1.
+/// Gauss–Newton on the ten cubics over the unit sphere of the null space: E = Σ q_k basis_k, |q| =
+/// 1.
 [[nodiscard]] bool polish(const Basis& basis, const Vec3& xyz, Mat3* E_out) noexcept {
   Vec4 q(xyz.x(), xyz.y(), xyz.z(), 1.0);
   q.normalize();
@@ -197,12 +221,14 @@ void cubics_at(const Mat3& E, Vec10* f) noexcept {
     for (int k = 0; k < 4; ++k) {
       const Mat3& D = basis[static_cast<std::size_t>(k)];
       const Mat3 DEt = D * E.transpose();
-      const Mat3 dT = (DEt + DEt.transpose()) * E + EEt * D - DEt.trace() * E - 0.5 * EEt.trace() * D;
+      const Mat3 dT =
+          (DEt + DEt.transpose()) * E + EEt * D - DEt.trace() * E - 0.5 * EEt.trace() * D;
       J(0, k) = cofactors.cwiseProduct(D).sum();
       for (int i = 0; i < 9; ++i) J(1 + i, k) = dT(i / 3, i % 3);
     }
     Eigen::Matrix4d H = J.transpose() * J;
-    H.noalias() += q * q.transpose();  // the length of q is free in the cubics: held, so that H has full rank
+    H.noalias() +=
+        q * q.transpose();  // the length of q is free in the cubics: held, so that H has full rank
     const Eigen::LDLT<Eigen::Matrix4d> ldlt(H);
     const Vec4 next = (q - ldlt.solve(Vec4(J.transpose() * f))).normalized();
     const Mat3 E_next = matrix(next);
@@ -220,7 +246,8 @@ void cubics_at(const Mat3& E, Vec10* f) noexcept {
 
 }  // namespace
 
-FivePointSolutions solve_five_point(const std::array<Vec2, 5>& left, const std::array<Vec2, 5>& right) noexcept {
+FivePointSolutions solve_five_point(const std::array<Vec2, 5>& left,
+                                    const std::array<Vec2, 5>& right) noexcept {
   FivePointSolutions out;
   const auto refuse = [&out](FivePointStatus why) noexcept {
     out.status = why;
@@ -236,8 +263,10 @@ FivePointSolutions solve_five_point(const std::array<Vec2, 5>& left, const std::
   const Eigen::Matrix<double, 10, 10> reduced = lu.solve(tail);
   if (!reduced.allFinite()) return refuse(FivePointStatus::degenerate);
   const auto row = [&reduced](int i) noexcept { return Vec10(reduced.row(i).transpose()); };
-  // Rows 4 … 9 of the reduced system lead with x²z x² y²z y² xyz xy: pairs that differ by a factor z.
-  const std::array<EliminatedRow, 3> B = {eliminate(row(4), row(5)), eliminate(row(6), row(7)), eliminate(row(8), row(9))};
+  // Rows 4 … 9 of the reduced system lead with x²z x² y²z y² xyz xy: pairs that differ by a factor
+  // z.
+  const std::array<EliminatedRow, 3> B = {eliminate(row(4), row(5)), eliminate(row(6), row(7)),
+                                          eliminate(row(8), row(9))};
   std::array<double, 11> det = determinant(B);
   double largest = 0;
   for (const double c : det) largest = std::max(largest, std::abs(c));
@@ -254,7 +283,8 @@ FivePointSolutions solve_five_point(const std::array<Vec2, 5>& left, const std::
       if (outside && roots[i] == 0.0) continue;
       Vec3 xyz;
       Mat3 E;
-      if (!x_and_y(B, outside ? 1.0 / roots[i] : roots[i], &xyz) || !polish(basis, xyz, &E)) continue;
+      if (!x_and_y(B, outside ? 1.0 / roots[i] : roots[i], &xyz) || !polish(basis, xyz, &E))
+        continue;
       bool seen = false;  // two starts may be polished into one
       for (int j = 0; j < out.count; ++j) {
         const Mat3& other = out.E[static_cast<std::size_t>(j)];
@@ -267,8 +297,8 @@ FivePointSolutions solve_five_point(const std::array<Vec2, 5>& left, const std::
   return out;
 }
 
-int decompose_essential(const Mat3& E, std::span<const Vec2> left, std::span<const Vec2> right, double baseline,
-                        Transform* T_right_left) noexcept {
+int decompose_essential(const Mat3& E, std::span<const Vec2> left, std::span<const Vec2> right,
+                        double baseline, Transform* T_right_left) noexcept {
   if (!E.allFinite() || left.size() != right.size()) return 0;
   const Eigen::JacobiSVD<Mat3> svd(E, Eigen::ComputeFullU | Eigen::ComputeFullV);
   Mat3 U = svd.matrixU(), V = svd.matrixV();

@@ -14,7 +14,8 @@ enum class FivePointStatus : std::uint8_t {
   no_solution,  // all roots are complex
 };
 
-/// Essential matrices, Frobenius norm √2: rayᵀ_right E ray_left = 0. `count` is 0 unless `status` is ok.
+/// Essential matrices, Frobenius norm √2: rayᵀ_right E ray_left = 0. `count` is 0 unless `status`
+/// is ok.
 struct FivePointSolutions {
   FivePointStatus status = FivePointStatus::no_solution;
   int count = 0;  // 0 … 10
@@ -23,16 +24,20 @@ struct FivePointSolutions {
 
 /// Relative pose from five matches, undistorted rays (x, y, 1).
 ///
-/// E = x X + y Y + z Z + W over the null space of the five epipolar equations; det E = 0 and E Eᵀ E − ½ tr(E Eᵀ) E = 0 are ten
-/// cubics; eliminated down to a 3×3 matrix of polynomials in z whose determinant has degree ten (D. Nistér, "An Efficient
-/// Solution to the Five-Point Relative Pose Problem", PAMI 26, 2004). Its real roots are isolated between critical points, and
-/// (x, y, z) polished by Gauss–Newton on the ten cubics, which takes away what the elimination has rounded.
+/// E = x X + y Y + z Z + W over the null space of the five epipolar equations; det E = 0 and E Eᵀ E
+/// − ½ tr(E Eᵀ) E = 0 are ten cubics; eliminated down to a 3×3 matrix of polynomials in z whose
+/// determinant has degree ten (D. Nistér, "An Efficient Solution to the Five-Point Relative Pose
+/// Problem", PAMI 26, 2004). Its real roots are isolated between critical points, and (x, y, z)
+/// polished by Gauss–Newton on the ten cubics, which takes away what the elimination has rounded.
 /// Threads pure. Memory none. Errors by status; nothing that comes out is NaN.
-[[nodiscard]] FivePointSolutions solve_five_point(const std::array<Vec2, 5>& left, const std::array<Vec2, 5>& right) noexcept;
+[[nodiscard]] FivePointSolutions solve_five_point(const std::array<Vec2, 5>& left,
+                                                  const std::array<Vec2, 5>& right) noexcept;
 
-/// The one of E's four transforms that has most of the matches in front of both cameras, |t| = baseline.
-/// Returns how many are; 0: none, *T_right_left untouched. Precondition: left.size() == right.size().
-[[nodiscard]] int decompose_essential(const Mat3& E, std::span<const Vec2> left, std::span<const Vec2> right, double baseline,
+/// The one of E's four transforms that has most of the matches in front of both cameras, |t| =
+/// baseline. Returns how many are; 0: none, *T_right_left untouched. Precondition: left.size() ==
+/// right.size().
+[[nodiscard]] int decompose_essential(const Mat3& E, std::span<const Vec2> left,
+                                      std::span<const Vec2> right, double baseline,
                                       Transform* T_right_left) noexcept;
 
 }  // namespace vergence

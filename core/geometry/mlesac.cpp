@@ -13,15 +13,17 @@ namespace vergence {
 namespace {
 
 constexpr const char* kWho = "rig MLESAC";
-// Scoring looks up after so many observations whether the hypothesis has lost already; a multiple of the block.
+// Scoring looks up after so many observations whether the hypothesis has lost already; a multiple
+// of the block.
 constexpr std::size_t kAbortChunk = 64;
-constexpr int kPolishSteps = 3;   // Gauss–Newton on inliers from a pose a few sigmas off
-constexpr int kMaxPolished = 12;  // new bests polished a solve: they come log(hypotheses) often, later ones matter least
+constexpr int kPolishSteps = 3;  // Gauss–Newton on inliers from a pose a few sigmas off
+constexpr int kMaxPolished =
+    12;  // new bests polished a solve: they come log(hypotheses) often, later ones matter least
 constexpr double kNoHuber = 1e6;  // sigmas: inliers are cut at T², nothing is left to down-weight
 
 [[nodiscard]] bool valid(const MlesacOptions& o) noexcept {
-  return o.max_hypotheses >= 1 && o.min_hypotheses >= 0 && o.confidence > 0 && o.confidence < 1 && o.outlier_cost > 0 &&
-         std::isfinite(o.outlier_cost);
+  return o.max_hypotheses >= 1 && o.min_hypotheses >= 0 && o.confidence > 0 && o.confidence < 1 &&
+         o.outlier_cost > 0 && std::isfinite(o.outlier_cost);
 }
 
 }  // namespace
@@ -36,15 +38,18 @@ int samples_needed(double inliers, int size, double confidence, int cap) noexcep
 
 std::size_t RigMlesac::memory_needed(std::size_t capacity) noexcept {
   const std::size_t n = detail::padded(capacity, detail::kFloatBlock);
-  const std::size_t camera = 7 * (n * sizeof(float) + kCacheLine) + n * sizeof(std::uint32_t) + n + 2 * kCacheLine;
-  return static_cast<std::size_t>(kMaxCameras) * camera + capacity + kCacheLine + detail::PoseProblem::memory_needed(capacity);
+  const std::size_t camera =
+      7 * (n * sizeof(float) + kCacheLine) + n * sizeof(std::uint32_t) + n + 2 * kCacheLine;
+  return static_cast<std::size_t>(kMaxCameras) * camera + capacity + kCacheLine +
+         detail::PoseProblem::memory_needed(capacity);
 }
 
 RigMlesac::RigMlesac(std::size_t capacity, Arena& arena)
     : problem_(capacity, arena, kWho), flags_(arena.make<std::uint8_t>(capacity, kWho)) {
   const std::size_t n = detail::padded(capacity, detail::kFloatBlock);
   for (CameraSet& s : sets_) {
-    for (std::span<float>* column : {&s.x, &s.y, &s.z, &s.u, &s.v, &s.weight, &s.cap}) *column = arena.make<float>(n, kWho);
+    for (std::span<float>* column : {&s.x, &s.y, &s.z, &s.u, &s.v, &s.weight, &s.cap})
+      *column = arena.make<float>(n, kWho);
     s.point = arena.make<std::uint32_t>(n, kWho);
     s.bucket = arena.make<std::uint8_t>(n, kWho);
   }
@@ -61,7 +66,8 @@ void RigMlesac::gather(const RigObservations& o, double cap) noexcept {
     sum += p;
     ++finite;
   }
-  centre_ = finite > 0 && sum.allFinite() ? Vec3(sum / static_cast<double>(finite)) : Vec3(Vec3::Zero());
+  centre_ =
+      finite > 0 && sum.allFinite() ? Vec3(sum / static_cast<double>(finite)) : Vec3(Vec3::Zero());
   for (int k = 0; k < kMaxCameras; ++k) {
     CameraSet& s = sets_[static_cast<std::size_t>(k)];
     s.count = s.scored = 0;
@@ -81,18 +87,22 @@ void RigMlesac::gather(const RigObservations& o, double cap) noexcept {
       s.cap[n] = static_cast<float>(cap);
       box.include(o.u[kk][i], o.v[kk][i]);
     }
-    for (std::size_t n = 0; n < s.count; ++n) s.bucket[n] = box.bucket(o.u[kk][s.point[n]], o.v[kk][s.point[n]]);
+    for (std::size_t n = 0; n < s.count; ++n)
+      s.bucket[n] = box.bucket(o.u[kk][s.point[n]], o.v[kk][s.point[n]]);
     s.scored = detail::padded(s.count, detail::kFloatBlock);
-    for (std::size_t n = s.count; n < s.scored; ++n) s.x[n] = s.y[n] = s.z[n] = s.u[n] = s.v[n] = s.weight[n] = s.cap[n] = 0.0F;
+    for (std::size_t n = s.count; n < s.scored; ++n)
+      s.x[n] = s.y[n] = s.z[n] = s.u[n] = s.v[n] = s.weight[n] = s.cap[n] = 0.0F;
     observations_ += static_cast<int>(s.count);
   }
 }
 
-bool RigMlesac::draw(const CameraSet& set, Random& random, std::array<std::uint32_t, 3>* picks) const noexcept {
+bool RigMlesac::draw(const CameraSet& set, Random& random,
+                     std::array<std::uint32_t, 3>* picks) const noexcept {
   return detail::draw_spread<3>(set.bucket.first(set.count), random, picks);
 }
 
-double RigMlesac::score(const RigObservations& o, const Transform& T_left_world, double best) const noexcept {
+double RigMlesac::score(const RigObservations& o, const Transform& T_left_world,
+                        double best) const noexcept {
   double cost = 0;
   for (int k = 0; k < o.cameras; ++k) {
     const auto kk = static_cast<std::size_t>(k);
@@ -104,13 +114,16 @@ double RigMlesac::score(const RigObservations& o, const Transform& T_left_world,
     const Vec3 gain(c.fx, c.fy, 1.0);
     detail::ProjectionRows rows;
     for (int r = 0; r < 3; ++r) {
-      for (int j = 0; j < 3; ++j) rows[static_cast<std::size_t>(4 * r + j)] = static_cast<float>(gain[r] * R(r, j));
+      for (int j = 0; j < 3; ++j)
+        rows[static_cast<std::size_t>(4 * r + j)] = static_cast<float>(gain[r] * R(r, j));
       rows[static_cast<std::size_t>(4 * r + 3)] = static_cast<float>(gain[r] * t[r]);
     }
-    const detail::ScoreColumns columns{s.x.data(), s.y.data(), s.z.data(), s.u.data(), s.v.data(), s.weight.data(), s.cap.data()};
+    const detail::ScoreColumns columns{s.x.data(), s.y.data(),      s.z.data(),  s.u.data(),
+                                       s.v.data(), s.weight.data(), s.cap.data()};
     for (std::size_t first = 0; first < s.scored; first += kAbortChunk) {
-      cost += static_cast<double>(
-          detail::projection_cost(columns, first, std::min(first + kAbortChunk, s.scored), rows, static_cast<float>(kMinDepth)));
+      cost += static_cast<double>(detail::projection_cost(columns, first,
+                                                          std::min(first + kAbortChunk, s.scored),
+                                                          rows, static_cast<float>(kMinDepth)));
       if (!(cost < best)) return std::numeric_limits<double>::infinity();
     }
   }
@@ -130,14 +143,16 @@ void RigMlesac::flag(const RigObservations& o, double cap, MlesacPose* pose) noe
       const Vec3 p = T_camera_world * Vec3(o.x[i], o.y[i], o.z[i]);
       if (!(p.z() > kMinDepth)) continue;
       const double iz = 1.0 / p.z();
-      const double du = c.fx * p.x() * iz + c.cx - o.u[kk][i], dv = c.fy * p.y() * iz + c.cy - o.v[kk][i];
+      const double du = c.fx * p.x() * iz + c.cx - o.u[kk][i],
+                   dv = c.fy * p.y() * iz + c.cy - o.v[kk][i];
       if (!(du * du + dv * dv < cap * o.sigma[i] * o.sigma[i])) continue;
       flags_[i] = static_cast<std::uint8_t>(flags_[i] | (1U << kk));
       ++pose->inlier_observations;
     }
   }
   pose->inliers = 0;
-  for (std::size_t i = 0; i < points_; ++i) pose->inliers += flags_[i] != 0 && flags_[i] == o.seen[i] ? 1 : 0;
+  for (std::size_t i = 0; i < points_; ++i)
+    pose->inliers += flags_[i] != 0 && flags_[i] == o.seen[i] ? 1 : 0;
 }
 
 bool RigMlesac::polish(double cap, Transform* T) noexcept {
@@ -158,7 +173,8 @@ bool RigMlesac::polish(double cap, Transform* T) noexcept {
   return true;
 }
 
-MlesacPose RigMlesac::solve(const RigObservations& o, const MlesacOptions& options, const Transform* prior, Random& random) noexcept {
+MlesacPose RigMlesac::solve(const RigObservations& o, const MlesacOptions& options,
+                            const Transform* prior, Random& random) noexcept {
   MlesacPose out;
   points_ = 0;
   const auto refuse = [&out](MlesacStatus why) noexcept {
@@ -200,9 +216,10 @@ MlesacPose RigMlesac::solve(const RigObservations& o, const MlesacOptions& optio
     }
     flag(o, cap, &out);
     const double share = static_cast<double>(out.inlier_observations) / observations_;
-    needed = drawable > 0 ? std::max(std::min(options.min_hypotheses, options.max_hypotheses),
-                                     samples_needed(share, 3, options.confidence, options.max_hypotheses))
-                          : 0;
+    needed = drawable > 0
+                 ? std::max(std::min(options.min_hypotheses, options.max_hypotheses),
+                            samples_needed(share, 3, options.confidence, options.max_hypotheses))
+                 : 0;
     return true;
   };
   if (has_prior) out.prior_best = consider(*prior);
@@ -230,7 +247,8 @@ MlesacPose RigMlesac::solve(const RigObservations& o, const MlesacOptions& optio
     const ThreePointSolutions found = solve_three_point(rays, points);
     const Transform T_left_camera = o.T_camera_left[k].inverse();
     for (int j = 0; j < found.count; ++j)
-      if (consider(T_left_camera * found.T_camera_world[static_cast<std::size_t>(j)])) out.prior_best = false;
+      if (consider(T_left_camera * found.T_camera_world[static_cast<std::size_t>(j)]))
+        out.prior_best = false;
   }
   if (out.status != MlesacStatus::ok) {
     std::fill_n(flags_.begin(), points_, std::uint8_t{0});

@@ -20,8 +20,9 @@ bool RigObservations::consistent() const noexcept {
 
 bool RigObservations::usable(std::size_t i, int camera) const noexcept {
   const auto k = static_cast<std::size_t>(camera);
-  return sees(i, camera) && std::isfinite(x[i]) && std::isfinite(y[i]) && std::isfinite(z[i]) && std::isfinite(u[k][i]) &&
-         std::isfinite(v[k][i]) && sigma[i] > 0 && std::isfinite(sigma[i]);
+  return sees(i, camera) && std::isfinite(x[i]) && std::isfinite(y[i]) && std::isfinite(z[i]) &&
+         std::isfinite(u[k][i]) && std::isfinite(v[k][i]) && sigma[i] > 0 &&
+         std::isfinite(sigma[i]);
 }
 
 std::size_t RigObservationTable::memory_needed(std::size_t capacity) noexcept {

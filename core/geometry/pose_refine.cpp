@@ -10,13 +10,15 @@ namespace {
 
 constexpr const char* kWho = "pose refinement";
 constexpr double kRayleighMedian = 1.1774100225154747;  // √(2 ln 2)
-constexpr int kRescaleAfter = 2;                        // steps: by then the pose is within a sigma or two
-constexpr double kFirstDamping = 1e-4;                  // relative to the diagonal, once a plain step has failed
-constexpr int kMaxFailures = 6;                         // damping grows tenfold a time: beyond, rounding decides
-constexpr double kMaxCondition = 1e12;                  // of the scaled information: beyond, double holds no digit of the worst direction
+constexpr int kRescaleAfter = 2;        // steps: by then the pose is within a sigma or two
+constexpr double kFirstDamping = 1e-4;  // relative to the diagonal, once a plain step has failed
+constexpr int kMaxFailures = 6;         // damping grows tenfold a time: beyond, rounding decides
+constexpr double kMaxCondition =
+    1e12;  // of the scaled information: beyond, double holds no digit of the worst direction
 
 [[nodiscard]] bool valid(const PoseRefineOptions& o) noexcept {
-  return o.max_steps >= 1 && o.max_steps <= 10 && o.huber > 0 && o.min_scale > 0 && o.inlier_chi2 > 0 && o.small_update >= 0;
+  return o.max_steps >= 1 && o.max_steps <= 10 && o.huber > 0 && o.min_scale > 0 &&
+         o.inlier_chi2 > 0 && o.small_update >= 0;
 }
 
 [[nodiscard]] bool small(const Vec6& delta, double limit) noexcept {
@@ -26,7 +28,8 @@ constexpr double kMaxCondition = 1e12;                  // of the scaled informa
 }  // namespace
 
 std::size_t PoseRefiner::memory_needed(std::size_t capacity) noexcept {
-  return detail::PoseProblem::memory_needed(capacity) + static_cast<std::size_t>(kMaxCameras) * capacity * sizeof(double) + capacity +
+  return detail::PoseProblem::memory_needed(capacity) +
+         static_cast<std::size_t>(kMaxCameras) * capacity * sizeof(double) + capacity +
          2 * kCacheLine;
 }
 
@@ -35,7 +38,8 @@ PoseRefiner::PoseRefiner(std::size_t capacity, Arena& arena)
       sorted_(arena.make<double>(static_cast<std::size_t>(kMaxCameras) * capacity, kWho)),
       flags_(arena.make<std::uint8_t>(capacity, kWho)) {}
 
-double PoseRefiner::residual_scale(const Transform& T, std::span<const std::uint8_t> use, double floor) noexcept {
+double PoseRefiner::residual_scale(const Transform& T, std::span<const std::uint8_t> use,
+                                   double floor) noexcept {
   problem_.evaluate(T);
   std::size_t n = 0;
   for (int k = 0; k < problem_.cameras(); ++k) {
@@ -50,7 +54,8 @@ double PoseRefiner::residual_scale(const Transform& T, std::span<const std::uint
   return std::isfinite(scale) ? std::max(floor, scale) : floor;
 }
 
-void PoseRefiner::describe(const RigObservations& o, const PoseRefineOptions& options, RefinedPose* pose) noexcept {
+void PoseRefiner::describe(const RigObservations& o, const PoseRefineOptions& options,
+                           RefinedPose* pose) noexcept {
   problem_.evaluate(pose->T_left_world);
   std::fill_n(flags_.begin(), points_, std::uint8_t{0});
   const double limit = options.inlier_chi2 * pose->scale * pose->scale;
@@ -65,11 +70,14 @@ void PoseRefiner::describe(const RigObservations& o, const PoseRefineOptions& op
       ++pose->inlier_observations;
     }
   }
-  for (std::size_t i = 0; i < points_; ++i) pose->inliers += flags_[i] != 0 && flags_[i] == o.seen[i] ? 1 : 0;
-  if (pose->inlier_observations > 0) pose->rms_px = std::sqrt(sum_px2 / (2.0 * pose->inlier_observations));
+  for (std::size_t i = 0; i < points_; ++i)
+    pose->inliers += flags_[i] != 0 && flags_[i] == o.seen[i] ? 1 : 0;
+  if (pose->inlier_observations > 0)
+    pose->rms_px = std::sqrt(sum_px2 / (2.0 * pose->inlier_observations));
 }
 
-RefinedPose PoseRefiner::refine(const RigObservations& o, const Transform& start, std::span<const std::uint8_t> use,
+RefinedPose PoseRefiner::refine(const RigObservations& o, const Transform& start,
+                                std::span<const std::uint8_t> use,
                                 const PoseRefineOptions& options) noexcept {
   RefinedPose out;
   out.T_left_world = start;
@@ -78,7 +86,8 @@ RefinedPose PoseRefiner::refine(const RigObservations& o, const Transform& start
     out.status = why;
     return out;
   };
-  if (!valid(options) || !o.consistent() || !start.finite() || (!use.empty() && use.size() != o.size()))
+  if (!valid(options) || !o.consistent() || !start.finite() ||
+      (!use.empty() && use.size() != o.size()))
     return refuse(PoseRefineStatus::invalid_input);
   if (o.size() > flags_.size()) return refuse(PoseRefineStatus::capacity);
   points_ = o.size();
@@ -136,7 +145,8 @@ RefinedPose PoseRefiner::refine(const RigObservations& o, const Transform& start
       break;
     }
   }
-  if (out.steps <= kRescaleAfter) {  // the scale at the end is the one that information and flags are in
+  if (out.steps <=
+      kRescaleAfter) {  // the scale at the end is the one that information and flags are in
     out.scale = residual_scale(out.T_left_world, use, options.min_scale);
     now = problem_.sums(out.T_left_world, out.scale, options.huber);
   }
@@ -145,19 +155,24 @@ RefinedPose PoseRefiner::refine(const RigObservations& o, const Transform& start
 
   Vec6 d;
   for (int i = 0; i < 6; ++i) {
-    if (!(out.information(i, i) > 0.0) || !std::isfinite(out.information(i, i))) return refuse(PoseRefineStatus::rank_deficient);
+    if (!(out.information(i, i) > 0.0) || !std::isfinite(out.information(i, i)))
+      return refuse(PoseRefineStatus::rank_deficient);
     d[i] = 1.0 / std::sqrt(out.information(i, i));
   }
   const Mat6 unit = d.asDiagonal() * out.information * d.asDiagonal();
   const Eigen::SelfAdjointEigenSolver<Mat6> scaled(unit, Eigen::EigenvaluesOnly);
-  out.eigenvalues = Eigen::SelfAdjointEigenSolver<Mat6>(out.information, Eigen::EigenvaluesOnly).eigenvalues();
+  out.eigenvalues =
+      Eigen::SelfAdjointEigenSolver<Mat6>(out.information, Eigen::EigenvaluesOnly).eigenvalues();
   const double least = scaled.eigenvalues()[0];
-  if (!(least > scaled.eigenvalues()[5] / kMaxCondition)) return refuse(PoseRefineStatus::rank_deficient);
+  if (!(least > scaled.eigenvalues()[5] / kMaxCondition))
+    return refuse(PoseRefineStatus::rank_deficient);
   out.condition = scaled.eigenvalues()[5] / least;
-  const Mat6 covariance = d.asDiagonal() * Mat6(Eigen::LLT<Mat6>(unit).solve(Mat6::Identity())) * d.asDiagonal();
+  const Mat6 covariance =
+      d.asDiagonal() * Mat6(Eigen::LLT<Mat6>(unit).solve(Mat6::Identity())) * d.asDiagonal();
   const auto worst = [&covariance](int at) noexcept {
     const Mat3 block = covariance.block<3, 3>(at, at);
-    return std::sqrt(std::max(0.0, Eigen::SelfAdjointEigenSolver<Mat3>(block, Eigen::EigenvaluesOnly).eigenvalues()[2]));
+    return std::sqrt(std::max(
+        0.0, Eigen::SelfAdjointEigenSolver<Mat3>(block, Eigen::EigenvaluesOnly).eigenvalues()[2]));
   };
   out.rotation_sigma = worst(0);
   out.translation_sigma = worst(3);

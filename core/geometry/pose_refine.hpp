@@ -8,9 +8,10 @@
 namespace vergence {
 
 struct PoseRefineOptions {
-  int max_steps = 10;          // solver steps, 1 … 10; four are usual
-  double huber = 2.0;          // threshold in scaled sigmas, > 0
-  double min_scale = 1.0;      // floor of the residual scale in given sigmas: a good frame is not believed beyond them
+  int max_steps = 10;  // solver steps, 1 … 10; four are usual
+  double huber = 2.0;  // threshold in scaled sigmas, > 0
+  double min_scale =
+      1.0;  // floor of the residual scale in given sigmas: a good frame is not believed beyond them
   double inlier_chi2 = 9.21;   // squared scaled sigmas: χ² of two coordinates at 99 %
   double small_update = 1e-7;  // rad and m: converged below it
 };
@@ -27,47 +28,62 @@ enum class PoseRefineStatus : std::uint8_t {
 struct RefinedPose {
   PoseRefineStatus status = PoseRefineStatus::too_few;
   Transform T_left_world{};         // the start where nothing could be refined
-  Mat6 information = Mat6::Zero();  // Σ w JᵀJ/(σ scale)² at the end, undamped; δ = (φ rad, τ m), X_left ← Exp(φ) X_left + τ
+  Mat6 information = Mat6::Zero();  // Σ w JᵀJ/(σ scale)² at the end, undamped; δ = (φ rad, τ m),
+                                    // X_left ← Exp(φ) X_left + τ
   Vec6 eigenvalues = Vec6::Zero();  // of `information`, ascending
   double rotation_sigma = 0;        // rad, in the direction known worst, the translation unknown
   double translation_sigma = 0;     // m, likewise: camera position; large → weak_geometry
-  double condition = 0;             // largest over least eigenvalue of the information scaled to a unit diagonal; units drop out
-  double scale = 1;                 // robust residual scale in given sigmas, ≥ min_scale
-  double rms_px = 0;                // of the inliers' residuals, per coordinate
-  int inliers = 0;                  // points with every usable observation under the χ² threshold
+  double condition = 0;  // largest over least eigenvalue of the information scaled to a unit
+                         // diagonal; units drop out
+  double scale = 1;      // robust residual scale in given sigmas, ≥ min_scale
+  double rms_px = 0;     // of the inliers' residuals, per coordinate
+  int inliers = 0;       // points with every usable observation under the χ² threshold
   int inlier_observations = 0;
   int observations = 0;
   int steps = 0;
-  [[nodiscard]] bool usable() const noexcept { return status == PoseRefineStatus::small_update || status == PoseRefineStatus::max_steps; }
+  [[nodiscard]] bool usable() const noexcept {
+    return status == PoseRefineStatus::small_update || status == PoseRefineStatus::max_steps;
+  }
 };
 
-/// Pose of a rig over all cameras' observations with points held: Levenberg–Marquardt on Huber-weighted pixels.
+/// Pose of a rig over all cameras' observations with points held: Levenberg–Marquardt on
+/// Huber-weighted pixels.
 ///
-///     min Σ_o ρ(|x_o − π_k(T_k T_left_world p)| / (σ_o s)),   s = max(min_scale, median |e| / 1.1774)
+///     min Σ_o ρ(|x_o − π_k(T_k T_left_world p)| / (σ_o s)),   s = max(min_scale, median |e|
+///     / 1.1774)
 ///
-/// (1.1774 σ is the median length of a Gaussian vector of two coordinates: the MAD of the residuals). s is taken at the
-/// start and again after the first steps, when a rough start no longer inflates it.
+/// (1.1774 σ is the median length of a Gaussian vector of two coordinates: the MAD of the
+/// residuals). s is taken at the start and again after the first steps, when a rough start no
+/// longer inflates it.
 ///
 /// Ownership  Workspace in the arena. flags() stay valid until the next refine().
 /// Threads    One caller per object. Memory: all at construction.
-/// Errors     By status; nothing that comes out is NaN. Same input, same result, on every instruction set.
+/// Errors     By status; nothing that comes out is NaN. Same input, same result, on every
+///            instruction set.
 class PoseRefiner {
  public:
   [[nodiscard]] static std::size_t memory_needed(std::size_t capacity) noexcept;
   /// At most `capacity` points. Throws std::length_error when the arena is full.
   PoseRefiner(std::size_t capacity, Arena& arena);
 
-  /// `use` (may be empty, else one per point): bit k set lets camera k's observation into the solve, MLESAC's flags for
-  /// instance. Flags, rms and counts are over all usable observations regardless.
-  [[nodiscard]] RefinedPose refine(const RigObservations& observations, const Transform& T_left_world, std::span<const std::uint8_t> use,
+  /// `use` (may be empty, else one per point): bit k set lets camera k's observation into the
+  /// solve, MLESAC's flags for instance. Flags, rms and counts are over all usable observations
+  /// regardless.
+  [[nodiscard]] RefinedPose refine(const RigObservations& observations,
+                                   const Transform& T_left_world, std::span<const std::uint8_t> use,
                                    const PoseRefineOptions& options) noexcept;
 
-  /// For each point of the last refine(): bit k set if camera k's observation is under the χ² threshold.
-  [[nodiscard]] std::span<const std::uint8_t> flags() const noexcept { return flags_.first(points_); }
+  /// For each point of the last refine(): bit k set if camera k's observation is under the χ²
+  /// threshold.
+  [[nodiscard]] std::span<const std::uint8_t> flags() const noexcept {
+    return flags_.first(points_);
+  }
 
  private:
-  [[nodiscard]] double residual_scale(const Transform& T_left_world, std::span<const std::uint8_t> use, double floor) noexcept;
-  void describe(const RigObservations& observations, const PoseRefineOptions& options, RefinedPose* pose) noexcept;
+  [[nodiscard]] double residual_scale(const Transform& T_left_world,
+                                      std::span<const std::uint8_t> use, double floor) noexcept;
+  void describe(const RigObservations& observations, const PoseRefineOptions& options,
+                RefinedPose* pose) noexcept;
 
   detail::PoseProblem problem_;
   std::span<double> sorted_;  // for the median

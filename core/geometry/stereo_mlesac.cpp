@@ -16,24 +16,32 @@ namespace vergence {
 namespace {
 
 constexpr const char* kWho = "stereo MLESAC";
-constexpr std::size_t kAbortChunk = 128;  // matches scored between looks at the best so far; a multiple of the block
-                                          // Gauss–Newton from a pose a few sigmas off
-// Gauss–Newton steps of a polish and, for each, by how much T² is widened: a sample's noise hides good matches at first.
+constexpr std::size_t kAbortChunk =
+    128;  // matches scored between looks at the best so far; a multiple of the block
+          // Gauss–Newton from a pose a few sigmas off
+// Gauss–Newton steps of a polish and, for each, by how much T² is widened: a sample's noise hides
+// good matches at first.
 constexpr std::array kPolishWidths = {9.0, 4.0, 1.0, 1.0, 1.0};
-constexpr int kMaxPolished = 12;        // new bests polished a call: they come log(hypotheses) often
-constexpr double kMaxCondition = 1e12;  // of the information: beyond, double holds no digit of the worst direction
+constexpr int kMaxPolished = 12;  // new bests polished a call: they come log(hypotheses) often
+constexpr double kMaxCondition =
+    1e12;  // of the information: beyond, double holds no digit of the worst direction
 
-[[nodiscard]] bool valid(const StereoMatches& m, double baseline, const StereoMlesacOptions& o) noexcept {
+[[nodiscard]] bool valid(const StereoMatches& m, double baseline,
+                         const StereoMlesacOptions& o) noexcept {
   const std::size_t n = m.size();
-  return m.left_y.size() == n && m.right_x.size() == n && m.right_y.size() == n && m.sigma.size() == n && baseline > 0 &&
-         std::isfinite(baseline) && o.max_hypotheses >= 1 && o.min_hypotheses >= 0 && o.confidence > 0 && o.confidence < 1 &&
-         o.outlier_cost > 0 && std::isfinite(o.outlier_cost);
+  return m.left_y.size() == n && m.right_x.size() == n && m.right_y.size() == n &&
+         m.sigma.size() == n && baseline > 0 && std::isfinite(baseline) && o.max_hypotheses >= 1 &&
+         o.min_hypotheses >= 0 && o.confidence > 0 && o.confidence < 1 && o.outlier_cost > 0 &&
+         std::isfinite(o.outlier_cost);
 }
 
-/// In front of both cameras, or so far away that noise decides the sign of its depth, which then means nothing.
-[[nodiscard]] bool in_front(const Transform& T, const Vec2& left, const Vec2& right, double inverse_sigma, double cap) noexcept {
+/// In front of both cameras, or so far away that noise decides the sign of its depth, which then
+/// means nothing.
+[[nodiscard]] bool in_front(const Transform& T, const Vec2& left, const Vec2& right,
+                            double inverse_sigma, double cap) noexcept {
   double depth_left = 0, depth_right = 0;
-  if (match_depths(T, left, right, &depth_left, &depth_right) && depth_left > 0 && depth_right > 0) return true;
+  if (match_depths(T, left, right, &depth_left, &depth_right) && depth_left > 0 && depth_right > 0)
+    return true;
   const Vec3 turned = T.R * left.homogeneous();
   if (!(turned.z() > 0)) return false;
   const double gap = (turned.head<2>() / turned.z() - right).norm() * inverse_sigma;
@@ -44,13 +52,16 @@ constexpr double kMaxCondition = 1e12;  // of the information: beyond, double ho
 
 std::size_t StereoMlesac::memory_needed(std::size_t capacity) noexcept {
   const std::size_t n = detail::padded(capacity, detail::kFloatBlock);
-  return n * (6 * sizeof(float) + 4 * sizeof(Vec2) + sizeof(double) + sizeof(std::uint32_t) + 2) + 14 * kCacheLine;
+  return n * (6 * sizeof(float) + 4 * sizeof(Vec2) + sizeof(double) + sizeof(std::uint32_t) + 2) +
+         14 * kCacheLine;
 }
 
 StereoMlesac::StereoMlesac(std::size_t capacity, Arena& arena) {
   const std::size_t n = detail::padded(capacity, detail::kFloatBlock);
-  for (std::span<float>* column : {&x1_, &y1_, &x2_, &y2_, &weight_, &cap_}) *column = arena.make<float>(n, kWho);
-  for (std::span<Vec2>* rays : {&left_, &right_, &near_left_, &near_right_}) *rays = arena.make<Vec2>(n, kWho);
+  for (std::span<float>* column : {&x1_, &y1_, &x2_, &y2_, &weight_, &cap_})
+    *column = arena.make<float>(n, kWho);
+  for (std::span<Vec2>* rays : {&left_, &right_, &near_left_, &near_right_})
+    *rays = arena.make<Vec2>(n, kWho);
   inverse_sigma_ = arena.make<double>(n, kWho);
   match_ = arena.make<std::uint32_t>(n, kWho);
   bucket_ = arena.make<std::uint8_t>(n, kWho);
@@ -63,7 +74,8 @@ void StereoMlesac::gather(const StereoMatches& m, double cap) noexcept {
   detail::PixelBox box;
   for (std::size_t i = 0; i < matches_; ++i) {
     const Vec2 l(m.left_x[i], m.left_y[i]), r(m.right_x[i], m.right_y[i]);
-    if (!l.allFinite() || !r.allFinite() || !(m.sigma[i] > 0) || !std::isfinite(m.sigma[i])) continue;
+    if (!l.allFinite() || !r.allFinite() || !(m.sigma[i] > 0) || !std::isfinite(m.sigma[i]))
+      continue;
     const std::size_t n = count_++;
     left_[n] = l;
     right_[n] = r;
@@ -79,16 +91,20 @@ void StereoMlesac::gather(const StereoMatches& m, double cap) noexcept {
   }
   for (std::size_t n = 0; n < count_; ++n) bucket_[n] = box.bucket(left_[n].x(), left_[n].y());
   whole_ = detail::padded(count_, detail::kFloatBlock);
-  for (std::size_t n = count_; n < whole_; ++n) x1_[n] = y1_[n] = x2_[n] = y2_[n] = weight_[n] = cap_[n] = 0.0F;
+  for (std::size_t n = count_; n < whole_; ++n)
+    x1_[n] = y1_[n] = x2_[n] = y2_[n] = weight_[n] = cap_[n] = 0.0F;
 }
 
 double StereoMlesac::score(const Mat3& E, double best) const noexcept {
   std::array<float, 9> e;
-  for (std::size_t i = 0; i < 9; ++i) e[i] = static_cast<float>(E(static_cast<int>(i / 3), static_cast<int>(i % 3)));
-  const detail::MatchColumns columns{x1_.data(), y1_.data(), x2_.data(), y2_.data(), weight_.data(), cap_.data()};
+  for (std::size_t i = 0; i < 9; ++i)
+    e[i] = static_cast<float>(E(static_cast<int>(i / 3), static_cast<int>(i % 3)));
+  const detail::MatchColumns columns{x1_.data(), y1_.data(),     x2_.data(),
+                                     y2_.data(), weight_.data(), cap_.data()};
   double cost = 0;
   for (std::size_t first = 0; first < whole_; first += kAbortChunk) {
-    cost += static_cast<double>(detail::sampson_cost(columns, first, std::min(first + kAbortChunk, whole_), e));
+    cost += static_cast<double>(
+        detail::sampson_cost(columns, first, std::min(first + kAbortChunk, whole_), e));
     if (!(cost < best)) return std::numeric_limits<double>::infinity();
   }
   return cost;
@@ -116,7 +132,8 @@ Mat5 StereoMlesac::information(double cap, const Transform& T, Vec5* gradient) c
     Vec5 J;
     if (geometry.sampson(left_[i], right_[i], &r, &J) != EpipolarStatus::ok) continue;
     r *= inverse_sigma_[i];
-    // A wrong match that the line lets pass has a large disparity and with it a long lever on t: half of them stand behind.
+    // A wrong match that the line lets pass has a large disparity and with it a long lever on t:
+    // half of them stand behind.
     if (!(r * r < cap) || !in_front(T, left_[i], right_[i], inverse_sigma_[i], cap)) continue;
     J *= inverse_sigma_[i];
     H.noalias() += J * J.transpose();
@@ -156,7 +173,9 @@ int StereoMlesac::flag(double cap, const Transform& T) noexcept {
   return inliers;
 }
 
-StereoEstimate StereoMlesac::estimate_stereo_transform(const StereoMatches& matches, double baseline, const StereoMlesacOptions& options,
+StereoEstimate StereoMlesac::estimate_stereo_transform(const StereoMatches& matches,
+                                                       double baseline,
+                                                       const StereoMlesacOptions& options,
                                                        Random& random) noexcept {
   StereoEstimate out;
   matches_ = 0;
@@ -193,14 +212,16 @@ StereoEstimate StereoMlesac::estimate_stereo_transform(const StereoMatches& matc
         // The distances do not see the sign of t: with the better E the depths are asked again.
         const Mat3 E_better = essential_matrix(better);
         const double polished_cost = score(E_better, best);
-        if (polished_cost < best && transform_of(E_better, cap, baseline, &better)) best = polished_cost, T = better;
+        if (polished_cost < best && transform_of(E_better, cap, baseline, &better))
+          best = polished_cost, T = better;
       }
       out.status = StereoMlesacStatus::ok;
       out.T_right_left = T;
       out.inliers = flag(cap, T);
-      needed = std::max(
-          std::min(options.min_hypotheses, options.max_hypotheses),
-          samples_needed(static_cast<double>(out.inliers) / static_cast<double>(count_), 5, options.confidence, options.max_hypotheses));
+      needed =
+          std::max(std::min(options.min_hypotheses, options.max_hypotheses),
+                   samples_needed(static_cast<double>(out.inliers) / static_cast<double>(count_), 5,
+                                  options.confidence, options.max_hypotheses));
     }
   }
   if (out.status != StereoMlesacStatus::ok) return out;
@@ -210,11 +231,14 @@ StereoEstimate StereoMlesac::estimate_stereo_transform(const StereoMatches& matc
   out.rotation_sigma = out.direction_sigma = std::numeric_limits<double>::infinity();
   const Eigen::SelfAdjointEigenSolver<Mat5> eigen(out.information);
   if (eigen.eigenvalues()[0] > eigen.eigenvalues()[4] / kMaxCondition) {
-    const Mat5 covariance = eigen.eigenvectors() * eigen.eigenvalues().cwiseInverse().asDiagonal() * eigen.eigenvectors().transpose();
+    const Mat5 covariance = eigen.eigenvectors() * eigen.eigenvalues().cwiseInverse().asDiagonal() *
+                            eigen.eigenvectors().transpose();
     const Mat3 turn = covariance.topLeftCorner<3, 3>();
     const Mat2 direction = covariance.bottomRightCorner<2, 2>();
-    out.rotation_sigma = std::sqrt(Eigen::SelfAdjointEigenSolver<Mat3>(turn, Eigen::EigenvaluesOnly).eigenvalues()[2]);
-    out.direction_sigma = std::sqrt(Eigen::SelfAdjointEigenSolver<Mat2>(direction, Eigen::EigenvaluesOnly).eigenvalues()[1]);
+    out.rotation_sigma = std::sqrt(
+        Eigen::SelfAdjointEigenSolver<Mat3>(turn, Eigen::EigenvaluesOnly).eigenvalues()[2]);
+    out.direction_sigma = std::sqrt(
+        Eigen::SelfAdjointEigenSolver<Mat2>(direction, Eigen::EigenvaluesOnly).eigenvalues()[1]);
   }
   return out;
 }

@@ -9,23 +9,28 @@
 namespace vergence {
 namespace {
 
-constexpr double kUnitTolerance = 1e-6;      // of |ray|² − 1: a caller who forgot to normalise
-constexpr double kMinRaySine2 = 1e-14;       // sin² between two rays: 0.02″, far below what pixels resolve
-constexpr double kMinTriangleSine2 = 1e-12;  // sin² of a corner of the world triangle: below it the frame is noise
-constexpr int kPolishSteps = 3;              // Newton from a start good to 1e-8: two reach rounding
-constexpr double kMaxRelativeMisfit = 1e-9;  // of a squared side after polishing, relative to the sum of the squared sides
+constexpr double kUnitTolerance = 1e-6;  // of |ray|² − 1: a caller who forgot to normalise
+constexpr double kMinRaySine2 =
+    1e-14;  // sin² between two rays: 0.02″, far below what pixels resolve
+constexpr double kMinTriangleSine2 =
+    1e-12;  // sin² of a corner of the world triangle: below it the frame is noise
+constexpr int kPolishSteps = 3;  // Newton from a start good to 1e-8: two reach rounding
+constexpr double kMaxRelativeMisfit =
+    1e-9;  // of a squared side after polishing, relative to the sum of the squared sides
 
 /// A symmetric 3×3 form q(λ) = λᵀ M λ by its six numbers.
 struct Quadric {
   double xx, xy, xz, yy, yz, zz;
   [[nodiscard]] Vec3 times(const Vec3& v) const noexcept {
-    return {xx * v.x() + xy * v.y() + xz * v.z(), xy * v.x() + yy * v.y() + yz * v.z(), xz * v.x() + yz * v.y() + zz * v.z()};
+    return {xx * v.x() + xy * v.y() + xz * v.z(), xy * v.x() + yy * v.y() + yz * v.z(),
+            xz * v.x() + yz * v.y() + zz * v.z()};
   }
   [[nodiscard]] Vec3 row0() const noexcept { return {xx, xy, xz}; }
   [[nodiscard]] Vec3 row1() const noexcept { return {xy, yy, yz}; }
   [[nodiscard]] Vec3 row2() const noexcept { return {xz, yz, zz}; }
   [[nodiscard]] Quadric adjugate() const noexcept {
-    return {yy * zz - yz * yz, xz * yz - xy * zz, xy * yz - xz * yy, xx * zz - xz * xz, xz * xy - xx * yz, xx * yy - xy * xy};
+    return {yy * zz - yz * yz, xz * yz - xy * zz, xy * yz - xz * yy,
+            xx * zz - xz * xz, xz * xy - xx * yz, xx * yy - xy * xy};
   }
   /// tr(M N): the coefficient that couples two forms in a pencil's determinant.
   [[nodiscard]] double dot(const Quadric& o) const noexcept {
@@ -34,22 +39,26 @@ struct Quadric {
 };
 
 [[nodiscard]] Quadric combination(const Quadric& a, double s, const Quadric& b) noexcept {
-  return {a.xx + s * b.xx, a.xy + s * b.xy, a.xz + s * b.xz, a.yy + s * b.yy, a.yz + s * b.yz, a.zz + s * b.zz};
+  return {a.xx + s * b.xx, a.xy + s * b.xy, a.xz + s * b.xz,
+          a.yy + s * b.yy, a.yz + s * b.yz, a.zz + s * b.zz};
 }
 
 /// The sides of both triangles: cosines between rays, squared lengths between points.
 struct Sides {
   double cos01, cos02, cos12;
-  double gap01, gap02, gap12;  // |ray_i − ray_j|² = 2 − 2 cos, without its cancellation for narrow bundles
-  double a01, a02, a12;        // divided by their sum: the problem has no scale of its own
+  double gap01, gap02,
+      gap12;  // |ray_i − ray_j|² = 2 − 2 cos, without its cancellation for narrow bundles
+  double a01, a02, a12;  // divided by their sum: the problem has no scale of its own
 };
 
-/// Depths that meet the three squared sides (λ_i − λ_j)² + λ_i λ_j gap_ij = a_ij: Newton with the inverse of the 3×3 Jacobian by cofactors.
+/// Depths that meet the three squared sides (λ_i − λ_j)² + λ_i λ_j gap_ij = a_ij: Newton with the
+/// inverse of the 3×3 Jacobian by cofactors.
 [[nodiscard]] bool polish(const Sides& s, Vec3* depths) noexcept {
   Vec3 l = *depths;
   const auto residuals = [&s](const Vec3& d) noexcept {
     const double d01 = d[0] - d[1], d02 = d[0] - d[2], d12 = d[1] - d[2];
-    return Vec3(d01 * d01 + d[0] * d[1] * s.gap01 - s.a01, d02 * d02 + d[0] * d[2] * s.gap02 - s.a02,
+    return Vec3(d01 * d01 + d[0] * d[1] * s.gap01 - s.a01,
+                d02 * d02 + d[0] * d[2] * s.gap02 - s.a02,
                 d12 * d12 + d[1] * d[2] * s.gap12 - s.a12);
   };
   Vec3 r = residuals(l);
@@ -86,7 +95,8 @@ struct Sides {
 
 /// Null vector of a singular form: the longest cross product of its rows.
 [[nodiscard]] bool null_vector(const Quadric& q, Vec3* v) noexcept {
-  const Vec3 a = q.row0().cross(q.row1()), b = q.row0().cross(q.row2()), c = q.row1().cross(q.row2());
+  const Vec3 a = q.row0().cross(q.row1()), b = q.row0().cross(q.row2()),
+             c = q.row1().cross(q.row2());
   const double na = a.squaredNorm(), nb = b.squaredNorm(), nc = c.squaredNorm();
   const double n = std::max({na, nb, nc});
   if (!(n > 0.0)) return false;
@@ -103,8 +113,10 @@ struct Sides {
   return p * (1.0 / std::sqrt(p.squaredNorm()));
 }
 
-/// Directions λ (up to sign) where two conics meet; at most four. `split` = first + γ second is singular.
-int meet(const Quadric& first, const Quadric& second, double gamma, std::array<Vec3, 4>* directions) noexcept {
+/// Directions λ (up to sign) where two conics meet; at most four. `split` = first + γ second is
+/// singular.
+int meet(const Quadric& first, const Quadric& second, double gamma,
+         std::array<Vec3, 4>* directions) noexcept {
   const Quadric split = combination(first, gamma, second);
   Vec3 apex;
   if (!null_vector(split, &apex)) return 0;
@@ -115,18 +127,23 @@ int meet(const Quadric& first, const Quadric& second, double gamma, std::array<V
   const double mean = 0.5 * (ff + gg), half = 0.5 * (ff - gg);
   const double radius = std::sqrt(half * half + fg * fg);
   const double high = mean + radius, low = mean - radius;
-  if (!(high > 0.0) || !(low < 0.0)) return 0;  // both of one sign: two complex planes, no common direction
+  if (!(high > 0.0) || !(low < 0.0))
+    return 0;  // both of one sign: two complex planes, no common direction
   Vec3 e_high = half >= 0 ? Vec3((half + radius) * f + fg * g) : Vec3(fg * f + (radius - half) * g);
   e_high *= 1.0 / std::sqrt(e_high.squaredNorm());
   const Vec3 e_low = apex.cross(e_high);
   // high (e_high·λ)² + low (e_low·λ)² = 0: the planes √high e_high·λ = ±√−low e_low·λ.
   const double root_high = std::sqrt(high), root_low = std::sqrt(-low);
-  const Quadric& other = std::abs(gamma) > 1.0 ? first : second;  // on the planes first = −γ second: the larger has more digits
+  const Quadric& other =
+      std::abs(gamma) > 1.0
+          ? first
+          : second;  // on the planes first = −γ second: the larger has more digits
   const Vec3 M_apex = other.times(apex);
   const double uu = apex.dot(M_apex);
   int n = 0;
   for (const double sign : {1.0, -1.0}) {
-    const Vec3 v = sign * root_low * e_high + root_high * e_low;  // spans the plane together with the apex
+    const Vec3 v =
+        sign * root_low * e_high + root_high * e_low;  // spans the plane together with the apex
     const double uv = v.dot(M_apex), vv = v.dot(other.times(v));
     // uu α² + 2 uv αβ + vv β² = 0 in homogeneous (α, β), the stable pair of roots.
     double discriminant = uv * uv - uu * vv;
@@ -143,7 +160,8 @@ int meet(const Quadric& first, const Quadric& second, double gamma, std::array<V
 
 }  // namespace
 
-ThreePointSolutions solve_three_point(const std::array<Vec3, 3>& rays, const std::array<Vec3, 3>& points) noexcept {
+ThreePointSolutions solve_three_point(const std::array<Vec3, 3>& rays,
+                                      const std::array<Vec3, 3>& points) noexcept {
   ThreePointSolutions out;
   const auto refuse = [&out](ThreePointStatus why) noexcept {
     out.status = why;
@@ -151,7 +169,8 @@ ThreePointSolutions solve_three_point(const std::array<Vec3, 3>& rays, const std
   };
   for (std::size_t i = 0; i < 3; ++i) {
     if (!rays[i].allFinite() || !points[i].allFinite()) return refuse(ThreePointStatus::not_finite);
-    if (!(std::abs(rays[i].squaredNorm() - 1.0) < kUnitTolerance)) return refuse(ThreePointStatus::degenerate_rays);
+    if (!(std::abs(rays[i].squaredNorm() - 1.0) < kUnitTolerance))
+      return refuse(ThreePointStatus::degenerate_rays);
   }
   const Vec3 p01 = points[1] - points[0], p02 = points[2] - points[0], p12 = points[2] - points[1];
   Sides s{rays[0].dot(rays[1]),
@@ -163,27 +182,33 @@ ThreePointSolutions solve_three_point(const std::array<Vec3, 3>& rays, const std
           p01.squaredNorm(),
           p02.squaredNorm(),
           p12.squaredNorm()};
-  if (std::min({rays[0].cross(rays[1]).squaredNorm(), rays[0].cross(rays[2]).squaredNorm(), rays[1].cross(rays[2]).squaredNorm()}) <
-      kMinRaySine2)
+  if (std::min({rays[0].cross(rays[1]).squaredNorm(), rays[0].cross(rays[2]).squaredNorm(),
+                rays[1].cross(rays[2]).squaredNorm()}) < kMinRaySine2)
     return refuse(ThreePointStatus::degenerate_rays);
   const double sum = s.a01 + s.a02 + s.a12;
   if (!std::isfinite(sum)) return refuse(ThreePointStatus::not_finite);
-  const double longest = std::max({s.a01, s.a02, s.a12}), shortest = std::min({s.a01, s.a02, s.a12});
-  // |p01 × p02|² = (twice the area)²; with the two longer sides about equal it is longest × shortest × sin² of a corner.
-  if (!(p01.cross(p02).squaredNorm() > kMinTriangleSine2 * longest * shortest) || !(shortest > 1e-24 * longest))
+  const double longest = std::max({s.a01, s.a02, s.a12}),
+               shortest = std::min({s.a01, s.a02, s.a12});
+  // |p01 × p02|² = (twice the area)²; with the two longer sides about equal it is longest ×
+  // shortest × sin² of a corner.
+  if (!(p01.cross(p02).squaredNorm() > kMinTriangleSine2 * longest * shortest) ||
+      !(shortest > 1e-24 * longest))
     return refuse(ThreePointStatus::degenerate_points);
   const double scale = 1.0 / sum;
   s.a01 *= scale, s.a02 *= scale, s.a12 *= scale;
 
-  // D1 = a12 M01 − a01 M12, D2 = a12 M02 − a02 M12, with λᵀ M_ij λ = λ_i² + λ_j² − 2 cos_ij λ_i λ_j.
+  // D1 = a12 M01 − a01 M12, D2 = a12 M02 − a02 M12, with λᵀ M_ij λ = λ_i² + λ_j² − 2 cos_ij λ_i
+  // λ_j.
   const Quadric D1{s.a12, -s.a12 * s.cos01, 0.0, s.a12 - s.a01, s.a01 * s.cos12, -s.a01};
   const Quadric D2{s.a12, 0.0, -s.a12 * s.cos02, -s.a02, s.a02 * s.cos12, s.a12 - s.a02};
   const Quadric adj1 = D1.adjugate(), adj2 = D2.adjugate();
-  // det(D1 + γ D2); Vec3 rows suffice for the determinants: det M = row0 · first column of the adjugate.
+  // det(D1 + γ D2); Vec3 rows suffice for the determinants: det M = row0 · first column of the
+  // adjugate.
   const double c0 = D1.xx * adj1.xx + D1.xy * adj1.xy, c3 = D2.xx * adj2.xx + D2.xz * adj2.xz;
   const double c1 = adj1.dot(D2), c2 = adj2.dot(D1);
 
-  // Where the cubic is nearly flat the pencil may be taken the other way round: 1/γ is a root of the reversed cubic.
+  // Where the cubic is nearly flat the pencil may be taken the other way round: 1/γ is a root of
+  // the reversed cubic.
   std::array<Vec3, 4> directions;
   int n = 0;
   if (std::abs(c3) >= std::abs(c0))
@@ -201,12 +226,15 @@ ThreePointSolutions solve_three_point(const std::array<Vec3, 3>& rays, const std
     const double largest = l.maxCoeff();
     if (!(l.minCoeff() > -1e-6 * largest) || !(largest > 0.0)) continue;
     // Length of λ from the sum of the three sides, which is 1.
-    const double q = 2.0 * (l.squaredNorm() - s.cos01 * l[0] * l[1] - s.cos02 * l[0] * l[2] - s.cos12 * l[1] * l[2]);
+    const double q = 2.0 * (l.squaredNorm() - s.cos01 * l[0] * l[1] - s.cos02 * l[0] * l[2] -
+                            s.cos12 * l[1] * l[2]);
     if (!(q > 0.0)) continue;
     l *= 1.0 / std::sqrt(q);
     if (!polish(s, &l)) continue;
     bool seen = false;
-    for (int j = 0; j < out.count; ++j) seen = seen || (found[static_cast<std::size_t>(j)] - l).squaredNorm() < 1e-20 * l.squaredNorm();
+    for (int j = 0; j < out.count; ++j)
+      seen =
+          seen || (found[static_cast<std::size_t>(j)] - l).squaredNorm() < 1e-20 * l.squaredNorm();
     if (seen) continue;
     const Vec3 x0 = l[0] * rays[0], x1 = l[1] * rays[1], x2 = l[2] * rays[2];
     Transform T;

@@ -7,9 +7,11 @@
 namespace vergence {
 namespace {
 
-constexpr double kMinForward = 1e-6;        // of h_z, where the first view has 1: a ray nearly at right angles to the camera's axis
-constexpr double kConverged = 1e-12;        // of the ray, radians
-constexpr double kMinParallaxGain = 1e-18;  // of Σ (∂ray/∂ρ)², m²: cameras within nanometres of each other
+constexpr double kMinForward =
+    1e-6;  // of h_z, where the first view has 1: a ray nearly at right angles to the camera's axis
+constexpr double kConverged = 1e-12;  // of the ray, radians
+constexpr double kMinParallaxGain =
+    1e-18;  // of Σ (∂ray/∂ρ)², m²: cameras within nanometres of each other
 
 struct Reduced {
   Mat3 H;
@@ -61,7 +63,8 @@ struct Reduced {
     const Vec3 m = T.R * Vec3(first.ray.x(), first.ray.y(), 1.0);
     const double scale = 1.0 / (v.sigma * std::max(std::abs(m.z()), kMinForward));
     // x (m_z + ρ t_z) = m_x + ρ t_x, likewise y.
-    const Vec2 a = (v.ray * T.t.z() - T.t.head<2>()) * scale, b = (m.head<2>() - v.ray * m.z()) * scale;
+    const Vec2 a = (v.ray * T.t.z() - T.t.head<2>()) * scale,
+               b = (m.head<2>() - v.ray * m.z()) * scale;
     num += a.dot(b);
     den += a.squaredNorm();
     gain += a.squaredNorm() * v.sigma * v.sigma;
@@ -73,7 +76,8 @@ struct Reduced {
 
 }  // namespace
 
-TriangulatedPoint triangulate(std::span<const RayView> views, const TriangulateOptions& options) noexcept {
+TriangulatedPoint triangulate(std::span<const RayView> views,
+                              const TriangulateOptions& options) noexcept {
   TriangulatedPoint out;
   if (!valid(views)) return out;
   const RayView& first = views.front();
@@ -101,7 +105,8 @@ TriangulatedPoint triangulate(std::span<const RayView> views, const TriangulateO
     if (delta.norm() < kConverged) break;
   }
   const Eigen::LLT<Mat3> llt(now.H);
-  const Mat3 S = llt.info() == Eigen::Success ? Mat3(llt.solve(Mat3::Identity())) : Mat3(Mat3::Zero());
+  const Mat3 S =
+      llt.info() == Eigen::Success ? Mat3(llt.solve(Mat3::Identity())) : Mat3(Mat3::Zero());
   if (llt.info() != Eigen::Success || !S.allFinite() || !(S(2, 2) > 0)) {
     out.status = TriangulateStatus::no_baseline;
     return out;
@@ -117,7 +122,8 @@ TriangulatedPoint triangulate(std::span<const RayView> views, const TriangulateO
   const Transform T_world_first = first.T_camera_world.inverse();
   if (rho < options.min_significance * sigma) {
     out.status = TriangulateStatus::no_parallax;
-    out.p_world = T_world_first * Vec3(Vec3(abr[0], abr[1], 1.0) / (std::max(rho, 0.0) + options.min_significance * sigma));
+    out.p_world = T_world_first * Vec3(Vec3(abr[0], abr[1], 1.0) /
+                                       (std::max(rho, 0.0) + options.min_significance * sigma));
     return out;
   }
   out.status = TriangulateStatus::ok;

@@ -4,10 +4,12 @@
 
 namespace vergence {
 
-/// Small, seeded, the same on every platform (the standard's distributions are not): PCG32 (O'Neill 2014, XSH RR).
+/// Small, seeded, the same on every platform (the standard's distributions are not): PCG32 (O'Neill
+/// 2014, XSH RR).
 class Random {
  public:
-  explicit Random(std::uint64_t seed, std::uint64_t stream = 1) noexcept : state_(0), increment_((stream << 1U) | 1U) {
+  explicit Random(std::uint64_t seed, std::uint64_t stream = 1) noexcept
+      : state_(0), increment_((stream << 1U) | 1U) {
     (void)next();
     state_ += seed;
     (void)next();
@@ -30,7 +32,8 @@ class Random {
     return static_cast<double>((hi << 26U) | lo) * 0x1.0p-53;
   }
   [[nodiscard]] double uniform(double lo, double hi) noexcept { return lo + (hi - lo) * uniform(); }
-  /// Standard normal, Marsaglia's polar method; the loop ends after 1.27 turns on average and is bounded at 64.
+  /// Standard normal, Marsaglia's polar method; the loop ends after 1.27 turns on average and is
+  /// bounded at 64.
   [[nodiscard]] double normal() noexcept {
     for (int i = 0; i < 64; ++i) {
       const double u = uniform(-1, 1), v = uniform(-1, 1), s = u * u + v * v;

@@ -5,13 +5,16 @@ namespace vergence {
 
 /// A rigid transform written `T_to_from`: p_to = T_to_from * p_from = R p_from + t, metres.
 ///
-/// Perturbed on the left of the rotation and plainly in translation (METHOD §1): R ← Exp(φ) R, t ← t + τ.
+/// Perturbed on the left of the rotation and plainly in translation (METHOD §1): R ← Exp(φ) R, t ←
+/// t + τ.
 struct Transform {
   Mat3 R = Mat3::Identity();
   Vec3 t = Vec3::Zero();
 
   [[nodiscard]] Vec3 operator*(const Vec3& p) const noexcept { return R * p + t; }
-  [[nodiscard]] Transform operator*(const Transform& o) const noexcept { return {R * o.R, R * o.t + t}; }
+  [[nodiscard]] Transform operator*(const Transform& o) const noexcept {
+    return {R * o.R, R * o.t + t};
+  }
   [[nodiscard]] Transform inverse() const noexcept { return {R.transpose(), -(R.transpose() * t)}; }
   /// Camera centre (or body origin) of a world-to-camera transform, in world.
   [[nodiscard]] Vec3 centre() const noexcept { return -(R.transpose() * t); }
@@ -19,7 +22,8 @@ struct Transform {
 };
 
 /// R ← Exp(φ) R, t ← t + τ.
-[[nodiscard]] inline Transform perturbed(const Transform& T, const Vec3& phi, const Vec3& tau) noexcept {
+[[nodiscard]] inline Transform perturbed(const Transform& T, const Vec3& phi,
+                                         const Vec3& tau) noexcept {
   return {normalised(exp_so3(phi) * T.R), T.t + tau};
 }
 
@@ -32,13 +36,17 @@ struct Transform {
 }
 
 /// The same camera after everything in the world has grown by `factor` about a place.
-[[nodiscard]] inline Transform scaled_about(const Transform& T_camera_world, const Vec3& centre, double factor) noexcept {
-  return {T_camera_world.R, -(T_camera_world.R * (centre + factor * (T_camera_world.centre() - centre)))};
+[[nodiscard]] inline Transform scaled_about(const Transform& T_camera_world, const Vec3& centre,
+                                            double factor) noexcept {
+  return {T_camera_world.R,
+          -(T_camera_world.R * (centre + factor * (T_camera_world.centre() - centre)))};
 }
 
 /// Position linear, rotation along the shorter arc; s in [0, 1] from a to b.
-[[nodiscard]] inline Transform interpolate(const Transform& a, const Transform& b, double s) noexcept {
-  return {Eigen::Quaterniond(a.R).slerp(s, Eigen::Quaterniond(b.R)).normalized().toRotationMatrix(), a.t + s * (b.t - a.t)};
+[[nodiscard]] inline Transform interpolate(const Transform& a, const Transform& b,
+                                           double s) noexcept {
+  return {Eigen::Quaterniond(a.R).slerp(s, Eigen::Quaterniond(b.R)).normalized().toRotationMatrix(),
+          a.t + s * (b.t - a.t)};
 }
 
 }  // namespace vergence

@@ -14,7 +14,8 @@ namespace vergence {
   return m;
 }
 
-/// Rotation vector (axis × angle, rad) → rotation matrix, Rodrigues; a series below 1e-4 rad where sin(θ)/θ loses digits.
+/// Rotation vector (axis × angle, rad) → rotation matrix, Rodrigues; a series below 1e-4 rad where
+/// sin(θ)/θ loses digits.
 [[nodiscard]] inline Mat3 exp_so3(const Vec3& phi) noexcept {
   const double theta2 = phi.squaredNorm();
   double a, b;  // sin θ/θ, (1 − cos θ)/θ²
@@ -31,7 +32,8 @@ namespace vergence {
   return Mat3::Identity() + a * K + b * K * K;
 }
 
-/// Rotation matrix → rotation vector with angle in [0, π]. Through the quaternion, so that angles near π keep their digits.
+/// Rotation matrix → rotation vector with angle in [0, π]. Through the quaternion, so that angles
+/// near π keep their digits.
 [[nodiscard]] inline Vec3 log_so3(const Mat3& R) noexcept {
   Eigen::Quaterniond q(R);
   if (q.w() < 0) q.coeffs() *= -1.0;
@@ -49,11 +51,15 @@ namespace vergence {
   const Mat3 K = skew(phi);
   if (theta2 < 1e-8) return Mat3::Identity() + (0.5 - theta2 / 24.0) * K + K * K / 6.0;
   const double theta = std::sqrt(theta2);
-  const double s = std::sin(0.5 * theta);  // 1 − cos θ = 2 sin²(θ/2), which loses no digits at small angles
-  return Mat3::Identity() + 2.0 * s * s / theta2 * K + (theta - std::sin(theta)) / (theta2 * theta) * K * K;
+  const double s =
+      std::sin(0.5 * theta);  // 1 − cos θ = 2 sin²(θ/2), which loses no digits at small angles
+  return Mat3::Identity() + 2.0 * s * s / theta2 * K +
+         (theta - std::sin(theta)) / (theta2 * theta) * K * K;
 }
 
 /// The rotation nearest to a matrix that has drifted from orthonormality by products.
-[[nodiscard]] inline Mat3 normalised(const Mat3& R) noexcept { return Eigen::Quaterniond(R).normalized().toRotationMatrix(); }
+[[nodiscard]] inline Mat3 normalised(const Mat3& R) noexcept {
+  return Eigen::Quaterniond(R).normalized().toRotationMatrix();
+}
 
 }  // namespace vergence

@@ -5,9 +5,11 @@ namespace vergence {
 
 /// Counts heap allocations made by threads that have promised to make none (DESIGN §4).
 ///
-/// Works where the program links `vergence_core_memory_hooks`, which puts itself before the C library's malloc family;
-/// elsewhere (sanitizer builds bring their own) available() is false and the count stays 0.
-/// Threads  seal_thread() and unseal_thread() act on the calling thread; the counter is common to all.
+/// Works where the program links `vergence_core_memory_hooks`, which puts itself before the C
+/// library's malloc family; elsewhere (sanitizer builds bring their own) available() is false and
+/// the count stays 0.
+/// Threads  seal_thread() and unseal_thread() act on the calling thread; the counter is common to
+///          all.
 class AllocationGuard {
  public:
   [[nodiscard]] static bool available() noexcept;
@@ -16,7 +18,8 @@ class AllocationGuard {
   [[nodiscard]] static bool thread_sealed() noexcept;
   /// Allocations on sealed threads since the program's start.
   [[nodiscard]] static std::uint64_t allocations_after_seal() noexcept;
-  /// From now on an allocation on a sealed thread aborts (tests: the debugger then stands at the culprit).
+  /// From now on an allocation on a sealed thread aborts (tests: the debugger then stands at the
+  /// culprit).
   static void abort_on_allocation(bool on) noexcept;
 
   /// For the hooks only: an allocation has happened on this thread.
@@ -27,7 +30,9 @@ class AllocationGuard {
 /// Seals the thread for a scope.
 class SealedScope {
  public:
-  SealedScope() noexcept : was_(AllocationGuard::thread_sealed()) { AllocationGuard::seal_thread(); }
+  SealedScope() noexcept : was_(AllocationGuard::thread_sealed()) {
+    AllocationGuard::seal_thread();
+  }
   ~SealedScope() {
     if (!was_) AllocationGuard::unseal_thread();
   }

@@ -1,5 +1,5 @@
-// Stands before glibc's allocator in programs that link it: every allocation of every library passes here.
-// glibc exports its own functions under these names for exactly this purpose.
+// Stands before glibc's allocator in programs that link it: every allocation of every library
+// passes here. glibc exports its own functions under these names for exactly this purpose.
 #include <cerrno>
 #include <cstddef>
 
@@ -7,7 +7,8 @@
 
 extern "C" {
 
-// NOLINTBEGIN(bugprone-reserved-identifier,readability-identifier-naming): the C library chose these names
+// NOLINTBEGIN(bugprone-reserved-identifier,readability-identifier-naming): the C library chose
+// these names
 void* __libc_malloc(std::size_t);
 void* __libc_calloc(std::size_t, std::size_t);
 void* __libc_realloc(void*, std::size_t);

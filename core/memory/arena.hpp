@@ -10,17 +10,20 @@
 
 namespace vergence {
 
-inline constexpr std::size_t kCacheLine = 64;  // bytes; also the widest SIMD vector's natural alignment (AVX-512)
+inline constexpr std::size_t kCacheLine =
+    64;  // bytes; also the widest SIMD vector's natural alignment (AVX-512)
 
 /// All memory of the real-time path, taken once at start. Hands out, never takes back (DESIGN §4).
 ///
 /// Ownership  The arena owns the bytes; what is made in it lives as long as the arena.
 /// Threads    One thread, before the seal.
-/// Errors     Throws std::length_error when full, naming who asked: construction time only, outside the real-time path.
+/// Errors     Throws std::length_error when full, naming who asked: construction time only, outside
+///            the real-time path.
 class Arena {
  public:
   explicit Arena(std::size_t bytes)
-      : capacity_(bytes), storage_(static_cast<std::byte*>(::operator new (bytes, std::align_val_t{kCacheLine}))) {}
+      : capacity_(bytes),
+        storage_(static_cast<std::byte*>(::operator new (bytes, std::align_val_t{kCacheLine}))) {}
 
   Arena(const Arena&) = delete;
   Arena& operator=(const Arena&) = delete;
@@ -32,8 +35,9 @@ class Arena {
     static_assert(alignof(T) <= kCacheLine);
     const std::size_t bytes = (n * sizeof(T) + kCacheLine - 1) / kCacheLine * kCacheLine;
     if (n > capacity_ / sizeof(T) || bytes > capacity_ - used_)
-      throw std::length_error(std::string("arena full: ") + who + " asks for " + std::to_string(bytes) + " bytes, " +
-                              std::to_string(capacity_ - used_) + " of " + std::to_string(capacity_) + " are left");
+      throw std::length_error(
+          std::string("arena full: ") + who + " asks for " + std::to_string(bytes) + " bytes, " +
+          std::to_string(capacity_ - used_) + " of " + std::to_string(capacity_) + " are left");
     std::byte* at = storage_.get() + used_;
     used_ += bytes;
     T* first = reinterpret_cast<T*>(at);
@@ -46,7 +50,9 @@ class Arena {
 
  private:
   struct Free {
-    void operator()(std::byte* p) const noexcept { ::operator delete (p, std::align_val_t{kCacheLine}); }
+    void operator()(std::byte* p) const noexcept {
+      ::operator delete (p, std::align_val_t{kCacheLine});
+    }
   };
   std::size_t capacity_;
   std::size_t used_ = 0;

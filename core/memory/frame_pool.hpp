@@ -14,29 +14,38 @@ namespace vergence {
 /// One slot of a FramePool: a handle that goes through rings.
 using FrameSlot = std::uint16_t;
 
-/// Image memory of one size, taken once: slots start on a cache line, rows are padded to whole cache lines (DESIGN §4).
+/// Image memory of one size, taken once: slots start on a cache line, rows are padded to whole
+/// cache lines (DESIGN §4).
 ///
-/// Ownership  acquire() makes a slot the caller's, until release(). Views of it are valid that long.
-/// Threads    acquire(), writable(): one thread. release(): one thread, the same or another. view(): whoever holds the slot.
+/// Ownership  acquire() makes a slot the caller's, until release(). Views of it are valid that
+///            long.
+/// Threads    acquire(), writable(): one thread. release(): one thread, the same or another.
+///            view(): whoever holds the slot.
 /// Memory     All of it from the arena in the constructor; neither lock nor system call afterwards.
-/// Full       With no slot free acquire() refuses; the caller's stated policy acts (replay waits, live drops and counts).
+/// Full       With no slot free acquire() refuses; the caller's stated policy acts (replay waits,
+///            live drops and counts).
 /// Errors     The constructor throws std::length_error when the arena is too small.
 class FramePool {
  public:
-  static constexpr std::size_t kMaxSlots = 64;  // 16 pairs of four cameras ahead; more only adds latency
+  static constexpr std::size_t kMaxSlots =
+      64;  // 16 pairs of four cameras ahead; more only adds latency
 
   /// Bytes between the starts of two rows.
   [[nodiscard]] static constexpr std::size_t stride(int width) noexcept {
     return (static_cast<std::size_t>(width) + kCacheLine - 1) / kCacheLine * kCacheLine;
   }
   /// What the arena must offer.
-  [[nodiscard]] static constexpr std::size_t memory_needed(int width, int height, std::size_t slots) noexcept {
+  [[nodiscard]] static constexpr std::size_t memory_needed(int width, int height,
+                                                           std::size_t slots) noexcept {
     return slots * stride(width) * static_cast<std::size_t>(height);
   }
 
   /// Preconditions: width, height > 0; 0 < slots ≤ kMaxSlots.
   FramePool(int width, int height, std::size_t slots, Arena& arena)
-      : width_(width), height_(height), slots_(slots), bytes_(arena.make<std::uint8_t>(memory_needed(width, height, slots), "frame pool")) {
+      : width_(width),
+        height_(height),
+        slots_(slots),
+        bytes_(arena.make<std::uint8_t>(memory_needed(width, height, slots), "frame pool")) {
     assert(width > 0 && height > 0 && slots > 0 && slots <= kMaxSlots);
     for (std::size_t i = 0; i < slots; ++i) (void)free_.push(static_cast<FrameSlot>(i));
   }
@@ -58,7 +67,8 @@ class FramePool {
 
   [[nodiscard]] ImageView view(FrameSlot slot) const noexcept {
     assert(slot < slots_);
-    return {bytes_.data() + slot * slot_bytes(), width_, height_, static_cast<std::ptrdiff_t>(stride(width_))};
+    return {bytes_.data() + slot * slot_bytes(), width_, height_,
+            static_cast<std::ptrdiff_t>(stride(width_))};
   }
   /// All bytes of a slot, padding included; row y begins at y * stride(width()).
   [[nodiscard]] std::span<std::uint8_t> writable(FrameSlot slot) noexcept {
@@ -73,7 +83,9 @@ class FramePool {
   [[nodiscard]] std::size_t available() const noexcept { return free_.size(); }
 
  private:
-  [[nodiscard]] std::size_t slot_bytes() const noexcept { return stride(width_) * static_cast<std::size_t>(height_); }
+  [[nodiscard]] std::size_t slot_bytes() const noexcept {
+    return stride(width_) * static_cast<std::size_t>(height_);
+  }
 
   int width_, height_;
   std::size_t slots_;

@@ -10,8 +10,10 @@ namespace vergence {
 
 /// Bounded queue between exactly one producer thread and one consumer thread; N is a power of two.
 ///
-/// Threads  push(), full(): producer. pop(), empty(): consumer. size() is exact for neither: a figure for statistics.
-/// Memory   In place; no heap, no lock, no system call. When full, push() refuses: the caller's stated policy acts.
+/// Threads  push(), full(): producer. pop(), empty(): consumer. size() is exact for neither: a
+///          figure for statistics.
+/// Memory   In place; no heap, no lock, no system call. When full, push() refuses: the caller's
+///          stated policy acts.
 template <class T, std::size_t N>
 class Ring {
   static_assert(N > 0 && (N & (N - 1)) == 0, "a power of two, so that counters wrap");
@@ -35,14 +37,19 @@ class Ring {
     return true;
   }
   /// Exact for the consumer (it can only become less empty).
-  [[nodiscard]] bool empty() const noexcept { return tail_.load(std::memory_order_acquire) == head_.load(std::memory_order_acquire); }
+  [[nodiscard]] bool empty() const noexcept {
+    return tail_.load(std::memory_order_acquire) == head_.load(std::memory_order_acquire);
+  }
   /// Exact for the producer (it can only become less full).
   [[nodiscard]] bool full() const noexcept { return size() == N; }
-  [[nodiscard]] std::size_t size() const noexcept { return tail_.load(std::memory_order_acquire) - head_.load(std::memory_order_acquire); }
+  [[nodiscard]] std::size_t size() const noexcept {
+    return tail_.load(std::memory_order_acquire) - head_.load(std::memory_order_acquire);
+  }
   [[nodiscard]] static constexpr std::size_t capacity() noexcept { return N; }
 
  private:
-  alignas(kCacheLine) std::atomic<std::size_t> head_{0};  // each on its own cache line: no false sharing
+  alignas(kCacheLine) std::atomic<std::size_t> head_{
+      0};  // each on its own cache line: no false sharing
   alignas(kCacheLine) std::atomic<std::size_t> tail_{0};
   alignas(kCacheLine) std::array<T, N> items_{};
 };

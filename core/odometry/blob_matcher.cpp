@@ -3,8 +3,10 @@
 namespace vergence::odometry {
 
 std::size_t BlobMatcher::memory_needed(int max_width, int max_height) noexcept {
-  constexpr std::size_t kOfAnImage = kMaxBlobs * (sizeof(features::SurfPoint) + sizeof(features::SurfDescriptor)) + 2 * kCacheLine;
-  return features::Surf::memory_needed(max_width, max_height) + features::SurfMatcher::memory_needed(kMaxBlobs) + 2 * kOfAnImage +
+  constexpr std::size_t kOfAnImage =
+      kMaxBlobs * (sizeof(features::SurfPoint) + sizeof(features::SurfDescriptor)) + 2 * kCacheLine;
+  return features::Surf::memory_needed(max_width, max_height) +
+         features::SurfMatcher::memory_needed(kMaxBlobs) + 2 * kOfAnImage +
          kMaxBlobs * (sizeof(features::SurfMatch) + sizeof(RoughMatch)) + 2 * kCacheLine;
 }
 
@@ -14,12 +16,14 @@ BlobMatcher::BlobMatcher(int max_width, int max_height, Arena& arena)
       found_(arena.make<features::SurfMatch>(kMaxBlobs, "matches of blobs")),
       matches_(arena.make<RoughMatch>(kMaxBlobs, "rough matches")) {
   for (std::size_t k = 0; k < 2; ++k) {
-    points_[k] = BoundedVector<features::SurfPoint>(arena.make<features::SurfPoint>(kMaxBlobs, "blobs"));
+    points_[k] =
+        BoundedVector<features::SurfPoint>(arena.make<features::SurfPoint>(kMaxBlobs, "blobs"));
     descriptors_[k] = arena.make<features::SurfDescriptor>(kMaxBlobs, "descriptors of blobs");
   }
 }
 
-features::SurfView BlobMatcher::describe(const ImageView& image, const features::Mask* mask, std::size_t k) noexcept {
+features::SurfView BlobMatcher::describe(const ImageView& image, const features::Mask* mask,
+                                         std::size_t k) noexcept {
   if (surf_.set_image(image) != features::SurfStatus::ok) return {};
   features::SurfOptions how;
   how.mask = mask;
@@ -29,13 +33,18 @@ features::SurfView BlobMatcher::describe(const ImageView& image, const features:
   return {points_[k].span(), descriptors};
 }
 
-std::span<const RoughMatch> BlobMatcher::match(const ImageView& left, const features::Mask* left_mask, const ImageView& other,
+std::span<const RoughMatch> BlobMatcher::match(const ImageView& left,
+                                               const features::Mask* left_mask,
+                                               const ImageView& other,
                                                const features::Mask* other_mask) noexcept {
   matches_.clear();
   const features::SurfView a = describe(left, left_mask, 0), b = describe(other, other_mask, 1);
   if (matcher_.match(a, b, {}, nullptr, &found_) != features::SurfMatchStatus::ok) return {};
-  const auto pixel = [](const features::SurfPoint& p) noexcept { return Vec2(static_cast<double>(p.x), static_cast<double>(p.y)); };
-  for (const features::SurfMatch& m : found_) (void)matches_.push({pixel(a.points[m.left]), pixel(b.points[m.right])});
+  const auto pixel = [](const features::SurfPoint& p) noexcept {
+    return Vec2(static_cast<double>(p.x), static_cast<double>(p.y));
+  };
+  for (const features::SurfMatch& m : found_)
+    (void)matches_.push({pixel(a.points[m.left]), pixel(b.points[m.right])});
   return matches_.span();
 }
 

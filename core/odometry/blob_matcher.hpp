@@ -13,9 +13,11 @@ struct RoughMatch {
   Vec2 left = Vec2::Zero(), other = Vec2::Zero();
 };
 
-inline constexpr std::size_t kMaxBlobs = 1500;  // of an image: about what a street shows above the default response
+inline constexpr std::size_t kMaxBlobs =
+    1500;  // of an image: about what a street shows above the default response
 
-/// SURF-64 across two images of which nothing is known: upright, mutually best. docs/front_ends.md says how it compares with corners.
+/// SURF-64 across two images of which nothing is known: upright, mutually best. docs/front_ends.md
+/// says how it compares with corners.
 ///
 /// Threads  One caller.
 /// Memory   From the arena at construction. Of more than kMaxBlobs blobs the weakest are dropped.
@@ -29,11 +31,14 @@ class BlobMatcher {
 
   /// By the strength of the left blob, strongest first. Valid until the next call.
   /// A mask may be null.
-  [[nodiscard]] std::span<const RoughMatch> match(const ImageView& left, const features::Mask* left_mask, const ImageView& other,
+  [[nodiscard]] std::span<const RoughMatch> match(const ImageView& left,
+                                                  const features::Mask* left_mask,
+                                                  const ImageView& other,
                                                   const features::Mask* other_mask) noexcept;
 
  private:
-  [[nodiscard]] features::SurfView describe(const ImageView& image, const features::Mask* mask, std::size_t k) noexcept;
+  [[nodiscard]] features::SurfView describe(const ImageView& image, const features::Mask* mask,
+                                            std::size_t k) noexcept;
 
   features::Surf surf_;
   features::SurfMatcher matcher_;

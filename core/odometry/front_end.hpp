@@ -20,7 +20,8 @@ namespace vergence::odometry {
 struct ImageCheck {
   std::uint8_t given = 0;       // bit k: camera k delivered an image
   std::uint8_t structured = 0;  // bit k: and it shows something
-  bool repeated = false;        // a camera gave its last image or the left one's once more: noise makes that impossible
+  bool repeated = false;  // a camera gave its last image or the left one's once more: noise makes
+                          // that impossible
 };
 
 /// How the search across went for the corners of one frame.
@@ -38,10 +39,14 @@ struct FreeMatch {
 
 /// Pixels of one rig frame: pyramids, following points, new corners and their matches across.
 ///
-/// Ownership  Reads the frame's images until the next begin(). Options, rig and runner are the owner's.
-/// Threads    One caller; the runner takes the cameras but `left` to its other side. Results do not depend on it.
-/// Masks      Where one hides a pixel, or comes nearer than a window's half, nothing is found, followed or matched.
-/// Memory     From the arena at construction. When the map has no room for a new point, the weakest corners are dropped.
+/// Ownership  Reads the frame's images until the next begin(). Options, rig and runner are the
+///            owner's.
+/// Threads    One caller; the runner takes the cameras but `left` to its other side. Results do not
+///            depend on it.
+/// Masks      Where one hides a pixel, or comes nearer than a window's half, nothing is found,
+///            followed or matched.
+/// Memory     From the arena at construction. When the map has no room for a new point, the weakest
+///            corners are dropped.
 class FrontEnd {
  public:
   /// Sum and sum of squares of the coarsest level: equal for equal images.
@@ -50,17 +55,19 @@ class FrontEnd {
     bool operator==(const Fingerprint&) const = default;
   };
 
-  /// `masks` by camera, read here only: 0 is hidden; fewer than cameras, or empty ones: nothing is. Precondition: as large as the images.
-  FrontEnd(const OdometryOptions& options, const RigCalibration& rig, Arena& arena, PairRunner& runner,
-           std::span<const ImageView> masks = {});
-  [[nodiscard]] static std::size_t memory_needed(const OdometryOptions& options, const RigCalibration& rig,
+  /// `masks` by camera, read here only: 0 is hidden; fewer than cameras, or empty ones: nothing is.
+  /// Precondition: as large as the images.
+  FrontEnd(const OdometryOptions& options, const RigCalibration& rig, Arena& arena,
+           PairRunner& runner, std::span<const ImageView> masks = {});
+  [[nodiscard]] static std::size_t memory_needed(const OdometryOptions& options,
+                                                 const RigCalibration& rig,
                                                  std::span<const ImageView> masks = {}) noexcept;
 
   /// Builds the pyramids of a frame's images.
   [[nodiscard]] ImageCheck begin(const RigFrame& frame) noexcept;
 
-  /// Follows a spread sample of about `sample` active points from a rough prediction, from pyramid level `coarsest` down: it
-  /// may be off by some 8·2^coarsest px.
+  /// Follows a spread sample of about `sample` active points from a rough prediction, from pyramid
+  /// level `coarsest` down: it may be off by some 8·2^coarsest px.
   void follow_sample(Map& map, const Transform& T_left_world, int sample, int coarsest) noexcept;
   /// Follows every followed point into every structured camera from a good prediction.
   void follow_all(Map& map, const Transform& T_left_world) noexcept;
@@ -70,25 +77,32 @@ class FrontEnd {
   /// Half width of the band about the epipolar line, px, from now on.
   void set_band(double px) noexcept { band_px_ = px; }
 
-  /// Looks for the map's points in camera k wherever they may be, by what they look like. Answers how many seem found; their
-  /// sightings there, wrong ones among them, are rough; those in other cameras stay. Some milliseconds: for frames that tracking has
-  /// lost.
+  /// Looks for the map's points in camera k wherever they may be, by what they look like. Answers
+  /// how many seem found; their sightings there, wrong ones among them, are rough; those in other
+  /// cameras stay. Some milliseconds: for frames that tracking has lost.
   [[nodiscard]] int find_again(Map& map, int k) noexcept;
 
-  /// Corners of `left`, or blobs (OdometryOptions::first_pair), found in camera k with nothing known of the rig but that it does not turn
-  /// the image by more than some 20°: mutually best descriptors, then aligned. Wrong ones are among them. Some ten milliseconds, with
-  /// blobs three times that. Valid until the next call.
+  /// Corners of `left`, or blobs (OdometryOptions::first_pair), found in camera k with nothing
+  /// known of the rig but that it does not turn the image by more than some 20°: mutually best
+  /// descriptors, then aligned. Wrong ones are among them. Some ten milliseconds, with blobs three
+  /// times that. Valid until the next call.
   [[nodiscard]] std::span<const FreeMatch> match_free(int k) noexcept;
 
-  /// New corners of `left` where there are no points, matched across, as points of the given stage, each with its sighting in `now`.
+  /// New corners of `left` where there are no points, matched across, as points of the given stage,
+  /// each with its sighting in `now`.
   AcrossCount add_points(Map& map, const Transform& T_left_world, PointStage stage) noexcept;
 
-  /// How many corners of the last add_points() match where points of a rig with exchanged cameras would lie: behind it.
+  /// How many corners of the last add_points() match where points of a rig with exchanged cameras
+  /// would lie: behind it.
   [[nodiscard]] int count_exchanged() noexcept;
 
-  [[nodiscard]] const Lens& lens(int k) const noexcept { return lenses_[static_cast<std::size_t>(k)]; }
+  [[nodiscard]] const Lens& lens(int k) const noexcept {
+    return lenses_[static_cast<std::size_t>(k)];
+  }
   /// Nothing is looked for at this pixel of camera k.
-  [[nodiscard]] bool hides(int k, const Vec2& pixel) const noexcept { return masks_[static_cast<std::size_t>(k)].hides(pixel); }
+  [[nodiscard]] bool hides(int k, const Vec2& pixel) const noexcept {
+    return masks_[static_cast<std::size_t>(k)].hides(pixel);
+  }
   [[nodiscard]] float detect_ms() const noexcept { return detect_ms_; }
 
  private:
@@ -109,20 +123,26 @@ class FrontEnd {
     Followed left, across;
   };
 
-  [[nodiscard]] Followed follow(const MapPoint& p, const Transform& T_left_world, int k, const features::AlignOptions& how) const noexcept;
-  void follow_into_all(Map& map, const Transform& T_left_world, const features::AlignOptions& how, int stride) noexcept;
-  /// `parallax`: how far this camera stands from where the patch was cut, over the depth there: what its unknown slope can do.
+  [[nodiscard]] Followed follow(const MapPoint& p, const Transform& T_left_world, int k,
+                                const features::AlignOptions& how) const noexcept;
+  void follow_into_all(Map& map, const Transform& T_left_world, const features::AlignOptions& how,
+                       int stride) noexcept;
+  /// `parallax`: how far this camera stands from where the patch was cut, over the depth there:
+  /// what its unknown slope can do.
   [[nodiscard]] bool finish(int k, const Vec2& raw, double parallax, Followed* f) const noexcept;
   void match_across(const features::Corner& corner, bool exchanged, NewPoint* out) const noexcept;
   [[nodiscard]] features::CornerOptions corner_options(int k) const noexcept;
-  /// Corners of camera k four times as dense as points are: so that most of the other image's have their partner.
+  /// Corners of camera k four times as dense as points are: so that most of the other image's have
+  /// their partner.
   void find_dense_corners(int k) noexcept;
   void match_corners_freely(int k) noexcept;
   /// Aligns a rough match and keeps it if that succeeds and there is room.
   void keep_free_match(const features::Patch& patch, const RoughMatch& rough, int k) noexcept;
   void match_all(std::span<const features::Corner> corners, bool exchanged) noexcept;
   /// Where camera k sits is known, if only roughly: before, its transform is the identity.
-  [[nodiscard]] bool placed(int k) const noexcept { return k == 0 || rig_.T_camera_left[static_cast<std::size_t>(k)].t.squaredNorm() > 0; }
+  [[nodiscard]] bool placed(int k) const noexcept {
+    return k == 0 || rig_.T_camera_left[static_cast<std::size_t>(k)].t.squaredNorm() > 0;
+  }
   /// Null: camera k has none.
   [[nodiscard]] const features::Mask* mask(int k) const noexcept {
     const features::Mask& m = masks_[static_cast<std::size_t>(k)];
@@ -142,7 +162,8 @@ class FrontEnd {
   std::array<std::span<Followed>, kMaxCameras> followed_{};
   BoundedVector<features::Corner> corners_, taken_;
   std::span<NewPoint> fresh_;
-  std::span<features::Descriptor> described_;  // of the map's points in find_again(), of dense corners in match_free()
+  std::span<features::Descriptor>
+      described_;  // of the map's points in find_again(), of dense corners in match_free()
   BoundedVector<FreeMatch> free_matches_;
   BlobMatcher blobs_;  // has no memory unless asked for
   double band_px_;

@@ -3,16 +3,19 @@
 
 namespace vergence::odometry {
 
-/// One camera as the odometry uses it: raw pixels to follow features in, ideal pinhole pixels (same K, no distortion) to reckon with.
+/// One camera as the odometry uses it: raw pixels to follow features in, ideal pinhole pixels (same
+/// K, no distortion) to reckon with.
 class Lens {
  public:
   Lens() noexcept = default;
-  explicit Lens(const Intrinsics& k) noexcept : raw_(k), ideal_(without_distortion(k)), distorted_(k.has_distortion()) {}
+  explicit Lens(const Intrinsics& k) noexcept
+      : raw_(k), ideal_(without_distortion(k)), distorted_(k.has_distortion()) {}
 
   [[nodiscard]] const Camera& raw() const noexcept { return raw_; }
   [[nodiscard]] const Camera& ideal() const noexcept { return ideal_; }
 
-  /// Raw pixel → ideal pixel, and how much longer a short length is there. False: outside the lens model.
+  /// Raw pixel → ideal pixel, and how much longer a short length is there. False: outside the lens
+  /// model.
   [[nodiscard]] bool undistort(const Vec2& raw, Vec2* ideal, double* magnification) const noexcept;
   /// ∂(x, y of the ray (x, y, 1))/∂(raw pixel). False: outside the lens model.
   [[nodiscard]] bool ray_jacobian(const Vec2& raw, Vec3* ray, Mat2* J) const noexcept;

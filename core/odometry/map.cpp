@@ -35,7 +35,8 @@ void Map::drop_oldest_keyframe() noexcept {
     if (p.stage == PointStage::free) continue;
     p.seen[slot].cameras = 0;
     if (p.stage != PointStage::dormant) continue;
-    const bool still = std::any_of(order_.begin(), order_.end(), [&](std::uint8_t s) { return p.seen[s].cameras != 0; });
+    const bool still = std::any_of(order_.begin(), order_.end(),
+                                   [&](std::uint8_t s) { return p.seen[s].cameras != 0; });
     if (!still) p.stage = PointStage::free;
   }
 }

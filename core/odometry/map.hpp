@@ -9,24 +9,32 @@
 
 namespace vergence::odometry {
 
-inline constexpr std::size_t kMaxWindow = 20;    // keyframes; OdometryOptions::window_keyframes stays below
-inline constexpr std::size_t kMaxPoints = 2048;  // of the map: tracked ones and those the window still sees
+inline constexpr std::size_t kMaxWindow =
+    20;  // keyframes; OdometryOptions::window_keyframes stays below
+inline constexpr std::size_t kMaxPoints =
+    2048;  // of the map: tracked ones and those the window still sees
 
-inline constexpr double kNearDisparity = 3.0;  // px between a point and infinity: ten times the noise of a match; what makes scale
+inline constexpr double kNearDisparity =
+    3.0;  // px between a point and infinity: ten times the noise of a match; what makes scale
 
-/// What one rig frame saw of a point: pixels of an ideal pinhole camera with each camera's own K, distortion removed.
+/// What one rig frame saw of a point: pixels of an ideal pinhole camera with each camera's own K,
+/// distortion removed.
 struct Sighting {
   std::array<Eigen::Vector2f, kMaxCameras> pixel{};
   std::array<float, kMaxCameras> sigma{};  // px, one coordinate
   std::uint8_t cameras = 0;                // bit k: camera k saw it
 
-  [[nodiscard]] bool by(int k) const noexcept { return ((cameras >> static_cast<unsigned>(k)) & 1U) != 0; }
+  [[nodiscard]] bool by(int k) const noexcept {
+    return ((cameras >> static_cast<unsigned>(k)) & 1U) != 0;
+  }
   void set(int k, const Vec2& at, float s) noexcept {
     pixel[static_cast<std::size_t>(k)] = at.cast<float>();
     sigma[static_cast<std::size_t>(k)] = s;
     cameras = static_cast<std::uint8_t>(cameras | (1U << static_cast<unsigned>(k)));
   }
-  void drop(int k) noexcept { cameras = static_cast<std::uint8_t>(cameras & ~(1U << static_cast<unsigned>(k))); }
+  void drop(int k) noexcept {
+    cameras = static_cast<std::uint8_t>(cameras & ~(1U << static_cast<unsigned>(k)));
+  }
 };
 
 enum class PointStage : std::uint8_t {
@@ -36,7 +44,8 @@ enum class PointStage : std::uint8_t {
   dormant,    // no longer followed; the window still adjusts with its sightings
 };
 
-/// A point of the scene. p_world in metres; the patch is what it looked like in `left` where it was made.
+/// A point of the scene. p_world in metres; the patch is what it looked like in `left` where it was
+/// made.
 struct MapPoint {
   PointStage stage = PointStage::free;
   std::uint32_t id = 0;     // of the track, never given twice
@@ -47,45 +56,59 @@ struct MapPoint {
   Vec3 ray = Vec3::UnitZ();               // (x, y, 1) of its pixel there
   Mat2 d_ray_d_pixel = Mat2::Identity();  // of that ray's x, y by the raw pixel
   features::Patch patch{};
-  Sighting now{};                                  // this frame's
-  std::uint8_t in_images = 0;                      // bit k: found in camera k's image now, whether that agrees with the pose or not
-  bool logged = false;                             // `logged_at` says where
-  Eigen::Vector2f logged_at{};                     // raw pixel in `left` when the track log last took a frame
+  Sighting now{};  // this frame's
+  std::uint8_t in_images =
+      0;  // bit k: found in camera k's image now, whether that agrees with the pose or not
+  bool logged = false;          // `logged_at` says where
+  Eigen::Vector2f logged_at{};  // raw pixel in `left` when the track log last took a frame
   std::array<Eigen::Vector2f, kMaxCameras> raw{};  // this frame's pixels as the image has them
   std::array<Sighting, kMaxWindow> seen{};         // by keyframe slot
 
   /// Its position is good enough to reckon poses with.
-  [[nodiscard]] bool holds_poses() const noexcept { return stage == PointStage::active || stage == PointStage::dormant; }
-  [[nodiscard]] bool followed() const noexcept { return stage == PointStage::candidate || stage == PointStage::active; }
+  [[nodiscard]] bool holds_poses() const noexcept {
+    return stage == PointStage::active || stage == PointStage::dormant;
+  }
+  [[nodiscard]] bool followed() const noexcept {
+    return stage == PointStage::candidate || stage == PointStage::active;
+  }
 };
 
 struct Keyframe {
   Transform T_left_world{};
-  std::array<Transform, kMaxCameras> T_camera_left{};  // as they were then; read while the cameras are not linked
+  std::array<Transform, kMaxCameras>
+      T_camera_left{};  // as they were then; read while the cameras are not linked
   Stamp stamp{};
 };
 
 /// Points and the window of keyframes, fixed memory.
 ///
-/// Policies when full  Points: make_point() refuses, the caller counts. Keyframes: make_keyframe() drops the oldest first.
+/// Policies when full  Points: make_point() refuses, the caller counts. Keyframes: make_keyframe()
+/// drops the oldest first.
 class Map {
  public:
-  Map(std::size_t window, Arena& arena) : points_(arena.make<MapPoint>(kMaxPoints, "map points")), window_(window) {}
-  [[nodiscard]] static std::size_t memory_needed() noexcept { return kMaxPoints * sizeof(MapPoint) + 2 * kCacheLine; }
+  Map(std::size_t window, Arena& arena)
+      : points_(arena.make<MapPoint>(kMaxPoints, "map points")), window_(window) {}
+  [[nodiscard]] static std::size_t memory_needed() noexcept {
+    return kMaxPoints * sizeof(MapPoint) + 2 * kCacheLine;
+  }
 
   void clear() noexcept;
   /// A free slot, cleared; null when there is none.
   [[nodiscard]] MapPoint* make_point() noexcept;
   void free_point(MapPoint* p) noexcept { p->stage = PointStage::free; }
-  /// Slot of a new keyframe, dropping the oldest when the window is full. Every point's sighting there is empty.
+  /// Slot of a new keyframe, dropping the oldest when the window is full. Every point's sighting
+  /// there is empty.
   [[nodiscard]] std::size_t make_keyframe(const Transform& T_left_world, Stamp stamp) noexcept;
-  /// Everything grows by `factor` about a place of the world: points, keyframes and the distances of their cameras.
+  /// Everything grows by `factor` about a place of the world: points, keyframes and the distances
+  /// of their cameras.
   void scale_about(const Vec3& centre, double factor) noexcept;
 
   [[nodiscard]] std::span<MapPoint> points() noexcept { return points_; }
   [[nodiscard]] std::span<const MapPoint> points() const noexcept { return points_; }
   [[nodiscard]] Keyframe& keyframe(std::size_t slot) noexcept { return keyframes_[slot]; }
-  [[nodiscard]] const Keyframe& keyframe(std::size_t slot) const noexcept { return keyframes_[slot]; }
+  [[nodiscard]] const Keyframe& keyframe(std::size_t slot) const noexcept {
+    return keyframes_[slot];
+  }
   /// Slots in use, oldest first.
   [[nodiscard]] std::span<const std::uint8_t> order() const noexcept { return order_.span(); }
 

@@ -7,46 +7,60 @@
 namespace vergence::odometry {
 namespace {
 
-constexpr int kSample = 100;               // points followed from far away: enough for MLESAC, a third of the work
+constexpr int kSample =
+    100;  // points followed from far away: enough for MLESAC, a third of the work
 constexpr int kSampleInliers = 12;         // of the sample, below which the prediction was wrong
 constexpr double kSampleShare = 0.3;       // and of those found, which must agree
-constexpr double kLeastSampleShare = 0.2;  // where no start does better: a calibration that does not fit leaves a quarter of the far points
-constexpr double kSampleResidual = 3.0;    // px: worse than that is no agreement, however many take part in it
-constexpr int kRelocaliseInliers = 15;     // that agree on one pose: by chance of rough matches 8 do
-constexpr double kRecognisedShare = 0.5;   // of the points in view that must be found again where the way to a place was not followed
+constexpr double kLeastSampleShare = 0.2;  // where no start does better: a calibration that does
+                                           // not fit leaves a quarter of the far points
+constexpr double kSampleResidual =
+    3.0;  // px: worse than that is no agreement, however many take part in it
+constexpr int kRelocaliseInliers = 15;    // that agree on one pose: by chance of rough matches 8 do
+constexpr double kRecognisedShare = 0.5;  // of the points in view that must be found again where
+                                          // the way to a place was not followed
 constexpr std::uint8_t kMissesAllowed = 2;  // frames a point may be hidden
-constexpr std::uint16_t kFoundEnough = 2;   // rig frames, so four images, before a point holds a pose
-constexpr double kOutlier = 9.21;           // squared sigmas, two coordinates at 99 %
-constexpr int kNearEnough = 10;             // near points that keep the scale
-constexpr int kCameraHolds = 8;             // inliers for a camera to count as one that supports the pose
-constexpr double kRigidShare = 0.4;         // of the points found that must agree: below it something else moves
-constexpr double kAcrossShare = 0.5;        // of the points found in two cameras, in which both must agree with the pose
-constexpr double kConfirmedShare =
-    0.3;  // of points and new corners together: 0.44 to 0.65 on a rig that fits, 0.12 to 0.2 a frame out of step
-constexpr int kRestartedFrames = 10;  // frames marked after the scene was built anew
+constexpr std::uint16_t kFoundEnough =
+    2;                             // rig frames, so four images, before a point holds a pose
+constexpr double kOutlier = 9.21;  // squared sigmas, two coordinates at 99 %
+constexpr int kNearEnough = 10;    // near points that keep the scale
+constexpr int kCameraHolds = 8;    // inliers for a camera to count as one that supports the pose
+constexpr double kRigidShare =
+    0.4;  // of the points found that must agree: below it something else moves
+constexpr double kAcrossShare =
+    0.5;  // of the points found in two cameras, in which both must agree with the pose
+constexpr double kConfirmedShare = 0.3;  // of points and new corners together: 0.44 to 0.65 on a
+                                         // rig that fits, 0.12 to 0.2 a frame out of step
+constexpr int kRestartedFrames = 10;     // frames marked after the scene was built anew
 constexpr int kFramesLostBeforeRestart = 3;
 constexpr double kLongestExtrapolation = 2.0;  // s: a vehicle's speed says nothing about later
-constexpr double kCertainShare = 0.6;          // near matches of the corners above which nobody asks whether the cameras are exchanged
-constexpr double kStartShare = 0.4;            // of the corners that must match: chance across a wrong rig gives a tenth to a quarter
-constexpr int kStartMatches = 30;              // points across to start from
+constexpr double kCertainShare =
+    0.6;  // near matches of the corners above which nobody asks whether the cameras are exchanged
+constexpr double kStartShare =
+    0.4;  // of the corners that must match: chance across a wrong rig gives a tenth to a quarter
+constexpr int kStartMatches = 30;  // points across to start from
 
-constexpr double kUnlinkedBand = 4.0;    // px: this frame's transform between the cameras is itself measured
-constexpr double kFreeMatchSigma = 2.0;  // sigmas of a tracked corner: patches are aligned without their shape being known
+constexpr double kUnlinkedBand =
+    4.0;  // px: this frame's transform between the cameras is itself measured
+constexpr double kFreeMatchSigma =
+    2.0;  // sigmas of a tracked corner: patches are aligned without their shape being known
 constexpr double kWorstDirection = 0.1;  // rad, of t, to start from
 constexpr double kWorstRotation = 0.01;  // rad
 
 /// A pose of the sample that all points may be followed from.
 bool sample_agrees(const PoseFit& fit, double share) noexcept {
-  return fit.inliers >= kSampleInliers && fit.inliers > share * fit.given && fit.rms_px < kSampleResidual;
+  return fit.inliers >= kSampleInliers && fit.inliers > share * fit.given &&
+         fit.rms_px < kSampleResidual;
 }
 
 class StageClock {
  public:
-  explicit StageClock(FrameOutcome* out) noexcept : out_(out), last_(std::chrono::steady_clock::now()) {}
+  explicit StageClock(FrameOutcome* out) noexcept
+      : out_(out), last_(std::chrono::steady_clock::now()) {}
   /// What has passed since the last mark belongs to this stage.
   void mark(Stage stage) noexcept {
     const auto now = std::chrono::steady_clock::now();
-    out_->stage_ms[static_cast<std::size_t>(stage)] += std::chrono::duration<float, std::milli>(now - last_).count();
+    out_->stage_ms[static_cast<std::size_t>(stage)] +=
+        std::chrono::duration<float, std::milli>(now - last_).count();
     last_ = now;
   }
 
@@ -57,14 +71,16 @@ class StageClock {
 
 }  // namespace
 
-std::size_t Odometry::memory_needed(const OdometryOptions& options, const RigCalibration& rig, std::span<const ImageView> masks) noexcept {
+std::size_t Odometry::memory_needed(const OdometryOptions& options, const RigCalibration& rig,
+                                    std::span<const ImageView> masks) noexcept {
   const auto n = static_cast<std::size_t>(options.features);
-  return FrontEnd::memory_needed(options, rig, masks) + Map::memory_needed() + WindowAdjuster::memory_needed(options, rig) +
-         PoseEstimator::memory_needed() + StereoMlesac::memory_needed(n) + 5 * (n * sizeof(double) + kCacheLine);
+  return FrontEnd::memory_needed(options, rig, masks) + Map::memory_needed() +
+         WindowAdjuster::memory_needed(options, rig) + PoseEstimator::memory_needed() +
+         StereoMlesac::memory_needed(n) + 5 * (n * sizeof(double) + kCacheLine);
 }
 
-Odometry::Odometry(const OdometryOptions& options, const RigCalibration& rig, bool known, Arena& arena, PairRunner& runner,
-                   std::span<const ImageView> masks)
+Odometry::Odometry(const OdometryOptions& options, const RigCalibration& rig, bool known,
+                   Arena& arena, PairRunner& runner, std::span<const ImageView> masks)
     : options_(options),
       rig_(rig),
       link_(known ? Link::linked : Link::unlinked),
@@ -75,7 +91,8 @@ Odometry::Odometry(const OdometryOptions& options, const RigCalibration& rig, bo
       poses_(options, rig_, arena),
       across_(static_cast<std::size_t>(options.features), arena),
       random_(options.seed) {
-  for (std::span<double>& column : columns_) column = arena.make<double>(static_cast<std::size_t>(options.features), "matches across");
+  for (std::span<double>& column : columns_)
+    column = arena.make<double>(static_cast<std::size_t>(options.features), "matches across");
   if (known) return;
   unlink();
   forget_rig();
@@ -93,7 +110,8 @@ void Odometry::unlink() noexcept {
 }
 
 Transform Odometry::predict(double dt_s) const noexcept {
-  return {normalised(exp_so3(turn_per_s_ * dt_s) * T_left_world_.R), exp_so3(turn_per_s_ * dt_s) * T_left_world_.t + shift_per_s_ * dt_s};
+  return {normalised(exp_so3(turn_per_s_ * dt_s) * T_left_world_.R),
+          exp_so3(turn_per_s_ * dt_s) * T_left_world_.t + shift_per_s_ * dt_s};
 }
 
 void Odometry::remember(const Transform& T_left_world, Stamp stamp) noexcept {
@@ -112,22 +130,26 @@ PoseFit Odometry::fit(const Transform& start, bool sample) noexcept {
   if (link_ == Link::unlinked) return poses_.fit_unlinked(map_, start, sample, rig_.T_camera_left);
   PoseFit all = poses_.fit_linked(map_, start, sample);
   if (!all.found || confirmed_across(all) || all.across == 0) return all;
-  // The cameras contradict each other. Which is right the images do not say, but the left one is what the pose is of.
+  // The cameras contradict each other. Which is right the images do not say, but the left one is
+  // what the pose is of.
   const PoseFit left = poses_.fit_left(map_, start);
   return left.found && left.inliers >= options_.ok_inliers ? left : all;
 }
 
-PoseFit Odometry::track(const Transform& predicted, std::uint8_t structured, FrameOutcome* out) noexcept {
+PoseFit Odometry::track(const Transform& predicted, std::uint8_t structured,
+                        FrameOutcome* out) noexcept {
   PoseFit fit;
   if (structured == 0) return fit;
   StageClock clock(out);
-  // From the prediction; if that was wrong, from further away; if that was, from where the last frame stood.
+  // From the prediction; if that was wrong, from further away; if that was, from where the last
+  // frame stood.
   struct Attempt {
     const Transform* start;
     int coarsest;
   };
   PoseFit best;
-  for (const Attempt& a : {Attempt{&predicted, 2}, Attempt{&predicted, 3}, Attempt{&T_left_world_, 3}}) {
+  for (const Attempt& a :
+       {Attempt{&predicted, 2}, Attempt{&predicted, 3}, Attempt{&T_left_world_, 3}}) {
     front_end_.follow_sample(map_, *a.start, kSample, a.coarsest);
     clock.mark(Stage::track);
     fit = this->fit(*a.start, true);
@@ -148,18 +170,23 @@ PoseFit Odometry::track(const Transform& predicted, std::uint8_t structured, Fra
   clock.mark(Stage::track);
   fit = this->fit(coarse, false);
   if (!fit.found || fit.inliers < kRigidShare * fit.given) fit = this->fit(coarse, true);
-  // One facade looks like the next: a place is believed again only if most of what should be seen from there is.
-  if (doubtful && fit.inliers < kRecognisedShare * points_in_view(fit.T_left_world)) fit.found = false;
+  // One facade looks like the next: a place is believed again only if most of what should be seen
+  // from there is.
+  if (doubtful && fit.inliers < kRecognisedShare * points_in_view(fit.T_left_world))
+    fit.found = false;
   clock.mark(Stage::pose);
   return fit;
 }
 
 void Odometry::recover_cameras(const PoseFit& fit) noexcept {
   for (int k = 1; k < rig_.cameras; ++k) {
-    if (((fit.cameras >> static_cast<unsigned>(k)) & 1U) != 0 || front_end_.find_again(map_, k) < kRelocaliseInliers) continue;
+    if (((fit.cameras >> static_cast<unsigned>(k)) & 1U) != 0 ||
+        front_end_.find_again(map_, k) < kRelocaliseInliers)
+      continue;
     Transform& T_camera_left = rig_.T_camera_left[static_cast<std::size_t>(k)];
     Transform T_camera_world;
-    if (!poses_.fit_camera(map_, k, T_camera_left * fit.T_left_world, true, &T_camera_world)) continue;
+    if (!poses_.fit_camera(map_, k, T_camera_left * fit.T_left_world, true, &T_camera_world))
+      continue;
     T_camera_left = T_camera_world * fit.T_left_world.inverse();
   }
 }
@@ -170,7 +197,8 @@ int Odometry::points_in_view(const Transform& T_left_world) const noexcept {
   for (const MapPoint& p : map_.points()) {
     Vec2 pixel;
     const Camera& camera = front_end_.lens(0).raw();
-    if (p.stage == PointStage::active && camera.project(T_left_world * p.p_world, &pixel, nullptr) == ProjectStatus::ok &&
+    if (p.stage == PointStage::active &&
+        camera.project(T_left_world * p.p_world, &pixel, nullptr) == ProjectStatus::ok &&
         camera.inside(pixel, kBorder) && !front_end_.hides(0, pixel))
       ++n;
   }
@@ -209,10 +237,12 @@ void Odometry::settle_points(const PoseFit& fit) noexcept {
         if (!p.now.by(k)) continue;
         const auto c = static_cast<std::size_t>(k);
         Vec2 pixel;
-        const bool seen = front_end_.lens(k).ideal().project(rig_.T_camera_left[c] * (fit.T_left_world * p.p_world), &pixel, nullptr) ==
-                          ProjectStatus::ok;
+        const bool seen = front_end_.lens(k).ideal().project(
+                              rig_.T_camera_left[c] * (fit.T_left_world * p.p_world), &pixel,
+                              nullptr) == ProjectStatus::ok;
         const double limit = kOutlier * p.now.sigma[c] * p.now.sigma[c];
-        if (!seen || (pixel - p.now.pixel[c].cast<double>()).squaredNorm() > 4.0 * limit) p.now.drop(k);
+        if (!seen || (pixel - p.now.pixel[c].cast<double>()).squaredNorm() > 4.0 * limit)
+          p.now.drop(k);
       }
     }
     if (p.now.cameras != 0) {
@@ -263,7 +293,8 @@ void Odometry::make_keyframe(const PoseFit& fit, Stamp stamp, FrameOutcome* out)
   for (MapPoint& p : map_.points())
     if (p.followed()) p.seen[slot] = p.now;
   if (link_ == Link::linked) {
-    if (window_.adjust(map_).usable) std::copy_n(window_.T_camera_left().begin(), rig_.cameras, rig_.T_camera_left.begin());
+    if (window_.adjust(map_).usable)
+      std::copy_n(window_.T_camera_left().begin(), rig_.cameras, rig_.T_camera_left.begin());
   } else {
     (void)window_.adjust_unlinked(map_);
     out->scale = renew_scale(slot);
@@ -289,8 +320,10 @@ void Odometry::make_keyframe(const PoseFit& fit, Stamp stamp, FrameOutcome* out)
 bool Odometry::initialise_rig(FrameOutcome* out) noexcept {
   StageClock clock(out);
   const std::span<const FreeMatch> matches = front_end_.match_free(1);
-  const Pinhole left{rig_.intrinsics[0].fx, rig_.intrinsics[0].fy, rig_.intrinsics[0].cx, rig_.intrinsics[0].cy};
-  const Pinhole right{rig_.intrinsics[1].fx, rig_.intrinsics[1].fy, rig_.intrinsics[1].cx, rig_.intrinsics[1].cy};
+  const Pinhole left{rig_.intrinsics[0].fx, rig_.intrinsics[0].fy, rig_.intrinsics[0].cx,
+                     rig_.intrinsics[0].cy};
+  const Pinhole right{rig_.intrinsics[1].fx, rig_.intrinsics[1].fy, rig_.intrinsics[1].cx,
+                      rig_.intrinsics[1].cy};
   const std::size_t n = matches.size();
   for (std::size_t i = 0; i < n; ++i) {
     columns_[0][i] = (matches[i].left.x() - left.cx) / left.fx;
@@ -299,12 +332,18 @@ bool Odometry::initialise_rig(FrameOutcome* out) noexcept {
     columns_[3][i] = (matches[i].other.y() - right.cy) / right.fy;
     columns_[4][i] = kFreeMatchSigma * matches[i].sigma / left.fx;
   }
-  const StereoMatches rays{columns_[0].first(n), columns_[1].first(n), columns_[2].first(n), columns_[3].first(n), columns_[4].first(n)};
-  const StereoEstimate e = across_.estimate_stereo_transform(rays, rig_.baseline, StereoMlesacOptions{}, random_);
+  const StereoMatches rays{columns_[0].first(n), columns_[1].first(n), columns_[2].first(n),
+                           columns_[3].first(n), columns_[4].first(n)};
+  const StereoEstimate e =
+      across_.estimate_stereo_transform(rays, rig_.baseline, StereoMlesacOptions{}, random_);
   clock.mark(Stage::match);
-  out->reason = n < static_cast<std::size_t>(kStartMatches) ? Reason::needs_texture : Reason::uncalibrated;
-  if (e.status != StereoMlesacStatus::ok || e.inliers < kStartMatches || e.inliers < kRigidShare * static_cast<double>(n)) return false;
-  // A direction of t that the scene does not hold (all of it far away) is no start: depth would be arbitrary.
+  out->reason =
+      n < static_cast<std::size_t>(kStartMatches) ? Reason::needs_texture : Reason::uncalibrated;
+  if (e.status != StereoMlesacStatus::ok || e.inliers < kStartMatches ||
+      e.inliers < kRigidShare * static_cast<double>(n))
+    return false;
+  // A direction of t that the scene does not hold (all of it far away) is no start: depth would be
+  // arbitrary.
   if (!(e.direction_sigma < kWorstDirection) || !(e.rotation_sigma < kWorstRotation)) {
     out->reason = Reason::needs_near_structure;
     return false;
@@ -320,9 +359,11 @@ bool Odometry::start_scene(const Transform& T_left_world, Stamp stamp, FrameOutc
   clock.mark(Stage::match);
   if (across.corners < kStartMatches)
     out->reason = Reason::few_features;
-  else if (across.near < kCertainShare * across.corners && front_end_.count_exchanged() > across.near)
+  else if (across.near < kCertainShare * across.corners &&
+           front_end_.count_exchanged() > across.near)
     out->reason = Reason::cameras_swapped;
-  else if (across.matched < kStartMatches || across.matched < kStartShare * across.corners || across.near < kNearEnough)
+  else if (across.matched < kStartMatches || across.matched < kStartShare * across.corners ||
+           across.near < kNearEnough)
     out->reason = Reason::no_stereo_matches;
   else {
     across_fails_ = false;
@@ -357,7 +398,8 @@ Reason Odometry::weakness(const ImageCheck& images) const noexcept {
   return images.structured != all ? Reason::image_dark : Reason::none;
 }
 
-void Odometry::judge(const PoseFit& fit, const ImageCheck& images, FrameOutcome* out) const noexcept {
+void Odometry::judge(const PoseFit& fit, const ImageCheck& images,
+                     FrameOutcome* out) const noexcept {
   out->status = PoseStatus::degraded;
   const Reason of_images = weakness(images);
   if (restart_cooldown_ > 0)
@@ -384,8 +426,8 @@ void Odometry::judge(const PoseFit& fit, const ImageCheck& images, FrameOutcome*
   }
 }
 
-void Odometry::begin_scene(const RigFrame& frame, const ImageCheck& images, const Transform& predicted, double dt,
-                           FrameOutcome* out) noexcept {
+void Odometry::begin_scene(const RigFrame& frame, const ImageCheck& images,
+                           const Transform& predicted, double dt, FrameOutcome* out) noexcept {
   // Nothing to follow: this frame begins a scene, where the last one is thought to have ended.
   const bool initialise = link_ == Link::unlinked && !rig_known_;
   bool started = !initialise || initialise_rig(out);
@@ -444,7 +486,8 @@ FrameOutcome Odometry::process(const RigFrame& frame) noexcept {
   clock.mark(Stage::pyramid);
   out.images_good = weakness(images) == Reason::none;
   const double dt = any_pose_ ? (frame.stamp - stamp_).to_seconds() : 0.0;
-  const Transform predicted = any_pose_ ? predict(std::min(dt, kLongestExtrapolation)) : Transform{};
+  const Transform predicted =
+      any_pose_ ? predict(std::min(dt, kLongestExtrapolation)) : Transform{};
 
   if (map_.order().empty()) {
     if (link_pending_) take_up_link();
@@ -455,7 +498,9 @@ FrameOutcome Odometry::process(const RigFrame& frame) noexcept {
   if (dt > options_.max_gap_s && frames_lost_ == 0) out.gap_s = dt;
   const PoseFit fit = track(predicted, images.structured, &out);
   if (!fit.found) {
-    out.reason = weakness(images) != Reason::none ? weakness(images) : out.gap_s > 0 ? Reason::time_gap : Reason::no_pose;
+    out.reason = weakness(images) != Reason::none ? weakness(images)
+                 : out.gap_s > 0                  ? Reason::time_gap
+                                                  : Reason::no_pose;
     if (images.structured != 0 && ++frames_lost_ >= kFramesLostBeforeRestart) lose_scene();
     return out;
   }

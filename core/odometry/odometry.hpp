@@ -23,39 +23,46 @@ struct FrameOutcome {
   bool initialised = false;  // the rig's transform was found from this frame's images alone
   double gap_s = 0;          // time since the frame before, when it was too long to predict over
   bool images_good = false;  // every camera gave an image, new and with structure
-  double scale = 1;          // everything of the world was scaled by this about the left camera, to the known baseline
+  double scale =
+      1;  // everything of the world was scaled by this about the left camera, to the known baseline
   std::array<float, kStages> stage_ms{};
 };
 
 /// How the cameras hang together.
 enum class Link : std::uint8_t {
   linked,    // one rigid rig with the calibration in use: stereo odometry
-  unlinked,  // each camera's pose is found for itself; the baseline's length alone keeps the scale: parallel monocular
+  unlinked,  // each camera's pose is found for itself; the baseline's length alone keeps the scale:
+             // parallel monocular
 };
 
-/// Visual odometry (METHOD §3): predicts, follows, poses, keeps a window of keyframes; linked or not.
+/// Visual odometry (METHOD §3): predicts, follows, poses, keeps a window of keyframes; linked or
+/// not.
 ///
-/// Unlinked, rig() is this frame's transform between the cameras and no calibration. A knock of one camera is a motion of that camera
-/// like any other there.
-/// Frames     T_left_world; world is the left camera of the first frame posed and stays when the scene is built anew.
+/// Unlinked, rig() is this frame's transform between the cameras and no calibration. A knock of one
+/// camera is a motion of that camera like any other there.
+/// Frames     T_left_world; world is the left camera of the first frame posed and stays when the
+///            scene is built anew.
 /// Threads    One caller. Memory: from the arena at construction. Errors: by FrameOutcome.
 class Odometry {
  public:
-  /// `known`: rig.T_camera_left is a calibration. False: of the rig only intrinsics and baseline are read; the first pair that allows it
-  /// initialises the cameras, unlinked.
-  /// `masks` as FrontEnd's.
-  Odometry(const OdometryOptions& options, const RigCalibration& rig, bool known, Arena& arena, PairRunner& runner,
-           std::span<const ImageView> masks = {});
-  [[nodiscard]] static std::size_t memory_needed(const OdometryOptions& options, const RigCalibration& rig,
+  /// `known`: rig.T_camera_left is a calibration. False: of the rig only intrinsics and baseline
+  /// are read; the first pair that allows it initialises the cameras, unlinked. `masks` as
+  /// FrontEnd's.
+  Odometry(const OdometryOptions& options, const RigCalibration& rig, bool known, Arena& arena,
+           PairRunner& runner, std::span<const ImageView> masks = {});
+  [[nodiscard]] static std::size_t memory_needed(const OdometryOptions& options,
+                                                 const RigCalibration& rig,
                                                  std::span<const ImageView> masks = {}) noexcept;
 
   [[nodiscard]] FrameOutcome process(const RigFrame& frame) noexcept;
 
-  /// From the next frame on the cameras are one rig with this calibration: the scene is built anew where the left camera then is.
+  /// From the next frame on the cameras are one rig with this calibration: the scene is built anew
+  /// where the left camera then is.
   void link(const RigCalibration& rig) noexcept;
   /// From the next frame on the cameras are not linked; the scene stays.
   void unlink() noexcept;
-  /// What is known of the cameras' transform is of no use: unlinked, the next scene begins with finding it.
+  /// What is known of the cameras' transform is of no use: unlinked, the next scene begins with
+  /// finding it.
   void forget_rig() noexcept;
   [[nodiscard]] Link linked() const noexcept { return link_; }
 
@@ -69,7 +76,8 @@ class Odometry {
  private:
   [[nodiscard]] Transform predict(double dt_s) const noexcept;
   [[nodiscard]] PoseFit fit(const Transform& start, bool sample) noexcept;
-  [[nodiscard]] PoseFit track(const Transform& predicted, std::uint8_t structured, FrameOutcome* out) noexcept;
+  [[nodiscard]] PoseFit track(const Transform& predicted, std::uint8_t structured,
+                              FrameOutcome* out) noexcept;
   [[nodiscard]] int points_in_view(const Transform& T_left_world) const noexcept;
   [[nodiscard]] PoseFit relocalise(FrameOutcome* out) noexcept;
   /// Cameras whose own pose was not found are sought by what the points look like.
@@ -79,10 +87,13 @@ class Odometry {
   void make_keyframe(const PoseFit& fit, Stamp stamp, FrameOutcome* out) noexcept;
   [[nodiscard]] double renew_scale(std::size_t slot) noexcept;
   [[nodiscard]] bool initialise_rig(FrameOutcome* out) noexcept;
-  [[nodiscard]] bool start_scene(const Transform& T_left_world, Stamp stamp, FrameOutcome* out) noexcept;
-  void begin_scene(const RigFrame& frame, const ImageCheck& images, const Transform& predicted, double dt, FrameOutcome* out) noexcept;
+  [[nodiscard]] bool start_scene(const Transform& T_left_world, Stamp stamp,
+                                 FrameOutcome* out) noexcept;
+  void begin_scene(const RigFrame& frame, const ImageCheck& images, const Transform& predicted,
+                   double dt, FrameOutcome* out) noexcept;
   void take_up_link() noexcept;
-  /// Nothing of the scene is of use any more; without a calibration the rig has to be initialised again.
+  /// Nothing of the scene is of use any more; without a calibration the rig has to be initialised
+  /// again.
   void lose_scene() noexcept;
   /// The cameras agree about the scene: only then does a frame shape the map.
   [[nodiscard]] static bool confirmed_across(const PoseFit& fit) noexcept;
@@ -102,11 +113,13 @@ class Odometry {
   WindowAdjuster window_;
   PoseEstimator poses_;
   StereoMlesac across_;
-  std::array<std::span<double>, 5> columns_{};  // of the matches given to it: left x, y, right x, y, sigma
+  std::array<std::span<double>, 5>
+      columns_{};  // of the matches given to it: left x, y, right x, y, sigma
   Random random_;
 
-  Transform T_left_world_{};        // of the last posed frame
-  Vec3 turn_per_s_ = Vec3::Zero();  // of the last step: rotation vector and translation of T_now_before, a second
+  Transform T_left_world_{};  // of the last posed frame
+  Vec3 turn_per_s_ =
+      Vec3::Zero();  // of the last step: rotation vector and translation of T_now_before, a second
   Vec3 shift_per_s_ = Vec3::Zero();
   Stamp stamp_{};
   bool any_pose_ = false;

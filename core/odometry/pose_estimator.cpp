@@ -14,11 +14,13 @@ constexpr int kCameraAlone = 12;   // inliers for a camera's own pose to be beli
 }  // namespace
 
 std::size_t PoseEstimator::memory_needed() noexcept {
-  return RigObservationTable::memory_needed(kMaxPoints) + RigMlesac::memory_needed(kMaxPoints) + PoseRefiner::memory_needed(kMaxPoints) +
-         kMaxPoints * (sizeof(std::uint16_t) + 1) + 2 * kCacheLine;
+  return RigObservationTable::memory_needed(kMaxPoints) + RigMlesac::memory_needed(kMaxPoints) +
+         PoseRefiner::memory_needed(kMaxPoints) + kMaxPoints * (sizeof(std::uint16_t) + 1) +
+         2 * kCacheLine;
 }
 
-PoseEstimator::PoseEstimator(const OdometryOptions& options, const RigCalibration& rig, Arena& arena)
+PoseEstimator::PoseEstimator(const OdometryOptions& options, const RigCalibration& rig,
+                             Arena& arena)
     : options_(options),
       rig_(rig),
       table_(kMaxPoints, arena),
@@ -76,7 +78,8 @@ PoseEstimator::Solved PoseEstimator::solve(const Transform& start, bool sample) 
   PoseRefineOptions refine;
   refine.huber = options_.huber;
   refine.inlier_chi2 = kOutlier;
-  const RefinedPose r = refiner_.refine(table_.view(), s.T, sample ? mlesac_.flags() : std::span<const std::uint8_t>{}, refine);
+  const RefinedPose r = refiner_.refine(
+      table_.view(), s.T, sample ? mlesac_.flags() : std::span<const std::uint8_t>{}, refine);
   if (!r.usable()) return s;
   s.found = true;
   s.T = r.T_left_world;
@@ -100,14 +103,18 @@ void PoseEstimator::count(const Map& map, PoseFit* fit) const noexcept {
     if ((good & 1U) == 0 || (good & ~1U) == 0) continue;
     ++fit->stereo;
     const double z = (fit->T_left_world * p.p_world).z();
-    const auto other = static_cast<std::size_t>(std::countr_zero(static_cast<unsigned>(good & ~1U)));
-    if (rig_.intrinsics[0].fx * rig_.T_camera_left[other].t.norm() > kNearDisparity * z) ++fit->near;
+    const auto other =
+        static_cast<std::size_t>(std::countr_zero(static_cast<unsigned>(good & ~1U)));
+    if (rig_.intrinsics[0].fx * rig_.T_camera_left[other].t.norm() > kNearDisparity * z)
+      ++fit->near;
   }
   for (int k = 0; k < rig_.cameras; ++k)
     if (held[static_cast<std::size_t>(k)] >= kCameraHolds)
       fit->cameras = static_cast<std::uint8_t>(fit->cameras | (1U << static_cast<unsigned>(k)));
-  // One camera alone measures no depth and makes no new points: what is left of the map has to hold the pose well.
-  fit->found = fit->inliers >= (std::popcount(fit->cameras) < 2 ? options_.ok_inliers : options_.min_inliers);
+  // One camera alone measures no depth and makes no new points: what is left of the map has to hold
+  // the pose well.
+  fit->found = fit->inliers >=
+               (std::popcount(fit->cameras) < 2 ? options_.ok_inliers : options_.min_inliers);
 }
 
 PoseFit PoseEstimator::fit_linked(const Map& map, const Transform& start, bool sample) noexcept {
@@ -137,7 +144,8 @@ PoseFit PoseEstimator::fit_left(const Map& map, const Transform& start) noexcept
   PoseRefineOptions refine;
   refine.huber = options_.huber;
   refine.inlier_chi2 = kOutlier;
-  const RefinedPose r = refiner_.refine(table_.view(), T, std::span<const std::uint8_t>(left).first(table_.size()), refine);
+  const RefinedPose r = refiner_.refine(
+      table_.view(), T, std::span<const std::uint8_t>(left).first(table_.size()), refine);
   if (!r.usable()) return fit;
   fit.T_left_world = r.T_left_world;
   fit.rms_px = r.rms_px;
@@ -146,7 +154,8 @@ PoseFit PoseEstimator::fit_left(const Map& map, const Transform& start) noexcept
   return fit;
 }
 
-bool PoseEstimator::fit_camera(const Map& map, int k, const Transform& start, bool sample, Transform* T_camera_world) noexcept {
+bool PoseEstimator::fit_camera(const Map& map, int k, const Transform& start, bool sample,
+                               Transform* T_camera_world) noexcept {
   collect_camera(map, k);
   const Solved s = solve(start, sample);
   // Wrong matches agree with each other by chance, so a share is asked for besides a count.
@@ -155,7 +164,8 @@ bool PoseEstimator::fit_camera(const Map& map, int k, const Transform& start, bo
   return true;
 }
 
-PoseFit PoseEstimator::fit_unlinked(const Map& map, const Transform& start, bool sample, std::span<Transform> T_camera_left) noexcept {
+PoseFit PoseEstimator::fit_unlinked(const Map& map, const Transform& start, bool sample,
+                                    std::span<Transform> T_camera_left) noexcept {
   PoseFit fit;
   fit.T_left_world = start;
   std::fill(agrees_.begin(), agrees_.end(), std::uint8_t{0});
@@ -171,7 +181,9 @@ PoseFit PoseEstimator::fit_unlinked(const Map& map, const Transform& start, bool
       continue;
     }
     for (std::size_t i = 0; i < owner_.size(); ++i)
-      if (refiner_.flags()[i] != 0) agrees_[owner_[i]] = static_cast<std::uint8_t>(agrees_[owner_[i]] | (1U << static_cast<unsigned>(k)));
+      if (refiner_.flags()[i] != 0)
+        agrees_[owner_[i]] =
+            static_cast<std::uint8_t>(agrees_[owner_[i]] | (1U << static_cast<unsigned>(k)));
     if (k == 0)
       fit.T_left_world = s.T;
     else

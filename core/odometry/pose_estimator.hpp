@@ -21,8 +21,10 @@ struct PoseFit {
 
 /// Poses from points: three points in MLESAC, then all of them (METHOD §3).
 ///
-/// Linked, the cameras are one rigid rig; unlinked, each camera's pose is found for itself and the rig's transform is what comes out.
-/// Ownership  Options and rig are the owner's. agrees() stays valid until the next fit. Threads: one caller. Memory: the arena's.
+/// Linked, the cameras are one rigid rig; unlinked, each camera's pose is found for itself and the
+/// rig's transform is what comes out.
+/// Ownership  Options and rig are the owner's. agrees() stays valid until the next fit. Threads:
+///            one caller. Memory: the arena's.
 class PoseEstimator {
  public:
   PoseEstimator(const OdometryOptions& options, const RigCalibration& rig, Arena& arena);
@@ -30,13 +32,16 @@ class PoseEstimator {
 
   /// From `start`; with `sample` by MLESAC first, else by refinement alone.
   [[nodiscard]] PoseFit fit_linked(const Map& map, const Transform& start, bool sample) noexcept;
-  /// By the left camera's sightings alone; the others' are judged by the pose that comes out. Not found: the fit says so.
+  /// By the left camera's sightings alone; the others' are judged by the pose that comes out. Not
+  /// found: the fit says so.
   [[nodiscard]] PoseFit fit_left(const Map& map, const Transform& start) noexcept;
-  /// Each camera for itself. T_camera_left (in/out, as many as cameras): prediction, then this frame's; a camera that found no pose
-  /// keeps its prediction and supports nothing.
-  [[nodiscard]] PoseFit fit_unlinked(const Map& map, const Transform& start, bool sample, std::span<Transform> T_camera_left) noexcept;
+  /// Each camera for itself. T_camera_left (in/out, as many as cameras): prediction, then this
+  /// frame's; a camera that found no pose keeps its prediction and supports nothing.
+  [[nodiscard]] PoseFit fit_unlinked(const Map& map, const Transform& start, bool sample,
+                                     std::span<Transform> T_camera_left) noexcept;
   /// One camera alone, for its own pose T_camera_world; false: none found.
-  [[nodiscard]] bool fit_camera(const Map& map, int k, const Transform& start, bool sample, Transform* T_camera_world) noexcept;
+  [[nodiscard]] bool fit_camera(const Map& map, int k, const Transform& start, bool sample,
+                                Transform* T_camera_world) noexcept;
 
   /// By map point: bit k set if camera k's sighting agrees with the last fit.
   [[nodiscard]] std::span<const std::uint8_t> agrees() const noexcept { return agrees_; }

@@ -9,18 +9,21 @@ namespace vergence::odometry {
 namespace {
 
 constexpr std::size_t kMaxWindowPoints = 1024;
-constexpr std::size_t kSightingsAPoint = 10;  // on average, of all cameras; more are left out of the step
-constexpr float kOutlier = 16.F;              // squared whitened residual, 2 degrees of freedom: 3e-4 of Gaussian errors
-constexpr int kSightingsOfPose = 3;           // that hold six degrees of freedom
-constexpr double kMinDepthOfPoint = 0.05;     // m in front of every camera that sees it
-constexpr double kJudgedDepth = 20.0;         // m, where a calibration is asked for its depth error
-constexpr double kHeldSigma = 1e-6;           // rad and m, of what a window does not estimate of a rig
-constexpr double kInflation =
-    100.0;  // of a variance: a lens field of 0.03 px that no model has does not average out over 2000 observations of 0.15 px
+constexpr std::size_t kSightingsAPoint =
+    10;  // on average, of all cameras; more are left out of the step
+constexpr float kOutlier =
+    16.F;  // squared whitened residual, 2 degrees of freedom: 3e-4 of Gaussian errors
+constexpr int kSightingsOfPose = 3;        // that hold six degrees of freedom
+constexpr double kMinDepthOfPoint = 0.05;  // m in front of every camera that sees it
+constexpr double kJudgedDepth = 20.0;      // m, where a calibration is asked for its depth error
+constexpr double kHeldSigma = 1e-6;        // rad and m, of what a window does not estimate of a rig
+constexpr double kInflation = 100.0;  // of a variance: a lens field of 0.03 px that no model has
+                                      // does not average out over 2000 observations of 0.15 px
 
 }  // namespace
 
-BundleCapacities WindowAdjuster::capacities(const OdometryOptions& options, const RigCalibration& rig) noexcept {
+BundleCapacities WindowAdjuster::capacities(const OdometryOptions& options,
+                                            const RigCalibration& rig) noexcept {
   BundleCapacities c;
   c.cameras = static_cast<std::size_t>(rig.cameras);
   c.poses = static_cast<std::size_t>(options.window_keyframes * rig.cameras);
@@ -30,24 +33,29 @@ BundleCapacities WindowAdjuster::capacities(const OdometryOptions& options, cons
   return c;
 }
 
-std::size_t WindowAdjuster::memory_needed(const OdometryOptions& options, const RigCalibration& rig) noexcept {
+std::size_t WindowAdjuster::memory_needed(const OdometryOptions& options,
+                                          const RigCalibration& rig) noexcept {
   const BundleCapacities c = capacities(options, rig);
   return BundleAdjuster::memory_needed(c) + c.points * (sizeof(Vec3) + sizeof(std::uint16_t)) +
          c.observations * (sizeof(BundleObservation) + sizeof(float)) + 8 * kCacheLine;
 }
 
-WindowAdjuster::WindowAdjuster(const OdometryOptions& options, const RigCalibration& rig, Arena& arena)
+WindowAdjuster::WindowAdjuster(const OdometryOptions& options, const RigCalibration& rig,
+                               Arena& arena)
     : options_(options), rig_(rig), adjuster_(capacities(options, rig), arena) {
   const BundleCapacities c = capacities(options, rig);
   points_ = BoundedVector<Vec3>(arena.make<Vec3>(c.points, "window points"));
   owner_ = BoundedVector<std::uint16_t>(arena.make<std::uint16_t>(c.points, "window points"));
-  observations_ = BoundedVector<BundleObservation>(arena.make<BundleObservation>(c.observations, "window observations"));
+  observations_ = BoundedVector<BundleObservation>(
+      arena.make<BundleObservation>(c.observations, "window observations"));
   residuals_ = arena.make<float>(c.observations, "window residuals");
   take_up_rig();
 }
 
 void WindowAdjuster::take_up_rig() noexcept {
-  for (int k = 0; k < rig_.cameras; ++k) cameras_[static_cast<std::size_t>(k)] = Lens(rig_.intrinsics[static_cast<std::size_t>(k)]).ideal();
+  for (int k = 0; k < rig_.cameras; ++k)
+    cameras_[static_cast<std::size_t>(k)] =
+        Lens(rig_.intrinsics[static_cast<std::size_t>(k)]).ideal();
   T_camera_left_ = rig_.T_camera_left;
   doubt_rig();
 }
@@ -66,12 +74,17 @@ void WindowAdjuster::doubt_rig() noexcept {
       return;
     }
     // A turn of σ is a disparity of f σ, so a relative depth of z σ / b.
-    const double known = 0.01 * calibration::depth_error_percent(rig_, k, kJudgedDepth) * t.norm() / kJudgedDepth;
-    const double sigma = known > 0 ? std::min(known, options_.rig_turn_sigma) : options_.rig_turn_sigma;
-    const Mat3 turn = sigma * sigma * axis.normalized() * axis.normalized().transpose() + kHeldSigma * kHeldSigma * Mat3::Identity();
+    const double known =
+        0.01 * calibration::depth_error_percent(rig_, k, kJudgedDepth) * t.norm() / kJudgedDepth;
+    const double sigma =
+        known > 0 ? std::min(known, options_.rig_turn_sigma) : options_.rig_turn_sigma;
+    const Mat3 turn = sigma * sigma * axis.normalized() * axis.normalized().transpose() +
+                      kHeldSigma * kHeldSigma * Mat3::Identity();
     for (int i = 0; i < 3; ++i) {
-      for (int j = 0; j <= i; ++j) claimed_.covariance.set(extrinsic_row(k) + i, extrinsic_row(k) + j, turn(i, j));
-      claimed_.covariance.set(extrinsic_row(k) + 3 + i, extrinsic_row(k) + 3 + i, kHeldSigma * kHeldSigma);
+      for (int j = 0; j <= i; ++j)
+        claimed_.covariance.set(extrinsic_row(k) + i, extrinsic_row(k) + j, turn(i, j));
+      claimed_.covariance.set(extrinsic_row(k) + 3 + i, extrinsic_row(k) + 3 + i,
+                              kHeldSigma * kHeldSigma);
     }
   }
 }
@@ -86,7 +99,9 @@ void WindowAdjuster::gather(Map& map, bool linked) noexcept {
   for (std::size_t i = 0; i < map.order().size(); ++i) {
     const Keyframe& keyframe = map.keyframe(map.order()[i]);
     for (int k = 0; k < images; ++k) {
-      (void)poses_.push(linked ? keyframe.T_left_world : keyframe.T_camera_left[static_cast<std::size_t>(k)] * keyframe.T_left_world);
+      (void)poses_.push(linked ? keyframe.T_left_world
+                               : keyframe.T_camera_left[static_cast<std::size_t>(k)] *
+                                     keyframe.T_left_world);
       (void)constant_.push(i == 0 ? 1 : 0);
     }
   }
@@ -151,7 +166,8 @@ WindowOutcome WindowAdjuster::solve(BundleConfiguration configuration) noexcept 
   outcome.observations = static_cast<int>(observations_.size());
   if (poses_.size() < 2 || points_.empty()) return outcome;
   T_camera_left_ = rig_.T_camera_left;
-  if (configuration == BundleConfiguration::stereo_odometry && doubted_) configuration = BundleConfiguration::stereo_calibration;
+  if (configuration == BundleConfiguration::stereo_odometry && doubted_)
+    configuration = BundleConfiguration::stereo_calibration;
 
   const auto n = static_cast<std::size_t>(rig_.cameras);
   BundleProblem problem;
@@ -168,7 +184,8 @@ WindowOutcome WindowAdjuster::solve(BundleConfiguration configuration) noexcept 
   how.loss_threshold = options_.huber;
   how.max_steps = options_.window_steps;
   how.cost_tolerance = 1e-4;
-  if (configuration == BundleConfiguration::stereo_calibration) how.shared_prior = {&claimed_, kInflation};
+  if (configuration == BundleConfiguration::stereo_calibration)
+    how.shared_prior = {&claimed_, kInflation};
   const BundleResult result = adjuster_.solve(problem, how);
   outcome.termination = result.termination;
   outcome.usable = result.usable();
@@ -181,7 +198,8 @@ WindowOutcome WindowAdjuster::adjust(Map& map) noexcept {
   gather(map, true);
   WindowOutcome outcome = solve(BundleConfiguration::stereo_odometry);
   if (!outcome.usable) return outcome;
-  for (std::size_t i = 0; i < poses_.size(); ++i) map.keyframe(map.order()[i]).T_left_world = {normalised(poses_[i].R), poses_[i].t};
+  for (std::size_t i = 0; i < poses_.size(); ++i)
+    map.keyframe(map.order()[i]).T_left_world = {normalised(poses_[i].R), poses_[i].t};
   for (std::size_t i = 0; i < points_.size(); ++i) map.points()[owner_[i]].p_world = points_[i];
   outcome.dropped = drop_outliers(map);
   return outcome;

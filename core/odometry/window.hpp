@@ -15,23 +15,29 @@ struct WindowOutcome {
   double rms_px = 0;
 };
 
-/// Adjusts the window's poses and points together (METHOD §2, stereo odometry): the oldest keyframe is constant.
+/// Adjusts the window's poses and points together (METHOD §2, stereo odometry): the oldest keyframe
+/// is constant.
 ///
-/// What a calibration is off by moves all depths of a window together: one disparity, common to all points, and not one more independent
-/// error of each. So the turn of every further camera that shifts disparities is estimated with the window, about the calibration's own,
-/// by the sigma that the calibration's depths have (a consider parameter that the window may answer). It is found afresh in each window,
-/// so that nothing is counted twice, and it never leaves the odometry.
+/// What a calibration is off by moves all depths of a window together: one disparity, common to all
+/// points, and not one more independent error of each. So the turn of every further camera that
+/// shifts disparities is estimated with the window, about the calibration's own, by the sigma that
+/// the calibration's depths have (a consider parameter that the window may answer). It is found
+/// afresh in each window, so that nothing is counted twice, and it never leaves the odometry.
 ///
-/// Memory  From the arena at construction. More sightings than fit: the rest are left out of this adjustment.
+/// Memory  From the arena at construction. More sightings than fit: the rest are left out of this
+///         adjustment.
 class WindowAdjuster {
  public:
   WindowAdjuster(const OdometryOptions& options, const RigCalibration& rig, Arena& arena);
-  [[nodiscard]] static std::size_t memory_needed(const OdometryOptions& options, const RigCalibration& rig) noexcept;
+  [[nodiscard]] static std::size_t memory_needed(const OdometryOptions& options,
+                                                 const RigCalibration& rig) noexcept;
 
-  /// Writes poses and points back if the result is usable, and drops sightings beyond the robust limit. T_camera_left() is what it found.
+  /// Writes poses and points back if the result is usable, and drops sightings beyond the robust
+  /// limit. T_camera_left() is what it found.
   WindowOutcome adjust(Map& map) noexcept;
-  /// The same with the cameras not linked: every image has a pose of its own, in Keyframe::T_camera_left (METHOD §2, parallel
-  /// monocular). Both images of the oldest keyframe are constant; the caller renews the scale.
+  /// The same with the cameras not linked: every image has a pose of its own, in
+  /// Keyframe::T_camera_left (METHOD §2, parallel monocular). Both images of the oldest keyframe
+  /// are constant; the caller renews the scale.
   WindowOutcome adjust_unlinked(Map& map) noexcept;
   /// The owner's rig is another calibration than before.
   void take_up_rig() noexcept;
@@ -41,7 +47,8 @@ class WindowAdjuster {
   }
 
  private:
-  [[nodiscard]] static BundleCapacities capacities(const OdometryOptions& options, const RigCalibration& rig) noexcept;
+  [[nodiscard]] static BundleCapacities capacities(const OdometryOptions& options,
+                                                   const RigCalibration& rig) noexcept;
   /// What the calibration knows of itself, as a prior of the cameras' turns.
   void doubt_rig() noexcept;
   void gather(Map& map, bool linked) noexcept;
@@ -51,7 +58,8 @@ class WindowAdjuster {
   const OdometryOptions& options_;
   const RigCalibration& rig_;
   BundleAdjuster adjuster_;
-  RigCalibration claimed_;  // the calibration as it was given; `covariance`: of the turns that are estimated with a window
+  RigCalibration claimed_;  // the calibration as it was given; `covariance`: of the turns that are
+                            // estimated with a window
   bool doubted_ = false;    // they are
   std::array<Camera, kMaxCameras> cameras_{};
   std::array<Transform, kMaxCameras> T_camera_left_{};

@@ -7,22 +7,27 @@
 namespace vergence {
 namespace {
 
-constexpr int kPiece = 1022;  // columns at a time: what a row of sums on the stack holds, with one more at each end
+constexpr int kPiece =
+    1022;  // columns at a time: what a row of sums on the stack holds, with one more at each end
 
-/// out[0, count) from sums[0, count + 2). No branches, no aliases: the compiler makes vectors of it, of the sums' rows below, too.
-void across(const std::uint16_t* __restrict sums, int count, std::uint8_t* __restrict out) noexcept {
-  for (int i = 0; i < count; ++i) out[i] = static_cast<std::uint8_t>((sums[i] + 2 * sums[i + 1] + sums[i + 2] + 8) >> 4);
+/// out[0, count) from sums[0, count + 2). No branches, no aliases: the compiler makes vectors of
+/// it, of the sums' rows below, too.
+void across(const std::uint16_t* __restrict sums, int count,
+            std::uint8_t* __restrict out) noexcept {
+  for (int i = 0; i < count; ++i)
+    out[i] = static_cast<std::uint8_t>((sums[i] + 2 * sums[i + 1] + sums[i + 2] + 8) >> 4);
 }
 
 void down(const std::uint8_t* above, const std::uint8_t* here, const std::uint8_t* below, int count,
           std::uint16_t* __restrict sums) noexcept {
-  for (int i = 0; i < count; ++i) sums[i] = static_cast<std::uint16_t>(above[i] + 2 * here[i] + below[i]);
+  for (int i = 0; i < count; ++i)
+    sums[i] = static_cast<std::uint16_t>(above[i] + 2 * here[i] + below[i]);
 }
 
 }  // namespace
 
-void bayer_to_grey(const std::uint8_t* raw, std::ptrdiff_t raw_stride, int width, int height, std::uint8_t* out,
-                   std::ptrdiff_t out_stride) noexcept {
+void bayer_to_grey(const std::uint8_t* raw, std::ptrdiff_t raw_stride, int width, int height,
+                   std::uint8_t* out, std::ptrdiff_t out_stride) noexcept {
   assert(width >= 2 && height >= 2);
   std::array<std::uint16_t, kPiece + 2> sums;  // of columns first − 1 … first + count
   for (int y = 0; y < height; ++y) {
@@ -35,7 +40,8 @@ void bayer_to_grey(const std::uint8_t* raw, std::ptrdiff_t raw_stride, int width
       std::uint16_t* const own = sums.data() + (from - (first - 1));
       down(above + from, here + from, below + from, to - from, own);
       if (first == 0) sums[0] = sums[2];
-      if (first + count == width) sums[static_cast<std::size_t>(count) + 1] = sums[static_cast<std::size_t>(count) - 1];
+      if (first + count == width)
+        sums[static_cast<std::size_t>(count) + 1] = sums[static_cast<std::size_t>(count) - 1];
       across(sums.data(), count, out + y * out_stride + first);
     }
   }

@@ -33,19 +33,25 @@ struct Intrinsics {
   }
 };
 
-inline constexpr int kIntrinsicsSize = 9;                                         // fx fy cx cy d0 … d4
-inline constexpr int kExtrinsicsSize = 6 * (kMaxCameras - 1);                     // φ, τ of every further camera
-inline constexpr int kRigSize = kExtrinsicsSize + kIntrinsicsSize * kMaxCameras;  // all that a calibration may estimate
+inline constexpr int kIntrinsicsSize = 9;                      // fx fy cx cy d0 … d4
+inline constexpr int kExtrinsicsSize = 6 * (kMaxCameras - 1);  // φ, τ of every further camera
+inline constexpr int kRigSize =
+    kExtrinsicsSize + kIntrinsicsSize * kMaxCameras;  // all that a calibration may estimate
 
 /// First row of camera k's transform (k ≥ 1) and of its intrinsics among a rig's parameters.
 [[nodiscard]] constexpr int extrinsic_row(int k) noexcept { return 6 * (k - 1); }
-[[nodiscard]] constexpr int intrinsic_row(int k) noexcept { return kExtrinsicsSize + kIntrinsicsSize * k; }
+[[nodiscard]] constexpr int intrinsic_row(int k) noexcept {
+  return kExtrinsicsSize + kIntrinsicsSize * k;
+}
 
-/// Covariance of all of a rig's parameters together: transforms as left perturbations (φ rad, τ m), then fx fy cx cy (px) and distortion
-/// of each camera. Zero rows: held, or not known. Symmetric; the lower triangle is kept.
+/// Covariance of all of a rig's parameters together: transforms as left perturbations (φ rad, τ m),
+/// then fx fy cx cy (px) and distortion of each camera. Zero rows: held, or not known. Symmetric;
+/// the lower triangle is kept.
 class RigCovariance {
  public:
-  [[nodiscard]] double operator()(int row, int column) const noexcept { return packed_[place(row, column)]; }
+  [[nodiscard]] double operator()(int row, int column) const noexcept {
+    return packed_[place(row, column)];
+  }
   void set(int row, int column, double value) noexcept { packed_[place(row, column)] = value; }
   [[nodiscard]] bool known(int row) const noexcept { return (*this)(row, row) > 0; }
   [[nodiscard]] bool empty() const noexcept {
@@ -56,7 +62,8 @@ class RigCovariance {
 
  private:
   [[nodiscard]] static constexpr std::size_t place(int row, int column) noexcept {
-    const auto r = static_cast<std::size_t>(row < column ? column : row), c = static_cast<std::size_t>(row < column ? row : column);
+    const auto r = static_cast<std::size_t>(row < column ? column : row),
+               c = static_cast<std::size_t>(row < column ? row : column);
     return r * (r + 1) / 2 + c;
   }
   std::array<double, kRigSize*(kRigSize + 1) / 2> packed_{};
@@ -64,17 +71,21 @@ class RigCovariance {
 
 /// A rig: intrinsics of every camera and where each sits relative to camera 0 (`left`).
 ///
-/// X_k = T_camera_left[k] * X_left, metres; T_camera_left[0] is the identity.
-/// Covariances are of the left perturbation (rotation rad, then translation m): R ← Exp(φ)R, t ← t + τ.
+/// X_k = T_camera_left[k] * X_left, metres; T_camera_left[0] is the identity. Covariances are of
+/// the left perturbation (rotation rad, then translation m): R ← Exp(φ)R, t ← t + τ.
 struct RigCalibration {
   int cameras = 0;
   std::array<Intrinsics, kMaxCameras> intrinsics{};
   std::array<Transform, kMaxCameras> T_camera_left{};
-  std::array<std::array<double, 6>, kMaxCameras> sigma_noise{};  // rx ry rz (rad) tx ty tz (m); 0: not given
-  std::array<std::array<double, 6>, kMaxCameras> sigma_wide{};   // the same with uncertain intrinsics
+  std::array<std::array<double, 6>, kMaxCameras>
+      sigma_noise{};  // rx ry rz (rad) tx ty tz (m); 0: not given
+  std::array<std::array<double, 6>, kMaxCameras>
+      sigma_wide{};  // the same with uncertain intrinsics
   // zero: not given (Eigen leaves a Mat6 without initialiser undefined)
-  std::array<Mat6, kMaxCameras> covariance_wide{Mat6::Zero(), Mat6::Zero(), Mat6::Zero(), Mat6::Zero()};
-  RigCovariance covariance{};  // of all parameters together, wide: what a depth is off by follows from it; empty: not given
+  std::array<Mat6, kMaxCameras> covariance_wide{Mat6::Zero(), Mat6::Zero(), Mat6::Zero(),
+                                                Mat6::Zero()};
+  RigCovariance covariance{};  // of all parameters together, wide: what a depth is off by follows
+                               // from it; empty: not given
   double baseline = 0;         // m, |t| of camera 1 as measured once
   double baseline_sigma = 0;   // m; 0: exact
 
@@ -82,7 +93,8 @@ struct RigCalibration {
   int frames = 0;              // rig frames it was found from, all that its information is of
   double reprojection_px = 0;  // root mean square of that solve
   double scale_sigma = 0;      // relative, of the odometry's scale
-  double inflation = 0;        // variance of what was found over what its solve believes: weighs it as the next one's prior; 0: not known
+  double inflation = 0;  // variance of what was found over what its solve believes: weighs it as
+                         // the next one's prior; 0: not known
 };
 
 }  // namespace vergence

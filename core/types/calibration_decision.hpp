@@ -15,7 +15,8 @@ enum class CalibrationCause : std::uint8_t {
   out_of_step,   // a camera's images seem to be of another instant
   requested,     // the user asked
   refinement,    // the drive goes on: what it has shown since is added to what is known
-  contradicted,  // the calibration that the drive began with, or went on with, is not that of the rig
+  contradicted,  // the calibration that the drive began with, or went on with, is not that of the
+                 // rig
 };
 [[nodiscard]] std::string_view to_string(CalibrationCause) noexcept;
 
@@ -24,19 +25,24 @@ struct CalibrationDecision {
   Stamp stamp{};  // of the frame it was decided at
   CalibrationCause cause = CalibrationCause::from_scratch;
   bool accepted = false;
-  bool learnt = false;                  // measured while the drive went on: not accepted is no rejection, what is in use fits as well
-  const char* reason = "";              // why it was rejected, a constant sentence without commas; empty when accepted
-  RigCalibration calibration{};         // the one found, also when rejected
-  int latency_frames = 0;               // from the alarm (or the start, or the request) to here
-  std::uint64_t onset_frame = 0;        // when the rig is thought to have changed; 0: does not apply
-  double held_out_before_px = 0;        // distance to the epipolar lines of frames that were not in the solve, median: with the one before
-  double held_out_after_px = 0;         // and with this one
-  double judged_depth_m = 0;            // METHOD §6.4: the depth that the next three are of; 0: nothing was measured
-  double depth_sigma_percent = 0;       // predicted depth error of the calibration found, 1 sigma
-  double depth_difference_percent = 0;  // how far off the one before was, by the one found; 0: there was none
-  bool verified = false;                // the calibration now in use holds to the tolerated depth error
-  bool lenses = false;                  // lenses were part of what was found
-  double solve_ms = 0;                  // on the solver's thread
+  bool learnt = false;  // measured while the drive went on: not accepted is no rejection, what is
+                        // in use fits as well
+  const char* reason =
+      "";  // why it was rejected, a constant sentence without commas; empty when accepted
+  RigCalibration calibration{};   // the one found, also when rejected
+  int latency_frames = 0;         // from the alarm (or the start, or the request) to here
+  std::uint64_t onset_frame = 0;  // when the rig is thought to have changed; 0: does not apply
+  double held_out_before_px = 0;  // distance to the epipolar lines of frames that were not in the
+                                  // solve, median: with the one before
+  double held_out_after_px = 0;   // and with this one
+  double judged_depth_m =
+      0;  // METHOD §6.4: the depth that the next three are of; 0: nothing was measured
+  double depth_sigma_percent = 0;  // predicted depth error of the calibration found, 1 sigma
+  double depth_difference_percent =
+      0;                  // how far off the one before was, by the one found; 0: there was none
+  bool verified = false;  // the calibration now in use holds to the tolerated depth error
+  bool lenses = false;    // lenses were part of what was found
+  double solve_ms = 0;    // on the solver's thread
 };
 
 }  // namespace vergence

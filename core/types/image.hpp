@@ -5,9 +5,11 @@
 
 namespace vergence {
 
-/// An 8-bit grey image somebody else owns, row 0 on top. Bytes between `width` and `stride` are padding of any value.
+/// An 8-bit grey image somebody else owns, row 0 on top. Bytes between `width` and `stride` are
+/// padding of any value.
 ///
-/// Ownership  A view; the memory outlives it by contract of who hands it out (FramePool slot, pyramid level).
+/// Ownership  A view; the memory outlives it by contract of who hands it out (FramePool slot,
+///            pyramid level).
 /// Threads    Plain reads; as many readers as wanted while nobody writes.
 struct ImageView {
   const std::uint8_t* data = nullptr;
@@ -15,7 +17,9 @@ struct ImageView {
   int height = 0;
   std::ptrdiff_t stride = 0;  // bytes from a row to the next, ≥ width
 
-  [[nodiscard]] constexpr bool empty() const noexcept { return data == nullptr || width <= 0 || height <= 0; }
+  [[nodiscard]] constexpr bool empty() const noexcept {
+    return data == nullptr || width <= 0 || height <= 0;
+  }
   [[nodiscard]] const std::uint8_t* row(int y) const noexcept {
     assert(y >= 0 && y < height);
     return data + y * stride;

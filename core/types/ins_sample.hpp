@@ -14,10 +14,11 @@ struct Geodetic {
   double longitude_deg = 0;  // east positive, [−180, 360]
   double height_m = 0;
 
-  /// Finite and on the earth, from below the Dead Sea to above any aircraft. What a device sends is asked before it is used:
-  /// swapped latitude and longitude near Brisbane is not a place.
+  /// Finite and on the earth, from below the Dead Sea to above any aircraft. What a device sends is
+  /// asked before it is used: swapped latitude and longitude near Brisbane is not a place.
   [[nodiscard]] bool plausible() const noexcept {
-    return std::abs(latitude_deg) <= 90.0 && longitude_deg >= -180.0 && longitude_deg <= 360.0 && height_m > -1e3 && height_m < 1e5;
+    return std::abs(latitude_deg) <= 90.0 && longitude_deg >= -180.0 && longitude_deg <= 360.0 &&
+           height_m > -1e3 && height_m < 1e5;
   }
 };
 
@@ -31,7 +32,8 @@ enum class FixStatus : std::uint8_t {
 /// One reading of the INS: where its sensor body is and how it lies. A value: copied through rings.
 ///
 /// Time    Stamp mapped to host time; `stamp_error` bounds the error of the mapping.
-/// Frames  Body: forward, left, up. Attitude and velocity in the east-north-up axes at the point itself.
+/// Frames  Body: forward, left, up. Attitude and velocity in the east-north-up axes at the point
+///         itself.
 /// Sigma   0: the device gives none.
 struct InsSample {
   std::uint64_t number = 0;  // the device's count, unwrapped; gaps are lost samples
@@ -50,7 +52,8 @@ struct InsSample {
   double heading_sigma = 0;                     // rad
 };
 
-/// Heading as people read it: degrees clockwise from north, [0, 360), from an ENU yaw (counter-clockwise from east, rad).
+/// Heading as people read it: degrees clockwise from north, [0, 360), from an ENU yaw
+/// (counter-clockwise from east, rad).
 [[nodiscard]] inline double compass_heading_deg(double yaw_enu) noexcept {
   const double degrees = std::fmod(90.0 - yaw_enu * (180.0 / std::numbers::pi), 360.0);
   return degrees < 0 ? degrees + 360.0 : degrees;

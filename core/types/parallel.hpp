@@ -17,7 +17,8 @@ class TaskRef {
   void (*call_)(void*) noexcept;
 };
 
-/// Runs two independent tasks and returns when both are done. The core owns no threads: the app hands one in.
+/// Runs two independent tasks and returns when both are done. The core owns no threads: the app
+/// hands one in.
 ///
 /// Threads  Called from the estimator's thread only. Tasks share nothing they write.
 /// Errors   None; tasks are noexcept.
@@ -38,7 +39,8 @@ class SequentialRunner final : public PairRunner {
 
 /// Runs one long task beside the frames: the calibration solver's thread, handed in by the app.
 ///
-/// Threads  start(), busy() and wait() from one thread. The task runs on another, or within start().
+/// Threads  start(), busy() and wait() from one thread. The task runs on another, or within
+///          start().
 /// Errors   None; the task is noexcept.
 class BackgroundRunner {
  public:

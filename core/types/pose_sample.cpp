@@ -15,8 +15,9 @@ std::string_view name(const std::array<std::string_view, N>& names, Enum value) 
 }  // namespace
 
 std::string_view to_string(State s) noexcept {
-  static constexpr std::array<std::string_view, 6> names = {"initialising",    "parallel_monocular", "calibrating",
-                                                            "stereo_odometry", "recalibrating",      "lost"};
+  static constexpr std::array<std::string_view, 6> names = {"initialising",  "parallel_monocular",
+                                                            "calibrating",   "stereo_odometry",
+                                                            "recalibrating", "lost"};
   return name(names, s);
 }
 
@@ -53,7 +54,8 @@ std::string_view to_string(Reason r) noexcept {
 }
 
 std::string_view to_string(Stage s) noexcept {
-  static constexpr std::array<std::string_view, kStages> names = {"pyramid", "detect", "track", "match", "pose", "window"};
+  static constexpr std::array<std::string_view, kStages> names = {"pyramid", "detect", "track",
+                                                                  "match",   "pose",   "window"};
   return name(names, s);
 }
 

@@ -9,7 +9,14 @@
 namespace vergence {
 
 /// METHOD §3: what the running system is doing.
-enum class State : std::uint8_t { initialising, parallel_monocular, calibrating, stereo_odometry, recalibrating, lost };
+enum class State : std::uint8_t {
+  initialising,
+  parallel_monocular,
+  calibrating,
+  stereo_odometry,
+  recalibrating,
+  lost
+};
 
 /// How far a pose may be trusted (DESIGN §6).
 enum class PoseStatus : std::uint8_t {
@@ -21,28 +28,31 @@ enum class PoseStatus : std::uint8_t {
 /// Why a pose is not `ok`. One word each: it stands in poses.csv.
 enum class Reason : std::uint8_t {
   none,
-  no_image,                // a camera delivered nothing for this frame
-  image_dark,              // an image carries no structure: covered, black, saturated
-  image_repeated,          // a camera delivered the image of the frame before once more
-  few_features,            // too little texture to start from
-  no_stereo_matches,       // left and right do not fit this calibration
-  cameras_swapped,         // points would lie behind the rig: left and right exchanged
-  few_inliers,             // the pose rests on few points
-  one_camera,              // only one camera supports the pose; its scale is remembered, not measured
-  no_pose,                 // tracking failed
-  time_gap,                // no frame for longer than motion can be predicted
-  scene_restarted,         // the map was rebuilt; the way across the gap was extrapolated
-  weak_geometry,           // the points do not hold the pose well in some direction
-  moving_scene,            // more outliers than a rigid scene has
-  unconfirmed,             // calibration from a state file that the drive has not confirmed yet
-  unverified_calibration,  // the drive has not yet confirmed the calibration that the pose stands on
+  no_image,           // a camera delivered nothing for this frame
+  image_dark,         // an image carries no structure: covered, black, saturated
+  image_repeated,     // a camera delivered the image of the frame before once more
+  few_features,       // too little texture to start from
+  no_stereo_matches,  // left and right do not fit this calibration
+  cameras_swapped,    // points would lie behind the rig: left and right exchanged
+  few_inliers,        // the pose rests on few points
+  one_camera,         // only one camera supports the pose; its scale is remembered, not measured
+  no_pose,            // tracking failed
+  time_gap,           // no frame for longer than motion can be predicted
+  scene_restarted,    // the map was rebuilt; the way across the gap was extrapolated
+  weak_geometry,      // the points do not hold the pose well in some direction
+  moving_scene,       // more outliers than a rigid scene has
+  unconfirmed,        // calibration from a state file that the drive has not confirmed yet
+  unverified_calibration,  // the drive has not yet confirmed the calibration that the pose stands
+                           // on
   recalibrating,           // the rig no longer fits its calibration
-  uncalibrated,            // no calibration yet: each camera's pose is found for itself, the scale is the last pair's
-  out_of_step,             // a camera's images are of another instant than the others'
-  needs_motion,            // the calibration has to be found and cannot be without driving
-  needs_near_structure,    // the same, without points near the rig
-  needs_texture,           // the same, without anything to match across
-  unproven_pairing,        // what proves that its images were exposed together has contradicted: one of them alone was used
+  uncalibrated,  // no calibration yet: each camera's pose is found for itself, the scale is the
+                 // last pair's
+  out_of_step,   // a camera's images are of another instant than the others'
+  needs_motion,  // the calibration has to be found and cannot be without driving
+  needs_near_structure,  // the same, without points near the rig
+  needs_texture,         // the same, without anything to match across
+  unproven_pairing,  // what proves that its images were exposed together has contradicted: one of
+                     // them alone was used
 };
 
 [[nodiscard]] std::string_view to_string(State) noexcept;

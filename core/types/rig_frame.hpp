@@ -10,8 +10,10 @@ namespace vergence {
 
 /// The images of one trigger pulse. `images[k].empty()`: camera k gave none.
 ///
-/// Ownership  Views; whoever built the frame keeps the slots until Estimator::process() has returned.
-/// Time       One stamp for all: camera 0's mid-exposure. `spread`: the largest difference of the others to it.
+/// Ownership  Views; whoever built the frame keeps the slots until Estimator::process() has
+///            returned.
+/// Time       One stamp for all: camera 0's mid-exposure. `spread`: the largest difference of the
+///            others to it.
 struct RigFrame {
   std::uint64_t number = 0;  // of the pulse or of the data set's line; gaps are gaps in time
   Stamp stamp{};

@@ -8,9 +8,15 @@ namespace vergence {
 class Duration {
  public:
   constexpr Duration() noexcept = default;
-  [[nodiscard]] static constexpr Duration nanoseconds(std::int64_t ns) noexcept { return Duration(ns); }
-  [[nodiscard]] static constexpr Duration microseconds(std::int64_t us) noexcept { return Duration(us * 1'000); }
-  [[nodiscard]] static constexpr Duration milliseconds(std::int64_t ms) noexcept { return Duration(ms * 1'000'000); }
+  [[nodiscard]] static constexpr Duration nanoseconds(std::int64_t ns) noexcept {
+    return Duration(ns);
+  }
+  [[nodiscard]] static constexpr Duration microseconds(std::int64_t us) noexcept {
+    return Duration(us * 1'000);
+  }
+  [[nodiscard]] static constexpr Duration milliseconds(std::int64_t ms) noexcept {
+    return Duration(ms * 1'000'000);
+  }
   /// Rounds to the nearest nanosecond; precondition |s| < 9.2e9.
   [[nodiscard]] static constexpr Duration seconds(double s) noexcept {
     return Duration(static_cast<std::int64_t>(s * 1e9 + (s < 0 ? -0.5 : 0.5)));
@@ -18,7 +24,9 @@ class Duration {
 
   [[nodiscard]] constexpr std::int64_t ns() const noexcept { return ns_; }
   /// For arithmetic of short lengths and for printing; never to be turned back into a stamp.
-  [[nodiscard]] constexpr double to_seconds() const noexcept { return static_cast<double>(ns_) * 1e-9; }
+  [[nodiscard]] constexpr double to_seconds() const noexcept {
+    return static_cast<double>(ns_) * 1e-9;
+  }
 
   constexpr auto operator<=>(const Duration&) const noexcept = default;
   constexpr Duration operator-() const noexcept { return Duration(-ns_); }
@@ -40,7 +48,9 @@ class Instant {
   explicit constexpr Instant(std::int64_t ns) noexcept : ns_(ns) {}
   [[nodiscard]] constexpr std::int64_t ns() const noexcept { return ns_; }
   constexpr auto operator<=>(const Instant&) const noexcept = default;
-  constexpr Duration operator-(Instant o) const noexcept { return Duration::nanoseconds(ns_ - o.ns_); }
+  constexpr Duration operator-(Instant o) const noexcept {
+    return Duration::nanoseconds(ns_ - o.ns_);
+  }
   constexpr Instant operator+(Duration d) const noexcept { return Instant(ns_ + d.ns()); }
   constexpr Instant operator-(Duration d) const noexcept { return Instant(ns_ - d.ns()); }
 

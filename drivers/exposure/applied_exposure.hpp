@@ -4,9 +4,11 @@
 
 namespace vergence::exposure {
 
-/// Which exposure a frame had, of a camera that does not say: the one that was in its registers when the frame's exposure began.
+/// Which exposure a frame had, of a camera that does not say: the one that was in its registers
+/// when the frame's exposure began.
 ///
-/// Threads  reset(): while nobody else does anything. change(): one thread. at(): the transport's thread.
+/// Threads  reset(): while nobody else does anything. change(): one thread. at(): the transport's
+///          thread.
 class AppliedExposure {
  public:
   void reset(const ExposureSetting& setting) noexcept {
@@ -14,8 +16,11 @@ class AppliedExposure {
     current_ = setting;
     any_ = false;
   }
-  /// The camera has it from `written` on. False: more changes than frames come, the camera's say would be wrong; not made.
-  [[nodiscard]] bool change(const ExposureSetting& setting, HostStamp written) noexcept { return changes_.push({written, setting}); }
+  /// The camera has it from `written` on. False: more changes than frames come, the camera's say
+  /// would be wrong; not made.
+  [[nodiscard]] bool change(const ExposureSetting& setting, HostStamp written) noexcept {
+    return changes_.push({written, setting});
+  }
   /// Of an exposure that began then; later ones do not begin earlier.
   [[nodiscard]] const ExposureSetting& at(HostStamp began) noexcept {
     while (any_ || changes_.pop(&next_)) {

@@ -15,11 +15,13 @@ struct Brightness {
   int samples = 0;       // 0: nothing was looked at
 };
 
-inline constexpr int kSaturated = 250;  // grey level from which a pixel tells nothing but that it is bright
+inline constexpr int kSaturated =
+    250;  // grey level from which a pixel tells nothing but that it is bright
 
 /// Measures images on a sparse grid, leaving out what a mask hides.
 ///
-/// Threads  measure(): any. Memory: places at construction, none afterwards. Time: kColumns · kRows pixels read, some 10 µs.
+/// Threads  measure(): any. Memory: places at construction, none afterwards. Time: kColumns · kRows
+///          pixels read, some 10 µs.
 class BrightnessMeter {
  public:
   static constexpr int kColumns = 48, kRows = 36;

@@ -10,7 +10,8 @@ constexpr double kDbAStop = 6.020599913279624;  // 20 log10 2
 constexpr double kDarkest = 1.0;                // grey level: below it the mean is noise
 
 double stops_of(const ExposureOptions& o, const ExposureSetting& s) noexcept {
-  return std::log2(static_cast<double>(s.exposure.ns()) / static_cast<double>(o.least.ns())) + s.gain_db / kDbAStop;
+  return std::log2(static_cast<double>(s.exposure.ns()) / static_cast<double>(o.least.ns())) +
+         s.gain_db / kDbAStop;
 }
 
 }  // namespace
@@ -21,28 +22,37 @@ const char* ExposureOptions::validate() const noexcept {
   if (!(target >= 20 && target <= 200)) return "the target is a mean grey level of 20 to 200";
   if (!(may_saturate >= 0 && may_saturate <= 0.5)) return "at most half of the pixels may saturate";
   if (!(dead_band >= 0.05 && dead_band <= 1)) return "the dead band is 0.05 to 1 stops";
-  if (!(up_stops > 0 && up_stops <= 4 && down_stops > 0 && down_stops <= 4)) return "a change is at most 4 stops";
+  if (!(up_stops > 0 && up_stops <= 4 && down_stops > 0 && down_stops <= 4))
+    return "a change is at most 4 stops";
   if (!(most_gain_db >= 0)) return "the gain is not negative";
   if (settle_frames < 1) return "an image after a change is the least to judge by";
   return nullptr;
 }
 
 ExposureSetting within(const ExposureOptions& o, const ExposureSetting& wanted) noexcept {
-  return {std::clamp(wanted.exposure, o.least, o.most), std::clamp(wanted.gain_db, 0.0, o.most_gain_db)};
+  return {std::clamp(wanted.exposure, o.least, o.most),
+          std::clamp(wanted.gain_db, 0.0, o.most_gain_db)};
 }
 
-ExposureController::ExposureController(const ExposureOptions& options, const ExposureSetting& start) noexcept
-    : options_(options), setting_(within(options, start)), stops_(stops_of(options_, setting_)), since_change_(options.settle_frames) {}
+ExposureController::ExposureController(const ExposureOptions& options,
+                                       const ExposureSetting& start) noexcept
+    : options_(options),
+      setting_(within(options, start)),
+      stops_(stops_of(options_, setting_)),
+      since_change_(options.settle_frames) {}
 
 double ExposureController::wanted_stops(const Brightness& image) const noexcept {
   const double to_target = std::log2(options_.target / std::max(image.mean, kDarkest));
-  if (image.bright < kSaturated) return std::min(to_target, std::log2(kSaturated / std::max(image.bright, kDarkest)));
+  if (image.bright < kSaturated)
+    return std::min(to_target, std::log2(kSaturated / std::max(image.bright, kDarkest)));
   constexpr double kMostOfIt = 0.5;
-  return std::min(to_target, image.saturated > kMostOfIt ? -options_.down_stops : -0.5 * options_.down_stops);
+  return std::min(to_target,
+                  image.saturated > kMostOfIt ? -options_.down_stops : -0.5 * options_.down_stops);
 }
 
 ExposureSetting ExposureController::split(double stops) const noexcept {
-  const double longest = std::log2(static_cast<double>(options_.most.ns()) / static_cast<double>(options_.least.ns()));
+  const double longest =
+      std::log2(static_cast<double>(options_.most.ns()) / static_cast<double>(options_.least.ns()));
   const double exposure = std::clamp(stops, 0.0, longest);
   const auto ns = std::llround(static_cast<double>(options_.least.ns()) * std::exp2(exposure));
   return within(options_, {Duration::nanoseconds(ns), (stops - exposure) * kDbAStop});

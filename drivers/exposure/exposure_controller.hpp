@@ -7,33 +7,38 @@
 namespace vergence::exposure {
 
 struct ExposureOptions {
-  double target = 90;                            // mean grey level aimed at
-  double may_saturate = 0.05;                    // share of the pixels
-  double dead_band = 0.2;                        // stops (factors of two) to each side within which nothing is changed
+  double target = 90;          // mean grey level aimed at
+  double may_saturate = 0.05;  // share of the pixels
+  double dead_band = 0.2;  // stops (factors of two) to each side within which nothing is changed
   Duration least = Duration::microseconds(20);   // shortest exposure
   Duration most = Duration::microseconds(8000);  // longest: what motion blur allows
   double most_gain_db = 18;                      // used once the exposure is at its longest
-  double up_stops = 1, down_stops = 2;           // a change at most; down is faster: saturated pixels tell nothing
-  int settle_frames = 5;                         // from a change until an image is judged again: beyond every camera's latency
+  double up_stops = 1,
+         down_stops = 2;  // a change at most; down is faster: saturated pixels tell nothing
+  int settle_frames =
+      5;  // from a change until an image is judged again: beyond every camera's latency
   /// Null: they go together; else a sentence.
   [[nodiscard]] const char* validate() const noexcept;
 };
 
 /// Exposure and gain of a rig, from the brightness of its reference camera.
 ///
-/// Method   In stops. An image is log2(target / mean) too dark, but never asked so far up that more than `may_saturate` of it would
-///          saturate; where that share is saturated already, how far is unknown, and it goes down by half of `down_stops`, by all of it
-///          where half of the picture is. The sum of exposure and gain moves by that, exposure first, gain beyond its longest.
-/// Delay    A change shows some frames later, how many nobody says: until `settle_frames` images have been seen since, none is judged. So
-///          each change is measured before the next is made, and a sensor whose response is between linear and its square root does not
-///          swing.
+/// Method   In stops. An image is log2(target / mean) too dark, but never asked so far up that more
+///          than `may_saturate` of it would saturate; where that share is saturated already, how
+///          far is unknown, and it goes down by half of `down_stops`, by all of it where half of
+///          the picture is. The sum of exposure and gain moves by that, exposure first, gain beyond
+///          its longest.
+/// Delay    A change shows some frames later, how many nobody says: until `settle_frames` images
+///          have been seen since, none is judged. So each change is measured before the next is
+///          made, and a sensor whose response is between linear and its square root does not swing.
 /// Threads  One caller. Memory: none. Errors: none.
 class ExposureController {
  public:
   /// Precondition: options are valid. `start`: what the cameras have, brought inside the bounds.
   ExposureController(const ExposureOptions& options, const ExposureSetting& start) noexcept;
 
-  /// One image of the reference camera. → what all cameras are to have from now on; nothing: as it is.
+  /// One image of the reference camera. → what all cameras are to have from now on; nothing: as it
+  /// is.
   [[nodiscard]] std::optional<ExposureSetting> step(const Brightness& image) noexcept;
   /// The cameras were asked only now: images are counted from here on.
   void restart_settling() noexcept { since_change_ = 0; }
@@ -50,6 +55,7 @@ class ExposureController {
 };
 
 /// Brought inside the bounds: exposure first.
-[[nodiscard]] ExposureSetting within(const ExposureOptions& options, const ExposureSetting& wanted) noexcept;
+[[nodiscard]] ExposureSetting within(const ExposureOptions& options,
+                                     const ExposureSetting& wanted) noexcept;
 
 }  // namespace vergence::exposure

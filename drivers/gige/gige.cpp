@@ -19,7 +19,9 @@ class GigeDriver final : public CameraDriver {
     for (Found& f : discover()) all.push_back(std::move(f.info));
     complaint_.clear();
     if (all.empty())
-      complaint_ = "no GigE camera answers a broadcast; is its address in the network of this host, and no firewall in between?";
+      complaint_ =
+          "no GigE camera answers a broadcast; is its address in the network of this host, and no "
+          "firewall in between?";
     return all;
   }
 

@@ -11,9 +11,11 @@ namespace vergence::iidc {
 std::string budget_complaint(std::span<const BusShare> shares) {
   const unsigned need = total_units(shares);
   if (shares.empty() || need <= kBandwidthUnits) return {};
-  std::string text = std::to_string(shares.size()) + (shares.size() == 1 ? " camera needs " : " cameras need ");
+  std::string text =
+      std::to_string(shares.size()) + (shares.size() == 1 ? " camera needs " : " cameras need ");
   for (std::size_t i = 0; i < shares.size(); ++i)
-    text += (i == 0 ? "" : " + ") + std::to_string(bandwidth_units(shares[i].packet_bytes, shares[i].speed));
+    text += (i == 0 ? "" : " + ") +
+            std::to_string(bandwidth_units(shares[i].packet_bytes, shares[i].speed));
   if (shares.size() > 1) text += " = " + std::to_string(need);
   text += " of the bus's " + std::to_string(kBandwidthUnits) + " bandwidth units";
   BusSpeed slowest = BusSpeed::s800;
@@ -22,13 +24,16 @@ std::string budget_complaint(std::span<const BusShare> shares) {
     slowest = std::min(slowest, s.speed);
     image = std::max(image, s.image_bytes);
   }
-  const std::size_t packet = packet_for_units(kBandwidthUnits / static_cast<unsigned>(shares.size()), slowest);
+  const std::size_t packet =
+      packet_for_units(kBandwidthUnits / static_cast<unsigned>(shares.size()), slowest);
   std::array<char, 160> advice{};
-  (void)std::snprintf(advice.data(), advice.size(), "; packets of at most %zu bytes each (%.4g Hz at this size) fit at %s", packet,
-                      packet_rate(image, packet), std::string(to_string(slowest)).c_str());
+  (void)std::snprintf(advice.data(), advice.size(),
+                      "; packets of at most %zu bytes each (%.4g Hz at this size) fit at %s",
+                      packet, packet_rate(image, packet), std::string(to_string(slowest)).c_str());
   text += advice.data();
-  text += slowest == BusSpeed::s800 ? ": lower the rate or the image size, or use a second bus"
-                                    : ": lower the rate or the image size, or use S800 or a second bus";
+  text += slowest == BusSpeed::s800
+              ? ": lower the rate or the image size, or use a second bus"
+              : ": lower the rate or the image size, or use S800 or a second bus";
   return text;
 }
 

@@ -7,13 +7,15 @@
 #include "drivers/device.hpp"
 #include "firmware_iface/iidc/bandwidth.hpp"
 
-/// What an IIDC camera hangs on: registers and a stream, the same for USB, IEEE 1394 and a test's fake.
+/// What an IIDC camera hangs on: registers and a stream, the same for USB, IEEE 1394 and a test's
+/// fake.
 namespace vergence::iidc {
 
 /// The registers of one camera, by their 48-bit addresses.
 ///
 /// Threads  One caller at a time.
-/// Time     Every call ends, at the latest after the transport's own time-out (a second on USB, the split time-out on 1394).
+/// Time     Every call ends, at the latest after the transport's own time-out (a second on USB, the
+///          split time-out on 1394).
 /// Errors   → ok, unsupported (the camera refuses that address), timeout, gone, failed
 class RegisterPort {
  public:
@@ -31,7 +33,8 @@ struct StreamShape {
   std::size_t buffers = 0;  // slots, 4 … kMaxBuffers
   [[nodiscard]] bool operator==(const StreamShape&) const noexcept = default;
 };
-inline constexpr std::size_t kMaxBuffers = 32;  // half of FramePool::kMaxSlots: two generations of a ring fit into one range of slots
+inline constexpr std::size_t kMaxBuffers =
+    32;  // half of FramePool::kMaxSlots: two generations of a ring fit into one range of slots
 
 /// One filled buffer.
 struct Arrival {
@@ -57,18 +60,21 @@ class StreamSink {
 
 /// What a bus can, for the choice of a mode.
 struct BusTraits {
-  bool isochronous = false;           // one packet a cycle, in order; a lost one shifts the rest of its frame
-  BusSpeed fastest = BusSpeed::s400;  // of the path to the camera; USB: its packets are as those of S800
-  std::size_t largest_packet = 0;     // bytes
-  double bytes_per_second = 0;        // at best
+  bool isochronous =
+      false;  // one packet a cycle, in order; a lost one shifts the rest of its frame
+  BusSpeed fastest =
+      BusSpeed::s400;  // of the path to the camera; USB: its packets are as those of S800
+  std::size_t largest_packet = 0;  // bytes
+  double bytes_per_second = 0;     // at best
 };
 
-inline constexpr double kUsbPractical = 0.62;  // of a USB wire's bytes a second: what host controllers reach
+inline constexpr double kUsbPractical =
+    0.62;  // of a USB wire's bytes a second: what host controllers reach
 
 /// One camera's place on a bus.
 ///
-/// Ownership  Slots are the bus's until frame() keeps them, then the sink's until give_back(). bytes() stays valid that long, also over
-///            stop(), an unplug and a reopen().
+/// Ownership  Slots are the bus's until frame() keeps them, then the sink's until give_back().
+///            bytes() stays valid that long, also over stop(), an unplug and a reopen().
 /// Threads    start, stop, reopen, allocate, registers: the owner's thread. give_back, bytes: any.
 /// Errors     Nothing throws.
 class CameraBus : public RegisterPort {
@@ -77,11 +83,14 @@ class CameraBus : public RegisterPort {
   [[nodiscard]] virtual const BusTraits& traits() const noexcept = 0;
   /// Memory for such frames. Precondition: stopped, no slot kept. → ok, failed
   [[nodiscard]] virtual DeviceStatus allocate(const StreamShape& shape) noexcept = 0;
-  /// Buffers are ready for the camera when this returns. → ok, gone, no_permission, no_bandwidth, failed
+  /// Buffers are ready for the camera when this returns. → ok, gone, no_permission, no_bandwidth,
+  /// failed
   [[nodiscard]] virtual DeviceStatus start(StreamSink* sink) noexcept = 0;
-  /// The camera has been told to be quiet, or is gone. No call of the sink after it returns. Twice is harmless.
+  /// The camera has been told to be quiet, or is gone. No call of the sink after it returns. Twice
+  /// is harmless.
   virtual void stop() noexcept = 0;
-  /// After gone: finds the camera again and opens it. Precondition: stopped. → ok, gone, no_permission, busy
+  /// After gone: finds the camera again and opens it. Precondition: stopped. → ok, gone,
+  /// no_permission, busy
   [[nodiscard]] virtual DeviceStatus reopen() noexcept = 0;
 
   virtual void give_back(FrameSlot slot) noexcept = 0;
@@ -89,8 +98,10 @@ class CameraBus : public RegisterPort {
 
   /// One sentence about the last call that was not ok; empty: the status says it all.
   [[nodiscard]] virtual std::string complaint() const { return {}; }
-  /// One sentence about what will be tight with `sharing` cameras of this shape and rate; empty: nothing.
-  [[nodiscard]] virtual std::string remark(const StreamShape& shape, double rate_hz, int sharing) const = 0;
+  /// One sentence about what will be tight with `sharing` cameras of this shape and rate; empty:
+  /// nothing.
+  [[nodiscard]] virtual std::string remark(const StreamShape& shape, double rate_hz,
+                                           int sharing) const = 0;
 };
 
 }  // namespace vergence::iidc

@@ -9,10 +9,12 @@
 namespace vergence::iidc {
 namespace {
 
-std::optional<std::uint64_t> number(std::string_view text, std::uint64_t least, std::uint64_t most) {
+std::optional<std::uint64_t> number(std::string_view text, std::uint64_t least,
+                                    std::uint64_t most) {
   std::uint64_t value = 0;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (error != std::errc{} || end != text.data() + text.size() || value < least || value > most) return std::nullopt;
+  if (error != std::errc{} || end != text.data() + text.size() || value < least || value > most)
+    return std::nullopt;
   return value;
 }
 
@@ -22,7 +24,8 @@ std::optional<bool> yes_or_no(std::string_view text) {
   return std::nullopt;
 }
 
-/// One option: its name, what it takes (for sentences), and how it is taken. False: the value cannot be.
+/// One option: its name, what it takes (for sentences), and how it is taken. False: the value
+/// cannot be.
 struct Row {
   std::string_view name, takes;
   bool (*take)(std::string_view text, CameraOptions* o);
@@ -78,7 +81,8 @@ constexpr std::array kRows{
           return t == "start" || t == "middle" || t == "end";
         }},
     Row{"strobe_delay_us", "0 to 3998", &take_duration<&CameraOptions::strobe_delay>},
-    Row{"strobe_duration_us", "0 (the exposure) to 3998", &take_duration<&CameraOptions::strobe_duration>},
+    Row{"strobe_duration_us", "0 (the exposure) to 3998",
+        &take_duration<&CameraOptions::strobe_duration>},
     Row{"strobe_level", "high or low",
         [](std::string_view t, CameraOptions* o) {
           o->strobe_high = t == "high";
@@ -111,7 +115,8 @@ constexpr std::array kRows{
 
 }  // namespace
 
-DeviceStatus parse_options(const std::map<std::string, std::string>& given, CameraOptions* options, std::string* complaint) {
+DeviceStatus parse_options(const std::map<std::string, std::string>& given, CameraOptions* options,
+                           std::string* complaint) {
   CameraOptions out;
   for (const auto& [name, text] : given) {
     const Row* row = nullptr;
@@ -119,11 +124,13 @@ DeviceStatus parse_options(const std::map<std::string, std::string>& given, Came
       if (r.name == name) row = &r;
     if (row == nullptr) {
       *complaint = "there is no option \"" + name + "\"; IIDC cameras have ";
-      for (const Row& r : kRows) *complaint += (&r == kRows.data() ? "" : ", ") + std::string(r.name);
+      for (const Row& r : kRows)
+        *complaint += (&r == kRows.data() ? "" : ", ") + std::string(r.name);
       return DeviceStatus::unsupported;
     }
     if (!row->take(text, &out)) {
-      *complaint = "option " + name + " cannot be \"" + text + "\"; it takes " + std::string(row->takes);
+      *complaint =
+          "option " + name + " cannot be \"" + text + "\"; it takes " + std::string(row->takes);
       return DeviceStatus::bad_configuration;
     }
   }

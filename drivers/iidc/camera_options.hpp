@@ -30,7 +30,9 @@ struct CameraOptions {
   StampedInstant stamped = StampedInstant::end;
 };
 
-/// Reads them. → ok, unsupported (a name that does not exist), bad_configuration (a value that cannot be); then *complaint says which.
-[[nodiscard]] DeviceStatus parse_options(const std::map<std::string, std::string>& given, CameraOptions* options, std::string* complaint);
+/// Reads them. → ok, unsupported (a name that does not exist), bad_configuration (a value that
+/// cannot be); then *complaint says which.
+[[nodiscard]] DeviceStatus parse_options(const std::map<std::string, std::string>& given,
+                                         CameraOptions* options, std::string* complaint);
 
 }  // namespace vergence::iidc

@@ -10,27 +10,35 @@
 namespace vergence::iidc {
 namespace {
 
-constexpr double kRateSlack = 0.01;  // a rate is met when it is short by less: 29.96 Hz is called 30 Hz
+constexpr double kRateSlack =
+    0.01;  // a rate is met when it is short by less: 29.96 Hz is called 30 Hz
 constexpr unsigned kFormat7Modes = 8;
 
 /// From the cheapest to the dearest on the bus.
-constexpr std::array kCodings{ColorCoding::mono8, ColorCoding::raw8,   ColorCoding::yuv411, ColorCoding::mono16,
-                              ColorCoding::raw16, ColorCoding::yuv422, ColorCoding::yuv444, ColorCoding::rgb8};
+constexpr std::array kCodings{ColorCoding::mono8,  ColorCoding::raw8,  ColorCoding::yuv411,
+                              ColorCoding::mono16, ColorCoding::raw16, ColorCoding::yuv422,
+                              ColorCoding::yuv444, ColorCoding::rgb8};
 
 class Planner {
  public:
-  Planner(CameraRegisters* registers, const BusTraits& bus, const CameraConfiguration& wanted, CameraPlan* plan, std::string* complaint)
+  Planner(CameraRegisters* registers, const BusTraits& bus, const CameraConfiguration& wanted,
+          CameraPlan* plan, std::string* complaint)
       : r_(*registers), bus_(bus), wanted_(wanted), plan_(*plan), complaint_(*complaint) {}
 
   DeviceStatus run() {
     if (const DeviceStatus s = check_numbers(); s != DeviceStatus::ok) return s;
-    if (const DeviceStatus s = parse_options(wanted_.options, &plan_.options, &complaint_); s != DeviceStatus::ok) return s;
+    if (const DeviceStatus s = parse_options(wanted_.options, &plan_.options, &complaint_);
+        s != DeviceStatus::ok)
+      return s;
     plan_.trigger = wanted_.trigger;
     plan_.wanted_rate_hz = wanted_.rate_hz;
-    plan_.size = {static_cast<std::uint16_t>(wanted_.width), static_cast<std::uint16_t>(wanted_.height)};
-    plan_.position = {static_cast<std::uint16_t>(wanted_.offset_x), static_cast<std::uint16_t>(wanted_.offset_y)};
+    plan_.size = {static_cast<std::uint16_t>(wanted_.width),
+                  static_cast<std::uint16_t>(wanted_.height)};
+    plan_.position = {static_cast<std::uint16_t>(wanted_.offset_x),
+                      static_cast<std::uint16_t>(wanted_.offset_y)};
     for (const auto step :
-         {&Planner::choose_speed, &Planner::choose_trigger, &Planner::choose_features, &Planner::choose_strobe, &Planner::choose_mode}) {
+         {&Planner::choose_speed, &Planner::choose_trigger, &Planner::choose_features,
+          &Planner::choose_strobe, &Planner::choose_mode}) {
       const bool possible = (this->*step)();
       if (r_.status() != DeviceStatus::ok) {
         const DeviceStatus failed = r_.take_status();
@@ -45,17 +53,19 @@ class Planner {
  private:
   DeviceStatus check_numbers() {
     constexpr int kMost = 65535;
-    if (!(wanted_.rate_hz > 0) || !std::isfinite(wanted_.rate_hz) || wanted_.width <= 0 || wanted_.height <= 0 || wanted_.offset_x < 0 ||
-        wanted_.offset_y < 0 || !std::isfinite(wanted_.gain_db)) {
+    if (!(wanted_.rate_hz > 0) || !std::isfinite(wanted_.rate_hz) || wanted_.width <= 0 ||
+        wanted_.height <= 0 || wanted_.offset_x < 0 || wanted_.offset_y < 0 ||
+        !std::isfinite(wanted_.gain_db)) {
       complaint_ = "size and rate must be above zero";
       return DeviceStatus::bad_configuration;
     }
     if (wanted_.exposure <= Duration{} || wanted_.exposure.to_seconds() * wanted_.rate_hz > 1) {
-      complaint_ =
-          text("an exposure of %.0f us does not fit between two images at %g Hz", wanted_.exposure.to_seconds() * 1e6, wanted_.rate_hz);
+      complaint_ = text("an exposure of %.0f us does not fit between two images at %g Hz",
+                        wanted_.exposure.to_seconds() * 1e6, wanted_.rate_hz);
       return DeviceStatus::bad_configuration;
     }
-    if (wanted_.width > kMost || wanted_.height > kMost || wanted_.offset_x > kMost || wanted_.offset_y > kMost) {
+    if (wanted_.width > kMost || wanted_.height > kMost || wanted_.offset_x > kMost ||
+        wanted_.offset_y > kMost) {
       complaint_ = text("%d x %d is more than any camera has", wanted_.width, wanted_.height);
       return DeviceStatus::unsupported;
     }
@@ -64,37 +74,45 @@ class Planner {
 
   bool choose_speed() {
     const bool beta = BasicFunctions::of(r_.get(reg::kBasicFunctions)).beta;
-    BusSpeed most = bus_.isochronous && !beta ? std::min(bus_.fastest, BusSpeed::s400) : bus_.fastest;
+    BusSpeed most =
+        bus_.isochronous && !beta ? std::min(bus_.fastest, BusSpeed::s400) : bus_.fastest;
     if (plan_.options.speed && bus_.isochronous) {
       if (*plan_.options.speed > most) {
-        complaint_ = text("option speed: the camera and its bus reach %s", std::string(to_string(most)).c_str());
+        complaint_ = text("option speed: the camera and its bus reach %s",
+                          std::string(to_string(most)).c_str());
         return false;
       }
       most = *plan_.options.speed;
     }
     plan_.shape.speed = most;
     plan_.shape.buffers = plan_.options.buffers;
-    largest_ = std::min(bus_.largest_packet, bus_.isochronous ? largest_packet(most) : bus_.largest_packet);
+    largest_ = std::min(bus_.largest_packet,
+                        bus_.isochronous ? largest_packet(most) : bus_.largest_packet);
     return true;
   }
 
   bool choose_trigger() {
     if (wanted_.trigger == CameraTrigger::free) return true;
     const TriggerInquiry t = TriggerInquiry::of(r_.get(reg::kTriggerInquiry));
-    const unsigned source = wanted_.trigger == CameraTrigger::software ? kTriggerSourceSoftware : plan_.options.trigger_source;
+    const unsigned source = wanted_.trigger == CameraTrigger::software
+                                ? kTriggerSourceSoftware
+                                : plan_.options.trigger_source;
     if (!t.present || !t.has_source(source) || (!t.has_mode(0) && !t.has_mode(14))) {
-      complaint_ = wanted_.trigger == CameraTrigger::software ? "this camera has no software trigger"
-                                                              : text("this camera has no trigger input %u", source);
+      complaint_ = wanted_.trigger == CameraTrigger::software
+                       ? "this camera has no software trigger"
+                       : text("this camera has no trigger input %u", source);
       complaint_ += offered_triggers(t);
       return false;
     }
     plan_.trigger_mode = plan_.options.trigger_mode.value_or(t.has_mode(14) ? 14 : 0);
     if (!t.has_mode(plan_.trigger_mode)) {
-      complaint_ = text("this camera has no trigger mode %u", plan_.trigger_mode) + offered_triggers(t);
+      complaint_ =
+          text("this camera has no trigger mode %u", plan_.trigger_mode) + offered_triggers(t);
       return false;
     }
     if (!plan_.options.trigger_rising && !t.polarity) {
-      complaint_ = "the edge of this camera's trigger cannot be changed; option trigger_edge must be rising";
+      complaint_ =
+          "the edge of this camera's trigger cannot be changed; option trigger_edge must be rising";
       return false;
     }
     return true;
@@ -116,19 +134,24 @@ class Planner {
     const AbsoluteRange shutter = r_.absolute_range(Feature::shutter);
     const double s = wanted_.exposure.to_seconds();
     if (!shutter.present) {
-      complaint_ = "this camera does not take its exposure in seconds, which version 1.31 of IIDC and later do";
+      complaint_ =
+          "this camera does not take its exposure in seconds, which version 1.31 of IIDC and later "
+          "do";
       return false;
     }
     if (s < shutter.least * (1 - kFloat) || s > shutter.most * (1 + kFloat)) {
-      complaint_ = text("an exposure of %.6g us is not possible; this camera offers %.6g to %.6g us", s * 1e6, shutter.least * 1e6,
-                        shutter.most * 1e6);
+      complaint_ =
+          text("an exposure of %.6g us is not possible; this camera offers %.6g to %.6g us",
+               s * 1e6, shutter.least * 1e6, shutter.most * 1e6);
       return false;
     }
     const AbsoluteRange gain = r_.absolute_range(Feature::gain);
     const double slack = kFloat * std::max(1.0, std::abs(wanted_.gain_db));
-    if (gain.present ? wanted_.gain_db < gain.least - slack || wanted_.gain_db > gain.most + slack : wanted_.gain_db != 0) {
+    if (gain.present ? wanted_.gain_db < gain.least - slack || wanted_.gain_db > gain.most + slack
+                     : wanted_.gain_db != 0) {
       complaint_ = gain.present
-                       ? text("a gain of %g dB is not possible; this camera offers %g to %g dB", wanted_.gain_db, gain.least, gain.most)
+                       ? text("a gain of %g dB is not possible; this camera offers %g to %g dB",
+                              wanted_.gain_db, gain.least, gain.most)
                        : "this camera does not take its gain in dB; gain_db must be 0";
       return false;
     }
@@ -142,8 +165,11 @@ class Planner {
     if (!plan_.options.strobe_pin) return true;
     const bool any = (r_.get(reg::kOptionalFunctions) & bit(28)) != 0;
     const std::uint64_t csr = any ? r_.table(reg::kStrobeBase) : 0;
-    if (csr != 0 && (r_.get_at(csr + reg::strobe::inquiry(*plan_.options.strobe_pin)) & bit(31)) != 0) return true;
-    complaint_ = csr == 0 ? "this camera has no strobe outputs" : text("this camera has no strobe output %u", *plan_.options.strobe_pin);
+    if (csr != 0 &&
+        (r_.get_at(csr + reg::strobe::inquiry(*plan_.options.strobe_pin)) & bit(31)) != 0)
+      return true;
+    complaint_ = csr == 0 ? "this camera has no strobe outputs"
+                          : text("this camera has no strobe output %u", *plan_.options.strobe_pin);
     return false;
   }
 
@@ -156,7 +182,8 @@ class Planner {
   bool choose_mode() {
     const auto wishes = codings();
     const bool region = wanted_.offset_x != 0 || wanted_.offset_y != 0;
-    const bool may_fixed = !region && !plan_.options.packet_bytes && !plan_.options.format7.value_or(false);
+    const bool may_fixed =
+        !region && !plan_.options.packet_bytes && !plan_.options.format7.value_or(false);
     const bool may_format7 = plan_.options.format7.value_or(true);
     for (const ColorCoding c : wishes) {
       if (may_fixed && fixed(c, true)) return true;
@@ -165,24 +192,29 @@ class Planner {
     }
     for (const ColorCoding c : wishes)
       if (may_fixed && fixed(c, false)) return true;
-    complaint_ = text("%d x %d", wanted_.width, wanted_.height) + (wanted_.pixel_format.empty() ? "" : " " + wanted_.pixel_format) +
-                 text(" at %g Hz is not possible", wanted_.rate_hz) + (why_not_.empty() ? "" : ": " + why_not_) + "; this camera offers " +
-                 offers();
+    complaint_ = text("%d x %d", wanted_.width, wanted_.height) +
+                 (wanted_.pixel_format.empty() ? "" : " " + wanted_.pixel_format) +
+                 text(" at %g Hz is not possible", wanted_.rate_hz) +
+                 (why_not_.empty() ? "" : ": " + why_not_) + "; this camera offers " + offers();
     return false;
   }
 
-  /// `exactly`: a free-running camera at the rate that is wanted, not at the next higher one; and packets of which every camera of the
-  /// rig can send one a cycle.
+  /// `exactly`: a free-running camera at the rate that is wanted, not at the next higher one; and
+  /// packets of which every camera of the rig can send one a cycle.
   bool fixed(ColorCoding coding, bool exactly) {
     for (const FixedMode& m : fixed_modes()) {
-      if (m.coding != coding || m.width != wanted_.width || m.height != wanted_.height || !r_.has_mode(m.format, m.mode)) continue;
+      if (m.coding != coding || m.width != wanted_.width || m.height != wanted_.height ||
+          !r_.has_mode(m.format, m.mode))
+        continue;
       const std::uint32_t rates = r_.get(reg::rate_inquiry(m.format, m.mode));
       for (unsigned code = 0; code < kRates; ++code) {
         const std::size_t packet = fixed_packet_bytes(m, code);
         if ((rates & bit(31 - code)) == 0 || packet == 0 || packet > largest_) continue;
         if (rate_of(code) < wanted_.rate_hz * (1 - kRateSlack)) continue;
         if (exactly && crowded(packet)) break;
-        if (exactly && wanted_.trigger == CameraTrigger::free && rate_of(code) > wanted_.rate_hz * (1 + kRateSlack)) break;
+        if (exactly && wanted_.trigger == CameraTrigger::free &&
+            rate_of(code) > wanted_.rate_hz * (1 + kRateSlack))
+          break;
         plan_.format = m.format;
         plan_.mode = m.mode;
         plan_.rate_code = code;
@@ -198,7 +230,8 @@ class Planner {
 
   [[nodiscard]] bool crowded(std::size_t packet) const {
     return bus_.isochronous && wanted_.sharing > 1 &&
-           bandwidth_units(packet, plan_.shape.speed) * static_cast<unsigned>(wanted_.sharing) > kBandwidthUnits;
+           bandwidth_units(packet, plan_.shape.speed) * static_cast<unsigned>(wanted_.sharing) >
+               kBandwidthUnits;
   }
 
   bool format7(ColorCoding coding) {
@@ -206,31 +239,40 @@ class Planner {
     for (unsigned mode = 0; mode < kFormat7Modes; ++mode) {
       if (!r_.has_mode(7, mode)) continue;
       const std::uint64_t csr = r_.table(reg::format7_base(mode));
-      if (csr == 0 || (r_.get_at(csr + kCodingInquiry) & bit(31 - static_cast<unsigned>(coding))) == 0) continue;
-      const Size most = Size::of(r_.get_at(csr + kMaxSize)), unit = Size::of(r_.get_at(csr + kUnitSize));
+      if (csr == 0 ||
+          (r_.get_at(csr + kCodingInquiry) & bit(31 - static_cast<unsigned>(coding))) == 0)
+        continue;
+      const Size most = Size::of(r_.get_at(csr + kMaxSize)),
+                 unit = Size::of(r_.get_at(csr + kUnitSize));
       Size step = Size::of(r_.get_at(csr + kUnitPosition));
       if (step.width == 0 || step.height == 0) step = unit;
       if (unit.width == 0 || unit.height == 0) continue;
-      if (wanted_.offset_x + wanted_.width > most.width || wanted_.offset_y + wanted_.height > most.height) continue;
-      if (wanted_.width % unit.width != 0 || wanted_.height % unit.height != 0 || wanted_.offset_x % step.width != 0 ||
-          wanted_.offset_y % step.height != 0)
+      if (wanted_.offset_x + wanted_.width > most.width ||
+          wanted_.offset_y + wanted_.height > most.height)
+        continue;
+      if (wanted_.width % unit.width != 0 || wanted_.height % unit.height != 0 ||
+          wanted_.offset_x % step.width != 0 || wanted_.offset_y % step.height != 0)
         continue;
       const std::size_t bytes = frame_bytes(plan_.size.width, plan_.size.height, coding);
       const Size limits = Size::of(r_.get_at(csr + kPacketLimits));  // unit, most
       if (!choose_packet(bytes, limits)) continue;
       if (wanted_.trigger == CameraTrigger::free && frame_rate_.present &&
-          (wanted_.rate_hz < frame_rate_.least * (1 - kRateSlack) || wanted_.rate_hz > frame_rate_.most * (1 + kRateSlack))) {
-        say_why_not(text("its frame rate goes from %g to %g Hz", frame_rate_.least, frame_rate_.most));
+          (wanted_.rate_hz < frame_rate_.least * (1 - kRateSlack) ||
+           wanted_.rate_hz > frame_rate_.most * (1 + kRateSlack))) {
+        say_why_not(
+            text("its frame rate goes from %g to %g Hz", frame_rate_.least, frame_rate_.most));
         continue;
       }
       plan_.format = 7;
       plan_.mode = mode;
       plan_.csr = csr;
       plan_.coding = coding;
-      plan_.rate_hz =
-          wanted_.trigger != CameraTrigger::free || frame_rate_.present ? wanted_.rate_hz : packet_rate(bytes, plan_.shape.packet_bytes);
+      plan_.rate_hz = wanted_.trigger != CameraTrigger::free || frame_rate_.present
+                          ? wanted_.rate_hz
+                          : packet_rate(bytes, plan_.shape.packet_bytes);
       plan_.shape.image_bytes = bytes;
-      plan_.shape.frame_bytes = packets_for(bytes, plan_.shape.packet_bytes) * plan_.shape.packet_bytes;
+      plan_.shape.frame_bytes =
+          packets_for(bytes, plan_.shape.packet_bytes) * plan_.shape.packet_bytes;
       return possible_as_grey();
     }
     return false;
@@ -239,18 +281,23 @@ class Planner {
   /// `limits`: unit and largest, as the camera says; zeros: anything.
   bool choose_packet(std::size_t bytes, const Size& limits) {
     const std::size_t unit = limits.width == 0 ? 4 : limits.width;
-    const std::size_t most = limits.height == 0 ? largest_ : std::min<std::size_t>(limits.height, largest_);
+    const std::size_t most =
+        limits.height == 0 ? largest_ : std::min<std::size_t>(limits.height, largest_);
     const std::size_t asked = plan_.options.packet_bytes.value_or(0);
-    const std::size_t packet = asked != 0 ? asked : packet_for_rate(bytes, wanted_.rate_hz * (1 - kRateSlack), unit, most);
-    if (packet == 0 || packet > most || packet % unit != 0 || packet_rate(bytes, packet) < wanted_.rate_hz * (1 - kRateSlack)) {
+    const std::size_t packet =
+        asked != 0 ? asked : packet_for_rate(bytes, wanted_.rate_hz * (1 - kRateSlack), unit, most);
+    if (packet == 0 || packet > most || packet % unit != 0 ||
+        packet_rate(bytes, packet) < wanted_.rate_hz * (1 - kRateSlack)) {
       const std::size_t best = asked != 0 && asked <= most ? asked : most / unit * unit;
-      say_why_not(
-          text("packets of %zu bytes (largest %zu, in steps of %zu) carry %.4g Hz of it", best, most, unit, packet_rate(bytes, best)));
+      say_why_not(text("packets of %zu bytes (largest %zu, in steps of %zu) carry %.4g Hz of it",
+                       best, most, unit, packet_rate(bytes, best)));
       return false;
     }
-    // Larger ones bring the image sooner, where it is not the packets that set a free camera's rate.
+    // Larger ones bring the image sooner, where it is not the packets that set a free camera's
+    // rate.
     const bool paced = wanted_.trigger != CameraTrigger::free || frame_rate_.present;
-    plan_.shape.packet_bytes = asked == 0 && paced ? std::max(packet, std::min(share(), most) / unit * unit) : packet;
+    plan_.shape.packet_bytes =
+        asked == 0 && paced ? std::max(packet, std::min(share(), most) / unit * unit) : packet;
     return true;
   }
 
@@ -258,15 +305,18 @@ class Planner {
   [[nodiscard]] std::size_t share() const {
     const auto cameras = static_cast<unsigned>(std::max(wanted_.sharing, 1));
     if (bus_.isochronous) return packet_for_units(kBandwidthUnits / cameras, plan_.shape.speed);
-    return static_cast<std::size_t>(bus_.bytes_per_second * kUsbPractical / kCyclesPerSecond) / cameras;
+    return static_cast<std::size_t>(bus_.bytes_per_second * kUsbPractical / kCyclesPerSecond) /
+           cameras;
   }
 
   bool possible_as_grey() {
     const bool raw = plan_.coding == ColorCoding::raw8 || plan_.coding == ColorCoding::raw16;
     plan_.grey.coding = plan_.coding;
     plan_.grey.mosaic = raw && bayer_tile(r_.get_optional(reg::kBayerTile)) != BayerTile::none;
-    if (plan_.grey.possible() && (!plan_.grey.mosaic || (wanted_.width > 1 && wanted_.height > 1))) return true;
-    say_why_not(std::string(to_string(plan_.coding)) + " of this camera is not turned to grey here");
+    if (plan_.grey.possible() && (!plan_.grey.mosaic || (wanted_.width > 1 && wanted_.height > 1)))
+      return true;
+    say_why_not(std::string(to_string(plan_.coding)) +
+                " of this camera is not turned to grey here");
     return false;
   }
 
@@ -279,7 +329,8 @@ class Planner {
     std::string out;
     for (const FixedMode& m : fixed_modes()) {
       if (!r_.has_mode(m.format, m.mode)) continue;
-      out += (out.empty() ? "" : ", ") + text("%d x %d ", m.width, m.height) + std::string(to_string(m.coding)) + " at";
+      out += (out.empty() ? "" : ", ") + text("%d x %d ", m.width, m.height) +
+             std::string(to_string(m.coding)) + " at";
       const std::uint32_t rates = r_.get(reg::rate_inquiry(m.format, m.mode));
       for (unsigned code = 0; code < kRates; ++code)
         if ((rates & bit(31 - code)) != 0) out += text(" %g", rate_of(code));
@@ -288,12 +339,14 @@ class Planner {
     for (unsigned mode = 0; mode < kFormat7Modes; ++mode) {
       const std::uint64_t csr = r_.has_mode(7, mode) ? r_.table(reg::format7_base(mode)) : 0;
       if (csr == 0) continue;
-      const Size most = Size::of(r_.get_at(csr + reg::format7::kMaxSize)), unit = Size::of(r_.get_at(csr + reg::format7::kUnitSize));
-      out +=
-          (out.empty() ? "" : ", ") + text("any region of %d x %d in steps of %d x %d", most.width, most.height, unit.width, unit.height);
+      const Size most = Size::of(r_.get_at(csr + reg::format7::kMaxSize)),
+                 unit = Size::of(r_.get_at(csr + reg::format7::kUnitSize));
+      out += (out.empty() ? "" : ", ") + text("any region of %d x %d in steps of %d x %d",
+                                              most.width, most.height, unit.width, unit.height);
       const std::uint32_t codings = r_.get_at(csr + reg::format7::kCodingInquiry);
       for (unsigned c = 0; c < kColorCodings; ++c)
-        if ((codings & bit(31 - c)) != 0) out += " " + std::string(to_string(static_cast<ColorCoding>(c)));
+        if ((codings & bit(31 - c)) != 0)
+          out += " " + std::string(to_string(static_cast<ColorCoding>(c)));
     }
     return out.empty() ? "nothing that its registers name" : out;
   }
@@ -310,7 +363,8 @@ class Planner {
 
 }  // namespace
 
-DeviceStatus make_plan(CameraRegisters* registers, const BusTraits& bus, const CameraConfiguration& wanted, CameraPlan* plan,
+DeviceStatus make_plan(CameraRegisters* registers, const BusTraits& bus,
+                       const CameraConfiguration& wanted, CameraPlan* plan,
                        std::string* complaint) {
   CameraPlan out;
   const DeviceStatus status = Planner(registers, bus, wanted, &out, complaint).run();

@@ -29,13 +29,17 @@ struct CameraPlan {
   FrameInfoLayout info{};
 };
 
-/// Finds a mode for it: the fixed one of that size and rate, else a region of Format 7; the cheapest pixels that give grey first.
-/// Only reads registers. → ok, unsupported, bad_configuration, or why a register failed; then *complaint says what the camera offers.
-[[nodiscard]] DeviceStatus make_plan(CameraRegisters* registers, const BusTraits& bus, const CameraConfiguration& wanted, CameraPlan* plan,
+/// Finds a mode for it: the fixed one of that size and rate, else a region of Format 7; the
+/// cheapest pixels that give grey first. Only reads registers. → ok, unsupported,
+/// bad_configuration, or why a register failed; then *complaint says what the camera offers.
+[[nodiscard]] DeviceStatus make_plan(CameraRegisters* registers, const BusTraits& bus,
+                                     const CameraConfiguration& wanted, CameraPlan* plan,
                                      std::string* complaint);
 
-/// Stops the camera and writes the plan into it; fills in what the camera made of it. The camera stays quiet.
+/// Stops the camera and writes the plan into it; fills in what the camera made of it. The camera
+/// stays quiet.
 /// → ok, unsupported, or why a register failed; then *complaint says it.
-[[nodiscard]] DeviceStatus apply_plan(CameraRegisters* registers, const BusTraits& bus, CameraPlan* plan, std::string* complaint);
+[[nodiscard]] DeviceStatus apply_plan(CameraRegisters* registers, const BusTraits& bus,
+                                      CameraPlan* plan, std::string* complaint);
 
 }  // namespace vergence::iidc

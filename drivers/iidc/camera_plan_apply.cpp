@@ -16,15 +16,17 @@ bool write_format7(CameraRegisters& r, const CameraPlan& plan, std::string* comp
   r.set_at(plan.csr + kSize, plan.size.quadlet());
   r.set_at(plan.csr + kPosition, plan.position.quadlet());
   if (!r.apply_format7(plan.csr, kErrorRegion)) {
-    *complaint = text("the camera refuses the region %d x %d at (%d, %d)", plan.size.width, plan.size.height, plan.position.width,
-                      plan.position.height);
+    *complaint = text("the camera refuses the region %d x %d at (%d, %d)", plan.size.width,
+                      plan.size.height, plan.position.width, plan.position.height);
     return false;
   }
   const Size limits = Size::of(r.get_at(plan.csr + kPacketLimits));  // they may depend on the size
   const std::size_t packet = plan.shape.packet_bytes;
-  if (limits.height != 0 && (packet > limits.height || (limits.width != 0 && packet % limits.width != 0))) {
+  if (limits.height != 0 &&
+      (packet > limits.height || (limits.width != 0 && packet % limits.width != 0))) {
     *complaint =
-        text("the camera takes packets of at most %d bytes in steps of %d at this size, not %zu", limits.height, limits.width, packet);
+        text("the camera takes packets of at most %d bytes in steps of %d at this size, not %zu",
+             limits.height, limits.width, packet);
     return false;
   }
   r.set_at(plan.csr + kPacketBytes, static_cast<std::uint32_t>(packet) << 16U);
@@ -37,12 +39,15 @@ bool write_format7(CameraRegisters& r, const CameraPlan& plan, std::string* comp
 
 /// Exposure and gain by hand, every automatic that would change them off.
 void write_features(CameraRegisters& r, CameraPlan* plan) {
-  for (const Feature f : {Feature::auto_exposure, Feature::gamma, Feature::trigger_delay}) r.switch_off(f);
+  for (const Feature f : {Feature::auto_exposure, Feature::gamma, Feature::trigger_delay})
+    r.switch_off(f);
   plan->exposure = Duration::seconds(r.set_absolute(Feature::shutter, plan->exposure.to_seconds()));
-  if (r.absolute_range(Feature::gain).present) plan->gain_db = r.set_absolute(Feature::gain, plan->gain_db);
+  if (r.absolute_range(Feature::gain).present)
+    plan->gain_db = r.set_absolute(Feature::gain, plan->gain_db);
   const AbsoluteRange rate = r.absolute_range(Feature::frame_rate);
   if (plan->trigger == CameraTrigger::free && rate.present && plan->format == 7) {
-    plan->rate_hz = r.set_absolute(Feature::frame_rate, std::clamp(plan->wanted_rate_hz, rate.least, rate.most));
+    plan->rate_hz = r.set_absolute(Feature::frame_rate,
+                                   std::clamp(plan->wanted_rate_hz, rate.least, rate.most));
   } else if (plan->trigger != CameraTrigger::free) {
     r.switch_off(Feature::frame_rate);  // on, it shortens exposures and skips pulses
   }
@@ -53,14 +58,17 @@ void write_trigger(CameraRegisters& r, const CameraPlan& plan) {
   TriggerMode t;
   t.on = plan.trigger != CameraTrigger::free;
   t.rising = plan.options.trigger_rising;
-  t.source = plan.trigger == CameraTrigger::software ? kTriggerSourceSoftware : plan.options.trigger_source;
+  t.source = plan.trigger == CameraTrigger::software ? kTriggerSourceSoftware
+                                                     : plan.options.trigger_source;
   t.mode = plan.trigger_mode;
   r.set(reg::kTriggerMode, t.quadlet());
 }
 
 void write_strobe(CameraRegisters& r, const CameraOptions& o) {
   if (!o.strobe_pin) return;
-  const auto ticks = [](Duration d) { return static_cast<std::uint32_t>(std::min(4095.0, std::round(d.to_seconds() * 1024e3))); };
+  const auto ticks = [](Duration d) {
+    return static_cast<std::uint32_t>(std::min(4095.0, std::round(d.to_seconds() * 1024e3)));
+  };
   StrobeControl s;
   s.on = true;
   s.high = o.strobe_high;
@@ -73,7 +81,8 @@ void write_strobe(CameraRegisters& r, const CameraOptions& o) {
 FrameInfoLayout write_frame_info(CameraRegisters& r, bool wanted) {
   if (!BasicFunctions::of(r.get(reg::kBasicFunctions)).advanced) return {};
   if ((r.get_optional(reg::kFrameInfo) & kFrameInfoPresent) == 0) return {};
-  const std::uint32_t items = frame_info_bit(FrameInfoItem::time) | frame_info_bit(FrameInfoItem::counter);
+  const std::uint32_t items =
+      frame_info_bit(FrameInfoItem::time) | frame_info_bit(FrameInfoItem::counter);
   r.set(reg::kFrameInfo, kFrameInfoPresent | (wanted ? items : 0));
   return FrameInfoLayout::of(r.get(reg::kFrameInfo));  // what a camera lacks stays off
 }
@@ -81,13 +90,16 @@ FrameInfoLayout write_frame_info(CameraRegisters& r, bool wanted) {
 unsigned effective_bits(CameraRegisters& r, const CameraPlan& plan) {
   constexpr std::uint32_t kDataDepth = 0x630, kFormat7DataDepth = 0x54;
   if (bits_per_pixel(plan.coding) != 16) return 16;
-  const std::uint32_t depth = (plan.format == 7 ? r.get_at(plan.csr + kFormat7DataDepth) : r.get_optional(kDataDepth)) >> 24U;
+  const std::uint32_t depth =
+      (plan.format == 7 ? r.get_at(plan.csr + kFormat7DataDepth) : r.get_optional(kDataDepth)) >>
+      24U;
   return depth >= 8 && depth <= 16 ? depth : 16;
 }
 
 }  // namespace
 
-DeviceStatus apply_plan(CameraRegisters* registers, const BusTraits& bus, CameraPlan* plan, std::string* complaint) {
+DeviceStatus apply_plan(CameraRegisters* registers, const BusTraits& bus, CameraPlan* plan,
+                        std::string* complaint) {
   CameraRegisters& r = *registers;
   CameraPlan out = *plan;
   r.transmit(false);  // also what a program that crashed has left on
@@ -101,9 +113,12 @@ DeviceStatus apply_plan(CameraRegisters* registers, const BusTraits& bus, Camera
     r.set(reg::kIsoChannel, iso.quadlet());
   }
   if (out.format == 7) {
-    if (!write_format7(r, out, complaint) && r.status() == DeviceStatus::ok) return DeviceStatus::unsupported;
-    const std::uint32_t total = r.get_at(out.csr + reg::format7::kTotalBytesLow);  // the high half: frames of 4 GB
-    if (total >= out.shape.image_bytes && total <= out.shape.image_bytes + out.shape.packet_bytes) out.shape.frame_bytes = total;
+    if (!write_format7(r, out, complaint) && r.status() == DeviceStatus::ok)
+      return DeviceStatus::unsupported;
+    const std::uint32_t total =
+        r.get_at(out.csr + reg::format7::kTotalBytesLow);  // the high half: frames of 4 GB
+    if (total >= out.shape.image_bytes && total <= out.shape.image_bytes + out.shape.packet_bytes)
+      out.shape.frame_bytes = total;
   } else {
     r.set(reg::kFrameRate, out.rate_code << 29U);
   }

@@ -11,10 +11,12 @@
 namespace vergence::iidc {
 namespace {
 
-constexpr Duration kLook = Duration::milliseconds(1);  // between two looks at a register that is to change
+constexpr Duration kLook =
+    Duration::milliseconds(1);  // between two looks at a register that is to change
 
 void pause(Duration d) noexcept {
-  timespec t{static_cast<time_t>(d.ns() / 1'000'000'000), static_cast<long>(d.ns() % 1'000'000'000)};
+  timespec t{static_cast<time_t>(d.ns() / 1'000'000'000),
+             static_cast<long>(d.ns() % 1'000'000'000)};
   (void)::nanosleep(&t, nullptr);
 }
 
@@ -59,7 +61,9 @@ std::uint32_t CameraRegisters::get_optional(std::uint32_t offset) noexcept {
 std::uint64_t CameraRegisters::table(std::uint32_t offset) noexcept {
   constexpr std::uint32_t kLargest = 0x0FFF'FFFF / 4;  // inside the node's register space
   const std::uint32_t quadlets = get(offset);
-  return quadlets == 0 || quadlets > kLargest ? 0 : kRegisterSpace + 4 * static_cast<std::uint64_t>(quadlets);
+  return quadlets == 0 || quadlets > kLargest
+             ? 0
+             : kRegisterSpace + 4 * static_cast<std::uint64_t>(quadlets);
 }
 
 void CameraRegisters::await_clear(std::uint64_t address, std::uint32_t bits) noexcept {
@@ -71,7 +75,8 @@ void CameraRegisters::await_clear(std::uint64_t address, std::uint32_t bits) noe
 }
 
 bool CameraRegisters::has_mode(unsigned format, unsigned mode) noexcept {
-  return (get(reg::kFormatInquiry) & bit(31 - format)) != 0 && (get(reg::mode_inquiry(format)) & bit(31 - mode)) != 0;
+  return (get(reg::kFormatInquiry) & bit(31 - format)) != 0 &&
+         (get(reg::mode_inquiry(format)) & bit(31 - mode)) != 0;
 }
 
 AbsoluteRange CameraRegisters::absolute_range(Feature f) noexcept {
@@ -82,7 +87,8 @@ AbsoluteRange CameraRegisters::absolute_range(Feature f) noexcept {
   AbsoluteRange range;
   range.least = static_cast<double>(std::bit_cast<float>(get_at(csr + reg::absolute::kLeast)));
   range.most = static_cast<double>(std::bit_cast<float>(get_at(csr + reg::absolute::kMost)));
-  range.present = std::isfinite(range.least) && std::isfinite(range.most) && range.least <= range.most;
+  range.present =
+      std::isfinite(range.least) && std::isfinite(range.most) && range.least <= range.most;
   return range;
 }
 
@@ -94,7 +100,8 @@ double CameraRegisters::set_absolute(Feature f, double value) noexcept {
   v.automatic = v.one_push = false;
   set(reg::feature_value(f), v.quadlet());
   set_at(csr + reg::absolute::kValue, std::bit_cast<std::uint32_t>(static_cast<float>(value)));
-  const auto rounded = static_cast<double>(std::bit_cast<float>(get_at(csr + reg::absolute::kValue)));
+  const auto rounded =
+      static_cast<double>(std::bit_cast<float>(get_at(csr + reg::absolute::kValue)));
   return std::isfinite(rounded) ? rounded : value;
 }
 
@@ -133,7 +140,8 @@ std::string CameraRegisters::complaint() const {
                      : told_ == DeviceStatus::unsupported ? "was refused by the camera"
                      : told_ == DeviceStatus::gone        ? "was not answered: the camera is gone"
                                                           : "could not be reached";
-  (void)std::snprintf(text.data(), text.size(), "register 0x%llx %s%s", static_cast<unsigned long long>(failed_at_ - kRegisterSpace), what,
+  (void)std::snprintf(text.data(), text.size(), "register 0x%llx %s%s",
+                      static_cast<unsigned long long>(failed_at_ - kRegisterSpace), what,
                       failed_writing_ ? " (writing)" : "");
   return text.data();
 }

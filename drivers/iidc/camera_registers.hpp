@@ -13,10 +13,12 @@ struct AbsoluteRange {
   double least = 0, most = 0;
 };
 
-/// The registers of a camera by their meaning. The first access that fails sticks: what follows does nothing and reads 0, and
-/// take_status() tells at the end. So a sequence of registers is written as one, and checked once.
+/// The registers of a camera by their meaning. The first access that fails sticks: what follows
+/// does nothing and reads 0, and take_status() tells at the end. So a sequence of registers is
+/// written as one, and checked once.
 ///
-/// Threads  One caller at a time. Time: no wait is longer than `patience` beside the port's own time-outs.
+/// Threads  One caller at a time. Time: no wait is longer than `patience` beside the port's own
+///          time-outs.
 class CameraRegisters {
  public:
   CameraRegisters(RegisterPort* port, std::uint64_t command_base, Duration patience) noexcept
@@ -36,9 +38,12 @@ class CameraRegisters {
   void await_clear(std::uint64_t address, std::uint32_t bits) noexcept;
 
   [[nodiscard]] bool has_mode(unsigned format, unsigned mode) noexcept;
-  [[nodiscard]] FeatureInquiry inquiry(Feature f) noexcept { return FeatureInquiry::of(get(reg::feature_inquiry(f))); }
+  [[nodiscard]] FeatureInquiry inquiry(Feature f) noexcept {
+    return FeatureInquiry::of(get(reg::feature_inquiry(f)));
+  }
   [[nodiscard]] AbsoluteRange absolute_range(Feature f) noexcept;
-  /// Switches the feature to its absolute value, not automatic, and sets it. → the value as the camera rounded it.
+  /// Switches the feature to its absolute value, not automatic, and sets it. → the value as the
+  /// camera rounded it.
   [[nodiscard]] double set_absolute(Feature f, double value) noexcept;
   /// Not automatic, and off where it can be.
   void switch_off(Feature f) noexcept;
@@ -47,8 +52,9 @@ class CameraRegisters {
   /// Fires when the camera is ready for it.
   void software_trigger() noexcept;
 
-  /// Applies a Format 7 mode's values by the handshake of version 1.30; nothing on older cameras. False: the camera refuses them
-  /// (`error` is one of reg::format7::kError…), or a register failed.
+  /// Applies a Format 7 mode's values by the handshake of version 1.30; nothing on older cameras.
+  /// False: the camera refuses them (`error` is one of reg::format7::kError…), or a register
+  /// failed.
   [[nodiscard]] bool apply_format7(std::uint64_t csr, std::uint32_t error) noexcept;
 
   /// The first failure since the last call, ok otherwise; begins anew.
@@ -69,7 +75,8 @@ class CameraRegisters {
   bool failed_writing_ = false;
 };
 
-/// Reads the configuration ROM quadlet by quadlet until it ends (longer reads over the end fail), and parses it.
+/// Reads the configuration ROM quadlet by quadlet until it ends (longer reads over the end fail),
+/// and parses it.
 [[nodiscard]] DeviceStatus read_rom(RegisterPort* port, ConfigRom* rom, std::string* complaint);
 
 [[nodiscard]] HostStamp monotonic_now() noexcept;

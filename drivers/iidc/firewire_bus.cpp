@@ -25,8 +25,9 @@
 namespace vergence::iidc {
 namespace {
 
-constexpr int kLookMs = 100;                            // a thread that polls looks up at least so often
-constexpr Duration kSlow = Duration::milliseconds(90);  // a register access that takes longer met the kernel's split time-out
+constexpr int kLookMs = 100;  // a thread that polls looks up at least so often
+constexpr Duration kSlow = Duration::milliseconds(
+    90);  // a register access that takes longer met the kernel's split time-out
 
 /// libdc1394 writes to stderr unless told otherwise; what matters is said by status and sentence.
 void silence_library() {
@@ -45,10 +46,12 @@ std::int64_t realtime_us() noexcept {
 
 }  // namespace
 
-// ---- finding and opening ------------------------------------------------------------------------------------------
+// ---- finding and opening
+// ------------------------------------------------------------------------------------------
 
-std::unique_ptr<FirewireBus> FirewireBus::open(std::string_view wanted, std::shared_ptr<BusLedger> ledger, DeviceStatus* status,
-                                               std::string* complaint) {
+std::unique_ptr<FirewireBus> FirewireBus::open(std::string_view wanted,
+                                               std::shared_ptr<BusLedger> ledger,
+                                               DeviceStatus* status, std::string* complaint) {
   std::unique_ptr<FirewireBus> bus(new FirewireBus);
   bus->ledger_ = std::move(ledger);
   *status = bus->open_node(wanted);
@@ -66,13 +69,16 @@ DeviceStatus FirewireBus::open_node(std::string_view wanted) {
     if (!names_camera(wanted, node.rom.guid)) continue;
     lock_ = ::open(node.device.c_str(), O_RDWR | O_CLOEXEC);
     if (lock_ < 0) {
-      status = errno == EACCES || errno == EPERM ? DeviceStatus::no_permission : DeviceStatus::failed;
-      complaint_ = "no access to " + node.device + ": " + std::strerror(errno) +
-                   "; install the udev rules (vergence devices --write-udev), and be in group video";
+      status =
+          errno == EACCES || errno == EPERM ? DeviceStatus::no_permission : DeviceStatus::failed;
+      complaint_ =
+          "no access to " + node.device + ": " + std::strerror(errno) +
+          "; install the udev rules (vergence devices --write-udev), and be in group video";
       if (!wanted.empty()) return status;
       continue;
     }
-    // The kernel lets any number of programs at a camera; two that stream would spoil each other's registers.
+    // The kernel lets any number of programs at a camera; two that stream would spoil each other's
+    // registers.
     if (::flock(lock_, LOCK_EX | LOCK_NB) != 0) {
       status = DeviceStatus::busy;
       complaint_ = node.device + " is locked";
@@ -91,7 +97,8 @@ DeviceStatus FirewireBus::open_node(std::string_view wanted) {
       continue;
     }
     node_ = node;
-    info_ = {"iidc-1394", guid_text(node.rom.guid), node.rom.model[0] != 0 ? node.rom.model.data() : "IIDC camera", node.device};
+    info_ = {"iidc-1394", guid_text(node.rom.guid),
+             node.rom.model[0] != 0 ? node.rom.model.data() : "IIDC camera", node.device};
     complaint_.clear();
     return DeviceStatus::ok;
   }
@@ -130,7 +137,9 @@ DeviceStatus FirewireBus::reopen() noexcept {
     const DeviceStatus status = open_node(mine);
     if (status != DeviceStatus::ok) {
       if (complaint_.empty()) complaint_ = "the camera is not on the bus";
-      return status == DeviceStatus::no_permission || status == DeviceStatus::busy ? status : DeviceStatus::gone;
+      return status == DeviceStatus::no_permission || status == DeviceStatus::busy
+                 ? status
+                 : DeviceStatus::gone;
     }
     if (map().base != nullptr) generation_.store(other, std::memory_order_release);
     lost_.store(false, std::memory_order_release);
@@ -140,7 +149,8 @@ DeviceStatus FirewireBus::reopen() noexcept {
   }
 }
 
-// ---- registers ----------------------------------------------------------------------------------------------------
+// ---- registers
+// ----------------------------------------------------------------------------------------------------
 
 /// libdc1394 says only that it failed.
 DeviceStatus FirewireBus::failure(HostStamp begun) const noexcept {
@@ -151,16 +161,21 @@ DeviceStatus FirewireBus::failure(HostStamp begun) const noexcept {
 DeviceStatus FirewireBus::read(std::uint64_t address, std::uint32_t* value) noexcept {
   if (camera_ == nullptr) return DeviceStatus::gone;
   const HostStamp begun = monotonic_now();
-  return dc1394_get_registers(camera_, address - kRegisterSpace, value, 1) == DC1394_SUCCESS ? DeviceStatus::ok : failure(begun);
+  return dc1394_get_registers(camera_, address - kRegisterSpace, value, 1) == DC1394_SUCCESS
+             ? DeviceStatus::ok
+             : failure(begun);
 }
 
 DeviceStatus FirewireBus::write(std::uint64_t address, std::uint32_t value) noexcept {
   if (camera_ == nullptr) return DeviceStatus::gone;
   const HostStamp begun = monotonic_now();
-  return dc1394_set_registers(camera_, address - kRegisterSpace, &value, 1) == DC1394_SUCCESS ? DeviceStatus::ok : failure(begun);
+  return dc1394_set_registers(camera_, address - kRegisterSpace, &value, 1) == DC1394_SUCCESS
+             ? DeviceStatus::ok
+             : failure(begun);
 }
 
-// ---- the ring -----------------------------------------------------------------------------------------------------
+// ---- the ring
+// -----------------------------------------------------------------------------------------------------
 
 DeviceStatus FirewireBus::allocate(const StreamShape& shape) noexcept {
   tear_down();
@@ -176,14 +191,17 @@ DeviceStatus FirewireBus::allocate(const StreamShape& shape) noexcept {
 DeviceStatus FirewireBus::set_up() {
   complaint_ = ledger_->complaint(node_.bus);
   if (!complaint_.empty()) return DeviceStatus::no_bandwidth;
-  const dc1394error_t error = dc1394_capture_setup(camera_, static_cast<std::uint32_t>(shape_.buffers), DC1394_CAPTURE_FLAGS_DEFAULT);
+  const dc1394error_t error = dc1394_capture_setup(
+      camera_, static_cast<std::uint32_t>(shape_.buffers), DC1394_CAPTURE_FLAGS_DEFAULT);
   if (error == DC1394_NO_BANDWIDTH || error == DC1394_NO_ISO_CHANNEL) {
-    complaint_ = "the bus has no room left for its " + std::to_string(bandwidth_units(shape_.packet_bytes, shape_.speed)) +
+    complaint_ = "the bus has no room left for its " +
+                 std::to_string(bandwidth_units(shape_.packet_bytes, shape_.speed)) +
                  " bandwidth units, or no channel: another program streams on it";
     return DeviceStatus::no_bandwidth;
   }
   if (error != DC1394_SUCCESS) {
-    complaint_ = std::string("libdc1394 cannot set up the capture: ") + dc1394_error_get_string(error);
+    complaint_ =
+        std::string("libdc1394 cannot set up the capture: ") + dc1394_error_get_string(error);
     return ::access(node_.device.c_str(), F_OK) != 0 ? DeviceStatus::gone : DeviceStatus::failed;
   }
   captured_ = true;
@@ -218,7 +236,8 @@ bool FirewireBus::find_map() {
 /// Ends a capture whose node is there. Precondition: no slot of it is kept.
 void FirewireBus::tear_down() noexcept {
   if (!captured_) return;
-  if (lost_.load(std::memory_order_acquire) || dc1394_capture_stop(camera_) != DC1394_SUCCESS) return abandon();
+  if (lost_.load(std::memory_order_acquire) || dc1394_capture_stop(camera_) != DC1394_SUCCESS)
+    return abandon();
   captured_ = false;
   map() = {};
 }
@@ -249,7 +268,9 @@ const std::uint8_t* FirewireBus::bytes(FrameSlot slot) const noexcept {
 
 void FirewireBus::give_back(FrameSlot slot) noexcept {
   const bool current = slot / kMaxBuffers == generation_.load(std::memory_order_acquire);
-  if (current) returned_.put(slot);  // before it leaves kept_: an owner that sees none kept finds all of them here
+  if (current)
+    returned_.put(
+        slot);  // before it leaves kept_: an owner that sees none kept finds all of them here
   (void)kept_.remove(slot);
   if (current && wake_ >= 0) (void)!::write(wake_, "\1\0\0\0\0\0\0", 8);
 }
@@ -258,18 +279,21 @@ void FirewireBus::enqueue(std::size_t buffer) noexcept {
   dc1394video_frame_t frame{};  // the library looks at these two only
   frame.camera = camera_;
   frame.id = static_cast<std::uint32_t>(buffer);
-  if (dc1394_capture_enqueue(camera_, &frame) != DC1394_SUCCESS) return;  // gone: told by the next poll
+  if (dc1394_capture_enqueue(camera_, &frame) != DC1394_SUCCESS)
+    return;  // gone: told by the next poll
   queue_[(queue_first_ + queued_++) % queue_.size()] = static_cast<std::uint8_t>(buffer);
 }
 
 void FirewireBus::enqueue_returned() noexcept {
   const std::uint64_t all = returned_.take_all();
   // Of this ring only: a slot of the one before may have come back while it was replaced.
-  std::uint64_t bits = all >> generation_.load(std::memory_order_relaxed) * kMaxBuffers & 0xFFFF'FFFFU;
+  std::uint64_t bits =
+      all >> generation_.load(std::memory_order_relaxed) * kMaxBuffers & 0xFFFF'FFFFU;
   for (; bits != 0; bits &= bits - 1) enqueue(static_cast<std::size_t>(std::countr_zero(bits)));
 }
 
-// ---- streaming ----------------------------------------------------------------------------------------------------
+// ---- streaming
+// ----------------------------------------------------------------------------------------------------
 
 DeviceStatus FirewireBus::start(StreamSink* sink) noexcept {
   stop();
@@ -296,7 +320,9 @@ void FirewireBus::resume() noexcept {
   enqueue_returned();
   for (std::size_t i = 0; i < kMaxBuffers; ++i) {
     dc1394video_frame_t* frame = nullptr;
-    if (dc1394_capture_dequeue(camera_, DC1394_CAPTURE_POLICY_POLL, &frame) != DC1394_SUCCESS || frame == nullptr || queued_ == 0) return;
+    if (dc1394_capture_dequeue(camera_, DC1394_CAPTURE_POLICY_POLL, &frame) != DC1394_SUCCESS ||
+        frame == nullptr || queued_ == 0)
+      return;
     const std::size_t buffer = queue_[queue_first_];
     queue_first_ = (queue_first_ + 1) % queue_.size();
     --queued_;
@@ -340,7 +366,8 @@ void FirewireBus::stream() noexcept {
 /// False: the device is gone.
 bool FirewireBus::take_one() noexcept {
   dc1394video_frame_t* frame = nullptr;
-  if (dc1394_capture_dequeue(camera_, DC1394_CAPTURE_POLICY_POLL, &frame) != DC1394_SUCCESS) return false;
+  if (dc1394_capture_dequeue(camera_, DC1394_CAPTURE_POLICY_POLL, &frame) != DC1394_SUCCESS)
+    return false;
   if (frame == nullptr) return true;  // a bus reset, or nothing
   if (queued_ == 0) return true;      // cannot be: the kernel filled what it did not have
   const std::size_t buffer = queue_[queue_first_];
@@ -355,7 +382,8 @@ bool FirewireBus::take_one() noexcept {
   a.spare = queued_ >= kReserve;
   if (frame->timestamp != 0) {
     a.has_bus_stamp = true;
-    a.bus_stamp = a.at - Duration::microseconds(realtime_us() - static_cast<std::int64_t>(frame->timestamp));
+    a.bus_stamp =
+        a.at - Duration::microseconds(realtime_us() - static_cast<std::int64_t>(frame->timestamp));
   }
   kept_.put(a.slot);
   if (!sink_->frame(a)) {
@@ -366,7 +394,8 @@ bool FirewireBus::take_one() noexcept {
 }
 
 std::string FirewireBus::remark(const StreamShape& shape, double, int sharing) const {
-  const std::vector<BusShare> shares(static_cast<std::size_t>(std::max(sharing, 1)), {shape.packet_bytes, shape.speed, shape.image_bytes});
+  const std::vector<BusShare> shares(static_cast<std::size_t>(std::max(sharing, 1)),
+                                     {shape.packet_bytes, shape.speed, shape.image_bytes});
   const std::string text = budget_complaint(shares);
   return text.empty() ? text : "if all are on one bus, " + text;
 }

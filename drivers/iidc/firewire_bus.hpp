@@ -17,20 +17,25 @@ namespace vergence::iidc {
 
 /// An IIDC camera on IEEE 1394, by libdc1394.
 ///
-/// Stream     Slots are libdc1394's DMA ring. The library hands its buffers out by counting, whatever was filled; which one was filled is
-///            told by the order in which they were queued, kept here. So buffers can come back in any order, and one that finds no
-///            taker goes back at once; kReserve stay with the kernel, that it never runs dry.
-/// Threads    A thread polls the capture between start() and stop(), never without a limit: libdc1394's own wait has none.
-/// Slots      Two ranges of kMaxBuffers: after an unplug images that are still held stay mapped in one, the new ring takes the other.
-/// Unplug     libdc1394's capture_stop fails on a node that is gone, and leaves mapping and descriptor: they are undone here. (Some
-///            kilobytes of its heap stay.)
+/// Stream     Slots are libdc1394's DMA ring. The library hands its buffers out by counting,
+///            whatever was filled; which one was filled is told by the order in which they were
+///            queued, kept here. So buffers can come back in any order, and one that finds no taker
+///            goes back at once; kReserve stay with the kernel, that it never runs dry.
+/// Threads    A thread polls the capture between start() and stop(), never without a limit:
+///            libdc1394's own wait has none.
+/// Slots      Two ranges of kMaxBuffers: after an unplug images that are still held stay mapped in
+///            one, the new ring takes the other.
+/// Unplug     libdc1394's capture_stop fails on a node that is gone, and leaves mapping and
+///            descriptor: they are undone here. (Some kilobytes of its heap stay.)
 /// Budget     Known before the start from what all cameras of the ledger need on this bus.
 class FirewireBus final : public CameraBus {
  public:
   static constexpr std::size_t kReserve = 3;
 
   /// `wanted` as names_camera(). Null: *status and *complaint say why.
-  [[nodiscard]] static std::unique_ptr<FirewireBus> open(std::string_view wanted, std::shared_ptr<BusLedger> ledger, DeviceStatus* status,
+  [[nodiscard]] static std::unique_ptr<FirewireBus> open(std::string_view wanted,
+                                                         std::shared_ptr<BusLedger> ledger,
+                                                         DeviceStatus* status,
                                                          std::string* complaint);
   ~FirewireBus() override;
   FirewireBus(const FirewireBus&) = delete;
@@ -49,7 +54,8 @@ class FirewireBus final : public CameraBus {
   void give_back(FrameSlot slot) noexcept override;
   [[nodiscard]] const std::uint8_t* bytes(FrameSlot slot) const noexcept override;
   [[nodiscard]] std::string complaint() const override { return complaint_; }
-  [[nodiscard]] std::string remark(const StreamShape& shape, double rate_hz, int sharing) const override;
+  [[nodiscard]] std::string remark(const StreamShape& shape, double rate_hz,
+                                   int sharing) const override;
 
  private:
   /// One range of slots and what is mapped for it.
@@ -74,7 +80,8 @@ class FirewireBus final : public CameraBus {
   [[nodiscard]] DeviceStatus failure(HostStamp begun) const noexcept;
   [[nodiscard]] Map& map() noexcept { return maps_[generation_.load(std::memory_order_relaxed)]; }
   [[nodiscard]] FrameSlot slot_of(std::size_t buffer) const noexcept {
-    return static_cast<FrameSlot>(generation_.load(std::memory_order_relaxed) * kMaxBuffers + buffer);
+    return static_cast<FrameSlot>(generation_.load(std::memory_order_relaxed) * kMaxBuffers +
+                                  buffer);
   }
   [[nodiscard]] std::uint64_t kept_in(std::size_t generation) const noexcept {
     return kept_.bits() >> generation * kMaxBuffers & 0xFFFF'FFFFU;

@@ -18,7 +18,8 @@ class FirewireDriver final : public CameraDriver {
     complaint_ = has_firewire() ? "" : "this kernel has no FireWire stack: modprobe firewire-ohci";
     std::vector<DeviceInfo> out;
     for (const FirewireNode& n : list_firewire_cameras())
-      out.push_back({"iidc-1394", guid_text(n.rom.guid), n.rom.model[0] != 0 ? n.rom.model.data() : "IIDC camera", n.device});
+      out.push_back({"iidc-1394", guid_text(n.rom.guid),
+                     n.rom.model[0] != 0 ? n.rom.model.data() : "IIDC camera", n.device});
     return out;
   }
   std::unique_ptr<CameraDevice> open(std::string_view serial, DeviceStatus* status) override {

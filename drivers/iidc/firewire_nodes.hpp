@@ -16,7 +16,8 @@ struct FirewireNode {
 };
 
 /// The cameras on all buses; nothing is opened. `root`: /sys, elsewhere in tests.
-[[nodiscard]] std::vector<FirewireNode> list_firewire_cameras(const std::filesystem::path& root = "/sys");
+[[nodiscard]] std::vector<FirewireNode> list_firewire_cameras(
+    const std::filesystem::path& root = "/sys");
 
 /// Whether the kernel has a FireWire stack at all.
 [[nodiscard]] bool has_firewire(const std::filesystem::path& root = "/sys");

@@ -24,7 +24,8 @@ void FrameReader::begin(const CameraPlan& plan, bool isochronous, SharedClock* c
   clock_ = clock;
 }
 
-FrameReader::Embedded FrameReader::embedded(const std::uint8_t* data, std::size_t bytes) const noexcept {
+FrameReader::Embedded FrameReader::embedded(const std::uint8_t* data,
+                                            std::size_t bytes) const noexcept {
   Embedded e;
   if (bytes < info_.size()) return e;
   const std::span image(data, bytes);
@@ -51,9 +52,12 @@ bool FrameReader::holds_next_frame(const Arrival& arrival, const Embedded& own) 
   if (!isochronous_ || packet == 0 || !info_.has(FrameInfoItem::time)) return false;
   for (std::size_t at = packet; at + info_.size() <= arrival.bytes; at += packet) {
     const Embedded e = embedded(arrival.data + at, arrival.bytes - at);
-    const std::int64_t later = (e.wrapped_ns - own.wrapped_ns + kCycleTimeWrapNs) % kCycleTimeWrapNs;
+    const std::int64_t later =
+        (e.wrapped_ns - own.wrapped_ns + kCycleTimeWrapNs) % kCycleTimeWrapNs;
     // Two quadlets that both fit: pixels do so by chance once in 10¹⁰ packets.
-    if (e.valid && e.counter - own.counter - 1 < kLater && later > 0 && later < kCycleTimeWrapNs / 4) return true;
+    if (e.valid && e.counter - own.counter - 1 < kLater && later > 0 &&
+        later < kCycleTimeWrapNs / 4)
+      return true;
   }
   return false;
 }
@@ -90,12 +94,14 @@ ReadFrame FrameReader::read(const Arrival& arrival) noexcept {
   doubted_ = false;
   f.taken = true;
   f.stray = false;
-  f.status =
-      arrival.broken || arrival.bytes < shape_.image_bytes || holds_next_frame(arrival, e) ? FrameStatus::torn : FrameStatus::complete;
+  f.status = arrival.broken || arrival.bytes < shape_.image_bytes || holds_next_frame(arrival, e)
+                 ? FrameStatus::torn
+                 : FrameStatus::complete;
   if (info_.has(FrameInfoItem::time)) {
     f.exposure_start = DeviceStamp(clock_->unwrap(e.wrapped_ns, arrival.at)) - to_start();
   } else {
-    f.exposure_start = DeviceStamp((arrival.has_bus_stamp ? arrival.bus_stamp : arrival.at).ns()) - exposure_;
+    f.exposure_start =
+        DeviceStamp((arrival.has_bus_stamp ? arrival.bus_stamp : arrival.at).ns()) - exposure_;
   }
   any_ = true;
   last_at_ = arrival.at;
@@ -105,11 +111,13 @@ ReadFrame FrameReader::read(const Arrival& arrival) noexcept {
 ReadFrame FrameReader::count_only(const Arrival& arrival) noexcept {
   ReadFrame f;
   f.taken = true;
-  f.status = arrival.broken || arrival.bytes < shape_.image_bytes ? FrameStatus::torn : FrameStatus::complete;
+  f.status = arrival.broken || arrival.bytes < shape_.image_bytes ? FrameStatus::torn
+                                                                  : FrameStatus::complete;
   const HostStamp stamp = arrival.has_bus_stamp ? arrival.bus_stamp : arrival.at;
   if (any_ && arrival.has_bus_stamp && free_running_ && rate_hz_ > 0) {
     const double periods = (stamp - last_bus_stamp_).to_seconds() * rate_hz_;
-    if (periods > 1.5 && periods < 1e6) f.missing = static_cast<std::uint64_t>(std::llround(periods)) - 1;
+    if (periods > 1.5 && periods < 1e6)
+      f.missing = static_cast<std::uint64_t>(std::llround(periods)) - 1;
   }
   const auto step = static_cast<std::uint32_t>(f.missing + 1);
   f.counter = counter_.take(any_ ? counter_.last() + step : 0);

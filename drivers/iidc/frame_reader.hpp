@@ -9,7 +9,8 @@ namespace vergence::iidc {
 
 /// What one arrival is.
 struct ReadFrame {
-  bool taken = false;  // false: nothing an exposure could be told from; its number, if it had one, shows as a gap
+  bool taken = false;  // false: nothing an exposure could be told from; its number, if it had one,
+                       // shows as a gap
   bool stray = false;  // not taken, and long enough to be a frame: the stream may be out of step
   FrameStatus status = FrameStatus::complete;
   std::uint64_t counter = 0;
@@ -26,10 +27,11 @@ class SharedClock {
 
 /// Reads number, stamp and wholeness out of what the stream brings.
 ///
-/// With embedded information: counter and stamp are the camera's; a number that the time since the last frame cannot explain is not
-/// believed, unless the next one continues it. Without: frames are counted as they come, gaps told from bus stamps if there are any.
-/// A packet lost on an isochronous bus leaves the buffer to be filled by the beginning of the next frame: the stamp of that one stands at
-/// a packet's place inside the image, and is looked for.
+/// With embedded information: counter and stamp are the camera's; a number that the time since the
+/// last frame cannot explain is not believed, unless the next one continues it. Without: frames are
+/// counted as they come, gaps told from bus stamps if there are any. A packet lost on an
+/// isochronous bus leaves the buffer to be filled by the beginning of the next frame: the stamp of
+/// that one stands at a packet's place inside the image, and is looked for.
 /// Threads  One (the stream's), after begin(). Memory: in place. Time: one look per packet.
 class FrameReader {
  public:

@@ -24,8 +24,8 @@ bool GreyConversion::possible() const noexcept {
   }
 }
 
-void to_grey(const GreyConversion& conversion, const std::uint8_t* in, int width, int height, std::uint8_t* out,
-             std::size_t stride) noexcept {
+void to_grey(const GreyConversion& conversion, const std::uint8_t* in, int width, int height,
+             std::uint8_t* out, std::size_t stride) noexcept {
   if (conversion.mosaic) {
     bayer_to_grey(in, width, width, height, out, static_cast<std::ptrdiff_t>(stride));
     return;
@@ -46,14 +46,16 @@ void to_grey(const GreyConversion& conversion, const std::uint8_t* in, int width
         for (int x = 0; x < width; ++x) to[x] = row[2 * x + 1];
         break;
       case ColorCoding::yuv411:  // U Y Y V Y Y
-        for (int x = 0; x < width; ++x) to[x] = row[x / 4 * 6 + (x % 4 < 2 ? 1 + x % 4 : 2 + x % 4)];
+        for (int x = 0; x < width; ++x)
+          to[x] = row[x / 4 * 6 + (x % 4 < 2 ? 1 + x % 4 : 2 + x % 4)];
         break;
       case ColorCoding::yuv444:  // U Y V
         for (int x = 0; x < width; ++x) to[x] = row[3 * x + 1];
         break;
       case ColorCoding::rgb8:
         for (int x = 0; x < width; ++x)
-          to[x] = static_cast<std::uint8_t>((static_cast<unsigned>(row[3 * x]) + 2U * row[3 * x + 1] + row[3 * x + 2] + 2) / 4);
+          to[x] = static_cast<std::uint8_t>(
+              (static_cast<unsigned>(row[3 * x]) + 2U * row[3 * x + 1] + row[3 * x + 2] + 2) / 4);
         break;
       default:
         return;

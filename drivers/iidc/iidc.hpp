@@ -3,15 +3,17 @@
 
 #include "drivers/camera.hpp"
 
-/// FireWire-class industrial cameras (IIDC 1.31), over USB and over IEEE 1394. docs/cameras/iidc_usb.md, docs/cameras/iidc_1394.md
+/// FireWire-class industrial cameras (IIDC 1.31), over USB and over IEEE 1394.
+/// docs/cameras/iidc_usb.md, docs/cameras/iidc_1394.md
 namespace vergence::iidc {
 
-/// Cameras that carry IIDC's registers over USB (Point Grey's Firefly, Chameleon, Flea3, Grasshopper3), through libusb.
+/// Cameras that carry IIDC's registers over USB (Point Grey's Firefly, Chameleon, Flea3,
+/// Grasshopper3), through libusb.
 /// `serial`: GUID in hexadecimal, or the number on the label.
 [[nodiscard]] std::unique_ptr<CameraDriver> make_usb_driver();
 
-/// Cameras on IEEE 1394, through libdc1394 and the kernel's juju stack. Cameras that are opened by one driver and hang on one bus share
-/// its budget of bandwidth and its clock.
+/// Cameras on IEEE 1394, through libdc1394 and the kernel's juju stack. Cameras that are opened by
+/// one driver and hang on one bus share its budget of bandwidth and its clock.
 [[nodiscard]] std::unique_ptr<CameraDriver> make_1394_driver();
 
 }  // namespace vergence::iidc

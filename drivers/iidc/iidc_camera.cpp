@@ -11,7 +11,9 @@ namespace {
 /// A clock that nobody shares.
 class OwnClock final : public SharedClock {
  public:
-  std::int64_t unwrap(std::int64_t wrapped_ns, HostStamp at) noexcept override { return unwrapper_.unwrap(wrapped_ns, at.ns()); }
+  std::int64_t unwrap(std::int64_t wrapped_ns, HostStamp at) noexcept override {
+    return unwrapper_.unwrap(wrapped_ns, at.ns());
+  }
 
  private:
   CycleUnwrapper unwrapper_;
@@ -19,7 +21,8 @@ class OwnClock final : public SharedClock {
 
 }  // namespace
 
-IidcCamera::IidcCamera(std::unique_ptr<CameraBus> bus, const ConfigRom& rom, std::shared_ptr<SharedClock> clock, Duration patience)
+IidcCamera::IidcCamera(std::unique_ptr<CameraBus> bus, const ConfigRom& rom,
+                       std::shared_ptr<SharedClock> clock, Duration patience)
     : bus_(std::move(bus)),
       clock_(clock != nullptr ? std::move(clock) : std::make_shared<OwnClock>()),
       registers_(bus_.get(), rom.command_base, patience) {}
@@ -31,9 +34,11 @@ DeviceStatus IidcCamera::refused(DeviceStatus status, std::string why) {
   return status;
 }
 
-// ---- the owner's thread -------------------------------------------------------------------------------------------
+// ---- the owner's thread
+// -------------------------------------------------------------------------------------------
 
-DeviceStatus IidcCamera::configure(const CameraConfiguration& wanted, CameraConfiguration* actual) noexcept {
+DeviceStatus IidcCamera::configure(const CameraConfiguration& wanted,
+                                   CameraConfiguration* actual) noexcept {
   try {
     return configure_or_throw(wanted, actual);
   } catch (const std::exception&) {  // no memory for the slots, or for a sentence
@@ -41,8 +46,10 @@ DeviceStatus IidcCamera::configure(const CameraConfiguration& wanted, CameraConf
   }
 }
 
-DeviceStatus IidcCamera::configure_or_throw(const CameraConfiguration& wanted, CameraConfiguration* actual) {
-  if (streaming_.load(std::memory_order_acquire)) return refused(DeviceStatus::busy, "it is streaming; stop it first");
+DeviceStatus IidcCamera::configure_or_throw(const CameraConfiguration& wanted,
+                                            CameraConfiguration* actual) {
+  if (streaming_.load(std::memory_order_acquire))
+    return refused(DeviceStatus::busy, "it is streaming; stop it first");
   if (held_.size() != 0) return refused(DeviceStatus::busy, "images of it are still in use");
   drain();
   CameraPlan plan;
@@ -56,7 +63,8 @@ DeviceStatus IidcCamera::configure_or_throw(const CameraConfiguration& wanted, C
   }
   if (status != DeviceStatus::ok) return refused(status, std::move(why));
   if (!plan.grey.none())
-    converted_.allocate(plan.options.buffers, FramePool::stride(plan.size.width) * static_cast<std::size_t>(plan.size.height));
+    converted_.allocate(plan.options.buffers, FramePool::stride(plan.size.width) *
+                                                  static_cast<std::size_t>(plan.size.height));
   plan_ = plan;
   sharing_ = wanted.sharing;
   configured_ = true;
@@ -76,7 +84,9 @@ DeviceStatus IidcCamera::configure_or_throw(const CameraConfiguration& wanted, C
 Duration IidcCamera::transfer_time() const noexcept {
   const BusTraits& bus = bus_->traits();
   if (bus.isochronous)
-    return Duration::seconds(static_cast<double>(packets_for(plan_.shape.frame_bytes, plan_.shape.packet_bytes)) / kCyclesPerSecond);
+    return Duration::seconds(
+        static_cast<double>(packets_for(plan_.shape.frame_bytes, plan_.shape.packet_bytes)) /
+        kCyclesPerSecond);
   return Duration::seconds(static_cast<double>(plan_.shape.image_bytes) / bus.bytes_per_second);
 }
 
@@ -85,7 +95,8 @@ DeviceTiming IidcCamera::timing() const noexcept {
   const BusTraits& bus = bus_->traits();
   t.least_delay = plan_.exposure + transfer_time();
   const bool stamped = plan_.info.has(FrameInfoItem::time);
-  t.resolution = stamped ? Duration::nanoseconds(kCycleNs / kTicksPerCycle + 1) : Duration::nanoseconds(kCycleNs);
+  t.resolution = stamped ? Duration::nanoseconds(kCycleNs / kTicksPerCycle + 1)
+                         : Duration::nanoseconds(kCycleNs);
   if (!stamped && !bus.isochronous) {  // the stamp is the arrival
     t.least_delay = plan_.exposure;
     t.resolution = Duration::milliseconds(1);
@@ -95,7 +106,8 @@ DeviceTiming IidcCamera::timing() const noexcept {
 
 DeviceStatus IidcCamera::start(Notifier* ready) noexcept {
   if (!configured_) return DeviceStatus::bad_configuration;
-  if (streaming_.load(std::memory_order_acquire) && !lost_.load(std::memory_order_acquire)) return DeviceStatus::ok;
+  if (streaming_.load(std::memory_order_acquire) && !lost_.load(std::memory_order_acquire))
+    return DeviceStatus::ok;
   const bool again = streaming_.load(std::memory_order_acquire);
   const std::lock_guard lock(asking_);
   bus_->stop();
@@ -127,8 +139,10 @@ DeviceStatus IidcCamera::begin() {
   }
   CameraPlan plan = plan_;
   DeviceStatus status = apply_plan(&registers_, bus_->traits(), &plan, &why);
-  if (status == DeviceStatus::gone) lost_.store(true, std::memory_order_release);  // unplugged while stopped
-  if (status == DeviceStatus::timeout || status == DeviceStatus::failed || status == DeviceStatus::unsupported) {
+  if (status == DeviceStatus::gone)
+    lost_.store(true, std::memory_order_release);  // unplugged while stopped
+  if (status == DeviceStatus::timeout || status == DeviceStatus::failed ||
+      status == DeviceStatus::unsupported) {
     lost_.store(true, std::memory_order_release);
     status = DeviceStatus::gone;  // it does not answer as it did; asked again, it is opened anew
   }
@@ -155,7 +169,8 @@ DeviceStatus IidcCamera::begin() {
     registers_.transmit(true);
     status = registers_.take_status();
     if (status != DeviceStatus::ok) why = registers_.complaint();
-    if (status == DeviceStatus::timeout || status == DeviceStatus::unsupported) status = DeviceStatus::gone;
+    if (status == DeviceStatus::timeout || status == DeviceStatus::unsupported)
+      status = DeviceStatus::gone;
   } else {
     why = bus_->complaint();
   }
@@ -174,7 +189,8 @@ void IidcCamera::stop() noexcept {
   if (was && !lost_.load(std::memory_order_acquire)) {
     const std::lock_guard lock(asking_);
     registers_.transmit(false);
-    if (registers_.take_status() == DeviceStatus::gone) lost_.store(true, std::memory_order_release);
+    if (registers_.take_status() == DeviceStatus::gone)
+      lost_.store(true, std::memory_order_release);
   }
   if (was) bus_->stop();
   notifier_.store(nullptr, std::memory_order_release);
@@ -198,19 +214,25 @@ DeviceStatus IidcCamera::trigger_once() noexcept {
   return status;
 }
 
-DeviceStatus IidcCamera::set_exposure(const ExposureSetting& wanted, ExposureSetting* actual) noexcept {
+DeviceStatus IidcCamera::set_exposure(const ExposureSetting& wanted,
+                                      ExposureSetting* actual) noexcept {
   if (!streaming_.load(std::memory_order_acquire)) return DeviceStatus::stopped;
   if (lost_.load(std::memory_order_acquire)) return DeviceStatus::gone;
   const std::lock_guard lock(asking_);
-  if (wanted.exposure <= Duration{} || wanted.exposure.to_seconds() * plan_.rate_hz > 1) return DeviceStatus::bad_configuration;
-  const auto nearest = [](const AbsoluteRange& r, double value) { return std::clamp(value, r.least, std::max(r.least, r.most)); };
+  if (wanted.exposure <= Duration{} || wanted.exposure.to_seconds() * plan_.rate_hz > 1)
+    return DeviceStatus::bad_configuration;
+  const auto nearest = [](const AbsoluteRange& r, double value) {
+    return std::clamp(value, r.least, std::max(r.least, r.most));
+  };
   ExposureSetting taken{plan_.exposure, plan_.gain_db};
   if (const AbsoluteRange r = registers_.absolute_range(Feature::shutter); r.present)
-    taken.exposure = Duration::seconds(registers_.set_absolute(Feature::shutter, nearest(r, wanted.exposure.to_seconds())));
+    taken.exposure = Duration::seconds(
+        registers_.set_absolute(Feature::shutter, nearest(r, wanted.exposure.to_seconds())));
   if (const AbsoluteRange r = registers_.absolute_range(Feature::gain); r.present)
     taken.gain_db = registers_.set_absolute(Feature::gain, nearest(r, wanted.gain_db));
   const DeviceStatus status = registers_.take_status();
-  if (status != DeviceStatus::ok) return status == DeviceStatus::gone ? status : DeviceStatus::failed;
+  if (status != DeviceStatus::ok)
+    return status == DeviceStatus::gone ? status : DeviceStatus::failed;
   plan_.exposure = taken.exposure;  // also after a stop or a replug
   plan_.gain_db = taken.gain_db;
   (void)exposures_.change(taken, monotonic_now());
@@ -222,16 +244,19 @@ std::string IidcCamera::remark() const {
   if (!configured_) return {};
   std::string text = bus_->remark(plan_.shape, plan_.rate_hz, sharing_);
   if (!plan_.info.has(FrameInfoItem::counter))
-    text += std::string(text.empty() ? "" : "; ") + "it embeds no counter and no stamp: lost images are told by their times only";
+    text += std::string(text.empty() ? "" : "; ") +
+            "it embeds no counter and no stamp: lost images are told by their times only";
   return text;
 }
 
 CameraStatistics IidcCamera::statistics() const noexcept {
-  return {delivered_.load(std::memory_order_relaxed), torn_.load(std::memory_order_relaxed), underruns_.load(std::memory_order_relaxed),
-          missing_.load(std::memory_order_relaxed), starts_.load(std::memory_order_relaxed)};
+  return {delivered_.load(std::memory_order_relaxed), torn_.load(std::memory_order_relaxed),
+          underruns_.load(std::memory_order_relaxed), missing_.load(std::memory_order_relaxed),
+          starts_.load(std::memory_order_relaxed)};
 }
 
-// ---- the stream's thread ------------------------------------------------------------------------------------------
+// ---- the stream's thread
+// ------------------------------------------------------------------------------------------
 
 bool IidcCamera::frame(const Arrival& arrival) noexcept {
   if (lost_.load(std::memory_order_acquire)) return false;  // nothing follows a `gone`
@@ -246,7 +271,8 @@ bool IidcCamera::frame(const Arrival& arrival) noexcept {
   strays_ = 0;
   missing_.fetch_add(read.missing, std::memory_order_relaxed);
   Delivery d;
-  d.frame = {arrival.slot, read.counter, read.exposure_start, arrival.at, had.exposure, read.status, had.gain_db};
+  d.frame = {arrival.slot, read.counter, read.exposure_start, arrival.at,
+             had.exposure, read.status,  had.gain_db};
   const bool convert = !plan_.grey.none();
   if (convert) {
     const auto slot = converted_.acquire();
@@ -256,7 +282,8 @@ bool IidcCamera::frame(const Arrival& arrival) noexcept {
     }
     d.frame.slot = *slot;
     if (read.status == FrameStatus::complete)
-      to_grey(plan_.grey, arrival.data, plan_.size.width, plan_.size.height, converted_.bytes(*slot), FramePool::stride(plan_.size.width));
+      to_grey(plan_.grey, arrival.data, plan_.size.width, plan_.size.height,
+              converted_.bytes(*slot), FramePool::stride(plan_.size.width));
   } else if (!arrival.spare) {
     underruns_.fetch_add(1, std::memory_order_relaxed);
     return false;
@@ -280,7 +307,8 @@ void IidcCamera::push(const Delivery& delivery) noexcept {
   if (Notifier* n = notifier_.load(std::memory_order_acquire)) n->notify();
 }
 
-// ---- the consumer's thread ----------------------------------------------------------------------------------------
+// ---- the consumer's thread
+// ----------------------------------------------------------------------------------------
 
 DeviceStatus IidcCamera::wait(Duration limit, Frame* frame) noexcept {
   Delivery d;
@@ -290,8 +318,9 @@ DeviceStatus IidcCamera::wait(Duration limit, Frame* frame) noexcept {
     if (gone_.load(std::memory_order_acquire)) return DeviceStatus::gone;
     if (!ready_.pop(&d)) {
       if (limit <= Duration{}) return DeviceStatus::timeout;
-      (void)changed_.wait_for(lock, std::chrono::nanoseconds(limit.ns()),
-                              [this] { return !ready_.empty() || !streaming_.load(std::memory_order_acquire); });
+      (void)changed_.wait_for(lock, std::chrono::nanoseconds(limit.ns()), [this] {
+        return !ready_.empty() || !streaming_.load(std::memory_order_acquire);
+      });
       if (!streaming_.load(std::memory_order_acquire)) return DeviceStatus::stopped;
       if (!ready_.pop(&d)) return DeviceStatus::timeout;
     }
@@ -311,7 +340,8 @@ DeviceStatus IidcCamera::wait(Duration limit, Frame* frame) noexcept {
 ImageView IidcCamera::view(FrameSlot slot) const noexcept {
   const int width = plan_.size.width, height = plan_.size.height;
   if (plan_.grey.none()) return {bus_->bytes(slot), width, height, width};
-  return {converted_.bytes(slot), width, height, static_cast<std::ptrdiff_t>(FramePool::stride(width))};
+  return {converted_.bytes(slot), width, height,
+          static_cast<std::ptrdiff_t>(FramePool::stride(width))};
 }
 
 void IidcCamera::return_slot(FrameSlot slot) noexcept {

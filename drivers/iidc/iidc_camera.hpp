@@ -18,25 +18,31 @@ namespace vergence::iidc {
 
 /// An IIDC camera, whatever it hangs on.
 ///
-/// Contract as drivers/camera.hpp. Slots are the bus's buffers; only modes that are not 8-bit grey are converted, on the stream's thread,
-/// into memory of the camera's own.
-/// Counter   The camera's, where it embeds one: gaps are exposures that never arrived. `lost` counts them as soon as a later one is here.
-/// Stamps    The camera's own clock where it embeds it (on one 1394 bus common to all cameras), else the arrival.
-/// Gone      When the bus says so, or when the stream is out of step for kStrays frames: start() begins anew.
-/// Restart   start() writes all registers again: after a stop or a replug the camera is as configured.
+/// Contract as drivers/camera.hpp. Slots are the bus's buffers; only modes that are not 8-bit grey
+/// are converted, on the stream's thread, into memory of the camera's own.
+/// Counter   The camera's, where it embeds one: gaps are exposures that never arrived. `lost`
+///           counts them as soon as a later one is here.
+/// Stamps    The camera's own clock where it embeds it (on one 1394 bus common to all cameras),
+///           else the arrival.
+/// Gone      When the bus says so, or when the stream is out of step for kStrays frames: start()
+///           begins anew.
+/// Restart   start() writes all registers again: after a stop or a replug the camera is as
+///           configured.
 class IidcCamera final : public CameraDevice, private StreamSink {
  public:
   static constexpr int kStrays = 8;
 
-  /// `rom` of this camera. `clock` null: the camera's clock is its own. `patience`: how long a register may take to become ready.
-  IidcCamera(std::unique_ptr<CameraBus> bus, const ConfigRom& rom, std::shared_ptr<SharedClock> clock,
-             Duration patience = Duration::seconds(1));
+  /// `rom` of this camera. `clock` null: the camera's clock is its own. `patience`: how long a
+  /// register may take to become ready.
+  IidcCamera(std::unique_ptr<CameraBus> bus, const ConfigRom& rom,
+             std::shared_ptr<SharedClock> clock, Duration patience = Duration::seconds(1));
   ~IidcCamera() override;
   IidcCamera(const IidcCamera&) = delete;
   IidcCamera& operator=(const IidcCamera&) = delete;
 
   [[nodiscard]] const DeviceInfo& info() const noexcept override { return bus_->info(); }
-  [[nodiscard]] DeviceStatus configure(const CameraConfiguration& wanted, CameraConfiguration* actual) noexcept override;
+  [[nodiscard]] DeviceStatus configure(const CameraConfiguration& wanted,
+                                       CameraConfiguration* actual) noexcept override;
   [[nodiscard]] DeviceTiming timing() const noexcept override;
   [[nodiscard]] DeviceStatus start(Notifier* ready) noexcept override;
   [[nodiscard]] DeviceStatus wait(Duration limit, Frame* frame) noexcept override;
@@ -44,7 +50,8 @@ class IidcCamera final : public CameraDevice, private StreamSink {
   void release(FrameSlot slot) noexcept override;
   void stop() noexcept override;
   [[nodiscard]] DeviceStatus trigger_once() noexcept override;
-  [[nodiscard]] DeviceStatus set_exposure(const ExposureSetting& wanted, ExposureSetting* actual) noexcept override;
+  [[nodiscard]] DeviceStatus set_exposure(const ExposureSetting& wanted,
+                                          ExposureSetting* actual) noexcept override;
   [[nodiscard]] std::string complaint() const override { return complaint_; }
   [[nodiscard]] std::string remark() const override;
   [[nodiscard]] CameraStatistics statistics() const noexcept override;
@@ -60,7 +67,8 @@ class IidcCamera final : public CameraDevice, private StreamSink {
   [[nodiscard]] bool frame(const Arrival& arrival) noexcept override;
   void gone(HostStamp at) noexcept override;
   void push(const Delivery& delivery) noexcept;
-  [[nodiscard]] DeviceStatus configure_or_throw(const CameraConfiguration& wanted, CameraConfiguration* actual);
+  [[nodiscard]] DeviceStatus configure_or_throw(const CameraConfiguration& wanted,
+                                                CameraConfiguration* actual);
   [[nodiscard]] DeviceStatus begin();
   [[nodiscard]] Duration transfer_time() const noexcept;
   void return_slot(FrameSlot slot) noexcept;
@@ -87,7 +95,7 @@ class IidcCamera final : public CameraDevice, private StreamSink {
   std::atomic<Notifier*> notifier_{nullptr};
   std::atomic<bool> streaming_{false}, gone_{false};  // gone_: wait() has told it
   std::atomic<bool> lost_{false};                     // the device is gone, whether told or not
-  std::mutex mutex_;                                  // of the consumer's end of ready_, and for sleeping
+  std::mutex mutex_;  // of the consumer's end of ready_, and for sleeping
   std::condition_variable changed_;
   std::atomic<std::uint64_t> delivered_{0}, torn_{0}, underruns_{0}, missing_{0}, starts_{0};
 };

@@ -16,9 +16,14 @@ namespace vergence::iidc {
 class SlotSet {
  public:
   /// The first n numbers; n ≤ 64.
-  void fill(std::size_t n) noexcept { bits_.store(n >= 64 ? ~std::uint64_t{0} : (std::uint64_t{1} << n) - 1, std::memory_order_release); }
+  void fill(std::size_t n) noexcept {
+    bits_.store(n >= 64 ? ~std::uint64_t{0} : (std::uint64_t{1} << n) - 1,
+                std::memory_order_release);
+  }
   void clear() noexcept { bits_.store(0, std::memory_order_release); }
-  void put(FrameSlot slot) noexcept { bits_.fetch_or(std::uint64_t{1} << slot, std::memory_order_acq_rel); }
+  void put(FrameSlot slot) noexcept {
+    bits_.fetch_or(std::uint64_t{1} << slot, std::memory_order_acq_rel);
+  }
   /// Takes it out; false: it was not in.
   bool remove(FrameSlot slot) noexcept {
     const std::uint64_t one = std::uint64_t{1} << slot;
@@ -32,9 +37,15 @@ class SlotSet {
         return static_cast<FrameSlot>(std::countr_zero(bits));
     return std::nullopt;
   }
-  [[nodiscard]] std::uint64_t take_all() noexcept { return bits_.exchange(0, std::memory_order_acq_rel); }
-  [[nodiscard]] std::uint64_t bits() const noexcept { return bits_.load(std::memory_order_acquire); }
-  [[nodiscard]] std::size_t size() const noexcept { return static_cast<std::size_t>(std::popcount(bits())); }
+  [[nodiscard]] std::uint64_t take_all() noexcept {
+    return bits_.exchange(0, std::memory_order_acq_rel);
+  }
+  [[nodiscard]] std::uint64_t bits() const noexcept {
+    return bits_.load(std::memory_order_acquire);
+  }
+  [[nodiscard]] std::size_t size() const noexcept {
+    return static_cast<std::size_t>(std::popcount(bits()));
+  }
 
  private:
   std::atomic<std::uint64_t> bits_{0};
@@ -42,8 +53,8 @@ class SlotSet {
 
 /// Buffers of one size, page aligned, that are slots.
 ///
-/// Ownership  acquire() makes a slot the caller's, until release(). Threads  acquire, release, bytes: any.
-/// Memory     All of it at allocate(); neither lock nor system call afterwards.
+/// Ownership  acquire() makes a slot the caller's, until release(). Threads  acquire, release,
+/// bytes: any. Memory     All of it at allocate(); neither lock nor system call afterwards.
 class SlotMemory {
  public:
   /// Throws std::bad_alloc. Precondition: 0 < slots ≤ FramePool::kMaxSlots; none is out.
@@ -57,7 +68,9 @@ class SlotMemory {
   }
   [[nodiscard]] std::optional<FrameSlot> acquire() noexcept { return free_.take(); }
   void release(FrameSlot slot) noexcept { free_.put(slot); }
-  [[nodiscard]] std::uint8_t* bytes(FrameSlot slot) const noexcept { return reinterpret_cast<std::uint8_t*>(memory_.get()) + slot * each_; }
+  [[nodiscard]] std::uint8_t* bytes(FrameSlot slot) const noexcept {
+    return reinterpret_cast<std::uint8_t*>(memory_.get()) + slot * each_;
+  }
 
  private:
   static constexpr std::size_t kPage = 4096;

@@ -16,14 +16,16 @@
 namespace vergence::iidc {
 namespace {
 
-constexpr int kMostErrors = 8;                  // transfers in a row that failed: the device is given up
+constexpr int kMostErrors = 8;  // transfers in a row that failed: the device is given up
 constexpr std::size_t kSuperSpeedBlock = 1024;  // transfers of USB 3 are whole packets of this size
 
 }  // namespace
 
-// ---- opening -------------------------------------------------------------------------------------------------------
+// ---- opening
+// -------------------------------------------------------------------------------------------------------
 
-std::unique_ptr<UsbBus> UsbBus::open(std::string_view wanted, DeviceStatus* status, std::string* complaint) {
+std::unique_ptr<UsbBus> UsbBus::open(std::string_view wanted, DeviceStatus* status,
+                                     std::string* complaint) {
   std::unique_ptr<UsbBus> bus(new UsbBus);
   *status = bus->open_device(wanted);
   if (*status == DeviceStatus::ok) return bus;
@@ -33,7 +35,8 @@ std::unique_ptr<UsbBus> UsbBus::open(std::string_view wanted, DeviceStatus* stat
 
 DeviceStatus UsbBus::open_device(std::string_view wanted) {
   complaint_.clear();
-  // A context of its own: libusb's list of devices is as old as its context where no udev daemon tells it of new ones.
+  // A context of its own: libusb's list of devices is as old as its context where no udev daemon
+  // tells it of new ones.
   if (libusb_init(&context_) != LIBUSB_SUCCESS) {
     context_ = nullptr;
     complaint_ = kNoUsb;
@@ -42,7 +45,8 @@ DeviceStatus UsbBus::open_device(std::string_view wanted) {
   DeviceStatus status = DeviceStatus::not_found;
   const bool listed = for_each_usb_camera(context_, &complaint_, [&](FoundUsbCamera* found) {
     if (found->handle == nullptr) {  // it may have been the one
-      if (status == DeviceStatus::not_found && found->who.access == DeviceStatus::no_permission) status = found->who.access;
+      if (status == DeviceStatus::not_found && found->who.access == DeviceStatus::no_permission)
+        status = found->who.access;
       return false;
     }
     if (!names_camera(wanted, found->who.guid, found->who.transport_serial)) return false;
@@ -52,7 +56,8 @@ DeviceStatus UsbBus::open_device(std::string_view wanted) {
     info_ = found->who.info;
     rom_ = found->rom;
     const bool super = libusb_get_device_speed(found->device) >= LIBUSB_SPEED_SUPER;
-    traits_ = {false, BusSpeed::s800, super ? std::size_t{65532} : largest_packet(BusSpeed::s800), super ? 400e6 : 53e6};
+    traits_ = {false, BusSpeed::s800, super ? std::size_t{65532} : largest_packet(BusSpeed::s800),
+               super ? 400e6 : 53e6};
     complaint_.clear();
     return true;
   });
@@ -64,7 +69,8 @@ DeviceStatus UsbBus::open_device(std::string_view wanted) {
 DeviceStatus UsbBus::claim(libusb_device_handle* handle) {
   int active = 0;
   // Setting the configuration that is active already would reset what another program does with it.
-  if (libusb_get_configuration(handle, &active) == LIBUSB_SUCCESS && active != 1) (void)libusb_set_configuration(handle, 1);
+  if (libusb_get_configuration(handle, &active) == LIBUSB_SUCCESS && active != 1)
+    (void)libusb_set_configuration(handle, 1);
   libusb_config_descriptor* config = nullptr;
   if (libusb_get_active_config_descriptor(libusb_get_device(handle), &config) != LIBUSB_SUCCESS) {
     complaint_ = "its USB configuration cannot be read";
@@ -76,19 +82,23 @@ DeviceStatus UsbBus::claim(libusb_device_handle* handle) {
     if (config->interface[i].num_altsetting < 1) continue;
     const libusb_interface_descriptor& alt = config->interface[i].altsetting[0];
     for (int e = 0; e < alt.bNumEndpoints; ++e)
-      if (alt.endpoint[e].bEndpointAddress == kImages && (alt.endpoint[e].bmAttributes & 3) == LIBUSB_TRANSFER_TYPE_BULK) {
+      if (alt.endpoint[e].bEndpointAddress == kImages &&
+          (alt.endpoint[e].bmAttributes & 3) == LIBUSB_TRANSFER_TYPE_BULK) {
         interface_ = alt.bInterfaceNumber;
         endpoint_ = kImages;
       }
   }
   libusb_free_config_descriptor(config);
   if (interface_ < 0) {
-    complaint_ = "it has no bulk endpoint 0x81 for images: not an IIDC camera, or a USB3 Vision one (driver gige's library reads those)";
+    complaint_ =
+        "it has no bulk endpoint 0x81 for images: not an IIDC camera, or a USB3 Vision one (driver "
+        "gige's library reads those)";
     return DeviceStatus::failed;
   }
   const int error = libusb_claim_interface(handle, interface_);
   if (error == LIBUSB_SUCCESS) return DeviceStatus::ok;
-  complaint_ = error == LIBUSB_ERROR_BUSY ? "another program has claimed it" : libusb_strerror(static_cast<libusb_error>(error));
+  complaint_ = error == LIBUSB_ERROR_BUSY ? "another program has claimed it"
+                                          : libusb_strerror(static_cast<libusb_error>(error));
   return usb_status(error);
 }
 
@@ -124,7 +134,9 @@ DeviceStatus UsbBus::reopen() noexcept {
     if (status != DeviceStatus::ok) {
       if (complaint_.empty()) complaint_ = "the camera is not plugged in";
       info_.serial = mine;
-      return status == DeviceStatus::no_permission || status == DeviceStatus::busy ? status : DeviceStatus::gone;
+      return status == DeviceStatus::no_permission || status == DeviceStatus::busy
+                 ? status
+                 : DeviceStatus::gone;
     }
     lost_.store(false, std::memory_order_release);
     return status;
@@ -133,7 +145,8 @@ DeviceStatus UsbBus::reopen() noexcept {
   }
 }
 
-// ---- registers ----------------------------------------------------------------------------------------------------
+// ---- registers
+// ----------------------------------------------------------------------------------------------------
 
 DeviceStatus UsbBus::read(std::uint64_t address, std::uint32_t* value) noexcept {
   return handle_ == nullptr ? DeviceStatus::gone : read_usb_quadlet(handle_, address, value);
@@ -143,13 +156,16 @@ DeviceStatus UsbBus::write(std::uint64_t address, std::uint32_t value) noexcept 
   return handle_ == nullptr ? DeviceStatus::gone : write_usb_quadlet(handle_, address, value);
 }
 
-// ---- streaming ----------------------------------------------------------------------------------------------------
+// ---- streaming
+// ----------------------------------------------------------------------------------------------------
 
 DeviceStatus UsbBus::allocate(const StreamShape& shape) noexcept {
   try {
     const bool super = traits_.largest_packet > largest_packet(BusSpeed::s800);
     // USB 3 sends the image, USB 2 the packets with their padding.
-    transfer_bytes_ = super ? (shape.image_bytes + kSuperSpeedBlock - 1) / kSuperSpeedBlock * kSuperSpeedBlock : shape.frame_bytes;
+    transfer_bytes_ =
+        super ? (shape.image_bytes + kSuperSpeedBlock - 1) / kSuperSpeedBlock * kSuperSpeedBlock
+              : shape.frame_bytes;
     drop_memory();
     memory_ = std::make_unique<SlotMemory>();
     memory_->allocate(shape.buffers, transfer_bytes_);
@@ -163,8 +179,9 @@ DeviceStatus UsbBus::allocate(const StreamShape& shape) noexcept {
 }
 
 int UsbBus::submit(Flight* flight) noexcept {
-  libusb_fill_bulk_transfer(flight->transfer, handle_, endpoint_, memory_->bytes(flight->slot), static_cast<int>(transfer_bytes_),
-                            &UsbBus::on_transfer, flight, 0);  // no limit: a camera may be silent, cancelling ends it
+  libusb_fill_bulk_transfer(flight->transfer, handle_, endpoint_, memory_->bytes(flight->slot),
+                            static_cast<int>(transfer_bytes_), &UsbBus::on_transfer, flight,
+                            0);  // no limit: a camera may be silent, cancelling ends it
   flying_.fetch_add(1, std::memory_order_acq_rel);
   flight->flying = true;
   const int error = libusb_submit_transfer(flight->transfer);
@@ -205,7 +222,8 @@ DeviceStatus UsbBus::start(StreamSink* sink) noexcept {
   if (error == LIBUSB_ERROR_NO_DEVICE) return DeviceStatus::gone;
   complaint_ = error == LIBUSB_ERROR_OTHER
                    ? "no thread for its stream"
-                   : "the kernel takes no more USB memory, or its images are all in use: raise the limit, which is 16 MB for all devices, "
+                   : "the kernel takes no more USB memory, or its images are all in use: raise the "
+                     "limit, which is 16 MB for all devices, "
                      "with echo 256 > /sys/module/usbcore/parameters/usbfs_memory_mb";
   return error == LIBUSB_ERROR_OTHER ? DeviceStatus::failed : DeviceStatus::no_bandwidth;
 }
@@ -215,7 +233,8 @@ void UsbBus::on_transfer(libusb_transfer* transfer) {
   flight->bus->completed(flight);
 }
 
-/// A transfer has come back. One that is not sent again keeps its slot until stop(): the owner may be cancelling it at this moment.
+/// A transfer has come back. One that is not sent again keeps its slot until stop(): the owner may
+/// be cancelling it at this moment.
 void UsbBus::completed(Flight* flight) noexcept {
   bool again = !stopping_.load(std::memory_order_acquire) && !lost_.load(std::memory_order_acquire);
   if (again) {
@@ -265,7 +284,8 @@ void UsbBus::land(Flight* flight) noexcept {
 }
 
 void UsbBus::lose() noexcept {
-  if (lost_.exchange(true, std::memory_order_acq_rel) || stopping_.load(std::memory_order_acquire)) return;
+  if (lost_.exchange(true, std::memory_order_acq_rel) || stopping_.load(std::memory_order_acquire))
+    return;
   sink_->gone(monotonic_now());
 }
 
@@ -275,14 +295,17 @@ void UsbBus::handle_events() noexcept {
     timeval limit{0, 100'000};
     const int error = libusb_handle_events_timeout_completed(context_, &limit, nullptr);
     if (error == LIBUSB_ERROR_NO_DEVICE) lose();
-    if (stopping_.load(std::memory_order_acquire) && error != LIBUSB_SUCCESS && error != LIBUSB_ERROR_INTERRUPTED) break;
+    if (stopping_.load(std::memory_order_acquire) && error != LIBUSB_SUCCESS &&
+        error != LIBUSB_ERROR_INTERRUPTED)
+      break;
   }
 }
 
 void UsbBus::stop() noexcept {
   stopping_.store(true, std::memory_order_release);
   const HostStamp end = monotonic_now() + kCancelLimit;
-  // Asked again while some fly: a transfer may have been between its callback and its next submission.
+  // Asked again while some fly: a transfer may have been between its callback and its next
+  // submission.
   while (flying_.load(std::memory_order_acquire) > 0 && monotonic_now() < end) {
     for (Flight& f : flights_)
       if (f.transfer != nullptr) (void)libusb_cancel_transfer(f.transfer);
@@ -290,7 +313,8 @@ void UsbBus::stop() noexcept {
     (void)libusb_handle_events_timeout_completed(context_, &limit, nullptr);
   }
   if (flying_.load(std::memory_order_acquire) > 0) {
-    given_up_ = true;  // the host controller does not give them back: their memory stays for as long as the program runs
+    given_up_ = true;  // the host controller does not give them back: their memory stays for as
+                       // long as the program runs
     flying_.store(0, std::memory_order_release);
   }
   if (context_ != nullptr && thread_.joinable()) libusb_interrupt_event_handler(context_);
@@ -302,26 +326,29 @@ void UsbBus::stop() noexcept {
 
 std::string UsbBus::remark(const StreamShape& shape, double rate_hz, int sharing) const {
   std::string out;
-  const double need = static_cast<double>(shape.frame_bytes) * rate_hz * sharing, have = traits_.bytes_per_second * kUsbPractical;
+  const double need = static_cast<double>(shape.frame_bytes) * rate_hz * sharing,
+               have = traits_.bytes_per_second * kUsbPractical;
   std::array<char, 220> text{};
   if (need > have) {
-    (void)std::snprintf(
-        text.data(), text.size(),
-        "%d cameras of %.1f MB/s each are %.1f MB/s, one USB controller carries about %.0f: give each its own, or lower the rate", sharing,
-        static_cast<double>(shape.frame_bytes) * rate_hz / 1e6, need / 1e6, have / 1e6);
+    (void)std::snprintf(text.data(), text.size(),
+                        "%d cameras of %.1f MB/s each are %.1f MB/s, one USB controller carries "
+                        "about %.0f: give each its own, or lower the rate",
+                        sharing, static_cast<double>(shape.frame_bytes) * rate_hz / 1e6, need / 1e6,
+                        have / 1e6);
     out = text.data();
   }
-  const double megabytes = static_cast<double>(kTransfers * shape.frame_bytes) * sharing / 1048576.0;
+  const double megabytes =
+      static_cast<double>(kTransfers * shape.frame_bytes) * sharing / 1048576.0;
   int limit = 0;
   if (std::FILE* f = std::fopen("/sys/module/usbcore/parameters/usbfs_memory_mb", "r")) {
     if (std::fscanf(f, "%d", &limit) != 1) limit = 0;
     (void)std::fclose(f);
   }
   if (limit > 0 && megabytes > limit) {
-    (void)std::snprintf(
-        text.data(), text.size(),
-        "%d cameras need %.0f MB of USB memory, the kernel gives %d: echo %d > /sys/module/usbcore/parameters/usbfs_memory_mb", sharing,
-        megabytes, limit, static_cast<int>(megabytes * 2) + 1);
+    (void)std::snprintf(text.data(), text.size(),
+                        "%d cameras need %.0f MB of USB memory, the kernel gives %d: echo %d > "
+                        "/sys/module/usbcore/parameters/usbfs_memory_mb",
+                        sharing, megabytes, limit, static_cast<int>(megabytes * 2) + 1);
     out += (out.empty() ? "" : "; ") + std::string(text.data());
   }
   return out;

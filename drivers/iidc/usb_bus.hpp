@@ -17,23 +17,28 @@ namespace vergence::iidc {
 
 /// An IIDC camera on USB.
 ///
-/// Registers  Control requests, kUsbRegisterLimit at most each. Stream: kTransfers bulk transfers of a whole frame each, straight into the
+/// Registers  Control requests, kUsbRegisterLimit at most each. Stream: kTransfers bulk transfers
+///            of a whole frame each, straight into the
 /// slots;
-///            a full slot is replaced by a free one in the same callback, so the camera never waits for us. A short or empty packet ends a
-///            frame.
-/// Threads    A thread handles libusb's events between start() and stop(). Arrivals are stamped in its callbacks; while a register is
-///            accessed the owner's thread may run one in its place, never at the same time.
-/// Stop       Transfers are cancelled, and waited for until each has come back, at most kCancelLimit; those that have not are given up
-///            with their memory, never freed under the kernel's hands.
-/// Unplug     Seen by the transfers' ends. reopen() looks with a context of its own each time: it needs no hot-plug events, which
-///            containers and small systems do not have.
+///            a full slot is replaced by a free one in the same callback, so the camera never waits
+///            for us. A short or empty packet ends a frame.
+/// Threads    A thread handles libusb's events between start() and stop(). Arrivals are stamped in
+///            its callbacks; while a register is accessed the owner's thread may run one in its
+///            place, never at the same time.
+/// Stop       Transfers are cancelled, and waited for until each has come back, at most
+///            kCancelLimit; those that have not are given up with their memory, never freed under
+///            the kernel's hands.
+/// Unplug     Seen by the transfers' ends. reopen() looks with a context of its own each time: it
+///            needs no hot-plug events, which containers and small systems do not have.
 class UsbBus final : public CameraBus {
  public:
-  static constexpr std::size_t kTransfers = 4;  // 130 ms at 30 Hz: longer than any scheduling hold-up seen
+  static constexpr std::size_t kTransfers =
+      4;  // 130 ms at 30 Hz: longer than any scheduling hold-up seen
   static constexpr Duration kCancelLimit = Duration::seconds(2);
 
   /// `wanted` as names_camera(). Null: *status and *complaint say why.
-  [[nodiscard]] static std::unique_ptr<UsbBus> open(std::string_view wanted, DeviceStatus* status, std::string* complaint);
+  [[nodiscard]] static std::unique_ptr<UsbBus> open(std::string_view wanted, DeviceStatus* status,
+                                                    std::string* complaint);
   ~UsbBus() override;
   UsbBus(const UsbBus&) = delete;
   UsbBus& operator=(const UsbBus&) = delete;
@@ -48,9 +53,12 @@ class UsbBus final : public CameraBus {
   void stop() noexcept override;
   [[nodiscard]] DeviceStatus reopen() noexcept override;
   void give_back(FrameSlot slot) noexcept override { memory_->release(slot); }
-  [[nodiscard]] const std::uint8_t* bytes(FrameSlot slot) const noexcept override { return memory_->bytes(slot); }
+  [[nodiscard]] const std::uint8_t* bytes(FrameSlot slot) const noexcept override {
+    return memory_->bytes(slot);
+  }
   [[nodiscard]] std::string complaint() const override { return complaint_; }
-  [[nodiscard]] std::string remark(const StreamShape& shape, double rate_hz, int sharing) const override;
+  [[nodiscard]] std::string remark(const StreamShape& shape, double rate_hz,
+                                   int sharing) const override;
 
  private:
   struct Flight {

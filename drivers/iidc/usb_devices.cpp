@@ -17,9 +17,10 @@ struct Product {
   const char* name;
 };
 constexpr std::array kProducts{
-    Product{0x2000, "Firefly MV"},   Product{0x2001, "Firefly MV"}, Product{0x2002, "Firefly MV"}, Product{0x2003, "Firefly MV"},
-    Product{0x2004, "Chameleon"},    Product{0x2005, "Chameleon"},  Product{0x3000, "Flea3"},      Product{0x3005, "Flea3"},
-    Product{0x3006, "Flea3"},        Product{0x3008, "Flea3"},      Product{0x300A, "Flea3"},      Product{0x300B, "Flea3"},
+    Product{0x2000, "Firefly MV"},   Product{0x2001, "Firefly MV"}, Product{0x2002, "Firefly MV"},
+    Product{0x2003, "Firefly MV"},   Product{0x2004, "Chameleon"},  Product{0x2005, "Chameleon"},
+    Product{0x3000, "Flea3"},        Product{0x3005, "Flea3"},      Product{0x3006, "Flea3"},
+    Product{0x3008, "Flea3"},        Product{0x300A, "Flea3"},      Product{0x300B, "Flea3"},
     Product{0x3103, "Grasshopper3"}, Product{0x3300, "Flea3"},      Product{0x3800, "Ladybug5"},
 };
 
@@ -36,13 +37,15 @@ const Product* product_of(const libusb_device_descriptor& d) noexcept {
 
 std::string place_of(libusb_device* device) {
   std::array<char, 32> text{};
-  (void)std::snprintf(text.data(), text.size(), "usb %03d/%03d", libusb_get_bus_number(device), libusb_get_device_address(device));
+  (void)std::snprintf(text.data(), text.size(), "usb %03d/%03d", libusb_get_bus_number(device),
+                      libusb_get_device_address(device));
   return text.data();
 }
 
 std::string node_of(libusb_device* device) {
   std::array<char, 48> text{};
-  (void)std::snprintf(text.data(), text.size(), "/dev/bus/usb/%03d/%03d", libusb_get_bus_number(device), libusb_get_device_address(device));
+  (void)std::snprintf(text.data(), text.size(), "/dev/bus/usb/%03d/%03d",
+                      libusb_get_bus_number(device), libusb_get_device_address(device));
   return text.data();
 }
 
@@ -50,15 +53,20 @@ std::string node_of(libusb_device* device) {
 class HandlePort final : public RegisterPort {
  public:
   explicit HandlePort(libusb_device_handle* handle) : handle_(handle) {}
-  DeviceStatus read(std::uint64_t address, std::uint32_t* value) noexcept override { return read_usb_quadlet(handle_, address, value); }
-  DeviceStatus write(std::uint64_t, std::uint32_t) noexcept override { return DeviceStatus::unsupported; }
+  DeviceStatus read(std::uint64_t address, std::uint32_t* value) noexcept override {
+    return read_usb_quadlet(handle_, address, value);
+  }
+  DeviceStatus write(std::uint64_t, std::uint32_t) noexcept override {
+    return DeviceStatus::unsupported;
+  }
 
  private:
   libusb_device_handle* handle_;
 };
 
 /// Opens a device and asks who it is.
-FoundUsbCamera ask(libusb_device* device, const libusb_device_descriptor& d, const Product& product, std::string* complaint) {
+FoundUsbCamera ask(libusb_device* device, const libusb_device_descriptor& d, const Product& product,
+                   std::string* complaint) {
   FoundUsbCamera found;
   found.device = device;
   UsbCandidate& who = found.who;
@@ -67,13 +75,14 @@ FoundUsbCamera ask(libusb_device* device, const libusb_device_descriptor& d, con
   if (error != LIBUSB_SUCCESS) {
     who.access = usb_status(error);
     if (who.access == DeviceStatus::no_permission)
-      *complaint =
-          "no permission to open " + node_of(device) + ": install the udev rules (vergence devices --write-udev) and plug it in again";
+      *complaint = "no permission to open " + node_of(device) +
+                   ": install the udev rules (vergence devices --write-udev) and plug it in again";
     return found;
   }
   std::array<unsigned char, 64> text{};
   if (d.iSerialNumber != 0) {
-    const int n = libusb_get_string_descriptor_ascii(found.handle, d.iSerialNumber, text.data(), static_cast<int>(text.size()));
+    const int n = libusb_get_string_descriptor_ascii(found.handle, d.iSerialNumber, text.data(),
+                                                     static_cast<int>(text.size()));
     if (n > 0) who.transport_serial.assign(text.begin(), text.begin() + n);
   }
   HandlePort port(found.handle);
@@ -113,27 +122,33 @@ DeviceStatus usb_status(int libusb_error) noexcept {
   }
 }
 
-DeviceStatus read_usb_quadlet(libusb_device_handle* handle, std::uint64_t address, std::uint32_t* value) noexcept {
+DeviceStatus read_usb_quadlet(libusb_device_handle* handle, std::uint64_t address,
+                              std::uint32_t* value) noexcept {
   std::array<unsigned char, 4> b{};
-  const int got = libusb_control_transfer(handle, kReadRequest, kQuadlets, static_cast<std::uint16_t>(address & 0xFFFF),
-                                          static_cast<std::uint16_t>(address >> 16U & 0xFFFF), b.data(), b.size(), limit_ms());
+  const int got = libusb_control_transfer(
+      handle, kReadRequest, kQuadlets, static_cast<std::uint16_t>(address & 0xFFFF),
+      static_cast<std::uint16_t>(address >> 16U & 0xFFFF), b.data(), b.size(), limit_ms());
   if (got < 0) return usb_status(got);
   if (got != static_cast<int>(b.size())) return DeviceStatus::failed;
-  *value = static_cast<std::uint32_t>(b[0]) | static_cast<std::uint32_t>(b[1]) << 8U | static_cast<std::uint32_t>(b[2]) << 16U |
-           static_cast<std::uint32_t>(b[3]) << 24U;
+  *value = static_cast<std::uint32_t>(b[0]) | static_cast<std::uint32_t>(b[1]) << 8U |
+           static_cast<std::uint32_t>(b[2]) << 16U | static_cast<std::uint32_t>(b[3]) << 24U;
   return DeviceStatus::ok;
 }
 
-DeviceStatus write_usb_quadlet(libusb_device_handle* handle, std::uint64_t address, std::uint32_t value) noexcept {
-  std::array<unsigned char, 4> b{static_cast<unsigned char>(value), static_cast<unsigned char>(value >> 8U),
-                                 static_cast<unsigned char>(value >> 16U), static_cast<unsigned char>(value >> 24U)};
-  const int sent = libusb_control_transfer(handle, kWriteRequest, kQuadlets, static_cast<std::uint16_t>(address & 0xFFFF),
-                                           static_cast<std::uint16_t>(address >> 16U & 0xFFFF), b.data(), b.size(), limit_ms());
+DeviceStatus write_usb_quadlet(libusb_device_handle* handle, std::uint64_t address,
+                               std::uint32_t value) noexcept {
+  std::array<unsigned char, 4> b{
+      static_cast<unsigned char>(value), static_cast<unsigned char>(value >> 8U),
+      static_cast<unsigned char>(value >> 16U), static_cast<unsigned char>(value >> 24U)};
+  const int sent = libusb_control_transfer(
+      handle, kWriteRequest, kQuadlets, static_cast<std::uint16_t>(address & 0xFFFF),
+      static_cast<std::uint16_t>(address >> 16U & 0xFFFF), b.data(), b.size(), limit_ms());
   if (sent < 0) return usb_status(sent);
   return sent == static_cast<int>(b.size()) ? DeviceStatus::ok : DeviceStatus::failed;
 }
 
-bool for_each_usb_camera(libusb_context* context, std::string* complaint, const std::function<bool(FoundUsbCamera*)>& look) {
+bool for_each_usb_camera(libusb_context* context, std::string* complaint,
+                         const std::function<bool(FoundUsbCamera*)>& look) {
   libusb_device** list = nullptr;
   const ssize_t n = libusb_get_device_list(context, &list);
   if (n < 0) {
@@ -166,9 +181,11 @@ std::vector<UsbCandidate> find_usb_cameras(std::string* complaint) {
     return false;
   });
   libusb_exit(context);
-  // By GUID, those that do not tell theirs last: the order in which ports were found changes from one start to the next.
-  std::sort(all.begin(), all.end(),
-            [](const UsbCandidate& a, const UsbCandidate& b) { return std::pair(a.guid == 0, a.guid) < std::pair(b.guid == 0, b.guid); });
+  // By GUID, those that do not tell theirs last: the order in which ports were found changes from
+  // one start to the next.
+  std::sort(all.begin(), all.end(), [](const UsbCandidate& a, const UsbCandidate& b) {
+    return std::pair(a.guid == 0, a.guid) < std::pair(b.guid == 0, b.guid);
+  });
   return all;
 }
 

@@ -32,13 +32,17 @@ struct FoundUsbCamera {
   libusb_device* device = nullptr;
   libusb_device_handle* handle = nullptr;
 };
-/// Opens each in turn and calls back; true ends it. Whoever does not take the handle (sets it to null) has it closed.
+/// Opens each in turn and calls back; true ends it. Whoever does not take the handle (sets it to
+/// null) has it closed.
 /// False: the system's devices cannot be listed.
-bool for_each_usb_camera(libusb_context* context, std::string* complaint, const std::function<bool(FoundUsbCamera*)>& look);
+bool for_each_usb_camera(libusb_context* context, std::string* complaint,
+                         const std::function<bool(FoundUsbCamera*)>& look);
 
 [[nodiscard]] DeviceStatus usb_status(int libusb_error) noexcept;
-[[nodiscard]] DeviceStatus read_usb_quadlet(libusb_device_handle* handle, std::uint64_t address, std::uint32_t* value) noexcept;
-[[nodiscard]] DeviceStatus write_usb_quadlet(libusb_device_handle* handle, std::uint64_t address, std::uint32_t value) noexcept;
+[[nodiscard]] DeviceStatus read_usb_quadlet(libusb_device_handle* handle, std::uint64_t address,
+                                            std::uint32_t* value) noexcept;
+[[nodiscard]] DeviceStatus write_usb_quadlet(libusb_device_handle* handle, std::uint64_t address,
+                                             std::uint32_t value) noexcept;
 
 inline constexpr const char* kNoUsb = "the system's USB devices cannot be listed";
 

@@ -44,8 +44,10 @@ struct Fault {
   Duration at{};              // since the drive's start
   Duration duration{};        // zero: to the end
   int camera = -1;            // −1: every camera
-  Vec3 turn = Vec3::Zero();   // rad about the camera's x (pitch), y (yaw), z (roll); of occluder: z alone, about the vertical
-  Vec3 shift = Vec3::Zero();  // m along the camera's x, y, z; of position_jump: east, north, up; of occluder: ahead, to the left, 0
+  Vec3 turn = Vec3::Zero();   // rad about the camera's x (pitch), y (yaw), z (roll); of occluder: z
+                              // alone, about the vertical
+  Vec3 shift = Vec3::Zero();  // m along the camera's x, y, z; of position_jump: east, north, up; of
+                              // occluder: ahead, to the left, 0
   double speed = 0;           // m/s, along its own length, relative to the vehicle
   double factor = 1;          // of the brightness
   double share = 0;           // of the frames, 0..1
@@ -54,7 +56,9 @@ struct Fault {
   int pulses = 0;             // one after the other
   bool powered = false;       // it has a supply of its own
 
-  [[nodiscard]] bool active(Duration time) const noexcept { return time >= at && (duration <= Duration{} || time < at + duration); }
+  [[nodiscard]] bool active(Duration time) const noexcept {
+    return time >= at && (duration <= Duration{} || time < at + duration);
+  }
   [[nodiscard]] bool concerns(int k) const noexcept { return camera < 0 || camera == k; }
 };
 
@@ -76,8 +80,10 @@ struct FaultRow {
 [[nodiscard]] std::span<const FaultRow> fault_rows() noexcept;
 [[nodiscard]] std::string_view to_string(FaultKind) noexcept;
 
-/// A fault from its kind, time in seconds and parameters. Throws std::invalid_argument: half a sentence about what is wrong.
-[[nodiscard]] Fault make_fault(const std::string& kind, double at_s, const std::vector<std::pair<std::string, double>>& parameters);
+/// A fault from its kind, time in seconds and parameters. Throws std::invalid_argument: half a
+/// sentence about what is wrong.
+[[nodiscard]] Fault make_fault(const std::string& kind, double at_s,
+                               const std::vector<std::pair<std::string, double>>& parameters);
 
 /// `knock@42 camera=1 pitch_deg=0.2`. Throws as make_fault().
 [[nodiscard]] Fault parse_fault(std::string_view text);

@@ -67,9 +67,10 @@ InsSample InsModel::sample(std::uint64_t number, Duration time) {
     s.tilt_sigma = s.heading_sigma = 1e-5;
   }
   std::vector<double> rotation(9);  // v_enu = M · v_local, row-major
-  plane_.Reverse(T_enu_ins.t.x(), T_enu_ins.t.y(), T_enu_ins.t.z(), s.position.latitude_deg, s.position.longitude_deg, s.position.height_m,
-                 rotation);
-  const Mat3 R_enu_local = Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(rotation.data());
+  plane_.Reverse(T_enu_ins.t.x(), T_enu_ins.t.y(), T_enu_ins.t.z(), s.position.latitude_deg,
+                 s.position.longitude_deg, s.position.height_m, rotation);
+  const Mat3 R_enu_local =
+      Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(rotation.data());
   const Eigen::Quaterniond q = quaternion(R_enu_local.transpose() * T_enu_ins.R);
   s.q_enu_ins = {q.x(), q.y(), q.z(), q.w()};
   const Vec3 local = R_enu_local.transpose() * velocity;

@@ -18,12 +18,14 @@ struct InsModelOptions {
   double rate_hz = 120;
 };
 
-/// An INS of the MTi-G's class: each error is a first-order Gauss–Markov process, as slow as the real thing's.
+/// An INS of the MTi-G's class: each error is a first-order Gauss–Markov process, as slow as the
+/// real thing's.
 ///
 ///   position  2.5 m CEP (2.12 m each axis), height 4 m, wandering over 60 s
 ///   velocity  0.1 m/s each axis over 5 s
 ///   attitude  roll and pitch 0.5° over 30 s, heading 1° over 60 s
-/// Ideal: no errors at all. Geodetic coordinates from the exact tangent plane at kWorldOrigin, attitude in the axes at the place itself.
+/// Ideal: no errors at all. Geodetic coordinates from the exact tangent plane at kWorldOrigin,
+/// attitude in the axes at the place itself.
 /// Threads  One caller; samples in order of their numbers.
 class InsModel {
  public:

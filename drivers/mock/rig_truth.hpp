@@ -10,14 +10,16 @@
 
 namespace vergence::mock {
 
-/// Where everything on the vehicle truly is at a time of the drive: the drive's spline, the mounts, and the faults that move them.
+/// Where everything on the vehicle truly is at a time of the drive: the drive's spline, the mounts,
+/// and the faults that move them.
 ///
 /// Threads  Const after construction. Time: since the drive's start.
 class RigTruth {
  public:
-  /// `rig`: as mounted, before any fault. p_body = T_body_left · p_left, p_body = T_body_ins · p_ins.
-  RigTruth(std::shared_ptr<const World> world, const DriveOptions& drive, const RigCalibration& rig, const Transform& T_body_left,
-           const Transform& T_body_ins, std::vector<Fault> faults);
+  /// `rig`: as mounted, before any fault. p_body = T_body_left · p_left, p_body = T_body_ins ·
+  /// p_ins.
+  RigTruth(std::shared_ptr<const World> world, const DriveOptions& drive, const RigCalibration& rig,
+           const Transform& T_body_left, const Transform& T_body_ins, std::vector<Fault> faults);
 
   [[nodiscard]] const World& world() const noexcept { return *world_; }
   [[nodiscard]] std::shared_ptr<const World> shared_world() const noexcept { return world_; }
@@ -32,9 +34,11 @@ class RigTruth {
     return drive_.at(time).T_enu_body * camera_on_body(camera, time);
   }
   /// p_enu = T · p_ins.
-  [[nodiscard]] Transform ins_in_enu(Duration time) const noexcept { return drive_.at(time).T_enu_body * T_body_ins_; }
-  /// p_enu = T · p_bus (x forward, y left, z up, the middle of its floor): the bus that is in the way then, if one is. It stands level on
-  /// the ground.
+  [[nodiscard]] Transform ins_in_enu(Duration time) const noexcept {
+    return drive_.at(time).T_enu_body * T_body_ins_;
+  }
+  /// p_enu = T · p_bus (x forward, y left, z up, the middle of its floor): the bus that is in the
+  /// way then, if one is. It stands level on the ground.
   [[nodiscard]] std::optional<Transform> bus_in_enu(Duration time) const noexcept;
   /// The rig's calibration as it truly is then.
   [[nodiscard]] RigCalibration calibration(Duration time) const noexcept;

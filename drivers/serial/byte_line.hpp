@@ -20,26 +20,34 @@ struct LineSettings {
 struct LineRead {
   DeviceStatus status = DeviceStatus::timeout;
   std::size_t size = 0;  // bytes; 0 unless ok
-  HostStamp arrival{};   // ok: when the LAST of these bytes was here, never earlier than it was; gone: when that was noticed
+  HostStamp arrival{};   // ok: when the LAST of these bytes was here, never earlier than it was;
+                         // gone: when that was noticed
 };
 
-/// An open line to a device that sends and takes bytes: a serial port, a plain tty, a pipe in the process, a simulator.
+/// An open line to a device that sends and takes bytes: a serial port, a plain tty, a pipe in the
+/// process, a simulator.
 ///
-/// Ownership  One owner, who closes it by destruction; closing does not wait for bytes that a dead device will never take.
-/// Threads    read and write: one thread each, the same or two. wake: any. The rest: while no read or write runs.
+/// Ownership  One owner, who closes it by destruction; closing does not wait for bytes that a dead
+///            device will never take.
+/// Threads    read and write: one thread each, the same or two. wake: any. The rest: while no read
+///            or write runs.
 /// Memory     read, write and wake do not allocate.
-/// Time       `arrival` and now() are of the host's monotonic clock, or of the virtual one that a simulator keeps. All limits are of that
-///            clock: a driver that reckons in now() runs the same in virtual time. No call outlasts its limit but for the scheduler.
+/// Time       `arrival` and now() are of the host's monotonic clock, or of the virtual one that a
+///            simulator keeps. All limits are of that
+///            clock: a driver that reckons in now() runs the same in virtual time. No call outlasts
+///            its limit but for the scheduler.
 /// Errors     Nothing throws. `gone` stays: close it and open another.
 class ByteLine {
  public:
   virtual ~ByteLine() = default;
 
-  /// What is there, at least a byte, waiting at most `limit` for the first (0: look once). Precondition: `out` is not empty.
+  /// What is there, at least a byte, waiting at most `limit` for the first (0: look once).
+  /// Precondition: `out` is not empty.
   /// → ok, timeout, stopped (woken), ended (a simulation is at its end), gone, failed
   [[nodiscard]] virtual LineRead read(std::span<std::uint8_t> out, Duration limit) noexcept = 0;
   /// All of `bytes`, or not ok: some may have gone out. → ok, timeout, gone, failed
-  [[nodiscard]] virtual DeviceStatus write(std::span<const std::uint8_t> bytes, Duration limit) noexcept = 0;
+  [[nodiscard]] virtual DeviceStatus write(std::span<const std::uint8_t> bytes,
+                                           Duration limit) noexcept = 0;
   /// Discards what waits to be read, at the old baud and the new. → ok, unsupported, gone
   [[nodiscard]] virtual DeviceStatus set_baud(std::uint32_t baud) noexcept = 0;
   [[nodiscard]] virtual std::uint32_t baud() const noexcept = 0;
@@ -49,19 +57,23 @@ class ByteLine {
   [[nodiscard]] virtual HostStamp now() const noexcept = 0;
 };
 
-/// A place where a line can be opened, as often as needed: the device may have been unplugged in between.
+/// A place where a line can be opened, as often as needed: the device may have been unplugged in
+/// between.
 ///
 /// Threads  One caller. Memory: ordinary.
 class LinePlace {
  public:
   virtual ~LinePlace() = default;
   /// Null: *status says why. → ok, not_found, no_permission, busy, unsupported, failed
-  [[nodiscard]] virtual std::unique_ptr<ByteLine> open(const LineSettings& settings, DeviceStatus* status) = 0;
+  [[nodiscard]] virtual std::unique_ptr<ByteLine> open(const LineSettings& settings,
+                                                       DeviceStatus* status) = 0;
   /// For sentences: `/dev/ttyUSB0`, `pipe`, …
   [[nodiscard]] virtual std::string name() const = 0;
-  /// How long a chip between device and host may hold bytes back (latency timer of a USB converter); 0: it does not, or is not known.
+  /// How long a chip between device and host may hold bytes back (latency timer of a USB
+  /// converter); 0: it does not, or is not known.
   [[nodiscard]] virtual Duration latency_timer() const { return {}; }
-  /// For a simulation in virtual time: lets so much of it pass, with no line open. False: time is real, the caller waits by itself.
+  /// For a simulation in virtual time: lets so much of it pass, with no line open. False: time is
+  /// real, the caller waits by itself.
   [[nodiscard]] virtual bool pass(Duration /*time*/) { return false; }
 };
 

@@ -29,7 +29,8 @@ struct Shared {
 
 class PipeEnd final : public ByteLine {
  public:
-  PipeEnd(std::shared_ptr<Shared> shared, std::size_t reads) : shared_(std::move(shared)), reads_(reads) {}
+  PipeEnd(std::shared_ptr<Shared> shared, std::size_t reads)
+      : shared_(std::move(shared)), reads_(reads) {}
   PipeEnd(const PipeEnd&) = delete;
   PipeEnd& operator=(const PipeEnd&) = delete;
   ~PipeEnd() override {
@@ -47,7 +48,8 @@ class PipeEnd final : public ByteLine {
       in().woken = false;
       return {DeviceStatus::stopped, 0, {}};
     }
-    if (in().size == 0) return {in().closed ? DeviceStatus::gone : DeviceStatus::timeout, 0, monotonic_now()};
+    if (in().size == 0)
+      return {in().closed ? DeviceStatus::gone : DeviceStatus::timeout, 0, monotonic_now()};
     const std::size_t n = std::min(to.size(), in().size);
     for (std::size_t i = 0; i < n; ++i) to[i] = in().bytes[(in().head + i) % kPipeBytes];
     in().head = (in().head + n) % kPipeBytes;
@@ -59,9 +61,11 @@ class PipeEnd final : public ByteLine {
   DeviceStatus write(std::span<const std::uint8_t> bytes, Duration limit) noexcept override {
     std::unique_lock lock(shared_->mutex);
     const auto fits = [&] { return out().refused || kPipeBytes - out().size >= bytes.size(); };
-    if (!shared_->changed.wait_for(lock, std::chrono::nanoseconds(limit.ns()), fits)) return DeviceStatus::timeout;
+    if (!shared_->changed.wait_for(lock, std::chrono::nanoseconds(limit.ns()), fits))
+      return DeviceStatus::timeout;
     if (out().refused) return DeviceStatus::gone;
-    for (std::size_t i = 0; i < bytes.size(); ++i) out().bytes[(out().head + out().size + i) % kPipeBytes] = bytes[i];
+    for (std::size_t i = 0; i < bytes.size(); ++i)
+      out().bytes[(out().head + out().size + i) % kPipeBytes] = bytes[i];
     out().size += bytes.size();
     out().newest = monotonic_now();
     shared_->changed.notify_all();

@@ -24,7 +24,8 @@ timespec left_until(HostStamp deadline) noexcept {
 }  // namespace
 
 void UniqueFd::reset(int fd) noexcept {
-  if (fd_ >= 0) (void)::close(fd_);  // nothing can be done about a failure: the descriptor is free either way
+  if (fd_ >= 0)
+    (void)::close(fd_);  // nothing can be done about a failure: the descriptor is free either way
   fd_ = fd;
 }
 
@@ -34,22 +35,28 @@ void PortCloser::operator()(sp_port* port) const noexcept {
 }
 
 DeviceStatus set_port(sp_port* port, const LineSettings& settings) noexcept {
-  if (::sp_set_baudrate(port, static_cast<int>(settings.baud)) != SP_OK || ::sp_set_bits(port, 8) != SP_OK ||
-      ::sp_set_parity(port, SP_PARITY_NONE) != SP_OK || ::sp_set_stopbits(port, settings.stop_bits) != SP_OK ||
+  if (::sp_set_baudrate(port, static_cast<int>(settings.baud)) != SP_OK ||
+      ::sp_set_bits(port, 8) != SP_OK || ::sp_set_parity(port, SP_PARITY_NONE) != SP_OK ||
+      ::sp_set_stopbits(port, settings.stop_bits) != SP_OK ||
       ::sp_set_flowcontrol(port, SP_FLOWCONTROL_NONE) != SP_OK)
     return ::sp_input_waiting(port) < 0 ? DeviceStatus::gone : DeviceStatus::unsupported;
   // The library reports success for a speed that the driver rounded away.
   sp_port_config* config = nullptr;
   if (::sp_new_config(&config) != SP_OK) return DeviceStatus::failed;
   int baud = 0;
-  const bool read_back = ::sp_get_config(port, config) == SP_OK && ::sp_get_config_baudrate(config, &baud) == SP_OK;
+  const bool read_back =
+      ::sp_get_config(port, config) == SP_OK && ::sp_get_config_baudrate(config, &baud) == SP_OK;
   ::sp_free_config(config);
   const double error = static_cast<double>(baud) / static_cast<double>(settings.baud) - 1;
   return read_back && error < 0.03 && error > -0.03 ? DeviceStatus::ok : DeviceStatus::unsupported;
 }
 
 FdLine::FdLine(UniquePort port, UniqueFd tty, UniqueFd wake, const LineSettings& settings) noexcept
-    : port_(std::move(port)), tty_(std::move(tty)), wake_(std::move(wake)), fd_(tty_.get()), settings_(settings) {
+    : port_(std::move(port)),
+      tty_(std::move(tty)),
+      wake_(std::move(wake)),
+      fd_(tty_.get()),
+      settings_(settings) {
   if (port_) (void)::sp_get_port_handle(port_.get(), &fd_);
 }
 
@@ -73,12 +80,15 @@ LineRead FdLine::read(std::span<std::uint8_t> out, Duration limit) noexcept {
     }
     if (n > 0 && fds[0].revents != 0) {
       const ssize_t got = ::read(fd_, out.data(), out.size());
-      // After the read: bytes that came while it was on its way would else have arrived before they were sent.
+      // After the read: bytes that came while it was on its way would else have arrived before they
+      // were sent.
       const HostStamp arrival = monotonic_now();
       if (got > 0) return {DeviceStatus::ok, static_cast<std::size_t>(got), arrival};
-      const bool nothing_yet = got < 0 && (errno == EAGAIN || errno == EWOULDBLOCK || errno == EINTR);
+      const bool nothing_yet =
+          got < 0 && (errno == EAGAIN || errno == EWOULDBLOCK || errno == EINTR);
       // A wake-up for nothing to read is a hang-up: the converter is unplugged.
-      if (!nothing_yet || (fds[0].revents & (POLLHUP | POLLERR | POLLNVAL)) != 0) return {DeviceStatus::gone, 0, arrival};
+      if (!nothing_yet || (fds[0].revents & (POLLHUP | POLLERR | POLLNVAL)) != 0)
+        return {DeviceStatus::gone, 0, arrival};
     }
     if (monotonic_now() >= deadline) return {DeviceStatus::timeout, 0, {}};
   }
@@ -92,7 +102,8 @@ DeviceStatus FdLine::write(std::span<const std::uint8_t> bytes, Duration limit) 
       bytes = bytes.subspan(static_cast<std::size_t>(put));
       continue;
     }
-    if (put < 0 && errno != EAGAIN && errno != EWOULDBLOCK && errno != EINTR) return DeviceStatus::gone;
+    if (put < 0 && errno != EAGAIN && errno != EWOULDBLOCK && errno != EINTR)
+      return DeviceStatus::gone;
     pollfd p{fd_, POLLOUT, 0};
     const timespec left = left_until(deadline);
     const int n = ::ppoll(&p, 1, &left, nullptr);

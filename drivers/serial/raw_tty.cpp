@@ -1,4 +1,5 @@
-// Alone in its file: <asm/termbits.h>, which has the speeds outside the table, and <termios.h> exclude each other.
+// Alone in its file: <asm/termbits.h>, which has the speeds outside the table, and <termios.h>
+// exclude each other.
 #include <asm/termbits.h>
 #include <sys/ioctl.h>
 

@@ -29,7 +29,9 @@ fs::path resolved(const std::string& port) {
 
 bool known_to_library(const fs::path& real) {
   std::error_code error;
-  return real.parent_path() == "/dev" && fs::exists(fs::path("/sys/class/tty") / real.filename(), error) && real.filename() != "tty";
+  return real.parent_path() == "/dev" &&
+         fs::exists(fs::path("/sys/class/tty") / real.filename(), error) &&
+         real.filename() != "tty";
 }
 
 DeviceStatus status_of(int system_error) noexcept {
@@ -69,14 +71,17 @@ SerialPortInfo info_of(const sp_port* port) {
   return info;
 }
 
-/// The line is ours alone: TIOCEXCL keeps others out, the lock also those with the rights to ignore that.
+/// The line is ours alone: TIOCEXCL keeps others out, the lock also those with the rights to ignore
+/// that.
 DeviceStatus hold(int fd) noexcept {
-  if (::flock(fd, LOCK_EX | LOCK_NB) != 0) return errno == EWOULDBLOCK ? DeviceStatus::busy : status_of(errno);
+  if (::flock(fd, LOCK_EX | LOCK_NB) != 0)
+    return errno == EWOULDBLOCK ? DeviceStatus::busy : status_of(errno);
   return ::ioctl(fd, TIOCEXCL) == 0 ? DeviceStatus::ok : status_of(errno);
 }
 
 /// What the library opens, or a plain tty. Not ok: both empty.
-DeviceStatus open_tty(const fs::path& real, const LineSettings& settings, UniquePort* port, UniqueFd* tty) {
+DeviceStatus open_tty(const fs::path& real, const LineSettings& settings, UniquePort* port,
+                      UniqueFd* tty) {
   if (known_to_library(real)) {
     sp_port* found = nullptr;
     if (::sp_get_port_by_name(real.c_str(), &found) != SP_OK) return DeviceStatus::not_found;
@@ -111,7 +116,8 @@ std::vector<SerialPortInfo> list_serial_ports() {
 }
 
 std::optional<int> read_latency_timer_ms(const std::string& port) {
-  std::ifstream file(fs::path("/sys/class/tty") / resolved(port).filename() / "device/latency_timer");
+  std::ifstream file(fs::path("/sys/class/tty") / resolved(port).filename() /
+                     "device/latency_timer");
   int ms = 0;
   if (!(file >> ms) || ms < 1 || ms > 255) return std::nullopt;
   return ms;

@@ -22,21 +22,25 @@ struct SerialPortInfo {
 /// Ports that are there now.
 [[nodiscard]] std::vector<SerialPortInfo> list_serial_ports();
 
-/// Latency timer of the FTDI converter behind a port (`/dev/ttyUSB0` or a link to it); nothing: no such chip.
+/// Latency timer of the FTDI converter behind a port (`/dev/ttyUSB0` or a link to it); nothing: no
+/// such chip.
 [[nodiscard]] std::optional<int> read_latency_timer_ms(const std::string& port);
 
-/// A serial port by its name, a link to it (/dev/serial/by-id/…), or a plain tty (a pseudo-terminal).
+/// A serial port by its name, a link to it (/dev/serial/by-id/…), or a plain tty (a
+/// pseudo-terminal).
 ///
-/// Real ports are opened and set through libserialport, which refuses links and pseudo-terminals: links are resolved, the others are opened
-/// as ttys. Reading waits in poll(): the library's own waiting reads spin after an unplug.
-/// A port on USB is remembered by the converter's serial number from its first opening: a device that comes back as ttyUSB1 is found.
-/// The port is held exclusively; a second opening is `busy`.
+/// Real ports are opened and set through libserialport, which refuses links and pseudo-terminals:
+/// links are resolved, the others are opened as ttys. Reading waits in poll(): the library's own
+/// waiting reads spin after an unplug. A port on USB is remembered by the converter's serial number
+/// from its first opening: a device that comes back as ttyUSB1 is found. The port is held
+/// exclusively; a second opening is `busy`.
 /// Threads  One caller. Memory: ordinary; the lines as ByteLine says.
 class SerialPort final : public LinePlace {
  public:
   explicit SerialPort(std::string port) : port_(std::move(port)) {}
 
-  [[nodiscard]] std::unique_ptr<ByteLine> open(const LineSettings& settings, DeviceStatus* status) override;
+  [[nodiscard]] std::unique_ptr<ByteLine> open(const LineSettings& settings,
+                                               DeviceStatus* status) override;
   [[nodiscard]] std::string name() const override { return port_; }
   [[nodiscard]] Duration latency_timer() const override;
 

@@ -37,7 +37,8 @@ void ClockMapper::begin(DeviceStamp device, HostStamp host) noexcept {
   pairs_ = 0;
 }
 
-/// Doubles hold nanoseconds of a hundred days; the origin follows, by a whole number of bins, so that no stamp moves.
+/// Doubles hold nanoseconds of a hundred days; the origin follows, by a whole number of bins, so
+/// that no stamp moves.
 void ClockMapper::anchor_near(DeviceStamp device) noexcept {
   constexpr std::int64_t kFar = 1'000'000;  // bins: twelve days
   const std::int64_t bins = (device - origin_).ns() / kBin.ns();
@@ -66,7 +67,8 @@ bool ClockMapper::take(Points* points, const Point& p, double side) const noexce
   if (points->count > 0 && bin <= points->newest_bin) {
     // Compared along the line, so that drift inside the bin does not decide.
     Point& held = points->at[points->count - 1];
-    if (side * ((p.delay - slope_ * p.device) - (held.delay - slope_ * held.device)) >= 0) return false;
+    if (side * ((p.delay - slope_ * p.device) - (held.delay - slope_ * held.device)) >= 0)
+      return false;
     held = p;
     return true;
   }
@@ -74,8 +76,8 @@ bool ClockMapper::take(Points* points, const Point& p, double side) const noexce
   std::size_t old = points->count == kBins ? 1 : 0;
   while (old < points->count && p.device - points->at[old].device > kStale) ++old;
   if (old > 0) {
-    std::move(points->at.begin() + static_cast<std::ptrdiff_t>(old), points->at.begin() + static_cast<std::ptrdiff_t>(points->count),
-              points->at.begin());
+    std::move(points->at.begin() + static_cast<std::ptrdiff_t>(old),
+              points->at.begin() + static_cast<std::ptrdiff_t>(points->count), points->at.begin());
     points->count -= old;
   }
   points->at[points->count++] = p;
@@ -98,7 +100,9 @@ MappedStamp ClockMapper::begin_one_way(DeviceStamp device, HostStamp arrival) no
 
 MappedStamp ClockMapper::map(DeviceStamp device, HostStamp arrival) noexcept {
   if (two_way_)
-    return absurd(device, origin_) ? MappedStamp{arrival - options_.least_delay, options_.delay_spread + options_.stall} : at(device);
+    return absurd(device, origin_)
+               ? MappedStamp{arrival - options_.least_delay, options_.delay_spread + options_.stall}
+               : at(device);
   const HostStamp host = arrival - options_.least_delay;
   if (!known()) return begin_one_way(device, arrival);
   if (far_off(device, host)) {
@@ -116,7 +120,8 @@ MappedStamp ClockMapper::map(DeviceStamp device, HostStamp arrival) noexcept {
     return begin_one_way(device, arrival);
   }
   if (above > in_ns(options_.stall) || p.device < newest - 2 * in_ns(kBin)) {
-    // A stall or a clock set back: which, the next ones tell. Until then the arrival is the better witness, within the stall.
+    // A stall or a clock set back: which, the next ones tell. Until then the arrival is the better
+    // witness, within the stall.
     if (++behind_ >= kBehind) {
       ++resets_;
       return begin_one_way(device, arrival);
@@ -143,7 +148,9 @@ void ClockMapper::fit_one_way() noexcept {
   std::array<std::size_t, kBins> hull{};
   std::size_t n = 0;
   const auto below = [&](const Point& a, const Point& b, const Point& c) {
-    return (b.device - a.device) * (c.delay - a.delay) - (b.delay - a.delay) * (c.device - a.device) <= 0;
+    return (b.device - a.device) * (c.delay - a.delay) -
+               (b.delay - a.delay) * (c.device - a.device) <=
+           0;
   };
   for (std::size_t i = 0; i < count; ++i) {
     while (n >= 2 && below(points[hull[n - 2]], points[hull[n - 1]], points[i])) --n;
@@ -157,14 +164,17 @@ void ClockMapper::fit_one_way() noexcept {
   }
   slope_ = std::clamp(slope_, -options_.drift_bound, options_.drift_bound);
   intercept_ = points[0].delay - slope_ * points[0].device;
-  for (std::size_t i = 1; i < count; ++i) intercept_ = std::min(intercept_, points[i].delay - slope_ * points[i].device);
+  for (std::size_t i = 1; i < count; ++i)
+    intercept_ = std::min(intercept_, points[i].delay - slope_ * points[i].device);
   worst_ = 0;
-  for (std::size_t i = 0; i < count; ++i) worst_ = std::max(worst_, points[i].delay - line(points[i].device));
+  for (std::size_t i = 0; i < count; ++i)
+    worst_ = std::max(worst_, points[i].delay - line(points[i].device));
 }
 
 // ---- two ways ----
 
-void ClockMapper::begin_two_way(HostStamp t1, DeviceStamp t2, DeviceStamp t3, HostStamp t4) noexcept {
+void ClockMapper::begin_two_way(HostStamp t1, DeviceStamp t2, DeviceStamp t3,
+                                HostStamp t4) noexcept {
   begin(t2, t1 + ((t4 - t1) - (t3 - t2)) / 2);
   two_way_ = true;
   (void)take(&lower_, point(t2, t1), -1);
@@ -185,10 +195,12 @@ void ClockMapper::ping(HostStamp t1, DeviceStamp t2, DeviceStamp t3, HostStamp t
   anchor_near(t2);
   const Point early = point(t2, t1), late = point(t3, t4);
   const double newest = upper_.at[upper_.count - 1].device;
-  // Both bounds are hard, so a clock that was set shows at once, forward and back; what is less, the room between the bounds tells.
+  // Both bounds are hard, so a clock that was set shows at once, forward and back; what is less,
+  // the room between the bounds tells.
   const double silent = std::max(0.0, late.device - newest);
   const double margin = in_ns(options_.jump) + 2 * options_.drift_bound * silent;
-  const bool stepped = late.delay < line(late.device) - margin || early.delay > line(early.device) + margin;
+  const bool stepped =
+      late.delay < line(late.device) - margin || early.delay > line(early.device) + margin;
   if (stepped || late.device < newest - 2 * in_ns(kBin)) {
     ++resets_;
     return begin_two_way(t1, t2, t3, t4);
@@ -197,18 +209,21 @@ void ClockMapper::ping(HostStamp t1, DeviceStamp t2, DeviceStamp t3, HostStamp t
   const bool raised = take(&lower_, early, -1), lowered = take(&upper_, late, 1);
   if (!raised && !lowered) return;
   fit_two_way();
-  constexpr double kBent = 100e3;  // ns, more than a crystal's rate bends the line within the window
+  constexpr double kBent =
+      100e3;  // ns, more than a crystal's rate bends the line within the window
   if (room_ < -(kBent + slack)) {
     ++resets_;
     begin_two_way(t1, t2, t3, t4);
   }
 }
 
-/// The slope b with the most room between parallel lines under all upper and above all lower points. The room, min(U − b·x) − max(L − b·x),
-/// is concave in b; its derivative is the place of the lower line's support less that of the upper line's.
+/// The slope b with the most room between parallel lines under all upper and above all lower
+/// points. The room, min(U − b·x) − max(L − b·x), is concave in b; its derivative is the place of
+/// the lower line's support less that of the upper line's.
 void ClockMapper::fit_two_way() noexcept {
-  constexpr int kHalvings = 40;    // of the drift bound: 1e-16
-  constexpr double kEnough = 2e9;  // ns, a window shorter than that says more of the noise than of the rate
+  constexpr int kHalvings = 40;  // of the drift bound: 1e-16
+  constexpr double kEnough =
+      2e9;  // ns, a window shorter than that says more of the noise than of the rate
   const auto support = [](const Points& points, double slope, double side) {
     std::size_t best = 0;
     for (std::size_t i = 1; i < points.count; ++i) {
@@ -231,17 +246,21 @@ void ClockMapper::fit_two_way() noexcept {
   bound_two_way();
 }
 
-/// The farthest that a line within the bounds may be from the one chosen, at the newest point, and in slope.
+/// The farthest that a line within the bounds may be from the one chosen, at the newest point, and
+/// in slope.
 void ClockMapper::bound_two_way() noexcept {
-  const double at = std::max(upper_.at[upper_.count - 1].device, lower_.at[lower_.count - 1].device);
-  // Of true − chosen: at most `over` at an upper point, at least −over at a lower one; its slope is what the drift bound leaves.
+  const double at =
+      std::max(upper_.at[upper_.count - 1].device, lower_.at[lower_.count - 1].device);
+  // Of true − chosen: at most `over` at an upper point, at least −over at a lower one; its slope is
+  // what the drift bound leaves.
   double rise = options_.drift_bound - slope_, fall = options_.drift_bound + slope_;
   for (std::size_t i = 0; i < lower_.count; ++i) {
     const Point& l = lower_.at[i];
     const double below = std::max(0.0, line(l.device) - l.delay);
     for (std::size_t j = 0; j < upper_.count; ++j) {
       const Point& u = upper_.at[j];
-      const double apart = u.device - l.device, turn = (std::max(0.0, u.delay - line(u.device)) + below) / std::abs(apart);
+      const double apart = u.device - l.device,
+                   turn = (std::max(0.0, u.delay - line(u.device)) + below) / std::abs(apart);
       if (apart > 0) rise = std::min(rise, turn);
       if (apart < 0) fall = std::min(fall, turn);
     }
@@ -270,10 +289,12 @@ Duration ClockMapper::error_at(double device) const noexcept {
   if (two_way_) {
     constexpr double kBend = 2e-8 * 1e-9;  // 1/ns: a crystal's rate changes by 1 ppm a minute
     const double at = std::max(newest.device, lower_.at[lower_.count - 1].device);
-    return options_.resolution + rounded(farthest_ + turn_ * std::abs(device - at) + kBend * span * span / 8);
+    return options_.resolution +
+           rounded(farthest_ + turn_ * std::abs(device - at) + kBend * span * span / 8);
   }
   const double spread = in_ns(options_.delay_spread);
-  // The two ends of the hull's edge may each be late by what other bins are above the line, or by as much as is usual while there are few.
+  // The two ends of the hull's edge may each be late by what other bins are above the line, or by
+  // as much as is usual while there are few.
   constexpr std::size_t kEnough = 8;
   const double few = spread * std::max(1.0, kTail / static_cast<double>(pairs_));
   const double late = upper_.count < kEnough ? few : std::min(spread, 2 * worst_);

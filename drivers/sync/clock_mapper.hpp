@@ -8,12 +8,16 @@
 namespace vergence {
 
 struct ClockMapperOptions {
-  Duration least_delay{};                             // from measurement to arrival at best, as the transport states it
-  Duration delay_spread = Duration::milliseconds(2);  // by how much a delay exceeds it on average: the error bound while little is known
-  Duration resolution = Duration::microseconds(1);    // of the device's stamps
-  double drift_bound = 200e-6;                        // |rate − 1| of the device's clock against the host's, crystals keep 100 ppm
-  Duration jump = Duration::milliseconds(20);         // a stamp that far ahead of what is possible is a clock that was set
-  Duration stall = Duration::milliseconds(500);       // one that far behind is a stall, or such a clock after kBehind of them
+  Duration least_delay{};  // from measurement to arrival at best, as the transport states it
+  Duration delay_spread = Duration::milliseconds(
+      2);  // by how much a delay exceeds it on average: the error bound while little is known
+  Duration resolution = Duration::microseconds(1);  // of the device's stamps
+  double drift_bound =
+      200e-6;  // |rate − 1| of the device's clock against the host's, crystals keep 100 ppm
+  Duration jump = Duration::milliseconds(
+      20);  // a stamp that far ahead of what is possible is a clock that was set
+  Duration stall = Duration::milliseconds(
+      500);  // one that far behind is a stall, or such a clock after kBehind of them
 };
 
 /// A stamp on the host's clock.
@@ -22,29 +26,38 @@ struct MappedStamp {
   Duration error{};  // |true − host| is below this
 };
 
-/// Ties a device's clock to the host's: offset and drift, from pairs of device stamp and arrival, or from questions and answers.
+/// Ties a device's clock to the host's: offset and drift, from pairs of device stamp and arrival,
+/// or from questions and answers.
 ///
-/// One way    Arrivals are late, never early: the line under all points (host − device against device) is the clock. Every kBin of device
-///            time keeps its least-delayed pair, kBins of them are held; the line is the edge of their lower convex hull under the mean,
-///            its slope held within the drift bound. What the least delay of the way truly is nobody can see one way: by what the
-///            stated one (`least_delay`) is wrong, all stamps are, beyond the bound.
-/// Two ways   A question puts the line above a point, its answer below one. Of the slopes the one is taken that leaves the most room
-///            between those bounds, and the line in the middle of it: right where both ways are alike at their best. The error bound holds
-///            for any least delays, also unlike ones: it is the farthest that a line may be which keeps to all bounds (a linear
-///            programme of two unknowns), plus what the rate may change within the window.
-/// Threads    One caller. Memory: fixed. Time: constant a call; a call that tightens a bound takes at most kBins² steps.
-/// Units      Integer nanoseconds in and out; doubles only for differences within the window: exact whatever the clocks' origins are, and
-///            however long they run.
+/// One way    Arrivals are late, never early: the line under all points (host − device against
+///            device) is the clock. Every kBin of device time keeps its least-delayed pair, kBins
+///            of them are held; the line is the edge of their lower convex hull under the mean, its
+///            slope held within the drift bound. What the least delay of the way truly is nobody
+///            can see one way: by what the stated one (`least_delay`) is wrong, all stamps are,
+///            beyond the bound.
+/// Two ways   A question puts the line above a point, its answer below one. Of the slopes the one
+///            is taken that leaves the most room between those bounds, and the line in the middle
+///            of it: right where both ways are alike at their best. The error bound holds for any
+///            least delays, also unlike ones: it is the farthest that a line may be which keeps to
+///            all bounds (a linear programme of two unknowns), plus what the rate may change within
+///            the window.
+/// Threads    One caller. Memory: fixed. Time: constant a call; a call that tightens a bound takes
+///            at most kBins² steps.
+/// Units      Integer nanoseconds in and out; doubles only for differences within the window: exact
+///            whatever the clocks' origins are, and however long they run.
 /// Errors     None. A clock that was set begins a new fit (`resets`).
 class ClockMapper {
  public:
   explicit ClockMapper(const ClockMapperOptions& options) noexcept : options_(options) {}
 
-  /// Takes a pair into the fit and says when the device measured. Pairs in the order of the device's stamps.
+  /// Takes a pair into the fit and says when the device measured. Pairs in the order of the
+  /// device's stamps.
   [[nodiscard]] MappedStamp map(DeviceStamp device, HostStamp arrival) noexcept;
-  /// Takes a question and its answer into the fit: the host sent at t1, the device received at t2 and answered at t3, the host received
-  /// at t4. In the order of the device's stamps. From the first one on map() takes nothing in any more, it only says what the fit does.
-  /// A ping that took less time here than there (t4 − t1 < t3 − t2, but for the drift), or less than none, is not believed.
+  /// Takes a question and its answer into the fit: the host sent at t1, the device received at t2
+  /// and answered at t3, the host received at t4. In the order of the device's stamps. From the
+  /// first one on map() takes nothing in any more, it only says what the fit does. A ping that took
+  /// less time here than there (t4 − t1 < t3 − t2, but for the drift), or less than none, is not
+  /// believed.
   void ping(HostStamp t1, DeviceStamp t2, DeviceStamp t3, HostStamp t4) noexcept;
   /// The host's time of any stamp, without taking anything in. Precondition: known().
   [[nodiscard]] MappedStamp at(DeviceStamp device) const noexcept;
@@ -58,14 +71,17 @@ class ClockMapper {
   void restart() noexcept;
 
  private:
-  static constexpr std::size_t kBins = 64;  // of kBin: a minute, over which a crystal's rate holds to 1e-8
+  static constexpr std::size_t kBins =
+      64;  // of kBin: a minute, over which a crystal's rate holds to 1e-8
   static constexpr Duration kBin = Duration::seconds(1);
-  static constexpr int kBehind = 3;    // in a row beyond `stall`: the clock was set back
-  static constexpr int kLagging = 16;  // in a row beyond `jump`: no transport stays congested so evenly
+  static constexpr int kBehind = 3;  // in a row beyond `stall`: the clock was set back
+  static constexpr int kLagging =
+      16;  // in a row beyond `jump`: no transport stays congested so evenly
 
   struct Point {
     double device = 0;  // ns since origin_
-    double delay = 0;   // ns, (host − host_origin_) − (device − origin_): on the line at best, late above it, early below it
+    double delay = 0;  // ns, (host − host_origin_) − (device − origin_): on the line at best, late
+                       // above it, early below it
   };
   /// One point a bin, oldest first.
   struct Points {
@@ -80,7 +96,8 @@ class ClockMapper {
   void anchor_near(DeviceStamp device) noexcept;
   [[nodiscard]] Point point(DeviceStamp device, HostStamp host) const noexcept;
   [[nodiscard]] bool far_off(DeviceStamp device, HostStamp host) const noexcept;
-  /// True: it is the best of its bin, so that the line may change. `side` +1: smaller delays are better, −1: greater ones.
+  /// True: it is the best of its bin, so that the line may change. `side` +1: smaller delays are
+  /// better, −1: greater ones.
   bool take(Points* points, const Point& p, double side) const noexcept;
   [[nodiscard]] double line(double device) const noexcept { return intercept_ + slope_ * device; }
   void fit_one_way() noexcept;
@@ -94,10 +111,11 @@ class ClockMapper {
   HostStamp host_origin_{};
   Points upper_{}, lower_{};          // the line is below all of upper, above all of lower
   double slope_ = 0, intercept_ = 0;  // ns: delay = intercept + slope · device
-  double worst_ = 0;                  // ns, one way: largest distance of a held point above the line
-  double room_ = 0;                   // ns, two ways: between the bounds, negative: no line keeps to them
-  double farthest_ = 0, turn_ = 0;    // ns and 1, two ways: of a line that keeps to the bounds, at the newest point, and in slope
-  std::uint64_t pairs_ = 0;           // taken since begin()
+  double worst_ = 0;  // ns, one way: largest distance of a held point above the line
+  double room_ = 0;   // ns, two ways: between the bounds, negative: no line keeps to them
+  double farthest_ = 0, turn_ = 0;  // ns and 1, two ways: of a line that keeps to the bounds, at
+                                    // the newest point, and in slope
+  std::uint64_t pairs_ = 0;         // taken since begin()
   int behind_ = 0, lagging_ = 0;
   std::uint64_t resets_ = 0;
 };

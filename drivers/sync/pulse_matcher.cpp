@@ -7,10 +7,14 @@ namespace vergence {
 namespace {
 
 Duration magnitude(Duration d) noexcept { return d < Duration{} ? -d : d; }
-Duration scaled(Duration d, double factor) noexcept { return Duration::nanoseconds(std::llround(static_cast<double>(d.ns()) * factor)); }
+Duration scaled(Duration d, double factor) noexcept {
+  return Duration::nanoseconds(std::llround(static_cast<double>(d.ns()) * factor));
+}
 
 /// Counts that a camera advanced; negative: it ran back.
-std::int64_t advance(std::uint64_t from, std::uint64_t to) noexcept { return static_cast<std::int64_t>(to - from); }
+std::int64_t advance(std::uint64_t from, std::uint64_t to) noexcept {
+  return static_cast<std::int64_t>(to - from);
+}
 
 }  // namespace
 
@@ -28,7 +32,8 @@ std::uint64_t PulseMatcher::least_number(std::uint64_t counter) const noexcept {
   return steps > 0 ? last_.number + static_cast<std::uint64_t>(steps) : last_.number;
 }
 
-PulseMatcher::Match PulseMatcher::frame(const PulseTrain& train, std::uint64_t counter, DeviceStamp stamp, HostStamp arrival) noexcept {
+PulseMatcher::Match PulseMatcher::frame(const PulseTrain& train, std::uint64_t counter,
+                                        DeviceStamp stamp, HostStamp arrival) noexcept {
   const Seen seen{counter, stamp, arrival, 0};
   if (proven_) return match(train, seen);
   remember(seen);
@@ -36,7 +41,8 @@ PulseMatcher::Match PulseMatcher::frame(const PulseTrain& train, std::uint64_t c
   return {};
 }
 
-std::optional<std::uint64_t> PulseMatcher::report(const PulseTrain& train, HostStamp arrival) noexcept {
+std::optional<std::uint64_t> PulseMatcher::report(const PulseTrain& train,
+                                                  HostStamp arrival) noexcept {
   if (!proven_) {
     acquire(train, arrival);
     return std::nullopt;
@@ -47,7 +53,8 @@ std::optional<std::uint64_t> PulseMatcher::report(const PulseTrain& train, HostS
   std::optional<Seen> made;
   for (std::size_t i = 0; i < pendings_; ++i) {
     const Seen& frame = pending_[i];
-    const bool at_edge = magnitude(pulse.edge - edge_of(frame.stamp)) <= gate(frame.stamp), numbered = frame.number == pulse.number;
+    const bool at_edge = magnitude(pulse.edge - edge_of(frame.stamp)) <= gate(frame.stamp),
+               numbered = frame.number == pulse.number;
     const bool in_pause = pulse.resumed && frame.number < pulse.number && frame.number > before;
     if (at_edge != numbered || in_pause) {
       const std::uint64_t number = frame.number;
@@ -55,7 +62,8 @@ std::optional<std::uint64_t> PulseMatcher::report(const PulseTrain& train, HostS
       return number;
     }
     if (numbered) made = frame;
-    if (frame.number > pulse.number) pending_[kept++] = frame;  // reports come in order: one of an older will never come
+    if (frame.number > pulse.number)
+      pending_[kept++] = frame;  // reports come in order: one of an older will never come
   }
   pendings_ = kept;
   if (made) {
@@ -75,7 +83,8 @@ void PulseMatcher::remember(const Seen& seen) noexcept {
   if (count_ > 0) {
     const Seen& last = frames_[count_ - 1];
     if (seen.counter == last.counter && seen.stamp == last.stamp) return;
-    if (advance(last.counter, seen.counter) < 1 || seen.stamp <= last.stamp) count_ = tried_ = 0;  // it began to count anew
+    if (advance(last.counter, seen.counter) < 1 || seen.stamp <= last.stamp)
+      count_ = tried_ = 0;  // it began to count anew
   }
   if (count_ == kFrames) {
     std::move(frames_.begin() + 1, frames_.end(), frames_.begin());
@@ -105,7 +114,8 @@ void PulseMatcher::acquire(const PulseTrain& train, HostStamp now) noexcept {
     strict = f == Fit::strict;
     found = place;
   }
-  const bool proven = fits == 1 && strict && !(open_ended && beyond + kNear >= found) && believable(train, found, end);
+  const bool proven = fits == 1 && strict && !(open_ended && beyond + kNear >= found) &&
+                      believable(train, found, end);
   if (proven) {
     adopt(train, found, end, now);
   } else {
@@ -113,20 +123,24 @@ void PulseMatcher::acquire(const PulseTrain& train, HostStamp now) noexcept {
   }
 }
 
-/// The frame came no later than frames do, every pulse that it might be of instead was tried, and a pause hides none.
-bool PulseMatcher::believable(const PulseTrain& train, std::size_t place, std::size_t end) const noexcept {
+/// The frame came no later than frames do, every pulse that it might be of instead was tried, and a
+/// pause hides none.
+bool PulseMatcher::believable(const PulseTrain& train, std::size_t place,
+                              std::size_t end) const noexcept {
   if (frames_[end - 1].arrival - train[place].host > latest_) return false;
   const std::size_t until = std::min(train.size(), place + kNear + 1);
   for (std::size_t i = place > 2 * kRun ? place - 2 * kRun : 1; i < until; ++i) {
     const std::uint64_t left_out = train[i].number - train[i - 1].number - 1;
-    const bool beside = i + kNear >= place, pause = train[i].resumed && (pause_ == 0 || left_out == pause_);
+    const bool beside = i + kNear >= place,
+               pause = train[i].resumed && (pause_ == 0 || left_out == pause_);
     if (left_out > 0 && !pause && (beside || train[i].resumed)) return false;
   }
   return true;
 }
 
 /// Whether the run that ends before frame `end` fits with its last frame on the train's `place`.
-PulseMatcher::Fit PulseMatcher::fit(const PulseTrain& train, std::size_t place, std::size_t end) const noexcept {
+PulseMatcher::Fit PulseMatcher::fit(const PulseTrain& train, std::size_t place,
+                                    std::size_t end) const noexcept {
   const std::size_t begin = end - kRun;
   const Seen& last = frames_[end - 1];
   std::size_t at = place;
@@ -140,7 +154,8 @@ PulseMatcher::Fit PulseMatcher::fit(const PulseTrain& train, std::size_t place, 
     while (at > 0 && train[at].edge > target + noise * 2) --at;
     const PulseTrain::Entry& pulse = train[at];
     const Duration off = magnitude(pulse.edge - target);
-    const auto counted = static_cast<std::uint64_t>(advance(frames_[i].counter, frames_[i + 1].counter));
+    const auto counted =
+        static_cast<std::uint64_t>(advance(frames_[i].counter, frames_[i + 1].counter));
     if (off <= noise * 2) {
       const Duration span = last.stamp - frames_[i].stamp;
       const Duration along = noise_ * 2 + scaled(span, kDrift);
@@ -159,7 +174,8 @@ PulseMatcher::Fit PulseMatcher::fit(const PulseTrain& train, std::size_t place, 
       const auto unreported = train.place(target, Duration{});
       if (!unreported || unreported->number >= number) return Fit::none;
       if (counted > number - unreported->number) return Fit::none;
-      const std::uint64_t least = PulseTrain::least(unreported->number, unreported->skipped_with, number, skipped);
+      const std::uint64_t least =
+          PulseTrain::least(unreported->number, unreported->skipped_with, number, skipped);
       odd += (least > counted ? least - counted : 0) + (unreported->paused ? 1 : 0);
       strict = false;
       edge = target;
@@ -171,7 +187,8 @@ PulseMatcher::Fit PulseMatcher::fit(const PulseTrain& train, std::size_t place, 
   return strict && odd == 0 ? Fit::strict : Fit::loose;
 }
 
-void PulseMatcher::adopt(const PulseTrain& train, std::size_t place, std::size_t end, HostStamp now) noexcept {
+void PulseMatcher::adopt(const PulseTrain& train, std::size_t place, std::size_t end,
+                         HostStamp now) noexcept {
   proven_ = true;
   failures_ = 0;
   begun_ = false;
@@ -186,7 +203,8 @@ void PulseMatcher::adopt(const PulseTrain& train, std::size_t place, std::size_t
   for (std::size_t i = kRun; i-- > 0;) {
     const Duration span = frames_[end - 1].stamp - frames_[end - kRun + i].stamp;
     const DeviceStamp target = train[place].edge - span;
-    while (at > 0 && magnitude(train[at - 1].edge - target) < magnitude(train[at].edge - target)) --at;
+    while (at > 0 && magnitude(train[at - 1].edge - target) < magnitude(train[at].edge - target))
+      --at;
     places[i] = at;
   }
   for (std::size_t i = 0; i < kRun; ++i) {
@@ -237,7 +255,8 @@ void PulseMatcher::tie(DeviceStamp stamp, DeviceStamp edge) noexcept {
   const Duration off = edge - expected;
   tie_stamp_ = stamp;
   tie_edge_ = expected + scaled(off, g);
-  rate_ = std::clamp(rate_ + h * static_cast<double>(off.ns()) / static_cast<double>(since.ns()), -kDrift, kDrift);
+  rate_ = std::clamp(rate_ + h * static_cast<double>(off.ns()) / static_cast<double>(since.ns()),
+                     -kDrift, kDrift);
 }
 
 PulseMatcher::Match PulseMatcher::contradict(const Seen& seen) noexcept {
@@ -258,8 +277,9 @@ PulseMatcher::Match PulseMatcher::repeated(const Seen& seen) const noexcept {
   return m;
 }
 
-/// A frame of this reported pulse fits it within the gate. Had the clock been set instead of s triggers missed, its stamps would now follow
-/// the pulse s earlier, a constant time off: refuted where that time changes by more than two gates.
+/// A frame of this reported pulse fits it within the gate. Had the clock been set instead of s
+/// triggers missed, its stamps would now follow the pulse s earlier, a constant time off: refuted
+/// where that time changes by more than two gates.
 void PulseMatcher::settle(const PulseTrain& train, std::uint64_t number) noexcept {
   if (doubt_ == 0) return;
   const PulseTrain::Entry* pulse = train.find(number);
@@ -292,19 +312,24 @@ PulseMatcher::Match PulseMatcher::match(const PulseTrain& train, const Seen& see
   Match m;
   m.edge = edge_of(seen.stamp);
   m.gate = gate(seen.stamp);
-  if (m.gate * 3 > interval_) return contradict(seen);  // nothing was seen for so long that the stamp no longer tells the pulse
+  if (m.gate * 3 > interval_)
+    return contradict(
+        seen);  // nothing was seen for so long that the stamp no longer tells the pulse
   const auto place = train.place(m.edge, m.gate);
   if (!place || place->paused || place->number <= last_.number) return contradict(seen);
   const std::uint64_t most = place->number - last_.number;
-  const std::uint64_t least = PulseTrain::least(last_.number, last_skipped_, place->number, place->skipped);
+  const std::uint64_t least =
+      PulseTrain::least(last_.number, last_skipped_, place->number, place->skipped);
   const auto exposures = static_cast<std::uint64_t>(counted);
   if (exposures > most) return contradict(seen);
   m.missed = least > exposures ? least - exposures : 0;
   m.lost = exposures - 1;
-  // A clock that was set may point at another pulse; then the frame seems quicker than ever, or is here before its pulse.
+  // A clock that was set may point at another pulse; then the frame seems quicker than ever, or is
+  // here before its pulse.
   const MappedStamp host = train.host_of(m.edge);
   const Duration delay = seen.arrival - host.host;
-  if (delay < -host.error || (m.missed > 0 && delay + interval_ / 2 < least_delay_)) return contradict(seen);
+  if (delay < -host.error || (m.missed > 0 && delay + interval_ / 2 < least_delay_))
+    return contradict(seen);
   least_delay_ = std::min(least_delay_, delay);
   if (m.missed > 0) {
     doubt_ += m.missed;

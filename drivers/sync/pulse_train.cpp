@@ -23,7 +23,8 @@ PulseTrain::Step PulseTrain::add(const Pulse& pulse, std::uint64_t first_free) n
       steps = number - last.number;
       const Duration passed = pulse.edge - last.edge;
       // Varied intervals are within a fourth; four times as long is a clock that was set.
-      goes_on = steps <= kLeap && passed > Duration{} && (pulse.resumed || passed <= nominal_ * static_cast<std::int64_t>(4 * steps + 4));
+      goes_on = steps <= kLeap && passed > Duration{} &&
+                (pulse.resumed || passed <= nominal_ * static_cast<std::int64_t>(4 * steps + 4));
     }
   }
   Entry e{number, 0, pulse.edge, pulse.host, pulse.host_error, pulse.resumed, pulse.exposure};
@@ -58,13 +59,15 @@ const PulseTrain::Entry* PulseTrain::find(std::uint64_t number) const noexcept {
   return nullptr;
 }
 
-const PulseTrain::Entry* PulseTrain::before(std::uint64_t number, std::uint64_t pulses) const noexcept {
+const PulseTrain::Entry* PulseTrain::before(std::uint64_t number,
+                                            std::uint64_t pulses) const noexcept {
   for (std::size_t i = count_; i-- > pulses;) {
     const Entry& e = (*this)[i];
     if (e.number > number) continue;
     if (e.number < number) return nullptr;
     const Entry& earlier = (*this)[i - pulses];
-    return least(earlier.number, earlier.skipped, e.number, e.skipped) == pulses ? &earlier : nullptr;
+    return least(earlier.number, earlier.skipped, e.number, e.skipped) == pulses ? &earlier
+                                                                                 : nullptr;
   }
   return nullptr;
 }
@@ -79,18 +82,23 @@ Duration PulseTrain::interval() const noexcept {
   return (b.edge - a.edge) / static_cast<std::int64_t>(b.number - a.number);
 }
 
-std::optional<PulseTrain::Place> PulseTrain::unreported(const Entry& before, const Entry* after, DeviceStamp edge) const noexcept {
+std::optional<PulseTrain::Place> PulseTrain::unreported(const Entry& before, const Entry* after,
+                                                        DeviceStamp edge) const noexcept {
   const std::uint64_t room = after == nullptr ? kAhead : after->number - before.number - 1;
   if (room == 0) return std::nullopt;
-  const bool spread = after != nullptr && !after->resumed;  // its pulses fill the time between evenly
-  const Duration step = spread ? (after->edge - before.edge) / static_cast<std::int64_t>(room + 1) : interval();
+  const bool spread =
+      after != nullptr && !after->resumed;  // its pulses fill the time between evenly
+  const Duration step =
+      spread ? (after->edge - before.edge) / static_cast<std::int64_t>(room + 1) : interval();
   const Duration passed = edge - before.edge;
   const std::int64_t steps = (passed + step / 2).ns() / step.ns();
   if (steps < 1 || static_cast<std::uint64_t>(steps) > room) return std::nullopt;
   if (magnitude(passed - step * steps) * 4 > step) return std::nullopt;
   const bool paused = after != nullptr && after->resumed;
-  const std::uint64_t skipped = before.skipped + (paused ? static_cast<std::uint64_t>(steps) - 1 : 0);
-  return Place{before.number + static_cast<std::uint64_t>(steps), skipped, skipped + (paused ? 1 : 0), nullptr, paused};
+  const std::uint64_t skipped =
+      before.skipped + (paused ? static_cast<std::uint64_t>(steps) - 1 : 0);
+  return Place{before.number + static_cast<std::uint64_t>(steps), skipped,
+               skipped + (paused ? 1 : 0), nullptr, paused};
 }
 
 std::optional<PulseTrain::Place> PulseTrain::place(DeviceStamp edge, Duration gate) const noexcept {
@@ -118,7 +126,8 @@ MappedStamp PulseTrain::host_of(DeviceStamp edge) const noexcept {
 
 std::uint64_t PulseTrain::between(std::uint64_t after, std::uint64_t before) const noexcept {
   std::uint64_t n = 0;
-  for (std::size_t i = count_; i-- > 0 && (*this)[i].number > after;) n += (*this)[i].number < before ? 1 : 0;
+  for (std::size_t i = count_; i-- > 0 && (*this)[i].number > after;)
+    n += (*this)[i].number < before ? 1 : 0;
   return n;
 }
 

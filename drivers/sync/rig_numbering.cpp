@@ -20,15 +20,19 @@ std::size_t first_of(const SyncedSet& set) noexcept {
 // ---- by counter ----
 
 std::uint64_t RigSynchronizer::number_of(const SyncFrame& frame) noexcept {
-  constexpr std::uint64_t kLeap = 100'000;  // pulses: over an hour of silence; a counter that leaps further is broken
+  constexpr std::uint64_t kLeap =
+      100'000;  // pulses: over an hour of silence; a counter that leaps further is broken
   Source& source = sources_[static_cast<std::size_t>(frame.camera)];
-  const auto counted = static_cast<std::uint64_t>(source.base) + frame.counter;  // wraps where the base is negative
+  const auto counted =
+      static_cast<std::uint64_t>(source.base) + frame.counter;  // wraps where the base is negative
   if (timed_ && counted > timed_number_ + kLeap) source.align = true;
   if (source.align) {
     source.align = false;
     if (timed_) {
-      const double pulses = (frame.middle.host - timed_middle_).to_seconds() / options_.interval.to_seconds();
-      source.base = static_cast<std::int64_t>(timed_number_) + std::llround(pulses) - static_cast<std::int64_t>(frame.counter);
+      const double pulses =
+          (frame.middle.host - timed_middle_).to_seconds() / options_.interval.to_seconds();
+      source.base = static_cast<std::int64_t>(timed_number_) + std::llround(pulses) -
+                    static_cast<std::int64_t>(frame.counter);
     } else {
       source.base = 0;
     }
@@ -39,8 +43,8 @@ std::uint64_t RigSynchronizer::number_of(const SyncFrame& frame) noexcept {
 
 // ---- by time ----
 
-/// Middle of the exposure on the clock that pairs. The bus's wraps: of the two unwrapped by their cameras' drivers that nearest to the
-/// newest set's is meant.
+/// Middle of the exposure on the clock that pairs. The bus's wraps: of the two unwrapped by their
+/// cameras' drivers that nearest to the newest set's is meant.
 std::int64_t RigSynchronizer::pairing_time(const SyncFrame& frame) const noexcept {
   if (options_.mode == SyncMode::software) return frame.middle.host.ns();
   const std::int64_t own = (frame.exposure_start + frame.exposure / 2).ns();
@@ -49,7 +53,9 @@ std::int64_t RigSynchronizer::pairing_time(const SyncFrame& frame) const noexcep
   for (const Open& o : open_)
     if (o.used) reference = o.images[first_of(o.set)].time;
   const std::int64_t apart = (own - reference) % kBusWrap;
-  return reference + (apart > kBusWrap / 2 ? apart - kBusWrap : apart < -kBusWrap / 2 ? apart + kBusWrap : apart);
+  return reference + (apart > kBusWrap / 2    ? apart - kBusWrap
+                      : apart < -kBusWrap / 2 ? apart + kBusWrap
+                                              : apart);
 }
 
 /// A common clock that has been set back would make everything late for ever.
@@ -62,7 +68,8 @@ bool RigSynchronizer::ran_back(std::int64_t time) noexcept {
   return true;
 }
 
-/// The number of the open set that it fits into, or a new one in the order of time; a number that is out already: too late.
+/// The number of the open set that it fits into, or a new one in the order of time; a number that
+/// is out already: too late.
 std::uint64_t RigSynchronizer::number_by_time(const SyncFrame& frame, std::int64_t time) noexcept {
   if (ran_back(time)) {
     ++counters_.contradictions[static_cast<std::size_t>(frame.camera)];
@@ -84,14 +91,18 @@ std::uint64_t RigSynchronizer::number_by_time(const SyncFrame& frame, std::int64
     anew_ = false;
     return flushed_;
   }
-  if (any_out_ && last_out_ >= flushed_ && time - last_time_ <= options_.tolerance.ns()) return last_out_;
+  if (any_out_ && last_out_ >= flushed_ && time - last_time_ <= options_.tolerance.ns())
+    return last_out_;
   if (newest == nullptr && !any_out_) return 0;
   const std::uint64_t reference = newest != nullptr ? newest->set.number : last_out_;
-  const std::int64_t reference_time = newest != nullptr ? newest->images[first_of(newest->set)].time : last_time_;
-  const std::int64_t steps = std::llround(static_cast<double>(time - reference_time) / static_cast<double>(options_.interval.ns()));
+  const std::int64_t reference_time =
+      newest != nullptr ? newest->images[first_of(newest->set)].time : last_time_;
+  const std::int64_t steps = std::llround(static_cast<double>(time - reference_time) /
+                                          static_cast<double>(options_.interval.ns()));
   const bool after = time > reference_time;
   const std::int64_t number =
-      static_cast<std::int64_t>(reference) + (after ? std::max<std::int64_t>(steps, 1) : std::min<std::int64_t>(steps, -1));
+      static_cast<std::int64_t>(reference) +
+      (after ? std::max<std::int64_t>(steps, 1) : std::min<std::int64_t>(steps, -1));
   const bool taken = number < 0 || find(static_cast<std::uint64_t>(number)) != nullptr;
   return taken ? last_out_ : static_cast<std::uint64_t>(number);
 }
@@ -157,8 +168,9 @@ void RigSynchronizer::take_pulse(const Pulse& pulse) noexcept {
 }
 
 std::uint32_t RigSynchronizer::wants_pause() noexcept {
-  constexpr int kInVain = 8;                                   // trials of a camera
-  constexpr std::uint64_t kPatience = 3 * PulseMatcher::kRun;  // pulses, until a pause has been seen or has not helped
+  constexpr int kInVain = 8;  // trials of a camera
+  constexpr std::uint64_t kPatience =
+      3 * PulseMatcher::kRun;  // pulses, until a pause has been seen or has not helped
   if (!proves_numbers(options_.mode) || (asked_ && pulses_ < asked_at_ + kPatience)) return 0;
   for (std::size_t k = 0; k < static_cast<std::size_t>(options_.cameras); ++k) {
     const bool settled = proven(static_cast<int>(k)) && !matchers_[k].doubtful();
@@ -172,13 +184,18 @@ std::uint32_t RigSynchronizer::wants_pause() noexcept {
 
 bool RigSynchronizer::proven(int camera) const noexcept {
   const bool is_master = options_.mode == SyncMode::master_strobe && camera == 0;
-  return !proves_numbers(options_.mode) || is_master || matchers_[static_cast<std::size_t>(camera)].proven();
+  return !proves_numbers(options_.mode) || is_master ||
+         matchers_[static_cast<std::size_t>(camera)].proven();
 }
 
-RigSynchronizer::Step RigSynchronizer::number_by_pulse(const SyncFrame& frame, std::uint64_t* number, Image* image) noexcept {
+RigSynchronizer::Step RigSynchronizer::number_by_pulse(const SyncFrame& frame,
+                                                       std::uint64_t* number,
+                                                       Image* image) noexcept {
   const auto k = static_cast<std::size_t>(frame.camera);
-  if (options_.mode == SyncMode::master_strobe && k == 0) return number_by_master(frame, number, image);
-  const PulseMatcher::Match m = matchers_[k].frame(train_, frame.counter, frame.exposure_start, frame.arrival);
+  if (options_.mode == SyncMode::master_strobe && k == 0)
+    return number_by_master(frame, number, image);
+  const PulseMatcher::Match m =
+      matchers_[k].frame(train_, frame.counter, frame.exposure_start, frame.arrival);
   switch (m.outcome) {
     case PulseMatcher::Outcome::matched:
       break;
@@ -205,7 +222,9 @@ RigSynchronizer::Step RigSynchronizer::number_by_pulse(const SyncFrame& frame, s
 }
 
 /// Camera 0 makes the pulses: its frame is the report of one.
-RigSynchronizer::Step RigSynchronizer::number_by_master(const SyncFrame& frame, std::uint64_t* number, Image* image) noexcept {
+RigSynchronizer::Step RigSynchronizer::number_by_master(const SyncFrame& frame,
+                                                        std::uint64_t* number,
+                                                        Image* image) noexcept {
   const auto counted = static_cast<std::int64_t>(frame.counter - master_.counter);
   Pulse pulse;
   pulse.edge = image->edge = frame.exposure_start;
@@ -219,7 +238,8 @@ RigSynchronizer::Step RigSynchronizer::number_by_master(const SyncFrame& frame, 
     const Duration since = frame.exposure_start - master_.stamp;
     const std::int64_t steps = (since + options_.interval / 2).ns() / options_.interval.ns();
     pulse.resumed = true;
-    master_.base = master_.base + master_.counter + static_cast<std::uint64_t>(std::max<std::int64_t>(steps, 1)) - frame.counter;
+    master_.base = master_.base + master_.counter +
+                   static_cast<std::uint64_t>(std::max<std::int64_t>(steps, 1)) - frame.counter;
   } else if (counted <= 0) {
     if (counted == 0 && frame.exposure_start == master_.stamp) {
       *number = train_.newest().number;
@@ -229,7 +249,8 @@ RigSynchronizer::Step RigSynchronizer::number_by_master(const SyncFrame& frame, 
     ++master_.boot;
   } else {
     counters_.lost[0] += static_cast<std::uint64_t>(counted) - 1;
-    pulse.resumed = frame.exposure_start - master_.stamp > options_.interval * counted + options_.interval / 2;
+    pulse.resumed =
+        frame.exposure_start - master_.stamp > options_.interval * counted + options_.interval / 2;
   }
   pulse.number = master_.base + frame.counter;
   pulse.boot = master_.boot;

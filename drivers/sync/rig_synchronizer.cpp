@@ -10,7 +10,8 @@ Duration magnitude(Duration d) noexcept { return d < Duration{} ? -d : d; }
 
 }  // namespace
 
-RigSynchronizer::RigSynchronizer(const SyncOptions& options) noexcept : options_(options), train_(options.interval) {
+RigSynchronizer::RigSynchronizer(const SyncOptions& options) noexcept
+    : options_(options), train_(options.interval) {
   assert(options.validate() == nullptr);
   for (Source& s : sources_) s.align = options.align_start && options.mode == SyncMode::counter;
   const std::uint64_t pause = options.mode == SyncMode::master_strobe ? 0 : kPause;
@@ -55,7 +56,8 @@ SyncVerdict RigSynchronizer::offer(const SyncFrame& frame) noexcept {
   if (any_out_ && number <= last_out_) {
     const Gone& g = history_[number % kHistory];
     const bool of_it = !by_time || image.time - last_time_ >= -options_.tolerance.ns();
-    const bool given = step == Step::again || (of_it && g.used && g.number == number && g.present[k]);
+    const bool given =
+        step == Step::again || (of_it && g.used && g.number == number && g.present[k]);
     ++(given ? counters_.duplicate : counters_.late)[k];
     return given ? SyncVerdict::duplicate : SyncVerdict::late;
   }
@@ -65,7 +67,8 @@ SyncVerdict RigSynchronizer::offer(const SyncFrame& frame) noexcept {
     return SyncVerdict::duplicate;
   }
   if (open == nullptr) {
-    open = std::find_if(open_.data(), open_.data() + open_.size(), [](const Open& o) { return !o.used; });
+    open = std::find_if(open_.data(), open_.data() + open_.size(),
+                        [](const Open& o) { return !o.used; });
     *open = Open{};
     open->used = true;
     open->set.number = number;
@@ -88,12 +91,16 @@ SyncVerdict RigSynchronizer::offer(const SyncFrame& frame) noexcept {
   return SyncVerdict::taken;
 }
 
-bool RigSynchronizer::waited_for(std::size_t camera) const noexcept { return sources_[camera].here && proven(static_cast<int>(camera)); }
+bool RigSynchronizer::waited_for(std::size_t camera) const noexcept {
+  return sources_[camera].here && proven(static_cast<int>(camera));
+}
 
 bool RigSynchronizer::ready(const Open& open) const noexcept {
   const std::uint64_t number = open.set.number;
-  if (finishing_ || open_count_ > kOpen || now_ - open.first >= options_.hold || number < flushed_) return true;
-  if (proves_numbers(options_.mode) && (train_.size() == 0 || train_.newest().number < number)) return false;
+  if (finishing_ || open_count_ > kOpen || now_ - open.first >= options_.hold || number < flushed_)
+    return true;
+  if (proves_numbers(options_.mode) && (train_.size() == 0 || train_.newest().number < number))
+    return false;
   for (std::size_t k = 0; k < static_cast<std::size_t>(options_.cameras); ++k) {
     const Source& s = sources_[k];
     if (open.set.present[k] && open.images[k].doubtful && matchers_[k].doubtful()) return false;
@@ -117,10 +124,12 @@ void RigSynchronizer::stamp(const Open& open, SyncedSet* set) const noexcept {
   set->stamp = open.images[base].middle.host;
   set->error = open.images[base].middle.error;
   for (std::size_t k = 0; k < static_cast<std::size_t>(options_.cameras); ++k)
-    if (set->present[k]) set->spread = std::max(set->spread, magnitude(open.images[k].middle.host - set->stamp));
+    if (set->present[k])
+      set->spread = std::max(set->spread, magnitude(open.images[k].middle.host - set->stamp));
 }
 
-/// The pulse's edge on the host's clock, and from it to the middles of the exposures, as they were fed back or as they were asked for.
+/// The pulse's edge on the host's clock, and from it to the middles of the exposures, as they were
+/// fed back or as they were asked for.
 void RigSynchronizer::stamp_by_pulse(const Open& open, SyncedSet* set) const noexcept {
   const PulseTrain::Entry* pulse = train_.find(set->number);
   std::size_t base = 0;
@@ -135,7 +144,8 @@ void RigSynchronizer::stamp_by_pulse(const Open& open, SyncedSet* set) const noe
   }
   const auto middle = [&](std::size_t k) {
     const bool fed_back = pulse != nullptr && pulse->exposure[k].seen;
-    return fed_back ? (pulse->exposure[k].start + pulse->exposure[k].end) / 2 : options_.camera[k].delay + open.images[k].exposure / 2;
+    return fed_back ? (pulse->exposure[k].start + pulse->exposure[k].end) / 2
+                    : options_.camera[k].delay + open.images[k].exposure / 2;
   };
   set->stamp = edge.host + middle(base);
   set->error = edge.error;
@@ -168,7 +178,8 @@ void RigSynchronizer::emit(Open* open, SyncedSet* set) noexcept {
   ++(set->complete ? counters_.complete : counters_.incomplete);
   if (!set->complete && open_count_ > kOpen) ++counters_.pushed_out;
   if (numbered) {
-    counters_.missed += any_out_ && last_out_ >= steady_from_ ? train_.between(last_out_, set->number) : 0;
+    counters_.missed +=
+        any_out_ && last_out_ >= steady_from_ ? train_.between(last_out_, set->number) : 0;
   } else {
     counters_.missed += any_out_ ? set->number - last_out_ - 1 : set->number;
   }
@@ -196,8 +207,10 @@ void RigSynchronizer::prove(Open* open, SyncedSet* set) noexcept {
     case SyncMode::ins_syncout:
     case SyncMode::master_strobe:
       for (std::size_t k = 0; k < matchers_.size(); ++k)
-        open->contradicted = open->contradicted || (set->present[k] && open->images[k].doubtful && matchers_[k].doubtful());
-      set->proof = options_.mode == SyncMode::master_strobe ? SyncProof::master : SyncProof::numbered;
+        open->contradicted = open->contradicted || (set->present[k] && open->images[k].doubtful &&
+                                                    matchers_[k].doubtful());
+      set->proof =
+          options_.mode == SyncMode::master_strobe ? SyncProof::master : SyncProof::numbered;
       if (open->contradicted) {
         set->proof = SyncProof::unproven;
         ++counters_.unproven;
@@ -217,7 +230,8 @@ void RigSynchronizer::prove(Open* open, SyncedSet* set) noexcept {
   if (!options_.align_start || ++unproven_run_ < kUnproven) return;
   unproven_run_ = 0;
   ++counters_.realigned;
-  for (std::size_t k = 1; k < sources_.size(); ++k) sources_[k].align = true;  // to camera 0, whose numbers go on
+  for (std::size_t k = 1; k < sources_.size(); ++k)
+    sources_[k].align = true;  // to camera 0, whose numbers go on
 }
 
 SyncCounters RigSynchronizer::counters() const noexcept {
@@ -246,7 +260,9 @@ void RigSynchronizer::lost(int camera, std::uint64_t counter) noexcept {
   source.any = true;
 }
 
-void RigSynchronizer::absent(int camera) noexcept { sources_[static_cast<std::size_t>(camera)].here = false; }
+void RigSynchronizer::absent(int camera) noexcept {
+  sources_[static_cast<std::size_t>(camera)].here = false;
+}
 
 void RigSynchronizer::restarted(int camera) noexcept {
   const auto k = static_cast<std::size_t>(camera);

@@ -10,29 +10,39 @@
 
 namespace vergence {
 
-/// Pairs the frames of a rig: by the pulses that made them, by their counters, or by their stamps (SyncMode).
+/// Pairs the frames of a rig: by the pulses that made them, by their counters, or by their stamps
+/// (SyncMode).
 ///
-/// A set goes out as soon as every camera that is there has given its image, or has given a later one (its image is lost), and its
-/// pulse's report is here where there are pulses; or `hold` after the set's first image, by the arrivals of others. Sets go out in order
-/// of their numbers, each once. Determined by what is offered and in which order; no clock is read.
+/// A set goes out as soon as every camera that is there has given its image, or has given a later
+/// one (its image is lost), and its pulse's report is here where there are pulses; or `hold` after
+/// the set's first image, by the arrivals of others. Sets go out in order of their numbers, each
+/// once. Determined by what is offered and in which order; no clock is read.
 ///
-/// Pulses     A camera is `acquiring` until its own intervals fit the pulses' at exactly one place; arrival never decides. Its frames are
-///            given back and counted meanwhile, those of the others go out without them. From then on every frame's pulse follows from its
-///            stamp (the camera's clock tied to the board's), and its counter must agree: more pulses than counts are missed triggers,
-///            counts without images are lost frames, anything else is a contradiction and it acquires again. After a missed trigger sets
-///            wait up to `hold` for the intervals to show that it was none of the clock's, else they are `unproven`. A pulse that runs back
-///            in number or has another `boot` makes all acquire again. A frame that comes before its pulse's report is given the pulse's
-///            number all the same; the report then confirms it, or the set is `unproven`.
-/// A limit    A camera that hands out the image of one exposure under the stamp of the next cannot be told here.
-/// Ownership  A slot that is `taken` comes out of next() in exactly one set; then it is the caller's again.
+/// Pulses     A camera is `acquiring` until its own intervals fit the pulses' at exactly one place;
+///            arrival never decides. Its frames are given back and counted meanwhile, those of the
+///            others go out without them. From then on every frame's pulse follows from its stamp
+///            (the camera's clock tied to the board's), and its counter must agree: more pulses
+///            than counts are missed triggers, counts without images are lost frames, anything else
+///            is a contradiction and it acquires again. After a missed trigger sets wait up to
+///            `hold` for the intervals to show that it was none of the clock's, else they are
+///            `unproven`. A pulse that runs back in number or has another `boot` makes all acquire
+///            again. A frame that comes before its pulse's report is given the pulse's number all
+///            the same; the report then confirms it, or the set is `unproven`.
+/// A limit    A camera that hands out the image of one exposure under the stamp of the next cannot
+///            be told here.
+/// Ownership  A slot that is `taken` comes out of next() in exactly one set; then it is the
+///            caller's again.
 /// Threads    One caller. Memory: fixed, kOpen pulses. Time: constant a call.
 /// Errors     Nothing throws. What cannot be paired is told by the verdict and counted.
 class RigSynchronizer {
  public:
-  static constexpr std::size_t kOpen = 4;      // pulses waiting at most: bounds the latency and the slots held
-  static constexpr std::size_t kHistory = 64;  // sets remembered, to tell a duplicate from a late frame
-  static constexpr int kUnproven = 10;         // in a row: the pulses were not found rightly
-  static constexpr std::uint32_t kPause = 4;   // pulses left out: more than what a camera misses by itself
+  static constexpr std::size_t kOpen =
+      4;  // pulses waiting at most: bounds the latency and the slots held
+  static constexpr std::size_t kHistory =
+      64;                               // sets remembered, to tell a duplicate from a late frame
+  static constexpr int kUnproven = 10;  // in a row: the pulses were not found rightly
+  static constexpr std::uint32_t kPause =
+      4;  // pulses left out: more than what a camera misses by itself
 
   /// Precondition: options.validate() == nullptr.
   explicit RigSynchronizer(const SyncOptions& options) noexcept;
@@ -42,22 +52,26 @@ class RigSynchronizer {
   /// The next set that is ready. Call until false.
   [[nodiscard]] bool next(SyncedSet* set) noexcept;
 
-  /// A pulse's report, in the order of arrival; in the modes board and ins_syncout (elsewhere it does nothing). next() as after offer().
+  /// A pulse's report, in the order of arrival; in the modes board and ins_syncout (elsewhere it
+  /// does nothing). next() as after offer().
   /// Precondition: pulse.mapped.
   void pulse(const Pulse& pulse) noexcept;
-  /// So many pulses should be left out, because the intervals prove nothing; mostly 0. Asked for once, and again when it did not help.
-  /// board: TriggerDevice::pause() with just that number, another could hide a report that was lost. ins_syncout, master_strobe: stop the
-  /// source and start it again.
+  /// So many pulses should be left out, because the intervals prove nothing; mostly 0. Asked for
+  /// once, and again when it did not help.
+  /// board: TriggerDevice::pause() with just that number, another could hide a report that was
+  /// lost. ins_syncout, master_strobe: stop the source and start it again.
   [[nodiscard]] std::uint32_t wants_pause() noexcept;
   /// Nothing is left to be proven of that camera's frames: always, where nothing can be.
   [[nodiscard]] bool proven(int camera) const noexcept;
 
-  /// That exposure of a camera gave no image that could be used: nobody waits for it. Else as offer(); not where stamps pair.
+  /// That exposure of a camera gave no image that could be used: nobody waits for it. Else as
+  /// offer(); not where stamps pair.
   void lost(int camera, std::uint64_t counter) noexcept;
   /// A camera has gone: nobody waits for it.
   void absent(int camera) noexcept;
-  /// It has come back and counts anew. By counter: its first frame joins the pulse nearest in time, the others follow. With pulses: it
-  /// acquires, the others go on; a master's count goes on by its clock.
+  /// It has come back and counts anew. By counter: its first frame joins the pulse nearest in time,
+  /// the others follow. With pulses: it acquires, the others go on; a master's count goes on by its
+  /// clock.
   void restarted(int camera) noexcept;
   /// No more frames will come: everything open goes out by next().
   void finish() noexcept { finishing_ = true; }
@@ -109,8 +123,10 @@ class RigSynchronizer {
   [[nodiscard]] std::int64_t pairing_time(const SyncFrame& frame) const noexcept;
   [[nodiscard]] std::uint64_t number_by_time(const SyncFrame& frame, std::int64_t time) noexcept;
   [[nodiscard]] bool ran_back(std::int64_t time) noexcept;
-  [[nodiscard]] Step number_by_pulse(const SyncFrame& frame, std::uint64_t* number, Image* image) noexcept;
-  [[nodiscard]] Step number_by_master(const SyncFrame& frame, std::uint64_t* number, Image* image) noexcept;
+  [[nodiscard]] Step number_by_pulse(const SyncFrame& frame, std::uint64_t* number,
+                                     Image* image) noexcept;
+  [[nodiscard]] Step number_by_master(const SyncFrame& frame, std::uint64_t* number,
+                                      Image* image) noexcept;
   void take_pulse(const Pulse& pulse) noexcept;
   void distrust(std::size_t camera) noexcept;
   void acquired(std::size_t camera) noexcept;

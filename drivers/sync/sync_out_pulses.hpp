@@ -10,22 +10,31 @@ namespace vergence {
 
 /// The pulses of an INS's SyncOut, from its readings: for the mode ins_syncout.
 ///
-/// Numbers  Intervals of the INS's own clock, which makes the pulses too; a reading that was lost loses no number. A gap made on purpose
+/// Numbers  Intervals of the INS's own clock, which makes the pulses too; a reading that was lost
+///          loses no number. A gap made on purpose
 /// must
-///          be told by restart(): numbers go on after it, for it is the gap between pulses of one boot that proves.
-/// Marked   A device that marks its pulses (InsQuality::sync_out) does so on the sample after the pulse: edges are multiples of the
+///          be told by restart(): numbers go on after it, for it is the gap between pulses of one
+///          boot that proves.
+/// Marked   A device that marks its pulses (InsQuality::sync_out) does so on the sample after the
+///          pulse: edges are multiples of the
 /// interval
-///          from the earliest mark. One that does not pulses with every `divider`-th sample from its first since restart().
+///          from the earliest mark. One that does not pulses with every `divider`-th sample from
+///          its first since restart().
 /// Threads  One caller. Memory: in place. Errors: none; a clock that runs back is another boot.
-/// A limit  The INS's clock must go on over the gap: one that is continued by the host's time only proves nothing.
+/// A limit  The INS's clock must go on over the gap: one that is continued by the host's time only
+///          proves nothing.
 class SyncOutPulses {
  public:
-  /// `interval`: between two pulses. `divider`: readings a pulse where none are marked; 0: they are marked.
-  SyncOutPulses(Duration interval, std::uint32_t divider) noexcept : interval_(interval), divider_(divider) {}
+  /// `interval`: between two pulses. `divider`: readings a pulse where none are marked; 0: they are
+  /// marked.
+  SyncOutPulses(Duration interval, std::uint32_t divider) noexcept
+      : interval_(interval), divider_(divider) {}
 
-  /// The pulse that left with this reading, if one did. `at`: the reading's stamp on the host's clock.
+  /// The pulse that left with this reading, if one did. `at`: the reading's stamp on the host's
+  /// clock.
   [[nodiscard]] std::optional<Pulse> reading(const InsReading& reading, MappedStamp at) noexcept;
-  /// The device was told to stop measuring and to go on: a gap. Its first reading after it is a pulse.
+  /// The device was told to stop measuring and to go on: a gap. Its first reading after it is a
+  /// pulse.
   void restart() noexcept { fresh_ = true; }
 
  private:

@@ -5,8 +5,9 @@
 namespace vergence {
 namespace {
 
-constexpr std::array<SyncMode, 7> kModes{SyncMode::counter,       SyncMode::software, SyncMode::board, SyncMode::ins_syncout,
-                                         SyncMode::master_strobe, SyncMode::bus,      SyncMode::ptp};
+constexpr std::array<SyncMode, 7> kModes{
+    SyncMode::counter,       SyncMode::software, SyncMode::board, SyncMode::ins_syncout,
+    SyncMode::master_strobe, SyncMode::bus,      SyncMode::ptp};
 
 }  // namespace
 
@@ -60,13 +61,18 @@ const char* SyncOptions::validate() const noexcept {
   if (hold <= Duration{}) return "the time a set waits for its images must be positive";
   if (pairs_by_time(mode) && (tolerance <= Duration{} || tolerance * 2 > interval))
     return "the tolerance must be positive and at most half of the interval between two exposures";
-  if (mode == SyncMode::master_strobe && cameras < 2) return "a master without another camera triggers nobody";
+  if (mode == SyncMode::master_strobe && cameras < 2)
+    return "a master without another camera triggers nobody";
   for (std::size_t k = 0; proves_numbers(mode) && k < static_cast<std::size_t>(cameras); ++k) {
     const SyncCameraOptions& c = camera[k];
-    if (c.resolution < Duration{} || c.jitter < Duration{}) return "a camera's stamps cannot be better than exact";
-    if ((c.resolution + c.jitter) * 8 > interval) return "a camera's stamps are too coarse to tell one pulse from the next";
-    if (c.latest <= Duration{}) return "a frame arrives after its pulse: the latest arrival must be positive";
-    if (c.delay < Duration{} || c.delay >= interval) return "a line's delay must be at least 0 and below the interval of the pulses";
+    if (c.resolution < Duration{} || c.jitter < Duration{})
+      return "a camera's stamps cannot be better than exact";
+    if ((c.resolution + c.jitter) * 8 > interval)
+      return "a camera's stamps are too coarse to tell one pulse from the next";
+    if (c.latest <= Duration{})
+      return "a frame arrives after its pulse: the latest arrival must be positive";
+    if (c.delay < Duration{} || c.delay >= interval)
+      return "a line's delay must be at least 0 and below the interval of the pulses";
   }
   return nullptr;
 }

@@ -8,7 +8,8 @@
 namespace vergence::trigger_board {
 namespace {
 
-constexpr std::int64_t kPingBytes = trigger_ping_payload_size + trigger_overhead + 3;  // COBS byte, and a 00 at either end
+constexpr std::int64_t kPingBytes =
+    trigger_ping_payload_size + trigger_overhead + 3;  // COBS byte, and a 00 at either end
 constexpr std::int64_t kEventBytes = trigger_event_payload_size + trigger_overhead + 2;
 
 }  // namespace
@@ -82,7 +83,8 @@ PongWord BoardClock::answer(const TriggerPong& pong, HostStamp t4) noexcept {
     ++totals_.refused;
     return PongWord::nonsense;
   }
-  const Duration inside = Duration::microseconds(static_cast<std::int64_t>(pong.sent - pong.received));
+  const Duration inside =
+      Duration::microseconds(static_cast<std::int64_t>(pong.sent - pong.received));
   const Duration rtt = (t4 - sent) - inside;
   // A tick at either end, and the board's clock may be slow.
   const Duration tolerance = Duration::microseconds(2) + inside / 1000;
@@ -99,9 +101,12 @@ PongWord BoardClock::answer(const TriggerPong& pong, HostStamp t4) noexcept {
     return PongWord::backward;
   }
   backward_ = 0;
-  newest_tick_ = pong.received;  // not `sent`: the next question may have come while this answer waited for the line
+  newest_tick_ = pong.received;  // not `sent`: the next question may have come while this answer
+                                 // waited for the line
   take_turns(t4);
-  for (ClockMapper& m : mappers_) m.ping(sent, stamp_of_tick(pong.received), stamp_of_tick(pong.sent), std::max(t4, sent + inside));
+  for (ClockMapper& m : mappers_)
+    m.ping(sent, stamp_of_tick(pong.received), stamp_of_tick(pong.sent),
+           std::max(t4, sent + inside));
   known_ = true;
   ++answers_;
   ++totals_.answered;
@@ -123,7 +128,8 @@ TimeQuality BoardClock::quality() const noexcept {
   t.drift_ppm = mappers_[used_].drift() * 1e6;
   if (rtts_ > 0) {
     std::array<std::int64_t, kRemembered> sorted = rtt_ns_;
-    const auto end = sorted.begin() + static_cast<std::ptrdiff_t>(rtts_), middle = sorted.begin() + static_cast<std::ptrdiff_t>(rtts_ / 2);
+    const auto end = sorted.begin() + static_cast<std::ptrdiff_t>(rtts_),
+               middle = sorted.begin() + static_cast<std::ptrdiff_t>(rtts_ / 2);
     std::nth_element(sorted.begin(), middle, end);
     t.rtt_median = Duration::nanoseconds(*middle);
     t.rtt_least = Duration::nanoseconds(*std::min_element(sorted.begin(), middle + 1));

@@ -11,7 +11,9 @@ constexpr std::size_t kTextAtLeast = 12;  // so many printable bytes in a row ar
 
 /// The first bytes may be the end of something, or of another baud rate.
 std::string_view longest_text(std::string_view heard) noexcept {
-  const auto printable = [](char c) { return (c >= ' ' && c <= '~') || c == '\r' || c == '\n' || c == '\t'; };
+  const auto printable = [](char c) {
+    return (c >= ' ' && c <= '~') || c == '\r' || c == '\n' || c == '\t';
+  };
   std::string_view best;
   for (std::size_t from = 0; from < heard.size(); ++from) {
     std::size_t to = from;
@@ -47,12 +49,14 @@ void BoardLine::note_end_of_read() noexcept {
   bounded_ = true;
 }
 
-DeviceStatus BoardLine::send(std::uint8_t type, std::span<const std::uint8_t> payload, std::uint8_t* sequence) noexcept {
+DeviceStatus BoardLine::send(std::uint8_t type, std::span<const std::uint8_t> payload,
+                             std::uint8_t* sequence) noexcept {
   constexpr Duration kWrite = Duration::milliseconds(50);
   if (sequence != nullptr) *sequence = sequence_;
   // The 00 before it ends whatever an earlier program left half sent.
   std::array<std::uint8_t, trigger_max_frame + 1> frame{};
-  const std::size_t size = trigger_write_frame(type, sequence_, payload.data(), payload.size(), frame.data() + 1);
+  const std::size_t size =
+      trigger_write_frame(type, sequence_, payload.data(), payload.size(), frame.data() + 1);
   sequence_ = static_cast<std::uint8_t>((sequence_ + 1U) % trigger_unasked);
   return line_->write(std::span(frame).first(size + 1), kWrite);
 }
@@ -72,7 +76,8 @@ DeviceStatus BoardLine::next(HostStamp deadline, TriggerFrame* frame, Times* tim
       const std::uint8_t byte = buffer_[used_++];
       const bool ready = trigger_decode(&decoder_, byte, frame) == trigger_frame_ready;
       note_byte(byte);
-      if (used_ == size_ || ready) note_end_of_read();  // its end bounds a whole frame, wherever in the read it is
+      if (used_ == size_ || ready)
+        note_end_of_read();  // its end bounds a whole frame, wherever in the read it is
       const HostStamp departure = departure_;
       if (byte == 0) {
         into_frame_ = 0;
@@ -109,8 +114,10 @@ void BoardLine::forget() noexcept {
 std::string BoardLine::heard_instead() const {
   const std::string_view heard(heard_.data(), heard_size_);
   if (heard.empty() || frames_heard_ > 0) return {};
-  if (heard.find("\xFA\xFF") != std::string_view::npos) return "it speaks Xbus, as an XSens INS does";
-  if (heard.find("$G") != std::string_view::npos) return "it speaks NMEA 0183, as a GNSS receiver does";
+  if (heard.find("\xFA\xFF") != std::string_view::npos)
+    return "it speaks Xbus, as an XSens INS does";
+  if (heard.find("$G") != std::string_view::npos)
+    return "it speaks NMEA 0183, as a GNSS receiver does";
   if (const std::string_view text = longest_text(heard); text.size() >= kTextAtLeast) {
     std::string some(text.substr(0, 40));
     std::replace_if(

@@ -17,13 +17,16 @@ struct LineCounters {
   [[nodiscard]] std::uint64_t refused() const noexcept { return bad_coding + bad_length + bad_crc; }
 };
 
-/// Frames of the trigger protocol on a line. They come one after the other, whoever asks for them: an answer that was waited for and an
-/// event that came in the same read are both had.
+/// Frames of the trigger protocol on a line. They come one after the other, whoever asks for them:
+/// an answer that was waited for and an event that came in the same read are both had.
 ///
-/// Time     A converter hands bytes over in bursts, so the end of a frame says little about when it was sent. But the last byte of a read
-///          was on the wire just before the burst left. Of a frame that reads ended in, each of them bounds when its first bit left the
-///          board: the arrival less what the bytes up to there take on the wire. The earliest of these is the frame's departure.
-/// Threads  One caller. Memory: in place. Errors: what is no frame is counted and passed over; the next 00 is a new beginning.
+/// Time     A converter hands bytes over in bursts, so the end of a frame says little about when it
+///          was sent. But the last byte of a read was on the wire just before the burst left. Of a
+///          frame that reads ended in, each of them bounds when its first bit left the
+///          board: the arrival less what the bytes up to there take on the wire. The earliest of
+///          these is the frame's departure.
+/// Threads  One caller. Memory: in place. Errors: what is no frame is counted and passed over; the
+///          next 00 is a new beginning.
 class BoardLine {
  public:
   /// What a frame tells about time.
@@ -32,19 +35,23 @@ class BoardLine {
     HostStamp departure{};  // of its first bit, at the latest
   };
 
-  /// From another line, or the same anew: what was read before is forgotten, the counters go on. The line outlives its use.
+  /// From another line, or the same anew: what was read before is forgotten, the counters go on.
+  /// The line outlives its use.
   void attach(ByteLine* line) noexcept;
   /// A byte's time on the wire, 0 where it has none.
   void set_byte_time(Duration time) noexcept { byte_time_ = time; }
   [[nodiscard]] HostStamp now() const noexcept { return line_->now(); }
-  /// Sends a frame, `sequence` (may be null): the number that its answer has. → ok, timeout, gone, failed
-  [[nodiscard]] DeviceStatus send(std::uint8_t type, std::span<const std::uint8_t> payload, std::uint8_t* sequence) noexcept;
+  /// Sends a frame, `sequence` (may be null): the number that its answer has. → ok, timeout, gone,
+  /// failed
+  [[nodiscard]] DeviceStatus send(std::uint8_t type, std::span<const std::uint8_t> payload,
+                                  std::uint8_t* sequence) noexcept;
   /// The next frame, reading until `deadline` of the line's clock.
   /// → ok, timeout, stopped (woken), ended, gone, failed
   [[nodiscard]] DeviceStatus next(HostStamp deadline, TriggerFrame* frame, Times* times) noexcept;
 
   [[nodiscard]] LineCounters counters() const noexcept;
-  /// What the first bytes look like when no frame has come since attach() or forget(). Empty: nothing was heard, or frames were.
+  /// What the first bytes look like when no frame has come since attach() or forget(). Empty:
+  /// nothing was heard, or frames were.
   [[nodiscard]] std::string heard_instead() const;
   void forget() noexcept;
 

@@ -15,13 +15,16 @@ namespace {
 /// Nobody tells these questions to end: they are short.
 const std::atomic<bool> kNever{false};
 
-DeviceTiming timing_of(const TriggerConfig& config, Duration byte_time, Duration latency_timer) noexcept {
+DeviceTiming timing_of(const TriggerConfig& config, Duration byte_time,
+                       Duration latency_timer) noexcept {
   constexpr std::int64_t kEventBytes = trigger_event_payload_size + trigger_overhead + 2;
   DeviceTiming t;
   t.least_delay = byte_time * kEventBytes;
   // A report waits for the end of the exposures, at the latest for the next pulse.
-  const Duration period = Duration::nanoseconds(1'000'000'000'000 / std::max<std::int64_t>(1, config.rate_millihertz));
-  t.delay_spread = Duration::milliseconds(4) + latency_timer + (config.feedback_inputs != 0 ? period : Duration{});
+  const Duration period =
+      Duration::nanoseconds(1'000'000'000'000 / std::max<std::int64_t>(1, config.rate_millihertz));
+  t.delay_spread = Duration::milliseconds(4) + latency_timer +
+                   (config.feedback_inputs != 0 ? period : Duration{});
   t.resolution = Duration::microseconds(1);
   return t;
 }
@@ -38,7 +41,8 @@ std::string hex_of(const std::uint8_t (&bytes)[12]) {
 
 }  // namespace
 
-Device::Device(std::unique_ptr<LinePlace> place, const Options& options) : place_(std::move(place)), options_(options) {
+Device::Device(std::unique_ptr<LinePlace> place, const Options& options)
+    : place_(std::move(place)), options_(options) {
   info_.driver = "board";
   info_.place = place_->name();
 }
@@ -57,12 +61,14 @@ std::string Device::complaint() const {
 }
 
 Duration Device::byte_time() const noexcept {
-  return options_.native_usb || baud_ == 0 ? Duration{} : Duration::nanoseconds(10'000'000'000 / baud_);
+  return options_.native_usb || baud_ == 0 ? Duration{}
+                                           : Duration::nanoseconds(10'000'000'000 / baud_);
 }
 
 DeviceStatus Device::open() {
   LineSettings settings;
-  if (const std::uint32_t baud = baud_ != 0 ? baud_ : options_.baud; baud != 0) settings.baud = baud;
+  if (const std::uint32_t baud = baud_ != 0 ? baud_ : options_.baud; baud != 0)
+    settings.baud = baud;
   DeviceStatus status = DeviceStatus::ok;
   auto line = place_->open(settings, &status);
   const std::lock_guard lock(line_mutex_);
@@ -80,7 +86,8 @@ void Device::close_line() noexcept {
 /// Opens the line and asks who is there.
 DeviceStatus Device::meet(TriggerInfo* who_is_there) {
   DeviceStatus status = open();
-  if (status != DeviceStatus::ok) return refuse(status, place_->name() + " cannot be opened: " + std::string(to_string(status)));
+  if (status != DeviceStatus::ok)
+    return refuse(status, place_->name() + " cannot be opened: " + std::string(to_string(status)));
   Setup setup(*line_, frames_, stopping_, this);
   TriggerInfo who;
   status = setup.find(options_.native_usb ? line_->baud() : options_.baud, &who);
@@ -88,12 +95,13 @@ DeviceStatus Device::meet(TriggerInfo* who_is_there) {
   const std::string serial = hex_of(who.serial);
   // Another board would have other lines: that is for a person to decide.
   if (connected_ && serial != info_.serial)
-    return refuse(DeviceStatus::not_found,
-                  place_->name() + ": another trigger board is there now (" + serial + " instead of " + info_.serial + ")");
+    return refuse(DeviceStatus::not_found, place_->name() +
+                                               ": another trigger board is there now (" + serial +
+                                               " instead of " + info_.serial + ")");
   if (!connected_) {
     info_.serial = serial;
-    info_.model = "trigger board, firmware " + std::to_string(who.firmware_major) + "." + std::to_string(who.firmware_minor) + "." +
-                  std::to_string(who.firmware_patch);
+    info_.model = "trigger board, firmware " + std::to_string(who.firmware_major) + "." +
+                  std::to_string(who.firmware_minor) + "." + std::to_string(who.firmware_patch);
   }
   connected_ = true;
   baud_ = line_->baud();
@@ -101,7 +109,8 @@ DeviceStatus Device::meet(TriggerInfo* who_is_there) {
   return DeviceStatus::ok;
 }
 
-// ---- the owner's thread ---------------------------------------------------------------------------------------------
+// ---- the owner's thread
+// ---------------------------------------------------------------------------------------------
 
 DeviceStatus Device::connect() {
   stop();
@@ -112,7 +121,8 @@ DeviceStatus Device::connect() {
   return status;
 }
 
-DeviceStatus Device::configure(const TriggerConfiguration& wanted, TriggerConfiguration* actual) noexcept {
+DeviceStatus Device::configure(const TriggerConfiguration& wanted,
+                               TriggerConfiguration* actual) noexcept {
   try {
     stop();
     remark_.clear();
@@ -122,7 +132,8 @@ DeviceStatus Device::configure(const TriggerConfiguration& wanted, TriggerConfig
     }
     std::string sentence;
     TriggerConfig config;
-    const DeviceStatus possible = wire_configuration(wanted, options_, identity_, &config, &sentence);
+    const DeviceStatus possible =
+        wire_configuration(wanted, options_, identity_, &config, &sentence);
     if (possible != DeviceStatus::ok) return refuse(possible, std::move(sentence));
     config_ = config;
     mark_ = mark_of(config);
@@ -158,7 +169,8 @@ DeviceStatus Device::start(Notifier* ready) noexcept {
   if (!configured_) return DeviceStatus::bad_configuration;
   if (!thread_.joinable()) out_.clear();  // of the start before: its pulses are past
   const DeviceStatus status = out_.start(ready);
-  if (thread_.joinable() || status != DeviceStatus::ok) return status;  // streaming, or gone and perhaps back
+  if (thread_.joinable() || status != DeviceStatus::ok)
+    return status;  // streaming, or gone and perhaps back
   try {
     pause_.store(0, std::memory_order_relaxed);
     told_gone_ = false;
@@ -196,7 +208,8 @@ DeviceStatus Device::wait(Duration limit, Pulse* pulse) noexcept {
 DeviceStatus Device::pause(std::uint32_t pulses) noexcept {
   if (!out_.streaming()) return DeviceStatus::stopped;
   if (away_.load(std::memory_order_acquire)) return DeviceStatus::gone;
-  pause_.fetch_add(pulses, std::memory_order_release);  // the thread looks at least every ping_interval
+  pause_.fetch_add(pulses,
+                   std::memory_order_release);  // the thread looks at least every ping_interval
   return DeviceStatus::ok;
 }
 
@@ -206,7 +219,8 @@ TriggerStatistics Device::statistics() const noexcept {
   s.pulses = b.pulses.pulses;
   s.lost = b.pulses.lost;
   s.reboots = b.reboots;
-  s.malformed = b.pulses.refused() + b.pulses.exposures_refused + b.line.refused() + b.frames_unknown + b.time.refused;
+  s.malformed = b.pulses.refused() + b.pulses.exposures_refused + b.line.refused() +
+                b.frames_unknown + b.time.refused;
   s.overruns = overruns_.load(std::memory_order_relaxed);
   s.starts = starts_.load(std::memory_order_relaxed);
   return s;

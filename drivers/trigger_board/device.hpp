@@ -22,8 +22,9 @@ namespace vergence::trigger_board {
 struct BoardStatistics {
   LineCounters line{};  // frames, and what was none
   PulseCounters pulses{};
-  std::uint64_t frames_unknown = 0;     // right frames of a type or size that this protocol does not have
-  std::uint64_t errors = 0;             // ERROR messages that no one waited for
+  std::uint64_t frames_unknown =
+      0;                     // right frames of a type or size that this protocol does not have
+  std::uint64_t errors = 0;  // ERROR messages that no one waited for
   std::uint64_t writes_refused = 0;     // questions that the line did not take
   std::uint64_t reboots = 0, gone = 0;  // begun anew; the line was lost
   std::uint64_t restarts = 0;           // it had stopped by itself, and was started again
@@ -34,30 +35,34 @@ struct BoardStatistics {
 
 /// A trigger board on a serial line.
 ///
-/// As TriggerDevice says. connect() and configure() talk to the board and may take a second, at most seven where none answers. start()
-/// never waits: a thread of the device's own asks for the board's time, starts it, reads, and after `gone` opens and sets it again until it
-/// is back. A board that says nothing for kSilent is gone. One that begins anew (another boot_id) is configured and started by itself, the
-/// pulses of another `boot` follow. A board that kept its pulses going while the line was away goes on with them.
-/// Time     Pulses are mapped: by pings, kFirstPings of them before the board starts, then every Options::ping_interval. Where it answers
-///          none, they come unmapped.
+/// As TriggerDevice says. connect() and configure() talk to the board and may take a second, at
+/// most seven where none answers. start() never waits: a thread of the device's own asks for the
+/// board's time, starts it, reads, and after `gone` opens and sets it again until it is back. A
+/// board that says nothing for kSilent is gone. One that begins anew (another boot_id) is
+/// configured and started by itself, the pulses of another `boot` follow. A board that kept its
+/// pulses going while the line was away goes on with them.
+/// Time     Pulses are mapped: by pings, kFirstPings of them before the board starts, then every
+///          Options::ping_interval. Where it answers none, they come unmapped.
 /// Memory   The thread allocates only while the board is gone or begins anew.
 class Device final : public TriggerDevice, private FrameSink {
  public:
   static constexpr Duration kSilent = Duration::seconds(1);
   static constexpr int kFirstPings = 8;
-  static constexpr int kMostRefused = 8;  // events in a row that make no sense: the board is set up anew
+  static constexpr int kMostRefused =
+      8;  // events in a row that make no sense: the board is set up anew
 
   Device(std::unique_ptr<LinePlace> place, const Options& options);
   Device(const Device&) = delete;
   Device& operator=(const Device&) = delete;
   ~Device() override;
 
-  /// Opens the line and asks who is there. → ok, not_found (another make, or nobody), no_permission, busy, unsupported (another protocol
-  /// version), gone, failed
+  /// Opens the line and asks who is there. → ok, not_found (another make, or nobody),
+  /// no_permission, busy, unsupported (another protocol version), gone, failed
   [[nodiscard]] DeviceStatus connect();
 
   [[nodiscard]] const DeviceInfo& info() const noexcept override { return info_; }
-  [[nodiscard]] DeviceStatus configure(const TriggerConfiguration& wanted, TriggerConfiguration* actual) noexcept override;
+  [[nodiscard]] DeviceStatus configure(const TriggerConfiguration& wanted,
+                                       TriggerConfiguration* actual) noexcept override;
   [[nodiscard]] DeviceTiming timing() const noexcept override { return timing_; }
   [[nodiscard]] DeviceStatus start(Notifier* ready) noexcept override;
   [[nodiscard]] DeviceStatus wait(Duration limit, Pulse* pulse) noexcept override;
@@ -81,7 +86,12 @@ class Device final : public TriggerDevice, private FrameSink {
     int turns = 0;
     HostStamp again{};
   };
-  enum class Seen : std::uint8_t { nothing, reboot, halted, nonsense };  // what makes the thread stop reading and set the board up
+  enum class Seen : std::uint8_t {
+    nothing,
+    reboot,
+    halted,
+    nonsense
+  };  // what makes the thread stop reading and set the board up
 
   [[nodiscard]] DeviceStatus open();
   [[nodiscard]] DeviceStatus meet(TriggerInfo* who);
@@ -125,7 +135,7 @@ class Device final : public TriggerDevice, private FrameSink {
   mutable std::mutex complaint_mutex_;
   std::string complaint_;
 
-  std::mutex line_mutex_;           // of the pointer: stop() wakes a line that the thread may be replacing
+  std::mutex line_mutex_;  // of the pointer: stop() wakes a line that the thread may be replacing
   std::unique_ptr<ByteLine> line_;  // from here on: of the thread while it runs, else the owner's
   BoardLine frames_;
   PulseAccount account_;

@@ -10,11 +10,13 @@ enum class Edge : std::uint8_t { none, rising, falling };
 
 /// How a trigger board is reached, and what its inputs beside the cameras' are for.
 struct Options {
-  std::uint32_t baud = 0;   // 0: found by asking at kBauds
-  bool native_usb = false;  // bytes never are on a wire at the baud rate: the board's own USB, a pseudo-terminal
-  Edge pps = Edge::none;    // GNSS pulse per second, which disciplines the board's ticks
-  Edge ins = Edge::none;    // the INS' SyncOut
-  /// Between two questions for the board's time; each is up to a fifth sooner or later, so that no period of the line hides its floor.
+  std::uint32_t baud = 0;  // 0: found by asking at kBauds
+  bool native_usb =
+      false;  // bytes never are on a wire at the baud rate: the board's own USB, a pseudo-terminal
+  Edge pps = Edge::none;  // GNSS pulse per second, which disciplines the board's ticks
+  Edge ins = Edge::none;  // the INS' SyncOut
+  /// Between two questions for the board's time; each is up to a fifth sooner or later, so that no
+  /// period of the line hides its floor.
   Duration ping_interval = Duration::milliseconds(10);
 };
 

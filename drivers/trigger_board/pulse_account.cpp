@@ -10,15 +10,18 @@ static_assert(trigger_max_lines == kMaxCameras, "line k is camera k");
 /// The number that is meant by its low 32 bits, near `expected`.
 std::int64_t steps_from(std::uint64_t expected, std::uint32_t low) noexcept {
   const std::uint32_t d = low - static_cast<std::uint32_t>(expected);
-  return d < 0x80000000U ? static_cast<std::int64_t>(d) : static_cast<std::int64_t>(d) - 0x100000000LL;
+  return d < 0x80000000U ? static_cast<std::int64_t>(d)
+                         : static_cast<std::int64_t>(d) - 0x100000000LL;
 }
 
 enum class ExposureWord : std::uint8_t { none, good, nonsense };
 
 ExposureWord exposure_of(const TriggerExposure& told, PulseExposure* exposure) noexcept {
   constexpr std::int32_t kLongest = 10'000'000;  // µs
-  if (told.start_us == TRIGGER_NOT_SEEN || told.end_us == TRIGGER_NOT_SEEN) return ExposureWord::none;
-  if (told.start_us < 0 || told.end_us < told.start_us || told.end_us > kLongest) return ExposureWord::nonsense;
+  if (told.start_us == TRIGGER_NOT_SEEN || told.end_us == TRIGGER_NOT_SEEN)
+    return ExposureWord::none;
+  if (told.start_us < 0 || told.end_us < told.start_us || told.end_us > kLongest)
+    return ExposureWord::nonsense;
   *exposure = {true, Duration::microseconds(told.start_us), Duration::microseconds(told.end_us)};
   return ExposureWord::good;
 }
@@ -37,7 +40,8 @@ void PulseAccount::begin(std::uint32_t boot, std::uint32_t next) noexcept {
 void PulseAccount::set_intervals(std::uint32_t rate_millihertz, std::uint32_t vary_us) noexcept {
   const std::uint64_t period_us = 1'000'000'000U / std::max(1U, rate_millihertz);
   // A tenth less: the board's timer rounds, and PPS disciplines its ticks.
-  shortest_us_ = std::max<std::uint64_t>(1, (period_us - std::min<std::uint64_t>(period_us, vary_us)) * 9 / 10);
+  shortest_us_ = std::max<std::uint64_t>(
+      1, (period_us - std::min<std::uint64_t>(period_us, vary_us)) * 9 / 10);
 }
 
 void PulseAccount::end(std::uint32_t next, std::uint32_t to_come) noexcept {
@@ -62,11 +66,13 @@ bool PulseAccount::take(const TriggerEvent& event, Pulse* pulse) noexcept {
   if (missing < 0) return refuse(&counters_.repeated);
   if (event.tick > kMostTicks || (any_ && event.tick <= tick_)) return refuse(&counters_.backward);
   // Before the first, the ticks since the board's start bound the count.
-  if (static_cast<std::uint64_t>(missing) > (event.tick - tick_) / shortest_us_ + 1) return refuse(&counters_.too_many);
+  if (static_cast<std::uint64_t>(missing) > (event.tick - tick_) / shortest_us_ + 1)
+    return refuse(&counters_.too_many);
 
   const auto gap = static_cast<std::uint64_t>(missing);
   const bool flagged = (event.flags & 1U) != 0;
-  // A pause is seen by its flag or, where the event that carried it is lost, by a gap that holds all of it and that event.
+  // A pause is seen by its flag or, where the event that carried it is lost, by a gap that holds
+  // all of it and that event.
   const bool over = asked_ > 0 && gap > 0 && (flagged || gap > asked_);
   const std::uint64_t left_out = over ? std::min(asked_, gap) : 0;
   if (over) asked_ = 0;
@@ -83,7 +89,8 @@ bool PulseAccount::take(const TriggerEvent& event, Pulse* pulse) noexcept {
   p.boot = event.boot_id;
   p.resumed = flagged || over;
   for (std::size_t k = 0; k < p.exposure.size(); ++k)
-    if (exposure_of(event.exposure[k], &p.exposure[k]) == ExposureWord::nonsense) ++counters_.exposures_refused;
+    if (exposure_of(event.exposure[k], &p.exposure[k]) == ExposureWord::nonsense)
+      ++counters_.exposures_refused;
   *pulse = p;
   next_ = p.number + 1;
   tick_ = event.tick;

@@ -36,8 +36,8 @@ class PulseAccount {
   void forget_pause() noexcept { asked_ = 0; }
   /// The board's clock was set back: the next event may be earlier than the last.
   void forget_time() noexcept { any_ = false, tick_ = 0; }
-  /// Pulses are over, the board says, and the next would have this number: what is missing was lost, but for so many whose reports are
-  /// still to come.
+  /// Pulses are over, the board says, and the next would have this number: what is missing was
+  /// lost, but for so many whose reports are still to come.
   void end(std::uint32_t next, std::uint32_t to_come) noexcept;
   /// False: refused, *pulse is as it was. Sets all of it but the arrival and the host's time.
   [[nodiscard]] bool take(const TriggerEvent& event, Pulse* pulse) noexcept;
@@ -63,6 +63,8 @@ class PulseAccount {
 /// Beyond this a tick is nonsense: thirty years.
 inline constexpr std::uint64_t kMostTicks = 1'000'000'000'000'000;
 
-[[nodiscard]] inline DeviceStamp stamp_of_tick(std::uint64_t tick) noexcept { return DeviceStamp(static_cast<std::int64_t>(tick) * 1000); }
+[[nodiscard]] inline DeviceStamp stamp_of_tick(std::uint64_t tick) noexcept {
+  return DeviceStamp(static_cast<std::int64_t>(tick) * 1000);
+}
 
 }  // namespace vergence::trigger_board

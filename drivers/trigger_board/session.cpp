@@ -13,9 +13,11 @@
 namespace vergence::trigger_board {
 namespace {
 
-constexpr Duration kAgain = Duration::milliseconds(500);     // between attempts to open a line that is gone
-constexpr Duration kPublish = Duration::milliseconds(100);   // statistics are as old as this at most
-constexpr Duration kFirstPong = Duration::milliseconds(50);  // the first pings wait for their answers
+constexpr Duration kAgain =
+    Duration::milliseconds(500);  // between attempts to open a line that is gone
+constexpr Duration kPublish = Duration::milliseconds(100);  // statistics are as old as this at most
+constexpr Duration kFirstPong =
+    Duration::milliseconds(50);  // the first pings wait for their answers
 
 constexpr Duration kPauseAgain = Duration::milliseconds(300);  // without an answer
 constexpr int kPauseTurns = 3;
@@ -55,9 +57,14 @@ DeviceStatus Device::begin() noexcept {
   try {
     Setup setup(*line_, frames_, stopping_, this);
     const DeviceStatus status = begin_on(&setup);
-    if (status != DeviceStatus::ok && status != DeviceStatus::stopped) (void)refuse(status, place_->name() + ": " + setup.complaint());
-    // What it will not do it does not do the next time either; but boards are switched, and programs wait.
-    return status == DeviceStatus::ok || status == DeviceStatus::stopped || status == DeviceStatus::ended ? status : DeviceStatus::gone;
+    if (status != DeviceStatus::ok && status != DeviceStatus::stopped)
+      (void)refuse(status, place_->name() + ": " + setup.complaint());
+    // What it will not do it does not do the next time either; but boards are switched, and
+    // programs wait.
+    return status == DeviceStatus::ok || status == DeviceStatus::stopped ||
+                   status == DeviceStatus::ended
+               ? status
+               : DeviceStatus::gone;
   } catch (const std::exception&) {
     return DeviceStatus::gone;
   }
@@ -73,7 +80,8 @@ DeviceStatus Device::begin_on(Setup* setup) {
   frames_.set_byte_time(byte_time());
   TriggerStatus board{};
   if (running_ && who.boot_id == account_.boot()) {
-    // Its pulses may have gone on while the line was away, or it has stopped by itself: it goes on, and what was missed counts.
+    // Its pulses may have gone on while the line was away, or it has stopped by itself: it goes on,
+    // and what was missed counts.
     go_streaming(line_->now());
     status = setup->start(&board);
     if (status == DeviceStatus::ok && board.configuration == mark_) return started();
@@ -125,7 +133,9 @@ DeviceStatus Device::tie_clocks() noexcept {
     while (clock_.answers() == before && line_->now() < until) {
       if (stopping_.load(std::memory_order_acquire)) return DeviceStatus::stopped;
       const DeviceStatus status = read_one(until);
-      if (status != DeviceStatus::ok && status != DeviceStatus::timeout && status != DeviceStatus::stopped) return status;
+      if (status != DeviceStatus::ok && status != DeviceStatus::timeout &&
+          status != DeviceStatus::stopped)
+        return status;
     }
   }
   return DeviceStatus::ok;
@@ -142,21 +152,26 @@ DeviceStatus Device::read_on() noexcept {
     if (now >= next_ping) {
       ping();
       const double part = 1 + 0.2 * dither_.uniform(-1, 1);
-      next_ping = now + Duration::nanoseconds(std::llround(part * static_cast<double>(options_.ping_interval.ns())));
+      next_ping = now + Duration::nanoseconds(
+                            std::llround(part * static_cast<double>(options_.ping_interval.ns())));
     }
     if (now - published_ >= kPublish || now < published_) {
       published_ = now;
       publish(false);
     }
     const DeviceStatus status = read_one(next_ping);
-    if (status != DeviceStatus::ok && status != DeviceStatus::timeout && status != DeviceStatus::stopped) return status;
+    if (status != DeviceStatus::ok && status != DeviceStatus::timeout &&
+        status != DeviceStatus::stopped)
+      return status;
   }
   if (seen_ == Seen::halted) ++counted_.restarts;
   if (seen_ != Seen::nonsense) return DeviceStatus::ok;
   running_ = false;
   try {
-    (void)refuse(DeviceStatus::failed,
-                 place_->name() + ": the trigger board's numbers or ticks run backwards; check its supply and firmware");
+    (void)refuse(
+        DeviceStatus::failed,
+        place_->name() +
+            ": the trigger board's numbers or ticks run backwards; check its supply and firmware");
   } catch (const std::exception&) {  // out of memory: the counters say it
   }
   return DeviceStatus::failed;
@@ -188,10 +203,12 @@ bool Device::come_back() noexcept {
 void Device::rest(Duration time) noexcept {
   if (place_->pass(time)) return;
   std::unique_lock lock(rest_mutex_);
-  (void)stopped_.wait_for(lock, std::chrono::nanoseconds(time.ns()), [this] { return stopping_.load(std::memory_order_acquire); });
+  (void)stopped_.wait_for(lock, std::chrono::nanoseconds(time.ns()),
+                          [this] { return stopping_.load(std::memory_order_acquire); });
 }
 
-/// With exposure feedback the last pulse's report comes after the answer to STOP, when its exposures are over; nobody waits for it.
+/// With exposure feedback the last pulse's report comes after the answer to STOP, when its
+/// exposures are over; nobody waits for it.
 std::uint32_t Device::open_reports() const noexcept { return config_.feedback_inputs != 0 ? 1 : 0; }
 
 /// No pulse after it, and the last ones are counted.
@@ -201,7 +218,8 @@ void Device::halt_board() noexcept {
     TriggerStatus status;
     const DeviceStatus done = setup.halt(&status);
     if (done == DeviceStatus::ok) counted_.board = status;
-    if (done == DeviceStatus::ok && status.boot_id == account_.boot()) account_.end(status.pulses, open_reports());
+    if (done == DeviceStatus::ok && status.boot_id == account_.boot())
+      account_.end(status.pulses, open_reports());
     if (done != DeviceStatus::ok) (void)refuse(done, place_->name() + ": " + setup.complaint());
     if (done == DeviceStatus::gone) close_line();
   } catch (const std::exception&) {
@@ -217,8 +235,8 @@ void Device::ping() noexcept {
   if (frames_.send(trigger_ping, payload, nullptr) != DeviceStatus::ok) ++counted_.writes_refused;
 }
 
-/// Sends what was asked for, and again where no answer comes. One that was heard and whose answer was lost makes another pause: a gap more,
-/// which its numbers tell.
+/// Sends what was asked for, and again where no answer comes. One that was heard and whose answer
+/// was lost makes another pause: a gap more, which its numbers tell.
 void Device::send_pause(HostStamp now) noexcept {
   const std::uint32_t fresh = pause_.exchange(0, std::memory_order_acq_rel);
   if (fresh > 0)
@@ -240,7 +258,8 @@ void Device::send_pause(HostStamp now) noexcept {
     ++counted_.writes_refused;
 }
 
-// ---- what comes in --------------------------------------------------------------------------------------------------
+// ---- what comes in
+// --------------------------------------------------------------------------------------------------
 
 /// False: the board has begun anew since it was set up.
 bool Device::same_boot(std::uint32_t boot) noexcept {
@@ -275,7 +294,9 @@ void Device::accept(const TriggerFrame& frame, const BoardLine::Times& times) no
       asked_pause_ = {};
       account_.forget_pause();
     }
-  } else if (frame.type != trigger_info || !trigger_get_info(frame.payload, size, &info)) {  // an INFO answers a question given up
+  } else if (frame.type != trigger_info ||
+             !trigger_get_info(frame.payload, size,
+                               &info)) {  // an INFO answers a question given up
     ++counted_.frames_unknown;
   }
 }
@@ -326,7 +347,8 @@ void Device::publish(bool last) noexcept {
   counted_.time = clock_.quality();
   counted_.time.pps_locked = counted_.board.pps_locked != 0;
   const bool seen = counted_.board.boot_id != 0 && counted_.board.pps_age_ms != 0xFFFFFFFFU;
-  counted_.time.pps_age = seen ? Duration::milliseconds(counted_.board.pps_age_ms) : Duration::nanoseconds(-1);
+  counted_.time.pps_age =
+      seen ? Duration::milliseconds(counted_.board.pps_age_ms) : Duration::nanoseconds(-1);
   // Whoever reads it holds the lock for a copy's time; the next tenth of a second will do as well.
   std::unique_lock lock(published_mutex_, std::defer_lock);
   if (last)

@@ -21,7 +21,9 @@ std::string text(const char* format, Args... args) {
 }
 
 /// From one sequence number of ours to another, forwards.
-int steps(std::uint8_t from, std::uint8_t to) noexcept { return (to + trigger_unasked - from) % trigger_unasked; }
+int steps(std::uint8_t from, std::uint8_t to) noexcept {
+  return (to + trigger_unasked - from) % trigger_unasked;
+}
 
 const char* words_of(std::uint8_t type) noexcept {
   switch (type) {
@@ -43,12 +45,16 @@ std::string words_of_error(std::uint8_t code) {
     case trigger_error_rate:
       return "its timer cannot make this rate; choose another trigger.rate";
     case trigger_error_pulse:
-      return "the pulse is not shorter than its period, or has no width; change trigger.width_us or trigger.vary_us";
+      return "the pulse is not shorter than its period, or has no width; change trigger.width_us "
+             "or trigger.vary_us";
     case trigger_error_line:
-      return "it does not have all of these lines and inputs; change trigger.lines, trigger.feedback, trigger.pps or trigger.ins";
+      return "it does not have all of these lines and inputs; change trigger.lines, "
+             "trigger.feedback, trigger.pps or trigger.ins";
     case trigger_error_version:
-      return text("it does not speak version %d of the trigger protocol, as this program does; flash this release's firmware",
-                  static_cast<int>(trigger_protocol_version));
+      return text(
+          "it does not speak version %d of the trigger protocol, as this program does; flash this "
+          "release's firmware",
+          static_cast<int>(trigger_protocol_version));
     case trigger_error_unknown_type:
     case trigger_error_wrong_size:
       return "it does not know the message; flash this release's firmware";
@@ -59,7 +65,8 @@ std::string words_of_error(std::uint8_t code) {
     case trigger_error_not_configured:
       return "it has lost its configuration";
     default:
-      return text("it gives error %u, which is none of this protocol version", static_cast<unsigned>(code));
+      return text("it gives error %u, which is none of this protocol version",
+                  static_cast<unsigned>(code));
   }
 }
 
@@ -71,7 +78,8 @@ std::uint32_t mark_of(const TriggerConfig& config) noexcept {
   return trigger_crc32(payload.data(), payload.size());
 }
 
-Setup::Answer Setup::listen(std::uint8_t type, std::uint8_t first, std::uint8_t last, std::uint8_t wanted, HostStamp until) {
+Setup::Answer Setup::listen(std::uint8_t type, std::uint8_t first, std::uint8_t last,
+                            std::uint8_t wanted, HostStamp until) {
   for (;;) {  // ends at `until`
     if (stop_.load(std::memory_order_acquire)) return Answer::stopped;
     TriggerFrame frame;
@@ -80,13 +88,15 @@ Setup::Answer Setup::listen(std::uint8_t type, std::uint8_t first, std::uint8_t 
     if (status == DeviceStatus::timeout) return Answer::silent;
     if (status == DeviceStatus::stopped) continue;  // woken: perhaps to be told to stop
     if (status != DeviceStatus::ok) return Answer::gone;
-    const bool mine = frame.sequence < trigger_unasked && steps(first, frame.sequence) <= steps(first, last);
+    const bool mine =
+        frame.sequence < trigger_unasked && steps(first, frame.sequence) <= steps(first, last);
     if (mine && frame.type == wanted) {
       frame_ = frame;
       return Answer::ok;
     }
     TriggerError error;
-    if (mine && frame.type == trigger_error && trigger_get_error(frame.payload, frame.size, &error) && error.refused == type) {
+    if (mine && frame.type == trigger_error &&
+        trigger_get_error(frame.payload, frame.size, &error) && error.refused == type) {
       error_ = error.code;
       return Answer::refused;
     }
@@ -94,14 +104,16 @@ Setup::Answer Setup::listen(std::uint8_t type, std::uint8_t first, std::uint8_t 
   }
 }
 
-Setup::Answer Setup::ask(std::uint8_t type, std::span<const std::uint8_t> payload, std::uint8_t wanted, Duration limit) {
+Setup::Answer Setup::ask(std::uint8_t type, std::span<const std::uint8_t> payload,
+                         std::uint8_t wanted, Duration limit) {
   const HostStamp end = frames_.now() + limit;
   std::uint8_t first = 0, last = 0;
   for (bool again = false;; again = true) {  // each turn listens for kAskAgain of the limit
     const DeviceStatus sent = frames_.send(type, payload, &last);
     if (sent == DeviceStatus::gone || sent == DeviceStatus::failed) return Answer::gone;
     if (!again) first = last;
-    const Answer answer = listen(type, first, last, wanted, std::min(end, frames_.now() + kAskAgain));
+    const Answer answer =
+        listen(type, first, last, wanted, std::min(end, frames_.now() + kAskAgain));
     if (answer != Answer::silent || frames_.now() >= end) return answer;
   }
 }
@@ -114,13 +126,15 @@ DeviceStatus Setup::verdict(Answer answer, std::uint8_t type) {
       return DeviceStatus::stopped;
     case Answer::refused:
       complaint_ = text("the trigger board refuses %s: ", words_of(type)) + words_of_error(error_);
-      return error_ == trigger_error_not_stopped || error_ == trigger_error_not_configured ? DeviceStatus::failed
-                                                                                           : DeviceStatus::unsupported;
+      return error_ == trigger_error_not_stopped || error_ == trigger_error_not_configured
+                 ? DeviceStatus::failed
+                 : DeviceStatus::unsupported;
     case Answer::silent:
     case Answer::gone:
       break;
   }
-  complaint_ = text("the trigger board did not answer when asked %s; check its cable and supply", words_of(type));
+  complaint_ = text("the trigger board did not answer when asked %s; check its cable and supply",
+                    words_of(type));
   return DeviceStatus::gone;
 }
 
@@ -134,14 +148,18 @@ DeviceStatus Setup::hello(Duration limit, TriggerInfo* info) {
   const unsigned theirs = frame_.size > 0 ? frame_.payload[0] : 0U;
   if (theirs != trigger_protocol_version) return other_version(theirs);
   if (trigger_get_info(frame_.payload, frame_.size, info)) return DeviceStatus::ok;
-  complaint_ = text("the trigger board tells %u bytes about itself, which are no INFO; flash this release's firmware",
-                    static_cast<unsigned>(frame_.size));
+  complaint_ = text(
+      "the trigger board tells %u bytes about itself, which are no INFO; flash this release's "
+      "firmware",
+      static_cast<unsigned>(frame_.size));
   return DeviceStatus::unsupported;
 }
 
 DeviceStatus Setup::other_version(unsigned theirs) {
-  complaint_ = text("the trigger board speaks version %u of the protocol and this program version %d; flash this release's firmware",
-                    theirs, static_cast<int>(trigger_protocol_version));
+  complaint_ = text(
+      "the trigger board speaks version %u of the protocol and this program version %d; flash this "
+      "release's firmware",
+      theirs, static_cast<int>(trigger_protocol_version));
   return DeviceStatus::unsupported;
 }
 
@@ -157,7 +175,8 @@ DeviceStatus Setup::name_version() {
     if (answer != Answer::refused) break;
   }
   complaint_ = text(
-      "the trigger board does not speak version %d of the protocol, as this program does, nor any below %d; flash this release's "
+      "the trigger board does not speak version %d of the protocol, as this program does, nor any "
+      "below %d; flash this release's "
       "firmware",
       static_cast<int>(trigger_protocol_version), static_cast<int>(kNewest));
   return DeviceStatus::unsupported;
@@ -182,38 +201,48 @@ DeviceStatus Setup::find(std::uint32_t baud, TriggerInfo* info) {
       if (baud != 0) break;
     }
   }
-  complaint_ = heard.empty() ? std::string("nothing there answers as a trigger board does; check its cable, supply and firmware")
-                             : "what is there is no trigger board: " + heard + "; name the board's port in trigger.port";
+  complaint_ = heard.empty() ? std::string(
+                                   "nothing there answers as a trigger board does; check its "
+                                   "cable, supply and firmware")
+                             : "what is there is no trigger board: " + heard +
+                                   "; name the board's port in trigger.port";
   return DeviceStatus::not_found;
 }
 
 template <class Fits>
-DeviceStatus Setup::ask_status(std::uint8_t type, std::span<const std::uint8_t> payload, TriggerStatus* status, Fits fits) {
+DeviceStatus Setup::ask_status(std::uint8_t type, std::span<const std::uint8_t> payload,
+                               TriggerStatus* status, Fits fits) {
   for (int turn = 0; turn < kTurns; ++turn) {
     const DeviceStatus answered = verdict(ask(type, payload, trigger_status, kAnswer), type);
     if (answered != DeviceStatus::ok) return answered;
-    // The answer to a question before this one, given up, may have come late: it tells the state before.
+    // The answer to a question before this one, given up, may have come late: it tells the state
+    // before.
     TriggerStatus s;
     if (!trigger_get_status(frame_.payload, frame_.size, &s) || !fits(s)) continue;
     *status = s;
     return DeviceStatus::ok;
   }
-  complaint_ = text("the trigger board answers when asked %s, and does not do it; switch it off and on", words_of(type));
+  complaint_ =
+      text("the trigger board answers when asked %s, and does not do it; switch it off and on",
+           words_of(type));
   return DeviceStatus::failed;
 }
 
 DeviceStatus Setup::halt(TriggerStatus* status) {
-  return ask_status(trigger_stop, {}, status, [](const TriggerStatus& s) { return s.state == trigger_stopped; });
+  return ask_status(trigger_stop, {}, status,
+                    [](const TriggerStatus& s) { return s.state == trigger_stopped; });
 }
 
 DeviceStatus Setup::configure(const TriggerConfig& config, TriggerStatus* status) {
   std::array<std::uint8_t, trigger_config_payload_size> payload{};
   trigger_put_config(&config, payload.data());
-  return ask_status(trigger_config, payload, status, [&](const TriggerStatus& s) { return s.configuration == mark_of(config); });
+  return ask_status(trigger_config, payload, status,
+                    [&](const TriggerStatus& s) { return s.configuration == mark_of(config); });
 }
 
 DeviceStatus Setup::start(TriggerStatus* status) {
-  return ask_status(trigger_start, {}, status, [](const TriggerStatus& s) { return s.state != trigger_stopped; });
+  return ask_status(trigger_start, {}, status,
+                    [](const TriggerStatus& s) { return s.state != trigger_stopped; });
 }
 
 }  // namespace vergence::trigger_board

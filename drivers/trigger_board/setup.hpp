@@ -18,13 +18,16 @@ class FrameSink {
 
 /// Questions to a board, each with its answer: who it is, halt, configuration, start.
 ///
-/// Threads  One caller. Memory: none, but for the sentence of a refusal. Time: no call outlasts a second, find() two a baud rate.
-/// Errors   Statuses: gone (silent, or the line is), stopped (`stop` is set), unsupported (another protocol version, or refused by the
-///          board), failed. complaint() says what and what to do.
+/// Threads  One caller. Memory: none, but for the sentence of a refusal. Time: no call outlasts a
+///          second, find() two a baud rate.
+/// Errors   Statuses: gone (silent, or the line is), stopped (`stop` is set), unsupported (another
+///          protocol version, or refused by the board), failed. complaint() says what and what to
+///          do.
 class Setup {
  public:
   /// `others` may be null.
-  Setup(ByteLine& line, BoardLine& frames, const std::atomic<bool>& stop, FrameSink* others) noexcept
+  Setup(ByteLine& line, BoardLine& frames, const std::atomic<bool>& stop,
+        FrameSink* others) noexcept
       : line_(line), frames_(frames), stop_(stop), others_(others) {}
 
   /// Asks who is there, at the baud rates that `baud` (0: all that boards use) allows.
@@ -38,10 +41,13 @@ class Setup {
 
  private:
   enum class Answer : std::uint8_t { ok, refused, silent, gone, stopped };
-  [[nodiscard]] Answer ask(std::uint8_t type, std::span<const std::uint8_t> payload, std::uint8_t wanted, Duration limit);
-  [[nodiscard]] Answer listen(std::uint8_t type, std::uint8_t first, std::uint8_t last, std::uint8_t wanted, HostStamp until);
+  [[nodiscard]] Answer ask(std::uint8_t type, std::span<const std::uint8_t> payload,
+                           std::uint8_t wanted, Duration limit);
+  [[nodiscard]] Answer listen(std::uint8_t type, std::uint8_t first, std::uint8_t last,
+                              std::uint8_t wanted, HostStamp until);
   template <class Fits>
-  [[nodiscard]] DeviceStatus ask_status(std::uint8_t type, std::span<const std::uint8_t> payload, TriggerStatus* status, Fits fits);
+  [[nodiscard]] DeviceStatus ask_status(std::uint8_t type, std::span<const std::uint8_t> payload,
+                                        TriggerStatus* status, Fits fits);
   [[nodiscard]] DeviceStatus hello(Duration limit, TriggerInfo* info);
   [[nodiscard]] DeviceStatus other_version(unsigned theirs);
   [[nodiscard]] DeviceStatus name_version();

@@ -9,7 +9,8 @@ namespace {
 /// Converters that XSens builds into its own cables: an INS is behind them.
 bool of_xsens(const SerialPortInfo& port) noexcept {
   constexpr std::uint16_t kFtdi = 0x0403, kXsens = 0x2639;
-  return port.usb_vendor == kXsens || (port.usb_vendor == kFtdi && port.usb_product >= 0xD388 && port.usb_product <= 0xD38F);
+  return port.usb_vendor == kXsens ||
+         (port.usb_vendor == kFtdi && port.usb_product >= 0xD388 && port.usb_product <= 0xD38F);
 }
 
 /// The board's own USB: its baud rate is a word without meaning.
@@ -22,7 +23,9 @@ bool is_native(const std::string& port) {
 }  // namespace
 
 Driver::Driver(const Options& options)
-    : Driver(options, {list_serial_ports, [](const std::string& port) { return std::make_unique<SerialPort>(port); }}) {}
+    : Driver(options, {list_serial_ports, [](const std::string& port) {
+                         return std::make_unique<SerialPort>(port);
+                       }}) {}
 
 std::vector<std::string> Driver::candidates() const {
   std::vector<std::string> found;
@@ -54,34 +57,42 @@ std::unique_ptr<Device> Driver::look_for(std::string_view serial, DeviceStatus* 
     std::unique_ptr<Device> board = open_port(port, status);
     if (board == nullptr) {
       // A board that cannot be used is worth more words than a port without one.
-      if (*status != DeviceStatus::not_found && *status != DeviceStatus::gone) trouble = *status, others = complaint_;
+      if (*status != DeviceStatus::not_found && *status != DeviceStatus::gone)
+        trouble = *status, others = complaint_;
       continue;
     }
     if (!serial.empty() && board->info().serial != serial) continue;
     if (chosen != nullptr) {
-      complaint_ = "there is more than one trigger board; name one's port or serial number in trigger.port";
+      complaint_ =
+          "there is more than one trigger board; name one's port or serial number in trigger.port";
       *status = DeviceStatus::not_found;
       return nullptr;
     }
     chosen = std::move(board);
   }
   *status = chosen != nullptr ? DeviceStatus::ok : trouble;
-  complaint_ = chosen != nullptr ? ""
-               : !others.empty() ? others
-               : serial.empty()
-                   ? "no trigger board answers on any USB port; plug it in, or name its port in trigger.port"
-                   : "no trigger board with serial number " + std::string(serial) + " answers; check trigger.port and its cable";
+  complaint_ =
+      chosen != nullptr ? ""
+      : !others.empty() ? others
+      : serial.empty()
+          ? "no trigger board answers on any USB port; plug it in, or name its port in trigger.port"
+          : "no trigger board with serial number " + std::string(serial) +
+                " answers; check trigger.port and its cable";
   return chosen;
 }
 
 std::unique_ptr<Device> Driver::open_board(std::string_view where, DeviceStatus* status) {
   complaint_.clear();
-  return where.find('/') != std::string_view::npos ? open_port(std::string(where), status) : look_for(where, status);
+  return where.find('/') != std::string_view::npos ? open_port(std::string(where), status)
+                                                   : look_for(where, status);
 }
 
-std::unique_ptr<TriggerDevice> Driver::open(std::string_view where, DeviceStatus* status) { return open_board(where, status); }
+std::unique_ptr<TriggerDevice> Driver::open(std::string_view where, DeviceStatus* status) {
+  return open_board(where, status);
+}
 
-std::unique_ptr<Device> open_on(std::unique_ptr<LinePlace> place, const Options& options, DeviceStatus* status, std::string* complaint) {
+std::unique_ptr<Device> open_on(std::unique_ptr<LinePlace> place, const Options& options,
+                                DeviceStatus* status, std::string* complaint) {
   auto device = std::make_unique<Device>(std::move(place), options);
   *status = device->connect();
   if (*status == DeviceStatus::ok) return device;

@@ -15,7 +15,8 @@ namespace vergence::trigger_board {
 
 /// Trigger boards on serial lines: the row `board` of the table of trigger drivers.
 ///
-/// A board is known by what it answers to HELLO. Asked are the ports of USB converters and boards, but those of XSens' own converters.
+/// A board is known by what it answers to HELLO. Asked are the ports of USB converters and boards,
+/// but those of XSens' own converters.
 /// Threads  One caller. Errors: TriggerDriver's.
 class Driver final : public TriggerDriver {
  public:
@@ -28,11 +29,14 @@ class Driver final : public TriggerDriver {
   explicit Driver(const Options& options = {});
   Driver(const Options& options, Ports ports) : options_(options), ports_(std::move(ports)) {}
 
-  /// Boards that answer now; a port that somebody holds is passed over. Takes up to three seconds for a port where none answers.
+  /// Boards that answer now; a port that somebody holds is passed over. Takes up to three seconds
+  /// for a port where none answers.
   [[nodiscard]] std::vector<DeviceInfo> enumerate() override;
-  /// `where`: a port (`/dev/ttyACM0`, a link to one), a board's serial number as enumerate() tells it, or empty: the only board there is.
+  /// `where`: a port (`/dev/ttyACM0`, a link to one), a board's serial number as enumerate() tells
+  /// it, or empty: the only board there is.
   /// → ok, not_found, no_permission, busy, unsupported, gone, failed
-  [[nodiscard]] std::unique_ptr<TriggerDevice> open(std::string_view where, DeviceStatus* status) override;
+  [[nodiscard]] std::unique_ptr<TriggerDevice> open(std::string_view where,
+                                                    DeviceStatus* status) override;
   /// The same, with what a trigger board has beyond other TriggerDevices.
   [[nodiscard]] std::unique_ptr<Device> open_board(std::string_view where, DeviceStatus* status);
   [[nodiscard]] std::string complaint() const override { return complaint_; }
@@ -48,7 +52,8 @@ class Driver final : public TriggerDriver {
 };
 
 /// The same on any line: simulators, tests. Null: *status and *complaint say why.
-[[nodiscard]] std::unique_ptr<Device> open_on(std::unique_ptr<LinePlace> place, const Options& options, DeviceStatus* status,
+[[nodiscard]] std::unique_ptr<Device> open_on(std::unique_ptr<LinePlace> place,
+                                              const Options& options, DeviceStatus* status,
                                               std::string* complaint);
 
 }  // namespace vergence::trigger_board

@@ -14,7 +14,7 @@ std::string text(const char* format, Args... args) {
   return buffer.data();
 }
 
-constexpr double kFastest = 2000;            // Hz: two events a millisecond are more than a line carries
+constexpr double kFastest = 2000;  // Hz: two events a millisecond are more than a line carries
 constexpr std::int64_t kWidest = 1'000'000;  // µs, of a pulse: the board's own limit
 
 std::uint8_t edge_kind(Edge edge) noexcept {
@@ -24,39 +24,57 @@ std::uint8_t edge_kind(Edge edge) noexcept {
 }
 
 /// Lines that a mask names beyond those that are there.
-bool beyond(std::uint8_t mask, std::uint8_t lines) noexcept { return lines < 8 && (mask >> lines) != 0; }
+bool beyond(std::uint8_t mask, std::uint8_t lines) noexcept {
+  return lines < 8 && (mask >> lines) != 0;
+}
 
 }  // namespace
 
-DeviceStatus wire_configuration(const TriggerConfiguration& wanted, const Options& options, const TriggerInfo& board, TriggerConfig* config,
+DeviceStatus wire_configuration(const TriggerConfiguration& wanted, const Options& options,
+                                const TriggerInfo& board, TriggerConfig* config,
                                 std::string* sentence) {
   const auto refuse = [sentence](DeviceStatus status, std::string why) {
     *sentence = std::move(why);
     return status;
   };
-  const auto bad = [&refuse](std::string why) { return refuse(DeviceStatus::bad_configuration, std::move(why)); };
-  const auto cannot = [&refuse](std::string why) { return refuse(DeviceStatus::unsupported, std::move(why)); };
+  const auto bad = [&refuse](std::string why) {
+    return refuse(DeviceStatus::bad_configuration, std::move(why));
+  };
+  const auto cannot = [&refuse](std::string why) {
+    return refuse(DeviceStatus::unsupported, std::move(why));
+  };
 
   if (!(wanted.rate_hz >= 0.001 && wanted.rate_hz <= kFastest))
-    return bad(text("a trigger.rate of %g Hz is none; choose 0.001 to %g", wanted.rate_hz, kFastest));
+    return bad(
+        text("a trigger.rate of %g Hz is none; choose 0.001 to %g", wanted.rate_hz, kFastest));
   const auto millihertz = static_cast<std::uint32_t>(std::llround(wanted.rate_hz * 1000));
-  const std::int64_t period_us = 1'000'000'000 / millihertz, width_us = wanted.width.ns() / 1000, vary_us = wanted.vary.ns() / 1000;
+  const std::int64_t period_us = 1'000'000'000 / millihertz, width_us = wanted.width.ns() / 1000,
+                     vary_us = wanted.vary.ns() / 1000;
   if (width_us < 1) return bad("a pulse needs a width: set trigger.width_us to 1 or more");
   if (width_us > kWidest)
-    return bad(text("a pulse of %lld µs is longer than a second; lower trigger.width_us", static_cast<long long>(width_us)));
+    return bad(text("a pulse of %lld µs is longer than a second; lower trigger.width_us",
+                    static_cast<long long>(width_us)));
   if (vary_us < 0 || vary_us >= period_us)
-    return bad(text("trigger.vary_us is %lld and the period %lld µs; it must lie between 0 and that", static_cast<long long>(vary_us),
-                    static_cast<long long>(period_us)));
+    return bad(
+        text("trigger.vary_us is %lld and the period %lld µs; it must lie between 0 and that",
+             static_cast<long long>(vary_us), static_cast<long long>(period_us)));
   if (width_us >= period_us - vary_us)
-    return bad(text("a pulse of %lld µs does not fit into %lld µs from pulse to pulse; lower trigger.width_us",
-                    static_cast<long long>(width_us), static_cast<long long>(period_us - vary_us)));
-  if (wanted.lines == 0) return bad("no line is to be pulsed; name the cameras' lines in trigger.lines");
+    return bad(text(
+        "a pulse of %lld µs does not fit into %lld µs from pulse to pulse; lower trigger.width_us",
+        static_cast<long long>(width_us), static_cast<long long>(period_us - vary_us)));
+  if (wanted.lines == 0)
+    return bad("no line is to be pulsed; name the cameras' lines in trigger.lines");
   if (beyond(wanted.lines, board.lines) || beyond(wanted.active_low, board.lines))
-    return cannot(text("the trigger board has %u lines, numbered from 0; trigger.lines names more", static_cast<unsigned>(board.lines)));
-  if (beyond(wanted.feedback, board.feedback_inputs) || beyond(wanted.feedback_active_low, board.feedback_inputs))
-    return cannot(text("the trigger board has %u inputs for exposure feedback, numbered from 0; trigger.feedback names more",
-                       static_cast<unsigned>(board.feedback_inputs)));
-  if (options.pps != Edge::none && board.has_pps == 0) return cannot("the trigger board has no input for PPS; set trigger.pps to none");
+    return cannot(text("the trigger board has %u lines, numbered from 0; trigger.lines names more",
+                       static_cast<unsigned>(board.lines)));
+  if (beyond(wanted.feedback, board.feedback_inputs) ||
+      beyond(wanted.feedback_active_low, board.feedback_inputs))
+    return cannot(
+        text("the trigger board has %u inputs for exposure feedback, numbered from 0; "
+             "trigger.feedback names more",
+             static_cast<unsigned>(board.feedback_inputs)));
+  if (options.pps != Edge::none && board.has_pps == 0)
+    return cannot("the trigger board has no input for PPS; set trigger.pps to none");
   if (options.ins != Edge::none && board.has_ins == 0)
     return cannot("the trigger board has no input for the INS' SyncOut; set trigger.ins to none");
 

@@ -13,7 +13,8 @@ namespace vergence::v4l2 {
 namespace {
 
 constexpr int kPollLimit_ms = 500;  // the longest look of the capture thread; nothing depends on it
-constexpr int kPollErrors = 20;     // looks in a row that end in an error without a frame: nothing comes any more
+constexpr int kPollErrors =
+    20;  // looks in a row that end in an error without a frame: nothing comes any more
 
 }  // namespace
 
@@ -65,7 +66,8 @@ void V4l2Camera::enqueue_returned() noexcept {
 }
 
 void V4l2Camera::give_back(std::uint32_t buffer) noexcept {
-  if (queue_->enqueue(buffer) == 0) ++with_kernel_;  // else the camera is gone, which the next look finds
+  if (queue_->enqueue(buffer) == 0)
+    ++with_kernel_;  // else the camera is gone, which the next look finds
 }
 
 /// False: the camera is gone.
@@ -99,9 +101,12 @@ void V4l2Camera::handle(Filled filled) noexcept {
   frame.exposure = had.exposure;
   frame.gain_db = had.gain_db;
   const StampKind kind = stamp_kind(filled.flags, filled.stamp_ns);
-  frame.exposure_start = exposure_start(kind, filled.stamp_ns, frame.arrival, frame.exposure, s.readout);
+  frame.exposure_start =
+      exposure_start(kind, filled.stamp_ns, frame.arrival, frame.exposure, s.readout);
   const std::size_t needed = least_frame_bytes(s.format, s.actual.width, s.actual.height, s.stride);
-  const bool inside = filled.offset <= slots_.buffer(filled.index).size() - needed;  // buffers hold what is needed: configure() has looked
+  const bool inside =
+      filled.offset <= slots_.buffer(filled.index).size() -
+                           needed;  // buffers hold what is needed: configure() has looked
   const bool whole = inside && filled.bytes >= needed;
   if (!inside) filled.offset = 0;
   if ((filled.flags & V4L2_BUF_FLAG_ERROR) != 0 || !whole) frame.status = FrameStatus::torn;
@@ -144,8 +149,9 @@ bool V4l2Camera::hand_over(const Filled& filled, Frame frame) noexcept {
     }
     frame.slot = *slot;
     lock.unlock();
-    to_grey(settings_->format, slots_.buffer(filled.index).data() + filled.offset, settings_->stride, settings_->actual.width,
-            settings_->actual.height, slots_.writable(*slot).data(), FramePool::stride(settings_->actual.width));
+    to_grey(settings_->format, slots_.buffer(filled.index).data() + filled.offset,
+            settings_->stride, settings_->actual.width, settings_->actual.height,
+            slots_.writable(*slot).data(), FramePool::stride(settings_->actual.width));
     give_back(filled.index);
     lock.lock();
   }

@@ -16,7 +16,8 @@
 namespace vergence::v4l2 {
 namespace {
 
-constexpr Duration kUnstamped = Duration::milliseconds(10);  // spread of arrivals where they have to serve as stamps
+constexpr Duration kUnstamped =
+    Duration::milliseconds(10);  // spread of arrivals where they have to serve as stamps
 
 }  // namespace
 
@@ -30,14 +31,16 @@ V4l2Camera::V4l2Camera(UniqueFd fd, Node node)
 
 V4l2Camera::~V4l2Camera() { stop(); }
 
-// ---- the owner's side ---------------------------------------------------------------------------------------------
+// ---- the owner's side
+// ---------------------------------------------------------------------------------------------
 
 DeviceStatus V4l2Camera::refuse(DeviceStatus status, std::string sentence) noexcept {
   complaint_ = std::move(sentence);
   return status;
 }
 
-DeviceStatus V4l2Camera::configure(const CameraConfiguration& wanted, CameraConfiguration* actual) noexcept {
+DeviceStatus V4l2Camera::configure(const CameraConfiguration& wanted,
+                                   CameraConfiguration* actual) noexcept {
   complaint_.clear();
   {
     const std::lock_guard lock(mutex_);
@@ -54,13 +57,15 @@ DeviceStatus V4l2Camera::configure(const CameraConfiguration& wanted, CameraConf
       if (actual != nullptr) *actual = settings_->actual;
     } else if (wanted_) {
       const std::string why = complaint_;
-      if (bring_to(*wanted_, false) != DeviceStatus::ok) lost_node_ = true;  // start() tries once more, from the beginning
+      if (bring_to(*wanted_, false) != DeviceStatus::ok)
+        lost_node_ = true;  // start() tries once more, from the beginning
       complaint_ = why;
     }
     return status;
   } catch (const std::exception& e) {
     lost_node_ = true;
-    return refuse(DeviceStatus::failed, std::string("there is no memory for its images: ") + e.what());
+    return refuse(DeviceStatus::failed,
+                  std::string("there is no memory for its images: ") + e.what());
   }
 }
 
@@ -72,7 +77,8 @@ DeviceStatus V4l2Camera::bring_to(const CameraConfiguration& wanted, bool keep_s
   if (!options.subdevice.empty()) {
     subdevice_.reset(::open(options.subdevice.c_str(), O_RDWR | O_CLOEXEC));
     if (!subdevice_.valid())
-      return refuse(DeviceStatus::unsupported, "option subdevice: " + options.subdevice + ": " + std::strerror(errno));
+      return refuse(DeviceStatus::unsupported,
+                    "option subdevice: " + options.subdevice + ": " + std::strerror(errno));
     controls.add(subdevice_.get());
   }
   controls.add(fd_.get());
@@ -84,19 +90,25 @@ DeviceStatus V4l2Camera::bring_to(const CameraConfiguration& wanted, bool keep_s
     queue_.reset();
   }
   Settings settings;
-  if (const DeviceStatus s = apply(fd_.get(), node_.type, controls_, wanted, options, &settings, &complaint_); s != DeviceStatus::ok)
+  if (const DeviceStatus s =
+          apply(fd_.get(), node_.type, controls_, wanted, options, &settings, &complaint_);
+      s != DeviceStatus::ok)
     return s;
   CaptureQueue queue(fd_.get(), node_.type);
   std::vector<Mapping> mappings;
-  if (const int error = queue.request(static_cast<std::uint32_t>(options.buffers), &mappings); error != 0) {
+  if (const int error = queue.request(static_cast<std::uint32_t>(options.buffers), &mappings);
+      error != 0) {
     if (error == ENODEV) return refuse(DeviceStatus::gone, {});
-    if (error == EBUSY) return refuse(DeviceStatus::busy, "another program streams from this camera: end it first");
-    return refuse(DeviceStatus::failed, std::string("the kernel gives no buffers: ") + std::strerror(error));
+    if (error == EBUSY)
+      return refuse(DeviceStatus::busy, "another program streams from this camera: end it first");
+    return refuse(DeviceStatus::failed,
+                  std::string("the kernel gives no buffers: ") + std::strerror(error));
   }
   if (mappings.size() <= kBufferReserve || mappings.front().bytes() < settings.image_size) {
     queue.free();
-    return refuse(DeviceStatus::failed, "the kernel gives " + std::to_string(mappings.size()) + " buffers of " +
-                                            std::to_string(mappings.front().bytes()) + " bytes, too few or too small");
+    return refuse(DeviceStatus::failed,
+                  "the kernel gives " + std::to_string(mappings.size()) + " buffers of " +
+                      std::to_string(mappings.front().bytes()) + " bytes, too few or too small");
   }
   stamps_ = stamp_kind(queue.description_flags(), 1);
   if (!keep_slots) {
@@ -128,8 +140,11 @@ DeviceStatus V4l2Camera::open_again() {
   close_node();
   Node node;
   const DeviceStatus found = find_node(info_.serial, &fd_, &node);
-  if (found == DeviceStatus::no_permission) return refuse(found, node_.path + ": no permission; add the user to the group video");
-  if (found != DeviceStatus::ok) return refuse(DeviceStatus::gone, "there is no camera " + info_.serial + " any more: check its cable");
+  if (found == DeviceStatus::no_permission)
+    return refuse(found, node_.path + ": no permission; add the user to the group video");
+  if (found != DeviceStatus::ok)
+    return refuse(DeviceStatus::gone,
+                  "there is no camera " + info_.serial + " any more: check its cable");
   node_ = std::move(node);
   info_.place = node_.path;
   lost_node_ = false;
@@ -163,10 +178,13 @@ DeviceStatus V4l2Camera::start(Notifier* ready) noexcept {
     }
     if (const DeviceStatus status = start_streaming(); status != DeviceStatus::ok) return status;
     notifier_ = ready;
-    const Duration period = settings_->camera_rate_hz > 0 ? Duration::seconds(1 / settings_->camera_rate_hz) : Duration{};
+    const Duration period = settings_->camera_rate_hz > 0
+                                ? Duration::seconds(1 / settings_->camera_rate_hz)
+                                : Duration{};
     counter_.emplace(period);
     raster_.reset();
-    if (settings_->options.thin > 1) raster_.emplace(Duration::seconds(1 / settings_->actual.rate_hz));
+    if (settings_->options.thin > 1)
+      raster_.emplace(Duration::seconds(1 / settings_->actual.rate_hz));
     poll_errors_ = 0;
     exposures_.reset({settings_->actual.exposure, settings_->actual.gain_db});
     exposure_now_ = settings_->actual.exposure;
@@ -210,10 +228,12 @@ DeviceStatus V4l2Camera::start_streaming() {
   if (error == ENODEV) return DeviceStatus::gone;
   if (error == ENOSPC)
     return refuse(DeviceStatus::no_bandwidth,
-                  "its bus has no room for another stream: a lower rate, a smaller size, or a port of another USB controller");
+                  "its bus has no room for another stream: a lower rate, a smaller size, or a port "
+                  "of another USB controller");
   const std::string advice = media_advice(node_.path);
-  return refuse(DeviceStatus::failed,
-                std::string("it does not begin to stream: ") + std::strerror(error) + (advice.empty() ? "" : "\n" + advice));
+  return refuse(DeviceStatus::failed, std::string("it does not begin to stream: ") +
+                                          std::strerror(error) +
+                                          (advice.empty() ? "" : "\n" + advice));
 }
 
 /// After it the owner alone has the camera.
@@ -238,16 +258,20 @@ void V4l2Camera::stop() noexcept {
   end_thread();
 }
 
-DeviceStatus V4l2Camera::set_exposure(const ExposureSetting& wanted, ExposureSetting* actual) noexcept {
+DeviceStatus V4l2Camera::set_exposure(const ExposureSetting& wanted,
+                                      ExposureSetting* actual) noexcept {
   const std::lock_guard controlling(controlling_);
   {
     const std::lock_guard lock(mutex_);
     if (!streaming_) return DeviceStatus::stopped;
     if (gone_) return DeviceStatus::gone;
   }
-  if (wanted.exposure <= Duration{} || wanted.exposure.to_seconds() * settings_->actual.rate_hz > 1) return DeviceStatus::bad_configuration;
+  if (wanted.exposure <= Duration{} || wanted.exposure.to_seconds() * settings_->actual.rate_hz > 1)
+    return DeviceStatus::bad_configuration;
   ExposureSetting taken;
-  if (const DeviceStatus status = change_exposure(controls_, *settings_, wanted, &taken); status != DeviceStatus::ok) return status;
+  if (const DeviceStatus status = change_exposure(controls_, *settings_, wanted, &taken);
+      status != DeviceStatus::ok)
+    return status;
   wanted_->exposure = taken.exposure;  // also after it was unplugged
   wanted_->gain_db = taken.gain_db;
   settings_->actual.exposure = taken.exposure;
@@ -257,13 +281,15 @@ DeviceStatus V4l2Camera::set_exposure(const ExposureSetting& wanted, ExposureSet
   return DeviceStatus::ok;
 }
 
-// ---- the consumer's side ------------------------------------------------------------------------------------------
+// ---- the consumer's side
+// ------------------------------------------------------------------------------------------
 
 DeviceStatus V4l2Camera::wait(Duration limit, Frame* frame) noexcept {
   std::unique_lock lock(mutex_);
   if (!streaming_) return DeviceStatus::stopped;
   const auto something = [this] { return ready_count_ > 0 || gone_ || !streaming_; };
-  if (!something() && limit > Duration{}) (void)changed_.wait_for(lock, std::chrono::nanoseconds(limit.ns()), something);
+  if (!something() && limit > Duration{})
+    (void)changed_.wait_for(lock, std::chrono::nanoseconds(limit.ns()), something);
   if (!streaming_) return DeviceStatus::stopped;
   if (ready_count_ > 0) {
     *frame = ready_[ready_first_];

@@ -19,15 +19,17 @@
 
 namespace vergence::v4l2 {
 
-inline constexpr std::size_t kBufferReserve = 2;  // the kernel always has: with none it drops frames, and nobody knows how many
+inline constexpr std::size_t kBufferReserve =
+    2;  // the kernel always has: with none it drops frames, and nobody knows how many
 
 /// CLOCK_MONOTONIC.
 [[nodiscard]] HostStamp monotonic_now() noexcept;
 
 /// A camera behind a video node: drivers/camera.hpp and v4l2.hpp have the contract.
 ///
-/// The capture thread alone calls the kernel while streaming; the owner does in between. What passes between them, the consumer and the
-/// releaser is under one mutex that nobody holds across a system call that may wait.
+/// The capture thread alone calls the kernel while streaming; the owner does in between. What
+/// passes between them, the consumer and the releaser is under one mutex that nobody holds across a
+/// system call that may wait.
 class V4l2Camera final : public CameraDevice {
  public:
   /// An open node; `node.serial` is what it is found by after an unplug.
@@ -35,14 +37,16 @@ class V4l2Camera final : public CameraDevice {
   ~V4l2Camera() override;
 
   const DeviceInfo& info() const noexcept override { return info_; }
-  DeviceStatus configure(const CameraConfiguration& wanted, CameraConfiguration* actual) noexcept override;
+  DeviceStatus configure(const CameraConfiguration& wanted,
+                         CameraConfiguration* actual) noexcept override;
   DeviceTiming timing() const noexcept override;
   DeviceStatus start(Notifier* ready) noexcept override;
   DeviceStatus wait(Duration limit, Frame* frame) noexcept override;
   ImageView view(FrameSlot slot) const noexcept override { return slots_.view(slot); }
   void release(FrameSlot slot) noexcept override;
   void stop() noexcept override;
-  DeviceStatus set_exposure(const ExposureSetting& wanted, ExposureSetting* actual) noexcept override;
+  DeviceStatus set_exposure(const ExposureSetting& wanted,
+                            ExposureSetting* actual) noexcept override;
   std::string complaint() const override { return complaint_; }
   std::string remark() const override { return settings_ ? settings_->remark : std::string(); }
   CameraStatistics statistics() const noexcept override;

@@ -29,8 +29,12 @@ struct Description {
   Description& operator=(const Description&) = delete;
 
   [[nodiscard]] bool planes() const noexcept { return V4L2_TYPE_IS_MULTIPLANAR(buffer.type); }
-  [[nodiscard]] std::size_t length() const noexcept { return planes() ? plane.length : buffer.length; }
-  [[nodiscard]] std::int64_t offset() const noexcept { return planes() ? plane.m.mem_offset : buffer.m.offset; }
+  [[nodiscard]] std::size_t length() const noexcept {
+    return planes() ? plane.length : buffer.length;
+  }
+  [[nodiscard]] std::int64_t offset() const noexcept {
+    return planes() ? plane.m.mem_offset : buffer.m.offset;
+  }
   [[nodiscard]] std::size_t used() const noexcept {
     if (!planes()) return buffer.bytesused;
     return plane.bytesused - std::min(plane.data_offset, plane.bytesused);
@@ -40,7 +44,8 @@ struct Description {
 
 }  // namespace
 
-Mapping::Mapping(Mapping&& o) noexcept : data_(std::exchange(o.data_, nullptr)), bytes_(std::exchange(o.bytes_, 0)) {}
+Mapping::Mapping(Mapping&& o) noexcept
+    : data_(std::exchange(o.data_, nullptr)), bytes_(std::exchange(o.bytes_, 0)) {}
 
 Mapping& Mapping::operator=(Mapping&& o) noexcept {
   std::swap(data_, o.data_);
@@ -85,13 +90,13 @@ int CaptureQueue::enqueue(std::uint32_t index) noexcept {
 int CaptureQueue::dequeue(Filled* filled) noexcept {
   Description d(type_, 0);
   if (const int error = control(fd_, VIDIOC_DQBUF, &d.buffer); error != 0) return error;
-  *filled = {
-      d.buffer.index,
-      d.buffer.sequence,
-      d.buffer.flags,
-      static_cast<std::int64_t>(d.buffer.timestamp.tv_sec) * 1'000'000'000 + static_cast<std::int64_t>(d.buffer.timestamp.tv_usec) * 1'000,
-      d.used(),
-      d.first()};
+  *filled = {d.buffer.index,
+             d.buffer.sequence,
+             d.buffer.flags,
+             static_cast<std::int64_t>(d.buffer.timestamp.tv_sec) * 1'000'000'000 +
+                 static_cast<std::int64_t>(d.buffer.timestamp.tv_usec) * 1'000,
+             d.used(),
+             d.first()};
   return 0;
 }
 

@@ -9,7 +9,8 @@ namespace vergence::v4l2 {
 class Mapping {
  public:
   Mapping() noexcept = default;
-  Mapping(void* data, std::size_t bytes) noexcept : data_(static_cast<std::uint8_t*>(data)), bytes_(bytes) {}
+  Mapping(void* data, std::size_t bytes) noexcept
+      : data_(static_cast<std::uint8_t*>(data)), bytes_(bytes) {}
   Mapping(Mapping&& o) noexcept;
   Mapping& operator=(Mapping&& o) noexcept;
   ~Mapping();
@@ -27,11 +28,13 @@ struct Filled {
   std::uint32_t sequence = 0;
   std::uint32_t flags = 0;
   std::int64_t stamp_ns = 0;
-  std::size_t bytes = 0;   // that came
-  std::size_t offset = 0;  // of the first pixel in the buffer: some drivers put a header before the image
+  std::size_t bytes = 0;  // that came
+  std::size_t offset =
+      0;  // of the first pixel in the buffer: some drivers put a header before the image
 };
 
-/// The kernel's queue of capture buffers of one open node, single plane or a multi-plane queue of one plane.
+/// The kernel's queue of capture buffers of one open node, single plane or a multi-plane queue of
+/// one plane.
 ///
 /// Ownership  The descriptor stays the caller's and open longer than this.
 /// Errors     Every call → 0 or the errno.

@@ -15,8 +15,9 @@ constexpr int kMostControls = 512;  // more than any sensor has: a driver that n
 constexpr std::int64_t kMostItems = 64;
 
 bool is_number_like(std::uint32_t type) noexcept {
-  return type == V4L2_CTRL_TYPE_INTEGER || type == V4L2_CTRL_TYPE_BOOLEAN || type == V4L2_CTRL_TYPE_MENU ||
-         type == V4L2_CTRL_TYPE_INTEGER_MENU || type == V4L2_CTRL_TYPE_INTEGER64 || type == V4L2_CTRL_TYPE_BITMASK;
+  return type == V4L2_CTRL_TYPE_INTEGER || type == V4L2_CTRL_TYPE_BOOLEAN ||
+         type == V4L2_CTRL_TYPE_MENU || type == V4L2_CTRL_TYPE_INTEGER_MENU ||
+         type == V4L2_CTRL_TYPE_INTEGER64 || type == V4L2_CTRL_TYPE_BITMASK;
 }
 
 /// Text of a fixed field that need not end in a zero.
@@ -27,12 +28,15 @@ std::string text(const Char (&field)[N]) {
 }
 
 void read_menu(Control* control) {
-  for (std::int64_t i = control->least; i <= control->most && i < control->least + kMostItems; ++i) {
+  for (std::int64_t i = control->least; i <= control->most && i < control->least + kMostItems;
+       ++i) {
     v4l2_querymenu item{};
     item.id = control->id;
     item.index = static_cast<__u32>(i);
     if (v4l2::control(control->fd, VIDIOC_QUERYMENU, &item) != 0) continue;  // menus have holes
-    control->menu.emplace_back(i, control->type == V4L2_CTRL_TYPE_MENU ? key_of(text(item.name)) : std::to_string(item.value));
+    control->menu.emplace_back(i, control->type == V4L2_CTRL_TYPE_MENU
+                                      ? key_of(text(item.name))
+                                      : std::to_string(item.value));
   }
 }
 
@@ -72,18 +76,21 @@ void Controls::add(int fd) {
 }
 
 const Control* Controls::find(std::uint32_t id) const noexcept {
-  const auto it = std::find_if(controls_.begin(), controls_.end(), [&](const Control& c) { return c.id == id; });
+  const auto it = std::find_if(controls_.begin(), controls_.end(),
+                               [&](const Control& c) { return c.id == id; });
   return it == controls_.end() ? nullptr : &*it;
 }
 
 const Control* Controls::find(std::string_view key) const noexcept {
-  const auto it = std::find_if(controls_.begin(), controls_.end(), [&](const Control& c) { return c.key == key; });
+  const auto it = std::find_if(controls_.begin(), controls_.end(),
+                               [&](const Control& c) { return c.key == key; });
   return it == controls_.end() ? nullptr : &*it;
 }
 
 const Control* Controls::trigger() const noexcept {
   const auto it = std::find_if(controls_.begin(), controls_.end(), [](const Control& c) {
-    return c.key.find("trigger") != std::string::npos && is_number_like(c.type) && (c.flags & V4L2_CTRL_FLAG_READ_ONLY) == 0;
+    return c.key.find("trigger") != std::string::npos && is_number_like(c.type) &&
+           (c.flags & V4L2_CTRL_FLAG_READ_ONLY) == 0;
   });
   return it == controls_.end() ? nullptr : &*it;
 }
@@ -108,18 +115,21 @@ bool value_of(const Control& control, std::string_view text, std::int64_t* value
   std::int64_t number = 0;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
   if (error != std::errc{} || end != text.data() + text.size()) return false;
-  if (control.type != V4L2_CTRL_TYPE_BUTTON && (number < control.least || number > control.most)) return false;
+  if (control.type != V4L2_CTRL_TYPE_BUTTON && (number < control.least || number > control.most))
+    return false;
   *value = number;
   return true;
 }
 
 std::int64_t clamped(const Control& control, std::int64_t value) noexcept {
-  const std::int64_t inside = std::clamp(value, control.least, std::max(control.least, control.most));
+  const std::int64_t inside =
+      std::clamp(value, control.least, std::max(control.least, control.most));
   return control.least + (inside - control.least + control.step / 2) / control.step * control.step;
 }
 
 std::int64_t trigger_on(const Control& control) noexcept {
-  constexpr std::array<std::string_view, 5> kWords = {"external", "hardware", "slave", "enable", "on"};
+  constexpr std::array<std::string_view, 5> kWords = {"external", "hardware", "slave", "enable",
+                                                      "on"};
   for (const std::string_view word : kWords)
     for (const auto& [item, name] : control.menu)
       if (("_" + name + "_").find("_" + std::string(word)) != std::string::npos) return item;
@@ -128,7 +138,8 @@ std::int64_t trigger_on(const Control& control) noexcept {
 
 std::string range_of(const Control& control) {
   if (control.menu.empty())
-    return std::to_string(control.least) + " to " + std::to_string(control.most) + " in steps of " + std::to_string(control.step);
+    return std::to_string(control.least) + " to " + std::to_string(control.most) + " in steps of " +
+           std::to_string(control.step);
   std::string list;
   for (const auto& [item, name] : control.menu) list += (list.empty() ? "" : ", ") + name;
   return list;

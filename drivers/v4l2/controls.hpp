@@ -12,7 +12,8 @@ struct Control {
   std::uint32_t id = 0;
   std::uint32_t type = 0;   // V4L2_CTRL_TYPE_…
   std::uint32_t flags = 0;  // V4L2_CTRL_FLAG_…
-  std::string key;          // "exposure_time_absolute": lower case, one '_' for all that is no letter or digit
+  std::string
+      key;  // "exposure_time_absolute": lower case, one '_' for all that is no letter or digit
   std::int64_t least = 0, most = 0, step = 1;
   std::vector<std::pair<std::int64_t, std::string>> menu;  // values with the keys of their names
 };
@@ -28,8 +29,8 @@ class Controls {
   void add(int fd);
   [[nodiscard]] const Control* find(std::uint32_t id) const noexcept;
   [[nodiscard]] const Control* find(std::string_view key) const noexcept;
-  /// The control to switch an external trigger on with: the first whose key has the word "trigger" in it and that is a switch, a menu or
-  /// a number. Null: none.
+  /// The control to switch an external trigger on with: the first whose key has the word "trigger"
+  /// in it and that is a switch, a menu or a number. Null: none.
   [[nodiscard]] const Control* trigger() const noexcept;
   /// Keys of all that can be written, for a sentence; at most `most`.
   [[nodiscard]] std::string keys(std::size_t most = 24) const;
@@ -38,12 +39,13 @@ class Controls {
   std::vector<Control> controls_;
 };
 
-/// What `text` means for a control: a number, or the name of a menu item in any spelling of case and blanks. False: neither, or out of
-/// range.
+/// What `text` means for a control: a number, or the name of a menu item in any spelling of case
+/// and blanks. False: neither, or out of range.
 [[nodiscard]] bool value_of(const Control& control, std::string_view text, std::int64_t* value);
 /// A value on a control's grid, inside its range.
 [[nodiscard]] std::int64_t clamped(const Control& control, std::int64_t value) noexcept;
-/// The value a trigger control takes to be on: a menu item whose name speaks of external, hardware, on or enabled; else 1.
+/// The value a trigger control takes to be on: a menu item whose name speaks of external, hardware,
+/// on or enabled; else 1.
 [[nodiscard]] std::int64_t trigger_on(const Control& control) noexcept;
 /// "0 to 4095 in steps of 1", or the names of the menu.
 [[nodiscard]] std::string range_of(const Control& control);

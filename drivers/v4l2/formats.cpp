@@ -13,23 +13,34 @@ namespace vergence::v4l2 {
 namespace {
 
 constexpr std::array kFormats = {
-    PixelFormat{V4L2_PIX_FMT_GREY, Layout::luma_plane},    PixelFormat{V4L2_PIX_FMT_NV12, Layout::luma_plane},
-    PixelFormat{V4L2_PIX_FMT_NV21, Layout::luma_plane},    PixelFormat{V4L2_PIX_FMT_YUV420, Layout::luma_plane},
-    PixelFormat{V4L2_PIX_FMT_YVU420, Layout::luma_plane},  PixelFormat{V4L2_PIX_FMT_NV16, Layout::luma_plane},
-    PixelFormat{V4L2_PIX_FMT_YUV422P, Layout::luma_plane}, PixelFormat{V4L2_PIX_FMT_Y10P, Layout::packed10},
-    PixelFormat{V4L2_PIX_FMT_Y10, Layout::words, 2},       PixelFormat{V4L2_PIX_FMT_Y12, Layout::words, 4},
-    PixelFormat{V4L2_PIX_FMT_Y14, Layout::words, 6},       PixelFormat{V4L2_PIX_FMT_Y16, Layout::words, 8},
-    PixelFormat{V4L2_PIX_FMT_YUYV, Layout::luma_first},    PixelFormat{V4L2_PIX_FMT_YVYU, Layout::luma_first},
-    PixelFormat{V4L2_PIX_FMT_UYVY, Layout::chroma_first},  PixelFormat{V4L2_PIX_FMT_VYUY, Layout::chroma_first},
-    PixelFormat{V4L2_PIX_FMT_SRGGB8, Layout::mosaic},      PixelFormat{V4L2_PIX_FMT_SGRBG8, Layout::mosaic},
-    PixelFormat{V4L2_PIX_FMT_SGBRG8, Layout::mosaic},      PixelFormat{V4L2_PIX_FMT_SBGGR8, Layout::mosaic},
+    PixelFormat{V4L2_PIX_FMT_GREY, Layout::luma_plane},
+    PixelFormat{V4L2_PIX_FMT_NV12, Layout::luma_plane},
+    PixelFormat{V4L2_PIX_FMT_NV21, Layout::luma_plane},
+    PixelFormat{V4L2_PIX_FMT_YUV420, Layout::luma_plane},
+    PixelFormat{V4L2_PIX_FMT_YVU420, Layout::luma_plane},
+    PixelFormat{V4L2_PIX_FMT_NV16, Layout::luma_plane},
+    PixelFormat{V4L2_PIX_FMT_YUV422P, Layout::luma_plane},
+    PixelFormat{V4L2_PIX_FMT_Y10P, Layout::packed10},
+    PixelFormat{V4L2_PIX_FMT_Y10, Layout::words, 2},
+    PixelFormat{V4L2_PIX_FMT_Y12, Layout::words, 4},
+    PixelFormat{V4L2_PIX_FMT_Y14, Layout::words, 6},
+    PixelFormat{V4L2_PIX_FMT_Y16, Layout::words, 8},
+    PixelFormat{V4L2_PIX_FMT_YUYV, Layout::luma_first},
+    PixelFormat{V4L2_PIX_FMT_YVYU, Layout::luma_first},
+    PixelFormat{V4L2_PIX_FMT_UYVY, Layout::chroma_first},
+    PixelFormat{V4L2_PIX_FMT_VYUY, Layout::chroma_first},
+    PixelFormat{V4L2_PIX_FMT_SRGGB8, Layout::mosaic},
+    PixelFormat{V4L2_PIX_FMT_SGRBG8, Layout::mosaic},
+    PixelFormat{V4L2_PIX_FMT_SGBRG8, Layout::mosaic},
+    PixelFormat{V4L2_PIX_FMT_SBGGR8, Layout::mosaic},
 };
 
 // One row each. The loops are plain so that the compiler makes vectors of them.
 
 void take_words(const std::uint8_t* from, std::size_t width, int shift, std::uint8_t* to) noexcept {
   for (std::size_t x = 0; x < width; ++x) {
-    const unsigned word = static_cast<unsigned>(from[2 * x]) | static_cast<unsigned>(from[2 * x + 1]) << 8U;
+    const unsigned word =
+        static_cast<unsigned>(from[2 * x]) | static_cast<unsigned>(from[2 * x + 1]) << 8U;
     to[x] = static_cast<std::uint8_t>(std::min(word >> static_cast<unsigned>(shift), 255U));
   }
 }
@@ -58,7 +69,8 @@ std::string name_of(std::uint32_t fourcc) {
   return name;
 }
 
-const PixelFormat* choose_format(std::span<const std::uint32_t> offered, std::string_view wanted) noexcept {
+const PixelFormat* choose_format(std::span<const std::uint32_t> offered,
+                                 std::string_view wanted) noexcept {
   for (const PixelFormat& format : kFormats) {
     if (std::find(offered.begin(), offered.end(), format.fourcc) == offered.end()) continue;
     if (wanted.empty() || name_of(format.fourcc) == wanted) return &format;
@@ -82,15 +94,18 @@ std::size_t least_row_bytes(const PixelFormat& format, int width) noexcept {
   return 2 * w;
 }
 
-std::size_t least_frame_bytes(const PixelFormat& format, int width, int height, std::size_t stride) noexcept {
+std::size_t least_frame_bytes(const PixelFormat& format, int width, int height,
+                              std::size_t stride) noexcept {
   return stride * static_cast<std::size_t>(height - 1) + least_row_bytes(format, width);
 }
 
-void to_grey(const PixelFormat& format, const std::uint8_t* from, std::size_t from_stride, int width, int height, std::uint8_t* to,
-             std::size_t to_stride) noexcept {
-  assert(from_stride >= least_row_bytes(format, width) && to_stride >= static_cast<std::size_t>(width));
+void to_grey(const PixelFormat& format, const std::uint8_t* from, std::size_t from_stride,
+             int width, int height, std::uint8_t* to, std::size_t to_stride) noexcept {
+  assert(from_stride >= least_row_bytes(format, width) &&
+         to_stride >= static_cast<std::size_t>(width));
   if (format.layout == Layout::mosaic) {
-    bayer_to_grey(from, static_cast<std::ptrdiff_t>(from_stride), width, height, to, static_cast<std::ptrdiff_t>(to_stride));
+    bayer_to_grey(from, static_cast<std::ptrdiff_t>(from_stride), width, height, to,
+                  static_cast<std::ptrdiff_t>(to_stride));
     return;
   }
   const auto w = static_cast<std::size_t>(width);

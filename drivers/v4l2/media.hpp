@@ -31,7 +31,8 @@ struct MediaGraph {
 /// The advice of media_advice() for the video node `video`; empty: nothing stands before it.
 [[nodiscard]] std::string advice(const MediaGraph& graph, const std::string& video);
 
-/// The graph that a video node belongs to, from /dev/mediaN. Nothing: it has none, or it cannot be read.
+/// The graph that a video node belongs to, from /dev/mediaN. Nothing: it has none, or it cannot be
+/// read.
 [[nodiscard]] std::optional<MediaGraph> read_graph(const std::string& video);
 
 }  // namespace vergence::v4l2

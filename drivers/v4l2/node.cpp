@@ -16,7 +16,8 @@ namespace fs = std::filesystem;
 namespace {
 
 constexpr std::string_view kDevices = "/dev";
-constexpr int kParents = 4;  // from the video device up: USB interface, USB device; a bridge, its bus
+constexpr int kParents =
+    4;  // from the video device up: USB interface, USB device; a bridge, its bus
 
 /// Text of a fixed field that need not end in a zero.
 template <std::size_t N>
@@ -43,9 +44,12 @@ std::vector<int> node_numbers() {
   constexpr std::string_view kPrefix = "video";
   for (fs::directory_iterator it(kDevices, error), end; !error && it != end; it.increment(error)) {
     const std::string name = it->path().filename();
-    if (!name.starts_with(kPrefix) || name.size() == kPrefix.size() || name.size() > kPrefix.size() + 6) continue;
+    if (!name.starts_with(kPrefix) || name.size() == kPrefix.size() ||
+        name.size() > kPrefix.size() + 6)
+      continue;
     const std::string digits = name.substr(kPrefix.size());
-    if (std::all_of(digits.begin(), digits.end(), [](char c) { return c >= '0' && c <= '9'; })) numbers.push_back(std::stoi(digits));
+    if (std::all_of(digits.begin(), digits.end(), [](char c) { return c >= '0' && c <= '9'; }))
+      numbers.push_back(std::stoi(digits));
   }
   std::sort(numbers.begin(), numbers.end());
   return numbers;
@@ -84,9 +88,11 @@ DeviceStatus open_node(const std::string& path, UniqueFd* out, Node* node) {
   v4l2_capability cap{};
   if (const int error = control(fd.get(), VIDIOC_QUERYCAP, &cap); error != 0)
     return error == ENODEV ? DeviceStatus::gone : DeviceStatus::unsupported;
-  const std::uint32_t has = (cap.capabilities & V4L2_CAP_DEVICE_CAPS) != 0 ? cap.device_caps : cap.capabilities;
+  const std::uint32_t has =
+      (cap.capabilities & V4L2_CAP_DEVICE_CAPS) != 0 ? cap.device_caps : cap.capabilities;
   const bool planes = (has & V4L2_CAP_VIDEO_CAPTURE_MPLANE) != 0;
-  if ((has & V4L2_CAP_STREAMING) == 0 || ((has & V4L2_CAP_VIDEO_CAPTURE) == 0 && !planes)) return DeviceStatus::unsupported;
+  if ((has & V4L2_CAP_STREAMING) == 0 || ((has & V4L2_CAP_VIDEO_CAPTURE) == 0 && !planes))
+    return DeviceStatus::unsupported;
 
   Node found;
   found.path = path;
@@ -111,7 +117,9 @@ NodeList list_nodes() {
     const DeviceStatus status = open_node(path, &fd, &node);
     if (status == DeviceStatus::no_permission) list.closed.push_back(path);
     if (status != DeviceStatus::ok) continue;
-    const auto same = [base = node.serial](const Node& n) { return n.serial == base || n.serial.starts_with(base + "#"); };
+    const auto same = [base = node.serial](const Node& n) {
+      return n.serial == base || n.serial.starts_with(base + "#");
+    };
     if (const auto before = std::count_if(list.nodes.begin(), list.nodes.end(), same); before > 0)
       node.serial += "#" + std::to_string(before);
     list.nodes.push_back(std::move(node));
@@ -122,7 +130,8 @@ NodeList list_nodes() {
 DeviceStatus find_node(std::string_view serial, UniqueFd* fd, Node* node) {
   if (serial.starts_with(std::string(kDevices) + "/")) {
     const DeviceStatus status = open_node(std::string(serial), fd, node);
-    if (status == DeviceStatus::ok) node->serial = serial;  // what it is found by again after an unplug
+    if (status == DeviceStatus::ok)
+      node->serial = serial;  // what it is found by again after an unplug
     return status;
   }
   const NodeList list = list_nodes();

@@ -42,7 +42,8 @@ struct Node {
   std::uint32_t type = 0;  // of buffers: V4L2_BUF_TYPE_VIDEO_CAPTURE or …_MPLANE
 };
 
-/// → ok, not_found, no_permission, unsupported (does not capture and stream), gone, failed. Not `ok`: nothing stays open.
+/// → ok, not_found, no_permission, unsupported (does not capture and stream), gone, failed. Not
+///   `ok`: nothing stays open.
 [[nodiscard]] DeviceStatus open_node(const std::string& path, UniqueFd* fd, Node* node);
 
 struct NodeList {
@@ -51,7 +52,8 @@ struct NodeList {
 };
 [[nodiscard]] NodeList list_nodes();
 
-/// The node with that serial (empty: the first), or at that path under /dev. → ok, not_found, no_permission, and as open_node().
+/// The node with that serial (empty: the first), or at that path under /dev. → ok, not_found,
+/// no_permission, and as open_node().
 [[nodiscard]] DeviceStatus find_node(std::string_view serial, UniqueFd* fd, Node* node);
 
 }  // namespace vergence::v4l2

@@ -17,7 +17,8 @@ namespace {
 constexpr std::string_view kControlPrefix = "control_";
 constexpr int kLeastBuffers = 4, kMostBuffers = 32;  // 32: the kernel's own limit
 constexpr int kMostThin = 60;
-constexpr double kRateTolerance = 0.02;    // between what was asked and what the camera chose, before it is worth a remark
+constexpr double kRateTolerance =
+    0.02;  // between what was asked and what the camera chose, before it is worth a remark
 constexpr std::uint32_t kMostListed = 24;  // sizes and formats named in a sentence
 
 std::string number(double value) {
@@ -26,7 +27,9 @@ std::string number(double value) {
   return text.data();
 }
 
-std::string size_text(std::uint32_t width, std::uint32_t height) { return std::to_string(width) + " x " + std::to_string(height); }
+std::string size_text(std::uint32_t width, std::uint32_t height) {
+  return std::to_string(width) + " x " + std::to_string(height);
+}
 
 bool parse_number(const std::string& text, double* value) {
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), *value);
@@ -47,16 +50,22 @@ DeviceStatus status_of(int error) noexcept {
 /// The steps of apply(), which share what they read and leave behind.
 class Applier {
  public:
-  Applier(int fd, std::uint32_t type, const Controls& controls, const CameraConfiguration& wanted, const Options& options,
-          std::string* complaint)
-      : fd_(fd), type_(type), controls_(controls), wanted_(wanted), options_(options), complaint_(complaint) {
+  Applier(int fd, std::uint32_t type, const Controls& controls, const CameraConfiguration& wanted,
+          const Options& options, std::string* complaint)
+      : fd_(fd),
+        type_(type),
+        controls_(controls),
+        wanted_(wanted),
+        options_(options),
+        complaint_(complaint) {
     out_.actual = wanted;
     out_.options = options;
   }
 
   DeviceStatus run(Settings* settings) {
-    for (const auto step : {&Applier::other_controls, &Applier::region, &Applier::format, &Applier::rate, &Applier::exposure,
-                            &Applier::gain, &Applier::trigger}) {
+    for (const auto step :
+         {&Applier::other_controls, &Applier::region, &Applier::format, &Applier::rate,
+          &Applier::exposure, &Applier::gain, &Applier::trigger}) {
       if (const DeviceStatus status = (this->*step)(); status != DeviceStatus::ok) return status;
     }
     out_.readout = options_.readout < Duration{} ? sensor_readout() : options_.readout;
@@ -70,16 +79,20 @@ class Applier {
     return status;
   }
   DeviceStatus system(int error, const std::string& what) {
-    if (error == EBUSY) return refuse(DeviceStatus::busy, "another program streams from this camera: end it first");
+    if (error == EBUSY)
+      return refuse(DeviceStatus::busy, "another program streams from this camera: end it first");
     return refuse(status_of(error), what + " failed: " + std::strerror(error));
   }
-  void remark(const std::string& sentence) { out_.remark += (out_.remark.empty() ? "" : "; ") + sentence; }
+  void remark(const std::string& sentence) {
+    out_.remark += (out_.remark.empty() ? "" : "; ") + sentence;
+  }
 
   DeviceStatus set(const Control& control, std::int64_t value) {
     const int error = write(control, value);
     if (error == 0) return DeviceStatus::ok;
     if (error == EINVAL || error == ERANGE)
-      return refuse(DeviceStatus::unsupported, control.key + " takes " + range_of(control) + ", not " + std::to_string(value));
+      return refuse(DeviceStatus::unsupported,
+                    control.key + " takes " + range_of(control) + ", not " + std::to_string(value));
     return system(error, "setting " + control.key);
   }
   /// Of a control that may be absent.
@@ -96,10 +109,13 @@ class Applier {
   DeviceStatus other_controls() {
     for (const auto& [key, text] : options_.controls) {
       const Control* c = controls_.find(key);
-      if (c == nullptr) return refuse(DeviceStatus::unsupported, "there is no control " + key + "; this camera has " + controls_.keys());
+      if (c == nullptr)
+        return refuse(DeviceStatus::unsupported,
+                      "there is no control " + key + "; this camera has " + controls_.keys());
       std::int64_t value = 0;
       if (!value_of(*c, text, &value))
-        return refuse(DeviceStatus::unsupported, "control_" + key + " is \"" + text + "\"; it takes " + range_of(*c));
+        return refuse(DeviceStatus::unsupported,
+                      "control_" + key + " is \"" + text + "\"; it takes " + range_of(*c));
       if (const DeviceStatus status = set(*c, value); status != DeviceStatus::ok) return status;
     }
     return DeviceStatus::ok;
@@ -110,19 +126,24 @@ class Applier {
     v4l2_selection s{};
     s.type = V4L2_BUF_TYPE_VIDEO_CAPTURE;
     s.target = V4L2_SEL_TGT_CROP;
-    s.r = {wanted_.offset_x, wanted_.offset_y, static_cast<__u32>(wanted_.width), static_cast<__u32>(wanted_.height)};
-    if (control(fd_, VIDIOC_S_SELECTION, &s) == 0 && s.r.left == wanted_.offset_x && s.r.top == wanted_.offset_y &&
-        s.r.width == static_cast<__u32>(wanted_.width) && s.r.height == static_cast<__u32>(wanted_.height))
+    s.r = {wanted_.offset_x, wanted_.offset_y, static_cast<__u32>(wanted_.width),
+           static_cast<__u32>(wanted_.height)};
+    if (control(fd_, VIDIOC_S_SELECTION, &s) == 0 && s.r.left == wanted_.offset_x &&
+        s.r.top == wanted_.offset_y && s.r.width == static_cast<__u32>(wanted_.width) &&
+        s.r.height == static_cast<__u32>(wanted_.height))
       return DeviceStatus::ok;
-    return refuse(DeviceStatus::unsupported, "this camera cannot read out a region at " + std::to_string(wanted_.offset_x) + ", " +
-                                                 std::to_string(wanted_.offset_y) + ": leave offset_x and offset_y at 0");
+    return refuse(DeviceStatus::unsupported, "this camera cannot read out a region at " +
+                                                 std::to_string(wanted_.offset_x) + ", " +
+                                                 std::to_string(wanted_.offset_y) +
+                                                 ": leave offset_x and offset_y at 0");
   }
 
   [[nodiscard]] std::vector<std::uint32_t> offered() const {
     std::vector<std::uint32_t> list;
     v4l2_fmtdesc d{};
     d.type = type_;
-    for (d.index = 0; d.index < 256 && control(fd_, VIDIOC_ENUM_FMT, &d) == 0; ++d.index) list.push_back(d.pixelformat);
+    for (d.index = 0; d.index < 256 && control(fd_, VIDIOC_ENUM_FMT, &d) == 0; ++d.index)
+      list.push_back(d.pixelformat);
     return list;
   }
 
@@ -130,9 +151,11 @@ class Applier {
     std::string list;
     v4l2_frmsizeenum e{};
     e.pixel_format = fourcc;
-    for (e.index = 0; e.index < kMostListed && control(fd_, VIDIOC_ENUM_FRAMESIZES, &e) == 0; ++e.index) {
+    for (e.index = 0; e.index < kMostListed && control(fd_, VIDIOC_ENUM_FRAMESIZES, &e) == 0;
+         ++e.index) {
       if (e.type != V4L2_FRMSIZE_TYPE_DISCRETE)
-        return size_text(e.stepwise.min_width, e.stepwise.min_height) + " to " + size_text(e.stepwise.max_width, e.stepwise.max_height);
+        return size_text(e.stepwise.min_width, e.stepwise.min_height) + " to " +
+               size_text(e.stepwise.max_width, e.stepwise.max_height);
       list += (list.empty() ? "" : ", ") + size_text(e.discrete.width, e.discrete.height);
     }
     return list;
@@ -145,12 +168,14 @@ class Applier {
       std::string names;
       for (const std::uint32_t f : list) names += (names.empty() ? "" : ", ") + name_of(f);
       return refuse(DeviceStatus::unsupported,
-                    (wanted_.pixel_format.empty() ? "no pixel format that gives grey" : "no pixel format " + wanted_.pixel_format) +
+                    (wanted_.pixel_format.empty() ? "no pixel format that gives grey"
+                                                  : "no pixel format " + wanted_.pixel_format) +
                         "; this camera offers " + (names.empty() ? "none" : names));
     }
     v4l2_format f{};
     f.type = type_;
-    const auto width = static_cast<__u32>(wanted_.width), height = static_cast<__u32>(wanted_.height);
+    const auto width = static_cast<__u32>(wanted_.width),
+               height = static_cast<__u32>(wanted_.height);
     const bool planes = V4L2_TYPE_IS_MULTIPLANAR(type_);
     if (planes) {
       f.fmt.pix_mp.width = width;
@@ -167,30 +192,38 @@ class Applier {
     if (const int error = control(fd_, VIDIOC_S_FMT, &f); error != 0)
       return system(error, "setting " + name_of(chosen->fourcc) + " " + size_text(width, height));
     // The kernel changes what it cannot do without a word.
-    const __u32 got_width = planes ? f.fmt.pix_mp.width : f.fmt.pix.width, got_height = planes ? f.fmt.pix_mp.height : f.fmt.pix.height;
+    const __u32 got_width = planes ? f.fmt.pix_mp.width : f.fmt.pix.width,
+                got_height = planes ? f.fmt.pix_mp.height : f.fmt.pix.height;
     const __u32 got_format = planes ? f.fmt.pix_mp.pixelformat : f.fmt.pix.pixelformat,
                 field = planes ? f.fmt.pix_mp.field : f.fmt.pix.field;
     if (got_width != width || got_height != height) {
       const std::string list_of_sizes = sizes(chosen->fourcc);
-      return refuse(DeviceStatus::unsupported, "no size " + size_text(width, height) + " in " + name_of(chosen->fourcc) +
-                                                   "; this camera offers " +
-                                                   (list_of_sizes.empty() ? size_text(got_width, got_height) : list_of_sizes));
+      return refuse(DeviceStatus::unsupported,
+                    "no size " + size_text(width, height) + " in " + name_of(chosen->fourcc) +
+                        "; this camera offers " +
+                        (list_of_sizes.empty() ? size_text(got_width, got_height) : list_of_sizes));
     }
     if (got_format != chosen->fourcc || (planes && f.fmt.pix_mp.num_planes != 1))
-      return refuse(DeviceStatus::unsupported, "the camera gives " + name_of(got_format) + " where " + name_of(chosen->fourcc) +
+      return refuse(DeviceStatus::unsupported, "the camera gives " + name_of(got_format) +
+                                                   " where " + name_of(chosen->fourcc) +
                                                    " was asked for: name another pixel_format");
     if (field != V4L2_FIELD_NONE && field != V4L2_FIELD_ANY)
-      return refuse(DeviceStatus::unsupported, "the camera gives interlaced images, of which two halves are of two moments");
+      return refuse(DeviceStatus::unsupported,
+                    "the camera gives interlaced images, of which two halves are of two moments");
     out_.stride = planes ? f.fmt.pix_mp.plane_fmt[0].bytesperline : f.fmt.pix.bytesperline;
     out_.image_size = planes ? f.fmt.pix_mp.plane_fmt[0].sizeimage : f.fmt.pix.sizeimage;
     out_.format = *chosen;
     if (chosen->layout == Layout::mosaic && (wanted_.width < 2 || wanted_.height < 2))
-      return refuse(DeviceStatus::unsupported, "a mosaic of colours needs at least two rows and columns");
+      return refuse(DeviceStatus::unsupported,
+                    "a mosaic of colours needs at least two rows and columns");
     if (options_.shift >= 0 && chosen->layout == Layout::words) out_.format.shift = options_.shift;
     out_.stride = std::max(out_.stride, least_row_bytes(out_.format, wanted_.width));
-    if (out_.image_size < least_frame_bytes(out_.format, wanted_.width, wanted_.height, out_.stride))
-      return refuse(DeviceStatus::unsupported, "the driver's buffers of " + std::to_string(out_.image_size) + " bytes do not hold " +
-                                                   size_text(width, height) + " in " + name_of(chosen->fourcc));
+    if (out_.image_size <
+        least_frame_bytes(out_.format, wanted_.width, wanted_.height, out_.stride))
+      return refuse(DeviceStatus::unsupported,
+                    "the driver's buffers of " + std::to_string(out_.image_size) +
+                        " bytes do not hold " + size_text(width, height) + " in " +
+                        name_of(chosen->fourcc));
     out_.actual.pixel_format = name_of(chosen->fourcc);
     return DeviceStatus::ok;
   }
@@ -200,13 +233,17 @@ class Applier {
     p.type = type_;
     const int error = control(fd_, VIDIOC_G_PARM, &p);
     if (error == 0 && (p.parm.capture.capability & V4L2_CAP_TIMEPERFRAME) != 0) {
-      p.parm.capture.timeperframe = {1000, static_cast<__u32>(std::lround(wanted_.rate_hz * options_.thin * 1000))};
-      if (const int set_error = control(fd_, VIDIOC_S_PARM, &p); set_error != 0) return system(set_error, "setting the rate");
+      p.parm.capture.timeperframe = {
+          1000, static_cast<__u32>(std::lround(wanted_.rate_hz * options_.thin * 1000))};
+      if (const int set_error = control(fd_, VIDIOC_S_PARM, &p); set_error != 0)
+        return system(set_error, "setting the rate");
     }
     const v4l2_fract& t = p.parm.capture.timeperframe;
-    if (error == 0 && t.numerator > 0 && t.denominator > 0) out_.camera_rate_hz = static_cast<double>(t.denominator) / t.numerator;
+    if (error == 0 && t.numerator > 0 && t.denominator > 0)
+      out_.camera_rate_hz = static_cast<double>(t.denominator) / t.numerator;
     if (error != 0) out_.camera_rate_hz = sensor_rate();
-    if (wanted_.trigger == CameraTrigger::hardware) return DeviceStatus::ok;  // the pulses are the rate
+    if (wanted_.trigger == CameraTrigger::hardware)
+      return DeviceStatus::ok;  // the pulses are the rate
     const double camera = out_.camera_rate_hz;
     if (!(camera > 0)) {
       remark("the camera does not say its rate");
@@ -214,8 +251,10 @@ class Applier {
     }
     if (options_.thin > 1 && camera >= wanted_.rate_hz) return DeviceStatus::ok;
     if (std::abs(camera - wanted_.rate_hz) > kRateTolerance * wanted_.rate_hz)
-      remark("the camera runs at " + number(camera) + " Hz where " + number(wanted_.rate_hz) + " was asked for" +
-             (camera > 1.5 * wanted_.rate_hz ? "; the option thin keeps as many as were asked for" : ""));
+      remark("the camera runs at " + number(camera) + " Hz where " + number(wanted_.rate_hz) +
+             " was asked for" +
+             (camera > 1.5 * wanted_.rate_hz ? "; the option thin keeps as many as were asked for"
+                                             : ""));
     out_.actual.rate_hz = camera;
     return DeviceStatus::ok;
   }
@@ -231,14 +270,23 @@ class Applier {
     const double blank = read_or(V4L2_CID_HBLANK, -1);
     return clock > 0 && blank >= 0 ? (wanted_.width + blank) / clock : 0;
   }
-  [[nodiscard]] Duration sensor_readout() const { return Duration::seconds(line_seconds() * wanted_.height); }
+  [[nodiscard]] Duration sensor_readout() const {
+    return Duration::seconds(line_seconds() * wanted_.height);
+  }
 
   DeviceStatus exposure() {
-    if (DeviceStatus s = set_if_there(V4L2_CID_EXPOSURE_AUTO, V4L2_EXPOSURE_MANUAL); s != DeviceStatus::ok) return s;
-    if (DeviceStatus s = set_if_there(V4L2_CID_EXPOSURE_AUTO_PRIORITY, 0); s != DeviceStatus::ok) return s;
-    if (const Control* c = controls_.find(V4L2_CID_EXPOSURE_ABSOLUTE); c != nullptr) return set_exposure(*c, 1e-4);
-    if (const Control* c = controls_.find(V4L2_CID_EXPOSURE); c != nullptr && line_seconds() > 0) return set_exposure(*c, line_seconds());
-    remark("the camera has no exposure that can be set in microseconds; exposure_us is taken for what it does");
+    if (DeviceStatus s = set_if_there(V4L2_CID_EXPOSURE_AUTO, V4L2_EXPOSURE_MANUAL);
+        s != DeviceStatus::ok)
+      return s;
+    if (DeviceStatus s = set_if_there(V4L2_CID_EXPOSURE_AUTO_PRIORITY, 0); s != DeviceStatus::ok)
+      return s;
+    if (const Control* c = controls_.find(V4L2_CID_EXPOSURE_ABSOLUTE); c != nullptr)
+      return set_exposure(*c, 1e-4);
+    if (const Control* c = controls_.find(V4L2_CID_EXPOSURE); c != nullptr && line_seconds() > 0)
+      return set_exposure(*c, line_seconds());
+    remark(
+        "the camera has no exposure that can be set in microseconds; exposure_us is taken for what "
+        "it does");
     return DeviceStatus::ok;
   }
   /// `unit`: seconds a step of the control is.
@@ -246,9 +294,11 @@ class Applier {
     const std::int64_t steps = std::llround(wanted_.exposure.to_seconds() / unit);
     const std::int64_t value = clamped(c, steps);
     if (std::llabs(value - steps) > c.step)
-      return refuse(DeviceStatus::unsupported, "no exposure of " + number(wanted_.exposure.to_seconds() * 1e6) +
-                                                   " us; this camera offers " + number(static_cast<double>(c.least) * unit * 1e6) + " to " +
-                                                   number(static_cast<double>(c.most) * unit * 1e6) + " us at this rate");
+      return refuse(DeviceStatus::unsupported,
+                    "no exposure of " + number(wanted_.exposure.to_seconds() * 1e6) +
+                        " us; this camera offers " +
+                        number(static_cast<double>(c.least) * unit * 1e6) + " to " +
+                        number(static_cast<double>(c.most) * unit * 1e6) + " us at this rate");
     if (const DeviceStatus status = set(c, value); status != DeviceStatus::ok) return status;
     out_.exposure_id = c.id;
     out_.exposure_unit_s = unit;
@@ -263,18 +313,22 @@ class Applier {
     if (c == nullptr) c = controls_.find(V4L2_CID_GAIN);
     if (c == nullptr) {
       if (wanted_.gain_db == 0) return DeviceStatus::ok;
-      return refuse(DeviceStatus::unsupported, "the camera has no gain control: set gain_db to 0; it has " + controls_.keys());
+      return refuse(DeviceStatus::unsupported,
+                    "the camera has no gain control: set gain_db to 0; it has " + controls_.keys());
     }
     for (const auto& [key, text] : options_.controls)
       if (key == c->key) return DeviceStatus::ok;  // given by number
     if (wanted_.gain_db != 0 && options_.gain_step_db <= 0)
-      return refuse(DeviceStatus::unsupported, "how many dB a step of " + c->key + " (" + range_of(*c) +
-                                                   ") is, the camera does not say: set the option gain_step_db, or control_" + c->key);
+      return refuse(DeviceStatus::unsupported,
+                    "how many dB a step of " + c->key + " (" + range_of(*c) +
+                        ") is, the camera does not say: set the option gain_step_db, or control_" +
+                        c->key);
     const double step = options_.gain_step_db > 0 ? options_.gain_step_db : 1;
     const std::int64_t value = c->least + std::llround(wanted_.gain_db / step);
     if (value < c->least || value > c->most)
-      return refuse(DeviceStatus::unsupported, "no gain of " + number(wanted_.gain_db) + " dB; this camera offers 0 to " +
-                                                   number(static_cast<double>(c->most - c->least) * step));
+      return refuse(DeviceStatus::unsupported,
+                    "no gain of " + number(wanted_.gain_db) + " dB; this camera offers 0 to " +
+                        number(static_cast<double>(c->most - c->least) * step));
     out_.gain_id = c->id;
     out_.gain_unit_db = options_.gain_step_db;
     out_.actual.gain_db = static_cast<double>(value - c->least) * options_.gain_step_db;
@@ -283,22 +337,28 @@ class Applier {
 
   DeviceStatus trigger() {
     if (wanted_.trigger == CameraTrigger::software)
-      return refuse(DeviceStatus::unsupported, "V4L2 has no software trigger: trigger hardware or free");
+      return refuse(DeviceStatus::unsupported,
+                    "V4L2 has no software trigger: trigger hardware or free");
     const bool hardware = wanted_.trigger == CameraTrigger::hardware;
     if (options_.trigger_control == "external") return DeviceStatus::ok;
-    const Control* c = options_.trigger_control.empty() ? controls_.trigger() : controls_.find(options_.trigger_control);
+    const Control* c = options_.trigger_control.empty() ? controls_.trigger()
+                                                        : controls_.find(options_.trigger_control);
     if (c == nullptr) {
       if (!hardware && options_.trigger_control.empty()) return DeviceStatus::ok;
       return refuse(DeviceStatus::unsupported,
-                    (options_.trigger_control.empty() ? "the camera has no control with \"trigger\" in its name"
-                                                      : "there is no control " + options_.trigger_control) +
+                    (options_.trigger_control.empty()
+                         ? "the camera has no control with \"trigger\" in its name"
+                         : "there is no control " + options_.trigger_control) +
                         "; it has " + controls_.keys() +
-                        ". If a module parameter or the device tree switches its trigger, set the option trigger_control to external; "
+                        ". If a module parameter or the device tree switches its trigger, set the "
+                        "option trigger_control to external; "
                         "else set trigger to free");
     }
     std::int64_t value = hardware ? trigger_on(*c) : 0;
-    if (hardware && !options_.trigger_value.empty() && !value_of(*c, options_.trigger_value, &value))
-      return refuse(DeviceStatus::unsupported, "trigger_value is \"" + options_.trigger_value + "\"; " + c->key + " takes " + range_of(*c));
+    if (hardware && !options_.trigger_value.empty() &&
+        !value_of(*c, options_.trigger_value, &value))
+      return refuse(DeviceStatus::unsupported, "trigger_value is \"" + options_.trigger_value +
+                                                   "\"; " + c->key + " takes " + range_of(*c));
     return set(*c, value);
   }
 
@@ -314,10 +374,13 @@ class Applier {
 }  // namespace
 
 std::string find_nonsense(const CameraConfiguration& wanted) {
-  if (wanted.width <= 0 || wanted.height <= 0) return "a size of " + std::to_string(wanted.width) + " x " + std::to_string(wanted.height);
-  if (!(wanted.rate_hz > 0) || wanted.rate_hz > 1e6) return "a rate of " + number(wanted.rate_hz) + " Hz";
+  if (wanted.width <= 0 || wanted.height <= 0)
+    return "a size of " + std::to_string(wanted.width) + " x " + std::to_string(wanted.height);
+  if (!(wanted.rate_hz > 0) || wanted.rate_hz > 1e6)
+    return "a rate of " + number(wanted.rate_hz) + " Hz";
   if (wanted.exposure <= Duration{}) return "an exposure that is not positive";
-  if (wanted.exposure.to_seconds() * wanted.rate_hz > 1) return "an exposure longer than the time between two images";
+  if (wanted.exposure.to_seconds() * wanted.rate_hz > 1)
+    return "an exposure longer than the time between two images";
   if (wanted.offset_x < 0 || wanted.offset_y < 0) return "a region that begins outside the sensor";
   if (!std::isfinite(wanted.gain_db)) return "a gain that is no number";
   return {};
@@ -342,13 +405,15 @@ bool parse_options(const CameraConfiguration& wanted, Options* options, std::str
       if (!whole(0, 8)) return bad(key, "bits, 0 to 8");
       o.shift = static_cast<int>(value);
     } else if (key == "thin") {
-      if (!whole(1, kMostThin)) return bad(key, "how many times the rate the camera is to run at, 1 to 60");
+      if (!whole(1, kMostThin))
+        return bad(key, "how many times the rate the camera is to run at, 1 to 60");
       o.thin = static_cast<int>(value);
     } else if (key == "buffers") {
       if (!whole(kLeastBuffers, kMostBuffers)) return bad(key, "a number, 4 to 32");
       o.buffers = static_cast<int>(value);
     } else if (key == "gain_step_db") {
-      if (!is_number || value <= 0 || value > 20) return bad(key, "dB a step, more than 0 and at most 20");
+      if (!is_number || value <= 0 || value > 20)
+        return bad(key, "dB a step, more than 0 and at most 20");
       o.gain_step_db = value;
     } else if (key == "subdevice") {
       o.subdevice = text;
@@ -360,7 +425,8 @@ bool parse_options(const CameraConfiguration& wanted, Options* options, std::str
       o.controls.emplace_back(key_of(key.substr(kControlPrefix.size())), text);
     } else {
       *complaint = "there is no option " + key +
-                   "; V4L2 cameras have readout_us, shift, thin, buffers, subdevice, trigger_control, trigger_value, gain_step_db and "
+                   "; V4L2 cameras have readout_us, shift, thin, buffers, subdevice, "
+                   "trigger_control, trigger_value, gain_step_db and "
                    "control_NAME for each of their controls";
       return false;
     }
@@ -369,24 +435,33 @@ bool parse_options(const CameraConfiguration& wanted, Options* options, std::str
   return true;
 }
 
-DeviceStatus apply(int fd, std::uint32_t buffer_type, const Controls& controls, const CameraConfiguration& wanted, const Options& options,
-                   Settings* settings, std::string* complaint) {
+DeviceStatus apply(int fd, std::uint32_t buffer_type, const Controls& controls,
+                   const CameraConfiguration& wanted, const Options& options, Settings* settings,
+                   std::string* complaint) {
   return Applier(fd, buffer_type, controls, wanted, options, complaint).run(settings);
 }
 
-DeviceStatus change_exposure(const Controls& controls, const Settings& settings, const ExposureSetting& wanted,
-                             ExposureSetting* actual) noexcept {
+DeviceStatus change_exposure(const Controls& controls, const Settings& settings,
+                             const ExposureSetting& wanted, ExposureSetting* actual) noexcept {
   const auto status_of = [](int error) {
-    return error == 0 ? DeviceStatus::ok : error == ENODEV ? DeviceStatus::gone : DeviceStatus::failed;
+    return error == 0        ? DeviceStatus::ok
+           : error == ENODEV ? DeviceStatus::gone
+                             : DeviceStatus::failed;
   };
-  const Control* exposure = settings.exposure_id != 0 ? controls.find(settings.exposure_id) : nullptr;
+  const Control* exposure =
+      settings.exposure_id != 0 ? controls.find(settings.exposure_id) : nullptr;
   if (exposure == nullptr) return DeviceStatus::unsupported;
-  const std::int64_t steps = clamped(*exposure, std::llround(wanted.exposure.to_seconds() / settings.exposure_unit_s));
+  const std::int64_t steps =
+      clamped(*exposure, std::llround(wanted.exposure.to_seconds() / settings.exposure_unit_s));
   if (const DeviceStatus s = status_of(write(*exposure, steps)); s != DeviceStatus::ok) return s;
-  *actual = {Duration::seconds(static_cast<double>(steps) * settings.exposure_unit_s), settings.actual.gain_db};
-  const Control* gain = settings.gain_id != 0 && settings.gain_unit_db > 0 ? controls.find(settings.gain_id) : nullptr;
+  *actual = {Duration::seconds(static_cast<double>(steps) * settings.exposure_unit_s),
+             settings.actual.gain_db};
+  const Control* gain = settings.gain_id != 0 && settings.gain_unit_db > 0
+                            ? controls.find(settings.gain_id)
+                            : nullptr;
   if (gain == nullptr) return DeviceStatus::ok;
-  const std::int64_t level = clamped(*gain, gain->least + std::llround(wanted.gain_db / settings.gain_unit_db));
+  const std::int64_t level =
+      clamped(*gain, gain->least + std::llround(wanted.gain_db / settings.gain_unit_db));
   if (const DeviceStatus s = status_of(write(*gain, level)); s != DeviceStatus::ok) return s;
   actual->gain_db = static_cast<double>(level - gain->least) * settings.gain_unit_db;
   return DeviceStatus::ok;

@@ -12,9 +12,10 @@ namespace vergence::v4l2 {
 
 /// CameraConfiguration::options in their own types.
 struct Options {
-  Duration readout = Duration::nanoseconds(-1);  // negative: from the sensor's own figures, else zero
-  int shift = -1;                                // bits below the eight that are kept, of 16-bit formats; negative: by the format
-  int thin = 1;                                  // the camera runs at so many times the rate, one image in each interval is kept
+  Duration readout =
+      Duration::nanoseconds(-1);  // negative: from the sensor's own figures, else zero
+  int shift = -1;  // bits below the eight that are kept, of 16-bit formats; negative: by the format
+  int thin = 1;    // the camera runs at so many times the rate, one image in each interval is kept
   int buffers = 16;
   std::string subdevice;        // node with the sensor's controls
   std::string trigger_control;  // key; "external": switched outside (module parameter, device tree)
@@ -24,7 +25,8 @@ struct Options {
 };
 
 /// False: *complaint says which option is wrong and what there is.
-[[nodiscard]] bool parse_options(const CameraConfiguration& wanted, Options* options, std::string* complaint);
+[[nodiscard]] bool parse_options(const CameraConfiguration& wanted, Options* options,
+                                 std::string* complaint);
 /// What is wrong with the numbers by themselves; empty: nothing.
 [[nodiscard]] std::string find_nonsense(const CameraConfiguration& wanted);
 
@@ -36,20 +38,27 @@ struct Settings {
   std::size_t stride = 0;      // bytes from a row to the next
   std::size_t image_size = 0;  // bytes of a buffer
   Duration readout{};
-  std::uint32_t exposure_id = 0, gain_id = 0;  // controls; 0: the camera has none that could be set in units
+  std::uint32_t exposure_id = 0,
+                gain_id = 0;  // controls; 0: the camera has none that could be set in units
   double exposure_unit_s = 0, gain_unit_db = 0;
-  double camera_rate_hz = 0;  // of the exposures; with `thin` more than actual.rate_hz. 0: not known
+  double camera_rate_hz =
+      0;  // of the exposures; with `thin` more than actual.rate_hz. 0: not known
   std::string remark;
 };
 
-/// Brings an open camera to a configuration: format, region, rate, exposure, gain, trigger, other controls.
+/// Brings an open camera to a configuration: format, region, rate, exposure, gain, trigger, other
+/// controls.
 ///
-/// → ok, unsupported, busy, gone, failed; not `ok`: *complaint, and the camera may be somewhere in between.
-[[nodiscard]] DeviceStatus apply(int fd, std::uint32_t buffer_type, const Controls& controls, const CameraConfiguration& wanted,
-                                 const Options& options, Settings* settings, std::string* complaint);
+/// → ok, unsupported, busy, gone, failed; not `ok`: *complaint, and the camera may be somewhere in
+///   between.
+[[nodiscard]] DeviceStatus apply(int fd, std::uint32_t buffer_type, const Controls& controls,
+                                 const CameraConfiguration& wanted, const Options& options,
+                                 Settings* settings, std::string* complaint);
 
-/// The nearest exposure and gain that the camera has, also while it streams. *actual: what it took. → ok, unsupported, gone, failed
-[[nodiscard]] DeviceStatus change_exposure(const Controls& controls, const Settings& settings, const ExposureSetting& wanted,
+/// The nearest exposure and gain that the camera has, also while it streams. *actual: what it took.
+/// → ok, unsupported, gone, failed
+[[nodiscard]] DeviceStatus change_exposure(const Controls& controls, const Settings& settings,
+                                           const ExposureSetting& wanted,
                                            ExposureSetting* actual) noexcept;
 
 }  // namespace vergence::v4l2

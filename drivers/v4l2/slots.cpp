@@ -93,7 +93,8 @@ std::optional<std::uint32_t> Slots::release(FrameSlot slot) noexcept {
 
 ImageView Slots::view(FrameSlot slot) const noexcept {
   if (!in_place()) return pool_->view(slot);
-  return {entries_[slot].memory.data() + entries_[slot].offset, width_, height_, static_cast<std::ptrdiff_t>(stride_)};
+  return {entries_[slot].memory.data() + entries_[slot].offset, width_, height_,
+          static_cast<std::ptrdiff_t>(stride_)};
 }
 
 }  // namespace vergence::v4l2

@@ -14,14 +14,17 @@
 
 namespace vergence::v4l2 {
 
-/// A camera's slots: the kernel's buffers where the pixels are grey as they come, else those of a FramePool.
+/// A camera's slots: the kernel's buffers where the pixels are grey as they come, else those of a
+/// FramePool.
 ///
-/// Survives a camera that comes back: buffers of the lost one that somebody holds stay mapped until they are released.
+/// Survives a camera that comes back: buffers of the lost one that somebody holds stay mapped until
+/// they are released.
 /// Threads  One at a time; view() of a held slot at any time.
 class Slots {
  public:
   static constexpr std::size_t kMost = FramePool::kMaxSlots;
-  static constexpr std::size_t kPool = 16;  // as many as buffers by default: the synchroniser's, the estimator's, the next
+  static constexpr std::size_t kPool =
+      16;  // as many as buffers by default: the synchroniser's, the estimator's, the next
 
   /// Grey as they come: slots are buffers. Precondition: nothing is held.
   void use_buffers(int width, int height, std::size_t stride);
@@ -33,14 +36,18 @@ class Slots {
   void install(std::vector<Mapping> mappings);
   [[nodiscard]] std::span<const std::uint8_t> buffer(std::uint32_t index) const noexcept;
   [[nodiscard]] std::size_t buffers() const noexcept { return buffer_slots_.size(); }
-  /// In place: buffers that are neither the kernel's nor held may go to the kernel. A pool's: always.
+  /// In place: buffers that are neither the kernel's nor held may go to the kernel. A pool's:
+  /// always.
   [[nodiscard]] bool may_enqueue(std::uint32_t index) const noexcept;
 
   /// The slot that a filled buffer is, now held; its first pixel lies at `offset`.
   [[nodiscard]] FrameSlot hold_buffer(std::uint32_t index, std::size_t offset = 0) noexcept;
   [[nodiscard]] std::optional<FrameSlot> hold_pooled() noexcept;
-  [[nodiscard]] std::span<std::uint8_t> writable(FrameSlot slot) noexcept { return pool_->writable(slot); }
-  /// → the buffer that is free by it; nothing for a pool's slot, or a buffer of a camera that was lost.
+  [[nodiscard]] std::span<std::uint8_t> writable(FrameSlot slot) noexcept {
+    return pool_->writable(slot);
+  }
+  /// → the buffer that is free by it; nothing for a pool's slot, or a buffer of a camera that was
+  ///   lost.
   std::optional<std::uint32_t> release(FrameSlot slot) noexcept;
   [[nodiscard]] std::size_t held() const noexcept { return held_; }
 

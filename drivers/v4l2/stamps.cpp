@@ -7,11 +7,15 @@
 namespace vergence::v4l2 {
 
 StampKind stamp_kind(std::uint32_t flags, std::int64_t stamp_ns) noexcept {
-  if ((flags & V4L2_BUF_FLAG_TIMESTAMP_MASK) != V4L2_BUF_FLAG_TIMESTAMP_MONOTONIC || stamp_ns <= 0) return StampKind::none;
-  return (flags & V4L2_BUF_FLAG_TSTAMP_SRC_MASK) == V4L2_BUF_FLAG_TSTAMP_SRC_SOE ? StampKind::exposure_start : StampKind::frame_end;
+  if ((flags & V4L2_BUF_FLAG_TIMESTAMP_MASK) != V4L2_BUF_FLAG_TIMESTAMP_MONOTONIC || stamp_ns <= 0)
+    return StampKind::none;
+  return (flags & V4L2_BUF_FLAG_TSTAMP_SRC_MASK) == V4L2_BUF_FLAG_TSTAMP_SRC_SOE
+             ? StampKind::exposure_start
+             : StampKind::frame_end;
 }
 
-DeviceStamp exposure_start(StampKind kind, std::int64_t stamp_ns, HostStamp arrival, Duration exposure, Duration readout) noexcept {
+DeviceStamp exposure_start(StampKind kind, std::int64_t stamp_ns, HostStamp arrival,
+                           Duration exposure, Duration readout) noexcept {
   switch (kind) {
     case StampKind::exposure_start:
       return DeviceStamp(stamp_ns);

@@ -16,11 +16,13 @@ enum class StampKind : std::uint8_t {
 /// From the buffer's flags and its stamp; a zero stamp is none.
 [[nodiscard]] StampKind stamp_kind(std::uint32_t buffer_flags, std::int64_t stamp_ns) noexcept;
 
-/// Start of the exposure on CLOCK_MONOTONIC. `readout`: from the end of the exposure to the last pixel.
-[[nodiscard]] DeviceStamp exposure_start(StampKind kind, std::int64_t stamp_ns, HostStamp arrival, Duration exposure,
-                                         Duration readout) noexcept;
+/// Start of the exposure on CLOCK_MONOTONIC. `readout`: from the end of the exposure to the last
+/// pixel.
+[[nodiscard]] DeviceStamp exposure_start(StampKind kind, std::int64_t stamp_ns, HostStamp arrival,
+                                         Duration exposure, Duration readout) noexcept;
 
-/// Counts exposures by the 32-bit numbers buffers carry, from 0 on. A driver that does not number its buffers is counted by time.
+/// Counts exposures by the 32-bit numbers buffers carry, from 0 on. A driver that does not number
+/// its buffers is counted by time.
 ///
 /// Threads  One caller. Memory: none but its own.
 class SequenceCounter {
@@ -43,14 +45,16 @@ class SequenceCounter {
   std::uint64_t counter_ = 0;
 };
 
-/// Thins a camera that cannot run slowly enough: of its frames the first one in every interval of CLOCK_MONOTONIC is kept, so that all
-/// cameras of a rig keep frames of the same moments, whenever each was started.
+/// Thins a camera that cannot run slowly enough: of its frames the first one in every interval of
+/// CLOCK_MONOTONIC is kept, so that all cameras of a rig keep frames of the same moments, whenever
+/// each was started.
 class Raster {
  public:
   /// Precondition: interval > 0.
   explicit Raster(Duration interval) noexcept : interval_(interval) {}
 
-  /// False: not the first of its interval. Else step->counter is the interval's number since the first frame's.
+  /// False: not the first of its interval. Else step->counter is the interval's number since the
+  /// first frame's.
   [[nodiscard]] bool keep(DeviceStamp stamp, SequenceCounter::Step* step) noexcept;
 
  private:

@@ -22,14 +22,16 @@ class Driver final : public CameraDriver {
     UniqueFd fd;
     Node node;
     *status = find_node(serial, &fd, &node);
-    if (*status == DeviceStatus::ok) return std::make_unique<V4l2Camera>(std::move(fd), std::move(node));
+    if (*status == DeviceStatus::ok)
+      return std::make_unique<V4l2Camera>(std::move(fd), std::move(node));
     const std::string name = serial.empty() ? "any camera" : std::string(serial);
     switch (*status) {
       case DeviceStatus::no_permission:
         complaint_ = permission(name);
         break;
       case DeviceStatus::unsupported:
-        complaint_ = name + " is no node that captures and streams; vergence devices lists those that do";
+        complaint_ =
+            name + " is no node that captures and streams; vergence devices lists those that do";
         *status = DeviceStatus::failed;
         break;
       case DeviceStatus::gone:
@@ -45,7 +47,9 @@ class Driver final : public CameraDriver {
 
  private:
   static std::string permission(const std::string& node) {
-    return node + ": no permission to open it; add the user to the group video (sudo usermod -aG video $USER) and log in again";
+    return node +
+           ": no permission to open it; add the user to the group video (sudo usermod -aG video "
+           "$USER) and log in again";
   }
   std::string complaint_;
 };

@@ -9,22 +9,27 @@ namespace vergence::v4l2 {
 
 /// The driver for the table of drivers.
 ///
-/// Serials    The USB serial number where the camera has one, else the bus the kernel names (platform:…, usb-…); a second camera of the
-///            same serial gets "#1". open() takes a path under /dev as well (also of /dev/v4l/by-path).
-/// Slots      The kernel's own buffers, mapped, for GREY and formats that begin with a luma plane (NV12, NV21, YU12, YV12, NV16, 422P):
-///            no copy, rows as the driver lays them. Other formats are turned to 8-bit grey into a FramePool slot, and the buffer goes
-///            back.
-/// Threads    One of its own a camera, from start() to stop(): it alone talks to the kernel in between.
-/// Time       Stamps are CLOCK_MONOTONIC as the kernel gives them: a start of exposure is taken as it is, an end of frame less read-out and
-///            exposure; where the driver gives none the arrival serves, and timing() is wide.
-/// Options    readout_us, shift, thin, buffers, subdevice, trigger_control, trigger_value, gain_step_db, control_NAME:
-/// docs/cameras/v4l2.md. Errors     configure(): also `busy`, another program streams from it. start(): also `failed`, the sentence has the
-/// kernel's reason.
+/// Serials    The USB serial number where the camera has one, else the bus the kernel names
+///            (platform:…, usb-…); a second camera of the same serial gets "#1". open() takes a
+///            path under /dev as well (also of /dev/v4l/by-path).
+/// Slots      The kernel's own buffers, mapped, for GREY and formats that begin with a luma plane
+///            (NV12, NV21, YU12, YV12, NV16, 422P): no copy, rows as the driver lays them. Other
+///            formats are turned to 8-bit grey into a FramePool slot, and the buffer goes back.
+/// Threads    One of its own a camera, from start() to stop(): it alone talks to the kernel in
+///            between.
+/// Time       Stamps are CLOCK_MONOTONIC as the kernel gives them: a start of exposure is taken as
+///            it is, an end of frame less read-out and exposure; where the driver gives none the
+///            arrival serves, and timing() is wide.
+/// Options    readout_us, shift, thin, buffers, subdevice, trigger_control, trigger_value,
+///            gain_step_db, control_NAME:
+/// docs/cameras/v4l2.md. Errors     configure(): also `busy`, another program streams from it.
+/// start(): also `failed`, the sentence has the kernel's reason.
 [[nodiscard]] std::unique_ptr<CameraDriver> make_driver();
 
-/// What a field engineer needs when a node refuses to stream: the chain of entities from the sensor to that node with the formats of their
-/// pads, and the media-ctl commands that look at it and mend it. Empty: the node has no media controller (USB cameras need none), or does
-/// not exist. Several lines.
+/// What a field engineer needs when a node refuses to stream: the chain of entities from the sensor
+/// to that node with the formats of their pads, and the media-ctl commands that look at it and mend
+/// it. Empty: the node has no media controller (USB cameras need none), or does not exist. Several
+/// lines.
 ///
 /// Threads  Any; opens and closes device nodes. Allocates.
 [[nodiscard]] std::string media_advice(const std::string& node);

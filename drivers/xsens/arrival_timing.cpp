@@ -8,7 +8,8 @@ namespace {
 
 ClockMapperOptions mapper_options() noexcept {
   ClockMapperOptions o;
-  o.delay_spread = Duration::milliseconds(5);  // of a read behind its last byte: a USB frame and the scheduler
+  o.delay_spread =
+      Duration::milliseconds(5);  // of a read behind its last byte: a USB frame and the scheduler
   o.resolution = Duration::microseconds(100);  // SampleTimeFine's tick
   o.jump = Duration::milliseconds(20);
   o.stall = Duration::seconds(1);
@@ -42,7 +43,8 @@ void ArrivalTiming::read(std::uint64_t end, HostStamp arrival) noexcept {
 void ArrivalTiming::drop_marks(std::uint64_t end) noexcept {
   std::size_t n = 0;
   while (n < count_ && marks_[n].end <= end) ++n;
-  std::move(marks_.begin() + static_cast<std::ptrdiff_t>(n), marks_.begin() + static_cast<std::ptrdiff_t>(count_), marks_.begin());
+  std::move(marks_.begin() + static_cast<std::ptrdiff_t>(n),
+            marks_.begin() + static_cast<std::ptrdiff_t>(count_), marks_.begin());
   count_ -= n;
 }
 

@@ -26,7 +26,8 @@ Eigen::Quaterniond enu_from(LocalFrame frame) noexcept {
 }
 
 /// What both generations' status bits say alike.
-void fill_fix(bool filter_valid, bool fix, bool coasting, const Receiver& receiver, HostStamp now, InsReading* r) noexcept {
+void fill_fix(bool filter_valid, bool fix, bool coasting, const Receiver& receiver, HostStamp now,
+              InsReading* r) noexcept {
   const bool fresh = receiver.known && now - receiver.heard < kReceiverStale;
   InsSample& s = r->sample;
   r->quality.filter_valid = filter_valid;
@@ -52,9 +53,11 @@ void fill_fix(bool filter_valid, bool fix, bool coasting, const Receiver& receiv
   }
 }
 
-void place(const std::optional<std::array<double, 2>>& latitude_longitude, const std::optional<double>& altitude, InsSample* s) noexcept {
+void place(const std::optional<std::array<double, 2>>& latitude_longitude,
+           const std::optional<double>& altitude, InsSample* s) noexcept {
   Geodetic at;
-  if (latitude_longitude && altitude) at = {(*latitude_longitude)[0], (*latitude_longitude)[1], *altitude};
+  if (latitude_longitude && altitude)
+    at = {(*latitude_longitude)[0], (*latitude_longitude)[1], *altitude};
   if (latitude_longitude && altitude && at.plausible()) {
     s->position = at;
     return;
@@ -64,7 +67,8 @@ void place(const std::optional<std::array<double, 2>>& latitude_longitude, const
 }
 
 template <class Data>
-void fill_motion(const Data& d, LocalFrame orientation_frame, LocalFrame velocity_frame, InsSample* s) noexcept {
+void fill_motion(const Data& d, LocalFrame orientation_frame, LocalFrame velocity_frame,
+                 InsSample* s) noexcept {
   std::optional<std::array<double, 4>> q = d.quaternion;
   if (!q && d.euler_deg) q = quaternion_of_euler(*d.euler_deg);
   if (!q && d.rotation_matrix) q = quaternion_of_matrix(*d.rotation_matrix);
@@ -88,7 +92,8 @@ void fill_utc(const std::optional<Utc>& utc, std::uint8_t enough, InsQuality* qu
 
 }  // namespace
 
-std::optional<std::array<double, 4>> enu_attitude(const std::array<double, 4>& wxyz, LocalFrame frame) noexcept {
+std::optional<std::array<double, 4>> enu_attitude(const std::array<double, 4>& wxyz,
+                                                  LocalFrame frame) noexcept {
   const Eigen::Quaterniond q(wxyz[0], wxyz[1], wxyz[2], wxyz[3]);
   const double n = q.norm();
   constexpr double kLeast = 0.9, kMost = 1.1;  // what 12.20 rounds is far inside
@@ -105,7 +110,8 @@ std::array<double, 4> quaternion_of_euler(const Three& deg) noexcept {
 }
 
 std::array<double, 4> quaternion_of_matrix(const std::array<double, 9>& rows) noexcept {
-  const Eigen::Quaterniond q(Eigen::Matrix3d(Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(rows.data())));
+  const Eigen::Quaterniond q(
+      Eigen::Matrix3d(Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(rows.data())));
   return {q.w(), q.x(), q.y(), q.z()};
 }
 

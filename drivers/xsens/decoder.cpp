@@ -8,11 +8,13 @@ namespace {
 
 using namespace xbus;
 
-constexpr Duration kWithoutPlace = Duration::milliseconds(200);  // so long a position may be missing while there is a fix
+constexpr Duration kWithoutPlace =
+    Duration::milliseconds(200);  // so long a position may be missing while there is a fix
 
 }  // namespace
 
-void Decoder::begin(const StreamSettings& stream, std::uint32_t baud, Duration processing) noexcept {
+void Decoder::begin(const StreamSettings& stream, std::uint32_t baud,
+                    Duration processing) noexcept {
   set_ = stream;
   stream_.reset();
   const StreamCounters& c = stream_.counters();
@@ -94,7 +96,8 @@ bool Decoder::step(ClockStep step) noexcept {
   return false;
 }
 
-bool Decoder::take_mtdata2(const Message& m, std::uint64_t begin, std::uint64_t end, InsReading* reading) noexcept {
+bool Decoder::take_mtdata2(const Message& m, std::uint64_t begin, std::uint64_t end,
+                           InsReading* reading) noexcept {
   Mtdata2 d;
   if (decode_mtdata2(m.payload, &d) != PacketStatus::ok) {
     ++counters_.malformed;
@@ -106,17 +109,21 @@ bool Decoder::take_mtdata2(const Message& m, std::uint64_t begin, std::uint64_t 
     receiver_ = receiver_of(*d.gnss_pvt, arrival_);
   }
   // A receiver's message has no sample of its own.
-  if (!d.sample_time_fine || !(d.quaternion || d.euler_deg || d.rotation_matrix || d.latitude_longitude_deg)) {
+  if (!d.sample_time_fine ||
+      !(d.quaternion || d.euler_deg || d.rotation_matrix || d.latitude_longitude_deg)) {
     const bool receivers = d.gnss_pvt || d.satellites;
     counters_.malformed += receivers || d.sample_time_fine ? 0U : 1U;
     counters_.incomplete += !receivers && d.sample_time_fine ? 1U : 0U;
     return false;
   }
-  if (!step(sample_time_.next(*d.sample_time_fine, last_sample_ != HostStamp{} ? arrival_ - last_sample_ : Duration{}))) return false;
+  if (!step(sample_time_.next(*d.sample_time_fine,
+                              last_sample_ != HostStamp{} ? arrival_ - last_sample_ : Duration{})))
+    return false;
   InsReading r;
   fill(d, receiver_, arrival_, &r);
   if (!finish(sample_time_.stamp(), begin, end, &r)) return false;
-  const bool lacks_place = r.sample.fix == FixStatus::none && (r.quality.status & kStatusGnssFix) != 0;
+  const bool lacks_place =
+      r.sample.fix == FixStatus::none && (r.quality.status & kStatusGnssFix) != 0;
   if (lacks_place && arrival_ - last_place_ < kWithoutPlace) {
     ++counters_.incomplete;
     return false;
@@ -125,7 +132,8 @@ bool Decoder::take_mtdata2(const Message& m, std::uint64_t begin, std::uint64_t 
   return hand_out(r, reading);
 }
 
-bool Decoder::take_mtdata(const Message& m, std::uint64_t begin, std::uint64_t end, InsReading* reading) noexcept {
+bool Decoder::take_mtdata(const Message& m, std::uint64_t begin, std::uint64_t end,
+                          InsReading* reading) noexcept {
   Mtdata d;
   const MtdataStatus status = decode_mtdata(m.payload, set_.layout, &d);
   if (status != MtdataStatus::ok || !d.sample_counter) {
@@ -135,10 +143,12 @@ bool Decoder::take_mtdata(const Message& m, std::uint64_t begin, std::uint64_t e
   }
   const double elapsed = last_sample_ != HostStamp{} ? (arrival_ - last_sample_).to_seconds() : 0;
   const std::int64_t before = sample_counter_.count();
-  const ClockStep how = sample_counter_.next(*d.sample_counter, std::llround(elapsed * set_.rate_hz()));
+  const ClockStep how =
+      sample_counter_.next(*d.sample_counter, std::llround(elapsed * set_.rate_hz()));
   if (!step(how)) return false;
   if (how == ClockStep::forward)
-    counters_.lost += static_cast<std::uint64_t>(std::max<std::int64_t>(0, sample_counter_.count() - before - 1));
+    counters_.lost +=
+        static_cast<std::uint64_t>(std::max<std::int64_t>(0, sample_counter_.count() - before - 1));
   if (d.fix) {
     // The block is repeated in every sample; its age drops when a new one has come.
     if (d.fix->age <= last_fix_age_ || !receiver_.known) {
@@ -153,7 +163,8 @@ bool Decoder::take_mtdata(const Message& m, std::uint64_t begin, std::uint64_t e
   return hand_out(r, reading);
 }
 
-/// Just after a start the map still improves: a reading that falls before one that went out already would turn time back.
+/// Just after a start the map still improves: a reading that falls before one that went out already
+/// would turn time back.
 bool Decoder::hand_out(const InsReading& r, InsReading* reading) noexcept {
   if (counters_.readings > 0 && r.host <= last_host_) {
     ++counters_.unsettled;
@@ -166,7 +177,8 @@ bool Decoder::hand_out(const InsReading& r, InsReading* reading) noexcept {
 }
 
 /// False: the clocks are not tied yet.
-bool Decoder::finish(DeviceStamp measured, std::uint64_t begin, std::uint64_t end, InsReading* r) noexcept {
+bool Decoder::finish(DeviceStamp measured, std::uint64_t begin, std::uint64_t end,
+                     InsReading* r) noexcept {
   timing_.message(begin, end, measured);
   last_sample_ = arrival_;
   if (!timing_.known()) {

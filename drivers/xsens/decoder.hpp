@@ -14,30 +14,36 @@ namespace vergence::xsens {
 /// Counters of a stream; all only grow.
 struct DecoderCounters {
   std::uint64_t readings = 0;
-  std::uint64_t fixes = 0;         // receiver's messages
-  std::uint64_t lost = 0;          // messages (MTi-G-700/710) or samples (MTi-G) missing in the device's count
-  std::uint64_t malformed = 0;     // whole frames that made no sense
-  std::uint64_t backward = 0;      // samples not newer than the one before
-  std::uint64_t incomplete = 0;    // samples without attitude and position, or without a position though there is a fix: not handed out
-  std::uint64_t unsettled = 0;     // of the first after a start: the clocks were not tied yet, or turned back
-  std::uint64_t other = 0;         // messages of other kinds
-  std::uint64_t errors = 0;        // of these, errors that the device told
-  std::uint64_t restarts = 0;      // the device started anew, or its clock was set
-  std::uint64_t layout_wrong = 0;  // of the malformed: MTData of another length than the settings say
+  std::uint64_t fixes = 0;  // receiver's messages
+  std::uint64_t lost =
+      0;  // messages (MTi-G-700/710) or samples (MTi-G) missing in the device's count
+  std::uint64_t malformed = 0;   // whole frames that made no sense
+  std::uint64_t backward = 0;    // samples not newer than the one before
+  std::uint64_t incomplete = 0;  // samples without attitude and position, or without a position
+                                 // though there is a fix: not handed out
+  std::uint64_t unsettled =
+      0;  // of the first after a start: the clocks were not tied yet, or turned back
+  std::uint64_t other = 0;     // messages of other kinds
+  std::uint64_t errors = 0;    // of these, errors that the device told
+  std::uint64_t restarts = 0;  // the device started anew, or its clock was set
+  std::uint64_t layout_wrong =
+      0;  // of the malformed: MTData of another length than the settings say
   std::uint8_t last_error = 0;
 };
 
 /// Bytes of a measuring device into readings with times.
 ///
-/// Time     A reading's time is that of its sample by the device's clock, mapped to the host's by ArrivalTiming. The receiver's messages
-///          are older than the inertial ones before them and not in step: they say how good the fix is, and are no readings.
+/// Time     A reading's time is that of its sample by the device's clock, mapped to the host's by
+///          ArrivalTiming. The receiver's messages are older than the inertial ones before them and
+///          not in step: they say how good the fix is, and are no readings.
 /// Order    Of measurement; a sample that is not newer than the last is counted and dropped.
 /// Threads  One caller. Memory: in place, no heap.
 /// Errors   Counted; nothing stops the stream.
 class Decoder {
  public:
   Decoder() = default;
-  /// Of a device that was set like this, on a line of this rate. Forgets everything but the counters and the numbers.
+  /// Of a device that was set like this, on a line of this rate. Forgets everything but the
+  /// counters and the numbers.
   void begin(const StreamSettings& stream, std::uint32_t baud, Duration processing) noexcept;
   /// What a read brought. Precondition: next() has said false since the last; at most kMostBytes.
   void accept(std::span<const std::uint8_t> bytes, HostStamp arrival) noexcept;
@@ -50,15 +56,20 @@ class Decoder {
   [[nodiscard]] bool woke() noexcept;
 
   [[nodiscard]] const DecoderCounters& counters() const noexcept { return counters_; }
-  [[nodiscard]] const xbus::StreamCounters& line_counters() const noexcept { return stream_.counters(); }
+  [[nodiscard]] const xbus::StreamCounters& line_counters() const noexcept {
+    return stream_.counters();
+  }
   [[nodiscard]] const ArrivalTiming& timing() const noexcept { return timing_; }
 
  private:
-  [[nodiscard]] bool take_mtdata2(const xbus::Message& message, std::uint64_t begin, std::uint64_t end, InsReading* reading) noexcept;
-  [[nodiscard]] bool take_mtdata(const xbus::Message& message, std::uint64_t begin, std::uint64_t end, InsReading* reading) noexcept;
+  [[nodiscard]] bool take_mtdata2(const xbus::Message& message, std::uint64_t begin,
+                                  std::uint64_t end, InsReading* reading) noexcept;
+  [[nodiscard]] bool take_mtdata(const xbus::Message& message, std::uint64_t begin,
+                                 std::uint64_t end, InsReading* reading) noexcept;
   void take_other(const xbus::Message& message) noexcept;
   [[nodiscard]] bool step(ClockStep step) noexcept;
-  [[nodiscard]] bool finish(DeviceStamp measured, std::uint64_t begin, std::uint64_t end, InsReading* reading) noexcept;
+  [[nodiscard]] bool finish(DeviceStamp measured, std::uint64_t begin, std::uint64_t end,
+                            InsReading* reading) noexcept;
   [[nodiscard]] bool hand_out(const InsReading& r, InsReading* reading) noexcept;
   void count_messages(std::uint16_t counter) noexcept;
 

@@ -13,23 +13,27 @@ namespace vergence::xsens {
 namespace {
 
 constexpr Duration kRead = Duration::milliseconds(200);
-constexpr Duration kAgain = Duration::milliseconds(500);  // between attempts to open a line that is gone
+constexpr Duration kAgain =
+    Duration::milliseconds(500);  // between attempts to open a line that is gone
 
 }  // namespace
 
-Device::Device(std::unique_ptr<LinePlace> place, const Options& options) : place_(std::move(place)), options_(options) {
+Device::Device(std::unique_ptr<LinePlace> place, const Options& options)
+    : place_(std::move(place)), options_(options) {
   info_.driver = "xsens";
   info_.place = place_->name();
 }
 
 Device::~Device() { stop(); }
 
-// ---- the owner's thread ---------------------------------------------------------------------------------------------
+// ---- the owner's thread
+// ---------------------------------------------------------------------------------------------
 
 DeviceStatus Device::open() {
   LineSettings settings;
   if (baud_ != 0) settings.baud = baud_;
-  // MTi-G built before 2008 want two stop bits; a receiver that wants one takes the second for idle line.
+  // MTi-G built before 2008 want two stop bits; a receiver that wants one takes the second for idle
+  // line.
   settings.stop_bits = 2;
   DeviceStatus status = DeviceStatus::ok;
   auto line = place_->open(settings, &status);
@@ -74,7 +78,8 @@ DeviceStatus Device::configure(double rate_hz, double* actual_hz) noexcept {
     complaint_.clear();
     remark_.clear();
     if (!(rate_hz > 0 && rate_hz <= 2000)) {
-      complaint_ = "a rate of " + std::to_string(rate_hz) + " Hz is none; set ins.rate to 100 or 120";
+      complaint_ =
+          "a rate of " + std::to_string(rate_hz) + " Hz is none; set ins.rate to 100 or 120";
       return DeviceStatus::bad_configuration;
     }
     stop();
@@ -106,11 +111,14 @@ std::string Device::remark_about(double rate_hz) const {
   std::array<char, 200> text{};
   std::string all;
   if (differs(set_.rate_hz(), rate_hz)) {
-    (void)std::snprintf(text.data(), text.size(), "it measures at %.4g Hz: of its rates the nearest to %.4g", set_.rate_hz(), rate_hz);
+    (void)std::snprintf(text.data(), text.size(),
+                        "it measures at %.4g Hz: of its rates the nearest to %.4g", set_.rate_hz(),
+                        rate_hz);
     all = text.data();
   }
   if (set_.sync_out_hz > 0 && differs(set_.sync_out_hz, options_.sync_out_hz)) {
-    (void)std::snprintf(text.data(), text.size(), "its SyncOut makes %.4g Hz: the nearest to %.4g", set_.sync_out_hz, options_.sync_out_hz);
+    (void)std::snprintf(text.data(), text.size(), "its SyncOut makes %.4g Hz: the nearest to %.4g",
+                        set_.sync_out_hz, options_.sync_out_hz);
     all += (all.empty() ? "" : "; ") + std::string(text.data());
   }
   return all;
@@ -118,9 +126,13 @@ std::string Device::remark_about(double rate_hz) const {
 
 DeviceTiming Device::timing() const noexcept {
   DeviceTiming t;
-  const std::size_t bytes = set_.generation == xbus::Generation::legacy ? xbus::frame_size(set_.layout.payload_size().value_or(0)) : 100;
-  t.least_delay = options_.processing + Duration::nanoseconds(xbus::wire_time_ns(bytes, baud_ == 0 ? 115200 : baud_));
-  t.delay_spread = place_->latency_timer() + Duration::milliseconds(60);  // a burst of 496 bytes at 115200 baud
+  const std::size_t bytes = set_.generation == xbus::Generation::legacy
+                                ? xbus::frame_size(set_.layout.payload_size().value_or(0))
+                                : 100;
+  t.least_delay = options_.processing +
+                  Duration::nanoseconds(xbus::wire_time_ns(bytes, baud_ == 0 ? 115200 : baud_));
+  t.delay_spread =
+      place_->latency_timer() + Duration::milliseconds(60);  // a burst of 496 bytes at 115200 baud
   t.resolution = Duration::microseconds(100);
   return t;
 }
@@ -175,7 +187,8 @@ InsStatistics Device::statistics() const noexcept {
   return s;
 }
 
-// ---- the device's thread --------------------------------------------------------------------------------------------
+// ---- the device's thread
+// --------------------------------------------------------------------------------------------
 
 void Device::work() noexcept {
   (void)pthread_setname_np(pthread_self(), "vergence-ins");
@@ -220,7 +233,8 @@ DeviceStatus Device::read_on() noexcept {
     const LineRead r = line_->read(bytes, kRead);
     if (r.status == DeviceStatus::ok) {
       decoder_.accept(std::span(bytes).first(r.size), r.arrival);
-      for (InsReading reading; decoder_.next(&reading);) hand_out({Item::What::item, reading.arrival, reading}, false);
+      for (InsReading reading; decoder_.next(&reading);)
+        hand_out({Item::What::item, reading.arrival, reading}, false);
       count();
       if (decoder_.line_counters().messages != frames) heard = r.arrival;
       frames = decoder_.line_counters().messages;
@@ -255,7 +269,8 @@ DeviceStatus Device::bring_up() {
     if (status == DeviceStatus::ok) status = setup.identify(&who);
     if (status == DeviceStatus::ok) status = setup.set(who, rate_hz_, &set);
     // Another one would have another mount: that is for a person to decide.
-    if (status == DeviceStatus::ok && who.device_id != identity_.device_id) status = DeviceStatus::not_found;
+    if (status == DeviceStatus::ok && who.device_id != identity_.device_id)
+      status = DeviceStatus::not_found;
     if (status != DeviceStatus::ok) return status;
     set_ = set;
     baud_ = line_->baud();
@@ -268,7 +283,8 @@ DeviceStatus Device::bring_up() {
 void Device::pause(Duration time) noexcept {
   if (place_->pass(time)) return;
   std::unique_lock lock(pause_mutex_);
-  (void)stopped_.wait_for(lock, std::chrono::nanoseconds(time.ns()), [this] { return stopping_.load(std::memory_order_acquire); });
+  (void)stopped_.wait_for(lock, std::chrono::nanoseconds(time.ns()),
+                          [this] { return stopping_.load(std::memory_order_acquire); });
 }
 
 void Device::hand_out(const Item& item, bool always) noexcept {
@@ -285,7 +301,8 @@ void Device::hand_out(const Item& item, bool always) noexcept {
 void Device::count() noexcept {
   const DecoderCounters& c = decoder_.counters();
   lost_.store(c.lost, std::memory_order_relaxed);
-  malformed_.store(c.malformed + decoder_.line_counters().checksum_wrong, std::memory_order_relaxed);
+  malformed_.store(c.malformed + decoder_.line_counters().checksum_wrong,
+                   std::memory_order_relaxed);
   restarts_.store(c.restarts, std::memory_order_relaxed);
 }
 

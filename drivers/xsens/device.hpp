@@ -16,9 +16,10 @@ namespace vergence::xsens {
 
 /// An XSens MTi-G or MTi-G-700/710 on a serial line.
 ///
-/// As InsDevice says. configure() finds the device (baud scan), sets what differs, and may take seconds; so the owner calls it before the
-/// drive. start() never waits: a thread of the device's own puts it into measurement, reads, and after `gone` opens and sets it again until
-/// it is back. A silent device (kSilent) is one that is gone.
+/// As InsDevice says. configure() finds the device (baud scan), sets what differs, and may take
+/// seconds; so the owner calls it before the drive. start() never waits: a thread of the device's
+/// own puts it into measurement, reads, and after `gone` opens and sets it again until it is back.
+/// A silent device (kSilent) is one that is gone.
 /// Time  Readings are mapped: `host` and `host_error` are set (decoder.hpp).
 class Device final : public InsDevice {
  public:
@@ -29,8 +30,8 @@ class Device final : public InsDevice {
   Device& operator=(const Device&) = delete;
   ~Device() override;
 
-  /// Opens the line, finds the device and asks who it is; leaves it in its configuration state. → ok, not_found, no_permission, busy,
-  /// unsupported (another make), gone, failed
+  /// Opens the line, finds the device and asks who it is; leaves it in its configuration state. →
+  /// ok, not_found, no_permission, busy, unsupported (another make), gone, failed
   [[nodiscard]] DeviceStatus connect();
 
   [[nodiscard]] const DeviceInfo& info() const noexcept override { return info_; }
@@ -73,7 +74,7 @@ class Device final : public InsDevice {
   bool configured_ = false, virtual_time_ = false;
   std::string complaint_, remark_;
 
-  std::mutex line_mutex_;           // of the pointer: stop() wakes a line that the thread may be replacing
+  std::mutex line_mutex_;  // of the pointer: stop() wakes a line that the thread may be replacing
   std::unique_ptr<ByteLine> line_;  // of the thread while it runs, else the owner's
   Decoder decoder_;                 // the same
   vergence::Stream<InsReading, kRing> out_;
@@ -81,7 +82,8 @@ class Device final : public InsDevice {
   std::mutex pause_mutex_;
   std::condition_variable stopped_;
   std::thread thread_;
-  std::atomic<std::uint64_t> delivered_{0}, lost_{0}, malformed_{0}, overruns_{0}, starts_{0}, restarts_{0};
+  std::atomic<std::uint64_t> delivered_{0}, lost_{0}, malformed_{0}, overruns_{0}, starts_{0},
+      restarts_{0};
 };
 
 }  // namespace vergence::xsens

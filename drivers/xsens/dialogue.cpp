@@ -12,9 +12,11 @@ constexpr Duration kWrite = Duration::milliseconds(100);
 
 }  // namespace
 
-void Dialogue::ask(xbus::MessageId id, std::span<const std::uint8_t> payload, Reply* reply, Duration limit) {
+void Dialogue::ask(xbus::MessageId id, std::span<const std::uint8_t> payload, Reply* reply,
+                   Duration limit) {
   std::array<std::uint8_t, xbus::kMaxFrame> frame{};
-  const xbus::WrittenFrame w = xbus::write_frame({xbus::kBusMaster, static_cast<std::uint8_t>(id), payload}, frame);
+  const xbus::WrittenFrame w =
+      xbus::write_frame({xbus::kBusMaster, static_cast<std::uint8_t>(id), payload}, frame);
   const HostStamp end = line_.now() + limit;
   reply->answer = Answer::silent;
   do {  // ends: each turn listens for kAskAgain of the limit
@@ -45,7 +47,9 @@ Answer Dialogue::listen(std::uint8_t wanted, HostStamp until, Reply* reply) {
     const HostStamp now = line_.now();
     if (now >= until) return Answer::silent;
     const LineRead r = line_.read(bytes, std::min(kListen, until - now));
-    if (r.status == DeviceStatus::gone || r.status == DeviceStatus::failed || r.status == DeviceStatus::ended) return Answer::gone;
+    if (r.status == DeviceStatus::gone || r.status == DeviceStatus::failed ||
+        r.status == DeviceStatus::ended)
+      return Answer::gone;
     if (r.status != DeviceStatus::ok) continue;
     const std::span<const std::uint8_t> got(bytes.data(), r.size);
     remember(got);
@@ -68,11 +72,14 @@ void Dialogue::forget() noexcept {
 std::string Dialogue::heard_instead() const {
   const std::string_view heard(reinterpret_cast<const char*>(heard_.data()), heard_size_);
   if (heard.empty() || messages_ > 0) return {};
-  if (heard.find("$G") != std::string_view::npos && heard.find("\r\n") != std::string_view::npos) return "it speaks NMEA 0183";
+  if (heard.find("$G") != std::string_view::npos && heard.find("\r\n") != std::string_view::npos)
+    return "it speaks NMEA 0183";
   if (heard.find("\xB5\x62") != std::string_view::npos) return "it speaks u-blox's protocol";
   if (heard.find("\xAA\x44\x12") != std::string_view::npos) return "it speaks NovAtel's protocol";
-  if (heard.find("snp") != std::string_view::npos) return "it speaks the protocol of a Redshift or CH Robotics sensor";
-  if (heard.find("VNYMR") != std::string_view::npos || heard.find("$VN") != std::string_view::npos) return "it speaks VectorNav's protocol";
+  if (heard.find("snp") != std::string_view::npos)
+    return "it speaks the protocol of a Redshift or CH Robotics sensor";
+  if (heard.find("VNYMR") != std::string_view::npos || heard.find("$VN") != std::string_view::npos)
+    return "it speaks VectorNav's protocol";
   return "its bytes are no Xbus";
 }
 

@@ -24,12 +24,16 @@ struct Reply {
   std::uint8_t error = 0;  // refused: the code
   std::size_t size = 0;    // of the payload
   std::array<std::uint8_t, xbus::kMaxPayload> payload{};
-  [[nodiscard]] std::span<const std::uint8_t> bytes() const noexcept { return {payload.data(), size}; }
+  [[nodiscard]] std::span<const std::uint8_t> bytes() const noexcept {
+    return {payload.data(), size};
+  }
 };
 
-/// Questions and answers over an Xbus line, also while data keep streaming: what is no answer is passed over.
+/// Questions and answers over an Xbus line, also while data keep streaming: what is no answer is
+/// passed over.
 ///
-/// Threads  One caller. Memory: in place. Time: no call outlasts its limit (of the line's clock) by more than a read of 50 ms.
+/// Threads  One caller. Memory: in place. Time: no call outlasts its limit (of the line's clock) by
+///          more than a read of 50 ms.
 class Dialogue {
  public:
   /// `stop`: while true, every question is `stopped`.
@@ -38,10 +42,12 @@ class Dialogue {
   static constexpr Duration kAnswerTime = Duration::milliseconds(500);
 
   /// Asks, waits for the answer to this message, asks again every 150 ms until the limit.
-  void ask(xbus::MessageId id, std::span<const std::uint8_t> payload, Reply* reply, Duration limit = kAnswerTime);
+  void ask(xbus::MessageId id, std::span<const std::uint8_t> payload, Reply* reply,
+           Duration limit = kAnswerTime);
   void ask(xbus::MessageId id, Reply* reply) { ask(id, {}, reply); }
 
-  /// What the bytes that were heard look like, when they are no Xbus: for a sentence. Empty: nothing was heard.
+  /// What the bytes that were heard look like, when they are no Xbus: for a sentence. Empty:
+  /// nothing was heard.
   [[nodiscard]] std::string heard_instead() const;
   [[nodiscard]] std::uint64_t messages_heard() const noexcept { return messages_; }
   /// Forgets what was heard: after a change of the baud rate.

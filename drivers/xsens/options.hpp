@@ -21,7 +21,8 @@ struct Options {
   double sync_out_hz = 0;        // 0: as the device has it; negative: off
   double sync_out_width_ms = 1;  // of its pulse
   SyncIn sync_in = SyncIn::leave;
-  Duration processing = Duration::milliseconds(2);  // from a sample to its first byte on the wire: acquisition and filter
+  Duration processing = Duration::milliseconds(
+      2);  // from a sample to its first byte on the wire: acquisition and filter
 };
 
 /// What a device is.
@@ -41,10 +42,13 @@ struct StreamSettings {
   std::int64_t period_denominator = 100;  // … parts of a second
   double sync_out_hz = 0;                 // as it is; 0: not set by us
 
-  [[nodiscard]] double rate_hz() const noexcept { return static_cast<double>(period_denominator) / static_cast<double>(period_numerator); }
+  [[nodiscard]] double rate_hz() const noexcept {
+    return static_cast<double>(period_denominator) / static_cast<double>(period_numerator);
+  }
   /// Nanoseconds of so many samples, exact to one over any count that a drive reaches.
   [[nodiscard]] std::int64_t time_ns(std::int64_t samples) const noexcept {
-    const std::int64_t ticks = samples * period_numerator, whole = ticks / period_denominator, part = ticks % period_denominator;
+    const std::int64_t ticks = samples * period_numerator, whole = ticks / period_denominator,
+                       part = ticks % period_denominator;
     return whole * 1'000'000'000 + part * 1'000'000'000 / period_denominator;
   }
 };

@@ -7,7 +7,8 @@ namespace vergence::xsens {
 
 std::int64_t SampleTime::difference(std::uint32_t ticks) const noexcept {
   const std::int64_t plain = static_cast<std::int64_t>(ticks) - static_cast<std::int64_t>(last_);
-  // The nearest of the three: no wrap, a day's, the full width's. A counter that has been past a day's end has the full width.
+  // The nearest of the three: no wrap, a day's, the full width's. A counter that has been past a
+  // day's end has the full width.
   std::int64_t best = plain;
   for (const std::int64_t modulus : {kDay, kFull}) {
     if (modulus == kDay && (last_ >= kDay || ticks >= kDay)) continue;

@@ -14,9 +14,11 @@ enum class ClockStep : std::uint8_t {
   restart,   // the clock was set, or the device started anew
 };
 
-/// Unwraps SampleTimeFine: 0.1 ms, wrapping at one day on MTi 10/100 series and the 700/710, at 2³² on others.
+/// Unwraps SampleTimeFine: 0.1 ms, wrapping at one day on MTi 10/100 series and the 700/710, at 2³²
+/// on others.
 ///
-/// Threads  One caller. Time: the device's, from the first stamp on; goes on over a restart by what `elapsed` says has passed.
+/// Threads  One caller. Time: the device's, from the first stamp on; goes on over a restart by what
+///          `elapsed` says has passed.
 class SampleTime {
  public:
   /// `elapsed`: of the host's clock since the last stamp, roughly.
@@ -29,7 +31,8 @@ class SampleTime {
   static constexpr std::int64_t kTick = 100'000;        // ns
   static constexpr std::int64_t kDay = 864'000'000;     // ticks
   static constexpr std::int64_t kFull = 4'294'967'296;  // ticks
-  static constexpr std::int64_t kFarthest = 100'000;    // ticks, 10 s: a gap, beyond it a clock that was set
+  static constexpr std::int64_t kFarthest =
+      100'000;  // ticks, 10 s: a gap, beyond it a clock that was set
   [[nodiscard]] std::int64_t difference(std::uint32_t ticks) const noexcept;
 
   bool known_ = false;

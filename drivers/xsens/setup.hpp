@@ -7,17 +7,21 @@
 
 namespace vergence::xsens {
 
-/// Finds a device on an open line, brings it into its configuration state and sets it, changing only what differs.
+/// Finds a device on an open line, brings it into its configuration state and sets it, changing
+/// only what differs.
 ///
-/// Threads  One caller. Memory: ordinary. Time: find() up to a second for each baud rate, the rest at most a few seconds in all.
+/// Threads  One caller. Memory: ordinary. Time: find() up to a second for each baud rate, the rest
+///          at most a few seconds in all.
 /// Errors   Status and complaint(); a device that was found stays in its configuration state.
 class Setup {
  public:
-  Setup(ByteLine& line, const Options& options, const std::atomic<bool>& stop) : line_(line), options_(options), dialogue_(line, stop) {}
+  Setup(ByteLine& line, const Options& options, const std::atomic<bool>& stop)
+      : line_(line), options_(options), dialogue_(line, stop) {}
 
   /// Tries the rate asked for, then the usual ones. → ok, not_found, gone, stopped
   [[nodiscard]] DeviceStatus find();
-  /// Who it is; the generation is what it answers, not what its name says. → ok, unsupported, gone, stopped
+  /// Who it is; the generation is what it answers, not what its name says. → ok, unsupported, gone,
+  /// stopped
   [[nodiscard]] DeviceStatus identify(Identity* identity);
   /// Output, rate, lines and baud rate. → ok, unsupported, no_bandwidth, gone, stopped, failed
   [[nodiscard]] DeviceStatus set(const Identity& identity, double rate_hz, StreamSettings* stream);
@@ -32,12 +36,17 @@ class Setup {
   [[nodiscard]] DeviceStatus set_mark4(double rate_hz, StreamSettings* stream);
   [[nodiscard]] DeviceStatus set_baud(const Identity& identity);
   [[nodiscard]] DeviceStatus set_legacy_lines(double rate_hz, StreamSettings* stream);
-  [[nodiscard]] DeviceStatus set_legacy_line(xbus::MessageId id, xbus::LegacySync parameter, std::uint32_t value);
+  [[nodiscard]] DeviceStatus set_legacy_line(xbus::MessageId id, xbus::LegacySync parameter,
+                                             std::uint32_t value);
   [[nodiscard]] DeviceStatus set_mark4_lines(StreamSettings* stream);
-  [[nodiscard]] DeviceStatus write(xbus::MessageId id, std::span<const std::uint8_t> payload, const char* what);
+  [[nodiscard]] DeviceStatus write(xbus::MessageId id, std::span<const std::uint8_t> payload,
+                                   const char* what);
   [[nodiscard]] DeviceStatus failed(const char* what);
-  [[nodiscard]] DeviceStatus refuse_load(const xbus::LineBudget& budget, double rate_hz, std::uint32_t baud);
-  [[nodiscard]] std::uint32_t baud_to_be() const noexcept { return options_.baud != 0 ? options_.baud : line_.baud(); }
+  [[nodiscard]] DeviceStatus refuse_load(const xbus::LineBudget& budget, double rate_hz,
+                                         std::uint32_t baud);
+  [[nodiscard]] std::uint32_t baud_to_be() const noexcept {
+    return options_.baud != 0 ? options_.baud : line_.baud();
+  }
 
   ByteLine& line_;
   Options options_;

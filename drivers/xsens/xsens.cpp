@@ -8,7 +8,8 @@ namespace vergence::xsens {
 std::vector<DeviceInfo> Driver::enumerate() {
   std::vector<DeviceInfo> found;
   for (const SerialPortInfo& port : list_serial_ports())
-    if (port.usb_vendor != 0) found.push_back({"xsens", port.usb_serial, port.description, port.port});
+    if (port.usb_vendor != 0)
+      found.push_back({"xsens", port.usb_serial, port.description, port.port});
   return found;
 }
 
@@ -18,8 +19,10 @@ std::unique_ptr<InsDevice> Driver::open(std::string_view port, DeviceStatus* sta
     const std::vector<DeviceInfo> ports = enumerate();
     if (ports.size() != 1) {
       *status = DeviceStatus::not_found;
-      complaint_ = ports.empty() ? "there is no serial port on USB; plug the INS in, or name its port in ins.port"
-                                 : "there is more than one serial port on USB; name the INS's in ins.port";
+      complaint_ =
+          ports.empty()
+              ? "there is no serial port on USB; plug the INS in, or name its port in ins.port"
+              : "there is more than one serial port on USB; name the INS's in ins.port";
       return nullptr;
     }
     name = ports.front().place;
@@ -27,7 +30,8 @@ std::unique_ptr<InsDevice> Driver::open(std::string_view port, DeviceStatus* sta
   return open_on(std::make_unique<SerialPort>(name), options_, status, &complaint_);
 }
 
-std::unique_ptr<InsDevice> open_on(std::unique_ptr<LinePlace> place, const Options& options, DeviceStatus* status, std::string* complaint) {
+std::unique_ptr<InsDevice> open_on(std::unique_ptr<LinePlace> place, const Options& options,
+                                   DeviceStatus* status, std::string* complaint) {
   auto device = std::make_unique<Device>(std::move(place), options);
   *status = device->connect();
   if (*status == DeviceStatus::ok) return device;

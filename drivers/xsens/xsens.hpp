@@ -12,15 +12,18 @@ namespace vergence::xsens {
 
 /// XSens INS on serial lines: the row `xsens` of the table of INS drivers.
 ///
-/// open() takes a port (`/dev/ttyUSB0`, a link to one), not a serial number: an INS is found by the line it is on, and asked who it is.
+/// open() takes a port (`/dev/ttyUSB0`, a link to one), not a serial number: an INS is found by the
+/// line it is on, and asked who it is.
 class Driver final : public InsDriver {
  public:
   explicit Driver(const Options& options = {}) : options_(options) {}
 
   /// Ports on which one could be: those of USB converters. Nothing is sent to them.
   [[nodiscard]] std::vector<DeviceInfo> enumerate() override;
-  /// Opens and asks. `port` empty: the only USB converter there is. → ok, not_found, no_permission, busy, unsupported, gone, failed
-  [[nodiscard]] std::unique_ptr<InsDevice> open(std::string_view port, DeviceStatus* status) override;
+  /// Opens and asks. `port` empty: the only USB converter there is. → ok, not_found, no_permission,
+  /// busy, unsupported, gone, failed
+  [[nodiscard]] std::unique_ptr<InsDevice> open(std::string_view port,
+                                                DeviceStatus* status) override;
   [[nodiscard]] std::string complaint() const override { return complaint_; }
 
  private:
@@ -29,7 +32,8 @@ class Driver final : public InsDriver {
 };
 
 /// The same on any line: simulators, tests. Null: *status and *complaint say why.
-[[nodiscard]] std::unique_ptr<InsDevice> open_on(std::unique_ptr<LinePlace> place, const Options& options, DeviceStatus* status,
+[[nodiscard]] std::unique_ptr<InsDevice> open_on(std::unique_ptr<LinePlace> place,
+                                                 const Options& options, DeviceStatus* status,
                                                  std::string* complaint);
 
 }  // namespace vergence::xsens

@@ -30,7 +30,8 @@ struct Entry {
 /// A directory whose entries all lie inside the ROM.
 class Directory {
  public:
-  static std::optional<Directory> at(std::span<const std::uint32_t> rom, std::size_t header) noexcept {
+  static std::optional<Directory> at(std::span<const std::uint32_t> rom,
+                                     std::size_t header) noexcept {
     if (header >= rom.size()) return std::nullopt;
     const std::size_t entries = rom[header] >> 16U;
     if (entries > rom.size() - header - 1) return std::nullopt;
@@ -57,7 +58,8 @@ class Directory {
 /// Where an entry's offset points to; 24 bits added to at most 255 cannot overflow.
 std::size_t target(const Entry& e) noexcept { return e.at + e.value; }
 
-void read_text(std::span<const std::uint32_t> rom, const std::optional<Entry>& leaf, std::array<char, 64>* text) noexcept {
+void read_text(std::span<const std::uint32_t> rom, const std::optional<Entry>& leaf,
+               std::array<char, 64>* text) noexcept {
   constexpr std::size_t kBefore = 2;  // quadlets: character set and language
   if (!leaf || target(*leaf) >= rom.size()) return;
   const std::size_t header = target(*leaf), quadlets = rom[header] >> 16U;
@@ -78,7 +80,8 @@ bool checksum_wrong(std::span<const std::uint32_t> rom, std::size_t header) noex
   return rom_checksum(rom.subspan(header + 1, n)) != (rom[header] & 0xFFFFU);
 }
 
-IidcVersion version_of(std::uint32_t unit_version, const std::optional<Entry>& sub_version) noexcept {
+IidcVersion version_of(std::uint32_t unit_version,
+                       const std::optional<Entry>& sub_version) noexcept {
   if (unit_version <= 0x100) return IidcVersion::v1_04;
   if (unit_version == 0x101) return IidcVersion::v1_20;
   switch (sub_version ? sub_version->value >> 4U & 0xFU : 0) {
@@ -163,7 +166,9 @@ RomStatus parse_config_rom(std::span<const std::uint32_t> quadlets, ConfigRom* r
     const auto unit = Directory::at(all, target(e));
     if (!unit) continue;
     const auto specifier = unit->find(key_specifier);
-    if (!specifier || (specifier->value != kSpecifierIidc && specifier->value != kSpecifierPointGrey)) continue;
+    if (!specifier ||
+        (specifier->value != kSpecifierIidc && specifier->value != kSpecifierPointGrey))
+      continue;
     camera = true;
     out.specifier = specifier->value;
     const auto version = unit->find(key_version);

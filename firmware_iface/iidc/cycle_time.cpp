@@ -7,7 +7,8 @@ std::int64_t CycleUnwrapper::unwrap(std::int64_t wrapped_ns, std::int64_t host_n
   if (known_) {
     const std::int64_t expected = last_ns_ + (host_ns - last_host_ns_);
     const std::int64_t turns = expected - wrapped_ns + kCycleTimeWrapNs / 2;
-    const std::int64_t whole = turns >= 0 ? turns / kCycleTimeWrapNs : -((-turns + kCycleTimeWrapNs - 1) / kCycleTimeWrapNs);
+    const std::int64_t whole = turns >= 0 ? turns / kCycleTimeWrapNs
+                                          : -((-turns + kCycleTimeWrapNs - 1) / kCycleTimeWrapNs);
     unwrapped += whole * kCycleTimeWrapNs;
   }
   known_ = true;

@@ -31,17 +31,25 @@ enum class Feature : std::uint8_t {  // the number is the place in every table o
 [[nodiscard]] std::string_view to_string(Feature) noexcept;
 
 namespace reg {
-[[nodiscard]] constexpr std::uint32_t feature_inquiry(Feature f) noexcept { return 0x500 + 4 * static_cast<std::uint32_t>(f); }
-[[nodiscard]] constexpr std::uint32_t feature_absolute_base(Feature f) noexcept { return 0x700 + 4 * static_cast<std::uint32_t>(f); }
-[[nodiscard]] constexpr std::uint32_t feature_value(Feature f) noexcept { return 0x800 + 4 * static_cast<std::uint32_t>(f); }
+[[nodiscard]] constexpr std::uint32_t feature_inquiry(Feature f) noexcept {
+  return 0x500 + 4 * static_cast<std::uint32_t>(f);
+}
+[[nodiscard]] constexpr std::uint32_t feature_absolute_base(Feature f) noexcept {
+  return 0x700 + 4 * static_cast<std::uint32_t>(f);
+}
+[[nodiscard]] constexpr std::uint32_t feature_value(Feature f) noexcept {
+  return 0x800 + 4 * static_cast<std::uint32_t>(f);
+}
 }  // namespace reg
 
 struct FeatureInquiry {
-  bool present = false, absolute = false, one_push = false, readable = false, on_off = false, automatic = false, manual = false;
+  bool present = false, absolute = false, one_push = false, readable = false, on_off = false,
+       automatic = false, manual = false;
   std::uint32_t least = 0, most = 0;
   [[nodiscard]] static constexpr FeatureInquiry of(std::uint32_t q) noexcept {
-    return {(q & bit(31)) != 0, (q & bit(30)) != 0, (q & bit(28)) != 0, (q & bit(27)) != 0, (q & bit(26)) != 0,
-            (q & bit(25)) != 0, (q & bit(24)) != 0, field(q, 23, 12),   field(q, 11, 0)};
+    return {(q & bit(31)) != 0, (q & bit(30)) != 0, (q & bit(28)) != 0,
+            (q & bit(27)) != 0, (q & bit(26)) != 0, (q & bit(25)) != 0,
+            (q & bit(24)) != 0, field(q, 23, 12),   field(q, 11, 0)};
   }
 };
 
@@ -53,11 +61,12 @@ struct FeatureValue {
   bool automatic = false;
   std::uint32_t value = 0;  // 12 bits
   [[nodiscard]] static constexpr FeatureValue of(std::uint32_t q) noexcept {
-    return {(q & bit(31)) != 0, (q & bit(30)) != 0, (q & bit(26)) != 0, (q & bit(25)) != 0, (q & bit(24)) != 0, field(q, 11, 0)};
+    return {(q & bit(31)) != 0, (q & bit(30)) != 0, (q & bit(26)) != 0,
+            (q & bit(25)) != 0, (q & bit(24)) != 0, field(q, 11, 0)};
   }
   [[nodiscard]] constexpr std::uint32_t quadlet() const noexcept {
-    return (present ? bit(31) : 0) | (absolute ? bit(30) : 0) | (one_push ? bit(26) : 0) | (on ? bit(25) : 0) | (automatic ? bit(24) : 0) |
-           (value & 0xFFFU);
+    return (present ? bit(31) : 0) | (absolute ? bit(30) : 0) | (one_push ? bit(26) : 0) |
+           (on ? bit(25) : 0) | (automatic ? bit(24) : 0) | (value & 0xFFFU);
   }
 };
 
@@ -69,7 +78,8 @@ struct TriggerInquiry {
   std::uint8_t sources = 0;  // bit n: input n, 0 … 3
   std::uint16_t modes = 0;   // bit n: mode n; 0 … 5, 14, 15 exist
   [[nodiscard]] static constexpr TriggerInquiry of(std::uint32_t q) noexcept {
-    TriggerInquiry t{(q & bit(31)) != 0, (q & bit(25)) != 0, (q & bit(24)) != 0, (q & bit(16)) != 0, 0, 0};
+    TriggerInquiry t{
+        (q & bit(31)) != 0, (q & bit(25)) != 0, (q & bit(24)) != 0, (q & bit(16)) != 0, 0, 0};
     for (unsigned n = 0; n < 4; ++n)
       if ((q & bit(23 - n)) != 0) t.sources = static_cast<std::uint8_t>(t.sources | 1U << n);
     for (unsigned n = 0; n < 6; ++n)
@@ -78,9 +88,12 @@ struct TriggerInquiry {
     if ((q & bit(0)) != 0) t.modes = static_cast<std::uint16_t>(t.modes | 1U << 15U);
     return t;
   }
-  [[nodiscard]] constexpr bool has_mode(unsigned mode) const noexcept { return mode < 16 && (modes >> mode & 1U) != 0; }
+  [[nodiscard]] constexpr bool has_mode(unsigned mode) const noexcept {
+    return mode < 16 && (modes >> mode & 1U) != 0;
+  }
   [[nodiscard]] constexpr bool has_source(unsigned source) const noexcept {
-    return source == kTriggerSourceSoftware ? software : source < 4 && (sources >> source & 1U) != 0;
+    return source == kTriggerSourceSoftware ? software
+                                            : source < 4 && (sources >> source & 1U) != 0;
   }
 };
 
@@ -92,10 +105,12 @@ struct TriggerMode {
   unsigned mode = 0;       // 0: one frame an edge; 14: the same, exposing during readout
   unsigned parameter = 0;  // 12 bits
   [[nodiscard]] static constexpr TriggerMode of(std::uint32_t q) noexcept {
-    return {(q & bit(25)) != 0, (q & bit(24)) != 0, field(q, 23, 21), field(q, 19, 16), field(q, 11, 0)};
+    return {(q & bit(25)) != 0, (q & bit(24)) != 0, field(q, 23, 21), field(q, 19, 16),
+            field(q, 11, 0)};
   }
   [[nodiscard]] constexpr std::uint32_t quadlet() const noexcept {
-    return bit(31) | (on ? bit(25) : 0) | (rising ? bit(24) : 0) | (source & 7U) << 21U | (mode & 15U) << 16U | (parameter & 0xFFFU);
+    return bit(31) | (on ? bit(25) : 0) | (rising ? bit(24) : 0) | (source & 7U) << 21U |
+           (mode & 15U) << 16U | (parameter & 0xFFFU);
   }
 };
 
@@ -109,7 +124,8 @@ struct StrobeControl {
     return {(q & bit(25)) != 0, (q & bit(24)) != 0, field(q, 23, 12), field(q, 11, 0)};
   }
   [[nodiscard]] constexpr std::uint32_t quadlet() const noexcept {
-    return bit(31) | (on ? bit(25) : 0) | (high ? bit(24) : 0) | (delay & 0xFFFU) << 12U | (duration & 0xFFFU);
+    return bit(31) | (on ? bit(25) : 0) | (high ? bit(24) : 0) | (delay & 0xFFFU) << 12U |
+           (duration & 0xFFFU);
   }
 };
 

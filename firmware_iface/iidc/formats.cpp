@@ -8,18 +8,23 @@ namespace {
 
 using C = ColorCoding;
 constexpr std::array kModes{
-    FixedMode{0, 0, 160, 120, C::yuv444},   FixedMode{0, 1, 320, 240, C::yuv422},   FixedMode{0, 2, 640, 480, C::yuv411},
-    FixedMode{0, 3, 640, 480, C::yuv422},   FixedMode{0, 4, 640, 480, C::rgb8},     FixedMode{0, 5, 640, 480, C::mono8},
-    FixedMode{0, 6, 640, 480, C::mono16},   FixedMode{1, 0, 800, 600, C::yuv422},   FixedMode{1, 1, 800, 600, C::rgb8},
-    FixedMode{1, 2, 800, 600, C::mono8},    FixedMode{1, 3, 1024, 768, C::yuv422},  FixedMode{1, 4, 1024, 768, C::rgb8},
-    FixedMode{1, 5, 1024, 768, C::mono8},   FixedMode{1, 6, 800, 600, C::mono16},   FixedMode{1, 7, 1024, 768, C::mono16},
-    FixedMode{2, 0, 1280, 960, C::yuv422},  FixedMode{2, 1, 1280, 960, C::rgb8},    FixedMode{2, 2, 1280, 960, C::mono8},
-    FixedMode{2, 3, 1600, 1200, C::yuv422}, FixedMode{2, 4, 1600, 1200, C::rgb8},   FixedMode{2, 5, 1600, 1200, C::mono8},
-    FixedMode{2, 6, 1280, 960, C::mono16},  FixedMode{2, 7, 1600, 1200, C::mono16},
+    FixedMode{0, 0, 160, 120, C::yuv444},   FixedMode{0, 1, 320, 240, C::yuv422},
+    FixedMode{0, 2, 640, 480, C::yuv411},   FixedMode{0, 3, 640, 480, C::yuv422},
+    FixedMode{0, 4, 640, 480, C::rgb8},     FixedMode{0, 5, 640, 480, C::mono8},
+    FixedMode{0, 6, 640, 480, C::mono16},   FixedMode{1, 0, 800, 600, C::yuv422},
+    FixedMode{1, 1, 800, 600, C::rgb8},     FixedMode{1, 2, 800, 600, C::mono8},
+    FixedMode{1, 3, 1024, 768, C::yuv422},  FixedMode{1, 4, 1024, 768, C::rgb8},
+    FixedMode{1, 5, 1024, 768, C::mono8},   FixedMode{1, 6, 800, 600, C::mono16},
+    FixedMode{1, 7, 1024, 768, C::mono16},  FixedMode{2, 0, 1280, 960, C::yuv422},
+    FixedMode{2, 1, 1280, 960, C::rgb8},    FixedMode{2, 2, 1280, 960, C::mono8},
+    FixedMode{2, 3, 1600, 1200, C::yuv422}, FixedMode{2, 4, 1600, 1200, C::rgb8},
+    FixedMode{2, 5, 1600, 1200, C::mono8},  FixedMode{2, 6, 1280, 960, C::mono16},
+    FixedMode{2, 7, 1600, 1200, C::mono16},
 };
 
-constexpr std::array<std::string_view, kColorCodings> kNames{"Mono8", "YUV411",       "YUV422",      "YUV444", "RGB8", "Mono16",
-                                                             "RGB16", "Mono16signed", "RGB16signed", "Raw8",   "Raw16"};
+constexpr std::array<std::string_view, kColorCodings> kNames{
+    "Mono8", "YUV411",       "YUV422",      "YUV444", "RGB8", "Mono16",
+    "RGB16", "Mono16signed", "RGB16signed", "Raw8",   "Raw16"};
 constexpr std::array<unsigned, kColorCodings> kBits{8, 12, 16, 24, 24, 16, 48, 16, 48, 8, 16};
 
 }  // namespace
@@ -68,7 +73,8 @@ double packet_rate(std::size_t image_bytes, std::size_t packet_bytes) noexcept {
   return kCyclesPerSecond / static_cast<double>(packets_for(image_bytes, packet_bytes) + 1);
 }
 
-std::size_t packet_for_rate(std::size_t image_bytes, double rate_hz, std::size_t unit, std::size_t most) noexcept {
+std::size_t packet_for_rate(std::size_t image_bytes, double rate_hz, std::size_t unit,
+                            std::size_t most) noexcept {
   if (!(rate_hz > 0) || unit == 0 || image_bytes == 0) return 0;
   const double packets = std::floor(kCyclesPerSecond / rate_hz * (1 + 1e-9)) - 1;
   if (!(packets >= 1)) return 0;

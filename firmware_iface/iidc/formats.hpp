@@ -37,23 +37,27 @@ struct FixedMode {
 
 inline constexpr unsigned kRates = 8;
 /// Frames a second of a rate code: 1.875 · 2^code.
-[[nodiscard]] constexpr double rate_of(unsigned code) noexcept { return 1.875 * static_cast<double>(1U << code); }
+[[nodiscard]] constexpr double rate_of(unsigned code) noexcept {
+  return 1.875 * static_cast<double>(1U << code);
+}
 /// The smallest code with rate_of(code) ≥ rate (to a ten-thousandth); none above 240 Hz.
 [[nodiscard]] std::optional<unsigned> rate_code_for(double rate_hz) noexcept;
 
-/// Bytes of one packet of a fixed mode; 0: not a whole number of quadlets, such a rate does not exist.
-/// A frame of 30 Hz is 240 packets, of 768 lines 256: whole parts of lines travel together.
+/// Bytes of one packet of a fixed mode; 0: not a whole number of quadlets, such a rate does not
+/// exist. A frame of 30 Hz is 240 packets, of 768 lines 256: whole parts of lines travel together.
 [[nodiscard]] std::size_t fixed_packet_bytes(const FixedMode& mode, unsigned rate_code) noexcept;
 
 inline constexpr double kCyclesPerSecond = 8000;  // each carries one packet of every camera
 
-[[nodiscard]] constexpr std::size_t packets_for(std::size_t bytes, std::size_t packet_bytes) noexcept {
+[[nodiscard]] constexpr std::size_t packets_for(std::size_t bytes,
+                                                std::size_t packet_bytes) noexcept {
   return packet_bytes == 0 ? 0 : (bytes + packet_bytes - 1) / packet_bytes;
 }
 /// Highest frame rate that packets of this size allow, with one cycle between two frames.
 [[nodiscard]] double packet_rate(std::size_t image_bytes, std::size_t packet_bytes) noexcept;
 /// The smallest packet, a multiple of `unit`, with packet_rate ≥ rate; 0: none up to `most`.
-[[nodiscard]] std::size_t packet_for_rate(std::size_t image_bytes, double rate_hz, std::size_t unit, std::size_t most) noexcept;
+[[nodiscard]] std::size_t packet_for_rate(std::size_t image_bytes, double rate_hz, std::size_t unit,
+                                          std::size_t most) noexcept;
 
 /// A mosaic of colour filters, by the letters of its first two rows.
 enum class BayerTile : std::uint8_t { none, rggb, grbg, gbrg, bggr };

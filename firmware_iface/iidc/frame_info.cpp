@@ -13,9 +13,11 @@ FrameInfoLayout FrameInfoLayout::of(std::uint32_t quadlet) noexcept {
   return layout;
 }
 
-std::uint32_t FrameInfoLayout::read(FrameInfoItem i, std::span<const std::uint8_t> image) const noexcept {
+std::uint32_t FrameInfoLayout::read(FrameInfoItem i,
+                                    std::span<const std::uint8_t> image) const noexcept {
   const auto at = static_cast<std::size_t>(at_[static_cast<std::size_t>(i)]);
-  return static_cast<std::uint32_t>(image[at]) << 24U | static_cast<std::uint32_t>(image[at + 1]) << 16U |
+  return static_cast<std::uint32_t>(image[at]) << 24U |
+         static_cast<std::uint32_t>(image[at + 1]) << 16U |
          static_cast<std::uint32_t>(image[at + 2]) << 8U | image[at + 3];
 }
 

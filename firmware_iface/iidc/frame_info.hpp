@@ -24,19 +24,25 @@ enum class FrameInfoItem : std::uint8_t {
 };
 inline constexpr unsigned kFrameInfoItems = 10;
 inline constexpr std::uint32_t kFrameInfoPresent = 0x8000'0000;
-[[nodiscard]] constexpr std::uint32_t frame_info_bit(FrameInfoItem i) noexcept { return std::uint32_t{1} << static_cast<unsigned>(i); }
+[[nodiscard]] constexpr std::uint32_t frame_info_bit(FrameInfoItem i) noexcept {
+  return std::uint32_t{1} << static_cast<unsigned>(i);
+}
 
-/// Where each item stands, from what the register reads after it was written (bits that a camera lacks stay 0).
+/// Where each item stands, from what the register reads after it was written (bits that a camera
+/// lacks stay 0).
 class FrameInfoLayout {
  public:
   FrameInfoLayout() noexcept { at_.fill(-1); }
   [[nodiscard]] static FrameInfoLayout of(std::uint32_t quadlet) noexcept;
 
-  [[nodiscard]] bool has(FrameInfoItem i) const noexcept { return at_[static_cast<std::size_t>(i)] >= 0; }
+  [[nodiscard]] bool has(FrameInfoItem i) const noexcept {
+    return at_[static_cast<std::size_t>(i)] >= 0;
+  }
   /// Bytes at the beginning of the image that are no pixels.
   [[nodiscard]] std::size_t size() const noexcept { return size_; }
   /// The item's quadlet. Precondition: has(i), image.size() ≥ size().
-  [[nodiscard]] std::uint32_t read(FrameInfoItem i, std::span<const std::uint8_t> image) const noexcept;
+  [[nodiscard]] std::uint32_t read(FrameInfoItem i,
+                                   std::span<const std::uint8_t> image) const noexcept;
 
  private:
   std::array<std::int16_t, kFrameInfoItems> at_{};
@@ -47,7 +53,9 @@ class FrameInfoLayout {
 class CounterUnwrapper {
  public:
   /// Distance of `counter` from the last one taken, as a signed number; 0 before the first.
-  [[nodiscard]] std::int64_t step(std::uint32_t counter) const noexcept { return known_ ? static_cast<std::int32_t>(counter - last_) : 0; }
+  [[nodiscard]] std::int64_t step(std::uint32_t counter) const noexcept {
+    return known_ ? static_cast<std::int32_t>(counter - last_) : 0;
+  }
   /// Takes it. Precondition: known and step(counter) > 0, or not known.
   [[nodiscard]] std::uint64_t take(std::uint32_t counter) noexcept {
     if (known_) count_ += static_cast<std::uint64_t>(step(counter));

@@ -6,7 +6,8 @@ namespace vergence::iidc {
 
 [[nodiscard]] constexpr std::uint32_t bit(unsigned n) noexcept { return std::uint32_t{1} << n; }
 /// Bits high … low of a quadlet.
-[[nodiscard]] constexpr std::uint32_t field(std::uint32_t quadlet, unsigned high, unsigned low) noexcept {
+[[nodiscard]] constexpr std::uint32_t field(std::uint32_t quadlet, unsigned high,
+                                            unsigned low) noexcept {
   return quadlet >> low & static_cast<std::uint32_t>((std::uint64_t{1} << (high - low + 1)) - 1);
 }
 
@@ -32,11 +33,16 @@ inline constexpr std::uint32_t kBayerTile = 0x1040;  // four letters, "YYYY": mo
 inline constexpr std::uint32_t kFrameInfo = 0x12F8;
 inline constexpr std::uint32_t kSerialNumber = 0x1F20;
 
-[[nodiscard]] constexpr std::uint32_t mode_inquiry(unsigned format) noexcept { return 0x180 + 4 * format; }  // b31 − m: mode m
-[[nodiscard]] constexpr std::uint32_t rate_inquiry(unsigned format, unsigned mode) noexcept {                // b31 − r: rate r
+[[nodiscard]] constexpr std::uint32_t mode_inquiry(unsigned format) noexcept {
+  return 0x180 + 4 * format;
+}  // b31 − m: mode m
+[[nodiscard]] constexpr std::uint32_t rate_inquiry(unsigned format,
+                                                   unsigned mode) noexcept {  // b31 − r: rate r
   return 0x200 + 0x20 * format + 4 * mode;
 }
-[[nodiscard]] constexpr std::uint32_t format7_base(unsigned mode) noexcept { return 0x2E0 + 4 * mode; }  // quadlet offset
+[[nodiscard]] constexpr std::uint32_t format7_base(unsigned mode) noexcept {
+  return 0x2E0 + 4 * mode;
+}  // quadlet offset
 
 /// Of a Format 7 mode, from its base.
 namespace format7 {
@@ -52,7 +58,8 @@ inline constexpr std::uint32_t kPacketLimits = 0x40;  // unit b31–16, largest 
 inline constexpr std::uint32_t kPacketBytes = 0x44;   // set b31–16, recommended b15–0
 inline constexpr std::uint32_t kUnitPosition = 0x4C;  // 0: as the size
 inline constexpr std::uint32_t kValueSetting = 0x7C;
-inline constexpr std::uint32_t kValuePresent = bit(31), kValueApply = bit(30), kErrorRegion = bit(23), kErrorPacket = bit(22);
+inline constexpr std::uint32_t kValuePresent = bit(31), kValueApply = bit(30),
+                               kErrorRegion = bit(23), kErrorPacket = bit(22);
 }  // namespace format7
 
 /// Of the strobe outputs, from their base.
@@ -76,7 +83,8 @@ struct BasicFunctions {
   bool power_switch = false;
   bool one_shot = false;
   [[nodiscard]] static constexpr BasicFunctions of(std::uint32_t q) noexcept {
-    return {(q & bit(31)) != 0, (q & bit(28)) != 0, (q & bit(23)) != 0, (q & bit(15)) != 0, (q & bit(12)) != 0};
+    return {(q & bit(31)) != 0, (q & bit(28)) != 0, (q & bit(23)) != 0, (q & bit(15)) != 0,
+            (q & bit(12)) != 0};
   }
 };
 
@@ -85,7 +93,9 @@ struct Size {
   [[nodiscard]] static constexpr Size of(std::uint32_t q) noexcept {
     return {static_cast<std::uint16_t>(q >> 16U), static_cast<std::uint16_t>(q & 0xFFFFU)};
   }
-  [[nodiscard]] constexpr std::uint32_t quadlet() const noexcept { return static_cast<std::uint32_t>(width) << 16U | height; }
+  [[nodiscard]] constexpr std::uint32_t quadlet() const noexcept {
+    return static_cast<std::uint32_t>(width) << 16U | height;
+  }
   [[nodiscard]] constexpr bool operator==(const Size&) const noexcept = default;
 };
 
@@ -99,7 +109,8 @@ struct IsoChannel {
     return {field(q, 31, 28), field(q, 25, 24), false};
   }
   [[nodiscard]] constexpr std::uint32_t quadlet() const noexcept {
-    return beta ? bit(15) | (channel & 63U) << 8U | (speed & 7U) : (channel & 15U) << 28U | (speed & 3U) << 24U;
+    return beta ? bit(15) | (channel & 63U) << 8U | (speed & 7U)
+                : (channel & 15U) << 28U | (speed & 3U) << 24U;
   }
 };
 

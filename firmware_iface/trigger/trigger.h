@@ -1,19 +1,24 @@
 #ifndef VERGENCE_FIRMWARE_IFACE_TRIGGER_TRIGGER_H
 #define VERGENCE_FIRMWARE_IFACE_TRIGGER_TRIGGER_H
 /*
- * What host and trigger board say to each other: one C11 header for both sides (the host includes it from C++).
+ * What host and trigger board say to each other: one C11 header for both sides (the host includes
+ * it from C++).
  *
- * Frame      COBS(type u8, sequence u8, payload 0..64 bytes, CRC-32 of all before it) and one byte 00. 00 stands nowhere else, so a
- *            receiver that starts or stumbles anywhere is right again at the next 00. All numbers are little endian, without padding.
- * CRC        CRC-32 of IEEE 802.3: reflected polynomial EDB88320, start and final exclusive-or FFFFFFFF.
- * Answers    The host numbers its messages 0..127, and the board answers each with the same sequence: HELLO by INFO, PING by PONG, the
- *            others by STATUS once they are in effect, or by ERROR. What the board sends unasked (EVENT, PPS, INS, STATUS every second and
- *            when its state changes) has bit 7 set and counts in the others, so that it is never taken for an answer; a gap is a message
- * lost. Boot       boot_id differs at every start of the board. Pulse numbers and ticks mean nothing across two boot_ids. Ticks      64-bit
- * microseconds of the board's clock since its start, taken by hardware at the edge. With PPS they are seconds of PPS divided by a million;
- * they never step, and after the first HELLO their rate moves by at most 1 ppm a second (or by a sixteenth of what is missing, if that is
- * more). Memory     The caller's; no heap, no state but in TriggerDecoder. Threads: whatever the caller does with its own objects. Errors
- * Closed enums; a call that is not ok has changed no output.
+ * Frame      COBS(type u8, sequence u8, payload 0..64 bytes, CRC-32 of all before it) and one byte
+ * 00. 00 stands nowhere else, so a receiver that starts or stumbles anywhere is right again at the
+ * next 00. All numbers are little endian, without padding. CRC        CRC-32 of IEEE 802.3:
+ * reflected polynomial EDB88320, start and final exclusive-or FFFFFFFF. Answers    The host numbers
+ * its messages 0..127, and the board answers each with the same sequence: HELLO by INFO, PING by
+ * PONG, the others by STATUS once they are in effect, or by ERROR. What the board sends unasked
+ * (EVENT, PPS, INS, STATUS every second and when its state changes) has bit 7 set and counts in the
+ * others, so that it is never taken for an answer; a gap is a message lost. Boot       boot_id
+ * differs at every start of the board. Pulse numbers and ticks mean nothing across two boot_ids.
+ * Ticks      64-bit microseconds of the board's clock since its start, taken by hardware at the
+ * edge. With PPS they are seconds of PPS divided by a million; they never step, and after the first
+ * HELLO their rate moves by at most 1 ppm a second (or by a sixteenth of what is missing, if that
+ * is more). Memory     The caller's; no heap, no state but in TriggerDecoder. Threads: whatever the
+ * caller does with its own objects. Errors Closed enums; a call that is not ok has changed no
+ * output.
  */
 #include <stdbool.h>
 #include <stddef.h>
@@ -28,10 +33,11 @@ enum {
   trigger_protocol_version = 1, /* a board with another one is refused by name */
   trigger_max_lines = 4,
   trigger_max_payload = 64,
-  trigger_unasked = 0x80,                                    /* in a sequence: nobody asked */
-  trigger_overhead = 6,                                      /* type, sequence, CRC */
-  trigger_max_body = trigger_max_payload + trigger_overhead, /* < 254: COBS then adds exactly one byte */
-  trigger_max_frame = trigger_max_body + 2,                  /* COBS byte and 00 */
+  trigger_unasked = 0x80, /* in a sequence: nobody asked */
+  trigger_overhead = 6,   /* type, sequence, CRC */
+  trigger_max_body =
+      trigger_max_payload + trigger_overhead, /* < 254: COBS then adds exactly one byte */
+  trigger_max_frame = trigger_max_body + 2,   /* COBS byte and 00 */
   trigger_info_payload_size = 28,
   trigger_config_payload_size = 18,
   trigger_pause_payload_size = 4,
@@ -60,7 +66,11 @@ typedef enum {
 } TriggerType;
 
 /* Edge that counts on an input. */
-typedef enum { trigger_edge_none = 0, trigger_edge_rising = 1, trigger_edge_falling = 2 } TriggerEdgeKind;
+typedef enum {
+  trigger_edge_none = 0,
+  trigger_edge_rising = 1,
+  trigger_edge_falling = 2
+} TriggerEdgeKind;
 
 typedef enum { trigger_stopped = 0, trigger_running = 1, trigger_paused = 2 } TriggerState;
 
@@ -68,42 +78,49 @@ typedef enum {
   trigger_error_unknown_type = 1,
   trigger_error_wrong_size = 2, /* a payload of another size than its type has */
   trigger_error_version = 3,
-  trigger_error_not_stopped = 4, /* CONFIG while pulses run; START or STOP before the last STOP was answered */
+  trigger_error_not_stopped =
+      4, /* CONFIG while pulses run; START or STOP before the last STOP was answered */
   trigger_error_not_configured = 5,
-  trigger_error_rate = 6,       /* the timer cannot make this rate */
-  trigger_error_pulse = 7,      /* pulse width 0, above a second or not below the shortest interval */
-  trigger_error_line = 8,       /* a line or input that the board does not have, or no line at all */
+  trigger_error_rate = 6,  /* the timer cannot make this rate */
+  trigger_error_pulse = 7, /* pulse width 0, above a second or not below the shortest interval */
+  trigger_error_line = 8,  /* a line or input that the board does not have, or no line at all */
   trigger_error_not_running = 9 /* PAUSE while stopped */
 } TriggerErrorCode;
 
-/* INFO, 28 bytes: 0 version, 1..3 firmware, 4 boot_id, 8 tick_hz, 12 lines, 13 feedback_inputs, 14 has_pps, 15 has_ins, 16 serial */
+/* INFO, 28 bytes: 0 version, 1..3 firmware, 4 boot_id, 8 tick_hz, 12 lines, 13 feedback_inputs, 14
+ * has_pps, 15 has_ins, 16 serial */
 typedef struct {
   uint8_t version;
   uint8_t firmware_major, firmware_minor, firmware_patch;
   uint32_t boot_id;
-  uint32_t tick_hz; /* of the hardware counter behind the ticks: their resolution; ticks on the wire are microseconds */
+  uint32_t tick_hz; /* of the hardware counter behind the ticks: their resolution; ticks on the wire
+                       are microseconds */
   uint8_t lines;
   uint8_t feedback_inputs;
   uint8_t has_pps, has_ins; /* 0 or 1 */
   uint8_t serial[12];       /* of the board's processor */
 } TriggerInfo;
 
-/* CONFIG, 18 bytes: 0 rate_millihertz, 4 pulse_us, 8 vary_us, 12 lines, 13 active_low, 14 feedback_inputs, 15 feedback_active_low,
- * 16 pps_edge, 17 ins_edge. Bit k of a mask is line or input k. */
+/* CONFIG, 18 bytes: 0 rate_millihertz, 4 pulse_us, 8 vary_us, 12 lines, 13 active_low, 14
+ * feedback_inputs, 15 feedback_active_low, 16 pps_edge, 17 ins_edge. Bit k of a mask is line or
+ * input k. */
 typedef struct {
   uint32_t rate_millihertz;
   uint32_t pulse_us;
-  uint32_t vary_us; /* 0: even intervals; else every interval is longer or shorter by this: trigger_interval_is_longer() */
+  uint32_t vary_us; /* 0: even intervals; else every interval is longer or shorter by this:
+                       trigger_interval_is_longer() */
   uint8_t lines;
   uint8_t active_low;
-  uint8_t feedback_inputs; /* exposure-active outputs of the cameras: input k is that of line k's camera */
+  uint8_t feedback_inputs; /* exposure-active outputs of the cameras: input k is that of line k's
+                              camera */
   uint8_t feedback_active_low;
   uint8_t pps_edge; /* TriggerEdgeKind */
   uint8_t ins_edge;
 } TriggerConfig;
 
-/* PAUSE, 4 bytes: 0 pulses. So many pulses are left out after the one that the timer already holds, then they go on by themselves; their
- * numbers are left out too. In a pause: so many from now on; 0 ends it. */
+/* PAUSE, 4 bytes: 0 pulses. So many pulses are left out after the one that the timer already holds,
+ * then they go on by themselves; their numbers are left out too. In a pause: so many from now on; 0
+ * ends it. */
 typedef struct {
   uint32_t pulses;
 } TriggerPause;
@@ -113,7 +130,8 @@ typedef struct {
   uint32_t token;
 } TriggerPing;
 
-/* PONG, 24 bytes: 0 token, 4 boot_id, 8 received, 16 sent: ticks of the PING's last byte and of the PONG's first. */
+/* PONG, 24 bytes: 0 token, 4 boot_id, 8 received, 16 sent: ticks of the PING's last byte and of the
+ * PONG's first. */
 typedef struct {
   uint32_t token;
   uint32_t boot_id;
@@ -123,18 +141,21 @@ typedef struct {
 
 /* One line's exposure as its camera's feedback told it, microseconds after the pulse's edge. */
 typedef struct {
-  int32_t start_us, end_us; /* TRIGGER_NOT_SEEN: no edge before the next pulse, or no feedback wired */
+  int32_t start_us,
+      end_us; /* TRIGGER_NOT_SEEN: no edge before the next pulse, or no feedback wired */
 } TriggerExposure;
 #define TRIGGER_NOT_SEEN INT32_MIN
 
-/* EVENT, 50 bytes: 0 boot_id, 4 pulse, 8 tick, 16 lines, 17 flags, 18 + 8 k start_us and end_us of line k. Sent when the exposures are
- * over, at the latest at the next pulse or, where none comes, an interval after its own. */
+/* EVENT, 50 bytes: 0 boot_id, 4 pulse, 8 tick, 16 lines, 17 flags, 18 + 8 k start_us and end_us of
+ * line k. Sent when the exposures are over, at the latest at the next pulse or, where none comes,
+ * an interval after its own. */
 typedef struct {
   uint32_t boot_id;
   uint32_t pulse; /* from 0 at every boot, one more a pulse, also for those a PAUSE left out */
   uint64_t tick;  /* of the pulse's active edge */
   uint8_t lines;  /* mask of the lines that were pulsed */
-  uint8_t flags;  /* bit 0: first after START or a pause; bit 1: the board was late, the edge is off the grid or numbers were left out */
+  uint8_t flags;  /* bit 0: first after START or a pause; bit 1: the board was late, the edge is off
+                     the grid or numbers were left out */
   TriggerExposure exposure[trigger_max_lines];
 } TriggerEvent;
 
@@ -145,8 +166,8 @@ typedef struct {
   uint64_t tick;
 } TriggerEdge;
 
-/* STATUS, 38 bytes: 0 boot_id, 4 tick, 12 pulses, 16 configuration, 20 frames_refused, 24 events_dropped, 28 edges_dropped, 32 pps_age_ms,
- * 36 state, 37 pps_locked */
+/* STATUS, 38 bytes: 0 boot_id, 4 tick, 12 pulses, 16 configuration, 20 frames_refused, 24
+ * events_dropped, 28 edges_dropped, 32 pps_age_ms, 36 state, 37 pps_locked */
 typedef struct {
   uint32_t boot_id;
   uint64_t tick;
@@ -166,8 +187,9 @@ typedef struct {
   uint8_t code; /* TriggerErrorCode */
 } TriggerError;
 
-/* With vary_us: whether the interval that begins at this pulse is longer. The same bits on both sides, and no run of 24 intervals
- * among the first 100 000 fits itself shifted by up to eight, so that a camera's own intervals prove which frame belongs to which pulse. */
+/* With vary_us: whether the interval that begins at this pulse is longer. The same bits on both
+ * sides, and no run of 24 intervals among the first 100 000 fits itself shifted by up to eight, so
+ * that a camera's own intervals prove which frame belongs to which pulse. */
 static inline bool trigger_interval_is_longer(uint32_t pulse) {
   uint32_t mixed = pulse + 1U;
   mixed = (mixed ^ (mixed >> 16U)) * 0x45D9F3BU;
@@ -188,7 +210,9 @@ static inline uint64_t trigger_get_bytes(const uint8_t* at, unsigned bytes) {
   return value;
 }
 
-static inline uint32_t trigger_get_u32(const uint8_t* at) { return (uint32_t)trigger_get_bytes(at, 4); }
+static inline uint32_t trigger_get_u32(const uint8_t* at) {
+  return (uint32_t)trigger_get_bytes(at, 4);
+}
 
 /* Two's complement without a conversion whose result the language leaves open. */
 static inline int32_t trigger_get_i32(const uint8_t* at) {
@@ -207,7 +231,8 @@ static inline uint32_t trigger_crc32(const uint8_t* bytes, size_t size) {
   return crc ^ 0xFFFFFFFFU;
 }
 
-/* ---- payloads: put writes exactly the payload's size; get is false, *m untouched, for any other size ---- */
+/* ---- payloads: put writes exactly the payload's size; get is false, *m untouched, for any other
+ * size ---- */
 
 static inline void trigger_put_info(const TriggerInfo* m, uint8_t* p) {
   p = trigger_put_bytes(p, m->version, 1);
@@ -265,7 +290,9 @@ static inline bool trigger_get_config(const uint8_t* p, size_t size, TriggerConf
   return true;
 }
 
-static inline void trigger_put_pause(const TriggerPause* m, uint8_t* p) { (void)trigger_put_bytes(p, m->pulses, 4); }
+static inline void trigger_put_pause(const TriggerPause* m, uint8_t* p) {
+  (void)trigger_put_bytes(p, m->pulses, 4);
+}
 
 static inline bool trigger_get_pause(const uint8_t* p, size_t size, TriggerPause* m) {
   if (size != trigger_pause_payload_size) return false;
@@ -273,7 +300,9 @@ static inline bool trigger_get_pause(const uint8_t* p, size_t size, TriggerPause
   return true;
 }
 
-static inline void trigger_put_ping(const TriggerPing* m, uint8_t* p) { (void)trigger_put_bytes(p, m->token, 4); }
+static inline void trigger_put_ping(const TriggerPing* m, uint8_t* p) {
+  (void)trigger_put_bytes(p, m->token, 4);
+}
 
 static inline bool trigger_get_ping(const uint8_t* p, size_t size, TriggerPing* m) {
   if (size != trigger_ping_payload_size) return false;
@@ -379,8 +408,10 @@ static inline bool trigger_get_error(const uint8_t* p, size_t size, TriggerError
 
 /* ---- frames ---- */
 
-/* Writes a whole frame, its 00 included, to out[trigger_max_frame]; returns its size, 0 for a payload that is too long. */
-static inline size_t trigger_write_frame(uint8_t type, uint8_t sequence, const uint8_t* payload, size_t size, uint8_t* out) {
+/* Writes a whole frame, its 00 included, to out[trigger_max_frame]; returns its size, 0 for a
+ * payload that is too long. */
+static inline size_t trigger_write_frame(uint8_t type, uint8_t sequence, const uint8_t* payload,
+                                         size_t size, uint8_t* out) {
   uint8_t body[trigger_max_body];
   if (size > trigger_max_payload) return 0;
   body[0] = type;
@@ -388,7 +419,8 @@ static inline size_t trigger_write_frame(uint8_t type, uint8_t sequence, const u
   if (size > 0) memcpy(body + 2, payload, size);
   (void)trigger_put_bytes(body + 2 + size, trigger_crc32(body, size + 2), 4);
 
-  /* COBS: each 00 is replaced by the distance to the next; bodies are shorter than 254, so one byte is added. */
+  /* COBS: each 00 is replaced by the distance to the next; bodies are shorter than 254, so one byte
+   * is added. */
   size_t code_at = 0, at = 1;
   uint8_t code = 1;
   for (size_t i = 0; i < size + trigger_overhead; ++i) {
@@ -409,8 +441,9 @@ static inline size_t trigger_write_frame(uint8_t type, uint8_t sequence, const u
 typedef enum {
   trigger_wait,        /* more bytes are needed */
   trigger_frame_ready, /* *frame is filled */
-  trigger_bad_coding,  /* the bytes before this 00 are no COBS: most often the stream's cut beginning */
-  trigger_bad_length,  /* shorter than a frame can be, or longer */
+  trigger_bad_coding, /* the bytes before this 00 are no COBS: most often the stream's cut beginning
+                       */
+  trigger_bad_length, /* shorter than a frame can be, or longer */
   trigger_bad_crc
 } TriggerDecodeStatus;
 
@@ -441,8 +474,10 @@ static inline size_t trigger_uncobs(uint8_t* bytes, size_t size) {
   return to;
 }
 
-/* One received byte. Anything but trigger_frame_ready leaves *frame alone. Idle 00 bytes between frames are nothing. */
-static inline TriggerDecodeStatus trigger_decode(TriggerDecoder* decoder, uint8_t byte, TriggerFrame* frame) {
+/* One received byte. Anything but trigger_frame_ready leaves *frame alone. Idle 00 bytes between
+ * frames are nothing. */
+static inline TriggerDecodeStatus trigger_decode(TriggerDecoder* decoder, uint8_t byte,
+                                                 TriggerFrame* frame) {
   if (byte != 0) {
     if (decoder->used == sizeof decoder->buffer)
       decoder->overrun = true;

@@ -4,31 +4,38 @@
 #include <cstdint>
 #include <span>
 
-/// Big-endian numbers as they stand in Xbus payloads. Precondition of all: the span is as long as the type says.
+/// Big-endian numbers as they stand in Xbus payloads. Precondition of all: the span is as long as
+/// the type says.
 namespace vergence::xbus {
 
 [[nodiscard]] constexpr std::uint16_t read_u16(std::span<const std::uint8_t> b) noexcept {
   return static_cast<std::uint16_t>((b[0] << 8U) | b[1]);
 }
 [[nodiscard]] constexpr std::uint32_t read_u32(std::span<const std::uint8_t> b) noexcept {
-  return (static_cast<std::uint32_t>(b[0]) << 24U) | (static_cast<std::uint32_t>(b[1]) << 16U) | (static_cast<std::uint32_t>(b[2]) << 8U) |
-         b[3];
+  return (static_cast<std::uint32_t>(b[0]) << 24U) | (static_cast<std::uint32_t>(b[1]) << 16U) |
+         (static_cast<std::uint32_t>(b[2]) << 8U) | b[3];
 }
 [[nodiscard]] constexpr std::uint64_t read_u64(std::span<const std::uint8_t> b) noexcept {
   return (static_cast<std::uint64_t>(read_u32(b)) << 32U) | read_u32(b.subspan(4));
 }
-[[nodiscard]] constexpr std::int32_t read_i32(std::span<const std::uint8_t> b) noexcept { return static_cast<std::int32_t>(read_u32(b)); }
+[[nodiscard]] constexpr std::int32_t read_i32(std::span<const std::uint8_t> b) noexcept {
+  return static_cast<std::int32_t>(read_u32(b));
+}
 [[nodiscard]] constexpr double read_float32(std::span<const std::uint8_t> b) noexcept {
   return static_cast<double>(std::bit_cast<float>(read_u32(b)));
 }
-[[nodiscard]] constexpr double read_float64(std::span<const std::uint8_t> b) noexcept { return std::bit_cast<double>(read_u64(b)); }
+[[nodiscard]] constexpr double read_float64(std::span<const std::uint8_t> b) noexcept {
+  return std::bit_cast<double>(read_u64(b));
+}
 /// 12.20: a signed 32-bit count of 2⁻²⁰, range ±2048.
 [[nodiscard]] constexpr double read_fp12_20(std::span<const std::uint8_t> b) noexcept {
   return static_cast<double>(read_i32(b)) / 1048576.0;
 }
-/// 16.32: the 32-bit fraction first, then the signed 16-bit integer part; 48 bits, so a double holds it exactly.
+/// 16.32: the 32-bit fraction first, then the signed 16-bit integer part; 48 bits, so a double
+/// holds it exactly.
 [[nodiscard]] constexpr double read_fp16_32(std::span<const std::uint8_t> b) noexcept {
-  return static_cast<double>(static_cast<std::int16_t>(read_u16(b.subspan(4)))) + static_cast<double>(read_u32(b)) / 4294967296.0;
+  return static_cast<double>(static_cast<std::int16_t>(read_u16(b.subspan(4)))) +
+         static_cast<double>(read_u32(b)) / 4294967296.0;
 }
 
 constexpr void write_u16(std::span<std::uint8_t> b, std::uint16_t v) noexcept {
@@ -44,7 +51,8 @@ constexpr void write_u64(std::span<std::uint8_t> b, std::uint64_t v) noexcept {
   write_u32(b.subspan(4), static_cast<std::uint32_t>(v));
 }
 
-/// How floating numbers travel: the lowest two bits of a packet's id (MTData2), bits 8 and 9 of the output settings (MTData).
+/// How floating numbers travel: the lowest two bits of a packet's id (MTData2), bits 8 and 9 of the
+/// output settings (MTData).
 enum class NumberFormat : std::uint8_t { float32 = 0, fp12_20 = 1, fp16_32 = 2, float64 = 3 };
 
 /// Bytes of one number.
@@ -52,7 +60,8 @@ enum class NumberFormat : std::uint8_t { float32 = 0, fp12_20 = 1, fp16_32 = 2, 
   return format == NumberFormat::fp16_32 ? 6 : format == NumberFormat::float64 ? 8 : 4;
 }
 
-[[nodiscard]] constexpr double read_number(std::span<const std::uint8_t> b, NumberFormat format) noexcept {
+[[nodiscard]] constexpr double read_number(std::span<const std::uint8_t> b,
+                                           NumberFormat format) noexcept {
   switch (format) {
     case NumberFormat::float32:
       return read_float32(b);
@@ -66,7 +75,8 @@ enum class NumberFormat : std::uint8_t { float32 = 0, fp12_20 = 1, fp16_32 = 2, 
   return 0;  // not reached: two bits have four values
 }
 
-/// Rounds to the format; outside a fixed-point format's range its nearest end. Not a number becomes 0 in fixed point.
+/// Rounds to the format; outside a fixed-point format's range its nearest end. Not a number becomes
+/// 0 in fixed point.
 void write_number(std::span<std::uint8_t> b, NumberFormat format, double value) noexcept;
 
 }  // namespace vergence::xbus

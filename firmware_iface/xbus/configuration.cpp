@@ -30,7 +30,8 @@ constexpr std::array<BaudCode, 14> kBaudCodes{{{460800, 0x00},
 constexpr std::uint8_t kOldCode921600 = 0x80;
 
 /// Rates that the receiver's pulse cannot correct.
-constexpr std::array<std::uint16_t, 11> kRatesExcluded{10, 15, 18, 25, 45, 50, 75, 90, 150, 225, 450};
+constexpr std::array<std::uint16_t, 11> kRatesExcluded{10, 15, 18,  25,  45, 50,
+                                                       75, 90, 150, 225, 450};
 
 }  // namespace
 
@@ -43,12 +44,14 @@ std::optional<Generation> generation_of_device_id(std::uint32_t id) noexcept {
 std::optional<std::uint8_t> baud_code(std::uint32_t baud, Generation generation) noexcept {
   if (baud == 921600 && generation == Generation::legacy) return kOldCode921600;
   if (baud == 2000000 && generation == Generation::legacy) return std::nullopt;
-  const auto* found = std::find_if(kBaudCodes.begin(), kBaudCodes.end(), [baud](const BaudCode& b) { return b.baud == baud; });
+  const auto* found = std::find_if(kBaudCodes.begin(), kBaudCodes.end(),
+                                   [baud](const BaudCode& b) { return b.baud == baud; });
   return found == kBaudCodes.end() ? std::nullopt : std::optional(found->code);
 }
 
 std::optional<std::uint32_t> baud_of_code(std::uint8_t code) noexcept {
-  const auto* found = std::find_if(kBaudCodes.begin(), kBaudCodes.end(), [code](const BaudCode& b) { return b.code == code; });
+  const auto* found = std::find_if(kBaudCodes.begin(), kBaudCodes.end(),
+                                   [code](const BaudCode& b) { return b.code == code; });
   return found == kBaudCodes.end() ? std::nullopt : std::optional(found->baud);
 }
 
@@ -57,7 +60,8 @@ std::optional<std::uint16_t> period_of_rate(double rate_hz) noexcept {
   if (!(rate_hz >= kLeast && rate_hz <= kMost)) return std::nullopt;
   const double period = std::round(kPeriodClock / rate_hz);
   if (std::abs(kPeriodClock / period - rate_hz) > 1e-6 * rate_hz) return std::nullopt;
-  if (std::any_of(kRatesExcluded.begin(), kRatesExcluded.end(), [rate_hz](std::uint16_t r) { return std::abs(rate_hz - r) < 1e-3; }))
+  if (std::any_of(kRatesExcluded.begin(), kRatesExcluded.end(),
+                  [rate_hz](std::uint16_t r) { return std::abs(rate_hz - r) < 1e-3; }))
     return std::nullopt;
   return static_cast<std::uint16_t>(period);
 }
@@ -106,16 +110,19 @@ bool OutputConfiguration::operator==(const OutputConfiguration& o) const noexcep
   return std::equal(items().begin(), items().end(), o.items().begin(), o.items().end());
 }
 
-bool read_output_configuration(std::span<const std::uint8_t> payload, OutputConfiguration* out) noexcept {
+bool read_output_configuration(std::span<const std::uint8_t> payload,
+                               OutputConfiguration* out) noexcept {
   constexpr std::size_t kEntry = 4;
   if (payload.size() % kEntry != 0 || payload.size() / kEntry > kMostOutputs) return false;
   OutputConfiguration read;
-  for (; !payload.empty(); payload = payload.subspan(kEntry)) (void)read.add({read_u16(payload), read_u16(payload.subspan(2))});
+  for (; !payload.empty(); payload = payload.subspan(kEntry))
+    (void)read.add({read_u16(payload), read_u16(payload.subspan(2))});
   *out = read;
   return true;
 }
 
-std::size_t write_output_configuration(const OutputConfiguration& configuration, std::span<std::uint8_t> out) noexcept {
+std::size_t write_output_configuration(const OutputConfiguration& configuration,
+                                       std::span<std::uint8_t> out) noexcept {
   constexpr std::size_t kEntry = 4;
   if (out.size() < configuration.count * kEntry) return 0;
   for (std::size_t i = 0; i < configuration.count; ++i) {
@@ -125,7 +132,8 @@ std::size_t write_output_configuration(const OutputConfiguration& configuration,
   return configuration.count * kEntry;
 }
 
-std::size_t write_legacy_sync(LegacySync parameter, std::uint32_t value, std::span<std::uint8_t> out) noexcept {
+std::size_t write_legacy_sync(LegacySync parameter, std::uint32_t value,
+                              std::span<std::uint8_t> out) noexcept {
   const bool wide = parameter == LegacySync::offset || parameter == LegacySync::width;
   const std::size_t size = wide ? 5 : 3;
   if (out.size() < size) return 0;
@@ -137,7 +145,8 @@ std::size_t write_legacy_sync(LegacySync parameter, std::uint32_t value, std::sp
   return size;
 }
 
-bool read_legacy_sync(std::span<const std::uint8_t> payload, LegacySync* parameter, std::uint32_t* value) noexcept {
+bool read_legacy_sync(std::span<const std::uint8_t> payload, LegacySync* parameter,
+                      std::uint32_t* value) noexcept {
   if (payload.empty() || payload[0] > static_cast<std::uint8_t>(LegacySync::width)) return false;
   const auto which = static_cast<LegacySync>(payload[0]);
   const bool wide = which == LegacySync::offset || which == LegacySync::width;
@@ -152,7 +161,8 @@ bool SyncSettings::operator==(const SyncSettings& o) const noexcept {
 }
 
 bool read_sync_settings(std::span<const std::uint8_t> payload, SyncSettings* out) noexcept {
-  if (payload.size() % kSyncEntrySize != 0 || payload.size() / kSyncEntrySize > kMostSyncEntries) return false;
+  if (payload.size() % kSyncEntrySize != 0 || payload.size() / kSyncEntrySize > kMostSyncEntries)
+    return false;
   SyncSettings read;
   for (; !payload.empty(); payload = payload.subspan(kSyncEntrySize))
     read.entries[read.count++] = {payload[0],
@@ -167,7 +177,8 @@ bool read_sync_settings(std::span<const std::uint8_t> payload, SyncSettings* out
   return true;
 }
 
-std::size_t write_sync_settings(const SyncSettings& settings, std::span<std::uint8_t> out) noexcept {
+std::size_t write_sync_settings(const SyncSettings& settings,
+                                std::span<std::uint8_t> out) noexcept {
   if (out.size() < settings.count * kSyncEntrySize) return 0;
   for (const SyncEntry& e : settings.items()) {
     out[0] = e.function;

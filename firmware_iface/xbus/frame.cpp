@@ -26,7 +26,8 @@ ParsedFrame parse_frame(std::span<const std::uint8_t> bytes) noexcept {
   if (bytes.empty()) return refused(FrameStatus::incomplete);
   if (bytes[0] != kPreamble) return refused(FrameStatus::no_preamble);
   // Each byte is judged as soon as it is there: a false preamble shall not hold up the stream.
-  if (bytes.size() > 1 && bytes[1] != kBusMaster && bytes[1] != kBusFirst) return refused(FrameStatus::bus_refused);
+  if (bytes.size() > 1 && bytes[1] != kBusMaster && bytes[1] != kBusFirst)
+    return refused(FrameStatus::bus_refused);
   if (bytes.size() < kShortHeader) return refused(FrameStatus::incomplete);
   std::size_t header = kShortHeader, length = bytes[3];
   if (bytes[3] == kLengthExtended) {
@@ -87,8 +88,10 @@ bool FrameStream::next(Message* message) noexcept {
         return false;
       case FrameStatus::no_preamble: {
         const void* preamble = std::memchr(buffer_.data() + begin_, kPreamble, end_ - begin_);
-        skip(preamble == nullptr ? end_ - begin_
-                                 : static_cast<std::size_t>(static_cast<const std::uint8_t*>(preamble) - (buffer_.data() + begin_)));
+        skip(preamble == nullptr
+                 ? end_ - begin_
+                 : static_cast<std::size_t>(static_cast<const std::uint8_t*>(preamble) -
+                                            (buffer_.data() + begin_)));
         continue;
       }
       case FrameStatus::bus_refused:

@@ -4,18 +4,22 @@
 #include <cstdint>
 #include <span>
 
-/// Xbus frames: FA, bus id, message id, length (FF: two more bytes of length follow, big endian), payload, checksum.
-/// The checksum makes the sum of all bytes after FA, itself included, a multiple of 256.
+/// Xbus frames: FA, bus id, message id, length (FF: two more bytes of length follow, big endian),
+/// payload, checksum. The checksum makes the sum of all bytes after FA, itself included, a multiple
+/// of 256.
 namespace vergence::xbus {
 
 inline constexpr std::uint8_t kPreamble = 0xFA;
-inline constexpr std::uint8_t kBusMaster = 0xFF;  // what a sensor sends unasked, and the usual address
-inline constexpr std::uint8_t kBusFirst = 0x01;   // the other address a single sensor answers to
+inline constexpr std::uint8_t kBusMaster =
+    0xFF;  // what a sensor sends unasked, and the usual address
+inline constexpr std::uint8_t kBusFirst = 0x01;  // the other address a single sensor answers to
 inline constexpr std::uint8_t kLengthExtended = 0xFF;
-inline constexpr std::size_t kMaxPayload = 2048;           // bytes; longer claims are false frames
-inline constexpr std::size_t kMaxFrame = kMaxPayload + 7;  // FA, bus, id, FF, two of length, payload, checksum
+inline constexpr std::size_t kMaxPayload = 2048;  // bytes; longer claims are false frames
+inline constexpr std::size_t kMaxFrame =
+    kMaxPayload + 7;  // FA, bus, id, FF, two of length, payload, checksum
 
-/// Message ids; an answer's id is the request's plus one, and a request for a setting is the message that sets it, without payload.
+/// Message ids; an answer's id is the request's plus one, and a request for a setting is the
+/// message that sets it, without payload.
 /// L: MTi-G (MTData), 4: MTi-G-700/710 (MTData2).
 enum class MessageId : std::uint8_t {
   device_id_request = 0x00,
@@ -45,7 +49,8 @@ enum class MessageId : std::uint8_t {
   output_mode = 0xD0,           // L
   output_settings = 0xD2,       // L
   output_skip = 0xD4,           // L
-  legacy_sync_in = 0xD6,        // L; the same number sets the heading of a 4: never sent before the generation is known
+  legacy_sync_in = 0xD6,        // L; the same number sets the heading of a 4: never sent before the
+                                // generation is known
   legacy_sync_out = 0xD8,       // L
 };
 
@@ -54,7 +59,9 @@ struct Message {
   std::uint8_t id = 0;  // MessageId, or one this header does not name
   std::span<const std::uint8_t> payload{};
 
-  [[nodiscard]] bool is(MessageId what) const noexcept { return id == static_cast<std::uint8_t>(what); }
+  [[nodiscard]] bool is(MessageId what) const noexcept {
+    return id == static_cast<std::uint8_t>(what);
+  }
 };
 
 enum class FrameStatus : std::uint8_t {
@@ -72,7 +79,8 @@ struct ParsedFrame {
   Message message{};     // payload points into the bytes given
 };
 
-/// The frame that begins at bytes[0]. Pure: what follows a refused first byte is the caller's to try, one byte on.
+/// The frame that begins at bytes[0]. Pure: what follows a refused first byte is the caller's to
+/// try, one byte on.
 [[nodiscard]] ParsedFrame parse_frame(std::span<const std::uint8_t> bytes) noexcept;
 
 enum class WriteStatus : std::uint8_t { ok, payload_too_long, no_room };
@@ -82,8 +90,10 @@ struct WrittenFrame {
   std::size_t size = 0;  // bytes written; 0 unless ok
 };
 
-/// Writes the message to the beginning of `out`, extended length only where needed. Not ok: `out` untouched.
-[[nodiscard]] WrittenFrame write_frame(const Message& message, std::span<std::uint8_t> out) noexcept;
+/// Writes the message to the beginning of `out`, extended length only where needed. Not ok: `out`
+/// untouched.
+[[nodiscard]] WrittenFrame write_frame(const Message& message,
+                                       std::span<std::uint8_t> out) noexcept;
 
 /// What a stream held; every byte is in a message or in `garbage_bytes`, or still waits.
 struct StreamCounters {
@@ -106,16 +116,19 @@ struct StreamCounters {
 ///
 /// Ownership  A message's payload points into the stream's buffer: valid until the next accept().
 /// Threads    One.
-/// Memory     In place, no heap. accept() takes what fits; once next() has said false it takes at least one byte.
-/// Errors     None: whatever is not a frame is skipped from the failed preamble one byte on, and counted.
+/// Memory     In place, no heap. accept() takes what fits; once next() has said false it takes at
+///            least one byte.
+/// Errors     None: whatever is not a frame is skipped from the failed preamble one byte on, and
+///            counted.
 class FrameStream {
  public:
   /// Takes bytes from the front of `bytes`; returns how many.
   [[nodiscard]] std::size_t accept(std::span<const std::uint8_t> bytes) noexcept;
   /// The oldest whole message not yet handed out. False: none, *message untouched.
   [[nodiscard]] bool next(Message* message) noexcept;
-  /// Gives up the frame that is being waited for, if any: for a line that has been quiet longer than the frame would take
-  /// (a false length of 2048 is 178 ms at 115200 baud). The bytes behind it are looked at again.
+  /// Gives up the frame that is being waited for, if any: for a line that has been quiet longer
+  /// than the frame would take (a false length of 2048 is 178 ms at 115200 baud). The bytes behind
+  /// it are looked at again.
   void abandon() noexcept;
   /// Forgets waiting bytes (they count as garbage): after the line was reopened.
   void reset() noexcept;
@@ -127,7 +140,8 @@ class FrameStream {
  private:
   void skip(std::size_t n) noexcept;
 
-  std::array<std::uint8_t, 4 * kMaxFrame> buffer_{};  // room for reads to gather behind an incomplete frame
+  std::array<std::uint8_t, 4 * kMaxFrame>
+      buffer_{};  // room for reads to gather behind an incomplete frame
   std::size_t begin_ = 0;
   std::size_t end_ = 0;
   StreamCounters counters_{};

@@ -10,16 +10,22 @@ namespace {
 
 constexpr double kBitsPerByte = 10;
 constexpr std::size_t kPacketHeader = 3;
-constexpr std::array<std::uint32_t, 10> kBauds{4800, 9600, 19200, 38400, 57600, 115200, 230400, 460800, 921600, 2000000};
+constexpr std::array<std::uint32_t, 10> kBauds{4800,   9600,   19200,  38400,  57600,
+                                               115200, 230400, 460800, 921600, 2000000};
 
 /// `fixed`: bytes a second that do not grow with the samples' rate.
-LineBudget budget(double bytes_per_sample, double rate_hz, double fixed, std::uint32_t baud) noexcept {
+LineBudget budget(double bytes_per_sample, double rate_hz, double fixed,
+                  std::uint32_t baud) noexcept {
   LineBudget b;
   b.bytes_per_second = bytes_per_sample * rate_hz + fixed;
   b.load = b.bytes_per_second * kBitsPerByte / baud;
-  b.greatest_rate = bytes_per_sample > 0 ? std::max(0.0, (kLineLoadMost * baud / kBitsPerByte - fixed) / bytes_per_sample) : 0;
+  b.greatest_rate =
+      bytes_per_sample > 0
+          ? std::max(0.0, (kLineLoadMost * baud / kBitsPerByte - fixed) / bytes_per_sample)
+          : 0;
   for (const std::uint32_t candidate : kBauds)
-    if (b.baud_needed == 0 && b.bytes_per_second * kBitsPerByte <= kLineLoadMost * candidate) b.baud_needed = candidate;
+    if (b.baud_needed == 0 && b.bytes_per_second * kBitsPerByte <= kLineLoadMost * candidate)
+      b.baud_needed = candidate;
   return b;
 }
 
@@ -34,7 +40,8 @@ std::size_t bytes_of(std::uint16_t id) noexcept {
 }  // namespace
 
 LineBudget line_budget(const MtdataLayout& layout, double rate_hz, std::uint32_t baud) noexcept {
-  return budget(static_cast<double>(frame_size(layout.payload_size().value_or(0))), rate_hz, 0, baud);
+  return budget(static_cast<double>(frame_size(layout.payload_size().value_or(0))), rate_hz, 0,
+                baud);
 }
 
 LineBudget line_budget(const OutputConfiguration& outputs, std::uint32_t baud) noexcept {

@@ -12,7 +12,9 @@ namespace vergence::xbus {
 inline constexpr double kLineLoadMost = 0.9;  // above it a moment's delay is never caught up
 
 /// Bytes of a message in its frame.
-[[nodiscard]] constexpr std::size_t frame_size(std::size_t payload) noexcept { return payload + (payload > 254 ? 7 : 5); }
+[[nodiscard]] constexpr std::size_t frame_size(std::size_t payload) noexcept {
+  return payload + (payload > 254 ? 7 : 5);
+}
 
 /// Nanoseconds that so many bytes take.
 [[nodiscard]] constexpr std::int64_t wire_time_ns(std::size_t bytes, std::uint32_t baud) noexcept {
@@ -21,15 +23,20 @@ inline constexpr double kLineLoadMost = 0.9;  // above it a moment's delay is ne
 
 struct LineBudget {
   double bytes_per_second = 0;
-  double load = 0;                // of the line, 1 is all of it
-  double greatest_rate = 0;       // Hz, of the samples, at kLineLoadMost
-  std::uint32_t baud_needed = 0;  // the lowest of the device's that carries it within kLineLoadMost; 0: none does
+  double load = 0;           // of the line, 1 is all of it
+  double greatest_rate = 0;  // Hz, of the samples, at kLineLoadMost
+  std::uint32_t baud_needed =
+      0;  // the lowest of the device's that carries it within kLineLoadMost; 0: none does
   [[nodiscard]] bool fits() const noexcept { return load <= kLineLoadMost; }
 };
 
-/// Of an MTi-G that sends this layout so often. Precondition: the layout is known, rate and baud positive.
-[[nodiscard]] LineBudget line_budget(const MtdataLayout& layout, double rate_hz, std::uint32_t baud) noexcept;
-/// Of an MTi-G-700/710: samples at the highest rate of the list, the receiver's packets in messages of their own.
-[[nodiscard]] LineBudget line_budget(const OutputConfiguration& outputs, std::uint32_t baud) noexcept;
+/// Of an MTi-G that sends this layout so often. Precondition: the layout is known, rate and baud
+/// positive.
+[[nodiscard]] LineBudget line_budget(const MtdataLayout& layout, double rate_hz,
+                                     std::uint32_t baud) noexcept;
+/// Of an MTi-G-700/710: samples at the highest rate of the list, the receiver's packets in messages
+/// of their own.
+[[nodiscard]] LineBudget line_budget(const OutputConfiguration& outputs,
+                                     std::uint32_t baud) noexcept;
 
 }  // namespace vergence::xbus

@@ -7,14 +7,16 @@ namespace {
 
 constexpr std::size_t kRawSize = 20;
 constexpr std::size_t kFixSize = 44;
-constexpr std::uint16_t kModesKnown = kModeTemperature | kModeCalibrated | kModeOrientation | kModeAuxiliary | kModePosition |
-                                      kModeVelocity | kModeStatus | kModeGnss | kModeRaw;
+constexpr std::uint16_t kModesKnown = kModeTemperature | kModeCalibrated | kModeOrientation |
+                                      kModeAuxiliary | kModePosition | kModeVelocity | kModeStatus |
+                                      kModeGnss | kModeRaw;
 constexpr std::uint32_t kOrientationBits = 0xC;
 constexpr std::uint32_t kPlaceBits = 0x7U << 14U;  // 0: latitude, longitude, altitude on WGS84
 constexpr std::uint32_t kSpeedBits = 0x3U << 17U;  // 0: m/s along x, y, z
 
-/// Walks a payload in the layout's order; reading and writing differ only in what happens to a field.
-/// `Fields` has raw(), fix(), numbers(span of doubles by optional), u8(), u16(), utc(): each takes the optional it belongs to.
+/// Walks a payload in the layout's order; reading and writing differ only in what happens to a
+/// field. `Fields` has raw(), fix(), numbers(span of doubles by optional), u8(), u16(), utc(): each
+/// takes the optional it belongs to.
 template <class Data, class Fields>
 void walk(const MtdataLayout& layout, Data& d, Fields& fields) noexcept {
   const std::uint16_t m = layout.mode;
@@ -139,28 +141,39 @@ struct Writer {
     write_u16(room(2), f.pressure_2pa);
     room(1)[0] = f.pressure_age;
     write_u32(room(4), f.itow_ms);
-    for (const std::int32_t v :
-         {f.latitude_1e7_deg, f.longitude_1e7_deg, f.height_mm, f.velocity_north_cm_s, f.velocity_east_cm_s, f.velocity_down_cm_s})
+    for (const std::int32_t v : {f.latitude_1e7_deg, f.longitude_1e7_deg, f.height_mm,
+                                 f.velocity_north_cm_s, f.velocity_east_cm_s, f.velocity_down_cm_s})
       put_i32(v);
-    for (const std::uint32_t v : {f.horizontal_accuracy_mm, f.vertical_accuracy_mm, f.speed_accuracy_cm_s}) write_u32(room(4), v);
+    for (const std::uint32_t v :
+         {f.horizontal_accuracy_mm, f.vertical_accuracy_mm, f.speed_accuracy_cm_s})
+      write_u32(room(4), v);
     room(1)[0] = f.age;
   }
-  void number(const std::optional<double>& field) noexcept { write_number(room(size_of(format)), format, field.value_or(0)); }
+  void number(const std::optional<double>& field) noexcept {
+    write_number(room(size_of(format)), format, field.value_or(0));
+  }
   template <std::size_t N>
   void numbers(const std::optional<std::array<double, N>>& field) noexcept {
-    for (const double value : field.value_or(std::array<double, N>{})) write_number(room(size_of(format)), format, value);
+    for (const double value : field.value_or(std::array<double, N>{}))
+      write_number(room(size_of(format)), format, value);
   }
   void u8(const std::optional<std::uint8_t>& field) noexcept { room(1)[0] = field.value_or(0); }
-  void u16(const std::optional<std::uint16_t>& field) noexcept { write_u16(room(2), field.value_or(0)); }
-  void utc(const std::optional<Utc>& field) noexcept { write_utc(room(kUtcSize), field.value_or(Utc{})); }
+  void u16(const std::optional<std::uint16_t>& field) noexcept {
+    write_u16(room(2), field.value_or(0));
+  }
+  void utc(const std::optional<Utc>& field) noexcept {
+    write_utc(room(kUtcSize), field.value_or(Utc{}));
+  }
 };
 
 }  // namespace
 
 std::optional<std::size_t> MtdataLayout::payload_size() const noexcept {
   if ((mode & static_cast<std::uint16_t>(~kModesKnown)) != 0) return std::nullopt;
-  if ((mode & kModeRaw) != 0 && (mode & static_cast<std::uint16_t>(~(kModeRaw | kModeGnss))) != 0) return std::nullopt;
-  if ((mode & kModeOrientation) != 0 && (settings & kOrientationBits) == kOrientationBits) return std::nullopt;
+  if ((mode & kModeRaw) != 0 && (mode & static_cast<std::uint16_t>(~(kModeRaw | kModeGnss))) != 0)
+    return std::nullopt;
+  if ((mode & kModeOrientation) != 0 && (settings & kOrientationBits) == kOrientationBits)
+    return std::nullopt;
   if ((mode & kModePosition) != 0 && (settings & kPlaceBits) != 0) return std::nullopt;
   if ((mode & kModeVelocity) != 0 && (settings & kSpeedBits) != 0) return std::nullopt;
   Sizes sizes{size_of(format())};
@@ -169,7 +182,8 @@ std::optional<std::size_t> MtdataLayout::payload_size() const noexcept {
   return sizes.total;
 }
 
-MtdataStatus decode_mtdata(std::span<const std::uint8_t> payload, const MtdataLayout& layout, Mtdata* out) noexcept {
+MtdataStatus decode_mtdata(std::span<const std::uint8_t> payload, const MtdataLayout& layout,
+                           Mtdata* out) noexcept {
   const std::optional<std::size_t> size = layout.payload_size();
   if (!size) return MtdataStatus::layout_unknown;
   if (*size != payload.size()) return MtdataStatus::length_wrong;
@@ -183,7 +197,8 @@ MtdataStatus decode_mtdata(std::span<const std::uint8_t> payload, const MtdataLa
   return MtdataStatus::ok;
 }
 
-std::size_t encode_mtdata(const Mtdata& data, const MtdataLayout& layout, std::span<std::uint8_t> out) noexcept {
+std::size_t encode_mtdata(const Mtdata& data, const MtdataLayout& layout,
+                          std::span<std::uint8_t> out) noexcept {
   const std::optional<std::size_t> size = layout.payload_size();
   if (!size || *size > out.size()) return 0;
   Writer writer{out.first(*size), layout.format()};

@@ -7,8 +7,9 @@
 
 #include "firmware_iface/xbus/values.hpp"
 
-/// MTData (message 32) of the MTi-G and its siblings: fields in a fixed order, which of them and in what format is said by the output mode
-/// and the output settings alone. Nothing in a message repeats them: the length is the only check.
+/// MTData (message 32) of the MTi-G and its siblings: fields in a fixed order, which of them and in
+/// what format is said by the output mode and the output settings alone. Nothing in a message
+/// repeats them: the length is the only check.
 namespace vergence::xbus {
 
 /// Bits of the output mode (message D0).
@@ -34,7 +35,9 @@ inline constexpr std::uint32_t kSettingsNoMagneticField = 0x40;
 inline constexpr std::uint32_t kSettingsNoAnalogue1 = 0x400;
 inline constexpr std::uint32_t kSettingsNoAnalogue2 = 0x800;
 inline constexpr std::uint32_t kSettingsNed = 0x80000000;  // else x north, y west, z up
-[[nodiscard]] constexpr std::uint32_t settings_format(NumberFormat format) noexcept { return static_cast<std::uint32_t>(format) << 8U; }
+[[nodiscard]] constexpr std::uint32_t settings_format(NumberFormat format) noexcept {
+  return static_cast<std::uint32_t>(format) << 8U;
+}
 
 /// Output mode and settings as the device has them.
 struct MtdataLayout {
@@ -42,13 +45,19 @@ struct MtdataLayout {
   std::uint32_t settings = 0;
 
   constexpr bool operator==(const MtdataLayout&) const noexcept = default;
-  [[nodiscard]] constexpr NumberFormat format() const noexcept { return static_cast<NumberFormat>((settings >> 8U) & 3U); }
-  [[nodiscard]] constexpr LocalFrame frame() const noexcept { return (settings & kSettingsNed) != 0 ? LocalFrame::ned : LocalFrame::nwu; }
-  /// Bytes of a payload; nothing: a combination that has no meaning, or one that this code does not know.
+  [[nodiscard]] constexpr NumberFormat format() const noexcept {
+    return static_cast<NumberFormat>((settings >> 8U) & 3U);
+  }
+  [[nodiscard]] constexpr LocalFrame frame() const noexcept {
+    return (settings & kSettingsNed) != 0 ? LocalFrame::ned : LocalFrame::nwu;
+  }
+  /// Bytes of a payload; nothing: a combination that has no meaning, or one that this code does not
+  /// know.
   [[nodiscard]] std::optional<std::size_t> payload_size() const noexcept;
 };
 
-/// The receiver's fix as the MTi-G repeats it in every sample: a new one has come when `age` is less than in the sample before.
+/// The receiver's fix as the MTi-G repeats it in every sample: a new one has come when `age` is
+/// less than in the sample before.
 struct LegacyFix {
   std::uint16_t pressure_2pa = 0;  // counts of 2 Pa
   std::uint8_t pressure_age = 0;   // samples
@@ -78,10 +87,11 @@ struct Mtdata {
   std::optional<Three> euler_deg;                        // roll, pitch, yaw
   std::optional<std::array<double, 9>> rotation_matrix;  // row by row
   std::optional<std::uint16_t> analogue_1, analogue_2;
-  std::optional<std::array<double, 2>> latitude_longitude_deg;  // as float32 it steps by 0.2 m and more
-  std::optional<double> altitude_m;                             // above the ellipsoid
-  std::optional<Three> velocity;                                // m/s, in `frame`
-  LocalFrame frame = LocalFrame::nwu;                           // of orientation and velocity
+  std::optional<std::array<double, 2>>
+      latitude_longitude_deg;          // as float32 it steps by 0.2 m and more
+  std::optional<double> altitude_m;    // above the ellipsoid
+  std::optional<Three> velocity;       // m/s, in `frame`
+  LocalFrame frame = LocalFrame::nwu;  // of orientation and velocity
   NumberFormat format = NumberFormat::float32;
   std::optional<std::uint8_t> status;
   std::optional<std::uint16_t> sample_counter;  // steps by one with every sample
@@ -96,9 +106,12 @@ enum class MtdataStatus : std::uint8_t {
 };
 
 /// Decodes a payload. Not ok: *out untouched.
-[[nodiscard]] MtdataStatus decode_mtdata(std::span<const std::uint8_t> payload, const MtdataLayout& layout, Mtdata* out) noexcept;
+[[nodiscard]] MtdataStatus decode_mtdata(std::span<const std::uint8_t> payload,
+                                         const MtdataLayout& layout, Mtdata* out) noexcept;
 
-/// Writes the layout's fields, absent ones as zeros. Returns the bytes written; 0: the layout is unknown, or there is no room.
-[[nodiscard]] std::size_t encode_mtdata(const Mtdata& data, const MtdataLayout& layout, std::span<std::uint8_t> out) noexcept;
+/// Writes the layout's fields, absent ones as zeros. Returns the bytes written; 0: the layout is
+/// unknown, or there is no room.
+[[nodiscard]] std::size_t encode_mtdata(const Mtdata& data, const MtdataLayout& layout,
+                                        std::span<std::uint8_t> out) noexcept;
 
 }  // namespace vergence::xbus

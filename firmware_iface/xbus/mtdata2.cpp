@@ -20,7 +20,8 @@ std::optional<LocalFrame> frame_of(std::uint16_t id) noexcept {
   return static_cast<LocalFrame>(bits);
 }
 
-/// The format of numbers of `size` bytes each, by their length first and the id second; nothing: no format has this length.
+/// The format of numbers of `size` bytes each, by their length first and the id second; nothing: no
+/// format has this length.
 std::optional<NumberFormat> format_of(std::uint16_t id, std::size_t size) noexcept {
   const auto announced = static_cast<NumberFormat>(id & 3U);
   switch (size) {
@@ -59,7 +60,8 @@ bool store(const std::optional<T>& decoded, std::optional<T>* field) noexcept {
 
 /// The same with the frame that the numbers refer to.
 template <class T>
-bool store_in_frame(const Packet& packet, const std::optional<T>& decoded, std::optional<T>* field, LocalFrame* frame) noexcept {
+bool store_in_frame(const Packet& packet, const std::optional<T>& decoded, std::optional<T>* field,
+                    LocalFrame* frame) noexcept {
   const std::optional<LocalFrame> named = frame_of(packet.id);
   if (!decoded || !named) return false;
   *field = decoded;
@@ -129,7 +131,8 @@ bool store_pvt(Bytes b, std::optional<GnssPvt>* field) noexcept {
 }
 
 bool store_satellites(Bytes b, std::optional<SatelliteInfo>* field) noexcept {
-  if (b.size() < kSatelliteHeader || b.size() != kSatelliteHeader + std::size_t{4} * b[4]) return false;
+  if (b.size() < kSatelliteHeader || b.size() != kSatelliteHeader + std::size_t{4} * b[4])
+    return false;
   *field = SatelliteInfo{read_u32(b), b[4], b.subspan(kSatelliteHeader)};
   return true;
 }
@@ -151,11 +154,14 @@ Taken take(const Packet& packet, Mtdata2* out) noexcept {
     case PacketId::sample_time_coarse:
       return taken(store_u32(packet.data, &out->sample_time_coarse_s));
     case PacketId::quaternion:
-      return taken(store_in_frame(packet, numbers<4>(packet), &out->quaternion, &out->orientation_frame));
+      return taken(
+          store_in_frame(packet, numbers<4>(packet), &out->quaternion, &out->orientation_frame));
     case PacketId::rotation_matrix:
-      return taken(store_in_frame(packet, numbers<9>(packet), &out->rotation_matrix, &out->orientation_frame));
+      return taken(store_in_frame(packet, numbers<9>(packet), &out->rotation_matrix,
+                                  &out->orientation_frame));
     case PacketId::euler:
-      return taken(store_in_frame(packet, numbers<3>(packet), &out->euler_deg, &out->orientation_frame));
+      return taken(
+          store_in_frame(packet, numbers<3>(packet), &out->euler_deg, &out->orientation_frame));
     case PacketId::pressure:
       return taken(store_u32(packet.data, &out->pressure_pa));
     case PacketId::delta_v:
@@ -185,7 +191,8 @@ Taken take(const Packet& packet, Mtdata2* out) noexcept {
     case PacketId::magnetic_field:
       return taken(store(numbers<3>(packet), &out->magnetic_field));
     case PacketId::velocity:
-      return taken(store_in_frame(packet, numbers<3>(packet), &out->velocity, &out->velocity_frame));
+      return taken(
+          store_in_frame(packet, numbers<3>(packet), &out->velocity, &out->velocity_frame));
     case PacketId::status_byte:
       if (packet.data.size() != 1) return Taken::refused;
       out->status_byte = packet.data[0];
@@ -200,7 +207,8 @@ Taken take(const Packet& packet, Mtdata2* out) noexcept {
 
 PacketStatus PacketReader::next(Packet* packet) noexcept {
   if (rest_.empty()) return PacketStatus::end;
-  if (rest_.size() < kPacketHeader || rest_.size() < kPacketHeader + rest_[2]) return PacketStatus::torn;
+  if (rest_.size() < kPacketHeader || rest_.size() < kPacketHeader + rest_[2])
+    return PacketStatus::torn;
   *packet = {read_u16(rest_), rest_.subspan(kPacketHeader, rest_[2])};
   rest_ = rest_.subspan(kPacketHeader + rest_[2]);
   return PacketStatus::ok;
@@ -270,7 +278,8 @@ void PacketWriter::put_numbers(std::uint16_t id, std::span<const double> values)
     full_ = true;
     return;
   }
-  for (std::size_t i = 0; i < values.size(); ++i) write_number(std::span(bytes).subspan(i * size), format, values[i]);
+  for (std::size_t i = 0; i < values.size(); ++i)
+    write_number(std::span(bytes).subspan(i * size), format, values[i]);
   put(id, std::span(bytes).first(values.size() * size));
 }
 
@@ -294,8 +303,12 @@ void PacketWriter::put_utc(const Utc& utc) noexcept {
 
 void PacketWriter::put_pvt(const GnssPvt& p) noexcept {
   std::array<std::uint8_t, kPvtSize> b{};
-  const auto u32 = [&b](std::size_t at, std::uint32_t v) { write_u32(std::span(b).subspan(at), v); };
-  const auto i32 = [&u32](std::size_t at, std::int32_t v) { u32(at, static_cast<std::uint32_t>(v)); };
+  const auto u32 = [&b](std::size_t at, std::uint32_t v) {
+    write_u32(std::span(b).subspan(at), v);
+  };
+  const auto i32 = [&u32](std::size_t at, std::int32_t v) {
+    u32(at, static_cast<std::uint32_t>(v));
+  };
   u32(0, p.itow_ms);
   write_u16(std::span(b).subspan(4), p.year);
   b[6] = p.month;
@@ -323,7 +336,8 @@ void PacketWriter::put_pvt(const GnssPvt& p) noexcept {
   u32(68, p.speed_accuracy_mm_s);
   u32(72, p.heading_accuracy_1e5_deg);
   i32(76, p.heading_of_vehicle_1e5_deg);
-  for (std::size_t i = 0; i < p.dop_1e2.size(); ++i) write_u16(std::span(b).subspan(80 + 2 * i), p.dop_1e2[i]);
+  for (std::size_t i = 0; i < p.dop_1e2.size(); ++i)
+    write_u16(std::span(b).subspan(80 + 2 * i), p.dop_1e2[i]);
   put(wire_id(PacketId::gnss_pvt), b);
 }
 

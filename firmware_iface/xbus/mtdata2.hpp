@@ -7,8 +7,9 @@
 
 #include "firmware_iface/xbus/values.hpp"
 
-/// MTData2 (message 36) of MTi-G-700/710 and their kin: packets of id (16 bits), size (8 bits), data; all big endian.
-/// Every packet is optional in every message, in any order: parse the whole message, then use its stamps.
+/// MTData2 (message 36) of MTi-G-700/710 and their kin: packets of id (16 bits), size (8 bits),
+/// data; all big endian. Every packet is optional in every message, in any order: parse the whole
+/// message, then use its stamps.
 namespace vergence::xbus {
 
 /// Ids of the packets, without number format (+ 0 … 3) and frame (+ 0 ENU, + 4 NED, + 8 NWU).
@@ -39,11 +40,15 @@ enum class PacketId : std::uint16_t {
   status_word = 0xE020,
 };
 
-[[nodiscard]] constexpr PacketId packet_id(std::uint16_t id) noexcept { return static_cast<PacketId>(id & 0xFFF0U); }
+[[nodiscard]] constexpr PacketId packet_id(std::uint16_t id) noexcept {
+  return static_cast<PacketId>(id & 0xFFF0U);
+}
 /// An id as it stands on the wire.
-[[nodiscard]] constexpr std::uint16_t wire_id(PacketId id, NumberFormat format = NumberFormat::float32,
+[[nodiscard]] constexpr std::uint16_t wire_id(PacketId id,
+                                              NumberFormat format = NumberFormat::float32,
                                               LocalFrame frame = LocalFrame::enu) noexcept {
-  return static_cast<std::uint16_t>(static_cast<unsigned>(id) | static_cast<unsigned>(format) | (static_cast<unsigned>(frame) << 2U));
+  return static_cast<std::uint16_t>(static_cast<unsigned>(id) | static_cast<unsigned>(format) |
+                                    (static_cast<unsigned>(frame) << 2U));
 }
 /// Bytes of a packet's data; nothing: not known, or not fixed.
 [[nodiscard]] std::optional<std::size_t> packet_size(std::uint16_t id) noexcept;
@@ -56,8 +61,11 @@ inline constexpr std::uint32_t kStatusClockSynced = 1U << 6U;
 inline constexpr std::uint32_t kStatusClipping = 1U << 19U;
 inline constexpr std::uint32_t kStatusSyncInMarker = 1U << 21U;
 inline constexpr std::uint32_t kStatusSyncOutMarker = 1U << 22U;
-/// Filter mode of a status word: 0 without GNSS, 1 coasting (less than a minute without), 3 with GNSS.
-[[nodiscard]] constexpr unsigned filter_mode(std::uint32_t status_word) noexcept { return (status_word >> 23U) & 7U; }
+/// Filter mode of a status word: 0 without GNSS, 1 coasting (less than a minute without), 3 with
+/// GNSS.
+[[nodiscard]] constexpr unsigned filter_mode(std::uint32_t status_word) noexcept {
+  return (status_word >> 23U) & 7U;
+}
 
 /// One packet as it stands in the payload.
 struct Packet {
@@ -87,20 +95,23 @@ struct GnssPvt {
   std::uint32_t itow_ms = 0;  // GPS time of week, not UTC
   std::uint16_t year = 0;
   std::uint8_t month = 0, day = 0, hour = 0, minute = 0, second = 0;  // UTC
-  std::uint8_t valid = 0;                                             // 1 date, 2 time, 4 fully resolved; others are set too: mask
+  std::uint8_t valid = 0;  // 1 date, 2 time, 4 fully resolved; others are set too: mask
   std::uint32_t time_accuracy_ns = 0;
   std::int32_t nanosecond = 0;  // signed, added to the second
-  std::uint8_t fix = 0;         // 0 none, 1 dead reckoning, 2 2D, 3 3D, 4 GNSS and dead reckoning, 5 time only
-  std::uint8_t flags = 0;       // 1 fix ok, 2 differential, 20h heading of vehicle valid
+  std::uint8_t fix =
+      0;  // 0 none, 1 dead reckoning, 2 2D, 3 3D, 4 GNSS and dead reckoning, 5 time only
+  std::uint8_t flags = 0;  // 1 fix ok, 2 differential, 20h heading of vehicle valid
   std::uint8_t satellites = 0;
   std::int32_t longitude_1e7_deg = 0, latitude_1e7_deg = 0;
   std::int32_t height_ellipsoid_mm = 0, height_msl_mm = 0;
   std::uint32_t horizontal_accuracy_mm = 0, vertical_accuracy_mm = 0;  // FFFFFFFF without fix
-  std::int32_t velocity_north_mm_s = 0, velocity_east_mm_s = 0, velocity_down_mm_s = 0, ground_speed_mm_s = 0;
+  std::int32_t velocity_north_mm_s = 0, velocity_east_mm_s = 0, velocity_down_mm_s = 0,
+               ground_speed_mm_s = 0;
   std::int32_t heading_of_motion_1e5_deg = 0;
   std::uint32_t speed_accuracy_mm_s = 0, heading_accuracy_1e5_deg = 0;
   std::int32_t heading_of_vehicle_1e5_deg = 0;
-  std::array<std::uint16_t, 7> dop_1e2{};  // geometric, position, time, vertical, horizontal, northing, easting; 9999 without fix
+  std::array<std::uint16_t, 7> dop_1e2{};  // geometric, position, time, vertical, horizontal,
+                                           // northing, easting; 9999 without fix
 };
 
 /// One satellite of the satellite list (7020).
@@ -120,10 +131,12 @@ struct SatelliteInfo {
   }
 };
 
-/// A message's fields; absent: the message had no such packet. Units as in the names; vectors are in sensor axes unless said.
+/// A message's fields; absent: the message had no such packet. Units as in the names; vectors are
+/// in sensor axes unless said.
 struct Mtdata2 {
-  std::optional<std::uint16_t> packet_counter;    // steps by one with every message, of any content
-  std::optional<std::uint32_t> sample_time_fine;  // 0.1 ms; wraps at 864 000 000 (one day) or 2³², by generation
+  std::optional<std::uint16_t> packet_counter;  // steps by one with every message, of any content
+  std::optional<std::uint32_t>
+      sample_time_fine;  // 0.1 ms; wraps at 864 000 000 (one day) or 2³², by generation
   std::optional<std::uint32_t> sample_time_coarse_s;
   std::optional<Utc> utc;
   std::optional<std::uint8_t> status_byte;
@@ -139,7 +152,8 @@ struct Mtdata2 {
   std::optional<std::array<double, 4>> delta_q;
   std::optional<Three> magnetic_field;  // 1: the field of the sensor's calibration
   std::optional<std::array<double, 2>> latitude_longitude_deg;
-  NumberFormat position_format = NumberFormat::float64;  // of latitude and longitude: float32 steps by 0.4 m and more
+  NumberFormat position_format =
+      NumberFormat::float64;  // of latitude and longitude: float32 steps by 0.4 m and more
   std::optional<double> altitude_ellipsoid_m;
   std::optional<double> altitude_msl_m;
   std::optional<Three> position_ecef_m;
@@ -152,7 +166,8 @@ struct Mtdata2 {
 
   std::uint32_t packets = 0;
   std::uint32_t unknown_packets = 0;  // skipped by their size
-  std::uint32_t refused_packets = 0;  // known, but of a size the field cannot have, or a number that is not finite
+  std::uint32_t refused_packets =
+      0;  // known, but of a size the field cannot have, or a number that is not finite
 };
 
 /// Puts packets one behind the other into a payload.
@@ -177,8 +192,9 @@ class PacketWriter {
   bool full_ = false;
 };
 
-/// Decodes a message's payload. `torn`: *out untouched. Never `end`.
-/// A packet's length outranks its id's format bits: firmware has been seen to announce a double and send four bytes.
-[[nodiscard]] PacketStatus decode_mtdata2(std::span<const std::uint8_t> payload, Mtdata2* out) noexcept;
+/// Decodes a message's payload. `torn`: *out untouched. Never `end`. A packet's length outranks its
+/// id's format bits: firmware has been seen to announce a double and send four bytes.
+[[nodiscard]] PacketStatus decode_mtdata2(std::span<const std::uint8_t> payload,
+                                          Mtdata2* out) noexcept;
 
 }  // namespace vergence::xbus

@@ -15,7 +15,9 @@ std::int64_t nearest(double value, double lo, double hi) noexcept {
 
 constexpr std::int64_t kDayNs = 86'400'000'000'000;
 
-constexpr bool leap(int year) noexcept { return (year % 4 == 0 && year % 100 != 0) || year % 400 == 0; }
+constexpr bool leap(int year) noexcept {
+  return (year % 4 == 0 && year % 100 != 0) || year % 400 == 0;
+}
 
 constexpr int days_of(int year, int month) noexcept {
   constexpr std::array<int, 12> kDays{31, 28, 31, 30, 31, 30, 31, 31, 30, 31, 30, 31};
@@ -69,7 +71,8 @@ void write_utc(std::span<std::uint8_t> b, const Utc& utc) noexcept {
 
 bool plausible(const Utc& utc) noexcept {
   return utc.year >= 1980 && utc.year < 2200 && utc.month >= 1 && utc.month <= 12 && utc.day >= 1 &&
-         utc.day <= days_of(utc.year, utc.month) && utc.hour < 24 && utc.minute < 60 && utc.second <= 60 && utc.nanosecond < 1'000'000'000U;
+         utc.day <= days_of(utc.year, utc.month) && utc.hour < 24 && utc.minute < 60 &&
+         utc.second <= 60 && utc.nanosecond < 1'000'000'000U;
 }
 
 std::int64_t unix_ns(const Utc& utc) noexcept {
@@ -82,7 +85,8 @@ std::int64_t unix_ns(const Utc& utc) noexcept {
 Utc utc_of_unix_ns(std::int64_t ns, std::uint8_t flags) noexcept {
   std::int64_t day = ns / kDayNs, of_day = ns % kDayNs;
   if (of_day < 0) --day, of_day += kDayNs;
-  int year = static_cast<int>(1970 + day * 400 / 146'097);  // within a year; 146 097 days are four centuries
+  int year = static_cast<int>(
+      1970 + day * 400 / 146'097);  // within a year; 146 097 days are four centuries
   while (days_before(year + 1) <= day) ++year;
   while (days_before(year) > day) --year;
   std::int64_t left = day - days_before(year);

@@ -18,7 +18,8 @@ struct Utc {
   std::uint32_t nanosecond = 0;
   std::uint16_t year = 0;
   std::uint8_t month = 0, day = 0, hour = 0, minute = 0, second = 0;
-  std::uint8_t flags = 0;  // 1 time of week valid, 2 week valid, 4 leap seconds known: without it the time is GPS-based
+  std::uint8_t flags = 0;  // 1 time of week valid, 2 week valid, 4 leap seconds known: without it
+                           // the time is GPS-based
 };
 
 inline constexpr std::uint8_t kUtcTimeOfWeekValid = 1;

@@ -1,4 +1,5 @@
-// Raw Bayer to grey, bytes of image a second: one 1024 x 768 image over and over, in and out of the second-level cache.
+// Raw Bayer to grey, bytes of image a second: one 1024 x 768 image over and over, in and out of the
+// second-level cache.
 #include <benchmark/benchmark.h>
 
 #include <vector>

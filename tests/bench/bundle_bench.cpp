@@ -1,6 +1,8 @@
-// The partitioned bundle adjustment against Ceres on the simulated rig: the same random problems, in alternation, one thread.
-// Usage: bundle_bench [runs]. One line a size: medians of the solve alone, their ratio, the largest relative
-// difference between our final cost and that of Ceres run on, untimed, until nothing changes.
+// The partitioned bundle adjustment against Ceres on the simulated rig: the same random problems,
+// in alternation, one thread.
+// Usage: bundle_bench [runs]. One line a size: medians of the solve alone, their ratio, the largest
+// relative difference between our final cost and that of Ceres run on, untimed, until nothing
+// changes.
 #include <algorithm>
 #include <chrono>
 #include <cstdio>
@@ -15,8 +17,9 @@
 namespace vergence {
 namespace {
 
-/// A transform as qx qy qz qw tx ty tz, moved by R ← Exp(φ) R, t ← t + τ; `sphere`: t keeps its length and has two directions.
-/// Cost functions give derivatives by (φ, τ) in the first six ambient columns, so that the manifold's part of the chain is a selection.
+/// A transform as qx qy qz qw tx ty tz, moved by R ← Exp(φ) R, t ← t + τ; `sphere`: t keeps its
+/// length and has two directions. Cost functions give derivatives by (φ, τ) in the first six
+/// ambient columns, so that the manifold's part of the chain is a selection.
 class TransformManifold final : public ceres::Manifold {
  public:
   explicit TransformManifold(bool sphere) : sphere_(sphere) {}
@@ -50,7 +53,9 @@ class TransformManifold final : public ceres::Manifold {
     J.block<3, 1>(3, 4) = b;
     return true;
   }
-  bool Minus(const double*, const double*, double*) const override { return false; }  // not used by the solver
+  bool Minus(const double*, const double*, double*) const override {
+    return false;
+  }  // not used by the solver
   bool MinusJacobian(const double*, double*) const override { return false; }
 
  private:
@@ -69,7 +74,8 @@ using Mat37 = Eigen::Map<Eigen::Matrix<double, 2, 7, Eigen::RowMajor>>;
 using Mat33 = Eigen::Map<Eigen::Matrix<double, 2, 3, Eigen::RowMajor>>;
 
 /// Residual and G (2×3, weighted) of a point in the camera.
-inline bool residual_of(const Pinhole& k, const BundleObservation& o, const Vec3& p, double* residual, Mat23* G) {
+inline bool residual_of(const Pinhole& k, const BundleObservation& o, const Vec3& p,
+                        double* residual, Mat23* G) {
   if (!(p.z() > kMinDepth)) return false;
   const double s = o.inverse_sigma, iz = 1 / p.z(), x = p.x() * iz, y = p.y() * iz;
   residual[0] = s * (k.fx * x + k.cx - o.x);
@@ -113,7 +119,8 @@ class RightCost final : public ceres::SizedCostFunction<2, 7, 7, 3> {
     const Vec3 turned = R * Eigen::Map<const Vec3>(v[2]);
     const Vec3 rig_turned = Rk * (turned + Eigen::Map<const Vec3>(v[1] + 4));
     Mat23 G;
-    if (!residual_of(k_, o_, rig_turned + Eigen::Map<const Vec3>(v[0] + 4), residual, &G)) return false;
+    if (!residual_of(k_, o_, rig_turned + Eigen::Map<const Vec3>(v[0] + 4), residual, &G))
+      return false;
     if (jacobians == nullptr) return true;
     const Mat23 F = G * Rk;
     if (jacobians[0] != nullptr) put_pose(G, rig_turned, jacobians[0]);
@@ -134,7 +141,8 @@ void put(const Transform& T, double out[7]) {
 }
 
 double milliseconds_since(std::chrono::steady_clock::time_point start) {
-  return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
+  return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start)
+      .count();
 }
 
 struct CeresRun {
@@ -158,7 +166,8 @@ CeresRun solve_with_ceres(const SimulatedRig& rig) {
     if (o.camera == 0)
       problem.AddResidualBlock(new LeftCost(k, o), nullptr, poses[o.pose].data(), point);
     else
-      problem.AddResidualBlock(new RightCost(k, o), nullptr, right.data(), poses[o.pose].data(), point);
+      problem.AddResidualBlock(new RightCost(k, o), nullptr, right.data(), poses[o.pose].data(),
+                               point);
   }
   for (Vec3& p : points) ordering->AddElementToGroup(p.data(), 0);
   for (auto& pose : poses) {
@@ -179,7 +188,8 @@ CeresRun solve_with_ceres(const SimulatedRig& rig) {
   const auto start = std::chrono::steady_clock::now();
   ceres::Solve(options, &problem, &summary);
   CeresRun run{milliseconds_since(start), 0, summary.num_successful_steps - 1};
-  options.function_tolerance = options.parameter_tolerance = 1e-14;  // to the very optimum: what the costs are compared with
+  options.function_tolerance = options.parameter_tolerance =
+      1e-14;  // to the very optimum: what the costs are compared with
   ceres::Solve(options, &problem, &summary);
   run.cost = summary.final_cost;
   return run;
@@ -210,20 +220,24 @@ void compare(int points, double noise, int runs) {
     const BundleResult r = adjuster.solve(problem, options);
     ours.push_back(milliseconds_since(start));
     theirs.push_back(ceres.ms);
-    if (noise > 0) difference = std::max(difference, std::abs(r.final_cost - ceres.cost) / ceres.cost);
+    if (noise > 0)
+      difference = std::max(difference, std::abs(r.final_cost - ceres.cost) / ceres.cost);
     our_steps += static_cast<double>(r.steps) / runs;
     their_steps += static_cast<double>(ceres.steps) / runs;
     failed += r.converged() ? 0 : 1;
   }
   std::printf(
-      "points=%d noise=%.1f ours_ms=%.3f ceres_ms=%.3f ratio=%.1f cost_difference=%.1e ours_steps=%.1f ceres_steps=%.1f ours_min_ms=%.3f "
+      "points=%d noise=%.1f ours_ms=%.3f ceres_ms=%.3f ratio=%.1f cost_difference=%.1e "
+      "ours_steps=%.1f ceres_steps=%.1f ours_min_ms=%.3f "
       "ceres_min_ms=%.3f failed=%d\n",
-      points, noise, median(ours), median(theirs), median(theirs) / median(ours), difference, our_steps, their_steps,
-      *std::min_element(ours.begin(), ours.end()), *std::min_element(theirs.begin(), theirs.end()), failed);
+      points, noise, median(ours), median(theirs), median(theirs) / median(ours), difference,
+      our_steps, their_steps, *std::min_element(ours.begin(), ours.end()),
+      *std::min_element(theirs.begin(), theirs.end()), failed);
   std::fflush(stdout);
 }
 
-/// A window as the odometry has it: rig frames on a path, points alive for a few of them, Huber, five steps.
+/// A window as the odometry has it: rig frames on a path, points alive for a few of them, Huber,
+/// five steps.
 void window(int runs) {
   constexpr int kPoses = 11, kPoints = 300;
   SimulationOptions s;
@@ -250,7 +264,9 @@ void window(int runs) {
       first[j] = static_cast<std::uint16_t>(random.below(kPoses - 1));
       last[j] = static_cast<std::uint16_t>(first[j] + 2 + random.below(5));
     }
-    std::erase_if(rig.observations, [&](const BundleObservation& o) { return o.pose < first[o.point] || o.pose >= last[o.point]; });
+    std::erase_if(rig.observations, [&](const BundleObservation& o) {
+      return o.pose < first[o.point] || o.pose >= last[o.point];
+    });
     observations += static_cast<double>(rig.observations.size()) / runs;
     const BundleProblem p = rig.problem();
     const auto start = std::chrono::steady_clock::now();
@@ -258,8 +274,9 @@ void window(int runs) {
     ms.push_back(milliseconds_since(start));
     steps += static_cast<double>(r.steps) / runs;
   }
-  std::printf("window poses=%d points=%d observations=%.0f steps=%.1f ours_ms=%.3f ours_min_ms=%.3f\n", kPoses, kPoints, observations,
-              steps, median(ms), *std::min_element(ms.begin(), ms.end()));
+  std::printf(
+      "window poses=%d points=%d observations=%.0f steps=%.1f ours_ms=%.3f ours_min_ms=%.3f\n",
+      kPoses, kPoints, observations, steps, median(ms), *std::min_element(ms.begin(), ms.end()));
 }
 
 }  // namespace

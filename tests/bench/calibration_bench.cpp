@@ -1,12 +1,14 @@
 // Calibration from nothing but the baseline's length: error of the transform found and its sigmas.
 //
-//   calibration_bench mock [--starts N] [--first K] [--from SECONDS] [--frames N] [--set KEY=VALUE]…    the paper's rig on the mock's
-//   streets calibration_bench euroc|kitti [--set …]                                              recorded excerpts, images as they are
-//   calibration_bench drives|stretches [--only NAME] [--set …]    every recorded drive: calibration given, wrong, found, knocked;
-//   how far disjoint stretches of it agree
-//   calibration_bench learning [--starts N]                       one drive N times to and fro: what is known after every solve
+//   calibration_bench mock [--starts N] [--first K] [--from SECONDS] [--frames N] [--set
+//   KEY=VALUE]…    the paper's rig on the mock's streets calibration_bench euroc|kitti [--set …]
+//   recorded excerpts, images as they are calibration_bench drives|stretches [--only NAME] [--set
+//   …]    every recorded drive: calibration given, wrong, found, knocked; how far disjoint
+//   stretches of it agree calibration_bench learning [--starts N]                       one drive N
+//   times to and fro: what is known after every solve
 //
-// One line a calibration, then the largest errors and their root means. `--verbose`: every event and the poses' status.
+// One line a calibration, then the largest errors and their root means. `--verbose`: every event
+// and the poses' status.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -80,9 +82,11 @@ Found calibrate(const Arguments& a, const RigCalibration& rig, const FrameSource
   const auto note = [&](int i) {
     for (const CalibrationDecision& d : estimator.calibrations()) {
       if (a.verbose || !d.accepted)
-        fmt::print("       decision {} {} frames {} rms {:.3f} px held out {:.2f} -> {:.2f} px solve {:.0f} ms\n",
-                   d.accepted ? "yes" : "no", d.reason, d.calibration.frames, d.calibration.reprojection_px, d.held_out_before_px,
-                   d.held_out_after_px, d.solve_ms);
+        fmt::print(
+            "       decision {} {} frames {} rms {:.3f} px held out {:.2f} -> {:.2f} px solve "
+            "{:.0f} ms\n",
+            d.accepted ? "yes" : "no", d.reason, d.calibration.frames,
+            d.calibration.reprojection_px, d.held_out_before_px, d.held_out_after_px, d.solve_ms);
       f.solve_ms = d.solve_ms;
       f.rig = d.calibration;
       f.at_frame = i;
@@ -95,10 +99,12 @@ Found calibrate(const Arguments& a, const RigCalibration& rig, const FrameSource
     const PoseSample s = estimator.process(*frame);
     if (a.verbose) {
       const Vec3& t = s.T_world_left.t;
-      fmt::print("  {:4d} {} {} {} {} inl {} st {} {:.2f} px {:.1f} ms  {:.3f} {:.3f} {:.3f}\n", i, to_string(s.state), to_string(s.status),
-                 to_string(s.reason), s.keyframe ? "K" : " ", s.inliers, s.stereo_inliers, s.reprojection_px, s.estimate_ms, t.x(), t.y(),
-                 t.z());
-      for (const EstimatorEvent& e : estimator.events()) fmt::print("       {} {:.3g}\n", e.why, e.value);
+      fmt::print("  {:4d} {} {} {} {} inl {} st {} {:.2f} px {:.1f} ms  {:.3f} {:.3f} {:.3f}\n", i,
+                 to_string(s.state), to_string(s.status), to_string(s.reason),
+                 s.keyframe ? "K" : " ", s.inliers, s.stereo_inliers, s.reprojection_px,
+                 s.estimate_ms, t.x(), t.y(), t.z());
+      for (const EstimatorEvent& e : estimator.events())
+        fmt::print("       {} {:.3g}\n", e.why, e.value);
     }
     note(i);
     if (f.accepted) break;
@@ -130,16 +136,17 @@ Errors errors_of(const RigCalibration& found, const Transform& truth) {
 }
 
 void print(const std::string& name, const Found& f, const Errors& e) {
-  fmt::print("{:10s} {} frame {:3d}  {:3d} frames {:.3f} px ", name, f.accepted ? "ok" : "NO", f.at_frame, f.rig.frames,
-             f.rig.reprojection_px);
+  fmt::print("{:10s} {} frame {:3d}  {:3d} frames {:.3f} px ", name, f.accepted ? "ok" : "NO",
+             f.at_frame, f.rig.frames, f.rig.reprojection_px);
   for (std::size_t i = 0; i < 6; ++i) fmt::print(" {:+8.4f}({:.3f})", e.value[i], e.noise[i]);
-  fmt::print("  f {:.2f} {:.2f} px  scale {:.2f} %  {:.0f} ms\n", f.rig.intrinsics[1].fx, f.rig.intrinsics[1].fy, 100 * f.rig.scale_sigma,
-             f.solve_ms);
+  fmt::print("  f {:.2f} {:.2f} px  scale {:.2f} %  {:.0f} ms\n", f.rig.intrinsics[1].fx,
+             f.rig.intrinsics[1].fy, 100 * f.rig.scale_sigma, f.solve_ms);
 }
 
 int run_mock(const Arguments& a) {
   mock::DriveOptions drive;
-  std::vector<double> starts = a.from >= 0 ? std::vector<double>{a.from} : test::RenderedDrive::starts(drive, a.starts, 3.0, 5.0);
+  std::vector<double> starts = a.from >= 0 ? std::vector<double>{a.from}
+                                           : test::RenderedDrive::starts(drive, a.starts, 3.0, 5.0);
   std::array<double, 6> largest{}, squares{}, nees{};
   int n = 0, within = 0;
   for (std::size_t i = static_cast<std::size_t>(a.first); i < starts.size(); ++i) {
@@ -158,7 +165,8 @@ int run_mock(const Arguments& a) {
         told.intrinsics[k].cy += 0.5 * random.normal();
       }
     }
-    const Found f = calibrate(a, told, [&](int k) { return &rendered.frame(static_cast<std::uint64_t>(k)); });
+    const Found f =
+        calibrate(a, told, [&](int k) { return &rendered.frame(static_cast<std::uint64_t>(k)); });
     const Errors e = errors_of(f.rig, o.rig.T_camera_left[1]);
     print(fmt::format("{:.2f} s", starts[i]), f, e);
     std::fflush(stdout);
@@ -172,11 +180,16 @@ int run_mock(const Arguments& a) {
       within += k != 3 && std::abs(e.value[k]) <= 2 * sigma ? 1 : 0;
     }
   }
-  fmt::print("{} calibrated of {}; mrad and mm; {} of {} single errors within two {} sigmas (t_x follows from the length)\n", n,
-             starts.size() - static_cast<std::size_t>(a.first), within, 5 * n, a.wrong_intrinsics ? "wide" : "noise");
-  for (const auto& [name, row] : {std::pair("largest", &largest), std::pair("rms", &squares), std::pair("z rms", &nees)}) {
+  fmt::print(
+      "{} calibrated of {}; mrad and mm; {} of {} single errors within two {} sigmas (t_x follows "
+      "from the length)\n",
+      n, starts.size() - static_cast<std::size_t>(a.first), within, 5 * n,
+      a.wrong_intrinsics ? "wide" : "noise");
+  for (const auto& [name, row] :
+       {std::pair("largest", &largest), std::pair("rms", &squares), std::pair("z rms", &nees)}) {
     fmt::print("{:10s}", name);
-    for (const double v : *row) fmt::print(" {:8.4f}", name == std::string("largest") ? v : std::sqrt(v / std::max(1, n)));
+    for (const double v : *row)
+      fmt::print(" {:8.4f}", name == std::string("largest") ? v : std::sqrt(v / std::max(1, n)));
     fmt::print("\n");
   }
   return 0;
@@ -199,13 +212,14 @@ int run_knocks(const Arguments& a) {
                              Knock{"t_y 4 mm", {0, 0, 0}, {0, 4, 0}},
                              Knock{"t_z 10 mm", {0, 0, 0}, {0, 0, 10}},
                              Knock{"pitch 2 deg", {2, 0, 0}, {0, 0, 0}}};
-  for (std::size_t index = static_cast<std::size_t>(a.first); index < knocks.size() && static_cast<int>(index) < a.first + a.starts;
-       ++index) {
+  for (std::size_t index = static_cast<std::size_t>(a.first);
+       index < knocks.size() && static_cast<int>(index) < a.first + a.starts; ++index) {
     const Knock& knock = knocks[index];
     test::RenderedDriveOptions o;
     o.from_s = a.from >= 0 ? a.from : 20;
     const Transform before = o.rig.T_camera_left[1];
-    Transform after{exp_so3(knock.turn_deg * std::numbers::pi / 180) * before.R, before.t + 1e-3 * knock.shift_mm};
+    Transform after{exp_so3(knock.turn_deg * std::numbers::pi / 180) * before.R,
+                    before.t + 1e-3 * knock.shift_mm};
     after.t *= before.t.norm() / after.t.norm();
     o.placed = [&](int, std::uint64_t i) { return i < kKnockAt ? before : after; };
     test::RenderedDrive rendered(o);
@@ -231,8 +245,9 @@ int run_knocks(const Arguments& a) {
       drift = (s.T_world_left.t - truth.t).norm();
       if (s.status == PoseStatus::lost) ++lost;
       if (a.verbose)
-        fmt::print("  {:4d} {} {} {} inl {} st {} {:.2f} px {:.1f} ms  off {:.3f} m {:.2f} mrad\n", i, to_string(s.state),
-                   to_string(s.status), to_string(s.reason), s.inliers, s.stereo_inliers, s.reprojection_px, s.estimate_ms, drift,
+        fmt::print("  {:4d} {} {} {} inl {} st {} {:.2f} px {:.1f} ms  off {:.3f} m {:.2f} mrad\n",
+                   i, to_string(s.state), to_string(s.status), to_string(s.reason), s.inliers,
+                   s.stereo_inliers, s.reprojection_px, s.estimate_ms, drift,
                    1e3 * log_so3(s.T_world_left.R * truth.R.transpose()).norm());
       if (n >= kKnockAt && mended < 0 && s.status == PoseStatus::ok) ++wrong_ok;
       for (const EstimatorEvent& e : estimator.events()) {
@@ -240,8 +255,8 @@ int run_knocks(const Arguments& a) {
         if (e.kind == EstimatorEvent::Kind::rig_changed && noticed < 0) noticed = i;
       }
       for (const CalibrationDecision& d : estimator.calibrations()) {
-        fmt::print("    decision {} frames {} held out {:.2f} -> {:.2f} px\n", d.reason, d.calibration.frames, d.held_out_before_px,
-                   d.held_out_after_px);
+        fmt::print("    decision {} frames {} held out {:.2f} -> {:.2f} px\n", d.reason,
+                   d.calibration.frames, d.held_out_before_px, d.held_out_after_px);
         if (d.accepted) {
           mended = i;
           Found f{true, d.calibration, i, d.solve_ms, 0};
@@ -249,8 +264,11 @@ int run_knocks(const Arguments& a) {
         }
       }
     }
-    fmt::print("  noticed after {} frames, mended {} frames later, {} lost, {} ok between, {:.3f} m off at the end\n",
-               noticed < 0 ? -1 : noticed - static_cast<int>(kKnockAt), mended < 0 ? -1 : mended - noticed, lost, wrong_ok, drift);
+    fmt::print(
+        "  noticed after {} frames, mended {} frames later, {} lost, {} ok between, {:.3f} m off "
+        "at the end\n",
+        noticed < 0 ? -1 : noticed - static_cast<int>(kKnockAt), mended < 0 ? -1 : mended - noticed,
+        lost, wrong_ok, drift);
     std::fflush(stdout);
   }
   return 0;
@@ -260,10 +278,13 @@ int run_recorded(const Arguments& a) {
   const bool euroc = a.what == "euroc";
   const auto folder = test::shared_data(euroc ? "data/euroc_mh01" : "data/kitti06_51");
   if (!folder) {
-    fmt::print(stderr, "calibration_bench: no recorded excerpts; set VERGENCE_SHARED to the folder that holds data/\n");
+    fmt::print(stderr,
+               "calibration_bench: no recorded excerpts; set VERGENCE_SHARED to the folder that "
+               "holds data/\n");
     return 2;
   }
-  const app::StereoSequence sequence = app::open_sequence(euroc ? app::SequenceFormat::euroc : app::SequenceFormat::kitti, *folder);
+  const app::StereoSequence sequence =
+      app::open_sequence(euroc ? app::SequenceFormat::euroc : app::SequenceFormat::kitti, *folder);
   RigFrame frame;
   std::array<cv::Mat, 2> images;
   const Found f = calibrate(a, sequence.calibration, [&](int i) -> const RigFrame* {
@@ -277,16 +298,19 @@ int run_recorded(const Arguments& a) {
       images[k].create(c.height, (c.width + 63) / 64 * 64, CV_8U);
       std::vector<std::uint8_t> bytes;
       if (app::read_image_file(sequence.root / pair.file[k], &bytes) != app::ImageFileStatus::ok ||
-          app::decode_grey(bytes, {c.width, c.height}, images[k].data, images[k].step) != app::ImageFileStatus::ok)
+          app::decode_grey(bytes, {c.width, c.height}, images[k].data, images[k].step) !=
+              app::ImageFileStatus::ok)
         return nullptr;
-      frame.images[k] = {images[k].data, c.width, c.height, static_cast<std::ptrdiff_t>(images[k].step)};
+      frame.images[k] = {images[k].data, c.width, c.height,
+                         static_cast<std::ptrdiff_t>(images[k].step)};
     }
     return &frame;
   });
   print(a.what, f, errors_of(f.rig, sequence.calibration.T_camera_left[1]));
   const Vec3 turn = log_so3(f.rig.T_camera_left[1].R) * 180 / std::numbers::pi;
-  fmt::print("rotation vector {:.4f} {:.4f} {:.4f} deg, t {:.5f} {:.5f} {:.5f} m\n", turn.x(), turn.y(), turn.z(),
-             f.rig.T_camera_left[1].t.x(), f.rig.T_camera_left[1].t.y(), f.rig.T_camera_left[1].t.z());
+  fmt::print("rotation vector {:.4f} {:.4f} {:.4f} deg, t {:.5f} {:.5f} {:.5f} m\n", turn.x(),
+             turn.y(), turn.z(), f.rig.T_camera_left[1].t.x(), f.rig.T_camera_left[1].t.y(),
+             f.rig.T_camera_left[1].t.z());
   return 0;
 }
 
@@ -327,6 +351,8 @@ int main(int argc, char** argv) {
     fmt::print(stderr, "calibration_bench: {}\n", e.what());
     return 2;
   }
-  fmt::print(stderr, "calibration_bench: drives, stretches, learning, mock, knock, euroc or kitti is wanted\n");
+  fmt::print(
+      stderr,
+      "calibration_bench: drives, stretches, learning, mock, knock, euroc or kitti is wanted\n");
   return 2;
 }

@@ -1,5 +1,6 @@
-// Calibration on recorded drives: what comes of a nominal calibration, of a wrong one, of none; whether anything is told that was not
-// there; and knocks made on real images by turning the right ones.
+// Calibration on recorded drives: what comes of a nominal calibration, of a wrong one, of none;
+// whether anything is told that was not there; and knocks made on real images by turning the right
+// ones.
 #include "tests/bench/calibration_drives.hpp"
 
 #include <cmath>
@@ -28,12 +29,16 @@ using test::RecordedSequence;
 using test::with_right_turned;
 
 void print(const std::string& drive_name, const std::string& what, const DriveOutcome& r) {
-  fmt::print("{:12s} {:34s} seg {:6.3f} %  ATE {:7.4f} m, {:7.4f} m after a scale of {:.4f}  ok {:3d} of {:3d}", drive_name, what,
-             r.segments_percent, r.ate_m, r.ate_scaled_m, r.scale, r.ok, r.frames);
+  fmt::print(
+      "{:12s} {:34s} seg {:6.3f} %  ATE {:7.4f} m, {:7.4f} m after a scale of {:.4f}  ok {:3d} of "
+      "{:3d}",
+      drive_name, what, r.segments_percent, r.ate_m, r.ate_scaled_m, r.scale, r.ok, r.frames);
   fmt::print("  knocks told {}  verified at {:3d} ({:3.0f} % ok since)", r.knocks, r.verified_at,
              r.since_verified > 0 ? 100.0 * r.ok_since_verified / r.since_verified : 0.0);
-  if (r.contradicted_at >= 0) fmt::print("  contradicted at {} by {:.1f} %", r.contradicted_at, r.contradicted_percent);
-  if (r.told_at >= 0 || r.mended_at >= 0) fmt::print("  told at {} mended at {}", r.told_at, r.mended_at);
+  if (r.contradicted_at >= 0)
+    fmt::print("  contradicted at {} by {:.1f} %", r.contradicted_at, r.contradicted_percent);
+  if (r.told_at >= 0 || r.mended_at >= 0)
+    fmt::print("  told at {} mended at {}", r.told_at, r.mended_at);
   fmt::print("\n");
   std::fflush(stdout);
 }
@@ -45,7 +50,8 @@ void run_drive(const RecordedSequence& d, const app::Configuration& c) {
   held.online = 0;
   print(d.name, "own calibration, held", drive_recorded(d, d.sequence, held, given));
   print(d.name, "own calibration, one pass", drive_recorded(d, d.sequence, c, given));
-  const app::DriveCalibration found = app::calibrate_drive({d.sequence, c, 0, d.sequence.pairs.size(), {}, {}}, given);
+  const app::DriveCalibration found =
+      app::calibrate_drive({d.sequence, c, 0, d.sequence.pairs.size(), {}, {}}, given);
   if (!found.rig) {
     fmt::print("{:12s} calibrate first: {}\n", d.name, found.why);
     return;
@@ -53,19 +59,23 @@ void run_drive(const RecordedSequence& d, const app::Configuration& c) {
   StartingCalibration first = given;
   first.file.rig = *found.rig;
   print(d.name, "calibrated first", drive_recorded(d, d.sequence, c, first));
-  fmt::print("{:12s}   found from {} frames: depth at {:.1f} m known to {:.2f} %, rms {:.3f} px\n", d.name, found.rig->frames,
-             found.depth_m, found.depth_sigma_percent, found.rig->reprojection_px);
+  fmt::print("{:12s}   found from {} frames: depth at {:.1f} m known to {:.2f} %, rms {:.3f} px\n",
+             d.name, found.rig->frames, found.depth_m, found.depth_sigma_percent,
+             found.rig->reprojection_px);
 
   // Turned images are not the raw ones: a homography knows no distortion.
   if (d.sequence.calibration.intrinsics[1].has_distortion()) return;
   const test::TemporaryFolder folder;
   int index = 0;
   for (const Vec3& turn : {Vec3(0, 0.3, 0), Vec3(0.3, 0.2, 0.25)}) {
-    const StereoSequence s = with_right_turned(d, turn, 0, folder / fmt::format("start{}", index++));
-    const std::string words = fmt::format("turned ({:g}, {:g}, {:g}) deg", turn.x(), turn.y(), turn.z());
+    const StereoSequence s =
+        with_right_turned(d, turn, 0, folder / fmt::format("start{}", index++));
+    const std::string words =
+        fmt::format("turned ({:g}, {:g}, {:g}) deg", turn.x(), turn.y(), turn.z());
     const StartingCalibration wrong = app::replayed_calibration(c, s, false);
     print(d.name, words + ", one pass", drive_recorded(d, s, c, wrong));
-    const app::DriveCalibration mended = app::calibrate_drive({s, c, 0, s.pairs.size(), {}, {}}, wrong);
+    const app::DriveCalibration mended =
+        app::calibrate_drive({s, c, 0, s.pairs.size(), {}, {}}, wrong);
     StartingCalibration then = wrong;
     if (mended.rig) then.file.rig = *mended.rig;
     print(d.name, words + ", first", drive_recorded(d, s, c, then));
@@ -73,39 +83,52 @@ void run_drive(const RecordedSequence& d, const app::Configuration& c) {
   const std::size_t at = d.sequence.pairs.size() / 2;
   if (d.sequence.pairs.size() < 100) return;
   for (const Vec3& turn : {Vec3(0.1, 0, 0), Vec3(0, 0, 0.2), Vec3(0, 0.3, 0), Vec3(2, 0, 0)}) {
-    const StereoSequence s = with_right_turned(d, turn, at, folder / fmt::format("knock{}", index++));
+    const StereoSequence s =
+        with_right_turned(d, turn, at, folder / fmt::format("knock{}", index++));
     const DriveOutcome r = drive_recorded(d, s, c, first, at);
-    fmt::print("{:12s} knock at {} by ({:g}, {:g}, {:g}) deg: told after {}, mended after {}, {} ok before that, {} false before it\n",
-               d.name, at, turn.x(), turn.y(), turn.z(), r.told_at < 0 ? -1 : r.told_at - static_cast<int>(at),
-               r.mended_at < 0 ? -1 : r.mended_at - static_cast<int>(at), r.ok_before_mended, r.knocks);
+    fmt::print(
+        "{:12s} knock at {} by ({:g}, {:g}, {:g}) deg: told after {}, mended after {}, {} ok "
+        "before that, {} false before it\n",
+        d.name, at, turn.x(), turn.y(), turn.z(),
+        r.told_at < 0 ? -1 : r.told_at - static_cast<int>(at),
+        r.mended_at < 0 ? -1 : r.mended_at - static_cast<int>(at), r.ok_before_mended, r.knocks);
     std::fflush(stdout);
   }
 }
 
-void print_stretches(const std::string& name, const std::vector<calibration::RigSolution>& stretches) {
-  fmt::print("{}: {} stretches of some {} frames\n", name, stretches.size(), stretches.empty() ? 0 : stretches.front().frames);
+void print_stretches(const std::string& name,
+                     const std::vector<calibration::RigSolution>& stretches) {
+  fmt::print("{}: {} stretches of some {} frames\n", name, stretches.size(),
+             stretches.empty() ? 0 : stretches.front().frames);
   calibration::Agreement mean;
   std::size_t n = 0;
   for (std::size_t i = 0; i < stretches.size(); ++i) {
     const calibration::RigSolution& s = stretches[i];
     const Vec3 phi = 1e3 * log_so3(s.rig.T_camera_left[1].R), t = 1e3 * s.rig.T_camera_left[1].t;
     const auto& sigma = s.rig.sigma_noise[1];
-    fmt::print("  rotation {:8.3f} ({:.3f}) {:8.3f} ({:.3f}) {:8.3f} ({:.3f}) mrad  t_y {:7.3f} ({:.3f}) t_z {:7.3f} ({:.3f}) mm", phi.x(),
-               1e3 * sigma[0], phi.y(), 1e3 * sigma[1], phi.z(), 1e3 * sigma[2], t.y(), 1e3 * sigma[4], t.z(), 1e3 * sigma[5]);
-    fmt::print("  cx {:.2f} ({:.2f}) cy {:.2f} ({:.2f}) px  {:.0f} ms, inflation {:.1f}\n", s.rig.intrinsics[1].cx,
-               s.rig.intrinsics[1].sigma[2], s.rig.intrinsics[1].cy, s.rig.intrinsics[1].sigma[3], s.solve_ms, s.rig.inflation);
+    fmt::print(
+        "  rotation {:8.3f} ({:.3f}) {:8.3f} ({:.3f}) {:8.3f} ({:.3f}) mrad  t_y {:7.3f} ({:.3f}) "
+        "t_z {:7.3f} ({:.3f}) mm",
+        phi.x(), 1e3 * sigma[0], phi.y(), 1e3 * sigma[1], phi.z(), 1e3 * sigma[2], t.y(),
+        1e3 * sigma[4], t.z(), 1e3 * sigma[5]);
+    fmt::print("  cx {:.2f} ({:.2f}) cy {:.2f} ({:.2f}) px  {:.0f} ms, inflation {:.1f}\n",
+               s.rig.intrinsics[1].cx, s.rig.intrinsics[1].sigma[2], s.rig.intrinsics[1].cy,
+               s.rig.intrinsics[1].sigma[3], s.solve_ms, s.rig.inflation);
     if (i == 0) continue;
     const calibration::Agreement a = calibration::agreement(stretches[i - 1].rig, s.rig, 1);
     ++n;
     mean.transform += a.transform;
     mean.intrinsics += a.intrinsics;
-    for (std::size_t k = 0; k < a.depth.size(); ++k) mean.depth[k] += a.depth[k], mean.depth_percent[k] += a.depth_percent[k];
+    for (std::size_t k = 0; k < a.depth.size(); ++k)
+      mean.depth[k] += a.depth[k], mean.depth_percent[k] += a.depth_percent[k];
   }
   if (n == 0) return;
   const auto by = static_cast<double>(n);
-  fmt::print("  NEES a dimension: transform {:.2f}, intrinsics {:.2f}, depth", mean.transform / by, mean.intrinsics / by);
+  fmt::print("  NEES a dimension: transform {:.2f}, intrinsics {:.2f}, depth", mean.transform / by,
+             mean.intrinsics / by);
   for (std::size_t k = 0; k < mean.depth.size(); ++k)
-    fmt::print(" {:g} m {:.2f} ({:.2f} %)", calibration::Agreement::depth_m[k], mean.depth[k] / by, mean.depth_percent[k] / by);
+    fmt::print(" {:g} m {:.2f} ({:.2f} %)", calibration::Agreement::depth_m[k], mean.depth[k] / by,
+               mean.depth_percent[k] / by);
   fmt::print("\n");
   std::fflush(stdout);
 }
@@ -122,11 +145,13 @@ void rendered_stretches(const app::Configuration& c) {
   options.calibration = c.calibration;
   options.monitor = c.monitor;
   const auto features = static_cast<std::size_t>(c.odometry.features);
-  Arena arena(Estimator::memory_needed(options, o.rig) + calibration::Stretches::memory_needed(c.calibration, c.monitor, 2, features));
+  Arena arena(Estimator::memory_needed(options, o.rig) +
+              calibration::Stretches::memory_needed(c.calibration, c.monitor, 2, features));
   app::ThreadRunner two;
   ImmediateRunner solver;
   Estimator estimator(options, o.rig, o.rig, arena, two, solver);
-  calibration::Stretches alone(calibration::Stretches::Kind::alone, o.rig, o.rig, kStretch, c.calibration, c.monitor, features, arena);
+  calibration::Stretches alone(calibration::Stretches::Kind::alone, o.rig, o.rig, kStretch,
+                               c.calibration, c.monitor, features, arena);
   std::vector<calibration::RigSolution> stretches;
   for (std::uint64_t i = 0; i < kFrames; ++i) {
     (void)estimator.process(rendered.frame(i));
@@ -136,8 +161,9 @@ void rendered_stretches(const app::Configuration& c) {
   print_stretches("mock", stretches);
 }
 
-int for_drives(const std::vector<std::string>& set, const std::string& only,
-               const std::function<void(const RecordedSequence&, const app::Configuration&)>& each) {
+int for_drives(
+    const std::vector<std::string>& set, const std::string& only,
+    const std::function<void(const RecordedSequence&, const app::Configuration&)>& each) {
   const app::Configuration c = app::load_configuration(std::nullopt, set);
   int n = 0;
   for (const char* name : test::kRecordedSequences) {
@@ -148,22 +174,29 @@ int for_drives(const std::vector<std::string>& set, const std::string& only,
     }
   }
   if (n > 0) return 0;
-  fmt::print(stderr, "calibration_bench: no recorded drives; set VERGENCE_SHARED to the folder that holds data/\n");
+  fmt::print(stderr,
+             "calibration_bench: no recorded drives; set VERGENCE_SHARED to the folder that holds "
+             "data/\n");
   return 2;
 }
 
 }  // namespace
 
-int run_drives(const std::vector<std::string>& set, const std::string& only) { return for_drives(set, only, run_drive); }
+int run_drives(const std::vector<std::string>& set, const std::string& only) {
+  return for_drives(set, only, run_drive);
+}
 
 int run_learning(const std::vector<std::string>& set, int times) {
   const app::Configuration c = app::load_configuration(std::nullopt, set);
   const auto d = test::open_recorded("kitti00_151");
   if (!d) {
-    fmt::print(stderr, "calibration_bench: no recorded drives; set VERGENCE_SHARED to the folder that holds data/\n");
+    fmt::print(stderr,
+               "calibration_bench: no recorded drives; set VERGENCE_SHARED to the folder that "
+               "holds data/\n");
     return 2;
   }
-  // To and fro over the same road: the speed changes its sign at the ends, the rig stays what it is.
+  // To and fro over the same road: the speed changes its sign at the ends, the rig stays what it
+  // is.
   StereoSequence s = d->sequence;
   const std::size_t n = d->sequence.pairs.size();
   const Duration step = d->sequence.pairs[1].stamp - d->sequence.pairs[0].stamp;
@@ -176,23 +209,28 @@ int run_learning(const std::vector<std::string>& set, int times) {
     }
   const StartingCalibration scratch = test::blank(app::replayed_calibration(c, s, false));
   int knocks = 0;
-  const auto rig = app::drive_once({s, c, 0, s.pairs.size(), {}, {}}, scratch, [&](const Estimator& e, const PoseSample& sample) {
-    for (const EstimatorEvent& event : e.events()) knocks += event.kind == EstimatorEvent::Kind::rig_changed ? 1 : 0;
-    for (const CalibrationDecision& decision : e.calibrations()) {
-      const RigCalibration& r = decision.calibration;
-      const Vec3 phi = 1e3 * log_so3(r.T_camera_left[1].R), t = 1e3 * r.T_camera_left[1].t;
-      fmt::print(
-          "frame {:5d} {:8s} {:4d} frames  yaw {:.3f} ({:.3f}) mrad  t_y {:.2f} t_z {:.2f} mm  cx {:.2f} ({:.2f})  depth ± {:.2f} %  held "
-          "out {:.4f} px  {:.0f} ms\n",
-          sample.frame,
-          decision.accepted ? "adopted"
-          : decision.learnt ? "kept"
-                            : "rejected",
-          r.frames, phi.y(), 1e3 * r.sigma_noise[1][1], t.y(), t.z(), r.intrinsics[1].cx, r.intrinsics[1].sigma[2],
-          decision.depth_sigma_percent, decision.held_out_after_px, decision.solve_ms);
-      std::fflush(stdout);
-    }
-  });
+  const auto rig = app::drive_once(
+      {s, c, 0, s.pairs.size(), {}, {}}, scratch,
+      [&](const Estimator& e, const PoseSample& sample) {
+        for (const EstimatorEvent& event : e.events())
+          knocks += event.kind == EstimatorEvent::Kind::rig_changed ? 1 : 0;
+        for (const CalibrationDecision& decision : e.calibrations()) {
+          const RigCalibration& r = decision.calibration;
+          const Vec3 phi = 1e3 * log_so3(r.T_camera_left[1].R), t = 1e3 * r.T_camera_left[1].t;
+          fmt::print(
+              "frame {:5d} {:8s} {:4d} frames  yaw {:.3f} ({:.3f}) mrad  t_y {:.2f} t_z {:.2f} mm  "
+              "cx {:.2f} ({:.2f})  depth ± {:.2f} %  held "
+              "out {:.4f} px  {:.0f} ms\n",
+              sample.frame,
+              decision.accepted ? "adopted"
+              : decision.learnt ? "kept"
+                                : "rejected",
+              r.frames, phi.y(), 1e3 * r.sigma_noise[1][1], t.y(), t.z(), r.intrinsics[1].cx,
+              r.intrinsics[1].sigma[2], decision.depth_sigma_percent, decision.held_out_after_px,
+              decision.solve_ms);
+          std::fflush(stdout);
+        }
+      });
   fmt::print("{} knocks told\n", knocks);
   if (!rig) return 1;
   StartingCalibration learnt = app::replayed_calibration(c, d->sequence, false);
@@ -202,11 +240,13 @@ int run_learning(const std::vector<std::string>& set, int times) {
 }
 
 int run_stretches(const std::vector<std::string>& set, const std::string& only) {
-  const int recorded = for_drives(set, only, [](const RecordedSequence& d, const app::Configuration& c) {
-    const StartingCalibration given = app::replayed_calibration(c, d.sequence, false);
-    const app::DriveCalibration found = app::calibrate_drive({d.sequence, c, 0, d.sequence.pairs.size(), {}, {}}, given);
-    print_stretches(d.name, found.stretches);
-  });
+  const int recorded =
+      for_drives(set, only, [](const RecordedSequence& d, const app::Configuration& c) {
+        const StartingCalibration given = app::replayed_calibration(c, d.sequence, false);
+        const app::DriveCalibration found =
+            app::calibrate_drive({d.sequence, c, 0, d.sequence.pairs.size(), {}, {}}, given);
+        print_stretches(d.name, found.stretches);
+      });
   if (only.empty() || only == "mock") {
     rendered_stretches(app::load_configuration(std::nullopt, set));
     return 0;

@@ -4,14 +4,16 @@
 
 namespace vergence::bench {
 
-/// `calibration_bench drives`: every recorded drive, its calibration given, wrong, found; knocks on real images. → exit code.
+/// `calibration_bench drives`: every recorded drive, its calibration given, wrong, found; knocks on
+/// real images. → exit code.
 int run_drives(const std::vector<std::string>& set, const std::string& only);
 
-/// `calibration_bench stretches DATA…`: normalised squared differences of disjoint stretches (METHOD §6.5), of recorded drives and of a
-/// rendered one. → exit code.
+/// `calibration_bench stretches DATA…`: normalised squared differences of disjoint stretches
+/// (METHOD §6.5), of recorded drives and of a rendered one. → exit code.
 int run_stretches(const std::vector<std::string>& set, const std::string& only);
 
-/// `calibration_bench learning`: KITTI 00 so many times to and fro, from scratch; what is known after every solve. → exit code.
+/// `calibration_bench learning`: KITTI 00 so many times to and fro, from scratch; what is known
+/// after every solve. → exit code.
 int run_learning(const std::vector<std::string>& set, int times);
 
 }  // namespace vergence::bench

@@ -1,10 +1,12 @@
-// Matches between two images of which nothing is known: SURF-64 beside the project's own corners, on the mock's streets and on recorded
-// excerpts.
+// Matches between two images of which nothing is known: SURF-64 beside the project's own corners,
+// on the mock's streets and on recorded excerpts.
 //
-//   front_end_bench [--pairs N] [--data mock|euroc|kitti]… [--surf-response X] [--surf-room N] [--set KEY=VALUE]… [--markdown FILE]
+//   front_end_bench [--pairs N] [--data mock|euroc|kitti]… [--surf-response X] [--surf-room N]
+//   [--set KEY=VALUE]… [--markdown FILE]
 //
-// Across: left to right of one frame, as the first pair of a rig that nobody has calibrated. In time: left to left of successive
-// frames. The five-point transform of StereoMlesac is compared with the truth (mock) or with what the data set publishes.
+// Across: left to right of one frame, as the first pair of a rig that nobody has calibrated. In
+// time: left to left of successive frames. The five-point transform of StereoMlesac is compared
+// with the truth (mock) or with what the data set publishes.
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -35,7 +37,8 @@ namespace {
 using namespace vergence;
 
 constexpr int kManyCorners = 1000;  // the most that may be asked for
-constexpr double kNearLine = 1.0;   // px to the true epipolar line: a match this near counts as right
+constexpr double kNearLine =
+    1.0;  // px to the true epipolar line: a match this near counts as right
 
 struct Arguments {
   int pairs = 24;
@@ -57,9 +60,12 @@ struct ImagePair {
 using Matches = std::vector<odometry::FreeMatch>;
 
 /// Of the processor: other programs do not count.
-double milliseconds_since(std::clock_t start) { return 1e3 * static_cast<double>(std::clock() - start) / CLOCKS_PER_SEC; }
+double milliseconds_since(std::clock_t start) {
+  return 1e3 * static_cast<double>(std::clock() - start) / CLOCKS_PER_SEC;
+}
 
-/// What the estimator uses on the first pair: corners with binary descriptors, or upright SURF-64, mutually best, then aligned.
+/// What the estimator uses on the first pair: corners with binary descriptors, or upright SURF-64,
+/// mutually best, then aligned.
 Matches match_freely(const ImagePair& pair, const OdometryOptions& options, double* ms) {
   RigCalibration rig;
   rig.cameras = 2;
@@ -79,14 +85,16 @@ Matches match_freely(const ImagePair& pair, const OdometryOptions& options, doub
   return {found.begin(), found.end()};
 }
 
-/// The same corners followed from where they stand, coarse to fine, without looking for them elsewhere: for small motions.
+/// The same corners followed from where they stand, coarse to fine, without looking for them
+/// elsewhere: for small motions.
 Matches follow_corners(const ImagePair& pair, const OdometryOptions& options, double* ms) {
   constexpr int kCoarsest = 3;
   const Intrinsics& c = pair.intrinsics[0];
   const auto room = static_cast<std::size_t>(options.features);
-  Arena arena(2 * features::Pyramid::memory_needed(c.width, c.height, options.pyramid_levels) + room * sizeof(features::Corner) +
-              kCacheLine);
-  features::Pyramid first(c.width, c.height, options.pyramid_levels, arena), second(c.width, c.height, options.pyramid_levels, arena);
+  Arena arena(2 * features::Pyramid::memory_needed(c.width, c.height, options.pyramid_levels) +
+              room * sizeof(features::Corner) + kCacheLine);
+  features::Pyramid first(c.width, c.height, options.pyramid_levels, arena),
+      second(c.width, c.height, options.pyramid_levels, arena);
   BoundedVector<features::Corner> corners(arena.make<features::Corner>(room, "corners"));
   const odometry::Lens lens(c);
   SequentialRunner one;
@@ -94,7 +102,9 @@ Matches follow_corners(const ImagePair& pair, const OdometryOptions& options, do
   first.build(pair.images[0]);
   second.build(pair.images[1]);
   features::CornerOptions where;
-  where.cell = std::clamp(static_cast<int>(std::sqrt(c.width * c.height / (1.6 * options.features))), 12, features::kMaxCell);
+  where.cell =
+      std::clamp(static_cast<int>(std::sqrt(c.width * c.height / (1.6 * options.features))), 12,
+                 features::kMaxCell);
   where.min_score = static_cast<float>(options.min_corner_score);
   where.min_distance = 0.5F * static_cast<float>(where.cell);
   features::find_corners(first.level(0), where, {}, one, &corners);
@@ -126,8 +136,11 @@ Matches match_surf(const ImagePair& pair, const Arguments& a, bool upright, doub
   constexpr double kSigmaOfScale = 0.15;
   const Intrinsics& c = pair.intrinsics[0];
   const std::size_t room = a.surf_room;
-  Arena arena(2 * features::Surf::memory_needed(c.width, c.height) + features::SurfMatcher::memory_needed(room) +
-              room * (2 * (sizeof(features::SurfPoint) + sizeof(features::SurfDescriptor)) + sizeof(features::SurfMatch)) + 8 * kCacheLine);
+  Arena arena(2 * features::Surf::memory_needed(c.width, c.height) +
+              features::SurfMatcher::memory_needed(room) +
+              room * (2 * (sizeof(features::SurfPoint) + sizeof(features::SurfDescriptor)) +
+                      sizeof(features::SurfMatch)) +
+              8 * kCacheLine);
   features::Surf surf(c.width, c.height, arena);
   features::SurfMatcher matcher(room, arena);
   std::array<BoundedVector<features::SurfPoint>, 2> points;
@@ -137,7 +150,8 @@ Matches match_surf(const ImagePair& pair, const Arguments& a, bool upright, doub
     descriptors[k] = arena.make<features::SurfDescriptor>(room, "descriptors");
   }
   BoundedVector<features::SurfMatch> found(arena.make<features::SurfMatch>(room, "matches"));
-  const std::array<odometry::Lens, 2> lens{odometry::Lens(pair.intrinsics[0]), odometry::Lens(pair.intrinsics[1])};
+  const std::array<odometry::Lens, 2> lens{odometry::Lens(pair.intrinsics[0]),
+                                           odometry::Lens(pair.intrinsics[1])};
   const std::clock_t start = std::clock();
   std::array<features::SurfView, 2> views;
   for (std::size_t k = 0; k < 2; ++k) {
@@ -147,7 +161,8 @@ Matches match_surf(const ImagePair& pair, const Arguments& a, bool upright, doub
     surf.describe(points[k].span(), descriptors[k].first(points[k].size()));
     views[k] = {points[k].span(), descriptors[k].first(points[k].size())};
   }
-  if (matcher.match(views[0], views[1], {}, nullptr, &found) != features::SurfMatchStatus::ok) return {};
+  if (matcher.match(views[0], views[1], {}, nullptr, &found) != features::SurfMatchStatus::ok)
+    return {};
   Matches matches;
   for (const features::SurfMatch& f : found) {
     const features::SurfPoint &p = points[0][f.left], &q = points[1][f.right];
@@ -156,7 +171,9 @@ Matches match_surf(const ImagePair& pair, const Arguments& a, bool upright, doub
     const double sigma = kSigmaOfScale * static_cast<double>(std::max(p.scale, q.scale));
     odometry::FreeMatch m;
     double magnification = 1;
-    if (!lens[0].undistort(left, &m.left, &magnification) || !lens[1].undistort(right, &m.other, &magnification)) continue;
+    if (!lens[0].undistort(left, &m.left, &magnification) ||
+        !lens[1].undistort(right, &m.other, &magnification))
+      continue;
     m.sigma = sigma * magnification;
     matches.push_back(m);
   }
@@ -172,7 +189,9 @@ struct Measured {
   double ms = 0;
 };
 
-double angle_between(const Vec3& a, const Vec3& b) { return std::atan2(a.cross(b).norm(), a.dot(b)) * 180 / std::numbers::pi; }
+double angle_between(const Vec3& a, const Vec3& b) {
+  return std::atan2(a.cross(b).norm(), a.dot(b)) * 180 / std::numbers::pi;
+}
 
 double median(std::vector<double> v, double q = 0.5) {
   if (v.empty()) return std::numeric_limits<double>::quiet_NaN();
@@ -188,7 +207,9 @@ Measured measure(const ImagePair& pair, const Matches& matches, double ms) {
   std::vector<double> lx, ly, rx, ry, sigma, off;
   const EpipolarGeometry truth(pair.T_second_first);
   for (const odometry::FreeMatch& f : matches) {
-    const auto ray = [](const Intrinsics& c, const Vec2& p) { return Vec2((p.x() - c.cx) / c.fx, (p.y() - c.cy) / c.fy); };
+    const auto ray = [](const Intrinsics& c, const Vec2& p) {
+      return Vec2((p.x() - c.cx) / c.fx, (p.y() - c.cy) / c.fy);
+    };
     const Vec2 l = ray(pair.intrinsics[0], f.left), r = ray(pair.intrinsics[1], f.other);
     lx.push_back(l.x());
     ly.push_back(l.y());
@@ -205,11 +226,12 @@ Measured measure(const ImagePair& pair, const Matches& matches, double ms) {
   Arena arena(StereoMlesac::memory_needed(matches.size() + 1));
   StereoMlesac mlesac(matches.size() + 1, arena);
   Random random(1);
-  const StereoEstimate e =
-      mlesac.estimate_stereo_transform({lx, ly, rx, ry, sigma}, pair.T_second_first.t.norm(), StereoMlesacOptions{}, random);
+  const StereoEstimate e = mlesac.estimate_stereo_transform(
+      {lx, ly, rx, ry, sigma}, pair.T_second_first.t.norm(), StereoMlesacOptions{}, random);
   if (e.status != StereoMlesacStatus::ok) return m;
   m.inliers = e.inliers;
-  m.turn_deg = log_so3(e.T_right_left.R * pair.T_second_first.R.transpose()).norm() * 180 / std::numbers::pi;
+  m.turn_deg =
+      log_so3(e.T_right_left.R * pair.T_second_first.R.transpose()).norm() * 180 / std::numbers::pi;
   m.direction_deg = angle_between(e.T_right_left.t, pair.T_second_first.t);
   return m;
 }
@@ -229,21 +251,28 @@ struct Row {
       right += m.right;
       matches += m.matches;
     }
-    return fmt::format("| {} | {} | {} | {:.0f} | {:.0f} % | {:.0f} | {:.2f} | {:.3f} / {:.3f} | {:.2f} / {:.2f} | {:.0f} |\n", data, task,
-                       front_end, at(&Measured::matches), 100 * right / std::max(1.0, matches), at(&Measured::inliers),
-                       at(&Measured::off_px), at(&Measured::turn_deg), at(&Measured::turn_deg, 0.9), at(&Measured::direction_deg),
-                       at(&Measured::direction_deg, 0.9), at(&Measured::ms));
+    return fmt::format(
+        "| {} | {} | {} | {:.0f} | {:.0f} % | {:.0f} | {:.2f} | {:.3f} / {:.3f} | {:.2f} / {:.2f} "
+        "| {:.0f} |\n",
+        data, task, front_end, at(&Measured::matches), 100 * right / std::max(1.0, matches),
+        at(&Measured::inliers), at(&Measured::off_px), at(&Measured::turn_deg),
+        at(&Measured::turn_deg, 0.9), at(&Measured::direction_deg),
+        at(&Measured::direction_deg, 0.9), at(&Measured::ms));
   }
 };
 
 constexpr const char* kHeader =
-    "| data | pair | front end | matches | right | inliers | px off | rotation ° | direction ° | ms |\n"
+    "| data | pair | front end | matches | right | inliers | px off | rotation ° | direction ° | "
+    "ms |\n"
     "|---|---|---|---|---|---|---|---|---|---|\n";
 
 class Table {
  public:
   explicit Table(const Arguments& a)
-      : a_(a), odometry_(app::load_configuration(std::nullopt, a.set).odometry), many_(odometry_), blobs_(odometry_) {
+      : a_(a),
+        odometry_(app::load_configuration(std::nullopt, a.set).odometry),
+        many_(odometry_),
+        blobs_(odometry_) {
     odometry_.first_pair = many_.first_pair = 0;
     blobs_.first_pair = 1;
     many_.features = blobs_.features = kManyCorners;
@@ -252,7 +281,9 @@ class Table {
   void add(const std::string& data, bool across, const ImagePair& pair) {
     double ms = 0;
     const std::string task = across ? "across" : "in time";
-    const auto one = [&](const char* name, const Matches& matches) { row(data, task, name).all.push_back(measure(pair, matches, ms)); };
+    const auto one = [&](const char* name, const Matches& matches) {
+      row(data, task, name).all.push_back(measure(pair, matches, ms));
+    };
     one("corners", match_freely(pair, odometry_, &ms));
     one("corners, 1000", match_freely(pair, many_, &ms));
     if (!across) one("corners followed", follow_corners(pair, odometry_, &ms));
@@ -294,11 +325,17 @@ void run_mock(const Arguments& a, Table* table) {
     test::RenderedDrive rendered(o);
     const Intrinsics& c = o.rig.intrinsics[0];
     const RigFrame& frame = rendered.frame(0);
-    table->add("mock", true, {{frame.images[0], frame.images[1]}, {c, o.rig.intrinsics[1]}, o.rig.T_camera_left[1]});
+    table->add(
+        "mock", true,
+        {{frame.images[0], frame.images[1]}, {c, o.rig.intrinsics[1]}, o.rig.T_camera_left[1]});
     Copy first{cv::Mat(c.height, static_cast<int>(frame.images[0].stride), CV_8U)};
-    for (int y = 0; y < c.height; ++y) std::copy_n(frame.images[0].row(y), frame.images[0].stride, first.pixels.ptr(y));
+    for (int y = 0; y < c.height; ++y)
+      std::copy_n(frame.images[0].row(y), frame.images[0].stride, first.pixels.ptr(y));
     const RigFrame& next = rendered.frame(1);
-    table->add("mock", false, {{first.view(c), next.images[0]}, {c, c}, rendered.T_enu_left(1).inverse() * rendered.T_enu_left(0)});
+    table->add("mock", false,
+               {{first.view(c), next.images[0]},
+                {c, c},
+                rendered.T_enu_left(1).inverse() * rendered.T_enu_left(0)});
   }
 }
 
@@ -308,7 +345,8 @@ Copy read(const app::StereoSequence& s, std::size_t pair, std::size_t k) {
   Copy image{cv::Mat(c.height, (c.width + 63) / 64 * 64, CV_8U)};
   const std::filesystem::path file = s.root / s.pairs[pair].file[k];
   if (app::read_image_file(file, &bytes) != app::ImageFileStatus::ok ||
-      app::decode_grey(bytes, {c.width, c.height}, image.pixels.data, image.pixels.step) != app::ImageFileStatus::ok)
+      app::decode_grey(bytes, {c.width, c.height}, image.pixels.data, image.pixels.step) !=
+          app::ImageFileStatus::ok)
     throw std::runtime_error(file.string() + ": cannot be decoded");
   return image;
 }
@@ -317,7 +355,9 @@ Copy read(const app::StereoSequence& s, std::size_t pair, std::size_t k) {
 std::optional<Transform> pose_at(const app::Trajectory& truth, Stamp stamp) {
   const StampedPose* best = nullptr;
   for (const StampedPose& p : truth)
-    if (best == nullptr || std::abs(p.stamp.ns() - stamp.ns()) < std::abs(best->stamp.ns() - stamp.ns())) best = &p;
+    if (best == nullptr ||
+        std::abs(p.stamp.ns() - stamp.ns()) < std::abs(best->stamp.ns() - stamp.ns()))
+      best = &p;
   if (best == nullptr || std::abs(best->stamp.ns() - stamp.ns()) > 5'000'000) return std::nullopt;
   return best->T_world_body;
 }
@@ -330,7 +370,8 @@ void run_recorded(const Arguments& a, const std::string& name, Table* table) {
     fmt::print(stderr, "{}: {}\n", name, test::shared_data_missing(below));
     return;
   }
-  const app::StereoSequence s = app::open_sequence(euroc ? app::SequenceFormat::euroc : app::SequenceFormat::kitti, *folder);
+  const app::StereoSequence s =
+      app::open_sequence(euroc ? app::SequenceFormat::euroc : app::SequenceFormat::kitti, *folder);
   const app::Trajectory truth = app::read_trajectory(*folder);
   const Intrinsics& c = s.calibration.intrinsics[0];
   const auto last = static_cast<int>(s.pairs.size()) - 1;
@@ -338,8 +379,11 @@ void run_recorded(const Arguments& a, const std::string& name, Table* table) {
     const auto n = static_cast<std::size_t>(last * i / a.pairs);
     const Copy left = read(s, n, 0), right = read(s, n, 1), next = read(s, n + 1, 0);
     table->add(name, true,
-               {{left.view(c), right.view(s.calibration.intrinsics[1])}, {c, s.calibration.intrinsics[1]}, s.calibration.T_camera_left[1]});
-    const auto before = pose_at(truth, s.pairs[n].stamp), after = pose_at(truth, s.pairs[n + 1].stamp);
+               {{left.view(c), right.view(s.calibration.intrinsics[1])},
+                {c, s.calibration.intrinsics[1]},
+                s.calibration.T_camera_left[1]});
+    const auto before = pose_at(truth, s.pairs[n].stamp),
+               after = pose_at(truth, s.pairs[n + 1].stamp);
     constexpr double kLeastMotion = 0.02;  // m: shorter ways of EuRoC's truth have no direction
     if (!before || !after || (after->t - before->t).norm() < kLeastMotion) continue;
     table->add(name, false, {{left.view(c), next.view(c)}, {c, c}, after->inverse() * *before});

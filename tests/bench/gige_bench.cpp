@@ -1,7 +1,9 @@
-/// Two simulated GigE cameras, 1280 × 960 at 30 Hz, over the loopback into the driver: what arrives, when, and what it costs.
+/// Two simulated GigE cameras, 1280 × 960 at 30 Hz, over the loopback into the driver: what
+/// arrives, when, and what it costs.
 ///
 ///   gige_bench [--seconds 60] [--starts 20] [--packet 9000]
-/// CPU time is that of every thread but the simulators' own; the latency from the last sendto() of a frame to wait()'s return.
+/// CPU time is that of every thread but the simulators' own; the latency from the last sendto() of
+/// a frame to wait()'s return.
 #include <pthread.h>
 #include <unistd.h>
 
@@ -65,11 +67,13 @@ Rig make_rig(int packet) {
     rig.simulators.push_back(std::make_unique<test::GigeCamera>(o));
     DeviceStatus status = DeviceStatus::ok;
     auto camera = gige::make_driver()->open(o.address, &status);
-    CameraConfiguration c{kWidth, kHeight, kRate, Duration::milliseconds(5), 0, CameraTrigger::free};
+    CameraConfiguration c{
+        kWidth, kHeight, kRate, Duration::milliseconds(5), 0, CameraTrigger::free};
     c.options["packet_size"] = std::to_string(packet);
     c.sharing = kCameras;
     if (camera == nullptr || camera->configure(c, nullptr) != DeviceStatus::ok) {
-      std::fprintf(stderr, "camera %d: %s\n", k, camera == nullptr ? "not opened" : camera->complaint().c_str());
+      std::fprintf(stderr, "camera %d: %s\n", k,
+                   camera == nullptr ? "not opened" : camera->complaint().c_str());
       std::exit(2);
     }
     if (!camera->remark().empty()) std::printf("camera %d: %s\n", k, camera->remark().c_str());
@@ -102,7 +106,8 @@ Taken consume(CameraDevice* camera, const test::GigeCamera* simulator) {
   }
 }
 
-/// One start, so many seconds, one stop. → frames that the cameras exposed and that did not arrive whole
+/// One start, so many seconds, one stop. → frames that the cameras exposed and that did not arrive
+/// whole
 std::uint64_t run(Rig* rig, double seconds, std::vector<Taken>* all, double* cpu) {
   std::vector<std::uint64_t> before;
   for (const auto& s : rig->simulators) before.push_back(s->report().exposed);
@@ -115,9 +120,11 @@ std::uint64_t run(Rig* rig, double seconds, std::vector<Taken>* all, double* cpu
   all->assign(kCameras, {});
   std::vector<std::thread> threads;
   for (std::size_t k = 0; k < kCameras; ++k)
-    threads.emplace_back([rig, all, k] { (*all)[k] = consume(rig->cameras[k].get(), rig->simulators[k].get()); });
+    threads.emplace_back(
+        [rig, all, k] { (*all)[k] = consume(rig->cameras[k].get(), rig->simulators[k].get()); });
   std::this_thread::sleep_for(std::chrono::duration<double>(seconds));
-  for (const auto& s : rig->simulators) s->silence(true);  // so that nothing is on its way at the end
+  for (const auto& s : rig->simulators)
+    s->silence(true);  // so that nothing is on its way at the end
   std::this_thread::sleep_for(std::chrono::milliseconds(200));
   *cpu = cpu_seconds() - cpu_before;
   for (const auto& c : rig->cameras) c->stop();
@@ -133,7 +140,8 @@ std::uint64_t run(Rig* rig, double seconds, std::vector<Taken>* all, double* cpu
 double at(std::vector<double>* sorted, double share) {
   if (sorted->empty()) return -1;
   std::sort(sorted->begin(), sorted->end());
-  return (*sorted)[std::min(sorted->size() - 1, static_cast<std::size_t>(share * static_cast<double>(sorted->size())))];
+  return (*sorted)[std::min(sorted->size() - 1,
+                            static_cast<std::size_t>(share * static_cast<double>(sorted->size())))];
 }
 
 }  // namespace
@@ -157,11 +165,15 @@ int main(int argc, char** argv) {
   const std::uint64_t missing = run(&rig, seconds, &all, &cpu);
   for (std::size_t k = 0; k < kCameras; ++k) {
     Taken& t = all[k];
-    std::printf("camera %zu: %llu frames of %llu exposed; sendto to hand: median %.2f ms, p99 %.2f, most %.2f\n", k,
-                static_cast<unsigned long long>(t.complete), static_cast<unsigned long long>(rig.simulators[k]->report().exposed),
-                at(&t.latency_ms, 0.5), at(&t.latency_ms, 0.99), at(&t.latency_ms, 1));
+    std::printf(
+        "camera %zu: %llu frames of %llu exposed; sendto to hand: median %.2f ms, p99 %.2f, most "
+        "%.2f\n",
+        k, static_cast<unsigned long long>(t.complete),
+        static_cast<unsigned long long>(rig.simulators[k]->report().exposed),
+        at(&t.latency_ms, 0.5), at(&t.latency_ms, 0.99), at(&t.latency_ms, 1));
   }
-  std::printf("%.0f s at %d-byte packets: %llu frames lost; %.2f %% of one core for both cameras\n", seconds, packet,
-              static_cast<unsigned long long>(missing), 100 * cpu / (seconds + 0.2));
+  std::printf("%.0f s at %d-byte packets: %llu frames lost; %.2f %% of one core for both cameras\n",
+              seconds, packet, static_cast<unsigned long long>(missing),
+              100 * cpu / (seconds + 0.2));
   return 0;
 }

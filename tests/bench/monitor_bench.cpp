@@ -1,4 +1,5 @@
-// Time of the monitor for a frame: matches across alone, with motion tracks, and while a knock keeps it searching for the onset.
+// Time of the monitor for a frame: matches across alone, with motion tracks, and while a knock
+// keeps it searching for the onset.
 #include <benchmark/benchmark.h>
 
 #include <algorithm>
@@ -18,7 +19,8 @@ using namespace vergence::calibration;
 constexpr std::size_t kMotionTracks = 200;
 constexpr std::size_t kPairing = 5;  // frames between the two sightings of a motion track
 
-/// Frames with 300 matches across each; where asked, every one of them with 200 motion tracks, which a drive has in one of eight.
+/// Frames with 300 matches across each; where asked, every one of them with 200 motion tracks,
+/// which a drive has in one of eight.
 struct Recorded {
   struct Frame {
     MonitorFrame frame;
@@ -38,7 +40,8 @@ struct Recorded {
       drive.next();
       Frame& f = frames[i];
       f.T_left_world = drive.T_left_world();
-      for (const test::FeatureTrack& t : drive.tracks().first(std::min<std::size_t>(300, drive.tracks().size())))
+      for (const test::FeatureTrack& t :
+           drive.tracks().first(std::min<std::size_t>(300, drive.tracks().size())))
         f.across.push_back({t.left, t.right, t.sigma_px, t.id});
       f.frame.stamp = drive.stamp();
       f.frame.frame = drive.frame();
@@ -53,7 +56,8 @@ struct Recorded {
       for (const AcrossSighting& s : f.across) {
         const auto it = earlier.find(s.track);
         if (it != earlier.end() && f.motion.size() < kMotionTracks)
-          f.motion.push_back({it->second->left, it->second->right, s.left, s.right, s.sigma_px, s.track});
+          f.motion.push_back(
+              {it->second->left, it->second->right, s.left, s.right, s.sigma_px, s.track});
       }
       fewest_motion = std::min(fewest_motion, f.motion.size());
       f.frame.before = before.frame.frame;
@@ -61,7 +65,8 @@ struct Recorded {
       f.frame.T_before_earlier = before.frame.T_now_previous;
     }
     for (Frame& f : frames) f.frame.across = f.across, f.frame.motion = f.motion;
-    options.T_right_left.R = exp_so3({0, yaw_deg * std::numbers::pi / 180, 0}) * options.T_right_left.R;
+    options.T_right_left.R =
+        exp_so3({0, yaw_deg * std::numbers::pi / 180, 0}) * options.T_right_left.R;
   }
 };
 
@@ -69,7 +74,8 @@ void look(benchmark::State& state, bool with_motion, double yaw_deg) {
   const Recorded recorded(with_motion, yaw_deg);
   Arena arena(Monitor::memory_needed({}));
   Monitor monitor({}, arena);
-  (void)monitor.set_reference(recorded.options.T_right_left, recorded.options.left, recorded.options.right, Mat6::Zero());
+  (void)monitor.set_reference(recorded.options.T_right_left, recorded.options.left,
+                              recorded.options.right, Mat6::Zero());
   std::uint64_t n = 0;
   bool alarm = false;
   for (auto _ : state) {

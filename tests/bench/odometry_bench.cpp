@@ -1,9 +1,12 @@
-// Stereo odometry on recorded excerpts: accuracy, time a frame by stage, and a yardstick of the machine's speed in the same run.
+// Stereo odometry on recorded excerpts: accuracy, time a frame by stage, and a yardstick of the
+// machine's speed in the same run.
 //
-//   odometry_bench [--repeats N] [--threads 1|2] [--set KEY=VALUE]… [--json FILE] [--markdown FILE] [--no-yardstick] [--frames PREFIX]
+//   odometry_bench [--repeats N] [--threads 1|2] [--set KEY=VALUE]… [--json FILE] [--markdown FILE]
+//   [--no-yardstick] [--frames PREFIX]
 //
-// Images are decoded beforehand; the clock runs from the decoded pair to the pose. Yardstick: OpenCV's pyramidal Lucas–Kanade on
-// 1000 corners of one pair of successive EuRoC left images (pyramids included, one thread). A time counts as its ratio to it.
+// Images are decoded beforehand; the clock runs from the decoded pair to the pose. Yardstick:
+// OpenCV's pyramidal Lucas–Kanade on 1000 corners of one pair of successive EuRoC left images
+// (pyramids included, one thread). A time counts as its ratio to it.
 #include <algorithm>
 #include <chrono>
 #include <cstdio>
@@ -92,16 +95,18 @@ DecodedDrive load(const Excerpt& excerpt, const std::filesystem::path& folder) {
   for (const app::StereoPair& p : d.sequence.pairs) {
     std::array<cv::Mat, 2> images;
     for (std::size_t k = 0; k < 2; ++k)
-      images[k] =
-          decode(d.sequence.root / p.file[k], d.sequence.calibration.intrinsics[k].width, d.sequence.calibration.intrinsics[k].height);
+      images[k] = decode(d.sequence.root / p.file[k], d.sequence.calibration.intrinsics[k].width,
+                         d.sequence.calibration.intrinsics[k].height);
     d.pairs.push_back(std::move(images));
   }
   d.decode_ms =
-      std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count() / static_cast<double>(d.pairs.size());
+      std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count() /
+      static_cast<double>(d.pairs.size());
   return d;
 }
 
-Replay replay(const DecodedDrive& d, const app::Configuration& configuration, int threads, std::FILE* frames) {
+Replay replay(const DecodedDrive& d, const app::Configuration& configuration, int threads,
+              std::FILE* frames) {
   EstimatorOptions options;
   options.odometry = configuration.odometry;
   options.online = false;  // the odometry by itself: calibrations are solved by calibration_bench
@@ -110,7 +115,8 @@ Replay replay(const DecodedDrive& d, const app::Configuration& configuration, in
   std::optional<app::ThreadRunner> two;
   if (threads == 2) two.emplace();
   ImmediateRunner solver;
-  Estimator estimator(options, d.sequence.calibration, d.sequence.calibration, arena, two ? static_cast<PairRunner&>(*two) : one, solver);
+  Estimator estimator(options, d.sequence.calibration, d.sequence.calibration, arena,
+                      two ? static_cast<PairRunner&>(*two) : one, solver);
   Replay r;
   for (std::size_t i = 0; i < d.pairs.size(); ++i) {
     RigFrame frame;
@@ -119,15 +125,17 @@ Replay replay(const DecodedDrive& d, const app::Configuration& configuration, in
     frame.cameras = 2;
     for (std::size_t k = 0; k < 2; ++k) {
       const Intrinsics& c = d.sequence.calibration.intrinsics[k];
-      frame.images[k] = {d.pairs[i][k].data, c.width, c.height, static_cast<std::ptrdiff_t>(d.pairs[i][k].step)};
+      frame.images[k] = {d.pairs[i][k].data, c.width, c.height,
+                         static_cast<std::ptrdiff_t>(d.pairs[i][k].step)};
     }
     const PoseSample s = estimator.process(frame);
     r.milliseconds.push_back(s.estimate_ms);
     for (std::size_t k = 0; k < kStages; ++k) r.stage_ms[k] += static_cast<double>(s.stage_ms[k]);
     r.keyframes += s.keyframe ? 1 : 0;
     if (frames != nullptr)
-      fmt::print(frames, "{},{},{},{},{},{},{:.3f},{},{:.2f},{:.6f},{:.6f},{:.6f}\n", i, s.stamp.ns(), to_string(s.status),
-                 to_string(s.reason), s.inliers, s.stereo_inliers, s.reprojection_px, s.keyframe ? 1 : 0, s.estimate_ms,
+      fmt::print(frames, "{},{},{},{},{},{},{:.3f},{},{:.2f},{:.6f},{:.6f},{:.6f}\n", i,
+                 s.stamp.ns(), to_string(s.status), to_string(s.reason), s.inliers,
+                 s.stereo_inliers, s.reprojection_px, s.keyframe ? 1 : 0, s.estimate_ms,
                  s.T_world_left.t.x(), s.T_world_left.t.y(), s.T_world_left.t.z());
     if (s.status == PoseStatus::lost) continue;
     ++r.posed;
@@ -142,8 +150,9 @@ void write_tum(const std::string& file, const std::vector<StampedPose>& poses) {
   for (const StampedPose& p : poses) {
     const Eigen::Quaterniond q = quaternion(p.T_world_body.R);
     const Vec3& t = p.T_world_body.t;
-    out << fmt::format("{}.{:09} {:.9f} {:.9f} {:.9f} {:.9f} {:.9f} {:.9f} {:.9f}\n", p.stamp.ns() / 1'000'000'000,
-                       p.stamp.ns() % 1'000'000'000, t.x(), t.y(), t.z(), q.x(), q.y(), q.z(), q.w());
+    out << fmt::format("{}.{:09} {:.9f} {:.9f} {:.9f} {:.9f} {:.9f} {:.9f} {:.9f}\n",
+                       p.stamp.ns() / 1'000'000'000, p.stamp.ns() % 1'000'000'000, t.x(), t.y(),
+                       t.z(), q.x(), q.y(), q.z(), q.w());
   }
 }
 
@@ -161,15 +170,18 @@ double yardstick_ms(const DecodedDrive& euroc) {
     std::vector<float> error;
     const auto start = std::chrono::steady_clock::now();
     cv::calcOpticalFlowPyrLK(a, b, corners, found, status, error, {21, 21}, 3);
-    times.push_back(std::chrono::duration<float, std::milli>(std::chrono::steady_clock::now() - start).count());
+    times.push_back(
+        std::chrono::duration<float, std::milli>(std::chrono::steady_clock::now() - start).count());
   }
   cv::setNumThreads(threads);
   return quantile(times, 0.5);
 }
 
-/// Scaled segment error after the constant rotation between the camera and the body that the truth is of, as fits best: what is left
-/// when the data set's own mounting is taken out. Coordinate search over two turns; the roll about the way changes nothing.
-double segments_without_mount(const std::vector<StampedPose>& estimate, const app::Trajectory& truth, const EvaluationOptions& options,
+/// Scaled segment error after the constant rotation between the camera and the body that the truth
+/// is of, as fits best: what is left when the data set's own mounting is taken out. Coordinate
+/// search over two turns; the roll about the way changes nothing.
+double segments_without_mount(const std::vector<StampedPose>& estimate,
+                              const app::Trajectory& truth, const EvaluationOptions& options,
                               double scale) {
   const MatchedTrajectories matched = associate(estimate, truth, options);
   const auto error = [&](const Vec3& turn) {
@@ -182,7 +194,8 @@ double segments_without_mount(const std::vector<StampedPose>& estimate, const ap
   for (double step = 2e-3; step > 2e-5; step /= 2) {
     for (bool better = true; better;) {
       better = false;
-      for (const Vec3& axis : {Vec3(step, 0, 0), Vec3(-step, 0, 0), Vec3(0, step, 0), Vec3(0, -step, 0)}) {
+      for (const Vec3& axis :
+           {Vec3(step, 0, 0), Vec3(-step, 0, 0), Vec3(0, step, 0), Vec3(0, -step, 0)}) {
         const double e = error(best + axis);
         if (!(e < least)) continue;
         least = e;
@@ -194,13 +207,16 @@ double segments_without_mount(const std::vector<StampedPose>& estimate, const ap
   return least;
 }
 
-nlohmann::json measure(const Excerpt& excerpt, const DecodedDrive& drive, const Arguments& arguments, double* yardstick) {
+nlohmann::json measure(const Excerpt& excerpt, const DecodedDrive& drive,
+                       const Arguments& arguments, double* yardstick) {
   const app::Configuration configuration = app::load_configuration(std::nullopt, arguments.set);
   std::vector<float> pooled, means, yards;
   Replay last;
   for (int i = 0; i < arguments.repeats; ++i) {
     std::FILE* frames =
-        i == 0 && !arguments.frames.empty() ? std::fopen((arguments.frames + "." + excerpt.name + ".csv").c_str(), "w") : nullptr;
+        i == 0 && !arguments.frames.empty()
+            ? std::fopen((arguments.frames + "." + excerpt.name + ".csv").c_str(), "w")
+            : nullptr;
     last = replay(drive, configuration, arguments.threads, frames);
     if (frames != nullptr) {
       std::fclose(frames);
@@ -224,7 +240,8 @@ nlohmann::json measure(const Excerpt& excerpt, const DecodedDrive& drive, const 
   j["scale"] = e.sim3.scale;
   j["segment_percent"] = 1e2 * e.segments[0].translation;
   j["segment_scaled_percent"] = 1e2 * e.segments[1].translation;
-  j["segment_scaled_mount_percent"] = 1e2 * segments_without_mount(last.poses, drive.truth, options, e.sim3.scale);
+  j["segment_scaled_mount_percent"] =
+      1e2 * segments_without_mount(last.poses, drive.truth, options, e.sim3.scale);
   j["rotation_deg_per_m"] = e.segments[0].rotation * 180.0 / std::numbers::pi;
   j["end_percent"] = 1e2 * e.end_error_ratio;
   j["mean_ms"] = quantile(means, 0.5);
@@ -237,24 +254,31 @@ nlohmann::json measure(const Excerpt& excerpt, const DecodedDrive& drive, const 
   }
   j["stages_ms"]["decode"] = drive.decode_ms;
   for (int k = 0; k < kStages; ++k)
-    j["stages_ms"][std::string(to_string(static_cast<Stage>(k)))] = last.stage_ms[static_cast<std::size_t>(k)] / n;
+    j["stages_ms"][std::string(to_string(static_cast<Stage>(k)))] =
+        last.stage_ms[static_cast<std::size_t>(k)] / n;
   return j;
 }
 
 void print(const nlohmann::json& j) {
-  fmt::print("{}: {} of {} posed, {} ok, {} keyframes\n", j["data"].get<std::string>(), j["posed"].get<int>(), j["frames"].get<int>(),
-             j["ok"].get<int>(), j["keyframes"].get<int>());
+  fmt::print("{}: {} of {} posed, {} ok, {} keyframes\n", j["data"].get<std::string>(),
+             j["posed"].get<int>(), j["frames"].get<int>(), j["ok"].get<int>(),
+             j["keyframes"].get<int>());
   fmt::print(
-      "  ATE {:.2f} mm · Sim(3) {:.2f} mm, scale {:.5f} · segments {:.3f} %, scaled {:.3f} %, and mount {:.3f} % · {:.4f} °/m · end {:.3f} "
+      "  ATE {:.2f} mm · Sim(3) {:.2f} mm, scale {:.5f} · segments {:.3f} %, scaled {:.3f} %, and "
+      "mount {:.3f} % · {:.4f} °/m · end {:.3f} "
       "%\n",
-      j["ate_mm"].get<double>(), j["ate_sim3_mm"].get<double>(), j["scale"].get<double>(), j["segment_percent"].get<double>(),
-      j["segment_scaled_percent"].get<double>(), j["segment_scaled_mount_percent"].get<double>(), j["rotation_deg_per_m"].get<double>(),
+      j["ate_mm"].get<double>(), j["ate_sim3_mm"].get<double>(), j["scale"].get<double>(),
+      j["segment_percent"].get<double>(), j["segment_scaled_percent"].get<double>(),
+      j["segment_scaled_mount_percent"].get<double>(), j["rotation_deg_per_m"].get<double>(),
       j["end_percent"].get<double>());
-  fmt::print("  {:.2f} ms mean · {:.2f} p50 · {:.2f} p99 · {:.2f} max", j["mean_ms"].get<double>(), j["p50_ms"].get<double>(),
-             j["p99_ms"].get<double>(), j["max_ms"].get<double>());
-  if (j.contains("ratio")) fmt::print(" · yardstick {:.2f} ms, ratio {:.3f}", j["yardstick_ms"].get<double>(), j["ratio"].get<double>());
+  fmt::print("  {:.2f} ms mean · {:.2f} p50 · {:.2f} p99 · {:.2f} max", j["mean_ms"].get<double>(),
+             j["p50_ms"].get<double>(), j["p99_ms"].get<double>(), j["max_ms"].get<double>());
+  if (j.contains("ratio"))
+    fmt::print(" · yardstick {:.2f} ms, ratio {:.3f}", j["yardstick_ms"].get<double>(),
+               j["ratio"].get<double>());
   fmt::print("\n ");
-  for (const auto& [stage, ms] : j["stages_ms"].items()) fmt::print(" {} {:.2f}", stage, ms.get<double>());
+  for (const auto& [stage, ms] : j["stages_ms"].items())
+    fmt::print(" {} {:.2f}", stage, ms.get<double>());
   fmt::print("\n");
 }
 
@@ -265,27 +289,38 @@ std::string processor() {
   return "unknown processor";
 }
 
-/// docs/benchmarks.md: accuracy, time and stages of the last run, with the version and the machine that gave them.
-void write_markdown(const std::string& file, const nlohmann::json& all, const Arguments& arguments) {
+/// docs/benchmarks.md: accuracy, time and stages of the last run, with the version and the machine
+/// that gave them.
+void write_markdown(const std::string& file, const nlohmann::json& all,
+                    const Arguments& arguments) {
   std::ofstream out(file);
-  out << "# Benchmarks\n\nWritten by `scripts/bench` (`build/bench/odometry_bench`), version " << app::version() << ", " << processor()
-      << ", " << arguments.threads << " threads.\nMedian of " << arguments.repeats
-      << " replays' means; images decoded beforehand, the clock runs from the decoded pair to the pose.\n"
-         "Yardstick: OpenCV's pyramidal Lucas–Kanade on 1000 corners of one EuRoC pair, in the same run; only the ratio compares between "
+  out << "# Benchmarks\n\nWritten by `scripts/bench` (`build/bench/odometry_bench`), version "
+      << app::version() << ", " << processor() << ", " << arguments.threads
+      << " threads.\nMedian of " << arguments.repeats
+      << " replays' means; images decoded beforehand, the clock runs from the decoded pair to the "
+         "pose.\n"
+         "Yardstick: OpenCV's pyramidal Lucas–Kanade on 1000 corners of one EuRoC pair, in the "
+         "same run; only the ratio compares between "
          "machines.\n\n"
-         "| data | frames posed | ATE SE(3) mm | ATE Sim(3) mm | scale | segments % | after one scale % | and one mounting % | °/m "
+         "| data | frames posed | ATE SE(3) mm | ATE Sim(3) mm | scale | segments % | after one "
+         "scale % | and one mounting % | °/m "
          "|\n|---|---|---|---|---|---|---|---|---|\n";
   for (const auto& j : all)
-    out << fmt::format("| {} | {} of {} | {:.2f} | {:.2f} | {:.5f} | {:.3f} | {:.3f} | {:.3f} | {:.4f} |\n", j["data"].get<std::string>(),
-                       j["posed"].get<int>(), j["frames"].get<int>(), j["ate_mm"].get<double>(), j["ate_sim3_mm"].get<double>(),
-                       j["scale"].get<double>(), j["segment_percent"].get<double>(), j["segment_scaled_percent"].get<double>(),
-                       j["segment_scaled_mount_percent"].get<double>(), j["rotation_deg_per_m"].get<double>());
-  out << "\nSegments: 0.2, 0.5, 1 m on EuRoC, 10 to 50 m on KITTI, every frame a start.\n\n| data | mean ms | p50 | p99 | max | yardstick "
+    out << fmt::format(
+        "| {} | {} of {} | {:.2f} | {:.2f} | {:.5f} | {:.3f} | {:.3f} | {:.3f} | {:.4f} |\n",
+        j["data"].get<std::string>(), j["posed"].get<int>(), j["frames"].get<int>(),
+        j["ate_mm"].get<double>(), j["ate_sim3_mm"].get<double>(), j["scale"].get<double>(),
+        j["segment_percent"].get<double>(), j["segment_scaled_percent"].get<double>(),
+        j["segment_scaled_mount_percent"].get<double>(), j["rotation_deg_per_m"].get<double>());
+  out << "\nSegments: 0.2, 0.5, 1 m on EuRoC, 10 to 50 m on KITTI, every frame a start.\n\n| data "
+         "| mean ms | p50 | p99 | max | yardstick "
          "ms | mean / yardstick |\n|---|---|---|---|---|---|---|\n";
   for (const auto& j : all)
-    out << fmt::format("| {} | {:.2f} | {:.2f} | {:.2f} | {:.2f} | {:.2f} | {:.3f} |\n", j["data"].get<std::string>(),
-                       j["mean_ms"].get<double>(), j["p50_ms"].get<double>(), j["p99_ms"].get<double>(), j["max_ms"].get<double>(),
-                       j.value("yardstick_ms", 0.0), j.value("ratio", 0.0));
+    out << fmt::format("| {} | {:.2f} | {:.2f} | {:.2f} | {:.2f} | {:.2f} | {:.3f} |\n",
+                       j["data"].get<std::string>(), j["mean_ms"].get<double>(),
+                       j["p50_ms"].get<double>(), j["p99_ms"].get<double>(),
+                       j["max_ms"].get<double>(), j.value("yardstick_ms", 0.0),
+                       j.value("ratio", 0.0));
   out << "\n| stage, ms a frame |";
   for (const auto& j : all) out << " " << j["data"].get<std::string>() << " |";
   out << "\n|---|";
@@ -294,7 +329,8 @@ void write_markdown(const std::string& file, const nlohmann::json& all, const Ar
     out << "\n| " << stage << " |";
     for (const auto& j : all) out << fmt::format(" {:.2f} |", j["stages_ms"][stage].get<double>());
   }
-  out << "\n\nDecode runs on its own thread ahead of the estimator and is not in the times above.\n";
+  out << "\n\nDecode runs on its own thread ahead of the estimator and is not in the times "
+         "above.\n";
 }
 
 Arguments parse(int argc, char** argv) {
@@ -343,11 +379,13 @@ int main(int argc, char** argv) {
         continue;
       }
       const DecodedDrive drive = load(excerpt, *folder);
-      if (arguments.yardstick && yardstick == 0 && excerpt.format == app::SequenceFormat::euroc) yardstick = yardstick_ms(drive);
+      if (arguments.yardstick && yardstick == 0 && excerpt.format == app::SequenceFormat::euroc)
+        yardstick = yardstick_ms(drive);
       all.push_back(measure(excerpt, drive, arguments, &yardstick));
       print(all.back());
     }
-    if (!arguments.markdown.empty() && !all.empty()) write_markdown(arguments.markdown, all, arguments);
+    if (!arguments.markdown.empty() && !all.empty())
+      write_markdown(arguments.markdown, all, arguments);
     if (!arguments.json.empty()) std::ofstream(arguments.json) << all.dump(2) << '\n';
     return all.empty() ? 2 : 0;
   } catch (const std::exception& e) {

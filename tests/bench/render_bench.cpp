@@ -1,4 +1,5 @@
-// What a rendered stereo pair costs on one core, along the loop drive: mean and worst, noise and distortion on.
+// What a rendered stereo pair costs on one core, along the loop drive: mean and worst, noise and
+// distortion on.
 //
 //   render_bench [WIDTH]…        default 640 1024 1280; height is three quarters of it
 //
@@ -38,7 +39,8 @@ void measure(const std::shared_ptr<const mock::World>& world, int width) {
   const Camera camera = camera_of(width);
   mock::Renderer left(world, camera), right(world, camera);
   const Transform T_right_left{Mat3::Identity(), Vec3(-0.75, 0, 0)};
-  std::vector<std::uint8_t> image(static_cast<std::size_t>(width) * static_cast<std::size_t>(width) * 3 / 4);
+  std::vector<std::uint8_t> image(static_cast<std::size_t>(width) *
+                                  static_cast<std::size_t>(width) * 3 / 4);
   std::vector<double> times;
   mock::Shot shot;
   for (Duration t{}; t < drive.duration(); t = t + Duration::milliseconds(1500)) {
@@ -53,8 +55,8 @@ void measure(const std::shared_ptr<const mock::World>& world, int width) {
   std::sort(times.begin(), times.end());
   double sum = 0;
   for (const double v : times) sum += v;
-  std::printf("%4d x %4d  mean %6.1f  median %6.1f  worst %6.1f ms a pair\n", width, width * 3 / 4, sum / static_cast<double>(times.size()),
-              times[times.size() / 2], times.back());
+  std::printf("%4d x %4d  mean %6.1f  median %6.1f  worst %6.1f ms a pair\n", width, width * 3 / 4,
+              sum / static_cast<double>(times.size()), times[times.size() / 2], times.back());
 }
 
 }  // namespace

@@ -6,7 +6,8 @@
 #include "tests/support/session_writer.hpp"
 #include "tests/support/temporary_folder.hpp"
 
-/// report.html of a session of so many frames, from reading its files to the page on the disk. The limit for 33 000 frames is 3 s and 3 MB.
+/// report.html of a session of so many frames, from reading its files to the page on the disk. The
+/// limit for 33 000 frames is 3 s and 3 MB.
 namespace vergence {
 namespace {
 
@@ -17,7 +18,8 @@ void report_of_a_session(benchmark::State& state, bool torn) {
   writer.write(folder.path());
   if (torn) std::filesystem::remove(folder / "summary.json");
   for (auto _ : state) benchmark::DoNotOptimize(app::write_report(folder.path()));
-  state.counters["page_MB"] = static_cast<double>(std::filesystem::file_size(folder / "report.html")) * 1e-6;
+  state.counters["page_MB"] =
+      static_cast<double>(std::filesystem::file_size(folder / "report.html")) * 1e-6;
 }
 
 void whole(benchmark::State& state) { report_of_a_session(state, false); }

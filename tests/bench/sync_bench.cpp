@@ -39,7 +39,8 @@ void stamps(const char* name, Clock clock, double settle, bool feedback, int see
     rig.keep_errors();
     rig.run(settle + 10);
     outside += rig.truth().outside;
-    errors.insert(errors.end(), rig.truth().stamp_errors_us.begin(), rig.truth().stamp_errors_us.end());
+    errors.insert(errors.end(), rig.truth().stamp_errors_us.begin(),
+                  rig.truth().stamp_errors_us.end());
   }
   double sum = 0, mean = 0;
   for (double& e : errors) {
@@ -49,9 +50,11 @@ void stamps(const char* name, Clock clock, double settle, bool feedback, int see
   }
   std::sort(errors.begin(), errors.end());
   const auto n = static_cast<double>(errors.size());
-  std::printf("stamp, %-28s %7zu frames  rms %5.1f us  mean %5.1f us  p99 %5.1f us  max %5.1f us  outside their bound %llu\n", name,
-              errors.size(), std::sqrt(sum / n), mean / n, errors[errors.size() * 99 / 100], errors.back(),
-              static_cast<unsigned long long>(outside));
+  std::printf(
+      "stamp, %-28s %7zu frames  rms %5.1f us  mean %5.1f us  p99 %5.1f us  max %5.1f us  outside "
+      "their bound %llu\n",
+      name, errors.size(), std::sqrt(sum / n), mean / n, errors[errors.size() * 99 / 100],
+      errors.back(), static_cast<unsigned long long>(outside));
 }
 
 void acquisition(double rate, double vary_ms, const char* name, int seeds) {
@@ -68,7 +71,9 @@ void acquisition(double rate, double vary_ms, const char* name, int seeds) {
     worst = std::max(worst, rig.truth().worst_acquisition_s);
     mean += rig.truth().worst_acquisition_s / seeds;
   }
-  std::printf("acquisition, %2.0f Hz, %-26s worst of start, reconnect, reboot: mean %.2f s, worst %.2f s\n", rate, name, mean, worst);
+  std::printf(
+      "acquisition, %2.0f Hz, %-26s worst of start, reconnect, reboot: mean %.2f s, worst %.2f s\n",
+      rate, name, mean, worst);
 }
 
 void ten_hours(std::uint64_t seed) {
@@ -76,20 +81,27 @@ void ten_hours(std::uint64_t seed) {
   o.seed = seed;
   o.lost = 1e-3;
   o.missed = 5e-4;
-  o.gone = {{0, 1000, 1003}, {1, 7000, 7010}, {1, 14000, 14001}, {0, 21000, 21005}, {1, 30000, 30002}};
+  o.gone = {
+      {0, 1000, 1003}, {1, 7000, 7010}, {1, 14000, 14001}, {0, 21000, 21005}, {1, 30000, 30002}};
   o.reboots = {5000, 16000, 27000};
   const auto begin = std::chrono::steady_clock::now();
   PulseRig rig(o, board());
   rig.run(36'000);
-  const double took = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  const double took =
+      std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   const auto& t = rig.truth();
   const SyncCounters c = rig.counters();
   const auto n = [](std::uint64_t v) { return static_cast<unsigned long long>(v); };
-  std::printf("ten hours, seed %llu: %llu pulses, %llu sets, %llu complete, %llu wrong, %llu in doubt; %.1f s\n", n(seed), n(t.pulses),
-              n(t.sets), n(t.complete), n(t.wrong), n(t.unproven), took);
+  std::printf(
+      "ten hours, seed %llu: %llu pulses, %llu sets, %llu complete, %llu wrong, %llu in doubt; "
+      "%.1f s\n",
+      n(seed), n(t.pulses), n(t.sets), n(t.complete), n(t.wrong), n(t.unproven), took);
   for (std::size_t k = 0; k < 2; ++k)
-    std::printf("  camera %zu: lost %llu of %llu, missed triggers %llu of %llu, late %llu, acquisitions %llu, frames given back %llu\n", k,
-                n(c.lost[k]), n(t.lost[k]), n(c.missed_trigger[k]), n(t.missed[k]), n(c.late[k]), n(c.acquisitions[k]), n(c.acquiring[k]));
+    std::printf(
+        "  camera %zu: lost %llu of %llu, missed triggers %llu of %llu, late %llu, acquisitions "
+        "%llu, frames given back %llu\n",
+        k, n(c.lost[k]), n(t.lost[k]), n(c.missed_trigger[k]), n(t.missed[k]), n(c.late[k]),
+        n(c.acquisitions[k]), n(c.acquiring[k]));
 }
 
 }  // namespace
@@ -105,6 +117,7 @@ int main(int argc, char** argv) {
     acquisition(rate, 1, "intervals varied by 1 ms", seeds);
     acquisition(rate, 0, "even intervals, a pause", seeds);
   }
-  for (int seed = 1; seed <= std::max(1, seeds / 10); ++seed) ten_hours(static_cast<std::uint64_t>(seed));
+  for (int seed = 1; seed <= std::max(1, seeds / 10); ++seed)
+    ten_hours(static_cast<std::uint64_t>(seed));
   return 0;
 }

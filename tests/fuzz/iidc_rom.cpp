@@ -1,4 +1,5 @@
-/// Any bytes as a camera's configuration ROM. Entry point of libFuzzer; the unit tests call it with seeded mutations.
+/// Any bytes as a camera's configuration ROM. Entry point of libFuzzer; the unit tests call it with
+/// seeded mutations.
 #include <cstddef>
 #include <cstdint>
 #include <cstdlib>
@@ -11,12 +12,14 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace vergence::iidc;
-  std::vector<std::uint32_t> quadlets(size / 4);  // exactly so many: a read behind the last one is found by ASan
+  std::vector<std::uint32_t> quadlets(
+      size / 4);  // exactly so many: a read behind the last one is found by ASan
   if (!quadlets.empty()) std::memcpy(quadlets.data(), data, quadlets.size() * 4);
   ConfigRom rom;
   rom.guid = 77;
   const RomStatus status = parse_config_rom(quadlets, &rom);
-  if (status != RomStatus::ok && rom.guid != 77) std::abort();  // a refused ROM leaves the result alone
+  if (status != RomStatus::ok && rom.guid != 77)
+    std::abort();  // a refused ROM leaves the result alone
   if (status == RomStatus::ok) {
     if (rom.vendor.back() != 0 || rom.model.back() != 0) std::abort();  // texts end
     if (rom.command_base < kRegisterSpace || rom.command_base >= 0x1'0000'0000'0000) std::abort();

@@ -1,4 +1,5 @@
-/// Any bytes as an image file. Entry point of libFuzzer; the unit tests call it with seeded mutations.
+/// Any bytes as an image file. Entry point of libFuzzer; the unit tests call it with seeded
+/// mutations.
 #include <cstddef>
 #include <cstdint>
 #include <cstdlib>
@@ -12,10 +13,12 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   using namespace vergence::app;
   constexpr std::size_t kMostPixels = 1U << 20;
   constexpr std::uint8_t kFence = 0xa5;
-  const std::vector<std::uint8_t> bytes(data, data + size);  // exactly so many: a read behind the last one is found by ASan
+  const std::vector<std::uint8_t> bytes(
+      data, data + size);  // exactly so many: a read behind the last one is found by ASan
   ImageSize claimed;
   if (check_image(bytes, &claimed) != ImageFileStatus::ok) return 0;
-  const auto width = static_cast<std::size_t>(claimed.width), height = static_cast<std::size_t>(claimed.height);
+  const auto width = static_cast<std::size_t>(claimed.width),
+             height = static_cast<std::size_t>(claimed.height);
   if (width * height > kMostPixels) return 0;
   const std::size_t stride = width + 8;
   std::vector<std::uint8_t> out(stride * height, kFence);

@@ -22,7 +22,8 @@ constexpr auto kLook = std::chrono::milliseconds(20);
 
 Emulator::Emulator(const std::string& program, std::vector<std::string> arguments) {
   const char* folder = std::getenv("VERGENCE_RIGS");
-  const std::string path = (folder != nullptr ? std::string(folder) + "/" : std::string()) + program;
+  const std::string path =
+      (folder != nullptr ? std::string(folder) + "/" : std::string()) + program;
   static int number = 0;
   const std::string ready = "/run/ready-" + std::to_string(++number);
   arguments.insert(arguments.begin(), path);
@@ -32,7 +33,8 @@ Emulator::Emulator(const std::string& program, std::vector<std::string> argument
   words.push_back(nullptr);
 
   std::array<int, 2> in{}, out{};
-  if (::pipe2(in.data(), O_CLOEXEC) != 0 || ::pipe2(out.data(), O_CLOEXEC) != 0) throw std::runtime_error("no pipe for " + path);
+  if (::pipe2(in.data(), O_CLOEXEC) != 0 || ::pipe2(out.data(), O_CLOEXEC) != 0)
+    throw std::runtime_error("no pipe for " + path);
   pid_ = ::fork();
   if (pid_ == 0) {
     (void)::dup2(in[0], 0);
@@ -69,7 +71,8 @@ std::string Emulator::finish() {
     (void)!::write(commands_, "quit\n", 5);
     (void)::close(commands_);
     std::array<char, 512> piece{};
-    for (ssize_t n = 0; (n = ::read(report_, piece.data(), piece.size())) > 0;) report.append(piece.data(), static_cast<std::size_t>(n));
+    for (ssize_t n = 0; (n = ::read(report_, piece.data(), piece.size())) > 0;)
+      report.append(piece.data(), static_cast<std::size_t>(n));
     (void)::close(report_);
     (void)::waitpid(pid_, nullptr, 0);
     commands_ = report_ = -1;
@@ -82,7 +85,8 @@ std::int64_t count_of(const std::string& report, int camera, std::string_view wo
   const std::string name = "camera " + std::to_string(camera) + " ";
   for (std::string line; std::getline(lines, line);) {
     const std::size_t at = line.find(name);
-    const std::size_t key = at == std::string::npos ? at : line.find(" " + std::string(word) + " ", at);
+    const std::size_t key =
+        at == std::string::npos ? at : line.find(" " + std::string(word) + " ", at);
     if (key != std::string::npos) return std::atoll(line.c_str() + key + word.size() + 2);
   }
   return -1;

@@ -13,16 +13,19 @@ namespace vergence::test {
 ///
 /// Ownership  The process is ended by finish() or the destructor.
 /// Threads    One.
-/// Errors     The constructor throws std::runtime_error when the program is missing or its devices are not ready in ten seconds.
+/// Errors     The constructor throws std::runtime_error when the program is missing or its devices
+///            are not ready in ten seconds.
 class Emulator {
  public:
-  /// `program`: sim_1394, sim_usb_iidc, sim_ftdi; looked for in the folder VERGENCE_RIGS names. Returns when its devices are there.
+  /// `program`: sim_1394, sim_usb_iidc, sim_ftdi; looked for in the folder VERGENCE_RIGS names.
+  /// Returns when its devices are there.
   explicit Emulator(const std::string& program, std::vector<std::string> arguments = {});
   ~Emulator();
   Emulator(const Emulator&) = delete;
   Emulator& operator=(const Emulator&) = delete;
 
-  /// One line to its standard input: "drop 0 3". Takes effect within a millisecond or two of the emulator's time.
+  /// One line to its standard input: "drop 0 3". Takes effect within a millisecond or two of the
+  /// emulator's time.
   void command(std::string_view line);
   /// Ends it. → all it printed: what each camera exposed and sent.
   [[nodiscard]] std::string finish();
@@ -33,7 +36,8 @@ class Emulator {
   int report_ = -1;    // its standard output
 };
 
-/// The number after `word` in the report's line about a camera: count_of(report, 1, "exposed"). −1: not there.
+/// The number after `word` in the report's line about a camera: count_of(report, 1, "exposed"). −1:
+/// not there.
 [[nodiscard]] std::int64_t count_of(const std::string& report, int camera, std::string_view word);
 
 }  // namespace vergence::test

@@ -57,7 +57,8 @@ void render_film(const std::filesystem::path& folder, const FilmOptions& o) {
   mock::DriveOptions way;
   way.kind = mock::DriveKind::brief;
   way.speed = o.speed;
-  const mock::RigTruth truth(std::make_shared<const mock::World>(mock::WorldOptions{}), way, rig(), mock::default_T_body_left(), {}, {});
+  const mock::RigTruth truth(std::make_shared<const mock::World>(mock::WorldOptions{}), way, rig(),
+                             mock::default_T_body_left(), {}, {});
   std::ofstream poses(folder / "truth.txt");
   poses << std::setprecision(17);
   const auto time = [&](int n) { return Duration::seconds(o.start_s + n / o.rate_hz); };
@@ -75,14 +76,18 @@ void render_film(const std::filesystem::path& folder, const FilmOptions& o) {
     for (int n = 0; n < o.pairs; ++n) {
       mock::Shot shot;
       shot.noise_seed = static_cast<std::uint32_t>(2 * n + 1) + static_cast<std::uint32_t>(k);
-      renderer.render(truth.camera_in_enu(static_cast<int>(k), time(n)).inverse(), shot, image.data(), kFilmWidth);
-      out.write(reinterpret_cast<const char*>(image.data()), static_cast<std::streamsize>(image.size()));
+      renderer.render(truth.camera_in_enu(static_cast<int>(k), time(n)).inverse(), shot,
+                      image.data(), kFilmWidth);
+      out.write(reinterpret_cast<const char*>(image.data()),
+                static_cast<std::streamsize>(image.size()));
     }
-    if (!out.flush()) throw std::runtime_error(image_file(folder, k).string() + ": cannot be written");
+    if (!out.flush())
+      throw std::runtime_error(image_file(folder, k).string() + ": cannot be written");
   }
   std::ofstream done(folder / "film.txt");
   done << key_of(o) << "\n";
-  if (!poses.flush() || !done.flush()) throw std::runtime_error(folder.string() + ": cannot be written");
+  if (!poses.flush() || !done.flush())
+    throw std::runtime_error(folder.string() + ": cannot be written");
 }
 
 Film::Film(const std::filesystem::path& folder) {
@@ -97,7 +102,8 @@ Film::Film(const std::filesystem::path& folder) {
     in >> T.t.x() >> T.t.y() >> T.t.z();
     if (in) truth_.push_back(T);
   }
-  if (truth_.empty() || images_[0].size() != truth_.size() * kImageBytes || images_[1].size() != images_[0].size())
+  if (truth_.empty() || images_[0].size() != truth_.size() * kImageBytes ||
+      images_[1].size() != images_[0].size())
     throw std::runtime_error(folder.string() + ": no film, or not all of it");
 }
 

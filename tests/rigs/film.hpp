@@ -9,10 +9,12 @@
 
 namespace vergence::test {
 
-/// A rendered drive as files, made once on this machine and played into emulated cameras: cameraK.raw (8-bit images of one size, one
-/// after the other) and truth.txt (of every image T_first_left: rotation by rows and translation, metres).
+/// A rendered drive as files, made once on this machine and played into emulated cameras:
+/// cameraK.raw (8-bit images of one size, one after the other) and truth.txt (of every image
+/// T_first_left: rotation by rows and translation, metres).
 ///
-/// The rig is the one that `rig.nominal` of app/config/mock.yaml describes: two parallel cameras 0.75 m apart.
+/// The rig is the one that `rig.nominal` of app/config/mock.yaml describes: two parallel cameras
+/// 0.75 m apart.
 struct FilmOptions {
   int pairs = 100;
   double rate_hz = 10;
@@ -33,7 +35,9 @@ class Film {
   /// The last image stays.
   [[nodiscard]] std::span<const std::uint8_t> image(std::size_t camera, std::uint64_t number) const;
   /// p_first = T · p_left, at that image.
-  [[nodiscard]] const Transform& T_first_left(std::size_t number) const { return truth_.at(number); }
+  [[nodiscard]] const Transform& T_first_left(std::size_t number) const {
+    return truth_.at(number);
+  }
 
  private:
   std::vector<std::uint8_t> images_[2];

@@ -18,9 +18,11 @@ namespace vergence::test {
 namespace {
 
 constexpr std::uint32_t kBuffers = 4;
-// The frames of 59.94 Hz come 25 ms apart: the kernel of the rig counts time in ticks of 10 ms, of which one or two are rounded up.
+// The frames of 59.94 Hz come 25 ms apart: the kernel of the rig counts time in ticks of 10 ms, of
+// which one or two are rounded up.
 constexpr std::int64_t kFrame_ns = 25'000'000;
-// From a buffer's filling to its time: those before it in the queue, and half a frame of what is not known.
+// From a buffer's filling to its time: those before it in the queue, and half a frame of what is
+// not known.
 constexpr std::int64_t kAhead_ns = (kBuffers - 1) * kFrame_ns + kFrame_ns / 2;
 
 [[noreturn]] void fail(const std::string& node, const std::string& what, int error) {
@@ -33,7 +35,8 @@ v4l2::UniqueFd open_rw(const std::string& node) {
   return fd;
 }
 
-void must(const std::string& node, int fd, unsigned long request, void* argument, const char* what) {
+void must(const std::string& node, int fd, unsigned long request, void* argument,
+          const char* what) {
   if (const int error = v4l2::control(fd, request, argument); error != 0) fail(node, what, error);
 }
 
@@ -66,7 +69,9 @@ void set_control(const std::string& node, const std::string& key, std::int64_t v
   v4l2::Controls controls;
   controls.add(fd.get());
   const v4l2::Control* c = controls.find(key);
-  if (c == nullptr) throw std::runtime_error(node + ": there is no control " + key + "; it has " + controls.keys(200));
+  if (c == nullptr)
+    throw std::runtime_error(node + ": there is no control " + key + "; it has " +
+                             controls.keys(200));
   if (const int error = v4l2::write(*c, value); error != 0) fail(node, key, error);
 }
 
@@ -77,7 +82,8 @@ void loop(const std::string& capture, const std::string& output) {
   set_control(capture, "osd_text_mode", 2);  // else the frame's number is written over the image
 }
 
-VividPlayer::VividPlayer(const std::vector<std::string>& outputs, std::int64_t interval_ns, Draw draw)
+VividPlayer::VividPlayer(const std::vector<std::string>& outputs, std::int64_t interval_ns,
+                         Draw draw)
     : interval_ns_(interval_ns), draw_(std::move(draw)) {
   for (const std::string& node : outputs) {
     Output out;
@@ -89,7 +95,9 @@ VividPlayer::VividPlayer(const std::vector<std::string>& outputs, std::int64_t i
     f.fmt.pix.pixelformat = V4L2_PIX_FMT_GREY;
     f.fmt.pix.field = V4L2_FIELD_NONE;
     must(node, out.fd.get(), VIDIOC_S_FMT, &f, "format");
-    if (f.fmt.pix.width != kWidth || f.fmt.pix.height != kHeight || f.fmt.pix.bytesperline != kWidth) fail(node, "640 x 480", EINVAL);
+    if (f.fmt.pix.width != kWidth || f.fmt.pix.height != kHeight ||
+        f.fmt.pix.bytesperline != kWidth)
+      fail(node, "640 x 480", EINVAL);
     v4l2_requestbuffers ask{};
     ask.count = kBuffers;
     ask.type = V4L2_BUF_TYPE_VIDEO_OUTPUT;
@@ -98,9 +106,11 @@ VividPlayer::VividPlayer(const std::vector<std::string>& outputs, std::int64_t i
     for (std::uint32_t i = 0; i < ask.count; ++i) {
       v4l2_buffer b = description(i);
       must(node, out.fd.get(), VIDIOC_QUERYBUF, &b, "buffer");
-      void* at = ::mmap(nullptr, b.length, PROT_READ | PROT_WRITE, MAP_SHARED, out.fd.get(), b.m.offset);
+      void* at =
+          ::mmap(nullptr, b.length, PROT_READ | PROT_WRITE, MAP_SHARED, out.fd.get(), b.m.offset);
       if (at == MAP_FAILED) fail(node, "mmap", errno);
-      out.buffers.push_back(std::span(static_cast<std::uint8_t*>(at), b.length).first(static_cast<std::size_t>(kWidth) * kHeight));
+      out.buffers.push_back(std::span(static_cast<std::uint8_t*>(at), b.length)
+                                .first(static_cast<std::size_t>(kWidth) * kHeight));
     }
     outputs_.push_back(std::move(out));
   }
@@ -128,7 +138,9 @@ void VividPlayer::stop() {
 }
 
 void VividPlayer::feed() {
-  const auto due = [this] { return static_cast<std::uint64_t>((now_ns() + kAhead_ns - interval_ns_ / 2) / interval_ns_); };
+  const auto due = [this] {
+    return static_cast<std::uint64_t>((now_ns() + kAhead_ns - interval_ns_ / 2) / interval_ns_);
+  };
   const std::uint64_t first = due();
   std::vector<pollfd> looks;
   for (const Output& out : outputs_) looks.push_back({out.fd.get(), POLLOUT, 0});
@@ -144,7 +156,10 @@ void VividPlayer::feed() {
         if (v4l2::control(out.fd.get(), VIDIOC_QBUF, &b) != 0) return;
       }
     }
-    shown_ = std::min_element(outputs_.begin(), outputs_.end(), [](const Output& a, const Output& b) { return a.last < b.last; })->last;
+    shown_ =
+        std::min_element(outputs_.begin(), outputs_.end(), [](const Output& a, const Output& b) {
+          return a.last < b.last;
+        })->last;
   }
 }
 

@@ -9,27 +9,32 @@
 
 #include "drivers/v4l2/node.hpp"
 
-/// The kernel's test camera, from its far side: buttons that break it, and an output that is looped to its input.
+/// The kernel's test camera, from its far side: buttons that break it, and an output that is looped
+/// to its input.
 namespace vergence::test {
 
-/// Sets a control of a node by its key ("disconnect", "inject_fatal_streaming_error", "percentage_of_dropped_buffers"). Throws
-/// std::runtime_error when there is none, or it takes no such value.
+/// Sets a control of a node by its key ("disconnect", "inject_fatal_streaming_error",
+/// "percentage_of_dropped_buffers"). Throws std::runtime_error when there is none, or it takes no
+/// such value.
 void set_control(const std::string& node, const std::string& key, std::int64_t value = 1);
 
 /// Makes /dev/videoCAPTURE show what /dev/videoOUTPUT is given: 640 x 480 GREY at 59.94 Hz on both.
 void loop(const std::string& capture, const std::string& output);
 
-/// Feeds outputs of looped cameras from a thread, all at once: each shows the same image number until the next is due.
+/// Feeds outputs of looped cameras from a thread, all at once: each shows the same image number
+/// until the next is due.
 ///
-/// Ownership  `draw` is called from the thread for every image of every output until stop(); `image` is 640 x 480, rows without padding.
+/// Ownership  `draw` is called from the thread for every image of every output until stop();
+///            `image` is 640 x 480, rows without padding.
 /// Errors     The constructor throws std::runtime_error naming the node.
 class VividPlayer {
  public:
   static constexpr int kWidth = 640, kHeight = 480;
-  using Draw = std::function<void(std::size_t output, std::uint64_t number, std::span<std::uint8_t> image)>;
+  using Draw =
+      std::function<void(std::size_t output, std::uint64_t number, std::span<std::uint8_t> image)>;
 
-  /// Image n is shown from (n + 1/2) interval_ns of CLOCK_MONOTONIC on, `first` being the one now due: halfway between the
-  /// multiples of the interval, at which a thinned camera looks.
+  /// Image n is shown from (n + 1/2) interval_ns of CLOCK_MONOTONIC on, `first` being the one now
+  /// due: halfway between the multiples of the interval, at which a thinned camera looks.
   VividPlayer(const std::vector<std::string>& outputs, std::int64_t interval_ns, Draw draw);
   ~VividPlayer();
   VividPlayer(const VividPlayer&) = delete;

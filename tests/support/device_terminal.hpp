@@ -27,11 +27,13 @@ namespace vergence::test {
 
 /// A simulated device in real time on a descriptor: the far end of a serial line.
 ///
-/// Ownership  Takes the descriptor and the device. Threads: one of its own, on which alone the device is used, from construction to
+/// Ownership  Takes the descriptor and the device. Threads: one of its own, on which alone the
+///            device is used, from construction to
 /// destruction.
 class DeviceOnDescriptor {
  public:
-  DeviceOnDescriptor(int descriptor, std::unique_ptr<mock::DeviceModel> device) : descriptor_(descriptor), device_(std::move(device)) {
+  DeviceOnDescriptor(int descriptor, std::unique_ptr<mock::DeviceModel> device)
+      : descriptor_(descriptor), device_(std::move(device)) {
     if (descriptor_ < 0) throw std::runtime_error("no terminal for the simulated device");
     thread_ = std::thread([this] { work(); });
   }
@@ -47,8 +49,11 @@ class DeviceOnDescriptor {
   void work() {
     while (!stop_) {
       std::vector<std::uint8_t> out;
-      for (auto next = device_->next(); next && *next <= monotonic_now(); next = device_->next()) device_->produce(monotonic_now(), &out);
-      if (!out.empty()) (void)!::write(descriptor_, out.data(), out.size());  // a line that nobody reads drops bytes
+      for (auto next = device_->next(); next && *next <= monotonic_now(); next = device_->next())
+        device_->produce(monotonic_now(), &out);
+      if (!out.empty())
+        (void)!::write(descriptor_, out.data(),
+                       out.size());  // a line that nobody reads drops bytes
       pollfd p{descriptor_, POLLIN, 0};
       if (::poll(&p, 1, 1) <= 0) continue;
       std::array<std::uint8_t, 512> in{};

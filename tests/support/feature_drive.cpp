@@ -21,7 +21,9 @@ constexpr std::array<double, 6> kFieldRms{1.0, 0.57735, 0.57735, 0.29814, 0.3333
 
 /// Uniform in [0, 1) from what a thing is: the street is the same whenever one looks.
 double draw(std::uint64_t seed, std::int64_t block, std::uint64_t what) {
-  std::uint64_t z = seed * 0x9E3779B97F4A7C15ULL + static_cast<std::uint64_t>(block) * 0xBF58476D1CE4E5B9ULL + what * 0x94D049BB133111EBULL;
+  std::uint64_t z = seed * 0x9E3779B97F4A7C15ULL +
+                    static_cast<std::uint64_t>(block) * 0xBF58476D1CE4E5B9ULL +
+                    what * 0x94D049BB133111EBULL;
   for (int i = 0; i < 2; ++i) z = (z ^ (z >> 30U)) * 0xBF58476D1CE4E5B9ULL, z ^= z >> 27U;
   return static_cast<double>(z >> 11U) * 0x1.0p-53;
 }
@@ -38,7 +40,9 @@ FeatureDrive::FeatureDrive(const FeatureDriveOptions& options)
   tracks_.reserve(static_cast<std::size_t>(options.tracks));
 }
 
-Stamp FeatureDrive::stamp() const noexcept { return Stamp(static_cast<std::int64_t>(static_cast<double>(frame_) * 1e9 / options_.rate)); }
+Stamp FeatureDrive::stamp() const noexcept {
+  return Stamp(static_cast<std::int64_t>(static_cast<double>(frame_) * 1e9 / options_.rate));
+}
 
 void FeatureDrive::next() {
   if (started_) ++frame_;
@@ -48,7 +52,10 @@ void FeatureDrive::next() {
   T_right_left_ = options_.T_right_left;
   for (const RigChange& c : options_.changes) {
     if (frame_ < c.frame) continue;
-    const double share = c.over == 0 ? 1.0 : std::min(1.0, static_cast<double>(frame_ - c.frame) / static_cast<double>(c.over));
+    const double share =
+        c.over == 0
+            ? 1.0
+            : std::min(1.0, static_cast<double>(frame_ - c.frame) / static_cast<double>(c.over));
     T_right_left_ = perturbed(T_right_left_, share * c.rotation, share * c.translation);
   }
   double lag = 0;
@@ -73,7 +80,9 @@ void FeatureDrive::next() {
     Point p;
     FeatureTrack t;
     if (!new_point(&p) || !sight(&p, &t)) continue;
-    if (!started_) p.life = 1 + static_cast<int>(random_.below(static_cast<std::uint32_t>(p.life)));  // not all born in the first frame
+    if (!started_)
+      p.life = 1 + static_cast<int>(random_.below(
+                       static_cast<std::uint32_t>(p.life)));  // not all born in the first frame
     points_.push_back(p);
     tracks_.push_back(t);
   }
@@ -91,37 +100,46 @@ void FeatureDrive::move() {
     speed_ += std::clamp(wanted - speed_, -kAcceleration * dt, kAcceleration * dt);
     rocked_s_ += dt * std::min(1.0, speed_ / 2.0);
   }
-  const auto wave = [&](double hertz, std::size_t phase) { return std::sin(2 * std::numbers::pi * hertz * rocked_s_ + phases_[phase]); };
+  const auto wave = [&](double hertz, std::size_t phase) {
+    return std::sin(2 * std::numbers::pi * hertz * rocked_s_ + phases_[phase]);
+  };
   constexpr double kWeave = 0.14;  // Hz
   const double a = options_.rocking;
   const double pitch = a * 0.3 * kDegree * (0.6 * wave(1.1, 0) + 0.4 * wave(1.7, 1));
   const double roll = a * 0.35 * kDegree * (0.6 * wave(0.8, 2) + 0.4 * wave(1.4, 3));
   const double heave = a * 0.015 * wave(1.3, 4);
-  const double heading = a * 1.7 * kDegree / (2 * std::numbers::pi * kWeave) * wave(kWeave, 5) - 0.005 * x_;  // back to the middle
+  const double heading = a * 1.7 * kDegree / (2 * std::numbers::pi * kWeave) * wave(kWeave, 5) -
+                         0.005 * x_;  // back to the middle
   if (started_) {
     x_ += speed_ * dt * std::sin(heading);
     z_ += speed_ * dt * std::cos(heading);
   }
-  const Mat3 R_world_left = exp_so3({0, heading, 0}) * exp_so3({pitch, 0, 0}) * exp_so3({0, 0, roll});
+  const Mat3 R_world_left =
+      exp_so3({0, heading, 0}) * exp_so3({pitch, 0, 0}) * exp_so3({0, 0, roll});
   poses_[1] = poses_[0];
   poses_[0] = Transform{R_world_left, {x_, -kHeight + heave, z_}}.inverse();
 }
 
 void FeatureDrive::wander() {
-  const double keep = std::exp(-1.0 / (options_.rate * options_.bias_s)), add = std::sqrt(1 - keep * keep);
+  const double keep = std::exp(-1.0 / (options_.rate * options_.bias_s)),
+               add = std::sqrt(1 - keep * keep);
   for (Field& f : field_)
     for (double& a : f) a = keep * a + add * random_.normal();
 }
 
-Transform FeatureDrive::pose_at(double frames_ago) const noexcept { return interpolate(poses_[0], poses_[1], frames_ago); }
+Transform FeatureDrive::pose_at(double frames_ago) const noexcept {
+  return interpolate(poses_[0], poses_[1], frames_ago);
+}
 
 bool FeatureDrive::project(const Vec3& p_world, Vec2* left, Vec2* right) const noexcept {
   const auto into = [this](const Vec3& q, const Pinhole& k, Vec2* pixel) {
     if (q.z() < 0.5 * kBonnet) return false;
     *pixel = {k.fx * q.x() / q.z() + k.cx, k.fy * q.y() / q.z() + k.cy};
-    return pixel->x() >= 0 && pixel->y() >= 0 && pixel->x() <= options_.width - 1 && pixel->y() <= options_.height - 1;
+    return pixel->x() >= 0 && pixel->y() >= 0 && pixel->x() <= options_.width - 1 &&
+           pixel->y() <= options_.height - 1;
   };
-  return into(T_left_world_ * p_world, options_.left, left) && into(T_right_world_ * p_world, options_.right, right);
+  return into(T_left_world_ * p_world, options_.left, left) &&
+         into(T_right_world_ * p_world, options_.right, right);
 }
 
 bool FeatureDrive::sight(Point* point, FeatureTrack* track) {
@@ -132,7 +150,8 @@ bool FeatureDrive::sight(Point* point, FeatureTrack* track) {
   std::array<double, 4> e{};
   for (std::size_t i = 0; i < 4; ++i) {
     p.walked[i] += options_.walk_px * random_.normal();
-    e[i] = options_.constant_px * p.constant[i] + p.walked[i] + options_.white_px * random_.normal();
+    e[i] =
+        options_.constant_px * p.constant[i] + p.walked[i] + options_.white_px * random_.normal();
   }
   track->id = p.id;
   track->left = left + Vec2(e[0], e[1]);
@@ -146,15 +165,17 @@ bool FeatureDrive::sight(Point* point, FeatureTrack* track) {
 bool FeatureDrive::new_point(Point* p) {
   const Transform T_world_left = T_left_world_.inverse();
   for (int i = 0; i < kTries; ++i) {
-    const Vec2 pixel(random_.uniform(0, options_.width - 1), random_.uniform(0, options_.height - 1));
-    const Vec3 ray((pixel.x() - options_.left.cx) / options_.left.fx, (pixel.y() - options_.left.cy) / options_.left.fy, 1);
+    const Vec2 pixel(random_.uniform(0, options_.width - 1),
+                     random_.uniform(0, options_.height - 1));
+    const Vec3 ray((pixel.x() - options_.left.cx) / options_.left.fx,
+                   (pixel.y() - options_.left.cy) / options_.left.fy, 1);
     Vec2 left, right;
     if (!hit(T_world_left.t, T_world_left.R * ray, &p->p_world)) continue;
     if (p->p_world.y() > -1e-6 && random_.uniform() >= kGroundKept) continue;
     if (!project(p->p_world, &left, &right)) continue;
     p->id = next_id_++;
-    p->life = options_.shortest_life +
-              static_cast<int>(random_.below(static_cast<std::uint32_t>(options_.longest_life - options_.shortest_life + 1)));
+    p->life = options_.shortest_life + static_cast<int>(random_.below(static_cast<std::uint32_t>(
+                                           options_.longest_life - options_.shortest_life + 1)));
     for (double& c : p->constant) c = random_.normal();
     const double kind = random_.uniform();
     if (kind < options_.outliers) {
@@ -171,7 +192,8 @@ bool FeatureDrive::new_point(Point* p) {
 
 bool FeatureDrive::hit(const Vec3& origin, const Vec3& ray, Vec3* p) const noexcept {
   double nearest = 1e9;
-  const auto try_at = [&](double along, double low_z, double high_z, double height) {  // a wall x = const
+  const auto try_at = [&](double along, double low_z, double high_z,
+                          double height) {  // a wall x = const
     if (!(along > 0) || along >= nearest) return;
     const Vec3 q = origin + along * ray;
     if (q.z() < low_z || q.z() > high_z || q.y() > 0 || q.y() < -height) return;
@@ -181,13 +203,16 @@ bool FeatureDrive::hit(const Vec3& origin, const Vec3& ray, Vec3* p) const noexc
   const auto first = static_cast<std::int64_t>(std::floor(origin.z() / kBlock));
   const std::uint64_t side = ray.x() > 0 ? 1 : 0;  // the camera is between the walls
   const double sign = side == 1 ? 1.0 : -1.0;
-  for (std::int64_t block = first; block < first + kBlocksAhead && std::abs(ray.x()) > 1e-9; ++block) {
+  for (std::int64_t block = first; block < first + kBlocksAhead && std::abs(ray.x()) > 1e-9;
+       ++block) {
     const auto of = [&](std::uint64_t what) { return draw(options_.seed, block, 2 * what + side); };
     const double z = kBlock * static_cast<double>(block);
-    if (of(0) < 0.8) try_at((sign * (5 + 10 * of(1)) - origin.x()) / ray.x(), z, z + kBlock, 4 + 6 * of(2));
+    if (of(0) < 0.8)
+      try_at((sign * (5 + 10 * of(1)) - origin.x()) / ray.x(), z, z + kBlock, 4 + 6 * of(2));
     if (of(3) < 0.35) try_at((sign * (3 + of(4)) - origin.x()) / ray.x(), z + 3, z + 7.5, 1.5);
   }
-  const double backdrop = (60 + 40 * draw(options_.seed, first, 10) - std::fmod(origin.z(), kBlock)) / ray.z();
+  const double backdrop =
+      (60 + 40 * draw(options_.seed, first, 10) - std::fmod(origin.z(), kBlock)) / ray.z();
   const bool in_front = ray.z() > 0 && backdrop < nearest;
   if (in_front && origin.y() + backdrop * ray.y() < -kBackdropHeight) return false;
   if (in_front) nearest = backdrop;
@@ -197,10 +222,12 @@ bool FeatureDrive::hit(const Vec3& origin, const Vec3& ray, Vec3* p) const noexc
 }
 
 Vec2 FeatureDrive::bias_at(const Vec2& right) const noexcept {
-  const double x = 2 * right.x() / (options_.width - 1) - 1, y = 2 * right.y() / (options_.height - 1) - 1;
+  const double x = 2 * right.x() / (options_.width - 1) - 1,
+               y = 2 * right.y() / (options_.height - 1) - 1;
   const std::array<double, 6> basis{1, x, y, x * x - 1.0 / 3, x * y, y * y - 1.0 / 3};
   Vec2 b = Vec2::Zero();
-  for (std::size_t i = 0; i < 6; ++i) b += basis[i] / kFieldRms[i] * Vec2(field_[0][i], field_[1][i]);
+  for (std::size_t i = 0; i < 6; ++i)
+    b += basis[i] / kFieldRms[i] * Vec2(field_[0][i], field_[1][i]);
   return options_.bias_px / std::sqrt(6.0) * b;
 }
 

@@ -11,7 +11,8 @@
 
 namespace vergence::test {
 
-/// A change of the true T_right_left: R ← Exp(φ) R, t ← t + τ, growing from nothing at `frame` to the whole `over` frames later.
+/// A change of the true T_right_left: R ← Exp(φ) R, t ← t + τ, growing from nothing at `frame` to
+/// the whole `over` frames later.
 struct RigChange {
   std::uint64_t frame = 0;          // the first frame that is different
   Vec3 rotation = Vec3::Zero();     // φ, rad
@@ -19,34 +20,40 @@ struct RigChange {
   std::uint64_t over = 0;           // frames; 0: a knock
 };
 
-/// From `frame` on the right camera exposes `frames` frames late (negative: the left one does); −1 … 1.
+/// From `frame` on the right camera exposes `frames` frames late (negative: the left one does); −1
+/// … 1.
 struct LagChange {
   std::uint64_t frame = 0;
   double frames = 0;
 };
 
 struct FeatureDriveOptions {
-  int width = 1024, height = 768;          // px
-  Pinhole left{1247, 1247, 511.5, 383.5};  // true; a test that wants wrong intrinsics reckons with others
+  int width = 1024, height = 768;  // px
+  Pinhole left{1247, 1247, 511.5,
+               383.5};  // true; a test that wants wrong intrinsics reckons with others
   Pinhole right{1247, 1247, 511.5, 383.5};
   Transform T_right_left{exp_so3({5e-3, -8e-3, 3e-3}), {-0.75, 0, 0}};  // true, before any change
   double rate = 30;                                                     // Hz
-  int tracks = 300;                                                     // alive in every frame, seen by both cameras
-  int shortest_life = 5, longest_life = 20;                             // frames
-  double speed = 8;                                                     // m/s when driving
-  double drive_s = 0, stop_s = 0;                                       // drives so long, stands so long, again and again; 0: never stops
-  double rocking = 1;                                                   // of pitch ±0.3°, roll ±0.35°, heave ±15 mm, heading ±1.7°/s
-  double white_px = 0.3, constant_px = 0.3, walk_px = 0.1;  // each camera's coordinate: every frame, every track, a step a frame
-  double sigma_px = 0.5;                                    // what a track says of itself
-  double outliers = 0.05;                                   // share of tracks 3 to 30 px off in the right image
-  double movers = 0.03;                                     // share of tracks on things that move by themselves, up to 10 m/s
-  double bias_px = 0.02, bias_s = 10;                       // smooth error field in the right image: rms of a coordinate, time constant
+  int tracks = 300;                          // alive in every frame, seen by both cameras
+  int shortest_life = 5, longest_life = 20;  // frames
+  double speed = 8;                          // m/s when driving
+  double drive_s = 0,
+         stop_s = 0;   // drives so long, stands so long, again and again; 0: never stops
+  double rocking = 1;  // of pitch ±0.3°, roll ±0.35°, heave ±15 mm, heading ±1.7°/s
+  double white_px = 0.3, constant_px = 0.3,
+         walk_px = 0.1;    // each camera's coordinate: every frame, every track, a step a frame
+  double sigma_px = 0.5;   // what a track says of itself
+  double outliers = 0.05;  // share of tracks 3 to 30 px off in the right image
+  double movers = 0.03;    // share of tracks on things that move by themselves, up to 10 m/s
+  double bias_px = 0.02,
+         bias_s = 10;  // smooth error field in the right image: rms of a coordinate, time constant
   std::vector<RigChange> changes;
   std::vector<LagChange> lags;
   std::uint64_t seed = 1;
 };
 
-/// One point in the two images of a frame, as a tracker with the lens model taken out would give it.
+/// One point in the two images of a frame, as a tracker with the lens model taken out would give
+/// it.
 struct FeatureTrack {
   std::uint32_t id = 0;
   Vec2 left, right;       // ideal pixels
@@ -56,8 +63,9 @@ struct FeatureTrack {
   bool wrong = false;           // truth: an outlier or a mover
 };
 
-/// A drive along a street without images: plane of the road, facades, parked cars, backdrop; tracks with the errors of real ones.
-/// The street runs along +z of the world, y down, the road at y = 0, the camera 1.7 m above it.
+/// A drive along a street without images: plane of the road, facades, parked cars, backdrop; tracks
+/// with the errors of real ones. The street runs along +z of the world, y down, the road at y = 0,
+/// the camera 1.7 m above it.
 /// Deterministic: the same options, the same tracks on every platform.
 class FeatureDrive {
  public:
@@ -68,11 +76,19 @@ class FeatureDrive {
 
   [[nodiscard]] std::uint64_t frame() const noexcept { return frame_; }
   [[nodiscard]] Stamp stamp() const noexcept;
-  [[nodiscard]] std::span<const FeatureTrack> tracks() const noexcept { return tracks_; }     // until the next call
-  [[nodiscard]] const Transform& T_left_world() const noexcept { return T_left_world_; }      // true, when the left camera exposed
-  [[nodiscard]] const Transform& T_now_previous() const noexcept { return T_now_previous_; }  // true, of the left camera
-  [[nodiscard]] const Transform& T_right_left() const noexcept { return T_right_left_; }      // true, of this frame
-  [[nodiscard]] double speed() const noexcept { return speed_; }                              // m/s
+  [[nodiscard]] std::span<const FeatureTrack> tracks() const noexcept {
+    return tracks_;
+  }  // until the next call
+  [[nodiscard]] const Transform& T_left_world() const noexcept {
+    return T_left_world_;
+  }  // true, when the left camera exposed
+  [[nodiscard]] const Transform& T_now_previous() const noexcept {
+    return T_now_previous_;
+  }  // true, of the left camera
+  [[nodiscard]] const Transform& T_right_left() const noexcept {
+    return T_right_left_;
+  }                                                               // true, of this frame
+  [[nodiscard]] double speed() const noexcept { return speed_; }  // m/s
   [[nodiscard]] const FeatureDriveOptions& options() const noexcept { return options_; }
 
  private:
@@ -101,8 +117,9 @@ class FeatureDrive {
   std::uint64_t frame_ = 0;
   bool started_ = false;
   std::uint32_t next_id_ = 1;
-  double speed_ = 0, phase_s_ = 0, rocked_s_ = 0;  // m/s; s into the cycle of driving and standing; s of rocking
-  double x_ = 0, z_ = 0;                           // m, of the left camera
+  double speed_ = 0, phase_s_ = 0,
+         rocked_s_ = 0;   // m/s; s into the cycle of driving and standing; s of rocking
+  double x_ = 0, z_ = 0;  // m, of the left camera
   std::array<double, 8> phases_{};
   std::array<Transform, 2> poses_{};  // T_left_world of the vehicle's clock: now, one frame ago
   Transform T_left_world_, T_right_world_, T_now_previous_, T_right_left_;

@@ -24,7 +24,9 @@ double worst(const FeatureDrive& drive) {
   const EpipolarGeometry geometry(drive.T_right_left());
   double most = 0, d = 0;
   for (const FeatureTrack& t : drive.tracks()) {
-    EXPECT_EQ(geometry.to_line(ray(drive.options().left, t.left), ray(drive.options().right, t.right), &d, nullptr), EpipolarStatus::ok);
+    EXPECT_EQ(geometry.to_line(ray(drive.options().left, t.left),
+                               ray(drive.options().right, t.right), &d, nullptr),
+              EpipolarStatus::ok);
     most = std::max(most, std::abs(d) * drive.options().right.fy);
   }
   return most;
@@ -32,7 +34,8 @@ double worst(const FeatureDrive& drive) {
 
 TEST(FeatureDrive, exactTracksFitTheTrueRigThroughAKnockAndADrift) {
   FeatureDriveOptions o = exact();
-  o.changes = {{20, Vec3(0.01, -0.02, 0.005), Vec3(0, 0.003, 0.01), 0}, {40, Vec3(0.002, 0, 0), Vec3::Zero(), 30}};
+  o.changes = {{20, Vec3(0.01, -0.02, 0.005), Vec3(0, 0.003, 0.01), 0},
+               {40, Vec3(0.002, 0, 0), Vec3::Zero(), 30}};
   FeatureDrive drive(o);
   for (int i = 0; i < 80; ++i) {
     drive.next();
@@ -40,11 +43,17 @@ TEST(FeatureDrive, exactTracksFitTheTrueRigThroughAKnockAndADrift) {
     EXPECT_EQ(drive.frame(), static_cast<std::uint64_t>(i));
     for (const FeatureTrack& t : drive.tracks()) {
       const Vec3 p = drive.T_left_world() * t.p_world;
-      EXPECT_LT((Vec2(o.left.fx * p.x() / p.z() + o.left.cx, o.left.fy * p.y() / p.z() + o.left.cy) - t.left).norm(), 1e-6);
+      EXPECT_LT(
+          (Vec2(o.left.fx * p.x() / p.z() + o.left.cx, o.left.fy * p.y() / p.z() + o.left.cy) -
+           t.left)
+              .norm(),
+          1e-6);
     }
   }
-  EXPECT_NEAR(rotation_angle(drive.T_right_left().R * perturbed(o.T_right_left, {0.01, -0.02, 0.005}, Vec3::Zero()).R.transpose()), 0.002,
-              1e-9);
+  EXPECT_NEAR(
+      rotation_angle(drive.T_right_left().R *
+                     perturbed(o.T_right_left, {0.01, -0.02, 0.005}, Vec3::Zero()).R.transpose()),
+      0.002, 1e-9);
 }
 
 TEST(FeatureDrive, keepsItsTracksAliveAsLongAsAsked) {
@@ -60,7 +69,8 @@ TEST(FeatureDrive, keepsItsTracksAliveAsLongAsAsked) {
     EXPECT_LE(frames, 20);
     sum += frames;
   }
-  EXPECT_GT(sum / static_cast<double>(lives.size()), 7.0);  // 12.5 but for those that leave the image
+  EXPECT_GT(sum / static_cast<double>(lives.size()),
+            7.0);  // 12.5 but for those that leave the image
 }
 
 TEST(FeatureDrive, aLaggingCameraFitsTheRigOnlyWhileStanding) {
@@ -84,7 +94,9 @@ TEST(FeatureDrive, errorsHaveTheSizeAskedFor) {
     drive.next();
     for (const FeatureTrack& t : drive.tracks()) {
       const Vec3 p = drive.T_left_world() * t.p_world;
-      sum2 += (Vec2(o.left.fx * p.x() / p.z() + o.left.cx, o.left.fy * p.y() / p.z() + o.left.cy) - t.left).squaredNorm();
+      sum2 += (Vec2(o.left.fx * p.x() / p.z() + o.left.cx, o.left.fy * p.y() / p.z() + o.left.cy) -
+               t.left)
+                  .squaredNorm();
       n += 2;
     }
   }
@@ -99,7 +111,8 @@ TEST(FeatureDrive, theSameOptionsGiveTheSameDrive) {
   for (int i = 0; i < 700; ++i) {
     a.next(), b.next();
     ASSERT_EQ(a.tracks().size(), b.tracks().size());
-    for (std::size_t k = 0; k < a.tracks().size(); ++k) ASSERT_EQ(a.tracks()[k].right, b.tracks()[k].right);
+    for (std::size_t k = 0; k < a.tracks().size(); ++k)
+      ASSERT_EQ(a.tracks()[k].right, b.tracks()[k].right);
     stood = stood || (i > 100 && a.speed() == 0);
   }
   EXPECT_TRUE(stood);

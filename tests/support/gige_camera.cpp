@@ -28,21 +28,29 @@ namespace {
 using namespace gige_register;
 
 constexpr std::uint16_t kControlPort = 3956;
-constexpr std::size_t kLatchedPulses = 256;  // exposed one after the other, stamped with their own time: a busy machine's delays are none
-constexpr std::uint32_t kMemory = 0x40000, kDescription = 0x20000;  // bytes; address of the description in it
-constexpr std::uint32_t kHeartbeat = 0x938, kTicksHigh = 0x93C, kTicksLow = 0x940, kLatch = 0x944, kLatchedHigh = 0x948, kControl = 0xA00,
-                        kStreamPort = 0xD00, kPacketSize = 0xD04, kPacketDelay = 0xD08, kStreamTarget = 0xD18;
+constexpr std::size_t kLatchedPulses = 256;  // exposed one after the other, stamped with their own
+                                             // time: a busy machine's delays are none
+constexpr std::uint32_t kMemory = 0x40000,
+                        kDescription = 0x20000;  // bytes; address of the description in it
+constexpr std::uint32_t kHeartbeat = 0x938, kTicksHigh = 0x93C, kTicksLow = 0x940, kLatch = 0x944,
+                        kLatchedHigh = 0x948, kControl = 0xA00, kStreamPort = 0xD00,
+                        kPacketSize = 0xD04, kPacketDelay = 0xD08, kStreamTarget = 0xD18;
 constexpr std::uint32_t kFireTest = 1U << 31U;
 // Chunks: their numbers, and their places in ChunkSelector.
-constexpr std::uint32_t kImageChunk = 0xA5A50001, kExposureChunk = 0xA5A50002, kTimestampChunk = 0xA5A50003;
+constexpr std::uint32_t kImageChunk = 0xA5A50001, kExposureChunk = 0xA5A50002,
+                        kTimestampChunk = 0xA5A50003;
 constexpr std::uint32_t kSelectExposure = 1, kSelectTimestamp = 2;
 // Status codes of GVCP.
-constexpr std::uint32_t kOk = 0, kNotImplemented = 0x8001, kInvalidParameter = 0x8002, kInvalidAddress = 0x8003, kDenied = 0x8006;
+constexpr std::uint32_t kOk = 0, kNotImplemented = 0x8001, kInvalidParameter = 0x8002,
+                        kInvalidAddress = 0x8003, kDenied = 0x8006;
 
 std::uint32_t from_wire(const std::uint8_t* p) {
-  return static_cast<std::uint32_t>(p[0]) << 24U | static_cast<std::uint32_t>(p[1]) << 16U | static_cast<std::uint32_t>(p[2]) << 8U | p[3];
+  return static_cast<std::uint32_t>(p[0]) << 24U | static_cast<std::uint32_t>(p[1]) << 16U |
+         static_cast<std::uint32_t>(p[2]) << 8U | p[3];
 }
-std::uint32_t from_wire16(const std::uint8_t* p) { return static_cast<std::uint32_t>(p[0]) << 8U | p[1]; }
+std::uint32_t from_wire16(const std::uint8_t* p) {
+  return static_cast<std::uint32_t>(p[0]) << 8U | p[1];
+}
 
 int datagram_socket(const char* address) {
   const int fd = ::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
@@ -50,7 +58,8 @@ int datagram_socket(const char* address) {
   own.sin_family = AF_INET;
   own.sin_port = htons(kControlPort);
   const int on = 1;
-  if (fd >= 0 && ::setsockopt(fd, SOL_SOCKET, SO_REUSEADDR, &on, sizeof on) == 0 && ::inet_pton(AF_INET, address, &own.sin_addr) == 1 &&
+  if (fd >= 0 && ::setsockopt(fd, SOL_SOCKET, SO_REUSEADDR, &on, sizeof on) == 0 &&
+      ::inet_pton(AF_INET, address, &own.sin_addr) == 1 &&
       ::bind(fd, reinterpret_cast<const sockaddr*>(&own), sizeof own) == 0)
     return fd;
   if (fd >= 0) (void)::close(fd);
@@ -87,8 +96,10 @@ class GigeCamera::Impl {
   std::uint64_t ticks(HostStamp host) const {
     if (options.tick_frequency == 0) return 0;
     const double f = static_cast<double>(options.tick_frequency) * 1e-9;
-    const double ns = static_cast<double>(host.ns() - born_.ns()) * (1 + options.clock_drift_ppm * 1e-6);
-    return static_cast<std::uint64_t>(std::llround((static_cast<double>(options.clock_offset_ns) + ns) * f));
+    const double ns =
+        static_cast<double>(host.ns() - born_.ns()) * (1 + options.clock_drift_ppm * 1e-6);
+    return static_cast<std::uint64_t>(
+        std::llround((static_cast<double>(options.clock_offset_ns) + ns) * f));
   }
   bool acquiring() const {
     const std::lock_guard lock(mutex_);
@@ -106,26 +117,38 @@ class GigeCamera::Impl {
  private:
   void answer();
   void handle(int fd, const std::uint8_t* bytes, std::size_t length, const sockaddr_in& from);
-  std::uint32_t write_registers(const std::uint8_t* payload, std::uint32_t length, const sockaddr_in& from);
+  std::uint32_t write_registers(const std::uint8_t* payload, std::uint32_t length,
+                                const sockaddr_in& from);
   std::uint32_t store(std::uint32_t address, std::uint32_t value);
   bool value_fits(std::uint32_t address, std::uint32_t value) const;
   void expose();
   GvspFrame make_frame(std::uint64_t number, HostStamp when);
   void append_chunks(GvspFrame* frame);
   [[nodiscard]] double exposure_of(std::uint64_t number) const;
-  [[nodiscard]] bool has_chunk(std::uint32_t selected) const { return (chunks_enabled_ >> selected & 1U) != 0; }
+  [[nodiscard]] bool has_chunk(std::uint32_t selected) const {
+    return (chunks_enabled_ >> selected & 1U) != 0;
+  }
   void follow_registers();
   [[nodiscard]] bool may_write(const sockaddr_in& from, std::uint32_t address) const;
-  [[nodiscard]] std::uint32_t word(std::uint32_t address) const { return address + 4 <= kMemory ? from_wire(&memory_[address]) : 0; }
-  [[nodiscard]] float real(std::uint32_t address) const { return std::bit_cast<float>(word(address)); }
-  [[nodiscard]] std::uint32_t payload() const {
-    const std::uint32_t pixels = word(width) * word(height) * (word(pixel_format) >> 16U & 0xFFU) / 8;
-    if (word(chunk_mode) == 0) return pixels;
-    return pixels + 8 + (has_chunk(kSelectExposure) ? exposure_bytes() + 8 : 0) + (has_chunk(kSelectTimestamp) ? 16 : 0);
+  [[nodiscard]] std::uint32_t word(std::uint32_t address) const {
+    return address + 4 <= kMemory ? from_wire(&memory_[address]) : 0;
   }
-  [[nodiscard]] std::uint32_t exposure_bytes() const { return options.old_names ? 4 : 8; }  // a float or a double
+  [[nodiscard]] float real(std::uint32_t address) const {
+    return std::bit_cast<float>(word(address));
+  }
+  [[nodiscard]] std::uint32_t payload() const {
+    const std::uint32_t pixels =
+        word(width) * word(height) * (word(pixel_format) >> 16U & 0xFFU) / 8;
+    if (word(chunk_mode) == 0) return pixels;
+    return pixels + 8 + (has_chunk(kSelectExposure) ? exposure_bytes() + 8 : 0) +
+           (has_chunk(kSelectTimestamp) ? 16 : 0);
+  }
+  [[nodiscard]] std::uint32_t exposure_bytes() const {
+    return options.old_names ? 4 : 8;
+  }  // a float or a double
   void put(std::uint32_t address, std::uint32_t value) {
-    for (std::uint32_t i = 0; i < 4; ++i) memory_[address + i] = static_cast<std::uint8_t>(value >> (24U - 8U * i));
+    for (std::uint32_t i = 0; i < 4; ++i)
+      memory_[address + i] = static_cast<std::uint8_t>(value >> (24U - 8U * i));
   }
   void put_text(std::uint32_t address, const std::string& text, std::size_t room) {
     std::memcpy(&memory_[address], text.data(), std::min(text.size(), room - 1));
@@ -137,18 +160,23 @@ class GigeCamera::Impl {
   int control_ = -1, broadcast_ = -1, wake_ = -1;
   bool quit_ = false, powered_ = true, acquiring_ = false, foreign_ = false;
   sockaddr_in controller_{};
-  HostStamp heard_{};                                       // the controller's last word
-  std::deque<std::pair<std::uint64_t, HostStamp>> pulses_;  // triggers not yet served: the image's number, and when
-  std::uint64_t triggered_ = 0;                             // by software
+  HostStamp heard_{};  // the controller's last word
+  std::deque<std::pair<std::uint64_t, HostStamp>>
+      pulses_;                   // triggers not yet served: the image's number, and when
+  std::uint64_t triggered_ = 0;  // by software
   std::uint64_t block_ = 0;
   std::uint32_t chunks_enabled_ = 1;  // bits by ChunkSelector; the image always is
   std::thread answering_, exposing_;
 };
 
 GigeCamera::Impl::Impl(const GigeCameraOptions& o)
-    : options(o), sender(o.address, o.extended_ids, o.loss, o.seed), memory_(kMemory, 0), born_(monotonic_now()) {
+    : options(o),
+      sender(o.address, o.extended_ids, o.loss, o.seed),
+      memory_(kMemory, 0),
+      born_(monotonic_now()) {
   control_ = datagram_socket(o.address.c_str());
-  if (control_ < 0) throw std::runtime_error("simulated camera: " + o.address + " port 3956 is in use");
+  if (control_ < 0)
+    throw std::runtime_error("simulated camera: " + o.address + " port 3956 is in use");
   broadcast_ = o.discoverable ? datagram_socket("255.255.255.255") : -1;
   wake_ = ::eventfd(0, EFD_CLOEXEC);
   reset();
@@ -200,7 +228,8 @@ void GigeCamera::Impl::reset() {
             return std::string(hex);
           }(),
       512);
-  if (kDescription + description.size() > kMemory) throw std::runtime_error("simulated camera: the description is too long");
+  if (kDescription + description.size() > kMemory)
+    throw std::runtime_error("simulated camera: the description is too long");
   std::memcpy(&memory_[kDescription], description.data(), description.size());
   put(0x600, 1);
   put(0x900, 0);
@@ -243,7 +272,8 @@ void GigeCamera::Impl::power(bool on) {
   changed_.notify_all();
 }
 
-// ---- control --------------------------------------------------------------------------------------------------------
+// ---- control
+// --------------------------------------------------------------------------------------------------------
 
 void GigeCamera::Impl::answer() {
   std::array<std::uint8_t, 2048> bytes{};
@@ -252,7 +282,9 @@ void GigeCamera::Impl::answer() {
     (void)::poll(fds.data(), fds.size(), 50);
     std::unique_lock lock(mutex_);
     if (quit_) return;
-    const bool silent_for_long = !foreign_ && word(kControl) != 0 && monotonic_now() - heard_ > Duration::milliseconds(word(kHeartbeat));
+    const bool silent_for_long =
+        !foreign_ && word(kControl) != 0 &&
+        monotonic_now() - heard_ > Duration::milliseconds(word(kHeartbeat));
     if (silent_for_long) {  // its controller is gone
       put(kControl, 0);
       controller_ = {};
@@ -262,7 +294,8 @@ void GigeCamera::Impl::answer() {
       if (p.fd == wake_ || p.fd < 0 || (p.revents & POLLIN) == 0) continue;
       sockaddr_in from{};
       socklen_t length = sizeof from;
-      const ssize_t n = ::recvfrom(p.fd, bytes.data(), bytes.size(), MSG_DONTWAIT, reinterpret_cast<sockaddr*>(&from), &length);
+      const ssize_t n = ::recvfrom(p.fd, bytes.data(), bytes.size(), MSG_DONTWAIT,
+                                   reinterpret_cast<sockaddr*>(&from), &length);
       if (n >= 8 && powered_) handle(control_, bytes.data(), static_cast<std::size_t>(n), from);
     }
   }
@@ -271,17 +304,21 @@ void GigeCamera::Impl::answer() {
 bool GigeCamera::Impl::may_write(const sockaddr_in& from, std::uint32_t address) const {
   if (foreign_) return false;
   const bool in_control = word(kControl) != 0;
-  const bool theirs = controller_.sin_port == from.sin_port && controller_.sin_addr.s_addr == from.sin_addr.s_addr;
+  const bool theirs =
+      controller_.sin_port == from.sin_port && controller_.sin_addr.s_addr == from.sin_addr.s_addr;
   return in_control ? theirs : address == kControl;
 }
 
-void GigeCamera::Impl::handle(int fd, const std::uint8_t* bytes, std::size_t length, const sockaddr_in& from) {
+void GigeCamera::Impl::handle(int fd, const std::uint8_t* bytes, std::size_t length,
+                              const sockaddr_in& from) {
   if (bytes[0] != 0x42) return;
   const bool wants_answer = (bytes[1] & 1U) != 0, extended = (bytes[1] & 0x10U) != 0;
-  const std::uint32_t command = from_wire16(bytes + 2), size = from_wire16(bytes + 4), id = from_wire16(bytes + 6);
+  const std::uint32_t command = from_wire16(bytes + 2), size = from_wire16(bytes + 4),
+                      id = from_wire16(bytes + 6);
   const std::uint8_t* payload = bytes + 8;
   if (size > length - 8) return;
-  if (controller_.sin_port == from.sin_port && controller_.sin_addr.s_addr == from.sin_addr.s_addr) heard_ = monotonic_now();
+  if (controller_.sin_port == from.sin_port && controller_.sin_addr.s_addr == from.sin_addr.s_addr)
+    heard_ = monotonic_now();
   Wire body;
   std::uint32_t status = kOk;
   switch (command) {
@@ -291,7 +328,9 @@ void GigeCamera::Impl::handle(int fd, const std::uint8_t* bytes, std::size_t len
     case 0x40:  // resend; never answered
       if (size >= 12) {
         std::uint64_t block = from_wire(payload) & 0xFFFFU;
-        if (extended && size >= 20) block = static_cast<std::uint64_t>(from_wire(payload + 12)) << 32U | from_wire(payload + 16);
+        if (extended && size >= 20)
+          block =
+              static_cast<std::uint64_t>(from_wire(payload + 12)) << 32U | from_wire(payload + 16);
         if (options.resend)
           sender.resend(block, from_wire(payload + 4) & (extended ? ~0U : 0xFFFFFFU),
                         from_wire(payload + 8) & (extended ? ~0U : 0xFFFFFFU));
@@ -321,7 +360,8 @@ void GigeCamera::Impl::handle(int fd, const std::uint8_t* bytes, std::size_t len
     case 0x86: {  // write memory: registers in a row
       const std::uint32_t address = from_wire(payload);
       for (std::uint32_t i = 4; i + 4 <= size && status == kOk; i += 4)
-        status = may_write(from, address) ? store(address + i - 4, from_wire(payload + i)) : kDenied;
+        status =
+            may_write(from, address) ? store(address + i - 4, from_wire(payload + i)) : kDenied;
       body.u16(0).u16(size - 4);
       break;
     }
@@ -333,10 +373,12 @@ void GigeCamera::Impl::handle(int fd, const std::uint8_t* bytes, std::size_t len
   out.u16(status).u16(command + 1).u16(static_cast<std::uint32_t>(body.bytes().size())).u16(id);
   std::vector<std::uint8_t> all = out.bytes();
   all.insert(all.end(), body.bytes().begin(), body.bytes().end());
-  (void)::sendto(fd, all.data(), all.size(), MSG_DONTWAIT, reinterpret_cast<const sockaddr*>(&from), sizeof from);
+  (void)::sendto(fd, all.data(), all.size(), MSG_DONTWAIT, reinterpret_cast<const sockaddr*>(&from),
+                 sizeof from);
 }
 
-std::uint32_t GigeCamera::Impl::write_registers(const std::uint8_t* payload, std::uint32_t size, const sockaddr_in& from) {
+std::uint32_t GigeCamera::Impl::write_registers(const std::uint8_t* payload, std::uint32_t size,
+                                                const sockaddr_in& from) {
   for (std::uint32_t i = 0; i + 8 <= size; i += 8) {
     const std::uint32_t address = from_wire(payload + i), value = from_wire(payload + i + 4);
     if (!may_write(from, address)) return kDenied;
@@ -351,7 +393,8 @@ std::uint32_t GigeCamera::Impl::write_registers(const std::uint8_t* payload, std
 }
 
 bool GigeCamera::Impl::value_fits(std::uint32_t address, std::uint32_t value) const {
-  const auto w = static_cast<std::uint32_t>(options.sensor_width), h = static_cast<std::uint32_t>(options.sensor_height);
+  const auto w = static_cast<std::uint32_t>(options.sensor_width),
+             h = static_cast<std::uint32_t>(options.sensor_height);
   switch (address) {
     case width:
       return value >= 16 && value % 8 == 0 && value + word(offset_x) <= w;
@@ -432,15 +475,19 @@ void GigeCamera::Impl::follow_registers() {
   target.sin_port = htons(static_cast<std::uint16_t>(word(kStreamPort)));
   target.sin_addr.s_addr = htonl(word(kStreamTarget));
   const std::uint64_t f = options.tick_frequency;
-  sender.aim(target, word(kPacketSize) & 0xFFFFU,
-             f == 0 ? Duration{} : Duration::seconds(static_cast<double>(word(kPacketDelay)) / static_cast<double>(f)));
+  sender.aim(
+      target, word(kPacketSize) & 0xFFFFU,
+      f == 0 ? Duration{}
+             : Duration::seconds(static_cast<double>(word(kPacketDelay)) / static_cast<double>(f)));
 }
 
-// ---- exposures ------------------------------------------------------------------------------------------------------
+// ---- exposures
+// ------------------------------------------------------------------------------------------------------
 
 void GigeCamera::Impl::pulse(std::uint64_t number, std::uint32_t source, HostStamp when) {
   const std::lock_guard lock(mutex_);
-  if (!acquiring_ || !powered_ || word(trigger_mode) == 0 || word(trigger_source) != source || pulses_.size() >= kLatchedPulses) {
+  if (!acquiring_ || !powered_ || word(trigger_mode) == 0 || word(trigger_source) != source ||
+      pulses_.size() >= kLatchedPulses) {
     ++ignored_;
     return;
   }
@@ -463,7 +510,8 @@ GvspFrame GigeCamera::Impl::make_frame(std::uint64_t number, HostStamp when) {
     f.width = lie_width_;
     f.height = lie_height_;
   }
-  const std::size_t bytes = static_cast<std::size_t>(f.width) * static_cast<std::size_t>(f.height) * (f.pixel_format >> 16U & 0xFFU) / 8;
+  const std::size_t bytes = static_cast<std::size_t>(f.width) * static_cast<std::size_t>(f.height) *
+                            (f.pixel_format >> 16U & 0xFFU) / 8;
   const std::uint8_t* given = options.images ? options.images(number) : nullptr;
   if (given != nullptr) {
     f.pixels.assign(given, given + bytes);
@@ -530,8 +578,10 @@ void GigeCamera::Impl::expose() {
     if (triggered) {
       std::tie(number, when) = pulses_.front();
     } else {
-      const std::int64_t period = Duration::seconds(1.0 / static_cast<double>(real(frame_rate))).ns();
-      number = static_cast<std::uint64_t>(std::max(when.ns() - exposure.ns(), last.ns()) / period + 1);
+      const std::int64_t period =
+          Duration::seconds(1.0 / static_cast<double>(real(frame_rate))).ns();
+      number =
+          static_cast<std::uint64_t>(std::max(when.ns() - exposure.ns(), last.ns()) / period + 1);
       when = HostStamp(static_cast<std::int64_t>(number) * period);
       last = when;
     }
@@ -560,14 +610,16 @@ void GigeCamera::Impl::expose() {
   }
 }
 
-// ---- the front ------------------------------------------------------------------------------------------------------
+// ---- the front
+// ------------------------------------------------------------------------------------------------------
 
 GigeCamera::GigeCamera(const GigeCameraOptions& options) : impl_(std::make_unique<Impl>(options)) {}
 GigeCamera::~GigeCamera() = default;
 
 std::string GigeCamera::address(int k) {
   const auto pid = static_cast<unsigned>(::getpid());
-  return "127." + std::to_string(1 + (pid >> 8U) % 250) + "." + std::to_string(pid & 0xFFU) + "." + std::to_string(k + 2);
+  return "127." + std::to_string(1 + (pid >> 8U) % 250) + "." + std::to_string(pid & 0xFFU) + "." +
+         std::to_string(k + 2);
 }
 
 void GigeCamera::unplug() { impl_->power(false); }

@@ -20,19 +20,22 @@ struct GigeCameraOptions {
   std::uint64_t first_block = 65'500;  // 16-bit ids wrap 35 frames later; 0 is never used
   bool extended_ids = false;           // 64-bit block ids
   bool resend = true;                  // answers resend requests
-  bool old_names = false;              // ExposureTimeAbs, GainRaw, AcquisitionFrameRateAbs as cameras before SFNC 2.0
-  bool discoverable = true;            // answers broadcasts
-  double loss = 0;                     // share of the stream's packets that are not sent, the resent ones too
-  std::uint64_t seed = 1;              // of the loss
+  bool old_names =
+      false;  // ExposureTimeAbs, GainRaw, AcquisitionFrameRateAbs as cameras before SFNC 2.0
+  bool discoverable = true;  // answers broadcasts
+  double loss = 0;           // share of the stream's packets that are not sent, the resent ones too
+  std::uint64_t seed = 1;    // of the loss
   std::uint32_t heartbeat_ms = 3000;
   std::uint32_t smallest_packet = 576, largest_packet = 16'000;  // bytes, of GevSCPSPacketSize
-  bool chunks = false;                                           // has chunk data: the exposure, the time stamp
-  std::uint32_t chunk_payload = 0x4001;  // payload type then: image with chunks; 5: extended chunk data; 4: chunk data
-  bool chunk_formula = false;            // the description has the chunk's exposure behind a formula
+  bool chunks = false;  // has chunk data: the exposure, the time stamp
+  std::uint32_t chunk_payload =
+      0x4001;  // payload type then: image with chunks; 5: extended chunk data; 4: chunk data
+  bool chunk_formula = false;  // the description has the chunk's exposure behind a formula
   /// How long image `number` was really exposed, µs, of what the registers say; empty: as they say.
   std::function<double(std::uint64_t number, double us)> exposures{};
   bool number_images = true;  // the first 8 bytes of an image are its number, little endian
-  /// Pixels of image `number`, width × height bytes that stay valid; empty: a pattern of the simulator's own.
+  /// Pixels of image `number`, width × height bytes that stay valid; empty: a pattern of the
+  /// simulator's own.
   std::function<const std::uint8_t*(std::uint64_t number)> images{};
 };
 
@@ -51,11 +54,15 @@ struct GigeCameraReport {
   std::uint64_t ignored_triggers = 0;  // pulses that came while it was not waiting for one
 };
 
-/// A small GigE Vision camera on the loopback: GVCP control, GenICam description, GVSP stream, in threads of its own.
+/// A small GigE Vision camera on the loopback: GVCP control, GenICam description, GVSP stream, in
+/// threads of its own.
 ///
-/// Free running cameras expose at the multiples of their period of CLOCK_MONOTONIC, so that two of one rate expose together.
-/// Registers  Bootstrap registers of GigE Vision 1.2 and the few features of the description (description()).
-/// Threads    Any call from any thread. Errors  The constructor throws std::runtime_error: the address is in use.
+/// Free running cameras expose at the multiples of their period of CLOCK_MONOTONIC, so that two of
+/// one rate expose together.
+/// Registers  Bootstrap registers of GigE Vision 1.2 and the few features of the description
+///            (description()).
+/// Threads    Any call from any thread. Errors  The constructor throws std::runtime_error: the
+/// address is in use.
 class GigeCamera {
  public:
   explicit GigeCamera(const GigeCameraOptions& options);
@@ -64,16 +71,22 @@ class GigeCamera {
   /// An address of the loopback that no other program's tests use at the same time; `k` below 250.
   [[nodiscard]] static std::string address(int k);
 
-  void unplug();  // answers nothing, sends nothing; powered on again by replug(), with nobody in control
+  void
+  unplug();  // answers nothing, sends nothing; powered on again by replug(), with nobody in control
   void replug();
-  void silence(bool silent);                      // answers, exposes nothing
-  void lose_frames(int exposures);                // the next ones are not sent at all
-  void tear_frames(int exposures);                // of the next ones one packet of data is not sent and not sent again
-  void delay_frames(int exposures, Duration by);  // the last half of each is sent so much later, after what comes between
+  void silence(bool silent);        // answers, exposes nothing
+  void lose_frames(int exposures);  // the next ones are not sent at all
+  void tear_frames(
+      int exposures);  // of the next ones one packet of data is not sent and not sent again
+  void delay_frames(
+      int exposures,
+      Duration by);  // the last half of each is sent so much later, after what comes between
   void set_loss(double share);
-  void garble_chunks(int exposures);           // the next ones have nonsense behind their pixels
-  void lie_about_size(int width, int height);  // sends this size, whatever the registers say; 0: honest again
-  /// A pulse at Line1: one exposure of image `number` where the camera waits for one. `when`: its time; 0: now.
+  void garble_chunks(int exposures);  // the next ones have nonsense behind their pixels
+  void lie_about_size(int width,
+                      int height);  // sends this size, whatever the registers say; 0: honest again
+  /// A pulse at Line1: one exposure of image `number` where the camera waits for one. `when`: its
+  /// time; 0: now.
   void pulse(std::uint64_t number, HostStamp when = {});
   /// Somebody else takes control, as another program would; false gives it back.
   void take_control(bool taken);
@@ -86,7 +99,8 @@ class GigeCamera {
   void write(std::uint32_t address, std::uint32_t value);
   /// When the last packet of image `number` was handed to the system; 0: not one of the newest.
   [[nodiscard]] HostStamp sent(std::uint64_t number) const;
-  /// How long image `number` was exposed, µs, as its chunk data say where it has them; 0: there is no such image.
+  /// How long image `number` was exposed, µs, as its chunk data say where it has them; 0: there is
+  /// no such image.
   [[nodiscard]] double exposed(std::uint64_t number) const;
   /// The device clock at a time of the host's, in its ticks.
   [[nodiscard]] std::uint64_t ticks(HostStamp host) const;
@@ -100,15 +114,21 @@ class GigeCamera {
 
 /// Addresses of the features' registers.
 namespace gige_register {
-inline constexpr std::uint32_t width = 0x10000, height = 0x10004, offset_x = 0x10008, offset_y = 0x1000C, pixel_format = 0x10010,
-                               acquisition_start = 0x10014, acquisition_stop = 0x10018, acquisition_mode = 0x1001C,
-                               frame_rate_enable = 0x10020, frame_rate = 0x10024, exposure_time = 0x10028, gain = 0x1002C,
-                               trigger_selector = 0x10030, trigger_mode = 0x10034, trigger_source = 0x10038, trigger_activation = 0x1003C,
-                               trigger_overlap = 0x10040, trigger_delay = 0x10044, trigger_software = 0x10048, exposure_mode = 0x1004C,
-                               exposure_auto = 0x10050, gain_auto = 0x10054, payload_size = 0x10058, locked = 0x1005C, ptp_enable = 0x10060,
-                               ptp_status = 0x10064, gain_raw = 0x10068, sensor_width = 0x1006C, sensor_height = 0x10070,
-                               line_selector = 0x10074, line_mode = 0x10078, line_source = 0x1007C, chunk_mode = 0x10080,
-                               chunk_selector = 0x10084, chunk_enable = 0x10088;
+inline constexpr std::uint32_t width = 0x10000, height = 0x10004, offset_x = 0x10008,
+                               offset_y = 0x1000C, pixel_format = 0x10010,
+                               acquisition_start = 0x10014, acquisition_stop = 0x10018,
+                               acquisition_mode = 0x1001C, frame_rate_enable = 0x10020,
+                               frame_rate = 0x10024, exposure_time = 0x10028, gain = 0x1002C,
+                               trigger_selector = 0x10030, trigger_mode = 0x10034,
+                               trigger_source = 0x10038, trigger_activation = 0x1003C,
+                               trigger_overlap = 0x10040, trigger_delay = 0x10044,
+                               trigger_software = 0x10048, exposure_mode = 0x1004C,
+                               exposure_auto = 0x10050, gain_auto = 0x10054, payload_size = 0x10058,
+                               locked = 0x1005C, ptp_enable = 0x10060, ptp_status = 0x10064,
+                               gain_raw = 0x10068, sensor_width = 0x1006C, sensor_height = 0x10070,
+                               line_selector = 0x10074, line_mode = 0x10078, line_source = 0x1007C,
+                               chunk_mode = 0x10080, chunk_selector = 0x10084,
+                               chunk_enable = 0x10088;
 }  // namespace gige_register
 
 /// The GenICam description of such a camera.

@@ -10,54 +10,78 @@ using namespace gige_register;
 /// Writes the nodes of a description; every feature is also listed in the root category.
 class Description {
  public:
-  void integer(const char* name, std::uint32_t address, const std::string& limits, const char* access = "RW") {
+  void integer(const char* name, std::uint32_t address, const std::string& limits,
+               const char* access = "RW") {
     feature(name);
-    text_ += fmt::format("<Integer Name=\"{0}\"><pValue>{0}Reg</pValue>{1}</Integer>\n", name, limits);
+    text_ +=
+        fmt::format("<Integer Name=\"{0}\"><pValue>{0}Reg</pValue>{1}</Integer>\n", name, limits);
     text_ += fmt::format(
-        "<IntReg Name=\"{}Reg\"><Address>{}</Address><Length>4</Length><AccessMode>{}</AccessMode><pPort>Device</pPort>"
-        "<Cachable>NoCache</Cachable><Sign>Unsigned</Sign><Endianess>BigEndian</Endianess></IntReg>\n",
+        "<IntReg "
+        "Name=\"{}Reg\"><Address>{}</Address><Length>4</Length><AccessMode>{}</"
+        "AccessMode><pPort>Device</pPort>"
+        "<Cachable>NoCache</Cachable><Sign>Unsigned</Sign><Endianess>BigEndian</Endianess></"
+        "IntReg>\n",
         name, address, access);
   }
-  void number(const char* name, std::uint32_t address, double least, double most, const char* unit) {
+  void number(const char* name, std::uint32_t address, double least, double most,
+              const char* unit) {
     feature(name);
-    text_ += fmt::format("<Float Name=\"{0}\"><pValue>{0}Reg</pValue><Min>{1}</Min><Max>{2}</Max><Unit>{3}</Unit></Float>\n", name, least,
-                         most, unit);
     text_ += fmt::format(
-        "<FloatReg Name=\"{}Reg\"><Address>{}</Address><Length>4</Length><AccessMode>RW</AccessMode><pPort>Device</pPort>"
+        "<Float "
+        "Name=\"{0}\"><pValue>{0}Reg</pValue><Min>{1}</Min><Max>{2}</Max><Unit>{3}</Unit></"
+        "Float>\n",
+        name, least, most, unit);
+    text_ += fmt::format(
+        "<FloatReg "
+        "Name=\"{}Reg\"><Address>{}</Address><Length>4</Length><AccessMode>RW</"
+        "AccessMode><pPort>Device</pPort>"
         "<Cachable>NoCache</Cachable><Endianess>BigEndian</Endianess></FloatReg>\n",
         name, address);
   }
   void boolean(const char* name, std::uint32_t address) {
     feature(name);
-    text_ += fmt::format("<Boolean Name=\"{0}\"><pValue>{0}Reg</pValue><OnValue>1</OnValue><OffValue>0</OffValue></Boolean>\n", name);
+    text_ += fmt::format(
+        "<Boolean "
+        "Name=\"{0}\"><pValue>{0}Reg</pValue><OnValue>1</OnValue><OffValue>0</OffValue></"
+        "Boolean>\n",
+        name);
     reg(name, address, "RW");
   }
   void command(const char* name, std::uint32_t address) {
     feature(name);
-    text_ += fmt::format("<Command Name=\"{0}\"><pValue>{0}Reg</pValue><CommandValue>1</CommandValue></Command>\n", name);
+    text_ += fmt::format(
+        "<Command Name=\"{0}\"><pValue>{0}Reg</pValue><CommandValue>1</CommandValue></Command>\n",
+        name);
     reg(name, address, "WO");
   }
-  void choice(const char* name, std::uint32_t address, const std::vector<std::pair<const char*, std::uint32_t>>& entries) {
+  void choice(const char* name, std::uint32_t address,
+              const std::vector<std::pair<const char*, std::uint32_t>>& entries) {
     feature(name);
     text_ += fmt::format("<Enumeration Name=\"{}\">", name);
-    for (const auto& [entry, value] : entries) text_ += fmt::format("<EnumEntry Name=\"{}\"><Value>{}</Value></EnumEntry>", entry, value);
+    for (const auto& [entry, value] : entries)
+      text_ += fmt::format("<EnumEntry Name=\"{}\"><Value>{}</Value></EnumEntry>", entry, value);
     text_ += fmt::format("<pValue>{}Reg</pValue></Enumeration>\n", name);
     reg(name, address, "RW");
   }
   void bits(const char* name, std::uint32_t address, int lsb, int msb, const std::string& limits) {
     feature(name);
-    text_ += fmt::format("<Integer Name=\"{0}\"><pValue>{0}Reg</pValue>{1}</Integer>\n", name, limits);
+    text_ +=
+        fmt::format("<Integer Name=\"{0}\"><pValue>{0}Reg</pValue>{1}</Integer>\n", name, limits);
     masked(name, address, lsb, msb, "RW");
   }
   void bit_command(const char* name, std::uint32_t address, int bit) {
     feature(name);
-    text_ += fmt::format("<Command Name=\"{0}\"><pValue>{0}Reg</pValue><CommandValue>1</CommandValue></Command>\n", name);
+    text_ += fmt::format(
+        "<Command Name=\"{0}\"><pValue>{0}Reg</pValue><CommandValue>1</CommandValue></Command>\n",
+        name);
     masked(name, address, bit, bit, "RW");
   }
   void text(const char* name, std::uint32_t address, int length) {
     feature(name);
     text_ += fmt::format(
-        "<StringReg Name=\"{}\"><Address>{}</Address><Length>{}</Length><AccessMode>RO</AccessMode><pPort>Device</pPort></StringReg>\n",
+        "<StringReg "
+        "Name=\"{}\"><Address>{}</Address><Length>{}</Length><AccessMode>RO</"
+        "AccessMode><pPort>Device</pPort></StringReg>\n",
         name, address, length);
   }
   /// A number in the chunk `id` (hexadecimal).
@@ -65,36 +89,52 @@ class Description {
     feature(name);
     const std::string reg = fmt::format("{}Reg", name);
     text_ += formula
-                 ? fmt::format("<SwissKnife Name=\"{}\"><pVariable Name=\"RAW\">{}</pVariable><Formula>RAW*1.5</Formula></SwissKnife>\n",
-                               name, reg)
-                 : fmt::format("<Float Name=\"{}\"><pValue>{}</pValue><Unit>us</Unit></Float>\n", name, reg);
+                 ? fmt::format(
+                       "<SwissKnife Name=\"{}\"><pVariable "
+                       "Name=\"RAW\">{}</pVariable><Formula>RAW*1.5</Formula></SwissKnife>\n",
+                       name, reg)
+                 : fmt::format("<Float Name=\"{}\"><pValue>{}</pValue><Unit>us</Unit></Float>\n",
+                               name, reg);
     text_ += fmt::format(
-        "<FloatReg Name=\"{0}\"><Address>0</Address><Length>{1}</Length><AccessMode>RO</AccessMode><pPort>{0}Port</pPort>"
-        "<Cachable>NoCache</Cachable><Endianess>{2}</Endianess></FloatReg>\n<Port Name=\"{0}Port\"><ChunkID>{3}</ChunkID></Port>\n",
+        "<FloatReg "
+        "Name=\"{0}\"><Address>0</Address><Length>{1}</Length><AccessMode>RO</"
+        "AccessMode><pPort>{0}Port</pPort>"
+        "<Cachable>NoCache</Cachable><Endianess>{2}</Endianess></FloatReg>\n<Port "
+        "Name=\"{0}Port\"><ChunkID>{3}</ChunkID></Port>\n",
         reg, length, endianness, id);
   }
   [[nodiscard]] std::string done() const {
     return "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n"
-           "<RegisterDescription ModelName=\"Simulator\" VendorName=\"Vergence\" StandardNameSpace=\"GEV\" SchemaMajorVersion=\"1\" "
-           "SchemaMinorVersion=\"1\" SchemaSubMinorVersion=\"0\" MajorVersion=\"1\" MinorVersion=\"0\" SubMinorVersion=\"0\" "
-           "ProductGuid=\"5d0f8a0c-0000-4000-8000-000000000001\" VersionGuid=\"5d0f8a0c-0000-4000-8000-000000000002\" "
+           "<RegisterDescription ModelName=\"Simulator\" VendorName=\"Vergence\" "
+           "StandardNameSpace=\"GEV\" SchemaMajorVersion=\"1\" "
+           "SchemaMinorVersion=\"1\" SchemaSubMinorVersion=\"0\" MajorVersion=\"1\" "
+           "MinorVersion=\"0\" SubMinorVersion=\"0\" "
+           "ProductGuid=\"5d0f8a0c-0000-4000-8000-000000000001\" "
+           "VersionGuid=\"5d0f8a0c-0000-4000-8000-000000000002\" "
            "xmlns=\"http://www.genicam.org/GenApi/Version_1_1\">\n"
            "<Category Name=\"Root\" NameSpace=\"Standard\">\n" +
-           features_ + "</Category>\n" + text_ + "<Port Name=\"Device\"></Port>\n</RegisterDescription>\n";
+           features_ + "</Category>\n" + text_ +
+           "<Port Name=\"Device\"></Port>\n</RegisterDescription>\n";
   }
 
  private:
   void feature(const char* name) { features_ += fmt::format("<pFeature>{}</pFeature>\n", name); }
   void reg(const char* name, std::uint32_t address, const char* access) {
     text_ += fmt::format(
-        "<IntReg Name=\"{}Reg\"><Address>{}</Address><Length>4</Length><AccessMode>{}</AccessMode><pPort>Device</pPort>"
-        "<Cachable>NoCache</Cachable><Sign>Unsigned</Sign><Endianess>BigEndian</Endianess></IntReg>\n",
+        "<IntReg "
+        "Name=\"{}Reg\"><Address>{}</Address><Length>4</Length><AccessMode>{}</"
+        "AccessMode><pPort>Device</pPort>"
+        "<Cachable>NoCache</Cachable><Sign>Unsigned</Sign><Endianess>BigEndian</Endianess></"
+        "IntReg>\n",
         name, address, access);
   }
   void masked(const char* name, std::uint32_t address, int lsb, int msb, const char* access) {
     text_ += fmt::format(
-        "<MaskedIntReg Name=\"{}Reg\"><Address>{}</Address><Length>4</Length><AccessMode>{}</AccessMode><pPort>Device</pPort>"
-        "<Cachable>NoCache</Cachable><LSB>{}</LSB><MSB>{}</MSB><Sign>Unsigned</Sign><Endianess>BigEndian</Endianess></MaskedIntReg>\n",
+        "<MaskedIntReg "
+        "Name=\"{}Reg\"><Address>{}</Address><Length>4</Length><AccessMode>{}</"
+        "AccessMode><pPort>Device</pPort>"
+        "<Cachable>NoCache</Cachable><LSB>{}</LSB><MSB>{}</MSB><Sign>Unsigned</"
+        "Sign><Endianess>BigEndian</Endianess></MaskedIntReg>\n",
         name, address, access, lsb, msb);
   }
   std::string features_, text_;
@@ -110,17 +150,23 @@ std::string gige_description(const GigeCameraOptions& o) {
   d.integer("SensorWidth", sensor_width, "", "RO");
   d.integer("SensorHeight", sensor_height, "", "RO");
   d.integer("Width", width, fmt::format("<Min>16</Min><Max>{}</Max><Inc>8</Inc>", o.sensor_width));
-  d.integer("Height", height, fmt::format("<Min>16</Min><Max>{}</Max><Inc>2</Inc>", o.sensor_height));
-  d.integer("OffsetX", offset_x, fmt::format("<Min>0</Min><Max>{}</Max><Inc>8</Inc>", o.sensor_width - 16));
-  d.integer("OffsetY", offset_y, fmt::format("<Min>0</Min><Max>{}</Max><Inc>2</Inc>", o.sensor_height - 16));
-  d.choice("PixelFormat", pixel_format, {{"Mono8", 0x01080001}, {"Mono12", 0x01100005}, {"BayerGB8", 0x0108000A}});
+  d.integer("Height", height,
+            fmt::format("<Min>16</Min><Max>{}</Max><Inc>2</Inc>", o.sensor_height));
+  d.integer("OffsetX", offset_x,
+            fmt::format("<Min>0</Min><Max>{}</Max><Inc>8</Inc>", o.sensor_width - 16));
+  d.integer("OffsetY", offset_y,
+            fmt::format("<Min>0</Min><Max>{}</Max><Inc>2</Inc>", o.sensor_height - 16));
+  d.choice("PixelFormat", pixel_format,
+           {{"Mono8", 0x01080001}, {"Mono12", 0x01100005}, {"BayerGB8", 0x0108000A}});
   d.integer("PayloadSize", payload_size, "", "RO");
   d.integer("TLParamsLocked", locked, "<Min>0</Min><Max>1</Max>");
-  d.choice("AcquisitionMode", acquisition_mode, {{"SingleFrame", 0}, {"MultiFrame", 1}, {"Continuous", 2}});
+  d.choice("AcquisitionMode", acquisition_mode,
+           {{"SingleFrame", 0}, {"MultiFrame", 1}, {"Continuous", 2}});
   d.command("AcquisitionStart", acquisition_start);
   d.command("AcquisitionStop", acquisition_stop);
   if (!o.old_names) d.boolean("AcquisitionFrameRateEnable", frame_rate_enable);
-  d.number(o.old_names ? "AcquisitionFrameRateAbs" : "AcquisitionFrameRate", frame_rate, 0.5, 400, "Hz");
+  d.number(o.old_names ? "AcquisitionFrameRateAbs" : "AcquisitionFrameRate", frame_rate, 0.5, 400,
+           "Hz");
   d.number(o.old_names ? "ExposureTimeAbs" : "ExposureTime", exposure_time, 10, 900'000, "us");
   d.choice("ExposureAuto", exposure_auto, {{"Off", 0}, {"Continuous", 2}});
   d.choice("ExposureMode", exposure_mode, {{"Timed", 1}, {"TriggerWidth", 2}});
@@ -141,17 +187,21 @@ std::string gige_description(const GigeCameraOptions& o) {
   d.choice("LineSource", line_source, {{"Off", 0}, {"ExposureActive", 1}});
   if (!o.old_names) {
     d.boolean("PtpEnable", ptp_enable);
-    d.choice("PtpStatus", ptp_status, {{"Initializing", 1}, {"Disabled", 3}, {"Listening", 4}, {"Master", 6}, {"Slave", 9}});
+    d.choice("PtpStatus", ptp_status,
+             {{"Initializing", 1}, {"Disabled", 3}, {"Listening", 4}, {"Master", 6}, {"Slave", 9}});
   }
   if (o.chunks) {
     d.boolean("ChunkModeActive", chunk_mode);
-    d.choice("ChunkSelector", chunk_selector, {{"Image", 0}, {"ExposureTime", 1}, {"Timestamp", 2}});
+    d.choice("ChunkSelector", chunk_selector,
+             {{"Image", 0}, {"ExposureTime", 1}, {"Timestamp", 2}});
     d.boolean("ChunkEnable", chunk_enable);
-    d.chunk(o.old_names ? "ChunkExposureTimeAbs" : "ChunkExposureTime", "A5A50002", o.old_names ? 4 : 8,
-            o.old_names ? "LittleEndian" : "BigEndian", o.chunk_formula);
+    d.chunk(o.old_names ? "ChunkExposureTimeAbs" : "ChunkExposureTime", "A5A50002",
+            o.old_names ? 4 : 8, o.old_names ? "LittleEndian" : "BigEndian", o.chunk_formula);
   }
   // Of the bootstrap registers; bit 0 is the most significant one.
-  d.bits("GevSCPSPacketSize", 0xD04, 31, 16, fmt::format("<Min>{}</Min><Max>{}</Max><Inc>4</Inc>", o.smallest_packet, o.largest_packet));
+  d.bits(
+      "GevSCPSPacketSize", 0xD04, 31, 16,
+      fmt::format("<Min>{}</Min><Max>{}</Max><Inc>4</Inc>", o.smallest_packet, o.largest_packet));
   d.bit_command("GevSCPSFireTestPacket", 0xD04, 0);
   d.bits("GevSCPSDoNotFragment", 0xD04, 1, 1, "<Min>0</Min><Max>1</Max>");
   d.integer("GevSCPD", 0xD08, "<Min>0</Min><Max>1000000</Max>");

@@ -28,7 +28,8 @@ void sleep_until(HostStamp when) noexcept {
   (void)::clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &t, nullptr);
 }
 
-GvspSender::GvspSender(const std::string& address, bool extended_ids, double loss, std::uint64_t seed)
+GvspSender::GvspSender(const std::string& address, bool extended_ids, double loss,
+                       std::uint64_t seed)
     : extended_(extended_ids), loss_(loss), random_(seed, 77) {
   socket_ = ::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
   sockaddr_in own{};
@@ -62,7 +63,8 @@ void GvspSender::hold_back(Duration by) {
   held_by_ = by;
 }
 
-Wire GvspSender::header(std::uint64_t block, std::uint32_t format, std::uint32_t id, std::uint32_t status) const {
+Wire GvspSender::header(std::uint64_t block, std::uint32_t format, std::uint32_t id,
+                        std::uint32_t status) const {
   Wire w;
   if (extended_)
     w.u16(status).u16(0).u32((0x80U | format) << 24U).u64(block).u32(id);
@@ -71,9 +73,10 @@ Wire GvspSender::header(std::uint64_t block, std::uint32_t format, std::uint32_t
   return w;
 }
 
-void GvspSender::transmit(const std::vector<std::uint8_t>& head, std::span<const std::uint8_t> data) {
-  std::array<iovec, 2> parts{
-      {{const_cast<std::uint8_t*>(head.data()), head.size()}, {const_cast<std::uint8_t*>(data.data()), data.size()}}};
+void GvspSender::transmit(const std::vector<std::uint8_t>& head,
+                          std::span<const std::uint8_t> data) {
+  std::array<iovec, 2> parts{{{const_cast<std::uint8_t*>(head.data()), head.size()},
+                              {const_cast<std::uint8_t*>(data.data()), data.size()}}};
   msghdr message{};
   message.msg_name = &target_;
   message.msg_namelen = sizeof target_;
@@ -85,7 +88,8 @@ void GvspSender::transmit(const std::vector<std::uint8_t>& head, std::span<const
 /// Precondition: mutex_ held.
 void GvspSender::packet(const Record& record, std::uint32_t id, bool again) {
   Account& account = accounts_[record.account];
-  const bool lost = (account.never && id == account.hole) || (loss_ > 0 && random_.uniform() < loss_);
+  const bool lost =
+      (account.never && id == account.hole) || (loss_ > 0 && random_.uniform() < loss_);
   if (lost) {
     dropped_ += again ? 0 : 1;
     return;
@@ -124,9 +128,12 @@ void GvspSender::send(GvspFrame frame, Fate fate) {
   Record& record = history_[slot];
   record.frame = std::move(frame);
   record.data_bytes = packet_size_ - (extended_ ? 48U : 36U);
-  record.packets = static_cast<std::uint32_t>((record.frame.pixels.size() + record.data_bytes - 1) / record.data_bytes) + 2;
+  record.packets = static_cast<std::uint32_t>((record.frame.pixels.size() + record.data_bytes - 1) /
+                                              record.data_bytes) +
+                   2;
   record.account = accounts_.size();
-  accounts_.push_back({number, std::vector<bool>(record.packets, false), fate == Fate::torn, 1 + (record.packets - 2) / 2});
+  accounts_.push_back({number, std::vector<bool>(record.packets, false), fate == Fate::torn,
+                       1 + (record.packets - 2) / 2});
   packets_ += record.packets;
   if (fate == Fate::unsent) {
     record.packets = 0;
@@ -186,7 +193,10 @@ void GvspSender::add_to(GigeCameraReport* r) const {
   const std::lock_guard lock(mutex_);
   for (const Account& a : accounts_) {
     const auto went = static_cast<std::size_t>(std::count(a.went.begin(), a.went.end(), true));
-    ++(went == a.went.size() ? r->whole : went == 0 ? r->nothing : a.went[0] ? r->torn : r->headless);
+    ++(went == a.went.size() ? r->whole
+       : went == 0           ? r->nothing
+       : a.went[0]           ? r->torn
+                             : r->headless);
   }
   r->exposed += accounts_.size();
   r->packets += packets_;

@@ -24,7 +24,9 @@ class Wire {
   }
   Wire& u16(std::uint32_t v) { return u8(v >> 8U & 0xFFU).u8(v & 0xFFU); }
   Wire& u32(std::uint32_t v) { return u16(v >> 16U).u16(v & 0xFFFFU); }
-  Wire& u64(std::uint64_t v) { return u32(static_cast<std::uint32_t>(v >> 32U)).u32(static_cast<std::uint32_t>(v)); }
+  Wire& u64(std::uint64_t v) {
+    return u32(static_cast<std::uint32_t>(v >> 32U)).u32(static_cast<std::uint32_t>(v));
+  }
   [[nodiscard]] const std::vector<std::uint8_t>& bytes() const noexcept { return bytes_; }
 
  private:
@@ -40,7 +42,8 @@ struct GvspFrame {
   std::vector<std::uint8_t> pixels;  // and the chunk data behind them
 };
 
-/// The stream channel of the simulated camera: packets, their loss, what is sent again, and the accounts of it all.
+/// The stream channel of the simulated camera: packets, their loss, what is sent again, and the
+/// accounts of it all.
 ///
 /// Threads  send(): one. Everything else: any.
 class GvspSender {
@@ -71,7 +74,8 @@ class GvspSender {
   static constexpr std::size_t kHistory = 8;  // frames that can be asked for again
   struct Record {
     GvspFrame frame;
-    std::uint32_t data_bytes = 0, packets = 0;  // of a packet; of the frame, leader and trailer among them
+    std::uint32_t data_bytes = 0,
+                  packets = 0;  // of a packet; of the frame, leader and trailer among them
     std::size_t account = 0;
   };
   struct Account {
@@ -88,7 +92,8 @@ class GvspSender {
   };
   void packet(const Record& record, std::uint32_t id, bool again);
   void transmit(const std::vector<std::uint8_t>& head, std::span<const std::uint8_t> data);
-  [[nodiscard]] Wire header(std::uint64_t block, std::uint32_t format, std::uint32_t id, std::uint32_t status) const;
+  [[nodiscard]] Wire header(std::uint64_t block, std::uint32_t format, std::uint32_t id,
+                            std::uint32_t status) const;
 
   int socket_ = -1;
   std::uint16_t port_ = 0;

@@ -53,12 +53,16 @@ void McapWriter::message(std::uint16_t channel, std::int64_t log_time, std::stri
 void McapWriter::close_chunk() {
   if (chunk_.empty()) return;
   const std::string body = packed(compression_, chunk_);
-  const auto crc = ::crc32(0, reinterpret_cast<const Bytef*>(chunk_.data()), static_cast<uInt>(chunk_.size()));
-  record(6, number(0, 8) + number(0, 8) + number(chunk_.size(), 8) + number(crc, 4) + text(compression_) + number(body.size(), 8) + body);
+  const auto crc =
+      ::crc32(0, reinterpret_cast<const Bytef*>(chunk_.data()), static_cast<uInt>(chunk_.size()));
+  record(6, number(0, 8) + number(0, 8) + number(chunk_.size(), 8) + number(crc, 4) +
+                text(compression_) + number(body.size(), 8) + body);
   chunk_.clear();
 }
 
-void McapWriter::record(std::uint8_t opcode, std::string_view content) { file_ += record_of(opcode, content); }
+void McapWriter::record(std::uint8_t opcode, std::string_view content) {
+  file_ += record_of(opcode, content);
+}
 
 void McapWriter::finish() {
   close_chunk();

@@ -6,7 +6,8 @@
 
 namespace vergence::test {
 
-/// Bytes in the order of XCDR1: values aligned to their size, counted from the first; either byte order.
+/// Bytes in the order of XCDR1: values aligned to their size, counted from the first; either byte
+/// order.
 class CdrWriter {
  public:
   explicit CdrWriter(bool little = true) : little_(little) {}
@@ -28,10 +29,13 @@ class CdrWriter {
   }
   /// std_msgs/msg/Header.
   CdrWriter& header(std::int64_t stamp_ns, std::string_view frame = "f") {
-    put(static_cast<std::int32_t>(stamp_ns / 1'000'000'000)).put(static_cast<std::uint32_t>(stamp_ns % 1'000'000'000));
+    put(static_cast<std::int32_t>(stamp_ns / 1'000'000'000))
+        .put(static_cast<std::uint32_t>(stamp_ns % 1'000'000'000));
     return text(frame);
   }
-  [[nodiscard]] std::string bytes() const { return std::string{'\0', little_ ? '\1' : '\0', '\0', '\0'} + bytes_; }
+  [[nodiscard]] std::string bytes() const {
+    return std::string{'\0', little_ ? '\1' : '\0', '\0', '\0'} + bytes_;
+  }
 
  private:
   void raw(const void* value, std::size_t size) {

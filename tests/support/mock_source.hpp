@@ -5,8 +5,10 @@
 
 namespace vergence::test {
 
-/// How a drive of the mock is taken down as a data set: paired as `vergence run --fast` pairs it, every frame waited for, on its clock.
-[[nodiscard]] inline app::LiveSource::Options mock_source_options(const app::Configuration& c, const app::MockDrive& drive) {
+/// How a drive of the mock is taken down as a data set: paired as `vergence run --fast` pairs it,
+/// every frame waited for, on its clock.
+[[nodiscard]] inline app::LiveSource::Options mock_source_options(const app::Configuration& c,
+                                                                  const app::MockDrive& drive) {
   constexpr Stamp kVirtualEpoch{1'577'836'800'000'000'000};  // of vergence run --fast: 2020-01-01
   app::LiveSource::Options o;
   o.sync.cameras = 2;

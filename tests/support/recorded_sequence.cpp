@@ -23,7 +23,8 @@ using app::StereoSequence;
 namespace {
 
 /// The sequence with its right images from a frame on replaced by what `change` makes of them.
-StereoSequence with_right_changed(const RecordedSequence& drive, std::size_t from, const std::filesystem::path& folder,
+StereoSequence with_right_changed(const RecordedSequence& drive, std::size_t from,
+                                  const std::filesystem::path& folder,
                                   const std::function<cv::Mat(const cv::Mat&)>& change) {
   StereoSequence s = drive.sequence;
   std::filesystem::create_directories(folder);
@@ -42,7 +43,10 @@ std::optional<RecordedSequence> open_recorded(const std::string& name) {
   const auto folder = shared_data("data/" + name);
   if (!folder) return std::nullopt;
   const bool euroc = name.starts_with("euroc");
-  RecordedSequence d{name, app::open_sequence(euroc ? app::SequenceFormat::euroc : app::SequenceFormat::kitti, *folder), {}};
+  RecordedSequence d{
+      name,
+      app::open_sequence(euroc ? app::SequenceFormat::euroc : app::SequenceFormat::kitti, *folder),
+      {}};
   const auto truth = app::find_truth(*folder);
   if (truth && truth->kind != app::TruthFiles::Kind::kitti) {
     d.truth = app::read_truth(*truth);
@@ -54,8 +58,8 @@ std::optional<RecordedSequence> open_recorded(const std::string& name) {
   return d;
 }
 
-StereoSequence with_right_turned(const RecordedSequence& drive, const Vec3& degrees, std::size_t from,
-                                 const std::filesystem::path& folder) {
+StereoSequence with_right_turned(const RecordedSequence& drive, const Vec3& degrees,
+                                 std::size_t from, const std::filesystem::path& folder) {
   const Intrinsics& lens = drive.sequence.calibration.intrinsics[1];
   Mat3 K;
   K << lens.fx, 0, lens.cx, 0, lens.fy, lens.cy, 0, 0, 1;
@@ -70,7 +74,8 @@ StereoSequence with_right_turned(const RecordedSequence& drive, const Vec3& degr
   });
 }
 
-StereoSequence with_right_mirrored(const RecordedSequence& drive, const std::filesystem::path& folder) {
+StereoSequence with_right_mirrored(const RecordedSequence& drive,
+                                   const std::filesystem::path& folder) {
   return with_right_changed(drive, 0, folder, [](const cv::Mat& image) {
     cv::Mat out;
     cv::flip(image, out, 1);
@@ -85,8 +90,9 @@ StartingCalibration blank(const StartingCalibration& given) {
   return scratch;
 }
 
-DriveOutcome drive_recorded(const RecordedSequence& d, const StereoSequence& sequence, const app::Configuration& c,
-                            const StartingCalibration& begin, std::size_t knock_at) {
+DriveOutcome drive_recorded(const RecordedSequence& d, const StereoSequence& sequence,
+                            const app::Configuration& c, const StartingCalibration& begin,
+                            std::size_t knock_at) {
   DriveOutcome row;
   std::vector<StampedPose> poses;
   const app::DrivePass pass{sequence, c, 0, sequence.pairs.size(), {}, {}};
@@ -114,7 +120,9 @@ DriveOutcome drive_recorded(const RecordedSequence& d, const StereoSequence& seq
     if (row.verified_at < 0 && s.status == PoseStatus::ok) ++row.ok_before_verified;
     if (knocked && row.mended_at < 0 && s.status == PoseStatus::ok) ++row.ok_before_mended;
     if (row.verified_at >= 0) ++row.since_verified;
-    (s.status == PoseStatus::ok ? row.ok : s.status == PoseStatus::degraded ? row.degraded : row.lost)++;
+    (s.status == PoseStatus::ok         ? row.ok
+     : s.status == PoseStatus::degraded ? row.degraded
+                                        : row.lost)++;
     if (row.verified_at >= 0 && s.status == PoseStatus::ok) ++row.ok_since_verified;
   });
   if (!d.truth.empty() && poses.size() > 3) {

@@ -18,16 +18,19 @@ struct RecordedSequence {
   app::Trajectory truth;
 };
 
-inline constexpr std::array kRecordedSequences = {"kitti06_51", "kitti01_51", "kitti00_151", "euroc_mh01"};
+inline constexpr std::array kRecordedSequences = {"kitti06_51", "kitti01_51", "kitti00_151",
+                                                  "euroc_mh01"};
 /// By the name of its folder below data/; empty: it is not there.
 [[nodiscard]] std::optional<RecordedSequence> open_recorded(const std::string& name);
 
-/// The right camera turned about its centre from a frame on, its images written into `folder`: by a homography, which is exact for a lens
-/// without distortion.
-[[nodiscard]] app::StereoSequence with_right_turned(const RecordedSequence& drive, const Vec3& degrees, std::size_t from,
+/// The right camera turned about its centre from a frame on, its images written into `folder`: by a
+/// homography, which is exact for a lens without distortion.
+[[nodiscard]] app::StereoSequence with_right_turned(const RecordedSequence& drive,
+                                                    const Vec3& degrees, std::size_t from,
                                                     const std::filesystem::path& folder);
 /// The right images left for right: no lens model makes that fit.
-[[nodiscard]] app::StereoSequence with_right_mirrored(const RecordedSequence& drive, const std::filesystem::path& folder);
+[[nodiscard]] app::StereoSequence with_right_mirrored(const RecordedSequence& drive,
+                                                      const std::filesystem::path& folder);
 
 /// Of the drive's calibration only lenses and length are read.
 [[nodiscard]] app::StartingCalibration blank(const app::StartingCalibration& given);
@@ -47,7 +50,10 @@ struct DriveOutcome {
 };
 
 /// `knock_at`: the frame from which on the images are of a turned camera, if any.
-[[nodiscard]] DriveOutcome drive_recorded(const RecordedSequence& drive, const app::StereoSequence& sequence, const app::Configuration& c,
-                                          const app::StartingCalibration& begin, std::size_t knock_at = ~std::size_t{0});
+[[nodiscard]] DriveOutcome drive_recorded(const RecordedSequence& drive,
+                                          const app::StereoSequence& sequence,
+                                          const app::Configuration& c,
+                                          const app::StartingCalibration& begin,
+                                          std::size_t knock_at = ~std::size_t{0});
 
 }  // namespace vergence::test

@@ -22,8 +22,9 @@ std::shared_ptr<const mock::World> world() {
 RigCalibration paper_rig() {
   RigCalibration rig;
   rig.cameras = 2;
-  const std::array<std::array<double, 4>, 2> k = {{{1246.561673900704, 1247.092336797580, 532.287936343425, 383.604069688392},
-                                                   {1244.805048771648, 1245.815687282771, 506.635543659909, 390.704813552426}}};
+  const std::array<std::array<double, 4>, 2> k = {
+      {{1246.561673900704, 1247.092336797580, 532.287936343425, 383.604069688392},
+       {1244.805048771648, 1245.815687282771, 506.635543659909, 390.704813552426}}};
   for (std::size_t i = 0; i < 2; ++i) {
     Intrinsics& c = rig.intrinsics[i];
     c.width = 1024;
@@ -34,8 +35,9 @@ RigCalibration paper_rig() {
     c.cy = k[i][3];
   }
   Transform& T = rig.T_camera_left[1];
-  T.R << 0.999985020769994, 0.001356661749366, -0.005302612991045, -0.001329315763428, 0.999985817981778, 0.005157204176297,
-      0.005309534370930, -0.005150078078314, 0.999972642396056;
+  T.R << 0.999985020769994, 0.001356661749366, -0.005302612991045, -0.001329315763428,
+      0.999985817981778, 0.005157204176297, 0.005309534370930, -0.005150078078314,
+      0.999972642396056;
   T.t = {-0.7506666877284111, -0.003857678457065100, 0.0030959446910902};
   rig.baseline = T.t.norm();
   return rig;
@@ -47,7 +49,8 @@ struct RenderedDrive::Parts {
       const Intrinsics& c = o.rig.intrinsics[static_cast<std::size_t>(k)];
       renderers.emplace_back(world(), Camera(c));
       stride.push_back((c.width + 63) / 64 * 64);
-      pixels.emplace_back(static_cast<std::size_t>(stride.back()) * static_cast<std::size_t>(c.height));
+      pixels.emplace_back(static_cast<std::size_t>(stride.back()) *
+                          static_cast<std::size_t>(c.height));
     }
     frame.cameras = o.rig.cameras;
   }
@@ -59,7 +62,8 @@ struct RenderedDrive::Parts {
   RigFrame frame;
 };
 
-RenderedDrive::RenderedDrive(const RenderedDriveOptions& options) : parts_(std::make_unique<Parts>(options)) {}
+RenderedDrive::RenderedDrive(const RenderedDriveOptions& options)
+    : parts_(std::make_unique<Parts>(options)) {}
 RenderedDrive::~RenderedDrive() = default;
 const RigCalibration& RenderedDrive::rig() const noexcept { return parts_->options.rig; }
 
@@ -69,12 +73,15 @@ Transform RenderedDrive::T_camera_left(int k, std::uint64_t i) const {
 }
 
 Transform RenderedDrive::T_enu_left(std::uint64_t i) const {
-  const auto at = Duration::seconds(parts_->options.from_s + static_cast<double>(i) / parts_->options.rate);
+  const auto at =
+      Duration::seconds(parts_->options.from_s + static_cast<double>(i) / parts_->options.rate);
   return mock::camera_pose(parts_->drive.at(at), mock::default_T_body_left()).inverse();
 }
 
 double RenderedDrive::speed(std::uint64_t i) const {
-  return parts_->drive.at(Duration::seconds(parts_->options.from_s + static_cast<double>(i) / parts_->options.rate)).velocity.norm();
+  return parts_->drive
+      .at(Duration::seconds(parts_->options.from_s + static_cast<double>(i) / parts_->options.rate))
+      .velocity.norm();
 }
 
 const RigFrame& RenderedDrive::frame(std::uint64_t i) {
@@ -98,19 +105,22 @@ const RigFrame& RenderedDrive::frame(std::uint64_t i) {
   return p.frame;
 }
 
-std::vector<double> RenderedDrive::starts(const mock::DriveOptions& options, int count, double speed, double seconds) {
+std::vector<double> RenderedDrive::starts(const mock::DriveOptions& options, int count,
+                                          double speed, double seconds) {
   const mock::Drive drive(options, *world());
   std::vector<double> possible;
   constexpr double kStep = 0.25;
   const double end = drive.duration().to_seconds() - seconds;
   for (double t = 0; t < end; t += kStep) {
     bool fast = true;
-    for (double u = t; fast && u < t + seconds; u += kStep) fast = drive.at(Duration::seconds(u)).velocity.norm() >= speed;
+    for (double u = t; fast && u < t + seconds; u += kStep)
+      fast = drive.at(Duration::seconds(u)).velocity.norm() >= speed;
     if (fast) possible.push_back(t);
   }
   std::vector<double> chosen;
   for (int i = 0; i < count && !possible.empty(); ++i)
-    chosen.push_back(possible[possible.size() * static_cast<std::size_t>(i) / static_cast<std::size_t>(count)]);
+    chosen.push_back(
+        possible[possible.size() * static_cast<std::size_t>(i) / static_cast<std::size_t>(count)]);
   return chosen;
 }
 

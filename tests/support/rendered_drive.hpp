@@ -11,7 +11,8 @@
 
 namespace vergence::test {
 
-/// The rig of the paper's experiment: 1024 × 768 px, 0.75 m, its published intrinsics and extrinsics, no distortion.
+/// The rig of the paper's experiment: 1024 × 768 px, 0.75 m, its published intrinsics and
+/// extrinsics, no distortion.
 [[nodiscard]] RigCalibration paper_rig();
 
 struct RenderedDriveOptions {
@@ -23,7 +24,8 @@ struct RenderedDriveOptions {
   std::function<Transform(int k, std::uint64_t frame)> placed;
 };
 
-/// A drive through the mock's suburb, rendered frame by frame as it is asked for; two threads. The same options, the same pixels.
+/// A drive through the mock's suburb, rendered frame by frame as it is asked for; two threads. The
+/// same options, the same pixels.
 class RenderedDrive {
  public:
   explicit RenderedDrive(const RenderedDriveOptions& options);
@@ -35,8 +37,10 @@ class RenderedDrive {
   [[nodiscard]] double speed(std::uint64_t i) const;  // m/s
   [[nodiscard]] Transform T_camera_left(int k, std::uint64_t i) const;
   [[nodiscard]] const RigCalibration& rig() const noexcept;
-  /// Times into the drive at which the vehicle is faster than `speed` for `seconds` on end, spread over it.
-  [[nodiscard]] static std::vector<double> starts(const mock::DriveOptions& drive, int count, double speed, double seconds);
+  /// Times into the drive at which the vehicle is faster than `speed` for `seconds` on end, spread
+  /// over it.
+  [[nodiscard]] static std::vector<double> starts(const mock::DriveOptions& drive, int count,
+                                                  double speed, double seconds);
 
  private:
   struct Parts;

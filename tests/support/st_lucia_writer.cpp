@@ -16,7 +16,9 @@ namespace {
 const std::string kPrefix = "200101_100000_";  // that in Brisbane
 const std::string kImages = kPrefix + "MultiCamera0";
 
-std::string stamp_text(Stamp stamp) { return fmt::format("{} {}", stamp.ns() / 1'000'000'000, stamp.ns() % 1'000'000'000 / 1'000); }
+std::string stamp_text(Stamp stamp) {
+  return fmt::format("{} {}", stamp.ns() / 1'000'000'000, stamp.ns() % 1'000'000'000 / 1'000);
+}
 
 std::vector<std::uint8_t> mosaic_of(const ImageView& v) {
   std::vector<std::uint8_t> pixels;
@@ -25,13 +27,17 @@ std::vector<std::uint8_t> mosaic_of(const ImageView& v) {
 }
 
 std::string ins_line(const InsSample& s) {
-  const Mat3 R = Eigen::Quaterniond(s.q_enu_ins[3], s.q_enu_ins[0], s.q_enu_ins[1], s.q_enu_ins[2]).toRotationMatrix();
-  const double roll = std::atan2(R(2, 1), R(2, 2)), pitch = std::asin(-R(2, 0)), yaw = std::atan2(R(1, 0), R(0, 0));
+  const Mat3 R = Eigen::Quaterniond(s.q_enu_ins[3], s.q_enu_ins[0], s.q_enu_ins[1], s.q_enu_ins[2])
+                     .toRotationMatrix();
+  const double roll = std::atan2(R(2, 1), R(2, 2)), pitch = std::asin(-R(2, 0)),
+               yaw = std::atan2(R(1, 0), R(0, 0));
   const auto& v = s.velocity_enu;
   constexpr double kGeoid = 40;  // m, about what it is there
-  return fmt::format("{} {:.13f} {:.13f} {:.7f} {:.7f} {:.9f} {:.9f} {:.9f} {:.12f} {:.12f} {:.12f}\n", stamp_text(s.stamp),
-                     s.position.latitude_deg, s.position.longitude_deg, s.position.height_m, s.position.height_m - kGeoid, v[1], -v[0],
-                     v[2], roll, pitch, std::remainder(yaw - std::numbers::pi / 2, 2 * std::numbers::pi));
+  return fmt::format(
+      "{} {:.13f} {:.13f} {:.7f} {:.7f} {:.9f} {:.9f} {:.9f} {:.12f} {:.12f} {:.12f}\n",
+      stamp_text(s.stamp), s.position.latitude_deg, s.position.longitude_deg, s.position.height_m,
+      s.position.height_m - kGeoid, v[1], -v[0], v[2], roll, pitch,
+      std::remainder(yaw - std::numbers::pi / 2, 2 * std::numbers::pi));
 }
 
 }  // namespace
@@ -63,12 +69,15 @@ std::vector<std::uint8_t> bmp_of(const std::uint8_t* pixels, int width, int heig
 
 void write_bytes(const std::filesystem::path& file, const std::vector<std::uint8_t>& bytes) {
   std::ofstream out(file, std::ios::binary);
-  out.write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
+  out.write(reinterpret_cast<const char*>(bytes.data()),
+            static_cast<std::streamsize>(bytes.size()));
 }
 
-void write_st_lucia(const app::Configuration& c, double duration_s, const std::filesystem::path& folder) {
+void write_st_lucia(const app::Configuration& c, double duration_s,
+                    const std::filesystem::path& folder) {
   const app::MockDrive drive = app::make_mock_drive(c, {}, false, duration_s, true);
-  app::LiveSource source({&drive.rig->camera(0), &drive.rig->camera(1)}, drive.has_ins ? &drive.rig->ins() : nullptr, &drive.rig->trigger(),
+  app::LiveSource source({&drive.rig->camera(0), &drive.rig->camera(1)},
+                         drive.has_ins ? &drive.rig->ins() : nullptr, &drive.rig->trigger(),
                          mock_source_options(c, drive));
 
   std::filesystem::create_directories(folder / kImages);
@@ -79,11 +88,16 @@ void write_st_lucia(const app::Configuration& c, double duration_s, const std::f
     if (item.kind == app::LiveItem::Kind::reading) ins << ins_line(item.sample);
     if (item.kind != app::LiveItem::Kind::images) continue;
     if (item.set.complete) {
-      const std::string size = fmt::format("{} {} GBRG8", c.cameras[0].width, c.cameras[0].height), stamp = stamp_text(item.stamp);
-      const auto name = [&](int k) { return fmt::format("cam{}_image{:05d}.bmp", k, item.set.number); };
-      for (int k = 0; k < 2; ++k) write_bytes(folder / kImages / name(k), mosaic_of(source.image(item.set, k)));
+      const std::string size = fmt::format("{} {} GBRG8", c.cameras[0].width, c.cameras[0].height),
+                        stamp = stamp_text(item.stamp);
+      const auto name = [&](int k) {
+        return fmt::format("cam{}_image{:05d}.bmp", k, item.set.number);
+      };
+      for (int k = 0; k < 2; ++k)
+        write_bytes(folder / kImages / name(k), mosaic_of(source.image(item.set, k)));
       // One with the folder in front, one without: the readers of the data set meet both.
-      images << fmt::format("{} {} {} {} {}/{} {}\n", stamp, size, stamp, size, kImages, name(0), name(1));
+      images << fmt::format("{} {} {} {} {}/{} {}\n", stamp, size, stamp, size, kImages, name(0),
+                            name(1));
     }
     source.release(item.set);
   }

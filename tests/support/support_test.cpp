@@ -9,7 +9,9 @@
 namespace vergence {
 namespace {
 
-Eigen::Vector2d curve(const Eigen::Vector3d& d) { return {std::sin(d.x()) + d.y() * d.y(), d.z() * (1.0 + d.x())}; }
+Eigen::Vector2d curve(const Eigen::Vector3d& d) {
+  return {std::sin(d.x()) + d.y() * d.y(), d.z() * (1.0 + d.x())};
+}
 
 TEST(NumericJacobian, acceptsTheRightDerivativeAndPrintsBothWhenOneIsWrong) {
   Eigen::Matrix<double, 2, 3> J;

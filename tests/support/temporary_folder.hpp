@@ -16,7 +16,8 @@ class TemporaryFolder {
  public:
   TemporaryFolder() {
     std::string name = (std::filesystem::temp_directory_path() / "vergence-test-XXXXXX").string();
-    if (::mkdtemp(name.data()) == nullptr) throw std::runtime_error("cannot make a temporary folder like " + name);
+    if (::mkdtemp(name.data()) == nullptr)
+      throw std::runtime_error("cannot make a temporary folder like " + name);
     path_ = name;
   }
   ~TemporaryFolder() {
@@ -27,7 +28,9 @@ class TemporaryFolder {
   TemporaryFolder& operator=(const TemporaryFolder&) = delete;
 
   [[nodiscard]] const std::filesystem::path& path() const noexcept { return path_; }
-  [[nodiscard]] std::filesystem::path operator/(const std::filesystem::path& below) const { return path_ / below; }
+  [[nodiscard]] std::filesystem::path operator/(const std::filesystem::path& below) const {
+    return path_ / below;
+  }
 
   /// Writes `text` to a file below, folders made as needed; returns its path.
   std::filesystem::path write(const std::filesystem::path& below, std::string_view text) const {

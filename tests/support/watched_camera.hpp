@@ -5,21 +5,25 @@
 
 namespace vergence::test {
 
-/// A mock's camera that is watched: knows of every slot it hands out when the image was exposed, by the arrival less the least delay.
+/// A mock's camera that is watched: knows of every slot it hands out when the image was exposed, by
+/// the arrival less the least delay.
 ///
-/// Ownership  The camera outlives it. Threads: CameraDevice's; edge_of_slot by the consumer, while it has the slot.
+/// Ownership  The camera outlives it. Threads: CameraDevice's; edge_of_slot by the consumer, while
+///            it has the slot.
 class WatchedCamera final : public CameraDevice {
  public:
   explicit WatchedCamera(CameraDevice* camera) : camera_(camera) {}
   const DeviceInfo& info() const noexcept override { return camera_->info(); }
-  DeviceStatus configure(const CameraConfiguration& c, CameraConfiguration* actual) noexcept override {
+  DeviceStatus configure(const CameraConfiguration& c,
+                         CameraConfiguration* actual) noexcept override {
     return camera_->configure(c, actual);
   }
   DeviceTiming timing() const noexcept override { return camera_->timing(); }
   DeviceStatus start(Notifier* ready) noexcept override { return camera_->start(ready); }
   DeviceStatus wait(Duration limit, Frame* frame) noexcept override {
     const DeviceStatus status = camera_->wait(limit, frame);
-    if (status == DeviceStatus::ok) edge_of_slot[frame->slot] = frame->arrival - camera_->timing().least_delay;
+    if (status == DeviceStatus::ok)
+      edge_of_slot[frame->slot] = frame->arrival - camera_->timing().least_delay;
     return status;
   }
   ImageView view(FrameSlot slot) const noexcept override { return camera_->view(slot); }
@@ -27,7 +31,8 @@ class WatchedCamera final : public CameraDevice {
   void stop() noexcept override { camera_->stop(); }
   CameraStatistics statistics() const noexcept override { return camera_->statistics(); }
 
-  std::array<HostStamp, 64> edge_of_slot{};  // not before the true edge, and at most 1.9 ms after it: the mock's jitter
+  std::array<HostStamp, 64>
+      edge_of_slot{};  // not before the true edge, and at most 1.9 ms after it: the mock's jitter
 
  private:
   CameraDevice* camera_;

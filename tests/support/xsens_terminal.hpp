@@ -19,7 +19,8 @@ namespace vergence::test {
 }
 
 /// A simulated XSens INS that rests so, from now on.
-[[nodiscard]] inline std::unique_ptr<mock::XsensSimulator> resting_xsens(mock::XsensSimulatorOptions options = {}) {
+[[nodiscard]] inline std::unique_ptr<mock::XsensSimulator> resting_xsens(
+    mock::XsensSimulatorOptions options = {}) {
   options.power_on = monotonic_now();
   return std::make_unique<mock::XsensSimulator>(resting_sample, options);
 }
@@ -27,8 +28,10 @@ namespace vergence::test {
 /// The same behind a pseudo-terminal: port() is what a driver opens.
 class XsensOnTerminal {
  public:
-  explicit XsensOnTerminal(const mock::XsensSimulatorOptions& options) : master_(::posix_openpt(O_RDWR | O_NOCTTY | O_NONBLOCK)) {
-    if (master_ < 0 || ::grantpt(master_) != 0 || ::unlockpt(master_) != 0) throw std::runtime_error("no pseudo-terminal");
+  explicit XsensOnTerminal(const mock::XsensSimulatorOptions& options)
+      : master_(::posix_openpt(O_RDWR | O_NOCTTY | O_NONBLOCK)) {
+    if (master_ < 0 || ::grantpt(master_) != 0 || ::unlockpt(master_) != 0)
+      throw std::runtime_error("no pseudo-terminal");
     port_ = ::ptsname(master_);
     sensor_ = std::make_unique<DeviceOnDescriptor>(master_, resting_xsens(options));
   }

@@ -8,15 +8,19 @@
 namespace vergence::app::detail {
 namespace {
 
-/// Luminance of ITU-R BT.601 in 8 bits, as JPEG has it. `red`, `blue`: place of the colours in a pixel.
-void colour_to_grey(const std::uint8_t* row, int width, std::size_t red, std::size_t blue, std::uint8_t* out) noexcept {
+/// Luminance of ITU-R BT.601 in 8 bits, as JPEG has it. `red`, `blue`: place of the colours in a
+/// pixel.
+void colour_to_grey(const std::uint8_t* row, int width, std::size_t red, std::size_t blue,
+                    std::uint8_t* out) noexcept {
   for (int x = 0; x < width; ++x, row += 3)
-    out[x] = static_cast<std::uint8_t>((77U * row[red] + 150U * row[1] + 29U * row[blue] + 128U) >> 8U);
+    out[x] =
+        static_cast<std::uint8_t>((77U * row[red] + 150U * row[1] + 29U * row[blue] + 128U) >> 8U);
 }
 
 }  // namespace
 
-BagImages::BagImages(std::vector<std::unique_ptr<FileBytes>> files, std::array<std::string, 2> topics,
+BagImages::BagImages(std::vector<std::unique_ptr<FileBytes>> files,
+                     std::array<std::string, 2> topics,
                      std::array<std::vector<BagImage>, 2> images) noexcept
     : files_(std::move(files)), topics_(std::move(topics)), images_(std::move(images)) {}
 
@@ -29,11 +33,13 @@ const BagImage* BagImages::find(const std::string& name, std::size_t* camera) co
   const std::size_t mark = name.rfind('#');
   if (mark == std::string::npos) return nullptr;
   std::size_t index = 0;
-  if (std::from_chars(name.data() + mark + 1, name.data() + name.size(), index).ec != std::errc{}) return nullptr;
+  if (std::from_chars(name.data() + mark + 1, name.data() + name.size(), index).ec != std::errc{})
+    return nullptr;
   for (*camera = 0; *camera < 2; ++*camera) {
     std::string_view topic = topics_[*camera];
     if (topic.starts_with('/')) topic.remove_prefix(1);
-    if (topic == std::string_view(name).substr(0, mark)) return index < images_[*camera].size() ? &images_[*camera][index] : nullptr;
+    if (topic == std::string_view(name).substr(0, mark))
+      return index < images_[*camera].size() ? &images_[*camera][index] : nullptr;
   }
   return nullptr;
 }
@@ -46,7 +52,8 @@ ImageFileStatus BagImages::size(const std::string& name, ImageSize* size) const 
   return ImageFileStatus::ok;
 }
 
-bool BagImages::load(const BagImage& entry, Unpacked* unpacked, std::vector<std::uint8_t>* data) const {
+bool BagImages::load(const BagImage& entry, Unpacked* unpacked,
+                     std::vector<std::uint8_t>* data) const {
   const FileBytes& file = *files_[entry.file];
   data->resize(entry.image.bytes);
   const std::uint64_t offset = entry.place.offset + entry.image.offset;
@@ -61,8 +68,8 @@ bool BagImages::load(const BagImage& entry, Unpacked* unpacked, std::vector<std:
   return MemoryBytes(unpacked->records).read(offset, *data);
 }
 
-ImageFileStatus BagImages::decode(const std::string& name, ImageSize size, std::uint8_t* out, std::size_t stride,
-                                  std::vector<std::uint8_t>* work) const {
+ImageFileStatus BagImages::decode(const std::string& name, ImageSize size, std::uint8_t* out,
+                                  std::size_t stride, std::vector<std::uint8_t>* work) const {
   std::size_t camera = 0;
   const BagImage* entry = find(name, &camera);
   if (entry == nullptr) return ImageFileStatus::missing;
@@ -74,7 +81,8 @@ ImageFileStatus BagImages::decode(const std::string& name, ImageSize size, std::
     case PixelLayout::encoded:
       return decode_grey(*work, size, out, stride);
     case PixelLayout::bayer:
-      bayer_to_grey(in, image.step, size.width, size.height, out, static_cast<std::ptrdiff_t>(stride));
+      bayer_to_grey(in, image.step, size.width, size.height, out,
+                    static_cast<std::ptrdiff_t>(stride));
       return ImageFileStatus::ok;
     case PixelLayout::grey:
     case PixelLayout::rgb:
@@ -85,7 +93,8 @@ ImageFileStatus BagImages::decode(const std::string& name, ImageSize size, std::
     if (image.layout == PixelLayout::grey)
       std::copy_n(in, size.width, out);
     else
-      colour_to_grey(in, size.width, image.layout == PixelLayout::rgb ? 0 : 2, image.layout == PixelLayout::rgb ? 2 : 0, out);
+      colour_to_grey(in, size.width, image.layout == PixelLayout::rgb ? 0 : 2,
+                     image.layout == PixelLayout::rgb ? 2 : 0, out);
   }
   return ImageFileStatus::ok;
 }

@@ -19,7 +19,8 @@ struct BagImage {
   std::uint32_t file = 0;  // of the bag's files
 };
 
-/// The images of two topics of a bag, loaded when they are asked for. A camera's chunk stays unpacked until its next one is wanted.
+/// The images of two topics of a bag, loaded when they are asked for. A camera's chunk stays
+/// unpacked until its next one is wanted.
 /// Memory  Some 80 bytes an image, and twice kMostChunk a camera at most.
 class BagImages final : public ImageStore {
  public:
@@ -30,7 +31,8 @@ class BagImages final : public ImageStore {
   /// What names image `index` of camera `camera`: `left/image_raw#12`.
   [[nodiscard]] std::string name(std::size_t camera, std::size_t index) const;
   [[nodiscard]] ImageFileStatus size(const std::string& name, ImageSize* size) const override;
-  [[nodiscard]] ImageFileStatus decode(const std::string& name, ImageSize size, std::uint8_t* out, std::size_t stride,
+  [[nodiscard]] ImageFileStatus decode(const std::string& name, ImageSize size, std::uint8_t* out,
+                                       std::size_t stride,
                                        std::vector<std::uint8_t>* work) const override;
 
  private:
@@ -43,7 +45,8 @@ class BagImages final : public ImageStore {
   };
   /// Nothing: no such image.
   [[nodiscard]] const BagImage* find(const std::string& name, std::size_t* camera) const noexcept;
-  [[nodiscard]] bool load(const BagImage& entry, Unpacked* unpacked, std::vector<std::uint8_t>* data) const;
+  [[nodiscard]] bool load(const BagImage& entry, Unpacked* unpacked,
+                          std::vector<std::uint8_t>* data) const;
 
   std::vector<std::unique_ptr<FileBytes>> files_;
   std::array<std::string, 2> topics_;

@@ -10,15 +10,20 @@ namespace {
 using Bytes = std::span<const std::uint8_t>;
 
 // Where things stand: the file header of 14 bytes, then the information header.
-constexpr std::size_t kPixelsAt = 10, kHeaderSize = 14, kWidth = 18, kHeight = 22, kBits = 28, kCompression = 30, kColours = 46;
+constexpr std::size_t kPixelsAt = 10, kHeaderSize = 14, kWidth = 18, kHeight = 22, kBits = 28,
+                      kCompression = 30, kColours = 46;
 constexpr std::size_t kFileHeader = 14, kLeastHeader = 40, kWholeHead = kFileHeader + kLeastHeader;
 
-std::uint32_t u16(Bytes b, std::size_t at) noexcept { return b[at] | std::uint32_t{b[at + 1]} << 8U; }
+std::uint32_t u16(Bytes b, std::size_t at) noexcept {
+  return b[at] | std::uint32_t{b[at + 1]} << 8U;
+}
 std::uint32_t u32(Bytes b, std::size_t at) noexcept { return u16(b, at) | u16(b, at + 2) << 16U; }
 
 /// A negative height says that the first row is the top one.
 bool top_down(Bytes b) noexcept { return (u32(b, kHeight) & 0x80000000U) != 0; }
-std::size_t row_bytes(std::uint32_t width, std::uint32_t bits) noexcept { return (std::size_t{width} * bits + 31) / 32 * 4; }
+std::size_t row_bytes(std::uint32_t width, std::uint32_t bits) noexcept {
+  return (std::size_t{width} * bits + 31) / 32 * 4;
+}
 
 bool palette_is_grey(Bytes b) noexcept {
   const std::size_t first = kFileHeader + u32(b, kHeaderSize), end = u32(b, kPixelsAt);
@@ -33,12 +38,16 @@ bool palette_is_grey(Bytes b) noexcept {
 
 }  // namespace
 
-bool is_bmp(Bytes bytes) noexcept { return bytes.size() >= 2 && bytes[0] == 'B' && bytes[1] == 'M'; }
+bool is_bmp(Bytes bytes) noexcept {
+  return bytes.size() >= 2 && bytes[0] == 'B' && bytes[1] == 'M';
+}
 
 ImageFileStatus bmp_size(Bytes b, ImageSize* size) noexcept {
   if (b.size() < kBmpHead) return ImageFileStatus::torn;
-  if (u32(b, kHeaderSize) < kLeastHeader) return ImageFileStatus::not_an_image;  // an older kind, or no BMP at all
-  const std::uint32_t width = u32(b, kWidth), height = top_down(b) ? 0U - u32(b, kHeight) : u32(b, kHeight);
+  if (u32(b, kHeaderSize) < kLeastHeader)
+    return ImageFileStatus::not_an_image;  // an older kind, or no BMP at all
+  const std::uint32_t width = u32(b, kWidth),
+                      height = top_down(b) ? 0U - u32(b, kHeight) : u32(b, kHeight);
   return accept_size(width, height, size);
 }
 
@@ -46,19 +55,26 @@ ImageFileStatus check_bmp(Bytes b) noexcept {
   ImageSize size;
   if (const auto status = bmp_size(b, &size); status != ImageFileStatus::ok) return status;
   if (b.size() < kWholeHead) return ImageFileStatus::torn;
-  if (u32(b, kCompression) != 0 || u16(b, kBits) > 32) return ImageFileStatus::ok;  // the decoder refuses it
+  if (u32(b, kCompression) != 0 || u16(b, kBits) > 32)
+    return ImageFileStatus::ok;  // the decoder refuses it
   const std::size_t pixels = u32(b, kPixelsAt);
-  const std::size_t needed = row_bytes(static_cast<std::uint32_t>(size.width), u16(b, kBits)) * static_cast<std::size_t>(size.height);
-  return pixels <= b.size() && needed <= b.size() - pixels ? ImageFileStatus::ok : ImageFileStatus::torn;
+  const std::size_t needed = row_bytes(static_cast<std::uint32_t>(size.width), u16(b, kBits)) *
+                             static_cast<std::size_t>(size.height);
+  return pixels <= b.size() && needed <= b.size() - pixels ? ImageFileStatus::ok
+                                                           : ImageFileStatus::torn;
 }
 
-ImageFileStatus decode_bmp(Bytes b, ImageSize size, std::uint8_t* out, std::size_t stride) noexcept {
-  if (u16(b, kBits) != 8 || u32(b, kCompression) != 0 || !palette_is_grey(b)) return ImageFileStatus::undecodable;
-  const std::size_t width = static_cast<std::size_t>(size.width), height = static_cast<std::size_t>(size.height);
+ImageFileStatus decode_bmp(Bytes b, ImageSize size, std::uint8_t* out,
+                           std::size_t stride) noexcept {
+  if (u16(b, kBits) != 8 || u32(b, kCompression) != 0 || !palette_is_grey(b))
+    return ImageFileStatus::undecodable;
+  const std::size_t width = static_cast<std::size_t>(size.width),
+                    height = static_cast<std::size_t>(size.height);
   const std::size_t row = row_bytes(static_cast<std::uint32_t>(size.width), 8);
   for (std::size_t y = 0; y < height; ++y)
-    std::copy_n(b.begin() + static_cast<std::ptrdiff_t>(u32(b, kPixelsAt) + (top_down(b) ? y : height - 1 - y) * row), width,
-                out + y * stride);
+    std::copy_n(b.begin() + static_cast<std::ptrdiff_t>(u32(b, kPixelsAt) +
+                                                        (top_down(b) ? y : height - 1 - y) * row),
+                width, out + y * stride);
   return ImageFileStatus::ok;
 }
 

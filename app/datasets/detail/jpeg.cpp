@@ -17,7 +17,9 @@ using Bytes = std::span<const std::uint8_t>;
 
 constexpr int kMostScans = 100;  // a progressive image has ten; each costs a pass over all of it
 
-std::uint32_t u16(Bytes b, std::size_t at) noexcept { return (std::uint32_t{b[at]} << 8U) | b[at + 1]; }
+std::uint32_t u16(Bytes b, std::size_t at) noexcept {
+  return (std::uint32_t{b[at]} << 8U) | b[at + 1];
+}
 
 bool is_frame_header(std::uint8_t marker) noexcept {  // SOF0 … SOF15 without DHT, JPG, DAC
   return marker >= 0xc0 && marker <= 0xcf && marker != 0xc4 && marker != 0xc8 && marker != 0xcc;
@@ -63,18 +65,22 @@ void count_scans(j_common_ptr jpeg) {
 }
 
 /// Between setjmp and the handlers' longjmp nothing may stand that has a destructor.
-bool read_rows(Decoder* d, Bytes bytes, ImageSize size, std::uint8_t* out, std::size_t stride) noexcept {
+bool read_rows(Decoder* d, Bytes bytes, ImageSize size, std::uint8_t* out,
+               std::size_t stride) noexcept {
   if (setjmp(d->leave) != 0) return false;
   jpeg_create_decompress(&d->jpeg);
   d->jpeg.client_data = d;
   d->jpeg.progress = &d->progress;
   jpeg_mem_src(&d->jpeg, bytes.data(), bytes.size());
   if (jpeg_read_header(&d->jpeg, TRUE) != JPEG_HEADER_OK) return false;
-  const auto width = static_cast<JDIMENSION>(size.width), height = static_cast<JDIMENSION>(size.height);
+  const auto width = static_cast<JDIMENSION>(size.width),
+             height = static_cast<JDIMENSION>(size.height);
   if (d->jpeg.image_width != width || d->jpeg.image_height != height) return false;
   d->jpeg.out_color_space = JCS_GRAYSCALE;
   (void)jpeg_start_decompress(&d->jpeg);
-  if (d->jpeg.output_components != 1 || d->jpeg.output_width != width || d->jpeg.output_height != height) return false;
+  if (d->jpeg.output_components != 1 || d->jpeg.output_width != width ||
+      d->jpeg.output_height != height)
+    return false;
   while (d->jpeg.output_scanline < height) {
     JSAMPROW row = out + d->jpeg.output_scanline * stride;
     (void)jpeg_read_scanlines(&d->jpeg, &row, 1);
@@ -84,7 +90,9 @@ bool read_rows(Decoder* d, Bytes bytes, ImageSize size, std::uint8_t* out, std::
 
 }  // namespace
 
-bool is_jpeg(Bytes b) noexcept { return b.size() >= 3 && b[0] == 0xff && b[1] == 0xd8 && b[2] == 0xff; }
+bool is_jpeg(Bytes b) noexcept {
+  return b.size() >= 3 && b[0] == 0xff && b[1] == 0xd8 && b[2] == 0xff;
+}
 
 ImageFileStatus jpeg_size(Bytes b, ImageSize* size) noexcept {
   std::size_t at = 2;
@@ -106,7 +114,8 @@ ImageFileStatus check_jpeg(Bytes b) noexcept {
   return b[end - 2] == 0xff && b[end - 1] == 0xd9 ? ImageFileStatus::ok : ImageFileStatus::torn;
 }
 
-ImageFileStatus decode_jpeg(Bytes bytes, ImageSize size, std::uint8_t* out, std::size_t stride) noexcept {
+ImageFileStatus decode_jpeg(Bytes bytes, ImageSize size, std::uint8_t* out,
+                            std::size_t stride) noexcept {
   Decoder decoder;
   decoder.jpeg.err = jpeg_std_error(&decoder.errors);
   decoder.jpeg.client_data = &decoder;  // jpeg_create_decompress() keeps it
@@ -115,7 +124,9 @@ ImageFileStatus decode_jpeg(Bytes bytes, ImageSize size, std::uint8_t* out, std:
   decoder.progress.progress_monitor = count_scans;
   const bool done = read_rows(&decoder, bytes, size, out, stride);
   jpeg_destroy_decompress(&decoder.jpeg);
-  return done ? ImageFileStatus::ok : decoder.damaged ? ImageFileStatus::torn : ImageFileStatus::undecodable;
+  return done              ? ImageFileStatus::ok
+         : decoder.damaged ? ImageFileStatus::torn
+                           : ImageFileStatus::undecodable;
 }
 
 }  // namespace vergence::app::detail

@@ -13,8 +13,9 @@
 #include "core/types/calibration.hpp"
 #include "core/types/time.hpp"
 
-/// What the readers of a KITTI raw drive share: where its files lie, its stamps, its calibration. Layout and units are those of the raw
-/// data's development kit (Geiger, Lenz, Stiller, Urtasun, "Vision meets robotics: The KITTI dataset", IJRR 2013).
+/// What the readers of a KITTI raw drive share: where its files lie, its stamps, its calibration.
+/// Layout and units are those of the raw data's development kit (Geiger, Lenz, Stiller, Urtasun,
+/// "Vision meets robotics: The KITTI dataset", IJRR 2013).
 namespace vergence::app::detail {
 
 struct KittiRawFolders {
@@ -38,11 +39,13 @@ struct KittiStamps {
   std::size_t first_broken = 0;               // its number in the file, from 1
 };
 
-/// A last line without its end that has fewer decimals than the one before counts as broken: it was cut off.
+/// A last line without its end that has fewer decimals than the one before counts as broken: it was
+/// cut off.
 /// InputError: not there, no stamp in it, more lines than kMostReadings.
 [[nodiscard]] KittiStamps read_kitti_stamps(const std::filesystem::path& file);
 
-/// Indices of a longest strictly ascending part of the stamps: what stays when the fewest are left out that go back or repeat one.
+/// Indices of a longest strictly ascending part of the stamps: what stays when the fewest are left
+/// out that go back or repeat one.
 [[nodiscard]] std::vector<std::size_t> ascending(std::span<const Stamp> stamps);
 
 /// The rig of two of the four cameras, and where it sits.
@@ -52,12 +55,15 @@ struct KittiRawRig {
   Transform T_left_camera0{};  // p_left = T · p_camera0, of the camera 00 before rectification
 };
 
-/// From calib_cam_to_cam.txt: `images` is the size that the images have, by which they are raw (S_NN) or rectified (S_rect_NN); where both
-/// are that size, `drive_name` that ends in _sync says rectified. InputError with file:line.
-[[nodiscard]] KittiRawRig read_kitti_raw_rig(const std::filesystem::path& file, const std::array<int, 2>& cameras, ImageSize images,
+/// From calib_cam_to_cam.txt: `images` is the size that the images have, by which they are raw
+/// (S_NN) or rectified (S_rect_NN); where both are that size, `drive_name` that ends in _sync says
+/// rectified. InputError with file:line.
+[[nodiscard]] KittiRawRig read_kitti_raw_rig(const std::filesystem::path& file,
+                                             const std::array<int, 2>& cameras, ImageSize images,
                                              const std::string& drive_name);
 
-/// p_camera0 = T · p_ins from calib_velo_to_cam.txt and calib_imu_to_velo.txt. InputError with file:line.
+/// p_camera0 = T · p_ins from calib_velo_to_cam.txt and calib_imu_to_velo.txt. InputError with
+/// file:line.
 [[nodiscard]] Transform read_kitti_raw_mount(const std::filesystem::path& folder);
 
 /// The images of camera `camera` of the drive, image_NN.

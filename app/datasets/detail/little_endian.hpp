@@ -7,7 +7,8 @@
 
 namespace vergence::app::detail {
 
-/// Reads what MCAP records are made of, one after the other. Once something is not all there, ok() is false and every further value 0.
+/// Reads what MCAP records are made of, one after the other. Once something is not all there, ok()
+/// is false and every further value 0.
 class LittleEndian {
  public:
   explicit LittleEndian(std::span<const std::uint8_t> bytes) noexcept : rest_(bytes) {}

@@ -22,10 +22,18 @@ namespace {
 constexpr std::array<std::uint8_t, 8> kMagic{0x89, 'M', 'C', 'A', 'P', 0x30, '\r', '\n'};
 constexpr std::uint64_t kRecordHead = 9;    // opcode u8, length u64
 constexpr std::uint64_t kMessageHead = 22;  // channel u16, sequence u32, log and publish time u64
-constexpr std::uint64_t kChunkHead = 32;    // start, end, unpacked size u64, check sum u32, length of the compression's name u32
-constexpr std::uint64_t kMostName = 16;     // bytes of a compression's name
+constexpr std::uint64_t kChunkHead =
+    32;  // start, end, unpacked size u64, check sum u32, length of the compression's name u32
+constexpr std::uint64_t kMostName = 16;  // bytes of a compression's name
 
-enum class Opcode : std::uint8_t { footer = 2, schema = 3, channel = 4, message = 5, chunk = 6, data_end = 15 };
+enum class Opcode : std::uint8_t {
+  footer = 2,
+  schema = 3,
+  channel = 4,
+  message = 5,
+  chunk = 6,
+  data_end = 15
+};
 
 struct Record {
   Opcode opcode{};
@@ -37,7 +45,8 @@ struct Record {
 std::optional<Record> record_at(const ByteSource& bytes, std::uint64_t offset) noexcept {
   std::array<std::uint8_t, kRecordHead> head{};
   if (!bytes.read(offset, head) || head[0] == 0) return std::nullopt;
-  Record record{static_cast<Opcode>(head[0]), offset + kRecordHead, LittleEndian(std::span(head).subspan(1)).u64()};
+  Record record{static_cast<Opcode>(head[0]), offset + kRecordHead,
+                LittleEndian(std::span(head).subspan(1)).u64()};
   if (record.size > bytes.size() - record.content) return std::nullopt;
   return record;
 }
@@ -53,7 +62,8 @@ struct ChunkHead {
 
 std::optional<ChunkHead> chunk_head(const ByteSource& file, const Record& record) {
   std::array<std::uint8_t, kChunkHead + kMostName + 8> bytes{};
-  const auto there = std::span(bytes).first(static_cast<std::size_t>(std::min<std::uint64_t>(bytes.size(), record.size)));
+  const auto there = std::span(bytes).first(
+      static_cast<std::size_t>(std::min<std::uint64_t>(bytes.size(), record.size)));
   if (!file.read(record.content, there) || there.size() < kChunkHead) return std::nullopt;
   LittleEndian in(there.subspan(16));
   ChunkHead head;
@@ -67,15 +77,20 @@ std::optional<ChunkHead> chunk_head(const ByteSource& file, const Record& record
 }
 
 /// Why a chunk cannot be unpacked; empty: it is in *records.
-std::string unpack(const ByteSource& file, const ChunkHead& head, std::vector<std::uint8_t>* records) {
-  if (head.packed > kMostChunk || head.unpacked > kMostChunk) return "a chunk larger than 64 MiB; write the bag with smaller chunks";
+std::string unpack(const ByteSource& file, const ChunkHead& head,
+                   std::vector<std::uint8_t>* records) {
+  if (head.packed > kMostChunk || head.unpacked > kMostChunk)
+    return "a chunk larger than 64 MiB; write the bag with smaller chunks";
   std::vector<std::uint8_t> packed(static_cast<std::size_t>(head.packed));
   if (!file.read(head.records, packed)) return "a chunk that cannot be read";
   records->resize(static_cast<std::size_t>(head.unpacked));
   if (head.compression != "zstd" && head.compression != "lz4")
-    return "a chunk of the compression \"" + head.compression + "\"; lz4, zstd and none can be read";
-  if (!decompress(head.compression, packed, *records)) return "a chunk whose " + head.compression + " data do not unpack";
-  if (head.crc != 0 && ::crc32(0, records->data(), static_cast<uInt>(records->size())) != head.crc) return "a chunk whose check sum fails";
+    return "a chunk of the compression \"" + head.compression +
+           "\"; lz4, zstd and none can be read";
+  if (!decompress(head.compression, packed, *records))
+    return "a chunk whose " + head.compression + " data do not unpack";
+  if (head.crc != 0 && ::crc32(0, records->data(), static_cast<uInt>(records->size())) != head.crc)
+    return "a chunk whose check sum fails";
   return "";
 }
 
@@ -87,11 +102,13 @@ bool decompress_zstd(std::span<const std::uint8_t> packed, std::span<std::uint8_
 bool decompress_lz4(std::span<const std::uint8_t> packed, std::span<std::uint8_t> out) noexcept {
   LZ4F_dctx* context = nullptr;
   if (LZ4F_isError(LZ4F_createDecompressionContext(&context, LZ4F_VERSION)) != 0) return false;
-  const std::unique_ptr<LZ4F_dctx, decltype(&LZ4F_freeDecompressionContext)> owner(context, &LZ4F_freeDecompressionContext);
+  const std::unique_ptr<LZ4F_dctx, decltype(&LZ4F_freeDecompressionContext)> owner(
+      context, &LZ4F_freeDecompressionContext);
   std::size_t in = 0, written = 0, hint = 1;
   while (in < packed.size() && hint != 0) {
     std::size_t taken = packed.size() - in, given = out.size() - written;
-    hint = LZ4F_decompress(context, out.data() + written, &given, packed.data() + in, &taken, nullptr);
+    hint =
+        LZ4F_decompress(context, out.data() + written, &given, packed.data() + in, &taken, nullptr);
     if (LZ4F_isError(hint) != 0 || (taken == 0 && given == 0)) return false;
     in += taken, written += given;
   }
@@ -101,7 +118,8 @@ bool decompress_lz4(std::span<const std::uint8_t> packed, std::span<std::uint8_t
 /// One scan of one file.
 class Scanner {
  public:
-  Scanner(const FileBytes& file, const std::function<void(const McapMessage&)>& each) : file_(file), each_(each) {}
+  Scanner(const FileBytes& file, const std::function<void(const McapMessage&)>& each)
+      : file_(file), each_(each) {}
 
   McapScan scan() {
     std::uint64_t at = kMagic.size();
@@ -125,17 +143,20 @@ class Scanner {
   void take_chunk(const Record& record) {
     const std::uint64_t here = record.content - kRecordHead;
     const auto head = chunk_head(file_, record);
-    if (!head) return broken(&scan_.broken_chunks, here, "a chunk whose head contradicts its length");
+    if (!head)
+      return broken(&scan_.broken_chunks, here, "a chunk whose head contradicts its length");
     if (head->compression.empty()) {
       walk(file_, head->records, head->records + head->packed, McapPlace::kNoChunk, here);
       return;
     }
-    if (const std::string why = unpack(file_, *head, &records_); !why.empty()) return broken(&scan_.broken_chunks, here, why);
+    if (const std::string why = unpack(file_, *head, &records_); !why.empty())
+      return broken(&scan_.broken_chunks, here, why);
     walk(MemoryBytes(records_), 0, records_.size(), here, here);
   }
 
   /// Records [at, end) of a chunk.
-  void walk(const ByteSource& bytes, std::uint64_t at, std::uint64_t end, std::uint64_t chunk, std::uint64_t here) {
+  void walk(const ByteSource& bytes, std::uint64_t at, std::uint64_t end, std::uint64_t chunk,
+            std::uint64_t here) {
     while (at < end) {
       const auto record = record_at(bytes, at);
       if (!record || record->content + record->size > end)
@@ -146,31 +167,38 @@ class Scanner {
   }
 
   /// A record that is no chunk. `here`: for sentences.
-  void take(const ByteSource& bytes, const Record& record, std::uint64_t chunk, std::uint64_t here) {
+  void take(const ByteSource& bytes, const Record& record, std::uint64_t chunk,
+            std::uint64_t here) {
     if (record.opcode == Opcode::message) return take_message(bytes, record, chunk, here);
     if (record.opcode != Opcode::schema && record.opcode != Opcode::channel) return;
-    if (record.size > kMostDescription) return broken(&scan_.broken_records, here, "a description longer than 1 MiB");
+    if (record.size > kMostDescription)
+      return broken(&scan_.broken_records, here, "a description longer than 1 MiB");
     std::vector<std::uint8_t> content(static_cast<std::size_t>(record.size));
-    if (!bytes.read(record.content, content)) return broken(&scan_.broken_records, here, "a description that cannot be read");
+    if (!bytes.read(record.content, content))
+      return broken(&scan_.broken_records, here, "a description that cannot be read");
     LittleEndian in(content);
     const std::uint16_t id = in.u16();
     if (record.opcode == Opcode::schema) {
       std::string name = in.text();
-      if (!in.ok()) return broken(&scan_.broken_records, here, "a schema whose lengths contradict each other");
+      if (!in.ok())
+        return broken(&scan_.broken_records, here, "a schema whose lengths contradict each other");
       types_.try_emplace(id, std::move(name));
       return;
     }
     const std::uint16_t schema = in.u16();
     McapChannel channel{in.text(), "", in.text()};
-    if (!in.ok()) return broken(&scan_.broken_records, here, "a channel whose lengths contradict each other");
+    if (!in.ok())
+      return broken(&scan_.broken_records, here, "a channel whose lengths contradict each other");
     if (const auto type = types_.find(schema); type != types_.end()) channel.type = type->second;
     channels_.try_emplace(id, std::move(channel));
   }
 
-  void take_message(const ByteSource& bytes, const Record& record, std::uint64_t chunk, std::uint64_t here) {
+  void take_message(const ByteSource& bytes, const Record& record, std::uint64_t chunk,
+                    std::uint64_t here) {
     std::array<std::uint8_t, kMessageHead> head{};
     if (record.size < kMessageHead || record.size > kMostChunk || !bytes.read(record.content, head))
-      return broken(&scan_.broken_records, here, "a message shorter than its head or longer than 64 MiB");
+      return broken(&scan_.broken_records, here,
+                    "a message shorter than its head or longer than 64 MiB");
     LittleEndian in(head);
     const auto channel = channels_.find(in.u16());
     if (channel == channels_.end()) {
@@ -182,7 +210,8 @@ class Scanner {
     const std::uint64_t log_time = in.u64();
     each_({&channel->second,
            log_time,
-           {chunk, record.content + kMessageHead, static_cast<std::uint32_t>(record.size - kMessageHead)},
+           {chunk, record.content + kMessageHead,
+            static_cast<std::uint32_t>(record.size - kMessageHead)},
            &bytes});
   }
 
@@ -203,7 +232,8 @@ class Scanner {
 
 }  // namespace
 
-FileBytes::FileBytes(const std::filesystem::path& file) : path_(file), fd_(::open(file.c_str(), O_RDONLY | O_CLOEXEC)) {
+FileBytes::FileBytes(const std::filesystem::path& file)
+    : path_(file), fd_(::open(file.c_str(), O_RDONLY | O_CLOEXEC)) {
   if (fd_ < 0) refuse(file, 0, std::string("cannot be opened: ") + std::strerror(errno));
   struct stat about {};
   if (::fstat(fd_, &about) != 0 || !S_ISREG(about.st_mode)) {
@@ -218,7 +248,8 @@ FileBytes::~FileBytes() { ::close(fd_); }
 bool FileBytes::read(std::uint64_t offset, std::span<std::uint8_t> out) const noexcept {
   if (offset > size_ || out.size() > size_ - offset) return false;
   for (std::size_t got = 0; got < out.size();) {
-    const ssize_t n = ::pread(fd_, out.data() + got, out.size() - got, static_cast<off_t>(offset + got));
+    const ssize_t n =
+        ::pread(fd_, out.data() + got, out.size() - got, static_cast<off_t>(offset + got));
     if (n < 0 && errno == EINTR) continue;
     if (n <= 0) return false;
     got += static_cast<std::size_t>(n);
@@ -235,7 +266,8 @@ bool MemoryBytes::read(std::uint64_t offset, std::span<std::uint8_t> out) const 
 McapScan scan_mcap(const FileBytes& file, const std::function<void(const McapMessage&)>& each) {
   std::array<std::uint8_t, kMagic.size()> magic{};
   if (!file.read(0, magic) || magic != kMagic)
-    refuse(file.path(), 0, "does not begin as an MCAP file does (offset 0: 89 4D 43 41 50 30 0D 0A)");
+    refuse(file.path(), 0,
+           "does not begin as an MCAP file does (offset 0: 89 4D 43 41 50 30 0D 0A)");
   return Scanner(file, each).scan();
 }
 
@@ -246,7 +278,8 @@ bool unpack_chunk(const FileBytes& file, std::uint64_t offset, std::vector<std::
   return head && unpack(file, *head, records).empty();
 }
 
-bool decompress(const std::string& name, std::span<const std::uint8_t> packed, std::span<std::uint8_t> records) noexcept {
+bool decompress(const std::string& name, std::span<const std::uint8_t> packed,
+                std::span<std::uint8_t> records) noexcept {
   if (name == "zstd") return decompress_zstd(packed, records);
   return name == "lz4" && decompress_lz4(packed, records);
 }

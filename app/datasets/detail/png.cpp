@@ -18,7 +18,8 @@ using Bytes = std::span<const std::uint8_t>;
 constexpr std::array<std::uint8_t, 8> kSignature{0x89, 'P', 'N', 'G', '\r', '\n', 0x1a, '\n'};
 
 std::uint32_t u32(Bytes b, std::size_t at) noexcept {
-  return (std::uint32_t{b[at]} << 24U) | (std::uint32_t{b[at + 1]} << 16U) | (std::uint32_t{b[at + 2]} << 8U) | b[at + 3];
+  return (std::uint32_t{b[at]} << 24U) | (std::uint32_t{b[at + 1]} << 16U) |
+         (std::uint32_t{b[at + 2]} << 8U) | b[at + 3];
 }
 
 struct Source {
@@ -61,21 +62,26 @@ void ask_for_grey(png_structp png, png_infop info) {
     png_set_expand_gray_1_2_4_to_8(png);
 }
 
-/// Between setjmp and libpng's longjmp nothing may stand that has a destructor: all of it is the caller's.
-bool read_rows(const Reader& reader, Source* source, ImageSize size, std::uint8_t* out, std::size_t stride) noexcept {
+/// Between setjmp and libpng's longjmp nothing may stand that has a destructor: all of it is the
+/// caller's.
+bool read_rows(const Reader& reader, Source* source, ImageSize size, std::uint8_t* out,
+               std::size_t stride) noexcept {
   png_structp png = reader.png;
   png_infop info = reader.info;
   if (setjmp(png_jmpbuf(png)) != 0) return false;
   png_set_read_fn(png, source, read_on);
   png_set_crc_action(png, PNG_CRC_QUIET_USE, PNG_CRC_QUIET_USE);  // check_png() has them behind it
-  constexpr std::array<png_byte, 15> kTexts{'t', 'E', 'X', 't', 0, 'z', 'T', 'X', 't', 0, 'i', 'T', 'X', 't', 0};
+  constexpr std::array<png_byte, 15> kTexts{'t', 'E', 'X', 't', 0,   'z', 'T', 'X',
+                                            't', 0,   'i', 'T', 'X', 't', 0};
   png_set_keep_unknown_chunks(png, PNG_HANDLE_CHUNK_NEVER, kTexts.data(), 3);
   png_read_info(png, info);
   ask_for_grey(png, info);
   const int passes = png_set_interlace_handling(png);
   png_read_update_info(png, info);
-  const auto width = static_cast<std::uint32_t>(size.width), height = static_cast<std::uint32_t>(size.height);
-  if (png_get_image_width(png, info) != width || png_get_image_height(png, info) != height || png_get_rowbytes(png, info) != width)
+  const auto width = static_cast<std::uint32_t>(size.width),
+             height = static_cast<std::uint32_t>(size.height);
+  if (png_get_image_width(png, info) != width || png_get_image_height(png, info) != height ||
+      png_get_rowbytes(png, info) != width)
     return false;
   for (int pass = 0; pass < passes; ++pass)
     for (std::uint32_t y = 0; y < height; ++y) png_read_row(png, out + y * stride, nullptr);
@@ -84,9 +90,14 @@ bool read_rows(const Reader& reader, Source* source, ImageSize size, std::uint8_
 
 }  // namespace
 
-bool is_png(Bytes b) noexcept { return b.size() >= kSignature.size() && std::equal(kSignature.begin(), kSignature.end(), b.begin()); }
+bool is_png(Bytes b) noexcept {
+  return b.size() >= kSignature.size() &&
+         std::equal(kSignature.begin(), kSignature.end(), b.begin());
+}
 
-bool may_become_png(Bytes b) noexcept { return b.size() < kSignature.size() && std::equal(b.begin(), b.end(), kSignature.begin()); }
+bool may_become_png(Bytes b) noexcept {
+  return b.size() < kSignature.size() && std::equal(b.begin(), b.end(), kSignature.begin());
+}
 
 ImageFileStatus png_size(Bytes b, ImageSize* size) noexcept {
   if (b.size() < kPngHead) return ImageFileStatus::torn;
@@ -104,17 +115,20 @@ ImageFileStatus check_png(Bytes b) noexcept {
     const auto sum = crc32(0, &b[at + 4], static_cast<uInt>(length + 4));
     if (sum != u32(b, at + 8 + length)) return ImageFileStatus::torn;
     if (std::memcmp(&b[at + 4], "IDAT", 4) == 0) pixels = true;
-    if (std::memcmp(&b[at + 4], "IEND", 4) == 0) return pixels ? ImageFileStatus::ok : ImageFileStatus::torn;
+    if (std::memcmp(&b[at + 4], "IEND", 4) == 0)
+      return pixels ? ImageFileStatus::ok : ImageFileStatus::torn;
     at += length + kFrame;
   }
   return ImageFileStatus::torn;
 }
 
-ImageFileStatus decode_png(Bytes bytes, ImageSize size, std::uint8_t* out, std::size_t stride) noexcept {
+ImageFileStatus decode_png(Bytes bytes, ImageSize size, std::uint8_t* out,
+                           std::size_t stride) noexcept {
   const Reader reader;
   if (reader.info == nullptr) return ImageFileStatus::undecodable;  // no memory
   Source source{bytes};
-  return read_rows(reader, &source, size, out, stride) ? ImageFileStatus::ok : ImageFileStatus::undecodable;
+  return read_rows(reader, &source, size, out, stride) ? ImageFileStatus::ok
+                                                       : ImageFileStatus::undecodable;
 }
 
 }  // namespace vergence::app::detail

@@ -5,7 +5,8 @@
 
 #include "app/datasets/image_file.hpp"
 
-/// PNG by libpng. Files are hostile: chunks are walked with their check sums and the size is accepted before libpng sees a byte.
+/// PNG by libpng. Files are hostile: chunks are walked with their check sums and the size is
+/// accepted before libpng sees a byte.
 namespace vergence::app::detail {
 
 inline constexpr std::size_t kPngHead = 33;  // bytes of the signature and the whole IHDR chunk
@@ -15,14 +16,17 @@ inline constexpr std::size_t kPngHead = 33;  // bytes of the signature and the w
 [[nodiscard]] bool may_become_png(std::span<const std::uint8_t> bytes) noexcept;
 
 /// From the head alone. Precondition: is_png(). → ok, torn, not_an_image
-[[nodiscard]] ImageFileStatus png_size(std::span<const std::uint8_t> bytes, ImageSize* size) noexcept;
+[[nodiscard]] ImageFileStatus png_size(std::span<const std::uint8_t> bytes,
+                                       ImageSize* size) noexcept;
 
-/// Every chunk with its check sum, up to IEND; what follows it is nobody's business. Precondition: is_png(). → ok, torn
+/// Every chunk with its check sum, up to IEND; what follows it is nobody's business. Precondition:
+/// is_png(). → ok, torn
 [[nodiscard]] ImageFileStatus check_png(std::span<const std::uint8_t> bytes) noexcept;
 
-/// Rows of `stride` bytes: the upper 8 of 16 bits, palettes and colours as 0.299 R + 0.587 G + 0.114 B, alpha dropped.
+/// Rows of `stride` bytes: the upper 8 of 16 bits, palettes and colours as 0.299 R + 0.587 G +
+/// 0.114 B, alpha dropped.
 /// Precondition: check_png() and the size are right. Throws nothing. → ok, undecodable
-[[nodiscard]] ImageFileStatus decode_png(std::span<const std::uint8_t> bytes, ImageSize size, std::uint8_t* out,
-                                         std::size_t stride) noexcept;
+[[nodiscard]] ImageFileStatus decode_png(std::span<const std::uint8_t> bytes, ImageSize size,
+                                         std::uint8_t* out, std::size_t stride) noexcept;
 
 }  // namespace vergence::app::detail

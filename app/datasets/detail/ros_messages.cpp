@@ -19,12 +19,15 @@ struct Encoding {
   PixelLayout layout;
   std::uint32_t bytes;  // a pixel
 };
-constexpr std::array kEncodings{Encoding{"mono8", PixelLayout::grey, 1},        Encoding{"8UC1", PixelLayout::grey, 1},
-                                Encoding{"bayer_rggb8", PixelLayout::bayer, 1}, Encoding{"bayer_bggr8", PixelLayout::bayer, 1},
-                                Encoding{"bayer_gbrg8", PixelLayout::bayer, 1}, Encoding{"bayer_grbg8", PixelLayout::bayer, 1},
-                                Encoding{"rgb8", PixelLayout::rgb, 3},          Encoding{"bgr8", PixelLayout::bgr, 3}};
+constexpr std::array kEncodings{
+    Encoding{"mono8", PixelLayout::grey, 1},        Encoding{"8UC1", PixelLayout::grey, 1},
+    Encoding{"bayer_rggb8", PixelLayout::bayer, 1}, Encoding{"bayer_bggr8", PixelLayout::bayer, 1},
+    Encoding{"bayer_gbrg8", PixelLayout::bayer, 1}, Encoding{"bayer_grbg8", PixelLayout::bayer, 1},
+    Encoding{"rgb8", PixelLayout::rgb, 3},          Encoding{"bgr8", PixelLayout::bgr, 3}};
 
-bool is_rotation(const Mat3& R) { return (R.transpose() * R - Mat3::Identity()).cwiseAbs().maxCoeff() <= 1e-3; }
+bool is_rotation(const Mat3& R) {
+  return (R.transpose() * R - Mat3::Identity()).cwiseAbs().maxCoeff() <= 1e-3;
+}
 
 }  // namespace
 
@@ -44,7 +47,9 @@ T CdrReader::get() noexcept {
   }
   std::array<std::uint8_t, sizeof(T)> raw{};
   for (std::size_t i = 0; i < sizeof(T); ++i)
-    raw[i] = bytes_[at + (little_ == (std::endian::native == std::endian::little) ? i : sizeof(T) - 1 - i)];
+    raw[i] =
+        bytes_[at +
+               (little_ == (std::endian::native == std::endian::little) ? i : sizeof(T) - 1 - i)];
   std::memcpy(&value, raw.data(), sizeof(T));
   at_ = at + sizeof(T);
   return value;
@@ -77,11 +82,14 @@ std::optional<RosImage> read_ros_image(std::span<const std::uint8_t> head, std::
   (void)in.get<std::uint8_t>();  // bytes of 8 bits have no order
   image.step = in.get<std::uint32_t>();
   image.bytes = in.get<std::uint32_t>();
-  if (!in.ok() || width < 2 || height < 2 || accept_size(width, height, &image.size) != ImageFileStatus::ok) return std::nullopt;
+  if (!in.ok() || width < 2 || height < 2 ||
+      accept_size(width, height, &image.size) != ImageFileStatus::ok)
+    return std::nullopt;
   image.offset = static_cast<std::uint32_t>(in.position());
   for (const Encoding& known : kEncodings) {
     if (encoding != known.name) continue;
-    if (image.step < width * known.bytes || std::uint64_t{image.step} * height > image.bytes || image.bytes > size - image.offset)
+    if (image.step < width * known.bytes || std::uint64_t{image.step} * height > image.bytes ||
+        image.bytes > size - image.offset)
       return std::nullopt;
     image.layout = known.layout;
     return image;
@@ -89,7 +97,8 @@ std::optional<RosImage> read_ros_image(std::span<const std::uint8_t> head, std::
   return std::nullopt;
 }
 
-std::optional<RosImage> read_ros_compressed_image(std::span<const std::uint8_t> head, std::size_t size) {
+std::optional<RosImage> read_ros_compressed_image(std::span<const std::uint8_t> head,
+                                                  std::size_t size) {
   CdrReader in(head);
   RosImage image;
   image.layout = PixelLayout::encoded;
@@ -99,7 +108,8 @@ std::optional<RosImage> read_ros_compressed_image(std::span<const std::uint8_t> 
   if (!in.ok()) return std::nullopt;
   image.offset = static_cast<std::uint32_t>(in.position());
   if (image.bytes > size - image.offset) return std::nullopt;
-  const auto data = head.subspan(image.offset).first(std::min<std::size_t>(image.bytes, head.size() - image.offset));
+  const auto data = head.subspan(image.offset)
+                        .first(std::min<std::size_t>(image.bytes, head.size() - image.offset));
   if (read_image_size(data, &image.size) != ImageFileStatus::ok) return std::nullopt;
   return image;
 }
@@ -125,9 +135,11 @@ std::optional<RosCameraInfo> read_ros_camera_info(std::span<const std::uint8_t> 
   if (accept_size(width, height, &size) != ImageFileStatus::ok) return std::nullopt;
   lens.width = size.width, lens.height = size.height;
   lens.fx = k[0], lens.fy = k[4], lens.cx = k[2], lens.cy = k[5];
-  if (!(camera.P(0, 0) > 0 && camera.P(1, 1) > 0)) info.fault_rectified = "p has no positive focal lengths";
+  if (!(camera.P(0, 0) > 0 && camera.P(1, 1) > 0))
+    info.fault_rectified = "p has no positive focal lengths";
   info.fault = info.fault_rectified;
-  if (const std::string fault = set_ros_distortion(model, d, &lens); !fault.empty()) info.fault = "d " + fault;
+  if (const std::string fault = set_ros_distortion(model, d, &lens); !fault.empty())
+    info.fault = "d " + fault;
   if (!is_rotation(camera.R)) info.fault = "r is not a rotation";
   return info;
 }
@@ -136,7 +148,8 @@ RosCamera rectified(RosCamera camera) noexcept {
   Intrinsics& lens = camera.lens;
   lens.kind = CameraModelKind::pinhole_radtan;
   lens.distortion = {};
-  lens.fx = camera.P(0, 0), lens.fy = camera.P(1, 1), lens.cx = camera.P(0, 2), lens.cy = camera.P(1, 2);
+  lens.fx = camera.P(0, 0), lens.fy = camera.P(1, 1), lens.cx = camera.P(0, 2),
+  lens.cy = camera.P(1, 2);
   camera.R = Mat3::Identity();
   return camera;
 }

@@ -25,18 +25,21 @@ struct Partition {
   int estimated_count = 0, held_count = 0;
 };
 
-Partition partition(const SharedLayout& s, const BundleProblem& problem, const BundleOptions& options) noexcept {
+Partition partition(const SharedLayout& s, const BundleProblem& problem,
+                    const BundleOptions& options) noexcept {
   Partition p;
   for (std::size_t k = 0; k < problem.cameras.size(); ++k)
     if (s.extrinsic[k] >= 0)
-      for (int i = 0; i < (s.exact[k] ? 5 : 6); ++i) p.estimated[p.estimated_count++] = s.extrinsic[k] + i;
+      for (int i = 0; i < (s.exact[k] ? 5 : 6); ++i)
+        p.estimated[p.estimated_count++] = s.extrinsic[k] + i;
   for (std::size_t k = 0; k < problem.cameras.size(); ++k)
     for (int i = 0; i < s.intrinsic_count[k]; ++i) {
       const int parameter = s.intrinsic_index[k][i], row = s.intrinsic[k] + i;
       if (((options.intrinsics[k].free >> static_cast<unsigned>(parameter)) & 1U) != 0) {
         p.estimated[p.estimated_count++] = row;
       } else {
-        const double sigma = held_sigma(options.intrinsics[k], problem.cameras[k].intrinsics(), parameter);
+        const double sigma =
+            held_sigma(options.intrinsics[k], problem.cameras[k].intrinsics(), parameter);
         p.held_variance[p.held_count] = sigma * sigma;
         p.held[p.held_count++] = row;
       }
@@ -44,7 +47,8 @@ Partition partition(const SharedLayout& s, const BundleProblem& problem, const B
   return p;
 }
 
-/// K = L_SI L_II⁻¹ in the place of L_SI: what a pose's gradient adds to that of θ_S once the poses are eliminated.
+/// K = L_SI L_II⁻¹ in the place of L_SI: what a pose's gradient adds to that of θ_S once the poses
+/// are eliminated.
 void poses_to_shared(double* A, std::size_t ld, std::size_t first, std::size_t size) noexcept {
   for (std::size_t c = first; c-- > 0;) {
     double* column = A + c * ld;
@@ -58,10 +62,12 @@ void poses_to_shared(double* A, std::size_t ld, std::size_t first, std::size_t s
   }
 }
 
-/// The gradients of one lane's observations, straight from the camera model, and the robust weight of each.
+/// The gradients of one lane's observations, straight from the camera model, and the robust weight
+/// of each.
 class TrackGradient {
  public:
-  TrackGradient(const BundleWorkspace& w, const BundleOptions& options, const BundleState& state, const System& system) noexcept
+  TrackGradient(const BundleWorkspace& w, const BundleOptions& options, const BundleState& state,
+                const System& system) noexcept
       : w_(w),
         options_(options),
         state_(state),
@@ -79,15 +85,20 @@ class TrackGradient {
     for (std::uint32_t i = w_.first_observation[point]; i < w_.first_observation[point + 1]; ++i)
       add_observation(problem.observations[i], X, &s);
     const double* z = job_.factors + (batch * kFactorRows + 6) * kBatch + lane;
-    const auto product = [&](const double* y) { return y[0] * z[0] + y[kBatch] * z[kBatch] + y[2 * kBatch] * z[2 * kBatch]; };
+    const auto product = [&](const double* y) {
+      return y[0] * z[0] + y[kBatch] * z[kBatch] + y[2 * kBatch] * z[2 * kBatch];
+    };
     for (std::uint32_t b = w_.batches[batch].block_begin; b < w_.batches[batch].block_end; ++b) {
       const std::int32_t block = w_.poses[w_.blocks[b].pose].block;
       if (block < 0) continue;
       for (std::size_t r = 0; r < kBlock; ++r)
-        subtract_pose(static_cast<std::size_t>(block) * kBlock + r, -product(job_.y + b * kYSize + r * 3 * kBatch + lane), &s);
+        subtract_pose(static_cast<std::size_t>(block) * kBlock + r,
+                      -product(job_.y + b * kYSize + r * 3 * kBatch + lane), &s);
     }
-    const double* rows = job_.y_shared + batch * static_cast<std::size_t>(layout.blocks) * kYSize + lane;
-    for (int r = 0; r < layout.size; ++r) s[r] -= product(rows + static_cast<std::size_t>(r) * 3 * kBatch);
+    const double* rows =
+        job_.y_shared + batch * static_cast<std::size_t>(layout.blocks) * kYSize + lane;
+    for (int r = 0; r < layout.size; ++r)
+      s[r] -= product(rows + static_cast<std::size_t>(r) * 3 * kBatch);
     return s;
   }
 
@@ -116,7 +127,8 @@ class TrackGradient {
     Vec2 pixel;
     Mat23 G;
     if (camera.project(Xc, &pixel, &G) != ProjectStatus::ok) return;
-    const double information = static_cast<double>(o.inverse_sigma) * static_cast<double>(o.inverse_sigma);
+    const double information =
+        static_cast<double>(o.inverse_sigma) * static_cast<double>(o.inverse_sigma);
     const Vec2 miss(o.x - pixel.x(), o.y - pixel.y());
     const Vec2 weighted = weight(miss.squaredNorm() * information) * information * miss;
     const Vec3 q = (G * T.R).transpose() * weighted;
@@ -125,7 +137,8 @@ class TrackGradient {
     const std::int32_t block = w_.poses[o.pose].block;
     if (block >= 0)
       for (std::size_t r = 0; r < kBlock; ++r)
-        subtract_pose(static_cast<std::size_t>(block) * kBlock + r, gradient[static_cast<Index>(r)], s);
+        subtract_pose(static_cast<std::size_t>(block) * kBlock + r, gradient[static_cast<Index>(r)],
+                      s);
     const int k = o.camera;
     if (layout.extrinsic[k] >= 0) {
       const Vec6 own = extrinsic_basis(layout, job_.cameras[k], k).transpose() * gradient;
@@ -133,7 +146,8 @@ class TrackGradient {
     }
     if (layout.intrinsic_count[k] == 0) return;
     const auto J = camera.intrinsics_jacobian(Xc);
-    for (int i = 0; i < layout.intrinsic_count[k]; ++i) (*s)[layout.intrinsic[k] + i] += J.col(layout.intrinsic_index[k][i]).dot(weighted);
+    for (int i = 0; i < layout.intrinsic_count[k]; ++i)
+      (*s)[layout.intrinsic[k] + i] += J.col(layout.intrinsic_index[k][i]).dot(weighted);
   }
 
   const BundleWorkspace& w_;
@@ -143,12 +157,14 @@ class TrackGradient {
   std::size_t first_, ld_;
 };
 
-/// What is known beside the tracks: its information in H, and the variance that it brings into the gradient (clusters of their own).
+/// What is known beside the tracks: its information in H, and the variance that it brings into the
+/// gradient (clusters of their own).
 struct KnownBeside {
   Shared information, variance;
 };
 
-KnownBeside known_beside(const SharedLayout& s, const BundleProblem& problem, const BundleOptions& options, const BundleState& state,
+KnownBeside known_beside(const SharedLayout& s, const BundleProblem& problem,
+                         const BundleOptions& options, const BundleState& state,
                          const System& system) noexcept {
   KnownBeside known{Shared::Zero(s.size, s.size), Shared::Zero(s.size, s.size)};
   for (std::size_t k = 0; k < problem.cameras.size(); ++k) {
@@ -173,7 +189,8 @@ KnownBeside known_beside(const SharedLayout& s, const BundleProblem& problem, co
 }
 
 /// Σ_j s_j s_jᵀ, a cluster a track.
-Shared variance_by_tracks(const BundleWorkspace& w, const BundleProblem& problem, TrackGradient& gradient, int size) noexcept {
+Shared variance_by_tracks(const BundleWorkspace& w, const BundleProblem& problem,
+                          TrackGradient& gradient, int size) noexcept {
   Shared meat = Shared::Zero(size, size);
   for (std::size_t i = 0; i < w.point_count; ++i) {
     const SharedVector s = gradient(problem, i);
@@ -194,8 +211,11 @@ class Clusters {
     any_[cluster] = true;
   }
   /// A single cluster's gradient is zero at the minimum, whatever its errors: it says nothing.
-  [[nodiscard]] bool enough() const noexcept { return std::count(any_.begin(), any_.end(), true) > 1; }
-  /// Σ s sᵀ, made up for there being few: a mean over n clusters has taken up one of them, and `parameters` each one more.
+  [[nodiscard]] bool enough() const noexcept {
+    return std::count(any_.begin(), any_.end(), true) > 1;
+  }
+  /// Σ s sᵀ, made up for there being few: a mean over n clusters has taken up one of them, and
+  /// `parameters` each one more.
   [[nodiscard]] Shared variance(int parameters) const noexcept {
     Shared meat = Shared::Zero(size_, size_);
     int n = 0;
@@ -204,7 +224,8 @@ class Clusters {
       ++n;
       meat.noalias() += sums_[c].lazyProduct(sums_[c].transpose());
     }
-    return meat * std::min(kMostFewClusters, n / std::max(1.0, static_cast<double>(n - parameters)));
+    return meat *
+           std::min(kMostFewClusters, n / std::max(1.0, static_cast<double>(n - parameters)));
   }
 
  private:
@@ -213,39 +234,52 @@ class Clusters {
   std::array<bool, static_cast<std::size_t>(kMostCells* kMostCells)> any_{};
 };
 
-/// The same with larger clusters, of two kinds, since tracks share errors in both ways: a cell of the left image (what a lens model leaves
-/// is a field over the image, common to all tracks there), and a block of frames (what a scene does to it). Under independent errors each
-/// gives the variance by tracks; the mean of both is taken. Where all tracks are in one cell, or in the middle of their lives in one block,
-/// the other kind is left, or the tracks.
-Shared variance_by_cells(const BundleWorkspace& w, const BundleProblem& problem, int cells, TrackGradient& gradient, int size) noexcept {
+/// The same with larger clusters, of two kinds, since tracks share errors in both ways: a cell of
+/// the left image (what a lens model leaves is a field over the image, common to all tracks there),
+/// and a block of frames (what a scene does to it). Under independent errors each gives the
+/// variance by tracks; the mean of both is taken. Where all tracks are in one cell, or in the
+/// middle of their lives in one block, the other kind is left, or the tracks.
+Shared variance_by_cells(const BundleWorkspace& w, const BundleProblem& problem, int cells,
+                         TrackGradient& gradient, int size) noexcept {
   Clusters by_cell(size), by_block(size);
   const Intrinsics& lens = problem.cameras[0].intrinsics();
-  const auto cell_of = [&](double at, int length) { return std::clamp(static_cast<int>(at * cells / length), 0, cells - 1); };
+  const auto cell_of = [&](double at, int length) {
+    return std::clamp(static_cast<int>(at * cells / length), 0, cells - 1);
+  };
   const std::size_t poses = problem.T_left_world.size();
-  const std::size_t blocks = std::clamp<std::size_t>(poses / kBlockFrames, 1, static_cast<std::size_t>(kMostCells));
+  const std::size_t blocks =
+      std::clamp<std::size_t>(poses / kBlockFrames, 1, static_cast<std::size_t>(kMostCells));
   for (std::size_t i = 0; i < w.point_count; ++i) {
     const auto point = static_cast<std::uint32_t>(w.order[i]);
     const std::uint32_t begin = w.first_observation[point], end = w.first_observation[point + 1];
-    // In the middle of its life; any image does, for the fields of all are fields over the direction.
+    // In the middle of its life; any image does, for the fields of all are fields over the
+    // direction.
     const BundleObservation& middle = problem.observations[begin + (end - begin) / 2];
     const SharedVector s = gradient(problem, i);
-    by_cell.add(static_cast<std::size_t>(cell_of(middle.y, lens.height) * cells + cell_of(middle.x, lens.width)), s);
+    by_cell.add(static_cast<std::size_t>(cell_of(middle.y, lens.height) * cells +
+                                         cell_of(middle.x, lens.width)),
+                s);
     by_block.add(middle.pose * blocks / poses, s);
   }
-  if (!by_cell.enough()) return by_block.enough() ? by_block.variance(1) : variance_by_tracks(w, problem, gradient, size);
+  if (!by_cell.enough())
+    return by_block.enough() ? by_block.variance(1)
+                             : variance_by_tracks(w, problem, gradient, size);
   const Shared cell = by_cell.variance(size);
   return by_block.enough() ? Shared(0.5 * (cell + by_block.variance(1))) : cell;
 }
 
-/// From the rows of camera k to (φ, τ) of the left perturbation R ← Exp(φ) R, t ← t + τ; its first columns are the rows that there are.
-Mat6 to_published(const SharedLayout& s, const KernelCamera& camera, const Transform& T, int k) noexcept {
+/// From the rows of camera k to (φ, τ) of the left perturbation R ← Exp(φ) R, t ← t + τ; its first
+/// columns are the rows that there are.
+Mat6 to_published(const SharedLayout& s, const KernelCamera& camera, const Transform& T,
+                  int k) noexcept {
   Mat6 turn = Mat6::Zero();
   turn.topRightCorner<3, 3>() = T.R;
   turn.bottomLeftCorner<3, 3>() = T.R;
   return turn * extrinsic_basis(s, camera, k);
 }
 
-Mat6 published(const Shared& estimated, const SharedLayout& s, const KernelCamera& camera, const Transform& T, int k) noexcept {
+Mat6 published(const Shared& estimated, const SharedLayout& s, const KernelCamera& camera,
+               const Transform& T, int k) noexcept {
   const int size = s.exact[k] ? 5 : 6;
   Mat6 rows = Mat6::Zero();
   rows.topLeftCorner(size, size) = estimated.block(s.extrinsic[k], s.extrinsic[k], size, size);
@@ -267,21 +301,25 @@ void publish_all(const Shared& joint, const PublishedRow* rows, RigCovariance* o
       for (int i = 0; i < rows[a].count; ++i)
         for (int j = 0; j < rows[b].count; ++j) {
           const int r = rows[a].first + i, c = rows[b].first + j;
-          if (c <= r) out->set(r, c, (*out)(r, c) + rows[a].factor[i] * rows[b].factor[j] * joint(a, b));
+          if (c <= r)
+            out->set(r, c, (*out)(r, c) + rows[a].factor[i] * rows[b].factor[j] * joint(a, b));
         }
 }
 
 /// Σ w|ε|²/σ² over what is left after the parameters.
-double residual_variance(const BundleWorkspace& w, const BundleProblem& problem, const Partition& p, double weighted) noexcept {
-  const double freedom = 2.0 * static_cast<double>(problem.observations.size()) - 3.0 * static_cast<double>(w.free_points) -
+double residual_variance(const BundleWorkspace& w, const BundleProblem& problem, const Partition& p,
+                         double weighted) noexcept {
+  const double freedom = 2.0 * static_cast<double>(problem.observations.size()) -
+                         3.0 * static_cast<double>(w.free_points) -
                          static_cast<double>(kBlock * w.free_poses) - p.estimated_count;
   return freedom > 0 ? weighted / freedom : 1.0;
 }
 
 }  // namespace
 
-void shared_covariance(BundleWorkspace& w, const BundleProblem& problem, const BundleOptions& options, const BundleState& state,
-                       System& system, BundleResult* result) noexcept {
+void shared_covariance(BundleWorkspace& w, const BundleProblem& problem,
+                       const BundleOptions& options, const BundleState& state, System& system,
+                       BundleResult* result) noexcept {
   const SharedLayout layout = shared_layout(problem, options, true);
   system.use(layout);
   if (!system.linearise(state, 0.0)) return;
@@ -295,7 +333,8 @@ void shared_covariance(BundleWorkspace& w, const BundleProblem& problem, const B
     for (std::size_t c = 0; c <= r; ++c) {
       double v = A[(first + c) * ld + first + r];
       for (std::size_t k = 0; k < first; ++k) v -= A[k * ld + first + r] * A[k * ld + first + c];
-      H(static_cast<Index>(r), static_cast<Index>(c)) = H(static_cast<Index>(c), static_cast<Index>(r)) = v;
+      H(static_cast<Index>(r), static_cast<Index>(c)) =
+          H(static_cast<Index>(c), static_cast<Index>(r)) = v;
     }
   const Partition p = partition(layout, problem, options);
   Shared inner(p.estimated_count, p.estimated_count), cross(p.estimated_count, p.held_count);
@@ -310,8 +349,9 @@ void shared_covariance(BundleWorkspace& w, const BundleProblem& problem, const B
 
   poses_to_shared(A, ld, first, size);
   TrackGradient gradient(w, options, state, system);
-  const Shared meat = options.cells > 0 ? variance_by_cells(w, problem, options.cells, gradient, layout.size)
-                                        : variance_by_tracks(w, problem, gradient, layout.size);
+  const Shared meat = options.cells > 0
+                          ? variance_by_cells(w, problem, options.cells, gradient, layout.size)
+                          : variance_by_tracks(w, problem, gradient, layout.size);
   const KnownBeside known = known_beside(layout, problem, options, state, system);
   Shared own_meat(p.estimated_count, p.estimated_count);
   double clustered = 0, believed = 0;
@@ -338,10 +378,12 @@ void shared_covariance(BundleWorkspace& w, const BundleProblem& problem, const B
     wide += scaled.lazyProduct(D.transpose());
     joint.topRightCorner(p.estimated_count, p.held_count) = -scaled;
     joint.bottomLeftCorner(p.held_count, p.estimated_count) = -scaled.transpose();
-    for (int c = 0; c < p.held_count; ++c) joint(p.estimated_count + c, p.estimated_count + c) = p.held_variance[c];
+    for (int c = 0; c < p.held_count; ++c)
+      joint(p.estimated_count + c, p.estimated_count + c) = p.held_variance[c];
   }
   joint.topLeftCorner(p.estimated_count, p.estimated_count) = wide;
-  // Extrinsics are the first rows of θ_S and of the estimated ones alike; intrinsics are found by their place in the partition.
+  // Extrinsics are the first rows of θ_S and of the estimated ones alike; intrinsics are found by
+  // their place in the partition.
   for (std::size_t k = 1; k < problem.cameras.size(); ++k) {
     const int number = static_cast<int>(k);
     const KernelCamera& camera = system.job().cameras[k];
@@ -366,12 +408,15 @@ void shared_covariance(BundleWorkspace& w, const BundleProblem& problem, const B
     const int row = estimated ? p.estimated[i] : p.held[i - p.estimated_count];
     for (std::size_t k = 0; k < problem.cameras.size(); ++k) {
       const int place = row - layout.intrinsic[k];
-      if (layout.intrinsic_count[k] == 0 || place < 0 || place >= layout.intrinsic_count[k]) continue;
+      if (layout.intrinsic_count[k] == 0 || place < 0 || place >= layout.intrinsic_count[k])
+        continue;
       const int parameter = layout.intrinsic_index[k][place];
       rows[i].first = intrinsic_row(static_cast<int>(k)) + parameter;
       rows[i].count = 1;
       rows[i].factor[0] = 1;
-      if (estimated) result->intrinsics_sigma[k][static_cast<std::size_t>(parameter)] = std::sqrt(std::max(0.0, noise(i, i)));
+      if (estimated)
+        result->intrinsics_sigma[k][static_cast<std::size_t>(parameter)] =
+            std::sqrt(std::max(0.0, noise(i, i)));
     }
   }
   publish_all(joint, rows, &result->covariance);

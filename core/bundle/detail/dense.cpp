@@ -66,8 +66,10 @@ HWY_INLINE void subtract_sums(V x, V y, double* at) {
 
 #endif
 
-/// A[a, b] −= Σ Y_a Y_bᵀ over `count` batches; rows row0 … row0 + kTileRows, columns col0 … col0 + 3 of the block.
-HWY_INLINE void tile(const YBlock& a, const YBlock& b, std::size_t count, int row0, int col0, double* HWY_RESTRICT A, std::size_t ld) {
+/// A[a, b] −= Σ Y_a Y_bᵀ over `count` batches; rows row0 … row0 + kTileRows, columns col0 … col0 +
+/// 3 of the block.
+HWY_INLINE void tile(const YBlock& a, const YBlock& b, std::size_t count, int row0, int col0,
+                     double* HWY_RESTRICT A, std::size_t ld) {
   const D d;
   V sum[kTileRows * 3];
   for (V& s : sum) s = hn::Zero(d);
@@ -75,7 +77,8 @@ HWY_INLINE void tile(const YBlock& a, const YBlock& b, std::size_t count, int ro
   const double* HWY_RESTRICT pb = b.first + static_cast<std::size_t>(col0) * 3 * kBatch;
   for (std::size_t i = 0; i < count; ++i, pa += a.stride, pb += b.stride) {
     for (std::size_t k = 0; k < 3 * kBatch; k += hn::Lanes(d)) {
-      const V b0 = hn::Load(d, pb + k), b1 = hn::Load(d, pb + 3 * kBatch + k), b2 = hn::Load(d, pb + 6 * kBatch + k);
+      const V b0 = hn::Load(d, pb + k), b1 = hn::Load(d, pb + 3 * kBatch + k),
+              b2 = hn::Load(d, pb + 6 * kBatch + k);
 #pragma GCC unroll 6
       for (int r = 0; r < kTileRows; ++r) {
         const V va = hn::Load(d, pa + r * 3 * kBatch + static_cast<int>(k));
@@ -85,16 +88,20 @@ HWY_INLINE void tile(const YBlock& a, const YBlock& b, std::size_t count, int ro
       }
     }
   }
-  double* at = A + static_cast<std::size_t>(b.row + col0) * ld + static_cast<std::size_t>(a.row + row0);
+  double* at =
+      A + static_cast<std::size_t>(b.row + col0) * ld + static_cast<std::size_t>(a.row + row0);
 #pragma GCC unroll 3
   for (int c = 0; c < 3; ++c, at += ld) {
 #pragma GCC unroll 6
-    for (int r = 0; r + 1 < kTileRows; r += 2) subtract_sums(sum[3 * r + c], sum[3 * (r + 1) + c], at + r);
-    if constexpr (kTileRows % 2 != 0) at[kTileRows - 1] -= hn::GetLane(hn::SumOfLanes(d, sum[3 * (kTileRows - 1) + c]));
+    for (int r = 0; r + 1 < kTileRows; r += 2)
+      subtract_sums(sum[3 * r + c], sum[3 * (r + 1) + c], at + r);
+    if constexpr (kTileRows % 2 != 0)
+      at[kTileRows - 1] -= hn::GetLane(hn::SumOfLanes(d, sum[3 * (kTileRows - 1) + c]));
   }
 }
 
-void subtract_points_one(const KernelJob& job, std::size_t first, std::size_t last, double* A, std::size_t ld) {
+void subtract_points_one(const KernelJob& job, std::size_t first, std::size_t last, double* A,
+                         std::size_t ld) {
   const Batch& batch = job.batches[first];
   const std::size_t block_count = batch.block_end - batch.block_begin;
   const auto block_at = [&](std::size_t i) {
@@ -102,7 +109,8 @@ void subtract_points_one(const KernelJob& job, std::size_t first, std::size_t la
       return YBlock{job.y + (batch.block_begin + i) * kYSize, block_count * kYSize,
                     job.poses[job.blocks[batch.block_begin + i].pose].block * kBlock};
     const std::size_t s = i - block_count, shared = static_cast<std::size_t>(job.shared.blocks);
-    return YBlock{job.y_shared + (first * shared + s) * kYSize, shared * kYSize, (job.free_poses + static_cast<std::int32_t>(s)) * kBlock};
+    return YBlock{job.y_shared + (first * shared + s) * kYSize, shared * kYSize,
+                  (job.free_poses + static_cast<std::int32_t>(s)) * kBlock};
   };
   const std::size_t all = block_count + static_cast<std::size_t>(job.shared.blocks);
   for (std::size_t i = 0; i < all; ++i) {
@@ -120,7 +128,8 @@ void subtract_points_one(const KernelJob& job, std::size_t first, std::size_t la
 
 /// Columns p … p + 5 less what the columns before them explain, rows from the vector that holds p.
 template <int kVectors>
-HWY_INLINE void update_panel(double* HWY_RESTRICT A, std::size_t ld, std::size_t p, std::size_t row) {
+HWY_INLINE void update_panel(double* HWY_RESTRICT A, std::size_t ld, std::size_t p,
+                             std::size_t row) {
   const D d;
   const std::size_t N = hn::Lanes(d);
   V sum[kBlock * kVectors];
@@ -128,21 +137,25 @@ HWY_INLINE void update_panel(double* HWY_RESTRICT A, std::size_t ld, std::size_t
   for (std::size_t k = 0; k < p; ++k) {
     const double* column = A + k * ld;
     V l[kVectors];
-    for (int v = 0; v < kVectors; ++v) l[v] = hn::Load(d, column + row + static_cast<std::size_t>(v) * N);
+    for (int v = 0; v < kVectors; ++v)
+      l[v] = hn::Load(d, column + row + static_cast<std::size_t>(v) * N);
 #pragma GCC unroll 6
     for (int c = 0; c < kBlock; ++c) {
       const V f = hn::Set(d, column[p + static_cast<std::size_t>(c)]);
-      for (int v = 0; v < kVectors; ++v) sum[c * kVectors + v] = hn::MulAdd(l[v], f, sum[c * kVectors + v]);
+      for (int v = 0; v < kVectors; ++v)
+        sum[c * kVectors + v] = hn::MulAdd(l[v], f, sum[c * kVectors + v]);
     }
   }
   for (int c = 0; c < kBlock; ++c)
     for (int v = 0; v < kVectors; ++v) {
-      double* at = A + (p + static_cast<std::size_t>(c)) * ld + row + static_cast<std::size_t>(v) * N;
+      double* at =
+          A + (p + static_cast<std::size_t>(c)) * ld + row + static_cast<std::size_t>(v) * N;
       hn::Store(hn::Sub(hn::Load(d, at), sum[c * kVectors + v]), d, at);
     }
 }
 
-PivotReport cholesky_one(double* HWY_RESTRICT A, std::size_t n, std::size_t columns, std::size_t ld, double tolerance) {
+PivotReport cholesky_one(double* HWY_RESTRICT A, std::size_t n, std::size_t columns, std::size_t ld,
+                         double tolerance) {
   const D d;
   const std::size_t N = hn::Lanes(d);
   const std::size_t rows = (n + N - 1) / N * N;
@@ -180,7 +193,8 @@ PivotReport cholesky_one(double* HWY_RESTRICT A, std::size_t n, std::size_t colu
         L[r][c] = v * inverse[c];
       }
     }
-    // The rows of the diagonal block go through this loop too and are put right after it: whole vectors, no masks.
+    // The rows of the diagonal block go through this loop too and are put right after it: whole
+    // vectors, no masks.
     for (row = p / N * N; row < rows; row += N) {
       V x[kBlock];
 #pragma GCC unroll 6
@@ -198,7 +212,8 @@ PivotReport cholesky_one(double* HWY_RESTRICT A, std::size_t n, std::size_t colu
   return report;
 }
 
-void solve_factored_one(const double* HWY_RESTRICT L, std::size_t n, std::size_t ld, double* HWY_RESTRICT b) {
+void solve_factored_one(const double* HWY_RESTRICT L, std::size_t n, std::size_t ld,
+                        double* HWY_RESTRICT b) {
   const D d;
   const std::size_t N = hn::Lanes(d);
   const std::size_t rows = (n + N - 1) / N * N;
@@ -211,7 +226,8 @@ void solve_factored_one(const double* HWY_RESTRICT L, std::size_t n, std::size_t
     const std::size_t start = k / N * N;
     double head[kBatch];
     for (std::size_t i = start; i < k; ++i) head[i - start] = b[i];
-    for (std::size_t i = start; i < rows; i += N) hn::Store(hn::NegMulAdd(hn::Load(d, column + i), f, hn::Load(d, b + i)), d, b + i);
+    for (std::size_t i = start; i < rows; i += N)
+      hn::Store(hn::NegMulAdd(hn::Load(d, column + i), f, hn::Load(d, b + i)), d, b + i);
     for (std::size_t i = start; i < k; ++i) b[i] = head[i - start];
     b[k] = value;
   }
@@ -220,7 +236,8 @@ void solve_factored_one(const double* HWY_RESTRICT L, std::size_t n, std::size_t
     const double* column = L + k * ld;
     const std::size_t start = (k / N + 1) * N;
     V sum = hn::Zero(d);
-    for (std::size_t i = start; i < rows; i += N) sum = hn::MulAdd(hn::Load(d, column + i), hn::Load(d, b + i), sum);
+    for (std::size_t i = start; i < rows; i += N)
+      sum = hn::MulAdd(hn::Load(d, column + i), hn::Load(d, b + i), sum);
     double v = b[k] - hn::GetLane(hn::SumOfLanes(d, sum));
     for (std::size_t i = k + 1; i < std::min(start, n); ++i) v -= column[i] * b[i];
     b[k] = v / column[k];
@@ -238,10 +255,12 @@ HWY_EXPORT(subtract_points_one);
 HWY_EXPORT(cholesky_one);
 HWY_EXPORT(solve_factored_one);
 
-void subtract_points(const KernelJob& job, std::size_t first, std::size_t last, double* A, std::size_t ld) noexcept {
+void subtract_points(const KernelJob& job, std::size_t first, std::size_t last, double* A,
+                     std::size_t ld) noexcept {
   HWY_DYNAMIC_DISPATCH(subtract_points_one)(job, first, last, A, ld);
 }
-PivotReport cholesky(double* A, std::size_t n, std::size_t columns, std::size_t ld, double tolerance) noexcept {
+PivotReport cholesky(double* A, std::size_t n, std::size_t columns, std::size_t ld,
+                     double tolerance) noexcept {
   return HWY_DYNAMIC_DISPATCH(cholesky_one)(A, n, columns, ld, tolerance);
 }
 void solve_factored(const double* L, std::size_t n, std::size_t ld, double* b) noexcept {

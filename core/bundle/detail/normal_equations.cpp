@@ -1,12 +1,15 @@
-// One pass over the observations: residuals, normal equations, eliminated points; and the way back. Built once per SIMD target.
+// One pass over the observations: residuals, normal equations, eliminated points; and the way back.
+// Built once per SIMD target.
 //
-// Every lane is a point. With F = ∂x/∂X_i (2×3, X_i the point in the base camera) all derivatives of METHOD §1 are F times something that
-// does not depend on the camera, in the parametrisation of bundle.hpp:
+// Every lane is a point. With F = ∂x/∂X_i (2×3, X_i the point in the base camera) all derivatives
+// of METHOD §1 are F times something that does not depend on the camera, in the parametrisation of
+// bundle.hpp:
 //     pose (τ, φ):       B = F [ I  −[X_i]× ]
-//     camera k (τ, φ):   A = F [ I  −[X_i]× ]     (its perturbation is written in the base camera's axes)
-//     point:             C = F R_i
-// So one 3×3 matrix Q = Σ FᵀwF a pose and camera carries everything: P += R_iᵀ Q R_i, O = [I; [X_i]×] Q R_i, and the sums of Bᵀ w B over
-// the points of one camera serve as its share of I, of M and of S alike.
+//     camera k (τ, φ):   A = F [ I  −[X_i]× ]     (its perturbation is written in the base camera's
+//     axes) point:             C = F R_i
+// So one 3×3 matrix Q = Σ FᵀwF a pose and camera carries everything: P += R_iᵀ Q R_i, O = [I;
+// [X_i]×] Q R_i, and the sums of Bᵀ w B over the points of one camera serve as its share of I, of M
+// and of S alike.
 #include <algorithm>
 #include <bit>
 
@@ -30,8 +33,9 @@ namespace hn = hwy::HWY_NAMESPACE;
 using D = hn::CappedTag<double, kBatch>;
 using V = hn::Vec<D>;
 
-constexpr double kPivotTolerance = 1e-13;  // of a point's 3×3 block: below, that direction is not seen at all and stays
-constexpr double kDepthShare = 0.8;        // of its least depth that a point moves in one step at most
+constexpr double kPivotTolerance =
+    1e-13;  // of a point's 3×3 block: below, that direction is not seen at all and stays
+constexpr double kDepthShare = 0.8;  // of its least depth that a point moves in one step at most
 
 HWY_INLINE V load(const double* p) { return hn::Load(D(), p); }
 HWY_INLINE V set(double v) { return hn::Set(D(), v); }
@@ -42,7 +46,9 @@ HWY_INLINE double total(V v) { return hn::GetLane(hn::SumOfLanes(D(), v)); }
 /// R X + t, row by row.
 HWY_INLINE void transform(const double* R, const double* t, const V X[3], V out[3]) {
   for (int r = 0; r < 3; ++r)
-    out[r] = hn::MulAdd(set(R[3 * r]), X[0], hn::MulAdd(set(R[3 * r + 1]), X[1], hn::MulAdd(set(R[3 * r + 2]), X[2], set(t[r]))));
+    out[r] = hn::MulAdd(
+        set(R[3 * r]), X[0],
+        hn::MulAdd(set(R[3 * r + 1]), X[1], hn::MulAdd(set(R[3 * r + 2]), X[2], set(t[r]))));
 }
 
 /// What a slot says of its points.
@@ -53,8 +59,10 @@ struct Residual {
   V iz, xn, yn;
 };
 
-/// Pinhole without distortion. Lanes without an observation may stand anywhere: what they compute is finite and weighs nothing.
-HWY_INLINE Residual project(const KernelCamera& camera, const Slot& slot, std::size_t lane, const V Xi[3], V* behind) {
+/// Pinhole without distortion. Lanes without an observation may stand anywhere: what they compute
+/// is finite and weighs nothing.
+HWY_INLINE Residual project(const KernelCamera& camera, const Slot& slot, std::size_t lane,
+                            const V Xi[3], V* behind) {
   const D d;
   V Xc[3] = {Xi[0], Xi[1], Xi[2]};
   if (!camera.identity) transform(camera.R, camera.t, Xi, Xc);
@@ -107,7 +115,8 @@ HWY_INLINE V loss(BundleLoss kind, double threshold2, V s, V* weight) {
   return hn::Mul(c2, hn::Log(d, u));
 }
 
-/// sums += Bᵀ (Q, q) B with B = [I −[X]×]: 21 of the symmetric 6×6 (tt 6, φt 9 row-major, φφ 6), then the gradient.
+/// sums += Bᵀ (Q, q) B with B = [I −[X]×]: 21 of the symmetric 6×6 (tt 6, φt 9 row-major, φφ 6),
+/// then the gradient.
 HWY_INLINE void add_pose_sums(const V Q[6], const V q[3], const V X[3], double* HWY_RESTRICT sums) {
   constexpr int kSym[3][3] = {{0, 1, 2}, {1, 3, 4}, {2, 4, 5}};
   constexpr int kUpper[6][2] = {{0, 0}, {0, 1}, {0, 2}, {1, 1}, {1, 2}, {2, 2}};
@@ -138,28 +147,39 @@ HWY_INLINE void add_pose_sums(const V Q[6], const V q[3], const V X[3], double* 
 }
 
 /// Intrinsics of one slot: their own equations, those with the pose, and their rows of N.
-HWY_INLINE void add_intrinsics(KernelJob& job, int camera, const double* jet, std::size_t lane, std::uint16_t pose, V wx, V wy,
-                               const V F[6], V weight, const V Xi[3], const double* R, double* HWY_RESTRICT rows) {
+HWY_INLINE void add_intrinsics(KernelJob& job, int camera, const double* jet, std::size_t lane,
+                               std::uint16_t pose, V wx, V wy, const V F[6], V weight,
+                               const V Xi[3], const double* R, double* HWY_RESTRICT rows) {
   const int count = job.shared.intrinsic_count[camera];
-  double* own = job.intrinsic_own + static_cast<std::size_t>(camera) * kIntrinsicsSize * (kIntrinsicsSize + 1) * kBatch + lane;
-  double* with_pose = job.intrinsic_sums +
-                      (static_cast<std::size_t>(pose) * kMaxCameras + static_cast<std::size_t>(camera)) * kIntrinsicsSize * 6 * kBatch +
-                      lane;
+  double* own =
+      job.intrinsic_own +
+      static_cast<std::size_t>(camera) * kIntrinsicsSize * (kIntrinsicsSize + 1) * kBatch + lane;
+  double* with_pose =
+      job.intrinsic_sums +
+      (static_cast<std::size_t>(pose) * kMaxCameras + static_cast<std::size_t>(camera)) *
+          kIntrinsicsSize * 6 * kBatch +
+      lane;
   for (int i = 0; i < count; ++i) {
-    const double* J = jet + (kJetIntrinsics + 2 * job.shared.intrinsic_index[camera][i]) * kBatch + lane;
+    const double* J =
+        jet + (kJetIntrinsics + 2 * job.shared.intrinsic_index[camera][i]) * kBatch + lane;
     const V jx = load(J), jy = load(J + kBatch);
     for (int k = 0; k <= i; ++k) {
-      const double* K = jet + (kJetIntrinsics + 2 * job.shared.intrinsic_index[camera][k]) * kBatch + lane;
-      add_to(hn::Mul(weight, hn::MulAdd(jx, load(K), hn::Mul(jy, load(K + kBatch)))), own + (i * (kIntrinsicsSize + 1) + k) * kBatch);
+      const double* K =
+          jet + (kJetIntrinsics + 2 * job.shared.intrinsic_index[camera][k]) * kBatch + lane;
+      add_to(hn::Mul(weight, hn::MulAdd(jx, load(K), hn::Mul(jy, load(K + kBatch)))),
+             own + (i * (kIntrinsicsSize + 1) + k) * kBatch);
     }
-    add_to(hn::MulAdd(jx, wx, hn::Mul(jy, wy)), own + (i * (kIntrinsicsSize + 1) + kIntrinsicsSize) * kBatch);
+    add_to(hn::MulAdd(jx, wx, hn::Mul(jy, wy)),
+           own + (i * (kIntrinsicsSize + 1) + kIntrinsicsSize) * kBatch);
     V h[3];  // w Jᵀ F
     for (int c = 0; c < 3; ++c) h[c] = hn::Mul(weight, hn::MulAdd(jx, F[c], hn::Mul(jy, F[3 + c])));
     for (int c = 0; c < 3; ++c) {
       const int a = (c + 1) % 3, b = (c + 2) % 3;
       add_to(h[c], with_pose + (i * 6 + c) * kBatch);
-      add_to(hn::NegMulAdd(Xi[b], h[a], hn::Mul(Xi[a], h[b])), with_pose + (i * 6 + 3 + c) * kBatch);
-      add_to(hn::MulAdd(h[0], set(R[c]), hn::MulAdd(h[1], set(R[3 + c]), hn::Mul(h[2], set(R[6 + c])))),
+      add_to(hn::NegMulAdd(Xi[b], h[a], hn::Mul(Xi[a], h[b])),
+             with_pose + (i * 6 + 3 + c) * kBatch);
+      add_to(hn::MulAdd(h[0], set(R[c]),
+                        hn::MulAdd(h[1], set(R[3 + c]), hn::Mul(h[2], set(R[6 + c])))),
              rows + ((job.shared.intrinsic[camera] + i) * 3 + c) * kBatch);
     }
   }
@@ -176,7 +196,8 @@ HWY_INLINE void linearise_lanes(KernelJob& job, std::size_t index, std::size_t l
   for (std::size_t i = 0; i < shared_blocks * kBlock * 3; ++i) store(zero, rows + i * kBatch);
 
   V X[3], P[6], e[3];
-  for (int r = 0; r < 3; ++r) X[r] = load(job.points + (index * 3 + static_cast<std::size_t>(r)) * kBatch + lane);
+  for (int r = 0; r < 3; ++r)
+    X[r] = load(job.points + (index * 3 + static_cast<std::size_t>(r)) * kBatch + lane);
   for (V& p : P) p = zero;
   for (V& g : e) g = zero;
   V least_depth = set(kFar), cost = zero, squared = zero, weighted = zero, behind = zero;
@@ -204,7 +225,8 @@ HWY_INLINE void linearise_lanes(KernelJob& job, std::size_t index, std::size_t l
         const int number = std::countr_zero(mask);
         const KernelCamera& camera = job.cameras[number];
         const double* jet = kJets ? job.jets + jet_index++ * kJetRows * kBatch : nullptr;
-        const Residual r = kJets ? from_jets(jet, *slot, lane) : project(camera, *slot, lane, Xi, &behind);
+        const Residual r =
+            kJets ? from_jets(jet, *slot, lane) : project(camera, *slot, lane, Xi, &behind);
         const V r2 = hn::MulAdd(r.x, r.x, hn::Mul(r.y, r.y));
         const V s = hn::Mul(r.weight, r2);
         V w = r.weight;
@@ -221,7 +243,8 @@ HWY_INLINE void linearise_lanes(KernelJob& job, std::size_t index, std::size_t l
         const V wx = hn::Mul(w, r.x), wy = hn::Mul(w, r.y);
         if (!kJets && camera.identity) {  // F = [a 0 −a xn; 0 b −b yn]
           const V a = hn::Mul(set(camera.fx), r.iz), b = hn::Mul(set(camera.fy), r.iz);
-          const V wa = hn::Mul(w, a), wb = hn::Mul(w, b), ax = hn::Mul(a, r.xn), by = hn::Mul(b, r.yn);
+          const V wa = hn::Mul(w, a), wb = hn::Mul(w, b), ax = hn::Mul(a, r.xn),
+                  by = hn::Mul(b, r.yn);
           Q[0] = hn::MulAdd(wa, a, Q[0]);
           Q[2] = hn::NegMulAdd(wa, ax, Q[2]);
           Q[3] = hn::MulAdd(wb, b, Q[3]);
@@ -236,9 +259,12 @@ HWY_INLINE void linearise_lanes(KernelJob& job, std::size_t index, std::size_t l
         if (kJets) {  // G R_k
           const double* G = jet + lane;
           for (int row = 0; row < 2; ++row) {
-            const V g0 = load(G + (3 * row) * kBatch), g1 = load(G + (3 * row + 1) * kBatch), g2 = load(G + (3 * row + 2) * kBatch);
+            const V g0 = load(G + (3 * row) * kBatch), g1 = load(G + (3 * row + 1) * kBatch),
+                    g2 = load(G + (3 * row + 2) * kBatch);
             for (int c = 0; c < 3; ++c)
-              F[3 * row + c] = hn::MulAdd(g0, set(camera.R[c]), hn::MulAdd(g1, set(camera.R[3 + c]), hn::Mul(g2, set(camera.R[6 + c]))));
+              F[3 * row + c] = hn::MulAdd(
+                  g0, set(camera.R[c]),
+                  hn::MulAdd(g1, set(camera.R[3 + c]), hn::Mul(g2, set(camera.R[6 + c]))));
           }
         } else {
           const V a = hn::Mul(set(camera.fx), r.iz), b = hn::Mul(set(camera.fy), r.iz);
@@ -260,16 +286,19 @@ HWY_INLINE void linearise_lanes(KernelJob& job, std::size_t index, std::size_t l
         Q[5] = hn::MulAdd(wF[2], F[2], hn::MulAdd(wF[5], F[5], Q[5]));
 #pragma GCC unroll 3
         for (int c = 0; c < 3; ++c) q[c] = hn::MulAdd(F[c], wx, hn::MulAdd(F[3 + c], wy, q[c]));
-        if (kJets && job.shared.intrinsic_count[number] > 0) add_intrinsics(job, number, jet, lane, block.pose, wx, wy, F, w, Xi, R, rows);
+        if (kJets && job.shared.intrinsic_count[number] > 0)
+          add_intrinsics(job, number, jet, lane, block.pose, wx, wy, F, w, Xi, R, rows);
       }
 
       const bool moving = k > 0;  // class k > 0 is camera k, free
       if (moving || pose.block >= 0)
-        add_pose_sums(Q, q, Xi,
-                      job.sums +
-                          (static_cast<std::size_t>(block.pose) * static_cast<std::size_t>(job.classes) + static_cast<std::size_t>(k)) *
-                              kPoseSums * kBatch +
-                          lane);
+        add_pose_sums(
+            Q, q, Xi,
+            job.sums +
+                (static_cast<std::size_t>(block.pose) * static_cast<std::size_t>(job.classes) +
+                 static_cast<std::size_t>(k)) *
+                    kPoseSums * kBatch +
+                lane);
       V Tk[3][3];  // Q R_i
 #pragma GCC unroll 3
       for (int c = 0; c < 3; ++c) {
@@ -286,14 +315,17 @@ HWY_INLINE void linearise_lanes(KernelJob& job, std::size_t index, std::size_t l
         for (int c = 0; c < 3; ++c) {
           if (job.shared.exact[k]) {
             for (int b = 0; b < 2; ++b)
-              add_to(hn::MulAdd(set(basis[b]), Tk[0][c], hn::MulAdd(set(basis[2 + b]), Tk[1][c], hn::Mul(set(basis[4 + b]), Tk[2][c]))),
+              add_to(hn::MulAdd(set(basis[b]), Tk[0][c],
+                                hn::MulAdd(set(basis[2 + b]), Tk[1][c],
+                                           hn::Mul(set(basis[4 + b]), Tk[2][c]))),
                      N + (3 * b + c) * kBatch);
           } else {
             for (int r = 0; r < 3; ++r) add_to(Tk[r][c], N + (3 * r + c) * kBatch);
           }
           for (int r = 0; r < 3; ++r) {
             const int a = (r + 1) % 3, b = (r + 2) % 3;
-            add_to(hn::NegMulAdd(Xi[b], Tk[a][c], hn::Mul(Xi[a], Tk[b][c])), N + (3 * (phi + r) + c) * kBatch);
+            add_to(hn::NegMulAdd(Xi[b], Tk[a][c], hn::Mul(Xi[a], Tk[b][c])),
+                   N + (3 * (phi + r) + c) * kBatch);
           }
         }
       }
@@ -324,12 +356,15 @@ HWY_INLINE void linearise_lanes(KernelJob& job, std::size_t index, std::size_t l
     }
   }
 
-  // P (1 + λ on the diagonal) = L Lᵀ; the inverse of L is what everything needs. Constant points: inverse 0, so they drop out.
-  const V grow = set(1.0 + job.damping), tolerance = set(kPivotTolerance), free = load(job.point_free + index * kBatch + lane);
+  // P (1 + λ on the diagonal) = L Lᵀ; the inverse of L is what everything needs. Constant points:
+  // inverse 0, so they drop out.
+  const V grow = set(1.0 + job.damping), tolerance = set(kPivotTolerance),
+          free = load(job.point_free + index * kBatch + lane);
   const V d0 = hn::Mul(P[0], grow), d1 = hn::Mul(P[3], grow), d2 = hn::Mul(P[5], grow);
   const auto inverse_root = [&](V pivot, V diagonal) {
     const auto good = hn::Gt(pivot, hn::Mul(tolerance, diagonal));
-    return hn::Mul(free, hn::IfThenElseZero(good, hn::Div(one, hn::Sqrt(hn::IfThenElse(good, pivot, one)))));
+    return hn::Mul(
+        free, hn::IfThenElseZero(good, hn::Div(one, hn::Sqrt(hn::IfThenElse(good, pivot, one)))));
   };
   const V m00 = inverse_root(d0, d0);
   const V l10 = hn::Mul(P[1], m00), l20 = hn::Mul(P[2], m00);
@@ -355,7 +390,8 @@ HWY_INLINE void linearise_lanes(KernelJob& job, std::size_t index, std::size_t l
     double* g = job.reduced + static_cast<std::size_t>(pose.block) * kBlock * kBatch + lane;
 #pragma GCC unroll 3
     for (int r = 0; r < 3; ++r) {
-      const V t0 = load(y + (3 * r) * kBatch), t1 = load(y + (3 * r + 1) * kBatch), t2 = load(y + (3 * r + 2) * kBatch);
+      const V t0 = load(y + (3 * r) * kBatch), t1 = load(y + (3 * r + 1) * kBatch),
+              t2 = load(y + (3 * r + 2) * kBatch);
       Y[r][0] = hn::Mul(t0, m00);
       Y[r][1] = hn::MulAdd(t0, m10, hn::Mul(t1, m11));
       Y[r][2] = hn::MulAdd(t0, m20, hn::MulAdd(t1, m21, hn::Mul(t2, m22)));
@@ -378,7 +414,10 @@ HWY_INLINE void linearise_lanes(KernelJob& job, std::size_t index, std::size_t l
   }
   for (int i = 0; i < job.shared.size; ++i) {
     double* n = rows + i * 3 * kBatch;
-    double* g = job.reduced + (static_cast<std::size_t>(job.free_poses) * kBlock + static_cast<std::size_t>(i)) * kBatch + lane;
+    double* g =
+        job.reduced +
+        (static_cast<std::size_t>(job.free_poses) * kBlock + static_cast<std::size_t>(i)) * kBatch +
+        lane;
     const V n0 = load(n), n1 = load(n + kBatch), n2 = load(n + 2 * kBatch);
     const V y0 = hn::Mul(n0, m00), y1 = hn::MulAdd(n0, m10, hn::Mul(n1, m11)),
             y2 = hn::MulAdd(n0, m20, hn::MulAdd(n1, m21, hn::Mul(n2, m22)));
@@ -401,7 +440,8 @@ HWY_INLINE void evaluate_lanes(KernelJob& job, std::size_t index, std::size_t la
   const D d;
   const Batch& batch = job.batches[index];
   V X[3];
-  for (int r = 0; r < 3; ++r) X[r] = load(job.points + (index * 3 + static_cast<std::size_t>(r)) * kBatch + lane);
+  for (int r = 0; r < 3; ++r)
+    X[r] = load(job.points + (index * 3 + static_cast<std::size_t>(r)) * kBatch + lane);
   const V zero = hn::Zero(d);
   V cost = zero, squared = zero, weighted = zero, behind = zero;
   std::size_t jet_index = 0;
@@ -413,7 +453,8 @@ HWY_INLINE void evaluate_lanes(KernelJob& job, std::size_t index, std::size_t la
     for (unsigned mask = block.cameras; mask != 0; mask &= mask - 1, ++slot) {
       const double* jet = kJets ? job.jets + jet_index++ * kJetRows * kBatch : nullptr;
       const Residual r =
-          kJets ? from_jets(jet, job.slots[slot], lane) : project(job.cameras[std::countr_zero(mask)], job.slots[slot], lane, Xi, &behind);
+          kJets ? from_jets(jet, job.slots[slot], lane)
+                : project(job.cameras[std::countr_zero(mask)], job.slots[slot], lane, Xi, &behind);
       const V r2 = hn::MulAdd(r.x, r.x, hn::Mul(r.y, r.y));
       const V s = hn::Mul(r.weight, r2);
       V factor;
@@ -432,7 +473,8 @@ HWY_INLINE void evaluate_lanes(KernelJob& job, std::size_t index, std::size_t la
   job.behind = job.behind || total(behind) > 0;
 }
 
-HWY_INLINE void back_substitute_lanes(KernelJob& job, std::size_t index, std::size_t lane, const double* delta) {
+HWY_INLINE void back_substitute_lanes(KernelJob& job, std::size_t index, std::size_t lane,
+                                      const double* delta) {
   const Batch& batch = job.batches[index];
   const double* factor = job.factors + index * kFactorRows * kBatch + lane;
   V X[3], v[3];
@@ -448,25 +490,32 @@ HWY_INLINE void back_substitute_lanes(KernelJob& job, std::size_t index, std::si
 #pragma GCC unroll 3
     for (int r = 0; r < 3; ++r) {  // how far the step moves X_i: τ + φ × X_i
       const int a = (r + 1) % 3, b = (r + 2) % 3;
-      const V moved = hn::MulAdd(set(step[3 + a]), Xi[b], hn::NegMulAdd(set(step[3 + b]), Xi[a], set(step[r])));
+      const V moved =
+          hn::MulAdd(set(step[3 + a]), Xi[b], hn::NegMulAdd(set(step[3 + b]), Xi[a], set(step[r])));
 #pragma GCC unroll 3
       for (int c = 0; c < 3; ++c) v[c] = hn::NegMulAdd(load(y + (3 * r + c) * kBatch), moved, v[c]);
     }
   }
-  const double* rows = job.y_shared + index * static_cast<std::size_t>(job.shared.blocks) * kYSize + lane;
+  const double* rows =
+      job.y_shared + index * static_cast<std::size_t>(job.shared.blocks) * kYSize + lane;
   const double* shared_step = delta + job.free_poses * kBlock;
   for (int i = 0; i < job.shared.size; ++i)
-    for (int c = 0; c < 3; ++c) v[c] = hn::NegMulAdd(load(rows + (3 * i + c) * kBatch), set(shared_step[i]), v[c]);
-  const V m00 = load(factor), m10 = load(factor + kBatch), m11 = load(factor + 2 * kBatch), m20 = load(factor + 3 * kBatch),
-          m21 = load(factor + 4 * kBatch), m22 = load(factor + 5 * kBatch);
-  V step[3] = {hn::MulAdd(m00, v[0], hn::MulAdd(m10, v[1], hn::Mul(m20, v[2]))), hn::MulAdd(m11, v[1], hn::Mul(m21, v[2])),
-               hn::Mul(m22, v[2])};
-  const V length2 = hn::MulAdd(step[0], step[0], hn::MulAdd(step[1], step[1], hn::Mul(step[2], step[2])));
+    for (int c = 0; c < 3; ++c)
+      v[c] = hn::NegMulAdd(load(rows + (3 * i + c) * kBatch), set(shared_step[i]), v[c]);
+  const V m00 = load(factor), m10 = load(factor + kBatch), m11 = load(factor + 2 * kBatch),
+          m20 = load(factor + 3 * kBatch), m21 = load(factor + 4 * kBatch),
+          m22 = load(factor + 5 * kBatch);
+  V step[3] = {hn::MulAdd(m00, v[0], hn::MulAdd(m10, v[1], hn::Mul(m20, v[2]))),
+               hn::MulAdd(m11, v[1], hn::Mul(m21, v[2])), hn::Mul(m22, v[2])};
+  const V length2 =
+      hn::MulAdd(step[0], step[0], hn::MulAdd(step[1], step[1], hn::Mul(step[2], step[2])));
   const V limit = hn::Mul(set(kDepthShare), load(factor + 9 * kBatch));
   const V limit2 = hn::Mul(limit, limit);
   const auto too_far = hn::Gt(length2, limit2);
-  const V scale = hn::IfThenElse(too_far, hn::Sqrt(hn::Div(limit2, hn::IfThenElse(too_far, length2, set(1.0)))), set(1.0));
-  for (std::size_t r = 0; r < 3; ++r) store(hn::MulAdd(scale, step[r], X[r]), job.candidate + (index * 3 + r) * kBatch + lane);
+  const V scale = hn::IfThenElse(
+      too_far, hn::Sqrt(hn::Div(limit2, hn::IfThenElse(too_far, length2, set(1.0)))), set(1.0));
+  for (std::size_t r = 0; r < 3; ++r)
+    store(hn::MulAdd(scale, step[r], X[r]), job.candidate + (index * 3 + r) * kBatch + lane);
   job.update += total(length2);
   job.norm += total(hn::MulAdd(X[0], X[0], hn::MulAdd(X[1], X[1], hn::Mul(X[2], X[2]))));
 }
@@ -474,18 +523,21 @@ HWY_INLINE void back_substitute_lanes(KernelJob& job, std::size_t index, std::si
 void linearise_one(KernelJob& job, std::size_t first, std::size_t last) {
   for (std::size_t i = first; i < last; ++i)
     for (std::size_t lane = 0; lane < kBatch; lane += hn::Lanes(D()))
-      job.jets != nullptr ? linearise_lanes<true>(job, i, lane) : linearise_lanes<false>(job, i, lane);
+      job.jets != nullptr ? linearise_lanes<true>(job, i, lane)
+                          : linearise_lanes<false>(job, i, lane);
 }
 
 void evaluate_one(KernelJob& job, std::size_t first, std::size_t last) {
   for (std::size_t i = first; i < last; ++i)
     for (std::size_t lane = 0; lane < kBatch; lane += hn::Lanes(D()))
-      job.jets != nullptr ? evaluate_lanes<true>(job, i, lane) : evaluate_lanes<false>(job, i, lane);
+      job.jets != nullptr ? evaluate_lanes<true>(job, i, lane)
+                          : evaluate_lanes<false>(job, i, lane);
 }
 
 void back_substitute_one(KernelJob& job, std::size_t first, std::size_t last, const double* delta) {
   for (std::size_t i = first; i < last; ++i)
-    for (std::size_t lane = 0; lane < kBatch; lane += hn::Lanes(D())) back_substitute_lanes(job, i, lane, delta);
+    for (std::size_t lane = 0; lane < kBatch; lane += hn::Lanes(D()))
+      back_substitute_lanes(job, i, lane, delta);
 }
 
 }  // namespace HWY_NAMESPACE
@@ -499,9 +551,14 @@ HWY_EXPORT(linearise_one);
 HWY_EXPORT(evaluate_one);
 HWY_EXPORT(back_substitute_one);
 
-void linearise(KernelJob& job, std::size_t first, std::size_t last) noexcept { HWY_DYNAMIC_DISPATCH(linearise_one)(job, first, last); }
-void evaluate(KernelJob& job, std::size_t first, std::size_t last) noexcept { HWY_DYNAMIC_DISPATCH(evaluate_one)(job, first, last); }
-void back_substitute(KernelJob& job, std::size_t first, std::size_t last, const double* delta) noexcept {
+void linearise(KernelJob& job, std::size_t first, std::size_t last) noexcept {
+  HWY_DYNAMIC_DISPATCH(linearise_one)(job, first, last);
+}
+void evaluate(KernelJob& job, std::size_t first, std::size_t last) noexcept {
+  HWY_DYNAMIC_DISPATCH(evaluate_one)(job, first, last);
+}
+void back_substitute(KernelJob& job, std::size_t first, std::size_t last,
+                     const double* delta) noexcept {
   HWY_DYNAMIC_DISPATCH(back_substitute_one)(job, first, last, delta);
 }
 

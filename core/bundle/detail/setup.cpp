@@ -8,9 +8,11 @@
 namespace vergence::detail {
 namespace {
 
-constexpr double kOrthonormal = 1e-6;  // largest entry of RᵀR − I of a rotation that only rounding has touched
+constexpr double kOrthonormal =
+    1e-6;  // largest entry of RᵀR − I of a rotation that only rounding has touched
 
-bool refuse(BundleResult* result, BundleTermination termination, BundleDefect defect, std::size_t index = 0) noexcept {
+bool refuse(BundleResult* result, BundleTermination termination, BundleDefect defect,
+            std::size_t index = 0) noexcept {
   result->termination = termination;
   result->defect = defect;
   result->defect_index = static_cast<std::uint32_t>(index);
@@ -18,7 +20,9 @@ bool refuse(BundleResult* result, BundleTermination termination, BundleDefect de
 }
 
 bool rigid(const Transform& T) noexcept {
-  return T.finite() && (T.R.transpose() * T.R - Mat3::Identity()).cwiseAbs().maxCoeff() < kOrthonormal && T.R.determinant() > 0;
+  return T.finite() &&
+         (T.R.transpose() * T.R - Mat3::Identity()).cwiseAbs().maxCoeff() < kOrthonormal &&
+         T.R.determinant() > 0;
 }
 
 bool usable(const Intrinsics& k) noexcept {
@@ -27,22 +31,28 @@ bool usable(const Intrinsics& k) noexcept {
   return k.fx > 0 && k.fy > 0;
 }
 
-bool check_sizes(const BundleWorkspace& w, const BundleProblem& p, const BundleOptions& o, BundleResult* r) noexcept {
+bool check_sizes(const BundleWorkspace& w, const BundleProblem& p, const BundleOptions& o,
+                 BundleResult* r) noexcept {
   const bool mono = o.configuration == BundleConfiguration::parallel_monocular;
   const auto as_many = [](std::size_t n, std::size_t of) { return n == of || n == 0; };
   if (p.cameras.empty() || p.cameras.size() > kMaxCameras || p.T_left_world.empty() ||
-      !as_many(p.pose_constant.size(), p.T_left_world.size()) || !as_many(p.point_constant.size(), p.points.size()) ||
+      !as_many(p.pose_constant.size(), p.T_left_world.size()) ||
+      !as_many(p.point_constant.size(), p.points.size()) ||
       !as_many(p.squared_residuals.size(), p.observations.size()) ||
-      (mono ? !as_many(p.T_camera_left.size(), p.cameras.size()) : p.T_camera_left.size() != p.cameras.size()))
+      (mono ? !as_many(p.T_camera_left.size(), p.cameras.size())
+            : p.T_camera_left.size() != p.cameras.size()))
     return refuse(r, BundleTermination::invalid_input, BundleDefect::sizes);
-  if (p.cameras.size() > w.capacity.cameras || p.T_left_world.size() > w.capacity.poses || p.points.size() > w.capacity.points ||
-      p.observations.size() > w.capacity.observations || (o.configuration == BundleConfiguration::stereo_calibration && !w.capacity.shared))
+  if (p.cameras.size() > w.capacity.cameras || p.T_left_world.size() > w.capacity.poses ||
+      p.points.size() > w.capacity.points || p.observations.size() > w.capacity.observations ||
+      (o.configuration == BundleConfiguration::stereo_calibration && !w.capacity.shared))
     return refuse(r, BundleTermination::capacity, BundleDefect::none);
   return true;
 }
 
 bool check_state(const BundleProblem& p, const BundleOptions& o, BundleResult* r) noexcept {
-  const auto bad = [&](std::size_t i) { return refuse(r, BundleTermination::invalid_input, BundleDefect::state_not_finite, i); };
+  const auto bad = [&](std::size_t i) {
+    return refuse(r, BundleTermination::invalid_input, BundleDefect::state_not_finite, i);
+  };
   for (std::size_t i = 0; i < p.points.size(); ++i)
     if (!p.points[i].allFinite()) return bad(i);
   for (std::size_t i = 0; i < p.T_left_world.size(); ++i)
@@ -52,9 +62,11 @@ bool check_state(const BundleProblem& p, const BundleOptions& o, BundleResult* r
     if (!usable(p.cameras[k].intrinsics())) return bad(k);
     if (mono) continue;
     if (!rigid(p.T_camera_left[k])) return bad(k);
-    if (k == 0 && !(p.T_camera_left[0].R.isIdentity(kOrthonormal) && p.T_camera_left[0].t.norm() < kOrthonormal)) return bad(k);
-    if (k > 0 && o.configuration == BundleConfiguration::stereo_calibration && o.length[k].kind != BundleLength::free &&
-        !(p.T_camera_left[k].t.norm() > kOrthonormal))
+    if (k == 0 && !(p.T_camera_left[0].R.isIdentity(kOrthonormal) &&
+                    p.T_camera_left[0].t.norm() < kOrthonormal))
+      return bad(k);
+    if (k > 0 && o.configuration == BundleConfiguration::stereo_calibration &&
+        o.length[k].kind != BundleLength::free && !(p.T_camera_left[k].t.norm() > kOrthonormal))
       return bad(k);  // a length without a direction
   }
   return true;
@@ -63,7 +75,8 @@ bool check_state(const BundleProblem& p, const BundleOptions& o, BundleResult* r
 /// Observations: index, order, values; where each point's begin; how many each pose has.
 bool check_observations(BundleWorkspace& w, const BundleProblem& p, BundleResult* r) noexcept {
   std::fill(w.pose_observations.begin(), w.pose_observations.end(), 0U);
-  const std::size_t points = p.points.size(), poses = p.T_left_world.size(), cameras = p.cameras.size();
+  const std::size_t points = p.points.size(), poses = p.T_left_world.size(),
+                    cameras = p.cameras.size();
   std::uint32_t* const pose_observations = w.pose_observations.data();
   std::size_t next_point = 0;
   std::uint64_t last = 0;
@@ -71,20 +84,25 @@ bool check_observations(BundleWorkspace& w, const BundleProblem& p, BundleResult
     const BundleObservation& o = p.observations[i];
     if (o.point >= points || o.pose >= poses || o.camera >= cameras)
       return refuse(r, BundleTermination::invalid_input, BundleDefect::index, i);
-    const std::uint64_t key = (static_cast<std::uint64_t>(o.point) << 24U) | (static_cast<std::uint64_t>(o.pose) << 8U) | o.camera;
-    if (i > 0 && key <= last) return refuse(r, BundleTermination::invalid_input, BundleDefect::order, i);
+    const std::uint64_t key = (static_cast<std::uint64_t>(o.point) << 24U) |
+                              (static_cast<std::uint64_t>(o.pose) << 8U) | o.camera;
+    if (i > 0 && key <= last)
+      return refuse(r, BundleTermination::invalid_input, BundleDefect::order, i);
     last = key;
-    if (!std::isfinite(o.x) || !std::isfinite(o.y) || !std::isfinite(o.inverse_sigma) || !(o.inverse_sigma > 0))
+    if (!std::isfinite(o.x) || !std::isfinite(o.y) || !std::isfinite(o.inverse_sigma) ||
+        !(o.inverse_sigma > 0))
       return refuse(r, BundleTermination::invalid_input, BundleDefect::not_finite, i);
     while (next_point <= o.point) w.first_observation[next_point++] = static_cast<std::uint32_t>(i);
     ++pose_observations[o.pose];
   }
-  while (next_point <= p.points.size()) w.first_observation[next_point++] = static_cast<std::uint32_t>(p.observations.size());
+  while (next_point <= p.points.size())
+    w.first_observation[next_point++] = static_cast<std::uint32_t>(p.observations.size());
   return true;
 }
 
 /// Numbers the free poses; every one of them has to be determined by something.
-bool check_poses(BundleWorkspace& w, const BundleProblem& p, const BundleOptions& o, BundleResult* r) noexcept {
+bool check_poses(BundleWorkspace& w, const BundleProblem& p, const BundleOptions& o,
+                 BundleResult* r) noexcept {
   w.free_poses = 0;
   bool anchored = !p.pose_priors.empty();
   for (std::size_t i = 0; i < p.T_left_world.size(); ++i) {
@@ -95,16 +113,22 @@ bool check_poses(BundleWorkspace& w, const BundleProblem& p, const BundleOptions
   if (!anchored) return refuse(r, BundleTermination::invalid_input, BundleDefect::sizes);
   for (std::size_t i = 0; i < p.pose_priors.size(); ++i) {
     const BundlePosePrior& prior = p.pose_priors[i];
-    if (prior.pose >= p.T_left_world.size()) return refuse(r, BundleTermination::invalid_input, BundleDefect::index, i);
+    if (prior.pose >= p.T_left_world.size())
+      return refuse(r, BundleTermination::invalid_input, BundleDefect::index, i);
     if (!rigid(prior.T_left_world) || !prior.information.allFinite())
       return refuse(r, BundleTermination::invalid_input, BundleDefect::not_finite, i);
   }
   for (std::size_t i = 0; i < p.T_left_world.size(); ++i) {
     if (w.poses[i].block < 0 || w.pose_observations[i] > 0) continue;
-    const bool held = std::any_of(p.pose_priors.begin(), p.pose_priors.end(), [&](const BundlePosePrior& q) { return q.pose == i; });
-    if (!held) return refuse(r, BundleTermination::rank_deficient, BundleDefect::pose_without_observations, i);
+    const bool held = std::any_of(p.pose_priors.begin(), p.pose_priors.end(),
+                                  [&](const BundlePosePrior& q) { return q.pose == i; });
+    if (!held)
+      return refuse(r, BundleTermination::rank_deficient, BundleDefect::pose_without_observations,
+                    i);
   }
-  if (static_cast<std::size_t>(w.free_poses) * kBlock + static_cast<std::size_t>(shared_layout(p, o, false).blocks) * kBlock == 0 &&
+  if (static_cast<std::size_t>(w.free_poses) * kBlock +
+              static_cast<std::size_t>(shared_layout(p, o, false).blocks) * kBlock ==
+          0 &&
       p.points.empty())
     return refuse(r, BundleTermination::invalid_input, BundleDefect::sizes);
   return true;
@@ -118,7 +142,8 @@ bool order_points(BundleWorkspace& w, const BundleProblem& p, BundleResult* r) n
     const std::uint32_t begin = w.first_observation[i], end = w.first_observation[i + 1];
     if (begin == end) continue;
     const bool free = p.point_constant.empty() || p.point_constant[i] == 0;
-    if (free && end - begin < 2) return refuse(r, BundleTermination::rank_deficient, BundleDefect::seen_once, i);
+    if (free && end - begin < 2)
+      return refuse(r, BundleTermination::rank_deficient, BundleDefect::seen_once, i);
     w.free_points += free ? 1U : 0U;
     const std::uint64_t first = p.observations[begin].pose, last = p.observations[end - 1].pose;
     w.order[w.point_count++] = (first << 48U) | (last << 32U) | i;
@@ -128,29 +153,37 @@ bool order_points(BundleWorkspace& w, const BundleProblem& p, BundleResult* r) n
   return true;
 }
 
-/// Slots of a pose in order of camera: how many before camera k for every set of cameras, [set][k]; [set][kMaxCameras]: all.
+/// Slots of a pose in order of camera: how many before camera k for every set of cameras, [set][k];
+/// [set][kMaxCameras]: all.
 constexpr auto kSlotsBefore = [] {
   std::array<std::array<std::uint8_t, kMaxCameras + 1>, 1U << kMaxCameras> table{};
   for (unsigned set = 0; set < table.size(); ++set)
-    for (unsigned k = 0; k <= kMaxCameras; ++k) table[set][k] = static_cast<std::uint8_t>(std::popcount(set & ((1U << k) - 1U)));
+    for (unsigned k = 0; k <= kMaxCameras; ++k)
+      table[set][k] = static_cast<std::uint8_t>(std::popcount(set & ((1U << k) - 1U)));
   return table;
 }();
 
-/// The images of one batch: the union of those that see its points. False: more than there is room for.
+/// The images of one batch: the union of those that see its points. False: more than there is room
+/// for.
 bool lay_out_batch(BundleWorkspace& w, const BundleProblem& p, std::size_t index) noexcept {
   Batch& batch = w.batches[index];
-  batch.lanes = static_cast<std::uint32_t>(std::min<std::size_t>(kBatch, w.point_count - index * kBatch));
+  batch.lanes =
+      static_cast<std::uint32_t>(std::min<std::size_t>(kBatch, w.point_count - index * kBatch));
   batch.block_begin = static_cast<std::uint32_t>(w.block_count);
   const BundleObservation* const observations = p.observations.data();
   const std::uint32_t* const first_observation = w.first_observation.data();
   std::uint8_t* const pose_cameras = w.pose_cameras.data();
   std::uint32_t* const pose_slot = w.pose_slot.data();
   std::size_t lowest = p.T_left_world.size(), highest = 0;
-  const auto point_of = [&](std::size_t lane) { return static_cast<std::uint32_t>(w.order[index * kBatch + lane]); };
+  const auto point_of = [&](std::size_t lane) {
+    return static_cast<std::uint32_t>(w.order[index * kBatch + lane]);
+  };
   for (std::size_t lane = 0; lane < batch.lanes; ++lane) {
-    const std::uint32_t begin = first_observation[point_of(lane)], end = first_observation[point_of(lane) + 1];
+    const std::uint32_t begin = first_observation[point_of(lane)],
+                        end = first_observation[point_of(lane) + 1];
     for (std::uint32_t i = begin; i < end; ++i)
-      pose_cameras[observations[i].pose] = static_cast<std::uint8_t>(pose_cameras[observations[i].pose] | (1U << observations[i].camera));
+      pose_cameras[observations[i].pose] = static_cast<std::uint8_t>(
+          pose_cameras[observations[i].pose] | (1U << observations[i].camera));
     lowest = std::min<std::size_t>(lowest, observations[begin].pose);
     highest = std::max<std::size_t>(highest, observations[end - 1].pose);
   }
@@ -163,7 +196,8 @@ bool lay_out_batch(BundleWorkspace& w, const BundleProblem& p, std::size_t index
       room = false;
       break;
     }
-    w.blocks[w.block_count++] = {static_cast<std::uint32_t>(w.slot_count), static_cast<std::uint16_t>(pose), cameras};
+    w.blocks[w.block_count++] = {static_cast<std::uint32_t>(w.slot_count),
+                                 static_cast<std::uint16_t>(pose), cameras};
     pose_slot[pose] = static_cast<std::uint32_t>(w.slot_count);
     std::fill_n(w.slots.begin() + static_cast<std::ptrdiff_t>(w.slot_count), count, Slot{});
     w.slot_count += count;
@@ -181,21 +215,31 @@ bool lay_out_batch(BundleWorkspace& w, const BundleProblem& p, std::size_t index
       observation_lane[i] = slot * kBatch + static_cast<std::uint32_t>(lane);
     }
   }
-  if (lowest <= highest) std::fill(pose_cameras + lowest, pose_cameras + highest + 1, std::uint8_t{0});
+  if (lowest <= highest)
+    std::fill(pose_cameras + lowest, pose_cameras + highest + 1, std::uint8_t{0});
   batch.block_end = static_cast<std::uint32_t>(w.block_count);
   return room;
 }
 
 bool same_poses(const BundleWorkspace& w, const Batch& a, const Batch& b) noexcept {
   const auto begin = w.blocks.begin();
-  return std::equal(begin + a.block_begin, begin + a.block_end, begin + b.block_begin, begin + b.block_end,
+  return std::equal(begin + a.block_begin, begin + a.block_end, begin + b.block_begin,
+                    begin + b.block_end,
                     [](const PoseBlock& x, const PoseBlock& y) { return x.pose == y.pose; });
 }
 
 }  // namespace
 
 std::array<double, kIntrinsicsSize> parameters(const Intrinsics& k) noexcept {
-  return {k.fx, k.fy, k.cx, k.cy, k.distortion[0], k.distortion[1], k.distortion[2], k.distortion[3], k.distortion[4]};
+  return {k.fx,
+          k.fy,
+          k.cx,
+          k.cy,
+          k.distortion[0],
+          k.distortion[1],
+          k.distortion[2],
+          k.distortion[3],
+          k.distortion[4]};
 }
 
 void set_parameters(Intrinsics& k, const std::array<double, kIntrinsicsSize>& v) noexcept {
@@ -210,7 +254,10 @@ double held_sigma(const BundleIntrinsics& intrinsics, const Intrinsics& k, int p
   constexpr double kFocalShare = 1e-3, kPrincipalPoint = 0.5;  // px; METHOD §2
   const double given = intrinsics.held_sigma[static_cast<std::size_t>(parameter)];
   if (given >= 0) return given;
-  return parameter == 0 ? kFocalShare * k.fx : parameter == 1 ? kFocalShare * k.fy : parameter < 4 ? kPrincipalPoint : 0;
+  return parameter == 0   ? kFocalShare * k.fx
+         : parameter == 1 ? kFocalShare * k.fy
+         : parameter < 4  ? kPrincipalPoint
+                          : 0;
 }
 
 SharedLayout shared_layout(const BundleProblem& p, const BundleOptions& o, bool held_too) noexcept {
@@ -234,10 +281,12 @@ SharedLayout shared_layout(const BundleProblem& p, const BundleOptions& o, bool 
   return s;
 }
 
-bool set_up(BundleWorkspace& w, const BundleProblem& p, const BundleOptions& o, BundleResult* r) noexcept {
-  if (o.validate()[0] != '\0') return refuse(r, BundleTermination::invalid_input, BundleDefect::options);
-  if (!check_sizes(w, p, o, r) || !check_state(p, o, r) || !check_observations(w, p, r) || !check_poses(w, p, o, r) ||
-      !order_points(w, p, r))
+bool set_up(BundleWorkspace& w, const BundleProblem& p, const BundleOptions& o,
+            BundleResult* r) noexcept {
+  if (o.validate()[0] != '\0')
+    return refuse(r, BundleTermination::invalid_input, BundleDefect::options);
+  if (!check_sizes(w, p, o, r) || !check_state(p, o, r) || !check_observations(w, p, r) ||
+      !check_poses(w, p, o, r) || !order_points(w, p, r))
     return false;
   w.batch_count = (w.point_count + kBatch - 1) / kBatch;
   w.block_count = w.slot_count = 0;
@@ -257,15 +306,22 @@ bool set_up(BundleWorkspace& w, const BundleProblem& p, const BundleOptions& o, 
     const bool used = i < w.point_count;
     const auto point = used ? static_cast<std::uint32_t>(w.order[i]) : 0U;
     for (std::size_t c = 0; c < 3; ++c)
-      state.points[(batch * 3 + c) * kBatch + lane] = used ? p.points[point][static_cast<Eigen::Index>(c)] : 0.0;
-    w.point_free[i] = used && (p.point_constant.empty() || p.point_constant[point] == 0) ? 1.0 : 0.0;
+      state.points[(batch * 3 + c) * kBatch + lane] =
+          used ? p.points[point][static_cast<Eigen::Index>(c)] : 0.0;
+    w.point_free[i] =
+        used && (p.point_constant.empty() || p.point_constant[point] == 0) ? 1.0 : 0.0;
   }
   std::copy(p.T_left_world.begin(), p.T_left_world.end(), state.poses.begin());
   for (std::size_t k = 0; k < p.cameras.size(); ++k) {
     state.cameras[k] = p.cameras[k];
-    state.T_camera_left[k] = o.configuration == BundleConfiguration::parallel_monocular || k == 0 ? Transform{} : p.T_camera_left[k];
-    if (o.configuration != BundleConfiguration::stereo_calibration || k == 0 || o.length[k].kind != BundleLength::exact) continue;
-    if (o.length[k].metres > 0) state.T_camera_left[k].t *= o.length[k].metres / state.T_camera_left[k].t.norm();
+    state.T_camera_left[k] = o.configuration == BundleConfiguration::parallel_monocular || k == 0
+                                 ? Transform{}
+                                 : p.T_camera_left[k];
+    if (o.configuration != BundleConfiguration::stereo_calibration || k == 0 ||
+        o.length[k].kind != BundleLength::exact)
+      continue;
+    if (o.length[k].metres > 0)
+      state.T_camera_left[k].t *= o.length[k].metres / state.T_camera_left[k].t.norm();
   }
   return true;
 }

@@ -12,9 +12,11 @@ namespace vergence::detail {
 namespace {
 
 using Index = Eigen::Index;
-constexpr double kRidge = 1e-9;  // of a unit variance: keeps what was written with few digits positive definite
+constexpr double kRidge =
+    1e-9;  // of a unit variance: keeps what was written with few digits positive definite
 
-/// Rows of the published parameters that say something about one place in the layout: at most six, with their factors.
+/// Rows of the published parameters that say something about one place in the layout: at most six,
+/// with their factors.
 struct Combination {
   int first = 0, count = 0;
   double factor[6]{};
@@ -36,13 +38,15 @@ Combination extrinsic_combination(const Mat6& basis, const Mat3& R, int k, int r
 double covariance_of(const RigCovariance& C, const Combination& a, const Combination& b) noexcept {
   double sum = 0;
   for (int i = 0; i < a.count; ++i)
-    for (int j = 0; j < b.count; ++j) sum += a.factor[i] * b.factor[j] * C(a.first + i, b.first + j);
+    for (int j = 0; j < b.count; ++j)
+      sum += a.factor[i] * b.factor[j] * C(a.first + i, b.first + j);
   return sum;
 }
 
 }  // namespace
 
-SharedPrior::SharedPrior(const BundleSharedPrior& prior, const SharedLayout& layout, std::size_t cameras) noexcept
+SharedPrior::SharedPrior(const BundleSharedPrior& prior, const SharedLayout& layout,
+                         std::size_t cameras) noexcept
     : layout_(layout), cameras_(cameras), weight_(prior.weight) {
   if (prior.rig == nullptr || layout.size == 0) return;
   Combination rows[kMaxShared];
@@ -56,7 +60,8 @@ SharedPrior::SharedPrior(const BundleSharedPrior& prior, const SharedLayout& lay
     const Mat6 basis = extrinsic_basis(layout, mean_[k], number);
     for (int i = 0; i < (layout.exact[k] ? 5 : 6); ++i) {
       rows[n] = extrinsic_combination(basis, T.R, number, i);
-      if (!(covariance_of(prior.rig->covariance, rows[n], rows[n]) > 0)) return;  // of the transform nothing is known, nor of the rest
+      if (!(covariance_of(prior.rig->covariance, rows[n], rows[n]) > 0))
+        return;  // of the transform nothing is known, nor of the rest
       place[n++] = layout.extrinsic[k] + i;
     }
   }
@@ -74,9 +79,12 @@ SharedPrior::SharedPrior(const BundleSharedPrior& prior, const SharedLayout& lay
     }
   SharedMatrix C(n, n);
   SharedVector scale(n);
-  for (int i = 0; i < n; ++i) scale[i] = 1.0 / std::sqrt(covariance_of(prior.rig->covariance, rows[i], rows[i]));
   for (int i = 0; i < n; ++i)
-    for (int j = 0; j <= i; ++j) C(i, j) = C(j, i) = scale[i] * scale[j] * covariance_of(prior.rig->covariance, rows[i], rows[j]);
+    scale[i] = 1.0 / std::sqrt(covariance_of(prior.rig->covariance, rows[i], rows[i]));
+  for (int i = 0; i < n; ++i)
+    for (int j = 0; j <= i; ++j)
+      C(i, j) = C(j, i) =
+          scale[i] * scale[j] * covariance_of(prior.rig->covariance, rows[i], rows[j]);
   C.diagonal().array() += kRidge;
   const Eigen::LLT<SharedMatrix> factor(C);
   if (factor.info() != Eigen::Success) return;
@@ -85,7 +93,8 @@ SharedPrior::SharedPrior(const BundleSharedPrior& prior, const SharedLayout& lay
   information_ = SharedMatrix::Zero(layout.size, layout.size);
   for (int i = 0; i < n; ++i)
     for (int j = 0; j < n; ++j)
-      if (place[i] >= 0 && place[j] >= 0) information_(place[i], place[j]) = weight_ * scale[i] * scale[j] * inverse(i, j);
+      if (place[i] >= 0 && place[j] >= 0)
+        information_(place[i], place[j]) = weight_ * scale[i] * scale[j] * inverse(i, j);
   rig_ = prior.rig;
 }
 
@@ -99,7 +108,8 @@ SharedVector SharedPrior::residual(const BundleState& state) const noexcept {
     for (int i = 0; i < (layout_.exact[k] ? 5 : 6); ++i) d[layout_.extrinsic[k] + i] = own[i];
   }
   for (std::size_t k = 0; k < cameras_; ++k) {
-    const auto now = parameters(state.cameras[k].intrinsics()), then = parameters(rig_->intrinsics[k]);
+    const auto now = parameters(state.cameras[k].intrinsics()),
+               then = parameters(rig_->intrinsics[k]);
     for (int i = 0; i < layout_.intrinsic_count[k]; ++i) {
       const std::size_t parameter = layout_.intrinsic_index[k][i];
       d[layout_.intrinsic[k] + i] = now[parameter] - then[parameter];
@@ -114,7 +124,8 @@ SharedMatrix SharedPrior::jacobian(const BundleState& state, const KernelJob& jo
     const int number = static_cast<int>(k), size = layout_.exact[k] ? 5 : 6;
     Mat6 turn = Mat6::Identity();
     turn.topLeftCorner<3, 3>() = rig_->T_camera_left[k].R.transpose() * state.T_camera_left[k].R;
-    const Mat6 own = extrinsic_basis(layout_, mean_[k], number).transpose() * turn * extrinsic_basis(layout_, job.cameras[k], number);
+    const Mat6 own = extrinsic_basis(layout_, mean_[k], number).transpose() * turn *
+                     extrinsic_basis(layout_, job.cameras[k], number);
     J.block(layout_.extrinsic[k], layout_.extrinsic[k], size, size) = own.topLeftCorner(size, size);
   }
   return J;

@@ -39,7 +39,8 @@ void unpack(const double* sums, Mat6* H, Vec6* e) noexcept {
 }
 
 /// The prior's δ = (φ, τ) at T, and how it moves with the pose's own (τ, φ): ∂δ/∂(τ, φ).
-void prior_residual(const BundlePosePrior& prior, const Transform& T, Vec6* delta, Mat6* J) noexcept {
+void prior_residual(const BundlePosePrior& prior, const Transform& T, Vec6* delta,
+                    Mat6* J) noexcept {
   const Mat3 turn = T.R * prior.T_left_world.R.transpose();
   const Vec3 phi = log_so3(turn);
   const Vec3 tau = T.t - turn * prior.T_left_world.t;
@@ -74,7 +75,8 @@ Row6 extrinsic_basis(const SharedLayout& shared, const KernelCamera& camera, int
   return J;  // the sixth column stays empty
 }
 
-System::System(BundleWorkspace& workspace, const BundleProblem& problem, const BundleOptions& options) noexcept
+System::System(BundleWorkspace& workspace, const BundleProblem& problem,
+               const BundleOptions& options) noexcept
     : w_(workspace), problem_(problem), options_(options) {
   job_.batches = w_.batches.data();
   job_.blocks = w_.blocks.data();
@@ -104,12 +106,14 @@ void System::use(const SharedLayout& shared) noexcept {
   ld_ = (rows_ + kBatch - 1) / kBatch * kBatch;
   use_jets_ = false;
   for (std::size_t k = 0; k < problem_.cameras.size(); ++k)
-    use_jets_ = use_jets_ || problem_.cameras[k].intrinsics().has_distortion() || shared.intrinsic_count[k] > 0;
+    use_jets_ = use_jets_ || problem_.cameras[k].intrinsics().has_distortion() ||
+                shared.intrinsic_count[k] > 0;
   job_.jets = use_jets_ ? w_.jets.data() : nullptr;
   const bool calibration = options_.configuration == BundleConfiguration::stereo_calibration;
   job_.classes = calibration ? static_cast<int>(problem_.cameras.size()) : 1;
   for (int k = 0; k < kMaxCameras; ++k)
-    job_.class_cameras[k] = static_cast<std::uint8_t>(calibration ? 1U << static_cast<unsigned>(k) : 0xFFU);
+    job_.class_cameras[k] =
+        static_cast<std::uint8_t>(calibration ? 1U << static_cast<unsigned>(k) : 0xFFU);
 }
 
 void System::prepare(const BundleState& state) noexcept {
@@ -141,17 +145,23 @@ void System::fill_jets(const BundleState& state, const Batch& batch) noexcept {
   for (std::uint32_t b = batch.block_begin; b < batch.block_end; ++b) {
     const PoseBlock& block = w_.blocks[b];
     std::size_t slot = block.slot;
-    for (unsigned mask = block.cameras; mask != 0; mask &= mask - 1, ++slot, jet += kJetRows * kBatch) {
+    for (unsigned mask = block.cameras; mask != 0;
+         mask &= mask - 1, ++slot, jet += kJetRows * kBatch) {
       const auto k = static_cast<std::size_t>(std::countr_zero(mask));
       const Camera& camera = state.cameras[k];
       for (std::size_t lane = 0; lane < kBatch; ++lane) {
-        const auto put = [&](int row, double value) { jet[static_cast<std::size_t>(row) * kBatch + lane] = value; };
+        const auto put = [&](int row, double value) {
+          jet[static_cast<std::size_t>(row) * kBatch + lane] = value;
+        };
         for (int row = 0; row < kJetRows; ++row) put(row, 0.0);
         put(kJetDepth, kFar);
         const Slot& s = w_.slots[slot];
         if (!(s.inverse_sigma[lane] > 0)) continue;
-        const auto coordinate = [&](std::size_t c) { return state.points[(batch_index * 3 + c) * kBatch + lane]; };
-        const Vec3 p = state.T_camera_left[k] * (state.poses[block.pose] * Vec3(coordinate(0), coordinate(1), coordinate(2)));
+        const auto coordinate = [&](std::size_t c) {
+          return state.points[(batch_index * 3 + c) * kBatch + lane];
+        };
+        const Vec3 p = state.T_camera_left[k] * (state.poses[block.pose] *
+                                                 Vec3(coordinate(0), coordinate(1), coordinate(2)));
         Vec2 pixel;
         Mat23 G;
         if (camera.project(p, &pixel, &G) != ProjectStatus::ok) {
@@ -177,12 +187,16 @@ bool System::linearise(const BundleState& state, double damping) noexcept {
   prepare(state);
   job_.damping = damping;
   std::fill_n(w_.A.begin(), ld_ * rows_, 0.0);
-  std::fill_n(w_.sums.begin(), problem_.T_left_world.size() * static_cast<std::size_t>(job_.classes) * kPoseSums * kBatch, 0.0);
+  std::fill_n(
+      w_.sums.begin(),
+      problem_.T_left_world.size() * static_cast<std::size_t>(job_.classes) * kPoseSums * kBatch,
+      0.0);
   std::fill_n(w_.reduced.begin(), rows_ * kBatch, 0.0);
   bool any_intrinsics = false;
   for (const int count : job_.shared.intrinsic_count) any_intrinsics = any_intrinsics || count > 0;
   if (any_intrinsics) {
-    std::fill_n(w_.intrinsic_sums.begin(), problem_.T_left_world.size() * kMaxCameras * kIntrinsicsSize * 6 * kBatch, 0.0);
+    std::fill_n(w_.intrinsic_sums.begin(),
+                problem_.T_left_world.size() * kMaxCameras * kIntrinsicsSize * 6 * kBatch, 0.0);
     std::fill(w_.intrinsic_own.begin(), w_.intrinsic_own.end(), 0.0);
   }
   for (std::size_t b = 0; b < w_.batch_count;) {
@@ -230,7 +244,8 @@ void System::assemble(const BundleState& state) noexcept {
   for (std::size_t i = 0; i < problem_.T_left_world.size(); ++i) assemble_pose(i);
   assemble_intrinsics();
   add_priors(state);
-  for (std::size_t i = first_shared_ + static_cast<std::size_t>(job_.shared.size); i < rows_; ++i) {  // padding
+  for (std::size_t i = first_shared_ + static_cast<std::size_t>(job_.shared.size); i < rows_;
+       ++i) {  // padding
     at(i, i) = 1;
     w_.rhs[i] = 0;
   }
@@ -244,7 +259,10 @@ void System::assemble_pose(std::size_t pose) noexcept {
     if (k == 0 && block < 0) continue;
     Mat6 H;
     Vec6 e;
-    unpack(w_.sums.data() + (pose * static_cast<std::size_t>(job_.classes) + static_cast<std::size_t>(k)) * kPoseSums * kBatch, &H, &e);
+    unpack(w_.sums.data() +
+               (pose * static_cast<std::size_t>(job_.classes) + static_cast<std::size_t>(k)) *
+                   kPoseSums * kBatch,
+           &H, &e);
     all += H;
     gradient += e;
     if (k == 0) continue;
@@ -256,9 +274,11 @@ void System::assemble_pose(std::size_t pose) noexcept {
     for (int r = 0; r < size; ++r) {
       const std::size_t row = first + static_cast<std::size_t>(r);
       w_.rhs[row] += g[r];
-      for (int c = 0; c <= r; ++c) add_information(row, first + static_cast<std::size_t>(c), own(r, c));
+      for (int c = 0; c <= r; ++c)
+        add_information(row, first + static_cast<std::size_t>(c), own(r, c));
       if (block < 0) continue;
-      for (int c = 0; c < kBlock; ++c) at(row, static_cast<std::size_t>(block * kBlock + c)) += JtH(r, c);
+      for (int c = 0; c < kBlock; ++c)
+        at(row, static_cast<std::size_t>(block * kBlock + c)) += JtH(r, c);
     }
   }
   if (block < 0) return;
@@ -266,7 +286,8 @@ void System::assemble_pose(std::size_t pose) noexcept {
   for (std::size_t r = 0; r < kBlock; ++r) {
     w_.rhs[first + r] += gradient[static_cast<Eigen::Index>(r)];
     for (std::size_t c = 0; c <= r; ++c)
-      add_information(first + r, first + c, all(static_cast<Eigen::Index>(r), static_cast<Eigen::Index>(c)));
+      add_information(first + r, first + c,
+                      all(static_cast<Eigen::Index>(r), static_cast<Eigen::Index>(c)));
   }
 }
 
@@ -277,13 +298,17 @@ void System::assemble_intrinsics() noexcept {
     const std::size_t first = first_shared_ + static_cast<std::size_t>(job_.shared.intrinsic[k]);
     for (int i = 0; i < count; ++i) {
       const std::size_t row = first + static_cast<std::size_t>(i);
-      const double* own = w_.intrinsic_own.data() + (k * kIntrinsicsSize + static_cast<std::size_t>(i)) * (kIntrinsicsSize + 1) * kBatch;
-      for (int c = 0; c <= i; ++c) add_information(row, first + static_cast<std::size_t>(c), lane_sum(own + c * kBatch));
+      const double* own =
+          w_.intrinsic_own.data() +
+          (k * kIntrinsicsSize + static_cast<std::size_t>(i)) * (kIntrinsicsSize + 1) * kBatch;
+      for (int c = 0; c <= i; ++c)
+        add_information(row, first + static_cast<std::size_t>(c), lane_sum(own + c * kBatch));
       w_.rhs[row] += lane_sum(own + kIntrinsicsSize * kBatch);
       Vec6 with_extrinsic = Vec6::Zero();
       for (std::size_t pose = 0; pose < problem_.T_left_world.size(); ++pose) {
         const double* sums =
-            w_.intrinsic_sums.data() + ((pose * kMaxCameras + k) * kIntrinsicsSize + static_cast<std::size_t>(i)) * 6 * kBatch;
+            w_.intrinsic_sums.data() +
+            ((pose * kMaxCameras + k) * kIntrinsicsSize + static_cast<std::size_t>(i)) * 6 * kBatch;
         Vec6 v;
         for (int c = 0; c < 6; ++c) v[c] = lane_sum(sums + c * kBatch);
         with_extrinsic += v;
@@ -292,7 +317,9 @@ void System::assemble_intrinsics() noexcept {
         for (int c = 0; c < 6; ++c) at(row, static_cast<std::size_t>(block * kBlock + c)) += v[c];
       }
       if (job_.shared.extrinsic[k] < 0) continue;
-      const Vec6 v = extrinsic_basis(job_.shared, job_.cameras[k], static_cast<int>(k)).transpose() * with_extrinsic;
+      const Vec6 v =
+          extrinsic_basis(job_.shared, job_.cameras[k], static_cast<int>(k)).transpose() *
+          with_extrinsic;
       for (int c = 0; c < (job_.shared.exact[k] ? 5 : 6); ++c)
         at(row, first_shared_ + static_cast<std::size_t>(job_.shared.extrinsic[k] + c)) += v[c];
     }
@@ -312,7 +339,8 @@ void System::add_priors(const BundleState& state) noexcept {
     for (std::size_t r = 0; r < kBlock; ++r) {
       w_.rhs[first + r] += e[static_cast<Eigen::Index>(r)];
       for (std::size_t c = 0; c <= r; ++c)
-        add_information(first + r, first + c, H(static_cast<Eigen::Index>(r), static_cast<Eigen::Index>(c)));
+        add_information(first + r, first + c,
+                        H(static_cast<Eigen::Index>(r), static_cast<Eigen::Index>(c)));
     }
   }
   for (std::size_t k = 0; k < problem_.cameras.size(); ++k) {
@@ -320,12 +348,14 @@ void System::add_priors(const BundleState& state) noexcept {
     if (s.extrinsic[k] >= 0 && options_.length[k].kind == BundleLength::measured) {
       const Transform& T = state.T_camera_left[k];
       const Vec3 j = T.R.transpose() * T.t.normalized();
-      const double information = 1.0 / (options_.length[k].sigma * options_.length[k].sigma), miss = options_.length[k].metres - T.t.norm();
+      const double information = 1.0 / (options_.length[k].sigma * options_.length[k].sigma),
+                   miss = options_.length[k].metres - T.t.norm();
       const std::size_t first = first_shared_ + static_cast<std::size_t>(s.extrinsic[k]);
       for (std::size_t r = 0; r < 3; ++r) {
         const double jr = j[static_cast<Eigen::Index>(r)];
         w_.rhs[first + r] += jr * miss * information;
-        for (std::size_t c = 0; c <= r; ++c) add_information(first + r, first + c, jr * j[static_cast<Eigen::Index>(c)] * information);
+        for (std::size_t c = 0; c <= r; ++c)
+          add_information(first + r, first + c, jr * j[static_cast<Eigen::Index>(c)] * information);
       }
     }
     const auto values = parameters(state.cameras[k].intrinsics());
@@ -333,7 +363,8 @@ void System::add_priors(const BundleState& state) noexcept {
       const std::size_t parameter = s.intrinsic_index[k][i];
       const BundleIntrinsics& given = options_.intrinsics[k];
       if (((given.free >> parameter) & 1U) == 0 || !(given.prior_sigma[parameter] > 0)) continue;
-      const double information = 1.0 / (given.prior_sigma[parameter] * given.prior_sigma[parameter]);
+      const double information =
+          1.0 / (given.prior_sigma[parameter] * given.prior_sigma[parameter]);
       const std::size_t row = first_shared_ + static_cast<std::size_t>(s.intrinsic[k] + i);
       w_.rhs[row] += information * (given.prior_mean[parameter] - values[parameter]);
       add_information(row, row, information);
@@ -347,7 +378,8 @@ void System::add_priors(const BundleState& state) noexcept {
   for (int r = 0; r < job_.shared.size; ++r) {
     const std::size_t row = first_shared_ + static_cast<std::size_t>(r);
     w_.rhs[row] -= e[r];
-    for (int c = 0; c <= r; ++c) add_information(row, first_shared_ + static_cast<std::size_t>(c), H(r, c));
+    for (int c = 0; c <= r; ++c)
+      add_information(row, first_shared_ + static_cast<std::size_t>(c), H(r, c));
   }
 }
 
@@ -362,7 +394,8 @@ double System::prior_cost(const BundleState& state) const noexcept {
   }
   for (std::size_t k = 0; k < problem_.cameras.size(); ++k) {
     if (job_.shared.extrinsic[k] >= 0 && options_.length[k].kind == BundleLength::measured) {
-      const double r = (options_.length[k].metres - state.T_camera_left[k].t.norm()) / options_.length[k].sigma;
+      const double r =
+          (options_.length[k].metres - state.T_camera_left[k].t.norm()) / options_.length[k].sigma;
       cost += 0.5 * r * r;
     }
     const auto values = parameters(state.cameras[k].intrinsics());
@@ -370,7 +403,8 @@ double System::prior_cost(const BundleState& state) const noexcept {
       const std::size_t parameter = job_.shared.intrinsic_index[k][i];
       const BundleIntrinsics& given = options_.intrinsics[k];
       if (((given.free >> parameter) & 1U) == 0 || !(given.prior_sigma[parameter] > 0)) continue;
-      const double r = (given.prior_mean[parameter] - values[parameter]) / given.prior_sigma[parameter];
+      const double r =
+          (given.prior_mean[parameter] - values[parameter]) / given.prior_sigma[parameter];
       cost += 0.5 * r * r;
     }
   }
@@ -390,7 +424,8 @@ void System::move(const BundleState& state, const double* delta, BundleState* ca
     if (w_.poses[i].block < 0) continue;
     const double* d = delta + w_.poses[i].block * kBlock;
     const Mat3 turn = exp_so3({d[3], d[4], d[5]});
-    candidate->poses[i] = {normalised(turn * state.poses[i].R), turn * state.poses[i].t + Vec3(d[0], d[1], d[2])};
+    candidate->poses[i] = {normalised(turn * state.poses[i].R),
+                           turn * state.poses[i].t + Vec3(d[0], d[1], d[2])};
   }
   const double* shared = delta + first_shared_;
   for (std::size_t k = 0; k < problem_.cameras.size(); ++k) {
@@ -398,7 +433,8 @@ void System::move(const BundleState& state, const double* delta, BundleState* ca
     candidate->cameras[k] = state.cameras[k];
     if (job_.shared.extrinsic[k] >= 0) {
       Vec6 rows = Vec6::Zero();
-      for (int i = 0; i < (job_.shared.exact[k] ? 5 : 6); ++i) rows[i] = shared[job_.shared.extrinsic[k] + i];
+      for (int i = 0; i < (job_.shared.exact[k] ? 5 : 6); ++i)
+        rows[i] = shared[job_.shared.extrinsic[k] + i];
       const Vec6 step = extrinsic_basis(job_.shared, job_.cameras[k], static_cast<int>(k)) * rows;
       const Transform& T = state.T_camera_left[k];
       Vec3 t = T.t + T.R * step.head<3>();

@@ -5,22 +5,25 @@
 
 namespace vergence::detail {
 
-/// The normal equations of METHOD §2 about one state, points eliminated: A δ = rhs, δ = [poses | θ_S].
+/// The normal equations of METHOD §2 about one state, points eliminated: A δ = rhs, δ = [poses |
+/// θ_S].
 ///
 /// Threads  One at a time; lives on the stack of solve(). Memory  The workspace's.
 class System {
  public:
-  System(BundleWorkspace& workspace, const BundleProblem& problem, const BundleOptions& options) noexcept;
+  System(BundleWorkspace& workspace, const BundleProblem& problem,
+         const BundleOptions& options) noexcept;
 
   /// Rows of θ_S from now on (free ones, or held intrinsics too).
   void use(const SharedLayout& shared) noexcept;
 
-  /// Cost, gradient and damped reduced system about `state`. False: an observed point is behind its camera or the cost is not finite.
+  /// Cost, gradient and damped reduced system about `state`. False: an observed point is behind its
+  /// camera or the cost is not finite.
   [[nodiscard]] bool linearise(const BundleState& state, double damping) noexcept;
   /// Cost alone; `squared`: also |ε|²/σ² of every slot into the workspace.
   [[nodiscard]] bool evaluate(const BundleState& state, bool squared) noexcept;
-  /// candidate ← state moved by `delta` (the reduced system's solution), points by back substitution. The last linearise() was about
-  /// `state`.
+  /// candidate ← state moved by `delta` (the reduced system's solution), points by back
+  /// substitution. The last linearise() was about `state`.
   void move(const BundleState& state, const double* delta, BundleState* candidate) noexcept;
 
   [[nodiscard]] std::size_t rows() const noexcept { return rows_; }
@@ -29,7 +32,9 @@ class System {
   [[nodiscard]] double squared_px() const noexcept { return job_.squared_px; }
   [[nodiscard]] double weighted() const noexcept { return job_.weighted; }
   [[nodiscard]] double point_decrement() const noexcept { return job_.decrement; }
-  [[nodiscard]] double update_squared() const noexcept { return update_; }  // of the last move(): |δ|², |θ|²
+  [[nodiscard]] double update_squared() const noexcept {
+    return update_;
+  }  // of the last move(): |δ|², |θ|²
   [[nodiscard]] double norm_squared() const noexcept { return norm_; }
   [[nodiscard]] const KernelJob& job() const noexcept { return job_; }
   [[nodiscard]] const SharedPrior& shared_prior() const noexcept { return shared_prior_; }
@@ -59,6 +64,8 @@ class System {
 void tangent_basis(const Vec3& u, double basis[6]) noexcept;
 
 /// J (6 × size, row-major): how (τ, φ) of camera k follows from its rows of θ_S.
-[[nodiscard]] Eigen::Matrix<double, 6, 6> extrinsic_basis(const SharedLayout& shared, const KernelCamera& camera, int k) noexcept;
+[[nodiscard]] Eigen::Matrix<double, 6, 6> extrinsic_basis(const SharedLayout& shared,
+                                                          const KernelCamera& camera,
+                                                          int k) noexcept;
 
 }  // namespace vergence::detail

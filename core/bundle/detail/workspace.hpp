@@ -7,26 +7,31 @@
 
 namespace vergence::detail {
 
-inline constexpr int kBatch = 8;                    // points worked on together: a cache line of doubles, the widest SIMD vector
-inline constexpr int kBlock = 6;                    // rows of one pose in the reduced system; θ_S is padded to a multiple
+inline constexpr int kBatch =
+    8;  // points worked on together: a cache line of doubles, the widest SIMD vector
+inline constexpr int kBlock =
+    6;  // rows of one pose in the reduced system; θ_S is padded to a multiple
 inline constexpr int kYSize = kBlock * 3 * kBatch;  // doubles of one block of Y
 inline constexpr int kFactorRows = 11;              // of PointFactor
 inline constexpr double kFar = 1e30;                // m: depth of what nobody sees
 inline constexpr int kPoseSums = 27;                // 21 of the symmetric 6×6, 6 of the gradient
-inline constexpr int kGroupLimit = 16;              // batches multiplied together: one block of each, 18 kB, stays in the first-level cache
+inline constexpr int kGroupLimit =
+    16;  // batches multiplied together: one block of each, 18 kB, stays in the first-level cache
 inline constexpr int kMaxShared = kBlock * (kMaxCameras - 1) + kIntrinsicsSize * kMaxCameras;
 inline constexpr int kMaxSharedBlocks = (kMaxShared + kBlock - 1) / kBlock;
 inline constexpr int kMostCells = 8;  // a side of the image, of a covariance by cells
 inline constexpr int kJetDepth = 8;
 inline constexpr int kJetIntrinsics = 9;
-inline constexpr int kJetRows = kJetIntrinsics + 2 * kIntrinsicsSize;  // G (6), ε (2), depth, ∂x/∂intrinsics (9 × 2)
+inline constexpr int kJetRows =
+    kJetIntrinsics + 2 * kIntrinsicsSize;  // G (6), ε (2), depth, ∂x/∂intrinsics (9 × 2)
 
 /// Eight points' observations in one image; where inverse_sigma is 0 there is none.
 struct alignas(kCacheLine) Slot {
   double x[kBatch], y[kBatch], inverse_sigma[kBatch];
 };
 
-/// One pose that sees at least one point of a batch: its images' slots follow each other from `slot`, cameras ascending.
+/// One pose that sees at least one point of a batch: its images' slots follow each other from
+/// `slot`, cameras ascending.
 struct PoseBlock {
   std::uint32_t slot = 0;
   std::uint16_t pose = 0;
@@ -51,7 +56,8 @@ struct KernelCamera {
   bool identity;
 };
 
-/// Rows of θ_S. Extrinsics of camera k: (τ, φ), or (β, φ) with τ = basis β; then free intrinsics of each camera.
+/// Rows of θ_S. Extrinsics of camera k: (τ, φ), or (β, φ) with τ = basis β; then free intrinsics of
+/// each camera.
 struct SharedLayout {
   int size = 0;                                   // rows used
   int blocks = 0;                                 // of kBlock rows, the last one padded
@@ -62,10 +68,12 @@ struct SharedLayout {
   std::uint8_t intrinsic_index[kMaxCameras][kIntrinsicsSize] = {};
 };
 
-using SharedMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::ColMajor, kMaxShared, kMaxShared>;
+using SharedMatrix =
+    Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::ColMajor, kMaxShared, kMaxShared>;
 using SharedVector = Eigen::Matrix<double, Eigen::Dynamic, 1, Eigen::ColMajor, kMaxShared, 1>;
 
-/// Everything a kernel reads and writes; pointers into the adjuster's arena. Lane arrays are [rows][kBatch].
+/// Everything a kernel reads and writes; pointers into the adjuster's arena. Lane arrays are
+/// [rows][kBatch].
 struct KernelJob {
   const Batch* batches = nullptr;
   const PoseBlock* blocks = nullptr;
@@ -74,17 +82,20 @@ struct KernelJob {
   KernelCamera cameras[kMaxCameras];
   const double* points = nullptr;      // [batch][3][kBatch]
   const double* point_free = nullptr;  // [batch][kBatch], 1 or 0
-  const double* jets = nullptr;        // [slot of the batch][kJetRows][kBatch]; only for cameras with distortion or free intrinsics
-  double* candidate = nullptr;         // [batch][3][kBatch], out of back_substitute
-  double* y = nullptr;                 // [block][6][3][kBatch]: Y = O L⁻ᵀ with P = L Lᵀ
-  double* y_shared = nullptr;          // [batch][shared.blocks][6][3][kBatch]: N L⁻ᵀ
-  double* factors = nullptr;           // [batch][kFactorRows][kBatch]: L⁻¹ (6), z = L⁻¹ e_P (3), least depth, 0
-  double* sums = nullptr;              // [pose][classes][kPoseSums][kBatch]
-  double* intrinsic_sums = nullptr;    // [pose][camera][kIntrinsicsSize][6][kBatch]: Σ JᵀwB
-  double* intrinsic_own = nullptr;     // [camera][kIntrinsicsSize][kIntrinsicsSize + 1][kBatch]: Σ JᵀwJ, Σ Jᵀwε
-  double* reduced = nullptr;           // [reduced block][6][kBatch]: Σ Y z
-  float* squared = nullptr;            // [slot][kBatch], out of evaluate; may be null
-  int classes = 1;                     // cameras whose normal equations are summed apart
+  const double* jets = nullptr;  // [slot of the batch][kJetRows][kBatch]; only for cameras with
+                                 // distortion or free intrinsics
+  double* candidate = nullptr;   // [batch][3][kBatch], out of back_substitute
+  double* y = nullptr;           // [block][6][3][kBatch]: Y = O L⁻ᵀ with P = L Lᵀ
+  double* y_shared = nullptr;    // [batch][shared.blocks][6][3][kBatch]: N L⁻ᵀ
+  double* factors =
+      nullptr;  // [batch][kFactorRows][kBatch]: L⁻¹ (6), z = L⁻¹ e_P (3), least depth, 0
+  double* sums = nullptr;            // [pose][classes][kPoseSums][kBatch]
+  double* intrinsic_sums = nullptr;  // [pose][camera][kIntrinsicsSize][6][kBatch]: Σ JᵀwB
+  double* intrinsic_own =
+      nullptr;  // [camera][kIntrinsicsSize][kIntrinsicsSize + 1][kBatch]: Σ JᵀwJ, Σ Jᵀwε
+  double* reduced = nullptr;  // [reduced block][6][kBatch]: Σ Y z
+  float* squared = nullptr;   // [slot][kBatch], out of evaluate; may be null
+  int classes = 1;            // cameras whose normal equations are summed apart
   std::uint8_t class_cameras[kMaxCameras] = {};
   SharedLayout shared;
   int free_poses = 0;
@@ -114,22 +125,25 @@ struct BundleWorkspace {
   BundleCapacities capacity;
   std::size_t block_capacity = 0, slot_capacity = 0, reduced_capacity = 0;
 
-  std::span<std::uint64_t> order;              // points with observations: (first pose, last pose, index)
+  std::span<std::uint64_t> order;  // points with observations: (first pose, last pose, index)
   std::span<std::uint32_t> first_observation;  // of each point; as many as points + 1
   std::span<std::uint32_t> pose_observations;  // how many
-  std::span<std::uint32_t> pose_slot;          // scratch of the set-up: first slot of each pose in the batch
-  std::span<std::uint8_t> pose_cameras;        // scratch of the set-up
-  std::span<std::uint32_t> observation_lane;   // of each observation: slot · kBatch + lane
+  std::span<std::uint32_t>
+      pose_slot;  // scratch of the set-up: first slot of each pose in the batch
+  std::span<std::uint8_t> pose_cameras;       // scratch of the set-up
+  std::span<std::uint32_t> observation_lane;  // of each observation: slot · kBatch + lane
   std::span<Batch> batches;
   std::span<PoseBlock> blocks;
   std::span<Slot> slots;
   std::span<KernelPose> poses;
-  std::span<double> point_free, y, y_shared, factors, sums, intrinsic_sums, intrinsic_own, reduced, jets;
+  std::span<double> point_free, y, y_shared, factors, sums, intrinsic_sums, intrinsic_own, reduced,
+      jets;
   std::span<double> A, rhs, delta;
   std::span<float> squared;
   BundleState states[2];
 
-  std::size_t batch_count = 0, block_count = 0, slot_count = 0, point_count = 0;  // of the problem at hand; points with observations
+  std::size_t batch_count = 0, block_count = 0, slot_count = 0,
+              point_count = 0;  // of the problem at hand; points with observations
   std::size_t free_points = 0;
   int free_poses = 0;
 };

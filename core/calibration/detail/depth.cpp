@@ -14,9 +14,9 @@ constexpr int kDepthSteps = 4;  // of Newton: from a few percent off to rounding
 }  // namespace
 
 DepthGradient depth_gradient(const SeenByBoth& p, const Transform& T, int k, bool lenses) noexcept {
-  // The right pixel moves by by_depth per metre, by G (−[R X]×, I) per error of the transform, by ∂x/∂intrinsics per error of the right
-  // lens, and along with the ray per error of the left one: the depth that a match then gives is the one that takes up the part along the
-  // epipolar line.
+  // The right pixel moves by by_depth per metre, by G (−[R X]×, I) per error of the transform, by
+  // ∂x/∂intrinsics per error of the right lens, and along with the ray per error of the left one:
+  // the depth that a match then gives is the one that takes up the part along the epipolar line.
   const Vec2 along = -p.by_depth / (p.by_depth.squaredNorm() * p.depth_m);
   DepthGradient g;
   Mat26 by_rig;
@@ -29,9 +29,11 @@ DepthGradient depth_gradient(const SeenByBoth& p, const Transform& T, int k, boo
   Mat23 G_left;
   if (p.left->project(p.ray, &unused, &G_left) != ProjectStatus::ok) return g;
   // Of a pixel that is held, the ray moves against what the lens would have moved the pixel by.
-  const Eigen::Matrix<double, 2, 9> ray_by_left = -G_left.leftCols<2>().inverse() * p.left->intrinsics_jacobian(p.ray);
+  const Eigen::Matrix<double, 2, 9> ray_by_left =
+      -G_left.leftCols<2>().inverse() * p.left->intrinsics_jacobian(p.ray);
   const Mat2 by_ray = p.depth_m * (p.G * T.R.leftCols<2>());
-  for (int i = 0; i < kIntrinsicsSize; ++i) g.add(intrinsic_row(0) + i, along.dot(by_ray * ray_by_left.col(i)));
+  for (int i = 0; i < kIntrinsicsSize; ++i)
+    g.add(intrinsic_row(0) + i, along.dot(by_ray * ray_by_left.col(i)));
   return g;
 }
 
@@ -40,26 +42,30 @@ double variance_of(const RigCalibration& rig, int k, const DepthGradient& g, boo
   const auto n = static_cast<std::size_t>(g.count), c = static_cast<std::size_t>(k);
   if (joint) {
     for (std::size_t i = 0; i < n; ++i)
-      for (std::size_t j = 0; j < n; ++j) sum += g.by[i] * g.by[j] * rig.covariance(g.row[i], g.row[j]);
+      for (std::size_t j = 0; j < n; ++j)
+        sum += g.by[i] * g.by[j] * rig.covariance(g.row[i], g.row[j]);
     return sum;
   }
   const bool full = rig.covariance_wide[c].squaredNorm() > 0;
   for (std::size_t i = 0; i < 6; ++i)
     for (std::size_t j = 0; j < 6; ++j) {
       const double of_sigma = i == j ? rig.sigma_wide[c][i] * rig.sigma_wide[c][i] : 0.0;
-      sum += g.by[i] * g.by[j] * (full ? rig.covariance_wide[c](static_cast<int>(i), static_cast<int>(j)) : of_sigma);
+      sum += g.by[i] * g.by[j] *
+             (full ? rig.covariance_wide[c](static_cast<int>(i), static_cast<int>(j)) : of_sigma);
     }
   return sum;
 }
 
 DepthReader::DepthReader(const RigCalibration& rig, int k) noexcept
-    : left_(rig.intrinsics[0]), right_(rig.intrinsics[static_cast<std::size_t>(k)]), T_(rig.T_camera_left[static_cast<std::size_t>(k)]) {}
+    : left_(rig.intrinsics[0]),
+      right_(rig.intrinsics[static_cast<std::size_t>(k)]),
+      T_(rig.T_camera_left[static_cast<std::size_t>(k)]) {}
 
 bool DepthReader::difference(const SeenByBoth& p, double* relative) const noexcept {
   Vec3 ray;
   if (!left_.unproject(p.pixel, &ray)) return false;
-  // Where along its own ray is the point that projects nearest to the match? In units of the depth, so that also what lies beyond infinity
-  // has a projection.
+  // Where along its own ray is the point that projects nearest to the match? In units of the depth,
+  // so that also what lies beyond infinity has a projection.
   double inverse = 1.0 / p.depth_m;
   for (int step = 0; step < kDepthSteps; ++step) {
     Vec2 at;

@@ -33,17 +33,20 @@ void for_places(const RigCalibration& rig, int k, double depth_m, Each each) noe
       p.left = &left;
       p.right = &right;
       p.depth_m = depth_m;
-      p.pixel = {(column + 0.5) / kDepthGrid * rig.intrinsics[0].width, (row + 0.5) / kDepthGrid * rig.intrinsics[0].height};
+      p.pixel = {(column + 0.5) / kDepthGrid * rig.intrinsics[0].width,
+                 (row + 0.5) / kDepthGrid * rig.intrinsics[0].height};
       if (!left.unproject(p.pixel, &p.ray)) continue;
       p.X = T * (p.ray * depth_m);
-      if (right.project(p.X, &p.at, &p.G) != ProjectStatus::ok || !right.inside(p.at, 0.0)) continue;
+      if (right.project(p.X, &p.at, &p.G) != ProjectStatus::ok || !right.inside(p.at, 0.0))
+        continue;
       p.by_depth = p.G * (T.R * p.ray);
       if (p.by_depth.squaredNorm() > 0) each(p);
     }
   }
 }
 
-/// Derivatives of a relative depth by a rig's parameters: the rows of RigCovariance that it has and their factors.
+/// Derivatives of a relative depth by a rig's parameters: the rows of RigCovariance that it has and
+/// their factors.
 struct DepthGradient {
   std::array<int, 6 + 2 * kIntrinsicsSize> row;
   std::array<double, 6 + 2 * kIntrinsicsSize> by;
@@ -56,16 +59,20 @@ struct DepthGradient {
 };
 
 /// `lenses`: theirs too, else the transform's alone.
-[[nodiscard]] DepthGradient depth_gradient(const SeenByBoth& place, const Transform& T_camera_left, int k, bool lenses) noexcept;
+[[nodiscard]] DepthGradient depth_gradient(const SeenByBoth& place, const Transform& T_camera_left,
+                                           int k, bool lenses) noexcept;
 
-/// Variance of the relative depth; without `joint` that of the transform alone, by covariance_wide or the wide sigmas.
-[[nodiscard]] double variance_of(const RigCalibration& rig, int k, const DepthGradient& g, bool joint) noexcept;
+/// Variance of the relative depth; without `joint` that of the transform alone, by covariance_wide
+/// or the wide sigmas.
+[[nodiscard]] double variance_of(const RigCalibration& rig, int k, const DepthGradient& g,
+                                 bool joint) noexcept;
 
 /// The depths that a rig gives to pairs of pixels.
 class DepthReader {
  public:
   DepthReader(const RigCalibration& rig, int k) noexcept;
-  /// How much larger the inverse depth is that this rig gives to the place's two pixels, relative. False: outside its lenses' models.
+  /// How much larger the inverse depth is that this rig gives to the place's two pixels, relative.
+  /// False: outside its lenses' models.
   [[nodiscard]] bool difference(const SeenByBoth& place, double* relative) const noexcept;
 
  private:

@@ -10,16 +10,19 @@
 
 namespace vergence::calibration::detail {
 
-/// θ of the monitor: φ (3, rad), α, β (rad: direction of t), κ (frames of lag). κ comes last, so that what is said of the
-/// first five is a prefix of what is said of all six.
+/// θ of the monitor: φ (3, rad), α, β (rad: direction of t), κ (frames of lag). κ comes last, so
+/// that what is said of the first five is a prefix of what is said of all six.
 inline constexpr int kTheta = 6, kFixed = 5, kLag = 5, kYaw = 1;
 inline constexpr int kTriangle = kTheta * (kTheta + 1) / 2;
 
-[[nodiscard]] constexpr std::size_t lower(int row, int column) noexcept { return static_cast<std::size_t>(row * (row + 1) / 2 + column); }
+[[nodiscard]] constexpr std::size_t lower(int row, int column) noexcept {
+  return static_cast<std::size_t>(row * (row + 1) / 2 + column);
+}
 
 using Theta = std::array<double, kTheta>;
 
-/// Gradient and information of θ from some sightings: with residuals r at θ = 0 and derivatives J, weights w,
+/// Gradient and information of θ from some sightings: with residuals r at θ = 0 and derivatives J,
+/// weights w,
 ///   g = −Σ w Jᵀ r / σ²,   A = Σ w Jᵀ J / σ² (lower triangle, row by row),   n = Σ w / σ², 1/px².
 /// All numbers add up over frames.
 struct Evidence {
@@ -50,9 +53,11 @@ struct TwoEvidences {
   }
 };
 
-/// L Lᵀ = A and y = L⁻¹ g. Directions that nothing was seen of (pivot under 1e-9 of the diagonal) stay out: y = 0 there.
+/// L Lᵀ = A and y = L⁻¹ g. Directions that nothing was seen of (pivot under 1e-9 of the diagonal)
+/// stay out: y = 0 there.
 ///
-/// |y|² over the first five is gᵀA⁻¹g of a fixed transform, over all six with the lag; κ̂ = y₅/L₅₅, its sigma 1/L₅₅.
+/// |y|² over the first five is gᵀA⁻¹g of a fixed transform, over all six with the lag; κ̂ = y₅/L₅₅,
+/// its sigma 1/L₅₅.
 struct Solved {
   std::array<double, kTriangle> L{};
   std::array<double, kTheta> y{};
@@ -77,9 +82,13 @@ struct Solved {
     }
   }
 
-  [[nodiscard]] double fixed_gain() const noexcept { return y[0] * y[0] + y[1] * y[1] + y[2] * y[2] + y[3] * y[3] + y[4] * y[4]; }
+  [[nodiscard]] double fixed_gain() const noexcept {
+    return y[0] * y[0] + y[1] * y[1] + y[2] * y[2] + y[3] * y[3] + y[4] * y[4];
+  }
   [[nodiscard]] double lag_gain() const noexcept { return y[kLag] * y[kLag]; }
-  [[nodiscard]] double lag() const noexcept { return seen[kLag] ? y[kLag] / L[lower(kLag, kLag)] : 0.0; }
+  [[nodiscard]] double lag() const noexcept {
+    return seen[kLag] ? y[kLag] / L[lower(kLag, kLag)] : 0.0;
+  }
   [[nodiscard]] double lag_sigma() const noexcept {
     return seen[kLag] ? 1.0 / L[lower(kLag, kLag)] : std::numeric_limits<double>::infinity();
   }

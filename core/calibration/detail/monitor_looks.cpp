@@ -9,30 +9,37 @@
 namespace vergence::calibration::detail {
 namespace {
 
-constexpr int kAcrossRounds = 3;     // of reweighting: the scale falls from that of a knock to that of the noise in two
-constexpr int kMotionRounds = 2;     // the odometry's motion is near, so fewer do
-constexpr double kTukey = 4.685;     // robust scales, where a scalar's weight reaches 0: 95 % efficient on Gaussian errors
+constexpr int kAcrossRounds =
+    3;  // of reweighting: the scale falls from that of a knock to that of the noise in two
+constexpr int kMotionRounds = 2;  // the odometry's motion is near, so fewer do
+constexpr double kTukey =
+    4.685;  // robust scales, where a scalar's weight reaches 0: 95 % efficient on Gaussian errors
 constexpr double kTukey3 = 6.0;      // the same for the length of three
 constexpr double kMedian1 = 0.6745;  // median of |normal|
 constexpr double kMedian3 = 1.5382;  // of the length of three normals
 constexpr double kMinScale = 0.1;    // of the sigma the sightings claim
-// An M-estimate's covariance has E ψ' where this code sums E w: (E w / E ψ')² for Gaussian errors at the constants above.
+// An M-estimate's covariance has E ψ' where this code sums E w: (E w / E ψ')² for Gaussian errors
+// at the constants above.
 constexpr double kTukeySpread = 1.46, kTukeySpread3 = 1.27;
-constexpr double kFitSigma = 0.1;        // rad: prior that keeps a frame's own fit from running off where it sees nothing
+constexpr double kFitSigma =
+    0.1;  // rad: prior that keeps a frame's own fit from running off where it sees nothing
 constexpr double kMaxInverseDepth = 2;   // 1/m
 constexpr int kMinMotionTracks = 12;     // six of the pose and something left to say
 constexpr std::uint64_t kTrackGap = 30;  // frames: a number seen after longer is another track
 
 using Mat36 = Eigen::Matrix<double, 3, 6>;
 
-Vec2 ray(const Pinhole& k, const Vec2& pixel) noexcept { return {(pixel.x() - k.cx) / k.fx, (pixel.y() - k.cy) / k.fy}; }
+Vec2 ray(const Pinhole& k, const Vec2& pixel) noexcept {
+  return {(pixel.x() - k.cx) / k.fx, (pixel.y() - k.cy) / k.fy};
+}
 
 double tukey(double squared, double limit) noexcept {
   const double u = 1.0 - squared / (limit * limit);
   return u > 0 ? u * u : 0.0;
 }
 
-/// Where camera k sees the point now minus where it saw it a frame ago, px; q = (x, y, 1/Z) in the left camera.
+/// Where camera k sees the point now minus where it saw it a frame ago, px; q = (x, y, 1/Z) in the
+/// left camera.
 Vec2 image_motion(const Reference& c, const Vec3& q, const Transform& T_previous_now) noexcept {
   const Mat3& R = c.T_right_left.R;
   const Vec3& t = c.T_right_left.t;
@@ -40,7 +47,8 @@ Vec2 image_motion(const Reference& c, const Vec3& q, const Transform& T_previous
   const Vec3 now = R * x + q.z() * t;
   const Vec3 then = R * (T_previous_now.R * x + q.z() * T_previous_now.t) + q.z() * t;
   if (!(now.z() > 0.1 && then.z() > 0.1)) return Vec2::Zero();
-  return {c.right.fx * (now.x() / now.z() - then.x() / then.z()), c.right.fy * (now.y() / now.z() - then.y() / then.z())};
+  return {c.right.fx * (now.x() / now.z() - then.x() / then.z()),
+          c.right.fy * (now.y() / now.z() - then.y() / then.z())};
 }
 
 double inverse_depth(const Reference& c, const Vec2& left, const Vec2& right) noexcept {
@@ -49,7 +57,8 @@ double inverse_depth(const Reference& c, const Vec2& left, const Vec2& right) no
   return std::clamp(1.0 / zl, 0.0, kMaxInverseDepth);
 }
 
-/// A point from its two pixels by least squares in (x, y, 1/Z), one Gauss–Newton step from the two rays' meeting.
+/// A point from its two pixels by least squares in (x, y, 1/Z), one Gauss–Newton step from the two
+/// rays' meeting.
 struct Triangulated {
   Vec3 q;
   Mat3 information, covariance;  // for a sigma of 1 px
@@ -64,26 +73,31 @@ struct Triangulated {
     if (!(Y.z() > 0.1)) return false;
     const double i = 1.0 / Y.z(), u = Y.x() * i, v = Y.y() * i;
     const double a = c.right.fx * i, b = c.right.fy * i;
-    J_right << a * (R(0, 0) - u * R(2, 0)), a * (R(0, 1) - u * R(2, 1)), a * (t.x() - u * t.z()),  //
+    J_right << a * (R(0, 0) - u * R(2, 0)), a * (R(0, 1) - u * R(2, 1)),
+        a * (t.x() - u * t.z()),  //
         b * (R(1, 0) - v * R(2, 0)), b * (R(1, 1) - v * R(2, 1)), b * (t.y() - v * t.z());
     information.noalias() = J_right.transpose() * J_right;
     information(0, 0) += c.left.fx * c.left.fx;
     information(1, 1) += c.left.fy * c.left.fy;
     covariance = information.inverse();
     // The left pixel is met exactly, so the right one alone is left over.
-    q += covariance * (J_right.transpose() * Vec2(c.right.fx * (r.x() - u), c.right.fy * (r.y() - v)));
+    q += covariance *
+         (J_right.transpose() * Vec2(c.right.fx * (r.x() - u), c.right.fy * (r.y() - v)));
     return q.allFinite() && std::abs(q.z()) < kMaxInverseDepth;
   }
 };
 
-/// Derivative by θ of where least squares puts the point, −(JᵀJ)⁻¹ Jᵀ ∂pixels/∂θ: what depends on the depth at q, the rest as triangulated.
-bool point_by_theta(const Reference& c, const Triangulated& point, const Vec3& q, const Transform& T_previous_now, Mat36* d) noexcept {
+/// Derivative by θ of where least squares puts the point, −(JᵀJ)⁻¹ Jᵀ ∂pixels/∂θ: what depends on
+/// the depth at q, the rest as triangulated.
+bool point_by_theta(const Reference& c, const Triangulated& point, const Vec3& q,
+                    const Transform& T_previous_now, Mat36* d) noexcept {
   const Vec3 turned = c.T_right_left.R * Vec3(q.x(), q.y(), 1);
   const Vec3 Y = turned + q.z() * c.T_right_left.t;
   if (!(Y.z() > 0.1)) return false;
   const double i = 1.0 / Y.z();
   Mat23 G;
-  G << c.right.fx * i, 0, -c.right.fx * Y.x() * i * i, 0, c.right.fy * i, -c.right.fy * Y.y() * i * i;
+  G << c.right.fx * i, 0, -c.right.fx * Y.x() * i * i, 0, c.right.fy * i,
+      -c.right.fy * Y.y() * i * i;
   Mat26 J_theta;
   J_theta.leftCols<3>() = -G * skew(turned);
   J_theta.middleCols<2>(3) = G * (q.z() * c.length * c.B);
@@ -107,7 +121,8 @@ void Looks::reset() noexcept {
   for (Memory& m : memories_) m.frame = 0;
 }
 
-AcrossLook Looks::across(const Reference& c, const MonitorFrame& frame, int min_matches, bool follow) noexcept {
+AcrossLook Looks::across(const Reference& c, const MonitorFrame& frame, int min_matches,
+                         bool follow) noexcept {
   const double f = 0.5 * (c.right.fx + c.right.fy);
   const Transform T_previous_now = frame.T_now_previous.inverse();
   const Mat3& E = c.epipolar.E();
@@ -122,9 +137,11 @@ AcrossLook Looks::across(const Reference& c, const MonitorFrame& frame, int min_
     row.r *= f;
     for (int i = 0; i < kFixed; ++i) row.J[static_cast<std::size_t>(i)] = f * J[i];
     const Vec2 normal = (E * left.homogeneous()).head<2>().normalized();
-    const Vec2 v = image_motion(c, {left.x(), left.y(), inverse_depth(c, left, right)}, T_previous_now);
+    const Vec2 v =
+        image_motion(c, {left.x(), left.y(), inverse_depth(c, left, right)}, T_previous_now);
     row.J[kLag] = normal.dot(v);
-    row.inverse_sigma2 = 1.0 / (2.0 * s.sigma_px * s.sigma_px);  // two images' errors across the line
+    row.inverse_sigma2 =
+        1.0 / (2.0 * s.sigma_px * s.sigma_px);  // two images' errors across the line
     row.track = s.track;
     if (std::isfinite(row.r) && std::isfinite(row.inverse_sigma2)) ++rows_;
   }
@@ -133,9 +150,12 @@ AcrossLook Looks::across(const Reference& c, const MonitorFrame& frame, int min_
 
   Vec5 fit = Vec5::Zero();
   for (int round = 0; round < kAcrossRounds; ++round) {
-    const auto rest = [&](const AcrossRow& row) { return row.r + Eigen::Map<const Vec5>(row.J.data()).dot(fit); };
-    const double middle =
-        median(sizes_, rows_, [&](std::size_t i) { return std::abs(rest(across_[i])) * std::sqrt(across_[i].inverse_sigma2); });
+    const auto rest = [&](const AcrossRow& row) {
+      return row.r + Eigen::Map<const Vec5>(row.J.data()).dot(fit);
+    };
+    const double middle = median(sizes_, rows_, [&](std::size_t i) {
+      return std::abs(rest(across_[i])) * std::sqrt(across_[i].inverse_sigma2);
+    });
     const double scale = std::max(middle / kMedian1, kMinScale);
     look.evidence = Evidence{};
     Evidence& e = look.evidence;
@@ -167,12 +187,15 @@ AcrossLook Looks::across(const Reference& c, const MonitorFrame& frame, int min_
   return look;
 }
 
-void Looks::spread_of(const Evidence& evidence, const Vec5& fit, std::uint64_t frame, bool follow, AcrossLook* look) noexcept {
-  // With x the part of a track in the gradient's noise and A = L Lᵀ: trace A⁻¹ Σ x xᵀ = Σ |L⁻¹ x|², and the variance that the frame adds to
-  // a running sum is Σ (x xᵀ + x sᵀ + s xᵀ), s what the track brought before.
+void Looks::spread_of(const Evidence& evidence, const Vec5& fit, std::uint64_t frame, bool follow,
+                      AcrossLook* look) noexcept {
+  // With x the part of a track in the gradient's noise and A = L Lᵀ: trace A⁻¹ Σ x xᵀ = Σ |L⁻¹ x|²,
+  // and the variance that the frame adds to a running sum is Σ (x xᵀ + x sᵀ + s xᵀ), s what the
+  // track brought before.
   const Solved factor(evidence.A, evidence.g);
   std::array<double, kFixed> inverse;
-  for (int i = 0; i < kFixed; ++i) inverse[static_cast<std::size_t>(i)] = 1.0 / factor.L[lower(i, i)];
+  for (int i = 0; i < kFixed; ++i)
+    inverse[static_cast<std::size_t>(i)] = 1.0 / factor.L[lower(i, i)];
   const auto whitened = [&](std::array<double, kFixed>& v) {
     for (int i = 0; i < kFixed; ++i) {
       const auto ii = static_cast<std::size_t>(i);
@@ -191,7 +214,8 @@ void Looks::spread_of(const Evidence& evidence, const Vec5& fit, std::uint64_t f
     for (const double a : white) now += a * a;
     if (!follow) continue;
     Memory& m = memories_[row.track % memories_.size()];
-    if (m.frame == 0 || m.track != row.track || frame + 1 - m.frame > kTrackGap) m = Memory{row.track, 0, {}};
+    if (m.frame == 0 || m.track != row.track || frame + 1 - m.frame > kTrackGap)
+      m = Memory{row.track, 0, {}};
     std::array<double, kFixed> s = m.sum;
     whitened(s);
     for (std::size_t a = 0; a < kFixed; ++a) before += 2 * white[a] * s[a], m.sum[a] += x[a];
@@ -201,12 +225,16 @@ void Looks::spread_of(const Evidence& evidence, const Vec5& fit, std::uint64_t f
   look->spread_life = kTukeySpread * (now + before) / kFixed;
 }
 
-bool Looks::motion_row(const Reference& c, const MonitorFrame& frame, const MotionTrack& track, MotionRow* row) noexcept {
+bool Looks::motion_row(const Reference& c, const MonitorFrame& frame, const MotionTrack& track,
+                       MotionRow* row) noexcept {
   const Transform& T = frame.T_now_before;
   if (!(track.sigma_px > 0)) return false;
-  const Transform T_previous_now = frame.T_now_previous.inverse(), T_earlier_before = frame.T_before_earlier.inverse();
+  const Transform T_previous_now = frame.T_now_previous.inverse(),
+                  T_earlier_before = frame.T_before_earlier.inverse();
   Triangulated b, n;
-  if (!b.from(c, track.left_before, track.right_before) || !n.from(c, track.left_now, track.right_now)) return false;
+  if (!b.from(c, track.left_before, track.right_before) ||
+      !n.from(c, track.left_now, track.right_now))
+    return false;
 
   // h: q before → q now, by Y = R (x, y, 1) + t/Z.
   Mat3 D;
@@ -234,7 +262,8 @@ bool Looks::motion_row(const Reference& c, const MonitorFrame& frame, const Moti
   const Vec3 gap = n.q - now;
   if (!gap.allFinite()) return false;
 
-  // Linearised at the point both sightings agree on: its error and the gap's are independent, so noise in depth does not bias the fit.
+  // Linearised at the point both sightings agree on: its error and the gap's are independent, so
+  // noise in depth does not bias the fit.
   const Mat3 joint = b.information + D.transpose() * n.information * D;
   const Vec3 q = b.q + joint.inverse() * (D.transpose() * (n.information * gap));
   if (!carried(q, &now, &Y)) return false;
@@ -283,7 +312,8 @@ MotionLook Looks::motion(const Reference& c, const MonitorFrame& frame) noexcept
       MotionRow& row = motion_[i];
       row.weight = row.inverse_sigma2 * tukey(row.weight, kTukey3 * scale);
       if (row.weight == 0) continue;
-      const Mat36 weighted_theta = row.weight * row.J_theta, weighted_pose = row.weight * row.J_pose;
+      const Mat36 weighted_theta = row.weight * row.J_theta,
+                  weighted_pose = row.weight * row.J_pose;
       A_theta.noalias() += weighted_theta.transpose() * row.J_theta;
       A_cross.noalias() += weighted_theta.transpose() * row.J_pose;
       A_pose.noalias() += weighted_pose.transpose() * row.J_pose;
@@ -300,7 +330,8 @@ MotionLook Looks::motion(const Reference& c, const MonitorFrame& frame) noexcept
     for (int i = 0; i < kTheta; ++i)
       for (int j = 0; j <= i; ++j) look.evidence.A[lower(i, j)] = 0.5 * (A(i, j) + A(j, i));
     Eigen::Map<Vec6>(look.evidence.g.data()) = g;
-    // The fit of this look alone: the lag and the directions it hardly sees are left where they are.
+    // The fit of this look alone: the lag and the directions it hardly sees are left where they
+    // are.
     Mat6 regular = A;
     regular.diagonal().head<kFixed>().array() += 1.0 / (kFitSigma * kFitSigma);
     regular(kLag, kLag) += 1e12;
@@ -314,7 +345,8 @@ MotionLook Looks::motion(const Reference& c, const MonitorFrame& frame) noexcept
     const MotionRow& row = motion_[i];
     if (row.weight == 0) continue;
     const Vec3 rest = row.weight * (row.r + row.J_theta * theta + row.J_pose * pose);
-    const Vec6 x = row.J_theta.transpose() * rest - eliminated.transpose() * (row.J_pose.transpose() * rest);
+    const Vec6 x =
+        row.J_theta.transpose() * rest - eliminated.transpose() * (row.J_pose.transpose() * rest);
     std::array<double, kFixed> y{};
     for (int a = 0; a < kFixed; ++a) {
       double s = x[a];
@@ -322,7 +354,8 @@ MotionLook Looks::motion(const Reference& c, const MonitorFrame& frame) noexcept
       y[static_cast<std::size_t>(a)] = s / factor.L[lower(a, a)];
       spread += y[static_cast<std::size_t>(a)] * y[static_cast<std::size_t>(a)];
     }
-    look.evidence.n += 1.5 * row.weight;  // three numbers a track, each the difference of two sightings
+    look.evidence.n +=
+        1.5 * row.weight;  // three numbers a track, each the difference of two sightings
   }
   // The look's own fit has taken up eleven of its 3 n numbers.
   const double numbers = 3.0 * static_cast<double>(n);

@@ -25,7 +25,8 @@ struct AcrossLook {
   bool usable = false;  // enough matches
   Evidence evidence;
   double spread_now = 0;   // variance of g, this frame alone, over the white one: mean of the five
-  double spread_life = 0;  // and with what the same tracks said before: its sum over frames is the variance of the sum
+  double spread_life = 0;  // and with what the same tracks said before: its sum over frames is the
+                           // variance of the sum
 };
 
 /// What the tracks through motion of one look say; nothing where there are too few.
@@ -35,14 +36,17 @@ struct MotionLook {
   double spread = 0;  // as above; a track speaks once
 };
 
-/// Turns sightings into evidence about θ, with redescending weights about the frame's own robust fit: a shifted rig is no outlier.
+/// Turns sightings into evidence about θ, with redescending weights about the frame's own robust
+/// fit: a shifted rig is no outlier.
 ///
 /// Memory  Fixed, in place (some 300 kB): lives in an arena. Time: linear in the sightings.
 class Looks {
  public:
   void reset() noexcept;
-  /// `follow`: remember what each track said, for spread_life. Off while the camera stands, where tracks live for ever.
-  [[nodiscard]] AcrossLook across(const Reference& reference, const MonitorFrame& frame, int min_matches, bool follow) noexcept;
+  /// `follow`: remember what each track said, for spread_life. Off while the camera stands, where
+  /// tracks live for ever.
+  [[nodiscard]] AcrossLook across(const Reference& reference, const MonitorFrame& frame,
+                                  int min_matches, bool follow) noexcept;
   [[nodiscard]] MotionLook motion(const Reference& reference, const MonitorFrame& frame) noexcept;
 
  private:
@@ -65,15 +69,17 @@ class Looks {
     std::uint64_t frame = 0;  // of the last sighting, plus one; 0: empty
     std::array<double, kFixed> sum{};
   };
-  [[nodiscard]] static bool motion_row(const Reference& reference, const MonitorFrame& frame, const MotionTrack& track,
-                                       MotionRow* row) noexcept;
-  void spread_of(const Evidence& evidence, const Vec5& fit, std::uint64_t frame, bool follow, AcrossLook* look) noexcept;
+  [[nodiscard]] static bool motion_row(const Reference& reference, const MonitorFrame& frame,
+                                       const MotionTrack& track, MotionRow* row) noexcept;
+  void spread_of(const Evidence& evidence, const Vec5& fit, std::uint64_t frame, bool follow,
+                 AcrossLook* look) noexcept;
 
   std::size_t rows_ = 0;
   std::array<AcrossRow, kMaxSightings> across_{};
   std::array<MotionRow, kMaxSightings / 2> motion_{};
   std::array<double, kMaxSightings> sizes_{};  // scratch of the medians
-  std::array<Memory, 4096> memories_{};        // by track number; a newer track takes the place of one that has the same last bits
+  std::array<Memory, 4096> memories_{};  // by track number; a newer track takes the place of one
+                                         // that has the same last bits
 };
 
 }  // namespace vergence::calibration::detail

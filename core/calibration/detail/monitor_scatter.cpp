@@ -5,7 +5,8 @@
 namespace vergence::calibration::detail {
 namespace {
 
-constexpr double kMostOfExpected = 20;  // a block that lies farther off than so many times what is expected is a change, no scatter
+constexpr double kMostOfExpected = 20;  // a block that lies farther off than so many times what is
+                                        // expected is a change, no scatter
 constexpr double kMostBlocks = 60;      // that are remembered: half a minute at 30 Hz
 
 }  // namespace
@@ -15,7 +16,8 @@ void BlockScatter::add(const Evidence& block, const Evidence& past, double lambd
   const Mat5 A = fixed_block(block), P = fixed_block(past);
   const Eigen::LLT<Mat5> of_block(A), of_past(P);
   if (of_block.info() != Eigen::Success || of_past.info() != Eigen::Success) return;
-  const Vec5 d = of_block.solve(Eigen::Map<const Vec5>(block.g.data())) - of_past.solve(Eigen::Map<const Vec5>(past.g.data()));
+  const Vec5 d = of_block.solve(Eigen::Map<const Vec5>(block.g.data())) -
+                 of_past.solve(Eigen::Map<const Vec5>(past.g.data()));
   const double by_noise = lambda * (kFixed + (A * of_past.solve(Mat5::Identity())).trace());
   const double scatter = (d.dot(A * d) - by_noise) / (kFixed * block.n);
   const double most = kMostOfExpected * std::max(variance(), lambda / block.n);

@@ -6,11 +6,12 @@
 
 namespace vergence::calibration::detail {
 
-/// How much successive stretches of a drive disagree beyond the noise of their tracks: what a lens model leaves shows as an offset that
-/// goes with where the structure is, and differs from stretch to stretch (METHOD §6.3).
+/// How much successive stretches of a drive disagree beyond the noise of their tracks: what a lens
+/// model leaves shows as an offset that goes with where the structure is, and differs from stretch
+/// to stretch (METHOD §6.3).
 ///
-/// A running mean of (dᵀ A d − expected by noise) / (5 n) over blocks of frames, d a block's own offset from the blocks before it; begins
-/// with an expectation that weighs some blocks. A value.
+/// A running mean of (dᵀ A d − expected by noise) / (5 n) over blocks of frames, d a block's own
+/// offset from the blocks before it; begins with an expectation that weighs some blocks. A value.
 class BlockScatter {
  public:
   /// Before anything was measured: px rms over the image.
@@ -20,13 +21,15 @@ class BlockScatter {
     blocks_ = 0;
     used_ = true;
   }
-  /// `lambda`: the inflation of both. Blocks that see next to nothing of some direction say nothing.
+  /// `lambda`: the inflation of both. Blocks that see next to nothing of some direction say
+  /// nothing.
   void add(const Evidence& block, const Evidence& past, double lambda) noexcept;
 
   /// px² of a mode; 0 where nothing was ever expected.
   [[nodiscard]] double variance() const noexcept {
     if (!used_) return 0;
-    return std::max(0.0, (kExpectedBlocks * expected2_ + sum_) / (kExpectedBlocks + static_cast<double>(blocks_)));
+    return std::max(0.0, (kExpectedBlocks * expected2_ + sum_) /
+                             (kExpectedBlocks + static_cast<double>(blocks_)));
   }
 
  private:

@@ -9,31 +9,41 @@
 namespace vergence::calibration::detail {
 namespace {
 
-// What correlated tracks bring in over their life, until it is measured: times the spread of the first frame, of the first look;
-// and the frames (looks) that guess weighs.
+// What correlated tracks bring in over their life, until it is measured: times the spread of the
+// first frame, of the first look; and the frames (looks) that guess weighs.
 constexpr double kFirstLife = 6.5, kFirstMotion = 2.0, kGuessFrames = 30, kGuessLooks = 4;
-// Of the scatter's variance, in looks at motion: two instants have it each, and along the baseline, where no epipolar line measures it,
-// real lenses leave more of it than across.
+// Of the scatter's variance, in looks at motion: two instants have it each, and along the baseline,
+// where no epipolar line measures it, real lenses leave more of it than across.
 constexpr double kMotionBias = 4;
-constexpr double kForgetAcross = 1.0 / 300, kForgetFast = 1.0 / 10, kForgetMotion = 1.0 / 40;  // a frame, a frame, a look
-constexpr double kLeastInflation = 0.3, kMostInflation = 200;  // below: sigmas claimed far too large; above: not a spread any more
-constexpr double kSpreadOutlier = 5;  // times the inflation: what one frame may count for at most, else one frame blinds the monitor
-// Windows that are also held against what was seen before them: a knock smaller than the reference's own error shows so, and only so.
+constexpr double kForgetAcross = 1.0 / 300, kForgetFast = 1.0 / 10,
+                 kForgetMotion = 1.0 / 40;  // a frame, a frame, a look
+constexpr double kLeastInflation = 0.3,
+                 kMostInflation =
+                     200;  // below: sigmas claimed far too large; above: not a spread any more
+constexpr double kSpreadOutlier = 5;  // times the inflation: what one frame may count for at most,
+                                      // else one frame blinds the monitor
+// Windows that are also held against what was seen before them: a knock smaller than the
+// reference's own error shows so, and only so.
 constexpr std::size_t kLearnWindow = 10, kLearnLongest = 150;
-constexpr std::size_t kScatterBlocks = 10;  // before a block, that it is held against: longer ago a rig may have crept
-// Of the blocks older than so many only every fourth is asked whether it is the onset: a search every frame of an alarm costs little then.
+constexpr std::size_t kScatterBlocks =
+    10;  // before a block, that it is held against: longer ago a rig may have crept
+// Of the blocks older than so many only every fourth is asked whether it is the onset: a search
+// every frame of an alarm costs little then.
 constexpr std::size_t kFineBlocks = 24, kCoarse = 4;
-constexpr double kPriorSigma = 0.2;   // rad: of directions nothing was seen of
-constexpr double kRelease = 0.5;      // of the threshold: an alarm stands until the statistic is below
-constexpr double kRampShare = 0.05;   // a ramp's best step explains 8/9 of it
-constexpr double kRampMargin = 10;    // gain by which a drift must beat a knock
-constexpr int kRampFrames = 150;      // and the least length of one
-constexpr double kLagMargin = 25;     // gain by which a lag must beat every fixed or drifting transform
-constexpr double kLagMost = 2;        // frames: what pairs images farther apart is no camera's fault
-constexpr double kLagModel = 0.6;     // frames: error of a lag from few frames, where speed and rocking change within one
-constexpr double kLagExplains = 0.6;  // share of the gain from which a lag alone is a rival of the knock
-constexpr int kLagFrames = 8;         // and the least frames it must have lasted
-constexpr int kLagPatience = 30;      // frames a verdict waits for the rivals to part
+constexpr double kPriorSigma = 0.2;  // rad: of directions nothing was seen of
+constexpr double kRelease = 0.5;  // of the threshold: an alarm stands until the statistic is below
+constexpr double kRampShare = 0.05;  // a ramp's best step explains 8/9 of it
+constexpr double kRampMargin = 10;   // gain by which a drift must beat a knock
+constexpr int kRampFrames = 150;     // and the least length of one
+constexpr double kLagMargin =
+    25;                         // gain by which a lag must beat every fixed or drifting transform
+constexpr double kLagMost = 2;  // frames: what pairs images farther apart is no camera's fault
+constexpr double kLagModel =
+    0.6;  // frames: error of a lag from few frames, where speed and rocking change within one
+constexpr double kLagExplains =
+    0.6;                       // share of the gain from which a lag alone is a rival of the knock
+constexpr int kLagFrames = 8;  // and the least frames it must have lasted
+constexpr int kLagPatience = 30;  // frames a verdict waits for the rivals to part
 
 }  // namespace
 
@@ -44,7 +54,9 @@ void Windows::reset(const MonitorOptions& options, const Mat5& covariance) noexc
   window_count_ = 0;
   for (const int frames : {options.short_window, 10, 30, 75, 150, options.long_window}) {
     const auto n = static_cast<std::size_t>(frames);
-    if (n > static_cast<std::size_t>(options.long_window) || (window_count_ > 0 && n <= windows_[window_count_ - 1])) continue;
+    if (n > static_cast<std::size_t>(options.long_window) ||
+        (window_count_ > 0 && n <= windows_[window_count_ - 1]))
+      continue;
     windows_[window_count_++] = n;
   }
   count_ = closed_ = 0;
@@ -72,7 +84,8 @@ void Windows::measure_scatter() noexcept {
   // What may be a change of the rig is no scatter.
   if (closed_ == 0 || newest_statistic_ > kRelease * options_.threshold) return;
   Evidence past;
-  for (std::size_t i = 0; i < std::min<std::size_t>({closed_, kScatterBlocks, kBlocks}); ++i) past.add(block(i).evidence.across);
+  for (std::size_t i = 0; i < std::min<std::size_t>({closed_, kScatterBlocks, kBlocks}); ++i)
+    past.add(block(i).evidence.across);
   scatter_.add(open_.evidence.across, past, lambda_across_);
   renew_floor();
 }
@@ -93,12 +106,14 @@ void Windows::follow_spread(const FrameEvidence& e) noexcept {
   }
   // Noise that has just grown (rain, dusk) counts at once, for the tracks it will go on to spoil.
   const double grown = now_slow_ > 0 ? std::max(1.0, now_fast_ / now_slow_) : 1.0;
-  lambda_across_ = std::clamp(std::max(life_slow_, now_slow_) * grown, kLeastInflation, kMostInflation);
+  lambda_across_ =
+      std::clamp(std::max(life_slow_, now_slow_) * grown, kLeastInflation, kMostInflation);
   if (e.spread_motion < 0) return;
   if (looks_ == 0)
     lambda_motion_ = kFirstMotion * e.spread_motion;
   else
-    follow(&lambda_motion_, e.spread_motion, std::max(kForgetMotion, 1.0 / (static_cast<double>(looks_) + kGuessLooks)));
+    follow(&lambda_motion_, e.spread_motion,
+           std::max(kForgetMotion, 1.0 / (static_cast<double>(looks_) + kGuessLooks)));
   lambda_motion_ = std::clamp(lambda_motion_, kLeastInflation, kMostInflation);
   ++looks_;
 }
@@ -144,7 +159,8 @@ void Windows::learn(const TwoEvidences& window, Vec5* mean, Mat5* covariance) co
   TwoEvidences past = total_;
   past.add(open_.evidence);
   past.add(window, -1.0);
-  // Without the floor: window and past share most of the slow error, and the window's own floor stands for what they do not share.
+  // Without the floor: window and past share most of the slow error, and the window's own floor
+  // stands for what they do not share.
   Evidence e;
   e.add(past.across, 1.0 / lambda_across_);
   if (past.motion.n > 0) e.add(past.motion, 1.0 / lambda_motion_);
@@ -168,7 +184,8 @@ double Windows::single(const Evidence& across, double spread) const noexcept {
   return statistic(e, Vec5::Zero(), covariance_);
 }
 
-void Windows::single_estimate(const Evidence& across, double spread, Vec5* theta, Mat5* covariance) const noexcept {
+void Windows::single_estimate(const Evidence& across, double spread, Vec5* theta,
+                              Mat5* covariance) const noexcept {
   Evidence e;
   e.add(across, 1.0 / (std::max(spread, kLeastInflation) + bias2_ * across.n));
   estimate(e, theta, covariance);
@@ -177,7 +194,8 @@ void Windows::single_estimate(const Evidence& across, double spread, Vec5* theta
 void Windows::sum_of(std::size_t frames, TwoEvidences* sum) const noexcept {
   *sum = open_.evidence;
   const std::size_t open = count_ % kBlock;
-  const std::size_t blocks = std::min<std::size_t>({(frames - std::min(frames, open) + kBlock - 1) / kBlock, closed_, kBlocks});
+  const std::size_t blocks = std::min<std::size_t>(
+      {(frames - std::min(frames, open) + kBlock - 1) / kBlock, closed_, kBlocks});
   for (std::size_t i = 0; i < blocks; ++i) sum->add(block(i).evidence);
 }
 
@@ -190,7 +208,8 @@ Decision Windows::decide() noexcept {
   Evidence longest;
   std::size_t window = 0;  // of the largest statistic
   const auto stands_out = [this](const Solved& s) {
-    return std::abs(s.lag()) > options_.lag_frames && std::abs(s.lag()) > options_.lag_sigmas * s.lag_sigma();
+    return std::abs(s.lag()) > options_.lag_frames &&
+           std::abs(s.lag()) > options_.lag_sigmas * s.lag_sigma();
   };
   TwoEvidences sum;
   std::size_t summed = 0;
@@ -234,7 +253,8 @@ void Windows::search(const Vec5& mean, Search* found) const noexcept {
     [[nodiscard]] Evidence ramp(double length) const noexcept {  // weight 1 − age/length
       Evidence r = zeroth;
       for (std::size_t i = 0; i < r.g.size(); ++i) r.g[i] -= first.g[i] / length;
-      for (std::size_t i = 0; i < r.A.size(); ++i) r.A[i] += (second.A[i] / length - 2 * first.A[i]) / length;
+      for (std::size_t i = 0; i < r.A.size(); ++i)
+        r.A[i] += (second.A[i] / length - 2 * first.A[i]) / length;
       return r;
     }
   };
@@ -249,7 +269,8 @@ void Windows::search(const Vec5& mean, Search* found) const noexcept {
     const auto solved = [&](const Evidence& e) {
       Theta g = e.g;
       for (int i = 0; i < kTheta; ++i)
-        for (int j = 0; j < kFixed; ++j) g[static_cast<std::size_t>(i)] -= e.A[lower(std::max(i, j), std::min(i, j))] * mean[j];
+        for (int j = 0; j < kFixed; ++j)
+          g[static_cast<std::size_t>(i)] -= e.A[lower(std::max(i, j), std::min(i, j))] * mean[j];
       return Solved(e.A, g);
     };
     const auto keep = [&](Onset* best, double gain, const Evidence& sum) {
@@ -268,10 +289,12 @@ void Windows::search(const Vec5& mean, Search* found) const noexcept {
   const std::size_t open = count_ % kBlock;
   const std::size_t whole = std::min<std::size_t>((kRecent - open) / kBlock, closed_);
   const std::size_t singles = open + whole * kBlock;
-  for (std::size_t age = 0; age < singles; ++age) take(recent(age), static_cast<double>(age), static_cast<int>(age) + 1, true);
+  for (std::size_t age = 0; age < singles; ++age)
+    take(recent(age), static_cast<double>(age), static_cast<int>(age) + 1, true);
   for (std::size_t b = whole; b < std::min<std::size_t>(closed_, kBlocks); ++b) {
     const std::size_t oldest = open + (b + 1) * kBlock - 1;
-    take(block(b), static_cast<double>(oldest) - 0.5 * (kBlock - 1), static_cast<int>(oldest) + 1, b < kFineBlocks || b % kCoarse == 0);
+    take(block(b), static_cast<double>(oldest) - 0.5 * (kBlock - 1), static_cast<int>(oldest) + 1,
+         b < kFineBlocks || b % kCoarse == 0);
   }
 }
 
@@ -281,9 +304,11 @@ bool Windows::find_lag(const Search& found, Decision* d) const noexcept {
   e.add(both.raw.across, 1.0 / (lambda_across_ + bias2_ * both.raw.across.n));
   const Solved lag(e.A, e.g);
   const double size = std::abs(lag.lag());
-  if (both.frames < kLagFrames || !(size > options_.lag_frames && size < kLagMost && size > options_.lag_sigmas * lag.lag_sigma()))
+  if (both.frames < kLagFrames || !(size > options_.lag_frames && size < kLagMost &&
+                                    size > options_.lag_sigmas * lag.lag_sigma()))
     return false;
-  if (both.gain < std::max(found.step_across.gain, found.ramp_across.gain) + kLagMargin) return false;
+  if (both.gain < std::max(found.step_across.gain, found.ramp_across.gain) + kLagMargin)
+    return false;
   d->kind = MonitorVerdict::Kind::out_of_step;
   d->lag = lag.lag();
   d->lag_sigma = lag.lag_sigma();
@@ -306,7 +331,9 @@ bool Windows::lag_is_rival(const Search& found) const noexcept {
 TwoEvidences Windows::since(const Onset& onset) const noexcept {
   // A look from before the onset to after it compares two rigs: it alarms, but it measures neither.
   TwoEvidences sum = onset.raw;
-  for (std::size_t age = 0; age < std::min<std::size_t>({static_cast<std::size_t>(onset.frames), kRecent, count_}); ++age) {
+  for (std::size_t age = 0;
+       age < std::min<std::size_t>({static_cast<std::size_t>(onset.frames), kRecent, count_});
+       ++age) {
     const Entry& e = recent(age);
     if (e.evidence.motion.n > 0 && e.before < onset.frame) sum.motion.add(e.evidence.motion, -1.0);
   }
@@ -331,7 +358,8 @@ void Windows::attribute(std::size_t window, Decision* d) noexcept {
     d->undecided = true;
     return;
   }
-  const bool ramp = found.ramp.gain > found.step.gain + std::max(kRampMargin, kRampShare * found.step.gain);
+  const bool ramp =
+      found.ramp.gain > found.step.gain + std::max(kRampMargin, kRampShare * found.step.gain);
   d->kind = ramp ? MonitorVerdict::Kind::drift : MonitorVerdict::Kind::knock;
   const Onset& onset = ramp ? found.ramp : found.step;
   d->onset = onset.frame;

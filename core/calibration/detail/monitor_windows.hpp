@@ -30,30 +30,35 @@ struct Decision {
   int frames = 0;  // measured since the onset
 };
 
-/// Evidence of the past moving frames in sliding windows, and the tests on it. It knows nothing of images or tracks.
+/// Evidence of the past moving frames in sliding windows, and the tests on it. It knows nothing of
+/// images or tracks.
 ///
-/// Memory  Fixed, in place (some 160 kB). Time: a few µs a frame; up to 0.1 ms while something is over the threshold.
+/// Memory  Fixed, in place (some 160 kB). Time: a few µs a frame; up to 0.1 ms while something is
+///         over the threshold.
 class Windows {
  public:
   /// covariance: of θ's first five at the reference.
   void reset(const MonitorOptions& options, const Mat5& covariance) noexcept;
-  /// How much stretches of the drive are expected to disagree until that is measured; outlives reset(), as what was measured does.
+  /// How much stretches of the drive are expected to disagree until that is measured; outlives
+  /// reset(), as what was measured does.
   void expect_scatter(double bias_px) noexcept;
   void push(const FrameEvidence& e) noexcept;
   [[nodiscard]] Decision decide() noexcept;
   /// The statistic of one frame by itself, `spread` its own λ: what a standing camera allows.
   [[nodiscard]] double single(const Evidence& across, double spread) const noexcept;
   /// A⁻¹ g and A⁻¹ of that frame, floors included.
-  void single_estimate(const Evidence& across, double spread, Vec5* theta, Mat5* covariance) const noexcept;
+  void single_estimate(const Evidence& across, double spread, Vec5* theta,
+                       Mat5* covariance) const noexcept;
 
   [[nodiscard]] double across_inflation() const noexcept { return lambda_across_; }
   [[nodiscard]] double motion_inflation() const noexcept { return lambda_motion_; }
   [[nodiscard]] std::uint64_t frames() const noexcept { return count_; }
 
  private:
-  static constexpr std::size_t kRecent = 64;   // single frames: an onset among them is exact
-  static constexpr std::size_t kBlock = 15;    // frames that older ones are summed by
-  static constexpr std::size_t kBlocks = 240;  // two minutes at 30 Hz: how far back a drift is traced
+  static constexpr std::size_t kRecent = 64;  // single frames: an onset among them is exact
+  static constexpr std::size_t kBlock = 15;   // frames that older ones are summed by
+  static constexpr std::size_t kBlocks =
+      240;  // two minutes at 30 Hz: how far back a drift is traced
   struct Entry {
     std::uint64_t frame = 0, before = 0;
     TwoEvidences evidence;
@@ -74,12 +79,17 @@ class Windows {
   void measure_scatter() noexcept;
   void renew_floor() noexcept;
   [[nodiscard]] Evidence effective(const TwoEvidences& sum) const noexcept;
-  [[nodiscard]] static double statistic(const Evidence& e, const Vec5& mean, const Mat5& covariance) noexcept;
+  [[nodiscard]] static double statistic(const Evidence& e, const Vec5& mean,
+                                        const Mat5& covariance) noexcept;
   void learn(const TwoEvidences& window, Vec5* mean, Mat5* covariance) const noexcept;
   void estimate(const Evidence& e, Vec5* theta, Mat5* covariance) const noexcept;
   void sum_of(std::size_t frames, TwoEvidences* sum) const noexcept;
-  [[nodiscard]] const Entry& recent(std::size_t age) const noexcept { return recent_[(count_ - 1 - age) % kRecent]; }
-  [[nodiscard]] const Entry& block(std::size_t age) const noexcept { return blocks_[(closed_ - 1 - age) % kBlocks]; }
+  [[nodiscard]] const Entry& recent(std::size_t age) const noexcept {
+    return recent_[(count_ - 1 - age) % kRecent];
+  }
+  [[nodiscard]] const Entry& block(std::size_t age) const noexcept {
+    return blocks_[(closed_ - 1 - age) % kBlocks];
+  }
   void search(const Vec5& mean, Search* found) const noexcept;
   [[nodiscard]] bool find_lag(const Search& found, Decision* d) const noexcept;
   [[nodiscard]] bool lag_is_rival(const Search& found) const noexcept;

@@ -14,7 +14,8 @@ namespace hn = hwy::HWY_NAMESPACE;
 using Tag = hn::CappedTag<float, kWindowStride>;
 constexpr int kRows = kWindow + 2;  // with a border of one pixel for the gradients
 
-/// Bilinear samples of the patch on the turned grid: kRows × (kWindowStride + 2), of which kRows columns count.
+/// Bilinear samples of the patch on the turned grid: kRows × (kWindowStride + 2), of which kRows
+/// columns count.
 void sample_patch(const std::uint8_t* patch, float cx, float cy, const float B[4], float* out) {
   const Tag d;
   const hn::RebindToSigned<Tag> d32;
@@ -22,7 +23,8 @@ void sample_patch(const std::uint8_t* patch, float cx, float cy, const float B[4
   constexpr float kHalf = 0.5F * static_cast<float>(kRows - 1);
   const auto zero = hn::Zero(d), last = hn::Set(d, kPatchSide - 1.001F);
   const auto byte = hn::Set(d32, 0xFF);
-  // Four bytes at once: the two neighbours in x are the lower ones. kPatchBytes leaves room behind the last pixel.
+  // Four bytes at once: the two neighbours in x are the lower ones. kPatchBytes leaves room behind
+  // the last pixel.
   const auto* base = reinterpret_cast<const std::int32_t*>(patch);
   for (int c = 0; c < kWindowStride; c += lanes) {
     const auto dx = hn::Add(hn::Iota(d, 0.F), hn::Set(d, static_cast<float>(c) - kHalf));
@@ -54,7 +56,8 @@ void MakeWindow(const std::uint8_t* patch, float cx, float cy, const float B[4],
   constexpr int kStride = kWindowStride + 2;
   HWY_ALIGN float t[kRows * kStride + kWindowStride];
   for (int i = kRows * kStride; i < kRows * kStride + kWindowStride; ++i) t[i] = 0.F;
-  for (int r = 0; r < kRows; ++r) t[r * kStride + kWindowStride] = t[r * kStride + kWindowStride + 1] = 0.F;
+  for (int r = 0; r < kRows; ++r)
+    t[r * kStride + kWindowStride] = t[r * kStride + kWindowStride + 1] = 0.F;
   sample_patch(patch, cx, cy, B, t);
   const Tag d;
   const int lanes = static_cast<int>(hn::Lanes(d));
@@ -69,7 +72,8 @@ void MakeWindow(const std::uint8_t* patch, float cx, float cy, const float B[4],
       const auto m = hn::Load(d, mask + c);
       const auto v = hn::Mul(m, hn::LoadU(d, p));
       const auto gx = hn::Mul(hn::Mul(m, half), hn::Sub(hn::LoadU(d, p + 1), hn::LoadU(d, p - 1)));
-      const auto gy = hn::Mul(hn::Mul(m, half), hn::Sub(hn::LoadU(d, p + kStride), hn::LoadU(d, p - kStride)));
+      const auto gy =
+          hn::Mul(hn::Mul(m, half), hn::Sub(hn::LoadU(d, p + kStride), hn::LoadU(d, p - kStride)));
       hn::Store(v, d, w->value + r * kWindowStride + c);
       hn::Store(gx, d, w->steep_x + r * kWindowStride + c);
       hn::Store(gy, d, w->steep_y + r * kWindowStride + c);
@@ -119,7 +123,8 @@ void MakeWindow(const std::uint8_t* patch, float cx, float cy, const float B[4],
   w->hyy = hn::GetLane(hn::SumOfLanes(d, yy));
 }
 
-void WindowSumsAt(const Window& w, const std::uint8_t* at, std::ptrdiff_t stride, float fx, float fy, WindowSums* sums) {
+void WindowSumsAt(const Window& w, const std::uint8_t* at, std::ptrdiff_t stride, float fx,
+                  float fy, WindowSums* sums) {
   const Tag d;
   const hn::Rebind<std::int32_t, Tag> d32;
   const hn::Rebind<std::uint8_t, Tag> d8;
@@ -164,11 +169,13 @@ namespace vergence::features::detail {
 HWY_EXPORT(MakeWindow);
 HWY_EXPORT(WindowSumsAt);
 
-void make_window(const std::uint8_t* patch, float centre_x, float centre_y, const float B[4], Window* window) noexcept {
+void make_window(const std::uint8_t* patch, float centre_x, float centre_y, const float B[4],
+                 Window* window) noexcept {
   HWY_DYNAMIC_DISPATCH(MakeWindow)(patch, centre_x, centre_y, B, window);
 }
 
-void window_sums(const Window& window, const std::uint8_t* at, std::ptrdiff_t stride, float fx, float fy, WindowSums* sums) noexcept {
+void window_sums(const Window& window, const std::uint8_t* at, std::ptrdiff_t stride, float fx,
+                 float fy, WindowSums* sums) noexcept {
   HWY_DYNAMIC_DISPATCH(WindowSumsAt)(window, at, stride, fx, fy, sums);
 }
 }  // namespace vergence::features::detail

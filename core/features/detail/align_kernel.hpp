@@ -21,11 +21,14 @@ struct WindowSums {
   float sum, square;       // Σ I, Σ I² over the window
 };
 
-/// `centre`: where the anchor lies in the patch (px from its first pixel); B = ∂(patch px)/∂(image px).
-void make_window(const std::uint8_t* patch, float centre_x, float centre_y, const float B[4], Window* window) noexcept;
+/// `centre`: where the anchor lies in the patch (px from its first pixel); B = ∂(patch px)/∂(image
+/// px).
+void make_window(const std::uint8_t* patch, float centre_x, float centre_y, const float B[4],
+                 Window* window) noexcept;
 
-/// Precondition: the kWindow + 1 pixels from (x0, y0) on lie inside the image, x0 + kWindowStride may reach past the
-/// row's end by no more than its padding. fx, fy in [0, 1).
-void window_sums(const Window& window, const std::uint8_t* at, std::ptrdiff_t stride, float fx, float fy, WindowSums* sums) noexcept;
+/// Precondition: the kWindow + 1 pixels from (x0, y0) on lie inside the image, x0 + kWindowStride
+/// may reach past the row's end by no more than its padding. fx, fy in [0, 1).
+void window_sums(const Window& window, const std::uint8_t* at, std::ptrdiff_t stride, float fx,
+                 float fy, WindowSums* sums) noexcept;
 
 }  // namespace vergence::features::detail

@@ -10,12 +10,15 @@ namespace vergence::features::detail {
 namespace HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
-constexpr int kColumns = kMaxBlock + 32;  // floats a row of the working buffers: block, window and whole vectors
+constexpr int kColumns =
+    kMaxBlock + 32;  // floats a row of the working buffers: block, window and whole vectors
 constexpr int kWindowSide = 2 * kTensorRadius + 1;
 using Tag = hn::CappedTag<float, 16>;
 
-/// Products of the gradients of one image row: xx, xy, yy at x0 − radius … , n of them rounded up to whole vectors.
-void gradient_products(const ImageView& image, int x, int y, int n, float* xx, float* xy, float* yy) {
+/// Products of the gradients of one image row: xx, xy, yy at x0 − radius … , n of them rounded up
+/// to whole vectors.
+void gradient_products(const ImageView& image, int x, int y, int n, float* xx, float* xy,
+                       float* yy) {
   const Tag d;
   const hn::Rebind<std::int32_t, Tag> d32;
   const hn::Rebind<std::uint8_t, Tag> d8;
@@ -25,7 +28,9 @@ void gradient_products(const ImageView& image, int x, int y, int n, float* xx, f
   const std::uint8_t* below = image.row(y + 1) + x;
   const auto half = hn::Set(d, 0.5F);
   for (int i = 0; i < n; i += lanes) {
-    const auto load = [&](const std::uint8_t* p) { return hn::ConvertTo(d, hn::PromoteTo(d32, hn::LoadU(d8, p))); };
+    const auto load = [&](const std::uint8_t* p) {
+      return hn::ConvertTo(d, hn::PromoteTo(d32, hn::LoadU(d8, p)));
+    };
     const auto gx = hn::Mul(half, hn::Sub(load(here + i + 1), load(here + i - 1)));
     const auto gy = hn::Mul(half, hn::Sub(load(below + i), load(above + i)));
     hn::StoreU(hn::Mul(gx, gx), d, xx + i);
@@ -46,8 +51,10 @@ void CornerScores(const ImageView& image, int x0, int y0, int w, int h, float* s
   HWY_ALIGN float newest[3][kColumns];
   for (int row = 0; row < h + kWindowSide - 1; ++row) {
     float(*oldest)[kColumns] = ring[row % kWindowSide];
-    gradient_products(image, x0 - kTensorRadius, y0 - kTensorRadius + row, columns, newest[0], newest[1], newest[2]);
-    // Sums of quarters below 2²⁴ quarters: exact in float, so adding the new row and taking the old one away leaves no error.
+    gradient_products(image, x0 - kTensorRadius, y0 - kTensorRadius + row, columns, newest[0],
+                      newest[1], newest[2]);
+    // Sums of quarters below 2²⁴ quarters: exact in float, so adding the new row and taking the old
+    // one away leaves no error.
     for (int p = 0; p < 3; ++p) {
       for (int i = 0; i < columns; i += lanes) {
         const auto in = hn::LoadU(d, newest[p] + i);

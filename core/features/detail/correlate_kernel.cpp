@@ -10,9 +10,10 @@ namespace vergence::features::detail {
 namespace HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
-void Correlate(const std::uint8_t* block, const std::uint8_t* image, std::ptrdiff_t stride, const std::int32_t* offsets, int n,
-               BlockSums* sums) {
-  // Eight pixels are one row: 16-bit lanes, products summed pairwise into 32 bits. Integers, so equal on every target.
+void Correlate(const std::uint8_t* block, const std::uint8_t* image, std::ptrdiff_t stride,
+               const std::int32_t* offsets, int n, BlockSums* sums) {
+  // Eight pixels are one row: 16-bit lanes, products summed pairwise into 32 bits. Integers, so
+  // equal on every target.
   const hn::CappedTag<std::int16_t, kBlock> d16;
   const hn::Rebind<std::uint8_t, decltype(d16)> d8;
   const hn::RepartitionToWide<decltype(d16)> d32;
@@ -31,7 +32,8 @@ void Correlate(const std::uint8_t* block, const std::uint8_t* image, std::ptrdif
         sum = hn::ReorderWidenMulAccumulate(d32, one, i, sum, sum1);
       }
     }
-    sums[k] = {hn::GetLane(hn::SumOfLanes(d32, hn::Add(product, product1))), hn::GetLane(hn::SumOfLanes(d32, hn::Add(sum, sum1))),
+    sums[k] = {hn::GetLane(hn::SumOfLanes(d32, hn::Add(product, product1))),
+               hn::GetLane(hn::SumOfLanes(d32, hn::Add(sum, sum1))),
                hn::GetLane(hn::SumOfLanes(d32, hn::Add(square, square1)))};
   }
 }
@@ -44,8 +46,8 @@ HWY_AFTER_NAMESPACE();
 namespace vergence::features::detail {
 HWY_EXPORT(Correlate);
 
-void correlate(const std::uint8_t* block, const std::uint8_t* image, std::ptrdiff_t stride, const std::int32_t* offsets, int n,
-               BlockSums* sums) noexcept {
+void correlate(const std::uint8_t* block, const std::uint8_t* image, std::ptrdiff_t stride,
+               const std::int32_t* offsets, int n, BlockSums* sums) noexcept {
   HWY_DYNAMIC_DISPATCH(Correlate)(block, image, stride, offsets, n, sums);
 }
 }  // namespace vergence::features::detail

@@ -10,7 +10,8 @@ namespace vergence::features::detail {
 namespace HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
-constexpr int kMargin = 64;  // entries before and after the row: room for mirrored pixels and for whole vectors
+constexpr int kMargin =
+    64;  // entries before and after the row: room for mirrored pixels and for whole vectors
 
 /// Column sums of five rows, weights 1 4 6 4 1: at most 255 · 16.
 void filter_rows(const std::uint8_t* const rows[5], int width, std::uint16_t* out) {
@@ -26,7 +27,9 @@ void filter_rows(const std::uint8_t* const rows[5], int width, std::uint16_t* ou
     const auto six = hn::Add(hn::ShiftLeft<2>(mid), hn::ShiftLeft<1>(mid));
     hn::StoreU(hn::Add(hn::Add(outer, six), hn::ShiftLeft<2>(inner)), d16, out + x);
   }
-  for (; x < width; ++x) out[x] = static_cast<std::uint16_t>(rows[0][x] + rows[4][x] + 4 * (rows[1][x] + rows[3][x]) + 6 * rows[2][x]);
+  for (; x < width; ++x)
+    out[x] = static_cast<std::uint16_t>(rows[0][x] + rows[4][x] + 4 * (rows[1][x] + rows[3][x]) +
+                                        6 * rows[2][x]);
 }
 
 /// Every second pixel of the row, filtered the same way; v[-2] … v[width + 1] are valid.
@@ -43,12 +46,16 @@ void filter_columns(const std::uint16_t* v, int out_width, std::uint8_t* out) {
     const auto outer = hn::Add(even_before, even_after);
     const auto inner = hn::Add(odd_before, odd);
     const auto six = hn::Add(hn::ShiftLeft<2>(even), hn::ShiftLeft<1>(even));
-    const auto sum = hn::Add(hn::Add(outer, six), hn::Add(hn::ShiftLeft<2>(inner), hn::Set(d16, 128)));
-    hn::StoreU(hn::DemoteTo(d8, hn::BitCast(hn::RebindToSigned<decltype(d16)>(), hn::ShiftRight<8>(sum))), d8, out + x);
+    const auto sum =
+        hn::Add(hn::Add(outer, six), hn::Add(hn::ShiftLeft<2>(inner), hn::Set(d16, 128)));
+    hn::StoreU(
+        hn::DemoteTo(d8, hn::BitCast(hn::RebindToSigned<decltype(d16)>(), hn::ShiftRight<8>(sum))),
+        d8, out + x);
   }
   for (; x < out_width; ++x) {
     const int i = 2 * x;
-    out[x] = static_cast<std::uint8_t>((v[i - 2] + v[i + 2] + 4 * (v[i - 1] + v[i + 1]) + 6 * v[i] + 128) >> 8);
+    out[x] = static_cast<std::uint8_t>(
+        (v[i - 2] + v[i + 2] + 4 * (v[i - 1] + v[i + 1]) + 6 * v[i] + 128) >> 8);
   }
 }
 
@@ -76,9 +83,12 @@ HWY_AFTER_NAMESPACE();
 namespace vergence::features::detail {
 HWY_EXPORT(Downsample);
 
-std::size_t filtered_row_length(int width) noexcept { return static_cast<std::size_t>(width) + 2 * 64 + 2; }
+std::size_t filtered_row_length(int width) noexcept {
+  return static_cast<std::size_t>(width) + 2 * 64 + 2;
+}
 
-void downsample(const ImageView& from, std::uint8_t* out, const ImageView& to, std::uint16_t* row) noexcept {
+void downsample(const ImageView& from, std::uint8_t* out, const ImageView& to,
+                std::uint16_t* row) noexcept {
   HWY_DYNAMIC_DISPATCH(Downsample)(from, out, to, row);
 }
 }  // namespace vergence::features::detail

@@ -11,6 +11,7 @@ namespace vergence::features::detail {
 
 /// One pyramid step: `to` gives size and stride of the half image, whose bytes are at `out`.
 /// Chosen at run time for the machine's widest vectors; every target gives the same bits.
-void downsample(const ImageView& from, std::uint8_t* out, const ImageView& to, std::uint16_t* row) noexcept;
+void downsample(const ImageView& from, std::uint8_t* out, const ImageView& to,
+                std::uint16_t* row) noexcept;
 
 }  // namespace vergence::features::detail

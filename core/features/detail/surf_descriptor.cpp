@@ -21,17 +21,21 @@ struct Gradient {
   float x = 0, y = 0;
 };
 
-constexpr float kMostPixels = 1e6F;  // of a coordinate or side: whole numbers of 32 bits hold it with room to spare
+constexpr float kMostPixels =
+    1e6F;  // of a coordinate or side: whole numbers of 32 bits hold it with room to spare
 
 /// Half of a wavelet's side, px.
-int half_side(float s) noexcept { return s > 1.F ? static_cast<int>(std::lround(std::min(s, kMostPixels))) : 1; }
+int half_side(float s) noexcept {
+  return s > 1.F ? static_cast<int>(std::lround(std::min(s, kMostPixels))) : 1;
+}
 
-/// Haar wavelets of side 2 h about the corner of pixels nearest to (x, y). Nothing where they leave the picture: half a wavelet
-/// would see the picture's edge.
+/// Haar wavelets of side 2 h about the corner of pixels nearest to (x, y). Nothing where they leave
+/// the picture: half a wavelet would see the picture's edge.
 Gradient haar(const IntegralImage& image, float x, float y, int h) noexcept {
   if (!(std::abs(x) < kMostPixels && std::abs(y) < kMostPixels)) return {};
   // Pixel centres lie at whole numbers, the corners between them at halves.
-  const int cx = static_cast<int>(std::lround(x + 0.5F)), cy = static_cast<int>(std::lround(y + 0.5F));
+  const int cx = static_cast<int>(std::lround(x + 0.5F)),
+            cy = static_cast<int>(std::lround(y + 0.5F));
   if (cx < h || cy < h || cx + h > image.width() || cy + h > image.height()) return {};
   const std::uint32_t* top = image.row(cy - h);
   const std::uint32_t* middle = image.row(cy);
@@ -40,7 +44,8 @@ Gradient haar(const IntegralImage& image, float x, float y, int h) noexcept {
   const std::uint32_t right = bottom[cx + h] - bottom[cx] - top[cx + h] + top[cx];
   const std::uint32_t upper = middle[cx + h] - middle[cx - h] - top[cx + h] + top[cx - h];
   const std::uint32_t lower = bottom[cx + h] - bottom[cx - h] - middle[cx + h] + middle[cx - h];
-  return {static_cast<float>(static_cast<std::int32_t>(right - left)), static_cast<float>(static_cast<std::int32_t>(lower - upper))};
+  return {static_cast<float>(static_cast<std::int32_t>(right - left)),
+          static_cast<float>(static_cast<std::int32_t>(lower - upper))};
 }
 
 std::array<float, kSide> descriptor_weights() noexcept {
@@ -58,7 +63,8 @@ const std::array<float, kSide> kWeights = descriptor_weights();
 std::array<float, kReach * kReach> circle_weights() noexcept {
   std::array<float, kReach * kReach> w{};
   for (int r2 = 0; r2 < kReach * kReach; ++r2)
-    w[static_cast<std::size_t>(r2)] = std::exp(-0.5F * static_cast<float>(r2) / (kOrientationSigma * kOrientationSigma));
+    w[static_cast<std::size_t>(r2)] =
+        std::exp(-0.5F * static_cast<float>(r2) / (kOrientationSigma * kOrientationSigma));
   return w;
 }
 
@@ -79,7 +85,8 @@ float surf_orientation(const IntegralImage& image, float x, float y, float scale
     for (int i = -kReach; i <= kReach; ++i) {
       const int r2 = i * i + j * j;
       if (r2 >= kReach * kReach) continue;
-      Gradient g = haar(image, x + scale * static_cast<float>(i), y + scale * static_cast<float>(j), h);
+      Gradient g =
+          haar(image, x + scale * static_cast<float>(i), y + scale * static_cast<float>(j), h);
       if (g.x == 0 && g.y == 0) continue;
       const float w = kCircleWeights[static_cast<std::size_t>(r2)];
       g = {w * g.x, w * g.y};
@@ -87,19 +94,24 @@ float surf_orientation(const IntegralImage& image, float x, float y, float scale
     }
   }
   if (n == 0) return 0.F;
-  std::sort(directions.begin(), directions.begin() + static_cast<std::ptrdiff_t>(n), [](const Direction& a, const Direction& b) {
-    if (a.angle != b.angle) return a.angle < b.angle;
-    return a.g.x != b.g.x ? a.g.x < b.g.x : a.g.y < b.g.y;  // one order, so one sum
-  });
-  // Each sector begins at a direction: nothing is gained by one that begins between two. Its end only moves on.
+  std::sort(directions.begin(), directions.begin() + static_cast<std::ptrdiff_t>(n),
+            [](const Direction& a, const Direction& b) {
+              if (a.angle != b.angle) return a.angle < b.angle;
+              return a.g.x != b.g.x ? a.g.x < b.g.x : a.g.y < b.g.y;  // one order, so one sum
+            });
+  // Each sector begins at a direction: nothing is gained by one that begins between two. Its end
+  // only moves on.
   float best = -1.F, angle = 0.F;
   Gradient sum;
   std::size_t end = 0;  // first beyond the sector, counted on over the turn
   for (std::size_t first = 0; first < n; ++first) {
     const auto beyond = [&](std::size_t i) noexcept {
-      return directions[i % n].angle - directions[first].angle + (i >= n ? 2 * std::numbers::pi_v<float> : 0.F) >= kSector;
+      return directions[i % n].angle - directions[first].angle +
+                 (i >= n ? 2 * std::numbers::pi_v<float> : 0.F) >=
+             kSector;
     };
-    for (; end < first + n && !beyond(end); ++end) sum = {sum.x + directions[end % n].g.x, sum.y + directions[end % n].g.y};
+    for (; end < first + n && !beyond(end); ++end)
+      sum = {sum.x + directions[end % n].g.x, sum.y + directions[end % n].g.y};
     const float length = sum.x * sum.x + sum.y * sum.y;
     if (length > best) {
       best = length;
@@ -116,7 +128,8 @@ SurfDescriptor surf_descriptor(const IntegralImage& image, const SurfPoint& p) n
   const float c = std::cos(p.angle), s = std::sin(p.angle);
   for (int j = 0; j < kSide; ++j) {
     for (int i = 0; i < kSide; ++i) {
-      const float u = p.scale * (static_cast<float>(i) - 0.5F * (kSide - 1)), v = p.scale * (static_cast<float>(j) - 0.5F * (kSide - 1));
+      const float u = p.scale * (static_cast<float>(i) - 0.5F * (kSide - 1)),
+                  v = p.scale * (static_cast<float>(j) - 0.5F * (kSide - 1));
       const Gradient g = haar(image, p.x + c * u - s * v, p.y + s * u + c * v, h);
       const float w = kWeights[static_cast<std::size_t>(i)] * kWeights[static_cast<std::size_t>(j)];
       const float along = w * (c * g.x + s * g.y), across = w * (c * g.y - s * g.x);

@@ -3,28 +3,39 @@
 namespace vergence::features::detail {
 namespace {
 
-/// The rows of the integral image that the boxes of one row of centres end on, and how far their columns lie from a centre.
+/// The rows of the integral image that the boxes of one row of centres end on, and how far their
+/// columns lie from a centre.
 struct Boxes {
   Boxes(const IntegralImage& image, int y, int L) noexcept
       : lobe(L / 3),
         half(L / 2),
         middle(lobe / 2),
         xx{image.row(y - lobe + 1), image.row(y + lobe)},
-        yy{image.row(y - half), image.row(y - middle), image.row(y + middle + 1), image.row(y + half + 1)},
+        yy{image.row(y - half), image.row(y - middle), image.row(y + middle + 1),
+           image.row(y + half + 1)},
         xy{image.row(y - lobe), image.row(y), image.row(y + 1), image.row(y + lobe + 1)},
         weight(1.F / static_cast<float>(L * L)) {}
 
   [[nodiscard]] BoxHessian at(int x) const noexcept {
-    const auto across = [](const std::uint32_t* row, int from, int to) noexcept { return row[to] - row[from]; };
-    // Modulo 2³² until the end: the sums of boxes and their small multiples fit into 32 bits with sign.
+    const auto across = [](const std::uint32_t* row, int from, int to) noexcept {
+      return row[to] - row[from];
+    };
+    // Modulo 2³² until the end: the sums of boxes and their small multiples fit into 32 bits with
+    // sign.
     const int a = x - half, b = x - middle, c = x + middle + 1, d = x + half + 1;
-    const std::uint32_t dxx = across(xx[1], a, d) - across(xx[0], a, d) - 3U * (across(xx[1], b, c) - across(xx[0], b, c));
+    const std::uint32_t dxx = across(xx[1], a, d) - across(xx[0], a, d) -
+                              3U * (across(xx[1], b, c) - across(xx[0], b, c));
     const int e = x - lobe + 1, f = x + lobe;
-    const std::uint32_t dyy = across(yy[3], e, f) - across(yy[0], e, f) - 3U * (across(yy[2], e, f) - across(yy[1], e, f));
+    const std::uint32_t dyy = across(yy[3], e, f) - across(yy[0], e, f) -
+                              3U * (across(yy[2], e, f) - across(yy[1], e, f));
     const int p = x - lobe, q = x + lobe + 1;
-    const std::uint32_t dxy = across(xy[1], p, x) - across(xy[0], p, x) + across(xy[3], x + 1, q) - across(xy[2], x + 1, q) -
-                              (across(xy[1], x + 1, q) - across(xy[0], x + 1, q)) - (across(xy[3], p, x) - across(xy[2], p, x));
-    const auto scaled = [this](std::uint32_t sum) noexcept { return weight * static_cast<float>(static_cast<std::int32_t>(sum)); };
+    const std::uint32_t dxy = across(xy[1], p, x) - across(xy[0], p, x) + across(xy[3], x + 1, q) -
+                              across(xy[2], x + 1, q) -
+                              (across(xy[1], x + 1, q) - across(xy[0], x + 1, q)) -
+                              (across(xy[3], p, x) - across(xy[2], p, x));
+    const auto scaled = [this](std::uint32_t sum) noexcept {
+      return weight * static_cast<float>(static_cast<std::int32_t>(sum));
+    };
     return {scaled(dxx), scaled(dyy), scaled(dxy)};
   }
 
@@ -37,9 +48,12 @@ struct Boxes {
 
 }  // namespace
 
-BoxHessian box_hessian(const IntegralImage& image, int x, int y, int L) noexcept { return Boxes(image, y, L).at(x); }
+BoxHessian box_hessian(const IntegralImage& image, int x, int y, int L) noexcept {
+  return Boxes(image, y, L).at(x);
+}
 
-void determinant_row(const IntegralImage& image, int x, int y, int L, int step, int n, float* out) noexcept {
+void determinant_row(const IntegralImage& image, int x, int y, int L, int step, int n,
+                     float* out) noexcept {
   const Boxes boxes(image, y, L);
   // Neighbouring places are loaded as vectors; a loop of its own lets the compiler see it.
   if (step == 1) {

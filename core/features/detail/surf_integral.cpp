@@ -7,7 +7,8 @@ namespace vergence::features::detail {
 namespace {
 
 std::size_t numbers(int width, int height) noexcept {
-  return (static_cast<std::size_t>(std::max(0, width)) + 1) * (static_cast<std::size_t>(std::max(0, height)) + 1);
+  return (static_cast<std::size_t>(std::max(0, width)) + 1) *
+         (static_cast<std::size_t>(std::max(0, height)) + 1);
 }
 
 }  // namespace

@@ -7,7 +7,8 @@
 
 namespace vergence::features::detail {
 
-/// Sums over the rectangles of a picture (Viola & Jones 2001): S(x, y) = Σ of the pixels in columns below x and rows below y.
+/// Sums over the rectangles of a picture (Viola & Jones 2001): S(x, y) = Σ of the pixels in columns
+/// below x and rows below y.
 ///
 /// Sums are modulo 2³²; that of a box is exact while 255 times its pixels stays below 2³¹.
 /// Memory  (width + 1) · (height + 1) numbers of the arena, for the largest picture.

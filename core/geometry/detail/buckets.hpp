@@ -9,17 +9,21 @@
 
 namespace vergence::detail {
 
-/// The rectangle that observations fill, cut into buckets; sampling one observation a bucket keeps a sample spread out.
+/// The rectangle that observations fill, cut into buckets; sampling one observation a bucket keeps
+/// a sample spread out.
 class PixelBox {
  public:
-  static constexpr int kColumns = 8, kRows = 6;  // 48 buckets: a sample of five still finds five in a half-covered image
+  static constexpr int
+      kColumns = 8,
+      kRows = 6;  // 48 buckets: a sample of five still finds five in a half-covered image
 
   void include(double u, double v) noexcept {
     u0_ = std::min(u0_, u), u1_ = std::max(u1_, u), v0_ = std::min(v0_, v), v1_ = std::max(v1_, v);
   }
   /// Precondition: (u, v) was included.
   [[nodiscard]] std::uint8_t bucket(double u, double v) const noexcept {
-    return static_cast<std::uint8_t>(cell(u, u0_, u1_, kColumns) + kColumns * cell(v, v0_, v1_, kRows));
+    return static_cast<std::uint8_t>(cell(u, u0_, u1_, kColumns) +
+                                     kColumns * cell(v, v0_, v1_, kRows));
   }
 
  private:
@@ -31,11 +35,14 @@ class PixelBox {
   double u0_ = kFar, u1_ = -kFar, v0_ = kFar, v1_ = -kFar;
 };
 
-/// N different indices into `bucket`, uniform over the items (a bucket in proportion to what it holds), no two of one bucket
-/// as long as kTries allow, then merely different. False: fewer than N items, or chance failed kTries times over.
+/// N different indices into `bucket`, uniform over the items (a bucket in proportion to what it
+/// holds), no two of one bucket as long as kTries allow, then merely different. False: fewer than N
+/// items, or chance failed kTries times over.
 template <std::size_t N>
-[[nodiscard]] bool draw_spread(std::span<const std::uint8_t> bucket, Random& random, std::array<std::uint32_t, N>* picks) noexcept {
-  constexpr int kTries = 12;  // a bucket with half of all items is avoided in all but 2⁻¹² of the draws
+[[nodiscard]] bool draw_spread(std::span<const std::uint8_t> bucket, Random& random,
+                               std::array<std::uint32_t, N>* picks) noexcept {
+  constexpr int kTries =
+      12;  // a bucket with half of all items is avoided in all but 2⁻¹² of the draws
   if (bucket.size() < N) return false;
   for (std::size_t j = 0; j < N; ++j) {
     bool found = false;

@@ -6,7 +6,8 @@
 
 namespace vergence::detail {
 
-/// The real root of a x³ + b x² + c x + d where the cubic is steepest: the one that rounding of the coefficients moves least.
+/// The real root of a x³ + b x² + c x + d where the cubic is steepest: the one that rounding of the
+/// coefficients moves least.
 ///
 /// Precondition: finite. a = 0 is allowed; then the root of what is left, 0 when there is none.
 [[nodiscard]] inline double sharpest_cubic_root(double a, double b, double c, double d) noexcept {
@@ -20,14 +21,17 @@ namespace vergence::detail {
   }
   const double i = 1.0 / a;
   b *= i, c *= i, d *= i;
-  // Newton from beyond the outer turning point converges monotonically; which side: where the cubic has its steep arm.
-  // x = y − b/3 turns it into y³ + p y + q.
+  // Newton from beyond the outer turning point converges monotonically; which side: where the cubic
+  // has its steep arm. x = y − b/3 turns it into y³ + p y + q.
   const double shift = b / 3.0;
   const double p = c - b * shift, q = (2.0 * shift * shift - c) * shift + d;
-  // f(turning middle) = q: the root on the side opposite to q's sign is the outer, steep one (also the only one).
-  // Upper bound of |y| for y³ + p y + q = 0 (Lagrange): max(2 √|p| …) is within a factor 2 of the root.
-  double y = -std::copysign(std::max(std::cbrt(2.0 * std::abs(q)), std::sqrt(2.0 * std::max(0.0, -p))), q);
-  constexpr int kSteps = 12;  // from within a factor two: five or six quadratic steps; the rest is for a flat triple root
+  // f(turning middle) = q: the root on the side opposite to q's sign is the outer, steep one (also
+  // the only one). Upper bound of |y| for y³ + p y + q = 0 (Lagrange): max(2 √|p| …) is within a
+  // factor 2 of the root.
+  double y =
+      -std::copysign(std::max(std::cbrt(2.0 * std::abs(q)), std::sqrt(2.0 * std::max(0.0, -p))), q);
+  constexpr int kSteps = 12;  // from within a factor two: five or six quadratic steps; the rest is
+                              // for a flat triple root
   for (int k = 0; k < kSteps; ++k) {
     const double f = (y * y + p) * y + q, slope = 3.0 * y * y + p;
     if (!(std::abs(slope) > 0.0)) break;
@@ -45,12 +49,15 @@ namespace vergence::detail {
   return x;
 }
 
-/// Real roots in [-1, 1] of Σ c[i] xⁱ, i ≤ Degree, ascending, where the polynomial changes its sign; returns how many.
+/// Real roots in [-1, 1] of Σ c[i] xⁱ, i ≤ Degree, ascending, where the polynomial changes its
+/// sign; returns how many.
 ///
-/// Between neighbouring critical points a polynomial is monotonic; those are the roots of its derivative, found the same way
-/// from the linear one upwards. Each root: Newton, bisected where it would leave its bracket, at most kSteps.
+/// Between neighbouring critical points a polynomial is monotonic; those are the roots of its
+/// derivative, found the same way from the linear one upwards. Each root: Newton, bisected where it
+/// would leave its bracket, at most kSteps.
 template <std::size_t Degree>
-[[nodiscard]] std::size_t roots_in_unit_interval(const std::array<double, Degree + 1>& c, std::array<double, Degree>* roots) noexcept {
+[[nodiscard]] std::size_t roots_in_unit_interval(const std::array<double, Degree + 1>& c,
+                                                 std::array<double, Degree>* roots) noexcept {
   constexpr int kSteps = 60;  // bisection alone reaches the last bit of [-1, 1] in 54
   std::array<double, Degree + 1> critical{};
   std::size_t n = 0;

@@ -9,19 +9,22 @@
 namespace vergence::detail {
 namespace {
 
-constexpr double kBehindCost = 1e4;  // squared sigmas: a step that turns a point behind a camera has to be worth it
+constexpr double kBehindCost =
+    1e4;  // squared sigmas: a step that turns a point behind a camera has to be worth it
 
 }  // namespace
 
 std::size_t PoseProblem::memory_needed(std::size_t capacity) noexcept {
   const std::size_t n = padded(capacity, kDoubleBlock);
-  return static_cast<std::size_t>(kMaxCameras) * (8 * (n * sizeof(double) + kCacheLine) + n * sizeof(std::uint32_t) + kCacheLine);
+  return static_cast<std::size_t>(kMaxCameras) *
+         (8 * (n * sizeof(double) + kCacheLine) + n * sizeof(std::uint32_t) + kCacheLine);
 }
 
 PoseProblem::PoseProblem(std::size_t capacity, Arena& arena, const char* who) {
   const std::size_t n = padded(capacity, kDoubleBlock);
   for (Set& s : sets_) {
-    for (std::span<double>* column : {&s.x, &s.y, &s.z, &s.u, &s.v, &s.weight, &s.given_weight, &s.error})
+    for (std::span<double>* column :
+         {&s.x, &s.y, &s.z, &s.u, &s.v, &s.weight, &s.given_weight, &s.error})
       *column = arena.make<double>(n, who);
     s.point = arena.make<std::uint32_t>(n, who);
   }
@@ -49,7 +52,8 @@ void PoseProblem::gather(const RigObservations& o) noexcept {
       s.weight[n] = s.given_weight[n] = 1.0 / (o.sigma[i] * o.sigma[i]);
     }
     s.whole = padded(s.count, kDoubleBlock);
-    for (std::size_t n = s.count; n < s.whole; ++n) s.x[n] = s.y[n] = s.z[n] = s.u[n] = s.v[n] = s.weight[n] = 0.0;
+    for (std::size_t n = s.count; n < s.whole; ++n)
+      s.x[n] = s.y[n] = s.z[n] = s.u[n] = s.v[n] = s.weight[n] = 0.0;
   }
 }
 
@@ -74,13 +78,15 @@ RefineColumns PoseProblem::columns(const Set& s) noexcept {
   return {s.x.data(), s.y.data(), s.z.data(), s.u.data(), s.v.data(), s.weight.data()};
 }
 
-PoseProblem::Sums PoseProblem::sums(const Transform& T_left_world, double scale, double huber) const noexcept {
+PoseProblem::Sums PoseProblem::sums(const Transform& T_left_world, double scale,
+                                    double huber) const noexcept {
   Sums out{Mat6::Zero(), Vec6::Zero(), 0.0};
   for (int k = 0; k < cameras_; ++k) {
     const Set& s = sets_[static_cast<std::size_t>(k)];
     if (s.count == 0) continue;
     const RefineCamera camera = camera_at(s, T_left_world);
-    const NormalSums n = normal_sums(columns(s), s.whole, camera, 1.0 / scale, huber, kMinDepth, kBehindCost);
+    const NormalSums n =
+        normal_sums(columns(s), s.whole, camera, 1.0 / scale, huber, kMinDepth, kBehindCost);
     Mat6 H;
     for (int r = 0, at = 0; r < 6; ++r)
       for (int c = r; c < 6; ++c) H(r, c) = H(c, r) = n.H[static_cast<std::size_t>(at++)];
@@ -90,7 +96,8 @@ PoseProblem::Sums PoseProblem::sums(const Transform& T_left_world, double scale,
     out.g.head<3>() += R.transpose() * g_rotation;
     out.g.tail<3>() += R.transpose() * g_translation;
     for (int a = 0; a < 6; a += 3)
-      for (int b = 0; b < 6; b += 3) out.H.block<3, 3>(a, b) += R.transpose() * Mat3(H.block<3, 3>(a, b)) * R;
+      for (int b = 0; b < 6; b += 3)
+        out.H.block<3, 3>(a, b) += R.transpose() * Mat3(H.block<3, 3>(a, b)) * R;
     out.cost += n.cost;
   }
   return out;
@@ -101,7 +108,8 @@ void PoseProblem::evaluate(const Transform& T_left_world) noexcept {
     Set& s = sets_[static_cast<std::size_t>(k)];
     RefineColumns c = columns(s);
     c.weight = s.given_weight.data();
-    squared_errors(c, s.whole, camera_at(s, T_left_world), kMinDepth, std::numeric_limits<double>::infinity(), s.error.data());
+    squared_errors(c, s.whole, camera_at(s, T_left_world), kMinDepth,
+                   std::numeric_limits<double>::infinity(), s.error.data());
   }
 }
 

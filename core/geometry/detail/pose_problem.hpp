@@ -9,13 +9,16 @@
 
 namespace vergence::detail {
 
-/// Least squares of T_left_world over the usable observations of a rig, points constant: columns and normal equations.
+/// Least squares of T_left_world over the usable observations of a rig, points constant: columns
+/// and normal equations.
 ///
-/// Pixel of point p in camera k: X_k = R_k X_left + t_k, X_left = T_left_world p. The pose is moved in the camera's own axes,
+/// Pixel of point p in camera k: X_k = R_k X_left + t_k, X_left = T_left_world p. The pose is moved
+/// in the camera's own axes,
 ///
 ///     X_left ← Exp(φ) X_left + τ,   δ = (φ, τ),   ∂X_k/∂δ = R_k [ −[X_left]×   I ]
 ///
-/// not about the world's origin, which lies kilometres behind a vehicle: there rotation and translation would be the same thing.
+/// not about the world's origin, which lies kilometres behind a vehicle: there rotation and
+/// translation would be the same thing.
 /// Memory  In the arena at construction. Threads: one caller.
 class PoseProblem {
  public:
@@ -38,14 +41,18 @@ class PoseProblem {
   void evaluate(const Transform& T_left_world) noexcept;
 
   [[nodiscard]] int cameras() const noexcept { return cameras_; }
-  [[nodiscard]] std::size_t count(int camera) const noexcept { return sets_[static_cast<std::size_t>(camera)].count; }
+  [[nodiscard]] std::size_t count(int camera) const noexcept {
+    return sets_[static_cast<std::size_t>(camera)].count;
+  }
   [[nodiscard]] std::size_t observations() const noexcept;
   [[nodiscard]] std::span<const double> errors(int camera) const noexcept {
     const Set& s = sets_[static_cast<std::size_t>(camera)];
     return s.error.first(s.count);
   }
   /// Index of the point that observation i of that camera is of.
-  [[nodiscard]] std::size_t point(int camera, std::size_t i) const noexcept { return sets_[static_cast<std::size_t>(camera)].point[i]; }
+  [[nodiscard]] std::size_t point(int camera, std::size_t i) const noexcept {
+    return sets_[static_cast<std::size_t>(camera)].point[i];
+  }
   [[nodiscard]] std::size_t capacity() const noexcept { return sets_[0].point.size(); }
 
  private:
@@ -56,7 +63,8 @@ class PoseProblem {
     Transform T_camera_left;
     double fx = 0, fy = 0;
   };
-  [[nodiscard]] static RefineCamera camera_at(const Set& set, const Transform& T_left_world) noexcept;
+  [[nodiscard]] static RefineCamera camera_at(const Set& set,
+                                              const Transform& T_left_world) noexcept;
   [[nodiscard]] static RefineColumns columns(const Set& set) noexcept;
 
   std::array<Set, kMaxCameras> sets_{};

@@ -6,7 +6,8 @@ namespace vergence::gige {
 
 /// Block ids of a stream, 16 or 64 bit, into exposures since its first frame.
 ///
-/// 16-bit ids are never 0: after 65535 comes 1. A 64-bit id shows itself by its size; until then both count alike.
+/// 16-bit ids are never 0: after 65535 comes 1. A 64-bit id shows itself by its size; until then
+/// both count alike.
 /// Threads  One caller. Memory: fixed.
 class BlockCounter {
  public:

@@ -15,14 +15,16 @@ struct Names {
 constexpr std::array kNames{
     Names{Purpose::exposure, {"ExposureTime", "ExposureTimeAbs", "ExposureTimeRaw", "Exposure"}},
     Names{Purpose::gain, {"Gain", "GainAbs", "GainRaw", nullptr}},
-    Names{Purpose::frame_rate, {"AcquisitionFrameRate", "AcquisitionFrameRateAbs", nullptr, nullptr}},
+    Names{Purpose::frame_rate,
+          {"AcquisitionFrameRate", "AcquisitionFrameRateAbs", nullptr, nullptr}},
     Names{Purpose::trigger_delay, {"TriggerDelay", "TriggerDelayAbs", nullptr, nullptr}},
     Names{Purpose::serial, {"DeviceSerialNumber", "DeviceID", nullptr, nullptr}},
     Names{Purpose::ptp_enable, {"PtpEnable", "GevIEEE1588", nullptr, nullptr}},
     Names{Purpose::ptp_status, {"PtpStatus", "GevIEEE1588Status", nullptr, nullptr}},
     Names{Purpose::ptp_latch, {"PtpDataSetLatch", "GevIEEE1588DataSetLatch", nullptr, nullptr}},
     Names{Purpose::chunk_mode, {"ChunkModeActive", "ChunkMode", nullptr, nullptr}},
-    Names{Purpose::chunk_exposure, {"ChunkExposureTime", "ChunkExposureTimeAbs", "ChunkExposure", nullptr}},
+    Names{Purpose::chunk_exposure,
+          {"ChunkExposureTime", "ChunkExposureTimeAbs", "ChunkExposure", nullptr}},
 };
 
 std::string shown(double v) {
@@ -65,7 +67,8 @@ std::optional<Features::Bounds> Features::bounds(const std::string& name) const 
     if (error) return std::nullopt;
     b.least = static_cast<double>(least);
     b.most = static_cast<double>(most);
-    b.step = static_cast<double>(arv_device_get_integer_feature_increment(device_, name.c_str(), error.out()));
+    b.step = static_cast<double>(
+        arv_device_get_integer_feature_increment(device_, name.c_str(), error.out()));
     if (error || !(b.step >= 1)) b.step = 1;
     return b;
   } else {
@@ -82,7 +85,8 @@ std::optional<double> Features::number(const std::string& name) const {
   if (ARV_IS_GC_FLOAT(node))
     value = arv_device_get_float_feature_value(device_, name.c_str(), error.out());
   else if (ARV_IS_GC_INTEGER(node))
-    value = static_cast<double>(arv_device_get_integer_feature_value(device_, name.c_str(), error.out()));
+    value = static_cast<double>(
+        arv_device_get_integer_feature_value(device_, name.c_str(), error.out()));
   else
     return std::nullopt;
   if (error) return std::nullopt;
@@ -98,7 +102,8 @@ std::string Features::text(const std::string& name) const {
 std::vector<std::string> Features::choices(const std::string& name) const {
   Error error;
   guint n = 0;
-  const Memory<const char*> entries(arv_device_dup_available_enumeration_feature_values_as_strings(device_, name.c_str(), &n, error.out()));
+  const Memory<const char*> entries(arv_device_dup_available_enumeration_feature_values_as_strings(
+      device_, name.c_str(), &n, error.out()));
   std::vector<std::string> all;
   for (guint i = 0; entries != nullptr && i < n; ++i) all.emplace_back(entries.get()[i]);
   return all;
@@ -108,17 +113,21 @@ bool Features::set(const std::string& name, double value, const char* unit, doub
   const auto limits = bounds(name);
   if (!limits) return refuse("the camera has no number " + name);
   const bool whole = limits->step > 0;
-  if (whole) value = limits->least + std::round((value - limits->least) / limits->step) * limits->step;
-  const double slack = 1e-6 * std::max(1.0, std::abs(value));  // floats on their way through a register of 32 bits
+  if (whole)
+    value = limits->least + std::round((value - limits->least) / limits->step) * limits->step;
+  const double slack =
+      1e-6 * std::max(1.0, std::abs(value));  // floats on their way through a register of 32 bits
   if (value < limits->least - slack || value > limits->most + slack)
-    return refuse(name + " " + shown(value) + " " + unit + " is not possible: the camera offers " + shown(limits->least) + " to " +
-                  shown(limits->most) + " " + unit);
+    return refuse(name + " " + shown(value) + " " + unit + " is not possible: the camera offers " +
+                  shown(limits->least) + " to " + shown(limits->most) + " " + unit);
   Error error;
   if (whole)
-    arv_device_set_integer_feature_value(device_, name.c_str(), static_cast<gint64>(std::llround(value)), error.out());
+    arv_device_set_integer_feature_value(device_, name.c_str(),
+                                         static_cast<gint64>(std::llround(value)), error.out());
   else
     arv_device_set_float_feature_value(device_, name.c_str(), value, error.out());
-  if (error) return refuse(name + " " + shown(value) + " " + unit + " was refused: " + error.text());
+  if (error)
+    return refuse(name + " " + shown(value) + " " + unit + " was refused: " + error.text());
   if (actual != nullptr) *actual = number(name).value_or(value);
   return true;
 }
@@ -135,7 +144,8 @@ bool Features::choose(const std::string& name, const std::string& entry) {
 
 bool Features::switch_on(const std::string& name, bool on) {
   if (!has(name)) return refuse("the camera has no " + name);
-  if (ARV_IS_GC_ENUMERATION(arv_device_get_feature(device_, name.c_str()))) return choose(name, on ? "On" : "Off");
+  if (ARV_IS_GC_ENUMERATION(arv_device_get_feature(device_, name.c_str())))
+    return choose(name, on ? "On" : "Off");
   Error error;
   arv_device_set_boolean_feature_value(device_, name.c_str(), on ? TRUE : FALSE, error.out());
   return !error || refuse(name + " was refused: " + error.text());
@@ -153,11 +163,13 @@ bool Features::set_text(const std::string& name, const std::string& value) {
   if (node == nullptr || !has(name)) return refuse("the camera has no feature " + name);
   if (ARV_IS_GC_COMMAND(node)) return execute(name);
   if (ARV_IS_GC_ENUMERATION(node)) return choose(name, value);
-  if (ARV_IS_GC_BOOLEAN(node)) return switch_on(name, value == "on" || value == "true" || value == "1");
+  if (ARV_IS_GC_BOOLEAN(node))
+    return switch_on(name, value == "on" || value == "true" || value == "1");
   if (ARV_IS_GC_FLOAT(node) || ARV_IS_GC_INTEGER(node)) {
     char* end = nullptr;
     const double v = g_ascii_strtod(value.c_str(), &end);
-    if (value.empty() || *end != '\0') return refuse(name + " is a number; \"" + value + "\" is none");
+    if (value.empty() || *end != '\0')
+      return refuse(name + " is a number; \"" + value + "\" is none");
     return set(name, v, "", nullptr);
   }
   Error error;

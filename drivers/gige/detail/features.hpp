@@ -41,7 +41,8 @@ class Features {
   [[nodiscard]] std::string text(const std::string& name) const;
   [[nodiscard]] std::vector<std::string> choices(const std::string& name) const;
 
-  /// A number of a float or integer feature, rounded to the integer's step; outside its bounds it is refused. *actual: as read back.
+  /// A number of a float or integer feature, rounded to the integer's step; outside its bounds it
+  /// is refused. *actual: as read back.
   [[nodiscard]] bool set(const std::string& name, double value, const char* unit, double* actual);
   /// One of the entries of an enumeration.
   [[nodiscard]] bool choose(const std::string& name, const std::string& entry);

@@ -11,7 +11,8 @@
 namespace vergence::gige {
 namespace {
 
-constexpr std::size_t kSpare = 3;        // buffers beside the slots that may be out: one is being filled, the next two wait
+constexpr std::size_t kSpare =
+    3;  // buffers beside the slots that may be out: one is being filled, the next two wait
 constexpr std::size_t kWireBuffers = 4;  // where every frame is converted at once
 
 }  // namespace
@@ -22,9 +23,12 @@ HostStamp monotonic_now() noexcept {
   return HostStamp(static_cast<std::int64_t>(t.tv_sec) * 1'000'000'000 + t.tv_nsec);
 }
 
-std::string size_text(int width, int height) { return std::to_string(width) + " x " + std::to_string(height); }
+std::string size_text(int width, int height) {
+  return std::to_string(width) + " x " + std::to_string(height);
+}
 
-GigeCamera::GigeCamera(std::unique_ptr<Session> session) : info_(session->info()), session_(std::move(session)), address_(info_.place) {}
+GigeCamera::GigeCamera(std::unique_ptr<Session> session)
+    : info_(session->info()), session_(std::move(session)), address_(info_.place) {}
 
 GigeCamera::~GigeCamera() {
   stop();
@@ -48,20 +52,28 @@ std::string GigeCamera::remark() const {
   const std::uint64_t untold = untold_.load(std::memory_order_relaxed);
   if (untold == 0) return remark_;
   return remark_ + (remark_.empty() ? "" : "; ") + std::to_string(untold) +
-         " images came without their exposure in the chunk data: it was reckoned; if that is most of them, set the option chunks to off";
+         " images came without their exposure in the chunk data: it was reckoned; if that is most "
+         "of them, set the option chunks to off";
 }
 
-// ---- the owner ------------------------------------------------------------------------------------------------------
+// ---- the owner
+// ------------------------------------------------------------------------------------------------------
 
-DeviceStatus GigeCamera::configure(const CameraConfiguration& wanted, CameraConfiguration* actual) noexcept {
+DeviceStatus GigeCamera::configure(const CameraConfiguration& wanted,
+                                   CameraConfiguration* actual) noexcept {
   try {
-    if (handover_.state() != Handover::State::stopped) return refuse(DeviceStatus::busy, "the camera streams; stop it first");
-    if (handover_.any_out()) return refuse(DeviceStatus::busy, "images are still in use; release them first");
+    if (handover_.state() != Handover::State::stopped)
+      return refuse(DeviceStatus::busy, "the camera streams; stop it first");
+    if (handover_.any_out())
+      return refuse(DeviceStatus::busy, "images are still in use; release them first");
     if (wanted.width <= 0 || wanted.height <= 0 || wanted.offset_x < 0 || wanted.offset_y < 0)
-      return refuse(DeviceStatus::bad_configuration, "a region of " + size_text(wanted.width, wanted.height) + " px is none");
-    if (!(wanted.rate_hz > 0) || wanted.exposure <= Duration{} || wanted.exposure.to_seconds() * wanted.rate_hz > 1)
       return refuse(DeviceStatus::bad_configuration,
-                    "rate and exposure must be positive, the exposure shorter than the time between two images");
+                    "a region of " + size_text(wanted.width, wanted.height) + " px is none");
+    if (!(wanted.rate_hz > 0) || wanted.exposure <= Duration{} ||
+        wanted.exposure.to_seconds() * wanted.rate_hz > 1)
+      return refuse(DeviceStatus::bad_configuration,
+                    "rate and exposure must be positive, the exposure shorter than the time "
+                    "between two images");
     Options options;
     if (std::string sentence = parse_options(wanted.options, &options); !sentence.empty())
       return refuse(DeviceStatus::unsupported, std::move(sentence));
@@ -69,7 +81,8 @@ DeviceStatus GigeCamera::configure(const CameraConfiguration& wanted, CameraConf
     if (const DeviceStatus s = reach(); s != DeviceStatus::ok) return s;
     Applied applied;
     stale_ = true;
-    if (const DeviceStatus s = session_->apply(wanted, options, &applied); s != DeviceStatus::ok) return refuse(s, session_->complaint());
+    if (const DeviceStatus s = session_->apply(wanted, options, &applied); s != DeviceStatus::ok)
+      return refuse(s, session_->complaint());
     stale_ = false;
     wanted_ = wanted;
     options_ = options;
@@ -92,9 +105,15 @@ void GigeCamera::make_slots() {
   drop_buffers();
   converting_ = applied_.format->how != GreyFormat::How::as_it_is;
   const auto most = static_cast<std::size_t>(options_.buffers);
-  const auto width = static_cast<std::size_t>(wanted_.width), height = static_cast<std::size_t>(wanted_.height);
-  const auto padded = [](std::size_t bytes) { return (bytes + kCacheLine - 1) / kCacheLine * kCacheLine; };
-  slots_ = most + (converting_ ? 1 : kSpare);  // converting: one more, into which the frame goes that is then refused
+  const auto width = static_cast<std::size_t>(wanted_.width),
+             height = static_cast<std::size_t>(wanted_.height);
+  const auto padded = [](std::size_t bytes) {
+    return (bytes + kCacheLine - 1) / kCacheLine * kCacheLine;
+  };
+  slots_ = most +
+           (converting_
+                ? 1
+                : kSpare);  // converting: one more, into which the frame goes that is then refused
   stride_ = converting_ ? FramePool::stride(wanted_.width) : width;
   slot_bytes_ = converting_ ? stride_ * height : padded(applied_.payload);
   wire_bytes_ = converting_ ? padded(applied_.payload) : 0;
@@ -104,7 +123,9 @@ void GigeCamera::make_slots() {
   // Exactly the payload: Aravis counts the packets of a frame by it.
   for (std::size_t i = 0; i < (converting_ ? kWireBuffers : slots_); ++i)
     buffers_.push_back(arv_buffer_new_full(
-        applied_.payload, converting_ ? wire_.data() + i * wire_bytes_ : pixels_.data() + i * slot_bytes_, GSIZE_TO_POINTER(i), nullptr));
+        applied_.payload,
+        converting_ ? wire_.data() + i * wire_bytes_ : pixels_.data() + i * slot_bytes_,
+        GSIZE_TO_POINTER(i), nullptr));
   free_.reserve(slots_);
   handover_.set_slots(slots_, most);
 }
@@ -116,9 +137,11 @@ void GigeCamera::drop_buffers() noexcept {
 
 DeviceTiming GigeCamera::timing() const noexcept {
   DeviceTiming t;
-  t.least_delay = applied_.plan.transfer + (options_.stamp_at_end ? Duration{} : applied_.actual.exposure);
+  t.least_delay =
+      applied_.plan.transfer + (options_.stamp_at_end ? Duration{} : applied_.actual.exposure);
   if (applied_.tick_frequency > 0)
-    t.resolution = std::max(Duration::nanoseconds(1), Duration::seconds(1.0 / static_cast<double>(applied_.tick_frequency)));
+    t.resolution = std::max(Duration::nanoseconds(1),
+                            Duration::seconds(1.0 / static_cast<double>(applied_.tick_frequency)));
   return t;
 }
 
@@ -134,10 +157,12 @@ DeviceStatus GigeCamera::reach() {
   return DeviceStatus::ok;
 }
 
-/// Precondition: device_ held, configured. The slots stay: the same configuration has the same payload.
+/// Precondition: device_ held, configured. The slots stay: the same configuration has the same
+/// payload.
 DeviceStatus GigeCamera::apply_again() {
   Applied again;
-  if (const DeviceStatus s = session_->apply(wanted_, options_, &again); s != DeviceStatus::ok) return refuse(s, session_->complaint());
+  if (const DeviceStatus s = session_->apply(wanted_, options_, &again); s != DeviceStatus::ok)
+    return refuse(s, session_->complaint());
   if (again.payload != applied_.payload || again.format != applied_.format)
     return refuse(DeviceStatus::gone, "the camera came back with frames of another size");
   applied_ = std::move(again);
@@ -177,7 +202,8 @@ DeviceStatus GigeCamera::start(Notifier* ready) noexcept {
 
 /// Precondition: device_ held, a session that is configured.
 DeviceStatus GigeCamera::begin(Notifier* ready) {
-  if (const DeviceStatus s = session_->open_stream(applied_, &GigeCamera::called, this); s != DeviceStatus::ok)
+  if (const DeviceStatus s = session_->open_stream(applied_, &GigeCamera::called, this);
+      s != DeviceStatus::ok)
     return refuse(s, session_->complaint());
   stream_ = session_->stream();
   blocks_.restart();
@@ -197,7 +223,8 @@ DeviceStatus GigeCamera::begin(Notifier* ready) {
   }
   if (converting_)
     for (ArvBuffer* b : buffers_) session_->push(b);
-  if (const DeviceStatus s = session_->start_acquisition(); s != DeviceStatus::ok) return refuse(s, session_->complaint());
+  if (const DeviceStatus s = session_->start_acquisition(); s != DeviceStatus::ok)
+    return refuse(s, session_->complaint());
   const std::lock_guard words(words_);
   remark_ = session_->remark();
   return DeviceStatus::ok;
@@ -228,16 +255,19 @@ DeviceStatus GigeCamera::standing() const noexcept {
   }
 }
 
-DeviceStatus GigeCamera::set_exposure(const ExposureSetting& wanted, ExposureSetting* actual) noexcept {
+DeviceStatus GigeCamera::set_exposure(const ExposureSetting& wanted,
+                                      ExposureSetting* actual) noexcept {
   try {
     if (const DeviceStatus s = standing(); s != DeviceStatus::ok) return s;
     if (wanted.exposure <= Duration{} || wanted.exposure.to_seconds() * wanted_.rate_hz > 1)
-      return refuse(DeviceStatus::bad_configuration, "the exposure must be positive, and shorter than the time between two images");
+      return refuse(DeviceStatus::bad_configuration,
+                    "the exposure must be positive, and shorter than the time between two images");
     const std::lock_guard lock(device_);
     if (session_ == nullptr || standing() != DeviceStatus::ok)
       return standing() == DeviceStatus::stopped ? DeviceStatus::stopped : DeviceStatus::gone;
     ExposureSetting taken;
-    if (const DeviceStatus s = session_->change_exposure(wanted, options_, &taken); s != DeviceStatus::ok)
+    if (const DeviceStatus s = session_->change_exposure(wanted, options_, &taken);
+        s != DeviceStatus::ok)
       return refuse(s, session_->complaint());
     wanted_.exposure = taken.exposure;  // also after it was unplugged
     wanted_.gain_db = taken.gain_db;
@@ -265,16 +295,20 @@ DeviceStatus GigeCamera::trigger_once() noexcept {
 }
 
 ImageView GigeCamera::view(FrameSlot slot) const noexcept {
-  return {pixels_.data() + slot * slot_bytes_, wanted_.width, wanted_.height, static_cast<std::ptrdiff_t>(stride_)};
+  return {pixels_.data() + slot * slot_bytes_, wanted_.width, wanted_.height,
+          static_cast<std::ptrdiff_t>(stride_)};
 }
 
-// ---- Aravis's thread ------------------------------------------------------------------------------------------------
+// ---- Aravis's thread
+// ------------------------------------------------------------------------------------------------
 
 void GigeCamera::called(void* self, ArvStreamCallbackType type, ArvBuffer*) {
   auto* camera = static_cast<GigeCamera*>(self);
-  if (type == ARV_STREAM_CALLBACK_TYPE_INIT) (void)pthread_setname_np(pthread_self(), "vergence-gige");
+  if (type == ARV_STREAM_CALLBACK_TYPE_INIT)
+    (void)pthread_setname_np(pthread_self(), "vergence-gige");
   if (type != ARV_STREAM_CALLBACK_TYPE_BUFFER_DONE) return;
-  if (ArvBuffer* done = arv_stream_try_pop_buffer(camera->stream_); done != nullptr) camera->take(done);
+  if (ArvBuffer* done = arv_stream_try_pop_buffer(camera->stream_); done != nullptr)
+    camera->take(done);
 }
 
 /// Slots that came back go to the transport again.
@@ -291,7 +325,8 @@ void GigeCamera::take(ArvBuffer* buffer) noexcept {
   const HostStamp arrival = monotonic_now();
   g_object_unref(buffer);  // ours still holds it
   recycle();
-  const auto index = static_cast<std::size_t>(reinterpret_cast<std::uintptr_t>(arv_buffer_get_user_data(buffer)));
+  const auto index =
+      static_cast<std::size_t>(reinterpret_cast<std::uintptr_t>(arv_buffer_get_user_data(buffer)));
   Frame frame;
   if (arv_buffer_get_status(buffer) == ARV_BUFFER_STATUS_ABORTED) return;  // the stream is closing
   if (!describe(buffer, arrival, &frame)) {
@@ -308,8 +343,8 @@ void GigeCamera::take(ArvBuffer* buffer) noexcept {
     return;
   }
   frame.slot = free_.back();
-  to_grey(*applied_.format, wire_.data() + index * wire_bytes_, wanted_.width, wanted_.height, pixels_.data() + frame.slot * slot_bytes_,
-          stride_);
+  to_grey(*applied_.format, wire_.data() + index * wire_bytes_, wanted_.width, wanted_.height,
+          pixels_.data() + frame.slot * slot_bytes_, stride_);
   session_->push(buffer);
   if (handover_.offer(frame)) free_.pop_back();
 }
@@ -319,22 +354,27 @@ bool GigeCamera::describe(ArvBuffer* buffer, HostStamp arrival, Frame* frame) no
   const bool whole = arv_buffer_get_status(buffer) == ARV_BUFFER_STATUS_SUCCESS;
   const std::uint64_t id = arv_buffer_get_frame_id(buffer);
   heard_ns_.store(arrival.ns(), std::memory_order_release);
-  const auto step = blocks_.next(id);  // 0, as it was pushed: the leader is lost; the next frame's id tells that one is missing
+  const auto step = blocks_.next(id);  // 0, as it was pushed: the leader is lost; the next frame's
+                                       // id tells that one is missing
   if (!step) return false;
   handover_.count_lost(step->missing);
   frame->counter = step->counter;
   frame->arrival = arrival;
   const ExposureSetting& had = exposures_.at(arrival - applied_.plan.transfer - exposure_now_);
   const auto told = whole ? told_exposure(buffer) : std::nullopt;
-  frame->status = whole && right_size(buffer, told.has_value()) ? FrameStatus::complete : FrameStatus::torn;
+  frame->status =
+      whole && right_size(buffer, told.has_value()) ? FrameStatus::complete : FrameStatus::torn;
   const bool complete = frame->status == FrameStatus::complete;
   if (complete && !told && applied_.exposure_chunk) untold_.fetch_add(1, std::memory_order_relaxed);
   frame->exposure = complete && told ? *told : had.exposure;
   frame->gain_db = had.gain_db;
   exposure_now_ = frame->exposure;
-  const Duration before = applied_.plan.transfer + (options_.stamp_at_end ? Duration{} : frame->exposure);
-  frame->exposure_start = applied_.tick_frequency > 0 ? DeviceStamp(static_cast<std::int64_t>(arv_buffer_get_timestamp(buffer)))
-                                                      : DeviceStamp(arrival.ns()) - before;
+  const Duration before =
+      applied_.plan.transfer + (options_.stamp_at_end ? Duration{} : frame->exposure);
+  frame->exposure_start =
+      applied_.tick_frequency > 0
+          ? DeviceStamp(static_cast<std::int64_t>(arv_buffer_get_timestamp(buffer)))
+          : DeviceStamp(arrival.ns()) - before;
   if (options_.stamp_at_end) frame->exposure_start = frame->exposure_start - frame->exposure;
   return true;
 }
@@ -344,7 +384,8 @@ std::optional<Duration> GigeCamera::told_exposure(ArvBuffer* buffer) const noexc
   if (!applied_.exposure_chunk) return std::nullopt;
   std::size_t bytes = 0;
   const auto* data = static_cast<const std::uint8_t*>(arv_buffer_get_data(buffer, &bytes));
-  return exposure_in_chunks(std::span(data, bytes).subspan(std::min(applied_.pixels, bytes)), *applied_.exposure_chunk);
+  return exposure_in_chunks(std::span(data, bytes).subspan(std::min(applied_.pixels, bytes)),
+                            *applied_.exposure_chunk);
 }
 
 /// A frame that came whole may still be another than the one that was asked for.
@@ -354,7 +395,8 @@ bool GigeCamera::right_size(ArvBuffer* buffer, bool chunks_in_place) noexcept {
   (void)arv_buffer_get_data(buffer, &bytes);
   if (arv_buffer_get_payload_type(buffer) != ARV_BUFFER_PAYLOAD_TYPE_CHUNK_DATA) {
     arv_buffer_get_image_region(buffer, &x, &y, &width, &height);
-  } else if (chunks_in_place) {  // such a leader does not tell; what is where it has to be behind the pixels does
+  } else if (chunks_in_place) {  // such a leader does not tell; what is where it has to be behind
+                                 // the pixels does
     width = wanted_.width;
     height = wanted_.height;
   }

@@ -24,26 +24,33 @@ namespace vergence::gige {
 
 /// A GigE Vision camera: drivers/camera.hpp and gige.hpp have the contract.
 ///
-/// Aravis's receive thread fills buffers that are the slots (or, where the format is not 8-bit grey, are converted into them) and offers
-/// them to the Handover. A supervisor watches while streaming: a camera that answers no more, or sends no more, is gone; then it opens and
+/// Aravis's receive thread fills buffers that are the slots (or, where the format is not 8-bit
+/// grey, are converted into them) and offers them to the Handover. A supervisor watches while
+/// streaming: a camera that answers no more, or sends no more, is gone; then it opens and
 /// configures it again, with growing pauses, until start() can go on.
-/// Threads  The owner, Aravis's, the supervisor; the session is under device_, which the frames' way never takes.
-/// Time     stop() and start() may take as long as the session's calls: 2.5 s each, once the camera has gone.
+/// Threads  The owner, Aravis's, the supervisor; the session is under device_, which the frames'
+///          way never takes.
+/// Time     stop() and start() may take as long as the session's calls: 2.5 s each, once the camera
+///          has gone.
 class GigeCamera final : public CameraDevice {
  public:
   explicit GigeCamera(std::unique_ptr<Session> session);
   ~GigeCamera() override;
 
   const DeviceInfo& info() const noexcept override { return info_; }
-  DeviceStatus configure(const CameraConfiguration& wanted, CameraConfiguration* actual) noexcept override;
+  DeviceStatus configure(const CameraConfiguration& wanted,
+                         CameraConfiguration* actual) noexcept override;
   DeviceTiming timing() const noexcept override;
   DeviceStatus start(Notifier* ready) noexcept override;
-  DeviceStatus wait(Duration limit, Frame* frame) noexcept override { return handover_.wait(limit, frame); }
+  DeviceStatus wait(Duration limit, Frame* frame) noexcept override {
+    return handover_.wait(limit, frame);
+  }
   ImageView view(FrameSlot slot) const noexcept override;
   void release(FrameSlot slot) noexcept override { handover_.release(slot); }
   void stop() noexcept override;
   DeviceStatus trigger_once() noexcept override;
-  DeviceStatus set_exposure(const ExposureSetting& wanted, ExposureSetting* actual) noexcept override;
+  DeviceStatus set_exposure(const ExposureSetting& wanted,
+                            ExposureSetting* actual) noexcept override;
   std::string complaint() const override;
   std::string remark() const override;
   CameraStatistics statistics() const noexcept override { return handover_.statistics(); }
@@ -91,7 +98,8 @@ class GigeCamera final : public CameraDevice {
   ExposureSetting in_force_{};               // what the camera's registers hold; under device_
   bool configured_ = false, stale_ = false;  // stale: the camera may hold what was refused
   std::unique_ptr<Arena> arena_;
-  std::span<std::uint8_t> pixels_, wire_;  // slots; transport's buffers where they are not the slots
+  std::span<std::uint8_t> pixels_,
+      wire_;  // slots; transport's buffers where they are not the slots
   std::size_t slot_bytes_ = 0, wire_bytes_ = 0, slots_ = 0, stride_ = 0;
   std::vector<ArvBuffer*> buffers_;
   bool converting_ = false;
@@ -107,7 +115,8 @@ class GigeCamera final : public CameraDevice {
   std::atomic<std::int64_t> heard_ns_{0};
   std::atomic<int> wrong_sizes_{0};  // in a row
   std::atomic<int> seen_width_{0}, seen_height_{0};
-  std::atomic<std::uint64_t> untold_{0};  // whole frames since configure() whose chunk data did not have the exposure
+  std::atomic<std::uint64_t> untold_{
+      0};  // whole frames since configure() whose chunk data did not have the exposure
 
   std::mutex supervisor_;
   std::condition_variable wake_;

@@ -11,10 +11,13 @@ namespace vergence::gige {
 namespace {
 
 constexpr Duration kTick = Duration::milliseconds(100);
-constexpr Duration kLeastSilence = Duration::seconds(1);  // of a free running camera before it is taken for gone
-constexpr Duration kAskEvery = Duration::seconds(1);      // a triggered one may rest; it is asked whether it is there
-constexpr Duration kFirstPause = Duration::milliseconds(500), kLongestPause = Duration::seconds(5);  // between attempts to reopen
-constexpr int kWrongSizes = 3;                                                                       // in a row: no accident
+constexpr Duration kLeastSilence =
+    Duration::seconds(1);  // of a free running camera before it is taken for gone
+constexpr Duration kAskEvery =
+    Duration::seconds(1);  // a triggered one may rest; it is asked whether it is there
+constexpr Duration kFirstPause = Duration::milliseconds(500),
+                   kLongestPause = Duration::seconds(5);  // between attempts to reopen
+constexpr int kWrongSizes = 3;                            // in a row: no accident
 
 }  // namespace
 
@@ -31,7 +34,8 @@ void GigeCamera::supervise() {
         case Handover::State::streaming:
           pause = kFirstPause;
           next_try = monotonic_now() + pause;
-          if (const Trouble trouble = what_is_wrong(monotonic_now(), &asked); !trouble.why.empty()) lose(trouble);
+          if (const Trouble trouble = what_is_wrong(monotonic_now(), &asked); !trouble.why.empty())
+            lose(trouble);
           break;
         case Handover::State::gone:
           if (monotonic_now() < next_try) break;
@@ -54,8 +58,11 @@ void GigeCamera::supervise() {
 GigeCamera::Trouble GigeCamera::what_is_wrong(HostStamp at, HostStamp* asked) {
   static const Trouble kSilent{"the camera does not answer any more", false};
   if (wrong_sizes_.load(std::memory_order_relaxed) >= kWrongSizes)
-    return {"the camera sends " + (seen_width_ > 0 ? size_text(seen_width_, seen_height_) : "images that do not tell their size") +
-            " where " + size_text(wanted_.width, wanted_.height) + " was configured; power it off and on"};
+    return {"the camera sends " +
+            (seen_width_ > 0 ? size_text(seen_width_, seen_height_)
+                             : "images that do not tell their size") +
+            " where " + size_text(wanted_.width, wanted_.height) +
+            " was configured; power it off and on"};
   const std::lock_guard lock(device_);
   if (session_ == nullptr || handover_.state() != Handover::State::streaming) return {};
   if (session_->lost()) return kSilent;
@@ -65,7 +72,8 @@ GigeCamera::Trouble GigeCamera::what_is_wrong(HostStamp at, HostStamp* asked) {
     if (!session_->in_control()) return kSilent;
     return {"the camera answers, but sends no images; check the firewall, and the MTU on the way"};
   }
-  if (wanted_.trigger != CameraTrigger::free && silence > std::max(kAskEvery, period * 3) && at - *asked > kAskEvery) {
+  if (wanted_.trigger != CameraTrigger::free && silence > std::max(kAskEvery, period * 3) &&
+      at - *asked > kAskEvery) {
     *asked = at;
     if (!session_->in_control()) return kSilent;
   }
@@ -92,9 +100,11 @@ bool GigeCamera::reopen() {
   std::string why;
   session_ = Session::open(address_, &status, &why);
   if (session_ != nullptr && session_->info().serial != info_.serial) session_.reset();
-  if (session_ == nullptr && status == DeviceStatus::not_found && !quitting())  // with another address, perhaps
+  if (session_ == nullptr && status == DeviceStatus::not_found &&
+      !quitting())  // with another address, perhaps
     for (const Found& f : discover())
-      if (f.info.serial == info_.serial && session_ == nullptr) session_ = Session::open(f.info.place, &status, &why);
+      if (f.info.serial == info_.serial && session_ == nullptr)
+        session_ = Session::open(f.info.place, &status, &why);
   if (session_ == nullptr || quitting()) return false;
   address_ = session_->info().place;
   if (apply_again() == DeviceStatus::ok) return true;

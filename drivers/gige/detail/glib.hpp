@@ -33,7 +33,9 @@ class Error {
     return &error_;
   }
   [[nodiscard]] explicit operator bool() const noexcept { return error_ != nullptr; }
-  [[nodiscard]] bool is(ArvDeviceError code) const noexcept { return error_ != nullptr && g_error_matches(error_, ARV_DEVICE_ERROR, code); }
+  [[nodiscard]] bool is(ArvDeviceError code) const noexcept {
+    return error_ != nullptr && g_error_matches(error_, ARV_DEVICE_ERROR, code);
+  }
   [[nodiscard]] std::string text() const { return error_ == nullptr ? "" : error_->message; }
 
  private:

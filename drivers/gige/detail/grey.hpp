@@ -14,13 +14,16 @@ struct GreyFormat {
   int shift = 0;  // words: bits below the eight that are kept
 };
 
-/// Of the formats a camera offers the one called `wanted`, or without a wish the cheapest. Null: none that gives grey.
-[[nodiscard]] const GreyFormat* choose_format(const std::vector<std::string>& offered, std::string_view wanted) noexcept;
+/// Of the formats a camera offers the one called `wanted`, or without a wish the cheapest. Null:
+/// none that gives grey.
+[[nodiscard]] const GreyFormat* choose_format(const std::vector<std::string>& offered,
+                                              std::string_view wanted) noexcept;
 
 /// Rows of `width` pixels without padding into rows of `stride` bytes.
 ///
 /// Words, little endian: the eight highest of the format's bits. Mosaic: bayer_to_grey().
 /// Preconditions: width, height ≥ 2; `from` holds the image.
-void to_grey(const GreyFormat& format, const std::uint8_t* from, int width, int height, std::uint8_t* to, std::size_t stride) noexcept;
+void to_grey(const GreyFormat& format, const std::uint8_t* from, int width, int height,
+             std::uint8_t* to, std::size_t stride) noexcept;
 
 }  // namespace vergence::gige

@@ -57,7 +57,8 @@ void Handover::end() {
 DeviceStatus Handover::wait(Duration limit, Frame* frame) {
   std::unique_lock lock(mutex_);
   if (limit > Duration{})
-    (void)changed_.wait_for(lock, std::chrono::nanoseconds(limit.ns()), [this] { return offered_ > 0 || state_ != State::streaming; });
+    (void)changed_.wait_for(lock, std::chrono::nanoseconds(limit.ns()),
+                            [this] { return offered_ > 0 || state_ != State::streaming; });
   if (state_ == State::stopped) return DeviceStatus::stopped;
   if (offered_ > 0) {
     *frame = frames_[first_];

@@ -10,11 +10,14 @@
 
 namespace vergence::gige {
 
-/// Between the transport's thread and the camera's users: frames one way, slots back, and what state the stream is in.
+/// Between the transport's thread and the camera's users: frames one way, slots back, and what
+/// state the stream is in.
 ///
-/// Ownership  A slot is the transport's, offered, the consumer's, then returned and the transport's again.
+/// Ownership  A slot is the transport's, offered, the consumer's, then returned and the transport's
+///            again.
 /// Threads    Each call by whom its comment names. One mutex, held for a few assignments only.
-/// Memory     Fixed. Full: of more than `most` slots out the newest frame is refused and counted as an underrun.
+/// Memory     Fixed. Full: of more than `most` slots out the newest frame is refused and counted as
+///            an underrun.
 class Handover {
  public:
   /// streaming, then lost, then ready again: start() may go on.

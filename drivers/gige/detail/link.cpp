@@ -18,7 +18,7 @@
 namespace vergence::gige {
 namespace {
 
-constexpr int kWireOverhead = 38;     // bytes: Ethernet's header 14, check sum 4, preamble 8, gap 12
+constexpr int kWireOverhead = 38;  // bytes: Ethernet's header 14, check sum 4, preamble 8, gap 12
 constexpr int kHeaders = 20 + 8 + 8;  // IP, UDP, GVSP
 constexpr int kExtendedHeaders = 20 + 8 + 20;
 constexpr int kMostBySwitches = 9000;  // bytes; beyond it few switches go
@@ -57,7 +57,8 @@ Interface interface_of(const std::string& address) {
   return found;
 }
 
-int choose_packet_size(int wished, int mtu, std::int64_t least, std::int64_t most, std::int64_t step) noexcept {
+int choose_packet_size(int wished, int mtu, std::int64_t least, std::int64_t most,
+                       std::int64_t step) noexcept {
   std::int64_t size = wished > 0 ? wished : std::min(mtu, kMostBySwitches);
   size = std::min<std::int64_t>({size, most, mtu});
   step = std::max<std::int64_t>(step, 1);
@@ -65,18 +66,23 @@ int choose_packet_size(int wished, int mtu, std::int64_t least, std::int64_t mos
   return static_cast<int>(std::max(size, least));
 }
 
-LinkPlan plan_link(const LinkLoad& load, int packet_size, std::int64_t speed, Duration delay) noexcept {
+LinkPlan plan_link(const LinkLoad& load, int packet_size, std::int64_t speed,
+                   Duration delay) noexcept {
   LinkPlan plan;
   plan.packet_size = packet_size;
-  const double on_wire = speed > 0 ? static_cast<double>(packet_size + kWireOverhead) * 8 / static_cast<double>(speed) : 0;
+  const double on_wire =
+      speed > 0 ? static_cast<double>(packet_size + kWireOverhead) * 8 / static_cast<double>(speed)
+                : 0;
   plan.delay = delay >= Duration{} ? delay : Duration::seconds(1.1 * (load.cameras - 1) * on_wire);
-  plan.transfer = Duration::seconds(packets_of(load, packet_size) * (on_wire + plan.delay.to_seconds()));
+  plan.transfer =
+      Duration::seconds(packets_of(load, packet_size) * (on_wire + plan.delay.to_seconds()));
   plan.share = plan.transfer.to_seconds() * load.rate_hz;
   return plan;
 }
 
 double highest_rate(const LinkLoad& load, int packet_size, std::int64_t speed) noexcept {
-  const double transfer = plan_link(load, packet_size, speed, Duration::nanoseconds(-1)).transfer.to_seconds();
+  const double transfer =
+      plan_link(load, packet_size, speed, Duration::nanoseconds(-1)).transfer.to_seconds();
   return transfer > 0 ? kMostOfPeriod / transfer : 1e9;
 }
 
@@ -88,10 +94,12 @@ int find_udp_socket(std::uint16_t port) {
     const int fd = std::atoi(entry->d_name);
     int type = 0;
     socklen_t length = sizeof type;
-    if (fd <= 2 || ::getsockopt(fd, SOL_SOCKET, SO_TYPE, &type, &length) != 0 || type != SOCK_DGRAM) continue;
+    if (fd <= 2 || ::getsockopt(fd, SOL_SOCKET, SO_TYPE, &type, &length) != 0 || type != SOCK_DGRAM)
+      continue;
     sockaddr_in own{};
     length = sizeof own;
-    if (::getsockname(fd, reinterpret_cast<sockaddr*>(&own), &length) != 0 || own.sin_family != AF_INET || ntohs(own.sin_port) != port)
+    if (::getsockname(fd, reinterpret_cast<sockaddr*>(&own), &length) != 0 ||
+        own.sin_family != AF_INET || ntohs(own.sin_port) != port)
       continue;
     found = fd;
     break;
@@ -102,7 +110,8 @@ int find_udp_socket(std::uint16_t port) {
 
 std::int64_t set_receive_buffer(int socket, std::int64_t bytes) {
   const int wanted = static_cast<int>(std::min<std::int64_t>(bytes, INT_MAX / 4));
-  // Beyond the system's limit where we may (CAP_NET_ADMIN); the plain call is capped by it in silence.
+  // Beyond the system's limit where we may (CAP_NET_ADMIN); the plain call is capped by it in
+  // silence.
   if (::setsockopt(socket, SOL_SOCKET, SO_RCVBUFFORCE, &wanted, sizeof wanted) != 0)
     (void)::setsockopt(socket, SOL_SOCKET, SO_RCVBUF, &wanted, sizeof wanted);
   int got = 0;

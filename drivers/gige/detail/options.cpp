@@ -16,7 +16,8 @@ using Taker = bool (*)(const std::string& text, Options* o);
 bool number(const std::string& text, double least, double most, double* value) {
   double v = 0;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), v);
-  if (error != std::errc{} || end != text.data() + text.size() || !(v >= least && v <= most)) return false;
+  if (error != std::errc{} || end != text.data() + text.size() || !(v >= least && v <= most))
+    return false;
   *value = v;
   return true;
 }
@@ -42,30 +43,43 @@ bool word(const std::string& text, std::initializer_list<const char*> words, std
 }
 
 constexpr std::array kRows{
-    OptionRow{"packet_size", "bytes, 576 to 65000", "computed",
-              "Size of the stream's packets with their headers: the interface's MTU, at most 9000."},
-    OptionRow{"packet_delay_us", "µs, 0 to 10000", "computed", "Pause after each packet, so that the cameras of one link interleave."},
-    OptionRow{"link_mbps", "Mbit/s", "the interface's", "Speed of the slowest link that the cameras share, where a switch is in between."},
+    OptionRow{
+        "packet_size", "bytes, 576 to 65000", "computed",
+        "Size of the stream's packets with their headers: the interface's MTU, at most 9000."},
+    OptionRow{"packet_delay_us", "µs, 0 to 10000", "computed",
+              "Pause after each packet, so that the cameras of one link interleave."},
+    OptionRow{"link_mbps", "Mbit/s", "the interface's",
+              "Speed of the slowest link that the cameras share, where a switch is in between."},
     OptionRow{"link_cameras", "1 to 16", "all GigE cameras", "Cameras that share that link."},
-    OptionRow{"packet_socket", "on, off", "off", "Receives through a packet socket (needs CAP_NET_RAW): less work, frames some ms later."},
-    OptionRow{"resend", "auto, on, off", "auto", "Asks again for lost packets; auto: where the camera says that it can."},
+    OptionRow{
+        "packet_socket", "on, off", "off",
+        "Receives through a packet socket (needs CAP_NET_RAW): less work, frames some ms later."},
+    OptionRow{"resend", "auto, on, off", "auto",
+              "Asks again for lost packets; auto: where the camera says that it can."},
     OptionRow{"frame_retention_ms", "ms, 1 to 1000", "3 periods",
               "How long an incomplete frame waits for packets that were asked for again."},
-    OptionRow{"socket_buffer_kb", "KiB", "eight frames", "Receive buffer of the socket; needs net.core.rmem_max of that size."},
+    OptionRow{"socket_buffer_kb", "KiB", "eight frames",
+              "Receive buffer of the socket; needs net.core.rmem_max of that size."},
     OptionRow{"buffers", "4 to 48", "12", "Frames that may be in use at once."},
     OptionRow{"trigger_line", "a name of the camera", "Line1", "Input of the hardware trigger."},
-    OptionRow{"trigger_edge", "rising, falling", "rising", "Edge of the pulse that begins the exposure."},
+    OptionRow{"trigger_edge", "rising, falling", "rising",
+              "Edge of the pulse that begins the exposure."},
     OptionRow{"trigger_overlap", "off, readout, previous_frame", "the camera's",
               "Whether a pulse is taken while the frame before is read out."},
     OptionRow{"trigger_delay_us", "µs, 0 to 1000000", "0", "From the pulse to the exposure."},
-    OptionRow{"exposure_mode", "timed, trigger_width", "timed", "trigger_width: the pulse's length is the exposure."},
-    OptionRow{"exposure_line", "a name of the camera", "none", "Output that is high during the exposure."},
-    OptionRow{"stamp_at", "start, end", "start", "What the camera's time stamp is of: the exposure's start or its end."},
+    OptionRow{"exposure_mode", "timed, trigger_width", "timed",
+              "trigger_width: the pulse's length is the exposure."},
+    OptionRow{"exposure_line", "a name of the camera", "none",
+              "Output that is high during the exposure."},
+    OptionRow{"stamp_at", "start, end", "start",
+              "What the camera's time stamp is of: the exposure's start or its end."},
     OptionRow{"ptp", "on, off", "off", "The camera's clock follows the network's (IEEE 1588)."},
-    OptionRow{"chunks", "auto, off", "auto", "Each frame tells its exposure itself, where the camera can (chunk data)."},
+    OptionRow{"chunks", "auto, off", "auto",
+              "Each frame tells its exposure itself, where the camera can (chunk data)."},
     OptionRow{"heartbeat_ms", "ms, 500 to 60000", "the camera's",
               "After so long without a word from us the camera gives up its controller."},
-    OptionRow{"feature.NAME", "a value", "", "Any feature of the camera by its own name, set after everything else."},
+    OptionRow{"feature.NAME", "a value", "",
+              "Any feature of the camera by its own name, set after everything else."},
 };
 // In the order of kRows.
 constexpr std::array<Taker, kRows.size() - 1> kTakers{
@@ -145,10 +159,12 @@ std::string parse_options(const std::map<std::string, std::string>& given, Optio
     while (i < kTakers.size() && name != kRows[i].name) ++i;
     if (i == kTakers.size()) {
       std::string known;
-      for (const OptionRow& row : kRows) known += (known.empty() ? "" : ", ") + std::string(row.name);
+      for (const OptionRow& row : kRows)
+        known += (known.empty() ? "" : ", ") + std::string(row.name);
       return "there is no option \"" + name + "\"; GigE cameras have " + known;
     }
-    if (!kTakers[i](value, &o)) return "the option " + name + " is \"" + value + "\"; it takes " + kRows[i].values;
+    if (!kTakers[i](value, &o))
+      return "the option " + name + " is \"" + value + "\"; it takes " + kRows[i].values;
   }
   *options = std::move(o);
   return {};

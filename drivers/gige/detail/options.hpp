@@ -24,12 +24,14 @@ struct Options {
   std::string exposure_mode = "timed", exposure_line;
   bool stamp_at_end = false;
   bool ptp = false;
-  bool chunks = true;                                         // where the camera has them
-  int heartbeat_ms = 0;                                       // 0: the camera's own
-  std::vector<std::pair<std::string, std::string>> features;  // of the camera, by its own names, last
+  bool chunks = true;    // where the camera has them
+  int heartbeat_ms = 0;  // 0: the camera's own
+  std::vector<std::pair<std::string, std::string>>
+      features;  // of the camera, by its own names, last
 };
 
 /// Empty: understood. Else the sentence: which name or value, and what there is.
-[[nodiscard]] std::string parse_options(const std::map<std::string, std::string>& given, Options* options);
+[[nodiscard]] std::string parse_options(const std::map<std::string, std::string>& given,
+                                        Options* options);
 
 }  // namespace vergence::gige

@@ -39,20 +39,26 @@ struct Applied {
 
 /// Control of one camera, and its stream.
 ///
-/// Threads  One caller at a time; `lost()` any. Every call may take 2.5 s when the camera has gone, and no longer.
+/// Threads  One caller at a time; `lost()` any. Every call may take 2.5 s when the camera has gone,
+///          and no longer.
 /// Errors   Statuses, with the sentence in complaint().
 class Session {
  public:
   /// By address or Aravis's id. Null: *status and *complaint say why. → ok, not_found, busy, failed
-  [[nodiscard]] static std::unique_ptr<Session> open(const std::string& where, DeviceStatus* status, std::string* complaint);
+  [[nodiscard]] static std::unique_ptr<Session> open(const std::string& where, DeviceStatus* status,
+                                                     std::string* complaint);
   ~Session();
 
   [[nodiscard]] const DeviceInfo& info() const noexcept { return info_; }
-  /// The whole configuration, in the order that cameras want. → ok, unsupported, bad_configuration, gone
-  [[nodiscard]] DeviceStatus apply(const CameraConfiguration& wanted, const Options& options, Applied* applied);
+  /// The whole configuration, in the order that cameras want. → ok, unsupported, bad_configuration,
+  /// gone
+  [[nodiscard]] DeviceStatus apply(const CameraConfiguration& wanted, const Options& options,
+                                   Applied* applied);
 
-  /// Makes the stream; the callback comes from its thread, from the first push() on. → ok, no_permission, gone, failed
-  [[nodiscard]] DeviceStatus open_stream(const Applied& applied, ArvStreamCallback callback, void* user);
+  /// Makes the stream; the callback comes from its thread, from the first push() on. → ok,
+  /// no_permission, gone, failed
+  [[nodiscard]] DeviceStatus open_stream(const Applied& applied, ArvStreamCallback callback,
+                                         void* user);
   /// Precondition: a stream is open.
   void push(ArvBuffer* buffer) noexcept;
   [[nodiscard]] ArvStream* stream() noexcept { return stream_.get(); }
@@ -61,8 +67,10 @@ class Session {
   /// Ends both; after it no callback comes. `reachable`: the camera is told, too.
   void close_stream(bool reachable) noexcept;
   [[nodiscard]] DeviceStatus trigger();
-  /// The nearest that the camera has, also while it streams. *actual: as read back. → ok, unsupported, gone
-  [[nodiscard]] DeviceStatus change_exposure(const ExposureSetting& wanted, const Options& options, ExposureSetting* actual);
+  /// The nearest that the camera has, also while it streams. *actual: as read back. → ok,
+  /// unsupported, gone
+  [[nodiscard]] DeviceStatus change_exposure(const ExposureSetting& wanted, const Options& options,
+                                             ExposureSetting* actual);
 
   /// Asks the camera: it answers, and we are in control.
   [[nodiscard]] bool in_control();
@@ -77,10 +85,12 @@ class Session {
   [[nodiscard]] DeviceStatus refuse(DeviceStatus status, std::string sentence);
   [[nodiscard]] DeviceStatus set_format(const CameraConfiguration& wanted, Applied* applied);
   [[nodiscard]] DeviceStatus set_region(const CameraConfiguration& wanted);
-  [[nodiscard]] DeviceStatus set_exposure(const CameraConfiguration& wanted, const Options& options, Applied* applied);
+  [[nodiscard]] DeviceStatus set_exposure(const CameraConfiguration& wanted, const Options& options,
+                                          Applied* applied);
   [[nodiscard]] DeviceStatus set_trigger(const CameraConfiguration& wanted, const Options& options);
   [[nodiscard]] DeviceStatus set_rate(const CameraConfiguration& wanted, Applied* applied);
-  [[nodiscard]] DeviceStatus set_packets(const CameraConfiguration& wanted, const Options& options, Applied* applied);
+  [[nodiscard]] DeviceStatus set_packets(const CameraConfiguration& wanted, const Options& options,
+                                         Applied* applied);
   [[nodiscard]] DeviceStatus set_clock(const Options& options, Applied* applied);
   void set_chunks(const Options& options, Applied* applied);
   [[nodiscard]] bool ask_for_exposures(const char* mode, Applied* applied);

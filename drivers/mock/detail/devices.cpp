@@ -8,7 +8,8 @@
 
 namespace vergence::mock {
 
-// ---- camera -------------------------------------------------------------------------------------------------------
+// ---- camera
+// -------------------------------------------------------------------------------------------------------
 
 MockCamera::MockCamera(RigContext* rig, int k)
     : rig_(rig),
@@ -16,17 +17,22 @@ MockCamera::MockCamera(RigContext* rig, int k)
       info_{"mock", "mock-" + std::to_string(k), "rendered camera", "world"},
       clock_(DeviceOscillator::of(rig->options.seed, k, rig->options.clock_drift_ppm)) {}
 
-DeviceStatus MockCamera::configure(const CameraConfiguration& wanted, CameraConfiguration* actual) noexcept {
+DeviceStatus MockCamera::configure(const CameraConfiguration& wanted,
+                                   CameraConfiguration* actual) noexcept {
   const Intrinsics& lens = rig_->truth->mounted().intrinsics[static_cast<std::size_t>(k_)];
-  if (!(wanted.rate_hz > 0) || wanted.exposure <= Duration{} || wanted.exposure.to_seconds() * wanted.rate_hz > 1)
+  if (!(wanted.rate_hz > 0) || wanted.exposure <= Duration{} ||
+      wanted.exposure.to_seconds() * wanted.rate_hz > 1)
     return DeviceStatus::bad_configuration;
   if (wanted.width != lens.width || wanted.height != lens.height) return DeviceStatus::unsupported;
-  if (stream.streaming() || out_.load() > 0 || (rig_->pulsing.load() && !rig_->options.real_time)) return DeviceStatus::busy;
+  if (stream.streaming() || out_.load() > 0 || (rig_->pulsing.load() && !rig_->options.real_time))
+    return DeviceStatus::busy;
   const std::unique_lock mine(memory);
   try {
-    arena_ = std::make_unique<Arena>(FramePool::memory_needed(lens.width, lens.height, MockRig::kSlots) + kCacheLine);
+    arena_ = std::make_unique<Arena>(
+        FramePool::memory_needed(lens.width, lens.height, MockRig::kSlots) + kCacheLine);
     pool_ = std::make_unique<FramePool>(lens.width, lens.height, MockRig::kSlots, *arena_);
-    renderer_ = std::make_unique<Renderer>(rig_->truth->shared_world(), vergence::Camera(lens), rig_->options.pattern);
+    renderer_ = std::make_unique<Renderer>(rig_->truth->shared_world(), vergence::Camera(lens),
+                                           rig_->options.pattern);
     if (rig_->options.pattern == Pattern::gbrg && !rig_->options.raw)
       mosaic_.resize(FramePool::stride(lens.width) * static_cast<std::size_t>(lens.height));
   } catch (const std::exception&) {
@@ -42,10 +48,12 @@ DeviceStatus MockCamera::configure(const CameraConfiguration& wanted, CameraConf
   return DeviceStatus::ok;
 }
 
-DeviceStatus MockCamera::set_exposure(const ExposureSetting& wanted, ExposureSetting* actual) noexcept {
+DeviceStatus MockCamera::set_exposure(const ExposureSetting& wanted,
+                                      ExposureSetting* actual) noexcept {
   constexpr double kMostGain = 40;  // dB
   if (!stream.streaming()) return DeviceStatus::stopped;
-  if (wanted.exposure <= Duration{} || wanted.exposure.to_seconds() * configuration_.rate_hz > 1) return DeviceStatus::bad_configuration;
+  if (wanted.exposure <= Duration{} || wanted.exposure.to_seconds() * configuration_.rate_hz > 1)
+    return DeviceStatus::bad_configuration;
   const ExposureSetting taken{wanted.exposure, std::clamp(wanted.gain_db, 0.0, kMostGain)};
   const auto latency = static_cast<std::uint64_t>(std::max(1, rig_->options.exposure_latency));
   const std::uint64_t from = std::max(rig_->looked_at.load() + latency, rig_->planned.load());
@@ -53,7 +61,8 @@ DeviceStatus MockCamera::set_exposure(const ExposureSetting& wanted, ExposureSet
     const std::lock_guard lock(setting_);
     while (changes_.size() > 1 && changes_.back().from >= from) changes_.pop_back();
     // Of what is past only the last is of use.
-    while (changes_.size() > 1 && changes_[1].from + MockRig::kSlots < rig_->planned.load()) changes_.erase(changes_.begin());
+    while (changes_.size() > 1 && changes_[1].from + MockRig::kSlots < rig_->planned.load())
+      changes_.erase(changes_.begin());
     changes_.push_back({from, taken});
   } catch (const std::exception&) {
     return DeviceStatus::failed;
@@ -123,23 +132,31 @@ CameraStatistics MockCamera::statistics() const noexcept {
   return s;
 }
 
-void MockCamera::take(std::span<const Transform> T_camera_enu, std::span<const Transform> T_camera_bus, const Shot& shot,
+void MockCamera::take(std::span<const Transform> T_camera_enu,
+                      std::span<const Transform> T_camera_bus, const Shot& shot,
                       std::uint8_t* out) {
   const auto stride = static_cast<std::ptrdiff_t>(FramePool::stride(pool_->width()));
-  renderer_->render(T_camera_enu, shot, mosaic_.empty() ? out : mosaic_.data(), stride, T_camera_bus);
-  if (!mosaic_.empty()) bayer_to_grey(mosaic_.data(), stride, pool_->width(), pool_->height(), out, stride);
+  renderer_->render(T_camera_enu, shot, mosaic_.empty() ? out : mosaic_.data(), stride,
+                    T_camera_bus);
+  if (!mosaic_.empty())
+    bayer_to_grey(mosaic_.data(), stride, pool_->width(), pool_->height(), out, stride);
 }
 
-// ---- INS ----------------------------------------------------------------------------------------------------------
+// ---- INS
+// ----------------------------------------------------------------------------------------------------------
 
-MockIns::MockIns(RigContext* rig) : rig_(rig), clock_(DeviceOscillator::of(rig->options.seed, -1, rig->options.clock_drift_ppm)) {}
+MockIns::MockIns(RigContext* rig)
+    : rig_(rig),
+      clock_(DeviceOscillator::of(rig->options.seed, -1, rig->options.clock_drift_ppm)) {}
 
 DeviceStatus MockIns::configure(double rate_hz, double* actual_hz) noexcept {
   if (!(rate_hz > 0)) return DeviceStatus::bad_configuration;
   if (rate_hz > 400) return DeviceStatus::unsupported;
   if (rig_->pulsing.load()) return DeviceStatus::busy;
   rate_ = rate_hz;
-  model_ = std::make_unique<InsModel>(InsModelOptions{rig_->options.ideal_ins, mixed(rig_->options.seed, 99), rate_hz}, *rig_->truth);
+  model_ = std::make_unique<InsModel>(
+      InsModelOptions{rig_->options.ideal_ins, mixed(rig_->options.seed, 99), rate_hz},
+      *rig_->truth);
   if (actual_hz != nullptr) *actual_hz = rate_hz;
   return DeviceStatus::ok;
 }
@@ -174,16 +191,22 @@ InsStatistics MockIns::statistics() const noexcept {
   return s;
 }
 
-// ---- trigger board ------------------------------------------------------------------------------------------------
+// ---- trigger board
+// ------------------------------------------------------------------------------------------------
 
 MockTrigger::MockTrigger(RigContext* rig, PulseListener* listener)
-    : rig_(rig), listener_(listener), clock_(DeviceOscillator::of(rig->options.seed, -2, rig->options.clock_drift_ppm)) {}
+    : rig_(rig),
+      listener_(listener),
+      clock_(DeviceOscillator::of(rig->options.seed, -2, rig->options.clock_drift_ppm)) {}
 
-DeviceStatus MockTrigger::configure(const TriggerConfiguration& wanted, TriggerConfiguration* actual) noexcept {
-  if (!(wanted.rate_hz > 0) || wanted.width <= Duration{} || wanted.vary < Duration{}) return DeviceStatus::bad_configuration;
+DeviceStatus MockTrigger::configure(const TriggerConfiguration& wanted,
+                                    TriggerConfiguration* actual) noexcept {
+  if (!(wanted.rate_hz > 0) || wanted.width <= Duration{} || wanted.vary < Duration{})
+    return DeviceStatus::bad_configuration;
   if (wanted.rate_hz > 200) return DeviceStatus::unsupported;
   const Duration period = Duration::seconds(1 / wanted.rate_hz);
-  if (wanted.vary * 2 > period || wanted.width + wanted.vary >= period) return DeviceStatus::unsupported;
+  if (wanted.vary * 2 > period || wanted.width + wanted.vary >= period)
+    return DeviceStatus::unsupported;
   if (rig_->pulsing.load()) return DeviceStatus::busy;
   configuration_ = wanted;
   if (actual != nullptr) *actual = wanted;
@@ -221,7 +244,8 @@ DeviceStatus MockTrigger::wait(Duration limit, Pulse* pulse) noexcept {
   pulses_.fetch_add(1, std::memory_order_relaxed);
   {
     const std::lock_guard lock(asking_);
-    if (!any_) pause_boot_ = d.value.pulse.boot;  // of a pause that was asked for before the first report
+    if (!any_)
+      pause_boot_ = d.value.pulse.boot;  // of a pause that was asked for before the first report
     any_ = true;
     newest_ = d.value.slot;
     boot_ = d.value.pulse.boot;
@@ -231,7 +255,8 @@ DeviceStatus MockTrigger::wait(Duration limit, Pulse* pulse) noexcept {
 }
 
 DeviceStatus MockTrigger::pause(std::uint32_t pulses) noexcept {
-  // A report is taken before the third pulse after it at the latest, see Scheduler: the fourth is not made yet, on any run.
+  // A report is taken before the third pulse after it at the latest, see Scheduler: the fourth is
+  // not made yet, on any run.
   constexpr std::uint64_t kAhead = 4;
   if (!stream.streaming()) return DeviceStatus::stopped;
   if (gone_) return DeviceStatus::gone;

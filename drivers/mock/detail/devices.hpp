@@ -16,7 +16,8 @@
 #include "drivers/mock/stream.hpp"
 #include "drivers/trigger.hpp"
 
-/// The mock's devices as their consumers meet them; what they deliver comes from the scheduler through their streams.
+/// The mock's devices as their consumers meet them; what they deliver comes from the scheduler
+/// through their streams.
 namespace vergence::mock {
 
 /// Tells the scheduler that a consumer has made room: a slot, or a place in a stream.
@@ -24,7 +25,9 @@ namespace vergence::mock {
 /// Threads  Everything from any.
 class Room {
  public:
-  [[nodiscard]] std::uint32_t look() const noexcept { return made_.load(std::memory_order_acquire); }
+  [[nodiscard]] std::uint32_t look() const noexcept {
+    return made_.load(std::memory_order_acquire);
+  }
   void made() noexcept {
     made_.fetch_add(1, std::memory_order_release);
     made_.notify_all();
@@ -42,8 +45,8 @@ struct RigContext {
   MockRigOptions options;
   Room room;
   std::atomic<bool> pulsing{false};  // the scheduler's threads use the devices
-  // Of camera 0, for who sets exposures: the pulse of the image handed out last, and whether images wait for their consumer or he is at
-  // one.
+  // Of camera 0, for who sets exposures: the pulse of the image handed out last, and whether images
+  // wait for their consumer or he is at one.
   std::atomic<std::uint64_t> looked_at{0};
   std::atomic<int> unseen{0};
   std::atomic<bool> looking{false};
@@ -60,9 +63,13 @@ class MockCamera final : public CameraDevice {
   ~MockCamera() override { stop(); }
 
   const DeviceInfo& info() const noexcept override { return info_; }
-  DeviceStatus configure(const CameraConfiguration& wanted, CameraConfiguration* actual) noexcept override;
-  DeviceStatus set_exposure(const ExposureSetting& wanted, ExposureSetting* actual) noexcept override;
-  DeviceTiming timing() const noexcept override { return {trigger_delay() + configuration_.exposure + kTransfer}; }
+  DeviceStatus configure(const CameraConfiguration& wanted,
+                         CameraConfiguration* actual) noexcept override;
+  DeviceStatus set_exposure(const ExposureSetting& wanted,
+                            ExposureSetting* actual) noexcept override;
+  DeviceTiming timing() const noexcept override {
+    return {trigger_delay() + configuration_.exposure + kTransfer};
+  }
   DeviceStatus start(Notifier* ready) noexcept override;
   DeviceStatus wait(Duration limit, Frame* frame) noexcept override;
   ImageView view(FrameSlot slot) const noexcept override { return pool_->view(slot); }
@@ -73,23 +80,32 @@ class MockCamera final : public CameraDevice {
   // The scheduler's side.
   Stream<Frame, 64> stream;
   std::atomic<std::uint64_t> underruns{0}, lost{0};
-  /// Held (shared) while pictures are planned, rendered and sent: configure() waits for it in real time.
+  /// Held (shared) while pictures are planned, rendered and sent: configure() waits for it in real
+  /// time.
   std::shared_mutex memory;
   /// Of the memory: frames of an older one are nobody's.
-  [[nodiscard]] std::uint32_t generation() const noexcept { return generation_.load(std::memory_order_acquire); }
+  [[nodiscard]] std::uint32_t generation() const noexcept {
+    return generation_.load(std::memory_order_acquire);
+  }
   /// From the edge of a pulse to the start of its exposure.
-  [[nodiscard]] Duration trigger_delay() const noexcept { return rig_->options.trigger_delay[static_cast<std::size_t>(k_)]; }
+  [[nodiscard]] Duration trigger_delay() const noexcept {
+    return rig_->options.trigger_delay[static_cast<std::size_t>(k_)];
+  }
   [[nodiscard]] FramePool& pool() noexcept { return *pool_; }
   /// What an image of that pulse is taken with.
   [[nodiscard]] ExposureSetting setting_at(std::uint64_t pulse) const;
   /// Tells whose pulse the image in a slot is.
-  void label(FrameSlot slot, std::uint64_t pulse) noexcept { pulse_of_[slot].store(pulse, std::memory_order_release); }
+  void label(FrameSlot slot, std::uint64_t pulse) noexcept {
+    pulse_of_[slot].store(pulse, std::memory_order_release);
+  }
   [[nodiscard]] const CameraConfiguration& configuration() const noexcept { return configuration_; }
   [[nodiscard]] const DeviceOscillator& clock() const noexcept { return clock_; }
   /// Image memory, bytes.
   [[nodiscard]] std::size_t bytes() const noexcept { return arena_ ? arena_->capacity() : 0; }
-  /// The picture through this camera's lens, as this sensor gives it, into width x height bytes in rows of the pool's stride.
-  void take(std::span<const Transform> T_camera_enu, std::span<const Transform> T_camera_bus, const Shot& shot, std::uint8_t* out);
+  /// The picture through this camera's lens, as this sensor gives it, into width x height bytes in
+  /// rows of the pool's stride.
+  void take(std::span<const Transform> T_camera_enu, std::span<const Transform> T_camera_bus,
+            const Shot& shot, std::uint8_t* out);
 
  private:
   RigContext* rig_;
@@ -152,7 +168,8 @@ class PulseListener {
   virtual void begin(const TriggerConfiguration& c) = 0;
   /// Twice is harmless.
   virtual void halt() noexcept = 0;
-  /// So many slots of the plan, from that one on, are left out in this boot; slots that were made already are not.
+  /// So many slots of the plan, from that one on, are left out in this boot; slots that were made
+  /// already are not.
   virtual void leave_out(std::uint64_t from, std::uint32_t pulses, std::uint32_t boot) noexcept = 0;
 };
 
@@ -169,11 +186,13 @@ class MockTrigger final : public TriggerDevice {
   ~MockTrigger() override { stop(); }
 
   const DeviceInfo& info() const noexcept override { return info_; }
-  DeviceStatus configure(const TriggerConfiguration& wanted, TriggerConfiguration* actual) noexcept override;
+  DeviceStatus configure(const TriggerConfiguration& wanted,
+                         TriggerConfiguration* actual) noexcept override;
   DeviceTiming timing() const noexcept override { return {kReportLatency}; }
   DeviceStatus start(Notifier* ready) noexcept override;
   DeviceStatus wait(Duration limit, Pulse* pulse) noexcept override;
-  /// From the fourth slot after that of the newest report taken. One that is asked for before the last is over changes nothing.
+  /// From the fourth slot after that of the newest report taken. One that is asked for before the
+  /// last is over changes nothing.
   DeviceStatus pause(std::uint32_t pulses) noexcept override;
   void stop() noexcept override;
   TriggerStatistics statistics() const noexcept override;
@@ -183,7 +202,9 @@ class MockTrigger final : public TriggerDevice {
   Stream<BoardReport, kRing> stream;
   std::atomic<std::uint64_t> overruns{0}, lost{0}, reboots{0};
   [[nodiscard]] const DeviceOscillator& clock() const noexcept { return clock_; }
-  [[nodiscard]] const TriggerConfiguration& configuration() const noexcept { return configuration_; }
+  [[nodiscard]] const TriggerConfiguration& configuration() const noexcept {
+    return configuration_;
+  }
 
  private:
   RigContext* rig_;

@@ -27,6 +27,7 @@ struct Exposure {
 };
 
 /// Pure function of its arguments; the draws of faults with a share come from `seed`.
-[[nodiscard]] Exposure exposure_of(const RigTruth& truth, std::uint64_t seed, const PulseAt& pulse, int camera) noexcept;
+[[nodiscard]] Exposure exposure_of(const RigTruth& truth, std::uint64_t seed, const PulseAt& pulse,
+                                   int camera) noexcept;
 
 }  // namespace vergence::mock

@@ -10,30 +10,35 @@
 namespace vergence::mock {
 
 /// Seeds that differ in their low bits only give streams that have nothing in common.
-[[nodiscard]] inline std::uint64_t mixed(std::uint64_t a, std::uint64_t b) noexcept {  // SplitMix64's finaliser
+[[nodiscard]] inline std::uint64_t mixed(std::uint64_t a,
+                                         std::uint64_t b) noexcept {  // SplitMix64's finaliser
   std::uint64_t z = a + 0x9e3779b97f4a7c15U * (b + 1);
   z = (z ^ (z >> 30U)) * 0xbf58476d1ce4e5b9U;
   z = (z ^ (z >> 27U)) * 0x94d049bb133111ebU;
   return z ^ (z >> 31U);
 }
 
-/// A device's crystal: reads the host's time with an offset and a drift, in whole microseconds; may be set by a fault.
+/// A device's crystal: reads the host's time with an offset and a drift, in whole microseconds; may
+/// be set by a fault.
 struct DeviceOscillator {
   std::int64_t offset = 0;  // ns
   double drift = 0;
   int owner = -1;  // as Fault::camera
 
   /// Each device has its own, up to `drift_ppm` fast or slow.
-  [[nodiscard]] static DeviceOscillator of(std::uint64_t seed, int owner, double drift_ppm) noexcept {
+  [[nodiscard]] static DeviceOscillator of(std::uint64_t seed, int owner,
+                                           double drift_ppm) noexcept {
     Random random(mixed(seed, static_cast<std::uint64_t>(owner) + 10));
     const std::int64_t offset = std::llround(random.uniform(1e9, 1e12));
     return {offset, drift_ppm * 1e-6 * random.uniform(-1, 1), owner};
   }
 
-  [[nodiscard]] DeviceStamp read(HostStamp host, Duration drive_time, const std::vector<Fault>& faults) const noexcept {
+  [[nodiscard]] DeviceStamp read(HostStamp host, Duration drive_time,
+                                 const std::vector<Fault>& faults) const noexcept {
     std::int64_t ns = host.ns() + offset + std::llround(drift * static_cast<double>(host.ns()));
     for (const Fault& f : faults)
-      if (f.kind == FaultKind::time_jump && f.camera == owner && drive_time >= f.at) ns += std::llround(f.jump * 1e9);
+      if (f.kind == FaultKind::time_jump && f.camera == owner && drive_time >= f.at)
+        ns += std::llround(f.jump * 1e9);
     return DeviceStamp(ns / 1000 * 1000);
   }
 };

@@ -12,7 +12,8 @@ bool stops_the_board(const Fault& f) noexcept {
   return f.kind == FaultKind::board_reboot || (f.kind == FaultKind::board_gone && !f.powered);
 }
 
-/// When the board runs again if it does not at that time, else that time; the largest Duration: never.
+/// When the board runs again if it does not at that time, else that time; the largest Duration:
+/// never.
 Duration running_from(const std::vector<Fault>& faults, Duration time) noexcept {
   for (bool again = true; again;) {
     again = false;
@@ -27,18 +28,23 @@ Duration running_from(const std::vector<Fault>& faults, Duration time) noexcept 
 }
 
 bool down_by(const std::vector<Fault>& faults, Duration time) noexcept {
-  return std::any_of(faults.begin(), faults.end(), [&](const Fault& f) { return f.kind == FaultKind::board_gone && f.active(time); });
+  return std::any_of(faults.begin(), faults.end(), [&](const Fault& f) {
+    return f.kind == FaultKind::board_gone && f.active(time);
+  });
 }
 
 }  // namespace
 
-PulsePlan::PulsePlan(const TriggerConfiguration& c, Duration length, const std::vector<Fault>& faults)
+PulsePlan::PulsePlan(const TriggerConfiguration& c, Duration length,
+                     const std::vector<Fault>& faults)
     : period_(Duration::seconds(1 / c.rate_hz)), boots_{Duration{}} {
-  std::uint64_t in_boot = 0;  // intervals since the boot's first pulse, and by how much they were longer than even ones
+  std::uint64_t in_boot =
+      0;  // intervals since the boot's first pulse, and by how much they were longer than even ones
   Duration first{}, longer{};
   for (;;) {
     // From the boot's first pulse: an even train has no sum of rounded intervals.
-    const Duration time = first + Duration::seconds(static_cast<double>(in_boot) / c.rate_hz) + longer;
+    const Duration time =
+        first + Duration::seconds(static_cast<double>(in_boot) / c.rate_hz) + longer;
     if (time > length) break;
     const Duration running = running_from(faults, time);
     if (running > time) {
@@ -50,7 +56,9 @@ PulsePlan::PulsePlan(const TriggerConfiguration& c, Duration length, const std::
       continue;
     }
     slots_.push_back({time, in_boot, static_cast<std::uint32_t>(boots_.size() - 1)});
-    if (c.vary > Duration{}) longer = longer + (trigger_interval_is_longer(static_cast<std::uint32_t>(in_boot)) ? c.vary : -c.vary);
+    if (c.vary > Duration{})
+      longer = longer +
+               (trigger_interval_is_longer(static_cast<std::uint32_t>(in_boot)) ? c.vary : -c.vary);
     ++in_boot;
   }
   std::vector<Duration> edges;
@@ -75,7 +83,8 @@ PulsePlan::Slot PulsePlan::at(std::size_t i) const noexcept {
 }
 
 std::size_t PulsePlan::first_from(Duration time) const noexcept {
-  const auto it = std::lower_bound(slots_.begin(), slots_.end(), time, [](const Slot& s, Duration t) { return s.time < t; });
+  const auto it = std::lower_bound(slots_.begin(), slots_.end(), time,
+                                   [](const Slot& s, Duration t) { return s.time < t; });
   return static_cast<std::size_t>(it - slots_.begin());
 }
 

@@ -8,10 +8,11 @@
 
 namespace vergence::mock {
 
-/// When the mock's board pulses, over a whole drive: rate, varied intervals and its own restarts are known beforehand; only a pause is
-/// asked for while it drives.
+/// When the mock's board pulses, over a whole drive: rate, varied intervals and its own restarts
+/// are known beforehand; only a pause is asked for while it drives.
 ///
-/// Threads  As any value; const after construction but for append(). Time: since the drive's start, by the host's clock.
+/// Threads  As any value; const after construction but for append(). Time: since the drive's start,
+///          by the host's clock.
 class PulsePlan {
  public:
   struct Slot {

@@ -28,7 +28,9 @@ Duration Scheduler::length() const noexcept {
   return rig_.options.duration > Duration{} ? std::min(all, rig_.options.duration) : all;
 }
 
-PulsePlan Scheduler::plan_of(const TriggerConfiguration& c) const { return {c, length(), rig_.truth->faults()}; }
+PulsePlan Scheduler::plan_of(const TriggerConfiguration& c) const {
+  return {c, length(), rig_.truth->faults()};
+}
 
 std::array<PulseExposure, kMaxCameras> Scheduler::feed(HostStamp edge) {
   std::array<PulseExposure, kMaxCameras> exposures{};
@@ -44,8 +46,10 @@ std::array<PulseExposure, kMaxCameras> Scheduler::feed(HostStamp edge) {
     const MockCamera& camera = *cameras_[static_cast<std::size_t>(k)];
     if (!pulsed(k) || unplugged_at(time, k) || !camera.stream.streaming()) continue;
     const Duration begins = camera.trigger_delay();
-    if (exposure_of(*rig_.truth, rig_.options.seed, {slot, time + begins, &fed_}, k).missed) continue;
-    exposures[static_cast<std::size_t>(k)] = {true, begins, begins + camera.configuration().exposure};
+    if (exposure_of(*rig_.truth, rig_.options.seed, {slot, time + begins, &fed_}, k).missed)
+      continue;
+    exposures[static_cast<std::size_t>(k)] = {true, begins,
+                                              begins + camera.configuration().exposure};
   }
   {
     const std::lock_guard lock(feeding_);
@@ -81,7 +85,8 @@ void Scheduler::begin(const TriggerConfiguration& c) {
   fed_ = plan_;
   stop_ = false;
   finished_ = false;
-  constexpr Duration kLead = Duration::milliseconds(100);  // the first pictures are rendered before they are due
+  constexpr Duration kLead =
+      Duration::milliseconds(100);  // the first pictures are rendered before they are due
   if (rig_.options.real_time) start_ = monotonic_now() + kLead;
   rig_.pulsing = true;
   producer_ = std::thread([this] { produce(); });
@@ -106,16 +111,20 @@ void Scheduler::leave_out(std::uint64_t from, std::uint32_t pulses, std::uint32_
   pause_ = {from, from + pulses, boot};
 }
 
-std::uint64_t Scheduler::pulses(double rate_hz) const noexcept { return static_cast<std::uint64_t>(length().to_seconds() * rate_hz) + 1; }
+std::uint64_t Scheduler::pulses(double rate_hz) const noexcept {
+  return static_cast<std::uint64_t>(length().to_seconds() * rate_hz) + 1;
+}
 
-HostStamp Scheduler::jittered(HostStamp least, std::uint64_t device, std::uint64_t number) const noexcept {
+HostStamp Scheduler::jittered(HostStamp least, std::uint64_t device,
+                              std::uint64_t number) const noexcept {
   if (!rig_.options.jitter) return least;
   Random random(mixed(rig_.options.seed, number), device);
   const double late = -static_cast<double>(kJitterMean.ns()) * std::log(1 - random.uniform());
   return least + std::min(kJitterMost, Duration::nanoseconds(std::llround(late)));
 }
 
-// ---- making -------------------------------------------------------------------------------------------------------
+// ---- making
+// -------------------------------------------------------------------------------------------------------
 
 void Scheduler::produce() {
   (void)pthread_setname_np(pthread_self(), "vergence-mock");
@@ -159,7 +168,8 @@ void Scheduler::produce() {
 void Scheduler::wait_for_exposures() {
   while (rig_.options.exposures_follow && !rig_.options.real_time && !stopping()) {
     const std::uint32_t seen = rig_.room.look();
-    if ((rig_.unseen.load() == 0 && !rig_.looking.load()) || !cameras_[0]->stream.streaming()) break;
+    if ((rig_.unseen.load() == 0 && !rig_.looking.load()) || !cameras_[0]->stream.streaming())
+      break;
     rig_.room.wait(seen);
   }
 }
@@ -167,7 +177,8 @@ void Scheduler::wait_for_exposures() {
 /// Not further ahead than two pulses. False: the pulse is over before its pictures are begun.
 bool Scheduler::wait_for_its_turn(std::uint64_t pulse) {
   const Duration period = plan_.period();
-  while (monotonic_now() < host_of(pulse) - period * 2 && !stopping()) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  while (monotonic_now() < host_of(pulse) - period * 2 && !stopping())
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
   return monotonic_now() <= host_of(pulse) + period;
 }
 
@@ -180,7 +191,8 @@ void Scheduler::make_link_events(std::uint64_t pulse) {
     Parcel p;
     p.device = kTriggerDevice;
     p.arrival = start_ + event.time;
-    p.report.what = event.gone ? Delivery<BoardReport>::What::gone : Delivery<BoardReport>::What::back;
+    p.report.what =
+        event.gone ? Delivery<BoardReport>::What::gone : Delivery<BoardReport>::What::back;
     post(p);
   }
 }
@@ -201,12 +213,14 @@ std::uint32_t Scheduler::boot_of(std::uint64_t pulse) const noexcept {
 }
 
 PulseAt Scheduler::pulse_at(std::uint64_t pulse, int k) const noexcept {
-  return {pulse, plan_.at(pulse).time + cameras_[static_cast<std::size_t>(k)]->trigger_delay(), &plan_};
+  return {pulse, plan_.at(pulse).time + cameras_[static_cast<std::size_t>(k)]->trigger_delay(),
+          &plan_};
 }
 
 bool Scheduler::unplugged_at(Duration time, int k) const noexcept {
-  return std::any_of(rig_.truth->faults().begin(), rig_.truth->faults().end(),
-                     [&](const Fault& f) { return f.kind == FaultKind::camera_gone && f.concerns(k) && f.active(time); });
+  return std::any_of(rig_.truth->faults().begin(), rig_.truth->faults().end(), [&](const Fault& f) {
+    return f.kind == FaultKind::camera_gone && f.concerns(k) && f.active(time);
+  });
 }
 
 PulseExposure Scheduler::feedback(std::uint64_t pulse, int k) const {
@@ -214,7 +228,8 @@ PulseExposure Scheduler::feedback(std::uint64_t pulse, int k) const {
   if (!pulsed(k) || unplugged_at(plan_.at(pulse).time, k) || !camera.stream.streaming()) return {};
   if (exposure_of(*rig_.truth, rig_.options.seed, pulse_at(pulse, k), k).missed) return {};
   const auto in_ticks = [](Duration d) { return Duration::microseconds((d.ns() + 500) / 1000); };
-  return {true, in_ticks(camera.trigger_delay()), in_ticks(camera.trigger_delay() + camera.setting_at(pulse).exposure)};
+  return {true, in_ticks(camera.trigger_delay()),
+          in_ticks(camera.trigger_delay() + camera.setting_at(pulse).exposure)};
 }
 
 void Scheduler::make_report(std::uint64_t pulse) {
@@ -228,10 +243,13 @@ void Scheduler::make_report(std::uint64_t pulse) {
   report.boot = boot_of(pulse);
   report.resumed = resumed_ || slot.number == 0;
   resumed_ = false;
-  // A boot's ticks begin with it; those of the first have been running for as long as the clock says.
+  // A boot's ticks begin with it; those of the first have been running for as long as the clock
+  // says.
   const HostStamp booted = start_ + plan_.boot_time(slot.boot);
   report.edge = trigger_->clock().read(edge, slot.time, rig_.truth->faults());
-  if (slot.boot > 0) report.edge = DeviceStamp((report.edge - trigger_->clock().read(booted, slot.time, rig_.truth->faults())).ns());
+  if (slot.boot > 0)
+    report.edge = DeviceStamp(
+        (report.edge - trigger_->clock().read(booted, slot.time, rig_.truth->faults())).ns());
   if (slot.boot > 0 && slot.number == 0) trigger_->reboots.fetch_add(1, std::memory_order_relaxed);
   Duration told{};  // after the edge
   for (int k = 0; k < static_cast<int>(cameras_.size()); ++k) {
@@ -241,7 +259,8 @@ void Scheduler::make_report(std::uint64_t pulse) {
     told = std::max(told, e.seen ? e.end : plan_.at(pulse + 1).time - slot.time - kReportLatency);
   }
   p.arrival = jittered(edge + std::max(told, Duration{}) + kReportLatency, 20, pulse);
-  if (board_.feedback != 0) {        // the report waits for exposures of any length, so the board is asked for its time
+  if (board_.feedback !=
+      0) {  // the report waits for exposures of any length, so the board is asked for its time
     constexpr double kKnown = 20e3;  // ns
     Random random(mixed(rig_.options.seed, pulse), 21);
     report.mapped = true;
@@ -258,12 +277,14 @@ void Scheduler::make_report(std::uint64_t pulse) {
 void Scheduler::make_readings(HostStamp until) {
   if (!ins_.stream.streaming()) return;
   for (;; ++readings_) {
-    const HostStamp at = start_ + Duration::seconds(static_cast<double>(readings_) / ins_.rate_hz());
+    const HostStamp at =
+        start_ + Duration::seconds(static_cast<double>(readings_) / ins_.rate_hz());
     if (at >= until) return;
     const Duration time = at - start_;
     InsSample sample = ins_.model().sample(readings_, time);
     bool silent = false;
-    for (const Fault& f : rig_.truth->faults()) silent = silent || (f.kind == FaultKind::ins_gone && f.active(time));
+    for (const Fault& f : rig_.truth->faults())
+      silent = silent || (f.kind == FaultKind::ins_gone && f.active(time));
     if (silent) {
       ins_.lost.fetch_add(1, std::memory_order_relaxed);
       continue;
@@ -281,12 +302,14 @@ void Scheduler::make_frames(std::uint64_t pulse) {
   std::array<Shooting, kMaxCameras> shootings;
   std::size_t count = 0;
   std::array<std::shared_lock<std::shared_mutex>, kMaxCameras> memories;
-  for (std::size_t k = 0; k < cameras_.size(); ++k) memories[k] = std::shared_lock(cameras_[k]->memory);
+  for (std::size_t k = 0; k < cameras_.size(); ++k)
+    memories[k] = std::shared_lock(cameras_[k]->memory);
   for (int k = 0; k < static_cast<int>(cameras_.size()); ++k) {
     if (!present(pulse, k)) continue;
     if (const auto shooting = plan(pulse, k)) shootings[count++] = *shooting;
   }
-  // Each camera renders with its own memory. A thread that lives for one pulse costs a thousandth of a picture.
+  // Each camera renders with its own memory. A thread that lives for one pulse costs a thousandth
+  // of a picture.
   const auto render_every_other = [&](std::size_t first) {
     for (std::size_t i = first; i < count; i += 2) render(shootings[i]);
   };
@@ -329,7 +352,8 @@ std::optional<FrameSlot> Scheduler::slot_of(int k) {
     }
     if (const auto slot = camera.pool().acquire()) return slot;
     // Slots that only time will free are not waited for: late frames hold them.
-    const bool held_by_delay = senders_[static_cast<std::size_t>(k)].on_the_way.load() > static_cast<int>(MockRig::kSlots) / 2;
+    const bool held_by_delay = senders_[static_cast<std::size_t>(k)].on_the_way.load() >
+                               static_cast<int>(MockRig::kSlots) / 2;
     if (rig_.options.real_time || held_by_delay || !camera.stream.streaming()) return std::nullopt;
     rig_.room.wait(seen);
   }
@@ -368,9 +392,13 @@ void Scheduler::send(std::uint64_t pulse, const Shooting& shooting) {
   p.device = shooting.camera;
   p.generation = camera.generation();
   p.arrival = jittered(begins + open + kTransfer, k, pulse) + shooting.exposure.delay;
-  p.frame.value = {
-      shooting.slot,         pulse - sender.counter_base, camera.clock().read(begins, plan_.at(pulse).time, rig_.truth->faults()), {}, open,
-      FrameStatus::complete, shooting.setting.gain_db};
+  p.frame.value = {shooting.slot,
+                   pulse - sender.counter_base,
+                   camera.clock().read(begins, plan_.at(pulse).time, rig_.truth->faults()),
+                   {},
+                   open,
+                   FrameStatus::complete,
+                   shooting.setting.gain_db};
   camera.label(shooting.slot, pulse);
   std::optional<FrameSlot> copy;
   if (shooting.exposure.twice) copy = camera.pool().acquire();
@@ -394,22 +422,27 @@ void Scheduler::render(const Shooting& shooting) {
   const ExposureSetting& c = shooting.setting;
   std::vector<Transform> way, bus;
   for (int i = 0; i < rig_.options.blur_samples; ++i) {
-    const Duration at = exposure.time + Duration::seconds((i + 0.5) / rig_.options.blur_samples * c.exposure.to_seconds());
+    const Duration at = exposure.time + Duration::seconds((i + 0.5) / rig_.options.blur_samples *
+                                                          c.exposure.to_seconds());
     way.push_back(rig_.truth->camera_in_enu(exposure.camera, at).inverse());
     if (const auto T_enu_bus = rig_.truth->bus_in_enu(at)) bus.push_back(way.back() * *T_enu_bus);
   }
   if (bus.size() != way.size()) bus.clear();  // it comes or goes amid the exposure
   Shot shot;
-  shot.exposure = exposure.brightness * c.exposure.to_seconds() / kNominalExposure.to_seconds() * std::pow(10.0, c.gain_db / 20);
+  shot.exposure = exposure.brightness * c.exposure.to_seconds() / kNominalExposure.to_seconds() *
+                  std::pow(10.0, c.gain_db / 20);
   if (rig_.options.noise) {
-    const std::uint64_t picture = exposure.pulse * kMaxCameras + static_cast<std::uint64_t>(exposure.camera);
+    const std::uint64_t picture =
+        exposure.pulse * kMaxCameras + static_cast<std::uint64_t>(exposure.camera);
     shot.noise_seed = static_cast<std::uint32_t>(mixed(rig_.options.seed, picture)) | 1U;
   }
   // Through the lens of the camera that sees it, into the memory of the one that sends it.
-  cameras_[static_cast<std::size_t>(exposure.camera)]->take(way, bus, shot, sender.pool().writable(shooting.slot).data());
+  cameras_[static_cast<std::size_t>(exposure.camera)]->take(
+      way, bus, shot, sender.pool().writable(shooting.slot).data());
 }
 
-// ---- handing out --------------------------------------------------------------------------------------------------
+// ---- handing out
+// --------------------------------------------------------------------------------------------------
 
 void Scheduler::announce_end(HostStamp at) {
   for (int device = kTriggerDevice; device < static_cast<int>(cameras_.size()); ++device) {
@@ -449,7 +482,8 @@ void Scheduler::hand_out_in_time() {
       continue;
     }
     const HostStamp now = monotonic_now();
-    const bool end = parcels_.top().frame.what == Delivery<Frame>::What::end;  // after the last delivery nothing is waited for
+    const bool end = parcels_.top().frame.what ==
+                     Delivery<Frame>::What::end;  // after the last delivery nothing is waited for
     if (parcels_.top().arrival > now && !end) {
       (void)posted_.wait_for(lock, std::chrono::nanoseconds((parcels_.top().arrival - now).ns()));
       continue;
@@ -479,13 +513,15 @@ void Scheduler::deliver(const Parcel& parcel, HostStamp arrival) {
     d.arrival = arrival;
     d.value.pulse.arrival = arrival;
     // Nobody needs to take the reports; the latest that find no room are counted.
-    if (trigger_->stream.streaming() && !trigger_->stream.push(d)) trigger_->overruns.fetch_add(1, std::memory_order_relaxed);
+    if (trigger_->stream.streaming() && !trigger_->stream.push(d))
+      trigger_->overruns.fetch_add(1, std::memory_order_relaxed);
     return;
   }
   if (parcel.device == kInsDevice) {
     Delivery<InsReading> d = parcel.reading;
     d.arrival = arrival;
-    if (rig_.options.real_time && ins_.stream.full()) ins_.overruns.fetch_add(1, std::memory_order_relaxed);
+    if (rig_.options.real_time && ins_.stream.full())
+      ins_.overruns.fetch_add(1, std::memory_order_relaxed);
     (void)push_or_wait(&ins_.stream, d);
     return;
   }

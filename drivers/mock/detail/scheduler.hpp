@@ -19,12 +19,13 @@ namespace vergence::mock {
 
 /// Makes what the devices deliver, pulse after pulse, and hands it out in the order of arrival.
 ///
-/// Threads  begin(), halt(): the owner's. One thread makes everything, a second one renders every other camera; in real time another hands
-///          out what is due.
-/// Time     Virtual: what is made before the next pulse is delivered before it, and the producer waits for room. Real: a pulse that is
-///          over before its pictures are begun has none.
-/// Pauses   Virtual, with reports_taken: slot n is made once every report that arrives before it was taken. Who asks at the report of slot
-///          m, before taking the next, finds slot m + 4 not made: the report of m + 1 is here within two periods of its pulse.
+/// Threads  begin(), halt(): the owner's. One thread makes everything, a second one renders every
+///          other camera; in real time another hands out what is due.
+/// Time     Virtual: what is made before the next pulse is delivered before it, and the producer
+///          waits for room. Real: a pulse that is over before its pictures are begun has none.
+/// Pauses   Virtual, with reports_taken: slot n is made once every report that arrives before it
+///          was taken. Who asks at the report of slot m, before taking the next, finds slot m + 4
+///          not made: the report of m + 1 is here within two periods of its pulse.
 class Scheduler final : public PulseListener {
  public:
   /// All of it outlives the scheduler; `trigger` is given by attach().
@@ -54,8 +55,9 @@ class Scheduler final : public PulseListener {
     Delivery<Frame> frame{};
     Delivery<InsReading> reading{};
     Delivery<BoardReport> report{};
-    std::uint32_t generation = 0;                                   // of the camera's memory that the frame is in
-    [[nodiscard]] bool operator<(const Parcel& o) const noexcept {  // the queue's top is the earliest
+    std::uint32_t generation = 0;  // of the camera's memory that the frame is in
+    [[nodiscard]] bool operator<(
+        const Parcel& o) const noexcept {  // the queue's top is the earliest
       return std::pair(arrival, order) > std::pair(o.arrival, o.order);
     }
   };
@@ -64,7 +66,8 @@ class Scheduler final : public PulseListener {
     bool unplugged = false;
     std::uint64_t counter_base = 0;  // of the slot less what the camera counts
     std::atomic<int> on_the_way{0};  // frames in parcels_
-    std::vector<FrameSlot> spare;    // of frames nobody was there for, of that generation; under mutex_
+    std::vector<FrameSlot>
+        spare;  // of frames nobody was there for, of that generation; under mutex_
     std::uint32_t spare_generation = 0;
   };
   struct Shooting {
@@ -78,7 +81,8 @@ class Scheduler final : public PulseListener {
     std::uint32_t boot = 0;           // of Pulse; 0: the first
   };
   static constexpr int kInsDevice = -1, kTriggerDevice = -2;
-  static constexpr HostStamp kVirtualStart{1'000'000'000'000};  // 1000 s after a machine's start, on every run
+  static constexpr HostStamp kVirtualStart{
+      1'000'000'000'000};  // 1000 s after a machine's start, on every run
 
   void produce();
   /// Whether there is a slot n. Fed: once the one after it is known too, or that there is none.
@@ -91,7 +95,9 @@ class Scheduler final : public PulseListener {
   void make_report(std::uint64_t pulse);
   /// What the feedback line of camera k tells of this pulse.
   [[nodiscard]] PulseExposure feedback(std::uint64_t pulse, int k) const;
-  [[nodiscard]] bool pulsed(int k) const noexcept { return (board_.lines >> static_cast<unsigned>(k) & 1U) != 0; }
+  [[nodiscard]] bool pulsed(int k) const noexcept {
+    return (board_.lines >> static_cast<unsigned>(k) & 1U) != 0;
+  }
   [[nodiscard]] bool unplugged_at(Duration time, int k) const noexcept;
   [[nodiscard]] PulseAt pulse_at(std::uint64_t pulse, int k) const noexcept;
   [[nodiscard]] std::uint32_t boot_of(std::uint64_t pulse) const noexcept;
@@ -111,8 +117,11 @@ class Scheduler final : public PulseListener {
   template <class S, class D>
   [[nodiscard]] bool push_or_wait(S* stream, const D& delivery);  // false: nobody takes it
   [[nodiscard]] std::optional<FrameSlot> slot_of(int k);
-  [[nodiscard]] HostStamp jittered(HostStamp least, std::uint64_t device, std::uint64_t number) const noexcept;
-  [[nodiscard]] HostStamp host_of(std::uint64_t pulse) const noexcept { return start_ + plan_.at(pulse).time; }
+  [[nodiscard]] HostStamp jittered(HostStamp least, std::uint64_t device,
+                                   std::uint64_t number) const noexcept;
+  [[nodiscard]] HostStamp host_of(std::uint64_t pulse) const noexcept {
+    return start_ + plan_.at(pulse).time;
+  }
   [[nodiscard]] bool stopping() const noexcept { return stop_.load(std::memory_order_acquire); }
 
   RigContext& rig_;

@@ -19,32 +19,38 @@ BoardSimulator::BoardSimulator(PulseSource pulses, const BoardSimulatorOptions& 
     : pulses_(std::move(pulses)), options_(options), end_(options.power_on + options.duration) {
   start(options_.power_on);
   if (options_.pps) plan_pps(options_.power_on);
-  if (options_.ins_interval > Duration{}) plan_edge({options_.power_on + options_.ins_interval, board_input_ins, true});
+  if (options_.ins_interval > Duration{})
+    plan_edge({options_.power_on + options_.ins_interval, board_input_ins, true});
   plan();
 }
 
-// ---- its clock ------------------------------------------------------------------------------------------------------
+// ---- its clock
+// ------------------------------------------------------------------------------------------------------
 
 double BoardSimulator::counts_since_power_on(HostStamp host) const noexcept {
   const double t = (host - options_.power_on).to_seconds();
   const double turn = 2 * std::numbers::pi / options_.wander_period.to_seconds();
-  const double ahead = options_.clock_ppm * t + options_.wander_ppm * (1 - std::cos(turn * t)) / turn;
+  const double ahead =
+      options_.clock_ppm * t + options_.wander_ppm * (1 - std::cos(turn * t)) / turn;
   return static_cast<double>(options_.counts_hz) * (t + 1e-6 * ahead);
 }
 
 std::uint64_t BoardSimulator::count_at(HostStamp host) const noexcept {
-  return static_cast<std::uint64_t>(std::max(0.0, std::floor(counts_since_power_on(host) - zero_counts_)));
+  return static_cast<std::uint64_t>(
+      std::max(0.0, std::floor(counts_since_power_on(host) - zero_counts_)));
 }
 
 HostStamp BoardSimulator::host_at(std::uint64_t count) const noexcept {
   const double wanted = zero_counts_ + static_cast<double>(count);
   HostStamp host = options_.power_on + Duration::seconds(wanted / options_.counts_hz);
   // Each turn leaves a part in ten thousand of the error, the crystal's.
-  for (int i = 0; i < 4; ++i) host = host + Duration::seconds((wanted - counts_since_power_on(host)) / options_.counts_hz);
+  for (int i = 0; i < 4; ++i)
+    host = host + Duration::seconds((wanted - counts_since_power_on(host)) / options_.counts_hz);
   return host;
 }
 
-// ---- its life -------------------------------------------------------------------------------------------------------
+// ---- its life
+// -------------------------------------------------------------------------------------------------------
 
 void BoardSimulator::start(HostStamp at) {
   BoardDescription d{};
@@ -147,7 +153,8 @@ void BoardSimulator::take_edge(const Edge& edge) {
     else
       plan_pps(edge.at);
   } else if (edge.input == board_input_ins) {
-    plan_edge({edge.at + (edge.rising ? kSyncWidth : options_.ins_interval - kSyncWidth), board_input_ins, !edge.rising});
+    plan_edge({edge.at + (edge.rising ? kSyncWidth : options_.ins_interval - kSyncWidth),
+               board_input_ins, !edge.rising});
   }
 }
 
@@ -163,7 +170,8 @@ void BoardSimulator::plan_pps(HostStamp after) {
   plan_edge({at, board_input_pps, true});
 }
 
-// ---- its line -------------------------------------------------------------------------------------------------------
+// ---- its line
+// -------------------------------------------------------------------------------------------------------
 
 void BoardSimulator::receive(std::span<const std::uint8_t> bytes, HostStamp at) {
   advance(at);
@@ -185,7 +193,8 @@ void BoardSimulator::produce(HostStamp at, std::vector<std::uint8_t>* out) {
     line_free_ = at + byte_time() * static_cast<std::int64_t>(size);
     // A start that comes while the frame is on the wire ends it there.
     if (reboots_done_ < options_.reboots.size() && options_.reboots[reboots_done_] < line_free_)
-      size = std::min(size, static_cast<std::size_t>((options_.reboots[reboots_done_] - at).ns() / byte_time().ns()));
+      size = std::min(size, static_cast<std::size_t>((options_.reboots[reboots_done_] - at).ns() /
+                                                     byte_time().ns()));
     out->insert(out->end(), frame.begin(), frame.begin() + static_cast<std::ptrdiff_t>(size));
   }
   plan();

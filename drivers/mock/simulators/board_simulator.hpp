@@ -20,30 +20,34 @@ struct SimulatedPulse {
   std::uint8_t lines = 0;  // mask of those that were pulsed
 };
 
-/// What a camera's exposure-active output does after a pulse, by the host's clock. No earlier than the edge.
+/// What a camera's exposure-active output does after a pulse, by the host's clock. No earlier than
+/// the edge.
 struct SimulatedExposure {
   bool happens = false;
   HostStamp start{}, end{};
 };
 using SimulatedExposures = std::array<SimulatedExposure, trigger_max_lines>;
 
-/// Told of every pulse as its edge is made, in order; returns what the cameras on the lines do. Called by whoever reads the board's line.
+/// Told of every pulse as its edge is made, in order; returns what the cameras on the lines do.
+/// Called by whoever reads the board's line.
 using PulseSource = std::function<SimulatedExposures(const SimulatedPulse& pulse)>;
 
 struct BoardSimulatorOptions {
   std::uint32_t baud = 921600;
-  std::uint32_t counts_hz = 84'000'000;             // of its timer, by its crystal …
-  double clock_ppm = 20;                            // … which is this fast against the host's clock …
-  double wander_ppm = 0;                            // … and swings by this …
+  std::uint32_t counts_hz = 84'000'000;  // of its timer, by its crystal …
+  double clock_ppm = 20;                 // … which is this fast against the host's clock …
+  double wander_ppm = 0;                 // … and swings by this …
   Duration wander_period = Duration::seconds(600);  // … in this time
   std::uint8_t lines = 4, feedback_inputs = 4;
   bool has_pps = true, has_ins = true;
-  std::array<std::uint8_t, 12> serial{0x30, 0, 0x2B, 0, 0x0B, 0x51, 0x33, 0x36, 0x34, 0x39, 0x31, 0x38};
+  std::array<std::uint8_t, 12> serial{0x30, 0,    0x2B, 0,    0x0B, 0x51,
+                                      0x33, 0x36, 0x34, 0x39, 0x31, 0x38};
   HostStamp power_on{};
   Duration duration = Duration::seconds(7 * 86400);  // nothing is sent and no pulse made after it
   Duration boot_time = Duration::milliseconds(20);   // deaf and mute after a start
-  std::vector<HostStamp> reboots{};                  // it begins anew, by itself, in mid-frame if need be; ascending
-  bool pps = false;                                  // a GNSS receiver is wired: an edge every whole second of the host's clock
+  std::vector<HostStamp>
+      reboots{};     // it begins anew, by itself, in mid-frame if need be; ascending
+  bool pps = false;  // a GNSS receiver is wired: an edge every whole second of the host's clock
   std::vector<std::pair<HostStamp, HostStamp>> pps_gaps{};
   Duration ins_interval{};  // of the INS' SyncOut; 0: not wired
   std::uint64_t seed = 1;
@@ -51,8 +55,9 @@ struct BoardSimulatorOptions {
 
 /// A trigger board at byte level: the reference firmware's own state machine on simulated hardware.
 ///
-/// The hardware is a timer on a drifting crystal that makes pulses and stamps edges to a count, and a UART. What firmware spends on the way
-/// is not simulated. Pulses go on while nobody is connected.
+/// The hardware is a timer on a drifting crystal that makes pulses and stamps edges to a count, and
+/// a UART. What firmware spends on the way is not simulated. Pulses go on while nobody is
+/// connected.
 /// Threads  As DeviceModel; the PulseSource is called on that thread.
 class BoardSimulator final : public DeviceModel {
  public:
@@ -81,7 +86,9 @@ class BoardSimulator final : public DeviceModel {
   [[nodiscard]] double counts_since_power_on(HostStamp host) const noexcept;
   [[nodiscard]] std::uint64_t count_at(HostStamp host) const noexcept;
   [[nodiscard]] HostStamp host_at(std::uint64_t count) const noexcept;
-  [[nodiscard]] Duration byte_time() const noexcept { return Duration::nanoseconds(10'000'000'000 / options_.baud); }
+  [[nodiscard]] Duration byte_time() const noexcept {
+    return Duration::nanoseconds(10'000'000'000 / options_.baud);
+  }
   void start(HostStamp at);
   void advance(HostStamp until);
   void serve(HostStamp at);

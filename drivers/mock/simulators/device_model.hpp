@@ -8,8 +8,8 @@
 
 namespace vergence::mock {
 
-/// A device at the far end of a simulated serial line: bytes in, bytes out, at times of the host's clock (which the device does not know;
-/// its own clock is the model's affair).
+/// A device at the far end of a simulated serial line: bytes in, bytes out, at times of the host's
+/// clock (which the device does not know; its own clock is the model's affair).
 ///
 /// Threads  One caller. Time: calls come in the order of their times.
 class DeviceModel {

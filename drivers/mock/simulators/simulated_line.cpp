@@ -32,7 +32,10 @@ HostStamp monotonic() noexcept {
 class SimulatedPlace::World {
  public:
   World(std::shared_ptr<DeviceModel> device, const SimulatedLineOptions& options)
-      : device_(std::move(device)), options_(options), random_(options.seed, 62), now_(options.real_time ? monotonic() : options.start) {
+      : device_(std::move(device)),
+        options_(options),
+        random_(options.seed, 62),
+        now_(options.real_time ? monotonic() : options.start) {
     next_frame_ = now_ + Duration::nanoseconds(random_.below(1'000'000));
     last_packet_ = now_;
   }
@@ -43,12 +46,14 @@ class SimulatedPlace::World {
 
   [[nodiscard]] const SimulatedLineOptions& options() const noexcept { return options_; }
   [[nodiscard]] HostStamp now() const noexcept { return options_.real_time ? monotonic() : now_; }
-  [[nodiscard]] bool unplugged() const noexcept { return outage_ < options_.outages.size() && now_ >= options_.outages[outage_].from; }
+  [[nodiscard]] bool unplugged() const noexcept {
+    return outage_ < options_.outages.size() && now_ >= options_.outages[outage_].from;
+  }
   [[nodiscard]] std::size_t outages_begun() const noexcept { return outages_begun_; }
   [[nodiscard]] bool anything_readable() const noexcept { return !ready_.empty(); }
   [[nodiscard]] bool ended() const {
-    return device_->ended() && on_wire_.empty() && chip_.empty() && frozen_.empty() && transfer_.empty() && arriving_.empty() &&
-           ready_.empty();
+    return device_->ended() && on_wire_.empty() && chip_.empty() && frozen_.empty() &&
+           transfer_.empty() && arriving_.empty() && ready_.empty();
   }
 
   /// Lets time pass until `until`, or until bytes can be read or the line is cut.
@@ -69,8 +74,9 @@ class SimulatedPlace::World {
     return n;
   }
   void send(std::span<const std::uint8_t> bytes) {
-    const HostStamp begin =
-        std::max(now_ + options_.transfer + late(options_.sent_late_fraction, options_.sent_late_mean), host_line_free_);
+    const HostStamp begin = std::max(
+        now_ + options_.transfer + late(options_.sent_late_fraction, options_.sent_late_mean),
+        host_line_free_);
     host_line_free_ = begin + byte_time(host_baud_) * static_cast<std::int64_t>(bytes.size());
     to_device_.push_back({host_line_free_, {bytes.begin(), bytes.end()}});
   }
@@ -102,18 +108,30 @@ class SimulatedPlace::World {
     std::vector<std::uint8_t> bytes;
   };
 
-  [[nodiscard]] static Duration byte_time(std::uint32_t baud) noexcept { return Duration::nanoseconds(10'000'000'000 / baud); }
+  [[nodiscard]] static Duration byte_time(std::uint32_t baud) noexcept {
+    return Duration::nanoseconds(10'000'000'000 / baud);
+  }
 
   /// The earliest thing that happens by `until`; false: nothing any more, and now_ is `until`.
   bool step(HostStamp until) {
-    enum class What : std::uint8_t { nothing, arrival, outage, command, produce, byte, timer, frame } what = What::nothing;
+    enum class What : std::uint8_t {
+      nothing,
+      arrival,
+      outage,
+      command,
+      produce,
+      byte,
+      timer,
+      frame
+    } what = What::nothing;
     HostStamp at = until;
     const auto consider = [&](HostStamp t, What w) {
       if (t < at || (t == at && what == What::nothing)) at = std::max(t, now_), what = w;
     };
     if (!arriving_.empty()) consider(arriving_.front().at, What::arrival);
     if (outage_ < options_.outages.size())
-      consider(outage_begun_ ? options_.outages[outage_].to : options_.outages[outage_].from, What::outage);
+      consider(outage_begun_ ? options_.outages[outage_].to : options_.outages[outage_].from,
+               What::outage);
     if (!to_device_.empty()) consider(to_device_.front().at, What::command);
     if (const auto next = device_->next()) consider(*next, What::produce);
     if (!on_wire_.empty()) consider(on_wire_.front().done, What::byte);
@@ -152,8 +170,8 @@ class SimulatedPlace::World {
   }
 
   [[nodiscard]] Duration timer() const noexcept {
-    return Duration::nanoseconds(
-        std::llround(static_cast<double>(options_.latency_timer.ns()) * (1 + 1e-6 * options_.converter_clock_ppm)));
+    return Duration::nanoseconds(std::llround(static_cast<double>(options_.latency_timer.ns()) *
+                                              (1 + 1e-6 * options_.converter_clock_ppm)));
   }
 
   void change_outage() {
@@ -196,7 +214,8 @@ class SimulatedPlace::World {
     std::uint8_t value = on_wire_.front().value;
     on_wire_.pop_front();
     if (outage_begun_ || !open_) return;
-    if (options_.corrupt > 0 && random_.uniform() < options_.corrupt) value ^= static_cast<std::uint8_t>(1U << random_.below(8));
+    if (options_.corrupt > 0 && random_.uniform() < options_.corrupt)
+      value ^= static_cast<std::uint8_t>(1U << random_.below(8));
     if (options_.converter) {
       chip_.push_back(value);
       return;
@@ -206,7 +225,8 @@ class SimulatedPlace::World {
     if (transfer_.size() >= options_.fifo || on_wire_.empty()) complete_transfer();
   }
 
-  /// The latency timer has run out: what is there now goes with the next frame, what comes later does not.
+  /// The latency timer has run out: what is there now goes with the next frame, what comes later
+  /// does not.
   void freeze() {
     timer_fired_ = true;
     if (chip_.size() >= kPacketBytes) return;
@@ -242,13 +262,15 @@ class SimulatedPlace::World {
   }
 
   void arrive(std::vector<std::uint8_t> bytes) {
-    last_arrival_ = std::max(last_arrival_, now_ + options_.transfer + late(options_.late_fraction, options_.late_mean));
+    last_arrival_ = std::max(
+        last_arrival_, now_ + options_.transfer + late(options_.late_fraction, options_.late_mean));
     arriving_.push_back({last_arrival_, std::move(bytes)});
   }
 
   [[nodiscard]] Duration late(double fraction, Duration mean) noexcept {
     if (!(fraction > 0 && random_.uniform() < fraction)) return {};
-    return Duration::nanoseconds(std::llround(-std::log(1 - random_.uniform()) * static_cast<double>(mean.ns())));
+    return Duration::nanoseconds(
+        std::llround(-std::log(1 - random_.uniform()) * static_cast<double>(mean.ns())));
   }
 
   void garble(std::vector<std::uint8_t>* bytes) {
@@ -276,7 +298,8 @@ namespace {
 
 class SimulatedLine final : public ByteLine {
  public:
-  explicit SimulatedLine(std::shared_ptr<SimulatedPlace::World> world) : world_(std::move(world)), outages_(world_->outages_begun()) {
+  explicit SimulatedLine(std::shared_ptr<SimulatedPlace::World> world)
+      : world_(std::move(world)), outages_(world_->outages_begun()) {
     world_->set_open(true);
   }
   SimulatedLine(const SimulatedLine&) = delete;
@@ -298,7 +321,8 @@ class SimulatedLine final : public ByteLine {
       if (world_->anything_readable()) return {DeviceStatus::ok, world_->take(out), now};
       if (world_->ended()) return {DeviceStatus::ended, 0, now};
       if (now >= deadline) return {DeviceStatus::timeout, 0, {}};
-      constexpr Duration kLook = Duration::milliseconds(1);  // a USB frame: nothing arrives more often
+      constexpr Duration kLook =
+          Duration::milliseconds(1);  // a USB frame: nothing arrives more often
       const Duration wait = std::min(kLook, deadline - now);
       (void)world_->woken_up.wait_for(lock, std::chrono::nanoseconds(wait.ns()));
     }
@@ -343,7 +367,8 @@ class SimulatedLine final : public ByteLine {
 
 }  // namespace
 
-SimulatedPlace::SimulatedPlace(std::shared_ptr<DeviceModel> device, const SimulatedLineOptions& options)
+SimulatedPlace::SimulatedPlace(std::shared_ptr<DeviceModel> device,
+                               const SimulatedLineOptions& options)
     : world_(std::make_shared<World>(std::move(device), options)) {}
 SimulatedPlace::~SimulatedPlace() = default;
 
@@ -359,7 +384,9 @@ std::unique_ptr<ByteLine> SimulatedPlace::open(const LineSettings& settings, Dev
   return std::make_unique<SimulatedLine>(world_);
 }
 
-Duration SimulatedPlace::latency_timer() const { return world_->options().converter ? world_->options().latency_timer : Duration{}; }
+Duration SimulatedPlace::latency_timer() const {
+  return world_->options().converter ? world_->options().latency_timer : Duration{};
+}
 
 bool SimulatedPlace::pass(Duration time) {
   const std::lock_guard lock(world_->mutex);

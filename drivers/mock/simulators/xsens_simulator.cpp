@@ -12,7 +12,8 @@ using namespace xbus;
 constexpr Duration kAnswerTime = Duration::milliseconds(1);
 constexpr Duration kWakeTime = Duration::milliseconds(500);  // that a host has to answer a wake-up
 constexpr Duration kStartTime = Duration::milliseconds(20);  // from power to the first byte
-constexpr std::array<std::uint16_t, 15> kRates{1, 2, 4, 5, 8, 10, 16, 20, 25, 40, 50, 80, 100, 200, 400};  // Hz, of an MTi-G-700/710
+constexpr std::array<std::uint16_t, 15> kRates{
+    1, 2, 4, 5, 8, 10, 16, 20, 25, 40, 50, 80, 100, 200, 400};  // Hz, of an MTi-G-700/710
 
 std::uint8_t id_of(MessageId id) noexcept { return static_cast<std::uint8_t>(id); }
 
@@ -26,8 +27,12 @@ std::uint16_t rate_taken(std::uint16_t asked) noexcept {
 
 OutputConfiguration factory_outputs() noexcept {
   OutputConfiguration o;
-  for (const OutputEntry e :
-       {OutputEntry{0x1020, kEveryMessage}, {0x1060, kEveryMessage}, {0x2030, 100}, {0x4020, 100}, {0x8020, 100}, {0xE020, kEveryMessage}})
+  for (const OutputEntry e : {OutputEntry{0x1020, kEveryMessage},
+                              {0x1060, kEveryMessage},
+                              {0x2030, 100},
+                              {0x4020, 100},
+                              {0x8020, 100},
+                              {0xE020, kEveryMessage}})
     (void)o.add(e);
   return o;
 }
@@ -52,15 +57,18 @@ XsensSimulator::XsensSimulator(InsSource source, const XsensSimulatorOptions& op
 }
 
 HostStamp XsensSimulator::host_time(std::int64_t ns) const noexcept {
-  return options_.power_on + Duration::nanoseconds(std::llround(static_cast<double>(ns) / (1 + 1e-6 * options_.clock_ppm)));
+  return options_.power_on + Duration::nanoseconds(std::llround(static_cast<double>(ns) /
+                                                                (1 + 1e-6 * options_.clock_ppm)));
 }
 
 std::int64_t XsensSimulator::device_ns(HostStamp host) const noexcept {
-  return std::llround(static_cast<double>((host - options_.power_on).ns()) * (1 + 1e-6 * options_.clock_ppm));
+  return std::llround(static_cast<double>((host - options_.power_on).ns()) *
+                      (1 + 1e-6 * options_.clock_ppm));
 }
 
 std::int64_t XsensSimulator::period_ns() const noexcept {
-  if (legacy()) return static_cast<std::int64_t>(period_) * (skip_ + 1) * 1'000'000'000 / kPeriodClock;
+  if (legacy())
+    return static_cast<std::int64_t>(period_) * (skip_ + 1) * 1'000'000'000 / kPeriodClock;
   std::uint16_t rate = 0;
   for (const OutputEntry& e : outputs_.items())
     if (e.rate_hz != kEveryMessage && (e.id & 0xF000U) != 0x7000U) rate = std::max(rate, e.rate_hz);
@@ -69,7 +77,8 @@ std::int64_t XsensSimulator::period_ns() const noexcept {
 
 double XsensSimulator::rate_hz() const noexcept { return 1e9 / static_cast<double>(period_ns()); }
 
-// ---- states ---------------------------------------------------------------------------------------------------------
+// ---- states
+// ---------------------------------------------------------------------------------------------------------
 
 void XsensSimulator::wake(HostStamp at) {
   baud_ = stored_baud_;
@@ -95,9 +104,12 @@ void XsensSimulator::power_cycle(HostStamp at) {
   wake(now_);
 }
 
-bool XsensSimulator::ended() const { return now_ > options_.power_on + options_.duration && outgoing_.empty(); }
+bool XsensSimulator::ended() const {
+  return now_ > options_.power_on + options_.duration && outgoing_.empty();
+}
 
-// ---- what the host says ---------------------------------------------------------------------------------------------
+// ---- what the host says
+// ---------------------------------------------------------------------------------------------
 
 void XsensSimulator::receive(std::span<const std::uint8_t> bytes, HostStamp at) {
   now_ = std::max(now_, at);
@@ -107,7 +119,9 @@ void XsensSimulator::receive(std::span<const std::uint8_t> bytes, HostStamp at) 
   }
 }
 
-void XsensSimulator::answer(std::uint8_t id, std::span<const std::uint8_t> payload) { send(now_ + kAnswerTime, id, payload); }
+void XsensSimulator::answer(std::uint8_t id, std::span<const std::uint8_t> payload) {
+  send(now_ + kAnswerTime, id, payload);
+}
 
 void XsensSimulator::refuse(std::uint8_t code) {
   ++writes_.refused;
@@ -119,7 +133,8 @@ void XsensSimulator::send(HostStamp at, std::uint8_t id, std::span<const std::ui
   const WrittenFrame w = write_frame({kBusMaster, id, payload}, frame);
   Outgoing o{at, {frame.begin(), frame.begin() + static_cast<std::ptrdiff_t>(w.size)}};
   // In order of their times, the earlier said first among equals.
-  const auto place = std::upper_bound(outgoing_.begin(), outgoing_.end(), at, [](HostStamp t, const Outgoing& e) { return t < e.at; });
+  const auto place = std::upper_bound(outgoing_.begin(), outgoing_.end(), at,
+                                      [](HostStamp t, const Outgoing& e) { return t < e.at; });
   outgoing_.insert(place, std::move(o));
 }
 
@@ -145,7 +160,8 @@ void XsensSimulator::handle_setting(const Message& m) {
   std::array<std::uint8_t, kMaxPayload> payload{};
   switch (static_cast<MessageId>(m.id)) {
     case MessageId::go_to_measurement: {
-      const double load = legacy() ? line_budget(layout_, rate_hz(), baud_).load : line_budget(outputs_, baud_).load;
+      const double load = legacy() ? line_budget(layout_, rate_hz(), baud_).load
+                                   : line_budget(outputs_, baud_).load;
       constexpr std::uint8_t kTooMuch = 0x29;
       if (load > 1) return refuse(kTooMuch);
       if (legacy()) send_configuration(now_ + kAnswerTime);
@@ -158,7 +174,8 @@ void XsensSimulator::handle_setting(const Message& m) {
       write_u32(payload, options_.device_id);
       return answer(m.id + 1, std::span(payload).first(4));
     case MessageId::product_code_request: {
-      constexpr std::string_view kLegacyCode = "MTi-G-28A53G35      ", kCode = "MTI-G-710-2A8G4     ";
+      constexpr std::string_view kLegacyCode = "MTi-G-28A53G35      ",
+                                 kCode = "MTI-G-710-2A8G4     ";
       const std::string_view code = legacy() ? kLegacyCode : kCode;
       std::copy(code.begin(), code.end(), payload.begin());
       return answer(m.id + 1, std::span(payload).first(code.size()));
@@ -179,7 +196,8 @@ void XsensSimulator::handle_setting(const Message& m) {
         ++writes_.baud;
       }
       payload[0] = baud_code(stored_baud_, options_.generation).value_or(0);
-      return answer(m.id + 1, m.payload.size() == 1 ? std::span<const std::uint8_t>{} : std::span(payload).first(1));
+      return answer(m.id + 1, m.payload.size() == 1 ? std::span<const std::uint8_t>{}
+                                                    : std::span(payload).first(1));
     }
     default:
       return legacy() ? handle_legacy(m) : handle_mark4(m);
@@ -202,7 +220,8 @@ void XsensSimulator::handle_legacy(const Message& m) {
   std::array<std::uint8_t, 8> payload{};
   switch (static_cast<MessageId>(m.id)) {
     case MessageId::period:
-      if (m.payload.size() == 2 && (read_u16(m.payload) < 225 || read_u16(m.payload) > 11520)) return refuse(0x03);
+      if (m.payload.size() == 2 && (read_u16(m.payload) < 225 || read_u16(m.payload) > 11520))
+        return refuse(0x03);
       return answer_u16(m, &period_, &writes_.period);
     case MessageId::output_skip:
       return answer_u16(m, &skip_, &writes_.skip);
@@ -230,7 +249,8 @@ void XsensSimulator::handle_legacy(const Message& m) {
         return answer(m.id + 1, {});
       }
       if (m.payload.size() != 1 || m.payload[0] > 3) return refuse(kErrorParameter);
-      const std::size_t n = write_legacy_sync(static_cast<LegacySync>(m.payload[0]), settings[m.payload[0]], payload);
+      const std::size_t n =
+          write_legacy_sync(static_cast<LegacySync>(m.payload[0]), settings[m.payload[0]], payload);
       return answer(m.id + 1, std::span(payload).first(n));
     }
     default:
@@ -246,11 +266,13 @@ void XsensSimulator::handle_mark4(const Message& m) {
       if (!m.payload.empty()) {
         if (!read_output_configuration(m.payload, &asked)) return refuse(kErrorParameter);
         for (std::size_t i = 0; i < asked.count; ++i)
-          if (asked.entries[i].rate_hz != kEveryMessage) asked.entries[i].rate_hz = rate_taken(asked.entries[i].rate_hz);
+          if (asked.entries[i].rate_hz != kEveryMessage)
+            asked.entries[i].rate_hz = rate_taken(asked.entries[i].rate_hz);
         outputs_ = asked;
         ++writes_.outputs;
       }
-      return answer(m.id + 1, std::span(payload).first(write_output_configuration(outputs_, payload)));
+      return answer(m.id + 1,
+                    std::span(payload).first(write_output_configuration(outputs_, payload)));
     }
     case MessageId::sync_settings:
       if (!m.payload.empty()) {
@@ -290,7 +312,8 @@ void XsensSimulator::send_configuration(HostStamp at) {
   send(at, id_of(MessageId::configuration), payload);
 }
 
-// ---- what it measures -----------------------------------------------------------------------------------------------
+// ---- what it measures
+// -----------------------------------------------------------------------------------------------
 
 std::optional<HostStamp> XsensSimulator::next() const {
   std::optional<HostStamp> first;
@@ -300,10 +323,12 @@ std::optional<HostStamp> XsensSimulator::next() const {
   if (!outgoing_.empty()) consider(outgoing_.front().at);
   if (reset_at_) consider(*reset_at_);
   if (mode_ == Mode::waking) consider(waits_for_host_until_);
-  if (mode_ == Mode::measuring && sample_at_ <= options_.power_on + options_.duration) consider(sample_at_);
+  if (mode_ == Mode::measuring && sample_at_ <= options_.power_on + options_.duration)
+    consider(sample_at_);
   if (dips_done_ < options_.dips.size()) consider(options_.dips[dips_done_]);
   if (silences_done_ < options_.silences.size()) consider(options_.silences[silences_done_]);
-  if (!first && now_ <= options_.power_on + options_.duration) consider(options_.power_on + options_.duration + Duration::nanoseconds(1));
+  if (!first && now_ <= options_.power_on + options_.duration)
+    consider(options_.power_on + options_.duration + Duration::nanoseconds(1));
   return first;
 }
 
@@ -342,8 +367,10 @@ void XsensSimulator::take_sample() {
   taken.sample = source_(samples_++, sample_at_ - options_.power_on);
   sample_times_.push_back(sample_ns_);
   if (sample_times_.size() > kRemembered) sample_times_.pop_front();
-  const HostStamp ready = sample_at_ + options_.processing +
-                          Duration::nanoseconds(std::llround(random_.uniform() * static_cast<double>(options_.processing_jitter.ns())));
+  const HostStamp ready =
+      sample_at_ + options_.processing +
+      Duration::nanoseconds(
+          std::llround(random_.uniform() * static_cast<double>(options_.processing_jitter.ns())));
   if (legacy())
     send_legacy(taken, ready);
   else
@@ -362,7 +389,8 @@ namespace {
 
 using Matrix = std::array<std::array<double, 3>, 3>;
 
-/// v_local = M v_enu, row by row: written out so that the driver's way through quaternions is checked against another.
+/// v_local = M v_enu, row by row: written out so that the driver's way through quaternions is
+/// checked against another.
 Matrix local_from_enu(LocalFrame frame) noexcept {
   switch (frame) {
     case LocalFrame::ned:
@@ -418,7 +446,8 @@ std::array<double, 4> quaternion_of(const Matrix& R) noexcept {
 
 Three euler_deg_of(const Matrix& R) noexcept {
   constexpr double kDegree = 180 / 3.14159265358979323846;
-  return {kDegree * std::atan2(R[2][1], R[2][2]), -kDegree * std::asin(std::clamp(R[2][0], -1.0, 1.0)),
+  return {kDegree * std::atan2(R[2][1], R[2][2]),
+          -kDegree * std::asin(std::clamp(R[2][0], -1.0, 1.0)),
           kDegree * std::atan2(R[1][0], R[0][0])};
 }
 
@@ -460,7 +489,8 @@ void XsensSimulator::send_legacy(const Taken& now, HostStamp at) {
   d.status = static_cast<std::uint8_t>(status_of(s) & 0x7U);
   d.sample_counter = counter_++;
   d.utc = utc_of_unix_ns(options_.unix_ns_at_power_on + now.device_ns, 7);
-  fix_age_ = sample_ns_ >= next_fix_ns_ ? std::uint8_t{0} : static_cast<std::uint8_t>(std::min(255, fix_age_ + 1));
+  fix_age_ = sample_ns_ >= next_fix_ns_ ? std::uint8_t{0}
+                                        : static_cast<std::uint8_t>(std::min(255, fix_age_ + 1));
   if (sample_ns_ >= next_fix_ns_) next_fix_ns_ += options_.fix_interval.ns();
   LegacyFix f;
   constexpr double kSeaLevel = 101325;
@@ -473,7 +503,8 @@ void XsensSimulator::send_legacy(const Taken& now, HostStamp at) {
   f.velocity_north_cm_s = rounded(then.velocity_enu[1] * 1e2);
   f.velocity_east_cm_s = rounded(then.velocity_enu[0] * 1e2);
   f.velocity_down_cm_s = rounded(-then.velocity_enu[2] * 1e2);
-  f.horizontal_accuracy_mm = static_cast<std::uint32_t>(rounded(then.position_sigma * std::sqrt(2.0) * 1e3));
+  f.horizontal_accuracy_mm =
+      static_cast<std::uint32_t>(rounded(then.position_sigma * std::sqrt(2.0) * 1e3));
   f.vertical_accuracy_mm = static_cast<std::uint32_t>(rounded(then.height_sigma * 1e3));
   f.speed_accuracy_cm_s = static_cast<std::uint32_t>(rounded(then.velocity_sigma * 1e2));
   f.age = fix_age_;
@@ -483,7 +514,8 @@ void XsensSimulator::send_legacy(const Taken& now, HostStamp at) {
 }
 
 void XsensSimulator::put_stamps(std::int64_t sample_ns, PacketWriter* packets) {
-  const auto ticks = static_cast<std::uint64_t>((sample_ns - clock_zero_ns_) / 100'000) + options_.first_sample_time;
+  const auto ticks = static_cast<std::uint64_t>((sample_ns - clock_zero_ns_) / 100'000) +
+                     options_.first_sample_time;
   for (const OutputEntry& e : outputs_.items()) {
     if (e.rate_hz != kEveryMessage) continue;
     switch (packet_id(e.id)) {
@@ -508,7 +540,8 @@ void XsensSimulator::send_mark4(const Taken& now, HostStamp at) {
   PacketWriter packets(buffer);
   const InsSample& s = now.sample;
   put_stamps(now.device_ns, &packets);
-  const bool place = s.fix != FixStatus::none && !(options_.missing_position > 0 && random_.uniform() < options_.missing_position);
+  const bool place = s.fix != FixStatus::none && !(options_.missing_position > 0 &&
+                                                   random_.uniform() < options_.missing_position);
   for (const OutputEntry& e : outputs_.items()) {
     const auto frame = static_cast<LocalFrame>((e.id >> 2U) & 3U);
     switch (packet_id(e.id)) {
@@ -528,7 +561,8 @@ void XsensSimulator::send_mark4(const Taken& now, HostStamp at) {
         packets.put_numbers(e.id, Three{});
         break;
       case PacketId::latitude_longitude:
-        if (place) packets.put_numbers(e.id, std::array{s.position.latitude_deg, s.position.longitude_deg});
+        if (place)
+          packets.put_numbers(e.id, std::array{s.position.latitude_deg, s.position.longitude_deg});
         break;
       case PacketId::altitude_ellipsoid:
         if (place) packets.put_numbers(e.id, std::array{s.position.height_m});
@@ -537,7 +571,9 @@ void XsensSimulator::send_mark4(const Taken& now, HostStamp at) {
         if (place) packets.put_numbers(e.id, in_frame(frame, s.velocity_enu));
         break;
       case PacketId::status_word:
-        packets.put_u32(e.id, status_of(s) | (sync_out_within(sample_ns_ - period_ns(), sample_ns_) ? kStatusSyncOutMarker : 0U));
+        packets.put_u32(e.id, status_of(s) | (sync_out_within(sample_ns_ - period_ns(), sample_ns_)
+                                                  ? kStatusSyncOutMarker
+                                                  : 0U));
         break;
       case PacketId::status_byte:
         packets.put(e.id, std::array{static_cast<std::uint8_t>(status_of(s))});
@@ -551,14 +587,16 @@ void XsensSimulator::send_mark4(const Taken& now, HostStamp at) {
 
 void XsensSimulator::send_fix(HostStamp at) {
   bool wanted = false;
-  for (const OutputEntry& e : outputs_.items()) wanted = wanted || packet_id(e.id) == PacketId::gnss_pvt;
+  for (const OutputEntry& e : outputs_.items())
+    wanted = wanted || packet_id(e.id) == PacketId::gnss_pvt;
   if (!wanted) return;
   const Taken& then = history_.front();
   const InsSample& s = then.sample;
   const Utc utc = utc_of_unix_ns(options_.unix_ns_at_power_on + then.device_ns, 7);
   GnssPvt p;
   p.itow_ms = static_cast<std::uint32_t>(then.device_ns / 1'000'000);
-  p.year = utc.year, p.month = utc.month, p.day = utc.day, p.hour = utc.hour, p.minute = utc.minute, p.second = utc.second;
+  p.year = utc.year, p.month = utc.month, p.day = utc.day, p.hour = utc.hour, p.minute = utc.minute,
+  p.second = utc.second;
   p.nanosecond = static_cast<std::int32_t>(utc.nanosecond);
   p.valid = 0x37;  // bits beyond the documented ones are set, too
   p.fix = s.fix == FixStatus::fix_3d ? 3 : s.fix == FixStatus::fix_2d ? 2 : 0;
@@ -568,7 +606,9 @@ void XsensSimulator::send_fix(HostStamp at) {
   p.latitude_1e7_deg = rounded(s.position.latitude_deg * 1e7);
   p.height_ellipsoid_mm = rounded(s.position.height_m * 1e3);
   p.height_msl_mm = p.height_ellipsoid_mm - 38'000;
-  const auto accuracy = [&p](double sigma) { return p.fix > 1 ? static_cast<std::uint32_t>(rounded(sigma * 1e3)) : 0xFFFFFFFFU; };
+  const auto accuracy = [&p](double sigma) {
+    return p.fix > 1 ? static_cast<std::uint32_t>(rounded(sigma * 1e3)) : 0xFFFFFFFFU;
+  };
   p.horizontal_accuracy_mm = accuracy(s.position_sigma * std::sqrt(2.0));
   p.vertical_accuracy_mm = accuracy(s.height_sigma);
   p.speed_accuracy_mm_s = accuracy(s.velocity_sigma);
@@ -584,7 +624,8 @@ void XsensSimulator::send_fix(HostStamp at) {
 
 bool XsensSimulator::sync_out_within(std::int64_t from_ns, std::int64_t to_ns) const noexcept {
   for (const SyncEntry& e : sync_.items()) {
-    if (e.function != kSyncIntervalTransition || e.line != kSyncLineOut || e.polarity == 0) continue;
+    if (e.function != kSyncIntervalTransition || e.line != kSyncLineOut || e.polarity == 0)
+      continue;
     const auto period = static_cast<std::int64_t>(1e9 / kSyncOutBase) * (e.skip + 1);
     if (to_ns / period != from_ns / period) return true;
   }

@@ -15,7 +15,8 @@ constexpr double kLane = 1.9;         // m left of the centreline: traffic keeps
 constexpr double kArcStep = 0.1;      // m between samples of the speed profile
 constexpr double kTurnRadius = 10.0;  // m
 
-// ---- the way ------------------------------------------------------------------------------------------------------
+// ---- the way
+// ------------------------------------------------------------------------------------------------------
 
 struct Route {
   std::vector<Vec2> corners;  // of the polyline; turned with kTurnRadius
@@ -26,9 +27,18 @@ Route route_of(DriveKind kind) {
   constexpr double X = kStreetSpacingX, Y = kStreetSpacingY, o = kLane;
   switch (kind) {
     case DriveKind::loop:
-      return {{{-o, 40}, {-o, 2 * Y + o}, {2 * X + o, 2 * Y + o}, {2 * X + o, -o}, {-o, -o}, {-o, 46}}, {285.0, 700.0}};
+      return {
+          {{-o, 40}, {-o, 2 * Y + o}, {2 * X + o, 2 * Y + o}, {2 * X + o, -o}, {-o, -o}, {-o, 46}},
+          {285.0, 700.0}};
     case DriveKind::figure_eight:
-      return {{{X - o, 40}, {X - o, 2 * Y + o}, {2 * X + o, 2 * Y + o}, {2 * X + o, Y - o}, {o, Y - o}, {o, o}, {X - o, o}, {X - o, 46}},
+      return {{{X - o, 40},
+               {X - o, 2 * Y + o},
+               {2 * X + o, 2 * Y + o},
+               {2 * X + o, Y - o},
+               {o, Y - o},
+               {o, o},
+               {X - o, o},
+               {X - o, 46}},
               {40.0, 420.0}};
     case DriveKind::straight:
       return {{{-90, 2 * Y + o}, {390, 2 * Y + o}}, {226.0}};
@@ -56,7 +66,8 @@ class Path {
       const double turn = std::atan2(d.x() * e.y() - d.y() * e.x(), d.dot(e));
       const double tangent = kTurnRadius * std::tan(0.5 * std::abs(turn));
       line(at, heading, (corners[i] - tangent * d - at).norm());
-      pieces_.push_back({length_, corners[i] - tangent * d, heading, turn > 0 ? 1 / kTurnRadius : -1 / kTurnRadius});
+      pieces_.push_back({length_, corners[i] - tangent * d, heading,
+                         turn > 0 ? 1 / kTurnRadius : -1 / kTurnRadius});
       length_ += kTurnRadius * std::abs(turn);
       at = corners[i] + tangent * e;
     }
@@ -78,7 +89,8 @@ class Path {
     const Vec2 forward(std::cos(p.heading), std::sin(p.heading)), left(-forward.y(), forward.x());
     if (p.curvature == 0) return {p.position + along * forward, heading, 0};
     const double angle = p.curvature * along;
-    return {p.position + (std::sin(angle) * forward + (1 - std::cos(angle)) * left) / p.curvature, heading + angle, p.curvature};
+    return {p.position + (std::sin(angle) * forward + (1 - std::cos(angle)) * left) / p.curvature,
+            heading + angle, p.curvature};
   }
   [[nodiscard]] double length() const { return length_; }
 
@@ -96,10 +108,13 @@ class Path {
   double length_ = 0;
 };
 
-// ---- the driver ---------------------------------------------------------------------------------------------------
+// ---- the driver
+// ---------------------------------------------------------------------------------------------------
 
-/// Distance driven at every kDriveStep: the fastest way along the path within the limits, with pauses.
-std::vector<double> distances(const Path& path, const std::vector<double>& stops, const DriveOptions& o) {
+/// Distance driven at every kDriveStep: the fastest way along the path within the limits, with
+/// pauses.
+std::vector<double> distances(const Path& path, const std::vector<double>& stops,
+                              const DriveOptions& o) {
   const auto n = static_cast<std::size_t>(path.length() / kArcStep) + 1;
   const double step = path.length() / static_cast<double>(n);
   std::vector<double> v2(n + 1);
@@ -111,8 +126,10 @@ std::vector<double> distances(const Path& path, const std::vector<double>& stops
   for (const double s : stops) halts.push_back(static_cast<std::size_t>(s / step));
   std::sort(halts.begin(), halts.end());
   for (const std::size_t h : halts) v2[h] = 0;
-  for (std::size_t i = 1; i <= n; ++i) v2[i] = std::min(v2[i], v2[i - 1] + 2 * o.acceleration * step);
-  for (std::size_t i = n; i-- > 0;) v2[i] = std::min(v2[i], v2[i + 1] + 2 * 1.3 * o.acceleration * step);
+  for (std::size_t i = 1; i <= n; ++i)
+    v2[i] = std::min(v2[i], v2[i - 1] + 2 * o.acceleration * step);
+  for (std::size_t i = n; i-- > 0;)
+    v2[i] = std::min(v2[i], v2[i + 1] + 2 * 1.3 * o.acceleration * step);
 
   const double dt = kDriveStep.to_seconds();
   std::vector<double> out;
@@ -151,20 +168,23 @@ std::vector<double> smoothed(const std::vector<double>& in, double sigma_s) {
   for (std::ptrdiff_t i = 0; i <= last; ++i) {
     double v = 0;
     for (std::ptrdiff_t k = -reach; k <= reach; ++k)
-      v += kernel[static_cast<std::size_t>(k + reach)] * in[static_cast<std::size_t>(std::clamp<std::ptrdiff_t>(i + k, 0, last))];
+      v += kernel[static_cast<std::size_t>(k + reach)] *
+           in[static_cast<std::size_t>(std::clamp<std::ptrdiff_t>(i + k, 0, last))];
     out[static_cast<std::size_t>(i)] = v / sum;
   }
   return out;
 }
 
-// ---- the springs --------------------------------------------------------------------------------------------------
+// ---- the springs
+// --------------------------------------------------------------------------------------------------
 
 /// A sum of sines with random phases: smooth, bounded, without memory.
 class Unrest {
  public:
   Unrest(Random* random, double low_hz, double high_hz, double amplitude) {
     for (Wave& w : waves_)
-      w = {2 * kPi * random->uniform(low_hz, high_hz), random->uniform(0, 2 * kPi), amplitude * random->uniform(0.25, 0.55)};
+      w = {2 * kPi * random->uniform(low_hz, high_hz), random->uniform(0, 2 * kPi),
+           amplitude * random->uniform(0.25, 0.55)};
   }
   [[nodiscard]] double at(double t) const noexcept {
     double sum = 0;
@@ -182,8 +202,8 @@ class Unrest {
 const DriveOptions& checked(const DriveOptions& o) {
   const auto in = [](double v, double lo, double hi, const char* name) {
     if (!(v >= lo && v <= hi))
-      throw std::invalid_argument(std::string("mock drive: ") + name + " must be between " + std::to_string(lo) + " and " +
-                                  std::to_string(hi));
+      throw std::invalid_argument(std::string("mock drive: ") + name + " must be between " +
+                                  std::to_string(lo) + " and " + std::to_string(hi));
   };
   in(o.speed, 1, 20, "speed");
   in(o.acceleration, 0.3, 4, "acceleration");
@@ -224,8 +244,10 @@ Drive::Drive(const DriveOptions& options, const World& world) : options_(checked
 
   Random random(options_.seed, 30);
   const double degree = kPi / 180;
-  const Unrest pitch(&random, 0.5, 1.9, 0.22 * degree * options_.suspension), roll(&random, 0.4, 1.6, 0.25 * degree * options_.suspension);
-  const Unrest heave(&random, 0.6, 2.0, 0.011 * options_.suspension), wander(&random, 0.05, 0.3, 0.10);
+  const Unrest pitch(&random, 0.5, 1.9, 0.22 * degree * options_.suspension),
+      roll(&random, 0.4, 1.6, 0.25 * degree * options_.suspension);
+  const Unrest heave(&random, 0.6, 2.0, 0.011 * options_.suspension),
+      wander(&random, 0.05, 0.3, 0.10);
   const Unrest shake_pitch(&random, 6, 12, 0.018 * degree * options_.vibration),
       shake_roll(&random, 6, 12, 0.018 * degree * options_.vibration);
   const Unrest shake_heave(&random, 6, 12, 0.0006 * options_.vibration);
@@ -235,28 +257,37 @@ Drive::Drive(const DriveOptions& options, const World& world) : options_(checked
   control_.resize(n);
   for (std::size_t i = 0; i < n; ++i) {
     const std::size_t a = i == 0 ? 0 : i - 1, b = std::min(i + 1, n - 1);
-    const double t = static_cast<double>(i) * dt, v = (s[b] - s[a]) / (2 * dt), forward = (s[b] - 2 * s[i] + s[a]) / (dt * dt);
+    const double t = static_cast<double>(i) * dt, v = (s[b] - s[a]) / (2 * dt),
+                 forward = (s[b] - 2 * s[i] + s[a]) / (dt * dt);
     const double lively = v * v / (v * v + 4.0);  // nothing shakes a standing body
     const double c = std::cos(yaw[i]), sn = std::sin(yaw[i]), slope = world.ground_slope(x[i]);
     // Across the lane the driver wanders a little.
     const double across = lively * wander.at(t);
     Control& p = control_[i];
-    p << x[i] - across * sn, y[i] + across * c, world.ground(x[i], y[i]) + lively * (heave.at(t) + shake_heave.at(t)), yaw[i],
-        std::atan(slope * c) + options_.suspension * kSpring * forward + lively * (pitch.at(t) + shake_pitch.at(t)),
-        std::atan(-slope * sn) + options_.suspension * kSpring * v * v * curvature[i] + lively * (roll.at(t) + shake_roll.at(t));
+    p << x[i] - across * sn, y[i] + across * c,
+        world.ground(x[i], y[i]) + lively * (heave.at(t) + shake_heave.at(t)), yaw[i],
+        std::atan(slope * c) + options_.suspension * kSpring * forward +
+            lively * (pitch.at(t) + shake_pitch.at(t)),
+        std::atan(-slope * sn) + options_.suspension * kSpring * v * v * curvature[i] +
+            lively * (roll.at(t) + shake_roll.at(t));
   }
 }
 
-Duration Drive::duration() const noexcept { return kDriveStep * static_cast<std::int64_t>(control_.size() - 1); }
+Duration Drive::duration() const noexcept {
+  return kDriveStep * static_cast<std::int64_t>(control_.size() - 1);
+}
 
 BodyState Drive::at(Duration time) const noexcept {
   const std::int64_t last = static_cast<std::int64_t>(control_.size()) - 1;
   const std::int64_t ns = std::clamp<std::int64_t>(time.ns(), 0, kDriveStep.ns() * last);
   const std::int64_t cell = std::min(ns / kDriveStep.ns(), last - 1);
-  const double u = static_cast<double>(ns - cell * kDriveStep.ns()) / static_cast<double>(kDriveStep.ns());
-  // Uniform quintic B-spline: six basis polynomials over one cell, coefficients of u⁰ … u⁵ times 120.
-  constexpr double kBasis[6][6] = {{1, -5, 10, -10, 5, -1},    {26, -50, 20, 20, -20, 5}, {66, 0, -60, 0, 30, -10},
-                                   {26, 50, 20, -20, -20, 10}, {1, 5, 10, 10, 5, -5},     {0, 0, 0, 0, 0, 1}};
+  const double u =
+      static_cast<double>(ns - cell * kDriveStep.ns()) / static_cast<double>(kDriveStep.ns());
+  // Uniform quintic B-spline: six basis polynomials over one cell, coefficients of u⁰ … u⁵ times
+  // 120.
+  constexpr double kBasis[6][6] = {{1, -5, 10, -10, 5, -1},  {26, -50, 20, 20, -20, 5},
+                                   {66, 0, -60, 0, 30, -10}, {26, 50, 20, -20, -20, 10},
+                                   {1, 5, 10, 10, 5, -5},    {0, 0, 0, 0, 0, 1}};
   Control p = Control::Zero(), d1 = Control::Zero(), d2 = Control::Zero();
   for (int k = 0; k < 6; ++k) {
     double w = 0, w1 = 0, w2 = 0;
@@ -265,7 +296,8 @@ BodyState Drive::at(Duration time) const noexcept {
       w1 = w1 * u + w;
       w = w * u + kBasis[k][j];
     }
-    const Control& c = control_[static_cast<std::size_t>(std::clamp<std::int64_t>(cell + k - 2, 0, last))];
+    const Control& c =
+        control_[static_cast<std::size_t>(std::clamp<std::int64_t>(cell + k - 2, 0, last))];
     p += w / 120 * c;
     d1 += w1 / 120 * c;
     d2 += 2 * w2 / 120 * c;
@@ -277,12 +309,14 @@ BodyState Drive::at(Duration time) const noexcept {
   BodyState state;
   // R = Rz(yaw) Ry(−pitch) Rx(roll)
   const double yaw = p[3], theta = -p[4], roll = p[5];
-  state.T_enu_body.R = exp_so3(Vec3(0, 0, yaw)) * exp_so3(Vec3(0, theta, 0)) * exp_so3(Vec3(roll, 0, 0));
+  state.T_enu_body.R =
+      exp_so3(Vec3(0, 0, yaw)) * exp_so3(Vec3(0, theta, 0)) * exp_so3(Vec3(roll, 0, 0));
   state.T_enu_body.t = p.head<3>();
   state.velocity = d1.head<3>();
   state.acceleration = d2.head<3>();
   const double st = std::sin(theta), ct = std::cos(theta), sr = std::sin(roll), cr = std::cos(roll);
-  state.angular_rate = {d1[5] - st * d1[3], -cr * d1[4] + sr * ct * d1[3], sr * d1[4] + cr * ct * d1[3]};
+  state.angular_rate = {d1[5] - st * d1[3], -cr * d1[4] + sr * ct * d1[3],
+                        sr * d1[4] + cr * ct * d1[3]};
   return state;
 }
 
@@ -301,7 +335,7 @@ bool parse(const std::string& name, DriveKind* kind) noexcept {
 }
 
 Transform camera_mount(const Vec3& position_body, double tilt_down) noexcept {
-  Mat3 R;                                             // columns: the camera's right, down, forward in body axes
+  Mat3 R;  // columns: the camera's right, down, forward in body axes
   R << 0, -std::sin(tilt_down), std::cos(tilt_down),  //
       -1, 0, 0,                                       //
       0, -std::cos(tilt_down), -std::sin(tilt_down);

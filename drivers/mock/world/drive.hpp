@@ -26,7 +26,7 @@ struct DriveOptions {
   double lateral = 2.6;       // m/s², in corners; 0.5..5
   double suspension = 1.0;    // gain on pitch, roll and heave of the springs; 0: rigid; up to 3
   double vibration = 1.0;     // gain on the shake at 6–12 Hz; 0: none; up to 5
-  double stop_s = 3.0;        // s, length of each stop on the way, and of the standing start and end
+  double stop_s = 3.0;  // s, length of each stop on the way, and of the standing start and end
 };
 
 /// The vehicle at an instant.
@@ -41,12 +41,14 @@ struct BodyState {
 
 /// Where the vehicle truly is at any time: the measure of everything in a mock session.
 ///
-/// Method     Position and attitude angles are uniform quintic B-splines (C⁴) over control points every kDriveStep, which
-///            come from a path of lines and arcs, a speed profile with limited acceleration, the ground's height and a
-///            sprung body's unrest. The spline is the truth: sampled exactly, differentiated exactly.
+/// Method     Position and attitude angles are uniform quintic B-splines (C⁴) over control points
+///            every kDriveStep, which come from a path of lines and arcs, a speed profile with
+///            limited acceleration, the ground's height and a sprung body's unrest. The spline is
+///            the truth: sampled exactly, differentiated exactly.
 /// Time       Since the drive's start. Before it and after its end the vehicle stands.
 /// Threads    Const after construction.
-/// Errors     The constructor throws std::invalid_argument naming the option out of range. at() cannot fail.
+/// Errors     The constructor throws std::invalid_argument naming the option out of range. at()
+///            cannot fail.
 class Drive {
  public:
   Drive(const DriveOptions& options, const World& world);
@@ -57,25 +59,33 @@ class Drive {
   [[nodiscard]] const DriveOptions& options() const noexcept { return options_; }
 
  private:
-  using Control = Eigen::Matrix<double, 6, 1>;  // x y z (m), yaw, pitch (nose up), roll (left side up), rad
+  using Control =
+      Eigen::Matrix<double, 6, 1>;  // x y z (m), yaw, pitch (nose up), roll (left side up), rad
   DriveOptions options_;
   std::vector<Control> control_;
   double length_ = 0;
 };
 
-inline constexpr Duration kDriveStep = Duration::milliseconds(20);  // between control points: holds what moves up to 12 Hz
+inline constexpr Duration kDriveStep =
+    Duration::milliseconds(20);  // between control points: holds what moves up to 12 Hz
 
-/// "loop", "figure-eight", "straight", "brief", "still" → kind. False: no such kind, *kind untouched.
+/// "loop", "figure-eight", "straight", "brief", "still" → kind. False: no such kind, *kind
+/// untouched.
 [[nodiscard]] bool parse(const std::string& name, DriveKind* kind) noexcept;
 
-/// Camera on the vehicle: at `position_body` (m), looking forward, tilted down by `tilt_down` (rad). p_body = T · p_camera.
+/// Camera on the vehicle: at `position_body` (m), looking forward, tilted down by `tilt_down`
+/// (rad). p_body = T · p_camera.
 [[nodiscard]] Transform camera_mount(const Vec3& position_body, double tilt_down) noexcept;
 
 /// T_body_left of the default rack: 1.7 m above the ground, level.
-[[nodiscard]] inline Transform default_T_body_left() noexcept { return camera_mount({1.2, 0.375, 1.7}, 0.0); }
+[[nodiscard]] inline Transform default_T_body_left() noexcept {
+  return camera_mount({1.2, 0.375, 1.7}, 0.0);
+}
 
-/// What a renderer asks for: p_camera = T_camera_enu · p_enu, from where the body is and where the camera sits on it.
-[[nodiscard]] inline Transform camera_pose(const BodyState& body, const Transform& T_body_camera) noexcept {
+/// What a renderer asks for: p_camera = T_camera_enu · p_enu, from where the body is and where the
+/// camera sits on it.
+[[nodiscard]] inline Transform camera_pose(const BodyState& body,
+                                           const Transform& T_body_camera) noexcept {
   return (body.T_enu_body * T_body_camera).inverse();
 }
 

@@ -17,9 +17,11 @@ constexpr float kHaze = 205.0F;                  // grey levels, the sky above t
 }  // namespace
 
 struct Renderer::Impl {
-  Impl(std::shared_ptr<const World> w, const Camera& c, Pattern p) : world(std::move(w)), camera(c), pattern(p), tiles(c) {
+  Impl(std::shared_ptr<const World> w, const Camera& c, Pattern p)
+      : world(std::move(w)), camera(c), pattern(p), tiles(c) {
     stride = static_cast<std::ptrdiff_t>(tiles.columns) * kTile;
-    brightness.resize(static_cast<std::size_t>(stride) * static_cast<std::size_t>(tiles.rows) * kTile);
+    brightness.resize(static_cast<std::size_t>(stride) * static_cast<std::size_t>(tiles.rows) *
+                      kTile);
   }
 
   void add_pose(const Transform& T_camera_enu, const Transform* T_camera_bus, float weight) {
@@ -42,7 +44,8 @@ struct Renderer::Impl {
 
   [[nodiscard]] std::ptrdiff_t offset(std::size_t tile) const noexcept {
     const auto columns = static_cast<std::size_t>(tiles.columns);
-    return static_cast<std::ptrdiff_t>(tile / columns) * kTile * stride + static_cast<std::ptrdiff_t>(tile % columns) * kTile;
+    return static_cast<std::ptrdiff_t>(tile / columns) * kTile * stride +
+           static_cast<std::ptrdiff_t>(tile % columns) * kTile;
   }
 
   std::shared_ptr<const World> world;
@@ -59,7 +62,8 @@ namespace {
 const Camera& checked(const Camera& camera) {
   const Intrinsics& k = camera.intrinsics();
   if (k.width <= 0 || k.height <= 0 || !(k.fx > 0) || !(k.fy > 0))
-    throw std::invalid_argument("mock camera: the image size and the focal lengths must be positive");
+    throw std::invalid_argument(
+        "mock camera: the image size and the focal lengths must be positive");
   return camera;
 }
 
@@ -73,13 +77,14 @@ Renderer& Renderer::operator=(Renderer&&) noexcept = default;
 
 const Camera& Renderer::camera() const noexcept { return impl_->camera; }
 
-void Renderer::render(std::span<const Transform> T_camera_enu, const Shot& shot, std::uint8_t* out, std::ptrdiff_t stride,
-                      std::span<const Transform> T_camera_bus) {
+void Renderer::render(std::span<const Transform> T_camera_enu, const Shot& shot, std::uint8_t* out,
+                      std::ptrdiff_t stride, std::span<const Transform> T_camera_bus) {
   assert(T_camera_bus.empty() || T_camera_bus.size() == T_camera_enu.size());
   Impl& m = *impl_;
   std::fill(m.brightness.begin(), m.brightness.end(), 0.0F);
   for (std::size_t i = 0; i < T_camera_enu.size(); ++i)
-    m.add_pose(T_camera_enu[i], T_camera_bus.empty() ? nullptr : &T_camera_bus[i], 1.0F / static_cast<float>(T_camera_enu.size()));
+    m.add_pose(T_camera_enu[i], T_camera_bus.empty() ? nullptr : &T_camera_bus[i],
+               1.0F / static_cast<float>(T_camera_enu.size()));
 
   SensorInput sensor;
   sensor.exposure = static_cast<float>(shot.exposure);
@@ -94,8 +99,9 @@ void Renderer::render(std::span<const Transform> T_camera_enu, const Shot& shot,
     const int y0 = static_cast<int>(tile / static_cast<std::size_t>(m.tiles.columns)) * kTile;
     sensor.ray_x = m.tiles.x.data() + tile * kTilePixels;
     sensor.ray_y = m.tiles.y.data() + tile * kTilePixels;
-    expose_tile(sensor, m.brightness.data() + m.offset(tile), m.stride, static_cast<std::uint32_t>(tile) * kTilePixels,
-                std::min(kTile, width - x0), std::min(kTile, height - y0), out + y0 * stride + x0, stride);
+    expose_tile(sensor, m.brightness.data() + m.offset(tile), m.stride,
+                static_cast<std::uint32_t>(tile) * kTilePixels, std::min(kTile, width - x0),
+                std::min(kTile, height - y0), out + y0 * stride + x0, stride);
   }
 }
 

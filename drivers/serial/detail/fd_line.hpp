@@ -40,11 +40,13 @@ struct PortCloser {
 };
 using UniquePort = std::unique_ptr<sp_port, PortCloser>;
 
-/// Bytes over a tty's descriptor, non-blocking, waiting in poll(). Opened through libserialport (`port` set: the descriptor is the
-/// library's) or as a plain tty (`port` null: the descriptor is its own).
+/// Bytes over a tty's descriptor, non-blocking, waiting in poll(). Opened through libserialport
+/// (`port` set: the descriptor is the library's) or as a plain tty (`port` null: the descriptor is
+/// its own).
 class FdLine final : public ByteLine {
  public:
-  /// Precondition: the descriptor is open, non-blocking and a raw tty at this baud; `wake` is an eventfd.
+  /// Precondition: the descriptor is open, non-blocking and a raw tty at this baud; `wake` is an
+  /// eventfd.
   FdLine(UniquePort port, UniqueFd tty, UniqueFd wake, const LineSettings& settings) noexcept;
   FdLine(const FdLine&) = delete;
   FdLine& operator=(const FdLine&) = delete;

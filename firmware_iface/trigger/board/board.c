@@ -1,14 +1,17 @@
 #include "firmware_iface/trigger/board/board.h"
 
 enum {
-  slots_a_poll = 64,     /* left out at most in one call: a long pause is walked through in several */
+  slots_a_poll = 64, /* left out at most in one call: a long pause is walked through in several */
   start_lead_us = 1000,  /* from START to the first edge */
-  arm_ahead_divisor = 4, /* armed at most a quarter of a second ahead: half a turn of a 32-bit counter at 1 GHz is two */
+  arm_ahead_divisor = 4, /* armed at most a quarter of a second ahead: half a turn of a 32-bit
+                            counter at 1 GHz is two */
   flag_first = 1,
   flag_late = 2
 };
 
-static uint64_t counts_of_us(const TriggerBoard* board, uint64_t us) { return (us * board->description.counts_hz + 999999U) / 1000000U; }
+static uint64_t counts_of_us(const TriggerBoard* board, uint64_t us) {
+  return (us * board->description.counts_hz + 999999U) / 1000000U;
+}
 
 /* ---- messages ---- */
 
@@ -19,12 +22,15 @@ static void put_status(TriggerBoard* board, uint64_t now, uint8_t* payload) {
   status.tick = tick_of(&board->ticks, now);
   status.pulses = board->schedule.next;
   status.configuration = board->config_crc;
-  status.frames_refused = decoder->bad_coding + decoder->bad_length + decoder->bad_crc + board->wrong_sizes;
+  status.frames_refused =
+      decoder->bad_coding + decoder->bad_length + decoder->bad_crc + board->wrong_sizes;
   status.events_dropped = board->outbox.dropped;
   status.edges_dropped = board->edges_dropped;
   status.pps_age_ms = UINT32_MAX;
   if (board->pps_edges != 0) {
-    const uint64_t age = now > board->last_pps ? (now - board->last_pps) / (board->description.counts_hz / 1000U) : 0;
+    const uint64_t age = now > board->last_pps
+                             ? (now - board->last_pps) / (board->description.counts_hz / 1000U)
+                             : 0;
     status.pps_age_ms = age < UINT32_MAX ? (uint32_t)age : UINT32_MAX - 1U;
   }
   status.state = board->state;
@@ -82,7 +88,8 @@ static void open_event(TriggerBoard* board, uint64_t count, uint8_t flags) {
   if (open->waiting == 0) close_event(board);
 }
 
-/* An end without its start belongs to an exposure that began before this pulse: no end of this one. */
+/* An end without its start belongs to an exposure that began before this pulse: no end of this one.
+ */
 static void feedback_edge(TriggerBoard* board, unsigned input, bool rising, uint64_t count) {
   OpenEvent* open = &board->event;
   const unsigned bit = 1U << input;
@@ -127,22 +134,32 @@ static void on_hello(TriggerBoard* board, const TriggerFrame* frame) {
   tick_hold_rate(&board->ticks);
 }
 
-static bool input_exists(uint8_t edge, bool wired) { return edge <= trigger_edge_falling && (edge == trigger_edge_none || wired); }
+static bool input_exists(uint8_t edge, bool wired) {
+  return edge <= trigger_edge_falling && (edge == trigger_edge_none || wired);
+}
 
 /* 0: the board can do this, and *schedule is set for it; else a TriggerErrorCode. */
-static uint8_t refusal(const TriggerBoard* board, const TriggerConfig* config, PulseSchedule* schedule) {
+static uint8_t refusal(const TriggerBoard* board, const TriggerConfig* config,
+                       PulseSchedule* schedule) {
   const BoardDescription* description = &board->description;
   const unsigned lines = (1U << description->lines) - 1U;
   const unsigned inputs = (1U << description->feedback_inputs) - 1U;
-  if (config->lines == 0 || ((unsigned)(config->lines | config->active_low) & ~lines) != 0) return trigger_error_line;
-  if (((unsigned)(config->feedback_inputs | config->feedback_active_low) & ~inputs) != 0) return trigger_error_line;
-  if (!input_exists(config->pps_edge, description->has_pps) || !input_exists(config->ins_edge, description->has_ins))
+  if (config->lines == 0 || ((unsigned)(config->lines | config->active_low) & ~lines) != 0)
     return trigger_error_line;
-  if (config->rate_millihertz == 0 || config->rate_millihertz > description->max_millihertz) return trigger_error_rate;
+  if (((unsigned)(config->feedback_inputs | config->feedback_active_low) & ~inputs) != 0)
+    return trigger_error_line;
+  if (!input_exists(config->pps_edge, description->has_pps) ||
+      !input_exists(config->ins_edge, description->has_ins))
+    return trigger_error_line;
+  if (config->rate_millihertz == 0 || config->rate_millihertz > description->max_millihertz)
+    return trigger_error_rate;
   schedule_set(schedule, description->counts_hz, config->rate_millihertz, config->vary_us);
-  if (schedule_shortest(schedule) < (uint64_t)description->counts_hz * 1000U / description->max_millihertz) return trigger_error_rate;
+  if (schedule_shortest(schedule) <
+      (uint64_t)description->counts_hz * 1000U / description->max_millihertz)
+    return trigger_error_rate;
   if (config->pulse_us == 0 || config->pulse_us > board_max_pulse_us) return trigger_error_pulse;
-  if (counts_of_us(board, config->pulse_us) >= schedule_shortest(schedule)) return trigger_error_pulse;
+  if (counts_of_us(board, config->pulse_us) >= schedule_shortest(schedule))
+    return trigger_error_pulse;
   return 0;
 }
 
@@ -298,7 +315,8 @@ void board_edges_lost(TriggerBoard* board, uint32_t edges) { board->edges_droppe
 
 void board_pulse_made(TriggerBoard* board, uint64_t now, uint64_t count, bool late) {
   if (!board->armed) return;
-  const unsigned flags = (board->first_pulse ? flag_first : 0U) | (late || board->armed_late ? flag_late : 0U);
+  const unsigned flags =
+      (board->first_pulse ? flag_first : 0U) | (late || board->armed_late ? flag_late : 0U);
   board->armed = false;
   board->armed_late = false;
   board->first_pulse = false;
@@ -321,7 +339,8 @@ static void next_slot(TriggerBoard* board) {
   board->first_pulse = true;
 }
 
-/* The next slot is left out: in a pause when its time has come, else when half its interval is over before it could be armed. */
+/* The next slot is left out: in a pause when its time has come, else when half its interval is over
+ * before it could be armed. */
 static bool slot_is_over(const TriggerBoard* board, uint64_t now) {
   if (board->state == trigger_stopped || board->armed) return false;
   if (board->state == trigger_paused) return board->schedule.due <= now;
@@ -333,7 +352,8 @@ void board_poll(TriggerBoard* board, uint64_t now) {
   for (unsigned n = 0; n < slots_a_poll && slot_is_over(board, now); ++n) next_slot(board);
   if (board->event.open && now >= board->event.close_at) close_event(board);
   const uint8_t locked = board->ticks.locked ? 1 : 0;
-  if (now < board->status_due && board->state == board->told_state && locked == board->told_locked) return;
+  if (now < board->status_due && board->state == board->told_state && locked == board->told_locked)
+    return;
   uint8_t payload[trigger_status_payload_size];
   put_status(board, now, payload);
   outbox_tell(&board->outbox, trigger_status, payload, sizeof payload);
@@ -369,8 +389,10 @@ void board_pulse_disarmed(TriggerBoard* board, uint64_t now) {
 size_t board_send(TriggerBoard* board, uint64_t departure, uint8_t* out) {
   OutboxMessage* message = outbox_front(&board->outbox);
   if (message == NULL) return 0;
-  if (message->type == trigger_pong) (void)trigger_put_bytes(message->payload + 16, tick_of(&board->ticks, departure), 8);
-  const size_t size = trigger_write_frame(message->type, message->sequence, message->payload, message->size, out);
+  if (message->type == trigger_pong)
+    (void)trigger_put_bytes(message->payload + 16, tick_of(&board->ticks, departure), 8);
+  const size_t size =
+      trigger_write_frame(message->type, message->sequence, message->payload, message->size, out);
   outbox_pop(&board->outbox);
   return size;
 }
@@ -389,9 +411,12 @@ uint64_t board_deadline(const TriggerBoard* board) {
 
 const TriggerConfig* board_configuration(const TriggerBoard* board) { return &board->config; }
 
-uint64_t board_tick(const TriggerBoard* board, uint64_t count) { return tick_of(&board->ticks, count); }
+uint64_t board_tick(const TriggerBoard* board, uint64_t count) {
+  return tick_of(&board->ticks, count);
+}
 
-void board_init(TriggerBoard* board, const BoardDescription* description, uint32_t boot_id, uint64_t now) {
+void board_init(TriggerBoard* board, const BoardDescription* description, uint32_t boot_id,
+                uint64_t now) {
   memset(board, 0, sizeof *board);
   board->description = *description;
   board->boot_id = boot_id;

@@ -1,23 +1,25 @@
 #ifndef VERGENCE_FIRMWARE_IFACE_TRIGGER_BOARD_BOARD_H
 #define VERGENCE_FIRMWARE_IFACE_TRIGGER_BOARD_BOARD_H
 /*
- * The trigger board without its hardware: what it answers, when it pulses, which exposure belongs to which pulse, what time it is.
- * The firmware (board/firmware.c on a port's hardware layer), the simulated board and the tests drive this same code.
+ * The trigger board without its hardware: what it answers, when it pulses, which exposure belongs
+ * to which pulse, what time it is. The firmware (board/firmware.c on a port's hardware layer), the
+ * simulated board and the tests drive this same code.
  *
- * Drive it   board_init(), then in a loop, in this order, as often as there is something to do and at the latest at board_deadline():
- *              board_edge(), board_pulse_made()   what the hardware stamped, oldest first
- *              board_receive()                    each byte from the host with the count of its arrival
- *              board_poll()
- *              board_wants_disarm()               true: take back the pulse that is armed, then board_pulse_disarmed(); if it has gone out
- *                                                 in the meantime board_pulse_made() comes instead
- *              board_take_pulse()                 true: arm this pulse in hardware (or board_pulse_refused()), later board_pulse_made()
- *              board_send()                       one frame for the host, when the line has room for trigger_max_frame bytes
- * Ownership  Everything is in the caller's TriggerBoard; several boards in one process know nothing of each other.
- * Threads    One at a time. Interrupts hand over what they stamped in a RecordRing (records.h).
- * Memory     Fixed, no heap. Messages that find no room are dropped and counted (outbox.h).
- * Time       Counts: the hardware's free-running counter, 64 bits, never back, counts_hz a second. `now` never decreases from call to
- *            call; stamps may be older than `now`. On the wire counts become ticks (discipline.h).
- * Errors     What comes from the wire is refused by ERROR or counted. Preconditions are the caller's; nothing else can fail.
+ * Drive it   board_init(), then in a loop, in this order, as often as there is something to do and
+ * at the latest at board_deadline(): board_edge(), board_pulse_made()   what the hardware stamped,
+ * oldest first board_receive()                    each byte from the host with the count of its
+ * arrival board_poll() board_wants_disarm()               true: take back the pulse that is armed,
+ * then board_pulse_disarmed(); if it has gone out in the meantime board_pulse_made() comes instead
+ *              board_take_pulse()                 true: arm this pulse in hardware (or
+ * board_pulse_refused()), later board_pulse_made() board_send()                       one frame for
+ * the host, when the line has room for trigger_max_frame bytes Ownership  Everything is in the
+ * caller's TriggerBoard; several boards in one process know nothing of each other. Threads    One
+ * at a time. Interrupts hand over what they stamped in a RecordRing (records.h). Memory     Fixed,
+ * no heap. Messages that find no room are dropped and counted (outbox.h). Time       Counts: the
+ * hardware's free-running counter, 64 bits, never back, counts_hz a second. `now` never decreases
+ * from call to call; stamps may be older than `now`. On the wire counts become ticks
+ * (discipline.h). Errors     What comes from the wire is refused by ERROR or counted. Preconditions
+ * are the caller's; nothing else can fail.
  */
 #include <stdbool.h>
 #include <stddef.h>
@@ -54,7 +56,8 @@ typedef struct {
 /* Inputs; feedback k is board_input_feedback + k. */
 typedef enum { board_input_pps = 0, board_input_ins = 1, board_input_feedback = 2 } BoardInput;
 
-/* A pulse to be armed: active from `count` on for `width` counts, on the lines of the mask; active is low where active_low says. */
+/* A pulse to be armed: active from `count` on for `width` counts, on the lines of the mask; active
+ * is low where active_low says. */
 typedef struct {
   uint64_t count, width;
   uint32_t number;
@@ -96,13 +99,16 @@ typedef struct {
 } TriggerBoard;
 
 /* boot_id: differs at every start. */
-void board_init(TriggerBoard* board, const BoardDescription* description, uint32_t boot_id, uint64_t now);
+void board_init(TriggerBoard* board, const BoardDescription* description, uint32_t boot_id,
+                uint64_t now);
 
-/* One byte from the host, whose last bit came at `count` (`now` where the hardware does not stamp it). */
+/* One byte from the host, whose last bit came at `count` (`now` where the hardware does not stamp
+ * it). */
 void board_receive(TriggerBoard* board, uint64_t now, uint64_t count, uint8_t byte);
 /* An input's level changed at `count`. Precondition: as many inputs as described. */
 void board_edge(TriggerBoard* board, uint64_t now, BoardInput input, bool rising, uint64_t count);
-/* The armed pulse's leading edge was made at `count`. Ignored when none is armed. late: not by the compare unit, or not when it was due. */
+/* The armed pulse's leading edge was made at `count`. Ignored when none is armed. late: not by the
+ * compare unit, or not when it was due. */
 void board_pulse_made(TriggerBoard* board, uint64_t now, uint64_t count, bool late);
 /* So many stamped edges found no room before they came here. */
 void board_edges_lost(TriggerBoard* board, uint32_t edges);
@@ -111,12 +117,14 @@ void board_poll(TriggerBoard* board, uint64_t now);
 
 /* True: *pulse is to be armed now; it is at least board_lead_us away and at most 250 ms. */
 bool board_take_pulse(TriggerBoard* board, uint64_t now, BoardPulse* pulse);
-/* The pulse just taken could not be armed in time: board_take_pulse() gives it again, later and marked late. */
+/* The pulse just taken could not be armed in time: board_take_pulse() gives it again, later and
+ * marked late. */
 void board_pulse_refused(TriggerBoard* board);
 bool board_wants_disarm(const TriggerBoard* board);
 void board_pulse_disarmed(TriggerBoard* board, uint64_t now);
 
-/* The next frame for the host into out[trigger_max_frame]; its first bit leaves at `departure`. Returns its size, 0: none. */
+/* The next frame for the host into out[trigger_max_frame]; its first bit leaves at `departure`.
+ * Returns its size, 0: none. */
 size_t board_send(TriggerBoard* board, uint64_t departure, uint8_t* out);
 
 /* Count at which board_poll() or board_take_pulse() has something to do at the latest. */

@@ -6,8 +6,10 @@ enum {
   rate_bits = 40,
   second_us = 1000000,
   pps_seconds = tick_pps_edges - 1, /* 16 s of microseconds, 2^-40: just below 2^64 */
-  pps_agree_us = 100,               /* receivers are right to 0.1 us, interrupts of a port without capture to some 10 us */
-  pps_wander = 20,                  /* an oscillator moves by less than a twentieth of its tolerance from one second to the next */
+  pps_agree_us =
+      100, /* receivers are right to 0.1 us, interrupts of a port without capture to some 10 us */
+  pps_wander = 20, /* an oscillator moves by less than a twentieth of its tolerance from one second
+                      to the next */
   pps_to_acquire = 4,
   pps_refused_limit = 3,
   pps_lost_s = 4
@@ -24,14 +26,17 @@ static uint64_t scaled(uint64_t counts, uint64_t rate, uint64_t* fraction) {
   const uint64_t middle_a = (counts >> 32U) * (rate & mask);
   const uint64_t middle_b = (counts & mask) * (rate >> 32U);
   const uint64_t middle = (low >> 32U) + (middle_a & mask) + (middle_b & mask);
-  const uint64_t high = (counts >> 32U) * (rate >> 32U) + (middle_a >> 32U) + (middle_b >> 32U) + (middle >> 32U);
+  const uint64_t high =
+      (counts >> 32U) * (rate >> 32U) + (middle_a >> 32U) + (middle_b >> 32U) + (middle >> 32U);
   const uint64_t low_word = (middle << 32U) | (low & mask);
   *fraction = low_word & kFractionMask;
   return (high << (64U - rate_bits)) | (low_word >> rate_bits);
 }
 
 /* Rate at which `counts` are so many seconds (at most 16). */
-static uint64_t rate_of(uint64_t seconds, uint64_t counts) { return (((seconds * second_us) << rate_bits) + counts / 2U) / counts; }
+static uint64_t rate_of(uint64_t seconds, uint64_t counts) {
+  return (((seconds * second_us) << rate_bits) + counts / 2U) / counts;
+}
 
 static TickSegment segment_at(const TickDiscipline* d, uint64_t count) {
   TickSegment at = count >= d->segment.count ? d->segment : d->before;
@@ -111,7 +116,8 @@ static void keep_edge(TickDiscipline* d, uint64_t edge) {
 
 /* Whole seconds that a difference of counts is, by the best rate there is; 0: it is none. */
 static uint64_t whole_seconds(const TickDiscipline* d, uint64_t counts) {
-  const uint64_t second = d->acquired ? ((uint64_t)second_us << rate_bits) / d->estimate : d->counts_hz;
+  const uint64_t second =
+      d->acquired ? ((uint64_t)second_us << rate_bits) / d->estimate : d->counts_hz;
   const uint64_t seconds = (counts + second / 2U) / second;
   const uint64_t off = difference(counts, seconds * second);
   if (seconds == 0 || seconds > pps_seconds) return 0;
@@ -201,5 +207,6 @@ void tick_advance(TickDiscipline* d, uint64_t now) {
     d->locked = false;
     if (now - d->last_edge > pps_seconds * d->counts_hz) forget_edges(d);
   }
-  if (now > d->segment.count && now - d->segment.count > d->counts_hz) set_rate(d, d->segment.rate, now);
+  if (now > d->segment.count && now - d->segment.count > d->counts_hz)
+    set_rate(d, d->segment.rate, now);
 }

@@ -19,7 +19,9 @@ static uint64_t refresh(Firmware* firmware) {
 }
 
 /* Of a stamp that is older than `now`, by less than a turn of the counter. */
-static uint64_t whole(const Firmware* firmware, uint32_t count) { return firmware->now - (uint32_t)((uint32_t)firmware->now - count); }
+static uint64_t whole(const Firmware* firmware, uint32_t count) {
+  return firmware->now - (uint32_t)((uint32_t)firmware->now - count);
+}
 
 static void take_stamps(Firmware* firmware) {
   StampRecord record;
@@ -38,13 +40,15 @@ static void take_stamps(Firmware* firmware) {
 
 static void drive_pulses(Firmware* firmware) {
   BoardPulse pulse;
-  if (board_wants_disarm(&firmware->board) && hal_disarm()) board_pulse_disarmed(&firmware->board, firmware->now);
+  if (board_wants_disarm(&firmware->board) && hal_disarm())
+    board_pulse_disarmed(&firmware->board, firmware->now);
   if (firmware->board.config_crc != firmware->applied) {
     hal_configure(board_configuration(&firmware->board));
     firmware->applied = firmware->board.config_crc;
   }
   if (!board_take_pulse(&firmware->board, refresh(firmware), &pulse)) return;
-  if (!hal_arm((uint32_t)pulse.count, (uint32_t)pulse.width, pulse.lines)) /* at most a second: it fits */
+  if (!hal_arm((uint32_t)pulse.count, (uint32_t)pulse.width,
+               pulse.lines)) /* at most a second: it fits */
     board_pulse_refused(&firmware->board);
 }
 
@@ -63,7 +67,8 @@ static void give_bytes(Firmware* firmware) {
     firmware->size = (uint8_t)board_send(&firmware->board, refresh(firmware), firmware->frame);
     firmware->sent = 0;
   }
-  while (firmware->sent < firmware->size && hal_send(firmware->frame[firmware->sent])) ++firmware->sent;
+  while (firmware->sent < firmware->size && hal_send(firmware->frame[firmware->sent]))
+    ++firmware->sent;
 }
 
 void firmware_main(void) {

@@ -1,11 +1,13 @@
 #ifndef VERGENCE_FIRMWARE_IFACE_TRIGGER_BOARD_HAL_H
 #define VERGENCE_FIRMWARE_IFACE_TRIGGER_BOARD_HAL_H
 /*
- * What a port provides: this and an entry point that calls firmware_main(). docs/trigger_board.md says how to write one.
+ * What a port provides: this and an entry point that calls firmware_main(). docs/trigger_board.md
+ * says how to write one.
  *
  * Threads    The main loop calls; interrupts only stamp edges and bytes into rings.
  * Time       One free-running 32-bit counter; an edge is made or stamped by it in hardware.
- * Errors     Every wait for hardware is bounded and has a fallback that is told: a worse clock in hal_describe(), a late pulse.
+ * Errors     Every wait for hardware is bounded and has a fallback that is told: a worse clock in
+ * hal_describe(), a late pulse.
  */
 #include <stdbool.h>
 #include <stdint.h>
@@ -23,11 +25,13 @@ uint32_t hal_boot_id(void);
 uint32_t hal_now(void);
 /* Inputs and outputs as configured; only while stopped. All lines inactive. */
 void hal_configure(const TriggerConfig* config);
-/* The compare unit makes the edges of this pulse, and a record_pulse of the leading one. False: too late, nothing is armed. */
+/* The compare unit makes the edges of this pulse, and a record_pulse of the leading one. False: too
+ * late, nothing is armed. */
 bool hal_arm(uint32_t count, uint32_t width, uint8_t lines);
 /* True: the armed pulse is taken back. False: it has gone out or is about to; its record comes. */
 bool hal_disarm(void);
-/* Edges that the compare unit should long have made are made now, the leading one with a late record_pulse. */
+/* Edges that the compare unit should long have made are made now, the leading one with a late
+ * record_pulse. */
 void hal_check_pulse(void);
 /* The oldest stamped edge. */
 bool hal_stamped(StampRecord* record);

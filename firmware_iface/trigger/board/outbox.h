@@ -1,8 +1,8 @@
 #ifndef VERGENCE_FIRMWARE_IFACE_TRIGGER_BOARD_OUTBOX_H
 #define VERGENCE_FIRMWARE_IFACE_TRIGGER_BOARD_OUTBOX_H
 /*
- * Messages on their way out, oldest first. When it is full the newest is dropped and counted; the last places are kept for answers,
- * so that a host that asks is answered however many events wait.
+ * Messages on their way out, oldest first. When it is full the newest is dropped and counted; the
+ * last places are kept for answers, so that a host that asks is answered however many events wait.
  *
  * Memory     The caller's struct, nothing else. Threads: one at a time.
  */
@@ -30,7 +30,8 @@ typedef struct {
 } Outbox;
 
 /* All zero is its start. `payload` has `size` bytes. */
-void outbox_answer(Outbox* box, uint8_t type, uint8_t sequence, const uint8_t* payload, uint8_t size);
+void outbox_answer(Outbox* box, uint8_t type, uint8_t sequence, const uint8_t* payload,
+                   uint8_t size);
 void outbox_tell(Outbox* box, uint8_t type, const uint8_t* payload, uint8_t size);
 /* The oldest, null when there is none; valid until outbox_pop(). */
 OutboxMessage* outbox_front(Outbox* box);

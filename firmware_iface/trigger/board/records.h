@@ -1,15 +1,19 @@
 #ifndef VERGENCE_FIRMWARE_IFACE_TRIGGER_BOARD_RECORDS_H
 #define VERGENCE_FIRMWARE_IFACE_TRIGGER_BOARD_RECORDS_H
 /*
- * From interrupts to the main loop: rings of what was stamped, without a lock. When a ring is full the newest is dropped and counted.
+ * From interrupts to the main loop: rings of what was stamped, without a lock. When a ring is full
+ * the newest is dropped and counted.
  *
- * Threads    One producer (interrupts of one priority count as one) and one consumer, at the same time.
- * Memory     The caller's; all zero is empty.
+ * Threads    One producer (interrupts of one priority count as one) and one consumer, at the same
+ * time. Memory     The caller's; all zero is empty.
  */
 #include <stdbool.h>
 #include <stdint.h>
 
-enum { record_ring_capacity = 64, byte_ring_capacity = 256 }; /* powers of two: indices run freely and wrap with their type */
+enum {
+  record_ring_capacity = 64,
+  byte_ring_capacity = 256
+}; /* powers of two: indices run freely and wrap with their type */
 
 /* Source: a BoardInput, or record_pulse for a pulse's leading edge. */
 enum { record_pulse = 0xFF };

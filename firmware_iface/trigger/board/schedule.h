@@ -1,8 +1,9 @@
 #ifndef VERGENCE_FIRMWARE_IFACE_TRIGGER_BOARD_SCHEDULE_H
 #define VERGENCE_FIRMWARE_IFACE_TRIGGER_BOARD_SCHEDULE_H
 /*
- * When which pulse is due: a grid of slots, one number each. The remainder of every division is carried, so that n even intervals are
- * n * 1000 / rate_millihertz seconds by the timer, to a count, for ever.
+ * When which pulse is due: a grid of slots, one number each. The remainder of every division is
+ * carried, so that n even intervals are n * 1000 / rate_millihertz seconds by the timer, to a
+ * count, for ever.
  *
  * Memory     The caller's struct, nothing else. Threads: one at a time. Bounded.
  */
@@ -26,7 +27,8 @@ typedef struct {
 } PulseSchedule;
 
 /* Precondition: rate_millihertz > 0. Keeps the number. */
-void schedule_set(PulseSchedule* schedule, uint32_t counts_hz, uint32_t rate_millihertz, uint32_t vary_us);
+void schedule_set(PulseSchedule* schedule, uint32_t counts_hz, uint32_t rate_millihertz,
+                  uint32_t vary_us);
 /* The next slot is at `count`, and the grid begins anew there. */
 void schedule_begin(PulseSchedule* schedule, uint64_t count);
 /* On to the slot after the next. */

@@ -1,7 +1,8 @@
 // The probe for libFuzzer:  trigger_fuzz CORPUS
 #include "tests/fuzz/trigger/probe.hpp"
 
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {  // NOLINT(readability-identifier-naming)
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data,
+                                      std::size_t size) {  // NOLINT(readability-identifier-naming)
   vergence::probe_trigger(data, size);
   return 0;
 }

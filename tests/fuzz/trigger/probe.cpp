@@ -24,8 +24,10 @@ void probe_decoder(const std::uint8_t* data, std::size_t size) {
     const TriggerDecoder before = decoder;
     const TriggerDecodeStatus status = trigger_decode(&decoder, data[i], &frame);
     promise(decoder.used <= sizeof decoder.buffer, "the decoder stays in its buffer");
-    promise(status == trigger_wait || (data[i] == 0 && decoder.used == 0), "only 00 ends a frame, and the next begins anew");
-    promise(before.frames + before.bad_coding + before.bad_length + before.bad_crc + (status == trigger_wait ? 0U : 1U) ==
+    promise(status == trigger_wait || (data[i] == 0 && decoder.used == 0),
+            "only 00 ends a frame, and the next begins anew");
+    promise(before.frames + before.bad_coding + before.bad_length + before.bad_crc +
+                    (status == trigger_wait ? 0U : 1U) ==
                 decoder.frames + decoder.bad_coding + decoder.bad_length + decoder.bad_crc,
             "every frame is counted once");
     if (status != trigger_frame_ready) continue;
@@ -33,10 +35,12 @@ void probe_decoder(const std::uint8_t* data, std::size_t size) {
     std::uint8_t again[trigger_max_frame];
     TriggerDecoder other{};
     TriggerFrame copy{};
-    const std::size_t n = trigger_write_frame(frame.type, frame.sequence, frame.payload, frame.size, again);
+    const std::size_t n =
+        trigger_write_frame(frame.type, frame.sequence, frame.payload, frame.size, again);
     TriggerDecodeStatus last = trigger_wait;
     for (std::size_t k = 0; k < n; ++k) last = trigger_decode(&other, again[k], &copy);
-    promise(last == trigger_frame_ready && copy.type == frame.type && copy.sequence == frame.sequence && copy.size == frame.size &&
+    promise(last == trigger_frame_ready && copy.type == frame.type &&
+                copy.sequence == frame.sequence && copy.size == frame.size &&
                 std::memcmp(copy.payload, frame.payload, frame.size) == 0,
             "what is written is read");
   }
@@ -98,11 +102,19 @@ class Bench {
 
   void message() {
     std::uint8_t payload[trigger_max_payload], frame[trigger_max_frame];
-    constexpr std::uint8_t kSizes[] = {0, 1, trigger_config_payload_size, 0, 0, trigger_pause_payload_size, trigger_ping_payload_size};
+    constexpr std::uint8_t kSizes[] = {0,
+                                       1,
+                                       trigger_config_payload_size,
+                                       0,
+                                       0,
+                                       trigger_pause_payload_size,
+                                       trigger_ping_payload_size};
     const std::uint8_t type = script_.byte() % 8;
-    const auto wanted = static_cast<std::uint8_t>(type < sizeof kSizes ? kSizes[type] : script_.byte() % trigger_max_payload);
+    const auto wanted = static_cast<std::uint8_t>(
+        type < sizeof kSizes ? kSizes[type] : script_.byte() % trigger_max_payload);
     for (std::uint8_t i = 0; i < wanted; ++i) payload[i] = script_.byte();
-    if (type == trigger_config) payload[3] = 0, payload[2] &= 0xFU, payload[6] = payload[7] = payload[10] = payload[11] = 0;
+    if (type == trigger_config)
+      payload[3] = 0, payload[2] &= 0xFU, payload[6] = payload[7] = payload[10] = payload[11] = 0;
     const std::size_t n = trigger_write_frame(type, script_.byte(), payload, wanted, frame);
     for (std::size_t i = 0; i < n; ++i) receive(frame[i]);
   }
@@ -149,7 +161,8 @@ class Bench {
     BoardPulse pulse{};
     if (!board_take_pulse(&board_, now_, &pulse)) return;
     promise(!armed_, "one pulse at a time");
-    promise(pulse.count >= now_ + 84 * board_lead_us && pulse.count <= now_ + 84'000'000 / 4, "pulses are armed in time, not long ahead");
+    promise(pulse.count >= now_ + 84 * board_lead_us && pulse.count <= now_ + 84'000'000 / 4,
+            "pulses are armed in time, not long ahead");
     promise(pulse.width > 0 && pulse.lines != 0, "pulses are some");
     if (script_.byte() % 8 == 0) {
       board_pulse_refused(&board_);
@@ -174,7 +187,8 @@ class Bench {
   }
 
   void check() {
-    promise(board_.outbox.used <= outbox_capacity && board_.outbox.first < outbox_capacity, "the outbox keeps its size");
+    promise(board_.outbox.used <= outbox_capacity && board_.outbox.first < outbox_capacity,
+            "the outbox keeps its size");
     promise(board_.state <= trigger_paused, "a state is one of three");
     const std::uint64_t tick = board_tick(&board_, now_);
     promise(tick >= tick_, "ticks never go back");

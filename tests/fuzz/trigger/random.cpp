@@ -1,4 +1,5 @@
-// Seeded random inputs for the same probe, without a fuzzer's library:  trigger_random [INPUTS] [SEED]
+// Seeded random inputs for the same probe, without a fuzzer's library:  trigger_random [INPUTS]
+// [SEED]
 #include <algorithm>
 #include <cstdio>
 #include <cstdlib>
@@ -15,12 +16,16 @@ int main(int argc, char** argv) {
   for (unsigned long long n = 0; n < inputs; ++n) {
     bytes.resize(random.below(300));
     for (std::uint8_t& b : bytes)
-      b = random.below(4) == 0 ? static_cast<std::uint8_t>(random.below(8)) : static_cast<std::uint8_t>(random.next() >> 24U);
+      b = random.below(4) == 0 ? static_cast<std::uint8_t>(random.below(8))
+                               : static_cast<std::uint8_t>(random.next() >> 24U);
     if (random.below(4) == 0) {  // a whole frame somewhere, perhaps with one bit wrong
       std::uint8_t frame[trigger_max_frame];
-      const std::size_t size = trigger_write_frame(static_cast<std::uint8_t>(random.below(8)), 1, bytes.data(),
-                                                   std::min<std::size_t>(bytes.size(), random.below(65)), frame);
-      if (random.below(2) == 0) frame[random.below(static_cast<std::uint32_t>(size))] ^= static_cast<std::uint8_t>(1U << random.below(8));
+      const std::size_t size =
+          trigger_write_frame(static_cast<std::uint8_t>(random.below(8)), 1, bytes.data(),
+                              std::min<std::size_t>(bytes.size(), random.below(65)), frame);
+      if (random.below(2) == 0)
+        frame[random.below(static_cast<std::uint32_t>(size))] ^=
+            static_cast<std::uint8_t>(1U << random.below(8));
       bytes.insert(bytes.begin(), frame, frame + size);
     }
     vergence::probe_trigger(bytes.data(), bytes.size());

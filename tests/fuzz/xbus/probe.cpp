@@ -26,18 +26,23 @@ void probe_mtdata(std::span<const std::uint8_t> payload, const MtdataLayout& lay
   require((status == MtdataStatus::layout_unknown) == !size, "a layout is known or it is not");
   if (status != MtdataStatus::ok) return;
   std::array<std::uint8_t, kMaxPayload> again{};
-  require(encode_mtdata(data, layout, again) == payload.size(), "what was read is written in the same length");
-  require(std::equal(payload.begin(), payload.end(), again.begin()), "what was read is written back the same");
+  require(encode_mtdata(data, layout, again) == payload.size(),
+          "what was read is written in the same length");
+  require(std::equal(payload.begin(), payload.end(), again.begin()),
+          "what was read is written back the same");
 }
 
 void probe_payload(std::span<const std::uint8_t> payload) {
   Mtdata2 data;
   if (decode_mtdata2(payload, &data) == PacketStatus::ok) {
     require(data.packets * 3 <= payload.size(), "every packet has a header");
-    require(data.unknown_packets + data.refused_packets <= data.packets, "a packet is counted once");
+    require(data.unknown_packets + data.refused_packets <= data.packets,
+            "a packet is counted once");
     if (data.quaternion)
       for (const double q : *data.quaternion) require(std::isfinite(q), "numbers are finite");
-    if (data.satellites) require(data.satellites->items.size() == 4U * data.satellites->count, "as many satellites as told");
+    if (data.satellites)
+      require(data.satellites->items.size() == 4U * data.satellites->count,
+              "as many satellites as told");
     if (data.utc && plausible(*data.utc)) {
       const Utc back = utc_of_unix_ns(unix_ns(*data.utc), data.utc->flags);
       require(data.utc->second == 60 || back.second == data.utc->second, "a time reads back");
@@ -49,27 +54,31 @@ void probe_payload(std::span<const std::uint8_t> payload) {
     std::array<std::uint8_t, kConfigurationSize> again{};
     write_configuration(configuration, again);
     DeviceConfiguration back;
-    require(read_configuration(again, &back) && back.device_id == configuration.device_id, "a configuration reads back");
+    require(read_configuration(again, &back) && back.device_id == configuration.device_id,
+            "a configuration reads back");
   }
   OutputConfiguration outputs;
   if (read_output_configuration(payload, &outputs)) {
     std::array<std::uint8_t, 4 * kMostOutputs> again{};
     const std::size_t n = write_output_configuration(outputs, again);
-    require(n == payload.size() && std::equal(payload.begin(), payload.end(), again.begin()), "outputs read back");
+    require(n == payload.size() && std::equal(payload.begin(), payload.end(), again.begin()),
+            "outputs read back");
     require(line_budget(outputs, 115200).load >= 0, "a load is not negative");
   }
   SyncSettings sync;
   if (read_sync_settings(payload, &sync)) {
     std::array<std::uint8_t, kSyncEntrySize * kMostSyncEntries> again{};
     const std::size_t n = write_sync_settings(sync, again);
-    require(n == payload.size() && std::equal(payload.begin(), payload.end(), again.begin()), "sync settings read back");
+    require(n == payload.size() && std::equal(payload.begin(), payload.end(), again.begin()),
+            "sync settings read back");
   }
   LegacySync parameter{};
   std::uint32_t value = 0;
   (void)read_legacy_sync(payload, &parameter, &value);
   if (payload.size() >= 6) {
     const MtdataLayout layout{static_cast<std::uint16_t>(payload[0] << 8U | payload[1]),
-                              static_cast<std::uint32_t>(payload[2]) << 24U | static_cast<std::uint32_t>(payload[3]) << 16U |
+                              static_cast<std::uint32_t>(payload[2]) << 24U |
+                                  static_cast<std::uint32_t>(payload[3]) << 16U |
                                   static_cast<std::uint32_t>(payload[4]) << 8U | payload[5]};
     const auto rest = payload.subspan(6);
     const auto size = layout.payload_size();
@@ -82,7 +91,8 @@ void probe_payload(std::span<const std::uint8_t> payload) {
 
 void probe(std::span<const std::uint8_t> bytes) {
   probe_payload(bytes);
-  // The stream against a reader without memory: the same frames, however the bytes are cut into pieces.
+  // The stream against a reader without memory: the same frames, however the bytes are cut into
+  // pieces.
   FrameStream stream;
   std::size_t at = 0;  // of the reader without memory
   std::span<const std::uint8_t> rest = bytes;
@@ -99,8 +109,10 @@ void probe(std::span<const std::uint8_t> bytes) {
         if (expected.status == FrameStatus::ok) break;
       }
       require(expected.status == FrameStatus::ok, "no frame is made up");
-      require(expected.message.id == message.id && expected.message.payload.size() == message.payload.size() &&
-                  std::equal(message.payload.begin(), message.payload.end(), expected.message.payload.begin()),
+      require(expected.message.id == message.id &&
+                  expected.message.payload.size() == message.payload.size() &&
+                  std::equal(message.payload.begin(), message.payload.end(),
+                             expected.message.payload.begin()),
               "the same frames however the bytes come");
       at += expected.size;
       probe_payload(message.payload);
@@ -109,8 +121,10 @@ void probe(std::span<const std::uint8_t> bytes) {
     piece = piece % 67U + 1;
   }
   const StreamCounters& c = stream.counters();
-  require(c.message_bytes + c.garbage_bytes + stream.waiting() == bytes.size(), "every byte is accounted for");
-  require(c.bus_refused + c.length_refused + c.checksum_wrong <= c.garbage_bytes, "a refusal costs a byte");
+  require(c.message_bytes + c.garbage_bytes + stream.waiting() == bytes.size(),
+          "every byte is accounted for");
+  require(c.bus_refused + c.length_refused + c.checksum_wrong <= c.garbage_bytes,
+          "a refusal costs a byte");
 }
 
 }  // namespace vergence::xbus

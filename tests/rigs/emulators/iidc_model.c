@@ -45,7 +45,9 @@ static uint32_t crc16(const uint32_t* quadlet, int count) {
   return crc;
 }
 
-static void close_block(uint32_t* rom, int at, int count) { rom[at] = (uint32_t)count << 16 | crc16(rom + at + 1, count); }
+static void close_block(uint32_t* rom, int at, int count) {
+  rom[at] = (uint32_t)count << 16 | crc16(rom + at + 1, count);
+}
 
 static int text_leaf(uint32_t* rom, int at, const char* text) {
   int quads = ((int)strlen(text) + 4) / 4;
@@ -55,7 +57,8 @@ static int text_leaf(uint32_t* rom, int at, const char* text) {
     char q[4] = {0};
     size_t left = strlen(text) > (size_t)i * 4 ? strlen(text) - (size_t)i * 4 : 0;
     memcpy(q, text + i * 4, left < 4 ? left : 4);
-    rom[at + 3 + i] = (uint32_t)(uint8_t)q[0] << 24 | (uint32_t)(uint8_t)q[1] << 16 | (uint32_t)(uint8_t)q[2] << 8 | (uint8_t)q[3];
+    rom[at + 3 + i] = (uint32_t)(uint8_t)q[0] << 24 | (uint32_t)(uint8_t)q[1] << 16 |
+                      (uint32_t)(uint8_t)q[2] << 8 | (uint8_t)q[3];
   }
   close_block(rom, at, quads + 2);
   return at + quads + 3;
@@ -126,7 +129,9 @@ unsigned iidc_bits(const struct iidc_camera* c) {
   return c->format == 7 ? (c->f7_coding == 5 || c->f7_coding == 10 ? 16 : 8) : current(c)->bits;
 }
 
-size_t iidc_frame_bytes(const struct iidc_camera* c) { return (size_t)iidc_width(c) * iidc_height(c) * iidc_bits(c) / 8; }
+size_t iidc_frame_bytes(const struct iidc_camera* c) {
+  return (size_t)iidc_width(c) * iidc_height(c) * iidc_bits(c) / 8;
+}
 
 static double nominal_rate(unsigned code) { return 1.875 * (double)(1u << code); }
 
@@ -134,13 +139,15 @@ static double nominal_rate(unsigned code) { return 1.875 * (double)(1u << code);
 unsigned iidc_packet_bytes(const struct iidc_camera* c) {
   if (c->format == 7) return c->f7_packet;
   /* 240 packets at 30 Hz, 256 for 768 lines: whole parts of lines travel together */
-  return (unsigned)((double)iidc_frame_bytes(c) * nominal_rate(c->rate) / (iidc_height(c) == 768 ? 7680.0 : 7200.0));
+  return (unsigned)((double)iidc_frame_bytes(c) * nominal_rate(c->rate) /
+                    (iidc_height(c) == 768 ? 7680.0 : 7200.0));
 }
 
 double iidc_rate(const struct iidc_camera* c) {
   if (c->format != 7) return nominal_rate(c->rate);
   size_t bytes = iidc_frame_bytes(c), packet = c->f7_packet ? c->f7_packet : 4;
-  double bus = 8000.0 / (double)((bytes + packet - 1) / packet + 1), wanted = (double)c->frame_rate_abs;
+  double bus = 8000.0 / (double)((bytes + packet - 1) / packet + 1),
+         wanted = (double)c->frame_rate_abs;
   return wanted < bus ? wanted : bus;
 }
 
@@ -149,7 +156,8 @@ static uint32_t rates_of(bool beta, unsigned format, unsigned mode) {
   const struct fixed_mode* m = fixed(format, mode);
   if (!m) return 0;
   for (unsigned r = 2; r <= 5; r++)
-    if ((double)m->width * m->height * m->bits / 8 * nominal_rate(r) / 7200 <= (beta ? 8192 : 4096)) inq |= bit(r);
+    if ((double)m->width * m->height * m->bits / 8 * nominal_rate(r) / 7200 <= (beta ? 8192 : 4096))
+      inq |= bit(r);
   return inq;
 }
 
@@ -189,8 +197,8 @@ void iidc_init_beta(struct iidc_camera* c) {
 #define FEATURE_TRIGGER_DELAY 13
 #define FEATURE_FRAME_RATE 15
 
-static const uint32_t feature_mask =
-    0x80000000u | 0x80000000u >> 7 | 0x80000000u >> 8 | 0x80000000u >> 12 | 0x80000000u >> 13 | 0x80000000u >> 15;
+static const uint32_t feature_mask = 0x80000000u | 0x80000000u >> 7 | 0x80000000u >> 8 |
+                                     0x80000000u >> 12 | 0x80000000u >> 13 | 0x80000000u >> 15;
 
 static uint32_t feature_inquiry(unsigned f) {
   switch (f) {
@@ -201,7 +209,8 @@ static uint32_t feature_inquiry(unsigned f) {
     case FEATURE_GAIN:
       return bit(0) | bit(1) | bit(4) | bit(6) | bit(7) | 0u << 12 | 680u;
     case FEATURE_TRIGGER: /* two sources and the software trigger; modes 0, 14, 15 */
-      return bit(0) | bit(4) | bit(5) | bit(6) | bit(7) | bit(8) | bit(9) | bit(15) | bit(16) | bit(30) | bit(31);
+      return bit(0) | bit(4) | bit(5) | bit(6) | bit(7) | bit(8) | bit(9) | bit(15) | bit(16) |
+             bit(30) | bit(31);
     case FEATURE_TRIGGER_DELAY:
       return bit(0) | bit(4) | bit(5) | bit(7) | 0u << 12 | 4095u;
     case FEATURE_FRAME_RATE:
@@ -309,7 +318,8 @@ static int read_command(struct iidc_camera* c, uint32_t at, uint32_t* v) {
       *v = c->format << 29;
       break;
     case 0x60c:
-      *v = c->iso_speed > 2 ? bit(16) | (c->channel & 63) << 8 | c->iso_speed : (c->channel & 15) << 28 | (c->iso_speed & 3) << 24;
+      *v = c->iso_speed > 2 ? bit(16) | (c->channel & 63) << 8 | c->iso_speed
+                            : (c->channel & 15) << 28 | (c->iso_speed & 3) << 24;
       break;
     case 0x610:
       *v = c->powered ? bit(0) : 0;
@@ -395,7 +405,8 @@ static unsigned f7_packets(const struct iidc_camera* c) {
 static uint32_t f7_errors(const struct iidc_camera* c) {
   unsigned width = c->f7_size >> 16, height = c->f7_size & 0xffff, most = c->beta ? 8192u : 4096u;
   uint32_t errors = 0;
-  if ((c->f7_position >> 16) + width > IIDC_MAX_WIDTH || (c->f7_position & 0xffff) + height > IIDC_MAX_HEIGHT || !width || !height)
+  if ((c->f7_position >> 16) + width > IIDC_MAX_WIDTH ||
+      (c->f7_position & 0xffff) + height > IIDC_MAX_HEIGHT || !width || !height)
     errors |= bit(8);
   if (c->f7_packet == 0 || c->f7_packet > most || c->f7_packet % 4) errors |= bit(9);
   return errors;
@@ -432,7 +443,8 @@ static int read_f7(struct iidc_camera* c, uint32_t at, uint32_t* v) {
       *v = 4u << 16 | (c->beta ? 8192u : 4096u);
       break;
     case 0x44: {
-      unsigned advice = (unsigned)((double)iidc_frame_bytes(c) * 30 / 8000 + 3) & ~3u, most = c->beta ? 8192u : 4096u;
+      unsigned advice = (unsigned)((double)iidc_frame_bytes(c) * 30 / 8000 + 3) & ~3u,
+               most = c->beta ? 8192u : 4096u;
       *v = c->f7_packet << 16 | (advice > most ? most : advice);
       break;
     }
@@ -489,7 +501,11 @@ int iidc_read(struct iidc_camera* c, uint64_t offset, uint32_t* value) {
   if (at >= ABS_BASE && at < ABS_BASE + 0x200) {
     float low, high, *f = absolute(c, ((unsigned)at - ABS_BASE) / 16, &low, &high);
     unsigned field = (unsigned)at / 4 % 4;
-    *value = !f ? 0 : field == 0 ? float_bits(low) : field == 1 ? float_bits(high) : field == 2 ? float_bits(*f) : 0;
+    *value = !f           ? 0
+             : field == 0 ? float_bits(low)
+             : field == 1 ? float_bits(high)
+             : field == 2 ? float_bits(*f)
+                          : 0;
     return RCODE_OK;
   }
   if (at >= STROBE_BASE && at < STROBE_BASE + 0x300) {
@@ -507,11 +523,14 @@ int iidc_write(struct iidc_camera* c, uint64_t offset, uint32_t value) {
   uint64_t at = offset - CSR;
   if (offset < CSR || offset & 3) return RCODE_ADDRESS;
   if (at >= ROM_OFFSET && at < ROM_OFFSET + 4u * (unsigned)c->rom_length) return RCODE_TYPE;
-  if (at >= COMMAND && at < COMMAND + 0x2000) return write_command(c, (uint32_t)at - COMMAND, value);
+  if (at >= COMMAND && at < COMMAND + 0x2000)
+    return write_command(c, (uint32_t)at - COMMAND, value);
   if (at >= F7_BASE && at < F7_BASE + 0x100) return write_f7(c, (uint32_t)at - F7_BASE, value);
   if (at >= ABS_BASE && at < ABS_BASE + 0x200) {
-    float low, high, wanted = bits_float(value), *f = absolute(c, ((unsigned)at - ABS_BASE) / 16, &low, &high);
-    if (f && at / 4 % 4 == 2 && isfinite(wanted)) *f = wanted < low ? low : wanted > high ? high : wanted;
+    float low, high, wanted = bits_float(value),
+                     *f = absolute(c, ((unsigned)at - ABS_BASE) / 16, &low, &high);
+    if (f && at / 4 % 4 == 2 && isfinite(wanted))
+      *f = wanted < low ? low : wanted > high ? high : wanted;
     return RCODE_OK;
   }
   if (at >= STROBE_BASE + 0x200 && at < STROBE_BASE + 0x210) {
@@ -537,9 +556,12 @@ static bool may_send(struct iidc_camera* c) {
   return false;
 }
 
-static uint64_t exposure_time_ns(const struct iidc_camera* c) { return (uint64_t)((double)c->shutter_abs * 1e9); }
+static uint64_t exposure_time_ns(const struct iidc_camera* c) {
+  return (uint64_t)((double)c->shutter_abs * 1e9);
+}
 
-bool iidc_next_frame(struct iidc_camera* c, struct iidc_sensor* s, uint64_t ns, uint64_t edge, uint64_t* begin) {
+bool iidc_next_frame(struct iidc_camera* c, struct iidc_sensor* s, uint64_t ns, uint64_t edge,
+                     uint64_t* begin) {
   uint64_t shutter = exposure_time_ns(c);
 
   if (c->trigger & bit(6)) {
@@ -600,7 +622,8 @@ static const uint8_t* film_image(const struct iidc_camera* c, uint64_t begin_ns)
   static bool any;
   size_t bytes = iidc_frame_bytes(c);
   if (!c->film || iidc_bits(c) != 8 || c->film_bytes < bytes || c->film_bytes % bytes) return NULL;
-  uint64_t n = (uint64_t)((double)begin_ns * 1e-9 * c->film_hz + 0.5), last = c->film_bytes / bytes - 1;
+  uint64_t n = (uint64_t)((double)begin_ns * 1e-9 * c->film_hz + 0.5),
+           last = c->film_bytes / bytes - 1;
   if (!any) first = n;
   any = true;
   n = n > first ? n - first : 0;
@@ -613,7 +636,8 @@ void iidc_draw(struct iidc_camera* c, uint8_t* image, uint64_t exposure_ns, uint
 
   const uint8_t* seen = film_image(c, exposure_ns - exposure_time_ns(c) / 2);
   if (seen) memcpy(image, seen, iidc_frame_bytes(c));
-  for (unsigned y = 0; y < height && !seen; y++) /* vertical bands in rows that move on by one grey level a frame */
+  for (unsigned y = 0; y < height && !seen;
+       y++) /* vertical bands in rows that move on by one grey level a frame */
     memset(image + (size_t)y * stride, (int)((y + n) & 0xff), stride);
   if (stride >= IIDC_STAMP_OFFSET + 24) {
     memcpy(image + IIDC_STAMP_OFFSET, "VRGF", 4);
@@ -621,7 +645,8 @@ void iidc_draw(struct iidc_camera* c, uint8_t* image, uint64_t exposure_ns, uint
     put(image + IIDC_STAMP_OFFSET + 8, exposure_ns, 8);
     put(image + IIDC_STAMP_OFFSET + 16, c->guid, 8);
   }
-  /* embedded information: one big-endian quadlet for each bit set, from the least significant bit on */
+  /* embedded information: one big-endian quadlet for each bit set, from the least significant bit
+   * on */
   for (unsigned b = 0; b < 10; b++) {
     if (!(c->frame_info >> b & 1) || at + 4 > iidc_frame_bytes(c)) continue;
     uint32_t v = b == 0 ? cycle_time : b == 6 ? n : 0;

@@ -46,7 +46,8 @@ void iidc_init(struct iidc_camera* c, unsigned index);
 /* The same camera with a 1394b link (S800). */
 void iidc_init_beta(struct iidc_camera* c);
 
-/* Registers and ROM, offsets in the 48-bit address space of a node. Return 0, or an IEEE 1394 response code. */
+/* Registers and ROM, offsets in the 48-bit address space of a node. Return 0, or an IEEE 1394
+ * response code. */
 int iidc_read(struct iidc_camera* c, uint64_t offset, uint32_t* value);
 int iidc_write(struct iidc_camera* c, uint64_t offset, uint32_t value);
 
@@ -58,26 +59,29 @@ unsigned iidc_packet_bytes(const struct iidc_camera* c);
 size_t iidc_frame_bytes(const struct iidc_camera* c);
 double iidc_rate(const struct iidc_camera* c);
 
-/* The sensor's own time. Free running, frame k begins to expose at k / rate on CLOCK_MONOTONIC, so that cameras of one rate
- * are in step as on a real 1394 bus. Triggered, it begins at the edge, and edges during an exposure are lost. */
+/* The sensor's own time. Free running, frame k begins to expose at k / rate on CLOCK_MONOTONIC, so
+ * that cameras of one rate are in step as on a real 1394 bus. Triggered, it begins at the edge, and
+ * edges during an exposure are lost. */
 struct iidc_sensor {
   uint64_t tick;     /* last frame begun */
   uint64_t exposing; /* begin of the triggered exposure now going on, or 0 */
   uint64_t missed_edges;
 };
 
-/* Call until it says false: is a frame ready (exposed to the end) at `ns`? Gives the begin of its exposure.
- * `edge`: time of an external trigger pulse, or 0. Consumes one-shots and software triggers. */
-bool iidc_next_frame(struct iidc_camera* c, struct iidc_sensor* s, uint64_t ns, uint64_t edge, uint64_t* begin);
+/* Call until it says false: is a frame ready (exposed to the end) at `ns`? Gives the begin of its
+ * exposure. `edge`: time of an external trigger pulse, or 0. Consumes one-shots and software
+ * triggers. */
+bool iidc_next_frame(struct iidc_camera* c, struct iidc_sensor* s, uint64_t ns, uint64_t edge,
+                     uint64_t* begin);
 
-/* The camera looks at DIR/camera<INDEX>.raw, image n of all cameras standing from (n - 1/2) / hz to (n + 1/2) / hz after the
- * exposure of the first frame anybody takes; the last one stays. Modes of another size or depth show the pattern. 0, or -1 with a
- * message. */
+/* The camera looks at DIR/camera<INDEX>.raw, image n of all cameras standing from (n - 1/2) / hz to
+ * (n + 1/2) / hz after the exposure of the first frame anybody takes; the last one stays. Modes of
+ * another size or depth show the pattern. 0, or -1 with a message. */
 int iidc_load_film(struct iidc_camera* c, const char* dir, unsigned index, double hz);
 
-/* Draws frame number c->frames_made (the film's image, or a moving pattern), stamps it and counts on.
- * Row 0, from byte 64: "VRGF", frame number (u32), middle of the exposure on CLOCK_MONOTONIC in ns (u64), GUID (u64);
- * all little endian. */
+/* Draws frame number c->frames_made (the film's image, or a moving pattern), stamps it and counts
+ * on. Row 0, from byte 64: "VRGF", frame number (u32), middle of the exposure on CLOCK_MONOTONIC in
+ * ns (u64), GUID (u64); all little endian. */
 #define IIDC_STAMP_OFFSET 64
 void iidc_draw(struct iidc_camera* c, uint8_t* image, uint64_t exposure_ns, uint32_t cycle_time);
 

@@ -1,15 +1,14 @@
 /* sim_1394: cameras on the virtual IEEE 1394 bus (/dev/vbus1394).
  *
- *   sim_1394 [--cameras N] [--s800] [--trigger-hz F] [--seconds S] [--ready FILE] [--film DIR] [--film-hz F]
+ *   sim_1394 [--cameras N] [--s800] [--trigger-hz F] [--seconds S] [--ready FILE] [--film DIR]
+ * [--film-hz F]
  *
  * Commands on standard input, one a line:
  *   plug N        N cameras on the bus from now on (0 to 3): a bus reset
- *   trigger [NS]  one external trigger pulse to all cameras, now or at that time of CLOCK_MONOTONIC, a moment ago
- *   miss C N      the next N pulses do not reach camera C
- *   drop C N      the next N frames of camera C are exposed but lost on the wire
- *   tear C N      the next N frames of camera C lose one packet each, in the middle
- *   mute C 0|1    camera C stops sending / goes on
- *   quit
+ *   trigger [NS]  one external trigger pulse to all cameras, now or at that time of
+ * CLOCK_MONOTONIC, a moment ago miss C N      the next N pulses do not reach camera C drop C N the
+ * next N frames of camera C are exposed but lost on the wire tear C N      the next N frames of
+ * camera C lose one packet each, in the middle mute C 0|1    camera C stops sending / goes on quit
  * At the end it prints for each camera what was exposed and what was put on the bus.
  */
 #include <endian.h>
@@ -67,7 +66,9 @@ static void bus_clock(void) {
   offset_s = parameter("offset_s");
 }
 
-static uint64_t bus_time(uint64_t ns) { return ns + (uint64_t)((int64_t)ns * drift_ppb / 1000000000) + (uint64_t)offset_s * 1000000000u; }
+static uint64_t bus_time(uint64_t ns) {
+  return ns + (uint64_t)((int64_t)ns * drift_ppb / 1000000000) + (uint64_t)offset_s * 1000000000u;
+}
 
 static void on_signal(int n) {
   (void)n;
@@ -75,7 +76,8 @@ static void on_signal(int n) {
 }
 
 static void send_records(const void* records, size_t bytes) {
-  if (bytes && write(bus, records, bytes) != (ssize_t)bytes) fprintf(stderr, "sim_1394: write: %s\n", strerror(errno));
+  if (bytes && write(bus, records, bytes) != (ssize_t)bytes)
+    fprintf(stderr, "sim_1394: write: %s\n", strerror(errno));
 }
 
 static void announce(void) {
@@ -123,14 +125,16 @@ static void answer(const struct vb_request* q) {
   send_records(&r, r.head.r.length);
 }
 
-/* Appends the packets that are due up to `cycle` to the batch, at the pace of the bus: one each 125 us. */
+/* Appends the packets that are due up to `cycle` to the batch, at the pace of the bus: one each 125
+ * us. */
 static size_t transmit(struct node* n, uint64_t cycle, uint8_t* batch, size_t room) {
   struct iidc_camera* c = &n->camera;
   size_t used = 0, packet = iidc_packet_bytes(c);
 
   while (n->sent < n->bytes && n->next_cycle <= cycle && packet) {
     size_t bytes = n->bytes - n->sent < packet ? n->bytes - n->sent : packet;
-    struct vb_iso iso = {{VB_ISO, (uint32_t)(sizeof iso + packet)}, (uint8_t)c->channel, 0, n->sent == 0, 0, 0};
+    struct vb_iso iso = {
+        {VB_ISO, (uint32_t)(sizeof iso + packet)}, (uint8_t)c->channel, 0, n->sent == 0, 0, 0};
     size_t whole = (sizeof iso + packet + 7) & ~(size_t)7;
     if (n->tearing && n->sent >= n->bytes / 2) { /* nobody hears this one */
       n->tearing = false;
@@ -142,7 +146,8 @@ static size_t transmit(struct node* n, uint64_t cycle, uint8_t* batch, size_t ro
     iso.cycle = (uint32_t)(n->next_cycle / 8000 % 8 << 13 | n->next_cycle % 8000);
     memcpy(batch + used, &iso, sizeof iso);
     memcpy(batch + used + sizeof iso, n->image + n->sent, bytes);
-    memset(batch + used + sizeof iso + bytes, 0, whole - sizeof iso - bytes); /* the last packet is padded */
+    memset(batch + used + sizeof iso + bytes, 0,
+           whole - sizeof iso - bytes); /* the last packet is padded */
     used += whole;
     n->sent += bytes;
     n->next_cycle++;
@@ -166,7 +171,8 @@ static size_t advance(struct node* n, uint64_t ns, uint64_t edge, uint8_t* batch
     }
     n->bytes = iidc_frame_bytes(c);
     n->image = realloc(n->image, n->bytes + 64);
-    iidc_draw(c, n->image, begin + shutter / 2, cycle_time(bus_time(begin + shutter))); /* cameras stamp its end */
+    iidc_draw(c, n->image, begin + shutter / 2,
+              cycle_time(bus_time(begin + shutter))); /* cameras stamp its end */
     n->sent = 0;
     n->tearing = false;
     n->next_cycle = bus_time(begin + shutter) / 125000 + 1;
@@ -264,7 +270,8 @@ int main(int argc, char** argv) {
     } record;
 
     for (unsigned i = 0; i < node_count; i++)
-      busy |= nodes[i].camera.transmitting || nodes[i].camera.one_shot || nodes[i].camera.multi_shot || nodes[i].sent < nodes[i].bytes;
+      busy |= nodes[i].camera.transmitting || nodes[i].camera.one_shot ||
+              nodes[i].camera.multi_shot || nodes[i].sent < nodes[i].bytes;
     poll(fds, 2, busy ? 1 : 20);
     if (fds[1].revents) {
       ssize_t got = read(0, line + filled, sizeof line - 1 - filled);
@@ -303,9 +310,11 @@ int main(int argc, char** argv) {
   }
   for (unsigned i = 0; i < VB_MAX_NODES; i++)
     if (nodes[i].exposed)
-      printf("sim_1394: camera %u exposed %llu transmitted %llu torn %llu dropped %llu overtaken %llu missed triggers %llu\n", i,
-             (unsigned long long)nodes[i].exposed, (unsigned long long)nodes[i].transmitted, (unsigned long long)nodes[i].torn,
-             (unsigned long long)nodes[i].dropped, (unsigned long long)nodes[i].overtaken,
-             (unsigned long long)nodes[i].sensor.missed_edges);
+      printf(
+          "sim_1394: camera %u exposed %llu transmitted %llu torn %llu dropped %llu overtaken %llu "
+          "missed triggers %llu\n",
+          i, (unsigned long long)nodes[i].exposed, (unsigned long long)nodes[i].transmitted,
+          (unsigned long long)nodes[i].torn, (unsigned long long)nodes[i].dropped,
+          (unsigned long long)nodes[i].overtaken, (unsigned long long)nodes[i].sensor.missed_edges);
   return 0;
 }

@@ -14,7 +14,8 @@ static inline uint64_t now_ns(void) {
 /* The cycle time register of the virtual 1394 bus at this moment of CLOCK_MONOTONIC. */
 static inline uint32_t cycle_time(uint64_t ns) {
   uint32_t rest = (uint32_t)(ns % 1000000000u);
-  return (uint32_t)(ns / 1000000000u % 128) << 25 | rest / 125000 << 12 | rest % 125000 * 3072 / 125000;
+  return (uint32_t)(ns / 1000000000u % 128) << 25 | rest / 125000 << 12 |
+         rest % 125000 * 3072 / 125000;
 }
 
 #endif

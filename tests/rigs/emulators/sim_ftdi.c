@@ -1,11 +1,12 @@
-/* sim_ftdi: an FT232R on the virtual USB host, so that the kernel's ftdi_sio makes /dev/ttyUSB* of it.
+/* sim_ftdi: an FT232R on the virtual USB host, so that the kernel's ftdi_sio makes /dev/ttyUSB* of
+ * it.
  *
  *   sim_ftdi --wire PATH [--serial TEXT] [--product TEXT] [--seconds S] [--ready FILE]
  *
- * PATH becomes a link to a pseudo-terminal: the far end of the serial line, for a simulated instrument to open. Bytes
- * from there reach the host at the line rate the host has set (and those of the host the far end), packed as the chip does
- * it: at most 62 to a USB packet, a short packet when the latency timer has run out. Commands on standard input: "unplug",
- * "replug", "quit".
+ * PATH becomes a link to a pseudo-terminal: the far end of the serial line, for a simulated
+ * instrument to open. Bytes from there reach the host at the line rate the host has set (and those
+ * of the host the far end), packed as the chip does it: at most 62 to a USB packet, a short packet
+ * when the latency timer has run out. Commands on standard input: "unplug", "replug", "quit".
  */
 #include <errno.h>
 #include <fcntl.h>
@@ -25,7 +26,8 @@
 #define MODEM 0x31u /* CTS and DSR on, in the layout of the chip's first status byte */
 #define LINE 0x60u  /* transmitter empty */
 
-/* One direction of the line: a byte that waits is through when its ten bits have passed, never sooner. */
+/* One direction of the line: a byte that waits is through when its ten bits have passed, never
+ * sooner. */
 struct way {
   uint8_t waiting[65536];
   size_t used;
@@ -46,9 +48,11 @@ static struct ftdi {
 } ftdi;
 static volatile sig_atomic_t stop;
 
-static const uint8_t device_descriptor[18] = {18, 1, 0x00, 0x02, 0, 0, 0, 8, 0x03, 0x04, 0x01, 0x60, 0x00, 0x06, 1, 2, 3, 1};
-static const uint8_t config_descriptor[32] = {9,    2, 32, 0, 1,    1, 0,  0xa0, 45, 9, 4, 0,    0, 2,  0xff, 0xff,
-                                              0xff, 2, 7,  5, 0x81, 2, 64, 0,    0,  7, 5, 0x02, 2, 64, 0,    0};
+static const uint8_t device_descriptor[18] = {18,   1,    0x00, 0x02, 0,    0, 0, 8, 0x03,
+                                              0x04, 0x01, 0x60, 0x00, 0x06, 1, 2, 3, 1};
+static const uint8_t config_descriptor[32] = {9,  2, 32, 0,    1,    1,    0, 0xa0, 45, 9,    4,
+                                              0,  0, 2,  0xff, 0xff, 0xff, 2, 7,    5,  0x81, 2,
+                                              64, 0, 0,  7,    5,    0x02, 2, 64,   0,  0};
 
 static void on_signal(int n) {
   (void)n;
@@ -137,7 +141,8 @@ static void from_host(void* self, unsigned endpoint, const uint8_t* data, size_t
   uint64_t ns = now_ns();
   give_to_wire(ns); /* what was there before has had its time, these bytes have not */
   begin(w, ns);
-  if (bytes > sizeof w->waiting - w->used) { /* the chip would make the host wait; nothing here sends that much */
+  if (bytes > sizeof w->waiting -
+                  w->used) { /* the chip would make the host wait; nothing here sends that much */
     ftdi.overrun += bytes - (sizeof w->waiting - w->used);
     bytes = sizeof w->waiting - w->used;
   }
@@ -162,7 +167,8 @@ static void take_from_wire(uint64_t ns) {
   w->used += (size_t)n;
 }
 
-/* Whole packets go at once; a part of one, or the bare status, when the latency timer has run out. */
+/* Whole packets go at once; a part of one, or the bare status, when the latency timer has run out.
+ */
 static void send_up(uint64_t ns) {
   uint64_t latency = (uint64_t)ftdi.latency_ms * 1000000;
   long room = usb_in_room(&ftdi.usb, 1);
@@ -273,6 +279,7 @@ int main(int argc, char** argv) {
   }
   usb_unplug(&ftdi.usb);
   unlink(wire);
-  printf("sim_ftdi: %lu bytes to the host, %lu from it, %lu found no room\n", ftdi.up, ftdi.down, ftdi.overrun);
+  printf("sim_ftdi: %lu bytes to the host, %lu from it, %lu found no room\n", ftdi.up, ftdi.down,
+         ftdi.overrun);
   return 0;
 }

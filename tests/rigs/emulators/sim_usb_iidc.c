@@ -1,12 +1,13 @@
-/* sim_usb_iidc: cameras with the IIDC register map behind USB vendor requests and one bulk endpoint, as Point Grey built
- * them and libdc1394 expects them (1e10:2005).
+/* sim_usb_iidc: cameras with the IIDC register map behind USB vendor requests and one bulk
+ * endpoint, as Point Grey built them and libdc1394 expects them (1e10:2005).
  *
- *   sim_usb_iidc [--cameras N] [--trigger-hz F] [--seconds S] [--ready FILE] [--film DIR] [--film-hz F]
+ *   sim_usb_iidc [--cameras N] [--trigger-hz F] [--seconds S] [--ready FILE] [--film DIR]
+ * [--film-hz F]
  *
- * Registers: control transfers 0xc0/0x40, request 0x7f for the 0xffff page, value and index = low and high half of the
- * lower 32 bits of the address, quadlets little endian. Image: bulk IN 0x81, a short packet at the end of a frame only
- * where its size asks for one. Commands on standard input as in sim_1394 ("tear": the frame ends in its middle), and
- * "unplug C", "replug C".
+ * Registers: control transfers 0xc0/0x40, request 0x7f for the 0xffff page, value and index = low
+ * and high half of the lower 32 bits of the address, quadlets little endian. Image: bulk IN 0x81, a
+ * short packet at the end of a frame only where its size asks for one. Commands on standard input
+ * as in sim_1394 ("tear": the frame ends in its middle), and "unplug C", "replug C".
  */
 #include <fcntl.h>
 #include <poll.h>
@@ -38,8 +39,10 @@ static struct unit units[MOST];
 static unsigned count = 2;
 static volatile sig_atomic_t stop;
 
-static const uint8_t device_descriptor[18] = {18, 1, 0x00, 0x02, 0, 0, 0, 64, 0x10, 0x1e, 0x05, 0x20, 0, 0, 1, 2, 3, 1};
-static const uint8_t high_speed[25] = {9, 2, 25, 0, 1, 1, 0, 0x80, 250, 9, 4, 0, 0, 1, 0xff, 0xff, 0xff, 0, 7, 5, 0x81, 2, 0x00, 0x02, 0};
+static const uint8_t device_descriptor[18] = {18,   1,    0x00, 0x02, 0, 0, 0, 64, 0x10,
+                                              0x1e, 0x05, 0x20, 0,    0, 1, 2, 3,  1};
+static const uint8_t high_speed[25] = {9, 2,    25,   0,    1, 1, 0, 0x80, 250, 9,    4,    0, 0,
+                                       1, 0xff, 0xff, 0xff, 0, 7, 5, 0x81, 2,   0x00, 0x02, 0};
 
 static void on_signal(int n) {
   (void)n;
@@ -57,7 +60,8 @@ static int control(void* self, const struct usb_setup* s, uint8_t* data) {
       if (iidc_read(&u->camera, offset + i, &v)) return -1;
       for (unsigned b = 0; b < 4; b++) data[i + b] = (uint8_t)(v >> (8 * b));
     } else {
-      v = (uint32_t)data[i] | (uint32_t)data[i + 1] << 8 | (uint32_t)data[i + 2] << 16 | (uint32_t)data[i + 3] << 24;
+      v = (uint32_t)data[i] | (uint32_t)data[i + 1] << 8 | (uint32_t)data[i + 2] << 16 |
+          (uint32_t)data[i + 3] << 24;
       if (iidc_write(&u->camera, offset + i, v)) return -1;
     }
   }
@@ -74,17 +78,20 @@ static void expose(struct unit* u, uint64_t ns, uint64_t edge) {
     edge = 0;
     u->exposed++;
     deliver(u);
-    if (u->sent > 0 && u->sent < u->bytes) { /* still on its way: the sensor's frame has nowhere to go */
+    if (u->sent > 0 &&
+        u->sent < u->bytes) { /* still on its way: the sensor's frame has nowhere to go */
       u->overtaken++;
       c->frames_made++;
       continue;
     }
     if (u->bytes && u->sent == 0) u->overtaken++; /* nobody fetched the last one */
     size_t packet = iidc_packet_bytes(c), image = iidc_frame_bytes(c);
-    u->bytes = packet ? (image + packet - 1) / packet * packet : image; /* whole packets, as over a bus */
+    u->bytes =
+        packet ? (image + packet - 1) / packet * packet : image; /* whole packets, as over a bus */
     u->image = realloc(u->image, u->bytes);
     memset(u->image + image, 0, u->bytes - image);
-    iidc_draw(c, u->image, begin + shutter / 2, cycle_time(begin + shutter)); /* cameras stamp its end */
+    iidc_draw(c, u->image, begin + shutter / 2,
+              cycle_time(begin + shutter)); /* cameras stamp its end */
     u->sent = 0;
     u->tearing = false;
     if (u->drop || u->muted) {
@@ -183,13 +190,14 @@ int main(int argc, char** argv) {
     iidc_init(&u->camera, i);
     if (film && iidc_load_film(&u->camera, film, i, film_hz)) return 1;
     snprintf(u->serial, sizeof u->serial, "%u", 10240000 + i);
-    u->usb = (struct usb_device){.device_descriptor = device_descriptor,
-                                 .config_descriptor = high_speed,
-                                 .strings = {NULL, "Vergence Rigs", "Emulated IIDC camera", u->serial},
-                                 .speed = USB_HIGH,
-                                 .self = u,
-                                 .control = control,
-                                 .fd = -1};
+    u->usb =
+        (struct usb_device){.device_descriptor = device_descriptor,
+                            .config_descriptor = high_speed,
+                            .strings = {NULL, "Vergence Rigs", "Emulated IIDC camera", u->serial},
+                            .speed = USB_HIGH,
+                            .self = u,
+                            .control = control,
+                            .fd = -1};
     if (usb_plug(&u->usb)) return 1;
   }
   if (ready) close(open(ready, O_CREAT | O_WRONLY, 0644));
@@ -201,7 +209,8 @@ int main(int argc, char** argv) {
 
     for (unsigned i = 0; i < count; i++) {
       fds[i] = (struct pollfd){units[i].usb.fd, POLLIN, 0};
-      if (units[i].camera.transmitting || units[i].camera.one_shot || units[i].camera.multi_shot) timeout = 1;
+      if (units[i].camera.transmitting || units[i].camera.one_shot || units[i].camera.multi_shot)
+        timeout = 1;
     }
     fds[count] = (struct pollfd){input ? 0 : -1, POLLIN, 0};
     poll(fds, count + 1, timeout);
@@ -241,9 +250,12 @@ int main(int argc, char** argv) {
   for (unsigned i = 0; i < count; i++) {
     usb_unplug(&units[i].usb);
     if (units[i].exposed)
-      printf("sim_usb_iidc: camera %u exposed %llu delivered %llu torn %llu dropped %llu overtaken %llu\n", i,
-             (unsigned long long)units[i].exposed, (unsigned long long)units[i].delivered, (unsigned long long)units[i].torn,
-             (unsigned long long)units[i].dropped, (unsigned long long)units[i].overtaken);
+      printf(
+          "sim_usb_iidc: camera %u exposed %llu delivered %llu torn %llu dropped %llu overtaken "
+          "%llu\n",
+          i, (unsigned long long)units[i].exposed, (unsigned long long)units[i].delivered,
+          (unsigned long long)units[i].torn, (unsigned long long)units[i].dropped,
+          (unsigned long long)units[i].overtaken);
   }
   return 0;
 }

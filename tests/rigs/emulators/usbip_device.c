@@ -16,7 +16,9 @@
 
 enum { CMD_SUBMIT = 1, CMD_UNLINK = 2, RET_SUBMIT = 3, RET_UNLINK = 4 };
 
-static uint32_t get32(const uint8_t* p) { return (uint32_t)p[0] << 24 | (uint32_t)p[1] << 16 | (uint32_t)p[2] << 8 | p[3]; }
+static uint32_t get32(const uint8_t* p) {
+  return (uint32_t)p[0] << 24 | (uint32_t)p[1] << 16 | (uint32_t)p[2] << 8 | p[3];
+}
 
 static void put32(uint8_t* p, uint32_t v) {
   p[0] = (uint8_t)(v >> 24);
@@ -46,7 +48,8 @@ static bool send_all(struct usb_device* d, const uint8_t* head, const uint8_t* d
 }
 
 /* `actual` counts for OUT transfers, too, which carry no data back. */
-static void complete(struct usb_device* d, uint32_t seqnum, int status, uint32_t actual, const uint8_t* data, size_t bytes) {
+static void complete(struct usb_device* d, uint32_t seqnum, int status, uint32_t actual,
+                     const uint8_t* data, size_t bytes) {
   uint8_t head[HEADER] = {0};
   put32(head, RET_SUBMIT);
   put32(head + 4, seqnum);
@@ -62,7 +65,9 @@ static int free_port(enum usb_speed speed) {
 
   if (!f) return -1;
   while (found < 0 && fgets(line, sizeof line, f))
-    if (sscanf(line, "%15s %d %d", hub, &port, &status) == 3 && status == 4 && !strcmp(hub, speed == USB_SUPER ? "ss" : "hs")) found = port;
+    if (sscanf(line, "%15s %d %d", hub, &port, &status) == 3 && status == 4 &&
+        !strcmp(hub, speed == USB_SUPER ? "ss" : "hs"))
+      found = port;
   fclose(f);
   return found;
 }
@@ -85,12 +90,14 @@ int usb_plug(struct usb_device* d) {
   for (int attempt = 0;; attempt++) {
     d->port = free_port(d->speed);
     if (d->port >= 0) {
-      snprintf(text, sizeof text, "%d %d %d %d", d->port, pair[1], 0x10000 + d->port + 2, (int)d->speed);
+      snprintf(text, sizeof text, "%d %d %d %d", d->port, pair[1], 0x10000 + d->port + 2,
+               (int)d->speed);
       if (!write_file(VHCI "attach", text)) break;
     }
     /* a port just left needs a moment, and another emulator may have been faster */
     if (attempt == 100 || (d->port >= 0 && errno != EBUSY)) {
-      fprintf(stderr, "usbip: no port of vhci_hcd: %s\n", d->port < 0 ? "none is free" : strerror(errno));
+      fprintf(stderr, "usbip: no port of vhci_hcd: %s\n",
+              d->port < 0 ? "none is free" : strerror(errno));
       close(pair[0]);
       close(pair[1]);
       return -1;
@@ -169,7 +176,8 @@ static int standard(struct usb_device* d, const struct usb_setup* s, uint8_t* da
   }
 }
 
-static void submit(struct usb_device* d, const uint8_t* head, const uint8_t* carried, uint32_t length) {
+static void submit(struct usb_device* d, const uint8_t* head, const uint8_t* carried,
+                   uint32_t length) {
   uint32_t seqnum = get32(head + 4);
   bool in = get32(head + 12) != 0;
   unsigned endpoint = get32(head + 16) & 15;
@@ -177,16 +185,20 @@ static void submit(struct usb_device* d, const uint8_t* head, const uint8_t* car
   if (endpoint == 0) {
     static uint8_t data[65536 + 64];
     const uint8_t* p = head + 40;
-    struct usb_setup s = {p[0], p[1], (uint16_t)(p[2] | p[3] << 8), (uint16_t)(p[4] | p[5] << 8), (uint16_t)(p[6] | p[7] << 8)};
+    struct usb_setup s = {p[0], p[1], (uint16_t)(p[2] | p[3] << 8), (uint16_t)(p[4] | p[5] << 8),
+                          (uint16_t)(p[6] | p[7] << 8)};
     int n;
 
     memset(data, 0, 256);
     if (!in && length) memcpy(data, carried, length < 65536 ? length : 65536);
-    n = (s.type & 0x60) == 0 ? standard(d, &s, data) : d->control ? d->control(d->self, &s, data) : -1;
+    n = (s.type & 0x60) == 0 ? standard(d, &s, data)
+        : d->control         ? d->control(d->self, &s, data)
+                             : -1;
     if (n < 0)
       complete(d, seqnum, -EPIPE, 0, NULL, 0);
     else if (in)
-      complete(d, seqnum, 0, (uint32_t)n < length ? (uint32_t)n : length, data, (uint32_t)n < length ? (uint32_t)n : length);
+      complete(d, seqnum, 0, (uint32_t)n < length ? (uint32_t)n : length, data,
+               (uint32_t)n < length ? (uint32_t)n : length);
     else
       complete(d, seqnum, 0, length, NULL, 0);
   } else if (in) {
@@ -203,7 +215,8 @@ static void submit(struct usb_device* d, const uint8_t* head, const uint8_t* car
 
 static void forget(struct usb_device* d, unsigned endpoint, unsigned i) {
   d->waiting_count[endpoint]--;
-  memmove(&d->waiting[endpoint][i], &d->waiting[endpoint][i + 1], (d->waiting_count[endpoint] - i) * sizeof d->waiting[0][0]);
+  memmove(&d->waiting[endpoint][i], &d->waiting[endpoint][i + 1],
+          (d->waiting_count[endpoint] - i) * sizeof d->waiting[0][0]);
 }
 
 static void unlink_transfer(struct usb_device* d, const uint8_t* head) {

@@ -1,5 +1,6 @@
-/* The device side of USB/IP, for devices that are programs: plugs a device into the kernel's virtual host controller
- * (vhci_hcd) through a socket pair. No server, no network. One thread; the caller polls usb.fd. */
+/* The device side of USB/IP, for devices that are programs: plugs a device into the kernel's
+ * virtual host controller (vhci_hcd) through a socket pair. No server, no network. One thread; the
+ * caller polls usb.fd. */
 #ifndef USBIP_DEVICE_H
 #define USBIP_DEVICE_H
 
@@ -22,7 +23,8 @@ struct usb_device {
   const char* strings[8]; /* 1 = manufacturer and so on */
   enum usb_speed speed;
   void* self;
-  /* Requests that are not standard ones. `data` holds what came, or takes what goes. Returns bytes, or -1 to stall. */
+  /* Requests that are not standard ones. `data` holds what came, or takes what goes. Returns bytes,
+   * or -1 to stall. */
   int (*control)(void* self, const struct usb_setup* setup, uint8_t* data);
   void (*out)(void* self, unsigned endpoint, const uint8_t* data, size_t bytes);
   void (*configured)(void* self, unsigned configuration);

@@ -1,12 +1,14 @@
 // SPDX-License-Identifier: GPL-2.0 OR MIT
 /*
- * A virtual IEEE 1394 card. To the kernel's FireWire core it is a link-layer controller like any other, so
- * /dev/fw*, sysfs, udev events, bus resets, transactions and isochronous reception are the real ones. The remote
- * nodes are played by a user program through /dev/vbus1394 (vergence_1394_abi.h).
+ * A virtual IEEE 1394 card. To the kernel's FireWire core it is a link-layer controller like any
+ * other, so /dev/fw*, sysfs, udev events, bus resets, transactions and isochronous reception are
+ * the real ones. The remote nodes are played by a user program through /dev/vbus1394
+ * (vergence_1394_abi.h).
  *
- * Cycle time follows CLOCK_MONOTONIC: second = ns / 1e9 mod 128, cycle = (ns mod 1e9) / 125 us, with the drift and the
- * offset of the parameters (vergence_1394.drift_ppb=50000 vergence_1394.offset_s=120 on the kernel's command line).
- * Not emulated: isochronous transmission, multichannel reception, requests from remote nodes to the host.
+ * Cycle time follows CLOCK_MONOTONIC: second = ns / 1e9 mod 128, cycle = (ns mod 1e9) / 125 us,
+ * with the drift and the offset of the parameters (vergence_1394.drift_ppb=50000
+ * vergence_1394.offset_s=120 on the kernel's command line). Not emulated: isochronous transmission,
+ * multichannel reception, requests from remote nodes to the host.
  */
 #include <linux/dma-mapping.h>
 #include <linux/firewire-constants.h>
@@ -93,7 +95,9 @@ struct vcard {
 
 static struct vcard* the_card;
 
-static struct vcard* to_vcard(struct fw_card* card) { return container_of(card, struct vcard, card); }
+static struct vcard* to_vcard(struct fw_card* card) {
+  return container_of(card, struct vcard, card);
+}
 
 static int drift_ppb;
 module_param(drift_ppb, int, 0444);
@@ -119,7 +123,8 @@ static u32 cycle_time_now(void) {
 /* ---- bus resets ---- */
 
 static u32 self_id(u32 id, u32 gap, u32 speed, bool contender, u32 p0, u32 p1, u32 p2) {
-  return 2u << 30 | id << 24 | 1u << 22 | gap << 16 | speed << 14 | (contender ? 1u << 11 : 0) | 4u << 8 | p0 << 6 | p1 << 4 | p2 << 2;
+  return 2u << 30 | id << 24 | 1u << 22 | gap << 16 | speed << 14 | (contender ? 1u << 11 : 0) |
+         4u << 8 | p0 << 6 | p1 << 4 | p2 << 2;
 }
 
 static void reset_work(struct work_struct* work) {
@@ -137,11 +142,13 @@ static void reset_work(struct work_struct* work) {
   v->bandwidth = BANDWIDTH_AVAILABLE_INITIAL;
   v->channels_hi = 0xffffffff;
   v->channels_lo = 0xffffffff;
-  list_splice_init(&v->pending, &stale); /* split transactions die with the reset; the core times them out */
+  list_splice_init(&v->pending,
+                   &stale); /* split transactions die with the reset; the core times them out */
   v->pending_count = 0;
   for (i = 0; i < count; i++) ids[i] = self_id(i, v->gap_count, v->speed, false, 2, 0, 0);
   for (i = 0; i < VB_MAX_NODES; i++) port[i] = i < count ? 3 : 1;
-  ids[count] = self_id(count, v->gap_count, 3, true, port[0], port[1], port[2]); /* the card itself: S800 */
+  ids[count] =
+      self_id(count, v->gap_count, 3, true, port[0], port[1], port[2]); /* the card itself: S800 */
   v->reset_to_report = true;
   spin_unlock_irq(&v->lock);
 
@@ -158,7 +165,8 @@ static void reset_work(struct work_struct* work) {
 static void answer_local_rom(struct vcard* v, struct fw_packet* packet, u32 csr) {
   struct fw_packet response;
   int tcode = H0_TCODE(packet->header[0]);
-  u32 at = csr - CSR_CONFIG_ROM, length = tcode == TCODE_READ_BLOCK_REQUEST ? H3_LENGTH(packet->header[3]) : 4;
+  u32 at = csr - CSR_CONFIG_ROM,
+      length = tcode == TCODE_READ_BLOCK_REQUEST ? H3_LENGTH(packet->header[3]) : 4;
 
   if (tcode != TCODE_READ_QUADLET_REQUEST && tcode != TCODE_READ_BLOCK_REQUEST)
     fw_fill_response(&response, packet->header, RCODE_TYPE_ERROR, NULL, 0);
@@ -192,7 +200,8 @@ static void answer_local_resource(struct vcard* v, struct fw_packet* packet, u32
       break;
   }
   old = cpu_to_be32(*cell);
-  if (tcode == TCODE_LOCK_REQUEST && H3_EXTCODE(packet->header[3]) == EXTCODE_COMPARE_SWAP && H3_LENGTH(packet->header[3]) == 8) {
+  if (tcode == TCODE_LOCK_REQUEST && H3_EXTCODE(packet->header[3]) == EXTCODE_COMPARE_SWAP &&
+      H3_LENGTH(packet->header[3]) == 8) {
     if (old == argument[0]) *cell = be32_to_cpu(argument[1]);
     fw_fill_response(&response, packet->header, RCODE_COMPLETE, &old, 4);
   } else if (tcode == TCODE_READ_QUADLET_REQUEST) {
@@ -212,8 +221,8 @@ static void request_to_self(struct vcard* v, struct fw_packet* packet) {
   packet->callback(packet, &v->card, packet->ack);
   if (csr >= CSR_CONFIG_ROM && csr < CSR_CONFIG_ROM_END)
     answer_local_rom(v, packet, csr);
-  else if (csr == CSR_BUS_MANAGER_ID || csr == CSR_BANDWIDTH_AVAILABLE || csr == CSR_CHANNELS_AVAILABLE_HI ||
-           csr == CSR_CHANNELS_AVAILABLE_LO)
+  else if (csr == CSR_BUS_MANAGER_ID || csr == CSR_BANDWIDTH_AVAILABLE ||
+           csr == CSR_CHANNELS_AVAILABLE_HI || csr == CSR_CHANNELS_AVAILABLE_LO)
     answer_local_resource(v, packet, csr);
   else
     fw_core_handle_request(&v->card, packet);
@@ -285,7 +294,8 @@ static void vcard_send_request(struct fw_card* card, struct fw_packet* packet) {
   packet->timestamp = (cycle_time_now() >> 12) & 0xffff;
   if (H0_TCODE(packet->header[0]) == TCODE_LINK_INTERNAL) {
     /* a PHY configuration packet: keep the gap count it sets */
-    if ((packet->header[1] >> 30) == 0 && (packet->header[1] & (1u << 22))) v->gap_count = (packet->header[1] >> 16) & 0x3f;
+    if ((packet->header[1] >> 30) == 0 && (packet->header[1] & (1u << 22)))
+      v->gap_count = (packet->header[1] >> 16) & 0x3f;
     packet->ack = ACK_COMPLETE;
     packet->callback(packet, card, packet->ack);
     return;
@@ -295,7 +305,8 @@ static void vcard_send_request(struct fw_card* card, struct fw_packet* packet) {
     packet->callback(packet, card, packet->ack);
     return;
   }
-  if (H0_DEST(packet->header[0]) == (LOCAL_BUS | v->node_count) && packet->generation == v->generation) {
+  if (H0_DEST(packet->header[0]) == (LOCAL_BUS | v->node_count) &&
+      packet->generation == v->generation) {
     request_to_self(v, packet);
     return;
   }
@@ -313,7 +324,8 @@ static void vcard_send_response(struct fw_card* card, struct fw_packet* packet) 
   struct vcard* v = to_vcard(card);
 
   packet->timestamp = (cycle_time_now() >> 12) & 0xffff;
-  if (H0_DEST(packet->header[0]) == (LOCAL_BUS | v->node_count)) fw_core_handle_response(card, packet);
+  if (H0_DEST(packet->header[0]) == (LOCAL_BUS | v->node_count))
+    fw_core_handle_response(card, packet);
   packet->ack = ACK_COMPLETE;
   packet->callback(packet, card, packet->ack);
 }
@@ -323,7 +335,8 @@ static int vcard_cancel_packet(struct fw_card* card, struct fw_packet* packet) {
 }
 
 /* A response of the program becomes a packet of the bus. */
-static int take_response(struct vcard* v, const struct vb_response* r, const u8* payload, size_t bytes) {
+static int take_response(struct vcard* v, const struct vb_response* r, const u8* payload,
+                         size_t bytes) {
   struct vpending *p = NULL, *iter;
   struct fw_packet response;
 
@@ -371,7 +384,8 @@ static void copy_into(struct vslot* s, const u8* data, size_t bytes) {
   }
 }
 
-static void deliver(struct vcontext* c, const struct vb_iso* iso, u32 stamp, const u8* data, size_t bytes) {
+static void deliver(struct vcontext* c, const struct vb_iso* iso, u32 stamp, const u8* data,
+                    size_t bytes) {
   struct vslot* s = list_first_entry_or_null(&c->slots, struct vslot, link);
   size_t stripped = 0;
   __be32 q[2];
@@ -383,13 +397,15 @@ static void deliver(struct vcontext* c, const struct vb_iso* iso, u32 stamp, con
   }
   list_del(&s->link);
   c->received++;
-  if (c->header_bytes + c->base.header_size > PAGE_SIZE && !c->base.drop_overflow_headers) report_headers(c);
+  if (c->header_bytes + c->base.header_size > PAGE_SIZE && !c->base.drop_overflow_headers)
+    report_headers(c);
   c->last_stamp = stamp;
   if (c->header_bytes + c->base.header_size <= PAGE_SIZE) {
     u8* h = c->header + c->header_bytes;
     size_t lead = min_t(size_t, c->base.header_size, 8);
 
-    q[0] = cpu_to_be32((u32)bytes << 16 | iso->tag << 14 | iso->channel << 8 | TCODE_STREAM_DATA << 4 | iso->sy);
+    q[0] = cpu_to_be32((u32)bytes << 16 | iso->tag << 14 | iso->channel << 8 |
+                       TCODE_STREAM_DATA << 4 | iso->sy);
     q[1] = cpu_to_be32(0x00110000u | stamp); /* "complete" and the 16-bit stamp */
     memset(h, 0, c->base.header_size);
     memcpy(h, q, lead);
@@ -409,11 +425,13 @@ static void take_iso(struct vcard* v, const struct vb_iso* iso, const u8* data, 
   struct vcontext* c;
 
   spin_lock_irq(&v->lock);
-  list_for_each_entry(c, &v->contexts, link) if (c->base.channel == iso->channel) deliver(c, iso, stamp, data, bytes);
+  list_for_each_entry(c, &v->contexts, link) if (c->base.channel == iso->channel)
+      deliver(c, iso, stamp, data, bytes);
   spin_unlock_irq(&v->lock);
 }
 
-static struct fw_iso_context* vcard_allocate_iso(struct fw_card* card, int type, int channel, size_t header_size) {
+static struct fw_iso_context* vcard_allocate_iso(struct fw_card* card, int type, int channel,
+                                                 size_t header_size) {
   struct vcard* v = to_vcard(card);
   struct vcontext* c;
 
@@ -479,14 +497,18 @@ static void vcard_free_iso(struct fw_iso_context* base) {
   list_del(&c->link);
   spin_unlock_irq(&v->lock);
   if (c->dropped)
-    pr_info("vergence_1394: channel %d: %llu packets taken, %llu without a buffer or sync\n", base->channel, c->received, c->dropped);
+    pr_info("vergence_1394: channel %d: %llu packets taken, %llu without a buffer or sync\n",
+            base->channel, c->received, c->dropped);
   free_page((unsigned long)c->header);
   kfree(c);
 }
 
-static int vcard_set_iso_channels(struct fw_iso_context* base, u64* channels) { return -EOPNOTSUPP; }
+static int vcard_set_iso_channels(struct fw_iso_context* base, u64* channels) {
+  return -EOPNOTSUPP;
+}
 
-static int vcard_queue_iso(struct fw_iso_context* base, struct fw_iso_packet* packet, struct fw_iso_buffer* buffer, unsigned long payload) {
+static int vcard_queue_iso(struct fw_iso_context* base, struct fw_iso_packet* packet,
+                           struct fw_iso_buffer* buffer, unsigned long payload) {
   struct vcontext* c = container_of(base, struct vcontext, base);
   struct vcard* v = to_vcard(base->card);
   u32 count = packet->header_length / base->header_size, each, i;
@@ -544,7 +566,8 @@ static int vcard_set_rom(struct fw_card* card, const __be32* rom, size_t quadlet
 static int vcard_read_phy(struct fw_card* card, int address) { return 0; }
 
 static int vcard_update_phy(struct fw_card* card, int address, int clear, int set) {
-  if ((address == 1 && (set & PHY_BUS_RESET)) || (address == 5 && (set & PHY_BUS_SHORT_RESET))) schedule_work(&to_vcard(card)->reset_work);
+  if ((address == 1 && (set & PHY_BUS_RESET)) || (address == 5 && (set & PHY_BUS_SHORT_RESET)))
+    schedule_work(&to_vcard(card)->reset_work);
   return 0;
 }
 
@@ -696,7 +719,8 @@ static int take_record(struct vcard* v, const u8* at, size_t length) {
     return 0;
   }
   if (r->type == VB_RESPONSE && length >= sizeof(struct vb_response)) {
-    take_response(v, (const void*)at, at + sizeof(struct vb_response), length - sizeof(struct vb_response));
+    take_response(v, (const void*)at, at + sizeof(struct vb_response),
+                  length - sizeof(struct vb_response));
     return 0;
   }
   if (r->type == VB_ISO && length >= sizeof(struct vb_iso)) {

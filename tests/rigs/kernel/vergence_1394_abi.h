@@ -1,9 +1,10 @@
 /* SPDX-License-Identifier: GPL-2.0 OR MIT */
 /*
- * /dev/vbus1394: a virtual IEEE 1394 bus. The kernel side (vergence_1394.c) is a card driver for the kernel's own
- * FireWire core; the other nodes of the bus live in one user program, which opens the device, announces the nodes,
- * answers the requests sent to them and sends isochronous packets. All records start with struct vb_record and are
- * padded to 8 bytes. Host byte order, except packet payload, which is bus order (big endian) as on the wire.
+ * /dev/vbus1394: a virtual IEEE 1394 bus. The kernel side (vergence_1394.c) is a card driver for
+ * the kernel's own FireWire core; the other nodes of the bus live in one user program, which opens
+ * the device, announces the nodes, answers the requests sent to them and sends isochronous packets.
+ * All records start with struct vb_record and are padded to 8 bytes. Host byte order, except packet
+ * payload, which is bus order (big endian) as on the wire.
  */
 #ifndef VERGENCE_1394_ABI_H
 #define VERGENCE_1394_ABI_H
@@ -29,7 +30,8 @@ struct vb_record {
 
 struct vb_topology {
   struct vb_record r;
-  __u32 count; /* 0 to VB_MAX_NODES; node i gets physical id i, the host is the root with id count */
+  __u32
+      count; /* 0 to VB_MAX_NODES; node i gets physical id i, the host is the root with id count */
   __u32 speed; /* 2: S400, 3: S800 */
 };
 

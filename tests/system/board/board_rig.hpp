@@ -14,8 +14,8 @@
 
 namespace vergence::test {
 
-/// The simulated trigger board at the far end of an emulated FTDI converter, in real time inside the rig's kernel: the board's firmware
-/// state machine behind ftdi_sio.
+/// The simulated trigger board at the far end of an emulated FTDI converter, in real time inside
+/// the rig's kernel: the board's firmware state machine behind ftdi_sio.
 ///
 /// Threads  pulses(): any. `told` is called on the board's own thread.
 class BoardBehindConverter {
@@ -23,11 +23,14 @@ class BoardBehindConverter {
   static constexpr const char* kWire = "/run/vergence-board";
 
   /// `told`: of every pulse as it is made; returns what the cameras' exposure outputs do.
-  explicit BoardBehindConverter(mock::PulseSource told = {}, mock::BoardSimulatorOptions options = {})
+  explicit BoardBehindConverter(mock::PulseSource told = {},
+                                mock::BoardSimulatorOptions options = {})
       : converter_("sim_ftdi", {"--wire", kWire, "--serial", "VGBOARD1"}), told_(std::move(told)) {
     options.power_on = monotonic_now();
-    auto board = std::make_unique<mock::BoardSimulator>([this](const mock::SimulatedPulse& pulse) { return take(pulse); }, options);
-    board_ = std::make_unique<DeviceOnDescriptor>(::open(kWire, O_RDWR | O_NOCTTY | O_NONBLOCK), std::move(board));
+    auto board = std::make_unique<mock::BoardSimulator>(
+        [this](const mock::SimulatedPulse& pulse) { return take(pulse); }, options);
+    board_ = std::make_unique<DeviceOnDescriptor>(::open(kWire, O_RDWR | O_NOCTTY | O_NONBLOCK),
+                                                  std::move(board));
   }
 
   [[nodiscard]] Emulator& converter() noexcept { return converter_; }

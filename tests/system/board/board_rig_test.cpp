@@ -1,4 +1,5 @@
-// The trigger board's firmware, simulated, at the far end of an emulated FTDI converter: the driver on the kernel's ftdi_sio.
+// The trigger board's firmware, simulated, at the far end of an emulated FTDI converter: the driver
+// on the kernel's ftdi_sio.
 #include <gtest/gtest.h>
 
 #include <chrono>
@@ -25,7 +26,8 @@ TriggerConfiguration thirty_hertz() {
 
 std::vector<Pulse> take(TriggerDevice& device, std::size_t most) {
   std::vector<Pulse> all;
-  for (Pulse p; all.size() < most && device.wait(Duration::seconds(5), &p) == DeviceStatus::ok;) all.push_back(p);
+  for (Pulse p; all.size() < most && device.wait(Duration::seconds(5), &p) == DeviceStatus::ok;)
+    all.push_back(p);
   return all;
 }
 
@@ -40,8 +42,9 @@ class BoardRig : public ::testing::Test {
     })) << driver_.complaint();
     return device;
   }
-  /// Every report against the pulse that was made: number, and the time of the edge within the bound that goes with it (half of the
-  /// shortest way there and back: the chip's latency timer is in it).
+  /// Every report against the pulse that was made: number, and the time of the edge within the
+  /// bound that goes with it (half of the shortest way there and back: the chip's latency timer is
+  /// in it).
   void expect_true_edges(const std::vector<Pulse>& told) {
     std::map<std::uint64_t, HostStamp> made;
     for (const mock::SimulatedPulse& p : board_.pulses()) made[p.number] = p.edge;
@@ -64,13 +67,16 @@ TEST_F(BoardRig, reportsEveryPulseThroughTheRealDriverWithEitherLatencyTimer) {
     std::ofstream("/sys/bus/usb-serial/devices/ttyUSB0/latency_timer") << timer << std::flush;
     ASSERT_EQ(read_latency_timer_ms("/dev/ttyUSB0"), timer);
     ASSERT_EQ(device->configure(thirty_hertz(), nullptr), DeviceStatus::ok) << device->complaint();
-    const std::uint64_t before = device->statistics().malformed;  // heard at other rates, when the board was looked for
+    const std::uint64_t before =
+        device->statistics().malformed;  // heard at other rates, when the board was looked for
     ASSERT_EQ(device->start(nullptr), DeviceStatus::ok);
     const auto told = take(*device, 90);
     ASSERT_EQ(told.size(), 90U) << device->complaint();
-    for (std::size_t i = 1; i < told.size(); ++i) ASSERT_EQ(told[i].number, told[i - 1].number + 1) << "none is lost";
+    for (std::size_t i = 1; i < told.size(); ++i)
+      ASSERT_EQ(told[i].number, told[i - 1].number + 1) << "none is lost";
     expect_true_edges(told);
-    EXPECT_LE(device->statistics().malformed, before + 1) << "but for what was under way when the line was taken over";
+    EXPECT_LE(device->statistics().malformed, before + 1)
+        << "but for what was under way when the line was taken over";
     EXPECT_EQ(device->statistics().lost, 0U);
     device->stop();
   }
@@ -96,7 +102,8 @@ TEST_F(BoardRig, comesBackAfterItsConverterWasUnpluggedWithTheBoardsOwnNumbers) 
   const auto after = take(*device, 30);
   ASSERT_EQ(after.size(), 30U);
   EXPECT_EQ(after.front().boot, before.front().boot) << "the board did not begin anew";
-  EXPECT_GT(after.front().number, before.back().number) << "it went on pulsing while nobody listened";
+  EXPECT_GT(after.front().number, before.back().number)
+      << "it went on pulsing while nobody listened";
   expect_true_edges(after);
   device->stop();
 }

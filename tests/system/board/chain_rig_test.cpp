@@ -1,5 +1,6 @@
-// The whole chain inside the rig's kernel: the board's firmware behind ftdi_sio makes pulses, emulated cameras on USB expose at them, and
-// what comes out as a pair is held against what the cameras wrote into the images.
+// The whole chain inside the rig's kernel: the board's firmware behind ftdi_sio makes pulses,
+// emulated cameras on USB expose at them, and what comes out as a pair is held against what the
+// cameras wrote into the images.
 #include <gtest/gtest.h>
 
 #include <atomic>
@@ -21,7 +22,9 @@ constexpr Duration kExposure = Duration::milliseconds(4);
 /// Board, cameras and what connects them; pairs are counted as they come out.
 class Chain {
  public:
-  Chain() : cameras_("sim_usb_iidc", {"--cameras", "2"}), board_([this](const mock::SimulatedPulse& pulse) { return trigger(pulse); }) {}
+  Chain()
+      : cameras_("sim_usb_iidc", {"--cameras", "2"}),
+        board_([this](const mock::SimulatedPulse& pulse) { return trigger(pulse); }) {}
 
   /// Opens, configures and starts all of it.
   void start() {
@@ -42,15 +45,18 @@ class Chain {
     pulses.rate_hz = kRate;
     pulses.vary = Duration::milliseconds(4);
     pulses.feedback = 0x03;
-    ASSERT_EQ(board_device_->configure(pulses, nullptr), DeviceStatus::ok) << board_device_->complaint();
+    ASSERT_EQ(board_device_->configure(pulses, nullptr), DeviceStatus::ok)
+        << board_device_->complaint();
 
     app::LiveSource::Options o;
     o.sync.mode = SyncMode::board;
     o.sync.interval = Duration::seconds(1 / kRate);
-    o.sync.hold = Duration::milliseconds(300);  // one processor is shared by emulators, kernel and test
+    o.sync.hold =
+        Duration::milliseconds(300);  // one processor is shared by emulators, kernel and test
     ASSERT_EQ(o.sync.validate(), nullptr) << o.sync.validate();
-    source_ = std::make_unique<app::LiveSource>(std::vector<CameraDevice*>{devices_[0].get(), devices_[1].get()}, nullptr,
-                                                board_device_.get(), o);
+    source_ = std::make_unique<app::LiveSource>(
+        std::vector<CameraDevice*>{devices_[0].get(), devices_[1].get()}, nullptr,
+        board_device_.get(), o);
     source_->start();
     consumer_ = std::thread([this] { consume(); });
   }
@@ -89,9 +95,11 @@ class Chain {
       back += item.kind == app::LiveItem::Kind::device_back;
       if (item.kind != app::LiveItem::Kind::images) continue;
       if (item.set.complete) {
-        const ImageStamp left = read_stamp(source_->image(item.set, 0)), right = read_stamp(source_->image(item.set, 1));
+        const ImageStamp left = read_stamp(source_->image(item.set, 0)),
+                         right = read_stamp(source_->image(item.set, 1));
         // Both cameras were given the very same time of the edge.
-        wrong += !left.valid || !right.valid || left.middle_ns != right.middle_ns || item.set.proof != SyncProof::numbered;
+        wrong += !left.valid || !right.valid || left.middle_ns != right.middle_ns ||
+                 item.set.proof != SyncProof::numbered;
         outside += std::abs(item.set.stamp.ns() - left.middle_ns) > item.set.error.ns();
         unreported += !item.set.reported;
         ++pairs;
@@ -139,7 +147,8 @@ TEST(BoardChain, ACameraThatWasUnpluggedIsProvenAnewWhileTheOtherGoesOn) {
   ASSERT_NO_FATAL_FAILURE(chain.start());
   ASSERT_TRUE(chain.await_pairs(20));
   chain.cameras().command("unplug 1");
-  for (int i = 0; i < 1500 && chain.gone == 0; ++i) std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  for (int i = 0; i < 1500 && chain.gone == 0; ++i)
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
   ASSERT_EQ(chain.gone, 1);
   chain.cameras().command("replug 1");
   ASSERT_TRUE(chain.await_pairs(30));

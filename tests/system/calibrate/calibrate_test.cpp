@@ -28,7 +28,8 @@ namespace fs = std::filesystem;
 const app::Checkerboard kBoard = app::parse_checkerboard("9x6", 0.04);
 constexpr const char* kArguments = " --board 9x6 --square 0.04";
 
-/// Fourteen pairs of drawn boards as left/NN.png and right/NN.png, the layout of a folder that `replay` takes.
+/// Fourteen pairs of drawn boards as left/NN.png and right/NN.png, the layout of a folder that
+/// `replay` takes.
 class Calibrate : public ::testing::Test {
  protected:
   static void SetUpTestSuite() {
@@ -42,7 +43,9 @@ class Calibrate : public ::testing::Test {
       for (std::size_t i = 0; i < 14; ++i) {
         auto pixels = painter.paint(kBoard, rig.T_camera_left[k] * poses[i]);
         const cv::Mat image(480, 640, CV_8U, pixels.data());
-        ASSERT_TRUE(cv::imwrite((*folder_ / fmt::format("{}/{:02}.png", k == 0 ? "left" : "right", i)).string(), image));
+        ASSERT_TRUE(cv::imwrite(
+            (*folder_ / fmt::format("{}/{:02}.png", k == 0 ? "left" : "right", i)).string(),
+            image));
         if (k == 0) times += fmt::format("{}\n", 1'000'000'000 + 50'000'000 * i);
       }
     }
@@ -50,7 +53,10 @@ class Calibrate : public ::testing::Test {
   }
   static void TearDownTestSuite() { delete folder_; }
 
-  static std::string images() { return fmt::format(" --left '{0}/left/*.png' --right '{0}/right/*.png'", folder_->path().string()); }
+  static std::string images() {
+    return fmt::format(" --left '{0}/left/*.png' --right '{0}/right/*.png'",
+                       folder_->path().string());
+  }
   static fs::path file(const std::string& name) { return *folder_ / name; }
 
   static inline TemporaryFolder* folder_ = nullptr;
@@ -64,7 +70,8 @@ std::size_t sentences(const std::string& text) {
 
 TEST_F(Calibrate, aPairOfCamerasIsCalibratedFromFilesAndTheFileServesAReplay) {
   const fs::path out = file("calibration.yaml");
-  const Outcome o = run_vergence("calibrate --quiet --json --baseline 0.121" + images() + kArguments + " --out '" + out.string() + "'");
+  const Outcome o = run_vergence("calibrate --quiet --json --baseline 0.121" + images() +
+                                 kArguments + " --out '" + out.string() + "'");
   ASSERT_EQ(o.code, 0) << o.err;
   const auto json = nlohmann::json::parse(o.out);
   EXPECT_EQ(json["views"].size(), 14U);
@@ -76,7 +83,8 @@ TEST_F(Calibrate, aPairOfCamerasIsCalibratedFromFilesAndTheFileServesAReplay) {
   const RigCalibration truth = known_rig(2, CameraModelKind::pinhole_radtan);
   EXPECT_EQ(c.source, "checkerboard");
   EXPECT_EQ(c.rig.frames, 14);
-  // The detector's bias in drawn images, some hundredths of a pixel, is no noise: its sigmas are not held against it.
+  // The detector's bias in drawn images, some hundredths of a pixel, is no noise: its sigmas are
+  // not held against it.
   EXPECT_LT(c.rig.reprojection_px, 0.1);
   for (std::size_t k = 0; k < 2; ++k) {
     EXPECT_NEAR(c.rig.intrinsics[k].fx / truth.intrinsics[k].fx, 1, 0.003);
@@ -87,30 +95,38 @@ TEST_F(Calibrate, aPairOfCamerasIsCalibratedFromFilesAndTheFileServesAReplay) {
   EXPECT_LT(off.tail<3>().norm(), 0.0005) << "m";
   for (std::size_t i = 0; i < 6; ++i) {
     EXPECT_GT(c.rig.sigma_wide[1][i], c.rig.sigma_noise[1][i]);
-    EXPECT_NEAR(std::sqrt(c.rig.covariance_wide[1](static_cast<int>(i), static_cast<int>(i))) / c.rig.sigma_wide[1][i], 1, 1e-9);
+    EXPECT_NEAR(std::sqrt(c.rig.covariance_wide[1](static_cast<int>(i), static_cast<int>(i))) /
+                    c.rig.sigma_wide[1][i],
+                1, 1e-9);
   }
 
-  const Outcome replay = run_vergence("replay '" + folder_->path().string() + "' --format folder --quiet --calibration '" + out.string() +
+  const Outcome replay = run_vergence("replay '" + folder_->path().string() +
+                                      "' --format folder --quiet --calibration '" + out.string() +
                                       "' --out '" + file("session").string() + "'");
-  EXPECT_NE(replay.code, 2) << replay.err;  // boards that leap make no drive, but the calibration is taken
+  EXPECT_NE(replay.code, 2)
+      << replay.err;  // boards that leap make no drive, but the calibration is taken
   EXPECT_TRUE(fs::exists(file("session") / "summary.json")) << replay.err;
 }
 
 TEST_F(Calibrate, theTableSaysWhatAPersonWantsToKnow) {
-  const Outcome o = run_vergence("calibrate" + images() + kArguments + " --out '" + file("t.yaml").string() + "'");
+  const Outcome o = run_vergence("calibrate" + images() + kArguments + " --out '" +
+                                 file("t.yaml").string() + "'");
   ASSERT_EQ(o.code, 0) << o.err;
   for (const char* part :
-       {"14 views of a 9x6 board with squares of 40 mm: 14 used, 0 refused", "worst views used: ", "reprojection ", "rotation x, °",
-        "t_x, mm", "X_right = R X_left + t", "baseline 120.", "corners a cell", "lenses held", "between views"})
+       {"14 views of a 9x6 board with squares of 40 mm: 14 used, 0 refused",
+        "worst views used: ", "reprojection ", "rotation x, °", "t_x, mm", "X_right = R X_left + t",
+        "baseline 120.", "corners a cell", "lenses held", "between views"})
     EXPECT_NE(o.out.find(part), std::string::npos) << part << " in\n" << o.out;
   EXPECT_NE(o.err.find("t.yaml: written"), std::string::npos);
-  EXPECT_EQ(o.out.find("Still missing: left"), std::string::npos) << "the boards were all over the images:\n" << o.out;
+  EXPECT_EQ(o.out.find("Still missing: left"), std::string::npos)
+      << "the boards were all over the images:\n"
+      << o.out;
 }
 
 TEST_F(Calibrate, oneCameraAlone) {
   const fs::path out = file("one.yaml");
-  const Outcome o =
-      run_vergence("calibrate --quiet --left '" + file("left").string() + "/*.png'" + kArguments + " --out '" + out.string() + "'");
+  const Outcome o = run_vergence("calibrate --quiet --left '" + file("left").string() + "/*.png'" +
+                                 kArguments + " --out '" + out.string() + "'");
   ASSERT_EQ(o.code, 0) << o.err;
   EXPECT_NE(read_file(out).find("intrinsics: ["), std::string::npos);
   EXPECT_NE(o.err.find("one camera makes no rig"), std::string::npos) << o.err;
@@ -120,28 +136,37 @@ TEST_F(Calibrate, viewsWithoutABoardAreSaidAndSkipped) {
   const fs::path odd = file("odd");
   fs::create_directories(odd);
   for (const char* side : {"left", "right"})
-    for (int i = 0; i < 6; ++i) fs::copy_file(file(fmt::format("{}/{:02}.png", side, i)), odd / fmt::format("{}{}.png", side, i));
+    for (int i = 0; i < 6; ++i)
+      fs::copy_file(file(fmt::format("{}/{:02}.png", side, i)),
+                    odd / fmt::format("{}{}.png", side, i));
   const cv::Mat grey(480, 640, CV_8U, cv::Scalar(90));
   ASSERT_TRUE(cv::imwrite((odd / "right3.png").string(), grey));
   fs::remove(odd / "right5.png");
-  const Outcome o = run_vergence(
-      fmt::format("calibrate --quiet --left '{0}/left*.png' --right '{0}/right*.png'{1} --out '{0}/c.yaml'", odd.string(), kArguments));
+  const Outcome o = run_vergence(fmt::format(
+      "calibrate --quiet --left '{0}/left*.png' --right '{0}/right*.png'{1} --out '{0}/c.yaml'",
+      odd.string(), kArguments));
   ASSERT_EQ(o.code, 0) << o.err;
-  EXPECT_NE(o.err.find("no board of 9x6 in " + (odd / "right3.png").string()), std::string::npos) << o.err;
-  EXPECT_NE(o.err.find("left5.png: skipped, not every camera has an image of that number"), std::string::npos) << o.err;
+  EXPECT_NE(o.err.find("no board of 9x6 in " + (odd / "right3.png").string()), std::string::npos)
+      << o.err;
+  EXPECT_NE(o.err.find("left5.png: skipped, not every camera has an image of that number"),
+            std::string::npos)
+      << o.err;
   EXPECT_EQ(app::read_calibration(odd / "c.yaml").rig.frames, 4);
 }
 
 TEST_F(Calibrate, anotherBoardIsSaidOnceAndNotForEveryView) {
-  const Outcome o = run_vergence("calibrate --quiet" + images() + " --board 8x5 --square 0.04 --out '" + file("b.yaml").string() + "'");
+  const Outcome o =
+      run_vergence("calibrate --quiet" + images() + " --board 8x5 --square 0.04 --out '" +
+                   file("b.yaml").string() + "'");
   EXPECT_EQ(o.code, 2);
   EXPECT_EQ(sentences(o.err), 1U) << o.err;
   EXPECT_NE(o.err.find("no view has the board of 8x5 inner corners"), std::string::npos) << o.err;
 }
 
 TEST_F(Calibrate, exchangedCamerasAreNotUsableAndNothingIsWritten) {
-  const Outcome o = run_vergence(fmt::format("calibrate --quiet --left '{0}/right/*.png' --right '{0}/left/*.png'{1} --out '{0}/x.yaml'",
-                                             folder_->path().string(), kArguments));
+  const Outcome o = run_vergence(fmt::format(
+      "calibrate --quiet --left '{0}/right/*.png' --right '{0}/left/*.png'{1} --out '{0}/x.yaml'",
+      folder_->path().string(), kArguments));
   EXPECT_EQ(o.code, 1);
   EXPECT_NE(o.err.find("left and right are swapped"), std::string::npos) << o.err;
   EXPECT_FALSE(fs::exists(file("x.yaml")));
@@ -150,12 +175,15 @@ TEST_F(Calibrate, exchangedCamerasAreNotUsableAndNothingIsWritten) {
 TEST_F(Calibrate, badArgumentsAreOneSentence) {
   const std::string good = images() + kArguments, out = " --out '" + file("n.yaml").string() + "'";
   for (const std::string& bad :
-       {std::string(""), good, images() + out, good + out + " --baseline -1", good + " --out /proc/none/x.yaml",
-        images() + " --board 9 --square 0.04" + out, images() + " --board 9x6 --square 0" + out,
-        " --left '/none/*.png'" + std::string(kArguments) + out, good + out + " --model omni", good + out + " --model equidistant --k3",
-        good + out + " --convert a b", std::string(" --convert onlyone"),
-        " --convert '" + file("left/00.png").string() + "' '" + file("b.yaml").string() + "'", good + out + " --keep-views d",
-        std::string(" config.yaml --left x"), " --left '" + file("left/00.png").string() + "'" + kArguments + out}) {
+       {std::string(""), good, images() + out, good + out + " --baseline -1",
+        good + " --out /proc/none/x.yaml", images() + " --board 9 --square 0.04" + out,
+        images() + " --board 9x6 --square 0" + out,
+        " --left '/none/*.png'" + std::string(kArguments) + out, good + out + " --model omni",
+        good + out + " --model equidistant --k3", good + out + " --convert a b",
+        std::string(" --convert onlyone"),
+        " --convert '" + file("left/00.png").string() + "' '" + file("b.yaml").string() + "'",
+        good + out + " --keep-views d", std::string(" config.yaml --left x"),
+        " --left '" + file("left/00.png").string() + "'" + kArguments + out}) {
     const Outcome o = run_vergence("calibrate --quiet " + bad);
     EXPECT_EQ(o.code, 2) << bad << "\n" << o.err;
     EXPECT_EQ(sentences(o.err), 1U) << bad << "\n" << o.err;
@@ -169,20 +197,31 @@ TEST_F(Calibrate, conversionsGoThroughAllFormatsAndSayWhatTheyLeaveOut) {
   c.rig = known_rig(2, CameraModelKind::pinhole_equidistant);
   c.serials = {"15021234", "15021235", "", ""};
   app::write_calibration(file("ours.yaml"), c);
-  Outcome o = run_vergence(fmt::format("calibrate --convert '{0}/ours.yaml' '{0}/camchain.yaml'", f));
+  Outcome o =
+      run_vergence(fmt::format("calibrate --convert '{0}/ours.yaml' '{0}/camchain.yaml'", f));
   ASSERT_EQ(o.code, 0) << o.err;
-  EXPECT_NE(o.err.find("vergence: a camchain has no place for serials"), std::string::npos) << o.err;
+  EXPECT_NE(o.err.find("vergence: a camchain has no place for serials"), std::string::npos)
+      << o.err;
   EXPECT_EQ(o.out, "");
-  EXPECT_EQ(run_vergence(fmt::format("calibrate --convert '{0}/camchain.yaml' '{0}/l.yaml,{0}/r.yaml'", f)).code, 0);
-  EXPECT_EQ(run_vergence(fmt::format("calibrate --convert '{0}/l.yaml,{0}/r.yaml' '{0}/stereo.yml'", f)).code, 0);
-  o = run_vergence(fmt::format("calibrate --convert '{0}/stereo.yml' '{0}/back.txt' --format vergence", f));
+  EXPECT_EQ(run_vergence(
+                fmt::format("calibrate --convert '{0}/camchain.yaml' '{0}/l.yaml,{0}/r.yaml'", f))
+                .code,
+            0);
+  EXPECT_EQ(
+      run_vergence(fmt::format("calibrate --convert '{0}/l.yaml,{0}/r.yaml' '{0}/stereo.yml'", f))
+          .code,
+      0);
+  o = run_vergence(
+      fmt::format("calibrate --convert '{0}/stereo.yml' '{0}/back.txt' --format vergence", f));
   ASSERT_EQ(o.code, 0) << o.err;
   const RigCalibration back = app::read_calibration(file("back.txt")).rig;
   EXPECT_NEAR(place_error(back.T_camera_left[1], c.rig.T_camera_left[1]).norm(), 0, 1e-12);
   EXPECT_EQ(back.intrinsics[1].kind, CameraModelKind::pinhole_equidistant);
-  EXPECT_NE(o.err.find("back.txt: written as calibration.yaml of this program"), std::string::npos) << o.err;
+  EXPECT_NE(o.err.find("back.txt: written as calibration.yaml of this program"), std::string::npos)
+      << o.err;
 
-  const std::string once_more = fmt::format("calibrate --convert '{0}/stereo.yml' '{0}/back.txt' --to kalibr", f);
+  const std::string once_more =
+      fmt::format("calibrate --convert '{0}/stereo.yml' '{0}/back.txt' --to kalibr", f);
   o = run_vergence(once_more);
   EXPECT_EQ(o.code, 2) << "it is there already";
   EXPECT_NE(o.err.find("--force"), std::string::npos) << o.err;
@@ -196,7 +235,8 @@ TEST_F(Calibrate, conversionsGoThroughAllFormatsAndSayWhatTheyLeaveOut) {
 
 TEST_F(Calibrate, aFileThatIsThereIsNotOverwrittenUnasked) {
   (void)folder_->write("precious.yaml", "mine");
-  const std::string command = "calibrate --quiet" + images() + kArguments + " --out '" + file("precious.yaml").string() + "'";
+  const std::string command = "calibrate --quiet" + images() + kArguments + " --out '" +
+                              file("precious.yaml").string() + "'";
   const Outcome o = run_vergence(command);
   EXPECT_EQ(o.code, 2);
   EXPECT_NE(o.err.find("precious.yaml: is there already"), std::string::npos) << o.err;
@@ -206,10 +246,12 @@ TEST_F(Calibrate, aFileThatIsThereIsNotOverwrittenUnasked) {
 }
 
 TEST_F(Calibrate, viewsNeverGoIntoAFolderThatHasSomething) {
-  const Outcome o = run_vergence(fmt::format(
-      "calibrate '{}/app/config/mock.yaml' --quiet --board 9x6 --square 0.04 --out '{}' --set mock.texture_detail=0 --set mock.drive=brief "
-      "--set cameras.0.size=[160,120] --set cameras.1.size=[160,120] --keep-views '{}' --set mock.stop_s=1",
-      VERGENCE_SOURCE_DIR, file("m.yaml").string(), file("left").string()));
+  const Outcome o = run_vergence(
+      fmt::format("calibrate '{}/app/config/mock.yaml' --quiet --board 9x6 --square 0.04 --out "
+                  "'{}' --set mock.texture_detail=0 --set mock.drive=brief "
+                  "--set cameras.0.size=[160,120] --set cameras.1.size=[160,120] --keep-views '{}' "
+                  "--set mock.stop_s=1",
+                  VERGENCE_SOURCE_DIR, file("m.yaml").string(), file("left").string()));
   EXPECT_EQ(o.code, 2) << o.err;
   EXPECT_NE(o.err.find("is not empty"), std::string::npos) << o.err;
 }
@@ -217,16 +259,20 @@ TEST_F(Calibrate, viewsNeverGoIntoAFolderThatHasSomething) {
 TEST_F(Calibrate, withoutTheToolTheSentenceNamesItsPackageAndADriveNeedsNone) {
   fs::copy_file(VERGENCE_PROGRAM, file("alone"));
   const auto alone = [](const std::string& arguments) {
-    const std::string command = fmt::format("'{}' {} >'{}' 2>&1 </dev/null", file("alone").string(), arguments, file("said").string());
+    const std::string command = fmt::format("'{}' {} >'{}' 2>&1 </dev/null", file("alone").string(),
+                                            arguments, file("said").string());
     const int status = std::system(command.c_str());
     std::ifstream in(file("said"));
-    return std::pair(WIFEXITED(status) ? WEXITSTATUS(status) : -1, std::string(std::istreambuf_iterator<char>(in), {}));
+    return std::pair(WIFEXITED(status) ? WEXITSTATUS(status) : -1,
+                     std::string(std::istreambuf_iterator<char>(in), {}));
   };
-  auto [code, said] = alone("calibrate --quiet" + images() + kArguments + " --out '" + file("none.yaml").string() + "'");
+  auto [code, said] = alone("calibrate --quiet" + images() + kArguments + " --out '" +
+                            file("none.yaml").string() + "'");
   EXPECT_EQ(code, 2);
   EXPECT_EQ(sentences(said), 1U) << said;
   EXPECT_NE(said.find("the package vergence-checkerboard"), std::string::npos) << said;
-  std::tie(code, said) = alone("calibrate --drive nowhere --format folder --out '" + file("none.yaml").string() + "'");
+  std::tie(code, said) =
+      alone("calibrate --drive nowhere --format folder --out '" + file("none.yaml").string() + "'");
   EXPECT_EQ(code, 2);
   EXPECT_EQ(said.find("vergence-checkerboard"), std::string::npos) << said;
 }

@@ -1,4 +1,5 @@
-// `vergence calibrate CONFIG` on real GigE Vision over the loopback: a drawn board before two simulated cameras.
+// `vergence calibrate CONFIG` on real GigE Vision over the loopback: a drawn board before two
+// simulated cameras.
 #include <gtest/gtest.h>
 
 #include <atomic>
@@ -21,8 +22,9 @@ namespace vergence::test {
 namespace {
 
 const app::Checkerboard kBoard = app::parse_checkerboard("9x6", 0.04);
-constexpr double kRate = 5;            // Hz
-constexpr std::uint64_t kHeldFor = 8;  // images of one pose: time to find the board twice on a busy machine
+constexpr double kRate = 5;  // Hz
+constexpr std::uint64_t kHeldFor =
+    8;  // images of one pose: time to find the board twice on a busy machine
 
 TEST(CalibrateLive, aBoardCarriedAroundIsCollectedUntilNothingIsMissing) {
   if (const std::string why = socket_buffer_obstacle(); !why.empty()) GTEST_SKIP() << why;
@@ -31,10 +33,13 @@ TEST(CalibrateLive, aBoardCarriedAroundIsCollectedUntilNothingIsMissing) {
   std::vector<std::vector<std::uint8_t>> images[2];
   for (std::size_t k = 0; k < 2; ++k) {
     const BoardPainter painter(truth.intrinsics[k]);
-    for (const Transform& T : poses) images[k].push_back(painter.paint(kBoard, truth.T_camera_left[k] * T));
+    for (const Transform& T : poses)
+      images[k].push_back(painter.paint(kBoard, truth.T_camera_left[k] * T));
   }
   std::vector<std::unique_ptr<GigeCamera>> cameras;
-  std::string settings = fmt::format(" --set trigger.rate={} --set rig.nominal.baseline_m=0.12 --set rig.nominal.focal_px=520", kRate);
+  std::string settings = fmt::format(
+      " --set trigger.rate={} --set rig.nominal.baseline_m=0.12 --set rig.nominal.focal_px=520",
+      kRate);
   for (int k = 0; k < 2; ++k) {
     GigeCameraOptions o;
     o.address = GigeCamera::address(k);
@@ -43,14 +48,18 @@ TEST(CalibrateLive, aBoardCarriedAroundIsCollectedUntilNothingIsMissing) {
     o.sensor_height = 480;
     o.number_images = false;
     o.discoverable = false;
-    o.images = [&images, k](std::uint64_t n) { return images[k][(n / kHeldFor) % images[k].size()].data(); };
+    o.images = [&images, k](std::uint64_t n) {
+      return images[k][(n / kHeldFor) % images[k].size()].data();
+    };
     cameras.push_back(std::make_unique<GigeCamera>(o));
-    settings += fmt::format(" --set cameras.{0}.serial={1} --set cameras.{0}.size=[640,480]", k, o.address);
+    settings +=
+        fmt::format(" --set cameras.{0}.serial={1} --set cameras.{0}.size=[640,480]", k, o.address);
   }
   std::atomic<bool> over{false};
   std::thread pulses([&] {
     const auto give_up = std::chrono::steady_clock::now() + std::chrono::seconds(120);
-    while (!over && !(cameras[0]->acquiring() && cameras[1]->acquiring()) && std::chrono::steady_clock::now() < give_up)
+    while (!over && !(cameras[0]->acquiring() && cameras[1]->acquiring()) &&
+           std::chrono::steady_clock::now() < give_up)
       std::this_thread::sleep_for(std::chrono::milliseconds(10));
     std::this_thread::sleep_for(std::chrono::milliseconds(300));
     for (std::uint64_t n = 0; !over && std::chrono::steady_clock::now() < give_up; ++n) {
@@ -61,8 +70,10 @@ TEST(CalibrateLive, aBoardCarriedAroundIsCollectedUntilNothingIsMissing) {
   });
   const TemporaryFolder folder;
   const auto out = folder / "calibration.yaml", views = folder / "views";
-  const Outcome o = run_vergence(fmt::format("calibrate '{}/app/config/gige.yaml' --board 9x6 --square 0.04 --out '{}' --keep-views '{}'{}",
-                                             VERGENCE_SOURCE_DIR, out.string(), views.string(), settings));
+  const Outcome o =
+      run_vergence(fmt::format("calibrate '{}/app/config/gige.yaml' --board 9x6 --square 0.04 "
+                               "--out '{}' --keep-views '{}'{}",
+                               VERGENCE_SOURCE_DIR, out.string(), views.string(), settings));
   over = true;
   pulses.join();
   ASSERT_EQ(o.code, 0) << o.err;
@@ -76,7 +87,8 @@ TEST(CalibrateLive, aBoardCarriedAroundIsCollectedUntilNothingIsMissing) {
 
   // What was kept gives the same calibration again.
   const Outcome again =
-      run_vergence(fmt::format("calibrate --quiet --left '{0}/left_*.png' --right '{0}/right_*.png' --board 9x6 --square 0.04 --out '{1}'",
+      run_vergence(fmt::format("calibrate --quiet --left '{0}/left_*.png' --right "
+                               "'{0}/right_*.png' --board 9x6 --square 0.04 --out '{1}'",
                                views.string(), (folder / "again.yaml").string()));
   ASSERT_EQ(again.code, 0) << again.err;
   const app::CalibrationFile same = app::read_calibration(folder / "again.yaml");

@@ -50,7 +50,8 @@ struct Course::Parts {
       two.emplace();
       beside.emplace();
     }
-    estimator.emplace(s.options, s.given, s.nominal, arena, two ? static_cast<PairRunner&>(*two) : one,
+    estimator.emplace(s.options, s.given, s.nominal, arena,
+                      two ? static_cast<PairRunner&>(*two) : one,
                       beside ? static_cast<BackgroundRunner&>(*beside) : at_once);
   }
   Arena arena;
@@ -62,7 +63,8 @@ struct Course::Parts {
 };
 
 Course::Course(const CourseSetting& setting)
-    : parts_(std::make_unique<Parts>(setting)), allocations_before_(AllocationGuard::allocations_after_seal()) {}
+    : parts_(std::make_unique<Parts>(setting)),
+      allocations_before_(AllocationGuard::allocations_after_seal()) {}
 Course::~Course() = default;
 const Estimator& Course::estimator() const noexcept { return *parts_->estimator; }
 
@@ -79,7 +81,8 @@ void Course::give(const RigFrame& frame, const Transform& T_reference_left) {
     a.sample = parts_->estimator->process(frame);
   }
   a.T_reference_left = T_reference_left;
-  for (const EstimatorEvent& e : parts_->estimator->events()) a.restarted = a.restarted || e.kind == EstimatorEvent::Kind::scene_restarted;
+  for (const EstimatorEvent& e : parts_->estimator->events())
+    a.restarted = a.restarted || e.kind == EstimatorEvent::Kind::scene_restarted;
   answers_.push_back(a);
   last_ = frame.number;
   note(frame.number);
@@ -97,7 +100,9 @@ void Course::give(const StereoDrive& drive, std::size_t first, std::size_t last,
   }
 }
 
-std::uint64_t Course::allocations() const noexcept { return AllocationGuard::allocations_after_seal() - allocations_before_; }
+std::uint64_t Course::allocations() const noexcept {
+  return AllocationGuard::allocations_after_seal() - allocations_before_;
+}
 
 void Course::finish() {
   parts_->estimator->finish();
@@ -111,26 +116,31 @@ const CalibrationDecision* Course::accepted() const noexcept {
 }
 
 int Course::count_accepted() const noexcept {
-  return static_cast<int>(std::count_if(decisions_.begin(), decisions_.end(), [](const Decided& d) { return d.decision.accepted; }));
+  return static_cast<int>(std::count_if(decisions_.begin(), decisions_.end(),
+                                        [](const Decided& d) { return d.decision.accepted; }));
 }
 
 const Told* Course::first(EstimatorEvent::Kind kind) const noexcept {
-  const auto found = std::find_if(events_.begin(), events_.end(), [kind](const Told& t) { return t.event.kind == kind; });
+  const auto found = std::find_if(events_.begin(), events_.end(),
+                                  [kind](const Told& t) { return t.event.kind == kind; });
   return found == events_.end() ? nullptr : &*found;
 }
 
 bool Course::rejected_for(const std::string& reason) const noexcept {
-  return std::any_of(decisions_.begin(), decisions_.end(),
-                     [&](const Decided& d) { return !d.decision.accepted && reason == d.decision.reason; });
+  return std::any_of(decisions_.begin(), decisions_.end(), [&](const Decided& d) {
+    return !d.decision.accepted && reason == d.decision.reason;
+  });
 }
 
 std::string Course::story() const {
   std::string text = test::story(answers_);
-  for (const Told& t : events_) text += fmt::format("frame {}: {} ({:.3g})\n", t.frame, t.event.why, t.event.value);
+  for (const Told& t : events_)
+    text += fmt::format("frame {}: {} ({:.3g})\n", t.frame, t.event.why, t.event.value);
   for (const Decided& d : decisions_)
     text +=
-        fmt::format("frame {}: {} from {} frames, {:.3f} px, held out {:.3f} to {:.3f} px {}\n", d.frame,
-                    d.decision.accepted ? "accepted" : "rejected", d.decision.calibration.frames, d.decision.calibration.reprojection_px,
+        fmt::format("frame {}: {} from {} frames, {:.3f} px, held out {:.3f} to {:.3f} px {}\n",
+                    d.frame, d.decision.accepted ? "accepted" : "rejected",
+                    d.decision.calibration.frames, d.decision.calibration.reprojection_px,
                     d.decision.held_out_before_px, d.decision.held_out_after_px, d.decision.reason);
   return text;
 }
@@ -142,7 +152,8 @@ RigError rig_error(const RigCalibration& found, int k, const Transform& truth) {
   e.rotation = turn.cwiseAbs().maxCoeff();
   e.t = found.T_camera_left[c].t - truth.t;
   for (int i = 0; i < 6; ++i) {
-    const double error = i < 3 ? turn[i] : e.t[i - 3], sigma = found.sigma_noise[c][static_cast<std::size_t>(i)];
+    const double error = i < 3 ? turn[i] : e.t[i - 3],
+                 sigma = found.sigma_noise[c][static_cast<std::size_t>(i)];
     if (i == 3 && k == 1) continue;
     e.sigmas = std::max(e.sigmas, std::abs(error) / sigma);
   }
@@ -150,8 +161,8 @@ RigError rig_error(const RigCalibration& found, int k, const Transform& truth) {
 }
 
 std::string to_string(const RigError& e) {
-  return fmt::format("rotation {:.4f} mrad, t {:+.3f} {:+.3f} {:+.3f} mm, at most {:.2f} sigmas", 1e3 * e.rotation, 1e3 * e.t.x(),
-                     1e3 * e.t.y(), 1e3 * e.t.z(), e.sigmas);
+  return fmt::format("rotation {:.4f} mrad, t {:+.3f} {:+.3f} {:+.3f} mm, at most {:.2f} sigmas",
+                     1e3 * e.rotation, 1e3 * e.t.x(), 1e3 * e.t.y(), 1e3 * e.t.z(), e.sigmas);
 }
 
 StereoDrive film(const RenderedDriveOptions& options, std::size_t frames) {
@@ -165,7 +176,8 @@ StereoDrive film(const RenderedDriveOptions& options, std::size_t frames) {
       const ImageView& view = frame.images[k];
       pair[k] = Picture(view.width, view.height);
       for (int y = 0; y < view.height; ++y)
-        std::memcpy(pair[k].bytes.data() + y * pair[k].stride, view.row(y), static_cast<std::size_t>(view.width));
+        std::memcpy(pair[k].bytes.data() + y * pair[k].stride, view.row(y),
+                    static_cast<std::size_t>(view.width));
     }
     out.stamps.push_back(frame.stamp);
     out.pairs.push_back(std::move(pair));

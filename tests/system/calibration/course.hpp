@@ -15,10 +15,11 @@ struct CourseSetting {
   EstimatorOptions options;
   RigCalibration given;    // what the estimator is handed
   RigCalibration nominal;  // what the gates compare with
-  int threads = 2;         // 1: everything on the caller's; 2: front end on two, the solver on a third
+  int threads = 2;  // 1: everything on the caller's; 2: front end on two, the solver on a third
 };
 
-/// Cameras side by side looking the same way, as far apart as the true ones: all that a configuration knows.
+/// Cameras side by side looking the same way, as far apart as the true ones: all that a
+/// configuration knows.
 [[nodiscard]] RigCalibration nominal_of(const RigCalibration& rig);
 /// Of the rig only intrinsics and the baseline's length. Focal lengths held: the mock's are exact.
 [[nodiscard]] CourseSetting from_scratch(const RigCalibration& rig);
@@ -55,7 +56,8 @@ class Course {
   [[nodiscard]] const Told* first(EstimatorEvent::Kind kind) const noexcept;
   /// A decision against the new calibration gave this reason.
   [[nodiscard]] bool rejected_for(const std::string& reason) const noexcept;
-  /// Since the constructor, on the estimator's thread while it worked and on the threads that help it.
+  /// Since the constructor, on the estimator's thread while it worked and on the threads that help
+  /// it.
   [[nodiscard]] std::uint64_t allocations() const noexcept;
   [[nodiscard]] const Estimator& estimator() const noexcept;
   /// Statuses, events and decisions in words, for the message of a failed expectation.
@@ -76,7 +78,8 @@ class Course {
 struct RigError {
   double rotation = 0;  // rad, the largest about an axis
   Vec3 t = Vec3::Zero();
-  double sigmas = 0;  // the largest of the six in its noise-only sigma; t_x of the camera whose length is known is no error
+  double sigmas = 0;  // the largest of the six in its noise-only sigma; t_x of the camera whose
+                      // length is known is no error
 };
 [[nodiscard]] RigError rig_error(const RigCalibration& found, int k, const Transform& truth);
 [[nodiscard]] std::string to_string(const RigError& e);

@@ -36,7 +36,8 @@ TEST(HostileSlow, aCoveredLensFromTheStartCalibratesNothing) {
     course.finish();
     EXPECT_TRUE(course.decisions().empty()) << course.story();
     EXPECT_EQ(course.estimator().state(), State::initialising);
-    for (const Answer& a : course.answers()) EXPECT_EQ(a.sample.status, PoseStatus::lost) << course.story();
+    for (const Answer& a : course.answers())
+      EXPECT_EQ(a.sample.status, PoseStatus::lost) << course.story();
   }
 }
 
@@ -70,7 +71,8 @@ Edit night(std::size_t first, std::size_t last) {
       if (p.bytes.empty()) p = Picture(day.width, day.height);
       Random noise(2 * i + k);
       for (std::size_t b = 0; b < day.bytes.size(); ++b)
-        p.bytes[b] = static_cast<std::uint8_t>(std::clamp(std::lround(day.bytes[b] / 30.0 + 2 + 1.5 * noise.normal()), 0L, 255L));
+        p.bytes[b] = static_cast<std::uint8_t>(
+            std::clamp(std::lround(day.bytes[b] / 30.0 + 2 + 1.5 * noise.normal()), 0L, 255L));
       frame->images[k] = p.view();
     }
     return true;
@@ -102,8 +104,10 @@ Edit bus(std::size_t first, std::size_t last) {
         for (int x = 0; x < p.width; ++x) {
           const int on = x + (k == 1 ? disparity : 0) - nose;
           if (on < 0 || on >= length) continue;
-          const auto hash = static_cast<std::uint32_t>((on / 9) * 73856093) ^ static_cast<std::uint32_t>((y / 9) * 19349663);
-          p.bytes[static_cast<std::size_t>(y * p.stride + x)] = static_cast<std::uint8_t>(40 + (hash * 2654435761U >> 25U));
+          const auto hash = static_cast<std::uint32_t>((on / 9) * 73856093) ^
+                            static_cast<std::uint32_t>((y / 9) * 19349663);
+          p.bytes[static_cast<std::size_t>(y * p.stride + x)] =
+              static_cast<std::uint8_t>(40 + (hash * 2654435761U >> 25U));
         }
       frame->images[k] = p.view();
     }

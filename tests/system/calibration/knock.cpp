@@ -8,7 +8,10 @@
 namespace vergence::test {
 namespace {
 
-constexpr std::uint64_t kFilmed = 60, kMend = 90, kAfter = 20;  // frames: rendered once, 3 s to mend it, a look at the odometry afterwards
+constexpr std::uint64_t
+    kFilmed = 60,
+    kMend = 90,
+    kAfter = 20;  // frames: rendered once, 3 s to mend it, a look at the odometry afterwards
 
 RenderedDriveOptions drive_options() {
   RenderedDriveOptions o;
@@ -24,7 +27,8 @@ const StereoDrive& before_knocks() {
 
 /// Where the right camera sits after it. The length is what it was: images do not tell it.
 Transform knocked(const Transform& before, const Knock& knock) {
-  Transform after = perturbed(before, knock.turn_deg * std::numbers::pi / 180, 1e-3 * knock.shift_mm);
+  Transform after =
+      perturbed(before, knock.turn_deg * std::numbers::pi / 180, 1e-3 * knock.shift_mm);
   after.t *= before.t.norm() / after.t.norm();
   return after;
 }
@@ -45,7 +49,8 @@ void expect_taken_up(const Knock& knock) {
   std::printf("%s: after %d frames %s\n", knock.name, knock.frames, to_string(e).c_str());
   EXPECT_LT(std::abs(e.t.z()), 0.5e-3 * std::abs(knock.shift_mm.z())) << to_string(e);
   EXPECT_EQ(wrong_ok(course.answers(), {}), "") << course.story();
-  for (const Answer& a : course.answers()) EXPECT_NE(a.sample.status, PoseStatus::lost) << "frame " << a.sample.frame;
+  for (const Answer& a : course.answers())
+    EXPECT_NE(a.sample.status, PoseStatus::lost) << "frame " << a.sample.frame;
 }
 
 void expect_noticed_and_mended(const Knock& knock) {
@@ -57,7 +62,8 @@ void expect_noticed_and_mended(const Knock& knock) {
   const Transform before = options.rig.T_camera_left[1];
   options.placed = [&](int, std::uint64_t i) { return i < knock.at ? before : after; };
   RenderedDrive drive(options);
-  for (std::uint64_t i = kFilmed; i < knock.at; ++i) course.give(drive.frame(i), drive.T_enu_left(i));
+  for (std::uint64_t i = kFilmed; i < knock.at; ++i)
+    course.give(drive.frame(i), drive.T_enu_left(i));
   ASSERT_EQ(count_ok(course.answers(), 0, knock.at), static_cast<int>(knock.at)) << course.story();
 
   const std::uint64_t latest = knock.at + static_cast<std::uint64_t>(knock.frames) + kMend;
@@ -73,7 +79,8 @@ void expect_noticed_and_mended(const Knock& knock) {
   ASSERT_EQ(course.count_accepted(), 1) << course.story();
   const Decided& mended = course.decisions().back();
   EXPECT_LE(mended.frame, noticed->frame + kMend) << course.story();
-  for (const Answer& a : course.answers()) EXPECT_NE(a.sample.status, PoseStatus::lost) << "frame " << a.sample.frame;
+  for (const Answer& a : course.answers())
+    EXPECT_NE(a.sample.status, PoseStatus::lost) << "frame " << a.sample.frame;
   if (knock.matches) {
     EXPECT_EQ(wrong_ok(course.answers(), {}), "") << course.story();
   } else {
@@ -85,7 +92,8 @@ void expect_noticed_and_mended(const Knock& knock) {
 
   // Found from 25 frames or more.
   const RigError e = rig_error(mended.decision.calibration, 1, after);
-  std::printf("%s: noticed after %d frames, mended %d later, %s\n", knock.name, static_cast<int>(noticed->frame - knock.at),
+  std::printf("%s: noticed after %d frames, mended %d later, %s\n", knock.name,
+              static_cast<int>(noticed->frame - knock.at),
               static_cast<int>(mended.frame - noticed->frame), to_string(e).c_str());
   EXPECT_LT(e.rotation, 0.25e-3) << to_string(e);
   EXPECT_LT(std::abs(e.t.y()), 2.5e-3) << to_string(e);
@@ -93,7 +101,8 @@ void expect_noticed_and_mended(const Knock& knock) {
   EXPECT_EQ(course.estimator().state(), State::stereo_odometry) << course.story();
 
   // The odometry with it: between the last two dozen frames as right as before the knock.
-  const Answer &last = course.answers().back(), &first = course.answers()[course.answers().size() - kAfter / 2];
+  const Answer &last = course.answers().back(),
+               &first = course.answers()[course.answers().size() - kAfter / 2];
   const MotionError drift = motion_error(first, last);
   const double way = (last.T_reference_left.t - first.T_reference_left.t).norm();
   EXPECT_LT(drift.translation, 0.02 + 0.005 * way) << course.story();

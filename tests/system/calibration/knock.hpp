@@ -7,16 +7,17 @@ namespace vergence::test {
 struct Knock {
   const char* name;
   Vec3 turn_deg, shift_mm;
-  int frames;             // within which it is noticed
-  bool matches = true;    // are left across; else the left camera goes on alone for a while, and the scale is remembered
+  int frames;           // within which it is noticed
+  bool matches = true;  // are left across; else the left camera goes on alone for a while, and the
+                        // scale is remembered
   std::uint64_t at = 60;  // frame; the monitor has a reference of its own from about 90 on
 };
 
 /// A rig that knows its calibration is knocked on the way and mended.
 void expect_noticed_and_mended(const Knock& knock);
 
-/// The same of one that is too small to be told, a depth error of less than half a percent: within `frames` what the drive learns takes up
-/// most of it, and no pose is wrong meanwhile.
+/// The same of one that is too small to be told, a depth error of less than half a percent: within
+/// `frames` what the drive learns takes up most of it, and no pose is wrong meanwhile.
 void expect_taken_up(const Knock& knock);
 
 }  // namespace vergence::test

@@ -1,4 +1,5 @@
-// Recorded drives: what comes of a nominal calibration, of a wrong one, of none. `calibration_bench drives` prints all figures.
+// Recorded drives: what comes of a nominal calibration, of a wrong one, of none. `calibration_bench
+// drives` prints all figures.
 #include <gtest/gtest.h>
 
 #include "app/commands/drive_calibration.hpp"
@@ -21,7 +22,8 @@ const app::Configuration& configuration() {
 std::string missing(const std::string& name) { return shared_data_missing("data/" + name); }
 
 app::DriveCalibration calibrated(const StereoSequence& s) {
-  return app::calibrate_drive({s, configuration(), 0, s.pairs.size(), {}, {}}, app::replayed_calibration(configuration(), s, false));
+  return app::calibrate_drive({s, configuration(), 0, s.pairs.size(), {}, {}},
+                              app::replayed_calibration(configuration(), s, false));
 }
 
 /// The drive with what its own images say of its rig.
@@ -40,14 +42,15 @@ struct Reach {
 
 class RecordedLenses : public testing::TestWithParam<Reach> {};
 
-// Figures of calibration_bench with a fifth of margin: the bounds are what a regression would break, not what is reached.
+// Figures of calibration_bench with a fifth of margin: the bounds are what a regression would
+// break, not what is reached.
 TEST_P(RecordedLenses, aDriveCalibratedFromItselfIsRightInScaleAndTellsNoKnock) {
   const Reach& reach = GetParam();
   const auto d = open_recorded(reach.name);
   if (!d) GTEST_SKIP() << missing(reach.name);
   const DriveOutcome o = calibrated_first(*d, d->sequence);
-  std::printf("%s: segments %.3f %%, ATE %.4f m, scale %.4f, verified at %d\n", reach.name, o.segments_percent, o.ate_m, o.scale,
-              o.verified_at);
+  std::printf("%s: segments %.3f %%, ATE %.4f m, scale %.4f, verified at %d\n", reach.name,
+              o.segments_percent, o.ate_m, o.scale, o.verified_at);
   EXPECT_LE(o.segments_percent, reach.segments_percent);
   EXPECT_LE(o.ate_m, reach.ate_m);
   EXPECT_NEAR(o.scale, 1, reach.scale);
@@ -62,14 +65,18 @@ TEST_P(RecordedLenses, aDriveCalibratedFromItselfIsRightInScaleAndTellsNoKnock) 
 }
 
 INSTANTIATE_TEST_SUITE_P(Drives, RecordedLenses,
-                         testing::Values(Reach{"kitti06_51", 0.60, 0.030, 0.002}, Reach{"kitti01_51", 1.2, 0.065, 0.003},
-                                         Reach{"kitti00_151", 1.9, 0.33, 0.009}, Reach{"euroc_mh01", 0, 0.0041, 0.008}),
+                         testing::Values(Reach{"kitti06_51", 0.60, 0.030, 0.002},
+                                         Reach{"kitti01_51", 1.2, 0.065, 0.003},
+                                         Reach{"kitti00_151", 1.9, 0.33, 0.009},
+                                         Reach{"euroc_mh01", 0, 0.0041, 0.008}),
                          [](const auto& drive) { return std::string(drive.param.name); });
 
 TEST(RecordedClaims, aNominalCalibrationThatIsWrongIsNeverOkAndMended) {
   const auto d = open_recorded("kitti01_51");
   if (!d) GTEST_SKIP() << missing("kitti01_51");
-  const DriveOutcome o = drive_recorded(*d, d->sequence, configuration(), app::replayed_calibration(configuration(), d->sequence, false));
+  const DriveOutcome o =
+      drive_recorded(*d, d->sequence, configuration(),
+                     app::replayed_calibration(configuration(), d->sequence, false));
   ASSERT_GE(o.contradicted_at, 0);
   EXPECT_GT(o.contradicted_percent, 4);  // its path is 6 % off
   EXPECT_EQ(o.ok_before_verified, 0);
@@ -86,7 +93,8 @@ TEST(RecordedClaims, aCameraTurnedFromTheStartIsNoKnock) {
   int n = 0;
   for (const Vec3& degrees : {Vec3(0, 0.3, 0), Vec3(0.3, 0.2, 0.25)}) {
     const StereoSequence s = with_right_turned(*d, degrees, 0, folder / std::to_string(n++));
-    const DriveOutcome o = drive_recorded(*d, s, configuration(), app::replayed_calibration(configuration(), s, false));
+    const DriveOutcome o = drive_recorded(*d, s, configuration(),
+                                          app::replayed_calibration(configuration(), s, false));
     EXPECT_GE(o.contradicted_at, 0) << degrees.transpose();
     EXPECT_EQ(o.ok_before_verified, 0) << degrees.transpose();
     EXPECT_EQ(o.knocks, 0) << degrees.transpose();
@@ -97,7 +105,8 @@ TEST(RecordedClaims, aHeldCalibrationThatIsWrongKeepsTheShapeOfThePath) {
   const auto d = open_recorded("kitti01_51");
   if (!d) GTEST_SKIP() << missing("kitti01_51");
   const app::Configuration held = app::load_configuration(std::nullopt, {"calibration.online=off"});
-  const DriveOutcome o = drive_recorded(*d, d->sequence, held, app::replayed_calibration(held, d->sequence, false));
+  const DriveOutcome o =
+      drive_recorded(*d, d->sequence, held, app::replayed_calibration(held, d->sequence, false));
   EXPECT_EQ(o.lost, 0);
   EXPECT_EQ(o.contradicted_at, -1) << "nobody was asked";
   // Held as exact, 6.2 % and 0.34 m after one scale; the best peer, 4.7 % and 0.05 m.

@@ -22,7 +22,8 @@ TEST(LongSlow, twentyPlacesOfTheDriveGiveTheTransformFromSixtyFrames) {
     CourseSetting setting = from_scratch(options.rig);
     setting.options.calibration.min_frames = setting.options.calibration.max_frames = 60;
     Course course(setting);
-    for (std::uint64_t i = 0; i < 110 && course.accepted() == nullptr; ++i) course.give(drive.frame(i), drive.T_enu_left(i));
+    for (std::uint64_t i = 0; i < 110 && course.accepted() == nullptr; ++i)
+      course.give(drive.frame(i), drive.T_enu_left(i));
     ASSERT_NE(course.accepted(), nullptr) << start << " s\n" << course.story();
     const RigError e = rig_error(course.accepted()->calibration, 1, options.rig.T_camera_left[1]);
     std::printf("%.2f s: %s\n", start, to_string(e).c_str());
@@ -34,7 +35,8 @@ TEST(LongSlow, twentyPlacesOfTheDriveGiveTheTransformFromSixtyFrames) {
     along += e.t.z() * e.t.z();
     ++n;
   }
-  std::printf("root means: rotation %.4f mrad, t_y %.3f mm, t_z %.3f mm\n", 1e3 * std::sqrt(rotation / n), 1e3 * std::sqrt(across / n),
+  std::printf("root means: rotation %.4f mrad, t_y %.3f mm, t_z %.3f mm\n",
+              1e3 * std::sqrt(rotation / n), 1e3 * std::sqrt(across / n),
               1e3 * std::sqrt(along / n));
   EXPECT_LT(std::sqrt(rotation / n), 0.06e-3);
   EXPECT_LT(std::sqrt(across / n), 0.6e-3);
@@ -49,7 +51,8 @@ TEST(LongSlow, tenDrivesWithoutAKnockRaiseNoAlarm) {
     RenderedDrive drive(options);
     Course course(with_calibration(options.rig));
     for (std::uint64_t i = 0; i < 200; ++i) course.give(drive.frame(i), drive.T_enu_left(i));
-    EXPECT_EQ(course.first(EstimatorEvent::Kind::rig_changed), nullptr) << seed << '\n' << course.story();
+    EXPECT_EQ(course.first(EstimatorEvent::Kind::rig_changed), nullptr) << seed << '\n'
+                                                                        << course.story();
     EXPECT_EQ(wrong_ok(course.answers(), {}), "") << seed;
   }
 }
@@ -59,17 +62,21 @@ TEST(LongSlow, aPitchThatCreepsIsNoticedAndFollowed) {
   const Transform T = options.rig.T_camera_left[1];
   const double rate = 0.02 * kDegree / 60;  // rad/s
   const auto crept = [&](std::uint64_t i) { return rate * static_cast<double>(i) / options.rate; };
-  options.placed = [&](int, std::uint64_t i) { return perturbed(T, {crept(i), 0, 0}, Vec3::Zero()); };
+  options.placed = [&](int, std::uint64_t i) {
+    return perturbed(T, {crept(i), 0, 0}, Vec3::Zero());
+  };
   options.from_s = 8;
   RenderedDrive drive(options);
   Course course(with_calibration(options.rig));
   const auto frames = static_cast<std::uint64_t>(0.03 * kDegree / rate * options.rate);
   std::uint64_t i = 0;
-  for (; i < frames && course.first(EstimatorEvent::Kind::rig_changed) == nullptr; ++i) course.give(drive.frame(i), drive.T_enu_left(i));
+  for (; i < frames && course.first(EstimatorEvent::Kind::rig_changed) == nullptr; ++i)
+    course.give(drive.frame(i), drive.T_enu_left(i));
   const Told* noticed = course.first(EstimatorEvent::Kind::rig_changed);
   ASSERT_NE(noticed, nullptr) << course.story();
   std::printf("noticed at %.4f deg\n", crept(noticed->frame) / kDegree);
-  for (const std::uint64_t end = i + 120; i < end && course.accepted() == nullptr; ++i) course.give(drive.frame(i), drive.T_enu_left(i));
+  for (const std::uint64_t end = i + 120; i < end && course.accepted() == nullptr; ++i)
+    course.give(drive.frame(i), drive.T_enu_left(i));
   ASSERT_NE(course.accepted(), nullptr) << course.story();
   const RigError e = rig_error(course.accepted()->calibration, 1, options.placed(1, i));
   std::printf("%s\n", to_string(e).c_str());

@@ -28,7 +28,8 @@ std::optional<StereoDrive> excerpt(Excerpt which) {
   return load(which, *folder);
 }
 
-/// The calibration found from so many frames or more, decided at the end of the drive at the latest. Intrinsics held.
+/// The calibration found from so many frames or more, decided at the end of the drive at the
+/// latest. Intrinsics held.
 std::optional<RigCalibration> calibrate(const StereoDrive& drive, int frames) {
   CourseSetting setting = from_scratch(drive.rig);
   setting.options.calibration.min_frames = frames;
@@ -36,18 +37,21 @@ std::optional<RigCalibration> calibrate(const StereoDrive& drive, int frames) {
   course.give(drive, 0, drive.size());
   if (course.accepted() == nullptr) course.finish();
   EXPECT_NE(course.accepted(), nullptr) << course.story();
-  for (const Answer& a : course.answers()) EXPECT_NE(a.sample.status, PoseStatus::lost) << a.sample.frame;
+  for (const Answer& a : course.answers())
+    EXPECT_NE(a.sample.status, PoseStatus::lost) << a.sample.frame;
   if (course.accepted() == nullptr) return std::nullopt;
   return course.accepted()->calibration;
 }
 
 /// Rotation vector in degrees from one calibration to another.
-Vec3 turned(const RigCalibration& to, const Mat3& from) { return log_so3(to.T_camera_left[1].R * from.transpose()) / kDegree; }
+Vec3 turned(const RigCalibration& to, const Mat3& from) {
+  return log_so3(to.T_camera_left[1].R * from.transpose()) / kDegree;
+}
 
 void print(const char* name, const RigCalibration& rig) {
   const Vec3 r = log_so3(rig.T_camera_left[1].R) / kDegree, t = rig.T_camera_left[1].t;
-  std::printf("%s: rotation vector %.4f %.4f %.4f deg, t %.5f %.5f %.5f m, from %d frames\n", name, r.x(), r.y(), r.z(), t.x(), t.y(),
-              t.z(), rig.frames);
+  std::printf("%s: rotation vector %.4f %.4f %.4f deg, t %.5f %.5f %.5f m, from %d frames\n", name,
+              r.x(), r.y(), r.z(), t.x(), t.y(), t.z(), rig.frames);
 }
 
 /// Of a second drive with the calibration found.
@@ -75,9 +79,10 @@ TEST(RecordedFromScratch, eurocsPublishedTransformIsFound) {
   const Vec3 &a = found->T_camera_left[1].t, &b = published.t;
   EXPECT_LT(std::atan2(a.cross(b).norm(), a.dot(b)) / kDegree, 0.5);
   EXPECT_NEAR(a.norm(), 0.11007784, 1e-6);
-  const TrajectoryEvaluation with_found = odometry_with(*drive, *found), with_published = odometry_with(*drive, drive->rig);
-  std::printf("euroc: ATE %.2f mm with it, %.2f mm with the published one\n", 1e3 * with_found.ate_se3.rmse,
-              1e3 * with_published.ate_se3.rmse);
+  const TrajectoryEvaluation with_found = odometry_with(*drive, *found),
+                             with_published = odometry_with(*drive, drive->rig);
+  std::printf("euroc: ATE %.2f mm with it, %.2f mm with the published one\n",
+              1e3 * with_found.ate_se3.rmse, 1e3 * with_published.ate_se3.rmse);
   EXPECT_LT(with_found.ate_se3.rmse, with_published.ate_se3.rmse + 1e-3);
 }
 
@@ -87,15 +92,18 @@ TEST(RecordedFromScratch, kittisTransformIsFound) {
   const auto found = calibrate(*drive, kFrames);
   ASSERT_TRUE(found);
   print("kitti", *found);
-  // What an offline adjustment of the same images comes to, whose own directions are good to some hundredths of a degree: the nominal
-  // rectification leaves residuals that are no noise.
+  // What an offline adjustment of the same images comes to, whose own directions are good to some
+  // hundredths of a degree: the nominal rectification leaves residuals that are no noise.
   const Vec3 off = turned(*found, exp_so3(kDegree * Vec3(0.032, 0.042, -0.040)));
-  std::printf("kitti: %.4f %.4f %.4f deg off, %.4f in all\n", off.x(), off.y(), off.z(), off.norm());
+  std::printf("kitti: %.4f %.4f %.4f deg off, %.4f in all\n", off.x(), off.y(), off.z(),
+              off.norm());
   for (int i = 0; i < 3; ++i) EXPECT_LT(std::abs(off[i]), 0.02) << i;
   const TrajectoryEvaluation e = odometry_with(*drive, *found);
-  std::printf("kitti: segments %.3f %%, %.3f %% after one scale of %.4f; scale sigma %.4f\n", 100 * e.segments[0].translation,
-              100 * e.segments[1].translation, e.sim3.scale, found->scale_sigma);
-  EXPECT_LT(e.segments[1].translation, 0.0063) << "one lens model too few leaves so much; with the lenses found it is 0.55 %";
+  std::printf("kitti: segments %.3f %%, %.3f %% after one scale of %.4f; scale sigma %.4f\n",
+              100 * e.segments[0].translation, 100 * e.segments[1].translation, e.sim3.scale,
+              found->scale_sigma);
+  EXPECT_LT(e.segments[1].translation, 0.0063)
+      << "one lens model too few leaves so much; with the lenses found it is 0.55 %";
 }
 
 /// The right images as a camera turned by `degrees` would have taken them: x' ~ K R K⁻¹ x.
@@ -109,10 +117,13 @@ StereoDrive with_right_turned(StereoDrive drive, const Mat3& R) {
     for (int j = 0; j < 3; ++j) homography.at<double>(i, j) = H(i, j);
   for (auto& pair : drive.pairs) {
     const Picture before = pair[1];
-    const cv::Mat source(before.height, before.width, CV_8U, const_cast<std::uint8_t*>(before.bytes.data()),
+    const cv::Mat source(before.height, before.width, CV_8U,
+                         const_cast<std::uint8_t*>(before.bytes.data()),
                          static_cast<std::size_t>(before.stride));
-    cv::Mat target(before.height, before.width, CV_8U, pair[1].bytes.data(), static_cast<std::size_t>(before.stride));
-    cv::warpPerspective(source, target, homography, target.size(), cv::INTER_CUBIC, cv::BORDER_REPLICATE);
+    cv::Mat target(before.height, before.width, CV_8U, pair[1].bytes.data(),
+                   static_cast<std::size_t>(before.stride));
+    cv::warpPerspective(source, target, homography, target.size(), cv::INTER_CUBIC,
+                        cv::BORDER_REPLICATE);
   }
   return drive;
 }
@@ -130,8 +141,10 @@ TEST(RecordedFromScratch, kittisRightCameraTurnedIsFoundTurned) {
     ASSERT_TRUE(found);
     const Vec3 off = turned(*found, R * straight->T_camera_left[1].R);
     const TrajectoryEvaluation after = odometry_with(rotated, *found);
-    std::printf("kitti turned by %.2f deg: %.4f deg off; segments %.3f %% against %.3f %% unturned\n", degrees.norm(), off.norm(),
-                100 * after.segments[0].translation, 100 * before.segments[0].translation);
+    std::printf(
+        "kitti turned by %.2f deg: %.4f deg off; segments %.3f %% against %.3f %% unturned\n",
+        degrees.norm(), off.norm(), 100 * after.segments[0].translation,
+        100 * before.segments[0].translation);
     EXPECT_LT(off.norm(), 0.015) << off.transpose();
     EXPECT_LT(after.segments[0].translation, 1.2 * before.segments[0].translation);
   }

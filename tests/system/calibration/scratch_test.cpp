@@ -1,4 +1,5 @@
-// From nothing but the baseline's length, on the paper's rig. One program: the cases share what is rendered.
+// From nothing but the baseline's length, on the paper's rig. One program: the cases share what is
+// rendered.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -46,7 +47,8 @@ void expect_found(const Course& course, const Transform& truth) {
   EXPECT_LT(e.rotation, kRotation) << to_string(e);
   EXPECT_LT(std::abs(e.t.y()), kAcross) << to_string(e);
   EXPECT_LT(std::abs(e.t.z()), kAlong) << to_string(e);
-  EXPECT_NEAR(d->calibration.T_camera_left[1].t.norm(), truth.t.norm(), 1e-12) << "the length is known";
+  EXPECT_NEAR(d->calibration.T_camera_left[1].t.norm(), truth.t.norm(), 1e-12)
+      << "the length is known";
   // Six numbers whose sigmas hold up: beyond four in one of them is one case in three thousand.
   EXPECT_LT(e.sigmas, 4.0) << to_string(e);
   EXPECT_EQ(d->calibration.frames, kFrames);
@@ -54,7 +56,8 @@ void expect_found(const Course& course, const Transform& truth) {
   EXPECT_TRUE(course.estimator().calibrated());
 }
 
-/// Every frame once the first pair is found has a pose, and none without a calibration is called ok.
+/// Every frame once the first pair is found has a pose, and none without a calibration is called
+/// ok.
 void expect_poses_all_the_time(const Course& course) {
   bool any = false;
   for (const Answer& a : course.answers()) {
@@ -89,13 +92,15 @@ TEST(FromScratch, threePlacesOfTheDriveGiveTheTransform) {
 }
 
 TEST(FromScratch, allocatesNothingOnAnyThread) {
-  if (!AllocationGuard::available()) GTEST_SKIP() << "this build counts no allocations: the sanitizers bring their own malloc";
+  if (!AllocationGuard::available())
+    GTEST_SKIP() << "this build counts no allocations: the sanitizers bring their own malloc";
   for (const int threads : {1, 2}) {
     CourseSetting s = from_scratch(street().rig);
     s.threads = threads;
     Course course(s);
     course.give(street(), 0, 75);
-    EXPECT_FALSE(course.decisions().empty()) << "the solver's share has to be in it\n" << course.story();
+    EXPECT_FALSE(course.decisions().empty()) << "the solver's share has to be in it\n"
+                                             << course.story();
     EXPECT_EQ(course.allocations(), 0U) << threads;
   }
 }
@@ -148,7 +153,8 @@ TEST(FromScratch, exchangedCamerasAreNeverAdoptedAndItSaysWhy) {
   course.give(street(), 0, street().size(), swap_cameras(0, street().size()));
   course.finish();
   EXPECT_EQ(course.count_accepted(), 0) << course.story();
-  EXPECT_TRUE(course.rejected_for(calibration::reason(calibration::Gate::cameras_swapped))) << course.story();
+  EXPECT_TRUE(course.rejected_for(calibration::reason(calibration::Gate::cameras_swapped)))
+      << course.story();
   EXPECT_EQ(count_ok(course.answers(), 0, street().size()), 0) << course.story();
   EXPECT_TRUE(std::any_of(course.answers().begin(), course.answers().end(), [](const Answer& a) {
     return a.sample.reason == Reason::cameras_swapped;
@@ -217,7 +223,8 @@ TEST(StandingStill, fromScratchSaysThatItNeedsMotionAndAdoptsNothing) {
   for (const Answer& a : course.answers()) {
     EXPECT_NE(a.sample.status, PoseStatus::ok) << course.story();
     if (a.sample.frame >= 30) {
-      EXPECT_EQ(a.sample.reason, Reason::needs_motion) << "frame " << a.sample.frame << '\n' << course.story();
+      EXPECT_EQ(a.sample.reason, Reason::needs_motion) << "frame " << a.sample.frame << '\n'
+                                                       << course.story();
     }
   }
   EXPECT_NE(course.first(EstimatorEvent::Kind::calibration_waits), nullptr) << course.story();
@@ -228,14 +235,16 @@ TEST(StandingStill, fromScratchSaysThatItNeedsMotionAndAdoptsNothing) {
 TEST(StandingStill, aKnockIsNoticedAndWaitsForMotion) {
   const Standing before(standing_drive());
   RenderedDriveOptions knocked = standing_drive();
-  knocked.rig.T_camera_left[1] = perturbed(knocked.rig.T_camera_left[1], Vec3(0.5 * std::numbers::pi / 180, 0, 0), Vec3::Zero());
+  knocked.rig.T_camera_left[1] = perturbed(knocked.rig.T_camera_left[1],
+                                           Vec3(0.5 * std::numbers::pi / 180, 0, 0), Vec3::Zero());
   const Standing after(knocked);
   Course course(with_calibration(before.still.rig));
   constexpr std::uint64_t kKnock = 40, kEnd = 100;
   before.give(&course, 0, kKnock);
   EXPECT_EQ(count_ok(course.answers(), 0, kKnock), static_cast<int>(kKnock)) << course.story();
   after.give(&course, kKnock, kEnd);
-  // A rig that stood from the start has not confirmed its calibration: it may never have been the right one.
+  // A rig that stood from the start has not confirmed its calibration: it may never have been the
+  // right one.
   const Told* noticed = course.first(EstimatorEvent::Kind::calibration_contradicted);
   ASSERT_NE(noticed, nullptr) << course.story();
   EXPECT_GE(noticed->frame, kKnock);
@@ -263,10 +272,12 @@ TEST(ThreeCameras, allTransformsAreFound) {
   options.rig = rig;
   RenderedDrive drive(options);
   CourseSetting setting = from_sixty(rig);
-  setting.nominal.T_camera_left[2] = {Mat3::Identity(), {-0.25, -0.05, 0}};  // where it is mounted, as one would measure it
+  setting.nominal.T_camera_left[2] = {
+      Mat3::Identity(), {-0.25, -0.05, 0}};  // where it is mounted, as one would measure it
   Course course(setting);
   // Pixels twice as wide as the paper's: the sigmas that are enough are as much larger.
-  for (std::uint64_t i = 0; i < 110 && course.accepted() == nullptr; ++i) course.give(drive.frame(i), drive.T_enu_left(i));
+  for (std::uint64_t i = 0; i < 110 && course.accepted() == nullptr; ++i)
+    course.give(drive.frame(i), drive.T_enu_left(i));
   ASSERT_NE(course.accepted(), nullptr) << course.story();
   const RigCalibration& found = course.accepted()->calibration;
   for (int k = 1; k < 3; ++k) {

@@ -19,14 +19,16 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Short drives with small images in a folder of their own, with a state folder beside the sessions.
+/// Short drives with small images in a folder of their own, with a state folder beside the
+/// sessions.
 class CalibrationCli : public ::testing::Test {
  protected:
   [[nodiscard]] fs::path session(const std::string& name) const { return folder_ / name; }
   [[nodiscard]] fs::path state() const { return folder_ / "state" / "calibration_state.yaml"; }
   [[nodiscard]] std::string arguments(const std::string& name, const std::string& more) const {
     return fmt::format(
-        "run '{}/app/config/mock.yaml' --quiet --out '{}' --set rig.state_dir='{}' --set cameras.0.size=[320,240] "
+        "run '{}/app/config/mock.yaml' --quiet --out '{}' --set rig.state_dir='{}' --set "
+        "cameras.0.size=[320,240] "
         "--set cameras.1.size=[320,240] --set mock.texture_detail=0 --set cameras.0.name=links {}",
         VERGENCE_SOURCE_DIR, session(name).string(), (folder_ / "state").string(), more);
   }
@@ -36,14 +38,16 @@ class CalibrationCli : public ::testing::Test {
   [[nodiscard]] nlohmann::json summary(const std::string& name) const {
     return nlohmann::json::parse(read_file(session(name) / "summary.json"));
   }
-  [[nodiscard]] std::vector<std::string> lines(const std::string& name, const std::string& file) const {
+  [[nodiscard]] std::vector<std::string> lines(const std::string& name,
+                                               const std::string& file) const {
     std::istringstream in(read_file(session(name) / file));
     std::vector<std::string> found;
     for (std::string line; std::getline(in, line);) found.push_back(line);
     return found;
   }
   /// Sentences of the events of one kind.
-  [[nodiscard]] std::vector<std::string> events(const std::string& name, const std::string& kind) const {
+  [[nodiscard]] std::vector<std::string> events(const std::string& name,
+                                                const std::string& kind) const {
     std::vector<std::string> found;
     for (const std::string& line : lines(name, "events.jsonl")) {
       const auto event = nlohmann::json::parse(line);
@@ -53,22 +57,27 @@ class CalibrationCli : public ::testing::Test {
   }
   [[nodiscard]] std::size_t frames_with(const std::string& name, const std::string& word) const {
     const auto poses = lines(name, "poses.csv");
-    return static_cast<std::size_t>(
-        std::count_if(poses.begin(), poses.end(), [&](const std::string& l) { return l.find("," + word + ",") != std::string::npos; }));
+    return static_cast<std::size_t>(std::count_if(
+        poses.begin(), poses.end(),
+        [&](const std::string& l) { return l.find("," + word + ",") != std::string::npos; }));
   }
 
   TemporaryFolder folder_;
 };
 
-constexpr const char* kLongEnough = "--duration 9";  // three seconds of standing, a calibration needs some two of motion
+constexpr const char* kLongEnough =
+    "--duration 9";  // three seconds of standing, a calibration needs some two of motion
 
 TEST_F(CalibrationCli, fromScratchADriveFindsItsRigAndEveryFileTellsOfIt) {
   const Outcome o = drive("s", std::string("--from-scratch ") + kLongEnough);
   ASSERT_EQ(o.code, 0) << o.err;
   const auto rows = lines("s", "calibrations.csv");
   ASSERT_GE(rows.size(), 2U);
-  EXPECT_NE(rows[1].find(",from_scratch,"), std::string::npos) << "nothing was given: the first row is of the first attempt: " << rows[1];
-  const auto accepted = [](const std::string& row) { return row.find(",accepted,from_scratch,") != std::string::npos; };
+  EXPECT_NE(rows[1].find(",from_scratch,"), std::string::npos)
+      << "nothing was given: the first row is of the first attempt: " << rows[1];
+  const auto accepted = [](const std::string& row) {
+    return row.find(",accepted,from_scratch,") != std::string::npos;
+  };
   EXPECT_EQ(std::count_if(rows.begin(), rows.end(), accepted), 1);
 
   const auto s = summary("s");
@@ -80,11 +89,13 @@ TEST_F(CalibrationCli, fromScratchADriveFindsItsRigAndEveryFileTellsOfIt) {
   EXPECT_GE(c["from_scratch"]["frames"].get<int>(), 25);
   EXPECT_GT(c["from_scratch"]["latency_frames"].get<int>(), 25);
   EXPECT_TRUE(c["word"].is_string());
-  EXPECT_GT(c["depth_error_percent"]["50"].get<double>(), c["depth_error_percent"]["20"].get<double>());
+  EXPECT_GT(c["depth_error_percent"]["50"].get<double>(),
+            c["depth_error_percent"]["20"].get<double>());
   EXPECT_TRUE(s["recalibrations"].empty());
   EXPECT_GT(s["timing_ms"]["while_calibrating"]["frames"].get<int>(), 25);
   ASSERT_EQ(s["truth"]["calibration"].size(), 1U);
-  for (const auto& e : s["truth"]["calibration"][0]["rotation_rad"]) EXPECT_LT(std::abs(e.get<double>()), 0.002);
+  for (const auto& e : s["truth"]["calibration"][0]["rotation_rad"])
+    EXPECT_LT(std::abs(e.get<double>()), 0.002);
 
   const app::CalibrationFile found = app::read_calibration(session("s") / "calibration.yaml");
   EXPECT_EQ(found.source, "online");
@@ -93,7 +104,8 @@ TEST_F(CalibrationCli, fromScratchADriveFindsItsRigAndEveryFileTellsOfIt) {
   EXPECT_GT(found.rig.scale_sigma, 0);
   EXPECT_GT(found.rig.sigma_wide[1][4], 0);
   EXPECT_EQ(events("s", "calibration_kept").size(), 1U);
-  EXPECT_EQ(read_file(state()), read_file(session("s") / "calibration.yaml")) << "what is kept is what is in use";
+  EXPECT_EQ(read_file(state()), read_file(session("s") / "calibration.yaml"))
+      << "what is kept is what is in use";
 }
 
 TEST_F(CalibrationCli, whatOneDriveFoundIsWhereTheNextBeginsUnlessTheCamerasAreOthers) {
@@ -102,14 +114,17 @@ TEST_F(CalibrationCli, whatOneDriveFoundIsWhereTheNextBeginsUnlessTheCamerasAreO
 
   const Outcome second = drive("second", "--duration 4");
   ASSERT_EQ(second.code, 0) << second.err;
-  EXPECT_NE(lines("second", "calibrations.csv").at(1).find(",accepted,state_file,"), std::string::npos);
-  EXPECT_GT(frames_with("second", "unconfirmed"), 0U) << "until the monitor has seen that it still is true";
+  EXPECT_NE(lines("second", "calibrations.csv").at(1).find(",accepted,state_file,"),
+            std::string::npos);
+  EXPECT_GT(frames_with("second", "unconfirmed"), 0U)
+      << "until the monitor has seen that it still is true";
   EXPECT_EQ(app::read_calibration(session("second") / "calibration.yaml").rig.T_camera_left[1].t,
             app::read_calibration(state()).rig.T_camera_left[1].t);
 
   const Outcome other = drive("other", "--duration 1 --set cameras.1.serial=another");
   EXPECT_EQ(other.code, 0);
-  EXPECT_NE(other.err.find("another"), std::string::npos) << "told why it is not used: " << other.err;
+  EXPECT_NE(other.err.find("another"), std::string::npos)
+      << "told why it is not used: " << other.err;
   EXPECT_NE(lines("other", "calibrations.csv").at(1).find(",accepted,given,"), std::string::npos);
   EXPECT_EQ(read_file(state()), kept) << "nothing was accepted since";
 }
@@ -124,8 +139,12 @@ TEST_F(CalibrationCli, aStateFileThatCannotBeWrittenIsAnEventAndASentenceAndNoEn
 
 TEST_F(CalibrationCli, theSameDecisionsWhateverTheThreads) {
   for (const char* threads : {"1", "2"})
-    ASSERT_EQ(drive(threads, fmt::format("--from-scratch {} --threads {} --set rig.state_dir=none", kLongEnough, threads)).code, 0);
-  for (const char* file : {"trajectory.tum", "calibrations.csv", "calibration.yaml", "events.jsonl", "residuals.csv"})
+    ASSERT_EQ(drive(threads, fmt::format("--from-scratch {} --threads {} --set rig.state_dir=none",
+                                         kLongEnough, threads))
+                  .code,
+              0);
+  for (const char* file :
+       {"trajectory.tum", "calibrations.csv", "calibration.yaml", "events.jsonl", "residuals.csv"})
     EXPECT_EQ(read_file(session("1") / file), read_file(session("2") / file)) << file;
 }
 
@@ -136,16 +155,20 @@ TEST_F(CalibrationCli, aGivenFileGoesBeforeTheStateAndOneOfAnotherRigIsRefused) 
   fs::copy_file(mine, state());
   const Outcome o = drive("s", fmt::format("--duration 1 --calibration '{}'", mine.string()));
   EXPECT_EQ(o.code, 0) << o.err;
-  EXPECT_NE(lines("s", "calibrations.csv").at(1).find(",accepted,given,calibration.yaml,"), std::string::npos);
-  const Outcome refused = drive(
-      "t", fmt::format("--duration 1 --calibration '{}' --set cameras.0.size=[640,480] --set cameras.1.size=[640,480]", mine.string()));
+  EXPECT_NE(lines("s", "calibrations.csv").at(1).find(",accepted,given,calibration.yaml,"),
+            std::string::npos);
+  const Outcome refused =
+      drive("t", fmt::format("--duration 1 --calibration '{}' --set cameras.0.size=[640,480] --set "
+                             "cameras.1.size=[640,480]",
+                             mine.string()));
   EXPECT_EQ(refused.code, 2);
   EXPECT_NE(refused.err.find("cameras.0.size is 640 x 480"), std::string::npos) << refused.err;
 }
 
 TEST_F(CalibrationCli, aScheduledWishRecalibrates) {
   const Outcome o = drive("s", "--duration 9 --fault recalibrate@4");
-  ASSERT_EQ(o.code, 1) << "asked before the drive had confirmed what it had, so no frame was ok: " << o.err;
+  ASSERT_EQ(o.code, 1) << "asked before the drive had confirmed what it had, so no frame was ok: "
+                       << o.err;
   const auto attempts = summary("s")["recalibrations"];
   ASSERT_GE(attempts.size(), 1U);
   EXPECT_EQ(attempts[0]["reason"], "requested");
@@ -157,7 +180,8 @@ TEST_F(CalibrationCli, sigusr1AsksARunningDriveForANewCalibration) {
   // In real time; the signal comes once the first poses are in the file.
   const std::string command = arguments("s", "--duration 5");
   const std::string script = fmt::format(
-      "true; '{}' {} & pid=$!; for i in $(seq 300); do [ \"$(wc -l <'{}' 2>/dev/null || echo 0)\" -gt 3 ] && break; sleep 0.1; done; "
+      "true; '{}' {} & pid=$!; for i in $(seq 300); do [ \"$(wc -l <'{}' 2>/dev/null || echo 0)\" "
+      "-gt 3 ] && break; sleep 0.1; done; "
       "kill -USR1 $pid; wait $pid",
       VERGENCE_PROGRAM, command, (session("s") / "poses.csv").string());
   const fs::path file = folder_ / "drive.sh";
@@ -170,13 +194,15 @@ TEST_F(CalibrationCli, sigusr1AsksARunningDriveForANewCalibration) {
 }
 
 TEST_F(CalibrationCli, aBaselineTwiceTooLongDisagreesWithTheIns) {
-  const Outcome o =
-      drive("s", "--duration 29 --set mock.ins=ideal --set mock.calibration_error.length_percent=100 --set rig.state_dir=none");
+  const Outcome o = drive("s",
+                          "--duration 29 --set mock.ins=ideal --set "
+                          "mock.calibration_error.length_percent=100 --set rig.state_dir=none");
   ASSERT_EQ(o.code, 0) << o.err;
   ASSERT_EQ(events("s", "scale_disagrees").size(), 1U);
   EXPECT_NE(events("s", "scale_disagrees")[0].find("longer than the INS's"), std::string::npos);
   EXPECT_GT(summary("s")["comparison"]["scale_disagrees"].get<int>(), 0);
-  EXPECT_NEAR(summary("s")["truth"]["path_ratio"].get<double>(), 2, 0.05) << "the estimator stays as it is: images cannot tell";
+  EXPECT_NEAR(summary("s")["truth"]["path_ratio"].get<double>(), 2, 0.05)
+      << "the estimator stays as it is: images cannot tell";
 }
 
 }  // namespace

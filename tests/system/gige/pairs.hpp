@@ -24,10 +24,13 @@ inline std::string socket_buffer_obstacle() {
   const int fd = ::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
   const std::int64_t got = fd < 0 ? 0 : gige::set_receive_buffer(fd, kEnough);
   if (fd >= 0) (void)::close(fd);
-  return got >= kEnough ? "" : "receive buffers are too small here: sudo sysctl -w net.core.rmem_max=10485760";
+  return got >= kEnough
+             ? ""
+             : "receive buffers are too small here: sudo sysctl -w net.core.rmem_max=10485760";
 }
 
-/// Two simulated cameras on one pulse, driver, pairing: numbers of the pairs that came out complete.
+/// Two simulated cameras on one pulse, driver, pairing: numbers of the pairs that came out
+/// complete.
 class Pairs {
  public:
   static constexpr int kWidth = 640, kHeight = 480;
@@ -45,7 +48,10 @@ class Pairs {
       o.clock_offset_ns = 1'000'000'000'000 * (k + 3);
       o.discoverable = false;
       simulators.push_back(std::make_unique<GigeCamera>(o));
-      app::CameraRequest r{"cameras." + std::to_string(k), "gige", o.address, {kWidth, kHeight, rate, Duration::milliseconds(2), 0}};
+      app::CameraRequest r{"cameras." + std::to_string(k),
+                           "gige",
+                           o.address,
+                           {kWidth, kHeight, rate, Duration::milliseconds(2), 0}};
       r.configuration.options = {{"packet_size", "16000"}, {"resend", resend}};
       requests.push_back(std::move(r));
     }
@@ -54,11 +60,13 @@ class Pairs {
     app::LiveSource::Options o;
     o.sync.interval = Duration::seconds(1 / rate);
     o.sync.align_start = true;
-    source = std::make_unique<app::LiveSource>(std::vector<CameraDevice*>{cameras[0].device.get(), cameras[1].device.get()}, nullptr,
-                                               nullptr, o);
+    source = std::make_unique<app::LiveSource>(
+        std::vector<CameraDevice*>{cameras[0].device.get(), cameras[1].device.get()}, nullptr,
+        nullptr, o);
     source->start();
     std::thread pulses([this, loss, count] {
-      constexpr int kQuiet = 5;  // pulses at either end without loss: the first frame sets the count, the last shows the gap before it
+      constexpr int kQuiet = 5;  // pulses at either end without loss: the first frame sets the
+                                 // count, the last shows the gap before it
       pulse(0, kQuiet);
       for (const auto& s : simulators) s->set_loss(loss);
       pulse(kQuiet, count - kQuiet);
@@ -80,7 +88,8 @@ class Pairs {
   [[nodiscard]] std::vector<std::uint64_t> whole() const {
     const auto left = simulators[0]->whole(), right = simulators[1]->whole();
     std::vector<std::uint64_t> both;
-    std::set_intersection(left.begin(), left.end(), right.begin(), right.end(), std::back_inserter(both));
+    std::set_intersection(left.begin(), left.end(), right.begin(), right.end(),
+                          std::back_inserter(both));
     return both;
   }
 

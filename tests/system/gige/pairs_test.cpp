@@ -12,7 +12,8 @@ TEST(GigePairs, withoutResendEveryPairThatCameWholePairsUp) {
   const auto whole = p.whole();
   EXPECT_EQ(p.complete.size(), whole.size());
   for (const std::uint64_t n : whole)
-    EXPECT_TRUE(std::binary_search(p.complete.begin(), p.complete.end(), n)) << "pair " << n << " came whole";
+    EXPECT_TRUE(std::binary_search(p.complete.begin(), p.complete.end(), n))
+        << "pair " << n << " came whole";
   EXPECT_LT(p.complete.size(), kPulses - 15U) << "a fifth of the frames is torn";
   EXPECT_GT(p.complete.size(), 40U);
   const auto& c = p.source->counters();

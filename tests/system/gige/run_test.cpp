@@ -29,12 +29,14 @@ constexpr double kRate = 10;
 
 const std::string kExample = std::string(VERGENCE_SOURCE_DIR) + "/app/config/gige.yaml";
 
-/// A rendered drive: every camera's images, rows without padding, and where the left camera truly was.
+/// A rendered drive: every camera's images, rows without padding, and where the left camera truly
+/// was.
 struct RenderedDrive {
   RenderedDrive() {
     const app::Configuration c = app::parse_configuration(
         "rig: {nominal: {baseline_m: 0.75, k1: -0.08, k2: 0.02}}\n"
-        "cameras: [{driver: mock, size: [640, 480], exposure_us: 4000}, {driver: mock, size: [640, 480], exposure_us: 4000}]\n"
+        "cameras: [{driver: mock, size: [640, 480], exposure_us: 4000}, {driver: mock, size: [640, "
+        "480], exposure_us: 4000}]\n"
         "trigger: {driver: mock, rate: 10}\nins: {driver: none}\n"
         "mock: {drive: brief, texture_detail: 0, stop_s: 1, speed: 8}\n",
         "drive", {});
@@ -48,7 +50,8 @@ struct RenderedDrive {
         EXPECT_EQ(camera.wait(Duration::seconds(60), &frame), DeviceStatus::ok) << "image " << i;
         const ImageView image = camera.view(frame.slot);
         std::vector<std::uint8_t> bytes;
-        for (int y = 0; y < image.height; ++y) bytes.insert(bytes.end(), image.row(y), image.row(y) + image.width);
+        for (int y = 0; y < image.height; ++y)
+          bytes.insert(bytes.end(), image.row(y), image.row(y) + image.width);
         images[k].push_back(std::move(bytes));
         camera.release(frame.slot);
       }
@@ -71,16 +74,20 @@ struct Wires {
       o.number_images = false;
       o.discoverable = false;
       if (drive != nullptr)
-        o.images = [drive, k](std::uint64_t n) { return drive->images[k][std::min<std::size_t>(n, drive->images[k].size() - 1)].data(); };
+        o.images = [drive, k](std::uint64_t n) {
+          return drive->images[k][std::min<std::size_t>(n, drive->images[k].size() - 1)].data();
+        };
       cameras.push_back(std::make_unique<GigeCamera>(o));
     }
   }
   [[nodiscard]] std::string settings() const {
     std::string s =
-        " --set trigger.rate=10 --set rig.nominal.k1=-0.08 --set rig.nominal.k2=0.02 --set rig.nominal.baseline_m=0.75"
+        " --set trigger.rate=10 --set rig.nominal.k1=-0.08 --set rig.nominal.k2=0.02 --set "
+        "rig.nominal.baseline_m=0.75"
         " --set rig.state_dir=none --set 'cameras.1.T_camera_left=[1,0,0,-0.75,0,1,0,0,0,0,1,0]'";
     for (int k = 0; k < 2; ++k)
-      s += " --set cameras." + std::to_string(k) + ".serial=" + cameras[static_cast<std::size_t>(k)]->options().address +
+      s += " --set cameras." + std::to_string(k) +
+           ".serial=" + cameras[static_cast<std::size_t>(k)]->options().address +
            " --set cameras." + std::to_string(k) + ".size=[640,480]";
     return s;
   }
@@ -89,7 +96,8 @@ struct Wires {
 
 double path_length(const std::vector<StampedPose>& poses) {
   double sum = 0;
-  for (std::size_t i = 1; i < poses.size(); ++i) sum += (poses[i].T_world_body.t - poses[i - 1].T_world_body.t).norm();
+  for (std::size_t i = 1; i < poses.size(); ++i)
+    sum += (poses[i].T_world_body.t - poses[i - 1].T_world_body.t).norm();
   return sum;
 }
 
@@ -112,8 +120,9 @@ TEST(GigeRun, aDriveOverTheWireHasAPoseForEveryPair) {
   });
   const TemporaryFolder folder;
   const auto session = folder / "s";
-  const Outcome o = run_vergence("run '" + kExample + "' --duration " + std::to_string(kPairs / kRate + 3) + " --out '" + session.string() +
-                                 "'" + wires.settings());
+  const Outcome o =
+      run_vergence("run '" + kExample + "' --duration " + std::to_string(kPairs / kRate + 3) +
+                   " --out '" + session.string() + "'" + wires.settings());
   pulses.join();
   ASSERT_EQ(o.code, 0) << o.err;
   std::ifstream in(session / "summary.json");
@@ -132,7 +141,8 @@ TEST(GigeRun, aDriveOverTheWireHasAPoseForEveryPair) {
   }
   const auto poses = app::read_tum(session / "trajectory.tum");
   ASSERT_EQ(poses.size(), static_cast<std::size_t>(kPairs));
-  EXPECT_FALSE(summary.contains("truth") && !summary["truth"].is_null() && summary["truth"].contains("ate_m"))
+  EXPECT_FALSE(summary.contains("truth") && !summary["truth"].is_null() &&
+               summary["truth"].contains("ate_m"))
       << "nobody knows a truth here";
   const double way = path_length(drive.truth);
   EXPECT_GT(way, 5);
@@ -145,23 +155,28 @@ TEST(GigeRun, whatCannotBeDrivenIsRefusedInASentence) {
   const Wires wires(nullptr);
   const TemporaryFolder folder;
   const auto refused = [&](const std::string& more, const std::string& word) {
-    const Outcome o = run_vergence("run '" + kExample + "' --duration 2 --out '" + (folder / "s").string() + "'" + wires.settings() + more);
+    const Outcome o = run_vergence("run '" + kExample + "' --duration 2 --out '" +
+                                   (folder / "s").string() + "'" + wires.settings() + more);
     EXPECT_EQ(o.code, 2) << more << ": " << o.err;
     EXPECT_NE(o.err.find(word), std::string::npos) << o.err;
     EXPECT_FALSE(std::filesystem::exists(folder / "s")) << more;
   };
-  refused(" --set cameras.1.serial=NOT-HERE", "cameras.1: the gige camera \"NOT-HERE\" was not found");
+  refused(" --set cameras.1.serial=NOT-HERE",
+          "cameras.1: the gige camera \"NOT-HERE\" was not found");
   refused(" --set cameras.0.size=[1600,1200] --set cameras.1.size=[1600,1200]",
           "Width 1600 px is not possible: the camera offers 16 to 640 px");
-  refused(" --set cameras.0.options.trigger_line=Line9", "TriggerSource has no Line9; the camera offers Software, Line1, Line2");
+  refused(" --set cameras.0.options.trigger_line=Line9",
+          "TriggerSource has no Line9; the camera offers Software, Line1, Line2");
   refused(" --set cameras.0.options.paket_size=9000", "there is no option \"paket_size\"");
   refused(" --set cameras.0.trigger=free --set cameras.1.trigger=free", "sync.mode to software");
   refused(" --set cameras.0.trigger=soft", "cameras.0.trigger is \"soft\"");
   refused(" --set cameras.1.driver=mock", "a mock's cameras share one world");
   refused(" --set cameras.0.driver=gigevision", "this version knows");
   refused(" --fast", "--fast is virtual time");
-  refused(" --set trigger.rate=900 --set cameras.0.exposure_us=100 --set cameras.1.exposure_us=100 --set cameras.0.options.link_mbps=1000",
-          "trigger.rate");
+  refused(
+      " --set trigger.rate=900 --set cameras.0.exposure_us=100 --set cameras.1.exposure_us=100 "
+      "--set cameras.0.options.link_mbps=1000",
+      "trigger.rate");
   wires.cameras[1]->take_control(true);
   refused("", "is in use by another program");
 }

@@ -11,7 +11,9 @@
 namespace vergence::app {
 namespace {
 
-std::string readme() { return test::read_file(std::filesystem::path(VERGENCE_SOURCE_DIR) / "README.md"); }
+std::string readme() {
+  return test::read_file(std::filesystem::path(VERGENCE_SOURCE_DIR) / "README.md");
+}
 
 TEST(Readme, itsCalibrationIsRead) {
   const std::string text = readme();
@@ -19,7 +21,8 @@ TEST(Readme, itsCalibrationIsRead) {
   const std::size_t begin = text.find(open);
   ASSERT_NE(begin, std::string::npos);
   const std::size_t end = text.find("```", begin + open.size());
-  const CalibrationFile file = parse_calibration(text.substr(begin + open.size(), end - begin - open.size()), "README.md");
+  const CalibrationFile file =
+      parse_calibration(text.substr(begin + open.size(), end - begin - open.size()), "README.md");
   EXPECT_EQ(file.rig.cameras, 2);
   EXPECT_EQ(file.rig.intrinsics[1].width, 752);
   EXPECT_LT(file.rig.T_camera_left[1].t.x(), 0) << "the camera to the right";
@@ -31,7 +34,9 @@ TEST(Readme, theScriptsAndPapersItNamesExist) {
   const std::filesystem::path root(VERGENCE_SOURCE_DIR);
   int scripts = 0;
   for (const auto& entry : std::filesystem::directory_iterator(root / "scripts"))
-    if (entry.is_regular_file() && text.find("scripts/" + entry.path().filename().string()) != std::string::npos) ++scripts;
+    if (entry.is_regular_file() &&
+        text.find("scripts/" + entry.path().filename().string()) != std::string::npos)
+      ++scripts;
   EXPECT_GE(scripts, 4) << "demo, test, bench and the list of packages";
   for (const char* named : {"docs/configuration.md", "CONTRIBUTING.md", "CHANGELOG.md", "LICENSE"})
     EXPECT_TRUE(std::filesystem::exists(root / named)) << named;

@@ -12,16 +12,20 @@ namespace vergence::test {
 /// One emulated camera on a real stack, as the conformance suite wants it.
 class BusConformance final : public ConformanceRig {
  public:
-  BusConformance(std::unique_ptr<CameraDriver> driver, const std::string& program, std::string unplug, std::string replug)
+  BusConformance(std::unique_ptr<CameraDriver> driver, const std::string& program,
+                 std::string unplug, std::string replug)
       : driver_(std::move(driver)), unplug_(std::move(unplug)), replug_(std::move(replug)) {
     const bool none = await_cameras(driver_.get(), 0);  // those of the rig before
-    emulator_ = std::make_unique<Emulator>(program, std::vector<std::string>{"--cameras", "1", "--trigger-hz", "20"});
+    emulator_ = std::make_unique<Emulator>(
+        program, std::vector<std::string>{"--cameras", "1", "--trigger-hz", "20"});
     DeviceStatus status = DeviceStatus::not_found;
-    // A node that was listed may be the one before, on its way out after a bus reset: looked for again.
+    // A node that was listed may be the one before, on its way out after a bus reset: looked for
+    // again.
     const auto until = std::chrono::steady_clock::now() + std::chrono::seconds(15);
     while (none && camera_ == nullptr && std::chrono::steady_clock::now() < until)
       if (await_cameras(driver_.get(), 1)) camera_ = driver_->open("", &status);
-    if (camera_ == nullptr) throw std::runtime_error("the emulated camera does not open: " + driver_->complaint());
+    if (camera_ == nullptr)
+      throw std::runtime_error("the emulated camera does not open: " + driver_->complaint());
   }
   CameraDevice& camera() override { return *camera_; }
   std::vector<CameraConfiguration> possible() override {
@@ -38,7 +42,9 @@ class BusConformance final : public ConformanceRig {
     region.height = 120;
     return {free, pulsed, asked, wide, region};
   }
-  std::vector<ExposureSetting> exposures() override { return {{Duration::milliseconds(2), 0}, {Duration::milliseconds(8), 6}}; }
+  std::vector<ExposureSetting> exposures() override {
+    return {{Duration::milliseconds(2), 0}, {Duration::milliseconds(8), 6}};
+  }
   std::vector<CameraConfiguration> impossible() override {
     std::vector<CameraConfiguration> all(6, possible().front());
     all[0].width = 321;
@@ -60,7 +66,8 @@ class BusConformance final : public ConformanceRig {
     return true;
   }
   bool content_fits(const Frame&, ImageView image) override {
-    // All rows move on by one grey level an exposure; the number itself stands in row 0 of 8-bit images only.
+    // All rows move on by one grey level an exposure; the number itself stands in row 0 of 8-bit
+    // images only.
     for (int y = 2; y < image.height; ++y)
       for (const int x : {0, image.width - 1})
         if (image.at(x, y) != static_cast<std::uint8_t>(image.at(0, 1) + y - 1)) return false;

@@ -9,11 +9,14 @@ namespace vergence::test {
 struct BusUnderTest {
   static constexpr const char* kEmulator = "sim_1394";
   static constexpr const char* kSent = "transmitted";
-  static constexpr std::uint64_t kLostWithTorn = 1;  // the torn frame's buffer swallows the beginning of the next one
+  static constexpr std::uint64_t kLostWithTorn =
+      1;  // the torn frame's buffer swallows the beginning of the next one
   static std::unique_ptr<CameraDriver> driver() { return iidc::make_1394_driver(); }
   // Nodes are numbered along the bus: the last one goes.
   static void unplug(Emulator* e, unsigned camera) { e->command("plug " + std::to_string(camera)); }
-  static void replug(Emulator* e, unsigned camera) { e->command("plug " + std::to_string(camera + 1)); }
+  static void replug(Emulator* e, unsigned camera) {
+    e->command("plug " + std::to_string(camera + 1));
+  }
 };
 
 }  // namespace vergence::test
@@ -30,9 +33,11 @@ TEST_F(IidcRig, CamerasThatDoNotFitTogetherAreToldInNumbersBeforeTheyStart) {
   wide.rate_hz = 20;  // 3088 bytes a packet at S400: 3100 units each
   wide.sharing = 2;
   ASSERT_NO_FATAL_FAILURE(begin(wide));
-  EXPECT_NE(cameras_[0]->remark().find("of the bus's 4915"), std::string::npos) << cameras_[0]->remark();
+  EXPECT_NE(cameras_[0]->remark().find("of the bus's 4915"), std::string::npos)
+      << cameras_[0]->remark();
   EXPECT_EQ(cameras_[0]->start(nullptr), DeviceStatus::no_bandwidth);
-  EXPECT_NE(cameras_[0]->complaint().find("2 cameras need "), std::string::npos) << cameras_[0]->complaint();
+  EXPECT_NE(cameras_[0]->complaint().find("2 cameras need "), std::string::npos)
+      << cameras_[0]->complaint();
   cameras_.pop_back();  // one alone fits
   EXPECT_EQ(cameras_[0]->start(nullptr), DeviceStatus::ok) << cameras_[0]->complaint();
   (void)end();
@@ -55,12 +60,14 @@ TEST_F(IidcRig, AtS800TheyFit) {
 TEST_F(IidcRig, TheBusClockIsOneForBothCamerasThroughItsWrap) {
   ASSERT_NO_FATAL_FAILURE(begin(usual()));
   ASSERT_NO_FATAL_FAILURE(start());
-  // Fifteen seconds: with the card's clock at 100 s the wrap at 128 s comes in between, whatever the start took.
-  const bool wraps = std::filesystem::exists("/sys/module/vergence_1394/parameters/offset_s") && [] {
-    std::ifstream f("/sys/module/vergence_1394/parameters/offset_s");
-    int s = 0;
-    return static_cast<bool>(f >> s) && s != 0;
-  }();
+  // Fifteen seconds: with the card's clock at 100 s the wrap at 128 s comes in between, whatever
+  // the start took.
+  const bool wraps =
+      std::filesystem::exists("/sys/module/vergence_1394/parameters/offset_s") && [] {
+        std::ifstream f("/sys/module/vergence_1394/parameters/offset_s");
+        int s = 0;
+        return static_cast<bool>(f >> s) && s != 0;
+      }();
   const std::uint64_t frames = wraps ? 30 * 32 : 60;
   ASSERT_TRUE(taker_->take(frames, Duration::seconds(90)));
   (void)end();

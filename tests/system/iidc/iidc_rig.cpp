@@ -12,7 +12,9 @@
 #ifdef __SANITIZE_THREAD__
 /// libusb is not instrumented: its locks are seen, and the order they make is not.
 extern "C" const char* __tsan_default_suppressions();
-extern "C" const char* __tsan_default_suppressions() { return "called_from_lib:libusb-1.0.so\nrace:libusb-1.0.so\n"; }
+extern "C" const char* __tsan_default_suppressions() {
+  return "called_from_lib:libusb-1.0.so\nrace:libusb-1.0.so\n";
+}
 #endif
 
 namespace vergence::test {
@@ -50,7 +52,9 @@ bool shows_pattern(ImageView image, std::uint32_t number) {
 
 std::string emulated_serial(unsigned camera) { return "0205a9000000c00" + std::to_string(camera); }
 
-CameraConfiguration usual(CameraTrigger trigger) { return {640, 480, 30, Duration::milliseconds(4), 0, trigger}; }
+CameraConfiguration usual(CameraTrigger trigger) {
+  return {640, 480, 30, Duration::milliseconds(4), 0, trigger};
+}
 
 bool Taker::take_one(std::size_t k, Duration limit) {
   Frame frame;
@@ -63,7 +67,9 @@ bool Taker::take_one(std::size_t k, Duration limit) {
   const ImageView image = cameras_[k]->view(frame.slot);
   const ImageStamp stamp = read_stamp(image);
   if (frame.status == FrameStatus::complete) {
-    if (!stamp.valid || stamp.guid != std::strtoull(cameras_[k]->info().serial.c_str(), nullptr, 16) || !shows_pattern(image, stamp.number))
+    if (!stamp.valid ||
+        stamp.guid != std::strtoull(cameras_[k]->info().serial.c_str(), nullptr, 16) ||
+        !shows_pattern(image, stamp.number))
       ++a.wrong;
     if (a.complete + a.torn == 0) a.first = stamp.number;
     a.last = stamp.number;
@@ -99,7 +105,8 @@ void Taker::drain(Duration quiet) {
     }
 }
 
-std::unique_ptr<CameraDevice> open_camera(CameraDriver* driver, unsigned camera, const CameraConfiguration& wanted) {
+std::unique_ptr<CameraDevice> open_camera(CameraDriver* driver, unsigned camera,
+                                          const CameraConfiguration& wanted) {
   DeviceStatus status = DeviceStatus::failed;
   auto device = driver->open(emulated_serial(camera), &status);
   // After a bus reset the node that was listed may be on its way out: looked for again.
@@ -133,7 +140,8 @@ bool start_again(CameraDevice* camera, Duration limit) {
 
 Holdings Holdings::now() {
   Holdings h;
-  for ([[maybe_unused]] const auto& entry : std::filesystem::directory_iterator("/proc/self/fd")) ++h.descriptors;
+  for ([[maybe_unused]] const auto& entry : std::filesystem::directory_iterator("/proc/self/fd"))
+    ++h.descriptors;
   std::ifstream maps("/proc/self/maps");
   for (std::string line; std::getline(maps, line);)
     if (line.find("/dev/") != std::string::npos) ++h.mappings;

@@ -32,7 +32,7 @@ struct Account {
   std::uint64_t complete = 0, torn = 0;
   std::uint64_t gaps = 0;             // in the counters, after the first
   std::uint32_t first = 0, last = 0;  // numbers in the images
-  std::uint64_t wrong = 0;            // complete, and with pixels, number or GUID that are not its own
+  std::uint64_t wrong = 0;  // complete, and with pixels, number or GUID that are not its own
   std::vector<std::int64_t> middles;  // of the exposures, by the emulator
   std::vector<std::int64_t> starts;   // by the camera's stamp
   /// Exposures from the first to the last delivered.
@@ -53,7 +53,9 @@ class Taker {
   void restarted(std::size_t camera) { counters_[camera] = -1; }
 
   [[nodiscard]] const Account& account(std::size_t camera) const { return accounts_[camera]; }
-  [[nodiscard]] const std::vector<DeviceStatus>& told() const { return told_; }  // by wait(), other than ok and timeout
+  [[nodiscard]] const std::vector<DeviceStatus>& told() const {
+    return told_;
+  }  // by wait(), other than ok and timeout
 
  private:
   bool take_one(std::size_t camera, Duration limit);
@@ -64,9 +66,11 @@ class Taker {
 };
 
 /// Opens and configures; fails the test with the sentence when it cannot.
-[[nodiscard]] std::unique_ptr<CameraDevice> open_camera(CameraDriver* driver, unsigned camera, const CameraConfiguration& wanted);
+[[nodiscard]] std::unique_ptr<CameraDevice> open_camera(CameraDriver* driver, unsigned camera,
+                                                        const CameraConfiguration& wanted);
 
-/// Until the driver lists so many cameras; the kernel takes two seconds to forget those of an emulator that ended.
+/// Until the driver lists so many cameras; the kernel takes two seconds to forget those of an
+/// emulator that ended.
 bool await_cameras(CameraDriver* driver, std::size_t count, Duration limit = Duration::seconds(15));
 
 /// start() until it is ok: what a supervisor does after `gone`.
@@ -79,7 +83,8 @@ struct Holdings {
   [[nodiscard]] bool operator==(const Holdings&) const = default;
 };
 
-/// Whether this runs inside the rig's kernel; there, a device that is missing is a failure and no reason to skip.
+/// Whether this runs inside the rig's kernel; there, a device that is missing is a failure and no
+/// reason to skip.
 [[nodiscard]] bool inside_rig();
 
 }  // namespace vergence::test

@@ -10,9 +10,11 @@
 
 #include "tests/system/iidc/iidc_rig.hpp"
 
-/// What holds on both buses: one set of cases, included once by each bus's test with its own BusUnderTest.
+/// What holds on both buses: one set of cases, included once by each bus's test with its own
+/// BusUnderTest.
 ///
-///   struct BusUnderTest { static constexpr const char* kEmulator; static constexpr const char* kSent;   // its word for frames sent whole
+///   struct BusUnderTest { static constexpr const char* kEmulator; static constexpr const char*
+///   kSent;   // its word for frames sent whole
 ///                         static std::unique_ptr<CameraDriver> driver();
 ///                         static void unplug(Emulator*, unsigned), replug(Emulator*, unsigned); };
 namespace vergence::test {
@@ -31,7 +33,8 @@ class IidcRig : public ::testing::Test {
       cameras_.push_back(open_camera(driver_.get(), k, wanted));
       ASSERT_NE(cameras_.back(), nullptr);
     }
-    taker_ = std::make_unique<Taker>(std::vector<CameraDevice*>{cameras_[0].get(), cameras_[1].get()});
+    taker_ =
+        std::make_unique<Taker>(std::vector<CameraDevice*>{cameras_[0].get(), cameras_[1].get()});
   }
   void start() {
     for (const auto& c : cameras_) ASSERT_EQ(c->start(nullptr), DeviceStatus::ok) << c->complaint();
@@ -44,12 +47,13 @@ class IidcRig : public ::testing::Test {
       taker_->drain(Duration{});
     }
   }
-  /// Every exposure from the first to the last that was taken was given out or is a gap, and every gap is in the driver's counters; what
-  /// these have beyond was exposed after the last.
+  /// Every exposure from the first to the last that was taken was given out or is a gap, and every
+  /// gap is in the driver's counters; what these have beyond was exposed after the last.
   void check_account(unsigned k, const std::string& report) {
     const Account& a = taker_->account(k);
     const CameraStatistics s = cameras_[k]->statistics();
-    const auto exposed = static_cast<std::uint64_t>(count_of(report, static_cast<int>(k), "exposed"));
+    const auto exposed =
+        static_cast<std::uint64_t>(count_of(report, static_cast<int>(k), "exposed"));
     EXPECT_EQ(a.span(), a.complete + a.torn + a.gaps) << "camera " << k << '\n' << report;
     EXPECT_GE(s.lost + s.underruns, a.gaps) << report;
     EXPECT_LE(s.lost + s.underruns - a.gaps, exposed - a.span()) << report;
@@ -99,13 +103,16 @@ TEST_F(IidcRig, TwoCamerasStreamEveryExposureInStep) {
     check_account(k, report);
     // A machine that keeps up loses nothing but what the emulator could not send.
     if (s.underruns == 0) {
-      EXPECT_LE(s.lost, static_cast<std::uint64_t>(count_of(report, static_cast<int>(k), "overtaken"))) << report;
+      EXPECT_LE(s.lost,
+                static_cast<std::uint64_t>(count_of(report, static_cast<int>(k), "overtaken")))
+          << report;
     }
   }
   // Free-running cameras of one rate expose together.
   for (const std::int64_t m : taker_->account(0).middles) {
     std::int64_t nearest = INT64_MAX;
-    for (const std::int64_t other : taker_->account(1).middles) nearest = std::min(nearest, std::abs(other - m));
+    for (const std::int64_t other : taker_->account(1).middles)
+      nearest = std::min(nearest, std::abs(other - m));
     EXPECT_LT(nearest, 1'000'000'000) << "another time altogether";
   }
 }
@@ -123,17 +130,22 @@ TEST_F(IidcRig, EveryPulseIsOneFrameAndTheEmulatorsAccountsAgree) {
     const Account& a = taker_->account(static_cast<std::size_t>(k));
     const CameraStatistics s = cameras_[static_cast<std::size_t>(k)]->statistics();
     EXPECT_EQ(count_of(report, k, "exposed"), 20) << report;
-    EXPECT_EQ(static_cast<std::int64_t>(a.complete), count_of(report, k, BusUnderTest::kSent)) << report;
-    EXPECT_EQ(static_cast<std::int64_t>(s.lost), count_of(report, k, "dropped") + count_of(report, k, "overtaken")) << report;
+    EXPECT_EQ(static_cast<std::int64_t>(a.complete), count_of(report, k, BusUnderTest::kSent))
+        << report;
+    EXPECT_EQ(static_cast<std::int64_t>(s.lost),
+              count_of(report, k, "dropped") + count_of(report, k, "overtaken"))
+        << report;
     EXPECT_EQ(count_of(report, k, "dropped"), k == 1 ? 3 : 0);
     EXPECT_EQ(a.complete + s.lost, 20U);
     EXPECT_EQ(a.gaps, s.lost);
     EXPECT_EQ(a.torn + a.wrong + s.underruns, 0U);
     // A frame stamped by its pulse: the camera's clock and the emulator's run alike.
     for (std::size_t i = 1; i < a.starts.size(); ++i)
-      EXPECT_NEAR(static_cast<double>(a.starts[i] - a.starts[i - 1]), static_cast<double>(a.middles[i] - a.middles[i - 1]), 200);
+      EXPECT_NEAR(static_cast<double>(a.starts[i] - a.starts[i - 1]),
+                  static_cast<double>(a.middles[i] - a.middles[i - 1]), 200);
   }
-  EXPECT_EQ(taker_->account(0).middles.back(), taker_->account(1).middles.back()) << "one pulse, one instant";
+  EXPECT_EQ(taker_->account(0).middles.back(), taker_->account(1).middles.back())
+      << "one pulse, one instant";
 }
 
 TEST_F(IidcRig, ATornFrameIsMarkedAndNoOther) {
@@ -174,13 +186,16 @@ TEST_F(IidcRig, ACameraThatFallsSilentIsATimeoutAndGoesOn) {
   emulator_->command("mute 0 1");
   Frame frame;
   DeviceStatus status = DeviceStatus::ok;
-  while ((status = cameras_[0]->wait(Duration::milliseconds(500), &frame)) == DeviceStatus::ok) cameras_[0]->release(frame.slot);
+  while ((status = cameras_[0]->wait(Duration::milliseconds(500), &frame)) == DeviceStatus::ok)
+    cameras_[0]->release(frame.slot);
   EXPECT_EQ(status, DeviceStatus::timeout);
   emulator_->command("mute 0 0");
   ASSERT_TRUE(taker_->take(10));
   const std::string report = end();
   EXPECT_GT(cameras_[0]->statistics().lost, 5U);
-  EXPECT_EQ(cameras_[0]->statistics().lost, static_cast<std::uint64_t>(count_of(report, 0, "dropped") + count_of(report, 0, "overtaken")))
+  EXPECT_EQ(
+      cameras_[0]->statistics().lost,
+      static_cast<std::uint64_t>(count_of(report, 0, "dropped") + count_of(report, 0, "overtaken")))
       << report;
 }
 
@@ -235,18 +250,21 @@ TEST_F(IidcRig, UnpluggedWhileStreamingAndPluggedInAgainLeavesNothingBehind) {
     BusUnderTest::replug(emulator_.get(), 1);
     ASSERT_TRUE(start_again(cameras_[1].get())) << cameras_[1]->complaint();
     if (holds) {
-      EXPECT_EQ(read_stamp(cameras_[1]->view(held.slot)).number, number) << "an image that is held stays, whatever happens to its camera";
+      EXPECT_EQ(read_stamp(cameras_[1]->view(held.slot)).number, number)
+          << "an image that is held stays, whatever happens to its camera";
       cameras_[1]->release(held.slot);
     }
     taker_->restarted(1);
-    ASSERT_TRUE(taker_->take(10)) << "camera 1 after the replug, camera 0 all along: " << cameras_[1]->complaint();
+    ASSERT_TRUE(taker_->take(10)) << "camera 1 after the replug, camera 0 all along: "
+                                  << cameras_[1]->complaint();
     cameras_[1]->stop();  // what waited for the last image to be released goes now
     taker_->restarted(1);
     ASSERT_EQ(cameras_[1]->start(nullptr), DeviceStatus::ok) << cameras_[1]->complaint();
     ASSERT_TRUE(taker_->take(3));
-    EXPECT_EQ(Holdings::now(), before) << "round " << round << ": " << Holdings::now().descriptors << " descriptors instead of "
-                                       << before.descriptors << ", " << Holdings::now().mappings << " mappings instead of "
-                                       << before.mappings;
+    EXPECT_EQ(Holdings::now(), before)
+        << "round " << round << ": " << Holdings::now().descriptors << " descriptors instead of "
+        << before.descriptors << ", " << Holdings::now().mappings << " mappings instead of "
+        << before.mappings;
   }
   EXPECT_EQ(taker_->account(0).wrong + taker_->account(1).wrong, 0U);
   EXPECT_EQ(cameras_[0]->statistics().starts, 1U) << "the other camera goes on";

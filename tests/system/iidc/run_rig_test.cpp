@@ -1,4 +1,5 @@
-// `vergence run` on emulated IIDC cameras that look at a rendered drive: what the example configurations do on real stacks.
+// `vergence run` on emulated IIDC cameras that look at a rendered drive: what the example
+// configurations do on real stacks.
 #include <gtest/gtest.h>
 
 #include <atomic>
@@ -38,14 +39,15 @@ std::map<std::uint64_t, Pose> read_poses(const std::filesystem::path& file) {
     if (cells.size() < 8) continue;
     Pose p;
     p.status = cells[3];
-    if (!cells[5].empty()) p.position = {std::stod(cells[5]), std::stod(cells[6]), std::stod(cells[7])};
+    if (!cells[5].empty())
+      p.position = {std::stod(cells[5]), std::stod(cells[6]), std::stod(cells[7])};
     out[std::stoull(cells[0])] = p;
   }
   return out;
 }
 
-/// Distance of the track from the film's, worst of all poses, as part of the way: the film begins with the first exposure of any
-/// camera, the track with the first pair, a few images later.
+/// Distance of the track from the film's, worst of all poses, as part of the way: the film begins
+/// with the first exposure of any camera, the track with the first pair, a few images later.
 double worst_error(const std::map<std::uint64_t, Pose>& poses, const Film& film) {
   constexpr std::size_t kLatest = 20;
   double best = 1e9;
@@ -76,25 +78,30 @@ double worst_error(const std::map<std::uint64_t, Pose>& poses, const Film& film)
   return best;
 }
 
-/// `vergence run` for nine seconds of the film; `settings`: --set KEY=VALUE. → the session's folder.
+/// `vergence run` for nine seconds of the film; `settings`: --set KEY=VALUE. → the session's
+/// folder.
 std::filesystem::path run_nine_seconds(const std::string& name, const std::string& configuration,
                                        const std::vector<std::string>& settings) {
   const std::filesystem::path out = std::filesystem::absolute("session-" + name);
   std::filesystem::remove_all(out);
-  std::string command = std::string(VERGENCE_PROGRAM) + " run " + VERGENCE_SOURCE_FOLDER + "/app/config/" + configuration + " --out " +
-                        out.string() + " --duration 9 --quiet --set rig.state_dir=none";
+  std::string command = std::string(VERGENCE_PROGRAM) + " run " + VERGENCE_SOURCE_FOLDER +
+                        "/app/config/" + configuration + " --out " + out.string() +
+                        " --duration 9 --quiet --set rig.state_dir=none";
   for (const std::string& setting : settings) command += " --set " + setting;
   EXPECT_EQ(std::system(command.c_str()), 0) << command;
   return out;
 }
 
 /// What every drive on the film must be: all pairs posed, nothing allocated, the way right.
-void expect_a_drive(const std::filesystem::path& session, const nlohmann::json& summary, const Film& film) {
+void expect_a_drive(const std::filesystem::path& session, const nlohmann::json& summary,
+                    const Film& film) {
   const auto& frames = summary.at("frames");
   const auto& devices = summary.at("devices");
   EXPECT_GE(frames.at("read").get<int>(), 60) << "of 90 at 10 Hz";
-  EXPECT_GE(frames.at("posed").get<int>(), devices.at("sets_complete").get<int>()) << "every pair that came gets a pose";
-  EXPECT_GE(frames.at("ok").get<int>(), 15) << "until a calibration is found the poses are degraded";
+  EXPECT_GE(frames.at("posed").get<int>(), devices.at("sets_complete").get<int>())
+      << "every pair that came gets a pose";
+  EXPECT_GE(frames.at("ok").get<int>(), 15)
+      << "until a calibration is found the poses are degraded";
   EXPECT_EQ(summary.at("allocations_after_seal").get<int>(), 0);
   EXPECT_LT(worst_error(read_poses(session / "poses.csv"), film), 0.03);
 }
@@ -108,11 +115,13 @@ class IidcRun : public ::testing::TestWithParam<Bus> {};
 
 TEST_P(IidcRun, TheExampleConfigurationDrivesOnWhatTheCamerasSend) {
   const char* film_folder = std::getenv("VERGENCE_FILM");
-  if (!inside_rig() || film_folder == nullptr) GTEST_SKIP() << "this test runs inside the rig's kernel: ctest -L rig";
+  if (!inside_rig() || film_folder == nullptr)
+    GTEST_SKIP() << "this test runs inside the rig's kernel: ctest -L rig";
   const Film film(film_folder);
   std::vector<std::string> arguments{"--cameras", "2", "--film", film_folder, "--film-hz", "10"};
   if (GetParam().pulses) arguments.insert(arguments.end(), {"--trigger-hz", "10"});
-  auto driver = std::string(GetParam().emulator) == "sim_1394" ? iidc::make_1394_driver() : iidc::make_usb_driver();
+  auto driver = std::string(GetParam().emulator) == "sim_1394" ? iidc::make_1394_driver()
+                                                               : iidc::make_usb_driver();
   Emulator emulator(GetParam().emulator, arguments);
   ASSERT_TRUE(await_cameras(driver.get(), 2));
 
@@ -129,9 +138,11 @@ TEST_P(IidcRun, TheExampleConfigurationDrivesOnWhatTheCamerasSend) {
   for (int k = 0; k < 2; ++k) {
     const std::string name = "camera" + std::to_string(k) + "_";
     const auto delivered = devices.at(name + "delivered").get<std::int64_t>();
-    const auto lost = devices.at(name + "lost").get<std::int64_t>(), underruns = devices.at(name + "underruns").get<std::int64_t>();
+    const auto lost = devices.at(name + "lost").get<std::int64_t>(),
+               underruns = devices.at(name + "underruns").get<std::int64_t>();
     EXPECT_EQ(devices.at("frames_torn").get<int>(), 0);
-    // What the emulator says it exposed, but for the images that were under way when the drive ended.
+    // What the emulator says it exposed, but for the images that were under way when the drive
+    // ended.
     EXPECT_LE(delivered + lost + underruns, count_of(report, k, "exposed"));
     EXPECT_GE(delivered + lost + underruns + 4, count_of(report, k, "exposed"));
     EXPECT_LE(lost, count_of(report, k, "overtaken"));
@@ -140,7 +151,8 @@ TEST_P(IidcRun, TheExampleConfigurationDrivesOnWhatTheCamerasSend) {
 
 TEST(BoardRun, ABoardsPulsesCamerasAndAnInsAllOnEmulatedLinesMakeOneDrive) {
   const char* film_folder = std::getenv("VERGENCE_FILM");
-  if (!inside_rig() || film_folder == nullptr) GTEST_SKIP() << "this test runs inside the rig's kernel: ctest -L rig";
+  if (!inside_rig() || film_folder == nullptr)
+    GTEST_SKIP() << "this test runs inside the rig's kernel: ctest -L rig";
   const Film film(film_folder);
   auto driver = iidc::make_usb_driver();
   Emulator cameras("sim_usb_iidc", {"--cameras", "2", "--film", film_folder, "--film-hz", "10"});
@@ -151,7 +163,8 @@ TEST(BoardRun, ABoardsPulsesCamerasAndAnInsAllOnEmulatedLinesMakeOneDrive) {
     return mock::SimulatedExposures{};
   });
   const auto await_port = [](const char* port) {
-    for (int i = 0; i < 1000 && !std::filesystem::exists(port); ++i) std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    for (int i = 0; i < 1000 && !std::filesystem::exists(port); ++i)
+      std::this_thread::sleep_for(std::chrono::milliseconds(10));
     return std::filesystem::exists(port);
   };
   ASSERT_TRUE(await_port("/dev/ttyUSB0"));
@@ -160,9 +173,11 @@ TEST(BoardRun, ABoardsPulsesCamerasAndAnInsAllOnEmulatedLinesMakeOneDrive) {
   DeviceOnDescriptor sensor(::open(kInsWire, O_RDWR | O_NOCTTY | O_NONBLOCK), resting_xsens());
   ASSERT_TRUE(await_port("/dev/ttyUSB1"));
 
-  const auto out = run_nine_seconds("board", "iidc_usb.yaml",
-                                    {"sync.mode=board", "trigger.driver=board", "trigger.port=/dev/ttyUSB0", "trigger.vary_us=2000",
-                                     "ins.driver=xsens", "ins.port=/dev/ttyUSB1", "ins.baud=115200", "ins.rate=50"});
+  const auto out =
+      run_nine_seconds("board", "iidc_usb.yaml",
+                       {"sync.mode=board", "trigger.driver=board", "trigger.port=/dev/ttyUSB0",
+                        "trigger.vary_us=2000", "ins.driver=xsens", "ins.port=/dev/ttyUSB1",
+                        "ins.baud=115200", "ins.rate=50"});
   wired = false;
   const std::string report = cameras.finish();
   const auto summary = nlohmann::json::parse(std::ifstream(out / "summary.json"));
@@ -171,7 +186,8 @@ TEST(BoardRun, ABoardsPulsesCamerasAndAnInsAllOnEmulatedLinesMakeOneDrive) {
   const auto& pairing = summary.at("time").at("pairing");
   EXPECT_TRUE(pairing.at("proven").get<bool>());
   EXPECT_EQ(pairing.at("sets").at("unproven").get<int>(), 0);
-  for (const auto& camera : pairing.at("cameras")) EXPECT_EQ(camera.at("acquisitions").get<int>(), 1);
+  for (const auto& camera : pairing.at("cameras"))
+    EXPECT_EQ(camera.at("acquisitions").get<int>(), 1);
 }
 
 INSTANTIATE_TEST_SUITE_P(Buses, IidcRun,

@@ -8,7 +8,8 @@ std::unique_ptr<ConformanceRig> make_conformance_rig(std::uint64_t, std::string*
     *why = "this test runs inside the rig's kernel: ctest -L rig";
     return nullptr;
   }
-  return std::make_unique<BusConformance>(iidc::make_usb_driver(), "sim_usb_iidc", "unplug 0", "replug 0");
+  return std::make_unique<BusConformance>(iidc::make_usb_driver(), "sim_usb_iidc", "unplug 0",
+                                          "replug 0");
 }
 
 }  // namespace vergence::test

@@ -6,10 +6,15 @@ namespace vergence::test {
 struct BusUnderTest {
   static constexpr const char* kEmulator = "sim_usb_iidc";
   static constexpr const char* kSent = "delivered";
-  static constexpr std::uint64_t kLostWithTorn = 0;  // a short packet ends the frame, the next is whole
+  static constexpr std::uint64_t kLostWithTorn =
+      0;  // a short packet ends the frame, the next is whole
   static std::unique_ptr<CameraDriver> driver() { return iidc::make_usb_driver(); }
-  static void unplug(Emulator* e, unsigned camera) { e->command("unplug " + std::to_string(camera)); }
-  static void replug(Emulator* e, unsigned camera) { e->command("replug " + std::to_string(camera)); }
+  static void unplug(Emulator* e, unsigned camera) {
+    e->command("unplug " + std::to_string(camera));
+  }
+  static void replug(Emulator* e, unsigned camera) {
+    e->command("replug " + std::to_string(camera));
+  }
 };
 
 }  // namespace vergence::test

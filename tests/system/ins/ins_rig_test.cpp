@@ -1,4 +1,5 @@
-// A simulated XSens INS at the far end of an emulated FTDI converter, behind the kernel's ftdi_sio and libserialport.
+// A simulated XSens INS at the far end of an emulated FTDI converter, behind the kernel's ftdi_sio
+// and libserialport.
 #include <fcntl.h>
 #include <gtest/gtest.h>
 
@@ -23,7 +24,9 @@ constexpr const char* kWire = "/run/vergence-wire";
 
 std::vector<InsReading> readings(InsDevice& device, std::size_t most) {
   std::vector<InsReading> all;
-  for (InsReading r; all.size() < most && device.wait(Duration::seconds(10), &r) == DeviceStatus::ok;) all.push_back(r);
+  for (InsReading r;
+       all.size() < most && device.wait(Duration::seconds(10), &r) == DeviceStatus::ok;)
+    all.push_back(r);
   return all;
 }
 
@@ -41,7 +44,8 @@ class InsRig : public ::testing::Test {
  protected:
   InsRig() : converter_("sim_ftdi", {"--wire", kWire}) {
     EXPECT_TRUE(within(10, [] { return std::filesystem::exists(kPort); }));
-    sensor_ = std::make_unique<test::DeviceOnDescriptor>(::open(kWire, O_RDWR | O_NOCTTY | O_NONBLOCK), test::resting_xsens());
+    sensor_ = std::make_unique<test::DeviceOnDescriptor>(
+        ::open(kWire, O_RDWR | O_NOCTTY | O_NONBLOCK), test::resting_xsens());
   }
   std::unique_ptr<InsDevice> open(std::uint32_t baud) {
     xsens::Options o;
@@ -63,7 +67,8 @@ class InsRig : public ::testing::Test {
 
 TEST_F(InsRig, streamsThroughTheRealDriverWithEitherLatencyTimer) {
   const auto ports = list_serial_ports();
-  const auto port = std::find_if(ports.begin(), ports.end(), [](const SerialPortInfo& p) { return p.port == kPort; });
+  const auto port = std::find_if(ports.begin(), ports.end(),
+                                 [](const SerialPortInfo& p) { return p.port == kPort; });
   ASSERT_NE(port, ports.end());
   EXPECT_EQ(port->usb_vendor, 0x0403);
   EXPECT_EQ(port->usb_serial, "VG000001");
@@ -97,7 +102,8 @@ TEST_F(InsRig, comesBackAfterTheConverterWasUnplugged) {
     while (status == DeviceStatus::ok);
     return status == DeviceStatus::gone;
   }));
-  EXPECT_EQ(device->start(nullptr), DeviceStatus::gone) << "not back, and start() does not wait for it";
+  EXPECT_EQ(device->start(nullptr), DeviceStatus::gone)
+      << "not back, and start() does not wait for it";
   converter_.command("replug");
   ASSERT_TRUE(within(30, [&] { return device->start(nullptr) == DeviceStatus::ok; }));
   expect_whole(readings(*device, 100), 100);

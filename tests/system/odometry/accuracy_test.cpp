@@ -24,8 +24,9 @@ Trajectories trajectories(const std::vector<Answer>& answers) {
 }
 
 bool same_bits(const PoseSample& a, const PoseSample& b) {
-  return a.status == b.status && a.reason == b.reason && a.inliers == b.inliers && a.T_world_left.R == b.T_world_left.R &&
-         a.T_world_left.t == b.T_world_left.t && a.reprojection_px == b.reprojection_px;
+  return a.status == b.status && a.reason == b.reason && a.inliers == b.inliers &&
+         a.T_world_left.R == b.T_world_left.R && a.T_world_left.t == b.T_world_left.t &&
+         a.reprojection_px == b.reprojection_px;
 }
 
 int first_difference(const std::vector<Answer>& a, const std::vector<Answer>& b) {
@@ -35,15 +36,18 @@ int first_difference(const std::vector<Answer>& a, const std::vector<Answer>& b)
   return -1;
 }
 
-// One pair measures a point 15 m away (27 px of disparity) to 15 m · 0.15 · √2 px / 27 px = 0.12 m, a hundred of them the step's way to
-// 12 mm; a keyframe hands that on every metre or so, and the window ties five to ten of them together: 10 m come to some 20 to 40 mm,
-// 0.2 to 0.4 %. A fault of scale, of the lens model or of the rig's transform would show as a per cent and more.
+// One pair measures a point 15 m away (27 px of disparity) to 15 m · 0.15 · √2 px / 27 px = 0.12 m,
+// a hundred of them the step's way to 12 mm; a keyframe hands that on every metre or so, and the
+// window ties five to ten of them together: 10 m come to some 20 to 40 mm, 0.2 to 0.4 %. A fault of
+// scale, of the lens model or of the rig's transform would show as a per cent and more.
 constexpr double kSegmentError = 0.004, kEndError = 0.004;
-constexpr double kTurnPerMetre = 0.0005;  // rad: a hundred directions of 0.15 px / 550 px each, per keyframe, over 10 m; ten times that
+constexpr double kTurnPerMetre = 0.0005;  // rad: a hundred directions of 0.15 px / 550 px each, per
+                                          // keyframe, over 10 m; ten times that
 
 TEST(OdometryOnTheMockDrive, isOkAllTheWayAndWithinFourPerMilleOfIt) {
   const Replay r = replay(brief_drive());
-  EXPECT_EQ(count_ok(r.answers, 0, brief_drive().size()), static_cast<int>(brief_drive().size())) << story(r.answers);
+  EXPECT_EQ(count_ok(r.answers, 0, brief_drive().size()), static_cast<int>(brief_drive().size()))
+      << story(r.answers);
   EXPECT_EQ(wrong_ok(r.answers, {}), "");
   const Trajectories t = trajectories(r.answers);
   EvaluationOptions options;
@@ -65,21 +69,24 @@ TEST(OdometryOnTheMockDrive, isTheSameBitForBitWithOneAndTwoThreadsAndAgain) {
 }
 
 TEST(OdometryOnTheMockDrive, allocatesNothingOnAnyThread) {
-  if (!AllocationGuard::available()) GTEST_SKIP() << "this build counts no allocations: the sanitizers bring their own malloc";
+  if (!AllocationGuard::available())
+    GTEST_SKIP() << "this build counts no allocations: the sanitizers bring their own malloc";
   EXPECT_EQ(replay(brief_drive(), {}, 1).allocations, 0U);
   EXPECT_EQ(replay(brief_drive(), {}, 2).allocations, 0U);
 }
 
 TEST(OdometryOnTheMockDrive, standingStillItStays) {
   const Replay r = replay(still_drive());
-  EXPECT_EQ(count_ok(r.answers, 0, still_drive().size()), static_cast<int>(still_drive().size())) << story(r.answers);
+  EXPECT_EQ(count_ok(r.answers, 0, still_drive().size()), static_cast<int>(still_drive().size()))
+      << story(r.answers);
   double furthest = 0, turned = 0;
   for (const Answer& a : r.answers) {
     const MotionError e = motion_error(r.answers.front(), a);
     furthest = std::max(furthest, e.translation);
     turned = std::max(turned, e.rotation);
   }
-  // All frames are measured against the same keyframe: the noise of one frame, a hundred points of 15 m and 0.15 px, four sigmas.
+  // All frames are measured against the same keyframe: the noise of one frame, a hundred points of
+  // 15 m and 0.15 px, four sigmas.
   EXPECT_LT(furthest, 0.012);
   EXPECT_LT(turned, 4 * 0.15 / 550 / 10);
 }

@@ -11,9 +11,11 @@ namespace {
 
 // The vehicle moves at 9 m/s and turns a corner: frames 120 on are half way.
 constexpr std::size_t kFirst = 120, kLast = 135;
-constexpr bool kCalibrationHeld = false;  // what the odometry alone makes of it; else the rig would be calibrated as it is now
+constexpr bool kCalibrationHeld =
+    false;  // what the odometry alone makes of it; else the rig would be calibrated as it is now
 
-/// What every condition is asked: no `ok` while it lasts, none that is wrong at any time, and `ok` again at the end.
+/// What every condition is asked: no `ok` while it lasts, none that is wrong at any time, and `ok`
+/// again at the end.
 struct Verdict {
   Replay replayed;
   std::size_t first, last;
@@ -27,10 +29,12 @@ struct Verdict {
   /// `ok` before the condition, and again from `settled` frames after it to the end.
   void expect_recovery(std::size_t settled) const {
     const std::size_t n = brief_drive().size();
-    const auto before =
-        std::count_if(replayed.answers.begin(), replayed.answers.end(), [this](const Answer& a) { return a.sample.frame < first; });
-    EXPECT_EQ(count_ok(replayed.answers, 0, first), static_cast<int>(before)) << story(replayed.answers);
-    EXPECT_EQ(count_ok(replayed.answers, last + settled, n), static_cast<int>(n - last - settled)) << story(replayed.answers);
+    const auto before = std::count_if(replayed.answers.begin(), replayed.answers.end(),
+                                      [this](const Answer& a) { return a.sample.frame < first; });
+    EXPECT_EQ(count_ok(replayed.answers, 0, first), static_cast<int>(before))
+        << story(replayed.answers);
+    EXPECT_EQ(count_ok(replayed.answers, last + settled, n), static_cast<int>(n - last - settled))
+        << story(replayed.answers);
   }
   void expect_status(PoseStatus status) const {
     for (const Answer& a : replayed.answers)
@@ -41,18 +45,20 @@ struct Verdict {
   void expect_reason(Reason reason) const {
     for (const Answer& a : replayed.answers)
       if (a.sample.frame >= first && a.sample.frame < last) {
-        EXPECT_EQ(a.sample.reason, reason) << "frame " << a.sample.frame << '\n' << story(replayed.answers);
+        EXPECT_EQ(a.sample.reason, reason) << "frame " << a.sample.frame << '\n'
+                                           << story(replayed.answers);
       }
   }
   [[nodiscard]] const Answer* at(std::size_t frame) const {
-    const auto found =
-        std::find_if(replayed.answers.begin(), replayed.answers.end(), [&](const Answer& a) { return a.sample.frame == frame; });
+    const auto found = std::find_if(replayed.answers.begin(), replayed.answers.end(),
+                                    [&](const Answer& a) { return a.sample.frame == frame; });
     return found == replayed.answers.end() ? nullptr : &*found;
   }
 };
 
-constexpr std::size_t kAtOnce = 3;         // frames: the map still knows the place
-constexpr std::size_t kAfterRestart = 20;  // frames: three tries, ten marked ones after the restart, and as many to fill the map
+constexpr std::size_t kAtOnce = 3;  // frames: the map still knows the place
+constexpr std::size_t kAfterRestart =
+    20;  // frames: three tries, ten marked ones after the restart, and as many to fill the map
 
 const StereoDrive& drive() { return brief_drive(); }
 
@@ -106,7 +112,8 @@ TEST(OdometryInBadConditions, aMissingImageIsDegradedAndTwoAreLost) {
 }
 
 TEST(OdometryInBadConditions, aGlaredPairIsLost) {
-  const auto white = std::make_shared<Picture>(drive().pairs[0][0].width, drive().pairs[0][0].height);
+  const auto white =
+      std::make_shared<Picture>(drive().pairs[0][0].width, drive().pairs[0][0].height);
   std::fill(white->bytes.begin(), white->bytes.end(), std::uint8_t{255});
   const Verdict v(
       [=](std::size_t i, RigFrame* f) {
@@ -121,13 +128,15 @@ TEST(OdometryInBadConditions, aGlaredPairIsLost) {
 TEST(OdometryInBadConditions, camerasExchangedFromTheStartNeverGiveAPose) {
   const Verdict v(swap_cameras(0, drive().size()), 0, drive().size(), kCalibrationHeld);
   v.expect_status(PoseStatus::lost);
-  const auto said = std::count_if(v.replayed.answers.begin(), v.replayed.answers.end(),
-                                  [](const Answer& a) { return a.sample.reason == Reason::cameras_swapped; });
+  const auto said =
+      std::count_if(v.replayed.answers.begin(), v.replayed.answers.end(),
+                    [](const Answer& a) { return a.sample.reason == Reason::cameras_swapped; });
   EXPECT_GT(said, 0) << "somewhere on the way there is enough near the rig to know it";
 }
 
 TEST(OdometryInBadConditions, camerasExchangedOnTheWayAreNeverOk) {
-  const Verdict for_good(swap_cameras(kFirst, drive().size()), kFirst, drive().size(), kCalibrationHeld);
+  const Verdict for_good(swap_cameras(kFirst, drive().size()), kFirst, drive().size(),
+                         kCalibrationHeld);
   EXPECT_EQ(for_good.replayed.answers.back().sample.status, PoseStatus::lost);
   const Verdict for_a_while(swap_cameras(kFirst, kLast), kFirst, kLast, kCalibrationHeld);
   for_a_while.expect_recovery(kAfterRestart);
@@ -139,15 +148,17 @@ TEST(OdometryInBadConditions, afterTwoSecondsWithoutFramesItSaysSoAndStartsAnew)
   ASSERT_NE(v.at(back), nullptr);
   EXPECT_EQ(v.at(back)->sample.reason, Reason::time_gap);
   v.expect_recovery(kAfterRestart);
-  // Where a scene is built anew, it stands where constant velocity leads to: the step before the gap, as many times as it would have been
-  // made.
-  const auto restart = std::find_if(v.replayed.answers.begin(), v.replayed.answers.end(), [](const Answer& a) { return a.restarted; });
+  // Where a scene is built anew, it stands where constant velocity leads to: the step before the
+  // gap, as many times as it would have been made.
+  const auto restart = std::find_if(v.replayed.answers.begin(), v.replayed.answers.end(),
+                                    [](const Answer& a) { return a.restarted; });
   if (restart == v.replayed.answers.end()) return;
   EXPECT_EQ(restart->sample.status, PoseStatus::degraded);
   EXPECT_EQ(restart->sample.reason, Reason::scene_restarted);
   const Transform& last = v.at(kFirst - 1)->sample.T_world_left;
   const Vec3 step = last.t - v.at(kFirst - 2)->sample.T_world_left.t;
-  const double frames = std::min<double>(static_cast<double>(restart->sample.frame - (kFirst - 1)), 40);  // no further than two seconds
+  const double frames = std::min<double>(static_cast<double>(restart->sample.frame - (kFirst - 1)),
+                                         40);  // no further than two seconds
   // The way bends with the rig's turn: a path of that length ends within it, and ahead.
   const Vec3 way = restart->sample.T_world_left.t - last.t;
   EXPECT_LT(way.norm(), 1.01 * frames * step.norm());
@@ -163,7 +174,8 @@ TEST(OdometryInBadConditions, aShortGapIsMarkedAndBridged) {
 
 TEST(OdometryInBadConditions, oneLostFrameInThreeIsNothing) {
   const Replay r = replay(drive(), [](std::size_t i, RigFrame*) { return i % 3 != 1; });
-  EXPECT_EQ(count_ok(r.answers, 0, drive().size()), static_cast<int>(r.answers.size())) << story(r.answers);
+  EXPECT_EQ(count_ok(r.answers, 0, drive().size()), static_cast<int>(r.answers.size()))
+      << story(r.answers);
   EXPECT_EQ(wrong_ok(r.answers, {}), "");
 }
 
@@ -189,11 +201,14 @@ TEST(OdometryInBadConditions, stampsThatGoBackAreLostAndDisturbNothing) {
   EXPECT_EQ(count_ok(r.answers, kFirst, kFirst + 2), 0);
   EXPECT_EQ(r.answers[kFirst].sample.reason, Reason::time_gap);
   EXPECT_EQ(wrong_ok(r.answers, {}), "");
-  EXPECT_EQ(count_ok(r.answers, kFirst + 2, drive().size()), static_cast<int>(drive().size() - kFirst - 2)) << story(r.answers);
+  EXPECT_EQ(count_ok(r.answers, kFirst + 2, drive().size()),
+            static_cast<int>(drive().size() - kFirst - 2))
+      << story(r.answers);
 }
 
 TEST(OdometryInBadConditions, aLongGapIsNowhereTakenForAPlaceThatLooksTheSame) {
-  for (const std::size_t from : {std::size_t{40}, std::size_t{70}, std::size_t{110}, std::size_t{150}}) {
+  for (const std::size_t from :
+       {std::size_t{40}, std::size_t{70}, std::size_t{110}, std::size_t{150}}) {
     const Replay r = replay(drive(), leave_out(from, from + 40));
     EXPECT_EQ(wrong_ok(r.answers, {}), "") << "gap from frame " << from << '\n' << story(r.answers);
   }
@@ -203,12 +218,14 @@ TEST(OdometryInBadConditions, exchangedCamerasLeaveNoTraceWhenTheyArePutBack) {
   for (const std::size_t from : {std::size_t{40}, std::size_t{70}, std::size_t{110}}) {
     const Replay r = replay(drive(), swap_cameras(from, from + 40));
     EXPECT_EQ(count_ok(r.answers, from, from + 40), 0) << story(r.answers);
-    EXPECT_EQ(wrong_ok(r.answers, {}), "") << "exchanged from frame " << from << '\n' << story(r.answers);
+    EXPECT_EQ(wrong_ok(r.answers, {}), "") << "exchanged from frame " << from << '\n'
+                                           << story(r.answers);
   }
 }
 
 TEST(OdometryInBadConditions, withTwoThreadsTheyAreTheSameBitForBit) {
-  for (const Edit& edit : {cover(drive(), Cover::right, kFirst, kLast), swap_cameras(kFirst, kLast), leave_out(kFirst, kFirst + 40)}) {
+  for (const Edit& edit : {cover(drive(), Cover::right, kFirst, kLast), swap_cameras(kFirst, kLast),
+                           leave_out(kFirst, kFirst + 40)}) {
     const Replay one = replay(drive(), edit, 1), two = replay(drive(), edit, 2);
     ASSERT_EQ(one.answers.size(), two.answers.size());
     for (std::size_t i = 0; i < one.answers.size(); ++i) {

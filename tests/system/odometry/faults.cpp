@@ -19,14 +19,18 @@ bool within(std::size_t i, std::size_t first, std::size_t last) { return i >= fi
 Picture dark_picture(int width, int height, std::uint64_t seed) {
   Picture p(width, height);
   Random random(seed);
-  for (std::uint8_t& b : p.bytes) b = static_cast<std::uint8_t>(std::clamp(std::lround(kBlackLevel + kNoise * random.normal()), 0L, 255L));
+  for (std::uint8_t& b : p.bytes)
+    b = static_cast<std::uint8_t>(
+        std::clamp(std::lround(kBlackLevel + kNoise * random.normal()), 0L, 255L));
   return p;
 }
 
 Edit cover(const StereoDrive& drive, Cover which, std::size_t first, std::size_t last) {
-  constexpr std::size_t kPictures = 4;  // different ones in turn, so that the noise does not stand still
+  constexpr std::size_t kPictures =
+      4;  // different ones in turn, so that the noise does not stand still
   auto dark = std::make_shared<std::vector<Picture>>();
-  for (std::size_t i = 0; i < kPictures; ++i) dark->push_back(dark_picture(drive.pairs[0][0].width, drive.pairs[0][0].height, i + 1));
+  for (std::size_t i = 0; i < kPictures; ++i)
+    dark->push_back(dark_picture(drive.pairs[0][0].width, drive.pairs[0][0].height, i + 1));
   return [=](std::size_t i, RigFrame* frame) {
     if (!within(i, first, last)) return true;
     if (which != Cover::right) frame->images[0] = (*dark)[(2 * i) % kPictures].view();

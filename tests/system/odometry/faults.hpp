@@ -9,7 +9,8 @@ namespace vergence::test {
 enum class Cover : std::uint8_t { left, right, both };
 
 /// Frames [first, last) show only the dark on the cameras named. The pictures live in the edit.
-[[nodiscard]] Edit cover(const StereoDrive& drive, Cover which, std::size_t first, std::size_t last);
+[[nodiscard]] Edit cover(const StereoDrive& drive, Cover which, std::size_t first,
+                         std::size_t last);
 /// Frames [first, last) come with left and right exchanged.
 [[nodiscard]] Edit swap_cameras(std::size_t first, std::size_t last);
 /// Frames [first, last) never come.

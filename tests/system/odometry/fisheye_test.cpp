@@ -11,7 +11,8 @@ namespace {
 
 constexpr double kDegrees = 180 / std::numbers::pi;
 
-/// 120° across, 150° from corner to corner: pinhole-equidistant lenses, the right camera turned a little.
+/// 120° across, 150° from corner to corner: pinhole-equidistant lenses, the right camera turned a
+/// little.
 RigCalibration fisheye_rig() {
   RigCalibration rig;
   rig.cameras = 2;
@@ -44,12 +45,14 @@ const StereoDrive& fisheye_drive() {
 
 TEST(FisheyeLenses, arePosedAllTheWayWithinOnePerCentOfIt) {
   const StereoDrive& drive = fisheye_drive();
-  // The picture's edge is where it is meant to be: 60° from the axis at half the width, but for the distortion.
+  // The picture's edge is where it is meant to be: 60° from the axis at half the width, but for the
+  // distortion.
   Vec3 ray;
   ASSERT_TRUE(Camera(drive.rig.intrinsics[0]).unproject(Vec2(639, 241), &ray));
   ASSERT_NEAR(std::atan(ray.x()) * kDegrees, 60, 1.0);
   const Replay r = replay(drive);
-  EXPECT_EQ(count_ok(r.answers, 0, drive.size()), static_cast<int>(drive.size())) << story(r.answers);
+  EXPECT_EQ(count_ok(r.answers, 0, drive.size()), static_cast<int>(drive.size()))
+      << story(r.answers);
   EXPECT_EQ(wrong_ok(r.answers, {}), "");
   std::vector<StampedPose> estimate, truth;
   for (const Answer& a : r.answers) {
@@ -62,7 +65,8 @@ TEST(FisheyeLenses, arePosedAllTheWayWithinOnePerCentOfIt) {
   const TrajectoryEvaluation e = evaluate(estimate, truth, options);
   ASSERT_EQ(e.status, EvaluationStatus::ok);
   ASSERT_GT(e.path_reference, 40.0);
-  // As accuracy_test.cpp reckons for lenses of 550 px: a pixel is 1.8 times the angle here, and so is every error of depth and way.
+  // As accuracy_test.cpp reckons for lenses of 550 px: a pixel is 1.8 times the angle here, and so
+  // is every error of depth and way.
   EXPECT_LT(e.segments[0].translation, 0.0075);
   EXPECT_LT(e.segments[0].rotation, 0.001);
   EXPECT_NEAR(e.sim3.scale, 1.0, 0.0075);
@@ -89,9 +93,11 @@ TEST(FisheyeLenses, areCalibratedFromTheDriveItself) {
   }
   estimator.finish();
   ASSERT_TRUE(estimator.calibrated());
-  const Transform &found = estimator.calibration().T_camera_left[1], &real = drive.rig.T_camera_left[1];
+  const Transform &found = estimator.calibration().T_camera_left[1],
+                  &real = drive.rig.T_camera_left[1];
   const Vec3 turn = log_so3(found.R * real.R.transpose());
-  // Three of the sigmas below which a calibration is taken: 0.15 mrad an axis, 4 mm along y and along z.
+  // Three of the sigmas below which a calibration is taken: 0.15 mrad an axis, 4 mm along y and
+  // along z.
   EXPECT_LT(turn.cwiseAbs().maxCoeff(), 3 * 0.15e-3);
   EXPECT_LT((found.t - real.t).cwiseAbs().maxCoeff(), 3 * 0.004);
   EXPECT_GT(posed, static_cast<int>(drive.size()) * 9 / 10);

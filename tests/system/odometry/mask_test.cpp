@@ -17,7 +17,8 @@ constexpr int kDirtRadius = 38;  // px
 
 /// What of camera k's picture is not the street: the bonnet, dirt on the glass.
 bool is_painted(std::size_t k, int x, int y, int height) {
-  return y >= height - kBonnet || (Eigen::Vector2i(x, y) - kDirt[k]).squaredNorm() < kDirtRadius * kDirtRadius;
+  return y >= height - kBonnet ||
+         (Eigen::Vector2i(x, y) - kDirt[k]).squaredNorm() < kDirtRadius * kDirtRadius;
 }
 
 /// Static things with more texture than the street has: rivets, grains, reflections.
@@ -28,12 +29,14 @@ Picture paint(int width, int height) {
     for (int x = 0; x < width; x += 4) {
       const auto grey = static_cast<std::uint8_t>(random.below(256));
       for (int v = y; v < std::min(y + 4, height); ++v)
-        for (int u = x; u < std::min(x + 4, width); ++u) p.bytes[static_cast<std::size_t>(v * p.stride + u)] = grey;
+        for (int u = x; u < std::min(x + 4, width); ++u)
+          p.bytes[static_cast<std::size_t>(v * p.stride + u)] = grey;
     }
   return p;
 }
 
-/// The same as the other camera sees it, as if it stood some metres off: so that it matches across and looks like a thing in the street.
+/// The same as the other camera sees it, as if it stood some metres off: so that it matches across
+/// and looks like a thing in the street.
 Picture seen_from_the_other(const Picture& left, const RigCalibration& rig) {
   constexpr double kDepth = 8;  // m
   const Camera camera(rig.intrinsics[1]), to(rig.intrinsics[0]);
@@ -43,10 +46,13 @@ Picture seen_from_the_other(const Picture& left, const RigCalibration& rig) {
     for (int x = 0; x < p.width; ++x) {
       Vec3 ray;
       Vec2 pixel;
-      if (!camera.unproject(Vec2(x, y), &ray) || to.project(T_left_camera * (kDepth * ray), &pixel, nullptr) != ProjectStatus::ok) continue;
+      if (!camera.unproject(Vec2(x, y), &ray) ||
+          to.project(T_left_camera * (kDepth * ray), &pixel, nullptr) != ProjectStatus::ok)
+        continue;
       const auto u = std::lround(pixel.x()), v = std::lround(pixel.y());
       if (u < 0 || v < 0 || u >= left.width || v >= left.height) continue;
-      p.bytes[static_cast<std::size_t>(y * p.stride + x)] = left.bytes[static_cast<std::size_t>(v * left.stride + u)];
+      p.bytes[static_cast<std::size_t>(y * p.stride + x)] =
+          left.bytes[static_cast<std::size_t>(v * left.stride + u)];
     }
   return p;
 }
@@ -63,7 +69,8 @@ class DirtyDrive {
       masks_[k] = Picture(c.width, c.height);
       for (int y = 0; y < c.height; ++y)
         for (int x = 0; x < c.width; ++x)
-          masks_[k].bytes[static_cast<std::size_t>(y * masks_[k].stride + x)] = is_painted(k, x, y, c.height) ? 0 : 255;
+          masks_[k].bytes[static_cast<std::size_t>(y * masks_[k].stride + x)] =
+              is_painted(k, x, y, c.height) ? 0 : 255;
     }
     for (std::size_t i = 0; i < kFrames; ++i) {
       pairs_.push_back(drive_.pairs[i]);
@@ -74,13 +81,16 @@ class DirtyDrive {
       }
     }
   }
-  [[nodiscard]] std::array<ImageView, 2> masks() const { return {masks_[0].view(), masks_[1].view()}; }
+  [[nodiscard]] std::array<ImageView, 2> masks() const {
+    return {masks_[0].view(), masks_[1].view()};
+  }
   [[nodiscard]] RigFrame frame(std::size_t i, bool dirty) const {
     RigFrame f;
     f.number = i;
     f.stamp = drive_.stamps[i];
     f.cameras = 2;
-    for (std::size_t k = 0; k < 2; ++k) f.images[k] = (dirty ? pairs_[i] : drive_.pairs[i])[k].view();
+    for (std::size_t k = 0; k < 2; ++k)
+      f.images[k] = (dirty ? pairs_[i] : drive_.pairs[i])[k].view();
     return f;
   }
   [[nodiscard]] const StereoDrive& drive() const { return drive_; }
@@ -119,7 +129,8 @@ Passed pass(bool dirty, std::span<const ImageView> masks, bool known = true) {
       for (int k = 0; p.followed() && k < 2; ++k) {
         if (!p.now.by(k)) continue;
         const auto c = static_cast<std::size_t>(k);
-        const int x = static_cast<int>(std::lround(p.raw[c].x())), y = static_cast<int>(std::lround(p.raw[c].y()));
+        const int x = static_cast<int>(std::lround(p.raw[c].x())),
+                  y = static_cast<int>(std::lround(p.raw[c].y()));
         ++passed.sightings[c];
         passed.painted[c] += is_painted(c, x, y, truth.rig.intrinsics[0].height) ? 1 : 0;
       }
@@ -130,7 +141,8 @@ Passed pass(bool dirty, std::span<const ImageView> masks, bool known = true) {
 }
 
 TEST(MaskedOdometry, sightsNothingUnderAMaskAndIsAsGoodAsOnCleanGlass) {
-  const double way = (dirty_drive().drive().truth[kFrames - 1].t - dirty_drive().drive().truth[0].t).norm();
+  const double way =
+      (dirty_drive().drive().truth[kFrames - 1].t - dirty_drive().drive().truth[0].t).norm();
   ASSERT_GT(way, 15.0);
   const Passed clean = pass(false, {});
   const auto masks = dirty_drive().masks();
@@ -143,7 +155,8 @@ TEST(MaskedOdometry, sightsNothingUnderAMaskAndIsAsGoodAsOnCleanGlass) {
     EXPECT_GT(bare.painted[k], static_cast<int>(kFrames)) << "camera " << k;
   }
   EXPECT_EQ(masked.posed, static_cast<int>(kFrames));
-  // As accuracy_test.cpp has it for clean pictures: 4 per mille of the way, and the first metre's share of a keyframe.
+  // As accuracy_test.cpp has it for clean pictures: 4 per mille of the way, and the first metre's
+  // share of a keyframe.
   EXPECT_LT(clean.error, 0.004 * way + 0.02);
   EXPECT_LT(masked.error, 0.004 * way + 0.02);
 }

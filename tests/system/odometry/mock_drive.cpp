@@ -44,7 +44,8 @@ StereoDrive render_drive(const mock::DriveOptions& options, Duration from, std::
   return render_drive(options, from, frames, make_rig());
 }
 
-StereoDrive render_drive(const mock::DriveOptions& options, Duration from, std::size_t frames, const RigCalibration& rig) {
+StereoDrive render_drive(const mock::DriveOptions& options, Duration from, std::size_t frames,
+                         const RigCalibration& rig) {
   const mock::Drive drive(options, *world());
   StereoDrive out;
   out.rig = rig;
@@ -52,13 +53,15 @@ StereoDrive render_drive(const mock::DriveOptions& options, Duration from, std::
                                           mock::Renderer(world(), Camera(out.rig.intrinsics[1]))};
   for (std::size_t i = 0; i < frames; ++i) {
     const Duration since = kInterval * static_cast<std::int64_t>(i);
-    const Transform T_left_enu = mock::camera_pose(drive.at(from + since), mock::default_T_body_left());
+    const Transform T_left_enu =
+        mock::camera_pose(drive.at(from + since), mock::default_T_body_left());
     std::array<Picture, 2> pair;
     for (std::size_t k = 0; k < 2; ++k) {
       pair[k] = Picture(rig.intrinsics[k].width, rig.intrinsics[k].height);
       mock::Shot shot;
       shot.noise_seed = static_cast<std::uint32_t>(2 * i + k + 1);
-      renderers[k].render(out.rig.T_camera_left[k] * T_left_enu, shot, pair[k].bytes.data(), pair[k].stride);
+      renderers[k].render(out.rig.T_camera_left[k] * T_left_enu, shot, pair[k].bytes.data(),
+                          pair[k].stride);
     }
     out.stamps.push_back(kStart + since);
     out.pairs.push_back(std::move(pair));

@@ -4,11 +4,13 @@
 
 namespace vergence::test {
 
-/// Part of a drive through the rendered suburb: 640×480 px, 60° wide, radtan lenses, 0.75 m baseline with the right camera turned a
-/// little, sensor noise, 20 pairs a second.
-[[nodiscard]] StereoDrive render_drive(const mock::DriveOptions& options, Duration from, std::size_t frames);
+/// Part of a drive through the rendered suburb: 640×480 px, 60° wide, radtan lenses, 0.75 m
+/// baseline with the right camera turned a little, sensor noise, 20 pairs a second.
+[[nodiscard]] StereoDrive render_drive(const mock::DriveOptions& options, Duration from,
+                                       std::size_t frames);
 /// The same through another rig's two lenses.
-[[nodiscard]] StereoDrive render_drive(const mock::DriveOptions& options, Duration from, std::size_t frames, const RigCalibration& rig);
+[[nodiscard]] StereoDrive render_drive(const mock::DriveOptions& options, Duration from,
+                                       std::size_t frames, const RigCalibration& rig);
 
 /// Standing, starting and a corner: rendered once a process.
 [[nodiscard]] const StereoDrive& brief_drive();

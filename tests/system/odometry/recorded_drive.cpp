@@ -14,7 +14,8 @@ Picture decode(const std::filesystem::path& file, const Intrinsics& camera) {
   Picture p(camera.width, camera.height);
   std::vector<std::uint8_t> bytes;
   if (app::read_image_file(file, &bytes) != app::ImageFileStatus::ok ||
-      app::decode_grey(bytes, {p.width, p.height}, p.bytes.data(), static_cast<std::size_t>(p.stride)) != app::ImageFileStatus::ok)
+      app::decode_grey(bytes, {p.width, p.height}, p.bytes.data(),
+                       static_cast<std::size_t>(p.stride)) != app::ImageFileStatus::ok)
     throw std::runtime_error(file.string() + " cannot be decoded");
   return p;
 }
@@ -33,8 +34,8 @@ StereoDrive load(const Excerpt& excerpt, const std::filesystem::path& folder) {
     if (matched.reference.empty()) continue;
     drive.stamps.push_back(pair.stamp);
     drive.truth.push_back(matched.reference[0].T_world_body);
-    drive.pairs.push_back(
-        {decode(sequence.root / pair.file[0], drive.rig.intrinsics[0]), decode(sequence.root / pair.file[1], drive.rig.intrinsics[1])});
+    drive.pairs.push_back({decode(sequence.root / pair.file[0], drive.rig.intrinsics[0]),
+                           decode(sequence.root / pair.file[1], drive.rig.intrinsics[1])});
   }
   return drive;
 }

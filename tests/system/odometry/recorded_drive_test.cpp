@@ -15,8 +15,8 @@ class RecordedDrive : public testing::TestWithParam<Excerpt> {
     drive_ = load(GetParam(), *folder);
     ASSERT_GT(drive_.size(), 45U);
   }
-  /// Truth here has errors of its own: EuRoC's of a centimetre, KITTI's calibration of half a per cent and a degree of yaw over the
-  /// excerpt.
+  /// Truth here has errors of its own: EuRoC's of a centimetre, KITTI's calibration of half a per
+  /// cent and a degree of yaw over the excerpt.
   [[nodiscard]] static OkBound bound() {
     OkBound b;
     b.translation = 0.05;
@@ -34,7 +34,8 @@ class RecordedDrive : public testing::TestWithParam<Excerpt> {
 
 TEST_P(RecordedDrive, isOkAllTheWayAndRight) {
   const Replay r = replay(drive_, {}, 2);
-  EXPECT_EQ(count_ok(r.answers, 0, drive_.size()), static_cast<int>(drive_.size())) << story(r.answers);
+  EXPECT_EQ(count_ok(r.answers, 0, drive_.size()), static_cast<int>(drive_.size()))
+      << story(r.answers);
   EXPECT_EQ(wrong_ok(r.answers, bound()), "");
   EXPECT_EQ(r.allocations, 0U);
 }
@@ -46,7 +47,8 @@ TEST_P(RecordedDrive, withItsCamerasExchangedNeverGivesAPose) {
 }
 
 TEST_P(RecordedDrive, withItsRightCameraCoveredIsNotOkFromThere) {
-  expect_no_wrong_ok(replay(drive_, cover(drive_, Cover::right, 20, drive_.size()), 2), 20, drive_.size());
+  expect_no_wrong_ok(replay(drive_, cover(drive_, Cover::right, 20, drive_.size()), 2), 20,
+                     drive_.size());
 }
 
 TEST_P(RecordedDrive, blackFramesAreLost) {

@@ -25,7 +25,8 @@ Replay replay(const StereoDrive& drive, const Edit& edit, int threads, bool onli
   std::optional<app::ThreadRunner> two;
   if (threads == 2) two.emplace();
   ImmediateRunner solver;
-  Estimator estimator(options, drive.rig, drive.rig, arena, two ? static_cast<PairRunner&>(*two) : one, solver);
+  Estimator estimator(options, drive.rig, drive.rig, arena,
+                      two ? static_cast<PairRunner&>(*two) : one, solver);
   Replay out;
   out.answers.reserve(drive.size());
   const std::uint64_t before = AllocationGuard::allocations_after_seal();
@@ -41,7 +42,8 @@ Replay replay(const StereoDrive& drive, const Edit& edit, int threads, bool onli
       const SealedScope sealed;
       a.sample = estimator.process(frame);
     }
-    for (const EstimatorEvent& e : estimator.events()) a.restarted = a.restarted || e.kind == EstimatorEvent::Kind::scene_restarted;
+    for (const EstimatorEvent& e : estimator.events())
+      a.restarted = a.restarted || e.kind == EstimatorEvent::Kind::scene_restarted;
     a.T_reference_left = drive.truth[i];
     out.answers.push_back(a);
   }
@@ -72,18 +74,21 @@ std::string wrong_ok(const std::vector<Answer>& answers, const OkBound& bound) {
     way += (a.T_reference_left.t - previous->T_reference_left.t).norm();
     previous = &a;
     const MotionError e = motion_error(*first, a);
-    const double ratio = std::max(e.translation / (bound.translation + bound.per_metre * way), e.rotation / bound.rotation);
+    const double ratio = std::max(e.translation / (bound.translation + bound.per_metre * way),
+                                  e.rotation / bound.rotation);
     if (ratio <= worst_ratio) continue;
     worst_ratio = ratio;
-    worst = fmt::format("frame {} is called ok, yet since frame {} ({:.2f} m) it is {:.3f} m and {:.4f} rad off", a.sample.frame,
-                        first->sample.frame, way, e.translation, e.rotation);
+    worst = fmt::format(
+        "frame {} is called ok, yet since frame {} ({:.2f} m) it is {:.3f} m and {:.4f} rad off",
+        a.sample.frame, first->sample.frame, way, e.translation, e.rotation);
   }
   return worst;
 }
 
 int count_ok(const std::vector<Answer>& answers, std::size_t first, std::size_t last) {
   int n = 0;
-  for (const Answer& a : answers) n += a.sample.frame >= first && a.sample.frame < last && good(a.sample) ? 1 : 0;
+  for (const Answer& a : answers)
+    n += a.sample.frame >= first && a.sample.frame < last && good(a.sample) ? 1 : 0;
   return n;
 }
 
@@ -95,11 +100,15 @@ std::string story(const std::vector<Answer>& answers) {
     int inliers = first.inliers;
     for (; end < answers.size(); ++end) {
       const PoseSample& s = answers[end].sample;
-      if (s.status != first.status || s.reason != first.reason || (answers[end].restarted && end != i)) break;
+      if (s.status != first.status || s.reason != first.reason ||
+          (answers[end].restarted && end != i))
+        break;
       inliers = std::min(inliers, s.inliers);
     }
-    text += fmt::format("frames {} to {}: {} {}, at least {} inliers{}\n", first.frame, answers[end - 1].sample.frame,
-                        to_string(first.status), to_string(first.reason), inliers, answers[i].restarted ? ", scene restarted" : "");
+    text +=
+        fmt::format("frames {} to {}: {} {}, at least {} inliers{}\n", first.frame,
+                    answers[end - 1].sample.frame, to_string(first.status), to_string(first.reason),
+                    inliers, answers[i].restarted ? ", scene restarted" : "");
     i = end;
   }
   return text;

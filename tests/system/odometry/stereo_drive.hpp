@@ -33,7 +33,8 @@ struct StereoDrive {
   [[nodiscard]] std::size_t size() const noexcept { return pairs.size(); }
 };
 
-/// What an estimator said about one frame, and where the left camera truly was when its image was taken.
+/// What an estimator said about one frame, and where the left camera truly was when its image was
+/// taken.
 struct Answer {
   PoseSample sample;
   Transform T_reference_left{};
@@ -48,13 +49,17 @@ struct Replay {
   std::uint64_t allocations = 0;  // on sealed threads, from the first frame to the last
 };
 
-/// `ok`, or nothing stands against it but that the drive has not confirmed its calibration yet: what is asked of the odometry itself.
+/// `ok`, or nothing stands against it but that the drive has not confirmed its calibration yet:
+/// what is asked of the odometry itself.
 [[nodiscard]] inline bool good(const PoseSample& s) noexcept {
-  return s.status == PoseStatus::ok || (s.status == PoseStatus::degraded && s.reason == Reason::unverified_calibration);
+  return s.status == PoseStatus::ok ||
+         (s.status == PoseStatus::degraded && s.reason == Reason::unverified_calibration);
 }
 
-/// Every frame of the drive through a new estimator. `threads`: 1 or 2. `online`: it may find the rig's calibration anew.
-[[nodiscard]] Replay replay(const StereoDrive& drive, const Edit& edit = {}, int threads = 1, bool online = true);
+/// Every frame of the drive through a new estimator. `threads`: 1 or 2. `online`: it may find the
+/// rig's calibration anew.
+[[nodiscard]] Replay replay(const StereoDrive& drive, const Edit& edit = {}, int threads = 1,
+                            bool online = true);
 
 /// Difference of two relative motions over the same pair of frames.
 struct MotionError {
@@ -63,7 +68,8 @@ struct MotionError {
 };
 [[nodiscard]] MotionError motion_error(const Answer& from, const Answer& to);
 
-/// How far a pose called `ok` may be from the truth, relative to the first `ok` pose since the drive's start or the last marked restart.
+/// How far a pose called `ok` may be from the truth, relative to the first `ok` pose since the
+/// drive's start or the last marked restart.
 struct OkBound {
   double translation = 0.05;  // m
   double per_metre = 0.015;   // m of the way driven since
@@ -76,7 +82,8 @@ struct OkBound {
 /// Frames of [first, last) that were called `ok`.
 [[nodiscard]] int count_ok(const std::vector<Answer>& answers, std::size_t first, std::size_t last);
 
-/// One line for every run of frames with the same status and reason: for the message of a failed expectation.
+/// One line for every run of frames with the same status and reason: for the message of a failed
+/// expectation.
 [[nodiscard]] std::string story(const std::vector<Answer>& answers);
 
 }  // namespace vergence::test

@@ -1,4 +1,5 @@
-// Whole drives of the mock as KITTI raw drives at the data set's rates: what the comparison and the mount come to.
+// Whole drives of the mock as KITTI raw drives at the data set's rates: what the comparison and the
+// mount come to.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -43,8 +44,8 @@ app::Configuration configuration_of(const WholeDrive& d) {
                                fmt::format("mock.seed={}", d.seed),
                                fmt::format("ins.rate={}", d.oxts_rate)};
   if (!d.rectified)
-    set.insert(set.end(),
-               {"cameras.0.distortion=[-0.37, 0.2, 0.002, 0.001, -0.07]", "cameras.1.distortion=[-0.36, 0.18, 0.001, -0.001, -0.05]"});
+    set.insert(set.end(), {"cameras.0.distortion=[-0.37, 0.2, 0.002, 0.001, -0.07]",
+                           "cameras.1.distortion=[-0.36, 0.18, 0.001, -0.001, -0.05]"});
   return app::load_configuration(std::string(VERGENCE_SOURCE_DIR) + "/app/config/mock.yaml", set);
 }
 
@@ -54,16 +55,21 @@ TEST_P(KittiRawWhole, driftHeadingAndMount) {
   const WholeDrive& d = GetParam();
   const TemporaryFolder work;
   const std::string session = (work / "session").string();
-  write_kitti_raw(configuration_of(d), d.seconds, {d.rectified, true, static_cast<std::uint64_t>(d.seed)}, work / "data");
-  const Outcome o = run_vergence("replay '" + (work / "data").string() + "' --format kitti-raw --quiet --out '" + session + "'");
+  write_kitti_raw(configuration_of(d), d.seconds,
+                  {d.rectified, true, static_cast<std::uint64_t>(d.seed)}, work / "data");
+  const Outcome o = run_vergence("replay '" + (work / "data").string() +
+                                 "' --format kitti-raw --quiet --out '" + session + "'");
   ASSERT_EQ(o.code, 0) << o.err;
   const auto summary = summary_of(session);
   const auto& errors = summary["earth"]["errors"];
   ASSERT_TRUE(errors.is_object());
-  std::printf("%s: way %.1f m, horizontal end %.2f m (%.2f %%) max %.2f, heading rms %.3f end %.3f deg, scale %.4f\n", d.name,
-              summary["earth"]["way_m"].get<double>(), errors["horizontal_end_m"].get<double>(),
-              errors["horizontal_end_percent"].get<double>(), errors["horizontal_max_m"].get<double>(),
-              errors["heading_rms_deg"].get<double>(), errors["heading_end_deg"].get<double>(), summary["metrics"]["scale"].get<double>());
+  std::printf(
+      "%s: way %.1f m, horizontal end %.2f m (%.2f %%) max %.2f, heading rms %.3f end %.3f deg, "
+      "scale %.4f\n",
+      d.name, summary["earth"]["way_m"].get<double>(), errors["horizontal_end_m"].get<double>(),
+      errors["horizontal_end_percent"].get<double>(), errors["horizontal_max_m"].get<double>(),
+      errors["heading_rms_deg"].get<double>(), errors["heading_end_deg"].get<double>(),
+      summary["metrics"]["scale"].get<double>());
   EXPECT_LT(errors["horizontal_end_percent"].get<double>(), 0.8);
   EXPECT_LT(errors["heading_rms_deg"].get<double>(), 0.5);
 
@@ -76,11 +82,13 @@ TEST_P(KittiRawWhole, driftHeadingAndMount) {
     const std::string axis(1, "xyz"[k]);
     const auto tell = [&](const char* what, const nlohmann::json& v, double truth) {
       if (v["value"].is_null()) {
-        std::printf("  %s %s not observable, sigma %.3f\n", what, axis.c_str(), v["sigma"].get<double>());
+        std::printf("  %s %s not observable, sigma %.3f\n", what, axis.c_str(),
+                    v["sigma"].get<double>());
         return;
       }
       const double error = v["value"].get<double>() - truth, sigma = v["sigma"];
-      std::printf("  %s %s error %+.4f sigma %.4f (%.1f)\n", what, axis.c_str(), error, sigma, error / sigma);
+      std::printf("  %s %s error %+.4f sigma %.4f (%.1f)\n", what, axis.c_str(), error, sigma,
+                  error / sigma);
       EXPECT_LT(std::abs(error), 3 * sigma) << what << ' ' << axis;
     };
     tell("turn, deg,", mount["rotation_deg"][axis], turn[k]);
@@ -94,7 +102,8 @@ TEST_P(KittiRawWhole, driftHeadingAndMount) {
 INSTANTIATE_TEST_SUITE_P(Drives, KittiRawWhole,
                          ::testing::Values(WholeDrive{"sync", "figure-eight", 45, 1, true, 10},
                                            WholeDrive{"extract", "loop", 45, 2, false, 100},
-                                           WholeDrive{"syncLong", "figure-eight", 120, 3, true, 10}),
+                                           WholeDrive{"syncLong", "figure-eight", 120, 3, true,
+                                                      10}),
                          [](const auto& tested) { return tested.param.name; });
 
 }  // namespace

@@ -28,7 +28,8 @@ namespace fs = std::filesystem;
 const std::string kRig = std::string(VERGENCE_SOURCE_DIR) + "/app/config/mock.yaml";
 constexpr double kSeconds = 9;
 const std::string kForReplay =
-    " --set odometry.features=300 --set calibration.online=off --set comparison.placement_m=20 --set comparison.correlation_s=60";
+    " --set odometry.features=300 --set calibration.online=off --set comparison.placement_m=20 "
+    "--set comparison.correlation_s=60";
 
 // A quarter of the pixels, an INS without errors; the calibration is the one given throughout.
 const std::vector<std::string> kSmall{"cameras.0.size=[320, 240]",
@@ -78,7 +79,8 @@ class KittiRawReplay : public ::testing::Test {
   static void SetUpTestSuite() {
     master_ = new TemporaryFolder;
     const app::Configuration c = app::load_configuration(kRig, kSmall);
-    drive_ = fs::relative(write_kitti_raw(c, kSeconds, {}, *master_ / "data"), *master_ / "data").string();
+    drive_ = fs::relative(write_kitti_raw(c, kSeconds, {}, *master_ / "data"), *master_ / "data")
+                 .string();
     app::CalibrationFile calibration;
     calibration.rig = app::nominal_rig(c);
     app::write_calibration(*master_ / "calibration.yaml", calibration);
@@ -88,14 +90,18 @@ class KittiRawReplay : public ::testing::Test {
   /// A copy that may be spoilt: images are links.
   fs::path copy() const {
     const fs::path to = work_ / "data";
-    fs::copy(*master_ / "data", to, fs::copy_options::recursive | fs::copy_options::create_hard_links);
+    fs::copy(*master_ / "data", to,
+             fs::copy_options::recursive | fs::copy_options::create_hard_links);
     return to;
   }
   [[nodiscard]] Outcome replay(const fs::path& data, const std::string& more = "") const {
-    return run_vergence("replay '" + data.string() + "' --format kitti-raw --out '" + session().string() + "'" + kForReplay + " " + more);
+    return run_vergence("replay '" + data.string() + "' --format kitti-raw --out '" +
+                        session().string() + "'" + kForReplay + " " + more);
   }
   [[nodiscard]] fs::path session() const { return work_ / "session"; }
-  [[nodiscard]] static fs::path packet(const fs::path& data, int i) { return data / drive_ / fmt::format("oxts/data/{:010d}.txt", i); }
+  [[nodiscard]] static fs::path packet(const fs::path& data, int i) {
+    return data / drive_ / fmt::format("oxts/data/{:010d}.txt", i);
+  }
   /// As a new file: a link shares its bytes with every other test.
   static void rewrite(const fs::path& file, const std::string& text) {
     fs::remove(file);
@@ -110,10 +116,12 @@ TemporaryFolder* KittiRawReplay::master_ = nullptr;
 std::string KittiRawReplay::drive_;
 
 TEST_F(KittiRawReplay, aDriveReplayedFromTheDataSetsFilesIsTheDriveItselfOnTheEarthToo) {
-  const Outcome run = run_vergence("run '" + kRig + "' --fast --duration " + std::to_string(kSeconds) + set_arguments() +
-                                   " --quiet --out '" + (work_ / "run").string() + "'");
+  const Outcome run =
+      run_vergence("run '" + kRig + "' --fast --duration " + std::to_string(kSeconds) +
+                   set_arguments() + " --quiet --out '" + (work_ / "run").string() + "'");
   ASSERT_EQ(run.code, 0) << run.err;
-  const Outcome o = replay(*master_ / "data", "--calibration '" + (*master_ / "calibration.yaml").string() + "'");
+  const Outcome o =
+      replay(*master_ / "data", "--calibration '" + (*master_ / "calibration.yaml").string() + "'");
   ASSERT_EQ(o.code, 0) << o.err;
   EXPECT_EQ(read_file(work_ / "run/trajectory.tum"), read_file(session() / "trajectory.tum"));
 
@@ -122,11 +130,12 @@ TEST_F(KittiRawReplay, aDriveReplayedFromTheDataSetsFilesIsTheDriveItselfOnTheEa
   std::size_t compared = 0;
   for (std::size_t i = 0; i < live.size(); ++i) {
     auto mine = ours[i], theirs = live[i];
-    // The last poses wait for readings: which of them come before the drive's end is the devices' affair.
+    // The last poses wait for readings: which of them come before the drive's end is the devices'
+    // affair.
     if (i + 2 >= live.size()) continue;
     ASSERT_EQ(mine["error_east_m"].empty(), theirs["error_east_m"].empty()) << i;
-    // Positions weigh against attitude by what the data set says of both, otherwise than by what the mock says: the placement of 20 m
-    // differs by a quarter of its residual of 20 mm.
+    // Positions weigh against attitude by what the data set says of both, otherwise than by what
+    // the mock says: the placement of 20 m differs by a quarter of its residual of 20 mm.
     for (const auto& [name, within] : std::map<std::string, double>{{"east", 5e-3},
                                                                     {"north", 5e-3},
                                                                     {"up", 5e-3},
@@ -136,13 +145,15 @@ TEST_F(KittiRawReplay, aDriveReplayedFromTheDataSetsFilesIsTheDriveItselfOnTheEa
                                                                     {"error_north_m", 5e-3},
                                                                     {"error_heading_deg", 15e-3}}) {
       if (theirs[name].empty()) continue;
-      EXPECT_NEAR(std::stod(mine[name]), std::stod(theirs[name]), within) << name << " of row " << i;
+      EXPECT_NEAR(std::stod(mine[name]), std::stod(theirs[name]), within)
+          << name << " of row " << i;
       ++compared;
     }
   }
   EXPECT_GT(compared, 400U);
   const auto readings = app::read_ins_file(session() / "ins.csv");
-  EXPECT_NEAR(static_cast<double>(readings.size()), 100 * kSeconds, 25) << "the devices go on for a moment";
+  EXPECT_NEAR(static_cast<double>(readings.size()), 100 * kSeconds, 25)
+      << "the devices go on for a moment";
   EXPECT_EQ(readings[5].sample.fix, FixStatus::fix_3d);
 
   const auto summary = summary_of(session());
@@ -162,9 +173,11 @@ TEST_F(KittiRawReplay, aDriveReplayedFromTheDataSetsFilesIsTheDriveItselfOnTheEa
 TEST_F(KittiRawReplay, withTheDataSetsOwnCalibrationAndInOtherForms) {
   const Outcome o = replay(*master_ / "data", "--quiet --also kitti,enu,geojson,kml");
   ASSERT_EQ(o.code, 0) << o.err;
-  const app::Trajectory world = app::read_tum(session() / "trajectory.tum"), enu = app::read_tum(session() / "trajectory_enu.tum");
+  const app::Trajectory world = app::read_tum(session() / "trajectory.tum"),
+                        enu = app::read_tum(session() / "trajectory_enu.tum");
   ASSERT_EQ(world.size(), enu.size());
-  // Every pose, those before the placement too, by one rigid transform; where poses.csv has east it is the same.
+  // Every pose, those before the placement too, by one rigid transform; where poses.csv has east it
+  // is the same.
   const Transform T_enu_world = enu[0].T_world_body * world[0].T_world_body.inverse();
   const auto rows = rows_of(session());
   for (std::size_t i = 0; i < world.size(); ++i) {
@@ -194,7 +207,8 @@ TEST_F(KittiRawReplay, withTheDataSetsOwnCalibrationAndInOtherForms) {
     EXPECT_NEAR(place[0].get<double>(), 153.0137, 0.01);  // longitude first (RFC 7946)
     EXPECT_NEAR(place[1].get<double>(), -27.4975, 0.01);
     EXPECT_TRUE(feature["properties"]["stroke"].is_string());
-    if (feature["properties"].contains("status")) points += feature["geometry"]["coordinates"].size();
+    if (feature["properties"].contains("status"))
+      points += feature["geometry"]["coordinates"].size();
   }
   EXPECT_GE(points, world.size());
   EXPECT_NE(read_file(session() / "drive.kml").find("<coordinates>153.0"), std::string::npos);
@@ -208,7 +222,9 @@ TEST_F(KittiRawReplay, withoutAPlacementOtherFormsAreNotWrittenAndThatIsSaid) {
   ASSERT_EQ(o.code, 0) << o.err;
   EXPECT_TRUE(fs::exists(session() / "trajectory.kitti"));
   EXPECT_FALSE(fs::exists(session() / "drive.geojson"));
-  EXPECT_NE(o.err.find("drive.geojson is not written: the drive was never placed on the earth"), std::string::npos) << o.err;
+  EXPECT_NE(o.err.find("drive.geojson is not written: the drive was never placed on the earth"),
+            std::string::npos)
+      << o.err;
   EXPECT_NE(o.err.find("there is no INS to compare with"), std::string::npos) << o.err;
   EXPECT_TRUE(summary_of(session())["earth"].is_null());
 }
@@ -222,8 +238,11 @@ TEST_F(KittiRawReplay, packetsMissingInTheMiddleAndWithoutAFixPauseTheComparison
   }
   const Outcome o = replay(data);
   ASSERT_EQ(o.code, 0) << o.err;
-  EXPECT_NE(o.err.find("oxts: 60 packets are missing, the first is 0000000400.txt"), std::string::npos) << o.err;
-  EXPECT_NE(o.err.find("oxts: 60 of 860 packets have no satellites' fix"), std::string::npos) << o.err;
+  EXPECT_NE(o.err.find("oxts: 60 packets are missing, the first is 0000000400.txt"),
+            std::string::npos)
+      << o.err;
+  EXPECT_NE(o.err.find("oxts: 60 of 860 packets have no satellites' fix"), std::string::npos)
+      << o.err;
   EXPECT_EQ(events(session(), "ins_gap").size(), 1U);
   EXPECT_EQ(events(session(), "ins_no_fix").size(), 1U);
   EXPECT_EQ(events(session(), "ins_ok").size(), 2U);
@@ -253,7 +272,8 @@ TEST_F(KittiRawReplay, whatIsLeftOutCountsAsSkipped) {
   ASSERT_EQ(o.code, 0) << o.err;
   const auto frames = summary_of(session())["frames"];
   EXPECT_EQ(frames["read"], 149);
-  EXPECT_EQ(frames["read"].get<int>() + frames["skipped"].get<int>(), static_cast<int>(text.size() / line));
+  EXPECT_EQ(frames["read"].get<int>() + frames["skipped"].get<int>(),
+            static_cast<int>(text.size() / line));
   EXPECT_FALSE(events(session(), "data").empty());
 }
 
@@ -262,10 +282,12 @@ TEST_F(KittiRawReplay, aMountIsTheConfigurationsWhereItSaysOne) {
   fs::remove(data / fs::path(drive_).parent_path() / "calib_imu_to_velo.txt");
   const Outcome refused = replay(data, "--frames 20");
   EXPECT_EQ(refused.code, 2);
-  EXPECT_NE(refused.err.find("calib_imu_to_velo.txt: is missing"), std::string::npos) << refused.err;
+  EXPECT_NE(refused.err.find("calib_imu_to_velo.txt: is missing"), std::string::npos)
+      << refused.err;
   EXPECT_FALSE(fs::exists(session()));
   ASSERT_EQ(replay(data, "--frames 20 --set 'ins.lever_arm_m=[1, 0, 0]'").code, 0);
-  EXPECT_EQ(summary_of(session())["earth"]["mount"]["lever_arm_m"], nlohmann::json({1.0, 0.0, 0.0}));
+  EXPECT_EQ(summary_of(session())["earth"]["mount"]["lever_arm_m"],
+            nlohmann::json({1.0, 0.0, 0.0}));
 }
 
 }  // namespace

@@ -22,7 +22,9 @@ namespace fs = std::filesystem;
 
 constexpr std::size_t kFrames = 24;  // of a straight stretch at 9 m/s: 10 m
 
-std::string image_name(int camera, std::size_t pair) { return fmt::format("{}/{:03d}.png", camera == 0 ? "left" : "right", pair); }
+std::string image_name(int camera, std::size_t pair) {
+  return fmt::format("{}/{:03d}.png", camera == 0 ? "left" : "right", pair);
+}
 
 /// A rendered stretch in the layout of `--format folder`: what a newcomer brings.
 class ReplayedFolder : public ::testing::Test {
@@ -39,7 +41,8 @@ class ReplayedFolder : public ::testing::Test {
         const Picture& p = drive.pairs[i][static_cast<std::size_t>(k)];
         const fs::path file = *master_ / image_name(k, i);
         fs::create_directories(file.parent_path());
-        const cv::Mat image(p.height, p.width, CV_8U, const_cast<std::uint8_t*>(p.bytes.data()), static_cast<std::size_t>(p.stride));
+        const cv::Mat image(p.height, p.width, CV_8U, const_cast<std::uint8_t*>(p.bytes.data()),
+                            static_cast<std::size_t>(p.stride));
         ASSERT_TRUE(cv::imwrite(file.string(), image));
       }
     }
@@ -56,9 +59,12 @@ class ReplayedFolder : public ::testing::Test {
   [[nodiscard]] fs::path data() const { return work_ / "data"; }
   [[nodiscard]] fs::path session() const { return work_ / "session"; }
   [[nodiscard]] Outcome replay(const std::string& more = "") const {
-    return run_vergence("replay '" + data().string() + "' --format folder --quiet --out '" + session().string() + "' " + more);
+    return run_vergence("replay '" + data().string() + "' --format folder --quiet --out '" +
+                        session().string() + "' " + more);
   }
-  [[nodiscard]] nlohmann::json summary() const { return nlohmann::json::parse(read_file(session() / "summary.json")); }
+  [[nodiscard]] nlohmann::json summary() const {
+    return nlohmann::json::parse(read_file(session() / "summary.json"));
+  }
   void expect_refused(const std::string& named) const {
     const Outcome o = replay();
     EXPECT_EQ(o.code, 2) << o.err;
@@ -74,7 +80,9 @@ class ReplayedFolder : public ::testing::Test {
     EXPECT_EQ(s["frames"]["posed"], kFrames - frames);
     EXPECT_NE(read_file(session() / "events.jsonl").find("skipped"), std::string::npos);
   }
-  void write(const std::string& name, const std::string& text) const { std::ofstream(data() / name, std::ios::binary) << text; }
+  void write(const std::string& name, const std::string& text) const {
+    std::ofstream(data() / name, std::ios::binary) << text;
+  }
 
   TemporaryFolder work_;
   static TemporaryFolder* master_;
@@ -84,9 +92,11 @@ TemporaryFolder* ReplayedFolder::master_ = nullptr;
 
 TEST_F(ReplayedFolder, aMaskChangesWhatIsSeenAndOneOfAnotherSizeIsRefused) {
   const std::string white(640 * 480, '\xff');
-  const fs::path bonnet = work_.write("bonnet.pgm", "P5 640 480 255\n" + white.substr(0, 640 * 400) + std::string(640 * 80, '\0'));
+  const fs::path bonnet = work_.write(
+      "bonnet.pgm", "P5 640 480 255\n" + white.substr(0, 640 * 400) + std::string(640 * 80, '\0'));
   const fs::path small = work_.write("small.pgm", "P5 320 240 255\n" + white.substr(0, 320 * 240));
-  const Outcome o = replay("--set cameras.0.mask=" + bonnet.string() + " --set cameras.1.mask=" + bonnet.string());
+  const Outcome o = replay("--set cameras.0.mask=" + bonnet.string() +
+                           " --set cameras.1.mask=" + bonnet.string());
   ASSERT_EQ(o.code, 0) << o.err;
   const std::string masked = read_file(session() / "poses.csv");
   EXPECT_EQ(summary()["frames"]["posed"], kFrames);
@@ -96,7 +106,8 @@ TEST_F(ReplayedFolder, aMaskChangesWhatIsSeenAndOneOfAnotherSizeIsRefused) {
   fs::remove_all(session());
   const Outcome refused = replay("--set cameras.1.mask=" + small.string());
   EXPECT_EQ(refused.code, 2);
-  EXPECT_NE(refused.err.find("cameras.1.mask: " + small.string() + " is 320 × 240 px, the camera's images are 640 × 480"),
+  EXPECT_NE(refused.err.find("cameras.1.mask: " + small.string() +
+                             " is 320 × 240 px, the camera's images are 640 × 480"),
             std::string::npos)
       << refused.err;
 }
@@ -111,15 +122,17 @@ TEST_F(ReplayedFolder, aBagGivesThePosesOfTheSameImages) {
   std::size_t pair = 0;
   for (std::int64_t ns = 0; times >> ns; ++pair) {
     for (int k = 0; k < 2; ++k)
-      bag.message(static_cast<std::uint16_t>(k + 1), ns,
-                  CdrWriter().header(ns).text("png").blob(read_file(data() / image_name(k, pair))).bytes());
+      bag.message(
+          static_cast<std::uint16_t>(k + 1), ns,
+          CdrWriter().header(ns).text("png").blob(read_file(data() / image_name(k, pair))).bytes());
     bag.close_chunk();  // never finished: as a recorder that was killed leaves it
   }
   ASSERT_EQ(pair, kFrames);
   const fs::path file = work_.write("drive.mcap", bag.bytes());
   const fs::path other = work_ / "of_bag";
-  const Outcome o = run_vergence("replay '" + file.string() + "' --out '" + other.string() + "' --calibration '" +
-                                 (data() / "calibration.yaml").string() + "'");
+  const Outcome o =
+      run_vergence("replay '" + file.string() + "' --out '" + other.string() + "' --calibration '" +
+                   (data() / "calibration.yaml").string() + "'");
   ASSERT_EQ(o.code, 0) << o.err;
   EXPECT_NE(o.err.find("drive.mcap is unfinished"), std::string::npos) << o.err;
   EXPECT_EQ(read_file(other / "trajectory.tum"), poses);
@@ -128,8 +141,8 @@ TEST_F(ReplayedFolder, aBagGivesThePosesOfTheSameImages) {
 TEST_F(ReplayedFolder, givesASessionWithAPoseForEveryFrame) {
   const Outcome o = replay();
   ASSERT_EQ(o.code, 0) << o.err;
-  for (const char* file :
-       {"trajectory.tum", "poses.csv", "calibration.yaml", "calibrations.csv", "events.jsonl", "summary.json", "report.html"})
+  for (const char* file : {"trajectory.tum", "poses.csv", "calibration.yaml", "calibrations.csv",
+                           "events.jsonl", "summary.json", "report.html"})
     EXPECT_TRUE(fs::exists(session() / file)) << file;
   const auto s = summary();
   EXPECT_EQ(s["frames"]["posed"], kFrames);
@@ -139,12 +152,14 @@ TEST_F(ReplayedFolder, givesASessionWithAPoseForEveryFrame) {
 }
 
 TEST_F(ReplayedFolder, aDriveTooShortToConfirmItsCalibrationSaysSo) {
-  const Outcome o = run_vergence("replay '" + data().string() + "' --format folder --out '" + session().string() + "'");
+  const Outcome o = run_vergence("replay '" + data().string() + "' --format folder --out '" +
+                                 session().string() + "'");
   ASSERT_EQ(o.code, 0) << o.err;
   EXPECT_EQ(summary()["calibration"]["verified"], false);
   EXPECT_TRUE(summary()["calibration"]["verified_frame"].is_null());
   EXPECT_NE(o.err.find("the drive has not confirmed its calibration"), std::string::npos) << o.err;
-  EXPECT_NE(read_file(session() / "poses.csv").find("degraded,unverified_calibration"), std::string::npos);
+  EXPECT_NE(read_file(session() / "poses.csv").find("degraded,unverified_calibration"),
+            std::string::npos);
   EXPECT_NE(read_file(session() / "report.html").find("not verified"), std::string::npos);
 }
 
@@ -159,7 +174,10 @@ TEST_F(ReplayedFolder, whereNothingWatchesTheRigPosesAreOkAndTheCalibrationIsNot
 TEST_F(ReplayedFolder, theSameBytesWithOneThreadAndTwo) {
   ASSERT_EQ(replay("--threads 1").code, 0);
   const fs::path other = work_ / "other";
-  ASSERT_EQ(run_vergence("replay '" + data().string() + "' --format folder --quiet --threads 2 --out '" + other.string() + "'").code, 0);
+  ASSERT_EQ(run_vergence("replay '" + data().string() +
+                         "' --format folder --quiet --threads 2 --out '" + other.string() + "'")
+                .code,
+            0);
   EXPECT_EQ(read_file(session() / "trajectory.tum"), read_file(other / "trajectory.tum"));
   EXPECT_EQ(read_file(session() / "events.jsonl"), read_file(other / "events.jsonl"));
 }
@@ -192,17 +210,22 @@ TEST_F(ReplayedFolder, whatIsMissingNamesTheWayOut) {
 }
 
 TEST_F(ReplayedFolder, theLayoutIsFoundOut) {
-  const Outcome o = run_vergence("replay '" + data().string() + "' --quiet --out '" + session().string() + "'");
+  const Outcome o =
+      run_vergence("replay '" + data().string() + "' --quiet --out '" + session().string() + "'");
   ASSERT_EQ(o.code, 0) << o.err;
   EXPECT_EQ(summary()["frames"]["posed"], kFrames);
   const Outcome none = run_vergence("replay '" + work_.path().string() + "' --out x");
   EXPECT_EQ(none.code, 2);
-  EXPECT_NE(none.err.find("holds no drive that is known: KITTI (image_0"), std::string::npos) << none.err;
+  EXPECT_NE(none.err.find("holds no drive that is known: KITTI (image_0"), std::string::npos)
+      << none.err;
 }
 
 TEST_F(ReplayedFolder, aCamchainIsReadAsItIs) {
   const std::string camchain = (work_ / "camchain.yaml").string();
-  ASSERT_EQ(run_vergence("calibrate --convert '" + (data() / "calibration.yaml").string() + "' '" + camchain + "'").code, 0);
+  ASSERT_EQ(run_vergence("calibrate --convert '" + (data() / "calibration.yaml").string() + "' '" +
+                         camchain + "'")
+                .code,
+            0);
   ASSERT_EQ(replay().code, 0);
   const std::string same = read_file(session() / "trajectory.tum");
   fs::remove_all(session());
@@ -223,7 +246,8 @@ TEST_F(ReplayedFolder, swappedFoldersAreNotToBeUsedAndSaySo) {
   EXPECT_NE(o.err.find("do not use these poses: "), std::string::npos) << o.err;
   EXPECT_NE(o.err.find("of 24 frames)"), std::string::npos) << o.err;
   EXPECT_NE(read_file(session() / "report.html").find("Do not use"), std::string::npos);
-  EXPECT_EQ(read_file(session() / "report.html").find("is missing"), std::string::npos) << "nothing is, but what is so by design";
+  EXPECT_EQ(read_file(session() / "report.html").find("is missing"), std::string::npos)
+      << "nothing is, but what is so by design";
 }
 
 TEST_F(ReplayedFolder, timesOfAnotherUnitAndReversedOnesAreRefused) {
@@ -260,13 +284,17 @@ TEST_F(ReplayedFolder, trueAndFalseAreOnAndOff) {
 
 TEST_F(ReplayedFolder, imagesWithoutTimesAreTakenAtTenHertzAndThatIsSaid) {
   fs::remove(data() / "times.txt");
-  const Outcome o = run_vergence("replay '" + data().string() + "' --out '" + session().string() + "'");
+  const Outcome o =
+      run_vergence("replay '" + data().string() + "' --out '" + session().string() + "'");
   ASSERT_EQ(o.code, 0) << o.err;
-  EXPECT_NE(o.err.find("there is no times.txt: pairs are taken to be 0.1 s apart"), std::string::npos) << o.err;
+  EXPECT_NE(o.err.find("there is no times.txt: pairs are taken to be 0.1 s apart"),
+            std::string::npos)
+      << o.err;
 }
 
 TEST_F(ReplayedFolder, focalLengthAndBaselineNeedEachOther) {
-  for (const char* bad : {"--focal 500", "--focal 5 --baseline 0.5", "--distortion 0,0,0,0", "--focal 500 --baseline 0.5 --distortion 1,2",
+  for (const char* bad : {"--focal 500", "--focal 5 --baseline 0.5", "--distortion 0,0,0,0",
+                          "--focal 500 --baseline 0.5 --distortion 1,2",
                           "--focal 500 --baseline 0.5 --calibration c.yaml"}) {
     const Outcome o = replay(bad);
     EXPECT_EQ(o.code, 2) << bad << o.err;
@@ -318,7 +346,8 @@ TEST_F(ReplayedFolder, aCalibrationWhoseRotationIsNoneIsRefused) {
 }
 
 TEST_F(ReplayedFolder, imagesOfAnotherSizeAreRefused) {
-  ASSERT_TRUE(cv::imwrite((data() / image_name(0, 3)).string(), cv::Mat(100, 100, CV_8U, cv::Scalar(90))));
+  ASSERT_TRUE(
+      cv::imwrite((data() / image_name(0, 3)).string(), cv::Mat(100, 100, CV_8U, cv::Scalar(90))));
   expect_refused("003.png");
 }
 
@@ -344,7 +373,9 @@ TEST_F(ReplayedFolder, aSessionThatExistsIsNotTouched) {
 
 TEST_F(ReplayedFolder, blackImagesOnlyEndWithOneAndSayWhy) {
   for (std::size_t i = 0; i < kFrames; ++i)
-    for (int k = 0; k < 2; ++k) ASSERT_TRUE(cv::imwrite((data() / image_name(k, i)).string(), cv::Mat(480, 640, CV_8U, cv::Scalar(2))));
+    for (int k = 0; k < 2; ++k)
+      ASSERT_TRUE(cv::imwrite((data() / image_name(k, i)).string(),
+                              cv::Mat(480, 640, CV_8U, cv::Scalar(2))));
   const Outcome o = replay();
   EXPECT_EQ(o.code, 1) << o.err;
   EXPECT_NE(read_file(session() / "poses.csv").find("image_dark"), std::string::npos);

@@ -18,8 +18,8 @@ namespace {
 const std::string kRig = std::string(VERGENCE_SOURCE_DIR) + "/app/config/mock_st_lucia.yaml";
 constexpr double kSeconds = 8;
 
-// The paper's rig in a quarter of its pixels, with an INS without errors. The calibration is the one given throughout: what is compared is
-// the way of images and stamps through files.
+// The paper's rig in a quarter of its pixels, with an INS without errors. The calibration is the
+// one given throughout: what is compared is the way of images and stamps through files.
 const std::vector<std::string> kSmall{"cameras.0.size=[320, 240]",
                                       "cameras.1.size=[320, 240]",
                                       "cameras.0.intrinsics=[390, 390, 160, 120]",
@@ -45,23 +45,28 @@ TEST(StLucia, aDriveReplayedFromTheDataSetsFilesIsTheDriveItself) {
   app::write_calibration(work / "calibration.yaml", calibration);
 
   const std::string quiet = " --quiet --out '";
-  const Outcome run = run_vergence("run '" + kRig + "' --fast --duration " + std::to_string(kSeconds) + set_arguments() + quiet +
-                                   (work / "run").string() + "'");
+  const Outcome run =
+      run_vergence("run '" + kRig + "' --fast --duration " + std::to_string(kSeconds) +
+                   set_arguments() + quiet + (work / "run").string() + "'");
   ASSERT_EQ(run.code, 0) << run.err;
-  const Outcome replay =
-      run_vergence("replay '" + (work / "data").string() + "' --format st-lucia --calibration '" + (work / "calibration.yaml").string() +
-                   "' --set odometry.features=300 --set odometry.min_corner_score=3 --set calibration.online=off"
-                   " --set 'ins.lever_arm_m=[0.9, 0.375, 0.5]' --quiet --out '" +
-                   (work / "replay").string() + "'");
+  const Outcome replay = run_vergence(
+      "replay '" + (work / "data").string() + "' --format st-lucia --calibration '" +
+      (work / "calibration.yaml").string() +
+      "' --set odometry.features=300 --set odometry.min_corner_score=3 --set calibration.online=off"
+      " --set 'ins.lever_arm_m=[0.9, 0.375, 0.5]' --quiet --out '" +
+      (work / "replay").string() + "'");
   ASSERT_EQ(replay.code, 0) << replay.err;
 
-  EXPECT_EQ(read_file(work / "run" / "trajectory.tum"), read_file(work / "replay" / "trajectory.tum"));
+  EXPECT_EQ(read_file(work / "run" / "trajectory.tum"),
+            read_file(work / "replay" / "trajectory.tum"));
   const auto summary = nlohmann::json::parse(read_file(work / "replay" / "summary.json"));
   EXPECT_EQ(summary["frames"]["posed"], 241);
   EXPECT_EQ(summary["frames"]["skipped"], 0);
 
-  // The reference of both: each in the axes of its first place. The INS's readings are 8 ms apart; a log's digits hold micrometres.
-  const app::Trajectory ours = app::read_tum(work / "replay" / "reference.tum"), live = app::read_tum(work / "run" / "reference.tum");
+  // The reference of both: each in the axes of its first place. The INS's readings are 8 ms apart;
+  // a log's digits hold micrometres.
+  const app::Trajectory ours = app::read_tum(work / "replay" / "reference.tum"),
+                        live = app::read_tum(work / "run" / "reference.tum");
   ASSERT_GT(live.size(), 200U);
   std::size_t compared = 0;
   for (const StampedPose& pose : live)

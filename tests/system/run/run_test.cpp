@@ -45,25 +45,32 @@ TEST(Run, aMockDrivePosesEveryFrameNearTheTruthWithoutAllocating) {
   EXPECT_EQ(summary["devices"]["sets_incomplete"], 0);
   EXPECT_EQ(summary["comparison"]["without_ins"], 0);
   EXPECT_EQ(summary["comparison"]["placements"], 1);
-  // The kilometre's aim is 0.4 % over 100 to 800 m; here only the shortest of those lengths exist, with less to average over.
+  // The kilometre's aim is 0.4 % over 100 to 800 m; here only the shortest of those lengths exist,
+  // with less to average over.
   EXPECT_LT(summary["truth"]["segment_error_percent"].get<double>(), 0.8);
   EXPECT_LT(summary["truth"]["rotation_error_deg_per_m"].get<double>(), 0.004);
   EXPECT_NEAR(summary["truth"]["path_ratio"].get<double>(), 1, 0.01);
-  // The INS wanders by metres: against it the path looks far worse, and the summary does not mix the two up.
+  // The INS wanders by metres: against it the path looks far worse, and the summary does not mix
+  // the two up.
   EXPECT_GT(summary["metrics"]["ate_m"].get<double>(), summary["truth"]["ate_m"].get<double>());
-  for (const double e : summary["truth"]["calibration_error"]) EXPECT_EQ(e, 0) << "the estimator was given the true rig";
-  for (const char* name : {"trajectory.tum", "reference.tum", "truth.tum", "poses.csv", "events.jsonl", "calibration.yaml", "report.html"})
+  for (const double e : summary["truth"]["calibration_error"])
+    EXPECT_EQ(e, 0) << "the estimator was given the true rig";
+  for (const char* name : {"trajectory.tum", "reference.tum", "truth.tum", "poses.csv",
+                           "events.jsonl", "calibration.yaml", "report.html"})
     EXPECT_GT(std::filesystem::file_size(session / name), 0U) << name;
 }
 
 TEST(Run, everyConfigurationThatComesWithTheProgramRunsAsItStands) {
   int files = 0;
-  for (const auto& entry : std::filesystem::directory_iterator(std::string(VERGENCE_SOURCE_DIR) + "/app/config")) {
+  for (const auto& entry :
+       std::filesystem::directory_iterator(std::string(VERGENCE_SOURCE_DIR) + "/app/config")) {
     if (entry.path().extension() != ".yaml") continue;
-    if (text_of(entry.path()).find("driver: mock") == std::string::npos) continue;  // real cameras: tests/system has them on their stacks
+    if (text_of(entry.path()).find("driver: mock") == std::string::npos)
+      continue;  // real cameras: tests/system has them on their stacks
     ++files;
     const TemporaryFolder folder;
-    const Outcome o = run_vergence("run '" + entry.path().string() + "' --fast --duration 2 --out '" + (folder / "s").string() + "'");
+    const Outcome o = run_vergence("run '" + entry.path().string() +
+                                   "' --fast --duration 2 --out '" + (folder / "s").string() + "'");
     EXPECT_EQ(o.code, 0) << entry.path() << ": " << o.err;
   }
   EXPECT_GE(files, 1);
@@ -72,14 +79,18 @@ TEST(Run, everyConfigurationThatComesWithTheProgramRunsAsItStands) {
 TEST(Run, inRealTimeEveryFrameIsPosedOrCounted) {
   const TemporaryFolder folder;
   const auto session = folder / "s";
-  const Outcome o = run_vergence("run '" + kMock + "' --duration 4 --out '" + session.string() + "'" + kSmall);
+  const Outcome o =
+      run_vergence("run '" + kMock + "' --duration 4 --out '" + session.string() + "'" + kSmall);
   ASSERT_EQ(o.code, 0) << o.err;
   const auto summary = summary_of(session);
   const auto& devices = summary["devices"];
   const int read = summary["frames"]["read"], overtaken = devices["sets_overtaken"];
-  EXPECT_EQ(read + overtaken, devices["sets_complete"].get<int>() + devices["sets_incomplete"].get<int>());
+  EXPECT_EQ(read + overtaken,
+            devices["sets_complete"].get<int>() + devices["sets_incomplete"].get<int>());
   // How many a loaded machine drops is its own affair; that none vanishes uncounted is ours.
-  EXPECT_EQ(devices["camera0_delivered"].get<int>() + devices["camera0_lost"].get<int>() + devices["camera0_underruns"].get<int>(), 81);
+  EXPECT_EQ(devices["camera0_delivered"].get<int>() + devices["camera0_lost"].get<int>() +
+                devices["camera0_underruns"].get<int>(),
+            81);
   EXPECT_EQ(summary["allocations_after_seal"], 0);
 }
 
@@ -87,7 +98,8 @@ TEST(Run, theSameDriveGivesTheSameBytesWhateverTheThreads) {
   const TemporaryFolder folder;
   ASSERT_EQ(drive(folder / "a", "--duration 6 --threads 2 --quiet" + kSmall).code, 0);
   ASSERT_EQ(drive(folder / "b", "--duration 6 --threads 1 --quiet" + kSmall).code, 0);
-  for (const char* name : {"trajectory.tum", "reference.tum", "truth.tum", "events.jsonl", "ins.csv"})
+  for (const char* name :
+       {"trajectory.tum", "reference.tum", "truth.tum", "events.jsonl", "ins.csv"})
     EXPECT_EQ(text_of(folder / "a" / name), text_of(folder / "b" / name)) << name;
 }
 
@@ -96,9 +108,11 @@ TEST(Run, withAnIdealInsTheReferenceIsTheTruthToAMillimetre) {
   const auto session = folder / "s";
   const Outcome o = drive(session, "--duration 20 --set mock.ins=ideal --quiet" + kSmall);
   ASSERT_EQ(o.code, 0) << o.err;
-  // The whole chain but the odometry: device clocks, tangent plane, interpolation, lever arm. `enu` of the reference begins at the first
-  // fix; its axes differ from the world's by the way there over the earth's radius.
-  const app::Trajectory reference = app::read_tum(session / "reference.tum"), truth = app::read_tum(session / "truth.tum");
+  // The whole chain but the odometry: device clocks, tangent plane, interpolation, lever arm. `enu`
+  // of the reference begins at the first fix; its axes differ from the world's by the way there
+  // over the earth's radius.
+  const app::Trajectory reference = app::read_tum(session / "reference.tum"),
+                        truth = app::read_tum(session / "truth.tum");
   ASSERT_GT(reference.size(), 390U);
   ASSERT_LE(reference.size(), truth.size());
   double worst_m = 0, worst_rad = 0;
@@ -106,13 +120,16 @@ TEST(Run, withAnIdealInsTheReferenceIsTheTruthToAMillimetre) {
   const Transform& R0 = reference[100].T_world_body;
   for (std::size_t i = 100; i < reference.size(); ++i) {  // the clocks are known after five seconds
     ASSERT_LT(std::abs((reference[i].stamp - truth[i].stamp).to_seconds()), 1e-4);
-    const Transform step = T0.inverse() * truth[i].T_world_body, ours = R0.inverse() * reference[i].T_world_body;
+    const Transform step = T0.inverse() * truth[i].T_world_body,
+                    ours = R0.inverse() * reference[i].T_world_body;
     worst_m = std::max(worst_m, (step.t - ours.t).norm());
     worst_rad = std::max(worst_rad, log_so3(step.R.transpose() * ours.R).norm());
   }
-  // A stamp that is off by the clocks' 20 µs is 0.24 mm at 12 m/s, one of the INS's as much; straight lines between readings add 0.03 mm.
+  // A stamp that is off by the clocks' 20 µs is 0.24 mm at 12 m/s, one of the INS's as much;
+  // straight lines between readings add 0.03 mm.
   EXPECT_LT(worst_m, 1e-3);
-  EXPECT_LT(worst_rad, 0.001 * 3.14159265 / 180 * 2) << "twice a thousandth of a degree: the chosen start errs, too";
+  EXPECT_LT(worst_rad, 0.001 * 3.14159265 / 180 * 2)
+      << "twice a thousandth of a degree: the chosen start errs, too";
 }
 
 TEST(Run, aMaskIsHeldAgainstTheCamerasSizeAndItsSkyIsMissedByNobody) {
@@ -123,14 +140,18 @@ TEST(Run, aMaskIsHeldAgainstTheCamerasSizeAndItsSkyIsMissedByNobody) {
     std::fill(all.end() - width * height, all.end() - width * (height - height / 3), '\0');
     return all;
   };
-  const auto large = folder.write("large.pgm", mask_of(640, 480)), small = folder.write("small.pgm", mask_of(320, 240));
-  const Outcome refused = drive(folder / "a", "--duration 2 --quiet" + kSmall + " --set cameras.1.mask=" + large.string());
+  const auto large = folder.write("large.pgm", mask_of(640, 480)),
+             small = folder.write("small.pgm", mask_of(320, 240));
+  const Outcome refused = drive(
+      folder / "a", "--duration 2 --quiet" + kSmall + " --set cameras.1.mask=" + large.string());
   EXPECT_EQ(refused.code, 2);
-  EXPECT_NE(refused.err.find("cameras.1.mask: " + large.string() + " is 640 × 480 px, the camera's images are 320 × 240"),
+  EXPECT_NE(refused.err.find("cameras.1.mask: " + large.string() +
+                             " is 640 × 480 px, the camera's images are 320 × 240"),
             std::string::npos)
       << refused.err;
   EXPECT_FALSE(std::filesystem::exists(folder / "a")) << "nothing was begun";
-  const std::string masks = " --set cameras.0.mask=" + small.string() + " --set cameras.1.mask=" + small.string();
+  const std::string masks =
+      " --set cameras.0.mask=" + small.string() + " --set cameras.1.mask=" + small.string();
   const Outcome o = drive(folder / "b", "--duration 6 --quiet" + kSmall + masks);
   ASSERT_EQ(o.code, 0) << o.err;
   EXPECT_EQ(summary_of(folder / "b")["frames"]["posed"], 121);
@@ -139,34 +160,46 @@ TEST(Run, aMaskIsHeldAgainstTheCamerasSizeAndItsSkyIsMissedByNobody) {
 
 TEST(Run, atNightControlledExposuresKeepThePosesAndAreTheSameOnEveryRun) {
   const TemporaryFolder folder;
-  const std::string night = "--duration 14 --quiet --set exposure.mode=auto --fault 'night@5 factor=0.05 duration_s=6'" + kSmall;
+  const std::string night =
+      "--duration 14 --quiet --set exposure.mode=auto --fault 'night@5 factor=0.05 duration_s=6'" +
+      kSmall;
   ASSERT_EQ(drive(folder / "a", night + " --threads 2").code, 0);
   ASSERT_EQ(drive(folder / "b", night + " --threads 1").code, 0);
   EXPECT_EQ(text_of(folder / "a" / "trajectory.tum"), text_of(folder / "b" / "trajectory.tum"));
   const auto summary = summary_of(folder / "a");
   const auto& devices = summary["devices"];
-  // A twentieth of the light is 4.3 stops: at a stop a change, six images apart, some of the first twenty have too little of it.
+  // A twentieth of the light is 4.3 stops: at a stop a change, six images apart, some of the first
+  // twenty have too little of it.
   EXPECT_GE(summary["frames"]["posed"].get<int>(), 281 - 20);
   EXPECT_GT(devices["exposure_changes"].get<int>(), 4);
-  EXPECT_EQ(devices["exposure_refused"].get<int>() + devices["exposure_unequal"].get<int>() + devices["exposure_again"].get<int>(), 0);
+  EXPECT_EQ(devices["exposure_refused"].get<int>() + devices["exposure_unequal"].get<int>() +
+                devices["exposure_again"].get<int>(),
+            0);
   EXPECT_LE(devices["exposure_last_us"].get<int>(), 8000);
   EXPECT_EQ(devices["gain_last_millidb"], 0) << "by day no gain is left";
   EXPECT_EQ(summary["allocations_after_seal"], 0);
   // Clocks are mapped by the ends of exposures: their changes do not shift the stamps.
   EXPECT_NEAR(summary["truth"]["path_ratio"].get<double>(), 1, 0.02);
-  const Outcome o = drive(folder / "c", "--duration 2 --quiet --set exposure.mode=auto --set exposure.max_us=60000");
+  const Outcome o = drive(
+      folder / "c", "--duration 2 --quiet --set exposure.mode=auto --set exposure.max_us=60000");
   EXPECT_EQ(o.code, 2);
-  EXPECT_NE(o.err.find("exposure.max_us is 60000, longer than the 50000 µs between two pulses (trigger.rate 20)"), std::string::npos)
+  EXPECT_NE(o.err.find("exposure.max_us is 60000, longer than the 50000 µs between two pulses "
+                       "(trigger.rate 20)"),
+            std::string::npos)
       << o.err;
 }
 
 TEST(Run, aDiskThatIsFullForAWhileIsAnEventAndTheDriveIsWhole) {
   const TemporaryFolder folder;
-  const Outcome o = drive(folder / "s", "--duration 6 --quiet --fault 'disk_full@2 duration_s=2'" + kSmall);
+  const Outcome o =
+      drive(folder / "s", "--duration 6 --quiet --fault 'disk_full@2 duration_s=2'" + kSmall);
   EXPECT_EQ(o.code, 0) << o.err;
-  EXPECT_NE(o.err.find("the disk has no room, as the drive's faults want it; the session goes on"), std::string::npos) << o.err;
+  EXPECT_NE(o.err.find("the disk has no room, as the drive's faults want it; the session goes on"),
+            std::string::npos)
+      << o.err;
   EXPECT_EQ(events(folder / "s", "disk_full").size(), 1U);
-  EXPECT_EQ(events(folder / "s", "disk_room"), std::vector<std::string>{"the disk takes lines again; 0 were lost"});
+  EXPECT_EQ(events(folder / "s", "disk_room"),
+            std::vector<std::string>{"the disk takes lines again; 0 were lost"});
   EXPECT_EQ(app::read_tum(folder / "s" / "trajectory.tum").size(), 121U);
   EXPECT_EQ(summary_of(folder / "s")["drops"]["lines"], 0);
 }
@@ -174,10 +207,10 @@ TEST(Run, aDiskThatIsFullForAWhileIsAnEventAndTheDriveIsWhole) {
 TEST(Run, faultsActAndTheDriveGoesOn) {
   const TemporaryFolder folder;
   const auto session = folder / "s";
-  const Outcome o =
-      drive(session, "--duration 12" + kSmall +
-                         " --fault 'camera_gone@6 camera=1 duration_s=1' --fault 'lose_frames@8 camera=0 share=0.2 duration_s=2'"
-                         " --fault 'time_jump@11 camera=0 jump_s=5'");
+  const Outcome o = drive(session, "--duration 12" + kSmall +
+                                       " --fault 'camera_gone@6 camera=1 duration_s=1' --fault "
+                                       "'lose_frames@8 camera=0 share=0.2 duration_s=2'"
+                                       " --fault 'time_jump@11 camera=0 jump_s=5'");
   ASSERT_EQ(o.code, 0) << o.err;
   const auto summary = summary_of(session);
   EXPECT_EQ(events(session, "camera_gone").size(), 1U);
@@ -193,7 +226,8 @@ TEST(Run, faultsActAndTheDriveGoesOn) {
 
 TEST(Run, aCameraThatNeverComesBackIsADeviceThatFailed) {
   const TemporaryFolder folder;
-  const Outcome o = drive(folder / "s", "--duration 4 --fault 'camera_gone@2 camera=1 duration_s=0'" + kSmall);
+  const Outcome o =
+      drive(folder / "s", "--duration 4 --fault 'camera_gone@2 camera=1 duration_s=0'" + kSmall);
   EXPECT_EQ(o.code, 3) << o.err;
   EXPECT_NE(o.err.find("camera 1 was gone at the end"), std::string::npos) << o.err;
   EXPECT_EQ(summary_of(folder / "s")["frames"]["read"], 81) << "the drive went on with the other";
@@ -201,10 +235,14 @@ TEST(Run, aCameraThatNeverComesBackIsADeviceThatFailed) {
 
 TEST(Run, aKnockIsInTheTruthAndWithoutOnlineCalibrationNowhereElse) {
   const TemporaryFolder folder;
-  const Outcome o = drive(folder / "s", "--duration 4 --set calibration.online=off --fault 'knock@2 camera=1 pitch_deg=0.2'" + kSmall);
+  const Outcome o =
+      drive(folder / "s",
+            "--duration 4 --set calibration.online=off --fault 'knock@2 camera=1 pitch_deg=0.2'" +
+                kSmall);
   ASSERT_EQ(o.code, 0) << o.err;
   const auto summary = summary_of(folder / "s");
-  EXPECT_NEAR(summary["truth"]["calibration_error"][0].get<double>(), -0.2 * 3.14159265 / 180, 1e-6);
+  EXPECT_NEAR(summary["truth"]["calibration_error"][0].get<double>(), -0.2 * 3.14159265 / 180,
+              1e-6);
   EXPECT_EQ(summary["calibration"]["T_right_left"][0], 1.0);
 }
 
@@ -218,7 +256,8 @@ class RunWithABadIns : public ::testing::TestWithParam<InsCase> {};
 TEST_P(RunWithABadIns, saysSoAndDrivesOn) {
   const TemporaryFolder folder;
   const auto session = folder / "s";
-  const Outcome o = drive(session, std::string("--duration 9 --fault '") + GetParam().fault + "'" + kSmall);
+  const Outcome o =
+      drive(session, std::string("--duration 9 --fault '") + GetParam().fault + "'" + kSmall);
   EXPECT_EQ(o.code, GetParam().code) << o.err;
   EXPECT_GE(events(session, GetParam().event).size(), 1U) << text_of(session / "events.jsonl");
   EXPECT_NE(o.err.find("INS"), std::string::npos) << o.err;
@@ -227,13 +266,14 @@ TEST_P(RunWithABadIns, saysSoAndDrivesOn) {
   EXPECT_EQ(summary["allocations_after_seal"], 0);
 }
 
-INSTANTIATE_TEST_SUITE_P(Ways, RunWithABadIns,
-                         ::testing::Values(InsCase{"ins_gone@0 duration_s=4", "ins_silent", 0},   // starts late
-                                           InsCase{"ins_gone@5 duration_s=0", "ins_silent", 0},   // stops
-                                           InsCase{"ins_gone@0 duration_s=0", "ins_silent", 1},   // never speaks
-                                           InsCase{"position_jump@5 east_m=100", "ins_jump", 0},  //
-                                           InsCase{"no_fix@4 duration_s=2", "ins_no_fix", 0},     //
-                                           InsCase{"no_fix@0 duration_s=0", "ins_no_fix", 1}));
+INSTANTIATE_TEST_SUITE_P(
+    Ways, RunWithABadIns,
+    ::testing::Values(InsCase{"ins_gone@0 duration_s=4", "ins_silent", 0},   // starts late
+                      InsCase{"ins_gone@5 duration_s=0", "ins_silent", 0},   // stops
+                      InsCase{"ins_gone@0 duration_s=0", "ins_silent", 1},   // never speaks
+                      InsCase{"position_jump@5 east_m=100", "ins_jump", 0},  //
+                      InsCase{"no_fix@4 duration_s=2", "ins_no_fix", 0},     //
+                      InsCase{"no_fix@0 duration_s=0", "ins_no_fix", 1}));
 
 struct BadCase {
   const char* arguments;
@@ -251,16 +291,20 @@ TEST_P(RunRefuses, whatIsImpossibleWithASentenceAndExitsTwo) {
 
 INSTANTIATE_TEST_SUITE_P(
     Ways, RunRefuses,
-    ::testing::Values(BadCase{"--set trigger.rate=0", "trigger.rate is 0"}, BadCase{"--set ins.rate=0", "ins.rate is 0"},
-                      BadCase{"--set cameras.1.size=[800,600]", "all cameras of a rig have one size"},
-                      BadCase{"--set cameras.0.exposure_us=60000", "longer than the 50000 µs between two pulses"},
-                      BadCase{"--set cameras.0.driver=gige", "--fast is virtual time"},
-                      BadCase{"--set cameras.1.driver=", "one camera alone has no scale"},
-                      BadCase{"--set sync.mode=bord", "did you mean \"board\"?"}, BadCase{"--set mock.drive=lop", "did you mean \"loop\"?"},
-                      BadCase{"--set rig.nominal.focal_px=3", "rig.nominal"}, BadCase{"--fault knok@3", "there is no fault \"knok\""},
-                      BadCase{"--fault 'cover@1 camera=3'", "there is no camera 3"},
-                      BadCase{"--set 'faults.0=drift@x'", "faults.0: the time of drift is \"x\""},
-                      BadCase{"--duration=-1", "--duration needs seconds"}));
+    ::testing::Values(
+        BadCase{"--set trigger.rate=0", "trigger.rate is 0"},
+        BadCase{"--set ins.rate=0", "ins.rate is 0"},
+        BadCase{"--set cameras.1.size=[800,600]", "all cameras of a rig have one size"},
+        BadCase{"--set cameras.0.exposure_us=60000", "longer than the 50000 µs between two pulses"},
+        BadCase{"--set cameras.0.driver=gige", "--fast is virtual time"},
+        BadCase{"--set cameras.1.driver=", "one camera alone has no scale"},
+        BadCase{"--set sync.mode=bord", "did you mean \"board\"?"},
+        BadCase{"--set mock.drive=lop", "did you mean \"loop\"?"},
+        BadCase{"--set rig.nominal.focal_px=3", "rig.nominal"},
+        BadCase{"--fault knok@3", "there is no fault \"knok\""},
+        BadCase{"--fault 'cover@1 camera=3'", "there is no camera 3"},
+        BadCase{"--set 'faults.0=drift@x'", "faults.0: the time of drift is \"x\""},
+        BadCase{"--duration=-1", "--duration needs seconds"}));
 
 }  // namespace
 }  // namespace vergence

@@ -10,7 +10,8 @@
 namespace vergence::test {
 
 /// A quarter of the pixels: the mock's rig and drive in a quarter of the time.
-inline const std::string kSmall = " --set cameras.0.size=[320,240] --set cameras.1.size=[320,240] --set mock.texture_detail=0";
+inline const std::string kSmall =
+    " --set cameras.0.size=[320,240] --set cameras.1.size=[320,240] --set mock.texture_detail=0";
 
 [[nodiscard]] inline std::string text_of(const std::filesystem::path& file) {
   std::ifstream in(file, std::ios::binary);
@@ -24,7 +25,8 @@ inline const std::string kSmall = " --set cameras.0.size=[320,240] --set cameras
 }
 
 /// Sentences of a session's events of one kind.
-[[nodiscard]] inline std::vector<std::string> events(const std::filesystem::path& session, const std::string& kind) {
+[[nodiscard]] inline std::vector<std::string> events(const std::filesystem::path& session,
+                                                     const std::string& kind) {
   std::istringstream in(text_of(session / "events.jsonl"));
   std::vector<std::string> found;
   for (std::string line; std::getline(in, line);) {

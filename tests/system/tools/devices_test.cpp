@@ -16,7 +16,9 @@ using nlohmann::json;
 using test::Outcome;
 using test::run_vergence;
 
-bool contains(const std::string& text, const std::string& part) { return text.find(part) != std::string::npos; }
+bool contains(const std::string& text, const std::string& part) {
+  return text.find(part) != std::string::npos;
+}
 
 TEST(Devices, aCameraOnTheNetworkIsListedWithWhatToPaste) {
   test::GigeCameraOptions o;
@@ -30,11 +32,13 @@ TEST(Devices, aCameraOnTheNetworkIsListedWithWhatToPaste) {
   const Outcome for_programs = run_vergence("devices --json");
   EXPECT_EQ(for_programs.code, 0);
   const json all = json::parse(for_programs.out);
-  const auto found = std::find_if(all["cameras"].begin(), all["cameras"].end(), [](const json& c) { return c["serial"] == "TOOL-60"; });
+  const auto found = std::find_if(all["cameras"].begin(), all["cameras"].end(),
+                                  [](const json& c) { return c["serial"] == "TOOL-60"; });
   ASSERT_NE(found, all["cameras"].end()) << for_programs.out;
   EXPECT_EQ((*found)["place"], o.address);
   EXPECT_EQ((*found)["driver"], "gige");
-  for (const char* key : {"driver", "serial", "model", "place", "also", "configuration"}) EXPECT_TRUE(found->contains(key)) << key;
+  for (const char* key : {"driver", "serial", "model", "place", "also", "configuration"})
+    EXPECT_TRUE(found->contains(key)) << key;
   ASSERT_EQ(all["drivers"].size(), 4U);
   for (const json& d : all["drivers"]) EXPECT_EQ(d["answered"], true) << d;
   EXPECT_TRUE(all["serial_ports"].is_array());

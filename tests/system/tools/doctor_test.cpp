@@ -16,7 +16,9 @@ using test::run_vergence;
 
 const std::string kConfigurations = std::string(VERGENCE_SOURCE_DIR) + "/app/config/";
 
-bool contains(const std::string& text, const std::string& part) { return text.find(part) != std::string::npos; }
+bool contains(const std::string& text, const std::string& part) {
+  return text.find(part) != std::string::npos;
+}
 
 /// The findings of one check.
 json of(const json& all, const std::string& check) {
@@ -30,13 +32,16 @@ TEST(Doctor, aDriveOfTheMockNeedsNoDevice) {
   const Outcome o = run_vergence("doctor '" + kConfigurations + "mock.yaml' --json");
   const json all = json::parse(o.out);
   EXPECT_EQ(o.code, all["problems"] == 0 ? 0 : 1);
-  for (const char* check : {"cameras", "receive_buffer", "usb_memory", "firewire", "ins"}) EXPECT_TRUE(of(all, check).empty()) << check;
-  EXPECT_EQ(all["problems"].get<int>() + all["advice"].get<int>() + all["ok"].get<int>(), static_cast<int>(all["findings"].size()));
+  for (const char* check : {"cameras", "receive_buffer", "usb_memory", "firewire", "ins"})
+    EXPECT_TRUE(of(all, check).empty()) << check;
+  EXPECT_EQ(all["problems"].get<int>() + all["advice"].get<int>() + all["ok"].get<int>(),
+            static_cast<int>(all["findings"].size()));
 }
 
 TEST(Doctor, missingCamerasAreAProblemAndTheExitCodeSaysSo) {
   const Outcome o =
-      run_vergence("doctor '" + kConfigurations + "gige.yaml' --set cameras.0.serial=NOT-HERE --set cameras.1.serial=NOR-HERE");
+      run_vergence("doctor '" + kConfigurations +
+                   "gige.yaml' --set cameras.0.serial=NOT-HERE --set cameras.1.serial=NOR-HERE");
   EXPECT_EQ(o.code, 1) << o.out << o.err;
   EXPECT_EQ(o.err, "");
   EXPECT_TRUE(contains(o.out, "NOT-HERE"));
@@ -49,19 +54,22 @@ TEST(Doctor, aCameraThatIsThereIsMatchedAndItsLinkJudged) {
   options.address = test::GigeCamera::address(61);
   options.serial = "TOOL-61";
   const test::GigeCamera camera(options);
-  const Outcome o =
-      run_vergence("doctor '" + kConfigurations + "gige.yaml' --json --set cameras.0.serial=TOOL-61 --set cameras.1.serial=NOR-HERE");
+  const Outcome o = run_vergence(
+      "doctor '" + kConfigurations +
+      "gige.yaml' --json --set cameras.0.serial=TOOL-61 --set cameras.1.serial=NOR-HERE");
   const json all = json::parse(o.out);
   EXPECT_EQ(of(all, "cameras").size(), 2U) << all.dump(1);
   EXPECT_TRUE(contains(of(all, "cameras").dump(), "cameras.0 (left) is gige TOOL-61"));
   EXPECT_TRUE(contains(of(all, "mtu").dump(), "lo carries packets of 9000 bytes"));
-  EXPECT_TRUE(contains(of(all, "camera_network").dump(), options.address + " through lo 127.0.0.1/8"));
+  EXPECT_TRUE(
+      contains(of(all, "camera_network").dump(), options.address + " through lo 127.0.0.1/8"));
 }
 
 TEST(Doctor, whatCannotBeReadIsRefusedInASentence) {
   EXPECT_EQ(run_vergence("doctor /no/such/file.yaml").code, 2);
   EXPECT_EQ(run_vergence("doctor --set threads=1").code, 2);
-  EXPECT_EQ(run_vergence("doctor '" + kConfigurations + "gige.yaml' --set cameras.0.options.x=").code, 2);
+  EXPECT_EQ(
+      run_vergence("doctor '" + kConfigurations + "gige.yaml' --set cameras.0.options.x=").code, 2);
 }
 
 }  // namespace

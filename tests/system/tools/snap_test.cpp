@@ -28,12 +28,18 @@ using test::TemporaryFolder;
 const std::string kConfigurations = std::string(VERGENCE_SOURCE_DIR) + "/app/config/";
 constexpr int kWidth = 320, kHeight = 240;
 
-bool contains(const std::string& text, const std::string& part) { return text.find(part) != std::string::npos; }
-
-Outcome snap(const TemporaryFolder& folder, const std::string& configuration, const std::string& more) {
-  return run_vergence("snap '" + kConfigurations + configuration + "' --out '" + (folder / "s").string() + "' " + more);
+bool contains(const std::string& text, const std::string& part) {
+  return text.find(part) != std::string::npos;
 }
-json report(const TemporaryFolder& folder) { return json::parse(test::read_file(folder / "s/snap.json")); }
+
+Outcome snap(const TemporaryFolder& folder, const std::string& configuration,
+             const std::string& more) {
+  return run_vergence("snap '" + kConfigurations + configuration + "' --out '" +
+                      (folder / "s").string() + "' " + more);
+}
+json report(const TemporaryFolder& folder) {
+  return json::parse(test::read_file(folder / "s/snap.json"));
+}
 
 app::ImageSize size_of(const std::filesystem::path& file) {
   app::ImageSize size;
@@ -46,7 +52,8 @@ TEST(SnapMock, aPictureOfEachCameraAndTheirFigures) {
   const Outcome o = snap(folder, "mock.yaml", "");
   ASSERT_EQ(o.code, 0) << o.err;
   EXPECT_EQ(o.err, "");
-  for (const char* name : {"left", "right"}) EXPECT_EQ(size_of(folder / (std::string("s/") + name + ".png")), (app::ImageSize{640, 480}));
+  for (const char* name : {"left", "right"})
+    EXPECT_EQ(size_of(folder / (std::string("s/") + name + ".png")), (app::ImageSize{640, 480}));
   const json set = report(folder)["sets"].at(0);
   EXPECT_EQ(set["proof"], "counted");
   EXPECT_LT(set["spread_ms"].get<double>(), 5);
@@ -61,15 +68,20 @@ TEST(SnapMock, aPictureOfEachCameraAndTheirFigures) {
 
 TEST(SnapMock, severalSetsAreNumbered) {
   const TemporaryFolder folder;
-  const Outcome o = snap(folder, "mock.yaml", "--count 3 --set cameras.0.name=port --set cameras.1.name=starboard");
+  const Outcome o = snap(folder, "mock.yaml",
+                         "--count 3 --set cameras.0.name=port --set cameras.1.name=starboard");
   ASSERT_EQ(o.code, 0) << o.err;
-  for (const char* name : {"port_0000.png", "port_0002.png", "starboard_0001.png"}) (void)size_of(folder / (std::string("s/") + name));
+  for (const char* name : {"port_0000.png", "port_0002.png", "starboard_0001.png"})
+    (void)size_of(folder / (std::string("s/") + name));
   const json all = report(folder);
   ASSERT_EQ(all["sets"].size(), 3U);
   // A period apart, as well as each stamp says that it is known.
-  const double apart_ms =
-      static_cast<double>(all["sets"][1]["stamp_ns"].get<std::int64_t>() - all["sets"][0]["stamp_ns"].get<std::int64_t>()) * 1e-6;
-  EXPECT_NEAR(apart_ms, 50, all["sets"][0]["stamp_error_ms"].get<double>() + all["sets"][1]["stamp_error_ms"].get<double>());
+  const double apart_ms = static_cast<double>(all["sets"][1]["stamp_ns"].get<std::int64_t>() -
+                                              all["sets"][0]["stamp_ns"].get<std::int64_t>()) *
+                          1e-6;
+  EXPECT_NEAR(apart_ms, 50,
+              all["sets"][0]["stamp_error_ms"].get<double>() +
+                  all["sets"][1]["stamp_error_ms"].get<double>());
 }
 
 TEST(SnapMock, exchangedCablesAreNoticed) {
@@ -92,14 +104,16 @@ TEST(SnapMock, nothingIsOverwrittenAndNonsenseIsRefused) {
   (void)folder.write("s/precious", "x");
   EXPECT_EQ(snap(folder, "mock.yaml", "").code, 2);
   const TemporaryFolder other;
-  for (const char* more : {"--count 0", "--count 10000", "--wait 0", "--wait -1", "--set cameras.5.driver=mock", "--set no.such.key=1"}) {
+  for (const char* more : {"--count 0", "--count 10000", "--wait 0", "--wait -1",
+                           "--set cameras.5.driver=mock", "--set no.such.key=1"}) {
     const Outcome o = snap(other, "mock.yaml", more);
     EXPECT_EQ(o.code, 2) << more;
     EXPECT_FALSE(std::filesystem::exists(other / "s/snap.json")) << more;
   }
 }
 
-/// The two cameras of app/config/gige.yaml, simulated; the second sees the same scene from further right, as it should.
+/// The two cameras of app/config/gige.yaml, simulated; the second sees the same scene from further
+/// right, as it should.
 struct Wires {
   explicit Wires(bool same_picture = false) {
     for (int k = 0; k < 2; ++k) {
@@ -129,7 +143,8 @@ struct Wires {
     std::string s = "--set trigger.rate=10";
     for (int k = 0; k < 2; ++k) {
       const std::string at = " --set cameras." + std::to_string(k);
-      s += at + ".serial=" + cameras[static_cast<std::size_t>(k)]->options().address + at + ".size=[320,240]";
+      s += at + ".serial=" + cameras[static_cast<std::size_t>(k)]->options().address + at +
+           ".size=[320,240]";
     }
     return s;
   }
@@ -157,8 +172,10 @@ TEST(SnapGige, pulsesGivePairsAndThePicturesAreThoseThatWereSent) {
   EXPECT_EQ(all["sets"][0]["images"][1]["serial"], "SNAP-1");
   for (std::size_t k = 0; k < 2; ++k) {
     std::vector<std::uint8_t> bytes, pixels(std::size_t{kWidth} * kHeight);
-    ASSERT_EQ(app::read_image_file(folder / (k == 0 ? "s/left.png" : "s/right.png"), &bytes), app::ImageFileStatus::ok);
-    ASSERT_EQ(app::decode_grey(bytes, {kWidth, kHeight}, pixels.data(), kWidth), app::ImageFileStatus::ok);
+    ASSERT_EQ(app::read_image_file(folder / (k == 0 ? "s/left.png" : "s/right.png"), &bytes),
+              app::ImageFileStatus::ok);
+    ASSERT_EQ(app::decode_grey(bytes, {kWidth, kHeight}, pixels.data(), kWidth),
+              app::ImageFileStatus::ok);
     EXPECT_EQ(pixels, wires.pictures[k]);
   }
 }
@@ -177,7 +194,9 @@ TEST(SnapGige, withoutPulsesItAsksByCommandAndSaysSo) {
 TEST(SnapGige, oneCameraTwiceIsNoticed) {
   const Wires wires(true);
   const TemporaryFolder folder;
-  const Outcome o = snap(folder, "gige.yaml", wires.settings() + " --set cameras.0.trigger=software --set cameras.1.trigger=software");
+  const Outcome o =
+      snap(folder, "gige.yaml",
+           wires.settings() + " --set cameras.0.trigger=software --set cameras.1.trigger=software");
   EXPECT_EQ(o.code, 1) << o.err;
   EXPECT_TRUE(contains(o.err, "left and right are the same picture")) << o.err;
 }
@@ -188,17 +207,21 @@ TEST(SnapGige, aCameraThatSendsNothingEndsWithThreeAndItsName) {
   const TemporaryFolder folder;
   const auto begin = std::chrono::steady_clock::now();
   const Outcome o =
-      snap(folder, "gige.yaml", wires.settings() + " --wait 2 --set cameras.0.trigger=software --set cameras.1.trigger=software");
+      snap(folder, "gige.yaml",
+           wires.settings() +
+               " --wait 2 --set cameras.0.trigger=software --set cameras.1.trigger=software");
   EXPECT_EQ(o.code, 3) << o.err;
   EXPECT_TRUE(contains(o.err, "right (gige SNAP-1) sent no image within 2 s")) << o.err;
   EXPECT_FALSE(std::filesystem::exists(folder / "s/left.png"));
-  EXPECT_LT(std::chrono::steady_clock::now() - begin, std::chrono::seconds(20)) << "the wait is bounded";
+  EXPECT_LT(std::chrono::steady_clock::now() - begin, std::chrono::seconds(20))
+      << "the wait is bounded";
 }
 
 TEST(SnapGige, aCameraThatIsNotThereEndsWithTwoAndItsKey) {
   const Wires wires;
   const TemporaryFolder folder;
-  const Outcome o = snap(folder, "gige.yaml", wires.settings() + " --set cameras.1.serial=127.77.77.77");
+  const Outcome o =
+      snap(folder, "gige.yaml", wires.settings() + " --set cameras.1.serial=127.77.77.77");
   EXPECT_EQ(o.code, 2);
   EXPECT_TRUE(contains(o.err, "cameras.1")) << o.err;
 }

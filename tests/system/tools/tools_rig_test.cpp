@@ -1,5 +1,5 @@
-// `vergence devices`, `doctor` and `snap` on the kernel's real stacks: two cameras of each kind and an INS on an FTDI converter
-// (docs/rigs.md).
+// `vergence devices`, `doctor` and `snap` on the kernel's real stacks: two cameras of each kind and
+// an INS on an FTDI converter (docs/rigs.md).
 #include <fcntl.h>
 #include <gtest/gtest.h>
 
@@ -29,7 +29,9 @@ using nlohmann::json;
 constexpr const char* kWire = "/run/vergence-wire";
 const std::string kConfigurations = std::string(VERGENCE_SOURCE_FOLDER) + "/app/config/";
 
-bool contains(const std::string& text, const std::string& part) { return text.find(part) != std::string::npos; }
+bool contains(const std::string& text, const std::string& part) {
+  return text.find(part) != std::string::npos;
+}
 
 json devices(const std::string& more = "") {
   const Outcome o = run_vergence("devices --json " + more);
@@ -56,7 +58,8 @@ json finding(const std::string& arguments, const std::string& check) {
 /// Types what the doctor printed; root needs no sudo.
 void mend(const json& f) {
   std::string command = f["mend"].at(0);
-  for (auto at = command.find("sudo "); at != std::string::npos; at = command.find("sudo ")) command.erase(at, 5);
+  for (auto at = command.find("sudo "); at != std::string::npos; at = command.find("sudo "))
+    command.erase(at, 5);
   EXPECT_EQ(std::system((command + " >/dev/null").c_str()), 0) << command;
 }
 
@@ -67,7 +70,8 @@ class ToolsRig : public ::testing::Test {
     EXPECT_TRUE(within(10, [] { return !fs::exists("/dev/ttyUSB0"); }));
     converter_ = std::make_unique<Emulator>("sim_ftdi", std::vector<std::string>{"--wire", kWire});
     EXPECT_TRUE(within(10, [] { return fs::exists("/dev/ttyUSB0"); }));
-    sensor_ = std::make_unique<DeviceOnDescriptor>(::open(kWire, O_RDWR | O_NOCTTY | O_NONBLOCK), resting_xsens());
+    sensor_ = std::make_unique<DeviceOnDescriptor>(::open(kWire, O_RDWR | O_NOCTTY | O_NONBLOCK),
+                                                   resting_xsens());
     (void)std::system("udevadm settle --timeout=10");
   }
   std::unique_ptr<Emulator> converter_;
@@ -119,17 +123,21 @@ TEST_F(ToolsRig, theRulesThatAreWrittenWork) {
   ASSERT_EQ(run_vergence("devices --write-udev /run/udev/rules.d/98-vergence-rig.rules").code, 0);
   const std::string rules = read_file("/run/udev/rules.d/98-vergence-rig.rules");
   std::ofstream("/sys/bus/usb-serial/devices/ttyUSB0/latency_timer") << 1 << std::flush;
-  ASSERT_EQ(std::system("udevadm control --reload && udevadm trigger --action=add && udevadm settle --timeout=20"), 0);
+  ASSERT_EQ(std::system("udevadm control --reload && udevadm trigger --action=add && udevadm "
+                        "settle --timeout=20"),
+            0);
   std::size_t names = 0;
   for (const auto& entry : fs::directory_iterator("/dev/vergence")) {
     (void)entry;
     ++names;
   }
   EXPECT_GE(names, 2U) << rules;
-  EXPECT_EQ(read_file("/sys/bus/usb-serial/devices/ttyUSB0/latency_timer").substr(0, 2), "16") << rules;
+  EXPECT_EQ(read_file("/sys/bus/usb-serial/devices/ttyUSB0/latency_timer").substr(0, 2), "16")
+      << rules;
   std::size_t awake = 0;
   for (const auto& device : fs::directory_iterator("/sys/bus/usb/devices"))
-    if (fs::exists(device.path() / "idVendor") && read_file(device.path() / "idVendor").starts_with("1e10"))
+    if (fs::exists(device.path() / "idVendor") &&
+        read_file(device.path() / "idVendor").starts_with("1e10"))
       awake += read_file(device.path() / "power/control").starts_with("on") ? 1 : 0;
   EXPECT_EQ(awake, 1U) << rules;
 }
@@ -142,7 +150,9 @@ TEST_F(ToolsRig, whatTheDoctorPrintsMends) {
   mend(slow);
   EXPECT_EQ(finding("", "latency_timer")["state"], "ok");
 
-  const std::string large = "'" + kConfigurations + "iidc_usb.yaml' --set cameras.0.size=[4096,4096] --set cameras.1.size=[4096,4096]";
+  const std::string large =
+      "'" + kConfigurations +
+      "iidc_usb.yaml' --set cameras.0.size=[4096,4096] --set cameras.1.size=[4096,4096]";
   const json little = finding(large, "usb_memory");
   ASSERT_EQ(little["state"], "problem") << little;
   mend(little);
@@ -150,17 +160,19 @@ TEST_F(ToolsRig, whatTheDoctorPrintsMends) {
 }
 
 TEST_F(ToolsRig, aPictureOfEachCameraOfEveryKind) {
-  // An emulated camera is plugged in when its emulator starts; it is there when the bus has found it.
+  // An emulated camera is plugged in when its emulator starts; it is there when the bus has found
+  // it.
   const auto until_there = [](const char* driver, std::size_t count) {
     return within(20, [&] { return cameras_of(devices(), driver) == count; });
   };
   const auto snapped = [](const std::string& configuration, const std::string& more) {
     const TemporaryFolder folder;
-    const Outcome o =
-        run_vergence("snap '" + kConfigurations + configuration + "' --wait 10 --out '" + (folder / "s").string() + "' " + more);
+    const Outcome o = run_vergence("snap '" + kConfigurations + configuration +
+                                   "' --wait 10 --out '" + (folder / "s").string() + "' " + more);
     // What emulators and test patterns show may be the same twice, or exchanged: that is told by 1.
     EXPECT_TRUE(o.code == 0 || o.code == 1) << configuration << ": " << o.code << o.err;
-    for (const char* name : {"s/left.png", "s/right.png", "s/snap.json"}) EXPECT_TRUE(fs::exists(folder / name)) << configuration << o.err;
+    for (const char* name : {"s/left.png", "s/right.png", "s/snap.json"})
+      EXPECT_TRUE(fs::exists(folder / name)) << configuration << o.err;
   };
   {
     Emulator usb("sim_usb_iidc", {"--cameras", "2", "--trigger-hz", "10"});

@@ -1,4 +1,5 @@
-// Own images through the V4L2 stack: numbered ones go into the outputs of looped test cameras, and every number has to come back.
+// Own images through the V4L2 stack: numbered ones go into the outputs of looped test cameras, and
+// every number has to come back.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -41,7 +42,8 @@ std::int64_t number_in(const ImageView& view, std::size_t output) {
 class V4l2Loop : public ::testing::Test {
  protected:
   void SetUp() override {
-    if (!std::filesystem::exists("/dev/video3")) GTEST_SKIP() << "no looped video nodes: this test runs inside the rig's kernel";
+    if (!std::filesystem::exists("/dev/video3"))
+      GTEST_SKIP() << "no looped video nodes: this test runs inside the rig's kernel";
     for (int k = 0; k < 2; ++k) test::loop(node(2 * k), node(2 * k + 1));
   }
   static std::string node(int number) { return "/dev/video" + std::to_string(number); }
@@ -64,7 +66,8 @@ class V4l2Loop : public ::testing::Test {
 
 TEST_F(V4l2Loop, everyImageShownArrivesWholeInOrderAndInItsOwnCamera) {
   VividPlayer player({node(1), node(3)}, kInterval_ns, draw_number);
-  std::unique_ptr<CameraDevice> cameras[2] = {streaming(0, configuration(59.94)), streaming(1, configuration(59.94))};
+  std::unique_ptr<CameraDevice> cameras[2] = {streaming(0, configuration(59.94)),
+                                              streaming(1, configuration(59.94))};
   std::int64_t newest[2] = {-1, -1};
   std::uint64_t frames[2] = {}, noise[2] = {}, skipped[2] = {};
   while (newest[0] < 40 && newest[1] < 40) {
@@ -79,14 +82,16 @@ TEST_F(V4l2Loop, everyImageShownArrivesWholeInOrderAndInItsOwnCamera) {
         continue;
       }
       EXPECT_GE(number, newest[k]) << "camera " << k << ": an image from before";
-      if (newest[k] >= 0 && number > newest[k] + 1) skipped[k] += static_cast<std::uint64_t>(number - newest[k] - 1);
+      if (newest[k] >= 0 && number > newest[k] + 1)
+        skipped[k] += static_cast<std::uint64_t>(number - newest[k] - 1);
       newest[k] = number;
     }
     ASSERT_LT(frames[0], 2000U);
   }
   for (std::size_t k = 0; k < 2; ++k) {
     EXPECT_EQ(cameras[k]->statistics().torn, 0U);
-    // Where the player came too late the test camera makes noise of its own; an image is missing only with the frames it was shown in.
+    // Where the player came too late the test camera makes noise of its own; an image is missing
+    // only with the frames it was shown in.
     const CameraStatistics s = cameras[k]->statistics();
     EXPECT_LE(skipped[k] * 4, s.lost + s.underruns + noise[k]) << "camera " << k;
     EXPECT_LT(noise[k], frames[k] / 4);
@@ -104,14 +109,17 @@ TEST_F(V4l2Loop, thinnedCamerasSeeTheSameImagesAndEveryOne) {
     for (std::size_t k = 0; k < 2; ++k) {
       Frame frame;
       ASSERT_EQ(cameras[k]->wait(Duration::seconds(3), &frame), DeviceStatus::ok);
-      seen[k][frame.exposure_start.ns() / kInterval_ns] = number_in(cameras[k]->view(frame.slot), k);
+      seen[k][frame.exposure_start.ns() / kInterval_ns] =
+          number_in(cameras[k]->view(frame.slot), k);
       cameras[k]->release(frame.slot);
     }
   int pairs = 0, equal = 0;
   std::int64_t last = -1;
   for (const auto& [interval, number] : seen[0]) {
     const auto other = seen[1].find(interval);
-    if (other == seen[1].end() || interval == seen[0].begin()->first || interval == seen[1].begin()->first) continue;
+    if (other == seen[1].end() || interval == seen[0].begin()->first ||
+        interval == seen[1].begin()->first)
+      continue;
     ++pairs;
     equal += other->second == number && number >= 0 ? 1 : 0;
     if (last > 0 && number >= 0) {  // image 0 is there as soon as the player is
@@ -120,7 +128,8 @@ TEST_F(V4l2Loop, thinnedCamerasSeeTheSameImagesAndEveryOne) {
     last = std::max(last, number);
   }
   EXPECT_GE(pairs, 34);
-  EXPECT_GE(equal, pairs - 2) << "of " << pairs << " pairs; the scheduler may hold the player up once";
+  EXPECT_GE(equal, pairs - 2) << "of " << pairs
+                              << " pairs; the scheduler may hold the player up once";
 }
 
 TEST_F(V4l2Loop, aHeldImageKeepsItsPixelsWhileTheStreamGoesOn) {

@@ -1,4 +1,5 @@
-// The V4L2 driver on the kernel's own test cameras, as a USB camera would be: webcam inputs, nobody at the far side.
+// The V4L2 driver on the kernel's own test cameras, as a USB camera would be: webcam inputs, nobody
+// at the far side.
 #include <fcntl.h>
 #include <gtest/gtest.h>
 #include <linux/videodev2.h>
@@ -30,12 +31,15 @@ CameraConfiguration webcam() {
 }
 
 /// Waits of at most `limit` until something other than a time-out comes.
-DeviceStatus next(CameraDevice* camera, Frame* frame, Duration limit = kSoon) { return camera->wait(limit, frame); }
+DeviceStatus next(CameraDevice* camera, Frame* frame, Duration limit = kSoon) {
+  return camera->wait(limit, frame);
+}
 
 class V4l2Rig : public ::testing::Test {
  protected:
   void SetUp() override {
-    if (!std::filesystem::exists("/dev/video0")) GTEST_SKIP() << "no video nodes: this test runs inside the rig's kernel";
+    if (!std::filesystem::exists("/dev/video0"))
+      GTEST_SKIP() << "no video nodes: this test runs inside the rig's kernel";
     for (const DeviceInfo& d : driver_->enumerate()) serials_.push_back(d.serial);
     ASSERT_EQ(serials_.size(), 2U) << "two test cameras";
   }
@@ -51,7 +55,8 @@ class V4l2Rig : public ::testing::Test {
     EXPECT_EQ(camera->start(nullptr), DeviceStatus::ok) << camera->complaint();
     return camera;
   }
-  /// Silences the camera, takes what was under way, and holds the counters against the last frame's: exact, with nothing to come.
+  /// Silences the camera, takes what was under way, and holds the counters against the last
+  /// frame's: exact, with nothing to come.
   void expect_all_accounted_for(CameraDevice* camera, std::size_t k) {
     set_control(node(k), "percentage_of_dropped_buffers", 100);
     Frame frame;
@@ -133,8 +138,8 @@ TEST_F(V4l2Rig, everyFormatGivesTheSameGrey) {
   set_control(node(0), "osd_text_mode", 2);
   std::vector<std::uint8_t> reference;
   int formats = 0;
-  for (const char* name :
-       {"GREY", "NV12", "NV16", "YU12", "422P", "Y10", "Y12", "Y16", "YUYV", "UYVY", "YVYU", "VYUY", "RGGB", "GRBG", "GBRG", "BA81"}) {
+  for (const char* name : {"GREY", "NV12", "NV16", "YU12", "422P", "Y10", "Y12", "Y16", "YUYV",
+                           "UYVY", "YVYU", "VYUY", "RGGB", "GRBG", "GBRG", "BA81"}) {
     CameraConfiguration c = webcam();
     c.pixel_format = name;
     auto camera = open(0);
@@ -151,14 +156,19 @@ TEST_F(V4l2Rig, everyFormatGivesTheSameGrey) {
     std::vector<std::uint8_t> row(view.row(200), view.row(200) + view.width);
     if (reference.empty()) reference = row;
     // Colour formats have black at 16 and white at 235 (ITU-R 601); each rounds by a level.
-    const bool colour = std::set<std::string>{"GREY", "Y10", "Y12", "Y16", "RGGB", "GRBG", "GBRG", "BA81"}.count(name) == 0;
+    const bool colour =
+        std::set<std::string>{"GREY", "Y10", "Y12", "Y16", "RGGB", "GRBG", "GBRG", "BA81"}.count(
+            name) == 0;
     for (std::size_t x = 0; x < row.size(); ++x)
-      ASSERT_NEAR(row[x], colour ? 16 + reference[x] * 219.0 / 255 : reference[x], 2) << name << " at " << x;
+      ASSERT_NEAR(row[x], colour ? 16 + reference[x] * 219.0 / 255 : reference[x], 2)
+          << name << " at " << x;
     camera->release(frame.slot);
     ++formats;
   }
   EXPECT_GE(formats, 6) << "of those the test camera offers";
-  EXPECT_GT(*std::max_element(reference.begin(), reference.end()) - *std::min_element(reference.begin(), reference.end()), 200);
+  EXPECT_GT(*std::max_element(reference.begin(), reference.end()) -
+                *std::min_element(reference.begin(), reference.end()),
+            200);
   set_control(node(0), "test_pattern", 0);
 }
 
@@ -170,18 +180,31 @@ TEST_F(V4l2Rig, whatItCannotDoIsSaidWithWhatItOffers) {
     EXPECT_EQ(camera->configure(c, nullptr), DeviceStatus::unsupported);
     return camera->complaint();
   };
-  EXPECT_NE(said([](auto* c) { c->width = 641; }).find("640 x 360"), std::string::npos) << camera->complaint();
-  EXPECT_NE(said([](auto* c) { c->pixel_format = "Mono8"; }).find("GREY"), std::string::npos) << camera->complaint();
-  EXPECT_NE(said([](auto* c) { c->trigger = CameraTrigger::hardware; }).find("trigger"), std::string::npos) << camera->complaint();
-  EXPECT_NE(said([](auto* c) { c->trigger = CameraTrigger::software; }).find("free"), std::string::npos) << camera->complaint();
-  EXPECT_NE(said([](auto* c) { c->options["control_nonsense"] = "1"; }).find("brightness"), std::string::npos) << camera->complaint();
-  EXPECT_NE(said([](auto* c) { c->options["control_brightness"] = "256"; }).find("0 to 255"), std::string::npos) << camera->complaint();
-  EXPECT_NE(said([](auto* c) { c->options["subdevice"] = "/dev/v4l-subdev9"; }).find("v4l-subdev9"), std::string::npos);
-  EXPECT_NE(said([](auto* c) { c->gain_db = 6; }).find("gain_step_db"), std::string::npos) << camera->complaint();
+  EXPECT_NE(said([](auto* c) { c->width = 641; }).find("640 x 360"), std::string::npos)
+      << camera->complaint();
+  EXPECT_NE(said([](auto* c) { c->pixel_format = "Mono8"; }).find("GREY"), std::string::npos)
+      << camera->complaint();
+  EXPECT_NE(said([](auto* c) { c->trigger = CameraTrigger::hardware; }).find("trigger"),
+            std::string::npos)
+      << camera->complaint();
+  EXPECT_NE(said([](auto* c) { c->trigger = CameraTrigger::software; }).find("free"),
+            std::string::npos)
+      << camera->complaint();
+  EXPECT_NE(said([](auto* c) { c->options["control_nonsense"] = "1"; }).find("brightness"),
+            std::string::npos)
+      << camera->complaint();
+  EXPECT_NE(said([](auto* c) { c->options["control_brightness"] = "256"; }).find("0 to 255"),
+            std::string::npos)
+      << camera->complaint();
+  EXPECT_NE(said([](auto* c) { c->options["subdevice"] = "/dev/v4l-subdev9"; }).find("v4l-subdev9"),
+            std::string::npos);
+  EXPECT_NE(said([](auto* c) { c->gain_db = 6; }).find("gain_step_db"), std::string::npos)
+      << camera->complaint();
   CameraConfiguration actual;
   EXPECT_EQ(camera->configure(webcam(), &actual), DeviceStatus::ok) << camera->complaint();
   EXPECT_EQ(actual.rate_hz, 25);
-  EXPECT_NE(camera->remark().find("exposure"), std::string::npos) << "this camera has none that can be set";
+  EXPECT_NE(camera->remark().find("exposure"), std::string::npos)
+      << "this camera has none that can be set";
   EXPECT_EQ(media_advice(camera->info().place), "") << "nothing stands before a test camera";
 }
 
@@ -210,7 +233,8 @@ TEST_F(V4l2Rig, controlsAreSetByName) {
 }
 
 TEST_F(V4l2Rig, stampsOfTheStartOfExposureAreTakenAsTheyAre) {
-  // The test camera delivers at the start of a frame; the end of frame it stamps lies nine tenths of a period later.
+  // The test camera delivers at the start of a frame; the end of frame it stamps lies nine tenths
+  // of a period later.
   const Duration exposure = Duration::milliseconds(8), later = Duration::milliseconds(36);
   Duration age[2];
   for (int source = 0; source < 2; ++source) {
@@ -221,13 +245,15 @@ TEST_F(V4l2Rig, stampsOfTheStartOfExposureAreTakenAsTheyAre) {
     age[source] = Duration::seconds(1);
     for (int i = 0; i < 20; ++i) {
       ASSERT_EQ(next(camera.get(), &frame), DeviceStatus::ok);
-      age[source] = std::min(age[source], Duration::nanoseconds(frame.arrival.ns() - frame.exposure_start.ns()));
+      age[source] = std::min(age[source],
+                             Duration::nanoseconds(frame.arrival.ns() - frame.exposure_start.ns()));
       camera->release(frame.slot);
     }
   }
   set_control(node(0), "timestamp_source", 0);
   EXPECT_GE(age[1], Duration{}) << "as it is: before the arrival";
-  EXPECT_NEAR((age[1] - age[0]).to_seconds(), (later - exposure).to_seconds(), 0.012) << "the exposure is taken off the end of frame";
+  EXPECT_NEAR((age[1] - age[0]).to_seconds(), (later - exposure).to_seconds(), 0.012)
+      << "the exposure is taken off the end of frame";
 }
 
 TEST_F(V4l2Rig, sequenceNumbersGoOnAcrossTheirWrap) {
@@ -251,7 +277,8 @@ TEST_F(V4l2Rig, aSilentCameraIsATimeoutAndWhatItSwallowedIsCounted) {
   camera->release(frame.slot);
   set_control(node(0), "percentage_of_dropped_buffers", 100);
   std::uint64_t newest = frame.counter;
-  while (camera->wait(Duration::milliseconds(100), &frame) == DeviceStatus::ok) {  // what was under way
+  while (camera->wait(Duration::milliseconds(100), &frame) ==
+         DeviceStatus::ok) {  // what was under way
     newest = frame.counter;
     camera->release(frame.slot);
   }
@@ -305,7 +332,8 @@ TEST_F(V4l2Rig, anUnpluggedCameraComesBackWithItsConfigurationWhileImagesAreHeld
   Frame frame;
   ASSERT_EQ(next(camera.get(), &frame), DeviceStatus::ok);
   set_control(node(0), "disconnect", 1);
-  // As long as anybody has a handle of its node the test camera stays unplugged; a held image is one.
+  // As long as anybody has a handle of its node the test camera stays unplugged; a held image is
+  // one.
   const FrameSlot held = frame.slot;
   const std::uint8_t pixel = camera->view(held).at(100, 100);
   DeviceStatus status = DeviceStatus::ok;
@@ -333,7 +361,9 @@ TEST_F(V4l2Rig, anotherProgramsStreamIsBusy) {
 }
 
 TEST_F(V4l2Rig, stopsAndStartsUnderLoadLeakNothing) {
-  const auto open_files = [] { return std::distance(std::filesystem::directory_iterator("/proc/self/fd"), {}); };
+  const auto open_files = [] {
+    return std::distance(std::filesystem::directory_iterator("/proc/self/fd"), {});
+  };
   const auto before = open_files();
   {
     std::unique_ptr<CameraDevice> cameras[2] = {open(0), open(1)};
@@ -377,9 +407,12 @@ TEST_F(V4l2Rig, thinnedCamerasKeepFramesOfTheSameMoments) {
     ASSERT_EQ(next(right.get(), &frame), DeviceStatus::ok);
     right->release(frame.slot);
     const auto partner = lefts.find(interval(frame));
-    if (i == 0 || partner == lefts.end() || partner == lefts.begin()) continue;  // the first of each may come late in its interval
+    if (i == 0 || partner == lefts.end() || partner == lefts.begin())
+      continue;  // the first of each may come late in its interval
     ++pairs;
-    close += std::llabs(partner->second - frame.exposure_start.ns()) <= 60'000'000 ? 1 : 0;  // a frame's time and the scheduler's
+    close += std::llabs(partner->second - frame.exposure_start.ns()) <= 60'000'000
+                 ? 1
+                 : 0;  // a frame's time and the scheduler's
   }
   EXPECT_GE(pairs, 8);
   EXPECT_GE(close, pairs - 2) << "a camera that lost the first frame of an interval keeps the next";

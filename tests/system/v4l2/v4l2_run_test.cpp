@@ -50,7 +50,8 @@ class Program {
   int finish(int with_signal, std::chrono::seconds limit) {
     if (with_signal != 0) (void)::kill(pid_, with_signal);
     const auto end = std::chrono::steady_clock::now() + limit;
-    for (int status = 0; std::chrono::steady_clock::now() < end; std::this_thread::sleep_for(20ms)) {
+    for (int status = 0; std::chrono::steady_clock::now() < end;
+         std::this_thread::sleep_for(20ms)) {
       if (::waitpid(pid_, &status, WNOHANG) != pid_) continue;
       pid_ = -1;
       return WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
@@ -77,7 +78,8 @@ std::string text_of(const std::filesystem::path& file) {
 class V4l2Run : public ::testing::Test {
  protected:
   void SetUp() override {
-    if (!std::filesystem::exists("/dev/video3")) GTEST_SKIP() << "no looped video nodes: this test runs inside the rig's kernel";
+    if (!std::filesystem::exists("/dev/video3"))
+      GTEST_SKIP() << "no looped video nodes: this test runs inside the rig's kernel";
     for (int k = 0; k < 2; ++k) test::loop(node(2 * k), node(2 * k + 1));
     std::filesystem::remove_all(session_);
   }
@@ -100,20 +102,25 @@ TEST_F(V4l2Run, theDriveInFrontOfTheCamerasComesOut) {
   // The first pair stands until the program has posed a few, so that all of the drive is seen.
   std::atomic<bool> roll{false};
   std::atomic<std::int64_t> began{-1};
-  test::VividPlayer player({node(1), node(3)}, kInterval_ns, [&](std::size_t output, std::uint64_t number, std::span<std::uint8_t> image) {
-    const auto n = static_cast<std::int64_t>(number);
-    std::int64_t start = -1;
-    if (roll && began.compare_exchange_strong(start, n)) start = n;
-    const auto shown = film.image(output, start < 0 || n < start ? 0 : static_cast<std::uint64_t>(n - start));
-    std::copy(shown.begin(), shown.end(), image.begin());
-  });
+  test::VividPlayer player(
+      {node(1), node(3)}, kInterval_ns,
+      [&](std::size_t output, std::uint64_t number, std::span<std::uint8_t> image) {
+        const auto n = static_cast<std::int64_t>(number);
+        std::int64_t start = -1;
+        if (roll && began.compare_exchange_strong(start, n)) start = n;
+        const auto shown =
+            film.image(output, start < 0 || n < start ? 0 : static_cast<std::uint64_t>(n - start));
+        std::copy(shown.begin(), shown.end(), image.begin());
+      });
   Program program(words());
-  for (const auto end = std::chrono::steady_clock::now() + 60s; lines_of(session_ + "/poses.csv") < 6;) {
+  for (const auto end = std::chrono::steady_clock::now() + 60s;
+       lines_of(session_ + "/poses.csv") < 6;) {
     ASSERT_LT(std::chrono::steady_clock::now(), end) << "no pose in a minute";
     std::this_thread::sleep_for(100ms);
   }
   roll = true;
-  std::this_thread::sleep_for(std::chrono::nanoseconds(kInterval_ns) * (static_cast<int>(film.pairs()) + 20));
+  std::this_thread::sleep_for(std::chrono::nanoseconds(kInterval_ns) *
+                              (static_cast<int>(film.pairs()) + 20));
   EXPECT_EQ(program.finish(SIGINT, 30s), 130) << "ended by the signal, session closed";
 
   const auto summary = nlohmann::json::parse(text_of(session_ + "/summary.json"));
@@ -121,13 +128,15 @@ TEST_F(V4l2Run, theDriveInFrontOfTheCamerasComesOut) {
   const auto& devices = summary["devices"];
   const auto read = frames["read"].get<std::uint64_t>();
   EXPECT_GE(read, film.pairs()) << summary.dump(1);
-  // Not every interval has a frame of both cameras when the one processor is late; what came in pairs is posed.
+  // Not every interval has a frame of both cameras when the one processor is late; what came in
+  // pairs is posed.
   EXPECT_GE(devices["sets_complete"].get<std::uint64_t>() * 10, read * 9);
   EXPECT_GE(frames["posed"].get<std::uint64_t>() * 20, read * 19);
   EXPECT_EQ(frames["lost"].get<std::uint64_t>() + frames["posed"].get<std::uint64_t>(), read);
   EXPECT_EQ(summary["allocations_after_seal"], 0);
   EXPECT_EQ(devices["frames_torn"], 0);
-  for (const char* name : {"camera0_underruns", "camera1_underruns"}) EXPECT_EQ(devices[name], 0) << name;
+  for (const char* name : {"camera0_underruns", "camera1_underruns"})
+    EXPECT_EQ(devices[name], 0) << name;
   for (const char* name : {"camera0_starts", "camera1_starts"}) EXPECT_EQ(devices[name], 1) << name;
 
   const app::Trajectory trajectory = app::read_tum(session_ + "/trajectory.tum");
@@ -135,7 +144,8 @@ TEST_F(V4l2Run, theDriveInFrontOfTheCamerasComesOut) {
   const Transform& truth = film.T_first_left(film.pairs() - 1);
   const double way = truth.t.norm();
   EXPECT_GT(way, 30) << "metres: the film is a drive";
-  EXPECT_LT((last.t - truth.t).norm(), 0.03 * way) << "ends at " << last.t.transpose() << ", truly at " << truth.t.transpose();
+  EXPECT_LT((last.t - truth.t).norm(), 0.03 * way)
+      << "ends at " << last.t.transpose() << ", truly at " << truth.t.transpose();
   EXPECT_LT(log_so3(last.R * truth.R.transpose()).norm(), 0.02) << "radians";
 }
 

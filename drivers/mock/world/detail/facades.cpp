@@ -10,14 +10,16 @@ namespace {
 void bricks(Canvas& c, float mortar, float contrast, std::uint64_t seed) {
   constexpr double kBrick = 0.25, kCourse = 0.0857;  // m: 48 x 140 of them tile 12 m x 12 m
   Random random(seed, 5);
-  const int across = static_cast<int>(c.width_m() / kBrick + 0.5), up = static_cast<int>(c.height_m() / kCourse + 0.5);
+  const int across = static_cast<int>(c.width_m() / kBrick + 0.5),
+            up = static_cast<int>(c.height_m() / kCourse + 0.5);
   const double h = c.height_m() / up;
   for (int j = 0; j < up; ++j) {
     for (int i = 0; i < across; ++i) {
       const double u = (i + (j % 2) * 0.5) * kBrick, v = j * h;
       const auto shade = static_cast<float>(random.uniform(-1, 1)) * contrast;
-      const float own = c.at(std::clamp(static_cast<int>((u + 0.12) / c.width_m() * c.width()), 0, c.width() - 1),
-                             std::clamp(static_cast<int>((v + 0.04) / c.height_m() * c.height()), 0, c.height() - 1));
+      const float own = c.at(
+          std::clamp(static_cast<int>((u + 0.12) / c.width_m() * c.width()), 0, c.width() - 1),
+          std::clamp(static_cast<int>((v + 0.04) / c.height_m() * c.height()), 0, c.height() - 1));
       c.rectangle(u + 0.01, v + 0.01, u + kBrick, v + h, own + shade, 0.9F);
       c.rectangle(u, v, u + 0.012, v + h, mortar, 0.6F);
     }
@@ -46,7 +48,8 @@ struct Window {
 void window(Canvas& c, const Window& w, float frame, Random& random) {
   c.rectangle(w.u - 0.1, w.v - 0.1, w.u + w.width + 0.1, w.v + w.height + 0.1, frame);
   c.rectangle(w.u - 0.18, w.v - 0.18, w.u + w.width + 0.18, w.v - 0.1, frame * 0.85F);
-  c.rectangle(w.u - 0.12, w.v + w.height + 0.1, w.u + w.width + 0.12, w.v + w.height + 0.25, 0.25F, 0.7F);  // lintel in its own shadow
+  c.rectangle(w.u - 0.12, w.v + w.height + 0.1, w.u + w.width + 0.12, w.v + w.height + 0.25, 0.25F,
+              0.7F);  // lintel in its own shadow
   const double pu = w.width / w.panes_across, pv = w.height / w.panes_up;
   const int curtain = static_cast<int>(random.below(4));
   for (int j = 0; j < w.panes_up; ++j)
@@ -56,8 +59,10 @@ void window(Canvas& c, const Window& w, float frame, Random& random) {
       c.rectangle(u, v, u + pu - 0.06, v + pv - 0.06, glass);
       const bool edge = i == 0 || i == w.panes_across - 1;
       if (curtain == 1 && edge) c.rectangle(u, v, u + pu * 0.45, v + pv - 0.06, 0.55F, 0.8F);
-      if (curtain == 2 && j == w.panes_up - 1) c.rectangle(u, v + pv * 0.4, u + pu - 0.06, v + pv - 0.06, 0.62F, 0.85F);  // blind
-      if (curtain == 3) c.stroke(u, v, u + pu * 0.7, v + pv * 0.8, 0.12, 0.45F, 0.5F);                                    // reflection
+      if (curtain == 2 && j == w.panes_up - 1)
+        c.rectangle(u, v + pv * 0.4, u + pu - 0.06, v + pv - 0.06, 0.62F, 0.85F);  // blind
+      if (curtain == 3)
+        c.stroke(u, v, u + pu * 0.7, v + pv * 0.8, 0.12, 0.45F, 0.5F);  // reflection
     }
 }
 
@@ -66,8 +71,8 @@ void door(Canvas& c, double u, double width, float paint, float frame) {
   c.rectangle(u, 0.1, u + width, 2.2, paint);
   for (int i = 0; i < 2; ++i)
     for (int j = 0; j < 3; ++j)
-      c.rectangle(u + 0.12 + i * width * 0.48, 0.3 + j * 0.62, u + width * 0.45 + i * width * 0.46, 0.78 + j * 0.62,
-                  j == 2 ? 0.12F : paint * 0.75F);
+      c.rectangle(u + 0.12 + i * width * 0.48, 0.3 + j * 0.62, u + width * 0.45 + i * width * 0.46,
+                  0.78 + j * 0.62, j == 2 ? 0.12F : paint * 0.75F);
   c.disc(u + width - 0.1, 1.15, 0.045, 0.9F);
   c.rectangle(u - 0.3, 0, u + width + 0.3, 0.12, 0.7F);  // step
 }
@@ -98,7 +103,8 @@ void shopfront(Canvas& c, Random& random) {
     c.rectangle(u, 0.45, u + 2.3, 2.5, static_cast<float>(random.uniform(0.08, 0.2)));
     for (int k = 0; k < 5; ++k) {
       const double a = u + random.uniform(0.1, 1.7), b = random.uniform(0.5, 1.8);
-      c.rectangle(a, b, a + random.uniform(0.15, 0.5), b + random.uniform(0.15, 0.6), static_cast<float>(random.uniform(0.2, 0.9)));
+      c.rectangle(a, b, a + random.uniform(0.15, 0.5), b + random.uniform(0.15, 0.6),
+                  static_cast<float>(random.uniform(0.2, 0.9)));
     }
   }
 }
@@ -132,8 +138,11 @@ Canvas paint_facade(int kind, std::uint64_t seed, int detail) {
   Random random(seed, 9);
   for (int storey = 0; storey < 4; ++storey) {
     const double floor = storey * kStorey;
-    if (storey > 0) c.rectangle(0, floor - 0.12, 12, floor + 0.1, storey % 2 == 1 ? s.frame : s.wall * 0.8F, 0.85F);
-    const int door_slot = storey == 0 ? static_cast<int>(random.below(static_cast<std::uint32_t>(s.windows))) : -1;
+    if (storey > 0)
+      c.rectangle(0, floor - 0.12, 12, floor + 0.1, storey % 2 == 1 ? s.frame : s.wall * 0.8F,
+                  0.85F);
+    const int door_slot =
+        storey == 0 ? static_cast<int>(random.below(static_cast<std::uint32_t>(s.windows))) : -1;
     if (kind == 3 && storey == 0) {
       shopfront(c, random);
       continue;
@@ -145,12 +154,15 @@ Canvas paint_facade(int kind, std::uint64_t seed, int detail) {
         door(c, centre - 0.5, 1.0, s.door, s.frame);
         continue;
       }
-      window(c, {centre - 0.5 * s.window_width, floor + 0.95, s.window_width, s.window_height, s.panes_across, s.panes_up}, s.frame,
-             random);
+      window(c,
+             {centre - 0.5 * s.window_width, floor + 0.95, s.window_width, s.window_height,
+              s.panes_across, s.panes_up},
+             s.frame, random);
     }
     if (kind == 5) {  // verandah rail and posts
       c.rectangle(0, floor + 0.85, 12, floor + 0.95, s.frame);
-      for (double u = 0.1; u < 12; u += 0.3) c.rectangle(u, floor + 0.1, u + 0.06, floor + 0.9, s.frame, 0.9F);
+      for (double u = 0.1; u < 12; u += 0.3)
+        c.rectangle(u, floor + 0.1, u + 0.06, floor + 0.9, s.frame, 0.9F);
       for (double u = 0.2; u < 12; u += 2.9) c.rectangle(u, floor, u + 0.16, floor + 2.9, s.frame);
     }
   }
@@ -168,10 +180,11 @@ Canvas paint_side_wall(std::uint64_t seed, int detail) {
   for (int storey = 0; storey < 4; ++storey)
     for (int i = 0; i < 3; ++i)
       if (random.below(3) != 0)
-        window(c,
-               {1.2 + i * 3.8 + random.uniform(-0.5, 0.5), storey * kStorey + random.uniform(1.1, 1.5), random.uniform(0.6, 1.1),
-                random.uniform(0.6, 1.1), 1, 1},
-               0.75F, random);
+        window(
+            c,
+            {1.2 + i * 3.8 + random.uniform(-0.5, 0.5), storey * kStorey + random.uniform(1.1, 1.5),
+             random.uniform(0.6, 1.1), random.uniform(0.6, 1.1), 1, 1},
+            0.75F, random);
   weather(c, seed + 3);
   return c;
 }
@@ -183,8 +196,10 @@ Canvas paint_flats(std::uint64_t seed, int detail) {
     c.rectangle(0, j * 3.0, 24, j * 3.0 + 0.35, 0.78F);
     for (int i = 0; i < 8; ++i) {
       const double u = i * 3.0 + 0.4;
-      c.rectangle(u, j * 3.0 + 0.9, u + random.uniform(1.4, 2.3), j * 3.0 + 2.5, static_cast<float>(random.uniform(0.08, 0.3)));
-      if (random.below(3) == 0) c.rectangle(u, j * 3.0 + 0.3, u + 2.2, j * 3.0 + 1.2, 0.85F);  // balcony
+      c.rectangle(u, j * 3.0 + 0.9, u + random.uniform(1.4, 2.3), j * 3.0 + 2.5,
+                  static_cast<float>(random.uniform(0.08, 0.3)));
+      if (random.below(3) == 0)
+        c.rectangle(u, j * 3.0 + 0.3, u + 2.2, j * 3.0 + 1.2, 0.85F);  // balcony
     }
   }
   weather(c, seed + 3);

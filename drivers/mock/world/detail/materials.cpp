@@ -9,7 +9,8 @@
 namespace vergence::mock {
 namespace {
 
-constexpr Tint kWarm{1.0F, 1.08F, 0.98F, 0.88F}, kGreen{1.0F, 0.86F, 1.08F, 0.70F}, kBlue{1.0F, 0.90F, 1.0F, 1.15F}, kNeutral{};
+constexpr Tint kWarm{1.0F, 1.08F, 0.98F, 0.88F}, kGreen{1.0F, 0.86F, 1.08F, 0.70F},
+    kBlue{1.0F, 0.90F, 1.0F, 1.15F}, kNeutral{};
 
 Canvas paint_asphalt(std::uint64_t seed, int detail) {
   Canvas c(9 + detail, 9 + detail, 16, 16, 0.30F);
@@ -17,9 +18,11 @@ Canvas paint_asphalt(std::uint64_t seed, int detail) {
   c.octaves(0.4, 4, 0.045F, 1.1F, seed + 50);  // aggregate
   Random random(seed, 1);
   for (int i = 0; i < 2600; ++i)  // stones and worn spots
-    c.disc(random.uniform(0, 16), random.uniform(0, 16), random.uniform(0.02, 0.06), static_cast<float>(random.uniform(0.10, 0.62)), 0.65F);
+    c.disc(random.uniform(0, 16), random.uniform(0, 16), random.uniform(0.02, 0.06),
+           static_cast<float>(random.uniform(0.10, 0.62)), 0.65F);
   for (int i = 0; i < 7; ++i) {  // mended trenches and patches with tarred rims
-    const double u = random.uniform(0, 16), v = random.uniform(0, 16), a = random.uniform(0.6, 3.0), b = random.uniform(0.5, 1.6);
+    const double u = random.uniform(0, 16), v = random.uniform(0, 16), a = random.uniform(0.6, 3.0),
+                 b = random.uniform(0.5, 1.6);
     const auto tone = static_cast<float>(random.uniform(0.17, 0.40));
     c.rectangle(u, v, u + a, v + b, tone, 0.6F);
     c.stroke(u, v, u + a, v, 0.05, 0.1F, 0.8F);
@@ -28,7 +31,8 @@ Canvas paint_asphalt(std::uint64_t seed, int detail) {
     c.stroke(u, v, u, v + b, 0.05, 0.1F, 0.8F);
   }
   for (int i = 0; i < 14; ++i) {  // cracks that wander
-    double u = random.uniform(0, 16), v = random.uniform(0, 16), heading = random.uniform(0, 2 * std::numbers::pi);
+    double u = random.uniform(0, 16), v = random.uniform(0, 16),
+           heading = random.uniform(0, 2 * std::numbers::pi);
     const int length = 8 + static_cast<int>(random.below(20));
     for (int k = 0; k < length; ++k) {
       heading += random.uniform(-0.7, 0.7);
@@ -39,7 +43,8 @@ Canvas paint_asphalt(std::uint64_t seed, int detail) {
     }
   }
   for (int i = 0; i < 60; ++i)
-    c.disc(random.uniform(0, 16), random.uniform(0, 16), random.uniform(0.04, 0.25), static_cast<float>(random.uniform(0.12, 0.45)),
+    c.disc(random.uniform(0, 16), random.uniform(0, 16), random.uniform(0.04, 0.25),
+           static_cast<float>(random.uniform(0.12, 0.45)),
            0.6F);                  // oil, gum, stones
   c.disc(5.0, 11.5, 0.38, 0.14F);  // a manhole
   c.disc(5.0, 11.5, 0.30, 0.34F);
@@ -52,14 +57,16 @@ Canvas paint_pavement(std::uint64_t seed, int detail) {
   Canvas c(8 + detail, 8 + detail, 8, 8, 0.56F);
   Random random(seed, 2);
   for (int j = 0; j < 8; ++j)
-    for (int i = 0; i < 8; ++i) c.rectangle(i, j, i + 1, j + 1, 0.56F + static_cast<float>(random.uniform(-0.09, 0.09)));
+    for (int i = 0; i < 8; ++i)
+      c.rectangle(i, j, i + 1, j + 1, 0.56F + static_cast<float>(random.uniform(-0.09, 0.09)));
   c.octaves(2.0, 6, 0.04F, 0.85F, seed);
   for (int i = 0; i < 8; ++i) {
     c.rectangle(i, 0, i + 0.035, 8, 0.2F, 0.85F);
     c.rectangle(0, i, 8, i + 0.035, 0.2F, 0.85F);
   }
   for (int i = 0; i < 40; ++i)
-    c.disc(random.uniform(0, 8), random.uniform(0, 8), random.uniform(0.02, 0.09), static_cast<float>(random.uniform(0.25, 0.75)), 0.7F);
+    c.disc(random.uniform(0, 8), random.uniform(0, 8), random.uniform(0.02, 0.09),
+           static_cast<float>(random.uniform(0.25, 0.75)), 0.7F);
   c.clamp(0.05F, 0.95F);
   return c;
 }
@@ -69,7 +76,8 @@ Canvas paint_grass(std::uint64_t seed, int detail) {
   c.octaves(4.0, 7, 0.06F, 0.92F, seed);
   Random random(seed, 3);
   for (int i = 0; i < 260; ++i)
-    c.disc(random.uniform(0, 8), random.uniform(0, 8), random.uniform(0.03, 0.13), static_cast<float>(random.uniform(0.15, 0.62)), 0.5F);
+    c.disc(random.uniform(0, 8), random.uniform(0, 8), random.uniform(0.03, 0.13),
+           static_cast<float>(random.uniform(0.15, 0.62)), 0.5F);
   c.clamp(0.05F, 0.9F);
   return c;
 }
@@ -87,7 +95,8 @@ Canvas paint_roof(std::uint64_t seed, int detail) {
   for (int j = 0; j < 24; ++j) {  // courses of tiles
     for (int i = 0; i < 26; ++i) {
       const double w = 8.0 / 26, u = (i + 0.5 * (j % 2)) * w, v = j / 3.0;
-      c.rectangle(u, v, u + w, v + 1.0 / 3, 0.40F + static_cast<float>(random.uniform(-0.08, 0.08)));
+      c.rectangle(u, v, u + w, v + 1.0 / 3,
+                  0.40F + static_cast<float>(random.uniform(-0.08, 0.08)));
       c.rectangle(u, v, u + 0.035, v + 1.0 / 3, 0.2F, 0.6F);
     }
     c.rectangle(0, j / 3.0, 8, j / 3.0 + 0.06, 0.15F, 0.8F);
@@ -103,13 +112,17 @@ void paint_foliage(std::uint64_t seed, int detail, Canvas* brightness, Canvas* o
   *opacity = Canvas(7 + detail, 7 + detail, 1, 1, 0.0F);
   Random random(seed, 12);
   for (int clump = 0; clump < 34; ++clump) {
-    const double r = 0.33 * std::sqrt(random.uniform()), a = random.uniform(0, 2 * std::numbers::pi);
-    const double cu = 0.5 + r * std::cos(a), cv = 0.48 + r * std::sin(a), spread = random.uniform(0.035, 0.07);
+    const double r = 0.33 * std::sqrt(random.uniform()),
+                 a = random.uniform(0, 2 * std::numbers::pi);
+    const double cu = 0.5 + r * std::cos(a), cv = 0.48 + r * std::sin(a),
+                 spread = random.uniform(0.035, 0.07);
     const double lit = 0.14 + 0.16 * cv + random.uniform(-0.04, 0.08);
     for (int leaf = 0; leaf < 75; ++leaf) {
       const double du = spread * random.normal(), dv = 0.75 * spread * random.normal();
-      const double u = std::clamp(cu + du, 0.03, 0.97), v = std::clamp(cv + dv, 0.03, 0.97), size = random.uniform(0.006, 0.017);
-      brightness->disc(u, v, size * 1.6, static_cast<float>(lit + 1.3 * dv + random.uniform(-0.06, 0.10)), 0.85F);
+      const double u = std::clamp(cu + du, 0.03, 0.97), v = std::clamp(cv + dv, 0.03, 0.97),
+                   size = random.uniform(0.006, 0.017);
+      brightness->disc(u, v, size * 1.6,
+                       static_cast<float>(lit + 1.3 * dv + random.uniform(-0.06, 0.10)), 0.85F);
       opacity->disc(u, v, size, 1.0F);
     }
   }
@@ -154,7 +167,8 @@ Canvas paint_fence(std::uint64_t seed, int detail) {
   Canvas c(8 + detail, 6 + detail, 4, 1.2, 0.55F);
   Random random(seed, 13);
   for (int i = 0; i < 32; ++i) {
-    c.rectangle(i * 0.125, 0, i * 0.125 + 0.105, 1.2, 0.5F + static_cast<float>(random.uniform(-0.14, 0.14)));
+    c.rectangle(i * 0.125, 0, i * 0.125 + 0.105, 1.2,
+                0.5F + static_cast<float>(random.uniform(-0.14, 0.14)));
     c.rectangle(i * 0.125 + 0.105, 0, i * 0.125 + 0.125, 1.2, 0.1F);
   }
   c.octaves(1.0, 4, 0.03F, 0.9F, seed);
@@ -170,7 +184,8 @@ void paint_tree_line(std::uint64_t seed, int detail, Canvas* brightness, Canvas*
   Random random(seed, 14);
   opacity->rectangle(0, 0.0, 64, 6.0, 1.0F);
   for (int i = 0; i < 26; ++i) {
-    const double u = random.uniform(0, 64), top = random.uniform(7.5, 14.0), r = random.uniform(1.6, 3.6);
+    const double u = random.uniform(0, 64), top = random.uniform(7.5, 14.0),
+                 r = random.uniform(1.6, 3.6);
     const auto tone = static_cast<float>(random.uniform(0.17, 0.38));
     for (int k = 0; k < 40; ++k) {
       const double a = u + random.uniform(-r, r), b = random.uniform(2.0, top - 1.2);
@@ -193,7 +208,8 @@ void paint_hills(std::uint64_t seed, Canvas* brightness, Canvas* opacity) {
     double top = 42;
     for (int k = 0; k < 6; ++k)
       top += 26.0 / (1 << (k / 2 + (k > 0))) *
-             std::sin(2 * std::numbers::pi * (k * 2 + 1) * x / opacity->width() + phase[static_cast<std::size_t>(k)]);
+             std::sin(2 * std::numbers::pi * (k * 2 + 1) * x / opacity->width() +
+                      phase[static_cast<std::size_t>(k)]);
     opacity->rectangle(x * 2.0, 0, x * 2.0 + 2.0, std::clamp(top, 6.0, 118.0), 1.0F);
   }
 }
@@ -219,7 +235,8 @@ Canvas paint_sign(int detail) {
   for (int i = 0; i < 7; ++i) c.rectangle(0.1 + 0.12 * i, 1.35, 0.16 + 0.12 * i, 1.65, 0.1F);
   for (int i = 0; i < 4; ++i)
     for (int j = 0; j < 4; ++j)
-      if ((i + j) % 2 == 0) c.rectangle(1 + i * 0.25, 1 + j * 0.25, 1.25 + i * 0.25, 1.25 + j * 0.25, 0.08F);
+      if ((i + j) % 2 == 0)
+        c.rectangle(1 + i * 0.25, 1 + j * 0.25, 1.25 + i * 0.25, 1.25 + j * 0.25, 0.08F);
   return c;
 }
 
@@ -229,7 +246,8 @@ void paint_shadow(Canvas* brightness, Canvas* opacity) {
   for (int y = 0; y < 32; ++y)
     for (int x = 0; x < 32; ++x) {
       const double u = std::abs((x + 0.5) / 16 - 1), v = std::abs((y + 0.5) / 16 - 1);
-      opacity->at(x, y) = static_cast<float>(0.8 * std::clamp((1 - u) / 0.3, 0.0, 1.0) * std::clamp((1 - v) / 0.3, 0.0, 1.0));
+      opacity->at(x, y) = static_cast<float>(0.8 * std::clamp((1 - u) / 0.3, 0.0, 1.0) *
+                                             std::clamp((1 - v) / 0.3, 0.0, 1.0));
     }
 }
 
@@ -237,8 +255,11 @@ class Painter {
  public:
   explicit Painter(Scene* scene) : scene_(scene) {}
   void add(const Canvas& c, Tint tint) {
-    scene_->materials.push_back(
-        {scene_->atlas.add(c), {}, static_cast<float>(c.width() / c.width_m()), static_cast<float>(c.height() / c.height_m()), tint});
+    scene_->materials.push_back({scene_->atlas.add(c),
+                                 {},
+                                 static_cast<float>(c.width() / c.width_m()),
+                                 static_cast<float>(c.height() / c.height_m()),
+                                 tint});
   }
   void add(const Canvas& c, const Canvas& opacity, Tint tint) {
     add(c, tint);
@@ -255,7 +276,8 @@ void paint_materials(std::uint64_t seed, int detail, Scene* scene) {
   Painter p(scene);
   const std::uint64_t s = seed * 1000003U;
   for (int i = 0; i < kFacades; ++i)
-    p.add(paint_facade(i, s + static_cast<std::uint64_t>(i) * 101U, detail), i % 3 == 1 ? kNeutral : kWarm);
+    p.add(paint_facade(i, s + static_cast<std::uint64_t>(i) * 101U, detail),
+          i % 3 == 1 ? kNeutral : kWarm);
   p.add(paint_side_wall(s + 900, detail), kWarm);
   p.add(paint_flats(s + 901, detail), kNeutral);
   p.add(paint_roof(s + 902, detail), Tint{1.0F, 1.2F, 0.9F, 0.75F});

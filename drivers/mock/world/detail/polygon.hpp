@@ -11,7 +11,8 @@ struct Tint {
   float grey = 1.0F, red = 1.0F, green = 1.0F, blue = 1.0F;
 };
 
-/// A painted surface: brightness, and opacity where it has holes, with how many texels a metre takes.
+/// A painted surface: brightness, and opacity where it has holes, with how many texels a metre
+/// takes.
 struct Material {
   TextureRef brightness;
   TextureRef opacity;  // base < 0: solid
@@ -20,7 +21,8 @@ struct Material {
   Tint tint;
 };
 
-/// A flat convex polygon of three or four corners in `enu`, metres, counter-clockwise seen from its front.
+/// A flat convex polygon of three or four corners in `enu`, metres, counter-clockwise seen from its
+/// front.
 struct Polygon {
   std::array<Vec3, 4> corners;
   int count = 4;

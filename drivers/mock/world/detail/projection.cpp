@@ -25,7 +25,9 @@ void grow(Bounds& b, const Bounds& o) noexcept {
   grow(b, o.x1, o.y1);
 }
 
-bool overlaps(const Bounds& a, const Bounds& b) noexcept { return a.x0 <= b.x1 && a.x1 >= b.x0 && a.y0 <= b.y1 && a.y1 >= b.y0; }
+bool overlaps(const Bounds& a, const Bounds& b) noexcept {
+  return a.x0 <= b.x1 && a.x1 >= b.x0 && a.y0 <= b.y1 && a.y1 >= b.y0;
+}
 
 /// Range of a · (x, y, 1) over a rectangle.
 struct Range {
@@ -43,12 +45,15 @@ std::array<float, 3> floats(const Vec3& v) noexcept {
 /// Bounds of the part of a polygon in front of the camera; empty when there is none.
 Bounds ray_bounds(const std::array<Vec3, 4>& corners, int count) noexcept {
   Bounds box = empty();
-  const auto put = [&](const Vec3& p) { grow(box, static_cast<float>(p.x() / p.z()), static_cast<float>(p.y() / p.z())); };
+  const auto put = [&](const Vec3& p) {
+    grow(box, static_cast<float>(p.x() / p.z()), static_cast<float>(p.y() / p.z()));
+  };
   for (int i = 0; i < count; ++i) {
     const Vec3& a = corners[static_cast<std::size_t>(i)];
     const Vec3& b = corners[static_cast<std::size_t>((i + 1) % count)];
     if (a.z() >= kNearest) put(a);
-    if ((a.z() >= kNearest) != (b.z() >= kNearest)) put(a + (kNearest - a.z()) / (b.z() - a.z()) * (b - a));
+    if ((a.z() >= kNearest) != (b.z() >= kNearest))
+      put(a + (kNearest - a.z()) / (b.z() - a.z()) * (b - a));
   }
   return box;
 }
@@ -79,9 +84,11 @@ RayTiles::RayTiles(const Camera& camera) {
   all = empty();
   for (int r = 0; r < rows; ++r)
     for (int c = 0; c < columns; ++c) {
-      const std::size_t tile = static_cast<std::size_t>(r) * static_cast<std::size_t>(columns) + static_cast<std::size_t>(c);
+      const std::size_t tile = static_cast<std::size_t>(r) * static_cast<std::size_t>(columns) +
+                               static_cast<std::size_t>(c);
       for (int k = 0; k < kTilePixels; ++k) {
-        const Vec2 pixel(std::min(c * kTile + k % kTile, width - 1), std::min(r * kTile + k / kTile, height - 1));
+        const Vec2 pixel(std::min(c * kTile + k % kTile, width - 1),
+                         std::min(r * kTile + k / kTile, height - 1));
         const Vec3 ray = ray_of(camera, pixel);
         const std::size_t at = tile * kTilePixels + static_cast<std::size_t>(k);
         x[at] = static_cast<float>(ray.x());
@@ -94,14 +101,15 @@ RayTiles::RayTiles(const Camera& camera) {
     }
 }
 
-void Projection::build(const Scene& scene, const RayTiles& tiles, const Camera& camera, const Transform& T_camera_enu,
-                       const Transform* T_camera_bus, bool bayer) {
+void Projection::build(const Scene& scene, const RayTiles& tiles, const Camera& camera,
+                       const Transform& T_camera_enu, const Transform* T_camera_bus, bool bayer) {
   polygons_.clear();
   candidates_.resize(tiles.bounds.size());
   for (auto& list : candidates_) list.clear();
   const double f = std::max(camera.intrinsics().fx, camera.intrinsics().fy);
-  const double half_angle = std::atan(
-      std::hypot(std::max(std::abs(tiles.all.x0), std::abs(tiles.all.x1)), std::max(std::abs(tiles.all.y0), std::abs(tiles.all.y1))));
+  const double half_angle =
+      std::atan(std::hypot(std::max(std::abs(tiles.all.x0), std::abs(tiles.all.x1)),
+                           std::max(std::abs(tiles.all.y0), std::abs(tiles.all.y1))));
   for (const Object& object : scene.objects) {
     const Vec3 centre = T_camera_enu * object.centre;
     const double distance = centre.norm();
@@ -114,24 +122,27 @@ void Projection::build(const Scene& scene, const RayTiles& tiles, const Camera& 
       (void)add(scene, scene.polygons[i], tiles, camera, T_camera_enu, bayer);
   }
   if (T_camera_bus != nullptr)
-    for (const Polygon& polygon : scene.bus) (void)add(scene, polygon, tiles, camera, *T_camera_bus, bayer);
+    for (const Polygon& polygon : scene.bus)
+      (void)add(scene, polygon, tiles, camera, *T_camera_bus, bayer);
   for (auto& list : candidates_) {
     float closed = 0;  // inverse depth in front of which everything that counts lies
     for (const Candidate& c : list)
       if (c.covers) closed = std::max(closed, c.q_min);
     std::erase_if(list, [closed](const Candidate& c) { return c.q_max < closed; });
-    std::sort(list.begin(), list.end(),
-              [](const Candidate& a, const Candidate& b) { return a.q_max > b.q_max || (a.q_max == b.q_max && a.polygon < b.polygon); });
+    std::sort(list.begin(), list.end(), [](const Candidate& a, const Candidate& b) {
+      return a.q_max > b.q_max || (a.q_max == b.q_max && a.polygon < b.polygon);
+    });
   }
 }
 
-bool Projection::add(const Scene& scene, const Polygon& polygon, const RayTiles& tiles, const Camera& camera, const Transform& T_camera_enu,
-                     bool bayer) {
+bool Projection::add(const Scene& scene, const Polygon& polygon, const RayTiles& tiles,
+                     const Camera& camera, const Transform& T_camera_enu, bool bayer) {
   const std::size_t count = static_cast<std::size_t>(polygon.count);
   std::array<Vec3, 4> corners;
   for (std::size_t i = 0; i < count; ++i) corners[i] = T_camera_enu * polygon.corners[i];
   const Vec3 normal = T_camera_enu.R * polygon.normal;
-  const double height = normal.dot(corners[0]);  // of the plane along its normal from the eye; negative: the front is seen
+  const double height = normal.dot(
+      corners[0]);  // of the plane along its normal from the eye; negative: the front is seen
   if (std::abs(height) < kFlat || (height > 0 && !polygon.two_sided)) return false;
 
   Bounds box = ray_bounds(corners, polygon.count);
@@ -147,7 +158,8 @@ bool Projection::add(const Scene& scene, const Polygon& polygon, const RayTiles&
       out.edge[i] = {0, 0, 1};  // always inside
       continue;
     }
-    // The plane through the eye and the edge; inside is where X · m > 0. Holds also for corners behind the eye.
+    // The plane through the eye and the edge; inside is where X · m > 0. Holds also for corners
+    // behind the eye.
     Vec3 m = corners[i].cross(corners[(i + 1) % count]);
     if (height < 0) m = -m;
     const double per_pixel = std::hypot(m.x() / fx, m.y() / fy);
@@ -175,8 +187,10 @@ bool Projection::add(const Scene& scene, const Polygon& polygon, const RayTiles&
   if (out.opacity >= 0) {
     out.opacity_log2_width = material.opacity.log2_width;
     out.opacity_log2_height = material.opacity.log2_height;
-    out.opacity_scale_u = std::ldexp(1.0F, material.opacity.log2_width - material.brightness.log2_width);
-    out.opacity_scale_v = std::ldexp(1.0F, material.opacity.log2_height - material.brightness.log2_height);
+    out.opacity_scale_u =
+        std::ldexp(1.0F, material.opacity.log2_width - material.brightness.log2_width);
+    out.opacity_scale_v =
+        std::ldexp(1.0F, material.opacity.log2_height - material.brightness.log2_height);
   }
   const auto index = static_cast<std::int32_t>(polygons_.size());
   polygons_.push_back(out);
@@ -184,7 +198,8 @@ bool Projection::add(const Scene& scene, const Polygon& polygon, const RayTiles&
   return true;
 }
 
-void Projection::bin(const ProjectedPolygon& polygon, std::int32_t index, const RayTiles& tiles, const Bounds& box, float slope) {
+void Projection::bin(const ProjectedPolygon& polygon, std::int32_t index, const RayTiles& tiles,
+                     const Bounds& box, float slope) {
   int r0 = 0, r1 = tiles.rows - 1, c0 = 0, c1 = tiles.columns - 1;
   while (r0 <= r1 && tiles.row_bounds[static_cast<std::size_t>(r0)].y1 < box.y0) ++r0;
   while (r1 >= r0 && tiles.row_bounds[static_cast<std::size_t>(r1)].y0 > box.y1) --r1;
@@ -192,7 +207,9 @@ void Projection::bin(const ProjectedPolygon& polygon, std::int32_t index, const 
   while (c1 >= c0 && tiles.column_bounds[static_cast<std::size_t>(c1)].x0 > box.x1) --c1;
   for (int r = r0; r <= r1; ++r)
     for (int c = c0; c <= c1; ++c) {
-      const std::size_t tile = static_cast<std::size_t>(r) * static_cast<std::size_t>(tiles.columns) + static_cast<std::size_t>(c);
+      const std::size_t tile =
+          static_cast<std::size_t>(r) * static_cast<std::size_t>(tiles.columns) +
+          static_cast<std::size_t>(c);
       const Bounds& b = tiles.bounds[tile];
       if (!overlaps(b, box)) continue;
       const Range q = range(polygon.q, b);

@@ -8,8 +8,9 @@
 
 namespace vergence::mock {
 
-/// The rays of a camera's pixels in tiles of 16 x 16, row after row of tiles, and the bounds of each tile.
-/// Pixels beyond the image's edge, or where the lens model has no ray, repeat the nearest one that has.
+/// The rays of a camera's pixels in tiles of 16 x 16, row after row of tiles, and the bounds of
+/// each tile. Pixels beyond the image's edge, or where the lens model has no ray, repeat the
+/// nearest one that has.
 struct RayTiles {
   explicit RayTiles(const Camera& camera);
 
@@ -27,16 +28,19 @@ struct RayTiles {
 class Projection {
  public:
   /// `T_camera_bus`: null, there is none.
-  void build(const Scene& scene, const RayTiles& tiles, const Camera& camera, const Transform& T_camera_enu, const Transform* T_camera_bus,
-             bool bayer);
+  void build(const Scene& scene, const RayTiles& tiles, const Camera& camera,
+             const Transform& T_camera_enu, const Transform* T_camera_bus, bool bayer);
 
   [[nodiscard]] std::span<const ProjectedPolygon> polygons() const noexcept { return polygons_; }
-  [[nodiscard]] std::span<const Candidate> candidates(std::size_t tile) const noexcept { return candidates_[tile]; }
+  [[nodiscard]] std::span<const Candidate> candidates(std::size_t tile) const noexcept {
+    return candidates_[tile];
+  }
 
  private:
-  [[nodiscard]] bool add(const Scene& scene, const Polygon& polygon, const RayTiles& tiles, const Camera& camera,
-                         const Transform& T_camera_enu, bool bayer);
-  void bin(const ProjectedPolygon& polygon, std::int32_t index, const RayTiles& tiles, const RayTiles::Bounds& box, float slope);
+  [[nodiscard]] bool add(const Scene& scene, const Polygon& polygon, const RayTiles& tiles,
+                         const Camera& camera, const Transform& T_camera_enu, bool bayer);
+  void bin(const ProjectedPolygon& polygon, std::int32_t index, const RayTiles& tiles,
+           const RayTiles::Bounds& box, float slope);
 
   std::vector<ProjectedPolygon> polygons_;
   std::vector<std::vector<Candidate>> candidates_;

@@ -18,7 +18,8 @@ struct Scene {
   std::vector<Material> materials;
   std::vector<Polygon> polygons;
   std::vector<Object> objects;
-  std::vector<Polygon> bus;  // in its own axes: x forward, y left, z up, the middle of its floor on the ground
+  std::vector<Polygon>
+      bus;  // in its own axes: x forward, y left, z up, the middle of its floor on the ground
 };
 
 }  // namespace vergence::mock

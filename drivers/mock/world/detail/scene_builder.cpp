@@ -10,10 +10,13 @@
 namespace vergence::mock {
 namespace {
 
-constexpr double kHillLength = 300.0;    // m, of a whole wave; the north-south streets lie on its level places
+constexpr double kHillLength =
+    300.0;  // m, of a whole wave; the north-south streets lie on its level places
 constexpr double kTexturePeriod = 16.0;  // m: every ground texture repeats in it
 
-double amplitude(double hill_deg) noexcept { return std::tan(hill_deg * std::numbers::pi / 180.0) * kHillLength / (2 * std::numbers::pi); }
+double amplitude(double hill_deg) noexcept {
+  return std::tan(hill_deg * std::numbers::pi / 180.0) * kHillLength / (2 * std::numbers::pi);
+}
 
 /// Sun from the north-east over an even sky; the ground receives about 1.15.
 float light_of(const Vec3& normal) noexcept {
@@ -45,7 +48,8 @@ double area(std::span<const Vec2> p) {
 }  // namespace
 
 double smooth_ground(double hill_deg, double x) noexcept {
-  return amplitude(hill_deg) * (1.0 - std::cos(2 * std::numbers::pi * std::clamp(x, kWorldX0, kWorldX1) / kHillLength));
+  return amplitude(hill_deg) *
+         (1.0 - std::cos(2 * std::numbers::pi * std::clamp(x, kWorldX0, kWorldX1) / kHillLength));
 }
 
 double smooth_ground_slope(double hill_deg, double x) noexcept {
@@ -56,7 +60,8 @@ double smooth_ground_slope(double hill_deg, double x) noexcept {
 
 double drawn_ground(double hill_deg, double x) noexcept {
   const double cell = std::floor(x / kGroundStep), s = x / kGroundStep - cell;
-  const double a = smooth_ground(hill_deg, cell * kGroundStep), b = smooth_ground(hill_deg, (cell + 1) * kGroundStep);
+  const double a = smooth_ground(hill_deg, cell * kGroundStep),
+               b = smooth_ground(hill_deg, (cell + 1) * kGroundStep);
   return a + s * (b - a);
 }
 
@@ -78,7 +83,8 @@ void SceneBuilder::end() {
 
 void SceneBuilder::push(const Polygon& polygon) { scene_->polygons.push_back(polygon); }
 
-void SceneBuilder::ground_polygon(std::span<const Vec2> outline, double lift_m, int material, float light) {
+void SceneBuilder::ground_polygon(std::span<const Vec2> outline, double lift_m, int material,
+                                  float light) {
   double x0 = 1e30, x1 = -1e30;
   for (const Vec2& p : outline) {
     x0 = std::min(x0, p.x());
@@ -88,15 +94,16 @@ void SceneBuilder::ground_polygon(std::span<const Vec2> outline, double lift_m, 
   const Material& m = scene_->materials[static_cast<std::size_t>(material)];
   // Beyond the built world the ground is level: one piece.
   std::vector<double> cuts{x0};
-  for (double cut = std::max(kWorldX0, std::floor(x0 / kGroundStep + 1) * kGroundStep); cut < std::min(x1, kWorldX1 + 1e-9);
-       cut += kGroundStep)
+  for (double cut = std::max(kWorldX0, std::floor(x0 / kGroundStep + 1) * kGroundStep);
+       cut < std::min(x1, kWorldX1 + 1e-9); cut += kGroundStep)
     if (cut > x0) cuts.push_back(cut);
   cuts.push_back(x1);
   for (std::size_t i = 0; i + 1 < cuts.size(); ++i) {
     const auto piece = clipped(clipped(outline, cuts[i], 1.0), cuts[i + 1], -1.0);
     if (piece.size() < 3 || area(piece) < 1e-6) continue;
     const double mid = 0.5 * (cuts[i] + cuts[i + 1]);
-    const double slope = (ground(std::min(cuts[i + 1], mid + 1e-3)) - ground(mid)) / (std::min(cuts[i + 1], mid + 1e-3) - mid);
+    const double slope = (ground(std::min(cuts[i + 1], mid + 1e-3)) - ground(mid)) /
+                         (std::min(cuts[i + 1], mid + 1e-3) - mid);
     const auto height = [&](double x) { return ground(mid) + slope * (x - mid) + lift_m; };
     Polygon p;
     p.normal = Vec3(-slope, 0, 1).normalized();
@@ -108,7 +115,8 @@ void SceneBuilder::ground_polygon(std::span<const Vec2> outline, double lift_m, 
     p.axis_u = Vec3::UnitX() * m.texels_per_metre_u;
     p.axis_v = Vec3::UnitY() * m.texels_per_metre_v;
     begin();
-    for (std::size_t k = 1; k + 1 < piece.size();) {  // a fan of quads, the last one perhaps a triangle
+    for (std::size_t k = 1;
+         k + 1 < piece.size();) {  // a fan of quads, the last one perhaps a triangle
       p.count = 3;
       p.corners[0] = {piece[0].x(), piece[0].y(), height(piece[0].x())};
       p.corners[1] = {piece[k].x(), piece[k].y(), height(piece[k].x())};
@@ -131,7 +139,8 @@ void SceneBuilder::kerb(const Vec2& a, const Vec2& b) {
   std::vector<double> cuts{0.0};
   const double dx = b.x() - a.x();
   if (std::abs(dx) > 1e-9)
-    for (double x = std::ceil(std::min(a.x(), b.x()) / kGroundStep) * kGroundStep; x < std::max(a.x(), b.x()); x += kGroundStep) {
+    for (double x = std::ceil(std::min(a.x(), b.x()) / kGroundStep) * kGroundStep;
+         x < std::max(a.x(), b.x()); x += kGroundStep) {
       const double s = (x - a.x()) / dx;
       if (s > 1e-6 && s < 1 - 1e-6) cuts.push_back(s);
     }
@@ -139,8 +148,9 @@ void SceneBuilder::kerb(const Vec2& a, const Vec2& b) {
   std::sort(cuts.begin(), cuts.end());
   for (std::size_t i = 0; i + 1 < cuts.size(); ++i) {
     const Vec2 p = a + cuts[i] * (b - a), q = a + cuts[i + 1] * (b - a);
-    const std::array<Vec3, 4> corners{Vec3(p.x(), p.y(), ground(p.x())), Vec3(q.x(), q.y(), ground(q.x())),
-                                      Vec3(q.x(), q.y(), ground(q.x()) + kKerb), Vec3(p.x(), p.y(), ground(p.x()) + kKerb)};
+    const std::array<Vec3, 4> corners{
+        Vec3(p.x(), p.y(), ground(p.x())), Vec3(q.x(), q.y(), ground(q.x())),
+        Vec3(q.x(), q.y(), ground(q.x()) + kKerb), Vec3(p.x(), p.y(), ground(p.x()) + kKerb)};
     begin();
     flat(corners, {material::concrete, 0.8F, cuts[i] * length, 0});
     end();
@@ -165,7 +175,8 @@ void SceneBuilder::flat(std::span<const Vec3> corners, const Face& face, bool tw
   push(p);
 }
 
-void SceneBuilder::picture(std::span<const Vec3> corners, int material, float light, double span_u, double span_v) {
+void SceneBuilder::picture(std::span<const Vec3> corners, int material, float light, double span_u,
+                           double span_v) {
   flat(corners, {material, light, 0, 0}, true);
   Polygon& p = scene_->polygons.back();
   const Material& m = scene_->materials[static_cast<std::size_t>(material)];
@@ -176,14 +187,17 @@ void SceneBuilder::picture(std::span<const Vec3> corners, int material, float li
 
 void SceneBuilder::box(const Box& b, const Face& front_back, const Face& sides, const Face* top) {
   const Vec3 a(b.along.x() * b.half_length, b.along.y() * b.half_length, 0);
-  const Vec3 n(b.along.y() * b.half_width, -b.along.x() * b.half_width, 0);  // to the right of `along`
+  const Vec3 n(b.along.y() * b.half_width, -b.along.x() * b.half_width,
+               0);  // to the right of `along`
   const Vec3 up(0, 0, b.height);
-  const std::array<Vec3, 4> base{b.base - a + n, b.base + a + n, b.base + a - n, b.base - a - n};  // counter-clockwise from above
+  const std::array<Vec3, 4> base{b.base - a + n, b.base + a + n, b.base + a - n,
+                                 b.base - a - n};  // counter-clockwise from above
   for (std::size_t i = 0; i < 4; ++i) {
     const Vec3 &p = base[i], &q = base[(i + 1) % 4];
     flat(std::array<Vec3, 4>{p, q, q + up, p + up}, i % 2 == 0 ? front_back : sides);
   }
-  if (top != nullptr) flat(std::array<Vec3, 4>{base[0] + up, base[1] + up, base[2] + up, base[3] + up}, *top);
+  if (top != nullptr)
+    flat(std::array<Vec3, 4>{base[0] + up, base[1] + up, base[2] + up, base[3] + up}, *top);
 }
 
 }  // namespace vergence::mock

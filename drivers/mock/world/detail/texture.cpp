@@ -14,15 +14,18 @@ int wrapped(int i, int n) noexcept { return ((i % n) + n) % n; }
 
 /// Overlap of texel [i, i + 1] with [a, b].
 float overlap(int i, double a, double b) noexcept {
-  return static_cast<float>(std::clamp(std::min(b, i + 1.0) - std::max(a, static_cast<double>(i)), 0.0, 1.0));
+  return static_cast<float>(
+      std::clamp(std::min(b, i + 1.0) - std::max(a, static_cast<double>(i)), 0.0, 1.0));
 }
 
-/// Halves one axis with the binomial-like taps 1 3 3 1: flatter than a box below the new Nyquist frequency, no overshoot.
+/// Halves one axis with the binomial-like taps 1 3 3 1: flatter than a box below the new Nyquist
+/// frequency, no overshoot.
 std::vector<float> halve(const std::vector<float>& in, int width, int height, bool along_u) {
   const int w = along_u ? width / 2 : width, h = along_u ? height : height / 2;
   std::vector<float> out(static_cast<std::size_t>(w) * static_cast<std::size_t>(h));
   const auto at = [&](int x, int y) {
-    return in[static_cast<std::size_t>(y) * static_cast<std::size_t>(width) + static_cast<std::size_t>(x)];
+    return in[static_cast<std::size_t>(y) * static_cast<std::size_t>(width) +
+              static_cast<std::size_t>(x)];
   };
   for (int y = 0; y < h; ++y)
     for (int x = 0; x < w; ++x) {
@@ -34,7 +37,8 @@ std::vector<float> halve(const std::vector<float>& in, int width, int height, bo
         const int a = wrapped(2 * y - 1, height), d = wrapped(2 * y + 2, height);
         v = 0.125F * (at(x, a) + at(x, d)) + 0.375F * (at(x, 2 * y) + at(x, 2 * y + 1));
       }
-      out[static_cast<std::size_t>(y) * static_cast<std::size_t>(w) + static_cast<std::size_t>(x)] = v;
+      out[static_cast<std::size_t>(y) * static_cast<std::size_t>(w) + static_cast<std::size_t>(x)] =
+          v;
     }
   return out;
 }
@@ -73,33 +77,45 @@ void Canvas::rectangle(double u0, double v0, double u1, double v1, float value, 
   const double su = width() / width_m_, sv = height() / height_m_;
   const double x0 = u0 * su, x1 = u1 * su, y0 = v0 * sv, y1 = v1 * sv;
   for (int y = static_cast<int>(std::floor(y0)); y < y1; ++y)
-    for (int x = static_cast<int>(std::floor(x0)); x < x1; ++x) blend(x, y, value, opacity * overlap(x, x0, x1) * overlap(y, y0, y1));
+    for (int x = static_cast<int>(std::floor(x0)); x < x1; ++x)
+      blend(x, y, value, opacity * overlap(x, x0, x1) * overlap(y, y0, y1));
 }
 
 void Canvas::disc(double u, double v, double radius_m, float value, float opacity) {
   const double su = width() / width_m_, sv = height() / height_m_, texel = 1.0 / std::min(su, sv);
-  for (int y = static_cast<int>(std::floor((v - radius_m - texel) * sv)); y <= (v + radius_m + texel) * sv; ++y)
-    for (int x = static_cast<int>(std::floor((u - radius_m - texel) * su)); x <= (u + radius_m + texel) * su; ++x) {
+  for (int y = static_cast<int>(std::floor((v - radius_m - texel) * sv));
+       y <= (v + radius_m + texel) * sv; ++y)
+    for (int x = static_cast<int>(std::floor((u - radius_m - texel) * su));
+         x <= (u + radius_m + texel) * su; ++x) {
       const double r = std::hypot((x + 0.5) / su - u, (y + 0.5) / sv - v);
-      blend(x, y, value, opacity * static_cast<float>(std::clamp((radius_m - r) / texel + 0.5, 0.0, 1.0)));
+      blend(x, y, value,
+            opacity * static_cast<float>(std::clamp((radius_m - r) / texel + 0.5, 0.0, 1.0)));
     }
 }
 
-void Canvas::stroke(double u0, double v0, double u1, double v1, double width, float value, float opacity) {
-  const double su = width_m_ > 0 ? this->width() / width_m_ : 1.0, sv = height() / height_m_, texel = 1.0 / std::min(su, sv);
-  const double du = u1 - u0, dv = v1 - v0, length2 = std::max(du * du + dv * dv, 1e-12), margin = 0.5 * width + texel;
-  for (int y = static_cast<int>(std::floor((std::min(v0, v1) - margin) * sv)); y <= (std::max(v0, v1) + margin) * sv; ++y)
-    for (int x = static_cast<int>(std::floor((std::min(u0, u1) - margin) * su)); x <= (std::max(u0, u1) + margin) * su; ++x) {
+void Canvas::stroke(double u0, double v0, double u1, double v1, double width, float value,
+                    float opacity) {
+  const double su = width_m_ > 0 ? this->width() / width_m_ : 1.0, sv = height() / height_m_,
+               texel = 1.0 / std::min(su, sv);
+  const double du = u1 - u0, dv = v1 - v0, length2 = std::max(du * du + dv * dv, 1e-12),
+               margin = 0.5 * width + texel;
+  for (int y = static_cast<int>(std::floor((std::min(v0, v1) - margin) * sv));
+       y <= (std::max(v0, v1) + margin) * sv; ++y)
+    for (int x = static_cast<int>(std::floor((std::min(u0, u1) - margin) * su));
+         x <= (std::max(u0, u1) + margin) * su; ++x) {
       const double pu = (x + 0.5) / su - u0, pv = (y + 0.5) / sv - v0;
       const double s = std::clamp((pu * du + pv * dv) / length2, 0.0, 1.0);
       const double r = std::hypot(pu - s * du, pv - s * dv);
-      blend(x, y, value, opacity * static_cast<float>(std::clamp((0.5 * width - r) / texel + 0.5, 0.0, 1.0)));
+      blend(x, y, value,
+            opacity * static_cast<float>(std::clamp((0.5 * width - r) / texel + 0.5, 0.0, 1.0)));
     }
 }
 
 void Canvas::noise(double cell_u_m, double cell_v_m, float amplitude, std::uint64_t seed) {
-  const int nu = std::clamp(static_cast<int>(std::lround(width_m_ / cell_u_m)), 1, std::max(1, width() / 3));
-  const int nv = std::clamp(static_cast<int>(std::lround(height_m_ / cell_v_m)), 1, std::max(1, height() / 3));
+  const int nu =
+      std::clamp(static_cast<int>(std::lround(width_m_ / cell_u_m)), 1, std::max(1, width() / 3));
+  const int nv =
+      std::clamp(static_cast<int>(std::lround(height_m_ / cell_v_m)), 1, std::max(1, height() / 3));
   std::vector<float> lattice(static_cast<std::size_t>(nu) * static_cast<std::size_t>(nv));
   Random random(seed, 77);
   for (float& l : lattice) l = amplitude * static_cast<float>(random.uniform(-1, 1));
@@ -111,9 +127,11 @@ void Canvas::noise(double cell_u_m, double cell_v_m, float amplitude, std::uint6
   const auto taps = [&](int n, int cells) {
     std::vector<Tap> t(static_cast<std::size_t>(n));
     for (int i = 0; i < n; ++i) {
-      const float at = (static_cast<float>(i) + 0.5F) * static_cast<float>(cells) / static_cast<float>(n);
+      const float at =
+          (static_cast<float>(i) + 0.5F) * static_cast<float>(cells) / static_cast<float>(n);
       const int c = std::min(static_cast<int>(at), cells - 1);
-      t[static_cast<std::size_t>(i)] = {static_cast<std::size_t>(c), static_cast<std::size_t>((c + 1) % cells),
+      t[static_cast<std::size_t>(i)] = {static_cast<std::size_t>(c),
+                                        static_cast<std::size_t>((c + 1) % cells),
                                         smooth(at - static_cast<float>(c))};
     }
     return t;
@@ -131,7 +149,8 @@ void Canvas::noise(double cell_u_m, double cell_v_m, float amplitude, std::uint6
   }
 }
 
-void Canvas::octaves(double coarsest_m, int count, float amplitude, float falloff, std::uint64_t seed) {
+void Canvas::octaves(double coarsest_m, int count, float amplitude, float falloff,
+                     std::uint64_t seed) {
   double cell = coarsest_m;
   for (int i = 0; i < count; ++i, cell *= 0.5, amplitude *= falloff)
     noise(cell, cell, amplitude, seed + static_cast<std::uint64_t>(i) * 1013U);
@@ -146,7 +165,8 @@ TextureRef TextureAtlas::add(const Canvas& canvas) {
   const std::size_t words = 4U * static_cast<std::size_t>(w) * static_cast<std::size_t>(h);
   if (words_.size() + words > static_cast<std::size_t>(std::numeric_limits<std::int32_t>::max()))
     throw std::length_error("the world's textures do not fit 31-bit indices");
-  const TextureRef ref{static_cast<std::int32_t>(words_.size()), canvas.log2_width(), canvas.log2_height()};
+  const TextureRef ref{static_cast<std::int32_t>(words_.size()), canvas.log2_width(),
+                       canvas.log2_height()};
   words_.resize(words_.size() + words);
   std::int32_t* base = words_.data() + ref.base;
   std::vector<float> row = canvas.texels();  // level (0, j)

@@ -4,7 +4,8 @@
 
 namespace vergence::mock {
 
-/// A periodic grey picture under construction: brightness 0..1 over a rectangle of metres, row 0 at v = 0 (bottom).
+/// A periodic grey picture under construction: brightness 0..1 over a rectangle of metres, row 0 at
+/// v = 0 (bottom).
 class Canvas {
  public:
   /// Texels are powers of two: 2^log2_width by 2^log2_height.
@@ -17,21 +18,26 @@ class Canvas {
   [[nodiscard]] double width_m() const noexcept { return width_m_; }
   [[nodiscard]] double height_m() const noexcept { return height_m_; }
   [[nodiscard]] float& at(int x, int y) noexcept {
-    return texels_[static_cast<std::size_t>(y) * static_cast<std::size_t>(width()) + static_cast<std::size_t>(x)];
+    return texels_[static_cast<std::size_t>(y) * static_cast<std::size_t>(width()) +
+                   static_cast<std::size_t>(x)];
   }
   [[nodiscard]] const std::vector<float>& texels() const noexcept { return texels_; }
 
-  /// Blends `value` over [u0, u1] x [v0, v1] (m) with exact area coverage at the border texels; wraps around the edges.
+  /// Blends `value` over [u0, u1] x [v0, v1] (m) with exact area coverage at the border texels;
+  /// wraps around the edges.
   void rectangle(double u0, double v0, double u1, double v1, float value, float opacity = 1.0F);
   /// The same for a disc; the border is one texel wide.
   void disc(double u, double v, double radius_m, float value, float opacity = 1.0F);
   /// A straight stroke of the given width.
-  void stroke(double u0, double v0, double u1, double v1, double width_m, float value, float opacity = 1.0F);
+  void stroke(double u0, double v0, double u1, double v1, double width_m, float value,
+              float opacity = 1.0F);
 
-  /// Adds periodic value noise of one band: lattice of about `cell_m`, uniform in ±amplitude. Cells below three texels
-  /// are widened to three, so that the picture holds nothing near its own Nyquist frequency.
+  /// Adds periodic value noise of one band: lattice of about `cell_m`, uniform in ±amplitude. Cells
+  /// below three texels are widened to three, so that the picture holds nothing near its own
+  /// Nyquist frequency.
   void noise(double cell_u_m, double cell_v_m, float amplitude, std::uint64_t seed);
-  /// Octaves of noise() from `coarsest_m` down by halves, each `falloff` as strong as the one before.
+  /// Octaves of noise() from `coarsest_m` down by halves, each `falloff` as strong as the one
+  /// before.
   void octaves(double coarsest_m, int count, float amplitude, float falloff, std::uint64_t seed);
   void clamp(float lo, float hi);
 
@@ -50,12 +56,14 @@ struct TextureRef {
   std::int32_t log2_height = 0;
 };
 
-/// All textures of a world in one array of words, prefiltered per axis (rip-maps: level (i, j) is halved i times along u
-/// and j times along v), because streets are seen at grazing angles where one level for both axes would blur everything.
+/// All textures of a world in one array of words, prefiltered per axis (rip-maps: level (i, j) is
+/// halved i times along u and j times along v), because streets are seen at grazing angles where
+/// one level for both axes would blur everything.
 ///
-/// Layout  A texture of w x h texels takes 2w x 2h words, rows of 2w; level (i, j) starts at x = 2w - (2w >> i),
-///         y = 2h - (2h >> j). One word holds the texel and its right, upper and upper right neighbours (bits 0, 8, 16, 24),
-///         so that one 32-bit gather fetches everything a bilinear look-up needs. All levels wrap around.
+/// Layout  A texture of w x h texels takes 2w x 2h words, rows of 2w; level (i, j) starts at x = 2w
+///         - (2w >> i), y = 2h - (2h >> j). One word holds the texel and its right, upper and upper
+///         right neighbours (bits 0, 8, 16, 24), so that one 32-bit gather fetches everything a
+///         bilinear look-up needs. All levels wrap around.
 class TextureAtlas {
  public:
   TextureRef add(const Canvas& canvas);

@@ -9,13 +9,16 @@
 
 namespace vergence::mock {
 
-inline constexpr double kRoadHalf = 5.5;       // m from the centreline to the kerb: a lane and parked cars on each side
+inline constexpr double kRoadHalf =
+    5.5;  // m from the centreline to the kerb: a lane and parked cars on each side
 inline constexpr double kPavementWidth = 2.0;  // m
-inline constexpr double kCornerCut = 4.0;      // m: kerbs are cut at crossings so that cars can turn
-inline constexpr double kGroundStep = 10.0;    // m: the ground is flat pieces this long along x
-inline constexpr double kWorldX0 = -150, kWorldX1 = 450, kWorldY0 = -150, kWorldY1 = 350;  // m: outside is open country
+inline constexpr double kCornerCut = 4.0;    // m: kerbs are cut at crossings so that cars can turn
+inline constexpr double kGroundStep = 10.0;  // m: the ground is flat pieces this long along x
+inline constexpr double kWorldX0 = -150, kWorldX1 = 450, kWorldY0 = -150,
+                        kWorldY1 = 350;  // m: outside is open country
 
-/// Smooth height of the ground, m, and the flat pieces that are drawn; equal at multiples of kGroundStep.
+/// Smooth height of the ground, m, and the flat pieces that are drawn; equal at multiples of
+/// kGroundStep.
 [[nodiscard]] double smooth_ground(double hill_deg, double x) noexcept;
 [[nodiscard]] double smooth_ground_slope(double hill_deg, double x) noexcept;
 [[nodiscard]] double drawn_ground(double hill_deg, double x) noexcept;
@@ -28,10 +31,14 @@ class SceneBuilder {
   void begin();
   void end();
 
-  [[nodiscard]] double ground(double x) const noexcept { return drawn_ground(options_.hill_deg, x); }
+  [[nodiscard]] double ground(double x) const noexcept {
+    return drawn_ground(options_.hill_deg, x);
+  }
 
-  /// A convex polygon on the ground, corners counter-clockwise from above; cut where the ground bends, each piece an object.
-  void ground_polygon(std::span<const Vec2> outline, double lift_m, int material, float light = 1.0F);
+  /// A convex polygon on the ground, corners counter-clockwise from above; cut where the ground
+  /// bends, each piece an object.
+  void ground_polygon(std::span<const Vec2> outline, double lift_m, int material,
+                      float light = 1.0F);
   /// A kerb's vertical face from a to b; its front is on the right of that way.
   void kerb(const Vec2& a, const Vec2& b);
 
@@ -40,11 +47,14 @@ class SceneBuilder {
     float light = 1.0F;
     double u_offset_m = 0, v_offset_m = 0;  // texture position of the face's lower left corner
   };
-  /// Flat quad or triangle; (u, v) start at corner 0 with u along corner 0 → 1 and v at right angles to it.
+  /// Flat quad or triangle; (u, v) start at corner 0 with u along corner 0 → 1 and v at right
+  /// angles to it.
   void flat(std::span<const Vec3> corners, const Face& face, bool two_sided = false);
   /// The same with the whole texture (its metres over `span_u` x `span_v` of the polygon).
-  void picture(std::span<const Vec3> corners, int material, float light, double span_u, double span_v);
-  /// Upright box: centre of the base, unit direction of its length, half length and half width, height.
+  void picture(std::span<const Vec3> corners, int material, float light, double span_u,
+               double span_v);
+  /// Upright box: centre of the base, unit direction of its length, half length and half width,
+  /// height.
   struct Box {
     Vec3 base = Vec3::Zero();
     Vec2 along = Vec2::UnitX();
@@ -66,7 +76,8 @@ void build_bus(const WorldOptions& options, Scene* scene);
 /// The whole suburb (town.cpp), from small things (props.cpp).
 void build_town(const WorldOptions& options, Scene* scene);
 
-/// A lot along a street: where its kerb-side middle is, which way the street runs, which way the house looks.
+/// A lot along a street: where its kerb-side middle is, which way the street runs, which way the
+/// house looks.
 struct Lot {
   Vec2 on_centreline;  // foot on the street's centreline, m
   Vec2 along;          // unit; to the right of who stands on the street looking at the house
@@ -79,11 +90,14 @@ struct Lot {
 void add_house(SceneBuilder* builder, const Lot& lot, Random* random);
 void add_garden(SceneBuilder* builder, const Lot& lot, Random* random);
 void add_car(SceneBuilder* builder, const Lot& lot, double along_m, Random* random);
-void add_tree(SceneBuilder* builder, const Vec2& foot, double size_m, double lift_m, Random* random);
+void add_tree(SceneBuilder* builder, const Vec2& foot, double size_m, double lift_m,
+              Random* random);
 void add_power_pole(SceneBuilder* builder, const Lot& lot);
 void add_sign(SceneBuilder* builder, const Vec2& foot, const Vec2& facing, int board);
-void add_flats(SceneBuilder* builder, const Vec2& centre, double half_length, double half_width, int storeys, Random* random);
+void add_flats(SceneBuilder* builder, const Vec2& centre, double half_length, double half_width,
+               int storeys, Random* random);
 /// Opaque below, ragged on top; seen from both sides.
-void add_tree_line(SceneBuilder* builder, const Vec2& a, const Vec2& b, double height_m, Random* random);
+void add_tree_line(SceneBuilder* builder, const Vec2& a, const Vec2& b, double height_m,
+                   Random* random);
 
 }  // namespace vergence::mock

@@ -1,6 +1,6 @@
 /*
- * 168 MHz from the crystal; where it or the PLL does not come up the board runs on the internal 16 MHz and says so by tick_hz.
- * RM0090 "Reset and clock control", "Embedded Flash memory interface".
+ * 168 MHz from the crystal; where it or the PLL does not come up the board runs on the internal 16
+ * MHz and says so by tick_hz. RM0090 "Reset and clock control", "Embedded Flash memory interface".
  */
 #include "firmware_iface/trigger/board/stm32f405/port.h"
 #include "firmware_iface/trigger/board/stm32f405/registers.h"
@@ -8,7 +8,8 @@
 #ifndef VERGENCE_BOARD_CRYSTAL_MHZ
 #define VERGENCE_BOARD_CRYSTAL_MHZ 8
 #endif
-_Static_assert(VERGENCE_BOARD_CRYSTAL_MHZ >= 4 && VERGENCE_BOARD_CRYSTAL_MHZ <= 26, "HSE takes 4 to 26 MHz");
+_Static_assert(VERGENCE_BOARD_CRYSTAL_MHZ >= 4 && VERGENCE_BOARD_CRYSTAL_MHZ <= 26,
+               "HSE takes 4 to 26 MHz");
 
 enum {
   internal_hz = 16000000,
@@ -44,8 +45,10 @@ static bool wait_for(const Register* at, uint32_t mask, uint32_t value) {
 static bool start_pll(void) {
   RCC->cr |= cr_hseon;
   if (!wait_for(&RCC->cr, cr_hserdy, cr_hserdy)) return false;
-  /* VCO: crystal / M * 336 = 336 MHz; / P = 2: 168 MHz; / Q = 7: 48 MHz, which the random number generator needs. */
-  RCC->pllcfgr = VERGENCE_BOARD_CRYSTAL_MHZ | (336U << 6U) | (0U << 16U) | (1U << 22U) | (7U << 24U);
+  /* VCO: crystal / M * 336 = 336 MHz; / P = 2: 168 MHz; / Q = 7: 48 MHz, which the random number
+   * generator needs. */
+  RCC->pllcfgr =
+      VERGENCE_BOARD_CRYSTAL_MHZ | (336U << 6U) | (0U << 16U) | (1U << 22U) | (7U << 24U);
   RCC->cr |= cr_pllon;
   if (!wait_for(&RCC->cr, cr_pllrdy, cr_pllrdy)) return false;
   FLASH_ACR = acr_latency_5 | acr_caches;

@@ -1,4 +1,5 @@
-/* Who the board is, which start this is, and the watchdog: RM0090 "Device electronic signature", "Random number generator", "IWDG". */
+/* Who the board is, which start this is, and the watchdog: RM0090 "Device electronic signature",
+ * "Random number generator", "IWDG". */
 #include "firmware_iface/trigger/board/hal.h"
 #include "firmware_iface/trigger/board/stm32f405/port.h"
 #include "firmware_iface/trigger/board/stm32f405/registers.h"
@@ -11,12 +12,14 @@ enum {
 
 static Clocks clocks;
 
-/* Random when power comes up; then it carries each start's value to the next, where the generator has no clock. */
+/* Random when power comes up; then it carries each start's value to the next, where the generator
+ * has no clock. */
 static uint32_t noise[noise_words] __attribute__((section(".noinit")));
 
 static volatile bool probing, absent;
 
-/* A load from an address where the bus may have nothing. The instruction is two bytes long: the fault handler steps over it. */
+/* A load from an address where the bus may have nothing. The instruction is two bytes long: the
+ * fault handler steps over it. */
 bool probe_word(uint32_t address, uint32_t* word) {
   register uint32_t value __asm("r3") = 0;
   absent = false;
@@ -35,7 +38,9 @@ __attribute__((used)) static void on_bus_fault(uint32_t* stacked) {
   SCB_CFSR = SCB_CFSR; /* cleared by writing ones */
 }
 
-__attribute__((naked)) void bus_fault_handler(void) { __asm volatile("mrs r0, msp\n b on_bus_fault"); }
+__attribute__((naked)) void bus_fault_handler(void) {
+  __asm volatile("mrs r0, msp\n b on_bus_fault");
+}
 
 void irq_enable(unsigned irq, uint8_t priority) {
   NVIC_IPR[irq] = priority;
@@ -87,7 +92,8 @@ void hal_describe(BoardDescription* description) {
   }
 }
 
-/* The generator's second number (the first is not to be used: RM0090 "RNG operation"), 0 where it has no clock. */
+/* The generator's second number (the first is not to be used: RM0090 "RNG operation"), 0 where it
+ * has no clock. */
 static uint32_t random_word(void) {
   uint32_t word = 0;
   RNG->cr = 1U << 2U;

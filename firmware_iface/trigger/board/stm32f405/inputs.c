@@ -1,10 +1,11 @@
 /*
- * Inputs are stamped by capture units that count in step with TIM2: RM0090 "Input capture mode", "Timer synchronization" (trigger mode;
- * they start a few clock periods after TIM2).
- * Feedback 0, 1: PA0 (TIM5_CH1), PA2 (TIM5_CH3), alternate function 2; each pin feeds two capture channels, one for either edge, so that
- *                start and end of an exposure are both stamped and told apart by hardware.
- * PPS, INS:      PB6 (TIM4_CH1), PB7 (TIM4_CH2), alternate function 2. EXTI lines 6 and 7 of the same pins call the interrupt; TIM4 has
- *                the stamp. Without it (no capture came) the interrupt's own time is the stamp, later by its latency.
+ * Inputs are stamped by capture units that count in step with TIM2: RM0090 "Input capture mode",
+ * "Timer synchronization" (trigger mode; they start a few clock periods after TIM2). Feedback 0, 1:
+ * PA0 (TIM5_CH1), PA2 (TIM5_CH3), alternate function 2; each pin feeds two capture channels, one
+ * for either edge, so that start and end of an exposure are both stamped and told apart by
+ * hardware. PPS, INS:      PB6 (TIM4_CH1), PB7 (TIM4_CH2), alternate function 2. EXTI lines 6 and 7
+ * of the same pins call the interrupt; TIM4 has the stamp. Without it (no capture came) the
+ * interrupt's own time is the stamp, later by its latency.
  */
 #include "firmware_iface/trigger/board/hal.h"
 #include "firmware_iface/trigger/board/stm32f405/pins.h"
@@ -17,7 +18,7 @@ enum {
   trigger_mode = 6,            /* SMS */
   trigger_of_tim2_at_tim4 = 1, /* TS: ITR1 */
   trigger_of_tim2_at_tim5 = 0, /* ITR0 */
-  capture_polls = 16,          /* an edge passes the capture's filter later than EXTI's, by less than this */
+  capture_polls = 16, /* an edge passes the capture's filter later than EXTI's, by less than this */
   feedback_count = 2,
   exti_pps = 6
 };
@@ -51,7 +52,9 @@ void inputs_start(void) {
 
 static void configure_edge(unsigned channel, uint8_t edge) {
   const uint32_t bit = 1U << (exti_pps + channel);
-  const uint32_t enable = edge == trigger_edge_none ? 0U : edge == trigger_edge_rising ? 1U : 3U; /* CCxE, CCxP: falling */
+  const uint32_t enable = edge == trigger_edge_none     ? 0U
+                          : edge == trigger_edge_rising ? 1U
+                                                        : 3U; /* CCxE, CCxP: falling */
   TIM4->ccer = (TIM4->ccer & ~(0xFU << (4U * channel))) | (enable << (4U * channel));
   EXTI->imr &= ~bit;
   EXTI->rtsr = (EXTI->rtsr & ~bit) | (edge == trigger_edge_rising ? bit : 0U);
@@ -78,7 +81,9 @@ void hal_configure(const TriggerConfig* config) {
 }
 
 static void push_feedback(unsigned input, bool rising, uint32_t count) {
-  record_push(&port_stamps, (StampRecord){.count = count, .source = (uint8_t)(board_input_feedback + input), .rising = rising});
+  record_push(&port_stamps, (StampRecord){.count = count,
+                                          .source = (uint8_t)(board_input_feedback + input),
+                                          .rising = rising});
 }
 
 /* A capture that overwrote another is one edge lost. */
@@ -112,7 +117,8 @@ static uint32_t captured(unsigned channel) {
       count_overcapture(TIM4, TIM4->sr, channel);
       const uint32_t low = TIM4->ccr[channel];
       const uint32_t now = TIM2->cnt;
-      return now - ((now - low) & 0xFFFFU); /* 16 bits in step with TIM2: 0.8 ms at 84 MHz, longer than any latency here */
+      return now - ((now - low) & 0xFFFFU); /* 16 bits in step with TIM2: 0.8 ms at 84 MHz, longer
+                                               than any latency here */
     }
   return TIM2->cnt;
 }
@@ -122,8 +128,9 @@ void exti9_5_handler(void) {
     const uint32_t bit = 1U << (exti_pps + channel);
     if ((EXTI->pr & bit) == 0) continue;
     EXTI->pr = bit; /* cleared by writing one */
-    const StampRecord record = {
-        .count = captured(channel), .source = (uint8_t)(board_input_pps + channel), .rising = (EXTI->rtsr & bit) != 0};
+    const StampRecord record = {.count = captured(channel),
+                                .source = (uint8_t)(board_input_pps + channel),
+                                .rising = (EXTI->rtsr & bit) != 0};
     record_push(&port_stamps, record);
   }
 }

@@ -19,7 +19,8 @@ void bus_fault_handler(void);
 /* clocks.c */
 void clocks_start(Clocks* clocks);
 
-/* pulses.c, inputs.c: TIM2 is the time base and makes the pulses; TIM4 and TIM5 count in step with it and stamp inputs. */
+/* pulses.c, inputs.c: TIM2 is the time base and makes the pulses; TIM4 and TIM5 count in step with
+ * it and stamp inputs. */
 void pulses_start(void);
 void pulses_configure(uint8_t lines, uint8_t active_low);
 void inputs_start(void);

@@ -1,7 +1,8 @@
 /*
- * Pulses by TIM2, which is the time base: all channels of a pulse match on one count, so that the compare unit makes their edges, not an
- * interrupt. RM0090 "General-purpose timers (TIM2 to TIM5)": output compare mode, forced output mode.
- * Lines 0..3: PA5 (TIM2_CH1), PA1 (CH2), PB10 (CH3), PB11 (CH4), alternate function 1.
+ * Pulses by TIM2, which is the time base: all channels of a pulse match on one count, so that the
+ * compare unit makes their edges, not an interrupt. RM0090 "General-purpose timers (TIM2 to TIM5)":
+ * output compare mode, forced output mode. Lines 0..3: PA5 (TIM2_CH1), PA1 (CH2), PB10 (CH3), PB11
+ * (CH4), alternate function 1.
  */
 #include "firmware_iface/trigger/board/hal.h"
 #include "firmware_iface/trigger/board/stm32f405/pins.h"
@@ -13,8 +14,9 @@ enum {
   mode_inactive_on_match = 2,
   mode_force_inactive = 4,
   mode_force_active = 5,
-  /* A compare is set at least so many counts ahead, and taken back only before that: longer than the code between look and deed, with
-   * interrupts off (some 250 processor cycles, of which a count has one or two). */
+  /* A compare is set at least so many counts ahead, and taken back only before that: longer than
+   * the code between look and deed, with interrupts off (some 250 processor cycles, of which a
+   * count has one or two). */
   guard_counts = 400,
   overdue_counts = 100000 /* about 1 ms: the compare unit's interrupt should have come long ago */
 };
@@ -62,12 +64,14 @@ static void end_pulse(void) {
 
 /* The leading edge was made at `count`: next comes the trailing one. */
 static void begin_pulse(uint32_t count, bool late) {
-  record_push(&port_stamps, (StampRecord){.count = count, .source = record_pulse, .rising = true, .late = late});
+  record_push(&port_stamps,
+              (StampRecord){.count = count, .source = record_pulse, .rising = true, .late = late});
   pulse.at = count + pulse.width;
   pulse.phase = pulse_active;
   set_compare(pulse.lines, pulse.at);
   set_mode(pulse.lines, mode_inactive_on_match);
-  if ((int32_t)(pulse.at - TIM2->cnt) <= 0 && !edge_was_made()) end_pulse(); /* this came too late for a match */
+  if ((int32_t)(pulse.at - TIM2->cnt) <= 0 && !edge_was_made())
+    end_pulse(); /* this came too late for a match */
 }
 
 void pulses_start(void) {
@@ -90,9 +94,11 @@ void pulses_configure(uint8_t lines, uint8_t active_low) {
   pulse.phase = pulse_idle;
   uint32_t ccer = 0;
   for (unsigned k = 0; k < line_count; ++k)
-    if (has_line(lines, k)) ccer |= (has_line(active_low, k) ? 3U : 1U) << (4U * k); /* CCxE, CCxP */
+    if (has_line(lines, k))
+      ccer |= (has_line(active_low, k) ? 3U : 1U) << (4U * k); /* CCxE, CCxP */
   TIM2->ccer = ccer;
-  for (unsigned k = 0; k < line_count; ++k) pin_set(line_port(k), line_pin(k), has_line(lines, k) ? pin_alternate : pin_input, 1);
+  for (unsigned k = 0; k < line_count; ++k)
+    pin_set(line_port(k), line_pin(k), has_line(lines, k) ? pin_alternate : pin_input, 1);
   irq_restore(primask);
 }
 
@@ -116,7 +122,8 @@ bool hal_arm(uint32_t count, uint32_t width, uint8_t lines) {
 
 bool hal_disarm(void) {
   const uint32_t primask = irq_off();
-  const bool ok = pulse.phase == pulse_armed && (int32_t)(pulse.at - TIM2->cnt) > guard_counts && !edge_was_made();
+  const bool ok = pulse.phase == pulse_armed && (int32_t)(pulse.at - TIM2->cnt) > guard_counts &&
+                  !edge_was_made();
   if (ok) end_pulse();
   irq_restore(primask);
   return ok;
@@ -133,7 +140,8 @@ void tim2_handler(void) {
 
 void hal_check_pulse(void) {
   const uint32_t primask = irq_off();
-  if (pulse.phase != pulse_idle && (int32_t)(TIM2->cnt - pulse.at) > overdue_counts && !edge_was_made()) {
+  if (pulse.phase != pulse_idle && (int32_t)(TIM2->cnt - pulse.at) > overdue_counts &&
+      !edge_was_made()) {
     if (pulse.phase == pulse_armed) {
       set_mode(pulse.lines, mode_force_active);
       begin_pulse(TIM2->cnt, true);

@@ -1,8 +1,9 @@
 #ifndef VERGENCE_FIRMWARE_IFACE_TRIGGER_BOARD_STM32F405_REGISTERS_H
 #define VERGENCE_FIRMWARE_IFACE_TRIGGER_BOARD_STM32F405_REGISTERS_H
 /*
- * The registers that the port uses, by the chapters of the reference manual RM0090 (STM32F405/415…) and, for the core, of the Cortex-M4
- * programming manual PM0214. Base addresses: RM0090 "Memory map".
+ * The registers that the port uses, by the chapters of the reference manual RM0090 (STM32F405/415…)
+ * and, for the core, of the Cortex-M4 programming manual PM0214. Base addresses: RM0090 "Memory
+ * map".
  */
 #include <stdint.h>
 
@@ -10,8 +11,8 @@ typedef volatile uint32_t Register;
 
 /* "Reset and clock control (RCC)" */
 typedef struct {
-  Register cr, pllcfgr, cfgr, cir, ahb1rstr, ahb2rstr, ahb3rstr, reserved_1c, apb1rstr, apb2rstr, reserved_28[2], ahb1enr, ahb2enr, ahb3enr,
-      reserved_3c, apb1enr, apb2enr;
+  Register cr, pllcfgr, cfgr, cir, ahb1rstr, ahb2rstr, ahb3rstr, reserved_1c, apb1rstr, apb2rstr,
+      reserved_28[2], ahb1enr, ahb2enr, ahb3enr, reserved_3c, apb1enr, apb2enr;
 } RccRegisters;
 
 /* "General-purpose I/Os (GPIO)" */
@@ -60,7 +61,8 @@ typedef struct {
 #define SYSCFG ((SyscfgRegisters*)0x40013800UL)
 #define IWDG ((WatchdogRegisters*)0x40003000UL)
 #define RNG ((RandomRegisters*)0x50060800UL)
-#define FLASH_ACR (*(Register*)0x40023C00UL) /* "Embedded Flash memory interface": access control */
+#define FLASH_ACR (*(Register*)0x40023C00UL) /* "Embedded Flash memory interface": access control \
+                                              */
 #define UNIQUE_ID 0x1FFF7A10U                /* "Device electronic signature": 96 bits */
 
 /* PM0214 "Nested vectored interrupt controller", "System control block" */

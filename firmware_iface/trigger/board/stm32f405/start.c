@@ -3,11 +3,13 @@
 #include "firmware_iface/trigger/board/stm32f405/port.h"
 #include "firmware_iface/trigger/board/stm32f405/registers.h"
 
-extern uint32_t stack_top, data_load, data_begin, data_end, bss_begin, bss_end; /* the linker script's */
+extern uint32_t stack_top, data_load, data_begin, data_end, bss_begin,
+    bss_end; /* the linker script's */
 
 void reset_handler(void);
 
-/* Anything that nobody expects: the board starts anew, which the host sees by another boot id. PM0214 "AIRCR": key and SYSRESETREQ. */
+/* Anything that nobody expects: the board starts anew, which the host sees by another boot id.
+ * PM0214 "AIRCR": key and SYSRESETREQ. */
 void restart(void) {
   SCB_AIRCR = 0x05FA0004U;
   for (;;) {
@@ -24,7 +26,8 @@ typedef union {
 __attribute__((section(".vectors"), used)) static const Vector kVectors[16 + irq_count] = {
     [0] = {.stack = &stack_top},
     [1] = {.handler = reset_handler},
-    [2] = UNEXPECTED, /* NMI: the clock security system found the crystal dead; the next start runs on the internal oscillator */
+    [2] = UNEXPECTED, /* NMI: the clock security system found the crystal dead; the next start runs
+                         on the internal oscillator */
     [3] = UNEXPECTED,
     [4] = UNEXPECTED,
     [5] = {.handler = bus_fault_handler},

@@ -27,18 +27,24 @@ void expect_recovered(const BoardCalibration& c, const RigCalibration& truth, do
   ASSERT_EQ(c.complaint, "");
   for (std::size_t k = 0; k < static_cast<std::size_t>(truth.cameras); ++k) {
     const Intrinsics &found = c.rig.intrinsics[k], &real = truth.intrinsics[k];
-    const std::array off{found.fx - real.fx, found.fy - real.fy, found.cx - real.cx, found.cy - real.cy};
-    for (std::size_t i = 0; i < 4; ++i) EXPECT_LT(std::abs(off[i]), sigmas * found.sigma[i]) << "camera " << k << " intrinsics " << i;
+    const std::array off{found.fx - real.fx, found.fy - real.fy, found.cx - real.cx,
+                         found.cy - real.cy};
     for (std::size_t i = 0; i < 4; ++i)
-      EXPECT_LT(std::abs(found.distortion[i] - real.distortion[i]), sigmas * c.cameras[k].distortion_sigma[i]) << k << " " << i;
+      EXPECT_LT(std::abs(off[i]), sigmas * found.sigma[i]) << "camera " << k << " intrinsics " << i;
+    for (std::size_t i = 0; i < 4; ++i)
+      EXPECT_LT(std::abs(found.distortion[i] - real.distortion[i]),
+                sigmas * c.cameras[k].distortion_sigma[i])
+          << k << " " << i;
     if (k == 0) continue;
     const Vec6 e = place_error(c.rig.T_camera_left[k], truth.T_camera_left[k]);
     for (int i = 0; i < 6; ++i)
-      EXPECT_LT(std::abs(e(i)), sigmas * c.rig.sigma_wide[k][static_cast<std::size_t>(i)]) << "camera " << k << " place " << i;
+      EXPECT_LT(std::abs(e(i)), sigmas * c.rig.sigma_wide[k][static_cast<std::size_t>(i)])
+          << "camera " << k << " place " << i;
   }
 }
 
-// 26 to 42 numbers a case: one in 10⁴ of a normal distribution lies outside 4 sigma, one in 400 outside 3. The seeds are fixed.
+// 26 to 42 numbers a case: one in 10⁴ of a normal distribution lies outside 4 sigma, one in 400
+// outside 3. The seeds are fixed.
 TEST(BoardCalibration, aStereoRigIsRecoveredWithinItsSigmas) {
   for (const auto kind : {CameraModelKind::pinhole_radtan, CameraModelKind::pinhole_equidistant}) {
     const RigCalibration truth = known_rig(2, kind);
@@ -68,7 +74,8 @@ TEST(BoardCalibration, oneCameraAloneIsRecovered) {
   const BoardScene scene = board_scene(truth, kBoard, 12, kNoise, 5);
   const BoardCalibration c = calibrate_boards(scene.views, board_options(truth, kBoard));
   expect_recovered(c, truth, 3);
-  EXPECT_NEAR(c.cameras[0].alone_rms_px, c.cameras[0].rms_px, 1e-6) << "OpenCV and the joint adjustment answer the same question";
+  EXPECT_NEAR(c.cameras[0].alone_rms_px, c.cameras[0].rms_px, 1e-6)
+      << "OpenCV and the joint adjustment answer the same question";
 }
 
 TEST(BoardCalibration, sigmasHoldUpOverSeeds) {
@@ -98,7 +105,8 @@ TEST(BoardCalibration, theJackknifeAgreesWithTheSigmasWhereNoiseIsAllThereIs) {
   const BoardScene scene = board_scene(truth, kBoard, 30, kNoise, 6);
   const BoardCalibration c = calibrate_boards(scene.views, board_options(truth, kBoard));
   ASSERT_EQ(c.complaint, "");
-  for (std::size_t i = 0; i < 6; ++i) {  // 29 degrees of freedom: 13 % is one sigma, and the views differ in weight
+  for (std::size_t i = 0; i < 6;
+       ++i) {  // 29 degrees of freedom: 13 % is one sigma, and the views differ in weight
     EXPECT_GT(c.between[1][i], 0.5 * c.rig.sigma_wide[1][i]) << i;
     EXPECT_LT(c.between[1][i], 2.0 * c.rig.sigma_wide[1][i]) << i;
   }
@@ -118,7 +126,8 @@ TEST(BoardCalibration, theJackknifeIsWhatLeavingOutViewsDoes) {
     const Vec6 moved = place_error(rest.rig.T_camera_left[1], all.rig.T_camera_left[1]);
     const Vec6 told = s.without.row(static_cast<Eigen::Index>(v)).tail<6>().transpose();
     for (int i = 0; i < 6; ++i)
-      EXPECT_NEAR(told(i), moved(i), 0.1 * std::sqrt(s.covariance(16 + i, 16 + i))) << "view " << v << " number " << i;
+      EXPECT_NEAR(told(i), moved(i), 0.1 * std::sqrt(s.covariance(16 + i, 16 + i)))
+          << "view " << v << " number " << i;
   }
 }
 
@@ -135,7 +144,8 @@ TEST(BoardCalibration, aPairOfImagesThatDoNotBelongTogetherIsRefusedAndNothingEl
 TEST(BoardCalibration, aBoardThatMovedBetweenTheExposuresIsRefused) {
   const RigCalibration truth = known_rig(2, CameraModelKind::pinhole_radtan);
   BoardScene scene = board_scene(truth, kBoard, 14, kNoise, 10);
-  for (Vec2& corner : scene.views[7].corners[1]) corner.y() += 2.5;  // px: half of it goes into the board's pose
+  for (Vec2& corner : scene.views[7].corners[1])
+    corner.y() += 2.5;  // px: half of it goes into the board's pose
   const BoardCalibration c = calibrate_boards(scene.views, board_options(truth, kBoard));
   expect_recovered(c, truth, 4);
   EXPECT_FALSE(c.views[7].used);
@@ -155,7 +165,8 @@ TEST(BoardCalibration, viewsThatDetermineNothingAreSaidToBeThat) {
   BoardScene scene = board_scene(truth, kBoard, 3, kNoise, 12);
   scene.views.pop_back();
   EXPECT_THROW((void)calibrate_boards(scene.views, board_options(truth, kBoard)), InputError);
-  scene.views.assign(6, scene.views.front());  // one board pose six times: its focal length is anybody's guess
+  scene.views.assign(
+      6, scene.views.front());  // one board pose six times: its focal length is anybody's guess
   const BoardCalibration c = calibrate_boards(scene.views, board_options(truth, kBoard));
   if (c.complaint.empty()) {
     EXPECT_GT(c.rig.intrinsics[0].sigma[0], 1) << "px: not known, and said so";
@@ -164,9 +175,11 @@ TEST(BoardCalibration, viewsThatDetermineNothingAreSaidToBeThat) {
 
 TEST(Checkerboard, onlyBoardsThatCanBeToldArePermitted) {
   EXPECT_EQ(parse_checkerboard("9x6", 0.1).corners(), 54U);
-  for (const char* bad : {"", "9", "9x", "x6", "9x6x", "9 x 6", "2x6", "-9x6", "1000x6", "6x6", "9X6"})
+  for (const char* bad :
+       {"", "9", "9x", "x6", "9x6x", "9 x 6", "2x6", "-9x6", "1000x6", "6x6", "9X6"})
     EXPECT_THROW((void)parse_checkerboard(bad, 0.1), InputError) << bad;
-  for (const double bad : {0.0, -0.1, 25.0, std::nan("")}) EXPECT_THROW((void)parse_checkerboard("9x6", bad), InputError) << bad;
+  for (const double bad : {0.0, -0.1, 25.0, std::nan("")})
+    EXPECT_THROW((void)parse_checkerboard("9x6", bad), InputError) << bad;
   EXPECT_TRUE(parse_checkerboard("9x6", 0.1).tells_its_ends());
   EXPECT_FALSE(parse_checkerboard("8x6", 0.1).tells_its_ends());
 }

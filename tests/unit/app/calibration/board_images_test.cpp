@@ -21,12 +21,16 @@ TEST(BoardImages, patternsNameFilesInOrderAndOnce) {
 
 TEST(BoardImages, viewsArePairedByNumberWhereSomeAreMissingElseByOrder) {
   std::vector<std::string> remarks;
-  auto views = group_views({{"left01.png", "left02.png", "left04.png"}, {"right01.png", "right03.png", "right04.png"}}, &remarks);
-  EXPECT_EQ(views, (std::vector<Paths>{{"left01.png", "right01.png"}, {"left04.png", "right04.png"}}));
+  auto views = group_views(
+      {{"left01.png", "left02.png", "left04.png"}, {"right01.png", "right03.png", "right04.png"}},
+      &remarks);
+  EXPECT_EQ(views,
+            (std::vector<Paths>{{"left01.png", "right01.png"}, {"left04.png", "right04.png"}}));
   EXPECT_EQ(remarks.size(), 2U);
   remarks.clear();
   views = group_views({{"a10.png", "a11.png"}, {"b20.png", "b21.png"}}, &remarks);
-  EXPECT_EQ(views, (std::vector<Paths>{{"a10.png", "b20.png"}, {"a11.png", "b21.png"}})) << "numbers that have nothing in common";
+  EXPECT_EQ(views, (std::vector<Paths>{{"a10.png", "b20.png"}, {"a11.png", "b21.png"}}))
+      << "numbers that have nothing in common";
   EXPECT_TRUE(remarks.empty());
   views = group_views({{"a.png", "b.png"}, {"c.png", "d.png"}}, &remarks);
   EXPECT_EQ(views[1], (Paths{"b.png", "d.png"}));

@@ -27,8 +27,10 @@ struct Reference {
 };
 
 Vec2 project(const Reference& r, const Vec3& X_left) {
-  const cv::Mat in_camera = r.R * (cv::Mat_<double>(3, 1) << X_left.x(), X_left.y(), X_left.z()) + r.t;
-  const std::vector<cv::Point3d> X{{in_camera.at<double>(0), in_camera.at<double>(1), in_camera.at<double>(2)}};
+  const cv::Mat in_camera =
+      r.R * (cv::Mat_<double>(3, 1) << X_left.x(), X_left.y(), X_left.z()) + r.t;
+  const std::vector<cv::Point3d> X{
+      {in_camera.at<double>(0), in_camera.at<double>(1), in_camera.at<double>(2)}};
   const cv::Mat none = cv::Mat::zeros(3, 1, CV_64F);
   std::vector<cv::Point2d> x;
   if (r.fisheye)
@@ -83,7 +85,8 @@ CalibrationFile ours(CameraModelKind kind, int cameras = 2) {
   CalibrationFile c;
   c.rig = test::known_rig(cameras, kind);
   for (std::size_t k = 1; k < static_cast<std::size_t>(cameras); ++k)
-    c.rig.T_camera_left[k].R = normalised(exp_so3(Vec3(0.02, -0.05, 0.013)) * c.rig.T_camera_left[k].R);
+    c.rig.T_camera_left[k].R =
+        normalised(exp_so3(Vec3(0.02, -0.05, 0.013)) * c.rig.T_camera_left[k].R);
   c.names = {"port", "starboard", "bow", "stern"};
   c.serials[0] = "4711";
   return c;
@@ -91,15 +94,19 @@ CalibrationFile ours(CameraModelKind kind, int cameras = 2) {
 
 constexpr std::array kModels{CameraModelKind::pinhole_radtan, CameraModelKind::pinhole_equidistant};
 
-cv::Mat diagonal(double fx, double fy, double cx, double cy) { return (cv::Mat_<double>(3, 3) << fx, 0, cx, 0, fy, cy, 0, 0, 1); }
+cv::Mat diagonal(double fx, double fy, double cx, double cy) {
+  return (cv::Mat_<double>(3, 3) << fx, 0, cx, 0, fy, cy, 0, 0, 1);
+}
 
 cv::Mat matrix(const YAML::Node& list, int rows, int columns) {
   cv::Mat m(rows, columns, CV_64F);
-  for (int i = 0; i < rows * columns; ++i) m.at<double>(i / columns, i % columns) = list[static_cast<std::size_t>(i)].as<double>();
+  for (int i = 0; i < rows * columns; ++i)
+    m.at<double>(i / columns, i % columns) = list[static_cast<std::size_t>(i)].as<double>();
   return m;
 }
 
-// ---- Kalibr -------------------------------------------------------------------------------------------------------------
+// ---- Kalibr
+// -------------------------------------------------------------------------------------------------------------
 
 /// By Kalibr's own words: X_cn = T_cn_cnm1 X_cn-1, one after the other.
 std::vector<Reference> reference_of_camchain(const std::string& text) {
@@ -111,13 +118,17 @@ std::vector<Reference> reference_of_camchain(const std::string& text) {
     if (k > 0) {
       cv::Mat step(4, 4, CV_64F);
       for (int i = 0; i < 16; ++i)
-        step.at<double>(i / 4, i % 4) = cam["T_cn_cnm1"][static_cast<std::size_t>(i / 4)][static_cast<std::size_t>(i % 4)].as<double>();
+        step.at<double>(i / 4, i % 4) =
+            cam["T_cn_cnm1"][static_cast<std::size_t>(i / 4)][static_cast<std::size_t>(i % 4)]
+                .as<double>();
       before = step * before;
     }
     const auto f = cam["intrinsics"].as<std::vector<double>>();
-    Reference r{diagonal(f[0], f[1], f[2], f[3]), cv::Mat::zeros(4, 1, CV_64F), before(cv::Rect(0, 0, 3, 3)).clone(),
-                before(cv::Rect(3, 0, 1, 3)).clone(), cam["distortion_model"].as<std::string>() == "equidistant"};
-    if (cam["distortion_model"].as<std::string>() != "none") r.D = matrix(cam["distortion_coeffs"], 4, 1);
+    Reference r{diagonal(f[0], f[1], f[2], f[3]), cv::Mat::zeros(4, 1, CV_64F),
+                before(cv::Rect(0, 0, 3, 3)).clone(), before(cv::Rect(3, 0, 1, 3)).clone(),
+                cam["distortion_model"].as<std::string>() == "equidistant"};
+    if (cam["distortion_model"].as<std::string>() != "none")
+      r.D = matrix(cam["distortion_coeffs"], 4, 1);
     references.push_back(r);
   }
   return references;
@@ -196,7 +207,8 @@ TEST(Kalibr, aThirdCoefficientOfRadiusHasNoPlaceAndIsNotDropped) {
   EXPECT_THROW((void)format_kalibr(c, &remarks), InputError);
 }
 
-// ---- ROS ----------------------------------------------------------------------------------------------------------------
+// ---- ROS
+// ----------------------------------------------------------------------------------------------------------------
 
 struct Info {
   cv::Mat K, D, R, P;
@@ -206,42 +218,56 @@ struct Info {
 Info info_of(const std::string& text) {
   const YAML::Node root = YAML::Load(text);
   const int d = root["distortion_coefficients"]["cols"].as<int>();
-  return {matrix(root["camera_matrix"]["data"], 3, 3), matrix(root["distortion_coefficients"]["data"], 1, d),
-          matrix(root["rectification_matrix"]["data"], 3, 3), matrix(root["projection_matrix"]["data"], 3, 4),
+  return {matrix(root["camera_matrix"]["data"], 3, 3),
+          matrix(root["distortion_coefficients"]["data"], 1, d),
+          matrix(root["rectification_matrix"]["data"], 3, 3),
+          matrix(root["projection_matrix"]["data"], 3, 4),
           root["distortion_model"].as<std::string>() == "equidistant"};
 }
 
-/// By the definition of sensor_msgs/CameraInfo: a point X of the rectified left camera has the pixel P (X, 1) in each rectified image,
-/// and lies at R⁻¹ K'⁻¹ (pixel, 1) · depth in the camera itself, where K and D make the raw image of it.
+/// By the definition of sensor_msgs/CameraInfo: a point X of the rectified left camera has the
+/// pixel P (X, 1) in each rectified image, and lies at R⁻¹ K'⁻¹ (pixel, 1) · depth in the camera
+/// itself, where K and D make the raw image of it.
 void expect_camera_info(const CalibrationFile& c, const Info& l, const Info& r) {
   for (const Vec3& X_left : points()) {
     const cv::Mat X = (cv::Mat_<double>(3, 1) << X_left.x(), X_left.y(), X_left.z());
     cv::Mat rectified(4, 1, CV_64F, 1.0);
     rectified.rowRange(0, 3) = l.R * X;
     const cv::Mat pixel = r.P * rectified;
-    const cv::Mat X_right = r.R.t() * r.P.colRange(0, 3).inv() * pixel;  // homogeneous pixel keeps its depth
-    const Reference in_left{l.K, l.D, cv::Mat::eye(3, 3, CV_64F), cv::Mat::zeros(3, 1, CV_64F), l.fisheye};
-    const Reference in_right{r.K, r.D, cv::Mat::eye(3, 3, CV_64F), cv::Mat::zeros(3, 1, CV_64F), r.fisheye};
+    const cv::Mat X_right =
+        r.R.t() * r.P.colRange(0, 3).inv() * pixel;  // homogeneous pixel keeps its depth
+    const Reference in_left{l.K, l.D, cv::Mat::eye(3, 3, CV_64F), cv::Mat::zeros(3, 1, CV_64F),
+                            l.fisheye};
+    const Reference in_right{r.K, r.D, cv::Mat::eye(3, 3, CV_64F), cv::Mat::zeros(3, 1, CV_64F),
+                             r.fisheye};
     Vec2 x_left, x_right;
     ASSERT_EQ(Camera(c.rig.intrinsics[0]).project(X_left, &x_left, nullptr), ProjectStatus::ok);
-    ASSERT_EQ(Camera(c.rig.intrinsics[1]).project(c.rig.T_camera_left[1] * X_left, &x_right, nullptr), ProjectStatus::ok);
+    ASSERT_EQ(
+        Camera(c.rig.intrinsics[1]).project(c.rig.T_camera_left[1] * X_left, &x_right, nullptr),
+        ProjectStatus::ok);
     ASSERT_LT((x_left - project(in_left, X_left)).norm(), kSamePixel);
-    ASSERT_LT((x_right - project(in_right, {X_right.at<double>(0), X_right.at<double>(1), X_right.at<double>(2)})).norm(), kSamePixel);
+    ASSERT_LT((x_right - project(in_right, {X_right.at<double>(0), X_right.at<double>(1),
+                                            X_right.at<double>(2)}))
+                  .norm(),
+              kSamePixel);
     // Rectified rows are the same in both images: what camera_info is for.
     const cv::Mat left_pixel = l.P * rectified;
-    ASSERT_NEAR(left_pixel.at<double>(1) / left_pixel.at<double>(2), pixel.at<double>(1) / pixel.at<double>(2), 1e-8);
+    ASSERT_NEAR(left_pixel.at<double>(1) / left_pixel.at<double>(2),
+                pixel.at<double>(1) / pixel.at<double>(2), 1e-8);
   }
 }
 
 TEST(RosCameraInfo, whatIsWrittenProjectsAsOursAndReadsBack) {
   for (const auto kind : kModels) {
     CalibrationFile c = ours(kind);
-    if (kind == CameraModelKind::pinhole_radtan) c.rig.intrinsics[0].distortion[4] = -0.004;  // k3 has its place here
+    if (kind == CameraModelKind::pinhole_radtan)
+      c.rig.intrinsics[0].distortion[4] = -0.004;  // k3 has its place here
     Remarks remarks;
     const auto [left, right] = format_ros(c, &remarks);
     expect_camera_info(c, info_of(left), info_of(right));
     EXPECT_LT(info_of(right).P.at<double>(0, 3), 0) << "−fx B of a camera on the right";
-    const CalibrationFile back = read_ros(YamlFile::parse(left, "left.yaml"), YamlFile::parse(right, "right.yaml"), &remarks);
+    const CalibrationFile back = read_ros(YamlFile::parse(left, "left.yaml"),
+                                          YamlFile::parse(right, "right.yaml"), &remarks);
     expect_same(c, back);
     EXPECT_EQ(back.names[0], "port");
   }
@@ -254,27 +280,38 @@ TEST(RosCameraInfo, aPairFromOpenCvsOwnRectificationIsReadAsItProjects) {
   for (std::size_t k = 0; k < 2; ++k) {
     const Intrinsics& lens = truth.rig.intrinsics[k];
     K[k] = diagonal(lens.fx, lens.fy, lens.cx, lens.cy);
-    D[k] = (cv::Mat_<double>(1, 5) << lens.distortion[0], lens.distortion[1], lens.distortion[2], lens.distortion[3], 0);
+    D[k] = (cv::Mat_<double>(1, 5) << lens.distortion[0], lens.distortion[1], lens.distortion[2],
+            lens.distortion[3], 0);
   }
   const Transform& T = truth.rig.T_camera_left[1];
-  cv::Mat R(3, 3, CV_64F), t = (cv::Mat_<double>(3, 1) << T.t.x(), T.t.y(), T.t.z()), R1, R2, P1, P2, Q;
+  cv::Mat R(3, 3, CV_64F), t = (cv::Mat_<double>(3, 1) << T.t.x(), T.t.y(), T.t.z()), R1, R2, P1,
+                           P2, Q;
   for (int i = 0; i < 9; ++i) R.at<double>(i / 3, i % 3) = T.R(i / 3, i % 3);
   cv::stereoRectify(K[0], D[0], K[1], D[1], {640, 480}, R, t, R1, R2, P1, P2, Q, 0, 1, {640, 480});
-  const auto list = [](const cv::Mat& m) { return fmt::format("[{}]", fmt::join(m.begin<double>(), m.end<double>(), ", ")); };
+  const auto list = [](const cv::Mat& m) {
+    return fmt::format("[{}]", fmt::join(m.begin<double>(), m.end<double>(), ", "));
+  };
   for (std::size_t k = 0; k < 2; ++k) {
-    const std::string d = k == 0 ? "plumb_bob\ndistortion_coefficients: {rows: 1, cols: 5, data: " + list(D[k]) + "}"
-                                 : "rational_polynomial\ndistortion_coefficients: {rows: 1, cols: 8, data: [" +
-                                       fmt::format("{}, 0, 0, 0]}}", fmt::join(D[k].begin<double>(), D[k].end<double>(), ", "));
-    text[k] = "image_width: 640\nimage_height: 480\ncamera_name: narrow_stereo\ncamera_matrix: {rows: 3, cols: 3, data: " + list(K[k]) +
-              "}\ndistortion_model: " + d + "\nrectification_matrix: {rows: 3, cols: 3, data: " + list(k == 0 ? R1 : R2) +
-              "}\nprojection_matrix: {rows: 3, cols: 4, data: " + list(k == 0 ? P1 : P2) + "}\n";
+    const std::string d =
+        k == 0 ? "plumb_bob\ndistortion_coefficients: {rows: 1, cols: 5, data: " + list(D[k]) + "}"
+               : "rational_polynomial\ndistortion_coefficients: {rows: 1, cols: 8, data: [" +
+                     fmt::format("{}, 0, 0, 0]}}",
+                                 fmt::join(D[k].begin<double>(), D[k].end<double>(), ", "));
+    text[k] =
+        "image_width: 640\nimage_height: 480\ncamera_name: narrow_stereo\ncamera_matrix: {rows: 3, "
+        "cols: 3, data: " +
+        list(K[k]) + "}\ndistortion_model: " + d +
+        "\nrectification_matrix: {rows: 3, cols: 3, data: " + list(k == 0 ? R1 : R2) +
+        "}\nprojection_matrix: {rows: 3, cols: 4, data: " + list(k == 0 ? P1 : P2) + "}\n";
   }
   Remarks remarks;
-  const CalibrationFile c = read_ros(YamlFile::parse(text[0], "l.yaml"), YamlFile::parse(text[1], "r.yaml"), &remarks);
+  const CalibrationFile c =
+      read_ros(YamlFile::parse(text[0], "l.yaml"), YamlFile::parse(text[1], "r.yaml"), &remarks);
   expect_same(truth, c);
 }
 
-// ---- OpenCV -------------------------------------------------------------------------------------------------------------
+// ---- OpenCV
+// -------------------------------------------------------------------------------------------------------------
 
 TEST(OpenCvStereo, whatIsWrittenIsReadByOpenCvAndProjectsAsOurs) {
   for (const auto kind : kModels) {
@@ -283,10 +320,15 @@ TEST(OpenCvStereo, whatIsWrittenIsReadByOpenCvAndProjectsAsOurs) {
     const auto parts = format_opencv(c, &remarks);
     const std::string text = "%YAML:1.0\n---\n" + parts[0] + parts[1];
     cv::FileStorage file(text, cv::FileStorage::READ | cv::FileStorage::MEMORY);
-    Reference left{{}, {}, cv::Mat::eye(3, 3, CV_64F), cv::Mat::zeros(3, 1, CV_64F), kind == CameraModelKind::pinhole_equidistant};
+    Reference left{{},
+                   {},
+                   cv::Mat::eye(3, 3, CV_64F),
+                   cv::Mat::zeros(3, 1, CV_64F),
+                   kind == CameraModelKind::pinhole_equidistant};
     Reference right;
     right.fisheye = left.fisheye;
-    file["M1"] >> left.K, file["D1"] >> left.D, file["M2"] >> right.K, file["D2"] >> right.D, file["R"] >> right.R, file["T"] >> right.t;
+    file["M1"] >> left.K, file["D1"] >> left.D, file["M2"] >> right.K, file["D2"] >> right.D,
+        file["R"] >> right.R, file["T"] >> right.t;
     expect_same(c, {left, right});
     expect_same(c, read_opencv({parse_opencv_yaml(text, "stereo.yml")}, std::nullopt, &remarks));
   }
@@ -297,14 +339,16 @@ TEST(OpenCvStereo, whatOpenCvWritesIsReadAsItProjectsUnderEachOfItsNames) {
   struct Names {
     const char *M1, *D1, *M2, *D2, *R, *T;
   };
-  for (const Names& n : {Names{"M1", "D1", "M2", "D2", "R", "T"}, Names{"K1", "D1", "K2", "D2", "R", "T"},
-                         Names{"cameraMatrix1", "distCoeffs1", "cameraMatrix2", "distCoeffs2", "R", "T"}}) {
+  for (const Names& n :
+       {Names{"M1", "D1", "M2", "D2", "R", "T"}, Names{"K1", "D1", "K2", "D2", "R", "T"},
+        Names{"cameraMatrix1", "distCoeffs1", "cameraMatrix2", "distCoeffs2", "R", "T"}}) {
     std::array<Reference, 2> references;
     for (std::size_t k = 0; k < 2; ++k) {
       const Intrinsics& lens = truth.rig.intrinsics[k];
       references[k].K = diagonal(lens.fx, lens.fy, lens.cx, lens.cy);
       references[k].D = cv::Mat::zeros(1, 14, CV_64F);
-      for (int i = 0; i < 5; ++i) references[k].D.at<double>(i) = lens.distortion[static_cast<std::size_t>(i)];
+      for (int i = 0; i < 5; ++i)
+        references[k].D.at<double>(i) = lens.distortion[static_cast<std::size_t>(i)];
       const Transform& T = truth.rig.T_camera_left[k];
       references[k].t = (cv::Mat_<double>(3, 1) << T.t.x(), T.t.y(), T.t.z());
       references[k].R = cv::Mat(3, 3, CV_64F);
@@ -313,26 +357,30 @@ TEST(OpenCvStereo, whatOpenCvWritesIsReadAsItProjectsUnderEachOfItsNames) {
     // As the sample does: lenses in one file, places in another.
     cv::FileStorage lenses("a.yml", cv::FileStorage::WRITE | cv::FileStorage::MEMORY),
         places("b.yml", cv::FileStorage::WRITE | cv::FileStorage::MEMORY);
-    lenses << n.M1 << references[0].K << n.D1 << references[0].D << n.M2 << references[1].K << n.D2 << references[1].D;
+    lenses << n.M1 << references[0].K << n.D1 << references[0].D << n.M2 << references[1].K << n.D2
+           << references[1].D;
     places << n.R << references[1].R << n.T << references[1].t;
-    const std::vector<YamlFile> files{parse_opencv_yaml(lenses.releaseAndGetString(), "intrinsics.yml"),
-                                      parse_opencv_yaml(places.releaseAndGetString(), "extrinsics.yml")};
+    const std::vector<YamlFile> files{
+        parse_opencv_yaml(lenses.releaseAndGetString(), "intrinsics.yml"),
+        parse_opencv_yaml(places.releaseAndGetString(), "extrinsics.yml")};
     Remarks remarks;
     EXPECT_THROW((void)read_opencv(files, std::nullopt, &remarks), InputError) << "no size";
     expect_same(read_opencv(files, ImageSize{640, 480}, &remarks), {references[0], references[1]});
   }
 }
 
-// ---- all of them --------------------------------------------------------------------------------------------------------
+// ---- all of them
+// --------------------------------------------------------------------------------------------------------
 
 TEST(Conversion, everyFormatToEveryOtherAndBackIsTheSameRig) {
   const test::TemporaryFolder folder;
   for (const auto kind : kModels) {
     const CalibrationFile c = ours(kind);
-    const std::array<std::pair<CalibrationFormat, std::string>, 4> kOuts{{{CalibrationFormat::vergence, (folder / "c.yaml").string()},
-                                                                          {CalibrationFormat::kalibr, (folder / "camchain.yaml").string()},
-                                                                          {CalibrationFormat::ros, (folder / "ros").string() + "/"},
-                                                                          {CalibrationFormat::opencv, (folder / "stereo.yml").string()}}};
+    const std::array<std::pair<CalibrationFormat, std::string>, 4> kOuts{
+        {{CalibrationFormat::vergence, (folder / "c.yaml").string()},
+         {CalibrationFormat::kalibr, (folder / "camchain.yaml").string()},
+         {CalibrationFormat::ros, (folder / "ros").string() + "/"},
+         {CalibrationFormat::opencv, (folder / "stereo.yml").string()}}};
     for (const auto& [first, in] : kOuts) {
       Remarks remarks;
       write_any_calibration(in, first, c, &remarks);
@@ -357,10 +405,14 @@ TEST(Conversion, namesAndSerialsSurviveWhereTheyHaveAPlace) {
   Remarks remarks;
   write_any_calibration((folder / "c.yaml").string(), CalibrationFormat::vergence, c, &remarks);
   EXPECT_TRUE(remarks.empty());
-  const CalibrationFile same = read_any_calibration((folder / "c.yaml").string(), std::nullopt, &remarks);
+  const CalibrationFile same =
+      read_any_calibration((folder / "c.yaml").string(), std::nullopt, &remarks);
   EXPECT_EQ(same.serials[0], "4711");
-  write_any_calibration((folder / "camchain.yaml").string(), CalibrationFormat::kalibr, c, &remarks);
-  EXPECT_EQ(read_any_calibration((folder / "camchain.yaml").string(), std::nullopt, &remarks).names[1], "starboard");
+  write_any_calibration((folder / "camchain.yaml").string(), CalibrationFormat::kalibr, c,
+                        &remarks);
+  EXPECT_EQ(
+      read_any_calibration((folder / "camchain.yaml").string(), std::nullopt, &remarks).names[1],
+      "starboard");
   ASSERT_FALSE(remarks.empty());
 }
 
@@ -393,11 +445,18 @@ TEST(Conversion, spoiltFilesAreRefusedWithFileAndKey) {
       {"just words", "", "is not a group of keys"},
       {"a: [1, 2", "", "is not YAML"},
       {"a: 1", "", "is no calibration that this program knows"},
-      {replaced(kCamchain, "camera_model: pinhole", "camera_model: omni"), "", "cam0.camera_model is \"omni\""},
-      {replaced(kCamchain, "distortion_model: radtan", "distortion_model: fov"), "", "cam0.distortion_model is \"fov\""},
-      {replaced(kCamchain, "[458.654, 457.296, 367.215, 248.375]", "[458.654, .nan, 367.215, 248.375]"), "", "cam0.intrinsics"},
-      {replaced(kCamchain, "[458.654, 457.296, 367.215, 248.375]", "[458.654, 1e308, 367.215, 248.375]"), "", "cameras.0.intrinsics"},
-      {replaced(kCamchain, "[458.654, 457.296, 367.215, 248.375]", "[458.654, 457.296]"), "", "cam0.intrinsics has 2 numbers"},
+      {replaced(kCamchain, "camera_model: pinhole", "camera_model: omni"), "",
+       "cam0.camera_model is \"omni\""},
+      {replaced(kCamchain, "distortion_model: radtan", "distortion_model: fov"), "",
+       "cam0.distortion_model is \"fov\""},
+      {replaced(kCamchain, "[458.654, 457.296, 367.215, 248.375]",
+                "[458.654, .nan, 367.215, 248.375]"),
+       "", "cam0.intrinsics"},
+      {replaced(kCamchain, "[458.654, 457.296, 367.215, 248.375]",
+                "[458.654, 1e308, 367.215, 248.375]"),
+       "", "cameras.0.intrinsics"},
+      {replaced(kCamchain, "[458.654, 457.296, 367.215, 248.375]", "[458.654, 457.296]"), "",
+       "cam0.intrinsics has 2 numbers"},
       {replaced(kCamchain, "[752, 480]", "[752]"), "", "cam0.resolution"},
       {replaced(kCamchain, "[752, 480]", "[99999999999, 480]"), "", "cam0.resolution"},
       {replaced(kCamchain, "  T_cn_cnm1:", "  T_c1_c0:"), "", "cam1.T_cn_cnm1 is missing"},
@@ -420,19 +479,24 @@ TEST(Conversion, spoiltFilesAreRefusedWithFileAndKey) {
   for (std::size_t i = 0; i < cases.size(); ++i) {
     std::string in = folder.write("in.yaml", cases[i].text).string();
     if (!cases[i].second.empty()) in += "," + folder.write("second.yaml", cases[i].second).string();
-    const std::string said = complaint([&] { (void)read_any_calibration(in, std::nullopt, &none); });
+    const std::string said =
+        complaint([&] { (void)read_any_calibration(in, std::nullopt, &none); });
     EXPECT_NE(said.find(cases[i].key), std::string::npos) << "case " << i << " said: " << said;
     EXPECT_EQ(said.find('\n'), std::string::npos) << said;
     EXPECT_NE(said.find(folder.path().string()), std::string::npos) << "which file: " << said;
   }
-  EXPECT_THROW((void)read_any_calibration((folder / "none").string(), std::nullopt, &none), InputError);
+  EXPECT_THROW((void)read_any_calibration((folder / "none").string(), std::nullopt, &none),
+               InputError);
 }
 
 TEST(Conversion, rationalLensesAreRefusedUnlessTheyAreNone) {
   Remarks none;
   const auto parts = format_opencv(ours(kModels[0]), &none);
-  const std::string more = replaced(replaced(parts[0], "cols: 5", "cols: 8"), "-0.0005, 0]", "-0.0005, 0, 0, 0, 0.02]") + parts[1];
-  const std::string said = complaint([&] { (void)read_opencv({parse_opencv_yaml(more, "m.yml")}, std::nullopt, &none); });
+  const std::string more =
+      replaced(replaced(parts[0], "cols: 5", "cols: 8"), "-0.0005, 0]", "-0.0005, 0, 0, 0, 0.02]") +
+      parts[1];
+  const std::string said = complaint(
+      [&] { (void)read_opencv({parse_opencv_yaml(more, "m.yml")}, std::nullopt, &none); });
   EXPECT_NE(said.find("D1 has a sixth or later coefficient"), std::string::npos) << said;
 }
 
@@ -445,8 +509,12 @@ TEST(Conversion, aFileWithSomeBytesChangedIsReadOrRefusedAndNothingElse) {
   Random random(77);
   int refused = 0;
   for (int run = 0; run < 300; ++run) {
-    std::string text = run % 3 == 0 ? kCamchain : run % 3 == 1 ? left : "%YAML:1.0\n---\n" + parts[0] + parts[1];
-    for (int i = 0; i < 4; ++i) text[random.below(static_cast<std::uint32_t>(text.size()))] = static_cast<char>(random.below(256));
+    std::string text = run % 3 == 0   ? kCamchain
+                       : run % 3 == 1 ? left
+                                      : "%YAML:1.0\n---\n" + parts[0] + parts[1];
+    for (int i = 0; i < 4; ++i)
+      text[random.below(static_cast<std::uint32_t>(text.size()))] =
+          static_cast<char>(random.below(256));
     if (run % 5 == 0) text.resize(random.below(static_cast<std::uint32_t>(text.size())));
     std::string in = folder.write("in.yaml", text).string();
     if (run % 3 == 1) in += "," + second;
@@ -457,7 +525,8 @@ TEST(Conversion, aFileWithSomeBytesChangedIsReadOrRefusedAndNothingElse) {
 
 TEST(Conversion, wordsOfTheCommandLineAreChecked) {
   EXPECT_EQ(parse_format("ros"), CalibrationFormat::ros);
-  EXPECT_NE(complaint([] { (void)parse_format("kalbr"); }).find("did you mean \"kalibr\""), std::string::npos);
+  EXPECT_NE(complaint([] { (void)parse_format("kalbr"); }).find("did you mean \"kalibr\""),
+            std::string::npos);
   EXPECT_EQ(parse_size("640x480"), (ImageSize{640, 480}));
   for (const char* bad : {"", "640", "640x", "x480", "640x-1", "640x480x3", "640*480"})
     EXPECT_THROW((void)parse_size(bad), InputError) << bad;

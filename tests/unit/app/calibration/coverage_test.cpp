@@ -18,7 +18,9 @@ using test::shown_around;
 
 const Checkerboard kBoard = parse_checkerboard("9x6", 0.04);
 
-Coverage nothing_yet(const RigCalibration& rig) { return {kBoard, {"left", "right"}, {{640, 480}, {640, 480}}, rig.intrinsics[0].fx}; }
+Coverage nothing_yet(const RigCalibration& rig) {
+  return {kBoard, {"left", "right"}, {{640, 480}, {640, 480}}, rig.intrinsics[0].fx};
+}
 
 std::string all(const std::vector<std::string>& needs) {
   std::string text;
@@ -26,12 +28,16 @@ std::string all(const std::vector<std::string>& needs) {
   return text;
 }
 
-bool contains(const std::string& text, const std::string& part) { return text.find(part) != std::string::npos; }
+bool contains(const std::string& text, const std::string& part) {
+  return text.find(part) != std::string::npos;
+}
 
 /// Face to face at a place in the left image, in shares of it.
-Transform flat(const RigCalibration& rig, double right, double down, double extent, const Vec3& turn = Vec3::Zero()) {
+Transform flat(const RigCalibration& rig, double right, double down, double extent,
+               const Vec3& turn = Vec3::Zero()) {
   const Intrinsics& lens = rig.intrinsics[0];
-  const double width = kBoard.square * (kBoard.columns - 1), height = kBoard.square * (kBoard.rows - 1);
+  const double width = kBoard.square * (kBoard.columns - 1),
+               height = kBoard.square * (kBoard.rows - 1);
   const double far = lens.fx * width / (lens.width * extent);
   const Mat3 R = exp_so3(turn);
   const Vec3 centre(far * right * lens.width / lens.fx, far * down * lens.height / lens.fx, far);
@@ -51,17 +57,22 @@ TEST(Coverage, saysWhichPartsTiltsAndSizesAreMissing) {
   EXPECT_TRUE(contains(needs, "11 more views")) << needs;
 
   // Which edge is the nearer one is asked of the board's own corners.
-  const Transform turned = flat(rig, 0.06, 0, 0.3, Vec3(0, 0.4, 0)), tipped = flat(rig, 0.06, 0, 0.3, Vec3(0.4, 0, 0));
+  const Transform turned = flat(rig, 0.06, 0, 0.3, Vec3(0, 0.4, 0)),
+                  tipped = flat(rig, 0.06, 0, 0.3, Vec3(0.4, 0, 0));
   c.add(seen_board(rig, kBoard, turned));
   c.add(seen_board(rig, kBoard, tipped));
   const bool left_nearer = (turned * kBoard.corner(0)).z() < (turned * kBoard.corner(8)).z();
   const bool top_nearer = (tipped * kBoard.corner(0)).z() < (tipped * kBoard.corner(45)).z();
-  EXPECT_TRUE(contains(all(c.needs()), std::string("tilted, the ") + (left_nearer ? "right" : "left") + " and " +
-                                           (top_nearer ? "bottom" : "top") + " edges nearer in turn"))
+  EXPECT_TRUE(contains(all(c.needs()),
+                       std::string("tilted, the ") + (left_nearer ? "right" : "left") + " and " +
+                           (top_nearer ? "bottom" : "top") + " edges nearer in turn"))
       << all(c.needs());
   c.add(seen_board(rig, kBoard, flat(rig, 0.06, 0, 0.45)));
   const auto last = c.needs();
-  EXPECT_EQ(std::count(last.begin(), last.end(), "nearer") + std::count(last.begin(), last.end(), "farther"), 0) << all(last);
+  EXPECT_EQ(std::count(last.begin(), last.end(), "nearer") +
+                std::count(last.begin(), last.end(), "farther"),
+            0)
+      << all(last);
 }
 
 TEST(Coverage, theGridCountsCornersWhereTheyAre) {
@@ -69,7 +80,8 @@ TEST(Coverage, theGridCountsCornersWhereTheyAre) {
   Coverage c = nothing_yet(rig);
   const auto marks = [&c] {
     const std::string grid = c.grid();
-    return std::count_if(grid.begin(), grid.end(), [](char ch) { return ch == '-' || ch == '+' || ch == '#'; });
+    return std::count_if(grid.begin(), grid.end(),
+                         [](char ch) { return ch == '-' || ch == '+' || ch == '#'; });
   };
   EXPECT_EQ(marks(), 0);
   BoardView corner_only;
@@ -94,7 +106,8 @@ TEST(ViewCollector, takesAViewOnceHeldStillAndEndsWhenNothingIsMissing) {
     EXPECT_EQ(collector.offer(seen), OfferVerdict::moving) << "it was elsewhere a moment ago";
     const OfferVerdict held = collector.offer(seen);
     EXPECT_TRUE(held == OfferVerdict::taken || held == OfferVerdict::nothing_new);
-    EXPECT_EQ(collector.offer(seen), OfferVerdict::nothing_new) << "the same view again tells nothing";
+    EXPECT_EQ(collector.offer(seen), OfferVerdict::nothing_new)
+        << "the same view again tells nothing";
     ++verdicts[held];
   }
   EXPECT_TRUE(collector.complete()) << all(collector.coverage().needs());
@@ -124,12 +137,14 @@ TEST(ViewCollector, oneCameraAloneDoesNotCountInARig) {
   EXPECT_EQ(collector.offer(seen), OfferVerdict::not_seen);
 }
 
-/// In drawn images, sharper than any lens makes them, cornerSubPix is off by a tenth of a pixel here and there. Another order would be off
-/// by a square, another idea of where a pixel's centre is by half a pixel all together.
+/// In drawn images, sharper than any lens makes them, cornerSubPix is off by a tenth of a pixel
+/// here and there. Another order would be off by a square, another idea of where a pixel's centre
+/// is by half a pixel all together.
 TEST(Checkerboard, cornersOfADrawnBoardAreFoundInItsOrder) {
   const RigCalibration rig = known_rig(1, CameraModelKind::pinhole_radtan);
   const test::BoardPainter painter(rig.intrinsics[0]);
-  for (const Checkerboard& board : {kBoard, parse_checkerboard("6x9", 0.04), parse_checkerboard("8x6", 0.04)})
+  for (const Checkerboard& board :
+       {kBoard, parse_checkerboard("6x9", 0.04), parse_checkerboard("8x6", 0.04)})
     for (const double roll : {0.0, 0.3, M_PI}) {
       const Vec3 middle = 0.5 * (board.corner(0) + board.corner(board.corners() - 1));
       const Mat3 R = exp_so3(Vec3(0.35, -0.2, 0)) * exp_so3(Vec3(0, 0, roll));
@@ -142,7 +157,8 @@ TEST(Checkerboard, cornersOfADrawnBoardAreFoundInItsOrder) {
       if (!board.tells_its_ends()) same_way_up(truth, &*found);
       Vec2 sum = Vec2::Zero();
       for (std::size_t i = 0; i < truth.size(); ++i) {
-        EXPECT_LT(((*found)[i] - truth[i]).norm(), 0.3) << i << " is off by " << ((*found)[i] - truth[i]).transpose();
+        EXPECT_LT(((*found)[i] - truth[i]).norm(), 0.3)
+            << i << " is off by " << ((*found)[i] - truth[i]).transpose();
         sum += (*found)[i] - truth[i];
       }
       EXPECT_LT(sum.norm() / static_cast<double>(truth.size()), 0.05);
@@ -154,8 +170,10 @@ TEST(Checkerboard, whereNoWholeBoardIsNothingIsFound) {
   EXPECT_FALSE(find_checkerboard({grey.data(), 640, 480, 640}, kBoard, BoardSearch::thorough));
   EXPECT_FALSE(find_checkerboard({}, kBoard, BoardSearch::thorough));
   const RigCalibration rig = known_rig(1, CameraModelKind::pinhole_radtan);
-  const auto other = test::BoardPainter(rig.intrinsics[0]).paint(parse_checkerboard("7x5", 0.04), flat(rig, 0, 0, 0.5));
-  EXPECT_FALSE(find_checkerboard({other.data(), 640, 480, 640}, kBoard, BoardSearch::thorough)) << "a smaller board is another";
+  const auto other = test::BoardPainter(rig.intrinsics[0])
+                         .paint(parse_checkerboard("7x5", 0.04), flat(rig, 0, 0, 0.5));
+  EXPECT_FALSE(find_checkerboard({other.data(), 640, 480, 640}, kBoard, BoardSearch::thorough))
+      << "a smaller board is another";
 }
 
 }  // namespace

@@ -1,4 +1,5 @@
-// Thirteen pairs of a chessboard whose calibration by OpenCV is known (checkerboards/opencv/README.md of the shared data).
+// Thirteen pairs of a chessboard whose calibration by OpenCV is known
+// (checkerboards/opencv/README.md of the shared data).
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -36,7 +37,9 @@ std::vector<BoardView> listed_corners(const fs::path& folder) {
     int view = 0, row = 0, col = 0;
     char camera[16] = {};
     double u = 0, v = 0;
-    if (std::sscanf(line.c_str(), "%d,%15[^,],%d,%d,%lf,%lf", &view, camera, &row, &col, &u, &v) != 6) continue;
+    if (std::sscanf(line.c_str(), "%d,%15[^,],%d,%d,%lf,%lf", &view, camera, &row, &col, &u, &v) !=
+        6)
+      continue;
     BoardView& seen = views[view];
     seen.name = std::to_string(view);
     auto& corners = seen.corners[std::string(camera) == "left" ? 0 : 1];
@@ -57,10 +60,13 @@ TEST(KnownAnswers, theListedCornersGiveTheListedCalibration) {
   ASSERT_EQ(c.complaint, "");
   // The listed figures end where they end; the corners have five digits or so behind the point.
   const Intrinsics &left = c.rig.intrinsics[0], &right = c.rig.intrinsics[1];
-  const std::array found{left.fx, left.fy, left.cx, left.cy, right.fx, right.fy, right.cx, right.cy};
-  const std::array listed{533.5633, 533.5966, 342.5343, 234.7651, 536.8943, 536.4753, 327.3958, 249.9484};
+  const std::array found{left.fx,  left.fy,  left.cx,  left.cy,
+                         right.fx, right.fy, right.cx, right.cy};
+  const std::array listed{533.5633, 533.5966, 342.5343, 234.7651,
+                          536.8943, 536.4753, 327.3958, 249.9484};
   for (std::size_t i = 0; i < found.size(); ++i) EXPECT_NEAR(found[i], listed[i], 0.02) << i;
-  const std::array listed_left{-0.28866, 0.09360, 0.001203, -0.000144}, listed_right{-0.29009, 0.10620, -0.000509, 0.000105};
+  const std::array listed_left{-0.28866, 0.09360, 0.001203, -0.000144},
+      listed_right{-0.29009, 0.10620, -0.000509, 0.000105};
   for (std::size_t i = 0; i < 4; ++i) {
     EXPECT_NEAR(left.distortion[i], listed_left[i], 1e-4) << i;
     EXPECT_NEAR(right.distortion[i], listed_right[i], 1e-4) << i;
@@ -87,23 +93,25 @@ TEST(KnownAnswers, theImagesGiveTheSameCalibration) {
   const auto folder = test::shared_data(kFolder);
   if (!folder) GTEST_SKIP() << test::shared_data_missing(kFolder);
   std::vector<std::string> remarks;
-  const auto files = group_views(
-      {matching_files({(*folder / "left*.jpg").string()}, "--left"), matching_files({(*folder / "right*.jpg").string()}, "--right")},
-      &remarks);
+  const auto files = group_views({matching_files({(*folder / "left*.jpg").string()}, "--left"),
+                                  matching_files({(*folder / "right*.jpg").string()}, "--right")},
+                                 &remarks);
   EXPECT_TRUE(remarks.empty());
   const BoardImages images = read_board_images(files, options().board, {});
   EXPECT_TRUE(images.remarks.empty()) << images.remarks.front();
   ASSERT_EQ(images.views.size(), 13U) << "the board is found in all 26 images";
   const BoardCalibration c = calibrate_boards(images.views, options());
   ASSERT_EQ(c.complaint, "");
-  // The corners are refined in another window than the listed ones: "within 0.5 mm and 0.15° is the same answer", rms up to 0.25 px.
+  // The corners are refined in another window than the listed ones: "within 0.5 mm and 0.15° is the
+  // same answer", rms up to 0.25 px.
   EXPECT_LE(c.rig.reprojection_px, 0.2153) << "not worse than the listed corners";
   EXPECT_EQ(c.rig.frames, 13);
   const Vec3 t = 1e3 * c.rig.T_camera_left[1].t, r = log_so3(c.rig.T_camera_left[1].R) / kDegree;
   EXPECT_LT((t - Vec3(-83.178, 0.918, -0.119)).norm(), 0.5) << t.transpose();
   EXPECT_LT((r - Vec3(0.4102, 0.2449, -0.2010)).norm(), 0.15) << r.transpose();
   for (std::size_t k = 0; k < 2; ++k)
-    EXPECT_NEAR(c.rig.intrinsics[k].fx, k == 0 ? 533.5633 : 536.8943, 3 * 0.7) << "listed sigmas 0.61, 0.70";
+    EXPECT_NEAR(c.rig.intrinsics[k].fx, k == 0 ? 533.5633 : 536.8943, 3 * 0.7)
+        << "listed sigmas 0.61, 0.70";
 }
 
 }  // namespace

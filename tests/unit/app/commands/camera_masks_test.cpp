@@ -24,7 +24,9 @@ RigCalibration small_rig() {
   return rig;
 }
 
-std::string pgm(const std::string& head, char value = 1) { return head + std::string(kWidth * kHeight, value); }
+std::string pgm(const std::string& head, char value = 1) {
+  return head + std::string(kWidth * kHeight, value);
+}
 
 /// The sentence with which a mask of camera 1 is refused.
 std::string refusal(const std::filesystem::path& folder, const std::string& name) {
@@ -74,14 +76,21 @@ TEST(CameraMasks, thatCannotBeUsedAreRefusedInASentence) {
   (void)folder.write("text.pgm", "P2 80 60 255\n0 0 0");
   (void)folder.write("huge.pgm", "P5 99999999999999999999 60 255\n");
   (void)folder.write("headless.pgm", "P5");
-  ASSERT_TRUE(cv::imwrite((folder / "photo.jpg").string(), cv::Mat(kHeight, kWidth, CV_8U, cv::Scalar(255))));
+  ASSERT_TRUE(cv::imwrite((folder / "photo.jpg").string(),
+                          cv::Mat(kHeight, kWidth, CV_8U, cv::Scalar(255))));
   const std::string at = "cameras.1.mask: " + folder.path().string() + "/";
-  EXPECT_EQ(refusal(folder.path(), "small.pgm"), at + "small.pgm is 40 × 30 px, the camera's images are 80 × 60; draw it on one of them");
-  EXPECT_EQ(refusal(folder.path(), "torn.pgm"), at + "torn.pgm is torn: it ends before the image is complete, or its check sums fail");
+  EXPECT_EQ(
+      refusal(folder.path(), "small.pgm"),
+      at + "small.pgm is 40 × 30 px, the camera's images are 80 × 60; draw it on one of them");
+  EXPECT_EQ(refusal(folder.path(), "torn.pgm"),
+            at + "torn.pgm is torn: it ends before the image is complete, or its check sums fail");
   EXPECT_EQ(refusal(folder.path(), "black.pgm"),
-            at + "black.pgm is 0 everywhere: nothing of the image is left; 0 hides, any other value shows");
+            at + "black.pgm is 0 everywhere: nothing of the image is left; 0 hides, any other "
+                 "value shows");
   for (const std::string name : {"text.pgm", "huge.pgm", "headless.pgm", "photo.jpg"})
-    EXPECT_EQ(refusal(folder.path(), name), at + name + " is no mask; a PNG or a binary PGM is, 0 where nothing is to be looked for");
+    EXPECT_EQ(
+        refusal(folder.path(), name),
+        at + name + " is no mask; a PNG or a binary PGM is, 0 where nothing is to be looked for");
   EXPECT_EQ(refusal(folder.path(), "nowhere.png"), "cameras.1.mask: nowhere.png is missing");
 }
 

@@ -50,8 +50,10 @@ Outcome evaluate_command(std::vector<std::string> words) {
   return outcome;
 }
 
-/// Every figure of `expected` is in `got` at the same place and agrees to six digits (expected has eight).
-void expect_same(const nlohmann::json& expected, const nlohmann::json& got, const std::string& where) {
+/// Every figure of `expected` is in `got` at the same place and agrees to six digits (expected has
+/// eight).
+void expect_same(const nlohmann::json& expected, const nlohmann::json& got,
+                 const std::string& where) {
   if (expected.is_object()) {
     ASSERT_TRUE(got.is_object()) << where;
     for (const auto& [key, value] : expected.items()) {
@@ -60,7 +62,8 @@ void expect_same(const nlohmann::json& expected, const nlohmann::json& got, cons
     }
   } else if (expected.is_array()) {
     ASSERT_EQ(expected.size(), got.size()) << where;
-    for (std::size_t i = 0; i < expected.size(); ++i) expect_same(expected[i], got[i], where + "/" + std::to_string(i));
+    for (std::size_t i = 0; i < expected.size(); ++i)
+      expect_same(expected[i], got[i], where + "/" + std::to_string(i));
   } else if (expected.is_number_integer()) {
     EXPECT_EQ(expected, got) << where;
   } else {
@@ -84,26 +87,32 @@ TEST(EvaluateCommand, everyKnownAnswerToSixDigits) {
   for (const auto& [name, answer] : answers.items()) {
     const std::string pair = name.substr(0, 1);
     for (const auto& segments : answer["segments"]) {
-      const Outcome o = evaluate_command({(*folder / (pair + "_estimate.tum")).string(), (*folder / (pair + "_reference.tum")).string(),
-                                          "--json", "--lengths", joined(segments["lengths"]), "--step", segments["step"].dump(),
-                                          "--associate", name == "b_nearest" ? "nearest" : "interpolate", "--max-gap",
-                                          pair == "b" ? "0.1" : "0.2", "--axes", pair < "c" ? "flu" : "camera"});
+      const Outcome o = evaluate_command(
+          {(*folder / (pair + "_estimate.tum")).string(),
+           (*folder / (pair + "_reference.tum")).string(), "--json", "--lengths",
+           joined(segments["lengths"]), "--step", segments["step"].dump(), "--associate",
+           name == "b_nearest" ? "nearest" : "interpolate", "--max-gap",
+           pair == "b" ? "0.1" : "0.2", "--axes", pair < "c" ? "flu" : "camera"});
       ASSERT_EQ(o.code, ExitCode::done) << o.err;
       auto expected = answer;
       expected["segments"] = nlohmann::json::array({segments});
       const auto got = nlohmann::json::parse(o.out);
       expect_same(expected, got, name);
       EXPECT_EQ(got["dropped"], answer["dropped"]);
-      EXPECT_EQ(got["roll_about_path_unobservable"], pair == "c");  // the straight one, and only that
+      EXPECT_EQ(got["roll_about_path_unobservable"],
+                pair == "c");  // the straight one, and only that
     }
   }
 }
 
 TEST(EvaluateCommand, dataSetFoldersAreReferencesOfTheirOwn) {
-  const auto kitti = test::shared_data("data/kitti06_51"), estimate = test::shared_data("data/eval/c_estimate.tum");
-  const auto euroc = test::shared_data("data/euroc_mh01"), camera = test::shared_data("data/eval/euroc_mh01_left_camera.tum");
+  const auto kitti = test::shared_data("data/kitti06_51"),
+             estimate = test::shared_data("data/eval/c_estimate.tum");
+  const auto euroc = test::shared_data("data/euroc_mh01"),
+             camera = test::shared_data("data/eval/euroc_mh01_left_camera.tum");
   if (!kitti || !estimate || !euroc || !camera) GTEST_SKIP() << test::shared_data_missing("data");
-  Outcome o = evaluate_command({estimate->string(), kitti->string(), "--json", "--lengths", "100,200"});
+  Outcome o =
+      evaluate_command({estimate->string(), kitti->string(), "--json", "--lengths", "100,200"});
   ASSERT_EQ(o.code, ExitCode::done) << o.err;
   auto got = nlohmann::json::parse(o.out);
   EXPECT_NEAR(got["ate_se3_m"]["rmse"].get<double>(), 0.14752451, 1e-6);
@@ -113,7 +122,8 @@ TEST(EvaluateCommand, dataSetFoldersAreReferencesOfTheirOwn) {
   o = evaluate_command({estimate->string(), kitti->string(), "--json"});
   got = nlohmann::json::parse(o.out);
   ASSERT_EQ(got["segments"].size(), 1U);
-  EXPECT_EQ(got["segments"][0]["lengths"], nlohmann::json({10, 20, 30, 40, 50})) << "unasked the lengths that it is long enough for";
+  EXPECT_EQ(got["segments"][0]["lengths"], nlohmann::json({10, 20, 30, 40, 50}))
+      << "unasked the lengths that it is long enough for";
   EXPECT_GT(got["segments"][0]["t_percent"], 0);
 
   o = evaluate_command({camera->string(), euroc->string(), "--json"});
@@ -129,11 +139,14 @@ TEST(EvaluateCommand, tableForAPersonHasTheFigures) {
   for (int i = 0; i < 200; ++i) {
     const double a = 0.05 * i;
     const std::string stamp = std::to_string(i / 10) + "." + std::to_string(i % 10);
-    reference += stamp + " " + std::to_string(20 * std::cos(a)) + " " + std::to_string(20 * std::sin(a)) + " 0 0 0 0 1\n";
-    estimate += stamp + " " + std::to_string(20.4 * std::cos(a)) + " " + std::to_string(20.4 * std::sin(a)) + " 0 0 0 0 1\n";
+    reference += stamp + " " + std::to_string(20 * std::cos(a)) + " " +
+                 std::to_string(20 * std::sin(a)) + " 0 0 0 0 1\n";
+    estimate += stamp + " " + std::to_string(20.4 * std::cos(a)) + " " +
+                std::to_string(20.4 * std::sin(a)) + " 0 0 0 0 1\n";
   }
   const auto r = folder.write("r.tum", reference), e = folder.write("e.tum", estimate);
-  const Outcome o = evaluate_command({e.string(), r.string(), "--lengths", "10,300", "--step", "1"});
+  const Outcome o =
+      evaluate_command({e.string(), r.string(), "--lengths", "10,300", "--step", "1"});
   EXPECT_EQ(o.code, ExitCode::done) << o.err;
   EXPECT_NE(o.out.find("200 poses matched"), std::string::npos) << o.out;
   EXPECT_NE(o.out.find("scale: 0.980392"), std::string::npos) << o.out;
@@ -148,42 +161,51 @@ TEST(EvaluateCommand, trajectoriesWithoutCommonTimeAreNotUsable) {
   const Outcome o = evaluate_command({a.string(), b.string(), "--json"});
   EXPECT_EQ(o.code, ExitCode::not_usable);
   EXPECT_EQ(nlohmann::json::parse(o.out)["matched"], 0);
-  EXPECT_NE(o.err.find("no pose of the estimate has a reference at its time (2 before the reference"), std::string::npos) << o.err;
+  EXPECT_NE(
+      o.err.find("no pose of the estimate has a reference at its time (2 before the reference"),
+      std::string::npos)
+      << o.err;
 }
 
 TEST(EvaluateCommand, estimatesTheMountBetweenTwoBodies) {
-  // A drive round corners on rolling ground; the reference sits 0.8 m forward and 0.3 m left of the estimate, its clock 30 ms late.
+  // A drive round corners on rolling ground; the reference sits 0.8 m forward and 0.3 m left of the
+  // estimate, its clock 30 ms late.
   const test::TemporaryFolder folder;
   std::string ours, theirs;
   const auto line = [](double stamp, const Transform& T) {
     const Eigen::Quaterniond q(T.R);
-    return fmt::format("{:.9f} {:.9f} {:.9f} {:.9f} {:.12f} {:.12f} {:.12f} {:.12f}\n", stamp, T.t.x(), T.t.y(), T.t.z(), q.x(), q.y(),
-                       q.z(), q.w());
+    return fmt::format("{:.9f} {:.9f} {:.9f} {:.9f} {:.12f} {:.12f} {:.12f} {:.12f}\n", stamp,
+                       T.t.x(), T.t.y(), T.t.z(), q.x(), q.y(), q.z(), q.w());
   };
   for (int i = 0; i < 2400; ++i) {
     const double t = 0.05 * i, yaw = 0.9 * std::sin(0.15 * t) + 0.4 * std::sin(0.6 * t);
     Transform T_world_body;
-    T_world_body.R = exp_so3(Vec3(0, 0, yaw)) * exp_so3(Vec3(0.06 * std::sin(0.9 * t), 0.08 * std::sin(0.7 * t), 0));
+    T_world_body.R = exp_so3(Vec3(0, 0, yaw)) *
+                     exp_so3(Vec3(0.06 * std::sin(0.9 * t), 0.08 * std::sin(0.7 * t), 0));
     T_world_body.t = {6 * t, 25 * std::sin(0.15 * t), std::sin(0.7 * t)};
     ours += line(1000 + t, T_world_body);
-    theirs += line(1000.03 + t, T_world_body * Transform{exp_so3(Vec3(0, 0, 0.1)), Vec3(0.8, 0.3, 0)});
+    theirs +=
+        line(1000.03 + t, T_world_body * Transform{exp_so3(Vec3(0, 0, 0.1)), Vec3(0.8, 0.3, 0)});
   }
-  const std::string a = folder.write("ours.tum", ours).string(), b = folder.write("theirs.tum", theirs).string();
+  const std::string a = folder.write("ours.tum", ours).string(),
+                    b = folder.write("theirs.tum", theirs).string();
   const Outcome outcome = evaluate_command({a, b, "--axes", "flu", "--estimate-mount", "--json"});
   ASSERT_EQ(outcome.code, ExitCode::done) << outcome.err;
   const auto mount = nlohmann::json::parse(outcome.out).at("mount");
   // T_ref_est is the inverse: turned back, and the arm seen from the reference.
   EXPECT_NEAR(mount["rotation_deg"]["z"]["value"].get<double>(), -0.1 * 180 / M_PI, 0.02);
-  EXPECT_NEAR(mount["lever_arm_m"]["x"]["value"].get<double>(), -(0.8 * std::cos(0.1) + 0.3 * std::sin(0.1)), 0.02);
-  EXPECT_NEAR(mount["lever_arm_m"]["y"]["value"].get<double>(), 0.8 * std::sin(0.1) - 0.3 * std::cos(0.1), 0.02);
+  EXPECT_NEAR(mount["lever_arm_m"]["x"]["value"].get<double>(),
+              -(0.8 * std::cos(0.1) + 0.3 * std::sin(0.1)), 0.02);
+  EXPECT_NEAR(mount["lever_arm_m"]["y"]["value"].get<double>(),
+              0.8 * std::sin(0.1) - 0.3 * std::cos(0.1), 0.02);
   EXPECT_NEAR(mount["clock_offset_s"]["value"].get<double>(), 0.03, 1e-3);
   EXPECT_LT(mount["lever_arm_m"]["x"]["sigma"].get<double>(), 0.1);
   const Outcome table = evaluate_command({a, b, "--axes", "flu", "--estimate-mount"});
   EXPECT_NE(table.out.find("told, not applied"), std::string::npos) << table.out;
 }
 
-/// A session of a drive round corners on rolling ground with its INS: the left camera 0.9 m forward and 0.4 m left of it, turned by 2°
-/// of yaw, the INS's stamps 12 ms late.
+/// A session of a drive round corners on rolling ground with its INS: the left camera 0.9 m forward
+/// and 0.4 m left of it, turned by 2° of yaw, the INS's stamps 12 ms late.
 std::string session_with_ins(const test::TemporaryFolder& folder, const std::string& name) {
   const LocalTangentPlane plane({-27.5, 153, 60});
   Transform T_ins_left = mount_of({0.9, 0.4, 0}, {0, 0, 2 * M_PI / 180});
@@ -195,15 +217,16 @@ std::string session_with_ins(const test::TemporaryFolder& folder, const std::str
     T.t = {6 * t, 25 * std::sin(0.15 * t), std::sin(0.7 * t)};
     return T;
   };
-  const Transform T_world_enu = (T_enu_ins(0) * T_ins_left).inverse();  // the odometry begins where it is
+  const Transform T_world_enu =
+      (T_enu_ins(0) * T_ins_left).inverse();  // the odometry begins where it is
   for (int i = 0; i < 4800; ++i) {
     const double t = 0.025 * i;
     const Transform T = T_enu_ins(t);
     if (i % 2 == 0) {
       const Transform left = T_world_enu * T * T_ins_left;
       const Eigen::Quaterniond q(left.R);
-      ours += fmt::format("{:.9f} {:.9f} {:.9f} {:.9f} {:.12f} {:.12f} {:.12f} {:.12f}\n", 1000 + t, left.t.x(), left.t.y(), left.t.z(),
-                          q.x(), q.y(), q.z(), q.w());
+      ours += fmt::format("{:.9f} {:.9f} {:.9f} {:.9f} {:.12f} {:.12f} {:.12f} {:.12f}\n", 1000 + t,
+                          left.t.x(), left.t.y(), left.t.z(), q.x(), q.y(), q.z(), q.w());
     }
     InsRecord r;
     r.sample.stamp = Stamp(1'000'012'000'000 + i * 25'000'000LL);
@@ -236,13 +259,21 @@ TEST(EvaluateCommand, aSessionsOwnInsGivesTheMountOfTheCamera) {
   EXPECT_NEAR(mount["clock_offset_s"]["value"].get<double>(), 0.012, 1e-3);
   // However the INS is named.
   for (const std::string& reference : {session, session + "/ins.csv"})
-    EXPECT_EQ(evaluate_command({session, reference, "--estimate-mount", "--json"}).out, alone.out) << reference;
+    EXPECT_EQ(evaluate_command({session, reference, "--estimate-mount", "--json"}).out, alone.out)
+        << reference;
   const Outcome table = evaluate_command({session, "--estimate-mount"});
-  EXPECT_NE(table.out.find("mount of the left camera in the INS's body"), std::string::npos) << table.out;
+  EXPECT_NE(table.out.find("mount of the left camera in the INS's body"), std::string::npos)
+      << table.out;
   EXPECT_NE(table.out.find("ins.boresight_deg: ["), std::string::npos) << table.out;
   // Without a mount a session folder stands for its poses, its ins.csv for the INS's.
-  EXPECT_LT(nlohmann::json::parse(evaluate_command({session, session, "--json"}).out)["ate_se3_m"]["max"].get<double>(), 1e-9);
-  EXPECT_GT(nlohmann::json::parse(evaluate_command({session, session + "/ins.csv", "--json"}).out)["ate_se3_m"]["max"].get<double>(), 0.1);
+  EXPECT_LT(
+      nlohmann::json::parse(evaluate_command({session, session, "--json"}).out)["ate_se3_m"]["max"]
+          .get<double>(),
+      1e-9);
+  EXPECT_GT(nlohmann::json::parse(
+                evaluate_command({session, session + "/ins.csv", "--json"}).out)["ate_se3_m"]["max"]
+                .get<double>(),
+            0.1);
 }
 
 TEST(EvaluateCommand, saysWhatAMountLacks) {
@@ -252,19 +283,22 @@ TEST(EvaluateCommand, saysWhatAMountLacks) {
     EXPECT_EQ(o.code, ExitCode::bad_input);
     EXPECT_NE(o.err.find(part), std::string::npos) << o.err;
   };
-  const std::string tum = folder.write("s/trajectory.tum", "1 0 0 0 0 0 0 1\n2 1 0 0 0 0 0 1\n").string();
+  const std::string tum =
+      folder.write("s/trajectory.tum", "1 0 0 0 0 0 0 1\n2 1 0 0 0 0 0 1\n").string();
   refused({tum}, "REFERENCE is missing");
   const Outcome brief = evaluate_command({tum, tum, "--estimate-mount"});
   EXPECT_EQ(brief.code, ExitCode::not_usable);
   EXPECT_NE(brief.err.find("no mount between"), std::string::npos) << brief.err;
   EXPECT_NE(brief.err.find("fewer than 20 moments in common"), std::string::npos) << brief.err;
   refused({(folder / "s").string()}, "REFERENCE is missing");
-  refused({(folder / "s").string(), "--estimate-mount"}, "is no session folder with an ins.csv; name a REFERENCE");
+  refused({(folder / "s").string(), "--estimate-mount"},
+          "is no session folder with an ins.csv; name a REFERENCE");
   InsRecord bare;
   std::string line;
   format_ins_record(bare, &line);
   folder.write("s/ins.csv", std::string(kInsHeader) + "\n" + line);
-  refused({(folder / "s").string(), "--estimate-mount"}, "has no reading with an attitude and a satellites' fix");
+  refused({(folder / "s").string(), "--estimate-mount"},
+          "has no reading with an attitude and a satellites' fix");
   folder.write("s/ins.csv", std::string(kInsHeader) + "\nnonsense\n");
   refused({(folder / "s").string(), "--estimate-mount"}, "ins.csv:2: has 1 columns");
 }

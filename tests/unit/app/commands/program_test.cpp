@@ -18,12 +18,15 @@ using test::run_vergence;
 /// Refused as DESIGN §6 wants it: exit 2, nothing on stdout, one line on stderr.
 testing::AssertionResult refused_in_one_sentence(const Outcome& outcome) {
   const auto lines = std::count(outcome.err.begin(), outcome.err.end(), '\n');
-  if (outcome.code == 2 && outcome.out.empty() && lines == 1 && outcome.err.size() > 20) return testing::AssertionSuccess();
-  return testing::AssertionFailure() << "exit code " << outcome.code << ", stdout \"" << outcome.out << "\", stderr \"" << outcome.err
-                                     << '"';
+  if (outcome.code == 2 && outcome.out.empty() && lines == 1 && outcome.err.size() > 20)
+    return testing::AssertionSuccess();
+  return testing::AssertionFailure() << "exit code " << outcome.code << ", stdout \"" << outcome.out
+                                     << "\", stderr \"" << outcome.err << '"';
 }
 
-bool contains(const std::string& text, const std::string& part) { return text.find(part) != std::string::npos; }
+bool contains(const std::string& text, const std::string& part) {
+  return text.find(part) != std::string::npos;
+}
 
 TEST(Program, VersionAndHelpGoToStandardOutput) {
   const Outcome version_asked = run_vergence("--version");
@@ -33,12 +36,14 @@ TEST(Program, VersionAndHelpGoToStandardOutput) {
   const Outcome help = run_vergence("--help");
   EXPECT_EQ(help.code, 0);
   EXPECT_EQ(help.err, "");
-  for (const char* word : {"run", "replay", "evaluate", "simulate", "calibrate", "devices", "doctor", "snap", "report"})
+  for (const char* word : {"run", "replay", "evaluate", "simulate", "calibrate", "devices",
+                           "doctor", "snap", "report"})
     EXPECT_TRUE(contains(help.out, std::string("\n  ") + word + " ")) << word;
 }
 
 TEST(Program, EveryCommandHasItsHelp) {
-  for (const char* word : {"run", "replay", "evaluate", "simulate", "calibrate", "devices", "doctor", "snap", "report"}) {
+  for (const char* word : {"run", "replay", "evaluate", "simulate", "calibrate", "devices",
+                           "doctor", "snap", "report"}) {
     const Outcome help = run_vergence(std::string(word) + " --help");
     EXPECT_EQ(help.code, 0) << word;
     EXPECT_TRUE(contains(help.out, std::string("vergence ") + word)) << help.out;
@@ -69,7 +74,8 @@ std::vector<std::string> options_of(const std::string& help) {
 TEST(Program, ManualAndCompletionHaveEveryCommandAndOption) {
   const std::string completion = run_vergence("completion").out, whole = run_vergence("manual").out;
   std::size_t count = 0;
-  for (const char* word : {"run", "replay", "evaluate", "simulate", "calibrate", "devices", "doctor", "snap", "report"}) {
+  for (const char* word : {"run", "replay", "evaluate", "simulate", "calibrate", "devices",
+                           "doctor", "snap", "report"}) {
     const std::string page = run_vergence(std::string("manual ") + word).out;
     EXPECT_TRUE(contains(whole, std::string("\\fB") + word + "\\fR")) << word;
     const auto at = completion.find(std::string("    ") + word + ") options=");
@@ -90,11 +96,13 @@ TEST(Program, ManualAndCompletionHaveEveryCommandAndOption) {
 TEST(Program, BashCompletesCommandsAndOptions) {
   const test::TemporaryFolder folder;
   folder.write("completion", run_vergence("completion").out);
-  const std::string script = "source '" + (folder / "completion").string() +
-                             "'; COMP_WORDS=(vergence rep); COMP_CWORD=1; _vergence; echo \"${COMPREPLY[@]}\"; "
-                             "COMP_WORDS=(vergence replay x --from); COMP_CWORD=3; _vergence; echo \"${COMPREPLY[@]}\"";
+  const std::string script =
+      "source '" + (folder / "completion").string() +
+      "'; COMP_WORDS=(vergence rep); COMP_CWORD=1; _vergence; echo \"${COMPREPLY[@]}\"; "
+      "COMP_WORDS=(vergence replay x --from); COMP_CWORD=3; _vergence; echo \"${COMPREPLY[@]}\"";
   folder.write("script", script);
-  const std::string command = "bash '" + (folder / "script").string() + "' > '" + (folder / "out").string() + "'";
+  const std::string command =
+      "bash '" + (folder / "script").string() + "' > '" + (folder / "out").string() + "'";
   ASSERT_EQ(std::system(command.c_str()), 0);
   EXPECT_EQ(test::read_file(folder / "out"), "replay report\n--from-scratch\n");
 }
@@ -102,7 +110,8 @@ TEST(Program, BashCompletesCommandsAndOptions) {
 TEST(Program, AnUnknownCommandNamesTheNearest) {
   const Outcome outcome = run_vergence("evalute a b");
   EXPECT_TRUE(refused_in_one_sentence(outcome));
-  EXPECT_TRUE(contains(outcome.err, "unknown command \"evalute\"; did you mean \"evaluate\"?")) << outcome.err;
+  EXPECT_TRUE(contains(outcome.err, "unknown command \"evalute\"; did you mean \"evaluate\"?"))
+      << outcome.err;
   EXPECT_TRUE(refused_in_one_sentence(run_vergence("''")));
 }
 
@@ -115,14 +124,18 @@ TEST(Program, ACommandLineThatSaysNothingIsRefused) {
 TEST(Program, AnUnknownOptionNamesTheNearest) {
   const Outcome outcome = run_vergence("--verison");
   EXPECT_TRUE(refused_in_one_sentence(outcome));
-  EXPECT_TRUE(contains(outcome.err, "unknown option \"--verison\"; did you mean \"--version\"?")) << outcome.err;
+  EXPECT_TRUE(contains(outcome.err, "unknown option \"--verison\"; did you mean \"--version\"?"))
+      << outcome.err;
   const Outcome of_command = run_vergence("evaluate a.tum b.tum --jsno");
   EXPECT_TRUE(refused_in_one_sentence(of_command));
-  EXPECT_TRUE(contains(of_command.err, "evaluate: unknown option \"--jsno\"; did you mean \"--json\"?")) << of_command.err;
+  EXPECT_TRUE(
+      contains(of_command.err, "evaluate: unknown option \"--jsno\"; did you mean \"--json\"?"))
+      << of_command.err;
 }
 
 TEST(Program, WrongValuesOfOptionsAreOneSentence) {
-  EXPECT_TRUE(refused_in_one_sentence(run_vergence("replay somewhere --format kitti --out out --frames many")));
+  EXPECT_TRUE(refused_in_one_sentence(
+      run_vergence("replay somewhere --format kitti --out out --frames many")));
   EXPECT_TRUE(refused_in_one_sentence(run_vergence("replay")));
 }
 
@@ -133,7 +146,8 @@ TEST(Program, WordsOfTheUserCannotSteerTheTerminal) {
 }
 
 TEST(Program, AStandardOutputThatTakesNothingIsAnError) {
-  const std::string command = std::string("'") + VERGENCE_PROGRAM + "' --help >/dev/full 2>/dev/null";
+  const std::string command =
+      std::string("'") + VERGENCE_PROGRAM + "' --help >/dev/full 2>/dev/null";
   EXPECT_EQ(WEXITSTATUS(std::system(command.c_str())), 2);
 }
 

@@ -12,11 +12,14 @@
 namespace vergence::app {
 namespace {
 
-bool contains(const std::string& text, const std::string& part) { return text.find(part) != std::string::npos; }
+bool contains(const std::string& text, const std::string& part) {
+  return text.find(part) != std::string::npos;
+}
 
 TEST(TerminalText, linesBreakAtBlanksAndNowhereElse) {
   EXPECT_EQ(wrapped("one two  three", 7), (std::vector<std::string>{"one two", "three"}));
-  EXPECT_EQ(wrapped("a-word-longer-than-the-line b", 5), (std::vector<std::string>{"a-word-longer-than-the-line", "b"}));
+  EXPECT_EQ(wrapped("a-word-longer-than-the-line b", 5),
+            (std::vector<std::string>{"a-word-longer-than-the-line", "b"}));
   EXPECT_EQ(wrapped("", 5), std::vector<std::string>{""});
   EXPECT_EQ(wrapped("  ", 5), std::vector<std::string>{""});
 }
@@ -27,26 +30,33 @@ TEST(TerminalText, columnsAreLettersAndNotBytes) {
   EXPECT_EQ(padded("long", 2), "long");
 }
 
-TEST(TerminalText, whatADeviceSaysCannotSteerTheTerminal) { EXPECT_EQ(harmless("a\033[2J\nb\x7f"), "a [2J b "); }
+TEST(TerminalText, whatADeviceSaysCannotSteerTheTerminal) {
+  EXPECT_EQ(harmless("a\033[2J\nb\x7f"), "a [2J b ");
+}
 
 std::vector<Finding> findings() {
-  return {{"receive_buffer",
-           FindingState::problem,
-           "net.core.rmem_max is too little \033[2J for what this drive asks of it, as anybody can see",
-           {"sudo sysctl -w net.core.rmem_max=10485760 # a command longer than the line stays on it, for it is copied by hand"}},
-          {"mtu", FindingState::advice, "larger", {}},
-          {"disk", FindingState::ok, "room", {}}};
+  return {
+      {"receive_buffer",
+       FindingState::problem,
+       "net.core.rmem_max is too little \033[2J for what this drive asks of it, as anybody can see",
+       {"sudo sysctl -w net.core.rmem_max=10485760 # a command longer than the line stays on it, "
+        "for it is copied by hand"}},
+      {"mtu", FindingState::advice, "larger", {}},
+      {"disk", FindingState::ok, "room", {}}};
 }
 
 TEST(DoctorReport, aTableThatCanBeReadAndCommandsThatCanBeCopied) {
   const std::string text = doctor_text(findings(), true, {60, false});
-  EXPECT_TRUE(contains(text, "problem  receive_buffer     net.core.rmem_max is too little\n")) << text;
-  EXPECT_TRUE(contains(
-      text, "  sudo sysctl -w net.core.rmem_max=10485760 # a command longer than the line stays on it, for it is copied by hand\n"));
+  EXPECT_TRUE(contains(text, "problem  receive_buffer     net.core.rmem_max is too little\n"))
+      << text;
+  EXPECT_TRUE(contains(text,
+                       "  sudo sysctl -w net.core.rmem_max=10485760 # a command longer than the "
+                       "line stays on it, for it is copied by hand\n"));
   EXPECT_TRUE(contains(text, "1 problem, 1 piece of advice, 1 checked and well.\n"));
   EXPECT_FALSE(contains(text, "\033"));
   EXPECT_FALSE(contains(text, "vergence doctor CONFIG"));
-  EXPECT_TRUE(contains(doctor_text({}, false, {60, false}), "No problem, 0 checked and well.\nName a configuration"));
+  EXPECT_TRUE(contains(doctor_text({}, false, {60, false}),
+                       "No problem, 0 checked and well.\nName a configuration"));
 }
 
 TEST(DoctorReport, coloursOnlyWhereTheyAreWelcomeAndOnlyOurs) {
@@ -86,7 +96,10 @@ Inventory some_devices() {
 TEST(DevicesReport, saysWhatIsThereWhatToPasteAndWhatIsNot) {
   const std::string text = devices_text(some_devices(), {80, false});
   EXPECT_TRUE(contains(text, "Cameras\n  gige  1502  A camera  10.0.0.2\n")) << text;
-  EXPECT_TRUE(contains(text, "  cameras:\n    - {driver: gige, serial: \"1502\"}\n  ins: {driver: xsens, port: /dev/ttyUSB0}\n")) << text;
+  EXPECT_TRUE(contains(text,
+                       "  cameras:\n    - {driver: gige, serial: \"1502\"}\n  ins: {driver: xsens, "
+                       "port: /dev/ttyUSB0}\n"))
+      << text;
   EXPECT_TRUE(contains(text, "Not found\n  v4l2        /dev/video0: no permission\n")) << text;
   EXPECT_FALSE(contains(text, "\033"));
 }
@@ -102,7 +115,8 @@ TEST(DevicesReport, keysForProgramsStay) {
   const auto all = nlohmann::json::parse(devices_json(some_devices(), ""));
   EXPECT_EQ(all["cameras"][0]["configuration"], "{driver: gige, serial: \"1502\"}");
   const auto& port = all["serial_ports"][0];
-  for (const char* key : {"port", "by_id", "kind", "usb_ids", "usb_serial", "description", "latency_timer_ms", "device", "configuration"})
+  for (const char* key : {"port", "by_id", "kind", "usb_ids", "usb_serial", "description",
+                          "latency_timer_ms", "device", "configuration"})
     EXPECT_TRUE(port.contains(key)) << key;
   EXPECT_EQ(port["usb_ids"], "0403:d38b");
   EXPECT_EQ(port["latency_timer_ms"], 16);

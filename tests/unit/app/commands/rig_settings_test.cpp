@@ -15,7 +15,9 @@ namespace {
 
 const std::string kTwo = "cameras: [{driver: mock}, {driver: mock}]\ntrigger: {driver: mock}\n";
 
-Configuration configured(const std::vector<std::string>& set) { return parse_configuration(kTwo, "test", set); }
+Configuration configured(const std::vector<std::string>& set) {
+  return parse_configuration(kTwo, "test", set);
+}
 
 std::string refusal(const std::vector<std::string>& set) {
   try {
@@ -47,7 +49,8 @@ TEST(RigSettings, withoutErrorsTheEstimatorIsGivenTheRigAsMounted) {
 
 TEST(RigSettings, aCamerasOwnNumbersGoBeforeThoseOfTheRig) {
   const RigCalibration rig = mounted_rig(
-      configured({"rig.nominal.k1=-0.1", "cameras.1.intrinsics=[500, 501, 322, 241]", "cameras.1.distortion=[-0.2, 0.05, 0.001]",
+      configured({"rig.nominal.k1=-0.1", "cameras.1.intrinsics=[500, 501, 322, 241]",
+                  "cameras.1.distortion=[-0.2, 0.05, 0.001]",
                   "cameras.1.T_camera_left=[0, -1, 0, -0.4, 1, 0, 0, 0.3, 0, 0, 1, 0]"}));
   EXPECT_EQ(rig.intrinsics[0].distortion[0], -0.1);
   EXPECT_EQ(rig.intrinsics[1].fy, 501);
@@ -59,7 +62,8 @@ TEST(RigSettings, aCamerasOwnNumbersGoBeforeThoseOfTheRig) {
 }
 
 TEST(RigSettings, intrinsicsErrorsHaveTheirSigmasAndTheirSeed) {
-  const std::vector<std::string> errors{"mock.intrinsics_error.principal_point_px=0.5", "mock.intrinsics_error.focal_percent=0.1"};
+  const std::vector<std::string> errors{"mock.intrinsics_error.principal_point_px=0.5",
+                                        "mock.intrinsics_error.focal_percent=0.1"};
   double centre = 0, focal = 0;
   constexpr int kSeeds = 500;
   for (int seed = 0; seed < kSeeds; ++seed) {
@@ -83,42 +87,50 @@ TEST(RigSettings, intrinsicsErrorsHaveTheirSigmasAndTheirSeed) {
 }
 
 TEST(RigSettings, aWrongTransformIsTheTrueOneKnocked) {
-  const Configuration c = configured({"mock.calibration_error.pitch_deg=0.2", "mock.calibration_error.y_m=0.004"});
-  const Transform wrong = nominal_rig(c).T_camera_left[1] * mounted_rig(c).T_camera_left[1].inverse();
+  const Configuration c =
+      configured({"mock.calibration_error.pitch_deg=0.2", "mock.calibration_error.y_m=0.004"});
+  const Transform wrong =
+      nominal_rig(c).T_camera_left[1] * mounted_rig(c).T_camera_left[1].inverse();
   EXPECT_TRUE(log_so3(wrong.R).isApprox(Vec3(0.2 * std::numbers::pi / 180, 0, 0), 1e-12));
   EXPECT_TRUE(wrong.t.isApprox(Vec3(0, 0.004, 0), 1e-12));
   EXPECT_EQ(nominal_rig(c).baseline, 0.75) << "what was measured is the length, and that is right";
 }
 
 TEST(RigSettings, aWrongLengthIsWrongEverywhere) {
-  const RigCalibration rig = nominal_rig(configured({"cameras.2.driver=mock", "mock.calibration_error.length_percent=100"}));
+  const RigCalibration rig = nominal_rig(
+      configured({"cameras.2.driver=mock", "mock.calibration_error.length_percent=100"}));
   EXPECT_DOUBLE_EQ(rig.baseline, 1.5);
   EXPECT_DOUBLE_EQ(rig.T_camera_left[1].t.x(), -1.5);
   EXPECT_DOUBLE_EQ(rig.T_camera_left[2].t.x(), -3.0);
 }
 
 TEST(RigSettings, whatIsRenderedAndWhatTheTruthComparesWithHasNoErrors) {
-  const Configuration c = configured(
-      {"mock.intrinsics_error.principal_point_px=2", "mock.calibration_error.yaw_deg=1", "mock.texture_detail=0", "mock.drive=still"});
+  const Configuration c =
+      configured({"mock.intrinsics_error.principal_point_px=2", "mock.calibration_error.yaw_deg=1",
+                  "mock.texture_detail=0", "mock.drive=still"});
   const MockDrive drive = make_mock_drive(c, {"knock@5 camera=1 pitch_deg=0.2"}, false, 1.0);
   expect_equal(drive.rig->truth().mounted(), mounted_rig(c));
   expect_equal(drive.rig->truth().calibration(Duration::seconds(4)), mounted_rig(c));
-  const Transform moved = drive.rig->truth().calibration(Duration::seconds(6)).T_camera_left[1] * mounted_rig(c).T_camera_left[1].inverse();
+  const Transform moved = drive.rig->truth().calibration(Duration::seconds(6)).T_camera_left[1] *
+                          mounted_rig(c).T_camera_left[1].inverse();
   EXPECT_NEAR(log_so3(moved.R).x(), 0.2 * std::numbers::pi / 180, 1e-12);
 }
 
 TEST(RigSettings, impossibleRigsAreRefusedByTheirKeys) {
-  EXPECT_NE(refusal({"cameras.1.T_camera_left.3=0.75", "cameras.1.T_camera_left.0=1", "cameras.1.T_camera_left.5=1",
-                     "cameras.1.T_camera_left.10=1"})
+  EXPECT_NE(refusal({"cameras.1.T_camera_left.3=0.75", "cameras.1.T_camera_left.0=1",
+                     "cameras.1.T_camera_left.5=1", "cameras.1.T_camera_left.10=1"})
                 .find("left and right are swapped"),
             std::string::npos);
-  EXPECT_NE(refusal({"cameras.1.intrinsics=[500, 0, 322, 241]"}).find("cameras.1.intrinsics"), std::string::npos);
-  EXPECT_NE(refusal({"mock.calibration_error.x_m=0.3"}).find("mock.calibration_error"), std::string::npos);
+  EXPECT_NE(refusal({"cameras.1.intrinsics=[500, 0, 322, 241]"}).find("cameras.1.intrinsics"),
+            std::string::npos);
+  EXPECT_NE(refusal({"mock.calibration_error.x_m=0.3"}).find("mock.calibration_error"),
+            std::string::npos);
   EXPECT_NE(refusal({"cameras.3.driver=mock"}).find("no holes"), std::string::npos);
 }
 
 TEST(RigSettings, theRigOfThePaperIsItsPublishedCalibration) {
-  const RigCalibration rig = mounted_rig(load_configuration(std::string(VERGENCE_SOURCE_DIR) + "/app/config/mock_st_lucia.yaml", {}));
+  const RigCalibration rig = mounted_rig(
+      load_configuration(std::string(VERGENCE_SOURCE_DIR) + "/app/config/mock_st_lucia.yaml", {}));
   EXPECT_NEAR(rig.baseline, 0.750683, 1e-6);
   const Vec3 published(-0.0051537, -0.0053061, -0.0013430);  // rad, rotation vector
   EXPECT_TRUE(log_so3(rig.T_camera_left[1].R).isApprox(published, 1e-4));

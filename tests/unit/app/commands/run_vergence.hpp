@@ -26,8 +26,8 @@ struct Outcome {
     return all.str();
   };
   const auto out = folder / "out", err = folder / "err";
-  const std::string command =
-      std::string("'") + VERGENCE_PROGRAM + "' " + arguments + " >'" + out.string() + "' 2>'" + err.string() + "' </dev/null";
+  const std::string command = std::string("'") + VERGENCE_PROGRAM + "' " + arguments + " >'" +
+                              out.string() + "' 2>'" + err.string() + "' </dev/null";
   const int status = std::system(command.c_str());
   Outcome outcome;
   outcome.code = WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);

@@ -1,4 +1,5 @@
-// The mock drive with its board, and its INS, as bytes on lines: from the devices to the stream of paired, stamped items.
+// The mock drive with its board, and its INS, as bytes on lines: from the devices to the stream of
+// paired, stamped items.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -79,7 +80,8 @@ Driven drive(const Configuration& c, const std::vector<std::string>& faults = {}
 }
 
 int count(const Driven& d, LiveItem::Kind kind) {
-  return static_cast<int>(std::count_if(d.others.begin(), d.others.end(), [kind](const LiveItem& i) { return i.kind == kind; }));
+  return static_cast<int>(std::count_if(d.others.begin(), d.others.end(),
+                                        [kind](const LiveItem& i) { return i.kind == kind; }));
 }
 
 double worst_acquisition(const Driven& d) {
@@ -89,7 +91,8 @@ double worst_acquisition(const Driven& d) {
   return worst;
 }
 
-/// Every image of a set is of its pulse, and the stamp is that pulse's middle within its bound; the errors in µs.
+/// Every image of a set is of its pulse, and the stamp is that pulse's middle within its bound; the
+/// errors in µs.
 std::vector<double> stamp_errors(const Driven& d) {
   std::vector<double> errors;
   for (const Set& s : d.sets) {
@@ -126,7 +129,8 @@ TEST_P(SimulatedBoard, pairsAreProvenWithinASecondRightAndStampedWithinTheirBoun
   EXPECT_EQ(count(d, LiveItem::Kind::proven), 2);
   EXPECT_EQ(d.counters.sync.incomplete, 0U);
   EXPECT_EQ(d.counters.sync.unproven, 0U);
-  // What mapping the edge leaves, with pings 100 times a second over lines that are late now and then.
+  // What mapping the edge leaves, with pings 100 times a second over lines that are late now and
+  // then.
   EXPECT_LT(p99(errors), 1000) << "µs";
   ASSERT_TRUE(d.board);
   EXPECT_GT(d.board->time.answered, 500U);
@@ -155,16 +159,19 @@ TEST_P(SimulatedBoardFault, isSaidAndNoPairIsWrongAfterItAndTheSameOnEveryRun) {
   EXPECT_EQ(count(d, LiveItem::Kind::proven), GetParam().proven);
   EXPECT_LE(worst_acquisition(d), 1);
   ASSERT_EQ(d.sets.size(), again.sets.size());
-  for (std::size_t i = 0; i < d.sets.size(); ++i) ASSERT_EQ(d.sets[i].stamp, again.sets[i].stamp) << i;
+  for (std::size_t i = 0; i < d.sets.size(); ++i)
+    ASSERT_EQ(d.sets[i].stamp, again.sets[i].stamp) << i;
 }
 
 using Kind = LiveItem::Kind;
-INSTANTIATE_TEST_SUITE_P(Ways, SimulatedBoardFault,
-                         ::testing::Values(FaultCase{"reboot", {"board_reboot@4"}, Kind::board_rebooted, 1, 4},
-                                           FaultCase{"camera", {"camera_gone@4 camera=1 duration_s=1"}, Kind::device_back, 1, 3},
-                                           FaultCase{"off", {"board_gone@4 duration_s=1"}, Kind::board_gone, 1, 4},
-                                           FaultCase{"ins", {"ins_gone@4 duration_s=2"}, Kind::acquiring, 2, 2}),
-                         [](const auto& i) { return std::string(i.param.name); });
+INSTANTIATE_TEST_SUITE_P(
+    Ways, SimulatedBoardFault,
+    ::testing::Values(
+        FaultCase{"reboot", {"board_reboot@4"}, Kind::board_rebooted, 1, 4},
+        FaultCase{"camera", {"camera_gone@4 camera=1 duration_s=1"}, Kind::device_back, 1, 3},
+        FaultCase{"off", {"board_gone@4 duration_s=1"}, Kind::board_gone, 1, 4},
+        FaultCase{"ins", {"ins_gone@4 duration_s=2"}, Kind::acquiring, 2, 2}),
+    [](const auto& i) { return std::string(i.param.name); });
 
 TEST(SimulatedBoardLine, aBoardThatNeverComesBackEndsNothingButItsPulses) {
   const Driven d = drive(chain(), {"board_gone@4 duration_s=0"});

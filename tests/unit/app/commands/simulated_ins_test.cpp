@@ -62,7 +62,9 @@ class SimulatedIns : public ::testing::TestWithParam<const char*> {};
 TEST_P(SimulatedIns, readingsStandWhereTheVehicleWasAtTheirStamps) {
   std::unique_ptr<DriveDevices> devices;
   const Driven driven = drive(brief_drive(GetParam()), {}, 24, &devices);
-  const GeographicLib::LocalCartesian plane(mock::kWorldOrigin.latitude_deg, mock::kWorldOrigin.longitude_deg, mock::kWorldOrigin.height_m);
+  const GeographicLib::LocalCartesian plane(mock::kWorldOrigin.latitude_deg,
+                                            mock::kWorldOrigin.longitude_deg,
+                                            mock::kWorldOrigin.height_m);
   std::size_t readings = 0;
   for (const LiveItem& item : driven.items) {
     if (item.kind != LiveItem::Kind::reading) continue;
@@ -73,11 +75,13 @@ TEST_P(SimulatedIns, readingsStandWhereTheVehicleWasAtTheirStamps) {
     const auto truth = devices->mock()->truth().ins_in_enu(time);
     const auto body = devices->mock()->truth().drive().at(time);
     Vec3 at;
-    plane.Forward(item.sample.position.latitude_deg, item.sample.position.longitude_deg, item.sample.position.height_m, at.x(), at.y(),
-                  at.z());
-    // The ideal INS's place is off by what the vehicle drove in the stamp's error: 0.5 ms, and 16.32's steps.
+    plane.Forward(item.sample.position.latitude_deg, item.sample.position.longitude_deg,
+                  item.sample.position.height_m, at.x(), at.y(), at.z());
+    // The ideal INS's place is off by what the vehicle drove in the stamp's error: 0.5 ms, and
+    // 16.32's steps.
     constexpr double kStamp = 0.5e-3, kStep = 1e-4;
-    EXPECT_LT((at - truth.t).norm(), kStamp * (body.velocity.norm() + 1) + kStep) << time.to_seconds();
+    EXPECT_LT((at - truth.t).norm(), kStamp * (body.velocity.norm() + 1) + kStep)
+        << time.to_seconds();
     EXPECT_LT(std::abs(item.sample.stamp_error.to_seconds()), 10e-3);
   }
   EXPECT_GT(readings, 2200U);
@@ -111,7 +115,9 @@ TEST_P(SimulatedIns, aLineThatIsUnpluggedComesBack) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Lines, SimulatedIns, ::testing::Values("mti-g", "mti-g-710"),
-                         [](const auto& one) { return std::string(one.param) == "mti-g" ? "legacy" : "mark4"; });
+                         [](const auto& one) {
+                           return std::string(one.param) == "mti-g" ? "legacy" : "mark4";
+                         });
 
 TEST(SimulatedInsConfiguration, isRefusedWhereItCannotBe) {
   const auto refusal = [](const Configuration& c, bool fast) -> std::string {
@@ -124,9 +130,12 @@ TEST(SimulatedInsConfiguration, isRefusedWhereItCannotBe) {
   };
   EXPECT_NE(refusal(brief_drive("mti-g"), false).find("--fast"), std::string::npos);
   EXPECT_NE(refusal(brief_drive("mti-h"), true).find("mock.ins_line"), std::string::npos);
-  EXPECT_NE(refusal(brief_drive("mti-g", {"ins.rate=110"}), true).find("ins.rate"), std::string::npos);
-  EXPECT_NE(refusal(brief_drive("mti-g-710", {"ins.rate=400"}), true).find("ins.baud"), std::string::npos);
-  EXPECT_EQ(refusal(brief_drive("mti-g-710", {"ins.rate=400", "ins.baud=460800"}), true), "nothing was refused");
+  EXPECT_NE(refusal(brief_drive("mti-g", {"ins.rate=110"}), true).find("ins.rate"),
+            std::string::npos);
+  EXPECT_NE(refusal(brief_drive("mti-g-710", {"ins.rate=400"}), true).find("ins.baud"),
+            std::string::npos);
+  EXPECT_EQ(refusal(brief_drive("mti-g-710", {"ins.rate=400", "ins.baud=460800"}), true),
+            "nothing was refused");
 }
 
 }  // namespace

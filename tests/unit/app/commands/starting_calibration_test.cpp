@@ -15,17 +15,21 @@ namespace {
 const std::vector<std::string> kSerials{"m-0", "m-1"};
 
 /// Two cameras with places of their own, and a state folder.
-Configuration configuration(const test::TemporaryFolder& folder, const std::string& driver = "mock") {
-  return parse_configuration("rig: {name: van, state_dir: \"" + folder.path().string() +
-                                 "\"}\n"
-                                 "cameras:\n"
-                                 "  - {driver: " +
-                                 driver + ", name: links, serial: A1}\n  - {driver: " + driver +
-                                 ", T_camera_left: [1, 0, 0, -0.75, 0, 1, 0, 0.001, 0, 0, 1, 0.002]}\n",
-                             "drive.yaml", {});
+Configuration configuration(const test::TemporaryFolder& folder,
+                            const std::string& driver = "mock") {
+  return parse_configuration(
+      "rig: {name: van, state_dir: \"" + folder.path().string() +
+          "\"}\n"
+          "cameras:\n"
+          "  - {driver: " +
+          driver + ", name: links, serial: A1}\n  - {driver: " + driver +
+          ", T_camera_left: [1, 0, 0, -0.75, 0, 1, 0, 0.001, 0, 0, 1, 0.002]}\n",
+      "drive.yaml", {});
 }
 
-CalibrationFile expected_of(const Configuration& c) { return starting_calibration(c, {.from_scratch = true}, kSerials).file; }
+CalibrationFile expected_of(const Configuration& c) {
+  return starting_calibration(c, {.from_scratch = true}, kSerials).file;
+}
 
 /// A calibration of that rig, recognised by its t_y.
 CalibrationFile found(const Configuration& c, double t_y) {
@@ -58,16 +62,19 @@ TEST(StartingCalibration, fromScratchBeatsTheFileBeatsTheStateBeatsTheConfigurat
   EXPECT_STREQ(state.cause, "state_file");
 
   write_calibration(folder / "mine.yaml", found(c, 0.022));
-  const StartingCalibration given = starting_calibration(c, {.file = folder / "mine.yaml"}, kSerials);
+  const StartingCalibration given =
+      starting_calibration(c, {.file = folder / "mine.yaml"}, kSerials);
   EXPECT_EQ(given.trust, CalibrationTrust::given);
   EXPECT_EQ(given.file.rig.T_camera_left[1].t.y(), 0.022);
   EXPECT_EQ(given.source, "mine.yaml");
 
-  for (const CalibrationWish& wish : {CalibrationWish{.from_scratch = true}, CalibrationWish{true, folder / "mine.yaml"}}) {
+  for (const CalibrationWish& wish :
+       {CalibrationWish{.from_scratch = true}, CalibrationWish{true, folder / "mine.yaml"}}) {
     const StartingCalibration scratch = starting_calibration(c, wish, kSerials);
     EXPECT_EQ(scratch.trust, CalibrationTrust::none);
     EXPECT_EQ(scratch.file.rig.T_camera_left[1].R, Mat3(Mat3::Identity()));
-    EXPECT_EQ(scratch.file.rig.T_camera_left[1].t.y(), 0) << "no place of an old calibration is read";
+    EXPECT_EQ(scratch.file.rig.T_camera_left[1].t.y(), 0)
+        << "no place of an old calibration is read";
     EXPECT_NEAR(scratch.file.rig.baseline, 0.75, 1e-4);
     EXPECT_TRUE(scratch.state) << "what is found is kept";
   }
@@ -90,14 +97,16 @@ TEST(StartingCalibration, aFileOfAnotherRigIsRefused) {
   CalibrationFile other = found(c, 0);
   for (Intrinsics& lens : other.rig.intrinsics) lens.width = 800;
   write_calibration(folder / "other.yaml", other);
-  EXPECT_THROW((void)starting_calibration(c, {.file = folder / "other.yaml"}, kSerials), InputError);
+  EXPECT_THROW((void)starting_calibration(c, {.file = folder / "other.yaml"}, kSerials),
+               InputError);
   EXPECT_THROW((void)starting_calibration(c, {.file = folder / "none.yaml"}, kSerials), InputError);
 }
 
 TEST(StartingCalibration, realCamerasWithoutAPlaceBeginFromScratch) {
   const test::TemporaryFolder folder;
   Configuration c = configuration(folder, "gige");
-  EXPECT_EQ(starting_calibration(c, {}, kSerials).trust, CalibrationTrust::given) << "the configuration has places";
+  EXPECT_EQ(starting_calibration(c, {}, kSerials).trust, CalibrationTrust::given)
+      << "the configuration has places";
   c.cameras[1].T_camera_left = {};
   EXPECT_EQ(starting_calibration(c, {}, kSerials).trust, CalibrationTrust::none);
   write_state(folder / "calibration_state.yaml", found(c, 0.011));

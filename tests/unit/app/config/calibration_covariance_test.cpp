@@ -33,30 +33,36 @@ std::string refusal(const std::string& yaml) {
   return "";
 }
 
-testing::AssertionResult refused(const std::string& yaml, const std::string& beginning, const std::string& part) {
+testing::AssertionResult refused(const std::string& yaml, const std::string& beginning,
+                                 const std::string& part) {
   const std::string sentence = refusal(yaml);
-  if (sentence.rfind(beginning, 0) == 0 && sentence.find(part) != std::string::npos) return testing::AssertionSuccess();
+  if (sentence.rfind(beginning, 0) == 0 && sentence.find(part) != std::string::npos)
+    return testing::AssertionSuccess();
   return testing::AssertionFailure() << "the sentence is: " << sentence;
 }
 
-/// Rows of both cameras that a drive estimates, one combination of them exactly known, as with a baseline of known length.
+/// Rows of both cameras that a drive estimates, one combination of them exactly known, as with a
+/// baseline of known length.
 RigCovariance singular(const std::vector<int>& rows) {
   Random random(5);
   const auto n = static_cast<Eigen::Index>(rows.size());
   Eigen::MatrixXd root(n, n - 1);
   for (Eigen::Index i = 0; i < n; ++i)
-    for (Eigen::Index j = 0; j < n - 1; ++j) root(i, j) = std::pow(10.0, -static_cast<double>(i % 6)) * (random.uniform() - 0.5);
+    for (Eigen::Index j = 0; j < n - 1; ++j)
+      root(i, j) = std::pow(10.0, -static_cast<double>(i % 6)) * (random.uniform() - 0.5);
   const Eigen::MatrixXd C = root * root.transpose();
   RigCovariance covariance;
   for (Eigen::Index i = 0; i < n; ++i)
-    for (Eigen::Index j = 0; j <= i; ++j) covariance.set(rows[static_cast<std::size_t>(i)], rows[static_cast<std::size_t>(j)], C(i, j));
+    for (Eigen::Index j = 0; j <= i; ++j)
+      covariance.set(rows[static_cast<std::size_t>(i)], rows[static_cast<std::size_t>(j)], C(i, j));
   return covariance;
 }
 
 CalibrationFile example() {
   CalibrationFile c = parse_calibration(kRig, "c.yaml");
-  c.rig.covariance = singular({extrinsic_row(1), extrinsic_row(1) + 3, extrinsic_row(1) + 5, intrinsic_row(0) + 4, intrinsic_row(0) + 8,
-                               intrinsic_row(1), intrinsic_row(1) + 2, intrinsic_row(1) + 7});
+  c.rig.covariance = singular({extrinsic_row(1), extrinsic_row(1) + 3, extrinsic_row(1) + 5,
+                               intrinsic_row(0) + 4, intrinsic_row(0) + 8, intrinsic_row(1),
+                               intrinsic_row(1) + 2, intrinsic_row(1) + 7});
   return c;
 }
 
@@ -67,32 +73,40 @@ void expect_same(const RigCovariance& a, const RigCovariance& b) {
 
 TEST(CalibrationCovariance, RowsGoByCameraAndParameter) {
   const RigCalibration rig =
-      parse_calibration(with_block("[left.k1, right.rx, right.k4, left.k3]", "[4e-4, 1e-6, 0, 0, 1e-6, 0, 0, 9e-4, 0, 1e-4]"), "c.yaml")
+      parse_calibration(with_block("[left.k1, right.rx, right.k4, left.k3]",
+                                   "[4e-4, 1e-6, 0, 0, 1e-6, 0, 0, 9e-4, 0, 1e-4]"),
+                        "c.yaml")
           .rig;
   EXPECT_EQ(rig.covariance(intrinsic_row(0) + 4, intrinsic_row(0) + 4), 4e-4);
   EXPECT_EQ(rig.covariance(extrinsic_row(1), intrinsic_row(0) + 4), 1e-6);
-  EXPECT_EQ(rig.covariance(intrinsic_row(1) + 7, intrinsic_row(1) + 7), 9e-4) << "k4 of an equidistant lens";
-  EXPECT_EQ(rig.covariance(intrinsic_row(0) + 8, intrinsic_row(0) + 8), 1e-4) << "k3 of a radtan one";
+  EXPECT_EQ(rig.covariance(intrinsic_row(1) + 7, intrinsic_row(1) + 7), 9e-4)
+      << "k4 of an equidistant lens";
+  EXPECT_EQ(rig.covariance(intrinsic_row(0) + 8, intrinsic_row(0) + 8), 1e-4)
+      << "k3 of a radtan one";
   EXPECT_FALSE(rig.covariance.known(extrinsic_row(1) + 1));
 }
 
 TEST(CalibrationCovariance, WhatIsWrittenReadsBackToTheSameDoublesAndStaysACovariance) {
   const CalibrationFile before = example();
   const std::string text = format_calibration(before);
-  EXPECT_NE(text.find("parameters: [right.rx, right.tx, right.tz, left.k1, left.k3, right.fx, right.cx, right.k4]"), std::string::npos);
+  EXPECT_NE(text.find("parameters: [right.rx, right.tx, right.tz, left.k1, left.k3, right.fx, "
+                      "right.cx, right.k4]"),
+            std::string::npos);
   expect_same(parse_calibration(text, "c.yaml").rig.covariance, before.rig.covariance);
   EXPECT_EQ(format_calibration(parse_calibration(text, "c.yaml")), text);
 }
 
 TEST(CalibrationCovariance, CamerasThatNamesDoNotTellApartGoByIndex) {
-  for (const auto& names : {std::pair{"left", "left"}, std::pair{"1", "0"}, std::pair{"", "right"}, std::pair{"a.rx", "a"}}) {
+  for (const auto& names : {std::pair{"left", "left"}, std::pair{"1", "0"}, std::pair{"", "right"},
+                            std::pair{"a.rx", "a"}}) {
     CalibrationFile c = example();
     c.names[0] = names.first, c.names[1] = names.second;
     const std::string text = format_calibration(c);
     EXPECT_NE(text.find("parameters: [1.rx, 1.tx, 1.tz, 0.k1, "), std::string::npos) << text;
     expect_same(parse_calibration(text, "c.yaml").rig.covariance, c.rig.covariance);
   }
-  EXPECT_EQ(refusal(with_block("[1.rx, left.k1]", "[1e-6, 0, 1e-4]")), "") << "an index is understood beside names";
+  EXPECT_EQ(refusal(with_block("[1.rx, left.k1]", "[1e-6, 0, 1e-4]")), "")
+      << "an index is understood beside names";
 }
 
 TEST(CalibrationCovariance, NothingKnownIsNoBlock) {
@@ -101,27 +115,40 @@ TEST(CalibrationCovariance, NothingKnownIsNoBlock) {
 }
 
 TEST(CalibrationCovariance, WhatIsWrongIsSaidInOneSentence) {
-  EXPECT_TRUE(refused(with_block("[right.rx, rihgt.ry]", "[1, 0, 1]"), "c.yaml:7: covariance.parameters has \"rihgt.ry\"",
+  EXPECT_TRUE(refused(with_block("[right.rx, rihgt.ry]", "[1, 0, 1]"),
+                      "c.yaml:7: covariance.parameters has \"rihgt.ry\"",
                       "did you mean \"right.ry\"?"));
-  EXPECT_TRUE(refused(with_block("[left.rx]", "[1]"), "c.yaml:7: covariance.parameters has \"left.rx\"", "no parameter"))
+  EXPECT_TRUE(refused(with_block("[left.rx]", "[1]"),
+                      "c.yaml:7: covariance.parameters has \"left.rx\"", "no parameter"))
       << "left sits still";
-  EXPECT_TRUE(refused(with_block("[right.p1]", "[1]"), "c.yaml:7: covariance.parameters", "no parameter"))
+  EXPECT_TRUE(
+      refused(with_block("[right.p1]", "[1]"), "c.yaml:7: covariance.parameters", "no parameter"))
       << "an equidistant lens has none";
-  EXPECT_TRUE(refused(with_block("[right.rx, 1.rx]", "[1, 0, 1]"), "c.yaml:7: covariance.parameters has 1.rx twice", ""));
-  EXPECT_TRUE(refused(with_block("[]", "[]"), "c.yaml:7: covariance.parameters is not a list of parameters", ""));
-  EXPECT_TRUE(refused(with_block("right.rx", "[1]"), "c.yaml:7: covariance.parameters is not a list of parameters", ""));
-  EXPECT_TRUE(refused(with_block("[[right.rx]]", "[1]"), "c.yaml:7: covariance.parameters is not a text", ""));
-  EXPECT_TRUE(refused(with_block("[right.rx, right.ry]", "[1, 0]"), "c.yaml:8: covariance.upper has 2 numbers; it needs 3", ""));
-  EXPECT_TRUE(refused(with_block("[right.rx, right.ry]", "[1, .nan, 1]"), "c.yaml:8: covariance.upper", "finite"));
-  EXPECT_TRUE(
-      refused(with_block("[right.rx, right.ry]", "[1, 0, -1]"), "c.yaml:8: covariance.upper has -1 as the variance of right.ry", ""));
-  EXPECT_TRUE(refused(with_block("[right.rx, right.ry]", "[1, 0, 0]"), "c.yaml:8: covariance.upper has 0 as the variance of right.ry", ""));
-  EXPECT_TRUE(refused(with_block("[right.rx, right.ry]", "[1, 1.1, 1]"), "c.yaml:7: covariance has a correlation beyond 1", ""));
-  EXPECT_TRUE(
-      refused(with_block("[right.rx, right.ry, right.rz]", "[1, 0.9, -0.9, 1, 0.9, 1]"), "c.yaml:7: covariance is not positive", ""));
-  EXPECT_TRUE(refused(kRig + "covariance: {parameters: [right.rx]}\n", "c.yaml:6: covariance.upper is missing", ""));
+  EXPECT_TRUE(refused(with_block("[right.rx, 1.rx]", "[1, 0, 1]"),
+                      "c.yaml:7: covariance.parameters has 1.rx twice", ""));
+  EXPECT_TRUE(refused(with_block("[]", "[]"),
+                      "c.yaml:7: covariance.parameters is not a list of parameters", ""));
+  EXPECT_TRUE(refused(with_block("right.rx", "[1]"),
+                      "c.yaml:7: covariance.parameters is not a list of parameters", ""));
+  EXPECT_TRUE(refused(with_block("[[right.rx]]", "[1]"),
+                      "c.yaml:7: covariance.parameters is not a text", ""));
+  EXPECT_TRUE(refused(with_block("[right.rx, right.ry]", "[1, 0]"),
+                      "c.yaml:8: covariance.upper has 2 numbers; it needs 3", ""));
+  EXPECT_TRUE(refused(with_block("[right.rx, right.ry]", "[1, .nan, 1]"),
+                      "c.yaml:8: covariance.upper", "finite"));
+  EXPECT_TRUE(refused(with_block("[right.rx, right.ry]", "[1, 0, -1]"),
+                      "c.yaml:8: covariance.upper has -1 as the variance of right.ry", ""));
+  EXPECT_TRUE(refused(with_block("[right.rx, right.ry]", "[1, 0, 0]"),
+                      "c.yaml:8: covariance.upper has 0 as the variance of right.ry", ""));
+  EXPECT_TRUE(refused(with_block("[right.rx, right.ry]", "[1, 1.1, 1]"),
+                      "c.yaml:7: covariance has a correlation beyond 1", ""));
+  EXPECT_TRUE(refused(with_block("[right.rx, right.ry, right.rz]", "[1, 0.9, -0.9, 1, 0.9, 1]"),
+                      "c.yaml:7: covariance is not positive", ""));
+  EXPECT_TRUE(refused(kRig + "covariance: {parameters: [right.rx]}\n",
+                      "c.yaml:6: covariance.upper is missing", ""));
   EXPECT_TRUE(refused(kRig + "covariance: 3\n", "c.yaml:6: covariance is not a group", ""));
-  EXPECT_TRUE(refused(kRig + "covariance: {parameter: [right.rx], upper: [1]}\n", "c.yaml:6: covariance has the unknown key", ""));
+  EXPECT_TRUE(refused(kRig + "covariance: {parameter: [right.rx], upper: [1]}\n",
+                      "c.yaml:6: covariance has the unknown key", ""));
 }
 
 TEST(CalibrationCovariance, FlawsInMemoryAreFoundToo) {
@@ -141,7 +168,9 @@ TEST(CalibrationCovariance, NineDigitsAreEnough) {
   RigCovariance rounded = example().rig.covariance;
   for (int i = 0; i < kRigSize; ++i)
     for (int j = 0; j <= i; ++j) {
-      const double value = rounded(i, j), unit = value == 0 ? 1 : std::pow(10.0, std::floor(std::log10(std::abs(value))) - 8);
+      const double value = rounded(i, j),
+                   unit =
+                       value == 0 ? 1 : std::pow(10.0, std::floor(std::log10(std::abs(value))) - 8);
       rounded.set(i, j, std::round(value / unit) * unit);
     }
   EXPECT_FALSE(find_flaw(rounded));
@@ -177,10 +206,12 @@ TEST(CalibrationCovariance, TornAndGarbledBlocksNeverEscapeAsAnythingElse) {
   const std::string good = format_calibration(example());
   const std::size_t begin = good.find("covariance:");
   Random random(13);
-  for (std::size_t length = begin; length < good.size(); length += 7) static_cast<void>(refusal(good.substr(0, length)));
+  for (std::size_t length = begin; length < good.size(); length += 7)
+    static_cast<void>(refusal(good.substr(0, length)));
   for (int i = 0; i < 500; ++i) {
     std::string text = good;
-    const auto at = begin + static_cast<std::size_t>(random.uniform() * static_cast<double>(text.size() - begin));
+    const auto at = begin + static_cast<std::size_t>(random.uniform() *
+                                                     static_cast<double>(text.size() - begin));
     text[at] = static_cast<char>(random.uniform() * 256.0);
     static_cast<void>(refusal(text));
   }

@@ -45,9 +45,11 @@ std::string refusal(const std::string& yaml) {
   return "";
 }
 
-testing::AssertionResult refused(const std::string& yaml, const std::string& beginning, const std::string& part) {
+testing::AssertionResult refused(const std::string& yaml, const std::string& beginning,
+                                 const std::string& part) {
   const std::string sentence = refusal(yaml);
-  if (sentence.rfind(beginning, 0) == 0 && sentence.find(part) != std::string::npos) return testing::AssertionSuccess();
+  if (sentence.rfind(beginning, 0) == 0 && sentence.find(part) != std::string::npos)
+    return testing::AssertionSuccess();
   return testing::AssertionFailure() << "the sentence is: " << sentence;
 }
 
@@ -106,10 +108,13 @@ CalibrationFile awkward() {
     i.cy = 384 + number(1);
     for (std::size_t d = 0; d < (k == 0 ? 5U : 4U); ++d) i.distortion[d] = number(0.1);
     i.sigma = {number(1) + 1, 1e-300, 1.0 / 3.0, 0.1};
-    for (std::size_t d = 0; d < (k == 0 ? 5U : 4U); ++d) i.distortion_sigma[d] = number(0.01) + 0.01;
+    for (std::size_t d = 0; d < (k == 0 ? 5U : 4U); ++d)
+      i.distortion_sigma[d] = number(0.01) + 0.01;
     if (k == 0) continue;
-    c.rig.T_camera_left[k] = {exp_so3(Vec3(number(0.2), number(0.2), number(0.2))), Vec3(-0.75 + number(0.1), number(0.1), number(0.1))};
-    for (std::size_t j = 0; j < 6; ++j) c.rig.sigma_noise[k][j] = (c.rig.sigma_wide[k][j] = number(1e-3) + 1e-3) / 3.0;
+    c.rig.T_camera_left[k] = {exp_so3(Vec3(number(0.2), number(0.2), number(0.2))),
+                              Vec3(-0.75 + number(0.1), number(0.1), number(0.1))};
+    for (std::size_t j = 0; j < 6; ++j)
+      c.rig.sigma_noise[k][j] = (c.rig.sigma_wide[k][j] = number(1e-3) + 1e-3) / 3.0;
     Mat6 root;
     for (int row = 0; row < 6; ++row)
       for (int column = 0; column < 6; ++column) root(row, column) = number(1e-3);
@@ -168,43 +173,62 @@ TEST(CalibrationFile, AFileThatCannotBeWrittenIsNamed) {
 }
 
 TEST(CalibrationPlausibility, Sizes) {
-  EXPECT_TRUE(refused(with("size: [1024, 768]", "size: [1024, 0]"), "c.yaml:4: cameras.0.size", "1024 x 0"));
-  EXPECT_TRUE(refused(with("size: [1024, 768]", "size: [-5, 768]"), "c.yaml:4: cameras.0.size", ""));
-  EXPECT_TRUE(refused(with("size: [1024, 768]", "size: [1024, 768, 1]"), "c.yaml:4: cameras.0.size", "[width, height]"));
-  EXPECT_TRUE(refused(with("size: [1024, 768]", "size: [1024, 76800]"), "c.yaml:4: cameras.0.size", ""));
-  EXPECT_TRUE(refused(with("size: [1024, 768]", "size: [1e3, 768]"), "c.yaml:4: cameras.0.size", "not an integer"));
+  EXPECT_TRUE(refused(with("size: [1024, 768]", "size: [1024, 0]"), "c.yaml:4: cameras.0.size",
+                      "1024 x 0"));
+  EXPECT_TRUE(
+      refused(with("size: [1024, 768]", "size: [-5, 768]"), "c.yaml:4: cameras.0.size", ""));
+  EXPECT_TRUE(refused(with("size: [1024, 768]", "size: [1024, 768, 1]"), "c.yaml:4: cameras.0.size",
+                      "[width, height]"));
+  EXPECT_TRUE(
+      refused(with("size: [1024, 768]", "size: [1024, 76800]"), "c.yaml:4: cameras.0.size", ""));
+  EXPECT_TRUE(refused(with("size: [1024, 768]", "size: [1e3, 768]"), "c.yaml:4: cameras.0.size",
+                      "not an integer"));
 }
 
 TEST(CalibrationPlausibility, FocalLengths) {
-  EXPECT_TRUE(refused(with("[982, 983, 510, 380]", "[-982, 983, 510, 380]"), "c.yaml:8: cameras.1.intrinsics", "positive"));
-  EXPECT_TRUE(refused(with("[982, 983, 510, 380]", "[982, 9830, 510, 380]"), "c.yaml:8: cameras.1.intrinsics", "9830"));
-  EXPECT_TRUE(refused(with("[982, 983, 510, 380]", "[0.98, 0.98, 510, 380]"), "c.yaml:8: cameras.1.intrinsics", "0.98"));
-  EXPECT_TRUE(refused(with("[982, 983, 510, 380]", "[982, 2000, 510, 380]"), "c.yaml:8: cameras.1.intrinsics", "different"));
-  EXPECT_TRUE(refused(with("[982, 983, 510, 380]", "[982, 983, 510]"), "c.yaml:8: cameras.1.intrinsics", "3 numbers"));
+  EXPECT_TRUE(refused(with("[982, 983, 510, 380]", "[-982, 983, 510, 380]"),
+                      "c.yaml:8: cameras.1.intrinsics", "positive"));
+  EXPECT_TRUE(refused(with("[982, 983, 510, 380]", "[982, 9830, 510, 380]"),
+                      "c.yaml:8: cameras.1.intrinsics", "9830"));
+  EXPECT_TRUE(refused(with("[982, 983, 510, 380]", "[0.98, 0.98, 510, 380]"),
+                      "c.yaml:8: cameras.1.intrinsics", "0.98"));
+  EXPECT_TRUE(refused(with("[982, 983, 510, 380]", "[982, 2000, 510, 380]"),
+                      "c.yaml:8: cameras.1.intrinsics", "different"));
+  EXPECT_TRUE(refused(with("[982, 983, 510, 380]", "[982, 983, 510]"),
+                      "c.yaml:8: cameras.1.intrinsics", "3 numbers"));
 }
 
 TEST(CalibrationPlausibility, PrincipalPoint) {
-  EXPECT_TRUE(refused(with("[982, 983, 510, 380]", "[982, 983, 1024, 380]"), "c.yaml:8: cameras.1.intrinsics", "outside the image"));
-  EXPECT_TRUE(refused(with("[982, 983, 510, 380]", "[982, 983, 510, -1]"), "c.yaml:8: cameras.1.intrinsics", "outside the image"));
+  EXPECT_TRUE(refused(with("[982, 983, 510, 380]", "[982, 983, 1024, 380]"),
+                      "c.yaml:8: cameras.1.intrinsics", "outside the image"));
+  EXPECT_TRUE(refused(with("[982, 983, 510, 380]", "[982, 983, 510, -1]"),
+                      "c.yaml:8: cameras.1.intrinsics", "outside the image"));
 }
 
 TEST(CalibrationPlausibility, Distortion) {
-  EXPECT_TRUE(
-      refused(with("[-0.28, 0.07, 1e-4, 2e-5, 0.01]", "[-28, 0.07, 1e-4, 2e-5, 0.01]"), "c.yaml:9: cameras.1.distortion", "corner"));
-  EXPECT_TRUE(refused(with("[-0.28, 0.07, 1e-4, 2e-5, 0.01]", "[-0.28, 0.07, 2, 2e-5, 0.01]"), "c.yaml:9: cameras.1.distortion", "corner"));
-  EXPECT_TRUE(refused(with("[-0.28, 0.07, 1e-4, 2e-5, 0.01]", "[-0.28]"), "c.yaml:9: cameras.1.distortion", "4 to 5"));
+  EXPECT_TRUE(refused(with("[-0.28, 0.07, 1e-4, 2e-5, 0.01]", "[-28, 0.07, 1e-4, 2e-5, 0.01]"),
+                      "c.yaml:9: cameras.1.distortion", "corner"));
+  EXPECT_TRUE(refused(with("[-0.28, 0.07, 1e-4, 2e-5, 0.01]", "[-0.28, 0.07, 2, 2e-5, 0.01]"),
+                      "c.yaml:9: cameras.1.distortion", "corner"));
+  EXPECT_TRUE(refused(with("[-0.28, 0.07, 1e-4, 2e-5, 0.01]", "[-0.28]"),
+                      "c.yaml:9: cameras.1.distortion", "4 to 5"));
   std::string fisheye = with("model: pinhole-radtan\n", "model: pinhole-equidistant\n");
-  EXPECT_TRUE(refused(fisheye, "c.yaml:9: cameras.1.distortion", "5 numbers")) << "equidistant has four";
+  EXPECT_TRUE(refused(fisheye, "c.yaml:9: cameras.1.distortion", "5 numbers"))
+      << "equidistant has four";
 }
 
 TEST(CalibrationPlausibility, SigmasOfDistortion) {
-  const std::string sigmas = "    distortion_sigma: [1e-3, 1e-3, 1e-4, 1e-4, 1e-2]\n    T_camera_left";
+  const std::string sigmas =
+      "    distortion_sigma: [1e-3, 1e-3, 1e-4, 1e-4, 1e-2]\n    T_camera_left";
   EXPECT_EQ(refusal(with("    T_camera_left", sigmas)), "");
-  EXPECT_EQ(refusal(with("    T_camera_left", "    distortion_sigma: [1e-3, 1e-3, 1e-4, 1e-4]\n    T_camera_left")), "");
+  EXPECT_EQ(refusal(with("    T_camera_left",
+                         "    distortion_sigma: [1e-3, 1e-3, 1e-4, 1e-4]\n    T_camera_left")),
+            "");
   EXPECT_TRUE(refused(with("    T_camera_left", "    distortion_sigma: [1e-3]\n    T_camera_left"),
                       "c.yaml:10: cameras.1.distortion_sigma has 1 numbers", "4 to 5"));
-  EXPECT_TRUE(refused(with("    T_camera_left", "    distortion_sigma: [1e-3, -1e-3, 0, 0]\n    T_camera_left"),
-                      "c.yaml:10: cameras.1.distortion_sigma", "negative"));
+  EXPECT_TRUE(refused(
+      with("    T_camera_left", "    distortion_sigma: [1e-3, -1e-3, 0, 0]\n    T_camera_left"),
+      "c.yaml:10: cameras.1.distortion_sigma", "negative"));
   std::string fisheye = with("    T_camera_left", sigmas);
   fisheye.replace(fisheye.find("model: pinhole-radtan\n"), 21, "model: pinhole-equidistant");
   fisheye.replace(fisheye.find(", 2e-5, 0.01]"), 13, ", 2e-5]");
@@ -213,12 +237,15 @@ TEST(CalibrationPlausibility, SigmasOfDistortion) {
 
 TEST(CalibrationPlausibility, RealLensesPass) {
   // EuRoC's left camera, a KITTI raw camera, and the widest fisheye lens of a public data set.
-  for (const char* lens : {"size: [752, 480], model: pinhole-radtan, intrinsics: [458.654, 457.296, 367.215, 248.375], "
-                           "distortion: [-0.28340811, 0.07395907, 0.00019359, 1.76187114e-05]",
-                           "size: [1392, 512], model: pinhole-radtan, intrinsics: [984.2439, 980.8141, 690, 233.1966], "
-                           "distortion: [-0.3728755, 0.2037299, 0.002219027, 0.001383707, -0.07233722]",
-                           "size: [512, 512], model: pinhole-equidistant, intrinsics: [190.97847, 190.97330, 254.93170, 256.89744], "
-                           "distortion: [0.00348238, 0.00071503, -0.00205323, 0.00020293]"})
+  for (
+      const char* lens :
+      {"size: [752, 480], model: pinhole-radtan, intrinsics: [458.654, 457.296, 367.215, 248.375], "
+       "distortion: [-0.28340811, 0.07395907, 0.00019359, 1.76187114e-05]",
+       "size: [1392, 512], model: pinhole-radtan, intrinsics: [984.2439, 980.8141, 690, 233.1966], "
+       "distortion: [-0.3728755, 0.2037299, 0.002219027, 0.001383707, -0.07233722]",
+       "size: [512, 512], model: pinhole-equidistant, intrinsics: [190.97847, 190.97330, "
+       "254.93170, 256.89744], "
+       "distortion: [0.00348238, 0.00071503, -0.00205323, 0.00020293]"})
     EXPECT_EQ(refusal(std::string("version: 1\ncameras:\n  - {") + lens + "}\n  - {" + lens +
                       ", T_camera_left: [1, 0, 0, -0.11, 0, 1, 0, 0, 0, 0, 1, 0]}\n"),
               "");
@@ -247,21 +274,29 @@ TEST(CalibrationPlausibility, ARotationWithFewDigitsIsReplacedByTheNearest) {
 TEST(CalibrationPlausibility, ARotationOffByAThousandthIsRefused) {
   Mat3 R = Mat3::Identity();
   R(0, 0) = 1 + 1e-3;
-  EXPECT_NE(refusal(with_rotation(R)).find("cameras.1.T_camera_left has a rotation that is not orthonormal"), std::string::npos);
+  EXPECT_NE(refusal(with_rotation(R))
+                .find("cameras.1.T_camera_left has a rotation that is not orthonormal"),
+            std::string::npos);
   EXPECT_NE(refusal(with_rotation(Mat3::Zero())).find("not orthonormal"), std::string::npos);
   EXPECT_NE(refusal(with_rotation(-Mat3::Identity())).find("mirrors"), std::string::npos);
 }
 
 TEST(CalibrationPlausibility, BaselineAgainstTheTranslation) {
-  EXPECT_TRUE(refused(with("baseline: 0.750702, baseline_sigma: 0.0005", "baseline: 0.54"), "c.yaml:2: rig.baseline", "0.54 m"));
-  EXPECT_TRUE(refused(with("baseline: 0.750702", "baseline: 750.702"), "c.yaml:2: rig.baseline", "750.702 m"));
-  EXPECT_TRUE(refused(with("baseline: 0.750702", "baseline: 0"), "c.yaml:2: rig.baseline", "positive"));
-  EXPECT_TRUE(refused(with("-0.75, 0, 1, 0, 0.01", "-750, 0, 1, 0, 10"), "c.yaml:10: cameras.1.T_camera_left", "metres"));
-  EXPECT_TRUE(refused(with("-0.75, 0, 1, 0, 0.01, 0, 0, 1, 0.02", "0, 0, 1, 0, 0, 0, 0, 1, 0"), "c.yaml:10: cameras.1.T_camera_left", ""));
+  EXPECT_TRUE(refused(with("baseline: 0.750702, baseline_sigma: 0.0005", "baseline: 0.54"),
+                      "c.yaml:2: rig.baseline", "0.54 m"));
+  EXPECT_TRUE(refused(with("baseline: 0.750702", "baseline: 750.702"), "c.yaml:2: rig.baseline",
+                      "750.702 m"));
+  EXPECT_TRUE(
+      refused(with("baseline: 0.750702", "baseline: 0"), "c.yaml:2: rig.baseline", "positive"));
+  EXPECT_TRUE(refused(with("-0.75, 0, 1, 0, 0.01", "-750, 0, 1, 0, 10"),
+                      "c.yaml:10: cameras.1.T_camera_left", "metres"));
+  EXPECT_TRUE(refused(with("-0.75, 0, 1, 0, 0.01, 0, 0, 1, 0.02", "0, 0, 1, 0, 0, 0, 0, 1, 0"),
+                      "c.yaml:10: cameras.1.T_camera_left", ""));
 }
 
 TEST(CalibrationPlausibility, ALeftCameraOnTheRightIsNoticed) {
-  EXPECT_TRUE(refused(with("-0.75, 0, 1, 0, 0.01", "0.75, 0, 1, 0, 0.01"), "c.yaml:10: cameras.1.T_camera_left",
+  EXPECT_TRUE(refused(with("-0.75, 0, 1, 0, 0.01", "0.75, 0, 1, 0, 0.01"),
+                      "c.yaml:10: cameras.1.T_camera_left",
                       "left and right are swapped, or the transform is given as its inverse"));
 }
 
@@ -272,7 +307,8 @@ TEST(CalibrationPlausibility, OneCameraAboveTheOtherIsARigToo) {
 TEST(CalibrationPlausibility, NumbersThatAreNotFinite) {
   EXPECT_TRUE(refused(with("982, 983", ".nan, 983"), "c.yaml:8: cameras.1.intrinsics", "finite"));
   EXPECT_TRUE(refused(with("982, 983", "nan, 983"), "c.yaml:8: cameras.1.intrinsics", "finite"));
-  EXPECT_TRUE(refused(with("-0.75, 0, 1", ".inf, 0, 1"), "c.yaml:10: cameras.1.T_camera_left", "finite"));
+  EXPECT_TRUE(
+      refused(with("-0.75, 0, 1", ".inf, 0, 1"), "c.yaml:10: cameras.1.T_camera_left", "finite"));
   EXPECT_TRUE(refused(with("982, 983", "1e999, 983"), "c.yaml:8: cameras.1.intrinsics", ""));
 }
 
@@ -321,13 +357,18 @@ TEST(CalibrationPlausibility, EveryNumberOfARigInMemoryIsCheckedToo) {
 }
 
 TEST(CalibrationFile, UnknownMissingAndRepeatedFieldsAreNamed) {
-  EXPECT_TRUE(refused(with("    T_camera_left", "    T_camera_lefd"), "c.yaml:10: cameras.1 has the unknown key",
+  EXPECT_TRUE(refused(with("    T_camera_left", "    T_camera_lefd"),
+                      "c.yaml:10: cameras.1 has the unknown key",
                       "did you mean \"T_camera_left\"?"));
-  EXPECT_TRUE(refused(with("    sigma_noise", "    size"), "c.yaml:11: cameras.1 has the key \"size\" twice", ""));
-  EXPECT_TRUE(refused(with("    intrinsics: [982, 983, 510, 380]\n", ""), "c.yaml:5: cameras.1.intrinsics is missing", ""));
+  EXPECT_TRUE(refused(with("    sigma_noise", "    size"),
+                      "c.yaml:11: cameras.1 has the key \"size\" twice", ""));
+  EXPECT_TRUE(refused(with("    intrinsics: [982, 983, 510, 380]\n", ""),
+                      "c.yaml:5: cameras.1.intrinsics is missing", ""));
   EXPECT_TRUE(refused(with("version: 1\n", ""), "c.yaml:1: version is missing", ""));
-  EXPECT_TRUE(refused(with("version: 1", "version: 2"), "c.yaml:1: version is 2", "reads version 1"));
-  EXPECT_TRUE(refused(with("model: pinhole-radtan\n", "model: pinhole\n"), "c.yaml:7: cameras.1.model is \"pinhole\"", "pinhole-radtan"));
+  EXPECT_TRUE(
+      refused(with("version: 1", "version: 2"), "c.yaml:1: version is 2", "reads version 1"));
+  EXPECT_TRUE(refused(with("model: pinhole-radtan\n", "model: pinhole\n"),
+                      "c.yaml:7: cameras.1.model is \"pinhole\"", "pinhole-radtan"));
   EXPECT_TRUE(refused("", "c.yaml: is empty", ""));
   EXPECT_TRUE(refused("just words", "c.yaml:1: the calibration is not a group", ""));
   EXPECT_TRUE(refused("version: 1\ncameras: 3\n", "c.yaml:2: cameras is not a list", ""));
@@ -338,7 +379,8 @@ TEST(CalibrationFile, UnknownMissingAndRepeatedFieldsAreNamed) {
 /// No cut and no changed byte of a good file may do anything but be read or be refused.
 TEST(CalibrationFile, TornAndGarbledFilesNeverEscapeAsAnythingElse) {
   Random random(11);
-  for (std::size_t length = 0; length < kGood.size(); ++length) static_cast<void>(refusal(kGood.substr(0, length)));
+  for (std::size_t length = 0; length < kGood.size(); ++length)
+    static_cast<void>(refusal(kGood.substr(0, length)));
   for (int i = 0; i < 2000; ++i) {
     std::string text = kGood;
     const auto at = static_cast<std::size_t>(random.uniform() * static_cast<double>(text.size()));
@@ -353,17 +395,23 @@ constexpr const char* kNewRig =
     "  - {size: [640, 480], model: pinhole-radtan, intrinsics: [450, 450, 320, 240]}\n";
 
 TEST(CalibrationFile, fromScratchIntrinsicsAndALengthAreEnough) {
-  EXPECT_THROW((void)parse_calibration(kNewRig, "c.yaml"), InputError) << "without --from-scratch the places are needed";
+  EXPECT_THROW((void)parse_calibration(kNewRig, "c.yaml"), InputError)
+      << "without --from-scratch the places are needed";
   const RigCalibration rig = parse_calibration(kNewRig, "c.yaml", {.length_only = true}).rig;
   EXPECT_EQ(rig.baseline, 0.5);
   EXPECT_EQ(rig.T_camera_left[1].t, Vec3(-0.5, 0, 0));
-  EXPECT_EQ(parse_calibration(kNewRig, "c.yaml", {.length_only = true, .baseline = 0.6}).rig.T_camera_left[1].t, Vec3(-0.6, 0, 0));
+  EXPECT_EQ(parse_calibration(kNewRig, "c.yaml", {.length_only = true, .baseline = 0.6})
+                .rig.T_camera_left[1]
+                .t,
+            Vec3(-0.6, 0, 0));
 }
 
 TEST(CalibrationFile, fromScratchNothingButTheLengthOfAnOldTransformIsRead) {
   // Turned by a right angle about z and 0.5 m long: no rig that would be taken as it is.
-  const std::string old = std::string(kNewRig).replace(
-      std::string(kNewRig).rfind('}'), 1, ", T_camera_left: [0, -1, 0, 0.3, 1, 0, 0, 0.4, 0, 0, 1, 0], sigma_wide: [1, 1, 1, 1, 1, 1]}");
+  const std::string old =
+      std::string(kNewRig).replace(std::string(kNewRig).rfind('}'), 1,
+                                   ", T_camera_left: [0, -1, 0, 0.3, 1, 0, 0, 0.4, 0, 0, 1, 0], "
+                                   "sigma_wide: [1, 1, 1, 1, 1, 1]}");
   const RigCalibration rig = parse_calibration(old, "c.yaml", {.length_only = true}).rig;
   EXPECT_EQ(rig.T_camera_left[1].R, Mat3(Mat3::Identity()));
   EXPECT_EQ(rig.T_camera_left[1].t, Vec3(-0.5, 0, 0));

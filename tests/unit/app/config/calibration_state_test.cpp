@@ -51,7 +51,8 @@ TEST(StateFile, LiesWhereTheKeyOrTheUsersEnvironmentSays) {
   }
   for (const char* useless : {static_cast<const char*>(nullptr), "", "relative/path"}) {
     const Environment state("XDG_STATE_HOME", useless);
-    EXPECT_EQ(state_file(rig("van")), "/users/anna/.local/state/vergence/van/calibration_state.yaml");
+    EXPECT_EQ(state_file(rig("van")),
+              "/users/anna/.local/state/vergence/van/calibration_state.yaml");
   }
   const Environment state("XDG_STATE_HOME", nullptr), homeless("HOME", nullptr);
   EXPECT_EQ(state_file(rig("van")), std::nullopt);
@@ -68,7 +69,9 @@ TEST(StateFile, ARigsNameNeverLeavesTheFolder) {
 CalibrationFile two_cameras() {
   CalibrationFile file;
   file.rig.cameras = 2;
-  for (std::size_t k = 0; k < 2; ++k) file.rig.intrinsics[k] = {.width = 640, .height = 480, .fx = 460, .fy = 460, .cx = 320, .cy = 240};
+  for (std::size_t k = 0; k < 2; ++k)
+    file.rig.intrinsics[k] = {
+        .width = 640, .height = 480, .fx = 460, .fy = 460, .cx = 320, .cy = 240};
   file.rig.T_camera_left[1].t = {-0.75, 0.001, 0.002};
   file.rig.T_camera_left[1].t *= 0.75 / file.rig.T_camera_left[1].t.norm();
   file.rig.baseline = 0.75;
@@ -99,13 +102,18 @@ TEST(StateFile, OfAnotherRigIsNotUsedAndTheSentenceSaysWhy) {
     const CalibrationState state = read_state(path, expected);
     EXPECT_FALSE(state.calibration) << why;
     EXPECT_NE(state.sentence.find(why), std::string::npos) << state.sentence;
-    EXPECT_NE(state.sentence.find("calibration_state.yaml: is not used"), std::string::npos) << state.sentence;
+    EXPECT_NE(state.sentence.find("calibration_state.yaml: is not used"), std::string::npos)
+        << state.sentence;
   };
-  refused("serial \"102\", the configuration's \"103\"", [](CalibrationFile* c) { c->serials[1] = "103"; });
+  refused("serial \"102\", the configuration's \"103\"",
+          [](CalibrationFile* c) { c->serials[1] = "103"; });
   refused("2 cameras, the configuration has 3", [](CalibrationFile* c) { c->rig.cameras = 3; });
   refused("640 x 480", [](CalibrationFile* c) { c->rig.intrinsics[0].width = 1280; });
-  refused("lens model", [](CalibrationFile* c) { c->rig.intrinsics[1].kind = CameraModelKind::pinhole_equidistant; });
-  refused("baseline of 0.75 m, the configuration says 0.76 m", [](CalibrationFile* c) { c->rig.baseline = 0.76; });
+  refused("lens model", [](CalibrationFile* c) {
+    c->rig.intrinsics[1].kind = CameraModelKind::pinhole_equidistant;
+  });
+  refused("baseline of 0.75 m, the configuration says 0.76 m",
+          [](CalibrationFile* c) { c->rig.baseline = 0.76; });
 }
 
 TEST(StateFile, ADamagedOneIsASentenceAndNoEnd) {
@@ -113,13 +121,15 @@ TEST(StateFile, ADamagedOneIsASentenceAndNoEnd) {
   folder.write("calibration_state.yaml", "version: 1\ncameras: [{name: left");
   const CalibrationState state = read_state(folder / "calibration_state.yaml", two_cameras());
   EXPECT_FALSE(state.calibration);
-  EXPECT_NE(state.sentence.find("the drive begins without it"), std::string::npos) << state.sentence;
+  EXPECT_NE(state.sentence.find("the drive begins without it"), std::string::npos)
+      << state.sentence;
 }
 
 TEST(StateFile, AFolderThatCannotBeMadeIsNamed) {
   const test::TemporaryFolder folder;
   folder.write("file", "");
-  EXPECT_THROW(write_state(folder / "file/below/calibration_state.yaml", two_cameras()), InputError);
+  EXPECT_THROW(write_state(folder / "file/below/calibration_state.yaml", two_cameras()),
+               InputError);
 }
 
 }  // namespace

@@ -22,16 +22,22 @@ std::string refusal(const std::string& yaml, const std::vector<std::string>& set
   return "";
 }
 
-bool contains(const std::string& text, const std::string& part) { return text.find(part) != std::string::npos; }
+bool contains(const std::string& text, const std::string& part) {
+  return text.find(part) != std::string::npos;
+}
 
 TEST(Configuration, NothingGivenMeansTheDefaults) {
   EXPECT_EQ(canonical_text(load_configuration(std::nullopt, {})), canonical_text(Configuration{}));
-  EXPECT_EQ(canonical_text(parse_configuration("", "drive.yaml", {})), canonical_text(Configuration{}));
-  EXPECT_EQ(canonical_text(parse_configuration("odometry:\n", "drive.yaml", {})), canonical_text(Configuration{}));
+  EXPECT_EQ(canonical_text(parse_configuration("", "drive.yaml", {})),
+            canonical_text(Configuration{}));
+  EXPECT_EQ(canonical_text(parse_configuration("odometry:\n", "drive.yaml", {})),
+            canonical_text(Configuration{}));
 }
 
 TEST(Configuration, ReadsNestedAndDottedKeys) {
-  const auto c = parse_configuration("rig: {name: van}\nodometry:\n  features: 400\n  band_px: 3.5\nthreads: 1\n", "drive.yaml", {});
+  const auto c = parse_configuration(
+      "rig: {name: van}\nodometry:\n  features: 400\n  band_px: 3.5\nthreads: 1\n", "drive.yaml",
+      {});
   EXPECT_EQ(c.rig.name, "van");
   EXPECT_EQ(c.odometry.features, 400);
   EXPECT_EQ(c.odometry.band_px, 3.5);
@@ -41,46 +47,60 @@ TEST(Configuration, ReadsNestedAndDottedKeys) {
 
 TEST(Configuration, TheLastSetWinsOverEarlierOnesAndTheFile) {
   const auto c =
-      parse_configuration("odometry: {features: 400}", "drive.yaml", {"odometry.features=500", "odometry.features=600", "rig.name=a: b"});
+      parse_configuration("odometry: {features: 400}", "drive.yaml",
+                          {"odometry.features=500", "odometry.features=600", "rig.name=a: b"});
   EXPECT_EQ(c.odometry.features, 600);
   EXPECT_EQ(c.rig.name, "a: b") << "a value is taken as it stands";
 }
 
 TEST(Configuration, SetTakesGroupsAsYaml) {
-  EXPECT_EQ(parse_configuration("", "drive.yaml", {"odometry={features: 70, band_px: 4}"}).odometry.features, 70);
+  EXPECT_EQ(parse_configuration("", "drive.yaml", {"odometry={features: 70, band_px: 4}"})
+                .odometry.features,
+            70);
 }
 
 TEST(Configuration, AnUnknownKeyNamesTheNearestFileAndLine) {
-  EXPECT_EQ(refusal("threads: 1\nodometry:\n  featurs: 3\n"),
-            "drive.yaml:3: there is no key \"odometry.featurs\"; did you mean \"odometry.features\"?");
-  EXPECT_EQ(refusal("", {"thread=1"}), "--set thread=1: there is no key \"thread\"; did you mean \"threads\"?");
+  EXPECT_EQ(
+      refusal("threads: 1\nodometry:\n  featurs: 3\n"),
+      "drive.yaml:3: there is no key \"odometry.featurs\"; did you mean \"odometry.features\"?");
+  EXPECT_EQ(refusal("", {"thread=1"}),
+            "--set thread=1: there is no key \"thread\"; did you mean \"threads\"?");
 }
 
 TEST(Configuration, AKeyWithoutItsGroupIsFoundByItsLastPart) {
-  EXPECT_TRUE(contains(refusal("features: 300"), "did you mean \"odometry.features\"?")) << refusal("features: 300");
+  EXPECT_TRUE(contains(refusal("features: 300"), "did you mean \"odometry.features\"?"))
+      << refusal("features: 300");
 }
 
 TEST(Configuration, ListItemsAreNamedByNumber) {
-  const auto c = parse_configuration("cameras: [{serial: a, size: [800, 600]}, {serial: b}]", "drive.yaml", {"cameras.1.serial=c"});
+  const auto c = parse_configuration("cameras: [{serial: a, size: [800, 600]}, {serial: b}]",
+                                     "drive.yaml", {"cameras.1.serial=c"});
   EXPECT_EQ(c.cameras[0].serial, "a");
   EXPECT_EQ(c.cameras[0].width, 800);
   EXPECT_EQ(c.cameras[0].height, 600);
   EXPECT_EQ(c.cameras[1].serial, "c");
-  EXPECT_TRUE(contains(refusal("cameras: [{serail: a}]"), "drive.yaml:1: there is no key \"cameras.0.serail\""));
-  EXPECT_TRUE(contains(refusal("cameras: [{}, {}, {}, {}, {driver: mock}]"), "there is no key \"cameras."));
+  EXPECT_TRUE(contains(refusal("cameras: [{serail: a}]"),
+                       "drive.yaml:1: there is no key \"cameras.0.serail\""));
+  EXPECT_TRUE(
+      contains(refusal("cameras: [{}, {}, {}, {}, {driver: mock}]"), "there is no key \"cameras."));
 }
 
 TEST(Configuration, AFaultIsALineOrAGroup) {
-  const auto c = parse_configuration("faults: [{at: 42.0, kind: knock, camera: 1, pitch_deg: 0.2}, 'cover@3 camera=0']", "drive.yaml", {});
+  const auto c = parse_configuration(
+      "faults: [{at: 42.0, kind: knock, camera: 1, pitch_deg: 0.2}, 'cover@3 camera=0']",
+      "drive.yaml", {});
   EXPECT_EQ(c.faults[0], "knock@42.0 camera=1 pitch_deg=0.2");
   EXPECT_EQ(c.faults[1], "cover@3 camera=0");
-  EXPECT_TRUE(contains(refusal("faults: [{kind: knock}]"), "drive.yaml:1: faults.0 needs `kind` and `at`"));
-  EXPECT_TRUE(contains(refusal("faults: [{kind: knock, at: [1, 2]}]"), "faults.0")) << refusal("faults: [{kind: knock, at: [1, 2]}]");
+  EXPECT_TRUE(
+      contains(refusal("faults: [{kind: knock}]"), "drive.yaml:1: faults.0 needs `kind` and `at`"));
+  EXPECT_TRUE(contains(refusal("faults: [{kind: knock, at: [1, 2]}]"), "faults.0"))
+      << refusal("faults: [{kind: knock, at: [1, 2]}]");
   EXPECT_EQ(refusal("faults: []"), "");
 }
 
 TEST(Configuration, ValuesOfTheWrongTypeAreRefusedWithTheirPlace) {
-  EXPECT_TRUE(contains(refusal("odometry:\n  features: many"), "drive.yaml:2: odometry.features is \"many\", not an integer"));
+  EXPECT_TRUE(contains(refusal("odometry:\n  features: many"),
+                       "drive.yaml:2: odometry.features is \"many\", not an integer"));
   EXPECT_TRUE(contains(refusal("odometry: {features: 300.5}"), "not an integer"));
   EXPECT_TRUE(contains(refusal("odometry: {features: 99999999999999999999}"), "not an integer"));
   EXPECT_TRUE(contains(refusal("odometry: {band_px: 2px}"), "not a number"));
@@ -90,7 +110,8 @@ TEST(Configuration, ValuesOfTheWrongTypeAreRefusedWithTheirPlace) {
   EXPECT_TRUE(contains(refusal("threads: []"), "takes one value"));
   EXPECT_TRUE(contains(refusal("odometry: 3"), "is a group of keys"));
   EXPECT_TRUE(contains(refusal("[1, 2]"), "is not a configuration"));
-  EXPECT_TRUE(contains(refusal("rig: {name: " + std::string(65, 'x') + "}"), "longer than 64 bytes"));
+  EXPECT_TRUE(
+      contains(refusal("rig: {name: " + std::string(65, 'x') + "}"), "longer than 64 bytes"));
 }
 
 TEST(Configuration, NotANumberIsNeverInsideARange) {
@@ -100,8 +121,10 @@ TEST(Configuration, NotANumberIsNeverInsideARange) {
 }
 
 TEST(Configuration, AKeyThatStandsTwiceIsRefused) {
-  EXPECT_EQ(refusal("odometry:\n  features: 300\n  features: 301\n"), "drive.yaml:3: the key \"odometry.features\" stands twice");
-  EXPECT_TRUE(contains(refusal("odometry: {features: 300}\nodometry.features: 301\n"), "stands twice"));
+  EXPECT_EQ(refusal("odometry:\n  features: 300\n  features: 301\n"),
+            "drive.yaml:3: the key \"odometry.features\" stands twice");
+  EXPECT_TRUE(
+      contains(refusal("odometry: {features: 300}\nodometry.features: 301\n"), "stands twice"));
 }
 
 TEST(Configuration, KeysThatContradictEachOtherAreRefused) {
@@ -143,15 +166,18 @@ TEST(Configuration, FilesThatCannotBeReadAreNamed) {
     }
     return "";
   };
-  EXPECT_EQ(sentence(folder / "none.yaml"), (folder / "none.yaml").string() + ": there is no such file");
+  EXPECT_EQ(sentence(folder / "none.yaml"),
+            (folder / "none.yaml").string() + ": there is no such file");
   EXPECT_TRUE(contains(sentence(folder.path()), "is a folder"));
-  EXPECT_TRUE(contains(sentence(folder.write("huge.yaml", std::string(2'000'000, ' '))), "is larger than"));
+  EXPECT_TRUE(
+      contains(sentence(folder.write("huge.yaml", std::string(2'000'000, ' '))), "is larger than"));
   EXPECT_EQ(load_configuration(folder.write("good.yaml", "threads: 1\n"), {}).threads, 1);
 }
 
 TEST(ConfigurationHash, IsOfTheValuesNotOfTheWriting) {
   const auto a = parse_configuration("odometry: {band_px: 2.50}\nthreads: 1", "a.yaml", {});
-  const auto b = parse_configuration("threads: 1 # one\nodometry:\n    band_px: 25e-1\n", "b.yaml", {});
+  const auto b =
+      parse_configuration("threads: 1 # one\nodometry:\n    band_px: 25e-1\n", "b.yaml", {});
   EXPECT_EQ(configuration_hash(a), configuration_hash(b));
   EXPECT_EQ(configuration_hash(a).size(), 16U);
   EXPECT_NE(configuration_hash(a), configuration_hash(Configuration{}));

@@ -61,7 +61,8 @@ TEST(Schema, EveryRowsRangeIsEnforcedAtBothEnds) {
         EXPECT_TRUE(accepts(key, std::numeric_limits<std::int64_t>::max()));
       } else {
         EXPECT_TRUE(accepts(key, value_at(key, key.most)));
-        EXPECT_FALSE(accepts(key, value_at(key, integer ? key.most + 1 : std::nextafter(key.most, 1e300))));
+        EXPECT_FALSE(
+            accepts(key, value_at(key, integer ? key.most + 1 : std::nextafter(key.most, 1e300))));
       }
       ++rows;
     }
@@ -84,8 +85,10 @@ TEST(Schema, EveryKeyChangesItsOwnValueOnly) {
       Configuration changed;
       const std::string text = key.words.empty() ? "other" : key.words.front();
       key.set(changed, key.type == KeyType::text ? KeyValue(text) : value_at(key, key.least));
-      if (!key.words.empty() && to_text(key.get(changed)) == to_text(key.get(Configuration{}))) key.set(changed, key.words.back());
-      if (to_text(key.get(changed)) == to_text(key.get(Configuration{}))) key.set(changed, value_at(key, key.least + 1));
+      if (!key.words.empty() && to_text(key.get(changed)) == to_text(key.get(Configuration{})))
+        key.set(changed, key.words.back());
+      if (to_text(key.get(changed)) == to_text(key.get(Configuration{})))
+        key.set(changed, value_at(key, key.least + 1));
       for (const Group& other_group : schema())
         for (const Key& other : other_group.keys) {
           const bool same = to_text(other.get(changed)) == to_text(other.get(Configuration{}));
@@ -104,11 +107,14 @@ TEST(Schema, NamesAreUniqueAndInTheirGroup) {
     }
 }
 
-/// The fields of a struct as its header declares them: name and the range in its comment, where there is one.
-std::map<std::string, std::string> declared_fields(const std::string& header_file, const std::string& name_of_struct) {
+/// The fields of a struct as its header declares them: name and the range in its comment, where
+/// there is one.
+std::map<std::string, std::string> declared_fields(const std::string& header_file,
+                                                   const std::string& name_of_struct) {
   std::istringstream header(file_text(header_file));
   // A field whose line is full has its value, or its comment, on the next one.
-  const std::regex field(R"(^  (?:bool|int|double|std::\w+) (\w+) =.*)"), range(R"(, ([0-9.]+ … [0-9.]+))");
+  const std::regex field(R"(^  (?:bool|int|double|std::\w+) (\w+) =.*)"),
+      range(R"(, ([0-9.]+ … [0-9.]+))");
   std::map<std::string, std::string> fields;
   bool inside = false;
   std::string last;
@@ -118,13 +124,16 @@ std::map<std::string, std::string> declared_fields(const std::string& header_fil
     if (!inside) continue;
     std::smatch name, numbers;
     if (std::regex_match(line, name, field)) fields[last = name[1]] = "";
-    if (!last.empty() && fields[last].empty() && std::regex_search(line, numbers, range)) fields[last] = numbers[1].str();
+    if (!last.empty() && fields[last].empty() && std::regex_search(line, numbers, range))
+      fields[last] = numbers[1].str();
   }
   return fields;
 }
 
-/// Every field has a row in the group, by its own name or that in `renamed`, with the range that its header states.
-void expect_rows_for(const std::map<std::string, std::string>& declared, const std::string& group_name,
+/// Every field has a row in the group, by its own name or that in `renamed`, with the range that
+/// its header states.
+void expect_rows_for(const std::map<std::string, std::string>& declared,
+                     const std::string& group_name,
                      const std::map<std::string, std::string>& renamed = {}) {
   ASSERT_GE(declared.size(), 8U) << "the header is read";
   std::map<std::string, const Key*> rows;
@@ -134,7 +143,8 @@ void expect_rows_for(const std::map<std::string, std::string>& declared, const s
   for (const auto& [field, range] : declared) {
     const auto other = renamed.find(field);
     const std::string& name = other == renamed.end() ? field : other->second;
-    ASSERT_TRUE(rows.contains(name)) << "app/config/schema.cpp has no row for " << group_name << "'s " << field;
+    ASSERT_TRUE(rows.contains(name))
+        << "app/config/schema.cpp has no row for " << group_name << "'s " << field;
     if (range.empty()) continue;
     EXPECT_EQ(range_text(*rows[name]), range) << name;
   }
@@ -142,34 +152,45 @@ void expect_rows_for(const std::map<std::string, std::string>& declared, const s
 
 TEST(Schema, EveryOptionOfTheCoreCanBeSetInTheRangeItsHeaderStates) {
   expect_rows_for(declared_fields("core/odometry/options.hpp", "OdometryOptions"), "odometry");
-  expect_rows_for(declared_fields("core/calibration/options.hpp", "CalibrationOptions"), "calibration",
-                  {{"estimate_focal_lengths", "focal_lengths"}, {"refine_intrinsics", "intrinsics"}, {"estimate_lenses", "lenses"}});
+  expect_rows_for(declared_fields("core/calibration/options.hpp", "CalibrationOptions"),
+                  "calibration",
+                  {{"estimate_focal_lengths", "focal_lengths"},
+                   {"refine_intrinsics", "intrinsics"},
+                   {"estimate_lenses", "lenses"}});
   expect_rows_for(declared_fields("core/calibration/monitor.hpp", "MonitorOptions"), "monitor");
 }
 
 TEST(Schema, AKeyOfAFewWordsTakesTheseOnly) {
-  EXPECT_EQ(
-      parse_configuration("calibration: {focal_lengths: hold, intrinsics: refine, online: off}", "", {}).calibration.estimate_focal_lengths,
-      0);
-  EXPECT_EQ(parse_configuration("calibration: {intrinsics: refine}", "", {}).calibration.refine_intrinsics, 1);
-  EXPECT_EQ(parse_configuration("calibration: {lenses: hold}", "", {}).calibration.estimate_lenses, 0);
+  EXPECT_EQ(parse_configuration(
+                "calibration: {focal_lengths: hold, intrinsics: refine, online: off}", "", {})
+                .calibration.estimate_focal_lengths,
+            0);
+  EXPECT_EQ(parse_configuration("calibration: {intrinsics: refine}", "", {})
+                .calibration.refine_intrinsics,
+            1);
+  EXPECT_EQ(parse_configuration("calibration: {lenses: hold}", "", {}).calibration.estimate_lenses,
+            0);
   EXPECT_EQ(parse_configuration("calibration: {online: off}", "", {}).online, 0);
   try {
     static_cast<void>(parse_configuration("calibration: {focal_lengths: holds}", "drive.yaml", {}));
     FAIL() << "taken";
   } catch (const InputError& e) {
-    EXPECT_STREQ(e.what(), "drive.yaml:1: calibration.focal_lengths is \"holds\"; did you mean \"hold\"?; it is one of hold, estimate");
+    EXPECT_STREQ(e.what(),
+                 "drive.yaml:1: calibration.focal_lengths is \"holds\"; did you mean \"hold\"?; it "
+                 "is one of hold, estimate");
   }
 }
 
 TEST(Schema, TheDocumentIsWrittenFromTheTable) {
-  EXPECT_EQ(file_text("docs/configuration.md"), configuration_document()) << "write it again: ninja -C build docs";
+  EXPECT_EQ(file_text("docs/configuration.md"), configuration_document())
+      << "write it again: ninja -C build docs";
 }
 
 TEST(Schema, TheDocumentsExampleIsUnderstood) {
   const std::string page = configuration_document();
   const auto start = page.find("```yaml\n") + 8;
-  EXPECT_NO_THROW(static_cast<void>(parse_configuration(page.substr(start, page.find("```", start) - start), "example", {})));
+  EXPECT_NO_THROW(static_cast<void>(
+      parse_configuration(page.substr(start, page.find("```", start) - start), "example", {})));
 }
 
 }  // namespace

@@ -22,7 +22,15 @@ std::string image(std::int64_t stamp, bool little = true, std::uint32_t width = 
   std::string data(std::size_t{kStride} * kHeight, '\0');
   for (std::uint32_t y = 0; y < kHeight; ++y)
     for (std::uint32_t x = 0; x < width; ++x) data[y * kStride + x] = pixel(x, y);
-  return CdrWriter(little).header(stamp).put(kHeight).put(width).text("mono8").put(std::uint8_t{0}).put(kStride).blob(data).bytes();
+  return CdrWriter(little)
+      .header(stamp)
+      .put(kHeight)
+      .put(width)
+      .text("mono8")
+      .put(std::uint8_t{0})
+      .put(kStride)
+      .blob(data)
+      .bytes();
 }
 
 /// Of a rectified pair 0.12 m apart, fx = fy = 60.
@@ -32,7 +40,8 @@ std::string camera_info(double fx_times_b, const std::string& model = "plumb_bob
   for (const double d : {-0.1, 0.01, 0.001, 0.002, 0.0}) w.put(d);
   for (const double k : {60.0, 0.0, 35.0, 0.0, 61.0, 24.0, 0.0, 0.0, 1.0}) w.put(k);
   for (const double r : {1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0}) w.put(r);
-  for (const double p : {60.0, 0.0, 35.0, fx_times_b, 0.0, 60.0, 24.0, 0.0, 0.0, 0.0, 1.0, 0.0}) w.put(p);
+  for (const double p : {60.0, 0.0, 35.0, fx_times_b, 0.0, 60.0, 24.0, 0.0, 0.0, 0.0, 1.0, 0.0})
+    w.put(p);
   return w.bytes();
 }
 
@@ -80,11 +89,15 @@ TEST_F(Bag, PairsCalibrationAndPixelsAreThoseOfTheMessages) {
   EXPECT_NEAR((s.calibration.T_camera_left[1].t - Vec3(-0.12, 0, 0)).norm(), 0, 1e-15);
   std::vector<std::uint8_t> out(std::size_t{kWidth} * kHeight), work;
   for (const std::string& name : s.pairs[3].file) {
-    ASSERT_EQ(s.store->decode(name, {kWidth, kHeight}, out.data(), kWidth, &work), ImageFileStatus::ok) << name;
+    ASSERT_EQ(s.store->decode(name, {kWidth, kHeight}, out.data(), kWidth, &work),
+              ImageFileStatus::ok)
+        << name;
     for (std::uint32_t y = 0; y < kHeight; ++y)
-      for (std::uint32_t x = 0; x < kWidth; ++x) ASSERT_EQ(out[y * kWidth + x], static_cast<std::uint8_t>(pixel(x, y)));
+      for (std::uint32_t x = 0; x < kWidth; ++x)
+        ASSERT_EQ(out[y * kWidth + x], static_cast<std::uint8_t>(pixel(x, y)));
   }
-  EXPECT_EQ(s.store->decode("left/image_raw#4", {kWidth, kHeight}, out.data(), kWidth, &work), ImageFileStatus::missing);
+  EXPECT_EQ(s.store->decode("left/image_raw#4", {kWidth, kHeight}, out.data(), kWidth, &work),
+            ImageFileStatus::missing);
 }
 
 TEST_F(Bag, ImagesOfAnotherSizeOrGoingBackAreLeftOutAndCounted) {
@@ -96,7 +109,8 @@ TEST_F(Bag, ImagesOfAnotherSizeOrGoingBackAreLeftOutAndCounted) {
   EXPECT_EQ(s.pairs.size(), 4U);
   EXPECT_EQ(s.left_out, 3U);
   ASSERT_EQ(s.remarks.size(), 1U);
-  EXPECT_NE(s.remarks[0].find("1 images that cannot be read, 1 of another size than the first and 1 whose stamps do not go forward"),
+  EXPECT_NE(s.remarks[0].find("1 images that cannot be read, 1 of another size than the first and "
+                              "1 whose stamps do not go forward"),
             std::string::npos)
       << s.remarks[0];
   EXPECT_NE(s.remarks[0].find("drive_0.mcap, offset "), std::string::npos) << s.remarks[0];
@@ -122,7 +136,9 @@ TEST_F(Bag, SeveralTopicsAreListedAndOneIsChosen) {
   for (std::int64_t i = 0; i < 4; ++i) frame(i);
   const std::string said = refusal();
   EXPECT_NE(said.find("--left-topic"), std::string::npos) << said;
-  EXPECT_NE(said.find("/left/image_raw (4 images), /left/image_small (1 images)"), std::string::npos) << said;
+  EXPECT_NE(said.find("/left/image_raw (4 images), /left/image_small (1 images)"),
+            std::string::npos)
+      << said;
   EXPECT_EQ(open({"/left/image_raw", ""}).pairs.size(), 4U);
 }
 
@@ -141,7 +157,8 @@ TEST_F(Bag, CameraInfoOfAnotherSizeIsRefused) {
   writer_.message(2, kStart, image(kStart, true, kWidth - 2));
   const std::string said = refusal();
   EXPECT_NE(said.find("left/image_raw#0"), std::string::npos) << said;
-  EXPECT_NE(said.find("is 68x48 pixels, but the calibration of this camera (CameraInfo of /left and /right) is for 70x48"),
+  EXPECT_NE(said.find("is 68x48 pixels, but the calibration of this camera (CameraInfo of /left "
+                      "and /right) is for 70x48"),
             std::string::npos)
       << said;
 }

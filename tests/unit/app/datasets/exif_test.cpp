@@ -11,7 +11,8 @@ namespace {
 
 using Bytes = std::vector<std::uint8_t>;
 
-/// A JPEG's beginning with an EXIF block of two entries, written by hand from the standards' tables.
+/// A JPEG's beginning with an EXIF block of two entries, written by hand from the standards'
+/// tables.
 Bytes jpeg_with(std::uint8_t orientation, bool big) {
   const auto two = [big](std::uint8_t v) { return big ? Bytes{0, v} : Bytes{v, 0}; };
   const auto four = [big](std::uint8_t v) { return big ? Bytes{0, 0, 0, v} : Bytes{v, 0, 0, 0}; };
@@ -25,7 +26,9 @@ Bytes jpeg_with(std::uint8_t orientation, bool big) {
   add(two(3)), add(four(1)), add(two(64)), add(two(0));
   add(big ? Bytes{0x01, 0x12} : Bytes{0x12, 0x01});
   add(two(3)), add(four(1)), add(two(orientation)), add(two(0));
-  Bytes jpeg{0xff, 0xd8, 0xff, 0xe0, 0, 4, 0, 0, 0xff, 0xe1, 0, static_cast<std::uint8_t>(8 + tiff.size()), 'E', 'x', 'i', 'f', 0, 0};
+  Bytes jpeg{0xff, 0xd8, 0xff, 0xe0, 0, 4,
+             0,    0,    0xff, 0xe1, 0, static_cast<std::uint8_t>(8 + tiff.size()),
+             'E',  'x',  'i',  'f',  0, 0};
   for (const std::uint8_t byte : tiff) jpeg.push_back(byte);
   for (const int byte : {0xff, 0xda, 0, 2}) jpeg.push_back(static_cast<std::uint8_t>(byte));
   return jpeg;

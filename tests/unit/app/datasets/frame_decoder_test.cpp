@@ -44,14 +44,17 @@ class Decoder : public testing::Test {
       const ImageView image = pool_.view(pair.slots[static_cast<std::size_t>(k)]);
       for (int y = 0; y < image.height; ++y)
         for (int x = 0; x < image.width; ++x)
-          if (image.at(x, y) != test::tiny_pixel(x, y, test::tiny_seed(static_cast<int>(pair.frame), k))) return false;
+          if (image.at(x, y) !=
+              test::tiny_pixel(x, y, test::tiny_seed(static_cast<int>(pair.frame), k)))
+            return false;
     }
     return true;
   }
 
   test::TemporaryFolder folder_;
   StereoSequence sequence_;
-  Arena arena_{FramePool::memory_needed(test::kTinyWidth, test::kTinyHeight, FrameDecoder::kSlots) + kCacheLine};
+  Arena arena_{FramePool::memory_needed(test::kTinyWidth, test::kTinyHeight, FrameDecoder::kSlots) +
+               kCacheLine};
   FramePool pool_{test::kTinyWidth, test::kTinyHeight, FrameDecoder::kSlots, arena_};
 };
 
@@ -60,7 +63,8 @@ TEST_F(Decoder, imagesSideBySideAreTakenApart) {
   for (int i = 0; i < 3; ++i) {
     cv::Mat both;
     cv::hconcat(cv::imread((folder_ / test::folder_name(0, i)).string(), cv::IMREAD_GRAYSCALE),
-                cv::imread((folder_ / test::folder_name(1, i)).string(), cv::IMREAD_GRAYSCALE), both);
+                cv::imread((folder_ / test::folder_name(1, i)).string(), cv::IMREAD_GRAYSCALE),
+                both);
     std::filesystem::create_directories(folder_ / "both");
     ASSERT_TRUE(cv::imwrite((folder_ / fmt::format("both/{:03d}.png", i)).string(), both));
   }
@@ -107,14 +111,18 @@ TEST_F(Decoder, missingTornAndForeignImagesSkipTheirFrameAndNoOther) {
   test::write_tiny_image(folder_ / "left/005.png", 1, 64, 48);
   const auto seen = drain(0, 8);
   ASSERT_EQ(seen.size(), 8U);
-  const std::vector<std::string> kinds = {"", "image_missing", "image_torn", "image_unreadable", "image_torn", "image_size", "", ""};
+  const std::vector<std::string> kinds = {
+      "", "image_missing", "image_torn", "image_unreadable", "image_torn", "image_size", "", ""};
   for (std::size_t i = 0; i < 8; ++i) {
     EXPECT_EQ(seen[i].pair.kind, kinds[i]) << i;
     EXPECT_EQ(seen[i].pair.decoded, kinds[i].empty()) << i;
     EXPECT_EQ(seen[i].right_pixels, kinds[i].empty()) << i;
   }
-  EXPECT_NE(std::string(seen[1].pair.note.data()).find("left/001.png is missing"), std::string::npos) << seen[1].pair.note.data();
-  EXPECT_NE(std::string(seen[2].pair.note.data()).find("right/002.png is torn"), std::string::npos) << seen[2].pair.note.data();
+  EXPECT_NE(std::string(seen[1].pair.note.data()).find("left/001.png is missing"),
+            std::string::npos)
+      << seen[1].pair.note.data();
+  EXPECT_NE(std::string(seen[2].pair.note.data()).find("right/002.png is torn"), std::string::npos)
+      << seen[2].pair.note.data();
 }
 
 TEST_F(Decoder, timesThatDoNotGoForwardsSkipTheirFrame) {
@@ -126,8 +134,9 @@ TEST_F(Decoder, timesThatDoNotGoForwardsSkipTheirFrame) {
   const std::vector<bool> decoded = {true, true, false, false, true};
   for (std::size_t i = 0; i < 5; ++i) EXPECT_EQ(seen[i].pair.decoded, decoded[i]) << i;
   EXPECT_STREQ(seen[2].pair.kind, "time_backwards");
-  EXPECT_EQ(std::string(seen[2].pair.note.data()),
-            "frame 2 skipped: its time 0.200000000 is not later than 0.300000000, the latest before it");
+  EXPECT_EQ(
+      std::string(seen[2].pair.note.data()),
+      "frame 2 skipped: its time 0.200000000 is not later than 0.300000000, the latest before it");
 }
 
 TEST_F(Decoder, aLongNameIsCutNotOverrun) {
@@ -141,7 +150,9 @@ TEST_F(Decoder, aLongNameIsCutNotOverrun) {
 TEST_F(Decoder, endsAtAnyMomentWhileTheConsumerHoldsPairsBack) {
   open(40);
   for (const int taken : {0, 1, 10}) {
-    Arena arena(FramePool::memory_needed(test::kTinyWidth, test::kTinyHeight, FrameDecoder::kSlots) + kCacheLine);
+    Arena arena(
+        FramePool::memory_needed(test::kTinyWidth, test::kTinyHeight, FrameDecoder::kSlots) +
+        kCacheLine);
     FramePool pool(test::kTinyWidth, test::kTinyHeight, FrameDecoder::kSlots, arena);
     FrameDecoder decoder(sequence_, 0, 40, pool);
     DecodedPair pair;
@@ -166,7 +177,8 @@ TEST_F(Decoder, stopWakesAConsumerThatWaits) {
 }
 
 TEST_F(Decoder, theConsumersSideAllocatesNothing) {
-  if (!AllocationGuard::available()) GTEST_SKIP() << "needs the allocation hooks, which sanitizer builds leave out";
+  if (!AllocationGuard::available())
+    GTEST_SKIP() << "needs the allocation hooks, which sanitizer builds leave out";
   open(20);
   FrameDecoder decoder(sequence_, 0, 20, pool_);
   const auto before = AllocationGuard::allocations_after_seal();

@@ -1,4 +1,5 @@
-// Against OpenCV's decoder, which the same files went through before, and against files that want to do harm.
+// Against OpenCV's decoder, which the same files went through before, and against files that want
+// to do harm.
 #include <gtest/gtest.h>
 #include <sys/resource.h>
 
@@ -21,18 +22,24 @@ using test::append_chunk;
 using test::FileBytes;
 using test::PngKind;
 
-constexpr int kWidth = 37, kHeight = 21;  // no multiple of eight: interlacing and single bits have ends of rows
+constexpr int kWidth = 37,
+              kHeight = 21;  // no multiple of eight: interlacing and single bits have ends of rows
 
-cv::Mat by_opencv(const FileBytes& file) { return cv::imdecode(file, cv::IMREAD_GRAYSCALE | cv::IMREAD_IGNORE_ORIENTATION); }
+cv::Mat by_opencv(const FileBytes& file) {
+  return cv::imdecode(file, cv::IMREAD_GRAYSCALE | cv::IMREAD_IGNORE_ORIENTATION);
+}
 
 void expect_opencvs_pixels(const FileBytes& file, int width, int height, const std::string& what) {
   const cv::Mat expected = by_opencv(file);
   ASSERT_EQ(expected.size(), cv::Size(width, height)) << what;
   FileBytes out(static_cast<std::size_t>(width * height));
-  ASSERT_EQ(decode_grey(file, {width, height}, out.data(), static_cast<std::size_t>(width)), ImageFileStatus::ok) << what;
+  ASSERT_EQ(decode_grey(file, {width, height}, out.data(), static_cast<std::size_t>(width)),
+            ImageFileStatus::ok)
+      << what;
   for (int y = 0; y < height; ++y)
     for (int x = 0; x < width; ++x)
-      ASSERT_EQ(out[static_cast<std::size_t>(y * width + x)], expected.at<std::uint8_t>(y, x)) << what << " at " << x << " " << y;
+      ASSERT_EQ(out[static_cast<std::size_t>(y * width + x)], expected.at<std::uint8_t>(y, x))
+          << what << " at " << x << " " << y;
 }
 
 /// A PNG of noise; `more` stands between IHDR and the palette: gAMA, or nothing.
@@ -41,10 +48,13 @@ FileBytes noisy_png(const PngKind& kind, const FileBytes& gamma, bool transparen
   if (!gamma.empty()) append_chunk(&png, "gAMA", gamma);
   if (kind.colours == 3) {
     FileBytes palette;
-    for (int i = 0; i < 3 << kind.depth; ++i) palette.push_back(static_cast<std::uint8_t>(i * 89 + 7));
+    for (int i = 0; i < 3 << kind.depth; ++i)
+      palette.push_back(static_cast<std::uint8_t>(i * 89 + 7));
     append_chunk(&png, "PLTE", palette);
   }
-  if (transparent) append_chunk(&png, "tRNS", kind.colours == 3 ? FileBytes{0, 128} : FileBytes(kind.colours == 2 ? 6 : 2, 0));
+  if (transparent)
+    append_chunk(&png, "tRNS",
+                 kind.colours == 3 ? FileBytes{0, 128} : FileBytes(kind.colours == 2 ? 6 : 2, 0));
   append_chunk(&png, "IDAT", test::deflated(test::png_noise(kind, kWidth, kHeight)));
   append_chunk(&png, "IEND", {});
   return png;
@@ -66,9 +76,10 @@ TEST(PngDecoder, everyKindHasOpenCvsPixelsToTheBit) {
     for (const FileBytes& gamma : {FileBytes{}, FileBytes{0, 0, 0xb1, 0x8f}})  // none, 0.45455
       for (const bool transparent : {false, true}) {
         if (transparent && kind.colours > 3) continue;  // has its alpha already
-        expect_opencvs_pixels(noisy_png(kind, gamma, transparent), kWidth, kHeight,
-                              fmt::format("colours {} depth {} interlaced {} gamma {} transparent {}", kind.colours, kind.depth,
-                                          kind.interlaced, !gamma.empty(), transparent));
+        expect_opencvs_pixels(
+            noisy_png(kind, gamma, transparent), kWidth, kHeight,
+            fmt::format("colours {} depth {} interlaced {} gamma {} transparent {}", kind.colours,
+                        kind.depth, kind.interlaced, !gamma.empty(), transparent));
       }
 }
 
@@ -77,7 +88,8 @@ cv::Mat picture() {
   cv::Mat image(61, 83, CV_8UC3);
   for (int y = 0; y < image.rows; ++y)
     for (int x = 0; x < image.cols; ++x)
-      image.at<cv::Vec3b>(y, x) = {static_cast<std::uint8_t>(3 * x), static_cast<std::uint8_t>(x * y / 20),
+      image.at<cv::Vec3b>(y, x) = {static_cast<std::uint8_t>(3 * x),
+                                   static_cast<std::uint8_t>(x * y / 20),
                                    static_cast<std::uint8_t>(((x / 7 + y / 5) % 2) * 200)};
   return image;
 }
@@ -95,7 +107,8 @@ TEST(JpegDecoder, greyColourAndProgressiveHaveOpenCvsPixelsToTheBit) {
   expect_opencvs_pixels(jpeg_of(grey), 83, 61, "grey");
   expect_opencvs_pixels(jpeg_of(colour), 83, 61, "colour");
   expect_opencvs_pixels(jpeg_of(colour, {cv::IMWRITE_JPEG_PROGRESSIVE, 1}), 83, 61, "progressive");
-  expect_opencvs_pixels(jpeg_of(grey, {cv::IMWRITE_JPEG_RST_INTERVAL, 2}), 83, 61, "restart markers");
+  expect_opencvs_pixels(jpeg_of(grey, {cv::IMWRITE_JPEG_RST_INTERVAL, 2}), 83, 61,
+                        "restart markers");
 }
 
 /// Four colours, as printers have them.
@@ -114,7 +127,8 @@ FileBytes cmyk_jpeg(int width, int height) {
   jpeg_set_defaults(&jpeg);
   jpeg_start_compress(&jpeg, TRUE);
   FileBytes row(static_cast<std::size_t>(4 * width), 90);
-  for (JSAMPROW rows[1] = {row.data()}; jpeg.next_scanline < jpeg.image_height;) (void)jpeg_write_scanlines(&jpeg, rows, 1);
+  for (JSAMPROW rows[1] = {row.data()}; jpeg.next_scanline < jpeg.image_height;)
+    (void)jpeg_write_scanlines(&jpeg, rows, 1);
   jpeg_finish_compress(&jpeg);
   FileBytes file(memory, memory + size);
   jpeg_destroy_compress(&jpeg);
@@ -129,7 +143,9 @@ ImageFileStatus decode(const FileBytes& file, int width, int height) {
 
 TEST(JpegDecoder, fourColoursAreRefusedAndTheSentenceSaysWhatCanBeRead) {
   EXPECT_EQ(decode(cmyk_jpeg(40, 30), 40, 30), ImageFileStatus::undecodable);
-  EXPECT_NE(std::string(to_phrase(ImageFileStatus::undecodable)).find("JPEG of 8-bit grey or three colours"), std::string::npos);
+  EXPECT_NE(std::string(to_phrase(ImageFileStatus::undecodable))
+                .find("JPEG of 8-bit grey or three colours"),
+            std::string::npos);
 }
 
 TEST(JpegDecoder, aHoleInTheMiddleIsTornThoughTheEndIsThere) {
@@ -184,7 +200,9 @@ TEST(PngDecoder, pixelsThatAreFewerOrMoreThanTheHeadSaysStayInTheirRows) {
     FileBytes png = test::png_head(kind, kWidth, kHeight);
     append_chunk(&png, "IDAT", test::deflated(test::png_noise(kind, kWidth, rows)));
     append_chunk(&png, "IEND", {});
-    EXPECT_EQ(decode(png, kWidth, kHeight), rows < kHeight ? ImageFileStatus::undecodable : ImageFileStatus::ok) << rows;
+    EXPECT_EQ(decode(png, kWidth, kHeight),
+              rows < kHeight ? ImageFileStatus::undecodable : ImageFileStatus::ok)
+        << rows;
     (void)LLVMFuzzerTestOneInput(png.data(), png.size());
   }
 }
@@ -197,12 +215,16 @@ TEST(ImageFile, anAreaThatNoCameraHasIsRefusedBeforeAnythingIsTakenForIt) {
   EXPECT_EQ(check_image(png, &size), ImageFileStatus::not_an_image);
 }
 
-/// Bytes changed, taken out, put in and cut off; of a PNG the check sums mended, or nothing would get past them.
+/// Bytes changed, taken out, put in and cut off; of a PNG the check sums mended, or nothing would
+/// get past them.
 FileBytes mutated(FileBytes file, Random* random) {
-  const auto any = [random](std::size_t n) { return static_cast<std::size_t>(random->below(static_cast<std::uint32_t>(n))); };
+  const auto any = [random](std::size_t n) {
+    return static_cast<std::size_t>(random->below(static_cast<std::uint32_t>(n)));
+  };
   const std::size_t changes = 1 + any(4);
   for (std::size_t i = 0; i < changes && file.size() > 16; ++i) {
-    const std::size_t at = any(any(3) == 0 ? std::min<std::size_t>(file.size(), 80) : file.size());  // heads are where lies live
+    const std::size_t at = any(any(3) == 0 ? std::min<std::size_t>(file.size(), 80)
+                                           : file.size());  // heads are where lies live
     const auto place = file.begin() + static_cast<std::ptrdiff_t>(at);
     switch (any(5)) {
       case 0:
@@ -212,7 +234,8 @@ FileBytes mutated(FileBytes file, Random* random) {
         *place = static_cast<std::uint8_t>(any(2) == 0 ? 0xff : any(256));
         break;
       case 2:
-        file.erase(place, place + static_cast<std::ptrdiff_t>(std::min<std::size_t>(1 + any(16), file.size() - at)));
+        file.erase(place, place + static_cast<std::ptrdiff_t>(
+                                      std::min<std::size_t>(1 + any(16), file.size() - at)));
         break;
       case 3:
         file.insert(place, 1 + any(16), static_cast<std::uint8_t>(any(256)));
@@ -226,8 +249,10 @@ FileBytes mutated(FileBytes file, Random* random) {
 }
 
 TEST(ImageFile, aHundredThousandMutationsKeepWithinTheirRows) {
-  std::vector<FileBytes> seeds{jpeg_of(picture()), jpeg_of(picture(), {cv::IMWRITE_JPEG_PROGRESSIVE, 1})};
-  for (const PngKind& kind : every_png_kind()) seeds.push_back(noisy_png(kind, {0, 0, 0xb1, 0x8f}, kind.colours <= 3));
+  std::vector<FileBytes> seeds{jpeg_of(picture()),
+                               jpeg_of(picture(), {cv::IMWRITE_JPEG_PROGRESSIVE, 1})};
+  for (const PngKind& kind : every_png_kind())
+    seeds.push_back(noisy_png(kind, {0, 0, 0xb1, 0x8f}, kind.colours <= 3));
   FileBytes bmp;
   ASSERT_TRUE(cv::imencode(".bmp", cv::Mat(kHeight, kWidth, CV_8UC1, cv::Scalar(90)), bmp));
   seeds.push_back(bmp);

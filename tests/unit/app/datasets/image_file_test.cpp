@@ -44,7 +44,8 @@ TEST_F(ImageFile, pngIsDecodedToTheBitIntoPaddedRowsAndPaddingIsLeftAlone) {
   ASSERT_EQ(decode_grey(bytes, kSize, out.data(), kStride), ImageFileStatus::ok);
   for (int y = 0; y < kTinyHeight; ++y)
     for (int x = 0; x < static_cast<int>(kStride); ++x)
-      ASSERT_EQ(out[static_cast<std::size_t>(y) * kStride + static_cast<std::size_t>(x)], x < kTinyWidth ? test::tiny_pixel(x, y, 5) : 77)
+      ASSERT_EQ(out[static_cast<std::size_t>(y) * kStride + static_cast<std::size_t>(x)],
+                x < kTinyWidth ? test::tiny_pixel(x, y, 5) : 77)
           << x << " " << y;
 }
 
@@ -57,14 +58,18 @@ std::vector<std::uint8_t> tiny_bmp(const test::TemporaryFolder& folder, const cv
 TEST_F(ImageFile, greyBmpIsReadToTheBitFromBothEnds) {
   cv::Mat image(kTinyHeight, kTinyWidth, CV_8UC1);
   for (int y = 0; y < kTinyHeight; ++y)
-    for (int x = 0; x < kTinyWidth; ++x) image.at<std::uint8_t>(y, x) = static_cast<std::uint8_t>(test::tiny_pixel(x, y, 5));
+    for (int x = 0; x < kTinyWidth; ++x)
+      image.at<std::uint8_t>(y, x) = static_cast<std::uint8_t>(test::tiny_pixel(x, y, 5));
   auto bytes = tiny_bmp(folder_, image);
   std::vector<std::uint8_t> out(kStride * kTinyHeight, 77);
   ASSERT_EQ(decode_grey(bytes, kSize, out.data(), kStride), ImageFileStatus::ok);
   for (int y = 0; y < kTinyHeight; ++y)
     for (int x = 0; x < static_cast<int>(kStride); ++x)
-      ASSERT_EQ(out[static_cast<std::size_t>(y) * kStride + static_cast<std::size_t>(x)], x < kTinyWidth ? test::tiny_pixel(x, y, 5) : 77);
-  const std::uint32_t turned = 0U - static_cast<std::uint32_t>(kTinyHeight);  // a negative height: the first row is the top one
+      ASSERT_EQ(out[static_cast<std::size_t>(y) * kStride + static_cast<std::size_t>(x)],
+                x < kTinyWidth ? test::tiny_pixel(x, y, 5) : 77);
+  const std::uint32_t turned =
+      0U -
+      static_cast<std::uint32_t>(kTinyHeight);  // a negative height: the first row is the top one
   for (std::size_t i = 0; i < 4; ++i) bytes[22 + i] = static_cast<std::uint8_t>(turned >> (8 * i));
   ASSERT_EQ(decode_grey(bytes, kSize, out.data(), kStride), ImageFileStatus::ok);
   EXPECT_EQ(out[0], test::tiny_pixel(0, kTinyHeight - 1, 5));
@@ -76,8 +81,12 @@ TEST_F(ImageFile, greyBmpIsReadToTheBitFromBothEnds) {
 TEST_F(ImageFile, aBmpCutAnywhereIsTornAndOneOfColoursIsRefused) {
   const auto bytes = tiny_bmp(folder_, cv::Mat(kTinyHeight, kTinyWidth, CV_8UC1, cv::Scalar(90)));
   for (std::size_t n = 2; n < bytes.size(); n += n < 60 ? 1 : 37)
-    EXPECT_EQ(decode({bytes.begin(), bytes.begin() + static_cast<std::ptrdiff_t>(n)}), ImageFileStatus::torn) << n;
-  EXPECT_EQ(decode(tiny_bmp(folder_, cv::Mat(kTinyHeight, kTinyWidth, CV_8UC3, cv::Scalar(90, 80, 70)))), ImageFileStatus::undecodable);
+    EXPECT_EQ(decode({bytes.begin(), bytes.begin() + static_cast<std::ptrdiff_t>(n)}),
+              ImageFileStatus::torn)
+        << n;
+  EXPECT_EQ(
+      decode(tiny_bmp(folder_, cv::Mat(kTinyHeight, kTinyWidth, CV_8UC3, cv::Scalar(90, 80, 70)))),
+      ImageFileStatus::undecodable);
   auto painted = bytes;
   painted[14 + 40 + 4 * 90] ^= 1U;  // blue of palette entry 90
   EXPECT_EQ(decode(painted), ImageFileStatus::undecodable);
@@ -94,28 +103,36 @@ TEST_F(ImageFile, aBmpWhoseNumbersLieReadsNothingBeyondItsBytes) {
 }
 
 TEST_F(ImageFile, colourAndSixteenBitAreReadAsGrey) {
-  cv::Mat grey(kTinyHeight, kTinyWidth, CV_8UC1, cv::Scalar(90)), deep(kTinyHeight, kTinyWidth, CV_16UC1, cv::Scalar(90 * 257)), colour;
+  cv::Mat grey(kTinyHeight, kTinyWidth, CV_8UC1, cv::Scalar(90)),
+      deep(kTinyHeight, kTinyWidth, CV_16UC1, cv::Scalar(90 * 257)), colour;
   cv::cvtColor(grey, colour, cv::COLOR_GRAY2BGR);
   cv::imwrite((folder_ / "colour.png").string(), colour);
   cv::imwrite((folder_ / "deep.png").string(), deep);
   for (const char* name : {"colour.png", "deep.png"}) {
     std::vector<std::uint8_t> out(kStride * kTinyHeight);
-    ASSERT_EQ(decode_grey(bytes_of(folder_ / name), kSize, out.data(), kStride), ImageFileStatus::ok) << name;
+    ASSERT_EQ(decode_grey(bytes_of(folder_ / name), kSize, out.data(), kStride),
+              ImageFileStatus::ok)
+        << name;
     EXPECT_NEAR(out[3 * kStride + 7], 90, 1) << name;
   }
 }
 
-TEST_F(ImageFile, jpegIsDecoded) { EXPECT_EQ(decode(bytes_of(write("a.jpg"))), ImageFileStatus::ok); }
+TEST_F(ImageFile, jpegIsDecoded) {
+  EXPECT_EQ(decode(bytes_of(write("a.jpg"))), ImageFileStatus::ok);
+}
 
 TEST_F(ImageFile, everyTruncationIsTorn) {
   for (const char* name : {"a.png", "a.jpg"}) {
     const auto whole = bytes_of(write(name));
     ASSERT_EQ(decode(whole), ImageFileStatus::ok);
     for (std::size_t n = 0; n < whole.size(); n += n < 200 ? 1 : 37) {
-      const std::vector<std::uint8_t> part(whole.begin(), whole.begin() + static_cast<std::ptrdiff_t>(n));
+      const std::vector<std::uint8_t> part(whole.begin(),
+                                           whole.begin() + static_cast<std::ptrdiff_t>(n));
       // Of a few bytes nobody can say what they were to become.
       const ImageFileStatus status = decode(part);
-      EXPECT_TRUE(status == ImageFileStatus::torn || (n < 8 && status == ImageFileStatus::not_an_image)) << name << " cut at " << n;
+      EXPECT_TRUE(status == ImageFileStatus::torn ||
+                  (n < 8 && status == ImageFileStatus::not_an_image))
+          << name << " cut at " << n;
     }
     auto lacks_one = whole;
     lacks_one.pop_back();
@@ -169,11 +186,14 @@ TEST_F(ImageFile, aPngThatIsWrittenHoldsExactlyThePixelsAndNoPadding) {
   std::vector<std::uint8_t> pixels(kStride * kTinyHeight, 77);
   for (int y = 0; y < kTinyHeight; ++y)
     for (int x = 0; x < kTinyWidth; ++x)
-      pixels[static_cast<std::size_t>(y) * kStride + static_cast<std::size_t>(x)] = test::tiny_pixel(x, y, 9);
-  const ImageView image{pixels.data(), kTinyWidth, kTinyHeight, static_cast<std::ptrdiff_t>(kStride)};
+      pixels[static_cast<std::size_t>(y) * kStride + static_cast<std::size_t>(x)] =
+          test::tiny_pixel(x, y, 9);
+  const ImageView image{pixels.data(), kTinyWidth, kTinyHeight,
+                        static_cast<std::ptrdiff_t>(kStride)};
   write_png(folder_ / "w.png", image);
   std::vector<std::uint8_t> out(kStride * kTinyHeight, 77);
-  ASSERT_EQ(decode_grey(bytes_of(folder_ / "w.png"), kSize, out.data(), kStride), ImageFileStatus::ok);
+  ASSERT_EQ(decode_grey(bytes_of(folder_ / "w.png"), kSize, out.data(), kStride),
+            ImageFileStatus::ok);
   EXPECT_EQ(out, pixels);
   EXPECT_THROW(write_png(folder_ / "no such folder/w.png", image), InputError);
   EXPECT_THROW(write_png("/dev/full", image), InputError);

@@ -36,7 +36,8 @@ Found scan(const TemporaryFolder& folder, const std::string& bytes) {
   Found found;
   found.scan = scan_mcap(file, [&](const McapMessage& m) {
     std::string content(m.place.size, '\0');
-    EXPECT_TRUE(m.bytes->read(m.place.offset, {reinterpret_cast<std::uint8_t*>(content.data()), content.size()}));
+    EXPECT_TRUE(m.bytes->read(m.place.offset,
+                              {reinterpret_cast<std::uint8_t*>(content.data()), content.size()}));
     EXPECT_EQ(m.channel->topic, "/left/image_raw");
     EXPECT_EQ(m.channel->type, "sensor_msgs/msg/Image");
     found.contents.push_back(content);
@@ -50,7 +51,8 @@ class McapOf : public ::testing::TestWithParam<const char*> {};
 TEST_P(McapOf, MessagesComeInOrder) {
   const TemporaryFolder folder;
   const Found found = scan(folder, small_file(GetParam()));
-  EXPECT_EQ(found.contents, (std::vector<std::string>{"first", "second", std::string(1000, 'x'), "fourth"}));
+  EXPECT_EQ(found.contents,
+            (std::vector<std::string>{"first", "second", std::string(1000, 'x'), "fourth"}));
   EXPECT_TRUE(found.scan.finished);
   EXPECT_FALSE(found.scan.first_broken);
 }
@@ -116,7 +118,8 @@ TEST(Mcap, ChunkThatClaimsTooMuchIsSkippedWithASentence) {
   writer.close_chunk();
   const std::size_t here = writer.bytes().size();
   std::string head(16, '\0');
-  head += std::string("\0\0\0\0\1\0\0\0", 8) + std::string(4, '\0') + std::string("\4\0\0\0zstd", 8) + std::string(8, '\0');
+  head += std::string("\0\0\0\0\1\0\0\0", 8) + std::string(4, '\0') +
+          std::string("\4\0\0\0zstd", 8) + std::string(8, '\0');
   writer.record(6, head);
   writer.message(1, 5, "after");
   writer.finish();

@@ -12,7 +12,8 @@ namespace vergence::test {
 using FileBytes = std::vector<std::uint8_t>;
 
 inline void append_u32(FileBytes* to, std::uint32_t v) {
-  for (const unsigned shift : {24U, 16U, 8U, 0U}) to->push_back(static_cast<std::uint8_t>(v >> shift));
+  for (const unsigned shift : {24U, 16U, 8U, 0U})
+    to->push_back(static_cast<std::uint8_t>(v >> shift));
 }
 
 inline void append_chunk(FileBytes* png, std::string_view type, const FileBytes& data) {
@@ -20,7 +21,8 @@ inline void append_chunk(FileBytes* png, std::string_view type, const FileBytes&
   const std::size_t at = png->size();
   png->insert(png->end(), type.begin(), type.end());
   png->insert(png->end(), data.begin(), data.end());
-  append_u32(png, static_cast<std::uint32_t>(crc32(0, png->data() + at, static_cast<uInt>(data.size() + 4))));
+  append_u32(png, static_cast<std::uint32_t>(
+                      crc32(0, png->data() + at, static_cast<uInt>(data.size() + 4))));
 }
 
 inline FileBytes deflated(const FileBytes& raw) {
@@ -31,7 +33,8 @@ inline FileBytes deflated(const FileBytes& raw) {
   return packed;
 }
 
-/// What a PNG is before its pixels. `colours` as in IHDR: 0 grey, 2 RGB, 3 palette, 4 grey and alpha, 6 RGBA.
+/// What a PNG is before its pixels. `colours` as in IHDR: 0 grey, 2 RGB, 3 palette, 4 grey and
+/// alpha, 6 RGBA.
 struct PngKind {
   int colours = 0, depth = 8;
   bool interlaced = false;
@@ -41,7 +44,8 @@ inline FileBytes png_head(const PngKind& kind, int width, int height) {
   FileBytes png{0x89, 'P', 'N', 'G', '\r', '\n', 0x1a, '\n'}, head;
   append_u32(&head, static_cast<std::uint32_t>(width));
   append_u32(&head, static_cast<std::uint32_t>(height));
-  for (const int v : {kind.depth, kind.colours, 0, 0, kind.interlaced ? 1 : 0}) head.push_back(static_cast<std::uint8_t>(v));
+  for (const int v : {kind.depth, kind.colours, 0, 0, kind.interlaced ? 1 : 0})
+    head.push_back(static_cast<std::uint8_t>(v));
   append_chunk(&png, "IHDR", head);
   return png;
 }
@@ -49,14 +53,16 @@ inline FileBytes png_head(const PngKind& kind, int width, int height) {
 /// Bytes of all rows with their filter bytes, of all seven passes where it is interlaced.
 inline std::vector<std::size_t> png_row_sizes(const PngKind& kind, int width, int height) {
   const int samples = kind.colours == 2 ? 3 : kind.colours == 4 ? 2 : kind.colours == 6 ? 4 : 1;
-  constexpr int kPasses[7][4] = {{0, 0, 8, 8}, {4, 0, 8, 8}, {0, 4, 4, 8}, {2, 0, 4, 4}, {0, 2, 2, 4}, {1, 0, 2, 2}, {0, 1, 1, 2}};
+  constexpr int kPasses[7][4] = {{0, 0, 8, 8}, {4, 0, 8, 8}, {0, 4, 4, 8}, {2, 0, 4, 4},
+                                 {0, 2, 2, 4}, {1, 0, 2, 2}, {0, 1, 1, 2}};
   constexpr int kWhole[4] = {0, 0, 1, 1};
   std::vector<std::size_t> rows;
   for (int pass = 0; pass < (kind.interlaced ? 7 : 1); ++pass) {
     const auto& p = kind.interlaced ? kPasses[pass] : kWhole;
     const int columns = (width - p[0] + p[2] - 1) / p[2], lines = (height - p[1] + p[3] - 1) / p[3];
     if (columns <= 0) continue;
-    for (int y = 0; y < lines; ++y) rows.push_back(1 + static_cast<std::size_t>((columns * samples * kind.depth + 7) / 8));
+    for (int y = 0; y < lines; ++y)
+      rows.push_back(1 + static_cast<std::size_t>((columns * samples * kind.depth + 7) / 8));
   }
   return rows;
 }
@@ -87,7 +93,8 @@ inline void mend_check_sums(FileBytes* png) {
     const std::size_t length = u32(at);
     if (length > png->size() - at - 12) return;
     FileBytes sum;
-    append_u32(&sum, static_cast<std::uint32_t>(crc32(0, png->data() + at + 4, static_cast<uInt>(length + 4))));
+    append_u32(&sum, static_cast<std::uint32_t>(
+                         crc32(0, png->data() + at + 4, static_cast<uInt>(length + 4))));
     std::memcpy(png->data() + at + 8 + length, sum.data(), 4);
     at += length + 12;
   }

@@ -26,7 +26,9 @@ constexpr double kPi = std::numbers::pi;
 using Velocity = StLuciaConventions::Velocity;
 using Yaw = StLuciaConventions::Yaw;
 
-void write(const std::filesystem::path& file, const std::string& text) { std::ofstream(file, std::ios::binary) << text; }
+void write(const std::filesystem::path& file, const std::string& text) {
+  std::ofstream(file, std::ios::binary) << text;
+}
 
 template <class Action>
 std::string refusal(const Action& action) {
@@ -38,7 +40,8 @@ std::string refusal(const Action& action) {
   return "";
 }
 
-// ---- images -------------------------------------------------------------------------------------------------------
+// ---- images
+// -------------------------------------------------------------------------------------------------------
 
 constexpr int kWidth = 62, kHeight = 48;  // no multiple of four: BMP pads its rows
 
@@ -55,22 +58,29 @@ class StLuciaImages : public testing::Test {
     std::filesystem::create_directories(folder_ / "101215_153851_MultiCamera0");
     for (int i = 0; i < 2; ++i)
       for (int k = 0; k < 2; ++k)
-        test::write_bytes(folder_ / fmt::format("101215_153851_MultiCamera0/cam{}_image{:05d}.bmp", k, i),
-                          test::bmp_of(mosaic(static_cast<std::uint64_t>(10 * i + k)).data(), kWidth, kHeight));
+        test::write_bytes(
+            folder_ / fmt::format("101215_153851_MultiCamera0/cam{}_image{:05d}.bmp", k, i),
+            test::bmp_of(mosaic(static_cast<std::uint64_t>(10 * i + k)).data(), kWidth, kHeight));
     write(log_,
           "sec usec w h f sec usec w h f left right\n"
-          "1292391531 1234 62 48 raw 1292391531 990 62 48 raw 101215_153851_MultiCamera0/cam0_image00000.bmp cam1_image00000.bmp\n"
-          "1292391531 34567 62 48 raw 1292391531 34570 62 48 raw cam0_image00001.bmp /data/x/cam1_image00001.bmp\n");
+          "1292391531 1234 62 48 raw 1292391531 990 62 48 raw "
+          "101215_153851_MultiCamera0/cam0_image00000.bmp cam1_image00000.bmp\n"
+          "1292391531 34567 62 48 raw 1292391531 34570 62 48 raw cam0_image00001.bmp "
+          "/data/x/cam1_image00001.bmp\n");
     CalibrationFile calibration;
     calibration.rig.cameras = 2;
-    for (Intrinsics& lens : calibration.rig.intrinsics) lens = {.width = kWidth, .height = kHeight, .fx = 50, .fy = 50, .cx = 30, .cy = 23};
+    for (Intrinsics& lens : calibration.rig.intrinsics)
+      lens = {.width = kWidth, .height = kHeight, .fx = 50, .fy = 50, .cx = 30, .cy = 23};
     calibration.rig.T_camera_left[1].t = {-0.75, 0, 0};
     write_calibration(calibration_, calibration);
   }
-  [[nodiscard]] StereoSequence open() const { return open_sequence(SequenceFormat::st_lucia, folder_.path(), calibration_); }
+  [[nodiscard]] StereoSequence open() const {
+    return open_sequence(SequenceFormat::st_lucia, folder_.path(), calibration_);
+  }
 
   test::TemporaryFolder folder_;
-  std::filesystem::path log_ = folder_ / "101215_153851_MultiCamera0.log", calibration_ = folder_ / "calibration.yaml";
+  std::filesystem::path log_ = folder_ / "101215_153851_MultiCamera0.log",
+                        calibration_ = folder_ / "calibration.yaml";
 };
 
 TEST_F(StLuciaImages, pairsByLineWithMicrosecondsThatAreNotPadded) {
@@ -80,7 +90,8 @@ TEST_F(StLuciaImages, pairsByLineWithMicrosecondsThatAreNotPadded) {
   EXPECT_EQ(s.pairs[1].stamp.ns(), 1'292'391'531'034'567'000);
   EXPECT_EQ(s.pairs[0].file[0], "101215_153851_MultiCamera0/cam0_image00000.bmp");
   EXPECT_EQ(s.pairs[0].file[1], "101215_153851_MultiCamera0/cam1_image00000.bmp");
-  EXPECT_EQ(s.pairs[1].file[1], "101215_153851_MultiCamera0/cam1_image00001.bmp") << "the folder of another machine";
+  EXPECT_EQ(s.pairs[1].file[1], "101215_153851_MultiCamera0/cam1_image00001.bmp")
+      << "the folder of another machine";
   EXPECT_TRUE(s.bayer);
 }
 
@@ -98,19 +109,22 @@ TEST_F(StLuciaImages, greyIsMadeOfTheMosaic) {
       bayer_to_grey(mosaic(10 * i + k).data(), kWidth, kWidth, kHeight, grey.data(), kWidth);
       const ImageView v = pool.view(pair.slots[k]);
       for (int y = 0; y < kHeight; ++y)
-        for (int x = 0; x < kWidth; ++x) ASSERT_EQ(v.at(x, y), grey[static_cast<std::size_t>(y * kWidth + x)]);
+        for (int x = 0; x < kWidth; ++x)
+          ASSERT_EQ(v.at(x, y), grey[static_cast<std::size_t>(y * kWidth + x)]);
     }
     decoder.release(pair);
   }
 }
 
 TEST_F(StLuciaImages, withoutACalibrationGivenItIsThePublishedOneForItsOwnSizeOnly) {
-  const std::string said = refusal([&] { (void)open_sequence(SequenceFormat::st_lucia, folder_.path()); });
+  const std::string said =
+      refusal([&] { (void)open_sequence(SequenceFormat::st_lucia, folder_.path()); });
   EXPECT_NE(said.find("62x48"), std::string::npos) << said;
   EXPECT_NE(said.find("1024x768"), std::string::npos) << said;
   const std::vector<std::uint8_t> full(1024 * 768, 90);
   for (const char* name : {"cam0_image00000.bmp", "cam1_image00000.bmp"})
-    test::write_bytes(folder_ / "101215_153851_MultiCamera0" / name, test::bmp_of(full.data(), 1024, 768));
+    test::write_bytes(folder_ / "101215_153851_MultiCamera0" / name,
+                      test::bmp_of(full.data(), 1024, 768));
   const StereoSequence s = open_sequence(SequenceFormat::st_lucia, folder_.path());
   EXPECT_NEAR(s.calibration.baseline, 0.750683, 1e-6);
   EXPECT_LT(s.calibration.T_camera_left[1].t.x(), 0) << "the right camera is on the right";
@@ -119,7 +133,9 @@ TEST_F(StLuciaImages, withoutACalibrationGivenItIsThePublishedOneForItsOwnSizeOn
 TEST_F(StLuciaImages, brokenFoldersAreNamed) {
   write(log_, "1292391531 1234 62 48 raw 1292391531 990 62 48 raw cam0_image00000.bmp\n");
   EXPECT_NE(refusal([&] { (void)open(); }).find("MultiCamera0.log:1:"), std::string::npos);
-  write(log_, "1292391531 1000000 62 48 raw 1292391531 990 62 48 raw cam0_image00000.bmp cam1_image00000.bmp\n");
+  write(log_,
+        "1292391531 1000000 62 48 raw 1292391531 990 62 48 raw cam0_image00000.bmp "
+        "cam1_image00000.bmp\n");
   EXPECT_NE(refusal([&] { (void)open(); }).find("below a million"), std::string::npos);
   write(log_, "sec usec\n");
   EXPECT_NE(refusal([&] { (void)open(); }).find("names no images"), std::string::npos);
@@ -127,21 +143,28 @@ TEST_F(StLuciaImages, brokenFoldersAreNamed) {
   EXPECT_NE(refusal([&] { (void)open(); }).find("2 files"), std::string::npos);
   std::filesystem::remove(folder_ / "101215_160000_MultiCamera0.log");
   std::filesystem::remove(log_);
-  EXPECT_NE(refusal([&] { (void)open(); }).find("holds no file that ends in _MultiCamera0.log"), std::string::npos);
+  EXPECT_NE(refusal([&] { (void)open(); }).find("holds no file that ends in _MultiCamera0.log"),
+            std::string::npos);
 }
 
-// ---- INS ----------------------------------------------------------------------------------------------------------
+// ---- INS
+// ----------------------------------------------------------------------------------------------------------
 
-/// An S-shaped way at 10 m/s over a hill, in enu at the first place; the vehicle points along it and leans into its bends.
+/// An S-shaped way at 10 m/s over a hill, in enu at the first place; the vehicle points along it
+/// and leans into its bends.
 struct Way {
   static constexpr double kRate = 20, kSeconds = 40;
   static double yaw(double t) { return 0.4 + 0.9 * std::sin(0.3 * t); }
   static double pitch_up(double t) { return 0.05 * std::sin(0.5 * t); }
   static double roll(double t) { return 0.03 * std::cos(0.9 * t + 1); }
   static Vec3 velocity(double t) {
-    return 10 * Vec3(std::cos(yaw(t)) * std::cos(pitch_up(t)), std::sin(yaw(t)) * std::cos(pitch_up(t)), std::sin(pitch_up(t)));
+    return 10 * Vec3(std::cos(yaw(t)) * std::cos(pitch_up(t)),
+                     std::sin(yaw(t)) * std::cos(pitch_up(t)), std::sin(pitch_up(t)));
   }
-  static Mat3 R(double t) { return exp_so3(Vec3(0, 0, yaw(t))) * exp_so3(Vec3(0, -pitch_up(t), 0)) * exp_so3(Vec3(roll(t), 0, 0)); }
+  static Mat3 R(double t) {
+    return exp_so3(Vec3(0, 0, yaw(t))) * exp_so3(Vec3(0, -pitch_up(t), 0)) *
+           exp_so3(Vec3(roll(t), 0, 0));
+  }
 };
 
 std::vector<std::string> ins_lines(const StLuciaConventions& c, double speed = 1) {
@@ -153,18 +176,23 @@ std::vector<std::string> ins_lines(const StLuciaConventions& c, double speed = 1
     double latitude = 0, longitude = 0, height = 0;
     plane.Reverse(p.x(), p.y(), p.z(), latitude, longitude, height);
     const Vec3 v = speed * Way::velocity(t);
-    p += dt / 6 * speed * (Way::velocity(t) + 4 * Way::velocity(t + dt / 2) + Way::velocity(t + dt));  // Simpson's rule
+    p += dt / 6 * speed *
+         (Way::velocity(t) + 4 * Way::velocity(t + dt / 2) +
+          Way::velocity(t + dt));  // Simpson's rule
     const Vec3 written = c.velocity == Velocity::east_north_up     ? v
                          : c.velocity == Velocity::north_east_down ? Vec3(v.y(), v.x(), -v.z())
                                                                    : Vec3(v.y(), -v.x(), v.z());
     const double yaw = c.yaw == Yaw::east_to_north   ? Way::yaw(t)
                        : c.yaw == Yaw::north_to_east ? kPi / 2 - Way::yaw(t)
                                                      : Way::yaw(t) - kPi / 2;
-    const double pitch = c.nose_up_positive ? Way::pitch_up(t) : -Way::pitch_up(t), roll = Way::roll(t);
+    const double pitch = c.nose_up_positive ? Way::pitch_up(t) : -Way::pitch_up(t),
+                 roll = Way::roll(t);
     const int us = static_cast<int>(std::lround(t * 1e6));
-    lines.push_back(fmt::format("{} {} {:.12f} {:.12f} {:.6f} {:.6f} {:.9f} {:.9f} {:.9f} {:.9f} {:.9f} {:.9f}", 1292391531 + us / 1000000,
-                                us % 1000000, latitude, longitude, height, height - 40, written.x(), written.y(), written.z(),
-                                c.pitch_first ? pitch : roll, c.pitch_first ? roll : pitch, yaw));
+    lines.push_back(
+        fmt::format("{} {} {:.12f} {:.12f} {:.6f} {:.6f} {:.9f} {:.9f} {:.9f} {:.9f} {:.9f} {:.9f}",
+                    1292391531 + us / 1000000, us % 1000000, latitude, longitude, height,
+                    height - 40, written.x(), written.y(), written.z(),
+                    c.pitch_first ? pitch : roll, c.pitch_first ? roll : pitch, yaw));
   }
   return lines;
 }
@@ -182,11 +210,13 @@ bool says(const StLuciaIns& ins, const std::string& part) {
 }
 
 TEST(StLuciaIns, whateverItsAxesTheDriveShowsThem) {
-  for (const Velocity velocity : {Velocity::east_north_up, Velocity::north_east_down, Velocity::north_west_up})
+  for (const Velocity velocity :
+       {Velocity::east_north_up, Velocity::north_east_down, Velocity::north_west_up})
     for (const Yaw yaw : {Yaw::north_to_west, Yaw::north_to_east, Yaw::east_to_north})
       for (const bool pitch_first : {false, true})
         for (const bool nose_up : {false, true}) {
-          SCOPED_TRACE(fmt::format("{} {} {} {}", static_cast<int>(velocity), static_cast<int>(yaw), pitch_first, nose_up));
+          SCOPED_TRACE(fmt::format("{} {} {} {}", static_cast<int>(velocity), static_cast<int>(yaw),
+                                   pitch_first, nose_up));
           const StLuciaIns ins = read(ins_lines({velocity, yaw, pitch_first, nose_up}));
           EXPECT_EQ(ins.conventions.velocity, velocity);
           EXPECT_EQ(ins.conventions.yaw, yaw);
@@ -195,9 +225,14 @@ TEST(StLuciaIns, whateverItsAxesTheDriveShowsThem) {
           ASSERT_EQ(ins.samples.size(), 800U);
           const InsSample& s = ins.samples[333];
           const double t = 333 / Way::kRate;
-          const Mat3 R = Eigen::Quaterniond(s.q_enu_ins[3], s.q_enu_ins[0], s.q_enu_ins[1], s.q_enu_ins[2]).toRotationMatrix();
+          const Mat3 R =
+              Eigen::Quaterniond(s.q_enu_ins[3], s.q_enu_ins[0], s.q_enu_ins[1], s.q_enu_ins[2])
+                  .toRotationMatrix();
           EXPECT_LT(log_so3(R.transpose() * Way::R(t)).norm(), 1e-8);
-          EXPECT_LT((Vec3(s.velocity_enu[0], s.velocity_enu[1], s.velocity_enu[2]) - Way::velocity(t)).norm(), 1e-8);
+          EXPECT_LT(
+              (Vec3(s.velocity_enu[0], s.velocity_enu[1], s.velocity_enu[2]) - Way::velocity(t))
+                  .norm(),
+              1e-8);
           EXPECT_EQ(s.stamp.ns(), 1'292'391'531'000'000'000 + 333 * 50'000'000LL);
         }
 }
@@ -215,7 +250,8 @@ TEST(StLuciaIns, disorderBrokenLinesAndEqualStampsAreMendedAndSaid) {
   lines[300] = "1292391546 0 -27.5";
   const StLuciaIns ins = read(lines);
   EXPECT_EQ(ins.samples.size(), 798U);
-  for (std::size_t i = 1; i < ins.samples.size(); ++i) ASSERT_LT(ins.samples[i - 1].stamp, ins.samples[i].stamp);
+  for (std::size_t i = 1; i < ins.samples.size(); ++i)
+    ASSERT_LT(ins.samples[i - 1].stamp, ins.samples[i].stamp);
   EXPECT_TRUE(says(ins, "1 lines that are not twelve numbers"));
   EXPECT_TRUE(says(ins, "not in the order"));
   EXPECT_TRUE(says(ins, "1 samples of the INS had the stamp of another"));
@@ -224,8 +260,10 @@ TEST(StLuciaIns, disorderBrokenLinesAndEqualStampsAreMendedAndSaid) {
 TEST(StLuciaIns, longitudeFirstIsSeen) {
   std::vector<std::string> lines = ins_lines({});
   for (std::string& line : lines) {
-    const std::size_t a = line.find(' ', line.find(' ') + 1) + 1, b = line.find(' ', a) + 1, c = line.find(' ', b);
-    line = line.substr(0, a) + line.substr(b, c - b) + " " + line.substr(a, b - a - 1) + line.substr(c);
+    const std::size_t a = line.find(' ', line.find(' ') + 1) + 1, b = line.find(' ', a) + 1,
+                      c = line.find(' ', b);
+    line = line.substr(0, a) + line.substr(b, c - b) + " " + line.substr(a, b - a - 1) +
+           line.substr(c);
   }
   const StLuciaIns ins = read(lines);
   EXPECT_TRUE(says(ins, "longitude stands before latitude"));
@@ -233,8 +271,14 @@ TEST(StLuciaIns, longitudeFirstIsSeen) {
 }
 
 TEST(StLuciaIns, whatIsNoSuchLogIsRefused) {
-  EXPECT_NE(refusal([] { (void)read({"1 2 3", "4 5 6", "7 8 9"}); }).find("Ins0.log:1: and 2 more lines"), std::string::npos);
-  EXPECT_NE(refusal([] { (void)read({"1292391531 0 -27.5 153 1e9 0 0 0 0 0 0 0"}); }).find("a place that is none"), std::string::npos);
+  EXPECT_NE(refusal([] {
+              (void)read({"1 2 3", "4 5 6", "7 8 9"});
+            }).find("Ins0.log:1: and 2 more lines"),
+            std::string::npos);
+  EXPECT_NE(refusal([] {
+              (void)read({"1292391531 0 -27.5 153 1e9 0 0 0 0 0 0 0"});
+            }).find("a place that is none"),
+            std::string::npos);
   const test::TemporaryFolder empty;
   const StLuciaIns none = read_st_lucia_ins(empty.path());
   EXPECT_TRUE(none.samples.empty());

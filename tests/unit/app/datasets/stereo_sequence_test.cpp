@@ -14,9 +14,11 @@ std::string refusal(SequenceFormat format, const std::filesystem::path& folder,
   return test::sentence_of<InputError>([&] { (void)open_sequence(format, folder, calibration); });
 }
 
-testing::AssertionResult says(const std::string& sentence, std::initializer_list<const char*> parts) {
+testing::AssertionResult says(const std::string& sentence,
+                              std::initializer_list<const char*> parts) {
   for (const char* part : parts)
-    if (sentence.find(part) == std::string::npos) return testing::AssertionFailure() << "\"" << sentence << "\" lacks \"" << part << "\"";
+    if (sentence.find(part) == std::string::npos)
+      return testing::AssertionFailure() << "\"" << sentence << "\" lacks \"" << part << "\"";
   return testing::AssertionSuccess();
 }
 
@@ -51,7 +53,8 @@ TEST_F(Sequence, kittiImagesThatAreMissingKeepTheirPlace) {
 TEST_F(Sequence, kittiSaysWhatIsWrong) {
   test::write_tiny_kitti(folder_, 3);
   folder_.write("times.txt", "0\n0.1\n");
-  EXPECT_TRUE(says(refusal(SequenceFormat::kitti, folder_.path()), {"image_0/000002.png", "times.txt"}));
+  EXPECT_TRUE(
+      says(refusal(SequenceFormat::kitti, folder_.path()), {"image_0/000002.png", "times.txt"}));
   folder_.write("times.txt", "0\n0.1\nnoon\n");
   EXPECT_TRUE(says(refusal(SequenceFormat::kitti, folder_.path()), {"times.txt:3", "noon"}));
   folder_.write("times.txt", "0\n0.1\n0.2\n");
@@ -61,12 +64,14 @@ TEST_F(Sequence, kittiSaysWhatIsWrong) {
   EXPECT_TRUE(says(refusal(SequenceFormat::kitti, folder_.path()), {"calib.txt:2", "12 numbers"}));
   folder_.write("calib.txt", "P0: 60 0 35 0 0 60 24 0 0 0 1 0\nP1: 60 0 35 30 0 60 24 0 0 0 1 0\n");
   EXPECT_TRUE(says(refusal(SequenceFormat::kitti, folder_.path()), {"calib.txt", "swapped"}));
-  folder_.write("calib.txt", "P0: 60 0 35 0 0 60 24 0 0 0 1 0\nP1: 60 0 35 nan 0 60 24 0 0 0 1 0\n");
+  folder_.write("calib.txt",
+                "P0: 60 0 35 0 0 60 24 0 0 0 1 0\nP1: 60 0 35 nan 0 60 24 0 0 0 1 0\n");
   EXPECT_TRUE(says(refusal(SequenceFormat::kitti, folder_.path()), {"calib.txt:2", "nan"}));
 }
 
 TEST_F(Sequence, foldersThatAreNotThereOrEmptyAreNamed) {
-  EXPECT_TRUE(says(refusal(SequenceFormat::kitti, folder_ / "nowhere"), {"nowhere", "does not exist"}));
+  EXPECT_TRUE(
+      says(refusal(SequenceFormat::kitti, folder_ / "nowhere"), {"nowhere", "does not exist"}));
   EXPECT_TRUE(says(refusal(SequenceFormat::kitti, folder_.path()), {"times.txt"}));
   EXPECT_TRUE(says(refusal(SequenceFormat::euroc, folder_.path()), {"cam0"}));
   EXPECT_TRUE(says(refusal(SequenceFormat::folder, folder_.path()), {"left"}));
@@ -83,7 +88,8 @@ TEST_F(Sequence, eurocStampsAreExactAndTheRightCameraSitsWhereT_BSPutsIt) {
       ASSERT_EQ(s.pairs.size(), 3U);
       EXPECT_EQ(s.pairs[1].stamp.ns(), test::kTinyStart + test::kTinyStep);
       EXPECT_EQ(s.pairs[1].file[0], "cam0/data/1403636584813555456.png");
-      // Camera 1 is 0.5 m along the body's y axis, which is the camera's x axis: in camera 1 the left camera lies at −0.5.
+      // Camera 1 is 0.5 m along the body's y axis, which is the camera's x axis: in camera 1 the
+      // left camera lies at −0.5.
       EXPECT_NEAR((s.calibration.T_camera_left[1].t - Vec3(-0.5, 0, 0)).norm(), 0, 1e-15);
       EXPECT_NEAR((s.calibration.T_camera_left[1].R - Mat3::Identity()).norm(), 0, 1e-15);
       EXPECT_EQ(s.calibration.intrinsics[0].distortion[3], -0.002);
@@ -95,7 +101,8 @@ TEST_F(Sequence, eurocStampsAreExactAndTheRightCameraSitsWhereT_BSPutsIt) {
 TEST_F(Sequence, eurocImagesOfOneCameraOnlyStandWhereTheirStampBelongs) {
   test::write_tiny_euroc(folder_, 3);
   const auto line = [](std::int64_t stamp) { return fmt::format("{0},{0}.png\n", stamp); };
-  folder_.write("mav0/cam1/data.csv", line(test::kTinyStart) + line(test::kTinyStart + 7) + line(test::kTinyStart + 2 * test::kTinyStep));
+  folder_.write("mav0/cam1/data.csv", line(test::kTinyStart) + line(test::kTinyStart + 7) +
+                                          line(test::kTinyStart + 2 * test::kTinyStep));
   const auto s = open_sequence(SequenceFormat::euroc, folder_.path());
   ASSERT_EQ(s.pairs.size(), 4U);
   EXPECT_EQ(s.pairs[1].stamp.ns(), test::kTinyStart + 7);
@@ -111,7 +118,8 @@ TEST_F(Sequence, eurocSaysWhatIsWrong) {
   folder_.write("mav0/cam0/data.csv", "15,../../secret.png\n");
   EXPECT_TRUE(says(refusal(SequenceFormat::euroc, folder_.path()), {"cam0/data.csv:1", "outside"}));
   folder_.write("mav0/cam0/data.csv", "15,15.png\n");
-  EXPECT_TRUE(says(refusal(SequenceFormat::euroc, folder_.path()), {"cam1/data.csv", "no stamp in common"}));
+  EXPECT_TRUE(says(refusal(SequenceFormat::euroc, folder_.path()),
+                   {"cam1/data.csv", "no stamp in common"}));
   test::write_tiny_euroc(folder_, 2);
   std::string yaml = test::tiny_sensor_yaml("", 0.5, "\n");
   const auto with = [&](const std::string& from, const std::string& to) {
@@ -120,12 +128,17 @@ TEST_F(Sequence, eurocSaysWhatIsWrong) {
     folder_.write("mav0/cam1/sensor.yaml", changed);
     return refusal(SequenceFormat::euroc, folder_.path());
   };
-  EXPECT_TRUE(says(with("0.0, -1.0, 0.0,", "0.0, -1.01, 0.0,"), {"cam1/sensor.yaml", "T_BS", "orthonormal"}));
+  EXPECT_TRUE(says(with("0.0, -1.0, 0.0,", "0.0, -1.01, 0.0,"),
+                   {"cam1/sensor.yaml", "T_BS", "orthonormal"}));
   EXPECT_TRUE(says(with("radial-tangential", "fov"), {"cam1/sensor.yaml", "fov"}));
-  EXPECT_TRUE(says(with("intrinsics: [60, 61, 35, 24]", "intrinsics: [60, 61, 35]"), {"cam1/sensor.yaml", "intrinsics", "4 numbers"}));
-  EXPECT_TRUE(says(with("intrinsics: [60, 61, 35, 24]", "intrinsics: {a: b}"), {"cam1/sensor.yaml", "intrinsics"}));
-  EXPECT_TRUE(says(with("resolution: [70, 48]", "resolution: [1e30, 48]"), {"cam1/sensor.yaml", "resolution"}));
-  EXPECT_TRUE(says(with("resolution: [70, 48]", "resolution: [80, 48]"), {"sensor.yaml", "80x48", "one size"}));
+  EXPECT_TRUE(says(with("intrinsics: [60, 61, 35, 24]", "intrinsics: [60, 61, 35]"),
+                   {"cam1/sensor.yaml", "intrinsics", "4 numbers"}));
+  EXPECT_TRUE(says(with("intrinsics: [60, 61, 35, 24]", "intrinsics: {a: b}"),
+                   {"cam1/sensor.yaml", "intrinsics"}));
+  EXPECT_TRUE(says(with("resolution: [70, 48]", "resolution: [1e30, 48]"),
+                   {"cam1/sensor.yaml", "resolution"}));
+  EXPECT_TRUE(says(with("resolution: [70, 48]", "resolution: [80, 48]"),
+                   {"sensor.yaml", "80x48", "one size"}));
 }
 
 TEST_F(Sequence, folderPairsInOrderOfNameAndReadsBothKindsOfTime) {
@@ -142,7 +155,8 @@ TEST_F(Sequence, folderPairsInOrderOfNameAndReadsBothKindsOfTime) {
 
 TEST_F(Sequence, folderWhoseTimesNameTheirImages) {
   test::write_tiny_folder(folder_, 4);
-  folder_.write("times.txt", "# stamp,file\n0.0,000.png\n0.1,003.png\n0.2,001.png,002.png\n0.3,gone.png\n");
+  folder_.write("times.txt",
+                "# stamp,file\n0.0,000.png\n0.1,003.png\n0.2,001.png,002.png\n0.3,gone.png\n");
   const auto s = open_sequence(SequenceFormat::folder, folder_.path());
   ASSERT_EQ(s.pairs.size(), 4U);
   EXPECT_EQ(s.pairs[1].file[1], "right/003.png");
@@ -154,9 +168,11 @@ TEST_F(Sequence, folderWhoseTimesNameTheirImages) {
   folder_.write("times.txt", "0.0,../000.png\n");
   EXPECT_TRUE(says(refusal(SequenceFormat::folder, folder_.path()), {"times.txt:1", "../000.png"}));
   folder_.write("times.txt", "stamp,file\n0.0,000.png\n");
-  EXPECT_TRUE(says(refusal(SequenceFormat::folder, folder_.path()), {"times.txt:1", "begin a line of headings with #"}));
+  EXPECT_TRUE(says(refusal(SequenceFormat::folder, folder_.path()),
+                   {"times.txt:1", "begin a line of headings with #"}));
   folder_.write("times.txt", "0.0,a.png\n0.1,b.png\n");
-  EXPECT_TRUE(says(refusal(SequenceFormat::folder, folder_.path()), {"times.txt", "left/a.png", "left/000.png"}));
+  EXPECT_TRUE(says(refusal(SequenceFormat::folder, folder_.path()),
+                   {"times.txt", "left/a.png", "left/000.png"}));
   folder_.write("times.txt", "0.0,a,b,c\n");
   EXPECT_TRUE(says(refusal(SequenceFormat::folder, folder_.path()), {"4 columns"}));
 }
@@ -175,9 +191,11 @@ TEST_F(Sequence, timesInAnotherUnitAreRefusedWithTheUnitTheySeemToHave) {
     double step;
     const char* unit;
   };
-  for (const Case& c : {Case{"{:.0f}", 104, "milliseconds?"}, Case{"{:.0f}", 50, "milliseconds?"}, Case{"{:.0f}", 103700, "microseconds?"},
-                        Case{"{:.0f}", 33333, "microseconds?"}, Case{"{:.0f}", 1, "seconds?"}, Case{"{:.1f}", 103.7, "milliseconds?"},
-                        Case{"{:.1f}", 103700.5, "microseconds?"}, Case{"{:.1f}", 5e7, "nanoseconds?"}}) {
+  for (const Case& c :
+       {Case{"{:.0f}", 104, "milliseconds?"}, Case{"{:.0f}", 50, "milliseconds?"},
+        Case{"{:.0f}", 103700, "microseconds?"}, Case{"{:.0f}", 33333, "microseconds?"},
+        Case{"{:.0f}", 1, "seconds?"}, Case{"{:.1f}", 103.7, "milliseconds?"},
+        Case{"{:.1f}", 103700.5, "microseconds?"}, Case{"{:.1f}", 5e7, "nanoseconds?"}}) {
     folder_.write("times.txt", times_of(c.format, c.step, 5));
     const std::string sentence = refusal(SequenceFormat::folder, folder_.path());
     EXPECT_TRUE(says(sentence, {"times.txt", "are these ", c.unit})) << c.format << " " << c.step;
@@ -187,17 +205,21 @@ TEST_F(Sequence, timesInAnotherUnitAreRefusedWithTheUnitTheySeemToHave) {
     EXPECT_NO_THROW((void)open_sequence(SequenceFormat::folder, folder_.path())) << ns;
   }
   folder_.write("times.txt", "0.0\n0.1\n0.2\n500.0\n500.1\n");
-  EXPECT_NO_THROW((void)open_sequence(SequenceFormat::folder, folder_.path())) << "a gap is no unit";
+  EXPECT_NO_THROW((void)open_sequence(SequenceFormat::folder, folder_.path()))
+      << "a gap is no unit";
 }
 
 TEST_F(Sequence, timesThatRunBackwardsAreRefused) {
   test::write_tiny_folder(folder_, 5);
   folder_.write("times.txt", "0.5\n0.4\n0.3\n0.2\n0.1\n");
-  EXPECT_TRUE(says(refusal(SequenceFormat::folder, folder_.path()), {"times.txt", "of 4 steps", "4 go back", "oldest first"}));
+  EXPECT_TRUE(says(refusal(SequenceFormat::folder, folder_.path()),
+                   {"times.txt", "of 4 steps", "4 go back", "oldest first"}));
   folder_.write("times.txt", "0.5\n0.5\n0.5\n0.5\n0.5\n");
-  EXPECT_TRUE(says(refusal(SequenceFormat::folder, folder_.path()), {"0 go back and 4 stand still"}));
+  EXPECT_TRUE(
+      says(refusal(SequenceFormat::folder, folder_.path()), {"0 go back and 4 stand still"}));
   folder_.write("times.txt", "0.1\n0.2\n0.15\n0.3\n0.4\n");
-  EXPECT_NO_THROW((void)open_sequence(SequenceFormat::folder, folder_.path())) << "one frame is skipped when it comes";
+  EXPECT_NO_THROW((void)open_sequence(SequenceFormat::folder, folder_.path()))
+      << "one frame is skipped when it comes";
 }
 
 TEST_F(Sequence, folderWithALostImagePairsTheRestByName) {
@@ -212,7 +234,8 @@ TEST_F(Sequence, folderWithALostImagePairsTheRestByName) {
 TEST_F(Sequence, folderCountsThatDoNotGoTogetherAreRefused) {
   test::write_tiny_folder(folder_, 3);
   folder_.write("times.txt", "1\n2\n3\n4\n");
-  EXPECT_TRUE(says(refusal(SequenceFormat::folder, folder_.path()), {"3 images in left/", "4 lines in times.txt"}));
+  EXPECT_TRUE(says(refusal(SequenceFormat::folder, folder_.path()),
+                   {"3 images in left/", "4 lines in times.txt"}));
   folder_.write("times.txt", "1\n2\nthree\n");
   EXPECT_TRUE(says(refusal(SequenceFormat::folder, folder_.path()), {"times.txt:3", "three"}));
 }
@@ -224,18 +247,21 @@ TEST_F(Sequence, aGivenCalibrationReplacesTheDataSetsOwnWhichNeedNotExist) {
   const auto s = open_sequence(SequenceFormat::kitti, folder_.path(), file);
   EXPECT_DOUBLE_EQ(s.calibration.T_camera_left[1].t.x(), -0.5);
   EXPECT_EQ(s.calibration_source, "mine.yaml");
-  EXPECT_TRUE(says(refusal(SequenceFormat::kitti, folder_.path(), folder_ / "other.yaml"), {"other.yaml"}));
+  EXPECT_TRUE(
+      says(refusal(SequenceFormat::kitti, folder_.path(), folder_ / "other.yaml"), {"other.yaml"}));
 }
 
 TEST_F(Sequence, imagesOfAnotherSizeAreRefusedWherverTheyStand) {
   test::write_tiny_folder(folder_, 3);
   test::write_tiny_image(folder_ / "left/000.png", 0, 64, 48);
-  EXPECT_TRUE(says(refusal(SequenceFormat::folder, folder_.path()), {"left/000.png", "64x48", "70x48", "calibration.yaml"}));
+  EXPECT_TRUE(says(refusal(SequenceFormat::folder, folder_.path()),
+                   {"left/000.png", "64x48", "70x48", "calibration.yaml"}));
   test::write_tiny_folder(folder_, 3);
   test::write_tiny_image(folder_ / "right/002.png", 0, 70, 50);
   const auto s = open_sequence(SequenceFormat::folder, folder_.path());
   EXPECT_EQ(test::sentence_of<InputError>([&] { check_image_sizes(s, 0, 2); }), "");
-  EXPECT_TRUE(says(test::sentence_of<InputError>([&] { check_image_sizes(s, 0, 3); }), {"right/002.png", "70x50"}));
+  EXPECT_TRUE(says(test::sentence_of<InputError>([&] { check_image_sizes(s, 0, 3); }),
+                   {"right/002.png", "70x50"}));
   EXPECT_EQ(test::sentence_of<InputError>([&] { check_image_sizes(s, 99, 3); }), "");
 }
 
@@ -261,7 +287,8 @@ TEST(RecordedSequence, eurocExcerptHasTheCalibrationOfItsDescription) {
   const Transform& T = s.calibration.T_camera_left[1];
   EXPECT_LT((T.t - Vec3(-0.110073808, 0.000399122, -0.000853703)).cwiseAbs().maxCoeff(), 1e-9);
   constexpr double kDegree = 3.14159265358979323846 / 180;
-  EXPECT_LT((log_so3(T.R) / kDegree - Vec3(-0.80734, 0.02061, -0.13262)).cwiseAbs().maxCoeff(), 1e-5);
+  EXPECT_LT((log_so3(T.R) / kDegree - Vec3(-0.80734, 0.02061, -0.13262)).cwiseAbs().maxCoeff(),
+            1e-5);
 }
 
 }  // namespace

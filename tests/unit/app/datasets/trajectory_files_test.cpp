@@ -47,13 +47,15 @@ std::string tum_complaint(const std::string& text) {
 constexpr const char* kGoodLine = "1.5 1 2 3 0 0 0 1\n";
 
 constexpr const char* kSensor =
-    "%YAML:1.0\nsensor_type: camera\nT_BS:\n  cols: 4\n  rows: 4\n  data: [0.0, -1.0, 0.0, 0.1,\n         1.0, 0.0, 0.0, 0.2,\n         "
+    "%YAML:1.0\nsensor_type: camera\nT_BS:\n  cols: 4\n  rows: 4\n  data: [0.0, -1.0, 0.0, 0.1,\n  "
+    "       1.0, 0.0, 0.0, 0.2,\n         "
     "0.0, 0.0, "
     "1.0, 0.3,\n         0.0, 0.0, 0.0, 1.0]\n";
 
 TEST(Split, everyByteEndsAFieldOrBelongsToOne) {
   for (int byte = 0; byte < 256; ++byte) {
-    const std::string line = std::string("1 2") + static_cast<char>(byte) + "3 " + static_cast<char>(byte);
+    const std::string line =
+        std::string("1 2") + static_cast<char>(byte) + "3 " + static_cast<char>(byte);
     std::array<std::string_view, 8> fields;
     EXPECT_LE(split(line, ' ', fields), 4U) << byte;  // and it comes back
   }
@@ -61,16 +63,19 @@ TEST(Split, everyByteEndsAFieldOrBelongsToOne) {
 
 TEST(Tum, readsStampsAsIntegersAndQuaternionsWithWLast) {
   const test::TemporaryFolder folder;
-  const auto file = folder.write("t.tum",
-                                 "# a comment\n\n1403636584.763555584 1 -2 3.5e0 0 0 0.70710678 0.70710678\r\n"
-                                 "1403636584.763555585\t0 0 0   0 0 0 -1");
+  const auto file =
+      folder.write("t.tum",
+                   "# a comment\n\n1403636584.763555584 1 -2 3.5e0 0 0 0.70710678 0.70710678\r\n"
+                   "1403636584.763555585\t0 0 0   0 0 0 -1");
   const Trajectory t = read_tum(file);
   ASSERT_EQ(t.size(), 2U);
   EXPECT_EQ(t[0].stamp.ns(), 1403636584763555584);
   EXPECT_EQ(t[1].stamp.ns(), 1403636584763555585);
   EXPECT_EQ(t[0].T_world_body.t, Vec3(1, -2, 3.5));
-  EXPECT_LT((t[0].T_world_body * Vec3(1, 0, 0) - Vec3(1, -1, 3.5)).norm(), 1e-15);  // a quarter turn about z
-  EXPECT_LT((t[0].T_world_body.R * t[0].T_world_body.R.transpose() - Mat3::Identity()).norm(), 1e-15);
+  EXPECT_LT((t[0].T_world_body * Vec3(1, 0, 0) - Vec3(1, -1, 3.5)).norm(),
+            1e-15);  // a quarter turn about z
+  EXPECT_LT((t[0].T_world_body.R * t[0].T_world_body.R.transpose() - Mat3::Identity()).norm(),
+            1e-15);
   EXPECT_EQ(t[1].T_world_body.R, Mat3(Mat3::Identity()));
 }
 
@@ -78,16 +83,20 @@ TEST(Tum, saysFileAndLineOfWhatIsWrong) {
   const std::string good = kGoodLine;
   EXPECT_TRUE(has(tum_complaint(good + "2.5 1 2 3 0 0 0\n"), "t.tum:2: has 7 columns"));
   EXPECT_TRUE(has(tum_complaint(good + "2.5 1 2 3 0 0 0 1 9\n"), "t.tum:2: has 9 columns"));
-  EXPECT_TRUE(has(tum_complaint("# c\n" + good + "2.5 1 two 3 0 0 0 1\n"), "t.tum:3: `two` is not a finite number"));
+  EXPECT_TRUE(has(tum_complaint("# c\n" + good + "2.5 1 two 3 0 0 0 1\n"),
+                  "t.tum:3: `two` is not a finite number"));
   EXPECT_TRUE(has(tum_complaint(good + "2.5 nan 2 3 0 0 0 1\n"), "t.tum:2: `nan` is not"));
   EXPECT_TRUE(has(tum_complaint(good + "2.5 1e999 2 3 0 0 0 1\n"), "t.tum:2: `1e999` is not"));
   EXPECT_TRUE(has(tum_complaint(good + "2.5 -inf 2 3 0 0 0 1\n"), "t.tum:2: `-inf` is not"));
   EXPECT_TRUE(has(tum_complaint(good + "nan 1 2 3 0 0 0 1\n"), "t.tum:2: `nan` is not a stamp"));
   EXPECT_TRUE(has(tum_complaint(good + "1e30 1 2 3 0 0 0 1\n"), "t.tum:2: `1e30` is not a stamp"));
-  EXPECT_TRUE(has(tum_complaint(good + "2.5 1 2 3 0 0 0 0\n"), "t.tum:2: the quaternion has length 0"));
-  EXPECT_TRUE(has(tum_complaint(good + "2.5 1 2 3 1 1 0 1\n"), "t.tum:2: the quaternion has length 1.73"));
+  EXPECT_TRUE(
+      has(tum_complaint(good + "2.5 1 2 3 0 0 0 0\n"), "t.tum:2: the quaternion has length 0"));
+  EXPECT_TRUE(
+      has(tum_complaint(good + "2.5 1 2 3 1 1 0 1\n"), "t.tum:2: the quaternion has length 1.73"));
   EXPECT_TRUE(has(tum_complaint(good + good), "t.tum:2: the stamp 1.500000000 s is not later"));
-  EXPECT_TRUE(has(tum_complaint(good + "1.4 1 2 3 0 0 0 1\n"), "t.tum:2: the stamp 1.400000000 s is not later"));
+  EXPECT_TRUE(has(tum_complaint(good + "1.4 1 2 3 0 0 0 1\n"),
+                  "t.tum:2: the stamp 1.400000000 s is not later"));
   EXPECT_TRUE(has(tum_complaint(""), "t.tum: has no pose"));
   EXPECT_TRUE(has(tum_complaint("# only words\n\n"), "t.tum: has no pose"));
   EXPECT_TRUE(has(tum_complaint(std::string(100, '\0') + "\n"), "t.tum:1: has 1 columns"));
@@ -96,13 +105,15 @@ TEST(Tum, saysFileAndLineOfWhatIsWrong) {
 
 TEST(Tum, saysWhichFileCannotBeRead) {
   const test::TemporaryFolder folder;
-  EXPECT_TRUE(has(complaint([&] { (void)read_tum(folder / "none.tum"); }), "none.tum: cannot be opened (No such file"));
+  EXPECT_TRUE(has(complaint([&] { (void)read_tum(folder / "none.tum"); }),
+                  "none.tum: cannot be opened (No such file"));
   EXPECT_TRUE(has(complaint([&] { (void)read_tum(folder.path()); }), "is a folder"));
 }
 
 TEST(Kitti, readsPosesWithTheirTimes) {
   const test::TemporaryFolder folder;
-  const auto poses = folder.write("poses.txt", "1 0 0 0 0 1 0 0 0 0 1 0\n0 -1 0 4 1 0 0 5 0 0 1 6\n");
+  const auto poses =
+      folder.write("poses.txt", "1 0 0 0 0 1 0 0 0 0 1 0\n0 -1 0 4 1 0 0 5 0 0 1 6\n");
   folder.write("times.txt", "0.000000e+00\n1.044989e-01\n");
   for (const auto& path : {poses, folder.path()}) {
     const Trajectory t = read_trajectory(path);
@@ -129,9 +140,11 @@ TEST(Kitti, normalisesRoundedRotationsAndRefusesOthersByFileAndLine) {
   EXPECT_LT((R * R.transpose() - Mat3::Identity()).norm(), 1e-14);
 
   folder.write("poses.txt", first + "1.0005 0 0 7 0 1 0 8 0 0 1 9\n");  // R Rᵀ − I: 1.0e-3
-  EXPECT_TRUE(has(complaint([&] { (void)read_trajectory(poses); }), "poses.txt:2: the matrix is not a rotation"));
+  EXPECT_TRUE(has(complaint([&] { (void)read_trajectory(poses); }),
+                  "poses.txt:2: the matrix is not a rotation"));
   folder.write("poses.txt", first + "1 0.001 0 7 0 1 0 8 0 0 1 9\n");
-  EXPECT_TRUE(has(complaint([&] { (void)read_trajectory(poses); }), "poses.txt:2: the matrix is not a rotation"));
+  EXPECT_TRUE(has(complaint([&] { (void)read_trajectory(poses); }),
+                  "poses.txt:2: the matrix is not a rotation"));
   folder.write("poses.txt", first + "1 0 0 7 0 1 0 8 0 0 -1 9\n");
   EXPECT_TRUE(has(complaint([&] { (void)read_trajectory(poses); }), "a reflection"));
 }
@@ -214,7 +227,8 @@ TEST(Euroc, saysFileAndLineOfWhatIsWrong) {
 
 TEST(Trajectory, folderWithoutOneSaysWhatWasLookedFor) {
   const test::TemporaryFolder folder;
-  EXPECT_TRUE(has(complaint([&] { (void)read_trajectory(folder.path()); }), "has no trajectory.tum, no poses.txt"));
+  EXPECT_TRUE(has(complaint([&] { (void)read_trajectory(folder.path()); }),
+                  "has no trajectory.tum, no poses.txt"));
   EXPECT_FALSE(find_truth(folder.path()).has_value());
 }
 
@@ -225,16 +239,20 @@ TEST(Trajectory, sessionFolderStandsForItsTrajectory) {
 }
 
 TEST(Trajectory, kittiExcerptIsTheReferenceOfPairC) {
-  const auto folder = test::shared_data("data/kitti06_51"), tum = test::shared_data("data/eval/c_reference.tum");
+  const auto folder = test::shared_data("data/kitti06_51"),
+             tum = test::shared_data("data/eval/c_reference.tum");
   if (!folder || !tum) GTEST_SKIP() << test::shared_data_missing("data/kitti06_51");
   const Trajectory kitti = read_trajectory(*folder), reference = read_trajectory(*tum);
   ASSERT_EQ(kitti.size(), 51U);
   ASSERT_EQ(reference.size(), kitti.size());
   for (std::size_t i = 0; i < kitti.size(); ++i) {
-    EXPECT_LE(std::abs((kitti[i].stamp - reference[i].stamp).ns()), 500);             // six decimals in the TUM file, seven digits here
-    EXPECT_LT((kitti[i].T_world_body.t - reference[i].T_world_body.t).norm(), 2e-9);  // nine decimals in the TUM file
+    EXPECT_LE(std::abs((kitti[i].stamp - reference[i].stamp).ns()),
+              500);  // six decimals in the TUM file, seven digits here
+    EXPECT_LT((kitti[i].T_world_body.t - reference[i].T_world_body.t).norm(),
+              2e-9);  // nine decimals in the TUM file
     // Which of the rotations near a rounded matrix is taken differs by the rounding, seven digits.
-    EXPECT_LT(rotation_angle(kitti[i].T_world_body.R.transpose() * reference[i].T_world_body.R), 5e-7);
+    EXPECT_LT(rotation_angle(kitti[i].T_world_body.R.transpose() * reference[i].T_world_body.R),
+              5e-7);
   }
 }
 
@@ -252,7 +270,8 @@ TEST(Trajectory, kittiPosesWithTimesInHandLeaveOutThoseThatGoBackwards) {
 }
 
 TEST(Trajectory, eurocExcerptGivesTheKnownLeftCamera) {
-  const auto folder = test::shared_data("data/euroc_mh01"), tum = test::shared_data("data/eval/euroc_mh01_left_camera.tum");
+  const auto folder = test::shared_data("data/euroc_mh01"),
+             tum = test::shared_data("data/eval/euroc_mh01_left_camera.tum");
   if (!folder || !tum) GTEST_SKIP() << test::shared_data_missing("data/euroc_mh01");
   const Trajectory truth = read_trajectory(*folder), expected = read_trajectory(*tum);
   EXPECT_EQ(truth.size(), 1140U);

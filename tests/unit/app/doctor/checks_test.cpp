@@ -14,9 +14,12 @@ using test::FakeMachine;
 
 constexpr std::uint32_t kHost = 0xC0A80A01U, kMask24 = 0xFFFFFF00U;  // 192.168.10.1/24
 
-bool contains(const std::string& text, const std::string& part) { return text.find(part) != std::string::npos; }
+bool contains(const std::string& text, const std::string& part) {
+  return text.find(part) != std::string::npos;
+}
 bool mends_with(const Finding& f, const std::string& part) {
-  return std::any_of(f.mend.begin(), f.mend.end(), [&](const std::string& c) { return contains(c, part); });
+  return std::any_of(f.mend.begin(), f.mend.end(),
+                     [&](const std::string& c) { return contains(c, part); });
 }
 
 /// A GigE camera of 1280 x 960 at 30 Hz on eth1.
@@ -31,7 +34,8 @@ void put_gige(FakeMachine* f) {
 
 TEST(Doctor, aBareMachineIsNoWallOfNotFound) {
   const FakeMachine f;
-  for (const Finding& finding : f.examined()) EXPECT_EQ(finding.state, FindingState::ok) << finding.check << ": " << finding.sentence;
+  for (const Finding& finding : f.examined())
+    EXPECT_EQ(finding.state, FindingState::ok) << finding.check << ": " << finding.sentence;
   EXPECT_LE(f.examined().size(), 3U);
 }
 
@@ -58,7 +62,8 @@ TEST(Doctor, worstFirst) {
   f.file("/proc/sys/net/core/rmem_max", "212992\n");
   f.file("/sys/class/net/eth1/mtu", "1500\n");
   const auto findings = f.examined();
-  EXPECT_TRUE(std::is_sorted(findings.begin(), findings.end(), [](const auto& a, const auto& b) { return a.state > b.state; }));
+  EXPECT_TRUE(std::is_sorted(findings.begin(), findings.end(),
+                             [](const auto& a, const auto& b) { return a.state > b.state; }));
   EXPECT_EQ(findings.front().check, "receive_buffer");
 }
 
@@ -104,7 +109,9 @@ TEST(DoctorNetwork, aCameraInAnotherNetworkIsAProblem) {
   const auto found = f.of("camera_network");
   ASSERT_EQ(found.size(), 2U);
   EXPECT_EQ(found[0].state, FindingState::problem);
-  EXPECT_TRUE(contains(found[0].sentence, "169.254.7.1 is in no network of this host (eth1 192.168.10.1/24)")) << found[0].sentence;
+  EXPECT_TRUE(contains(found[0].sentence,
+                       "169.254.7.1 is in no network of this host (eth1 192.168.10.1/24)"))
+      << found[0].sentence;
   EXPECT_TRUE(mends_with(found[0], "sudo ip addr add 169.254.7.2/16 dev eth1"));
   EXPECT_EQ(found[1].state, FindingState::ok);
 }
@@ -121,7 +128,9 @@ TEST(DoctorNetwork, camerasShareTheLink) {
   EXPECT_TRUE(contains(f.of("link")[0].sentence, "they fit up to 42")) << f.of("link")[0].sentence;
   f.file("/sys/class/net/eth1/speed", "100\n");
   const auto slow = f.of("link");
-  EXPECT_TRUE(std::any_of(slow.begin(), slow.end(), [](const Finding& x) { return contains(x.sentence, "runs at 100 Mbit/s"); }));
+  EXPECT_TRUE(std::any_of(slow.begin(), slow.end(), [](const Finding& x) {
+    return contains(x.sentence, "runs at 100 Mbit/s");
+  }));
 }
 
 TEST(DoctorNetwork, twoInterfacesInOneNetworkLoseWhatComesInByTheOther) {
@@ -156,7 +165,8 @@ TEST(DoctorCameras, whatIsAskedForAndNotThereIsNamed) {
   const auto found = f.of("cameras");
   ASSERT_EQ(found.size(), 2U);
   EXPECT_EQ(found[0].state, FindingState::problem);
-  EXPECT_TRUE(contains(found[0].sentence, "cameras.1: the v4l2 camera \"B\" (there: A)")) << found[0].sentence;
+  EXPECT_TRUE(contains(found[0].sentence, "cameras.1: the v4l2 camera \"B\" (there: A)"))
+      << found[0].sentence;
   EXPECT_TRUE(contains(found[1].sentence, "cameras.0 is v4l2 A"));
 }
 
@@ -213,7 +223,8 @@ TEST(DoctorCameras, aMediaControllersAdviceBecomesCommands) {
   ASSERT_EQ(found.mend.size(), 1U);
   EXPECT_EQ(found.mend[0], "media-ctl -d /dev/media0 -l '\"ov9281\":0->\"unicam\":0[1]'");
   EXPECT_TRUE(contains(found.sentence, "; the link is off"));
-  f.inventory.drivers[0].cameras[0].media = "/dev/media0: a → b\n  all of it: media-ctl -d /dev/media0 -p";
+  f.inventory.drivers[0].cameras[0].media =
+      "/dev/media0: a → b\n  all of it: media-ctl -d /dev/media0 -p";
   EXPECT_EQ(f.of("media_chain")[0].state, FindingState::ok);
 }
 
@@ -231,7 +242,8 @@ TEST(DoctorUsb, theKernelsMemoryIsHeldAgainstTheTransfers) {
   EXPECT_EQ(f.of("usb_memory")[0].state, FindingState::ok) << "9.4 MB";
   f.needs.cameras[1].bytes *= 4;
   EXPECT_EQ(f.of("usb_memory")[0].state, FindingState::problem);
-  EXPECT_TRUE(mends_with(f.of("usb_memory")[0], "sudo tee /sys/module/usbcore/parameters/usbfs_memory_mb"));
+  EXPECT_TRUE(
+      mends_with(f.of("usb_memory")[0], "sudo tee /sys/module/usbcore/parameters/usbfs_memory_mb"));
   f.file("/sys/module/usbcore/parameters/usbfs_memory_mb", "0\n");  // no limit
   EXPECT_EQ(f.of("usb_memory")[0].state, FindingState::ok);
 }
@@ -258,7 +270,8 @@ TEST(DoctorUsb, camerasMustNotSleep) {
   f.file("/sys/bus/usb/devices/1-2/power/control", "auto\n");
   f.inventory.usb = list_usb_devices(f.machine);
   ASSERT_EQ(f.of("usb_sleep").size(), 1U) << "mice may";
-  EXPECT_TRUE(mends_with(f.of("usb_sleep")[0], "echo on | sudo tee /sys/bus/usb/devices/1-1/power/control"));
+  EXPECT_TRUE(mends_with(f.of("usb_sleep")[0],
+                         "echo on | sudo tee /sys/bus/usb/devices/1-1/power/control"));
 }
 
 TEST(DoctorFirewire, theBudgetIsTheDriversOwn) {
@@ -266,10 +279,12 @@ TEST(DoctorFirewire, theBudgetIsTheDriversOwn) {
   f.file("/sys/bus/firewire/devices/fw0/guid", "0x1");
   for (int k = 0; k < 2; ++k) f.need("iidc-1394", "", 1280, 960, 20);
   ASSERT_EQ(f.of("firewire_bus").size(), 1U);
-  EXPECT_EQ(f.of("firewire_bus")[0].state, FindingState::problem) << "3076 bytes a packet at least: 2 x 3088 units at S400";
+  EXPECT_EQ(f.of("firewire_bus")[0].state, FindingState::problem)
+      << "3076 bytes a packet at least: 2 x 3088 units at S400";
   EXPECT_TRUE(contains(f.of("firewire_bus")[0].sentence, "4915"));
   for (CameraNeed& n : f.needs.cameras) n.rate_hz = 15;
-  EXPECT_EQ(f.of("firewire_bus")[0].state, FindingState::ok) << "2 x 2572 units in the fixed mode are too many, Format 7 does with less";
+  EXPECT_EQ(f.of("firewire_bus")[0].state, FindingState::ok)
+      << "2 x 2572 units in the fixed mode are too many, Format 7 does with less";
   EXPECT_TRUE(contains(f.of("firewire_bus")[0].sentence, "Format 7"));
   for (CameraNeed& n : f.needs.cameras) n.options["speed"] = "800";
   EXPECT_EQ(f.of("firewire_bus")[0].state, FindingState::ok);
@@ -304,7 +319,8 @@ TEST(DoctorSerial, theLatencyTimerOfAnInsIsSixteen) {
   f.inventory.ports = {ftdi("/dev/ttyUSB0", 1)};
   ASSERT_EQ(f.of("latency_timer").size(), 1U);
   EXPECT_EQ(f.of("latency_timer")[0].state, FindingState::advice);
-  EXPECT_EQ(f.of("latency_timer")[0].mend[0], "echo 16 | sudo tee /sys/bus/usb-serial/devices/ttyUSB0/latency_timer");
+  EXPECT_EQ(f.of("latency_timer")[0].mend[0],
+            "echo 16 | sudo tee /sys/bus/usb-serial/devices/ttyUSB0/latency_timer");
   f.inventory.ports = {ftdi("/dev/ttyUSB0", 16)};
   EXPECT_EQ(f.of("latency_timer")[0].state, FindingState::ok);
   f.needs.given = true;
@@ -351,7 +367,8 @@ TEST(DoctorSerial, portsThatNobodyAsksForAreNobodysProblem) {
   f.closed = {"/dev/ttyUSB0"};
   f.file("/proc/9/comm", "ModemManager\n");
   f.needs.given = true;
-  for (const char* check : {"serial_permission", "latency_timer", "modem_manager"}) EXPECT_TRUE(f.of(check).empty()) << check;
+  for (const char* check : {"serial_permission", "latency_timer", "modem_manager"})
+    EXPECT_TRUE(f.of(check).empty()) << check;
   f.needs.trigger_driver = "board";
   EXPECT_FALSE(f.of("serial_permission").empty());
   EXPECT_TRUE(f.of("latency_timer").empty()) << "a board's stamps do not rest on it";
@@ -373,7 +390,9 @@ TEST(DoctorSystem, aGovernorThatKeepsProcessorsSlowIsTold) {
 
 TEST(DoctorSystem, realTimeLimitsMatterWhenThreadsAskForThem) {
   FakeMachine f;
-  f.file("/proc/self/limits", "Max realtime priority     0                    0\nMax locked memory         8388608    8388608   bytes\n");
+  f.file("/proc/self/limits",
+         "Max realtime priority     0                    0\nMax locked memory         8388608    "
+         "8388608   bytes\n");
   EXPECT_TRUE(f.of("realtime").empty());
   f.needs.realtime_priority = 50;
   EXPECT_EQ(f.of("realtime")[0].state, FindingState::problem);
@@ -408,7 +427,8 @@ TEST(DoctorSystem, theDiskNeedsRoom) {
 TEST(Needs, aConfigurationBecomesBytesAndRates) {
   const Configuration c = parse_configuration(
       "cameras:\n  - {name: left, driver: v4l2, size: [640, 480], options: {thin: 3}}\n"
-      "  - {name: right, driver: v4l2, size: [640, 480], pixel_format: GREY, serial: B}\ntrigger: {rate: 10}\n",
+      "  - {name: right, driver: v4l2, size: [640, 480], pixel_format: GREY, serial: B}\ntrigger: "
+      "{rate: 10}\n",
       "text", {});
   const Needs n = needs_of(c);
   ASSERT_EQ(n.cameras.size(), 2U);

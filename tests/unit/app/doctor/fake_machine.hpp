@@ -14,7 +14,9 @@ struct FakeMachine {
   FakeMachine() {
     machine.root = folder.path();
     machine.user = "driver";
-    machine.may_use = [this](const std::string& node) { return std::find(closed.begin(), closed.end(), node) == closed.end(); };
+    machine.may_use = [this](const std::string& node) {
+      return std::find(closed.begin(), closed.end(), node) == closed.end();
+    };
     machine.group_of = [this](const std::string&) { return group; };
     machine.free_bytes = [this](const std::filesystem::path&) { return free; };
     machine.clock_synchronised = true;
@@ -22,7 +24,9 @@ struct FakeMachine {
   FakeMachine(const FakeMachine&) = delete;
   FakeMachine& operator=(const FakeMachine&) = delete;
 
-  void file(const std::string& path, const std::string& text) const { (void)folder.write(path.substr(1), text); }
+  void file(const std::string& path, const std::string& text) const {
+    (void)folder.write(path.substr(1), text);
+  }
   /// A device on USB at port `1-2`.
   void usb(const std::string& port, const std::string& ids, const std::string& serial) const {
     const std::string at = "/sys/bus/usb/devices/" + port + "/";
@@ -34,11 +38,14 @@ struct FakeMachine {
     if (!serial.empty()) file(at + "serial", serial + "\n");
   }
   void camera(const std::string& driver, const std::string& serial, const std::string& place) {
-    auto at = std::find_if(inventory.drivers.begin(), inventory.drivers.end(), [&](const auto& d) { return d.name == driver; });
-    if (at == inventory.drivers.end()) at = inventory.drivers.insert(at, app::DriverFindings{driver, "", true, {}, ""});
+    auto at = std::find_if(inventory.drivers.begin(), inventory.drivers.end(),
+                           [&](const auto& d) { return d.name == driver; });
+    if (at == inventory.drivers.end())
+      at = inventory.drivers.insert(at, app::DriverFindings{driver, "", true, {}, ""});
     at->cameras.push_back({{driver, serial, "A camera", place}, {}, ""});
   }
-  void need(const std::string& driver, const std::string& serial, int width, int height, double rate) {
+  void need(const std::string& driver, const std::string& serial, int width, int height,
+            double rate) {
     app::CameraNeed n;
     n.key = "cameras." + std::to_string(needs.cameras.size());
     n.driver = driver;
@@ -50,8 +57,12 @@ struct FakeMachine {
     needs.given = true;
     needs.cameras.push_back(n);
   }
-  void address(const std::string& name, std::uint32_t a, std::uint32_t mask) { machine.addresses.push_back({name, a, mask}); }
-  [[nodiscard]] std::vector<app::Finding> examined() const { return app::examine({machine, inventory, needs, "."}); }
+  void address(const std::string& name, std::uint32_t a, std::uint32_t mask) {
+    machine.addresses.push_back({name, a, mask});
+  }
+  [[nodiscard]] std::vector<app::Finding> examined() const {
+    return app::examine({machine, inventory, needs, "."});
+  }
   /// The findings of one check, the worst first.
   [[nodiscard]] std::vector<app::Finding> of(const std::string& check) const {
     std::vector<app::Finding> some;

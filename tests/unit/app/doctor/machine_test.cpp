@@ -24,7 +24,8 @@ TEST(Machine, aNumberIsANumberAndNothingElse) {
   f.file("/sys/binary", std::string("\0\x01\xff\n42", 6));
   EXPECT_EQ(f.machine.number("/sys/good"), 42);
   EXPECT_EQ(f.machine.number("/sys/negative"), -1);
-  for (const char* name : {"/sys/words", "/sys/empty", "/sys/huge", "/sys/binary", "/sys/missing", "/sys"})
+  for (const char* name :
+       {"/sys/words", "/sys/empty", "/sys/huge", "/sys/binary", "/sys/missing", "/sys"})
     EXPECT_FALSE(f.machine.number(name)) << name;
 }
 
@@ -80,7 +81,8 @@ TEST(Machine, readsLimitsAndCapabilitiesOfTheProcess) {
 TEST(Machine, tellsMembershipFromAMerePlaceOnTheList) {
   FakeMachine f;
   f.machine.groups = {"video"};
-  f.file("/etc/group", "video:x:44:\ndialout:x:20:somebody, driver\ndialouts:x:21:driver\nplug:x:22:driverx\n");
+  f.file("/etc/group",
+         "video:x:44:\ndialout:x:20:somebody, driver\ndialouts:x:21:driver\nplug:x:22:driverx\n");
   EXPECT_TRUE(f.machine.in_group("video"));
   EXPECT_FALSE(f.machine.in_group("dialout"));
   EXPECT_TRUE(f.machine.listed_in_group("dialout"));

@@ -15,14 +15,17 @@
 namespace vergence::app {
 namespace {
 
-bool contains(const std::string& text, const std::string& part) { return text.find(part) != std::string::npos; }
+bool contains(const std::string& text, const std::string& part) {
+  return text.find(part) != std::string::npos;
+}
 
 /// The house's own check of udev rules.
 testing::AssertionResult holds_as_rules(const std::string& rules) {
   const test::TemporaryFolder folder;
   const auto file = folder.write("98-rig.rules", rules);
-  const std::string command = "python3 '" VERGENCE_SOURCE_DIR "/tests/system/house/udev_rules.py' '" + file.string() + "' >'" +
-                              (folder / "said").string() + "' 2>&1";
+  const std::string command = "python3 '" VERGENCE_SOURCE_DIR
+                              "/tests/system/house/udev_rules.py' '" +
+                              file.string() + "' >'" + (folder / "said").string() + "' 2>&1";
   if (std::system(command.c_str()) == 0) return testing::AssertionSuccess();
   return testing::AssertionFailure() << test::read_file(folder / "said") << rules;
 }
@@ -54,7 +57,8 @@ TEST(UdevRules, nothingPluggedInIsAFileWithoutRules) {
 TEST(UdevRules, everyDeviceIsNamedByItsSerial) {
   Inventory i;
   i.ports = {port(0x2639, 0x0300, "X07"), port(0x0403, 0x6001, "A1B2"), port(0x2341, 0x0043, "75")};
-  i.usb = {usb(0x1E10, "15021234", {}), usb(0x046D, "CAM", {"video0", "video1"}), usb(0x1234, "mouse", {})};
+  i.usb = {usb(0x1E10, "15021234", {}), usb(0x046D, "CAM", {"video0", "video1"}),
+           usb(0x1234, "mouse", {})};
   iidc::FirewireNode node;
   node.device = "/dev/fw1";
   node.rom.guid = 0x00B09D0100A1B2C3;
@@ -62,8 +66,9 @@ TEST(UdevRules, everyDeviceIsNamedByItsSerial) {
   i.firewire = {node};
   const std::string rules = udev_rules(i);
   EXPECT_TRUE(holds_as_rules(rules));
-  for (const char* name : {"vergence/ins-X07", "vergence/serial-A1B2", "vergence/board-75", "vergence/camera-15021234",
-                           "vergence/camera-CAM", "vergence/camera-00b09d0100a1b2c3"})
+  for (const char* name :
+       {"vergence/ins-X07", "vergence/serial-A1B2", "vergence/board-75", "vergence/camera-15021234",
+        "vergence/camera-CAM", "vergence/camera-00b09d0100a1b2c3"})
     EXPECT_TRUE(contains(rules, name)) << name;
   EXPECT_TRUE(contains(rules, "ATTR{guid}==\"0x00b09d0100a1b2c3\""));
   EXPECT_TRUE(contains(rules, "ATTRS{serial}==\"A1B2\", ATTR{latency_timer}=\"16\""));
@@ -102,7 +107,8 @@ TEST(UdevRules, whatADeviceSaysOfItselfCannotWriteRules) {
 
 TEST(Inventory, nodesOfOneDeviceAreOneCameraAndTwoDevicesWithOneSerialAreTwo) {
   const test::FakeMachine f;
-  UsbDevice first = usb(0x046D, "SN0001", {"video0", "video1"}), second = usb(0x046D, "SN0001", {"video2"});
+  UsbDevice first = usb(0x046D, "SN0001", {"video0", "video1"}),
+            second = usb(0x046D, "SN0001", {"video2"});
   second.port = "1-3";
   const std::vector<DeviceInfo> found{{"v4l2", "SN0001", "Cam", "/dev/video0"},
                                       {"v4l2", "SN0001#1", "Cam infrared", "/dev/video1"},
@@ -121,7 +127,8 @@ TEST(Inventory, twoDevicesOfOneParentAreTwo) {
   for (const char* node : {"video0", "video1", "video2"}) {
     const auto folder = f.folder / "sys/class/video4linux" / node;
     std::filesystem::create_directories(folder);
-    std::filesystem::create_directory_symlink(f.folder / "sys/devices/platform/vivid.0", folder / "device");
+    std::filesystem::create_directory_symlink(f.folder / "sys/devices/platform/vivid.0",
+                                              folder / "device");
   }
   const std::vector<DeviceInfo> found{{"v4l2", "platform:vivid-000", "vivid", "/dev/video0"},
                                       {"v4l2", "platform:vivid-001", "vivid", "/dev/video1"},
@@ -134,14 +141,17 @@ TEST(Inventory, twoDevicesOfOneParentAreTwo) {
 TEST(Inventory, aLineForTheConfigurationIsYamlWhateverTheSerial) {
   EXPECT_EQ(camera_line({"gige", "15021234", "", ""}), "{driver: gige, serial: \"15021234\"}");
   EXPECT_EQ(camera_line({"gige", "", "", "10.0.0.2"}), "{driver: gige, serial: \"10.0.0.2\"}");
-  EXPECT_EQ(camera_line({"v4l2", "a\"b\\\n\xff", "", ""}), "{driver: v4l2, serial: \"a\\\"b\\\\\\n\\ufffd\"}");
+  EXPECT_EQ(camera_line({"v4l2", "a\"b\\\n\xff", "", ""}),
+            "{driver: v4l2, serial: \"a\\\"b\\\\\\n\\ufffd\"}");
 }
 
 /// Notes who was asked; the one named `answers` says that its device is there.
 std::vector<Asker> listening(std::vector<std::string>* asked, const std::string& answers) {
   std::vector<Asker> askers;
   for (const auto& [group, driver] : {std::pair{"ins", "xsens"}, std::pair{"trigger", "board"}})
-    askers.push_back({group, driver, [asked, answers, name = std::string(driver)](const std::string&) -> std::optional<DeviceInfo> {
+    askers.push_back({group, driver,
+                      [asked, answers, name = std::string(driver)](
+                          const std::string&) -> std::optional<DeviceInfo> {
                         asked->push_back(name);
                         if (name != answers) return std::nullopt;
                         return DeviceInfo{name, "42", "A model", ""};

@@ -18,7 +18,13 @@ RigCalibration rig_of_two(double k1) {
   RigCalibration rig;
   rig.cameras = 2;
   for (std::size_t k = 0; k < 2; ++k)
-    rig.intrinsics[k] = {.width = 640, .height = 480, .fx = 500, .fy = 500, .cx = 320, .cy = 240, .distortion = {k1, 0, 0, 0, 0}};
+    rig.intrinsics[k] = {.width = 640,
+                         .height = 480,
+                         .fx = 500,
+                         .fy = 500,
+                         .cx = 320,
+                         .cy = 240,
+                         .distortion = {k1, 0, 0, 0, 0}};
   rig.T_camera_left[1] = {exp_so3({0.01, 0.003, -0.004}), {-0.5, 0.01, 0.02}};
   return rig;
 }
@@ -33,11 +39,13 @@ std::vector<RawMatch> matches_of(const RigCalibration& rig, std::size_t count) {
     Vec3 ray;
     Vec2 other;
     if (!left.unproject(at, &ray) ||
-        right.project(rig.T_camera_left[1] * (ray * (5 + 40 * random.uniform())), &other, nullptr) != ProjectStatus::ok)
+        right.project(rig.T_camera_left[1] * (ray * (5 + 40 * random.uniform())), &other,
+                      nullptr) != ProjectStatus::ok)
       continue;
     RawMatch m;
     m.left = {static_cast<float>(at.x()), static_cast<float>(at.y())};
-    m.other = {static_cast<float>(other.x()), static_cast<float>(other.y() + (matches.size() % 2 == 0 ? 0.2 : -0.2))};
+    m.other = {static_cast<float>(other.x()),
+               static_cast<float>(other.y() + (matches.size() % 2 == 0 ? 0.2 : -0.2))};
     m.frame = matches.size();
     matches.push_back(m);
   }
@@ -53,12 +61,15 @@ TEST(CalibrationMistake, aRotationGivenTransposedIsTold) {
   const RigCalibration rig = rig_of_two(-0.3);
   RigCalibration given = rig;
   given.T_camera_left[1].R.transposeInPlace();
-  EXPECT_EQ(find_mistake(matches_of(rig, 2000), given, kAll), CalibrationMistake::rotation_transposed);
-  EXPECT_EQ(find_mistake(matches_of(rig, 2000), given, 100), CalibrationMistake::none) << "a hundred matches are few";
+  EXPECT_EQ(find_mistake(matches_of(rig, 2000), given, kAll),
+            CalibrationMistake::rotation_transposed);
+  EXPECT_EQ(find_mistake(matches_of(rig, 2000), given, 100), CalibrationMistake::none)
+      << "a hundred matches are few";
 }
 
 TEST(CalibrationMistake, distortionOfImagesThatAreRectifiedIsTold) {
-  EXPECT_EQ(find_mistake(matches_of(rig_of_two(0), 2000), rig_of_two(-0.3), kAll), CalibrationMistake::already_rectified);
+  EXPECT_EQ(find_mistake(matches_of(rig_of_two(0), 2000), rig_of_two(-0.3), kAll),
+            CalibrationMistake::already_rectified);
 }
 
 TEST(CalibrationMistake, aKnockIsNone) {

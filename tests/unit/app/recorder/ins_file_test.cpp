@@ -56,7 +56,8 @@ TEST(InsFile, aReadingComesBackAsItWas) {
   InsRecord bare;
   bare.sample.number = 8;
   bare.sample.stamp = reading(8).sample.stamp;
-  const auto read = read_ins_file(folder.write("ins.csv", kHead + line_of(reading(7)) + line_of(bare)));
+  const auto read =
+      read_ins_file(folder.write("ins.csv", kHead + line_of(reading(7)) + line_of(bare)));
   ASSERT_EQ(read.size(), 2U);
   const InsRecord &a = read[0], b = reading(7);
   EXPECT_EQ(a.sample.stamp, b.sample.stamp);
@@ -67,7 +68,8 @@ TEST(InsFile, aReadingComesBackAsItWas) {
   EXPECT_NEAR(a.sample.position.longitude_deg, b.sample.position.longitude_deg, 1e-10);
   EXPECT_NEAR(a.sample.position.height_m, b.sample.position.height_m, 1e-5);
   EXPECT_TRUE(a.sample.velocity_valid && a.sample.attitude_valid);
-  for (std::size_t i = 0; i < 3; ++i) EXPECT_NEAR(a.sample.velocity_enu[i], b.sample.velocity_enu[i], 1e-6);
+  for (std::size_t i = 0; i < 3; ++i)
+    EXPECT_NEAR(a.sample.velocity_enu[i], b.sample.velocity_enu[i], 1e-6);
   EXPECT_EQ(a.sample.q_enu_ins, b.sample.q_enu_ins);
   EXPECT_EQ(a.sample.position_sigma, 2.5);
   EXPECT_EQ(a.sample.height_sigma, 0);
@@ -77,11 +79,13 @@ TEST(InsFile, aReadingComesBackAsItWas) {
   EXPECT_TRUE(a.quality.filter_valid && a.quality.utc_valid);
   EXPECT_EQ(a.quality.utc_ns, b.quality.utc_ns);
   EXPECT_EQ(read[1].sample.fix, FixStatus::none);
-  EXPECT_FALSE(read[1].sample.velocity_valid || read[1].sample.attitude_valid || read[1].quality.utc_valid);
+  EXPECT_FALSE(read[1].sample.velocity_valid || read[1].sample.attitude_valid ||
+               read[1].quality.utc_valid);
 }
 
 TEST(InsFile, whateverADeviceSendsTheFileCanBeRead) {
-  constexpr double kNan = std::numeric_limits<double>::quiet_NaN(), kInf = std::numeric_limits<double>::infinity();
+  constexpr double kNan = std::numeric_limits<double>::quiet_NaN(),
+                   kInf = std::numeric_limits<double>::infinity();
   InsRecord r = reading(1);
   r.sample.position.latitude_deg = kNan;
   r.sample.velocity_enu[1] = kInf;
@@ -111,8 +115,11 @@ TEST(InsFile, hostileLinesAreRefusedWithTheirPlace) {
     for (const std::string& f : fields) line += (line.empty() ? "" : ",") + f;
     return refusal(kHead + line_of(reading(0)) + line + "\n");
   };
-  const auto has = [](const std::string& text, const std::string& part) { return text.find(part) != std::string::npos; };
-  EXPECT_TRUE(has(with(0, "1.5"), "ins.csv:3: `1.5` is not a stamp in whole nanoseconds")) << with(0, "1.5");
+  const auto has = [](const std::string& text, const std::string& part) {
+    return text.find(part) != std::string::npos;
+  };
+  EXPECT_TRUE(has(with(0, "1.5"), "ins.csv:3: `1.5` is not a stamp in whole nanoseconds"))
+      << with(0, "1.5");
   EXPECT_TRUE(has(with(0, "99999999999999999999"), "is not a stamp"));
   EXPECT_TRUE(has(with(1, "-1"), "is not a bound"));
   EXPECT_TRUE(has(with(3, "great"), "`great` is not none, dead_reckoning"));
@@ -131,14 +138,16 @@ TEST(InsFile, hostileLinesAreRefusedWithTheirPlace) {
   EXPECT_TRUE(has(refusal("a,b\n" + good), "ins.csv:1: is not the head"));
   EXPECT_TRUE(has(refusal(""), "is not the head"));
   EXPECT_TRUE(has(refusal(kHead), "has no reading in it"));
-  EXPECT_TRUE(has(refusal(kHead + good.substr(0, good.size() - 1)), "has no reading in it")) << "torn";
+  EXPECT_TRUE(has(refusal(kHead + good.substr(0, good.size() - 1)), "has no reading in it"))
+      << "torn";
 }
 
 TEST(InsFile, aTornEndAndAClockSetBackArePassedOver) {
   const test::TemporaryFolder folder;
   const std::string torn = line_of(reading(5));
-  const auto read = read_ins_file(folder.write(
-      "ins.csv", kHead + line_of(reading(2)) + line_of(reading(1)) + line_of(reading(2)) + line_of(reading(3)) + torn.substr(0, 30)));
+  const auto read = read_ins_file(
+      folder.write("ins.csv", kHead + line_of(reading(2)) + line_of(reading(1)) +
+                                  line_of(reading(2)) + line_of(reading(3)) + torn.substr(0, 30)));
   ASSERT_EQ(read.size(), 2U);
   EXPECT_EQ(read[1].sample.number, 3U);
 }

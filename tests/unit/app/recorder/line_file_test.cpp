@@ -12,7 +12,8 @@
 namespace vergence::app {
 namespace {
 
-/// Files of this process can grow to `bytes` and no further: a disk that is full, without needing one.
+/// Files of this process can grow to `bytes` and no further: a disk that is full, without needing
+/// one.
 class SmallDisk {
  public:
   explicit SmallDisk(rlim_t bytes) : former_handler_(std::signal(SIGXFSZ, SIG_IGN)) {

@@ -14,7 +14,9 @@ namespace {
 class Drive {
  public:
   explicit Drive(std::size_t sightings)
-      : sightings_(sightings), arena_(calibration::TrackLog::memory_needed(3, sightings) + 64), log_(3, sightings, arena_) {}
+      : sightings_(sightings),
+        arena_(calibration::TrackLog::memory_needed(3, sightings) + 64),
+        log_(3, sightings, arena_) {}
 
   void frame(std::uint64_t number, unsigned cameras) {
     calibration::LoggedFrame f;
@@ -80,7 +82,8 @@ TEST(MatchSample, aLongDriveIsSampledThinnerAndEvenly) {
   }
   const std::vector<double> values = lefts(*sample);
   ASSERT_EQ(values.size(), 12'627U);
-  for (std::size_t i = 0; i < values.size(); ++i) ASSERT_EQ(values[i], 8.0 * static_cast<double>(i));
+  for (std::size_t i = 0; i < values.size(); ++i)
+    ASSERT_EQ(values[i], 8.0 * static_cast<double>(i));
 }
 
 TEST(MatchSample, remembersBetweenWhichFramesTheRigWasWhich) {

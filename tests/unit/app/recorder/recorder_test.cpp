@@ -69,7 +69,9 @@ TEST(Recorder, posesGoToTheirFilesWithExactStampsAndLostOnesHaveNoPose) {
 
   const auto tum = lines_of(folder / "trajectory.tum");
   ASSERT_EQ(tum.size(), 2U);
-  EXPECT_EQ(tum[0], "1403636584.763555584 0.000000000 0.000000000 0.000000000 0.000000000 0.000000000 0.000000000 1.000000000");
+  EXPECT_EQ(tum[0],
+            "1403636584.763555584 0.000000000 0.000000000 0.000000000 0.000000000 0.000000000 "
+            "0.000000000 1.000000000");
   EXPECT_EQ(tum[1].substr(0, 32), "1403636584.863555584 1.500000000");
   const auto reference = lines_of(folder / "reference.tum");
   ASSERT_EQ(reference.size(), 1U);
@@ -78,9 +80,12 @@ TEST(Recorder, posesGoToTheirFilesWithExactStampsAndLostOnesHaveNoPose) {
   const auto csv = lines_of(folder / "poses.csv");
   ASSERT_EQ(csv.size(), 4U);
   EXPECT_EQ(csv[0], kPosesHeader);
-  for (const std::string& line : csv) EXPECT_EQ(std::count(line.begin(), line.end(), ','), 32) << line;  // 33 columns
-  EXPECT_EQ(csv[2], "1,1403636584813555584,stereo_odometry,lost,few_inliers" + std::string(26, ',') + "100,,7.500");
-  EXPECT_EQ(csv[3].substr(0, 64), "2,1403636584863555584,stereo_odometry,degraded,few_inliers,1.500");
+  for (const std::string& line : csv)
+    EXPECT_EQ(std::count(line.begin(), line.end(), ','), 32) << line;  // 33 columns
+  EXPECT_EQ(csv[2], "1,1403636584813555584,stereo_odometry,lost,few_inliers" +
+                        std::string(26, ',') + "100,,7.500");
+  EXPECT_EQ(csv[3].substr(0, 64),
+            "2,1403636584863555584,stereo_odometry,degraded,few_inliers,1.500");
 
   EXPECT_EQ(totals->read, 3U);
   EXPECT_EQ(totals->ok, 1U);
@@ -133,7 +138,8 @@ TEST(EventRecord, aLongSentenceIsCutBetweenCharacters) {
 RigCalibration two_cameras() {
   RigCalibration rig;
   rig.cameras = 2;
-  for (std::size_t k = 0; k < 2; ++k) rig.intrinsics[k] = {.width = 640, .height = 480, .fx = 460, .fy = 461, .cx = 320, .cy = 240};
+  for (std::size_t k = 0; k < 2; ++k)
+    rig.intrinsics[k] = {.width = 640, .height = 480, .fx = 460, .fy = 461, .cx = 320, .cy = 240};
   rig.T_camera_left[1].t = {-0.5, 0, 0.25};
   rig.sigma_noise[1] = {1e-4, 2e-4, 3e-4, 0.001, 0.002, 0.003};
   return rig;
@@ -170,15 +176,21 @@ TEST(Recorder, calibrationsCarryTheirNumbersAndEmptyFieldsWhereNothingIsGiven) {
   EXPECT_EQ(lines[0], kCalibrationsHeader);
   const std::string numbers =
       ",1,0.000000000,0.000000000,0.000000000,-0.500000000,0.000000000,0.250000000,"
-      "0.000100000,0.000200000,0.000300000,0.001000000,0.002000000,0.003000000,,,,,,,460.00000,461.00000,320.00000,240.00000,";
+      "0.000100000,0.000200000,0.000300000,0.001000000,0.002000000,0.003000000,,,,,,,460.00000,461."
+      "00000,320.00000,240.00000,";
   const std::string distortion = ",0.000000000,0.000000000,0.000000000,0.000000000,,,,";
-  EXPECT_EQ(lines[1],
-            "1403636584763555584,accepted,given,of a; file,0,,,0.0000,,,0.000000" + numbers + ",,," + distortion + distortion + ",,,,,");
-  EXPECT_EQ(lines[2], "1403636584763555584,accepted,knock,,60,71,840,0.1800,1.5000,0.1250,0.002000" + numbers +
-                          "0.200000000,0.300000000,0.000000000,0.000000000" + distortion + distortion + ",,,,,");
-  EXPECT_EQ(lines[3].substr(0, 71), "1403636584763555584,rejected,knock,held-out frames do not fit better,60");
+  EXPECT_EQ(lines[1], "1403636584763555584,accepted,given,of a; file,0,,,0.0000,,,0.000000" +
+                          numbers + ",,," + distortion + distortion + ",,,,,");
+  EXPECT_EQ(lines[2],
+            "1403636584763555584,accepted,knock,,60,71,840,0.1800,1.5000,0.1250,0.002000" +
+                numbers + "0.200000000,0.300000000,0.000000000,0.000000000" + distortion +
+                distortion + ",,,,,");
+  EXPECT_EQ(lines[3].substr(0, 71),
+            "1403636584763555584,rejected,knock,held-out frames do not fit better,60");
   for (const std::string& line : lines)
-    EXPECT_EQ(std::count(lines[0].begin(), lines[0].end(), ','), std::count(line.begin(), line.end(), ',')) << line;
+    EXPECT_EQ(std::count(lines[0].begin(), lines[0].end(), ','),
+              std::count(line.begin(), line.end(), ','))
+        << line;
 
   EXPECT_EQ(totals->accepted, 1U) << "what the drive begins with is no decision";
   EXPECT_EQ(totals->rejected, 1U);
@@ -218,7 +230,8 @@ EventRecord event_at(std::int64_t ns, EstimatorEvent::Kind kind, double value) {
 
 TEST(Recorder, theFirstConfirmationAndTheFirstContradictionAreInTheTotals) {
   using Kind = EstimatorEvent::Kind;
-  for (const bool after_the_pose : {false, true}) {  // at the end of a drive the event comes after the last pose
+  for (const bool after_the_pose :
+       {false, true}) {  // at the end of a drive the event comes after the last pose
     const test::TemporaryFolder folder;
     Recorder recorder(folder.path(), {});
     PoseSample sample;
@@ -291,14 +304,16 @@ TEST(EventRecord, whatHappensToACalibrationIsAWholeSentence) {
   EstimatorEvent event;
   event.kind = EstimatorEvent::Kind::calibration_rejected;
   event.why = "too little motion";
-  EXPECT_STREQ(EventRecord::of(event).sentence.data(), "a calibration was rejected: too little motion");
+  EXPECT_STREQ(EventRecord::of(event).sentence.data(),
+               "a calibration was rejected: too little motion");
   event.kind = EstimatorEvent::Kind::calibration_confirmed;
   event.why = "the drive confirms it";
   EXPECT_STREQ(EventRecord::of(event).sentence.data(), "the drive confirms it");
   event.kind = EstimatorEvent::Kind::calibration_contradicted;
   event.why = "it is not that of the rig";
   event.value = 6.54;
-  EXPECT_STREQ(EventRecord::of(event).sentence.data(), "it is not that of the rig: its depths are off by 6.5 %");
+  EXPECT_STREQ(EventRecord::of(event).sentence.data(),
+               "it is not that of the rig: its depths are off by 6.5 %");
   event.kind = EstimatorEvent::Kind::rig_changed;
   event.why = "the rig no longer fits";
   EXPECT_STREQ(EventRecord::of(event).sentence.data(), "the rig no longer fits");
@@ -326,9 +341,11 @@ TEST(Recorder, theSameRecordsGiveTheSameBytes) {
     const test::TemporaryFolder folder;
     Recorder recorder(folder.path(), {});
     for (std::uint64_t i = 0; i < 500; ++i)
-      recorder.post(pose(i, i % 7 == 3 ? PoseStatus::lost : PoseStatus::ok, std::sin(static_cast<double>(i))));
+      recorder.post(pose(i, i % 7 == 3 ? PoseStatus::lost : PoseStatus::ok,
+                         std::sin(static_cast<double>(i))));
     (void)recorder.close();
-    b = test::read_file(folder / "trajectory.tum") + test::read_file(folder / "poses.csv") + test::read_file(folder / "events.jsonl");
+    b = test::read_file(folder / "trajectory.tum") + test::read_file(folder / "poses.csv") +
+        test::read_file(folder / "events.jsonl");
   }
   EXPECT_EQ(bytes[0], bytes[1]);
 }
@@ -346,7 +363,8 @@ TEST(Recorder, nothingIsLostWhenTheProducerOutrunsTheDisk) {
 
 TEST(Recorder, liveDropsAreCountedAndNeverMakeTheProducerWait) {
   const test::TemporaryFolder folder;
-  Recorder recorder(folder.path(), {.when_full = Recorder::WhenFull::drop, .keep_trajectory = false});
+  Recorder recorder(folder.path(),
+                    {.when_full = Recorder::WhenFull::drop, .keep_trajectory = false});
   constexpr std::uint64_t kFrames = 20000;
   for (std::uint64_t i = 0; i < kFrames; ++i) recorder.post(pose(i, PoseStatus::ok, 0));
   const auto totals = recorder.close();
@@ -376,7 +394,8 @@ TEST(Recorder, aFullDiskIsASentenceAndTheOtherFilesAreWhole) {
   ASSERT_EQ(complaints.size(), 1U);  // once, not for every line
   EXPECT_NE(complaints[0].find("poses.csv"), std::string::npos);
   ASSERT_EQ(totals->faults.size(), 1U);
-  EXPECT_NE(totals->faults[0].find("poses.csv: is not complete"), std::string::npos) << totals->faults[0];
+  EXPECT_NE(totals->faults[0].find("poses.csv: is not complete"), std::string::npos)
+      << totals->faults[0];
   EXPECT_EQ(lines_of(folder / "trajectory.tum").size(), 10U);
   EXPECT_EQ(totals->read, 10U);
 }
@@ -404,19 +423,23 @@ TEST(Recorder, aDiskThatIsFullForAWhileCostsNothingThatMemoryHolds) {
   Recorder::Options options;
   options.disk_full = full_from_to(20, 40);
   Recorder recorder(folder.path(), options);
-  for (std::uint64_t i = 0; i < 100; ++i) recorder.post(pose(i, PoseStatus::ok, 0.1 * static_cast<double>(i)));
+  for (std::uint64_t i = 0; i < 100; ++i)
+    recorder.post(pose(i, PoseStatus::ok, 0.1 * static_cast<double>(i)));
   const auto totals = recorder.close();
   EXPECT_TRUE(totals->faults.empty());
   EXPECT_EQ(totals->lost_lines, 0U);
   EXPECT_EQ(lines_of(folder / "trajectory.tum").size(), 100U);
   EXPECT_EQ(lines_of(folder / "poses.csv").size(), 101U);
-  EXPECT_EQ(told(folder.path(), "disk_full"), std::vector<std::string>{"the disk of the session has no room: lines wait in memory"});
-  EXPECT_EQ(told(folder.path(), "disk_room"), std::vector<std::string>{"the disk takes lines again; 0 were lost"});
+  EXPECT_EQ(told(folder.path(), "disk_full"),
+            std::vector<std::string>{"the disk of the session has no room: lines wait in memory"});
+  EXPECT_EQ(told(folder.path(), "disk_room"),
+            std::vector<std::string>{"the disk takes lines again; 0 were lost"});
   const auto full = nlohmann::json::parse(lines_of(folder / "events.jsonl").front());
   EXPECT_EQ(full["stamp_ns"], kStamp + 20 * std::int64_t{50'000'000});
   const auto complaints = recorder.take_complaints();
   EXPECT_TRUE(std::any_of(complaints.begin(), complaints.end(), [](const std::string& c) {
-    return c.find("the disk has no room, as the drive's faults want it; the session goes on") != std::string::npos;
+    return c.find("the disk has no room, as the drive's faults want it; the session goes on") !=
+           std::string::npos;
   }));
 }
 
@@ -426,17 +449,21 @@ TEST(Recorder, aDiskThatIsFullForLongLosesWholeLinesAndSaysHowMany) {
   Recorder::Options options;
   options.disk_full = full_from_to(10, kFrames - 10);
   Recorder recorder(folder.path(), options);
-  for (std::uint64_t i = 0; i < kFrames; ++i) recorder.post(pose(i, PoseStatus::ok, 0.1 * static_cast<double>(i)));
+  for (std::uint64_t i = 0; i < kFrames; ++i)
+    recorder.post(pose(i, PoseStatus::ok, 0.1 * static_cast<double>(i)));
   const auto totals = recorder.close();
   EXPECT_TRUE(totals->faults.empty()) << "the files end whole: the session is usable";
   ASSERT_GT(totals->lost_lines, 1000U);
-  const std::size_t written = lines_of(folder / "trajectory.tum").size() + lines_of(folder / "poses.csv").size() - 1;
+  const std::size_t written =
+      lines_of(folder / "trajectory.tum").size() + lines_of(folder / "poses.csv").size() - 1;
   EXPECT_EQ(written + totals->lost_lines, 2 * kFrames);
   EXPECT_EQ(told(folder.path(), "disk_room"),
-            std::vector<std::string>{"the disk takes lines again; " + std::to_string(totals->lost_lines) + " were lost"});
+            std::vector<std::string>{"the disk takes lines again; " +
+                                     std::to_string(totals->lost_lines) + " were lost"});
   const auto complaints = recorder.take_complaints();
   EXPECT_TRUE(std::any_of(complaints.begin(), complaints.end(), [](const std::string& c) {
-    return c.find("lines that found no room on the disk in time; the others are all there") != std::string::npos;
+    return c.find("lines that found no room on the disk in time; the others are all there") !=
+           std::string::npos;
   }));
 }
 
@@ -445,7 +472,8 @@ TEST(Recorder, aDiskThatIsFullToTheEndLeavesFilesThatAreNotWholeAndNamesThem) {
   Recorder::Options options;
   options.disk_full = full_from_to(10, 1'000'000);
   Recorder recorder(folder.path(), options);
-  for (std::uint64_t i = 0; i < 100; ++i) recorder.post(pose(i, PoseStatus::ok, 0.1 * static_cast<double>(i)));
+  for (std::uint64_t i = 0; i < 100; ++i)
+    recorder.post(pose(i, PoseStatus::ok, 0.1 * static_cast<double>(i)));
   const auto totals = recorder.close();
   EXPECT_GE(totals->faults.size(), 2U);
   EXPECT_EQ(lines_of(folder / "trajectory.tum").size(), 10U);
@@ -457,7 +485,8 @@ TEST(Recorder, aFolderThatCannotBeWrittenIsNamed) {
 }
 
 TEST(Recorder, postingAllocatesNothing) {
-  if (!AllocationGuard::available()) GTEST_SKIP() << "needs the allocation hooks, which sanitizer builds leave out";
+  if (!AllocationGuard::available())
+    GTEST_SKIP() << "needs the allocation hooks, which sanitizer builds leave out";
   const test::TemporaryFolder folder;
   Recorder recorder(folder.path(), {});
   EstimatorEvent event;

@@ -18,7 +18,13 @@ RigCalibration rig_of_two() {
   RigCalibration rig;
   rig.cameras = 2;
   for (std::size_t k = 0; k < 2; ++k)
-    rig.intrinsics[k] = {.width = 640, .height = 480, .fx = 500, .fy = 500, .cx = 320, .cy = 240, .distortion = {-0.1, 0.02, 0, 0, 0}};
+    rig.intrinsics[k] = {.width = 640,
+                         .height = 480,
+                         .fx = 500,
+                         .fy = 500,
+                         .cx = 320,
+                         .cy = 240,
+                         .distortion = {-0.1, 0.02, 0, 0, 0}};
   rig.T_camera_left[1] = {exp_so3({0.002, 0.003, -0.001}), {-0.5, 0.01, 0.02}};
   return rig;
 }
@@ -33,7 +39,8 @@ std::vector<RawMatch> matches_of(const RigCalibration& rig, int count) {
     Vec3 ray;
     Vec2 other;
     if (!left.unproject(at, &ray) ||
-        right.project(rig.T_camera_left[1] * (ray * (10 + 40 * random.uniform())), &other, nullptr) != ProjectStatus::ok)
+        right.project(rig.T_camera_left[1] * (ray * (10 + 40 * random.uniform())), &other,
+                      nullptr) != ProjectStatus::ok)
       continue;
     RawMatch m;
     m.left = {static_cast<float>(at.x()), static_cast<float>(at.y())};
@@ -59,7 +66,8 @@ TEST(ResidualField, ofTheTrueRigIsZeroEverywhere) {
 TEST(ResidualField, aPitchMovesTheLinesByTheFocalLengthTimesItAndDownIsPositive) {
   const RigCalibration truth = rig_of_two();
   const auto matches = matches_of(truth, 4000);
-  RigCalibration claimed = truth;  // X_claimed = Exp(−φ) X: y/z grows by φ, so lines lie too far down and points above them
+  RigCalibration claimed = truth;  // X_claimed = Exp(−φ) X: y/z grows by φ, so lines lie too far
+                                   // down and points above them
   claimed.T_camera_left[1].R = exp_so3({-0.001, 0, 0}) * claimed.T_camera_left[1].R;
   for (const ResidualCell& c : residual_field(matches, claimed, 0, kAll)) {
     EXPECT_LT(c.mean_px, -0.4) << "px; 0.5 in the middle";
@@ -88,7 +96,8 @@ TEST(ResidualField, onlyFramesOfTheSameRigCount) {
 }
 
 TEST(ResidualField, aTableOfBothEnds) {
-  const std::vector<ResidualCell> begin{{1, 0, 80, 80, 80, 12, -0.5, 0.25}}, end{{2, 0, 0, 80.5, 60.25, 9, 0.125, 0.3}};
+  const std::vector<ResidualCell> begin{{1, 0, 80, 80, 80, 12, -0.5, 0.25}},
+      end{{2, 0, 0, 80.5, 60.25, 9, 0.125, 0.3}};
   EXPECT_EQ(format_residuals(begin, end),
             "calibration,camera,left_px,top_px,width_px,height_px,matches,mean_px,scatter_px\n"
             "begin,1,0.00,80.00,80.00,80.00,12,-0.5000,0.2500\n"

@@ -22,7 +22,9 @@ Session bent_drive(std::size_t n) {
     f.state = State::stereo_odometry;
     f.posed = true;
     const double angle = 0.005 * static_cast<double>(i), radius = 100;
-    f.T_world_left = {exp_so3({0, angle, 0}), {radius * (1 - std::cos(angle)), 0.3 * std::sin(7 * angle), radius * std::sin(angle)}};
+    f.T_world_left = {
+        exp_so3({0, angle, 0}),
+        {radius * (1 - std::cos(angle)), 0.3 * std::sin(7 * angle), radius * std::sin(angle)}};
     s.frames.push_back(f);
   }
   return s;
@@ -77,10 +79,12 @@ Session unverified_drive(std::size_t waiting) {
 
 TEST(Analysis, framesThatOnlyWaitedForTheCalibrationAreCountedApart) {
   Session s = unverified_drive(100);
-  s.events = {{s.frames[100].stamp, "calibration_confirmed", ""}, {s.frames[400].stamp, "calibration_confirmed", ""}};
+  s.events = {{s.frames[100].stamp, "calibration_confirmed", ""},
+              {s.frames[400].stamp, "calibration_confirmed", ""}};
   const Analysis a = analyse(s);
   EXPECT_EQ(a.degraded, 101U);
-  EXPECT_EQ(a.waited, 99U) << "neither the one with another fault nor the one after the first confirmation";
+  EXPECT_EQ(a.waited, 99U)
+      << "neither the one with another fault nor the one after the first confirmation";
   EXPECT_EQ(a.waited_by_reason, (std::vector<std::size_t>{0, 99, 0}));
   ASSERT_TRUE(a.confirmed_s);
   EXPECT_NEAR(*a.confirmed_s, 10, 1e-9);
@@ -105,7 +109,8 @@ TEST(Analysis, aStraightWayIsLaidByAttitudesAndKeepsItsVerticalError) {
   }
   const Analysis a = analyse(s);
   EXPECT_NE(a.source_sentence.find("attitudes"), std::string::npos);
-  EXPECT_NEAR(a.vertical_m.back() - a.vertical_m.front(), 0.01 * 119, 1e-9) << "a climb that the reference lacks is not turned away";
+  EXPECT_NEAR(a.vertical_m.back() - a.vertical_m.front(), 0.01 * 119, 1e-9)
+      << "a climb that the reference lacks is not turned away";
 }
 
 TEST(Analysis, withoutAReferenceThereAreNoErrorsAndItIsSaid) {
@@ -122,12 +127,14 @@ TEST(Analysis, aReferenceOfAnotherTimeIsNone) {
   for (StampedPose& p : s.reference) p.stamp = Stamp(p.stamp.ns() + 3'600'000'000'000);
   const Analysis a = analyse(s);
   EXPECT_EQ(a.source, ErrorSource::none);
-  EXPECT_NE(a.source_sentence.find("reference.tum has no pose at the times of ours"), std::string::npos);
+  EXPECT_NE(a.source_sentence.find("reference.tum has no pose at the times of ours"),
+            std::string::npos);
 }
 
 TEST(Analysis, lostFramesHaveNoPlaceAndMissingOnesABreak) {
   Session s = bent_drive(100);
-  for (std::size_t i = 40; i < 45; ++i) s.frames[i].posed = false, s.frames[i].status = PoseStatus::lost;
+  for (std::size_t i = 40; i < 45; ++i)
+    s.frames[i].posed = false, s.frames[i].status = PoseStatus::lost;
   s.frames.erase(s.frames.begin() + 70, s.frames.begin() + 80);
   const Analysis a = analyse(s);
   EXPECT_TRUE(std::isnan(a.ours_x[42]));
@@ -177,7 +184,8 @@ TEST(Analysis, driftAgainstTheInsIsByPositionsWhateverItsAttitudeAndThePlacement
   for (Frame& f : s.frames) f.T_world_left.t *= 1.02;  // two per cent too long
   const Analysis a = analyse(s);
   EXPECT_NE(a.drift_sentence.find("300 m"), std::string::npos);
-  // 300 m of ours are an arc of 300/102 rad on a circle of 102 m; the ways differ by 2 m of radius over its chord.
+  // 300 m of ours are an arc of 300/102 rad on a circle of 102 m; the ways differ by 2 m of radius
+  // over its chord.
   EXPECT_NEAR(a.drift.value(), 2 * 2 * std::sin(150.0 / 102) / 300, 2e-4);
 }
 
@@ -195,7 +203,8 @@ TEST(Analysis, withoutASummaryTheFiguresAreReckonedAgain) {
   const Analysis a = analyse(s);
   EXPECT_NEAR(a.scale.value(), 1.03, 1e-6);
   ASSERT_TRUE(a.drift.has_value());
-  EXPECT_NEAR(*a.drift, 0.03 / 1.03, 0.006) << "segments of a bent way are a little shorter than their nominal length";
+  EXPECT_NEAR(*a.drift, 0.03 / 1.03, 0.006)
+      << "segments of a bent way are a little shorter than their nominal length";
 }
 
 TEST(Analysis, extremeStampsDoNotOverflow) {

@@ -41,17 +41,19 @@ TEST(Decimate, everyColumnKeepsItsExtremesItsFirstAndItsLastValue) {
   EXPECT_LE(lines[0].size(), 4U * kColumns);
   for (int column = 0; column < kColumns; ++column) {
     const auto begin = static_cast<std::size_t>(column) * 330, end = begin + 330;
-    const auto [low, high] =
-        std::minmax_element(c.y.begin() + static_cast<std::ptrdiff_t>(begin), c.y.begin() + static_cast<std::ptrdiff_t>(end));
+    const auto [low, high] = std::minmax_element(c.y.begin() + static_cast<std::ptrdiff_t>(begin),
+                                                 c.y.begin() + static_cast<std::ptrdiff_t>(end));
     const auto kept = [&](std::size_t i) {
-      return std::any_of(lines[0].begin(), lines[0].end(), [&](const Point& p) { return p.x == c.x[i] && p.y == c.y[i]; });
+      return std::any_of(lines[0].begin(), lines[0].end(),
+                         [&](const Point& p) { return p.x == c.x[i] && p.y == c.y[i]; });
     };
     EXPECT_TRUE(kept(begin)) << column;
     EXPECT_TRUE(kept(end - 1)) << column;
     EXPECT_TRUE(kept(static_cast<std::size_t>(low - c.y.begin()))) << column;
     EXPECT_TRUE(kept(static_cast<std::size_t>(high - c.y.begin()))) << column;
   }
-  EXPECT_TRUE(std::is_sorted(lines[0].begin(), lines[0].end(), [](const Point& a, const Point& b) { return a.x < b.x; }));
+  EXPECT_TRUE(std::is_sorted(lines[0].begin(), lines[0].end(),
+                             [](const Point& a, const Point& b) { return a.x < b.x; }));
 }
 
 TEST(Decimate, oneFrameThatIsDifferentAmongManySurvives) {
@@ -59,7 +61,8 @@ TEST(Decimate, oneFrameThatIsDifferentAmongManySurvives) {
   std::fill(c.y.begin(), c.y.end(), 1.0);
   c.y[77'777] = 42.0;
   const auto lines = decimate(c.x, c.y, {}, 0, 100'000, 50);
-  EXPECT_TRUE(std::any_of(lines[0].begin(), lines[0].end(), [](const Point& p) { return p.y == 42.0 && p.x == 77'777.0; }));
+  EXPECT_TRUE(std::any_of(lines[0].begin(), lines[0].end(),
+                          [](const Point& p) { return p.y == 42.0 && p.x == 77'777.0; }));
   EXPECT_LE(points(lines), 4U * 50U);
 }
 
@@ -105,7 +108,8 @@ TEST(Thin, noPointLeftOutIsFartherThanTheStepFromAPointKept) {
   EXPECT_EQ(lines[0].back().x, c.x.back());
   for (std::size_t i = 0; i < c.x.size(); ++i) {
     double nearest = 1e9;
-    for (const Point& p : lines[0]) nearest = std::min(nearest, std::hypot(p.x - c.x[i], p.y - c.y[i]));
+    for (const Point& p : lines[0])
+      nearest = std::min(nearest, std::hypot(p.x - c.x[i], p.y - c.y[i]));
     ASSERT_LE(nearest, 2.0) << i;
   }
 }

@@ -10,7 +10,8 @@
 namespace vergence::app::report {
 namespace {
 
-/// 8 × 6 cells of 100 matches whose distances are `middle` px at the centre and grow with the square of the radius to `corner`.
+/// 8 × 6 cells of 100 matches whose distances are `middle` px at the centre and grow with the
+/// square of the radius to `corner`.
 void add_field(bool at_the_end, double middle, double corner, double scatter, Session* s) {
   for (int i = 0; i < 48; ++i) {
     ResidualRow r;
@@ -32,9 +33,11 @@ Session session(double middle, double corner, double scatter) {
 TEST(FitPattern, growsTowardsTheEdges) {
   EXPECT_EQ(fit_of(Session{}, true).pattern, FitPattern::unknown);
   EXPECT_EQ(fit_of(session(0.1, 0.4, 0.3), true).pattern, FitPattern::fine);
-  EXPECT_EQ(fit_of(session(0.5, 3, 0.3), true).pattern, FitPattern::turned) << "near and far points alike";
+  EXPECT_EQ(fit_of(session(0.5, 3, 0.3), true).pattern, FitPattern::turned)
+      << "near and far points alike";
   EXPECT_EQ(fit_of(session(0.5, 3, 0.7), true).pattern, FitPattern::lens);
-  EXPECT_EQ(fit_of(session(3, 3, 0.7), true).pattern, FitPattern::fine) << "the same everywhere is no lens";
+  EXPECT_EQ(fit_of(session(3, 3, 0.7), true).pattern, FitPattern::fine)
+      << "the same everywhere is no lens";
   EXPECT_EQ(fit_of(session(0.5, 3, 0.7), false).pattern, FitPattern::unknown);
   const Fit fit = fit_of(session(0.5, 3, 0.7), true);
   EXPECT_LT(fit.middle_px, fit.edge_px);
@@ -71,7 +74,8 @@ TEST(FitPattern, aWrongLensIsNotToBeUsedUntilTheDriveHasFoundIt) {
     const Verdict v = judge(s, analyse(s));
     EXPECT_EQ(v.grade, Grade::bad);
     EXPECT_FALSE(v.usable);
-    EXPECT_NE(v.sentence.find("esiduals grow towards the edges of the image"), std::string::npos) << v.sentence;
+    EXPECT_NE(v.sentence.find("esiduals grow towards the edges of the image"), std::string::npos)
+        << v.sentence;
     EXPECT_NE(v.sentence.find(": the lens"), std::string::npos) << v.sentence;
   }
   const Session found = drive(PoseStatus::ok, false);

@@ -25,17 +25,20 @@ TEST(Happenings, nothingHappenedOnAGoodDrive) {
 
 TEST(Happenings, saysWhatHowOftenAndWhenTheMostFrequentFirst) {
   Session s = drive();
-  for (std::size_t i = 20; i < 50; ++i) s.frames[i].status = PoseStatus::degraded, s.frames[i].reason = 1;
+  for (std::size_t i = 20; i < 50; ++i)
+    s.frames[i].status = PoseStatus::degraded, s.frames[i].reason = 1;
   s.frames[70].status = PoseStatus::lost, s.frames[70].reason = 2, s.frames[70].posed = false;
-  s.events = {{s.frames[60].stamp, "rig_changed", "the rig has changed: a <b>camera</b> was knocked"},
-              {s.frames[80].stamp, "image_torn", "frame skipped"},
-              {s.frames[90].stamp, "state", "of no interest"}};
+  s.events = {
+      {s.frames[60].stamp, "rig_changed", "the rig has changed: a <b>camera</b> was knocked"},
+      {s.frames[80].stamp, "image_torn", "frame skipped"},
+      {s.frames[90].stamp, "state", "of no interest"}};
   const std::string table = happenings_table(s, analyse(s));
-  const auto few = table.find("the pose rested on few points"), lost = table.find("tracking failed");
+  const auto few = table.find("the pose rested on few points"),
+             lost = table.find("tracking failed");
   ASSERT_NE(few, std::string::npos) << table;
   EXPECT_LT(few, lost);
-  for (const char* part :
-       {"30 frames", "2.0 … 4.9 s", "1 frame<", "7.0 s", "skipped: an image file is torn", "&lt;b&gt;camera", "once", "6.0 s"})
+  for (const char* part : {"30 frames", "2.0 … 4.9 s", "1 frame<", "7.0 s",
+                           "skipped: an image file is torn", "&lt;b&gt;camera", "once", "6.0 s"})
     EXPECT_NE(table.find(part), std::string::npos) << part << "\n" << table;
   EXPECT_EQ(table.find("of no interest"), std::string::npos);
 }

@@ -16,11 +16,14 @@
 namespace vergence::app {
 namespace {
 
-bool contains(const std::string& text, const std::string& part) { return text.find(part) != std::string::npos; }
+bool contains(const std::string& text, const std::string& part) {
+  return text.find(part) != std::string::npos;
+}
 
 /// Nothing that a browser would load or run.
 testing::AssertionResult self_contained(const std::string& html) {
-  for (const char* word : {"<script", "src=", "@import", "url(", "http:", "https:", "javascript:", "onload", "<iframe", "<object"})
+  for (const char* word : {"<script", "src=", "@import", "url(",
+                           "http:", "https:", "javascript:", "onload", "<iframe", "<object"})
     if (contains(html, word)) return testing::AssertionFailure() << "has " << word;
   const std::string problem = test::XmlCheck::problem(html);
   if (!problem.empty()) return testing::AssertionFailure() << problem;
@@ -107,7 +110,8 @@ TEST(Page, withoutAReferenceSaysSoAndHasNoErrorPlots) {
   const std::string html = page_of(folder.path());
   EXPECT_TRUE(contains(html, "There was no reference"));
   EXPECT_TRUE(contains(html, "not known"));
-  for (const char* part : {"Horizontal error", "Vertical error", "Heading error", "north"}) EXPECT_FALSE(contains(html, part)) << part;
+  for (const char* part : {"Horizontal error", "Vertical error", "Heading error", "north"})
+    EXPECT_FALSE(contains(html, part)) << part;
   EXPECT_TRUE(self_contained(html));
 }
 
@@ -123,17 +127,21 @@ TEST(Page, withoutResidualsHasNoSectionAndMissesNothing) {
 TEST(Page, isMadeOfEveryTornSession) {
   const test::TemporaryFolder whole;
   writer_of(300).write(whole.path());
-  for (const char* gone : {"summary.json", "poses.csv", "trajectory.tum", "reference.tum", "calibrations.csv", "calibration.yaml",
-                           "events.jsonl", "residuals.csv"})
+  for (const char* gone : {"summary.json", "poses.csv", "trajectory.tum", "reference.tum",
+                           "calibrations.csv", "calibration.yaml", "events.jsonl", "residuals.csv"})
     for (const double kept : {-1.0, 0.0, 0.37, 0.99}) {  // of the file; negative: no file
       const test::TemporaryFolder folder;
       std::filesystem::copy(whole.path(), folder.path(), std::filesystem::copy_options::recursive);
       const std::string text = test::read_file(folder / gone);
       std::filesystem::remove(folder / gone);
-      if (kept >= 0) folder.write(gone, text.substr(0, static_cast<std::size_t>(kept * static_cast<double>(text.size()))));
+      if (kept >= 0)
+        folder.write(
+            gone,
+            text.substr(0, static_cast<std::size_t>(kept * static_cast<double>(text.size()))));
       const std::string html = page_of(folder.path());
       EXPECT_TRUE(self_contained(html)) << gone << " " << kept;
-      const bool may_be_gone = std::string(gone) == "trajectory.tum" || (std::string(gone) == "residuals.csv" && kept < 0);
+      const bool may_be_gone = std::string(gone) == "trajectory.tum" ||
+                               (std::string(gone) == "residuals.csv" && kept < 0);
       if (!may_be_gone && (kept < 0 || kept == 0.37)) {
         EXPECT_TRUE(contains(html, "What is missing")) << gone << " " << kept;
       }
@@ -145,11 +153,14 @@ TEST(Page, hostileTextNeverBecomesMarkup) {
   writer_of(200).write(folder.path());
   const std::string evil = "</svg><script>alert(1)</script><img src=x onerror=alert(2)>";
   std::ofstream(folder / "events.jsonl", std::ios::app)
-      << R"({"stamp_ns":1,"kind":")" << evil << R"(","sentence":")" << evil << std::string(5000, 'x') << "\"}\n";
+      << R"({"stamp_ns":1,"kind":")" << evil << R"(","sentence":")" << evil
+      << std::string(5000, 'x') << "\"}\n";
   std::ofstream(folder / "calibrations.csv", std::ios::app)
-      << "1,accepted," << evil << ',' << evil << ",1,7,0,1,1,1,0,1,0,0,0,0,0,0" << std::string(20, ',') << '\n';
-  folder.write("summary.json", R"({"version":")" + evil + R"(","configuration_hash":")" + evil + R"(","calibration":{"source":")" + evil +
-                                   R"(","word":")" + evil + R"("},"truth":{")" + evil + R"(":1}})");
+      << "1,accepted," << evil << ',' << evil << ",1,7,0,1,1,1,0,1,0,0,0,0,0,0"
+      << std::string(20, ',') << '\n';
+  folder.write("summary.json", R"({"version":")" + evil + R"(","configuration_hash":")" + evil +
+                                   R"(","calibration":{"source":")" + evil + R"(","word":")" +
+                                   evil + R"("},"truth":{")" + evil + R"(":1}})");
   const std::string html = page_of(folder.path());
   EXPECT_EQ(test::XmlCheck::problem(html), "");
   for (const char* word : {"<script", "<img"}) EXPECT_FALSE(contains(html, word)) << word;
@@ -162,7 +173,8 @@ TEST(Page, hugeAndNonsensicalNumbersStayWellFormed) {
   std::string poses = test::SessionWriter::kHead;
   const std::string nothing(26, ',');
   poses +=
-      "0,-9223372036854775808,stereo_odometry,ok,,9e6,9e6,9e6,0,0,0,1,9e6,9e6,9e6,,,,,-9e6,-9e6,9e6,,,,,1e7,1e7,1e7,1e300,1e300,1,1e300\n";
+      "0,-9223372036854775808,stereo_odometry,ok,,9e6,9e6,9e6,0,0,0,1,9e6,9e6,9e6,,,,,-9e6,-9e6,"
+      "9e6,,,,,1e7,1e7,1e7,1e300,1e300,1,1e300\n";
   poses += "1,9223372036854775807,lost,lost,no_pose" + nothing + ",,\n";
   folder.write("poses.csv", poses);
   folder.write("events.jsonl", R"({"stamp_ns":9223372036854775807,"kind":"","sentence":""})"
@@ -174,10 +186,12 @@ TEST(Page, hugeAndNonsensicalNumbersStayWellFormed) {
 
 TEST(Page, manyEventsAreCondensed) {
   report::Session s;
-  for (int i = 0; i < 5000; ++i) s.events.push_back({Stamp(i), "dropped", "number " + std::to_string(i)});
+  for (int i = 0; i < 5000; ++i)
+    s.events.push_back({Stamp(i), "dropped", "number " + std::to_string(i)});
   const std::string table = report::events_table(s);
   EXPECT_LT(table.size(), 40'000U);
-  for (const char* part : {"number 0<", "number 79<", "number 4920<", "number 4999<", "4 840 rows are left out"})
+  for (const char* part :
+       {"number 0<", "number 79<", "number 4920<", "number 4999<", "4 840 rows are left out"})
     EXPECT_TRUE(contains(table, part)) << part;
   EXPECT_FALSE(contains(table, "number 80<"));
 }

@@ -12,10 +12,12 @@
 namespace vergence::app::report {
 namespace {
 
-constexpr const char* kShortHead = "frame,stamp_ns,state,status,reason,x,y,z,qx,qy,qz,qw,inliers,estimate_ms\n";
+constexpr const char* kShortHead =
+    "frame,stamp_ns,state,status,reason,x,y,z,qx,qy,qz,qw,inliers,estimate_ms\n";
 
 bool says(const Session& s, const std::string& part) {
-  return std::any_of(s.missing.begin(), s.missing.end(), [&](const std::string& m) { return m.find(part) != std::string::npos; });
+  return std::any_of(s.missing.begin(), s.missing.end(),
+                     [&](const std::string& m) { return m.find(part) != std::string::npos; });
 }
 
 /// A folder with poses.csv of that text and nothing else.
@@ -56,10 +58,12 @@ TEST(ReadSession, aWholeOneHasNothingMissing) {
   EXPECT_EQ(s.frames.front().stamp.ns(), writer.first_stamp_ns);
   EXPECT_EQ(s.frames[250].status, PoseStatus::lost);  // 62 to 64 %
   EXPECT_FALSE(s.frames[250].posed);
-  EXPECT_TRUE(s.frames[399].compared && s.frames[399].placed && s.frames[399].has_ins && s.frames[399].posed);
+  EXPECT_TRUE(s.frames[399].compared && s.frames[399].placed && s.frames[399].has_ins &&
+              s.frames[399].posed);
   ASSERT_EQ(s.calibrations.size(), 5U);
   EXPECT_FALSE(s.calibrations[1].accepted);
-  EXPECT_NEAR(s.calibrations[0].sigma[0], 2 * 0.0009, 1e-9) << "the wide sigma goes before the noise's";
+  EXPECT_NEAR(s.calibrations[0].sigma[0], 2 * 0.0009, 1e-9)
+      << "the wide sigma goes before the noise's";
   EXPECT_EQ(s.calibrations[3].cause, "knock");
   EXPECT_TRUE(s.calibrations[3].decided);
   EXPECT_EQ(s.calibrations[3].latency_frames, 75);
@@ -90,26 +94,32 @@ TEST(ReadSession, aFolderThatIsNoSessionIsRefused) {
 }
 
 TEST(ReadSession, everyFileThatIsMissingIsSaid) {
-  const Session s = with_poses(std::string(kShortHead) + "0,1000,stereo_odometry,ok,,1,2,3,0,0,0,1,100,5\n");
+  const Session s =
+      with_poses(std::string(kShortHead) + "0,1000,stereo_odometry,ok,,1,2,3,0,0,0,1,100,5\n");
   ASSERT_EQ(s.frames.size(), 1U);
-  for (const char* file : {"summary.json", "calibrations.csv", "calibration.yaml", "events.jsonl"}) EXPECT_TRUE(says(s, file)) << file;
+  for (const char* file : {"summary.json", "calibrations.csv", "calibration.yaml", "events.jsonl"})
+    EXPECT_TRUE(says(s, file)) << file;
 }
 
 TEST(ReadSession, whatIsNotThereByDesignIsNotMissing) {
   const test::TemporaryFolder folder;
-  folder.write("poses.csv", std::string(kShortHead) + "0,1000,stereo_odometry,degraded,uncalibrated,1,2,3,0,0,0,1,100,5\n");
+  folder.write("poses.csv",
+               std::string(kShortHead) +
+                   "0,1000,stereo_odometry,degraded,uncalibrated,1,2,3,0,0,0,1,100,5\n");
   folder.write("calibrations.csv", "stamp_ns,outcome,cause,reason,camera\n");
   folder.write("events.jsonl", "");
   folder.write("summary.json", R"({"metrics": null})");
   const Session s = read_session(folder.path());
   EXPECT_TRUE(s.missing.empty()) << s.missing.front();
   folder.write("summary.json", R"({"metrics": {"ate_m": 0.1}})");
-  EXPECT_TRUE(says(read_session(folder.path()), "reference.tum")) << "its figures stand in the summary";
+  EXPECT_TRUE(says(read_session(folder.path()), "reference.tum"))
+      << "its figures stand in the summary";
 }
 
 TEST(ReadSession, aTornLastLineIsLeftOutEvenWhenItLooksWhole) {
   const std::string good = "0,1000,stereo_odometry,ok,,1,2,3,0,0,0,1,100,5.25\n";
-  const Session s = with_poses(kShortHead + good + "1,2000,stereo_odometry,ok,,1,2,3,0,0,0,1,100,5");
+  const Session s =
+      with_poses(kShortHead + good + "1,2000,stereo_odometry,ok,,1,2,3,0,0,0,1,100,5");
   EXPECT_EQ(s.frames.size(), 1U);
   EXPECT_TRUE(says(s, "poses.csv: the last line is torn"));
 }
@@ -134,7 +144,8 @@ TEST(ReadSession, damagedAndDisorderedLinesAreLeftOutAndCounted) {
 }
 
 TEST(ReadSession, aLostFrameNeverHasAPoseWhateverItsLineSays) {
-  const Session s = with_poses(std::string(kShortHead) + "0,1000,lost,lost,no_pose,1,2,3,0,0,0,1,100,5\n");
+  const Session s =
+      with_poses(std::string(kShortHead) + "0,1000,lost,lost,no_pose,1,2,3,0,0,0,1,100,5\n");
   ASSERT_EQ(s.frames.size(), 1U);
   EXPECT_FALSE(s.frames[0].posed);
 }
@@ -153,7 +164,8 @@ TEST(ReadSession, tornJsonIsSaidAndNeverHalfTaken) {
   const test::TemporaryFolder folder;
   folder.write("summary.json", "{\"frames\": {\"read\": 5, ");
   folder.write("events.jsonl",
-               "{\"stamp_ns\":1,\"kind\":\"state\",\"sentence\":\"a\"}\n[1,2]\n{\"stamp_ns\":\"x\",\"kind\":7}\n{\"stamp_ns\":2,\"ki");
+               "{\"stamp_ns\":1,\"kind\":\"state\",\"sentence\":\"a\"}\n[1,2]\n{\"stamp_ns\":\"x\","
+               "\"kind\":7}\n{\"stamp_ns\":2,\"ki");
   const Session s = read_session(folder.path());
   EXPECT_TRUE(s.summary.is_null());
   EXPECT_TRUE(says(s, "summary.json is torn"));
@@ -165,7 +177,8 @@ TEST(ReadSession, tornJsonIsSaidAndNeverHalfTaken) {
 TEST(ReadSession, residualsThatAreNoPlaceOfAnImageAreLeftOut) {
   const test::TemporaryFolder folder;
   folder.write("trajectory.tum", "1.5 0 0 0 0 0 0 1\n");
-  const std::string head = "calibration,camera,left_px,top_px,width_px,height_px,matches,mean_px,scatter_px\n";
+  const std::string head =
+      "calibration,camera,left_px,top_px,width_px,height_px,matches,mean_px,scatter_px\n";
   folder.write("residuals.csv", head +
                                     "end,1,0,0,80,80,40,0.5,0.25\n"
                                     "end,9,0,0,80,80,40,0.5,0.25\n"
@@ -184,7 +197,8 @@ TEST(ReadSession, residualsThatAreNoPlaceOfAnImageAreLeftOut) {
 TEST(NumberAt, isNothingWhereThereIsNoFiniteNumber) {
   const auto json = nlohmann::json::parse(R"({"a": {"b": 1.5, "c": null, "d": "7", "e": [1]}})");
   EXPECT_EQ(number_at(json, "a.b"), 1.5);
-  for (const char* path : {"a.c", "a.d", "a.e", "a", "b", "a.b.c", ""}) EXPECT_FALSE(number_at(json, path)) << path;
+  for (const char* path : {"a.c", "a.d", "a.e", "a", "b", "a.b.c", ""})
+    EXPECT_FALSE(number_at(json, path)) << path;
   EXPECT_FALSE(number_at(nlohmann::json(), "a"));
   EXPECT_EQ(text_at(json, "a.d"), "7");
   EXPECT_EQ(flag_at(nlohmann::json::parse(R"({"a": {"b": false, "c": 0}})"), "a.b"), false);

@@ -15,13 +15,14 @@ namespace {
 
 TEST(XmlCheck, refusesWhatIsNotWellFormed) {
   EXPECT_EQ(test::XmlCheck::problem("<a b=\"c\"><d/>x &amp; y</a>"), "");
-  for (const char* wrong :
-       {"<a>", "<a></b>", "</a>", "<a b=c/>", "<a b=\"1\" b=\"2\"/>", "<a>&nbsp;</a>", "<a b=\"<\"/>", "<a", "<a>\x01</a>"})
+  for (const char* wrong : {"<a>", "<a></b>", "</a>", "<a b=c/>", "<a b=\"1\" b=\"2\"/>",
+                            "<a>&nbsp;</a>", "<a b=\"<\"/>", "<a", "<a>\x01</a>"})
     EXPECT_NE(test::XmlCheck::problem(wrong), "") << wrong;
 }
 
 TEST(Escape, markupBecomesText) {
-  EXPECT_EQ(escape("<script>alert(\"1\" & '2')</script>"), "&lt;script&gt;alert(&quot;1&quot; &amp; &#39;2&#39;)&lt;/script&gt;");
+  EXPECT_EQ(escape("<script>alert(\"1\" & '2')</script>"),
+            "&lt;script&gt;alert(&quot;1&quot; &amp; &#39;2&#39;)&lt;/script&gt;");
   EXPECT_EQ(escape("a\nb\x1b[31m\x7f"), "a b [31m ");
 }
 
@@ -53,7 +54,12 @@ TEST(Coordinate, isShortAndAlwaysANumber) {
 }
 
 TEST(Ticks, areRoundFewAndWithinTheAxis) {
-  for (const auto& [low, high] : {std::pair{0.0, 1.0}, {-3.7, 12.9}, {1e-7, 3e-7}, {0.0, 9.6e11}, {-750.1, -749.8}, {5.0, 5.0}}) {
+  for (const auto& [low, high] : {std::pair{0.0, 1.0},
+                                  {-3.7, 12.9},
+                                  {1e-7, 3e-7},
+                                  {0.0, 9.6e11},
+                                  {-750.1, -749.8},
+                                  {5.0, 5.0}}) {
     const auto ticks = nice_ticks(low, high, 6);
     ASSERT_FALSE(ticks.empty());
     EXPECT_LE(ticks.size(), 8U);
@@ -92,7 +98,10 @@ TEST(SvgElement, isWellFormedWhateverGoesIn) {
 /// WCAG 2: relative luminance of #rrggbb.
 double luminance(const char* colour) {
   const auto channel = [&](int k) {
-    const double c = static_cast<double>(std::stoi(std::string(colour).substr(static_cast<std::size_t>(1 + 2 * k), 2), nullptr, 16)) / 255;
+    const double c =
+        static_cast<double>(std::stoi(
+            std::string(colour).substr(static_cast<std::size_t>(1 + 2 * k), 2), nullptr, 16)) /
+        255;
     return c <= 0.04045 ? c / 12.92 : std::pow((c + 0.055) / 1.055, 2.4);
   };
   return 0.2126 * channel(0) + 0.7152 * channel(1) + 0.0722 * channel(2);
@@ -108,8 +117,10 @@ TEST(Colours, areReadableOnBothGroundsInBothThemes) {
   for (const Colour& c : kColours)
     for (const Colour& ground : {kPage, kPanel}) {
       const double wanted = c.text ? 4.5 : 3.0;
-      EXPECT_GE(contrast(c.light, ground.light), wanted) << c.name << " on " << ground.name << ", light";
-      EXPECT_GE(contrast(c.dark, ground.dark), wanted) << c.name << " on " << ground.name << ", dark";
+      EXPECT_GE(contrast(c.light, ground.light), wanted)
+          << c.name << " on " << ground.name << ", light";
+      EXPECT_GE(contrast(c.dark, ground.dark), wanted)
+          << c.name << " on " << ground.name << ", dark";
     }
 }
 
@@ -118,7 +129,8 @@ using Rgb = std::array<double, 3>;
 Rgb linear(const char* colour) {
   Rgb out{};
   for (std::size_t k = 0; k < 3; ++k) {
-    const double c = static_cast<double>(std::stoi(std::string(colour).substr(1 + 2 * k, 2), nullptr, 16)) / 255;
+    const double c =
+        static_cast<double>(std::stoi(std::string(colour).substr(1 + 2 * k, 2), nullptr, 16)) / 255;
     out[k] = c <= 0.04045 ? c / 12.92 : std::pow((c + 0.055) / 1.055, 2.4);
   }
   return out;
@@ -127,16 +139,18 @@ Rgb linear(const char* colour) {
 /// CIE L*a*b* (D65).
 Rgb lab(const Rgb& c) {
   const auto f = [](double t) { return t > 0.008856 ? std::cbrt(t) : 7.787 * t + 16.0 / 116; };
-  const double x = f((0.4124 * c[0] + 0.3576 * c[1] + 0.1805 * c[2]) / 0.95047), y = f(0.2126 * c[0] + 0.7152 * c[1] + 0.0722 * c[2]),
+  const double x = f((0.4124 * c[0] + 0.3576 * c[1] + 0.1805 * c[2]) / 0.95047),
+               y = f(0.2126 * c[0] + 0.7152 * c[1] + 0.0722 * c[2]),
                z = f((0.0193 * c[0] + 0.1192 * c[1] + 0.9505 * c[2]) / 1.08883);
   return {116 * y - 16, 500 * (x - y), 200 * (y - z)};
 }
 
-/// As somebody without red or green cones sees it: Machado, Oliveira, Fernandes, "A physiologically-based model for simulation of color
-/// vision deficiency", 2009, severity 1.
+/// As somebody without red or green cones sees it: Machado, Oliveira, Fernandes, "A
+/// physiologically-based model for simulation of color vision deficiency", 2009, severity 1.
 Rgb seen(const Rgb& c, const std::array<Rgb, 3>& eye) {
   Rgb out{};
-  for (std::size_t i = 0; i < 3; ++i) out[i] = std::clamp(eye[i][0] * c[0] + eye[i][1] * c[1] + eye[i][2] * c[2], 0.0, 1.0);
+  for (std::size_t i = 0; i < 3; ++i)
+    out[i] = std::clamp(eye[i][0] * c[0] + eye[i][1] * c[1] + eye[i][2] * c[2], 0.0, 1.0);
   return out;
 }
 
@@ -146,21 +160,27 @@ double difference(const char* a, const char* b, const std::array<Rgb, 3>& eye) {
 }
 
 const Colour& colour(std::string_view name) {
-  return *std::find_if(kColours.begin(), kColours.end(), [name](const Colour& c) { return name == c.name; });
+  return *std::find_if(kColours.begin(), kColours.end(),
+                       [name](const Colour& c) { return name == c.name; });
 }
 
 TEST(Colours, ofTheMapAndOfTheStatusAreToldApartByEveryEye) {
-  constexpr std::array<std::array<Rgb, 3>, 3> kEyes{
-      {{{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}},
-       {{{0.152286, 1.052583, -0.204868}, {0.114503, 0.786281, 0.099216}, {-0.003882, -0.048116, 1.051998}}},
-       {{{0.367322, 0.860646, -0.227968}, {0.280085, 0.672501, 0.047413}, {-0.011820, 0.042940, 0.968881}}}}};
+  constexpr std::array<std::array<Rgb, 3>, 3> kEyes{{{{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}},
+                                                     {{{0.152286, 1.052583, -0.204868},
+                                                       {0.114503, 0.786281, 0.099216},
+                                                       {-0.003882, -0.048116, 1.051998}}},
+                                                     {{{0.367322, 0.860646, -0.227968},
+                                                       {0.280085, 0.672501, 0.047413},
+                                                       {-0.011820, 0.042940, 0.968881}}}}};
   constexpr double kClear = 20;  // of L*a*b*: seen at a glance; 2 can just be told
   const std::array<std::pair<const char*, const char*>, 4> pairs{
       {{"ours", "theirs"}, {"ours", "care"}, {"theirs", "care"}, {"good", "bad"}}};
   for (const auto& [a, b] : pairs)
     for (std::size_t eye = 0; eye < kEyes.size(); ++eye) {
-      EXPECT_GE(difference(colour(a).light, colour(b).light, kEyes[eye]), kClear) << a << " " << b << " eye " << eye << ", light";
-      EXPECT_GE(difference(colour(a).dark, colour(b).dark, kEyes[eye]), kClear) << a << " " << b << " eye " << eye << ", dark";
+      EXPECT_GE(difference(colour(a).light, colour(b).light, kEyes[eye]), kClear)
+          << a << " " << b << " eye " << eye << ", light";
+      EXPECT_GE(difference(colour(a).dark, colour(b).dark, kEyes[eye]), kClear)
+          << a << " " << b << " eye " << eye << ", dark";
     }
 }
 

@@ -9,7 +9,9 @@
 namespace vergence::app::report {
 namespace {
 
-bool contains(const std::string& text, const std::string& part) { return text.find(part) != std::string::npos; }
+bool contains(const std::string& text, const std::string& part) {
+  return text.find(part) != std::string::npos;
+}
 
 Session session_of(const std::string& time) {
   Session s;
@@ -31,8 +33,10 @@ const std::string kWhole = R"({
 
 TEST(TimeSection, saysWhatProvesThePairsHowTheClocksWereAndWhatWasLost) {
   const TimeSection s = time_section(session_of(kWhole));
-  for (const char* part : {"Pairs are proven by &lt;numbers&gt;.", "0.62 s at most", "3 sets contradicted", "+12.4 ppm", "7.3 µs", "2.1 ms",
-                           "310 µs", "locked", "54.0 µs at worst", "found set: 2", "missed trigger", "malformed 4", "0.0123 s behind"})
+  for (const char* part :
+       {"Pairs are proven by &lt;numbers&gt;.", "0.62 s at most", "3 sets contradicted",
+        "+12.4 ppm", "7.3 µs", "2.1 ms", "310 µs", "locked", "54.0 µs at worst", "found set: 2",
+        "missed trigger", "malformed 4", "0.0123 s behind"})
     EXPECT_TRUE(contains(s.body, part)) << part << "\n" << s.body;
   EXPECT_FALSE(contains(s.body, "late")) << "what never happened has no row";
   EXPECT_EQ(test::XmlCheck::problem("<div>" + s.body + "</div>"), "");
@@ -43,22 +47,28 @@ TEST(TimeSection, theLatenciesAreAPictureOfTheBarsThatAreNotEmpty) {
   EXPECT_EQ(test::XmlCheck::problem(s.latency), "");
   EXPECT_TRUE(contains(s.caption, "half within 31 ms, 99 % within 48 ms"));
   std::size_t bars = 0;
-  for (std::size_t at = s.latency.find("<rect"); at != std::string::npos; at = s.latency.find("<rect", at + 1)) ++bars;
+  for (std::size_t at = s.latency.find("<rect"); at != std::string::npos;
+       at = s.latency.find("<rect", at + 1))
+    ++bars;
   EXPECT_EQ(bars, 3U);
 }
 
 TEST(TimeSection, aDriveThatNothingProvesSaysThat) {
-  const TimeSection s = time_section(session_of(R"({"pairing": {"sentence": "nothing proves that", "can_be_proven": false}})"));
+  const TimeSection s = time_section(
+      session_of(R"({"pairing": {"sentence": "nothing proves that", "can_be_proven": false}})"));
   EXPECT_TRUE(contains(s.body, "Nothing proves that."));
   EXPECT_TRUE(s.latency.empty());
 }
 
 TEST(TimeSection, whatIsMissingOrNonsenseIsLeftOut) {
   EXPECT_TRUE(time_section(Session{}).body.empty());
-  for (const char* text : {"null", "7", "[]", "{}", R"({"clocks": 3, "pairing": [1], "latency_ms": {"edges": ["a"], "counts": [1, 2]}})",
-                           R"({"clocks": [null, {"device": 5, "drift_ppm": "x"}], "pairing": {"cameras": [{"losses": 4}], "sentence": 3}})",
-                           R"({"latency_ms": {"edges": [1, 2], "counts": [1, 2]}, "board": {"lost": "many"}, "utc": {"host_ahead_s": []}})",
-                           R"({"latency_ms": {"edges": [1], "counts": [0, 0]}})"}) {
+  for (
+      const char* text :
+      {"null", "7", "[]", "{}",
+       R"({"clocks": 3, "pairing": [1], "latency_ms": {"edges": ["a"], "counts": [1, 2]}})",
+       R"({"clocks": [null, {"device": 5, "drift_ppm": "x"}], "pairing": {"cameras": [{"losses": 4}], "sentence": 3}})",
+       R"({"latency_ms": {"edges": [1, 2], "counts": [1, 2]}, "board": {"lost": "many"}, "utc": {"host_ahead_s": []}})",
+       R"({"latency_ms": {"edges": [1], "counts": [0, 0]}})"}) {
     const TimeSection s = time_section(session_of(text));
     EXPECT_EQ(test::XmlCheck::problem("<div>" + s.body + "</div>"), "") << text;
     EXPECT_TRUE(s.latency.empty()) << text;

@@ -20,7 +20,9 @@ struct Case {
       f.estimate_ms = 10;
       session.frames.push_back(f);
     }
-    session.summary = {{"calibration", {{"word", "good"}}}, {"timing_ms", {{"p99", 20.0}}}, {"allocations_after_seal", 0}};
+    session.summary = {{"calibration", {{"word", "good"}}},
+                       {"timing_ms", {{"p99", 20.0}}},
+                       {"allocations_after_seal", 0}};
     analysis.read = analysis.ok = 1000;
     analysis.ok_share = 1.0;
     analysis.by_reason = {0};
@@ -33,7 +35,8 @@ struct Case {
 };
 
 bool any_has(const std::vector<std::string>& sentences, const std::string& part) {
-  return std::any_of(sentences.begin(), sentences.end(), [&](const std::string& s) { return s.find(part) != std::string::npos; });
+  return std::any_of(sentences.begin(), sentences.end(),
+                     [&](const std::string& s) { return s.find(part) != std::string::npos; });
 }
 
 TEST(Verdict, aDriveWithNothingWrongIsGood) {
@@ -53,7 +56,8 @@ TEST(Verdict, withoutAReferenceItIsNeverGood) {
 }
 
 TEST(Verdict, driftAndScaleMoveTheGradeAtTheirLimits) {
-  const std::vector<std::pair<double, Grade>> drifts{{0.02, Grade::good}, {0.021, Grade::care}, {0.05, Grade::care}, {0.051, Grade::bad}};
+  const std::vector<std::pair<double, Grade>> drifts{
+      {0.02, Grade::good}, {0.021, Grade::care}, {0.05, Grade::care}, {0.051, Grade::bad}};
   for (const auto& [drift, grade] : drifts) {
     Case c;
     c.analysis.drift = drift;
@@ -137,7 +141,8 @@ TEST(Verdict, aKnockThatWasMendedIsAdviceAndNoGrade) {
 
 TEST(Verdict, aRejectedCalibrationIsADoubtUnlessTheOneInUseFitsAsWell) {
   Case c;
-  c.session.calibrations = {attempt(true, "from_scratch", 0, 0.2), attempt(false, "drift", 1.4, 0.2)};
+  c.session.calibrations = {attempt(true, "from_scratch", 0, 0.2),
+                            attempt(false, "drift", 1.4, 0.2)};
   EXPECT_EQ(c.verdict().grade, Grade::care);
   EXPECT_TRUE(any_has(c.verdict().advice, "it is worse"));
   c.session.calibrations.back() = attempt(false, "requested", 0.2, 0.2);
@@ -172,7 +177,8 @@ TEST(Verdict, aDriveThatEndsWithoutVerificationSaysWhatWouldHelp) {
   c.session.summary["calibration"]["verified"] = false;
   EXPECT_EQ(c.verdict().grade, Grade::care);
   EXPECT_TRUE(any_has(c.verdict().reasons, "has not confirmed its calibration"));
-  for (const char* help : {"turns", "near things at the roadside", "corners of the image"}) EXPECT_TRUE(any_has(c.verdict().advice, help));
+  for (const char* help : {"turns", "near things at the roadside", "corners of the image"})
+    EXPECT_TRUE(any_has(c.verdict().advice, help));
   c.analysis.confirmed_s = 20;
   EXPECT_TRUE(any_has(c.verdict().reasons, "at the end is not verified"));
   c.session.summary["calibration"]["online"] = false;
@@ -191,7 +197,9 @@ TEST(Verdict, aTornSessionThatWaitedInVainSaysSo) {
 TEST(Verdict, aContradictedCalibrationIsTold) {
   Case c;
   c.session.calibrations = {attempt(true, "given", 0, 0)};
-  c.session.events = {{Stamp(), "calibration_contradicted", "the calibration in use is not that of the rig: its depths are off by 6.1 %"}};
+  c.session.events = {
+      {Stamp(), "calibration_contradicted",
+       "the calibration in use is not that of the rig: its depths are off by 6.1 %"}};
   EXPECT_TRUE(any_has(c.verdict().advice, "off by 6.1 %"));
 }
 
@@ -210,7 +218,8 @@ TEST(Verdict, neverACalibrationSaysHowToGetOne) {
 
 TEST(Verdict, aScaleThatDisagreesAndACalibrationThatWasNotKeptAreTold) {
   Case c;
-  c.session.events = {{Stamp(), "scale_disagrees", "the way comes out 90.0 % longer"}, {Stamp(), "calibration_not_kept", "no room"}};
+  c.session.events = {{Stamp(), "scale_disagrees", "the way comes out 90.0 % longer"},
+                      {Stamp(), "calibration_not_kept", "no room"}};
   c.session.calibrations = {attempt(true, "from_scratch", 0, 0.2)};
   const Verdict v = c.verdict();
   EXPECT_EQ(v.grade, Grade::care);

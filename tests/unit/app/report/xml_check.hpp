@@ -7,8 +7,9 @@
 
 namespace vergence::test {
 
-/// Whether a document is well-formed: elements nested and closed, attributes quoted and not twice, entities known, no stray markup.
-/// Empty when it is, else what is wrong and where. A doctype at the front is passed over; comments and CDATA are not expected.
+/// Whether a document is well-formed: elements nested and closed, attributes quoted and not twice,
+/// entities known, no stray markup. Empty when it is, else what is wrong and where. A doctype at
+/// the front is passed over; comments and CDATA are not expected.
 class XmlCheck {
  public:
   [[nodiscard]] static std::string problem(std::string_view text) {
@@ -37,7 +38,8 @@ class XmlCheck {
       const char c = text_[at_];
       if (c == '&') entity();
       if (c == '<') fail("a bare <");
-      if (static_cast<unsigned char>(c) < 0x20 && c != '\n' && c != '\t') fail("a control character");
+      if (static_cast<unsigned char>(c) < 0x20 && c != '\n' && c != '\t')
+        fail("a control character");
     }
   }
   void entity() {
@@ -48,7 +50,8 @@ class XmlCheck {
 
   std::string name() {
     const std::size_t begin = at_;
-    while (at_ < text_.size() && (std::isalnum(static_cast<unsigned char>(text_[at_])) != 0 || text_[at_] == '-' || text_[at_] == ':'))
+    while (at_ < text_.size() && (std::isalnum(static_cast<unsigned char>(text_[at_])) != 0 ||
+                                  text_[at_] == '-' || text_[at_] == ':'))
       ++at_;
     if (at_ == begin) fail("a name is missing");
     return std::string(text_.substr(begin, at_ - begin));
@@ -66,7 +69,8 @@ class XmlCheck {
     if (at_ >= text_.size() || text_[at_] != '>') return fail("<" + element + " does not end");
     ++at_;
     if (closing) {
-      if (open_.empty() || open_.back() != element) return fail("</" + element + "> closes nothing");
+      if (open_.empty() || open_.back() != element)
+        return fail("</" + element + "> closes nothing");
       open_.pop_back();
     } else if (!empty) {
       open_.push_back(element);
@@ -76,7 +80,8 @@ class XmlCheck {
   void attribute(std::vector<std::string>* seen) {
     ++at_;
     const std::string key = name();
-    if (std::find(seen->begin(), seen->end(), key) != seen->end()) return fail("attribute " + key + " twice");
+    if (std::find(seen->begin(), seen->end(), key) != seen->end())
+      return fail("attribute " + key + " twice");
     seen->push_back(key);
     if (text_.substr(at_, 2) != "=\"") return fail("attribute " + key + " has no quoted value");
     at_ += 2;
@@ -85,7 +90,8 @@ class XmlCheck {
   }
 
   void fail(const std::string& what) {
-    if (problem_.empty()) problem_ = what + " near: " + std::string(text_.substr(at_ < 60 ? 0 : at_ - 60, 120));
+    if (problem_.empty())
+      problem_ = what + " near: " + std::string(text_.substr(at_ < 60 ? 0 : at_ - 60, 120));
   }
 
   std::string_view text_;

@@ -63,7 +63,8 @@ TEST(BackgroundThread, waitingWithoutATaskReturnsAtOnceAndTheEndWaitsForOne) {
 }
 
 TEST(BackgroundThread, allocatesNothingPerTaskAndSealsItsThread) {
-  if (!AllocationGuard::available()) GTEST_SKIP() << "needs the allocation hooks, which sanitizer builds leave out";
+  if (!AllocationGuard::available())
+    GTEST_SKIP() << "needs the allocation hooks, which sanitizer builds leave out";
   BackgroundThread runner;
   bool sealed = false;
   auto look = [&] { sealed = AllocationGuard::thread_sealed(); };

@@ -14,7 +14,10 @@ namespace vergence::app {
 namespace {
 
 CameraRequest request(const std::string& driver, const std::string& serial) {
-  return {"cameras.0", driver, serial, {320, 240, 30, Duration::milliseconds(2), 0, CameraTrigger::software}};
+  return {"cameras.0",
+          driver,
+          serial,
+          {320, 240, 30, Duration::milliseconds(2), 0, CameraTrigger::software}};
 }
 
 std::string refusal(const std::vector<CameraRequest>& requests) {
@@ -39,7 +42,9 @@ test::GigeCameraOptions small(int k) {
 
 TEST(CameraDrivers, anUnknownDriverIsRefusedWithTheNearestOne) {
   const std::string sentence = refusal({request("gigE", "1")});
-  EXPECT_NE(sentence.find("cameras.0.driver is \"gigE\"; did you mean \"gige\"?"), std::string::npos) << sentence;
+  EXPECT_NE(sentence.find("cameras.0.driver is \"gigE\"; did you mean \"gige\"?"),
+            std::string::npos)
+      << sentence;
 }
 
 TEST(CameraDrivers, everyNameStandsOnce) {
@@ -50,12 +55,15 @@ TEST(CameraDrivers, everyNameStandsOnce) {
 }
 
 TEST(CameraDrivers, oneSerialTwiceIsRefused) {
-  EXPECT_NE(refusal({request("gige", "A"), request("gige", "A")}).find("two entries"), std::string::npos);
+  EXPECT_NE(refusal({request("gige", "A"), request("gige", "A")}).find("two entries"),
+            std::string::npos);
 }
 
 TEST(CameraDrivers, aCameraThatIsNotThereIsNamedWithTheKey) {
   const std::string sentence = refusal({request("gige", "NO-SUCH-CAMERA")});
-  EXPECT_NE(sentence.find("cameras.0: the gige camera \"NO-SUCH-CAMERA\" was not found"), std::string::npos) << sentence;
+  EXPECT_NE(sentence.find("cameras.0: the gige camera \"NO-SUCH-CAMERA\" was not found"),
+            std::string::npos)
+      << sentence;
 }
 
 TEST(CameraDrivers, whatACameraRefusesIsSaidWithItsName) {
@@ -63,20 +71,25 @@ TEST(CameraDrivers, whatACameraRefusesIsSaidWithItsName) {
   CameraRequest r = request("gige", small(0).address);
   r.configuration.width = 640;
   const std::string sentence = refusal({r});
-  EXPECT_NE(sentence.find("cameras.0 (gige TABLE-0): Width 640 px is not possible: the camera offers 16 to 320 px"), std::string::npos)
+  EXPECT_NE(
+      sentence.find(
+          "cameras.0 (gige TABLE-0): Width 640 px is not possible: the camera offers 16 to 320 px"),
+      std::string::npos)
       << sentence;
 }
 
 TEST(SoftwareTrigger, everyCameraExposesAtEveryPulse) {
   const test::GigeCamera left(small(1)), right(small(2));
   std::vector<std::string> remarks;
-  const auto cameras = open_cameras({request("gige", small(1).address), request("gige", small(2).address)}, &remarks);
+  const auto cameras = open_cameras(
+      {request("gige", small(1).address), request("gige", small(2).address)}, &remarks);
   std::vector<CameraDevice*> devices{cameras[0].device.get(), cameras[1].device.get()};
   SoftwareTrigger trigger(devices);
   EXPECT_EQ(trigger.start(nullptr), DeviceStatus::bad_configuration);
   EXPECT_EQ(trigger.configure({0}, nullptr), DeviceStatus::bad_configuration);
   ASSERT_EQ(trigger.configure({40}, nullptr), DeviceStatus::ok);
-  for (CameraDevice* camera : devices) ASSERT_EQ(camera->start(nullptr), DeviceStatus::ok) << camera->complaint();
+  for (CameraDevice* camera : devices)
+    ASSERT_EQ(camera->start(nullptr), DeviceStatus::ok) << camera->complaint();
   ASSERT_EQ(trigger.start(nullptr), DeviceStatus::ok);
   for (std::uint64_t n = 0; n < 10; ++n) {
     Pulse pulse;

@@ -22,7 +22,8 @@ std::string refusal(const std::filesystem::path& file) {
 }
 
 std::ptrdiff_t files_in(const std::filesystem::path& folder) {
-  return std::distance(std::filesystem::directory_iterator(folder), std::filesystem::directory_iterator{});
+  return std::distance(std::filesystem::directory_iterator(folder),
+                       std::filesystem::directory_iterator{});
 }
 
 TEST(DurableFile, isMadeAndReplacedAndLeavesNothingBeside) {
@@ -41,7 +42,8 @@ TEST(DurableFile, aFailureNamesTheFileAndKeepsTheOldOne) {
   std::filesystem::create_directory(folder / "a.yaml.new");  // cannot be opened as a file
   EXPECT_NE(refusal(folder / "a.yaml").find("a.yaml: cannot be written"), std::string::npos);
   EXPECT_EQ(test::read_file(folder / "a.yaml"), "old");
-  EXPECT_NE(refusal(folder / "none" / "b.yaml").find("b.yaml: cannot be written"), std::string::npos);
+  EXPECT_NE(refusal(folder / "none" / "b.yaml").find("b.yaml: cannot be written"),
+            std::string::npos);
   std::filesystem::create_directory(folder / "c.yaml");
   EXPECT_NE(refusal(folder / "c.yaml").find("c.yaml: cannot be replaced"), std::string::npos);
   EXPECT_FALSE(std::filesystem::exists(folder / "c.yaml.new"));

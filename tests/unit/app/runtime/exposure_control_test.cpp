@@ -58,12 +58,17 @@ Driven drive(const std::vector<std::string>& faults, int latency, double seconds
   o.duration = Duration::seconds(seconds);
   o.exposures_follow = true;
   o.exposure_latency = latency;
-  mock::MockRig mock(std::make_shared<const mock::RigTruth>(town(), way, rig, mock::default_T_body_left(), Transform{}, parsed), o);
+  mock::MockRig mock(std::make_shared<const mock::RigTruth>(
+                         town(), way, rig, mock::default_T_body_left(), Transform{}, parsed),
+                     o);
   const exposure::ExposureOptions options;
   const ExposureSetting start{Duration::microseconds(4000), 0};
   for (int k = 0; k < 2; ++k)
-    EXPECT_EQ(mock.camera(k).configure({kWidth, kHeight, kRate, start.exposure, start.gain_db}, nullptr), DeviceStatus::ok);
-  ExposureControl control({&mock.camera(0), &mock.camera(1)}, kWidth, kHeight, {}, options, start, true);
+    EXPECT_EQ(
+        mock.camera(k).configure({kWidth, kHeight, kRate, start.exposure, start.gain_db}, nullptr),
+        DeviceStatus::ok);
+  ExposureControl control({&mock.camera(0), &mock.camera(1)}, kWidth, kHeight, {}, options, start,
+                          true);
   const std::vector<CameraDevice*> cameras = control.cameras();
   for (CameraDevice* camera : cameras) EXPECT_EQ(camera->start(nullptr), DeviceStatus::ok);
   EXPECT_EQ(mock.trigger().configure({kRate}, nullptr), DeviceStatus::ok);
@@ -79,7 +84,8 @@ Driven drive(const std::vector<std::string>& faults, int latency, double seconds
       ended += status == DeviceStatus::ended ? 1 : 0;
       if (status != DeviceStatus::ok) continue;
       any = true;
-      driven.cameras[k][frame.counter] = {{frame.exposure, frame.gain_db}, meter.measure(cameras[k]->view(frame.slot), 0).mean};
+      driven.cameras[k][frame.counter] = {{frame.exposure, frame.gain_db},
+                                          meter.measure(cameras[k]->view(frame.slot), 0).mean};
       cameras[k]->release(frame.slot);
     }
     if (!any) std::this_thread::sleep_for(std::chrono::microseconds(100));
@@ -92,30 +98,38 @@ Driven drive(const std::vector<std::string>& faults, int latency, double seconds
 
 int changes_between(const Driven& d, std::uint64_t first, std::uint64_t last) {
   int n = 0;
-  for (std::uint64_t i = first + 1; i < last; ++i) n += d.cameras[0].at(i).had == d.cameras[0].at(i - 1).had ? 0 : 1;
+  for (std::uint64_t i = first + 1; i < last; ++i)
+    n += d.cameras[0].at(i).had == d.cameras[0].at(i - 1).had ? 0 : 1;
   return n;
 }
 
 /// Images from the one at which an exposure is asked for to the first that has it.
 class ExposureOnTheMock : public ::testing::TestWithParam<int> {};
 
-TEST_P(ExposureOnTheMock, nightCoverAndALampAreFollowedAtRestWithinThreeSecondsAndAlikeInBothCameras) {
-  // Night, an eighth of the light, from 4 to 10 s; both lenses covered from 14 to 16 s; a lamp, four times the light, from 20 to 25 s.
-  const Driven d =
-      drive({"night@4 duration_s=6 factor=0.125", "cover@14 duration_s=2", "exposure@20 duration_s=5 factor=4"}, GetParam(), 29);
+TEST_P(ExposureOnTheMock,
+       nightCoverAndALampAreFollowedAtRestWithinThreeSecondsAndAlikeInBothCameras) {
+  // Night, an eighth of the light, from 4 to 10 s; both lenses covered from 14 to 16 s; a lamp,
+  // four times the light, from 20 to 25 s.
+  const Driven d = drive({"night@4 duration_s=6 factor=0.125", "cover@14 duration_s=2",
+                          "exposure@20 duration_s=5 factor=4"},
+                         GetParam(), 29);
   ASSERT_EQ(d.cameras[0].size(), 581U);
   ASSERT_EQ(d.cameras[1].size(), 581U);
-  for (const auto& [counter, shown] : d.cameras[0]) EXPECT_EQ(shown.had, d.cameras[1].at(counter).had) << "pulse " << counter;
+  for (const auto& [counter, shown] : d.cameras[0])
+    EXPECT_EQ(shown.had, d.cameras[1].at(counter).had) << "pulse " << counter;
   EXPECT_EQ(d.counters.refused + d.counters.unequal + d.counters.again, 0U);
   const exposure::ExposureOptions o;
-  // Images: three stops up one at a time and a correction, each after settle_frames and the latency, come to 40; with room for one more.
+  // Images: three stops up one at a time and a correction, each after settle_frames and the
+  // latency, come to 40; with room for one more.
   constexpr std::uint64_t kRest = 60;
   const auto at = [](double seconds) { return static_cast<std::uint64_t>(seconds * kRate); };
-  for (const auto& [from, to] : {std::pair(0.0, 4.0), {4.0, 10.0}, {10.0, 14.0}, {16.0, 20.0}, {20.0, 25.0}, {25.0, 29.0}}) {
+  for (const auto& [from, to] :
+       {std::pair(0.0, 4.0), {4.0, 10.0}, {10.0, 14.0}, {16.0, 20.0}, {20.0, 25.0}, {25.0, 29.0}}) {
     const std::uint64_t first = at(from) + kRest, last = at(to);
     ASSERT_LT(first, last);
     EXPECT_EQ(changes_between(d, first, last), 0) << from << " s: a limit cycle";
-    // In the dead band, or as bright as the bright part of the picture allows: darker than the target then, never brighter.
+    // In the dead band, or as bright as the bright part of the picture allows: darker than the
+    // target then, never brighter.
     const double mean = d.cameras[0].at(last - 1).mean;
     EXPECT_LT(std::log2(mean / o.target), o.dead_band + 0.05) << from << " s";
     EXPECT_GT(mean, 0.5 * o.target) << from << " s";
@@ -127,8 +141,9 @@ TEST_P(ExposureOnTheMock, nightCoverAndALampAreFollowedAtRestWithinThreeSecondsA
 INSTANTIATE_TEST_SUITE_P(ByLatency, ExposureOnTheMock, ::testing::Values(1, 4));
 
 TEST(ExposureControl, isTheSameOnEveryRunInVirtualTime) {
-  const std::vector<std::string> faults{"night@2 duration_s=3 factor=0.2", "lose_frames@1 camera=0 share=0.3 duration_s=5",
-                                        "late_frames@2 camera=0 share=0.2 delay_s=0.12 duration_s=3"};
+  const std::vector<std::string> faults{
+      "night@2 duration_s=3 factor=0.2", "lose_frames@1 camera=0 share=0.3 duration_s=5",
+      "late_frames@2 camera=0 share=0.2 delay_s=0.12 duration_s=3"};
   const Driven a = drive(faults, 2, 8), b = drive(faults, 2, 8);
   EXPECT_GT(a.counters.changes, 3U);
   EXPECT_LT(a.cameras[0].size(), a.cameras[1].size());
@@ -139,17 +154,22 @@ TEST(ExposureControl, isTheSameOnEveryRunInVirtualTime) {
 class SlowCamera final : public CameraDevice {
  public:
   const DeviceInfo& info() const noexcept override { return info_; }
-  DeviceStatus configure(const CameraConfiguration&, CameraConfiguration*) noexcept override { return DeviceStatus::ok; }
+  DeviceStatus configure(const CameraConfiguration&, CameraConfiguration*) noexcept override {
+    return DeviceStatus::ok;
+  }
   DeviceTiming timing() const noexcept override { return {}; }
   DeviceStatus start(Notifier*) noexcept override { return DeviceStatus::ok; }
   DeviceStatus wait(Duration, Frame* frame) noexcept override {
     frame->exposure = has.exposure;
     return DeviceStatus::ok;
   }
-  ImageView view(FrameSlot) const noexcept override { return {pixels_.data(), kWidth, kHeight, kWidth}; }
+  ImageView view(FrameSlot) const noexcept override {
+    return {pixels_.data(), kWidth, kHeight, kWidth};
+  }
   void release(FrameSlot) noexcept override {}
   void stop() noexcept override {}
-  DeviceStatus set_exposure(const ExposureSetting& wanted, ExposureSetting* actual) noexcept override {
+  DeviceStatus set_exposure(const ExposureSetting& wanted,
+                            ExposureSetting* actual) noexcept override {
     std::this_thread::sleep_for(std::chrono::milliseconds(300));
     asked.fetch_add(1);
     if (answer.load() == DeviceStatus::ok) *actual = wanted;
@@ -177,7 +197,8 @@ TEST(ExposureControl, aCameraThatAnswersSlowlyKeepsNobodyWaiting) {
     Frame frame;
     EXPECT_EQ(watched->wait({}, &frame), DeviceStatus::ok);
   }
-  EXPECT_LT(std::chrono::steady_clock::now() - begun, std::chrono::milliseconds(290)) << "500 looks; one answer takes 300 ms";
+  EXPECT_LT(std::chrono::steady_clock::now() - begun, std::chrono::milliseconds(290))
+      << "500 looks; one answer takes 300 ms";
   EXPECT_EQ(control.counters().changes, 1U) << "nothing more is asked while the camera is at it";
   control.settle();
 }
@@ -199,7 +220,8 @@ TEST(ExposureControl, aCameraThatCannotEndsItAndOneThatForgotIsAskedAgain) {
   options.target = 20;
   options.dead_band = 1;  // 10 grey levels are within a stop of 20
   ExposureControl again({&forgetful}, kWidth, kHeight, {}, options, start, true);
-  for (int i = 0; i < 4 * options.settle_frames; ++i) (void)again.cameras().front()->wait({}, &frame);
+  for (int i = 0; i < 4 * options.settle_frames; ++i)
+    (void)again.cameras().front()->wait({}, &frame);
   EXPECT_EQ(forgetful.asked, 1);
   EXPECT_EQ(again.counters().again, 1U);
 }

@@ -40,7 +40,9 @@ TEST(InsDrivers, whatCannotBeOpenedIsToldInOneSentence) {
   InsRequest unknown;
   unknown.driver = "xsense";
   EXPECT_NE(refusal(unknown).find("did you mean"), std::string::npos) << refusal(unknown);
-  EXPECT_NE(refusal(xsens_on("/dev/ttyNotThere", 100)).find("/dev/ttyNotThere cannot be opened: not found"), std::string::npos)
+  EXPECT_NE(refusal(xsens_on("/dev/ttyNotThere", 100))
+                .find("/dev/ttyNotThere cannot be opened: not found"),
+            std::string::npos)
       << refusal(xsens_on("/dev/ttyNotThere", 100));
   InsRequest word = xsens_on("/dev/ttyNotThere", 100);
   word.sync_in = "upwards";
@@ -55,11 +57,15 @@ TEST(InsDrivers, readsARealTerminalInRealTime) {
     std::vector<std::string> remarks;
     const auto device = open_ins(xsens_on(terminal.port(), 120), &remarks);
     ASSERT_NE(device, nullptr);
-    EXPECT_EQ(remarks.size(), generation == xbus::Generation::mark4 ? 1U : 0U) << "120 Hz are no rate of the newer one";
-    EXPECT_EQ(refusal(xsens_on(terminal.port(), 120)).find("in use") == std::string::npos, false) << "the port is ours";
+    EXPECT_EQ(remarks.size(), generation == xbus::Generation::mark4 ? 1U : 0U)
+        << "120 Hz are no rate of the newer one";
+    EXPECT_EQ(refusal(xsens_on(terminal.port(), 120)).find("in use") == std::string::npos, false)
+        << "the port is ours";
     ASSERT_EQ(device->start(nullptr), DeviceStatus::ok);
     std::vector<InsReading> all;
-    for (InsReading r; all.size() < 60 && device->wait(Duration::seconds(5), &r) == DeviceStatus::ok;) all.push_back(r);
+    for (InsReading r;
+         all.size() < 60 && device->wait(Duration::seconds(5), &r) == DeviceStatus::ok;)
+      all.push_back(r);
     ASSERT_EQ(all.size(), 60U);
     for (const InsReading& r : all) {
       EXPECT_EQ(r.sample.fix, FixStatus::fix_3d);

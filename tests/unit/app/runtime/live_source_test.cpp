@@ -58,11 +58,14 @@ struct Bench {
     o.real_time = real_time;
     o.reports_taken = true;
     rig = std::make_unique<mock::MockRig>(
-        std::make_shared<const mock::RigTruth>(std::make_shared<const mock::World>(town), drive, calibration, mock::default_T_body_left(),
+        std::make_shared<const mock::RigTruth>(std::make_shared<const mock::World>(town), drive,
+                                               calibration, mock::default_T_body_left(),
                                                Transform{}, parsed),
         o);
     for (int k = 0; k < 2; ++k)
-      EXPECT_EQ(rig->camera(k).configure({64, 48, 20, Duration::milliseconds(8), 0, CameraTrigger::hardware}, nullptr), DeviceStatus::ok);
+      EXPECT_EQ(rig->camera(k).configure(
+                    {64, 48, 20, Duration::milliseconds(8), 0, CameraTrigger::hardware}, nullptr),
+                DeviceStatus::ok);
     EXPECT_EQ(rig->ins().configure(120, nullptr), DeviceStatus::ok);
     TriggerConfiguration pulses;
     pulses.rate_hz = 20;
@@ -78,7 +81,8 @@ struct Bench {
     options.stamp_grid = grid;
     for (int k = 0; k < 2; ++k) watched.push_back(std::make_unique<WatchedCamera>(&rig->camera(k)));
     source =
-        std::make_unique<LiveSource>(std::vector<CameraDevice*>{watched[0].get(), watched[1].get()}, &rig->ins(), &rig->trigger(), options);
+        std::make_unique<LiveSource>(std::vector<CameraDevice*>{watched[0].get(), watched[1].get()},
+                                     &rig->ins(), &rig->trigger(), options);
     times = rig->pulse_times();
   }
 
@@ -101,7 +105,8 @@ struct Bench {
       items.push_back(item);
       if (item.kind != LiveItem::Kind::images) continue;
       pulses_of.push_back({});
-      for (std::size_t k = 0; k < 2; ++k) pulses_of.back()[k] = item.set.present[k] ? static_cast<int>(true_pulse(item.set, k)) : -1;
+      for (std::size_t k = 0; k < 2; ++k)
+        pulses_of.back()[k] = item.set.present[k] ? static_cast<int>(true_pulse(item.set, k)) : -1;
       source->release(item.set);
     }
     source->join();
@@ -130,7 +135,8 @@ TEST(LiveSource, bringsEveryPulseAndReadingOnceInOrderAndWithinTheStampsOwnError
   for (const LiveItem& item : items) {
     if (item.kind == LiveItem::Kind::images) {
       EXPECT_EQ(item.set.number, number);
-      const Stamp truth = kStart + Duration::milliseconds(50) * static_cast<std::int64_t>(number) + Duration::milliseconds(4);
+      const Stamp truth = kStart + Duration::milliseconds(50) * static_cast<std::int64_t>(number) +
+                          Duration::milliseconds(4);
       const Duration error = item.stamp - truth;
       EXPECT_LE(std::abs(error.ns()), item.set.error.ns()) << number;
       ++number;
@@ -138,7 +144,8 @@ TEST(LiveSource, bringsEveryPulseAndReadingOnceInOrderAndWithinTheStampsOwnError
       ASSERT_EQ(item.kind, LiveItem::Kind::reading);
       EXPECT_EQ(item.sample.number, reading);
       const Stamp truth = kStart + Duration::seconds(static_cast<double>(reading) / 120);
-      EXPECT_LE(std::abs((item.sample.stamp - truth).ns()), item.sample.stamp_error.ns()) << reading;
+      EXPECT_LE(std::abs((item.sample.stamp - truth).ns()), item.sample.stamp_error.ns())
+          << reading;
       ++reading;
     }
   }
@@ -146,8 +153,9 @@ TEST(LiveSource, bringsEveryPulseAndReadingOnceInOrderAndWithinTheStampsOwnError
 }
 
 TEST(LiveSource, twoRunsOfADriveInVirtualTimeAreTheSameItemByItem) {
-  const std::vector<std::string> faults{"camera_gone@2 camera=1 duration_s=1", "duplicate_frames@0 share=0.3 duration_s=0",
-                                        "late_frames@1 camera=0 share=0.2 delay_s=0.2 duration_s=2"};
+  const std::vector<std::string> faults{
+      "camera_gone@2 camera=1 duration_s=1", "duplicate_frames@0 share=0.3 duration_s=0",
+      "late_frames@1 camera=0 share=0.2 delay_s=0.2 duration_s=2"};
   const auto a = Bench(faults).drive(), b = Bench(faults).drive();
   ASSERT_EQ(a.size(), b.size());
   for (std::size_t i = 0; i < a.size(); ++i) {
@@ -159,7 +167,8 @@ TEST(LiveSource, twoRunsOfADriveInVirtualTimeAreTheSameItemByItem) {
 }
 
 TEST(LiveSource, stampsLieOnTheirGridAndNoFartherFromWhereTheyWereThanHalfOfIt) {
-  const auto fine = Bench({}).drive(), coarse = Bench({}, {.grid = Duration::microseconds(1)}).drive();
+  const auto fine = Bench({}).drive(),
+             coarse = Bench({}, {.grid = Duration::microseconds(1)}).drive();
   ASSERT_EQ(fine.size(), coarse.size());
   int off = 0;
   for (std::size_t i = 0; i < fine.size(); ++i) {
@@ -181,7 +190,8 @@ TEST(LiveSource, aCameraThatWasGoneJoinsTheRightPulsesAgain) {
   for (const LiveItem& item : items) {
     if (item.kind != LiveItem::Kind::images) continue;
     EXPECT_TRUE(item.set.present[0]);
-    EXPECT_EQ(item.set.present[1], item.set.number < 40 || item.set.number >= 60) << item.set.number;
+    EXPECT_EQ(item.set.present[1], item.set.number < 40 || item.set.number >= 60)
+        << item.set.number;
     // Both expose at the same instant: a camera paired a pulse off would be 50 ms away.
     EXPECT_LT(item.set.spread, Duration::milliseconds(5)) << item.set.number;
   }
@@ -196,11 +206,14 @@ TEST(LiveSource, everySlotComesBack) {
   EXPECT_EQ(b.rig->camera(0).statistics().underruns, 0U);
 }
 
-// ---- with the board's pulses --------------------------------------------------------------------------------------
+// ---- with the board's pulses
+// --------------------------------------------------------------------------------------
 
-constexpr BenchOptions kByPulses{.mode = SyncMode::board, .vary = Duration::milliseconds(2), .seconds = 8};
+constexpr BenchOptions kByPulses{
+    .mode = SyncMode::board, .vary = Duration::milliseconds(2), .seconds = 8};
 
-/// Sets with both images, all of the same pulse, stamped at its middle within the error; the first of them after that time.
+/// Sets with both images, all of the same pulse, stamped at its middle within the error; the first
+/// of them after that time.
 void expect_right_pairs(const Bench& b, const std::vector<LiveItem>& items, int most_unproven = 0) {
   std::size_t i = 0;
   int unproven = 0;
@@ -211,11 +224,13 @@ void expect_right_pairs(const Bench& b, const std::vector<LiveItem>& items, int 
     if (pulses[0] >= 0 && pulses[1] >= 0) {
       EXPECT_EQ(pulses[0], pulses[1]) << "a wrong pair, set " << item.set.number;
     }
-    const Stamp truth = kStart + b.times[static_cast<std::size_t>(first)] + Duration::milliseconds(4);
+    const Stamp truth =
+        kStart + b.times[static_cast<std::size_t>(first)] + Duration::milliseconds(4);
     EXPECT_LE(std::abs((item.stamp - truth).ns()), item.set.error.ns()) << item.set.number;
     // One that is not proven for the while says so, and is right all the same.
     unproven += item.set.proof == SyncProof::unproven ? 1 : 0;
-    EXPECT_TRUE(item.set.proof == SyncProof::numbered || item.set.proof == SyncProof::unproven) << to_string(item.set.proof);
+    EXPECT_TRUE(item.set.proof == SyncProof::numbered || item.set.proof == SyncProof::unproven)
+        << to_string(item.set.proof);
     EXPECT_EQ(item.set.spread, Duration{}) << "equal exposures of one pulse";
   }
   EXPECT_EQ(i, b.pulses_of.size());
@@ -238,7 +253,8 @@ TEST(LiveSource, byPulsesEveryPairIsProvenWithinASecondAndRight) {
   EXPECT_LE(worst_acquisition(items), 1);
   const LiveCounters& c = b.source->counters();
   EXPECT_EQ(c.pulses, b.times.size());
-  EXPECT_EQ(static_cast<std::uint64_t>(count(items, LiveItem::Kind::images)) + c.sync.acquiring[0], b.times.size());
+  EXPECT_EQ(static_cast<std::uint64_t>(count(items, LiveItem::Kind::images)) + c.sync.acquiring[0],
+            b.times.size());
   EXPECT_EQ(c.sync.incomplete, 0U);
   EXPECT_EQ(c.pauses, 0U) << "varied intervals prove it";
 }
@@ -254,7 +270,8 @@ TEST(LiveSource, evenPulsesArePausedAtTheSamePulseOnEveryRunAndWhatComesOutIsRig
     EXPECT_LT(b.source->counters().pulses, b.times.size()) << "some were left out";
   }
   ASSERT_EQ(runs[0].size(), runs[1].size());
-  for (std::size_t i = 0; i < runs[0].size(); ++i) ASSERT_EQ(runs[0][i].stamp, runs[1][i].stamp) << i;
+  for (std::size_t i = 0; i < runs[0].size(); ++i)
+    ASSERT_EQ(runs[0][i].stamp, runs[1][i].stamp) << i;
 }
 
 struct LossCase {
@@ -285,19 +302,25 @@ TEST_P(LiveSourceByPulses, whateverIsLostNoPairIsWrongAndAllIsSaid) {
 using Kind = LiveItem::Kind;
 INSTANTIATE_TEST_SUITE_P(
     Ways, LiveSourceByPulses,
-    ::testing::Values(LossCase{"camera", {"camera_gone@4 camera=1 duration_s=1"}, 3, Kind::device_back, 1},
-                      LossCase{"left", {"camera_gone@4 camera=0 duration_s=1"}, 3, Kind::device_back, 1},
-                      LossCase{"reboot", {"board_reboot@4 duration_s=0.5"}, 4, Kind::board_rebooted, 1},
-                      LossCase{"board", {"board_gone@4 duration_s=1"}, 4, Kind::board_back, 1},
-                      LossCase{"line", {"board_gone@4 duration_s=1 powered=1"}, 2, Kind::board_gone, 1},
-                      LossCase{"missed", {"missed_trigger@4 camera=1 pulses=2", "missed_trigger@6 camera=0"}, 2, Kind::acquiring, 2},
-                      LossCase{"frames", {"lose_frames@3 share=0.2 duration_s=0"}, 2, Kind::acquiring, 2},
-                      LossCase{"pairs", {"break_pairs@3 share=0.5 duration_s=0"}, 2, Kind::acquiring, 2},
-                      LossCase{"doubles", {"duplicate_frames@3 share=0.3 duration_s=0"}, 2, Kind::acquiring, 2}),
+    ::testing::Values(
+        LossCase{"camera", {"camera_gone@4 camera=1 duration_s=1"}, 3, Kind::device_back, 1},
+        LossCase{"left", {"camera_gone@4 camera=0 duration_s=1"}, 3, Kind::device_back, 1},
+        LossCase{"reboot", {"board_reboot@4 duration_s=0.5"}, 4, Kind::board_rebooted, 1},
+        LossCase{"board", {"board_gone@4 duration_s=1"}, 4, Kind::board_back, 1},
+        LossCase{"line", {"board_gone@4 duration_s=1 powered=1"}, 2, Kind::board_gone, 1},
+        LossCase{"missed",
+                 {"missed_trigger@4 camera=1 pulses=2", "missed_trigger@6 camera=0"},
+                 2,
+                 Kind::acquiring,
+                 2},
+        LossCase{"frames", {"lose_frames@3 share=0.2 duration_s=0"}, 2, Kind::acquiring, 2},
+        LossCase{"pairs", {"break_pairs@3 share=0.5 duration_s=0"}, 2, Kind::acquiring, 2},
+        LossCase{"doubles", {"duplicate_frames@3 share=0.3 duration_s=0"}, 2, Kind::acquiring, 2}),
     [](const auto& i) { return std::string(i.param.name); });
 
 TEST(LiveSource, everyLossHasItsOwnCounter) {
-  Bench b({"missed_trigger@4 camera=1 pulses=2", "lose_frames@5 camera=0 share=0.2 duration_s=2"}, kByPulses);
+  Bench b({"missed_trigger@4 camera=1 pulses=2", "lose_frames@5 camera=0 share=0.2 duration_s=2"},
+          kByPulses);
   (void)b.drive();
   const SyncCounters& c = b.source->counters().sync;
   EXPECT_EQ(c.missed_trigger[1], 2U);
@@ -322,9 +345,11 @@ TEST(LiveSource, theClocksOfADriveAreRecorded) {
   const LiveCounters& c = b.source->counters();
   for (const ClockRecord* clock : {&c.cameras[0], &c.cameras[1], &c.board, &c.ins}) {
     EXPECT_GT(clock->stamps(), 100U);
-    EXPECT_LE(std::abs(clock->drift_ppm()), 60) << "30 ppm at most, known to as much within eight seconds";
+    EXPECT_LE(std::abs(clock->drift_ppm()), 60)
+        << "30 ppm at most, known to as much within eight seconds";
     EXPECT_GT(clock->worst_error(), Duration{});
-    // The spread of the delays, and what a crystal may drift within the drive: tighter once the fit knows.
+    // The spread of the delays, and what a crystal may drift within the drive: tighter once the fit
+    // knows.
     EXPECT_LE(clock->worst_error(), Duration::milliseconds(2) + Duration::microseconds(200) * 8);
   }
 }

@@ -17,7 +17,8 @@ TEST(EditDistance, KnownAnswers) {
 }
 
 TEST(EditDistance, IsSymmetricAndBounded) {
-  const std::vector<std::string> words{"a", "ab", "ba", "threads", "odometry.features", "odometry.feature"};
+  const std::vector<std::string> words{
+      "a", "ab", "ba", "threads", "odometry.features", "odometry.feature"};
   for (const auto& a : words)
     for (const auto& b : words) {
       EXPECT_EQ(edit_distance(a, b), edit_distance(b, a)) << a << ' ' << b;
@@ -25,7 +26,9 @@ TEST(EditDistance, IsSymmetricAndBounded) {
     }
 }
 
-TEST(EditDistance, HugeWordsCostLittle) { EXPECT_LE(edit_distance(std::string(10'000'000, 'x'), "threads"), 256U); }
+TEST(EditDistance, HugeWordsCostLittle) {
+  EXPECT_LE(edit_distance(std::string(10'000'000, 'x'), "threads"), 256U);
+}
 
 TEST(Nearest, PicksTheLeastDistant) {
   EXPECT_EQ(nearest("evalute", {"replay", "evaluate", "simulate"}), "evaluate");

@@ -85,7 +85,9 @@ TEST_F(ProgressTest, TheLineSaysEverythingThatIsKnown) {
   ProgressState s = at(1001, 33000);  // 100 frames a second: 31999 are left, 319.99 s
   s.from_ins_m = 0.42;
   p.update(s);
-  EXPECT_EQ(show(out.str()).row, "stereo · frame 1001/33000 · 0.62 km · 318 inliers · 7.9 ms · 0.42 m from INS · 05:20 left");
+  EXPECT_EQ(
+      show(out.str()).row,
+      "stereo · frame 1001/33000 · 0.62 km · 318 inliers · 7.9 ms · 0.42 m from INS · 05:20 left");
 }
 
 TEST_F(ProgressTest, WhatIsNotKnownIsLeftOut) {
@@ -119,7 +121,8 @@ TEST_F(ProgressTest, TheLineIsCutToTheWidthInCharactersNotBytes) {
   const auto shown = code_points(show(out.str()).row);
   EXPECT_LE(shown.size(), 30U);
   EXPECT_GE(shown.size(), 28U) << "the room is used";
-  EXPECT_EQ(show(out.str()).row.substr(0, 8), "stereo \xC2") << "and nothing is cut inside a character";
+  EXPECT_EQ(show(out.str()).row.substr(0, 8), "stereo \xC2")
+      << "and nothing is cut inside a character";
   for (const auto& c : shown) EXPECT_TRUE(c.size() == 1 || c == "·");
 }
 
@@ -182,7 +185,8 @@ TEST_F(ProgressTest, AnUnknownWidthIsTakenAsEightyColumns) {
   width = 0;
   auto p = progress(Progress::Mode::terminal);
   ProgressState s = at(1204, 33000);
-  s.state = "a state whose name is so long that it fills the line of any terminal that there is, twice";
+  s.state =
+      "a state whose name is so long that it fills the line of any terminal that there is, twice";
   p.update(s);
   EXPECT_EQ(code_points(show(out.str()).row).size(), 79U);
 }

@@ -52,7 +52,8 @@ TEST(ThreadRunner, sleepingBetweenRunsLosesNoWakeUp) {
   auto nothing = [] {};
   auto add = [&] { ++count; };
   for (int i = 0; i < 20; ++i) {
-    std::this_thread::sleep_for(std::chrono::milliseconds(1));  // far beyond the spin: the worker sleeps
+    std::this_thread::sleep_for(
+        std::chrono::milliseconds(1));  // far beyond the spin: the worker sleeps
     runner.run(TaskRef(nothing), TaskRef(add));
   }
   EXPECT_EQ(count, 20);
@@ -61,7 +62,8 @@ TEST(ThreadRunner, sleepingBetweenRunsLosesNoWakeUp) {
 TEST(ThreadRunner, joinsWithoutEverHavingRun) { const ThreadRunner runner; }
 
 TEST(ThreadRunner, allocatesNothingPerRunAndSealsItsWorker) {
-  if (!AllocationGuard::available()) GTEST_SKIP() << "needs the allocation hooks, which sanitizer builds leave out";
+  if (!AllocationGuard::available())
+    GTEST_SKIP() << "needs the allocation hooks, which sanitizer builds leave out";
   ThreadRunner runner;
   bool worker_sealed = false;
   auto nothing = [] {};
@@ -76,7 +78,8 @@ TEST(ThreadRunner, allocatesNothingPerRunAndSealsItsWorker) {
 }
 
 TEST(ThreadRunner, theWorkerOfAReaderMayAllocate) {
-  if (!AllocationGuard::available()) GTEST_SKIP() << "needs the allocation hooks, which sanitizer builds leave out";
+  if (!AllocationGuard::available())
+    GTEST_SKIP() << "needs the allocation hooks, which sanitizer builds leave out";
   ThreadRunner runner(ThreadRunner::Worker::of_reader);
   const auto before = AllocationGuard::allocations_after_seal();
   std::vector<int> grown;

@@ -11,7 +11,8 @@ namespace {
 TEST(Version, IsTheProjectsVersionWithTheCommitWhereOneIsKnown) {
   const std::string text(version());
   EXPECT_EQ(text.substr(0, text.find(' ')), VERGENCE_PROJECT_VERSION);
-  EXPECT_TRUE(std::regex_match(text, std::regex(R"([0-9]+\.[0-9]+\.[0-9]+( \([0-9a-f]+\+?\))?)"))) << text;
+  EXPECT_TRUE(std::regex_match(text, std::regex(R"([0-9]+\.[0-9]+\.[0-9]+( \([0-9a-f]+\+?\))?)")))
+      << text;
 }
 
 }  // namespace

@@ -14,7 +14,8 @@ namespace {
 
 /// A picture with padded rows, so that whoever takes the stride for the width is found out.
 struct Picture {
-  Picture(int w, int h, std::uint8_t grey) : width(w), height(h), pixels(static_cast<std::size_t>((w + 13) * h), 255) {
+  Picture(int w, int h, std::uint8_t grey)
+      : width(w), height(h), pixels(static_cast<std::size_t>((w + 13) * h), 255) {
     for (int y = 0; y < h; ++y)
       for (int x = 0; x < w; ++x) at(x, y) = grey;
   }
@@ -31,7 +32,8 @@ Picture squares(int w, int h, std::uint64_t seed, Shift shift) {
   Random random(seed);
   const int columns = w / kSquare + 2 * kMore, rows = h / kSquare + 1;
   std::vector<std::uint8_t> levels;
-  for (int i = 0; i < columns * rows; ++i) levels.push_back(static_cast<std::uint8_t>(40 + random.below(170)));
+  for (int i = 0; i < columns * rows; ++i)
+    levels.push_back(static_cast<std::uint8_t>(40 + random.below(170)));
   Picture p(w, h, 0);
   for (int y = 0; y < h; ++y)
     for (int x = 0; x < w; ++x) {
@@ -48,7 +50,9 @@ std::vector<PictureRemark> judged(const std::vector<Picture>& pictures) {
   return judge_pictures(std::span(kNames).first(pictures.size()), figures);
 }
 
-bool contains(const std::string& text, const std::string& part) { return text.find(part) != std::string::npos; }
+bool contains(const std::string& text, const std::string& part) {
+  return text.find(part) != std::string::npos;
+}
 
 TEST(PictureFigures, areThoseOfThePixelsAndNotOfThePadding) {
   Picture p(4, 4, 100);
@@ -78,7 +82,8 @@ TEST(Judgement, soundPicturesAreNotRemarkedUpon) {
 }
 
 TEST(Judgement, aBlackAWhiteAndAFlatOneAreNoGood) {
-  const auto remarks = judged({Picture(320, 240, 2), Picture(320, 240, 255), Picture(320, 240, 90)});
+  const auto remarks =
+      judged({Picture(320, 240, 2), Picture(320, 240, 255), Picture(320, 240, 90)});
   ASSERT_EQ(remarks.size(), 3U);
   EXPECT_TRUE(contains(remarks[0].sentence, "left is black"));
   EXPECT_TRUE(contains(remarks[1].sentence, "right is overexposed: 100 %"));
@@ -114,7 +119,8 @@ TEST(Judgement, oneCameraOutOfFocusShowsBesideTheOther) {
   const auto remarks = judged({sharp, blurred});
   ASSERT_EQ(remarks.size(), 1U);
   EXPECT_FALSE(remarks[0].unusable);
-  EXPECT_TRUE(contains(remarks[0].sentence, "right is much less sharp than left")) << remarks[0].sentence;
+  EXPECT_TRUE(contains(remarks[0].sentence, "right is much less sharp than left"))
+      << remarks[0].sentence;
 }
 
 TEST(Identity, oneCameraTwiceIsFoundAndACapIsNotCalledThat) {
@@ -132,7 +138,8 @@ TEST(Identity, oneCameraTwiceIsFoundAndACapIsNotCalledThat) {
 TEST(Exchange, nearThingsLieFurtherLeftInTheRightPicture) {
   // 4 px far away at the top, 60 px near at the bottom: a street.
   const auto depth = [](int y) { return 4 + y / 8; };
-  const Picture left = squares(640, 480, 3, [](int) { return 0; }), right = squares(640, 480, 3, depth);
+  const Picture left = squares(640, 480, 3, [](int) { return 0; }),
+                right = squares(640, 480, 3, depth);
   const HorizontalShift fine = horizontal_shift(left.view(), right.view());
   EXPECT_GE(fine.patches, 10);
   EXPECT_GT(fine.median, 0.02);
@@ -143,11 +150,14 @@ TEST(Exchange, nearThingsLieFurtherLeftInTheRightPicture) {
 }
 
 TEST(Exchange, nothingIsSaidWithoutEnoughToGoBy) {
-  const Picture grey(640, 480, 100), one = squares(640, 480, 1, [](int) { return 0; }), other = squares(640, 480, 2, [](int) { return 0; });
+  const Picture grey(640, 480, 100), one = squares(640, 480, 1, [](int) { return 0; }),
+                                     other = squares(640, 480, 2, [](int) { return 0; });
   EXPECT_FALSE(look_exchanged(horizontal_shift(grey.view(), grey.view())));
-  EXPECT_FALSE(look_exchanged(horizontal_shift(one.view(), other.view()))) << "two different scenes";
+  EXPECT_FALSE(look_exchanged(horizontal_shift(one.view(), other.view())))
+      << "two different scenes";
   EXPECT_FALSE(look_exchanged(horizontal_shift(one.view(), one.view())));
-  EXPECT_FALSE(look_exchanged(horizontal_shift(Picture(8, 8, 9).view(), Picture(8, 8, 9).view()))) << "smaller than a patch";
+  EXPECT_FALSE(look_exchanged(horizontal_shift(Picture(8, 8, 9).view(), Picture(8, 8, 9).view())))
+      << "smaller than a patch";
   EXPECT_FALSE(look_exchanged(horizontal_shift(Picture(1, 1, 9).view(), Picture(1, 1, 9).view())));
 }
 

@@ -24,13 +24,15 @@ class BadBundle : public ::testing::Test {
     return simulate_rig(small(), random);
   }
   /// Refused with this reason, and nothing of the caller's is changed.
-  void expect(BundleTermination termination, BundleDefect defect, const BundleProblem& p, const BundleOptions& o = calibration_options()) {
+  void expect(BundleTermination termination, BundleDefect defect, const BundleProblem& p,
+              const BundleOptions& o = calibration_options()) {
     const std::vector<Vec3> points(p.points.begin(), p.points.end());
     const BundleResult r = own.adjuster.solve(p, o);
     EXPECT_EQ(r.termination, termination) << to_string(r.termination);
     EXPECT_EQ(r.defect, defect) << to_string(r.defect);
     EXPECT_FALSE(r.usable());
-    for (std::size_t i = 0; i < points.size(); ++i) EXPECT_TRUE(points[i] == p.points[i] || points[i].hasNaN());
+    for (std::size_t i = 0; i < points.size(); ++i)
+      EXPECT_TRUE(points[i] == p.points[i] || points[i].hasNaN());
     index = r.defect_index;
   }
   OwnAdjuster own;
@@ -45,7 +47,9 @@ TEST_F(BadBundle, pointBehindItsCameraIsNamed) {
 }
 
 TEST_F(BadBundle, pointSeenOnceIsNamed) {
-  std::erase_if(rig.observations, [](const BundleObservation& o) { return o.point == 5 && !(o.pose == 2 && o.camera == 1); });
+  std::erase_if(rig.observations, [](const BundleObservation& o) {
+    return o.point == 5 && !(o.pose == 2 && o.camera == 1);
+  });
   expect(BundleTermination::rank_deficient, BundleDefect::seen_once, rig.problem());
   EXPECT_EQ(index, 5U);
 }
@@ -118,17 +122,22 @@ TEST_F(BadBundle, moreThanTheCapacityIsRefused) {
     if (what == 3) c.cameras = 1;
     if (what == 4) c.blocks = 15;
     OwnAdjuster tight(c);
-    EXPECT_EQ(tight.adjuster.solve(rig.problem(), calibration_options()).termination, BundleTermination::capacity) << what;
+    EXPECT_EQ(tight.adjuster.solve(rig.problem(), calibration_options()).termination,
+              BundleTermination::capacity)
+        << what;
   }
   BundleCapacities c = capacities_for(small());
   c.shared = false;
   OwnAdjuster odometry_only(c);
-  EXPECT_EQ(odometry_only.adjuster.solve(rig.problem(), calibration_options()).termination, BundleTermination::capacity);
+  EXPECT_EQ(odometry_only.adjuster.solve(rig.problem(), calibration_options()).termination,
+            BundleTermination::capacity);
   EXPECT_TRUE(odometry_only.adjuster.solve(rig.problem(), {}).usable());
 }
 
 TEST_F(BadBundle, aPoseSeenByTwoPointsIsRankDeficient) {
-  std::erase_if(rig.observations, [](const BundleObservation& o) { return o.pose == 3 && (o.point > 1 || o.camera == 1); });
+  std::erase_if(rig.observations, [](const BundleObservation& o) {
+    return o.pose == 3 && (o.point > 1 || o.camera == 1);
+  });
   rig.T_camera_left = rig.true_T_camera_left;
   const BundleResult r = own.adjuster.solve(rig.problem(), {});
   EXPECT_EQ(r.termination, BundleTermination::rank_deficient) << to_string(r.termination);
@@ -158,10 +167,12 @@ TEST(BundleFuzz, hostileProblemsEndWithANameAndNeverWithNaN) {
     s.start_rotation = random.uniform(0, seed % 7 == 0 ? 3 : 0.3);
     s.start_points = seed % 2 == 0 ? -1 : random.uniform(0, 20);
     SimulatedRig rig = simulate_rig(s, random);
-    const double hostile[] = {kNaN, std::numeric_limits<double>::infinity(), -1e308, 1e30, 0, -1e-300};
+    const double hostile[] = {kNaN,   std::numeric_limits<double>::infinity(), -1e308, 1e30, 0,
+                              -1e-300};
     for (std::uint32_t i = random.below(4); i > 0; --i) {
       const double value = hostile[random.below(6)];
-      BundleObservation& o = rig.observations[random.below(static_cast<std::uint32_t>(rig.observations.size()))];
+      BundleObservation& o =
+          rig.observations[random.below(static_cast<std::uint32_t>(rig.observations.size()))];
       switch (random.below(8)) {
         case 0:
           o.x = value;
@@ -182,7 +193,8 @@ TEST(BundleFuzz, hostileProblemsEndWithANameAndNeverWithNaN) {
           o.point = random.next();
           break;
         case 6:
-          std::erase_if(rig.observations, [&](const BundleObservation&) { return random.below(3) == 0; });
+          std::erase_if(rig.observations,
+                        [&](const BundleObservation&) { return random.below(3) == 0; });
           break;
         default:
           for (Vec3& p : rig.points) p = rig.points[0];
@@ -202,13 +214,16 @@ TEST(BundleFuzz, hostileProblemsEndWithANameAndNeverWithNaN) {
     std::vector<Transform> images;
     std::vector<BundleObservation> per_image;
     std::vector<std::uint8_t> constant;
-    const BundleProblem p =
-        o.configuration == BundleConfiguration::parallel_monocular ? rig.monocular_problem(&images, &per_image, &constant) : rig.problem();
+    const BundleProblem p = o.configuration == BundleConfiguration::parallel_monocular
+                                ? rig.monocular_problem(&images, &per_image, &constant)
+                                : rig.problem();
     const BundleResult r = own.adjuster.solve(p, o);
     EXPECT_GE(r.steps, 0);
     EXPECT_LE(r.steps, o.max_steps);
-    if (r.termination == BundleTermination::invalid_input || r.termination == BundleTermination::capacity) {
-      EXPECT_TRUE(r.termination == BundleTermination::capacity || r.defect != BundleDefect::none) << seed;
+    if (r.termination == BundleTermination::invalid_input ||
+        r.termination == BundleTermination::capacity) {
+      EXPECT_TRUE(r.termination == BundleTermination::capacity || r.defect != BundleDefect::none)
+          << seed;
       continue;
     }
     EXPECT_TRUE(std::isfinite(r.final_cost) && std::isfinite(r.rms_px)) << seed;

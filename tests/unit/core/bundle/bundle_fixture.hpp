@@ -7,7 +7,8 @@ namespace vergence {
 
 /// An adjuster with an arena of its own.
 struct OwnAdjuster {
-  explicit OwnAdjuster(const BundleCapacities& c) : arena(BundleAdjuster::memory_needed(c)), adjuster(c, arena) {}
+  explicit OwnAdjuster(const BundleCapacities& c)
+      : arena(BundleAdjuster::memory_needed(c)), adjuster(c, arena) {}
   Arena arena;
   BundleAdjuster adjuster;
 };
@@ -22,7 +23,8 @@ inline BundleOptions calibration_options() {
 inline double pose_error(const SimulatedRig& rig) {
   double worst = 0;
   for (std::size_t i = 0; i < rig.T_left_world.size(); ++i)
-    worst = std::max(worst, (rig.T_left_world[i].centre() - rig.true_T_left_world[i].centre()).norm());
+    worst =
+        std::max(worst, (rig.T_left_world[i].centre() - rig.true_T_left_world[i].centre()).norm());
   return worst;
 }
 

@@ -9,10 +9,12 @@
 namespace vergence {
 namespace {
 
-// Rounding of a pixel near 1000 is 1e-13 px; of a 25 m coordinate 4e-15 m. A direction as weak as a rig's depth loses three digits more.
+// Rounding of a pixel near 1000 is 1e-13 px; of a 25 m coordinate 4e-15 m. A direction as weak as a
+// rig's depth loses three digits more.
 constexpr double kExactPixel = 1e-11, kExactMetre = 1e-10, kExactRadian = 1e-11;
 
-TEST(Bundle, stereoCalibrationFitsNoiseFreeDataToMachinePrecisionFromHalfAMetreAndTriangulatedPoints) {
+TEST(Bundle,
+     stereoCalibrationFitsNoiseFreeDataToMachinePrecisionFromHalfAMetreAndTriangulatedPoints) {
   SimulationOptions s;
   s.noise = 0;
   s.generator = SimulationGenerator::tight;
@@ -42,7 +44,8 @@ TEST(Bundle, everyRunOfTheSimulationWithAThousandPointsConverges) {
     const BundleResult r = own.adjuster.solve(rig.problem(), calibration_options());
     ASSERT_TRUE(r.converged()) << to_string(r.termination);
     // √2 σ less the degrees of freedom that 3 · 1000 + 54 + 5 parameters take of 40 000 residuals.
-    EXPECT_NEAR(r.rms_px, noise * std::sqrt(2.0 * (1 - 3059.0 / 40000.0)), 0.02 * noise + kExactPixel);
+    EXPECT_NEAR(r.rms_px, noise * std::sqrt(2.0 * (1 - 3059.0 / 40000.0)),
+                0.02 * noise + kExactPixel);
   }
 }
 
@@ -74,13 +77,15 @@ TEST(Bundle, parallelMonocularFindsEveryImageUpToScale) {
     std::vector<Transform> images;
     std::vector<BundleObservation> observations;
     std::vector<std::uint8_t> constant;
-    const BundleResult r = own.adjuster.solve(rig.monocular_problem(&images, &observations, &constant), options);
+    const BundleResult r =
+        own.adjuster.solve(rig.monocular_problem(&images, &observations, &constant), options);
     ASSERT_TRUE(r.converged()) << to_string(r.termination);
     EXPECT_LT(r.rms_px, kExactPixel);
     const Transform& newest_left = images[images.size() - 2];
     const Transform T_right_left = images.back() * newest_left.inverse();
     const double scale = rig.true_T_camera_left[1].t.norm() / T_right_left.t.norm();
-    EXPECT_LT(rotation_angle(T_right_left.R * rig.true_T_camera_left[1].R.transpose()), kExactRadian);
+    EXPECT_LT(rotation_angle(T_right_left.R * rig.true_T_camera_left[1].R.transpose()),
+              kExactRadian);
     EXPECT_LT((scale * T_right_left.t - rig.true_T_camera_left[1].t).norm(), kExactMetre);
   }
 }
@@ -95,7 +100,8 @@ TEST(Bundle, everyExtraCameraOfTwoThreeAndFourIsFound) {
     Random random(15);
     SimulatedRig rig = simulate_rig(s, random);
     BundleOptions o = calibration_options();
-    for (std::size_t k = 2; k < kMaxCameras; ++k) o.length[k].kind = BundleLength::free;  // one known length is the scale of all
+    for (std::size_t k = 2; k < kMaxCameras; ++k)
+      o.length[k].kind = BundleLength::free;  // one known length is the scale of all
     const BundleResult r = own.adjuster.solve(rig.problem(), o);
     ASSERT_TRUE(r.converged()) << cameras << " cameras: " << to_string(r.termination);
     for (std::size_t k = 1; k < static_cast<std::size_t>(cameras); ++k) {
@@ -117,8 +123,10 @@ TEST(Bundle, intrinsicsWithPriorsAreFoundThroughDistortion) {
   }
   for (BundleObservation& o : rig.observations) {
     Vec2 pixel;
-    ASSERT_EQ(rig.cameras[o.camera].project(rig.true_T_camera_left[o.camera] * (rig.true_T_left_world[o.pose] * rig.true_points[o.point]),
-                                            &pixel, nullptr),
+    ASSERT_EQ(rig.cameras[o.camera].project(
+                  rig.true_T_camera_left[o.camera] *
+                      (rig.true_T_left_world[o.pose] * rig.true_points[o.point]),
+                  &pixel, nullptr),
               ProjectStatus::ok);
     o.x = pixel.x();
     o.y = pixel.y();
@@ -131,7 +139,8 @@ TEST(Bundle, intrinsicsWithPriorsAreFoundThroughDistortion) {
   rig.cameras[1] = Camera(start);
   BundleOptions o = calibration_options();
   o.intrinsics[1].free = 0b10011;
-  for (const std::size_t i : {0U, 1U, 4U}) o.intrinsics[1].prior_sigma[i] = 1e9;  // a prior that says nothing keeps the fit exact
+  for (const std::size_t i : {0U, 1U, 4U})
+    o.intrinsics[1].prior_sigma[i] = 1e9;  // a prior that says nothing keeps the fit exact
   o.update_tolerance = 1e-12;
   OwnAdjuster own(capacities_for(s));
   const BundleResult r = own.adjuster.solve(rig.problem(), o);
@@ -150,7 +159,8 @@ TEST(Bundle, robustLossesShrugOffWrongObservations) {
   OwnAdjuster own(capacities_for(s));
   const auto error_with = [&](BundleLoss loss) {
     SimulatedRig rig = original;
-    for (std::size_t i = 0; i < rig.observations.size(); i += 50) rig.observations[i].x += 20;  // 2 % wrong by 200 sigmas
+    for (std::size_t i = 0; i < rig.observations.size(); i += 50)
+      rig.observations[i].x += 20;  // 2 % wrong by 200 sigmas
     BundleOptions o = calibration_options();
     o.loss = loss;
     const BundleResult r = own.adjuster.solve(rig.problem(), o);
@@ -175,9 +185,12 @@ TEST(Bundle, residualsOfTheResultAreGivenBackWhitened) {
   for (std::size_t i = 0; i < squared.size(); ++i) {
     const BundleObservation& o = rig.observations[i];
     Vec2 pixel;
-    ASSERT_EQ(rig.cameras[0].project(rig.T_camera_left[o.camera] * (rig.T_left_world[o.pose] * rig.points[o.point]), &pixel, nullptr),
+    ASSERT_EQ(rig.cameras[0].project(
+                  rig.T_camera_left[o.camera] * (rig.T_left_world[o.pose] * rig.points[o.point]),
+                  &pixel, nullptr),
               ProjectStatus::ok);
-    const double expected = (pixel - Vec2(o.x, o.y)).squaredNorm() * o.inverse_sigma * o.inverse_sigma;
+    const double expected =
+        (pixel - Vec2(o.x, o.y)).squaredNorm() * o.inverse_sigma * o.inverse_sigma;
     EXPECT_NEAR(squared[i], expected, 1e-5 * (1 + expected)) << i;
   }
 }
@@ -215,7 +228,8 @@ TEST(Bundle, withEveryPoseConstantThePointsAloneAreFound) {
   OwnAdjuster own(capacities_for(s));
   const BundleResult r = own.adjuster.solve(p, {});
   ASSERT_TRUE(r.converged()) << to_string(r.termination);
-  for (std::size_t i = 0; i < rig.points.size(); ++i) EXPECT_LT((rig.points[i] - rig.true_points[i]).norm(), kExactMetre);
+  for (std::size_t i = 0; i < rig.points.size(); ++i)
+    EXPECT_LT((rig.points[i] - rig.true_points[i]).norm(), kExactMetre);
 }
 
 TEST(Bundle, aPosePriorHoldsAPoseThatNothingElseHolds) {
@@ -241,7 +255,8 @@ TEST(Bundle, aPosePriorHoldsAPoseThatNothingElseHolds) {
 }
 
 TEST(Bundle, solveDoesNotAllocate) {
-  if (!AllocationGuard::available()) GTEST_SKIP() << "the allocation hooks are not in this build (sanitizers bring their own)";
+  if (!AllocationGuard::available())
+    GTEST_SKIP() << "the allocation hooks are not in this build (sanitizers bring their own)";
   SimulationOptions s;
   Random random(21);
   SimulatedRig rig = simulate_rig(s, random);
@@ -282,7 +297,8 @@ TEST(Bundle, everySimdTargetFindsTheSameOptimum) {
     const BundleResult r = own.adjuster.solve(rig.problem(), calibration_options());
     EXPECT_EQ(r.steps, expected.steps) << hwy::TargetName(targets & -targets);
     // Sums of 2440 squares in another order: about √2440 roundings of 1e-16.
-    EXPECT_NEAR(r.final_cost, expected.final_cost, 1e-12 * expected.final_cost) << hwy::TargetName(targets & -targets);
+    EXPECT_NEAR(r.final_cost, expected.final_cost, 1e-12 * expected.final_cost)
+        << hwy::TargetName(targets & -targets);
     EXPECT_LT((rig.T_camera_left[1].t - reference.T_camera_left[1].t).norm(), 1e-9);
   }
   hwy::SetSupportedTargetsForTest(0);

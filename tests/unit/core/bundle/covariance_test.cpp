@@ -10,11 +10,13 @@ namespace {
 /// Error of T_camera_left[1] as the left perturbation (φ, τ) that takes the truth to the estimate.
 Vec6 error_of(const SimulatedRig& rig) {
   Vec6 e;
-  e << log_so3(rig.T_camera_left[1].R * rig.true_T_camera_left[1].R.transpose()), rig.T_camera_left[1].t - rig.true_T_camera_left[1].t;
+  e << log_so3(rig.T_camera_left[1].R * rig.true_T_camera_left[1].R.transpose()),
+      rig.T_camera_left[1].t - rig.true_T_camera_left[1].t;
   return e;
 }
 
-/// eᵀ C⁻¹ e in the space where C is not singular: with an exact length the direction of t is left out.
+/// eᵀ C⁻¹ e in the space where C is not singular: with an exact length the direction of t is left
+/// out.
 double normalised_squared(const Vec6& e, const Mat6& C, const Vec3& t, bool exact) {
   if (!exact) return e.dot(C.ldlt().solve(e));
   const Vec3 u = t.normalized(), a = u.unitOrthogonal(), b = u.cross(a);
@@ -37,11 +39,13 @@ SimulationOptions tight() {
 BundleOptions with_covariance() {
   BundleOptions o = calibration_options();
   o.covariance = true;
-  for (BundleIntrinsics& i : o.intrinsics) i.held_sigma = {};  // intrinsics exact unless a test says otherwise
+  for (BundleIntrinsics& i : o.intrinsics)
+    i.held_sigma = {};  // intrinsics exact unless a test says otherwise
   return o;
 }
 
-// The standard error of a mean of 1000 draws of χ²(5) is 0.100, of χ²(6) 0.110: three of them either way.
+// The standard error of a mean of 1000 draws of χ²(5) is 0.100, of χ²(6) 0.110: three of them
+// either way.
 TEST(BundleCovariance, normalisedErrorsHaveTheirChiSquareMeanWithTheExactLength) {
   SimulationOptions s = tight();
   s.points = 60;
@@ -67,7 +71,8 @@ TEST(BundleCovariance, normalisedErrorsHaveTheirChiSquareMeanWithAMeasuredLength
   for (int run = 0; run < 1000; ++run) {
     SimulatedRig rig = simulate_rig(s, random);
     BundleOptions o = with_covariance();
-    o.length[1] = {BundleLength::measured, rig.true_T_camera_left[1].t.norm() + 1e-3 * random.normal(), 1e-3};
+    o.length[1] = {BundleLength::measured,
+                   rig.true_T_camera_left[1].t.norm() + 1e-3 * random.normal(), 1e-3};
     const BundleResult r = own.adjuster.solve(rig.problem(), o);
     ASSERT_TRUE(r.converged() && r.has_covariance) << run << to_string(r.termination);
     sum += normalised_squared(error_of(rig), r.covariance_white[1], rig.T_camera_left[1].t, false);
@@ -76,7 +81,8 @@ TEST(BundleCovariance, normalisedErrorsHaveTheirChiSquareMeanWithAMeasuredLength
   EXPECT_LT(sum / 1000, 6.33);
 }
 
-// Half of a track's noise is the same in all its images of one camera: white covariance is too small, that of clusters is not.
+// Half of a track's noise is the same in all its images of one camera: white covariance is too
+// small, that of clusters is not.
 TEST(BundleCovariance, clustersCoverErrorsThatATrackCarriesThroughAllFrames) {
   SimulationOptions s = tight();
   s.points = 300;
@@ -123,7 +129,8 @@ TEST(BundleCovariance, clustersAgreeWithTheWhiteOneWhenTheNoiseIsWhite) {
   }
 }
 
-// Held intrinsics drawn from 0.5 px and 0.1 %: noise alone does not cover the error, the wide covariance does.
+// Held intrinsics drawn from 0.5 px and 0.1 %: noise alone does not cover the error, the wide
+// covariance does.
 TEST(BundleCovariance, wideCoversIntrinsicsThatAreOff) {
   SimulationOptions s = tight();
   OwnAdjuster own(capacities_for(s));
@@ -149,7 +156,8 @@ TEST(BundleCovariance, wideCoversIntrinsicsThatAreOff) {
     wide += normalised_squared(e, r.covariance_wide[1], rig.T_camera_left[1].t, true) / kRuns;
   }
   EXPECT_GT(narrow, 50);
-  // χ²(5) has a standard error of 0.18 over 300 runs; beyond it the linearisation about the wrong intrinsics.
+  // χ²(5) has a standard error of 0.18 over 300 runs; beyond it the linearisation about the wrong
+  // intrinsics.
   EXPECT_GT(wide, 4.0);
   EXPECT_LT(wide, 6.0);
 }

@@ -1,5 +1,6 @@
-// One step of the adjuster against the same step computed the long way: residuals through Camera::project, every derivative a central
-// difference, the normal equations dense and undivided. It checks each Jacobian, each weight and each block of METHOD §2.
+// One step of the adjuster against the same step computed the long way: residuals through
+// Camera::project, every derivative a central difference, the normal equations dense and undivided.
+// It checks each Jacobian, each weight and each block of METHOD §2.
 #include <gtest/gtest.h>
 
 #include <Eigen/Cholesky>
@@ -11,14 +12,18 @@ namespace {
 
 using Vector = Eigen::VectorXd;
 
-/// The parameters of one problem and how a vector moves them, written down independently of the adjuster.
+/// The parameters of one problem and how a vector moves them, written down independently of the
+/// adjuster.
 struct Dense {
   SimulatedRig rig;
   BundleOptions options;
 
-  [[nodiscard]] bool calibrating() const { return options.configuration == BundleConfiguration::stereo_calibration; }
+  [[nodiscard]] bool calibrating() const {
+    return options.configuration == BundleConfiguration::stereo_calibration;
+  }
   [[nodiscard]] Eigen::Index size() const {
-    Eigen::Index n = static_cast<Eigen::Index>(6 * (rig.T_left_world.size() - 1) + 3 * rig.points.size());
+    Eigen::Index n =
+        static_cast<Eigen::Index>(6 * (rig.T_left_world.size() - 1) + 3 * rig.points.size());
     if (!calibrating()) return n;
     for (std::size_t k = 0; k < rig.cameras.size(); ++k) {
       if (k > 0) n += options.length[k].kind == BundleLength::exact ? 5 : 6;
@@ -54,7 +59,14 @@ struct Dense {
         }
       }
       Intrinsics in = out.cameras[k].intrinsics();
-      double* all[] = {&in.fx,           &in.fy, &in.cx, &in.cy, &in.distortion[0], &in.distortion[1], &in.distortion[2], &in.distortion[3],
+      double* all[] = {&in.fx,
+                       &in.fy,
+                       &in.cx,
+                       &in.cy,
+                       &in.distortion[0],
+                       &in.distortion[1],
+                       &in.distortion[2],
+                       &in.distortion[3],
                        &in.distortion[4]};
       for (unsigned i = 0; i < 9; ++i)
         if (((options.intrinsics[k].free >> i) & 1U) != 0) *all[i] += v[at++];
@@ -69,7 +81,9 @@ struct Dense {
     std::vector<double> e;
     for (const BundleObservation& o : at.observations) {
       Vec2 pixel;
-      EXPECT_EQ(at.cameras[o.camera].project(at.T_camera_left[o.camera] * (at.T_left_world[o.pose] * at.points[o.point]), &pixel, nullptr),
+      EXPECT_EQ(at.cameras[o.camera].project(
+                    at.T_camera_left[o.camera] * (at.T_left_world[o.pose] * at.points[o.point]),
+                    &pixel, nullptr),
                 ProjectStatus::ok);
       e.push_back((pixel.x() - o.x) * o.inverse_sigma);
       e.push_back((pixel.y() - o.y) * o.inverse_sigma);
@@ -77,13 +91,23 @@ struct Dense {
     if (calibrating())
       for (std::size_t k = 0; k < at.cameras.size(); ++k) {
         if (k > 0 && options.length[k].kind == BundleLength::measured)
-          e.push_back((at.T_camera_left[k].t.norm() - options.length[k].metres) / options.length[k].sigma);
+          e.push_back((at.T_camera_left[k].t.norm() - options.length[k].metres) /
+                      options.length[k].sigma);
         const Intrinsics& in = at.cameras[k].intrinsics();
-        const double all[] = {in.fx,           in.fy, in.cx, in.cy, in.distortion[0], in.distortion[1], in.distortion[2], in.distortion[3],
+        const double all[] = {in.fx,
+                              in.fy,
+                              in.cx,
+                              in.cy,
+                              in.distortion[0],
+                              in.distortion[1],
+                              in.distortion[2],
+                              in.distortion[3],
                               in.distortion[4]};
         for (unsigned i = 0; i < 9; ++i)
-          if (((options.intrinsics[k].free >> i) & 1U) != 0 && options.intrinsics[k].prior_sigma[i] > 0)
-            e.push_back((all[i] - options.intrinsics[k].prior_mean[i]) / options.intrinsics[k].prior_sigma[i]);
+          if (((options.intrinsics[k].free >> i) & 1U) != 0 &&
+              options.intrinsics[k].prior_sigma[i] > 0)
+            e.push_back((all[i] - options.intrinsics[k].prior_mean[i]) /
+                        options.intrinsics[k].prior_sigma[i]);
       }
     return Eigen::Map<const Vector>(e.data(), static_cast<Eigen::Index>(e.size()));
   }
@@ -93,20 +117,24 @@ struct Dense {
     Eigen::MatrixXd J(e.size(), size());
     for (Eigen::Index i = 0; i < size(); ++i) {
       const double h = 1e-6;
-      J.col(i) = (residuals(Vector::Unit(size(), i) * h) - residuals(Vector::Unit(size(), i) * -h)) / (2 * h);
+      J.col(i) =
+          (residuals(Vector::Unit(size(), i) * h) - residuals(Vector::Unit(size(), i) * -h)) /
+          (2 * h);
     }
     Vector weight = Vector::Ones(e.size());
     const double c2 = options.loss_threshold * options.loss_threshold;
     for (Eigen::Index i = 0; i < 2 * static_cast<Eigen::Index>(rig.observations.size()); i += 2) {
       const double s = e.segment<2>(i).squaredNorm();
-      if (options.loss == BundleLoss::huber && s > c2) weight.segment<2>(i).setConstant(std::sqrt(c2 / s));
+      if (options.loss == BundleLoss::huber && s > c2)
+        weight.segment<2>(i).setConstant(std::sqrt(c2 / s));
       if (options.loss == BundleLoss::cauchy) weight.segment<2>(i).setConstant(1 / (1 + s / c2));
     }
     const Eigen::MatrixXd H = J.transpose() * weight.asDiagonal() * J;
     // Scaled to a unit diagonal: pixels of focal length and coefficients of r⁶ stand in one system.
     const Vector scale = H.diagonal().cwiseSqrt().cwiseInverse();
     const Vector g = scale.asDiagonal() * (J.transpose() * (weight.asDiagonal() * e));
-    return moved(-(scale.asDiagonal() * (scale.asDiagonal() * H * scale.asDiagonal()).ldlt().solve(g)));
+    return moved(
+        -(scale.asDiagonal() * (scale.asDiagonal() * H * scale.asDiagonal()).ldlt().solve(g)));
   }
 };
 
@@ -148,12 +176,16 @@ TEST_P(DenseReference, oneStepIsTheDenseStep) {
     d.options.intrinsics[k].free = static_cast<std::uint16_t>(c.free);
     d.options.intrinsics[k].prior_mean = {in.fx + 1, in.fy - 1, in.cx, in.cy, 0, 0, 0, 0, 0};
     d.options.intrinsics[k].prior_sigma = {2, 2, 3, 3, 0.1, 0.1, 0.01, 0.01, 0.1};
-    d.options.length[k] = {k > 1 ? BundleLength::free : c.length, c.length == BundleLength::measured ? 0.8 : 0.0, 0.01};
+    d.options.length[k] = {k > 1 ? BundleLength::free : c.length,
+                           c.length == BundleLength::measured ? 0.8 : 0.0, 0.01};
   }
-  for (BundleObservation& o : d.rig.observations) {  // the truth seen through this lens, the noise kept small against the curvature
+  for (BundleObservation& o : d.rig.observations) {  // the truth seen through this lens, the noise
+                                                     // kept small against the curvature
     Vec2 pixel;
     ASSERT_EQ(d.rig.cameras[o.camera].project(
-                  d.rig.true_T_camera_left[o.camera] * (d.rig.true_T_left_world[o.pose] * d.rig.true_points[o.point]), &pixel, nullptr),
+                  d.rig.true_T_camera_left[o.camera] *
+                      (d.rig.true_T_left_world[o.pose] * d.rig.true_points[o.point]),
+                  &pixel, nullptr),
               ProjectStatus::ok);
     o.x = pixel.x() + 0.5 * random.normal();
     o.y = pixel.y() + 0.5 * random.normal();
@@ -168,28 +200,35 @@ TEST_P(DenseReference, oneStepIsTheDenseStep) {
   OwnAdjuster own(capacities_for(s));
   const BundleResult r = own.adjuster.solve(rig.problem(), o);
   ASSERT_EQ(r.accepted, 1) << to_string(r.termination) << " " << to_string(r.defect);
-  // Central differences with h = 1e-6 of residuals near 1000 px carry 1e-7; weak directions (depth, focal length) amplify it.
+  // Central differences with h = 1e-6 of residuals near 1000 px carry 1e-7; weak directions (depth,
+  // focal length) amplify it.
   for (std::size_t i = 0; i < rig.points.size(); ++i)
-    EXPECT_LT((rig.points[i] - expected.points[i]).norm(), 1e-4 * (d.rig.points[i] - expected.points[i]).norm() + 1e-7) << "point " << i;
+    EXPECT_LT((rig.points[i] - expected.points[i]).norm(),
+              1e-4 * (d.rig.points[i] - expected.points[i]).norm() + 1e-7)
+        << "point " << i;
   for (std::size_t i = 1; i < rig.T_left_world.size(); ++i) {
     EXPECT_LT((rig.T_left_world[i].t - expected.T_left_world[i].t).norm(),
               1e-4 * (d.rig.T_left_world[i].t - expected.T_left_world[i].t).norm() + 1e-7)
         << "pose " << i;
-    EXPECT_LT(rotation_angle(rig.T_left_world[i].R * expected.T_left_world[i].R.transpose()), 1e-7) << "pose " << i;
+    EXPECT_LT(rotation_angle(rig.T_left_world[i].R * expected.T_left_world[i].R.transpose()), 1e-7)
+        << "pose " << i;
   }
   for (std::size_t k = 1; k < rig.cameras.size(); ++k) {
     // The second-order part of the way t and R are moved may differ: the step is 1e-3 long.
     EXPECT_LT((rig.T_camera_left[k].t - expected.T_camera_left[k].t).norm(),
               1e-4 * (d.rig.T_camera_left[k].t - expected.T_camera_left[k].t).norm() + 1e-7);
-    EXPECT_LT(rotation_angle(rig.T_camera_left[k].R * expected.T_camera_left[k].R.transpose()), 1e-7) << "camera " << k;
+    EXPECT_LT(rotation_angle(rig.T_camera_left[k].R * expected.T_camera_left[k].R.transpose()),
+              1e-7)
+        << "camera " << k;
   }
   for (std::size_t k = 0; k < rig.cameras.size(); ++k) {
     const Intrinsics &a = rig.cameras[k].intrinsics(), &b = expected.cameras[k].intrinsics();
     EXPECT_NEAR(a.fx, b.fx, 1e-3);
     EXPECT_NEAR(a.cy, b.cy, 1e-3);
     for (std::size_t i = 0; i < 5; ++i)
-      EXPECT_NEAR(a.distortion[i], b.distortion[i],
-                  1e-4 * (1e-2 + std::abs(d.rig.cameras[k].intrinsics().distortion[i] - b.distortion[i])));
+      EXPECT_NEAR(
+          a.distortion[i], b.distortion[i],
+          1e-4 * (1e-2 + std::abs(d.rig.cameras[k].intrinsics().distortion[i] - b.distortion[i])));
   }
 }
 
@@ -201,12 +240,48 @@ constexpr auto kOdometry = BundleConfiguration::stereo_odometry;
 INSTANTIATE_TEST_SUITE_P(
     Every, DenseReference,
     ::testing::Values(
-        Case{"pinholeExact", kCalibration, 2, kRadtan, {}, BundleLength::exact, BundleLoss::none, 0},
-        Case{"pinholeMeasured", kCalibration, 2, kRadtan, {}, BundleLength::measured, BundleLoss::huber, 0},
-        Case{"threeCamerasCauchy", kCalibration, 3, kRadtan, {}, BundleLength::exact, BundleLoss::cauchy, 0},
-        Case{"fourCameras", kCalibration, 4, kRadtan, {}, BundleLength::measured, BundleLoss::none, 0},
-        Case{"focalLengths", kCalibration, 2, kRadtan, {}, BundleLength::exact, BundleLoss::none, 0b000000011},
-        Case{"radtanAll", kCalibration, 2, kRadtan, {-0.1, 0.02, 1e-3, -2e-3, 0.01}, BundleLength::exact, BundleLoss::none, 0b111111111},
+        Case{
+            "pinholeExact", kCalibration, 2, kRadtan, {}, BundleLength::exact, BundleLoss::none, 0},
+        Case{"pinholeMeasured",
+             kCalibration,
+             2,
+             kRadtan,
+             {},
+             BundleLength::measured,
+             BundleLoss::huber,
+             0},
+        Case{"threeCamerasCauchy",
+             kCalibration,
+             3,
+             kRadtan,
+             {},
+             BundleLength::exact,
+             BundleLoss::cauchy,
+             0},
+        Case{"fourCameras",
+             kCalibration,
+             4,
+             kRadtan,
+             {},
+             BundleLength::measured,
+             BundleLoss::none,
+             0},
+        Case{"focalLengths",
+             kCalibration,
+             2,
+             kRadtan,
+             {},
+             BundleLength::exact,
+             BundleLoss::none,
+             0b000000011},
+        Case{"radtanAll",
+             kCalibration,
+             2,
+             kRadtan,
+             {-0.1, 0.02, 1e-3, -2e-3, 0.01},
+             BundleLength::exact,
+             BundleLoss::none,
+             0b111111111},
         Case{"equidistantAll",
              kCalibration,
              3,
@@ -215,9 +290,23 @@ INSTANTIATE_TEST_SUITE_P(
              BundleLength::measured,
              BundleLoss::cauchy,
              0b011111111},
-        Case{"radtanHeld", kCalibration, 2, kRadtan, {-0.1, 0.02, 1e-3, -2e-3, 0.01}, BundleLength::exact, BundleLoss::huber, 0},
+        Case{"radtanHeld",
+             kCalibration,
+             2,
+             kRadtan,
+             {-0.1, 0.02, 1e-3, -2e-3, 0.01},
+             BundleLength::exact,
+             BundleLoss::huber,
+             0},
         Case{"odometry", kOdometry, 2, kRadtan, {}, BundleLength::exact, BundleLoss::huber, 0},
-        Case{"odometryEquidistant", kOdometry, 3, kFisheye, {-0.02, 0.01, -0.005, 0.001, 0}, BundleLength::exact, BundleLoss::none, 0}),
+        Case{"odometryEquidistant",
+             kOdometry,
+             3,
+             kFisheye,
+             {-0.02, 0.01, -0.005, 0.001, 0},
+             BundleLength::exact,
+             BundleLoss::none,
+             0}),
     [](const auto& one) { return one.param.name; });
 
 }  // namespace

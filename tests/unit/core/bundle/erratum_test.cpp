@@ -1,4 +1,5 @@
-// METHOD §1: with world → camera poses the rig is T_k P_i. In the order the paper prints, P_i T_k, camera k does not sit still on the rig.
+// METHOD §1: with world → camera poses the rig is T_k P_i. In the order the paper prints, P_i T_k,
+// camera k does not sit still on the rig.
 #include <functional>
 
 #include <gtest/gtest.h>
@@ -12,9 +13,12 @@ namespace {
 
 using Vector = Eigen::VectorXd;
 
-/// The printed model's cameras and points from one vector: T_1 (6), poses 1 … n (6 each), points (3 each); rotation vectors.
+/// The printed model's cameras and points from one vector: T_1 (6), poses 1 … n (6 each), points (3
+/// each); rotation vectors.
 Vector printed_residuals(const SimulatedRig& rig, const Vector& v) {
-  const auto transform_at = [&](Eigen::Index i) { return Transform{exp_so3(v.segment<3>(i)), v.segment<3>(i + 3)}; };
+  const auto transform_at = [&](Eigen::Index i) {
+    return Transform{exp_so3(v.segment<3>(i)), v.segment<3>(i + 3)};
+  };
   const Transform T1 = transform_at(0);
   const auto poses = static_cast<Eigen::Index>(rig.T_left_world.size());
   Vector e(2 * static_cast<Eigen::Index>(rig.observations.size()));
@@ -24,13 +28,16 @@ Vector printed_residuals(const SimulatedRig& rig, const Vector& v) {
     const Vec3 X = v.segment<3>(6 * poses + 3 * static_cast<Eigen::Index>(o.point));
     const Vec3 Y = o.camera == 0 ? P * X : P * (T1 * X);
     const Intrinsics& k = rig.cameras[0].intrinsics();
-    const double z = std::max(Y.z(), 0.1);  // a step that goes behind the camera is a bad step, not the end
-    e.segment<2>(2 * static_cast<Eigen::Index>(n)) << k.fx * Y.x() / z + k.cx - o.x, k.fy * Y.y() / z + k.cy - o.y;
+    const double z =
+        std::max(Y.z(), 0.1);  // a step that goes behind the camera is a bad step, not the end
+    e.segment<2>(2 * static_cast<Eigen::Index>(n)) << k.fx * Y.x() / z + k.cx - o.x,
+        k.fy * Y.y() / z + k.cy - o.y;
   }
   return e;
 }
 
-/// Levenberg–Marquardt with central differences: slow, general, and it shares no line with the adjuster.
+/// Levenberg–Marquardt with central differences: slow, general, and it shares no line with the
+/// adjuster.
 double fit(const std::function<Vector(const Vector&)>& residuals, Vector x) {
   double lambda = 1e-3;
   Vector e = residuals(x);
@@ -70,11 +77,16 @@ TEST(Erratum, printedOrderCannotFitARigThatMovesAndTurnsAndOursCan) {
   for (int run = 0; run < 2; ++run) {
     SimulatedRig rig = simulate_rig(s, random);
     Vector start(6 * 6 + 3 * 15);
-    const auto put = [&](Eigen::Index i, const Transform& T) { start.segment<6>(i) << log_so3(T.R), T.t; };
+    const auto put = [&](Eigen::Index i, const Transform& T) {
+      start.segment<6>(i) << log_so3(T.R), T.t;
+    };
     put(0, rig.true_T_camera_left[1]);
-    for (Eigen::Index i = 1; i < 6; ++i) put(6 * i, rig.true_T_left_world[static_cast<std::size_t>(i)]);
-    for (Eigen::Index j = 0; j < 15; ++j) start.segment<3>(36 + 3 * j) = rig.true_points[static_cast<std::size_t>(j)];
-    EXPECT_GT(fit([&](const Vector& v) { return printed_residuals(rig, v); }, start), 1.0) << "px a coordinate, from the true values";
+    for (Eigen::Index i = 1; i < 6; ++i)
+      put(6 * i, rig.true_T_left_world[static_cast<std::size_t>(i)]);
+    for (Eigen::Index j = 0; j < 15; ++j)
+      start.segment<3>(36 + 3 * j) = rig.true_points[static_cast<std::size_t>(j)];
+    EXPECT_GT(fit([&](const Vector& v) { return printed_residuals(rig, v); }, start), 1.0)
+        << "px a coordinate, from the true values";
 
     OwnAdjuster own(capacities_for(s));
     const BundleResult r = own.adjuster.solve(rig.problem(), calibration_options());
@@ -85,11 +97,13 @@ TEST(Erratum, printedOrderCannotFitARigThatMovesAndTurnsAndOursCan) {
 
 TEST(Erratum, printedOrderMovesTheSecondCameraOnTheRig) {
   const Transform T1{exp_so3({0.010, -0.020, 0.005}), {-0.750, 0.003, 0.004}};
-  const Transform forward{Mat3::Identity(), {0, 0, -10}}, turned{exp_so3({0, 0.1, 0}), Vec3::Zero()};
+  const Transform forward{Mat3::Identity(), {0, 0, -10}},
+      turned{exp_so3({0, 0.1, 0}), Vec3::Zero()};
   const auto relative = [&](const Transform& P) { return (P * T1) * P.inverse(); };
   EXPECT_GT((relative(forward).t - T1.t).norm(), 0.2);  // ten metres on, 20 mrad of yaw: 0.2 m
   EXPECT_GT((relative(turned).t - T1.t).norm(), 0.07);
-  for (const Transform& P : {forward, turned}) EXPECT_LT((((T1 * P) * P.inverse()).t - T1.t).norm(), 1e-14);
+  for (const Transform& P : {forward, turned})
+    EXPECT_LT((((T1 * P) * P.inverse()).t - T1.t).norm(), 1e-14);
 }
 
 }  // namespace

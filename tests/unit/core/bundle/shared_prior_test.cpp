@@ -76,8 +76,9 @@ struct Alone {
   }
 };
 
-// A prior a millionth of the tracks' own covariance wide: of the tracks' error e a linear problem leaves 1e-6 e. The covariance by tracks
-// differs from the one of the solve's own information by its estimate from 100 clusters, which in no direction is a factor of ten.
+// A prior a millionth of the tracks' own covariance wide: of the tracks' error e a linear problem
+// leaves 1e-6 e. The covariance by tracks differs from the one of the solve's own information by
+// its estimate from 100 clusters, which in no direction is a factor of ten.
 TEST(BundleSharedPrior, aTightOneHoldsTheTransformWhereItIs) {
   Alone a(71);
   ASSERT_TRUE(a.result.converged() && a.result.has_covariance);
@@ -97,17 +98,22 @@ TEST(BundleSharedPrior, aWideOneChangesNothing) {
   Alone a(72);
   ASSERT_TRUE(a.result.converged() && a.result.has_covariance);
   BundleResult r;
-  // A million sigmas wide and centred where the solve begins, 0.1 rad off: a pull of 1e-12 of some thousand sigmas.
+  // A million sigmas wide and centred where the solve begins, 0.1 rad off: a pull of 1e-12 of some
+  // thousand sigmas.
   const SimulatedRig found = a.with(calibration_of(a.start, times(a.result.covariance, 1e12)), &r);
   ASSERT_TRUE(r.converged() && r.has_covariance);
   const Vec6 moved = way(a.solved.T_camera_left[1], found.T_camera_left[1]);
   for (int i = 0; i < 6; ++i) {
-    EXPECT_LT(std::abs(moved[i]), 1e-6 * std::sqrt(a.result.covariance_noise[1](i, i)) + 1e-12) << i;
-    EXPECT_NEAR(r.covariance_noise[1](i, i), a.result.covariance_noise[1](i, i), 1e-6 * a.result.covariance_noise[1](i, i) + 1e-18) << i;
+    EXPECT_LT(std::abs(moved[i]), 1e-6 * std::sqrt(a.result.covariance_noise[1](i, i)) + 1e-12)
+        << i;
+    EXPECT_NEAR(r.covariance_noise[1](i, i), a.result.covariance_noise[1](i, i),
+                1e-6 * a.result.covariance_noise[1](i, i) + 1e-18)
+        << i;
   }
 }
 
-/// Two drives with one rig: five frames see one half of the points, the next five, begun at a known pose, the other half.
+/// Two drives with one rig: five frames see one half of the points, the next five, begun at a known
+/// pose, the other half.
 struct TwoHalves {
   static constexpr int kPoints = 600;
   SimulationOptions simulation = tight(kPoints);
@@ -119,28 +125,36 @@ struct TwoHalves {
     Random random(seed);
     all = simulate_rig(simulation, random);
     all.T_left_world[5] = all.true_T_left_world[5];
-    std::erase_if(all.observations, [](const BundleObservation& o) { return (o.pose < 5) != (o.point < kPoints / 2); });
+    std::erase_if(all.observations, [](const BundleObservation& o) {
+      return (o.pose < 5) != (o.point < kPoints / 2);
+    });
   }
   /// `which`: 1, 2, or 3 for both.
   [[nodiscard]] BundleResult solve(unsigned which, const BundleOptions& o, SimulatedRig* rig) {
     *rig = all;
-    std::erase_if(rig->observations, [&](const BundleObservation& s) { return (which & (s.pose < 5 ? 1U : 2U)) == 0; });
+    std::erase_if(rig->observations, [&](const BundleObservation& s) {
+      return (which & (s.pose < 5 ? 1U : 2U)) == 0;
+    });
     constant.assign(10, 0);
-    for (std::size_t i = 0; i < 10; ++i) constant[i] = i % 5 == 0 || (which & (i < 5 ? 1U : 2U)) == 0 ? 1 : 0;
+    for (std::size_t i = 0; i < 10; ++i)
+      constant[i] = i % 5 == 0 || (which & (i < 5 ? 1U : 2U)) == 0 ? 1 : 0;
     BundleProblem problem = rig->problem();
     problem.pose_constant = constant;
     return own.adjuster.solve(problem, o);
   }
 };
 
-/// The second half with the first one's covariance as its prior against all at once. The prior is the covariance by 300 tracks instead of
-/// the information itself: its variances are off by √(2/300) = 8 %, some more in the worst of six directions. That shifts the weight
-/// between the halves by no more, and their distance is √2 of each one's sigma, twice that of both: 0.3 of the latter is several times the
-/// shift.
-void halves_one_after_the_other(const BundleOptions& first, const BundleOptions& second, int intrinsic) {
+/// The second half with the first one's covariance as its prior against all at once. The prior is
+/// the covariance by 300 tracks instead of the information itself: its variances are off by
+/// √(2/300) = 8 %, some more in the worst of six directions. That shifts the weight between the
+/// halves by no more, and their distance is √2 of each one's sigma, twice that of both: 0.3 of the
+/// latter is several times the shift.
+void halves_one_after_the_other(const BundleOptions& first, const BundleOptions& second,
+                                int intrinsic) {
   TwoHalves h(73);
   SimulatedRig one, alone, two, both;
-  const BundleResult r1 = h.solve(1, first, &one), r2 = h.solve(2, first, &alone), r = h.solve(3, first, &both);
+  const BundleResult r1 = h.solve(1, first, &one), r2 = h.solve(2, first, &alone),
+                     r = h.solve(3, first, &both);
   ASSERT_TRUE(r1.converged() && r2.converged() && r.converged());
   const RigCalibration known = calibration_of(one, r1.covariance);
   BundleOptions o = second;
@@ -179,8 +193,8 @@ TEST(BundleSharedPrior, ofAFreeFocalLengthTooTwoHalvesSayWhatBothTogetherSay) {
   halves_one_after_the_other(first, second, 0);
 }
 
-// Seen twice with the same tracks: at a weight of two they count half as much as what is known, so that where the solve ends moves from
-// the middle to a third of the way.
+// Seen twice with the same tracks: at a weight of two they count half as much as what is known, so
+// that where the solve ends moves from the middle to a third of the way.
 TEST(BundleSharedPrior, itsWeightSaysHowMuchItPulls) {
   Alone a(74);
   ASSERT_TRUE(a.result.converged() && a.result.has_covariance);
@@ -195,7 +209,8 @@ TEST(BundleSharedPrior, itsWeightSaysHowMuchItPulls) {
     const BundleResult r = a.own.adjuster.solve(rig.problem(), o);
     ASSERT_TRUE(r.converged());
     const double share = way(a.solved.T_camera_left[1], rig.T_camera_left[1])[1] / (4 * sigma[1]);
-    // w / (1 + w), the variance by a hundred tracks being 14 % uncertain, and more in directions that are hardly seen.
+    // w / (1 + w), the variance by a hundred tracks being 14 % uncertain, and more in directions
+    // that are hardly seen.
     EXPECT_NEAR(share, weight / (1 + weight), 0.2) << weight;
     EXPECT_GT(share, last);
     last = share;
@@ -216,7 +231,8 @@ TEST(BundleCovariance, theJointOneHoldsTheWideOneAndGivenWhatIsHeldTheOneOfNoise
   std::vector<int> held;
   for (int k = 0; k < 2; ++k)
     for (int i = 0; i < kIntrinsicsSize; ++i) {
-      const double sigma = o.intrinsics[static_cast<std::size_t>(k)].held_sigma[static_cast<std::size_t>(i)];
+      const double sigma =
+          o.intrinsics[static_cast<std::size_t>(k)].held_sigma[static_cast<std::size_t>(i)];
       if (!(sigma > 0)) continue;
       held.push_back(intrinsic_row(k) + i);
       EXPECT_NEAR(r.covariance(held.back(), held.back()), sigma * sigma, 1e-12 * sigma * sigma);
@@ -226,17 +242,22 @@ TEST(BundleCovariance, theJointOneHoldsTheWideOneAndGivenWhatIsHeldTheOneOfNoise
   Eigen::MatrixXd C_held(n, n), cross(6, n);
   Mat6 block;
   for (Eigen::Index j = 0; j < n; ++j) {
-    for (Eigen::Index i = 0; i < n; ++i) C_held(i, j) = r.covariance(held[static_cast<std::size_t>(i)], held[static_cast<std::size_t>(j)]);
-    for (int i = 0; i < 6; ++i) cross(i, j) = r.covariance(extrinsic_row(1) + i, held[static_cast<std::size_t>(j)]);
+    for (Eigen::Index i = 0; i < n; ++i)
+      C_held(i, j) =
+          r.covariance(held[static_cast<std::size_t>(i)], held[static_cast<std::size_t>(j)]);
+    for (int i = 0; i < 6; ++i)
+      cross(i, j) = r.covariance(extrinsic_row(1) + i, held[static_cast<std::size_t>(j)]);
   }
   for (int i = 0; i < 6; ++i)
-    for (int j = 0; j < 6; ++j) block(i, j) = r.covariance(extrinsic_row(1) + i, extrinsic_row(1) + j);
+    for (int j = 0; j < 6; ++j)
+      block(i, j) = r.covariance(extrinsic_row(1) + i, extrinsic_row(1) + j);
   // Sums of some ten products of the same doubles in another order.
   EXPECT_LT((block - r.covariance_wide[1]).norm(), 1e-12 * r.covariance_wide[1].norm());
   const Mat6 given = block - cross * C_held.ldlt().solve(cross.transpose());
   // What is left is smaller than what it is the difference of by up to 1e4: as many digits less.
   EXPECT_LT((given - r.covariance_noise[1]).norm(), 1e-10 * r.covariance_wide[1].norm());
-  EXPECT_GT(r.covariance_wide[1].trace(), 2 * r.covariance_noise[1].trace()) << "otherwise nothing was shown";
+  EXPECT_GT(r.covariance_wide[1].trace(), 2 * r.covariance_noise[1].trace())
+      << "otherwise nothing was shown";
 }
 
 TEST(BundleSharedPrior, oneThatSaysNothingIsLeftOut) {

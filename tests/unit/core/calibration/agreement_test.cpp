@@ -47,7 +47,8 @@ RigCovariance published(const Free& C) {
   return out;
 }
 
-/// The same with what camera 0's focal lengths and centre, held, may be off by: D Σ Dᵀ, and −D Σ beside it.
+/// The same with what camera 0's focal lengths and centre, held, may be off by: D Σ Dᵀ, and −D Σ
+/// beside it.
 RigCovariance with_held(const Free& noise, Random& random) {
   Eigen::Matrix<double, kFree, 4> D;
   for (int i = 0; i < kFree; ++i)
@@ -56,7 +57,8 @@ RigCovariance with_held(const Free& noise, Random& random) {
   RigCovariance out = published(noise + D * variance.asDiagonal() * D.transpose());
   for (int j = 0; j < 4; ++j) {
     out.set(intrinsic_row(0) + j, intrinsic_row(0) + j, variance[j]);
-    for (int i = 0; i < kFree; ++i) out.set(row_of(i), intrinsic_row(0) + j, -D(i, j) * variance[j]);
+    for (int i = 0; i < kFree; ++i)
+      out.set(row_of(i), intrinsic_row(0) + j, -D(i, j) * variance[j]);
   }
   return out;
 }
@@ -91,9 +93,12 @@ TEST(Agreement, theConditionalCovarianceHoldsNothingOfWhatIsHeld) {
   for (int i = 0; i < kFree; ++i)
     for (int j = 0; j <= i; ++j)
       // Differences of numbers that are some ten times as large.
-      EXPECT_NEAR(left(row_of(i), row_of(j)), noise(i, j), 1e-12 * std::sqrt(noise(i, i) * noise(j, j))) << i << ' ' << j;
+      EXPECT_NEAR(left(row_of(i), row_of(j)), noise(i, j),
+                  1e-12 * std::sqrt(noise(i, i) * noise(j, j)))
+          << i << ' ' << j;
   for (int j = 0; j < 4; ++j)
-    for (int i = 0; i < kRigSize; ++i) EXPECT_NEAR(left(i, intrinsic_row(0) + j), 0, 1e-15) << i << ' ' << j;
+    for (int i = 0; i < kRigSize; ++i)
+      EXPECT_NEAR(left(i, intrinsic_row(0) + j), 0, 1e-15) << i << ' ' << j;
 }
 
 // Where the lenses of all cameras are estimated, camera 0's go with each other.
@@ -109,10 +114,13 @@ TEST(Agreement, theConditionalCovarianceTakesWhatGoesTogetherOnce) {
   for (int i = 0; i < kFree + 4; ++i)
     for (int j = 0; j <= i; ++j) wide.set(row(i), row(j), C(i, j));
   const Eigen::Matrix<double, kFree, 4> cross = C.topRightCorner<kFree, 4>();
-  const Free given = C.topLeftCorner<kFree, kFree>() - cross * C.bottomRightCorner<4, 4>().ldlt().solve(cross.transpose());
+  const Free given = C.topLeftCorner<kFree, kFree>() -
+                     cross * C.bottomRightCorner<4, 4>().ldlt().solve(cross.transpose());
   const RigCovariance left = noise_only(wide);
   for (int i = 0; i < kFree; ++i)
-    for (int j = 0; j <= i; ++j) EXPECT_NEAR(left(row_of(i), row_of(j)), given(i, j), 1e-10) << i << ' ' << j;  // of numbers near 20
+    for (int j = 0; j <= i; ++j)
+      EXPECT_NEAR(left(row_of(i), row_of(j)), given(i, j), 1e-10)
+          << i << ' ' << j;  // of numbers near 20
 }
 
 TEST(Agreement, whatIsNotHeldStaysAsItIs) {
@@ -122,8 +130,9 @@ TEST(Agreement, whatIsNotHeldStaysAsItIs) {
     for (int j = 0; j <= i; ++j) ASSERT_EQ(left(i, j), noise(i, j));
 }
 
-// Both calibrations drawn about one truth. 1000 draws: the mean of χ²(5)/5 has a standard error of 0.02; a depth at one place is one of
-// χ²(1), all places of an image together hardly more, 0.045. The truth's gradient serves for rigs that are a sigma off: some hundredths.
+// Both calibrations drawn about one truth. 1000 draws: the mean of χ²(5)/5 has a standard error of
+// 0.02; a depth at one place is one of χ²(1), all places of an image together hardly more, 0.045.
+// The truth's gradient serves for rigs that are a sigma off: some hundredths.
 TEST(Agreement, differencesOfOneSigmaAreOneOnAverage) {
   Random random(84);
   const RigCalibration truth = rig();

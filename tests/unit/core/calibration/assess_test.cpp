@@ -51,7 +51,8 @@ TEST(Assessment, aYawThatIsOffIsContradicted) {
   for (const double yaw : {1.5e-3, -1.5e-3, 5e-3}) {
     Measured m(1e-4);
     const Assessment a = m.of({0, yaw, 0});
-    EXPECT_NEAR(a.difference_percent, 100 * 20 * std::abs(yaw) / 0.75, 0.1 * 100 * 20 * std::abs(yaw) / 0.75);
+    EXPECT_NEAR(a.difference_percent, 100 * 20 * std::abs(yaw) / 0.75,
+                0.1 * 100 * 20 * std::abs(yaw) / 0.75);
     EXPECT_TRUE(a.contradicted) << yaw;
     EXPECT_FALSE(a.confirmed) << yaw;
     EXPECT_FALSE(a.worse) << yaw;
@@ -91,7 +92,8 @@ TEST(Assessment, aPitchIsSeenOnFramesThatWereNotUsed) {
   EXPECT_TRUE(b.worse);
 }
 
-RigSolution solve_with(const std::vector<test::RigChange>& changes, std::uint64_t seed, RigCalibration* nominal) {
+RigSolution solve_with(const std::vector<test::RigChange>& changes, std::uint64_t seed,
+                       RigCalibration* nominal) {
   test::FeatureDriveOptions o;
   o.seed = seed;
   o.changes = changes;

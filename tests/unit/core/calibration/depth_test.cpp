@@ -17,7 +17,8 @@ RigCalibration rig_with(double baseline, double focal, int width, int height) {
   rig.cameras = 2;
   for (std::size_t k = 0; k < 2; ++k) {
     Intrinsics& c = rig.intrinsics[k];
-    c.width = width, c.height = height, c.fx = c.fy = focal, c.cx = 0.5 * (width - 1), c.cy = 0.5 * (height - 1);
+    c.width = width, c.height = height, c.fx = c.fy = focal, c.cx = 0.5 * (width - 1),
+    c.cy = 0.5 * (height - 1);
   }
   rig.T_camera_left[1].t = Vec3(-baseline, 0, 0);
   rig.baseline = baseline;
@@ -25,19 +26,24 @@ RigCalibration rig_with(double baseline, double focal, int width, int height) {
 }
 RigCalibration wide_rig() { return rig_with(kBaseline, kFocal, 1024, 768); }
 
-void turn(RigCalibration* rig, const Vec3& angle) { rig->T_camera_left[1].R = exp_so3(angle) * rig->T_camera_left[1].R; }
+void turn(RigCalibration* rig, const Vec3& angle) {
+  rig->T_camera_left[1].R = exp_so3(angle) * rig->T_camera_left[1].R;
+}
 
 TEST(DepthDifference, ofARigFromItselfIsNone) {
   RigCalibration rig = wide_rig();
   turn(&rig, {0.01, -0.02, 0.005});
   rig.intrinsics[0].distortion = {-0.1, 0.02, 1e-3, -5e-4, 0};
   rig.intrinsics[1].distortion = {-0.12, 0.03, -1e-3, 5e-4, 0};
-  // Iterations end at the rounding of a pixel, 1e-13 of a thousand; the disparity is 19 px and more.
-  for (const double z : kHealthDepths) EXPECT_LT(depth_difference_percent(rig, rig, 1, z), 1e-8) << z;
+  // Iterations end at the rounding of a pixel, 1e-13 of a thousand; the disparity is 19 px and
+  // more.
+  for (const double z : kHealthDepths)
+    EXPECT_LT(depth_difference_percent(rig, rig, 1, z), 1e-8) << z;
 }
 
-// A yaw δ moves what is straight ahead by f δ, at the edge of the image (x/z = 0.41) by f (1 + x²) δ; the disparity is f b / Z. So the
-// inverse depth is off by Z δ (1 + x²) / b, relative, whatever the depth: of the root mean square over the image x² takes 6 %.
+// A yaw δ moves what is straight ahead by f δ, at the edge of the image (x/z = 0.41) by f (1 + x²)
+// δ; the disparity is f b / Z. So the inverse depth is off by Z δ (1 + x²) / b, relative, whatever
+// the depth: of the root mean square over the image x² takes 6 %.
 TEST(DepthDifference, ofAYawGrowsWithTheDepth) {
   for (const double yaw : {1e-3, -2e-3})
     for (const double z : {5.0, 10.0, 20.0, 50.0}) {
@@ -45,7 +51,8 @@ TEST(DepthDifference, ofAYawGrowsWithTheDepth) {
       RigCalibration off = rig;
       turn(&off, {0, yaw, 0});
       const double straight = 100 * z * std::abs(yaw) / kBaseline;
-      EXPECT_NEAR(depth_difference_percent(rig, off, 1, z), straight, 0.1 * straight) << yaw << ' ' << z;
+      EXPECT_NEAR(depth_difference_percent(rig, off, 1, z), straight, 0.1 * straight)
+          << yaw << ' ' << z;
     }
 }
 
@@ -56,10 +63,12 @@ TEST(DepthDifference, ofAYawThatACentreMakesUpForIsSmall) {
   turn(&yaw, {0, 2e-3, 0});
   RigCalibration both = yaw;
   both.intrinsics[1].cx -= kFocal * std::tan(2e-3);
-  EXPECT_LT(depth_difference_percent(rig, both, 1, 20), 0.1 * depth_difference_percent(rig, yaw, 1, 20));
+  EXPECT_LT(depth_difference_percent(rig, both, 1, 20),
+            0.1 * depth_difference_percent(rig, yaw, 1, 20));
   // The other way round they add up.
   both.intrinsics[1].cx += 2 * kFocal * std::tan(2e-3);
-  EXPECT_NEAR(depth_difference_percent(rig, both, 1, 20), 2 * depth_difference_percent(rig, yaw, 1, 20),
+  EXPECT_NEAR(depth_difference_percent(rig, both, 1, 20),
+              2 * depth_difference_percent(rig, yaw, 1, 20),
               0.1 * depth_difference_percent(rig, yaw, 1, 20));
 }
 
@@ -68,7 +77,8 @@ TEST(DepthDifference, ofALengthIsItsShareAtEveryDepth) {
   RigCalibration longer = rig;
   longer.T_camera_left[1].t *= 1.01;
   // The same disparity at a baseline 1 % longer is a depth 1 % larger.
-  for (const double z : {5.0, 20.0, 50.0}) EXPECT_NEAR(depth_difference_percent(rig, longer, 1, z), 100 * (1 - 1 / 1.01), 1e-6) << z;
+  for (const double z : {5.0, 20.0, 50.0})
+    EXPECT_NEAR(depth_difference_percent(rig, longer, 1, z), 100 * (1 - 1 / 1.01), 1e-6) << z;
 }
 
 TEST(DepthDifference, ofWhatCannotBeSeenByBothIsNotSaid) {
@@ -93,17 +103,21 @@ TEST(DepthError, ofAYawAndACentreThatAreKnownTogetherIsSmall) {
   EXPECT_NEAR(depth_error_percent(apart, 1, 20), std::sqrt(2.0) * of_yaw, 0.1 * of_yaw);
 }
 
-// The gradient against the difference that it predicts, parameter by parameter: one small step of each.
+// The gradient against the difference that it predicts, parameter by parameter: one small step of
+// each.
 TEST(DepthError, ofOneSigmaIsTheDifferenceThatItMakes) {
   RigCalibration rig = wide_rig();
   turn(&rig, {0.01, -0.02, 0.005});
-  for (std::size_t k = 0; k < 2; ++k) rig.intrinsics[k].distortion = {-0.1, 0.02, 1e-3, -5e-4, 0.01};
+  for (std::size_t k = 0; k < 2; ++k)
+    rig.intrinsics[k].distortion = {-0.1, 0.02, 1e-3, -5e-4, 0.01};
   const auto compare = [&](int row, double step, const RigCalibration& off) {
     RigCalibration known = rig;
     known.covariance = {};
     known.covariance.set(row, row, step * step);
-    const double predicted = depth_error_percent(known, 1, 20), made = depth_difference_percent(rig, off, 1, 20);
-    // Steps of some hundredths of a pixel: beyond the linear part is less than that of a disparity of 47 px.
+    const double predicted = depth_error_percent(known, 1, 20),
+                 made = depth_difference_percent(rig, off, 1, 20);
+    // Steps of some hundredths of a pixel: beyond the linear part is less than that of a disparity
+    // of 47 px.
     EXPECT_NEAR(made, predicted, 2e-3 * predicted + 1e-6) << row;
   };
   for (int i = 0; i < 6; ++i) {
@@ -121,7 +135,8 @@ TEST(DepthError, ofOneSigmaIsTheDifferenceThatItMakes) {
       RigCalibration off = rig;
       Intrinsics& lens = off.intrinsics[static_cast<std::size_t>(k)];
       const std::array place = {&lens.fx, &lens.fy, &lens.cx, &lens.cy};
-      (i < 4 ? *place[static_cast<std::size_t>(i)] : lens.distortion[static_cast<std::size_t>(i - 4)]) += step;
+      (i < 4 ? *place[static_cast<std::size_t>(i)]
+             : lens.distortion[static_cast<std::size_t>(i - 4)]) += step;
       compare(intrinsic_row(k) + i, step, off);
     }
 }
@@ -130,7 +145,8 @@ TEST(JudgedDepth, isNearerWhereASingleMatchIsNoBetter) {
   const CalibrationOptions options;
   // A match of 0.15 px in both images is off by 0.21 px, 1 % of a disparity of 21.2 px.
   const double px = std::sqrt(2.0) * 0.15 / 0.01;
-  EXPECT_NEAR(judged_depth_m(rig_with(0.11, 458, 752, 480), 1, options, 0.15), 458 * 0.11 / px, 1e-9);
+  EXPECT_NEAR(judged_depth_m(rig_with(0.11, 458, 752, 480), 1, options, 0.15), 458 * 0.11 / px,
+              1e-9);
   EXPECT_LT(judged_depth_m(rig_with(0.11, 458, 752, 480), 1, options, 0.15), 20);
   EXPECT_EQ(judged_depth_m(wide_rig(), 1, options, 0.15), 20) << "44 m otherwise";
 }

@@ -15,8 +15,10 @@ namespace vergence::test {
   return o;
 }
 
-/// The rig of a feature drive as a calibration: cameras of these intrinsics, each number of them known to its sigma (px).
-[[nodiscard]] inline RigCalibration rig_of(const FeatureDriveOptions& drive, const std::array<Pinhole, 2>& lenses,
+/// The rig of a feature drive as a calibration: cameras of these intrinsics, each number of them
+/// known to its sigma (px).
+[[nodiscard]] inline RigCalibration rig_of(const FeatureDriveOptions& drive,
+                                           const std::array<Pinhole, 2>& lenses,
                                            const std::array<double, 4>& sigma) {
   RigCalibration rig;
   rig.cameras = 2;
@@ -36,23 +38,30 @@ namespace vergence::test {
   return rig_of(drive, {drive.left, drive.right}, {kExact, kExact, kExact, kExact});
 }
 
-/// How far what is logged is from the truth, beyond the errors of the tracks: where a solve starts from.
+/// How far what is logged is from the truth, beyond the errors of the tracks: where a solve starts
+/// from.
 struct LogStart {
   double pose_rad = 0, pose_m = 0;  // of every frame's pose but the first, each axis, sigma
   double rig_rad = 0, rig_m = 0;    // of every frame's T_camera_left
 };
 
 /// The next `frames` frames of a drive as the estimator would log them.
-inline void log_drive(FeatureDrive& drive, int frames, const LogStart& start, calibration::TrackLog& log) {
+inline void log_drive(FeatureDrive& drive, int frames, const LogStart& start,
+                      calibration::TrackLog& log) {
   Random random(drive.options().seed, 5);
-  const auto vector = [&](double sigma) { return Vec3(sigma * Vec3(random.normal(), random.normal(), random.normal())); };
+  const auto vector = [&](double sigma) {
+    return Vec3(sigma * Vec3(random.normal(), random.normal(), random.normal()));
+  };
   for (int i = 0; i < frames; ++i) {
     drive.next();
     calibration::LoggedFrame f;
     f.number = drive.frame();
     f.stamp = drive.stamp();
-    f.T_left_world = i == 0 ? drive.T_left_world() : perturbed(drive.T_left_world(), vector(start.pose_rad), vector(start.pose_m));
-    f.T_camera_left[1] = perturbed(drive.T_right_left(), vector(start.rig_rad), vector(start.rig_m));
+    f.T_left_world =
+        i == 0 ? drive.T_left_world()
+               : perturbed(drive.T_left_world(), vector(start.pose_rad), vector(start.pose_m));
+    f.T_camera_left[1] =
+        perturbed(drive.T_right_left(), vector(start.rig_rad), vector(start.rig_m));
     f.unlinked = true;
     f.reprojection_px = 0.5;
     f.across = static_cast<int>(drive.tracks().size());
@@ -76,22 +85,27 @@ struct SolverInArena {
   Arena arena;
   calibration::RigSolver solver;
   explicit SolverInArena(const calibration::CalibrationOptions& o, std::size_t features = 300)
-      : options(o), arena(calibration::RigSolver::memory_needed(o, monitor, 2, features)), solver(options, monitor, 2, features, arena) {}
+      : options(o),
+        arena(calibration::RigSolver::memory_needed(o, monitor, 2, features)),
+        solver(options, monitor, 2, features, arena) {}
 };
 
 using Vec5 = Eigen::Matrix<double, 5, 1>;
 using Mat5 = Eigen::Matrix<double, 5, 5>;
-/// Rotation and the two coordinates of t that the known length leaves: along the baseline there is nothing to find.
+/// Rotation and the two coordinates of t that the known length leaves: along the baseline there is
+/// nothing to find.
 [[nodiscard]] inline Vec5 five_errors(const RigCalibration& found, const Transform& truth) {
   Vec5 e;
-  e << log_so3(found.T_camera_left[1].R * truth.R.transpose()), (found.T_camera_left[1].t - truth.t).tail<2>();
+  e << log_so3(found.T_camera_left[1].R * truth.R.transpose()),
+      (found.T_camera_left[1].t - truth.t).tail<2>();
   return e;
 }
 [[nodiscard]] inline Mat5 five_covariance(const Mat6& C) {
   constexpr std::array<int, 5> kWhich = {0, 1, 2, 4, 5};
   Mat5 out;
   for (int i = 0; i < 5; ++i)
-    for (int j = 0; j < 5; ++j) out(i, j) = C(kWhich[static_cast<std::size_t>(i)], kWhich[static_cast<std::size_t>(j)]);
+    for (int j = 0; j < 5; ++j)
+      out(i, j) = C(kWhich[static_cast<std::size_t>(i)], kWhich[static_cast<std::size_t>(j)]);
   return out;
 }
 

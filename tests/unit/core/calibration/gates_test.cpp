@@ -54,7 +54,8 @@ TEST(Gates, aSoundSolutionPassesThem) { EXPECT_EQ(Case().ask(), Gate::open); }
 
 TEST(Gates, whatWasNotSolvedIsNotAdopted) {
   for (const RigSolveStatus status :
-       {RigSolveStatus::too_few_tracks, RigSolveStatus::no_candidate, RigSolveStatus::not_converged, RigSolveStatus::not_observable}) {
+       {RigSolveStatus::too_few_tracks, RigSolveStatus::no_candidate, RigSolveStatus::not_converged,
+        RigSolveStatus::not_observable}) {
     Case c;
     c.solution.status = status;
     EXPECT_EQ(c.ask(), Gate::not_solved);
@@ -125,7 +126,8 @@ TEST(Gates, aRotationFarFromTheConfiguredOneIsImplausibleUnlessFromScratch) {
   for (const double degrees : {9.9, 10.1}) {
     Case c;
     c.nominal.T_camera_left[1].R = exp_so3(degrees * kDegree * Vec3(0, 0.6, 0.8)) * c.found().R;
-    EXPECT_EQ(c.ask(), Gate::open) << "from scratch only the sign of t_x and the direction are asked";
+    EXPECT_EQ(c.ask(), Gate::open)
+        << "from scratch only the sign of t_x and the direction are asked";
     c.turn(&c.in_use, {0.3, 0, 0});
     c.question.in_use = &c.in_use;
     EXPECT_EQ(c.ask(), degrees > 10 ? Gate::implausible_rotation : Gate::open) << degrees;
@@ -165,7 +167,8 @@ TEST(Gates, oneThatIsNoBetterThanTheOneInUseIsNotAdopted) {
   c.turn(&c.solution.rig, {0.03, 0, 0});
   EXPECT_EQ(c.ask(), Gate::no_better) << "a worse one";
   std::swap(c.solution.rig.T_camera_left[1], c.in_use.T_camera_left[1]);
-  EXPECT_EQ(c.ask(), Gate::open) << "the better one, by 0.65 px of row: many times the spread of a median of 150 matches";
+  EXPECT_EQ(c.ask(), Gate::open)
+      << "the better one, by 0.65 px of row: many times the spread of a median of 150 matches";
 }
 
 TEST(Gates, everyReasonIsASentenceOfItsOwnWithoutCommas) {

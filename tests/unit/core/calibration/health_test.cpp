@@ -27,12 +27,13 @@ void know(RigCalibration* rig, std::size_t k, int what, double sigma) {
   rig->covariance_wide[k](what, what) = sigma * sigma;
 }
 
-// Depth from disparity: Z = f b / d, so ∂Z/Z = ∂b/b for the baseline and ∂Z/Z = Z/(f b) · ∂d for what moves the right image, a yaw ψ
-// of the right camera by f (1 + x²) ψ.
+// Depth from disparity: Z = f b / d, so ∂Z/Z = ∂b/b for the baseline and ∂Z/Z = Z/(f b) · ∂d for
+// what moves the right image, a yaw ψ of the right camera by f (1 + x²) ψ.
 TEST(Health, aBaselinesErrorIsTheSameShareOfEveryDepth) {
   RigCalibration rig = narrow_rig();
   know(&rig, 1, 3, 0.002);
-  for (const double z : {5.0, 10.0, 20.0, 50.0}) EXPECT_NEAR(depth_error_percent(rig, 1, z), 2.0, 1e-9) << z;
+  for (const double z : {5.0, 10.0, 20.0, 50.0})
+    EXPECT_NEAR(depth_error_percent(rig, 1, z), 2.0, 1e-9) << z;
 }
 
 TEST(Health, aYawsErrorGrowsWithTheDepth) {
@@ -59,7 +60,8 @@ TEST(Health, errorsAcrossTheDisparityCostNothingStraightAhead) {
 TEST(Health, correlatedErrorsCancelAsTheyDoInTheDepth) {
   RigCalibration rig = narrow_rig();
   const double z = 20, yaw = 1e-4;
-  // A shift that moves what is straight ahead at 20 m back to where a yaw of the same sign took it from: R X moves by ψ Z along x.
+  // A shift that moves what is straight ahead at 20 m back to where a yaw of the same sign took it
+  // from: R X moves by ψ Z along x.
   know(&rig, 1, 1, yaw);
   know(&rig, 1, 3, yaw * z);
   rig.covariance_wide[1](1, 3) = rig.covariance_wide[1](3, 1) = -yaw * yaw * z;

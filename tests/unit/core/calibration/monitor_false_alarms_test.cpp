@@ -32,13 +32,15 @@ FiveReference five_of(const FeatureDriveOptions& o) {
   const TrialReference reference = calibrated(o);
   Eigen::Matrix<double, 5, 6> back = Eigen::Matrix<double, 5, 6>::Zero();
   back.topLeftCorner<3, 3>().setIdentity();
-  back.bottomRightCorner<2, 3>() = tangent_basis(o.T_right_left.t.normalized()).transpose() / o.T_right_left.t.norm();
+  back.bottomRightCorner<2, 3>() =
+      tangent_basis(o.T_right_left.t.normalized()).transpose() / o.T_right_left.t.norm();
   const Mat5 C = back * reference.covariance * back.transpose();
   return {C, Eigen::LLT<Mat5>(C).matrixL()};
 }
 
 double quantile(std::vector<double> v, double share) {
-  const auto at = v.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(v.size() - 1));
+  const auto at =
+      v.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(v.size() - 1));
   std::nth_element(v.begin(), at, v.end());
   return *at;
 }
@@ -63,7 +65,8 @@ TEST(MonitorModes, haveTheStatisticsOfWholeTracks) {
     const double s = windows->decide().statistic;
     if (i > 300) modes.push_back(s);
   }
-  // The slow error wanders over ten seconds: 160 s of tracks hold some sixteen draws of it, so a third either way.
+  // The slow error wanders over ten seconds: 160 s of tracks hold some sixteen draws of it, so a
+  // third either way.
   for (const double share : {0.5, 0.9, 0.99}) {
     const double a = quantile(tracks, share), b = quantile(modes, share);
     std::printf("quantile %.2f of the statistic: %.1f with tracks, %.1f with modes\n", share, a, b);
@@ -76,7 +79,8 @@ TEST(MonitorFalseAlarms, areFourAtMostInAHundredHours) {
   std::vector<std::unique_ptr<ModeDrive>> drives;
   std::vector<FiveReference> references;
   for (const double speed : kSpeeds) {
-    drives.push_back(std::make_unique<ModeDrive>(street(speed), 100 + static_cast<std::uint64_t>(speed)));
+    drives.push_back(
+        std::make_unique<ModeDrive>(street(speed), 100 + static_cast<std::uint64_t>(speed)));
     references.push_back(five_of(street(speed)));
   }
   Random random(17);
@@ -115,8 +119,10 @@ TEST(MonitorFalseAlarms, areFourAtMostInAHundredHours) {
     hourly.push_back(most);
     worst = std::max(worst, most);
   }
-  std::printf("100 h: %d alarms; largest statistic %.1f, median of the hours' largest %.1f, standing %.1f; threshold %.0f\n", alarms, worst,
-              quantile(hourly, 0.5), worst_standing, options.threshold);
+  std::printf(
+      "100 h: %d alarms; largest statistic %.1f, median of the hours' largest %.1f, standing %.1f; "
+      "threshold %.0f\n",
+      alarms, worst, quantile(hourly, 0.5), worst_standing, options.threshold);
   EXPECT_LE(alarms, 4);
 }
 

@@ -23,7 +23,8 @@ struct Fed {
   MonitorFrame next() {
     drive.next();
     sightings.clear();
-    for (const FeatureTrack& t : drive.tracks()) sightings.push_back({t.left, t.right, t.sigma_px, t.id});
+    for (const FeatureTrack& t : drive.tracks())
+      sightings.push_back({t.left, t.right, t.sigma_px, t.id});
     return feed.next(drive.stamp(), drive.frame(), sightings, drive.T_now_previous());
   }
 };
@@ -81,8 +82,10 @@ TEST(MonitorFeed, leavesOutWhatItHasNoRoomFor) {
   for (int i = 0; i < 60; ++i) {
     drive.next();
     sightings.clear();
-    for (const FeatureTrack& t : drive.tracks()) sightings.push_back({t.left, t.right, t.sigma_px, t.id});
-    const MonitorFrame f = feed.next(drive.stamp(), drive.frame(), sightings, drive.T_now_previous());
+    for (const FeatureTrack& t : drive.tracks())
+      sightings.push_back({t.left, t.right, t.sigma_px, t.id});
+    const MonitorFrame f =
+        feed.next(drive.stamp(), drive.frame(), sightings, drive.T_now_previous());
     EXPECT_EQ(f.across.size(), sightings.size());
     most = std::max(most, f.motion.size());
   }

@@ -53,11 +53,13 @@ Sums watch(const FeatureDriveOptions& o, const Transform& T_reference, int frame
   return sums;
 }
 
-/// |g − A θ| over |g|, both in the metric of A⁻¹: 0 where the derivatives are right and the sightings exact.
+/// |g − A θ| over |g|, both in the metric of A⁻¹: 0 where the derivatives are right and the
+/// sightings exact.
 double misfit(const Evidence& e, const Eigen::Matrix<double, kTheta, 1>& theta) {
   Theta rest = e.g;
   for (int i = 0; i < kTheta; ++i)
-    for (int j = 0; j < kTheta; ++j) rest[static_cast<std::size_t>(i)] -= e.A[lower(std::max(i, j), std::min(i, j))] * theta[j];
+    for (int j = 0; j < kTheta; ++j)
+      rest[static_cast<std::size_t>(i)] -= e.A[lower(std::max(i, j), std::min(i, j))] * theta[j];
   const Solved whole(e.A, e.g), left(e.A, rest);
   return std::sqrt((left.fixed_gain() + left.lag_gain()) / (whole.fixed_gain() + whole.lag_gain()));
 }
@@ -73,14 +75,16 @@ TEST(MonitorLooks, gradientsPointFromTheReferenceToTheTruthInEveryParameter) {
     if (i == kLag) o.lags = {{0, theta[kLag]}};
     const Sums sums = watch(o, T_reference, 120);
     ASSERT_GT(sums.looks, 5);
-    // Second order: 0.1 px against disparities of ten and more, a fiftieth of image motions of up to 100 px a frame.
+    // Second order: 0.1 px against disparities of ten and more, a fiftieth of image motions of up
+    // to 100 px a frame.
     EXPECT_LT(misfit(sums.across, theta), 0.05);
     EXPECT_LT(misfit(sums.motion, theta), 0.05);
   }
 }
 
 TEST(MonitorLooks, motionSaysNothingOfWhatAPairMeasures) {
-  // A point's place and its distance to the epipolar line are independent measurements: nothing is counted twice.
+  // A point's place and its distance to the epipolar line are independent measurements: nothing is
+  // counted twice.
   FeatureDriveOptions o = exact_street();
   const Transform T_reference = o.T_right_left;
   Vec5 theta = Vec5::Zero();
@@ -103,7 +107,8 @@ TEST(MonitorLooks, spreadOfWhiteErrorsIsOneAndOfLastingOnesTheLifeOfATrack) {
   const Sums white = watch(o, o.T_right_left, 400);
   EXPECT_NEAR(white.spread_now / white.frames, 1.0, 0.1);
   EXPECT_NEAR(white.spread_life / white.frames, 1.0, 0.2);
-  // Weights under one make A smaller: E ψ² E w / (E ψ')² = 0.87 for vectors of three, 0.96 for numbers.
+  // Weights under one make A smaller: E ψ² E w / (E ψ')² = 0.87 for vectors of three, 0.96 for
+  // numbers.
   EXPECT_NEAR(white.spread_motion / white.looks, 0.87, 0.15);
   o.white_px = 0;
   o.constant_px = 0.5;

@@ -13,8 +13,9 @@
 
 namespace vergence::test {
 
-/// What a drive shows a monitor, below the level of tracks: the information of recorded frames, and gradients drawn anew with the
-/// variances, the correlation in time and the slow error that the recorded tracks had. A thousand times an hour's tracks in a minute.
+/// What a drive shows a monitor, below the level of tracks: the information of recorded frames, and
+/// gradients drawn anew with the variances, the correlation in time and the slow error that the
+/// recorded tracks had. A thousand times an hour's tracks in a minute.
 class ModeDrive {
  public:
   struct Frame {
@@ -23,7 +24,8 @@ class ModeDrive {
     double spread_now = 0;
   };
 
-  /// Records one cycle of driving and standing from a feature drive, and from a second one without noise what the slow error does to it.
+  /// Records one cycle of driving and standing from a feature drive, and from a second one without
+  /// noise what the slow error does to it.
   explicit ModeDrive(const FeatureDriveOptions& options, std::uint64_t seed) : random_(seed, 5) {
     record(options);
     measure_bias(options);
@@ -40,7 +42,8 @@ class ModeDrive {
     f.evidence.frame = number_++;
     f.evidence.before = f.evidence.frame > 8 ? f.evidence.frame - 8 : 0;
     if (f.moving) {
-      // Errors that stay with a track die with it: correlation 0.9 a frame has the same sum over a life of twenty.
+      // Errors that stay with a track die with it: correlation 0.9 a frame has the same sum over a
+      // life of twenty.
       track_ = kTrackKeeps * track_ + std::sqrt(1 - kTrackKeeps * kTrackKeeps) * draw();
       const double lasting = (spread_life_ - spread_now_) * (1 - kTrackKeeps) / (2 * kTrackKeeps);
       noise_ = std::sqrt(lasting) * track_ + std::sqrt(spread_now_ - lasting) * draw();
@@ -48,12 +51,16 @@ class ModeDrive {
     auto& [across, motion] = f.evidence.evidence;
     set_gradient(&across, noise_ + std::sqrt(across.n) * (bias_across_ * bias_), reference_error);
     if (motion.n > 0)
-      set_gradient(&motion, std::sqrt(spread_motion_) * draw() + std::sqrt(motion.n) * (bias_motion_ * bias_), reference_error);
+      set_gradient(
+          &motion,
+          std::sqrt(spread_motion_) * draw() + std::sqrt(motion.n) * (bias_motion_ * bias_),
+          reference_error);
     return f;
   }
 
  private:
-  // Outliers that pass for matches and modes that share the noise unequally: what Gaussian modes lack, found by the comparison with tracks.
+  // Outliers that pass for matches and modes that share the noise unequally: what Gaussian modes
+  // lack, found by the comparison with tracks.
   static constexpr double kLarger = 1.1;
   static constexpr double kTrackKeeps = 0.9;
   static constexpr double kBiasKeeps = 0.99667;  // 10 s at 30 Hz
@@ -65,14 +72,16 @@ class ModeDrive {
   }
 
   /// g = L y − A θ of the reference's error, the lag left out of the latter.
-  static void set_gradient(calibration::detail::Evidence* e, const Vec6& y, const Vec5& reference_error) {
+  static void set_gradient(calibration::detail::Evidence* e, const Vec6& y,
+                           const Vec5& reference_error) {
     using namespace calibration::detail;
     const Solved factor(e->A, e->g);
     for (int i = 0; i < kTheta; ++i) {
       double g = 0;
       for (int k = 0; k <= i; ++k)
         if (factor.seen[static_cast<std::size_t>(k)]) g += factor.L[lower(i, k)] * y[k];
-      for (int k = 0; k < kFixed; ++k) g -= e->A[lower(std::max(i, k), std::min(i, k))] * reference_error[k];
+      for (int k = 0; k < kFixed; ++k)
+        g -= e->A[lower(std::max(i, k), std::min(i, k))] * reference_error[k];
       e->g[static_cast<std::size_t>(i)] = g;
     }
   }
@@ -82,9 +91,12 @@ class ModeDrive {
     using namespace calibration::detail;
     const auto looks = std::make_unique<Looks>();
     looks->reset();
-    const Reference reference{
-        o.T_right_left, EpipolarGeometry(o.T_right_left), tangent_basis(o.T_right_left.t.normalized()), o.T_right_left.t.norm(), o.left,
-        o.right};
+    const Reference reference{o.T_right_left,
+                              EpipolarGeometry(o.T_right_left),
+                              tangent_basis(o.T_right_left.t.normalized()),
+                              o.T_right_left.t.norm(),
+                              o.left,
+                              o.right};
     MonitorTrial trial(o);
     for (int i = 0; i < frames; ++i) {
       (void)trial.step();
@@ -98,19 +110,22 @@ class ModeDrive {
   void record(FeatureDriveOptions o) {
     o.drive_s = 60, o.stop_s = 15;
     int moving = 0, looks = 0;
-    watch(o, 2250, [&](const calibration::MonitorFrame& frame, const auto& across, const auto& motion) {
-      Frame f;
-      f.moving = frame.moving;
-      f.spread_now = across.spread_now;
-      f.evidence.evidence.across = across.evidence;
-      f.evidence.spread_now = across.spread_now;
-      f.evidence.spread_life = across.spread_life;
-      if (motion.usable) f.evidence.evidence.motion = motion.evidence, f.evidence.spread_motion = motion.spread;
-      frames_.push_back(f);
-      if (!frame.moving || frame.frame < 100) return;
-      ++moving, spread_now_ += across.spread_now, spread_life_ += across.spread_life;
-      if (motion.usable) ++looks, spread_motion_ += motion.spread;
-    });
+    watch(o, 2250,
+          [&](const calibration::MonitorFrame& frame, const auto& across, const auto& motion) {
+            Frame f;
+            f.moving = frame.moving;
+            f.spread_now = across.spread_now;
+            f.evidence.evidence.across = across.evidence;
+            f.evidence.spread_now = across.spread_now;
+            f.evidence.spread_life = across.spread_life;
+            if (motion.usable)
+              f.evidence.evidence.motion = motion.evidence,
+              f.evidence.spread_motion = motion.spread;
+            frames_.push_back(f);
+            if (!frame.moving || frame.frame < 100) return;
+            ++moving, spread_now_ += across.spread_now, spread_life_ += across.spread_life;
+            if (motion.usable) ++looks, spread_motion_ += motion.spread;
+          });
     spread_now_ /= moving, spread_life_ /= moving, spread_motion_ /= looks;
   }
 

@@ -1,4 +1,5 @@
-// How much stretches of a drive disagree beyond their noise, from blocks drawn with what is to be found.
+// How much stretches of a drive disagree beyond their noise, from blocks drawn with what is to be
+// found.
 #include "core/calibration/detail/monitor_scatter.hpp"
 
 #include <gtest/gtest.h>
@@ -67,8 +68,9 @@ TEST(BlockScatter, beforeAnythingIsMeasuredItIsWhatIsExpected) {
   EXPECT_DOUBLE_EQ(s.variance(), 0.2 * 0.2 / 5);
 }
 
-// Noise alone is λ/n in each direction, 7.5e-5 px²; what is taken off for it leaves a mean over 60 blocks of five that scatters by
-// √(2/300) = 8 % of that, 6e-6. The expectation, 0.2² / 5 = 8e-3, weighs four blocks beside them.
+// Noise alone is λ/n in each direction, 7.5e-5 px²; what is taken off for it leaves a mean over 60
+// blocks of five that scatters by √(2/300) = 8 % of that, 6e-6. The expectation, 0.2² / 5 = 8e-3,
+// weighs four blocks beside them.
 TEST(BlockScatter, noiseIsNoScatter) {
   BlockScatter s;
   s.expect(0.2);

@@ -53,27 +53,32 @@ TEST_P(MonitorKnock, isNoticedInTimeAndItsOnsetFound) {
       EXPECT_NE(trial.verdict().kind, Kind::out_of_step);
       latencies.push_back(*frames);
       for (int i = 0; i < 10; ++i) (void)trial.step();
-      // A recalibration that starts here must hold next to nothing of the old rig: 10 of the 60 frames it wants.
+      // A recalibration that starts here must hold next to nothing of the old rig: 10 of the 60
+      // frames it wants.
       EXPECT_GE(trial.verdict().onset_frame + 10, static_cast<std::uint64_t>(kBefore));
       EXPECT_LE(trial.verdict().onset_frame, static_cast<std::uint64_t>(kBefore) + 15);
     }
   }
   std::sort(latencies.begin(), latencies.end());
-  std::printf("%s: noticed after %d to %d frames, median %d, of %zu drives\n", row.name, latencies.front(), latencies.back(),
-              latencies[latencies.size() / 2], latencies.size());
+  std::printf("%s: noticed after %d to %d frames, median %d, of %zu drives\n", row.name,
+              latencies.front(), latencies.back(), latencies[latencies.size() / 2],
+              latencies.size());
 }
 
-INSTANTIATE_TEST_SUITE_P(
-    Table, MonitorKnock,
-    testing::Values(KnockRow{"pitch_0_2_deg", {0.2, 0, 0}, {0, 0, 0}, 10}, KnockRow{"pitch_0_05_deg", {-0.05, 0, 0}, {0, 0, 0}, 30},
-                    KnockRow{"roll_0_1_deg", {0, 0, 0.1}, {0, 0, 0}, 30}, KnockRow{"yaw_0_3_deg", {0, 0.3, 0}, {0, 0, 0}, 30},
-                    KnockRow{"yaw_minus_0_3_deg", {0, -0.3, 0}, {0, 0, 0}, 30}, KnockRow{"t_y_4_mm", {0, 0, 0}, {0, 4, 0}, 30},
-                    KnockRow{"t_z_10_mm", {0, 0, 0}, {0, 0, 10}, 150}, KnockRow{"pitch_2_deg", {2, 0, 0}, {0, 0, 0}, 10}),
-    [](const auto& row) { return std::string(row.param.name); });
+INSTANTIATE_TEST_SUITE_P(Table, MonitorKnock,
+                         testing::Values(KnockRow{"pitch_0_2_deg", {0.2, 0, 0}, {0, 0, 0}, 10},
+                                         KnockRow{"pitch_0_05_deg", {-0.05, 0, 0}, {0, 0, 0}, 30},
+                                         KnockRow{"roll_0_1_deg", {0, 0, 0.1}, {0, 0, 0}, 30},
+                                         KnockRow{"yaw_0_3_deg", {0, 0.3, 0}, {0, 0, 0}, 30},
+                                         KnockRow{"yaw_minus_0_3_deg", {0, -0.3, 0}, {0, 0, 0}, 30},
+                                         KnockRow{"t_y_4_mm", {0, 0, 0}, {0, 4, 0}, 30},
+                                         KnockRow{"t_z_10_mm", {0, 0, 0}, {0, 0, 10}, 150},
+                                         KnockRow{"pitch_2_deg", {2, 0, 0}, {0, 0, 0}, 10}),
+                         [](const auto& row) { return std::string(row.param.name); });
 
 TEST(Monitor, estimatesASmallKnockWithinItsCovarianceAndALargeOneToFirstOrder) {
-  for (const Vec3& degrees :
-       {Vec3(0.03, 0, 0), Vec3(0, 0.04, 0), Vec3(0.02, -0.04, 0.05), Vec3(0.1, 0, 0), Vec3(0, 0.3, 0), Vec3(0.05, -0.2, 0.1)}) {
+  for (const Vec3& degrees : {Vec3(0.03, 0, 0), Vec3(0, 0.04, 0), Vec3(0.02, -0.04, 0.05),
+                              Vec3(0.1, 0, 0), Vec3(0, 0.3, 0), Vec3(0.05, -0.2, 0.1)}) {
     SCOPED_TRACE(degrees.transpose());
     FeatureDriveOptions o = street(8, 5, 300);
     o.changes = {{150, degrees / kRadian, Vec3::Zero(), 0}};
@@ -84,7 +89,8 @@ TEST(Monitor, estimatesASmallKnockWithinItsCovarianceAndALargeOneToFirstOrder) {
     EXPECT_LT(error.norm() * kRadian, 0.003 + 0.1 * degrees.norm());
     if (degrees.norm() > 0.08) continue;
     // χ² of three beyond 30: one in a million, with room for what is not Gaussian.
-    EXPECT_LT(error.dot(trial.verdict().covariance.topLeftCorner<3, 3>().inverse() * error), 30.0) << error.transpose();
+    EXPECT_LT(error.dot(trial.verdict().covariance.topLeftCorner<3, 3>().inverse() * error), 30.0)
+        << error.transpose();
   }
 }
 
@@ -97,9 +103,12 @@ TEST(Monitor, callsASlowTurnADriftBeforeItReachesThreeHundredthsOfADegree) {
     for (int i = 0; i < kBefore; ++i) ASSERT_EQ(trial.step().kind, Kind::quiet);
     const auto frames = trial.frames_until(2700);  // 0.03°
     ASSERT_TRUE(frames.has_value());
-    const auto as_drift = trial.verdict().kind == Kind::drift ? frames : trial.frames_until(2700 - *frames, Kind::drift);
+    const auto as_drift = trial.verdict().kind == Kind::drift
+                              ? frames
+                              : trial.frames_until(2700 - *frames, Kind::drift);
     EXPECT_TRUE(as_drift.has_value());
-    std::printf("%+.2f deg a minute: noticed after %d frames, %.4f deg\n", rate, *frames, std::abs(rate) * *frames / 1800);
+    std::printf("%+.2f deg a minute: noticed after %d frames, %.4f deg\n", rate, *frames,
+                std::abs(rate) * *frames / 1800);
   }
 }
 
@@ -107,14 +116,17 @@ TEST(Monitor, findsACameraOneFrameOutOfStepWithinASecond) {
   for (const double speed : {3.0, 8.0, 15.0})
     for (const double lag : {1.0, -1.0})
       for (const std::uint64_t from : {0U, 150U}) {
-        SCOPED_TRACE(testing::Message() << lag << " frames at " << speed << " m/s from frame " << from);
+        SCOPED_TRACE(testing::Message()
+                     << lag << " frames at " << speed << " m/s from frame " << from);
         FeatureDriveOptions o = street(speed, 3, 300);
         o.lags = {{from, lag}};
         MonitorTrial trial(o);
         for (std::uint64_t i = 0; i < from; ++i) ASSERT_EQ(trial.step().kind, Kind::quiet);
         const auto frames = trial.frames_until(30, Kind::out_of_step);
-        ASSERT_TRUE(frames.has_value()) << "lag " << trial.verdict().lag_frames << " ± " << trial.verdict().lag_sigma;
-        std::printf("lag %+.0f at %.0f m/s from frame %d: noticed after %d frames\n", lag, speed, static_cast<int>(from), *frames);
+        ASSERT_TRUE(frames.has_value())
+            << "lag " << trial.verdict().lag_frames << " ± " << trial.verdict().lag_sigma;
+        std::printf("lag %+.0f at %.0f m/s from frame %d: noticed after %d frames\n", lag, speed,
+                    static_cast<int>(from), *frames);
         for (int i = 0; i < 60; ++i) (void)trial.step();
         EXPECT_EQ(trial.verdict().kind, Kind::out_of_step);
         EXPECT_NEAR(trial.verdict().lag_frames, lag, 0.2);
@@ -125,7 +137,8 @@ TEST(Monitor, findsALagThatTheCalibrationHasSwallowed) {
   FeatureDriveOptions o = street(8, 4, 300);
   o.lags = {{0, 1.0}};
   Transform T_wrong = o.T_right_left;
-  for (int round = 0; round < 4; ++round) {  // the fixed transform that fits the first two seconds best
+  for (int round = 0; round < 4;
+       ++round) {  // the fixed transform that fits the first two seconds best
     MonitorTrial fit(o, T_wrong, Mat6::Zero());
     for (int i = 0; i < 75; ++i) (void)fit.step();
     Vec6 step = fit.verdict().offset;
@@ -147,7 +160,8 @@ TEST(Monitor, isQuietWhenNothingHappensStandingIncluded) {
     MonitorTrial trial(o, reference.T_right_left, reference.covariance);
     int standing = 0;
     for (int i = 0; i < 2 * 60 * 30; ++i) {
-      ASSERT_EQ(trial.step().kind, Kind::quiet) << "frame " << i << ", statistic " << trial.verdict().statistic;
+      ASSERT_EQ(trial.step().kind, Kind::quiet)
+          << "frame " << i << ", statistic " << trial.verdict().statistic;
       standing += trial.frame().moving ? 0 : 1;
     }
     EXPECT_GT(standing, 900);
@@ -167,7 +181,8 @@ TEST(Monitor, bearsTheErrorsOfAnOdometry) {
     T_now_previous = perturbed(T_now_previous, phi, tau);
   };
   for (int i = 0; i < kBefore; ++i)
-    ASSERT_EQ(trial.step().kind, Kind::quiet) << "frame " << i << ", statistic " << trial.verdict().statistic;
+    ASSERT_EQ(trial.step().kind, Kind::quiet)
+        << "frame " << i << ", statistic " << trial.verdict().statistic;
   EXPECT_TRUE(trial.frames_until(30, Kind::knock).has_value());
 }
 
@@ -193,7 +208,8 @@ TEST(Monitor, staysQuietWhenTheNoiseDoubles) {
   for (int i = 0; i < 300; ++i) drive.next();
   for (int i = 0; i < 300; ++i) {
     drive.next();
-    ASSERT_EQ(trial.show(drive).kind, Kind::quiet) << "frame " << i << ", statistic " << trial.verdict().statistic;
+    ASSERT_EQ(trial.show(drive).kind, Kind::quiet)
+        << "frame " << i << ", statistic " << trial.verdict().statistic;
   }
 }
 
@@ -221,7 +237,8 @@ TEST(Monitor, saysThatItNeedsMotion) {
   MonitorTrial moving(street(8, 9));
   for (int i = 0; i < 60; ++i) (void)moving.step();
   EXPECT_FALSE(moving.verdict().needs_motion);
-  EXPECT_EQ(moving.monitor().frames_agreed(), 57);  // of 59 that move: the shortest window wants three
+  EXPECT_EQ(moving.monitor().frames_agreed(),
+            57);  // of 59 that move: the shortest window wants three
   moving.monitor().reset();
   EXPECT_EQ(moving.monitor().frames_agreed(), 0);
 }
@@ -231,7 +248,8 @@ TEST(Monitor, leavesOutWhatIsNotANumber) {
   const double nan = std::numeric_limits<double>::quiet_NaN();
   dirty.spoil = [nan](std::vector<calibration::AcrossSighting>& sightings) {
     sightings.push_back({{nan, 1}, {2, 3}, 0.5, 4'000'000'001U});
-    sightings.push_back({{10, 1}, {2, std::numeric_limits<double>::infinity()}, 0.5, 4'000'000'002U});
+    sightings.push_back(
+        {{10, 1}, {2, std::numeric_limits<double>::infinity()}, 0.5, 4'000'000'002U});
     sightings.push_back({{10, 1}, {2, 3}, 0, 4'000'000'003U});
     sightings.push_back({{10, 1}, {2, 3}, nan, 4'000'000'004U});
   };
@@ -244,7 +262,8 @@ TEST(Monitor, leavesOutWhatIsNotANumber) {
 }
 
 TEST(Monitor, allocatesNothingWhileLooking) {
-  if (!AllocationGuard::available()) GTEST_SKIP() << "a sanitizer brings its own malloc: there is nothing to count";
+  if (!AllocationGuard::available())
+    GTEST_SKIP() << "a sanitizer brings its own malloc: there is nothing to count";
   FeatureDriveOptions o = street(8, 11);
   o.changes = {{40, Vec3(0, 0.3, 0) / kRadian, Vec3::Zero(), 0}};
   MonitorTrial trial(o);

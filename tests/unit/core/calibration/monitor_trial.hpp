@@ -15,16 +15,18 @@ namespace vergence::test {
 
 inline constexpr double kRadian = 180.0 / std::numbers::pi;
 
-/// A feature drive watched by a Monitor as the estimator would run one: matches are those within `gate_px` of the epipolar line
-/// of the calibration in use.
+/// A feature drive watched by a Monitor as the estimator would run one: matches are those within
+/// `gate_px` of the epipolar line of the calibration in use.
 class MonitorTrial {
  public:
   /// The reference is the true transform, exactly.
-  explicit MonitorTrial(const FeatureDriveOptions& drive, const calibration::MonitorOptions& options = {})
+  explicit MonitorTrial(const FeatureDriveOptions& drive,
+                        const calibration::MonitorOptions& options = {})
       : MonitorTrial(drive, drive.T_right_left, Mat6::Zero(), options) {}
-  MonitorTrial(const FeatureDriveOptions& drive, const Transform& T_right_left, const Mat6& covariance,
-               const calibration::MonitorOptions& options = {})
-      : arena_(std::make_unique<Arena>(calibration::Monitor::memory_needed(options) + calibration::MonitorFeed::memory_needed(kTracks))),
+  MonitorTrial(const FeatureDriveOptions& drive, const Transform& T_right_left,
+               const Mat6& covariance, const calibration::MonitorOptions& options = {})
+      : arena_(std::make_unique<Arena>(calibration::Monitor::memory_needed(options) +
+                                       calibration::MonitorFeed::memory_needed(kTracks))),
         drive_(drive),
         monitor_(options, *arena_),
         feed_(kTracks, *arena_),
@@ -59,8 +61,10 @@ class MonitorTrial {
     return verdict_;
   }
 
-  /// Frames until the verdict is `wanted` or, without one, anything but quiet; nothing within `limit` frames.
-  [[nodiscard]] std::optional<int> frames_until(int limit, std::optional<calibration::MonitorVerdict::Kind> wanted = {}) {
+  /// Frames until the verdict is `wanted` or, without one, anything but quiet; nothing within
+  /// `limit` frames.
+  [[nodiscard]] std::optional<int> frames_until(
+      int limit, std::optional<calibration::MonitorVerdict::Kind> wanted = {}) {
     for (int i = 1; i <= limit; ++i) {
       const auto kind = step().kind;
       if (wanted ? kind == *wanted : kind != calibration::MonitorVerdict::Kind::quiet) return i;
@@ -74,8 +78,9 @@ class MonitorTrial {
   [[nodiscard]] calibration::Monitor& monitor() { return monitor_; }
 
   double gate_px = 20;
-  std::function<void(std::vector<calibration::AcrossSighting>&)> spoil;  // what is done to a frame's matches
-  std::function<void(Transform&)> disturb;                               // and to its motion
+  std::function<void(std::vector<calibration::AcrossSighting>&)>
+      spoil;                                // what is done to a frame's matches
+  std::function<void(Transform&)> disturb;  // and to its motion
 
  private:
   static constexpr std::size_t kTracks = 1000;
@@ -89,7 +94,8 @@ class MonitorTrial {
   calibration::MonitorVerdict verdict_;
 };
 
-/// A calibration as a drive of two seconds through another street finds it: off by its error, with its covariance.
+/// A calibration as a drive of two seconds through another street finds it: off by its error, with
+/// its covariance.
 struct TrialReference {
   Transform T_right_left;
   Mat6 covariance;

@@ -7,7 +7,8 @@
 namespace vergence::calibration {
 namespace {
 
-/// Three cameras; of the second's transform and lens and the third's transform all is known, everything going with everything.
+/// Three cameras; of the second's transform and lens and the third's transform all is known,
+/// everything going with everything.
 RigCalibration known_rig() {
   RigCalibration rig;
   rig.cameras = 3;
@@ -17,7 +18,8 @@ RigCalibration known_rig() {
   const auto fill = [&](int row, double sigma) {
     rig.covariance.set(row, row, sigma * sigma);
     for (int other = 0; other < row; ++other)
-      if (rig.covariance.known(other)) rig.covariance.set(row, other, 0.3 * sigma * std::sqrt(rig.covariance(other, other)));
+      if (rig.covariance.known(other))
+        rig.covariance.set(row, other, 0.3 * sigma * std::sqrt(rig.covariance(other, other)));
   };
   for (int i = 0; i < 12; ++i) fill(extrinsic_row(1) + i, i % 6 < 3 ? 1e-4 : 1e-3);
   for (int i = 0; i < kIntrinsicsSize - 1; ++i) fill(intrinsic_row(1) + i, i < 4 ? 0.5 : 1e-3);
@@ -32,15 +34,19 @@ TEST(Posterior, anHourAddsTheWalkOfAnHourAndFourHoursTwiceItsSigma) {
     RigCalibration rig = before;
     let_drift(hours, options, &rig);
     const double walk = 0.4e-3 * 0.4e-3 * hours;
-    const auto added = [&](int row) { return rig.covariance(row, row) - before.covariance(row, row); };
+    const auto added = [&](int row) {
+      return rig.covariance(row, row) - before.covariance(row, row);
+    };
     for (int i = 0; i < 3; ++i) {
       EXPECT_NEAR(added(extrinsic_row(1) + i), walk, 1e-9 * walk) << i;
-      EXPECT_NEAR(added(extrinsic_row(1) + 3 + i), walk * 0.75 * 0.75, 1e-9 * walk) << i;  // t turns by as much
+      EXPECT_NEAR(added(extrinsic_row(1) + 3 + i), walk * 0.75 * 0.75, 1e-9 * walk)
+          << i;  // t turns by as much
       EXPECT_NEAR(added(extrinsic_row(2) + 3 + i), walk * 0.5 * 0.5, 1e-9 * walk) << i;
     }
     for (int i = 0; i < kIntrinsicsSize - 1; ++i) EXPECT_GT(added(intrinsic_row(1) + i), 0) << i;
     for (int r = 0; r < kRigSize; ++r)
-      for (int c = 0; c < r; ++c) ASSERT_EQ(rig.covariance(r, c), before.covariance(r, c)) << "a walk of each by itself";
+      for (int c = 0; c < r; ++c)
+        ASSERT_EQ(rig.covariance(r, c), before.covariance(r, c)) << "a walk of each by itself";
   }
 }
 
@@ -50,7 +56,8 @@ TEST(Posterior, noTimeAddsNothing) {
     RigCalibration rig = before;
     let_drift(hours, {}, &rig);
     for (int r = 0; r < kRigSize; ++r)
-      for (int c = 0; c <= r; ++c) ASSERT_EQ(rig.covariance(r, c), before.covariance(r, c)) << hours;
+      for (int c = 0; c <= r; ++c)
+        ASSERT_EQ(rig.covariance(r, c), before.covariance(r, c)) << hours;
   }
 }
 
@@ -74,11 +81,14 @@ TEST(Posterior, forgettingTheTransformsLeavesTheLenses) {
   forget_transforms(&rig);
   for (int i = 0; i < 12; ++i) {
     const int row = extrinsic_row(1) + i;
-    EXPECT_GE(rig.covariance(row, row), std::pow(i % 6 < 3 ? 0.1 : 0.1 * 0.5, 2)) << "0.1 rad, and a tenth of the length";
-    for (int other = 0; other < kRigSize; ++other) EXPECT_EQ(rig.covariance(row, other) != 0, other == row) << row << ' ' << other;
+    EXPECT_GE(rig.covariance(row, row), std::pow(i % 6 < 3 ? 0.1 : 0.1 * 0.5, 2))
+        << "0.1 rad, and a tenth of the length";
+    for (int other = 0; other < kRigSize; ++other)
+      EXPECT_EQ(rig.covariance(row, other) != 0, other == row) << row << ' ' << other;
   }
   for (int r = kExtrinsicsSize; r < kRigSize; ++r)
-    for (int c = kExtrinsicsSize; c <= r; ++c) ASSERT_EQ(rig.covariance(r, c), before.covariance(r, c));
+    for (int c = kExtrinsicsSize; c <= r; ++c)
+      ASSERT_EQ(rig.covariance(r, c), before.covariance(r, c));
   EXPECT_EQ(rig.T_camera_left[1].t, before.T_camera_left[1].t);
 }
 

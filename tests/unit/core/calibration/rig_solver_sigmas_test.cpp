@@ -56,8 +56,11 @@ Statistics drives(const CalibrationOptions& options, bool intrinsics_off) {
   out.nees /= kDrives;
   out.within /= 5 * kDrives;
   out.rms = (out.rms / kDrives).cwiseSqrt();
-  std::printf("squared error over its dimension %.3f, %.1f %% within two sigmas; rms %.4f %.4f %.4f mrad, t_y %.3f t_z %.3f mm\n", out.nees,
-              100 * out.within, 1e3 * out.rms[0], 1e3 * out.rms[1], 1e3 * out.rms[2], 1e3 * out.rms[3], 1e3 * out.rms[4]);
+  std::printf(
+      "squared error over its dimension %.3f, %.1f %% within two sigmas; rms %.4f %.4f %.4f mrad, "
+      "t_y %.3f t_z %.3f mm\n",
+      out.nees, 100 * out.within, 1e3 * out.rms[0], 1e3 * out.rms[1], 1e3 * out.rms[2],
+      1e3 * out.rms[3], 1e3 * out.rms[4]);
   return out;
 }
 
@@ -67,7 +70,8 @@ CalibrationOptions held() {
   return o;
 }
 
-// 250 normal errors lie within two sigmas for 95 %, give or take 1.4; ninety leaves room for the drives being few.
+// 250 normal errors lie within two sigmas for 95 %, give or take 1.4; ninety leaves room for the
+// drives being few.
 TEST(RigSolverSigmas, holdUpOverFiftyDrivesWithExactIntrinsics) {
   const Statistics s = drives(held(), false);
   EXPECT_GT(s.nees, 0.5);

@@ -12,7 +12,8 @@ using calibration::CalibrationOptions;
 using calibration::RigSolution;
 using calibration::RigSolveStatus;
 
-constexpr LogStart kRough{2e-3, 0.02, 5e-3, 0.02};  // what cameras posed each for itself are off, and more
+constexpr LogStart kRough{2e-3, 0.02, 5e-3,
+                          0.02};  // what cameras posed each for itself are off, and more
 
 CalibrationOptions held() {
   CalibrationOptions o;
@@ -22,7 +23,8 @@ CalibrationOptions held() {
 }
 
 /// 40 frames from the same rough start.
-RigSolution solve(const FeatureDriveOptions& drive_options, const CalibrationOptions& o, const RigCalibration& rig) {
+RigSolution solve(const FeatureDriveOptions& drive_options, const CalibrationOptions& o,
+                  const RigCalibration& rig) {
   SolverInArena s(o);
   FeatureDrive drive(drive_options);
   log_drive(drive, 40, kRough, s.solver.log());
@@ -33,8 +35,9 @@ TEST(RigSolver, exactTracksGiveTheTransformToTheirRounding) {
   const FeatureDriveOptions drive = exact_drive();
   const RigSolution s = solve(drive, held(), rig_of(drive));
   ASSERT_EQ(s.status, RigSolveStatus::ok);
-  // Pixels are logged as floats: up to 3e-5 px of rounding near 1000 px. One pair of images turns that into 3e-8 rad; over tens of
-  // thousands of sightings rotation is better than that. t_y and t_z follow from directions to points 10 to 20 m away: 1e-6 m at most.
+  // Pixels are logged as floats: up to 3e-5 px of rounding near 1000 px. One pair of images turns
+  // that into 3e-8 rad; over tens of thousands of sightings rotation is better than that. t_y and
+  // t_z follow from directions to points 10 to 20 m away: 1e-6 m at most.
   const Vec5 e = five_errors(s.rig, drive.T_right_left);
   EXPECT_LT(e.head<3>().cwiseAbs().maxCoeff(), 3e-8) << e.transpose();
   EXPECT_LT(e.tail<2>().cwiseAbs().maxCoeff(), 1e-6) << e.transpose();
@@ -63,7 +66,8 @@ TEST(RigSolver, withNoiseTheErrorsAreWithinItsSigmas) {
       EXPECT_GT(C(i, i), 0) << i;
     }
     // Exact intrinsics make nothing wider.
-    for (std::size_t i = 0; i < 6; ++i) EXPECT_NEAR(s.rig.sigma_wide[1][i], s.rig.sigma_noise[1][i], 0.02 * s.rig.sigma_noise[1][i]);
+    for (std::size_t i = 0; i < 6; ++i)
+      EXPECT_NEAR(s.rig.sigma_wide[1][i], s.rig.sigma_noise[1][i], 0.02 * s.rig.sigma_noise[1][i]);
     EXPECT_GT(s.rig.reprojection_px, 0.1);
     EXPECT_LT(s.rig.reprojection_px, 1.0);
   }
@@ -72,12 +76,15 @@ TEST(RigSolver, withNoiseTheErrorsAreWithinItsSigmas) {
 TEST(RigSolver, uncertainIntrinsicsMakeTheSigmasWider) {
   const FeatureDriveOptions drive;
   const RigSolution exact = solve(drive, held(), rig_of(drive));
-  const RigSolution uncertain = solve(drive, held(), rig_of(drive, {drive.left, drive.right}, {1.2, 1.2, 0.5, 0.5}));
+  const RigSolution uncertain =
+      solve(drive, held(), rig_of(drive, {drive.left, drive.right}, {1.2, 1.2, 0.5, 0.5}));
   ASSERT_EQ(exact.status, RigSolveStatus::ok);
   ASSERT_EQ(uncertain.status, RigSolveStatus::ok);
-  EXPECT_EQ(exact.rig.T_camera_left[1].t, uncertain.rig.T_camera_left[1].t) << "held intrinsics are held";
+  EXPECT_EQ(exact.rig.T_camera_left[1].t, uncertain.rig.T_camera_left[1].t)
+      << "held intrinsics are held";
   for (std::size_t i = 0; i < 6; ++i) {
-    EXPECT_NEAR(uncertain.rig.sigma_noise[1][i], exact.rig.sigma_noise[1][i], 1e-12 + 1e-9 * exact.rig.sigma_noise[1][i]);
+    EXPECT_NEAR(uncertain.rig.sigma_noise[1][i], exact.rig.sigma_noise[1][i],
+                1e-12 + 1e-9 * exact.rig.sigma_noise[1][i]);
     EXPECT_GE(uncertain.rig.sigma_wide[1][i], uncertain.rig.sigma_noise[1][i]);
   }
   // Half a pixel of the principal point is 0.4 mrad of pitch, many times what tracks leave open.
@@ -92,10 +99,13 @@ TEST(RigSolver, theFurtherCamerasFocalLengthIsFoundWhenItIsAskedFor) {
   o.estimate_focal_lengths = 1;
   // Two thousandths off, known to five: the tracks outweigh that by far.
   const double sigma = 0.005 * drive.left.fx;
-  const RigSolution s = solve(drive, o, rig_of(drive, {drive.left, drive.left}, {sigma, sigma, 1e-6, 1e-6}));
+  const RigSolution s =
+      solve(drive, o, rig_of(drive, {drive.left, drive.left}, {sigma, sigma, 1e-6, 1e-6}));
   ASSERT_EQ(s.status, RigSolveStatus::ok);
-  EXPECT_NEAR(s.rig.intrinsics[1].fx, drive.right.fx, 0.05 * std::abs(drive.right.fx - drive.left.fx));
-  EXPECT_NEAR(s.rig.intrinsics[1].fy, drive.right.fy, 0.05 * std::abs(drive.right.fy - drive.left.fy));
+  EXPECT_NEAR(s.rig.intrinsics[1].fx, drive.right.fx,
+              0.05 * std::abs(drive.right.fx - drive.left.fx));
+  EXPECT_NEAR(s.rig.intrinsics[1].fy, drive.right.fy,
+              0.05 * std::abs(drive.right.fy - drive.left.fy));
   EXPECT_EQ(s.rig.intrinsics[0].fx, drive.left.fx);
   EXPECT_LT(s.rig.intrinsics[1].sigma[0], sigma);
 }
@@ -153,8 +163,10 @@ TEST(RigSolver, whatHoldsNoTransformSaysSo) {
   SolverInArena linked(held());
   FeatureDrive a(drive);
   log_drive(a, 30, kRough, linked.solver.log());
-  for (std::size_t i = 0; i < linked.solver.log().size(); ++i) linked.solver.log().frame(i).unlinked = false;
-  EXPECT_EQ(linked.solver.solve(rig).status, RigSolveStatus::no_candidate) << "no frame measured the cameras each for itself";
+  for (std::size_t i = 0; i < linked.solver.log().size(); ++i)
+    linked.solver.log().frame(i).unlinked = false;
+  EXPECT_EQ(linked.solver.solve(rig).status, RigSolveStatus::no_candidate)
+      << "no frame measured the cameras each for itself";
 
   SolverInArena one_eyed(held());
   FeatureDrive b(drive);
@@ -169,7 +181,9 @@ TEST(RigSolver, whatHoldsNoTransformSaysSo) {
   Random random(3);
   for (std::size_t i = 0; i < garbage.solver.log().size(); ++i)
     for (auto& s : garbage.solver.log().frame(i).sightings)
-      for (auto& p : s.raw) p = Eigen::Vector2f(static_cast<float>(random.uniform(0, 1023)), static_cast<float>(random.uniform(0, 767)));
+      for (auto& p : s.raw)
+        p = Eigen::Vector2f(static_cast<float>(random.uniform(0, 1023)),
+                            static_cast<float>(random.uniform(0, 767)));
   const RigSolution g = garbage.solver.solve(rig);
   EXPECT_NE(g.status, RigSolveStatus::ok) << g.tracks << " tracks";
 }

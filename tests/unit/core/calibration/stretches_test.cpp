@@ -21,9 +21,11 @@ using calibration::Stretches;
 using calibration::TrackLog;
 
 constexpr std::size_t kStretch = 30, kFeatures = 300, kLogged = 40;
-constexpr std::array<double, 4> kNotGiven = {0, 0, 0, 0};  // sigmas of a lens: priors as the options have them
+constexpr std::array<double, 4> kNotGiven = {
+    0, 0, 0, 0};  // sigmas of a lens: priors as the options have them
 
-/// A drive whose estimator's log is shown to the stretches after every few frames, as an application does.
+/// A drive whose estimator's log is shown to the stretches after every few frames, as an
+/// application does.
 struct Driven {
   FeatureDrive drive;
   CalibrationOptions options;
@@ -39,8 +41,8 @@ struct Driven {
     o.drift_mrad = drift_mrad;
     return o;
   }
-  Driven(const FeatureDriveOptions& o, Stretches::Kind kind, const RigCalibration& told, const RigCalibration& start,
-         double drift_mrad = 0.3)
+  Driven(const FeatureDriveOptions& o, Stretches::Kind kind, const RigCalibration& told,
+         const RigCalibration& start, double drift_mrad = 0.3)
       : drive(o),
         options(small(drift_mrad)),
         arena(Stretches::memory_needed(options, monitor, 2, kFeatures)),
@@ -79,32 +81,40 @@ TEST(Stretches, eachByItselfFindsTheTransform) {
     EXPECT_EQ(s.frames, static_cast<int>(kStretch));
     const Vec5 e = five_errors(s.rig, o.T_right_left);
     const Mat5 C = five_covariance(s.rig.covariance_wide[1]);
-    // Of fifteen errors none is beyond four sigmas; and since a yaw goes with a centre, what both do to the depth is what counts: it is
-    // within the tolerance, and began at 20 m · 3 mrad / 0.75 m, 8 %.
+    // Of fifteen errors none is beyond four sigmas; and since a yaw goes with a centre, what both
+    // do to the depth is what counts: it is within the tolerance, and began at 20 m · 3 mrad / 0.75
+    // m, 8 %.
     for (int i = 0; i < 5; ++i) EXPECT_LT(std::abs(e[i]), 4 * std::sqrt(C(i, i))) << i;
     EXPECT_LT(calibration::depth_difference_percent(rig_of(o), s.rig, 1, 20), 2.0) << e.transpose();
     EXPECT_EQ(s.rig.frames, static_cast<int>(kStretch)) << "of its own frames only";
   }
   EXPECT_EQ(d.stretches.frames(), 90U);
-  EXPECT_NE(d.solved[0].rig.T_camera_left[1].t, d.solved[1].rig.T_camera_left[1].t) << "disjoint tracks";
+  EXPECT_NE(d.solved[0].rig.T_camera_left[1].t, d.solved[1].rig.T_camera_left[1].t)
+      << "disjoint tracks";
 }
 
 TEST(Stretches, joinedTheyKnowMoreEachTime) {
   const FeatureDriveOptions o = little_noise();
   const RigCalibration told = rig_of(o, {o.left, o.right}, kNotGiven);
-  Driven joined(o, Stretches::Kind::joined, told, rough(told)), alone(o, Stretches::Kind::alone, told, rough(told));
+  Driven joined(o, Stretches::Kind::joined, told, rough(told)),
+      alone(o, Stretches::Kind::alone, told, rough(told));
   joined.go(90);
   alone.go(90);
   ASSERT_EQ(joined.solved.size(), 3U);
   ASSERT_EQ(alone.solved.size(), 3U);
   for (const RigSolution& s : joined.solved) ASSERT_EQ(s.status, RigSolveStatus::ok);
-  const auto sigma = [](const RigSolution& s, int row) { return std::sqrt(s.rig.covariance(row, row)); };
+  const auto sigma = [](const RigSolution& s, int row) {
+    return std::sqrt(s.rig.covariance(row, row));
+  };
   for (const int i : {0, 1, 2, 4, 5}) {
     const int row = extrinsic_row(1) + i;
     EXPECT_LT(sigma(joined.solved[2], row), sigma(joined.solved[0], row)) << i;
   }
   const Vec5 e = five_errors(joined.solved[2].rig, o.T_right_left);
-  for (int i = 0; i < 5; ++i) EXPECT_LT(std::abs(e[i]), 4 * std::sqrt(five_covariance(joined.solved[2].rig.covariance_wide[1])(i, i))) << i;
+  for (int i = 0; i < 5; ++i)
+    EXPECT_LT(std::abs(e[i]),
+              4 * std::sqrt(five_covariance(joined.solved[2].rig.covariance_wide[1])(i, i)))
+        << i;
   EXPECT_EQ(joined.solved[2].rig.frames, 3 * static_cast<int>(kStretch));
   // The first knows nothing of others in either kind.
   EXPECT_EQ(joined.solved[0].rig.T_camera_left[1].t, alone.solved[0].rig.T_camera_left[1].t);
@@ -159,7 +169,8 @@ TEST(Stretches, whatIsLeftAtTheEndIsSolvedIfItIsEnough) {
   }
 }
 
-// An angle of the walk of an hour, 0.3 mrad, is many times what 30 frames leave open: after a day what was known hardly counts.
+// An angle of the walk of an hour, 0.3 mrad, is many times what 30 frames leave open: after a day
+// what was known hardly counts.
 TEST(Stretches, whatWasToldLongAgoCountsForLess) {
   const FeatureDriveOptions o = little_noise();
   const RigCalibration told = rig_of(o, {o.left, o.right}, kNotGiven);
@@ -177,7 +188,8 @@ TEST(Stretches, whatWasToldLongAgoCountsForLess) {
   EXPECT_GT(sigma[1], sigma[0]);
 }
 
-// What was known grows old by the time that has passed since, once, whether or not somebody tried to add to it.
+// What was known grows old by the time that has passed since, once, whether or not somebody tried
+// to add to it.
 TEST(Stretches, oneThatFailsLeavesNoTraceInTheNext) {
   const FeatureDriveOptions o = little_noise();
   const RigCalibration told = rig_of(o, {o.left, o.right}, kNotGiven);
@@ -225,7 +237,8 @@ TEST(TrackLogAppend, aFrameOfAnotherLogComesWithItsSightings) {
     }
   }
   for (std::size_t i = 0; i < 4; ++i) to.append(from.frame(i));
-  // Room for three: the oldest went. Room for five sightings: of six, and twice of eight, the rest is left out and counted.
+  // Room for three: the oldest went. Room for five sightings: of six, and twice of eight, the rest
+  // is left out and counted.
   ASSERT_EQ(to.size(), 3U);
   EXPECT_EQ(to.left_out(), 1U + 3U + 3U);
   from.clear();

@@ -13,7 +13,8 @@ namespace {
 struct Log {
   Arena arena;
   TrackLog log;
-  Log(std::size_t frames, std::size_t sightings) : arena(TrackLog::memory_needed(frames, sightings)), log(frames, sightings, arena) {}
+  Log(std::size_t frames, std::size_t sightings)
+      : arena(TrackLog::memory_needed(frames, sightings)), log(frames, sightings, arena) {}
   /// A frame with as many sightings; tracks are numbered 100 · frame + i.
   void frame(std::uint64_t number, std::uint32_t sightings) {
     LoggedFrame f;
@@ -106,7 +107,8 @@ TEST(TrackLog, aScaledWorldLooksTheSame) {
     LoggedFrame f;
     f.number = n;
     f.unlinked = n != 2;
-    f.T_left_world = {exp_so3({random.normal(), random.normal(), random.normal()}), {random.normal(), random.normal(), random.normal()}};
+    f.T_left_world = {exp_so3({random.normal(), random.normal(), random.normal()}),
+                      {random.normal(), random.normal(), random.normal()}};
     f.T_camera_left[1] = {exp_so3({0.01, 0.02, 0.03}), {-0.7, 0.01, 0.02}};
     left.push_back(f.T_left_world);
     right.push_back(f.T_camera_left[1]);
@@ -119,7 +121,10 @@ TEST(TrackLog, aScaledWorldLooksTheSame) {
     // A point of the grown world is in the same direction, by the factor further away.
     EXPECT_LT((f.T_left_world * grown - kFactor * (left[i] * p)).norm(), 1e-12);
     if (f.unlinked) {
-      EXPECT_LT((f.T_camera_left[1] * (f.T_left_world * grown) - kFactor * (right[i] * (left[i] * p))).norm(), 1e-12);
+      EXPECT_LT(
+          (f.T_camera_left[1] * (f.T_left_world * grown) - kFactor * (right[i] * (left[i] * p)))
+              .norm(),
+          1e-12);
     } else {
       EXPECT_EQ(f.T_camera_left[1].t, right[i].t) << "a calibration in use keeps its length";
     }

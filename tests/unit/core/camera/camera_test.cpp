@@ -20,7 +20,8 @@ struct Model {
   double widest;  // rad from the axis up to which this lens is looked at
 };
 
-Intrinsics intrinsics(CameraModelKind kind, int width, int height, const std::array<double, 4>& k, const std::array<double, 5>& d) {
+Intrinsics intrinsics(CameraModelKind kind, int width, int height, const std::array<double, 4>& k,
+                      const std::array<double, 5>& d) {
   Intrinsics i;
   i.kind = kind;
   i.width = width;
@@ -36,16 +37,22 @@ Intrinsics intrinsics(CameraModelKind kind, int width, int height, const std::ar
 /// Real lenses of both kinds and one without distortion.
 std::array<Model, 4> models() {
   using enum CameraModelKind;
-  return {{{"plain", intrinsics(pinhole_radtan, 1226, 370, {707.0912, 707.0912, 601.8873, 183.1104}, {}), 0.8},
-           {"radtan",
-            intrinsics(pinhole_radtan, 752, 480, {458.654, 457.296, 367.215, 248.375},
-                       {-0.28340811, 0.07395907, 0.00019359, 1.76187114e-05, 0}),
-            0.75},
-           {"radtan with k3", intrinsics(pinhole_radtan, 1024, 768, {700, 702, 510, 380}, {0.12, -0.21, -1.1e-3, 2.3e-3, 0.08}), 0.75},
-           {"equidistant",
-            intrinsics(pinhole_equidistant, 512, 512, {190.97847715, 190.97330720, 254.93170605, 256.89744287},
-                       {3.48238940e-3, 7.15034845e-4, -2.05323614e-3, 2.02936735e-4, 0}),
-            1.25}}};
+  return {
+      {{"plain",
+        intrinsics(pinhole_radtan, 1226, 370, {707.0912, 707.0912, 601.8873, 183.1104}, {}), 0.8},
+       {"radtan",
+        intrinsics(pinhole_radtan, 752, 480, {458.654, 457.296, 367.215, 248.375},
+                   {-0.28340811, 0.07395907, 0.00019359, 1.76187114e-05, 0}),
+        0.75},
+       {"radtan with k3",
+        intrinsics(pinhole_radtan, 1024, 768, {700, 702, 510, 380},
+                   {0.12, -0.21, -1.1e-3, 2.3e-3, 0.08}),
+        0.75},
+       {"equidistant",
+        intrinsics(pinhole_equidistant, 512, 512,
+                   {190.97847715, 190.97330720, 254.93170605, 256.89744287},
+                   {3.48238940e-3, 7.15034845e-4, -2.05323614e-3, 2.02936735e-4, 0}),
+        1.25}}};
 }
 
 /// Points from the axis to the lens's edge, all round, near and far.
@@ -54,7 +61,8 @@ std::vector<Vec3> points(const Model& model) {
   for (const double depth : {0.5, 4.0, 1000.0})
     for (const double share : {0.0, 1e-10, 1e-6, 0.1, 0.5, 0.9, 1.0})
       for (int i = 0; i < 8; ++i) {
-        const double around = i * std::numbers::pi / 4 + 0.1, radius = depth * std::tan(share * model.widest);
+        const double around = i * std::numbers::pi / 4 + 0.1,
+                     radius = depth * std::tan(share * model.widest);
         all.emplace_back(radius * std::cos(around), radius * std::sin(around), depth);
       }
   return all;
@@ -66,15 +74,19 @@ TEST(Camera, projectsLikeOpenCv) {
     const cv::Matx33d K(model.k.fx, 0, model.k.cx, 0, model.k.fy, model.k.cy, 0, 0, 1);
     for (const Vec3& p : points(model)) {
       Vec2 pixel;
-      ASSERT_EQ(camera.project(p, &pixel, nullptr), ProjectStatus::ok) << model.name << " " << p.transpose();
+      ASSERT_EQ(camera.project(p, &pixel, nullptr), ProjectStatus::ok)
+          << model.name << " " << p.transpose();
       const std::vector<cv::Point3d> point = {{p.x(), p.y(), p.z()}};
       std::vector<cv::Point2d> expected;
       const auto& d = model.k.distortion;
       if (model.k.kind == CameraModelKind::pinhole_equidistant)
-        cv::fisheye::projectPoints(point, expected, cv::Vec3d(), cv::Vec3d(), K, cv::Vec4d(d[0], d[1], d[2], d[3]));
+        cv::fisheye::projectPoints(point, expected, cv::Vec3d(), cv::Vec3d(), K,
+                                   cv::Vec4d(d[0], d[1], d[2], d[3]));
       else
-        cv::projectPoints(point, cv::Vec3d(), cv::Vec3d(), K, cv::Mat(1, 5, CV_64F, const_cast<double*>(d.data())), expected);
-      // OpenCV leaves the equidistant factor at 1 below r = 1e-8, which is exact to better than this.
+        cv::projectPoints(point, cv::Vec3d(), cv::Vec3d(), K,
+                          cv::Mat(1, 5, CV_64F, const_cast<double*>(d.data())), expected);
+      // OpenCV leaves the equidistant factor at 1 below r = 1e-8, which is exact to better than
+      // this.
       EXPECT_NEAR(pixel.x(), expected[0].x, 1e-9) << model.name << " " << p.transpose();
       EXPECT_NEAR(pixel.y(), expected[0].y, 1e-9) << model.name << " " << p.transpose();
     }
@@ -93,8 +105,10 @@ TEST(Camera, jacobianMatchesCentralDifferences) {
         EXPECT_EQ(camera.project(p + d, &x, nullptr), ProjectStatus::ok);
         return x;
       };
-      // Steps in proportion to the depth: pixels of order 1000 carry 1e-13, so the difference quotient carries 1e-7/depth.
-      EXPECT_TRUE(test::jacobian_matches(J, at, 1e-6, 1e-6 * p.z())) << model.name << " at " << p.transpose();
+      // Steps in proportion to the depth: pixels of order 1000 carry 1e-13, so the difference
+      // quotient carries 1e-7/depth.
+      EXPECT_TRUE(test::jacobian_matches(J, at, 1e-6, 1e-6 * p.z()))
+          << model.name << " at " << p.transpose();
     }
   }
 }
@@ -114,7 +128,8 @@ TEST(Camera, intrinsicsJacobianMatchesCentralDifferences) {
         EXPECT_EQ(Camera(k).project(p, &x, nullptr), ProjectStatus::ok);
         return x;
       };
-      EXPECT_TRUE(test::jacobian_matches(Camera(model.k).intrinsics_jacobian(p), at, 1e-6)) << model.name << " at " << p.transpose();
+      EXPECT_TRUE(test::jacobian_matches(Camera(model.k).intrinsics_jacobian(p), at, 1e-6))
+          << model.name << " at " << p.transpose();
     }
   }
 }
@@ -131,8 +146,10 @@ TEST(Camera, unprojectFindsTheRayOfEveryPointTheLensSees) {
       Vec2 again;
       ASSERT_EQ(camera.project(ray, &again, nullptr), ProjectStatus::ok);
       EXPECT_LT((again - pixel).norm(), 1e-8) << model.name << " " << p.transpose();
-      // The slope of the distorted radius is at least 1/20 inside the range: pixels carry rays to 20 times their error.
-      EXPECT_LT((ray - p / p.z()).norm(), 2e-10 * (1 + (p / p.z()).squaredNorm())) << model.name << " " << p.transpose();
+      // The slope of the distorted radius is at least 1/20 inside the range: pixels carry rays to
+      // 20 times their error.
+      EXPECT_LT((ray - p / p.z()).norm(), 2e-10 * (1 + (p / p.z()).squaredNorm()))
+          << model.name << " " << p.transpose();
     }
   }
 }
@@ -167,7 +184,8 @@ TEST(Camera, behindAndNotANumberLeaveTheOutputsAlone) {
   const double nan = std::numeric_limits<double>::quiet_NaN();
   for (const Model& model : models()) {
     const Camera camera(model.k);
-    for (const Vec3& p : {Vec3(0, 0, 0), Vec3(1, 1, -5), Vec3(0, 0, kMinDepth / 2), Vec3(0, 0, nan)}) {
+    for (const Vec3& p :
+         {Vec3(0, 0, 0), Vec3(1, 1, -5), Vec3(0, 0, kMinDepth / 2), Vec3(0, 0, nan)}) {
       Vec2 pixel(-1, -2);
       Mat23 J = Mat23::Constant(-3);
       EXPECT_EQ(camera.project(p, &pixel, &J), ProjectStatus::behind) << model.name;
@@ -183,8 +201,10 @@ TEST(Camera, behindAndNotANumberLeaveTheOutputsAlone) {
 }
 
 TEST(Camera, foldedLightMakesNoImage) {
-  // r (1 − 0.3 r²) grows up to r = 1/√0.9 ≈ 1.054 and comes back: r = 1.5 would land on the pixel of r = 0.53.
-  Intrinsics k = intrinsics(CameraModelKind::pinhole_radtan, 640, 480, {400, 400, 320, 240}, {-0.3, 0, 0, 0, 0});
+  // r (1 − 0.3 r²) grows up to r = 1/√0.9 ≈ 1.054 and comes back: r = 1.5 would land on the pixel
+  // of r = 0.53.
+  Intrinsics k = intrinsics(CameraModelKind::pinhole_radtan, 640, 480, {400, 400, 320, 240},
+                            {-0.3, 0, 0, 0, 0});
   const Camera camera(k);
   Vec2 pixel(-1, -2);
   Mat23 J = Mat23::Zero();
@@ -196,7 +216,8 @@ TEST(Camera, foldedLightMakesNoImage) {
 }
 
 TEST(Camera, theEquidistantModelWithoutCoefficientsIsTheAngle) {
-  const Camera camera(intrinsics(CameraModelKind::pinhole_equidistant, 512, 512, {200, 200, 256, 256}, {}));
+  const Camera camera(
+      intrinsics(CameraModelKind::pinhole_equidistant, 512, 512, {200, 200, 256, 256}, {}));
   Vec2 pixel;
   ASSERT_EQ(camera.project({1, 0, 1}, &pixel, nullptr), ProjectStatus::ok);
   EXPECT_NEAR(pixel.x(), 256 + 200 * std::numbers::pi / 4, 1e-12 * 512);

@@ -20,11 +20,13 @@ namespace {
 const Geodetic kOrigin{-27.4975, 153.0137, 60};
 constexpr double kDegree = std::numbers::pi / 180.0;
 
-/// A drive over the ground as a smooth function of time: body (forward, left, up) of the INS in enu. About 10 m/s.
+/// A drive over the ground as a smooth function of time: body (forward, left, up) of the INS in
+/// enu. About 10 m/s.
 Transform T_enu_ins(double t) {
   const double w = 0.05;
   const Vec3 p(200 * std::sin(w * t), 150 * (1 - std::cos(w * t)), 3 * std::sin(0.5 * w * t));
-  const Vec3 v(200 * w * std::cos(w * t), 150 * w * std::sin(w * t), 1.5 * w * std::cos(0.5 * w * t));
+  const Vec3 v(200 * w * std::cos(w * t), 150 * w * std::sin(w * t),
+               1.5 * w * std::cos(0.5 * w * t));
   const double yaw = std::atan2(v.y(), v.x()), pitch = -std::atan2(v.z(), v.head<2>().norm());
   return {exp_so3({0, 0, yaw}) * exp_so3({0, pitch, 0}) * exp_so3({0.02 * std::sin(t), 0, 0}), p};
 }
@@ -38,7 +40,8 @@ struct Bench {
   Comparison comparison;
   std::vector<ComparedPose> out;
 
-  explicit Bench(ComparisonOptions o = with_mount()) : options(o), arena(Comparison::bytes_needed(o)), comparison(o, arena) {}
+  explicit Bench(ComparisonOptions o = with_mount())
+      : options(o), arena(Comparison::bytes_needed(o)), comparison(o, arena) {}
 
   static ComparisonOptions with_mount() {
     ComparisonOptions o;
@@ -77,8 +80,10 @@ struct Bench {
   using EditSample = std::function<bool(double, InsSample*)>;  // false: not sent
   using EditPose = std::function<void(double, PoseSample*)>;
   /// INS at 120 Hz, poses at 20 Hz, the pose a little before the INS samples around it.
-  void drive(double from, double to, const EditSample& edit_sample = {}, const EditPose& edit_pose = {}) {
-    for (int i = static_cast<int>(std::lround(from * 120)); i <= static_cast<int>(std::lround(to * 120)); ++i) {
+  void drive(double from, double to, const EditSample& edit_sample = {},
+             const EditPose& edit_pose = {}) {
+    for (int i = static_cast<int>(std::lround(from * 120));
+         i <= static_cast<int>(std::lround(to * 120)); ++i) {
       const double t = i / 120.0;
       if (i % 6 == 0) {
         PoseSample p = pose(t + 0.003);
@@ -99,11 +104,14 @@ struct Bench {
 
 TEST(MountOf, turnsCameraAxesIntoTheVehicles) {
   const Transform T = mount_of({1, 2, 3}, Vec3::Zero());
-  EXPECT_LT((T * Vec3(0, 0, 5) - Vec3(6, 2, 3)).norm(), 1e-15);   // seen ahead is ahead
-  EXPECT_LT((T * Vec3(5, 0, 0) - Vec3(1, -3, 3)).norm(), 1e-15);  // seen on the right is on the right
+  EXPECT_LT((T * Vec3(0, 0, 5) - Vec3(6, 2, 3)).norm(), 1e-15);  // seen ahead is ahead
+  EXPECT_LT((T * Vec3(5, 0, 0) - Vec3(1, -3, 3)).norm(),
+            1e-15);  // seen on the right is on the right
   EXPECT_LT((T * Vec3(0, 5, 0) - Vec3(1, 2, -2)).norm(), 1e-15);  // seen below is below
   // A rig turned to the left by yaw sees ahead of it what lies ahead and left of the INS.
-  EXPECT_LT((mount_of(Vec3::Zero(), {0, 0, std::numbers::pi / 2}) * Vec3(0, 0, 1) - Vec3(0, 1, 0)).norm(), 1e-15);
+  EXPECT_LT(
+      (mount_of(Vec3::Zero(), {0, 0, std::numbers::pi / 2}) * Vec3(0, 0, 1) - Vec3(0, 1, 0)).norm(),
+      1e-15);
 }
 
 TEST(Comparison, idealInsAndTruePosesAgreeThroughTheWholeChain) {
@@ -122,7 +130,8 @@ TEST(Comparison, idealInsAndTruePosesAgreeThroughTheWholeChain) {
     EXPECT_LT(c.error_enu.norm(), 1e-3);
     EXPECT_LT(std::abs(c.error_yaw), 0.001 * kDegree);
     EXPECT_LT((c.reference.T_enu_left.t - b.T_enu_left(t).t).norm(), 1e-3);
-    EXPECT_LT(rotation_angle(c.reference.T_enu_left.R.transpose() * b.T_enu_left(t).R), 0.001 * kDegree);
+    EXPECT_LT(rotation_angle(c.reference.T_enu_left.R.transpose() * b.T_enu_left(t).R),
+              0.001 * kDegree);
     EXPECT_LT((b.plane.to_enu(c.ours.position) - b.T_enu_left(t).t).norm(), 1e-3);
     EXPECT_FALSE(c.scale_disagrees);
   }
@@ -151,7 +160,9 @@ TEST(Comparison, aShortDriveIsPlacedAtItsEnd) {
   EXPECT_EQ(b.comparison.placement().revision, 0U);
   b.finish();
   ASSERT_EQ(b.comparison.placement().revision, 1U);
-  EXPECT_LT((b.comparison.placement().T_enu_world * b.pose(3).T_world_left.t - b.T_enu_left(3).t).norm(), 1e-3);
+  EXPECT_LT(
+      (b.comparison.placement().T_enu_world * b.pose(3).T_world_left.t - b.T_enu_left(3).t).norm(),
+      1e-3);
 }
 
 TEST(Comparison, theErrorIsTheDriftAfterThePlacement) {
@@ -166,7 +177,8 @@ TEST(Comparison, theErrorIsTheDriftAfterThePlacement) {
   const ComparedPose& c = b.out[b.out.size() - 2];
   ASSERT_TRUE(c.compared);
   EXPECT_LT((c.error_enu - b.T_enu_left(0).R * drift).norm(), 1e-3);
-  // The world's y axis points down but for the mounting and the slope at the start; the view is level but for them.
+  // The world's y axis points down but for the mounting and the slope at the start; the view is
+  // level but for them.
   EXPECT_NEAR(c.error_yaw, 0.01, 0.001);
   EXPECT_EQ(b.comparison.placement().revision, 1U);  // frozen
 }
@@ -336,7 +348,8 @@ TEST(Comparison, aWrongScaleIsSeen) {
   // A receiver that knows 2.5 m cannot tell 3 % of 200 m: 4 √2 2.5 / 200 = 7 %.
   Bench b;
   b.drive(
-      0, 60, [](double, InsSample* s) { return s->position_sigma = 2.5, true; }, [](double, PoseSample* p) { p->T_world_left.t *= 1.03; });
+      0, 60, [](double, InsSample* s) { return s->position_sigma = 2.5, true; },
+      [](double, PoseSample* p) { p->T_world_left.t *= 1.03; });
   EXPECT_FALSE(b.out[b.out.size() - 2].scale_disagrees);
 }
 
@@ -421,7 +434,8 @@ TEST(Comparison, aRealDriveWithKnownAnswersToTheMillimetre) {
     ASSERT_EQ(b.out.back().ins, InsMatch::ok);
     EXPECT_LT((b.out.back().reference.T_enu_left.t - Vec3(row[4], row[5], row[6])).norm(), 1e-3);
   }
-  // Attitude level in the axes at each place, 600 m apart: the tangent plane turns by 1e-4 rad, the placement's roll and pitch by less.
+  // Attitude level in the axes at each place, 600 m apart: the tangent plane turns by 1e-4 rad, the
+  // placement's roll and pitch by less.
   EXPECT_GT(b.comparison.counters().compared, 3000U);
   EXPECT_LT(b.comparison.placement().residual, 1e-3);
   EXPECT_LT(rotation_angle(b.comparison.placement().T_enu_world.R * T_world_enu.R), 1e-4);

@@ -18,11 +18,17 @@ struct KnownPoint {
   Vec3 enu;  // m, six decimals
 };
 
-// Both hemispheres, computed with GeographicLib's CartConvert and checked through earth-centred coordinates.
+// Both hemispheres, computed with GeographicLib's CartConvert and checked through earth-centred
+// coordinates.
 const std::array kKnown = {
-    KnownPoint{{49.011212804408, 8.4228850417969, 112.83492279053}, {49.012, 8.4235, 113.5}, {44.987583, 87.545734, 0.664317}},
-    KnownPoint{{-27.4975, 153.0137, 40}, {-27.4980, 153.0142, 41.5}, {49.407283, -55.406162, 1.499567}},
-    KnownPoint{{-27.4975, 153.0137, 40}, {-27.5100, 152.9990, 38}, {-1452.415758, -1385.238005, -2.316367}},
+    KnownPoint{{49.011212804408, 8.4228850417969, 112.83492279053},
+               {49.012, 8.4235, 113.5},
+               {44.987583, 87.545734, 0.664317}},
+    KnownPoint{
+        {-27.4975, 153.0137, 40}, {-27.4980, 153.0142, 41.5}, {49.407283, -55.406162, 1.499567}},
+    KnownPoint{{-27.4975, 153.0137, 40},
+               {-27.5100, 152.9990, 38},
+               {-1452.415758, -1385.238005, -2.316367}},
 };
 
 TEST(LocalTangentPlane, knownPointsOfBothHemispheres) {

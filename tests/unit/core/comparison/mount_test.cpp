@@ -45,7 +45,8 @@ struct How {
   double late_s = 0;  // of the reference's stamps
 };
 
-/// The left camera as an odometry would have it (in its own world, drifting a little), and the mock's INS.
+/// The left camera as an odometry would have it (in its own world, drifting a little), and the
+/// mock's INS.
 Drove drove(const How& how) {
   mock::DriveOptions options;
   options.kind = how.kind;
@@ -80,7 +81,9 @@ Drove drove(const How& how) {
     const Mat3 R_enu_local = plane.rotation_from(s.position);
     MountReference r;
     r.stamp = kStart + Duration::seconds(t + how.late_s);
-    r.T_enu_ref.R = R_enu_local * Eigen::Quaterniond(s.q_enu_ins[3], s.q_enu_ins[0], s.q_enu_ins[1], s.q_enu_ins[2]).toRotationMatrix();
+    r.T_enu_ref.R = R_enu_local * Eigen::Quaterniond(s.q_enu_ins[3], s.q_enu_ins[0], s.q_enu_ins[1],
+                                                     s.q_enu_ins[2])
+                                      .toRotationMatrix();
     r.T_enu_ref.t = plane.to_enu(s.position);
     r.v_enu_ref = R_enu_local * Vec3(s.velocity_enu[0], s.velocity_enu[1], s.velocity_enu[2]);
     r.has_velocity = how.velocity;
@@ -107,7 +110,8 @@ TEST(Mount, anIdealReferenceGivesItsMount) {
       ASSERT_TRUE(m.rotation[k].observable) << k;
       EXPECT_NEAR(m.rotation[k].value, true_turn()[static_cast<int>(k)], 1e-4);
     }
-    for (std::size_t k = 0; k < 2; ++k) EXPECT_NEAR(m.lever_arm[k].value, kLever[static_cast<int>(k)], 0.02);
+    for (std::size_t k = 0; k < 2; ++k)
+      EXPECT_NEAR(m.lever_arm[k].value, kLever[static_cast<int>(k)], 0.02);
     ASSERT_TRUE(m.clock_offset.observable);
     EXPECT_NEAR(m.clock_offset.value, 0.012, 1e-3);
   }
@@ -131,14 +135,18 @@ void sigmas_hold(bool velocity) {
       const int i = static_cast<int>(k);
       sigmas[k].push_back(m.rotation[k].sigma);
       sigmas[3 + k].push_back(m.lever_arm[k].sigma);
-      if (m.rotation[k].observable) ratios[k].push_back((m.rotation[k].value - true_turn()[i]) / m.rotation[k].sigma);
-      if (m.lever_arm[k].observable) ratios[3 + k].push_back((m.lever_arm[k].value - kLever[i]) / m.lever_arm[k].sigma);
+      if (m.rotation[k].observable)
+        ratios[k].push_back((m.rotation[k].value - true_turn()[i]) / m.rotation[k].sigma);
+      if (m.lever_arm[k].observable)
+        ratios[3 + k].push_back((m.lever_arm[k].value - kLever[i]) / m.lever_arm[k].sigma);
     }
     if (m.lever_arm[2].observable) ++heights;
     sigmas[6].push_back(m.clock_offset.sigma);
-    if (m.clock_offset.observable) ratios[6].push_back((m.clock_offset.value - 0.02) / m.clock_offset.sigma);
+    if (m.clock_offset.observable)
+      ratios[6].push_back((m.clock_offset.value - 0.02) / m.clock_offset.sigma);
   }
-  // By position a car's small pitch and roll show no height; to the velocity the springs' quick motion does.
+  // By position a car's small pitch and roll show no height; to the velocity the springs' quick
+  // motion does.
   EXPECT_EQ(heights, velocity ? kDrives : 0);
   for (std::size_t k = 0; k < ratios.size(); ++k) {
     if (k == 5 && !velocity) continue;
@@ -146,13 +154,16 @@ void sigmas_hold(bool velocity) {
     double sum = 0, worst = 0;
     for (const double r : ratios[k]) sum += r * r, worst = std::max(worst, std::abs(r));
     const double rms = std::sqrt(sum / static_cast<double>(ratios[k].size()));
-    // The root mean square of 30 normal ratios is within 1 ± 0.4 at three sigma; a sigma up to twice too large is still an honest one.
+    // The root mean square of 30 normal ratios is within 1 ± 0.4 at three sigma; a sigma up to
+    // twice too large is still an honest one.
     EXPECT_GT(rms, 0.4) << "parameter " << k;
     EXPECT_LT(rms, 1.4) << "parameter " << k;
     EXPECT_LT(worst, 3.8) << "parameter " << k;
     std::sort(sigmas[k].begin(), sigmas[k].end());
-    std::printf("[ figures  ] parameter %zu: %zu drives, sigma %.4f to %.4f, rms of error over sigma %.2f, worst %.2f\n", k,
-                ratios[k].size(), sigmas[k].front(), sigmas[k].back(), rms, worst);
+    std::printf(
+        "[ figures  ] parameter %zu: %zu drives, sigma %.4f to %.4f, rms of error over sigma %.2f, "
+        "worst %.2f\n",
+        k, ratios[k].size(), sigmas[k].front(), sigmas[k].back(), rms, worst);
   }
 }
 
@@ -183,7 +194,8 @@ TEST(Mount, whatCannotBeDoneIsToldAndLeavesTheResultAlone) {
   EXPECT_EQ(estimate_mount({}, {}, nominal(), {}, &m), MountStatus::too_few);
   d = drove({});
   for (MountReference& r : d.reference) r.stamp = r.stamp + Duration::seconds(1e6);
-  EXPECT_EQ(estimate_mount(d.estimate, d.reference, nominal(), {}, &m), MountStatus::too_few) << "no time in common";
+  EXPECT_EQ(estimate_mount(d.estimate, d.reference, nominal(), {}, &m), MountStatus::too_few)
+      << "no time in common";
   EXPECT_EQ(m.moments, 77U);
 }
 

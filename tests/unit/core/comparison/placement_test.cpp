@@ -16,7 +16,8 @@ const Mat3 kCameraInEnu = (Mat3() << 0, 0, 1, -1, 0, 0, 0, -1, 0).finished();  /
 Transform truth() { return {exp_so3({0.02, -0.03, 2.5}) * kCameraInEnu, {30, -40, 5}}; }
 
 /// A drive forward (z of the world) with a bend, exact, 10 m/s.
-std::vector<PlacementPair> drive(double length, double bend, int count, const Vec3& sigma = {2.5, 5.0, 0.0087}) {
+std::vector<PlacementPair> drive(double length, double bend, int count,
+                                 const Vec3& sigma = {2.5, 5.0, 0.0087}) {
   std::vector<PlacementPair> pairs;
   for (int i = 0; i < count; ++i) {
     const double s = length * i / (count - 1);
@@ -33,14 +34,17 @@ std::vector<PlacementPair> drive(double length, double bend, int count, const Ve
   return pairs;
 }
 
-double rotation_error(const Placement& p) { return rotation_angle(p.T_enu_world.R * truth().R.transpose()); }
+double rotation_error(const Placement& p) {
+  return rotation_angle(p.T_enu_world.R * truth().R.transpose());
+}
 
 TEST(FitPlacement, findsAnExactPlacement) {
   Placement placement;
   const auto pairs = drive(100, 0.3, 200);
   ASSERT_EQ(fit_placement(pairs, kCorrelation, &placement), PlacementStatus::ok);
   EXPECT_LT(rotation_error(placement), 1e-10);
-  for (const PlacementPair& p : pairs) EXPECT_LT((placement.T_enu_world * p.p_world_left - p.p_enu_left).norm(), 1e-8);
+  for (const PlacementPair& p : pairs)
+    EXPECT_LT((placement.T_enu_world * p.p_world_left - p.p_enu_left).norm(), 1e-8);
   EXPECT_LT(placement.residual, 1e-8);
   EXPECT_EQ(placement.revision, 1U);
   EXPECT_EQ(placement.pairs, 200);
@@ -84,7 +88,8 @@ TEST(FitPlacement, aStraightRoadTakesItsRollFromTheAttitude) {
 }
 
 TEST(FitPlacement, attitudeAndPositionsShareThePitchByTheirSigmas) {
-  // Positions say level; the attitude of the INS is pitched by 10 mrad across the way. The result lies where the weights put it.
+  // Positions say level; the attitude of the INS is pitched by 10 mrad across the way. The result
+  // lies where the weights put it.
   const double wrong = 0.01;
   const auto pitched = [&](double tilt_sigma) {
     auto pairs = drive(100, 0.0, 200, {2.5, 5.0, tilt_sigma});
@@ -104,7 +109,8 @@ TEST(FitPlacement, attitudeAndPositionsShareThePitchByTheirSigmas) {
 }
 
 TEST(FitPlacement, sigmaOfTheHeadingIsWhatTheReceiverCanTell) {
-  // A line of length L with n_eff independent positions: σ_yaw = σ √12 / (L √n_eff), for many pairs.
+  // A line of length L with n_eff independent positions: σ_yaw = σ √12 / (L √n_eff), for many
+  // pairs.
   Placement placement;
   ASSERT_EQ(fit_placement(drive(100, 0.0, 1000), kCorrelation, &placement), PlacementStatus::ok);
   const double expected = 2.5 * std::sqrt(12.0) / (100.0 * std::sqrt(2.0));
@@ -114,7 +120,8 @@ TEST(FitPlacement, sigmaOfTheHeadingIsWhatTheReceiverCanTell) {
 }
 
 TEST(FitPlacement, sigmasHoldOverManyNoisyDrives) {
-  // White errors and a correlation short enough that each pair counts: the squared error over the variance averages to one a parameter.
+  // White errors and a correlation short enough that each pair counts: the squared error over the
+  // variance averages to one a parameter.
   Random random(11);
   const int runs = 300;
   Vec3 nees = Vec3::Zero();
@@ -127,9 +134,13 @@ TEST(FitPlacement, sigmasHoldOverManyNoisyDrives) {
     }
     Placement placement;
     ASSERT_EQ(fit_placement(pairs, Duration::milliseconds(1), &placement), PlacementStatus::ok);
-    nees += log_so3(placement.T_enu_world.R * truth().R.transpose()).cwiseQuotient(placement.rotation_sigma).cwiseAbs2() / runs;
+    nees += log_so3(placement.T_enu_world.R * truth().R.transpose())
+                .cwiseQuotient(placement.rotation_sigma)
+                .cwiseAbs2() /
+            runs;
   }
-  // χ² of 300 degrees of freedom over 300: σ = √(2/300) = 0.082; four of them, and the excess factor may only widen the sigmas.
+  // χ² of 300 degrees of freedom over 300: σ = √(2/300) = 0.082; four of them, and the excess
+  // factor may only widen the sigmas.
   for (int axis = 0; axis < 3; ++axis) EXPECT_NEAR(nees[axis], 1.0, 0.35) << axis;
 }
 
@@ -138,7 +149,8 @@ TEST(FitPlacement, residualsBeyondTheSigmasWidenTheResult) {
   auto pairs = drive(100, 0.3, 200, {0.01, 0.01, 1e-4});
   Placement exact, noisy;
   ASSERT_EQ(fit_placement(pairs, kCorrelation, &exact), PlacementStatus::ok);
-  for (PlacementPair& p : pairs) p.p_enu_left += 0.1 * Vec3(random.normal(), random.normal(), random.normal());
+  for (PlacementPair& p : pairs)
+    p.p_enu_left += 0.1 * Vec3(random.normal(), random.normal(), random.normal());
   ASSERT_EQ(fit_placement(pairs, kCorrelation, &noisy), PlacementStatus::ok);
   EXPECT_NEAR(noisy.rotation_sigma.z() / exact.rotation_sigma.z(), 10.0, 1.0);
   EXPECT_NEAR(noisy.residual, 0.1 * std::sqrt(3.0), 0.02);
@@ -148,8 +160,10 @@ TEST(FitPlacement, saysWhatDoesNotHold) {
   Placement placement;
   placement.revision = 7;
   EXPECT_EQ(fit_placement(drive(100, 0.3, 2), kCorrelation, &placement), PlacementStatus::too_few);
-  EXPECT_EQ(fit_placement(drive(0.5, 0.0, 50), kCorrelation, &placement), PlacementStatus::not_held);  // half a metre against 2.5 m
-  EXPECT_EQ(fit_placement(drive(0.0, 0.0, 50), kCorrelation, &placement), PlacementStatus::not_held);
+  EXPECT_EQ(fit_placement(drive(0.5, 0.0, 50), kCorrelation, &placement),
+            PlacementStatus::not_held);  // half a metre against 2.5 m
+  EXPECT_EQ(fit_placement(drive(0.0, 0.0, 50), kCorrelation, &placement),
+            PlacementStatus::not_held);
   auto pairs = drive(100, 0.3, 50);
   pairs[20].p_enu_left.x() = std::nan("");
   EXPECT_EQ(fit_placement(pairs, kCorrelation, &placement), PlacementStatus::not_held);

@@ -14,7 +14,8 @@ constexpr double kPi = std::numbers::pi;
 // Sums of some hundred terms of the order of a hundred metres in doubles.
 constexpr double kRounding = 1e-11;
 
-StampedPose pose(double seconds, const Vec3& t = Vec3::Zero(), const Vec3& rotation_vector = Vec3::Zero()) {
+StampedPose pose(double seconds, const Vec3& t = Vec3::Zero(),
+                 const Vec3& rotation_vector = Vec3::Zero()) {
   return {Stamp{} + Duration::seconds(seconds), {exp_so3(rotation_vector), t}};
 }
 
@@ -35,24 +36,30 @@ std::vector<StampedPose> line(int count, double spacing, const Vec3& direction =
 }
 
 std::vector<StampedPose> moved(const Transform& T, double scale, std::vector<StampedPose> poses) {
-  for (StampedPose& p : poses) p.T_world_body = {T.R * p.T_world_body.R, T.R * (scale * p.T_world_body.t) + T.t};
+  for (StampedPose& p : poses)
+    p.T_world_body = {T.R * p.T_world_body.R, T.R * (scale * p.T_world_body.t) + T.t};
   return poses;
 }
 
 TEST(Associate, interpolatesPositionLinearlyAndRotationAlongTheShorterArc) {
   // From +170° to −170° about z the short way leads over 180°.
-  const std::vector<StampedPose> reference{pose(0, {0, 0, 0}, {0, 0, 170 * kPi / 180}), pose(0.1, {4, 2, 0}, {0, 0, -170 * kPi / 180})};
+  const std::vector<StampedPose> reference{pose(0, {0, 0, 0}, {0, 0, 170 * kPi / 180}),
+                                           pose(0.1, {4, 2, 0}, {0, 0, -170 * kPi / 180})};
   const std::vector<StampedPose> estimate{pose(0.025, {7, 7, 7})};
   const MatchedTrajectories m = associate(estimate, reference, {});
   ASSERT_EQ(m.reference.size(), 1U);
   EXPECT_LT((m.reference[0].T_world_body.t - Vec3(1, 0.5, 0)).norm(), 1e-14);
-  EXPECT_LT(rotation_angle(m.reference[0].T_world_body.R.transpose() * exp_so3({0, 0, 175 * kPi / 180})), 1e-12);
+  EXPECT_LT(
+      rotation_angle(m.reference[0].T_world_body.R.transpose() * exp_so3({0, 0, 175 * kPi / 180})),
+      1e-12);
   EXPECT_EQ(m.reference[0].stamp, estimate[0].stamp);
 }
 
 TEST(Associate, countsWhatLiesBeforeAfterAndInAHole) {
-  const std::vector<StampedPose> reference{pose(1.0, {1, 0, 0}), pose(1.2, {2, 0, 0}), pose(1.5, {3, 0, 0}), pose(1.6, {4, 0, 0})};
-  const std::vector<StampedPose> estimate{pose(0.9), pose(1.0), pose(1.1), pose(1.3), pose(1.5), pose(1.6), pose(1.7)};
+  const std::vector<StampedPose> reference{pose(1.0, {1, 0, 0}), pose(1.2, {2, 0, 0}),
+                                           pose(1.5, {3, 0, 0}), pose(1.6, {4, 0, 0})};
+  const std::vector<StampedPose> estimate{pose(0.9), pose(1.0), pose(1.1), pose(1.3),
+                                          pose(1.5), pose(1.6), pose(1.7)};
   EvaluationOptions options;
   options.max_gap = Duration::milliseconds(200);  // exactly the first interval: still bridged
   const MatchedTrajectories m = associate(estimate, reference, options);
@@ -62,19 +69,22 @@ TEST(Associate, countsWhatLiesBeforeAfterAndInAHole) {
   ASSERT_EQ(m.reference.size(), 4U);
   EXPECT_DOUBLE_EQ(m.reference[0].T_world_body.t.x(), 1);
   EXPECT_DOUBLE_EQ(m.reference[1].T_world_body.t.x(), 1.5);
-  EXPECT_DOUBLE_EQ(m.reference[2].T_world_body.t.x(), 3);  // a reference at the very stamp counts, whatever the hole beside it
+  EXPECT_DOUBLE_EQ(m.reference[2].T_world_body.t.x(),
+                   3);  // a reference at the very stamp counts, whatever the hole beside it
   EXPECT_DOUBLE_EQ(m.reference[3].T_world_body.t.x(), 4);
 }
 
 TEST(Associate, nearestTakesTheNeighbourAsItIsUpToTheLimitInclusive) {
   const std::vector<StampedPose> reference{pose(1.0, {1, 0, 0}), pose(1.1, {2, 0, 0})};
-  const std::vector<StampedPose> estimate{pose(0.994), pose(0.995), pose(1.004), pose(1.05), pose(1.097), pose(1.105), pose(1.106)};
+  const std::vector<StampedPose> estimate{pose(0.994), pose(0.995), pose(1.004), pose(1.05),
+                                          pose(1.097), pose(1.105), pose(1.106)};
   EvaluationOptions options;
   options.association = Association::nearest;
   const MatchedTrajectories m = associate(estimate, reference, options);
   ASSERT_EQ(m.reference.size(), 4U);
   const double expected[] = {1, 1, 2, 2};
-  for (std::size_t i = 0; i < 4; ++i) EXPECT_DOUBLE_EQ(m.reference[i].T_world_body.t.x(), expected[i]) << i;
+  for (std::size_t i = 0; i < 4; ++i)
+    EXPECT_DOUBLE_EQ(m.reference[i].T_world_body.t.x(), expected[i]) << i;
   EXPECT_EQ(m.before, 1U);
   EXPECT_EQ(m.gap, 1U);
   EXPECT_EQ(m.after, 1U);
@@ -97,15 +107,17 @@ TEST(Align, findsTheRigidMotionAndTheScaleThatWereApplied) {
   const std::vector<StampedPose> estimate = moved(T_estimate_reference, 1.02, reference);
   const Alignment sim3 = align(estimate, reference, AlignmentScale::free);
   EXPECT_NEAR(sim3.scale, 1 / 1.02, kRounding);
-  EXPECT_LT((sim3.R_reference_estimate * T_estimate_reference.R - Mat3::Identity()).norm(), kRounding);
+  EXPECT_LT((sim3.R_reference_estimate * T_estimate_reference.R - Mat3::Identity()).norm(),
+            kRounding);
   for (std::size_t i = 0; i < estimate.size(); ++i)
-    EXPECT_LT(
-        (sim3.scale * (sim3.R_reference_estimate * estimate[i].T_world_body.t) + sim3.t_reference_estimate - reference[i].T_world_body.t)
-            .norm(),
-        1e2 * kRounding);
+    EXPECT_LT((sim3.scale * (sim3.R_reference_estimate * estimate[i].T_world_body.t) +
+               sim3.t_reference_estimate - reference[i].T_world_body.t)
+                  .norm(),
+              1e2 * kRounding);
   const Alignment se3 = align(estimate, reference, AlignmentScale::one);
   EXPECT_EQ(se3.scale, 1.0);
-  EXPECT_LT((se3.R_reference_estimate * T_estimate_reference.R - Mat3::Identity()).norm(), kRounding);
+  EXPECT_LT((se3.R_reference_estimate * T_estimate_reference.R - Mat3::Identity()).norm(),
+            kRounding);
   EXPECT_FALSE(se3.roll_unobservable);
 }
 
@@ -113,27 +125,31 @@ TEST(Align, neverReflects) {
   const std::vector<StampedPose> reference = helix(80);
   std::vector<StampedPose> mirrored = reference;
   for (StampedPose& p : mirrored) p.T_world_body.t.z() *= -1.0;
-  EXPECT_NEAR(align(mirrored, reference, AlignmentScale::one).R_reference_estimate.determinant(), 1.0, kRounding);
+  EXPECT_NEAR(align(mirrored, reference, AlignmentScale::one).R_reference_estimate.determinant(),
+              1.0, kRounding);
   // A flat path leaves the sign of the third direction to the fit: it stays a rotation, too.
   std::vector<StampedPose> flat = reference;
   for (StampedPose& p : flat) p.T_world_body.t.z() = 0;
-  const Alignment a = align(moved({exp_so3({0.1, 0.2, 3.0}), {1, 2, 3}}, 1.0, flat), flat, AlignmentScale::one);
+  const Alignment a =
+      align(moved({exp_so3({0.1, 0.2, 3.0}), {1, 2, 3}}, 1.0, flat), flat, AlignmentScale::one);
   EXPECT_NEAR(a.R_reference_estimate.determinant(), 1.0, kRounding);
-  EXPECT_LT((a.R_reference_estimate * exp_so3({0.1, 0.2, 3.0}) - Mat3::Identity()).norm(), 1e2 * kRounding);
+  EXPECT_LT((a.R_reference_estimate * exp_so3({0.1, 0.2, 3.0}) - Mat3::Identity()).norm(),
+            1e2 * kRounding);
 }
 
 TEST(Align, noMotionWithinReachFitsBetter) {
   Random random(7);
   const std::vector<StampedPose> reference = helix(60);
   std::vector<StampedPose> estimate = moved({exp_so3({0, 0.5, 0}), {1, 1, 1}}, 1.0, reference);
-  for (StampedPose& p : estimate) p.T_world_body.t += 0.1 * Vec3(random.normal(), random.normal(), random.normal());
+  for (StampedPose& p : estimate)
+    p.T_world_body.t += 0.1 * Vec3(random.normal(), random.normal(), random.normal());
   const Alignment a = align(estimate, reference, AlignmentScale::one);
   const auto cost = [&](const Vec3& phi, const Vec3& tau) {
     double sum = 0;
     for (std::size_t i = 0; i < estimate.size(); ++i)
-      sum +=
-          (exp_so3(phi) * a.R_reference_estimate * estimate[i].T_world_body.t + a.t_reference_estimate + tau - reference[i].T_world_body.t)
-              .squaredNorm();
+      sum += (exp_so3(phi) * a.R_reference_estimate * estimate[i].T_world_body.t +
+              a.t_reference_estimate + tau - reference[i].T_world_body.t)
+                 .squaredNorm();
     return sum;
   };
   const double best = cost(Vec3::Zero(), Vec3::Zero());
@@ -147,7 +163,8 @@ TEST(Align, noMotionWithinReachFitsBetter) {
 TEST(Align, saysWhenAStraightPathLeavesTheRollOpen) {
   Random random(3);
   std::vector<StampedPose> reference = line(50, 1.2, Vec3::UnitZ()), estimate = reference;
-  for (StampedPose& p : estimate) p.T_world_body.t += 0.03 * Vec3(random.normal(), random.normal(), random.normal());
+  for (StampedPose& p : estimate)
+    p.T_world_body.t += 0.03 * Vec3(random.normal(), random.normal(), random.normal());
   EXPECT_TRUE(align(estimate, reference, AlignmentScale::one).roll_unobservable);
   EXPECT_TRUE(align(reference, reference, AlignmentScale::one).roll_unobservable);
 }
@@ -155,8 +172,10 @@ TEST(Align, saysWhenAStraightPathLeavesTheRollOpen) {
 TEST(Evaluate, averagesAsDefined) {
   const std::vector<StampedPose> reference = helix(40);
   std::vector<StampedPose> estimate = reference;
-  // ±d along z on alternating poses: no rigid motion takes it away but to O(d²), and the unaligned figures are exact.
-  for (std::size_t i = 0; i < estimate.size(); ++i) estimate[i].T_world_body.t.z() += i % 2 == 0 ? 0.0 : (i % 4 == 1 ? 0.3 : 0.1);
+  // ±d along z on alternating poses: no rigid motion takes it away but to O(d²), and the unaligned
+  // figures are exact.
+  for (std::size_t i = 0; i < estimate.size(); ++i)
+    estimate[i].T_world_body.t.z() += i % 2 == 0 ? 0.0 : (i % 4 == 1 ? 0.3 : 0.1);
   const TrajectoryEvaluation e = evaluate(estimate, reference, {});
   ASSERT_EQ(e.status, EvaluationStatus::ok);
   EXPECT_EQ(e.matched, 40U);
@@ -170,7 +189,8 @@ TEST(Evaluate, averagesAsDefined) {
 
 TEST(Evaluate, pathsAndScaleOfAnEstimateThatIsTooLarge) {
   const std::vector<StampedPose> reference = helix(100);
-  const TrajectoryEvaluation e = evaluate(moved({exp_so3({1, 2, 0}), {9, 9, 9}}, 1.02, reference), reference, {});
+  const TrajectoryEvaluation e =
+      evaluate(moved({exp_so3({1, 2, 0}), {9, 9, 9}}, 1.02, reference), reference, {});
   ASSERT_EQ(e.status, EvaluationStatus::ok);
   EXPECT_NEAR(e.path_ratio, 1.02, kRounding);
   EXPECT_NEAR(e.sim3.scale, 1 / 1.02, kRounding);
@@ -182,7 +202,8 @@ TEST(Evaluate, pathsAndScaleOfAnEstimateThatIsTooLarge) {
 
 TEST(Evaluate, headingIsCounterClockwiseFromAboveInAWorldWithZUp) {
   std::vector<StampedPose> reference = helix(50), estimate = reference;
-  for (std::size_t i = 1; i < estimate.size(); ++i) estimate[i].T_world_body.R = exp_so3({0, 0, 0.05}) * estimate[i].T_world_body.R;
+  for (std::size_t i = 1; i < estimate.size(); ++i)
+    estimate[i].T_world_body.R = exp_so3({0, 0, 0.05}) * estimate[i].T_world_body.R;
   EvaluationOptions options;
   options.axes = BodyAxes::forward_left_up;
   const TrajectoryEvaluation e = evaluate(estimate, reference, options);
@@ -195,11 +216,15 @@ TEST(Evaluate, headingIsCounterClockwiseFromAboveInAWorldWithZUp) {
 }
 
 TEST(Evaluate, headingOfACameraIsTakenAboutItsWorldsUp) {
-  // In a camera's world (y down) a turn to the left, counter-clockwise from above, is negative about y.
+  // In a camera's world (y down) a turn to the left, counter-clockwise from above, is negative
+  // about y.
   std::vector<StampedPose> reference;
-  for (int i = 0; i < 50; ++i) reference.push_back(pose(0.1 * i, {0.01 * i * i, 0.1 * std::sin(i), 1.0 * i}, {0, 0.02 * i, 0}));
+  for (int i = 0; i < 50; ++i)
+    reference.push_back(
+        pose(0.1 * i, {0.01 * i * i, 0.1 * std::sin(i), 1.0 * i}, {0, 0.02 * i, 0}));
   std::vector<StampedPose> estimate = reference;
-  for (std::size_t i = 1; i < estimate.size(); ++i) estimate[i].T_world_body.R = exp_so3({0, -0.05, 0}) * estimate[i].T_world_body.R;
+  for (std::size_t i = 1; i < estimate.size(); ++i)
+    estimate[i].T_world_body.R = exp_so3({0, -0.05, 0}) * estimate[i].T_world_body.R;
   TrajectoryEvaluation e = evaluate(estimate, reference, {});
   EXPECT_EQ(e.up_world, Vec3(-Vec3::UnitY()));
   EXPECT_NEAR(e.heading_start_aligned.last, 0.05, kRounding);
@@ -216,7 +241,8 @@ TEST(Evaluate, headingErrorsWrapToTheShorterWay) {
   for (int i = 0; i < 10; ++i) {
     const double yaw = i == 0 ? 0.0 : 3.1;
     reference.push_back(pose(0.1 * i, {1.0 * i, std::sin(i), 0}, {0, 0, yaw}));
-    estimate.push_back(pose(0.1 * i, {1.0 * i, std::sin(i), 0}, {0, 0, i == 0 ? 0.0 : yaw + 0.1}));  // 3.2 is −3.08
+    estimate.push_back(pose(0.1 * i, {1.0 * i, std::sin(i), 0},
+                            {0, 0, i == 0 ? 0.0 : yaw + 0.1}));  // 3.2 is −3.08
   }
   EvaluationOptions options;
   options.axes = BodyAxes::forward_left_up;
@@ -250,18 +276,21 @@ TEST(SegmentErrors, endAtTheFirstPoseStrictlyFartherAndDivideByTheNominalLength)
   EXPECT_EQ(s.per_length[2].count, 6U);
   EXPECT_NEAR(s.per_length[2].translation, 0.06 / 5, 1e-13);
   EXPECT_EQ(s.count, 7U);
-  EXPECT_NEAR(s.translation, (0.11 / 10 + 6 * 0.06 / 5) / 7, 1e-13);  // over all segments, not over the lengths' means
+  EXPECT_NEAR(s.translation, (0.11 / 10 + 6 * 0.06 / 5) / 7,
+              1e-13);  // over all segments, not over the lengths' means
   EXPECT_NEAR(s.rotation, 0, 1e-13);
 
   EXPECT_NEAR(segment_errors(estimate, reference, options, 1 / 1.01).translation, 0, 1e-13);
   options.step = 4;
-  EXPECT_EQ(segment_errors(estimate, reference, options).per_length[2].count, 2U);  // from poses 0 and 4
+  EXPECT_EQ(segment_errors(estimate, reference, options).per_length[2].count,
+            2U);  // from poses 0 and 4
 }
 
 TEST(SegmentErrors, rotationPerMetre) {
   const std::vector<StampedPose> reference = line(30, 1.0);
   std::vector<StampedPose> estimate = reference;
-  for (std::size_t i = 0; i < estimate.size(); ++i) estimate[i].T_world_body.R = exp_so3({0.001 * static_cast<double>(i), 0, 0});
+  for (std::size_t i = 0; i < estimate.size(); ++i)
+    estimate[i].T_world_body.R = exp_so3({0.001 * static_cast<double>(i), 0, 0});
   const SegmentErrors s = segment_errors(estimate, reference, {{10}, 1, false});
   EXPECT_NEAR(s.rotation, 0.011 / 10, 1e-12);
 }
@@ -288,7 +317,8 @@ TEST(Evaluate, saysWhatIsMissing) {
   const std::vector<StampedPose> reference = helix(50);
   EXPECT_EQ(evaluate({}, reference, {}).status, EvaluationStatus::no_match);
   EXPECT_EQ(evaluate(reference, {}, {}).status, EvaluationStatus::no_match);
-  EXPECT_EQ(evaluate(std::span(reference).first(2), reference, {}).status, EvaluationStatus::too_few);
+  EXPECT_EQ(evaluate(std::span(reference).first(2), reference, {}).status,
+            EvaluationStatus::too_few);
   EXPECT_EQ(evaluate(line(50, 0.0), reference, {}).status, EvaluationStatus::no_motion);
   EXPECT_EQ(evaluate(reference, line(50, 0.0), {}).status, EvaluationStatus::no_motion);
 }

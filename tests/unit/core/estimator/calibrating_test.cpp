@@ -26,7 +26,8 @@ struct Drive {
   std::optional<Estimator> estimator;
   std::vector<PoseSample> samples;
   std::vector<EstimatorEvent> events;
-  std::vector<CalibrationDecision> decisions;  // those sought; what the drive learns on the way is verifying_test's
+  std::vector<CalibrationDecision>
+      decisions;  // those sought; what the drive learns on the way is verifying_test's
 
   explicit Drive(CalibrationTrust trust) : given(corridor.rig()), nominal(given) {
     options.trust = trust;
@@ -61,7 +62,8 @@ struct Drive {
     for (int i = first; i < last; ++i) give(corridor.frame(i, rig));
   }
   [[nodiscard]] int count(Kind kind) const {
-    return static_cast<int>(std::count_if(events.begin(), events.end(), [kind](const EstimatorEvent& e) { return e.kind == kind; }));
+    return static_cast<int>(std::count_if(
+        events.begin(), events.end(), [kind](const EstimatorEvent& e) { return e.kind == kind; }));
   }
   /// State by state, as the events have it.
   [[nodiscard]] std::vector<State> way() const {
@@ -77,9 +79,11 @@ struct Drive {
   [[nodiscard]] std::string story() const {
     std::string text;
     for (const EstimatorEvent& e : events)
-      text += std::string(to_string(e.from)) + " → " + std::string(to_string(e.to)) + ": " + e.why + '\n';
+      text += std::string(to_string(e.from)) + " → " + std::string(to_string(e.to)) + ": " + e.why +
+              '\n';
     for (const PoseSample& s : samples)
-      text += std::to_string(s.frame) + ' ' + std::string(to_string(s.status)) + ' ' + std::string(to_string(s.reason)) + '\n';
+      text += std::to_string(s.frame) + ' ' + std::string(to_string(s.status)) + ' ' +
+              std::string(to_string(s.reason)) + '\n';
     return text;
   }
 };
@@ -89,7 +93,8 @@ TEST(Calibrating, fromScratchGoesItsWayToStereoOdometry) {
   d.begin();
   EXPECT_FALSE(d.estimator->calibrated());
   d.drive(0, 62);
-  EXPECT_EQ(d.way(), (std::vector{State::initialising, State::parallel_monocular, State::calibrating, State::stereo_odometry}))
+  EXPECT_EQ(d.way(), (std::vector{State::initialising, State::parallel_monocular,
+                                  State::calibrating, State::stereo_odometry}))
       << d.story();
   ASSERT_EQ(d.decisions.size(), 1U) << d.story();
   const CalibrationDecision& decision = d.decisions[0];
@@ -101,11 +106,14 @@ TEST(Calibrating, fromScratchGoesItsWayToStereoOdometry) {
   EXPECT_EQ(decision.held_out_before_px, 0) << "there was none before";
   EXPECT_TRUE(d.estimator->calibrated());
   EXPECT_EQ(d.count(Kind::calibration_accepted), 1);
-  const Transform &found = d.estimator->calibration().T_camera_left[1], &truth = d.corridor.rig().T_camera_left[1];
+  const Transform &found = d.estimator->calibration().T_camera_left[1],
+                  &truth = d.corridor.rig().T_camera_left[1];
   const auto& sigma = d.estimator->calibration().sigma_noise[1];
   const Vec3 turn = log_so3(found.R * truth.R.transpose()), shift = found.t - truth.t;
-  for (int i = 0; i < 3; ++i) EXPECT_LT(std::abs(turn[i]), 4 * sigma[static_cast<std::size_t>(i)]) << i;
-  for (int i = 1; i < 3; ++i) EXPECT_LT(std::abs(shift[i]), 4 * sigma[static_cast<std::size_t>(i + 3)]) << i;
+  for (int i = 0; i < 3; ++i)
+    EXPECT_LT(std::abs(turn[i]), 4 * sigma[static_cast<std::size_t>(i)]) << i;
+  for (int i = 1; i < 3; ++i)
+    EXPECT_LT(std::abs(shift[i]), 4 * sigma[static_cast<std::size_t>(i + 3)]) << i;
   // A pose on every frame, and ok only with a calibration.
   for (const PoseSample& s : d.samples) {
     EXPECT_NE(s.status, PoseStatus::lost) << d.story();
@@ -122,7 +130,8 @@ TEST(Calibrating, adoptionIsSoManyFramesAfterTheSnapshot) {
     d.begin();
     d.drive(0, 50);
     ASSERT_EQ(d.decisions.size(), 1U) << d.story();
-    at[later / 10 - 1] = static_cast<std::uint64_t>((d.decisions[0].stamp.ns() - 1'000'000'000) / 50'000'000);
+    at[later / 10 - 1] =
+        static_cast<std::uint64_t>((d.decisions[0].stamp.ns() - 1'000'000'000) / 50'000'000);
   }
   EXPECT_EQ(at[1] - at[0], 10U);
 }
@@ -133,7 +142,8 @@ TEST(Calibrating, aFilesCalibrationIsUnconfirmedUntilThirtyFramesAgree) {
   d.drive(0, 45);
   int confirmed = -1;
   for (const EstimatorEvent& e : d.events)
-    if (e.kind == Kind::calibration_confirmed) confirmed = static_cast<int>((e.stamp.ns() - 1'000'000'000) / 50'000'000);
+    if (e.kind == Kind::calibration_confirmed)
+      confirmed = static_cast<int>((e.stamp.ns() - 1'000'000'000) / 50'000'000);
   ASSERT_GE(confirmed, 30) << d.story();
   for (const PoseSample& s : d.samples) {
     if (static_cast<int>(s.frame) < confirmed) {
@@ -152,7 +162,9 @@ TEST(Calibrating, onRequestANewOneIsSoughtAndTheOneInUseIsNoWorse) {
   d.estimator->request_recalibration();
   EXPECT_EQ(d.estimator->state(), State::stereo_odometry) << "it acts at the next frame";
   d.drive(5, 66);
-  EXPECT_EQ(d.way(), (std::vector{State::initialising, State::stereo_odometry, State::recalibrating, State::stereo_odometry})) << d.story();
+  EXPECT_EQ(d.way(), (std::vector{State::initialising, State::stereo_odometry, State::recalibrating,
+                                  State::stereo_odometry}))
+      << d.story();
   EXPECT_EQ(d.samples[6].state, State::recalibrating);
   EXPECT_EQ(d.samples[6].status, PoseStatus::degraded);
   EXPECT_EQ(d.samples[6].reason, Reason::recalibrating);
@@ -172,13 +184,16 @@ TEST(Calibrating, aKnockIsMended) {
   knocked[1] = perturbed(knocked[1], {0.012, 0, 0}, Vec3::Zero());  // 3.4 px of row
   d.drive(0, 12);
   d.drive(12, 85, knocked);
-  EXPECT_EQ(d.way(), (std::vector{State::initialising, State::stereo_odometry, State::recalibrating, State::stereo_odometry})) << d.story();
+  EXPECT_EQ(d.way(), (std::vector{State::initialising, State::stereo_odometry, State::recalibrating,
+                                  State::stereo_odometry}))
+      << d.story();
   EXPECT_EQ(d.count(Kind::rig_changed), 1) << d.story();
   ASSERT_EQ(d.decisions.size(), 1U) << d.story();
   EXPECT_TRUE(d.decisions[0].accepted) << d.decisions[0].reason;
   EXPECT_GE(d.decisions[0].onset_frame, 12U);
   EXPECT_LT(d.decisions[0].held_out_after_px, d.decisions[0].held_out_before_px);
-  EXPECT_NEAR(log_so3(d.estimator->calibration().T_camera_left[1].R * knocked[1].R.transpose()).x(), 0.0, 1e-3);
+  EXPECT_NEAR(log_so3(d.estimator->calibration().T_camera_left[1].R * knocked[1].R.transpose()).x(),
+              0.0, 1e-3);
   for (const PoseSample& s : d.samples) EXPECT_NE(s.status, PoseStatus::lost) << d.story();
 }
 
@@ -223,7 +238,8 @@ TEST(Calibrating, fromScratchTheTransformHandedOverIsNotRead) {
   other.begin();
   d.drive(0, 35);
   other.drive(0, 35);
-  for (std::size_t i = 0; i < d.samples.size(); ++i) ASSERT_EQ(d.samples[i].T_world_left.t, other.samples[i].T_world_left.t) << i;
+  for (std::size_t i = 0; i < d.samples.size(); ++i)
+    ASSERT_EQ(d.samples[i].T_world_left.t, other.samples[i].T_world_left.t) << i;
 }
 
 TEST(Calibrating, withoutABaselineThereIsNoScaleToFind) {

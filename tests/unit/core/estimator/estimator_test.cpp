@@ -44,7 +44,8 @@ EstimatorOptions believing() {
   return o;
 }
 
-/// A rig that stands before a wall 12 px of disparity away. Every frame has noise of its own, as a sensor's would.
+/// A rig that stands before a wall 12 px of disparity away. Every frame has noise of its own, as a
+/// sensor's would.
 struct Standing {
   static constexpr int kPictures = 4;
   RigCalibration calibration = rig();
@@ -60,8 +61,11 @@ struct Standing {
   Standing() {
     Random random(8);
     for (int i = 0; i < kPictures; ++i) {
-      left.push_back(draw(kWidth, kHeight, [&](const Vec2& p) { return texture(p) + random.normal(); }));
-      right.push_back(draw(kWidth, kHeight, [&](const Vec2& p) { return texture(p + Vec2(kDisparity, 0)) + random.normal(); }));
+      left.push_back(
+          draw(kWidth, kHeight, [&](const Vec2& p) { return texture(p) + random.normal(); }));
+      right.push_back(draw(kWidth, kHeight, [&](const Vec2& p) {
+        return texture(p + Vec2(kDisparity, 0)) + random.normal();
+      }));
     }
   }
   [[nodiscard]] RigFrame frame(int i) const {
@@ -77,7 +81,8 @@ struct Standing {
 };
 
 void expect_at_start(const PoseSample& s) {
-  // One grey level of noise moves a corner by some 0.02 px, of 12 px of disparity at 11.7 m 2 cm; of forty points less than 4 mm.
+  // One grey level of noise moves a corner by some 0.02 px, of 12 px of disparity at 11.7 m 2 cm;
+  // of forty points less than 4 mm.
   EXPECT_LT(s.T_world_left.t.norm(), 0.02);
   EXPECT_LT(log_so3(s.T_world_left.R).norm(), 1e-3);
 }
@@ -186,14 +191,16 @@ TEST(Estimator, whatMakesNoRigIsRefusedWithASentence) {
     }
     return std::string();
   };
-  RigCalibration one = rig(), small = rig(), no_focus = rig(), no_baseline = rig(), not_a_number = rig();
+  RigCalibration one = rig(), small = rig(), no_focus = rig(), no_baseline = rig(),
+                 not_a_number = rig();
   one.cameras = 1;
   small.intrinsics[1].height = 40;
   no_focus.intrinsics[0].fx = 0;
   no_baseline.T_camera_left[1].t.setZero();
   not_a_number.T_camera_left[1].t.x() = std::numeric_limits<double>::quiet_NaN();
   EXPECT_EQ(refused(rig()), "");
-  for (const RigCalibration& r : {one, small, no_focus, no_baseline, not_a_number}) EXPECT_NE(refused(r), "");
+  for (const RigCalibration& r : {one, small, no_focus, no_baseline, not_a_number})
+    EXPECT_NE(refused(r), "");
 }
 
 TEST(Estimator, anArenaTooSmallIsRefusedNotOverrun) {
@@ -202,7 +209,8 @@ TEST(Estimator, anArenaTooSmallIsRefusedNotOverrun) {
   SequentialRunner runner;
   Arena arena(Estimator::memory_needed(options, calibration) / 2);
   ImmediateRunner solver;
-  EXPECT_THROW(Estimator(options, calibration, calibration, arena, runner, solver), std::length_error);
+  EXPECT_THROW(Estimator(options, calibration, calibration, arena, runner, solver),
+               std::length_error);
 }
 
 TEST(Estimator, staysWithinTheMemoryItAskedForAndOffTheHeap) {

@@ -47,10 +47,12 @@ TEST(Transitions, whatMeansNothingInAStateDoesNothing) {
 }
 
 TEST(Transitions, everyStateAnswersEveryTriggerAsTheMethodSays) {
-  constexpr std::array kStates = {State::initialising,    State::parallel_monocular, State::calibrating,
-                                  State::stereo_odometry, State::recalibrating,      State::lost};
+  constexpr std::array kStates = {State::initialising,  State::parallel_monocular,
+                                  State::calibrating,   State::stereo_odometry,
+                                  State::recalibrating, State::lost};
   constexpr State kStays = static_cast<State>(255);
-  // Rows: triggers in their order. Columns: states in theirs; where a state stays as it is, the trigger means nothing there.
+  // Rows: triggers in their order. Columns: states in theirs; where a state stays as it is, the
+  // trigger means nothing there.
   using enum State;
   constexpr std::array<std::array<State, 6>, 12> kWanted = {{
       {stereo_odometry, kStays, kStays, kStays, kStays, kStays},           // calibration_given
@@ -64,7 +66,7 @@ TEST(Transitions, everyStateAnswersEveryTriggerAsTheMethodSays) {
       {kStays, lost, lost, lost, lost, kStays},                            // pose_lost
       {kStays, kStays, kStays, kStays, kStays, stereo_odometry},           // pose_found
       {kStays, kStays, kStays, kStays, kStays, recalibrating},             // pose_found_doubtful
-      {kStays, kStays, kStays, kStays, kStays, initialising},              // pose_found_uncalibrated
+      {kStays, kStays, kStays, kStays, kStays, initialising},  // pose_found_uncalibrated
   }};
   ASSERT_EQ(static_cast<std::size_t>(Trigger::pose_found_uncalibrated) + 1, kWanted.size());
   for (std::size_t trigger = 0; trigger < kWanted.size(); ++trigger)

@@ -1,4 +1,5 @@
-// A calibration that is handed over is a claim: the drive confirms it, or shows that it is off and measures its own.
+// A calibration that is handed over is a claim: the drive confirms it, or shows that it is off and
+// measures its own.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -45,12 +46,14 @@ struct Claim {
       for (const EstimatorEvent& e : estimator->events()) {
         kinds.push_back(e.kind);
         frames.push_back(samples.back().frame);
-        story += std::to_string(static_cast<int>(e.kind)) + ' ' + e.why + ' ' + std::to_string(e.value) + '\n';
+        story += std::to_string(static_cast<int>(e.kind)) + ' ' + e.why + ' ' +
+                 std::to_string(e.value) + '\n';
       }
       for (const CalibrationDecision& d : estimator->calibrations()) {
         decisions.push_back(d);
-        story += std::string(d.accepted ? "accepted " : "rejected ") + d.reason + ", depth off by " +
-                 std::to_string(d.depth_difference_percent) + " %, sigma " + std::to_string(d.depth_sigma_percent) + " %\n";
+        story += std::string(d.accepted ? "accepted " : "rejected ") + d.reason +
+                 ", depth off by " + std::to_string(d.depth_difference_percent) + " %, sigma " +
+                 std::to_string(d.depth_sigma_percent) + " %\n";
       }
     }
   }
@@ -62,8 +65,8 @@ struct Claim {
   }
 };
 
-// Inverse depth is off by Z ψ / b: at the depth where a match of 0.15 px is 1 % (6.6 m) the tolerated 2 % are a yaw of 1.5 mrad. The claims
-// below are none and 15 mrad (20 %) off.
+// Inverse depth is off by Z ψ / b: at the depth where a match of 0.15 px is 1 % (6.6 m) the
+// tolerated 2 % are a yaw of 1.5 mrad. The claims below are none and 15 mrad (20 %) off.
 TEST(Verifying, aTrueCalibrationIsDegradedUntilTheDriveConfirmsIt) {
   Claim c;
   c.drive(60);
@@ -88,25 +91,31 @@ TEST(Verifying, aYawThatIsOffIsContradictedAndReplaced) {
   const Transform truth = c.given.T_camera_left[1];
   c.given.T_camera_left[1].R = exp_so3({0, 0.015, 0}) * truth.R;
   c.drive(70);
-  const int contradicted = c.first(Kind::calibration_contradicted), accepted = c.first(Kind::calibration_accepted);
+  const int contradicted = c.first(Kind::calibration_contradicted),
+            accepted = c.first(Kind::calibration_accepted);
   ASSERT_GE(contradicted, 0) << c.story;
   ASSERT_GE(accepted, contradicted) << c.story;
   bool any_ok = false;
   for (const PoseSample& s : c.samples) {
     EXPECT_NE(s.status, PoseStatus::lost) << s.frame << '\n' << c.story;
-    EXPECT_FALSE(s.status == PoseStatus::ok && static_cast<int>(s.frame) < accepted) << s.frame << '\n' << c.story;
+    EXPECT_FALSE(s.status == PoseStatus::ok && static_cast<int>(s.frame) < accepted)
+        << s.frame << '\n'
+        << c.story;
     any_ok = any_ok || s.status == PoseStatus::ok;
   }
   EXPECT_TRUE(any_ok) << c.story;
-  // Where it is judged (6.6 m) 15 mrad are 20 % of the inverse depth, known to a tenth: 2 % is what the drive's own may be off.
-  const auto first = std::find_if(c.decisions.begin(), c.decisions.end(), [](const CalibrationDecision& d) { return d.accepted; });
+  // Where it is judged (6.6 m) 15 mrad are 20 % of the inverse depth, known to a tenth: 2 % is what
+  // the drive's own may be off.
+  const auto first = std::find_if(c.decisions.begin(), c.decisions.end(),
+                                  [](const CalibrationDecision& d) { return d.accepted; });
   ASSERT_NE(first, c.decisions.end());
   EXPECT_EQ(first->cause, CalibrationCause::contradicted);
   EXPECT_TRUE(first->learnt);
   const double off = 100 * first->judged_depth_m * 0.015 / c.given.T_camera_left[1].t.norm();
   EXPECT_NEAR(first->depth_difference_percent, off, 0.1 * off + 2);
   EXPECT_TRUE(c.estimator->verified()) << c.story;
-  // Straight ahead at 6.6 m, yaw and centre together: within the tolerance twice over of what the truth gives.
+  // Straight ahead at 6.6 m, yaw and centre together: within the tolerance twice over of what the
+  // truth gives.
   const RigCalibration& found = c.estimator->calibration();
   const double yaw = log_so3(found.T_camera_left[1].R * truth.R.transpose()).y();
   const Intrinsics &lens = found.intrinsics[1], &true_lens = c.corridor.rig().intrinsics[1];
@@ -119,7 +128,8 @@ TEST(Verifying, offlineAClaimStandsAndIsNotCalledUnverified) {
     c.options.online = false;
     c.given.T_camera_left[1].R = exp_so3({0, yaw, 0}) * c.given.T_camera_left[1].R;
     c.drive(40);
-    for (const PoseSample& s : c.samples) EXPECT_NE(s.reason, Reason::unverified_calibration) << s.frame;
+    for (const PoseSample& s : c.samples)
+      EXPECT_NE(s.reason, Reason::unverified_calibration) << s.frame;
     EXPECT_EQ(c.first(Kind::calibration_confirmed), -1) << c.story;
     EXPECT_EQ(c.first(Kind::calibration_contradicted), -1) << c.story;
     EXPECT_TRUE(c.decisions.empty());

@@ -34,16 +34,18 @@ class BackwardRunner final : public PairRunner {
 struct Found {
   std::vector<Corner> storage;
   BoundedVector<Corner> corners;
-  Found(const ImageView& image, const CornerOptions& options, std::span<const Corner> taken = {}, std::size_t room = 1000,
-        PairRunner& runner = in_order)
+  Found(const ImageView& image, const CornerOptions& options, std::span<const Corner> taken = {},
+        std::size_t room = 1000, PairRunner& runner = in_order)
       : storage(room), corners(storage) {
     find_corners(image, options, taken, runner, &corners);
   }
 };
 
-/// OpenCV's least eigenvalues in our unit: its gradient is twice ours and in units of 255 grey levels.
+/// OpenCV's least eigenvalues in our unit: its gradient is twice ours and in units of 255 grey
+/// levels.
 cv::Mat reference_scores(const Image& image) {
-  const cv::Mat grey(image.height, image.width, CV_8U, const_cast<std::uint8_t*>(image.bytes.data()),
+  const cv::Mat grey(image.height, image.width, CV_8U,
+                     const_cast<std::uint8_t*>(image.bytes.data()),
                      static_cast<std::size_t>(image.stride));
   cv::Mat scores;
   cv::cornerMinEigenVal(grey, scores, 7, 1);
@@ -52,10 +54,13 @@ cv::Mat reference_scores(const Image& image) {
 
 Image textured() { return draw(kWidth, kHeight, Texture(5)); }
 
-std::pair<int, int> cell_of(const Corner& c, int cell) { return {static_cast<int>(c.x) / cell, static_cast<int>(c.y) / cell}; }
+std::pair<int, int> cell_of(const Corner& c, int cell) {
+  return {static_cast<int>(c.x) / cell, static_cast<int>(c.y) / cell};
+}
 
 TEST(Corners, scoresAreOpenCvsLeastEigenvaluesOnEveryTarget) {
-  // 49 products of up to 127² are summed in floats, seven by seven: relative error below 14 · 2⁻²⁴ of the trace, which is at most 2 · 127².
+  // 49 products of up to 127² are summed in floats, seven by seven: relative error below 14 · 2⁻²⁴
+  // of the trace, which is at most 2 · 127².
   constexpr float kRounding = 14.F * 6e-8F * 2.F * 127.F * 127.F;
   for (const Image& image : {textured(), white_noise(kWidth, kHeight, 6)}) {
     const cv::Mat expected = reference_scores(image);
@@ -67,7 +72,8 @@ TEST(Corners, scoresAreOpenCvsLeastEigenvaluesOnEveryTarget) {
       for (int y = 0; y < kBlockHeight; ++y)
         for (int x = 0; x < kBlockWidth; ++x)
           worst =
-              std::max(worst, std::abs(scores[static_cast<std::size_t>(y * detail::kMaxBlock + x)] - expected.at<float>(kY + y, kX + x)));
+              std::max(worst, std::abs(scores[static_cast<std::size_t>(y * detail::kMaxBlock + x)] -
+                                       expected.at<float>(kY + y, kX + x)));
       EXPECT_LT(worst, kRounding) << target;
     });
   }
@@ -84,16 +90,21 @@ TEST(Corners, eachIsTheStrongestOfItsCellAndAPeak) {
     const int x = static_cast<int>(c.x), y = static_cast<int>(c.y);
     EXPECT_NEAR(c.score, scores.at<float>(y, x), 1e-3F * c.score);
     for (int dy = -1; dy <= 1; ++dy)
-      for (int dx = -1; dx <= 1; ++dx) EXPECT_GE(c.score * 1.001F, scores.at<float>(y + dy, x + dx));
+      for (int dx = -1; dx <= 1; ++dx)
+        EXPECT_GE(c.score * 1.001F, scores.at<float>(y + dy, x + dx));
     // No pixel of the cell that is a peak too is stronger.
     const auto [column, row] = cell_of(c, options.cell);
-    for (int v = std::max(row * options.cell, options.border); v < std::min((row + 1) * options.cell, kHeight - options.border); ++v)
-      for (int u = std::max(column * options.cell, options.border); u < std::min((column + 1) * options.cell, kWidth - 28); ++u) {
+    for (int v = std::max(row * options.cell, options.border);
+         v < std::min((row + 1) * options.cell, kHeight - options.border); ++v)
+      for (int u = std::max(column * options.cell, options.border);
+           u < std::min((column + 1) * options.cell, kWidth - 28); ++u) {
         const float s = scores.at<float>(v, u);
         if (s <= c.score * 1.001F) continue;
         float around = 0;
         for (int dy = -1; dy <= 1; ++dy)
-          for (int dx = -1; dx <= 1; ++dx) around = std::max(around, (dx != 0 || dy != 0) ? scores.at<float>(v + dy, u + dx) : 0.F);
+          for (int dx = -1; dx <= 1; ++dx)
+            around =
+                std::max(around, (dx != 0 || dy != 0) ? scores.at<float>(v + dy, u + dx) : 0.F);
         EXPECT_GT(around * 1.001F, s) << "a stronger peak at " << u << ", " << v;
       }
   }
@@ -118,7 +129,8 @@ TEST(Corners, oneACellStrongestFirstApartAndInsideTheBorder) {
     EXPECT_GE(c.y, 19);
     EXPECT_LT(c.x, kWidth - 19);
     EXPECT_LT(c.y, kHeight - 19);
-    for (std::size_t k = 0; k < i; ++k) EXPECT_GE(std::hypot(c.x - found.corners[k].x, c.y - found.corners[k].y), 15.F);
+    for (std::size_t k = 0; k < i; ++k)
+      EXPECT_GE(std::hypot(c.x - found.corners[k].x, c.y - found.corners[k].y), 15.F);
   }
 }
 
@@ -126,7 +138,8 @@ TEST(Corners, cellsThatHoldATakenOneAreLeftAloneAndOthersKeepTheirDistance) {
   const Image image = textured();
   CornerOptions options;
   const Found all(image.view(), options);
-  // Every second one is taken: the rest must stay what they were, for they kept their distance before.
+  // Every second one is taken: the rest must stay what they were, for they kept their distance
+  // before.
   std::vector<Corner> taken;
   for (std::size_t i = 0; i < all.corners.size(); i += 2) taken.push_back(all.corners[i]);
   const Found rest(image.view(), options, taken);
@@ -137,7 +150,8 @@ TEST(Corners, cellsThatHoldATakenOneAreLeftAloneAndOthersKeepTheirDistance) {
     }
   std::size_t still_there = 0;
   for (std::size_t i = 1; i < all.corners.size(); i += 2)
-    for (const Corner& c : rest.corners.span()) still_there += c.x == all.corners[i].x && c.y == all.corners[i].y ? 1U : 0U;
+    for (const Corner& c : rest.corners.span())
+      still_there += c.x == all.corners[i].x && c.y == all.corners[i].y ? 1U : 0U;
   EXPECT_EQ(still_there, all.corners.size() / 2);
 }
 
@@ -149,8 +163,11 @@ TEST(Corners, withLittleRoomTheWeakestAreDropped) {
 }
 
 TEST(Corners, thereAreNoneOnFlatGroundAnEdgeOrBelowTheThreshold) {
-  EXPECT_EQ(Found(draw(kWidth, kHeight, [](const Vec2&) { return 90.0; }).view(), {}).corners.size(), 0U);
-  const Image edge = draw(kWidth, kHeight, [](const Vec2& p) { return 128 + 60 * std::tanh((p.x() - 0.4 * p.y() - 100) / 2.0); });
+  EXPECT_EQ(
+      Found(draw(kWidth, kHeight, [](const Vec2&) { return 90.0; }).view(), {}).corners.size(), 0U);
+  const Image edge = draw(kWidth, kHeight, [](const Vec2& p) {
+    return 128 + 60 * std::tanh((p.x() - 0.4 * p.y() - 100) / 2.0);
+  });
   // Rounding to whole grey levels leaves a third of a level: far below the threshold.
   EXPECT_EQ(Found(edge.view(), {}).corners.size(), 0U);
   CornerOptions strict;
@@ -159,13 +176,15 @@ TEST(Corners, thereAreNoneOnFlatGroundAnEdgeOrBelowTheThreshold) {
 }
 
 TEST(Corners, areTheSameAgainOnEveryTargetWhateverThePaddingAndTheRunner) {
-  const Image image = white_noise(kWidth, kHeight, 4), padded = white_noise(kWidth, kHeight, 4, 41, 200);
+  const Image image = white_noise(kWidth, kHeight, 4),
+              padded = white_noise(kWidth, kHeight, 4, 41, 200);
   BackwardRunner backward;
   const Found first(image.view(), {});
   ASSERT_GT(first.corners.size(), 20U);
   test::on_every_target([&](const char* target) {
-    for (const auto& [from, runner] :
-         {std::pair<const Image*, PairRunner*>(&image, &in_order), {&padded, &in_order}, {&image, &backward}}) {
+    for (const auto& [from, runner] : {std::pair<const Image*, PairRunner*>(&image, &in_order),
+                                       {&padded, &in_order},
+                                       {&image, &backward}}) {
       const Found again(from->view(), {}, {}, 1000, *runner);
       ASSERT_EQ(again.corners.size(), first.corners.size()) << target;
       for (std::size_t i = 0; i < first.corners.size(); ++i) {
@@ -182,7 +201,8 @@ TEST(Corners, readNoByteOutsideTheImage) {
       const test::GuardedImage image(white_noise(131, 99, 3), guard);
       CornerOptions options;
       options.border = border;
-      test::on_every_target([&](const char*) { EXPECT_GT(Found(image.view(), options).corners.size(), 0U); });
+      test::on_every_target(
+          [&](const char*) { EXPECT_GT(Found(image.view(), options).corners.size(), 0U); });
     }
 }
 

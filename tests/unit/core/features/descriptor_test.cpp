@@ -45,8 +45,8 @@ TEST(Descriptor, unrelatedPlacesDifferInHalfOfTheBits) {
     sum += d;
     least = std::min(least, d);
   }
-  // Neighbouring comparisons of a smooth picture agree with each other: far fewer than 256 of them are independent, say 20. Then one
-  // pair has a sigma of 29 bits, and the mean of a hundred 2.9.
+  // Neighbouring comparisons of a smooth picture agree with each other: far fewer than 256 of them
+  // are independent, say 20. Then one pair has a sigma of 29 bits, and the mean of a hundred 2.9.
   EXPECT_NEAR(sum / kPairs, 128.0, 4 * 2.9);
   EXPECT_GT(least, 128 - 4 * 29);
 }
@@ -60,10 +60,13 @@ TEST(Descriptor, thePlaceSeenAgainIsNearerThanAnyOther) {
     Mat2 turn;
     turn << std::cos(angle), -std::sin(angle), std::sin(angle), std::cos(angle);
     const Vec2 middle(60, 60);
-    const int noisy = distance(here, of([&](const Vec2& p) { return 0.7 * texture(p) + 20 + 5 * random.normal(); }));
-    const int turned = distance(here, of([&](const Vec2& p) { return texture(middle + 1.1 * (turn * (p - middle))); }));
+    const int noisy = distance(
+        here, of([&](const Vec2& p) { return 0.7 * texture(p) + 20 + 5 * random.normal(); }));
+    const int turned = distance(
+        here, of([&](const Vec2& p) { return texture(middle + 1.1 * (turn * (p - middle))); }));
     int other = 256;
-    for (std::uint64_t k = 1; k <= 10; ++k) other = std::min(other, distance(here, of(Texture(1000 + 10 * seed + k))));
+    for (std::uint64_t k = 1; k <= 10; ++k)
+      other = std::min(other, distance(here, of(Texture(1000 + 10 * seed + k))));
     EXPECT_LT(noisy, other) << seed;
     EXPECT_LT(turned, other) << seed;
   }

@@ -33,12 +33,14 @@ struct Built {
   Arena arena;
   Pyramid pyramid;
   explicit Built(const ImageView& image)
-      : arena(Pyramid::memory_needed(image.width, image.height, 3)), pyramid(image.width, image.height, 3, arena) {
+      : arena(Pyramid::memory_needed(image.width, image.height, 3)),
+        pyramid(image.width, image.height, 3, arena) {
     pyramid.build(image);
   }
 };
 
-/// Two cameras before a wall at depth `depth` (m, in left), painted with a function of the ideal left pixel.
+/// Two cameras before a wall at depth `depth` (m, in left), painted with a function of the ideal
+/// left pixel.
 struct Wall {
   Camera left, right;
   Transform T_right_left;
@@ -46,18 +48,24 @@ struct Wall {
   Image left_image, right_image;
   Built left_built, right_built;
 
-  Wall(const Grey& paint, double depth_m, bool distorted, const Transform& T, const Grey& right_paint = {})
+  Wall(const Grey& paint, double depth_m, bool distorted, const Transform& T,
+       const Grey& right_paint = {})
       : left(lens(distorted)),
         right(lens(distorted)),
         T_right_left(T),
         depth(depth_m),
-        left_image(draw(kWidth, kHeight, [&](const Vec2& p) { return paint(on_wall(left, Transform{}, p)); })),
-        right_image(draw(kWidth, kHeight, [&](const Vec2& p) { return (right_paint ? right_paint : paint)(on_wall(right, T, p)); })),
+        left_image(draw(kWidth, kHeight,
+                        [&](const Vec2& p) { return paint(on_wall(left, Transform{}, p)); })),
+        right_image(draw(kWidth, kHeight,
+                         [&](const Vec2& p) {
+                           return (right_paint ? right_paint : paint)(on_wall(right, T, p));
+                         })),
         left_built(left_image.view()),
         right_built(right_image.view()) {}
 
   /// Where a pixel's ray meets the wall, px of an ideal left camera.
-  [[nodiscard]] Vec2 on_wall(const Camera& camera, const Transform& T_camera_left, const Vec2& pixel) const {
+  [[nodiscard]] Vec2 on_wall(const Camera& camera, const Transform& T_camera_left,
+                             const Vec2& pixel) const {
     Vec3 ray;
     if (!camera.unproject(pixel, &ray)) return Vec2::Zero();
     const Transform back = T_camera_left.inverse();
@@ -92,15 +100,18 @@ TEST(EpipolarSearch, findsTheDepthToAPixelOfItsLevel) {
       for (const double depth : {4.0, 11.0, 60.0}) {
         const Wall wall(Texture(3), depth, distorted, T);
         int found = 0;
-        for (const Vec2& pixel : {Vec2(220, 160), Vec2(300, 90), Vec2(260, 240), Vec2(180, 200), Vec2(340, 170)}) {
+        for (const Vec2& pixel :
+             {Vec2(220, 160), Vec2(300, 90), Vec2(260, 240), Vec2(180, 200), Vec2(340, 170)}) {
           const SearchResult r = wall.search(pixel, to_two_metres());
           if (r.status != SearchStatus::ok) continue;
           ++found;
           Vec2 real, at;
           ASSERT_EQ(wall.curve(pixel).at(1 / depth, &real, nullptr), ProjectStatus::ok);
           ASSERT_EQ(wall.curve(pixel).at(r.rho, &at, nullptr), ProjectStatus::ok);
-          // A step along the curve is one pixel of level 1, and so is a pixel across: the diagonal; the foot is rounded once more.
-          EXPECT_LT((r.pixel - real).norm(), 2.0 * std::numbers::sqrt2) << depth << " m, distorted " << distorted;
+          // A step along the curve is one pixel of level 1, and so is a pixel across: the diagonal;
+          // the foot is rounded once more.
+          EXPECT_LT((r.pixel - real).norm(), 2.0 * std::numbers::sqrt2)
+              << depth << " m, distorted " << distorted;
           EXPECT_LT((at - real).norm(), 4.0) << depth << " m, distorted " << distorted;
         }
         EXPECT_GE(found, 4) << depth << " m, distorted " << distorted;
@@ -121,7 +132,8 @@ TEST(EpipolarSearch, isTheSameOnEveryTarget) {
 
 TEST(EpipolarSearch, aPatternThatRepeatsIsAmbiguous) {
   const auto fence = [](const Vec2& p) {
-    return 128 + 60 * std::cos(p.x() * 2 * std::numbers::pi / 24) * std::cos(p.y() * 2 * std::numbers::pi / 40);
+    return 128 + 60 * std::cos(p.x() * 2 * std::numbers::pi / 24) *
+                     std::cos(p.y() * 2 * std::numbers::pi / 40);
   };
   const Wall wall(fence, 8.0, false, beside());
   for (const Vec2& pixel : {Vec2(260, 160), Vec2(240, 100), Vec2(300, 220)})
@@ -134,7 +146,10 @@ TEST(EpipolarSearch, whatTheOtherCameraDoesNotSeeIsUncorrelated) {
   for (int i = 0; i < 30; ++i) {
     EpipolarSearchOptions strict = to_two_metres();
     strict.min_zncc = 0.95F;
-    refused += wall.search(Vec2(200 + 5 * i, 100 + 4 * i), strict).status == SearchStatus::uncorrelated ? 1 : 0;
+    refused +=
+        wall.search(Vec2(200 + 5 * i, 100 + 4 * i), strict).status == SearchStatus::uncorrelated
+            ? 1
+            : 0;
   }
   EXPECT_EQ(refused, 30);
 }
@@ -184,7 +199,8 @@ TEST(InverseDepth, isFittedToItsPixelAndTheDistanceLeftIsTheOneAcross) {
         const Vec2 normal = Vec2(-tangent.y(), tangent.x()).normalized();
         for (const double off : {0.0, 0.7}) {
           double value = 0.12, sigma = 0;
-          // Gauss–Newton ends where its fourth step is below the curve's own bend: with 0.7 px off, 1e-4 px.
+          // Gauss–Newton ends where its fourth step is below the curve's own bend: with 0.7 px off,
+          // 1e-4 px.
           EXPECT_NEAR(fit_inverse_depth(c, pixel + off * normal, &value, &sigma), off, 1e-4);
           EXPECT_NEAR(value, rho, 1e-4 * sigma + 1e-9 + (off > 0 ? 1e-3 * rho : 0));
           // One pixel along the curve is that much inverse depth.

@@ -47,7 +47,8 @@ TEST(Mask, hidesWhatIsZeroAndItsMarginAndNothingElse) {
       for (int x = 0; x < kWidth; ++x) {
         bool near = false;
         for (int v = std::max(0, y - margin); v <= std::min(kHeight - 1, y + margin); ++v)
-          for (int u = std::max(0, x - margin); u <= std::min(kWidth - 1, x + margin); ++u) near = near || image.view().at(u, v) == 0;
+          for (int u = std::max(0, x - margin); u <= std::min(kWidth - 1, x + margin); ++u)
+            near = near || image.view().at(u, v) == 0;
         hidden += near ? 1 : 0;
         ASSERT_EQ(mask.hides(x, y), near) << x << ", " << y << ", margin " << margin;
       }
@@ -86,14 +87,18 @@ TEST(Mask, keepsCornersAwayAndLeavesTheOthersAsTheyAre) {
   const std::vector<Corner> left = find();
   ASSERT_GT(left.size(), 20U);
   for (const Corner& c : left) EXPECT_FALSE(mask.hides(Vec2(c.x, c.y)));
-  // Corners nearer to the mask's edge than a cell and the distance kept may have lost a neighbour that crowded them out.
+  // Corners nearer to the mask's edge than a cell and the distance kept may have lost a neighbour
+  // that crowded them out.
   const float clear = static_cast<float>(kWidth / 2 - options.cell) - options.min_distance;
-  const auto same = [](const Corner& a, const Corner& b) { return a.x == b.x && a.y == b.y && a.score == b.score; };
+  const auto same = [](const Corner& a, const Corner& b) {
+    return a.x == b.x && a.y == b.y && a.score == b.score;
+  };
   std::size_t compared = 0;
   for (const Corner& c : all) {
     if (c.x >= clear) continue;
     ++compared;
-    EXPECT_TRUE(std::any_of(left.begin(), left.end(), [&](const Corner& o) { return same(c, o); })) << c.x << ", " << c.y;
+    EXPECT_TRUE(std::any_of(left.begin(), left.end(), [&](const Corner& o) { return same(c, o); }))
+        << c.x << ", " << c.y;
   }
   EXPECT_GT(compared, 10U);
 }
@@ -101,7 +106,8 @@ TEST(Mask, keepsCornersAwayAndLeavesTheOthersAsTheyAre) {
 TEST(Mask, keepsBlobsAwayAndDoesNotLetThemTakeRoom) {
   const Image image = draw(kWidth, kHeight, Texture(5));
   const Image shown = half_hidden(kWidth / 2);
-  Arena arena(Mask::memory_needed(kWidth, kHeight) + Surf::memory_needed(kWidth, kHeight) + 2 * kCacheLine);
+  Arena arena(Mask::memory_needed(kWidth, kHeight) + Surf::memory_needed(kWidth, kHeight) +
+              2 * kCacheLine);
   const Mask mask(shown.view(), 0, arena);
   Surf surf(kWidth, kHeight, arena);
   ASSERT_EQ(surf.set_image(image.view()), SurfStatus::ok);

@@ -17,15 +17,17 @@ using test::Image;
 using test::Texture;
 
 constexpr int kWidth = 180, kHeight = 160;
-// Without noise but rounding to 8 bits (0.29 grey levels). A window's information is some thousand (grey levels / px)², which makes
-// 0.01 px of that; bilinear interpolation of waves down to 8 px adds as much, and steps end below 0.01 px.
+// Without noise but rounding to 8 bits (0.29 grey levels). A window's information is some thousand
+// (grey levels / px)², which makes 0.01 px of that; bilinear interpolation of waves down to 8 px
+// adds as much, and steps end below 0.01 px.
 constexpr double kSubPixel = 0.02;
 
 struct Built {
   Arena arena;
   Pyramid pyramid;
   explicit Built(const ImageView& image, int levels = 3)
-      : arena(Pyramid::memory_needed(image.width, image.height, levels)), pyramid(image.width, image.height, levels, arena) {
+      : arena(Pyramid::memory_needed(image.width, image.height, levels)),
+        pyramid(image.width, image.height, levels, arena) {
     pyramid.build(image);
   }
 };
@@ -38,13 +40,16 @@ struct Scene {
   Patch patch{};
   Vec2 at;
   explicit Scene(std::uint64_t seed, Vec2 where = {90, 80})
-      : texture(seed), image(draw(kWidth, kHeight, texture)), built(image.view()), at(std::move(where)) {
+      : texture(seed),
+        image(draw(kWidth, kHeight, texture)),
+        built(image.view()),
+        at(std::move(where)) {
     EXPECT_TRUE(cut_patch(built.pyramid, at, &patch));
   }
 };
 
-AlignResult align_in(const Image& image, const Patch& patch, const Vec2& predicted, const Mat2& A = Mat2::Identity(),
-                     const AlignOptions& options = {}) {
+AlignResult align_in(const Image& image, const Patch& patch, const Vec2& predicted,
+                     const Mat2& A = Mat2::Identity(), const AlignOptions& options = {}) {
   const Built b(image.view());
   return align(patch, b.pyramid, predicted, A, options);
 }
@@ -64,7 +69,8 @@ TEST(Patch, knownShiftsAreFoundToAFiftiethOfAPixelOnEveryTarget) {
       const AlignResult r = align(s.patch, b.pyramid, s.at, Mat2::Identity(), {});
       ASSERT_EQ(r.status, AlignStatus::ok) << target << ", case " << i;
       const double error = (r.pixel - s.at - shift).norm();
-      EXPECT_LT(error, 4 * kSubPixel) << target << ", case " << i << ", " << r.steps << " steps, sigma " << r.sigma;
+      EXPECT_LT(error, 4 * kSubPixel)
+          << target << ", case " << i << ", " << r.steps << " steps, sigma " << r.sigma;
       square[t++] += error * error;
       EXPECT_GT(r.zncc, 0.99F);
     });
@@ -99,7 +105,8 @@ TEST(Patch, turnedAndScaledPatchesAreFoundWithTheirShape) {
         A *= scale;
         const Vec2 there = s.at + Vec2(random.uniform(-3, 3), random.uniform(-3, 3));
         const Mat2 back = A.inverse();
-        const Image warped = draw(kWidth, kHeight, [&](const Vec2& p) { return s.texture(s.at + back * (p - there)); });
+        const Image warped = draw(
+            kWidth, kHeight, [&](const Vec2& p) { return s.texture(s.at + back * (p - there)); });
         const AlignResult r = align_in(warped, s.patch, s.at, A);
         ASSERT_EQ(r.status, AlignStatus::ok) << angle_deg << "°, " << scale;
         const double error = (r.pixel - there).norm();
@@ -115,27 +122,32 @@ TEST(Patch, brightnessAndContrastDoNotMoveIt) {
   for (std::uint64_t seed = 1; seed <= 10; ++seed) {
     const Scene s(seed);
     const Vec2 shift(1.37, -0.81);
-    for (const auto& [gain, offset] : {std::pair(0.5, 30.0), std::pair(0.9, -10.0), std::pair(1.3, -15.0)}) {
-      const Image moved = draw(kWidth, kHeight, [&](const Vec2& p) { return 128 + gain * (s.texture(p - shift) - 128) + offset; });
+    for (const auto& [gain, offset] :
+         {std::pair(0.5, 30.0), std::pair(0.9, -10.0), std::pair(1.3, -15.0)}) {
+      const Image moved = draw(kWidth, kHeight, [&](const Vec2& p) {
+        return 128 + gain * (s.texture(p - shift) - 128) + offset;
+      });
       const AlignResult r = align_in(moved, s.patch, s.at);
       ASSERT_EQ(r.status, AlignStatus::ok);
       // Half the contrast doubles what rounding does.
-      EXPECT_LT((r.pixel - s.at - shift).norm(), 4 * kSubPixel / std::min(gain, 1.0)) << "gain " << gain << ", seed " << seed;
+      EXPECT_LT((r.pixel - s.at - shift).norm(), 4 * kSubPixel / std::min(gain, 1.0))
+          << "gain " << gain << ", seed " << seed;
     }
   }
 }
 
 TEST(Patch, itsSigmaIsWhatNoiseDoes) {
-  // One grey level of noise in the image (with the rounding 1.04), a clean patch: along the worst direction the error's sigma is the one
-  // told, along the other it is less, so the whole lies between one and √2 of it. 200 cases know it to 5 %; kSettled and interpolation add
-  // 0.02 px.
+  // One grey level of noise in the image (with the rounding 1.04), a clean patch: along the worst
+  // direction the error's sigma is the one told, along the other it is less, so the whole lies
+  // between one and √2 of it. 200 cases know it to 5 %; kSettled and interpolation add 0.02 px.
   double square = 0, predicted = 0;
   constexpr int kCases = 200;
   constexpr double kNoise = 4.0;
   for (int i = 0; i < kCases; ++i) {
     const Scene s(static_cast<std::uint64_t>(i) + 1);
     Random random(static_cast<std::uint64_t>(i) + 900);
-    const Image noisy = draw(kWidth, kHeight, [&](const Vec2& p) { return s.texture(p) + kNoise * random.normal(); });
+    const Image noisy = draw(
+        kWidth, kHeight, [&](const Vec2& p) { return s.texture(p) + kNoise * random.normal(); });
     AlignOptions only;
     only.coarsest = 0;
     const AlignResult r = align_in(noisy, s.patch, s.at, Mat2::Identity(), only);
@@ -150,13 +162,16 @@ TEST(Patch, itsSigmaIsWhatNoiseDoes) {
 
 TEST(Patch, whereTheImageEndsItSaysOutside) {
   const Scene s(1);
-  for (const Vec2& at : {Vec2(3, 80), Vec2(kWidth - 3, 80), Vec2(90, 2), Vec2(90, kHeight - 2), Vec2(-50, -50), Vec2(1e6, 5), Vec2(NAN, 5)})
-    EXPECT_EQ(align(s.patch, s.built.pyramid, at, Mat2::Identity(), {}).status, AlignStatus::outside);
+  for (const Vec2& at : {Vec2(3, 80), Vec2(kWidth - 3, 80), Vec2(90, 2), Vec2(90, kHeight - 2),
+                         Vec2(-50, -50), Vec2(1e6, 5), Vec2(NAN, 5)})
+    EXPECT_EQ(align(s.patch, s.built.pyramid, at, Mat2::Identity(), {}).status,
+              AlignStatus::outside);
 }
 
 TEST(Patch, withoutStructureInBothDirectionsItIsFlat) {
   const Image plain = draw(kWidth, kHeight, [](const Vec2&) { return 100.0; });
-  const Image stripes = draw(kWidth, kHeight, [](const Vec2& p) { return 128 + 60 * std::sin(p.x() / 3); });
+  const Image stripes =
+      draw(kWidth, kHeight, [](const Vec2& p) { return 128 + 60 * std::sin(p.x() / 3); });
   for (const Image* image : {&plain, &stripes}) {
     const Built b(image->view());
     Patch patch{};
@@ -167,27 +182,35 @@ TEST(Patch, withoutStructureInBothDirectionsItIsFlat) {
 
 TEST(Patch, furtherThanAllowedItDiverges) {
   const Scene s(2);
-  const Image moved = draw(kWidth, kHeight, [&](const Vec2& p) { return s.texture(p - Vec2(5, 0)); });
+  const Image moved =
+      draw(kWidth, kHeight, [&](const Vec2& p) { return s.texture(p - Vec2(5, 0)); });
   AlignOptions options;
   options.max_shift = 2;
-  EXPECT_EQ(align_in(moved, s.patch, s.at, Mat2::Identity(), options).status, AlignStatus::diverged);
+  EXPECT_EQ(align_in(moved, s.patch, s.at, Mat2::Identity(), options).status,
+            AlignStatus::diverged);
   EXPECT_EQ(align(s.patch, s.built.pyramid, s.at, Mat2::Zero(), {}).status, AlignStatus::diverged);
-  EXPECT_EQ(align(s.patch, s.built.pyramid, s.at, 100 * Mat2::Identity(), {}).status, AlignStatus::diverged);
+  EXPECT_EQ(align(s.patch, s.built.pyramid, s.at, 100 * Mat2::Identity(), {}).status,
+            AlignStatus::diverged);
 }
 
 TEST(Patch, somethingElseIsNeverTakenForIt) {
   for (std::uint64_t seed = 1; seed <= 40; ++seed) {
-    // Waves of 4 to 9 px fill a window with some thirty independent values: a correlation of 0.8 by chance would be four sigmas and more.
+    // Waves of 4 to 9 px fill a window with some thirty independent values: a correlation of 0.8 by
+    // chance would be four sigmas and more.
     const Image image = draw(kWidth, kHeight, Texture(seed, 4, 9));
     const Built b(image.view());
     Patch patch{};
     ASSERT_TRUE(cut_patch(b.pyramid, {90, 80}, &patch));
-    const AlignResult r = align_in(draw(kWidth, kHeight, Texture(seed + 1000, 4, 9)), patch, {90, 80});
+    const AlignResult r =
+        align_in(draw(kWidth, kHeight, Texture(seed + 1000, 4, 9)), patch, {90, 80});
     EXPECT_NE(r.status, AlignStatus::ok) << seed;
   }
   // The negative has the right edges in the right places.
   const Scene s(1);
-  EXPECT_NE(align_in(draw(kWidth, kHeight, [&](const Vec2& p) { return 255 - s.texture(p); }), s.patch, s.at).status, AlignStatus::ok);
+  EXPECT_NE(align_in(draw(kWidth, kHeight, [&](const Vec2& p) { return 255 - s.texture(p); }),
+                     s.patch, s.at)
+                .status,
+            AlignStatus::ok);
 }
 
 TEST(Patch, isCutOnTheLevelsThatHoldItAndOnNoneOutside) {

@@ -17,7 +17,8 @@ struct Built {
   Arena arena;
   Pyramid pyramid;
   Built(const ImageView& image, int levels)
-      : arena(Pyramid::memory_needed(image.width, image.height, levels)), pyramid(image.width, image.height, levels, arena) {
+      : arena(Pyramid::memory_needed(image.width, image.height, levels)),
+        pyramid(image.width, image.height, levels, arena) {
     pyramid.build(image);
   }
 };
@@ -71,11 +72,14 @@ TEST(Pyramid, isOpenCvsPyrDown) {
   for (const Size s : kSizes) {
     const Image image = white_noise(s.width, s.height, 8);
     const Built b(image.view(), 3);
-    cv::Mat from(s.height, s.width, CV_8U, const_cast<std::uint8_t*>(image.bytes.data()), static_cast<std::size_t>(image.stride));
+    cv::Mat from(s.height, s.width, CV_8U, const_cast<std::uint8_t*>(image.bytes.data()),
+                 static_cast<std::size_t>(image.stride));
     for (int l = 1; l < b.pyramid.levels(); ++l) {
       cv::Mat to;
       cv::pyrDown(from, to);
-      EXPECT_EQ(different_pixels(b.pyramid.level(l), {to.data, to.cols, to.rows, static_cast<std::ptrdiff_t>(to.step)}), 0)
+      EXPECT_EQ(different_pixels(b.pyramid.level(l),
+                                 {to.data, to.cols, to.rows, static_cast<std::ptrdiff_t>(to.step)}),
+                0)
           << s.width << "×" << s.height << ", level " << l;
       from = to;
     }
@@ -85,12 +89,14 @@ TEST(Pyramid, isOpenCvsPyrDown) {
 TEST(Pyramid, paddingOfTheRowsCountsForNothing) {
   const Image tight = white_noise(203, 117, 9), padded = white_noise(203, 117, 9, 53, 255);
   const Built a(tight.view(), 3), b(padded.view(), 3);
-  for (int l = 1; l < a.pyramid.levels(); ++l) EXPECT_EQ(different_pixels(a.pyramid.level(l), b.pyramid.level(l)), 0);
+  for (int l = 1; l < a.pyramid.levels(); ++l)
+    EXPECT_EQ(different_pixels(a.pyramid.level(l), b.pyramid.level(l)), 0);
 }
 
 TEST(Pyramid, readsNoByteOutsideTheImage) {
   for (const Size s : {Size{101, 75}, Size{64, 64}, Size{97, 66}})
-    for (const auto guard : {test::GuardedImage::Guard::before, test::GuardedImage::Guard::behind}) {
+    for (const auto guard :
+         {test::GuardedImage::Guard::before, test::GuardedImage::Guard::behind}) {
       const test::GuardedImage image(white_noise(s.width, s.height, 3), guard);
       test::on_every_target([&](const char*) {
         const Built b(image.view(), 2);
@@ -100,8 +106,11 @@ TEST(Pyramid, readsNoByteOutsideTheImage) {
 }
 
 TEST(Pyramid, aPixelOfALevelLiesAtItsIndexTimesThePowerOfTwo) {
-  // A symmetric spot at (160, 120): its centre of mass stays at the pixel that is its place halved again and again.
-  const Image image = test::draw(320, 240, [](const Vec2& p) { return 250.0 * std::exp(-(p - Vec2(160, 120)).squaredNorm() / 200.0); });
+  // A symmetric spot at (160, 120): its centre of mass stays at the pixel that is its place halved
+  // again and again.
+  const Image image = test::draw(320, 240, [](const Vec2& p) {
+    return 250.0 * std::exp(-(p - Vec2(160, 120)).squaredNorm() / 200.0);
+  });
   const Built b(image.view(), 3);
   for (int l = 0; l < 3; ++l) {
     const ImageView& v = b.pyramid.level(l);

@@ -31,15 +31,18 @@ struct Blobs {
   std::vector<Blob> blobs;
   [[nodiscard]] double operator()(const Vec2& p) const {
     double v = 128;
-    for (const Blob& b : blobs) v += b.amplitude * std::exp(-0.5 * (p - b.at).squaredNorm() / (b.sigma * b.sigma));
+    for (const Blob& b : blobs)
+      v += b.amplitude * std::exp(-0.5 * (p - b.at).squaredNorm() / (b.sigma * b.sigma));
     return v;
   }
 };
 
 /// Points and descriptors of a picture, with the memory they lie in.
 struct Described {
-  Described(const Image& image, std::size_t capacity, const SurfOptions& options, bool upright = true)
-      : arena(Surf::memory_needed(image.width, image.height) + capacity * sizeof(SurfPoint) + 4 * kCacheLine),
+  Described(const Image& image, std::size_t capacity, const SurfOptions& options,
+            bool upright = true)
+      : arena(Surf::memory_needed(image.width, image.height) + capacity * sizeof(SurfPoint) +
+              4 * kCacheLine),
         surf(image.width, image.height, arena),
         points(arena.make<SurfPoint>(capacity, "points")) {
     EXPECT_EQ(surf.set_image(image.view()), SurfStatus::ok);
@@ -70,7 +73,8 @@ constexpr float kMiddle = 60;
 
 /// The description of one given point of a picture.
 template <class Value>
-SurfDescriptor describe_at(const Value& value, const SurfPoint& at, bool upright, SurfPoint* oriented = nullptr) {
+SurfDescriptor describe_at(const Value& value, const SurfPoint& at, bool upright,
+                           SurfPoint* oriented = nullptr) {
   const Image image = draw(kSide, kSide, value);
   Arena arena(Surf::memory_needed(kSide, kSide));
   Surf surf(kSide, kSide, arena);
@@ -88,14 +92,16 @@ SurfDescriptor describe_at(const Value& value, const SurfPoint& at, bool upright
 double box_response(double L, const Blob& blob) {
   const auto box = [&](double width, double height) {
     const double unit = 2 * std::numbers::sqrt2 * blob.sigma;
-    return 2 * std::numbers::pi * blob.sigma * blob.sigma * std::erf(width / unit) * std::erf(height / unit);
+    return 2 * std::numbers::pi * blob.sigma * blob.sigma * std::erf(width / unit) *
+           std::erf(height / unit);
   };
   const double lobe = L / 3, height = 2 * lobe - 1;
   const double xx = blob.amplitude * (box(L, height) - 3 * box(lobe, height)) / (L * L);
   return xx * xx;  // of the four boxes of xy nothing is left
 }
 
-/// Of the octave whose inner sizes hold a blob: boxes of some 5.2 σ answer it most; those of 12 … 24, 21 … 45, 39 … 87 px can be a maximum.
+/// Of the octave whose inner sizes hold a blob: boxes of some 5.2 σ answer it most; those of 12 …
+/// 24, 21 … 45, 39 … 87 px can be a maximum.
 double places_apart(double sigma) { return 5.2 * sigma < 21 ? 1 : 5.2 * sigma < 42 ? 2 : 4; }
 
 TEST(SurfHessian, isTheSumOverTheBoxesItStandsFor) {
@@ -104,7 +110,8 @@ TEST(SurfHessian, isTheSumOverTheBoxesItStandsFor) {
   detail::IntegralImage sums(70, 60, arena);
   sums.build(image.view());
   for (const int L : {9, 15, 27, 51}) {
-    for (const auto& [x, y] : {std::pair(35, 30), std::pair(26, 25), std::pair(L / 2, L / 2), std::pair(69 - L / 2, 59 - L / 2)}) {
+    for (const auto& [x, y] : {std::pair(35, 30), std::pair(26, 25), std::pair(L / 2, L / 2),
+                               std::pair(69 - L / 2, 59 - L / 2)}) {
       const int half = L / 2, lobe = L / 3;
       long xx = 0, yy = 0, xy = 0;
       for (int v = -half; v <= half; ++v) {
@@ -113,7 +120,8 @@ TEST(SurfHessian, isTheSumOverTheBoxesItStandsFor) {
           const int g = image.view().at(x + u, y + v);
           if (std::abs(v) < lobe) xx += 2 * std::abs(u) < lobe ? -2 * g : g;
           if (std::abs(u) < lobe) yy += 2 * std::abs(v) < lobe ? -2 * g : g;
-          if (u != 0 && v != 0 && std::abs(u) <= lobe && std::abs(v) <= lobe) xy += (u > 0) == (v > 0) ? g : -g;
+          if (u != 0 && v != 0 && std::abs(u) <= lobe && std::abs(v) <= lobe)
+            xy += (u > 0) == (v > 0) ? g : -g;
         }
       }
       if (x < half || y < half || x + half >= 70 || y + half >= 60) continue;
@@ -135,14 +143,17 @@ TEST(SurfHessian, isTheSumOverTheBoxesItStandsFor) {
   }
 }
 
-// Along one size the determinant of a blob falls like a Gaussian of w² = (σ² + s²)/4, symmetric about its centre. A parabola through
-// three samples h apart of such a top misses it by at most 0.048 h³/w² (from its series, h δ (δ² − 1/4) h²/w², δ h the top's place
-// between the samples); boxes make a coarser top than the Gaussian's derivatives: twice that. Rounded grey values: 0.02 px.
+// Along one size the determinant of a blob falls like a Gaussian of w² = (σ² + s²)/4, symmetric
+// about its centre. A parabola through three samples h apart of such a top misses it by at most
+// 0.048 h³/w² (from its series, h δ (δ² − 1/4) h²/w², δ h the top's place between the samples);
+// boxes make a coarser top than the Gaussian's derivatives: twice that. Rounded grey values: 0.02
+// px.
 TEST(Surf, findsABlobAtItsSubPixelPlace) {
   Random random(5);
   for (const double sigma : {2.5, 3.0, 3.6, 5.5, 6.5, 7.5, 10.0, 13.0}) {
     for (int i = 0; i < 8; ++i) {
-      const Blob blob{{random.uniform(80, 84), random.uniform(80, 84)}, sigma, i % 2 == 0 ? 90.0 : -90.0};
+      const Blob blob{
+          {random.uniform(80, 84), random.uniform(80, 84)}, sigma, i % 2 == 0 ? 90.0 : -90.0};
       const Described d(draw(161, 165, Blobs{{blob}}), 50, SurfOptions{});
       ASSERT_GE(d.points.size(), 1U) << sigma;
       const SurfPoint& p = d.points[0];
@@ -168,10 +179,12 @@ TEST(Surf, theScaleIsThatOfTheBoxesThatAnswerMost) {
         size = L;
       }
     }
-    // Sizes differ by 6, 12, 24 px in octaves 1, 2, 3; the response rises steeper than it falls, so the parabola through three of them
-    // leans towards larger ones, by less than a quarter of a step.
+    // Sizes differ by 6, 12, 24 px in octaves 1, 2, 3; the response rises steeper than it falls, so
+    // the parabola through three of them leans towards larger ones, by less than a quarter of a
+    // step.
     const double step = 6 * places_apart(sigma);
-    EXPECT_NEAR(static_cast<double>(d.points[0].scale), 1.2 / 9 * size, 1.2 / 9 * step / 4) << sigma;
+    EXPECT_NEAR(static_cast<double>(d.points[0].scale), 1.2 / 9 * size, 1.2 / 9 * step / 4)
+        << sigma;
     EXPECT_LE(static_cast<double>(d.points[0].response), 1.02 * best);
   }
 }
@@ -181,17 +194,20 @@ TEST(Surf, everyBlobOfManyIsFoundStrongestFirst) {
   Random random(11);
   for (int y = 0; y < 4; ++y)
     for (int x = 0; x < 5; ++x)
-      many.blobs.push_back({{60.0 + 50 * x + random.uniform(-5, 5), 60.0 + 50 * y + random.uniform(-5, 5)},
-                            random.uniform(2.5, 5.0),
-                            (random.below(2) == 0 ? 1 : -1) * random.uniform(30, 100)});
+      many.blobs.push_back(
+          {{60.0 + 50 * x + random.uniform(-5, 5), 60.0 + 50 * y + random.uniform(-5, 5)},
+           random.uniform(2.5, 5.0),
+           (random.below(2) == 0 ? 1 : -1) * random.uniform(30, 100)});
   const Described d(draw(320, 270, many), 400, SurfOptions{});
   for (const Blob& b : many.blobs) {
     const auto here = std::find_if(d.points.begin(), d.points.end(), [&](const SurfPoint& p) {
-      return (Vec2(static_cast<double>(p.x), static_cast<double>(p.y)) - b.at).norm() < 0.3 && p.dark == (b.amplitude < 0);
+      return (Vec2(static_cast<double>(p.x), static_cast<double>(p.y)) - b.at).norm() < 0.3 &&
+             p.dark == (b.amplitude < 0);
     });
     EXPECT_NE(here, d.points.end()) << b.at.transpose();
   }
-  for (std::size_t i = 1; i < d.points.size(); ++i) EXPECT_GE(d.points[i - 1].response, d.points[i].response);
+  for (std::size_t i = 1; i < d.points.size(); ++i)
+    EXPECT_GE(d.points[i - 1].response, d.points[i].response);
   EXPECT_EQ(d.found, static_cast<int>(d.points.size()));
 }
 
@@ -216,7 +232,8 @@ TEST(SurfDescriptor, brightnessAndContrastDoNotChangeIt) {
   const SurfPoint at{60.3F, 59.6F, 2.5F, 0, 0, false};
   for (const bool upright : {true, false}) {
     const SurfDescriptor before = describe_at(coarse, at, upright);
-    const SurfDescriptor after = describe_at([&](const Vec2& p) { return 2 * coarse(p) + 17; }, at, upright);
+    const SurfDescriptor after =
+        describe_at([&](const Vec2& p) { return 2 * coarse(p) + 17; }, at, upright);
     EXPECT_LT(distance(before, after), 1e-5);
     float square = 0;
     for (const float v : before.values) square += v * v;
@@ -227,13 +244,17 @@ TEST(SurfDescriptor, brightnessAndContrastDoNotChangeIt) {
 TEST(SurfDescriptor, theDirectionTurnsWithThePicture) {
   const SurfPoint at{kMiddle, kMiddle, 2.4F, 0, 0, false};
   const Vec2 middle(60, 60);
-  // A ramp's direction is its own; wavelets sit on whole pixels and their boxes do not turn: symmetric about the point, so that is exact
-  // for a ramp but for the rounding of grey levels (0.3 of a rise of 3 a pixel over sides of 10 px).
+  // A ramp's direction is its own; wavelets sit on whole pixels and their boxes do not turn:
+  // symmetric about the point, so that is exact for a ramp but for the rounding of grey levels (0.3
+  // of a rise of 3 a pixel over sides of 10 px).
   for (double angle = -170; angle < 180; angle += 25) {
     SurfPoint p;
     const Vec2 g(std::cos(angle * kDegree), std::sin(angle * kDegree));
     (void)describe_at([&](const Vec2& q) { return 128 + 3 * g.dot(q - middle); }, at, false, &p);
-    EXPECT_NEAR(std::remainder(static_cast<double>(p.angle) - angle * kDegree, 2 * std::numbers::pi), 0, 1 * kDegree) << angle;
+    EXPECT_NEAR(
+        std::remainder(static_cast<double>(p.angle) - angle * kDegree, 2 * std::numbers::pi), 0,
+        1 * kDegree)
+        << angle;
   }
 }
 
@@ -253,7 +274,8 @@ Separation separation(const Warp& seen_again, float scale_again, bool upright) {
   for (std::uint64_t seed = 1; seed <= kTextures; ++seed) {
     const Texture texture(seed);
     first.push_back(describe_at(texture, at, upright));
-    second.push_back(describe_at([&](const Vec2& p) { return texture(seen_again(p)); }, again, upright));
+    second.push_back(
+        describe_at([&](const Vec2& p) { return texture(seen_again(p)); }, again, upright));
   }
   Separation s;
   for (std::size_t i = 0; i < kTextures; ++i) {
@@ -271,13 +293,15 @@ Separation separation(const Warp& seen_again, float scale_again, bool upright) {
 
 auto turned_by(double degrees, double larger = 1) {
   Mat2 turn;
-  turn << std::cos(degrees * kDegree), -std::sin(degrees * kDegree), std::sin(degrees * kDegree), std::cos(degrees * kDegree);
+  turn << std::cos(degrees * kDegree), -std::sin(degrees * kDegree), std::sin(degrees * kDegree),
+      std::cos(degrees * kDegree);
   const Vec2 middle(static_cast<double>(kMiddle), static_cast<double>(kMiddle));
   return [=](const Vec2& p) -> Vec2 { return middle + turn.transpose() * (p - middle) / larger; };
 }
 
 TEST(SurfDescriptor, aTurnedPictureIsKnownAgainUnlessUpright) {
-  // One texture in six may have two directions of nearly equal strength, of which another wins after the turn.
+  // One texture in six may have two directions of nearly equal strength, of which another wins
+  // after the turn.
   for (const double angle : {33.0, 90.0, 160.0, -75.0}) {
     const Separation s = separation(turned_by(angle), 1, false);
     EXPECT_GE(s.nearer, s.of - 2) << angle;
@@ -291,11 +315,13 @@ TEST(SurfDescriptor, aLargerPictureIsKnownAgainAtItsScale) {
   for (const float larger : {1.25F, 1.7F, 2.F}) {
     const Separation s = separation(turned_by(0, static_cast<double>(larger)), larger, true);
     EXPECT_GE(s.nearer, s.of - 1) << larger;
-    EXPECT_LT(s.mean, separation(turned_by(0, static_cast<double>(larger)), 1.F, true).mean) << larger;
+    EXPECT_LT(s.mean, separation(turned_by(0, static_cast<double>(larger)), 1.F, true).mean)
+        << larger;
   }
 }
 
-/// Matches of a picture with itself moved, turned and enlarged: where each left point went is known.
+/// Matches of a picture with itself moved, turned and enlarged: where each left point went is
+/// known.
 struct Moved {
   int matches = 0, right = 0;
 };
@@ -304,23 +330,29 @@ Moved match_moved(const Vec2& shift, double degrees, double larger, bool upright
   constexpr int kWhole = 260;
   const Vec2 middle(130, 130);
   Mat2 turn;
-  turn << std::cos(degrees * kDegree), -std::sin(degrees * kDegree), std::sin(degrees * kDegree), std::cos(degrees * kDegree);
+  turn << std::cos(degrees * kDegree), -std::sin(degrees * kDegree), std::sin(degrees * kDegree),
+      std::cos(degrees * kDegree);
   Moved m;
   for (std::uint64_t seed = 1; seed <= 2; ++seed) {
     // Waves of many lengths: one length alone has no size of its own.
     const Texture fine(seed, 9, 40), coarse(seed + 50, 20, 120);
     const auto picture = [&](const Vec2& p) { return 0.6 * fine(p) + 0.9 * coarse(p) - 64; };
-    const auto again = [&](const Vec2& p) { return picture(middle + turn.transpose() * (p - middle - shift) / larger); };
+    const auto again = [&](const Vec2& p) {
+      return picture(middle + turn.transpose() * (p - middle - shift) / larger);
+    };
     SurfOptions options;
     options.min_response = 1;
-    const Described left(draw(kWhole, kWhole, picture), 600, options, upright), right(draw(kWhole, kWhole, again), 600, options, upright);
+    const Described left(draw(kWhole, kWhole, picture), 600, options, upright),
+        right(draw(kWhole, kWhole, again), 600, options, upright);
     Arena arena(SurfMatcher::memory_needed(600) + 600 * sizeof(SurfMatch) + kCacheLine);
     SurfMatcher matcher(600, arena);
     BoundedVector<SurfMatch> matches(arena.make<SurfMatch>(600, "matches"));
     EXPECT_EQ(matcher.match(left.view(), right.view(), {}, nullptr, &matches), SurfMatchStatus::ok);
     for (const SurfMatch& match : matches) {
       const SurfPoint &a = left.points[match.left], &b = right.points[match.right];
-      const Vec2 there = middle + shift + larger * (turn * (Vec2(static_cast<double>(a.x), static_cast<double>(a.y)) - middle));
+      const Vec2 there =
+          middle + shift +
+          larger * (turn * (Vec2(static_cast<double>(a.x), static_cast<double>(a.y)) - middle));
       ++m.matches;
       // Within the finer of the two scales: the same blob.
       const double off = (there - Vec2(static_cast<double>(b.x), static_cast<double>(b.y))).norm();
@@ -407,7 +439,8 @@ TEST_F(Matching, badInputIsNamedAndMatchesNothing) {
   EXPECT_EQ(matcher.match(left.view(), right.view(), {}, nullptr, &out), SurfMatchStatus::capacity);
   EXPECT_TRUE(out.empty());
   left.points.pop_back();
-  EXPECT_EQ(matcher.match(left.view(), right.view(), {}, nullptr, &out), SurfMatchStatus::invalid_input);
+  EXPECT_EQ(matcher.match(left.view(), right.view(), {}, nullptr, &out),
+            SurfMatchStatus::invalid_input);
   left.descriptors.pop_back();
   EXPECT_EQ(matcher.match({}, right.view(), {}, nullptr, &out), SurfMatchStatus::ok);
   EXPECT_TRUE(out.empty());
@@ -427,14 +460,16 @@ TEST(Surf, smallFlatAndWrongImagesGiveNoPoints) {
   Surf surf(100, 80, arena);
   BoundedVector<SurfPoint> points(arena.make<SurfPoint>(50, "points"));
   EXPECT_EQ(surf.detect({}, &points), 0);  // no image yet
-  for (const auto& [w, h] : {std::pair(1, 1), std::pair(26, 80), std::pair(27, 27), std::pair(100, 3), std::pair(28, 29)}) {
+  for (const auto& [w, h] : {std::pair(1, 1), std::pair(26, 80), std::pair(27, 27),
+                             std::pair(100, 3), std::pair(28, 29)}) {
     const Image noise = test::white_noise(w, h, 1);
     EXPECT_EQ(surf.set_image(noise.view()), SurfStatus::ok);
     EXPECT_EQ(surf.detect({}, &points), 0) << w << " x " << h;
     // A point that lies outside has nothing about it.
     constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
-    for (SurfPoint outside : {SurfPoint{1e6F, -1e6F, 3, 0, 1, false}, SurfPoint{kNaN, 1e30F, 3, 0, 1, false},
-                              SurfPoint{5, 5, kNaN, 0, 1, false}, SurfPoint{5, 5, 1e30F, 0, 1, false}}) {
+    for (SurfPoint outside :
+         {SurfPoint{1e6F, -1e6F, 3, 0, 1, false}, SurfPoint{kNaN, 1e30F, 3, 0, 1, false},
+          SurfPoint{5, 5, kNaN, 0, 1, false}, SurfPoint{5, 5, 1e30F, 0, 1, false}}) {
       SurfDescriptor d;
       surf.orient({&outside, 1});
       EXPECT_EQ(outside.angle, 0) << outside.x << " " << outside.scale;
@@ -464,7 +499,8 @@ TEST(Surf, nothingBesideThePictureIsReadAndPaddingIsNoPicture) {
     Arena arena(2 * Surf::memory_needed(131, 117) + 4 * 300 * sizeof(SurfPoint));
     Surf a(131, 117, arena), b(200, 20, arena);
     EXPECT_EQ(b.set_image(guarded.view()), SurfStatus::too_large);
-    BoundedVector<SurfPoint> one(arena.make<SurfPoint>(300, "points")), two(arena.make<SurfPoint>(300, "points"));
+    BoundedVector<SurfPoint> one(arena.make<SurfPoint>(300, "points")),
+        two(arena.make<SurfPoint>(300, "points"));
     ASSERT_EQ(a.set_image(guarded.view()), SurfStatus::ok);
     EXPECT_GT(a.detect({4, 0.1F}, &one), 0);
     ASSERT_EQ(a.set_image(padded.view()), SurfStatus::ok);
@@ -478,7 +514,8 @@ TEST(Surf, takesTheMemoryItSaysAndNoneAfterwards) {
   const Image image = draw(240, 180, Texture(2));
   constexpr std::size_t kRoom = 200;
   Arena arena(Surf::memory_needed(240, 180) + SurfMatcher::memory_needed(kRoom) +
-              kRoom * (sizeof(SurfPoint) + sizeof(SurfDescriptor) + sizeof(SurfMatch)) + 3 * kCacheLine);
+              kRoom * (sizeof(SurfPoint) + sizeof(SurfDescriptor) + sizeof(SurfMatch)) +
+              3 * kCacheLine);
   Surf surf(240, 180, arena);
   SurfMatcher matcher(kRoom, arena);
   BoundedVector<SurfPoint> points(arena.make<SurfPoint>(kRoom, "points"));

@@ -25,20 +25,28 @@ struct Image {
   std::vector<std::uint8_t> bytes;
 
   Image(int w, int h, int extra = 0, std::uint8_t padding = 0)
-      : width(w), height(h), stride(w + extra), bytes(static_cast<std::size_t>(stride) * static_cast<std::size_t>(h), padding) {}
+      : width(w),
+        height(h),
+        stride(w + extra),
+        bytes(static_cast<std::size_t>(stride) * static_cast<std::size_t>(h), padding) {}
   [[nodiscard]] ImageView view() const { return {bytes.data(), width, height, stride}; }
-  [[nodiscard]] std::uint8_t& at(int x, int y) { return bytes[static_cast<std::size_t>(y * stride + x)]; }
+  [[nodiscard]] std::uint8_t& at(int x, int y) {
+    return bytes[static_cast<std::size_t>(y * stride + x)];
+  }
 };
 
 template <class Value>
 Image draw(int width, int height, const Value& value, int extra = 0) {
   Image image(width, height, extra);
   for (int y = 0; y < height; ++y)
-    for (int x = 0; x < width; ++x) image.at(x, y) = static_cast<std::uint8_t>(std::clamp(std::lround(value(Vec2(x, y))), 0L, 255L));
+    for (int x = 0; x < width; ++x)
+      image.at(x, y) =
+          static_cast<std::uint8_t>(std::clamp(std::lround(value(Vec2(x, y))), 0L, 255L));
   return image;
 }
 
-inline Image white_noise(int width, int height, std::uint64_t seed, int extra = 0, std::uint8_t padding = 0) {
+inline Image white_noise(int width, int height, std::uint64_t seed, int extra = 0,
+                         std::uint8_t padding = 0) {
   Random random(seed);
   Image image(width, height, extra, padding);
   for (int y = 0; y < height; ++y)
@@ -46,14 +54,16 @@ inline Image white_noise(int width, int height, std::uint64_t seed, int extra = 
   return image;
 }
 
-/// Grey values as a function of the plane: a sum of waves, so that any shift of it is known exactly. Sigma of the grey values 24.
+/// Grey values as a function of the plane: a sum of waves, so that any shift of it is known
+/// exactly. Sigma of the grey values 24.
 class Texture {
  public:
   /// Lengths of the waves, px.
   explicit Texture(std::uint64_t seed, double shortest = 8, double longest = 24) {
     Random random(seed);
     for (Wave& w : waves_) {
-      const double length = random.uniform(shortest, longest), angle = random.uniform(0, 2 * std::numbers::pi);
+      const double length = random.uniform(shortest, longest),
+                   angle = random.uniform(0, 2 * std::numbers::pi);
       w.k = 2 * std::numbers::pi / length * Vec2(std::cos(angle), std::sin(angle));
       w.phase = random.uniform(0, 2 * std::numbers::pi);
     }
@@ -72,7 +82,8 @@ class Texture {
   std::array<Wave, 10> waves_;
 };
 
-/// An image whose last byte is followed, or whose first is preceded, by a page that must not be touched.
+/// An image whose last byte is followed, or whose first is preceded, by a page that must not be
+/// touched.
 class GuardedImage {
  public:
   enum class Guard : std::uint8_t { before, behind };
@@ -81,11 +92,13 @@ class GuardedImage {
     const auto bytes = static_cast<std::size_t>(width_) * static_cast<std::size_t>(height_);
     const std::size_t room = (bytes + page - 1) / page * page;
     length_ = room + page;
-    void* const at = mmap(nullptr, length_, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
+    void* const at =
+        mmap(nullptr, length_, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
     if (at == MAP_FAILED) throw std::bad_alloc();
     memory_ = static_cast<std::uint8_t*>(at);
     data_ = guard == Guard::before ? memory_ + page : memory_ + room - bytes;
-    for (int y = 0; y < height_; ++y) std::copy_n(from.bytes.data() + y * from.stride, width_, data_ + y * width_);
+    for (int y = 0; y < height_; ++y)
+      std::copy_n(from.bytes.data() + y * from.stride, width_, data_ + y * width_);
     mprotect(guard == Guard::before ? memory_ : memory_ + room, page, PROT_NONE);
   }
   ~GuardedImage() { munmap(memory_, length_); }

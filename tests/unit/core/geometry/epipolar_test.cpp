@@ -10,7 +10,9 @@ namespace {
 
 using Value = Eigen::Matrix<double, 1, 1>;
 
-Transform random_stereo(Random& random) { return {exp_so3(test::random_vector(random, -0.5, 0.5)), test::random_vector(random, -1, 1)}; }
+Transform random_stereo(Random& random) {
+  return {exp_so3(test::random_vector(random, -0.5, 0.5)), test::random_vector(random, -1, 1)};
+}
 
 Vec2 ray_of(const Vec3& p) { return {p.x() / p.z(), p.y() / p.z()}; }
 
@@ -43,7 +45,8 @@ TEST(Epipolar, parallelCamerasMeasureTheVerticalDisparity) {
 
 TEST(Epipolar, derivativesMatchCentralDifferences) {
   Random random(42);
-  std::vector<Transform> transforms = {Transform{Mat3::Identity(), {-0.75, 0, 0}}, Transform{exp_so3({0, 3.1, 0}), {0.1, 0.2, 5}}};
+  std::vector<Transform> transforms = {Transform{Mat3::Identity(), {-0.75, 0, 0}},
+                                       Transform{exp_so3({0, 3.1, 0}), {0.1, 0.2, 5}}};
   for (int k = 0; k < 100; ++k) transforms.push_back(random_stereo(random));
   for (const Transform& T : transforms) {
     const Vec2 left(random.uniform(-0.6, 0.6), random.uniform(-0.4, 0.4));
@@ -55,7 +58,8 @@ TEST(Epipolar, derivativesMatchCentralDifferences) {
         J.transpose(),
         [&](const Vec5& d) {
           double v = 0;
-          EXPECT_EQ(EpipolarGeometry(moved_on_sphere(T, d)).sampson(left, right, &v, nullptr), EpipolarStatus::ok);
+          EXPECT_EQ(EpipolarGeometry(moved_on_sphere(T, d)).sampson(left, right, &v, nullptr),
+                    EpipolarStatus::ok);
           return Value(v);
         },
         1e-7));
@@ -64,7 +68,8 @@ TEST(Epipolar, derivativesMatchCentralDifferences) {
         J.transpose(),
         [&](const Vec5& d) {
           double v = 0;
-          EXPECT_EQ(EpipolarGeometry(moved_on_sphere(T, d)).to_line(left, right, &v, nullptr), EpipolarStatus::ok);
+          EXPECT_EQ(EpipolarGeometry(moved_on_sphere(T, d)).to_line(left, right, &v, nullptr),
+                    EpipolarStatus::ok);
           return Value(v);
         },
         1e-7));
@@ -88,7 +93,8 @@ TEST(Epipolar, movingKeepsTheLengthAndTheBasisIsOrthonormal) {
 
 TEST(Epipolar, namesWhereNothingIsMeasured) {
   double value = 7;
-  EXPECT_EQ(EpipolarGeometry(Transform{}).sampson({0, 0}, {0, 0}, &value, nullptr), EpipolarStatus::no_baseline);
+  EXPECT_EQ(EpipolarGeometry(Transform{}).sampson({0, 0}, {0, 0}, &value, nullptr),
+            EpipolarStatus::no_baseline);
   const EpipolarGeometry forward(Transform{Mat3::Identity(), {0, 0, -1}});
   EXPECT_EQ(forward.sampson({0, 0}, {0, 0}, &value, nullptr), EpipolarStatus::at_epipole);
   EXPECT_EQ(forward.to_line({0, 0}, {0.1, 0}, &value, nullptr), EpipolarStatus::at_epipole);

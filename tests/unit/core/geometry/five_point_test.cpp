@@ -21,7 +21,8 @@ struct Matches {
 
 Matches random_matches(Random& random) {
   Matches m;
-  m.T_right_left = {exp_so3(test::random_vector(random, -0.3, 0.3)), test::random_vector(random, -1, 1)};
+  m.T_right_left = {exp_so3(test::random_vector(random, -0.3, 0.3)),
+                    test::random_vector(random, -1, 1)};
   for (std::size_t i = 0; i < 5; ++i) {
     const Vec3 p = test::visible_point(random, 3, 20), q = m.T_right_left * p;
     m.left[i] = Vec2(p.x() / p.z(), p.y() / p.z());
@@ -55,7 +56,8 @@ TEST(FivePoint, findsTheTrueMatrixOfRandomMatches) {
   std::sort(errors.begin(), errors.end());
   EXPECT_LT(errors[kProblems / 2], 1e-12);
   EXPECT_LT(errors[kProblems * 98 / 100], 1e-9);
-  EXPECT_LE(missed, 3);  // two roots of the tenth degree so near to each other that no sign change lies between: one in thousands
+  EXPECT_LE(missed, 3);  // two roots of the tenth degree so near to each other that no sign change
+                         // lies between: one in thousands
 }
 
 TEST(FivePoint, everySolutionIsEssentialAndFitsTheFiveMatches) {
@@ -68,7 +70,8 @@ TEST(FivePoint, everySolutionIsEssentialAndFitsTheFiveMatches) {
       EXPECT_NEAR(E.norm(), std::sqrt(2.0), 1e-12);
       EXPECT_NEAR(E.determinant(), 0.0, 1e-7);
       EXPECT_LT((2 * E * E.transpose() * E - (E * E.transpose()).trace() * E).norm(), 1e-7);
-      for (std::size_t j = 0; j < 5; ++j) EXPECT_NEAR(m.right[j].homogeneous().dot(E * m.left[j].homogeneous()), 0.0, 1e-11);
+      for (std::size_t j = 0; j < 5; ++j)
+        EXPECT_NEAR(m.right[j].homogeneous().dot(E * m.left[j].homogeneous()), 0.0, 1e-11);
     }
   }
 }
@@ -79,15 +82,20 @@ TEST(FivePoint, findsWhatOpenCvFindsInTheSameFive) {
   for (int k = 0; k < 200; ++k) {
     const Matches m = random_matches(random);
     std::vector<cv::Point2d> left, right;
-    for (std::size_t i = 0; i < 5; ++i) left.emplace_back(m.left[i].x(), m.left[i].y()), right.emplace_back(m.right[i].x(), m.right[i].y());
-    const cv::Mat all = cv::findEssentialMat(left, right, cv::Mat::eye(3, 3, CV_64F), cv::RANSAC, 0.999, 1e-3);
+    for (std::size_t i = 0; i < 5; ++i)
+      left.emplace_back(m.left[i].x(), m.left[i].y()),
+          right.emplace_back(m.right[i].x(), m.right[i].y());
+    const cv::Mat all =
+        cv::findEssentialMat(left, right, cv::Mat::eye(3, 3, CV_64F), cv::RANSAC, 0.999, 1e-3);
     const FivePointSolutions s = solve_five_point(m.left, m.right);
-    for (int at = 0; at + 3 <= all.rows; at += 3) {  // with five matches it returns every solution, one below the other
+    for (int at = 0; at + 3 <= all.rows;
+         at += 3) {  // with five matches it returns every solution, one below the other
       Mat3 E;
       for (int r = 0; r < 3; ++r)
         for (int c = 0; c < 3; ++c) E(r, c) = all.at<double>(at + r, c);
       E *= std::sqrt(2.0) / E.norm();
-      if ((2 * E * E.transpose() * E - (E * E.transpose()).trace() * E).norm() > 1e-8) continue;  // its own rounding
+      if ((2 * E * E.transpose() * E - (E * E.transpose()).trace() * E).norm() > 1e-8)
+        continue;  // its own rounding
       ++compared;
       missing += nearest(s, E) < 1e-5 ? 0 : 1;
     }
@@ -102,7 +110,9 @@ TEST(FivePoint, decompositionFindsTheTransform) {
     const Matches m = random_matches(random);
     Transform T;
     const double baseline = m.T_right_left.t.norm();
-    ASSERT_EQ(decompose_essential(-3.0 * essential_matrix(m.T_right_left), m.left, m.right, baseline, &T), 5);
+    ASSERT_EQ(
+        decompose_essential(-3.0 * essential_matrix(m.T_right_left), m.left, m.right, baseline, &T),
+        5);
     EXPECT_LT(test::difference(T, m.T_right_left), 1e-9);
   }
 }
@@ -121,7 +131,9 @@ TEST(FivePoint, refusesDegenerateInputByName) {
   m.right.fill(Vec2::Zero());
   EXPECT_EQ(solve_five_point(m.left, m.right).status, FivePointStatus::degenerate);
   Transform T;
-  EXPECT_EQ(decompose_essential(Mat3::Constant(std::numeric_limits<double>::quiet_NaN()), m.left, m.right, 1, &T), 0);
+  EXPECT_EQ(decompose_essential(Mat3::Constant(std::numeric_limits<double>::quiet_NaN()), m.left,
+                                m.right, 1, &T),
+            0);
   EXPECT_EQ(T.R, Mat3::Identity());
 }
 

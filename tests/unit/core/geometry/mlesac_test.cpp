@@ -23,15 +23,17 @@ class RigMlesacTest : public testing::Test {
   RigObservationTable table_{kCapacity, arena_};
 };
 
-double share_flagged_right(const RigScene& scene, const RigObservations& o, std::span<const std::uint8_t> flags) {
+double share_flagged_right(const RigScene& scene, const RigObservations& o,
+                           std::span<const std::uint8_t> flags) {
   int right = 0;
-  for (std::size_t i = 0; i < o.size(); ++i) right += (flags[i] == o.seen[i]) == scene.good[i] ? 1 : 0;
+  for (std::size_t i = 0; i < o.size(); ++i)
+    right += (flags[i] == o.seen[i]) == scene.good[i] ? 1 : 0;
   return static_cast<double>(right) / static_cast<double>(o.size());
 }
 
 TEST_F(RigMlesacTest, findsThePoseAmongHalfOutliersAndFlagsThem) {
-  // T² = 9.21 alone calls 1 % of good pixels wrong, 2 % of points seen twice; three-point poses carry noise of their own,
-  // so sigma is told three times as large as it is.
+  // T² = 9.21 alone calls 1 % of good pixels wrong, 2 % of points seen twice; three-point poses
+  // carry noise of their own, so sigma is told three times as large as it is.
   int poses = 0;
   for (std::uint64_t seed = 1; seed <= 50; ++seed) {
     Random random(seed);
@@ -43,7 +45,8 @@ TEST_F(RigMlesacTest, findsThePoseAmongHalfOutliersAndFlagsThem) {
     if ((found.T_left_world.centre() - scene.T_left_world.centre()).norm() < 0.2) ++poses;
     EXPECT_EQ(static_cast<std::size_t>(found.observations), [&] {
       std::size_t n = 0;
-      for (std::size_t i = 0; i < table_.size(); ++i) n += table_.view().sees(i, 0) + table_.view().sees(i, 1);
+      for (std::size_t i = 0; i < table_.size(); ++i)
+        n += table_.view().sees(i, 0) + table_.view().sees(i, 1);
       return n;
     }());
   }
@@ -113,7 +116,8 @@ TEST_F(RigMlesacTest, theScoreIsTheTruncatedCostOfThePose) {
       if (!o.sees(i, static_cast<int>(k))) continue;
       const Vec3 p = o.T_camera_left[k] * (found.T_left_world * Vec3(o.x[i], o.y[i], o.z[i]));
       const Pinhole& c = o.pinhole[k];
-      const double du = c.fx * p.x() / p.z() + c.cx - o.u[k][i], dv = c.fy * p.y() / p.z() + c.cy - o.v[k][i];
+      const double du = c.fx * p.x() / p.z() + c.cx - o.u[k][i],
+                   dv = c.fy * p.y() / p.z() + c.cy - o.v[k][i];
       const double e2 = (du * du + dv * dv) / (o.sigma[i] * o.sigma[i]);
       cost += p.z() > 0 && e2 < options.outlier_cost ? e2 : options.outlier_cost;
     }
@@ -125,7 +129,8 @@ TEST_F(RigMlesacTest, namesWhatIsWrongWithTheInput) {
   (void)make_scene(random, 2, 2, 0.0, 0.0, 0.0, 0.3, &table_);
   EXPECT_EQ(mlesac_.solve(table_.view(), {}, nullptr, random).status, MlesacStatus::too_few);
   const Transform prior;
-  EXPECT_EQ(mlesac_.solve(table_.view(), {}, &prior, random).status, MlesacStatus::ok);  // the prior is all there is
+  EXPECT_EQ(mlesac_.solve(table_.view(), {}, &prior, random).status,
+            MlesacStatus::ok);  // the prior is all there is
   table_.clear();
   EXPECT_EQ(mlesac_.solve(table_.view(), {}, &prior, random).status, MlesacStatus::too_few);
 
@@ -141,7 +146,8 @@ TEST_F(RigMlesacTest, namesWhatIsWrongWithTheInput) {
   EXPECT_EQ(mlesac_.solve(o, {}, nullptr, random).status, MlesacStatus::invalid_input);
   MlesacOptions options;
   options.confidence = 1.0;
-  EXPECT_EQ(mlesac_.solve(table_.view(), options, nullptr, random).status, MlesacStatus::invalid_input);
+  EXPECT_EQ(mlesac_.solve(table_.view(), options, nullptr, random).status,
+            MlesacStatus::invalid_input);
 
   Arena small_arena(RigMlesac::memory_needed(20));
   RigMlesac small(20, small_arena);

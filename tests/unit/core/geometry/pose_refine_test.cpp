@@ -19,7 +19,8 @@ constexpr std::size_t kCapacity = 512;
 
 class PoseRefinerTest : public testing::Test {
  protected:
-  Arena arena_{PoseRefiner::memory_needed(kCapacity) + RigObservationTable::memory_needed(kCapacity) +
+  Arena arena_{PoseRefiner::memory_needed(kCapacity) +
+               RigObservationTable::memory_needed(kCapacity) +
                detail::PoseProblem::memory_needed(kCapacity)};
   PoseRefiner refiner_{kCapacity, arena_};
   RigObservationTable table_{kCapacity, arena_};
@@ -41,7 +42,8 @@ Vec6 step_between(const Transform& a, const Transform& b) {
 }
 
 TEST_F(PoseRefinerTest, gradientIsTheDerivativeOfTheCost) {
-  // dC/dδ = −2 g, Huber's tail included; cost of some 1e4, so that central differences are good to about 1e-5 of |g|.
+  // dC/dδ = −2 g, Huber's tail included; cost of some 1e4, so that central differences are good to
+  // about 1e-5 of |g|.
   Random random(21);
   for (int cameras = 1; cameras <= kMaxCameras; ++cameras) {
     const RigScene scene = make_scene(random, cameras, 101, 0.2, 0.3, 0.3, 0.5, &table_);
@@ -52,7 +54,8 @@ TEST_F(PoseRefinerTest, gradientIsTheDerivativeOfTheCost) {
     for (int i = 0; i < 6; ++i) {
       const double ahead = problem_.sums(detail::moved(at, h * Vec6::Unit(i)), 1.3, 2.0).cost;
       const double behind = problem_.sums(detail::moved(at, -h * Vec6::Unit(i)), 1.3, 2.0).cost;
-      EXPECT_NEAR((ahead - behind) / (2 * h), -2.0 * sums.g[i], 1e-5 * sums.g.norm()) << cameras << " cameras, column " << i;
+      EXPECT_NEAR((ahead - behind) / (2 * h), -2.0 * sums.g[i], 1e-5 * sums.g.norm())
+          << cameras << " cameras, column " << i;
     }
   }
 }
@@ -65,17 +68,20 @@ TEST_F(PoseRefinerTest, informationIsTheCurvatureOfTheCostWhereResidualsVanish) 
   Mat6 numeric;  // dg/dδ = −H
   const double h = 1e-6;
   for (int i = 0; i < 6; ++i)
-    numeric.col(i) = -(problem_.sums(detail::moved(scene.T_left_world, h * Vec6::Unit(i)), 1.0, 1e6).g -
-                       problem_.sums(detail::moved(scene.T_left_world, -h * Vec6::Unit(i)), 1.0, 1e6).g) /
-                     (2 * h);
+    numeric.col(i) =
+        -(problem_.sums(detail::moved(scene.T_left_world, h * Vec6::Unit(i)), 1.0, 1e6).g -
+          problem_.sums(detail::moved(scene.T_left_world, -h * Vec6::Unit(i)), 1.0, 1e6).g) /
+        (2 * h);
   EXPECT_LT((numeric - H).norm(), 1e-6 * H.norm()) << numeric << "\n\n" << H;
 }
 
 TEST_F(PoseRefinerTest, recoversTheExactPose) {
   for (std::uint64_t seed = 1; seed <= 200; ++seed) {
     Random random(seed);
-    const RigScene scene = make_scene(random, 1 + static_cast<int>(seed % 4), 60, 0.0, 0.3, 0.0, 0.3, &table_);
-    const RefinedPose found = refiner_.refine(table_.view(), disturbed(scene.T_left_world, random, 0.02, 0.2), {}, {});
+    const RigScene scene =
+        make_scene(random, 1 + static_cast<int>(seed % 4), 60, 0.0, 0.3, 0.0, 0.3, &table_);
+    const RefinedPose found =
+        refiner_.refine(table_.view(), disturbed(scene.T_left_world, random, 0.02, 0.2), {}, {});
     ASSERT_EQ(found.status, PoseRefineStatus::small_update) << seed;
     EXPECT_LT(test::difference(found.T_left_world, scene.T_left_world), 1e-9) << seed;
     EXPECT_EQ(found.inliers, 60);
@@ -88,18 +94,22 @@ TEST_F(PoseRefinerTest, resistsOutliersAndFlagsThem) {
   for (std::uint64_t seed = 1; seed <= 30; ++seed) {
     Random random(seed);
     const RigScene scene = make_scene(random, 2, 300, 0.2, 0.3, 0.3, 0.3, &table_);
-    const RefinedPose found = refiner_.refine(table_.view(), disturbed(scene.T_left_world, random, 0.005, 0.05), {}, {});
+    const RefinedPose found =
+        refiner_.refine(table_.view(), disturbed(scene.T_left_world, random, 0.005, 0.05), {}, {});
     ASSERT_TRUE(found.usable());
     EXPECT_LT((found.T_left_world.centre() - scene.T_left_world.centre()).norm(), 0.05);
     int right = 0;
-    for (std::size_t i = 0; i < table_.size(); ++i) right += (refiner_.flags()[i] == table_.view().seen[i]) == scene.good[i] ? 1 : 0;
-    EXPECT_GE(right, 290) << seed;  // χ² at 99 % of up to two observations a point: 2 % of 240, and their spread
+    for (std::size_t i = 0; i < table_.size(); ++i)
+      right += (refiner_.flags()[i] == table_.view().seen[i]) == scene.good[i] ? 1 : 0;
+    EXPECT_GE(right, 290)
+        << seed;  // χ² at 99 % of up to two observations a point: 2 % of 240, and their spread
   }
 }
 
 TEST_F(PoseRefinerTest, informationPredictsTheSpreadOfThePose) {
-  // Normalised squared error: 6 in the mean. Huber at 2 sigmas down-weights 13.5 % of Gaussian data by a few percent, which
-  // makes both the information and the spread a little conservative; 200 draws know the mean to 0.25.
+  // Normalised squared error: 6 in the mean. Huber at 2 sigmas down-weights 13.5 % of Gaussian data
+  // by a few percent, which makes both the information and the spread a little conservative; 200
+  // draws know the mean to 0.25.
   double nees = 0, rms = 0;
   constexpr int kDraws = 200;
   for (int k = 0; k < kDraws; ++k) {
@@ -142,8 +152,10 @@ TEST_F(PoseRefinerTest, resultDoesNotDependOnWhereTheWorldBegan) {
   const RefinedPose here = refiner_.refine(table_.view(), scene.T_left_world, {}, {});
   const Vec3 shift(3e4, -2e3, 5e4);  // an hour's drive
   RigObservations o = table_.view();
-  std::vector<double> x(o.x.begin(), o.x.end()), y(o.y.begin(), o.y.end()), z(o.z.begin(), o.z.end());
-  for (std::size_t i = 0; i < o.size(); ++i) x[i] += shift.x(), y[i] += shift.y(), z[i] += shift.z();
+  std::vector<double> x(o.x.begin(), o.x.end()), y(o.y.begin(), o.y.end()),
+      z(o.z.begin(), o.z.end());
+  for (std::size_t i = 0; i < o.size(); ++i)
+    x[i] += shift.x(), y[i] += shift.y(), z[i] += shift.z();
   o.x = x, o.y = y, o.z = z;
   const Transform start{scene.T_left_world.R, scene.T_left_world.t - scene.T_left_world.R * shift};
   const RefinedPose there = refiner_.refine(o, start, {}, {});
@@ -157,7 +169,8 @@ TEST_F(PoseRefinerTest, usesOnlyWhatItIsTold) {
   const RigScene scene = make_scene(random, 2, 100, 0.4, 0.0, 0.0, 0.3, &table_);
   std::vector<std::uint8_t> use(100, 0);
   for (std::size_t i = 0; i < 100; ++i) use[i] = scene.good[i] ? 3 : 0;
-  const RefinedPose found = refiner_.refine(table_.view(), disturbed(scene.T_left_world, random, 0.02, 0.2), use, {});
+  const RefinedPose found =
+      refiner_.refine(table_.view(), disturbed(scene.T_left_world, random, 0.02, 0.2), use, {});
   EXPECT_LT(test::difference(found.T_left_world, scene.T_left_world), 1e-9);
   for (std::size_t i = 0; i < 100; ++i) EXPECT_EQ(refiner_.flags()[i] == 3, scene.good[i]) << i;
 }
@@ -165,16 +178,19 @@ TEST_F(PoseRefinerTest, usesOnlyWhatItIsTold) {
 TEST_F(PoseRefinerTest, namesWhatIsWrong) {
   Random random(26);
   const RigScene scene = make_scene(random, 1, 2, 0.0, 0.0, 0.0, 0.3, &table_);
-  EXPECT_EQ(refiner_.refine(table_.view(), scene.T_left_world, {}, {}).status, PoseRefineStatus::too_few);
+  EXPECT_EQ(refiner_.refine(table_.view(), scene.T_left_world, {}, {}).status,
+            PoseRefineStatus::too_few);
   (void)make_scene(random, 2, 50, 0.0, 0.0, 0.0, 0.3, &table_);
   Transform bad;
   bad.t.x() = std::numeric_limits<double>::quiet_NaN();
   EXPECT_EQ(refiner_.refine(table_.view(), bad, {}, {}).status, PoseRefineStatus::invalid_input);
   const std::vector<std::uint8_t> use(3, 1);
-  EXPECT_EQ(refiner_.refine(table_.view(), Transform{}, use, {}).status, PoseRefineStatus::invalid_input);
+  EXPECT_EQ(refiner_.refine(table_.view(), Transform{}, use, {}).status,
+            PoseRefineStatus::invalid_input);
   PoseRefineOptions options;
   options.huber = 0;
-  EXPECT_EQ(refiner_.refine(table_.view(), Transform{}, {}, options).status, PoseRefineStatus::invalid_input);
+  EXPECT_EQ(refiner_.refine(table_.view(), Transform{}, {}, options).status,
+            PoseRefineStatus::invalid_input);
   Arena small_arena(PoseRefiner::memory_needed(20));
   PoseRefiner small(20, small_arena);
   EXPECT_EQ(small.refine(table_.view(), Transform{}, {}, {}).status, PoseRefineStatus::capacity);
@@ -184,13 +200,15 @@ TEST_F(PoseRefinerTest, namesWhatIsWrong) {
     ASSERT_TRUE(table_.push(Vec3(0.1 * i, 0, 10), 0.3));
     table_.see(0, Vec2(318 + 5.2 * i, 243));
   }
-  EXPECT_EQ(refiner_.refine(table_.view(), Transform{}, {}, {}).status, PoseRefineStatus::rank_deficient);
+  EXPECT_EQ(refiner_.refine(table_.view(), Transform{}, {}, {}).status,
+            PoseRefineStatus::rank_deficient);
   table_.clear();  // and all behind the camera
   for (int i = 0; i < 50; ++i) {
     ASSERT_TRUE(table_.push(test::visible_point(random, -9, -2), 0.3));
     table_.see(0, Vec2(318, 243));
   }
-  EXPECT_EQ(refiner_.refine(table_.view(), Transform{}, {}, {}).status, PoseRefineStatus::rank_deficient);
+  EXPECT_EQ(refiner_.refine(table_.view(), Transform{}, {}, {}).status,
+            PoseRefineStatus::rank_deficient);
 }
 
 TEST_F(PoseRefinerTest, allocatesNothing) {

@@ -9,7 +9,8 @@ namespace vergence::test {
   return {x, y, random.uniform(lo, hi)};
 }
 
-/// Rotation of at most `angle` rad about each axis' share, translation within a cube of half side `metres`.
+/// Rotation of at most `angle` rad about each axis' share, translation within a cube of half side
+/// `metres`.
 [[nodiscard]] inline Transform random_transform(Random& random, double angle, double metres) {
   const Vec3 phi = random_vector(random, -angle, angle);
   return {exp_so3(phi), random_vector(random, -metres, metres)};

@@ -21,15 +21,19 @@ struct RigScene {
   for (int k = 0; k < cameras; ++k) {
     Intrinsics& c = rig.intrinsics[static_cast<std::size_t>(k)];
     c.width = 640, c.height = 480, c.fx = 520 + k, c.fy = 525 - k, c.cx = 318, c.cy = 243;
-    if (k > 0) rig.T_camera_left[static_cast<std::size_t>(k)] = {exp_so3({0.01 * k, -0.02, 0.005}), {-0.5 * k, 0.01, 0.02}};
+    if (k > 0)
+      rig.T_camera_left[static_cast<std::size_t>(k)] = {exp_so3({0.01 * k, -0.02, 0.005}),
+                                                        {-0.5 * k, 0.01, 0.02}};
   }
   return rig;
 }
 
-/// Fills the table with `points` points at 2 … 40 m. A share `outliers` of them has all its pixels moved by 15 px or more;
-/// a share `left_only` is seen by camera 0 alone. Noise is Gaussian, sigma_px a coordinate.
-[[nodiscard]] inline RigScene make_scene(Random& random, int cameras, int points, double outliers, double left_only, double noise_px,
-                                         double sigma_px, RigObservationTable* table) {
+/// Fills the table with `points` points at 2 … 40 m. A share `outliers` of them has all its pixels
+/// moved by 15 px or more; a share `left_only` is seen by camera 0 alone. Noise is Gaussian,
+/// sigma_px a coordinate.
+[[nodiscard]] inline RigScene make_scene(Random& random, int cameras, int points, double outliers,
+                                         double left_only, double noise_px, double sigma_px,
+                                         RigObservationTable* table) {
   RigScene scene;
   scene.rig = make_rig(cameras);
   scene.T_left_world = random_transform(random, 1.5, 100.0);

@@ -25,18 +25,22 @@ struct MatchSet {
   [[nodiscard]] StereoMatches view() const { return {left_x, left_y, right_x, right_y, sigma}; }
 };
 
-/// A street-like pair: depths 3 … 60 m, rig turned by up to 0.1 rad from parallel; outliers anywhere in the right image.
+/// A street-like pair: depths 3 … 60 m, rig turned by up to 0.1 rad from parallel; outliers
+/// anywhere in the right image.
 MatchSet make_matches(Random& random, int n, double outliers, double noise_px) {
   MatchSet m;
   m.T_right_left.R = exp_so3(test::random_vector(random, -0.1, 0.1));
-  m.T_right_left.t = kBaseline * Vec3(-1, random.uniform(-0.1, 0.1), random.uniform(-0.1, 0.1)).normalized();
+  m.T_right_left.t =
+      kBaseline * Vec3(-1, random.uniform(-0.1, 0.1), random.uniform(-0.1, 0.1)).normalized();
   for (int i = 0; i < n; ++i) {
     const Vec3 p = test::visible_point(random, 3, 60), q = m.T_right_left * p;
     const bool good = !(random.uniform() < outliers);
     m.left_x.push_back(p.x() / p.z() + noise_px * kPixel * random.normal());
     m.left_y.push_back(p.y() / p.z() + noise_px * kPixel * random.normal());
-    m.right_x.push_back(good ? q.x() / q.z() + noise_px * kPixel * random.normal() : random.uniform(-0.6, 0.6));
-    m.right_y.push_back(good ? q.y() / q.z() + noise_px * kPixel * random.normal() : random.uniform(-0.45, 0.45));
+    m.right_x.push_back(good ? q.x() / q.z() + noise_px * kPixel * random.normal()
+                             : random.uniform(-0.6, 0.6));
+    m.right_y.push_back(good ? q.y() / q.z() + noise_px * kPixel * random.normal()
+                             : random.uniform(-0.45, 0.45));
     m.sigma.push_back(std::max(noise_px, 0.1) * kPixel);
     m.good.push_back(good);
   }
@@ -46,7 +50,8 @@ MatchSet make_matches(Random& random, int n, double outliers, double noise_px) {
 /// δ of moved_on_sphere() that leads from a to b, first order in the direction.
 Vec5 step_between(const Transform& a, const Transform& b) {
   Vec5 d;
-  d << log_so3(b.R * a.R.transpose()), tangent_basis(a.t.normalized()).transpose() * b.t.normalized();
+  d << log_so3(b.R * a.R.transpose()),
+      tangent_basis(a.t.normalized()).transpose() * b.t.normalized();
   return d;
 }
 
@@ -68,8 +73,8 @@ TEST_F(StereoMlesacTest, isExactOnExactMatches) {
 }
 
 TEST_F(StereoMlesacTest, findsTheTransformAmongFortyPercentOutliers) {
-  // By chance an outlier lies within the epipolar band of ±2.6·√2 sigmas of 0.3 px in under 1 % of the cases (540 px high
-  // images), half of them in front; χ² leaves 1 % of the good ones out.
+  // By chance an outlier lies within the epipolar band of ±2.6·√2 sigmas of 0.3 px in under 1 % of
+  // the cases (540 px high images), half of them in front; χ² leaves 1 % of the good ones out.
   int close = 0, flagged = 0;
   constexpr int kRuns = 30;
   for (std::uint64_t seed = 1; seed <= kRuns; ++seed) {
@@ -79,14 +84,21 @@ TEST_F(StereoMlesacTest, findsTheTransformAmongFortyPercentOutliers) {
     ASSERT_EQ(found.status, StereoMlesacStatus::ok);
     EXPECT_NEAR(found.T_right_left.t.norm(), kBaseline, 1e-12);
     int right = 0;
-    for (std::size_t i = 0; i < m.good.size(); ++i) right += (mlesac_.flags()[i] != 0) == m.good[i] ? 1 : 0;
+    for (std::size_t i = 0; i < m.good.size(); ++i)
+      right += (mlesac_.flags()[i] != 0) == m.good[i] ? 1 : 0;
     flagged += right >= 392 ? 1 : 0;
     const Vec5 d = step_between(found.T_right_left, m.T_right_left);
     EXPECT_LT(d.head<3>().norm(), 0.01) << seed;
-    close += d.head<3>().norm() < 4 * found.rotation_sigma && d.tail<2>().norm() < 4 * found.direction_sigma ? 1 : 0;
+    close += d.head<3>().norm() < 4 * found.rotation_sigma &&
+                     d.tail<2>().norm() < 4 * found.direction_sigma
+                 ? 1
+                 : 0;
   }
-  EXPECT_GE(flagged, kRuns - 2);  // 98 % right; a search that ends in a side valley of the cost loses a few more
-  EXPECT_GE(close, kRuns - 3);    // an outlier of large disparity on the right line has a long lever on t, and looks like a match
+  EXPECT_GE(
+      flagged,
+      kRuns - 2);  // 98 % right; a search that ends in a side valley of the cost loses a few more
+  EXPECT_GE(close, kRuns - 3);  // an outlier of large disparity on the right line has a long lever
+                                // on t, and looks like a match
 }
 
 TEST_F(StereoMlesacTest, informationPredictsTheErrorOfMostRuns) {
@@ -100,7 +112,9 @@ TEST_F(StereoMlesacTest, informationPredictsTheErrorOfMostRuns) {
     const Vec5 d = step_between(found.T_right_left, m.T_right_left);
     within += d.dot(found.information * d) < 15.09 ? 1 : 0;  // χ² of five, 99 %
   }
-  EXPECT_GE(within, kRuns * 9 / 10);  // the truncated cost has side valleys: a sampled search may end in one
+  EXPECT_GE(
+      within,
+      kRuns * 9 / 10);  // the truncated cost has side valleys: a sampled search may end in one
 }
 
 TEST_F(StereoMlesacTest, isNoWorseThanOpenCvOnTheSameMatches) {
@@ -113,7 +127,8 @@ TEST_F(StereoMlesacTest, isNoWorseThanOpenCvOnTheSameMatches) {
       left.emplace_back(m.left_x[i], m.left_y[i]), right.emplace_back(m.right_x[i], m.right_y[i]);
     cv::setRNGSeed(1);
     cv::Mat mask, R, t;
-    const cv::Mat E = cv::findEssentialMat(left, right, cv::Mat::eye(3, 3, CV_64F), cv::RANSAC, 0.999, kPixel, mask);
+    const cv::Mat E = cv::findEssentialMat(left, right, cv::Mat::eye(3, 3, CV_64F), cv::RANSAC,
+                                           0.999, kPixel, mask);
     ASSERT_EQ(E.rows, 3);
     cv::recoverPose(E, left, right, cv::Mat::eye(3, 3, CV_64F), R, t, mask);
     Transform T;
@@ -162,16 +177,21 @@ TEST_F(StereoMlesacTest, aFarSceneHoldsTheTurnButNotTheDirection) {
 TEST_F(StereoMlesacTest, namesWhatIsWrongAndLeavesOutWhatIsNoNumber) {
   Random random(11);
   MatchSet m = make_matches(random, 4, 0, 0);
-  EXPECT_EQ(mlesac_.estimate_stereo_transform(m.view(), kBaseline, {}, random).status, StereoMlesacStatus::too_few);
-  EXPECT_EQ(mlesac_.estimate_stereo_transform({}, kBaseline, {}, random).status, StereoMlesacStatus::too_few);
+  EXPECT_EQ(mlesac_.estimate_stereo_transform(m.view(), kBaseline, {}, random).status,
+            StereoMlesacStatus::too_few);
+  EXPECT_EQ(mlesac_.estimate_stereo_transform({}, kBaseline, {}, random).status,
+            StereoMlesacStatus::too_few);
   m = make_matches(random, 50, 0, 0);
-  EXPECT_EQ(mlesac_.estimate_stereo_transform(m.view(), 0.0, {}, random).status, StereoMlesacStatus::invalid_input);
+  EXPECT_EQ(mlesac_.estimate_stereo_transform(m.view(), 0.0, {}, random).status,
+            StereoMlesacStatus::invalid_input);
   StereoMatches short_one = m.view();
   short_one.sigma = short_one.sigma.first(3);
-  EXPECT_EQ(mlesac_.estimate_stereo_transform(short_one, kBaseline, {}, random).status, StereoMlesacStatus::invalid_input);
+  EXPECT_EQ(mlesac_.estimate_stereo_transform(short_one, kBaseline, {}, random).status,
+            StereoMlesacStatus::invalid_input);
   Arena small_arena(StereoMlesac::memory_needed(20));
   StereoMlesac small(20, small_arena);
-  EXPECT_EQ(small.estimate_stereo_transform(m.view(), kBaseline, {}, random).status, StereoMlesacStatus::capacity);
+  EXPECT_EQ(small.estimate_stereo_transform(m.view(), kBaseline, {}, random).status,
+            StereoMlesacStatus::capacity);
   m.left_x[3] = std::numeric_limits<double>::quiet_NaN();
   m.sigma[4] = 0;
   m.right_y[5] = std::numeric_limits<double>::infinity();
@@ -179,8 +199,10 @@ TEST_F(StereoMlesacTest, namesWhatIsWrongAndLeavesOutWhatIsNoNumber) {
   ASSERT_EQ(found.status, StereoMlesacStatus::ok);
   EXPECT_EQ(found.inliers, 47);
   EXPECT_EQ(mlesac_.flags()[3] + mlesac_.flags()[4] + mlesac_.flags()[5], 0);
-  for (auto* v : {&m.left_x, &m.left_y, &m.right_x, &m.right_y}) std::fill(v->begin(), v->end(), 0.1);  // all the same match
-  EXPECT_EQ(mlesac_.estimate_stereo_transform(m.view(), kBaseline, {}, random).status, StereoMlesacStatus::no_hypothesis);
+  for (auto* v : {&m.left_x, &m.left_y, &m.right_x, &m.right_y})
+    std::fill(v->begin(), v->end(), 0.1);  // all the same match
+  EXPECT_EQ(mlesac_.estimate_stereo_transform(m.view(), kBaseline, {}, random).status,
+            StereoMlesacStatus::no_hypothesis);
 }
 
 TEST_F(StereoMlesacTest, allocatesNothing) {
@@ -190,7 +212,8 @@ TEST_F(StereoMlesacTest, allocatesNothing) {
   const std::uint64_t before = AllocationGuard::allocations_after_seal();
   {
     const SealedScope sealed;
-    EXPECT_EQ(mlesac_.estimate_stereo_transform(m.view(), kBaseline, {}, random).status, StereoMlesacStatus::ok);
+    EXPECT_EQ(mlesac_.estimate_stereo_transform(m.view(), kBaseline, {}, random).status,
+              StereoMlesacStatus::ok);
   }
   EXPECT_EQ(AllocationGuard::allocations_after_seal(), before);
 }

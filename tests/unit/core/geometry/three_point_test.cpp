@@ -34,13 +34,15 @@ Problem random_problem(Random& random) {
 
 double nearest(const ThreePointSolutions& s, const Transform& truth) {
   double best = std::numeric_limits<double>::infinity();
-  for (int i = 0; i < s.count; ++i) best = std::min(best, test::difference(s.T_camera_world[static_cast<std::size_t>(i)], truth));
+  for (int i = 0; i < s.count; ++i)
+    best = std::min(best, test::difference(s.T_camera_world[static_cast<std::size_t>(i)], truth));
   return best;
 }
 
 TEST(ThreePoint, findsTheTruePoseOfRandomProblems) {
-  // Near a double root (the danger cylinder) the error of a pose is the square root of rounding: 1e-16 → 1e-8, and the
-  // median stays at rounding. Of 20 000 random problems one in ten thousand may be that near.
+  // Near a double root (the danger cylinder) the error of a pose is the square root of rounding:
+  // 1e-16 → 1e-8, and the median stays at rounding. Of 20 000 random problems one in ten thousand
+  // may be that near.
   Random random(11);
   constexpr int kProblems = 20000;
   int missed = 0;
@@ -88,14 +90,18 @@ TEST(ThreePoint, agreesWithOpenCvOnTheSetOfSolutions) {
       image.emplace_back(p.rays[i].x() / p.rays[i].z(), p.rays[i].y() / p.rays[i].z());
     }
     std::vector<cv::Mat> rotations, translations;
-    cv::solveP3P(object, image, cv::Mat::eye(3, 3, CV_64F), cv::noArray(), rotations, translations, cv::SOLVEPNP_P3P);
+    cv::solveP3P(object, image, cv::Mat::eye(3, 3, CV_64F), cv::noArray(), rotations, translations,
+                 cv::SOLVEPNP_P3P);
     const ThreePointSolutions s = solve_three_point(p.rays, p.points);
     for (std::size_t i = 0; i < rotations.size(); ++i) {
       Transform T;
-      T.R = exp_so3({rotations[i].at<double>(0), rotations[i].at<double>(1), rotations[i].at<double>(2)});
-      T.t = {translations[i].at<double>(0), translations[i].at<double>(1), translations[i].at<double>(2)};
+      T.R = exp_so3(
+          {rotations[i].at<double>(0), rotations[i].at<double>(1), rotations[i].at<double>(2)});
+      T.t = {translations[i].at<double>(0), translations[i].at<double>(1),
+             translations[i].at<double>(2)};
       double misfit = 0;  // OpenCV also answers poses that do not fit; those are not asked for
-      for (std::size_t j = 0; j < 3; ++j) misfit = std::max(misfit, ((T * p.points[j]).normalized() - p.rays[j]).norm());
+      for (std::size_t j = 0; j < 3; ++j)
+        misfit = std::max(misfit, ((T * p.points[j]).normalized() - p.rays[j]).norm());
       if (misfit > 1e-8) continue;
       ++compared;
       if (!(nearest(s, T) < 1e-5)) ++ours_missing;
@@ -111,12 +117,14 @@ TEST(ThreePoint, solvesSymmetricAndFarScenes) {
     for (const double size : {1.0, 0.1}) {
       Problem p;
       p.T_camera_world.t = {0, 0, depth};
-      p.points = {Vec3(size, 0, 0), Vec3(-0.5 * size, std::sqrt(0.75) * size, 0), Vec3(-0.5 * size, -std::sqrt(0.75) * size, 0)};
+      p.points = {Vec3(size, 0, 0), Vec3(-0.5 * size, std::sqrt(0.75) * size, 0),
+                  Vec3(-0.5 * size, -std::sqrt(0.75) * size, 0)};
       for (std::size_t i = 0; i < 3; ++i) p.rays[i] = (p.T_camera_world * p.points[i]).normalized();
       const ThreePointSolutions s = solve_three_point(p.rays, p.points);
       ASSERT_EQ(s.status, ThreePointStatus::ok) << depth << " " << size;
       // Depth is depth/size times as uncertain as the rays, and the tilt enters by its square.
-      EXPECT_LT(nearest(s, p.T_camera_world), 1e-6 * std::max(1.0, depth / size)) << depth << " " << size;
+      EXPECT_LT(nearest(s, p.T_camera_world), 1e-6 * std::max(1.0, depth / size))
+          << depth << " " << size;
     }
   }
   // Three axes of a corner seen from inside: right angles between the rays.
@@ -155,19 +163,22 @@ TEST(ThreePoint, refusesDegenerateInputByName) {
   p.rays = {Vec3(0, 0, 1), Vec3(1e-3, 0, 1).normalized(), Vec3(0, 1e-3, 1).normalized()};
   p.points = {Vec3(0, 0, 0), Vec3(1, 0, 0), Vec3(0.5, 1e-9, 0)};
   const ThreePointSolutions s = solve_three_point(p.rays, p.points);
-  for (int i = 0; i < s.count; ++i) EXPECT_TRUE(s.T_camera_world[static_cast<std::size_t>(i)].finite());
+  for (int i = 0; i < s.count; ++i)
+    EXPECT_TRUE(s.T_camera_world[static_cast<std::size_t>(i)].finite());
 }
 
 TEST(ThreePoint, nothingIsNotANumberWhateverTheInput) {
   Random random(15);
   for (int k = 0; k < 20000; ++k) {
     Problem p = random_problem(random);
-    for (Vec3& x : p.points) x *= std::pow(10.0, random.uniform(-12, 12));  // rays and triangle no longer belong together
+    for (Vec3& x : p.points)
+      x *= std::pow(10.0, random.uniform(-12, 12));  // rays and triangle no longer belong together
     if (random.below(2) == 0) p.points[1] = p.points[0] + 1e-9 * Vec3::Ones();
     if (random.below(2) == 0) p.rays[2] = (p.rays[0] + 1e-8 * p.rays[1]).normalized();
     const ThreePointSolutions s = solve_three_point(p.rays, p.points);
     EXPECT_EQ(s.count > 0, s.status == ThreePointStatus::ok);
-    for (int i = 0; i < s.count; ++i) EXPECT_TRUE(s.T_camera_world[static_cast<std::size_t>(i)].finite());
+    for (int i = 0; i < s.count; ++i)
+      EXPECT_TRUE(s.T_camera_world[static_cast<std::size_t>(i)].finite());
   }
 }
 

@@ -11,7 +11,8 @@ namespace {
 TEST(Random, isPcg32) {
   // The reference implementation's own demonstration: seed 42, stream 54.
   Random random(42, 54);
-  for (const std::uint32_t expected : {0xa15c02b7U, 0x7b47f409U, 0xba1d3330U, 0x83d2f293U, 0xbfa4784bU, 0xcbed606eU})
+  for (const std::uint32_t expected :
+       {0xa15c02b7U, 0x7b47f409U, 0xba1d3330U, 0x83d2f293U, 0xbfa4784bU, 0xcbed606eU})
     EXPECT_EQ(random.next(), expected);
 }
 
@@ -67,7 +68,8 @@ TEST(Random, normalHasItsFirstFourMoments) {
     m3 += x * x * x;
     m4 += x * x * x * x;
   }
-  // Variances of the moments of a standard normal: 1, 2, 15, 96 over the number of draws; five sigmas.
+  // Variances of the moments of a standard normal: 1, 2, 15, 96 over the number of draws; five
+  // sigmas.
   EXPECT_NEAR(m1 / kDraws, 0, 5 * std::sqrt(1.0 / kDraws));
   EXPECT_NEAR(m2 / kDraws, 1, 5 * std::sqrt(2.0 / kDraws));
   EXPECT_NEAR(m3 / kDraws, 0, 5 * std::sqrt(15.0 / kDraws));

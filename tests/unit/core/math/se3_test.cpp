@@ -12,10 +12,13 @@ constexpr double kRounding = 1e-14;  // roundings of metres of order ten
 
 Transform some(double k) { return {exp_so3({0.3 * k, -0.7, 0.2 + k}), Vec3(k, 2 - k, 5)}; }
 
-double apart(const Transform& a, const Transform& b) { return (a.R - b.R).norm() + (a.t - b.t).norm(); }
+double apart(const Transform& a, const Transform& b) {
+  return (a.R - b.R).norm() + (a.t - b.t).norm();
+}
 
 TEST(Transform, mapsPointsAsItsNameSays) {
-  const Transform T_right_left{Mat3::Identity(), {-0.75, 0, 0}};  // parallel cameras, the right one 0.75 m to the right
+  const Transform T_right_left{
+      Mat3::Identity(), {-0.75, 0, 0}};  // parallel cameras, the right one 0.75 m to the right
   EXPECT_TRUE((T_right_left * Vec3(0.75, 0, 4)).isApprox(Vec3(0, 0, 4)));
   EXPECT_TRUE(T_right_left.centre().isApprox(Vec3(0.75, 0, 0)));
 }
@@ -30,7 +33,9 @@ TEST(Transform, isAGroup) {
   EXPECT_LT(((a * b) * p - a * (b * p)).norm(), kRounding);
 }
 
-TEST(Transform, centreIsWhatItMapsToTheOrigin) { EXPECT_LT((some(0.4) * some(0.4).centre()).norm(), kRounding); }
+TEST(Transform, centreIsWhatItMapsToTheOrigin) {
+  EXPECT_LT((some(0.4) * some(0.4).centre()).norm(), kRounding);
+}
 
 TEST(Transform, finiteRefusesNanAndInfinity) {
   EXPECT_TRUE(some(1).finite());
@@ -61,7 +66,8 @@ TEST(Quaternion, hasOneSignAndGivesTheRotationBack) {
 }
 
 TEST(Interpolate, keepsTheEndsAndTurnsEvenlyAlongTheShorterArc) {
-  const Transform a{exp_so3({0, 0, 3.0}), {0, 0, 0}}, b{exp_so3({0, 0, -3.0}), {2, 4, 6}};  // 0.28 rad across π, not 6 back
+  const Transform a{exp_so3({0, 0, 3.0}), {0, 0, 0}},
+      b{exp_so3({0, 0, -3.0}), {2, 4, 6}};  // 0.28 rad across π, not 6 back
   EXPECT_LT(apart(interpolate(a, b, 0), a), kRounding);
   EXPECT_LT(apart(interpolate(a, b, 1), b), kRounding);
   const Transform quarter = interpolate(a, b, 0.25);

@@ -13,8 +13,10 @@ namespace {
 constexpr double kPi = std::numbers::pi;
 // A handful of roundings of numbers of order one.
 constexpr double kRounding = 4e-15;
-// Zero, tiny, both sides of the switch to series at 1e-4, ordinary, and as near to π as a double comes.
-constexpr std::array kAngles = {0.0, 1e-9, 1e-5, 0.99e-4, 1.01e-4, 1e-3, 0.7, 2.0, 3.0, kPi - 1e-5, kPi - 1e-9};
+// Zero, tiny, both sides of the switch to series at 1e-4, ordinary, and as near to π as a double
+// comes.
+constexpr std::array kAngles = {0.0, 1e-9, 1e-5, 0.99e-4,    1.01e-4,   1e-3,
+                                0.7, 2.0,  3.0,  kPi - 1e-5, kPi - 1e-9};
 
 std::array<Vec3, 6> axes() {
   return {Vec3::UnitX(),
@@ -25,7 +27,8 @@ std::array<Vec3, 6> axes() {
           Vec3(1e-8, -1, 1e-8).normalized()};
 }
 
-/// sin θ/θ, (1 − cos θ)/θ², (θ − sin θ)/θ³ by their series in extended precision: for θ ≤ π, 20 terms are exact to the last bit.
+/// sin θ/θ, (1 − cos θ)/θ², (θ − sin θ)/θ³ by their series in extended precision: for θ ≤ π, 20
+/// terms are exact to the last bit.
 struct Coefficients {
   double a, b, c;
 };
@@ -67,11 +70,13 @@ TEST(So3, expTurnsByTheRightHandRule) {
 
 TEST(So3, logUndoesExpUpToPi) {
   for (const Vec3& axis : axes())
-    for (const double angle : kAngles) EXPECT_LT((log_so3(exp_so3(angle * axis)) - angle * axis).norm(), kRounding) << angle;
+    for (const double angle : kAngles)
+      EXPECT_LT((log_so3(exp_so3(angle * axis)) - angle * axis).norm(), kRounding) << angle;
 }
 
 TEST(So3, logKeepsTheDigitsOfTinyAngles) {
-  for (const Vec3& axis : axes()) EXPECT_LT((log_so3(exp_so3(1e-9 * axis)) - 1e-9 * axis).norm(), 1e-9 * kRounding);
+  for (const Vec3& axis : axes())
+    EXPECT_LT((log_so3(exp_so3(1e-9 * axis)) - 1e-9 * axis).norm(), 1e-9 * kRounding);
 }
 
 TEST(So3, atPiEitherSignOfTheAxisIsRight) {
@@ -88,7 +93,9 @@ TEST(So3, leftJacobianMatchesCentralDifferences) {
   for (const Vec3& axis : axes())
     for (const double angle : kAngles) {
       const Vec3 phi = angle * axis;
-      const auto moved = [&](const Vec3& d) -> Vec3 { return log_so3(exp_so3(phi + d) * exp_so3(phi).transpose()); };
+      const auto moved = [&](const Vec3& d) -> Vec3 {
+        return log_so3(exp_so3(phi + d) * exp_so3(phi).transpose());
+      };
       EXPECT_TRUE(test::jacobian_matches(left_jacobian_so3(phi), moved, 1e-8)) << angle;
     }
 }
@@ -98,7 +105,9 @@ TEST(So3, leftJacobianAgreesWithTheSeriesAtEveryAngle) {
     for (const double angle : kAngles) {
       const auto [a, b, c] = by_series(angle);
       const Mat3 K = skew(angle * axis);
-      EXPECT_LT((left_jacobian_so3(angle * axis) - (Mat3::Identity() + b * K + c * K * K)).norm(), kRounding) << angle;
+      EXPECT_LT((left_jacobian_so3(angle * axis) - (Mat3::Identity() + b * K + c * K * K)).norm(),
+                kRounding)
+          << angle;
     }
 }
 

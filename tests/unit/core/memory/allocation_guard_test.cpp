@@ -29,7 +29,8 @@ std::uint64_t counted(void (*work)()) {
 class AllocationGuardTest : public testing::Test {
  protected:
   void SetUp() override {
-    if (!AllocationGuard::available()) GTEST_SKIP() << "a sanitizer brings its own malloc: there is nothing to count";
+    if (!AllocationGuard::available())
+      GTEST_SKIP() << "a sanitizer brings its own malloc: there is nothing to count";
   }
 };
 

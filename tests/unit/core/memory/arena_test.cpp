@@ -18,7 +18,8 @@ TEST(Arena, piecesAreZeroedAlignedAndApart) {
   for (const std::uint8_t b : bytes) EXPECT_EQ(b, 0);
   for (const double d : numbers) EXPECT_EQ(d, 0.0);
   for (const void* piece :
-       {static_cast<const void*>(bytes.data()), static_cast<const void*>(numbers.data()), static_cast<const void*>(more.data())})
+       {static_cast<const void*>(bytes.data()), static_cast<const void*>(numbers.data()),
+        static_cast<const void*>(more.data())})
     EXPECT_EQ(reinterpret_cast<std::uintptr_t>(piece) % kCacheLine, 0U);
   std::memset(bytes.data(), 0xff, bytes.size_bytes());
   for (const double d : numbers) EXPECT_EQ(d, 0.0);
@@ -42,8 +43,11 @@ TEST(Arena, whenFullSaysWhoAskedForHowMuchAndStaysUsable) {
 
 TEST(Arena, sizesThatOverflowAreRefused) {
   Arena arena(256);
-  EXPECT_THROW((void)arena.make<double>(std::numeric_limits<std::size_t>::max(), "too many"), std::length_error);
-  EXPECT_THROW((void)arena.make<double>(std::numeric_limits<std::size_t>::max() / sizeof(double) + 2, "wraps"), std::length_error);
+  EXPECT_THROW((void)arena.make<double>(std::numeric_limits<std::size_t>::max(), "too many"),
+               std::length_error);
+  EXPECT_THROW((void)arena.make<double>(
+                   std::numeric_limits<std::size_t>::max() / sizeof(double) + 2, "wraps"),
+               std::length_error);
   EXPECT_EQ(arena.used(), 0U);
 }
 

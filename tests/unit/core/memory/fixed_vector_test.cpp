@@ -49,7 +49,8 @@ void walk_beside_a_model(Vector& vector, std::uint64_t seed) {
     ASSERT_EQ(vector.size(), model.size()) << "step " << step;
     ASSERT_EQ(vector.empty(), model.empty());
     ASSERT_EQ(vector.full(), model.size() == vector.capacity());
-    ASSERT_TRUE(std::equal(vector.begin(), vector.end(), model.begin(), model.end())) << "step " << step;
+    ASSERT_TRUE(std::equal(vector.begin(), vector.end(), model.begin(), model.end()))
+        << "step " << step;
     if (!model.empty()) {
       ASSERT_EQ(vector.back(), model.back());
       ASSERT_EQ(vector.span().size(), model.size());

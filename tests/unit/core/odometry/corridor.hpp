@@ -11,11 +11,13 @@
 
 namespace vergence::odometry::test {
 
-/// A rig that drives along a textured corridor, drawn ray by ray: floor, two walls, an end. Sensor noise of one grey level.
+/// A rig that drives along a textured corridor, drawn ray by ray: floor, two walls, an end. Sensor
+/// noise of one grey level.
 /// World: x right, y down, z along the corridor; the left camera starts in its middle.
 class Corridor {
  public:
-  explicit Corridor(int cameras = 2) : images_(static_cast<std::size_t>(cameras), features::test::Image(kWidth, kHeight)) {
+  explicit Corridor(int cameras = 2)
+      : images_(static_cast<std::size_t>(cameras), features::test::Image(kWidth, kHeight)) {
     rig_.cameras = cameras;
     for (std::size_t k = 0; k < static_cast<std::size_t>(cameras); ++k) {
       Intrinsics& c = rig_.intrinsics[k];
@@ -30,7 +32,8 @@ class Corridor {
   /// Where the left camera is in frame i: 0.15 m further each time, weaving.
   [[nodiscard]] static Transform T_world_left(int i) {
     const double a = 0.05 * i;
-    return {exp_so3({0.004 * std::sin(3 * a), 0.02 * std::sin(a), 0.003 * std::cos(2 * a)}), {0.1 * std::sin(a), 0, 0.15 * i}};
+    return {exp_so3({0.004 * std::sin(3 * a), 0.02 * std::sin(a), 0.003 * std::cos(2 * a)}),
+            {0.1 * std::sin(a), 0, 0.15 * i}};
   }
   /// Frame i seen by a rig of these transforms; the images live until the next call.
   [[nodiscard]] RigFrame frame(int i, const std::array<Transform, kMaxCameras>& T_camera_left) {
@@ -44,7 +47,10 @@ class Corridor {
       const Intrinsics& c = rig_.intrinsics[k];
       for (int y = 0; y < kHeight; ++y)
         for (int x = 0; x < kWidth; ++x) {
-          const double grey = shade(T_world_camera.t, T_world_camera.R * Vec3((x - c.cx) / c.fx, (y - c.cy) / c.fy, 1)) + noise.normal();
+          const double grey =
+              shade(T_world_camera.t,
+                    T_world_camera.R * Vec3((x - c.cx) / c.fx, (y - c.cy) / c.fy, 1)) +
+              noise.normal();
           images_[k].at(x, y) = static_cast<std::uint8_t>(std::clamp(std::lround(grey), 0L, 255L));
         }
       f.images[k] = images_[k].view();
@@ -55,7 +61,8 @@ class Corridor {
 
  private:
   static constexpr int kWidth = 320, kHeight = 240;
-  /// The nearest surface along a ray. Waves are 0.25 to 0.8 m long, 12 px at 6 m; at the end 0.7 to 2 m.
+  /// The nearest surface along a ray. Waves are 0.25 to 0.8 m long, 12 px at 6 m; at the end 0.7 to
+  /// 2 m.
   [[nodiscard]] double shade(const Vec3& from, const Vec3& ray) const {
     constexpr double kWall = 3.0, kFloor = 1.5, kCeiling = -2.5, kEnd = 24.0;
     double at = 1e9;
@@ -71,14 +78,17 @@ class Corridor {
     meet(kFloor - from.y(), ray.y(), 3);
     meet(kCeiling - from.y(), ray.y(), 4);
     const Vec3 p = from + at * ray;
-    const Vec2 on = surface == 0 ? Vec2(p.x(), p.y()) : surface < 3 ? Vec2(p.z(), p.y()) : Vec2(p.x(), p.z());
+    const Vec2 on = surface == 0  ? Vec2(p.x(), p.y())
+                    : surface < 3 ? Vec2(p.z(), p.y())
+                                  : Vec2(p.x(), p.z());
     return textures_[surface](on);
   }
   RigCalibration rig_;
   std::vector<features::test::Image> images_;
-  std::array<features::test::Texture, 5> textures_{features::test::Texture(11, 0.7, 2.0), features::test::Texture(12, 0.25, 0.8),
-                                                   features::test::Texture(13, 0.25, 0.8), features::test::Texture(14, 0.25, 0.8),
-                                                   features::test::Texture(15, 0.25, 0.8)};
+  std::array<features::test::Texture, 5> textures_{
+      features::test::Texture(11, 0.7, 2.0), features::test::Texture(12, 0.25, 0.8),
+      features::test::Texture(13, 0.25, 0.8), features::test::Texture(14, 0.25, 0.8),
+      features::test::Texture(15, 0.25, 0.8)};
 };
 
 }  // namespace vergence::odometry::test

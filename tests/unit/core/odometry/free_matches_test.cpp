@@ -44,7 +44,8 @@ TEST_P(FreeMatches, ofAMovedPictureLieWhereItMovedWithoutHeap) {
   const auto picture = [&](const Vec2& p) { return 0.9 * fine(p) + 0.5 * coarse(p) - 51; };
   const features::test::Image left = features::test::draw(kWidth, kHeight, picture, 64),
                               right = features::test::draw(
-                                  kWidth, kHeight, [&](const Vec2&p) { return picture(p - shift); }, 64);
+                                  kWidth, kHeight, [&](const Vec2&p) { return picture(p - shift); },
+                                  64);
   RigFrame frame;
   frame.cameras = 2;
   frame.images[0] = left.view();
@@ -60,7 +61,8 @@ TEST_P(FreeMatches, ofAMovedPictureLieWhereItMovedWithoutHeap) {
   ASSERT_GE(matches.size(), 30U);
   std::size_t right_ones = 0;
   // Three sigmas of a corner's place: both are the same pixels but for the rounding of grey values.
-  for (const FreeMatch& m : matches) right_ones += (m.other - m.left - shift).norm() < 3 * o.pixel_sigma ? 1U : 0U;
+  for (const FreeMatch& m : matches)
+    right_ones += (m.other - m.left - shift).norm() < 3 * o.pixel_sigma ? 1U : 0U;
   EXPECT_GE(static_cast<double>(right_ones), 0.9 * static_cast<double>(matches.size()));
 }
 
@@ -71,7 +73,8 @@ TEST_P(FreeMatches, ofImagesThatAreMissingOrFlatAreNone) {
   SequentialRunner runner;
   FrontEnd front(o, rig, arena, runner);
   EXPECT_TRUE(front.match_free(1).empty());
-  const features::test::Image flat(kWidth, kHeight, 64), noise = features::test::white_noise(kWidth, kHeight, 1, 64);
+  const features::test::Image flat(kWidth, kHeight, 64),
+      noise = features::test::white_noise(kWidth, kHeight, 1, 64);
   RigFrame frame;
   frame.cameras = 2;
   frame.images[0] = noise.view();

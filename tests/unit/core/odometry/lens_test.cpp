@@ -26,7 +26,8 @@ Intrinsics wide_lens(CameraModelKind kind) {
   return k;
 }
 
-constexpr CameraModelKind kModels[] = {CameraModelKind::pinhole_radtan, CameraModelKind::pinhole_equidistant};
+constexpr CameraModelKind kModels[] = {CameraModelKind::pinhole_radtan,
+                                       CameraModelKind::pinhole_equidistant};
 
 TEST(Lens, anIdealPixelIsWhereAPinholeWouldSeeTheSameRay) {
   for (const CameraModelKind kind : kModels) {
@@ -51,7 +52,8 @@ TEST(Lens, derivativesAreThoseOfFiniteDifferences) {
     Random random(4);
     for (int i = 0; i < 100; ++i) {
       const Vec2 raw(random.uniform(20, 732), random.uniform(20, 460));
-      constexpr double kStep = 1e-3;  // px: the third derivative leaves 1e-6 of that, Newton's end 1e-8 / step
+      constexpr double kStep =
+          1e-3;  // px: the third derivative leaves 1e-6 of that, Newton's end 1e-8 / step
       Vec3 ray;
       Mat2 J, ideal_by_raw, ray_by_raw;
       ASSERT_TRUE(lens.ray_jacobian(raw, &ray, &J));
@@ -72,7 +74,8 @@ TEST(Lens, derivativesAreThoseOfFiniteDifferences) {
       Vec2 ideal;
       double magnification = 0;
       ASSERT_TRUE(lens.undistort(raw, &ideal, &magnification));
-      EXPECT_NEAR(magnification, std::sqrt(std::abs(ideal_by_raw.determinant())), 1e-4 * magnification);
+      EXPECT_NEAR(magnification, std::sqrt(std::abs(ideal_by_raw.determinant())),
+                  1e-4 * magnification);
     }
   }
 }
@@ -90,7 +93,8 @@ TEST(Lens, withoutDistortionNothingMoves) {
 
 TEST(Lens, outsideTheModelThereIsNoPixel) {
   Intrinsics k = wide_lens(CameraModelKind::pinhole_radtan);
-  k.distortion = {-0.5, 0, 0, 0, 0};  // folds at r² = 2/3: no ray is seen further out than 0.54 · 458 px
+  k.distortion = {-0.5, 0, 0, 0,
+                  0};  // folds at r² = 2/3: no ray is seen further out than 0.54 · 458 px
   const Lens lens(k);
   Vec2 ideal(1, 2);
   Vec3 ray;

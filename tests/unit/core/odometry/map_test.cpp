@@ -18,14 +18,18 @@ struct Filled {
     p->stage = stage;
     return p;
   }
-  std::size_t keyframe(double x = 0) { return map.make_keyframe({Mat3::Identity(), Vec3(x, 0, 0)}, Stamp(static_cast<std::int64_t>(x))); }
+  std::size_t keyframe(double x = 0) {
+    return map.make_keyframe({Mat3::Identity(), Vec3(x, 0, 0)},
+                             Stamp(static_cast<std::int64_t>(x)));
+  }
 };
 
 std::vector<int> order(const Map& map) { return {map.order().begin(), map.order().end()}; }
 
 TEST(Map, whenItsPointsAreUsedUpItRefuses) {
   Filled f(5);
-  for (std::size_t i = 0; i < kMaxPoints; ++i) ASSERT_NE(f.point(PointStage::candidate), nullptr) << i;
+  for (std::size_t i = 0; i < kMaxPoints; ++i)
+    ASSERT_NE(f.point(PointStage::candidate), nullptr) << i;
   EXPECT_EQ(f.map.make_point(), nullptr);
   MapPoint& somewhere = f.map.points()[1234];
   somewhere.found = 9;
@@ -44,10 +48,12 @@ TEST(Map, whenItsPointsAreUsedUpItRefuses) {
 TEST(Map, aFullWindowDropsItsOldestKeyframe) {
   Filled f(3);
   const std::size_t a = f.keyframe(1), b = f.keyframe(2), c = f.keyframe(3);
-  EXPECT_EQ(order(f.map), (std::vector{static_cast<int>(a), static_cast<int>(b), static_cast<int>(c)}));
+  EXPECT_EQ(order(f.map),
+            (std::vector{static_cast<int>(a), static_cast<int>(b), static_cast<int>(c)}));
   const std::size_t d = f.keyframe(4);
   EXPECT_EQ(d, a) << "the slot of the oldest is free again";
-  EXPECT_EQ(order(f.map), (std::vector{static_cast<int>(b), static_cast<int>(c), static_cast<int>(d)}));
+  EXPECT_EQ(order(f.map),
+            (std::vector{static_cast<int>(b), static_cast<int>(c), static_cast<int>(d)}));
   EXPECT_EQ(f.map.keyframe(d).T_left_world.t.x(), 4.0);
   EXPECT_EQ(f.map.keyframe(b).T_left_world.t.x(), 2.0);
   for (int i = 0; i < 100; ++i) (void)f.keyframe(i);
@@ -95,9 +101,11 @@ TEST(Map, clearedItIsEmptyAndHasItsWholeRoomAgain) {
   }
   f.map.clear();
   EXPECT_TRUE(f.map.order().empty());
-  EXPECT_TRUE(std::all_of(f.map.points().begin(), f.map.points().end(), [](const MapPoint& p) { return p.stage == PointStage::free; }));
+  EXPECT_TRUE(std::all_of(f.map.points().begin(), f.map.points().end(),
+                          [](const MapPoint& p) { return p.stage == PointStage::free; }));
   std::size_t n = 0;
-  while (f.map.make_point() != nullptr && n <= kMaxPoints) f.map.points()[n++].stage = PointStage::active;
+  while (f.map.make_point() != nullptr && n <= kMaxPoints)
+    f.map.points()[n++].stage = PointStage::active;
   EXPECT_EQ(n, kMaxPoints);
 }
 

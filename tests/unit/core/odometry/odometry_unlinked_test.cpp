@@ -9,9 +9,10 @@ namespace {
 
 using test::Corridor;
 
-// A corner is found to 0.1 px, 0.4 mrad at 280 px of focal length. A hundred of them hold rotation and shift together to some 0.2 mrad, and
-// that over 12 m of corridor is a few millimetres; up to ten keyframes hand their errors on: 0.6 mrad, 8 mm. Three times that. The cameras'
-// transform of one frame is the difference of two such poses, one drifting with the other.
+// A corner is found to 0.1 px, 0.4 mrad at 280 px of focal length. A hundred of them hold rotation
+// and shift together to some 0.2 mrad, and that over 12 m of corridor is a few millimetres; up to
+// ten keyframes hand their errors on: 0.6 mrad, 8 mm. Three times that. The cameras' transform of
+// one frame is the difference of two such poses, one drifting with the other.
 constexpr double kTurn = 2e-3, kShift = 0.025;  // rad, m
 
 struct Drive {
@@ -33,13 +34,17 @@ struct Drive {
   }
 };
 
-double turn(const Transform& a, const Transform& b) { return log_so3(a.R * b.R.transpose()).norm(); }
+double turn(const Transform& a, const Transform& b) {
+  return log_so3(a.R * b.R.transpose()).norm();
+}
 
 /// The pose of frame i against the truth; the world is the left camera of frame 0.
 void expect_pose(const FrameOutcome& out, int i) {
   const Transform truth = Corridor::T_world_left(i).inverse() * Corridor::T_world_left(0);
   EXPECT_LT(turn(out.T_left_world, truth), kTurn) << i;
-  EXPECT_LT((out.T_left_world.centre() - truth.centre()).norm(), kShift + 0.01 * truth.centre().norm()) << i;
+  EXPECT_LT((out.T_left_world.centre() - truth.centre()).norm(),
+            kShift + 0.01 * truth.centre().norm())
+      << i;
 }
 
 void expect_rig(const Odometry& odometry, int k, const Transform& truth, int i) {
@@ -70,11 +75,13 @@ TEST(OdometryUnlinked, aKnockIsAMotionOfOneCamera) {
   Drive d(true);
   std::array<Transform, kMaxCameras> knocked = d.corridor.rig().T_camera_left;
   knocked[1] = perturbed(knocked[1], {0.006, -0.004, 0.005}, Vec3::Zero());
-  for (int i = 0; i < 4; ++i) ASSERT_TRUE(d.odometry.process(d.corridor.frame(i)).status == PoseStatus::ok) << i;
+  for (int i = 0; i < 4; ++i)
+    ASSERT_TRUE(d.odometry.process(d.corridor.frame(i)).status == PoseStatus::ok) << i;
   d.odometry.unlink();
   EXPECT_EQ(d.odometry.linked(), Link::unlinked);
   for (int i = 4; i < 20; ++i) {
-    const FrameOutcome out = i < 8 ? d.odometry.process(d.corridor.frame(i)) : d.odometry.process(d.corridor.frame(i, knocked));
+    const FrameOutcome out = i < 8 ? d.odometry.process(d.corridor.frame(i))
+                                   : d.odometry.process(d.corridor.frame(i, knocked));
     ASSERT_TRUE(out.posed) << i;
     EXPECT_NE(out.status, PoseStatus::ok) << i;
     expect_pose(out, i);
@@ -97,10 +104,16 @@ TEST(OdometryUnlinked, linkedAgainTheWayGoesOnWithoutAJump) {
     ASSERT_TRUE(out.posed) << i;
     EXPECT_FALSE(out.restarted) << i;
     EXPECT_EQ(d.odometry.linked(), Link::linked);
-    EXPECT_LT((d.odometry.rig().T_camera_left[1].t - d.corridor.rig().T_camera_left[1].t).norm(), 1e-6) << i;
+    EXPECT_LT((d.odometry.rig().T_camera_left[1].t - d.corridor.rig().T_camera_left[1].t).norm(),
+              1e-6)
+        << i;
     expect_pose(out, i);
     const Transform step = out.T_left_world * before.inverse();
-    EXPECT_LT((step.centre() - (Corridor::T_world_left(i - 1).inverse() * Corridor::T_world_left(i)).t).norm(), kShift) << i;
+    EXPECT_LT(
+        (step.centre() - (Corridor::T_world_left(i - 1).inverse() * Corridor::T_world_left(i)).t)
+            .norm(),
+        kShift)
+        << i;
     if (i > 11) {
       EXPECT_EQ(out.status, PoseStatus::ok) << i << ' ' << to_string(out.reason);
     }
@@ -114,7 +127,8 @@ TEST(OdometryUnlinked, aThirdCameraIsFoundThroughTheSceneOfTheFirstTwo) {
     const FrameOutcome out = d.odometry.process(d.corridor.frame(i));
     ASSERT_TRUE(i == 0 || out.posed) << i;
   }
-  for (const int k : {1, 2}) expect_rig(d.odometry, k, d.corridor.rig().T_camera_left[static_cast<std::size_t>(k)], 15);
+  for (const int k : {1, 2})
+    expect_rig(d.odometry, k, d.corridor.rig().T_camera_left[static_cast<std::size_t>(k)], 15);
 }
 
 TEST(OdometryUnlinked, allocatesNothing) {

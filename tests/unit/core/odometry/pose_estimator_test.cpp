@@ -10,11 +10,12 @@ namespace vergence::odometry {
 namespace {
 
 constexpr int kPoints = 300;
-// Pixels are floats: 3e-5 px near 640 px, 6e-8 rad of a direction, and 2.4e-6 m at 40 m. Both are four times that for a single point; of
-// three hundred the pose is better.
+// Pixels are floats: 3e-5 px near 640 px, 6e-8 rad of a direction, and 2.4e-6 m at 40 m. Both are
+// four times that for a single point; of three hundred the pose is better.
 constexpr double kExactTurn = 2.4e-7, kExactShift = 1e-5;
 
-/// Three hundred points at 3 to 40 m before a rig of 640×480 cameras, seen without error by all of them.
+/// Three hundred points at 3 to 40 m before a rig of 640×480 cameras, seen without error by all of
+/// them.
 struct Scene {
   OdometryOptions options;
   RigCalibration rig;
@@ -24,19 +25,23 @@ struct Scene {
   Transform T_left_world{exp_so3({0.3, -0.2, 0.1}), {1, -2, 3}};
   std::array<Transform, kMaxCameras> T_camera_left{};  // true; the rig's may be another
 
-  explicit Scene(int cameras = 2) : arena(Map::memory_needed() + PoseEstimator::memory_needed()), map(10, arena) {
+  explicit Scene(int cameras = 2)
+      : arena(Map::memory_needed() + PoseEstimator::memory_needed()), map(10, arena) {
     rig.cameras = cameras;
     for (std::size_t k = 0; k < static_cast<std::size_t>(cameras); ++k) {
       Intrinsics& c = rig.intrinsics[k];
       c.width = 640, c.height = 480, c.fx = 520, c.fy = 525, c.cx = 318, c.cy = 243;
-      if (k > 0) rig.T_camera_left[k] = {exp_so3({0.01, -0.02, 0.005}), {-0.5 * static_cast<double>(k), 0.01, 0.02}};
+      if (k > 0)
+        rig.T_camera_left[k] = {exp_so3({0.01, -0.02, 0.005}),
+                                {-0.5 * static_cast<double>(k), 0.01, 0.02}};
     }
     T_camera_left = rig.T_camera_left;
     for (int i = 0; i < kPoints; ++i) {
       MapPoint* p = map.make_point();
       p->stage = i % 2 == 0 ? PointStage::active : PointStage::dormant;
       const double z = random.uniform(3, 40);
-      p->p_world = T_left_world.inverse() * Vec3(random.uniform(-0.5, 0.5) * z, random.uniform(-0.4, 0.4) * z, z);
+      p->p_world = T_left_world.inverse() *
+                   Vec3(random.uniform(-0.5, 0.5) * z, random.uniform(-0.4, 0.4) * z, z);
     }
     see();
   }
@@ -53,9 +58,12 @@ struct Scene {
   [[nodiscard]] std::span<MapPoint> points() { return map.points().first(kPoints); }
   void spoil(MapPoint* p, int k) {
     const double angle = random.uniform(0, 6.28);
-    p->now.pixel[static_cast<std::size_t>(k)] += (30.0 * Vec2(std::cos(angle), std::sin(angle))).cast<float>();
+    p->now.pixel[static_cast<std::size_t>(k)] +=
+        (30.0 * Vec2(std::cos(angle), std::sin(angle))).cast<float>();
   }
-  [[nodiscard]] Transform near(double rad, double m) const { return perturbed(T_left_world, rad * Vec3(1, -1, 1), m * Vec3(1, 1, -1)); }
+  [[nodiscard]] Transform near(double rad, double m) const {
+    return perturbed(T_left_world, rad * Vec3(1, -1, 1), m * Vec3(1, 1, -1));
+  }
   [[nodiscard]] int agreeing(const PoseEstimator& e, int k) const {
     int n = 0;
     for (int i = 0; i < kPoints; ++i) n += (e.agrees()[static_cast<std::size_t>(i)] >> k) & 1;
@@ -137,10 +145,12 @@ TEST(PoseEstimator, camerasPosedEachForItselfGiveTheRig) {
       s.T_camera_left[k] = perturbed(s.T_camera_left[k], {0.02, -0.01, 0.015}, {0.03, -0.02, 0.04});
     s.see();
     PoseEstimator e(s.options, s.rig, s.arena);
-    const PoseFit fit = e.fit_unlinked(s.map, s.near(0.01, 0.1), true, std::span(T).first(static_cast<std::size_t>(cameras)));
+    const PoseFit fit = e.fit_unlinked(s.map, s.near(0.01, 0.1), true,
+                                       std::span(T).first(static_cast<std::size_t>(cameras)));
     ASSERT_TRUE(fit.found);
     expect_exact(fit.T_left_world, s.T_left_world);
-    for (std::size_t k = 1; k < static_cast<std::size_t>(cameras); ++k) expect_exact(T[k], s.T_camera_left[k]);
+    for (std::size_t k = 1; k < static_cast<std::size_t>(cameras); ++k)
+      expect_exact(T[k], s.T_camera_left[k]);
     EXPECT_EQ(fit.cameras, (1 << cameras) - 1);
     EXPECT_EQ(fit.stereo, kPoints);
     EXPECT_EQ(T[0].t.norm(), 0) << "the left camera is the rig's origin";
@@ -200,7 +210,8 @@ TEST(PoseEstimator, oneCamerasPoseAsksForAShareOfItsPoints) {
   ASSERT_TRUE(e.fit_camera(s.map, 1, s.T_camera_left[1] * s.near(0.01, 0.1), true, &T));
   expect_exact(T, s.T_camera_left[1] * s.T_left_world);
   // Matches by chance: every sighting somewhere.
-  for (MapPoint& p : s.points()) p.now.set(1, {s.random.uniform(0, 639), s.random.uniform(0, 479)}, 0.15F);
+  for (MapPoint& p : s.points())
+    p.now.set(1, {s.random.uniform(0, 639), s.random.uniform(0, 479)}, 0.15F);
   EXPECT_FALSE(e.fit_camera(s.map, 1, s.T_camera_left[1] * s.T_left_world, true, &T));
 }
 

@@ -35,8 +35,8 @@ OdometryOptions many_steps() {
   return o;
 }
 
-/// Six keyframes along a bend before a cloud of points, each seen wherever it falls into an image; exact but for the rounding to
-/// floats, 3e-5 px.
+/// Six keyframes along a bend before a cloud of points, each seen wherever it falls into an image;
+/// exact but for the rounding to floats, 3e-5 px.
 struct Bend {
   RigCalibration calibration = rig();
   OdometryOptions options = many_steps();
@@ -56,7 +56,8 @@ struct Bend {
       p->p_world = points.back();
     }
     for (int i = 0; i < 6; ++i) {
-      poses.push_back(Transform{exp_so3(Vec3(0.002 * i, 0.02 * i, -0.003 * i)), Vec3(0.03 * i, 0.01 * i, -0.4 * i)});
+      poses.push_back(Transform{exp_so3(Vec3(0.002 * i, 0.02 * i, -0.003 * i)),
+                                Vec3(0.03 * i, 0.01 * i, -0.4 * i)});
       const std::size_t slot = map.make_keyframe(poses.back(), Stamp(i));
       for (MapPoint& p : map.points())
         if (p.stage != PointStage::free) see(&p, slot, poses.back());
@@ -67,7 +68,8 @@ struct Bend {
       const auto i = static_cast<std::size_t>(k);
       const Camera camera = Lens(calibration.intrinsics[i]).ideal();
       Vec2 pixel;
-      if (camera.project(calibration.T_camera_left[i] * (T_left_world * p->p_world), &pixel, nullptr) == ProjectStatus::ok &&
+      if (camera.project(calibration.T_camera_left[i] * (T_left_world * p->p_world), &pixel,
+                         nullptr) == ProjectStatus::ok &&
           camera.inside(pixel, 0))
         p->seen[slot].set(k, pixel, 0.15F);
     }
@@ -75,8 +77,11 @@ struct Bend {
   /// All poses but the first, and all points, from where they are not.
   void disturb() {
     Random random(23);
-    const auto some = [&](double size) { return Vec3(size * random.normal(), size * random.normal(), size * random.normal()); };
-    for (std::size_t i = 1; i < poses.size(); ++i) map.keyframe(map.order()[i]).T_left_world = perturbed(poses[i], some(0.003), some(0.03));
+    const auto some = [&](double size) {
+      return Vec3(size * random.normal(), size * random.normal(), size * random.normal());
+    };
+    for (std::size_t i = 1; i < poses.size(); ++i)
+      map.keyframe(map.order()[i]).T_left_world = perturbed(poses[i], some(0.003), some(0.03));
     for (MapPoint& p : map.points())
       if (p.stage != PointStage::free) p.p_world += some(0.005 * p.p_world.z());
   }
@@ -84,7 +89,8 @@ struct Bend {
     double worst = 0;
     for (std::size_t i = 0; i < poses.size(); ++i) {
       const Transform& T = map.keyframe(map.order()[i]).T_left_world;
-      worst = std::max({worst, (T.t - poses[i].t).norm(), log_so3(T.R * poses[i].R.transpose()).norm()});
+      worst = std::max(
+          {worst, (T.t - poses[i].t).norm(), log_so3(T.R * poses[i].R.transpose()).norm()});
     }
     return worst;
   }
@@ -92,7 +98,9 @@ struct Bend {
     int n = 0;
     for (const MapPoint& p : map.points())
       for (const std::uint8_t slot : map.order())
-        n += p.stage == PointStage::free ? 0 : (p.seen[slot].by(0) ? 1 : 0) + (p.seen[slot].by(1) ? 1 : 0);
+        n += p.stage == PointStage::free
+                 ? 0
+                 : (p.seen[slot].by(0) ? 1 : 0) + (p.seen[slot].by(1) ? 1 : 0);
     return n;
   }
 };
@@ -109,7 +117,8 @@ TEST(WindowAdjuster, exactSightingsBringThePosesBack) {
   EXPECT_GT(out.points, 100);
   EXPECT_EQ(out.dropped, 0);
   EXPECT_EQ(b.sightings(), before);
-  EXPECT_EQ(b.map.keyframe(b.map.order()[0]).T_left_world.t, first.t) << "the oldest keyframe holds the window";
+  EXPECT_EQ(b.map.keyframe(b.map.order()[0]).T_left_world.t, first.t)
+      << "the oldest keyframe holds the window";
 }
 
 TEST(WindowAdjuster, grossOutliersAreDroppedAndNothingElse) {
@@ -159,8 +168,12 @@ TEST(WindowAdjuster, oneKeyframeOrNoPointsChangeNothing) {
   EXPECT_EQ(b.map.keyframe(b.map.order()[0]).T_left_world.t, b.poses[1].t);
 }
 
-/// The turn about the camera's y by which the adjuster's rig differs from the one that the sightings were made with.
-double turn_left(const Bend& b) { return log_so3(Mat3(b.adjuster.T_camera_left()[1].R * rig().T_camera_left[1].R.transpose())).norm(); }
+/// The turn about the camera's y by which the adjuster's rig differs from the one that the
+/// sightings were made with.
+double turn_left(const Bend& b) {
+  return log_so3(Mat3(b.adjuster.T_camera_left()[1].R * rig().T_camera_left[1].R.transpose()))
+      .norm();
+}
 
 constexpr double kTurned = 2e-3;  // rad: a disparity of 1 px
 
@@ -173,7 +186,8 @@ TEST(WindowAdjuster, aTurnOfACameraIsOneErrorOfAllPointsAndIsFound) {
   ASSERT_NEAR(turn_left(b), kTurned, 1e-9);
   b.disturb();
   ASSERT_TRUE(b.adjuster.adjust(b.map).usable);
-  // The prior weighs a hundredth of the (0.2 mrad / 50 mrad)² that a window of exact sightings at 0.15 px would leave it.
+  // The prior weighs a hundredth of the (0.2 mrad / 50 mrad)² that a window of exact sightings at
+  // 0.15 px would leave it.
   EXPECT_LT(turn_left(b), 0.01 * kTurned);
   EXPECT_LT(b.worst_pose_error(), 0.01 * 2.0) << "of the 2 m driven";
 }
@@ -183,7 +197,8 @@ TEST(WindowAdjuster, aCalibrationThatIsCertainIsHeld) {
   const Vec3 axis = Vec3::UnitZ().cross(b.calibration.T_camera_left[1].t).normalized();
   b.calibration.T_camera_left[1].R = exp_so3(kTurned * axis) * b.calibration.T_camera_left[1].R;
   constexpr double kCertain = 1e-7;
-  for (int i = 0; i < 6; ++i) b.calibration.covariance.set(extrinsic_row(1) + i, extrinsic_row(1) + i, kCertain * kCertain);
+  for (int i = 0; i < 6; ++i)
+    b.calibration.covariance.set(extrinsic_row(1) + i, extrinsic_row(1) + i, kCertain * kCertain);
   b.adjuster.take_up_rig();
   b.disturb();
   ASSERT_TRUE(b.adjuster.adjust(b.map).usable);

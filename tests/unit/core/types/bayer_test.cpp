@@ -13,21 +13,32 @@ namespace vergence {
 namespace {
 
 /// The definition, pixel by pixel.
-int by_definition(const std::vector<std::uint8_t>& raw, int stride, int width, int height, int x, int y) {
+int by_definition(const std::vector<std::uint8_t>& raw, int stride, int width, int height, int x,
+                  int y) {
   const auto mirrored = [](int i, int n) { return i < 0 ? -i : i >= n ? 2 * (n - 1) - i : i; };
   constexpr std::array<int, 3> kWeights{1, 2, 1};
   int sum = 8;
   for (int j = -1; j <= 1; ++j)
     for (int i = -1; i <= 1; ++i)
-      sum += kWeights[static_cast<std::size_t>(i + 1)] * kWeights[static_cast<std::size_t>(j + 1)] *
-             raw[static_cast<std::size_t>(mirrored(y + j, height) * stride + mirrored(x + i, width))];
+      sum +=
+          kWeights[static_cast<std::size_t>(i + 1)] * kWeights[static_cast<std::size_t>(j + 1)] *
+          raw[static_cast<std::size_t>(mirrored(y + j, height) * stride + mirrored(x + i, width))];
   return sum / 16;
 }
 
 TEST(Bayer, isItsDefinitionAtEverySizeAndWritesNothingElse) {
   Random random(3);
-  for (const auto& [width, height] :
-       {std::pair{2, 2}, {3, 2}, {2, 5}, {17, 9}, {640, 4}, {1021, 3}, {1022, 3}, {1023, 3}, {1024, 3}, {2044, 3}, {2045, 3}}) {
+  for (const auto& [width, height] : {std::pair{2, 2},
+                                      {3, 2},
+                                      {2, 5},
+                                      {17, 9},
+                                      {640, 4},
+                                      {1021, 3},
+                                      {1022, 3},
+                                      {1023, 3},
+                                      {1024, 3},
+                                      {2044, 3},
+                                      {2045, 3}}) {
     const int in_stride = width + 3, out_stride = width + 5;
     std::vector<std::uint8_t> raw(static_cast<std::size_t>(in_stride * height));
     for (auto& v : raw) v = static_cast<std::uint8_t>(random.below(256));
@@ -35,36 +46,46 @@ TEST(Bayer, isItsDefinitionAtEverySizeAndWritesNothingElse) {
     bayer_to_grey(raw.data(), in_stride, width, height, out.data(), out_stride);
     for (int y = 0; y < height; ++y)
       for (int x = 0; x < out_stride; ++x)
-        ASSERT_EQ(out[static_cast<std::size_t>(y * out_stride + x)], x < width ? by_definition(raw, in_stride, width, height, x, y) : 77)
+        ASSERT_EQ(out[static_cast<std::size_t>(y * out_stride + x)],
+                  x < width ? by_definition(raw, in_stride, width, height, x, y) : 77)
             << width << " x " << height << " at " << x << ", " << y;
   }
 }
 
 TEST(Bayer, anEvenColourIsEvenGreyWhateverThePattern) {
   constexpr int kWidth = 18, kHeight = 12, kRed = 240, kGreen = 96, kBlue = 12;
-  constexpr std::array<std::array<int, 4>, 4> kPatterns{
-      {{kRed, kGreen, kGreen, kBlue}, {kBlue, kGreen, kGreen, kRed}, {kGreen, kBlue, kRed, kGreen}, {kGreen, kRed, kBlue, kGreen}}};
+  constexpr std::array<std::array<int, 4>, 4> kPatterns{{{kRed, kGreen, kGreen, kBlue},
+                                                         {kBlue, kGreen, kGreen, kRed},
+                                                         {kGreen, kBlue, kRed, kGreen},
+                                                         {kGreen, kRed, kBlue, kGreen}}};
   for (const auto& pattern : kPatterns) {
     std::vector<std::uint8_t> raw, out(kWidth * kHeight);
     for (int y = 0; y < kHeight; ++y)
-      for (int x = 0; x < kWidth; ++x) raw.push_back(static_cast<std::uint8_t>(pattern[static_cast<std::size_t>(2 * (y % 2) + x % 2)]));
+      for (int x = 0; x < kWidth; ++x)
+        raw.push_back(
+            static_cast<std::uint8_t>(pattern[static_cast<std::size_t>(2 * (y % 2) + x % 2)]));
     bayer_to_grey(raw.data(), kWidth, kWidth, kHeight, out.data(), kWidth);
-    EXPECT_TRUE(std::all_of(out.begin(), out.end(), [](int v) { return v == (kRed + 2 * kGreen + kBlue) / 4; }));
+    EXPECT_TRUE(std::all_of(out.begin(), out.end(),
+                            [](int v) { return v == (kRed + 2 * kGreen + kBlue) / 4; }));
   }
 }
 
 TEST(Bayer, aColouredSlopeKeepsItsPlace) {
-  // Linear brightness under a colour filter whose mean gain is 1: inside, grey is the slope itself at every phase.
+  // Linear brightness under a colour filter whose mean gain is 1: inside, grey is the slope itself
+  // at every phase.
   constexpr int kWidth = 40, kHeight = 30;
   constexpr std::array<double, 4> kGbrg{1.0, 0.7, 1.3, 1.0};
   std::vector<std::uint8_t> raw, out(kWidth * kHeight);
   for (int y = 0; y < kHeight; ++y)
     for (int x = 0; x < kWidth; ++x)
-      raw.push_back(static_cast<std::uint8_t>(kGbrg[static_cast<std::size_t>(2 * (y % 2) + x % 2)] * (40 + 2 * x + y) + 0.5));
+      raw.push_back(static_cast<std::uint8_t>(
+          kGbrg[static_cast<std::size_t>(2 * (y % 2) + x % 2)] * (40 + 2 * x + y) + 0.5));
   bayer_to_grey(raw.data(), kWidth, kWidth, kHeight, out.data(), kWidth);
-  // Rounded to half a level before and after; the colour's share changes over a pixel by (0.3 · 2 · 2 px) / 4 at most.
+  // Rounded to half a level before and after; the colour's share changes over a pixel by (0.3 · 2 ·
+  // 2 px) / 4 at most.
   for (int y = 1; y + 1 < kHeight; ++y)
-    for (int x = 1; x + 1 < kWidth; ++x) EXPECT_NEAR(out[static_cast<std::size_t>(y * kWidth + x)], 40 + 2 * x + y, 1.0 + 0.3);
+    for (int x = 1; x + 1 < kWidth; ++x)
+      EXPECT_NEAR(out[static_cast<std::size_t>(y * kWidth + x)], 40 + 2 * x + y, 1.0 + 0.3);
 }
 
 }  // namespace

@@ -18,7 +18,8 @@ void expect_words_of_their_own(Enum last) {
   for (int i = 0; i <= static_cast<int>(last); ++i) {
     const std::string_view word = to_string(static_cast<Enum>(i));
     EXPECT_TRUE(words.insert(word).second) << word;
-    for (const char c : word) EXPECT_TRUE((c >= 'a' && c <= 'z') || c == '_') << word << " stands in poses.csv";
+    for (const char c : word)
+      EXPECT_TRUE((c >= 'a' && c <= 'z') || c == '_') << word << " stands in poses.csv";
   }
 }
 

@@ -48,14 +48,17 @@ class CameraConformance : public ::testing::Test {
 };
 
 TEST_F(CameraConformance, randomRulesKeepTheContract) {
-  const int seeds = asked_for("VERGENCE_CONFORMANCE_SEEDS", 3), steps = asked_for("VERGENCE_CONFORMANCE_STEPS", 60);
+  const int seeds = asked_for("VERGENCE_CONFORMANCE_SEEDS", 3),
+            steps = asked_for("VERGENCE_CONFORMANCE_STEPS", 60);
   for (int seed = 1; seed <= seeds && !HasFailure(); ++seed) {
     if (make(static_cast<std::uint64_t>(seed)) == nullptr) GTEST_SKIP() << why_;
     const auto possible = rig_->possible();
     auto impossible = nonsense(possible.front());
     for (const CameraConfiguration& c : rig_->impossible()) impossible.push_back(c);
     Random random(static_cast<std::uint64_t>(seed));
-    const auto any_of = [&random](const auto& list) { return list[random.below(static_cast<std::uint32_t>(list.size()))]; };
+    const auto any_of = [&random](const auto& list) {
+      return list[random.below(static_cast<std::uint32_t>(list.size()))];
+    };
     ShadowCamera camera(rig_.get());
     int unplugs = 1;  // each takes seconds, because cameras are given time to answer
     for (int step = 0; step < steps && !HasFailure(); ++step) {
@@ -139,7 +142,8 @@ TEST_F(CameraConformance, aWaitEndsWhenTheCameraIsStopped) {
   });
   std::this_thread::sleep_for(std::chrono::milliseconds(200));
   camera.stop();
-  for (int i = 0; i < 200 && !ended; ++i) std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  for (int i = 0; i < 200 && !ended; ++i)
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
   EXPECT_TRUE(ended) << "stop() did not wake wait()";
   consumer.join();
 }
@@ -211,14 +215,16 @@ TEST_F(CameraConformance, anExposureSetWhileStreamingIsToldByFramesAndKeptOverAS
   rig_->started();
   EXPECT_TRUE(reaches(*rig_, c, {c.exposure, c.gain_db})) << "as configured";
   EXPECT_EQ(camera.set_exposure({-c.exposure, 0}, &actual), DeviceStatus::bad_configuration);
-  EXPECT_EQ(camera.set_exposure({Duration::seconds(2 / c.rate_hz), 0}, &actual), DeviceStatus::bad_configuration);
+  EXPECT_EQ(camera.set_exposure({Duration::seconds(2 / c.rate_hz), 0}, &actual),
+            DeviceStatus::bad_configuration);
   for (const ExposureSetting& s : settings) {
     ASSERT_EQ(camera.set_exposure(s, &actual), DeviceStatus::ok) << camera.complaint();
     EXPECT_EQ(actual, s);
     EXPECT_TRUE(reaches(*rig_, c, s));
   }
   // Beyond what it has: the nearest.
-  ASSERT_EQ(camera.set_exposure({settings[0].exposure, 1e6}, &actual), DeviceStatus::ok) << camera.complaint();
+  ASSERT_EQ(camera.set_exposure({settings[0].exposure, 1e6}, &actual), DeviceStatus::ok)
+      << camera.complaint();
   EXPECT_LT(actual.gain_db, 1e6);
   EXPECT_TRUE(reaches(*rig_, c, actual));
   camera.stop();
@@ -251,7 +257,8 @@ TEST_F(CameraConformance, ownerConsumerAndReleaserMayBeThreeThreads) {
   std::thread consumer([&] {
     for (Frame frame; !over;) {
       const DeviceStatus status = camera.wait(Duration::milliseconds(20), &frame);
-      if (status == DeviceStatus::stopped) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+      if (status == DeviceStatus::stopped)
+        std::this_thread::sleep_for(std::chrono::milliseconds(1));
       if (status != DeviceStatus::ok) continue;
       ++frames;
       const std::lock_guard lock(mutex);
@@ -285,7 +292,8 @@ TEST_F(CameraConformance, ownerConsumerAndReleaserMayBeThreeThreads) {
   over = true;
   consumer.join();
   {
-    const std::lock_guard lock(mutex);  // the releaser's last round may have been before the last frame
+    const std::lock_guard lock(
+        mutex);  // the releaser's last round may have been before the last frame
   }
   releaser.join();
   for (const FrameSlot slot : back) camera.release(slot);

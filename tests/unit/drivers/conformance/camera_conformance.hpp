@@ -6,11 +6,14 @@
 
 #include "drivers/camera.hpp"
 
-/// The one suite that every camera driver passes: drivers/camera.hpp as a shadow model, driven by random rules with a seed.
+/// The one suite that every camera driver passes: drivers/camera.hpp as a shadow model, driven by
+/// random rules with a seed.
 ///
-/// A driver joins with a file that defines make_conformance_rig(), and vergence_conformance(NAME SOURCES that_file DEPENDS …) in this
-/// folder's CMakeLists.txt, which makes the program `conformance_NAME` and the ctest `conformance.NAME`.
-/// Environment  VERGENCE_CONFORMANCE_SEEDS (how many, 3), VERGENCE_CONFORMANCE_STEPS (rules each, 60): more of them for a night's run.
+/// A driver joins with a file that defines make_conformance_rig(), and vergence_conformance(NAME
+/// SOURCES that_file DEPENDS …) in this folder's CMakeLists.txt, which makes the program
+/// `conformance_NAME` and the ctest `conformance.NAME`.
+/// Environment  VERGENCE_CONFORMANCE_SEEDS (how many, 3), VERGENCE_CONFORMANCE_STEPS (rules each,
+///              60): more of them for a night's run.
 namespace vergence::test {
 
 /// One camera on its rig, as the suite sees it.
@@ -22,10 +25,12 @@ class ConformanceRig {
 
   /// Opened, not configured. Lives as long as the rig.
   [[nodiscard]] virtual CameraDevice& camera() = 0;
-  /// What it can do, at least one: small pictures at a high rate, so that the suite is short. With CameraTrigger::software the suite
-  /// triggers. With CameraTrigger::hardware the rig pulses by itself while the camera streams.
+  /// What it can do, at least one: small pictures at a high rate, so that the suite is short. With
+  /// CameraTrigger::software the suite triggers. With CameraTrigger::hardware the rig pulses by
+  /// itself while the camera streams.
   [[nodiscard]] virtual std::vector<CameraConfiguration> possible() = 0;
-  /// What it must refuse, beside the nonsense that the suite knows: a size, a format, an option that it does not have.
+  /// What it must refuse, beside the nonsense that the suite knows: a size, a format, an option
+  /// that it does not have.
   [[nodiscard]] virtual std::vector<CameraConfiguration> impossible() { return {}; }
   /// After a start() that was ok.
   virtual void started() {}
@@ -33,7 +38,8 @@ class ConformanceRig {
   /// Cable out. False: this rig cannot.
   [[nodiscard]] virtual bool unplug() { return false; }
   virtual void replug() {}
-  /// After unplug() the camera must be gone within this, after replug() a start() must succeed within it.
+  /// After unplug() the camera must be gone within this, after replug() a start() must succeed
+  /// within it.
   [[nodiscard]] virtual Duration gone_within() const { return Duration::seconds(10); }
 
   /// The next exposures never arrive. False: this rig cannot.
@@ -46,13 +52,15 @@ class ConformanceRig {
     (void)frame, (void)image;
     return true;
   }
-  /// Two exposures that the camera takes as they are while it streams in possible().front(). Empty: this camera cannot be asked.
+  /// Two exposures that the camera takes as they are while it streams in possible().front(). Empty:
+  /// this camera cannot be asked.
   [[nodiscard]] virtual std::vector<ExposureSetting> exposures() { return {}; }
   /// False: counters go on over a stop (a rig whose pulses go on).
   [[nodiscard]] virtual bool counts_from_start() const { return true; }
 };
 
 /// Null: this machine cannot; *why says what is missing, and the suite skips with it.
-[[nodiscard]] std::unique_ptr<ConformanceRig> make_conformance_rig(std::uint64_t seed, std::string* why);
+[[nodiscard]] std::unique_ptr<ConformanceRig> make_conformance_rig(std::uint64_t seed,
+                                                                   std::string* why);
 
 }  // namespace vergence::test

@@ -24,7 +24,8 @@ class GigeConformance final : public ConformanceRig {
 
   CameraDevice& camera() override { return *camera_; }
   std::vector<CameraConfiguration> possible() override {
-    CameraConfiguration free{kWidth, kHeight, kRate, Duration::milliseconds(2), 0, CameraTrigger::free};
+    CameraConfiguration free{
+        kWidth, kHeight, kRate, Duration::milliseconds(2), 0, CameraTrigger::free};
     CameraConfiguration software = free;
     software.trigger = CameraTrigger::software;
     CameraConfiguration region = free;
@@ -43,13 +44,17 @@ class GigeConformance final : public ConformanceRig {
     all[3].gain_db = 90;
     return all;
   }
-  std::vector<ExposureSetting> exposures() override { return {{Duration::milliseconds(1), 0}, {Duration::milliseconds(8), 6}}; }
+  std::vector<ExposureSetting> exposures() override {
+    return {{Duration::milliseconds(1), 0}, {Duration::milliseconds(8), 6}};
+  }
   bool unplug() override {
     simulator_.unplug();
     return true;
   }
   void replug() override { simulator_.replug(); }
-  Duration gone_within() const override { return Duration::seconds(25); }  // two unanswered calls and the longest pause
+  Duration gone_within() const override {
+    return Duration::seconds(25);
+  }  // two unanswered calls and the longest pause
   bool lose(int exposures) override {
     simulator_.lose_frames(exposures);
     return true;

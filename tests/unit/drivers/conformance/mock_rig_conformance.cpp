@@ -25,8 +25,9 @@ class MockConformance final : public ConformanceRig {
     o.real_time = true;
     o.seed = seed;
     rig_ = std::make_unique<mock::MockRig>(
-        std::make_shared<const mock::RigTruth>(std::make_shared<const mock::World>(town), mock::DriveOptions{}, calibration,
-                                               mock::default_T_body_left(), Transform{}, std::vector<mock::Fault>{}),
+        std::make_shared<const mock::RigTruth>(
+            std::make_shared<const mock::World>(town), mock::DriveOptions{}, calibration,
+            mock::default_T_body_left(), Transform{}, std::vector<mock::Fault>{}),
         o);
   }
 
@@ -44,7 +45,9 @@ class MockConformance final : public ConformanceRig {
     (void)rig_->trigger().configure({50}, nullptr);
     (void)rig_->trigger().start(nullptr);
   }
-  std::vector<ExposureSetting> exposures() override { return {{Duration::milliseconds(4), 0}, {Duration::milliseconds(8), 6}}; }
+  std::vector<ExposureSetting> exposures() override {
+    return {{Duration::milliseconds(4), 0}, {Duration::milliseconds(8), 6}};
+  }
   bool counts_from_start() const override { return false; }
 
  private:

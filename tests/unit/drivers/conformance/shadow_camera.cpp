@@ -12,8 +12,10 @@ namespace {
 
 using std::chrono::steady_clock;
 
-constexpr Duration kSlack = Duration::milliseconds(500);   // a busy machine's, beyond any limit that is asked for
-constexpr Duration kFirst = Duration::milliseconds(4000);  // from start() to a frame at the latest: links are probed, sensors settle
+constexpr Duration kSlack =
+    Duration::milliseconds(500);  // a busy machine's, beyond any limit that is asked for
+constexpr Duration kFirst = Duration::milliseconds(
+    4000);  // from start() to a frame at the latest: links are probed, sensors settle
 
 HostStamp now() noexcept {
   timespec t{};
@@ -25,7 +27,8 @@ HostStamp now() noexcept {
 std::uint64_t sum_of(const ImageView& view) noexcept {
   std::uint64_t h = 0xcbf29ce484222325U;
   for (int y = 0; y < view.height; ++y)
-    for (const std::uint8_t *p = view.row(y), *end = p + view.width; p != end; ++p) h = (h ^ *p) * 0x100000001b3U;
+    for (const std::uint8_t *p = view.row(y), *end = p + view.width; p != end; ++p)
+      h = (h ^ *p) * 0x100000001b3U;
   return h;
 }
 
@@ -76,8 +79,10 @@ void ShadowCamera::refuse(const CameraConfiguration& nonsense) {
     EXPECT_NE(status, DeviceStatus::ok);
     return;
   }
-  EXPECT_TRUE(status == DeviceStatus::unsupported || status == DeviceStatus::bad_configuration || status == DeviceStatus::busy)
-      << to_string(status) << " for " << nonsense.width << " x " << nonsense.height << " at " << nonsense.rate_hz << " Hz";
+  EXPECT_TRUE(status == DeviceStatus::unsupported || status == DeviceStatus::bad_configuration ||
+              status == DeviceStatus::busy)
+      << to_string(status) << " for " << nonsense.width << " x " << nonsense.height << " at "
+      << nonsense.rate_hz << " Hz";
   EXPECT_EQ(actual.width, nonsense.width) << "refused, and *actual written";
   if (status == DeviceStatus::unsupported && camera_.info().driver != "mock") {
     EXPECT_FALSE(camera_.complaint().empty()) << "what the camera offers is not said";
@@ -114,7 +119,8 @@ void ShadowCamera::stop() {
 void ShadowCamera::trigger_if_asked() {
   if (now_.trigger != CameraTrigger::software || state_ != State::streaming) return;
   const DeviceStatus status = camera_.trigger_once();
-  EXPECT_TRUE(status == DeviceStatus::ok || (unplugged_ && status == DeviceStatus::gone)) << to_string(status) << camera_.complaint();
+  EXPECT_TRUE(status == DeviceStatus::ok || (unplugged_ && status == DeviceStatus::gone))
+      << to_string(status) << camera_.complaint();
 }
 
 DeviceStatus ShadowCamera::wait(Duration limit) {
@@ -124,7 +130,8 @@ DeviceStatus ShadowCamera::wait(Duration limit) {
   const auto begin = steady_clock::now();
   const DeviceStatus status = camera_.wait(limit, &frame);
   const auto took = Duration::nanoseconds((steady_clock::now() - begin).count());
-  EXPECT_LE(took, limit + kSlack) << "waited " << took.to_seconds() << " s for a limit of " << limit.to_seconds();
+  EXPECT_LE(took, limit + kSlack) << "waited " << took.to_seconds() << " s for a limit of "
+                                  << limit.to_seconds();
   switch (status) {
     case DeviceStatus::ok:
       EXPECT_TRUE(state_ == State::streaming) << "a frame while not streaming";
@@ -183,14 +190,16 @@ void ShadowCamera::take(const Frame& frame) {
   any_ = true;
   newest_ = frame;
   if (!torn) {
-    EXPECT_TRUE(rig_->content_fits(frame, view)) << "frame " << frame.counter << " has another one's pixels";
+    EXPECT_TRUE(rig_->content_fits(frame, view))
+        << "frame " << frame.counter << " has another one's pixels";
   }
   held_.push_back({frame, view, sum_of(view)});
 }
 
 void ShadowCamera::release(std::size_t which) {
   const Held h = held_[which];
-  EXPECT_EQ(sum_of(h.view), h.sum) << "frame " << h.frame.counter << " was written to while it was ours";
+  EXPECT_EQ(sum_of(h.view), h.sum)
+      << "frame " << h.frame.counter << " was written to while it was ours";
   held_.erase(held_.begin() + static_cast<std::ptrdiff_t>(which));
   camera_.release(h.frame.slot);
 }
@@ -202,7 +211,8 @@ void ShadowCamera::release_all() {
 void ShadowCamera::expect_frames(int count) {
   const auto deadline = steady_clock::now() + std::chrono::nanoseconds(kFirst.ns());
   for (int got = 0; got < count && !::testing::Test::HasFatalFailure();) {
-    ASSERT_LT(steady_clock::now(), deadline) << got << " of " << count << " frames came: " << camera_.complaint();
+    ASSERT_LT(steady_clock::now(), deadline)
+        << got << " of " << count << " frames came: " << camera_.complaint();
     release_all();
     if (wait(Duration::milliseconds(200)) == DeviceStatus::ok) ++got;
   }
@@ -211,7 +221,9 @@ void ShadowCamera::expect_frames(int count) {
 bool ShadowCamera::unplug_and_replug() {
   if (state_ != State::streaming || !rig_->unplug()) return false;
   unplugged_ = true;
-  const auto soon = [this] { return steady_clock::now() + std::chrono::nanoseconds(rig_->gone_within().ns()); };
+  const auto soon = [this] {
+    return steady_clock::now() + std::chrono::nanoseconds(rig_->gone_within().ns());
+  };
   for (const auto deadline = soon(); state_ != State::gone;) {  // what was under way still comes
     if (steady_clock::now() > deadline) {
       ADD_FAILURE() << "unplugged, and not gone";

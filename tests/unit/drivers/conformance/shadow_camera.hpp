@@ -17,7 +17,8 @@ class CountingNotifier final : public Notifier {
   std::atomic<std::uint64_t> told_{0};
 };
 
-/// The model beside the camera: every call goes through it, and what the camera answers is held against the contract.
+/// The model beside the camera: every call goes through it, and what the camera answers is held
+/// against the contract.
 ///
 /// Failures are GoogleTest's, each with the number of the step. Threads  One.
 class ShadowCamera {
@@ -47,7 +48,9 @@ class ShadowCamera {
   /// Statistics against the model.
   void check_statistics();
 
-  [[nodiscard]] std::uint64_t gaps() const noexcept { return gaps_; }  // exposures missing between handed out frames, this start
+  [[nodiscard]] std::uint64_t gaps() const noexcept {
+    return gaps_;
+  }  // exposures missing between handed out frames, this start
   [[nodiscard]] const CameraStatistics& at_start() const noexcept { return at_start_; }
 
  private:

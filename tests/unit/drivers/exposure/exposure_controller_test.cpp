@@ -14,7 +14,8 @@
 namespace vergence::exposure {
 namespace {
 
-/// A street's radiances, in grey levels at 8 ms without gain, seen by a sensor that takes a new setting over some frames late.
+/// A street's radiances, in grey levels at 8 ms without gain, seen by a sensor that takes a new
+/// setting over some frames late.
 class Street {
  public:
   Street(int latency, double gamma) : latency_(latency), gamma_(gamma) {
@@ -29,11 +30,13 @@ class Street {
       on_the_way_.pop_front();
     }
     ++frame_;
-    const double factor = light * had_.exposure.to_seconds() / 0.008 * std::pow(10, had_.gain_db / 20);
+    const double factor =
+        light * had_.exposure.to_seconds() / 0.008 * std::pow(10, had_.gain_db / 20);
     std::array<std::uint8_t, kWidth * kHeight> pixels{};
     for (std::size_t i = 0; i < pixels.size(); ++i) {
       const double linear = radiance_[i] * factor;
-      pixels[i] = static_cast<std::uint8_t>(std::clamp(90 * std::pow(linear / 90, gamma_), 0.0, 255.0));
+      pixels[i] =
+          static_cast<std::uint8_t>(std::clamp(90 * std::pow(linear / 90, gamma_), 0.0, 255.0));
     }
     static const BrightnessMeter meter(kWidth, kHeight, {});
     last_ = meter.measure({pixels.data(), kWidth, kHeight, kWidth}, o.may_saturate);
@@ -61,7 +64,8 @@ struct Stretch {
   int changes = 0, last_change = -1;  // frame of this stretch
 };
 
-Stretch drive(Street& street, ExposureController& controller, const ExposureOptions& o, double light, int frames) {
+Stretch drive(Street& street, ExposureController& controller, const ExposureOptions& o,
+              double light, int frames) {
   Stretch s;
   for (int i = 0; i < frames; ++i)
     if (const auto next = controller.step(street.shoot(light, o))) {
@@ -70,7 +74,8 @@ Stretch drive(Street& street, ExposureController& controller, const ExposureOpti
       s.last_change = i;
       EXPECT_GE(next->exposure, o.least);
       EXPECT_LE(next->exposure, o.most);
-      EXPECT_TRUE(next->gain_db == 0 || next->exposure == o.most) << "gain before the exposure is at its longest";
+      EXPECT_TRUE(next->gain_db == 0 || next->exposure == o.most)
+          << "gain before the exposure is at its longest";
     }
   return s;
 }
@@ -86,17 +91,21 @@ TEST_P(ExposureControl, settlesAfterEveryChangeOfLightAndThenRests) {
   ExposureController controller(o, start);
   Street street(latency, gamma);
   street.begin_with(start);
-  // Daylight, a tunnel, out of it, dusk, noon: at most 5 stops a time. A linear sensor needs a change a stop, one of the square root twice
-  // as many until it is in the dead band; every change waits settle_frames.
+  // Daylight, a tunnel, out of it, dusk, noon: at most 5 stops a time. A linear sensor needs a
+  // change a stop, one of the square root twice as many until it is in the dead band; every change
+  // waits settle_frames.
   const double most_changes = gamma < 1 ? 14 : 8;
   const int frames = static_cast<int>(most_changes) * (o.settle_frames + 1) + 60;
   for (const double light : {1.0, 1.0 / 6, 1.0, 0.3, 8.0, 0.25}) {
     const Stretch s = drive(street, controller, o, light, frames);
     EXPECT_LE(s.changes, most_changes) << "light " << light;
-    EXPECT_LT(s.last_change, frames - 60) << "light " << light;  // the last 60 frames nothing moves: no limit cycle
+    EXPECT_LT(s.last_change, frames - 60)
+        << "light " << light;  // the last 60 frames nothing moves: no limit cycle
     const Brightness b = street.last();
-    const double off = std::min(std::log2(o.target / b.mean), std::log2(kSaturated / std::max(1.0, b.bright)));
-    EXPECT_LE(std::abs(off), o.dead_band + 0.05) << "light " << light << ", mean " << b.mean << ", bright " << b.bright;
+    const double off =
+        std::min(std::log2(o.target / b.mean), std::log2(kSaturated / std::max(1.0, b.bright)));
+    EXPECT_LE(std::abs(off), o.dead_band + 0.05)
+        << "light " << light << ", mean " << b.mean << ", bright " << b.bright;
     EXPECT_EQ(street.had().exposure, controller.setting().exposure);
   }
 }
@@ -117,7 +126,8 @@ TEST_P(ExposureControl, aCoverTakenAwayIsGotOverInASecond) {
 }
 
 INSTANTIATE_TEST_SUITE_P(WhateverTheCamera, ExposureControl,
-                         ::testing::Combine(::testing::Values(1, 2, 3, 4), ::testing::Values(1.0, 0.5)));
+                         ::testing::Combine(::testing::Values(1, 2, 3, 4),
+                                            ::testing::Values(1.0, 0.5)));
 
 TEST(ExposureController, usesGainOnlyBeyondTheLongestExposureAndGivesItBackFirst) {
   ExposureOptions o;
@@ -155,7 +165,8 @@ TEST(ExposureController, refusesBoundsThatAreNone) {
   ExposureOptions o;
   o.most = Duration::microseconds(10);
   EXPECT_NE(o.validate(), nullptr);
-  EXPECT_EQ(within(ExposureOptions{}, {Duration::seconds(1), -3}), (ExposureSetting{ExposureOptions{}.most, 0}));
+  EXPECT_EQ(within(ExposureOptions{}, {Duration::seconds(1), -3}),
+            (ExposureSetting{ExposureOptions{}.most, 0}));
 }
 
 TEST(BrightnessMeter, measuresWhatTheMaskShows) {
@@ -163,7 +174,8 @@ TEST(BrightnessMeter, measuresWhatTheMaskShows) {
   std::vector<std::uint8_t> image(kWidth * kHeight, 40), mask(kWidth * kHeight, 255);
   std::fill(image.begin() + kWidth * kHeight / 2, image.end(), std::uint8_t{255});
   std::fill(mask.begin() + kWidth * kHeight / 2, mask.end(), std::uint8_t{0});
-  const ImageView view{image.data(), kWidth, kHeight, kWidth}, hidden{mask.data(), kWidth, kHeight, kWidth};
+  const ImageView view{image.data(), kWidth, kHeight, kWidth},
+      hidden{mask.data(), kWidth, kHeight, kWidth};
   const Brightness all = BrightnessMeter(kWidth, kHeight, {}).measure(view, 0.05);
   EXPECT_NEAR(all.mean, 0.5 * (40 + 255), 1e-9);
   EXPECT_EQ(all.bright, 255);
@@ -173,7 +185,8 @@ TEST(BrightnessMeter, measuresWhatTheMaskShows) {
   EXPECT_EQ(shown.mean, 40);
   EXPECT_EQ(shown.bright, 40);
   EXPECT_EQ(shown.saturated, 0);
-  EXPECT_EQ(half.places(), static_cast<std::size_t>(BrightnessMeter::kColumns * BrightnessMeter::kRows / 2));
+  EXPECT_EQ(half.places(),
+            static_cast<std::size_t>(BrightnessMeter::kColumns * BrightnessMeter::kRows / 2));
   EXPECT_EQ(half.measure({image.data(), 100, 100, 100}, 0.05).samples, 0) << "another size";
   EXPECT_EQ(half.measure({}, 0.05).samples, 0);
   EXPECT_EQ(BrightnessMeter(3, 2, {}).places(), 6U);

@@ -109,7 +109,8 @@ TEST(GigeCamera, everyPulseIsOneFrameAndRestIsNoError) {
   b.configure(c);
   b.start();
   Frame frame;
-  EXPECT_EQ(b.camera->wait(Duration::milliseconds(1500), &frame), DeviceStatus::timeout) << "no pulse, no frame, and still there";
+  EXPECT_EQ(b.camera->wait(Duration::milliseconds(1500), &frame), DeviceStatus::timeout)
+      << "no pulse, no frame, and still there";
   for (std::uint64_t n = 100; n < 110; ++n) {
     b.simulator->pulse(n);
     ASSERT_EQ(b.take(1).size(), 1U) << n;
@@ -141,7 +142,8 @@ TEST(GigeCamera, stampsAreTheCamerasClockInNanoseconds) {
   b.configure(b.wish());
   b.start();
   for (const Frame& f : b.take(20)) {
-    // One tick is 16 ns; exposed at a multiple of the period of the host's clock, 2 ms before the first packet.
+    // One tick is 16 ns; exposed at a multiple of the period of the host's clock, 2 ms before the
+    // first packet.
     const auto now = static_cast<std::int64_t>(b.simulator->ticks(f.arrival)) * 16;
     const double age_ms = static_cast<double>(now - f.exposure_start.ns()) * 1e-6;
     EXPECT_GE(age_ms, 2.0);
@@ -160,7 +162,8 @@ TEST(GigeCamera, withoutAClockItSaysSoAndStampsByArrival) {
   b.configure(b.wish());
   EXPECT_NE(b.camera->remark().find("no clock"), std::string::npos) << b.camera->remark();
   b.start();
-  for (const Frame& f : b.take(5)) EXPECT_EQ(f.exposure_start, DeviceStamp(f.arrival.ns()) - b.camera->timing().least_delay);
+  for (const Frame& f : b.take(5))
+    EXPECT_EQ(f.exposure_start, DeviceStamp(f.arrival.ns()) - b.camera->timing().least_delay);
 }
 
 TEST(GigeCamera, ptpIsSwitchedOnAndItsStateIsTold) {
@@ -169,7 +172,8 @@ TEST(GigeCamera, ptpIsSwitchedOnAndItsStateIsTold) {
   c.options["ptp"] = "on";
   b.configure(c);
   EXPECT_EQ(b.reg(reg::ptp_enable), 1U);
-  EXPECT_EQ(b.camera->remark().find("PTP"), std::string::npos) << "it is a slave: " << b.camera->remark();
+  EXPECT_EQ(b.camera->remark().find("PTP"), std::string::npos)
+      << "it is a slave: " << b.camera->remark();
   EXPECT_EQ(b.camera->timing().resolution, Duration::nanoseconds(1));
   GigeCameraOptions old;
   old.old_names = true;
@@ -190,12 +194,15 @@ TEST(GigeCamera, packetSizeAndDelayAreComputedForTheLink) {
   EXPECT_EQ(b.reg(0xD08), 1692U);
   c.options["link_mbps"] = "50";
   EXPECT_EQ(b.camera->configure(c, nullptr), DeviceStatus::unsupported);
-  EXPECT_NE(b.camera->complaint().find("2 cameras of 320 x 240 Mono8 at 50 Hz do not fit on lo of 50 Mbit/s"), std::string::npos)
+  EXPECT_NE(b.camera->complaint().find(
+                "2 cameras of 320 x 240 Mono8 at 50 Hz do not fit on lo of 50 Mbit/s"),
+            std::string::npos)
       << b.camera->complaint();
   c.options["packet_size"] = "20000";
   c.options["link_mbps"] = "1000";
   b.configure(c);
-  EXPECT_NE(b.camera->remark().find("packets of 16000 bytes instead of 20000"), std::string::npos) << b.camera->remark();
+  EXPECT_NE(b.camera->remark().find("packets of 16000 bytes instead of 20000"), std::string::npos)
+      << b.camera->remark();
 }
 
 TEST(GigeCamera, widerAndColouredFormatsBecomeGrey) {
@@ -208,7 +215,9 @@ TEST(GigeCamera, widerAndColouredFormatsBecomeGrey) {
   for (const std::string format : {"Mono12", "BayerGB8"}) {
     GigeCameraOptions o;
     o.number_images = false;
-    o.images = [&, format](std::uint64_t) { return format == "Mono12" ? words.data() : mosaic.data(); };
+    o.images = [&, format](std::uint64_t) {
+      return format == "Mono12" ? words.data() : mosaic.data();
+    };
     GigeBench b(o);
     CameraConfiguration c = b.wish();
     c.pixel_format = format;

@@ -6,7 +6,9 @@ namespace {
 namespace reg = gige_register;
 
 /// Longer than the registers say, by another amount each time.
-double longer(std::uint64_t number, double us) { return us + 100.25 + 1.5 * static_cast<double>(number % 7); }
+double longer(std::uint64_t number, double us) {
+  return us + 100.25 + 1.5 * static_cast<double>(number % 7);
+}
 
 GigeCameraOptions with_chunks() {
   GigeCameraOptions o;
@@ -33,7 +35,10 @@ TEST(GigeChunkCamera, everyFrameHadTheExposureThatItsChunkDataSay) {
     bool old_names;
     const char* format;
   };
-  for (const Case& c : {Case{0x4001, false, "Mono8"}, {5, true, "Mono8"}, {4, true, "Mono8"}, {0x4001, false, "Mono12"}}) {
+  for (const Case& c : {Case{0x4001, false, "Mono8"},
+                        {5, true, "Mono8"},
+                        {4, true, "Mono8"},
+                        {0x4001, false, "Mono12"}}) {
     GigeCameraOptions o = with_chunks();
     o.chunk_payload = c.payload;
     o.old_names = c.old_names;
@@ -47,12 +52,15 @@ TEST(GigeChunkCamera, everyFrameHadTheExposureThatItsChunkDataSay) {
     b.start();
     Frame frame;
     for (int i = 0; i < 15; ++i) {
-      ASSERT_EQ(b.camera->wait(Duration::seconds(1), &frame), DeviceStatus::ok) << b.camera->complaint();
+      ASSERT_EQ(b.camera->wait(Duration::seconds(1), &frame), DeviceStatus::ok)
+          << b.camera->complaint();
       EXPECT_EQ(frame.status, FrameStatus::complete);
       if (o.number_images) {
         const std::uint64_t number = b.number(frame);
-        EXPECT_EQ(frame.exposure, Duration::seconds(b.simulator->exposed(number) * 1e-6)) << c.payload;
-        EXPECT_EQ(b.camera->view(frame.slot).at(319, 239), static_cast<std::uint8_t>(31 * number)) << "the pixels are as they were";
+        EXPECT_EQ(frame.exposure, Duration::seconds(b.simulator->exposed(number) * 1e-6))
+            << c.payload;
+        EXPECT_EQ(b.camera->view(frame.slot).at(319, 239), static_cast<std::uint8_t>(31 * number))
+            << "the pixels are as they were";
       } else {  // converted: no number in it
         EXPECT_GE(frame.exposure, Duration::nanoseconds(2'100'250));
         EXPECT_LE(frame.exposure, Duration::nanoseconds(2'109'250));
@@ -69,7 +77,8 @@ TEST(GigeChunkCamera, aChangeWhileItStreamsIsSeenInTheFramesThatHaveIt) {
   b.start();
   for (const int ms : {3, 5, 2, 7, 4, 6}) {
     const std::size_t before = b.numbers.size();
-    ASSERT_EQ(b.camera->set_exposure({Duration::milliseconds(ms), 0}, nullptr), DeviceStatus::ok) << b.camera->complaint();
+    ASSERT_EQ(b.camera->set_exposure({Duration::milliseconds(ms), 0}, nullptr), DeviceStatus::ok)
+        << b.camera->complaint();
     const auto frames = b.take(8);
     ASSERT_EQ(frames.size(), 8U);
     expect_told(b, frames, before);
@@ -88,9 +97,11 @@ TEST(GigeChunkCamera, stampsOfTheEndGoBackByTheExposureThatWas) {
   ASSERT_EQ(b.numbers.size(), frames.size());
   for (std::size_t i = 0; i < frames.size(); ++i) {
     // Image n is exposed at n periods of 20 ms; a tick is 8 ns.
-    const auto ticks = b.simulator->ticks(HostStamp(static_cast<std::int64_t>(b.numbers[i]) * 20'000'000));
+    const auto ticks =
+        b.simulator->ticks(HostStamp(static_cast<std::int64_t>(b.numbers[i]) * 20'000'000));
     const Duration exposure = Duration::seconds(b.simulator->exposed(b.numbers[i]) * 1e-6);
-    EXPECT_EQ(frames[i].exposure_start, DeviceStamp(static_cast<std::int64_t>(ticks) * 8) - exposure);
+    EXPECT_EQ(frames[i].exposure_start,
+              DeviceStamp(static_cast<std::int64_t>(ticks) * 8) - exposure);
   }
 }
 
@@ -127,13 +138,15 @@ TEST(GigeChunkCamera, nonsenseInThemIsCountedAndTheFrameIsComplete) {
   int reckoned = 0;
   for (std::size_t i = 0; i < frames.size(); ++i) {
     EXPECT_EQ(frames[i].status, FrameStatus::complete);
-    const bool told = frames[i].exposure == Duration::seconds(b.simulator->exposed(b.numbers[before + i]) * 1e-6);
+    const bool told =
+        frames[i].exposure == Duration::seconds(b.simulator->exposed(b.numbers[before + i]) * 1e-6);
     if (told) continue;
     ++reckoned;
     EXPECT_EQ(frames[i].exposure, Duration::milliseconds(2));
   }
   EXPECT_EQ(reckoned, 5);
-  EXPECT_NE(b.camera->remark().find("5 images came without their exposure"), std::string::npos) << b.camera->remark();
+  EXPECT_NE(b.camera->remark().find("5 images came without their exposure"), std::string::npos)
+      << b.camera->remark();
 }
 
 TEST(GigeChunkCamera, aTornFrameTellsNothingAndIsNoFaultOfItsChunks) {
@@ -169,7 +182,8 @@ TEST(GigeChunkCamera, imagesOfAnotherSizeAreNeverComplete) {
       b.simulator->lie_about_size(width, height);
       (void)b.take(20);
       const std::size_t whole = b.numbers.size();
-      EXPECT_LE(whole, 5U) << payload << ": " << width << " x " << height << " after image " << before;
+      EXPECT_LE(whole, 5U) << payload << ": " << width << " x " << height << " after image "
+                           << before;
     }
   }
 }

@@ -18,7 +18,8 @@ constexpr ChunkField kDouble{kId, 0, 8, true, true};
 
 Bytes big(std::uint64_t value, std::size_t length) {
   Bytes b(length);
-  for (std::size_t i = 0; i < length; ++i) b[i] = static_cast<std::uint8_t>(value >> (8 * (length - 1 - i)));
+  for (std::size_t i = 0; i < length; ++i)
+    b[i] = static_cast<std::uint8_t>(value >> (8 * (length - 1 - i)));
   return b;
 }
 Bytes little(std::uint64_t value, std::size_t length) {
@@ -33,7 +34,9 @@ void append(Bytes* tail, std::uint32_t id, const Bytes& data, std::uint32_t leng
     tail->insert(tail->end(), b.begin(), b.end());
   }
 }
-void append(Bytes* tail, std::uint32_t id, const Bytes& data) { append(tail, id, data, static_cast<std::uint32_t>(data.size())); }
+void append(Bytes* tail, std::uint32_t id, const Bytes& data) {
+  append(tail, id, data, static_cast<std::uint32_t>(data.size()));
+}
 /// What is behind the pixels: their tag, then chunks.
 Bytes image_tag() {
   Bytes tail;
@@ -62,7 +65,8 @@ TEST(GigeChunks, numbersAreReadInEveryFormTheyMayHave) {
     append(&tail, 7, Bytes(24, 0xEE));
     append(&tail, kId, c.data);
     append(&tail, 8, Bytes(3, 0xEE));
-    EXPECT_EQ(exposure_in_chunks(tail, c.field), Duration::microseconds(4321)) << c.field.length << " at " << c.field.offset;
+    EXPECT_EQ(exposure_in_chunks(tail, c.field), Duration::microseconds(4321))
+        << c.field.length << " at " << c.field.offset;
   }
 }
 
@@ -82,7 +86,8 @@ TEST(GigeChunks, whatIsNotThereIsNothing) {
 }
 
 TEST(GigeChunks, onlyTimesThatAnExposureMayTakeAreTaken) {
-  for (const double us : {0.0, -1.0, 6.1e7, 1e300, std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity()}) {
+  for (const double us : {0.0, -1.0, 6.1e7, 1e300, std::numeric_limits<double>::quiet_NaN(),
+                          std::numeric_limits<double>::infinity()}) {
     Bytes tail = image_tag();
     append(&tail, kId, big(bits(us), 8));
     EXPECT_FALSE(exposure_in_chunks(tail, kDouble)) << us;
@@ -106,7 +111,9 @@ TEST(GigeChunks, noBytesLeadOutsideOfThem) {
   append(&whole, 8, Bytes(16, 2));
   for (int i = 0; i < 20'000; ++i) {
     // An allocation of exactly this size: the sanitizer sees the first byte beyond.
-    Bytes tail(whole.begin(), whole.begin() + static_cast<std::ptrdiff_t>(random.uniform() * static_cast<double>(whole.size() + 1)));
+    Bytes tail(whole.begin(),
+               whole.begin() + static_cast<std::ptrdiff_t>(random.uniform() *
+                                                           static_cast<double>(whole.size() + 1)));
     for (int k = 0; k < i % 4 && !tail.empty(); ++k)
       tail[static_cast<std::size_t>(random.uniform() * static_cast<double>(tail.size()))] =
           static_cast<std::uint8_t>(random.uniform() * 256);

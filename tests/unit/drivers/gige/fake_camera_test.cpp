@@ -9,10 +9,12 @@
 namespace vergence {
 namespace {
 
-/// Aravis's own simulated camera, of which nothing here is by the same hand as the driver: older names, no resend, no test packet.
+/// Aravis's own simulated camera, of which nothing here is by the same hand as the driver: older
+/// names, no resend, no test packet.
 TEST(GigeFakeCamera, isConfiguredAndStreams) {
   const gige::Object<ArvGvFakeCamera> fake(arv_gv_fake_camera_new("127.0.0.1", "FAKE-1"));
-  if (fake == nullptr || arv_gv_fake_camera_is_running(fake.get()) == FALSE) GTEST_SKIP() << "127.0.0.1 port 3956 is in use";
+  if (fake == nullptr || arv_gv_fake_camera_is_running(fake.get()) == FALSE)
+    GTEST_SKIP() << "127.0.0.1 port 3956 is in use";
   DeviceStatus status = DeviceStatus::ok;
   const auto driver = gige::make_driver();
   const auto camera = driver->open("127.0.0.1", &status);
@@ -23,7 +25,8 @@ TEST(GigeFakeCamera, isConfiguredAndStreams) {
   ASSERT_EQ(camera->start(nullptr), DeviceStatus::ok) << camera->complaint();
   Frame frame;
   for (std::uint64_t n = 0; n < 150; ++n) {  // its ids wrap after 135
-    ASSERT_EQ(camera->wait(Duration::seconds(2), &frame), DeviceStatus::ok) << n << camera->complaint();
+    ASSERT_EQ(camera->wait(Duration::seconds(2), &frame), DeviceStatus::ok)
+        << n << camera->complaint();
     EXPECT_EQ(frame.status, FrameStatus::complete);
     EXPECT_EQ(frame.counter, n);
     camera->release(frame.slot);

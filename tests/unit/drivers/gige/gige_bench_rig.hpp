@@ -33,9 +33,16 @@ struct GigeBench {
   }
 
   [[nodiscard]] CameraConfiguration wish() const {
-    return {simulator->options().sensor_width, simulator->options().sensor_height, 50, Duration::milliseconds(2), 0, CameraTrigger::free};
+    return {simulator->options().sensor_width,
+            simulator->options().sensor_height,
+            50,
+            Duration::milliseconds(2),
+            0,
+            CameraTrigger::free};
   }
-  void configure(const CameraConfiguration& c) { ASSERT_EQ(camera->configure(c, nullptr), DeviceStatus::ok) << camera->complaint(); }
+  void configure(const CameraConfiguration& c) {
+    ASSERT_EQ(camera->configure(c, nullptr), DeviceStatus::ok) << camera->complaint();
+  }
   void start() { ASSERT_EQ(camera->start(nullptr), DeviceStatus::ok) << camera->complaint(); }
 
   /// What comes until `count` complete frames came, or a second nothing; all slots given back.
@@ -55,7 +62,8 @@ struct GigeBench {
   std::vector<Frame> drain() {
     simulator->silence(true);
     std::vector<Frame> frames;
-    for (Frame frame; camera->wait(Duration::milliseconds(400), &frame) == DeviceStatus::ok; frames.push_back(frame)) {
+    for (Frame frame; camera->wait(Duration::milliseconds(400), &frame) == DeviceStatus::ok;
+         frames.push_back(frame)) {
       if (frame.status == FrameStatus::complete) numbers.push_back(number(frame));
       camera->release(frame.slot);
     }

@@ -6,7 +6,8 @@
 namespace vergence::test {
 namespace {
 
-/// Counters of a run against what the simulator did. The counters since start(), the report since the simulator's beginning.
+/// Counters of a run against what the simulator did. The counters since start(), the report since
+/// the simulator's beginning.
 void expect_equal_accounts(const GigeBench& b, std::size_t taken) {
   const GigeCameraReport r = b.simulator->report();
   const CameraStatistics s = b.camera->statistics();
@@ -45,7 +46,9 @@ TEST(GigeLoss, brokenFramesAreTornAndTheNextOnesWhole) {
     std::size_t taken = b.take(5).size();
     b.simulator->tear_frames(4);
     const auto frames = b.take(15);
-    EXPECT_EQ(std::count_if(frames.begin(), frames.end(), [](const Frame& f) { return f.status == FrameStatus::torn; }), 4);
+    EXPECT_EQ(std::count_if(frames.begin(), frames.end(),
+                            [](const Frame& f) { return f.status == FrameStatus::torn; }),
+              4);
     taken += frames.size() + b.drain().size();
     EXPECT_EQ(b.camera->statistics().lost, 0U);
     expect_equal_accounts(b, taken);
@@ -106,13 +109,15 @@ TEST(GigeLoss, lateHalvesComeInTimeOrAreTorn) {
   b.configure(c);
   b.start();
   (void)b.take(5);
-  b.simulator->delay_frames(3, Duration::milliseconds(60));  // three periods: after frames that came whole
+  b.simulator->delay_frames(
+      3, Duration::milliseconds(60));  // three periods: after frames that came whole
   const auto frames = b.take(20);
   (void)b.drain();
   const CameraStatistics s = b.camera->statistics();
   EXPECT_EQ(s.torn + s.lost, 3U);
   EXPECT_EQ(b.numbers.size() + 3, b.simulator->report().exposed);
-  EXPECT_TRUE(std::is_sorted(frames.begin(), frames.end(), [](const Frame& x, const Frame& y) { return x.counter < y.counter; }));
+  EXPECT_TRUE(std::is_sorted(frames.begin(), frames.end(),
+                             [](const Frame& x, const Frame& y) { return x.counter < y.counter; }));
 }
 
 TEST(GigeLoss, idsWrapAndWideIdsCountOn) {
@@ -125,7 +130,8 @@ TEST(GigeLoss, idsWrapAndWideIdsCountOn) {
     b.start();
     const auto frames = b.take(40);
     ASSERT_EQ(frames.size(), 40U);
-    for (std::size_t i = 0; i < frames.size(); ++i) EXPECT_EQ(frames[i].counter, i) << (wide ? "64-bit" : "16-bit");
+    for (std::size_t i = 0; i < frames.size(); ++i)
+      EXPECT_EQ(frames[i].counter, i) << (wide ? "64-bit" : "16-bit");
     EXPECT_EQ(b.camera->statistics().lost, 0U);
   }
 }

@@ -66,15 +66,19 @@ TEST(GigeLink, theDelayLeavesRoomForTheOtherCameras) {
   // (2 − 1) · (1500 + 38) · 8 / 10⁹ = 12.304 µs, and 10 % more.
   EXPECT_NEAR(plan_link(two, 1500, kGigabit, kComputed).delay.to_seconds(), 13.53e-6, 1e-8);
   EXPECT_NEAR(plan_link(two, 9000, kGigabit, kComputed).delay.to_seconds(), 79.53e-6, 1e-8);
-  EXPECT_EQ(plan_link({1280 * 960, 30, 1, false}, 1500, kGigabit, kComputed).delay, Duration{}) << "alone on its link";
+  EXPECT_EQ(plan_link({1280 * 960, 30, 1, false}, 1500, kGigabit, kComputed).delay, Duration{})
+      << "alone on its link";
   EXPECT_EQ(plan_link(two, 1500, 0, kComputed).delay, Duration{}) << "the loopback has no speed";
-  EXPECT_EQ(plan_link(two, 1500, kGigabit, Duration::microseconds(5)).delay, Duration::microseconds(5));
+  EXPECT_EQ(plan_link(two, 1500, kGigabit, Duration::microseconds(5)).delay,
+            Duration::microseconds(5));
 }
 
 TEST(GigeLink, aGigabitCarriesTwoCamerasOf1280By960At30HzAndNotAt45) {
   for (const int size : {1500, 9000}) {
-    EXPECT_LT(plan_link({1280 * 960, 30, 2, false}, size, kGigabit, kComputed).share, kMostOfPeriod) << size;
-    EXPECT_GT(plan_link({1280 * 960, 45, 2, false}, size, kGigabit, kComputed).share, kMostOfPeriod) << size;
+    EXPECT_LT(plan_link({1280 * 960, 30, 2, false}, size, kGigabit, kComputed).share, kMostOfPeriod)
+        << size;
+    EXPECT_GT(plan_link({1280 * 960, 45, 2, false}, size, kGigabit, kComputed).share, kMostOfPeriod)
+        << size;
     const double most = highest_rate({1280 * 960, 45, 2, false}, size, kGigabit);
     EXPECT_GT(most, 38) << size;
     EXPECT_LT(most, 45) << size;
@@ -162,7 +166,8 @@ TEST(GigeOptions, thePageHasEveryRowAsItStands) {
   for (std::string line; std::getline(page, line);) lines.insert(line);
   for (const OptionRow& r : option_rows()) {
     const std::string fallback = *r.fallback == '\0' ? "–" : r.fallback;
-    const std::string line = std::string("| `") + r.name + "` | " + r.values + " | " + fallback + " | " + r.meaning + " |";
+    const std::string line = std::string("| `") + r.name + "` | " + r.values + " | " + fallback +
+                             " | " + r.meaning + " |";
     EXPECT_TRUE(lines.contains(line)) << line;
   }
 }
@@ -176,7 +181,8 @@ TEST(GigeGrey, theCheapestFormatIsTaken) {
 }
 
 TEST(GigeGrey, wordsKeepTheirHighestEightBits) {
-  const std::vector<std::uint8_t> words{0xFF, 0x0F, 0x10, 0x00, 0x00, 0x08, 0xEF, 0x0A};  // 4095, 16, 2048, 2799
+  const std::vector<std::uint8_t> words{0xFF, 0x0F, 0x10, 0x00,
+                                        0x00, 0x08, 0xEF, 0x0A};  // 4095, 16, 2048, 2799
   std::vector<std::uint8_t> out(2 * 64, 7);
   to_grey(*choose_format({"Mono12"}, ""), words.data(), 2, 2, out.data(), 64);
   EXPECT_EQ(out[0], 255);
@@ -187,11 +193,13 @@ TEST(GigeGrey, wordsKeepTheirHighestEightBits) {
 }
 
 TEST(GigeGrey, aMosaicOfOneColourHasNoGrid) {
-  // Red 200, green 100, blue 40 everywhere: (200 + 2 · 100 + 40) / 4 at every pixel, the border too.
+  // Red 200, green 100, blue 40 everywhere: (200 + 2 · 100 + 40) / 4 at every pixel, the border
+  // too.
   constexpr int kW = 10, kH = 8;
   std::vector<std::uint8_t> mosaic(kW * kH), out(kW * kH);
   for (int y = 0; y < kH; ++y)
-    for (int x = 0; x < kW; ++x) mosaic[static_cast<std::size_t>(y * kW + x)] = (x + y) % 2 == 1 ? 100 : y % 2 == 0 ? 200 : 40;
+    for (int x = 0; x < kW; ++x)
+      mosaic[static_cast<std::size_t>(y * kW + x)] = (x + y) % 2 == 1 ? 100 : y % 2 == 0 ? 200 : 40;
   to_grey(*choose_format({"BayerRG8"}, ""), mosaic.data(), kW, kH, out.data(), kW);
   for (const std::uint8_t v : out) EXPECT_EQ(v, 110);
 }
@@ -237,7 +245,8 @@ TEST(GigeHandover, aNewBeginningKeepsOnlyWhatTheConsumerHolds) {
   ASSERT_EQ(h.wait(Duration{}, &frame), DeviceStatus::ok);  // 1, given back
   h.release(1);
   h.end();
-  EXPECT_EQ(h.wait(Duration{}, &frame), DeviceStatus::stopped) << "2 and 3 are of the stream before";
+  EXPECT_EQ(h.wait(Duration{}, &frame), DeviceStatus::stopped)
+      << "2 and 3 are of the stream before";
   EXPECT_FALSE(h.offer(frame));
   h.begin(nullptr);
   EXPECT_EQ(h.wait(Duration{}, &frame), DeviceStatus::timeout);

@@ -9,7 +9,9 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-double seconds_since(Clock::time_point begin) { return std::chrono::duration<double>(Clock::now() - begin).count(); }
+double seconds_since(Clock::time_point begin) {
+  return std::chrono::duration<double>(Clock::now() - begin).count();
+}
 
 /// Waits for `gone`, releasing what comes; false: not within the limit.
 bool goes(GigeBench* b, double limit_s) {
@@ -48,7 +50,8 @@ TEST(GigeTrouble, camerasAreFoundByBroadcastAndOpenedBySerial) {
     EXPECT_EQ(d.place, o.address);
     EXPECT_EQ(d.model, "Vergence Simulator");
   }
-  if (!found) GTEST_SKIP() << "broadcasts do not come through here; cameras are opened by their address";
+  if (!found)
+    GTEST_SKIP() << "broadcasts do not come through here; cameras are opened by their address";
   DeviceStatus status = DeviceStatus::failed;
   EXPECT_NE(driver->open(o.serial, &status), nullptr) << to_string(status);
   EXPECT_EQ(status, DeviceStatus::ok);
@@ -75,7 +78,8 @@ TEST(GigeTrouble, aCameraThatSendsNothingIsGoneWithASentenceAndComesBack) {
   EXPECT_EQ(b.take(3).size(), 3U);
   b.simulator->silence(true);
   ASSERT_TRUE(goes(&b, 6));
-  EXPECT_NE(b.camera->complaint().find("sends no images"), std::string::npos) << b.camera->complaint();
+  EXPECT_NE(b.camera->complaint().find("sends no images"), std::string::npos)
+      << b.camera->complaint();
   b.simulator->silence(false);
   const auto begin = Clock::now();
   DeviceStatus status = DeviceStatus::gone;
@@ -99,7 +103,8 @@ TEST(GigeTrouble, anotherSizeThanConfiguredIsToldAndNeverComplete) {
     ASSERT_TRUE(goes(&b, 6)) << width;
     const CameraStatistics s = b.camera->statistics();
     EXPECT_LE(s.delivered - s.torn, whole + 5) << "what was on its way before";
-    EXPECT_NE(b.camera->complaint().find(std::to_string(width) + " x " + std::to_string(height)), std::string::npos)
+    EXPECT_NE(b.camera->complaint().find(std::to_string(width) + " x " + std::to_string(height)),
+              std::string::npos)
         << b.camera->complaint();
   }
 }
@@ -132,7 +137,8 @@ void allow_raw_sockets(bool allowed) {
   __user_cap_data_struct data[2]{};
   ASSERT_EQ(::syscall(SYS_capget, &header, data), 0);
   constexpr unsigned kBit = 1U << CAP_NET_RAW;
-  data[0].effective = allowed ? data[0].effective | (data[0].permitted & kBit) : data[0].effective & ~kBit;
+  data[0].effective =
+      allowed ? data[0].effective | (data[0].permitted & kBit) : data[0].effective & ~kBit;
   ASSERT_EQ(::syscall(SYS_capset, &header, data), 0);
 }
 

@@ -27,7 +27,9 @@ TEST(IidcCamera, FramesCarryCounterStampArrivalAndTheirPixels) {
     EXPECT_EQ(f.exposure, c.actual.exposure);
     // The camera stamps the end of its exposure, in ticks of 41 ns, and its clock wraps at 128 s.
     EXPECT_NEAR(static_cast<double>(f.exposure_start.ns()),
-                static_cast<double>((c.bus->camera_now() % iidc::kCycleTimeWrapNs) - c.actual.exposure.ns()), 50);
+                static_cast<double>((c.bus->camera_now() % iidc::kCycleTimeWrapNs) -
+                                    c.actual.exposure.ns()),
+                50);
     EXPECT_EQ(f.arrival, c.bus->now() + Duration::milliseconds(5));
     const ImageView view = c.camera->view(f.slot);
     EXPECT_EQ(view.width, 640);
@@ -65,7 +67,8 @@ TEST(IidcCamera, LostExposuresAreCountedWhenALaterOneComes) {
   std::vector<std::uint64_t> counters;
   for (int i = 0; i < 5; ++i) counters.push_back(c.take_and_release().counter);
   EXPECT_EQ(counters, (std::vector<std::uint64_t>{0, 1, 5, 6, 7}));
-  EXPECT_EQ(c.camera->statistics().lost, 3U);  // what came before the first or after the last is not known
+  EXPECT_EQ(c.camera->statistics().lost,
+            3U);  // what came before the first or after the last is not known
 }
 
 TEST(IidcCamera, SlotsComeBackInAnyOrderAndTheNewestIsDroppedWithoutOne) {
@@ -98,8 +101,10 @@ TEST(IidcCamera, AFrameShortOfBytesIsTornAndKeepsItsNumber) {
   c.start();
   c.bus->expose(1);
   c.bus->expose_tampered([](auto*, std::size_t* bytes) { *bytes -= 512; });
-  c.bus->expose_tampered([](auto*, std::size_t* bytes) { *bytes = 0; });  // the empty packet that ends a frame
-  c.bus->expose_tampered([](auto*, std::size_t* bytes) { *bytes = 4; });  // nothing to tell its number from
+  c.bus->expose_tampered(
+      [](auto*, std::size_t* bytes) { *bytes = 0; });  // the empty packet that ends a frame
+  c.bus->expose_tampered(
+      [](auto*, std::size_t* bytes) { *bytes = 4; });  // nothing to tell its number from
   c.bus->expose(1);
   EXPECT_EQ(c.take_and_release().counter, 0U);
   const Frame torn = c.take_and_release();
@@ -119,7 +124,8 @@ TEST(IidcCamera, ALostPacketIsFoundByTheNextFramesStampInTheImage) {
     c.configure(wanted);
     ASSERT_EQ(c.camera->start(nullptr), DeviceStatus::ok);
     c.bus->expose(1);
-    // The receiver fills up with the beginning of the next frame and waits for the start of the one after that.
+    // The receiver fills up with the beginning of the next frame and waits for the start of the one
+    // after that.
     const std::size_t packet = c.bus->shape().packet_bytes, frame = c.bus->shape().frame_bytes;
     std::vector<std::uint8_t> first;
     c.bus->expose_tampered([&](std::vector<std::uint8_t>* image, std::size_t* bytes) {
@@ -189,10 +195,12 @@ TEST(IidcCamera, ARestartCountsFromZeroAndForgetsWhatWasUnderWay) {
   EXPECT_FALSE(c.bus->model().transmitting);
   Frame f;
   EXPECT_EQ(c.camera->wait(Duration::milliseconds(1), &f), DeviceStatus::stopped);
-  EXPECT_EQ(c.camera->configure(CameraUnderTest::usual(), nullptr), DeviceStatus::busy) << "an image is held";
+  EXPECT_EQ(c.camera->configure(CameraUnderTest::usual(), nullptr), DeviceStatus::busy)
+      << "an image is held";
   EXPECT_EQ(c.camera->view(held.slot).at(0, 1), 1) << "still there";
   ASSERT_EQ(c.camera->start(nullptr), DeviceStatus::ok);
-  EXPECT_EQ(c.camera->configure(CameraUnderTest::usual(), nullptr), DeviceStatus::busy) << "streaming";
+  EXPECT_EQ(c.camera->configure(CameraUnderTest::usual(), nullptr), DeviceStatus::busy)
+      << "streaming";
   c.bus->expose(1);
   EXPECT_EQ(c.take_and_release().counter, 0U);
   c.camera->release(held.slot);
@@ -209,7 +217,8 @@ TEST(IidcCamera, TheSoftwareTriggerFiresOnceACall) {
   ASSERT_EQ(c.camera->start(nullptr), DeviceStatus::ok);
   EXPECT_EQ(c.camera->trigger_once(), DeviceStatus::ok);
   EXPECT_EQ(c.bus->model().software_triggers, 1U);
-  EXPECT_EQ(iidc::TriggerMode::of(c.bus->command(iidc::reg::kTriggerMode)).source, iidc::kTriggerSourceSoftware);
+  EXPECT_EQ(iidc::TriggerMode::of(c.bus->command(iidc::reg::kTriggerMode)).source,
+            iidc::kTriggerSourceSoftware);
   CameraUnderTest free;
   free.start();
   EXPECT_EQ(free.camera->trigger_once(), DeviceStatus::unsupported);
@@ -234,7 +243,8 @@ TEST(IidcCamera, TimingIsExposureAndTheWay) {
   bus.configure();
   EXPECT_GT(usb.camera->timing().least_delay, usb.actual.exposure);
   // 75 packets of 4096 bytes, one in each cycle of 125 us.
-  EXPECT_EQ(bus.camera->timing().least_delay, bus.actual.exposure + Duration::microseconds(75 * 125));
+  EXPECT_EQ(bus.camera->timing().least_delay,
+            bus.actual.exposure + Duration::microseconds(75 * 125));
   EXPECT_LT(usb.camera->timing().resolution, Duration::microseconds(1));
 }
 

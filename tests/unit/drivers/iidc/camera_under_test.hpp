@@ -21,7 +21,9 @@ struct CameraUnderTest {
     camera = std::make_unique<iidc::IidcCamera>(std::move(made), rom, nullptr, kPatience);
   }
   /// 640 x 480 at 10 Hz of its own, 5 ms.
-  [[nodiscard]] static CameraConfiguration usual() { return {640, 480, 10, Duration::milliseconds(5), 0, CameraTrigger::free}; }
+  [[nodiscard]] static CameraConfiguration usual() {
+    return {640, 480, 10, Duration::milliseconds(5), 0, CameraTrigger::free};
+  }
 
   void configure(const CameraConfiguration& c = usual()) {
     ASSERT_EQ(camera->configure(c, &actual), DeviceStatus::ok) << camera->complaint();

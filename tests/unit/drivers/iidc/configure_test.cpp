@@ -8,7 +8,8 @@ namespace {
 using namespace iidc;
 
 void expect_says(const std::string& sentence, std::initializer_list<const char*> parts) {
-  for (const char* part : parts) EXPECT_NE(sentence.find(part), std::string::npos) << '"' << part << "\" in: " << sentence;
+  for (const char* part : parts)
+    EXPECT_NE(sentence.find(part), std::string::npos) << '"' << part << "\" in: " << sentence;
 }
 
 TEST(IidcConfigure, AFixedModeIsTakenWhereSizeAndRateAreItsOwn) {
@@ -64,13 +65,15 @@ TEST(IidcConfigure, APacketIsTheCamerasShareOfTheBus) {
     CameraConfiguration wanted = CameraUnderTest::usual();
     wanted.sharing = cameras;
     bus.configure(wanted);
-    const std::size_t packet = bus.bus->shape().packet_bytes, share = kBandwidthUnits / static_cast<unsigned>(cameras);
+    const std::size_t packet = bus.bus->shape().packet_bytes,
+                      share = kBandwidthUnits / static_cast<unsigned>(cameras);
     EXPECT_LE(bandwidth_units(packet, BusSpeed::s400), share);
     if (packet < 4096) {
       EXPECT_GT(bandwidth_units(packet + 4, BusSpeed::s400), share);
     }
     usb.configure(wanted);
-    EXPECT_LE(static_cast<double>(usb.bus->shape().packet_bytes) * kCyclesPerSecond * cameras, 33e6);
+    EXPECT_LE(static_cast<double>(usb.bus->shape().packet_bytes) * kCyclesPerSecond * cameras,
+              33e6);
   }
   CameraConfiguration wanted = CameraUnderTest::usual();
   wanted.options["packet_bytes"] = "1024";
@@ -145,8 +148,10 @@ TEST(IidcConfigure, StrobeAndTriggerOptionsReachTheirRegisters) {
   CameraUnderTest c;
   CameraConfiguration wanted = CameraUnderTest::usual();
   wanted.trigger = CameraTrigger::hardware;
-  wanted.options = {{"strobe_pin", "2"},         {"strobe_delay_us", "1000"}, {"strobe_duration_us", "2000"}, {"strobe_level", "low"},
-                    {"trigger_edge", "falling"}, {"trigger_source", "1"},     {"trigger_mode", "0"}};
+  wanted.options = {
+      {"strobe_pin", "2"},     {"strobe_delay_us", "1000"}, {"strobe_duration_us", "2000"},
+      {"strobe_level", "low"}, {"trigger_edge", "falling"}, {"trigger_source", "1"},
+      {"trigger_mode", "0"}};
   c.configure(wanted);
   const StrobeControl s = StrobeControl::of(c.bus->model().strobe[2]);
   EXPECT_TRUE(s.on);
@@ -203,24 +208,35 @@ TEST(IidcConfigure, WhatCannotBeSaysWhatTheCameraOffers) {
   };
   EXPECT_EQ(c.refuse(with([](auto& w) { w.width = 641; }), &said), DeviceStatus::unsupported);
   expect_says(said, {"641 x 480", "640 x 480 Mono8 at", "1280 x 960 in steps of 8 x 2"});
-  EXPECT_EQ(c.refuse(with([](auto& w) { w.width = 1280, w.height = 960, w.rate_hz = 30; }), &said), DeviceStatus::unsupported);
+  EXPECT_EQ(c.refuse(with([](auto& w) { w.width = 1280, w.height = 960, w.rate_hz = 30; }), &said),
+            DeviceStatus::unsupported);
   expect_says(said, {"packets of 4096 bytes", "26.58 Hz"});  // S400
-  EXPECT_EQ(c.refuse(with([](auto& w) { w.exposure = Duration::microseconds(3); }), &said), DeviceStatus::unsupported);
+  EXPECT_EQ(c.refuse(with([](auto& w) { w.exposure = Duration::microseconds(3); }), &said),
+            DeviceStatus::unsupported);
   expect_says(said, {"3 us", "10 to 100000 us"});
   EXPECT_EQ(c.refuse(with([](auto& w) { w.gain_db = 30; }), &said), DeviceStatus::unsupported);
   expect_says(said, {"30 dB", "0 to 24 dB"});
-  EXPECT_EQ(c.refuse(with([](auto& w) { w.pixel_format = "RGB8"; }), &said), DeviceStatus::unsupported);
+  EXPECT_EQ(c.refuse(with([](auto& w) { w.pixel_format = "RGB8"; }), &said),
+            DeviceStatus::unsupported);
   expect_says(said, {"RGB8", "Mono8 Mono16 Raw8"});
-  EXPECT_EQ(c.refuse(with([](auto& w) { w.trigger = CameraTrigger::hardware, w.options["trigger_source"] = "3"; }), &said),
+  EXPECT_EQ(c.refuse(with([](auto& w) {
+                       w.trigger = CameraTrigger::hardware, w.options["trigger_source"] = "3";
+                     }),
+                     &said),
             DeviceStatus::unsupported);
   expect_says(said, {"input 3", "inputs 0 1", "software", "modes 0 14 15"});
-  EXPECT_EQ(c.refuse(with([](auto& w) { w.options["shutter_mode"] = "x"; }), &said), DeviceStatus::unsupported);
+  EXPECT_EQ(c.refuse(with([](auto& w) { w.options["shutter_mode"] = "x"; }), &said),
+            DeviceStatus::unsupported);
   expect_says(said, {"shutter_mode", "packet_bytes", "trigger_mode"});
-  EXPECT_EQ(c.refuse(with([](auto& w) { w.options["packet_bytes"] = "1022"; }), &said), DeviceStatus::bad_configuration);
+  EXPECT_EQ(c.refuse(with([](auto& w) { w.options["packet_bytes"] = "1022"; }), &said),
+            DeviceStatus::bad_configuration);
   expect_says(said, {"1022", "multiple of 4"});
-  EXPECT_EQ(c.refuse(with([](auto& w) { w.options["packet_bytes"] = "256", w.rate_hz = 25; }), &said), DeviceStatus::unsupported);
+  EXPECT_EQ(
+      c.refuse(with([](auto& w) { w.options["packet_bytes"] = "256", w.rate_hz = 25; }), &said),
+      DeviceStatus::unsupported);
   expect_says(said, {"packets of 256 bytes"});
-  EXPECT_EQ(c.refuse(with([](auto& w) { w.exposure = Duration::milliseconds(150); }), &said), DeviceStatus::bad_configuration);
+  EXPECT_EQ(c.refuse(with([](auto& w) { w.exposure = Duration::milliseconds(150); }), &said),
+            DeviceStatus::bad_configuration);
   expect_says(said, {"150000 us", "10 Hz"});
 }
 

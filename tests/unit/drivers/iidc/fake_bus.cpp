@@ -33,7 +33,8 @@ DeviceStatus FakeBus::read(std::uint64_t address, std::uint32_t* value) noexcept
   const std::lock_guard lock(mutex_);
   if (!plugged_) return DeviceStatus::gone;
   if (all_accesses != DeviceStatus::ok) return all_accesses;
-  if (refused.contains(address) || iidc_read(&model_, address, value) != 0) return DeviceStatus::unsupported;
+  if (refused.contains(address) || iidc_read(&model_, address, value) != 0)
+    return DeviceStatus::unsupported;
   if (const auto it = stuck.find(address); it != stuck.end()) *value |= it->second;
   if (const auto it = masked.find(address); it != masked.end()) *value &= it->second;
   return DeviceStatus::ok;
@@ -44,7 +45,9 @@ DeviceStatus FakeBus::write(std::uint64_t address, std::uint32_t value) noexcept
   if (!plugged_) return DeviceStatus::gone;
   if (all_accesses != DeviceStatus::ok) return all_accesses;
   written.emplace_back(address, value);
-  return refused.contains(address) || iidc_write(&model_, address, value) != 0 ? DeviceStatus::unsupported : DeviceStatus::ok;
+  return refused.contains(address) || iidc_write(&model_, address, value) != 0
+             ? DeviceStatus::unsupported
+             : DeviceStatus::ok;
 }
 
 DeviceStatus FakeBus::allocate(const iidc::StreamShape& shape) noexcept {
@@ -89,13 +92,15 @@ void FakeBus::replug() {
 
 std::vector<std::uint8_t> FakeBus::draw(std::int64_t end_of_exposure) {
   std::vector<std::uint8_t> image(std::max(iidc_frame_bytes(&model_), shape_.frame_bytes));
-  iidc_draw(&model_, image.data(), static_cast<std::uint64_t>(end_of_exposure), CycleTime::at(end_of_exposure).quadlet());
+  iidc_draw(&model_, image.data(), static_cast<std::uint64_t>(end_of_exposure),
+            CycleTime::at(end_of_exposure).quadlet());
   return image;
 }
 
 void FakeBus::deliver(const std::vector<std::uint8_t>& image, std::size_t bytes, HostStamp at) {
   if (sink_ == nullptr) return;
-  // As the real buses: a free buffer must be there to replace a full one; one is always on the wire.
+  // As the real buses: a free buffer must be there to replace a full one; one is always on the
+  // wire.
   const auto filling = memory_.acquire();
   if (!filling) return;
   const auto next = memory_.acquire();
@@ -136,10 +141,12 @@ void FakeBus::work() {
       const std::lock_guard lock(mutex_);
       const auto ns = static_cast<std::uint64_t>(host.ns());
       // A pulse every 20 ms for those that wait for one.
-      const std::uint64_t edge = ns / 20'000'000 != (ns - 1'100'000) / 20'000'000 ? ns / 20'000'000 * 20'000'000 : 0;
+      const std::uint64_t edge =
+          ns / 20'000'000 != (ns - 1'100'000) / 20'000'000 ? ns / 20'000'000 * 20'000'000 : 0;
       std::uint64_t begin = 0;
       if (!iidc_next_frame(&model_, &sensor_, ns, edge, &begin)) continue;
-      image = draw(static_cast<std::int64_t>(begin + static_cast<std::uint64_t>(static_cast<double>(model_.shutter_abs) * 1e9)));
+      image = draw(static_cast<std::int64_t>(
+          begin + static_cast<std::uint64_t>(static_cast<double>(model_.shutter_abs) * 1e9)));
     }
     if (lose_ > 0) {
       --lose_;

@@ -22,8 +22,9 @@ namespace vergence::test {
 
 /// The register model behind a bus that is nothing but function calls.
 ///
-/// Exposures are made by expose() on the caller's thread, which then is the stream's; or, after run(), by a thread in real time.
-/// Its time is virtual: host and camera clock begin at kStart and 100 s, and expose() moves both.
+/// Exposures are made by expose() on the caller's thread, which then is the stream's; or, after
+/// run(), by a thread in real time. Its time is virtual: host and camera clock begin at kStart and
+/// 100 s, and expose() moves both.
 class FakeBus final : public iidc::CameraBus {
  public:
   static constexpr std::int64_t kStart = 5'000'000'000'000;  // ns, host
@@ -35,9 +36,12 @@ class FakeBus final : public iidc::CameraBus {
   // ---- the camera's side ----
   iidc_camera& model() { return model_; }
   [[nodiscard]] iidc::ConfigRom rom();
-  /// Makes exposures `period` apart and delivers them, those in `lost` (0: the first of this call) excepted.
-  void expose(int count, Duration period = Duration::milliseconds(100), const std::set<int>& lost = {});
-  /// One exposure whose buffer is changed before it is delivered: what is there, how many bytes of it are said to have come.
+  /// Makes exposures `period` apart and delivers them, those in `lost` (0: the first of this call)
+  /// excepted.
+  void expose(int count, Duration period = Duration::milliseconds(100),
+              const std::set<int>& lost = {});
+  /// One exposure whose buffer is changed before it is delivered: what is there, how many bytes of
+  /// it are said to have come.
   using Tamper = std::function<void(std::vector<std::uint8_t>* image, std::size_t* bytes)>;
   void expose_tampered(const Tamper& tamper, Duration period = Duration::milliseconds(100));
   /// Real time from the next start() on, at the rate that the registers ask for.

@@ -39,10 +39,12 @@ TEST(IidcFaults, ARegionThatTheCameraRefusesIsToldAsSuch) {
   CameraUnderTest c;
   c.bus->stuck[kFormat7 + reg::format7::kValueSetting] = reg::format7::kErrorRegion;
   EXPECT_EQ(c.camera->configure(CameraUnderTest::usual(), nullptr), DeviceStatus::unsupported);
-  EXPECT_NE(c.camera->complaint().find("refuses the region 640 x 480"), std::string::npos) << c.camera->complaint();
+  EXPECT_NE(c.camera->complaint().find("refuses the region 640 x 480"), std::string::npos)
+      << c.camera->complaint();
   c.bus->stuck[kFormat7 + reg::format7::kValueSetting] = reg::format7::kErrorPacket;
   EXPECT_EQ(c.camera->configure(CameraUnderTest::usual(), nullptr), DeviceStatus::unsupported);
-  EXPECT_NE(c.camera->complaint().find("refuses packets"), std::string::npos) << c.camera->complaint();
+  EXPECT_NE(c.camera->complaint().find("refuses packets"), std::string::npos)
+      << c.camera->complaint();
 }
 
 TEST(IidcFaults, EveryRegisterMayRefuseAndNothingHangsOrCrashes) {
@@ -57,7 +59,8 @@ TEST(IidcFaults, EveryRegisterMayRefuseAndNothingHangsOrCrashes) {
     CameraUnderTest c;
     c.bus->refused.insert(address);
     const DeviceStatus status = c.camera->configure(CameraUnderTest::usual(), nullptr);
-    EXPECT_TRUE(status == DeviceStatus::ok || status == DeviceStatus::unsupported) << std::hex << address << ' ' << to_string(status);
+    EXPECT_TRUE(status == DeviceStatus::ok || status == DeviceStatus::unsupported)
+        << std::hex << address << ' ' << to_string(status);
     EXPECT_EQ(status == DeviceStatus::ok, c.camera->complaint().empty()) << std::hex << address;
   }
 }
@@ -66,7 +69,8 @@ TEST(IidcFaults, RegistersFullOfNonsenseGiveAStatus) {
   for (const std::uint32_t pattern : {0xFFFF'FFFFU, 0x7F80'0001U, 0xAAAA'AAAAU, 0x8000'0000U})
     for (std::uint32_t first = 0x100; first < 0x900; first += 0x40) {
       CameraUnderTest c;
-      for (std::uint32_t offset = first; offset < first + 0x40; offset += 4) c.bus->stuck[kCommand + offset] = pattern;
+      for (std::uint32_t offset = first; offset < first + 0x40; offset += 4)
+        c.bus->stuck[kCommand + offset] = pattern;
       (void)c.camera->configure(CameraUnderTest::usual(), nullptr);
       (void)c.camera->start(nullptr);
       c.bus->expose(2);
@@ -140,8 +144,9 @@ TEST(IidcFaults, AStreamOutOfStepEndsAndBeginsAnew) {
   c.bus->expose(1);
   (void)c.take_and_release();
   for (int i = 0; i < IidcCamera::kStrays; ++i)
-    c.bus->expose_tampered(
-        [](std::vector<std::uint8_t>* image, std::size_t*) { std::rotate(image->begin(), image->begin() + 4096, image->end()); });
+    c.bus->expose_tampered([](std::vector<std::uint8_t>* image, std::size_t*) {
+      std::rotate(image->begin(), image->begin() + 4096, image->end());
+    });
   Frame f;
   EXPECT_EQ(c.camera->wait(Duration{}, &f), DeviceStatus::gone);
   ASSERT_EQ(c.camera->start(nullptr), DeviceStatus::ok);

@@ -12,13 +12,15 @@ namespace vergence::iidc {
 namespace {
 namespace fs = std::filesystem;
 
-void add_node(const fs::path& root, const std::string& card, const std::string& name, const std::vector<std::uint32_t>& rom) {
+void add_node(const fs::path& root, const std::string& card, const std::string& name,
+              const std::vector<std::uint32_t>& rom) {
   const fs::path real = root / "devices" / card / name;
   fs::create_directories(real);
   fs::create_directories(root / "bus/firewire/devices");
   fs::create_symlink(real, root / "bus/firewire/devices" / name);
   std::ofstream out(real / "config_rom", std::ios::binary);
-  out.write(reinterpret_cast<const char*>(rom.data()), static_cast<std::streamsize>(4 * rom.size()));
+  out.write(reinterpret_cast<const char*>(rom.data()),
+            static_cast<std::streamsize>(4 * rom.size()));
 }
 
 std::vector<std::uint32_t> model_rom(unsigned index) {
@@ -35,8 +37,9 @@ TEST(FirewireNodes, CamerasAreTheNodesWhoseRomSaysSo) {
   add_node(folder.path(), "card0", "fw2", model_rom(1));
   add_node(folder.path(), "card0", "fw1", model_rom(0));
   add_node(folder.path(), "card1", "fw4", model_rom(2));
-  add_node(folder.path(), "card0", "fw1.0", model_rom(0));                // a unit, not a node
-  add_node(folder.path(), "card0", "fw3", std::vector<std::uint32_t>{});  // a node that did not tell
+  add_node(folder.path(), "card0", "fw1.0", model_rom(0));  // a unit, not a node
+  add_node(folder.path(), "card0", "fw3",
+           std::vector<std::uint32_t>{});  // a node that did not tell
   EXPECT_TRUE(has_firewire(folder.path()));
   const auto nodes = list_firewire_cameras(folder.path());
   ASSERT_EQ(nodes.size(), 3U);

@@ -64,7 +64,8 @@ TEST(FrameReader, AnyBytesGiveAnAnswer) {
     bool any = false;
     for (int n = 0; n < 3000; ++n) {
       std::vector<std::uint8_t> bytes(random.below(3) == 0 ? random.below(60) : 640 * 8);
-      for (auto& b : bytes) b = static_cast<std::uint8_t>(random.below(4) == 0 ? random.below(256) : 0);
+      for (auto& b : bytes)
+        b = static_cast<std::uint8_t>(random.below(4) == 0 ? random.below(256) : 0);
       Arrival a;
       a.data = bytes.data();
       a.bytes = bytes.size();

@@ -15,7 +15,8 @@ class ModelConformance final : public ConformanceRig {
     bus_ = bus.get();
     bus_->run();
     const iidc::ConfigRom rom = bus->rom();
-    camera_ = std::make_unique<iidc::IidcCamera>(std::move(bus), rom, nullptr, Duration::milliseconds(100));
+    camera_ = std::make_unique<iidc::IidcCamera>(std::move(bus), rom, nullptr,
+                                                 Duration::milliseconds(100));
   }
 
   CameraDevice& camera() override { return *camera_; }
@@ -43,7 +44,9 @@ class ModelConformance final : public ConformanceRig {
     all[6].options["trigger_source"] = "many";
     return all;
   }
-  std::vector<ExposureSetting> exposures() override { return {{Duration::milliseconds(2), 0}, {Duration::milliseconds(8), 6}}; }
+  std::vector<ExposureSetting> exposures() override {
+    return {{Duration::milliseconds(2), 0}, {Duration::milliseconds(8), 6}};
+  }
   bool unplug() override {
     bus_->unplug();
     return true;
@@ -54,9 +57,11 @@ class ModelConformance final : public ConformanceRig {
     return true;
   }
   bool content_fits(const Frame&, ImageView image) override {
-    // Row y of exposure n is grey level y + n all along, but for what stands in row 0. Mono16 repeats it in both bytes.
+    // Row y of exposure n is grey level y + n all along, but for what stands in row 0. Mono16
+    // repeats it in both bytes.
     for (int y = 2; y < image.height; ++y)
-      if (image.at(image.width - 1, y) != static_cast<std::uint8_t>(image.at(0, 1) + y - 1)) return false;
+      if (image.at(image.width - 1, y) != static_cast<std::uint8_t>(image.at(0, 1) + y - 1))
+        return false;
     return true;
   }
 
@@ -67,6 +72,8 @@ class ModelConformance final : public ConformanceRig {
 
 }  // namespace
 
-std::unique_ptr<ConformanceRig> make_conformance_rig(std::uint64_t, std::string*) { return std::make_unique<ModelConformance>(); }
+std::unique_ptr<ConformanceRig> make_conformance_rig(std::uint64_t, std::string*) {
+  return std::make_unique<ModelConformance>();
+}
 
 }  // namespace vergence::test

@@ -39,8 +39,10 @@ TEST(Faults, everyKindStandsInTheTableAtItsPlaceAndTakesItsOwnParametersAtBothEn
     for (const FaultParameter& p : row.parameters) {
       EXPECT_NO_THROW((void)make_fault(row.name, 0, {{p.name, p.least}})) << row.name << p.name;
       EXPECT_NO_THROW((void)make_fault(row.name, 0, {{p.name, p.most}})) << row.name << p.name;
-      EXPECT_THROW((void)make_fault(row.name, 0, {{p.name, p.most + 1}}), std::invalid_argument) << row.name << p.name;
-      EXPECT_THROW((void)make_fault(row.name, 0, {{p.name, p.least - 1}}), std::invalid_argument) << row.name << p.name;
+      EXPECT_THROW((void)make_fault(row.name, 0, {{p.name, p.most + 1}}), std::invalid_argument)
+          << row.name << p.name;
+      EXPECT_THROW((void)make_fault(row.name, 0, {{p.name, p.least - 1}}), std::invalid_argument)
+          << row.name << p.name;
     }
   }
 }

@@ -20,9 +20,11 @@ TriggerConfiguration at_20_hz() {
   return c;
 }
 
-/// Tiny pictures of an almost empty town, and everything that the board, the cameras and the host see of a drive.
+/// Tiny pictures of an almost empty town, and everything that the board, the cameras and the host
+/// see of a drive.
 struct Bench {
-  explicit Bench(const std::vector<std::string>& faults, const TriggerConfiguration& c, double seconds = 4, bool reports_taken = true,
+  explicit Bench(const std::vector<std::string>& faults, const TriggerConfiguration& c,
+                 double seconds = 4, bool reports_taken = true,
                  std::array<Duration, kMaxCameras> delays = {}) {
     WorldOptions town;
     town.texture_detail = 0;
@@ -45,11 +47,14 @@ struct Bench {
     o.duration = Duration::seconds(seconds);
     o.reports_taken = reports_taken;
     o.trigger_delay = delays;
-    rig = std::make_unique<MockRig>(std::make_shared<const RigTruth>(std::make_shared<const World>(town), drive, calibration,
-                                                                     default_T_body_left(), Transform{}, std::move(parsed)),
-                                    o);
+    rig = std::make_unique<MockRig>(
+        std::make_shared<const RigTruth>(std::make_shared<const World>(town), drive, calibration,
+                                         default_T_body_left(), Transform{}, std::move(parsed)),
+        o);
     for (int k = 0; k < 2; ++k)
-      EXPECT_EQ(rig->camera(k).configure({64, 48, 20, kExposure, 0, CameraTrigger::hardware}, nullptr), DeviceStatus::ok);
+      EXPECT_EQ(
+          rig->camera(k).configure({64, 48, 20, kExposure, 0, CameraTrigger::hardware}, nullptr),
+          DeviceStatus::ok);
     EXPECT_EQ(rig->trigger().configure(c, nullptr), DeviceStatus::ok);
   }
 
@@ -106,9 +111,11 @@ TEST(MockBoard, evenPulsesAreReportedEveryOneOfThemByAClockOfItsOwn) {
     EXPECT_EQ(b.pulses[i].number, i);
     EXPECT_EQ(b.pulses[i].boot, b.pulses[0].boot);
     EXPECT_EQ(b.pulses[i].resumed, i == 0);
-    EXPECT_NEAR((b.pulses[i].edge - b.pulses[0].edge).to_seconds(), 0.05 * static_cast<double>(i), 4 * 30e-6 + 1e-6);
+    EXPECT_NEAR((b.pulses[i].edge - b.pulses[0].edge).to_seconds(), 0.05 * static_cast<double>(i),
+                4 * 30e-6 + 1e-6);
     EXPECT_FALSE(b.pulses[i].exposure[0].seen) << "no feedback is wired";
-    EXPECT_GE(b.pulses[i].arrival, b.rig->start() + b.rig->pulse_times()[i] + b.rig->trigger().timing().least_delay);
+    EXPECT_GE(b.pulses[i].arrival,
+              b.rig->start() + b.rig->pulse_times()[i] + b.rig->trigger().timing().least_delay);
   }
   EXPECT_NE(b.pulses[0].boot, 0U);
 }
@@ -122,10 +129,12 @@ TEST(MockBoard, variedIntervalsAreLongerAndShorterAsTheProtocolSays) {
   ASSERT_EQ(b.pulses.size(), times.size());
   ASSERT_EQ(b.frames[1].size(), times.size());
   for (std::size_t i = 0; i + 1 < times.size(); ++i) {
-    const Duration wanted = kPeriod + (trigger_interval_is_longer(static_cast<std::uint32_t>(i)) ? c.vary : -c.vary);
+    const Duration wanted =
+        kPeriod + (trigger_interval_is_longer(static_cast<std::uint32_t>(i)) ? c.vary : -c.vary);
     EXPECT_EQ(times[i + 1] - times[i], wanted);
     const Duration by_camera = b.frames[1][i + 1].exposure_start - b.frames[1][i].exposure_start;
-    EXPECT_NEAR(static_cast<double>((by_camera - wanted).ns()), 0, 3000) << "drift and whole microseconds";
+    EXPECT_NEAR(static_cast<double>((by_camera - wanted).ns()), 0, 3000)
+        << "drift and whole microseconds";
   }
 }
 
@@ -135,7 +144,8 @@ TEST(MockBoard, aPauseLeavesPulsesOutAtTheSamePlaceOnEveryRun) {
     b.drive(20);
     ASSERT_EQ(b.pulses.size(), 76U);
     EXPECT_EQ(b.pulses[23].number, 23U);
-    EXPECT_EQ(b.pulses[24].number, 29U) << "from the fourth after the report at which it was asked for, numbers too";
+    EXPECT_EQ(b.pulses[24].number, 29U)
+        << "from the fourth after the report at which it was asked for, numbers too";
     EXPECT_TRUE(b.pulses[24].resumed);
     for (const auto& frames : b.frames) {
       ASSERT_EQ(frames.size(), 76U);
@@ -165,8 +175,8 @@ TEST(MockBoard, whereNobodyTakesItsReportsItPulsesOn) {
 TEST(MockBoard, feedbackTellsEveryExposureAndThatOneNeverCame) {
   TriggerConfiguration c = at_20_hz();
   c.feedback = 0b11;
-  Bench b({"missed_trigger@1 camera=1 pulses=2", "camera_gone@2 camera=0 duration_s=0.5"}, c, 4, true,
-          {Duration::microseconds(20), Duration::microseconds(35)});
+  Bench b({"missed_trigger@1 camera=1 pulses=2", "camera_gone@2 camera=0 duration_s=0.5"}, c, 4,
+          true, {Duration::microseconds(20), Duration::microseconds(35)});
   b.drive();
   ASSERT_EQ(b.pulses.size(), 81U);
   for (const Pulse& p : b.pulses) {
@@ -244,7 +254,8 @@ TEST(MockBoard, whatCannotBePulsedIsRefusedAndNothingIsConfiguredAmidPulses) {
   Bench b({}, at_20_hz());
   TriggerConfiguration c = at_20_hz();
   c.vary = Duration::milliseconds(26);
-  EXPECT_EQ(b.rig->trigger().configure(c, nullptr), DeviceStatus::unsupported) << "longer than half the interval";
+  EXPECT_EQ(b.rig->trigger().configure(c, nullptr), DeviceStatus::unsupported)
+      << "longer than half the interval";
   c = at_20_hz();
   c.width = Duration::milliseconds(50);
   EXPECT_EQ(b.rig->trigger().configure(c, nullptr), DeviceStatus::unsupported);
@@ -254,9 +265,13 @@ TEST(MockBoard, whatCannotBePulsedIsRefusedAndNothingIsConfiguredAmidPulses) {
   EXPECT_EQ(b.rig->trigger().configure(at_20_hz(), nullptr), DeviceStatus::busy);
   EXPECT_EQ(b.rig->ins().configure(100, nullptr), DeviceStatus::busy);
   b.rig->camera(0).stop();
-  EXPECT_EQ(b.rig->camera(0).configure({64, 48, 20, kExposure, 0, CameraTrigger::hardware}, nullptr), DeviceStatus::busy);
+  EXPECT_EQ(
+      b.rig->camera(0).configure({64, 48, 20, kExposure, 0, CameraTrigger::hardware}, nullptr),
+      DeviceStatus::busy);
   b.rig->trigger().stop();
-  EXPECT_EQ(b.rig->camera(0).configure({64, 48, 20, kExposure, 0, CameraTrigger::hardware}, nullptr), DeviceStatus::ok);
+  EXPECT_EQ(
+      b.rig->camera(0).configure({64, 48, 20, kExposure, 0, CameraTrigger::hardware}, nullptr),
+      DeviceStatus::ok);
 }
 
 }  // namespace

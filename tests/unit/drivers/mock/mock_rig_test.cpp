@@ -44,7 +44,8 @@ std::shared_ptr<const RigTruth> truth_with(const std::vector<std::string>& fault
   for (const std::string& f : faults) parsed.push_back(parse_fault(f));
   DriveOptions drive;
   drive.kind = DriveKind::brief;
-  return std::make_shared<const RigTruth>(world(), drive, small_rig(), default_T_body_left(), Transform{Mat3::Identity(), {0.5, 0, 1.2}},
+  return std::make_shared<const RigTruth>(world(), drive, small_rig(), default_T_body_left(),
+                                          Transform{Mat3::Identity(), {0.5, 0, 1.2}},
                                           std::move(parsed));
 }
 
@@ -111,7 +112,8 @@ Harvest drive(MockRig* rig) {
     if (status == DeviceStatus::ok) h.readings.push_back(r);
     ended[2] = ended[2] || status == DeviceStatus::ended;
   }
-  for (int k = 0; k < 2; ++k) h.statistics[static_cast<std::size_t>(k)] = rig->camera(k).statistics();
+  for (int k = 0; k < 2; ++k)
+    h.statistics[static_cast<std::size_t>(k)] = rig->camera(k).statistics();
   h.ins = rig->ins().statistics();
   return h;
 }
@@ -153,7 +155,8 @@ TEST(MockRig, arrivalsKeepTheStatedDelaysAndDeviceStampsTheirClock) {
 }
 
 TEST(MockRig, theSameSeedGivesTheSameBytesAndStamps) {
-  const Harvest a = drive_with({"lose_frames@0 share=0.2 duration_s=0"}), b = drive_with({"lose_frames@0 share=0.2 duration_s=0"});
+  const Harvest a = drive_with({"lose_frames@0 share=0.2 duration_s=0"}),
+                b = drive_with({"lose_frames@0 share=0.2 duration_s=0"});
   for (std::size_t k = 0; k < 2; ++k) {
     ASSERT_EQ(a.frames[k].size(), b.frames[k].size());
     for (std::size_t i = 0; i < a.frames[k].size(); ++i) {
@@ -174,7 +177,8 @@ TEST(MockRig, aCoveredLensIsBlackForItsTimeAndOnlyThere) {
 }
 
 TEST(MockRig, exposureAndNightChangeTheBrightness) {
-  const Harvest h = drive_with({"exposure@1 camera=0 factor=0.5 duration_s=1", "night@2 duration_s=0"});
+  const Harvest h =
+      drive_with({"exposure@1 camera=0 factor=0.5 duration_s=1", "night@2 duration_s=0"});
   const double day = h.frames[0][10].mean;
   EXPECT_NEAR(h.frames[0][30].mean, 0.5 * day, 0.1 * day);
   EXPECT_NEAR(h.frames[1][30].mean, h.frames[1][10].mean, 0.1 * day);
@@ -221,7 +225,8 @@ TEST(MockRig, aColourSensorsGreyIsMadeOfTheMosaicThatItWouldHandOutRaw) {
   o.pattern = Pattern::gbrg;
   const auto first_picture = [&o] {
     MockRig rig(truth_with({}), o);
-    const CameraConfiguration c{96, 64, kRate, Duration::milliseconds(8), 0, CameraTrigger::hardware};
+    const CameraConfiguration c{
+        96, 64, kRate, Duration::milliseconds(8), 0, CameraTrigger::hardware};
     EXPECT_EQ(rig.camera(0).configure(c, nullptr), DeviceStatus::ok);
     EXPECT_EQ(rig.camera(0).start(nullptr), DeviceStatus::ok);
     EXPECT_EQ(rig.trigger().configure({kRate}, nullptr), DeviceStatus::ok);
@@ -278,7 +283,8 @@ TEST(MockRig, aLaggingCameraSendsTheImageBeforeWithTheCounterAndStampOfThisOne) 
 }
 
 TEST(MockRig, swappedCablesExchangeTheImagesAndNothingElse) {
-  const Harvest good = drive_with({}), swapped = drive_with({"swap_cables@1", "cover@2 camera=0 duration_s=0.5"});
+  const Harvest good = drive_with({}),
+                swapped = drive_with({"swap_cables@1", "cover@2 camera=0 duration_s=0.5"});
   for (std::size_t i = 0; i < 61; ++i) {
     const bool exchanged = i >= 20, covered = i >= 40 && i < 50;
     EXPECT_EQ(swapped.frames[0][i].mean, good.frames[exchanged ? 1 : 0][i].mean) << i;
@@ -292,17 +298,20 @@ TEST(MockRig, swappedCablesExchangeTheImagesAndNothingElse) {
 
 TEST(MockRig, aBusIsInTheWayForItsTimeOnly) {
   const Harvest good = drive_with({}), h = drive_with({"occluder@1 duration_s=1"});
-  for (std::size_t i = 0; i < 61; ++i) EXPECT_EQ(h.frames[0][i].mean != good.frames[0][i].mean, i >= 20 && i < 40) << i;
+  for (std::size_t i = 0; i < 61; ++i)
+    EXPECT_EQ(h.frames[0][i].mean != good.frames[0][i].mean, i >= 20 && i < 40) << i;
 }
 
 TEST(MockRig, aRequestOrAFullDiskDoesNothingToTheDevices) {
   const Harvest good = drive_with({}, 1), h = drive_with({"recalibrate@0.5", "disk_full@0.2"}, 1);
   ASSERT_EQ(h.frames[0].size(), good.frames[0].size());
-  for (std::size_t i = 0; i < h.frames[0].size(); ++i) EXPECT_EQ(h.frames[0][i].mean, good.frames[0][i].mean);
+  for (std::size_t i = 0; i < h.frames[0].size(); ++i)
+    EXPECT_EQ(h.frames[0][i].mean, good.frames[0][i].mean);
 }
 
 TEST(RigTruth, aBusStandsLevelOnTheGroundWhereItsFaultSays) {
-  const auto truth = truth_with({"occluder@2 ahead_m=1.5 left_m=3 duration_s=2", "occluder@5 ahead_m=4 turn_deg=90 speed_mps=-6"});
+  const auto truth = truth_with({"occluder@2 ahead_m=1.5 left_m=3 duration_s=2",
+                                 "occluder@5 ahead_m=4 turn_deg=90 speed_mps=-6"});
   EXPECT_FALSE(truth->bus_in_enu(Duration::seconds(1.9)));
   EXPECT_FALSE(truth->bus_in_enu(Duration::seconds(4.1)));
   // What the bus's own axes are in the vehicle's, without the vehicle's pitch and roll.
@@ -315,21 +324,24 @@ TEST(RigTruth, aBusStandsLevelOnTheGroundWhereItsFaultSays) {
     EXPECT_NEAR(T_enu_bus->t.z(), truth->world().ground(T_enu_bus->t.x(), T_enu_bus->t.y()), 1e-12);
     const Vec3 forward = T_enu_body.R.col(0);
     const Mat3 level = exp_so3(Vec3(0, 0, std::atan2(forward.y(), forward.x())));
-    return Transform{level.transpose() * T_enu_bus->R, level.transpose() * (T_enu_bus->t - T_enu_body.t)};
+    return Transform{level.transpose() * T_enu_bus->R,
+                     level.transpose() * (T_enu_bus->t - T_enu_body.t)};
   };
   const double camera_x = default_T_body_left().t.x();
   EXPECT_TRUE(seen(3).R.isApprox(Mat3::Identity(), 1e-12));
   EXPECT_NEAR(seen(3).t.x(), camera_x + 1.5 + kBusLength / 2, 1e-9);
   EXPECT_NEAR(seen(3).t.y(), 3, 1e-9);
   EXPECT_NEAR(seen(3.5).t.x(), seen(2.5).t.x(), 1e-9) << "moves with the rig";
-  EXPECT_NEAR(seen(6).t.x(), camera_x + 4 + kBusWidth / 2, 1e-9) << "its side is turned to the vehicle";
+  EXPECT_NEAR(seen(6).t.x(), camera_x + 4 + kBusWidth / 2, 1e-9)
+      << "its side is turned to the vehicle";
   EXPECT_NEAR(seen(6).t.y(), -6, 1e-9);
   EXPECT_NEAR(seen(6.5).t.y(), -9, 1e-9) << "crosses to the right";
 }
 
 TEST(MockRig, aKnockTurnsTheTrueRigByWhatItSays) {
   const auto truth = truth_with({"knock@1 camera=1 pitch_deg=0.2 x_m=0.003"});
-  const RigCalibration before = truth->calibration(Duration::seconds(0.9)), after = truth->calibration(Duration::seconds(1.1));
+  const RigCalibration before = truth->calibration(Duration::seconds(0.9)),
+                       after = truth->calibration(Duration::seconds(1.1));
   EXPECT_TRUE(before.T_camera_left[1].R.isApprox(Mat3::Identity(), 1e-14));
   const Vec3 turned = log_so3(after.T_camera_left[1].R * before.T_camera_left[1].R.transpose());
   EXPECT_NEAR(turned.x(), 0.2 * std::numbers::pi / 180, 1e-12);
@@ -343,7 +355,8 @@ TEST(MockRig, aKnockTurnsTheTrueRigByWhatItSays) {
 TEST(MockRig, aDriftGrowsEvenlyAndStays) {
   const auto truth = truth_with({"drift@1 camera=1 yaw_deg=1 duration_s=4"});
   const auto yaw = [&](double s) {
-    return log_so3(truth->calibration(Duration::seconds(s)).T_camera_left[1].R).y() * 180 / std::numbers::pi;
+    return log_so3(truth->calibration(Duration::seconds(s)).T_camera_left[1].R).y() * 180 /
+           std::numbers::pi;
   };
   EXPECT_NEAR(yaw(1), 0, 1e-12);
   EXPECT_NEAR(yaw(2), 0.25, 1e-9);
@@ -353,15 +366,18 @@ TEST(MockRig, aDriftGrowsEvenlyAndStays) {
 TEST(MockRig, anIdealInsIsTheTruthToAMicrometre) {
   const auto truth = truth_with({});
   InsModel model({true, 1, 120}, *truth);
-  const GeographicLib::LocalCartesian plane(kWorldOrigin.latitude_deg, kWorldOrigin.longitude_deg, kWorldOrigin.height_m);
+  const GeographicLib::LocalCartesian plane(kWorldOrigin.latitude_deg, kWorldOrigin.longitude_deg,
+                                            kWorldOrigin.height_m);
   for (std::uint64_t i = 0; i < 1200; ++i) {
     const Duration t = Duration::seconds(static_cast<double>(i) / 120);
     const InsSample s = model.sample(i, t);
     const Transform T = truth->ins_in_enu(t);
     Vec3 p;
-    plane.Forward(s.position.latitude_deg, s.position.longitude_deg, s.position.height_m, p.x(), p.y(), p.z());
+    plane.Forward(s.position.latitude_deg, s.position.longitude_deg, s.position.height_m, p.x(),
+                  p.y(), p.z());
     ASSERT_LT((p - T.t).norm(), 1e-6);
-    // Axes at the place and at the origin differ by less than distance / earth's radius: 300 m / 6.4e6 m.
+    // Axes at the place and at the origin differ by less than distance / earth's radius: 300 m /
+    // 6.4e6 m.
     const Eigen::Quaterniond q(s.q_enu_ins[3], s.q_enu_ins[0], s.q_enu_ins[1], s.q_enu_ins[2]);
     ASSERT_LT(log_so3(q.toRotationMatrix().transpose() * T.R).norm(), 1e-4);
   }
@@ -369,7 +385,8 @@ TEST(MockRig, anIdealInsIsTheTruthToAMicrometre) {
 
 TEST(MockRig, aNoisyInsErrsByItsSigmasAndSlowly) {
   const auto truth = truth_with({});
-  const GeographicLib::LocalCartesian plane(kWorldOrigin.latitude_deg, kWorldOrigin.longitude_deg, kWorldOrigin.height_m);
+  const GeographicLib::LocalCartesian plane(kWorldOrigin.latitude_deg, kWorldOrigin.longitude_deg,
+                                            kWorldOrigin.height_m);
   double squares = 0, step = 0;
   int n = 0;
   for (std::uint64_t seed = 1; seed <= 200; ++seed) {
@@ -379,7 +396,8 @@ TEST(MockRig, aNoisyInsErrsByItsSigmasAndSlowly) {
       const Duration t = Duration::seconds(static_cast<double>(i) / 120);
       const InsSample s = model.sample(i, t);
       Vec3 p;
-      plane.Forward(s.position.latitude_deg, s.position.longitude_deg, s.position.height_m, p.x(), p.y(), p.z());
+      plane.Forward(s.position.latitude_deg, s.position.longitude_deg, s.position.height_m, p.x(),
+                    p.y(), p.z());
       const Vec3 error = p - truth->ins_in_enu(t).t;
       if (i == 0) {
         squares += error.head<2>().squaredNorm();
@@ -399,17 +417,21 @@ TEST(MockRig, aNoisyInsErrsByItsSigmasAndSlowly) {
 TEST(MockRig, insFaultsAct) {
   const Harvest gone = drive_with({"ins_gone@1 duration_s=1"});
   EXPECT_EQ(gone.ins.lost, 120U);
-  for (const InsReading& r : gone.readings) EXPECT_FALSE(r.sample.number >= 120 && r.sample.number < 240);
+  for (const InsReading& r : gone.readings)
+    EXPECT_FALSE(r.sample.number >= 120 && r.sample.number < 240);
 
   const Harvest dark = drive_with({"no_fix@1 duration_s=1"}, 3, true);
   for (const InsReading& r : dark.readings)
-    EXPECT_EQ(r.sample.fix == FixStatus::none, r.sample.number >= 120 && r.sample.number < 240) << r.sample.number;
+    EXPECT_EQ(r.sample.fix == FixStatus::none, r.sample.number >= 120 && r.sample.number < 240)
+        << r.sample.number;
 
   const Harvest leap = drive_with({"position_jump@1 east_m=100"}, 2, true);
   for (std::size_t i = 1; i < leap.readings.size(); ++i) {
-    const double east = (leap.readings[i].sample.position.longitude_deg - leap.readings[i - 1].sample.position.longitude_deg) *
+    const double east = (leap.readings[i].sample.position.longitude_deg -
+                         leap.readings[i - 1].sample.position.longitude_deg) *
                         std::cos(27.4975 * std::numbers::pi / 180) * 111320;
-    EXPECT_EQ(std::abs(east) > 90, leap.readings[i].sample.number == 120) << leap.readings[i].sample.number;
+    EXPECT_EQ(std::abs(east) > 90, leap.readings[i].sample.number == 120)
+        << leap.readings[i].sample.number;
   }
 }
 
@@ -417,7 +439,9 @@ TEST(MockRig, aClockThatIsSetShowsInItsDevicesStampsOnly) {
   const Harvest h = drive_with({"time_jump@1 camera=0 jump_s=2"});
   for (std::size_t k = 0; k < 2; ++k)
     for (std::size_t i = 1; i < h.frames[k].size(); ++i) {
-      const double step = (h.frames[k][i].frame.exposure_start - h.frames[k][i - 1].frame.exposure_start).to_seconds();
+      const double step =
+          (h.frames[k][i].frame.exposure_start - h.frames[k][i - 1].frame.exposure_start)
+              .to_seconds();
       EXPECT_NEAR(step, k == 0 && i == 20 ? 2.05 : 0.05, 1e-4) << k << " " << i;
     }
 }
@@ -425,9 +449,11 @@ TEST(MockRig, aClockThatIsSetShowsInItsDevicesStampsOnly) {
 TEST(MockRig, nonsenseIsRefusedByName) {
   EXPECT_THROW(MockRig(truth_with({"cover@1 camera=2"}), options(1)), std::invalid_argument);
   MockRig rig(truth_with({}), options(1));
-  EXPECT_EQ(rig.camera(0).configure({96, 64, 0, Duration::milliseconds(8), 0, CameraTrigger::hardware}, nullptr),
+  EXPECT_EQ(rig.camera(0).configure(
+                {96, 64, 0, Duration::milliseconds(8), 0, CameraTrigger::hardware}, nullptr),
             DeviceStatus::bad_configuration);
-  EXPECT_EQ(rig.camera(0).configure({97, 64, 20, Duration::milliseconds(8), 0, CameraTrigger::hardware}, nullptr),
+  EXPECT_EQ(rig.camera(0).configure(
+                {97, 64, 20, Duration::milliseconds(8), 0, CameraTrigger::hardware}, nullptr),
             DeviceStatus::unsupported);
   EXPECT_EQ(rig.camera(0).start(nullptr), DeviceStatus::bad_configuration);
   EXPECT_EQ(rig.ins().configure(0, nullptr), DeviceStatus::bad_configuration);

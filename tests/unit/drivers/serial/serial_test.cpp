@@ -33,7 +33,8 @@ class Pair {
 class TerminalPair final : public Pair {
  public:
   TerminalPair() : master_(::posix_openpt(O_RDWR | O_NOCTTY)) {
-    if (master_ < 0 || ::grantpt(master_) != 0 || ::unlockpt(master_) != 0) throw std::runtime_error("no pseudo-terminal");
+    if (master_ < 0 || ::grantpt(master_) != 0 || ::unlockpt(master_) != 0)
+      throw std::runtime_error("no pseudo-terminal");
     place_ = std::make_unique<SerialPort>(::ptsname(master_));
     DeviceStatus status = DeviceStatus::ok;
     line_ = place_->open({}, &status);
@@ -41,7 +42,9 @@ class TerminalPair final : public Pair {
   }
   ~TerminalPair() override { hang_up(); }
   ByteLine& line() override { return *line_; }
-  void send(const Bytes& bytes) override { ASSERT_EQ(::write(master_, bytes.data(), bytes.size()), static_cast<ssize_t>(bytes.size())); }
+  void send(const Bytes& bytes) override {
+    ASSERT_EQ(::write(master_, bytes.data(), bytes.size()), static_cast<ssize_t>(bytes.size()));
+  }
   Bytes received(std::size_t n) override {
     Bytes all;
     std::array<std::uint8_t, 4096> some{};
@@ -72,7 +75,9 @@ class PipePair final : public Pair {
     other_ = std::move(ends.second);
   }
   ByteLine& line() override { return *line_; }
-  void send(const Bytes& bytes) override { ASSERT_EQ(other_->write(bytes, kLong), DeviceStatus::ok); }
+  void send(const Bytes& bytes) override {
+    ASSERT_EQ(other_->write(bytes, kLong), DeviceStatus::ok);
+  }
   Bytes received(std::size_t n) override {
     Bytes all(n);
     std::size_t have = 0;
@@ -106,7 +111,8 @@ class EveryLine : public ::testing::TestWithParam<Kind> {
 
 TEST_P(EveryLine, carriesEveryByteBothWays) {
   Bytes all(256);
-  for (std::size_t i = 0; i < all.size(); ++i) all[i] = static_cast<std::uint8_t>(i);  // XON, XOFF, CR, NUL and FF among them
+  for (std::size_t i = 0; i < all.size(); ++i)
+    all[i] = static_cast<std::uint8_t>(i);  // XON, XOFF, CR, NUL and FF among them
   pair_->send(all);
   Bytes got;
   while (got.size() < all.size()) {
@@ -163,7 +169,8 @@ TEST_P(EveryLine, wakeEndsOneReadAndOnlyOne) {
   waker.join();
   EXPECT_EQ(line().read(some, Duration{}).status, DeviceStatus::timeout);
   line().wake();
-  EXPECT_EQ(line().read(some, Duration{}).status, DeviceStatus::stopped) << "the next one, when none waits";
+  EXPECT_EQ(line().read(some, Duration{}).status, DeviceStatus::stopped)
+      << "the next one, when none waits";
   pair_->send({5});
   EXPECT_EQ(line().read(some, kLong).status, DeviceStatus::ok);
 }
@@ -181,7 +188,8 @@ TEST_P(EveryLine, aHungUpLineIsGoneAtOnceAndDoesNotBurnTime) {
 TEST_P(EveryLine, discardedInputDoesNotComeAgain) {
   pair_->send({1, 2, 3});
   std::array<std::uint8_t, 8> some{};
-  ASSERT_EQ(line().read(std::span(some).first(1), kLong).status, DeviceStatus::ok);  // the others are there, too
+  ASSERT_EQ(line().read(std::span(some).first(1), kLong).status,
+            DeviceStatus::ok);  // the others are there, too
   line().discard_input();
   EXPECT_EQ(line().read(some, Duration{}).status, DeviceStatus::timeout);
 }
@@ -202,19 +210,24 @@ TEST_P(EveryLine, aWriteThatNobodyTakesEndsAtItsLimit) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Serial, EveryLine, ::testing::Values(Kind::terminal, Kind::pipe),
-                         [](const auto& one) { return one.param == Kind::terminal ? "terminal" : "pipe"; });
+                         [](const auto& one) {
+                           return one.param == Kind::terminal ? "terminal" : "pipe";
+                         });
 
 TEST(SerialPort, aWaitingReadUsesNoTime) {
   TerminalPair pair;
   std::array<std::uint8_t, 8> some{};
   rusage before{}, after{};
   ASSERT_EQ(::getrusage(RUSAGE_THREAD, &before), 0);
-  for (int i = 0; i < 10; ++i) ASSERT_EQ(pair.line().read(some, kSoon).status, DeviceStatus::timeout);
+  for (int i = 0; i < 10; ++i)
+    ASSERT_EQ(pair.line().read(some, kSoon).status, DeviceStatus::timeout);
   ASSERT_EQ(::getrusage(RUSAGE_THREAD, &after), 0);
   const auto us = [](const rusage& r) {
-    return r.ru_utime.tv_usec + r.ru_stime.tv_usec + 1'000'000 * (r.ru_utime.tv_sec + r.ru_stime.tv_sec);
+    return r.ru_utime.tv_usec + r.ru_stime.tv_usec +
+           1'000'000 * (r.ru_utime.tv_sec + r.ru_stime.tv_sec);
   };
-  EXPECT_LT(us(after) - us(before), 50'000) << "200 ms were waited; a spinning read burns most of them";
+  EXPECT_LT(us(after) - us(before), 50'000)
+      << "200 ms were waited; a spinning read burns most of them";
 }
 
 TEST(SerialPort, isHeldByOne) {
@@ -229,7 +242,8 @@ TEST(SerialPort, opensThroughALink) {
   ASSERT_GE(master, 0);
   ASSERT_EQ(::grantpt(master), 0);
   ASSERT_EQ(::unlockpt(master), 0);
-  const std::filesystem::path link = std::filesystem::temp_directory_path() / ("vergence-line-" + std::to_string(::getpid()));
+  const std::filesystem::path link =
+      std::filesystem::temp_directory_path() / ("vergence-line-" + std::to_string(::getpid()));
   std::filesystem::create_symlink(::ptsname(master), link);
   DeviceStatus status = DeviceStatus::failed;
   SerialPort place(link.string());

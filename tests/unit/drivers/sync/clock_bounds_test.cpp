@@ -7,7 +7,8 @@
 #include "core/math/random.hpp"
 #include "drivers/sync/clock_mapper.hpp"
 
-/// What the clocks reach over a line with delays of a constant floor and exponential jitter, and that the bounds they state hold.
+/// What the clocks reach over a line with delays of a constant floor and exponential jitter, and
+/// that the bounds they state hold.
 namespace vergence {
 namespace {
 
@@ -21,11 +22,13 @@ struct Line {
 
   explicit Line(std::uint64_t seed) : random(seed) {}
   [[nodiscard]] DeviceStamp read(std::int64_t host) const {
-    return DeviceStamp((host + offset + std::llround(drift * static_cast<double>(host))) / 1000 * 1000);
+    return DeviceStamp((host + offset + std::llround(drift * static_cast<double>(host))) / 1000 *
+                       1000);
   }
   std::int64_t late() { return std::llround(-kJitter * std::log(1 - random.uniform())); }
   void ping(ClockMapper* clock, std::int64_t at) {
-    const std::int64_t t2 = at + floor_there + late(), t3 = t2 + 20'000, t4 = t3 + floor_back + late();
+    const std::int64_t t2 = at + floor_there + late(), t3 = t2 + 20'000,
+                       t4 = t3 + floor_back + late();
     clock->ping(HostStamp(at), read(t2), read(t3), HostStamp(t4));
   }
 };
@@ -100,7 +103,8 @@ TEST(ClockBounds, boundsHoldFromTheFirstStampOnWhateverTheDelaysAre) {
   for (std::uint64_t seed = 1; seed <= 400; ++seed) {
     Line line(seed);
     line.drift = line.random.uniform(-100e-6, 100e-6);
-    line.floor_there = line.random.below(3'000'000);  // unlike: nobody can see it, the bound allows for it
+    line.floor_there =
+        line.random.below(3'000'000);  // unlike: nobody can see it, the bound allows for it
     line.floor_back = line.random.below(3'000'000);
     ClockMapper arrivals(options_of(line, false)), pings(options_of(line, true));
     std::int64_t t = 1'000'000'000;
@@ -113,7 +117,8 @@ TEST(ClockBounds, boundsHoldFromTheFirstStampOnWhateverTheDelaysAre) {
     EXPECT_EQ(arrivals.resets() + pings.resets(), 0U) << seed;
   }
   EXPECT_EQ(two_way.outside, 0) << "of " << two_way.ns.size();
-  EXPECT_LE(one_way.outside, static_cast<int>(one_way.ns.size() / 1000)) << "of " << one_way.ns.size();
+  EXPECT_LE(one_way.outside, static_cast<int>(one_way.ns.size() / 1000))
+      << "of " << one_way.ns.size();
 }
 
 TEST(ClockBounds, aClockThatIsSetIsFoundByTheNextPingsBothWays) {
@@ -129,7 +134,8 @@ TEST(ClockBounds, aClockThatIsSetIsFoundByTheNextPingsBothWays) {
       outside += std::abs(m.host.ns() - t) > m.error.ns() ? 1 : 0;
     }
     EXPECT_GE(clock.resets(), 1U) << step;
-    // A small one shows when a ping is quick enough both ways: within the jitter's mean, a tenth of them are.
+    // A small one shows when a ping is quick enough both ways: within the jitter's mean, a tenth of
+    // them are.
     EXPECT_LE(outside, std::abs(step) > 0.1 ? 0 : 100) << step;
   }
 }
@@ -160,12 +166,14 @@ TEST(ClockBounds, exactToTheNanosecondOverTenYearsOfOffsetAndOfRunning) {
     ClockMapperOptions o;
     o.resolution = Duration::nanoseconds(1);
     ClockMapper one(o), two(o);
-    // No jitter, no drift: what is off is arithmetic. A minute of a stamp a second, then one every 20 days or in the next second.
+    // No jitter, no drift: what is off is arithmetic. A minute of a stamp a second, then one every
+    // 20 days or in the next second.
     std::int64_t t = 5'000'000'123;
     for (int i = 0; i < 240; ++i) {
       const DeviceStamp device(t + offset);
       EXPECT_EQ(one.map(device, HostStamp(t)).host, HostStamp(t)) << i;
-      two.ping(HostStamp(t - 1'000'003), device, device + Duration::nanoseconds(7), HostStamp(t + 1'000'010));
+      two.ping(HostStamp(t - 1'000'003), device, device + Duration::nanoseconds(7),
+               HostStamp(t + 1'000'010));
       EXPECT_EQ(two.at(device).host, HostStamp(t)) << i;
       t += i < 60 || i % 3 != 0 ? 1'000'000'001 : 3 * 1'753'200'000'000'007;
     }
@@ -181,7 +189,8 @@ TEST(ClockBounds, hostileStampsAreCountedAndHarmless) {
       const std::uint64_t bits = (static_cast<std::uint64_t>(random.next()) << 32U) | random.next();
       return static_cast<std::int64_t>(bits) / 2;
     };
-    if (random.below(2) == 0) clock.ping(HostStamp(any()), DeviceStamp(any()), DeviceStamp(any()), HostStamp(any()));
+    if (random.below(2) == 0)
+      clock.ping(HostStamp(any()), DeviceStamp(any()), DeviceStamp(any()), HostStamp(any()));
     const MappedStamp m = clock.map(DeviceStamp(any()), HostStamp(any()));
     EXPECT_GE(m.error, Duration{});
     if (i % 1000 == 0) clock.restart();

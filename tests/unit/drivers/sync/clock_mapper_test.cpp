@@ -44,7 +44,8 @@ TEST(ClockMapper, findsOffsetAndDriftWithinItsOwnBound) {
       const double error = std::abs((m.host - truth).to_seconds());
       ASSERT_LE(error, m.error.to_seconds()) << "drift " << drift << ", frame " << i;
       if (i == 20 * 100) {
-        // Twenty delays a bin: the least of them is late by 150 µs / 20 = 7.5 µs on average; the line lies under sixty of those.
+        // Twenty delays a bin: the least of them is late by 150 µs / 20 = 7.5 µs on average; the
+        // line lies under sixty of those.
         EXPECT_LT(error, 20e-6) << drift;
         EXPECT_NEAR(mapper.drift(), -drift / (1 + drift), 1e-6);
         EXPECT_LT(m.error.to_seconds(), 300e-6);
@@ -67,7 +68,8 @@ TEST(ClockMapper, aClockThatIsSetForwardOrBackIsFoundAtOnceOrAfterAFewStamps) {
       if (error > m.error.to_seconds()) ++wrong;
     }
     EXPECT_EQ(mapper.resets(), 1U) << jump;
-    // A clock set back by less than a stall looks like congestion until that has lasted for kLagging stamps.
+    // A clock set back by less than a stall looks like congestion until that has lasted for
+    // kLagging stamps.
     EXPECT_LE(wrong, jump == -0.3 ? 16 : 0) << jump;
   }
 }
@@ -78,7 +80,9 @@ TEST(ClockMapper, aStallOfTheTransportDoesNotMoveTheClock) {
   for (int i = 0; i < 400; ++i) {
     const HostStamp truth = at(10 + i * 0.05);
     HostStamp arrival = device.arrival(truth);
-    if (i >= 200 && i < 210) arrival = std::max(arrival, at(10 + 210 * 0.05));  // ten frames come together, the first 0.5 s late
+    if (i >= 200 && i < 210)
+      arrival =
+          std::max(arrival, at(10 + 210 * 0.05));  // ten frames come together, the first 0.5 s late
     const MappedStamp m = mapper.map(device.read(truth), arrival);
     EXPECT_LE(std::abs((m.host - truth).to_seconds()), m.error.to_seconds()) << i;
   }
@@ -100,7 +104,8 @@ TEST(ClockMapper, stampsOfARegularDeviceNeverGoBack) {
 TEST(ClockMapper, startsAnewAfterARestart) {
   Device device;
   ClockMapper mapper(options_of(device));
-  for (int i = 0; i < 100; ++i) (void)mapper.map(device.read(at(1 + i * 0.05)), device.arrival(at(1 + i * 0.05)));
+  for (int i = 0; i < 100; ++i)
+    (void)mapper.map(device.read(at(1 + i * 0.05)), device.arrival(at(1 + i * 0.05)));
   mapper.restart();
   device.offset = -900'000'000'000;
   const MappedStamp m = mapper.map(device.read(at(9)), device.arrival(at(9)));

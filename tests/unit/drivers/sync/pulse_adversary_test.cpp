@@ -4,7 +4,8 @@
 
 #include "tests/unit/drivers/sync/pulse_rules.hpp"
 
-/// Whatever a rig does wrong, no pair is called proven that is not one; the rig knows which pulse made which frame.
+/// Whatever a rig does wrong, no pair is called proven that is not one; the rig knows which pulse
+/// made which frame.
 namespace vergence {
 namespace {
 
@@ -18,7 +19,8 @@ SyncOptions board() {
   return o;
 }
 
-PulseRigTruth run(const PulseRigOptions& o, double seconds, SyncCounters* counters = nullptr, SyncOptions sync = board()) {
+PulseRigTruth run(const PulseRigOptions& o, double seconds, SyncCounters* counters = nullptr,
+                  SyncOptions sync = board()) {
   PulseRig rig(o, sync);
   rig.run(seconds);
   if (counters != nullptr) *counters = rig.counters();
@@ -48,7 +50,8 @@ TEST(PulseAdversary, aFirstTriggerThatIsIgnoredDoesNotShiftThePairs) {
 }
 
 TEST(PulseAdversary, wherACounterBeginsDoesNotMatter) {
-  for (const std::uint64_t start : {std::uint64_t{0}, std::uint64_t{1}, std::uint64_t{0xFFFF'FFFF'FFFF'FFF0}}) {
+  for (const std::uint64_t start :
+       {std::uint64_t{0}, std::uint64_t{1}, std::uint64_t{0xFFFF'FFFF'FFFF'FFF0}}) {
     PulseRigOptions o;
     o.counter_start = start;
     expect_mostly_complete(run(o, 10), 0.9);
@@ -124,7 +127,8 @@ TEST(PulseAdversary, evenIntervalsProveNothingUntilAPauseDoes) {
   EXPECT_EQ(rig.asked(), 1);
   expect_mostly_complete(rig.truth(), 0.9);
   EXPECT_LE(rig.truth().worst_acquisition_s, 2.0);
-  EXPECT_EQ(rig.counters().missed_trigger[0] + rig.counters().missed, 0U) << "what was left out was not missed";
+  EXPECT_EQ(rig.counters().missed_trigger[0] + rig.counters().missed, 0U)
+      << "what was left out was not missed";
 }
 
 TEST(PulseAdversary, stampsOfTheHostAreProvenByAPause) {

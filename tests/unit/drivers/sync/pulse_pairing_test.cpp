@@ -19,7 +19,9 @@ SyncOptions board() {
   return o;
 }
 
-TEST(PulsePairing, tenHoursWithoutAWrongPairAndEveryLossUnderItsName) { testing::expect_ten_hours_right(1); }
+TEST(PulsePairing, tenHoursWithoutAWrongPairAndEveryLossUnderItsName) {
+  testing::expect_ten_hours_right(1);
+}
 
 struct Acquisition : ::testing::TestWithParam<double> {};
 
@@ -73,7 +75,8 @@ void expect_exact_stamps(PulseRigOptions::Clock clock, double settle) {
     rig.run(settle + 10);
     EXPECT_EQ(rig.truth().wrong, 0U);
     outside += rig.truth().outside;
-    errors.insert(errors.end(), rig.truth().stamp_errors_us.begin(), rig.truth().stamp_errors_us.end());
+    errors.insert(errors.end(), rig.truth().stamp_errors_us.begin(),
+                  rig.truth().stamp_errors_us.end());
   }
   ASSERT_GT(errors.size(), 15'000U);
   EXPECT_LE(rms(errors), 20);
@@ -81,9 +84,13 @@ void expect_exact_stamps(PulseRigOptions::Clock clock, double settle) {
   EXPECT_LE(outside, errors.size() / 1000);
 }
 
-TEST(RigStamps, areTwentyMicrosecondsFromTheTruthAfterTenSecondsOfPings) { expect_exact_stamps(PulseRigOptions::Clock::pings, 10); }
+TEST(RigStamps, areTwentyMicrosecondsFromTheTruthAfterTenSecondsOfPings) {
+  expect_exact_stamps(PulseRigOptions::Clock::pings, 10);
+}
 
-TEST(RigStamps, areTwentyMicrosecondsFromTheTruthAfterThirtySecondsOfReports) { expect_exact_stamps(PulseRigOptions::Clock::arrivals, 30); }
+TEST(RigStamps, areTwentyMicrosecondsFromTheTruthAfterThirtySecondsOfReports) {
+  expect_exact_stamps(PulseRigOptions::Clock::arrivals, 30);
+}
 
 }  // namespace
 }  // namespace vergence

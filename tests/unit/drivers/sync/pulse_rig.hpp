@@ -11,7 +11,8 @@
 #include "drivers/sync/rig_synchronizer.hpp"
 #include "firmware_iface/trigger/trigger.h"
 
-/// A rig in virtual time that knows which pulse made which frame: board, cameras, their clocks, counters and transports; no images.
+/// A rig in virtual time that knows which pulse made which frame: board, cameras, their clocks,
+/// counters and transports; no images.
 namespace vergence::testing {
 
 struct PulseRigOptions {
@@ -20,19 +21,21 @@ struct PulseRigOptions {
   int cameras = 2;
   std::uint64_t seed = 1;
   double lost = 0, missed = 0, unreported = 0, duplicated = 0;  // probabilities a frame or pulse
-  double bursts = 0;                                            // probability a pulse that the board's line stalls for 60 ms
+  double bursts = 0;  // probability a pulse that the board's line stalls for 60 ms
   Duration report_delay = Duration::milliseconds(3), frame_delay = Duration::milliseconds(25);
   double report_jitter_ms = 1, frame_jitter_ms = 2;  // means, exponential
   double stamp_noise_us = 3;                         // of the cameras' stamps, uniform, each way
   std::array<Duration, kMaxCameras> lag{};           // more of the transport's delay, for ever
-  bool stale_first = false;                          // an image of before sits in each camera's buffer at its start
-  bool first_dropped = false;                        // each camera ignores its first trigger
-  std::uint64_t counter_start = 0;                   // of a camera's count
+  bool stale_first = false;         // an image of before sits in each camera's buffer at its start
+  bool first_dropped = false;       // each camera ignores its first trigger
+  std::uint64_t counter_start = 0;  // of a camera's count
   Duration exposure = Duration::milliseconds(8);
-  std::array<Duration, kMaxCameras> delay{Duration::microseconds(40), Duration::microseconds(70), {}, {}};
+  std::array<Duration, kMaxCameras> delay{
+      Duration::microseconds(40), Duration::microseconds(70), {}, {}};
   Duration host_noise = Duration::microseconds(20);  // of the pulses' mapped edges
-  /// How the host comes by the pulses' edges: it knows them but for `host_noise`; asks the board a hundred times a second; or from the
-  /// arrival of the reports alone. The line is late by report_delay, and by report_jitter_ms on average, each way.
+  /// How the host comes by the pulses' edges: it knows them but for `host_noise`; asks the board a
+  /// hundred times a second; or from the arrival of the reports alone. The line is late by
+  /// report_delay, and by report_jitter_ms on average, each way.
   enum class Clock : std::uint8_t { given, pings, arrivals } clock = Clock::given;
   bool feedback = false;  // the board measures the exposures
   double settle = 0;      // s, from which on stamps are compared with the truth
@@ -48,7 +51,8 @@ struct PulseRigOptions {
     double at = 0, seconds = 0;
   };
   std::vector<Jump> jumps{};  // a camera's clock is set
-  double quiet = 4;           // s around those, in which nothing is lost or missed: nobody can tell what was lost with a camera that went
+  double quiet = 4;  // s around those, in which nothing is lost or missed: nobody can tell what was
+                     // lost with a camera that went
 };
 
 /// What the rig did, by name.
@@ -59,13 +63,18 @@ struct PulseRigTruth {
   std::uint64_t broken = 0;   // promises to the user: a slot twice or never, an order, a flag
   std::uint64_t outside = 0;  // stamps farther from the truth than their bound
   std::vector<double> stamp_errors_us{};
-  double worst_acquisition_s = 0;  // from the first pulse after a start, reconnect or reboot to the first image of a set that is proven
+  double worst_acquisition_s = 0;  // from the first pulse after a start, reconnect or reboot to the
+                                   // first image of a set that is proven
 };
 
 class PulseRig {
  public:
   PulseRig(const PulseRigOptions& options, SyncOptions sync)
-      : o_(options), sync_(with(options, sync)), random_(options.seed, 77), truths_(1U << 16U), board_clock_(board_clock(options)) {
+      : o_(options),
+        sync_(with(options, sync)),
+        random_(options.seed, 77),
+        truths_(1U << 16U),
+        board_clock_(board_clock(options)) {
     board_offset_ = static_cast<std::int64_t>(random_.below(1'000'000)) * 1'000;
     board_drift_ = random_.uniform(-50e-6, 50e-6);
     for (int k = 0; k < o_.cameras; ++k) start_camera(k);
@@ -100,7 +109,8 @@ class PulseRig {
     deliver(INT64_MAX);
     sync_.finish();
     drain();
-    truth_.broken += static_cast<std::uint64_t>(std::count_if(held_.begin(), held_.end(), [](std::uint8_t n) { return n != 0; }));
+    truth_.broken += static_cast<std::uint64_t>(
+        std::count_if(held_.begin(), held_.end(), [](std::uint8_t n) { return n != 0; }));
   }
 
   void pauses(bool possible) { pauses_ = possible; }
@@ -130,7 +140,9 @@ class PulseRig {
     Pulse pulse{};
     Ping ping{};
     SyncFrame frame{};
-    [[nodiscard]] bool operator<(const Event& o) const { return arrival != o.arrival ? arrival > o.arrival : order > o.order; }
+    [[nodiscard]] bool operator<(const Event& o) const {
+      return arrival != o.arrival ? arrival > o.arrival : order > o.order;
+    }
   };
   struct Made {
     std::uint64_t pulse = 0;
@@ -150,12 +162,16 @@ class PulseRig {
     return c;
   }
   [[nodiscard]] DeviceStamp board_time(std::int64_t host) const {
-    return DeviceStamp((host + board_offset_ + std::llround(board_drift_ * static_cast<double>(host - ns(kStart)))) / 1'000 * 1'000);
+    return DeviceStamp((host + board_offset_ +
+                        std::llround(board_drift_ * static_cast<double>(host - ns(kStart)))) /
+                       1'000 * 1'000);
   }
   void ask(std::int64_t until) {
     if (o_.clock != PulseRigOptions::Clock::pings) return;
     for (; next_ping_ < until; next_ping_ += 10'000'000) {
-      const auto late = [&] { return o_.report_delay.ns() + ns(exponential(o_.report_jitter_ms * 1e-3)); };
+      const auto late = [&] {
+        return o_.report_delay.ns() + ns(exponential(o_.report_jitter_ms * 1e-3));
+      };
       const std::int64_t t2 = next_ping_ + late(), t3 = t2 + 20'000, t4 = t3 + late();
       Event e;
       e.is_ping = true;
@@ -174,12 +190,15 @@ class PulseRig {
     if (s < o_.quiet) return true;
     for (const auto& g : o_.gone)
       if (s > g.from - o_.quiet && s < g.until + o_.quiet) return true;
-    return std::any_of(o_.reboots.begin(), o_.reboots.end(), [&](double r) { return std::abs(s - r) < o_.quiet; });
+    return std::any_of(o_.reboots.begin(), o_.reboots.end(),
+                       [&](double r) { return std::abs(s - r) < o_.quiet; });
   }
-  /// Its clock is set about now. A clock that goes back by as many pulses as are missed at that moment nobody could tell.
+  /// Its clock is set about now. A clock that goes back by as many pulses as are missed at that
+  /// moment nobody could tell.
   bool being_set(int k, std::int64_t at) const {
     const double s = static_cast<double>(at) * 1e-9 - kStart;
-    return std::any_of(o_.jumps.begin(), o_.jumps.end(), [&](const auto& j) { return j.camera == k && std::abs(s - j.at) < 0.5; });
+    return std::any_of(o_.jumps.begin(), o_.jumps.end(),
+                       [&](const auto& j) { return j.camera == k && std::abs(s - j.at) < 0.5; });
   }
   void start_camera(int k) {
     Camera& c = cameras_[static_cast<std::size_t>(k)];
@@ -191,7 +210,8 @@ class PulseRig {
   }
   DeviceStamp stamp(const Camera& c, std::int64_t host) {
     const double noise = random_.uniform(-o_.stamp_noise_us, o_.stamp_noise_us) * 1e3;
-    const std::int64_t exact = host + c.offset + std::llround(c.drift * static_cast<double>(host - ns(kStart)) + noise);
+    const std::int64_t exact =
+        host + c.offset + std::llround(c.drift * static_cast<double>(host - ns(kStart)) + noise);
     return DeviceStamp(exact / 1'000 * 1'000);
   }
 
@@ -212,7 +232,8 @@ class PulseRig {
       }
     }
     for (const auto& j : o_.jumps)
-      if (s >= j.at && last_s_ < j.at) cameras_[static_cast<std::size_t>(j.camera)].offset += ns(j.seconds);
+      if (s >= j.at && last_s_ < j.at)
+        cameras_[static_cast<std::size_t>(j.camera)].offset += ns(j.seconds);
     last_s_ = s;
   }
 
@@ -230,14 +251,16 @@ class PulseRig {
       p.resumed = resumed;
       p.edge = board_time(at);
       p.mapped = true;
-      p.host = HostStamp(at + std::llround(random_.uniform(-1, 1) * static_cast<double>(o_.host_noise.ns())));
+      p.host = HostStamp(
+          at + std::llround(random_.uniform(-1, 1) * static_cast<double>(o_.host_noise.ns())));
       p.host_error = o_.host_noise + Duration::microseconds(1);
       for (std::size_t k = 0; o_.feedback && k < static_cast<std::size_t>(o_.cameras); ++k) {
         const Duration start = Duration::microseconds(o_.delay[k].ns() / 1'000);
         p.exposure[k] = {true, start, start + o_.exposure};
       }
       if (random_.uniform() < o_.bursts) stalled_until_ = at + 60'000'000;
-      const std::int64_t delayed = at + o_.report_delay.ns() + ns(exponential(o_.report_jitter_ms * 1e-3));
+      const std::int64_t delayed =
+          at + o_.report_delay.ns() + ns(exponential(o_.report_jitter_ms * 1e-3));
       last_report_ = std::max({delayed, stalled_until_, last_report_ + 1});
       p.arrival = HostStamp(last_report_);
       put(e, last_report_);
@@ -253,7 +276,8 @@ class PulseRig {
     const std::int64_t start = at + o_.delay[i].ns();
     if (c.first) {
       c.first = false;
-      if (o_.stale_first) frame(k, c.counter++, at - ns(random_.uniform(0.01, 0.5)), start, UINT64_MAX);
+      if (o_.stale_first)
+        frame(k, c.counter++, at - ns(random_.uniform(0.01, 0.5)), start, UINT64_MAX);
       if (o_.first_dropped) return;
     }
     if (!calm && !being_set(k, at) && random_.uniform() < o_.missed) {
@@ -269,7 +293,8 @@ class PulseRig {
     frame(k, counter, start, start, truth_.pulses);
   }
 
-  void frame(int k, std::uint64_t counter, std::int64_t start, std::int64_t sent, std::uint64_t pulse) {
+  void frame(int k, std::uint64_t counter, std::int64_t start, std::int64_t sent,
+             std::uint64_t pulse) {
     const auto i = static_cast<std::size_t>(k);
     Camera& c = cameras_[i];
     Event e;
@@ -281,7 +306,8 @@ class PulseRig {
     f.exposure_start = stamp(c, start);
     f.exposure = o_.exposure;
     f.middle = {HostStamp(start + o_.exposure.ns() / 2), Duration::milliseconds(1)};
-    const std::int64_t delayed = sent + (o_.exposure + o_.frame_delay + o_.lag[i]).ns() + ns(exponential(o_.frame_jitter_ms * 1e-3));
+    const std::int64_t delayed = sent + (o_.exposure + o_.frame_delay + o_.lag[i]).ns() +
+                                 ns(exponential(o_.frame_jitter_ms * 1e-3));
     c.last_arrival = std::max(delayed, c.last_arrival + 1);
     f.arrival = HostStamp(c.last_arrival);
     put(e, c.last_arrival);
@@ -321,7 +347,8 @@ class PulseRig {
   void check_contract(const SyncedSet& set) {
     bool complete = true;
     for (std::size_t k = 0; k < kMaxCameras; ++k) {
-      if (set.present[k]) truth_.broken += held_[static_cast<std::size_t>(set.slots[k])]-- == 1 ? 0 : 1;
+      if (set.present[k])
+        truth_.broken += held_[static_cast<std::size_t>(set.slots[k])]-- == 1 ? 0 : 1;
       complete = complete && (set.present[k] || k >= static_cast<std::size_t>(o_.cameras));
     }
     truth_.broken += complete == set.complete ? 0 : 1;

@@ -9,7 +9,8 @@
 /// What must hold for every seed: a few in the ordinary tests, many in the slow ones.
 namespace vergence::testing {
 
-/// Ten hours at 30 Hz: 0.1 % of the frames lost, 0.05 % of the triggers missed, five reconnects, three reboots.
+/// Ten hours at 30 Hz: 0.1 % of the frames lost, 0.05 % of the triggers missed, five reconnects,
+/// three reboots.
 inline PulseRigOptions ten_hours(std::uint64_t seed) {
   PulseRigOptions o;
   o.seed = seed;
@@ -72,7 +73,8 @@ inline void expect_never_wrong(std::uint64_t seed, double seconds) {
   o.bursts = often({0, 0, 0.05, 0.3});
   o.frame_jitter_ms = often({0.5, 2, 15});
   o.stamp_noise_us = often({1, 10, 300});
-  // Where only a pause proves, a camera that often misses as many in a row as a pause leaves out could be mistaken.
+  // Where only a pause proves, a camera that often misses as many in a row as a pause leaves out
+  // could be mistaken.
   const bool varied = o.vary.to_seconds() > o.stamp_noise_us * 8e-6;
   o.missed = varied ? often({0, 0.001, 0.02, 0.1}) : often({0, 0.001, 0.02});
   o.stale_first = random.below(2) == 0;
@@ -90,7 +92,9 @@ inline void expect_never_wrong(std::uint64_t seed, double seconds) {
         o.reboots.push_back(at);
         break;
       default:
-        o.jumps.push_back({camera, at, random.below(2) == 0 ? random.uniform(-3, 3) : (random.uniform() < 0.5 ? 1 : -2) / o.rate_hz});
+        o.jumps.push_back({camera, at,
+                           random.below(2) == 0 ? random.uniform(-3, 3)
+                                                : (random.uniform() < 0.5 ? 1 : -2) / o.rate_hz});
     }
   }
   SyncOptions sync;

@@ -26,7 +26,8 @@ struct Out {
     for (SyncedSet set; sync->next(&set);) sets.push_back(set);
   }
   [[nodiscard]] std::size_t complete() const {
-    return static_cast<std::size_t>(std::count_if(sets.begin(), sets.end(), [](const SyncedSet& s) { return s.complete; }));
+    return static_cast<std::size_t>(
+        std::count_if(sets.begin(), sets.end(), [](const SyncedSet& s) { return s.complete; }));
   }
   /// Slots carry the pulse in every test here.
   void expect_pairs() const {
@@ -38,8 +39,8 @@ struct Out {
   }
 };
 
-SyncFrame frame(int camera, int pulse, std::uint64_t counter, HostStamp start, DeviceStamp by_camera,
-                Duration delay = Duration::milliseconds(30)) {
+SyncFrame frame(int camera, int pulse, std::uint64_t counter, HostStamp start,
+                DeviceStamp by_camera, Duration delay = Duration::milliseconds(30)) {
   SyncFrame f;
   f.camera = camera;
   f.slot = static_cast<FrameSlot>(pulse);
@@ -93,7 +94,8 @@ TEST_P(CommonClock, whatIsTooFarApartIsNotPaired) {
   Out out;
   for (int n = 0; n < 50; ++n)
     for (int k = 0; k < 2; ++k) {
-      (void)sync.offer(frame(k, n, 0, host_at(n), DeviceStamp((kInterval * n).ns()) + Duration::milliseconds(15 * k)));
+      (void)sync.offer(frame(k, n, 0, host_at(n),
+                             DeviceStamp((kInterval * n).ns()) + Duration::milliseconds(15 * k)));
       out.drain(&sync);
     }
   EXPECT_EQ(out.complete(), 0U);
@@ -105,7 +107,8 @@ TEST_P(CommonClock, thatIsSetBackIsFollowedAfterThreeFrames) {
   for (int n = 0; n < 400; ++n) {
     const std::int64_t set = n < 200 ? 0 : -20'000'000'000;
     for (int k = 0; k < 2; ++k) {
-      (void)sync.offer(frame(k, n, 0, host_at(n), DeviceStamp(90'000'000'000 + (kInterval * n).ns() + set)));
+      (void)sync.offer(
+          frame(k, n, 0, host_at(n), DeviceStamp(90'000'000'000 + (kInterval * n).ns() + set)));
       out.drain(&sync);
     }
   }
@@ -114,7 +117,8 @@ TEST_P(CommonClock, thatIsSetBackIsFollowedAfterThreeFrames) {
   out.expect_pairs();
   EXPECT_GE(out.complete(), 397U);
   EXPECT_EQ(sync.counters().contradictions[0] + sync.counters().contradictions[1], 1U);
-  for (std::size_t i = 1; i < out.sets.size(); ++i) EXPECT_GT(out.sets[i].number, out.sets[i - 1].number);
+  for (std::size_t i = 1; i < out.sets.size(); ++i)
+    EXPECT_GT(out.sets[i].number, out.sets[i - 1].number);
 }
 
 INSTANTIATE_TEST_SUITE_P(Modes, CommonClock, ::testing::Values(SyncMode::bus, SyncMode::ptp));
@@ -138,7 +142,8 @@ TEST(RigModes, camerasOnABusThatUnwrappedItsClockDifferentlyArePairedModulo128Se
 
 struct SyncOut : ::testing::TestWithParam<std::uint32_t> {};
 
-/// Cameras triggered by an INS at 100 Hz that sends a pulse every fourth sample. Even intervals: only a gap proves.
+/// Cameras triggered by an INS at 100 Hz that sends a pulse every fourth sample. Even intervals:
+/// only a gap proves.
 TEST_P(SyncOut, isProvenByAGapBeforeTheDrive) {
   const std::uint32_t divider = GetParam();
   SyncOptions o = options(SyncMode::ins_syncout);
@@ -172,8 +177,9 @@ TEST_P(SyncOut, isProvenByAGapBeforeTheDrive) {
     if (!pulsed) continue;
     for (int k = 0; k < 2; ++k) {
       const auto i = static_cast<std::size_t>(k);
-      (void)sync.offer(
-          frame(k, pulse, counters[i]++, t, DeviceStamp(t.ns() / (k + 1) * (k + 1) - 7'000'000 * k), Duration::milliseconds(9)));
+      (void)sync.offer(frame(k, pulse, counters[i]++, t,
+                             DeviceStamp(t.ns() / (k + 1) * (k + 1) - 7'000'000 * k),
+                             Duration::milliseconds(9)));
       out.drain(&sync);
     }
     ++pulse;
@@ -219,16 +225,20 @@ struct MasterRig {
 
   void pulse() {
     const HostStamp start = HostStamp(9'000'000'000) + time;
-    const bool lost0 = lose && random.uniform() < 0.01, lost1 = lose && random.uniform() < 0.01, missed1 = std::exchange(miss, false);
+    const bool lost0 = lose && random.uniform() < 0.01, lost1 = lose && random.uniform() < 0.01,
+               missed1 = std::exchange(miss, false);
     lost[0] += lost0 ? 1 : 0;
-    if (!lost0) offer(frame(0, number, counters[0], start, DeviceStamp(start.ns() + 5'000'000'000)));
+    if (!lost0)
+      offer(frame(0, number, counters[0], start, DeviceStamp(start.ns() + 5'000'000'000)));
     ++counters[0];
     if (slave_here) {
       missed[1] += missed1 ? 1 : 0;
       if (!missed1) {
         lost[1] += lost1 ? 1 : 0;
         // 20 ppm faster.
-        if (!lost1) offer(frame(1, number, counters[1], start, DeviceStamp(start.ns() + start.ns() / 50'000 - slave_offset)));
+        if (!lost1)
+          offer(frame(1, number, counters[1], start,
+                      DeviceStamp(start.ns() + start.ns() / 50'000 - slave_offset)));
         ++counters[1];
       }
     }
@@ -294,7 +304,8 @@ TEST(RigModes, aMasterThatStopsAndStartsProvesItsSlaves) {
     EXPECT_EQ(c.lost[1], rig.lost[1]);
     EXPECT_EQ(c.missed_trigger[1], rig.missed[1]);
     EXPECT_GT(rig.out.complete(), 1200U);
-    for (const SyncedSet& s : rig.out.sets) EXPECT_TRUE(s.proof == SyncProof::master || s.proof == SyncProof::unproven);
+    for (const SyncedSet& s : rig.out.sets)
+      EXPECT_TRUE(s.proof == SyncProof::master || s.proof == SyncProof::unproven);
   }
 }
 
@@ -313,7 +324,8 @@ Pulse pulse_at(std::uint64_t number, HostStamp at) {
 
 /// Varied by a millisecond, as the board does it.
 Duration varied(std::uint64_t n) {
-  return kInterval + Duration::milliseconds(trigger_interval_is_longer(static_cast<std::uint32_t>(n)) ? 1 : -1);
+  return kInterval +
+         Duration::milliseconds(trigger_interval_is_longer(static_cast<std::uint32_t>(n)) ? 1 : -1);
 }
 
 TEST(RigModes, oneStampForAllFromTheMeasuredExposureOrFromEdgeDelayAndExposure) {
@@ -341,8 +353,10 @@ TEST(RigModes, oneStampForAllFromTheMeasuredExposureOrFromEdgeDelayAndExposure) 
   for (const SyncedSet& s : out.sets) {
     const HostStamp edge = edges[s.slots[0]];
     const bool measured = s.slots[0] >= 40;
-    EXPECT_EQ(s.stamp - edge, measured ? Duration::microseconds(2050) : Duration::microseconds(3030));
-    EXPECT_EQ(s.spread, measured ? Duration::microseconds(50) : Duration::microseconds(1030)) << "unequal exposures";
+    EXPECT_EQ(s.stamp - edge,
+              measured ? Duration::microseconds(2050) : Duration::microseconds(3030));
+    EXPECT_EQ(s.spread, measured ? Duration::microseconds(50) : Duration::microseconds(1030))
+        << "unequal exposures";
     EXPECT_EQ(s.error, Duration::microseconds(15));
     EXPECT_TRUE(s.reported);
   }
@@ -354,12 +368,15 @@ TEST(RigModes, aReportThatContradictsAFrameMakesItsSetUnproven) {
   HostStamp t(80'000'000'000);
   for (std::uint64_t n = 0; n < 40; ++n) {
     sync.pulse(pulse_at(n, t));
-    for (int k = 0; k < 2; ++k) (void)sync.offer(frame(k, static_cast<int>(n), n, t, DeviceStamp(t.ns()))), out.drain(&sync);
+    for (int k = 0; k < 2; ++k)
+      (void)sync.offer(frame(k, static_cast<int>(n), n, t, DeviceStamp(t.ns()))), out.drain(&sync);
     t = t + varied(n);
   }
   ASSERT_TRUE(sync.proven(0) && sync.proven(1));
-  // The frames come first; the report then says that the pulse went out 700 µs earlier than their stamps do.
-  for (int k = 0; k < 2; ++k) (void)sync.offer(frame(k, 40, 40, t, DeviceStamp(t.ns()))), out.drain(&sync);
+  // The frames come first; the report then says that the pulse went out 700 µs earlier than their
+  // stamps do.
+  for (int k = 0; k < 2; ++k)
+    (void)sync.offer(frame(k, 40, 40, t, DeviceStamp(t.ns()))), out.drain(&sync);
   const std::size_t before = out.sets.size();
   sync.pulse(pulse_at(40, t - Duration::microseconds(700)));
   out.drain(&sync);
@@ -380,12 +397,14 @@ TEST(RigModes, nothingIsTakenFromTheHeap) {
   {
     const SealedScope sealed;
     for (std::uint64_t n = 0; n < 500; ++n) {
-      clock.ping(t, DeviceStamp(t.ns() + 1000), DeviceStamp(t.ns() + 2000), t + Duration::microseconds(3));
+      clock.ping(t, DeviceStamp(t.ns() + 1000), DeviceStamp(t.ns() + 2000),
+                 t + Duration::microseconds(3));
       (void)clock.at(DeviceStamp(t.ns()));
       if (n == 200) sync.restarted(1);
       sync.pulse(pulse_at(n, t));
       for (int k = 0; k < 2; ++k) {
-        (void)sync.offer(frame(k, static_cast<int>(n), n, t, DeviceStamp(t.ns() * (n < 300 || k == 1 ? 1 : -1))));
+        (void)sync.offer(frame(k, static_cast<int>(n), n, t,
+                               DeviceStamp(t.ns() * (n < 300 || k == 1 ? 1 : -1))));
         for (SyncedSet set; sync.next(&set);) ++sets;
       }
       (void)sync.wants_pause();
@@ -397,8 +416,9 @@ TEST(RigModes, nothingIsTakenFromTheHeap) {
 }
 
 TEST(RigModes, modesHaveNamesAndNonsenseIsNamed) {
-  for (const SyncMode m : {SyncMode::counter, SyncMode::software, SyncMode::board, SyncMode::ins_syncout, SyncMode::master_strobe,
-                           SyncMode::bus, SyncMode::ptp}) {
+  for (const SyncMode m :
+       {SyncMode::counter, SyncMode::software, SyncMode::board, SyncMode::ins_syncout,
+        SyncMode::master_strobe, SyncMode::bus, SyncMode::ptp}) {
     EXPECT_EQ(sync_mode_of(to_string(m)), m);
     EXPECT_EQ(options(m).validate(), nullptr);
   }

@@ -22,7 +22,9 @@ SyncOptions options(int cameras = 2) {
   return o;
 }
 
-HostStamp middle_of(std::uint64_t pulse) { return HostStamp(1'000'000'000) + kInterval * static_cast<std::int64_t>(pulse); }
+HostStamp middle_of(std::uint64_t pulse) {
+  return HostStamp(1'000'000'000) + kInterval * static_cast<std::int64_t>(pulse);
+}
 
 SyncFrame frame(int camera, std::uint64_t counter, std::uint64_t pulse, FrameSlot slot = 0) {
   SyncFrame f;
@@ -40,7 +42,8 @@ std::vector<SyncedSet> drain(RigSynchronizer* sync) {
   return sets;
 }
 
-std::vector<SyncedSet> offer(RigSynchronizer* sync, const SyncFrame& f, SyncVerdict expected = SyncVerdict::taken) {
+std::vector<SyncedSet> offer(RigSynchronizer* sync, const SyncFrame& f,
+                             SyncVerdict expected = SyncVerdict::taken) {
   EXPECT_EQ(sync->offer(f), expected) << "camera " << f.camera << " counter " << f.counter;
   return drain(sync);
 }
@@ -141,7 +144,8 @@ TEST(RigSynchronizer, nonsenseIsNamed) {
   EXPECT_NE(o.validate(), nullptr);
 }
 
-/// What a synchroniser may know, kept in plain containers: which pulses each camera has given, which sets are out.
+/// What a synchroniser may know, kept in plain containers: which pulses each camera has given,
+/// which sets are out.
 class Shadow {
  public:
   explicit Shadow(int cameras) : given_(static_cast<std::size_t>(cameras)) {}
@@ -177,7 +181,9 @@ class Shadow {
   [[nodiscard]] std::size_t waiting() const { return waiting_.size(); }
   [[nodiscard]] std::uint64_t sets() const { return sets_; }
   /// No complete set may wait behind nothing.
-  [[nodiscard]] bool oldest_complete() const { return !waiting_.empty() && waiting_.begin()->second.size() == given_.size(); }
+  [[nodiscard]] bool oldest_complete() const {
+    return !waiting_.empty() && waiting_.begin()->second.size() == given_.size();
+  }
 
  private:
   std::vector<std::set<std::uint64_t>> given_;
@@ -193,7 +199,8 @@ TEST(RigSynchronizer, behavesLikeItsShadowUnderRandomLossRepetitionAndDelay) {
     Random random(seed);
     RigSynchronizer sync(options(cameras));
     Shadow shadow(cameras);
-    std::vector<std::uint64_t> at(static_cast<std::size_t>(cameras), 0);  // next pulse of each camera
+    std::vector<std::uint64_t> at(static_cast<std::size_t>(cameras),
+                                  0);  // next pulse of each camera
     FrameSlot slot = 0;
     std::uint64_t duplicates = 0, lates = 0;
     for (int step = 0; step < 20000; ++step) {
@@ -216,7 +223,8 @@ TEST(RigSynchronizer, behavesLikeItsShadowUnderRandomLossRepetitionAndDelay) {
       }
       const SyncVerdict expected = shadow.verdict(k, number);
       const SyncFrame f = frame(k, number, number, slot);
-      ASSERT_EQ(sync.offer(f), expected) << "step " << step << " camera " << k << " pulse " << number;
+      ASSERT_EQ(sync.offer(f), expected)
+          << "step " << step << " camera " << k << " pulse " << number;
       duplicates += expected == SyncVerdict::duplicate ? 1 : 0;
       lates += expected == SyncVerdict::late ? 1 : 0;
       if (expected == SyncVerdict::taken) shadow.taken(k, number, slot);
@@ -234,7 +242,8 @@ TEST(RigSynchronizer, behavesLikeItsShadowUnderRandomLossRepetitionAndDelay) {
     const SyncCounters& c = sync.counters();
     EXPECT_EQ(c.complete + c.incomplete, shadow.sets());
     std::uint64_t counted_duplicates = 0, counted_lates = 0;
-    for (std::size_t k = 0; k < kMaxCameras; ++k) counted_duplicates += c.duplicate[k], counted_lates += c.late[k];
+    for (std::size_t k = 0; k < kMaxCameras; ++k)
+      counted_duplicates += c.duplicate[k], counted_lates += c.late[k];
     EXPECT_EQ(counted_duplicates, duplicates);
     EXPECT_EQ(counted_lates, lates);
     EXPECT_GT(duplicates, 100U);
@@ -271,7 +280,8 @@ TEST(RigSynchronizer, stampsThatDisagreeMakeASetUnproven) {
   EXPECT_TRUE(sets[0].complete);
   EXPECT_EQ(sets[0].proof, SyncProof::unproven);
   EXPECT_EQ(sync.counters().unproven, 1U);
-  EXPECT_EQ(sync.counters().realigned, 0U) << "the pulses began with the cameras: the counters are right or a trigger was missed";
+  EXPECT_EQ(sync.counters().realigned, 0U)
+      << "the pulses began with the cameras: the counters are right or a trigger was missed";
 }
 
 TEST(RigSynchronizer, camerasThatStartAmidPulsesAreAlignedByTheirStamps) {
@@ -331,7 +341,8 @@ SyncFrame timed(int camera, std::uint64_t counter, double ms) {
 
 TEST(RigSynchronizer, withoutATriggerWhatIsNearInTimeIsPairedAndSaysSo) {
   RigSynchronizer sync(by_time());
-  // The counters mean nothing: camera 1 has counted 1000 exposures more, and jitters by up to 2.5 ms.
+  // The counters mean nothing: camera 1 has counted 1000 exposures more, and jitters by up to 2.5
+  // ms.
   Random random(5);
   int complete = 0;
   for (std::uint64_t n = 0; n < 200; ++n) {
@@ -373,7 +384,8 @@ TEST(RigSynchronizer, byTimeAPauseAndALostImageCostNothingElse) {
     }
   };
   for (std::uint64_t n = 0; n < 30; ++n) {
-    const double at = n < 15 ? 50.0 * static_cast<double>(n) : 50.0 * static_cast<double>(n) + 5013;  // five seconds of rest
+    const double at = n < 15 ? 50.0 * static_cast<double>(n)
+                             : 50.0 * static_cast<double>(n) + 5013;  // five seconds of rest
     take(timed(0, n, at));
     if (n != 7) take(timed(1, n, at + 1));
   }

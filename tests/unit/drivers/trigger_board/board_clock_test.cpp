@@ -10,7 +10,9 @@ namespace {
 constexpr std::int64_t kZero = 5'000'000'000;  // host time of tick 0, ns
 
 HostStamp host(std::int64_t us) { return HostStamp(kZero + us * 1000); }
-TriggerPong pong(std::uint32_t token, std::uint64_t received, std::uint64_t sent) { return {token, 1, received, sent}; }
+TriggerPong pong(std::uint32_t token, std::uint64_t received, std::uint64_t sent) {
+  return {token, 1, received, sent};
+}
 
 TEST(BoardClock, oneAnswerSaysTheTimeWithinHalfItsRoundTrip) {
   BoardClock clock;
@@ -42,10 +44,13 @@ TEST(BoardClock, answersThatCannotBeAreRefused) {
   BoardClock clock;
   EXPECT_EQ(clock.answer(pong(77, 10, 20), host(30)), PongWord::unasked);
   const std::uint32_t a = clock.ask(host(100));
-  EXPECT_EQ(clock.answer(pong(a, 300, 200), host(400)), PongWord::nonsense) << "sent before received";
-  EXPECT_EQ(clock.answer(pong(a, 200, 300), host(400)), PongWord::unasked) << "it has been answered";
+  EXPECT_EQ(clock.answer(pong(a, 300, 200), host(400)), PongWord::nonsense)
+      << "sent before received";
+  EXPECT_EQ(clock.answer(pong(a, 200, 300), host(400)), PongWord::unasked)
+      << "it has been answered";
   const std::uint32_t b = clock.ask(host(1000));
-  EXPECT_EQ(clock.answer(pong(b, 1000, 9000), host(2000)), PongWord::nonsense) << "longer in the board than under way";
+  EXPECT_EQ(clock.answer(pong(b, 1000, 9000), host(2000)), PongWord::nonsense)
+      << "longer in the board than under way";
   const std::uint32_t c = clock.ask(host(3000));
   EXPECT_EQ(clock.answer(pong(c, kMostTicks, kMostTicks + 1), host(4000)), PongWord::nonsense);
   EXPECT_FALSE(clock.known());
@@ -58,7 +63,8 @@ TEST(BoardClock, aClockThatWasSetBackIsBelievedAtTheThirdAnswer) {
   const auto ask = [&](std::int64_t back) {
     now += 10'000;
     const std::uint32_t token = clock.ask(host(now));
-    return clock.answer(pong(token, static_cast<std::uint64_t>(now - back + 200), static_cast<std::uint64_t>(now - back + 200)),
+    return clock.answer(pong(token, static_cast<std::uint64_t>(now - back + 200),
+                             static_cast<std::uint64_t>(now - back + 200)),
                         host(now + 400));
   };
   for (int i = 0; i < 20; ++i) ASSERT_EQ(ask(0), PongWord::taken);
@@ -68,13 +74,15 @@ TEST(BoardClock, aClockThatWasSetBackIsBelievedAtTheThirdAnswer) {
   EXPECT_EQ(ask(90'000), PongWord::backward);
   EXPECT_EQ(clock.resets_by_set_back(), 1U);
   EXPECT_EQ(ask(90'000), PongWord::taken);
-  const MappedStamp m = clock.map(stamp_of_tick(static_cast<std::uint64_t>(now - 90'000)), host(now));
+  const MappedStamp m =
+      clock.map(stamp_of_tick(static_cast<std::uint64_t>(now - 90'000)), host(now));
   EXPECT_LE(std::abs((m.host - host(now)).ns()), m.error.ns());
 }
 
 TEST(BoardClock, questionsThatNobodyAnswersAreCounted) {
   BoardClock clock;
-  for (std::size_t i = 0; i < BoardClock::kOpen + 10; ++i) (void)clock.ask(host(static_cast<std::int64_t>(i) * 1000));
+  for (std::size_t i = 0; i < BoardClock::kOpen + 10; ++i)
+    (void)clock.ask(host(static_cast<std::int64_t>(i) * 1000));
   EXPECT_EQ(clock.quality().unanswered, 10U);
   clock.reopen({});
   EXPECT_EQ(clock.quality().unanswered, BoardClock::kOpen + 10);

@@ -34,7 +34,8 @@ TEST(Board, isMetSetAndRead) {
   EXPECT_EQ(rig.device->wait(Duration{}, &p), DeviceStatus::stopped);
   EXPECT_EQ(rig.device->start(nullptr), DeviceStatus::bad_configuration) << "not configured";
   TriggerConfiguration actual;
-  ASSERT_EQ(rig.device->configure(thirty_hertz(), &actual), DeviceStatus::ok) << rig.device->complaint();
+  ASSERT_EQ(rig.device->configure(thirty_hertz(), &actual), DeviceStatus::ok)
+      << rig.device->complaint();
   EXPECT_EQ(actual.rate_hz, 30);
   EXPECT_TRUE(rig.device->remark().empty());
   ASSERT_EQ(rig.device->start(nullptr), DeviceStatus::ok);
@@ -57,7 +58,8 @@ TEST(Board, isMetSetAndRead) {
 
 TEST(Board, tellsEveryPulseOfTenMinutes) {
   BoardRig rig(board_for(Duration::seconds(600)), direct_line());
-  ASSERT_EQ(rig.device->configure(thirty_hertz(), nullptr), DeviceStatus::ok) << rig.device->complaint();
+  ASSERT_EQ(rig.device->configure(thirty_hertz(), nullptr), DeviceStatus::ok)
+      << rig.device->complaint();
   ASSERT_EQ(rig.device->start(nullptr), DeviceStatus::ok);
   const auto all = rig.pulses();
   expect_gapless(all);
@@ -78,7 +80,8 @@ TEST(Board, isFoundAtWhicheverBaudRateItHas) {
     mock::BoardSimulatorOptions board = board_for(Duration::seconds(20));
     board.baud = baud;
     BoardRig rig(board);
-    ASSERT_EQ(rig.device->configure(thirty_hertz(), nullptr), DeviceStatus::ok) << baud << ": " << rig.device->complaint();
+    ASSERT_EQ(rig.device->configure(thirty_hertz(), nullptr), DeviceStatus::ok)
+        << baud << ": " << rig.device->complaint();
     ASSERT_EQ(rig.device->start(nullptr), DeviceStatus::ok);
     EXPECT_EQ(rig.pulses(30).size(), 30U);
   }
@@ -95,7 +98,8 @@ TEST(Board, exposureFeedbackComesWithItsPulse) {
   rig.exposures = [](const mock::SimulatedPulse& p) {
     mock::SimulatedExposures e;
     e[0] = {true, p.edge + Duration::microseconds(35), p.edge + Duration::microseconds(8035)};
-    e[1] = {p.number % 5 != 3, p.edge + Duration::microseconds(41), p.edge + Duration::microseconds(6041 + p.number)};
+    e[1] = {p.number % 5 != 3, p.edge + Duration::microseconds(41),
+            p.edge + Duration::microseconds(6041 + p.number)};
     return e;
   };
   TriggerConfiguration wanted = thirty_hertz();
@@ -106,13 +110,16 @@ TEST(Board, exposureFeedbackComesWithItsPulse) {
   const auto all = rig.pulses();
   ASSERT_GT(all.size(), 500U);
   expect_gapless(all);
-  const auto near_us = [](Duration d, std::int64_t us) { return std::abs(d.ns() - us * 1000) <= 1000; };  // a tick
+  const auto near_us = [](Duration d, std::int64_t us) {
+    return std::abs(d.ns() - us * 1000) <= 1000;
+  };  // a tick
   for (const Pulse& p : all) {
     ASSERT_TRUE(p.exposure[0].seen);
     ASSERT_TRUE(near_us(p.exposure[0].start, 35) && near_us(p.exposure[0].end, 8035)) << p.number;
     ASSERT_EQ(p.exposure[1].seen, p.number % 5 != 3);
     if (p.exposure[1].seen) {
-      ASSERT_TRUE(near_us(p.exposure[1].start, 41) && near_us(p.exposure[1].end, 6041 + static_cast<std::int64_t>(p.number)));
+      ASSERT_TRUE(near_us(p.exposure[1].start, 41) &&
+                  near_us(p.exposure[1].end, 6041 + static_cast<std::int64_t>(p.number)));
     }
     ASSERT_FALSE(p.exposure[2].seen);
     ASSERT_LE(std::abs((p.host - rig.truth(p)).ns()), p.host_error.ns());
@@ -128,7 +135,9 @@ TEST(Board, variedIntervalsAreThoseThatBothSidesKnow) {
   const auto all = rig.pulses();
   ASSERT_GT(all.size(), 250U);
   for (std::size_t i = 1; i < all.size(); ++i) {
-    const double expected = 1.0 / 30 + (trigger_interval_is_longer(static_cast<std::uint32_t>(all[i - 1].number)) ? 2e-3 : -2e-3);
+    const double expected =
+        1.0 / 30 +
+        (trigger_interval_is_longer(static_cast<std::uint32_t>(all[i - 1].number)) ? 2e-3 : -2e-3);
     ASSERT_NEAR((all[i].edge - all[i - 1].edge).to_seconds(), expected, 2.5e-6);
   }
 }
@@ -136,7 +145,8 @@ TEST(Board, variedIntervalsAreThoseThatBothSidesKnow) {
 TEST(Board, aPauseIsAGapWithoutLoss) {
   BoardRig rig(board_for(Duration::seconds(30)), direct_line());
   ASSERT_EQ(rig.device->pause(4), DeviceStatus::stopped);
-  ASSERT_EQ(rig.device->configure(thirty_hertz(), nullptr), DeviceStatus::ok) << rig.device->complaint();
+  ASSERT_EQ(rig.device->configure(thirty_hertz(), nullptr), DeviceStatus::ok)
+      << rig.device->complaint();
   ASSERT_EQ(rig.device->start(nullptr), DeviceStatus::ok);
   auto all = rig.pulses(50);
   ASSERT_EQ(rig.device->pause(4), DeviceStatus::ok);
@@ -162,9 +172,11 @@ TEST(Board, aPauseIsAGapWithoutLoss) {
 
 TEST(Board, aRebootIsANewBootAndTheBoardGoesOnByItself) {
   mock::BoardSimulatorOptions board = board_for(Duration::seconds(40));
-  for (int i = 0; i < 20; ++i) board.reboots.push_back(at_s(10 + i + 0.000'137 * i));  // at any byte of any frame
+  for (int i = 0; i < 20; ++i)
+    board.reboots.push_back(at_s(10 + i + 0.000'137 * i));  // at any byte of any frame
   BoardRig rig(board, direct_line());
-  ASSERT_EQ(rig.device->configure(thirty_hertz(), nullptr), DeviceStatus::ok) << rig.device->complaint();
+  ASSERT_EQ(rig.device->configure(thirty_hertz(), nullptr), DeviceStatus::ok)
+      << rig.device->complaint();
   ASSERT_EQ(rig.device->start(nullptr), DeviceStatus::ok);
   const auto all = rig.pulses();
   EXPECT_EQ(rig.times_gone, 0) << "it answers all the while";
@@ -183,14 +195,16 @@ TEST(Board, aRebootIsANewBootAndTheBoardGoesOnByItself) {
   EXPECT_EQ(boots, 21U);
   for (const Pulse& p : all) ASSERT_LE(std::abs((p.host - rig.truth(p)).ns()), p.host_error.ns());
   EXPECT_EQ(rig.device->statistics().reboots, 20U);
-  EXPECT_EQ(rig.device->board_statistics().time.resets, 0U) << "another boot's clock is another clock, not one that was set";
+  EXPECT_EQ(rig.device->board_statistics().time.resets, 0U)
+      << "another boot's clock is another clock, not one that was set";
 }
 
 TEST(Board, pulsesGoOnWhileTheLineIsAwayAndWhatWasMissedIsCounted) {
   mock::SimulatedLineOptions line = direct_line();
   line.outages = {{at_s(10), at_s(12.5)}};
   BoardRig rig(board_for(Duration::seconds(20)), line);
-  ASSERT_EQ(rig.device->configure(thirty_hertz(), nullptr), DeviceStatus::ok) << rig.device->complaint();
+  ASSERT_EQ(rig.device->configure(thirty_hertz(), nullptr), DeviceStatus::ok)
+      << rig.device->complaint();
   ASSERT_EQ(rig.device->start(nullptr), DeviceStatus::ok);
   const auto all = rig.pulses();
   EXPECT_EQ(rig.times_gone, 1);
@@ -212,7 +226,8 @@ TEST(Board, oneThatLostItsSupplyTooBeginsAnew) {
   mock::SimulatedLineOptions line;
   line.outages = {{at_s(10), at_s(12), false}, {at_s(15), at_s(15.2), false}};
   BoardRig rig(board_for(Duration::seconds(20)), line);
-  ASSERT_EQ(rig.device->configure(thirty_hertz(), nullptr), DeviceStatus::ok) << rig.device->complaint();
+  ASSERT_EQ(rig.device->configure(thirty_hertz(), nullptr), DeviceStatus::ok)
+      << rig.device->complaint();
   ASSERT_EQ(rig.device->start(nullptr), DeviceStatus::ok);
   const auto all = rig.pulses();
   EXPECT_EQ(rig.times_gone, 2);
@@ -291,7 +306,8 @@ TEST(Board, oneThatRanBeforeTheProgramIsStoppedFirst) {
   rig.simulator->receive(start, at_s(5));
   (void)rig.place->pass(Duration::seconds(8));
   ASSERT_GT(rig.simulator->pulses_made(), 50U);
-  ASSERT_EQ(rig.device->configure(thirty_hertz(), nullptr), DeviceStatus::ok) << rig.device->complaint();
+  ASSERT_EQ(rig.device->configure(thirty_hertz(), nullptr), DeviceStatus::ok)
+      << rig.device->complaint();
   const std::uint64_t made = rig.simulator->pulses_made();
   (void)rig.place->pass(Duration::seconds(1));
   EXPECT_EQ(rig.simulator->pulses_made(), made);
@@ -305,11 +321,12 @@ TEST(Board, oneThatRanBeforeTheProgramIsStoppedFirst) {
 TEST(Board, oneThatStopsByItselfIsStartedAgain) {
   std::shared_ptr<mock::BoardSimulator> simulator;
   bool done = false;
-  BoardRig rig(board_for(Duration::seconds(20)), direct_line(), {}, [&](HostStamp at, std::vector<std::uint8_t>*) {
-    if (done || at < at_s(6)) return;
-    done = true;
-    simulator->receive(closed({trigger_stop, 9, 0, {}}), at);
-  });
+  BoardRig rig(board_for(Duration::seconds(20)), direct_line(), {},
+               [&](HostStamp at, std::vector<std::uint8_t>*) {
+                 if (done || at < at_s(6)) return;
+                 done = true;
+                 simulator->receive(closed({trigger_stop, 9, 0, {}}), at);
+               });
   simulator = rig.simulator;
   ASSERT_EQ(rig.device->configure(thirty_hertz(), nullptr), DeviceStatus::ok);
   ASSERT_EQ(rig.device->start(nullptr), DeviceStatus::ok);
@@ -326,7 +343,8 @@ TEST(Board, secondsOfPpsAndTheInsAreCountedAndTheTicksLocked) {
   board.clock_ppm = 30;
   board.ins_interval = Duration::milliseconds(40);
   BoardRig rig(board, direct_line(), {.pps = Edge::rising, .ins = Edge::falling});
-  ASSERT_EQ(rig.device->configure(thirty_hertz(), nullptr), DeviceStatus::ok) << rig.device->complaint();
+  ASSERT_EQ(rig.device->configure(thirty_hertz(), nullptr), DeviceStatus::ok)
+      << rig.device->complaint();
   ASSERT_EQ(rig.device->start(nullptr), DeviceStatus::ok);
   const auto all = rig.pulses();
   const BoardStatistics s = rig.device->board_statistics();
@@ -334,8 +352,10 @@ TEST(Board, secondsOfPpsAndTheInsAreCountedAndTheTicksLocked) {
   EXPECT_NEAR(static_cast<double>(s.ins_edges), 1490, 15);
   EXPECT_TRUE(s.time.pps_locked);
   EXPECT_LE(s.time.pps_age, Duration::seconds(2));
-  EXPECT_NEAR(s.time.drift_ppm, 0, 1) << "disciplined: as fast as the host's clock, which is the GNSS' here";
-  for (const Pulse& p : all) ASSERT_LE(std::abs((p.host - rig.truth(p)).ns()), p.host_error.ns()) << p.number;
+  EXPECT_NEAR(s.time.drift_ppm, 0, 1)
+      << "disciplined: as fast as the host's clock, which is the GNSS' here";
+  for (const Pulse& p : all)
+    ASSERT_LE(std::abs((p.host - rig.truth(p)).ns()), p.host_error.ns()) << p.number;
 }
 
 TEST(Board, anotherOneInItsPlaceIsNotTaken) {
@@ -363,7 +383,8 @@ TEST(Board, anotherOneInItsPlaceIsNotTaken) {
   EXPECT_GT(rig.truth(all.back()), at_s(59));
 }
 
-// ---- what is asked ----------------------------------------------------------------------------------------------------
+// ---- what is asked
+// ----------------------------------------------------------------------------------------------------
 
 struct Refusal {
   const char* name;
@@ -381,32 +402,43 @@ TEST_P(Refused, withTheKeyToChange) {
   TriggerConfiguration wanted = thirty_hertz();
   GetParam().change(&wanted);
   EXPECT_EQ(rig.device->configure(wanted, nullptr), GetParam().status);
-  EXPECT_NE(rig.device->complaint().find(GetParam().word), std::string::npos) << rig.device->complaint();
+  EXPECT_NE(rig.device->complaint().find(GetParam().word), std::string::npos)
+      << rig.device->complaint();
   EXPECT_EQ(rig.device->start(nullptr), DeviceStatus::bad_configuration);
-  EXPECT_EQ(rig.device->configure(thirty_hertz(), nullptr), DeviceStatus::ok) << "and it can still be set otherwise";
+  EXPECT_EQ(rig.device->configure(thirty_hertz(), nullptr), DeviceStatus::ok)
+      << "and it can still be set otherwise";
   EXPECT_TRUE(rig.device->complaint().empty());
 }
 
 INSTANTIATE_TEST_SUITE_P(
     Configuration, Refused,
     ::testing::Values(
-        Refusal{"noRate", [](TriggerConfiguration* c) { c->rate_hz = 0; }, DeviceStatus::bad_configuration, "trigger.rate"},
-        Refusal{"notANumber", [](TriggerConfiguration* c) { c->rate_hz = NAN; }, DeviceStatus::bad_configuration, "trigger.rate"},
-        Refusal{"fasterThanItsTimer", [](TriggerConfiguration* c) { c->rate_hz = 1500; }, DeviceStatus::unsupported, "trigger.rate"},
-        Refusal{"noWidth", [](TriggerConfiguration* c) { c->width = {}; }, DeviceStatus::bad_configuration, "trigger.width_us"},
+        Refusal{"noRate", [](TriggerConfiguration* c) { c->rate_hz = 0; },
+                DeviceStatus::bad_configuration, "trigger.rate"},
+        Refusal{"notANumber", [](TriggerConfiguration* c) { c->rate_hz = NAN; },
+                DeviceStatus::bad_configuration, "trigger.rate"},
+        Refusal{"fasterThanItsTimer", [](TriggerConfiguration* c) { c->rate_hz = 1500; },
+                DeviceStatus::unsupported, "trigger.rate"},
+        Refusal{"noWidth", [](TriggerConfiguration* c) { c->width = {}; },
+                DeviceStatus::bad_configuration, "trigger.width_us"},
         Refusal{"longerThanASecond",
                 [](TriggerConfiguration* c) {
                   c->rate_hz = 0.1;
                   c->width = Duration::seconds(2);
                 },
                 DeviceStatus::bad_configuration, "trigger.width_us"},
-        Refusal{"longerThanThePeriod", [](TriggerConfiguration* c) { c->width = Duration::milliseconds(40); },
+        Refusal{"longerThanThePeriod",
+                [](TriggerConfiguration* c) { c->width = Duration::milliseconds(40); },
                 DeviceStatus::bad_configuration, "trigger.width_us"},
-        Refusal{"variedByAll", [](TriggerConfiguration* c) { c->vary = Duration::milliseconds(34); }, DeviceStatus::bad_configuration,
-                "trigger.vary_us"},
-        Refusal{"noLine", [](TriggerConfiguration* c) { c->lines = 0; }, DeviceStatus::bad_configuration, "trigger.lines"},
-        Refusal{"aLineThatIsNot", [](TriggerConfiguration* c) { c->lines = 0x05; }, DeviceStatus::unsupported, "trigger.lines"},
-        Refusal{"anInputThatIsNot", [](TriggerConfiguration* c) { c->feedback = 0x03; }, DeviceStatus::unsupported, "trigger.feedback"}),
+        Refusal{"variedByAll",
+                [](TriggerConfiguration* c) { c->vary = Duration::milliseconds(34); },
+                DeviceStatus::bad_configuration, "trigger.vary_us"},
+        Refusal{"noLine", [](TriggerConfiguration* c) { c->lines = 0; },
+                DeviceStatus::bad_configuration, "trigger.lines"},
+        Refusal{"aLineThatIsNot", [](TriggerConfiguration* c) { c->lines = 0x05; },
+                DeviceStatus::unsupported, "trigger.lines"},
+        Refusal{"anInputThatIsNot", [](TriggerConfiguration* c) { c->feedback = 0x03; },
+                DeviceStatus::unsupported, "trigger.feedback"}),
     [](const auto& one) { return one.param.name; });
 
 TEST(Configuration, inputsThatTheBoardHasNotAreRefused) {

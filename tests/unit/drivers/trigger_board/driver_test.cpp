@@ -43,7 +43,8 @@ struct Machine {
     ports.push_back({{port, "", 0x0483, 0x5740, "", {}}, board});
     return board;
   }
-  void add(const char* port, std::uint16_t vendor, std::uint16_t product, DeviceStatus trouble = DeviceStatus::ok) {
+  void add(const char* port, std::uint16_t vendor, std::uint16_t product,
+           DeviceStatus trouble = DeviceStatus::ok) {
     ports.push_back({{port, "", vendor, product, "", {}}, std::make_shared<Silent>(), trouble});
   }
   std::vector<std::string> asked;
@@ -57,8 +58,10 @@ struct Machine {
                          asked.push_back(name);
                          for (const Port& p : ports) {
                            if (p.info.port != name) continue;
-                           if (p.trouble != DeviceStatus::ok) return std::make_unique<Refusing>(p.trouble);
-                           return std::make_unique<mock::SimulatedPlace>(p.device, test::direct_line());
+                           if (p.trouble != DeviceStatus::ok)
+                             return std::make_unique<Refusing>(p.trouble);
+                           return std::make_unique<mock::SimulatedPlace>(p.device,
+                                                                         test::direct_line());
                          }
                          return std::make_unique<Refusing>(DeviceStatus::not_found);
                        }});
@@ -80,7 +83,8 @@ TEST(Driver, listsTheBoardsAndAsksNoIns) {
   EXPECT_EQ(found[0].serial, "30002b000b513336343931aa");
   EXPECT_EQ(found[1].serial, "30002b000b513336343931bb");
   EXPECT_EQ(found[0].driver, "board");
-  EXPECT_EQ(m.asked, (std::vector<std::string>{"/dev/ttyUSB2", "/dev/ttyACM0", "/dev/ttyACM1", "/dev/ttyUSB9"}));
+  EXPECT_EQ(m.asked, (std::vector<std::string>{"/dev/ttyUSB2", "/dev/ttyACM0", "/dev/ttyACM1",
+                                               "/dev/ttyUSB9"}));
 }
 
 TEST(Driver, opensByPortBySerialNumberOrTheOnlyOne) {

@@ -26,18 +26,21 @@ struct Outcome {
   bool stamps_right = true;
 };
 
-Outcome half_a_minute(Tampered::Tamper tamper, const mock::SimulatedLineOptions& line = direct_line()) {
+Outcome half_a_minute(Tampered::Tamper tamper,
+                      const mock::SimulatedLineOptions& line = direct_line()) {
   BoardRig rig(board_for(Duration::seconds(30)), line, {}, [&tamper](HostStamp at, Bytes* bytes) {
     if (at > at_s(5)) tamper(at, bytes);
   });
   Outcome o;
-  EXPECT_EQ(rig.device->configure(thirty_hertz(), nullptr), DeviceStatus::ok) << rig.device->complaint();
+  EXPECT_EQ(rig.device->configure(thirty_hertz(), nullptr), DeviceStatus::ok)
+      << rig.device->complaint();
   EXPECT_EQ(rig.device->start(nullptr), DeviceStatus::ok);
   o.pulses = rig.pulses();
   o.board = rig.device->board_statistics();
   o.statistics = rig.device->statistics();
   o.times_gone = rig.times_gone;
-  for (const Pulse& p : o.pulses) o.stamps_right = o.stamps_right && std::abs((p.host - rig.truth(p)).ns()) <= p.host_error.ns();
+  for (const Pulse& p : o.pulses)
+    o.stamps_right = o.stamps_right && std::abs((p.host - rig.truth(p)).ns()) <= p.host_error.ns();
   return o;
 }
 
@@ -67,7 +70,8 @@ TEST(Hostile, burstsOfGarbageCostTheirFrameAndTheNextAtMost) {
   expect_all_accounted_for(o);
   ASSERT_GT(bursts, 20U);
   EXPECT_GE(o.statistics.lost, events);
-  EXPECT_LE(o.statistics.lost, events + bursts) << "an event that came just behind a burst goes with it";
+  EXPECT_LE(o.statistics.lost, events + bursts)
+      << "an event that came just behind a burst goes with it";
   EXPECT_GE(o.board.line.refused(), 1U);
   EXPECT_EQ(o.statistics.malformed, o.board.line.refused());
 }
@@ -115,8 +119,10 @@ TEST(Hostile, rightFramesOfWrongTypesAndSizesAreCounted) {
     if (random.uniform() >= 0.1) return;
     ++strange;
     TriggerFrame f{};
-    f.type = std::array<std::uint8_t, 5>{0x33, 0xFF, trigger_event, trigger_pong, trigger_status}[random.below(5)];
-    f.size = static_cast<std::uint8_t>(random.below(23));  // none has so few but ERROR and the edges, which these types are not
+    f.type = std::array<std::uint8_t, 5>{0x33, 0xFF, trigger_event, trigger_pong,
+                                         trigger_status}[random.below(5)];
+    f.size = static_cast<std::uint8_t>(
+        random.below(23));  // none has so few but ERROR and the edges, which these types are not
     for (std::uint8_t& b : f.payload) b = static_cast<std::uint8_t>(random.next() >> 24U);
     const Bytes extra = closed(f);
     bytes->insert(bytes->begin(), extra.begin(), extra.end());
@@ -133,7 +139,9 @@ TEST(Hostile, eventsThatNeverCameAreCountedToTheLast) {
   const Outcome o = half_a_minute([&](HostStamp, Bytes* bytes) {
     TriggerEvent e;
     const TriggerFrame f = opened(*bytes);
-    if (f.type != trigger_event || !trigger_get_event(f.payload, f.size, &e) || random.uniform() >= 0.1) return;
+    if (f.type != trigger_event || !trigger_get_event(f.payload, f.size, &e) ||
+        random.uniform() >= 0.1)
+      return;
     if (dropped++ == 0) first = e.pulse;
     last = e.pulse;
     bytes->clear();
@@ -189,7 +197,8 @@ TEST(Hostile, aClockThatIsSetBackIsFoundOutAndTheDriveGoesOn) {
   EXPECT_EQ(s.time.resets, 1U);
   EXPECT_LE(s.pulses.backward, 2U) << "until three pings have told, 30 ms";
   EXPECT_LE(s.pulses.lost, 2U);
-  for (const Pulse& p : all) ASSERT_LE(std::abs((p.host - rig.truth(p)).ns()), p.host_error.ns()) << p.number;
+  for (const Pulse& p : all)
+    ASSERT_LE(std::abs((p.host - rig.truth(p)).ns()), p.host_error.ns()) << p.number;
 }
 
 TEST(Hostile, singleBackwardTicksAreRefused) {
@@ -210,7 +219,8 @@ TEST(Hostile, aBoardWhoseNumbersStandStillIsGoneAndNamed) {
   BoardRig rig(board_for(Duration::seconds(30)), direct_line(), {}, [](HostStamp at, Bytes* bytes) {
     TriggerFrame f = opened(*bytes);
     TriggerEvent e;
-    if (at < at_s(5) || f.type != trigger_event || !trigger_get_event(f.payload, f.size, &e)) return;
+    if (at < at_s(5) || f.type != trigger_event || !trigger_get_event(f.payload, f.size, &e))
+      return;
     e.pulse = 3;
     trigger_put_event(&e, f.payload);
     *bytes = closed(f);
@@ -221,7 +231,8 @@ TEST(Hostile, aBoardWhoseNumbersStandStillIsGoneAndNamed) {
   DeviceStatus s = DeviceStatus::ok;
   while (s == DeviceStatus::ok) s = rig.device->wait(Duration::seconds(20), &p);
   EXPECT_EQ(s, DeviceStatus::gone);
-  EXPECT_NE(rig.device->complaint().find("backwards"), std::string::npos) << rig.device->complaint();
+  EXPECT_NE(rig.device->complaint().find("backwards"), std::string::npos)
+      << rig.device->complaint();
   EXPECT_GE(rig.device->board_statistics().pulses.repeated, 8U);
 }
 
@@ -247,7 +258,8 @@ TEST(Hostile, ofABoardThatDoesNotPingTheArrivalsTellTheTime) {
   const auto all = rig.pulses();
   ASSERT_GT(all.size(), 850U);
   EXPECT_EQ(rig.times_gone, 0);
-  for (const Pulse& p : all) ASSERT_LE(std::abs((p.host - rig.truth(p)).ns()), p.host_error.ns()) << p.number;
+  for (const Pulse& p : all)
+    ASSERT_LE(std::abs((p.host - rig.truth(p)).ns()), p.host_error.ns()) << p.number;
   EXPECT_GT(rig.device->board_statistics().time.unanswered, 2000U);
 }
 
@@ -271,24 +283,29 @@ TEST(Hostile, aPauseThatIsLostOnTheWayIsAskedForAgain) {
 TEST(Hostile, questionsThatAreLostOnTheWayAreAskedAgain) {
   Random random(17);
   BoardRig rig(board_for(Duration::seconds(30)), direct_line());
-  rig.between->lose([&](HostStamp, std::span<const std::uint8_t>) { return random.uniform() < 0.3; });
-  ASSERT_EQ(rig.device->configure(thirty_hertz(), nullptr), DeviceStatus::ok) << rig.device->complaint();
+  rig.between->lose(
+      [&](HostStamp, std::span<const std::uint8_t>) { return random.uniform() < 0.3; });
+  ASSERT_EQ(rig.device->configure(thirty_hertz(), nullptr), DeviceStatus::ok)
+      << rig.device->complaint();
   ASSERT_EQ(rig.device->start(nullptr), DeviceStatus::ok);
   const auto all = rig.pulses();
   EXPECT_EQ(rig.times_gone, 0);
   ASSERT_GT(all.size(), 830U);
-  for (const Pulse& p : all) ASSERT_LE(std::abs((p.host - rig.truth(p)).ns()), p.host_error.ns()) << p.number;
+  for (const Pulse& p : all)
+    ASSERT_LE(std::abs((p.host - rig.truth(p)).ns()), p.host_error.ns()) << p.number;
   EXPECT_EQ(rig.device->statistics().lost, 0U);
   EXPECT_GT(rig.device->board_statistics().time.unanswered, 500U);
 }
 
-// ---- who is there -----------------------------------------------------------------------------------------------------
+// ---- who is there
+// -----------------------------------------------------------------------------------------------------
 
 /// Something else on the port: says the same every 200 ms, and answers a frame as it is told.
 class Talker final : public mock::DeviceModel {
  public:
   using Answer = std::function<Bytes(const TriggerFrame&)>;
-  explicit Talker(std::string says, Answer answer = {}) : says_(std::move(says)), answer_(std::move(answer)) {}
+  explicit Talker(std::string says, Answer answer = {})
+      : says_(std::move(says)), answer_(std::move(answer)) {}
   void receive(std::span<const std::uint8_t> bytes, HostStamp at) override {
     now_ = at;
     TriggerFrame f;
@@ -299,7 +316,9 @@ class Talker final : public mock::DeviceModel {
     }
   }
   std::optional<HostStamp> next() const override {
-    return !out_.empty() ? std::optional(now_) : says_.empty() ? std::nullopt : std::optional(next_);
+    return !out_.empty()   ? std::optional(now_)
+           : says_.empty() ? std::nullopt
+                           : std::optional(next_);
   }
   void produce(HostStamp at, Bytes* out) override {
     out->insert(out->end(), out_.begin(), out_.end());
@@ -321,7 +340,9 @@ class Talker final : public mock::DeviceModel {
 
 std::string complaint_about(std::shared_ptr<mock::DeviceModel> there, DeviceStatus* status) {
   std::string complaint;
-  const auto device = open_on(std::make_unique<mock::SimulatedPlace>(std::move(there), direct_line()), {}, status, &complaint);
+  const auto device =
+      open_on(std::make_unique<mock::SimulatedPlace>(std::move(there), direct_line()), {}, status,
+              &complaint);
   EXPECT_EQ(device, nullptr);
   return complaint;
 }
@@ -332,7 +353,8 @@ bool has(const std::string& text, const char* word) { return text.find(word) != 
 
 TEST(AnotherMake, isNamed) {
   DeviceStatus s = DeviceStatus::ok;
-  std::string text = complaint_about("$GPGGA,130305.0,4717.115,N,00833.912,E,1,08,0.9,499.6,M,48.0,M,,*5B\r\n", &s);
+  std::string text = complaint_about(
+      "$GPGGA,130305.0,4717.115,N,00833.912,E,1,08,0.9,499.6,M,48.0,M,,*5B\r\n", &s);
   EXPECT_TRUE(has(text, "NMEA")) << text;
   EXPECT_EQ(s, DeviceStatus::not_found);
   EXPECT_TRUE(has(complaint_about("\xFA\xFF\x36\x03\x10\x20\x01"
@@ -351,41 +373,47 @@ TEST(AnotherMake, isNamed) {
 TEST(AnotherVersion, isRefusedWithBothNamed) {
   // One that answers a HELLO of any version, with an INFO that has grown.
   DeviceStatus s = DeviceStatus::ok;
-  std::string text = complaint_about(std::make_shared<Talker>("",
-                                                              [](const TriggerFrame& f) {
-                                                                TriggerFrame info{trigger_info, f.sequence, 40, {}};
-                                                                info.payload[0] = 7;
-                                                                return closed(info);
-                                                              }),
-                                     &s);
+  std::string text = complaint_about(
+      std::make_shared<Talker>("",
+                               [](const TriggerFrame& f) {
+                                 TriggerFrame info{trigger_info, f.sequence, 40, {}};
+                                 info.payload[0] = 7;
+                                 return closed(info);
+                               }),
+      &s);
   EXPECT_EQ(s, DeviceStatus::unsupported);
   EXPECT_TRUE(has(text, "version 7") && has(text, "version 1")) << text;
   // One that refuses every version but its own.
-  text = complaint_about(std::make_shared<Talker>("",
-                                                  [](const TriggerFrame& f) {
-                                                    if (f.payload[0] == 3) return closed({trigger_info, f.sequence, 28, {3}});
-                                                    return closed({trigger_error, f.sequence, 2, {f.type, trigger_error_version}});
-                                                  }),
-                         &s);
+  text = complaint_about(
+      std::make_shared<Talker>(
+          "",
+          [](const TriggerFrame& f) {
+            if (f.payload[0] == 3) return closed({trigger_info, f.sequence, 28, {3}});
+            return closed({trigger_error, f.sequence, 2, {f.type, trigger_error_version}});
+          }),
+      &s);
   EXPECT_EQ(s, DeviceStatus::unsupported);
   EXPECT_TRUE(has(text, "version 3") && has(text, "version 1")) << text;
   // One that refuses all that we can think of.
-  text = complaint_about(std::make_shared<Talker>("",
-                                                  [](const TriggerFrame& f) {
-                                                    return closed({trigger_error, f.sequence, 2, {f.type, trigger_error_version}});
-                                                  }),
-                         &s);
+  text = complaint_about(
+      std::make_shared<Talker>(
+          "",
+          [](const TriggerFrame& f) {
+            return closed({trigger_error, f.sequence, 2, {f.type, trigger_error_version}});
+          }),
+      &s);
   EXPECT_EQ(s, DeviceStatus::unsupported);
   EXPECT_TRUE(has(text, "version 1")) << text;
 }
 
 TEST(AnotherVersion, anInfoThatIsNoneIsRefused) {
   DeviceStatus s = DeviceStatus::ok;
-  const std::string text = complaint_about(std::make_shared<Talker>("",
-                                                                    [](const TriggerFrame& f) {
-                                                                      return closed({trigger_info, f.sequence, 5, {1, 2, 3, 4, 5}});
-                                                                    }),
-                                           &s);
+  const std::string text = complaint_about(
+      std::make_shared<Talker>("",
+                               [](const TriggerFrame& f) {
+                                 return closed({trigger_info, f.sequence, 5, {1, 2, 3, 4, 5}});
+                               }),
+      &s);
   EXPECT_EQ(s, DeviceStatus::unsupported);
   EXPECT_TRUE(has(text, "5 bytes")) << text;
 }

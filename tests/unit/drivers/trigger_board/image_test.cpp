@@ -21,12 +21,14 @@
 namespace vergence::trigger_board {
 namespace {
 
-/// qemu-system-arm with the image, its line to the host a socket. The process dies with this object, and with the test.
+/// qemu-system-arm with the image, its line to the host a socket. The process dies with this
+/// object, and with the test.
 class Machine {
  public:
   Machine() {
     std::array<int, 2> in{}, line{};
-    if (::pipe(in.data()) != 0 || ::socketpair(AF_UNIX, SOCK_STREAM, 0, line.data()) != 0) throw std::runtime_error("no pipes");
+    if (::pipe(in.data()) != 0 || ::socketpair(AF_UNIX, SOCK_STREAM, 0, line.data()) != 0)
+      throw std::runtime_error("no pipes");
     pid_ = ::fork();
     if (pid_ < 0) throw std::runtime_error("no process");
     if (pid_ == 0) {
@@ -35,9 +37,10 @@ class Machine {
       ::dup2(in[0], STDIN_FILENO);
       ::dup2(line[1], kLine);
       ::dup2(::open("/dev/null", O_WRONLY), STDOUT_FILENO);
-      ::execl(VERGENCE_QEMU_ARM, VERGENCE_QEMU_ARM, "-M", "netduinoplus2", "-display", "none", "-nodefaults", "-kernel",
-              VERGENCE_BOARD_IMAGE, "-chardev", "socket,id=line,fd=100", "-serial", "chardev:line", "-monitor", "stdio", "-icount",
-              "shift=3,sleep=off", nullptr);
+      ::execl(VERGENCE_QEMU_ARM, VERGENCE_QEMU_ARM, "-M", "netduinoplus2", "-display", "none",
+              "-nodefaults", "-kernel", VERGENCE_BOARD_IMAGE, "-chardev", "socket,id=line,fd=100",
+              "-serial", "chardev:line", "-monitor", "stdio", "-icount", "shift=3,sleep=off",
+              nullptr);
       ::_exit(127);
     }
     ::close(in[0]);
@@ -58,7 +61,8 @@ class Machine {
   }
   void reset() {
     const std::string command = "system_reset\n";
-    ASSERT_EQ(::write(commands_, command.data(), command.size()), static_cast<ssize_t>(command.size()));
+    ASSERT_EQ(::write(commands_, command.data(), command.size()),
+              static_cast<ssize_t>(command.size()));
   }
 
   /// The line's end at the host, as often as it is opened. Outlived by the machine.
@@ -67,7 +71,8 @@ class Machine {
     explicit Place(int line) : line_(line) {}
     std::unique_ptr<ByteLine> open(const LineSettings& settings, DeviceStatus* status) override {
       *status = DeviceStatus::ok;
-      return std::make_unique<FdLine>(UniquePort{}, UniqueFd(::dup(line_)), UniqueFd(::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)), settings);
+      return std::make_unique<FdLine>(UniquePort{}, UniqueFd(::dup(line_)),
+                                      UniqueFd(::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)), settings);
     }
     std::string name() const override { return "machine"; }
 
@@ -81,14 +86,17 @@ class Machine {
   int commands_ = -1, line_ = -1;
 };
 
-// An instruction is eight nanoseconds of the machine's time, so that nothing in it depends on how busy the host is; its timers count 62.5
-// times as fast as the image thinks. So its time cannot be tied to ours here, and the rate is asked for in its seconds, of which ours has
-// five to fifty. Numbers, boots and the dialogue are what they are on a board.
+// An instruction is eight nanoseconds of the machine's time, so that nothing in it depends on how
+// busy the host is; its timers count 62.5 times as fast as the image thinks. So its time cannot be
+// tied to ours here, and the rate is asked for in its seconds, of which ours has five to fifty.
+// Numbers, boots and the dialogue are what they are on a board.
 constexpr double kBoardRate = 1;  // Hz
 
 std::string missing() {
-  if (std::string(VERGENCE_BOARD_IMAGE).empty()) return "no image of the trigger board: gcc-arm-none-eabi was not there to build it";
-  if (std::string(VERGENCE_QEMU_ARM).empty()) return "no qemu-system-arm to run the trigger board's image in";
+  if (std::string(VERGENCE_BOARD_IMAGE).empty())
+    return "no image of the trigger board: gcc-arm-none-eabi was not there to build it";
+  if (std::string(VERGENCE_QEMU_ARM).empty())
+    return "no qemu-system-arm to run the trigger board's image in";
   return {};
 }
 
@@ -136,7 +144,9 @@ TEST(Image, isDrivenAndItsRebootSeen) {
   }
   machine.reset();
   auto after = take(std::chrono::milliseconds(500));
-  for (int i = 0; i < 20 && (after.empty() || after.back().boot == before[0].boot || after.back().number < 3); ++i) {
+  for (int i = 0;
+       i < 20 && (after.empty() || after.back().boot == before[0].boot || after.back().number < 3);
+       ++i) {
     const auto more = take(std::chrono::milliseconds(500));
     after.insert(after.end(), more.begin(), more.end());
   }
@@ -150,9 +160,10 @@ TEST(Image, isDrivenAndItsRebootSeen) {
   board->stop();
 
   const BoardStatistics s = board->board_statistics();
-  EXPECT_EQ(s.pulses.lost, 0U) << s.board.events_dropped << " dropped by the board, " << s.line.refused() << " bad frames, next pulse "
-                               << s.board.pulses << ", last taken " << after.back().number << ", state " << int{s.board.state}
-                               << " skipped " << s.pulses.skipped;
+  EXPECT_EQ(s.pulses.lost, 0U) << s.board.events_dropped << " dropped by the board, "
+                               << s.line.refused() << " bad frames, next pulse " << s.board.pulses
+                               << ", last taken " << after.back().number << ", state "
+                               << int{s.board.state} << " skipped " << s.pulses.skipped;
   EXPECT_EQ(s.pulses.skipped, 0U);
   EXPECT_EQ(s.reboots, 1U);
   EXPECT_EQ(s.restarts, 0U);

@@ -24,7 +24,9 @@ struct Accounted : ::testing::Test {
     account.set_intervals(30'000, 0);
     EXPECT_TRUE(account.take(event(0, kPeriod, 1), &pulse));
   }
-  bool take(std::uint32_t number, std::uint8_t flags = 0) { return account.take(event(number, kPeriod * (number + 1ULL), flags), &pulse); }
+  bool take(std::uint32_t number, std::uint8_t flags = 0) {
+    return account.take(event(number, kPeriod * (number + 1ULL), flags), &pulse);
+  }
   PulseAccount account;
   Pulse pulse{};
 };

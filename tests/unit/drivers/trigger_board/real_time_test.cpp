@@ -13,7 +13,8 @@ namespace {
 /// A simulated board in real time at the far end of a pipe within the process.
 class BoardOnPipe {
  public:
-  BoardOnPipe(std::unique_ptr<mock::BoardSimulator> board, std::unique_ptr<ByteLine> end) : board_(std::move(board)), end_(std::move(end)) {
+  BoardOnPipe(std::unique_ptr<mock::BoardSimulator> board, std::unique_ptr<ByteLine> end)
+      : board_(std::move(board)), end_(std::move(end)) {
     thread_ = std::thread([this] { work(); });
   }
   BoardOnPipe(const BoardOnPipe&) = delete;
@@ -28,7 +29,8 @@ class BoardOnPipe {
     std::array<std::uint8_t, 512> in{};
     while (!stop_) {
       std::vector<std::uint8_t> out;
-      for (auto next = board_->next(); next && *next <= end_->now(); next = board_->next()) board_->produce(end_->now(), &out);
+      for (auto next = board_->next(); next && *next <= end_->now(); next = board_->next())
+        board_->produce(end_->now(), &out);
       if (!out.empty()) (void)end_->write(out, Duration{});
       const LineRead r = end_->read(in, Duration::milliseconds(1));
       if (r.status == DeviceStatus::ok) board_->receive(std::span(in).first(r.size), end_->now());
@@ -44,12 +46,16 @@ class BoardOnPipe {
 /// A line that seals whoever reads it, as long as it is told to.
 class SealingLine final : public ByteLine {
  public:
-  SealingLine(std::unique_ptr<ByteLine> line, const std::atomic<bool>& seal) : line_(std::move(line)), seal_(seal) {}
+  SealingLine(std::unique_ptr<ByteLine> line, const std::atomic<bool>& seal)
+      : line_(std::move(line)), seal_(seal) {}
   LineRead read(std::span<std::uint8_t> out, Duration limit) noexcept override {
-    if (seal_ != AllocationGuard::thread_sealed()) seal_ ? AllocationGuard::seal_thread() : AllocationGuard::unseal_thread();
+    if (seal_ != AllocationGuard::thread_sealed())
+      seal_ ? AllocationGuard::seal_thread() : AllocationGuard::unseal_thread();
     return line_->read(out, limit);
   }
-  DeviceStatus write(std::span<const std::uint8_t> bytes, Duration limit) noexcept override { return line_->write(bytes, limit); }
+  DeviceStatus write(std::span<const std::uint8_t> bytes, Duration limit) noexcept override {
+    return line_->write(bytes, limit);
+  }
   DeviceStatus set_baud(std::uint32_t baud) noexcept override { return line_->set_baud(baud); }
   std::uint32_t baud() const noexcept override { return line_->baud(); }
   void discard_input() noexcept override { line_->discard_input(); }
@@ -80,10 +86,13 @@ struct PipeRig {
     auto ends = make_byte_pipe();
     mock::BoardSimulatorOptions o;
     o.power_on = ends.first->now();
-    board = std::make_unique<BoardOnPipe>(std::make_unique<mock::BoardSimulator>(mock::PulseSource{}, o), std::move(ends.second));
+    board = std::make_unique<BoardOnPipe>(
+        std::make_unique<mock::BoardSimulator>(mock::PulseSource{}, o), std::move(ends.second));
     Options options;
     options.native_usb = true;
-    device = std::make_unique<Device>(std::make_unique<OneLine>(std::make_unique<SealingLine>(std::move(ends.first), seal)), options);
+    device = std::make_unique<Device>(
+        std::make_unique<OneLine>(std::make_unique<SealingLine>(std::move(ends.first), seal)),
+        options);
   }
   static const std::atomic<bool>& never() {
     static const std::atomic<bool> no{false};
@@ -101,7 +110,8 @@ TriggerConfiguration hundred_hertz() {
 
 TEST(RealTime, ownerConsumerAndOnlookersDoNotMeet) {
   PipeRig rig;
-  ASSERT_EQ(rig.device->configure(hundred_hertz(), nullptr), DeviceStatus::ok) << rig.device->complaint();
+  ASSERT_EQ(rig.device->configure(hundred_hertz(), nullptr), DeviceStatus::ok)
+      << rig.device->complaint();
   for (int round = 0; round < 2; ++round) {
     ASSERT_EQ(rig.device->start(nullptr), DeviceStatus::ok);
     std::atomic<bool> done{false};
@@ -123,7 +133,8 @@ TEST(RealTime, ownerConsumerAndOnlookersDoNotMeet) {
         if (s != DeviceStatus::ok) break;
         if (taken++ > 0 && p.number <= last) ADD_FAILURE() << p.number << " after " << last;
         last = p.number;
-        if (!p.mapped || p.host > p.arrival + p.host_error) ADD_FAILURE() << "an edge after its report";
+        if (!p.mapped || p.host > p.arrival + p.host_error)
+          ADD_FAILURE() << "an edge after its report";
       }
     });
     std::this_thread::sleep_for(std::chrono::milliseconds(400));
@@ -137,7 +148,8 @@ TEST(RealTime, ownerConsumerAndOnlookersDoNotMeet) {
 
 TEST(RealTime, aLineThatIsCutIsGoneAndStopsAtOnce) {
   PipeRig rig;
-  ASSERT_EQ(rig.device->configure(hundred_hertz(), nullptr), DeviceStatus::ok) << rig.device->complaint();
+  ASSERT_EQ(rig.device->configure(hundred_hertz(), nullptr), DeviceStatus::ok)
+      << rig.device->complaint();
   ASSERT_EQ(rig.device->start(nullptr), DeviceStatus::ok);
   Pulse p;
   ASSERT_EQ(rig.device->wait(Duration::seconds(5), &p), DeviceStatus::ok);
@@ -151,10 +163,12 @@ TEST(RealTime, aLineThatIsCutIsGoneAndStopsAtOnce) {
 }
 
 TEST(RealTime, theDevicesThreadAllocatesNothingWhileItReads) {
-  if (!AllocationGuard::available()) GTEST_SKIP() << "needs the allocation hooks, which sanitizer builds leave out";
+  if (!AllocationGuard::available())
+    GTEST_SKIP() << "needs the allocation hooks, which sanitizer builds leave out";
   std::atomic<bool> seal{false};
   PipeRig rig(seal);
-  ASSERT_EQ(rig.device->configure(hundred_hertz(), nullptr), DeviceStatus::ok) << rig.device->complaint();
+  ASSERT_EQ(rig.device->configure(hundred_hertz(), nullptr), DeviceStatus::ok)
+      << rig.device->complaint();
   ASSERT_EQ(rig.device->start(nullptr), DeviceStatus::ok);
   Pulse p;
   ASSERT_EQ(rig.device->wait(Duration::seconds(5), &p), DeviceStatus::ok);
@@ -163,7 +177,8 @@ TEST(RealTime, theDevicesThreadAllocatesNothingWhileItReads) {
     const SealedScope sealed;
     seal = true;
     (void)rig.device->pause(2);
-    for (int i = 0; i < 50; ++i) ASSERT_EQ(rig.device->wait(Duration::seconds(5), &p), DeviceStatus::ok);
+    for (int i = 0; i < 50; ++i)
+      ASSERT_EQ(rig.device->wait(Duration::seconds(5), &p), DeviceStatus::ok);
     (void)rig.device->statistics();
   }
   EXPECT_EQ(AllocationGuard::allocations_after_seal(), before);

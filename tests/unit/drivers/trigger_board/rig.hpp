@@ -16,8 +16,10 @@ namespace vergence::test {
 /// A board whose bytes somebody tampers with on their way to the host.
 class Tampered final : public mock::DeviceModel {
  public:
-  using Tamper = std::function<void(HostStamp at, std::vector<std::uint8_t>* frame)>;  // a whole frame, its 00 included
-  Tampered(std::shared_ptr<mock::DeviceModel> device, Tamper tamper) : device_(std::move(device)), tamper_(std::move(tamper)) {}
+  using Tamper = std::function<void(
+      HostStamp at, std::vector<std::uint8_t>* frame)>;  // a whole frame, its 00 included
+  Tampered(std::shared_ptr<mock::DeviceModel> device, Tamper tamper)
+      : device_(std::move(device)), tamper_(std::move(tamper)) {}
   /// Of what the host sends; true: it is lost on the way.
   using Loss = std::function<bool(HostStamp at, std::span<const std::uint8_t> bytes)>;
   void lose(Loss loss) { loss_ = std::move(loss); }
@@ -51,7 +53,8 @@ class Tampered final : public mock::DeviceModel {
 }
 [[nodiscard]] inline std::vector<std::uint8_t> closed(const TriggerFrame& frame) {
   std::vector<std::uint8_t> bytes(trigger_max_frame);
-  bytes.resize(trigger_write_frame(frame.type, frame.sequence, frame.payload, frame.size, bytes.data()));
+  bytes.resize(
+      trigger_write_frame(frame.type, frame.sequence, frame.payload, frame.size, bytes.data()));
   return bytes;
 }
 
@@ -74,7 +77,8 @@ class Tampered final : public mock::DeviceModel {
 
 /// A driver's device on a simulated line to a simulated board, and what the board really did.
 struct BoardRig {
-  explicit BoardRig(const mock::BoardSimulatorOptions& board = {}, const mock::SimulatedLineOptions& line = {},
+  explicit BoardRig(const mock::BoardSimulatorOptions& board = {},
+                    const mock::SimulatedLineOptions& line = {},
                     const trigger_board::Options& options = {}, Tampered::Tamper tamper = {})
       : simulator(std::make_shared<mock::BoardSimulator>(
             [this](const mock::SimulatedPulse& p) {
@@ -88,7 +92,8 @@ struct BoardRig {
     device = std::make_unique<trigger_board::Device>(std::move(owned), options);
   }
 
-  std::map<std::pair<std::uint32_t, std::uint64_t>, HostStamp> edges;  // by boot and number; of the device's thread while it runs
+  std::map<std::pair<std::uint32_t, std::uint64_t>, HostStamp>
+      edges;  // by boot and number; of the device's thread while it runs
   mock::PulseSource exposures;
   std::shared_ptr<mock::BoardSimulator> simulator;
   std::shared_ptr<Tampered> between;
@@ -96,7 +101,8 @@ struct BoardRig {
   std::unique_ptr<trigger_board::Device> device;
   int times_gone = 0;
 
-  /// Pulses until the device has no more, or this many; `gone` is passed over, the device is asked to come back.
+  /// Pulses until the device has no more, or this many; `gone` is passed over, the device is asked
+  /// to come back.
   std::vector<Pulse> pulses(std::size_t most = SIZE_MAX) {
     std::vector<Pulse> all;
     while (all.size() < most) {

@@ -18,8 +18,10 @@ struct Errors {
   std::size_t beyond_bound = 0, count = 0;
 };
 
-/// |mapped − true| of the edges later than `settled` after the first, over seeds whose crystals are off by ±50 ppm.
-Errors errors_of(mock::BoardSimulatorOptions board, mock::SimulatedLineOptions line, Duration settled, const Options& options = {}) {
+/// |mapped − true| of the edges later than `settled` after the first, over seeds whose crystals are
+/// off by ±50 ppm.
+Errors errors_of(mock::BoardSimulatorOptions board, mock::SimulatedLineOptions line,
+                 Duration settled, const Options& options = {}) {
   std::vector<double> us;
   Errors e;
   for (const std::uint64_t seed : {1U, 2U, 3U, 4U}) {
@@ -30,7 +32,8 @@ Errors errors_of(mock::BoardSimulatorOptions board, mock::SimulatedLineOptions l
     // As a camera does: the report comes at the end of its exposure.
     rig.exposures = [](const mock::SimulatedPulse& p) {
       mock::SimulatedExposures x;
-      x[0] = x[1] = {true, p.edge + Duration::microseconds(30), p.edge + Duration::microseconds(8030)};
+      x[0] =
+          x[1] = {true, p.edge + Duration::microseconds(30), p.edge + Duration::microseconds(8030)};
       return x;
     };
     TriggerConfiguration wanted = thirty_hertz();
@@ -40,7 +43,8 @@ Errors errors_of(mock::BoardSimulatorOptions board, mock::SimulatedLineOptions l
     const auto all = rig.pulses();
     EXPECT_GT(all.size(), 1700U);
     for (const Pulse& p : all) {
-      const double error = std::abs((p.host - rig.truth(p)).to_seconds()) * 1e6, bound = p.host_error.to_seconds() * 1e6;
+      const double error = std::abs((p.host - rig.truth(p)).to_seconds()) * 1e6,
+                   bound = p.host_error.to_seconds() * 1e6;
       if (error > bound) ++e.beyond_bound;
       if (p.edge - all.front().edge < settled) continue;
       us.push_back(error);
@@ -57,8 +61,10 @@ Errors errors_of(mock::BoardSimulatorOptions board, mock::SimulatedLineOptions l
 }
 
 void print(const char* what, const Errors& e) {
-  std::printf("[ figures  ] %s: rms %.1f us, p99 %.1f us, worst %.1f us, largest bound %.0f us, %zu of %zu beyond their bound\n", what,
-              e.rms_us, e.p99_us, e.worst_us, e.bound_us, e.beyond_bound, e.count);
+  std::printf(
+      "[ figures  ] %s: rms %.1f us, p99 %.1f us, worst %.1f us, largest bound %.0f us, %zu of %zu "
+      "beyond their bound\n",
+      what, e.rms_us, e.p99_us, e.worst_us, e.bound_us, e.beyond_bound, e.count);
 }
 
 TEST(Stamps, areRightWithinFiftyMicrosecondsOverALineWithTwoMillisecondsOfJitter) {
@@ -109,9 +115,10 @@ TEST(Stamps, areRightWithinTensOfMicrosecondsOverAQuietLine) {
   EXPECT_EQ(e.beyond_bound, 0U);
 }
 
-/// A USB converter holds bytes back for its latency timer. With 16 ms this line's bytes fill its packets before the timer runs out, and the
-/// last of a full packet leave at once; with 1 ms every packet waits for a frame of the bus, 1 ms, and half of that is in the stamps, where
-/// nothing on the host can see it. It is within the bound.
+/// A USB converter holds bytes back for its latency timer. With 16 ms this line's bytes fill its
+/// packets before the timer runs out, and the last of a full packet leave at once; with 1 ms every
+/// packet waits for a frame of the bus, 1 ms, and half of that is in the stamps, where nothing on
+/// the host can see it. It is within the bound.
 class Converter : public ::testing::TestWithParam<int> {};
 TEST_P(Converter, isWithinItsBound) {
   mock::SimulatedLineOptions line;

@@ -43,7 +43,8 @@ TEST(V4l2Controls, aValueIsANumberInRangeOrAMenuItem) {
   const Control i = integer(-10, 10, 1);
   EXPECT_TRUE(value_of(i, "-10", &value));
   EXPECT_EQ(value, -10);
-  for (const char* bad : {"11", "", "1x", " 1", "1.5", "99999999999999999999"}) EXPECT_FALSE(value_of(i, bad, &value)) << bad;
+  for (const char* bad : {"11", "", "1x", " 1", "1.5", "99999999999999999999"})
+    EXPECT_FALSE(value_of(i, bad, &value)) << bad;
   EXPECT_EQ(value, -10) << "a refusal changes nothing";
 }
 

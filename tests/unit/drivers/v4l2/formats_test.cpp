@@ -19,7 +19,8 @@ const PixelFormat& format(std::uint32_t fourcc) {
 }
 
 TEST(V4l2Formats, withoutAWishTheCheapestIsTaken) {
-  const std::uint32_t offered[] = {V4L2_PIX_FMT_MJPEG, V4L2_PIX_FMT_YUYV, V4L2_PIX_FMT_Y16, V4L2_PIX_FMT_GREY};
+  const std::uint32_t offered[] = {V4L2_PIX_FMT_MJPEG, V4L2_PIX_FMT_YUYV, V4L2_PIX_FMT_Y16,
+                                   V4L2_PIX_FMT_GREY};
   EXPECT_EQ(choose_format(offered, "")->fourcc, V4L2_PIX_FMT_GREY);
   const std::uint32_t webcam[] = {V4L2_PIX_FMT_MJPEG, V4L2_PIX_FMT_YUYV};
   EXPECT_EQ(choose_format(webcam, "")->fourcc, V4L2_PIX_FMT_YUYV);
@@ -30,7 +31,8 @@ TEST(V4l2Formats, withoutAWishTheCheapestIsTaken) {
 TEST(V4l2Formats, aWishIsTakenByItsFourCharacters) {
   const std::uint32_t offered[] = {V4L2_PIX_FMT_GREY, V4L2_PIX_FMT_Y10, V4L2_PIX_FMT_YUYV};
   EXPECT_EQ(choose_format(offered, "YUYV")->fourcc, V4L2_PIX_FMT_YUYV);
-  EXPECT_EQ(choose_format(offered, "Y10")->fourcc, V4L2_PIX_FMT_Y10) << "the trailing blank of its name is not typed";
+  EXPECT_EQ(choose_format(offered, "Y10")->fourcc, V4L2_PIX_FMT_Y10)
+      << "the trailing blank of its name is not typed";
   EXPECT_EQ(choose_format(offered, "UYVY"), nullptr) << "not offered";
   EXPECT_EQ(choose_format(offered, "MJPG"), nullptr);
   EXPECT_EQ(choose_format({}, ""), nullptr);
@@ -48,10 +50,12 @@ TEST(V4l2Formats, aFrameNeedsNoPaddingAfterItsLastRow) {
   EXPECT_EQ(least_frame_bytes(grey, 630, 480, 640), 640U * 479 + 630);
   EXPECT_EQ(least_frame_bytes(format(V4L2_PIX_FMT_YUYV), 640, 2, 1280), 2560U);
   EXPECT_EQ(least_row_bytes(format(V4L2_PIX_FMT_Y10P), 640), 800U);
-  EXPECT_EQ(least_row_bytes(format(V4L2_PIX_FMT_Y10P), 641), 802U) << "a last group of one pixel has its low bits, too";
+  EXPECT_EQ(least_row_bytes(format(V4L2_PIX_FMT_Y10P), 641), 802U)
+      << "a last group of one pixel has its low bits, too";
 }
 
-/// Random samples of a depth are written as the kernel's documentation lays the format, and read back.
+/// Random samples of a depth are written as the kernel's documentation lays the format, and read
+/// back.
 class V4l2Luma : public ::testing::TestWithParam<std::uint32_t> {};
 
 struct Laid {
@@ -103,43 +107,51 @@ TEST_P(V4l2Luma, isWhatWasLaidIn) {
   const PixelFormat& f = format(GetParam());
   for (const int width : {1, 3, 4, 7, 64, 97, 640}) {
     const int height = 5;
-    const std::size_t stride = least_row_bytes(f, width) + random.below(9), to_stride = static_cast<std::size_t>(width) + 3;
+    const std::size_t stride = least_row_bytes(f, width) + random.below(9),
+                      to_stride = static_cast<std::size_t>(width) + 3;
     const Laid laid = lay(f.fourcc, width, height, stride, &random);
     std::vector<std::uint8_t> grey(to_stride * height, 0x55);
     to_grey(f, laid.bytes.data(), stride, width, height, grey.data(), to_stride);
     std::size_t i = 0;
     for (std::size_t y = 0; y < height; ++y) {
       for (std::size_t x = 0; x < static_cast<std::size_t>(width); ++x)
-        ASSERT_EQ(grey[y * to_stride + x], laid.grey[i++]) << name_of(f.fourcc) << " " << width << " at " << x << ", " << y;
-      for (std::size_t x = static_cast<std::size_t>(width); x < to_stride; ++x) ASSERT_EQ(grey[y * to_stride + x], 0x55) << "past the row";
+        ASSERT_EQ(grey[y * to_stride + x], laid.grey[i++])
+            << name_of(f.fourcc) << " " << width << " at " << x << ", " << y;
+      for (std::size_t x = static_cast<std::size_t>(width); x < to_stride; ++x)
+        ASSERT_EQ(grey[y * to_stride + x], 0x55) << "past the row";
     }
   }
 }
 
 INSTANTIATE_TEST_SUITE_P(, V4l2Luma,
-                         ::testing::Values(V4L2_PIX_FMT_GREY, V4L2_PIX_FMT_NV12, V4L2_PIX_FMT_Y10P, V4L2_PIX_FMT_Y10, V4L2_PIX_FMT_Y12,
-                                           V4L2_PIX_FMT_Y14, V4L2_PIX_FMT_Y16, V4L2_PIX_FMT_YUYV, V4L2_PIX_FMT_YVYU, V4L2_PIX_FMT_UYVY,
-                                           V4L2_PIX_FMT_VYUY),
+                         ::testing::Values(V4L2_PIX_FMT_GREY, V4L2_PIX_FMT_NV12, V4L2_PIX_FMT_Y10P,
+                                           V4L2_PIX_FMT_Y10, V4L2_PIX_FMT_Y12, V4L2_PIX_FMT_Y14,
+                                           V4L2_PIX_FMT_Y16, V4L2_PIX_FMT_YUYV, V4L2_PIX_FMT_YVYU,
+                                           V4L2_PIX_FMT_UYVY, V4L2_PIX_FMT_VYUY),
                          [](const auto& p) { return name_of(p.param); });
 
 TEST(V4l2Formats, mosaicsOfEveryPatternBecomeTheMeanOfTheirColours) {
-  // Red 40, green 80, blue 120 everywhere: (40 + 2 · 80 + 120) / 4 at every pixel, whichever comes first.
-  const std::pair<std::uint32_t, std::array<std::uint8_t, 4>> patterns[] = {{V4L2_PIX_FMT_SRGGB8, {40, 80, 80, 120}},
-                                                                            {V4L2_PIX_FMT_SGRBG8, {80, 40, 120, 80}},
-                                                                            {V4L2_PIX_FMT_SGBRG8, {80, 120, 40, 80}},
-                                                                            {V4L2_PIX_FMT_SBGGR8, {120, 80, 80, 40}}};
+  // Red 40, green 80, blue 120 everywhere: (40 + 2 · 80 + 120) / 4 at every pixel, whichever comes
+  // first.
+  const std::pair<std::uint32_t, std::array<std::uint8_t, 4>> patterns[] = {
+      {V4L2_PIX_FMT_SRGGB8, {40, 80, 80, 120}},
+      {V4L2_PIX_FMT_SGRBG8, {80, 40, 120, 80}},
+      {V4L2_PIX_FMT_SGBRG8, {80, 120, 40, 80}},
+      {V4L2_PIX_FMT_SBGGR8, {120, 80, 80, 40}}};
   for (const auto& [fourcc, tile] : patterns) {
     std::array<std::uint8_t, 8 * 6> raw{}, grey{};
     for (std::size_t y = 0; y < 6; ++y)
       for (std::size_t x = 0; x < 8; ++x) raw[y * 8 + x] = tile[y % 2 * 2 + x % 2];
     to_grey(format(fourcc), raw.data(), 8, 7, 6, grey.data(), 8);
     for (std::size_t y = 0; y < 6; ++y)
-      for (std::size_t x = 0; x < 7; ++x) EXPECT_EQ(grey[y * 8 + x], 80) << name_of(fourcc) << " at " << x << ", " << y;
+      for (std::size_t x = 0; x < 7; ++x)
+        EXPECT_EQ(grey[y * 8 + x], 80) << name_of(fourcc) << " at " << x << ", " << y;
   }
 }
 
 TEST(V4l2Formats, wordsDeeperThanToldSaturate) {
-  const PixelFormat shifted{V4L2_PIX_FMT_Y16, Layout::words, 2};  // a sensor of ten bits that lays them low into Y16
+  const PixelFormat shifted{V4L2_PIX_FMT_Y16, Layout::words,
+                            2};  // a sensor of ten bits that lays them low into Y16
   const std::uint8_t words[] = {0xFF, 0x03, 0x00, 0x04, 0x08, 0x00};
   std::uint8_t grey[3] = {};
   to_grey(shifted, words, sizeof words, 3, 1, grey, 3);

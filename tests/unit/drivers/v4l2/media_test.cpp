@@ -9,25 +9,33 @@ namespace {
 MediaGraph board() {
   MediaGraph g;
   g.node = "/dev/media0";
-  g.entities = {{1, "ov9281 10-0060", "/dev/v4l-subdev1", {{false, "0x200a/1280x800"}}},
-                {2, "csi", "/dev/v4l-subdev0", {{true, "0x200a/1280x800"}, {false, "0x200a/1280x800"}}},
-                {3, "unicam-image", "/dev/video0", {{true, ""}}}};
+  g.entities = {
+      {1, "ov9281 10-0060", "/dev/v4l-subdev1", {{false, "0x200a/1280x800"}}},
+      {2, "csi", "/dev/v4l-subdev0", {{true, "0x200a/1280x800"}, {false, "0x200a/1280x800"}}},
+      {3, "unicam-image", "/dev/video0", {{true, ""}}}};
   g.links = {{1, 2, 0, 0, true}, {2, 3, 1, 0, true}};
   return g;
 }
 
 TEST(V4l2Media, theChainIsNamedFromTheSensorOn) {
   const std::string text = advice(board(), "/dev/video0");
-  EXPECT_NE(text.find("ov9281 10-0060 [0x200a/1280x800] → csi [0x200a/1280x800] → unicam-image (/dev/video0)"), std::string::npos) << text;
+  EXPECT_NE(
+      text.find(
+          "ov9281 10-0060 [0x200a/1280x800] → csi [0x200a/1280x800] → unicam-image (/dev/video0)"),
+      std::string::npos)
+      << text;
   EXPECT_NE(text.find("media-ctl -d /dev/media0 -p"), std::string::npos);
-  EXPECT_NE(text.find("subdevice: /dev/v4l-subdev1"), std::string::npos) << "where the sensor's controls are";
+  EXPECT_NE(text.find("subdevice: /dev/v4l-subdev1"), std::string::npos)
+      << "where the sensor's controls are";
   EXPECT_EQ(text.find("off"), std::string::npos) << "nothing is wrong";
 }
 
 TEST(V4l2Media, aLinkThatIsOffIsMendedByACommand) {
   MediaGraph g = board();
   g.links[0].enabled = false;
-  EXPECT_NE(advice(g, "/dev/video0").find(R"(media-ctl -d /dev/media0 -l '"ov9281 10-0060":0->"csi":0[1]')"), std::string::npos)
+  EXPECT_NE(advice(g, "/dev/video0")
+                .find(R"(media-ctl -d /dev/media0 -l '"ov9281 10-0060":0->"csi":0[1]')"),
+            std::string::npos)
       << advice(g, "/dev/video0");
 }
 

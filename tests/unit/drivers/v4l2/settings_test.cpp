@@ -25,18 +25,21 @@ TEST(V4l2Settings, nonsenseIsNamed) {
   EXPECT_NE(nonsense([](auto* c) { c->rate_hz = std::numeric_limits<double>::quiet_NaN(); }), "");
   EXPECT_NE(nonsense([](auto* c) { c->rate_hz = -1; }), "");
   EXPECT_NE(nonsense([](auto* c) { c->exposure = {}; }), "");
-  EXPECT_NE(nonsense([](auto* c) { c->exposure = Duration::milliseconds(51); }), "") << "longer than the 50 ms between two images";
+  EXPECT_NE(nonsense([](auto* c) { c->exposure = Duration::milliseconds(51); }), "")
+      << "longer than the 50 ms between two images";
   EXPECT_NE(nonsense([](auto* c) { c->offset_y = -1; }), "");
   EXPECT_NE(nonsense([](auto* c) { c->gain_db = std::numeric_limits<double>::infinity(); }), "");
 }
 
 TEST(V4l2Settings, aCameraWithoutAnExposureInUnitsCannotBeAskedForAnother) {
   ExposureSetting actual{Duration::milliseconds(3), 1};
-  EXPECT_EQ(change_exposure(Controls{}, Settings{}, {Duration::milliseconds(2), 0}, &actual), DeviceStatus::unsupported);
+  EXPECT_EQ(change_exposure(Controls{}, Settings{}, {Duration::milliseconds(2), 0}, &actual),
+            DeviceStatus::unsupported);
   Settings lost;
   lost.exposure_id = 0x009a0902;
   lost.exposure_unit_s = 1e-4;
-  EXPECT_EQ(change_exposure(Controls{}, lost, {Duration::milliseconds(2), 0}, &actual), DeviceStatus::unsupported);
+  EXPECT_EQ(change_exposure(Controls{}, lost, {Duration::milliseconds(2), 0}, &actual),
+            DeviceStatus::unsupported);
   EXPECT_EQ(actual, (ExposureSetting{Duration::milliseconds(3), 1}));
 }
 
@@ -61,9 +64,10 @@ TEST(V4l2Settings, optionsAreReadIntoTheirTypes) {
 }
 
 TEST(V4l2Settings, aWrongOptionIsRefusedWithASentence) {
-  const std::pair<const char*, const char*> wrong[] = {{"readout_us", "-1"},  {"readout_us", "fast"},  {"thin", "0"},     {"buffers", "3"},
-                                                       {"buffers", "33"},     {"buffers", "8.5"},      {"shift", "9"},    {"shift", ""},
-                                                       {"gain_step_db", "0"}, {"gain_step_db", "nan"}, {"packet", "9000"}};
+  const std::pair<const char*, const char*> wrong[] = {
+      {"readout_us", "-1"},  {"readout_us", "fast"},  {"thin", "0"},     {"buffers", "3"},
+      {"buffers", "33"},     {"buffers", "8.5"},      {"shift", "9"},    {"shift", ""},
+      {"gain_step_db", "0"}, {"gain_step_db", "nan"}, {"packet", "9000"}};
   for (const auto& [key, value] : wrong) {
     CameraConfiguration c = sound();
     c.options = {{key, value}};

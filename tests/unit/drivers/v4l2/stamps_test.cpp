@@ -13,17 +13,23 @@ constexpr HostStamp kArrival{5'000'000'000};
 TEST(V4l2Stamps, theKindIsInTheFlags) {
   EXPECT_EQ(stamp_kind(kMonotonic | V4L2_BUF_FLAG_TSTAMP_SRC_SOE, 1), StampKind::exposure_start);
   EXPECT_EQ(stamp_kind(kMonotonic | V4L2_BUF_FLAG_TSTAMP_SRC_EOF, 1), StampKind::frame_end);
-  EXPECT_EQ(stamp_kind(kMonotonic | V4L2_BUF_FLAG_ERROR | V4L2_BUF_FLAG_KEYFRAME, 1), StampKind::frame_end) << "other flags say nothing";
-  EXPECT_EQ(stamp_kind(V4L2_BUF_FLAG_TIMESTAMP_COPY, 1), StampKind::none) << "somebody else's clock";
+  EXPECT_EQ(stamp_kind(kMonotonic | V4L2_BUF_FLAG_ERROR | V4L2_BUF_FLAG_KEYFRAME, 1),
+            StampKind::frame_end)
+      << "other flags say nothing";
+  EXPECT_EQ(stamp_kind(V4L2_BUF_FLAG_TIMESTAMP_COPY, 1), StampKind::none)
+      << "somebody else's clock";
   EXPECT_EQ(stamp_kind(V4L2_BUF_FLAG_TIMESTAMP_UNKNOWN, 1), StampKind::none);
   EXPECT_EQ(stamp_kind(kMonotonic, 0), StampKind::none) << "a zero is no stamp";
 }
 
 TEST(V4l2Stamps, exposureStartIsReckonedBackFromWhatTheStampIsOf) {
   const std::int64_t stamp = 4'900'000'000;
-  EXPECT_EQ(exposure_start(StampKind::exposure_start, stamp, kArrival, kExposure, kReadout), DeviceStamp(stamp));
-  EXPECT_EQ(exposure_start(StampKind::frame_end, stamp, kArrival, kExposure, kReadout), DeviceStamp(stamp - 20'000'000));
-  EXPECT_EQ(exposure_start(StampKind::none, stamp, kArrival, kExposure, kReadout), DeviceStamp(kArrival.ns() - 20'000'000));
+  EXPECT_EQ(exposure_start(StampKind::exposure_start, stamp, kArrival, kExposure, kReadout),
+            DeviceStamp(stamp));
+  EXPECT_EQ(exposure_start(StampKind::frame_end, stamp, kArrival, kExposure, kReadout),
+            DeviceStamp(stamp - 20'000'000));
+  EXPECT_EQ(exposure_start(StampKind::none, stamp, kArrival, kExposure, kReadout),
+            DeviceStamp(kArrival.ns() - 20'000'000));
 }
 
 TEST(V4l2Sequence, countsFromZeroAndTellsGaps) {
@@ -67,8 +73,10 @@ TEST(V4l2Sequence, unnumberedBuffersAreCountedByTime) {
 }
 
 TEST(V4l2Raster, keepsTheFirstFrameOfEveryIntervalOfTheClock) {
-  const Duration interval = Duration::milliseconds(100), frame = Duration::nanoseconds(16'683'333);  // 59.94 Hz
-  // Two cameras at one rate, started at different times: what they keep lies within one frame of each other.
+  const Duration interval = Duration::milliseconds(100),
+                 frame = Duration::nanoseconds(16'683'333);  // 59.94 Hz
+  // Two cameras at one rate, started at different times: what they keep lies within one frame of
+  // each other.
   Raster left(interval), right(interval);
   std::vector<DeviceStamp> kept[2];
   std::uint64_t first[2] = {}, counters[2] = {};

@@ -16,10 +16,12 @@ namespace {
 using xbus::LocalFrame;
 
 TEST(Frames, anSensorLookingEastIsTheSameInEveryFrame) {
-  // Forward is east: in ENU the identity, in NWU a quarter turn to the right, in NED a quarter turn and upside down.
+  // Forward is east: in ENU the identity, in NWU a quarter turn to the right, in NED a quarter turn
+  // and upside down.
   const double h = std::sqrt(0.5);
-  for (const auto& [q, frame] :
-       {std::pair{std::array<double, 4>{1, 0, 0, 0}, LocalFrame::enu}, {{h, 0, 0, -h}, LocalFrame::nwu}, {{0, h, h, 0}, LocalFrame::ned}}) {
+  for (const auto& [q, frame] : {std::pair{std::array<double, 4>{1, 0, 0, 0}, LocalFrame::enu},
+                                 {{h, 0, 0, -h}, LocalFrame::nwu},
+                                 {{0, h, h, 0}, LocalFrame::ned}}) {
     const auto enu = enu_attitude(q, frame);
     ASSERT_TRUE(enu);
     EXPECT_NEAR(std::abs((*enu)[3]), 1, 1e-12) << static_cast<int>(frame);
@@ -30,7 +32,8 @@ TEST(Frames, anSensorLookingEastIsTheSameInEveryFrame) {
 }
 
 TEST(Frames, attitudeTurnsVectorsAsVelocityDoes) {
-  // v_enu by the attitude in ENU of a body vector must be the frame's change of v by the attitude in that frame.
+  // v_enu by the attitude in ENU of a body vector must be the frame's change of v by the attitude
+  // in that frame.
   Random random(3);
   for (int i = 0; i < 200; ++i) {
     std::array<double, 4> q{random.normal(), random.normal(), random.normal(), random.normal()};
@@ -56,7 +59,8 @@ TEST(Frames, eulerAnglesAndMatricesGiveTheSameAttitude) {
   double dot = 0;
   for (std::size_t k = 0; k < 4; ++k) dot += q[k] * back[k];
   EXPECT_NEAR(std::abs(dot), 1, 1e-12);
-  EXPECT_NEAR(R(0, 0), std::cos(20 * M_PI / 180) * std::cos(130 * M_PI / 180), 1e-12) << "yaw, then pitch, then roll";
+  EXPECT_NEAR(R(0, 0), std::cos(20 * M_PI / 180) * std::cos(130 * M_PI / 180), 1e-12)
+      << "yaw, then pitch, then roll";
   EXPECT_NEAR(R(2, 0), std::sin(20 * M_PI / 180), 1e-12);
   EXPECT_FALSE(enu_attitude({0, 0, 0, 0}, LocalFrame::enu)) << "no rotation";
   EXPECT_FALSE(enu_attitude({NAN, 0, 0, 1}, LocalFrame::enu));
@@ -69,7 +73,8 @@ TEST(SampleTime, survivesEveryWrapAndTellsARestart) {
   EXPECT_EQ(day.stamp(), DeviceStamp(864'000'000LL * 100'000));
   EXPECT_EQ(day.next(100, {}), ClockStep::forward);
   EXPECT_EQ(day.stamp(), DeviceStamp(864'000'100LL * 100'000));
-  EXPECT_EQ(day.near(863'999'950), DeviceStamp(863'999'950LL * 100'000)) << "an older one, on the other side of the wrap";
+  EXPECT_EQ(day.near(863'999'950), DeviceStamp(863'999'950LL * 100'000))
+      << "an older one, on the other side of the wrap";
 
   SampleTime full;
   EXPECT_EQ(full.next(4'294'967'200U, {}), ClockStep::first);
@@ -85,7 +90,8 @@ TEST(SampleTime, survivesEveryWrapAndTellsARestart) {
   EXPECT_EQ(other.next(864'000'000, {}), ClockStep::backward) << "an older one";
   EXPECT_EQ(other.stamp(), DeviceStamp(864'000'050LL * 100'000)) << "changes nothing";
   EXPECT_EQ(other.next(5'000, Duration::seconds(2)), ClockStep::restart);
-  EXPECT_EQ(other.stamp(), DeviceStamp((864'000'050LL + 20'000) * 100'000)) << "goes on by what has passed";
+  EXPECT_EQ(other.stamp(), DeviceStamp((864'000'050LL + 20'000) * 100'000))
+      << "goes on by what has passed";
   EXPECT_EQ(other.next(5'100, {}), ClockStep::forward);
 }
 
@@ -107,13 +113,15 @@ TEST(SampleCounter, wrapsAndBridgesGapsByTheTimeBetween) {
   EXPECT_EQ(c.count(), 65'536);
   EXPECT_EQ(c.next(10, 10), ClockStep::forward) << "nine are lost";
   EXPECT_EQ(c.count(), 65'546);
-  EXPECT_EQ(c.next(20, 65'546), ClockStep::forward) << "nine minutes of silence at 120 Hz: a whole turn";
+  EXPECT_EQ(c.next(20, 65'546), ClockStep::forward)
+      << "nine minutes of silence at 120 Hz: a whole turn";
   EXPECT_EQ(c.count(), 65'546 + 65'546);
   EXPECT_EQ(c.next(20, 1), ClockStep::backward);
   EXPECT_EQ(c.next(30'000, 5), ClockStep::restart) << "started anew";
 }
 
-/// Messages of one period behind one another on a line without a converter: each read ends with a message.
+/// Messages of one period behind one another on a line without a converter: each read ends with a
+/// message.
 TEST(ArrivalTiming, lastBytesGiveTheLineUnderAllArrivals) {
   constexpr std::uint32_t kBaud = 115200;
   constexpr Duration kProcessing = Duration::milliseconds(2);
@@ -129,9 +137,11 @@ TEST(ArrivalTiming, lastBytesGiveTheLineUnderAllArrivals) {
     const std::uint64_t begin = at, end = at + 80;
     at = end;
     const auto late = static_cast<std::int64_t>(-1e6 * std::log(1 - random.uniform()));
-    timing.read(end, truth + kProcessing + Duration::nanoseconds(xbus::wire_time_ns(80, kBaud) + late));
+    timing.read(end,
+                truth + kProcessing + Duration::nanoseconds(xbus::wire_time_ns(80, kBaud) + late));
     timing.message(begin, end, measured);
-    if (i > 2000) worst = std::max(worst, std::abs((timing.at(measured).host - truth).to_seconds()));
+    if (i > 2000)
+      worst = std::max(worst, std::abs((timing.at(measured).host - truth).to_seconds()));
   }
   EXPECT_LT(worst, 60e-6) << "exponential lateness of 1 ms: the least of a hundred is 10 us";
   EXPECT_NEAR(timing.drift(), 40e-6, 2e-6);
@@ -143,7 +153,8 @@ TEST(ArrivalTiming, aReadThatEndsInsideAMessageWaitsForIt) {
   timing.read(80, HostStamp(1'002'700'000));
   timing.message(0, 80, DeviceStamp(0));
   // Byte 50 was on the wire 4.34 ms after the sample, byte 80 6.94 ms: both say the same to 0.1 ms.
-  EXPECT_NEAR(static_cast<double>(timing.at(DeviceStamp(0)).host.ns()), 1'000'000'000 - 4'340'278, 100'000);
+  EXPECT_NEAR(static_cast<double>(timing.at(DeviceStamp(0)).host.ns()), 1'000'000'000 - 4'340'278,
+              100'000);
 }
 
 /// Captured streams through the whole decoder: what is true of a real device's time holds.
@@ -159,23 +170,30 @@ TEST(Decoder, capturesGiveReadingsInStepWithTheirClock) {
     std::vector<InsReading> all;
     HostStamp now(1'000'000'000);
     for (std::size_t at = 0; at < bytes.size(); at += 62) {
-      const std::span<const std::uint8_t> piece(reinterpret_cast<const std::uint8_t*>(bytes.data()) + at,
-                                                std::min<std::size_t>(62, bytes.size() - at));
+      const std::span<const std::uint8_t> piece(
+          reinterpret_cast<const std::uint8_t*>(bytes.data()) + at,
+          std::min<std::size_t>(62, bytes.size() - at));
       now = now + Duration::nanoseconds(xbus::wire_time_ns(62, 115200));
       decoder.accept(piece, now);
       for (InsReading r; decoder.next(&r);) all.push_back(r);
     }
     EXPECT_EQ(decoder.line_counters().messages, 100U);
     EXPECT_EQ(decoder.counters().fixes, 4U) << set;
-    EXPECT_EQ(decoder.counters().lost + decoder.counters().malformed + decoder.counters().backward + decoder.counters().restarts, 0U)
+    EXPECT_EQ(decoder.counters().lost + decoder.counters().malformed + decoder.counters().backward +
+                  decoder.counters().restarts,
+              0U)
         << set;
-    EXPECT_EQ(all.size() + decoder.counters().incomplete + decoder.counters().unsettled, 96U) << set << ": all but the receiver's";
+    EXPECT_EQ(all.size() + decoder.counters().incomplete + decoder.counters().unsettled, 96U)
+        << set << ": all but the receiver's";
     for (std::size_t i = 1; i < all.size(); ++i) {
       const Duration step = all[i].measured - all[i - 1].measured;
-      EXPECT_EQ(step.ns() % 10'000'000, 0) << "in steps of the sample period, the receiver's older stamps between them notwithstanding";
+      EXPECT_EQ(step.ns() % 10'000'000, 0) << "in steps of the sample period, the receiver's older "
+                                              "stamps between them notwithstanding";
       EXPECT_GT(step, Duration{});
-      EXPECT_EQ(all[i].sample.number - all[i - 1].sample.number, static_cast<std::uint64_t>(step.ns() / 10'000'000));
-      EXPECT_EQ(all[i].quality.utc_ns - all[i - 1].quality.utc_ns, step.ns()) << "its UTC is the same clock";
+      EXPECT_EQ(all[i].sample.number - all[i - 1].sample.number,
+                static_cast<std::uint64_t>(step.ns() / 10'000'000));
+      EXPECT_EQ(all[i].quality.utc_ns - all[i - 1].quality.utc_ns, step.ns())
+          << "its UTC is the same clock";
     }
     EXPECT_NEAR(all.back().sample.position.latitude_deg, 57.6794, 1e-3);
     EXPECT_NEAR(all.back().sample.position.longitude_deg, 11.8825, 1e-3);

@@ -66,14 +66,16 @@ TEST_P(BothGenerations, valuesAreThoseOfTheDriveInEastNorthUp) {
   ASSERT_LE(skipped, 13U) << "two bursts of 496 bytes";
   for (std::size_t i = 0; i < all.size(); ++i) {
     const InsSample& s = all[i].sample;
-    const InsSample truth = easy_drive(0, rig.simulator->host_time(times[i + skipped]) - HostStamp{});
+    const InsSample truth =
+        easy_drive(0, rig.simulator->host_time(times[i + skipped]) - HostStamp{});
     ASSERT_NEAR(s.position.latitude_deg, truth.position.latitude_deg, 0x1p-32);
     ASSERT_NEAR(s.position.longitude_deg, truth.position.longitude_deg, 0x1p-32);
     ASSERT_NEAR(s.position.height_m, truth.position.height_m, 0x1p-32);
     double dot = 0;
     for (std::size_t k = 0; k < 4; ++k) dot += s.q_enu_ins[k] * truth.q_enu_ins[k];
     ASSERT_NEAR(std::abs(dot), 1, 1e-12);
-    for (std::size_t k = 0; k < 3; ++k) ASSERT_NEAR(s.velocity_enu[k], truth.velocity_enu[k], 2.5e-7) << "a float's step at 2 m/s";
+    for (std::size_t k = 0; k < 3; ++k)
+      ASSERT_NEAR(s.velocity_enu[k], truth.velocity_enu[k], 2.5e-7) << "a float's step at 2 m/s";
     ASSERT_TRUE(all[i].quality.utc_valid);
     ASSERT_EQ(all[i].quality.utc_ns, sensor.unix_ns_at_power_on + times[i + skipped]);
   }
@@ -92,7 +94,8 @@ TEST_P(BothGenerations, whatIsSetAlreadyIsNotWrittenAgain) {
   Options options;
   options.sync_out_hz = 25;
   options.sync_in = SyncIn::rising;
-  rig.device = std::make_unique<Device>(std::make_unique<mock::SimulatedPlace>(rig.simulator, mock::SimulatedLineOptions{}), options);
+  rig.device = std::make_unique<Device>(
+      std::make_unique<mock::SimulatedPlace>(rig.simulator, mock::SimulatedLineOptions{}), options);
   ASSERT_EQ(rig.device->configure(100, nullptr), DeviceStatus::ok) << rig.device->complaint();
   const mock::XsensWrites first = rig.simulator->writes();
   EXPECT_GT(first.outputs + first.layout, 0);
@@ -118,7 +121,8 @@ TEST_P(BothGenerations, syncOutIsSetPerGeneration) {
     return o;
   }());
   double actual = 0;
-  ASSERT_EQ(rig.device->configure(legacy() ? 120 : 100, &actual), DeviceStatus::ok) << rig.device->complaint();
+  ASSERT_EQ(rig.device->configure(legacy() ? 120 : 100, &actual), DeviceStatus::ok)
+      << rig.device->complaint();
   if (legacy()) {
     EXPECT_EQ(rig.simulator->legacy_sync_out(), (std::array<std::uint32_t, 4>{0x12, 3, 0, 58982}));
     EXPECT_EQ(rig.device->stream().sync_out_hz, 30);
@@ -127,9 +131,11 @@ TEST_P(BothGenerations, syncOutIsSetPerGeneration) {
     const auto entries = rig.simulator->sync_settings().items();
     ASSERT_EQ(entries.size(), 2U);
     EXPECT_EQ(entries[0].function, 14) << "the receiver's clock stays";
-    EXPECT_EQ(entries[1], (xbus::SyncEntry{xbus::kSyncIntervalTransition, xbus::kSyncLineOut, xbus::kSyncPositive, 0, 0, 12, 20, 0}));
+    EXPECT_EQ(entries[1], (xbus::SyncEntry{xbus::kSyncIntervalTransition, xbus::kSyncLineOut,
+                                           xbus::kSyncPositive, 0, 0, 12, 20, 0}));
     EXPECT_NEAR(rig.device->stream().sync_out_hz, 30.77, 0.01);
-    EXPECT_NE(rig.device->remark().find("30.77"), std::string::npos) << "it cannot make 30 Hz, and says so";
+    EXPECT_NE(rig.device->remark().find("30.77"), std::string::npos)
+        << "it cannot make 30 Hz, and says so";
   }
 }
 
@@ -152,10 +158,15 @@ TEST_P(BothGenerations, aLineTooSlowIsRefusedWithWhatWouldDo) {
   XsensRig rig(simulated(GetParam()));
   ASSERT_EQ(rig.device->connect(), DeviceStatus::ok);
   EXPECT_EQ(rig.device->configure(400, nullptr), DeviceStatus::no_bandwidth);
-  EXPECT_NE(rig.device->complaint().find("115200 baud"), std::string::npos) << rig.device->complaint();
+  EXPECT_NE(rig.device->complaint().find("115200 baud"), std::string::npos)
+      << rig.device->complaint();
   EXPECT_NE(rig.device->complaint().find("ins.baud"), std::string::npos) << rig.device->complaint();
-  EXPECT_EQ(rig.simulator->writes().outputs + rig.simulator->writes().layout + rig.simulator->writes().period, 0) << "nothing was changed";
-  EXPECT_EQ(rig.device->configure(100, nullptr), DeviceStatus::ok) << "and it can still be set otherwise";
+  EXPECT_EQ(rig.simulator->writes().outputs + rig.simulator->writes().layout +
+                rig.simulator->writes().period,
+            0)
+      << "nothing was changed";
+  EXPECT_EQ(rig.device->configure(100, nullptr), DeviceStatus::ok)
+      << "and it can still be set otherwise";
 }
 
 TEST_P(BothGenerations, comesBackAfterItWasUnplugged) {
@@ -243,7 +254,8 @@ TEST_P(BothGenerations, bytesThatFlipOnTheLineCostMessagesAndNothingElse) {
   for (std::size_t i = 1; i < all.size(); ++i) {
     ASSERT_GT(all[i].measured, all[i - 1].measured);
     const auto steps = all[i].sample.number - all[i - 1].sample.number;
-    ASSERT_NEAR((all[i].measured - all[i - 1].measured).to_seconds(), 0.01 * static_cast<double>(steps), 1e-6);
+    ASSERT_NEAR((all[i].measured - all[i - 1].measured).to_seconds(),
+                0.01 * static_cast<double>(steps), 1e-6);
   }
 }
 
@@ -265,10 +277,14 @@ TEST_P(BothGenerations, stopsAndStartsAgain) {
   EXPECT_EQ(rig.device->statistics().starts, 3U);
 }
 
-INSTANTIATE_TEST_SUITE_P(Xsens, BothGenerations, ::testing::Values(Generation::legacy, Generation::mark4),
-                         [](const auto& one) { return one.param == Generation::legacy ? "legacy" : "mark4"; });
+INSTANTIATE_TEST_SUITE_P(Xsens, BothGenerations,
+                         ::testing::Values(Generation::legacy, Generation::mark4),
+                         [](const auto& one) {
+                           return one.param == Generation::legacy ? "legacy" : "mark4";
+                         });
 
-// ---- stamps ---------------------------------------------------------------------------------------------------------
+// ---- stamps
+// ---------------------------------------------------------------------------------------------------------
 
 struct Timing {
   const char* name;
@@ -298,9 +314,12 @@ TEST_P(Stamps, areRightWithinThreeTenthsOfAMillisecondAfterTwentySeconds) {
     ASSERT_EQ(rig.device->start(nullptr), DeviceStatus::ok);
     const auto all = rig.readings();
     ASSERT_GT(all.size(), 70U * static_cast<unsigned>(t.rate));
-    // The simulator's newest samples are the readings' newest: the device's clock is tied by the last of both.
-    const std::int64_t origin = t.generation == Generation::mark4 ? rig.simulator->sample_time_origin_ns()
-                                                                  : all.back().measured.ns() - rig.simulator->sample_times_ns().back();
+    // The simulator's newest samples are the readings' newest: the device's clock is tied by the
+    // last of both.
+    const std::int64_t origin =
+        t.generation == Generation::mark4
+            ? rig.simulator->sample_time_origin_ns()
+            : all.back().measured.ns() - rig.simulator->sample_times_ns().back();
     const auto some = test::stamp_errors_ms(*rig.simulator, all, origin, Duration::seconds(20));
     errors.insert(errors.end(), some.begin(), some.end());
   }
@@ -310,14 +329,16 @@ TEST_P(Stamps, areRightWithinThreeTenthsOfAMillisecondAfterTwentySeconds) {
   RecordProperty("p99_us", static_cast<int>(1e3 * test::percentile(errors, 0.99)));
 }
 
-INSTANTIATE_TEST_SUITE_P(Lines, Stamps,
-                         ::testing::Values(Timing{"legacy_115200_16ms", Generation::legacy, 120, 115200, 16},
-                                           Timing{"mark4_115200_16ms", Generation::mark4, 100, 115200, 16},
-                                           Timing{"mark4_921600_16ms", Generation::mark4, 100, 921600, 16},
-                                           Timing{"mark4_115200_direct", Generation::mark4, 100, 115200, 0}),
-                         [](const auto& one) { return one.param.name; });
+INSTANTIATE_TEST_SUITE_P(
+    Lines, Stamps,
+    ::testing::Values(Timing{"legacy_115200_16ms", Generation::legacy, 120, 115200, 16},
+                      Timing{"mark4_115200_16ms", Generation::mark4, 100, 115200, 16},
+                      Timing{"mark4_921600_16ms", Generation::mark4, 100, 921600, 16},
+                      Timing{"mark4_115200_direct", Generation::mark4, 100, 115200, 0}),
+    [](const auto& one) { return one.param.name; });
 
-// ---- what is special to one of them, and what is none ----------------------------------------------------------------
+// ---- what is special to one of them, and what is none
+// ----------------------------------------------------------------
 
 TEST(Mark4, theDayOfItsClockWraps) {
   mock::XsensSimulatorOptions sensor = simulated(Generation::mark4);
@@ -328,7 +349,8 @@ TEST(Mark4, theDayOfItsClockWraps) {
   ASSERT_EQ(rig.device->start(nullptr), DeviceStatus::ok);
   const auto all = rig.readings();
   ASSERT_GT(all.size(), 2000U);
-  for (std::size_t i = 1; i < all.size(); ++i) ASSERT_EQ(all[i].measured - all[i - 1].measured, Duration::milliseconds(10));
+  for (std::size_t i = 1; i < all.size(); ++i)
+    ASSERT_EQ(all[i].measured - all[i - 1].measured, Duration::milliseconds(10));
   EXPECT_EQ(rig.device->statistics().restarts, 0U);
 }
 
@@ -376,7 +398,8 @@ TEST(Mark4, syncOutIsMarkedInTheStream) {
   ASSERT_EQ(rig.device->configure(100, nullptr), DeviceStatus::ok);
   ASSERT_EQ(rig.device->start(nullptr), DeviceStatus::ok);
   const auto all = rig.readings();
-  const auto marked = std::count_if(all.begin(), all.end(), [](const InsReading& r) { return r.quality.sync_out; });
+  const auto marked =
+      std::count_if(all.begin(), all.end(), [](const InsReading& r) { return r.quality.sync_out; });
   EXPECT_NEAR(static_cast<double>(marked), static_cast<double>(all.size()) / 4, 2);
 }
 
@@ -385,7 +408,9 @@ class Talker final : public mock::DeviceModel {
  public:
   explicit Talker(std::string says) : says_(std::move(says)) {}
   void receive(std::span<const std::uint8_t> /*bytes*/, HostStamp /*at*/) override {}
-  std::optional<HostStamp> next() const override { return says_.empty() ? std::nullopt : std::optional(next_); }
+  std::optional<HostStamp> next() const override {
+    return says_.empty() ? std::nullopt : std::optional(next_);
+  }
   void produce(HostStamp at, std::vector<std::uint8_t>* out) override {
     out->insert(out->end(), says_.begin(), says_.end());
     next_ = at + Duration::milliseconds(200);
@@ -399,17 +424,22 @@ class Talker final : public mock::DeviceModel {
 };
 
 std::string complaint_about(const std::string& says, DeviceStatus* status) {
-  Device device(std::make_unique<mock::SimulatedPlace>(std::make_shared<Talker>(says), mock::SimulatedLineOptions{}), {});
+  Device device(std::make_unique<mock::SimulatedPlace>(std::make_shared<Talker>(says),
+                                                       mock::SimulatedLineOptions{}),
+                {});
   *status = device.connect();
   return device.complaint();
 }
 
 TEST(AnotherMake, isNamed) {
   DeviceStatus status = DeviceStatus::ok;
-  EXPECT_NE(complaint_about("$GPGGA,130305.0,4717.115,N,00833.912,E,1,08,0.9,499.6,M,48.0,M,,*5B\r\n", &status).find("NMEA"),
+  EXPECT_NE(complaint_about(
+                "$GPGGA,130305.0,4717.115,N,00833.912,E,1,08,0.9,499.6,M,48.0,M,,*5B\r\n", &status)
+                .find("NMEA"),
             std::string::npos);
   EXPECT_EQ(status, DeviceStatus::not_found);
-  EXPECT_NE(complaint_about("\xB5\x62\x01\x07 some more bytes", &status).find("u-blox"), std::string::npos);
+  EXPECT_NE(complaint_about("\xB5\x62\x01\x07 some more bytes", &status).find("u-blox"),
+            std::string::npos);
   EXPECT_NE(complaint_about("hello hello hello", &status).find("no Xbus"), std::string::npos);
   EXPECT_NE(complaint_about("", &status).find("silent"), std::string::npos);
 }

@@ -21,8 +21,8 @@ namespace vergence::test {
   s.velocity_enu = {2.0 + 0.01 * t, 1.1, -0.1};
   const double yaw = 0.3 + 0.02 * t, roll = 0.05, h = 0.5;
   // yaw about up, then roll about forward
-  s.q_enu_ins = {std::cos(h * yaw) * std::sin(h * roll), std::sin(h * yaw) * std::sin(h * roll), std::sin(h * yaw) * std::cos(h * roll),
-                 std::cos(h * yaw) * std::cos(h * roll)};
+  s.q_enu_ins = {std::cos(h * yaw) * std::sin(h * roll), std::sin(h * yaw) * std::sin(h * roll),
+                 std::sin(h * yaw) * std::cos(h * roll), std::cos(h * yaw) * std::cos(h * roll)};
   s.position_sigma = 1.5, s.height_sigma = 3, s.velocity_sigma = 0.1;
   return s;
 }
@@ -37,15 +37,18 @@ namespace vergence::test {
 
 /// A driver's device on a simulated line.
 struct XsensRig {
-  explicit XsensRig(const mock::XsensSimulatorOptions& sensor = {}, const mock::SimulatedLineOptions& line = {},
-                    const xsens::Options& options = {}, mock::InsSource source = easy_drive)
+  explicit XsensRig(const mock::XsensSimulatorOptions& sensor = {},
+                    const mock::SimulatedLineOptions& line = {}, const xsens::Options& options = {},
+                    mock::InsSource source = easy_drive)
       : simulator(std::make_shared<mock::XsensSimulator>(std::move(source), sensor)),
-        device(std::make_unique<xsens::Device>(std::make_unique<mock::SimulatedPlace>(simulator, line), options)) {}
+        device(std::make_unique<xsens::Device>(
+            std::make_unique<mock::SimulatedPlace>(simulator, line), options)) {}
 
   std::shared_ptr<mock::XsensSimulator> simulator;
   std::unique_ptr<xsens::Device> device;
 
-  /// All readings until the device has no more, or this many; `gone` is passed over, the device is asked to come back.
+  /// All readings until the device has no more, or this many; `gone` is passed over, the device is
+  /// asked to come back.
   std::vector<InsReading> readings(std::size_t most = SIZE_MAX) {
     std::vector<InsReading> all;
     while (all.size() < most) {
@@ -66,7 +69,8 @@ struct XsensRig {
 };
 
 /// |mapped − true| of every reading after `settled` of the first, in milliseconds, ascending.
-[[nodiscard]] inline std::vector<double> stamp_errors_ms(const mock::XsensSimulator& simulator, const std::vector<InsReading>& readings,
+[[nodiscard]] inline std::vector<double> stamp_errors_ms(const mock::XsensSimulator& simulator,
+                                                         const std::vector<InsReading>& readings,
                                                          std::int64_t origin_ns, Duration settled) {
   std::vector<double> errors;
   for (const InsReading& r : readings) {
@@ -79,8 +83,11 @@ struct XsensRig {
 }
 
 [[nodiscard]] inline double percentile(const std::vector<double>& ascending, double p) {
-  return ascending.empty() ? 1e9
-                           : ascending[std::min(ascending.size() - 1, static_cast<std::size_t>(p * static_cast<double>(ascending.size())))];
+  return ascending.empty()
+             ? 1e9
+             : ascending[std::min(
+                   ascending.size() - 1,
+                   static_cast<std::size_t>(p * static_cast<double>(ascending.size())))];
 }
 
 }  // namespace vergence::test

@@ -34,7 +34,8 @@ TEST(CycleUnwrapper, CountsThroughTheWrap) {
   std::int64_t first = 0;
   for (std::int64_t i = 0; i < 10'000; ++i) {  // 1000 s at 10 Hz
     const std::int64_t bus = 120 * kSecond + i * kSecond / 10;
-    const std::int64_t t = u.unwrap(bus % kCycleTimeWrapNs, host + i * kSecond / 10 + i % 7 * 1'000'000);
+    const std::int64_t t =
+        u.unwrap(bus % kCycleTimeWrapNs, host + i * kSecond / 10 + i % 7 * 1'000'000);
     if (i == 0) first = t;
     ASSERT_EQ(t - first, i * kSecond / 10) << i;
   }
@@ -54,7 +55,8 @@ TEST(CycleUnwrapper, CamerasThatShareItAgreeWhicheverCameFirst) {
   CycleUnwrapper u;
   const std::int64_t host = 1'000 * kSecond, bus = 127 * kSecond + 990'000'000;
   const std::int64_t a = u.unwrap(bus, host);
-  const std::int64_t b = u.unwrap((bus + 20'000'000) % kCycleTimeWrapNs, host + 5'000'000);  // exposed 20 ms later, arrived sooner
+  const std::int64_t b = u.unwrap((bus + 20'000'000) % kCycleTimeWrapNs,
+                                  host + 5'000'000);  // exposed 20 ms later, arrived sooner
   EXPECT_EQ(b - a, 20'000'000);
   EXPECT_EQ(u.unwrap(bus, host + 60'000'000), a);  // an older stamp that arrives late
 }

@@ -35,12 +35,14 @@ TEST(Features, AValueGoesThereAndBack) {
   v.present = v.absolute = v.on = true;
   v.value = 0x123;
   EXPECT_EQ(v.quadlet(), 0xC200'0123U);
-  for (const std::uint32_t q : {0xC200'0123U, 0x8100'0FFFU, 0x8700'0000U}) EXPECT_EQ(FeatureValue::of(q).quadlet(), q);
+  for (const std::uint32_t q : {0xC200'0123U, 0x8100'0FFFU, 0x8700'0000U})
+    EXPECT_EQ(FeatureValue::of(q).quadlet(), q);
 }
 
 TEST(Features, TriggerModesZeroAndFourteenAndTheirSources) {
   // Present, readable, switchable, polarity, level, sources 0 and 1, software, modes 0, 14, 15.
-  const TriggerInquiry t = TriggerInquiry::of(bit(31) | bit(27) | bit(26) | bit(25) | bit(24) | bit(23) | bit(22) | bit(16) | bit(15) | 3);
+  const TriggerInquiry t = TriggerInquiry::of(bit(31) | bit(27) | bit(26) | bit(25) | bit(24) |
+                                              bit(23) | bit(22) | bit(16) | bit(15) | 3);
   EXPECT_TRUE(t.present && t.polarity && t.software);
   EXPECT_TRUE(t.has_mode(0) && t.has_mode(14) && t.has_mode(15));
   EXPECT_FALSE(t.has_mode(1) || t.has_mode(13) || t.has_mode(99));

@@ -18,9 +18,11 @@ TEST(Formats, SizesAndPacketsAreThoseOfTheStandard) {
   };
   // Packet bytes from the format tables of the standard (lines a packet times bytes a line).
   for (const Row& r :
-       {Row{0, 0, 160, 120, 4, 240}, Row{0, 1, 320, 240, 4, 640}, Row{0, 3, 640, 480, 4, 2560}, Row{0, 5, 640, 480, 4, 1280},
-        Row{0, 5, 640, 480, 1, 160}, Row{0, 6, 640, 480, 4, 2560}, Row{1, 2, 800, 600, 4, 2000}, Row{1, 5, 1024, 768, 4, 3072},
-        Row{1, 5, 1024, 768, 3, 1536}, Row{2, 2, 1280, 960, 4, 5120}, Row{2, 2, 1280, 960, 2, 1280}, Row{2, 5, 1600, 1200, 4, 8000}}) {
+       {Row{0, 0, 160, 120, 4, 240}, Row{0, 1, 320, 240, 4, 640}, Row{0, 3, 640, 480, 4, 2560},
+        Row{0, 5, 640, 480, 4, 1280}, Row{0, 5, 640, 480, 1, 160}, Row{0, 6, 640, 480, 4, 2560},
+        Row{1, 2, 800, 600, 4, 2000}, Row{1, 5, 1024, 768, 4, 3072}, Row{1, 5, 1024, 768, 3, 1536},
+        Row{2, 2, 1280, 960, 4, 5120}, Row{2, 2, 1280, 960, 2, 1280},
+        Row{2, 5, 1600, 1200, 4, 8000}}) {
     const FixedMode m = find(r.format, r.mode);
     EXPECT_EQ(m.width, r.width) << r.format << '/' << r.mode;
     EXPECT_EQ(m.height, r.height) << r.format << '/' << r.mode;
@@ -36,7 +38,8 @@ TEST(Formats, APacketOfAFixedModeIsWholeQuadletsAndFillsTheFrame) {
       EXPECT_EQ(packet % 4, 0U);
       EXPECT_EQ(frame_bytes(m.width, m.height, m.coding) % packet, 0U);
       // The frame's packets fit into the cycles of its period.
-      EXPECT_LE(static_cast<double>(frame_bytes(m.width, m.height, m.coding) / packet), kCyclesPerSecond / rate_of(code));
+      EXPECT_LE(static_cast<double>(frame_bytes(m.width, m.height, m.coding) / packet),
+                kCyclesPerSecond / rate_of(code));
     }
 }
 

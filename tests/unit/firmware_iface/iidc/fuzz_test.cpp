@@ -23,7 +23,8 @@ TEST(IidcFuzz, MutatedRomsGiveAStatusAndNothingElse) {
     std::vector<std::uint8_t> bytes = good;
     bytes.resize(random() % 4 == 0 ? random() % 1200 : bytes.size());
     if (bytes.empty()) continue;
-    for (unsigned n = random() % 8; n > 0; --n) bytes[random() % bytes.size()] = static_cast<std::uint8_t>(random());
+    for (unsigned n = random() % 8; n > 0; --n)
+      bytes[random() % bytes.size()] = static_cast<std::uint8_t>(random());
     (void)LLVMFuzzerTestOneInput(bytes.data(), bytes.size());
   }
 }

@@ -130,7 +130,8 @@ TEST(TriggerFrames, amongAMillionBytesOfNoiseEveryWholeFrameIsFound) {
   for (std::uint32_t block = 0; block < 10'000; ++block) {
     Bytes bytes = noise(100, block);
     bytes.push_back(0);
-    const Bytes good = framed(trigger_event, static_cast<std::uint8_t>(block), noise(block % 65, ~block));
+    const Bytes good =
+        framed(trigger_event, static_cast<std::uint8_t>(block), noise(block % 65, ~block));
     bytes.insert(bytes.end(), good.begin(), good.end());
     ++sent;
     for (std::size_t i = 0; i < bytes.size(); ++i) {
@@ -159,7 +160,8 @@ TEST(TriggerFrames, aRefusedFrameLeavesTheOutputAlone) {
   frame.type = 0x77;
   Bytes bad = framed(trigger_ping, 3, {1, 2, 3, 4});
   bad[4] ^= 0x10U;
-  for (const std::uint8_t b : bad) EXPECT_NE(trigger_decode(&decoder, b, &frame), trigger_frame_ready);
+  for (const std::uint8_t b : bad)
+    EXPECT_NE(trigger_decode(&decoder, b, &frame), trigger_frame_ready);
   EXPECT_EQ(frame.type, 0x77);
 }
 
@@ -167,7 +169,8 @@ TEST(TriggerPayloads, anEventStandsByteForByteWhereTheHeaderSays) {
   std::uint8_t p[trigger_event_payload_size];
   const TriggerEvent event = some_event();
   trigger_put_event(&event, p);
-  EXPECT_EQ(Bytes(p, p + 22), (Bytes{0xEF, 0xBE, 0xAD, 0xDE, 0x87, 0xD6, 0x12, 0x00, 8, 7, 6, 5, 4, 3, 2, 1, 3, 1, 12, 0, 0, 0}));
+  EXPECT_EQ(Bytes(p, p + 22), (Bytes{0xEF, 0xBE, 0xAD, 0xDE, 0x87, 0xD6, 0x12, 0x00, 8, 7, 6,
+                                     5,    4,    3,    2,    1,    3,    1,    12,   0, 0, 0}));
   EXPECT_EQ(Bytes(p + 26, p + 30), (Bytes{0xFD, 0xFF, 0xFF, 0xFF}));
   TriggerEvent back{};
   ASSERT_TRUE(trigger_get_event(p, sizeof p, &back));
@@ -179,12 +182,15 @@ TEST(TriggerPayloads, anEventStandsByteForByteWhereTheHeaderSays) {
 /// The bytes of docs/trigger_board.md, worked out by hand from its tables.
 TEST(TriggerPayloads, everyLayoutStandsByteForByteWhereItsTableSays) {
   Bytes p(trigger_info_payload_size);
-  const TriggerInfo info{1, 2, 3, 4, 0x11223344, 84'000'000, 4, 2, 1, 0, {1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12}};
+  const TriggerInfo info{
+      1, 2, 3, 4, 0x11223344, 84'000'000, 4, 2, 1, 0, {1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12}};
   trigger_put_info(&info, p.data());
-  EXPECT_EQ(p, (Bytes{1, 2, 3, 4, 0x44, 0x33, 0x22, 0x11, 0x00, 0xBD, 0x01, 0x05, 4, 2, 1, 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12}));
+  EXPECT_EQ(p, (Bytes{1, 2, 3, 4, 0x44, 0x33, 0x22, 0x11, 0x00, 0xBD, 0x01, 0x05, 4,  2,
+                      1, 0, 1, 2, 3,    4,    5,    6,    7,    8,    9,    10,   11, 12}));
 
   p.resize(trigger_config_payload_size);
-  const TriggerConfig config{30'000, 200, 1500, 0x03, 0x02, 0x01, 0x80, trigger_edge_rising, trigger_edge_falling};
+  const TriggerConfig config{
+      30'000, 200, 1500, 0x03, 0x02, 0x01, 0x80, trigger_edge_rising, trigger_edge_falling};
   trigger_put_config(&config, p.data());
   EXPECT_EQ(p, (Bytes{0x30, 0x75, 0, 0, 0xC8, 0, 0, 0, 0xDC, 0x05, 0, 0, 3, 2, 1, 0x80, 1, 2}));
 
@@ -201,8 +207,8 @@ TEST(TriggerPayloads, everyLayoutStandsByteForByteWhereItsTableSays) {
   p.resize(trigger_pong_payload_size);
   const TriggerPong pong{0xA1A2A3A4, 0x11223344, 0x0102030405060708, 0x1112131415161718};
   trigger_put_pong(&pong, p.data());
-  EXPECT_EQ(
-      p, (Bytes{0xA4, 0xA3, 0xA2, 0xA1, 0x44, 0x33, 0x22, 0x11, 8, 7, 6, 5, 4, 3, 2, 1, 0x18, 0x17, 0x16, 0x15, 0x14, 0x13, 0x12, 0x11}));
+  EXPECT_EQ(p, (Bytes{0xA4, 0xA3, 0xA2, 0xA1, 0x44, 0x33, 0x22, 0x11, 8,    7,    6,    5,
+                      4,    3,    2,    1,    0x18, 0x17, 0x16, 0x15, 0x14, 0x13, 0x12, 0x11}));
 
   p.resize(trigger_edge_payload_size);
   const TriggerEdge edge{0x11223344, 7, 1'000'000};
@@ -210,10 +216,12 @@ TEST(TriggerPayloads, everyLayoutStandsByteForByteWhereItsTableSays) {
   EXPECT_EQ(p, (Bytes{0x44, 0x33, 0x22, 0x11, 7, 0, 0, 0, 0x40, 0x42, 0x0F, 0, 0, 0, 0, 0}));
 
   p.resize(trigger_status_payload_size);
-  const TriggerStatus status{0x11223344, 1'000'000, 7, 0xCAFEBABE, 1, 2, 3, 0xFFFFFFFF, trigger_paused, 1};
+  const TriggerStatus status{0x11223344, 1'000'000, 7,          0xCAFEBABE,     1,
+                             2,          3,         0xFFFFFFFF, trigger_paused, 1};
   trigger_put_status(&status, p.data());
-  EXPECT_EQ(p, (Bytes{0x44, 0x33, 0x22, 0x11, 0x40, 0x42, 0x0F, 0, 0, 0, 0, 0, 7, 0,    0,    0,    0xBE, 0xBA, 0xFE,
-                      0xCA, 1,    0,    0,    0,    2,    0,    0, 0, 3, 0, 0, 0, 0xFF, 0xFF, 0xFF, 0xFF, 2,    1}));
+  EXPECT_EQ(p, (Bytes{0x44, 0x33, 0x22, 0x11, 0x40, 0x42, 0x0F, 0,    0,    0,    0, 0, 7,
+                      0,    0,    0,    0xBE, 0xBA, 0xFE, 0xCA, 1,    0,    0,    0, 2, 0,
+                      0,    0,    3,    0,    0,    0,    0xFF, 0xFF, 0xFF, 0xFF, 2, 1}));
 
   p.resize(trigger_error_payload_size);
   const TriggerError error{trigger_config, trigger_error_rate};
@@ -223,14 +231,17 @@ TEST(TriggerPayloads, everyLayoutStandsByteForByteWhereItsTableSays) {
 
 /// Whole frames as they stand on the wire; the CRCs are zlib's.
 TEST(TriggerFrames, wholeFramesAreTheseBytes) {
-  EXPECT_EQ(framed(trigger_hello, 5, {1}), (Bytes{0x08, 0x01, 0x05, 0x01, 0xF6, 0x77, 0xF3, 0xF4, 0x00}));
+  EXPECT_EQ(framed(trigger_hello, 5, {1}),
+            (Bytes{0x08, 0x01, 0x05, 0x01, 0xF6, 0x77, 0xF3, 0xF4, 0x00}));
   EXPECT_EQ(framed(trigger_start, 0, {}), (Bytes{0x02, 0x03, 0x05, 0x3C, 0x41, 0xF4, 0x6A, 0x00}));
-  EXPECT_EQ(framed(trigger_ping, 0x7F, {0, 1, 0, 2}), (Bytes{0x03, 0x06, 0x7F, 0x02, 0x01, 0x06, 0x02, 0xBB, 0x3E, 0xD5, 0xF3, 0x00}));
+  EXPECT_EQ(framed(trigger_ping, 0x7F, {0, 1, 0, 2}),
+            (Bytes{0x03, 0x06, 0x7F, 0x02, 0x01, 0x06, 0x02, 0xBB, 0x3E, 0xD5, 0xF3, 0x00}));
   EXPECT_EQ(framed(trigger_error, 9, {trigger_config, trigger_error_rate}),
             (Bytes{0x09, 0x94, 0x09, 0x02, 0x06, 0xD7, 0x55, 0xE2, 0xC7, 0x00}));
 }
 
-/// Any bytes → struct → the same bytes: every byte of the layout is read and written, and none twice.
+/// Any bytes → struct → the same bytes: every byte of the layout is read and written, and none
+/// twice.
 template <class Message, std::size_t kSize, class Get, class Put>
 void expect_bijective(Get get, Put put) {
   const Bytes bytes = noise(kSize, 42);
@@ -247,13 +258,15 @@ void expect_bijective(Get get, Put put) {
 
 TEST(TriggerPayloads, everyLayoutReadsAndWritesEachOfItsBytesOnce) {
   expect_bijective<TriggerInfo, trigger_info_payload_size>(trigger_get_info, trigger_put_info);
-  expect_bijective<TriggerConfig, trigger_config_payload_size>(trigger_get_config, trigger_put_config);
+  expect_bijective<TriggerConfig, trigger_config_payload_size>(trigger_get_config,
+                                                               trigger_put_config);
   expect_bijective<TriggerPause, trigger_pause_payload_size>(trigger_get_pause, trigger_put_pause);
   expect_bijective<TriggerPing, trigger_ping_payload_size>(trigger_get_ping, trigger_put_ping);
   expect_bijective<TriggerPong, trigger_pong_payload_size>(trigger_get_pong, trigger_put_pong);
   expect_bijective<TriggerEvent, trigger_event_payload_size>(trigger_get_event, trigger_put_event);
   expect_bijective<TriggerEdge, trigger_edge_payload_size>(trigger_get_edge, trigger_put_edge);
-  expect_bijective<TriggerStatus, trigger_status_payload_size>(trigger_get_status, trigger_put_status);
+  expect_bijective<TriggerStatus, trigger_status_payload_size>(trigger_get_status,
+                                                               trigger_put_status);
   expect_bijective<TriggerError, trigger_error_payload_size>(trigger_get_error, trigger_put_error);
 }
 
@@ -267,7 +280,8 @@ TEST(TriggerBothSides, theFirmwaresCompilerMakesTheHostsBytes) {
   TriggerDecoder decoder{};
   TriggerFrame frame{};
   int ready = 0;
-  for (const std::uint8_t b : from_c) ready += c_side_decode(&decoder, b, &frame) == trigger_frame_ready ? 1 : 0;
+  for (const std::uint8_t b : from_c)
+    ready += c_side_decode(&decoder, b, &frame) == trigger_frame_ready ? 1 : 0;
   EXPECT_EQ(ready, 1);
   EXPECT_EQ(payload_of(frame), payload);
 }
@@ -280,7 +294,9 @@ TEST(TriggerVariedIntervals, noRunOf24FitsItselfShifted) {
   for (std::uint32_t start = 0; start < kPulses; ++start)
     for (std::uint32_t shift = 1; shift <= 8; ++shift) {
       std::uint32_t same = 0;
-      while (same < kRun && trigger_interval_is_longer(start + same) == trigger_interval_is_longer(start + same + shift)) ++same;
+      while (same < kRun && trigger_interval_is_longer(start + same) ==
+                                trigger_interval_is_longer(start + same + shift))
+        ++same;
       ASSERT_LT(same, kRun) << "from pulse " << start << " shifted by " << shift;
     }
 }

@@ -34,12 +34,14 @@ std::vector<Block> blocks_of(const std::string& golden) {
     if (line.empty()) {
       blocks.emplace_back();
     } else if (line[0] != ' ') {
-      blocks.back().emplace_back(line.substr(0, line.find_first_of("(:")), std::vector<std::string>{});
+      blocks.back().emplace_back(line.substr(0, line.find_first_of("(:")),
+                                 std::vector<std::string>{});
     } else {
       const std::string text = line.substr(line.find_first_not_of(' '));
       const std::size_t colon = text.find(':');
       const bool clock = text.find('T') != std::string::npos && text.back() == 'Z';
-      blocks.back().back().second.push_back(colon == std::string::npos || clock ? text : text.substr(colon + 1));
+      blocks.back().back().second.push_back(
+          colon == std::string::npos || clock ? text : text.substr(colon + 1));
     }
   }
   if (blocks.back().empty()) blocks.pop_back();
@@ -90,7 +92,8 @@ std::vector<double> pvt_fields(const std::optional<GnssPvt>& fix) {
   return all;
 }
 
-/// The decoded numbers of an item under the name the text uses. Times and status are compared as text elsewhere.
+/// The decoded numbers of an item under the name the text uses. Times and status are compared as
+/// text elsewhere.
 std::vector<double> values_of(const Mtdata2& m, const std::string& item) {
   static const std::map<std::string, std::vector<double> (*)(const Mtdata2&)> kItems = {
       {"PacketCounter", [](const Mtdata2& x) { return single(x.packet_counter); }},
@@ -119,8 +122,8 @@ std::vector<double> values_of(const Mtdata2& m, const std::string& item) {
 
 std::string utc_text(const Utc& utc) {
   char text[64];
-  std::snprintf(text, sizeof text, "%04d-%02d-%02dT%02d:%02d:%02d.%09u", utc.year, utc.month, utc.day, utc.hour, utc.minute, utc.second,
-                utc.nanosecond);
+  std::snprintf(text, sizeof text, "%04d-%02d-%02dT%02d:%02d:%02d.%09u", utc.year, utc.month,
+                utc.day, utc.hour, utc.minute, utc.second, utc.nanosecond);
   std::string trimmed = text;
   trimmed.erase(trimmed.find_last_not_of('0') + 1);
   if (trimmed.back() == '.') trimmed.pop_back();
@@ -133,10 +136,12 @@ std::string binary(std::uint32_t value, unsigned bits) {
   return text;
 }
 
-std::vector<std::vector<std::uint8_t>> messages_of(const std::string& stream_bytes, std::size_t piece, StreamCounters* counters) {
+std::vector<std::vector<std::uint8_t>> messages_of(const std::string& stream_bytes,
+                                                   std::size_t piece, StreamCounters* counters) {
   std::vector<std::vector<std::uint8_t>> messages;
   FrameStream stream;
-  std::span<const std::uint8_t> rest(reinterpret_cast<const std::uint8_t*>(stream_bytes.data()), stream_bytes.size());
+  std::span<const std::uint8_t> rest(reinterpret_cast<const std::uint8_t*>(stream_bytes.data()),
+                                     stream_bytes.size());
   while (!rest.empty()) {
     rest = rest.subspan(stream.accept(rest.first(std::min(piece, rest.size()))));
     for (Message message; stream.next(&message);) {
@@ -153,7 +158,8 @@ int compare(const Block& block, const Mtdata2& m) {
   int values = 0;
   for (const auto& [item, texts] : block) {
     if (item == "UTCTime") {
-      EXPECT_TRUE(m.utc && texts.size() == 1 && utc_text(*m.utc) == texts[0]) << texts[0] << " " << (m.utc ? utc_text(*m.utc) : "none");
+      EXPECT_TRUE(m.utc && texts.size() == 1 && utc_text(*m.utc) == texts[0])
+          << texts[0] << " " << (m.utc ? utc_text(*m.utc) : "none");
     } else if (item == "StatusWord") {
       EXPECT_TRUE(m.status_word && binary(*m.status_word, 32) == texts.at(0));
     } else if (item == "StatusByte") {
@@ -195,7 +201,8 @@ TEST(Captures, everyValueOfFiveHundredMessagesAgrees) {
     messages += payloads.size();
   }
   EXPECT_EQ(messages, 500U);
-  EXPECT_EQ(values, 12295 + 19 * 35) << "the data's README counts the nineteen fixes of 35 fields apart";
+  EXPECT_EQ(values, 12295 + 19 * 35)
+      << "the data's README counts the nineteen fixes of 35 fields apart";
 }
 
 TEST(Captures, framesAreThoseOfTheHexListAndAreWrittenBackTheSame) {
@@ -204,11 +211,13 @@ TEST(Captures, framesAreThoseOfTheHexListAndAreWrittenBackTheSame) {
   for (const char* set : {"1", "2", "3", "4", "5"}) {
     StreamCounters counters;
     const auto payloads = messages_of(test::read_file(*folder / set / "output.bin"), 1, &counters);
-    const std::vector<std::string> lines = lines_of(test::read_file(*folder / set / "messages.golden"));
+    const std::vector<std::string> lines =
+        lines_of(test::read_file(*folder / set / "messages.golden"));
     ASSERT_EQ(payloads.size(), lines.size());
     for (std::size_t i = 0; i < lines.size(); ++i) {
       std::vector<std::uint8_t> out(kMaxFrame);
-      const WrittenFrame written = write_frame({kBusMaster, static_cast<std::uint8_t>(MessageId::mtdata2), payloads[i]}, out);
+      const WrittenFrame written = write_frame(
+          {kBusMaster, static_cast<std::uint8_t>(MessageId::mtdata2), payloads[i]}, out);
       ASSERT_EQ(written.status, WriteStatus::ok);
       out.resize(written.size);
       ASSERT_EQ(out, from_hex(lines[i])) << set << " line " << i;
@@ -243,7 +252,8 @@ TEST(Captures, singleFramesOfAnotherSensorAgree) {
       const std::vector<double> decoded = values_of(m, item);
       if (decoded.empty()) continue;  // status and what this decoder skips
       ASSERT_EQ(decoded.size(), texts.size()) << line;
-      for (std::size_t i = 0; i < decoded.size(); ++i) EXPECT_NEAR(decoded[i], std::stod(texts[i]), 1e-9 * std::abs(decoded[i])) << line;
+      for (std::size_t i = 0; i < decoded.size(); ++i)
+        EXPECT_NEAR(decoded[i], std::stod(texts[i]), 1e-9 * std::abs(decoded[i])) << line;
       if (texts[0].find('.') != std::string::npos) floating += static_cast<int>(texts.size());
     }
   }

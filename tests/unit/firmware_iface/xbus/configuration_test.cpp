@@ -34,7 +34,8 @@ TEST(Commands, areTheDocumentedBytes) {
   EXPECT_EQ(frame(MessageId::period, from_hex("03C0")), from_hex("FA FF 04 02 03 C0 38"));
   EXPECT_EQ(frame(MessageId::output_skip, from_hex("0000")), from_hex("FA FF D4 02 00 00 2B"));
   EXPECT_EQ(frame(MessageId::output_mode, from_hex("0836")), from_hex("FA FF D0 02 08 36 F1"));
-  EXPECT_EQ(frame(MessageId::output_settings, from_hex("00000203")), from_hex("FA FF D2 04 00 00 02 03 26"));
+  EXPECT_EQ(frame(MessageId::output_settings, from_hex("00000203")),
+            from_hex("FA FF D2 04 00 00 02 03 26"));
   EXPECT_EQ(frame(MessageId::lever_arm, from_hex("3F000000 BE800000 3F800000")),
             from_hex("FA FF 68 0C 3F 00 00 00 BE 80 00 00 3F 80 00 00 51"));
 }
@@ -42,8 +43,11 @@ TEST(Commands, areTheDocumentedBytes) {
 TEST(Commands, legacySyncOutIsOneParameterAMessage) {
   constexpr std::uint32_t kMillisecond = 29491;  // of the 29.4912 MHz clock
   EXPECT_EQ(kMillisecond, static_cast<std::uint32_t>(kLegacySyncClock * 1e-3));
-  const auto message = [](LegacySync p, std::uint32_t v) { return frame(MessageId::legacy_sync_out, legacy_sync(p, v)); };
-  EXPECT_EQ(message(LegacySync::mode, kLegacySyncOutPulse | kLegacySyncOutPositive), from_hex("FA FF D8 03 00 00 12 14"));
+  const auto message = [](LegacySync p, std::uint32_t v) {
+    return frame(MessageId::legacy_sync_out, legacy_sync(p, v));
+  };
+  EXPECT_EQ(message(LegacySync::mode, kLegacySyncOutPulse | kLegacySyncOutPositive),
+            from_hex("FA FF D8 03 00 00 12 14"));
   EXPECT_EQ(message(LegacySync::skip, 3), from_hex("FA FF D8 03 01 00 03 22"));
   EXPECT_EQ(message(LegacySync::offset, 0), from_hex("FA FF D8 05 02 00 00 00 00 22"));
   EXPECT_EQ(message(LegacySync::width, kMillisecond), from_hex("FA FF D8 05 03 00 00 73 33 7B"));
@@ -59,10 +63,12 @@ TEST(Commands, legacySyncOutIsOneParameterAMessage) {
 
 TEST(Commands, syncSettingsAreEntriesOfTwelveBytes) {
   SyncSettings settings;
-  settings.entries[settings.count++] = {kSyncIntervalTransition, kSyncLineOut, kSyncPositive, 0, 0, 12, 10, 0};
+  settings.entries[settings.count++] = {
+      kSyncIntervalTransition, kSyncLineOut, kSyncPositive, 0, 0, 12, 10, 0};
   Bytes payload(kSyncEntrySize);
   ASSERT_EQ(write_sync_settings(settings, payload), kSyncEntrySize);
-  EXPECT_EQ(frame(MessageId::sync_settings, payload), from_hex("FA FF 2C 0C 04 04 01 00 00 00 00 0C 00 0A 00 00 AA"));
+  EXPECT_EQ(frame(MessageId::sync_settings, payload),
+            from_hex("FA FF 2C 0C 04 04 01 00 00 00 00 0C 00 0A 00 00 AA"));
   SyncSettings back;
   ASSERT_TRUE(read_sync_settings(payload, &back));
   EXPECT_EQ(back, settings);
@@ -87,10 +93,10 @@ TEST(Commands, outputConfigurationIsPairsOfIdAndRate) {
     ASSERT_TRUE(outputs.add(e));
   Bytes payload(4 * outputs.count);
   ASSERT_EQ(write_output_configuration(outputs, payload), payload.size());
-  EXPECT_EQ(
-      frame(MessageId::output_configuration, payload),
-      from_hex("FA FF C0 2C 10 10 FF FF 10 20 FF FF 10 60 FF FF 20 13 00 64 40 20 00 64 80 20 00 64 50 42 00 64 50 22 00 64 D0 12 00 64 "
-               "E0 20 FF FF 70 10 00 04 68"));
+  EXPECT_EQ(frame(MessageId::output_configuration, payload),
+            from_hex("FA FF C0 2C 10 10 FF FF 10 20 FF FF 10 60 FF FF 20 13 00 64 40 20 00 64 80 "
+                     "20 00 64 50 42 00 64 50 22 00 64 D0 12 00 64 "
+                     "E0 20 FF FF 70 10 00 04 68"));
   OutputConfiguration back;
   ASSERT_TRUE(read_output_configuration(payload, &back));
   EXPECT_EQ(back, outputs);
@@ -197,7 +203,11 @@ TEST(LineBudget, isThatOfTheTable) {
 
 TEST(LineBudget, ofPacketsCountsEachAtItsRateAndTheReceiversApart) {
   OutputConfiguration outputs;
-  for (const OutputEntry e : {OutputEntry{0x1020, kEveryMessage}, {0x1060, kEveryMessage}, {0x2010, 100}, {0x5042, 100}, {0x7010, 4}})
+  for (const OutputEntry e : {OutputEntry{0x1020, kEveryMessage},
+                              {0x1060, kEveryMessage},
+                              {0x2010, 100},
+                              {0x5042, 100},
+                              {0x7010, 4}})
     (void)outputs.add(e);
   // A sample: 5 + (3+2) + (3+4) + (3+16) + (3+12) = 51; a fix: 5 + 5 + 7 + 97 = 114.
   const LineBudget b = line_budget(outputs, 115200);
@@ -214,7 +224,8 @@ TEST(LineBudget, ofPacketsCountsEachAtItsRateAndTheReceiversApart) {
 TEST(Errors, haveWords) {
   EXPECT_NE(error_text(0x29).find("line"), std::string_view::npos);
   EXPECT_NE(error_text(kErrorPowerDip).find("dip"), std::string_view::npos);
-  for (int code = 0; code < 256; ++code) EXPECT_FALSE(error_text(static_cast<std::uint8_t>(code)).empty());
+  for (int code = 0; code < 256; ++code)
+    EXPECT_FALSE(error_text(static_cast<std::uint8_t>(code)).empty());
 }
 
 }  // namespace

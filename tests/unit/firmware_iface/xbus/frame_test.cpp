@@ -19,7 +19,8 @@ struct Found {
 };
 
 /// Everything a stream finds when the bytes come in pieces of `piece`.
-std::vector<Found> find_all(FrameStream& stream, std::span<const std::uint8_t> bytes, std::size_t piece) {
+std::vector<Found> find_all(FrameStream& stream, std::span<const std::uint8_t> bytes,
+                            std::size_t piece) {
   std::vector<Found> found;
   while (!bytes.empty()) {
     const std::size_t taken = stream.accept(bytes.first(std::min(piece, bytes.size())));
@@ -27,7 +28,8 @@ std::vector<Found> find_all(FrameStream& stream, std::span<const std::uint8_t> b
     if (taken == 0) break;
     bytes = bytes.subspan(taken);
     Message message;
-    while (stream.next(&message)) found.push_back({message.bus, message.id, {message.payload.begin(), message.payload.end()}});
+    while (stream.next(&message))
+      found.push_back({message.bus, message.id, {message.payload.begin(), message.payload.end()}});
   }
   return found;
 }
@@ -65,8 +67,10 @@ TEST(WriteFrame, givesTheDocumentedBytes) {
   EXPECT_EQ(frame(0x42, from_hex("21")), from_hex("FA FF 42 01 21 9D"));
   EXPECT_EQ(frame(0x04, from_hex("03 C0")), from_hex("FA FF 04 02 03 C0 38"));  // SetPeriod 120 Hz
   EXPECT_EQ(frame(0xD2, from_hex("00 00 02 03")), from_hex("FA FF D2 04 00 00 02 03 26"));
-  EXPECT_EQ(frame(0x2C, from_hex("04 04 01 00 00 00 00 0C 00 0A 00 00")), from_hex("FA FF 2C 0C 04 04 01 00 00 00 00 0C 00 0A 00 00 AA"));
-  EXPECT_EQ(frame(0x68, from_hex("3F 00 00 00 BE 80 00 00 3F 80 00 00")), from_hex("FA FF 68 0C 3F 00 00 00 BE 80 00 00 3F 80 00 00 51"));
+  EXPECT_EQ(frame(0x2C, from_hex("04 04 01 00 00 00 00 0C 00 0A 00 00")),
+            from_hex("FA FF 2C 0C 04 04 01 00 00 00 00 0C 00 0A 00 00 AA"));
+  EXPECT_EQ(frame(0x68, from_hex("3F 00 00 00 BE 80 00 00 3F 80 00 00")),
+            from_hex("FA FF 68 0C 3F 00 00 00 BE 80 00 00 3F 80 00 00 51"));
 }
 
 TEST(WriteFrame, readsBackAtEveryLengthAndExtendsOnlyFrom255) {
@@ -87,13 +91,16 @@ TEST(WriteFrame, refusesWhatDoesNotFitAndLeavesTheOutputAlone) {
   const Bytes payload(2049);
   Bytes out(3000, 0x55);
   EXPECT_EQ(write_frame({kBusMaster, 0x36, payload}, out).status, WriteStatus::payload_too_long);
-  EXPECT_EQ(write_frame({kBusMaster, 0x36, std::span(payload).first(10)}, std::span(out).first(14)).status, WriteStatus::no_room);
+  EXPECT_EQ(write_frame({kBusMaster, 0x36, std::span(payload).first(10)}, std::span(out).first(14))
+                .status,
+            WriteStatus::no_room);
   EXPECT_EQ(out, Bytes(3000, 0x55));
 }
 
 TEST(ParseFrame, namesWhatIsWrong) {
   const Bytes good = from_hex("FA FF 01 04 00 50 01 23 88");
-  for (std::size_t n = 0; n < good.size(); ++n) EXPECT_EQ(parse_frame(std::span(good).first(n)).status, FrameStatus::incomplete) << n;
+  for (std::size_t n = 0; n < good.size(); ++n)
+    EXPECT_EQ(parse_frame(std::span(good).first(n)).status, FrameStatus::incomplete) << n;
   EXPECT_EQ(parse_frame(good).status, FrameStatus::ok);
   for (std::size_t i = 2; i < good.size(); ++i) {
     if (i == 3) continue;  // another length is another frame
@@ -109,8 +116,9 @@ TEST(ParseFrame, namesWhatIsWrong) {
 }
 
 TEST(FrameStream, findsTheSameMessagesHoweverTheBytesArrive) {
-  const Bytes bytes = joined({from_hex("12 FA 00 36"), frame(0x31, {}), frame(0x36, noise(2048, 3)), from_hex("FA FA FF"),
-                              frame(0x42, {0x21}), frame(0x36, noise(300, 4)), from_hex("00")});
+  const Bytes bytes = joined({from_hex("12 FA 00 36"), frame(0x31, {}), frame(0x36, noise(2048, 3)),
+                              from_hex("FA FA FF"), frame(0x42, {0x21}), frame(0x36, noise(300, 4)),
+                              from_hex("00")});
   FrameStream whole;
   const std::vector<Found> expected = find_all(whole, bytes, bytes.size());
   ASSERT_EQ(expected.size(), 4U);
@@ -124,7 +132,8 @@ TEST(FrameStream, findsTheSameMessagesHoweverTheBytesArrive) {
 
 TEST(FrameStream, resynchronisesOneByteOnSoThatNoMessageHidesInAFalseFrame) {
   // A false preamble whose claimed length covers the two real messages behind it.
-  const Bytes bytes = joined({from_hex("FA FF 36 09"), frame(0x31, {}), frame(0x31, {}), noise(1, 1)});
+  const Bytes bytes =
+      joined({from_hex("FA FF 36 09"), frame(0x31, {}), frame(0x31, {}), noise(1, 1)});
   FrameStream stream;
   const std::vector<Found> found = find_all(stream, bytes, 1);
   ASSERT_EQ(found.size(), 2U);
@@ -151,7 +160,8 @@ TEST(FrameStream, everyByteIsInAMessageOrCountedOrWaits) {
     }
     FrameStream stream;
     (void)find_all(stream, bytes, 1 + seed * 13);
-    EXPECT_EQ(stream.counters().message_bytes + stream.counters().garbage_bytes + stream.waiting(), bytes.size());
+    EXPECT_EQ(stream.counters().message_bytes + stream.counters().garbage_bytes + stream.waiting(),
+              bytes.size());
     EXPECT_GT(stream.counters().checksum_wrong + stream.counters().length_refused, 0U);
   }
 }

@@ -35,9 +35,10 @@ TEST(Numbers, fixedPointAsOnTheWire) {
 }
 
 TEST(Mtdata2, decodesTheMakersExample) {
-  const Mtdata2 m = decoded(
-      from_hex("FA FF 36 31 10 20 02 DF C5 10 60 04 00 45 9D A0 40 20 0C BE DC 9A FA 3F 54 9F 37 41 1C BB 70 80 20 0C BB AA 5C 80 3B 8C 55 "
-               "01 BB 81 33 00 E0 20 04 00 00 00 81 45"));
+  const Mtdata2 m =
+      decoded(from_hex("FA FF 36 31 10 20 02 DF C5 10 60 04 00 45 9D A0 40 20 0C BE DC 9A FA 3F 54 "
+                       "9F 37 41 1C BB 70 80 20 0C BB AA 5C 80 3B 8C 55 "
+                       "01 BB 81 33 00 E0 20 04 00 00 00 81 45"));
   EXPECT_EQ(m.packet_counter, 57285);
   EXPECT_EQ(m.sample_time_fine, 4562336U);
   ASSERT_TRUE(m.acceleration && m.rate_of_turn);
@@ -53,10 +54,12 @@ TEST(Mtdata2, decodesTheMakersExample) {
 }
 
 TEST(Mtdata2, keepsPositionInSixteenDotThirtyTwoExactly) {
-  const Mtdata2 m = decoded(from_hex(
-      "FA FF 36 53 10 20 02 FF FF 10 60 04 33 7F 97 9C 20 10 10 3F 35 04 F3 00 00 00 00 00 00 00 00 3F 35 04 F3 50 42 0C 86 01 47 28 "
-      "FF E4 07 5D 24 9E 00 99 50 22 06 40 00 00 00 00 34 D0 12 12 80 00 00 00 00 0A E0 00 00 00 FF FF 10 00 00 00 00 00 E0 20 04 01 "
-      "80 00 47 7F"));
+  const Mtdata2 m =
+      decoded(from_hex("FA FF 36 53 10 20 02 FF FF 10 60 04 33 7F 97 9C 20 10 10 3F 35 04 F3 00 00 "
+                       "00 00 00 00 00 00 3F 35 04 F3 50 42 0C 86 01 47 28 "
+                       "FF E4 07 5D 24 9E 00 99 50 22 06 40 00 00 00 00 34 D0 12 12 80 00 00 00 00 "
+                       "0A E0 00 00 00 FF FF 10 00 00 00 00 00 E0 20 04 01 "
+                       "80 00 47 7F"));
   EXPECT_EQ(m.packet_counter, 0xFFFF);
   EXPECT_EQ(m.sample_time_fine, 863'999'900U);
   ASSERT_TRUE(m.latitude_longitude_deg && m.altitude_ellipsoid_m && m.velocity && m.quaternion);
@@ -71,7 +74,8 @@ TEST(Mtdata2, keepsPositionInSixteenDotThirtyTwoExactly) {
 }
 
 TEST(Mtdata2, readsFormatAndFrameOfTheId) {
-  const Mtdata2 m = decoded(from_hex("FA FF 36 13 20 15 10 00 10 00 00 00 00 00 00 00 00 00 00 FF F8 00 00 6C"));  // 12.20, NED
+  const Mtdata2 m = decoded(from_hex(
+      "FA FF 36 13 20 15 10 00 10 00 00 00 00 00 00 00 00 00 00 FF F8 00 00 6C"));  // 12.20, NED
   ASSERT_TRUE(m.quaternion);
   EXPECT_EQ(*m.quaternion, (std::array<double, 4>{1, 0, 0, -0.5}));
   EXPECT_EQ(m.orientation_frame, LocalFrame::ned);
@@ -79,11 +83,14 @@ TEST(Mtdata2, readsFormatAndFrameOfTheId) {
 
 TEST(Mtdata2, decodesAReceiversFixWithLongitudeFirst) {
   const Mtdata2 m =
-      decoded(from_hex("FA FF 36 7C 70 10 5E 02 F5 C9 2A 07 E3 01 14 0D 2F 18 37 00 00 00 05 0E E3 2A 24 03 01 0B 00 07 15 22 E8 22 61 2F "
+      decoded(from_hex("FA FF 36 7C 70 10 5E 02 F5 C9 2A 07 E3 01 14 0D 2F 18 37 00 00 00 05 0E E3 "
+                       "2A 24 03 01 0B 00 07 15 22 E8 22 61 2F "
                        "55 00 01 3F 71 00 00 A9 "
-                       "2A 00 00 08 D3 00 00 08 18 FF FF FF E5 00 00 00 0A FF FF FF FE 00 00 00 1D 00 00 00 00 00 00 01 5E 00 E5 51 9A 00 "
+                       "2A 00 00 08 D3 00 00 08 18 FF FF FF E5 00 00 00 0A FF FF FF FE 00 00 00 1D "
+                       "00 00 00 00 00 00 01 5E 00 E5 51 9A 00 "
                        "02 00 00 00 9A 00 8B 00 "
-                       "44 00 70 00 53 00 37 00 3E 10 10 0C 0E E6 B2 80 07 E3 01 14 0D 2F 18 37 10 60 04 03 14 F2 54 10 20 02 A9 98 08"));
+                       "44 00 70 00 53 00 37 00 3E 10 10 0C 0E E6 B2 80 07 E3 01 14 0D 2F 18 37 10 "
+                       "60 04 03 14 F2 54 10 20 02 A9 98 08"));
   ASSERT_TRUE(m.gnss_pvt && m.utc);
   const GnssPvt& p = *m.gnss_pvt;
   EXPECT_EQ(p.itow_ms, 49662250U);
@@ -111,14 +118,17 @@ TEST(Mtdata2, tornPayloadsAreRefusedWhole) {
   for (std::size_t n = 0; n <= payload.size(); ++n) {
     const bool whole = n == 0 || n == 5 || n == payload.size();
     Mtdata2 at = out;
-    EXPECT_EQ(decode_mtdata2(std::span(payload).first(n), &at), whole ? PacketStatus::ok : PacketStatus::torn) << n;
+    EXPECT_EQ(decode_mtdata2(std::span(payload).first(n), &at),
+              whole ? PacketStatus::ok : PacketStatus::torn)
+        << n;
     EXPECT_EQ(at.packets == 77, !whole) << n;
   }
 }
 
 TEST(Mtdata2, unknownPacketsAreSkippedAndCounted) {
   Mtdata2 out;
-  ASSERT_EQ(decode_mtdata2(from_hex("88 30 03 01 02 03 10 20 02 00 07 FF FF 00"), &out), PacketStatus::ok);
+  ASSERT_EQ(decode_mtdata2(from_hex("88 30 03 01 02 03 10 20 02 00 07 FF FF 00"), &out),
+            PacketStatus::ok);
   EXPECT_EQ(out.unknown_packets, 2U);
   EXPECT_EQ(out.packet_counter, 7);
 }
@@ -130,31 +140,37 @@ TEST(Mtdata2, knownPacketsOfImpossibleSizeOrValueAreRefusedAndCounted) {
   };
   for (const auto& [bytes, what] :
        {Case{"10 20 01 00", "a counter of one byte"}, Case{"10 60 02 00 00", "a time of two bytes"},
-        Case{"20 10 0F 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00", "a quaternion of fifteen bytes"},
+        Case{"20 10 0F 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00",
+             "a quaternion of fifteen bytes"},
         Case{"20 10 00", "an empty quaternion"},
-        Case{"20 1C 10 3F 80 00 00 00 00 00 00 00 00 00 00 00 00 00 00", "a frame that does not exist"},
+        Case{"20 1C 10 3F 80 00 00 00 00 00 00 00 00 00 00 00 00 00 00",
+             "a frame that does not exist"},
         Case{"08 10 04 7F C0 00 00", "a temperature that is not a number"},
-        Case{"08 13 08 7F F0 00 00 00 00 00 00", "an infinite temperature"}, Case{"70 10 02 00 00", "a fix of two bytes"},
+        Case{"08 13 08 7F F0 00 00 00 00 00 00", "an infinite temperature"},
+        Case{"70 10 02 00 00", "a fix of two bytes"},
         Case{"70 20 08 00 00 00 00 01 00 00 00", "a satellite list without its satellite"},
-        Case{"70 20 02 00 00", "a satellite list without its header"}, Case{"E0 10 02 00 00", "a status byte of two"}}) {
+        Case{"70 20 02 00 00", "a satellite list without its header"},
+        Case{"E0 10 02 00 00", "a status byte of two"}}) {
     Mtdata2 out;
     ASSERT_EQ(decode_mtdata2(from_hex(bytes), &out), PacketStatus::ok) << what;
     EXPECT_EQ(out.refused_packets, 1U) << what;
-    EXPECT_FALSE(out.packet_counter || out.sample_time_fine || out.quaternion || out.temperature_c || out.gnss_pvt || out.satellites ||
-                 out.status_byte)
+    EXPECT_FALSE(out.packet_counter || out.sample_time_fine || out.quaternion ||
+                 out.temperature_c || out.gnss_pvt || out.satellites || out.status_byte)
         << what;
   }
 }
 
 TEST(Mtdata2, thePacketsLengthOutranksItsFormatBits) {
   Mtdata2 out;
-  ASSERT_EQ(decode_mtdata2(from_hex("30 13 04 00 01 8B C2  08 13 04 42 13 40 00"), &out), PacketStatus::ok);
+  ASSERT_EQ(decode_mtdata2(from_hex("30 13 04 00 01 8B C2  08 13 04 42 13 40 00"), &out),
+            PacketStatus::ok);
   EXPECT_EQ(out.pressure_pa, 101314U);
   EXPECT_EQ(out.temperature_c, 36.8125);
 }
 
 TEST(Mtdata2, listsSatellites) {
-  const std::vector<std::uint8_t> payload = from_hex("70 20 10 02 F5 C9 2A 02 00 00 00 00 05 2B 07 06 0A 1F 0F");
+  const std::vector<std::uint8_t> payload =
+      from_hex("70 20 10 02 F5 C9 2A 02 00 00 00 00 05 2B 07 06 0A 1F 0F");
   Mtdata2 out;
   ASSERT_EQ(decode_mtdata2(payload, &out), PacketStatus::ok);
   ASSERT_TRUE(out.satellites);

@@ -43,12 +43,13 @@ void expect_attitude(const Mtdata& m, double tolerance) {
 }
 
 TEST(Mtdata, decodesFloats) {
-  const Mtdata m = decoded(
-      from_hex(
-          "FA FF 32 4F 3E 00 00 00 BE 80 00 00 41 1D 00 00 3B 00 00 00 BC 00 00 00 3D 00 00 00 3F 00 00 00 BE 80 00 00 BF 40 00 00 3F "
-          "35 04 F3 00 00 00 00 00 00 00 00 3F 35 04 F3 C1 DB CF F6 43 19 07 5D 42 51 00 00 41 28 00 00 BE 00 00 00 3D 80 00 00 07 12 34 "
-          "3B"),
-      {0x0836, 0x001});
+  const Mtdata m =
+      decoded(from_hex("FA FF 32 4F 3E 00 00 00 BE 80 00 00 41 1D 00 00 3B 00 00 00 BC 00 00 00 3D "
+                       "00 00 00 3F 00 00 00 BE 80 00 00 BF 40 00 00 3F "
+                       "35 04 F3 00 00 00 00 00 00 00 00 3F 35 04 F3 C1 DB CF F6 43 19 07 5D 42 51 "
+                       "00 00 41 28 00 00 BE 00 00 00 3D 80 00 00 07 12 34 "
+                       "3B"),
+              {0x0836, 0x001});
   EXPECT_EQ(m.acceleration, (Three{0.125, -0.25, 9.8125}));
   EXPECT_EQ(m.rate_of_turn, (Three{0x1p-9, -0x1p-7, 0x1p-5}));
   EXPECT_EQ(m.magnetic_field, (Three{0.5, -0.25, -0.75}));
@@ -78,19 +79,23 @@ void expect_fp1632_tail(const Mtdata& m) {
 }
 
 TEST(Mtdata, decodesSixteenDotThirtyTwoExactly) {
-  expect_fp1632_tail(decoded(
-      from_hex("FA FF 32 4B B5 04 F3 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 B5 04 F3 00 00 00 86 01 47 28 FF E4 07 5D 24 9E 00 99 40 "
-               "00 00 00 00 34 80 00 00 00 00 0A E0 00 00 00 FF FF 10 00 00 00 00 00 07 12 34 0E E6 B2 80 07 DC 05 0E 03 04 05 07 2C"),
-      {0x0834, 0x203}));
+  expect_fp1632_tail(
+      decoded(from_hex("FA FF 32 4B B5 04 F3 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 B5 04 F3 "
+                       "00 00 00 86 01 47 28 FF E4 07 5D 24 9E 00 99 40 "
+                       "00 00 00 00 34 80 00 00 00 00 0A E0 00 00 00 FF FF 10 00 00 00 00 00 07 12 "
+                       "34 0E E6 B2 80 07 DC 05 0E 03 04 05 07 2C"),
+              {0x0834, 0x203}));
 }
 
 TEST(Mtdata, decodesTheReceiversFixWhichIsInIntegersWhateverTheFormat) {
-  const Mtdata m = decoded(
-      from_hex(
-          "FA FF 32 77 C5 E7 02 12 06 42 FA EF 9F 69 8A 5B 36 56 22 00 00 CC 1A 00 00 04 1A FF FF FF F4 00 00 00 06 00 00 09 C4 00 00 "
-          "0E D8 00 00 00 2D 03 B5 04 F3 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 B5 04 F3 00 00 00 86 01 47 28 FF E4 07 5D 24 9E 00 "
-          "99 40 00 00 00 00 34 80 00 00 00 00 0A E0 00 00 00 FF FF 10 00 00 00 00 00 07 12 34 0E E6 B2 80 07 DC 05 0E 03 04 05 07 96"),
-      {0x1834, 0x203});
+  const Mtdata m =
+      decoded(from_hex("FA FF 32 77 C5 E7 02 12 06 42 FA EF 9F 69 8A 5B 36 56 22 00 00 CC 1A 00 00 "
+                       "04 1A FF FF FF F4 00 00 00 06 00 00 09 C4 00 00 "
+                       "0E D8 00 00 00 2D 03 B5 04 F3 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 "
+                       "B5 04 F3 00 00 00 86 01 47 28 FF E4 07 5D 24 9E 00 "
+                       "99 40 00 00 00 00 34 80 00 00 00 00 0A E0 00 00 00 FF FF 10 00 00 00 00 00 "
+                       "07 12 34 0E E6 B2 80 07 DC 05 0E 03 04 05 07 96"),
+              {0x1834, 0x203});
   ASSERT_TRUE(m.fix);
   EXPECT_EQ(m.fix->pressure_2pa, 0xC5E7);
   EXPECT_EQ(m.fix->pressure_age, 2);
@@ -110,7 +115,8 @@ TEST(Mtdata, decodesTheReceiversFixWhichIsInIntegersWhateverTheFormat) {
 
 TEST(Mtdata, decodesTwelveDotTwenty) {
   const Mtdata m =
-      decoded(from_hex("FA FF 32 37 00 02 00 00 FF FC 00 00 00 9D 00 00 00 00 08 00 FF FF E0 00 00 00 80 00 00 08 00 00 FF FC 00 00 "
+      decoded(from_hex("FA FF 32 37 00 02 00 00 FF FC 00 00 00 9D 00 00 00 00 08 00 FF FF E0 00 00 "
+                       "00 80 00 00 08 00 00 FF FC 00 00 "
                        "FF F4 00 00 00 0B 50 4F 00 00 00 00 00 00 00 00 00 0B 50 4F 07 12 34 01"),
               {0x0806, 0x101});
   EXPECT_EQ(m.acceleration, (Three{0.125, -0.25, 9.8125}));
@@ -120,10 +126,12 @@ TEST(Mtdata, decodesTwelveDotTwenty) {
 }
 
 TEST(Mtdata, decodesDoubles) {
-  const Mtdata m =
-      decoded(from_hex("FA FF 32 3B 3F E6 A0 9E 60 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 3F E6 A0 9E 60 00 00 00 "
-                       "C0 3B 79 FE B8 D8 23 42 40 63 20 EB A4 93 C8 9F 40 4A 20 00 00 00 00 00 07 12 34 64"),
-              {0x0814, 0x301});
+  const Mtdata m = decoded(
+      from_hex(
+          "FA FF 32 3B 3F E6 A0 9E 60 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 3F "
+          "E6 A0 9E 60 00 00 00 "
+          "C0 3B 79 FE B8 D8 23 42 40 63 20 EB A4 93 C8 9F 40 4A 20 00 00 00 00 00 07 12 34 64"),
+      {0x0814, 0x301});
   expect_attitude(m, 1e-7);
   expect_place(m, 1e-13);
 }
@@ -144,7 +152,8 @@ TEST(Mtdata, layoutsWithoutMeaningAreRefused) {
   EXPECT_FALSE((MtdataLayout{0x4002, 0}).payload_size()) << "raw excludes calibrated";
   EXPECT_TRUE((MtdataLayout{0x5000, 0}).payload_size()) << "but not the receiver";
   EXPECT_FALSE((MtdataLayout{0x0004, 0xC}).payload_size()) << "the fourth kind of orientation";
-  EXPECT_FALSE((MtdataLayout{0x0010, 1U << 14U}).payload_size()) << "a position that is not latitude and longitude";
+  EXPECT_FALSE((MtdataLayout{0x0010, 1U << 14U}).payload_size())
+      << "a position that is not latitude and longitude";
   EXPECT_FALSE((MtdataLayout{0x0020, 1U << 17U}).payload_size()) << "a velocity in another mode";
   EXPECT_FALSE((MtdataLayout{0x0040, 0}).payload_size()) << "a bit without a field";
   Mtdata out;
@@ -155,24 +164,30 @@ TEST(Mtdata, notANumberIsRefused) {
   Bytes bytes(12, 0);
   bytes[0] = 0x7F, bytes[1] = 0xC0;
   Mtdata out;
-  EXPECT_EQ(decode_mtdata(bytes, {kModeCalibrated, kSettingsNoRateOfTurn | kSettingsNoMagneticField}, &out), MtdataStatus::not_finite);
+  EXPECT_EQ(decode_mtdata(
+                bytes, {kModeCalibrated, kSettingsNoRateOfTurn | kSettingsNoMagneticField}, &out),
+            MtdataStatus::not_finite);
 }
 
 /// A value that every format holds exactly.
 template <std::size_t N>
 std::array<double, N> exact(double first) {
   std::array<double, N> values{};
-  for (std::size_t i = 0; i < N; ++i) values[i] = (i % 2 == 0 ? 1 : -1) * (first + static_cast<double>(i) / 1024);
+  for (std::size_t i = 0; i < N; ++i)
+    values[i] = (i % 2 == 0 ? 1 : -1) * (first + static_cast<double>(i) / 1024);
   return values;
 }
 
 TEST(Mtdata, everyLayoutReadsBackWhatWasWritten) {
   Mtdata all;
   all.raw = RawInertial{{1, 2, 65535}, {4, 5, 6}, {7, 8, 9}, 10};
-  all.fix = LegacyFix{50660, 3, 302400250, -274765430, 1530287650, -52250, -1050, 12, -6, 2500, 3800, 45, 255};
+  all.fix = LegacyFix{50660, 3,  302400250, -274765430, 1530287650, -52250, -1050,
+                      12,    -6, 2500,      3800,       45,         255};
   all.temperature_c = -37.5;
-  all.acceleration = exact<3>(9.75), all.rate_of_turn = exact<3>(0.5), all.magnetic_field = exact<3>(0.25);
-  all.quaternion = exact<4>(0.5), all.euler_deg = exact<3>(170.5), all.rotation_matrix = exact<9>(0.75);
+  all.acceleration = exact<3>(9.75), all.rate_of_turn = exact<3>(0.5),
+  all.magnetic_field = exact<3>(0.25);
+  all.quaternion = exact<4>(0.5), all.euler_deg = exact<3>(170.5),
+  all.rotation_matrix = exact<9>(0.75);
   all.analogue_1 = 17, all.analogue_2 = 65535;
   all.latitude_longitude_deg = exact<2>(27.5);
   all.altitude_m = -12.5;
@@ -186,8 +201,9 @@ TEST(Mtdata, everyLayoutReadsBackWhatWasWritten) {
       for (std::uint32_t format = 0; format < 4; ++format) {
         // The bits that switch single fields off go round with the mode.
         const std::uint32_t off = (mode * 0x9E3779B1U) & 0xC70U, stamps = mode % 4;
-        const MtdataLayout layout{static_cast<std::uint16_t>(mode),
-                                  orientation | (format << 8U) | off | stamps | (mode % 3 == 0 ? kSettingsNed : 0U)};
+        const MtdataLayout layout{
+            static_cast<std::uint16_t>(mode),
+            orientation | (format << 8U) | off | stamps | (mode % 3 == 0 ? kSettingsNed : 0U)};
         const std::optional<std::size_t> size = layout.payload_size();
         if (!size) continue;
         ++layouts;
@@ -199,7 +215,8 @@ TEST(Mtdata, everyLayoutReadsBackWhatWasWritten) {
         ASSERT_EQ(encode_mtdata(back, layout, again), *size);
         ASSERT_EQ(bytes, again) << mode;
         ASSERT_TRUE(!back.velocity || back.velocity == all.velocity);
-        ASSERT_TRUE(!back.latitude_longitude_deg || back.latitude_longitude_deg == all.latitude_longitude_deg);
+        ASSERT_TRUE(!back.latitude_longitude_deg ||
+                    back.latitude_longitude_deg == all.latitude_longitude_deg);
         ASSERT_TRUE(!back.rotation_matrix || back.rotation_matrix == all.rotation_matrix);
         ASSERT_TRUE(!back.analogue_2 || back.analogue_2 == all.analogue_2);
         ASSERT_TRUE(!back.fix || back.fix->age == 255);
@@ -261,8 +278,10 @@ TEST(Utc, everyDayOfTwoCenturiesIsTheOneAfterTheDayBefore) {
     ASSERT_TRUE(plausible(utc)) << i;
     ASSERT_EQ(unix_ns(utc), ns) << i;
   }
-  EXPECT_EQ(utc_of_unix_ns(unix_ns({0, 2000, 2, 28, 0, 0, 0, 7}) + kDay, 7).day, 29) << "2000 was a leap year";
-  EXPECT_EQ(utc_of_unix_ns(unix_ns({0, 2100, 2, 28, 0, 0, 0, 7}) + kDay, 7).month, 3) << "2100 will be none";
+  EXPECT_EQ(utc_of_unix_ns(unix_ns({0, 2000, 2, 28, 0, 0, 0, 7}) + kDay, 7).day, 29)
+      << "2000 was a leap year";
+  EXPECT_EQ(utc_of_unix_ns(unix_ns({0, 2100, 2, 28, 0, 0, 0, 7}) + kDay, 7).month, 3)
+      << "2100 will be none";
 }
 
 /// The constructed vectors beside the captures, as their text gives them.
@@ -290,7 +309,8 @@ TEST(ConstructedVectors, agree) {
   EXPECT_EQ(all.acceleration, (Three{0.0625, -0.25, 9.8125}));
   EXPECT_EQ(all.rate_of_turn, (Three{0.015625, -0.03125, 0.5}));
   EXPECT_EQ(all.quaternion, (std::array<double, 4>{0.5, 0.5, -0.5, 0.5}));
-  EXPECT_EQ(*all.latitude_longitude_deg, (std::array<double, 2>{-27.497499465942383, 153.01370239257812}));
+  EXPECT_EQ(*all.latitude_longitude_deg,
+            (std::array<double, 2>{-27.497499465942383, 153.01370239257812}));
   EXPECT_EQ(all.sample_counter, 65535);
   const Mtdata fixed = decoded(frames.at("fp1632_position_velocity_euler"), {0x0834, 0x80000205});
   EXPECT_EQ(fixed.euler_deg, (Three{1.5, -2.25, -170.125}));

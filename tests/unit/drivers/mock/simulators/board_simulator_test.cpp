@@ -13,7 +13,8 @@ using Bytes = std::vector<std::uint8_t>;
 /// Talks to the board directly, without a line.
 class Bench {
  public:
-  explicit Bench(BoardSimulatorOptions o = {}, PulseSource pulses = {}) : pulses_(std::move(pulses)) {
+  explicit Bench(BoardSimulatorOptions o = {}, PulseSource pulses = {})
+      : pulses_(std::move(pulses)) {
     board_ = std::make_unique<BoardSimulator>(
         [this](const SimulatedPulse& p) {
           made.push_back(p);
@@ -80,7 +81,8 @@ std::vector<TriggerEvent> events_of(const std::vector<TriggerFrame>& frames) {
   return events;
 }
 std::size_t count_of(const std::vector<TriggerFrame>& frames, std::uint8_t type) {
-  return static_cast<std::size_t>(std::count_if(frames.begin(), frames.end(), [type](const TriggerFrame& f) { return f.type == type; }));
+  return static_cast<std::size_t>(std::count_if(
+      frames.begin(), frames.end(), [type](const TriggerFrame& f) { return f.type == type; }));
 }
 
 TEST(BoardSimulator, pulsesAreAtTheTimesThatItTells) {
@@ -112,7 +114,8 @@ TEST(BoardSimulator, whatTheCamerasDoIsInTheEvent) {
   Bench bench({}, [](const SimulatedPulse& p) {
     SimulatedExposures e;
     e[0] = {true, p.edge + Duration::microseconds(20), p.edge + Duration::microseconds(5020)};
-    e[1] = {p.number % 2 == 0, p.edge + Duration::microseconds(40), p.edge + Duration::microseconds(9040)};
+    e[1] = {p.number % 2 == 0, p.edge + Duration::microseconds(40),
+            p.edge + Duration::microseconds(9040)};
     return e;
   });
   (void)bench.run(Duration::milliseconds(100));
@@ -146,7 +149,8 @@ TEST(BoardSimulator, ppsAndSyncOutComeAsWired) {
     TriggerEdge e;
     if (f.type == trigger_pps && trigger_get_edge(f.payload, f.size, &e)) ticks.push_back(e.tick);
   }
-  EXPECT_NEAR(static_cast<double>(ticks.back() - ticks[ticks.size() - 2]), 1e6, 22) << "a crystal of 20 ppm on its way to PPS' rate";
+  EXPECT_NEAR(static_cast<double>(ticks.back() - ticks[ticks.size() - 2]), 1e6, 22)
+      << "a crystal of 20 ppm on its way to PPS' rate";
 }
 
 TEST(BoardSimulator, aRestartCutsWhatIsOnTheWireAndTakesAnotherBootId) {
@@ -154,7 +158,8 @@ TEST(BoardSimulator, aRestartCutsWhatIsOnTheWireAndTakesAnotherBootId) {
   int broken = 0;
   for (int i = 0; i < 100; ++i) {
     BoardSimulatorOptions o;
-    // The first report goes out when its pulse's exposures are over: the next pulse at the latest, 40 ms on.
+    // The first report goes out when its pulse's exposures are over: the next pulse at the latest,
+    // 40 ms on.
     o.reboots = {HostStamp{} + Duration::milliseconds(500) + Duration::microseconds(i * 400)};
     Bench bench(o);
     (void)bench.run(Duration::milliseconds(100));

@@ -14,12 +14,15 @@ using Bytes = std::vector<std::uint8_t>;
 /// Sends so many bytes every so often, counting up; keeps what it is told.
 class Counter final : public DeviceModel {
  public:
-  Counter(std::size_t bytes, Duration interval, int times = 1'000'000) : bytes_(bytes), interval_(interval), times_(times) {}
+  Counter(std::size_t bytes, Duration interval, int times = 1'000'000)
+      : bytes_(bytes), interval_(interval), times_(times) {}
   void receive(std::span<const std::uint8_t> bytes, HostStamp at) override {
     told.insert(told.end(), bytes.begin(), bytes.end());
     told_at = at;
   }
-  std::optional<HostStamp> next() const override { return times_ > 0 ? std::optional(next_) : std::nullopt; }
+  std::optional<HostStamp> next() const override {
+    return times_ > 0 ? std::optional(next_) : std::nullopt;
+  }
   void produce(HostStamp at, std::vector<std::uint8_t>* out) override {
     for (std::size_t i = 0; i < bytes_; ++i) out->push_back(value_++);
     next_ = at + interval_;
@@ -53,7 +56,8 @@ std::vector<Read> reads(ByteLine& line, std::size_t most, Bytes* bytes = nullptr
     const LineRead r = line.read(some, Duration::seconds(1));
     if (r.status != DeviceStatus::ok) break;
     all.push_back({r.size, r.arrival});
-    if (bytes != nullptr) bytes->insert(bytes->end(), some.begin(), some.begin() + static_cast<std::ptrdiff_t>(r.size));
+    if (bytes != nullptr)
+      bytes->insert(bytes->end(), some.begin(), some.begin() + static_cast<std::ptrdiff_t>(r.size));
   }
   return all;
 }
@@ -78,7 +82,8 @@ TEST(SimulatedLine, aDenseStreamComesInBurstsOfEightPacketsUnderALongTimer) {
   const auto all = reads(*line, 50, &bytes);
   ASSERT_EQ(all.size(), 50U);
   for (const Read& r : all) EXPECT_EQ(r.size, 496U);
-  for (std::size_t i = 0; i < bytes.size(); ++i) ASSERT_EQ(bytes[i], static_cast<std::uint8_t>(i)) << "every byte, in order";
+  for (std::size_t i = 0; i < bytes.size(); ++i)
+    ASSERT_EQ(bytes[i], static_cast<std::uint8_t>(i)) << "every byte, in order";
   // 8000 bytes a second: 62 ms for 496, in whole USB frames.
   EXPECT_NEAR((all.back().arrival - all.front().arrival).to_seconds() / 49, 0.062, 0.0005);
 }
@@ -101,7 +106,8 @@ TEST(SimulatedLine, nothingArrivesBeforeItWasOnTheWire) {
     std::size_t have = 0;
     for (const Read& r : reads(*line, 1000)) {
       have += r.size;
-      EXPECT_GE(r.arrival.ns(), static_cast<std::int64_t>(have) * 10'000'000'000 / 115200 - 1000) << have;
+      EXPECT_GE(r.arrival.ns(), static_cast<std::int64_t>(have) * 10'000'000'000 / 115200 - 1000)
+          << have;
     }
     EXPECT_EQ(have, 1000U);
   }
@@ -112,7 +118,8 @@ TEST(SimulatedLine, aTimeoutLetsExactlyItsTimePass) {
   DeviceStatus status = DeviceStatus::ok;
   const auto line = place.open({}, &status);
   std::array<std::uint8_t, 8> some{};
-  EXPECT_EQ(line->read(some, Duration::seconds(1)).status, DeviceStatus::ended) << "a device that will never speak again";
+  EXPECT_EQ(line->read(some, Duration::seconds(1)).status, DeviceStatus::ended)
+      << "a device that will never speak again";
   SimulatedPlace other(std::make_shared<Counter>(1, Duration::seconds(1000), 2), quiet_host());
   const auto waiting = opened(other);
   ASSERT_EQ(waiting->read(some, Duration::seconds(1)).status, DeviceStatus::ok);
@@ -145,7 +152,8 @@ TEST(SimulatedLine, theWrongBaudRateIsGarbageBothWays) {
   Bytes bytes;
   (void)reads(*line, 10, &bytes);
   std::size_t right = 0;
-  for (std::size_t i = 0; i < bytes.size(); ++i) right += bytes[i] == static_cast<std::uint8_t>(i) ? 1U : 0U;
+  for (std::size_t i = 0; i < bytes.size(); ++i)
+    right += bytes[i] == static_cast<std::uint8_t>(i) ? 1U : 0U;
   EXPECT_LT(right, bytes.size() / 10);
   ASSERT_EQ(device->told.size(), 50U);
   EXPECT_NE(device->told, Bytes(50, 1));

@@ -72,16 +72,20 @@ TEST(XsensSimulator, wakesWaitsForTheHostAndMeasuresByItself) {
     std::map<std::uint8_t, int> kinds;
     for (const auto& [id, payload] : second) ++kinds[id];
     EXPECT_GT(kinds[g == Generation::legacy ? 0x32 : 0x36], 60);
-    EXPECT_EQ(kinds[0x0D], g == Generation::legacy ? 1 : 0) << "an MTi-G says how it is set before it measures";
+    EXPECT_EQ(kinds[0x0D], g == Generation::legacy ? 1 : 0)
+        << "an MTi-G says how it is set before it measures";
   }
 }
 
 TEST(XsensSimulator, answersWhatItsGenerationKnowsAndRefusesTheRest) {
   Bench legacy(Generation::legacy, {.device_id = 0x00500123});
   ASSERT_EQ(legacy.ask(MessageId::go_to_config).back().first, 0x31);
-  EXPECT_EQ(legacy.ask(MessageId::device_id_request).back(), (std::pair<std::uint8_t, Bytes>{0x01, {0x00, 0x50, 0x01, 0x23}}));
-  EXPECT_EQ(legacy.ask(MessageId::output_configuration).back(), (std::pair<std::uint8_t, Bytes>{0x42, {kErrorMessageUnknown}}));
-  EXPECT_EQ(legacy.ask(MessageId::period, {0x00, 0x01}).back(), (std::pair<std::uint8_t, Bytes>{0x42, {0x03}}));
+  EXPECT_EQ(legacy.ask(MessageId::device_id_request).back(),
+            (std::pair<std::uint8_t, Bytes>{0x01, {0x00, 0x50, 0x01, 0x23}}));
+  EXPECT_EQ(legacy.ask(MessageId::output_configuration).back(),
+            (std::pair<std::uint8_t, Bytes>{0x42, {kErrorMessageUnknown}}));
+  EXPECT_EQ(legacy.ask(MessageId::period, {0x00, 0x01}).back(),
+            (std::pair<std::uint8_t, Bytes>{0x42, {0x03}}));
   EXPECT_EQ(legacy.ask(MessageId::period, {0x03, 0xC0}).back().first, 0x05);
   EXPECT_EQ(legacy.ask(MessageId::period).back().second, (Bytes{0x03, 0xC0}));
   Bench newer(Generation::mark4);
@@ -95,8 +99,10 @@ TEST(XsensSimulator, answersWhatItsGenerationKnowsAndRefusesTheRest) {
 TEST(XsensSimulator, refusesToMeasureMoreThanItsLineCarries) {
   Bench bench(Generation::mark4);
   ASSERT_EQ(bench.ask(MessageId::go_to_config).back().first, 0x31);
-  (void)bench.ask(MessageId::output_configuration, {0x20, 0x13, 0x01, 0x90, 0x40, 0x23, 0x01, 0x90});
-  EXPECT_EQ(bench.ask(MessageId::go_to_measurement).back(), (std::pair<std::uint8_t, Bytes>{0x42, {0x29}}));
+  (void)bench.ask(MessageId::output_configuration,
+                  {0x20, 0x13, 0x01, 0x90, 0x40, 0x23, 0x01, 0x90});
+  EXPECT_EQ(bench.ask(MessageId::go_to_measurement).back(),
+            (std::pair<std::uint8_t, Bytes>{0x42, {0x29}}));
 }
 
 TEST(XsensSimulator, aBaudRateHoldsFromTheNextResetOn) {
@@ -111,7 +117,11 @@ TEST(XsensSimulator, aBaudRateHoldsFromTheNextResetOn) {
 
 TEST(XsensSimulator, receiversMessagesAreOlderAndHaveTheirStampsBehindTheData) {
   XsensSimulatorOptions o;
-  for (const OutputEntry e : {OutputEntry{0x1020, kEveryMessage}, {0x1060, kEveryMessage}, {0x2010, 100}, {0x5042, 100}, {0x7010, 4}})
+  for (const OutputEntry e : {OutputEntry{0x1020, kEveryMessage},
+                              {0x1060, kEveryMessage},
+                              {0x2010, 100},
+                              {0x5042, 100},
+                              {0x7010, 4}})
     (void)o.outputs.add(e);
   Bench bench(Generation::mark4, o);
   (void)bench.run(Duration::seconds(1));
@@ -124,7 +134,8 @@ TEST(XsensSimulator, receiversMessagesAreOlderAndHaveTheirStampsBehindTheData) {
     Mtdata2 d;
     ASSERT_EQ(decode_mtdata2(payload, &d), PacketStatus::ok);
     ASSERT_TRUE(d.packet_counter && d.sample_time_fine);
-    EXPECT_TRUE(!any || *d.packet_counter == static_cast<std::uint16_t>(counter + 1)) << "counts messages of both kinds";
+    EXPECT_TRUE(!any || *d.packet_counter == static_cast<std::uint16_t>(counter + 1))
+        << "counts messages of both kinds";
     if (d.gnss_pvt) {
       ++fixes;
       EXPECT_EQ(newest - *d.sample_time_fine, 500U) << "50 ms older than the sample before it";

@@ -33,15 +33,17 @@ TEST(Drive, loopIsOneKilometreAndReturnsNearItsStart) {
     last = p;
   }
   EXPECT_NEAR(path, 1000.0, 15.0);
-  EXPECT_NEAR(path, drive.length(), 5.0);  // the nominal way is level, without the driver's wandering
+  EXPECT_NEAR(path, drive.length(),
+              5.0);  // the nominal way is level, without the driver's wandering
   EXPECT_LT((last - drive.at({}).T_enu_body.t).norm(), 10.0);
 }
 
 TEST(Drive, beginsAndEndsStanding) {
-  for (const DriveKind kind : {DriveKind::loop, DriveKind::figure_eight, DriveKind::straight, DriveKind::brief, DriveKind::still}) {
+  for (const DriveKind kind : {DriveKind::loop, DriveKind::figure_eight, DriveKind::straight,
+                               DriveKind::brief, DriveKind::still}) {
     const Drive drive = make(kind);
-    for (const Duration t :
-         {Duration::seconds(-5), Duration{}, Duration::seconds(1), drive.duration(), drive.duration() + Duration::seconds(9)}) {
+    for (const Duration t : {Duration::seconds(-5), Duration{}, Duration::seconds(1),
+                             drive.duration(), drive.duration() + Duration::seconds(9)}) {
       const BodyState s = drive.at(t);
       EXPECT_LT(s.velocity.norm(), 1e-6) << static_cast<int>(kind) << " at " << t.to_seconds();
       EXPECT_LT(s.angular_rate.norm(), 1e-6) << static_cast<int>(kind) << " at " << t.to_seconds();
@@ -50,8 +52,9 @@ TEST(Drive, beginsAndEndsStanding) {
 }
 
 TEST(Drive, derivativesAreThoseOfTheFunction) {
-  // Central differences over ±h miss a derivative by h²/6 of the one two orders higher: a 12 Hz shake of 0.02° or 0.6 mm
-  // has a third derivative of 150 rad/s³ and 260 m/s³, with h = 0.1 ms below 1e-6. Rounding: 1e-16 · 300 m / h = 3e-10.
+  // Central differences over ±h miss a derivative by h²/6 of the one two orders higher: a 12 Hz
+  // shake of 0.02° or 0.6 mm has a third derivative of 150 rad/s³ and 260 m/s³, with h = 0.1 ms
+  // below 1e-6. Rounding: 1e-16 · 300 m / h = 3e-10.
   const Drive drive = make(DriveKind::figure_eight);
   const Duration h = Duration::microseconds(100);
   for (double seconds = 0.0137; seconds < drive.duration().to_seconds(); seconds += 0.7731) {
@@ -59,8 +62,11 @@ TEST(Drive, derivativesAreThoseOfTheFunction) {
     const BodyState s = drive.at(t), a = drive.at(t - h), b = drive.at(t + h);
     const double dt = 2 * h.to_seconds();
     EXPECT_LT(((b.T_enu_body.t - a.T_enu_body.t) / dt - s.velocity).norm(), 2e-6) << seconds;
-    EXPECT_LT(((b.velocity - a.velocity) / dt - s.acceleration).norm(), 1e-3) << seconds;  // fifth derivative of the spline: jumps
-    EXPECT_LT((log_so3(a.T_enu_body.R.transpose() * b.T_enu_body.R) / dt - s.angular_rate).norm(), 2e-6) << seconds;
+    EXPECT_LT(((b.velocity - a.velocity) / dt - s.acceleration).norm(), 1e-3)
+        << seconds;  // fifth derivative of the spline: jumps
+    EXPECT_LT((log_so3(a.T_enu_body.R.transpose() * b.T_enu_body.R) / dt - s.angular_rate).norm(),
+              2e-6)
+        << seconds;
   }
 }
 
@@ -91,11 +97,14 @@ TEST(Drive, vehicleStandsOnTheGroundAndLooksWhereItGoes) {
   options.suspension = 0;
   options.vibration = 0;
   const Drive drive(options, bare_world());
-  for (Duration t = Duration::seconds(5); t < drive.duration(); t = t + Duration::milliseconds(310)) {
+  for (Duration t = Duration::seconds(5); t < drive.duration();
+       t = t + Duration::milliseconds(310)) {
     const BodyState s = drive.at(t);
-    EXPECT_NEAR(s.T_enu_body.t.z(), bare_world().ground(s.T_enu_body.t.x(), s.T_enu_body.t.y()), 0.01);
+    EXPECT_NEAR(s.T_enu_body.t.z(), bare_world().ground(s.T_enu_body.t.x(), s.T_enu_body.t.y()),
+                0.01);
     if (s.velocity.norm() > 3.0) {
-      EXPECT_GT(s.velocity.normalized().dot(s.T_enu_body.R.col(0)), std::cos(0.05)) << t.to_seconds();
+      EXPECT_GT(s.velocity.normalized().dot(s.T_enu_body.R.col(0)), std::cos(0.05))
+          << t.to_seconds();
     }
   }
 }
@@ -146,8 +155,10 @@ TEST(Drive, namesOfKinds) {
 
 TEST(CameraMount, looksForwardAndDownByTheTilt) {
   const Transform T_body_camera = camera_mount({1, 2, 3}, 0.1);
-  EXPECT_LT((T_body_camera * Vec3(0, 0, 1) - Vec3(1 + std::cos(0.1), 2, 3 - std::sin(0.1))).norm(), 1e-12);
-  EXPECT_LT((T_body_camera * Vec3(1, 0, 0) - Vec3(1, 1, 3)).norm(), 1e-12);  // its right is the body's right
+  EXPECT_LT((T_body_camera * Vec3(0, 0, 1) - Vec3(1 + std::cos(0.1), 2, 3 - std::sin(0.1))).norm(),
+            1e-12);
+  EXPECT_LT((T_body_camera * Vec3(1, 0, 0) - Vec3(1, 1, 3)).norm(),
+            1e-12);  // its right is the body's right
   EXPECT_NEAR(T_body_camera.R.determinant(), 1.0, 1e-12);
 }
 

@@ -12,8 +12,8 @@
 namespace vergence::mock {
 namespace {
 
-// One grey level in a picture of two levels 150 apart moves an edge by 1/150 px; rounding to 8 bits moves it by half of that
-// on each of the two pixels an edge spans.
+// One grey level in a picture of two levels 150 apart moves an edge by 1/150 px; rounding to 8 bits
+// moves it by half of that on each of the two pixels an edge spans.
 constexpr double kRounding = 1.0 / 150;
 
 /// A dark wall and bright plates in front of it; the camera looks along +y from the origin.
@@ -31,10 +31,14 @@ struct Plates {
   }
   void plate(double x0, double x1, double z0, double z1, double y, int material) {
     builder.begin();
-    builder.picture(std::array<Vec3, 4>{Vec3(x0, y, z0), Vec3(x1, y, z0), Vec3(x1, y, z1), Vec3(x0, y, z1)}, material, 1.0F, 1, 1);
+    builder.picture(
+        std::array<Vec3, 4>{Vec3(x0, y, z0), Vec3(x1, y, z0), Vec3(x1, y, z1), Vec3(x0, y, z1)},
+        material, 1.0F, 1, 1);
     builder.end();
   }
-  [[nodiscard]] std::shared_ptr<const World> world() { return std::make_shared<const World>(options, std::move(scene)); }
+  [[nodiscard]] std::shared_ptr<const World> world() {
+    return std::make_shared<const World>(options, std::move(scene));
+  }
 };
 
 /// Camera axes in enu: right = east, down = −up, forward = north.
@@ -59,12 +63,15 @@ Intrinsics lens(bool distorted) {
 struct Picture {
   int width = 0, height = 0;
   std::vector<std::uint8_t> pixels;
-  [[nodiscard]] int at(int x, int y) const { return pixels[static_cast<std::size_t>(y * width + x)]; }
+  [[nodiscard]] int at(int x, int y) const {
+    return pixels[static_cast<std::size_t>(y * width + x)];
+  }
 };
 
 Picture take(Renderer* renderer, const Transform& T_camera_enu, const Shot& shot) {
   const Intrinsics& k = renderer->camera().intrinsics();
-  Picture p{k.width, k.height, std::vector<std::uint8_t>(static_cast<std::size_t>(k.width * k.height))};
+  Picture p{k.width, k.height,
+            std::vector<std::uint8_t>(static_cast<std::size_t>(k.width * k.height))};
   renderer->render(T_camera_enu, shot, p.pixels.data(), k.width);
   return p;
 }
@@ -75,7 +82,8 @@ Shot clean() {
   return s;
 }
 
-/// Where the brightness from x0 to x1 of a row steps between `left` and `right`: the edge that would give this sum.
+/// Where the brightness from x0 to x1 of a row steps between `left` and `right`: the edge that
+/// would give this sum.
 double edge_position(const Picture& p, int y, int x0, int x1, double left, double right) {
   double sum = 0;
   for (int x = x0; x < x1; ++x) sum += (p.at(x, y) - right) / (left - right);
@@ -88,27 +96,31 @@ TEST(Renderer, edgesAppearWhereTheLensModelPutsThem) {
     scene.plate(-1.2, 1.7, -1.1, 1.4, 6.0, 1);
     const Camera camera(lens(distorted));
     Renderer renderer(scene.world(), camera);
-    for (double shift = 0; shift < 0.03; shift += 0.0041) {  // a pixel at 6 m is 0.02 m: every sub-pixel phase
+    for (double shift = 0; shift < 0.03;
+         shift += 0.0041) {  // a pixel at 6 m is 0.02 m: every sub-pixel phase
       const Transform T_camera_enu = looking_north({shift, 0, 0});
       const Picture p = take(&renderer, T_camera_enu, clean());
       const double dark = p.at(2, 120), bright = p.at(160, 120);
       ASSERT_GT(bright - dark, 150);
       for (const double plate_x : {-1.2, 1.7}) {
         for (int y = 90; y < 160; y += 7) {
-          // The height on the plate's vertical border that this row sees, by bisection on the model's projection.
+          // The height on the plate's vertical border that this row sees, by bisection on the
+          // model's projection.
           double lo = -1.1, hi = 1.4;
           Vec2 pixel(0, 0);
           for (int i = 0; i < 60; ++i) {
             const double mid = 0.5 * (lo + hi);
-            ASSERT_EQ(camera.project(T_camera_enu * Vec3(plate_x, 6.0, mid), &pixel, nullptr), ProjectStatus::ok);
+            ASSERT_EQ(camera.project(T_camera_enu * Vec3(plate_x, 6.0, mid), &pixel, nullptr),
+                      ProjectStatus::ok);
             (pixel.y() > y ? lo : hi) = mid;
           }
           const int x = static_cast<int>(pixel.x());
-          const double measured =
-              plate_x < 0 ? edge_position(p, y, x - 5, x + 6, dark, bright) : edge_position(p, y, x - 5, x + 6, bright, dark);
-          // A ray at a pixel's centre stands for the pixel: exact for an undistorted straight edge, and under distortion up
-          // to the change of the local scale across the ramp, some 1e-3 px.
-          EXPECT_NEAR(measured, pixel.x(), kRounding + 3e-3) << "row " << y << (distorted ? " distorted" : "");
+          const double measured = plate_x < 0 ? edge_position(p, y, x - 5, x + 6, dark, bright)
+                                              : edge_position(p, y, x - 5, x + 6, bright, dark);
+          // A ray at a pixel's centre stands for the pixel: exact for an undistorted straight edge,
+          // and under distortion up to the change of the local scale across the ramp, some 1e-3 px.
+          EXPECT_NEAR(measured, pixel.x(), kRounding + 3e-3)
+              << "row " << y << (distorted ? " distorted" : "");
         }
       }
     }
@@ -143,10 +155,13 @@ TEST(Renderer, surfacesThatShareAnEdgeLeaveNoSeam) {
 
 TEST(Renderer, surfacesThatCutThroughEachOtherMeetInASmoothLine) {
   Plates scene;
-  // A bright wall across the view, a dark one that turns from before it to behind it, 0.6 m deep over 4 m of width.
+  // A bright wall across the view, a dark one that turns from before it to behind it, 0.6 m deep
+  // over 4 m of width.
   scene.plate(-4, 4, -4, 4, 6.0, 1);
   scene.builder.begin();
-  scene.builder.picture(std::array<Vec3, 4>{Vec3(-2, 5.7, -4), Vec3(2, 6.3, -4), Vec3(2.4, 6.3, 4), Vec3(-1.6, 5.7, 4)}, 0, 1.0F, 1, 1);
+  scene.builder.picture(std::array<Vec3, 4>{Vec3(-2, 5.7, -4), Vec3(2, 6.3, -4), Vec3(2.4, 6.3, 4),
+                                            Vec3(-1.6, 5.7, 4)},
+                        0, 1.0F, 1, 1);
   scene.builder.end();
   const Camera camera(lens(false));
   Renderer renderer(scene.world(), camera);
@@ -157,11 +172,14 @@ TEST(Renderer, surfacesThatCutThroughEachOtherMeetInASmoothLine) {
     Vec2 pixel(0, 0);
     for (int i = 0; i < 60; ++i) {
       const double mid = 0.5 * (lo + hi);
-      ASSERT_EQ(camera.project(T_camera_enu * Vec3(0.2 + 0.05 * mid, 6.0, mid), &pixel, nullptr), ProjectStatus::ok);
+      ASSERT_EQ(camera.project(T_camera_enu * Vec3(0.2 + 0.05 * mid, 6.0, mid), &pixel, nullptr),
+                ProjectStatus::ok);
       (pixel.y() > y ? lo : hi) = mid;
     }
     const int x = static_cast<int>(pixel.x());
-    EXPECT_NEAR(edge_position(p, y, x - 5, x + 6, p.at(x - 5, y), p.at(x + 5, y)), pixel.x(), kRounding + 3e-3) << y;
+    EXPECT_NEAR(edge_position(p, y, x - 5, x + 6, p.at(x - 5, y), p.at(x + 5, y)), pixel.x(),
+                kRounding + 3e-3)
+        << y;
   }
 }
 
@@ -186,10 +204,12 @@ TEST(Renderer, vignettingFollowsItsLaw) {
   Shot shot;
   shot.vignetting = 1.0;
   const Picture p = take(&renderer, looking_north({0, 0, 0}), shot);
-  for (const auto& [x, y] : {std::pair{158, 122}, std::pair{0, 0}, std::pair{319, 239}, std::pair{300, 20}}) {
+  for (const auto& [x, y] :
+       {std::pair{158, 122}, std::pair{0, 0}, std::pair{319, 239}, std::pair{300, 20}}) {
     Vec3 ray;
     ASSERT_TRUE(camera.unproject({x, y}, &ray));
-    EXPECT_NEAR(p.at(x, y), p.at(158, 122) * std::pow(1 / ray.norm(), 4), 1.01);  // cos⁴ of the angle to the axis
+    EXPECT_NEAR(p.at(x, y), p.at(158, 122) * std::pow(1 / ray.norm(), 4),
+                1.01);  // cos⁴ of the angle to the axis
   }
 }
 
@@ -213,8 +233,10 @@ TEST(Renderer, noiseHasTheStatedVarianceAndItsOwnSeed) {
     difference2 += std::pow(a.pixels[i] - b.pixels[i], 2) / n;
     product += (a.pixels[i] - mean) * (b.pixels[i] - mean) / n;
   }
-  const double variance = shot.shot_noise * mean + shot.read_noise * shot.read_noise + 1.0 / 12;  // the last from rounding
-  // Standard errors over n pixels: of a variance √(2/n), of a product √(1/n) of the variance; four of them.
+  const double variance = shot.shot_noise * mean + shot.read_noise * shot.read_noise +
+                          1.0 / 12;  // the last from rounding
+  // Standard errors over n pixels: of a variance √(2/n), of a product √(1/n) of the variance; four
+  // of them.
   EXPECT_NEAR(0.5 * difference2, variance, 4 * std::sqrt(2 / n) * variance + 0.01 * variance);
   EXPECT_NEAR(product, 0, 4 * std::sqrt(1 / n) * variance);
   EXPECT_NEAR(mean, 0.8 * 255, 0.1);
@@ -224,13 +246,15 @@ TEST(Renderer, severalPosesAreTheirMean) {
   Plates scene;
   scene.plate(-1.2, 1.7, -1.1, 1.4, 6.0, 1);
   Renderer renderer(scene.world(), Camera(lens(true)));
-  const std::array<Transform, 3> way{looking_north({0, 0, 0}), looking_north({0.05, 0, 0}), looking_north({0.1, 0, 0})};
+  const std::array<Transform, 3> way{looking_north({0, 0, 0}), looking_north({0.05, 0, 0}),
+                                     looking_north({0.1, 0, 0})};
   Picture blurred{320, 240, std::vector<std::uint8_t>(320 * 240)};
   renderer.render(way, clean(), blurred.pixels.data(), 320);
   std::vector<Picture> sharp;
   for (const Transform& T : way) sharp.push_back(take(&renderer, T, clean()));
   for (std::size_t i = 0; i < blurred.pixels.size(); ++i)
-    EXPECT_NEAR(blurred.pixels[i], (sharp[0].pixels[i] + sharp[1].pixels[i] + sharp[2].pixels[i]) / 3.0, 1.01);
+    EXPECT_NEAR(blurred.pixels[i],
+                (sharp[0].pixels[i] + sharp[1].pixels[i] + sharp[2].pixels[i]) / 3.0, 1.01);
 }
 
 TEST(Renderer, everyTargetDrawsTheSamePicture) {
@@ -249,8 +273,9 @@ TEST(Renderer, everyTargetDrawsTheSamePicture) {
     hwy::GetChosenTarget().Update(hwy::SupportedTargets());
     const Picture p = take(&renderer, T_town, noisy);
     if (first.pixels.empty()) first = p;
-    // Fused or not, a product rounds differently in the last bit: a grey value may round to its neighbour, and where two
-    // surfaces are equally deep the order may change, whose pixels are shared by both to within the rounding.
+    // Fused or not, a product rounds differently in the last bit: a grey value may round to its
+    // neighbour, and where two surfaces are equally deep the order may change, whose pixels are
+    // shared by both to within the rounding.
     int differing = 0;
     for (std::size_t i = 0; i < p.pixels.size(); ++i) {
       const int d = std::abs(p.pixels[i] - first.pixels[i]);

@@ -34,11 +34,13 @@ Camera lens() {
 
 cv::Mat take(Renderer* renderer, const Transform& T_camera_enu) {
   cv::Mat image(480, 640, CV_8UC1);
-  renderer->render(T_camera_enu, Shot{.vignetting = 0}, image.data, static_cast<std::ptrdiff_t>(image.step));
+  renderer->render(T_camera_enu, Shot{.vignetting = 0}, image.data,
+                   static_cast<std::ptrdiff_t>(image.step));
   return image;
 }
 
-/// A picture between its pixels: blurred a little, so that cubic interpolation (Catmull–Rom) has no bias of its own.
+/// A picture between its pixels: blurred a little, so that cubic interpolation (Catmull–Rom) has no
+/// bias of its own.
 class Interpolated {
  public:
   explicit Interpolated(const cv::Mat& image) {
@@ -65,8 +67,10 @@ class Interpolated {
 
  private:
   static std::pair<Vec4, Vec4> weights(double t) {
-    return {Vec4(((-0.5 * t + 1) * t - 0.5) * t, (1.5 * t - 2.5) * t * t + 1, ((-1.5 * t + 2) * t + 0.5) * t, (0.5 * t - 0.5) * t * t),
-            Vec4((-1.5 * t + 2) * t - 0.5, (4.5 * t - 5) * t, (-4.5 * t + 4) * t + 0.5, (1.5 * t - 1) * t)};
+    return {Vec4(((-0.5 * t + 1) * t - 0.5) * t, (1.5 * t - 2.5) * t * t + 1,
+                 ((-1.5 * t + 2) * t + 0.5) * t, (0.5 * t - 0.5) * t * t),
+            Vec4((-1.5 * t + 2) * t - 0.5, (4.5 * t - 5) * t, (-4.5 * t + 4) * t + 0.5,
+                 (1.5 * t - 1) * t)};
   }
   cv::Mat values_;
 };
@@ -74,9 +78,10 @@ class Interpolated {
 constexpr int kReach = 5;  // px: patches of 11 x 11
 using Patch = std::array<Vec2, (2 * kReach + 1) * (2 * kReach + 1)>;
 
-/// Where the patch round a pixel of view a lies in view b by the geometry. False: out of sight in either, behind leaves,
-/// or not on one smooth surface.
-bool carry(const Camera& camera, const Transform& T_a_enu, const Transform& T_b_enu, const Vec2& centre, Patch* a, Patch* b) {
+/// Where the patch round a pixel of view a lies in view b by the geometry. False: out of sight in
+/// either, behind leaves, or not on one smooth surface.
+bool carry(const Camera& camera, const Transform& T_a_enu, const Transform& T_b_enu,
+           const Vec2& centre, Patch* a, Patch* b) {
   constexpr int kSide = 2 * kReach + 1;
   const Transform T_enu_a = T_a_enu.inverse(), T_enu_b = T_b_enu.inverse();
   std::array<double, kSide * kSide> inverse_depth{};
@@ -88,7 +93,9 @@ bool carry(const Camera& camera, const Transform& T_a_enu, const Transform& T_b_
     const auto hit = town()->cast(T_enu_a.t, T_enu_a.R * ray);
     if (!hit || hit->veiled) return false;
     const Vec3 point = T_enu_a * (hit->distance * ray);
-    if (camera.project(T_b_enu * point, &(*b)[i], nullptr) != ProjectStatus::ok || !camera.inside((*b)[i], 4)) return false;
+    if (camera.project(T_b_enu * point, &(*b)[i], nullptr) != ProjectStatus::ok ||
+        !camera.inside((*b)[i], 4))
+      return false;
     inverse_depth[i] = 1 / hit->distance;
     if (k % 5 == 0) {
       const auto seen = town()->cast(T_enu_b.t, point - T_enu_b.t);
@@ -106,15 +113,18 @@ bool carry(const Camera& camera, const Transform& T_a_enu, const Transform& T_b_
   return true;
 }
 
-/// The shift that is left between two patches which should show the same, by Gauss–Newton. False: no structure, no convergence.
-bool left_over(const Interpolated& image_a, const Interpolated& image_b, const Patch& a, const Patch& b, Vec2* shift) {
+/// The shift that is left between two patches which should show the same, by Gauss–Newton. False:
+/// no structure, no convergence.
+bool left_over(const Interpolated& image_a, const Interpolated& image_b, const Patch& a,
+               const Patch& b, Vec2* shift) {
   *shift = Vec2::Zero();
   for (int turn = 0; turn < 20; ++turn) {
     Mat2 H = Mat2::Zero();
     Vec2 g = Vec2::Zero();
     double offset = 0;
     for (std::size_t i = 0; i < a.size(); ++i)
-      offset += (image_b.at(b[i] + *shift).value - image_a.at(a[i]).value) / static_cast<double>(a.size());
+      offset += (image_b.at(b[i] + *shift).value - image_a.at(a[i]).value) /
+                static_cast<double>(a.size());
     for (std::size_t i = 0; i < a.size(); ++i) {
       const auto sa = image_a.at(a[i]), sb = image_b.at(b[i] + *shift);
       const Vec2 slope(sb.dx, sb.dy);
@@ -143,7 +153,9 @@ std::vector<double> errors_between(const Transform& T_a_enu, const Transform& T_
     const Vec2 centre(static_cast<double>(c.x), static_cast<double>(c.y));
     Patch patch_a, patch_b;
     Vec2 shift;
-    if (!camera.inside(centre, kReach + 4.0) || !carry(camera, T_a_enu, T_b_enu, centre, &patch_a, &patch_b)) continue;
+    if (!camera.inside(centre, kReach + 4.0) ||
+        !carry(camera, T_a_enu, T_b_enu, centre, &patch_a, &patch_b))
+      continue;
     if (left_over(image_a, image_b, patch_a, patch_b, &shift)) errors.push_back(shift.norm());
   }
   std::sort(errors.begin(), errors.end());
@@ -164,18 +176,21 @@ TEST(Town, standingCameraSeesTheSamePicture) {
   const cv::Mat a = take(&renderer, view(0.5)), b = take(&renderer, view(1.5));
   cv::Mat difference;
   cv::absdiff(a, b, difference);
-  // The spline's weights add up to one within a rounding, which may tip a grey value that lies on a half.
+  // The spline's weights add up to one within a rounding, which may tip a grey value that lies on a
+  // half.
   EXPECT_LE(cv::norm(difference, cv::NORM_INF), 1);
   EXPECT_LE(cv::countNonZero(difference), 30);
 }
 
 TEST(Town, cornersAreStableUnderSubPixelTurns) {
-  // A turn moves all depths alike: what is left is aliasing, 8-bit rounding of weak corners and the measurement's
-  // own error, of which a picture of 16 times as many rays still shows 0.012 px.
+  // A turn moves all depths alike: what is left is aliasing, 8-bit rounding of weak corners and the
+  // measurement's own error, of which a picture of 16 times as many rays still shows 0.012 px.
   for (const double seconds : {0.0, 30.0, 60.0, 90.0})
     for (const double fraction : {0.25, 0.5, 0.75}) {
       const double angle = fraction / 554;
-      const Transform T = view(seconds), turned = Transform{exp_so3({0.6 * angle, angle, 0.1 * angle}), Vec3::Zero()} * T;
+      const Transform T = view(seconds),
+                      turned =
+                          Transform{exp_so3({0.6 * angle, angle, 0.1 * angle}), Vec3::Zero()} * T;
       const auto errors = errors_between(T, turned);
       ASSERT_GT(errors.size(), 20U) << seconds;
       EXPECT_LT(quantile(errors, 0.5), 0.025) << seconds << " s, " << fraction << " px";
@@ -229,7 +244,8 @@ TEST(Town, hasNearAndFarStructureAllAlongTheLoop) {
 }
 
 TEST(Town, nothingStandsInTheVehiclesWay) {
-  for (const DriveKind kind : {DriveKind::loop, DriveKind::figure_eight, DriveKind::straight, DriveKind::brief}) {
+  for (const DriveKind kind :
+       {DriveKind::loop, DriveKind::figure_eight, DriveKind::straight, DriveKind::brief}) {
     DriveOptions options;
     options.kind = kind;
     const Drive drive(options, *town());
@@ -250,7 +266,8 @@ TEST(Town, sameSeedSamePictureOtherSeedOtherTown) {
   const Camera camera = lens();
   WorldOptions options;
   options.texture_detail = 0;
-  Renderer a(std::make_shared<const World>(options), camera), b(std::make_shared<const World>(options), camera);
+  Renderer a(std::make_shared<const World>(options), camera),
+      b(std::make_shared<const World>(options), camera);
   options.seed = 2;
   Renderer c(std::make_shared<const World>(options), camera);
   const Transform T = view(20);
@@ -266,8 +283,8 @@ TEST(Town, aBusThatFillsTheViewHidesTheTownAndIsTexturedItself) {
   T_camera_bus.t = {0, 1.7, 1.2 + 0.5 * kBusLength};
   const auto take_behind = [&](const Transform& T_camera_enu) {
     cv::Mat image(480, 640, CV_8UC1);
-    renderer.render(std::span(&T_camera_enu, 1), Shot{.vignetting = 0}, image.data, static_cast<std::ptrdiff_t>(image.step),
-                    std::span(&T_camera_bus, 1));
+    renderer.render(std::span(&T_camera_enu, 1), Shot{.vignetting = 0}, image.data,
+                    static_cast<std::ptrdiff_t>(image.step), std::span(&T_camera_bus, 1));
     return image;
   };
   const cv::Mat here = take_behind(view(20)), there = take_behind(view(45));

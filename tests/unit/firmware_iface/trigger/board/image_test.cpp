@@ -12,7 +12,8 @@ namespace {
 using Bytes = QemuBoard::Bytes;
 using namespace std::chrono_literals;
 
-constexpr double kBoardPerHost = 1e9 / 16e6;  // the machine's timers against the clock that the image fell back to
+constexpr double kBoardPerHost =
+    1e9 / 16e6;  // the machine's timers against the clock that the image fell back to
 constexpr double kCountsPerTick = 16;
 
 struct TriggerBoardImage : testing::Test {
@@ -84,7 +85,8 @@ TEST_F(TriggerBoardImage, saysWhatItIsAndRefusesWhatItIsNot) {
   five_lines[12] = 0x1F;
   EXPECT_EQ(refusal(trigger_config, five_lines), trigger_error_line);
   const Bytes good = config(1000);
-  EXPECT_EQ(status(board.ask(trigger_config, good)).configuration, trigger_crc32(good.data(), good.size()));
+  EXPECT_EQ(status(board.ask(trigger_config, good)).configuration,
+            trigger_crc32(good.data(), good.size()));
 }
 
 TEST_F(TriggerBoardImage, pulsesAreNumberedWithoutGapThroughStopAndStart) {
@@ -106,8 +108,10 @@ TEST_F(TriggerBoardImage, pulsesAreNumberedWithoutGapThroughStopAndStart) {
   }
   const TriggerStatus paused = status(board.ask(trigger_pause, {20, 0, 0, 0}));
   EXPECT_EQ(paused.state, trigger_paused);
-  const TriggerFrame resumed = board.wait([](const TriggerFrame& f) { return f.type == trigger_event && (event(f).flags & 1) != 0; });
-  EXPECT_GE(event(resumed).pulse, paused.pulses + 20) << "counted from the armed one, which still went out";
+  const TriggerFrame resumed = board.wait(
+      [](const TriggerFrame& f) { return f.type == trigger_event && (event(f).flags & 1) != 0; });
+  EXPECT_GE(event(resumed).pulse, paused.pulses + 20)
+      << "counted from the armed one, which still went out";
   EXPECT_LE(event(resumed).pulse, paused.pulses + 21);
 
   const TriggerStatus stopped = status(board.ask(trigger_stop));
@@ -126,10 +130,14 @@ TEST_F(TriggerBoardImage, pulsesAreNumberedWithoutGapThroughStopAndStart) {
 TEST_F(TriggerBoardImage, pingBracketsTheBoardsTicksBetweenTheHosts) {
   QemuBoard board;
   struct Exchange {
-    double sent, heard, received, answered;  // seconds; the latter two of the board's, brought to the host's
+    double sent, heard, received,
+        answered;  // seconds; the latter two of the board's, brought to the host's
   };
   std::vector<Exchange> exchanges;
-  const auto now = [] { return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count(); };
+  const auto now = [] {
+    return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch())
+        .count();
+  };
   for (std::uint8_t k = 0; k < 60; ++k) {
     const double sent = now();
     const TriggerFrame f = board.ask(trigger_ping, {k, 1, 2, 3});
@@ -137,11 +145,12 @@ TEST_F(TriggerBoardImage, pingBracketsTheBoardsTicksBetweenTheHosts) {
     const TriggerPong p = pong(f);
     EXPECT_EQ(p.token, 0x03020100U + k);
     ASSERT_LE(p.received, p.sent);
-    exchanges.push_back(
-        {sent, heard, static_cast<double>(p.received) / 1e6 / kBoardPerHost, static_cast<double>(p.sent) / 1e6 / kBoardPerHost});
+    exchanges.push_back({sent, heard, static_cast<double>(p.received) / 1e6 / kBoardPerHost,
+                         static_cast<double>(p.sent) / 1e6 / kBoardPerHost});
     std::this_thread::sleep_for(5ms);
   }
-  // One offset must fit all: board = host − offset with sent ≤ received + offset and answered + offset ≤ heard.
+  // One offset must fit all: board = host − offset with sent ≤ received + offset and answered +
+  // offset ≤ heard.
   double low = -1e300, high = 1e300;
   for (const Exchange& e : exchanges) {
     low = std::max(low, e.sent - e.received);
@@ -193,7 +202,8 @@ TEST_F(TriggerBoardImage, edgesOfPpsAndInsAreStampedBetweenTwoLooksAtTheCounter)
       EXPECT_EQ(e.count, k);
       board.set_exti(line, !active);  // the other edge: not reported
     }
-    // Between two edges as much time has passed as their looks allow; half a tick of rounding at each end.
+    // Between two edges as much time has passed as their looks allow; half a tick of rounding at
+    // each end.
     for (std::size_t k = 1; k < looks.size(); ++k) {
       const auto ticks = static_cast<double>(looks[k].tick - looks[k - 1].tick);
       const double least = (looks[k].before - looks[k - 1].after) / kCountsPerTick;
@@ -232,10 +242,14 @@ TEST_F(TriggerBoardImagePps, ticksAreItsMicrosecondsOnceFourEdgesAgree) {
   std::vector<std::uint64_t> ticks;
   ticks.reserve(40);
   for (int k = 0; k < 40; ++k) ticks.push_back(tick());
-  constexpr double kStamp = 10;  // us: an edge is stamped by the interrupt here, some hundred instructions at 1/16 us
-  for (std::size_t k = 1; k < 4; ++k) EXPECT_NEAR(static_cast<double>(ticks[k] - ticks[k - 1]), 1'004'000, kStamp) << k;
-  for (std::size_t k = 5; k < 40; ++k) EXPECT_NEAR(static_cast<double>(ticks[k] - ticks[k - 1]), 1'000'000, kStamp) << k;
-  EXPECT_NEAR(static_cast<double>(ticks[39] - ticks[4]), 35e6, kStamp) << "the phase is held, not the rate alone";
+  constexpr double kStamp =
+      10;  // us: an edge is stamped by the interrupt here, some hundred instructions at 1/16 us
+  for (std::size_t k = 1; k < 4; ++k)
+    EXPECT_NEAR(static_cast<double>(ticks[k] - ticks[k - 1]), 1'004'000, kStamp) << k;
+  for (std::size_t k = 5; k < 40; ++k)
+    EXPECT_NEAR(static_cast<double>(ticks[k] - ticks[k - 1]), 1'000'000, kStamp) << k;
+  EXPECT_NEAR(static_cast<double>(ticks[39] - ticks[4]), 35e6, kStamp)
+      << "the phase is held, not the rate alone";
   (void)board->drain();
   EXPECT_EQ(status(board->wait(trigger_status)).pps_locked, 1);
 }
@@ -248,7 +262,8 @@ TEST_F(TriggerBoardImagePps, afterHelloTheRateMovesSlowly) {
   for (int k = 0; k < 60; ++k) ticks.push_back(tick());
   constexpr double kStamp = 10;
   EXPECT_NEAR(static_cast<double>(ticks[3] - ticks[0]), 3'000'060, kStamp);
-  EXPECT_NEAR(static_cast<double>(ticks[10] - ticks[4]), 6'000'000 + 6 * 20 - 21, 2 * kStamp) << "1 ppm less each second, from 20";
+  EXPECT_NEAR(static_cast<double>(ticks[10] - ticks[4]), 6'000'000 + 6 * 20 - 21, 2 * kStamp)
+      << "1 ppm less each second, from 20";
   EXPECT_NEAR(static_cast<double>(ticks[59] - ticks[30]), 29e6, kStamp);
   (void)board->drain();
   EXPECT_EQ(status(board->wait(trigger_status)).pps_locked, 1);
@@ -261,14 +276,17 @@ TEST_F(TriggerBoardImage, aResetInMidFrameIsAnotherBootThatKnowsNothing) {
   (void)board.wait(trigger_event);
   Bytes frame(trigger_max_frame);
   const Bytes payload = config(1000);
-  frame.resize(trigger_write_frame(trigger_config, 9, payload.data(), payload.size(), frame.data()));
+  frame.resize(
+      trigger_write_frame(trigger_config, 9, payload.data(), payload.size(), frame.data()));
   const Bytes half(frame.begin(), frame.begin() + 12), rest(frame.begin() + 12, frame.end());
   board.bytes(half);
   (void)board.wait(trigger_event);  // so the half has been taken in
   std::uint32_t boot = first.boot_id;
   for (int k = 0; k < 3; ++k) {
     board.reset();
-    (void)board.wait([&](const TriggerFrame& f) { return f.type == trigger_status && status(f).boot_id != boot; });
+    (void)board.wait([&](const TriggerFrame& f) {
+      return f.type == trigger_status && status(f).boot_id != boot;
+    });
     if (k == 0) board.bytes(rest);
     const TriggerFrame hello = board.ask(trigger_hello, {trigger_protocol_version});
     TriggerInfo info{};

@@ -18,7 +18,8 @@ TEST(BoardSchedule, aMillionPulsesAreExactToACount) {
     std::uint64_t before = s.due;
     for (std::uint32_t n = 1; n <= 1'000'000; ++n) {
       schedule_advance(&s);
-      ASSERT_EQ(s.due, 5 + std::uint64_t{n} * VirtualBoard::kHz * 1000 / millihertz) << millihertz << " mHz, pulse " << n;
+      ASSERT_EQ(s.due, 5 + std::uint64_t{n} * VirtualBoard::kHz * 1000 / millihertz)
+          << millihertz << " mHz, pulse " << n;
       ASSERT_LE(s.due - before, s.interval + 1);
       before = s.due;
     }
@@ -69,7 +70,9 @@ TEST(BoardPulses, goOutOnTheirGridWithTheirWidthAndLines) {
   const auto events = b.events();
   ASSERT_EQ(events.size(), b.made.size());
   for (std::size_t i = 0; i < events.size(); ++i)
-    ASSERT_LE(std::llabs(static_cast<long long>(events[i].tick * kUs - (b.made[i].count - 1'000'000))), kUs / 2 + 1);
+    ASSERT_LE(
+        std::llabs(static_cast<long long>(events[i].tick * kUs - (b.made[i].count - 1'000'000))),
+        kUs / 2 + 1);
 }
 
 TEST(BoardPulses, oneThatTheHardwareRefusedComesLateAndSaysSo) {
@@ -140,11 +143,14 @@ struct WithFeedback : testing::Test {
     b.send(trigger_start);
     b.frames.clear();
   }
-  void exposure(unsigned line, std::uint64_t pulse, std::uint64_t start_us, std::uint64_t end_us, bool inverted = false) {
+  void exposure(unsigned line, std::uint64_t pulse, std::uint64_t start_us, std::uint64_t end_us,
+                bool inverted = false) {
     b.edge_at(pulse + start_us * kUs, input(line), !inverted);
     b.edge_at(pulse + end_us * kUs, input(line), inverted);
   }
-  static BoardInput input(unsigned line) { return static_cast<BoardInput>(board_input_feedback + line); }
+  static BoardInput input(unsigned line) {
+    return static_cast<BoardInput>(board_input_feedback + line);
+  }
 };
 
 TEST_F(WithFeedback, exposuresOfAllLinesStandInTheEventThatComesWhenTheyAreOver) {
@@ -187,7 +193,8 @@ TEST_F(WithFeedback, aMissedTriggerIsAnEventWithoutExposureAtTheNextPulse) {
 
 TEST_F(WithFeedback, anExposureThatOutlastsTheIntervalHasNoEndAndSpoilsNoOther) {
   b.on_pulse = [this](const BoardPulse& p) {
-    if (p.number % 2 == 0) exposure(0, p.count, 10, 14'000);  // a camera that ignores every other pulse
+    if (p.number % 2 == 0)
+      exposure(0, p.count, 10, 14'000);  // a camera that ignores every other pulse
     exposure(1, p.count, 10, 9'999);
   };
   begin();
@@ -216,7 +223,8 @@ TEST_F(WithFeedback, theLastEventComesWithoutAnotherPulse) {
 TEST_F(WithFeedback, ofABouncingLineTheFirstStartAndTheFirstEndCount) {
   b.on_pulse = [this](const BoardPulse& p) {
     b.edge_at(p.count + 3 * kUs, input(0), false);
-    for (const std::uint64_t us : {10U, 20U, 5000U, 5010U}) b.edge_at(p.count + us * kUs, input(0), us != 5000 && us != 5010);
+    for (const std::uint64_t us : {10U, 20U, 5000U, 5010U})
+      b.edge_at(p.count + us * kUs, input(0), us != 5000 && us != 5010);
     exposure(1, p.count, 10, 6000);
     b.edge_at(p.count + 7000 * kUs, input(0), true);
     b.edge_at(p.count + 7100 * kUs, input(0), false);
@@ -235,7 +243,8 @@ TEST_F(WithFeedback, anEdgeOlderThanItsPulseIsNoneOfIt) {
   b.run_for_us(2'000);
   ASSERT_EQ(b.made.size(), 1U);
   const std::uint64_t pulse = b.made[0].count;
-  board_edge(&b.board, b.now, input(0), true, pulse - 1);  // came to the main loop after the pulse's own record
+  board_edge(&b.board, b.now, input(0), true,
+             pulse - 1);  // came to the main loop after the pulse's own record
   exposure(0, pulse, 3000, 4000);
   exposure(1, pulse, 3000, 4000);
   b.run_for_us(5'000);
@@ -262,7 +271,8 @@ TEST(BoardInputs, insEdgesOfTheAskedKindAreCountedAndStamped) {
   TriggerConfig c = VirtualBoard::config(100'000);
   c.ins_edge = trigger_edge_falling;
   b.configure(c);
-  for (std::uint64_t k = 0; k < 20; ++k) b.edge_at(1'000'000 + (k + 1) * 2500 * kUs, board_input_ins, k % 2 == 0);
+  for (std::uint64_t k = 0; k < 20; ++k)
+    b.edge_at(1'000'000 + (k + 1) * 2500 * kUs, board_input_ins, k % 2 == 0);
   b.run_for_us(100'000);
   const auto told = b.take(trigger_ins);
   ASSERT_EQ(told.size(), 10U);

@@ -16,14 +16,16 @@ namespace {
 
 constexpr auto kPatience = std::chrono::seconds(10);
 
-/// Both ends of a socket pair; ours is kept from the child, the child's is given a fixed number there.
+/// Both ends of a socket pair; ours is kept from the child, the child's is given a fixed number
+/// there.
 struct Ends {
   int ours = -1, theirs = -1;
 };
 
 Ends make_ends() {
   int ends[2];
-  if (socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, ends) != 0) throw std::runtime_error("socketpair");
+  if (socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, ends) != 0)
+    throw std::runtime_error("socketpair");
   return {ends[0], ends[1]};
 }
 
@@ -40,7 +42,8 @@ void write_all(int fd, const void* data, std::size_t size) {
 char read_one(int fd) {
   pollfd ready{fd, POLLIN, 0};
   char c = 0;
-  if (poll(&ready, 1, 10'000) != 1 || ::read(fd, &c, 1) != 1) throw std::runtime_error("the machine does not answer");
+  if (poll(&ready, 1, 10'000) != 1 || ::read(fd, &c, 1) != 1)
+    throw std::runtime_error("the machine does not answer");
   return c;
 }
 
@@ -53,8 +56,10 @@ std::string read_text_line(int fd) {
 }  // namespace
 
 std::string QemuBoard::missing() {
-  if (std::string(VERGENCE_BOARD_IMAGE).empty()) return "no image of the trigger board: gcc-arm-none-eabi was not there to build it";
-  if (std::string(VERGENCE_QEMU_ARM).empty()) return "no qemu-system-arm to run the trigger board's image in";
+  if (std::string(VERGENCE_BOARD_IMAGE).empty())
+    return "no image of the trigger board: gcc-arm-none-eabi was not there to build it";
+  if (std::string(VERGENCE_QEMU_ARM).empty())
+    return "no qemu-system-arm to run the trigger board's image in";
   return {};
 }
 
@@ -82,7 +87,9 @@ QemuBoard::QemuBoard(int icount_shift) {
     arguments.emplace_back("-chardev");
     arguments.push_back("socket,id=" + std::string(names[i]) + ",fd=" + std::to_string(kFirst + i));
   }
-  if (icount_shift >= 0) arguments.insert(arguments.end(), {"-icount", "shift=" + std::to_string(icount_shift) + ",sleep=off"});
+  if (icount_shift >= 0)
+    arguments.insert(arguments.end(),
+                     {"-icount", "shift=" + std::to_string(icount_shift) + ",sleep=off"});
   std::vector<char*> argv;
   argv.reserve(arguments.size() + 1);
   for (std::string& a : arguments) argv.push_back(a.data());
@@ -177,19 +184,25 @@ std::string QemuBoard::qtest(const std::string& command) {
 }
 
 void QemuBoard::set_exti(unsigned line, bool level) {
-  const std::string command = "exti unnamed-gpio-in " + std::to_string(line) + (level ? " 1" : " 0");
+  const std::string command =
+      "exti unnamed-gpio-in " + std::to_string(line) + (level ? " 1" : " 0");
   if (processor_.empty()) try {
       (void)qtest("set_irq_in /machine/soc/" + command);
       processor_ = "/machine/soc/";
     } catch (const std::runtime_error&) {
-      processor_ = "/machine/unattached/device[0]/";  // older releases of the emulator have no name for it
+      processor_ =
+          "/machine/unattached/device[0]/";  // older releases of the emulator have no name for it
     }
   (void)qtest("set_irq_in " + processor_ + command);
 }
 
-std::uint32_t QemuBoard::counter() { return static_cast<std::uint32_t>(std::stoull(qtest("readl 0x40000024"), nullptr, 16)); }
+std::uint32_t QemuBoard::counter() {
+  return static_cast<std::uint32_t>(std::stoull(qtest("readl 0x40000024"), nullptr, 16));
+}
 
-void QemuBoard::set_counter(std::uint32_t count) { (void)qtest("writel 0x40000024 " + std::to_string(count)); }
+void QemuBoard::set_counter(std::uint32_t count) {
+  (void)qtest("writel 0x40000024 " + std::to_string(count));
+}
 
 void QemuBoard::monitor(const std::string& command) {
   const std::string line = "{\"execute\":\"" + command + "\"}\n";

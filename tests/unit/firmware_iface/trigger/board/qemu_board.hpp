@@ -17,9 +17,11 @@ namespace vergence {
 
 /// The real image in qemu-system-arm -M netduinoplus2, its line to the host on a socket.
 ///
-/// What the machine is: RCC reads 0, so that the image runs on the clock it falls back to, 16 MHz; the timers count 1 GHz of virtual time,
-/// so that a second of the board's is 16 ms; compare and capture units do nothing, so that pulses are forced by the main loop (late);
-/// GPIO is a stub; edges come in through EXTI. Virtual time is the host's (steady_clock), or it goes on by so many nanoseconds with every
+/// What the machine is: RCC reads 0, so that the image runs on the clock it falls back to, 16 MHz;
+/// the timers count 1 GHz of virtual time, so that a second of the board's is 16 ms; compare and
+/// capture units do nothing, so that pulses are forced by the main loop (late); GPIO is a stub;
+/// edges come in through EXTI. Virtual time is the host's (steady_clock), or it goes on by so many
+/// nanoseconds with every
 /// instruction: then nothing depends on how busy the host is.
 ///
 /// Ownership  The process is killed by the destructor, and by the kernel when the test dies.
@@ -37,7 +39,8 @@ class QemuBoard {
   /// Sentence why the image cannot be run here; empty: it can.
   static std::string missing();
 
-  /// `icount_shift`: an instruction takes 2^icount_shift ns of virtual time; −1: virtual time is the host's.
+  /// `icount_shift`: an instruction takes 2^icount_shift ns of virtual time; −1: virtual time is
+  /// the host's.
   explicit QemuBoard(int icount_shift = -1);
   ~QemuBoard();
   QemuBoard(const QemuBoard&) = delete;
@@ -46,7 +49,8 @@ class QemuBoard {
   void bytes(const Bytes& sent);
   /// Sends a message with the next sequence number. → that number
   std::uint8_t send(std::uint8_t type, const Bytes& payload = {});
-  /// The next frame not yet looked at that `wanted` likes, waiting ten seconds; others before it are skipped.
+  /// The next frame not yet looked at that `wanted` likes, waiting ten seconds; others before it
+  /// are skipped.
   TriggerFrame wait(const Predicate& wanted);
   TriggerFrame wait(std::uint8_t type) {
     return wait([type](const TriggerFrame& f) { return f.type == type; });

@@ -11,7 +11,8 @@ namespace {
 
 TEST(BoardRecords, aFullRingDropsTheNewestAndCounts) {
   auto ring = std::make_unique<RecordRing>();
-  for (std::uint32_t i = 0; i < record_ring_capacity + 5; ++i) record_push(ring.get(), {i, 1, true, false});
+  for (std::uint32_t i = 0; i < record_ring_capacity + 5; ++i)
+    record_push(ring.get(), {i, 1, true, false});
   EXPECT_EQ(ring->lost, 5U);
   StampRecord record{};
   for (std::uint32_t i = 0; i < record_ring_capacity; ++i) {
@@ -38,14 +39,17 @@ TEST(BoardRecords, oneWritesWhileAnotherReadsAndNothingIsTornOrLostUncounted) {
   auto ring = std::make_unique<RecordRing>();
   constexpr std::uint32_t kAll = 200'000;
   std::jthread producer([&ring] {
-    for (std::uint32_t i = 0; i < kAll; ++i) record_push(ring.get(), {i, static_cast<std::uint8_t>(i), (i & 1U) != 0, (i & 2U) != 0});
+    for (std::uint32_t i = 0; i < kAll; ++i)
+      record_push(ring.get(), {i, static_cast<std::uint8_t>(i), (i & 1U) != 0, (i & 2U) != 0});
     record_push(ring.get(), {kAll, 0, false, false});
   });
   std::uint32_t got = 0;
   std::int64_t last = -1;
   StampRecord record{};
   for (bool ended = false; !ended;) {
-    const bool over = __atomic_load_n(&ring->written, __ATOMIC_ACQUIRE) + __atomic_load_n(&ring->lost, __ATOMIC_RELAXED) == kAll + 1;
+    const bool over = __atomic_load_n(&ring->written, __ATOMIC_ACQUIRE) +
+                          __atomic_load_n(&ring->lost, __ATOMIC_RELAXED) ==
+                      kAll + 1;
     while (record_pop(ring.get(), &record)) {
       ++got;
       ASSERT_GT(static_cast<std::int64_t>(record.count), last);

@@ -1,6 +1,7 @@
-// The port of STM32F405 against its registers as plain memory at their addresses: what is written where, and what its interrupts make of
-// what the units report. Values are worked out by hand from the reference manual's bit tables. What hardware does to flags that are cleared
-// by writing is not in this memory: each test sets them as they would stand.
+// The port of STM32F405 against its registers as plain memory at their addresses: what is written
+// where, and what its interrupts make of what the units report. Values are worked out by hand from
+// the reference manual's bit tables. What hardware does to flags that are cleared by writing is not
+// in this memory: each test sets them as they would stand.
 #include <gtest/gtest.h>
 #include <sys/mman.h>
 
@@ -21,8 +22,9 @@ namespace vergence {
 namespace {
 
 constexpr std::uintptr_t kBegin = 0x40000000, kSize = 0x30000;
-constexpr std::uintptr_t kTim2 = 0x40000000, kTim4 = 0x40000800, kTim5 = 0x40000C00, kUsart1 = 0x40011000, kSyscfg = 0x40013800,
-                         kExti = 0x40013C00, kGpioa = 0x40020000, kGpiob = 0x40020400;
+constexpr std::uintptr_t kTim2 = 0x40000000, kTim4 = 0x40000800, kTim5 = 0x40000C00,
+                         kUsart1 = 0x40011000, kSyscfg = 0x40013800, kExti = 0x40013C00,
+                         kGpioa = 0x40020000, kGpiob = 0x40020400;
 enum Timer : std::uintptr_t {
   cr1 = 0x00,
   cr2 = 0x04,
@@ -44,19 +46,24 @@ enum Gpio : std::uintptr_t { moder = 0x00, afrl = 0x20, afrh = 0x24 };
 enum Exti : std::uintptr_t { imr = 0x00, rtsr = 0x08, ftsr = 0x0C, pr = 0x14 };
 
 volatile std::uint32_t& at(std::uintptr_t unit, std::uintptr_t offset) {
-  return *reinterpret_cast<volatile std::uint32_t*>(unit + offset);  // NOLINT(performance-no-int-to-ptr): that is what a register is
+  return *reinterpret_cast<volatile std::uint32_t*>(
+      unit + offset);  // NOLINT(performance-no-int-to-ptr): that is what a register is
 }
 
 struct BoardPort : testing::Test {
   static void SetUpTestSuite() {
     void* const want = reinterpret_cast<void*>(kBegin);  // NOLINT(performance-no-int-to-ptr)
-    mapped = mmap(want, kSize, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS | MAP_FIXED_NOREPLACE, -1, 0) == want;
+    mapped = mmap(want, kSize, PROT_READ | PROT_WRITE,
+                  MAP_PRIVATE | MAP_ANONYMOUS | MAP_FIXED_NOREPLACE, -1, 0) == want;
   }
   static void TearDownTestSuite() {
-    if (mapped) munmap(reinterpret_cast<void*>(kBegin), kSize);  // NOLINT(performance-no-int-to-ptr)
+    if (mapped)
+      munmap(reinterpret_cast<void*>(kBegin), kSize);  // NOLINT(performance-no-int-to-ptr)
   }
   void SetUp() override {
-    if (!mapped) GTEST_SKIP() << "something else of this process lives at 0x40000000, where the board's registers are";
+    if (!mapped)
+      GTEST_SKIP()
+          << "something else of this process lives at 0x40000000, where the board's registers are";
     std::memset(reinterpret_cast<void*>(kBegin), 0, kSize);  // NOLINT(performance-no-int-to-ptr)
     StampRecord record{};
     while (hal_stamped(&record)) {
@@ -242,7 +249,8 @@ TEST_F(BoardPort, exposuresAreStampedByCaptureEachEdgeByItsChannel) {
   EXPECT_EQ(r.count, 6000U);
   EXPECT_FALSE(r.rising);
 
-  // Both edges of both inputs in one interrupt, of the first the falling one earlier, across the wrap.
+  // Both edges of both inputs in one interrupt, of the first the falling one earlier, across the
+  // wrap.
   at(kTim5, sr) = 0x1E;
   at(kTim5, ccr1) = 0x00000010;
   at(kTim5, ccr2) = 0xFFFFFFF0;

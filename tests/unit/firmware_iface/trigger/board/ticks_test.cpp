@@ -12,7 +12,8 @@ namespace {
 
 constexpr double kHz = VirtualBoard::kHz;
 
-/// PPS on a crystal that is off by `ppm`, with a receiver's jitter of ±`jitter_us`; true second k is at count(k).
+/// PPS on a crystal that is off by `ppm`, with a receiver's jitter of ±`jitter_us`; true second k
+/// is at count(k).
 struct Pps {
   double ppm = 0, jitter_us = 0;
   std::uint32_t random = 1;
@@ -45,15 +46,19 @@ struct Disciplined : testing::Test {
     b.run_until(pps.count(static_cast<double>(to) - 0.5));
   }
   /// Tick at a true second, less that second.
-  [[nodiscard]] double error_us(double second) const { return static_cast<double>(board_tick(&b.board, pps.count(second))) - second * 1e6; }
+  [[nodiscard]] double error_us(double second) const {
+    return static_cast<double>(board_tick(&b.board, pps.count(second))) - second * 1e6;
+  }
 };
 
 TEST(BoardTicks, withoutPpsTheyAreTheCrystals) {
   VirtualBoard b;
   for (const std::uint64_t s : {1ULL, 60ULL, 86'400ULL, 100'000ULL}) {
     b.run_until(1'000'000 + s * VirtualBoard::kHz);
-    const auto off = static_cast<double>(board_tick(&b.board, b.now)) - static_cast<double>(s) * 1e6;
-    EXPECT_LE(std::abs(off), 0.5 + static_cast<double>(s) * 4e-5) << "the rate is held to 2^-41 us a count";
+    const auto off =
+        static_cast<double>(board_tick(&b.board, b.now)) - static_cast<double>(s) * 1e6;
+    EXPECT_LE(std::abs(off), 0.5 + static_cast<double>(s) * 4e-5)
+        << "the rate is held to 2^-41 us a count";
   }
 }
 
@@ -65,7 +70,8 @@ TEST_F(Disciplined, beforeTheHostCameTheRateIsTakenAtOnce) {
   const double at_lock = error_us(6.2);
   EXPECT_LT(std::abs(error_us(6.4) - at_lock), 2);
   feed(7, 100);
-  EXPECT_LT(std::abs(error_us(99.4) - at_lock), 2) << "a tick is a second of PPS, whatever the crystal";
+  EXPECT_LT(std::abs(error_us(99.4) - at_lock), 2)
+      << "a tick is a second of PPS, whatever the crystal";
 }
 
 struct DisciplinedSlowly : Disciplined, testing::WithParamInterface<double> {};
@@ -79,9 +85,11 @@ TEST_P(DisciplinedSlowly, afterHelloItTakesAMinuteAndNoRateStepOfMoreThanTheStat
   for (std::uint64_t k = 1; k < 120; ++k) {
     feed(k, k + 1);
     const auto rate = static_cast<double>(b.board.ticks.segment.rate);
-    const double missing_ppm = (rate_before / static_cast<double>(b.board.ticks.estimate) - 1) * 1e6;
+    const double missing_ppm =
+        (rate_before / static_cast<double>(b.board.ticks.estimate) - 1) * 1e6;
     const double step_ppm = (rate / rate_before - 1) * 1e6;
-    ASSERT_LE(std::abs(step_ppm), std::max(1.001, std::abs(missing_ppm) / 16 + 0.001)) << "second " << k;
+    ASSERT_LE(std::abs(step_ppm), std::max(1.001, std::abs(missing_ppm) / 16 + 0.001))
+        << "second " << k;
     rate_before = rate;
     if (locked_at == 0 && b.status().pps_locked == 1) locked_at = k;
   }
@@ -185,10 +193,15 @@ TEST_F(Disciplined, thePhaseIsBroughtBackAndWhatSteeredItEndsWithPps) {
     b.run_until(pps.count(to - 0.5));
   };
   feed_moved(32, 300);
-  EXPECT_LT(std::abs(error_us(299.4) - before + kMoved * 1e6), 2) << "whole seconds at the moved edges";
-  // Back again, for 20 s: the slope sees it no more, the phase is still being steered, and then PPS is gone.
+  EXPECT_LT(std::abs(error_us(299.4) - before + kMoved * 1e6), 2)
+      << "whole seconds at the moved edges";
+  // Back again, for 20 s: the slope sees it no more, the phase is still being steered, and then PPS
+  // is gone.
   feed(300, 320);
-  EXPECT_GT(std::abs(static_cast<double>(b.board.ticks.segment.rate) / static_cast<double>(b.board.ticks.estimate) - 1), 0.1e-6);
+  EXPECT_GT(std::abs(static_cast<double>(b.board.ticks.segment.rate) /
+                         static_cast<double>(b.board.ticks.estimate) -
+                     1),
+            0.1e-6);
   b.run_until(pps.count(326));
   EXPECT_EQ(b.status().pps_locked, 0);
   EXPECT_EQ(b.board.ticks.segment.rate, b.board.ticks.estimate) << "nothing steers any more";
@@ -216,13 +229,16 @@ TEST(BoardTicks, whatWasStampedBeforeARateChangedKeepsItsTick) {
 
 TEST_F(Disciplined, aSignalThatIsNoPpsIsNeverLockedTo) {
   begin(false);
-  for (int k = 1; k < 40; ++k)  // each second by itself is within the crystal's 200 ppm, but they do not agree
-    b.edge_at(b.now + static_cast<std::uint64_t>((k + (k % 2) * 150e-6) * kHz), board_input_pps, true);
+  for (int k = 1; k < 40;
+       ++k)  // each second by itself is within the crystal's 200 ppm, but they do not agree
+    b.edge_at(b.now + static_cast<std::uint64_t>((k + (k % 2) * 150e-6) * kHz), board_input_pps,
+              true);
   b.run_until(b.now + static_cast<std::uint64_t>(40 * kHz));
   EXPECT_EQ(b.status().pps_locked, 0);
   b.run_for_us(20'000'000);
   for (const double period : {0.02, 0.9, 1.001, 0.999}) {
-    for (int k = 0; k < 20; ++k) b.edge_at(b.now + static_cast<std::uint64_t>((k + 1) * period * kHz), board_input_pps, true);
+    for (int k = 0; k < 20; ++k)
+      b.edge_at(b.now + static_cast<std::uint64_t>((k + 1) * period * kHz), board_input_pps, true);
     b.run_until(b.now + static_cast<std::uint64_t>(21 * period * kHz));
     EXPECT_EQ(b.status().pps_locked, 0) << period;
     b.run_for_us(20'000'000);
@@ -234,7 +250,8 @@ TEST_F(Disciplined, aSecondPhaseIsTakenOverAfterAFewSeconds) {
   pps.ppm = 5;
   begin(false);
   feed(1, 30);
-  for (int k = 31; k < 90; ++k) b.edge_at(pps.count(k + 0.37), board_input_pps, true);  // another receiver
+  for (int k = 31; k < 90; ++k)
+    b.edge_at(pps.count(k + 0.37), board_input_pps, true);  // another receiver
   b.run_until(pps.count(33.9));
   EXPECT_EQ(b.status().pps_locked, 0) << "three in a row did not fit";
   b.run_until(pps.count(36.9));

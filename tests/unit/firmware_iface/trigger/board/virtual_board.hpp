@@ -9,19 +9,22 @@
 
 namespace vergence {
 
-/// The portable firmware in virtual time: hardware that makes every pulse on its count, a host without latency.
-/// Runs from event to event, so a day costs what happens in it.
+/// The portable firmware in virtual time: hardware that makes every pulse on its count, a host
+/// without latency. Runs from event to event, so a day costs what happens in it.
 class VirtualBoard {
  public:
   using Bytes = std::vector<std::uint8_t>;
   static constexpr std::uint32_t kHz = 84'000'000;
   static constexpr std::uint32_t kBootId = 0xB0071D00;
 
-  explicit VirtualBoard(BoardDescription description = usual(), std::uint64_t start = 1'000'000) : now(start) {
+  explicit VirtualBoard(BoardDescription description = usual(), std::uint64_t start = 1'000'000)
+      : now(start) {
     board_init(&board, &description, kBootId, now);
   }
 
-  static BoardDescription usual() { return {kHz, 200, 1'000'000, 4, 2, true, true, {1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12}}; }
+  static BoardDescription usual() {
+    return {kHz, 200, 1'000'000, 4, 2, true, true, {1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12}};
+  }
 
   static TriggerConfig config(std::uint32_t millihertz) {
     TriggerConfig c{};
@@ -37,7 +40,9 @@ class VirtualBoard {
       hardware();
     }
   }
-  void send(std::uint8_t type, const Bytes& payload = {}) { bytes(framed(type, ++sequence, payload)); }
+  void send(std::uint8_t type, const Bytes& payload = {}) {
+    bytes(framed(type, ++sequence, payload));
+  }
   static Bytes framed(std::uint8_t type, std::uint8_t sequence, const Bytes& payload) {
     Bytes out(trigger_max_frame);
     out.resize(trigger_write_frame(type, sequence, payload.data(), payload.size(), out.data()));
@@ -54,7 +59,9 @@ class VirtualBoard {
     send(trigger_pause, payload);
   }
   /// A level change to come.
-  void edge_at(std::uint64_t count, BoardInput input, bool rising) { edges.emplace(count, std::pair{input, rising}); }
+  void edge_at(std::uint64_t count, BoardInput input, bool rising) {
+    edges.emplace(count, std::pair{input, rising});
+  }
 
   void run_until(std::uint64_t until) {
     while (now < until) {
@@ -98,7 +105,8 @@ class VirtualBoard {
   }
   std::vector<TriggerEvent> events() {
     std::vector<TriggerEvent> all;
-    for (const TriggerFrame& f : take(trigger_event)) trigger_get_event(f.payload, f.size, &all.emplace_back());
+    for (const TriggerFrame& f : take(trigger_event))
+      trigger_get_event(f.payload, f.size, &all.emplace_back());
     return all;
   }
   /// The newest STATUS; forgets the other frames.
