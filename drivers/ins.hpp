@@ -73,8 +73,8 @@ class InsDevice {
   virtual void stop() noexcept = 0;
   /// One sentence about the last call that was not `ok`: what was refused, what to do. Empty: the
   /// status says it all. Owner's thread; may allocate.
-  [[nodiscard]] virtual std::string complaint() const { return {}; }
-  /// One sentence about what works, but not as asked. Empty: nothing. As complaint().
+  [[nodiscard]] virtual std::string last_error() const { return {}; }
+  /// One sentence about what works, but not as asked. Empty: nothing. As last_error().
   [[nodiscard]] virtual std::string remark() const { return {}; }
   /// It lives in a virtual time of its own, beside the other devices: its next reading is there for
   /// the waiting, whatever they do.
@@ -90,7 +90,7 @@ class InsDriver {
   [[nodiscard]] virtual std::unique_ptr<InsDevice> open(std::string_view serial,
                                                         DeviceStatus* status) = 0;
   /// One sentence about the last open() that gave nothing. Empty: the status says it all.
-  [[nodiscard]] virtual std::string complaint() const { return {}; }
+  [[nodiscard]] virtual std::string last_error() const { return {}; }
 };
 
 }  // namespace vergence

@@ -8,7 +8,7 @@
 namespace vergence::app {
 
 InsComparison::InsComparison(const ComparisonOptions& options, Source source, Arena& arena,
-                             DriveJournal& journal)
+                             EventLog& journal)
     : T_ins_left_(options.T_ins_left),
       scale_stretch_m_(options.scale_stretch_m),
       source_(source),

@@ -309,7 +309,7 @@ void Estimator::Parts::follow(const odometry::FrameOutcome& out, const RigFrame&
     unmatched_frames = 0;
     // Good images of which no scene can be made: then it is the rig that does not fit.
     give_up_calibration(frame, kUnmatchedAfter);
-    odometry.forget_rig();
+    odometry.reset_extrinsics();
   }
   if (!out.posed) {
     if (++without_pose == kLostAfter) {

@@ -50,7 +50,7 @@ enum class Reason : std::uint8_t {
   out_of_step,   // a camera's images are of another instant than the others'
   needs_motion,  // the calibration has to be found and cannot be without driving
   needs_near_structure,  // the same, without points near the rig
-  needs_texture,         // the same, without anything to match across
+  needs_texture,         // the same, without anything to stereo match
   unproven_pairing,  // what proves that its images were exposed together has contradicted: one of
                      // them alone was used
 };

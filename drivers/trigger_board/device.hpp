@@ -61,14 +61,14 @@ class Device final : public TriggerDevice, private FrameSink {
   [[nodiscard]] DeviceStatus connect();
 
   [[nodiscard]] const DeviceInfo& info() const noexcept override { return info_; }
-  [[nodiscard]] DeviceStatus configure(const TriggerConfiguration& wanted,
+  [[nodiscard]] DeviceStatus configure(const TriggerConfiguration& requested,
                                        TriggerConfiguration* actual) noexcept override;
   [[nodiscard]] DeviceTiming timing() const noexcept override { return timing_; }
   [[nodiscard]] DeviceStatus start(Notifier* ready) noexcept override;
   [[nodiscard]] DeviceStatus wait(Duration limit, Pulse* pulse) noexcept override;
   [[nodiscard]] DeviceStatus pause(std::uint32_t pulses) noexcept override;
   void stop() noexcept override;
-  [[nodiscard]] std::string complaint() const override;
+  [[nodiscard]] std::string last_error() const override;
   [[nodiscard]] std::string remark() const override { return remark_; }
   [[nodiscard]] TriggerStatistics statistics() const noexcept override;
 
@@ -132,8 +132,8 @@ class Device final : public TriggerDevice, private FrameSink {
   bool connected_ = false, configured_ = false, virtual_time_ = false;
   DeviceTiming timing_{};
   std::string remark_;
-  mutable std::mutex complaint_mutex_;
-  std::string complaint_;
+  mutable std::mutex last_error_mutex_;
+  std::string last_error_;
 
   std::mutex line_mutex_;  // of the pointer: stop() wakes a line that the thread may be replacing
   std::unique_ptr<ByteLine> line_;  // from here on: of the thread while it runs, else the owner's

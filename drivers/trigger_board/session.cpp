@@ -58,7 +58,7 @@ DeviceStatus Device::begin() noexcept {
     Setup setup(*line_, frames_, stopping_, this);
     const DeviceStatus status = begin_on(&setup);
     if (status != DeviceStatus::ok && status != DeviceStatus::stopped)
-      (void)refuse(status, place_->name() + ": " + setup.complaint());
+      (void)refuse(status, place_->name() + ": " + setup.last_error());
     // What it will not do it does not do the next time either; but boards are switched, and
     // programs wait.
     return status == DeviceStatus::ok || status == DeviceStatus::stopped ||
@@ -220,7 +220,7 @@ void Device::halt_board() noexcept {
     if (done == DeviceStatus::ok) counted_.board = status;
     if (done == DeviceStatus::ok && status.boot_id == account_.boot())
       account_.end(status.pulses, open_reports());
-    if (done != DeviceStatus::ok) (void)refuse(done, place_->name() + ": " + setup.complaint());
+    if (done != DeviceStatus::ok) (void)refuse(done, place_->name() + ": " + setup.last_error());
     if (done == DeviceStatus::gone) close_line();
   } catch (const std::exception&) {
     close_line();
@@ -259,7 +259,6 @@ void Device::send_pause(HostStamp now) noexcept {
 }
 
 // ---- what comes in
-// --------------------------------------------------------------------------------------------------
 
 /// False: the board has begun anew since it was set up.
 bool Device::same_boot(std::uint32_t boot) noexcept {

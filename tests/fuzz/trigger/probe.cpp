@@ -110,12 +110,12 @@ class Bench {
                                        trigger_pause_payload_size,
                                        trigger_ping_payload_size};
     const std::uint8_t type = script_.byte() % 8;
-    const auto wanted = static_cast<std::uint8_t>(
+    const auto requested = static_cast<std::uint8_t>(
         type < sizeof kSizes ? kSizes[type] : script_.byte() % trigger_max_payload);
-    for (std::uint8_t i = 0; i < wanted; ++i) payload[i] = script_.byte();
+    for (std::uint8_t i = 0; i < requested; ++i) payload[i] = script_.byte();
     if (type == trigger_config)
       payload[3] = 0, payload[2] &= 0xFU, payload[6] = payload[7] = payload[10] = payload[11] = 0;
-    const std::size_t n = trigger_write_frame(type, script_.byte(), payload, wanted, frame);
+    const std::size_t n = trigger_write_frame(type, script_.byte(), payload, requested, frame);
     for (std::size_t i = 0; i < n; ++i) receive(frame[i]);
   }
 
