@@ -1,0 +1,79 @@
+#pragma once
+#include <algorithm>
+#include <array>
+#include <cstdint>
+#include <span>
+#include <string_view>
+
+#include "app/recording/byte_writer.hpp"
+#include "core/types/time.hpp"
+
+namespace vergence::app {
+
+/// A ROS 2 message as CDR (XCDR1, little endian) into somebody's bytes. Values are aligned to their
+/// size, counted from behind the four bytes of the encapsulation.
+///
+/// Not Fast CDR's: that reports missing room by an exception, takes texts and sequences as
+/// containers only, and leaves what was in the padding before.
+/// Memory  None.  Errors  As ByteWriter.
+class CdrWriter {
+ public:
+  explicit CdrWriter(std::span<std::uint8_t> room) noexcept : out_(room) {
+    constexpr std::array<std::uint8_t, 4> kLittleEndian{0, 1, 0, 0};
+    out_.bytes(kLittleEndian.data(), kLittleEndian.size());
+  }
+
+  template <class T>
+  CdrWriter& put(T value) noexcept {
+    align(sizeof value);
+    out_.put(value);
+    return *this;
+  }
+  CdrWriter& boolean(bool value) noexcept { return put(static_cast<std::uint8_t>(value)); }
+  /// Length with the 0 at the end, the text, the 0.
+  CdrWriter& text(std::string_view s) noexcept {
+    put(static_cast<std::uint32_t>(s.size() + 1));
+    out_.bytes(s.data(), s.size());
+    out_.put(std::uint8_t{0});
+    return *this;
+  }
+  /// Items of an array of fixed length.
+  template <class T, std::size_t N>
+  CdrWriter& items(const std::array<T, N>& values) noexcept {
+    for (const T& v : values) put(v);
+    return *this;
+  }
+  /// How many items of a sequence follow.
+  CdrWriter& count(std::size_t items) noexcept { return put(static_cast<std::uint32_t>(items)); }
+  CdrWriter& raw(std::span<const std::uint8_t> bytes) noexcept {
+    out_.bytes(bytes.data(), bytes.size());
+    return *this;
+  }
+  /// builtin_interfaces/Time: whole seconds downwards, so that times before 1970 are right, too.
+  /// Seconds are of 32 bits: beyond 2038 the nearest that there is.
+  CdrWriter& time(Stamp stamp) noexcept {
+    constexpr std::int64_t kSecond = 1'000'000'000;
+    std::int64_t seconds = stamp.ns() / kSecond, ns = stamp.ns() % kSecond;
+    if (ns < 0) --seconds, ns += kSecond;
+    put(static_cast<std::int32_t>(std::clamp<std::int64_t>(seconds, INT32_MIN, INT32_MAX)));
+    return put(static_cast<std::uint32_t>(ns));
+  }
+  /// std_msgs/Header.
+  CdrWriter& header(Stamp stamp, std::string_view frame) noexcept {
+    return time(stamp).text(frame);
+  }
+  [[nodiscard]] bool ok() const noexcept { return out_.ok(); }
+  [[nodiscard]] std::size_t size() const noexcept { return out_.size(); }
+  [[nodiscard]] std::span<const std::uint8_t> written() const noexcept { return out_.written(); }
+
+ private:
+  void align(std::size_t size) noexcept {
+    constexpr std::array<std::uint8_t, 8> kZeros{};
+    const std::size_t over = (out_.size() - 4) % size;
+    if (over != 0) out_.bytes(kZeros.data(), size - over);
+  }
+
+  ByteWriter out_;
+};
+
+}  // namespace vergence::app

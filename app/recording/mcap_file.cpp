@@ -1,0 +1,352 @@
+#include "app/recording/mcap_file.hpp"
+
+#include <libdeflate.h>
+
+#include <algorithm>
+#include <cassert>
+#include <cerrno>
+#include <cstring>
+#include <string_view>
+
+namespace vergence::app {
+namespace {
+
+constexpr std::array<std::uint8_t, 8> kMagic{0x89, 'M', 'C', 'A', 'P', 0x30, '\r', '\n'};
+constexpr std::size_t kRecordHead = 9;                // opcode u8, length u64
+constexpr std::size_t kChunkHead = kRecordHead + 40;  // start, end, size u64, check sum u32, no
+                                                      // compression u32, size u64
+constexpr std::size_t kScratch = std::size_t{256} << 10;
+
+enum Opcode : std::uint8_t {
+  kHeader = 0x01,
+  kFooter = 0x02,
+  kSchema = 0x03,
+  kChannel = 0x04,
+  kMessage = 0x05,
+  kChunk = 0x06,
+  kMessageIndex = 0x07,
+  kChunkIndex = 0x08,
+  kStatistics = 0x0B,
+  kSummaryOffset = 0x0E,
+  kDataEnd = 0x0F
+};
+
+/// A record whose length is known when its content is written.
+template <class Content>
+void put_record(ByteWriter* out, Opcode opcode, const Content& content) noexcept {
+  out->put(static_cast<std::uint8_t>(opcode));
+  const std::size_t length_at = out->size();
+  out->put(std::uint64_t{0});
+  content(out);
+  out->overwrite(length_at, static_cast<std::uint64_t>(out->size() - length_at - 8));
+}
+
+}  // namespace
+
+void McapMessageHead::write(std::span<std::uint8_t, kSize> out) const noexcept {
+  ByteWriter w(out);
+  w.put(static_cast<std::uint8_t>(kMessage));
+  w.put(static_cast<std::uint64_t>(kSize - kRecordHead) + content);
+  w.put(channel);
+  w.put(sequence);
+  w.put(log_time);
+  w.put(log_time);  // published when it was measured, as far as anybody knows
+}
+
+McapMessageHead McapMessageHead::read(std::span<const std::uint8_t, kSize> in) noexcept {
+  McapMessageHead head;
+  std::uint64_t length = 0;
+  std::memcpy(&length, &in[1], sizeof length);
+  std::memcpy(&head.channel, &in[9], sizeof head.channel);
+  std::memcpy(&head.sequence, &in[11], sizeof head.sequence);
+  std::memcpy(&head.log_time, &in[15], sizeof head.log_time);
+  head.content = length - (kSize - kRecordHead);
+  return head;
+}
+
+/// Small records behind each other through a buffer, with the check sum that a summary has.
+class McapFile::Appender {
+ public:
+  explicit Appender(McapFile* file) noexcept : file_(file), out_(file->scratch_) {}
+
+  template <class Content>
+  void record(Opcode opcode, const Content& content) noexcept {
+    constexpr std::size_t kMostRecord = kScratch / 2;  // schemas are the longest
+    if (out_.size() > kScratch - kMostRecord) flush();
+    put_record(&out_, opcode, content);
+  }
+  void bytes(const void* data, std::size_t size) noexcept { out_.bytes(data, size); }
+  /// From here on.
+  void begin_crc() noexcept {
+    flush();
+    crc_ = 0;
+  }
+  [[nodiscard]] std::uint32_t crc() noexcept {
+    flush();
+    return crc_;
+  }
+  [[nodiscard]] std::uint64_t offset() const noexcept { return file_->end_ + out_.size(); }
+  void flush() noexcept {
+    if (out_.size() == 0 || error_ != 0) return;
+    if (!out_.ok()) error_ = -EMSGSIZE;
+    const auto bytes = out_.written();
+    crc_ = libdeflate_crc32(crc_, bytes.data(), bytes.size());
+    iovec piece{file_->scratch_.data(), bytes.size()};
+    if (error_ == 0) error_ = file_->append(&piece, 1);
+    out_ = ByteWriter(file_->scratch_);
+  }
+  [[nodiscard]] int error() const noexcept { return error_; }
+
+ private:
+  McapFile* file_;
+  ByteWriter out_;
+  std::uint32_t crc_ = 0;
+  int error_ = 0;
+};
+
+McapFile::McapFile(Disk& disk, std::span<const McapTopic> topics, std::string library)
+    : disk_(disk), topics_(topics), library_(std::move(library)), scratch_(kScratch) {
+  assert(topics.size() <= kMostChannels);
+  entries_.reserve(kMostMessages);
+  chunks_.reserve(kMostChunks);
+}
+
+McapFile::~McapFile() { abandon(); }
+
+int McapFile::create(const char* path) noexcept {
+  assert(fd_ < 0);
+  const int fd = disk_.create(path);
+  if (fd < 0) return fd;
+  fd_ = fd;
+  end_ = first_ = last_ = writeback_ = 0;
+  chunks_.clear();
+  counts_ = {};
+  Appender out(this);
+  out.bytes(kMagic.data(), kMagic.size());
+  out.record(kHeader, [this](ByteWriter* w) {
+    w->text("ros2");
+    w->text(library_);
+  });
+  write_schemas(&out);
+  write_channels(&out);
+  out.flush();
+  if (out.error() != 0) abandon();
+  return out.error();
+}
+
+void McapFile::write_schemas(Appender* out) const noexcept {
+  for (std::size_t i = 0; i < topics_.size(); ++i)
+    out->record(kSchema, [&](ByteWriter* w) {
+      w->put(static_cast<std::uint16_t>(i + 1));
+      w->text(topics_[i].type);
+      w->text("ros2msg");
+      w->text(topics_[i].definition);
+    });
+}
+
+void McapFile::write_channels(Appender* out) const noexcept {
+  for (std::size_t i = 0; i < topics_.size(); ++i)
+    out->record(kChannel, [&](ByteWriter* w) {
+      constexpr std::string_view kQos = "offered_qos_profiles";
+      w->put(static_cast<std::uint16_t>(i + 1));
+      w->put(static_cast<std::uint16_t>(i + 1));
+      w->text(topics_[i].topic);
+      w->text("cdr");
+      w->put(static_cast<std::uint32_t>(8 + kQos.size() + topics_[i].qos.size()));
+      w->text(kQos);
+      w->text(topics_[i].qos);
+    });
+}
+
+int McapFile::append(iovec* pieces, int count) noexcept {
+  std::uint64_t at = end_;
+  while (count > 0) {
+    if (pieces->iov_len == 0) {
+      ++pieces, --count;
+      continue;
+    }
+    const std::int64_t n = disk_.write(fd_, pieces, count, at);
+    if (n < 0) {
+      (void)disk_.truncate(fd_, end_);  // what was taken is no whole chunk
+      return static_cast<int>(n);
+    }
+    at += static_cast<std::uint64_t>(n);
+    auto left = static_cast<std::size_t>(n);
+    while (count > 0 && left >= pieces->iov_len) left -= pieces->iov_len, ++pieces, --count;
+    if (count > 0) {
+      pieces->iov_base = static_cast<std::uint8_t*>(pieces->iov_base) + left;
+      pieces->iov_len -= left;
+    }
+  }
+  end_ = at;
+  return 0;
+}
+
+/// Where each message of a chunk is, and the check sum over all of them.
+void McapFile::index_messages(std::span<const std::span<const std::uint8_t>> parts,
+                              ChunkIndex* chunk, std::uint32_t* crc) noexcept {
+  entries_.clear();
+  chunk->start = std::numeric_limits<std::uint64_t>::max();
+  for (std::span<const std::uint8_t> part : parts) {
+    *crc = libdeflate_crc32(*crc, part.data(), part.size());
+    while (!part.empty() && entries_.size() < kMostMessages) {
+      const auto head = McapMessageHead::read(part.first<McapMessageHead::kSize>());
+      entries_.push_back({head.channel, head.log_time, chunk->records});
+      chunk->start = std::min(chunk->start, head.log_time);
+      chunk->end = std::max(chunk->end, head.log_time);
+      chunk->records += head.record_size();
+      part = part.subspan(head.record_size());
+    }
+  }
+}
+
+int McapFile::write_chunk(std::span<const std::span<const std::uint8_t>> parts) noexcept {
+  assert(open() && !full() && parts.size() <= kMostParts);
+  ChunkIndex chunk;
+  std::uint32_t crc = 0;
+  index_messages(parts, &chunk, &crc);
+  if (entries_.empty()) return 0;
+
+  std::array<std::uint8_t, kChunkHead> head{};
+  ByteWriter w(head);
+  w.put(static_cast<std::uint8_t>(kChunk));
+  w.put(static_cast<std::uint64_t>(kChunkHead - kRecordHead) + chunk.records);
+  w.put(chunk.start);
+  w.put(chunk.end);
+  w.put(chunk.records);
+  w.put(crc);
+  w.text("");
+  w.put(chunk.records);
+  chunk.offset = end_;
+  chunk.length = kChunkHead + chunk.records;
+
+  ByteWriter index(scratch_);
+  chunk.index.fill(kNone);
+  for (std::size_t channel = 1; channel <= topics_.size(); ++channel) {
+    const auto mine = [channel](const Entry& e) { return e.channel == channel; };
+    if (std::none_of(entries_.begin(), entries_.end(), mine)) continue;
+    chunk.index[channel - 1] = static_cast<std::uint32_t>(index.size());
+    put_record(&index, kMessageIndex, [&](ByteWriter* out) {
+      out->put(static_cast<std::uint16_t>(channel));
+      const std::size_t size_at = out->size();
+      out->put(std::uint32_t{0});
+      for (const Entry& e : entries_)
+        if (mine(e)) out->put(e.log_time), out->put(e.offset);
+      out->overwrite(size_at, static_cast<std::uint32_t>(out->size() - size_at - 4));
+    });
+  }
+  chunk.index_length = static_cast<std::uint32_t>(index.size());
+
+  std::array<iovec, kMostParts + 2> pieces{};
+  int count = 0;
+  pieces[static_cast<std::size_t>(count++)] = {head.data(), head.size()};
+  for (const auto& part : parts)  // written from, never to
+    pieces[static_cast<std::size_t>(count++)] = {const_cast<std::uint8_t*>(part.data()),
+                                                 part.size()};
+  pieces[static_cast<std::size_t>(count++)] = {scratch_.data(), index.size()};
+  if (const int error = append(pieces.data(), count); error != 0) return error;
+
+  // The disk writes this chunk while the next one is gathered; the one before is there by now.
+  disk_.start_writeback(fd_, chunk.offset, end_ - chunk.offset);
+  if (chunk.offset > writeback_) {
+    disk_.finish_writeback(fd_, writeback_, chunk.offset - writeback_);
+    writeback_ = chunk.offset;
+  }
+  for (const Entry& e : entries_) ++counts_[e.channel - 1U];
+  first_ = chunks_.empty() ? chunk.start : std::min(first_, chunk.start);
+  last_ = std::max(last_, chunk.end);
+  chunks_.push_back(chunk);
+  return 0;
+}
+
+void McapFile::write_statistics(Appender* out) const noexcept {
+  out->record(kStatistics, [this](ByteWriter* w) {
+    std::uint64_t messages = 0;
+    for (const std::uint64_t n : counts_) messages += n;
+    w->put(messages);
+    w->put(static_cast<std::uint16_t>(topics_.size()));  // schemas
+    w->put(static_cast<std::uint32_t>(topics_.size()));  // channels
+    w->put(std::uint32_t{0});                            // attachments
+    w->put(std::uint32_t{0});                            // metadata
+    w->put(static_cast<std::uint32_t>(chunks_.size()));
+    w->put(first_);
+    w->put(last_);
+    w->put(static_cast<std::uint32_t>(10 * topics_.size()));
+    for (std::size_t i = 0; i < topics_.size(); ++i)
+      w->put(static_cast<std::uint16_t>(i + 1)), w->put(counts_[i]);
+  });
+}
+
+void McapFile::write_chunk_indexes(Appender* out) const noexcept {
+  for (const ChunkIndex& chunk : chunks_)
+    out->record(kChunkIndex, [&](ByteWriter* w) {
+      w->put(chunk.start);
+      w->put(chunk.end);
+      w->put(chunk.offset);
+      w->put(chunk.length);
+      const std::size_t size_at = w->size();
+      w->put(std::uint32_t{0});
+      for (std::size_t i = 0; i < topics_.size(); ++i)
+        if (chunk.index[i] != kNone)
+          w->put(static_cast<std::uint16_t>(i + 1)),
+              w->put(chunk.offset + chunk.length + chunk.index[i]);
+      w->overwrite(size_at, static_cast<std::uint32_t>(w->size() - size_at - 4));
+      w->put(std::uint64_t{chunk.index_length});
+      w->text("");
+      w->put(chunk.records);
+      w->put(chunk.records);
+    });
+}
+
+int McapFile::finish() noexcept {
+  if (fd_ < 0) return 0;
+  Appender out(this);
+  out.record(kDataEnd, [](ByteWriter* w) { w->put(std::uint32_t{0}); });
+  out.begin_crc();
+  const std::uint64_t summary = out.offset();
+  struct Part {
+    Opcode opcode;
+    std::uint64_t start, end;
+  };
+  std::array<Part, 4> groups{};
+  write_schemas(&out);
+  groups[0] = {kSchema, summary, out.offset()};
+  write_channels(&out);
+  groups[1] = {kChannel, groups[0].end, out.offset()};
+  write_statistics(&out);
+  groups[2] = {kStatistics, groups[1].end, out.offset()};
+  write_chunk_indexes(&out);
+  groups[3] = {kChunkIndex, groups[2].end, out.offset()};
+  const std::uint64_t offsets = out.offset();
+  for (const Part& group : groups)
+    if (group.end > group.start)
+      out.record(kSummaryOffset, [&](ByteWriter* w) {
+        w->put(static_cast<std::uint8_t>(group.opcode));
+        w->put(group.start);
+        w->put(group.end - group.start);
+      });
+  // The check sum covers the footer up to itself.
+  std::array<std::uint8_t, kRecordHead + 16> footer{};
+  ByteWriter w(footer);
+  w.put(static_cast<std::uint8_t>(kFooter));
+  w.put(std::uint64_t{20});
+  w.put(summary);
+  w.put(offsets);
+  out.bytes(footer.data(), footer.size());
+  const std::uint32_t crc = out.crc();
+  out.bytes(&crc, sizeof crc);
+  out.bytes(kMagic.data(), kMagic.size());
+  out.flush();
+  int error = out.error();
+  if (const int synchronised = disk_.synchronise(fd_); error == 0) error = synchronised;
+  abandon();
+  return error;
+}
+
+void McapFile::abandon() noexcept {
+  if (fd_ < 0) return;
+  disk_.close(fd_);
+  fd_ = -1;
+}
+
+}  // namespace vergence::app

@@ -1,0 +1,115 @@
+#pragma once
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "app/recording/byte_writer.hpp"
+#include "app/recording/disk.hpp"
+
+namespace vergence::app {
+
+/// What messages are of: a Schema and a Channel record, the ids of both its place in the list
+/// plus 1.
+struct McapTopic {
+  std::string topic;
+  std::string type;        // sensor_msgs/msg/Image
+  std::string definition;  // of the type and of all that it is made of, ros2msg
+  std::string qos;         // offered_qos_profiles of the ros2 profile; YAML
+};
+
+/// The head of a Message record, as it stands in a queue and in a chunk.
+struct McapMessageHead {
+  static constexpr std::size_t kSize = 31;  // opcode u8, length u64, channel u16, sequence u32, log
+                                            // and publish time u64; the content follows
+  std::uint16_t channel = 0;
+  std::uint32_t sequence = 0;
+  std::uint64_t log_time = 0;  // ns
+  std::uint64_t content = 0;   // bytes
+
+  void write(std::span<std::uint8_t, kSize> out) const noexcept;
+  /// Of a record that write() began.
+  [[nodiscard]] static McapMessageHead read(std::span<const std::uint8_t, kSize> in) noexcept;
+  [[nodiscard]] std::size_t record_size() const noexcept {
+    return kSize + static_cast<std::size_t>(content);
+  }
+};
+
+/// One MCAP file (mcap.dev, version 0, profile ros2) that grows by whole chunks: schemas and
+/// channels first, chunks that are not packed with their check sum and index, a summary at the end.
+///
+/// A chunk is one write, at an offset that only moves when all of it was taken; what a failed write
+/// left behind is cut off and written over. So the file is always good up to the last chunk, also
+/// without its end.
+/// Threads  One. Memory  Some 180 bytes for each of kMostChunks, at construction; none after.
+/// Errors   Negative errno values.
+class McapFile {
+ public:
+  static constexpr std::size_t kMostChunks = 65536;  // in a file: 109 minutes of 100 ms
+  static constexpr std::size_t kMostChannels = 32;
+  static constexpr std::size_t kMostMessages = 4096;  // in a chunk
+  static constexpr std::size_t kMostParts = 8;
+
+  /// Precondition: at most kMostChannels. Topics and disk outlive it.
+  McapFile(Disk& disk, std::span<const McapTopic> topics, std::string library);
+  ~McapFile();
+  McapFile(const McapFile&) = delete;
+  McapFile& operator=(const McapFile&) = delete;
+
+  /// A new file with its head. Precondition: none is open. → 0
+  [[nodiscard]] int create(const char* path) noexcept;
+  /// Message records, of at most kMostMessages, in pieces that are whole records. Precondition:
+  /// open, not full(). → 0, and then all of it is with the system
+  [[nodiscard]] int write_chunk(std::span<const std::span<const std::uint8_t>> parts) noexcept;
+  /// Index and summary; the file is closed whatever comes of them. → 0
+  [[nodiscard]] int finish() noexcept;
+  /// Closed as it is: without an end.
+  void abandon() noexcept;
+
+  [[nodiscard]] bool open() const noexcept { return fd_ >= 0; }
+  /// The index has no room for another chunk.
+  [[nodiscard]] bool full() const noexcept { return chunks_.size() == kMostChunks; }
+  [[nodiscard]] std::uint64_t size() const noexcept { return end_; }          // bytes that are good
+  [[nodiscard]] std::uint64_t first_time() const noexcept { return first_; }  // ns; of the messages
+  [[nodiscard]] std::uint64_t last_time() const noexcept { return last_; }
+
+ private:
+  static constexpr std::uint32_t kNone = std::numeric_limits<std::uint32_t>::max();
+  struct Entry {
+    std::uint16_t channel = 0;
+    std::uint64_t log_time = 0, offset = 0;
+  };
+  struct ChunkIndex {
+    std::uint64_t start = 0, end = 0;  // ns
+    std::uint64_t offset = 0, length = 0, records = 0;
+    std::uint32_t index_length = 0;
+    std::array<std::uint32_t, kMostChannels> index{};  // of each channel's MessageIndex, from the
+                                                       // chunk's end; kNone
+  };
+  class Appender;
+
+  [[nodiscard]] int append(iovec* pieces, int count) noexcept;
+  void index_messages(std::span<const std::span<const std::uint8_t>> parts, ChunkIndex* chunk,
+                      std::uint32_t* crc) noexcept;
+  void write_schemas(Appender* out) const noexcept;
+  void write_channels(Appender* out) const noexcept;
+  void write_chunk_indexes(Appender* out) const noexcept;
+  void write_statistics(Appender* out) const noexcept;
+
+  Disk& disk_;
+  std::span<const McapTopic> topics_;
+  std::string library_;
+  int fd_ = -1;
+  std::uint64_t end_ = 0, first_ = 0, last_ = 0;
+  std::uint64_t writeback_ = 0;  // offset up to which finish_writeback() was asked for
+  std::vector<Entry> entries_;   // of the chunk at hand
+  std::vector<ChunkIndex> chunks_;
+  std::array<std::uint64_t, kMostChannels> counts_{};  // messages of each channel
+  std::vector<std::uint8_t> scratch_;
+};
+
+}  // namespace vergence::app

@@ -1,0 +1,91 @@
+#pragma once
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <string_view>
+
+#include "app/recording/cdr_writer.hpp"
+#include "core/math/se3.hpp"
+#include "core/types/calibration.hpp"
+#include "core/types/image.hpp"
+#include "core/types/pose_sample.hpp"
+#include "core/types/rig_frame.hpp"
+#include "drivers/ins.hpp"
+#include "drivers/trigger.hpp"
+
+/// The ROS 2 messages of a recording, written into bytes that are given. No heap, no exceptions:
+/// made on the estimator's thread. What does not fit leaves CdrWriter::ok() false.
+namespace vergence::app {
+
+/// Bytes that a message takes at most, but for its texts and data.
+inline constexpr std::size_t kMessageRoom = 1024;
+
+/// sensor_msgs/Image, mono8, rows without padding.
+void write_image(CdrWriter* out, Stamp stamp, std::string_view frame,
+                 const ImageView& image) noexcept;
+/// What write_image() takes.
+[[nodiscard]] constexpr std::size_t image_message_size(int width, int height,
+                                                       std::size_t frame) noexcept {
+  return 64 + frame + static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
+}
+/// sensor_msgs/CompressedImage of a file's bytes.
+void write_compressed_image(CdrWriter* out, Stamp stamp, std::string_view frame,
+                            std::string_view format, std::span<const std::uint8_t> file) noexcept;
+
+/// sensor_msgs/CameraInfo of camera `camera`: k and d of the lens; r and p those of the pair that
+/// rectifies it with camera 0 where a calibration is there, else r the identity and p of k.
+void write_camera_info(CdrWriter* out, Stamp stamp, std::string_view frame,
+                       const RigCalibration& rig, int camera, bool calibrated) noexcept;
+
+/// Position of a reading; altitude above the ellipsoid, covariance east, north, up from its sigmas.
+void write_nav_sat_fix(CdrWriter* out, const InsSample& sample) noexcept;
+/// Attitude of a reading: body forward, left, up in east, north, up. Rates and accelerations are
+/// not measured, which their covariances say.
+void write_imu(CdrWriter* out, const InsSample& sample) noexcept;
+/// All of a reading, bit for bit.
+void write_ins_reading(CdrWriter* out, const InsSample& sample, const InsQuality& quality) noexcept;
+
+/// Pose of the left camera in `world`. The estimator publishes no covariance of a single pose: its
+/// numbers are 0, which is ROS' word for unknown, and −1 in the first where the pose is not to be
+/// used. Twist the same.
+void write_odometry(CdrWriter* out, const PoseSample& sample) noexcept;
+/// `world` → `left` of a frame that has a pose.
+void write_pose_transform(CdrWriter* out, const PoseSample& sample) noexcept;
+/// `left` → every other camera. `names`: the frames of the cameras.
+void write_rig_transforms(CdrWriter* out, Stamp stamp, const RigCalibration& rig,
+                          std::span<const std::string_view> names) noexcept;
+
+/// diagnostic_msgs/DiagnosticStatus, level as ROS has it.
+enum class DiagnosticLevel : std::uint8_t { ok = 0, warn = 1, error = 2, stale = 3 };
+struct DiagnosticValue {
+  std::string_view key;
+  std::int64_t value = 0;
+};
+struct Diagnostic {
+  DiagnosticLevel level = DiagnosticLevel::ok;
+  std::string_view name, message;
+  std::span<const DiagnosticValue> values;
+};
+void write_diagnostics(CdrWriter* out, Stamp stamp, std::span<const Diagnostic> status) noexcept;
+
+void write_text(CdrWriter* out, std::string_view text) noexcept;             // std_msgs/String
+void write_bytes(CdrWriter* out, std::span<const std::uint8_t> b) noexcept;  // UInt8MultiArray
+
+/// What one call of the estimator was given beside the images, and what came of it.
+struct FrameRecord {
+  std::uint64_t number = 0;
+  Stamp stamp{};
+  Duration stamp_error{}, spread{};
+  int cameras = 0;
+  std::uint8_t images_present = 0;       // mask by camera: the estimator had one
+  std::uint8_t images_recorded = 0;      // mask by camera: it is in the recording
+  bool recalibration_requested = false;  // before this frame
+  bool pairing_contradicted = false;     // the status was lowered for it
+  bool solver_done = false;              // the calibration solver answered at this frame
+  PoseSample sample{};
+};
+void write_frame(CdrWriter* out, const FrameRecord& frame) noexcept;
+void write_pulse(CdrWriter* out, Stamp stamp, const Pulse& pulse) noexcept;
+
+}  // namespace vergence::app

@@ -1,0 +1,169 @@
+#pragma once
+#include <array>
+#include <atomic>
+#include <condition_variable>
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <mutex>
+#include <span>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "app/recording/mcap_file.hpp"
+#include "app/recording/record_ring.hpp"
+#include "app/recording/ros_types.hpp"
+#include "app/runtime/wake_event.hpp"
+#include "core/memory/ring.hpp"
+#include "core/types/time.hpp"
+
+namespace vergence::app {
+
+/// One topic of a recording. Its number is its place in the list.
+struct RecordedTopic {
+  std::string name;
+  RosType type = RosType::text;
+  bool latched = false;  // who comes later is to have the last message (tf_static)
+};
+
+/// Counters; exact after close().
+struct RecordingCounters {
+  std::uint64_t messages = 0, bytes = 0;  // in files
+  std::uint64_t chunks = 0, files = 0;
+  std::uint64_t dropped = 0;         // messages that found no room in their queue
+  std::uint64_t dropped_images = 0;  // of these, the large ones
+  std::uint64_t lost = 0;            // messages that waited for a disk until there was no room
+  std::uint64_t passed_over = 0;     // messages older than what is kept before an event
+  std::size_t queue_bytes = 0, queue_high_water = 0;  // of the first queue
+};
+
+/// Messages into MCAP files `drive.mcap` on a thread of its own: who posts never waits for a disk.
+///
+/// Queues     One for each producer thread. What is posted lies there as it will lie in the file;
+///            the thread takes all that waits every 20 ms and writes it as a chunk when its oldest
+///            message has waited 60 ms. So a process that is killed loses the last 100 ms at most.
+/// Files      Rolled by size, by time and when the index is full: drive.mcap becomes drive_0.mcap,
+///            the next is drive_1.mcap. Every file begins with all schemas, channels and the
+///            preamble.
+/// Events     With keep > 0 only what was posted up to so long before an event and so long after
+///            it is written; the rest is passed over.
+/// Threads    begin(), commit(): one thread a queue. mark_event(): any. take_errors(), counters():
+///            any, counters exact after close(). close(): the owner's, after the last commit().
+/// Memory     All at construction; the writer's thread is sealed.
+/// Full       drop: begin() refuses, counted; what is bulky leaves room for the rest. wait:
+///            begin() waits for room (virtual time, replay).
+/// Errors     The constructor throws InputError (folder, disk) and std::system_error (memory). A
+///            disk that takes no more, or is gone: the data wait in their queue while there is
+///            room, the disk is asked again every quarter of a second (a gone one for a new file),
+///            the drive goes on; sentences by take_errors().
+class Recording {
+ public:
+  enum class WhenFull : std::uint8_t { drop, wait };
+  struct Preamble {
+    std::size_t topic = 0;
+    std::vector<std::uint8_t> message{};  // CDR
+  };
+  struct Options {
+    std::vector<RecordedTopic> topics;
+    std::vector<std::size_t> queues;   // bytes of each
+    std::vector<Preamble> preamble{};  // messages at the beginning of every file
+    Stamp start{};                     // of the preamble in the first file
+    std::uint64_t roll_bytes = 0;      // a file is ended when it has so many; 0: never
+    Duration roll_time{};              // … or when its messages span so long; 0: never
+    Duration keep{};                   // 0: everything
+    WhenFull when_full = WhenFull::drop;
+    Disk* disk = nullptr;  // null: the system's
+  };
+
+  /// `folder` exists.
+  Recording(const std::filesystem::path& folder, Options options);
+  ~Recording();
+  Recording(const Recording&) = delete;
+  Recording& operator=(const Recording&) = delete;
+
+  /// Where a message of at most `most` bytes is to be written; empty: dropped and counted. `bulky`:
+  /// an image, which leaves room for a thousand small messages.
+  [[nodiscard]] std::span<std::uint8_t> begin(std::size_t queue, std::size_t topic, Stamp stamp,
+                                              std::size_t most, bool bulky = false) noexcept;
+  /// The first `size` bytes of what begin() gave are the message. 0: there is none after all.
+  void commit(std::size_t queue, std::size_t size) noexcept;
+  /// Something happened: what is around it is kept.
+  void mark_event(Stamp stamp) noexcept;
+
+  /// Sentences about the disk since the last call.
+  [[nodiscard]] std::vector<std::string> take_errors();
+  [[nodiscard]] RecordingCounters counters() const noexcept;
+  /// Writes what waits, ends the file. Once.
+  void close() noexcept;
+
+ private:
+  enum class Trouble : std::uint8_t { none, full, gone, slow, unfinished };
+  struct Notice {
+    Trouble trouble = Trouble::none;  // none: the disk takes data again
+    int error = 0;                    // errno; of slow: ms
+    std::uint64_t lost = 0;           // messages, so far
+    int file = 0;
+  };
+  /// A producer's: only its thread touches what is no ring.
+  struct Queue {
+    explicit Queue(std::size_t bytes) : ring(bytes) {}
+    RecordRing ring;
+    McapMessageHead head{};
+    std::span<std::uint8_t> open{};  // head and content
+  };
+  /// What waits, as far as a chunk takes it.
+  struct Batch {
+    std::array<std::span<const std::uint8_t>, McapFile::kMostParts> parts{};
+    std::size_t messages = 0, bytes = 0;
+    bool filled = false;  // there is more than a chunk takes
+  };
+
+  void work() noexcept;
+  /// at_once: however young what waits is. last: what cannot be stored now is lost.
+  void drain(bool at_once, bool last) noexcept;
+  [[nodiscard]] Batch gather() const noexcept;
+  [[nodiscard]] bool due(const Batch& batch) noexcept;
+  void release(const Batch& batch) noexcept;
+  void pass_over_old(bool all) noexcept;
+  void make_room() noexcept;
+  static void drop_oldest(RecordRing* ring, std::atomic<std::uint64_t>* counter) noexcept;
+  [[nodiscard]] bool store(const Batch& batch) noexcept;
+  [[nodiscard]] bool open_file() noexcept;
+  void fail(int error) noexcept;
+  void roll_if_wanted() noexcept;
+  void begin_next_number() noexcept;
+  [[nodiscard]] const char* path(int number, std::vector<char>* out) const noexcept;
+  [[nodiscard]] bool holding() const noexcept;
+
+  std::string folder_;
+  Options options_;
+  std::vector<McapTopic> topics_;
+  std::vector<std::uint32_t> sequences_;  // by topic; of its producer
+  std::vector<std::unique_ptr<Queue>> queues_;
+  std::vector<std::uint8_t> preamble_;  // Message records
+  Disk& disk_;
+  McapFile file_;
+
+  // Of the writer's thread.
+  int number_ = 0;        // of the file at hand
+  bool several_ = false;  // files have numbers
+  Trouble trouble_ = Trouble::none;
+  std::int64_t retry_ns_ = 0, waiting_since_ns_ = 0;  // monotonic
+  std::vector<char> path_, other_path_;
+
+  std::atomic<std::int64_t> keep_until_ns_;
+  std::atomic<std::uint64_t> newest_ns_{0};  // of what was posted
+  std::atomic<std::uint64_t> messages_{0}, bytes_{0}, chunks_{0}, files_{0};
+  std::atomic<std::uint64_t> dropped_{0}, dropped_images_{0}, lost_{0}, passed_over_{0};
+  Ring<Notice, 64> notices_;  // writer to take_errors()
+  std::mutex errors_mutex_;   // of those who take
+  std::mutex mutex_;          // with stop_ and hurry_, for the writer that sleeps
+  std::condition_variable wake_;
+  bool stop_ = false, hurry_ = false;
+  WakeEvent freed_;
+  std::thread thread_;
+};
+
+}  // namespace vergence::app
