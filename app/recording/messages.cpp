@@ -41,7 +41,7 @@ Rectification rectification(const RigCalibration& rig, int camera, bool calibrat
   const Vec3 z = (axes - axes.dot(x) * x).normalized();
   Mat3 R_common_left;
   R_common_left << x.transpose(), z.cross(x).transpose(), z.transpose();
-  if (!R_common_left.allFinite()) return r;
+  if (!(centre.norm() > 0) || !R_common_left.allFinite()) return r;
   r.focal = (lenses[0].fx + lenses[0].fy + lenses[other].fx + lenses[other].fy) / 4;
   r.cx = lenses[0].cx;
   r.cy = lenses[0].cy;

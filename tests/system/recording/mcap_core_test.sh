@@ -1,0 +1,24 @@
+#!/bin/sh
+# A recording is read by Foxglove's own libraries: mcap_core_test.sh RECORD_SAMPLE SCRIPT FOLDER
+# FOLDER keeps the libraries for the next time. Exit 77: npm is not here or reaches no registry.
+set -eu
+sample=$1 script=$2 folder=$3
+
+command -v node >/dev/null && command -v npm >/dev/null || {
+  echo "SKIPPED: node and npm are not installed: the recording is read by the project's own reader only"
+  exit 77
+}
+mkdir -p "$folder"
+cp "$script" "$folder/read.mjs"
+cd "$folder"
+if ! [ -d node_modules/@mcap/core ]; then
+  echo '{"private": true, "type": "module"}' > package.json
+  timeout 100 npm install --no-audit --no-fund --silent \
+    @mcap/core@2.2.2 @foxglove/rosmsg@5.0.5 @foxglove/rosmsg2-serialization@3.1.0 || {
+    echo "SKIPPED: npm reaches no registry: the recording is read by the project's own reader only"
+    exit 77
+  }
+fi
+rm -rf recorded && mkdir recorded
+"$sample" recorded
+node read.mjs recorded/drive.mcap

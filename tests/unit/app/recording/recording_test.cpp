@@ -1,0 +1,315 @@
+#include "app/recording/recording.hpp"
+
+#include <chrono>
+#include <cstring>
+#include <string>
+#include <thread>
+
+#include <gtest/gtest.h>
+
+#include "app/recording/messages.hpp"
+#include "app/runtime/errors.hpp"
+#include "core/memory/allocation_guard.hpp"
+#include "tests/support/recording_reader.hpp"
+#include "tests/support/temporary_folder.hpp"
+#include "tests/unit/app/recording/faulty_disk.hpp"
+
+namespace vergence::app {
+namespace {
+
+using namespace std::chrono_literals;
+using test::FaultyDisk;
+using test::read_mcap;
+using test::TemporaryFolder;
+
+constexpr std::size_t kText = 0, kImage = 1;
+
+Recording::Options options() {
+  Recording::Options o;
+  o.topics = {{"/text", RosType::text, false}, {"/left/image_raw", RosType::image, false}};
+  o.queues = {4U << 20U};
+  o.when_full = Recording::WhenFull::wait;
+  return o;
+}
+
+std::string text_of(int n) { return "message " + std::to_string(n); }
+
+bool post(Recording* recording, int n, std::size_t padding = 0) {
+  const std::string text = text_of(n) + std::string(padding, '.');
+  const auto room = recording->begin(0, kText, Stamp(std::int64_t{n} * 1'000'000), 64 + padding);
+  if (room.empty()) return false;
+  CdrWriter out(room);
+  write_text(&out, text);
+  recording->commit(0, out.ok() ? out.size() : 0);
+  return true;
+}
+
+/// Numbers of the text messages of a file, in its order.
+std::vector<int> numbers(const std::filesystem::path& file) {
+  std::vector<int> out;
+  for (const auto& m : read_mcap(file).messages)
+    if (m.type == "std_msgs/msg/String") out.push_back(std::stoi(m.content.substr(16)));
+  return out;
+}
+
+std::vector<int> sequence(int first, int end) {
+  std::vector<int> out;
+  for (int i = first; i < end; ++i) out.push_back(i);
+  return out;
+}
+
+TEST(Recording, readsBackAsPosted) {
+  const TemporaryFolder folder;
+  {
+    Recording recording(folder.path(), options());
+    for (int i = 0; i < 1000; ++i) ASSERT_TRUE(post(&recording, i));
+    recording.close();
+    EXPECT_EQ(recording.counters().messages, 1000U);
+    EXPECT_EQ(recording.counters().dropped, 0U);
+    EXPECT_TRUE(recording.take_errors().empty());
+  }
+  const auto file = read_mcap(folder / "drive.mcap");
+  EXPECT_TRUE(file.scan.finished);
+  EXPECT_EQ(file.scan.broken_chunks + file.scan.broken_records + file.scan.orphans, 0U);
+  ASSERT_EQ(file.messages.size(), 1000U);
+  EXPECT_EQ(file.messages[7].topic, "/text");
+  EXPECT_EQ(file.messages[7].log_time, 7'000'000U);
+  EXPECT_EQ(numbers(folder / "drive.mcap"), sequence(0, 1000));
+}
+
+TEST(Recording, queueLargerThanItselfGoesThroughItManyTimes) {
+  const TemporaryFolder folder;
+  Recording::Options o = options();
+  o.queues = {64U << 10U};
+  Recording recording(folder.path(), o);
+  for (int i = 0; i < 3000; ++i) ASSERT_TRUE(post(&recording, i, 777));
+  recording.close();
+  EXPECT_EQ(numbers(folder / "drive.mcap"), sequence(0, 3000));
+}
+
+TEST(Recording, messagesAreInTheFileSoonWithoutItsEnd) {
+  const TemporaryFolder folder;
+  Recording recording(folder.path(), options());
+  for (int i = 0; i < 10; ++i) ASSERT_TRUE(post(&recording, i));
+  const auto begun = std::chrono::steady_clock::now();
+  while (numbers(folder / "drive.mcap").size() < 10 &&
+         std::chrono::steady_clock::now() - begun < 5s)
+    std::this_thread::sleep_for(1ms);
+  EXPECT_EQ(numbers(folder / "drive.mcap"), sequence(0, 10));
+  EXPECT_FALSE(read_mcap(folder / "drive.mcap").scan.finished);
+}
+
+TEST(Recording, rollsBySizeAndByTimeAsRosbagNamesIt) {
+  const TemporaryFolder folder;
+  for (const bool by_size : {true, false}) {
+    const auto below = folder.path() / (by_size ? "size" : "time");
+    std::filesystem::create_directories(below);
+    Recording::Options o = options();
+    o.queues = {64U << 10U};
+    o.preamble = {{kText, {0, 1, 0, 0, 2, 0, 0, 0, 'p', 0}}};
+    o.roll_bytes = by_size ? 300'000 : 0;
+    o.roll_time = by_size ? Duration{} : Duration::nanoseconds(1'000'000'000);
+    Recording recording(below, o);
+    for (int i = 0; i < 3000; ++i) ASSERT_TRUE(post(&recording, i, 500));
+    recording.close();
+    EXPECT_FALSE(std::filesystem::exists(below / "drive.mcap"));
+    std::vector<int> all;
+    const auto files = recording.counters().files;
+    EXPECT_GE(files, by_size ? 4U : 2U);
+    for (std::uint64_t f = 0; f < files; ++f) {
+      const auto file = read_mcap(below / ("drive_" + std::to_string(f) + ".mcap"));
+      EXPECT_TRUE(file.scan.finished);
+      ASSERT_FALSE(file.messages.empty());
+      EXPECT_EQ(file.messages[0].content.substr(8, 1), "p");
+      for (std::size_t m = 1; m < file.messages.size(); ++m)
+        all.push_back(std::stoi(file.messages[m].content.substr(16)));
+    }
+    EXPECT_EQ(all, sequence(0, 3000));
+  }
+}
+
+TEST(Recording, imagesNeverPushOutSmallMessages) {
+  const TemporaryFolder folder;
+  FaultyDisk disk;
+  Recording::Options o = options();
+  o.when_full = Recording::WhenFull::drop;
+  o.disk = &disk;
+  Recording recording(folder.path(), o);
+  disk.stall_ms = 400;  // the first chunk
+  ASSERT_TRUE(post(&recording, 0));
+  std::this_thread::sleep_for(150ms);
+  int images = 0;
+  while (!recording.begin(0, kImage, Stamp(1), 300'000, true).empty()) {
+    recording.commit(0, 300'000);
+    ++images;
+  }
+  EXPECT_GE(images, 8);
+  for (int i = 1; i < 1000; ++i) ASSERT_TRUE(post(&recording, i));
+  recording.close();
+  EXPECT_EQ(recording.counters().dropped, 1U);
+  EXPECT_EQ(recording.counters().dropped_images, 1U);
+  EXPECT_EQ(numbers(folder / "drive.mcap"), sequence(0, 1000));
+}
+
+TEST(Recording, aMessageLargerThanItsQueueIsDroppedAlsoWhenOneWaits) {
+  const TemporaryFolder folder;
+  Recording recording(folder.path(), options());
+  EXPECT_TRUE(recording.begin(0, kImage, Stamp(1), 5U << 20U, true).empty());
+  EXPECT_EQ(recording.counters().dropped_images, 1U);
+}
+
+TEST(Recording, shortWritesLoseNothing) {
+  const TemporaryFolder folder;
+  FaultyDisk disk;
+  disk.most = 777;
+  Recording::Options o = options();
+  o.disk = &disk;
+  Recording recording(folder.path(), o);
+  for (int i = 0; i < 500; ++i) ASSERT_TRUE(post(&recording, i));
+  recording.close();
+  EXPECT_EQ(numbers(folder / "drive.mcap"), sequence(0, 500));
+  EXPECT_TRUE(read_mcap(folder / "drive.mcap").scan.finished);
+}
+
+TEST(Recording, aFullDiskLosesNothingWhileTheQueueHasRoomAndIsSaidOnce) {
+  const TemporaryFolder folder;
+  FaultyDisk disk;
+  Recording::Options o = options();
+  o.disk = &disk;
+  Recording recording(folder.path(), o);
+  for (int i = 0; i < 100; ++i) ASSERT_TRUE(post(&recording, i));
+  std::this_thread::sleep_for(200ms);
+  const auto size = std::filesystem::file_size(folder / "drive.mcap");
+  disk.room = size + 100;  // part of the next chunk
+  for (int i = 100; i < 200; ++i) ASSERT_TRUE(post(&recording, i));
+  std::this_thread::sleep_for(700ms);
+  // What was taken of the chunk is cut off again.
+  EXPECT_EQ(std::filesystem::file_size(folder / "drive.mcap"), size);
+  auto errors = recording.take_errors();
+  ASSERT_EQ(errors.size(), 1U);
+  EXPECT_NE(errors[0].find("No space left"), std::string::npos) << errors[0];
+  disk.room = ~std::uint64_t{0};
+  std::this_thread::sleep_for(500ms);
+  errors = recording.take_errors();
+  ASSERT_EQ(errors.size(), 1U);
+  EXPECT_NE(errors[0].find("again; 0 messages were lost"), std::string::npos) << errors[0];
+  recording.close();
+  EXPECT_EQ(numbers(folder / "drive.mcap"), sequence(0, 200));
+  EXPECT_TRUE(read_mcap(folder / "drive.mcap").scan.finished);
+}
+
+TEST(Recording, aDiskThatStaysFullLosesTheOldestCountsThemAndEnds) {
+  const TemporaryFolder folder;
+  FaultyDisk disk;
+  Recording::Options o = options();
+  o.queues = {64U << 10U};
+  o.disk = &disk;
+  Recording recording(folder.path(), o);
+  disk.room = 0;
+  for (int i = 0; i < 2000; ++i) ASSERT_TRUE(post(&recording, i, 100));
+  recording.close();
+  const RecordingCounters c = recording.counters();
+  EXPECT_EQ(c.lost, 2000U);
+  EXPECT_EQ(c.messages, 0U);
+  const auto errors = recording.take_errors();
+  ASSERT_EQ(errors.size(), 2U);
+  EXPECT_NE(errors[1].find("no summary"), std::string::npos) << errors[1];
+  EXPECT_TRUE(numbers(folder / "drive.mcap").empty());
+}
+
+TEST(Recording, aDiskThatIsGoneIsTriedAgainWithANewFile) {
+  const TemporaryFolder folder;
+  FaultyDisk disk;
+  Recording::Options o = options();
+  o.disk = &disk;
+  Recording recording(folder.path(), o);
+  for (int i = 0; i < 100; ++i) ASSERT_TRUE(post(&recording, i));
+  std::this_thread::sleep_for(200ms);
+  disk.error = EIO;
+  for (int i = 100; i < 200; ++i) ASSERT_TRUE(post(&recording, i));
+  std::this_thread::sleep_for(600ms);
+  disk.error = 0;
+  std::this_thread::sleep_for(500ms);
+  recording.close();
+  const auto errors = recording.take_errors();
+  ASSERT_EQ(errors.size(), 2U);
+  EXPECT_NE(errors[0].find("Input/output error"), std::string::npos) << errors[0];
+  // The disk did not take the new name of the first file either.
+  EXPECT_EQ(numbers(folder / "drive.mcap"), sequence(0, 100));
+  EXPECT_EQ(numbers(folder / "drive_1.mcap"), sequence(100, 200));
+}
+
+TEST(Recording, aStalledDiskKeepsNobodyWaitingAndLosesNothingThatHasRoom) {
+  const TemporaryFolder folder;
+  FaultyDisk disk;
+  Recording::Options o = options();
+  o.when_full = Recording::WhenFull::drop;
+  o.disk = &disk;
+  Recording recording(folder.path(), o);
+  disk.stall_ms = 1500;
+  auto longest = 0ns;
+  for (int i = 0; i < 300; ++i) {
+    const auto begun = std::chrono::steady_clock::now();
+    ASSERT_TRUE(post(&recording, i));
+    longest = std::max(longest, std::chrono::steady_clock::now() - begun);
+    std::this_thread::sleep_for(1ms);
+  }
+  EXPECT_LT(longest, 1s);  // the disk's 1.5 s are not the producer's
+  recording.close();
+  EXPECT_EQ(numbers(folder / "drive.mcap"), sequence(0, 300));
+  const auto errors = recording.take_errors();
+  ASSERT_EQ(errors.size(), 1U);
+  EXPECT_NE(errors[0].find("kept the recording waiting for 1."), std::string::npos) << errors[0];
+}
+
+TEST(Recording, keepsWhatIsAroundAnEvent) {
+  const TemporaryFolder folder;
+  Recording::Options o = options();
+  o.when_full = Recording::WhenFull::drop;
+  o.keep = Duration::nanoseconds(100'000'000);  // messages are 1 ms apart
+  Recording recording(folder.path(), o);
+  for (int i = 0; i < 1000; ++i) ASSERT_TRUE(post(&recording, i));
+  std::this_thread::sleep_for(200ms);
+  recording.mark_event(Stamp(1'000'000'000));
+  for (int i = 1000; i < 1100; ++i) ASSERT_TRUE(post(&recording, i));
+  std::this_thread::sleep_for(300ms);
+  for (int i = 1100; i < 2000; ++i) ASSERT_TRUE(post(&recording, i));
+  recording.close();
+  const auto kept = numbers(folder / "drive.mcap");
+  EXPECT_EQ(kept, sequence(899, 1100));
+  EXPECT_EQ(recording.counters().passed_over, 2000U - kept.size());
+}
+
+TEST(Recording, aFolderThatTakesNoFileIsRefused) {
+  const TemporaryFolder folder;
+  (void)folder.write("drive.mcap", "somebody's");
+  EXPECT_THROW(Recording(folder.path() / "nowhere", options()), InputError);
+}
+
+TEST(Recording, postingAndWritingTakeNoMemory) {
+  if (!AllocationGuard::available()) GTEST_SKIP() << "no allocation hooks in this build";
+  const TemporaryFolder folder;
+  FaultyDisk disk;
+  Recording::Options o = options();
+  o.queues = {64U << 10U};
+  o.roll_bytes = 100'000;
+  o.disk = &disk;
+  Recording recording(folder.path(), o);
+  const auto before = AllocationGuard::allocations_after_seal();
+  {
+    const SealedScope sealed;
+    for (int i = 0; i < 2000; ++i) {
+      const auto room = recording.begin(0, kText, Stamp(i), 64);
+      CdrWriter out(room);
+      write_text(&out, "message");
+      recording.commit(0, out.size());
+      if (i == 1000) disk.room = 0;
+      if (i == 1200) disk.room = ~std::uint64_t{0};
+    }
+  }
+  recording.close();
+  EXPECT_EQ(AllocationGuard::allocations_after_seal() - before, 0U);
+}
+
+}  // namespace
+}  // namespace vergence::app
