@@ -25,7 +25,7 @@ namespace {
 using namespace std::chrono_literals;
 
 constexpr auto kLook = 20ms;                      // between two looks at the queues
-constexpr std::int64_t kMostWaitNs = 60'000'000;  // of a message for its chunk: with a look and
+constexpr std::int64_t kMostWaitNs = 40'000'000;  // of a message for its chunk: with a look and
                                                   // the write it is less than 100 ms
 constexpr std::size_t kMostChunkBytes = std::size_t{32} << 20;  // half of what readers take
 constexpr std::int64_t kRetryNs = 250'000'000;                  // until a disk is asked again
