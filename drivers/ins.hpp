@@ -40,7 +40,7 @@ struct InsStatistics {
   std::uint64_t delivered = 0;
   std::uint64_t lost = 0;       // gaps in the device's count
   std::uint64_t malformed = 0;  // packets that made no sense
-  std::uint64_t restarts = 0;   // the device started anew, or its clock was set
+  std::uint64_t restarts = 0;   // the device restarted, or its clock was set
   std::uint64_t overruns = 0;   // readings that found the ring full (live); never silent
   std::uint64_t starts = 0;
 };

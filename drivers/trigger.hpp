@@ -51,7 +51,7 @@ struct TriggerConfiguration {
 struct TriggerStatistics {
   std::uint64_t pulses = 0;     // reported
   std::uint64_t lost = 0;       // pulses that went out and whose report never came
-  std::uint64_t reboots = 0;    // the board began anew
+  std::uint64_t reboots = 0;    // the board began again
   std::uint64_t malformed = 0;  // reports that made no sense
   std::uint64_t overruns = 0;   // reports that found the ring full
   std::uint64_t starts = 0;

@@ -249,7 +249,7 @@ void Calibrator::conclude() {
   if (cameras_ == 1) return;
   rig.baseline = rig.T_camera_left[1].t.norm();
   if (const auto bad = find_implausible(&rig))
-    result_.error = "what comes out cannot be a rig: " + bad->sentence;
+    result_.error = "the result cannot be a rig: " + bad->sentence;
 }
 
 }  // namespace

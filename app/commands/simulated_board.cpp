@@ -102,7 +102,7 @@ mock::SimulatedLineOptions line_of(const Configuration& c, const mock::MockRig& 
   return o;
 }
 
-/// The simulated board pulses on while its line is away and starts anew with it: what one without a
+/// The simulated board pulses on while its line is away and restarts with it: what one without a
 /// supply would not do meanwhile.
 bool is_off(const mock::MockRig& rig, HostStamp at) noexcept {
   const auto& faults = rig.truth().faults();

@@ -80,7 +80,7 @@ TimingMonitor::Sentence TimingMonitor::of_device(const LiveItem& item) const noe
       return sentence("board_back", true, "the trigger board is back");
     case Kind::board_rebooted:
       return sentence("board_rebooted", true,
-                      "the trigger board has started anew: its pulses count from 0, the pairing is "
+                      "the trigger board has restarted: its pulses count from 0, the pairing is "
                       "proven again");
     case Kind::acquiring:
       return sentence(

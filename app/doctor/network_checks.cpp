@@ -234,7 +234,7 @@ void check_load(const Link& link, std::vector<Finding>* findings) {
         {"link",
          FindingState::advice,
          fmt::format(
-             "{} runs at {:.0f} Mbit/s; GigE cameras need a gigabit: look at cable and switch",
+             "{} runs at {:.0f} Mbit/s; GigE cameras need a gigabit: check cable and switch",
              link.name, link.speed / kMega),
          {}});
   if (link.needs.empty()) return;

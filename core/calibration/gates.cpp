@@ -180,7 +180,7 @@ Gate ask_common_gates(const AcceptanceInput& q, const CalibrationOptions& o) noe
         log_so3(found.R * nominal.R.transpose()).norm() > o.max_rotation_deg * kDegree)
       return Gate::implausible_rotation;
   }
-  // With the lenses free, the depth's own sigma says whether the way was long enough.
+  // With the lenses free, the depth's own sigma says whether the path was long enough.
   const double least = q.lenses ? 0.0 : o.needs_motion_m;
   if (s.travelled_m < std::max(least, kNeedsBaselines * s.rig.baseline)) return Gate::needs_motion;
   if (s.near < o.needs_near_points) return Gate::needs_near_structure;

@@ -225,7 +225,7 @@ void RigSolver::make_points() noexcept {
   }
 }
 
-/// A frame that hardly a track ties to the ones before it (the scene was built anew there) begins a
+/// A frame that hardly a track ties to the ones before it (the scene was rebuilt there) begins a
 /// piece of its own: its pose is held, as the first one is, for nothing else would.
 void RigSolver::hold_pieces() noexcept {
   held_.clear();
@@ -394,8 +394,8 @@ void RigSolver::write_result(const BundleResult& r, RigSolution* s) const noexce
   rig.scale_sigma = std::hypot(noise, std::hypot(kScaleByFocal * focal, kScaleByRadian * centre));
 }
 
-/// What the monitor would have said on the way, had it known the result: a camera out of step, or
-/// two rigs in one solve.
+/// What the monitor would have said during the drive, had it known the result: a camera out of
+/// step, or two rigs in one solve.
 void RigSolver::watch_frames(RigSolution* s) noexcept {
   const Intrinsics &a = cameras_[0].intrinsics(), &b = cameras_[1].intrinsics();
   const Pinhole left{a.fx, a.fy, a.cx, a.cy}, right{b.fx, b.fy, b.cx, b.cy};

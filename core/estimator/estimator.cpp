@@ -330,7 +330,7 @@ void Estimator::Parts::follow(const odometry::FrameOutcome& out, const RigFrame&
   }
   if (out.restarted) {
     note(EstimatorEvent::Kind::scene_restarted, frame.stamp,
-         "the scene was built anew; the way since the last pose is extrapolated", out.gap_s);
+         "the map was rebuilt; the motion since the last pose is extrapolated", out.gap_s);
     calibrator.scene_lost();
   }
   if (out.relocalised)

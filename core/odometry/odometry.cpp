@@ -30,7 +30,7 @@ constexpr double kStereoShare =
     0.5;  // of the points found in two cameras, in which both must agree with the pose
 constexpr double kConfirmedShare = 0.3;  // of points and new corners together: 0.44 to 0.65 on a
                                          // rig that fits, 0.12 to 0.2 a frame out of step
-constexpr int kRestartedFrames = 10;     // frames marked after the scene was built anew
+constexpr int kRestartedFrames = 10;     // frames marked after the scene was rebuilt
 constexpr int kFramesLostBeforeRestart = 3;
 constexpr double kLongestExtrapolation = 2.0;  // s: a vehicle's speed says nothing about later
 constexpr double kCertainShare =
@@ -518,7 +518,7 @@ FrameOutcome Odometry::process(const RigFrame& frame) noexcept {
   out.T_left_world = T_left_world_;
   judge(fit, images, &out);
   if (link_pending_ && weakness(images) == Reason::none) {
-    // The scene was made with another rig: it is built anew, where the camera now is.
+    // The scene was made with another rig: it is rebuilt, where the camera now is.
     take_up_link();
     FrameOutcome built;
     if (!start_scene(T_left_world_, frame.stamp, &built)) out.reason = built.reason;

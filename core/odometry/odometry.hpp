@@ -18,7 +18,7 @@ struct FrameOutcome {
   int stereo_inliers = 0;
   double reprojection_px = 0;
   bool keyframe = false;
-  bool restarted = false;    // the scene was built anew in this frame
+  bool restarted = false;    // the scene was rebuilt in this frame
   bool relocalised = false;  // found again in the window after being lost
   bool initialised = false;  // the rig's transform was found from this frame's images alone
   double gap_s = 0;          // time since the frame before, when it was too long to predict over
@@ -41,7 +41,7 @@ enum class Link : std::uint8_t {
 /// Unlinked, rig() is this frame's transform between the cameras and no calibration. A knock of one
 /// camera is a motion of that camera like any other there.
 /// Frames     T_left_world; world is the left camera of the first frame posed and stays when the
-///            scene is built anew.
+///            scene is rebuilt.
 /// Threads    One caller. Memory: from the arena at construction. Errors: by FrameOutcome.
 class Odometry {
  public:
@@ -56,7 +56,7 @@ class Odometry {
 
   [[nodiscard]] FrameOutcome process(const RigFrame& frame) noexcept;
 
-  /// From the next frame on the cameras are one rig with this calibration: the scene is built anew
+  /// From the next frame on the cameras are one rig with this calibration: the scene is rebuilt
   /// where the left camera then is.
   void link(const RigCalibration& rig) noexcept;
   /// From the next frame on the cameras are not linked; the scene stays.

@@ -57,7 +57,7 @@ class CameraRegisters {
   /// failed.
   [[nodiscard]] bool apply_format7(std::uint64_t csr, std::uint32_t error) noexcept;
 
-  /// The first failure since the last call, ok otherwise; begins anew.
+  /// The first failure since the last call, ok otherwise; begins again.
   [[nodiscard]] DeviceStatus take_status() noexcept;
   [[nodiscard]] DeviceStatus status() const noexcept { return status_; }
   /// About the failure: which register, what it did.

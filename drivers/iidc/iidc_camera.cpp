@@ -143,7 +143,7 @@ DeviceStatus IidcCamera::begin() {
   if (status == DeviceStatus::timeout || status == DeviceStatus::failed ||
       status == DeviceStatus::unsupported) {
     lost_.store(true, std::memory_order_release);
-    status = DeviceStatus::gone;  // it does not answer as it did; asked again, it is opened anew
+    status = DeviceStatus::gone;  // it does not answer as it did; asked again, it is opened again
   }
   if (status == DeviceStatus::ok && !(plan.shape == plan_.shape)) {
     why = "the camera's frames are not those it was configured for; configure it again";
@@ -244,7 +244,7 @@ std::string IidcCamera::remark() const {
   std::string text = bus_->remark(plan_.shape, plan_.rate_hz, sharing_);
   if (!plan_.info.has(FrameInfoItem::counter))
     text += std::string(text.empty() ? "" : "; ") +
-            "it embeds no counter and no stamp: lost images are told by their times only";
+            "it embeds no counter and no stamp: lost images are noticed by their times only";
   return text;
 }
 

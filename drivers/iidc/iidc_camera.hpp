@@ -25,7 +25,7 @@ namespace vergence::iidc {
 /// Stamps    The camera's own clock where it embeds it (on one 1394 bus common to all cameras),
 ///           else the arrival.
 /// Gone      When the bus says so, or when the stream is out of step for kStrays frames: start()
-///           begins anew.
+///           begins again.
 /// Restart   start() writes all registers again: after a stop or a replug the camera is as
 ///           configured.
 class IidcCamera final : public CameraDevice, private StreamSink {

@@ -39,7 +39,7 @@ void Device::work() noexcept {
     if (status == DeviceStatus::stopped) break;  // what still comes until it has stopped counts
     streaming_ = false;
     publish(false);
-    if (status == DeviceStatus::ok) continue;  // it began anew: set it up
+    if (status == DeviceStatus::ok) continue;  // it began again: set it up
     if (status == DeviceStatus::ended) {
       hand_out({Item::What::end, when, {}}, true);
       break;
@@ -260,7 +260,7 @@ void Device::send_pause(HostStamp now) noexcept {
 
 // ---- what comes in
 
-/// False: the board has begun anew since it was set up.
+/// False: the board has begun again since it was set up.
 bool Device::same_boot(std::uint32_t boot) noexcept {
   if (!streaming_ || boot == account_.boot()) return true;
   seen_ = Seen::reboot;

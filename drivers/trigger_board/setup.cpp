@@ -149,7 +149,7 @@ DeviceStatus Setup::hello(Duration limit, TriggerInfo* info) {
   if (theirs != trigger_protocol_version) return other_version(theirs);
   if (trigger_get_info(frame_.payload, frame_.size, info)) return DeviceStatus::ok;
   last_error_ = text(
-      "the trigger board tells %u bytes about itself, which are no INFO; flash this release's "
+      "the trigger board answered %u bytes, which are no INFO; flash this release's "
       "firmware",
       static_cast<unsigned>(frame_.size));
   return DeviceStatus::unsupported;

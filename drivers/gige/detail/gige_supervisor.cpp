@@ -59,8 +59,7 @@ GigeCamera::Trouble GigeCamera::what_is_wrong(HostStamp at, HostStamp* asked) {
   static const Trouble kSilent{"the camera does not answer any more", false};
   if (wrong_sizes_.load(std::memory_order_relaxed) >= kWrongSizes)
     return {"the camera sends " +
-            (seen_width_ > 0 ? size_text(seen_width_, seen_height_)
-                             : "images that do not tell their size") +
+            (seen_width_ > 0 ? size_text(seen_width_, seen_height_) : "images without their size") +
             " where " + size_text(requested_.width, requested_.height) +
             " was configured; power it off and on"};
   const std::lock_guard lock(device_);

@@ -15,7 +15,7 @@ constexpr double kLane = 1.9;         // m left of the centreline: traffic keeps
 constexpr double kArcStep = 0.1;      // m between samples of the speed profile
 constexpr double kTurnRadius = 10.0;  // m
 
-// ---- the way
+// ---- the path
 
 struct Route {
   std::vector<Vec2> corners;  // of the polyline; turned with kTurnRadius

@@ -25,7 +25,7 @@ void probe_decoder(const std::uint8_t* data, std::size_t size) {
     const TriggerDecodeStatus status = trigger_decode(&decoder, data[i], &frame);
     promise(decoder.used <= sizeof decoder.buffer, "the decoder stays in its buffer");
     promise(status == trigger_wait || (data[i] == 0 && decoder.used == 0),
-            "only 00 ends a frame, and the next begins anew");
+            "only 00 ends a frame, and the next begins again");
     promise(before.frames + before.bad_coding + before.bad_length + before.bad_crc +
                     (status == trigger_wait ? 0U : 1U) ==
                 decoder.frames + decoder.bad_coding + decoder.bad_length + decoder.bad_crc,

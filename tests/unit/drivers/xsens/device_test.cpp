@@ -219,7 +219,7 @@ TEST_P(BothGenerations, goesOnByItselfAfterTheSupplyDipped) {
   const auto all = rig.readings();
   EXPECT_EQ(rig.times_gone, 0);
   EXPECT_GT(all.back().arrival, HostStamp(19'500'000'000));
-  EXPECT_EQ(rig.device->statistics().restarts, 1U) << "its clock began anew";
+  EXPECT_EQ(rig.device->statistics().restarts, 1U) << "its clock began again";
   for (std::size_t i = 1; i < all.size(); ++i) ASSERT_GT(all[i].measured, all[i - 1].measured);
   // The stamps after the dip are right again, though its clock begins at another value.
   const InsReading& last = all.back();
