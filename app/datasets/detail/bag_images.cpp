@@ -19,10 +19,13 @@ void colour_to_grey(const std::uint8_t* row, int width, std::size_t red, std::si
 
 }  // namespace
 
-BagImages::BagImages(std::vector<std::unique_ptr<FileBytes>> files,
+BagImages::BagImages(BagFormat format, std::vector<BagFile> files,
                      std::array<std::string, 2> topics,
                      std::array<std::vector<BagImage>, 2> images) noexcept
-    : files_(std::move(files)), topics_(std::move(topics)), images_(std::move(images)) {}
+    : format_(format),
+      files_(std::move(files)),
+      topics_(std::move(topics)),
+      images_(std::move(images)) {}
 
 std::string BagImages::name(std::size_t camera, std::size_t index) const {
   const std::string& topic = topics_[camera];
@@ -54,14 +57,14 @@ ImageFileStatus BagImages::size(const std::string& name, ImageSize* size) const 
 
 bool BagImages::load(const BagImage& entry, Unpacked* unpacked,
                      std::vector<std::uint8_t>* data) const {
-  const FileBytes& file = *files_[entry.file];
+  const ByteSource& file = *files_[entry.file].bytes;
   data->resize(entry.image.bytes);
   const std::uint64_t offset = entry.place.offset + entry.image.offset;
-  if (entry.place.chunk == McapPlace::kNoChunk) return file.read(offset, *data);
+  if (entry.place.chunk == BagPlace::kNoChunk) return file.read(offset, *data);
   const std::lock_guard lock(unpacked->one_at_a_time);
   if (unpacked->chunk != entry.place.chunk || unpacked->file != entry.file) {
-    unpacked->chunk = McapPlace::kNoChunk;  // until it is whole
-    if (!unpack_chunk(file, entry.place.chunk, &unpacked->records)) return false;
+    unpacked->chunk = BagPlace::kNoChunk;  // until it is whole
+    if (!unpack_chunk(format_, file, entry.place.chunk, &unpacked->records)) return false;
     unpacked->chunk = entry.place.chunk;
     unpacked->file = entry.file;
   }

@@ -6,18 +6,10 @@
 #include <string>
 #include <vector>
 
-#include "app/datasets/detail/mcap.hpp"
-#include "app/datasets/detail/ros_messages.hpp"
+#include "app/datasets/detail/bag_index.hpp"
 #include "app/datasets/image_store.hpp"
 
 namespace vergence::app::detail {
-
-/// Where an image of a bag is; its pixels stay in the file.
-struct BagImage {
-  RosImage image{};
-  McapPlace place{};
-  std::uint32_t file = 0;  // of the bag's files
-};
 
 /// The images of two topics of a bag, loaded when they are asked for. A camera's chunk stays
 /// unpacked until its next one is wanted.
@@ -25,7 +17,7 @@ struct BagImage {
 class BagImages final : public ImageStore {
  public:
   /// `topics`, `images`: left, right.
-  BagImages(std::vector<std::unique_ptr<FileBytes>> files, std::array<std::string, 2> topics,
+  BagImages(BagFormat format, std::vector<BagFile> files, std::array<std::string, 2> topics,
             std::array<std::vector<BagImage>, 2> images) noexcept;
 
   /// What names image `index` of camera `camera`: `left/image_raw#12`.
@@ -48,7 +40,8 @@ class BagImages final : public ImageStore {
   [[nodiscard]] bool load(const BagImage& entry, Unpacked* unpacked,
                           std::vector<std::uint8_t>* data) const;
 
-  std::vector<std::unique_ptr<FileBytes>> files_;
+  BagFormat format_;
+  std::vector<BagFile> files_;
   std::array<std::string, 2> topics_;
   std::array<std::vector<BagImage>, 2> images_;
   mutable std::array<Unpacked, 2> unpacked_;

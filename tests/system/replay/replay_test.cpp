@@ -10,7 +10,7 @@
 #include <opencv2/imgcodecs.hpp>
 
 #include "app/config/calibration_file.hpp"
-#include "tests/support/mcap_writer.hpp"
+#include "tests/support/ros_messages.hpp"
 #include "tests/support/temporary_folder.hpp"
 #include "tests/system/odometry/mock_drive.hpp"
 #include "tests/unit/app/commands/run_vergence.hpp"
@@ -115,27 +115,30 @@ TEST_F(ReplayedFolder, aMaskChangesWhatIsSeenAndOneOfAnotherSizeIsRefused) {
 TEST_F(ReplayedFolder, aBagGivesThePosesOfTheSameImages) {
   ASSERT_EQ(replay().code, 0);
   const std::string poses = read_file(session() / "trajectory.tum");
-  McapWriter bag("zstd");
-  bag.channel(1, "/left/image_raw/compressed", "sensor_msgs/msg/CompressedImage");
-  bag.channel(2, "/right/image_raw/compressed", "sensor_msgs/msg/CompressedImage");
-  std::ifstream times(data() / "times.txt");
-  std::size_t pair = 0;
-  for (std::int64_t ns = 0; times >> ns; ++pair) {
-    for (int k = 0; k < 2; ++k)
-      bag.message(
-          static_cast<std::uint16_t>(k + 1), ns,
-          CdrWriter().header(ns).text("png").blob(read_file(data() / image_name(k, pair))).bytes());
-    bag.close_chunk();  // never finished: as a recorder that was killed leaves it
+  for (const BagKind& kind : {BagKind{"mcap", "zstd"}, BagKind{"rosbag", "bz2"}}) {
+    const auto bag = kind.writer();
+    bag->channel(1, "/left/image_raw/compressed", "sensor_msgs/CompressedImage");
+    bag->channel(2, "/right/image_raw/compressed", "sensor_msgs/CompressedImage");
+    std::ifstream times(data() / "times.txt");
+    std::size_t pair = 0;
+    for (std::int64_t ns = 0; times >> ns; ++pair) {
+      for (int k = 0; k < 2; ++k)
+        bag->message(
+            static_cast<std::uint16_t>(k + 1), ns,
+            compressed_message(kind.wire(), ns, "png", read_file(data() / image_name(k, pair))));
+      bag->close_chunk();  // never finished: as a recorder that was killed leaves it
+    }
+    ASSERT_EQ(pair, kFrames);
+    const std::string name = "drive" + kind.ending();
+    const fs::path file = work_.write(name, bag->bytes());
+    const fs::path other = work_ / ("of_" + name);
+    const Outcome o =
+        run_vergence("replay '" + file.string() + "' --out '" + other.string() +
+                     "' --calibration '" + (data() / "calibration.yaml").string() + "'");
+    ASSERT_EQ(o.code, 0) << o.err;
+    EXPECT_NE(o.err.find(name + " is unfinished"), std::string::npos) << o.err;
+    EXPECT_EQ(read_file(other / "trajectory.tum"), poses);
   }
-  ASSERT_EQ(pair, kFrames);
-  const fs::path file = work_.write("drive.mcap", bag.bytes());
-  const fs::path other = work_ / "of_bag";
-  const Outcome o =
-      run_vergence("replay '" + file.string() + "' --out '" + other.string() + "' --calibration '" +
-                   (data() / "calibration.yaml").string() + "'");
-  ASSERT_EQ(o.code, 0) << o.err;
-  EXPECT_NE(o.err.find("drive.mcap is unfinished"), std::string::npos) << o.err;
-  EXPECT_EQ(read_file(other / "trajectory.tum"), poses);
 }
 
 TEST_F(ReplayedFolder, givesASessionWithAPoseForEveryFrame) {
