@@ -1,6 +1,8 @@
 #include <bzlib.h>
 #include <lz4frame.h>
 
+#include <algorithm>
+
 #include "tests/support/bag_writer.hpp"
 
 namespace vergence::test {
@@ -79,6 +81,8 @@ void RosbagWriter::channel(std::uint16_t id, std::string_view topic, std::string
 }
 
 void RosbagWriter::message(std::uint16_t channel, std::int64_t log_time, std::string_view content) {
+  first_ = entries_.empty() ? log_time : std::min(first_, log_time);
+  last_ = entries_.empty() ? log_time : std::max(last_, log_time);
   const std::string time = time_of(log_time);
   entries_[channel].push_back({time, chunk_.size()});
   chunk_ += record_of({{"op", op(2)}, {"conn", number(channel, 4)}, {"time", time}}, content);
@@ -89,7 +93,7 @@ void RosbagWriter::close_chunk() {
   const std::size_t here = file_.size();
   record({{"op", op(5)}, {"compression", compression_}, {"size", number(chunk_.size(), 4)}},
          packed(compression_, chunk_));
-  std::string counts, first(8, '\0'), last(8, '\0');
+  std::string counts;
   for (const auto& [channel, entries] : entries_) {
     std::string index;
     for (const Entry& entry : entries) index += entry.time + number(entry.offset, 4);
@@ -99,14 +103,12 @@ void RosbagWriter::close_chunk() {
             {"count", number(entries.size(), 4)}},
            index);
     counts += number(channel, 4) + number(entries.size(), 4);
-    first = entries.front().time;
-    last = entries.back().time;
   }
   chunk_infos_ += record_of({{"op", op(6)},
                              {"ver", number(1, 4)},
                              {"chunk_pos", number(here, 8)},
-                             {"start_time", first},
-                             {"end_time", last},
+                             {"start_time", time_of(first_)},
+                             {"end_time", time_of(last_)},
                              {"count", number(entries_.size(), 4)}},
                             counts);
   ++chunks_;

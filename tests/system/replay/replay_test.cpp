@@ -141,6 +141,53 @@ TEST_F(ReplayedFolder, aBagGivesThePosesOfTheSameImages) {
   }
 }
 
+// The INS of a bag goes through the same comparison as any other: readings in ins.csv, poses with
+// errors, a pause where the receiver has no fix.
+TEST_F(ReplayedFolder, aBagWithAnInsIsCompared) {
+  for (const BagKind& kind : {BagKind{"mcap", "lz4"}, BagKind{"rosbag", "lz4"}}) {
+    const auto bag = kind.writer();
+    bag->channel(1, "/left/image_raw/compressed", "sensor_msgs/CompressedImage");
+    bag->channel(2, "/right/image_raw/compressed", "sensor_msgs/CompressedImage");
+    bag->channel(3, "/fix", "sensor_msgs/NavSatFix");
+    bag->channel(4, "/imu", "sensor_msgs/Imu");
+    std::ifstream times(data() / "times.txt");
+    std::size_t pair = 0;
+    for (std::int64_t ns = 0; times >> ns; ++pair) {
+      for (int k = 0; k < 2; ++k)
+        bag->message(
+            static_cast<std::uint16_t>(k + 1), ns,
+            compressed_message(kind.wire(), ns, "png", read_file(data() / image_name(k, pair))));
+      // North along a meridian, 110.6 km a degree there: half a metre a frame.
+      const bool pause = pair >= 12 && pair < 18;
+      bag->message(3, ns,
+                   fix_message(kind.wire(), ns,
+                               {static_cast<std::int8_t>(pause ? -1 : 0),
+                                0.5 / 110'600 * static_cast<double>(pair), 153, 40, 0.01}));
+      bag->message(4, ns,
+                   imu_message(kind.wire(), ns, {0, 0, std::sqrt(0.5), std::sqrt(0.5)}, 1e-6));
+    }
+    bag->finish();
+    const fs::path file = work_.write("ins" + kind.ending(), bag->bytes());
+    const fs::path out = work_ / ("of_" + std::string(kind.container));
+    const Outcome o = run_vergence("replay '" + file.string() + "' --out '" + out.string() +
+                                   "' --calibration '" + (data() / "calibration.yaml").string() +
+                                   "' --ins-topic /fix --set ins.lever_arm_m=[1,0,0.5]");
+    ASSERT_EQ(o.code, 0) << o.err;
+    EXPECT_NE(o.err.find("the INS is /fix with the orientation of /imu"), std::string::npos)
+        << o.err;
+    EXPECT_NE(o.err.find("6 of 24 readings have no fix"), std::string::npos) << o.err;
+    EXPECT_NE(o.err.find("[1.000, 0.000, 0.500] m in the INS's body"), std::string::npos) << o.err;
+    EXPECT_NE(
+        read_file(out / "events.jsonl").find("the INS had no position: the comparison pauses"),
+        std::string::npos);
+    const std::string readings = read_file(out / "ins.csv");
+    EXPECT_EQ(std::count(readings.begin(), readings.end(), '\n'), 1 + static_cast<int>(kFrames));
+    const Outcome other = run_vergence("replay '" + file.string() + "' --out '" +
+                                       (work_ / "no").string() + "' --ins-topic /imu");
+    EXPECT_EQ(other.code, 2) << other.err;
+  }
+}
+
 TEST_F(ReplayedFolder, givesASessionWithAPoseForEveryFrame) {
   const Outcome o = replay();
   ASSERT_EQ(o.code, 0) << o.err;

@@ -85,7 +85,7 @@ class BagIns : public ::testing::TestWithParam<BagKind> {
   }
   [[nodiscard]] RecordedIns open(const BagTopics& topics = {}) {
     writer_->finish();
-    return *test::bag_in_memory(GetParam().is_mcap(), writer_->bytes(), topics).ins;
+    return *test::bag_in_memory(GetParam().is_mcap(), writer_->bytes(), true, topics).ins;
   }
   [[nodiscard]] static std::string all(const RecordedIns& ins) {
     std::string text;
