@@ -1,5 +1,7 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cmath>
 #include <filesystem>
 #include <fstream>
 #include <functional>
@@ -182,9 +184,23 @@ TEST_F(ReplayedFolder, aBagWithAnInsIsCompared) {
         std::string::npos);
     const std::string readings = read_file(out / "ins.csv");
     EXPECT_EQ(std::count(readings.begin(), readings.end(), '\n'), 1 + static_cast<int>(kFrames));
-    const Outcome other = run_vergence("replay '" + file.string() + "' --out '" +
-                                       (work_ / "no").string() + "' --ins-topic /imu");
-    EXPECT_EQ(other.code, 2) << other.err;
+    const std::string no = "' --out '" + (work_ / "no").string() + "' ";
+    Outcome refused = run_vergence("replay '" + file.string() + no + "--ins-topic /imu");
+    EXPECT_EQ(refused.code, 2) << refused.err;
+    EXPECT_NE(refused.err.find("of NavSatFix are /fix"), std::string::npos) << refused.err;
+    refused = run_vergence("calibrate --drive '" + file.string() + no + "--left-topic /nowhere");
+    EXPECT_EQ(refused.code, 2) << refused.err;
+    EXPECT_NE(refused.err.find("has no image on /nowhere"), std::string::npos) << refused.err;
+    refused = run_vergence("calibrate --drive '" + data().string() + no + "--right-topic /right");
+    EXPECT_EQ(refused.code, 2) << refused.err;
+    EXPECT_NE(refused.err.find("topics are chosen of bags"), std::string::npos) << refused.err;
+    refused = run_vergence("calibrate --drive '" + file.string() + no + "--calibration '" +
+                           (data() / "calibration.yaml").string() +
+                           "' --left-topic /left/image_raw/compressed "
+                           "--right-topic /right/image_raw/compressed --quiet");
+    EXPECT_EQ(refused.code, 1) << refused.err;
+    EXPECT_NE(refused.err.find("no calibration was found"), std::string::npos)
+        << "24 frames are too few: " << refused.err;
   }
 }
 
