@@ -21,15 +21,18 @@ ExitCode calibrate_from_drive(const CalibrateOptions& a) {
   check_writable(a.out, a.force);
   const Configuration c = a.common.configuration(std::nullopt);
   const SequenceFormat format = sequence_format(a.format.empty() ? "auto" : a.format, a.drive);
+  const BagTopics topics{a.left_topic, a.right_topic, "", ""};
+  check_topics(format, topics);
   const CalibrationUse use{true, a.baseline.value_or(0)};
   std::vector<std::string> remarks;
   // Of what the drive comes with only lenses and length are read: how its cameras sit need not be
   // known.
   const std::array cameras{c.kitti_raw.left, c.kitti_raw.right};
   const StereoSequence sequence =
-      a.calibration ? open_sequence(format, a.drive,
-                                    given_calibration(*a.calibration, use, &remarks), use, cameras)
-                    : open_sequence(format, a.drive, std::nullopt, use, cameras);
+      a.calibration
+          ? open_sequence(format, a.drive, given_calibration(*a.calibration, use, &remarks), use,
+                          cameras, topics)
+          : open_sequence(format, a.drive, std::nullopt, use, cameras, topics);
   for (const std::string& sentence : remarks) std::cerr << "vergence: " << sentence << '\n';
   check_image_sizes(sequence, 0, sequence.pairs.size());
   const StartingCalibration given = replayed_calibration(c, sequence, true);

@@ -31,30 +31,39 @@ SequenceFormat sequence_format(const std::string& word, const std::filesystem::p
   constexpr const char* kLayouts =
       "KITTI (image_0, image_1, calib.txt, times.txt), KITTI raw (image_00, image_01, calib_*.txt "
       "above), EuRoC (mav0), plain (left, "
-      "right, times.txt, calibration.yaml), UQ St Lucia and ROS 2 bags (.mcap) are what can be "
-      "read";
+      "right, times.txt, calibration.yaml), UQ St Lucia and bags of ROS 2 (.mcap) and ROS 1 (.bag) "
+      "are what can be read";
   if (word == "kitti") return SequenceFormat::kitti;
   if (word == "kitti-raw") return SequenceFormat::kitti_raw;
   if (word == "euroc") return SequenceFormat::euroc;
   if (word == "folder") return SequenceFormat::folder;
   if (word == "st-lucia") return SequenceFormat::st_lucia;
   if (word == "mcap") return SequenceFormat::mcap;
+  if (word == "rosbag") return SequenceFormat::rosbag;
   if (word == "session")
     throw InputError(
         "--format session is not there yet in this version; kitti, kitti-raw, euroc, folder, "
-        "st-lucia and mcap are");
+        "st-lucia, mcap and rosbag are");
   if (word != "auto")
     throw InputError("--format \"" + word + "\" is not known" +
                      did_you_mean(word, {"auto", "kitti", "kitti-raw", "euroc", "folder",
-                                         "st-lucia", "mcap", "session"}) +
-                     "; kitti, kitti-raw, euroc, folder, st-lucia and mcap are what can be read, "
-                     "and auto finds out which it is");
+                                         "st-lucia", "mcap", "rosbag", "session"}) +
+                     "; kitti, kitti-raw, euroc, folder, st-lucia, mcap and rosbag are what can be "
+                     "read, and auto finds out which it is");
   std::error_code ignored;
-  if (folder.extension() == ".mcap") return SequenceFormat::mcap;
+  if (const auto bag = bag_format(folder); bag && !std::filesystem::is_directory(folder, ignored))
+    return *bag;
   if (!std::filesystem::is_directory(folder, ignored))
     throw InputError(folder.string() + ": is no folder; a folder with a drive is expected");
   if (const auto found = find_format(folder)) return *found;
   throw InputError(folder.string() + ": holds no drive that is known: " + kLayouts);
+}
+
+void check_topics(SequenceFormat format, const BagTopics& topics) {
+  if (!is_bag(format) && !topics.empty())
+    throw InputError(
+        "topics are chosen of bags (--format mcap or rosbag); leave --left-topic, --right-topic, "
+        "--ins-topic and --imu-topic away");
 }
 
 namespace {
@@ -94,8 +103,7 @@ ReplayRequest request_of(const Arguments& a) {
   r.data = a.data;
   r.format = sequence_format(a.format, r.data);
   r.topics = a.topics;
-  if (r.format != SequenceFormat::mcap && !(a.topics.left + a.topics.right).empty())
-    throw InputError("--left-topic and --right-topic are of ROS 2 bags (--format mcap)");
+  check_topics(r.format, r.topics);
   r.known = known_numbers(a);
   if (a.calibrate_first && a.from_scratch)
     throw InputError(
@@ -121,11 +129,13 @@ void add_replay(CLI::App& root, ExitCode* exit_code) {
   const auto a = std::make_shared<Arguments>();
   CLI::App* command = root.add_subcommand(
       "replay", "Run a recorded drive through the estimator and write a session folder");
-  command->add_option("DATA", a->data, "Folder of the data set, or a .mcap file")->required();
+  command->add_option("DATA", a->data, "Folder of the data set, or a .mcap or .bag file")
+      ->required();
   command
-      ->add_option(
-          "--format", a->format,
-          "Layout of DATA: kitti, kitti-raw, euroc, folder, st-lucia, mcap; auto: by what is in it")
+      ->add_option("--format", a->format,
+                   "Layout of DATA: kitti, kitti-raw, euroc, folder, st-lucia, mcap, rosbag; auto: "
+                   "by what is "
+                   "in it")
       ->type_name("NAME")
       ->capture_default_str();
   command->add_option("--out", a->out, "Session folder; must not exist or be empty")
@@ -136,11 +146,14 @@ void add_replay(CLI::App& root, ExitCode* exit_code) {
           "--calibration", a->calibration,
           "calibration.yaml, or a file of Kalibr, ROS or OpenCV, instead of the data set's own")
       ->type_name("FILE");
+  declare_image_topics(*command, &a->topics.left, &a->topics.right);
   command
-      ->add_option("--left-topic", a->topics.left,
-                   "Of a bag: topic of the left images, where names do not say")
+      ->add_option("--ins-topic", a->topics.ins,
+                   "Of a bag: topic of the INS, NavSatFix or Odometry, where types do not tell")
       ->type_name("TOPIC");
-  command->add_option("--right-topic", a->topics.right, "Of a bag: topic of the right images")
+  command
+      ->add_option("--imu-topic", a->topics.imu,
+                   "Of a bag: topic of the Imu whose orientation goes with the NavSatFix")
       ->type_name("TOPIC");
   command->add_option("--start", a->start, "First frame, from 0")->type_name("K");
   command->add_option("--frames", a->frames, "At most so many frames")->type_name("N");

@@ -35,6 +35,8 @@ struct ReplayRequest {
 /// A word of --format, or with `auto` what `folder` holds. InputError: none that is known.
 [[nodiscard]] SequenceFormat sequence_format(const std::string& word,
                                              const std::filesystem::path& folder);
+/// InputError: topics are named, and the format is none of a bag.
+void check_topics(SequenceFormat format, const BagTopics& topics);
 
 /// Reads a recorded drive, estimates a pose for every frame, writes the session folder of DESIGN §6
 /// and the figures against the data set's truth.
