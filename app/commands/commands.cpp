@@ -9,6 +9,7 @@ void add_all_commands(CLI::App& root, const ProgramWords& words, ExitCode* exit_
   add_replay(root, exit_code);
   add_evaluate(root, exit_code);
   add_report(root, exit_code);
+  add_export(root, exit_code);
   add_simulate(root, exit_code);
   add_devices(root, exit_code);
   add_doctor(root, exit_code);

@@ -14,6 +14,7 @@ void add_calibrate(CLI::App& root, const ProgramWords& words, ExitCode* exit_cod
 void add_devices(CLI::App& root, ExitCode* exit_code);
 void add_doctor(CLI::App& root, ExitCode* exit_code);
 void add_evaluate(CLI::App& root, ExitCode* exit_code);
+void add_export(CLI::App& root, ExitCode* exit_code);
 void add_replay(CLI::App& root, ExitCode* exit_code);
 void add_report(CLI::App& root, ExitCode* exit_code);
 void add_run(CLI::App& root, ExitCode* exit_code);

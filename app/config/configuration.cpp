@@ -262,8 +262,28 @@ std::vector<Entry> with_options_as_text(const std::vector<Entry>& entries) {
   return out;
 }
 
+/// `record: [poses, images]` switches its words on.
+std::vector<Entry> with_record_as_switches(std::vector<Entry> entries) {
+  constexpr std::string_view kGroup = "record.";
+  for (Entry& entry : entries) {
+    const bool item =
+        entry.name.starts_with(kGroup) && entry.name.size() > kGroup.size() &&
+        entry.name.find_first_not_of("0123456789", kGroup.size()) == std::string::npos;
+    if (!item) continue;
+    const std::vector<std::string> words{"poses", "ins", "images"};
+    if (!entry.scalar || std::find(words.begin(), words.end(), entry.value) == words.end())
+      throw InputError(fmt::format("{}: record lists \"{}\"{}; it takes {}", entry.origin,
+                                   entry.value.substr(0, 60), did_you_mean(entry.value, words),
+                                   fmt::join(words, ", ")));
+    entry.name = std::string(kGroup) + entry.value;
+    entry.value = "on";
+  }
+  return entries;
+}
+
 Configuration from_entries(const std::vector<Entry>& given, const std::string& name) {
-  const std::vector<Entry> entries = with_options_as_text(with_faults_as_text(given));
+  const std::vector<Entry> entries =
+      with_record_as_switches(with_options_as_text(with_faults_as_text(given)));
   Configuration configuration;
   for (const Entry& entry : entries) apply(entry, &configuration);
   if (const std::string sentence = find_contradiction(configuration); !sentence.empty())

@@ -127,6 +127,17 @@ struct MockSettings {
   CalibrationErrorSettings calibration_error{};
 };
 
+/// `record:` what goes into drive.mcap of a session (docs/recording.md).
+struct RecordSettings {
+  int poses = 0, ins = 0, images = 0;  // 1: recorded
+  double keep_s = 0;                   // 0: everything
+  int roll_mb = 0;                     // 0: one file
+  double roll_s = 0;                   // 0: one file
+  int memory_mb = 0;                   // 0: as much as six seconds take, and keep_s
+
+  [[nodiscard]] bool any() const noexcept { return poses + ins + images > 0; }
+};
+
 inline constexpr std::size_t kMostFaults = 16;
 
 /// Everything a user may change, with its defaults. Each member is bound to a row of the schema
@@ -141,6 +152,7 @@ struct Configuration {
   ComparisonSettings comparison{};
   KittiRawSettings kitti_raw{};
   MockSettings mock{};
+  RecordSettings record{};
   std::array<std::string, kMostFaults> faults{};  // `KIND@SECONDS NAME=NUMBER …`; empty: none
   OdometryOptions odometry{};
   calibration::CalibrationOptions calibration{};

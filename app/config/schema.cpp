@@ -665,6 +665,31 @@ Group monitor() {
       .done();
 }
 
+Group record() {
+  using R = RecordSettings;
+  const std::vector<std::string> off_on{"off", "on"};
+  return Rows<R>(
+             "record",
+             "What is recorded into `drive.mcap` of the session (docs/recording.md). A list, "
+             "`record: [poses, ins, images]`, switches its words on.",
+             [](auto& c) -> auto& { return c.record; })
+      .choice("poses", &R::poses, off_on, "Odometry, transforms and diagnostics of every frame.")
+      .choice("ins", &R::ins, off_on, "Readings of the INS.")
+      .choice("images", &R::images, off_on,
+              "All images that the estimator was given, not packed, with their cameras: what "
+              "`replay --format session` needs.")
+      .number("keep_s", &R::keep_s, 0, 3600, "s",
+              "0: everything; else only what was so long before an event and so long after it.")
+      .integer("roll_mb", &R::roll_mb, 0, 10'000'000, "MB",
+               "A file is ended when it has so many, and the next one begun; 0: by size never.")
+      .number("roll_s", &R::roll_s, 0, 86400, "s",
+              "A file is ended when it spans so long; 0: by time never.")
+      .integer("memory_mb", &R::memory_mb, 0, 1'000'000, "MB",
+               "What may wait for the disk, or for an event; 0: as much as six seconds take, and "
+               "`keep_s`.")
+      .done();
+}
+
 }  // namespace
 
 const std::vector<Group>& schema() {
@@ -672,7 +697,7 @@ const std::vector<Group>& schema() {
                                          exposure(), ins(),        trigger(),
                                          sync(),     odometry(),   calibration_options(),
                                          monitor(),  comparison(), kitti_raw(),
-                                         mock(),     faults()};
+                                         mock(),     record(),     faults()};
   return groups;
 }
 

@@ -1,5 +1,7 @@
 #include "app/recording/messages.hpp"
 
+#include <libdeflate.h>
+
 #include <algorithm>
 
 namespace vergence::app {
@@ -16,6 +18,12 @@ void put_quaternion(CdrWriter* out, const Mat3& R) noexcept {
 
 void put_matrix(CdrWriter* out, const Mat3& M) noexcept {
   for (int i = 0; i < 9; ++i) out->put(M(i / 3, i % 3));
+}
+
+/// Of all that was written so far.
+void put_crc(CdrWriter* out) noexcept {
+  const auto bytes = out->written();
+  out->put(crc32_of(bytes));
 }
 
 /// What rectifies a pair: x along the baseline, z between the optical axes. R maps from a camera
@@ -68,6 +76,10 @@ void put_diagnostic(CdrWriter* out, const Diagnostic& d) noexcept {
 }
 
 }  // namespace
+
+std::uint32_t crc32_of(std::span<const std::uint8_t> bytes) noexcept {
+  return libdeflate_crc32(0, bytes.data(), bytes.size());
+}
 
 void write_image(CdrWriter* out, Stamp stamp, std::string_view frame,
                  const ImageView& image) noexcept {
@@ -137,6 +149,7 @@ void write_ins_reading(CdrWriter* out, const InsSample& s, const InsQuality& q) 
   out->put(s.tilt_sigma).put(s.heading_sigma);
   out->put(q.status).boolean(q.utc_valid).put(q.utc_ns).put(q.satellites).put(q.position_dop);
   out->boolean(q.filter_valid).boolean(q.sync_out);
+  put_crc(out);
 }
 
 void write_odometry(CdrWriter* out, const PoseSample& sample) noexcept {
@@ -186,15 +199,16 @@ void write_bytes(CdrWriter* out, std::span<const std::uint8_t> bytes) noexcept {
 
 void write_frame(CdrWriter* out, const FrameRecord& f) noexcept {
   out->header(f.stamp, "left").put(f.number).put(f.stamp.ns()).put(f.stamp_error.ns());
-  out->put(f.spread.ns()).put(static_cast<std::uint8_t>(f.cameras));
-  out->put(f.images_present).put(f.images_recorded).boolean(f.recalibration_requested);
-  out->boolean(f.pairing_contradicted).boolean(f.solver_done);
+  out->put(f.spread.ns()).put(f.pairing).put(static_cast<std::uint8_t>(f.cameras));
+  out->put(f.images_present).put(f.images_recorded).count(f.image_crc.size()).items(f.image_crc);
+  out->boolean(f.recalibration_requested).boolean(f.solver_done);
   const PoseSample& s = f.sample;
   out->put(static_cast<std::uint8_t>(s.state)).put(static_cast<std::uint8_t>(s.status));
   out->put(static_cast<std::uint8_t>(s.reason));
   put_vector(out, s.T_world_left.t);
   put_quaternion(out, s.T_world_left.R);
   out->put(static_cast<std::int32_t>(s.inliers)).put(s.reprojection_px).put(s.estimate_ms);
+  put_crc(out);
 }
 
 void write_pulse(CdrWriter* out, Stamp stamp, const Pulse& pulse) noexcept {

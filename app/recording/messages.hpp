@@ -21,6 +21,9 @@ namespace vergence::app {
 /// Bytes that a message takes at most, but for its texts and data.
 inline constexpr std::size_t kMessageRoom = 1024;
 
+/// CRC-32 as zip has it.
+[[nodiscard]] std::uint32_t crc32_of(std::span<const std::uint8_t> bytes) noexcept;
+
 /// sensor_msgs/Image, mono8, rows without padding.
 void write_image(CdrWriter* out, Stamp stamp, std::string_view frame,
                  const ImageView& image) noexcept;
@@ -78,11 +81,12 @@ struct FrameRecord {
   Stamp stamp{};
   Duration stamp_error{}, spread{};
   int cameras = 0;
-  std::uint8_t images_present = 0;       // mask by camera: the estimator had one
-  std::uint8_t images_recorded = 0;      // mask by camera: it is in the recording
-  bool recalibration_requested = false;  // before this frame
-  bool pairing_contradicted = false;     // the status was lowered for it
-  bool solver_done = false;              // the calibration solver answered at this frame
+  std::uint8_t pairing = 0;                            // as a Pairing
+  std::uint8_t images_present = 0;                     // mask by camera: the estimator had one
+  std::uint8_t images_recorded = 0;                    // mask by camera: it is in the recording
+  std::array<std::uint32_t, kMaxCameras> image_crc{};  // CRC-32 of their pixels
+  bool recalibration_requested = false;                // before this frame
+  bool solver_done = false;  // the calibration solver answered at this frame
   PoseSample sample{};
 };
 void write_frame(CdrWriter* out, const FrameRecord& frame) noexcept;

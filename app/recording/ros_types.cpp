@@ -41,14 +41,14 @@ constexpr std::array kDefinitions{
     Definition{"std_msgs/String", "string data\n"},
     Definition{"std_msgs/UInt8MultiArray", "std_msgs/MultiArrayLayout layout\nuint8[] data\n"},
     // What one call of the estimator was given and what came of it: all that a replay needs beside
-    // the images.
+    // the images. `crc` is the CRC-32 of the message's bytes before it, `image_crc` that of pixels.
     Definition{"vergence_msgs/Frame",
                "std_msgs/Header header\nuint64 number\nint64 stamp_ns\nint64 stamp_error_ns\n"
-               "int64 spread_ns\nuint8 cameras\nuint8 images_present\nuint8 images_recorded\n"
-               "bool recalibration_requested\nbool pairing_contradicted\nbool solver_done\n"
-               "uint8 state\nuint8 status\nuint8 reason\n"
+               "int64 spread_ns\nuint8 pairing\nuint8 cameras\nuint8 images_present\n"
+               "uint8 images_recorded\nuint32[] image_crc\nbool recalibration_requested\n"
+               "bool solver_done\nuint8 state\nuint8 status\nuint8 reason\n"
                "geometry_msgs/Pose pose\nint32 inliers\nfloat64 reprojection_px\n"
-               "float32 estimate_ms\n"},
+               "float32 estimate_ms\nuint32 crc\n"},
     // A reading of the INS on the host's clock. Body forward, left, up; axes east, north, up.
     Definition{"vergence_msgs/InsReading",
                "std_msgs/Header header\nuint64 number\nint64 stamp_ns\nint64 stamp_error_ns\n"
@@ -57,7 +57,7 @@ constexpr std::array kDefinitions{
                "float64[4] q_enu_ins\nfloat64 position_sigma\nfloat64 height_sigma\n"
                "float64 velocity_sigma\nfloat64 tilt_sigma\nfloat64 heading_sigma\n"
                "uint32 device_status\nbool utc_valid\nint64 utc_ns\nuint8 satellites\n"
-               "float32 position_dop\nbool filter_valid\nbool sync_out\n"},
+               "float32 position_dop\nbool filter_valid\nbool sync_out\nuint32 crc\n"},
     Definition{"vergence_msgs/Pulse",
                "std_msgs/Header header\nuint64 number\nuint32 boot\nint64 edge_device_ns\n"
                "int64 arrival_host_ns\nbool resumed\nuint8 exposures_seen\n"

@@ -1,0 +1,92 @@
+#include <array>
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "app/commands/commands.hpp"
+#include "app/config/calibration_file.hpp"
+#include "app/datasets/session_export.hpp"
+#include "app/recorder/recorder.hpp"
+#include "app/runtime/progress.hpp"
+
+namespace vergence::app {
+namespace {
+
+constexpr std::array<std::pair<const char*, ExportFormat>, 3> kFormats{
+    {{"folder", ExportFormat::folder},
+     {"euroc", ExportFormat::euroc},
+     {"kitti", ExportFormat::kitti}}};
+
+struct Arguments {
+  std::string session, format, out;
+  std::optional<std::string> calibration;
+  bool quiet = false;
+};
+
+/// Of a mock the truth; else the reference that the drive was compared with.
+Trajectory truth_of(const std::filesystem::path& session) {
+  std::error_code ignored;
+  for (const char* name : {"truth.tum", "reference.tum"})
+    if (std::filesystem::exists(session / name, ignored)) return read_tum(session / name);
+  return {};
+}
+
+ExitCode run_export(const Arguments& a) {
+  const RecordedSession session = RecordedSession::open(a.session);
+  ExportRequest request;
+  for (const auto& [word, format] : kFormats)
+    if (a.format == word) request.format = format;
+  request.out = a.out;
+  request.calibration = a.calibration
+                            ? read_calibration(*a.calibration)
+                            : parse_calibration(session.description().calibration, a.session);
+  request.truth = truth_of(a.session);
+  make_session_folder(request.out);
+  Progress progress = Progress::on_stderr(a.quiet);
+  const ExportResult result = export_session(session, request, [&](std::size_t done) {
+    ProgressState state;
+    state.state = "export";
+    state.frame = done;
+    state.frames = session.frames().size();
+    state.words = "images as PNG";
+    progress.update(state);
+  });
+  progress.finish();
+  for (const std::string& sentence : result.remarks) progress.say("vergence: " + sentence);
+  if (result.left_out > 0)
+    progress.say(
+        fmt::format("vergence: {} frames without both images were left out", result.left_out));
+  if (!a.quiet)
+    progress.say(fmt::format("{}: {} frames; next: vergence replay {} --format {} --out DIR", a.out,
+                             result.frames, a.out, a.format));
+  return ExitCode::done;
+}
+
+}  // namespace
+
+void add_export(CLI::App& root, ExitCode* exit_code) {
+  const auto a = std::make_shared<Arguments>();
+  CLI::App* command = root.add_subcommand(
+      "export", "Write a recorded session's images and truth for other programs");
+  command->add_option("SESSION", a->session, "Session folder with drive.mcap (docs/recording.md)")
+      ->required();
+  command->add_option("--format", a->format, "Layout: euroc, kitti (rectified rigs only), folder")
+      ->required()
+      ->check(CLI::IsMember({"euroc", "kitti", "folder"}))
+      ->type_name("NAME");
+  command->add_option("--out", a->out, "Folder; must not exist or be empty")
+      ->required()
+      ->type_name("DIR");
+  command
+      ->add_option("--calibration", a->calibration,
+                   "calibration.yaml that goes with the images, instead of the one that the drive "
+                   "began with; SESSION/calibration.yaml is the one it ended with")
+      ->type_name("FILE");
+  command->add_flag("--quiet", a->quiet, "Say only what goes wrong");
+  command->callback([a, exit_code] { *exit_code = run_export(*a); });
+}
+
+}  // namespace vergence::app

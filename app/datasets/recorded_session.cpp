@@ -1,0 +1,254 @@
+#include "app/datasets/recorded_session.hpp"
+
+#include <algorithm>
+#include <cstring>
+#include <map>
+#include <system_error>
+
+#include <fmt/format.h>
+
+#include "app/datasets/detail/bag_index.hpp"
+#include "app/datasets/detail/ros_reader.hpp"
+#include "app/datasets/text_file.hpp"
+#include "app/runtime/version.hpp"
+
+namespace vergence::app {
+namespace {
+
+namespace fs = std::filesystem;
+using detail::RosReader;
+
+constexpr std::size_t kMostSmall = 65536;                       // bytes of a message that is none
+                                                                // of images
+constexpr std::size_t kMostDescription = std::size_t{4} << 20;  // bytes
+constexpr std::size_t kMostFrames = 4'000'000;                  // 37 hours at 30 Hz
+
+/// The bytes of a message; empty: too many, or they cannot be read.
+std::vector<std::uint8_t> content(const detail::BagMessage& m, std::size_t most) {
+  std::vector<std::uint8_t> bytes;
+  if (m.place.size > most) return bytes;
+  bytes.resize(m.place.size);
+  if (!m.bytes->read(m.place.offset, bytes)) bytes.clear();
+  return bytes;
+}
+
+/// The check sum that ends a message is that of what stands before it.
+bool check(std::span<const std::uint8_t> bytes, RosReader* in) {
+  const std::size_t end = in->position();
+  const auto crc = in->get<std::uint32_t>();
+  return in->ok() && crc == crc32_of(bytes.first(end));
+}
+
+std::optional<FrameRecord> read_frame(std::span<const std::uint8_t> bytes) {
+  RosReader in(bytes, detail::MessageEncoding::cdr);
+  (void)in.header();
+  FrameRecord f;
+  f.number = in.get<std::uint64_t>();
+  f.stamp = Stamp(in.get<std::int64_t>());
+  f.stamp_error = Duration::nanoseconds(in.get<std::int64_t>());
+  f.spread = Duration::nanoseconds(in.get<std::int64_t>());
+  f.pairing = in.get<std::uint8_t>();
+  f.cameras = in.get<std::uint8_t>();
+  f.images_present = in.get<std::uint8_t>();
+  f.images_recorded = in.get<std::uint8_t>();
+  if (in.get<std::uint32_t>() != f.image_crc.size()) return std::nullopt;
+  for (std::uint32_t& crc : f.image_crc) crc = in.get<std::uint32_t>();
+  f.recalibration_requested = in.get<std::uint8_t>() != 0;
+  f.solver_done = in.get<std::uint8_t>() != 0;
+  for (int i = 0; i < 3; ++i) (void)in.get<std::uint8_t>();  // state, status, reason
+  (void)in.doubles<7>();                                     // the pose
+  (void)in.get<std::int32_t>();
+  (void)in.get<double>();
+  (void)in.get<float>();
+  if (!check(bytes, &in) || f.cameras < 2 || f.cameras > kMaxCameras) return std::nullopt;
+  return f;
+}
+
+std::optional<RecordedReading> read_reading(std::span<const std::uint8_t> bytes) {
+  RosReader in(bytes, detail::MessageEncoding::cdr);
+  (void)in.header();
+  RecordedReading r;
+  InsSample& s = r.sample;
+  InsQuality& q = r.quality;
+  s.number = in.get<std::uint64_t>();
+  s.stamp = Stamp(in.get<std::int64_t>());
+  s.stamp_error = Duration::nanoseconds(in.get<std::int64_t>());
+  const auto fix = in.get<std::uint8_t>();
+  s.attitude_valid = in.get<std::uint8_t>() != 0;
+  s.velocity_valid = in.get<std::uint8_t>() != 0;
+  s.position = {in.get<double>(), in.get<double>(), in.get<double>()};
+  s.velocity_enu = in.doubles<3>();
+  s.q_enu_ins = in.doubles<4>();
+  for (double* sigma :
+       {&s.position_sigma, &s.height_sigma, &s.velocity_sigma, &s.tilt_sigma, &s.heading_sigma})
+    *sigma = in.get<double>();
+  q.status = in.get<std::uint32_t>();
+  q.utc_valid = in.get<std::uint8_t>() != 0;
+  q.utc_ns = in.get<std::int64_t>();
+  q.satellites = in.get<std::uint8_t>();
+  q.position_dop = in.get<float>();
+  q.filter_valid = in.get<std::uint8_t>() != 0;
+  q.sync_out = in.get<std::uint8_t>() != 0;
+  if (!check(bytes, &in) || fix > static_cast<std::uint8_t>(FixStatus::fix_3d)) return std::nullopt;
+  s.fix = static_cast<FixStatus>(fix);
+  return r;
+}
+
+}  // namespace
+
+struct RecordedSession::Files {
+  std::vector<detail::BagFile> list;
+};
+
+/// What a scan gathers.
+struct RecordedSession::Reader {
+  RecordedSession* session;
+  const fs::path& folder;
+  std::map<std::string, std::size_t> cameras{};  // topics of images
+  bool described = false;
+  std::array<RecordedImage, kMaxCameras> newest{};  // not yet of a frame
+  std::array<Stamp, kMaxCameras> newest_stamp{};
+  std::size_t broken = 0, images_lost = 0;
+
+  void take(const detail::BagMessage& m, std::uint32_t file) {
+    const std::string& type = m.channel->type;
+    if (m.channel->topic == SessionDescription::kTopic) return take_description(m);
+    if (type == "sensor_msgs/Image") return take_image(m, file);
+    if (type == "vergence_msgs/Frame") return take_frame(m);
+    if (type == "vergence_msgs/InsReading") return take_reading(m);
+  }
+
+  void take_description(const detail::BagMessage& m) {
+    if (described) return;
+    const auto bytes = content(m, kMostDescription);
+    RosReader in(bytes, detail::MessageEncoding::cdr);
+    const std::string json = in.text();
+    if (!in.ok()) refuse(folder, 0, "has a recording whose description is damaged");
+    session->description_ = parse_session_description(json, folder.string());
+    const auto& topics = session->description_.cameras;
+    if (topics.size() < 2 || topics.size() > kMaxCameras)
+      refuse(folder, 0, "has a recording whose description names no cameras");
+    for (std::size_t k = 0; k < topics.size(); ++k) cameras[topics[k]] = k;
+    described = true;
+  }
+
+  void take_image(const detail::BagMessage& m, std::uint32_t file) {
+    const auto camera = cameras.find(m.channel->topic);
+    if (camera == cameras.end() || m.place.chunk != detail::BagPlace::kNoChunk) return;
+    std::array<std::uint8_t, 256> head{};
+    const auto bytes = std::span(head).first(std::min<std::size_t>(head.size(), m.place.size));
+    if (!m.bytes->read(m.place.offset, bytes)) return;
+    const auto image = detail::read_ros_image(bytes, m.place.size, detail::MessageEncoding::cdr);
+    if (!image || image->layout != detail::PixelLayout::grey ||
+        image->step != static_cast<std::uint32_t>(image->size.width))
+      return;
+    newest[camera->second] = {file, m.place.offset + image->offset, image->size.width,
+                              image->size.height};
+    newest_stamp[camera->second] = image->stamp;
+  }
+
+  void take_frame(const detail::BagMessage& m) {
+    const auto record = read_frame(content(m, kMostSmall));
+    if (!record) {
+      ++broken;
+      return;
+    }
+    if (session->frames_.size() == kMostFrames)
+      refuse(folder, 0, fmt::format("has a recording of more than {} frames", kMostFrames));
+    RecordedFrame frame{*record, {}, session->readings_.size()};
+    for (std::size_t k = 0; k < static_cast<std::size_t>(record->cameras); ++k) {
+      if ((record->images_present >> k & 1U) == 0) continue;
+      if (newest[k].offset != 0 && newest_stamp[k] == record->stamp)
+        frame.images[k] = newest[k];
+      else
+        ++images_lost;
+    }
+    newest = {};
+    session->frames_.push_back(frame);
+  }
+
+  void take_reading(const detail::BagMessage& m) {
+    const auto reading = read_reading(content(m, kMostSmall));
+    if (!reading) {
+      ++broken;
+      return;
+    }
+    if (session->readings_.size() == kMostReadings)
+      refuse(folder, 0, fmt::format("has a recording of more than {} readings", kMostReadings));
+    session->readings_.push_back(*reading);
+  }
+};
+
+RecordedSession::RecordedSession() : files_(std::make_unique<Files>()) {}
+RecordedSession::RecordedSession(RecordedSession&&) noexcept = default;
+RecordedSession::~RecordedSession() = default;
+
+RecordedSession RecordedSession::open(const fs::path& folder) {
+  RecordedSession session;
+  session.files_->list = detail::open_bag_files(detail::BagFormat::mcap, folder);
+  Reader reader{&session, folder};
+  for (std::size_t i = 0; i < session.files_->list.size(); ++i) {
+    const detail::BagFile& file = session.files_->list[i];
+    const auto scan = detail::scan_bag(
+        detail::BagFormat::mcap, *file.bytes,
+        [&](const detail::BagMessage& m) { reader.take(m, static_cast<std::uint32_t>(i)); });
+    if (!scan) {
+      session.remarks_.push_back(file.name + " does not begin as a recording and was left out");
+      session.complete_ = session.complete_ && i + 1 == session.files_->list.size();
+      continue;
+    }
+    if (!scan->finished)
+      session.remarks_.push_back(fmt::format(
+          "{} is unfinished: it was read up to offset {}, where its last whole record ends",
+          file.name, scan->end));
+    if (scan->first_broken)
+      session.remarks_.push_back(fmt::format(
+          "{}: {} chunks and {} records were left out; the first at offset {} is {}", file.name,
+          scan->broken_chunks, scan->broken_records, *scan->first_broken, scan->why_broken));
+    session.complete_ = session.complete_ && !scan->first_broken;
+  }
+  if (!reader.described)
+    refuse(folder, 0,
+           "holds no recording of a session: its .mcap files are another program's, which "
+           "--format mcap replays");
+  if (session.frames_.empty())
+    refuse(folder, 0,
+           "has a recording without frames; record: [images] records them (docs/recording.md)");
+  if (reader.broken > 0)
+    session.remarks_.push_back(fmt::format(
+        "{} frames or readings of the recording are damaged and were left out", reader.broken));
+  if (reader.images_lost > 0)
+    session.remarks_.push_back(
+        fmt::format("{} images that the drive had are not in the recording", reader.images_lost));
+  session.complete_ = session.complete_ && reader.broken == 0 && reader.images_lost == 0;
+  if (session.description_.program != version())
+    session.remarks_.push_back(
+        fmt::format("recorded by version {}, replayed by {}: poses may differ",
+                    session.description_.program, version()));
+  return session;
+}
+
+bool RecordedSession::read(const RecordedFrame& frame, std::size_t camera, std::uint8_t* out,
+                           std::size_t stride) const noexcept {
+  const RecordedImage& image = frame.images[camera];
+  if (image.offset == 0) return false;
+  const auto width = static_cast<std::size_t>(image.width);
+  const auto size = width * static_cast<std::size_t>(image.height);
+  const detail::ByteSource& file = *files_->list[image.file].bytes;
+  // In one piece, so that the check sum is one; then the rows move apart, the last one first.
+  if (!file.read(image.offset, {out, size})) return false;
+  if (crc32_of({out, size}) != frame.given.image_crc[camera]) return false;
+  if (stride != width)
+    for (std::size_t y = static_cast<std::size_t>(image.height); y-- > 0;)
+      std::memmove(out + y * stride, out + y * width, width);
+  return true;
+}
+
+bool holds_recorded_session(const fs::path& folder) {
+  std::error_code ignored;
+  return fs::exists(folder / "poses.csv", ignored) &&
+         (fs::exists(folder / "drive.mcap", ignored) ||
+          fs::exists(folder / "drive_0.mcap", ignored));
+}
+
+}  // namespace vergence::app

@@ -1,0 +1,240 @@
+#include "app/datasets/session_export.hpp"
+
+#include <array>
+#include <system_error>
+
+#include <fmt/format.h>
+
+#include "app/datasets/decimal.hpp"
+#include "app/datasets/image_writer.hpp"
+#include "app/datasets/reference_track.hpp"
+#include "app/datasets/text_file.hpp"
+#include "app/runtime/durable_file.hpp"
+#include "app/runtime/errors.hpp"
+
+namespace vergence::app {
+namespace {
+
+namespace fs = std::filesystem;
+
+void make_folder(const fs::path& folder) {
+  std::error_code error;
+  fs::create_directories(folder, error);
+  if (error) throw InputError(folder.string() + ": cannot be made (" + error.message() + ")");
+}
+
+std::string rows(const Transform& T) {
+  std::string out;
+  for (int r = 0; r < 3; ++r)
+    out += fmt::format("{}{} {} {} {}", r == 0 ? "" : " ", T.R(r, 0), T.R(r, 1), T.R(r, 2), T.t(r));
+  return out;
+}
+
+/// One layout: where images go, and what its text files hold.
+class Writer {
+ public:
+  virtual ~Writer() = default;
+  [[nodiscard]] virtual fs::path image(std::size_t index, Stamp stamp, std::size_t camera) = 0;
+  virtual void note(Stamp stamp) = 0;
+  /// Text files, when all images are there.
+  virtual void finish(const ReferenceTrack& truth, ExportResult* result) = 0;
+};
+
+class FolderWriter final : public Writer {
+ public:
+  explicit FolderWriter(const ExportRequest& request) : request_(request) {
+    for (const char* side : {"left", "right"}) make_folder(request.out / side);
+  }
+  fs::path image(std::size_t index, Stamp /*stamp*/, std::size_t camera) override {
+    return request_.out / (camera == 0 ? "left" : "right") / fmt::format("{:06}.png", index);
+  }
+  void note(Stamp stamp) override { times_ += fmt::format("{}\n", stamp.ns()); }
+  void finish(const ReferenceTrack& /*truth*/, ExportResult* /*result*/) override {
+    replace_durably(request_.out / "times.txt", times_);
+    write_calibration(request_.out / "calibration.yaml", request_.calibration);
+    std::string tum;
+    for (const StampedPose& pose : request_.truth) {
+      const Eigen::Quaterniond q = quaternion(pose.T_world_body.R);
+      const Vec3& t = pose.T_world_body.t;
+      tum += fmt::format("{} {:.9f} {:.9f} {:.9f} {:.9f} {:.9f} {:.9f} {:.9f}\n",
+                         format_seconds(pose.stamp.ns()), t.x(), t.y(), t.z(), q.x(), q.y(), q.z(),
+                         q.w());
+    }
+    if (!tum.empty()) replace_durably(request_.out / "truth.tum", tum);
+  }
+
+ private:
+  const ExportRequest& request_;
+  std::string times_;
+};
+
+class EurocWriter final : public Writer {
+ public:
+  explicit EurocWriter(const ExportRequest& request) : request_(request) {
+    for (const char* camera : {"cam0", "cam1"}) make_folder(root() / camera / "data");
+  }
+  fs::path image(std::size_t /*index*/, Stamp stamp, std::size_t camera) override {
+    return root() / (camera == 0 ? "cam0" : "cam1") / "data" / fmt::format("{}.png", stamp.ns());
+  }
+  void note(Stamp stamp) override {
+    index_ += fmt::format("{0},{0}.png\n", stamp.ns());
+    stamps_.push_back(stamp);
+  }
+  void finish(const ReferenceTrack& truth, ExportResult* /*result*/) override {
+    for (std::size_t k = 0; k < 2; ++k) {
+      const fs::path camera = root() / (k == 0 ? "cam0" : "cam1");
+      replace_durably(camera / "data.csv", "#timestamp [ns],filename\n" + index_);
+      replace_durably(camera / "sensor.yaml", sensor(k));
+    }
+    write_truth(truth);
+  }
+
+ private:
+  [[nodiscard]] fs::path root() const { return request_.out / "mav0"; }
+
+  [[nodiscard]] std::string sensor(std::size_t k) const {
+    const Intrinsics& lens = request_.calibration.rig.intrinsics[k];
+    const auto& d = lens.distortion;
+    const bool radtan = lens.kind == CameraModelKind::pinhole_radtan;
+    const Transform T_left_camera = request_.calibration.rig.T_camera_left[k].inverse();
+    const std::string coefficients =
+        fmt::format("{}, {}, {}, {}{}", d[0], d[1], d[2], d[3],
+                    radtan && d[4] != 0 ? fmt::format(", {}", d[4]) : "");
+    std::string matrix = rows(T_left_camera);
+    for (char& c : matrix)
+      if (c == ' ') c = ',';
+    return fmt::format(
+        "sensor_type: camera\ncomment: {} camera; the body is the left camera\nT_BS:\n  cols: 4\n"
+        "  rows: 4\n  data: [{},0,0,0,1]\nresolution: [{}, {}]\ncamera_model: pinhole\n"
+        "intrinsics: [{}, {}, {}, {}]\ndistortion_model: {}\ndistortion_coefficients: [{}]\n",
+        k == 0 ? "left" : "right", matrix, lens.width, lens.height, lens.fx, lens.fy, lens.cx,
+        lens.cy, radtan ? "radial-tangential" : "equidistant", coefficients);
+  }
+
+  void write_truth(const ReferenceTrack& truth) const {
+    std::string csv;
+    for (const Stamp stamp : stamps_) {
+      const auto T = truth.at(stamp);
+      if (!T) continue;
+      const Eigen::Quaterniond q = quaternion(T->R);
+      csv += fmt::format("{},{:.9f},{:.9f},{:.9f},{:.9f},{:.9f},{:.9f},{:.9f}\n", stamp.ns(),
+                         T->t.x(), T->t.y(), T->t.z(), q.w(), q.x(), q.y(), q.z());
+    }
+    if (csv.empty()) return;
+    const fs::path folder = root() / "state_groundtruth_estimate0";
+    make_folder(folder);
+    replace_durably(folder / "data.csv",
+                    "#timestamp,p_RS_R_x [m],p_RS_R_y [m],p_RS_R_z [m],q_RS_w [],q_RS_x [],q_RS_y "
+                    "[],q_RS_z []\n" +
+                        csv);
+  }
+
+  const ExportRequest& request_;
+  std::string index_;
+  std::vector<Stamp> stamps_;
+};
+
+class KittiWriter final : public Writer {
+ public:
+  explicit KittiWriter(const ExportRequest& request) : request_(request) {
+    const RigCalibration& rig = request.calibration.rig;
+    const Transform& T = rig.T_camera_left[1];
+    const Intrinsics &l = rig.intrinsics[0], &r = rig.intrinsics[1];
+    const bool aligned = T.R.isApprox(Mat3::Identity(), 1e-9) && std::abs(T.t.y()) < 1e-9 &&
+                         std::abs(T.t.z()) < 1e-9;
+    if (l.has_distortion() || r.has_distortion() || !aligned)
+      throw InputError(
+          "--format kitti has no place for distortion and turned cameras, which these images have; "
+          "euroc and folder do");
+    for (const char* camera : {"image_0", "image_1"}) make_folder(request.out / camera);
+  }
+  fs::path image(std::size_t index, Stamp /*stamp*/, std::size_t camera) override {
+    return request_.out / (camera == 0 ? "image_0" : "image_1") / fmt::format("{:06}.png", index);
+  }
+  void note(Stamp stamp) override { stamps_.push_back(stamp); }
+  void finish(const ReferenceTrack& truth, ExportResult* result) override {
+    std::string times, poses;
+    bool whole = true;
+    for (const Stamp stamp : stamps_) {
+      times += format_seconds((stamp - stamps_.front()).ns()) + "\n";
+      const auto T = truth.at(stamp);
+      whole = whole && T.has_value();
+      if (T) poses += rows(*T) + "\n";
+    }
+    replace_durably(request_.out / "times.txt", times);
+    replace_durably(request_.out / "calib.txt", calib());
+    if (whole)
+      replace_durably(request_.out / "poses.txt", poses);
+    else if (!request_.truth.empty())
+      result->remarks.push_back("poses.txt is not written: the truth does not have every frame");
+  }
+
+ private:
+  [[nodiscard]] std::string calib() const {
+    std::string text;
+    for (std::size_t k = 0; k < 2; ++k) {
+      const Intrinsics& i = request_.calibration.rig.intrinsics[k];
+      text += fmt::format("P{}: {} 0 {} {} 0 {} {} 0 0 0 1 0\n", k, i.fx, i.cx,
+                          i.fx * request_.calibration.rig.T_camera_left[k].t.x(), i.fy, i.cy);
+    }
+    return text;
+  }
+
+  const ExportRequest& request_;
+  std::vector<Stamp> stamps_;
+};
+
+std::unique_ptr<Writer> make_writer(const ExportRequest& request) {
+  switch (request.format) {
+    case ExportFormat::euroc:
+      return std::make_unique<EurocWriter>(request);
+    case ExportFormat::kitti:
+      return std::make_unique<KittiWriter>(request);
+    case ExportFormat::folder:
+      break;
+  }
+  return std::make_unique<FolderWriter>(request);
+}
+
+/// False: one of the pair is not there.
+bool load_pair(const RecordedSession& session, const RecordedFrame& frame,
+               std::array<std::vector<std::uint8_t>, 2>* pixels) {
+  for (std::size_t k = 0; k < 2; ++k) {
+    const RecordedImage& image = frame.images[k];
+    const auto width = static_cast<std::size_t>(image.width);
+    (*pixels)[k].resize(width * static_cast<std::size_t>(image.height));
+    if (!session.read(frame, k, (*pixels)[k].data(), width)) return false;
+  }
+  return true;
+}
+
+}  // namespace
+
+ExportResult export_session(const RecordedSession& session, const ExportRequest& request,
+                            const std::function<void(std::size_t)>& progress) {
+  const std::unique_ptr<Writer> writer = make_writer(request);
+  ExportResult result;
+  result.remarks = session.remarks();
+  std::array<std::vector<std::uint8_t>, 2> pixels;
+  std::size_t done = 0;
+  for (const RecordedFrame& frame : session.frames()) {
+    progress(done++);
+    if (!load_pair(session, frame, &pixels)) {
+      ++result.left_out;
+      continue;
+    }
+    for (std::size_t k = 0; k < 2; ++k) {
+      const RecordedImage& image = frame.images[k];
+      write_png(writer->image(result.frames, frame.given.stamp, k),
+                {pixels[k].data(), image.width, image.height, image.width});
+    }
+    writer->note(frame.given.stamp);
+    ++result.frames;
+  }
+  if (result.frames == 0)
+    throw InputError("the recording has no frame with both images; nothing is exported");
+  writer->finish(ReferenceTrack(request.truth), &result);
+  return result;
+}
+
+}  // namespace vergence::app

@@ -1,0 +1,67 @@
+#pragma once
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "app/config/configuration.hpp"
+#include "app/recording/messages.hpp"
+#include "app/recording/recording.hpp"
+#include "app/session/frame_source.hpp"
+#include "app/session/session_observer.hpp"
+#include "app/session/solver_watch.hpp"
+
+namespace vergence::app {
+
+/// `record:` of the configuration: what goes through a session into drive.mcap (docs/recording.md).
+///
+/// Ownership  Configuration, facts and watch outlive it. Threads: as SessionObserver. The rest: the
+///            owner's.
+/// Memory     The recording's queue, at construction.
+/// Errors     The constructor throws InputError: no room, no file. Afterwards sentences.
+class DriveRecorder final : public SessionObserver {
+ public:
+  /// `folder`: of the session, exists. Precondition: configuration.record.any().
+  DriveRecorder(const std::filesystem::path& folder, const Configuration& configuration,
+                const SourceFacts& facts, const SolverWatch& watch);
+
+  void on_frame(const RigFrame& frame) noexcept override;
+  void on_pose(const PoseSample& sample) noexcept override;
+  void on_reading(const InsRecord& reading) noexcept override;
+  void on_event(const EventRecord& event) noexcept override;
+  void on_calibration(const CalibrationRecord& calibration) noexcept override;
+
+  /// Sentences about the disk, since the last call.
+  [[nodiscard]] std::vector<std::string> take_errors() { return recording_.take_errors(); }
+  /// Ends the files.
+  void close() noexcept { recording_.close(); }
+  /// For the summary.
+  [[nodiscard]] std::vector<std::pair<std::string, std::uint64_t>> counters() const;
+  [[nodiscard]] std::size_t memory() const noexcept { return recording_.counters().queue_bytes; }
+
+ private:
+  template <class Write>
+  std::uint32_t post(std::size_t topic, Stamp stamp, std::size_t most, bool bulky,
+                     const Write& write) noexcept;
+  void post_image(const RigFrame& frame, std::size_t camera) noexcept;
+  void post_rig(Stamp stamp) noexcept;
+  void post_health(const PoseSample& sample) noexcept;
+
+  const RecordSettings& settings_;
+  const SolverWatch& watch_;
+  std::array<std::string, kMaxCameras> frames_;  // of reference, of the cameras
+  std::array<std::string_view, kMaxCameras> frame_names_{};
+  Recording recording_;
+
+  // Of the estimator's thread.
+  RigCalibration rig_;
+  bool calibrated_ = false, rig_posted_ = false, recalibrate_ = false;
+  FrameRecord frame_{};
+  std::uint64_t frames_seen_ = 0;
+  Stamp last_health_{};
+};
+
+}  // namespace vergence::app

@@ -1,0 +1,163 @@
+#include "app/session/session_source.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "app/devices/comparison_settings.hpp"
+
+namespace vergence::app {
+namespace {
+
+/// A word of calibrations.csv, which are constants.
+const char* cause_of(const std::string& word) {
+  for (const char* known : {"state_file", "whole_drive"})
+    if (word == known) return known;
+  return "given";
+}
+
+}  // namespace
+
+StartingCalibration recorded_beginning(const SessionDescription& d, const std::string& name) {
+  StartingCalibration begin;
+  begin.file = parse_calibration(d.calibration, name + " (calibration)");
+  begin.nominal = parse_calibration(d.nominal, name + " (nominal)").rig;
+  begin.trust = d.trust;
+  begin.cause = cause_of(d.cause);
+  begin.source = d.source;
+  return begin;
+}
+
+SessionSource::SessionSource(const ReplayRequest& request, RecordedSession session,
+                             std::optional<StartingCalibration> other)
+    : request_(request),
+      session_(std::move(session)),
+      other_(other.has_value()),
+      end_(std::min(session_.frames().size(),
+                    request.start + request.frames.value_or(session_.frames().size()))),
+      next_frame_(request.start) {
+  make_facts(std::move(other));
+  const RigCalibration& rig = facts_.begin.file.rig;
+  for (std::size_t k = 0; k < static_cast<std::size_t>(rig.cameras); ++k)
+    pixels_[k].resize(static_cast<std::size_t>(rig.intrinsics[k].width) *
+                      static_cast<std::size_t>(rig.intrinsics[k].height));
+  for (std::size_t i = next_frame_; i < end_; ++i) {
+    const RecordedFrame& frame = session_.frames()[i];
+    for (std::size_t k = 0; k < kMaxCameras; ++k) {
+      const RecordedImage& image = frame.images[k];
+      if (image.offset != 0 &&
+          (k >= static_cast<std::size_t>(rig.cameras) || image.width != rig.intrinsics[k].width ||
+           image.height != rig.intrinsics[k].height))
+        throw InputError(fmt::format(
+            "{}: frame {} of the recording has an image of camera {} of {} x {} pixels, which the "
+            "calibration has not",
+            request.data.string(), frame.given.number, k, image.width, image.height));
+    }
+  }
+  // From the middle of a drive: what came before is not for it.
+  if (next_frame_ > 0) next_reading_ = session_.frames()[next_frame_ - 1].readings;
+}
+
+void SessionSource::make_facts(std::optional<StartingCalibration> other) {
+  const SessionDescription& d = session_.description();
+  facts_.begin = other ? std::move(*other) : recorded_beginning(d, request_.data.string());
+  facts_.adoption = other_ ? Adoption::after_fixed_frames : d.adoption;
+  facts_.frames = facts_.expected_frames = end_ - next_frame_;
+  facts_.first = session_.frames()[next_frame_].given.stamp;
+  if (d.ins && !session_.readings().empty())
+    facts_.ins =
+        SourceIns{comparison_options(request_.configuration), InsComparison::Source::recording,
+                  d.mount_source, session_.readings().capacity() * sizeof(RecordedReading)};
+  for (const std::string& sentence : session_.remarks())
+    facts_.remarks.push_back({sentence, "data", !request_.session.quiet});
+  if (!other_ && !session_.complete())
+    facts_.remarks.push_back({"the recording is not whole: the poses are not those of the drive",
+                              "data", !request_.session.quiet});
+  for (int k = 0; k < facts_.begin.file.rig.cameras; ++k) {
+    const Intrinsics& lens = facts_.begin.file.rig.intrinsics[static_cast<std::size_t>(k)];
+    facts_.image_bytes +=
+        static_cast<std::size_t>(lens.width) * static_cast<std::size_t>(lens.height);
+  }
+}
+
+// ---- the estimator's thread
+
+bool SessionSource::next(SourceItem* item) noexcept {
+  if (stopped_.load(std::memory_order_relaxed)) return false;
+  const bool frames_left = next_frame_ < end_;
+  const std::size_t readings = frames_left ? session_.frames()[next_frame_].readings
+                               : end_ == session_.frames().size() ? session_.readings().size()
+                                                                  : next_reading_;
+  if (facts_.ins && next_reading_ < readings) {
+    const RecordedReading& reading = session_.readings()[next_reading_++];
+    *item = InsRecord{reading.sample, reading.quality};
+    return true;
+  }
+  if (!frames_left) return false;
+  const RecordedFrame& frame = session_.frames()[next_frame_];
+  if (frame.given.recalibration_requested && !recalibration_said_) {
+    recalibration_said_ = true;
+    SourceEvent event;
+    event.record.stamp = frame.given.stamp;
+    event.record.kind = "recalibration_requested";
+    event.record.set_sentence("a new calibration was asked for, as in the drive");
+    event.recalibrate = true;
+    *item = event;
+    return true;
+  }
+  recalibration_said_ = false;
+  ++next_frame_;
+  *item = load(frame);
+  return true;
+}
+
+SourceFrame SessionSource::load(const RecordedFrame& recorded) noexcept {
+  const auto begun = std::chrono::steady_clock::now();
+  const FrameRecord& given = recorded.given;
+  SourceFrame frame;
+  frame.rig.number = given.number;
+  frame.rig.stamp = given.stamp;
+  frame.rig.stamp_error = given.stamp_error;
+  frame.rig.spread = given.spread;
+  frame.rig.pairing = static_cast<Pairing>(
+      std::min(given.pairing, static_cast<std::uint8_t>(Pairing::contradicted)));
+  frame.rig.cameras = facts_.begin.file.rig.cameras;
+  if (!other_) frame.solver_idle = given.solver_done;
+  for (std::size_t k = 0; k < static_cast<std::size_t>(frame.rig.cameras); ++k) {
+    if ((given.images_present >> k & 1U) == 0) continue;
+    const RecordedImage& image = recorded.images[k];
+    if (session_.read(recorded, k, pixels_[k].data(), static_cast<std::size_t>(image.width)))
+      frame.rig.images[k] = {pixels_[k].data(), image.width, image.height, image.width};
+    else
+      ++images_missing_;
+  }
+  frame.decode_ms =
+      std::chrono::duration<float, std::milli>(std::chrono::steady_clock::now() - begun).count();
+  return frame;
+}
+
+// ---- the caller's thread
+
+void SessionSource::finish(Progress* progress, std::vector<std::string>* /*faults*/) {
+  if (images_missing_ > 0)
+    progress->say(fmt::format(
+        "vergence: {} images of the drive are damaged or not in the recording; frames went without "
+        "them",
+        images_missing_));
+}
+
+void SessionSource::describe(const SessionTotals& /*totals*/, const Estimator& /*estimator*/,
+                             SummaryInput* input) const {
+  input->devices.emplace_back("images_missing", images_missing_);
+}
+
+void SessionSource::tell(const SessionTotals& /*totals*/, const SummaryInput& /*input*/,
+                         Progress* progress) const {
+  if (!other_ && session_.complete() && images_missing_ == 0 && request_.start == 0)
+    progress->say("the estimator was given what it was given in the drive; compare with " +
+                  (request_.data / "trajectory.tum").string());
+}
+
+}  // namespace vergence::app

@@ -1,0 +1,40 @@
+#pragma once
+#include "core/types/parallel.hpp"
+
+namespace vergence::app {
+
+/// The calibration solver's runner, with a note of the frames at which it was found idle: the one
+/// thing by which time decides what the estimator does. With that note it answers in a replay as it
+/// did in the drive.
+///
+/// Threads  As BackgroundRunner; begin_frame(), found_idle(): the same one. Memory: none.
+class SolverWatch final : public BackgroundRunner {
+ public:
+  explicit SolverWatch(BackgroundRunner& solver) noexcept : solver_(solver) {}
+
+  /// Before Estimator::process(). `replayed`: busy() says what it said then, waiting where the
+  /// solver is slower now.
+  void begin_frame(bool replayed, bool idle_then) noexcept {
+    replayed_ = replayed;
+    idle_then_ = idle_then;
+    found_idle_ = false;
+  }
+  /// busy() was asked since begin_frame(), and the task was done.
+  [[nodiscard]] bool found_idle() const noexcept { return found_idle_; }
+
+  void start(TaskRef task) noexcept override { solver_.start(task); }
+  [[nodiscard]] bool busy() noexcept override {
+    if (replayed_ && !idle_then_) return true;
+    if (replayed_) solver_.wait();
+    const bool busy = solver_.busy();
+    found_idle_ = found_idle_ || !busy;
+    return busy;
+  }
+  void wait() noexcept override { solver_.wait(); }
+
+ private:
+  BackgroundRunner& solver_;
+  bool replayed_ = false, idle_then_ = false, found_idle_ = false;
+};
+
+}  // namespace vergence::app
