@@ -26,7 +26,7 @@ void declare_also(CLI::App& command, std::optional<std::string>* words) {
 void declare_image_topics(CLI::App& command, std::string* left, std::string* right) {
   command
       .add_option("--left-topic", *left,
-                  "Of a bag: topic of the left images, where names do not tell")
+                  "Of a bag: topic of the left images, where names do not say")
       ->type_name("TOPIC");
   command.add_option("--right-topic", *right, "Of a bag: topic of the right images")
       ->type_name("TOPIC");

@@ -149,7 +149,7 @@ void add_replay(CLI::App& root, ExitCode* exit_code) {
   declare_image_topics(*command, &a->topics.left, &a->topics.right);
   command
       ->add_option("--ins-topic", a->topics.ins,
-                   "Of a bag: topic of the INS, NavSatFix or Odometry, where types do not tell")
+                   "Of a bag: topic of the INS, NavSatFix or Odometry, where types do not say")
       ->type_name("TOPIC");
   command
       ->add_option("--imu-topic", a->topics.imu,

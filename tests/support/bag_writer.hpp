@@ -115,7 +115,7 @@ class RosbagWriter final : public BagWriter {
   std::string compression_;
   std::map<std::uint16_t, std::string> connections_;     // their records
   std::map<std::uint16_t, std::vector<Entry>> entries_;  // of the open chunk
-  std::int64_t first_ = 0, last_ = 0;  // ns: log times of the open chunk
+  std::int64_t first_ = 0, last_ = 0;                    // ns: log times of the open chunk
   std::string chunk_infos_;
   std::uint32_t chunks_ = 0;
 };

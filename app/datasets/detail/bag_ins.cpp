@@ -253,19 +253,19 @@ struct Choice {
 };
 
 void require(const std::filesystem::path& path, const BagIndex& bag, const std::string& option,
-             const std::string& wanted, const std::vector<std::string>& there) {
-  if (wanted.empty() || std::find(there.begin(), there.end(), wanted) != there.end()) return;
+             const std::string& requested, const std::vector<std::string>& there) {
+  if (requested.empty() || std::find(there.begin(), there.end(), requested) != there.end()) return;
   refuse(path, 0,
          fmt::format("has no reading on {} that can be used as {} says; of NavSatFix are {}, of "
                      "Imu with an orientation {}, of Odometry {}",
-                     wanted, option, joined(usable(bag.fixes)), joined(usable(bag.attitudes)),
+                     requested, option, joined(usable(bag.fixes)), joined(usable(bag.attitudes)),
                      joined(usable(bag.odometry))));
 }
 
 /// A choice that is none has its reason in *why; no reason: the bag has no INS.
 Choice choose(const BagIndex& bag, const BagTopics& topics, std::string* why) {
-  const auto of = [](const std::vector<std::string>& wanted) {
-    return wanted.size() == 1 ? wanted.front() : std::string();
+  const auto of = [](const std::vector<std::string>& requested) {
+    return requested.size() == 1 ? requested.front() : std::string();
   };
   const std::vector<std::string> fixes = usable(bag.fixes), imus = usable(bag.attitudes),
                                  odometry = usable(bag.odometry);
@@ -277,17 +277,18 @@ Choice choose(const BagIndex& bag, const BagTopics& topics, std::string* why) {
   const std::string fix = topics.ins.empty() ? of(fixes) : topics.ins;
   const std::string imu = topics.imu.empty() ? of(imus) : topics.imu;
   if (!fix.empty() && !imu.empty()) return {fix, imu, ""};
-  const bool undecided = fixes.size() > 1 || imus.size() > 1 || odometry.size() > 1;
+  const bool no_orientation =
+      !fix.empty() && imus.empty() && (!topics.ins.empty() || odometry.empty());
   if (topics.ins.empty() && fixes.size() <= 1 && imus.empty() && odometry.size() == 1)
     return {fix, "", odometry.front()};
   if (topics.ins.empty() && fixes.empty() && odometry.size() == 1) return {"", "", of(odometry)};
   if (fixes.empty() && odometry.empty()) return {};
-  *why = undecided
-             ? "several topics could be the INS, nothing is compared; choose with --ins-topic "
-               "and --imu-topic; " +
-                   list()
-             : "the NavSatFix of " + fix +
-                   " has no orientation beside it (of an Imu): nothing can be compared";
+  *why = no_orientation
+             ? "the NavSatFix of " + fix +
+                   " has no orientation beside it (of an Imu): nothing can be compared"
+             : "several topics could be the INS, nothing is compared; choose with --ins-topic and "
+               "--imu-topic; " +
+                   list();
   return {};
 }
 
