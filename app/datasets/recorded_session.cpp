@@ -213,7 +213,14 @@ RecordedSession RecordedSession::open(const fs::path& folder) {
            "--format mcap replays");
   if (session.frames_.empty())
     refuse(folder, 0,
-           "has a recording without frames; record: [images] records them (docs/recording.md)");
+           "has a recording without a whole frame; the drive was too short, or the file is cut");
+  const auto has_image = [](const RecordedFrame& f) {
+    return std::any_of(f.images.begin(), f.images.end(),
+                       [](const RecordedImage& i) { return i.offset != 0; });
+  };
+  if (std::none_of(session.frames_.begin(), session.frames_.end(), has_image))
+    refuse(folder, 0,
+           "has a recording without images; record: [images] records them (docs/recording.md)");
   if (reader.broken > 0)
     session.remarks_.push_back(fmt::format(
         "{} frames or readings of the recording are damaged and were left out", reader.broken));

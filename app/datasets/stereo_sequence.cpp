@@ -6,6 +6,7 @@
 #include "app/config/calibration_file.hpp"
 #include "app/datasets/detail/formats.hpp"
 #include "app/datasets/detail/kitti_raw.hpp"
+#include "app/datasets/recorded_session.hpp"
 #include "app/datasets/text_file.hpp"
 
 namespace vergence::app {
@@ -31,6 +32,8 @@ StereoSequence open_by_format(SequenceFormat format, const std::filesystem::path
       return detail::open_bag(detail::BagFormat::mcap, folder, given, topics);
     case SequenceFormat::rosbag:
       return detail::open_bag(detail::BagFormat::rosbag, folder, given, topics);
+    case SequenceFormat::session:
+      return detail::open_recorded_session(folder, given);
   }
   refuse(folder, 0, "has no reader for its format");
 }
@@ -105,6 +108,7 @@ std::optional<SequenceFormat> find_format(const std::filesystem::path& folder) {
   const auto has = [&](const char* name) {
     return std::filesystem::exists(folder / name, ignored);
   };
+  if (holds_recorded_session(folder)) return SequenceFormat::session;
   if (has("mav0") || (has("cam0") && has("cam1"))) return SequenceFormat::euroc;
   if (has("image_0") && has("image_1")) return SequenceFormat::kitti;
   if ((has("left") && has("right")) || has("both")) return SequenceFormat::folder;

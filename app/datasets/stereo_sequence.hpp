@@ -27,7 +27,8 @@ enum class SequenceFormat : std::uint8_t {
   folder,
   st_lucia,
   mcap,
-  rosbag
+  rosbag,
+  session
 };
 
 struct RecordedIns;  // recorded_ins.hpp
@@ -113,6 +114,9 @@ struct BagTopics {
 ///   mcap, rosbag  a .mcap or .bag file, or a folder with some: a bag of ROS 2 or ROS 1
 ///           (docs/bags.md); paired by the nearest header.stamp, that of the left camera counts;
 ///           CameraInfo beside the images, and the INS
+///
+///   session  a session's folder with drive.mcap (docs/recording.md); the pairs that have both
+///           images, and the INS
 ///
 /// `use`: what of the calibration is wanted, whichever it is. `cameras`: left and right of a data
 /// set that has more than two (kitti_raw).

@@ -4,32 +4,34 @@
 #include <string>
 #include <vector>
 
+#include "app/datasets/detail/bag_scan.hpp"
 #include "app/datasets/detail/mcap.hpp"
 
 namespace vergence::test {
 
 struct ReadMessage {
-  std::string topic, type;
-  std::uint64_t log_time = 0;
+  std::string topic, type;  // as ROS 1 writes it
   std::string content;
 };
 
 struct ReadFile {
   std::vector<ReadMessage> messages;
-  app::detail::McapScan scan;
+  app::detail::BagScan scan;
 };
 
-/// Every message of an MCAP file, by the program's reader of bags.
+/// Every message of an MCAP file, by the program's reader of bags. One that does not begin as such
+/// a file has none.
 [[nodiscard]] inline ReadFile read_mcap(const std::filesystem::path& file) {
   ReadFile out;
   const app::detail::FileBytes bytes(file);
-  out.scan = app::detail::scan_mcap(bytes, [&](const app::detail::McapMessage& m) {
+  const auto scan = app::detail::scan_mcap(bytes, [&](const app::detail::BagMessage& m) {
     std::string content(m.place.size, '\0');
     if (!m.bytes->read(m.place.offset,
                        {reinterpret_cast<std::uint8_t*>(content.data()), content.size()}))
       content = "unreadable";
-    out.messages.push_back({m.channel->topic, m.channel->type, m.log_time, content});
+    out.messages.push_back({m.channel->topic, m.channel->type, content});
   });
+  if (scan) out.scan = *scan;
   return out;
 }
 

@@ -95,7 +95,8 @@ TEST(Messages, imageReadsBackWithoutItsPadding) {
   Room room;
   write_image(&room.out, Stamp(5'000'000'007), "left", {pixels.data(), 3, 3, 4});
   EXPECT_LE(room.out.size(), image_message_size(3, 3, 4));
-  const auto image = detail::read_ros_image(room.out.written(), room.out.size());
+  const auto image =
+      detail::read_ros_image(room.out.written(), room.out.size(), detail::MessageEncoding::cdr);
   ASSERT_TRUE(image);
   EXPECT_EQ(image->stamp.ns(), 5'000'000'007);
   EXPECT_EQ(image->step, 3U);
@@ -122,7 +123,8 @@ TEST(Messages, cameraInfosHoldTheRig) {
     Room room;
     write_camera_info(&room.out, Stamp(1), k == 0 ? "left" : "right", original, k, true);
     ASSERT_TRUE(room.out.ok());
-    const auto info = detail::read_ros_camera_info(room.out.written());
+    const auto info =
+        detail::read_ros_camera_info(room.out.written(), detail::MessageEncoding::cdr);
     ASSERT_TRUE(info);
     EXPECT_EQ(info->fault, "");
     cameras[static_cast<std::size_t>(k)] = info->camera;
@@ -141,7 +143,8 @@ TEST(Messages, aRigWithoutCalibrationHasPlainCameraInfos) {
   for (const bool calibrated : {false, true}) {  // true: no direction to rectify along
     Room room;
     write_camera_info(&room.out, Stamp(1), "right", original, 1, calibrated);
-    const auto info = detail::read_ros_camera_info(room.out.written());
+    const auto info =
+        detail::read_ros_camera_info(room.out.written(), detail::MessageEncoding::cdr);
     ASSERT_TRUE(info);
     EXPECT_EQ(info->camera.R, Mat3::Identity());
     EXPECT_EQ(info->camera.P(0, 0), 450);

@@ -48,7 +48,7 @@ bool post(Recording* recording, int n, std::size_t padding = 0) {
 std::vector<int> numbers(const std::filesystem::path& file) {
   std::vector<int> out;
   for (const auto& m : read_mcap(file).messages)
-    if (m.type == "std_msgs/msg/String") out.push_back(std::stoi(m.content.substr(16)));
+    if (m.type == "std_msgs/String") out.push_back(std::stoi(m.content.substr(16)));
   return out;
 }
 
@@ -73,7 +73,6 @@ TEST(Recording, readsBackAsPosted) {
   EXPECT_EQ(file.scan.broken_chunks + file.scan.broken_records + file.scan.orphans, 0U);
   ASSERT_EQ(file.messages.size(), 1000U);
   EXPECT_EQ(file.messages[7].topic, "/text");
-  EXPECT_EQ(file.messages[7].log_time, 7'000'000U);
   EXPECT_EQ(numbers(folder / "drive.mcap"), sequence(0, 1000));
 }
 

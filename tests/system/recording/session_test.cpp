@@ -1,0 +1,219 @@
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <map>
+#include <string>
+
+#include <nlohmann/json.hpp>
+
+#include "app/datasets/trajectory_files.hpp"
+#include "tests/support/recording_reader.hpp"
+#include "tests/support/temporary_folder.hpp"
+#include "tests/system/run/session.hpp"
+#include "tests/unit/app/commands/run_vergence.hpp"
+
+namespace vergence {
+namespace {
+
+using test::kSmall;
+using test::Outcome;
+using test::run_vergence;
+using test::summary_of;
+using test::TemporaryFolder;
+using test::text_of;
+
+const std::string kMock = std::string(VERGENCE_SOURCE_DIR) + "/app/config/mock.yaml";
+const std::string kRecord =
+    " --set record.poses=on --set record.ins=on --set record.images=on --set "
+    "record.memory_mb=64";
+
+Outcome drive(const std::filesystem::path& session, const std::string& more) {
+  return run_vergence("run '" + kMock + "' --out '" + session.string() + "'" + kSmall + kRecord +
+                      " " + more);
+}
+
+Outcome replay(const std::filesystem::path& data, const std::filesystem::path& session,
+               const std::string& more = "") {
+  return run_vergence("replay '" + data.string() + "' --out '" + session.string() + "' " + more);
+}
+
+void expect_same_poses(const std::filesystem::path& a, const std::filesystem::path& b) {
+  const std::string poses = text_of(a / "trajectory.tum");
+  EXPECT_FALSE(poses.empty());
+  EXPECT_EQ(poses, text_of(b / "trajectory.tum"));
+}
+
+/// One drive with a knock, a camera that is gone for a while and a calibration asked for: recorded
+/// once for all tests that read it.
+class RecordedDrive : public ::testing::Test {
+ protected:
+  static void SetUpTestSuite() {
+    folder_ = new TemporaryFolder;
+    const Outcome o = drive(session(),
+                            "--fast --duration 12 --fault \"camera_gone@5 camera=1 duration_s=1\" "
+                            "--fault \"recalibrate@3\"");
+    ASSERT_LE(o.code, 1) << o.err;
+  }
+  static void TearDownTestSuite() { delete folder_; }
+  static std::filesystem::path session() { return *folder_ / "drive"; }
+  static std::filesystem::path out(const std::string& name) { return *folder_ / name; }
+  /// The session's recording with `change` made to it, in a folder of its own.
+  template <class Change>
+  static std::filesystem::path changed(const std::string& name, const Change& change) {
+    std::string bytes = test::read_file(session() / "drive.mcap");
+    change(&bytes);
+    (void)folder_->write(name + "/drive.mcap", bytes);
+    (void)folder_->write(name + "/poses.csv", "");
+    return *folder_ / name;
+  }
+
+ private:
+  static inline TemporaryFolder* folder_ = nullptr;
+};
+
+TEST_F(RecordedDrive, replaysBitForBit) {
+  const Outcome o = replay(session(), out("again"));
+  EXPECT_LE(o.code, 1) << o.err;
+  expect_same_poses(session(), out("again"));
+  EXPECT_EQ(text_of(session() / "reference.tum"), text_of(out("again") / "reference.tum"));
+  EXPECT_NE(o.err.find("what it was given in the drive"), std::string::npos) << o.err;
+  EXPECT_EQ(summary_of(out("again"))["allocations_after_seal"], 0);
+}
+
+TEST_F(RecordedDrive, holdsEveryMessageOnceAndIsFinished) {
+  const auto file = test::read_mcap(session() / "drive.mcap");
+  EXPECT_TRUE(file.scan.finished);
+  std::map<std::string, int> count;
+  for (const auto& m : file.messages) ++count[m.topic];
+  const int frames = summary_of(session())["frames"]["read"];
+  EXPECT_EQ(count["/vergence/frame"], frames);
+  EXPECT_EQ(count["/left/image_raw"], frames);
+  EXPECT_EQ(count["/left/camera_info"], frames);
+  EXPECT_LT(count["/right/image_raw"], frames);  // it was gone
+  EXPECT_EQ(count["/ins/fix"], count["/vergence/ins_reading"]);
+  EXPECT_EQ(count["/vergence/session"], 1);
+  EXPECT_GT(count["/diagnostics"], 12);
+  EXPECT_GE(count["/tf_static"], 1);
+  EXPECT_EQ(summary_of(session())["devices"]["recording_dropped"], 0);
+}
+
+TEST_F(RecordedDrive, replaysWithAnotherConfigurationAndFromScratch) {
+  const Outcome fewer = replay(session(), out("fewer"), "--set odometry.features=300");
+  EXPECT_LE(fewer.code, 1) << fewer.err;
+  EXPECT_NE(text_of(session() / "trajectory.tum"), text_of(out("fewer") / "trajectory.tum"));
+  const Outcome scratch = replay(session(), out("scratch"), "--from-scratch");
+  EXPECT_LE(scratch.code, 1) << scratch.err;
+  EXPECT_NE(text_of(session() / "trajectory.tum"), text_of(out("scratch") / "trajectory.tum"));
+  const Outcome other = replay(session(), out("other"),
+                               "--calibration '" + (session() / "calibration.yaml").string() + "'");
+  EXPECT_LE(other.code, 1) << other.err;
+}
+
+TEST_F(RecordedDrive, aDamagedImageIsSaidAndTheRestReplays) {
+  const auto damaged = changed("damaged", [](std::string* bytes) {
+    const std::size_t at = bytes->size() / 2;  // pixels are all but a few of the bytes
+    (*bytes)[at] = static_cast<char>((*bytes)[at] ^ 4);
+  });
+  const Outcome o = replay(damaged, out("of-damaged"));
+  EXPECT_LE(o.code, 1) << o.err;
+  EXPECT_NE(o.err.find("1 images of the drive are damaged"), std::string::npos) << o.err;
+}
+
+TEST_F(RecordedDrive, aTornRecordingReplaysUpToItsEnd) {
+  const auto torn =
+      changed("torn", [](std::string* bytes) { bytes->resize(bytes->size() * 2 / 3); });
+  const Outcome o = replay(torn, out("of-torn"));
+  EXPECT_LE(o.code, 1) << o.err;
+  EXPECT_NE(o.err.find("is unfinished"), std::string::npos) << o.err;
+  const std::string poses = text_of(out("of-torn") / "trajectory.tum");
+  EXPECT_GT(poses.size(), text_of(session() / "trajectory.tum").size() / 2);
+  EXPECT_TRUE(text_of(session() / "trajectory.tum").starts_with(poses));
+}
+
+TEST_F(RecordedDrive, recordingsOfOtherVersionsAndProgramsAreRefusedWithASentence) {
+  const auto newer = changed("newer", [](std::string* bytes) {
+    const std::string word = "\"version\": 1";
+    const auto at = bytes->find(word);
+    ASSERT_NE(at, std::string::npos);
+    bytes->replace(at, word.size(), "\"version\": 7");
+  });
+  Outcome o = replay(newer, out("of-newer"));
+  EXPECT_EQ(o.code, 2);
+  EXPECT_NE(o.err.find("is a recording of version 7"), std::string::npos) << o.err;
+  const auto foreign = changed("foreign", [](std::string* bytes) {
+    for (std::size_t at = 0; (at = bytes->find("/vergence/session", at)) != std::string::npos;)
+      bytes->replace(at, 17, "/somebody/session");
+  });
+  o = replay(foreign, out("of-foreign"));
+  EXPECT_EQ(o.code, 2);
+  EXPECT_NE(o.err.find("another program's"), std::string::npos) << o.err;
+  const auto empty = changed("empty", [](std::string* bytes) { bytes->clear(); });
+  o = replay(empty, out("of-empty"));
+  EXPECT_EQ(o.code, 2) << o.err;
+}
+
+TEST_F(RecordedDrive, isExportedForOtherPrograms) {
+  const auto to = [&](const std::string& format) {
+    return run_vergence("export '" + session().string() + "' --format " + format + " --out '" +
+                        out(format).string() + "'");
+  };
+  const Outcome folder = to("folder");
+  EXPECT_EQ(folder.code, 0) << folder.err;
+  EXPECT_NE(folder.err.find("frames without both images were left out"), std::string::npos);
+  EXPECT_LE(replay(out("folder"), out("of-folder")).code, 1);
+  const Outcome euroc = to("euroc");
+  EXPECT_EQ(euroc.code, 0) << euroc.err;
+  EXPECT_LE(replay(out("euroc"), out("of-euroc")).code, 1);
+  // The same pixels, stamps and rig, the rig's last digit aside.
+  const auto a = app::read_tum(out("of-folder") / "trajectory.tum");
+  const auto b = app::read_tum(out("of-euroc") / "trajectory.tum");
+  ASSERT_EQ(a.size(), b.size());
+  for (std::size_t i = 0; i < a.size(); i += 10) {
+    EXPECT_EQ(a[i].stamp, b[i].stamp);
+    EXPECT_LT((a[i].T_world_body.t - b[i].T_world_body.t).norm(), 1e-2);
+  }
+  const Outcome kitti = to("kitti");
+  EXPECT_EQ(kitti.code, 2);
+  EXPECT_NE(kitti.err.find("no place for distortion"), std::string::npos) << kitti.err;
+}
+
+TEST(Recorded, aPlainDriveComesBackFromItsExportBitForBit) {
+  const TemporaryFolder folder;
+  ASSERT_LE(drive(folder / "s", "--fast --duration 5").code, 1);
+  const Outcome o = run_vergence("export '" + (folder / "s").string() +
+                                 "' --format folder --out '" + (folder / "data").string() + "'");
+  ASSERT_EQ(o.code, 0) << o.err;
+  EXPECT_LE(replay(folder / "data", folder / "again").code, 1);
+  expect_same_poses(folder / "s", folder / "again");
+}
+
+// In real time: images are dropped as this machine is busy, and the solver answers when it is done.
+TEST(Recorded, aLiveDriveReplaysBitForBit) {
+  const TemporaryFolder folder;
+  const Outcome o = drive(folder / "live", "--from-scratch --duration 12 --set trigger.rate=10");
+  ASSERT_LE(o.code, 1) << o.err;
+  ASSERT_LE(replay(folder / "live", folder / "again").code, 1);
+  expect_same_poses(folder / "live", folder / "again");
+}
+
+TEST(Recorded, aReplayOfAReplayedRecordingIsTheSame) {
+  const TemporaryFolder folder;
+  ASSERT_LE(drive(folder / "s", "--fast --duration 4").code, 1);
+  ASSERT_LE(replay(folder / "s", folder / "second", "--set record.images=on").code, 1);
+  ASSERT_LE(replay(folder / "second", folder / "third").code, 1);
+  expect_same_poses(folder / "s", folder / "third");
+}
+
+TEST(Recorded, aSessionWithoutImagesIsRefused) {
+  const TemporaryFolder folder;
+  const Outcome o =
+      run_vergence("run '" + kMock + "' --fast --duration 2 --out '" + (folder / "s").string() +
+                   "'" + kSmall + " --set record=[poses,ins]");
+  ASSERT_LE(o.code, 1) << o.err;
+  const Outcome r = replay(folder / "s", folder / "again");
+  EXPECT_EQ(r.code, 2);
+  EXPECT_NE(r.err.find("without images"), std::string::npos) << r.err;
+}
+
+}  // namespace
+}  // namespace vergence
