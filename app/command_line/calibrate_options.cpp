@@ -37,6 +37,7 @@ CLI::App* CalibrateOptions::declare(CLI::App& root) {
       ->add_option("--calibration", calibration,
                    "--drive: lenses and length to begin with, instead of the data set's own")
       ->type_name("FILE");
+  declare_image_topics(*command, &left_topic, &right_topic);
   command->add_option("--board", board, "Inner corners along and down")->type_name("9x6");
   command->add_option("--square", square, "Side of a square, m")->type_name("M");
   command->add_option("--out", out, "calibration.yaml to write")->type_name("F");

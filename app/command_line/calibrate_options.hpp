@@ -25,6 +25,7 @@ struct CalibrateOptions {
   std::optional<std::string> keep_views{};
   std::optional<double> square{}, baseline{};
   std::string to{};
+  std::string left_topic{}, right_topic{};  // --drive
   bool sixth_order = false, json = false, force = false;
 
   /// The subcommand with its options; `this` outlives its parsing.

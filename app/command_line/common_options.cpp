@@ -23,6 +23,15 @@ void declare_also(CLI::App& command, std::optional<std::string>* words) {
       ->type_name("WORDS");
 }
 
+void declare_image_topics(CLI::App& command, std::string* left, std::string* right) {
+  command
+      .add_option("--left-topic", *left,
+                  "Of a bag: topic of the left images, where names do not say")
+      ->type_name("TOPIC");
+  command.add_option("--right-topic", *right, "Of a bag: topic of the right images")
+      ->type_name("TOPIC");
+}
+
 Configuration CommonOptions::configuration(const std::optional<std::filesystem::path>& file) const {
   std::vector<std::string> all = set;
   if (threads) all.push_back("threads=" + std::to_string(*threads));

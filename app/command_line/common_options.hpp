@@ -28,4 +28,7 @@ struct CommonOptions {
 /// `--also WORDS` of the commands that write a session: parse_other_formats() reads it.
 void declare_also(CLI::App& command, std::optional<std::string>* words);
 
+/// `--left-topic`, `--right-topic` of the commands that read a bag's images.
+void declare_image_topics(CLI::App& command, std::string* left, std::string* right);
+
 }  // namespace vergence::app

@@ -17,6 +17,8 @@ DriveCalibrationRequest request_of(const CalibrateOptions& a) {
   DriveCalibrationRequest r;
   r.data = a.drive;
   r.format = sequence_format(a.format.empty() ? "auto" : a.format, a.drive);
+  r.topics = {a.left_topic, a.right_topic, "", ""};
+  check_topics(r.format, r.topics);
   r.out = a.out;
   r.calibration = a.calibration;
   r.baseline = a.baseline;

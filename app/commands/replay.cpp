@@ -60,8 +60,7 @@ ReplayRequest request_of(const Arguments& a) {
   r.data = a.data;
   r.format = sequence_format(a.format, r.data);
   r.topics = a.topics;
-  if (r.format != SequenceFormat::mcap && !(a.topics.left + a.topics.right).empty())
-    throw InputError("--left-topic and --right-topic are of ROS 2 bags (--format mcap)");
+  check_topics(r.format, r.topics);
   r.known = known_numbers(a);
   if (a.calibrate_first && a.from_scratch)
     throw InputError(
@@ -87,11 +86,13 @@ void add_replay(CLI::App& root, ExitCode* exit_code) {
   const auto a = std::make_shared<Arguments>();
   CLI::App* command = root.add_subcommand(
       "replay", "Run a recorded drive through the estimator and write a session folder");
-  command->add_option("DATA", a->data, "Folder of the data set, or a .mcap file")->required();
+  command->add_option("DATA", a->data, "Folder of the data set, or a .mcap or .bag file")
+      ->required();
   command
-      ->add_option(
-          "--format", a->format,
-          "Layout of DATA: kitti, kitti-raw, euroc, folder, st-lucia, mcap; auto: by what is in it")
+      ->add_option("--format", a->format,
+                   "Layout of DATA: kitti, kitti-raw, euroc, folder, st-lucia, mcap, rosbag; auto: "
+                   "by what is "
+                   "in it")
       ->type_name("NAME")
       ->capture_default_str();
   command->add_option("--out", a->out, "Session folder; must not exist or be empty")
@@ -102,11 +103,14 @@ void add_replay(CLI::App& root, ExitCode* exit_code) {
           "--calibration", a->calibration,
           "calibration.yaml, or a file of Kalibr, ROS or OpenCV, instead of the data set's own")
       ->type_name("FILE");
+  declare_image_topics(*command, &a->topics.left, &a->topics.right);
   command
-      ->add_option("--left-topic", a->topics.left,
-                   "Of a bag: topic of the left images, where names do not say")
+      ->add_option("--ins-topic", a->topics.ins,
+                   "Of a bag: topic of the INS, NavSatFix or Odometry, where types do not say")
       ->type_name("TOPIC");
-  command->add_option("--right-topic", a->topics.right, "Of a bag: topic of the right images")
+  command
+      ->add_option("--imu-topic", a->topics.imu,
+                   "Of a bag: topic of the Imu whose orientation goes with the NavSatFix")
       ->type_name("TOPIC");
   command->add_option("--start", a->start, "First frame, from 0")->type_name("K");
   command->add_option("--frames", a->frames, "At most so many frames")->type_name("N");

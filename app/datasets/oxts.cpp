@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 
 #include "app/datasets/decimal.hpp"
+#include "app/datasets/detail/ascending.hpp"
 #include "app/datasets/detail/formats.hpp"
 #include "app/datasets/detail/kitti_raw.hpp"
 #include "app/datasets/recorded_ins.hpp"

@@ -31,7 +31,8 @@ RecordedIns read_recorded_ins(SequenceFormat format, const std::filesystem::path
     case SequenceFormat::kitti:
     case SequenceFormat::euroc:
     case SequenceFormat::folder:
-    case SequenceFormat::mcap:
+    case SequenceFormat::mcap:  // has it in StereoSequence::ins
+    case SequenceFormat::rosbag:
       break;
   }
   return {};

@@ -27,8 +27,9 @@ struct RecordedIns {
   std::vector<std::string> remarks{};     // what was left out or taken on trust: a sentence each
 };
 
-/// The INS of the drive that open_sequence() opens with the same arguments. No readings: the data
-/// set has none, or none lie with the drive.
+/// The INS of the drive that open_sequence() opens with the same arguments, where it has files of
+/// its own; that of a bag is StereoSequence::ins. No readings: the data set has none, or none lie
+/// with the drive.
 /// `mount_wanted`: the published mount is read, where the data set publishes one; else somebody
 /// knows better.
 /// Memory  Some 250 bytes a reading, at most kMostReadings.  InputError  As the data set's reader

@@ -28,7 +28,9 @@ StereoSequence open_by_format(SequenceFormat format, const std::filesystem::path
     case SequenceFormat::st_lucia:
       return detail::open_st_lucia(folder, given);
     case SequenceFormat::mcap:
-      return detail::open_bag(folder, given, topics);
+      return detail::open_bag(detail::BagFormat::mcap, folder, given, topics);
+    case SequenceFormat::rosbag:
+      return detail::open_bag(detail::BagFormat::rosbag, folder, given, topics);
   }
   refuse(folder, 0, "has no reader for its format");
 }
@@ -50,7 +52,7 @@ StereoSequence open_sequence(SequenceFormat format, const std::filesystem::path&
                                             return read_calibration(*calibration, use);
                                           }},
                          use, cameras, topics);
-  if (format != SequenceFormat::mcap) detail::require_folder(folder, "a drive");
+  if (!is_bag(format)) detail::require_folder(folder, "a drive");
   StereoSequence sequence = open_by_format(format, folder, false, use, cameras, topics);
   const std::filesystem::path source = sequence.root / sequence.calibration_source;
   return checked(std::move(sequence), source, use);
@@ -59,7 +61,7 @@ StereoSequence open_sequence(SequenceFormat format, const std::filesystem::path&
 StereoSequence open_sequence(SequenceFormat format, const std::filesystem::path& folder,
                              const GivenCalibration& calibration, const CalibrationUse& use,
                              const std::array<int, 2>& cameras, const BagTopics& topics) {
-  if (format != SequenceFormat::mcap) detail::require_folder(folder, "a drive");
+  if (!is_bag(format)) detail::require_folder(folder, "a drive");
   StereoSequence sequence = open_by_format(format, folder, true, use, cameras, topics);
   sequence.calibration = calibration.read(sequence).rig;
   sequence.calibration_source = std::filesystem::path(calibration.name).filename().string();
@@ -90,10 +92,16 @@ StereoSequence checked(StereoSequence sequence, const std::filesystem::path& sou
 
 }  // namespace
 
+std::optional<SequenceFormat> bag_format(const std::filesystem::path& file) {
+  if (file.extension() == ".mcap") return SequenceFormat::mcap;
+  if (file.extension() == ".bag") return SequenceFormat::rosbag;
+  return std::nullopt;
+}
+
 std::optional<SequenceFormat> find_format(const std::filesystem::path& folder) {
   std::error_code ignored;
-  if (folder.extension() == ".mcap" && std::filesystem::is_regular_file(folder, ignored))
-    return SequenceFormat::mcap;
+  if (const auto bag = bag_format(folder); bag && std::filesystem::is_regular_file(folder, ignored))
+    return bag;
   const auto has = [&](const char* name) {
     return std::filesystem::exists(folder / name, ignored);
   };
@@ -106,7 +114,7 @@ std::optional<SequenceFormat> find_format(const std::filesystem::path& folder) {
       return SequenceFormat::st_lucia;
   for (std::filesystem::directory_iterator it(folder, ignored), end; !ignored && it != end;
        it.increment(ignored))
-    if (it->path().extension() == ".mcap") return SequenceFormat::mcap;
+    if (const auto bag = bag_format(it->path())) return bag;
   if (detail::holds_kitti_raw(folder)) return SequenceFormat::kitti_raw;
   return std::nullopt;
 }

@@ -20,7 +20,17 @@
 /// data set's own layout.
 namespace vergence::app {
 
-enum class SequenceFormat : std::uint8_t { kitti, kitti_raw, euroc, folder, st_lucia, mcap };
+enum class SequenceFormat : std::uint8_t {
+  kitti,
+  kitti_raw,
+  euroc,
+  folder,
+  st_lucia,
+  mcap,
+  rosbag
+};
+
+struct RecordedIns;  // recorded_ins.hpp
 
 /// One frame as the data set lists it.
 struct StereoPair {
@@ -47,6 +57,8 @@ struct StereoSequence {
   bool side_by_side = false;  // a file holds both images, the left one's columns first; file[0] and
                               // file[1] are the same
   std::shared_ptr<const ImageStore> store{};  // has the images; nothing: they are files below root
+  std::shared_ptr<const RecordedIns> ins{};   // that came with the images; nothing: it has files of
+                                              // its own (read_recorded_ins()), or there is none
   bool bayer = false;  // images are raw mosaics: grey is made of them (core/types/bayer.hpp)
 };
 
@@ -61,9 +73,21 @@ struct GivenCalibration {
 /// left and right.
 struct BagTopics {
   std::string left{}, right{};
+  std::string ins{};  // of NavSatFix or Odometry
+  std::string imu{};  // of Imu: the orientation that goes with a NavSatFix
+  [[nodiscard]] bool empty() const noexcept {
+    return left.empty() && right.empty() && ins.empty() && imu.empty();
+  }
 };
 
-/// The format of a folder (or a .mcap file) by what is in it; nothing: none that is known.
+[[nodiscard]] inline bool is_bag(SequenceFormat format) noexcept {
+  return format == SequenceFormat::mcap || format == SequenceFormat::rosbag;
+}
+
+/// Of a bag's file by the ending of its name; nothing: it is none.
+[[nodiscard]] std::optional<SequenceFormat> bag_format(const std::filesystem::path& file);
+
+/// The format of a folder (or a bag's file) by what is in it; nothing: none that is known.
 [[nodiscard]] std::optional<SequenceFormat> find_format(const std::filesystem::path& folder);
 
 /// A drive of the given format. `calibration`: a calibration.yaml that is used instead of the data
@@ -86,9 +110,9 @@ struct BagTopics {
 ///   st_lucia  PREFIX_MultiCamera0.log names the images in PREFIX_MultiCamera0/; paired by line,
 ///   stamp of the left camera; raw Bayer BMP;
 ///           the calibration published with the data set
-///   mcap    a .mcap file, or a folder with some: a ROS 2 bag (docs/bags.md); paired by the nearest
-///   header.stamp, that of the left camera
-///           counts; CameraInfo beside the images
+///   mcap, rosbag  a .mcap or .bag file, or a folder with some: a bag of ROS 2 or ROS 1
+///           (docs/bags.md); paired by the nearest header.stamp, that of the left camera counts;
+///           CameraInfo beside the images, and the INS
 ///
 /// `use`: what of the calibration is wanted, whichever it is. `cameras`: left and right of a data
 /// set that has more than two (kitti_raw).

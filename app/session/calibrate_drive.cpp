@@ -20,9 +20,10 @@ ExitCode calibrate_from_drive(const DriveCalibrationRequest& r) {
   // known.
   const std::array cameras{c.kitti_raw.left, c.kitti_raw.right};
   const StereoSequence sequence =
-      r.calibration ? open_sequence(r.format, r.data,
-                                    given_calibration(*r.calibration, use, &remarks), use, cameras)
-                    : open_sequence(r.format, r.data, std::nullopt, use, cameras);
+      r.calibration
+          ? open_sequence(r.format, r.data, given_calibration(*r.calibration, use, &remarks), use,
+                          cameras, r.topics)
+          : open_sequence(r.format, r.data, std::nullopt, use, cameras, r.topics);
   for (const std::string& sentence : remarks) std::cerr << "vergence: " << sentence << '\n';
   check_image_sizes(sequence, 0, sequence.pairs.size());
   const StartingCalibration given = replayed_calibration(c, sequence, true);

@@ -13,6 +13,7 @@ namespace vergence::app {
 struct DriveCalibrationRequest {
   std::filesystem::path data;
   SequenceFormat format = SequenceFormat::kitti;
+  BagTopics topics{};                      // of a bag
   std::filesystem::path out;               // calibration.yaml to write
   std::optional<std::string> calibration;  // lenses and length to begin with, of any program
   std::optional<double> baseline;          // m: instead of the file's

@@ -20,7 +20,7 @@ namespace {
 /// none.
 Trajectory read_reference(const ReplayRequest& request, const StereoSequence& sequence) {
   if (request.format == SequenceFormat::kitti_raw || request.format == SequenceFormat::st_lucia ||
-      request.format == SequenceFormat::mcap)
+      is_bag(request.format))
     return {};  // their layouts have no truth
   const bool plain = request.format == SequenceFormat::folder;
   std::error_code ignored;

@@ -64,8 +64,10 @@ ReplayedIns replayed_ins(const ReplayRequest& request, const StereoSequence& seq
   const Configuration& c = request.configuration;
   ReplayedIns out;
   out.options = comparison_options(c);
-  RecordedIns recorded = read_recorded_ins(
-      request.format, request.data, {c.kitti_raw.left, c.kitti_raw.right}, !says_mount(c.ins));
+  RecordedIns recorded =
+      sequence.ins ? *sequence.ins
+                   : read_recorded_ins(request.format, request.data,
+                                       {c.kitti_raw.left, c.kitti_raw.right}, !says_mount(c.ins));
   out.remarks = std::move(recorded.remarks);
   if (recorded.readings.empty()) return out;
   out.readings = std::move(recorded.readings);
@@ -77,8 +79,9 @@ ReplayedIns replayed_ins(const ReplayRequest& request, const StereoSequence& seq
     return out;
   }
   const Duration usual = usual_interval(out.readings);
-  out.options.max_gap =
-      std::max(out.options.max_gap, Duration::seconds(kMostOfInterval * usual.to_seconds()));
+  const Duration rarely = Duration::seconds(kMostOfInterval * usual.to_seconds());
+  out.options.max_gap = std::max(out.options.max_gap, rarely);
+  out.options.max_wait = std::max(out.options.max_wait, rarely);
   out.mount_source = says_mount(c.ins) ? "the configuration"
                                        : "nobody: ins.lever_arm_m and ins.boresight_deg are zero";
   if (recorded.T_ins_left) {

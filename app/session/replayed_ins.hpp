@@ -19,8 +19,8 @@ struct ReplayedIns {
 
 /// Of the frames [request.start, …) of the sequence. A mount that the configuration says
 /// (`ins.lever_arm_m`, `ins.boresight_deg`) stands before the data set's own;
-/// `comparison.max_gap_ms` is no less than one and a half of the recording's usual interval.
-/// InputError: as read_recorded_ins() and comparison_options() say.
+/// `comparison.max_gap_ms` and `max_wait_ms` are no less than one and a half of the recording's
+/// usual interval. InputError: as read_recorded_ins() and comparison_options() say.
 [[nodiscard]] ReplayedIns replayed_ins(const ReplayRequest& request,
                                        const StereoSequence& sequence);
 

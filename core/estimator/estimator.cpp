@@ -163,10 +163,11 @@ struct Estimator::Parts {
   Stamp last{};
   std::uint64_t last_number = 0;
   bool any = false;
-  bool unconfirmed;        // the calibration in use is the last drive's
-  bool undecided = false;  // something is wrong with the rig, and not yet told what
-  bool verified = false;   // the calibration in use, when last decided about
-  int out_of_step = 0;     // frames for which that is still believed
+  bool unconfirmed;         // the calibration in use is the last drive's
+  bool undecided = false;   // something is wrong with the rig, and not yet told what
+  bool verified = false;    // the calibration in use, when last decided about
+  bool superseded = false;  // poses still are of a calibration that was contradicted
+  int out_of_step = 0;      // frames for which that is still believed
   int without_pose = 0;
   int unmatched_frames = 0;  // in a row
   Reason told_missing = Reason::none;
@@ -253,6 +254,7 @@ void Estimator::Parts::take_learnt(const CalibrationDecision& decision, bool was
          decision.calibration.frames);
     calibrator.refine(decision.calibration);
     odometry.link(decision.calibration);
+    superseded = decision.cause == CalibrationCause::contradicted;
     undecided = false;
   }
   tell_verified(was_verified, decision, stamp);
@@ -365,7 +367,8 @@ void Estimator::Parts::grade(const odometry::FrameOutcome& out, Pairing pairing,
   } else if (sample->status == PoseStatus::ok && (undecided || state == State::recalibrating)) {
     sample->status = PoseStatus::degraded;
     sample->reason = Reason::recalibrating;
-  } else if (sample->status == PoseStatus::ok && options.online && !calibrator.verified()) {
+  } else if (sample->status == PoseStatus::ok && options.online &&
+             (superseded || !calibrator.verified())) {
     sample->status = PoseStatus::degraded;
     sample->reason = unconfirmed ? Reason::unconfirmed : Reason::unverified_calibration;
   } else if (out.reason == Reason::uncalibrated) {
@@ -440,6 +443,7 @@ PoseSample Estimator::process(const RigFrame& given) noexcept {
   }
   sample.state = p.state;
   p.grade(out, frame.pairing, &sample);
+  if (out.relinked) p.superseded = false;
   if (out.posed) sample.T_world_left = out.T_left_world.inverse();
   sample.inliers = out.inliers;
   sample.stereo_inliers = out.stereo_inliers;

@@ -97,7 +97,8 @@ std::size_t OnlineCalibrator::memory_needed(const EstimatorOptions& o,
          calibration::RigSolver::memory_needed(o.calibration, o.monitor, rig.cameras,
                                                most_tracks(o)) +
          further * (calibration::Monitor::memory_needed(o.monitor) +
-                    calibration::MotionTrackBuilder::memory_needed(most_tracks(o))) +
+                    calibration::MotionTrackBuilder::memory_needed(most_tracks(o)) +
+                    calibration::DisparityJumpDetector::memory_needed(most_tracks(o))) +
          most_tracks(o) * sizeof(calibration::StereoObservation) + 2 * kCacheLine;
 }
 
@@ -116,6 +117,7 @@ OnlineCalibrator::OnlineCalibrator(const EstimatorOptions& options, const RigCal
   for (int k = 1; k < rig.cameras; ++k) {
     monitors_[static_cast<std::size_t>(k)].emplace(options.monitor, arena);
     feeds_[static_cast<std::size_t>(k)].emplace(most_tracks(options), arena);
+    jumps_[static_cast<std::size_t>(k)].emplace(most_tracks(options), arena);
   }
   stereo_ = BoundedVector<calibration::StereoObservation>(
       arena.make<calibration::StereoObservation>(most_tracks(options), "monitored matches"));
@@ -172,6 +174,7 @@ void OnlineCalibrator::watch_against(int k, const Transform& T_camera_left,
   const auto c = static_cast<std::size_t>(k);
   (void)monitors_[c]->set_reference(T_camera_left, pinhole(0), pinhole(c), covariance);
   feeds_[c]->reset();
+  jumps_[c]->set_reference(rig_.T_camera_left[c], pinhole(0), pinhole(c));
   grace_[c] = kGraceFrames;
 }
 
@@ -196,6 +199,8 @@ void OnlineCalibrator::scene_lost() noexcept {
     if (m) m->reset();
   for (auto& f : feeds_)
     if (f) f->reset();
+  for (auto& j : jumps_)
+    if (j) j->reset();
 }
 
 int OnlineCalibrator::frames_agreed() const noexcept {
@@ -283,6 +288,7 @@ MonitorVerdict OnlineCalibrator::watch(const odometry::Odometry& odometry,
       (void)stereo_.push({p.now.pixel[0].cast<double>(), p.now.pixel[c].cast<double>(),
                           static_cast<double>(std::max(p.now.sigma[0], p.now.sigma[c])), p.id});
     }
+    const calibration::DisparityJump jump = jumps_[c]->next(frame.number, stereo_.span(), step);
     calibration::MonitorFrame f = feeds_[c]->next(frame.stamp, frame.number, stereo_.span(), step);
     f.expected_stereo =
         outcome.images_good ? expected_stereo(odometry, k, outcome.T_left_world) : 0;
@@ -293,6 +299,11 @@ MonitorVerdict OnlineCalibrator::watch(const odometry::Odometry& odometry,
       v = MonitorVerdict{};
     }
     learn_reference(k, v);
+    if (jump.confirmed && rank(v.kind) < rank(MonitorVerdict::Kind::knock)) {
+      v.kind = MonitorVerdict::Kind::knock;
+      v.onset_frame = jump.onset_frame;
+    }
+    v.undecided = v.undecided || jump.suspected;
     if (rank(v.kind) > rank(worst.kind) ||
         (rank(v.kind) == rank(worst.kind) && (v.undecided || v.statistic > worst.statistic)))
       worst = v;

@@ -2,6 +2,7 @@
 #include <array>
 #include <optional>
 
+#include "core/calibration/disparity_jump.hpp"
 #include "core/calibration/gates.hpp"
 #include "core/calibration/monitor.hpp"
 #include "core/calibration/motion_track_builder.hpp"
@@ -138,6 +139,7 @@ class OnlineCalibrator {
   SolveTask task_;
   std::array<std::optional<calibration::Monitor>, kMaxCameras> monitors_;  // [k] of camera k ≥ 1
   std::array<std::optional<calibration::MotionTrackBuilder>, kMaxCameras> feeds_;
+  std::array<std::optional<calibration::DisparityJumpDetector>, kMaxCameras> jumps_;
   BoundedVector<calibration::StereoObservation> stereo_;
   std::array<bool, kMaxCameras> learning_{};
   std::array<int, kMaxCameras> grace_{};  // frames whose verdict does not count yet

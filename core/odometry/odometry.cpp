@@ -490,7 +490,10 @@ FrameOutcome Odometry::process(const RigFrame& frame) noexcept {
       any_pose_ ? predict(std::min(dt, kLongestExtrapolation)) : Transform{};
 
   if (map_.order().empty()) {
-    if (link_pending_) take_up_link();
+    if (link_pending_) {
+      take_up_link();
+      out.relinked = true;
+    }
     begin_scene(frame, images, predicted, dt, &out);
     return out;
   }
@@ -520,6 +523,7 @@ FrameOutcome Odometry::process(const RigFrame& frame) noexcept {
   if (link_pending_ && weakness(images) == Reason::none) {
     // The scene was made with another rig: it is rebuilt, where the camera now is.
     take_up_link();
+    out.relinked = true;
     FrameOutcome built;
     if (!start_scene(T_left_world_, frame.stamp, &built)) out.reason = built.reason;
   } else if (confirmed_stereo(fit) && !images.repeated && wants_keyframe()) {

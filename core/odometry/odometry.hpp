@@ -20,6 +20,7 @@ struct FrameOutcome {
   bool keyframe = false;
   bool restarted = false;    // the scene was rebuilt in this frame
   bool relocalised = false;  // found again in the window after being lost
+  bool relinked = false;     // a calibration was taken up after this frame was posed
   bool initialised = false;  // the rig's transform was found from this frame's images alone
   double gap_s = 0;          // time since the frame before, when it was too long to predict over
   bool images_good = false;  // every camera gave an image, new and with structure

@@ -1,8 +1,8 @@
-#include "tests/support/mcap_writer.hpp"
-
 #include <lz4frame.h>
 #include <zlib.h>
 #include <zstd.h>
+
+#include "tests/support/bag_writer.hpp"
 
 namespace vergence::test {
 namespace {
@@ -41,7 +41,9 @@ McapWriter::McapWriter(std::string compression) : compression_(std::move(compres
 }
 
 void McapWriter::channel(std::uint16_t id, std::string_view topic, std::string_view type) {
-  chunk_ += record_of(3, number(id, 2) + text(type) + text("ros2msg") + text(""));
+  std::string of_ros2(type);
+  of_ros2.replace(of_ros2.find('/'), 1, "/msg/");
+  chunk_ += record_of(3, number(id, 2) + text(of_ros2) + text("ros2msg") + text(""));
   chunk_ += record_of(4, number(id, 2) + number(id, 2) + text(topic) + text("cdr") + number(0, 4));
 }
 

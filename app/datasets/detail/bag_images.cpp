@@ -19,10 +19,13 @@ void colour_to_grey(const std::uint8_t* row, int width, std::size_t red, std::si
 
 }  // namespace
 
-BagImages::BagImages(std::vector<std::unique_ptr<FileBytes>> files,
+BagImages::BagImages(BagFormat format, std::vector<BagFile> files,
                      std::array<std::string, 2> topics,
                      std::array<std::vector<BagImage>, 2> images) noexcept
-    : files_(std::move(files)), topics_(std::move(topics)), images_(std::move(images)) {}
+    : format_(format),
+      files_(std::move(files)),
+      topics_(std::move(topics)),
+      images_(std::move(images)) {}
 
 std::string BagImages::name(std::size_t camera, std::size_t index) const {
   const std::string& topic = topics_[camera];
@@ -52,20 +55,26 @@ ImageFileStatus BagImages::size(const std::string& name, ImageSize* size) const 
   return ImageFileStatus::ok;
 }
 
-bool BagImages::load(const BagImage& entry, Unpacked* unpacked,
-                     std::vector<std::uint8_t>* data) const {
-  const FileBytes& file = *files_[entry.file];
+std::shared_ptr<const std::vector<std::uint8_t>> BagImages::unpacked(const BagImage& entry) const {
+  // One at a time: who comes second for the same chunk finds it here.
+  const std::lock_guard lock(mutex_);
+  for (const Unpacked& u : unpacked_)
+    if (u.records && u.chunk == entry.place.chunk && u.file == entry.file) return u.records;
+  unpacked_[1] = {};
+  auto records = std::make_shared<std::vector<std::uint8_t>>();
+  if (!unpack_chunk(format_, *files_[entry.file].bytes, entry.place.chunk, records.get()))
+    return nullptr;
+  unpacked_[1] = std::move(unpacked_[0]);
+  unpacked_[0] = {entry.file, entry.place.chunk, std::move(records)};
+  return unpacked_[0].records;
+}
+
+bool BagImages::load(const BagImage& entry, std::vector<std::uint8_t>* data) const {
   data->resize(entry.image.bytes);
   const std::uint64_t offset = entry.place.offset + entry.image.offset;
-  if (entry.place.chunk == McapPlace::kNoChunk) return file.read(offset, *data);
-  const std::lock_guard lock(unpacked->one_at_a_time);
-  if (unpacked->chunk != entry.place.chunk || unpacked->file != entry.file) {
-    unpacked->chunk = McapPlace::kNoChunk;  // until it is whole
-    if (!unpack_chunk(file, entry.place.chunk, &unpacked->records)) return false;
-    unpacked->chunk = entry.place.chunk;
-    unpacked->file = entry.file;
-  }
-  return MemoryBytes(unpacked->records).read(offset, *data);
+  if (entry.place.chunk == BagPlace::kNoChunk) return files_[entry.file].bytes->read(offset, *data);
+  const auto records = unpacked(entry);
+  return records && MemoryBytes(*records).read(offset, *data);
 }
 
 ImageFileStatus BagImages::decode(const std::string& name, ImageSize size, std::uint8_t* out,
@@ -75,7 +84,7 @@ ImageFileStatus BagImages::decode(const std::string& name, ImageSize size, std::
   if (entry == nullptr) return ImageFileStatus::missing;
   const RosImage& image = entry->image;
   if (image.size != size) return ImageFileStatus::wrong_size;
-  if (!load(*entry, &unpacked_[camera], work)) return ImageFileStatus::unreadable;
+  if (!load(*entry, work)) return ImageFileStatus::unreadable;
   const std::uint8_t* in = work->data();
   switch (image.layout) {
     case PixelLayout::encoded:

@@ -6,26 +6,18 @@
 #include <string>
 #include <vector>
 
-#include "app/datasets/detail/mcap.hpp"
-#include "app/datasets/detail/ros_messages.hpp"
+#include "app/datasets/detail/bag_index.hpp"
 #include "app/datasets/image_store.hpp"
 
 namespace vergence::app::detail {
 
-/// Where an image of a bag is; its pixels stay in the file.
-struct BagImage {
-  RosImage image{};
-  McapPlace place{};
-  std::uint32_t file = 0;  // of the bag's files
-};
-
-/// The images of two topics of a bag, loaded when they are asked for. A camera's chunk stays
-/// unpacked until its next one is wanted.
-/// Memory  Some 80 bytes an image, and twice kMostChunk a camera at most.
+/// The images of two topics of a bag, loaded when they are asked for. The two chunks used last stay
+/// unpacked: the two images of a pair mostly lie in one.
+/// Memory  Some 80 bytes an image, and four times kMostChunk at most.
 class BagImages final : public ImageStore {
  public:
   /// `topics`, `images`: left, right.
-  BagImages(std::vector<std::unique_ptr<FileBytes>> files, std::array<std::string, 2> topics,
+  BagImages(BagFormat format, std::vector<BagFile> files, std::array<std::string, 2> topics,
             std::array<std::vector<BagImage>, 2> images) noexcept;
 
   /// What names image `index` of camera `camera`: `left/image_raw#12`.
@@ -36,22 +28,24 @@ class BagImages final : public ImageStore {
                                        std::vector<std::uint8_t>* work) const override;
 
  private:
-  /// The chunk that a camera's last image was in.
   struct Unpacked {
-    std::mutex one_at_a_time;
     std::uint32_t file = 0;
-    std::uint64_t chunk = 0;
-    std::vector<std::uint8_t> records;
+    std::uint64_t chunk = BagPlace::kNoChunk;
+    std::shared_ptr<const std::vector<std::uint8_t>> records{};
   };
   /// Nothing: no such image.
   [[nodiscard]] const BagImage* find(const std::string& name, std::size_t* camera) const noexcept;
-  [[nodiscard]] bool load(const BagImage& entry, Unpacked* unpacked,
-                          std::vector<std::uint8_t>* data) const;
+  [[nodiscard]] bool load(const BagImage& entry, std::vector<std::uint8_t>* data) const;
+  /// Records of the image's chunk; null: it does not unpack.
+  [[nodiscard]] std::shared_ptr<const std::vector<std::uint8_t>> unpacked(
+      const BagImage& entry) const;
 
-  std::vector<std::unique_ptr<FileBytes>> files_;
+  BagFormat format_;
+  std::vector<BagFile> files_;
   std::array<std::string, 2> topics_;
   std::array<std::vector<BagImage>, 2> images_;
-  mutable std::array<Unpacked, 2> unpacked_;
+  mutable std::mutex mutex_;                  // with unpacked_
+  mutable std::array<Unpacked, 2> unpacked_;  // the newer one first
 };
 
 }  // namespace vergence::app::detail

@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "app/datasets/detail/bag_index.hpp"
 #include "app/datasets/image_file.hpp"
 #include "app/datasets/recorded_ins.hpp"
 #include "app/datasets/stereo_sequence.hpp"
@@ -21,8 +22,11 @@ namespace vergence::app::detail {
 [[nodiscard]] StereoSequence open_folder(const std::filesystem::path& folder, bool given,
                                          const CalibrationUse& use);
 [[nodiscard]] StereoSequence open_st_lucia(const std::filesystem::path& folder, bool given);
-[[nodiscard]] StereoSequence open_bag(const std::filesystem::path& bag, bool given,
-                                      const BagTopics& topics);
+[[nodiscard]] StereoSequence open_bag(BagFormat format, const std::filesystem::path& bag,
+                                      bool given, const BagTopics& topics);
+/// The same of a bag whose index is there; `path`: for sentences.
+[[nodiscard]] StereoSequence sequence_of(const std::filesystem::path& path, BagIndex bag,
+                                         bool given, const BagTopics& topics);
 
 /// The packets of oxts/ of a KITTI raw drive as INS samples (docs/kitti_raw.md); what is missing,
 /// broken or out of order is left out and told. InputError: files that are not there, no packet

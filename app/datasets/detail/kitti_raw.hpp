@@ -44,10 +44,6 @@ struct KittiStamps {
 /// InputError: not there, no stamp in it, more lines than kMostReadings.
 [[nodiscard]] KittiStamps read_kitti_stamps(const std::filesystem::path& file);
 
-/// Indices of a longest strictly ascending part of the stamps: what stays when the fewest are left
-/// out that go back or repeat one.
-[[nodiscard]] std::vector<std::size_t> ascending(std::span<const Stamp> stamps);
-
 /// The rig of two of the four cameras, and where it sits.
 struct KittiRawRig {
   RigCalibration rig{};

@@ -1,20 +1,13 @@
 #include "app/datasets/detail/mcap.hpp"
 
-#include <fcntl.h>
-#include <lz4frame.h>
-#include <sys/stat.h>
-#include <unistd.h>
 #include <zlib.h>
-#include <zstd.h>
 
 #include <algorithm>
 #include <array>
-#include <cerrno>
-#include <cstring>
-#include <memory>
+#include <map>
 
+#include "app/datasets/detail/decompress.hpp"
 #include "app/datasets/detail/little_endian.hpp"
-#include "app/datasets/text_file.hpp"
 
 namespace vergence::app::detail {
 namespace {
@@ -24,7 +17,7 @@ constexpr std::uint64_t kRecordHead = 9;    // opcode u8, length u64
 constexpr std::uint64_t kMessageHead = 22;  // channel u16, sequence u32, log and publish time u64
 constexpr std::uint64_t kChunkHead =
     32;  // start, end, unpacked size u64, check sum u32, length of the compression's name u32
-constexpr std::uint64_t kMostName = 16;  // bytes of a compression's name
+constexpr std::uint64_t kMostCompression = 16;  // bytes of a compression's name
 
 enum class Opcode : std::uint8_t {
   footer = 2,
@@ -61,7 +54,7 @@ struct ChunkHead {
 };
 
 std::optional<ChunkHead> chunk_head(const ByteSource& file, const Record& record) {
-  std::array<std::uint8_t, kChunkHead + kMostName + 8> bytes{};
+  std::array<std::uint8_t, kChunkHead + kMostCompression + 8> bytes{};
   const auto there = std::span(bytes).first(
       static_cast<std::size_t>(std::min<std::uint64_t>(bytes.size(), record.size)));
   if (!file.read(record.content, there) || there.size() < kChunkHead) return std::nullopt;
@@ -94,34 +87,18 @@ std::string unpack(const ByteSource& file, const ChunkHead& head,
   return "";
 }
 
-bool decompress_zstd(std::span<const std::uint8_t> packed, std::span<std::uint8_t> out) noexcept {
-  const std::size_t got = ZSTD_decompress(out.data(), out.size(), packed.data(), packed.size());
-  return ZSTD_isError(got) == 0 && got == out.size();
-}
-
-bool decompress_lz4(std::span<const std::uint8_t> packed, std::span<std::uint8_t> out) noexcept {
-  LZ4F_dctx* context = nullptr;
-  if (LZ4F_isError(LZ4F_createDecompressionContext(&context, LZ4F_VERSION)) != 0) return false;
-  const std::unique_ptr<LZ4F_dctx, decltype(&LZ4F_freeDecompressionContext)> owner(
-      context, &LZ4F_freeDecompressionContext);
-  std::size_t in = 0, written = 0, hint = 1;
-  while (in < packed.size() && hint != 0) {
-    std::size_t taken = packed.size() - in, given = out.size() - written;
-    hint =
-        LZ4F_decompress(context, out.data() + written, &given, packed.data() + in, &taken, nullptr);
-    if (LZ4F_isError(hint) != 0 || (taken == 0 && given == 0)) return false;
-    in += taken, written += given;
-  }
-  return hint == 0 && written == out.size();
+MessageEncoding encoding_of(const std::string& name) {
+  return name == "cdr"    ? MessageEncoding::cdr
+         : name == "ros1" ? MessageEncoding::ros1
+                          : MessageEncoding::other;
 }
 
 /// One scan of one file.
 class Scanner {
  public:
-  Scanner(const FileBytes& file, const std::function<void(const McapMessage&)>& each)
-      : file_(file), each_(each) {}
+  Scanner(const ByteSource& file, const BagVisitor& each) : file_(file), each_(each) {}
 
-  McapScan scan() {
+  BagScan scan() {
     std::uint64_t at = kMagic.size();
     scan_.end = at;
     while (const auto record = record_at(file_, at)) {
@@ -134,7 +111,7 @@ class Scanner {
       if (record->opcode == Opcode::chunk)
         take_chunk(*record);
       else
-        take(file_, *record, McapPlace::kNoChunk, record->content - kRecordHead);
+        take(file_, *record, BagPlace::kNoChunk, record->content - kRecordHead);
     }
     return std::move(scan_);
   }
@@ -144,13 +121,14 @@ class Scanner {
     const std::uint64_t here = record.content - kRecordHead;
     const auto head = chunk_head(file_, record);
     if (!head)
-      return broken(&scan_.broken_chunks, here, "a chunk whose head contradicts its length");
+      return scan_.broken(&BagScan::broken_chunks, here,
+                          "a chunk whose head contradicts its length");
     if (head->compression.empty()) {
-      walk(file_, head->records, head->records + head->packed, McapPlace::kNoChunk, here);
+      walk(file_, head->records, head->records + head->packed, BagPlace::kNoChunk, here);
       return;
     }
     if (const std::string why = unpack(file_, *head, &records_); !why.empty())
-      return broken(&scan_.broken_chunks, here, why);
+      return scan_.broken(&BagScan::broken_chunks, here, why);
     walk(MemoryBytes(records_), 0, records_.size(), here, here);
   }
 
@@ -160,7 +138,7 @@ class Scanner {
     while (at < end) {
       const auto record = record_at(bytes, at);
       if (!record || record->content + record->size > end)
-        return broken(&scan_.broken_records, here, "a chunk whose records do not fill it");
+        return scan_.broken(&BagScan::broken_records, here, "a chunk whose records do not fill it");
       take(bytes, *record, chunk, here);
       at = record->content + record->size;
     }
@@ -172,23 +150,25 @@ class Scanner {
     if (record.opcode == Opcode::message) return take_message(bytes, record, chunk, here);
     if (record.opcode != Opcode::schema && record.opcode != Opcode::channel) return;
     if (record.size > kMostDescription)
-      return broken(&scan_.broken_records, here, "a description longer than 1 MiB");
+      return scan_.broken(&BagScan::broken_records, here, "a description longer than 1 MiB");
     std::vector<std::uint8_t> content(static_cast<std::size_t>(record.size));
     if (!bytes.read(record.content, content))
-      return broken(&scan_.broken_records, here, "a description that cannot be read");
+      return scan_.broken(&BagScan::broken_records, here, "a description that cannot be read");
     LittleEndian in(content);
     const std::uint16_t id = in.u16();
     if (record.opcode == Opcode::schema) {
       std::string name = in.text();
-      if (!in.ok())
-        return broken(&scan_.broken_records, here, "a schema whose lengths contradict each other");
-      types_.try_emplace(id, std::move(name));
+      if (!in.ok() || name.size() > kMostName)
+        return scan_.broken(&BagScan::broken_records, here,
+                            "a schema whose lengths contradict each other");
+      types_.try_emplace(id, plain_type(name));
       return;
     }
     const std::uint16_t schema = in.u16();
-    McapChannel channel{in.text(), "", in.text()};
-    if (!in.ok())
-      return broken(&scan_.broken_records, here, "a channel whose lengths contradict each other");
+    BagChannel channel{in.text(), "", encoding_of(in.text())};
+    if (!in.ok() || channel.topic.size() > kMostName)
+      return scan_.broken(&BagScan::broken_records, here,
+                          "a channel whose lengths contradict each other");
     if (const auto type = types_.find(schema); type != types_.end()) channel.type = type->second;
     channels_.try_emplace(id, std::move(channel));
   }
@@ -197,91 +177,43 @@ class Scanner {
                     std::uint64_t here) {
     std::array<std::uint8_t, kMessageHead> head{};
     if (record.size < kMessageHead || record.size > kMostChunk || !bytes.read(record.content, head))
-      return broken(&scan_.broken_records, here,
-                    "a message shorter than its head or longer than 64 MiB");
+      return scan_.broken(&BagScan::broken_records, here,
+                          "a message shorter than its head or longer than 64 MiB");
     LittleEndian in(head);
     const auto channel = channels_.find(in.u16());
     if (channel == channels_.end()) {
       ++scan_.orphans;
       return;
     }
-    (void)in.u32();
     ++scan_.messages;
-    const std::uint64_t log_time = in.u64();
     each_({&channel->second,
-           log_time,
            {chunk, record.content + kMessageHead,
             static_cast<std::uint32_t>(record.size - kMessageHead)},
            &bytes});
   }
 
-  void broken(std::uint64_t* counter, std::uint64_t offset, const std::string& why) {
-    ++*counter;
-    if (scan_.first_broken) return;
-    scan_.first_broken = offset;
-    scan_.why_broken = why;
-  }
-
-  const FileBytes& file_;
-  const std::function<void(const McapMessage&)>& each_;
-  McapScan scan_;
+  const ByteSource& file_;
+  const BagVisitor& each_;
+  BagScan scan_;
   std::vector<std::uint8_t> records_;           // of the chunk in hand
   std::map<std::uint16_t, std::string> types_;  // by schema
-  std::map<std::uint16_t, McapChannel> channels_;
+  std::map<std::uint16_t, BagChannel> channels_;
 };
 
 }  // namespace
 
-FileBytes::FileBytes(const std::filesystem::path& file)
-    : path_(file), fd_(::open(file.c_str(), O_RDONLY | O_CLOEXEC)) {
-  if (fd_ < 0) refuse(file, 0, std::string("cannot be opened: ") + std::strerror(errno));
-  struct stat about {};
-  if (::fstat(fd_, &about) != 0 || !S_ISREG(about.st_mode)) {
-    ::close(fd_);
-    refuse(file, 0, "is no regular file; a .mcap file is expected");
-  }
-  size_ = static_cast<std::uint64_t>(about.st_size);
-}
-
-FileBytes::~FileBytes() { ::close(fd_); }
-
-bool FileBytes::read(std::uint64_t offset, std::span<std::uint8_t> out) const noexcept {
-  if (offset > size_ || out.size() > size_ - offset) return false;
-  for (std::size_t got = 0; got < out.size();) {
-    const ssize_t n =
-        ::pread(fd_, out.data() + got, out.size() - got, static_cast<off_t>(offset + got));
-    if (n < 0 && errno == EINTR) continue;
-    if (n <= 0) return false;
-    got += static_cast<std::size_t>(n);
-  }
-  return true;
-}
-
-bool MemoryBytes::read(std::uint64_t offset, std::span<std::uint8_t> out) const noexcept {
-  if (offset > bytes_.size() || out.size() > bytes_.size() - offset) return false;
-  std::copy_n(bytes_.begin() + static_cast<std::ptrdiff_t>(offset), out.size(), out.begin());
-  return true;
-}
-
-McapScan scan_mcap(const FileBytes& file, const std::function<void(const McapMessage&)>& each) {
+std::optional<BagScan> scan_mcap(const ByteSource& file, const BagVisitor& each) {
   std::array<std::uint8_t, kMagic.size()> magic{};
-  if (!file.read(0, magic) || magic != kMagic)
-    refuse(file.path(), 0,
-           "does not begin as an MCAP file does (offset 0: 89 4D 43 41 50 30 0D 0A)");
+  if (!file.read(0, magic) || magic != kMagic) return std::nullopt;
   return Scanner(file, each).scan();
 }
 
-bool unpack_chunk(const FileBytes& file, std::uint64_t offset, std::vector<std::uint8_t>* records) {
+bool unpack_mcap_chunk(const ByteSource& file, std::uint64_t offset,
+                       std::vector<std::uint8_t>* records) {
   const auto record = record_at(file, offset);
   if (!record || record->opcode != Opcode::chunk) return false;
   const auto head = chunk_head(file, *record);
   return head && unpack(file, *head, records).empty();
-}
-
-bool decompress(const std::string& name, std::span<const std::uint8_t> packed,
-                std::span<std::uint8_t> records) noexcept {
-  if (name == "zstd") return decompress_zstd(packed, records);
-  return name == "lz4" && decompress_lz4(packed, records);
 }
 
 }  // namespace vergence::app::detail

@@ -1,13 +1,11 @@
 #include "app/datasets/detail/ros_messages.hpp"
 
 #include <array>
-#include <bit>
-#include <cstring>
 #include <string_view>
-#include <type_traits>
 #include <vector>
 
 #include "app/datasets/detail/image_size.hpp"
+#include "app/datasets/detail/ros_reader.hpp"
 
 namespace vergence::app::detail {
 namespace {
@@ -31,54 +29,13 @@ bool is_rotation(const Mat3& R) {
 
 }  // namespace
 
-CdrReader::CdrReader(std::span<const std::uint8_t> bytes) noexcept : bytes_(bytes) {
-  ok_ = bytes.size() >= 4 && bytes[0] == 0 && bytes[1] <= 1;
-  little_ = ok_ && bytes[1] == 1;
-}
-
-template <typename T>
-T CdrReader::get() noexcept {
-  static_assert(std::is_arithmetic_v<T>);
-  const std::size_t at = (at_ - 4 + sizeof(T) - 1) / sizeof(T) * sizeof(T) + 4;
-  T value{};
-  if (!ok_ || at > bytes_.size() || sizeof(T) > bytes_.size() - at) {
-    ok_ = false;
-    return value;
-  }
-  std::array<std::uint8_t, sizeof(T)> raw{};
-  for (std::size_t i = 0; i < sizeof(T); ++i)
-    raw[i] =
-        bytes_[at +
-               (little_ == (std::endian::native == std::endian::little) ? i : sizeof(T) - 1 - i)];
-  std::memcpy(&value, raw.data(), sizeof(T));
-  at_ = at + sizeof(T);
-  return value;
-}
-
-std::string CdrReader::text() {
-  const auto length = get<std::uint32_t>();  // with the 0 at its end
-  if (!ok_ || length > bytes_.size() - at_) {
-    ok_ = false;
-    return "";
-  }
-  const auto* begin = reinterpret_cast<const char*>(bytes_.data() + at_);
-  at_ += length;
-  return length == 0 ? "" : std::string(begin, length - 1);
-}
-
-Stamp CdrReader::header() {
-  const auto seconds = get<std::int32_t>();
-  const auto ns = get<std::uint32_t>();
-  (void)text();
-  return Stamp(std::int64_t{seconds} * 1'000'000'000 + ns);
-}
-
-std::optional<RosImage> read_ros_image(std::span<const std::uint8_t> head, std::size_t size) {
-  CdrReader in(head);
+std::optional<RosImage> read_ros_image(std::span<const std::uint8_t> head, std::size_t size,
+                                       MessageEncoding encoding) {
+  RosReader in(head, encoding);
   RosImage image;
   image.stamp = in.header();
   const auto height = in.get<std::uint32_t>(), width = in.get<std::uint32_t>();
-  const std::string encoding = in.text();
+  const std::string pixels = in.text();
   (void)in.get<std::uint8_t>();  // bytes of 8 bits have no order
   image.step = in.get<std::uint32_t>();
   image.bytes = in.get<std::uint32_t>();
@@ -87,7 +44,7 @@ std::optional<RosImage> read_ros_image(std::span<const std::uint8_t> head, std::
     return std::nullopt;
   image.offset = static_cast<std::uint32_t>(in.position());
   for (const Encoding& known : kEncodings) {
-    if (encoding != known.name) continue;
+    if (pixels != known.name) continue;
     if (image.step < width * known.bytes || std::uint64_t{image.step} * height > image.bytes ||
         image.bytes > size - image.offset)
       return std::nullopt;
@@ -98,8 +55,8 @@ std::optional<RosImage> read_ros_image(std::span<const std::uint8_t> head, std::
 }
 
 std::optional<RosImage> read_ros_compressed_image(std::span<const std::uint8_t> head,
-                                                  std::size_t size) {
-  CdrReader in(head);
+                                                  std::size_t size, MessageEncoding encoding) {
+  RosReader in(head, encoding);
   RosImage image;
   image.layout = PixelLayout::encoded;
   image.stamp = in.header();
@@ -114,8 +71,9 @@ std::optional<RosImage> read_ros_compressed_image(std::span<const std::uint8_t> 
   return image;
 }
 
-std::optional<RosCameraInfo> read_ros_camera_info(std::span<const std::uint8_t> message) {
-  CdrReader in(message);
+std::optional<RosCameraInfo> read_ros_camera_info(std::span<const std::uint8_t> message,
+                                                  MessageEncoding encoding) {
+  RosReader in(message, encoding);
   (void)in.header();
   const auto height = in.get<std::uint32_t>(), width = in.get<std::uint32_t>();
   const std::string model = in.text();
@@ -123,8 +81,7 @@ std::optional<RosCameraInfo> read_ros_camera_info(std::span<const std::uint8_t> 
   if (!in.ok() || count > kMostCoefficients) return std::nullopt;
   std::vector<double> d(count);
   for (double& v : d) v = in.get<double>();
-  std::array<double, 9> k{};
-  for (double& v : k) v = in.get<double>();
+  const auto k = in.doubles<9>();
   RosCameraInfo info;
   RosCamera& camera = info.camera;
   for (int i = 0; i < 9; ++i) camera.R(i / 3, i % 3) = in.get<double>();

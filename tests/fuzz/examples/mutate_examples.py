@@ -1,8 +1,10 @@
-"""Mutates the example configurations and a small data folder, and runs the program on each.
+"""Mutates the example configurations, a small data folder and small bags, and runs the program on each.
 
 None may crash, run longer than LIMIT_S of its own time, hold more than LIMIT_BYTES or end with another code than 0, 1, 2 (DESIGN §6; 3 is for
 devices, which no run here has). Usage: mutate_examples.py PROGRAM EXAMPLES RUNS [SEED]. The seed of a failure is printed with its files.
+mutate_examples.py --bags FOLDER writes the bags alone, for bag_fuzz to begin with.
 """
+import bz2
 import math
 import os
 import random
@@ -83,6 +85,99 @@ def write_folder(folder: Path) -> None:
     )
 
 
+class Message:
+    """Values of a ROS message one after the other: aligned and behind four bytes (CDR), or as ROS 1 has them."""
+
+    def __init__(self, cdr: bool, ns: int):
+        self.cdr, self.body = cdr, b""
+        if not cdr:
+            self.put("I", 7)
+        self.put("I", ns // 10**9).put("I", ns % 10**9).text("f")
+
+    def put(self, kind: str, *values) -> "Message":
+        for value in values:
+            size = struct.calcsize("<" + kind)
+            if self.cdr:
+                self.body += bytes(-len(self.body) % size)
+            self.body += struct.pack("<" + kind, value)
+        return self
+
+    def text(self, word: str) -> "Message":
+        raw = word.encode() + (b"\0" if self.cdr else b"")
+        return self.blob(raw)
+
+    def blob(self, raw: bytes) -> "Message":
+        self.put("I", len(raw))
+        self.body += raw
+        return self
+
+    def bytes(self) -> bytes:
+        return (b"\0\1\0\0" if self.cdr else b"") + self.body
+
+
+TOPICS = ["/left/image_raw", "/right/image_raw", "/left/camera_info", "/right/camera_info", "/fix", "/imu"]
+TYPES = ["Image", "Image", "CameraInfo", "CameraInfo", "NavSatFix", "Imu"]
+
+
+def messages(cdr: bool) -> list:
+    """(topic's number, time, bytes) of five pairs with their calibration and an INS."""
+    width, height, out = 96, 72, []
+    for i in range(5):
+        ns = 10**18 + 10**8 * i
+        for k in range(2):
+            rows = bytes((((x + 2 * i + 5 * k) // 7) * 7919 + (y // 5) * 104729) * 2654435761 >> 13 & 0xFF for y in range(height) for x in range(width))
+            out.append((k, ns, Message(cdr, ns).put("I", height, width).text("mono8").put("B", 0).put("I", width).blob(rows).bytes()))
+            info = Message(cdr, ns).put("I", height, width).text("plumb_bob").put("I", 5).put("d", *[0.0] * 5)
+            info.put("d", 80, 0, 48, 0, 80, 36, 0, 0, 1).put("d", 1, 0, 0, 0, 1, 0, 0, 0, 1)
+            out.append((2 + k, ns, info.put("d", 80, 0, 48, -40 * k, 0, 80, 36, 0, 0, 0, 1, 0).bytes()))
+        fix = Message(cdr, ns).put("b", 0).put("H", 1).put("d", -27.5, 153 + 1e-5 * i, 40).put("d", *[1.0] * 9).put("B", 2)
+        out.append((4, ns, fix.bytes()))
+        out.append((5, ns, Message(cdr, ns).put("d", 0, 0, 0, 1).put("d", *[1e-4] * 9).put("d", *[0.0] * 24).bytes()))
+    return out
+
+
+def mcap() -> bytes:
+    def text(word: str) -> bytes:
+        return struct.pack("<I", len(word)) + word.encode()
+
+    def record(op: int, body: bytes) -> bytes:
+        return struct.pack("<BQ", op, len(body)) + body
+
+    chunk = b""
+    for i, (topic, kind) in enumerate(zip(TOPICS, TYPES)):
+        chunk += record(3, struct.pack("<H", i) + text("sensor_msgs/msg/" + kind) + text("ros2msg") + text(""))
+        chunk += record(4, struct.pack("<HH", i, i) + text(topic) + text("cdr") + text(""))
+    for i, ns, body in messages(True):
+        chunk += record(5, struct.pack("<HIQQ", i, 0, ns, ns) + body)
+    whole = record(6, struct.pack("<QQQI", 0, 0, len(chunk), 0) + text("") + struct.pack("<Q", len(chunk)) + chunk)
+    return b"\x89MCAP0\r\n" + record(1, text("ros2") + text("")) + whole + record(15, bytes(4)) + record(2, bytes(20)) + b"\x89MCAP0\r\n"
+
+
+def rosbag(compression: str) -> bytes:
+    def fields(**values: bytes) -> bytes:
+        return b"".join(struct.pack("<I", len(n) + 1 + len(v)) + n.encode() + b"=" + v for n, v in values.items())
+
+    def record(header: bytes, data: bytes) -> bytes:
+        return struct.pack("<I", len(header)) + header + struct.pack("<I", len(data)) + data
+
+    chunk = b""
+    for i, (topic, kind) in enumerate(zip(TOPICS, TYPES)):
+        about = fields(topic=topic.encode(), type=b"sensor_msgs/" + kind.encode(), md5sum=b"*", message_definition=b"")
+        chunk += record(fields(op=b"\7", conn=struct.pack("<I", i), topic=topic.encode()), about)
+    for i, ns, body in messages(False):
+        chunk += record(fields(op=b"\2", conn=struct.pack("<I", i), time=struct.pack("<II", ns // 10**9, ns % 10**9)), body)
+    packed = bz2.compress(chunk) if compression == "bz2" else chunk
+    head = record(fields(op=b"\3", index_pos=bytes(8), conn_count=bytes(4), chunk_count=bytes(4)), b" " * 40)
+    return b"#ROSBAG V2.0\n" + head + record(fields(op=b"\5", compression=compression.encode(), size=struct.pack("<I", len(chunk))), packed)
+
+
+def write_bags(folder: Path) -> None:
+    folder.mkdir()
+    (folder / "a.mcap").write_bytes(mcap())
+    (folder / "a.bag").write_bytes(rosbag("none"))
+    (folder / "b.bag").write_bytes(rosbag("bz2"))
+
+
 def run(command: list, work: Path) -> str:
     """What is wrong with how the program ended; empty: nothing."""
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
@@ -122,6 +217,17 @@ def one_folder(program: str, original: Path, work: Path, rng: random.Random) -> 
     return run([program, "replay", "data", "--quiet", "--threads", "1", "--out", "out", *options], work)
 
 
+def one_bag(program: str, bags: list, work: Path, rng: random.Random) -> str:
+    bag = rng.choice(bags)
+    data = bag.read_bytes()
+    # Pixels are most of a bag: all but a few changes are where records begin.
+    at = rng.randrange(len(data)) if rng.random() < 0.3 else 0
+    spoilt = data[:at] + mutated(data[at : at + 2000], rng) + data[at + 2000 :] if bag.name != "b.bag" else mutated(data, rng)
+    (work / bag.name).write_bytes(spoilt)
+    options = rng.choice([[], [], ["--from-scratch"], ["--ins-topic", "/fix"], ["--left-topic", "/right/image_raw"], ["--frames", "3"]])
+    return run([program, "replay", bag.name, "--quiet", "--threads", "1", "--out", "out", *options], work)
+
+
 def one_configuration(program: str, examples: list, work: Path, rng: random.Random) -> str:
     text = rng.choice(examples).read_bytes()
     (work / "rig.yaml").write_bytes(mutated(text, rng))
@@ -131,17 +237,30 @@ def one_configuration(program: str, examples: list, work: Path, rng: random.Rand
 
 
 def main() -> int:
+    if sys.argv[1] == "--bags":
+        write_bags(Path(sys.argv[2]))
+        return 0
     program, examples, runs = os.path.abspath(sys.argv[1]), sorted(Path(sys.argv[2]).glob("mock*.yaml")), int(sys.argv[3])
     seed = int(sys.argv[4]) if len(sys.argv) > 4 else 1
     failures = 0
     with tempfile.TemporaryDirectory(prefix="vergence-mutate-") as root:
         original = Path(root) / "original"
         write_folder(original)
+        write_bags(Path(root) / "bags")
+        bags = sorted((Path(root) / "bags").iterdir())
+        for bag in bags:  # as they are they are drives
+            done = subprocess.run([program, "replay", bag, "--quiet", "--out", root + "/" + bag.name], capture_output=True)
+            if done.returncode > 1:
+                print(f"{bag.name} as it is ends with {done.returncode}: {done.stderr.decode()}")
+                failures += 1
         for i in range(seed, seed + runs):
             rng = random.Random(i)
             work = Path(root) / "work"
             work.mkdir()
-            wrong = one_folder(program, original, work, rng) if i % 2 else one_configuration(program, examples, work, rng)
+            if i % 2:
+                wrong = one_configuration(program, examples, work, rng)
+            else:
+                wrong = one_bag(program, bags, work, rng) if i % 4 else one_folder(program, original, work, rng)
             if wrong:
                 failures += 1
                 print(f"seed {i}: {wrong}")

@@ -9,86 +9,10 @@
 #include <nlohmann/json.hpp>
 #include <opencv2/imgcodecs.hpp>
 
-#include "app/config/calibration_file.hpp"
-#include "tests/support/mcap_writer.hpp"
-#include "tests/support/temporary_folder.hpp"
-#include "tests/system/odometry/mock_drive.hpp"
-#include "tests/unit/app/commands/run_vergence.hpp"
+#include "tests/system/replay/replayed_folder.hpp"
 
 namespace vergence::test {
 namespace {
-
-namespace fs = std::filesystem;
-
-constexpr std::size_t kFrames = 24;  // of a straight stretch at 9 m/s: 10 m
-
-std::string image_name(int camera, std::size_t pair) {
-  return fmt::format("{}/{:03d}.png", camera == 0 ? "left" : "right", pair);
-}
-
-/// A rendered stretch in the layout of `--format folder`: what a newcomer brings.
-class ReplayedFolder : public ::testing::Test {
- protected:
-  static void SetUpTestSuite() {
-    master_ = new TemporaryFolder;
-    mock::DriveOptions options;
-    options.kind = mock::DriveKind::brief;
-    const StereoDrive drive = render_drive(options, Duration::seconds(6), kFrames);
-    std::string times;
-    for (std::size_t i = 0; i < drive.size(); ++i) {
-      times += fmt::format("{}\n", drive.stamps[i].ns());
-      for (int k = 0; k < 2; ++k) {
-        const Picture& p = drive.pairs[i][static_cast<std::size_t>(k)];
-        const fs::path file = *master_ / image_name(k, i);
-        fs::create_directories(file.parent_path());
-        const cv::Mat image(p.height, p.width, CV_8U, const_cast<std::uint8_t*>(p.bytes.data()),
-                            static_cast<std::size_t>(p.stride));
-        ASSERT_TRUE(cv::imwrite(file.string(), image));
-      }
-    }
-    master_->write("times.txt", times);
-    app::CalibrationFile calibration;
-    calibration.rig = drive.rig;
-    app::write_calibration(*master_ / "calibration.yaml", calibration);
-  }
-  static void TearDownTestSuite() { delete master_; }
-
-  /// A copy of the stretch, to be spoilt.
-  ReplayedFolder() { fs::copy(*master_ / ".", data(), fs::copy_options::recursive); }
-
-  [[nodiscard]] fs::path data() const { return work_ / "data"; }
-  [[nodiscard]] fs::path session() const { return work_ / "session"; }
-  [[nodiscard]] Outcome replay(const std::string& more = "") const {
-    return run_vergence("replay '" + data().string() + "' --format folder --quiet --out '" +
-                        session().string() + "' " + more);
-  }
-  [[nodiscard]] nlohmann::json summary() const {
-    return nlohmann::json::parse(read_file(session() / "summary.json"));
-  }
-  void expect_refused(const std::string& named) const {
-    const Outcome o = replay();
-    EXPECT_EQ(o.code, 2) << o.err;
-    EXPECT_NE(o.err.find(named), std::string::npos) << o.err;
-    EXPECT_FALSE(fs::exists(session() / "trajectory.tum"));
-  }
-  void expect_skipped(std::size_t frames) const {
-    const Outcome o = replay();
-    EXPECT_EQ(o.code, 0) << o.err;
-    const auto s = summary();
-    EXPECT_EQ(s["frames"]["skipped"], frames);
-    EXPECT_EQ(s["frames"]["read"], kFrames - frames);
-    EXPECT_EQ(s["frames"]["posed"], kFrames - frames);
-    EXPECT_NE(read_file(session() / "events.jsonl").find("skipped"), std::string::npos);
-  }
-  void write(const std::string& name, const std::string& text) const {
-    std::ofstream(data() / name, std::ios::binary) << text;
-  }
-
-  TemporaryFolder work_;
-  static TemporaryFolder* master_;
-};
-
-TemporaryFolder* ReplayedFolder::master_ = nullptr;
 
 TEST_F(ReplayedFolder, aMaskChangesWhatIsSeenAndOneOfAnotherSizeIsRefused) {
   const std::string white(640 * 480, '\xff');
@@ -110,32 +34,6 @@ TEST_F(ReplayedFolder, aMaskChangesWhatIsSeenAndOneOfAnotherSizeIsRefused) {
                              " is 320 × 240 px, the camera's images are 640 × 480"),
             std::string::npos)
       << refused.err;
-}
-
-TEST_F(ReplayedFolder, aBagGivesThePosesOfTheSameImages) {
-  ASSERT_EQ(replay().code, 0);
-  const std::string poses = read_file(session() / "trajectory.tum");
-  McapWriter bag("zstd");
-  bag.channel(1, "/left/image_raw/compressed", "sensor_msgs/msg/CompressedImage");
-  bag.channel(2, "/right/image_raw/compressed", "sensor_msgs/msg/CompressedImage");
-  std::ifstream times(data() / "times.txt");
-  std::size_t pair = 0;
-  for (std::int64_t ns = 0; times >> ns; ++pair) {
-    for (int k = 0; k < 2; ++k)
-      bag.message(
-          static_cast<std::uint16_t>(k + 1), ns,
-          CdrWriter().header(ns).text("png").blob(read_file(data() / image_name(k, pair))).bytes());
-    bag.close_chunk();  // never finished: as a recorder that was killed leaves it
-  }
-  ASSERT_EQ(pair, kFrames);
-  const fs::path file = work_.write("drive.mcap", bag.bytes());
-  const fs::path other = work_ / "of_bag";
-  const Outcome o =
-      run_vergence("replay '" + file.string() + "' --out '" + other.string() + "' --calibration '" +
-                   (data() / "calibration.yaml").string() + "'");
-  ASSERT_EQ(o.code, 0) << o.err;
-  EXPECT_NE(o.err.find("drive.mcap is unfinished"), std::string::npos) << o.err;
-  EXPECT_EQ(read_file(other / "trajectory.tum"), poses);
 }
 
 TEST_F(ReplayedFolder, givesASessionWithAPoseForEveryFrame) {

@@ -1,68 +1,70 @@
 #include <gtest/gtest.h>
 
 #include <array>
+#include <memory>
+#include <span>
 
+#include "app/datasets/detail/formats.hpp"
 #include "app/datasets/stereo_sequence.hpp"
 #include "app/runtime/errors.hpp"
-#include "tests/support/mcap_writer.hpp"
+#include "tests/support/ros_messages.hpp"
 #include "tests/support/temporary_folder.hpp"
 
 namespace vergence::app {
 namespace {
 
-using test::CdrWriter;
-using test::McapWriter;
+using test::BagKind;
+using test::Wire;
 
 constexpr std::int64_t kStart = 1'700'000'000'000'000'000, kStep = 50'000'000;  // ns
 constexpr std::uint32_t kWidth = 70, kHeight = 48, kStride = 80;                // px, px, bytes
 
 char pixel(std::uint32_t x, std::uint32_t y) { return static_cast<char>((3 * x + 5 * y) & 0xFFU); }
 
-std::string image(std::int64_t stamp, bool little = true, std::uint32_t width = kWidth) {
+std::string image(Wire wire, std::int64_t stamp, std::uint32_t width = kWidth) {
   std::string data(std::size_t{kStride} * kHeight, '\0');
   for (std::uint32_t y = 0; y < kHeight; ++y)
     for (std::uint32_t x = 0; x < width; ++x) data[y * kStride + x] = pixel(x, y);
-  return CdrWriter(little)
-      .header(stamp)
-      .put(kHeight)
-      .put(width)
-      .text("mono8")
-      .put(std::uint8_t{0})
-      .put(kStride)
-      .blob(data)
-      .bytes();
+  return image_message(wire, stamp, {width, kHeight, kStride, "mono8", data});
 }
 
-/// Of a rectified pair 0.12 m apart, fx = fy = 60.
-std::string camera_info(double fx_times_b, const std::string& model = "plumb_bob") {
-  CdrWriter w;
-  w.header(kStart).put(kHeight).put(kWidth).text(model).put(std::uint32_t{5});
-  for (const double d : {-0.1, 0.01, 0.001, 0.002, 0.0}) w.put(d);
-  for (const double k : {60.0, 0.0, 35.0, 0.0, 61.0, 24.0, 0.0, 0.0, 1.0}) w.put(k);
-  for (const double r : {1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0}) w.put(r);
-  for (const double p : {60.0, 0.0, 35.0, fx_times_b, 0.0, 60.0, 24.0, 0.0, 0.0, 0.0, 1.0, 0.0})
-    w.put(p);
-  return w.bytes();
+/// Of a rectified pair 0.12 m apart, f = 60.
+std::string camera_info(Wire wire, double fx_times_b, const std::string& model = "plumb_bob") {
+  return camera_info_message(
+      wire, kStart,
+      {kWidth, kHeight, model, {-0.1, 0.01, 0.001, 0.002, 0.0}, 60, 61, 35, 24, fx_times_b});
 }
 
-class Bag : public ::testing::Test {
+class Bag : public ::testing::TestWithParam<BagKind> {
  protected:
   Bag() {
-    writer_.channel(1, "/left/image_raw", "sensor_msgs/msg/Image");
-    writer_.channel(2, "/right/image_raw", "sensor_msgs/msg/Image");
-    writer_.channel(3, "/left/camera_info", "sensor_msgs/msg/CameraInfo");
-    writer_.channel(4, "/right/camera_info", "sensor_msgs/msg/CameraInfo");
-    writer_.message(3, kStart, camera_info(0));
-    writer_.message(4, kStart, camera_info(-7.2));
+    begin();
+    writer_->channel(4, "/right/camera_info", "sensor_msgs/CameraInfo");
+    writer_->message(3, kStart, camera_info(wire(), 0));
+    writer_->message(4, kStart, camera_info(wire(), -7.2));
   }
+  void begin() {
+    writer_ = GetParam().writer();
+    writer_->channel(1, "/left/image_raw", "sensor_msgs/Image");
+    writer_->channel(2, "/right/image_raw", "sensor_msgs/Image");
+    writer_->channel(3, "/left/camera_info", "sensor_msgs/CameraInfo");
+  }
+  [[nodiscard]] static Wire wire() { return GetParam().wire(); }
   void frame(std::int64_t i, std::int64_t late = 0) {
-    writer_.message(1, kStart, image(kStart + i * kStep));
-    writer_.message(2, kStart, image(kStart + i * kStep + late, false));
+    const Wire other = GetParam().is_mcap() ? Wire::cdr_big : wire();
+    writer_->message(1, kStart, image(wire(), kStart + i * kStep));
+    writer_->message(2, kStart, image(other, kStart + i * kStep + late));
+  }
+  void left(std::int64_t stamp, std::uint32_t width = kWidth) {
+    writer_->message(1, kStart, image(wire(), stamp, width));
+  }
+  [[nodiscard]] static SequenceFormat format() {
+    return GetParam().is_mcap() ? SequenceFormat::mcap : SequenceFormat::rosbag;
   }
   [[nodiscard]] StereoSequence open(const BagTopics& topics = {}) {
-    writer_.finish();
-    folder_.write("drive/drive_0.mcap", writer_.bytes());
-    return open_sequence(SequenceFormat::mcap, folder_ / "drive", std::nullopt, {}, {0, 1}, topics);
+    writer_->finish();
+    folder_.write("drive/drive_0" + GetParam().ending(), writer_->bytes());
+    return open_sequence(format(), folder_ / "drive", std::nullopt, {}, {0, 1}, topics);
   }
   [[nodiscard]] std::string refusal(const BagTopics& topics = {}) {
     try {
@@ -74,13 +76,13 @@ class Bag : public ::testing::Test {
   }
 
   test::TemporaryFolder folder_;
-  McapWriter writer_{"lz4"};
+  std::unique_ptr<test::BagWriter> writer_;
 };
 
-TEST_F(Bag, PairsCalibrationAndPixelsAreThoseOfTheMessages) {
+TEST_P(Bag, PairsCalibrationAndPixelsAreThoseOfTheMessages) {
   for (std::int64_t i = 0; i < 4; ++i) frame(i, 1'000'000);
   const StereoSequence s = open();
-  EXPECT_EQ(find_format(folder_ / "drive"), SequenceFormat::mcap);
+  EXPECT_EQ(find_format(folder_ / "drive"), format());
   ASSERT_EQ(s.pairs.size(), 4U);
   EXPECT_EQ(s.left_out, 0U);
   EXPECT_EQ(s.pairs[2].stamp.ns(), kStart + 2 * kStep);
@@ -100,11 +102,11 @@ TEST_F(Bag, PairsCalibrationAndPixelsAreThoseOfTheMessages) {
             ImageFileStatus::missing);
 }
 
-TEST_F(Bag, ImagesOfAnotherSizeOrGoingBackAreLeftOutAndCounted) {
+TEST_P(Bag, ImagesOfAnotherSizeOrGoingBackAreLeftOutAndCounted) {
   for (std::int64_t i = 0; i < 4; ++i) frame(i);
-  writer_.message(1, 0, image(kStart + 4 * kStep, true, kWidth - 2));
-  writer_.message(1, 0, image(kStart + kStep));
-  writer_.message(1, 0, image(kStart + 5 * kStep).substr(0, 300));
+  left(kStart + 4 * kStep, kWidth - 2);
+  left(kStart + kStep);
+  writer_->message(1, 0, image(wire(), kStart + 5 * kStep).substr(0, 300));
   const StereoSequence s = open();
   EXPECT_EQ(s.pairs.size(), 4U);
   EXPECT_EQ(s.left_out, 3U);
@@ -113,26 +115,27 @@ TEST_F(Bag, ImagesOfAnotherSizeOrGoingBackAreLeftOutAndCounted) {
                               "1 whose stamps do not go forward"),
             std::string::npos)
       << s.remarks[0];
-  EXPECT_NE(s.remarks[0].find("drive_0.mcap, offset "), std::string::npos) << s.remarks[0];
+  EXPECT_NE(s.remarks[0].find("drive_0" + GetParam().ending() + ", offset "), std::string::npos)
+      << s.remarks[0];
 }
 
-TEST_F(Bag, ImageWithoutPartnerIsLeftOut) {
+TEST_P(Bag, ImageWithoutPartnerIsLeftOut) {
   for (std::int64_t i = 0; i < 4; ++i) frame(i);
-  writer_.message(1, 0, image(kStart + 4 * kStep));
+  left(kStart + 4 * kStep);
   frame(5);
   const StereoSequence s = open();
   EXPECT_EQ(s.pairs.size(), 5U);
   EXPECT_EQ(s.left_out, 1U);
 }
 
-TEST_F(Bag, StampsThatNeverMatchAreRefused) {
+TEST_P(Bag, StampsThatNeverMatchAreRefused) {
   for (std::int64_t i = 0; i < 4; ++i) frame(i, 3'600'000'000'000);
   EXPECT_NE(refusal().find("has no pair"), std::string::npos);
 }
 
-TEST_F(Bag, SeveralTopicsAreListedAndOneIsChosen) {
-  writer_.channel(5, "/left/image_small", "sensor_msgs/msg/Image");
-  writer_.message(5, 0, image(kStart));
+TEST_P(Bag, SeveralTopicsAreListedAndOneIsChosen) {
+  writer_->channel(5, "/left/image_small", "sensor_msgs/Image");
+  writer_->message(5, 0, image(wire(), kStart));
   for (std::int64_t i = 0; i < 4; ++i) frame(i);
   const std::string said = refusal();
   EXPECT_NE(said.find("--left-topic"), std::string::npos) << said;
@@ -142,19 +145,16 @@ TEST_F(Bag, SeveralTopicsAreListedAndOneIsChosen) {
   EXPECT_EQ(open({"/left/image_raw", ""}).pairs.size(), 4U);
 }
 
-TEST_F(Bag, CameraInfoOfAnotherModelIsRefused) {
-  writer_ = McapWriter();
-  writer_.channel(1, "/left/image_raw", "sensor_msgs/msg/Image");
-  writer_.channel(2, "/right/image_raw", "sensor_msgs/msg/Image");
-  writer_.channel(3, "/left/camera_info", "sensor_msgs/msg/CameraInfo");
-  writer_.message(3, kStart, camera_info(0, "fov"));
+TEST_P(Bag, CameraInfoOfAnotherModelIsRefused) {
+  begin();
+  writer_->message(3, kStart, camera_info(wire(), 0, "fov"));
   frame(0);
   EXPECT_NE(refusal().find("/left/camera_info: d is of the model \"fov\""), std::string::npos);
 }
 
-TEST_F(Bag, CameraInfoOfAnotherSizeIsRefused) {
-  writer_.message(1, kStart, image(kStart, true, kWidth - 2));
-  writer_.message(2, kStart, image(kStart, true, kWidth - 2));
+TEST_P(Bag, CameraInfoOfAnotherSizeIsRefused) {
+  left(kStart, kWidth - 2);
+  writer_->message(2, kStart, image(wire(), kStart, kWidth - 2));
   const std::string said = refusal();
   EXPECT_NE(said.find("left/image_raw#0"), std::string::npos) << said;
   EXPECT_NE(said.find("is 68x48 pixels, but the calibration of this camera (CameraInfo of /left "
@@ -163,21 +163,69 @@ TEST_F(Bag, CameraInfoOfAnotherSizeIsRefused) {
       << said;
 }
 
-TEST_F(Bag, CutAnywhereIsReadOrRefused) {
-  for (std::int64_t i = 0; i < 2; ++i) {
-    frame(i);
-    writer_.close_chunk();
-  }
-  const std::string whole = writer_.bytes();
-  for (std::size_t cut = 0; cut < whole.size(); cut += 7) {
-    folder_.write("cut.mcap", whole.substr(0, cut));
-    try {
-      EXPECT_LE(open_sequence(SequenceFormat::mcap, folder_ / "cut.mcap").pairs.size(), 2U);
-    } catch (const InputError& e) {
-      EXPECT_NE(std::string(e.what()).find("cut.mcap"), std::string::npos) << e.what();
-    }
+TEST_P(Bag, OtherFilesAreRefusedByWhatTheyBeginWith) {
+  folder_.write("drive/a" + GetParam().ending(), "#ROSBAG V1.2\n");
+  try {
+    (void)open_sequence(format(), folder_ / "drive");
+    FAIL() << "taken";
+  } catch (const InputError& e) {
+    EXPECT_NE(std::string(e.what()).find("does not begin as a"), std::string::npos) << e.what();
   }
 }
+
+TEST_P(Bag, OneStampFarAheadCostsOneImage) {
+  frame(0);
+  left(kStart + 86'400'000'000'000);
+  for (std::int64_t i = 1; i < 4; ++i) frame(i);
+  const StereoSequence s = open();
+  EXPECT_EQ(s.pairs.size(), 4U);
+  EXPECT_EQ(s.left_out, 1U);
+}
+
+TEST_P(Bag, CutAnywhereIsReadOrRefused) {
+  constexpr std::array<std::uint16_t, 2> kInfos{3, 4};
+  constexpr std::uint32_t kSmall = 6;  // px: all cuts of a bag take a second
+  const auto small = [](std::int64_t i) {
+    return image_message(
+        wire(), kStart + i * kStep,
+        {kSmall, kSmall, kSmall, "mono8", std::string(std::size_t{kSmall} * kSmall, 'x')});
+  };
+  begin();
+  writer_->channel(4, "/right/camera_info", "sensor_msgs/CameraInfo");
+  for (const std::uint16_t k : kInfos)
+    writer_->message(
+        k, kStart,
+        camera_info_message(wire(), kStart,
+                            {kSmall, kSmall, "plumb_bob", {}, 6, 6, 3, 3, k == 3 ? 0 : -1.2}));
+  for (std::int64_t i = 0; i < 2; ++i) {
+    writer_->message(1, kStart, small(i));
+    writer_->message(2, kStart, small(i));
+    writer_->close_chunk();
+  }
+  writer_->finish();
+  const std::string whole = writer_->bytes(), name = "cut" + GetParam().ending();
+  const auto container = GetParam().is_mcap() ? detail::BagFormat::mcap : detail::BagFormat::rosbag;
+  const std::span all(reinterpret_cast<const std::uint8_t*>(whole.data()), whole.size());
+  std::size_t opened = 0;
+  for (std::size_t cut = 0; cut < whole.size(); ++cut) {
+    std::vector<detail::BagFile> files;
+    files.push_back({name, std::make_unique<detail::MemoryBytes>(all.first(cut))});
+    try {
+      const StereoSequence s = detail::sequence_of(
+          name, detail::index_bag(container, name, std::move(files)), false, {});
+      EXPECT_LE(s.pairs.size(), 2U);
+      ++opened;
+    } catch (const InputError& e) {
+      EXPECT_NE(std::string(e.what()).find(name), std::string::npos) << e.what();
+    }
+  }
+  EXPECT_GT(opened, 0U);
+}
+
+INSTANTIATE_TEST_SUITE_P(Kinds, Bag,
+                         ::testing::Values(BagKind{"mcap", ""}, BagKind{"mcap", "lz4"},
+                                           BagKind{"rosbag", "none"}, BagKind{"rosbag", "lz4"},
+                                           BagKind{"rosbag", "bz2"}));
 
 }  // namespace
 }  // namespace vergence::app

@@ -10,6 +10,7 @@
 
 #include "app/datasets/image_file.hpp"
 #include "core/math/random.hpp"
+#include "tests/support/mutated.hpp"
 #include "tests/unit/app/datasets/png_bytes.hpp"
 #include "tests/unit/app/datasets/tiny_drive.hpp"
 
@@ -215,37 +216,12 @@ TEST(ImageFile, anAreaThatNoCameraHasIsRefusedBeforeAnythingIsTakenForIt) {
   EXPECT_EQ(check_image(png, &size), ImageFileStatus::not_an_image);
 }
 
-/// Bytes changed, taken out, put in and cut off; of a PNG the check sums mended, or nothing would
-/// get past them.
-FileBytes mutated(FileBytes file, Random* random) {
-  const auto any = [random](std::size_t n) {
-    return static_cast<std::size_t>(random->below(static_cast<std::uint32_t>(n)));
-  };
-  const std::size_t changes = 1 + any(4);
-  for (std::size_t i = 0; i < changes && file.size() > 16; ++i) {
-    const std::size_t at = any(any(3) == 0 ? std::min<std::size_t>(file.size(), 80)
-                                           : file.size());  // heads are where lies live
-    const auto place = file.begin() + static_cast<std::ptrdiff_t>(at);
-    switch (any(5)) {
-      case 0:
-        *place = static_cast<std::uint8_t>(*place ^ 1U << any(8));
-        break;
-      case 1:
-        *place = static_cast<std::uint8_t>(any(2) == 0 ? 0xff : any(256));
-        break;
-      case 2:
-        file.erase(place, place + static_cast<std::ptrdiff_t>(
-                                      std::min<std::size_t>(1 + any(16), file.size() - at)));
-        break;
-      case 3:
-        file.insert(place, 1 + any(16), static_cast<std::uint8_t>(any(256)));
-        break;
-      default:
-        if (any(8) == 0) file.resize(at);
-    }
-  }
-  if (any(4) != 0 && file.size() > 8 && file[1] == 'P') test::mend_check_sums(&file);
-  return file;
+/// Of a PNG the check sums mended, or nothing would get past them.
+FileBytes mutated(const FileBytes& file, Random* random) {
+  FileBytes changed = test::mutated(file, random);
+  if (random->below(4) != 0 && changed.size() > 8 && changed[1] == 'P')
+    test::mend_check_sums(&changed);
+  return changed;
 }
 
 TEST(ImageFile, aHundredThousandMutationsKeepWithinTheirRows) {

@@ -9,6 +9,7 @@
 
 #include <fmt/format.h>
 
+#include "app/datasets/detail/ascending.hpp"
 #include "app/datasets/detail/kitti_raw.hpp"
 #include "app/datasets/recorded_ins.hpp"
 #include "app/datasets/stereo_sequence.hpp"

@@ -1,0 +1,207 @@
+#include "app/datasets/detail/bag_index.hpp"
+
+#include <algorithm>
+#include <system_error>
+#include <type_traits>
+
+#include <fmt/format.h>
+
+#include "app/datasets/detail/ascending.hpp"
+#include "app/datasets/detail/jpeg.hpp"
+#include "app/datasets/recorded_ins.hpp"
+#include "app/datasets/text_file.hpp"
+
+namespace vergence::app::detail {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::size_t kMostFiles = 500;  // each stays open
+constexpr std::size_t kMostImages =
+    4'000'000;  // of all topics: a day and a half at 30 Hz, 320 MB of index
+constexpr std::size_t kMostAttitudes = 8'000'000;  // of all topics: five hours at 400 Hz, 460 MB
+constexpr std::size_t kMostBytes = 65536;          // of a CameraInfo and of a reading
+
+std::vector<fs::path> files_of(BagFormat format, const fs::path& bag) {
+  const std::string ending = format == BagFormat::mcap ? ".mcap" : ".bag";
+  std::error_code error;
+  if (!fs::is_directory(bag, error)) {
+    if (!fs::exists(bag, error))
+      refuse(bag, 0, "does not exist; a " + ending + " file or a folder with some is expected");
+    return {bag};
+  }
+  std::vector<fs::path> files;
+  for (fs::directory_iterator it(bag, error), end; !error && it != end; it.increment(error))
+    if (it->path().extension() == ending) files.push_back(it->path());
+  if (error) refuse(bag, 0, "cannot be listed (" + error.message() + "): check its permissions");
+  if (files.empty()) refuse(bag, 0, "holds no " + ending + " file");
+  if (files.size() > kMostFiles)
+    refuse(bag, 0,
+           fmt::format("holds {} {} files; at most {} are read", files.size(), ending, kMostFiles));
+  // Recorders count without leading zeros: drive_2.mcap stands before drive_10.mcap.
+  const auto order = [](const fs::path& a, const fs::path& b) {
+    const std::string l = a.filename().string(), r = b.filename().string();
+    return l.size() != r.size() ? l.size() < r.size() : l < r;
+  };
+  std::sort(files.begin(), files.end(), order);
+  return files;
+}
+
+std::vector<std::uint8_t> first_bytes(const BagMessage& message, std::size_t most) {
+  std::vector<std::uint8_t> bytes(std::min<std::size_t>(most, message.place.size));
+  if (!message.bytes->read(message.place.offset, bytes)) bytes.clear();
+  return bytes;
+}
+
+/// Of `list` what is not in `kept`, an ascending list of indices, goes.
+template <typename T>
+void keep(const std::vector<std::size_t>& kept, std::vector<T>* list) {
+  for (std::size_t i = 0; i < kept.size(); ++i) (*list)[i] = (*list)[kept[i]];
+  list->resize(kept.size());
+}
+
+class Indexer {
+ public:
+  Indexer(BagFormat format, const fs::path& path, std::vector<BagFile> files) : path_(path) {
+    bag_.format = format;
+    bag_.files = std::move(files);
+    for (; file_ < bag_.files.size(); ++file_) scan();
+    for (auto& [topic, of_topic] : bag_.images) put_in_order(&of_topic);
+    const auto order = [](auto& topics, const auto& stamp_of) {
+      for (auto& [name, topic] : topics) {
+        std::vector<Stamp> stamps;
+        for (const auto& reading : topic.readings) stamps.push_back(stamp_of(reading));
+        const std::vector<std::size_t> kept = ascending(stamps);
+        topic.backwards = stamps.size() - kept.size();
+        keep(kept, &topic.readings);
+      }
+    };
+    order(bag_.fixes, [](const RosFix& r) { return r.stamp; });
+    order(bag_.attitudes, [](const RosAttitude& r) { return r.stamp; });
+    order(bag_.odometry, [](const RosOdometry& r) { return r.attitude.stamp; });
+  }
+  BagIndex take_index() { return std::move(bag_); }
+
+ private:
+  void scan() {
+    const BagFile& file = bag_.files[file_];
+    const auto scan = scan_bag(bag_.format, *file.bytes, [this](const BagMessage& m) { take(m); });
+    if (!scan)
+      refuse(path_, 0,
+             fmt::format("{} does not begin as {} does", file.name,
+                         bag_.format == BagFormat::mcap
+                             ? "an MCAP file (offset 0: 89 4D 43 41 50 30 0D 0A)"
+                             : "a ROS 1 bag of version 2.0 (offset 0: #ROSBAG V2.0)"));
+    remark(file.name, *scan);
+  }
+
+  void take(const BagMessage& message) {
+    if (message.channel->encoding == MessageEncoding::other) return;
+    const std::string &type = message.channel->type, &topic = message.channel->topic;
+    if (type == "sensor_msgs/Image") return take_image(message, false);
+    if (type == "sensor_msgs/CompressedImage") return take_image(message, true);
+    if (type == "sensor_msgs/CameraInfo") return take_info(message);
+    if (type == "sensor_msgs/NavSatFix")
+      return take_reading(message, read_ros_fix, &bag_.fixes[topic]);
+    if (type == "sensor_msgs/Imu")
+      return take_reading(message, read_ros_attitude, &bag_.attitudes[topic]);
+    if (type == "nav_msgs/Odometry")
+      take_reading(message, read_ros_odometry, &bag_.odometry[topic]);
+  }
+
+  void take_image(const BagMessage& message, bool compressed) {
+    ImageTopic& topic = bag_.images[message.channel->topic];
+    const std::vector<std::uint8_t> head =
+        first_bytes(message, compressed ? kJpegHead : kRosImageHead);
+    const auto read = compressed ? read_ros_compressed_image : read_ros_image;
+    const auto image = read(head, message.place.size, message.channel->encoding);
+    const bool other_size =
+        image && !topic.images.empty() && image->size != topic.images.front().image.size;
+    if (image && !other_size) {
+      if (++images_ > kMostImages)
+        refuse(path_, 0, fmt::format("brings more than {} images; cut the bag", kMostImages));
+      topic.images.push_back({*image, message.place, static_cast<std::uint32_t>(file_)});
+      return;
+    }
+    if (topic.left_out.first.empty()) topic.left_out.first = where(message.place, file_);
+    ++(image ? topic.left_out.other_size : topic.left_out.unreadable);
+  }
+
+  void take_info(const BagMessage& message) {
+    const std::string& topic = message.channel->topic;
+    if (bag_.infos.contains(topic)) return;
+    if (auto info =
+            read_ros_camera_info(first_bytes(message, kMostBytes), message.channel->encoding))
+      bag_.infos.emplace(topic, std::move(*info));
+  }
+
+  template <typename Read, typename Reading>
+  void take_reading(const BagMessage& message, Read read, ReadingTopic<Reading>* topic) {
+    const auto reading = read(first_bytes(message, kMostBytes), message.channel->encoding);
+    if (!reading) {
+      ++topic->unreadable;
+      return;
+    }
+    constexpr bool kAttitude = std::is_same_v<Reading, RosAttitude>;
+    constexpr std::size_t kMost = kAttitude ? kMostAttitudes : kMostReadings;
+    if (++(kAttitude ? attitudes_ : readings_) > kMost)
+      refuse(path_, 0,
+             fmt::format("brings more than {} {}; cut the bag", kMost,
+                         kAttitude ? "orientations" : "readings of an INS"));
+    topic->readings.push_back(*reading);
+  }
+
+  /// Leaves out the images whose stamps do not go forward.
+  void put_in_order(ImageTopic* topic) {
+    std::vector<Stamp> stamps;
+    for (const BagImage& image : topic->images) stamps.push_back(image.image.stamp);
+    const std::vector<std::size_t> kept = ascending(stamps);
+    topic->left_out.backwards = stamps.size() - kept.size();
+    if (kept.size() == stamps.size()) return;
+    std::size_t first = 0;
+    while (first < kept.size() && kept[first] == first) ++first;
+    if (topic->left_out.first.empty())
+      topic->left_out.first = where(topic->images[first].place, topic->images[first].file);
+    keep(kept, &topic->images);
+  }
+
+  [[nodiscard]] std::string where(const BagPlace& place, std::size_t file) const {
+    const bool packed = place.chunk != BagPlace::kNoChunk;
+    return fmt::format("{}, offset {}{}", bag_.files[file].name,
+                       packed ? place.chunk : place.offset, packed ? " (of its chunk)" : "");
+  }
+
+  void remark(const std::string& name, const BagScan& scan) {
+    if (!scan.finished)
+      bag_.remarks.push_back(fmt::format(
+          "{} is unfinished: it was read up to offset {}, where its last whole record ends", name,
+          scan.end));
+    if (scan.first_broken)
+      bag_.remarks.push_back(fmt::format(
+          "{}: {} chunks and {} records were left out; the first at offset {} is {}", name,
+          scan.broken_chunks, scan.broken_records, *scan.first_broken, scan.why_broken));
+    if (scan.orphans > 0)
+      bag_.remarks.push_back(
+          fmt::format("{}: {} messages of no described channel were left out", name, scan.orphans));
+  }
+
+  const fs::path& path_;
+  BagIndex bag_{};
+  std::size_t file_ = 0;  // in hand
+  std::size_t images_ = 0, readings_ = 0, attitudes_ = 0;
+};
+
+}  // namespace
+
+std::vector<BagFile> open_bag_files(BagFormat format, const fs::path& path) {
+  std::vector<BagFile> files;
+  for (const fs::path& file : files_of(format, path))
+    files.push_back({file.filename().string(), std::make_unique<FileBytes>(file)});
+  return files;
+}
+
+BagIndex index_bag(BagFormat format, const fs::path& path, std::vector<BagFile> files) {
+  return Indexer(format, path, std::move(files)).take_index();
+}
+
+}  // namespace vergence::app::detail

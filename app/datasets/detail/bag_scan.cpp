@@ -1,0 +1,33 @@
+#include "app/datasets/detail/bag_scan.hpp"
+
+#include "app/datasets/detail/mcap.hpp"
+#include "app/datasets/detail/rosbag.hpp"
+
+namespace vergence::app::detail {
+
+std::string plain_type(std::string_view type) {
+  constexpr std::string_view kOfRos2 = "/msg/";
+  std::string plain(type);
+  if (const std::size_t at = plain.find(kOfRos2); at != std::string::npos)
+    plain.replace(at, kOfRos2.size(), "/");
+  return plain;
+}
+
+void BagScan::broken(std::uint64_t BagScan::*counter, std::uint64_t offset, std::string_view why) {
+  ++(this->*counter);
+  if (first_broken) return;
+  first_broken = offset;
+  why_broken = why;
+}
+
+std::optional<BagScan> scan_bag(BagFormat format, const ByteSource& file, const BagVisitor& each) {
+  return format == BagFormat::mcap ? scan_mcap(file, each) : scan_rosbag(file, each);
+}
+
+bool unpack_chunk(BagFormat format, const ByteSource& file, std::uint64_t offset,
+                  std::vector<std::uint8_t>* records) {
+  return format == BagFormat::mcap ? unpack_mcap_chunk(file, offset, records)
+                                   : unpack_rosbag_chunk(file, offset, records);
+}
+
+}  // namespace vergence::app::detail

@@ -1,0 +1,86 @@
+#pragma once
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "app/datasets/detail/byte_source.hpp"
+
+/// Messages out of recordings of ROS, whatever container they are in: front to back, indexes and
+/// summaries are neither believed nor needed.
+namespace vergence::app::detail {
+
+inline constexpr std::uint64_t kMostChunk =
+    std::uint64_t{64}
+    << 20U;  // bytes, packed or unpacked: rosbag and rosbag2 write less than 1 MiB
+inline constexpr std::uint64_t kMostDescription =
+    std::uint64_t{1} << 20;                          // bytes of a record that describes a channel
+inline constexpr std::size_t kMostName = 1024;       // bytes of a topic's or a type's name
+inline constexpr std::size_t kMostChannels = 65536;  // of a file
+
+enum class BagFormat : std::uint8_t { mcap, rosbag };
+
+/// How the messages of a channel are serialised: by CDR (ROS 2), as ROS 1 does it, or in a way that
+/// is not read.
+enum class MessageEncoding : std::uint8_t { cdr, ros1, other };
+
+struct BagChannel {
+  std::string topic;
+  std::string type;  // as ROS 1 writes it: sensor_msgs/Image
+  MessageEncoding encoding = MessageEncoding::other;
+};
+
+/// The type's name as ROS 1 writes it: without the /msg/ of ROS 2.
+[[nodiscard]] std::string plain_type(std::string_view type);
+
+/// Where a message's content is.
+struct BagPlace {
+  static constexpr std::uint64_t kNoChunk = 0;
+  std::uint64_t chunk = kNoChunk;  // offset of a packed chunk's record in the file; kNoChunk:
+                                   // `offset` counts from the file's start
+  std::uint64_t offset = 0;        // of the message's content, in the unpacked records of the chunk
+  std::uint32_t size = 0;          // bytes of the content
+};
+
+struct BagMessage {
+  const BagChannel* channel = nullptr;  // until the scan ends
+  BagPlace place{};
+  const ByteSource* bytes = nullptr;  // where place.offset counts; during the call
+};
+
+using BagVisitor = std::function<void(const BagMessage&)>;
+
+/// What a scan met.
+struct BagScan {
+  std::uint64_t messages = 0;
+  std::uint64_t orphans = 0;  // messages of no channel that was described before them
+  std::uint64_t broken_chunks =
+      0;  // do not unpack, fail their check sum, or are larger than kMostChunk: skipped
+  std::uint64_t broken_records =
+      0;  // descriptions that contradict themselves, messages shorter than their head: skipped
+  std::optional<std::uint64_t> first_broken{};  // offset in the file of the first of these
+  std::string why_broken{};                     // and what is wrong with it: a phrase
+  bool finished = false;                        // its writer closed it
+  std::uint64_t end = 0;                        // offset behind the last whole record
+
+  /// One more of `counter`, which is broken_chunks or broken_records.
+  void broken(std::uint64_t BagScan::*counter, std::uint64_t offset, std::string_view why);
+};
+
+/// Hands every message to `each`, in the file's order; content that is not all there is not handed
+/// over. Chunks without compression are read where they lie, the heads of messages only, whatever
+/// their length.
+/// Nothing: the file does not begin as the format does.
+/// Memory  Two times kMostChunk, and kMostChannels names, at most.
+[[nodiscard]] std::optional<BagScan> scan_bag(BagFormat format, const ByteSource& file,
+                                              const BagVisitor& each);
+
+/// Unpacks the chunk at `offset` of the file into *records. False: it is not as the scan found it;
+/// *records undefined.
+[[nodiscard]] bool unpack_chunk(BagFormat format, const ByteSource& file, std::uint64_t offset,
+                                std::vector<std::uint8_t>* records);
+
+}  // namespace vergence::app::detail

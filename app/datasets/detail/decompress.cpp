@@ -1,0 +1,54 @@
+#include "app/datasets/detail/decompress.hpp"
+
+#include <bzlib.h>
+#include <lz4frame.h>
+#include <zstd.h>
+
+#include <limits>
+#include <memory>
+
+namespace vergence::app::detail {
+namespace {
+
+bool decompress_zstd(std::span<const std::uint8_t> packed, std::span<std::uint8_t> out) noexcept {
+  const std::size_t got = ZSTD_decompress(out.data(), out.size(), packed.data(), packed.size());
+  return ZSTD_isError(got) == 0 && got == out.size();
+}
+
+bool decompress_lz4(std::span<const std::uint8_t> packed, std::span<std::uint8_t> out) noexcept {
+  LZ4F_dctx* context = nullptr;
+  if (LZ4F_isError(LZ4F_createDecompressionContext(&context, LZ4F_VERSION)) != 0) return false;
+  const std::unique_ptr<LZ4F_dctx, decltype(&LZ4F_freeDecompressionContext)> owner(
+      context, &LZ4F_freeDecompressionContext);
+  std::size_t in = 0, written = 0, hint = 1;
+  while (in < packed.size() && hint != 0) {
+    std::size_t taken = packed.size() - in, given = out.size() - written;
+    hint =
+        LZ4F_decompress(context, out.data() + written, &given, packed.data() + in, &taken, nullptr);
+    if (LZ4F_isError(hint) != 0 || (taken == 0 && given == 0)) return false;
+    in += taken, written += given;
+  }
+  return hint == 0 && written == out.size();
+}
+
+bool decompress_bz2(std::span<const std::uint8_t> packed, std::span<std::uint8_t> out) noexcept {
+  constexpr std::size_t kMost = std::numeric_limits<unsigned>::max();
+  if (packed.size() > kMost || out.size() > kMost) return false;
+  auto got = static_cast<unsigned>(out.size());
+  // The library's interface has no const; it does not write to its source.
+  auto* in = const_cast<char*>(reinterpret_cast<const char*>(packed.data()));
+  return BZ2_bzBuffToBuffDecompress(reinterpret_cast<char*>(out.data()), &got, in,
+                                    static_cast<unsigned>(packed.size()), 0, 0) == BZ_OK &&
+         got == out.size();
+}
+
+}  // namespace
+
+bool decompress(std::string_view name, std::span<const std::uint8_t> packed,
+                std::span<std::uint8_t> records) noexcept {
+  if (name == "zstd") return decompress_zstd(packed, records);
+  if (name == "bz2") return decompress_bz2(packed, records);
+  return name == "lz4" && decompress_lz4(packed, records);
+}
+
+}  // namespace vergence::app::detail

@@ -1,0 +1,106 @@
+#include "app/datasets/detail/ros_ins_messages.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "app/datasets/detail/ros_reader.hpp"
+
+namespace vergence::app::detail {
+namespace {
+
+constexpr double kUnitLength = 1e-2;     // what a quaternion's length may differ from 1 by
+constexpr double kFarthest = 1e7;        // m from the world's origin: a quarter of the earth
+constexpr double kUnknownHeight = 1000;  // m: sigma of a height that is not measured
+
+/// From the variances of two axes, or of one twice.
+double sigma(double a, double b) noexcept {
+  const double variance = (a + b) / 2;
+  return a >= 0 && b >= 0 && variance > 0 && std::isfinite(variance) ? std::sqrt(variance) : 0;
+}
+
+bool make_unit(std::array<double, 4>* q) noexcept {
+  const double length = std::hypot(std::hypot((*q)[0], (*q)[1]), std::hypot((*q)[2], (*q)[3]));
+  if (!(std::abs(length - 1) <= kUnitLength)) return false;
+  for (double& v : *q) v /= length;
+  return true;
+}
+
+}  // namespace
+
+std::optional<RosFix> read_ros_fix(std::span<const std::uint8_t> message,
+                                   MessageEncoding encoding) {
+  RosReader in(message, encoding);
+  RosFix fix;
+  fix.stamp = in.header();
+  const auto status = in.get<std::int8_t>();  // −1 no fix, 0 fix, 1 and 2 with corrections
+  (void)in.get<std::uint16_t>();              // of which systems
+  fix.position.latitude_deg = in.get<double>();
+  fix.position.longitude_deg = in.get<double>();
+  fix.position.height_m = in.get<double>();  // above the ellipsoid; NaN: not known
+  const auto covariance = in.doubles<9>();   // m², east, north, up
+  const auto covariance_type = in.get<std::uint8_t>();
+  if (!in.ok()) return std::nullopt;
+  fix.status = static_cast<std::uint8_t>(status);
+  if (covariance_type != 0) {
+    fix.position_sigma = sigma(covariance[0], covariance[4]);
+    fix.height_sigma = sigma(covariance[8], covariance[8]);
+  }
+  if (status < 0) {
+    if (!fix.position.plausible()) fix.position = {};
+    return fix;
+  }
+  fix.fix = FixStatus::fix_3d;
+  if (std::isnan(fix.position.height_m)) {
+    fix.fix = FixStatus::fix_2d;
+    fix.position.height_m = 0;
+    fix.height_sigma = kUnknownHeight;
+  }
+  if (!fix.position.plausible()) return std::nullopt;
+  return fix;
+}
+
+std::optional<RosAttitude> read_ros_attitude(std::span<const std::uint8_t> message,
+                                             MessageEncoding encoding) {
+  RosReader in(message, encoding);
+  RosAttitude attitude;
+  attitude.stamp = in.header();
+  attitude.q_world_body = in.doubles<4>();
+  const auto covariance = in.doubles<9>();  // rad², about x, y, z; first −1: no orientation
+  if (!in.ok() || covariance[0] < 0 || !make_unit(&attitude.q_world_body)) return std::nullopt;
+  attitude.tilt_sigma = sigma(covariance[0], covariance[4]);
+  attitude.heading_sigma = sigma(covariance[8], covariance[8]);
+  return attitude;
+}
+
+std::optional<RosOdometry> read_ros_odometry(std::span<const std::uint8_t> message,
+                                             MessageEncoding encoding) {
+  RosReader in(message, encoding);
+  RosOdometry odometry;
+  RosAttitude& attitude = odometry.attitude;
+  attitude.stamp = in.header();
+  (void)in.text();  // the body's name
+  const auto place = in.doubles<3>();
+  attitude.q_world_body = in.doubles<4>();
+  const auto of_pose = in.doubles<36>();  // m², rad²: x, y, z, about x, y, z
+  const auto linear = in.doubles<3>();
+  (void)in.doubles<3>();
+  const auto of_twist = in.doubles<36>();
+  const auto far = [](double v) { return !(std::abs(v) <= kFarthest); };
+  if (!in.ok() || std::any_of(place.begin(), place.end(), far) ||
+      !make_unit(&attitude.q_world_body))
+    return std::nullopt;
+  constexpr std::size_t kNext = 7;  // from one number of the diagonal to the next
+  odometry.p_world_body = {place[0], place[1], place[2]};
+  odometry.position_sigma = sigma(of_pose[0], of_pose[kNext]);
+  odometry.height_sigma = sigma(of_pose[2 * kNext], of_pose[2 * kNext]);
+  attitude.tilt_sigma = sigma(of_pose[3 * kNext], of_pose[4 * kNext]);
+  attitude.heading_sigma = sigma(of_pose[5 * kNext], of_pose[5 * kNext]);
+  odometry.v_body = {linear[0], linear[1], linear[2]};
+  odometry.velocity_sigma = sigma(of_twist[0], of_twist[kNext]);
+  // Publishers that know no velocity leave it all zero.
+  odometry.velocity_valid = std::none_of(linear.begin(), linear.end(), far) &&
+                            (odometry.v_body.norm() > 0 || odometry.velocity_sigma > 0);
+  return odometry;
+}
+
+}  // namespace vergence::app::detail

@@ -1,0 +1,62 @@
+#pragma once
+#include <array>
+#include <bit>
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+#include <span>
+#include <string>
+#include <type_traits>
+
+#include "app/datasets/detail/bag_scan.hpp"
+#include "core/types/time.hpp"
+
+namespace vergence::app::detail {
+
+/// Reads the values of a ROS message one after the other: CDR (XCDR1, either byte order), where
+/// they are aligned, or ROS 1, where they are not. Once something is not there, ok() is false and
+/// every further value 0. Lengths are checked against the bytes that are there before anything is
+/// reserved.
+class RosReader {
+ public:
+  RosReader(std::span<const std::uint8_t> bytes, MessageEncoding encoding) noexcept;
+
+  template <typename T>
+  [[nodiscard]] T get() noexcept {
+    static_assert(std::is_arithmetic_v<T>);
+    const std::size_t unit = cdr_ ? sizeof(T) : 1;
+    const std::size_t at = (at_ - begin_ + unit - 1) / unit * unit + begin_;
+    T value{};
+    if (!ok_ || at > bytes_.size() || sizeof(T) > bytes_.size() - at) {
+      ok_ = false;
+      return value;
+    }
+    const bool as_here = little_ == (std::endian::native == std::endian::little);
+    std::array<std::uint8_t, sizeof(T)> raw{};
+    for (std::size_t i = 0; i < sizeof(T); ++i)
+      raw[i] = bytes_[at + (as_here ? i : sizeof(T) - 1 - i)];
+    std::memcpy(&value, raw.data(), sizeof(T));
+    at_ = at + sizeof(T);
+    return value;
+  }
+  template <std::size_t N>
+  [[nodiscard]] std::array<double, N> doubles() noexcept {
+    std::array<double, N> values{};
+    for (double& v : values) v = get<double>();
+    return values;
+  }
+  [[nodiscard]] std::string text();
+  [[nodiscard]] Stamp header();  // std_msgs/Header
+  [[nodiscard]] bool ok() const noexcept { return ok_; }
+  [[nodiscard]] std::size_t position() const noexcept {
+    return at_;
+  }  // from the message's first byte
+
+ private:
+  std::span<const std::uint8_t> bytes_;
+  bool cdr_, little_ = true, ok_ = true;
+  std::size_t begin_ = 0;  // behind the encapsulation of CDR, from which alignment counts
+  std::size_t at_ = 0;
+};
+
+}  // namespace vergence::app::detail

@@ -1,0 +1,52 @@
+/// Any bytes as a bag, of ROS 1 if they begin like one, else of ROS 2. Entry point of libFuzzer;
+/// the unit tests call it with seeded mutations.
+#include <cstddef>
+#include <cstdint>
+#include <cstdlib>
+#include <vector>
+
+#include "app/datasets/recorded_ins.hpp"
+#include "app/runtime/errors.hpp"
+#include "tests/support/bag_in_memory.hpp"
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size);
+
+namespace {
+
+using namespace vergence;
+using namespace vergence::app;
+
+/// What a replay rests on; a bag that breaks it is not read as it should be.
+void check(const StereoSequence& s) {
+  constexpr std::size_t kMostPixels = 1U << 20;
+  for (std::size_t i = 1; i < s.pairs.size(); ++i)
+    if (s.pairs[i].stamp <= s.pairs[i - 1].stamp) std::abort();
+  for (std::size_t i = 1; i < s.ins->readings.size(); ++i)
+    if (s.ins->readings[i].sample.stamp <= s.ins->readings[i - 1].sample.stamp) std::abort();
+  for (const RecordedReading& r : s.ins->readings)
+    if (r.sample.fix != FixStatus::none && !r.sample.position.plausible()) std::abort();
+  std::vector<std::uint8_t> out, work;
+  for (const StereoPair& pair : s.pairs)
+    for (const std::string& name : pair.file) {
+      ImageSize image;
+      if (s.store->size(name, &image) != ImageFileStatus::ok) std::abort();
+      const auto width = static_cast<std::size_t>(image.width),
+                 height = static_cast<std::size_t>(image.height);
+      if (width * height > kMostPixels) continue;
+      out.resize(width * height);
+      (void)s.store->decode(name, image, out.data(), width, &work);
+    }
+}
+
+}  // namespace
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  const std::vector<char> bytes(
+      data, data + size);  // exactly so many: a read behind the last one is found by ASan
+  const bool mcap = size == 0 || data[0] != '#';
+  for (const bool given : {true, false}) try {
+      check(test::bag_in_memory(mcap, bytes, given));
+    } catch (const InputError&) {
+    }
+  return 0;
+}

@@ -1,0 +1,53 @@
+#pragma once
+#include <array>
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "tests/support/bag_writer.hpp"
+
+/// Messages of ROS as their publishers serialise them, byte by byte. Stamps in ns.
+namespace vergence::test {
+
+struct ImageMessage {
+  std::uint32_t width = 0, height = 0;  // px
+  std::uint32_t step = 0;               // bytes a row
+  std::string encoding = "mono8";
+  std::string data{};
+};
+[[nodiscard]] std::string image_message(Wire wire, std::int64_t stamp, const ImageMessage& image);
+[[nodiscard]] std::string compressed_message(Wire wire, std::int64_t stamp, std::string_view format,
+                                             std::string_view file);
+
+struct CameraInfoMessage {
+  std::uint32_t width = 0, height = 0;
+  std::string model = "plumb_bob";
+  std::vector<double> d{0, 0, 0, 0, 0};
+  double fx = 0, fy = 0, cx = 0, cy = 0;  // of K and, fy = fx, of P
+  double fx_times_b = 0;                  // px·m: fourth number of P
+};
+[[nodiscard]] std::string camera_info_message(Wire wire, std::int64_t stamp,
+                                              const CameraInfoMessage& info);
+
+struct FixMessage {
+  std::int8_t status = 0;
+  double latitude = 0, longitude = 0, altitude = 0;  // deg, m
+  double variance = 0;                               // m², east and north; up four times
+};
+[[nodiscard]] std::string fix_message(Wire wire, std::int64_t stamp, const FixMessage& fix);
+
+/// q: x y z w. `variance`: rad², of all three; −1: there is no orientation.
+[[nodiscard]] std::string imu_message(Wire wire, std::int64_t stamp, const std::array<double, 4>& q,
+                                      double variance = 0);
+
+struct OdometryMessage {
+  std::array<double, 3> p{};            // m
+  std::array<double, 4> q{0, 0, 0, 1};  // x y z w
+  std::array<double, 3> v{};            // m/s, body
+  double variance = 0;                  // m², of the position
+};
+[[nodiscard]] std::string odometry_message(Wire wire, std::int64_t stamp,
+                                           const OdometryMessage& odometry);
+
+}  // namespace vergence::test

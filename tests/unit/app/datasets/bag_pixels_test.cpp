@@ -1,0 +1,149 @@
+// What each encoding of sensor_msgs/Image and CompressedImage becomes, in both containers.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+
+#include <opencv2/imgcodecs.hpp>
+
+#include "app/datasets/stereo_sequence.hpp"
+#include "app/runtime/errors.hpp"
+#include "core/types/bayer.hpp"
+#include "tests/support/bag_in_memory.hpp"
+#include "tests/support/ros_messages.hpp"
+
+namespace vergence::app {
+namespace {
+
+using test::BagKind;
+using test::ImageMessage;
+
+constexpr std::int64_t kStart = 1'700'000'000'000'000'000;  // ns
+constexpr std::array<std::uint16_t, 2> kSides{1, 2};        // channels
+constexpr int kWidth = 16, kHeight = 8;
+using Grey = std::vector<std::uint8_t>;  // kWidth · kHeight
+
+std::uint8_t value(int x, int y, int channel) {
+  return static_cast<std::uint8_t>(7 * x + 31 * y + 85 * channel);
+}
+
+/// `channels` bytes a pixel and some between the rows.
+ImageMessage image_of(const char* encoding, int channels) {
+  const int step = kWidth * channels + 5;
+  ImageMessage image{kWidth, kHeight, static_cast<std::uint32_t>(step), encoding, {}};
+  image.data.assign(static_cast<std::size_t>(step * kHeight), '\0');
+  for (int y = 0; y < kHeight; ++y)
+    for (int x = 0; x < kWidth; ++x)
+      for (int c = 0; c < channels; ++c)
+        image.data[static_cast<std::size_t>(y * step + x * channels + c)] =
+            static_cast<char>(value(x, y, c));
+  return image;
+}
+
+class BagPixels : public ::testing::TestWithParam<BagKind> {
+ protected:
+  /// The same message left and right; grey of the right one. Empty: no pair.
+  [[nodiscard]] Grey grey_of(const char* type, const std::string& message) {
+    const auto writer = GetParam().writer();
+    writer->channel(1, "/left/image", type);
+    writer->channel(2, "/right/image", type);
+    for (const std::uint16_t k : kSides) writer->message(k, kStart, message);
+    writer->finish();
+    StereoSequence s;
+    try {
+      s = test::bag_in_memory(GetParam().is_mcap(), writer->bytes());
+    } catch (const InputError& e) {
+      refusal_ = e.what();
+      return {};
+    }
+    Grey out(std::size_t{kWidth} * kHeight), work;
+    EXPECT_EQ(s.store->decode(s.pairs.at(0).file[1], {kWidth, kHeight}, out.data(), kWidth, &work),
+              ImageFileStatus::ok);
+    return out;
+  }
+  [[nodiscard]] Grey grey_of(const ImageMessage& image) {
+    return grey_of("sensor_msgs/Image", image_message(GetParam().wire(), kStart, image));
+  }
+  [[nodiscard]] Grey grey_of_file(const char* format, const std::string& file) {
+    return grey_of("sensor_msgs/CompressedImage",
+                   compressed_message(GetParam().wire(), kStart, format, file));
+  }
+
+  std::string refusal_;
+};
+
+TEST_P(BagPixels, GreyIsAsItIs) {
+  for (const char* encoding : {"mono8", "8UC1"}) {
+    const Grey out = grey_of(image_of(encoding, 1));
+    ASSERT_FALSE(out.empty()) << refusal_;
+    for (int y = 0; y < kHeight; ++y)
+      for (int x = 0; x < kWidth; ++x)
+        ASSERT_EQ(out[static_cast<std::size_t>(y * kWidth + x)], value(x, y, 0)) << encoding;
+  }
+}
+
+// ITU-R BT.601: 0.299, 0.587, 0.114, to half a step.
+TEST_P(BagPixels, ColoursAreWeighedAsBt601Does) {
+  for (const char* encoding : {"rgb8", "bgr8"}) {
+    const int red = encoding[0] == 'r' ? 0 : 2;
+    const Grey out = grey_of(image_of(encoding, 3));
+    ASSERT_FALSE(out.empty()) << refusal_;
+    for (int y = 0; y < kHeight; ++y)
+      for (int x = 0; x < kWidth; ++x)
+        // Half a step of rounding, and 255 times what the weights in 256ths are off by.
+        ASSERT_NEAR(
+            out[static_cast<std::size_t>(y * kWidth + x)],
+            0.299 * value(x, y, red) + 0.587 * value(x, y, 1) + 0.114 * value(x, y, 2 - red),
+            0.5 + 255 * 0.0018)
+            << encoding;
+  }
+}
+
+TEST_P(BagPixels, MosaicsGoTheWayOfTheCameras) {
+  for (const char* encoding : {"bayer_rggb8", "bayer_bggr8", "bayer_gbrg8", "bayer_grbg8"}) {
+    const ImageMessage image = image_of(encoding, 1);
+    const Grey out = grey_of(image);
+    ASSERT_FALSE(out.empty()) << refusal_;
+    Grey wanted(out.size());
+    bayer_to_grey(reinterpret_cast<const std::uint8_t*>(image.data.data()),
+                  static_cast<std::ptrdiff_t>(image.step), kWidth, kHeight, wanted.data(), kWidth);
+    EXPECT_EQ(out, wanted) << encoding;
+  }
+}
+
+TEST_P(BagPixels, OtherEncodingsAndShortDataAreNoImages) {
+  EXPECT_TRUE(grey_of(image_of("mono16", 2)).empty());
+  EXPECT_NE(refusal_.find("/left/image (0 images)"), std::string::npos) << refusal_;
+  ImageMessage image = image_of("mono8", 1);
+  image.data.pop_back();
+  EXPECT_TRUE(grey_of(image).empty());
+  image = image_of("rgb8", 1);  // rows too short for three bytes a pixel
+  EXPECT_TRUE(grey_of(image).empty());
+}
+
+TEST_P(BagPixels, PngAndJpegAreToldByTheirBytes) {
+  cv::Mat picture(kHeight, kWidth, CV_8U);
+  for (int y = 0; y < kHeight; ++y)
+    for (int x = 0; x < kWidth; ++x) picture.at<std::uint8_t>(y, x) = value(x, y, 0) / 2;
+  for (const char* ending : {".png", ".jpg"}) {
+    std::vector<std::uint8_t> file;
+    ASSERT_TRUE(cv::imencode(ending, picture, file));
+    const Grey out =
+        grey_of_file("mono8; what a transport writes here", std::string(file.begin(), file.end()));
+    ASSERT_FALSE(out.empty()) << refusal_;
+    const cv::Mat wanted = cv::imdecode(file, cv::IMREAD_GRAYSCALE);
+    for (int y = 0; y < kHeight; ++y)
+      for (int x = 0; x < kWidth; ++x)
+        // Two decoders of JPEG may differ by their rounding.
+        ASSERT_NEAR(out[static_cast<std::size_t>(y * kWidth + x)], wanted.at<std::uint8_t>(y, x),
+                    ending[1] == 'p' ? 0 : 1)
+            << ending;
+  }
+  EXPECT_TRUE(grey_of_file("png", "no image at all").empty());
+}
+
+INSTANTIATE_TEST_SUITE_P(Containers, BagPixels,
+                         ::testing::Values(BagKind{"mcap", "zstd"}, BagKind{"rosbag", "lz4"}));
+
+}  // namespace
+}  // namespace vergence::app

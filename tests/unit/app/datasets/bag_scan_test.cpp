@@ -1,0 +1,164 @@
+#include "app/datasets/detail/bag_scan.hpp"
+
+#include <gtest/gtest.h>
+
+#include <optional>
+#include <span>
+
+#include "tests/support/bag_writer.hpp"
+
+namespace vergence::app::detail {
+namespace {
+
+using test::BagKind;
+using test::McapWriter;
+
+/// Two chunks of two messages each.
+std::string small_file(const BagKind& kind) {
+  const auto writer = kind.writer();
+  writer->channel(1, "/left/image_raw", "sensor_msgs/Image");
+  writer->message(1, 100, "first");
+  writer->message(1, 200, "second");
+  writer->close_chunk();
+  writer->message(1, 300, std::string(1000, 'x'));
+  writer->message(1, 400, "fourth");
+  writer->finish();
+  return writer->bytes();
+}
+
+struct Found {
+  BagScan scan;
+  std::vector<std::string> contents;
+  std::vector<BagPlace> places;
+};
+
+BagFormat format_of(const BagKind& kind) {
+  return kind.is_mcap() ? BagFormat::mcap : BagFormat::rosbag;
+}
+
+std::span<const std::uint8_t> bytes_of(const std::string& text) {
+  return {reinterpret_cast<const std::uint8_t*>(text.data()), text.size()};
+}
+
+/// Nothing: it does not begin as the kind does.
+std::optional<Found> scan(const BagKind& kind, const std::string& bytes) {
+  Found found;
+  const auto scan =
+      scan_bag(format_of(kind), MemoryBytes(bytes_of(bytes)), [&](const BagMessage& m) {
+        std::string content(m.place.size, '\0');
+        EXPECT_TRUE(m.bytes->read(
+            m.place.offset, {reinterpret_cast<std::uint8_t*>(content.data()), content.size()}));
+        EXPECT_EQ(m.channel->topic, "/left/image_raw");
+        EXPECT_EQ(m.channel->type, "sensor_msgs/Image");
+        EXPECT_EQ(m.channel->encoding,
+                  kind.is_mcap() ? MessageEncoding::cdr : MessageEncoding::ros1);
+        found.contents.push_back(content);
+        found.places.push_back(m.place);
+      });
+  if (!scan) return std::nullopt;
+  found.scan = *scan;
+  return found;
+}
+
+class BagScanOf : public ::testing::TestWithParam<BagKind> {};
+
+TEST_P(BagScanOf, MessagesComeInOrder) {
+  const Found found = scan(GetParam(), small_file(GetParam())).value();
+  EXPECT_EQ(found.contents,
+            (std::vector<std::string>{"first", "second", std::string(1000, 'x'), "fourth"}));
+  EXPECT_TRUE(found.scan.finished);
+  EXPECT_FALSE(found.scan.first_broken);
+  EXPECT_EQ(found.scan.orphans, 0U);
+}
+
+TEST_P(BagScanOf, MessageIsFoundAgainByItsPlace) {
+  const Found found = scan(GetParam(), small_file(GetParam())).value();
+  const std::string whole = small_file(GetParam());
+  const MemoryBytes file(bytes_of(whole));
+  const BagPlace place = found.places.at(3);
+  std::string content(place.size, '\0');
+  const std::span out(reinterpret_cast<std::uint8_t*>(content.data()), content.size());
+  std::vector<std::uint8_t> records;
+  if (place.chunk != BagPlace::kNoChunk) {
+    ASSERT_TRUE(unpack_chunk(format_of(GetParam()), file, place.chunk, &records));
+    ASSERT_TRUE(MemoryBytes(records).read(place.offset, out));
+  } else {
+    ASSERT_TRUE(file.read(place.offset, out));
+  }
+  EXPECT_EQ(content, "fourth");
+}
+
+TEST_P(BagScanOf, CutAnywhereGivesWholeChunksOnly) {
+  const std::string whole = small_file(GetParam());
+  const std::size_t magic = GetParam().is_mcap() ? 8 : 13;
+  std::size_t most = 0;
+  for (std::size_t cut = 0; cut < whole.size(); ++cut) {
+    const auto got = scan(GetParam(), whole.substr(0, cut));
+    ASSERT_EQ(got.has_value(), cut >= magic) << cut;
+    if (!got) continue;
+    const Found& found = *got;
+    EXPECT_TRUE(found.contents.size() % 2 == 0 && found.contents.size() >= most) << cut;
+    EXPECT_FALSE(found.scan.first_broken) << cut;
+    EXPECT_LE(found.scan.end, cut);
+    EXPECT_TRUE(!found.scan.finished || found.contents.size() == 4) << cut;
+    most = found.contents.size();
+  }
+  EXPECT_EQ(most, 4U);
+}
+
+TEST_P(BagScanOf, AnyByteSetIsSurvived) {
+  const std::string whole = small_file(GetParam());
+  for (std::size_t i = 8; i < whole.size(); ++i) {
+    if (whole[i] == ' ') continue;  // what pads the first record of a ROS 1 bag
+    for (const char value : {'\x00', '\x7f', '\xff'}) {
+      std::string spoilt = whole;
+      spoilt[i] = value;
+      const MemoryBytes file(bytes_of(spoilt));
+      std::size_t messages = 0;
+      const auto scan = scan_bag(format_of(GetParam()), file, [&](const BagMessage& m) {
+        std::vector<std::uint8_t> content(m.place.size);
+        EXPECT_TRUE(m.bytes->read(m.place.offset, content)) << i;
+        ++messages;
+      });
+      EXPECT_TRUE(scan || i < 13) << "of what a bag begins with";
+      EXPECT_LE(messages, 4U) << i;
+    }
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Kinds, BagScanOf,
+                         ::testing::Values(BagKind{"mcap", ""}, BagKind{"mcap", "lz4"},
+                                           BagKind{"mcap", "zstd"}, BagKind{"rosbag", "none"},
+                                           BagKind{"rosbag", "lz4"}, BagKind{"rosbag", "bz2"}));
+
+TEST(Mcap, ChunkThatClaimsTooMuchIsSkippedWithASentence) {
+  McapWriter writer;
+  writer.channel(1, "/left/image_raw", "sensor_msgs/Image");
+  writer.close_chunk();
+  const std::size_t here = writer.bytes().size();
+  std::string head(16, '\0');
+  head += std::string("\0\0\0\0\1\0\0\0", 8) + std::string(4, '\0') +
+          std::string("\4\0\0\0zstd", 8) + std::string(8, '\0');
+  writer.record(6, head);
+  writer.message(1, 5, "after");
+  writer.finish();
+  const Found found = scan({"mcap", ""}, writer.bytes()).value();
+  EXPECT_EQ(found.contents, std::vector<std::string>{"after"});
+  EXPECT_EQ(found.scan.broken_chunks, 1U);
+  EXPECT_EQ(found.scan.first_broken, here);
+  EXPECT_NE(found.scan.why_broken.find("larger than 64 MiB"), std::string::npos);
+}
+
+TEST(Mcap, MessageOfNoChannelIsCounted) {
+  for (const BagKind& kind : {BagKind{"mcap", ""}, BagKind{"rosbag", "none"}}) {
+    const auto writer = kind.writer();
+    writer->message(7, 5, "whose");
+    writer->finish();
+    const Found found = scan(kind, writer->bytes()).value();
+    EXPECT_TRUE(found.contents.empty());
+    EXPECT_EQ(found.scan.orphans, 1U);
+  }
+}
+
+}  // namespace
+}  // namespace vergence::app::detail
