@@ -23,6 +23,8 @@ std::string contents(const std::filesystem::path& path) {
   if (!std::filesystem::exists(status)) throw InputError(path.string() + ": there is no such file");
   if (std::filesystem::is_directory(status))
     throw InputError(path.string() + ": is a folder, not a YAML file");
+  if (!std::filesystem::is_regular_file(status))  // reading a pipe would wait for ever
+    throw InputError(path.string() + ": is a pipe or a device, not a YAML file");
   errno = 0;
   std::ifstream in(path, std::ios::binary);
   if (!in) throw InputError(path.string() + ": cannot be opened: " + std::strerror(errno));

@@ -28,10 +28,11 @@ ImageFileStatus size_of(Bytes b, ImageSize* size) noexcept {
   return detail::may_become_png(b) ? ImageFileStatus::torn : ImageFileStatus::not_an_image;
 }
 
-/// A descriptor that closes itself.
+/// A descriptor that closes itself. Opening does not wait, as that of a pipe would.
 class OpenFile {
  public:
-  explicit OpenFile(const char* path) noexcept : fd_(::open(path, O_RDONLY | O_CLOEXEC)) {}
+  explicit OpenFile(const char* path) noexcept
+      : fd_(::open(path, O_RDONLY | O_CLOEXEC | O_NONBLOCK)) {}
   ~OpenFile() {
     if (fd_ >= 0) ::close(fd_);
   }

@@ -29,8 +29,11 @@ void refuse(const std::filesystem::path& file, std::size_t line, std::string_vie
 
 std::string read_text(const std::filesystem::path& file, std::size_t limit) {
   std::error_code ignored;
-  if (std::filesystem::is_directory(file, ignored))
+  const auto status = std::filesystem::status(file, ignored);
+  if (std::filesystem::is_directory(status))
     refuse(file, 0, "is a folder where a file is expected");
+  if (std::filesystem::is_other(status))  // reading a pipe would wait for ever
+    refuse(file, 0, "is a pipe or a device where a file is expected");
   std::ifstream in(file, std::ios::binary);
   if (!in) {
     const int e = errno;

@@ -53,8 +53,11 @@ std::vector<std::string> settings_of(const Configuration& c) {
   std::vector<std::string> out;
   for (const Group& group : schema())
     for (const Key& key : group.keys)
-      if (const std::string value = to_text(key.get(c)); value != to_text(key.get(defaults)))
+      if (std::string value = to_text(key.get(c)); value != to_text(key.get(defaults))) {
+        if (key.name.ends_with(".mask"))  // beside the configuration, wherever the replay runs
+          value = std::filesystem::absolute(c.folder / value).string();
         out.push_back(key.name + "=" + value);
+      }
   return out;
 }
 

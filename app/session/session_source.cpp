@@ -153,8 +153,8 @@ void SessionSource::describe(const SessionTotals& /*totals*/, const Estimator& /
   input->devices.emplace_back("images_missing", images_missing_);
 }
 
-void SessionSource::tell(const SessionTotals& /*totals*/, const SummaryInput& /*input*/,
-                         Progress* progress) const {
+void SessionSource::print_figures(const SessionTotals& /*totals*/, const SummaryInput& /*input*/,
+                                  Progress* progress) const {
   if (!other_ && session_.complete() && images_missing_ == 0 && request_.start == 0)
     progress->say("the estimator was given what it was given in the drive; compare with " +
                   (request_.data / "trajectory.tum").string());

@@ -35,8 +35,8 @@ class SessionSource final : public FrameSource {
   void finish(Progress* progress, std::vector<std::string>* faults) override;
   void describe(const SessionTotals& totals, const Estimator& estimator,
                 SummaryInput* input) const override;
-  void tell(const SessionTotals& totals, const SummaryInput& input,
-            Progress* progress) const override;
+  void print_figures(const SessionTotals& totals, const SummaryInput& input,
+                     Progress* progress) const override;
 
  private:
   void make_facts(std::optional<StartingCalibration> other);

@@ -1,4 +1,6 @@
 #pragma once
+#include <optional>
+
 #include "core/types/parallel.hpp"
 
 namespace vergence::app {
@@ -12,10 +14,9 @@ class SolverWatch final : public BackgroundRunner {
  public:
   explicit SolverWatch(BackgroundRunner& solver) noexcept : solver_(solver) {}
 
-  /// Before Estimator::process(). `replayed`: busy() says what it said then, waiting where the
-  /// solver is slower now.
-  void begin_frame(bool replayed, bool idle_then) noexcept {
-    replayed_ = replayed;
+  /// Before Estimator::process(). `idle_then`: of a replay, what was found at this frame of the
+  /// drive: busy() says the same, waiting where the solver is slower now.
+  void begin_frame(std::optional<bool> idle_then) noexcept {
     idle_then_ = idle_then;
     found_idle_ = false;
   }
@@ -24,8 +25,8 @@ class SolverWatch final : public BackgroundRunner {
 
   void start(TaskRef task) noexcept override { solver_.start(task); }
   [[nodiscard]] bool busy() noexcept override {
-    if (replayed_ && !idle_then_) return true;
-    if (replayed_) solver_.wait();
+    if (idle_then_ && !*idle_then_) return true;
+    if (idle_then_) solver_.wait();
     const bool busy = solver_.busy();
     found_idle_ = found_idle_ || !busy;
     return busy;
@@ -34,7 +35,8 @@ class SolverWatch final : public BackgroundRunner {
 
  private:
   BackgroundRunner& solver_;
-  bool replayed_ = false, idle_then_ = false, found_idle_ = false;
+  std::optional<bool> idle_then_{};
+  bool found_idle_ = false;
 };
 
 }  // namespace vergence::app

@@ -13,7 +13,7 @@
 namespace vergence::app::detail {
 
 FileBytes::FileBytes(const std::filesystem::path& file)
-    : path_(file), fd_(::open(file.c_str(), O_RDONLY | O_CLOEXEC)) {
+    : path_(file), fd_(::open(file.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK)) {
   if (fd_ < 0) refuse(file, 0, std::string("cannot be opened: ") + std::strerror(errno));
   struct stat about {};
   if (::fstat(fd_, &about) != 0 || !S_ISREG(about.st_mode)) {

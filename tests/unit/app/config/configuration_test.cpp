@@ -1,5 +1,7 @@
 #include "app/config/configuration.hpp"
 
+#include <sys/stat.h>
+
 #include <cmath>
 #include <string>
 #include <vector>
@@ -169,6 +171,9 @@ TEST(Configuration, FilesThatCannotBeReadAreNamed) {
   EXPECT_EQ(sentence(folder / "none.yaml"),
             (folder / "none.yaml").string() + ": there is no such file");
   EXPECT_TRUE(contains(sentence(folder.path()), "is a folder"));
+  const std::filesystem::path pipe = folder / "pipe.yaml";
+  ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);
+  EXPECT_TRUE(contains(sentence(pipe), "is a pipe or a device"));
   EXPECT_TRUE(
       contains(sentence(folder.write("huge.yaml", std::string(2'000'000, ' '))), "is larger than"));
   EXPECT_EQ(load_configuration(folder.write("good.yaml", "threads: 1\n"), {}).threads, 1);

@@ -1,5 +1,7 @@
 #include "app/datasets/image_file.hpp"
 
+#include <sys/stat.h>
+
 #include <gtest/gtest.h>
 
 #include <fstream>
@@ -166,6 +168,13 @@ TEST_F(ImageFile, otherContentIsNotAnImage) {
 TEST_F(ImageFile, anotherSizeIsSaid) {
   test::write_tiny_image(folder_ / "b.png", 1, kTinyWidth + 1, kTinyHeight);
   EXPECT_EQ(decode(bytes_of(folder_ / "b.png")), ImageFileStatus::wrong_size);
+}
+
+TEST_F(ImageFile, aPipeIsNotWaitedFor) {
+  const std::filesystem::path pipe = folder_ / "pipe.png";
+  ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);
+  std::vector<std::uint8_t> bytes;
+  EXPECT_EQ(read_image_file(pipe, &bytes), ImageFileStatus::unreadable);
 }
 
 TEST_F(ImageFile, missingFilesAndFoldersAreTold) {

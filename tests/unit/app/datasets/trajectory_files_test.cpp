@@ -1,5 +1,7 @@
 #include "app/datasets/trajectory_files.hpp"
 
+#include <sys/stat.h>
+
 #include <array>
 #include <string_view>
 
@@ -108,6 +110,10 @@ TEST(Tum, saysWhichFileCannotBeRead) {
   EXPECT_TRUE(has(last_error([&] { (void)read_tum(folder / "none.tum"); }),
                   "none.tum: cannot be opened (No such file"));
   EXPECT_TRUE(has(last_error([&] { (void)read_tum(folder.path()); }), "is a folder"));
+  const std::filesystem::path pipe = folder / "pipe.tum";
+  ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);
+  EXPECT_TRUE(has(last_error([&] { (void)read_tum(pipe); }), "is a pipe or a device"));
+  EXPECT_TRUE(has(last_error([] { (void)read_tum("/dev/zero"); }), "is a pipe or a device"));
 }
 
 TEST(Kitti, readsPosesWithTheirTimes) {

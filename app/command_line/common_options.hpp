@@ -1,0 +1,36 @@
+#pragma once
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <CLI/App.hpp>
+
+#include "app/config/configuration.hpp"
+
+namespace vergence::app {
+
+/// What every command that runs understands: `--set KEY=VALUE` (any number of times), `--threads
+/// N`, `--seed N`, `--quiet`.
+struct CommonOptions {
+  std::vector<std::string> set{};
+  std::optional<int> threads{};
+  std::optional<std::uint64_t> seed{};
+  bool quiet = false;
+
+  /// Declares the options on a subcommand; `this` outlives its parsing.
+  void declare(CLI::App& command);
+  /// load_configuration() with --threads and --seed as the last --set. Errors  InputError.
+  /// `before`: KEY=VALUE that `set` overrules.
+  [[nodiscard]] Configuration configuration(const std::optional<std::filesystem::path>& file,
+                                            const std::vector<std::string>& before = {}) const;
+};
+
+/// `--also WORDS` of the commands that write a session: parse_other_formats() reads it.
+void declare_also(CLI::App& command, std::optional<std::string>* words);
+
+/// `--left-topic`, `--right-topic` of the commands that read a bag's images.
+void declare_image_topics(CLI::App& command, std::string* left, std::string* right);
+
+}  // namespace vergence::app
