@@ -15,7 +15,7 @@ struct Arguments {
   CommonOptions common;
   std::string configuration, out;
   std::vector<std::string> faults;
-  std::optional<std::string> calibration, also;
+  std::optional<std::string> calibration, also, record;
   std::optional<double> duration_s;
   bool fast = false, from_scratch = false, memory = false;
 };
@@ -25,7 +25,9 @@ RunRequest request_of(const Arguments& a) {
     throw InputError("--duration needs seconds, more than 0 and at most 86400");
   RunRequest r;
   r.session.out = a.out;
-  r.configuration = a.common.configuration(a.configuration);
+  r.configuration = a.common.configuration(
+      a.configuration, a.record ? std::vector<std::string>{"record=[" + *a.record + "]"}
+                                : std::vector<std::string>{});
   r.calibration.from_scratch = a.from_scratch;
   if (a.calibration) r.calibration.file = *a.calibration;
   r.faults = a.faults;
@@ -70,6 +72,10 @@ void add_run(CLI::App& root, ExitCode* exit_code) {
                    "of the state file's and the "
                    "configuration's; SIGUSR1 asks for a new one during the drive")
       ->type_name("FILE");
+  command
+      ->add_option("--record", a->record,
+                   "What is recorded into drive.mcap, e.g. poses,ins,images (docs/recording.md)")
+      ->type_name("WORDS");
   declare_also(*command, &a->also);
   command->add_flag("--memory", a->memory, "Print what memory is held, by whom");
   a->common.declare(*command);

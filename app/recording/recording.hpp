@@ -15,9 +15,9 @@
 #include "app/recording/mcap_file.hpp"
 #include "app/recording/record_ring.hpp"
 #include "app/recording/ros_types.hpp"
-#include "drivers/common/wake_event.hpp"
 #include "core/memory/ring.hpp"
 #include "core/types/time.hpp"
+#include "drivers/common/wake_event.hpp"
 
 namespace vergence::app {
 
