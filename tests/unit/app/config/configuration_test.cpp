@@ -194,5 +194,21 @@ TEST(ConfigurationHash, SeesTheLastBitOfANumber) {
   EXPECT_NE(configuration_hash(a), configuration_hash(b));
 }
 
+TEST(Configuration, AListOfWhatIsRecordedSwitchesItsWordsOn) {
+  EXPECT_FALSE(Configuration{}.record.any());
+  const auto c = parse_configuration("record: [poses, images]\n", "drive.yaml", {});
+  EXPECT_EQ(c.record.poses, 1);
+  EXPECT_EQ(c.record.ins, 0);
+  EXPECT_EQ(c.record.images, 1);
+  const auto keys = parse_configuration("record: {images: on, keep_s: 30}\n", "drive.yaml",
+                                        {"record=[ins]", "record.images=off"});
+  EXPECT_EQ(keys.record.ins, 1);
+  EXPECT_EQ(keys.record.images, 0);
+  EXPECT_EQ(keys.record.keep_s, 30);
+  EXPECT_TRUE(
+      contains(refusal("record: [poses, pictures]\n"), "drive.yaml:1: record lists \"pictures\""));
+  EXPECT_TRUE(contains(refusal("record: images\n"), "is a group of keys"));
+}
+
 }  // namespace
 }  // namespace vergence::app
