@@ -55,6 +55,12 @@ std::vector<McapTopic> described(const std::vector<RecordedTopic>& topics) {
   return out;
 }
 
+/// How full a queue may be that is not written: a producer that does not wait finds room for an
+/// image; one that waits (`hurried`) for anything that fits at all.
+std::size_t room_left_at(const RecordRing& ring, bool hurried) noexcept {
+  return hurried ? ring.capacity() / 4 : ring.capacity() / 8 * 7;
+}
+
 McapMessageHead head_of(std::span<const std::uint8_t> records) noexcept {
   return McapMessageHead::read(records.first<McapMessageHead::kSize>());
 }
@@ -101,7 +107,7 @@ std::span<std::uint8_t> Recording::begin(std::size_t queue, std::size_t topic, S
   q.head.log_time = static_cast<std::uint64_t>(std::max<std::int64_t>(stamp.ns(), 0));
   const std::size_t size = McapMessageHead::kSize + most;
   const std::size_t spare = bulky ? std::min(kSpare, q.ring.capacity() / 8) : 0;
-  const bool fits = size + spare <= q.ring.capacity() && size <= kMostChunkBytes;
+  const bool fits = size <= q.ring.capacity() / 2 && size <= kMostChunkBytes;
   for (;;) {
     const WakeEvent::Rung seen = freed_.look();
     q.open = fits ? q.ring.begin(size, spare) : std::span<std::uint8_t>{};
@@ -170,7 +176,7 @@ bool Recording::holding() const noexcept {
 void Recording::drain(bool at_once, bool last) noexcept {
   for (;;) {
     if (holding()) {
-      pass_over_old(last);
+      pass_over_old(at_once, last);
       return;
     }
     const Batch batch = gather();
@@ -179,13 +185,13 @@ void Recording::drain(bool at_once, bool last) noexcept {
       return;
     }
     if (!at_once && !due(batch)) return;
-    if (trouble_ != Trouble::none && !last && monotonic_ns() < retry_ns_) return make_room();
+    if (trouble_ != Trouble::none && !last && monotonic_ns() < retry_ns_) return make_room(at_once);
     if (store(batch)) {
       release(batch);
       roll_if_wanted();
       continue;
     }
-    if (!last) return make_room();
+    if (!last) return make_room(at_once);
     lost_.fetch_add(batch.messages, std::memory_order_relaxed);
     release(batch);
   }
@@ -229,13 +235,13 @@ void Recording::drop_oldest(RecordRing* ring, std::atomic<std::uint64_t>* counte
 
 /// While nothing happens: what is older than what an event would keep, and what a full queue would
 /// refuse new messages for.
-void Recording::pass_over_old(bool all) noexcept {
+void Recording::pass_over_old(bool hurried, bool all) noexcept {
   const auto newest = static_cast<std::int64_t>(newest_ns_.load(std::memory_order_relaxed));
   for (const auto& q : queues_)
     while (q->ring.fill() > 0) {
       const auto oldest = static_cast<std::int64_t>(head_of(q->ring.waiting()).log_time);
       if (!all && newest - oldest <= options_.keep.ns() &&
-          q->ring.fill() <= q->ring.capacity() / 8 * 7)
+          q->ring.fill() <= room_left_at(q->ring, hurried))
         break;
       drop_oldest(&q->ring, &passed_over_);
     }
@@ -243,10 +249,9 @@ void Recording::pass_over_old(bool all) noexcept {
 }
 
 /// While the disk takes nothing: the newest are worth more than the oldest.
-void Recording::make_room() noexcept {
+void Recording::make_room(bool hurried) noexcept {
   for (const auto& q : queues_)
-    if (q->ring.fill() > q->ring.capacity() / 8 * 7)
-      while (q->ring.fill() > q->ring.capacity() / 4 * 3) drop_oldest(&q->ring, &lost_);
+    while (q->ring.fill() > room_left_at(q->ring, hurried)) drop_oldest(&q->ring, &lost_);
   if (options_.when_full == WhenFull::wait) freed_.ring();
 }
 

@@ -126,8 +126,8 @@ class Recording {
   [[nodiscard]] Batch gather() const noexcept;
   [[nodiscard]] bool due(const Batch& batch) noexcept;
   void release(const Batch& batch) noexcept;
-  void pass_over_old(bool all) noexcept;
-  void make_room() noexcept;
+  void pass_over_old(bool hurried, bool all) noexcept;
+  void make_room(bool hurried) noexcept;
   static void drop_oldest(RecordRing* ring, std::atomic<std::uint64_t>* counter) noexcept;
   [[nodiscard]] bool store(const Batch& batch) noexcept;
   [[nodiscard]] bool open_file() noexcept;
