@@ -7,7 +7,7 @@
 
 #include "app/calibration/conversion.hpp"
 #include "app/checkerboard/calibrate_session.hpp"
-#include "app/commands/calibrate_options.hpp"
+#include "app/command_line/calibrate_options.hpp"
 
 namespace vergence::app {
 namespace {

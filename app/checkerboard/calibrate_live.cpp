@@ -9,11 +9,12 @@
 #include <fmt/format.h>
 
 #include "app/calibration/view_collector.hpp"
+#include "app/capture/capture_settings.hpp"
 #include "app/checkerboard/calibrate_session.hpp"
-#include "app/commands/drive_devices.hpp"
 #include "app/datasets/image_writer.hpp"
-#include "app/runtime/live_source.hpp"
+#include "app/devices/drive_devices.hpp"
 #include "app/runtime/signals.hpp"
+#include "drivers/acquisition/acquisition.hpp"
 
 namespace vergence::app {
 namespace {
@@ -58,7 +59,7 @@ void make_empty_folder(const fs::path& folder) {
 class Collection {
  public:
   Collection(const CalibrateRequest& request, const CalibratedRig& rig, double focal_px,
-             LiveSource* source)
+             Acquisition* source)
       : request_(request),
         rig_(rig),
         source_(source),
@@ -81,16 +82,12 @@ class Collection {
 
  private:
   void look() {
-    for (LiveItem item; source_->next(&item);) {
-      if (item.kind == LiveItem::Kind::device_gone || item.kind == LiveItem::Kind::device_back) {
-        const std::lock_guard lock(mutex_);
-        sentences_.push_back(fmt::format(
-            "camera {} is {}", item.camera,
-            item.kind == LiveItem::Kind::device_gone ? "gone; waiting for it" : "back"));
-      }
-      if (item.kind != LiveItem::Kind::images) continue;
-      offer(item.set);
-      source_->release(item.set);
+    for (Acquired item; source_->next(&item);) {
+      if (const auto* event = std::get_if<DeviceEvent>(&item)) note(*event);
+      const auto* frame = std::get_if<AcquiredFrame>(&item);
+      if (frame == nullptr) continue;
+      offer(frame->rig);
+      source_->release(*frame);
       if (complete_) source_->stop();
     }
     const std::lock_guard lock(mutex_);
@@ -98,19 +95,28 @@ class Collection {
     changed_.notify_one();
   }
 
-  void offer(const SyncedSet& set) {
+  void note(const DeviceEvent& event) {
+    const bool gone = event.kind == DeviceEvent::Kind::camera_gone;
+    if (!gone && event.kind != DeviceEvent::Kind::camera_back) return;
+    const std::lock_guard lock(mutex_);
+    sentences_.push_back(
+        fmt::format("camera {} is {}", event.camera, gone ? "gone; waiting for it" : "back"));
+  }
+
+  void offer(const RigFrame& frame) {
     BoardView seen;
     seen.name = fmt::format("view {}", collector_.views().size());
     for (int k = 0; k < static_cast<int>(rig_.sizes.size()); ++k) {
       const auto at = static_cast<std::size_t>(k);
-      auto corners = find_checkerboard(source_->image(set, k), request_.board, BoardSearch::quick);
+      auto corners = find_checkerboard(frame.images[static_cast<std::size_t>(k)], request_.board,
+                                       BoardSearch::quick);
       if (!corners) continue;
       if (!request_.board.tells_its_ends()) same_way_up(seen.corners[0], &*corners);
       seen.corners[at] = std::move(*corners);
     }
     const std::size_t number = collector_.views().size();
     const OfferVerdict verdict = collector_.offer(seen);
-    if (verdict == OfferVerdict::taken && request_.keep_views) keep(set, number);
+    if (verdict == OfferVerdict::taken && request_.keep_views) keep(frame, number);
     const auto needs = collector_.coverage().needs();
     complete_ = needs.empty();
     const std::lock_guard lock(mutex_);
@@ -120,9 +126,9 @@ class Collection {
                     needs.empty() ? "" : fmt::format(" · missing: {}", fmt::join(needs, "; ")));
   }
 
-  void keep(const SyncedSet& set, std::size_t number) {
+  void keep(const RigFrame& frame, std::size_t number) {
     for (int k = 0; k < static_cast<int>(rig_.sizes.size()); ++k) {
-      const ImageView image = source_->image(set, k);
+      const ImageView image = frame.images[static_cast<std::size_t>(k)];
       if (image.empty()) continue;
       const fs::path file =
           *request_.keep_views /
@@ -150,7 +156,7 @@ class Collection {
 
   const CalibrateRequest& request_;
   const CalibratedRig& rig_;
-  LiveSource* source_;
+  Acquisition* source_;
   ViewCollector collector_;  // of the looking thread, until it has ended
   bool complete_ = false;    // likewise
 
@@ -180,18 +186,16 @@ CalibratedRig rig_of(const Configuration& c, const DriveDevices& devices) {
 ExitCode calibrate_live(const CalibrateRequest& request, const Configuration& configuration) {
   const SignalGuard signals;
   if (request.keep_views) make_empty_folder(*request.keep_views);
-  Configuration c = configuration;
-  c.ins.driver = "none";
+  const Configuration c = capture_configuration(configuration);
   DriveDevices devices(c, {}, false, std::nullopt);
   Progress progress = Progress::on_stderr(request.quiet);
   for (const std::string& sentence : devices.remarks()) progress.say("vergence: " + sentence);
   const CalibratedRig rig = rig_of(c, devices);
-  LiveSource::Options options;
-  options.sync = devices.sync();
+  Acquisition::Options options = devices.acquisition_options();
   options.tie_host = monotonic_now();
-  LiveSource source(devices.cameras(), nullptr, devices.trigger(), options);
+  Acquisition source(devices.cameras(), devices.ins(), devices.trigger(), options);
   Collection collection(request, rig, nominal_rig(c).intrinsics[0].fx, &source);
-  source.start();
+  start_acquisition(&source);
   collection.run(signals, &progress);
   source.join();
   progress.finish();

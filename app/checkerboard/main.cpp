@@ -1,7 +1,7 @@
 // What of `vergence calibrate` needs OpenCV. `vergence` starts it with its own words; nobody has to
 // know its name.
 #include "app/checkerboard/board_command.hpp"
-#include "app/commands/program.hpp"
+#include "app/command_line/program.hpp"
 
 int main(int argc, char** argv) {
   using namespace vergence::app;

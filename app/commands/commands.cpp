@@ -1,6 +1,6 @@
 #include "app/commands/commands.hpp"
 
-#include "app/commands/manual.hpp"
+#include "app/command_line/manual.hpp"
 
 namespace vergence::app {
 

@@ -1,7 +1,7 @@
 #pragma once
 #include <CLI/App.hpp>
 
-#include "app/commands/program.hpp"
+#include "app/command_line/program.hpp"
 #include "app/runtime/errors.hpp"
 
 /// Every word of the command line: each function declares its options on `root` and, when its word

@@ -4,7 +4,7 @@
 #include <string>
 
 #include "app/commands/commands.hpp"
-#include "app/commands/devices_report.hpp"
+#include "app/doctor/devices_report.hpp"
 #include "app/doctor/udev_rules.hpp"
 
 namespace vergence::app {

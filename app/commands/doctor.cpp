@@ -5,8 +5,8 @@
 #include <vector>
 
 #include "app/commands/commands.hpp"
-#include "app/commands/doctor_report.hpp"
 #include "app/config/configuration.hpp"
+#include "app/doctor/doctor_report.hpp"
 
 namespace vergence::app {
 namespace {

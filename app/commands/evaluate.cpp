@@ -1,21 +1,12 @@
-#include <cmath>
-#include <filesystem>
-#include <iostream>
 #include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
-#include <system_error>
 #include <vector>
 
-#include <nlohmann/json.hpp>
-
 #include "app/commands/commands.hpp"
-#include "app/commands/evaluation_report.hpp"
-#include "app/commands/mount_report.hpp"
 #include "app/datasets/text_file.hpp"
-#include "app/datasets/trajectory_files.hpp"
-#include "app/recorder/ins_file.hpp"
+#include "app/evaluation/evaluation.hpp"
 
 namespace vergence::app {
 namespace {
@@ -75,84 +66,15 @@ EvaluationOptions options_of(const Arguments& a) {
   return options;
 }
 
-/// Of the usual lengths those that the path is long enough for; KITTI's where it is for none.
-void keep_longest(TrajectoryEvaluation* e, EvaluationOptions* options) {
-  if (e->segments.size() < 2) return;
-  std::size_t kept = 0;
-  for (std::size_t i = e->segments.size(); i-- > 0;)
-    if (e->segments[i].count > 0) kept = i;
-  e->segments = {e->segments[kept]};
-  options->segments = {options->segments[kept]};
-}
-
-/// Where the reference is.
-struct Reference {
-  std::filesystem::path path{};
-  bool is_ins = false;  // readings of an INS; else poses
-};
-
-Reference reference_of(const Arguments& a) {
-  if (a.reference.empty() && !a.estimate_mount)
-    throw InputError(
-        "REFERENCE is missing; name a trajectory, or with --estimate-mount a session folder that "
-        "has an ins.csv");
-  // A session folder stands for its poses, but where a mount is asked for: that is the INS's.
-  const std::filesystem::path path = a.reference.empty() ? a.estimate : a.reference;
-  std::error_code ignored;
-  const bool poses = !a.estimate_mount && std::filesystem::is_directory(path, ignored);
-  const std::filesystem::path ins = poses ? std::filesystem::path{} : find_ins_file(path);
-  if (!ins.empty()) return {ins, true};
-  if (a.reference.empty())
-    throw InputError(a.estimate + ": is no session folder with an ins.csv; name a REFERENCE");
-  return {path, false};
-}
-
-/// The reference's poses, brought to the estimate's body if that is asked for; *mount then tells
-/// how.
-Trajectory read_reference(const Arguments& a, const Reference& from, const Trajectory& estimate,
-                          FoundMount* mount) {
-  Trajectory reference;
-  if (from.is_ins) {
-    const std::vector<MountReference> moments = ins_moments(read_ins_file(from.path));
-    if (moments.empty())
-      throw InputError(from.path.string() +
-                       ": has no reading with an attitude and a satellites' fix");
-    reference = poses_of(moments);
-    if (a.estimate_mount) *mount = find_ins_mount(estimate, moments);
-  } else {
-    reference = read_trajectory(from.path);
-    if (a.estimate_mount) *mount = find_mount(estimate, reference);
-  }
-  if (a.estimate_mount && mount->status == MountStatus::ok)
-    reference = brought_over(reference, mount->mount);
-  return reference;
-}
-
-ExitCode run(const Arguments& a) {
-  EvaluationOptions options = options_of(a);
-  const Reference from = reference_of(a);
-  const Trajectory estimate = read_trajectory(a.estimate);
-  FoundMount mount;
-  const Trajectory reference = read_reference(a, from, estimate, &mount);
-  TrajectoryEvaluation evaluation = evaluate(estimate, reference, options);
-  if (!a.lengths) keep_longest(&evaluation, &options);
-  if (a.json) {
-    nlohmann::ordered_json out = evaluation_json(evaluation, options);
-    if (a.estimate_mount) out["mount"] = mount_json(mount);
-    std::cout << out.dump(1) << '\n';
-  } else {
-    std::cout << (a.estimate_mount ? mount_text(mount) : "")
-              << evaluation_text(evaluation, options);
-  }
-  if (a.estimate_mount && mount.status != MountStatus::ok) {
-    std::cerr << "vergence: no mount between " << a.estimate << " and " << from.path.string()
-              << ": " << mount_json(mount)["status"].get<std::string>() << '\n';
-    return ExitCode::not_usable;
-  }
-  if (evaluation.status == EvaluationStatus::ok) return ExitCode::done;
-  std::cerr << "vergence: " << a.estimate << " against " << from.path.string() << ": "
-            << evaluation_problem(evaluation, options) << '\n';
-  return ExitCode::not_usable;
+EvaluationRequest request_of(const Arguments& a) {
+  EvaluationRequest r;
+  r.estimate = a.estimate;
+  r.reference = a.reference;
+  r.options = options_of(a);
+  r.usual_lengths = !a.lengths;
+  r.json = a.json;
+  r.estimate_mount = a.estimate_mount;
+  return r;
 }
 
 }  // namespace
@@ -189,7 +111,7 @@ void add_evaluate(CLI::App& root, ExitCode* exit_code) {
   command->add_flag("--estimate-mount", a->estimate_mount,
                     "Find how the two bodies sit to one another; compare at the estimate's. "
                     "Without REFERENCE: the session's own INS");
-  command->callback([a, exit_code] { *exit_code = run(*a); });
+  command->callback([a, exit_code] { *exit_code = run_evaluation(request_of(*a)); });
 }
 
 }  // namespace vergence::app

@@ -3,9 +3,9 @@
 #include <string>
 #include <vector>
 
+#include "app/command_line/common_options.hpp"
 #include "app/commands/commands.hpp"
-#include "app/commands/common_options.hpp"
-#include "app/commands/run_session.hpp"
+#include "app/session/live_session.hpp"
 
 namespace vergence::app {
 namespace {
@@ -24,16 +24,16 @@ RunRequest request_of(const Arguments& a) {
   if (a.duration_s && !(*a.duration_s > 0 && *a.duration_s <= 86400))
     throw InputError("--duration needs seconds, more than 0 and at most 86400");
   RunRequest r;
-  r.out = a.out;
+  r.session.out = a.out;
   r.configuration = a.common.configuration(a.configuration);
   r.calibration.from_scratch = a.from_scratch;
   if (a.calibration) r.calibration.file = *a.calibration;
   r.faults = a.faults;
   r.duration_s = a.duration_s;
   r.fast = a.fast;
-  r.quiet = a.common.quiet;
-  if (a.also) r.also = parse_other_formats(*a.also);
-  r.print_memory = a.memory;
+  r.session.quiet = a.common.quiet;
+  if (a.also) r.session.also = parse_other_formats(*a.also);
+  r.session.print_memory = a.memory;
   return r;
 }
 

@@ -9,9 +9,9 @@
 #include "app/datasets/image_file.hpp"
 #include "app/datasets/stereo_sequence.hpp"
 #include "app/runtime/thread_runner.hpp"
-#include "app/runtime/wake_event.hpp"
 #include "core/memory/frame_pool.hpp"
 #include "core/memory/ring.hpp"
+#include "drivers/common/wake_event.hpp"
 
 namespace vergence::app {
 

@@ -13,8 +13,8 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "app/devices/camera_drivers.hpp"
 #include "app/doctor/probe.hpp"
-#include "app/runtime/camera_drivers.hpp"
 #include "drivers/v4l2/v4l2.hpp"
 
 namespace vergence::app {

@@ -5,8 +5,8 @@
 
 #include <fmt/format.h>
 
-#include "app/commands/drive_devices.hpp"
-#include "app/commands/rig_settings.hpp"
+#include "app/devices/drive_devices.hpp"
+#include "app/devices/rig_settings.hpp"
 
 namespace vergence::app {
 namespace {

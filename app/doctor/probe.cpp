@@ -5,7 +5,7 @@
 
 #include <fmt/format.h>
 
-#include "app/runtime/ins_drivers.hpp"
+#include "app/devices/ins_drivers.hpp"
 #include "drivers/trigger_board/trigger_board.hpp"
 
 namespace vergence::app {

@@ -15,8 +15,8 @@
 #include "app/recorder/histogram.hpp"
 #include "app/recorder/ins_file.hpp"
 #include "app/recorder/records.hpp"
-#include "app/runtime/wake_event.hpp"
 #include "core/memory/ring.hpp"
+#include "drivers/common/wake_event.hpp"
 
 namespace vergence::app {
 

@@ -101,6 +101,18 @@ const char* sentence_of(CalibrationCause cause) noexcept {
   return "";
 }
 
+/// The frame as it may be used: where the pairing is contradicted, its first image alone.
+RigFrame usable(const RigFrame& frame) noexcept {
+  RigFrame usable = frame;
+  if (frame.pairing != Pairing::contradicted) return usable;
+  bool any = false;
+  for (ImageView& image : usable.images) {
+    if (any) image = {};
+    any = any || !image.empty();
+  }
+  return usable;
+}
+
 }  // namespace
 
 struct Estimator::Parts {
@@ -143,7 +155,7 @@ struct Estimator::Parts {
   void tell_confirmed(Stamp stamp) noexcept;
   void follow(const odometry::FrameOutcome& out, const RigFrame& frame) noexcept;
   void tell_missing(Stamp stamp) noexcept;
-  void grade(const odometry::FrameOutcome& out, PoseSample* sample) const noexcept;
+  void grade(const odometry::FrameOutcome& out, Pairing pairing, PoseSample* sample) const noexcept;
   [[nodiscard]] Reason why_uncalibrated() const noexcept;
 
   EstimatorOptions options;
@@ -353,11 +365,15 @@ void Estimator::Parts::follow(const odometry::FrameOutcome& out, const RigFrame&
 }
 
 /// What the state of the calibration makes of a pose's status.
-void Estimator::Parts::grade(const odometry::FrameOutcome& out, PoseSample* sample) const noexcept {
+void Estimator::Parts::grade(const odometry::FrameOutcome& out, Pairing pairing,
+                             PoseSample* sample) const noexcept {
   sample->status = out.posed ? out.status : PoseStatus::lost;
   sample->reason = out.reason;
   if (!out.posed) return;
-  if (sample->status == PoseStatus::ok && out_of_step > 0) {
+  if (pairing == Pairing::contradicted && sample->status != PoseStatus::lost) {
+    sample->status = PoseStatus::degraded;
+    sample->reason = Reason::unproven_pairing;
+  } else if (sample->status == PoseStatus::ok && out_of_step > 0) {
     sample->status = PoseStatus::degraded;
     sample->reason = Reason::out_of_step;
   } else if (sample->status == PoseStatus::ok && (undecided || state == State::recalibrating)) {
@@ -402,8 +418,9 @@ Estimator::~Estimator() {
   parts_->~Parts();
 }
 
-PoseSample Estimator::process(const RigFrame& frame) noexcept {
+PoseSample Estimator::process(const RigFrame& given) noexcept {
   const auto start = std::chrono::steady_clock::now();
+  const RigFrame frame = usable(given);
   Parts& p = *parts_;
   p.events.clear();
   p.decisions.clear();
@@ -439,7 +456,7 @@ PoseSample Estimator::process(const RigFrame& frame) noexcept {
     p.calibrate(frame);
   }
   sample.state = p.state;
-  p.grade(out, &sample);
+  p.grade(out, frame.pairing, &sample);
   p.relinked = out.relinked;
   if (out.posed) sample.T_world_left = out.T_left_world.inverse();
   sample.inliers = out.inliers;

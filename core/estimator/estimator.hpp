@@ -97,8 +97,9 @@ class Estimator {
   Estimator& operator=(const Estimator&) = delete;
 
   /// One frame, stamps strictly increasing (a frame that is not newer is answered `lost`, reason
-  /// time_gap, and changes nothing). An empty image is a camera that gave none. T_world_left never
-  /// jumps but across a marked gap.
+  /// time_gap, and changes nothing). An empty image is a camera that gave none. Of a frame whose
+  /// pairing is contradicted the first image alone is used, and its pose is degraded. T_world_left
+  /// never jumps but across a marked gap.
   [[nodiscard]] PoseSample process(const RigFrame& frame) noexcept;
 
   /// No more frames will come. A calibration still sought is solved and decided from what there is;

@@ -8,6 +8,13 @@
 
 namespace vergence {
 
+/// How sure it is that the images of a rig frame were exposed together.
+enum class Pairing : std::uint8_t {
+  assumed,       // nothing proves it: a recording, or images paired by count or by arrival
+  proven,        // pulse numbers or stamps of one clock leave no other
+  contradicted,  // what should prove it contradicts itself: each image is one, nothing more is sure
+};
+
 /// The images of one trigger pulse. `images[k].empty()`: camera k gave none.
 ///
 /// Ownership  Views; whoever built the frame keeps the slots until Estimator::process() has
@@ -19,6 +26,7 @@ struct RigFrame {
   Stamp stamp{};
   Duration stamp_error{};  // bound of the stamp's error; 0 where the source gives none
   Duration spread{};
+  Pairing pairing = Pairing::assumed;
   int cameras = 0;
   std::array<ImageView, kMaxCameras> images{};
 };

@@ -35,6 +35,10 @@ enum class SyncMode : std::uint8_t {
 [[nodiscard]] constexpr bool proves_numbers(SyncMode m) noexcept {
   return wants_pulses(m) || m == SyncMode::master_strobe;
 }
+/// Something proves that the images of a set were exposed together.
+[[nodiscard]] constexpr bool proves_pairing(SyncMode m) noexcept {
+  return m != SyncMode::counter && m != SyncMode::software;
+}
 /// Frames are paired by their stamps.
 [[nodiscard]] constexpr bool pairs_by_time(SyncMode m) noexcept {
   return m == SyncMode::software || m == SyncMode::bus || m == SyncMode::ptp;

@@ -12,7 +12,7 @@
 #include <ceres/ceres.h>
 #include <glog/logging.h>
 
-#include "core/bundle/simulation.hpp"
+#include "app/simulation/rig_simulation.hpp"
 
 namespace vergence {
 namespace {

@@ -9,8 +9,8 @@
 
 #include <fmt/format.h>
 
-#include "app/commands/drive_calibration.hpp"
 #include "app/runtime/thread_runner.hpp"
+#include "app/session/drive_calibration.hpp"
 #include "core/calibration/stretches.hpp"
 #include "core/estimator/estimator.hpp"
 #include "core/math/so3.hpp"

@@ -13,7 +13,7 @@
 
 #include <fmt/format.h>
 
-#include "app/commands/drive_calibration.hpp"
+#include "app/session/drive_calibration.hpp"
 #include "core/estimator/estimator.hpp"
 #include "tests/bench/honesty_variants.hpp"
 #include "tests/support/temporary_folder.hpp"

@@ -12,7 +12,8 @@
 #include <fmt/format.h>
 #include <opencv2/imgcodecs.hpp>
 
-#include "app/commands/rig_settings.hpp"
+#include "app/devices/comparison_settings.hpp"
+#include "app/devices/rig_settings.hpp"
 #include "core/comparison/geodesy.hpp"
 #include "core/math/random.hpp"
 #include "core/math/so3.hpp"
@@ -144,16 +145,16 @@ struct Written {
   int images = 0, packets = 0;
 };
 
-void write_images(const app::LiveSource& source, const app::LiveItem& item, Written* w) {
+void write_images(const RigFrame& frame, Written* w) {
   for (int k = 0; k < 2; ++k) {
-    const ImageView v = source.image(item.set, k);
+    const ImageView& v = frame.images[static_cast<std::size_t>(k)];
     const cv::Mat image(v.height, v.width, CV_8U, const_cast<std::uint8_t*>(v.row(0)),
                         static_cast<std::size_t>(v.stride));
     (void)cv::imwrite(
         (w->drive / fmt::format("image_{:02d}/data/{:010d}.png", k, w->images)).string(), image,
         {cv::IMWRITE_PNG_COMPRESSION, 1});
     w->times[static_cast<std::size_t>(k)] +=
-        stamp_line(k == 0 ? item.stamp : item.stamp - kRightIsEarly);
+        stamp_line(k == 0 ? frame.stamp : frame.stamp - kRightIsEarly);
   }
   ++w->images;
 }
@@ -163,8 +164,8 @@ void write_images(const app::LiveSource& source, const app::LiveItem& item, Writ
 fs::path write_kitti_raw(const app::Configuration& c, double duration_s, const KittiRawForm& form,
                          const fs::path& folder) {
   const app::MockDrive drive = app::make_mock_drive(c, {}, false, duration_s, false);
-  app::LiveSource source({&drive.rig->camera(0), &drive.rig->camera(1)}, &drive.rig->ins(),
-                         &drive.rig->trigger(), mock_source_options(c, drive));
+  Acquisition source({&drive.rig->camera(0), &drive.rig->camera(1)}, &drive.rig->ins(),
+                     &drive.rig->trigger(), mock_source_options(c, drive));
 
   Written w;
   w.drive = folder / kDate / (kDate + "_drive_0001_" + (form.rectified ? "sync" : "extract"));
@@ -172,17 +173,18 @@ fs::path write_kitti_raw(const app::Configuration& c, double duration_s, const K
     fs::create_directories(w.drive / below);
   write_calibration(c, folder / kDate);
   OxtsErrors errors(form.seed);
-  source.start();
-  for (app::LiveItem item; source.next(&item);) {
-    if (item.kind == app::LiveItem::Kind::reading) {
-      InsSample s = item.sample;
+  if (source.start()) throw std::runtime_error("the mock does not start");
+  for (Acquired item; source.next(&item);) {
+    if (const auto* reading = std::get_if<AcquiredReading>(&item)) {
+      InsSample s = reading->sample;
       if (form.noisy_oxts) errors.spoil(&s);
       write(w.drive / fmt::format("oxts/data/{:010d}.txt", w.packets++), packet(s));
       w.oxts_times += stamp_line(s.stamp);
     }
-    if (item.kind != app::LiveItem::Kind::images) continue;
-    if (item.set.complete) write_images(source, item, &w);
-    source.release(item.set);
+    const auto* frame = std::get_if<AcquiredFrame>(&item);
+    if (frame == nullptr) continue;
+    if (frame->set.complete) write_images(frame->rig, &w);
+    source.release(*frame);
   }
   source.join();
   for (int k = 0; k < 2; ++k)

@@ -1,16 +1,16 @@
 #pragma once
-#include "app/commands/mock_drive.hpp"
-#include "app/commands/rig_settings.hpp"
-#include "app/runtime/live_source.hpp"
+#include "app/devices/mock_drive.hpp"
+#include "app/devices/rig_settings.hpp"
+#include "drivers/acquisition/acquisition.hpp"
 
 namespace vergence::test {
 
 /// How a drive of the mock is taken down as a data set: paired as `vergence run --fast` pairs it,
 /// every frame waited for, on its clock.
-[[nodiscard]] inline app::LiveSource::Options mock_source_options(const app::Configuration& c,
-                                                                  const app::MockDrive& drive) {
+[[nodiscard]] inline Acquisition::Options mock_source_options(const app::Configuration& c,
+                                                              const app::MockDrive& drive) {
   constexpr Stamp kVirtualEpoch{1'577'836'800'000'000'000};  // of vergence run --fast: 2020-01-01
-  app::LiveSource::Options o;
+  Acquisition::Options o;
   o.sync.cameras = 2;
   o.sync.interval = Duration::seconds(1 / c.trigger.rate);
   o.sync.hold = Duration::seconds(c.sync.hold_ms * 1e-3);

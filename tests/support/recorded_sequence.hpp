@@ -4,10 +4,10 @@
 #include <optional>
 #include <string>
 
-#include "app/commands/starting_calibration.hpp"
 #include "app/config/configuration.hpp"
 #include "app/datasets/stereo_sequence.hpp"
 #include "app/datasets/trajectory_files.hpp"
+#include "app/session/starting_calibration.hpp"
 
 namespace vergence::test {
 

@@ -76,30 +76,32 @@ void write_bytes(const std::filesystem::path& file, const std::vector<std::uint8
 void write_st_lucia(const app::Configuration& c, double duration_s,
                     const std::filesystem::path& folder) {
   const app::MockDrive drive = app::make_mock_drive(c, {}, false, duration_s, true);
-  app::LiveSource source({&drive.rig->camera(0), &drive.rig->camera(1)},
-                         drive.has_ins ? &drive.rig->ins() : nullptr, &drive.rig->trigger(),
-                         mock_source_options(c, drive));
+  Acquisition source({&drive.rig->camera(0), &drive.rig->camera(1)},
+                     drive.has_ins ? &drive.rig->ins() : nullptr, &drive.rig->trigger(),
+                     mock_source_options(c, drive));
 
   std::filesystem::create_directories(folder / kImages);
   std::ofstream images(folder / (kImages + ".log")), ins(folder / (kPrefix + "Ins0.log"));
   images << "sec0 usec0 width0 height0 format0 sec1 usec1 width1 height1 format1 path0 path1\n";
-  source.start();
-  for (app::LiveItem item; source.next(&item);) {
-    if (item.kind == app::LiveItem::Kind::reading) ins << ins_line(item.sample);
-    if (item.kind != app::LiveItem::Kind::images) continue;
-    if (item.set.complete) {
+  if (source.start()) throw std::runtime_error("the mock does not start");
+  for (Acquired item; source.next(&item);) {
+    if (const auto* reading = std::get_if<AcquiredReading>(&item)) ins << ins_line(reading->sample);
+    const auto* frame = std::get_if<AcquiredFrame>(&item);
+    if (frame == nullptr) continue;
+    if (frame->set.complete) {
       const std::string size = fmt::format("{} {} GBRG8", c.cameras[0].width, c.cameras[0].height),
-                        stamp = stamp_text(item.stamp);
+                        stamp = stamp_text(frame->rig.stamp);
       const auto name = [&](int k) {
-        return fmt::format("cam{}_image{:05d}.bmp", k, item.set.number);
+        return fmt::format("cam{}_image{:05d}.bmp", k, frame->rig.number);
       };
       for (int k = 0; k < 2; ++k)
-        write_bytes(folder / kImages / name(k), mosaic_of(source.image(item.set, k)));
+        write_bytes(folder / kImages / name(k),
+                    mosaic_of(frame->rig.images[static_cast<std::size_t>(k)]));
       // One with the folder in front, one without: the readers of the data set meet both.
       images << fmt::format("{} {} {} {} {}/{} {}\n", stamp, size, stamp, size, kImages, name(0),
                             name(1));
     }
-    source.release(item.set);
+    source.release(*frame);
   }
   source.join();
 }

@@ -10,7 +10,7 @@
 #include "drivers/serial/serial.hpp"
 #include "drivers/trigger_board/trigger_board.hpp"
 #include "tests/support/within.hpp"
-#include "tests/system/board/board_rig.hpp"
+#include "tests/rigs/board_rig.hpp"
 
 namespace vergence {
 namespace {

@@ -7,11 +7,11 @@
 #include <chrono>
 #include <thread>
 
-#include "app/runtime/live_source.hpp"
+#include "drivers/acquisition/acquisition.hpp"
 #include "drivers/iidc/iidc.hpp"
 #include "drivers/trigger_board/trigger_board.hpp"
-#include "tests/system/board/board_rig.hpp"
-#include "tests/system/iidc/iidc_rig.hpp"
+#include "tests/rigs/board_rig.hpp"
+#include "tests/rigs/iidc_rig.hpp"
 
 namespace vergence::test {
 namespace {
@@ -48,16 +48,16 @@ class Chain {
     ASSERT_EQ(board_device_->configure(pulses, nullptr), DeviceStatus::ok)
         << board_device_->last_error();
 
-    app::LiveSource::Options o;
+    Acquisition::Options o;
     o.sync.mode = SyncMode::board;
     o.sync.interval = Duration::seconds(1 / kRate);
     o.sync.hold =
         Duration::milliseconds(300);  // one processor is shared by emulators, kernel and test
     ASSERT_EQ(o.sync.validate(), nullptr) << o.sync.validate();
-    source_ = std::make_unique<app::LiveSource>(
+    source_ = std::make_unique<Acquisition>(
         std::vector<CameraDevice*>{devices_[0].get(), devices_[1].get()}, nullptr,
         board_device_.get(), o);
-    source_->start();
+    ASSERT_FALSE(source_->start());
     consumer_ = std::thread([this] { consume(); });
   }
   ~Chain() { finish(); }
@@ -78,7 +78,7 @@ class Chain {
     return false;
   }
   Emulator& cameras() { return cameras_; }
-  [[nodiscard]] const app::LiveCounters& counters() const { return source_->counters(); }
+  [[nodiscard]] const AcquisitionCounters& counters() const { return source_->counters(); }
 
   std::atomic<int> pairs{0}, wrong{0}, outside{0}, unreported{0}, gone{0}, back{0};
 
@@ -90,21 +90,25 @@ class Chain {
     return e;
   }
   void consume() {
-    for (app::LiveItem item; source_->next(&item);) {
-      gone += item.kind == app::LiveItem::Kind::device_gone;
-      back += item.kind == app::LiveItem::Kind::device_back;
-      if (item.kind != app::LiveItem::Kind::images) continue;
-      if (item.set.complete) {
-        const ImageStamp left = read_stamp(source_->image(item.set, 0)),
-                         right = read_stamp(source_->image(item.set, 1));
+    for (Acquired item; source_->next(&item);) {
+      if (const auto* event = std::get_if<DeviceEvent>(&item)) {
+        gone += event->kind == DeviceEvent::Kind::camera_gone;
+        back += event->kind == DeviceEvent::Kind::camera_back;
+      }
+      const auto* frame = std::get_if<AcquiredFrame>(&item);
+      if (frame == nullptr) continue;
+      const SyncedSet& set = frame->set;
+      if (set.complete) {
+        const ImageStamp left = read_stamp(frame->rig.images[0]),
+                         right = read_stamp(frame->rig.images[1]);
         // Both cameras were given the very same time of the edge.
         wrong += !left.valid || !right.valid || left.middle_ns != right.middle_ns ||
-                 item.set.proof != SyncProof::numbered;
-        outside += std::abs(item.set.stamp.ns() - left.middle_ns) > item.set.error.ns();
-        unreported += !item.set.reported;
+                 set.proof != SyncProof::numbered;
+        outside += std::abs(set.stamp.ns() - left.middle_ns) > set.error.ns();
+        unreported += !set.reported;
         ++pairs;
       }
-      source_->release(item.set);
+      source_->release(*frame);
     }
   }
 
@@ -113,7 +117,7 @@ class Chain {
   std::unique_ptr<CameraDriver> usb_ = iidc::make_usb_driver();
   std::vector<std::unique_ptr<CameraDevice>> devices_;
   std::unique_ptr<trigger_board::Device> board_device_;
-  std::unique_ptr<app::LiveSource> source_;
+  std::unique_ptr<Acquisition> source_;
   std::thread consumer_;
 };
 

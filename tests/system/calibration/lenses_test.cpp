@@ -2,7 +2,7 @@
 // drives` prints all figures.
 #include <gtest/gtest.h>
 
-#include "app/commands/drive_calibration.hpp"
+#include "app/session/drive_calibration.hpp"
 #include "core/math/so3.hpp"
 #include "tests/support/recorded_sequence.hpp"
 #include "tests/support/shared_data.hpp"

@@ -11,8 +11,8 @@
 #include <thread>
 #include <vector>
 
-#include "app/runtime/camera_drivers.hpp"
-#include "app/runtime/live_source.hpp"
+#include "app/devices/camera_drivers.hpp"
+#include "drivers/acquisition/acquisition.hpp"
 #include "drivers/gige/detail/link.hpp"
 #include "tests/support/gige_camera.hpp"
 
@@ -57,13 +57,13 @@ class Pairs {
     }
     std::vector<std::string> remarks;
     cameras = app::open_cameras(requests, &remarks);
-    app::LiveSource::Options o;
+    Acquisition::Options o;
     o.sync.interval = Duration::seconds(1 / rate);
     o.sync.align_start = true;
-    source = std::make_unique<app::LiveSource>(
+    source = std::make_unique<Acquisition>(
         std::vector<CameraDevice*>{cameras[0].device.get(), cameras[1].device.get()}, nullptr,
         nullptr, o);
-    source->start();
+    EXPECT_FALSE(source->start());
     std::thread pulses([this, loss, count] {
       constexpr int kQuiet = 5;  // pulses at either end without loss: the first frame sets the
                                  // count, the last shows the gap before it
@@ -75,10 +75,11 @@ class Pairs {
       std::this_thread::sleep_for(std::chrono::milliseconds(500));
       source->stop();
     });
-    for (app::LiveItem item; source->next(&item);) {
-      if (item.kind != app::LiveItem::Kind::images) continue;
-      take(item);
-      source->release(item.set);
+    for (Acquired item; source->next(&item);) {
+      const auto* frame = std::get_if<AcquiredFrame>(&item);
+      if (frame == nullptr) continue;
+      take(frame->rig);
+      source->release(*frame);
     }
     pulses.join();
     source->join();
@@ -95,7 +96,7 @@ class Pairs {
 
   std::vector<std::unique_ptr<GigeCamera>> simulators;
   std::vector<app::OpenedCamera> cameras;
-  std::unique_ptr<app::LiveSource> source;
+  std::unique_ptr<Acquisition> source;
   std::vector<std::uint64_t> complete;
 
  private:
@@ -108,11 +109,11 @@ class Pairs {
       std::this_thread::sleep_until(due += period);
     }
   }
-  void take(const app::LiveItem& item) {
+  void take(const RigFrame& frame) {
     std::uint64_t numbers[2] = {0, 0};
     for (int k = 0; k < 2; ++k) {
-      if (!item.set.present[static_cast<std::size_t>(k)]) return;
-      const ImageView image = source->image(item.set, k);
+      const ImageView& image = frame.images[static_cast<std::size_t>(k)];
+      if (image.empty()) return;
       for (int i = 7; i >= 0; --i) numbers[k] = numbers[k] << 8U | image.at(i, 0);
     }
     EXPECT_EQ(numbers[0], numbers[1]) << "images of two pulses in one set";

@@ -9,8 +9,8 @@
 
 #include <nlohmann/json.hpp>
 
-#include "app/commands/mock_drive.hpp"
 #include "app/datasets/trajectory_files.hpp"
+#include "app/devices/mock_drive.hpp"
 #include "tests/support/gige_camera.hpp"
 #include "tests/support/temporary_folder.hpp"
 #include "tests/system/gige/pairs.hpp"

@@ -2,6 +2,7 @@
 """Checks of the source tree itself, one word each:
 
   arrows    every #include goes where the table below allows
+  cycles    no two folders include from one another, directly or round about
   words     no file in the tree names a place of one machine or a habit the project does not have
   format    every C and C++ file is as clang-format writes it
   tidy      clang-tidy finds nothing in the files given
@@ -144,6 +145,53 @@ def arrows(root):
     return findings
 
 
+def folder_of(name):
+    """The folder whose file it is; detail/ is a part of the folder above."""
+    folder = os.path.dirname(name)
+    return folder[:-len("/detail")] if folder.endswith("/detail") else folder
+
+
+def folder_edges(root):
+    """{(from, to): the first include that goes there}: folder to folder, and between the two below their last common one."""
+    edges = {}
+    for name in tree_files(root):
+        if not name.endswith(SOURCE_SUFFIXES) or room_of(name) is None or name.startswith(WORLDS_OF_THEIR_OWN):
+            continue
+        for number, line in enumerate(lines_of(root, name), 1):
+            include = INCLUDE.match(line)
+            if include is None or include.group(1) is None or room_of(include.group(1)) is None:
+                continue
+            here, there = folder_of(name), folder_of(include.group(1))
+            if here == there:
+                continue
+            why = "%s:%d" % (name, number)
+            edges.setdefault(("of " + here, "of " + there), why)
+            a, b = here.split("/"), there.split("/")
+            same = next((i for i, (x, y) in enumerate(zip(a, b)) if x != y), None)
+            if same is not None:  # else one lies in the other
+                edges.setdefault(("/".join(a[:same + 1]), "/".join(b[:same + 1])), why)
+    return edges
+
+
+def cycles(root):
+    """One finding a group of folders that reach one another. `of X`: X's own files, without the folders below it."""
+    edges = folder_edges(root)
+    reach = {}
+    for start in {a for a, _ in edges}:
+        seen, todo = set(), [start]
+        while todo:
+            at = todo.pop()
+            for a, b in edges:
+                if a == at and b not in seen:
+                    seen.add(b)
+                    todo.append(b)
+        reach[start] = seen
+    groups = {frozenset(b for b in seen if a in reach.get(b, ())) for a, seen in reach.items() if a in seen}
+    return ["%s include from one another: %s" % (
+        ", ".join(sorted(group)), ", ".join(sorted("%s -> %s (%s)" % (a, b, why) for (a, b), why in edges.items() if a in group and b in group)))
+            for group in sorted(groups, key=sorted)]
+
+
 def words(root):
     findings = []
     for name in tree_files(root):
@@ -259,6 +307,21 @@ def self_test():
             if found and not found[0].startswith(name + ":2:"):
                 wrong.append("%s: the finding does not name the line: %s" % (name, found[0]))
             os.remove(path)
+        def put_includes(pairs):
+            return [put(name, '#include "%s"\n' % target) for name, target in pairs]
+
+        for pairs, expected in (
+                ((("core/a/a.cpp", "core/b/b.hpp"), ("core/b/b.cpp", "core/c/c.hpp")), False),
+                ((("core/a/a.cpp", "core/b/b.hpp"), ("core/b/b.cpp", "core/a/a.hpp")), True),
+                ((("core/a/a.cpp", "core/b/b.hpp"), ("core/b/b.cpp", "core/c/c.hpp"), ("core/c/c.cpp", "core/a/a.hpp")), True),
+                ((("core/a/a.cpp", "core/a/detail/x.hpp"), ("core/a/detail/x.cpp", "core/a/a.hpp")), False),
+                ((("core/a/a.cpp", "core/a/sub/x.hpp"), ("core/a/sub/x.cpp", "core/a/a.hpp")), True),
+                ((("core/a/x/a.cpp", "core/b/y/b.hpp"), ("core/b/z/b.cpp", "core/a/w/a.hpp")), True),
+                ((("tests/system/a/a.cpp", "tests/system/b/b.hpp"), ("tests/system/b/b.cpp", "tests/system/a/a.hpp")), True)):
+            paths = put_includes(pairs)
+            expect(cycles(root), expected, "cycle in %s" % (pairs,))
+            for path in paths:
+                os.remove(path)
         for text, expected in (("see /%s/me/x\n" % PLACES[1], True), ("in ../%s/data, app/%s/x\n" % (PLACES[0], PLACES[1]), False),
                                ("$HOME/%s/x\n" % PLACES[0], False), ("-march=" + "native\n", True)):
             path = put("docs/a.md", text)
@@ -276,7 +339,7 @@ def self_test():
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("check", choices=("arrows", "words", "format", "tidy", "self-test"))
+    parser.add_argument("check", choices=("arrows", "cycles", "words", "format", "tidy", "self-test"))
     parser.add_argument("--root", default=".")
     parser.add_argument("--build", default="build", help="tidy: folder of compile_commands.json")
     parser.add_argument("prefixes", nargs="*", help="tidy: folders to look at")
@@ -285,7 +348,7 @@ def main():
     if needs is not None and shutil.which(needs) is None:
         print("skipped: %s is not installed" % needs)
         return SKIPPED
-    findings = {"arrows": lambda: arrows(given.root), "words": lambda: words(given.root), "format": lambda: format_files(given.root),
+    findings = {"arrows": lambda: arrows(given.root), "cycles": lambda: cycles(given.root), "words": lambda: words(given.root), "format": lambda: format_files(given.root),
                 "tidy": lambda: tidy(given.root, given.build, given.prefixes), "self-test": self_test}[given.check]()
     print("\n".join(findings) if findings else "%s: nothing found" % given.check)
     return 1 if findings else 0

@@ -4,7 +4,7 @@
 #include <string>
 #include <thread>
 
-#include "tests/system/iidc/iidc_rig.hpp"
+#include "tests/rigs/iidc_rig.hpp"
 #include "tests/unit/drivers/conformance/camera_conformance.hpp"
 
 namespace vergence::test {

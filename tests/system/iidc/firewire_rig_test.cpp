@@ -2,7 +2,7 @@
 #include <fstream>
 
 #include "drivers/iidc/iidc.hpp"
-#include "tests/system/iidc/iidc_rig.hpp"
+#include "tests/rigs/iidc_rig.hpp"
 
 namespace vergence::test {
 

@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include "tests/system/iidc/iidc_rig.hpp"
+#include "tests/rigs/iidc_rig.hpp"
 
 /// What holds on both buses: one set of cases, included once by each bus's test with its own
 /// BusUnderTest.

@@ -15,8 +15,8 @@
 #include "drivers/iidc/iidc.hpp"
 #include "tests/rigs/film.hpp"
 #include "tests/support/xsens_terminal.hpp"
-#include "tests/system/board/board_rig.hpp"
-#include "tests/system/iidc/iidc_rig.hpp"
+#include "tests/rigs/board_rig.hpp"
+#include "tests/rigs/iidc_rig.hpp"
 
 namespace vergence::test {
 namespace {

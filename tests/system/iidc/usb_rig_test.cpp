@@ -1,5 +1,5 @@
 #include "drivers/iidc/iidc.hpp"
-#include "tests/system/iidc/iidc_rig.hpp"
+#include "tests/rigs/iidc_rig.hpp"
 
 namespace vergence::test {
 

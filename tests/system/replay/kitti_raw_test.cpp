@@ -10,9 +10,9 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
-#include "app/commands/rig_settings.hpp"
 #include "app/config/calibration_file.hpp"
 #include "app/datasets/trajectory_files.hpp"
+#include "app/devices/rig_settings.hpp"
 #include "app/recorder/ins_file.hpp"
 #include "core/math/so3.hpp"
 #include "tests/support/kitti_raw_writer.hpp"

@@ -5,9 +5,9 @@
 
 #include <nlohmann/json.hpp>
 
-#include "app/commands/rig_settings.hpp"
 #include "app/config/calibration_file.hpp"
 #include "app/datasets/trajectory_files.hpp"
+#include "app/devices/rig_settings.hpp"
 #include "tests/support/st_lucia_writer.hpp"
 #include "tests/support/temporary_folder.hpp"
 #include "tests/unit/app/commands/run_vergence.hpp"

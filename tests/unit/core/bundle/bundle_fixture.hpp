@@ -1,7 +1,7 @@
 #pragma once
 #include <memory>
 
-#include "core/bundle/simulation.hpp"
+#include "app/simulation/rig_simulation.hpp"
 
 namespace vergence {
 

@@ -111,6 +111,37 @@ TEST(Estimator, theFirstFrameSaysThatACalibrationWasGiven) {
   EXPECT_TRUE(s.estimator.events().empty());
 }
 
+TEST(Estimator, ofAContradictedPairingTheFirstImageAloneIsUsedAndThePoseSaysSo) {
+  Standing contradicted, one_camera;
+  for (int i = 0; i < 3; ++i) {
+    (void)contradicted.give(i);
+    (void)one_camera.give(i);
+  }
+  RigFrame frame = contradicted.frame(3);
+  frame.pairing = Pairing::contradicted;
+  const PoseSample sample = contradicted.estimator.process(frame);
+  EXPECT_EQ(sample.status, PoseStatus::degraded);
+  EXPECT_EQ(sample.reason, Reason::unproven_pairing);
+  RigFrame left = one_camera.frame(3);
+  left.images[1] = {};
+  const PoseSample expected = one_camera.estimator.process(left);
+  EXPECT_EQ(sample.T_world_left.t, expected.T_world_left.t) << "bit for bit";
+  EXPECT_EQ(sample.stereo_inliers, 0);
+  EXPECT_EQ(contradicted.give(4).status, PoseStatus::ok) << "that one frame only";
+}
+
+TEST(Estimator, aPairingThatNothingProvesIsUsedAsItIs) {
+  Standing proven, assumed;
+  for (int i = 0; i < 3; ++i) {
+    RigFrame frame = proven.frame(i);
+    frame.pairing = Pairing::proven;
+    const PoseSample p = proven.estimator.process(frame);
+    const PoseSample a = assumed.give(i);
+    EXPECT_EQ(p.status, a.status);
+    EXPECT_EQ(p.T_world_left.t, a.T_world_left.t);
+  }
+}
+
 TEST(Estimator, aFrameThatIsNotNewerIsLostToATimeGapAndChangesNothing) {
   Standing s, undisturbed;
   for (int i = 0; i < 4; ++i) {

@@ -1,0 +1,41 @@
+#pragma once
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <CLI/App.hpp>
+
+#include "app/command_line/common_options.hpp"
+
+namespace vergence::app {
+
+/// What `vergence calibrate` is asked to look at.
+enum class CalibrateWay : std::uint8_t { board_images, board_live, drive, convert };
+
+/// The command line of `vergence calibrate`, the words as given: the program declares it, and the
+/// checkerboard tool, which the program starts with the same words.
+struct CalibrateOptions {
+  CommonOptions common{};
+  std::string configuration{}, board{}, out{}, model = "radtan", format{}, size{}, drive{};
+  std::optional<std::string> calibration{};
+  std::vector<std::string> left{}, right{}, convert{};
+  std::vector<std::string> more_cameras{};  // one pattern each
+  std::optional<std::string> keep_views{};
+  std::optional<double> square{}, baseline{};
+  std::string to{};
+  std::string left_topic{}, right_topic{};  // --drive
+  bool sixth_order = false, json = false, force = false;
+
+  /// The subcommand with its options; `this` outlives its parsing.
+  CLI::App* declare(CLI::App& root);
+  /// InputError: none of the ways, or several.
+  [[nodiscard]] CalibrateWay way() const;
+};
+
+/// Before the board is carried around for half an hour, not after it: InputError unless a file can
+/// be written there. One that is there already is overwritten with `force` only.
+void check_writable(const std::filesystem::path& file, bool force);
+
+}  // namespace vergence::app

@@ -1,0 +1,224 @@
+#include "app/devices/drive_devices.hpp"
+
+#include <time.h>
+
+#include <algorithm>
+#include <cmath>
+#include <sstream>
+
+#include <fmt/format.h>
+
+#include "app/devices/drive_sync.hpp"
+#include "app/devices/exposure_settings.hpp"
+#include "app/devices/simulated_board.hpp"
+#include "app/devices/simulated_ins.hpp"
+#include "app/devices/software_trigger.hpp"
+#include "app/devices/trigger_boards.hpp"
+#include "app/runtime/errors.hpp"
+#include "app/runtime/nearest.hpp"
+
+namespace vergence::app {
+namespace {
+
+HostStamp monotonic_now() noexcept {
+  timespec t{};
+  (void)::clock_gettime(CLOCK_MONOTONIC, &t);
+  return HostStamp(static_cast<std::int64_t>(t.tv_sec) * 1'000'000'000 + t.tv_nsec);
+}
+
+bool all_mock(const Configuration& c) {
+  return std::all_of(c.cameras.begin(), c.cameras.end(), [](const CameraSettings& s) {
+    return s.driver.empty() || s.driver == "mock";
+  });
+}
+
+CameraTrigger trigger_of(const std::string& key, const std::string& word) {
+  if (word == "hardware") return CameraTrigger::hardware;
+  if (word == "software") return CameraTrigger::software;
+  if (word == "free") return CameraTrigger::free;
+  throw InputError(fmt::format("{}.trigger is \"{}\"{}; it is one of hardware, software, free", key,
+                               word, did_you_mean(word, {"hardware", "software", "free"})));
+}
+
+/// The MTi-G-700/710 makes pulses of 400 Hz / n and marks the reading each left with; the MTi-G
+/// makes its own sample rate / n, unmarked.
+bool marks_sync_out(const DeviceInfo& ins) { return ins.model.find("7") != std::string::npos; }
+
+void check_sync_out(const Configuration& c, const DeviceInfo& ins) {
+  constexpr double kBase = 400;  // Hz
+  const double base = marks_sync_out(ins) ? kBase : c.ins.rate;
+  const double nearest = base / std::max(1.0, std::round(base / c.trigger.rate));
+  if (std::abs(nearest - c.trigger.rate) <= 1e-3 * c.trigger.rate) return;
+  throw InputError(
+      fmt::format("trigger.rate is {}, and {} makes pulses of {:g} Hz / n: set trigger.rate and "
+                  "ins.sync_out_hz to {:.6g}",
+                  c.trigger.rate, ins_title(ins), base, nearest));
+}
+
+/// What real devices need of a configuration before any of them is opened.
+std::vector<CameraRequest> requests_of(const Configuration& c) {
+  std::vector<CameraRequest> requests;
+  const int cameras = nominal_rig(c).cameras;
+  if (cameras < 2)
+    throw InputError(
+        "one camera alone has no scale; two are the least, cameras: [{driver: gige}, {driver: "
+        "gige}]");
+  for (int k = 0; k < cameras; ++k) {
+    const CameraSettings& s = c.cameras[static_cast<std::size_t>(k)];
+    const std::string key = fmt::format("cameras.{}", k);
+    if (s.driver == "mock")
+      throw InputError(key +
+                       ".driver is mock, another camera is real; a mock's cameras share one world");
+    if (s.width != c.cameras[0].width || s.height != c.cameras[0].height)
+      throw InputError(fmt::format(
+          "{}.size is {} x {}, that of camera 0 is {} x {}; all cameras of a rig have one size",
+          key, s.width, s.height, c.cameras[0].width, c.cameras[0].height));
+    CameraRequest r;
+    r.key = key;
+    r.driver = s.driver;
+    r.serial = s.serial;
+    const ExposureSetting start = starting_exposure(c, static_cast<std::size_t>(k));
+    r.configuration = {s.width,        s.height,      c.trigger.rate,
+                       start.exposure, start.gain_db, trigger_of(key, s.trigger)};
+    r.configuration.offset_x = s.offset_x;
+    r.configuration.offset_y = s.offset_y;
+    r.configuration.pixel_format = s.pixel_format;
+    r.configuration.options = parse_camera_options(key + ".options", s.options);
+    if (c.sync.mode != "master_strobe" &&
+        r.configuration.trigger != trigger_of("cameras.0", c.cameras[0].trigger))
+      throw InputError(fmt::format(
+          "{}.trigger is {}, that of camera 0 is {}; all cameras of a rig are triggered alike", key,
+          s.trigger, c.cameras[0].trigger));
+    requests.push_back(std::move(r));
+  }
+  if (c.trigger.driver != "none" && c.trigger.driver != "board")
+    throw InputError(
+        fmt::format("trigger.driver is \"{}\"{}; with real cameras it is board, or none where "
+                    "something else pulses",
+                    c.trigger.driver, did_you_mean(c.trigger.driver, {"board", "none"})));
+  if (c.trigger.driver == "board" && requests[0].configuration.trigger != CameraTrigger::hardware)
+    throw InputError(
+        fmt::format("trigger.driver is board and cameras[].trigger {}; the board's pulses are for "
+                    "cameras with trigger: hardware",
+                    c.cameras[0].trigger));
+  return requests;
+}
+
+InsRequest ins_request(const InsSettings& s) {
+  return {s.driver,      s.port,
+          s.rate,        static_cast<std::uint32_t>(s.baud),
+          s.sync_out_hz, s.sync_out_width_ms,
+          s.sync_in,     s.processing_ms};
+}
+
+}  // namespace
+
+std::map<std::string, std::string> parse_camera_options(const std::string& key,
+                                                        const std::string& text) {
+  std::map<std::string, std::string> options;
+  std::istringstream words(text);
+  for (std::string word; words >> word;) {
+    const auto equals = word.find('=');
+    if (equals == std::string::npos || equals == 0 || equals + 1 == word.size())
+      throw InputError(
+          fmt::format("{} has \"{}\"; it takes NAME=VALUE, as in packet_size=9000, or a group "
+                      "{{packet_size: 9000}}",
+                      key, word.substr(0, 60)));
+    options.insert_or_assign(word.substr(0, equals), word.substr(equals + 1));
+  }
+  return options;
+}
+
+void start_acquisition(Acquisition* acquisition) {
+  const auto failure = acquisition->start();
+  if (!failure) return;
+  const std::string why = failure->message.empty()
+                              ? std::string(to_string(failure->status)) +
+                                    "; check its cable and its section of the configuration"
+                              : failure->message;
+  throw InputError(failure->device.driver + " " + failure->device.serial +
+                   " cannot be started: " + why);
+}
+
+DriveDevices::DriveDevices(const Configuration& c, const std::vector<std::string>& faults,
+                           bool fast, std::optional<double> duration_s) {
+  if (!all_mock(c)) {
+    if (fast)
+      throw InputError("--fast is virtual time, which real cameras do not keep; run without it");
+    if (!faults.empty()) throw InputError("--fault is for the mock; real cameras have their own");
+    open_real(c);
+    if (duration_s) frames_ = static_cast<std::uint64_t>(*duration_s * c.trigger.rate) + 1;
+    return;
+  }
+  check_drive(c);
+  mock_ = make_mock_drive(c, faults, !fast, duration_s);
+  for (int k = 0; k < mock_.rig->cameras(); ++k) cameras_.push_back(&mock_.rig->camera(k));
+  if (mock_.has_ins) ins_ = &mock_.rig->ins();
+  if (mock_.has_ins && c.mock.ins_line != "none") {
+    if (!fast)
+      throw InputError("mock.ins_line is \"" + c.mock.ins_line +
+                       "\", a line in virtual time; run with --fast, or set it to none");
+    opened_ins_ = make_simulated_ins(c, *mock_.rig, &remarks_);
+    ins_ = opened_ins_.get();
+  }
+  trigger_ = &mock_.rig->trigger();
+  if (c.mock.board_line != "none") {
+    if (!fast)
+      throw InputError("mock.board_line is \"" + c.mock.board_line +
+                       "\", a line in virtual time; run with --fast, or set it to none");
+    simulated_board_ = make_simulated_board(c, mock_.rig.get(), &board_driver_, &remarks_);
+    trigger_ = simulated_board_.get();
+    board_keeps_own_time_ = true;
+  }
+  sync_ = sync_options(c, mock_.rig->cameras());
+  frames_ = mock_.rig->pulses(c.trigger.rate);
+}
+
+void DriveDevices::open_real(const Configuration& c) {
+  const std::vector<CameraRequest> requests = requests_of(c);
+  sync_ = sync_options(c, static_cast<int>(requests.size()));
+  const TriggerConfiguration pulses = trigger_configuration(c, sync_.cameras);
+  opened_ = open_cameras(requests, &remarks_);
+  for (const OpenedCamera& camera : opened_) cameras_.push_back(camera.device.get());
+  opened_ins_ = open_ins(ins_request(c.ins), &remarks_);
+  ins_ = opened_ins_.get();
+  if (sync_.mode == SyncMode::ins_syncout) {
+    check_sync_out(c, ins_->info());
+    if (!marks_sync_out(ins_->info()))
+      sync_out_divider_ = static_cast<std::uint32_t>(std::lround(c.ins.rate / c.trigger.rate));
+  }
+  if (c.trigger.driver == "board") {
+    board_ = open_trigger_board(c.trigger, pulses, &remarks_);
+    trigger_ = board_.get();
+    board_driver_ = board_.get();
+  }
+  for (std::size_t k = 0; k < opened_.size(); ++k)
+    sync_.camera[k].resolution = opened_[k].device->timing().resolution;
+  const CameraTrigger trigger = requests[0].configuration.trigger;
+  sync_.align_start = trigger == CameraTrigger::hardware && sync_.mode == SyncMode::counter &&
+                      trigger_ == nullptr;  // the pulses do not wait for us
+  if (trigger == CameraTrigger::software) {
+    software_ = std::make_unique<SoftwareTrigger>(cameras_);
+    if (software_->configure(pulses, nullptr) != DeviceStatus::ok)
+      throw InputError("trigger.rate is not possible");
+    trigger_ = software_.get();
+  }
+  start_ = monotonic_now();
+}
+
+Acquisition::Options DriveDevices::acquisition_options() const {
+  Acquisition::Options o;
+  o.sync = sync_;
+  o.board_keeps_own_time = board_keeps_own_time_;
+  o.sync_out_divider = sync_out_divider_;
+  return o;
+}
+
+std::span<const mock::Fault> DriveDevices::faults() const noexcept {
+  if (mock_.rig == nullptr) return {};
+  return mock_.rig->truth().faults();
+}
+
+HostStamp DriveDevices::start() const noexcept { return mock_.rig ? mock_.rig->start() : start_; }
+
+}  // namespace vergence::app

@@ -1,0 +1,86 @@
+#pragma once
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "app/config/configuration.hpp"
+#include "app/devices/camera_drivers.hpp"
+#include "app/devices/ins_drivers.hpp"
+#include "app/devices/mock_drive.hpp"
+#include "drivers/acquisition/acquisition.hpp"
+#include "drivers/sync/rig_synchronizer.hpp"
+#include "drivers/trigger_board/device.hpp"
+
+namespace vergence::app {
+
+/// The devices of a drive, configured and ready to start: a mock's rig, or cameras that exist.
+///
+/// Ownership  Cameras, INS and trigger live in it and outlive the Acquisition that uses them.
+///            Threads: one caller.
+class DriveDevices {
+ public:
+  /// InputError names the key, or the device and what it offers. `fast`: virtual time, mock only.
+  DriveDevices(const Configuration& configuration, const std::vector<std::string>& faults,
+               bool fast, std::optional<double> duration_s);
+
+  [[nodiscard]] const std::vector<CameraDevice*>& cameras() const noexcept { return cameras_; }
+  /// Real cameras with what they made of their configuration; empty: a mock's.
+  [[nodiscard]] const std::vector<OpenedCamera>& opened() const noexcept { return opened_; }
+  [[nodiscard]] InsDevice* ins() const noexcept { return ins_; }  // null: none
+  [[nodiscard]] TriggerDevice* trigger() const noexcept {
+    return trigger_;
+  }  // null: pulses come from elsewhere, or none
+  [[nodiscard]] const SyncOptions& sync() const noexcept { return sync_; }
+  /// Its pulses are not known before they are made: Acquisition::Options::board_keeps_own_time.
+  [[nodiscard]] bool board_keeps_own_time() const noexcept { return board_keeps_own_time_; }
+  /// What an acquisition has to know of these devices; the rest as it stands.
+  [[nodiscard]] Acquisition::Options acquisition_options() const;
+  /// The driver of a board on a line, simulated or not; null: there is none.
+  [[nodiscard]] const trigger_board::Device* board() const noexcept { return board_driver_; }
+  /// Sentences about what works, but not as well as it should.
+  [[nodiscard]] const std::vector<std::string>& remarks() const noexcept { return remarks_; }
+
+  /// Null: the devices are real.
+  [[nodiscard]] const mock::MockRig* mock() const noexcept { return mock_.rig.get(); }
+  /// Scheduled in the mock.
+  [[nodiscard]] std::span<const mock::Fault> faults() const noexcept;
+  /// When the drive begins; a mock in real time knows it only after the start.
+  [[nodiscard]] HostStamp start() const noexcept;
+  /// Rig frames of the whole drive; 0: nobody knows.
+  [[nodiscard]] std::uint64_t frames() const noexcept { return frames_; }
+  /// Of a mock; real cameras do not tell.
+  [[nodiscard]] std::size_t image_bytes() const noexcept {
+    return mock_.rig ? mock_.rig->image_bytes() : 0;
+  }
+
+ private:
+  void open_real(const Configuration& configuration);
+
+  MockDrive mock_;
+  std::vector<OpenedCamera> opened_;
+  std::unique_ptr<InsDevice> opened_ins_;
+  std::unique_ptr<TriggerDevice> software_;
+  std::unique_ptr<trigger_board::Device> board_;
+  std::unique_ptr<TriggerDevice> simulated_board_;
+  const trigger_board::Device* board_driver_ = nullptr;
+  std::vector<CameraDevice*> cameras_;
+  InsDevice* ins_ = nullptr;
+  TriggerDevice* trigger_ = nullptr;
+  SyncOptions sync_;
+  std::uint32_t sync_out_divider_ = 0;
+  bool board_keeps_own_time_ = false;
+  std::vector<std::string> remarks_;
+  std::uint64_t frames_ = 0;
+  HostStamp start_{};
+};
+
+/// Acquisition::start(); InputError names the device that cannot be started.
+void start_acquisition(Acquisition* acquisition);
+
+/// `NAME=VALUE NAME=VALUE …` of `cameras.N.options`. InputError names the key.
+[[nodiscard]] std::map<std::string, std::string> parse_camera_options(const std::string& key,
+                                                                      const std::string& text);
+
+}  // namespace vergence::app

@@ -1,0 +1,224 @@
+#include "app/devices/drive_sync.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include <fmt/format.h>
+
+#include "app/runtime/errors.hpp"
+#include "app/runtime/nearest.hpp"
+
+namespace vergence::app {
+namespace {
+
+const std::vector<std::string> kModes{"board", "ins_syncout", "master_strobe", "bus",
+                                      "ptp",   "counter",     "software"};
+
+[[noreturn]] void refuse(const Configuration& c, const std::string& why) {
+  throw InputError(fmt::format("sync.mode is {}: {}", c.sync.mode, why));
+}
+
+bool is_mock(const CameraSettings& camera) {
+  return camera.driver.empty() || camera.driver == "mock";
+}
+
+template <class Condition>
+void for_each_camera(const Configuration& c, int cameras, const Condition& condition) {
+  for (int k = 0; k < cameras; ++k) condition(k, c.cameras[static_cast<std::size_t>(k)]);
+}
+
+void check_board(const Configuration& c) {
+  if (c.trigger.driver == "none")
+    refuse(c,
+           "trigger.driver is none, so nothing reports the pulses; set trigger.driver to board, or "
+           "sync.mode to counter (not proven)");
+}
+
+void check_ins_syncout(const Configuration& c, int cameras) {
+  if (c.ins.driver != "xsens")
+    refuse(c, fmt::format("ins.driver is {}, which has no SyncOut; it takes xsens, its SyncOut "
+                          "wired to the cameras",
+                          c.ins.driver));
+  if (!(c.ins.sync_out_hz > 0))
+    refuse(c,
+           "ins.sync_out_hz says how many pulses a second the INS makes; set it, 30 of 120 Hz for "
+           "instance");
+  if (std::abs(c.ins.sync_out_hz - c.trigger.rate) > 1e-3 * c.trigger.rate)
+    refuse(c, fmt::format("trigger.rate is {} and ins.sync_out_hz {}; the INS triggers the "
+                          "cameras, so both are one rate",
+                          c.trigger.rate, c.ins.sync_out_hz));
+  for_each_camera(c, cameras, [&](int k, const CameraSettings& s) {
+    if (is_mock(s))
+      refuse(c, fmt::format("cameras.{}.driver is mock, which no INS triggers; use mode board", k));
+  });
+}
+
+void check_master(const Configuration& c, int cameras) {
+  for_each_camera(c, cameras, [&](int k, const CameraSettings& s) {
+    if (is_mock(s))
+      refuse(c, fmt::format("cameras.{}.driver is mock, whose cameras are triggered by the mock's "
+                            "board; use mode board",
+                            k));
+    if (k == 0 && s.trigger == "hardware")
+      refuse(
+          c,
+          "cameras.0.trigger is hardware; camera 0 triggers the others, so it is free or software");
+    if (k > 0 && s.trigger != "hardware")
+      refuse(c, fmt::format(
+                    "cameras.{}.trigger is {}; camera 0's strobe triggers it, so it is hardware", k,
+                    s.trigger));
+  });
+}
+
+void check_bus(const Configuration& c, int cameras) {
+  for_each_camera(c, cameras, [&](int k, const CameraSettings& s) {
+    if (s.driver != "iidc-1394")
+      refuse(c, fmt::format("cameras.{}.driver is {}; only cameras on one IEEE 1394 bus "
+                            "(iidc-1394) share its cycle timer",
+                            k, s.driver));
+  });
+}
+
+void check_ptp(const Configuration& c, int cameras) {
+  for_each_camera(c, cameras, [&](int k, const CameraSettings& s) {
+    if (s.driver != "gige")
+      refuse(c, fmt::format("cameras.{}.driver is {}; PTP clocks are those of gige cameras", k,
+                            s.driver));
+    if (s.options.find("ptp=on") == std::string::npos)
+      refuse(c, fmt::format(
+                    "cameras.{}.options does not say ptp: on, so its clock follows nobody's", k));
+  });
+}
+
+void check_mode(const Configuration& c, SyncMode mode, int cameras) {
+  switch (mode) {
+    case SyncMode::board:
+      return check_board(c);
+    case SyncMode::ins_syncout:
+      return check_ins_syncout(c, cameras);
+    case SyncMode::master_strobe:
+      return check_master(c, cameras);
+    case SyncMode::bus:
+      return check_bus(c, cameras);
+    case SyncMode::ptp:
+      return check_ptp(c, cameras);
+    case SyncMode::counter:
+      if (c.cameras[0].trigger == "free")
+        throw InputError(
+            "cameras[].trigger is free: nothing makes the cameras expose together, so their "
+            "counters cannot pair the images; "
+            "trigger them, or set sync.mode to software");
+      return;
+    case SyncMode::software:
+      return;
+  }
+}
+
+/// A pulse that comes while a camera still exposes is ignored without a word.
+void check_exposures(const Configuration& c, int cameras) {
+  const double shortest_us = 1e6 / c.trigger.rate - c.trigger.vary_us;
+  for_each_camera(c, cameras, [&](int k, const CameraSettings& s) {
+    const double busy_us = s.trigger_delay_us + s.exposure_us;
+    if (busy_us > shortest_us)
+      throw InputError(
+          fmt::format("cameras.{}.exposure_us is {}{}, longer than the {:.0f} µs between two "
+                      "pulses (trigger.rate {}{}): the camera would miss pulses",
+                      k, s.exposure_us,
+                      s.trigger_delay_us > 0
+                          ? fmt::format(" after {} µs of trigger_delay_us", s.trigger_delay_us)
+                          : "",
+                      shortest_us, c.trigger.rate,
+                      c.trigger.vary_us > 0 ? fmt::format(", vary_us {}", c.trigger.vary_us) : ""));
+  });
+}
+
+/// What its stamps have where nothing is said: the V4L2 kernel stamps by the host's clock, the
+/// others have their own.
+Duration jitter_of(const CameraSettings& s) {
+  constexpr double kOwnClock = 20, kHostClock = 1000;  // µs
+  const double us = s.stamp_jitter_us > 0 ? s.stamp_jitter_us
+                    : s.driver == "v4l2"  ? kHostClock
+                                          : kOwnClock;
+  return Duration::nanoseconds(std::llround(us * 1e3));
+}
+
+Duration microseconds(double us) { return Duration::nanoseconds(std::llround(us * 1e3)); }
+
+}  // namespace
+
+SyncOptions sync_options(const Configuration& c, int cameras) {
+  const auto mode = sync_mode_of(c.sync.mode);
+  if (!mode)
+    throw InputError(fmt::format("sync.mode is \"{}\"{}; it is one of {}", c.sync.mode,
+                                 did_you_mean(c.sync.mode, kModes), fmt::join(kModes, ", ")));
+  check_mode(c, *mode, cameras);
+  check_exposures(c, cameras);
+  SyncOptions o;
+  o.cameras = cameras;
+  o.interval = Duration::seconds(1 / c.trigger.rate);
+  o.hold = Duration::seconds(c.sync.hold_ms * 1e-3);
+  o.tolerance = Duration::seconds(c.sync.tolerance_ms * 1e-3);
+  o.mode = *mode;
+  for_each_camera(c, cameras, [&](int k, const CameraSettings& s) {
+    SyncCameraOptions& camera = o.camera[static_cast<std::size_t>(k)];
+    camera.delay = microseconds(s.trigger_delay_us);
+    camera.jitter = jitter_of(s);
+  });
+  if (const char* sentence = o.validate())
+    throw InputError(fmt::format("sync ({}): {}", c.sync.mode, sentence));
+  return o;
+}
+
+TriggerConfiguration trigger_configuration(const Configuration& c, int cameras) {
+  const auto all = static_cast<std::uint8_t>((1U << static_cast<unsigned>(cameras)) - 1U);
+  TriggerConfiguration t;
+  t.rate_hz = c.trigger.rate;
+  t.width = microseconds(c.trigger.width_us);
+  t.vary = microseconds(c.trigger.vary_us);
+  t.lines = c.trigger.lines == 0 ? all : static_cast<std::uint8_t>(c.trigger.lines);
+  t.active_low = static_cast<std::uint8_t>(c.trigger.active_low);
+  t.feedback = static_cast<std::uint8_t>(c.trigger.feedback);
+  t.feedback_active_low = static_cast<std::uint8_t>(c.trigger.feedback_active_low);
+  if ((t.lines & all) != all)
+    throw InputError(
+        fmt::format("trigger.lines is {}, a mask that leaves out the line of a camera; 0 takes one "
+                    "line for each of the {}",
+                    c.trigger.lines, cameras));
+  const double period_us = 1e6 / c.trigger.rate;
+  if (c.trigger.vary_us * 2 > period_us)
+    throw InputError(
+        fmt::format("trigger.vary_us is {}, more than half of the {:.0f} µs between two pulses; a "
+                    "twentieth is plenty",
+                    c.trigger.vary_us, period_us));
+  if (c.trigger.width_us + c.trigger.vary_us >= period_us)
+    throw InputError(fmt::format(
+        "trigger.width_us is {}: a pulse would last until the next one, {:.0f} µs later",
+        c.trigger.width_us, period_us - c.trigger.vary_us));
+  return t;
+}
+
+const char* proof_sentence(SyncMode mode) noexcept {
+  switch (mode) {
+    case SyncMode::board:
+      return "pairs are proven by the board's numbered pulses";
+    case SyncMode::ins_syncout:
+      return "pairs are proven by the numbered pulses of the INS's SyncOut";
+    case SyncMode::master_strobe:
+      return "pairs are proven by the exposures of camera 0, which triggers the others";
+    case SyncMode::bus:
+      return "pairs are proven by stamps of the bus's one clock";
+    case SyncMode::ptp:
+      return "pairs are proven by stamps of one PTP clock";
+    case SyncMode::counter:
+      return "nothing proves that paired images were exposed together: sync.mode is counter, they "
+             "are counted and their stamps compared";
+    case SyncMode::software:
+      return "nothing proves that paired images were exposed together: sync.mode is software, "
+             "their stamps are near each other";
+  }
+  return "";
+}
+
+}  // namespace vergence::app

@@ -1,0 +1,21 @@
+#pragma once
+#include "app/config/configuration.hpp"
+#include "drivers/sync/sync_types.hpp"
+#include "drivers/trigger.hpp"
+
+/// From the configuration to how pulses are made and images paired. All of it throws InputError
+/// naming the key and what to do.
+namespace vergence::app {
+
+/// How the images are paired. Checks that the devices of the configuration can do what `sync.mode`
+/// needs.
+[[nodiscard]] SyncOptions sync_options(const Configuration& configuration, int cameras);
+
+/// What the board is asked for.
+[[nodiscard]] TriggerConfiguration trigger_configuration(const Configuration& configuration,
+                                                         int cameras);
+
+/// What proves the pairing, or that nothing does: for events and reports.
+[[nodiscard]] const char* proof_sentence(SyncMode mode) noexcept;
+
+}  // namespace vergence::app

@@ -1,0 +1,169 @@
+#include "app/devices/exposure_control.hpp"
+
+#include <pthread.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+
+namespace vergence::app {
+namespace {
+
+constexpr double kAlike = 0.02;      // of an exposure: what cameras round by
+constexpr double kAlikeGain = 0.15;  // dB
+
+bool alike(const Duration& a, const Duration& b) noexcept {
+  return std::abs(static_cast<double>((a - b).ns())) <=
+         kAlike * static_cast<double>(std::max(a, b).ns());
+}
+
+}  // namespace
+
+/// A camera whose frames are looked at as they are handed out.
+class ExposureControl::Watched final : public CameraDevice {
+ public:
+  Watched(ExposureControl* owner, std::size_t k, CameraDevice* camera)
+      : owner_(owner), k_(k), camera_(camera) {}
+
+  const DeviceInfo& info() const noexcept override { return camera_->info(); }
+  DeviceStatus configure(const CameraConfiguration& requested,
+                         CameraConfiguration* actual) noexcept override {
+    return camera_->configure(requested, actual);
+  }
+  DeviceTiming timing() const noexcept override { return camera_->timing(); }
+  DeviceStatus start(Notifier* ready) noexcept override { return camera_->start(ready); }
+  DeviceStatus wait(Duration limit, Frame* frame) noexcept override {
+    const DeviceStatus status = camera_->wait(limit, frame);
+    if (status == DeviceStatus::ok && frame->status == FrameStatus::complete)
+      owner_->look(k_, *frame, camera_->view(frame->slot));
+    return status;
+  }
+  ImageView view(FrameSlot slot) const noexcept override { return camera_->view(slot); }
+  void release(FrameSlot slot) noexcept override { camera_->release(slot); }
+  void stop() noexcept override { camera_->stop(); }
+  DeviceStatus trigger_once() noexcept override { return camera_->trigger_once(); }
+  DeviceStatus set_exposure(const ExposureSetting& requested,
+                            ExposureSetting* actual) noexcept override {
+    return camera_->set_exposure(requested, actual);
+  }
+  std::string last_error() const override { return camera_->last_error(); }
+  std::string remark() const override { return camera_->remark(); }
+  CameraStatistics statistics() const noexcept override { return camera_->statistics(); }
+
+ private:
+  ExposureControl* owner_;
+  std::size_t k_;
+  CameraDevice* camera_;
+};
+
+ExposureControl::ExposureControl(const std::vector<CameraDevice*>& cameras, int width, int height,
+                                 const ImageView& mask, const exposure::ExposureOptions& options,
+                                 const ExposureSetting& start, bool at_once)
+    : meter_(width, height, mask),
+      options_(options),
+      controller_(options, start),
+      at_once_(at_once) {
+  for (CameraDevice* camera : cameras)
+    watched_.push_back(std::make_unique<Watched>(this, watched_.size(), camera));
+  taken_.fill(start);
+  if (!at_once_) thread_ = std::thread([this] { work(); });
+}
+
+ExposureControl::~ExposureControl() { settle(); }
+
+std::vector<CameraDevice*> ExposureControl::cameras() const {
+  std::vector<CameraDevice*> all;
+  for (const auto& w : watched_) all.push_back(w.get());
+  return all;
+}
+
+void ExposureControl::settle() noexcept {
+  stop_.store(true, std::memory_order_release);
+  bell_.ring();
+  if (thread_.joinable()) thread_.join();
+}
+
+ExposureCounters ExposureControl::counters() const noexcept {
+  ExposureCounters c;
+  c.changes = changes_.load();
+  c.refused = refused_.load();
+  c.unequal = unequal_.load();
+  c.again = again_.load();
+  c.unsupported = unsupported_.load();
+  c.newest = controller_.setting();
+  return c;
+}
+
+void ExposureControl::look(std::size_t k, const Frame& frame, const ImageView& image) noexcept {
+  if (unsupported_.load(std::memory_order_relaxed) || under_way_.load(std::memory_order_acquire))
+    return;
+  if (asked_) {  // it is done: from here on images may have it
+    asked_ = false;
+    controller_.restart_settling();
+    frames_without_.fill(0);
+  }
+  if (is_without(k, frame)) {
+    again_.fetch_add(1, std::memory_order_relaxed);
+    ask(controller_.setting());
+    return;
+  }
+  if (k != 0) return;
+  const auto next = controller_.step(meter_.measure(image, options_.may_saturate));
+  if (!next) return;
+  changes_.fetch_add(1, std::memory_order_relaxed);
+  ask(*next);
+}
+
+/// A camera that came back may have lost what it was given.
+bool ExposureControl::is_without(std::size_t k, const Frame& frame) noexcept {
+  const int patience = 4 * options_.settle_frames;
+  int& n = frames_without_[k];
+  n = alike(frame.exposure, taken_[k].exposure) ? 0 : n + 1;
+  if (n < patience) return false;
+  n = 0;
+  return true;
+}
+
+void ExposureControl::ask(const ExposureSetting& requested) noexcept {
+  asked_ = true;
+  if (at_once_) {
+    set_all(requested);
+    return;
+  }
+  under_way_.store(true, std::memory_order_release);
+  (void)wishes_.push(requested);  // one at a time: there is room
+  bell_.ring();
+}
+
+void ExposureControl::set_all(const ExposureSetting& requested) noexcept {
+  bool unequal = false;
+  for (std::size_t k = 0; k < watched_.size(); ++k) {
+    ExposureSetting actual = requested;
+    const DeviceStatus status = watched_[k]->set_exposure(requested, &actual);
+    if (status == DeviceStatus::unsupported) unsupported_.store(true);
+    if (status != DeviceStatus::ok) {
+      refused_.fetch_add(1, std::memory_order_relaxed);
+      continue;
+    }
+    taken_[k] = actual;
+    unequal = unequal || !alike(actual.exposure, taken_[0].exposure) ||
+              std::abs(actual.gain_db - taken_[0].gain_db) > kAlikeGain;
+  }
+  if (unequal) unequal_.fetch_add(1, std::memory_order_relaxed);
+}
+
+void ExposureControl::work() noexcept {
+  (void)pthread_setname_np(pthread_self(), "vergence-expose");
+  for (ExposureSetting requested;;) {
+    const WakeEvent::Rung seen = bell_.look();
+    if (stop_.load(std::memory_order_acquire)) return;
+    if (!wishes_.pop(&requested)) {
+      bell_.wait(seen);
+      continue;
+    }
+    set_all(requested);
+    under_way_.store(false, std::memory_order_release);
+  }
+}
+
+}  // namespace vergence::app

@@ -1,0 +1,83 @@
+#pragma once
+#include <array>
+#include <atomic>
+#include <cstdint>
+#include <memory>
+#include <thread>
+#include <vector>
+
+#include "core/memory/ring.hpp"
+#include "core/types/calibration.hpp"
+#include "drivers/camera.hpp"
+#include "drivers/common/wake_event.hpp"
+#include "drivers/exposure/brightness.hpp"
+#include "drivers/exposure/exposure_controller.hpp"
+
+namespace vergence::app {
+
+/// Of a drive; exact once nobody waits for frames any more and settle() was called.
+struct ExposureCounters {
+  std::uint64_t changes = 0;  // asked of the cameras
+  std::uint64_t refused = 0;  // by a camera that was gone, or could not
+  std::uint64_t unequal = 0;  // the cameras took different ones
+  std::uint64_t again = 0;    // asked once more: a camera had another than it was given
+  bool unsupported =
+      false;  // a camera cannot be asked while it streams: nothing is changed any more
+  ExposureSetting newest{};  // wanted last
+};
+
+/// Exposure and gain of all cameras of a rig from how bright camera 0's images are; the same for
+/// all, so that their mid-exposures agree.
+///
+/// Stands between the cameras and whoever waits for their frames: cameras() are to be used in their
+/// place. Each image of camera 0 is looked at when it is handed out, some 10 µs; what is to change
+/// is asked of the cameras by a thread of its own, because a device may take seconds to answer.
+/// That thread would come at another image on every run: in virtual time the cameras are asked at
+/// once.
+/// Ownership  The cameras outlive it, its cameras() do not. Threads: those of the cameras' callers,
+///            camera 0's and the others' wait() one; a thread of its own.
+/// Memory     At construction; none in wait(). Errors: counted.
+class ExposureControl {
+ public:
+  /// `mask` of camera 0, read here only; it has the images' size or is empty. Preconditions: valid
+  /// options, at least one camera, all of them configured with `start` and `width` x `height`.
+  ExposureControl(const std::vector<CameraDevice*>& cameras, int width, int height,
+                  const ImageView& mask, const exposure::ExposureOptions& options,
+                  const ExposureSetting& start, bool at_once);
+  ~ExposureControl();
+  ExposureControl(const ExposureControl&) = delete;
+  ExposureControl& operator=(const ExposureControl&) = delete;
+
+  [[nodiscard]] std::vector<CameraDevice*> cameras() const;
+  /// Ends the thread. Owner, after the last wait(); twice is harmless.
+  void settle() noexcept;
+  [[nodiscard]] ExposureCounters counters() const noexcept;
+
+ private:
+  class Watched;
+  void look(std::size_t k, const Frame& frame, const ImageView& image) noexcept;
+  [[nodiscard]] bool is_without(std::size_t k, const Frame& frame) noexcept;
+  void ask(const ExposureSetting& requested) noexcept;
+  void set_all(const ExposureSetting& requested) noexcept;
+  void work() noexcept;
+
+  std::vector<std::unique_ptr<Watched>> watched_;
+  exposure::BrightnessMeter meter_;
+  exposure::ExposureOptions options_;
+  exposure::ExposureController controller_;
+  const bool at_once_;
+
+  // Of the thread that waits for frames.
+  bool asked_ = false;                             // and not yet seen as done
+  std::array<int, kMaxCameras> frames_without_{};  // in a row
+
+  std::array<ExposureSetting, kMaxCameras>
+      taken_{};  // as each camera rounded; of who asks, of the others while nothing is under way
+  Ring<ExposureSetting, 4> wishes_;
+  std::atomic<bool> under_way_{false}, stop_{false}, unsupported_{false};
+  std::atomic<std::uint64_t> changes_{0}, refused_{0}, unequal_{0}, again_{0};
+  WakeEvent bell_;
+  std::thread thread_;
+};
+
+}  // namespace vergence::app

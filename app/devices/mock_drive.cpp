@@ -1,0 +1,155 @@
+#include "app/devices/mock_drive.hpp"
+
+#include <cmath>
+#include <stdexcept>
+#include <string>
+
+#include <fmt/format.h>
+
+#include "app/devices/comparison_settings.hpp"
+#include "app/devices/drive_sync.hpp"
+#include "app/devices/exposure_settings.hpp"
+#include "app/runtime/errors.hpp"
+#include "app/runtime/nearest.hpp"
+
+namespace vergence::app {
+namespace {
+
+/// Checks a key that takes one of a few words.
+void one_of(const std::string& key, const std::string& value,
+            const std::vector<std::string>& words) {
+  for (const std::string& word : words)
+    if (value == word) return;
+  throw InputError(fmt::format("{} is \"{}\"{}; this version knows {}", key, value,
+                               did_you_mean(value, words), fmt::join(words, ", ")));
+}
+
+std::vector<mock::Fault> all_faults(const Configuration& c, const std::vector<std::string>& more) {
+  std::vector<mock::Fault> faults;
+  const auto add = [&](const std::string& text, const std::string& where) {
+    try {
+      faults.push_back(mock::parse_fault(text));
+    } catch (const std::invalid_argument& e) {
+      throw InputError(where + ": " + e.what());
+    }
+  };
+  for (std::size_t i = 0; i < c.faults.size(); ++i)
+    if (!c.faults[i].empty()) add(c.faults[i], fmt::format("faults.{}", i));
+  for (const std::string& text : more) add(text, "--fault \"" + text.substr(0, 80) + "\"");
+  return faults;
+}
+
+void configured(DeviceStatus status, const std::string& what) {
+  if (status != DeviceStatus::ok)
+    throw InputError(what + " is not possible: " + std::string(to_string(status)));
+}
+
+Duration trigger_delay(const Configuration& c, std::size_t k) {
+  return Duration::nanoseconds(std::llround(c.cameras[k].trigger_delay_us * 1e3));
+}
+
+}  // namespace
+
+void check_drive(const Configuration& c) {
+  const int n = camera_count(c);
+  if (n == 0)
+    throw InputError(
+        "the configuration names no camera; cameras: [{driver: mock}, {driver: mock}] is the "
+        "least");
+  if (n < 2)
+    throw InputError(
+        "one camera alone has no scale; two are the least, cameras: [{driver: mock}, {driver: "
+        "mock}]");
+  for (int k = 0; k < n; ++k) {
+    const CameraSettings& camera = c.cameras[static_cast<std::size_t>(k)];
+    one_of(fmt::format("cameras.{}.driver", k), camera.driver, {"mock"});
+    if (camera.width != c.cameras[0].width || camera.height != c.cameras[0].height)
+      throw InputError(
+          fmt::format("cameras.{}.size is {} x {}, that of camera 0 is {} x {}; all cameras of a "
+                      "rig have one size",
+                      k, camera.width, camera.height, c.cameras[0].width, c.cameras[0].height));
+  }
+  one_of("ins.driver", c.ins.driver, {"mock", "none"});
+  one_of("trigger.driver", c.trigger.driver, {"mock"});
+  (void)sync_options(c, n);
+  (void)trigger_configuration(c, n);
+  one_of("mock.world", c.mock.world, {"suburb"});
+  one_of("mock.drive", c.mock.drive, {"loop", "figure-eight", "straight", "brief", "still"});
+  one_of("mock.pattern", c.mock.pattern, {"grey", "gbrg"});
+  one_of("mock.ins", c.mock.ins, {"noisy", "ideal"});
+  one_of("mock.ins_line", c.mock.ins_line, {"none", "mti-g", "mti-g-710"});
+  one_of("mock.board_line", c.mock.board_line, {"none", "usb", "ftdi"});
+}
+
+MockDrive make_mock_drive(const Configuration& c, const std::vector<std::string>& more_faults,
+                          bool real_time, std::optional<double> duration_s, bool raw) {
+  MockDrive drive;
+  const RigCalibration rig = mounted_rig(c);
+  const std::vector<mock::Fault> faults = all_faults(c, more_faults);
+  try {
+    mock::WorldOptions world;
+    world.seed = static_cast<std::uint64_t>(c.mock.seed);
+    world.texture_detail = c.mock.texture_detail;
+    world.hill_deg = c.mock.hill_deg;
+    mock::DriveOptions way;
+    (void)mock::parse(c.mock.drive, &way.kind);
+    way.seed = world.seed;
+    way.speed = c.mock.speed;
+    way.suspension = c.mock.suspension;
+    way.vibration = c.mock.vibration;
+    way.stop_s = c.mock.stop_s;
+    // The INS sits where the configuration says: p_ins = T_ins_left p_left.
+    const Transform T_body_left = mock::default_T_body_left();
+    const Transform T_body_ins = T_body_left * comparison_options(c).T_ins_left.inverse();
+    auto truth = std::make_shared<const mock::RigTruth>(std::make_shared<const mock::World>(world),
+                                                        way, rig, T_body_left, T_body_ins, faults);
+    mock::MockRigOptions o;
+    o.real_time = real_time;
+    o.seed = world.seed;
+    o.pattern = c.mock.pattern == "gbrg" ? mock::Pattern::gbrg : mock::Pattern::grey;
+    o.raw = raw;
+    o.noise = c.mock.noise != 0;
+    o.blur_samples = c.mock.blur_samples;
+    o.ideal_ins = c.mock.ins == "ideal";
+    o.clock_drift_ppm = c.mock.clock_drift_ppm;
+    o.fed = c.mock.board_line != "none";
+    o.reports_taken =
+        !o.fed && c.sync.mode == "board";  // else nobody asks for a pause, nor need take them
+    for (std::size_t k = 0; k < static_cast<std::size_t>(rig.cameras); ++k)
+      o.trigger_delay[k] = trigger_delay(c, k);
+    o.exposures_follow = exposes_by_itself(c);
+    if (duration_s) o.duration = Duration::seconds(*duration_s);
+    drive.rig = std::make_unique<mock::MockRig>(std::move(truth), o);
+  } catch (const std::invalid_argument& e) {
+    throw InputError(e.what());
+  }
+  for (int k = 0; k < rig.cameras; ++k) {
+    const CameraSettings& camera = c.cameras[static_cast<std::size_t>(k)];
+    const ExposureSetting start = starting_exposure(c, static_cast<std::size_t>(k));
+    const CameraConfiguration requested{camera.width,   camera.height, c.trigger.rate,
+                                        start.exposure, start.gain_db, CameraTrigger::hardware};
+    configured(drive.rig->camera(k).configure(requested, nullptr), fmt::format("cameras.{}", k));
+  }
+  configured(drive.rig->trigger().configure(trigger_configuration(c, rig.cameras), nullptr),
+             "trigger");
+  drive.has_ins = c.ins.driver == "mock";
+  if (drive.has_ins) configured(drive.rig->ins().configure(c.ins.rate, nullptr), "ins");
+  return drive;
+}
+
+Duration stamp_grid(const Configuration& c) noexcept {
+  return c.mock.pattern == "gbrg" ? Duration::microseconds(1) : Duration::nanoseconds(1);
+}
+
+std::vector<StampedPose> true_trajectory(const mock::MockRig& rig, const Configuration& c,
+                                         Stamp start) {
+  std::vector<StampedPose> poses;
+  for (const Duration pulse : rig.pulse_times()) {
+    const Duration middle =
+        pulse + trigger_delay(c, 0) + Duration::seconds(c.cameras[0].exposure_us * 0.5e-6);
+    poses.push_back({start + middle, rig.truth().camera_in_enu(0, middle)});
+  }
+  return poses;
+}
+
+}  // namespace vergence::app

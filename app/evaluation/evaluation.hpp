@@ -1,0 +1,24 @@
+#pragma once
+#include <filesystem>
+
+#include "app/runtime/errors.hpp"
+#include "core/comparison/trajectory_metrics.hpp"
+
+namespace vergence::app {
+
+/// `vergence evaluate`.
+struct EvaluationRequest {
+  std::filesystem::path estimate;
+  std::filesystem::path reference;  // empty: the estimate's session has an INS
+  EvaluationOptions options{};
+  bool usual_lengths = true;  // of options.segments the longest that the path is long enough for
+  bool json = false;
+  bool estimate_mount = false;
+};
+
+/// Compares, and prints the figures on standard output.
+/// → done, not_usable (nothing to compare, no mount)
+/// Errors  InputError: files that are not there or cannot be read.
+[[nodiscard]] ExitCode run_evaluation(const EvaluationRequest& request);
+
+}  // namespace vergence::app

@@ -1,0 +1,235 @@
+#include "app/session/drive_calibration.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <iterator>
+#include <memory>
+#include <numbers>
+
+#include <fmt/format.h>
+
+#include "app/datasets/frame_decoder.hpp"
+#include "app/devices/camera_masks.hpp"
+#include "app/runtime/background_thread.hpp"
+#include "app/runtime/signals.hpp"
+#include "app/session/session_files.hpp"
+#include "core/calibration/gates.hpp"
+#include "core/calibration/health.hpp"
+#include "core/calibration/stretches.hpp"
+#include "core/estimator/estimator.hpp"
+#include "core/math/so3.hpp"
+
+namespace vergence::app {
+namespace {
+
+constexpr std::size_t kMiddleDepth = 2;  // of Agreement::depth_m: 20 m
+constexpr int kMoreFeatures = 2,
+              kMostFeatures = 1000;     // of a drive's own: nobody waits for a pose here
+constexpr int kObservations = 240'000;  // of a solve that nobody waits for
+constexpr std::size_t kAloneFrames =
+    40;  // of a stretch by itself, at most about: short drives, too, are to have two
+
+calibration::AcceptanceInput question_of(const calibration::RigSolution& s,
+                                         const StartingCalibration& given, const Configuration& c) {
+  calibration::AcceptanceInput q;
+  q.solution = &s;
+  q.nominal = &given.nominal;
+  q.lenses = true;
+  q.pixel_sigma = c.odometry.pixel_sigma;
+  q.must_be_better = false;
+  return q;
+}
+
+/// As many frames as make the drive's stretches equally long, at most `most`.
+std::size_t stretch_length(std::uint64_t frames, std::size_t most) {
+  const std::size_t n =
+      std::max<std::size_t>(1, (static_cast<std::size_t>(frames) + most - 1) / most);
+  return (static_cast<std::size_t>(frames) + n - 1) / n;
+}
+
+}  // namespace
+
+std::optional<RigCalibration> drive_once(const DrivePass& pass, const StartingCalibration& begin,
+                                         const DriveWatcher& watch) {
+  const RigCalibration& rig = begin.file.rig;
+  const int width = rig.intrinsics[0].width, height = rig.intrinsics[0].height;
+  const CameraMasks masks(pass.configuration, rig);
+  const EstimatorOptions options = estimator_options(pass.configuration, begin.trust,
+                                                     Adoption::after_fixed_frames, masks.views());
+  Arena frames_arena(arena_size(FramePool::memory_needed(width, height, FrameDecoder::kSlots)));
+  Arena estimator_arena(arena_size(Estimator::memory_needed(options, rig)));
+  FramePool pool(width, height, FrameDecoder::kSlots, frames_arena);
+  const std::unique_ptr<PairRunner> runner = make_runner(pass.configuration.threads);
+  BackgroundThread solver;
+  Estimator estimator(options, rig, begin.nominal, estimator_arena, *runner, solver);
+  FrameDecoder decoder(pass.sequence, pass.start, pass.count, pool);
+  std::size_t done = 0;
+  bool stopped = false;
+  for (DecodedPair pair; decoder.next(&pair);) {
+    if (pair.decoded) {
+      RigFrame frame;
+      frame.number = pair.frame;
+      frame.stamp = pair.stamp;
+      frame.cameras = 2;
+      for (std::size_t k = 0; k < 2; ++k) frame.images[k] = pool.view(pair.slots[k]);
+      const PoseSample sample = estimator.process(frame);
+      if (watch) watch(estimator, sample);
+      decoder.release(pair);
+    }
+    if (pass.progress) pass.progress(++done);
+    if (pass.stopped && pass.stopped()) {
+      decoder.stop();
+      stopped = true;
+    }
+  }
+  estimator.finish();
+  if (stopped || !estimator.calibrated()) return std::nullopt;
+  return estimator.calibration();
+}
+
+DriveCalibration calibrate_drive(const DrivePass& drive, const StartingCalibration& given) {
+  using calibration::Stretches;
+  DriveCalibration result;
+  Configuration c = drive.configuration;
+  c.odometry.features =
+      std::max(c.odometry.features, std::min(kMoreFeatures * c.odometry.features, kMostFeatures));
+  c.calibration.max_observations = std::max(c.calibration.max_observations, kObservations);
+  c.online = 1;
+  const DrivePass pass{drive.sequence, c, drive.start, drive.count, drive.stopped, drive.progress};
+  StartingCalibration blank = given;
+  apply_use({.length_only = true}, &blank.file.rig);
+  blank.trust = CalibrationTrust::none;
+  std::uint64_t newest = 0;
+  const auto first = drive_once(pass, blank, [&](const Estimator& e, const PoseSample& /*sample*/) {
+    const calibration::TrackLog& tracks = e.tracks();
+    if (tracks.empty() || tracks.frame(tracks.size() - 1).number <= newest) return;
+    newest = tracks.frame(tracks.size() - 1).number;
+    ++result.frames;
+  });
+  if (!first) {
+    result.why =
+        "from scratch no calibration was found: what the drive lacks, a replay with --from-scratch "
+        "says";
+    return result;
+  }
+  StartingCalibration found = given;
+  found.file.rig = *first;
+  found.trust = CalibrationTrust::given;
+
+  const auto features = static_cast<std::size_t>(c.odometry.features);
+  Arena arena(arena_size(
+      2 * Stretches::memory_needed(c.calibration, c.monitor, given.file.rig.cameras, features)));
+  Stretches joined(
+      Stretches::Kind::joined, blank.file.rig, *first,
+      stretch_length(result.frames, static_cast<std::size_t>(c.calibration.max_frames)),
+      c.calibration, c.monitor, features, arena);
+  Stretches alone(Stretches::Kind::alone, blank.file.rig, *first,
+                  stretch_length(result.frames, kAloneFrames), c.calibration, c.monitor, features,
+                  arena);
+  std::optional<calibration::RigSolution> last;
+  const auto keep = [&](const std::optional<calibration::RigSolution>& s) {
+    if (!s) return;
+    const calibration::Gate gate =
+        calibration::check_acceptance(question_of(*s, given, c), c.calibration);
+    if (gate == calibration::Gate::open)
+      last = s;
+    else
+      result.why = calibration::reason(gate);
+  };
+  const auto note = [&](const std::optional<calibration::RigSolution>& s) {
+    if (s && s->status == calibration::RigSolveStatus::ok) result.stretches.push_back(*s);
+  };
+  const auto second =
+      drive_once(pass, found, [&](const Estimator& e, const PoseSample& /*sample*/) {
+        keep(joined.take(e.tracks()));
+        note(alone.take(e.tracks()));
+      });
+  if (!second) {
+    result.why = "it was interrupted";
+    return result;
+  }
+  keep(joined.end());
+  note(alone.end());
+  for (std::size_t i = 1; i < result.stretches.size(); ++i)
+    result.agreements.push_back(
+        calibration::agreement(result.stretches[i - 1].rig, result.stretches[i].rig, 1));
+  if (!last) return result;
+  result.rig = last->rig;
+  result.why.clear();
+  for (int k = 1; k < result.rig->cameras; ++k) {
+    const double depth =
+        calibration::judged_depth_m(*result.rig, k, c.calibration, c.odometry.pixel_sigma);
+    const double sigma = calibration::depth_error_percent(*result.rig, k, depth);
+    if (sigma <= result.depth_sigma_percent) continue;
+    result.depth_m = depth;
+    result.depth_sigma_percent = sigma;
+  }
+  result.verified = result.depth_sigma_percent <= c.calibration.tolerated_depth_percent;
+  return result;
+}
+
+DriveCalibration calibrate_with_progress(const DrivePass& pass, const StartingCalibration& given,
+                                         Progress* progress) {
+  constexpr std::size_t kPasses = 2;
+  const SignalGuard signals;
+  std::size_t before = 0, last = 0;
+  DrivePass watched = pass;
+  watched.stopped = [&] { return signals.stop_requested(); };
+  watched.progress = [&](std::size_t done) {
+    if (done < last) before += last;  // the next pass
+    last = done;
+    ProgressState state;
+    state.state = "calibrating from the drive";
+    state.frame = before + done;
+    state.frames = kPasses * pass.count;
+    progress->update(state);
+  };
+  DriveCalibration found = calibrate_drive(watched, given);
+  progress->finish();
+  return found;
+}
+
+std::string describe(const DriveCalibration& found) {
+  std::string text;
+  const auto out = std::back_inserter(text);
+  const RigCalibration& rig = *found.rig;
+  for (std::size_t k = 0; k < static_cast<std::size_t>(rig.cameras); ++k) {
+    const Intrinsics& lens = rig.intrinsics[k];
+    fmt::format_to(out,
+                   "camera {}  fx {:.3f} ± {:.3f}  fy {:.3f} ± {:.3f}  cx {:.3f} ± {:.3f}  cy "
+                   "{:.3f} ± {:.3f} px\n",
+                   k, lens.fx, lens.sigma[0], lens.fy, lens.sigma[1], lens.cx, lens.sigma[2],
+                   lens.cy, lens.sigma[3]);
+    fmt::format_to(out, "          distortion");
+    for (std::size_t i = 0; i < 4; ++i)
+      fmt::format_to(out, " {:.5f} ± {:.5f}", lens.distortion[i], lens.distortion_sigma[i]);
+    text += '\n';
+    if (k == 0) continue;
+    const Vec3 turn = log_so3(rig.T_camera_left[k].R) * (180 / std::numbers::pi);
+    const Vec3& t = rig.T_camera_left[k].t;
+    const auto& sigma = rig.sigma_wide[k];
+    fmt::format_to(out,
+                   "          rotation {:.4f} ± {:.4f}, {:.4f} ± {:.4f}, {:.4f} ± {:.4f} deg\n",
+                   turn.x(), sigma[0] * 180 / std::numbers::pi, turn.y(),
+                   sigma[1] * 180 / std::numbers::pi, turn.z(), sigma[2] * 180 / std::numbers::pi);
+    fmt::format_to(out, "          t {:.3f} ± {:.3f}, {:.3f} ± {:.3f}, {:.3f} ± {:.3f} mm\n",
+                   1e3 * t.x(), 1e3 * sigma[3], 1e3 * t.y(), 1e3 * sigma[4], 1e3 * t.z(),
+                   1e3 * sigma[5]);
+  }
+  fmt::format_to(out, "depths at {:.1f} m are good to {:.2f} % (1 sigma), from {} moving frames\n",
+                 found.depth_m, found.depth_sigma_percent, rig.frames);
+  if (found.agreements.empty()) return text;
+  double sigmas = 0, percent = 0;
+  for (const calibration::Agreement& a : found.agreements) {
+    sigmas += a.transform / static_cast<double>(found.agreements.size());
+    percent = std::max(percent, a.depth_percent[kMiddleDepth]);
+  }
+  fmt::format_to(out,
+                 "{} stretches solved by themselves: transforms differ by {:.1f} of their sigmas, "
+                 "depths at {:g} m by {:.2f} % at most\n",
+                 found.stretches.size(), std::sqrt(sigmas),
+                 calibration::Agreement::depth_m[kMiddleDepth], percent);
+  return text;
+}
+
+}  // namespace vergence::app

@@ -1,0 +1,61 @@
+#pragma once
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "app/config/configuration.hpp"
+#include "app/datasets/stereo_sequence.hpp"
+#include "app/runtime/progress.hpp"
+#include "app/session/starting_calibration.hpp"
+#include "core/calibration/agreement.hpp"
+#include "core/calibration/rig_solver.hpp"
+
+namespace vergence::app {
+
+/// A rig's calibration from a whole recorded drive.
+struct DriveCalibration {
+  std::optional<RigCalibration> rig;  // empty: `why` says what is missing
+  std::string why;
+  double depth_m = 0,
+         depth_sigma_percent = 0;  // predicted depth error at the depth it is judged at
+  bool verified = false;           // that is within what is tolerated
+  std::uint64_t frames = 0;        // moving frames with tracks
+  std::vector<calibration::RigSolution> stretches;  // solved each by itself
+  std::vector<calibration::Agreement> agreements;   // of camera 1, each stretch with the one before
+};
+
+/// What a pass over a drive shows: after every frame, on the estimator's thread.
+using DriveWatcher = std::function<void(const Estimator&, const PoseSample&)>;
+
+struct DrivePass {
+  const StereoSequence& sequence;
+  const Configuration& configuration;
+  std::size_t start = 0, count = 0;             // frames
+  std::function<bool()> stopped{};              // asked after every frame; may be empty
+  std::function<void(std::size_t)> progress{};  // frames done of this pass; may be empty
+};
+
+/// Runs the drive once, without a session. → the calibration in use at its end; empty: there never
+/// was one, or it was stopped.
+[[nodiscard]] std::optional<RigCalibration> drive_once(const DrivePass& pass,
+                                                       const StartingCalibration& begin,
+                                                       const DriveWatcher& watch);
+
+/// Twice over the drive, with twice its features: from scratch, which gives the tracks their rig;
+/// then all of its frames in stretches, joined, and each by itself to be held against the next
+/// (METHOD §6.5). `told`: the drive's own calibration; of it lenses, sigmas and the baseline's
+/// length are read.
+[[nodiscard]] DriveCalibration calibrate_drive(const DrivePass& pass,
+                                               const StartingCalibration& given);
+
+/// The same with a progress line, and stopped by signals.
+[[nodiscard]] DriveCalibration calibrate_with_progress(const DrivePass& pass,
+                                                       const StartingCalibration& given,
+                                                       Progress* progress);
+
+/// What was found as lines for the terminal: each parameter with its sigma, the depth error, how
+/// far the stretches agree.
+[[nodiscard]] std::string describe(const DriveCalibration& found);
+
+}  // namespace vergence::app

@@ -1,0 +1,121 @@
+#include "app/session/event_log.hpp"
+
+#include <algorithm>
+#include <string>
+
+#include <fmt/format.h>
+
+namespace vergence::app {
+namespace {
+
+/// What a user wants to hear of at once.
+bool aloud(EstimatorEvent::Kind kind) noexcept {
+  using Kind = EstimatorEvent::Kind;
+  return kind == Kind::rig_changed || kind == Kind::calibration_confirmed ||
+         kind == Kind::calibration_contradicted || kind == Kind::calibration_accepted ||
+         kind == Kind::calibration_rejected || kind == Kind::calibration_waits;
+}
+
+std::string words(std::string_view name) {
+  std::string text(name);
+  std::replace(text.begin(), text.end(), '_', ' ');
+  return text;
+}
+
+/// `stereo`, `stereo, verifying the calibration`, `parallel monocular, needs motion`.
+std::string state_words(State state, Reason reason) {
+  std::string text = state == State::stereo_odometry ? "stereo" : words(to_string(state));
+  if (reason == Reason::unverified_calibration || reason == Reason::unconfirmed)
+    text += ", verifying the calibration";
+  if (reason == Reason::needs_motion || reason == Reason::needs_near_structure ||
+      reason == Reason::needs_texture)
+    text += ", " + words(to_string(reason));
+  return text;
+}
+
+}  // namespace
+
+void EventLog::open(SessionOutput* output, Stamp first) noexcept {
+  output_ = output;
+  first_ = first;
+}
+
+void EventLog::note(const Estimator& estimator) noexcept {
+  for (const EstimatorEvent& event : estimator.events()) {
+    if (event.kind == EstimatorEvent::Kind::dropped)
+      dropped_ += static_cast<std::uint64_t>(std::max(0.0, event.value));
+    const EventRecord record = EventRecord::of(event);
+    output_->post(record);
+    if (aloud(event.kind)) (void)notices_.push(record);
+  }
+  for (const CalibrationDecision& decision : estimator.calibrations()) {
+    output_->post(CalibrationRecord::of(decision));
+    note_change(decision);
+  }
+  matches_.take(estimator.tracks());
+}
+
+/// A rig that was knocked fits no match from before: a calibration is looked at with those of its
+/// own rig only.
+void EventLog::note_change(const CalibrationDecision& decision) noexcept {
+  using Cause = CalibrationCause;
+  const bool changed = decision.cause == Cause::knock || decision.cause == Cause::drift ||
+                       decision.cause == Cause::collapse;
+  if (decision.accepted && changed) matches_.rig_changed(decision.onset_frame);
+}
+
+void EventLog::note(const PoseSample& sample) noexcept {
+  ++now_.done;
+  now_.state = sample.state;
+  now_.reason = sample.reason;
+  now_.inliers = sample.inliers;
+  now_.estimate_ms = sample.estimate_ms;
+  if (sample.status != PoseStatus::lost) {
+    if (posed_) now_.path_m += (sample.T_world_left.t - last_position_).norm();
+    last_position_ = sample.T_world_left.t;
+    posed_ = true;
+  }
+  (void)glimpses_.push(now_);
+}
+
+void EventLog::note_skipped() noexcept {
+  ++now_.done;
+  (void)glimpses_.push(now_);
+}
+
+void EventLog::tell(Stamp stamp, const char* kind, std::string_view sentence,
+                    bool to_user) noexcept {
+  EventRecord event;
+  event.stamp = stamp;
+  event.kind = kind;
+  event.set_sentence(sentence);
+  tell(event, to_user);
+}
+
+void EventLog::tell(const EventRecord& event, bool to_user) noexcept {
+  output_->post(event);
+  if (to_user) (void)notices_.push(event);
+}
+
+void EventLog::show(Progress* progress, std::uint64_t frames) {
+  for (EventRecord notice; notices_.pop(&notice);)
+    progress->say(fmt::format("vergence: at {:.1f} s {}", (notice.stamp - first_).to_seconds(),
+                              notice.sentence.data()));
+  for (const std::string& sentence : output_->take_errors()) progress->say("vergence: " + sentence);
+  ProgressSnapshot newest;
+  bool any = false;
+  while (glimpses_.pop(&newest)) any = true;
+  if (!any) return;
+  const std::string state_text = state_words(newest.state, newest.reason);
+  ProgressState state;
+  state.state = state_text;
+  state.frame = newest.done;
+  state.frames = frames;
+  state.path_m = newest.path_m;
+  state.inliers = newest.inliers;
+  state.estimate_ms = static_cast<double>(newest.estimate_ms);
+  if (newest.from_ins_m >= 0) state.from_ins_m = newest.from_ins_m;
+  progress->update(state);
+}
+
+}  // namespace vergence::app

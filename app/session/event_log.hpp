@@ -1,0 +1,71 @@
+#pragma once
+#include <cstdint>
+#include <string_view>
+
+#include "app/recorder/match_sample.hpp"
+#include "app/runtime/progress.hpp"
+#include "app/session/session_output.hpp"
+#include "core/estimator/estimator.hpp"
+#include "core/memory/ring.hpp"
+
+namespace vergence::app {
+
+/// What becomes of each frame beside its line in poses.csv: events and calibrations for the
+/// recorder, the state of things for the progress line, sentences for the user, a sample of the
+/// matches across.
+///
+/// Threads  note…(), tell(): the estimator's, sealed. show(): the caller's. After the estimator's
+///          thread has joined all is anyone's.
+/// Memory   Fixed, most of it the sample of matches: not for a stack. Full: of the states for the
+///          line the newest are lost, the next one
+/// tells the same and more; of the sentences too, and
+///          events.jsonl has them.
+class EventLog {
+ public:
+  /// The output outlives the last note.
+  void open(SessionOutput* output, Stamp first) noexcept;
+
+  /// After a process() or finish() call: its events and its calibrations.
+  void note(const Estimator& estimator) noexcept;
+  /// The sample of a process() call.
+  void note(const PoseSample& sample) noexcept;
+  /// A frame that was not read.
+  void note_skipped() noexcept;
+  void note_distance_from_ins(double metres) noexcept { now_.from_ins_m = metres; }
+  /// An event of the session's own. `kind` points to a constant. `aloud`: on stderr, too.
+  void tell(Stamp stamp, const char* kind, std::string_view sentence, bool aloud) noexcept;
+  void tell(const EventRecord& event, bool aloud) noexcept;
+
+  /// Matches of the drive so far. Before the estimator's thread has joined they are its own.
+  [[nodiscard]] const MatchSample& matches() const noexcept { return matches_; }
+  /// Points and observations over the estimator's capacity.
+  [[nodiscard]] std::uint64_t dropped() const noexcept { return dropped_; }
+
+  /// Says what there is to say and updates the line. `frames` of the whole drive; 0: nobody knows.
+  void show(Progress* progress, std::uint64_t frames);
+
+ private:
+  struct ProgressSnapshot {
+    std::uint64_t done = 0;  // frames, skipped ones included
+    State state = State::initialising;
+    Reason reason = Reason::none;
+    double path_m = 0;
+    int inliers = 0;
+    float estimate_ms = 0;
+    double from_ins_m = -1;  // negative: not compared
+  };
+
+  void note_change(const CalibrationDecision& decision) noexcept;
+
+  SessionOutput* output_ = nullptr;
+  Stamp first_{};
+  ProgressSnapshot now_{};
+  std::uint64_t dropped_ = 0;
+  Vec3 last_position_ = Vec3::Zero();
+  bool posed_ = false;
+  MatchSample matches_;
+  Ring<ProgressSnapshot, 64> glimpses_;
+  Ring<EventRecord, 32> notices_;
+};
+
+}  // namespace vergence::app

@@ -1,0 +1,106 @@
+#pragma once
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <string>
+#include <utility>
+#include <variant>
+#include <vector>
+
+#include "app/datasets/trajectory_files.hpp"
+#include "app/recorder/ins_file.hpp"
+#include "app/recorder/recorder.hpp"
+#include "app/recorder/summary.hpp"
+#include "app/runtime/errors.hpp"
+#include "app/runtime/progress.hpp"
+#include "app/session/ins_comparison.hpp"
+#include "app/session/starting_calibration.hpp"
+
+namespace vergence::app {
+
+/// A rig frame for the estimator; its slots are the session's until FrameSource::done().
+struct SourceFrame {
+  RigFrame rig{};
+  float decode_ms = 0;  // reading and decoding its images; 0 where they came as pixels
+};
+
+/// Something to be noted, at its place among the frames.
+struct SourceEvent {
+  EventRecord record{};
+  bool to_user = false;      // on stderr, too
+  bool skipped = false;      // it is a frame that could not be read
+  bool recalibrate = false;  // a new calibration is to be sought
+};
+
+using SourceItem = std::variant<SourceFrame, InsRecord, SourceEvent>;
+
+/// A sentence of the set-up.
+struct SourceRemark {
+  std::string sentence{};
+  const char* kind = nullptr;  // of its event; null: it is only said
+  bool say = true;             // on stderr, too
+};
+
+/// The INS of a source and how its readings are compared with.
+struct SourceIns {
+  ComparisonOptions options{};
+  InsComparison::Source kind = InsComparison::Source::device;
+  std::string mount_source{};     // a few words: where the mount of the options is from
+  std::size_t reading_bytes = 0;  // held beside the comparison
+};
+
+/// What a session has to know of its source before the first frame.
+struct SourceFacts {
+  StartingCalibration begin{};
+  Adoption adoption = Adoption::after_fixed_frames;
+  Recorder::WhenFull when_full = Recorder::WhenFull::wait;
+  std::function<bool(Stamp)> disk_full{};  // of Recorder::Options
+  std::uint64_t frames = 0;                // of the whole drive; 0: nobody knows
+  std::size_t expected_frames = 0;         // memory is taken for so many
+  Stamp first{};                           // of the drive
+  std::optional<SourceIns> ins{};
+  Trajectory truth{};  // that came with a recording: what an estimate without INS is compared with
+  std::vector<SourceRemark> remarks{};
+  std::size_t image_bytes = 0, ring_bytes = 0;
+  const char* word_of_skipped = "skipped";  // frames of the drive that nobody estimated from
+  bool on_request = false;                  // SIGUSR1 asks for a new calibration
+};
+
+/// Where a session's frames, readings and device events come from: devices (LiveSource), or a
+/// recorded drive (RecordedSource). SessionRunner does the rest, the same for both.
+///
+/// Threads  next(), done(): the estimator's, sealed. stop(): any. The rest: the caller's, and what
+///          comes after finish() when the estimator's has joined.
+class FrameSource {
+ public:
+  virtual ~FrameSource() = default;
+
+  [[nodiscard]] virtual const SourceFacts& facts() const noexcept = 0;
+
+  /// Begins the stream; the session's files are open. What is wrong with a file goes to *faults.
+  /// InputError: a device does not start.
+  virtual void start(std::vector<std::string>* faults) = 0;
+  /// The next item, waiting for it. False: the drive is over, or stopped.
+  [[nodiscard]] virtual bool next(SourceItem* item) noexcept = 0;
+  /// The frame that next() gave last has its pose: takes the slots back.
+  virtual void done(const PoseSample& sample) noexcept = 0;
+  virtual void stop() noexcept = 0;
+  /// Called every 50 ms while frames come.
+  virtual void look() {}
+  /// Ends what start() began.
+  virtual void finish(Progress* progress, std::vector<std::string>* faults) = 0;
+
+  /// What it adds to the summary: frames skipped, devices, times, truth.
+  virtual void describe(const SessionTotals& totals, const Estimator& estimator,
+                        SummaryInput* input) const = 0;
+  /// The figures that a user wants to see at the end.
+  virtual void print_figures(const SessionTotals& totals, const SummaryInput& input,
+                             Progress* progress) const = 0;
+  /// A reason of its own why the session did not go well, said; poses are there.
+  [[nodiscard]] virtual std::optional<ExitCode> verdict(Progress* /*progress*/) const {
+    return std::nullopt;
+  }
+};
+
+}  // namespace vergence::app

@@ -1,0 +1,76 @@
+#pragma once
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "app/recorder/earth_figures.hpp"
+#include "app/session/event_log.hpp"
+#include "app/session/session_output.hpp"
+#include "core/comparison/comparison.hpp"
+#include "core/memory/fixed_vector.hpp"
+
+namespace vergence::app {
+
+/// What a drive does with its INS, live or recorded alike: the comparison pose by pose into the
+/// recorder, and what there is to tell of it.
+///
+/// Threads  The estimator's, sealed; after it has joined all is anyone's. Memory  The comparison's,
+/// from the arena. Order    Readings and poses as they come; every add() of a pose is followed by
+/// drain().
+class InsComparison {
+ public:
+  static constexpr std::size_t kMostPlacements = 64;  // that are kept; later ones count
+
+  enum class Source : std::uint8_t { none, device, recording };
+
+  /// Without a source poses go through and nothing is said. `journal` outlives it.
+  InsComparison(const ComparisonOptions& options, Source source, Arena& arena, EventLog& journal);
+
+  /// Before the first add(). `output` outlives the last one; with a source its recorder takes
+  /// readings (Recorder::Options::ins).
+  void open(SessionOutput* output) noexcept { output_ = output; }
+  void add(const InsRecord& reading) noexcept;
+  /// `decode_ms` of its images goes with the pose.
+  void add(const PoseSample& pose, float decode_ms) noexcept;
+  /// Hands on every pose that has met its readings.
+  void drain() noexcept;
+  /// No more readings and poses will come.
+  void finish() noexcept;
+
+  /// Poses that the INS had a place for.
+  [[nodiscard]] std::uint64_t matches() const noexcept { return matches_; }
+  [[nodiscard]] std::vector<std::pair<std::string, std::uint64_t>> counters() const;
+  /// `mount_source`: where the mount of the options is from.
+  [[nodiscard]] EarthFigures earth(const std::string& mount_source) const;
+
+ private:
+  void measure(const ComparedPose& pose) noexcept;
+  void note_placement(Stamp stamp) noexcept;
+  void note_ins(const ComparedPose& pose) noexcept;
+  void note_jump(Stamp stamp) noexcept;
+  void note_scale(const ComparedPose& pose) noexcept;
+
+  const Transform T_ins_left_;
+  const double scale_stretch_m_;
+  const Source source_;
+  Comparison comparison_;
+  EventLog& journal_;
+  SessionOutput* output_ = nullptr;
+  std::array<float, Comparison::kPending> decode_ms_{};  // of the poses that wait, by their count
+  std::uint64_t added_ = 0, drained_ = 0;
+  std::uint64_t matches_ = 0, jumps_ = 0, scale_disagreements_ = 0;
+  bool scale_disagrees_ = false;
+  std::uint32_t placement_revision_ = 0;
+  FixedVector<PlacementRecord, kMostPlacements> placements_;
+  EarthErrors errors_{};  // means and roots are squares' sums until earth()
+  bool on_way_ = false;   // last_place_ means something
+  Vec3 last_place_ = Vec3::Zero();
+  InsMatch last_match_ = InsMatch::ok;
+  std::uint64_t match_run_ = 0;  // poses in a row with that
+  Stamp newest_stamp_{};
+};
+
+}  // namespace vergence::app

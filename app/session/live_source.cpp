@@ -1,0 +1,319 @@
+#include "app/session/live_source.hpp"
+
+#include <time.h>
+
+#include <algorithm>
+#include <array>
+#include <cstdio>
+#include <string_view>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "app/datasets/decimal.hpp"
+#include "app/devices/camera_masks.hpp"
+#include "app/devices/comparison_settings.hpp"
+#include "app/devices/drive_sync.hpp"
+#include "app/devices/exposure_settings.hpp"
+#include "app/recorder/line_file.hpp"
+#include "app/session/session_files.hpp"
+
+namespace vergence::app {
+namespace {
+
+constexpr Stamp kVirtualEpoch{
+    1'577'836'800'000'000'000};  // 2020-01-01 00:00 UTC: a drive in virtual time has the same
+                                 // stamps on every run
+
+std::int64_t clock_ns(clockid_t clock) {
+  timespec t{};
+  (void)::clock_gettime(clock, &t);
+  return static_cast<std::int64_t>(t.tv_sec) * 1'000'000'000 + t.tv_nsec;
+}
+
+std::vector<std::string> serials_of(const std::vector<CameraDevice*>& cameras) {
+  std::vector<std::string> serials;
+  for (const CameraDevice* camera : cameras) serials.push_back(camera->info().serial);
+  return serials;
+}
+
+SourceEvent event_of(Stamp stamp, const TimingMonitor::Sentence& sentence) noexcept {
+  SourceEvent event;
+  event.record.stamp = stamp;
+  event.record.kind = sentence.kind;
+  event.record.set_sentence(sentence.text.data());
+  event.to_user = sentence.aloud;
+  return event;
+}
+
+}  // namespace
+
+LiveSource::LiveSource(const RunRequest& request)
+    : request_(request),
+      configuration_(request.configuration),
+      devices_(request.configuration, request.faults, request.fast, request.duration_s),
+      time_(devices_.sync().mode, request.fast),
+      fault_told_(devices_.faults().size(), false) {
+  facts_.begin =
+      starting_calibration(configuration_, request.calibration, serials_of(devices_.cameras()));
+  make_acquisition();
+  make_facts();
+}
+
+void LiveSource::make_acquisition() {
+  Acquisition::Options o = devices_.acquisition_options();
+  o.wait_when_full = request_.fast;
+  o.stamp_grid = stamp_grid(configuration_);
+  o.tie_stamp = request_.fast ? kVirtualEpoch : Stamp(clock_ns(CLOCK_REALTIME));
+  o.tie_host = request_.fast ? devices_.start() : HostStamp(clock_ns(CLOCK_MONOTONIC));
+  if (exposes_by_itself(configuration_)) {
+    const CameraSettings& c = configuration_.cameras[0];
+    const CameraMasks masks(configuration_, facts_.begin.file.rig);
+    exposure_ = std::make_unique<ExposureControl>(
+        devices_.cameras(), c.width, c.height, masks.views()[0], exposure_options(configuration_),
+        starting_exposure(configuration_, 0), request_.fast);
+  }
+  acquisition_ = std::make_unique<Acquisition>(
+      exposure_ ? exposure_->cameras() : devices_.cameras(), devices_.ins(), devices_.trigger(), o);
+  start_ = o.tie_stamp + (devices_.start() - o.tie_host);
+}
+
+void LiveSource::make_facts() {
+  constexpr double kUnknownDrive = 3600;  // s, memory for as long where nobody knows how long it is
+  facts_.adoption = request_.fast ? Adoption::after_fixed_frames : Adoption::when_ready;
+  facts_.when_full = request_.fast ? Recorder::WhenFull::wait : Recorder::WhenFull::drop;
+  facts_.frames = devices_.frames();
+  facts_.expected_frames =
+      devices_.frames() > 0 ? devices_.frames()
+                            : static_cast<std::size_t>(kUnknownDrive * configuration_.trigger.rate);
+  facts_.first = start_;
+  if (devices_.ins() != nullptr)
+    facts_.ins = SourceIns{comparison_options(configuration_), InsComparison::Source::device,
+                           "the configuration", 0};
+  const auto is_full = [](const mock::Fault& f) { return f.kind == mock::FaultKind::disk_full; };
+  const auto scheduled = devices_.faults();
+  if (std::any_of(scheduled.begin(), scheduled.end(), is_full))
+    facts_.disk_full = [this, scheduled, is_full](Stamp stamp) {
+      return std::any_of(scheduled.begin(), scheduled.end(), [&](const mock::Fault& f) {
+        return is_full(f) && f.active(stamp - start_);
+      });
+    };
+  for (const std::string& sentence : facts_.begin.remarks) facts_.remarks.push_back({sentence});
+  for (const std::string& sentence : devices_.remarks())
+    facts_.remarks.push_back({sentence, "device"});
+  const SyncMode mode = devices_.sync().mode;
+  facts_.remarks.push_back({proof_sentence(mode), "pairing", false});
+  if (mode == SyncMode::software)
+    facts_.remarks.push_back(
+        {std::string(proof_sentence(mode)) + "; poses in motion suffer from it"});
+  facts_.image_bytes = devices_.image_bytes();
+  facts_.ring_bytes = sizeof(Acquisition);
+  facts_.word_of_skipped = "dropped";
+  facts_.on_request = true;
+}
+
+void LiveSource::start(std::vector<std::string>* faults) {
+  const HostStamp assumed = devices_.start();
+  start_acquisition(acquisition_.get());
+  begun_ = std::chrono::steady_clock::now();
+  start_ = start_ + (devices_.start() - assumed);  // a mock in real time knows it only now
+  if (devices_.mock() == nullptr || devices_.board_keeps_own_time()) return;
+  truth_ = true_trajectory(*devices_.mock(), configuration_, start_);
+  if (!truth_.empty()) write_truth(faults);
+}
+
+// ---- the estimator's thread
+
+bool LiveSource::next(SourceItem* item) noexcept {
+  while (true) {
+    if (waiting_) {
+      if (next_event(item)) return true;
+      waiting_ = false;
+      *item = SourceFrame{std::get_if<AcquiredFrame>(&in_hand_)->rig, 0};
+      return true;
+    }
+    if (const auto* reading = std::get_if<AcquiredReading>(&in_hand_)) {
+      const TimingMonitor::Sentence sentence = time_.of_reading(*reading);
+      const Stamp stamp = reading->sample.stamp;
+      in_hand_ = DeviceEvent{};
+      if (sentence.kind != nullptr) {
+        *item = event_of(stamp, sentence);
+        return true;
+      }
+    }
+    if (!acquisition_->next(&in_hand_)) return false;
+    if (const auto* frame = std::get_if<AcquiredFrame>(&in_hand_)) {
+      waiting_ = true;
+      const TimingMonitor::Sentence sentence = time_.of_set(frame->set);
+      if (sentence.kind == nullptr) continue;
+      *item = event_of(frame->rig.stamp, sentence);
+      return true;
+    }
+    if (const auto* reading = std::get_if<AcquiredReading>(&in_hand_)) {
+      *item = InsRecord{reading->sample, reading->quality};
+      return true;
+    }
+    const auto* event = std::get_if<DeviceEvent>(&in_hand_);
+    *item = event_of(event->stamp, time_.of_device(*event));
+    return true;
+  }
+}
+
+/// The mock's faults that have begun by the frame in hand.
+bool LiveSource::next_event(SourceItem* item) noexcept {
+  const Stamp stamp = std::get_if<AcquiredFrame>(&in_hand_)->rig.stamp;
+  const auto faults = devices_.faults();
+  for (std::size_t i = 0; i < faults.size(); ++i) {
+    if (fault_told_[i] || stamp < start_ + faults[i].at) continue;
+    fault_told_[i] = true;
+    std::array<char, 96> text{};
+    const std::string_view kind = mock::to_string(faults[i].kind);
+    (void)std::snprintf(text.data(), text.size(), "%.*s, as scheduled",
+                        static_cast<int>(kind.size()), kind.data());
+    SourceEvent event;
+    event.record.stamp = start_ + faults[i].at;
+    event.record.kind = "fault";
+    event.record.set_sentence(text.data());
+    event.recalibrate = faults[i].kind == mock::FaultKind::recalibrate;
+    *item = event;
+    return true;
+  }
+  return false;
+}
+
+void LiveSource::done(const PoseSample& sample) noexcept {
+  const auto* frame = std::get_if<AcquiredFrame>(&in_hand_);
+  time_.note_pose(*frame, sample.estimate_ms,
+                  request_.fast ? HostStamp{} : HostStamp(clock_ns(CLOCK_MONOTONIC)));
+  acquisition_->release(*frame);
+}
+
+// ---- the caller's thread
+
+void LiveSource::look() {  // real cameras do not end by themselves
+  if (devices_.mock() == nullptr && request_.duration_s &&
+      std::chrono::steady_clock::now() - begun_ >
+          std::chrono::duration<double>(*request_.duration_s))
+    acquisition_->stop();
+}
+
+void LiveSource::finish(Progress* progress, std::vector<std::string>* faults) {
+  acquisition_->join();
+  if (devices_.mock() != nullptr &&
+      devices_.board_keeps_own_time()) {  // whose pulses nobody knew before they were made
+    truth_ = true_trajectory(*devices_.mock(), configuration_, start_);
+    write_truth(faults);
+  }
+  if (exposure_) exposure_->settle();
+  if (exposure_ && exposure_->counters().unsupported)
+    progress->say(
+        "vergence: exposure.mode is auto, but a camera cannot change its exposure while it "
+        "streams; set it to fixed");
+}
+
+void LiveSource::write_truth(std::vector<std::string>* faults) const {
+  try {
+    LineFile file(request_.session.out / "truth.tum");
+    for (const StampedPose& pose : truth_) {
+      const PoseNumbers n = PoseNumbers::of(pose.T_world_body);
+      (void)file.append(fmt::format("{} {:.9f} {:.9f} {:.9f} {:.9f} {:.9f} {:.9f} {:.9f}\n",
+                                    format_seconds(pose.stamp.ns()), n.t[0], n.t[1], n.t[2], n.q[0],
+                                    n.q[1], n.q[2], n.q[3]));
+    }
+    if (!file.close())
+      faults->push_back(file.path().string() + ": is not complete; make room on that disk");
+  } catch (const InputError& e) {
+    faults->emplace_back(e.what());
+  }
+}
+
+std::vector<std::pair<std::string, std::uint64_t>> LiveSource::counters() const {
+  const AcquisitionCounters& c = acquisition_->counters();
+  std::vector<std::pair<std::string, std::uint64_t>> out{
+      {"sets_complete", c.sync.complete},
+      {"sets_incomplete", c.sync.incomplete},
+      {"pulses_missed", c.sync.missed},
+      {"sets_overtaken", c.dropped_sets},
+      {"readings_dropped", c.dropped_readings},
+      {"frames_torn", c.torn},
+      {"sets_unproven", c.sync.unproven},
+      {"clock_resets", c.clock_resets},
+      {"worst_stamp_error_ns", static_cast<std::uint64_t>(c.worst_stamp_error_ns)}};
+  if (exposure_) {
+    const ExposureCounters e = exposure_->counters();
+    out.insert(out.end(),
+               {{"exposure_changes", e.changes},
+                {"exposure_refused", e.refused},
+                {"exposure_unequal", e.unequal},
+                {"exposure_again", e.again},
+                {"exposure_last_us", static_cast<std::uint64_t>(e.newest.exposure.ns() / 1000)},
+                {"gain_last_millidb", static_cast<std::uint64_t>(1000 * e.newest.gain_db)}});
+  }
+  for (int k = 0; k < facts_.begin.file.rig.cameras; ++k) {
+    const auto i = static_cast<std::size_t>(k);
+    const CameraStatistics s = devices_.cameras()[i]->statistics();
+    const std::string name = fmt::format("camera{}_", k);
+    out.insert(out.end(), {{name + "delivered", s.delivered},
+                           {name + "lost", s.lost},
+                           {name + "underruns", s.underruns},
+                           {name + "starts", s.starts},
+                           {name + "unpaired", c.sync.lost[i]},
+                           {name + "absent", c.sync.absent[i]},
+                           {name + "duplicate", c.sync.duplicate[i]},
+                           {name + "late", c.sync.late[i]}});
+  }
+  return out;
+}
+
+TruthFigures LiveSource::truth_figures(const SessionTotals& totals,
+                                       const Estimator& estimator) const {
+  TruthFigures figures;
+  if (totals.trajectory.empty() || devices_.mock() == nullptr) return figures;
+  figures.evaluation = evaluate(totals.trajectory, truth_, summary_evaluation_options());
+  if (estimator.calibrated())
+    figures.calibration_error = calibration_errors(
+        estimator.calibration(),
+        devices_.mock()->truth().calibration(totals.trajectory.back().stamp - start_));
+  return figures;
+}
+
+void LiveSource::describe(const SessionTotals& totals, const Estimator& estimator,
+                          SummaryInput* input) const {
+  const AcquisitionCounters& c = acquisition_->counters();
+  // Pulses whose images nobody estimated from: of some no set came, because nothing proved yet
+  // which images were theirs.
+  const auto acquiring = std::min_element(c.sync.acquiring.begin(),
+                                          c.sync.acquiring.begin() + facts_.begin.file.rig.cameras);
+  input->skipped = c.dropped_sets + c.sync.missed + *acquiring;
+  input->devices = counters();
+  input->time = time_.figures(c, devices_);
+  if (devices_.mock() != nullptr) input->truth = truth_figures(totals, estimator);
+}
+
+void LiveSource::print_figures(const SessionTotals& /*totals*/, const SummaryInput& input,
+                               Progress* progress) const {
+  if (!input.truth || !input.truth->evaluation ||
+      input.truth->evaluation->status != EvaluationStatus::ok)
+    return;
+  const TrajectoryEvaluation& e = *input.truth->evaluation;
+  const SegmentErrors &far = e.segments[0], &near = e.segments[1];
+  const std::string segments =
+      far.count > 0    ? fmt::format("; segments of 100 to 800 m {:.3f} %", 100 * far.translation)
+      : near.count > 0 ? fmt::format("; segments of 10 to 50 m {:.3f} %", 100 * near.translation)
+                       : "";
+  progress->say(
+      fmt::format("against the mock's truth over {:.1f} m: ATE {:.3f} m{}{}", e.path_reference,
+                  e.ate_se3.rmse, segments,
+                  devices_.ins() != nullptr
+                      ? " (the report compares with the INS, whose own errors are in its figures)"
+                      : ""));
+}
+
+std::optional<ExitCode> LiveSource::verdict(Progress* progress) const {
+  if (acquisition_->missing().empty()) return std::nullopt;
+  progress->say(fmt::format("vergence: camera {} was gone at the end; check its cable and power",
+                            fmt::join(acquisition_->missing(), ", ")));
+  return ExitCode::device_failed;
+}
+
+}  // namespace vergence::app

@@ -1,0 +1,123 @@
+#include "app/session/replay_session.hpp"
+
+#include <algorithm>
+#include <array>
+#include <memory>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "app/session/drive_calibration.hpp"
+#include "app/session/recorded_source.hpp"
+#include "app/session/replayed_ins.hpp"
+#include "app/session/session_runner.hpp"
+#include "app/session/starting_calibration.hpp"
+
+namespace vergence::app {
+namespace {
+
+/// The truth that lies with the data set, for the stamps that its frames have; empty when there is
+/// none.
+Trajectory read_reference(const ReplayRequest& request, const StereoSequence& sequence) {
+  if (request.format == SequenceFormat::kitti_raw || request.format == SequenceFormat::st_lucia ||
+      is_bag(request.format))
+    return {};  // their layouts have no truth
+  const bool plain = request.format == SequenceFormat::folder;
+  std::error_code ignored;
+  if (plain && std::filesystem::exists(request.data / "truth.tum", ignored))
+    return read_tum(request.data / "truth.tum");
+  if (plain && !std::filesystem::exists(request.data / "poses.txt", ignored)) return {};
+  const auto files =
+      plain ? std::optional(TruthFiles{TruthFiles::Kind::kitti, request.data / "poses.txt", {}})
+            : find_truth(request.data);
+  if (!files) return {};
+  if (files->kind != TruthFiles::Kind::kitti) return read_truth(*files);
+  std::vector<Stamp> times;
+  times.reserve(sequence.pairs.size());
+  for (const StereoPair& pair : sequence.pairs) times.push_back(pair.stamp);
+  return read_kitti(files->poses, times);
+}
+
+/// The drive, with the calibration that the user names, if any; remarks are said.
+StereoSequence open_drive(const ReplayRequest& request) {
+  const CalibrationUse use{request.from_scratch || request.known, request.baseline.value_or(0)};
+  const std::array cameras{request.configuration.kitti_raw.left,
+                           request.configuration.kitti_raw.right};
+  std::vector<std::string> remarks;
+  StereoSequence sequence;
+  if (request.known)
+    sequence = open_sequence(request.format, request.data, given_calibration(*request.known), use,
+                             cameras, request.topics);
+  else if (request.calibration)
+    sequence = open_sequence(request.format, request.data,
+                             given_calibration(*request.calibration, use, &remarks), use, cameras,
+                             request.topics);
+  else
+    sequence =
+        open_sequence(request.format, request.data, std::nullopt, use, cameras, request.topics);
+  if (!request.session.quiet)
+    for (const std::string& sentence : remarks) fmt::print(stderr, "vergence: {}\n", sentence);
+  return sequence;
+}
+
+/// What the drive itself says of its rig, in the place of what it came with; where nothing is found
+/// that stays, and the user hears why.
+bool calibrate_first(const ReplayRequest& request, const StereoSequence& sequence,
+                     StartingCalibration* begin) {
+  Progress progress = Progress::on_stderr(request.session.quiet);
+  const std::size_t count = std::min(request.frames.value_or(sequence.pairs.size()),
+                                     sequence.pairs.size() - request.start);
+  const DriveCalibration found = calibrate_with_progress(
+      {sequence, request.configuration, request.start, count, {}, {}}, *begin, &progress);
+  if (!found.rig) {
+    progress.say("vergence: the drive gives no calibration: " + found.why);
+    return false;
+  }
+  if (!request.session.quiet) progress.say(describe(found));
+  begin->file.rig = *found.rig;
+  begin->file.source = begin->source = "the drive itself";
+  begin->cause = "whole_drive";
+  begin->trust = CalibrationTrust::given;
+  return true;
+}
+
+/// Lenses are found from a beginning that is near enough. Of one that nobody knows anything of: no
+/// distortion, then that of a usual lens of 80 to 100 degrees.
+void calibrate_unknown(ReplayRequest request, StereoSequence* sequence,
+                       StartingCalibration* begin) {
+  if (calibrate_first(request, *sequence, begin)) return;
+  if (!request.known || !request.known->distortion.empty() ||
+      request.known->model != CameraModelKind::pinhole_radtan)
+    return;
+  if (!request.session.quiet)
+    fmt::print(stderr, "vergence: once more, with the distortion of a wide lens to begin with\n");
+  request.known->distortion = {-0.28, 0.07, 0, 0};
+  StereoSequence wide = open_drive(request);
+  StartingCalibration other = replayed_calibration(request.configuration, wide, true);
+  if (!calibrate_first(request, wide, &other)) return;
+  *sequence = std::move(wide);
+  *begin = std::move(other);
+}
+
+}  // namespace
+
+ExitCode run_replay(const ReplayRequest& request) {
+  StereoSequence sequence = open_drive(request);
+  if (request.start >= sequence.pairs.size())
+    throw InputError(fmt::format("--start {} is beyond the drive: {} has {} frames", request.start,
+                                 request.data.string(), sequence.pairs.size()));
+  check_image_sizes(sequence, request.start, request.frames.value_or(sequence.pairs.size()));
+  StartingCalibration begin =
+      replayed_calibration(request.configuration, sequence, request.from_scratch || request.known);
+  Trajectory truth = read_reference(request, sequence);
+  ReplayedIns ins = replayed_ins(request, sequence);
+  if (request.calibrate_first) calibrate_unknown(request, &sequence, &begin);
+  const auto source = in_words([&] {
+    return std::make_unique<RecordedSource>(request, std::move(sequence), std::move(begin),
+                                            std::move(truth), std::move(ins));
+  });
+  const SignalGuard signals;
+  return run_session(*source, request.configuration, request.session, signals);
+}
+
+}  // namespace vergence::app

@@ -1,0 +1,162 @@
+#include "app/session/session_files.hpp"
+
+#include <cstring>
+#include <iostream>
+#include <limits>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include "app/config/calibration_file.hpp"
+#include "app/config/calibration_state.hpp"
+#include "app/recorder/line_file.hpp"
+#include "app/recorder/residual_field.hpp"
+#include "app/report/report.hpp"
+#include "app/runtime/durable_file.hpp"
+#include "app/runtime/errors.hpp"
+#include "app/runtime/thread_runner.hpp"
+
+namespace vergence::app {
+
+std::unique_ptr<PairRunner> make_runner(int threads) {
+  if (threads >= 2) return std::make_unique<ThreadRunner>();
+  return std::make_unique<SequentialRunner>();
+}
+
+void write_session_calibration(const std::filesystem::path& session,
+                               const CalibrationFile& calibration,
+                               std::vector<std::string>* faults) {
+  try {
+    write_calibration(session / "calibration.yaml", calibration);
+  } catch (const InputError& e) {
+    faults->emplace_back(e.what());
+  }
+}
+
+std::function<Kept(const RigCalibration&)> calibration_keeper(
+    const std::filesystem::path& session, const CalibrationFile& words,
+    const std::optional<std::filesystem::path>& state) {
+  return [session, words, state](const RigCalibration& rig) -> Kept {
+    CalibrationFile file = words;
+    file.rig = rig;
+    file.source = "online";
+    Kept kept;
+    std::vector<std::string> faults;
+    write_session_calibration(session, file, &faults);
+    if (state) {
+      try {
+        write_state(*state, file);
+        kept.sentence = "the calibration is kept for the next drive: " + state->string();
+      } catch (const InputError& e) {
+        faults.insert(faults.begin(),
+                      std::string(e.what()) + "; the next drive will not know this calibration");
+      }
+    }
+    if (!faults.empty()) kept = {true, fmt::format("{}", fmt::join(faults, "; "))};
+    return kept;
+  };
+}
+
+namespace {
+
+/// residuals.csv, where there are matches.
+void write_residuals(const std::filesystem::path& session,
+                     const std::optional<RigCalibration>& before, const RigCalibration& at_the_end,
+                     const MatchSample& sample, std::vector<std::string>* faults) {
+  const auto field = [&sample](const RigCalibration& rig, std::uint64_t from, std::uint64_t until) {
+    return residual_field(sample.matches(), rig, from, until);
+  };
+  const std::vector<ResidualCell> end =
+      field(at_the_end, sample.last_change(), std::numeric_limits<std::uint64_t>::max());
+  if (end.empty()) return;
+  const std::vector<ResidualCell> begin =
+      before ? field(*before, 0, sample.first_change()) : std::vector<ResidualCell>{};
+  try {
+    replace_durably(session / "residuals.csv", format_residuals(begin, end));
+  } catch (const InputError& e) {
+    faults->emplace_back(e.what());
+  }
+}
+
+}  // namespace
+
+void begin_session(const std::filesystem::path& session, const StartingCalibration& begin,
+                   Stamp stamp, SessionOutput* output, std::vector<std::string>* faults) {
+  if (begin.trust == CalibrationTrust::none) return;
+  output->post(CalibrationRecord::begin(begin.file.rig, stamp, begin.cause, begin.source.c_str()));
+  write_session_calibration(session, begin.file,
+                            faults);  // at once: a session that is killed has it, too
+}
+
+void describe_calibration(const Estimator& estimator, const StartingCalibration& begin,
+                          const SessionTotals& totals, const EstimatorOptions& options,
+                          const MatchSample& matches, SummaryInput* input) {
+  input->calibrated = estimator.calibrated();
+  input->online = options.online;
+  input->verified = options.online && estimator.verified();
+  input->calibration = estimator.calibration();
+  input->calibration_source = totals.accepted > 0 ? "online" : begin.source;
+  if (begin.trust != CalibrationTrust::none) input->before = begin.file.rig;
+  if (input->before)
+    input->mistake = find_mistake(matches.matches(), *input->before, matches.first_change());
+  input->options = options.calibration;
+}
+
+std::string verification_sentence(const SummaryInput& input) {
+  if (input.verified || !input.calibrated) return "";
+  if (!input.online)
+    return "the calibration is not verified: nothing watched it (calibration.online: off)";
+  return "the drive has not confirmed its calibration; what would: turns, near structure at the "
+         "roadside, tracks in the images' corners";
+}
+
+void end_session(const std::filesystem::path& session, const StartingCalibration& begin,
+                 const SummaryInput& input, const SessionTotals& totals, const MatchSample& matches,
+                 std::vector<std::string>* faults) {
+  if (!input.calibrated) return;
+  CalibrationFile file = begin.file;
+  file.rig = input.calibration;
+  if (totals.accepted > 0) file.source = "online";
+  write_session_calibration(session, file, faults);
+  // With one calibration throughout there is nothing to compare.
+  write_residuals(session, totals.accepted > 0 ? input.before : std::nullopt, input.calibration,
+                  matches, faults);
+}
+
+void write_session_summary(const std::filesystem::path& session, const SessionTotals& totals,
+                           const SummaryInput& input, std::vector<std::string>* faults) {
+  const std::string text = summary_json(totals, input).dump(2) + "\n";
+  try {
+    LineFile file(session / "summary.json");
+    (void)file.append(text);
+    if (!file.close())
+      faults->push_back(file.path().string() + ": is not complete (" + std::strerror(file.fault()) +
+                        ")");
+  } catch (const InputError& e) {
+    faults->emplace_back(e.what());
+  }
+}
+
+bool write_session_report(const std::filesystem::path& session, bool quiet, Progress* progress) {
+  try {
+    const ReportOutcome outcome = write_report(session);
+    if (!quiet)
+      progress->say(fmt::format("report {}: {}", outcome.page.string(), outcome.headline));
+    if (!outcome.usable) progress->say("vergence: do not use these poses: " + outcome.main_reason);
+    return outcome.usable;
+  } catch (const InputError& e) {
+    progress->say(std::string("vergence: ") + e.what());
+    return true;  // nobody knows better
+  }
+}
+
+void print_memory_table(const std::vector<std::pair<std::string, std::size_t>>& memory) {
+  std::size_t sum = 0;
+  for (const auto& [what, bytes] : memory) {
+    std::cout << fmt::format("{:<24}{:>14}\n", what, bytes);
+    sum += bytes;
+  }
+  std::cout << fmt::format("{:<24}{:>14}\n", "sum_bytes", sum) << std::flush;
+}
+
+}  // namespace vergence::app

@@ -1,0 +1,73 @@
+#pragma once
+#include <cstddef>
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "app/config/calibration_file.hpp"
+#include "app/recorder/match_sample.hpp"
+#include "app/recorder/summary.hpp"
+#include "app/runtime/progress.hpp"
+#include "app/session/session_output.hpp"
+#include "app/session/starting_calibration.hpp"
+#include "core/types/parallel.hpp"
+
+/// What every command that writes a session folder does alike.
+namespace vergence::app {
+
+/// What an arena needs beside its contents: the first piece is aligned, too.
+[[nodiscard]] constexpr std::size_t arena_size(std::size_t bytes) { return bytes + 64; }
+
+/// One worker beside the estimator with two threads or more.
+[[nodiscard]] std::unique_ptr<PairRunner> make_runner(int threads);
+
+/// calibration.yaml of the session; what goes wrong becomes a sentence of *faults.
+void write_session_calibration(const std::filesystem::path& session,
+                               const CalibrationFile& calibration,
+                               std::vector<std::string>* faults);
+
+/// What the recorder does with a calibration found while driving: calibration.yaml of the session
+/// at once, so that a session that is killed has it, and the state file, if there is to be one.
+/// `words`: names and serials of the cameras.
+[[nodiscard]] std::function<Kept(const RigCalibration&)> calibration_keeper(
+    const std::filesystem::path& session, const CalibrationFile& words,
+    const std::optional<std::filesystem::path>& state);
+
+/// The session's first files: calibrations.csv and calibration.yaml have what the drive begins
+/// with, if there is anything.
+void begin_session(const std::filesystem::path& session, const StartingCalibration& begin,
+                   Stamp stamp, SessionOutput* output, std::vector<std::string>* faults);
+
+/// The calibration's part of the summary.
+void describe_calibration(const Estimator& estimator, const StartingCalibration& begin,
+                          const SessionTotals& totals, const EstimatorOptions& options,
+                          const MatchSample& matches, SummaryInput* input);
+
+/// What is to be said of a calibration that the drive has not confirmed; empty: it has, or there is
+/// none.
+[[nodiscard]] std::string verification_sentence(const SummaryInput& input);
+
+/// calibration.yaml as it is in use at the end, if there is one, and residuals.csv, if there are
+/// matches to look at it with.
+void end_session(const std::filesystem::path& session, const StartingCalibration& begin,
+                 const SummaryInput& input, const SessionTotals& totals, const MatchSample& matches,
+                 std::vector<std::string>* faults);
+
+/// summary.json of the session; what goes wrong becomes a sentence of *faults.
+void write_session_summary(const std::filesystem::path& session, const SessionTotals& totals,
+                           const SummaryInput& input, std::vector<std::string>* faults);
+
+/// report.html of the session, and a line that says where it is and what it says; what goes wrong
+/// is said, too. → false: no pose of the session can be relied on, which is said with the main
+/// reason, quiet or not
+[[nodiscard]] bool write_session_report(const std::filesystem::path& session, bool quiet,
+                                        Progress* progress);
+
+/// The table of --memory, on stdout.
+void print_memory_table(const std::vector<std::pair<std::string, std::size_t>>& memory);
+
+}  // namespace vergence::app

@@ -1,0 +1,295 @@
+#include "app/session/session_runner.hpp"
+
+#include <pthread.h>
+
+#include <atomic>
+#include <chrono>
+#include <condition_variable>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <thread>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "app/datasets/reference_track.hpp"
+#include "app/devices/camera_masks.hpp"
+#include "app/runtime/background_thread.hpp"
+#include "app/session/event_log.hpp"
+#include "app/session/ins_comparison.hpp"
+#include "app/session/session_files.hpp"
+#include "app/session/session_output.hpp"
+#include "core/estimator/estimator.hpp"
+#include "core/memory/allocation_guard.hpp"
+
+namespace vergence::app {
+namespace {
+
+/// Everything that is set up before the first frame and torn down after the last, in the order of
+/// its members.
+class SessionRunner {
+ public:
+  SessionRunner(FrameSource& source, const Configuration& configuration,
+                const SessionOptions& options, const SignalGuard& signals);
+  [[nodiscard]] ExitCode run();
+
+ private:
+  void open(std::vector<std::string>* faults);
+  void say_remarks(Progress* progress);
+  void estimate() noexcept;
+  void handle(const SourceFrame& frame) noexcept;
+  void handle(const InsRecord& reading) noexcept { comparison_->add(reading); }
+  void handle(const SourceEvent& event) noexcept;
+  void compare(const PoseSample& sample, float decode_ms) noexcept;
+  void watch(Progress* progress);
+  [[nodiscard]] SummaryInput summary_input(const SessionTotals& totals,
+                                           std::uint64_t allocations) const;
+  void write_files(const SessionTotals& totals, const SummaryInput& input,
+                   std::vector<std::string>* faults, Progress* progress);
+  void print_figures(const SessionTotals& totals, const SummaryInput& input,
+                     Progress* progress) const;
+  [[nodiscard]] ExitCode verdict(const SessionTotals& totals,
+                                 const std::vector<std::string>& faults, Progress* progress) const;
+  [[nodiscard]] std::vector<std::pair<std::string, std::size_t>> memory() const;
+
+  FrameSource& source_;
+  const SourceFacts& facts_;
+  const Configuration& configuration_;
+  const SessionOptions& request_;
+  const SignalGuard& signals_;
+  const ReferenceTrack reference_;
+  const CameraMasks masks_;
+  const EstimatorOptions options_;
+  Arena estimator_arena_, comparison_arena_;
+  std::unique_ptr<PairRunner> runner_;
+  BackgroundThread solver_;
+  std::unique_ptr<Estimator> estimator_;
+  std::unique_ptr<Recorder> recorder_;
+
+  // Of the estimator's thread; read by others after it has joined.
+  SessionOutput output_;
+  EventLog journal_;
+  std::unique_ptr<InsComparison> comparison_;  // null: there is no INS
+
+  std::atomic<bool> calibration_asked_{false};  // by the caller's thread, for the estimator's
+  std::mutex mutex_;                            // with done_, for the caller's thread that waits
+  std::condition_variable changed_;
+  bool done_ = false;
+};
+
+SessionRunner::SessionRunner(FrameSource& source, const Configuration& configuration,
+                             const SessionOptions& options, const SignalGuard& signals)
+    : source_(source),
+      facts_(source.facts()),
+      configuration_(configuration),
+      request_(options),
+      signals_(signals),
+      reference_(facts_.truth),
+      masks_(configuration, facts_.begin.file.rig),
+      options_(
+          estimator_options(configuration, facts_.begin.trust, facts_.adoption, masks_.views())),
+      estimator_arena_(arena_size(Estimator::memory_needed(options_, facts_.begin.file.rig))),
+      comparison_arena_(arena_size(facts_.ins ? Comparison::bytes_needed(facts_.ins->options) : 0)),
+      runner_(make_runner(configuration.threads)),
+      estimator_(std::make_unique<Estimator>(options_, facts_.begin.file.rig, facts_.begin.nominal,
+                                             estimator_arena_, *runner_, solver_)) {
+  if (facts_.ins)
+    comparison_ = std::make_unique<InsComparison>(facts_.ins->options, facts_.ins->kind,
+                                                  comparison_arena_, journal_);
+}
+
+// ---- the estimator's thread
+
+void SessionRunner::estimate() noexcept {
+  (void)pthread_setname_np(pthread_self(), "vergence-estim");
+  AllocationGuard::seal_thread();
+  for (SourceItem item; source_.next(&item);) {
+    if (const auto* frame = std::get_if<SourceFrame>(&item)) handle(*frame);
+    if (const auto* reading = std::get_if<InsRecord>(&item)) handle(*reading);
+    if (const auto* event = std::get_if<SourceEvent>(&item)) handle(*event);
+    if (comparison_) comparison_->drain();
+  }
+  estimator_->finish();
+  journal_.note(*estimator_);
+  if (comparison_) comparison_->finish();
+  AllocationGuard::unseal_thread();
+  const std::lock_guard lock(mutex_);
+  done_ = true;
+  changed_.notify_one();
+}
+
+void SessionRunner::handle(const SourceEvent& event) noexcept {
+  if (event.recalibrate) estimator_->request_recalibration();
+  if (event.skipped) journal_.note_skipped();
+  journal_.tell(event.record, event.to_user);
+}
+
+void SessionRunner::handle(const SourceFrame& frame) noexcept {
+  if (calibration_asked_.exchange(false, std::memory_order_relaxed)) {
+    estimator_->request_recalibration();
+    journal_.tell(frame.rig.stamp, "recalibration_requested",
+                  "a new calibration was asked for by SIGUSR1", true);
+  }
+  output_.post(frame.rig);
+  const PoseSample sample = estimator_->process(frame.rig);
+  source_.done(sample);
+  output_.post(sample);
+  journal_.note(*estimator_);
+  journal_.note(sample);
+  compare(sample, frame.decode_ms);
+}
+
+void SessionRunner::compare(const PoseSample& sample, float decode_ms) noexcept {
+  if (comparison_)
+    comparison_->add(sample, decode_ms);
+  else
+    output_.post(PoseRecord::of(sample, decode_ms, reference_.at(sample.stamp)));
+}
+
+// ---- the caller's thread
+
+void SessionRunner::watch(Progress* progress) {
+  constexpr std::chrono::milliseconds kLook{50};
+  std::unique_lock lock(mutex_);
+  while (!changed_.wait_for(lock, kLook, [this] { return done_; })) {
+    if (signals_.stop_requested()) source_.stop();
+    source_.look();
+    if (facts_.on_request && signals_.take_calibration_request())
+      calibration_asked_.store(true, std::memory_order_relaxed);
+    lock.unlock();
+    journal_.show(progress, facts_.frames);
+    lock.lock();
+  }
+  lock.unlock();
+  journal_.show(progress, facts_.frames);
+}
+
+void SessionRunner::open(std::vector<std::string>* faults) {
+  make_session_folder(request_.out);
+  Recorder::Options to_record;
+  to_record.when_full = facts_.when_full;
+  to_record.expected_frames = facts_.expected_frames;
+  to_record.ins = comparison_ != nullptr;
+  to_record.keep = calibration_keeper(request_.out, facts_.begin.file, facts_.begin.state);
+  to_record.disk_full = facts_.disk_full;
+  recorder_ = std::make_unique<Recorder>(request_.out, to_record);
+  output_ = SessionOutput(recorder_.get(), request_.observers);
+  journal_.open(&output_, facts_.first);
+  if (comparison_) comparison_->open(&output_);
+  begin_session(request_.out, facts_.begin, facts_.first, &output_, faults);
+}
+
+void SessionRunner::say_remarks(Progress* progress) {
+  for (const SourceRemark& remark : facts_.remarks) {
+    if (remark.say) progress->say("vergence: " + remark.sentence);
+    if (remark.kind != nullptr) journal_.tell(facts_.first, remark.kind, remark.sentence, false);
+  }
+}
+
+std::vector<std::pair<std::string, std::size_t>> SessionRunner::memory() const {
+  return {{"estimator_bytes", estimator_arena_.capacity()},
+          {"comparison_bytes",
+           comparison_arena_.capacity() + (facts_.ins ? facts_.ins->reading_bytes : 0)},
+          {"images_bytes", facts_.image_bytes},
+          {"rings_bytes", sizeof(Recorder) + sizeof(EventLog) + facts_.ring_bytes}};
+}
+
+SummaryInput SessionRunner::summary_input(const SessionTotals& totals,
+                                          std::uint64_t allocations) const {
+  SummaryInput input;
+  input.dropped_by_estimator = journal_.dropped();
+  const Trajectory& reference = comparison_ ? totals.reference : facts_.truth;
+  if (!reference.empty() && !totals.trajectory.empty())
+    input.evaluation = evaluate(totals.trajectory, reference, summary_evaluation_options());
+  if (comparison_) {
+    input.comparison = comparison_->counters();
+    input.earth = comparison_->earth(facts_.ins->mount_source);
+  }
+  describe_calibration(*estimator_, facts_.begin, totals, options_, journal_.matches(), &input);
+  input.allocations_after_seal = allocations;
+  input.memory = memory();
+  input.configuration_hash = configuration_hash(configuration_);
+  source_.describe(totals, *estimator_, &input);
+  return input;
+}
+
+void SessionRunner::write_files(const SessionTotals& totals, const SummaryInput& input,
+                                std::vector<std::string>* faults, Progress* progress) {
+  if (faults->empty())
+    end_session(request_.out, facts_.begin, input, totals, journal_.matches(), faults);
+  write_session_summary(request_.out, totals, input, faults);
+  faults->insert(faults->end(), totals.faults.begin(), totals.faults.end());
+  for (const std::string& sentence : write_other_formats(
+           request_.out, request_.also, totals, input.earth.value_or(EarthFigures{}), faults))
+    progress->say("vergence: " + sentence);
+  for (const std::string& sentence : recorder_->take_errors())
+    progress->say("vergence: " + sentence);
+  for (const std::string& sentence : *faults) progress->say("vergence: " + sentence);
+}
+
+void SessionRunner::print_figures(const SessionTotals& totals, const SummaryInput& input,
+                                  Progress* progress) const {
+  progress->say(fmt::format(
+      "session {}: {} frames, {} posed ({} degraded), {} lost, {} {}; {:.2f} m; {:.1f} ms a "
+      "frame, {:.1f} at p99",
+      request_.out.string(), totals.read, totals.ok + totals.degraded, totals.degraded, totals.lost,
+      input.skipped, facts_.word_of_skipped, totals.path_m, totals.estimate.mean(),
+      totals.estimate.percentile(0.99)));
+  if (const std::string sentence = verification_sentence(input); !sentence.empty())
+    progress->say(sentence);
+  source_.print_figures(totals, input, progress);
+}
+
+ExitCode SessionRunner::verdict(const SessionTotals& totals, const std::vector<std::string>& faults,
+                                Progress* progress) const {
+  if (totals.ok + totals.degraded == 0) {
+    progress->say("vergence: there never was a pose; events.jsonl and poses.csv in " +
+                  request_.out.string() + " say why");
+    return ExitCode::not_usable;
+  }
+  if (const auto code = source_.verdict(progress)) return *code;
+  if (comparison_ && comparison_->matches() == 0) {
+    progress->say(
+        "vergence: the INS never had a position for a frame: nothing is compared; the poses are "
+        "there");
+    return ExitCode::not_usable;
+  }
+  return faults.empty() ? ExitCode::done : ExitCode::not_usable;
+}
+
+ExitCode SessionRunner::run() {
+  std::vector<std::string> faults;
+  open(&faults);
+  if (request_.print_memory) print_memory_table(memory());
+  Progress progress = Progress::on_stderr(request_.quiet);
+  const auto allocations_before = AllocationGuard::allocations_after_seal();
+  say_remarks(&progress);
+  source_.start(&faults);
+  std::thread estimating([this] { estimate(); });
+  watch(&progress);
+  estimating.join();
+  progress.finish();
+  source_.finish(&progress, &faults);
+
+  const auto totals = recorder_->close();
+  const SummaryInput input =
+      summary_input(*totals, AllocationGuard::allocations_after_seal() - allocations_before);
+  write_files(*totals, input, &faults, &progress);
+  if (!request_.quiet) print_figures(*totals, input, &progress);
+  const bool usable = write_session_report(request_.out, request_.quiet, &progress);
+  ExitCode code = verdict(*totals, faults, &progress);
+  if (code == ExitCode::done && !usable) code = ExitCode::not_usable;
+  return signals_.stop_code().value_or(code);
+}
+
+}  // namespace
+
+ExitCode run_session(FrameSource& source, const Configuration& configuration,
+                     const SessionOptions& options, const SignalGuard& signals) {
+  const auto runner = in_words(
+      [&] { return std::make_unique<SessionRunner>(source, configuration, options, signals); });
+  return runner->run();
+}
+
+}  // namespace vergence::app

@@ -1,0 +1,50 @@
+#pragma once
+#include <filesystem>
+#include <stdexcept>
+#include <vector>
+
+#include "app/config/configuration.hpp"
+#include "app/recorder/other_formats.hpp"
+#include "app/runtime/errors.hpp"
+#include "app/runtime/signals.hpp"
+#include "app/session/frame_source.hpp"
+#include "app/session/session_observer.hpp"
+
+namespace vergence::app {
+
+/// What a session is to write and to say, whatever its source.
+struct SessionOptions {
+  std::filesystem::path out;
+  std::vector<OtherFormat> also{};  // written beside the session's own files
+  bool quiet = false;
+  bool print_memory = false;  // a table of what is held, on stdout
+  std::vector<SessionObserver*> observers{};
+};
+
+/// Runs a source through estimator and comparison into a session folder (DESIGN §6): set-up,
+/// watching, events, comparison, summary, report and verdict, the same for devices and recordings.
+///
+/// Threads  The source's own, the estimator (sealed, with the comparison and the observers), its
+///          worker, the calibration solver (sealed, too), the recorder; the caller's thread draws
+///          the progress line and watches for signals.
+/// Errors   InputError before the session folder is made, for all that can be known by then, and
+///          where the source does not start. Afterwards sentences on stderr.
+/// → done, not_usable (never a pose, an INS that never had a position, a file that is not whole),
+///   device_failed (the source's verdict), interrupted, terminated
+[[nodiscard]] ExitCode run_session(FrameSource& source, const Configuration& configuration,
+                                   const SessionOptions& options, const SignalGuard& signals);
+
+/// What `make` returns; options and rig that do not go together, which core refuses by
+/// std::invalid_argument and std::length_error, as an InputError with the same sentence.
+template <class Make>
+auto in_words(const Make& make) {
+  try {
+    return make();
+  } catch (const std::invalid_argument& e) {
+    throw InputError(e.what());
+  } catch (const std::length_error& e) {
+    throw InputError(e.what());
+  }
+}
+
+}  // namespace vergence::app

@@ -1,0 +1,154 @@
+#include "app/session/starting_calibration.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include <fmt/format.h>
+
+#include "app/config/calibration_state.hpp"
+#include "app/devices/rig_settings.hpp"
+#include "app/runtime/errors.hpp"
+#include "app/session/given_calibration.hpp"
+#include "core/math/so3.hpp"
+
+namespace vergence::app {
+namespace {
+
+/// The configuration's words around the numbers.
+void name_cameras(const Configuration& c, const std::vector<std::string>& serials,
+                  CalibrationFile* file) {
+  if (!c.rig.name.empty()) file->rig_name = c.rig.name;
+  for (std::size_t k = 0; k < static_cast<std::size_t>(file->rig.cameras); ++k) {
+    if (!c.cameras[k].name.empty()) file->names[k] = c.cameras[k].name;
+    if (!c.cameras[k].serial.empty())
+      file->serials[k] = c.cameras[k].serial;
+    else if (k < serials.size() && !serials[k].empty())
+      file->serials[k] = serials[k];
+  }
+}
+
+/// Whether the configuration says where the cameras sit. The mock's rig is what it says, also when
+/// it says nothing.
+bool placed_by_configuration(const Configuration& c, int cameras) {
+  for (std::size_t k = 1; k < static_cast<std::size_t>(cameras); ++k) {
+    const auto& T = c.cameras[k].T_camera_left;
+    if (c.cameras[k].driver != "mock" &&
+        std::all_of(T.begin(), T.end(), [](double v) { return v == 0; }))
+      return false;
+  }
+  return true;
+}
+
+/// Refuses a calibration of other cameras; of other serials it is a remark, for a camera may have
+/// been replaced by its like.
+void check_same_rig(const std::string& name, const CalibrationFile& file,
+                    const CalibrationFile& configured, std::vector<std::string>* remarks) {
+  if (file.rig.cameras != configured.rig.cameras)
+    throw InputError(fmt::format("{}: is of {} cameras, the configuration has {}", name,
+                                 file.rig.cameras, configured.rig.cameras));
+  for (std::size_t k = 0; k < static_cast<std::size_t>(file.rig.cameras); ++k) {
+    const Intrinsics &theirs = file.rig.intrinsics[k], &ours = configured.rig.intrinsics[k];
+    if (theirs.width != ours.width || theirs.height != ours.height)
+      throw InputError(
+          fmt::format("{}: is for images of {} x {} pixels, cameras.{}.size is {} x {}", name,
+                      theirs.width, theirs.height, k, ours.width, ours.height));
+    if (!file.serials[k].empty() && !configured.serials[k].empty() &&
+        file.serials[k] != configured.serials[k])
+      remarks->push_back(
+          fmt::format("{}: is of a camera {} with the serial \"{}\"; the configuration's is \"{}\"",
+                      name, k, file.serials[k], configured.serials[k]));
+  }
+}
+
+double angle_between(const Vec3& a, const Vec3& b) {
+  return std::atan2(a.cross(b).norm(), a.dot(b));
+}
+
+}  // namespace
+
+RigCalibration nominal_geometry(const RigCalibration& given, const RigCalibration& mounted,
+                                const calibration::CalibrationOptions& options) {
+  constexpr double kRadians = std::numbers::pi / 180;
+  RigCalibration nominal = given;
+  apply_use({.length_only = true}, &nominal);
+  const double length = mounted.T_camera_left[1].t.norm();
+  const double factor =
+      length > 0 ? given.baseline / length : 1;  // somebody may have measured another length
+  for (std::size_t k = 1; k < static_cast<std::size_t>(nominal.cameras); ++k) {
+    const Transform& T = mounted.T_camera_left[k];
+    if (log_so3(T.R).norm() > options.max_rotation_deg * kRadians ||
+        angle_between(T.t, nominal.T_camera_left[k].t) > options.max_direction_deg * kRadians)
+      nominal.T_camera_left[k] = {T.R, factor * T.t};
+  }
+  return nominal;
+}
+
+StartingCalibration starting_calibration(const Configuration& c, const CalibrationSource& source,
+                                         const std::vector<std::string>& serials) {
+  StartingCalibration start;
+  CalibrationFile configured;
+  configured.rig = nominal_rig(c);
+  configured.source = "given";
+  name_cameras(c, serials, &configured);
+  start.file = configured;
+  start.source = "the configuration";
+  start.state = state_file(c.rig);
+
+  const bool from_scratch =
+      source.from_scratch || (!source.file && !placed_by_configuration(c, configured.rig.cameras));
+  if (source.file) {
+    const ImageSize size{configured.rig.intrinsics[0].width, configured.rig.intrinsics[0].height};
+    start.file = read_given_calibration(source.file->string(), {.length_only = source.from_scratch},
+                                        size, &start.remarks);
+    check_same_rig(source.file->string(), start.file, configured, &start.remarks);
+    name_cameras(c, serials, &start.file);
+    start.source = source.file->filename().string();
+  } else if (!source.from_scratch && start.state) {
+    CalibrationState state = read_state(*start.state, configured);
+    if (!state.sentence.empty()) start.remarks.push_back(std::move(state.sentence));
+    if (state.calibration) {
+      start.file = std::move(*state.calibration);
+      name_cameras(c, serials, &start.file);
+      start.trust = CalibrationTrust::unconfirmed;
+      start.cause = "state_file";
+      start.source = start.state->string();
+    }
+  }
+  if (from_scratch && start.trust != CalibrationTrust::unconfirmed) {
+    apply_use({.length_only = true}, &start.file.rig);
+    start.trust = CalibrationTrust::none;
+    start.source = "none";
+  }
+  start.nominal = nominal_geometry(start.file.rig, mounted_rig(c), c.calibration);
+  return start;
+}
+
+StartingCalibration replayed_calibration(const Configuration& c, const StereoSequence& sequence,
+                                         bool from_scratch) {
+  StartingCalibration start;
+  start.file.rig = sequence.calibration;
+  start.file.rig_name = c.rig.name;
+  start.file.source = "given";
+  name_cameras(c, {}, &start.file);
+  start.source = from_scratch ? "none" : sequence.calibration_source;
+  if (from_scratch) start.trust = CalibrationTrust::none;
+  start.nominal = nominal_geometry(sequence.calibration, sequence.calibration, c.calibration);
+  return start;
+}
+
+EstimatorOptions estimator_options(const Configuration& c, CalibrationTrust trust,
+                                   Adoption adoption,
+                                   const std::array<ImageView, kMaxCameras>& masks) {
+  EstimatorOptions o;
+  o.odometry = c.odometry;
+  o.calibration = c.calibration;
+  o.monitor = c.monitor;
+  o.trust = trust;
+  o.adoption = adoption;
+  o.online = c.online != 0;
+  o.masks = masks;
+  return o;
+}
+
+}  // namespace vergence::app

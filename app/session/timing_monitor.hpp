@@ -1,0 +1,55 @@
+#pragma once
+#include <array>
+
+#include "app/devices/drive_devices.hpp"
+#include "app/recorder/time_figures.hpp"
+#include "drivers/acquisition/acquisition.hpp"
+
+namespace vergence::app {
+
+/// What a drive tells of time: clocks, pairing, latencies, the INS's UTC. Events as sentences,
+/// figures for summary.json.
+///
+/// Threads  note…(): the estimator's, sealed. figures(): any, after that has joined. Memory: fixed;
+///          sentences are in place.
+class TimingMonitor {
+ public:
+  struct Sentence {
+    const char* kind = nullptr;  // null: nothing to tell
+    std::array<char, 200> text{};
+    bool aloud = false;
+  };
+
+  explicit TimingMonitor(SyncMode mode, bool virtual_time) : mode_(mode), virtual_(virtual_time) {}
+
+  /// What an event of a device says.
+  [[nodiscard]] Sentence of_device(const DeviceEvent& event) const noexcept;
+  /// A set that was handed out: tells when a run of unproven ones begins.
+  [[nodiscard]] Sentence of_set(const SyncedSet& set) noexcept;
+  /// A reading: tells when what the receiver and the filter say has changed, and of the host's
+  /// clock against UTC.
+  [[nodiscard]] Sentence of_reading(const AcquiredReading& reading) noexcept;
+
+  /// A pose of these images has gone out. `estimate_ms`: what it took; `now`: by the host's clock,
+  /// meaningless in virtual time.
+  void note_pose(const AcquiredFrame& frame, float estimate_ms, HostStamp now) noexcept;
+
+  [[nodiscard]] TimeFigures figures(const AcquisitionCounters& counters,
+                                    const DriveDevices& devices) const;
+
+ private:
+  [[nodiscard]] Sentence of_utc(const AcquiredReading& reading) noexcept;
+
+  SyncMode mode_;
+  bool virtual_;
+  bool unproven_ = false;  // the last set
+  TimeHistogram latency_;
+  InsQuality quality_{};  // as told last
+  FixStatus fix_ = FixStatus::none;
+  bool any_quality_ = false, told_utc_ = false;
+  double told_ahead_s_ = 0, sum_ahead_s_ = 0;
+  UtcFigures utc_{};
+  SatelliteFigures satellites_{};
+};
+
+}  // namespace vergence::app

@@ -1,0 +1,222 @@
+#include "app/simulation/experiment.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <fstream>
+#include <iostream>
+#include <string_view>
+#include <vector>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include "app/datasets/text_file.hpp"
+#include "app/runtime/progress.hpp"
+
+namespace vergence::app {
+namespace {
+
+constexpr double kMeasuredSigma = 1e-3;  // m: of the given length with `--length measured`
+constexpr double kFailedRatio =
+    1.2;  // rms above so many times what the noise explains is a failed run
+constexpr double kFailedExact = 1e-6;  // px: mean reprojection error of a failed run without noise
+
+/// One figure of a level: of all runs that did not fail.
+class Figure {
+ public:
+  void add(double v) { values_.push_back(v); }
+  [[nodiscard]] double mean() const {
+    double sum = 0;
+    for (const double v : values_) sum += v;
+    return values_.empty() ? 0 : sum / static_cast<double>(values_.size());
+  }
+  [[nodiscard]] double median() const {
+    if (values_.empty()) return 0;
+    std::vector<double> v = values_;
+    const auto middle = v.begin() + static_cast<std::ptrdiff_t>(v.size() / 2);
+    std::nth_element(v.begin(), middle, v.end());
+    return *middle;
+  }
+
+ private:
+  std::vector<double> values_;
+};
+
+struct Level {
+  double noise = 0;
+  int runs = 0, failed = 0;
+  Figure reprojection_px, pose_m, rotation_rad, translation_m, ms, steps;
+};
+
+std::vector<double> parse_noise(const std::string& text) {
+  constexpr std::size_t kMost = 100;
+  constexpr double kLargest = 100;  // px
+  std::vector<std::string_view> fields(kMost);
+  const std::size_t count = split(text, ',', fields);
+  if (count > kMost) throw InputError("--noise has more than " + std::to_string(kMost) + " levels");
+  std::vector<double> levels(count);
+  for (std::size_t i = 0; i < count; ++i)
+    if (!parse_number(fields[i], &levels[i]) || !(levels[i] >= 0) || levels[i] > kLargest)
+      throw InputError("--noise: `" + std::string(fields[i]) +
+                       "` is not a noise between 0 and 100 pixels; give them like 0,0.1,0.2");
+  return levels;
+}
+
+void check(const Experiment& a) {
+  const SimulationOptions& s = a.simulation;
+  const auto within = [](const char* option, double value, double least, double most) {
+    if (!(value >= least && value <= most))
+      throw InputError(fmt::format("{} needs a number between {} and {}", option, least, most));
+  };
+  within("--points", s.points, 5, 100000);
+  within("--cameras", s.cameras, 2, kMaxCameras);
+  within("--runs", a.runs, 1, 1000000);
+  within("--radius", s.radius, 1e-3, 1e4);
+  within("--start-position", s.start_position, 0, 1e3);
+  within("--start-rotation", s.start_rotation, 0, M_PI);
+  within("--start-translation", s.start_translation, 0, 1e3);
+}
+
+/// Solves one problem and books what came out.
+void run_once(BundleAdjuster& adjuster, const Experiment& a, const SimulationOptions& s,
+              std::uint64_t run, Level* level) {
+  Random random(a.seed, run + 1);  // a stream a run: the same geometry at every noise level
+  SimulatedRig rig = simulate_rig(s, random);
+  BundleOptions options;
+  options.configuration = BundleConfiguration::stereo_calibration;
+  if (a.length == "measured")
+    for (std::size_t k = 1; k < rig.cameras.size(); ++k)
+      options.length[k] = {BundleLength::measured,
+                           rig.true_T_camera_left[k].t.norm() + kMeasuredSigma * random.normal(),
+                           kMeasuredSigma};
+  std::vector<float> squared(rig.observations.size());
+  BundleProblem problem = rig.problem();
+  problem.squared_residuals = squared;
+
+  const auto start = std::chrono::steady_clock::now();
+  const BundleResult result = adjuster.solve(problem, options);
+  level->ms.add(
+      std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count());
+
+  double reprojection = 0;
+  for (std::size_t i = 0; i < squared.size(); ++i)
+    reprojection += std::sqrt(static_cast<double>(squared[i])) /
+                    static_cast<double>(rig.observations[i].inverse_sigma) /
+                    static_cast<double>(squared.size());
+  const double parameters = 3.0 * s.points + 6.0 * (s.poses - 1) + 5.0 * (s.cameras - 1);
+  const double expected =
+      s.noise *
+      std::sqrt(2.0 *
+                std::max(0.0, 1.0 - parameters / (2.0 * static_cast<double>(squared.size()))));
+  ++level->runs;
+  if (!result.converged() ||
+      (s.noise > 0 ? result.rms_px > kFailedRatio * expected : reprojection > kFailedExact)) {
+    ++level->failed;
+    return;
+  }
+  double rotation = 0, translation = 0, pose = 0;
+  for (std::size_t k = 1; k < rig.cameras.size(); ++k) {
+    rotation += rotation_angle(rig.T_camera_left[k].R * rig.true_T_camera_left[k].R.transpose()) /
+                (s.cameras - 1);
+    translation += (rig.T_camera_left[k].t - rig.true_T_camera_left[k].t).norm() / (s.cameras - 1);
+  }
+  for (std::size_t i = 1; i < rig.T_left_world.size(); ++i)
+    pose +=
+        (rig.T_left_world[i].centre() - rig.true_T_left_world[i].centre()).norm() / (s.poses - 1);
+  level->reprojection_px.add(reprojection);
+  level->pose_m.add(pose);
+  level->rotation_rad.add(rotation);
+  level->translation_m.add(translation);
+  level->steps.add(result.steps);
+}
+
+nlohmann::ordered_json json_of(const std::vector<Level>& levels) {
+  nlohmann::ordered_json all = nlohmann::ordered_json::array();
+  for (const Level& l : levels)
+    all.push_back({{"pixel_noise", l.noise},
+                   {"runs", l.runs},
+                   {"failed", l.failed},
+                   {"mean_reprojection_px", l.reprojection_px.mean()},
+                   {"mean_pose_error_m", l.pose_m.mean()},
+                   {"mean_rotation_error_rad", l.rotation_rad.mean()},
+                   {"mean_translation_error_m", l.translation_m.mean()},
+                   {"median_reprojection_px", l.reprojection_px.median()},
+                   {"median_pose_error_m", l.pose_m.median()},
+                   {"median_rotation_error_rad", l.rotation_rad.median()},
+                   {"median_translation_error_m", l.translation_m.median()},
+                   {"median_ms", l.ms.median()},
+                   {"mean_steps", l.steps.mean()}});
+  return all;
+}
+
+void print_table(const Experiment& a, const std::vector<Level>& levels) {
+  const SimulationOptions& s = a.simulation;
+  std::cout << fmt::format(
+      "{} points in a {} of {} m, {} cameras, generator {}, length {} ({} free parameters a "
+      "camera), mean | median\n",
+      s.points, a.shape, s.radius, s.cameras, a.generator, a.length, a.length == "exact" ? 5 : 6);
+  std::cout << fmt::format("{:>8} {:>7} {:>6} {:>19} {:>19} {:>19} {:>19} {:>6} {:>9}\n",
+                           "noise px", "runs", "failed", "reprojection px", "pose m",
+                           "rotation rad", "translation m", "steps", "ms median");
+  const auto pair = [](const Figure& f) {
+    return fmt::format("{:.2e} | {:.2e}", f.mean(), f.median());
+  };
+  for (const Level& l : levels)
+    std::cout << fmt::format("{:>8} {:>7} {:>6} {:>19} {:>19} {:>19} {:>19} {:>6.1f} {:>9.3f}\n",
+                             l.noise, l.runs, l.failed, pair(l.reprojection_px), pair(l.pose_m),
+                             pair(l.rotation_rad), pair(l.translation_m), l.steps.mean(),
+                             l.ms.median());
+}
+
+}  // namespace
+
+ExitCode run_experiment(const Experiment& given) {
+  check(given);
+  Experiment a = given;
+  const std::vector<double> noise = parse_noise(a.noise);
+  a.simulation.shape = a.shape == "shell" ? SimulationShape::shell : SimulationShape::ball;
+  a.simulation.generator =
+      a.generator == "tight" ? SimulationGenerator::tight : SimulationGenerator::ring;
+  if (a.simulation.generator == SimulationGenerator::tight)
+    a.simulation.start_points = -1;  // triangulated
+  std::ofstream json;
+  if (!a.json.empty()) {  // before the work, not after it
+    json.open(a.json);
+    if (!json) throw InputError("--json: " + a.json + " cannot be written; is the folder there?");
+  }
+  Arena arena(BundleAdjuster::memory_needed(capacities_for(a.simulation)));
+  BundleAdjuster adjuster(capacities_for(a.simulation), arena);
+  Progress progress = Progress::on_stderr(a.quiet);
+  std::vector<Level> levels;
+  ProgressState state;
+  state.state = "simulate";
+  state.frames = noise.size() * static_cast<std::uint64_t>(a.runs);
+  for (const double n : noise) {
+    SimulationOptions s = a.simulation;
+    s.noise = n;
+    Level level;
+    level.noise = n;
+    for (int i = 0; i < a.runs; ++i) {
+      try {
+        run_once(adjuster, a, s, static_cast<std::uint64_t>(i), &level);
+      } catch (const std::runtime_error& impossible) {
+        throw InputError(impossible.what());
+      }
+      ++state.frame;
+      progress.update(state);
+    }
+    levels.push_back(std::move(level));
+  }
+  progress.finish();
+  print_table(a, levels);
+  if (json.is_open()) {
+    json << json_of(levels).dump(1) << '\n';
+    json.close();
+    if (!json)
+      throw InputError("--json: " + a.json + " could not be written to its end; is the disk full?");
+  }
+  return ExitCode::done;
+}
+
+}  // namespace vergence::app

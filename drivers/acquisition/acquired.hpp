@@ -1,0 +1,55 @@
+#pragma once
+#include <cstdint>
+#include <variant>
+
+#include "core/types/ins_sample.hpp"
+#include "core/types/rig_frame.hpp"
+#include "drivers/ins.hpp"
+#include "drivers/sync/sync_types.hpp"
+
+/// What an acquisition gives out: plain values of fixed size that go through rings.
+namespace vergence {
+
+/// The images of one pulse. `rig.images` are views of the slots, valid until the frame is released.
+struct AcquiredFrame {
+  RigFrame rig{};
+  SyncedSet set{};  // the slots, and what the synchroniser knows of them
+};
+
+/// A reading of the INS, its stamp and the stamp's error bound mapped from the device's clock.
+struct AcquiredReading {
+  InsSample sample{};
+  InsQuality quality{};
+};
+
+/// Something that happened to a device.
+struct DeviceEvent {
+  enum class Kind : std::uint8_t {
+    camera_gone,
+    camera_back,
+    board_gone,
+    board_back,
+    board_rebooted,
+    acquiring,  // nothing proves any more which pulses the camera's frames belong to
+    proven,     // now something does
+  } kind = Kind::camera_gone;
+  Stamp stamp{};
+  int camera = 0;      // camera_…, acquiring, proven
+  double seconds = 0;  // proven: since the first frame that was not
+};
+
+using Acquired = std::variant<AcquiredFrame, AcquiredReading, DeviceEvent>;
+
+[[nodiscard]] inline Stamp stamp_of(const Acquired& item) noexcept {
+  if (const auto* frame = std::get_if<AcquiredFrame>(&item)) return frame->rig.stamp;
+  if (const auto* reading = std::get_if<AcquiredReading>(&item)) return reading->sample.stamp;
+  return std::get_if<DeviceEvent>(&item)->stamp;
+}
+
+/// What the synchroniser's proof of a set comes to for an estimator.
+[[nodiscard]] constexpr Pairing pairing_of(SyncMode mode, SyncProof proof) noexcept {
+  if (!proves_pairing(mode)) return Pairing::assumed;
+  return proof == SyncProof::unproven ? Pairing::contradicted : Pairing::proven;
+}
+
+}  // namespace vergence

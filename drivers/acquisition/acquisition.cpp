@@ -1,0 +1,397 @@
+#include "drivers/acquisition/acquisition.hpp"
+
+#include <pthread.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cstdlib>
+#include <utility>
+
+namespace vergence {
+namespace {
+
+ClockMapperOptions clock_options(const DeviceTiming& t) noexcept {
+  ClockMapperOptions o;
+  o.least_delay = t.least_delay;
+  o.delay_spread = t.delay_spread;
+  o.resolution = t.resolution;
+  return o;
+}
+
+}  // namespace
+
+Acquisition::Acquisition(std::vector<CameraDevice*> cameras, InsDevice* ins, TriggerDevice* trigger,
+                         const Options& options)
+    : cameras_(std::move(cameras)),
+      ins_(ins),
+      trigger_(trigger),
+      options_(options),
+      sync_(options.sync),
+      heads_(cameras_.size()) {
+  for (std::size_t k = 0; k < cameras_.size(); ++k) heads_[k].device = cameras_[k];
+  ins_head_.device = ins_;
+  board_head_.device = trigger_;
+  for (const CameraDevice* camera : cameras_) clocks_.emplace_back(clock_options(camera->timing()));
+  if (ins_ != nullptr) ins_clock_ = std::make_unique<ClockMapper>(clock_options(ins_->timing()));
+  if (trigger_ != nullptr)
+    board_clock_ = std::make_unique<ClockMapper>(clock_options(trigger_->timing()));
+  if (options.sync.mode == SyncMode::ins_syncout)
+    sync_out_.emplace(options.sync.interval, options.sync_out_divider);
+}
+
+Acquisition::~Acquisition() {
+  stop();
+  join();
+}
+
+std::optional<StartFailure> Acquisition::start() {
+  std::optional<StartFailure> failure;
+  const auto start_device = [&](auto* device) {
+    if (device == nullptr || failure) return;
+    const DeviceStatus status = device->start(this);
+    if (status != DeviceStatus::ok)
+      failure = StartFailure{device->info(), status, device->last_error()};
+  };
+  const bool master = options_.sync.mode == SyncMode::master_strobe;
+  for (std::size_t k = master ? 1 : 0; k < cameras_.size(); ++k) start_device(cameras_[k]);
+  start_device(ins_);
+  start_device(trigger_);
+  if (master) start_device(cameras_[0]);
+  if (!failure) thread_ = std::thread([this] { work(); });
+  return failure;
+}
+
+void Acquisition::stop() noexcept {
+  stop_.store(true, std::memory_order_release);
+  bell_.ring();
+  filled_.ring();
+  freed_.ring();
+}
+
+void Acquisition::join() noexcept {
+  if (thread_.joinable()) thread_.join();
+  for (CameraDevice* camera : cameras_) camera->stop();
+  if (ins_ != nullptr) ins_->stop();
+  if (trigger_ != nullptr) trigger_->stop();
+  counters_.sync = sync_.counters();
+  for (std::size_t k = 0; k < cameras_.size(); ++k)
+    counters_.proven[k] = sync_.proven(static_cast<int>(k));
+  counters_.dropped_sets = skipped_.load();
+  counters_.clock_resets = ins_clock_ ? ins_clock_->resets() : 0;
+  for (const ClockMapper& clock : clocks_) counters_.clock_resets += clock.resets();
+  if (board_clock_) counters_.clock_resets += board_clock_->resets();
+}
+
+bool Acquisition::next(Acquired* out) noexcept {
+  for (Item item;;) {
+    const WakeEvent::Rung seen = filled_.look();
+    const bool finished = finished_.load(
+        std::memory_order_acquire);  // before the ring: what was pushed before is still found
+    if (!ring_.pop(&item)) {
+      if (finished) return false;
+      filled_.wait(seen);
+      continue;
+    }
+    freed_.ring();
+    if (const auto* reading = std::get_if<AcquiredReading>(&item)) {
+      *out = *reading;
+      return true;
+    }
+    if (const auto* event = std::get_if<DeviceEvent>(&item)) {
+      *out = *event;
+      return true;
+    }
+    if (const auto* refused = std::get_if<Refused>(&item)) {
+      release(refused->set);
+      continue;
+    }
+    auto* frame = std::get_if<AcquiredFrame>(&item);
+    const int behind = waiting_.fetch_sub(1, std::memory_order_acq_rel) - 1;
+    if (!options_.wait_when_full && behind >= kMostWaiting) {
+      release(frame->set);
+      skipped_.fetch_add(1, std::memory_order_relaxed);
+      continue;
+    }
+    for (std::size_t k = 0; k < cameras_.size(); ++k)
+      if (frame->set.present[k]) frame->rig.images[k] = cameras_[k]->view(frame->set.slots[k]);
+    *out = *frame;
+    return true;
+  }
+}
+
+void Acquisition::release(const SyncedSet& set) noexcept {
+  for (std::size_t k = 0; k < cameras_.size(); ++k)
+    if (set.present[k]) cameras_[k]->release(set.slots[k]);
+}
+
+Stamp Acquisition::stamp_of(HostStamp host) const noexcept {
+  const std::int64_t ns = (options_.tie_stamp + (host - options_.tie_host)).ns(),
+                     grid = options_.stamp_grid.ns();
+  return Stamp((ns + grid / 2) / grid * grid);  // after 1970
+}
+
+void Acquisition::work() {
+  (void)pthread_setname_np(pthread_self(), "vergence-sync");
+  while (!stop_.load(std::memory_order_acquire)) {
+    const WakeEvent::Rung seen = bell_.look();
+    // Twice: whatever arrived before an item of the first look is there at the second.
+    look();
+    look();
+    const int device = earliest();
+    if (device >= 0) {
+      if (static_cast<std::size_t>(device) < cameras_.size())
+        take_frame(static_cast<std::size_t>(device));
+      else if (device == ins_place())
+        take_reading();
+      else
+        take_board();
+      hand_out_sets();
+      continue;
+    }
+    const bool over =
+        std::all_of(heads_.begin(), heads_.end(), [](const auto& h) { return h.ended; }) &&
+        ins_head_.ended;
+    if (over) break;
+    bell_.wait(seen);
+  }
+  sync_.finish();
+  hand_out_sets();
+  for (std::size_t k = 0; k < heads_.size(); ++k) {
+    if (heads_[k].gone) missing_.push_back(static_cast<int>(k));
+  }
+  finished_.store(true, std::memory_order_release);
+  filled_.ring();
+}
+
+void Acquisition::look() {
+  const bool always = options_.wait_when_full;
+  for (auto& head : heads_) head.look({this, &stop_, always, false});
+  look_ins();
+  board_head_.look({this, &stop_, always, options_.board_keeps_own_time});
+}
+
+void Acquisition::look_ins() {
+  const bool own_time = ins_ != nullptr && ins_->keeps_own_time();
+  ins_head_.look({this, &stop_, options_.wait_when_full, own_time});
+  if (ins_head_.back) {
+    ins_head_.back = false;
+    ins_clock_->restart();
+    if (sync_out_) sync_out_->restart();
+  }
+  if (!ins_head_.held || !ins_head_.event) return;
+  ins_head_.held = false;  // nobody is told: a comparison without readings says so itself
+  ins_head_.gone = true;
+}
+
+int Acquisition::earliest() const {
+  int device = -1;
+  HostStamp first{};
+  for (std::size_t k = 0; k < heads_.size(); ++k)
+    if (heads_[k].held && (device < 0 || heads_[k].value.arrival < first)) {
+      device = static_cast<int>(k);
+      first = heads_[k].value.arrival;
+    }
+  // What keeps a time of its own may be ahead of the cameras: until one of them has something, an
+  // earlier image may still come.
+  const bool images_may_come =
+      device < 0 &&
+      std::any_of(heads_.begin(), heads_.end(), [](const auto& h) { return !h.ended && !h.gone; });
+  const bool any_camera = device >= 0;
+  // At the same instant pulses and then the INS go first: the images may need them.
+  const bool ins_waits = images_may_come && ins_ != nullptr && ins_->keeps_own_time();
+  if (ins_head_.held && !ins_waits && (!any_camera || ins_head_.value.arrival <= first)) {
+    device = ins_place();
+    first = ins_head_.value.arrival;
+  }
+  const bool board_waits = images_may_come && options_.board_keeps_own_time;
+  if (board_head_.held && !board_waits && (device < 0 || board_head_.value.arrival <= first))
+    device = ins_place() + 1;
+  return device;
+}
+
+void Acquisition::take_frame(std::size_t k) {
+  auto& head = heads_[k];
+  head.held = false;
+  const int camera = static_cast<int>(k);
+  if (head.event) {
+    head.gone = true;
+    sync_.absent(camera);
+    push_event(DeviceEvent::Kind::camera_gone, head.value.arrival, camera);
+    return;
+  }
+  if (head.back) {
+    head.back = false;
+    clocks_[k].restart();
+    counters_.cameras[k].restart();
+    proofs_[k] = {};
+    sync_.restarted(camera);
+    push_event(DeviceEvent::Kind::camera_back, head.value.arrival, camera);
+  }
+  const Frame& frame = head.value;
+  SyncFrame in;
+  in.camera = camera;
+  in.slot = frame.slot;
+  in.counter = frame.counter;
+  // From the end of an exposure to the arrival is always as long, from its start not.
+  if (exposures_[k] == Duration{}) exposures_[k] = frame.exposure;
+  const Duration longer = frame.exposure - exposures_[k];
+  in.middle = clocks_[k].map(frame.exposure_start + longer, frame.arrival);
+  in.middle.host = in.middle.host - longer;
+  counters_.cameras[k].note(frame.exposure_start, in.middle);
+  in.middle.host = in.middle.host + frame.exposure / 2;
+  in.arrival = frame.arrival;
+  in.exposure_start = frame.exposure_start;
+  in.exposure = frame.exposure;
+  const bool torn = frame.status != FrameStatus::complete;
+  counters_.torn += torn ? 1 : 0;
+  if (torn) sync_.lost(in.camera, in.counter);
+  const bool taken = !torn && sync_.offer(in) == SyncVerdict::taken;
+  proofs_[k].any = true;
+  note_proofs(frame.arrival);
+  if (options_.sync.mode == SyncMode::master_strobe && k == 0) pause_pulses();
+  if (taken) return;
+  Refused refused;
+  refused.set.present[k] = true;
+  refused.set.slots[k] = frame.slot;
+  push(refused);
+}
+
+void Acquisition::take_reading() {
+  ins_head_.held = false;
+  const InsReading& r = ins_head_.value;
+  const MappedStamp at =
+      r.mapped ? MappedStamp{r.host, r.host_error} : ins_clock_->map(r.measured, r.arrival);
+  AcquiredReading item{r.sample, r.quality};
+  item.sample.stamp = stamp_of(at.host);
+  item.sample.stamp_error = at.error;
+  counters_.ins.note(r.measured, at);
+  push(item);
+  if (!sync_out_) return;
+  if (const auto pulse = sync_out_->reading(r, at)) {
+    take_pulse(*pulse);
+    pause_pulses();
+  }
+}
+
+void Acquisition::take_board() {
+  auto& head = board_head_;
+  head.held = false;
+  if (head.event) {
+    head.gone = true;
+    push_event(DeviceEvent::Kind::board_gone, head.value.arrival);
+    return;
+  }
+  if (head.back) {
+    head.back = false;
+    push_event(DeviceEvent::Kind::board_back, head.value.arrival);
+  }
+  take_pulse(head.value);
+  if (options_.sync.mode == SyncMode::board) pause_pulses();
+}
+
+void Acquisition::take_pulse(const Pulse& reported) {
+  Pulse pulse = reported;
+  const bool rebooted = any_pulse_ && pulse.boot != boot_;
+  if (rebooted && !sync_out_) {
+    ++counters_.reboots;
+    push_event(DeviceEvent::Kind::board_rebooted, pulse.arrival);
+  }
+  any_pulse_ = true;
+  boot_ = pulse.boot;
+  ++counters_.pulses;
+  if (!pulse.mapped) {
+    if (rebooted) {
+      board_clock_->restart();
+      counters_.board.restart();
+    }
+    const MappedStamp at = board_clock_->map(pulse.edge, pulse.arrival);
+    pulse.mapped = true;
+    pulse.host = at.host;
+    pulse.host_error = at.error;
+  }
+  if (!sync_out_) counters_.board.note(pulse.edge, {pulse.host, pulse.host_error});
+  if (!wants_pulses(options_.sync.mode)) return;
+  sync_.pulse(pulse);
+  note_proofs(pulse.arrival);
+}
+
+void Acquisition::pause_pulses() {
+  const std::uint32_t pulses = sync_.wants_pause();
+  if (pulses == 0) return;
+  ++counters_.pauses;
+  if (options_.sync.mode == SyncMode::board) {
+    if (trigger_->pause(pulses) != DeviceStatus::ok) ++counters_.pauses_refused;
+    return;
+  }
+  // No other way than to stop who makes the pulses; meanwhile nothing else comes that could not
+  // wait.
+  const bool master = options_.sync.mode == SyncMode::master_strobe;
+  if (master)
+    cameras_[0]->stop();
+  else
+    ins_->stop();
+  std::this_thread::sleep_for(std::chrono::nanoseconds(
+      (options_.sync.interval * (static_cast<std::int64_t>(pulses) + 1)).ns()));
+  const DeviceStatus status = master ? cameras_[0]->start(this) : ins_->start(this);
+  if (status != DeviceStatus::ok) ++counters_.pauses_refused;
+  if (master) {
+    sync_.restarted(0);
+    if (status != DeviceStatus::ok) heads_[0].gone = true;
+  } else {
+    ins_clock_->restart();
+    sync_out_->restart();
+    if (status != DeviceStatus::ok) ins_head_.gone = true;
+  }
+}
+
+void Acquisition::note_proofs(HostStamp now) {
+  for (std::size_t k = 0; k < cameras_.size(); ++k) {
+    Proof& proof = proofs_[k];
+    const bool proven = sync_.proven(static_cast<int>(k));
+    if (proven == proof.proven || heads_[k].gone || !proof.any) continue;
+    const double seconds = proven ? (now - proof.since).to_seconds() : 0;
+    proof = {true, proven, now};
+    push_event(proven ? DeviceEvent::Kind::proven : DeviceEvent::Kind::acquiring, now,
+               static_cast<int>(k), seconds);
+  }
+}
+
+void Acquisition::hand_out_sets() {
+  constexpr std::uint64_t kSettled = 30;  // sets, after which the clocks are known
+  AcquiredFrame item;
+  SyncedSet& set = item.set;
+  while (sync_.next(&set)) {
+    item.rig = {set.number,
+                stamp_of(set.stamp),
+                set.error,
+                set.spread,
+                pairing_of(options_.sync.mode, set.proof),
+                static_cast<int>(cameras_.size()),
+                {}};
+    if (set.number > kSettled)
+      counters_.worst_stamp_error_ns = std::max(counters_.worst_stamp_error_ns, set.error.ns());
+    push(item);
+  }
+}
+
+void Acquisition::push_event(DeviceEvent::Kind kind, HostStamp when, int camera, double seconds) {
+  push(DeviceEvent{kind, stamp_of(when), camera, seconds});
+}
+
+void Acquisition::push(const Item& item) {
+  if (std::holds_alternative<AcquiredFrame>(item)) waiting_.fetch_add(1, std::memory_order_acq_rel);
+  for (;;) {
+    const WakeEvent::Rung seen = freed_.look();
+    if (ring_.push(item)) break;
+    if (stop_.load(std::memory_order_acquire)) return;  // nobody may be taking any more
+    if (!options_.wait_when_full && std::holds_alternative<AcquiredReading>(item)) {
+      ++counters_.dropped_readings;
+      return;
+    }
+    freed_.wait(seen);  // images: meanwhile the cameras drop, and count
+  }
+  counters_.ring_high_water = std::max(counters_.ring_high_water, ring_.size());
+  filled_.ring();
+}
+
+}  // namespace vergence

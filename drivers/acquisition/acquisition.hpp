@@ -1,0 +1,174 @@
+#pragma once
+#include <array>
+#include <atomic>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+#include <thread>
+#include <variant>
+#include <vector>
+
+#include "core/memory/ring.hpp"
+#include "core/types/rig_frame.hpp"
+#include "drivers/acquisition/acquired.hpp"
+#include "drivers/acquisition/clock_record.hpp"
+#include "drivers/acquisition/device_head.hpp"
+#include "drivers/camera.hpp"
+#include "drivers/common/wake_event.hpp"
+#include "drivers/ins.hpp"
+#include "drivers/sync/rig_synchronizer.hpp"
+#include "drivers/sync/sync_out_pulses.hpp"
+#include "drivers/trigger.hpp"
+
+namespace vergence {
+
+/// Counters of a drive; each written by one thread, exact after join().
+struct AcquisitionCounters {
+  SyncCounters sync{};
+  std::uint64_t torn = 0;                          // frames refused because parts were missing
+  std::uint64_t dropped_sets = 0;                  // live: older images that a newer one overtook
+  std::uint64_t dropped_readings = 0;              // live: INS readings that found the ring full
+  std::uint64_t clock_resets = 0;                  // device clocks that were found set
+  std::uint64_t pulses = 0;                        // the board, or the INS's SyncOut, reported
+  std::uint64_t reboots = 0;                       // of the board
+  std::uint64_t pauses = 0;                        // of the pulses, to prove the pairing
+  std::uint64_t pauses_refused = 0;                // the board cannot
+  std::array<ClockRecord, kMaxCameras> cameras{};  // their clocks
+  ClockRecord ins{}, board{};
+  std::array<bool, kMaxCameras> proven{};  // at the end
+  std::size_t ring_high_water = 0;
+  std::int64_t worst_stamp_error_ns = 0;  // of the images' stamps, after the first second
+};
+
+/// A device that could not be started.
+struct StartFailure {
+  DeviceInfo device{};
+  DeviceStatus status = DeviceStatus::ok;
+  std::string message{};  // the driver's sentence; empty: the status says it all
+};
+
+/// Cameras, INS and board into one stream of rig frames, INS samples and device events, stamped on
+/// the host's clock tied to Unix time.
+///
+/// The drivers' threads ring a bell; one thread here takes what they have in the order of arrival,
+/// maps the stamps, pairs the images and puts everything into a ring for the consumer's thread.
+/// Merged by arrival: a mock in virtual time gives the same stream on every run.
+/// Pulses     Their reports go into the synchroniser in the order of arrival among the frames; what
+///            the driver has not mapped is mapped here, with a new fit for every boot. A pause that
+///            the synchroniser wants is asked for when a report is taken: in virtual time always at
+///            the same one. With `ins_syncout` the INS's readings report the pulses; where a gap is
+///            wanted its stream is stopped for as long, as camera 0's is with `master_strobe`.
+/// Ownership  Devices are configured and outlive it. Slots of a frame are the consumer's until
+///            release(). All slots go back to their cameras on the consumer's thread.
+/// Threads    next(), release(): one consumer, which may be sealed. stop(): any. The rest: the
+///            owner.
+/// Full       wait_when_full (virtual time): the devices wait. Else the consumer skips to the
+///            newest images, readings that find the ring full are dropped; counted.
+/// Errors     start() returns the device that failed; std::system_error where no thread can be had.
+///            A device that goes later is an event, and is asked again every second.
+class Acquisition final : private Notifier {
+ public:
+  struct Options {
+    SyncOptions sync{};
+    bool wait_when_full = false;
+    Stamp tie_stamp{};     // this stamp …
+    HostStamp tie_host{};  // … was this time of the host's clock
+    Duration stamp_grid =
+        Duration::nanoseconds(1);  // stamps are whole multiples of it, rounded to the nearest; > 0
+    /// The board lives in a virtual time of its own, beside the other devices: its next report is
+    /// there for the waiting.
+    bool board_keeps_own_time = false;
+    std::uint32_t sync_out_divider =
+        0;  // ins_syncout: readings a pulse, where the INS does not mark those that one left with
+  };
+
+  /// `ins` may be null. The cameras in the order of the rig, camera 0 first.
+  Acquisition(std::vector<CameraDevice*> cameras, InsDevice* ins, TriggerDevice* trigger,
+              const Options& options);
+  ~Acquisition();
+
+  /// Who waits for pulses first, who makes them last: the board, the INS with `ins_syncout`, camera
+  /// 0 with `master_strobe`.
+  /// → the device that could not be started; the stream has not begun then.
+  [[nodiscard]] std::optional<StartFailure> start();
+  /// False: the drive is over, or stop() was called.
+  [[nodiscard]] bool next(Acquired* item) noexcept;
+  /// Of every AcquiredFrame that next() gave, once.
+  void release(const AcquiredFrame& frame) noexcept { release(frame.set); }
+  /// Ends the stream: next() gives what is in the ring, then false.
+  void stop() noexcept;
+  /// Waits for the thread, stops the devices. After it the counters are exact.
+  void join() noexcept;
+
+  [[nodiscard]] const AcquisitionCounters& counters() const noexcept { return counters_; }
+  /// Cameras that were gone at the end.
+  [[nodiscard]] const std::vector<int>& missing() const noexcept { return missing_; }
+
+ private:
+  /// Slots of a frame that was refused, on their way back on the consumer's thread.
+  struct Refused {
+    SyncedSet set{};
+  };
+  using Item = std::variant<AcquiredFrame, AcquiredReading, DeviceEvent, Refused>;
+  static constexpr std::size_t kRing = 256;
+  // Live: sets that may wait for the estimator before the oldest is skipped; when an image was lost
+  // so many come at once.
+  static constexpr int kMostWaiting = static_cast<int>(RigSynchronizer::kOpen);
+
+  void notify() noexcept override { bell_.ring(); }
+  void work();
+  void look();
+  void look_ins();
+  /// Which device's oldest item arrived first: a camera, or after those the INS, the board. −1:
+  /// none.
+  [[nodiscard]] int earliest() const;
+  [[nodiscard]] int ins_place() const noexcept { return static_cast<int>(heads_.size()); }
+  void take_frame(std::size_t k);
+  void take_reading();
+  void take_board();
+  void take_pulse(const Pulse& pulse);
+  /// Makes the gap that the synchroniser wants.
+  void pause_pulses();
+  /// Tells of cameras whose pairing was proven, or is not any more.
+  void note_proofs(HostStamp now);
+  void hand_out_sets();
+  void push_event(DeviceEvent::Kind kind, HostStamp when, int camera = 0, double seconds = 0);
+  void push(const Item& item);
+  void release(const SyncedSet& set) noexcept;
+  [[nodiscard]] Stamp stamp_of(HostStamp host) const noexcept;
+
+  std::vector<CameraDevice*> cameras_;
+  InsDevice* ins_;
+  TriggerDevice* trigger_;
+  Options options_;
+  RigSynchronizer sync_;
+  std::vector<ClockMapper> clocks_;
+  std::array<Duration, kMaxCameras>
+      exposures_{};  // of the first frames: what the mappers' least delays hold for
+  std::vector<DeviceHead<CameraDevice, Frame>> heads_;
+  std::unique_ptr<ClockMapper> ins_clock_;
+  DeviceHead<InsDevice, InsReading> ins_head_;
+  std::unique_ptr<ClockMapper> board_clock_;
+  DeviceHead<TriggerDevice, Pulse> board_head_;
+  std::optional<SyncOutPulses> sync_out_;
+  bool any_pulse_ = false;
+  std::uint32_t boot_ = 0;  // of the newest pulse
+  struct Proof {
+    bool any = false;  // a frame has come since it was started
+    bool proven = true;
+    HostStamp since{};  // of the first frame without
+  };
+  std::array<Proof, kMaxCameras> proofs_{};
+
+  Ring<Item, kRing> ring_;
+  std::atomic<int> waiting_{0};  // sets in the ring
+  WakeEvent bell_, filled_, freed_;
+  std::atomic<bool> stop_{false}, finished_{false};
+  std::atomic<std::uint64_t> skipped_{0};
+  AcquisitionCounters counters_{};
+  std::vector<int> missing_;
+  std::thread thread_;
+};
+
+}  // namespace vergence

@@ -1,0 +1,68 @@
+#pragma once
+#include <atomic>
+#include <chrono>
+#include <cstdint>
+#include <thread>
+
+#include "drivers/device.hpp"
+
+namespace vergence {
+
+/// The oldest item that a device has and nobody has taken, and whether the device is there: one
+/// way to look at cameras, INS and board.
+///
+/// Ownership  The device outlives it. Threads: the acquisition's, which calls all of it.
+template <class Device, class Value>
+struct DeviceHead {
+  struct Look {
+    Notifier* ready;                // what a device that is started again notifies
+    const std::atomic<bool>* stop;  // ends every wait
+    bool ask_always;                // virtual time: a device that is gone is asked at each look
+    bool own_time;                  // its next item is there for the waiting: wait for it
+  };
+  static constexpr std::int64_t kAskAgain =
+      1'000'000'000;  // ns: opening a bus device takes a while, a second more is no loss
+
+  Device* device = nullptr;
+  bool held = false;   // `value` waits to be taken
+  bool event = false;  // held: no value but that the device has gone, at value.arrival
+  bool gone = false;
+  bool back = false;  // it was started again, which nobody has been told yet
+  bool ended = false;
+  std::int64_t asked_ns = 0;  // when it was last asked to come back, steady clock
+  Value value{};
+
+  void look(const Look& l) {
+    if (device == nullptr) ended = true;
+    if (held || ended || (gone && !start_again(l))) return;
+    constexpr Duration kPatience = Duration::milliseconds(100);
+    DeviceStatus status = DeviceStatus::timeout;
+    do {
+      status = device->wait(l.own_time ? kPatience : Duration{}, &value);
+    } while (status == DeviceStatus::timeout && l.own_time &&
+             !l.stop->load(std::memory_order_acquire));
+    event = status == DeviceStatus::gone;
+    held = status == DeviceStatus::ok || event;
+    ended = status == DeviceStatus::ended || status == DeviceStatus::stopped;
+  }
+
+ private:
+  [[nodiscard]] bool start_again(const Look& l) {
+    const std::int64_t now = std::chrono::steady_clock::now().time_since_epoch().count();
+    if (!l.ask_always && now - asked_ns < kAskAgain) return false;
+    asked_ns = now;
+    DeviceStatus status = device->start(l.ready);
+    // Its time passes by itself: as long as it is not back, nothing says what else may go on.
+    while (status == DeviceStatus::gone && l.own_time && !l.stop->load(std::memory_order_acquire)) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(1));
+      status = device->start(l.ready);
+    }
+    ended = status == DeviceStatus::ended;
+    if (status != DeviceStatus::ok) return false;
+    gone = false;
+    back = true;
+    return true;
+  }
+};
+
+}  // namespace vergence

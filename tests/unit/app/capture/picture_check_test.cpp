@@ -1,0 +1,172 @@
+#include "app/capture/picture_check.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "app/capture/picture_files.hpp"
+#include "core/math/random.hpp"
+
+namespace vergence::app {
+namespace {
+
+/// A picture with padded rows, so that whoever takes the stride for the width is found out.
+struct Picture {
+  Picture(int w, int h, std::uint8_t grey)
+      : width(w), height(h), pixels(static_cast<std::size_t>((w + 13) * h), 255) {
+    for (int y = 0; y < h; ++y)
+      for (int x = 0; x < w; ++x) at(x, y) = grey;
+  }
+  std::uint8_t& at(int x, int y) { return pixels[static_cast<std::size_t>(y * (width + 13) + x)]; }
+  [[nodiscard]] ImageView view() const { return {pixels.data(), width, height, width + 13}; }
+  int width, height;
+  std::vector<std::uint8_t> pixels;
+};
+
+/// Random squares of 8 px, whose pattern lies `shift(y)` further left in it.
+template <class Shift>
+Picture squares(int w, int h, std::uint64_t seed, Shift shift) {
+  constexpr int kSquare = 8, kMore = 64;
+  Random random(seed);
+  const int columns = w / kSquare + 2 * kMore, rows = h / kSquare + 1;
+  std::vector<std::uint8_t> levels;
+  for (int i = 0; i < columns * rows; ++i)
+    levels.push_back(static_cast<std::uint8_t>(40 + random.below(170)));
+  Picture p(w, h, 0);
+  for (int y = 0; y < h; ++y)
+    for (int x = 0; x < w; ++x) {
+      const int u = (x + shift(y)) / kSquare + kMore;
+      p.at(x, y) = levels[static_cast<std::size_t>(y / kSquare * columns + u)];
+    }
+  return p;
+}
+
+std::vector<PictureRemark> judged(const std::vector<Picture>& pictures) {
+  static const std::vector<std::string> kNames{"left", "right", "middle"};
+  std::vector<PictureFigures> figures;
+  for (const Picture& p : pictures) figures.push_back(figures_of(p.view()));
+  return judge_pictures(std::span(kNames).first(pictures.size()), figures);
+}
+
+bool contains(const std::string& text, const std::string& part) {
+  return text.find(part) != std::string::npos;
+}
+
+TEST(PictureFigures, areThoseOfThePixelsAndNotOfThePadding) {
+  Picture p(4, 4, 100);
+  const PictureFigures flat = figures_of(p.view());
+  EXPECT_DOUBLE_EQ(flat.mean, 100);
+  EXPECT_DOUBLE_EQ(flat.contrast, 0);
+  EXPECT_DOUBLE_EQ(flat.saturated, 0);
+  EXPECT_DOUBLE_EQ(flat.dark, 0);
+  EXPECT_DOUBLE_EQ(flat.sharpness, 0);
+  for (int y = 0; y < 4; ++y) p.at(2, y) = p.at(3, y) = 254;
+  p.at(0, 0) = 4;
+  const PictureFigures f = figures_of(p.view());
+  EXPECT_DOUBLE_EQ(f.mean, (7 * 100 + 8 * 254 + 4) / 16.0);
+  EXPECT_DOUBLE_EQ(f.saturated, 0.5);
+  EXPECT_DOUBLE_EQ(f.dark, 1 / 16.0);
+  EXPECT_DOUBLE_EQ(f.sharpness, 77.0 * 77.0) << "half of 154 in each of the four inner pixels";
+}
+
+TEST(PictureFigures, aSingleColumnHasNoSharpness) {
+  const Picture p(1, 5, 7);
+  EXPECT_DOUBLE_EQ(figures_of(p.view()).sharpness, 0);
+}
+
+TEST(Judgement, soundPicturesAreNotRemarkedUpon) {
+  const auto still = [](int) { return 0; };
+  EXPECT_TRUE(judged({squares(320, 240, 1, still), squares(320, 240, 2, still)}).empty());
+}
+
+TEST(Judgement, aBlackAWhiteAndAFlatOneAreNoGood) {
+  const auto remarks =
+      judged({Picture(320, 240, 2), Picture(320, 240, 255), Picture(320, 240, 90)});
+  ASSERT_EQ(remarks.size(), 3U);
+  EXPECT_TRUE(contains(remarks[0].sentence, "left is black"));
+  EXPECT_TRUE(contains(remarks[1].sentence, "right is overexposed: 100 %"));
+  EXPECT_TRUE(contains(remarks[2].sentence, "middle shows nothing"));
+  for (const PictureRemark& r : remarks) EXPECT_TRUE(r.unusable);
+}
+
+TEST(Judgement, aBrightSkyAndADimSceneAreOnlyToldOf) {
+  Picture sky = squares(320, 240, 1, [](int) { return 0; }), dim = sky;
+  for (int y = 0; y < 40; ++y)
+    for (int x = 0; x < 320; ++x) sky.at(x, y) = 255;
+  for (int y = 0; y < 240; ++y)
+    for (int x = 0; x < 320; ++x) dim.at(x, y) = static_cast<std::uint8_t>(dim.at(x, y) / 6);
+  const auto remarks = judged({sky, dim});
+  ASSERT_GE(remarks.size(), 2U);
+  EXPECT_TRUE(contains(remarks[0].sentence, "left: 17 % of it is white"));
+  EXPECT_TRUE(contains(remarks[1].sentence, "right is underexposed"));
+  for (const PictureRemark& r : remarks) EXPECT_FALSE(r.unusable);
+}
+
+TEST(Judgement, oneCameraOutOfFocusShowsBesideTheOther) {
+  const Picture sharp = squares(320, 240, 1, [](int) { return 0; });
+  Picture blurred = sharp;
+  constexpr int kRadius = 12;  // px: three squares run into one
+  for (int y = 0; y < 240; ++y)
+    for (int x = kRadius; x + kRadius < 320; ++x) {
+      int sum = 0;
+      for (int u = -kRadius; u <= kRadius; ++u) sum += sharp.view().at(x + u, y / 8 * 8);
+      blurred.at(x, y) = static_cast<std::uint8_t>(sum / (2 * kRadius + 1));
+    }
+  for (int x = 0; x < 320; ++x)  // and over the rows
+    for (int y = 0; y < 240; ++y) blurred.at(x, y) = blurred.at(x, y / 48 * 48);
+  const auto remarks = judged({sharp, blurred});
+  ASSERT_EQ(remarks.size(), 1U);
+  EXPECT_FALSE(remarks[0].unusable);
+  EXPECT_TRUE(contains(remarks[0].sentence, "right is much less sharp than left"))
+      << remarks[0].sentence;
+}
+
+TEST(Identity, oneCameraTwiceIsFoundAndACapIsNotCalledThat) {
+  const auto still = [](int) { return 0; };
+  const Picture a = squares(320, 240, 1, still);
+  Picture b = a;
+  EXPECT_TRUE(are_identical(a.view(), b.view()));
+  b.at(319, 239) ^= 1;
+  EXPECT_FALSE(are_identical(a.view(), b.view()));
+  const Picture black(320, 240, 0);
+  EXPECT_FALSE(are_identical(black.view(), black.view()));
+  EXPECT_FALSE(are_identical(a.view(), Picture(320, 239, 1).view()));
+}
+
+TEST(Exchange, nearThingsLieFurtherLeftInTheRightPicture) {
+  // 4 px far away at the top, 60 px near at the bottom: a street.
+  const auto depth = [](int y) { return 4 + y / 8; };
+  const Picture left = squares(640, 480, 3, [](int) { return 0; }),
+                right = squares(640, 480, 3, depth);
+  const HorizontalShift fine = horizontal_shift(left.view(), right.view());
+  EXPECT_GE(fine.patches, 10);
+  EXPECT_GT(fine.median, 0.02);
+  EXPECT_FALSE(look_exchanged(fine));
+  const HorizontalShift exchanged = horizontal_shift(right.view(), left.view());
+  EXPECT_LT(exchanged.median, -0.02);
+  EXPECT_TRUE(look_exchanged(exchanged));
+}
+
+TEST(Exchange, nothingIsSaidWithoutEnoughToGoBy) {
+  const Picture grey(640, 480, 100), one = squares(640, 480, 1, [](int) { return 0; }),
+                                     other = squares(640, 480, 2, [](int) { return 0; });
+  EXPECT_FALSE(look_exchanged(horizontal_shift(grey.view(), grey.view())));
+  EXPECT_FALSE(look_exchanged(horizontal_shift(one.view(), other.view())))
+      << "two different scenes";
+  EXPECT_FALSE(look_exchanged(horizontal_shift(one.view(), one.view())));
+  EXPECT_FALSE(look_exchanged(horizontal_shift(Picture(8, 8, 9).view(), Picture(8, 8, 9).view())))
+      << "smaller than a patch";
+  EXPECT_FALSE(look_exchanged(horizontal_shift(Picture(1, 1, 9).view(), Picture(1, 1, 9).view())));
+}
+
+TEST(PictureFiles, namesOfCamerasAreNamesOfFiles) {
+  Configuration c;
+  c.cameras[0].name = "../left eye";
+  c.cameras[2].name = "camera1";
+  EXPECT_EQ(camera_names(c, 3), (std::vector<std::string>{"___left_eye", "camera1", "camera1_2"}));
+}
+
+}  // namespace
+}  // namespace vergence::app

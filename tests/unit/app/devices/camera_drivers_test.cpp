@@ -1,0 +1,113 @@
+#include "app/devices/camera_drivers.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <string>
+#include <vector>
+
+#include "app/devices/software_trigger.hpp"
+#include "app/runtime/errors.hpp"
+#include "tests/support/gige_camera.hpp"
+
+namespace vergence::app {
+namespace {
+
+CameraRequest request(const std::string& driver, const std::string& serial) {
+  return {"cameras.0",
+          driver,
+          serial,
+          {320, 240, 30, Duration::milliseconds(2), 0, CameraTrigger::software}};
+}
+
+std::string refusal(const std::vector<CameraRequest>& requests) {
+  std::vector<std::string> remarks;
+  try {
+    (void)open_cameras(requests, &remarks);
+  } catch (const InputError& e) {
+    return e.what();
+  }
+  return "nothing was refused";
+}
+
+test::GigeCameraOptions small(int k) {
+  test::GigeCameraOptions o;
+  o.address = test::GigeCamera::address(100 + k);
+  o.serial = "TABLE-" + std::to_string(k);
+  o.sensor_width = 320;
+  o.sensor_height = 240;
+  o.discoverable = false;
+  return o;
+}
+
+TEST(CameraDrivers, anUnknownDriverIsRefusedWithTheNearestOne) {
+  const std::string sentence = refusal({request("gigE", "1")});
+  EXPECT_NE(sentence.find("cameras.0.driver is \"gigE\"; did you mean \"gige\"?"),
+            std::string::npos)
+      << sentence;
+}
+
+TEST(CameraDrivers, everyNameStandsOnce) {
+  auto names = camera_driver_names();
+  std::sort(names.begin(), names.end());
+  EXPECT_EQ(std::adjacent_find(names.begin(), names.end()), names.end());
+  EXPECT_NE(std::find(names.begin(), names.end(), "gige"), names.end());
+}
+
+TEST(CameraDrivers, oneSerialTwiceIsRefused) {
+  EXPECT_NE(refusal({request("gige", "A"), request("gige", "A")}).find("two entries"),
+            std::string::npos);
+}
+
+TEST(CameraDrivers, aCameraThatIsNotThereIsNamedWithTheKey) {
+  const std::string sentence = refusal({request("gige", "NO-SUCH-CAMERA")});
+  EXPECT_NE(sentence.find("cameras.0: the gige camera \"NO-SUCH-CAMERA\" was not found"),
+            std::string::npos)
+      << sentence;
+}
+
+TEST(CameraDrivers, whatACameraRefusesIsSaidWithItsName) {
+  const test::GigeCamera simulator(small(0));
+  CameraRequest r = request("gige", small(0).address);
+  r.configuration.width = 640;
+  const std::string sentence = refusal({r});
+  EXPECT_NE(
+      sentence.find(
+          "cameras.0 (gige TABLE-0): Width 640 px is not possible: the camera offers 16 to 320 px"),
+      std::string::npos)
+      << sentence;
+}
+
+TEST(SoftwareTrigger, everyCameraExposesAtEveryPulse) {
+  const test::GigeCamera left(small(1)), right(small(2));
+  std::vector<std::string> remarks;
+  const auto cameras = open_cameras(
+      {request("gige", small(1).address), request("gige", small(2).address)}, &remarks);
+  std::vector<CameraDevice*> devices{cameras[0].device.get(), cameras[1].device.get()};
+  SoftwareTrigger trigger(devices);
+  EXPECT_EQ(trigger.start(nullptr), DeviceStatus::bad_configuration);
+  EXPECT_EQ(trigger.configure({0}, nullptr), DeviceStatus::bad_configuration);
+  ASSERT_EQ(trigger.configure({40}, nullptr), DeviceStatus::ok);
+  for (CameraDevice* camera : devices)
+    ASSERT_EQ(camera->start(nullptr), DeviceStatus::ok) << camera->last_error();
+  ASSERT_EQ(trigger.start(nullptr), DeviceStatus::ok);
+  for (std::uint64_t n = 0; n < 10; ++n) {
+    Pulse pulse;
+    ASSERT_EQ(trigger.wait(Duration::seconds(2), &pulse), DeviceStatus::ok);
+    EXPECT_EQ(pulse.number, n);
+    for (CameraDevice* camera : devices) {
+      Frame frame;
+      ASSERT_EQ(camera->wait(Duration::seconds(2), &frame), DeviceStatus::ok);
+      EXPECT_EQ(frame.counter, n);
+      camera->release(frame.slot);
+    }
+  }
+  trigger.stop();
+  Pulse pulse;
+  while (trigger.wait(Duration{}, &pulse) == DeviceStatus::ok) {
+  }
+  EXPECT_EQ(trigger.wait(Duration::milliseconds(200), &pulse), DeviceStatus::stopped);
+}
+
+}  // namespace
+}  // namespace vergence::app

@@ -1,0 +1,104 @@
+#include "app/devices/camera_masks.hpp"
+
+#include <gtest/gtest.h>
+
+#include <opencv2/imgcodecs.hpp>
+
+#include "app/runtime/errors.hpp"
+#include "tests/support/temporary_folder.hpp"
+
+namespace vergence::app {
+namespace {
+
+using test::TemporaryFolder;
+
+constexpr int kWidth = 80, kHeight = 60;
+
+RigCalibration small_rig() {
+  RigCalibration rig;
+  rig.cameras = 2;
+  for (std::size_t k = 0; k < 2; ++k) {
+    rig.intrinsics[k].width = kWidth;
+    rig.intrinsics[k].height = kHeight;
+  }
+  return rig;
+}
+
+std::string pgm(const std::string& head, char value = 1) {
+  return head + std::string(kWidth * kHeight, value);
+}
+
+/// The sentence with which a mask of camera 1 is refused.
+std::string refusal(const std::filesystem::path& folder, const std::string& name) {
+  Configuration c;
+  c.folder = folder;
+  c.cameras[1].mask = name;
+  try {
+    const CameraMasks masks(c, small_rig());
+  } catch (const InputError& e) {
+    return e.what();
+  }
+  return "taken";
+}
+
+TEST(CameraMasks, areReadFromPngAndPgmBesideTheConfiguration) {
+  const TemporaryFolder folder;
+  cv::Mat drawn(kHeight, kWidth, CV_8UC3, cv::Scalar(255, 255, 255));
+  drawn.rowRange(50, 60).setTo(cv::Scalar(0, 0, 0));
+  ASSERT_TRUE(cv::imwrite((folder / "bonnet.png").string(), drawn));
+  std::string dots = pgm("P5\n# drawn by hand\n80 60 255\n");
+  dots[dots.size() - 1] = '\0';
+  (void)folder.write("dots.pgm", dots);
+  Configuration c;
+  c.folder = folder.path();
+  c.cameras[0].mask = "bonnet.png";
+  c.cameras[1].mask = (folder / "dots.pgm").string();
+  const CameraMasks masks(c, small_rig());
+  const auto views = masks.views();
+  for (int y = 0; y < kHeight; ++y)
+    for (int x = 0; x < kWidth; ++x) {
+      EXPECT_EQ(views[0].at(x, y) == 0, y >= 50);
+      EXPECT_EQ(views[1].at(x, y) == 0, y == kHeight - 1 && x == kWidth - 1);
+    }
+  EXPECT_TRUE(views[2].empty());
+}
+
+TEST(CameraMasks, withoutKeysAreEmpty) {
+  const CameraMasks masks(Configuration{}, small_rig());
+  for (const ImageView& view : masks.views()) EXPECT_TRUE(view.empty());
+}
+
+TEST(CameraMasks, thatCannotBeUsedAreRefusedInASentence) {
+  const TemporaryFolder folder;
+  (void)folder.write("small.pgm", "P5 40 30 255\n" + std::string(40 * 30, '\1'));
+  (void)folder.write("torn.pgm", pgm("P5 80 60 255\n").substr(0, 1000));
+  (void)folder.write("black.pgm", pgm("P5 80 60 255\n", '\0'));
+  (void)folder.write("text.pgm", "P2 80 60 255\n0 0 0");
+  (void)folder.write("huge.pgm", "P5 99999999999999999999 60 255\n");
+  (void)folder.write("headless.pgm", "P5");
+  ASSERT_TRUE(cv::imwrite((folder / "photo.jpg").string(),
+                          cv::Mat(kHeight, kWidth, CV_8U, cv::Scalar(255))));
+  const std::string at = "cameras.1.mask: " + folder.path().string() + "/";
+  EXPECT_EQ(
+      refusal(folder.path(), "small.pgm"),
+      at + "small.pgm is 40 × 30 px, the camera's images are 80 × 60; draw it on one of them");
+  EXPECT_EQ(refusal(folder.path(), "torn.pgm"),
+            at + "torn.pgm is torn: it ends before the image is complete, or its check sums fail");
+  EXPECT_EQ(refusal(folder.path(), "black.pgm"),
+            at + "black.pgm is 0 everywhere: nothing of the image is left; 0 hides, any other "
+                 "value shows");
+  for (const std::string name : {"text.pgm", "huge.pgm", "headless.pgm", "photo.jpg"})
+    EXPECT_EQ(
+        refusal(folder.path(), name),
+        at + name + " is no mask; a PNG or a binary PGM is, 0 where nothing is to be looked for");
+  EXPECT_EQ(refusal(folder.path(), "nowhere.png"), "cameras.1.mask: nowhere.png is missing");
+}
+
+TEST(CameraMasks, ofCamerasThatTheRigDoesNotHaveAreRefused) {
+  Configuration c;
+  c.cameras[2].mask = "any.png";
+  EXPECT_THROW(CameraMasks(c, small_rig()), InputError);
+}
+
+}  // namespace
+}  // namespace vergence::app

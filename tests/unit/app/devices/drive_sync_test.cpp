@@ -1,0 +1,124 @@
+#include "app/devices/drive_sync.hpp"
+
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "app/devices/rig_settings.hpp"
+#include "app/devices/trigger_boards.hpp"
+#include "app/runtime/errors.hpp"
+
+namespace vergence::app {
+namespace {
+
+int cameras_of(const Configuration& c) {
+  int n = 0;
+  for (const CameraSettings& s : c.cameras) n += s.driver.empty() ? 0 : 1;
+  return n;
+}
+
+TEST(DriveSync, everyExampleLoadsAndTheyShowEveryMode) {
+  std::set<SyncMode> modes;
+  int files = 0;
+  for (const auto& entry :
+       std::filesystem::directory_iterator(std::string(VERGENCE_SOURCE_DIR) + "/app/config")) {
+    if (entry.path().extension() != ".yaml") continue;
+    SCOPED_TRACE(entry.path().filename());
+    ++files;
+    try {
+      const Configuration c = load_configuration(entry.path(), {});
+      const SyncOptions o = sync_options(c, cameras_of(c));
+      EXPECT_EQ(o.validate(), nullptr);
+      EXPECT_GT(trigger_configuration(c, cameras_of(c)).rate_hz, 0);
+      (void)trigger_board_options(c.trigger);
+      modes.insert(o.mode);
+    } catch (const InputError& e) {
+      ADD_FAILURE() << e.what();
+    }
+  }
+  EXPECT_GE(files, 13);
+  EXPECT_EQ(modes.size(), 7U);
+}
+
+constexpr const char* kTwoGige =
+    "cameras: [{driver: gige, exposure_us: 4000}, {driver: gige, exposure_us: 4000}]\n";
+
+std::string refusal(const std::string& yaml) {
+  try {
+    const Configuration c = parse_configuration(kTwoGige, "t", {});
+    const Configuration mine = parse_configuration(
+        yaml.find("cameras:") == std::string::npos ? kTwoGige + yaml : yaml, "t", {});
+    (void)sync_options(mine, 2);
+    (void)trigger_configuration(mine, 2);
+    (void)trigger_board_options(mine.trigger);
+  } catch (const InputError& e) {
+    return e.what();
+  }
+  return "";
+}
+
+struct BadCase {
+  const char* yaml;
+  const char* says;
+};
+class DriveSyncRefuses : public ::testing::TestWithParam<BadCase> {};
+
+TEST_P(DriveSyncRefuses, whatCannotBePairedSoAndSaysWhatToDo) {
+  const std::string said = refusal(GetParam().yaml);
+  EXPECT_NE(said.find(GetParam().says), std::string::npos) << said;
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Ways, DriveSyncRefuses,
+    ::testing::Values(
+        BadCase{"sync: {mode: bord}", "did you mean \"board\"?"},  //
+        BadCase{"sync: {mode: board}", "set trigger.driver to board, or sync.mode to counter"},
+        BadCase{"sync: {mode: ins_syncout}", "has no SyncOut"},
+        BadCase{"sync: {mode: ins_syncout}\nins: {driver: xsens}", "ins.sync_out_hz says how many"},
+        BadCase{
+            "sync: {mode: ins_syncout}\nins: {driver: xsens, sync_out_hz: 25}\ntrigger: {rate: 30}",
+            "both are one rate"},
+        BadCase{"sync: {mode: bus}", "share its cycle timer"},
+        BadCase{"sync: {mode: ptp}", "does not say ptp: on"},
+        BadCase{"sync: {mode: master_strobe}", "camera 0 triggers the others, so it is free"},
+        BadCase{"sync: {mode: master_strobe}\ncameras: [{driver: gige, trigger: free}, {driver: "
+                "gige, trigger: free}]",
+                "camera 0's strobe triggers it"},
+        BadCase{"cameras: [{driver: gige, trigger: free}, {driver: gige, trigger: free}]",
+                "set sync.mode to software"},
+        BadCase{"sync: {mode: board}\ntrigger: {driver: board, rate: 200, vary_us: 1500}",
+                "the camera would miss pulses"},
+        BadCase{"sync: {mode: board}\ntrigger: {driver: board, rate: 100, vary_us: 6000}",
+                "more than half of the 10000"},
+        BadCase{"sync: {mode: board}\ntrigger: {driver: board, rate: 10, vary_us: 20000, width_us: "
+                "90000}",
+                "a pulse would last until the next"},
+        BadCase{"sync: {mode: board}\ntrigger: {driver: board, lines: 1}",
+                "leaves out the line of a camera"},
+        BadCase{"sync: {mode: board}\ntrigger: {driver: board, pps: up}",
+                "it is one of none, rising, falling"},
+        BadCase{"sync: {mode: software, tolerance_ms: 100}", "at most half of the interval"}));
+
+TEST(DriveSync, aCameraThatOnlyTheHostStampsHasTheNoiseOfThat) {
+  const Configuration c = parse_configuration(
+      "cameras: [{driver: v4l2}, {driver: gige, stamp_jitter_us: 70, trigger_delay_us: 25}]", "t",
+      {});
+  const SyncOptions o = sync_options(c, 2);
+  EXPECT_EQ(o.camera[0].jitter, Duration::milliseconds(1));
+  EXPECT_EQ(o.camera[1].jitter, Duration::microseconds(70));
+  EXPECT_EQ(o.camera[1].delay, Duration::microseconds(25));
+}
+
+TEST(DriveSync, everyModeSaysWhatProvesItOrThatNothingDoes) {
+  for (int m = 0; m <= static_cast<int>(SyncMode::ptp); ++m) {
+    const auto mode = static_cast<SyncMode>(m);
+    const std::string sentence = proof_sentence(mode);
+    EXPECT_EQ(sentence.find("nothing proves") == 0, !proves_pairing(mode)) << sentence;
+  }
+}
+
+}  // namespace
+}  // namespace vergence::app

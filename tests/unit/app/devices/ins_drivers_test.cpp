@@ -1,0 +1,81 @@
+#include "app/devices/ins_drivers.hpp"
+
+#include <gtest/gtest.h>
+
+#include <string>
+#include <vector>
+
+#include "app/runtime/errors.hpp"
+#include "tests/support/xsens_terminal.hpp"
+
+namespace vergence::app {
+namespace {
+
+std::string refusal(const InsRequest& request) {
+  std::vector<std::string> remarks;
+  try {
+    (void)open_ins(request, &remarks);
+  } catch (const InputError& e) {
+    return e.what();
+  }
+  return "nothing was refused";
+}
+
+InsRequest xsens_on(const std::string& port, double rate) {
+  InsRequest r;
+  r.driver = "xsens";
+  r.port = port;
+  r.rate_hz = rate;
+  return r;
+}
+
+TEST(InsDrivers, noneIsNoDevice) {
+  std::vector<std::string> remarks;
+  InsRequest none;
+  none.driver = "none";
+  EXPECT_EQ(open_ins(none, &remarks), nullptr);
+}
+
+TEST(InsDrivers, whatCannotBeOpenedIsToldInOneSentence) {
+  InsRequest unknown;
+  unknown.driver = "xsense";
+  EXPECT_NE(refusal(unknown).find("did you mean"), std::string::npos) << refusal(unknown);
+  EXPECT_NE(refusal(xsens_on("/dev/ttyNotThere", 100))
+                .find("/dev/ttyNotThere cannot be opened: not found"),
+            std::string::npos)
+      << refusal(xsens_on("/dev/ttyNotThere", 100));
+  InsRequest word = xsens_on("/dev/ttyNotThere", 100);
+  word.sync_in = "upwards";
+  EXPECT_NE(refusal(word).find("ins.sync_in"), std::string::npos);
+}
+
+TEST(InsDrivers, readsARealTerminalInRealTime) {
+  for (const xbus::Generation generation : {xbus::Generation::legacy, xbus::Generation::mark4}) {
+    mock::XsensSimulatorOptions sensor;
+    sensor.generation = generation;
+    test::XsensOnTerminal terminal(sensor);
+    std::vector<std::string> remarks;
+    const auto device = open_ins(xsens_on(terminal.port(), 120), &remarks);
+    ASSERT_NE(device, nullptr);
+    EXPECT_EQ(remarks.size(), generation == xbus::Generation::mark4 ? 1U : 0U)
+        << "120 Hz are no rate of the newer one";
+    EXPECT_EQ(refusal(xsens_on(terminal.port(), 120)).find("in use") == std::string::npos, false)
+        << "the port is ours";
+    ASSERT_EQ(device->start(nullptr), DeviceStatus::ok);
+    std::vector<InsReading> all;
+    for (InsReading r;
+         all.size() < 60 && device->wait(Duration::seconds(5), &r) == DeviceStatus::ok;)
+      all.push_back(r);
+    ASSERT_EQ(all.size(), 60U);
+    for (const InsReading& r : all) {
+      EXPECT_EQ(r.sample.fix, FixStatus::fix_3d);
+      // No converter is in between: a reading is here soon after it was measured.
+      EXPECT_GT(r.arrival, r.host);
+      EXPECT_LT(r.arrival - r.host, Duration::milliseconds(300)) << "a loaded machine";
+    }
+    device->stop();
+  }
+}
+
+}  // namespace
+}  // namespace vergence::app

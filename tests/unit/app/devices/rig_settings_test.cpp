@@ -1,0 +1,141 @@
+#include "app/devices/rig_settings.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+#include <string>
+#include <vector>
+
+#include "app/devices/mock_drive.hpp"
+#include "app/runtime/errors.hpp"
+
+namespace vergence::app {
+namespace {
+
+const std::string kTwo = "cameras: [{driver: mock}, {driver: mock}]\ntrigger: {driver: mock}\n";
+
+Configuration configured(const std::vector<std::string>& set) {
+  return parse_configuration(kTwo, "test", set);
+}
+
+std::string refusal(const std::vector<std::string>& set) {
+  try {
+    (void)nominal_rig(configured(set));
+  } catch (const InputError& e) {
+    return e.what();
+  }
+  return "";
+}
+
+void expect_equal(const RigCalibration& a, const RigCalibration& b) {
+  ASSERT_EQ(a.cameras, b.cameras);
+  EXPECT_EQ(a.baseline, b.baseline);
+  for (std::size_t k = 0; k < static_cast<std::size_t>(a.cameras); ++k) {
+    const Intrinsics &i = a.intrinsics[k], &j = b.intrinsics[k];
+    EXPECT_EQ(std::vector({i.fx, i.fy, i.cx, i.cy}), std::vector({j.fx, j.fy, j.cx, j.cy}));
+    EXPECT_EQ(i.distortion, j.distortion);
+    EXPECT_EQ(a.T_camera_left[k].R, b.T_camera_left[k].R);
+    EXPECT_EQ(a.T_camera_left[k].t, b.T_camera_left[k].t);
+  }
+}
+
+TEST(RigSettings, withoutErrorsTheEstimatorIsGivenTheRigAsMounted) {
+  const Configuration c = configured({"rig.nominal.baseline_m=0.3", "rig.nominal.k1=-0.1"});
+  expect_equal(nominal_rig(c), mounted_rig(c));
+  EXPECT_DOUBLE_EQ(mounted_rig(c).baseline, 0.3);
+  EXPECT_EQ(mounted_rig(c).intrinsics[1].distortion[0], -0.1);
+}
+
+TEST(RigSettings, aCamerasOwnNumbersGoBeforeThoseOfTheRig) {
+  const RigCalibration rig = mounted_rig(
+      configured({"rig.nominal.k1=-0.1", "cameras.1.intrinsics=[500, 501, 322, 241]",
+                  "cameras.1.distortion=[-0.2, 0.05, 0.001]",
+                  "cameras.1.T_camera_left=[0, -1, 0, -0.4, 1, 0, 0, 0.3, 0, 0, 1, 0]"}));
+  EXPECT_EQ(rig.intrinsics[0].distortion[0], -0.1);
+  EXPECT_EQ(rig.intrinsics[1].fy, 501);
+  EXPECT_EQ(rig.intrinsics[1].cx, 322);
+  EXPECT_EQ(rig.intrinsics[1].distortion, (std::array<double, 5>{-0.2, 0.05, 0.001, 0, 0}));
+  EXPECT_EQ(rig.T_camera_left[1].t, Vec3(-0.4, 0.3, 0));
+  EXPECT_EQ(rig.T_camera_left[1].R(1, 0), 1);
+  EXPECT_DOUBLE_EQ(rig.baseline, 0.5);
+}
+
+TEST(RigSettings, intrinsicsErrorsHaveTheirSigmasAndTheirSeed) {
+  const std::vector<std::string> errors{"mock.intrinsics_error.principal_point_px=0.5",
+                                        "mock.intrinsics_error.focal_percent=0.1"};
+  double centre = 0, focal = 0;
+  constexpr int kSeeds = 500;
+  for (int seed = 0; seed < kSeeds; ++seed) {
+    auto set = errors;
+    set.push_back("mock.intrinsics_error.seed=" + std::to_string(seed));
+    const Configuration c = configured(set);
+    const RigCalibration given = nominal_rig(c), mounted = mounted_rig(c);
+    for (std::size_t k = 0; k < 2; ++k) {
+      const Intrinsics &g = given.intrinsics[k], &m = mounted.intrinsics[k];
+      centre += std::pow(g.cx - m.cx, 2) + std::pow(g.cy - m.cy, 2);
+      focal += std::pow(g.fx / m.fx - 1, 2);
+      EXPECT_NEAR(g.fx / m.fx, g.fy / m.fy, 1e-15);
+      EXPECT_NE(g.cx, m.cx);
+    }
+    EXPECT_NE(given.intrinsics[0].cx, given.intrinsics[1].cx);
+    if (seed == 7) expect_equal(given, nominal_rig(configured(set)));
+  }
+  // A sigma from n draws is known to 1/√(2n): 2000 and 1000 draws; five of those.
+  EXPECT_NEAR(std::sqrt(centre / (4 * kSeeds)), 0.5, 0.5 * 5 / std::sqrt(4000.0));
+  EXPECT_NEAR(std::sqrt(focal / (2 * kSeeds)), 1e-3, 1e-3 * 5 / std::sqrt(2000.0));
+}
+
+TEST(RigSettings, aWrongTransformIsTheTrueOneKnocked) {
+  const Configuration c =
+      configured({"mock.calibration_error.pitch_deg=0.2", "mock.calibration_error.y_m=0.004"});
+  const Transform wrong =
+      nominal_rig(c).T_camera_left[1] * mounted_rig(c).T_camera_left[1].inverse();
+  EXPECT_TRUE(log_so3(wrong.R).isApprox(Vec3(0.2 * std::numbers::pi / 180, 0, 0), 1e-12));
+  EXPECT_TRUE(wrong.t.isApprox(Vec3(0, 0.004, 0), 1e-12));
+  EXPECT_EQ(nominal_rig(c).baseline, 0.75) << "what was measured is the length, and that is right";
+}
+
+TEST(RigSettings, aWrongLengthIsWrongEverywhere) {
+  const RigCalibration rig = nominal_rig(
+      configured({"cameras.2.driver=mock", "mock.calibration_error.length_percent=100"}));
+  EXPECT_DOUBLE_EQ(rig.baseline, 1.5);
+  EXPECT_DOUBLE_EQ(rig.T_camera_left[1].t.x(), -1.5);
+  EXPECT_DOUBLE_EQ(rig.T_camera_left[2].t.x(), -3.0);
+}
+
+TEST(RigSettings, whatIsRenderedAndWhatTheTruthComparesWithHasNoErrors) {
+  const Configuration c =
+      configured({"mock.intrinsics_error.principal_point_px=2", "mock.calibration_error.yaw_deg=1",
+                  "mock.texture_detail=0", "mock.drive=still"});
+  const MockDrive drive = make_mock_drive(c, {"knock@5 camera=1 pitch_deg=0.2"}, false, 1.0);
+  expect_equal(drive.rig->truth().mounted(), mounted_rig(c));
+  expect_equal(drive.rig->truth().calibration(Duration::seconds(4)), mounted_rig(c));
+  const Transform moved = drive.rig->truth().calibration(Duration::seconds(6)).T_camera_left[1] *
+                          mounted_rig(c).T_camera_left[1].inverse();
+  EXPECT_NEAR(log_so3(moved.R).x(), 0.2 * std::numbers::pi / 180, 1e-12);
+}
+
+TEST(RigSettings, impossibleRigsAreRefusedByTheirKeys) {
+  EXPECT_NE(refusal({"cameras.1.T_camera_left.3=0.75", "cameras.1.T_camera_left.0=1",
+                     "cameras.1.T_camera_left.5=1", "cameras.1.T_camera_left.10=1"})
+                .find("left and right are swapped"),
+            std::string::npos);
+  EXPECT_NE(refusal({"cameras.1.intrinsics=[500, 0, 322, 241]"}).find("cameras.1.intrinsics"),
+            std::string::npos);
+  EXPECT_NE(refusal({"mock.calibration_error.x_m=0.3"}).find("mock.calibration_error"),
+            std::string::npos);
+  EXPECT_NE(refusal({"cameras.3.driver=mock"}).find("no holes"), std::string::npos);
+}
+
+TEST(RigSettings, theRigOfThePaperIsItsPublishedCalibration) {
+  const RigCalibration rig = mounted_rig(
+      load_configuration(std::string(VERGENCE_SOURCE_DIR) + "/app/config/mock_st_lucia.yaml", {}));
+  EXPECT_NEAR(rig.baseline, 0.750683, 1e-6);
+  const Vec3 published(-0.0051537, -0.0053061, -0.0013430);  // rad, rotation vector
+  EXPECT_TRUE(log_so3(rig.T_camera_left[1].R).isApprox(published, 1e-4));
+  EXPECT_EQ(rig.intrinsics[0].width, 1024);
+}
+
+}  // namespace
+}  // namespace vergence::app

@@ -1,0 +1,361 @@
+#include "drivers/acquisition/acquisition.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <map>
+#include <memory>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "core/memory/allocation_guard.hpp"
+#include "drivers/mock/mock_rig.hpp"
+#include "tests/support/acquired.hpp"
+#include "tests/support/watched_camera.hpp"
+
+namespace vergence {
+namespace {
+
+using test::count;
+using test::event_of;
+using test::frame_of;
+using test::reading_of;
+using test::same;
+using test::WatchedCamera;
+using test::worst_acquisition;
+
+constexpr Stamp kStart{1'577'836'800'000'000'000};
+
+struct BenchOptions {
+  bool real_time = false;
+  Duration grid = Duration::nanoseconds(1);
+  SyncMode mode = SyncMode::counter;
+  Duration vary{};
+  std::uint8_t feedback = 0;
+  double seconds = 4;
+};
+
+/// A mock rig with tiny pictures in an almost empty town, and the source on top of it.
+struct Bench {
+  explicit Bench(const std::vector<std::string>& faults, const BenchOptions& b = {}) {
+    const bool real_time = b.real_time;
+    const Duration grid = b.grid;
+    mock::WorldOptions town;
+    town.texture_detail = 0;
+    town.built_fraction = town.tree_fraction = town.car_fraction = 0;
+    RigCalibration calibration;
+    calibration.cameras = 2;
+    for (std::size_t k = 0; k < 2; ++k) {
+      Intrinsics& lens = calibration.intrinsics[k];
+      lens.width = 64;
+      lens.height = 48;
+      lens.fx = lens.fy = 50;
+      lens.cx = 31.5;
+      lens.cy = 23.5;
+    }
+    calibration.T_camera_left[1].t = {-0.75, 0, 0};
+    std::vector<mock::Fault> parsed;
+    for (const std::string& f : faults) parsed.push_back(mock::parse_fault(f));
+    mock::DriveOptions drive;
+    drive.kind = mock::DriveKind::brief;
+    mock::MockRigOptions o;
+    o.duration = Duration::seconds(b.seconds);
+    o.real_time = real_time;
+    o.reports_taken = true;
+    rig = std::make_unique<mock::MockRig>(
+        std::make_shared<const mock::RigTruth>(std::make_shared<const mock::World>(town), drive,
+                                               calibration, mock::default_T_body_left(),
+                                               Transform{}, parsed),
+        o);
+    for (int k = 0; k < 2; ++k)
+      EXPECT_EQ(rig->camera(k).configure(
+                    {64, 48, 20, Duration::milliseconds(8), 0, CameraTrigger::hardware}, nullptr),
+                DeviceStatus::ok);
+    EXPECT_EQ(rig->ins().configure(120, nullptr), DeviceStatus::ok);
+    TriggerConfiguration pulses;
+    pulses.rate_hz = 20;
+    pulses.vary = b.vary;
+    pulses.feedback = b.feedback;
+    EXPECT_EQ(rig->trigger().configure(pulses, nullptr), DeviceStatus::ok);
+    Acquisition::Options options;
+    options.sync.interval = Duration::milliseconds(50);
+    options.sync.mode = b.mode;
+    options.wait_when_full = !real_time;
+    options.tie_stamp = kStart;
+    options.tie_host = rig->start();
+    options.stamp_grid = grid;
+    for (int k = 0; k < 2; ++k) watched.push_back(std::make_unique<WatchedCamera>(&rig->camera(k)));
+    source = std::make_unique<Acquisition>(
+        std::vector<CameraDevice*>{watched[0].get(), watched[1].get()}, &rig->ins(),
+        &rig->trigger(), options);
+    times = rig->pulse_times();
+  }
+
+  /// The place in `times` of the pulse that this image truly is of.
+  [[nodiscard]] std::size_t true_pulse(const SyncedSet& set, std::size_t k) const {
+    const Duration edge = watched[k]->edge_of_slot[set.slots[k]] - rig->start();
+    const auto after = std::upper_bound(times.begin(), times.end(), edge);
+    EXPECT_LT(edge - *std::prev(after), Duration::milliseconds(2));
+    return static_cast<std::size_t>(std::prev(after) - times.begin());
+  }
+
+  /// The whole drive, on a sealed thread as the estimator's.
+  std::vector<Acquired> drive() {
+    std::vector<Acquired> items;
+    items.reserve(4096);
+    pulses_of.reserve(1024);
+    EXPECT_FALSE(source->start());
+    const SealedScope sealed;
+    for (Acquired item; source->next(&item);) {
+      items.push_back(item);
+      const AcquiredFrame* frame = frame_of(item);
+      if (frame == nullptr) continue;
+      const SyncedSet& set = frame->set;
+      pulses_of.push_back({});
+      for (std::size_t k = 0; k < 2; ++k)
+        pulses_of.back()[k] = set.present[k] ? static_cast<int>(true_pulse(set, k)) : -1;
+      source->release(*frame);
+    }
+    source->join();
+    return items;
+  }
+
+  std::unique_ptr<mock::MockRig> rig;
+  std::vector<std::unique_ptr<WatchedCamera>> watched;
+  std::vector<Duration> times;                  // of all pulses
+  std::vector<std::array<int, 2>> pulses_of{};  // of every set that came, by camera; −1: none
+  std::unique_ptr<Acquisition> source;
+};
+
+TEST(Acquisition, bringsEveryPulseAndReadingOnceInOrderAndWithinTheStampsOwnError) {
+  Bench b({});
+  const auto items = b.drive();
+  ASSERT_EQ(count<AcquiredFrame>(items), 81);
+  EXPECT_GE(count<AcquiredReading>(items), 480);
+  std::uint64_t number = 0, reading = 0;
+  for (const Acquired& item : items) {
+    if (const AcquiredFrame* frame = frame_of(item)) {
+      EXPECT_EQ(frame->set.number, number);
+      EXPECT_EQ(frame->rig.number, number);
+      EXPECT_EQ(frame->rig.pairing, Pairing::assumed) << "counted, nothing proves it";
+      const Stamp truth = kStart + Duration::milliseconds(50) * static_cast<std::int64_t>(number) +
+                          Duration::milliseconds(4);
+      EXPECT_LE(std::abs((frame->rig.stamp - truth).ns()), frame->rig.stamp_error.ns()) << number;
+      ++number;
+    } else {
+      ASSERT_NE(reading_of(item), nullptr);
+      const InsSample& sample = reading_of(item)->sample;
+      EXPECT_EQ(sample.number, reading);
+      const Stamp truth = kStart + Duration::seconds(static_cast<double>(reading) / 120);
+      EXPECT_LE(std::abs((sample.stamp - truth).ns()), sample.stamp_error.ns()) << reading;
+      ++reading;
+    }
+  }
+  EXPECT_EQ(b.source->counters().pulses, 81U);
+}
+
+TEST(Acquisition, twoRunsOfADriveInVirtualTimeAreTheSameItemByItem) {
+  const std::vector<std::string> faults{
+      "camera_gone@2 camera=1 duration_s=1", "duplicate_frames@0 share=0.3 duration_s=0",
+      "late_frames@1 camera=0 share=0.2 delay_s=0.2 duration_s=2"};
+  const auto a = Bench(faults).drive(), b = Bench(faults).drive();
+  ASSERT_EQ(a.size(), b.size());
+  for (std::size_t i = 0; i < a.size(); ++i) ASSERT_TRUE(same(a[i], b[i])) << i;
+}
+
+TEST(Acquisition, stampsLieOnTheirGridAndNoFartherFromWhereTheyWereThanHalfOfIt) {
+  const auto fine = Bench({}).drive(),
+             coarse = Bench({}, {.grid = Duration::microseconds(1)}).drive();
+  ASSERT_EQ(fine.size(), coarse.size());
+  int off = 0;
+  for (std::size_t i = 0; i < fine.size(); ++i) {
+    EXPECT_EQ(stamp_of(coarse[i]).ns() % 1000, 0);
+    EXPECT_LE(std::abs((stamp_of(coarse[i]) - stamp_of(fine[i])).ns()), 500);
+    off += stamp_of(fine[i]).ns() % 1000 != 0 ? 1 : 0;
+  }
+  EXPECT_GT(off, 100);
+}
+
+TEST(Acquisition, aCameraThatWasGoneJoinsTheRightPulsesAgain) {
+  Bench b({"camera_gone@2 camera=1 duration_s=1"});
+  const auto items = b.drive();
+  EXPECT_EQ(count(items, DeviceEvent::Kind::camera_gone), 1);
+  EXPECT_EQ(count(items, DeviceEvent::Kind::camera_back), 1);
+  for (const Acquired& item : items) {
+    const AcquiredFrame* frame = frame_of(item);
+    if (frame == nullptr) continue;
+    const SyncedSet& set = frame->set;
+    EXPECT_TRUE(set.present[0]);
+    EXPECT_EQ(set.present[1], set.number < 40 || set.number >= 60) << set.number;
+    // Both expose at the same instant: a camera paired a pulse off would be 50 ms away.
+    EXPECT_LT(set.spread, Duration::milliseconds(5)) << set.number;
+  }
+  EXPECT_TRUE(b.source->missing().empty());
+}
+
+TEST(Acquisition, everySlotComesBack) {
+  Bench b({"duplicate_frames@0 share=0.5 duration_s=0"});
+  (void)b.drive();
+  EXPECT_GT(b.source->counters().sync.duplicate[0], 10U);
+  // Kept slots would have stalled the drive: 81 frames and their doubles go through 24 of them.
+  EXPECT_EQ(b.rig->camera(0).statistics().underruns, 0U);
+}
+
+// ---- with the board's pulses
+
+constexpr BenchOptions kByPulses{
+    .mode = SyncMode::board, .vary = Duration::milliseconds(2), .seconds = 8};
+
+/// Sets with both images, all of the same pulse, stamped at its middle within the error; the first
+/// of them after that time.
+void expect_right_pairs(const Bench& b, const std::vector<Acquired>& items, int most_unproven = 0) {
+  std::size_t i = 0;
+  int unproven = 0;
+  for (const Acquired& item : items) {
+    const AcquiredFrame* frame = frame_of(item);
+    if (frame == nullptr) continue;
+    const SyncedSet& set = frame->set;
+    const auto& pulses = b.pulses_of[i++];
+    const int first = pulses[0] >= 0 ? pulses[0] : pulses[1];
+    if (pulses[0] >= 0 && pulses[1] >= 0) {
+      EXPECT_EQ(pulses[0], pulses[1]) << "a wrong pair, set " << set.number;
+    }
+    const Stamp truth =
+        kStart + b.times[static_cast<std::size_t>(first)] + Duration::milliseconds(4);
+    EXPECT_LE(std::abs((frame->rig.stamp - truth).ns()), set.error.ns()) << set.number;
+    // One that is not proven for the while says so, and is right all the same.
+    unproven += set.proof == SyncProof::unproven ? 1 : 0;
+    EXPECT_EQ(frame->rig.pairing,
+              set.proof == SyncProof::unproven ? Pairing::contradicted : Pairing::proven);
+    EXPECT_TRUE(set.proof == SyncProof::numbered || set.proof == SyncProof::unproven)
+        << to_string(set.proof);
+    EXPECT_EQ(set.spread, Duration{}) << "equal exposures of one pulse";
+  }
+  EXPECT_EQ(i, b.pulses_of.size());
+  EXPECT_LE(unproven, most_unproven);
+}
+
+TEST(Acquisition, byPulsesEveryPairIsProvenWithinASecondAndRight) {
+  Bench b({}, kByPulses);
+  const auto items = b.drive();
+  expect_right_pairs(b, items);
+  EXPECT_EQ(count(items, DeviceEvent::Kind::acquiring), 2);
+  EXPECT_EQ(count(items, DeviceEvent::Kind::proven), 2);
+  EXPECT_LE(worst_acquisition(items), 1);
+  const AcquisitionCounters& c = b.source->counters();
+  EXPECT_EQ(c.pulses, b.times.size());
+  EXPECT_EQ(static_cast<std::uint64_t>(count<AcquiredFrame>(items)) + c.sync.acquiring[0],
+            b.times.size());
+  EXPECT_EQ(c.sync.incomplete, 0U);
+  EXPECT_EQ(c.pauses, 0U) << "varied intervals prove it";
+}
+
+TEST(Acquisition, evenPulsesArePausedAtTheSamePulseOnEveryRunAndWhatComesOutIsRight) {
+  std::vector<std::vector<Acquired>> runs;
+  for (int run = 0; run < 2; ++run) {
+    Bench b({}, {.mode = SyncMode::board, .seconds = 8});
+    runs.push_back(b.drive());
+    expect_right_pairs(b, runs.back());
+    EXPECT_GE(b.source->counters().pauses, 1U);
+    EXPECT_EQ(b.source->counters().pauses_refused, 0U);
+    EXPECT_LT(b.source->counters().pulses, b.times.size()) << "some were left out";
+  }
+  ASSERT_EQ(runs[0].size(), runs[1].size());
+  for (std::size_t i = 0; i < runs[0].size(); ++i)
+    ASSERT_EQ(stamp_of(runs[0][i]), stamp_of(runs[1][i])) << i;
+}
+
+struct LossCase {
+  const char* name;
+  std::vector<std::string> faults;
+  int acquisitions;  // proven, in all
+  DeviceEvent::Kind kind;
+  int items;  // of that kind
+};
+class AcquisitionByPulses : public ::testing::TestWithParam<LossCase> {};
+
+TEST_P(AcquisitionByPulses, whateverIsLostNoPairIsWrongAndAllIsSaid) {
+  Bench b(GetParam().faults, kByPulses), again(GetParam().faults, kByPulses);
+  const auto items = b.drive(), more = again.drive();
+  expect_right_pairs(b, items, 2);
+  EXPECT_EQ(count(items, DeviceEvent::Kind::proven), GetParam().acquisitions);
+  EXPECT_LE(worst_acquisition(items), 1);
+  EXPECT_EQ(count(items, GetParam().kind), GetParam().items);
+  EXPECT_GT(b.pulses_of.size(), 90U) << "of 160: it came back";
+  ASSERT_EQ(items.size(), more.size()) << "another run";
+  for (std::size_t i = 0; i < items.size(); ++i) {
+    ASSERT_TRUE(same(items[i], more[i])) << i;
+  }
+}
+
+using Kind = DeviceEvent::Kind;
+INSTANTIATE_TEST_SUITE_P(
+    Ways, AcquisitionByPulses,
+    ::testing::Values(
+        LossCase{"camera", {"camera_gone@4 camera=1 duration_s=1"}, 3, Kind::camera_back, 1},
+        LossCase{"left", {"camera_gone@4 camera=0 duration_s=1"}, 3, Kind::camera_back, 1},
+        LossCase{"reboot", {"board_reboot@4 duration_s=0.5"}, 4, Kind::board_rebooted, 1},
+        LossCase{"board", {"board_gone@4 duration_s=1"}, 4, Kind::board_back, 1},
+        LossCase{"line", {"board_gone@4 duration_s=1 powered=1"}, 2, Kind::board_gone, 1},
+        LossCase{"missed",
+                 {"missed_trigger@4 camera=1 pulses=2", "missed_trigger@6 camera=0"},
+                 2,
+                 Kind::acquiring,
+                 2},
+        LossCase{"frames", {"lose_frames@3 share=0.2 duration_s=0"}, 2, Kind::acquiring, 2},
+        LossCase{"pairs", {"break_pairs@3 share=0.5 duration_s=0"}, 2, Kind::acquiring, 2},
+        LossCase{"doubles", {"duplicate_frames@3 share=0.3 duration_s=0"}, 2, Kind::acquiring, 2}),
+    [](const auto& i) { return std::string(i.param.name); });
+
+TEST(Acquisition, everyLossHasItsOwnCounter) {
+  Bench b({"missed_trigger@4 camera=1 pulses=2", "lose_frames@5 camera=0 share=0.2 duration_s=2"},
+          kByPulses);
+  (void)b.drive();
+  const SyncCounters& c = b.source->counters().sync;
+  EXPECT_EQ(c.missed_trigger[1], 2U);
+  EXPECT_EQ(c.missed_trigger[0], 0U);
+  EXPECT_EQ(c.lost[0], b.rig->camera(0).statistics().lost);
+  EXPECT_GT(c.lost[0], 2U);
+  EXPECT_EQ(c.lost[1], 0U);
+}
+
+TEST(Acquisition, feedbackIsTakenForTheMiddleOfTheExposure) {
+  BenchOptions o = kByPulses;
+  o.feedback = 0b11;
+  Bench b({}, o);
+  const auto items = b.drive();
+  expect_right_pairs(b, items);
+  EXPECT_LE(worst_acquisition(items), 1);
+}
+
+TEST(Acquisition, theClocksOfADriveAreRecorded) {
+  Bench b({}, kByPulses);
+  (void)b.drive();
+  const AcquisitionCounters& c = b.source->counters();
+  for (const ClockRecord* clock : {&c.cameras[0], &c.cameras[1], &c.board, &c.ins}) {
+    EXPECT_GT(clock->stamps(), 100U);
+    EXPECT_LE(std::abs(clock->drift_ppm()), 60)
+        << "30 ppm at most, known to as much within eight seconds";
+    EXPECT_GT(clock->worst_error(), Duration{});
+    // The spread of the delays, and what a crystal may drift within the drive: tighter once the fit
+    // knows.
+    EXPECT_LE(clock->worst_error(), Duration::milliseconds(2) + Duration::microseconds(200) * 8);
+  }
+}
+
+TEST(Acquisition, stopEndsTheStreamAmidTheDrive) {
+  Bench b({});
+  ASSERT_FALSE(b.source->start());
+  Acquired item;
+  ASSERT_TRUE(b.source->next(&item));
+  b.source->stop();
+  int rest = 0;
+  while (b.source->next(&item)) ++rest;
+  EXPECT_LE(rest, 256 + 8) << "what was in the ring";
+  b.source->join();
+}
+
+}  // namespace
+}  // namespace vergence
