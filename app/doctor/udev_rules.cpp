@@ -50,7 +50,7 @@ std::string which(const char* attribute, std::uint16_t vendor, std::uint16_t pro
 
 const char* name_of(SerialKind kind) {
   if (kind == SerialKind::ins) return "ins";
-  return kind == SerialKind::board ? "board" : "serial";
+  return kind == SerialKind::board ? "trigger" : "serial";
 }
 
 std::string port_rules(const FoundPort& port) {

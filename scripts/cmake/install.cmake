@@ -7,7 +7,7 @@ set(packaging ${PROJECT_SOURCE_DIR}/packaging)
 install(TARGETS vergence RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR} COMPONENT program)
 if(VERGENCE_CHECKERBOARD)
   # OPTIONAL: a build of the target vergence alone has none.
-  install(PROGRAMS $<TARGET_FILE:vergence-checkerboard> DESTINATION ${CMAKE_INSTALL_LIBEXECDIR}/vergence COMPONENT checkerboard OPTIONAL)
+  install(TARGETS vergence-checkerboard RUNTIME DESTINATION ${CMAKE_INSTALL_LIBEXECDIR}/vergence COMPONENT checkerboard OPTIONAL)
 endif()
 file(GLOB configurations CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/app/config/*.yaml)
 install(FILES ${configurations} DESTINATION ${CMAKE_INSTALL_DATADIR}/vergence/config COMPONENT program)

@@ -3,7 +3,8 @@
 # Depends that scripts/cmake/packages.cmake writes down cover every library that is linked.
 #   package_test.sh BUILD
 set -euo pipefail
-build="$1"
+build="$(cd "$1" && pwd)"
+trap 'echo "package_test: line $LINENO failed"' ERR
 failures=0
 fail() {
   echo "$1"
@@ -34,7 +35,7 @@ for package in "$build"/packages/*.deb; do
   # dpkg-shlibdeps reads debian/control of the folder it stands in.
   mkdir -p "$root/debian"
   printf 'Source: vergence\n\nPackage: vergence\nArchitecture: any\n' >"$root/debian/control"
-  programs="$(find "$root/usr/bin" "$root/usr/libexec" -type f -exec sh -c 'head -c4 "$1" | grep -q ELF && echo "$1"' _ {} \; 2>/dev/null)"
+  programs="$(find "$root/usr/bin" "$root/usr/libexec" -type f -exec sh -c 'head -c4 "$1" | grep -q ELF && echo "$1"' _ {} \; 2>/dev/null || true)"
   # shellcheck disable=SC2086  # one word a program
   needed="$(cd "$root" && dpkg-shlibdeps -O $programs 2>/dev/null | sed 's/.*Depends=//' | tr ',' '\n' | sed 's/^ *//; s/ .*//' | sort)"
   declared="$(dpkg-deb -f "$package" Depends | tr ',' '\n' | sed 's/^ *//; s/ .*//' | sort)"
