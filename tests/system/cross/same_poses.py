@@ -57,8 +57,9 @@ def largest_differences(a, b):
     metres, radians = 0.0, 0.0
     for p, q in zip(a, b):
         metres = max(metres, math.dist(p[1:4], q[1:4]))
-        dot = min(1.0, abs(sum(x * y for x, y in zip(p[4:8], q[4:8]))))
-        radians = max(radians, 2 * math.acos(dot) if dot < 1 else 0.0)
+        # Of nearly equal quaternions, from their difference: a cosine of the printed digits would be all rounding.
+        sign = 1.0 if sum(x * y for x, y in zip(p[4:8], q[4:8])) >= 0 else -1.0
+        radians = max(radians, 2 * math.sqrt(sum((x - sign * y) ** 2 for x, y in zip(p[4:8], q[4:8]))))
     return metres * 1e3, radians * 1e3
 
 
