@@ -26,8 +26,8 @@ chmod 755 "$work/steps"
 
 # $1 of a hook is the folder of the new Debian.
 # shellcheck disable=SC2016
-setsid --wait mmdebstrap --variant=minbase --customize-hook="copy-in $work/vergence.deb $work/newer.deb $work/steps /root" \
-  --customize-hook='if chroot "$1" sh /root/steps; then echo passed; else echo failed; fi >"'"$work"'/verdict"; cat "$1/root/log"' \
+setsid --wait mmdebstrap --variant=minbase --customize-hook="copy-in $work/vergence.deb $work/newer.deb $work/steps /srv" \
+  --customize-hook='if chroot "$1" sh /srv/steps; then echo passed; else echo failed; fi >"'"$work"'/verdict"; cat "$1/srv/log"' \
   bookworm /dev/null >"$work/log" 2>&1 </dev/null || true
 grep -E '^(step|wrong|figure): ' "$work/log" || true
 case "$(cat "$work/verdict" 2>/dev/null)" in

@@ -1,7 +1,7 @@
 #!/bin/sh
-# Inside the fresh Debian, as root: /root/vergence.deb and /root/newer.deb. Says each step in /root/log.
+# Inside the fresh Debian, as root: /srv/vergence.deb and /srv/newer.deb. Says each step in /srv/log.
 set -eu
-exec >/root/log 2>&1
+exec >/srv/log 2>&1
 export DEBIAN_FRONTEND=noninteractive
 failures=0
 wrong() {
@@ -17,13 +17,13 @@ installed_kb() {
   dpkg-query -W -f '${db:Status-Status} ${Installed-Size}\n' | awk '$1 == "installed" { sum += $2 } END { print sum }'
 }
 traces() {
-  find / -xdev \( -path /proc -o -path /sys -o -path /root -o -path /var/cache -o -path /var/log -o -path /var/lib/dpkg -o -path /var/lib/apt \) \
+  find / -xdev \( -path /proc -o -path /sys -o -path /srv -o -path /var/cache -o -path /var/log -o -path /var/lib/dpkg -o -path /var/lib/apt \) \
     -prune -o -name '*vergence*' -print
 }
 
 echo "step: install"
 before="$(installed_kb)"
-apt-get install -y --no-install-recommends /root/vergence.deb
+apt-get install -y --no-install-recommends /srv/vergence.deb
 grown=$((($(installed_kb) - before) / 1000))
 echo "figure: the program with all it depends on takes $grown MB"
 [ "$grown" -le 60 ] || wrong "more than 60 MB are installed"
@@ -38,7 +38,7 @@ echo "step: upgrade"
 mkdir -p /etc/vergence
 cp /usr/share/vergence/config/mock.yaml /etc/vergence/rig.yaml
 echo kept >/var/lib/vergence/calibration_state.yaml
-apt-get install -y --no-install-recommends /root/newer.deb
+apt-get install -y --no-install-recommends /srv/newer.deb
 dpkg-query -W -f '${Version}' vergence | grep -q upgrade || wrong "not upgraded"
 kept "the upgrade"
 
@@ -54,7 +54,7 @@ left="$(traces)"
 if getent passwd vergence; then wrong "purging left the user"; fi
 
 echo "step: purge with a recorded drive"
-apt-get install -y --no-install-recommends /root/vergence.deb
+apt-get install -y --no-install-recommends /srv/vergence.deb
 mkdir /var/lib/vergence/sessions/drive
 echo precious >/var/lib/vergence/sessions/drive/poses.csv
 apt-get purge -y vergence

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <limits>
+#include <span>
+#include <string>
 #include <vector>
 
 #include "core/features/detail/align_kernel.hpp"
@@ -85,6 +87,33 @@ TEST(FeatureTargets, cornerScoresDifferByFourRoundings) {
         kept.push_back(score[static_cast<std::size_t>(y * kMaxBlock + x)]);
     spread.see(target, kept, 4 * kEpsilon * kLargest);
   });
+}
+
+/// Where a product and a sum are one instruction everywhere in a window, its bits do not depend on
+/// the target, nor on the machine: those of AVX2, AVX3 and NEON.
+TEST(FeatureTargets, windowsHaveTheSameBitsWhereProductsAreFused) {
+  const test::Image patch = test::white_noise(kPatchSide, kPatchSide + 4, 11);
+  const test::Image image = test::white_noise(64, 64, 13, 64);
+  const float turned[4] = {0.96F, -0.2F, 0.21F, 1.03F};
+  int fused = 0;
+  test::on_every_target([&](const char* target) {
+    const std::string name = target;
+    if (name != "NEON" && !name.starts_with("AVX")) return;
+    ++fused;
+    Window w;
+    make_window(patch.bytes.data(), 13.7F, 13.2F, turned, &w);
+    WindowSums sums{};
+    window_sums(w, image.bytes.data() + 20 * image.stride + 20, image.stride, 0.3F, 0.85F, &sums);
+    Fingerprint bits;
+    bits.add(std::span<const float>(w.value));
+    bits.add(std::span<const float>(w.steep_x));
+    bits.add(std::span<const float>(w.steep_y));
+    for (const float x : {w.variance_sum, w.hxx, w.hxy, w.hyy, sums.steep_x, sums.steep_y,
+                          sums.value, sums.sum, sums.square})
+      bits.add(x);
+    EXPECT_EQ(bits.value(), 0xad232a4b8e8150c5U) << target << std::hex << ": 0x" << bits.value();
+  });
+  if (fused == 0) GTEST_SKIP() << "this machine has none of them";
 }
 
 /// A place in the patch is rounded twice, at most kPatchSide px from its corner; between two pixels
