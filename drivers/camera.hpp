@@ -95,7 +95,7 @@ class CameraDevice {
   [[nodiscard]] virtual const DeviceInfo& info() const noexcept = 0;
   /// While not streaming and with every slot released, else `busy`. *actual (may be null): what the
   /// camera will do, rounded to what it can. → ok, unsupported, bad_configuration, busy, gone
-  [[nodiscard]] virtual DeviceStatus configure(const CameraConfiguration& wanted,
+  [[nodiscard]] virtual DeviceStatus configure(const CameraConfiguration& requested,
                                                CameraConfiguration* actual) noexcept = 0;
   /// From the start of an exposure to its arrival. Precondition: configured.
   [[nodiscard]] virtual DeviceTiming timing() const noexcept = 0;
@@ -128,7 +128,7 @@ class CameraDevice {
   }
   /// One sentence about the last call that was not `ok`: what was refused, what the camera offers,
   /// what to do. Empty: the status says it all. Owner's thread; may allocate.
-  [[nodiscard]] virtual std::string complaint() const { return {}; }
+  [[nodiscard]] virtual std::string last_error() const { return {}; }
   /// One sentence about what works, but not as well as it should (a buffer the system made
   /// smaller): what, and what to do. Empty: nothing. Owner's thread; may allocate.
   [[nodiscard]] virtual std::string remark() const { return {}; }
@@ -149,7 +149,7 @@ class CameraDriver {
                                                            DeviceStatus* status) = 0;
   /// One sentence about the last open() that gave nothing, or enumerate() that found nothing.
   /// Empty: the status says it all.
-  [[nodiscard]] virtual std::string complaint() const { return {}; }
+  [[nodiscard]] virtual std::string last_error() const { return {}; }
 };
 
 }  // namespace vergence

@@ -40,7 +40,7 @@ struct InsStatistics {
   std::uint64_t delivered = 0;
   std::uint64_t lost = 0;       // gaps in the device's count
   std::uint64_t malformed = 0;  // packets that made no sense
-  std::uint64_t restarts = 0;   // the device started anew, or its clock was set
+  std::uint64_t restarts = 0;   // the device restarted, or its clock was set
   std::uint64_t overruns = 0;   // readings that found the ring full (live); never silent
   std::uint64_t starts = 0;
 };
@@ -73,8 +73,8 @@ class InsDevice {
   virtual void stop() noexcept = 0;
   /// One sentence about the last call that was not `ok`: what was refused, what to do. Empty: the
   /// status says it all. Owner's thread; may allocate.
-  [[nodiscard]] virtual std::string complaint() const { return {}; }
-  /// One sentence about what works, but not as asked. Empty: nothing. As complaint().
+  [[nodiscard]] virtual std::string last_error() const { return {}; }
+  /// One sentence about what works, but not as asked. Empty: nothing. As last_error().
   [[nodiscard]] virtual std::string remark() const { return {}; }
   /// It lives in a virtual time of its own, beside the other devices: its next reading is there for
   /// the waiting, whatever they do.
@@ -90,7 +90,7 @@ class InsDriver {
   [[nodiscard]] virtual std::unique_ptr<InsDevice> open(std::string_view serial,
                                                         DeviceStatus* status) = 0;
   /// One sentence about the last open() that gave nothing. Empty: the status says it all.
-  [[nodiscard]] virtual std::string complaint() const { return {}; }
+  [[nodiscard]] virtual std::string last_error() const { return {}; }
 };
 
 }  // namespace vergence

@@ -51,7 +51,7 @@ struct TriggerConfiguration {
 struct TriggerStatistics {
   std::uint64_t pulses = 0;     // reported
   std::uint64_t lost = 0;       // pulses that went out and whose report never came
-  std::uint64_t reboots = 0;    // the board began anew
+  std::uint64_t reboots = 0;    // the board began again
   std::uint64_t malformed = 0;  // reports that made no sense
   std::uint64_t overruns = 0;   // reports that found the ring full
   std::uint64_t starts = 0;
@@ -66,7 +66,7 @@ class TriggerDevice {
 
   [[nodiscard]] virtual const DeviceInfo& info() const noexcept = 0;
   /// → ok, unsupported, bad_configuration, gone
-  [[nodiscard]] virtual DeviceStatus configure(const TriggerConfiguration& wanted,
+  [[nodiscard]] virtual DeviceStatus configure(const TriggerConfiguration& requested,
                                                TriggerConfiguration* actual) noexcept = 0;
   /// From the edge to the arrival of its report. Precondition: configured.
   [[nodiscard]] virtual DeviceTiming timing() const noexcept { return {}; }
@@ -84,7 +84,7 @@ class TriggerDevice {
   /// No pulse after it returns.
   virtual void stop() noexcept = 0;
   /// As those of InsDevice.
-  [[nodiscard]] virtual std::string complaint() const { return {}; }
+  [[nodiscard]] virtual std::string last_error() const { return {}; }
   [[nodiscard]] virtual std::string remark() const { return {}; }
   [[nodiscard]] virtual TriggerStatistics statistics() const noexcept = 0;
 };
@@ -96,8 +96,8 @@ class TriggerDriver {
   [[nodiscard]] virtual std::vector<DeviceInfo> enumerate() = 0;
   [[nodiscard]] virtual std::unique_ptr<TriggerDevice> open(std::string_view serial,
                                                             DeviceStatus* status) = 0;
-  /// As InsDriver::complaint().
-  [[nodiscard]] virtual std::string complaint() const { return {}; }
+  /// As InsDriver::last_error().
+  [[nodiscard]] virtual std::string last_error() const { return {}; }
 };
 
 }  // namespace vergence

@@ -46,8 +46,8 @@ class Calibrator {
   bool adjust();
   void conclude();
 
-  bool fail(std::string complaint) {
-    result_.complaint = std::move(complaint);
+  bool fail(std::string error) {
+    result_.error = std::move(error);
     return false;
   }
   /// Leaves out what is beyond `ratio` times the median; `rms` one a view in use. False: nothing
@@ -249,7 +249,7 @@ void Calibrator::conclude() {
   if (cameras_ == 1) return;
   rig.baseline = rig.T_camera_left[1].t.norm();
   if (const auto bad = find_implausible(&rig))
-    result_.complaint = "what comes out cannot be a rig: " + bad->sentence;
+    result_.error = "the result cannot be a rig: " + bad->sentence;
 }
 
 }  // namespace

@@ -43,7 +43,7 @@ struct BoardCalibration {
   /// moved. rad, m.
   std::array<std::array<double, 6>, kMaxCameras> between{};
   double length_between = 0;  // m, of |t| of camera 1
-  std::string complaint{};    // why this is no calibration; empty: it is one
+  std::string error{};        // why this is no calibration; empty: it is one
 };
 
 inline constexpr double kRefusedRatio = 3;  // of the median over the views
@@ -55,7 +55,7 @@ inline constexpr std::size_t kFewestViews =
 /// Every camera for itself (start_camera()), bad views refused, then everything together
 /// (solve_boards()). Of several cameras a view counts where camera 0 and another have it; the
 /// others are to be left out before.
-/// Errors  InputError: fewer than kFewestViews views of a camera. `complaint`: no convergence, a
+/// Errors  InputError: fewer than kFewestViews views of a camera. `error`: no convergence, a
 ///         result that cannot be a rig.
 [[nodiscard]] BoardCalibration calibrate_boards(const std::vector<BoardView>& views,
                                                 const BoardCalibrationOptions& options);

@@ -73,7 +73,7 @@ std::vector<fs::path> matching_files(const std::vector<std::string>& patterns,
     ::globfree(&found);
     if (status != 0)
       throw InputError(
-          fmt::format("{} \"{}\": no such files; a pattern stands in quotes, '{} \"left*.png\"'",
+          fmt::format("{} \"{}\": no such files; put a pattern in quotes, '{} \"left*.png\"'",
                       option, pattern.substr(0, 200), option));
   }
   std::vector<fs::path> sorted(files.begin(), files.end());

@@ -62,7 +62,8 @@ CalibrationFormat format_of_name(const std::string& out) {
   if (extension == ".yml") return CalibrationFormat::opencv;
   if (extension == ".yaml") return CalibrationFormat::vergence;
   throw InputError(
-      out + ": its name does not tell what it is to be; add --to vergence, kalibr, ros or opencv");
+      out +
+      ": its name does not say which format to write; add --to vergence, kalibr, ros or opencv");
 }
 
 std::vector<fs::path> files_written(const std::string& out, CalibrationFormat format) {

@@ -198,7 +198,7 @@ ExitCode calibrate_live(const CalibrateRequest& request, const Configuration& co
   const auto stopped = signals.stop_code();
   for (const int camera : source.missing())
     progress.say(
-        fmt::format("vergence: camera {} did not come back; look at its cable and power", camera));
+        fmt::format("vergence: camera {} did not come back; check its cable and power", camera));
   if (collection.views().size() < kFewestViews) {
     progress.say(fmt::format(
         "vergence: no calibration: {} views of the board were taken, {} are the least; is it {}x{} "

@@ -57,8 +57,8 @@ ExitCode conclude_calibration(const CalibrateRequest& request, const CalibratedR
   options.model = request.model;
   options.sixth_order = request.sixth_order;
   const BoardCalibration found = calibrate_boards(views, options);
-  if (!found.complaint.empty()) {
-    progress->say("vergence: no calibration: " + found.complaint);
+  if (!found.error.empty()) {
+    progress->say("vergence: no calibration: " + found.error);
     return ExitCode::not_usable;
   }
   CalibrationFile file;

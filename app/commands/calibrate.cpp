@@ -28,21 +28,21 @@ ExitCode calibrate_from_drive(const CalibrateOptions& a) {
   const std::array cameras{c.kitti_raw.left, c.kitti_raw.right};
   const StereoSequence sequence =
       a.calibration ? open_sequence(format, a.drive,
-                                    calibration_source(*a.calibration, use, &remarks), use, cameras)
+                                    given_calibration(*a.calibration, use, &remarks), use, cameras)
                     : open_sequence(format, a.drive, std::nullopt, use, cameras);
   for (const std::string& sentence : remarks) std::cerr << "vergence: " << sentence << '\n';
   check_image_sizes(sequence, 0, sequence.pairs.size());
-  const StartingCalibration told = replayed_calibration(c, sequence, true);
+  const StartingCalibration given = replayed_calibration(c, sequence, true);
   Progress progress = Progress::on_stderr(a.common.quiet);
   for (const std::string& sentence : sequence.remarks) progress.say("vergence: " + sentence);
   const DriveCalibration found =
-      calibrate_with_progress({sequence, c, 0, sequence.pairs.size(), {}, {}}, told, &progress);
+      calibrate_with_progress({sequence, c, 0, sequence.pairs.size(), {}, {}}, given, &progress);
   if (!found.rig) {
     progress.say(fmt::format("vergence: {}: no calibration was found, nothing is written: {}",
                              a.drive, found.why));
     return ExitCode::not_usable;
   }
-  CalibrationFile written = told.file;
+  CalibrationFile written = given.file;
   written.rig = *found.rig;
   written.source = "drive";
   write_calibration(a.out, written);

@@ -70,7 +70,7 @@ CLI::App* CalibrateOptions::declare(CLI::App& root) {
       ->type_name("WORD");
   command
       ->add_option("--to", to,
-                   "--convert: what OUT is to be, where its name does not tell: vergence, kalibr, "
+                   "--convert: format of OUT, where its name does not say: vergence, kalibr, "
                    "ros, opencv")
       ->type_name("WORD");
   command->add_flag("--force", force, "Overwrite a file that is there already");

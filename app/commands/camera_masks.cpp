@@ -52,45 +52,47 @@ bool read_pgm_head(Bytes b, PgmHead* head) noexcept {
   return at < b.size() && std::isspace(b[at]) != 0;
 }
 
-ImageFileStatus read_pgm(Bytes b, ImageSize wanted, ImageSize* size, std::uint8_t* out) noexcept {
+ImageFileStatus read_pgm(Bytes b, ImageSize requested, ImageSize* size,
+                         std::uint8_t* out) noexcept {
   PgmHead head;
   if (!read_pgm_head(b, &head) || head.white > 255) return ImageFileStatus::not_an_image;
   *size = {head.width, head.height};
-  if (*size != wanted) return ImageFileStatus::wrong_size;
+  if (*size != requested) return ImageFileStatus::wrong_size;
   const auto n = static_cast<std::size_t>(head.width) * static_cast<std::size_t>(head.height);
   if (b.size() - head.pixels < n) return ImageFileStatus::torn;
   std::copy_n(b.begin() + static_cast<std::ptrdiff_t>(head.pixels), n, out);
   return ImageFileStatus::ok;
 }
 
-ImageFileStatus read_png(Bytes b, ImageSize wanted, ImageSize* size, std::uint8_t* out) noexcept {
+ImageFileStatus read_png(Bytes b, ImageSize requested, ImageSize* size,
+                         std::uint8_t* out) noexcept {
   constexpr std::array<std::uint8_t, 4> kPng{0x89, 'P', 'N', 'G'};
   // A JPEG's zeros are not zero: its compression leaves ripples about every edge.
   if (b.size() < kPng.size() || !std::equal(kPng.begin(), kPng.end(), b.begin()))
     return ImageFileStatus::not_an_image;
   const ImageFileStatus status = check_image(b, size);
   if (status != ImageFileStatus::ok) return status;
-  return decode_grey(b, wanted, out, static_cast<std::size_t>(wanted.width));
+  return decode_grey(b, requested, out, static_cast<std::size_t>(requested.width));
 }
 
 std::vector<std::uint8_t> read_mask(const std::string& key, const std::filesystem::path& file,
-                                    ImageSize wanted) {
+                                    ImageSize requested) {
   const auto fail = [&](const std::string& what) {
     throw InputError(fmt::format("{}: {} {}", key, file.string(), what));
   };
   std::vector<std::uint8_t> bytes;
-  std::vector<std::uint8_t> pixels(static_cast<std::size_t>(wanted.width) *
-                                   static_cast<std::size_t>(wanted.height));
+  std::vector<std::uint8_t> pixels(static_cast<std::size_t>(requested.width) *
+                                   static_cast<std::size_t>(requested.height));
   ImageSize size;
   ImageFileStatus status = read_image_file(file, &bytes);
   if (status == ImageFileStatus::ok)
-    status = is_pgm(bytes) ? read_pgm(bytes, wanted, &size, pixels.data())
-                           : read_png(bytes, wanted, &size, pixels.data());
+    status = is_pgm(bytes) ? read_pgm(bytes, requested, &size, pixels.data())
+                           : read_png(bytes, requested, &size, pixels.data());
   if (status == ImageFileStatus::not_an_image)
     fail("is no mask; a PNG or a binary PGM is, 0 where nothing is to be looked for");
   if (status == ImageFileStatus::wrong_size)
     fail(fmt::format("is {} × {} px, the camera's images are {} × {}; draw it on one of them",
-                     size.width, size.height, wanted.width, wanted.height));
+                     size.width, size.height, requested.width, requested.height));
   if (status != ImageFileStatus::ok) fail(to_phrase(status));
   if (std::all_of(pixels.begin(), pixels.end(), [](std::uint8_t v) { return v == 0; }))
     fail("is 0 everywhere: nothing of the image is left; 0 hides, any other value shows");

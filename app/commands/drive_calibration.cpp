@@ -29,11 +29,11 @@ constexpr int kObservations = 240'000;  // of a solve that nobody waits for
 constexpr std::size_t kAloneFrames =
     40;  // of a stretch by itself, at most about: short drives, too, are to have two
 
-calibration::GateQuestion question_of(const calibration::RigSolution& s,
-                                      const StartingCalibration& told, const Configuration& c) {
-  calibration::GateQuestion q;
+calibration::AcceptanceInput question_of(const calibration::RigSolution& s,
+                                         const StartingCalibration& given, const Configuration& c) {
+  calibration::AcceptanceInput q;
   q.solution = &s;
-  q.nominal = &told.nominal;
+  q.nominal = &given.nominal;
   q.lenses = true;
   q.pixel_sigma = c.odometry.pixel_sigma;
   q.must_be_better = false;
@@ -87,7 +87,7 @@ std::optional<RigCalibration> drive_once(const DrivePass& pass, const StartingCa
   return estimator.calibration();
 }
 
-DriveCalibration calibrate_drive(const DrivePass& drive, const StartingCalibration& told) {
+DriveCalibration calibrate_drive(const DrivePass& drive, const StartingCalibration& given) {
   using calibration::Stretches;
   DriveCalibration result;
   Configuration c = drive.configuration;
@@ -96,7 +96,7 @@ DriveCalibration calibrate_drive(const DrivePass& drive, const StartingCalibrati
   c.calibration.max_observations = std::max(c.calibration.max_observations, kObservations);
   c.online = 1;
   const DrivePass pass{drive.sequence, c, drive.start, drive.count, drive.stopped, drive.progress};
-  StartingCalibration blank = told;
+  StartingCalibration blank = given;
   apply_use({.length_only = true}, &blank.file.rig);
   blank.trust = CalibrationTrust::none;
   std::uint64_t newest = 0;
@@ -112,13 +112,13 @@ DriveCalibration calibrate_drive(const DrivePass& drive, const StartingCalibrati
         "says";
     return result;
   }
-  StartingCalibration found = told;
+  StartingCalibration found = given;
   found.file.rig = *first;
   found.trust = CalibrationTrust::given;
 
   const auto features = static_cast<std::size_t>(c.odometry.features);
   Arena arena(arena_size(
-      2 * Stretches::memory_needed(c.calibration, c.monitor, told.file.rig.cameras, features)));
+      2 * Stretches::memory_needed(c.calibration, c.monitor, given.file.rig.cameras, features)));
   Stretches joined(
       Stretches::Kind::joined, blank.file.rig, *first,
       stretch_length(result.frames, static_cast<std::size_t>(c.calibration.max_frames)),
@@ -129,7 +129,8 @@ DriveCalibration calibrate_drive(const DrivePass& drive, const StartingCalibrati
   std::optional<calibration::RigSolution> last;
   const auto keep = [&](const std::optional<calibration::RigSolution>& s) {
     if (!s) return;
-    const calibration::Gate gate = calibration::ask_gates(question_of(*s, told, c), c.calibration);
+    const calibration::Gate gate =
+        calibration::check_acceptance(question_of(*s, given, c), c.calibration);
     if (gate == calibration::Gate::open)
       last = s;
     else
@@ -167,7 +168,7 @@ DriveCalibration calibrate_drive(const DrivePass& drive, const StartingCalibrati
   return result;
 }
 
-DriveCalibration calibrate_with_progress(const DrivePass& pass, const StartingCalibration& told,
+DriveCalibration calibrate_with_progress(const DrivePass& pass, const StartingCalibration& given,
                                          Progress* progress) {
   constexpr std::size_t kPasses = 2;
   const SignalGuard signals;
@@ -183,7 +184,7 @@ DriveCalibration calibrate_with_progress(const DrivePass& pass, const StartingCa
     state.frames = kPasses * pass.count;
     progress->update(state);
   };
-  DriveCalibration found = calibrate_drive(watched, told);
+  DriveCalibration found = calibrate_drive(watched, given);
   progress->finish();
   return found;
 }

@@ -47,11 +47,11 @@ struct DrivePass {
 /// (METHOD §6.5). `told`: the drive's own calibration; of it lenses, sigmas and the baseline's
 /// length are read.
 [[nodiscard]] DriveCalibration calibrate_drive(const DrivePass& pass,
-                                               const StartingCalibration& told);
+                                               const StartingCalibration& given);
 
 /// The same with a progress line, and stopped by signals.
 [[nodiscard]] DriveCalibration calibrate_with_progress(const DrivePass& pass,
-                                                       const StartingCalibration& told,
+                                                       const StartingCalibration& given,
                                                        Progress* progress);
 
 /// What was found as lines for the terminal: each parameter with its sigma, the depth error, how

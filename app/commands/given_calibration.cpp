@@ -49,8 +49,8 @@ CalibrationFile read_given_calibration(const std::string& in, const CalibrationU
   return is_foreign(in) ? read_any_calibration(in, size, remarks) : read_calibration(in, use);
 }
 
-CalibrationSource calibration_source(const std::string& in, const CalibrationUse& use,
-                                     std::vector<std::string>* remarks) {
+GivenCalibration given_calibration(const std::string& in, const CalibrationUse& use,
+                                   std::vector<std::string>* remarks) {
   return {in, [in, use, remarks](const StereoSequence& sequence) {
             // The images are only looked at for a file that may lack their size.
             const std::optional<ImageSize> size =
@@ -59,7 +59,7 @@ CalibrationSource calibration_source(const std::string& in, const CalibrationUse
           }};
 }
 
-CalibrationSource calibration_source(const KnownNumbers& known) {
+GivenCalibration given_calibration(const KnownNumbers& known) {
   return {"--focal", [known](const StereoSequence& sequence) {
             const ImageSize size = first_image_size(sequence, 0);
             CalibrationFile file;

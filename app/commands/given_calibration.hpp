@@ -34,8 +34,8 @@ struct KnownNumbers {
                                                      std::vector<std::string>* remarks);
 
 /// For open_sequence().
-[[nodiscard]] CalibrationSource calibration_source(const std::string& in, const CalibrationUse& use,
-                                                   std::vector<std::string>* remarks);
-[[nodiscard]] CalibrationSource calibration_source(const KnownNumbers& known);
+[[nodiscard]] GivenCalibration given_calibration(const std::string& in, const CalibrationUse& use,
+                                                 std::vector<std::string>* remarks);
+[[nodiscard]] GivenCalibration given_calibration(const KnownNumbers& known);
 
 }  // namespace vergence::app

@@ -8,7 +8,7 @@
 namespace vergence::app {
 
 InsComparison::InsComparison(const ComparisonOptions& options, Source source, Arena& arena,
-                             DriveJournal& journal)
+                             EventLog& journal)
     : T_ins_left_(options.T_ins_left),
       scale_stretch_m_(options.scale_stretch_m),
       source_(source),
@@ -163,13 +163,15 @@ void InsComparison::note_scale(const ComparedPose& pose) noexcept {
   scale_disagrees_ = pose.scale_disagrees;
   std::array<char, 200> text{};
   if (scale_disagrees_)
-    (void)std::snprintf(text.data(), text.size(),
-                        "the way comes out %.1f %% %s than the INS's over %.0f m: images cannot "
-                        "tell, measure the baseline again",
-                        100 * std::abs(pose.path_ratio - 1),
-                        pose.path_ratio > 1 ? "longer" : "shorter", scale_stretch_m_);
+    (void)std::snprintf(
+        text.data(), text.size(),
+        "the distance travelled comes out %.1f %% %s than the INS's over %.0f m: images cannot "
+        "tell, measure the baseline again",
+        100 * std::abs(pose.path_ratio - 1), pose.path_ratio > 1 ? "longer" : "shorter",
+        scale_stretch_m_);
   else
-    (void)std::snprintf(text.data(), text.size(), "the way is as long as the INS's again");
+    (void)std::snprintf(text.data(), text.size(),
+                        "the distance travelled agrees with the INS again");
   journal_.tell(pose.pose.stamp, scale_disagrees_ ? "scale_disagrees" : "scale_agrees", text.data(),
                 scale_disagrees_);
 }

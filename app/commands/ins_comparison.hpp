@@ -6,7 +6,7 @@
 #include <utility>
 #include <vector>
 
-#include "app/commands/drive_journal.hpp"
+#include "app/commands/event_log.hpp"
 #include "app/recorder/earth_figures.hpp"
 #include "app/recorder/recorder.hpp"
 #include "core/comparison/comparison.hpp"
@@ -27,8 +27,7 @@ class InsComparison {
   enum class Source : std::uint8_t { none, device, recording };
 
   /// Without a source poses go through and nothing is said. `journal` outlives it.
-  InsComparison(const ComparisonOptions& options, Source source, Arena& arena,
-                DriveJournal& journal);
+  InsComparison(const ComparisonOptions& options, Source source, Arena& arena, EventLog& journal);
 
   /// Before the first add(). `recorder` outlives the last one; with a source it takes readings
   /// (Recorder::Options::ins).
@@ -58,7 +57,7 @@ class InsComparison {
   const double scale_stretch_m_;
   const Source source_;
   Comparison comparison_;
-  DriveJournal& journal_;
+  EventLog& journal_;
   Recorder* recorder_ = nullptr;
   std::array<float, Comparison::kPending> decode_ms_{};  // of the poses that wait, by their count
   std::uint64_t added_ = 0, drained_ = 0;

@@ -128,9 +128,9 @@ MockDrive make_mock_drive(const Configuration& c, const std::vector<std::string>
   for (int k = 0; k < rig.cameras; ++k) {
     const CameraSettings& camera = c.cameras[static_cast<std::size_t>(k)];
     const ExposureSetting start = starting_exposure(c, static_cast<std::size_t>(k));
-    const CameraConfiguration wanted{camera.width,   camera.height, c.trigger.rate,
-                                     start.exposure, start.gain_db, CameraTrigger::hardware};
-    configured(drive.rig->camera(k).configure(wanted, nullptr), fmt::format("cameras.{}", k));
+    const CameraConfiguration requested{camera.width,   camera.height, c.trigger.rate,
+                                        start.exposure, start.gain_db, CameraTrigger::hardware};
+    configured(drive.rig->camera(k).configure(requested, nullptr), fmt::format("cameras.{}", k));
   }
   configured(drive.rig->trigger().configure(trigger_configuration(c, rig.cameras), nullptr),
              "trigger");

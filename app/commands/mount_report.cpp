@@ -164,7 +164,7 @@ std::string mount_text(const FoundMount& found) {
   out += row("lever arm along x", m.lever_arm[0], 1, "m");
   out += row("lever arm along y", m.lever_arm[1], 1, "m");
   out += row("lever arm along z", m.lever_arm[2], 1, "m");
-  out += row("reference's stamps are late by", m.clock_offset, 1e3, "ms (told, not applied)");
+  out += row("reference's stamps are late by", m.clock_offset, 1e3, "ms (reported, not applied)");
   if (const auto b = boresight_deg(found))
     out +=
         fmt::format("  as the configuration has it: ins.boresight_deg: [{:.2f}, {:.2f}, {:.2f}]\n",

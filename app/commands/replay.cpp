@@ -67,7 +67,7 @@ std::optional<KnownNumbers> known_numbers(const Arguments& a) {
   }
   if (a.calibration)
     throw InputError(
-        "--focal stands for a calibration that nobody has; leave it or --calibration away");
+        "--focal is for rigs without a calibration; give it or --calibration, not both");
   if (!a.baseline)
     throw InputError(
         "--focal needs --baseline, the distance of the two cameras in metres, which images cannot "
@@ -138,7 +138,7 @@ void add_replay(CLI::App& root, ExitCode* exit_code) {
       ->type_name("FILE");
   command
       ->add_option("--left-topic", a->topics.left,
-                   "Of a bag: topic of the left images, where names do not tell")
+                   "Of a bag: topic of the left images, where names do not say")
       ->type_name("TOPIC");
   command->add_option("--right-topic", a->topics.right, "Of a bag: topic of the right images")
       ->type_name("TOPIC");
@@ -153,7 +153,7 @@ void add_replay(CLI::App& root, ExitCode* exit_code) {
                    "Focal length in pixels, for images without any calibration: with --baseline, "
                    "both cameras alike; the rest is found "
                    "from the whole drive first, "
-                   "or with --from-scratch on the way, and written")
+                   "or with --from-scratch during the drive, and written")
       ->type_name("PX");
   command
       ->add_option("--distortion", a->distortion,

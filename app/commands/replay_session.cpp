@@ -18,7 +18,7 @@
 
 #include "app/commands/camera_masks.hpp"
 #include "app/commands/drive_calibration.hpp"
-#include "app/commands/drive_journal.hpp"
+#include "app/commands/event_log.hpp"
 #include "app/commands/ins_comparison.hpp"
 #include "app/commands/replayed_ins.hpp"
 #include "app/commands/session_files.hpp"
@@ -76,7 +76,7 @@ class Replay {
   std::unique_ptr<FrameDecoder> decoder_;
 
   // Of the estimator's thread; read by others after it has joined.
-  DriveJournal journal_;
+  EventLog journal_;
   std::unique_ptr<InsComparison> comparison_;  // null: no INS was recorded
   std::size_t next_reading_ = 0;
   std::uint64_t skipped_ = 0;
@@ -213,7 +213,7 @@ std::vector<std::pair<std::string, std::size_t>> Replay::memory() const {
           {"comparison_bytes",
            comparison_arena_.capacity() + ins_.readings.capacity() * sizeof(RecordedReading)},
           {"images_bytes", frames_arena_.capacity()},
-          {"rings_bytes", sizeof(Recorder) + sizeof(FrameDecoder) + sizeof(DriveJournal)}};
+          {"rings_bytes", sizeof(Recorder) + sizeof(FrameDecoder) + sizeof(EventLog)}};
 }
 
 void Replay::tell(const SessionTotals& totals, const SummaryInput& input,
@@ -302,7 +302,7 @@ ExitCode Replay::run() {
   for (const std::string& sentence : write_other_formats(
            request_.out, request_.also, *totals, input.earth.value_or(EarthFigures{}), &faults))
     progress.say("vergence: " + sentence);
-  for (const std::string& sentence : recorder_->take_complaints())
+  for (const std::string& sentence : recorder_->take_errors())
     progress.say("vergence: " + sentence);
   for (const std::string& sentence : faults) progress.say("vergence: " + sentence);
   if (!request_.quiet) tell(*totals, input, &progress);
@@ -353,11 +353,11 @@ StereoSequence open_drive(const ReplayRequest& request) {
   std::vector<std::string> remarks;
   StereoSequence sequence;
   if (request.known)
-    sequence = open_sequence(request.format, request.data, calibration_source(*request.known), use,
+    sequence = open_sequence(request.format, request.data, given_calibration(*request.known), use,
                              cameras, request.topics);
   else if (request.calibration)
     sequence = open_sequence(request.format, request.data,
-                             calibration_source(*request.calibration, use, &remarks), use, cameras,
+                             given_calibration(*request.calibration, use, &remarks), use, cameras,
                              request.topics);
   else
     sequence =

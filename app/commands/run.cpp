@@ -68,7 +68,7 @@ void add_run(CLI::App& root, ExitCode* exit_code) {
       ->add_option("--calibration", a->calibration,
                    "calibration.yaml, or a file of Kalibr, ROS or OpenCV, to begin with, instead "
                    "of the state file's and the "
-                   "configuration's; SIGUSR1 asks for a new one on the way")
+                   "configuration's; SIGUSR1 asks for a new one during the drive")
       ->type_name("FILE");
   declare_also(*command, &a->also);
   command->add_flag("--memory", a->memory, "Print what memory is held, by whom");

@@ -21,12 +21,12 @@
 
 #include "app/commands/camera_masks.hpp"
 #include "app/commands/drive_devices.hpp"
-#include "app/commands/drive_journal.hpp"
 #include "app/commands/drive_sync.hpp"
-#include "app/commands/drive_time.hpp"
+#include "app/commands/event_log.hpp"
 #include "app/commands/exposure_settings.hpp"
 #include "app/commands/ins_comparison.hpp"
 #include "app/commands/session_files.hpp"
+#include "app/commands/timing_monitor.hpp"
 #include "app/datasets/decimal.hpp"
 #include "app/recorder/line_file.hpp"
 #include "app/recorder/recorder.hpp"
@@ -68,7 +68,7 @@ class Drive {
   void begin();
   void estimate() noexcept;
   void handle_images(const LiveItem& item) noexcept;
-  void tell(Stamp stamp, const DriveTime::Sentence& sentence) noexcept;
+  void tell(Stamp stamp, const TimingMonitor::Sentence& sentence) noexcept;
   void note_faults(Stamp stamp) noexcept;
   void watch(Progress* progress);
   void write_truth(std::vector<std::string>* faults) const;
@@ -94,7 +94,7 @@ class Drive {
   std::unique_ptr<PairRunner> runner_;
   BackgroundThread solver_;
   std::unique_ptr<Estimator> estimator_;
-  DriveJournal journal_;  // of the estimator's thread, as all after recorder_
+  EventLog journal_;  // of the estimator's thread, as all after recorder_
   std::unique_ptr<InsComparison> comparison_;
   std::unique_ptr<ExposureControl> exposure_;  // null: exposures are fixed
   std::unique_ptr<LiveSource> source_;
@@ -103,7 +103,7 @@ class Drive {
   std::vector<StampedPose> truth_;
 
   // Of the estimator's thread; read by others after it has joined.
-  DriveTime time_;
+  TimingMonitor time_;
   std::vector<bool> fault_told_;
 
   std::atomic<bool> calibration_asked_{false};  // by the caller's thread, for the estimator's
@@ -154,7 +154,6 @@ Drive::Drive(const RunRequest& request)
 }
 
 // ---- the estimator's thread
-// ---------------------------------------------------------------------------------------
 
 void Drive::estimate() noexcept {
   (void)pthread_setname_np(pthread_self(), "vergence-estim");
@@ -183,7 +182,7 @@ void Drive::estimate() noexcept {
   changed_.notify_one();
 }
 
-void Drive::tell(Stamp stamp, const DriveTime::Sentence& sentence) noexcept {
+void Drive::tell(Stamp stamp, const TimingMonitor::Sentence& sentence) noexcept {
   if (sentence.kind != nullptr)
     journal_.tell(stamp, sentence.kind, sentence.text.data(), sentence.aloud);
 }
@@ -235,7 +234,6 @@ void Drive::note_faults(Stamp stamp) noexcept {
 }
 
 // ---- the caller's thread
-// ------------------------------------------------------------------------------------------
 
 void Drive::watch(Progress* progress) {
   constexpr std::chrono::milliseconds kLook{50};
@@ -466,7 +464,7 @@ ExitCode Drive::run() {
   for (const std::string& sentence : write_other_formats(
            request_.out, request_.also, *totals, input.earth.value_or(EarthFigures{}), &faults))
     progress.say("vergence: " + sentence);
-  for (const std::string& sentence : recorder_->take_complaints())
+  for (const std::string& sentence : recorder_->take_errors())
     progress.say("vergence: " + sentence);
   for (const std::string& sentence : faults) progress.say("vergence: " + sentence);
   if (!request_.quiet) tell(*totals, input, &progress);

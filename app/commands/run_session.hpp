@@ -15,7 +15,7 @@ namespace vergence::app {
 struct RunRequest {
   std::filesystem::path out;
   Configuration configuration;
-  CalibrationWish calibration{};     // --from-scratch, --calibration
+  CalibrationSource calibration{};   // --from-scratch, --calibration
   std::vector<std::string> faults;   // of the command line, beside the configuration's
   std::optional<double> duration_s;  // all of the drive when not set
   bool fast = false;                 // virtual time: nothing is dropped for time

@@ -47,7 +47,7 @@ class SimulatedBoard final : public TriggerDevice {
     rig_->end_feed();
     rig_->trigger().stop();
   }
-  std::string complaint() const override { return board_->complaint(); }
+  std::string last_error() const override { return board_->last_error(); }
   std::string remark() const override { return board_->remark(); }
   TriggerStatistics statistics() const noexcept override { return board_->statistics(); }
 
@@ -102,7 +102,7 @@ mock::SimulatedLineOptions line_of(const Configuration& c, const mock::MockRig& 
   return o;
 }
 
-/// The simulated board pulses on while its line is away and starts anew with it: what one without a
+/// The simulated board pulses on while its line is away and restarts with it: what one without a
 /// supply would not do meanwhile.
 bool is_off(const mock::MockRig& rig, HostStamp at) noexcept {
   const auto& faults = rig.truth().faults();
@@ -133,13 +133,13 @@ std::unique_ptr<TriggerDevice> make_simulated_board(const Configuration& c, mock
       cameras_of(rig, rig->start() + length_of(c, *rig)), board_of(c, *rig));
   trigger_board::Options options = trigger_board_options(c.trigger);
   DeviceStatus status = DeviceStatus::ok;
-  std::string complaint;
+  std::string error;
   auto board = trigger_board::open_on(
       std::make_unique<mock::SimulatedPlace>(std::move(simulator), line_of(c, *rig)), options,
-      &status, &complaint);
-  if (board == nullptr) throw InputError("trigger: " + complaint);
+      &status, &error);
+  if (board == nullptr) throw InputError("trigger: " + error);
   if (board->configure(trigger_configuration(c, rig->cameras()), nullptr) != DeviceStatus::ok)
-    throw InputError(board_title(board->info()) + ": " + board->complaint());
+    throw InputError(board_title(board->info()) + ": " + board->last_error());
   if (const std::string remark = board->remark(); !remark.empty())
     remarks->push_back(board_title(board->info()) + ": " + remark);
   *driver = board.get();

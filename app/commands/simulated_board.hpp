@@ -16,7 +16,7 @@ namespace vergence::app {
 ///
 /// Virtual time only, one of its own: LiveSource::Options::board_keeps_own_time. It begins a little
 /// before the drive; pulses that are made before find nobody armed. The fault `board_gone` unplugs
-/// the line (`powered=0` switches the board off with it), `board_reboot` starts the board anew; how
+/// the line (`powered=0` switches the board off with it), `board_reboot` restarts the board; how
 /// long it is away is then up to the board and the driver. What asks for a pause gets it at a pulse
 /// that differs from run to run: with `trigger.vary_us` nobody asks.
 /// Ownership  The rig (with MockRigOptions::fed) outlives the device. *driver is the real driver

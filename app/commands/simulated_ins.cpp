@@ -71,13 +71,13 @@ std::unique_ptr<InsDevice> make_simulated_ins(const Configuration& c, const mock
   options.baud = static_cast<std::uint32_t>(c.ins.baud);
   options.processing = sensor.processing;
   DeviceStatus status = DeviceStatus::ok;
-  std::string complaint;
+  std::string error;
   auto device =
       xsens::open_on(std::make_unique<mock::SimulatedPlace>(std::move(simulator), line_of(c, rig)),
-                     options, &status, &complaint);
-  if (device == nullptr) throw InputError("ins: " + complaint);
+                     options, &status, &error);
+  if (device == nullptr) throw InputError("ins: " + error);
   if (device->configure(c.ins.rate, nullptr) != DeviceStatus::ok)
-    throw InputError(ins_title(device->info()) + ": " + device->complaint());
+    throw InputError(ins_title(device->info()) + ": " + device->last_error());
   if (const std::string remark = device->remark(); !remark.empty())
     remarks->push_back(ins_title(device->info()) + ": " + remark);
   return device;

@@ -84,7 +84,7 @@ RigCalibration nominal_geometry(const RigCalibration& given, const RigCalibratio
   return nominal;
 }
 
-StartingCalibration starting_calibration(const Configuration& c, const CalibrationWish& wish,
+StartingCalibration starting_calibration(const Configuration& c, const CalibrationSource& source,
                                          const std::vector<std::string>& serials) {
   StartingCalibration start;
   CalibrationFile configured;
@@ -96,15 +96,15 @@ StartingCalibration starting_calibration(const Configuration& c, const Calibrati
   start.state = state_file(c.rig);
 
   const bool from_scratch =
-      wish.from_scratch || (!wish.file && !placed_by_configuration(c, configured.rig.cameras));
-  if (wish.file) {
+      source.from_scratch || (!source.file && !placed_by_configuration(c, configured.rig.cameras));
+  if (source.file) {
     const ImageSize size{configured.rig.intrinsics[0].width, configured.rig.intrinsics[0].height};
-    start.file = read_given_calibration(wish.file->string(), {.length_only = wish.from_scratch},
+    start.file = read_given_calibration(source.file->string(), {.length_only = source.from_scratch},
                                         size, &start.remarks);
-    check_same_rig(wish.file->string(), start.file, configured, &start.remarks);
+    check_same_rig(source.file->string(), start.file, configured, &start.remarks);
     name_cameras(c, serials, &start.file);
-    start.source = wish.file->filename().string();
-  } else if (!wish.from_scratch && start.state) {
+    start.source = source.file->filename().string();
+  } else if (!source.from_scratch && start.state) {
     CalibrationState state = read_state(*start.state, configured);
     if (!state.sentence.empty()) start.remarks.push_back(std::move(state.sentence));
     if (state.calibration) {

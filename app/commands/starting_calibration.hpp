@@ -15,7 +15,7 @@
 namespace vergence::app {
 
 /// What the command line says about it.
-struct CalibrationWish {
+struct CalibrationSource {
   bool from_scratch = false;
   std::optional<std::filesystem::path>
       file{};  // --calibration; with from_scratch its intrinsics and its length only
@@ -37,7 +37,7 @@ struct StartingCalibration {
 /// cameras are real and neither a file nor the configuration says where they sit. Errors
 /// InputError: a file that is damaged or of another rig. A state file that is not used is a remark.
 [[nodiscard]] StartingCalibration starting_calibration(const Configuration& configuration,
-                                                       const CalibrationWish& wish,
+                                                       const CalibrationSource& source,
                                                        const std::vector<std::string>& serials);
 
 /// Of a replay; the sequence was opened with the same from_scratch. State files are neither read

@@ -57,10 +57,10 @@ std::unique_ptr<trigger_board::Device> open_trigger_board(const TriggerSettings&
   trigger_board::Driver driver(trigger_board_options(settings));
   DeviceStatus status = DeviceStatus::ok;
   std::unique_ptr<trigger_board::Device> board = driver.open_board(settings.port, &status);
-  if (board == nullptr) throw InputError(refusal(settings, driver.complaint(), status));
+  if (board == nullptr) throw InputError(refusal(settings, driver.last_error(), status));
   status = board->configure(pulses, nullptr);
   if (status != DeviceStatus::ok) {
-    const std::string said = board->complaint();
+    const std::string said = board->last_error();
     throw InputError(fmt::format(
         "{}: {}", board_title(board->info()),
         said.empty() ? fmt::format("cannot do what is asked: {}", to_string(status)) : said));

@@ -7,7 +7,7 @@
 
 /// The group `covariance` of calibration.yaml: what of a rig's parameters trades against what.
 /// `parameters` names the rows by camera and number (`right.rx`, `left.k1`), `upper` has the upper
-/// triangle row by row. Cameras go by their names, or by their index where names do not tell them
+/// triangle row by row. Cameras go by their names, or by their index where names do not say them
 /// apart. Rotation in rad, translation in m, as left perturbations; lenses in px and without unit.
 namespace vergence::app {
 

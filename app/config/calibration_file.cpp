@@ -238,7 +238,7 @@ CalibrationFile read_file(const YamlFile& file, const CalibrationUse& use) {
   if (top.has("found")) read_found(file, top.need("found"), &calibration);
   if (use.length_only && !(use.baseline > 0) && !(rig.baseline > 0))
     file.fail(file.root(),
-              "tells no length of the baseline (rig.baseline), which images alone cannot; give it "
+              "gives no baseline length (rig.baseline), which images alone cannot; give it "
               "with --baseline M");
   apply_use(use, &rig);
   if (const auto bad = find_implausible(&rig))

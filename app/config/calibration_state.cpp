@@ -14,7 +14,7 @@ namespace vergence::app {
 namespace {
 
 constexpr const char* kFileName = "calibration_state.yaml";
-constexpr double kSameLength = 1e-3;  // relative: beyond, somebody has measured the baseline anew
+constexpr double kSameLength = 1e-3;  // relative: beyond, somebody has measured the baseline again
 
 std::string folder_name(const std::string& rig_name) {
   std::string name = rig_name.empty() ? "rig" : rig_name;

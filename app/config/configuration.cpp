@@ -71,7 +71,7 @@ void add_file(const YamlFile& file, std::vector<Entry>* entries) {
   for (const Entry& entry : *entries)
     if (!names.insert(entry.name).second)
       throw InputError(entry.origin + ": the key \"" + entry.name.substr(0, 120) +
-                       "\" stands twice");
+                       "\" is given twice");
 }
 
 /// A list, a group or a quoted text is YAML; any other value is taken as it stands, so that nothing

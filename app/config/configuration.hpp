@@ -156,7 +156,7 @@ struct Configuration {
 ///
 /// KEY is dotted, with numbers for list items; VALUE is YAML (`0.4`, `text`, `[1, 2]`).
 /// Errors  InputError with file:line (or the --set argument): unreadable file, unknown key (with
-///         the nearest known one), a key that stands twice, wrong type, outside the range, values
+///         the nearest known one), a key that is given twice, wrong type, outside the range, values
 ///         that contradict each other.
 [[nodiscard]] Configuration load_configuration(const std::optional<std::filesystem::path>& file,
                                                const std::vector<std::string>& set);

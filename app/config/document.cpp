@@ -32,7 +32,7 @@ vergence replay DATA --format folder --out session --set odometry.features=400 -
 `--threads N` and `--seed N` are short for `--set threads=N` and `--set odometry.seed=N`.
 
 A key that does not exist is an error that names the nearest one that does; so is a value of the wrong type or outside its range,
-a key that stands twice, and two keys that contradict each other. The sentence names the file and the line; the program exits with 2.
+a key that is given twice, and two keys that contradict each other. The sentence names the file and the line; the program exits with 2.
 
 Units and frames: SI units, pixels of the image as it was taken, radians. `summary.json` of a session holds `configuration_hash`, equal for
 equal values of all keys however they were written.

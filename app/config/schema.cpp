@@ -368,7 +368,7 @@ Group comparison() {
       .number("jump_m", &C::jump_m, 0.1, 1e6, "m",
               "A step of the INS's position beyond this (and 60 m/s) is a jump.")
       .number("scale_tolerance", &C::scale_tolerance, 0.001, 1, "",
-              "Relative difference of the path lengths that is told.")
+              "Relative difference of the path lengths that is reported.")
       .done();
 }
 
@@ -420,7 +420,7 @@ Group mock() {
   using M = MockSettings;
   constexpr std::int64_t kLargestSeed = std::numeric_limits<std::int64_t>::max();
   return Rows<M>(
-             "mock", "The world and the vehicle of the mock drivers; docs/mock.md tells more.",
+             "mock", "The world and the vehicle of the mock drivers; see docs/mock.md.",
              [](auto& c) -> auto& { return c.mock; })
       .text("world", &M::world, 16, "What is driven through: `suburb`.")
       .text("drive", &M::drive, 16,

@@ -131,11 +131,12 @@ std::string YamlFile::text(const YAML::Node& node, const std::string& field) con
 
 std::vector<double> YamlFile::numbers(const YAML::Node& node, const std::string& field,
                                       std::size_t least, std::size_t most) const {
-  const std::string wanted =
+  const std::string requested =
       least == most ? std::to_string(least) : fmt::format("{} to {}", least, most);
-  if (!node.IsSequence()) fail(node, fmt::format("{} is not a list of {} numbers", field, wanted));
+  if (!node.IsSequence())
+    fail(node, fmt::format("{} is not a list of {} numbers", field, requested));
   if (node.size() < least || node.size() > most)
-    fail(node, fmt::format("{} has {} numbers; it needs {}", field, node.size(), wanted));
+    fail(node, fmt::format("{} has {} numbers; it needs {}", field, node.size(), requested));
   std::vector<double> values;
   values.reserve(node.size());
   for (const auto& item : node) values.push_back(number(item, field));

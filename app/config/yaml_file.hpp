@@ -27,7 +27,7 @@ class YamlFile {
   /// Throws InputError: `file:line: sentence`.
   [[noreturn]] void fail(const YAML::Node& node, const std::string& sentence) const;
 
-  /// Refuses what is no map, a key that stands twice and a key that is not known, naming the
+  /// Refuses what is no map, a key that is given twice and a key that is not known, naming the
   /// nearest known one. `what` says whose keys they are: `camera 1`.
   void check_keys(const YAML::Node& map, const std::string& what,
                   const std::vector<std::string>& known) const;

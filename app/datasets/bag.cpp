@@ -152,15 +152,15 @@ std::string list_of_image_topics(const Bag& bag) {
   return list.empty() ? "none" : list;
 }
 
-std::string choose(const fs::path& path, const Bag& bag, const std::string& wanted,
+std::string choose(const fs::path& path, const Bag& bag, const std::string& requested,
                    std::string_view side) {
   const std::string ask =
       fmt::format("choose with --{}-topic; topics of images: {}", side, list_of_image_topics(bag));
-  if (!wanted.empty()) {
-    const auto found = bag.topics.find(wanted);
+  if (!requested.empty()) {
+    const auto found = bag.topics.find(requested);
     if (found == bag.topics.end() || found->second.images.empty())
-      refuse(path, 0, fmt::format("has no image on {} that can be read; {}", wanted, ask));
-    return wanted;
+      refuse(path, 0, fmt::format("has no image on {} that can be read; {}", requested, ask));
+    return requested;
   }
   std::vector<std::string> named;
   for (const auto& [name, topic] : bag.topics)

@@ -65,12 +65,12 @@ std::optional<std::int64_t> parse_seconds_ns(std::string_view text) noexcept {
   const std::optional<Digits> d = read_digits(text);
   if (!d) return std::nullopt;
   std::uint64_t ns = 0;
-  const int wanted = d->point + kDecimals;  // digits before the nanosecond's point
-  for (int i = 0; i < wanted; ++i) {
+  const int requested = d->point + kDecimals;  // digits before the nanosecond's point
+  for (int i = 0; i < requested; ++i) {
     if (i >= d->count && ns == 0) break;  // only zeros follow zeros
     if (!append(&ns, i < d->count ? d->digit[i] - '0' : 0)) return std::nullopt;
   }
-  if (wanted >= 0 && wanted < d->count && d->digit[wanted] >= '5' &&
+  if (requested >= 0 && requested < d->count && d->digit[requested] >= '5' &&
       ns < static_cast<std::uint64_t>(std::numeric_limits<std::int64_t>::max()))
     ++ns;
   const auto value = static_cast<std::int64_t>(ns);

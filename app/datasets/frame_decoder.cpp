@@ -63,7 +63,7 @@ FrameDecoder::~FrameDecoder() {
 
 bool FrameDecoder::next(DecodedPair* pair) noexcept {
   for (;;) {
-    const Doorbell::Rung seen = filled_.look();
+    const WakeEvent::Rung seen = filled_.look();
     if (stop_.load(std::memory_order_acquire)) return false;
     // `finished_` is looked at before the ring: what was pushed before it was set is still found.
     const bool finished = finished_.load(std::memory_order_acquire);
@@ -185,7 +185,7 @@ ImageFileStatus FrameDecoder::load_both(const std::string& name, Workspace* work
 
 bool FrameDecoder::wait_for_slot(FrameSlot* slot) noexcept {
   for (;;) {
-    const Doorbell::Rung seen = freed_.look();
+    const WakeEvent::Rung seen = freed_.look();
     if (stop_.load(std::memory_order_acquire)) return false;
     if (const auto free = pool_.acquire()) {
       *slot = *free;
@@ -197,7 +197,7 @@ bool FrameDecoder::wait_for_slot(FrameSlot* slot) noexcept {
 
 bool FrameDecoder::hand_over(const DecodedPair& pair) noexcept {
   for (;;) {
-    const Doorbell::Rung seen = freed_.look();
+    const WakeEvent::Rung seen = freed_.look();
     if (stop_.load(std::memory_order_acquire)) return false;
     if (ring_.push(pair)) {
       filled_.ring();

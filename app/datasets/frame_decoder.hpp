@@ -8,8 +8,8 @@
 
 #include "app/datasets/image_file.hpp"
 #include "app/datasets/stereo_sequence.hpp"
-#include "app/runtime/doorbell.hpp"
 #include "app/runtime/thread_runner.hpp"
+#include "app/runtime/wake_event.hpp"
 #include "core/memory/frame_pool.hpp"
 #include "core/memory/ring.hpp"
 
@@ -89,8 +89,8 @@ class FrameDecoder {
   bool any_ = false;  // newest_ means something
 
   Ring<DecodedPair, kAhead> ring_;
-  Doorbell filled_;  // rung by the decoder: a pair, or the end
-  Doorbell freed_;   // rung by the consumer: room in the ring, slots in the pool
+  WakeEvent filled_;  // rung by the decoder: a pair, or the end
+  WakeEvent freed_;   // rung by the consumer: room in the ring, slots in the pool
   std::atomic<bool> stop_{false};
   std::atomic<bool> finished_{false};
   ThreadRunner both_{ThreadRunner::Worker::of_reader};

@@ -16,7 +16,7 @@ using Velocity = StLuciaConventions::Velocity;
 using Yaw = StLuciaConventions::Yaw;
 
 constexpr double kPi = std::numbers::pi;
-constexpr double kFast = 5.0;             // m/s: above it the way goes where the vehicle points
+constexpr double kFast = 5.0;             // m/s: above it the course is where the vehicle points
 constexpr double kApart = 1.0;            // s between the positions whose difference is the motion
 constexpr std::size_t kEnough = 100;      // samples: below, nothing is decided
 constexpr double kTells = 0.3;            // correlation from which the slope decides about pitch
@@ -184,7 +184,7 @@ double correlation(const std::vector<Moving>& fast, const std::vector<double>& s
   return spread > 0 ? (xy - x * y / n) / std::sqrt(spread) : 0;
 }
 
-/// The angle that follows the slope of the way is pitch. False: neither does.
+/// The angle that follows the slope of the path is pitch. False: neither does.
 bool decide_pitch(const std::vector<Moving>& fast, StLuciaConventions* c) {
   std::vector<double> slopes;
   for (const Moving& m : fast) {

@@ -45,10 +45,10 @@ StereoSequence open_sequence(SequenceFormat format, const std::filesystem::path&
                              const BagTopics& topics) {
   if (calibration)
     return open_sequence(format, folder,
-                         CalibrationSource{calibration->string(),
-                                           [&](const StereoSequence&) {
-                                             return read_calibration(*calibration, use);
-                                           }},
+                         GivenCalibration{calibration->string(),
+                                          [&](const StereoSequence&) {
+                                            return read_calibration(*calibration, use);
+                                          }},
                          use, cameras, topics);
   if (format != SequenceFormat::mcap) detail::require_folder(folder, "a drive");
   StereoSequence sequence = open_by_format(format, folder, false, use, cameras, topics);
@@ -57,7 +57,7 @@ StereoSequence open_sequence(SequenceFormat format, const std::filesystem::path&
 }
 
 StereoSequence open_sequence(SequenceFormat format, const std::filesystem::path& folder,
-                             const CalibrationSource& calibration, const CalibrationUse& use,
+                             const GivenCalibration& calibration, const CalibrationUse& use,
                              const std::array<int, 2>& cameras, const BagTopics& topics) {
   if (format != SequenceFormat::mcap) detail::require_folder(folder, "a drive");
   StereoSequence sequence = open_by_format(format, folder, true, use, cameras, topics);
@@ -138,11 +138,11 @@ void check_image_sizes(const StereoSequence& sequence, std::size_t first, std::s
       ImageSize size;
       if (image_size(sequence, name, &size) != ImageFileStatus::ok) continue;
       const Intrinsics& camera = sequence.calibration.intrinsics[k];
-      const ImageSize wanted{(sequence.side_by_side ? 2 : 1) * camera.width, camera.height};
-      if (size != wanted)
+      const ImageSize requested{(sequence.side_by_side ? 2 : 1) * camera.width, camera.height};
+      if (size != requested)
         refuse(sequence.root / name, 0,
                "is " + text(size) + " pixels, but the calibration of this camera (" +
-                   sequence.calibration_source + ") is for " + text(wanted) +
+                   sequence.calibration_source + ") is for " + text(requested) +
                    (sequence.side_by_side ? " (twice its width, side by side)" : "") +
                    "; use the calibration that belongs to these images");
     }

@@ -52,7 +52,7 @@ struct StereoSequence {
 
 /// A calibration that is used instead of the data set's own: where it is from, and how to have it,
 /// given the images that are there.
-struct CalibrationSource {
+struct GivenCalibration {
   std::string name;
   std::function<CalibrationFile(const StereoSequence& images)> read;
 };
@@ -103,7 +103,7 @@ struct BagTopics {
     const BagTopics& topics = {});
 [[nodiscard]] StereoSequence open_sequence(SequenceFormat format,
                                            const std::filesystem::path& folder,
-                                           const CalibrationSource& calibration,
+                                           const GivenCalibration& calibration,
                                            const CalibrationUse& use,
                                            const std::array<int, 2>& cameras = {0, 1},
                                            const BagTopics& topics = {});

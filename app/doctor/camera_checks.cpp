@@ -29,17 +29,17 @@ bool same_hex(const std::string& a, const std::string& b) {
          });
 }
 
-bool means(const std::string& wanted, const FoundCamera& camera) {
-  return same_hex(wanted, camera.info.serial) || wanted == camera.info.place ||
-         std::find(camera.also.begin(), camera.also.end(), wanted) != camera.also.end();
+bool means(const std::string& requested, const FoundCamera& camera) {
+  return same_hex(requested, camera.info.serial) || requested == camera.info.place ||
+         std::find(camera.also.begin(), camera.also.end(), requested) != camera.also.end();
 }
 
 /// Names under /dev/v4l that lead to the node.
-bool leads_to(const Machine& machine, const std::string& wanted, const std::string& place) {
+bool leads_to(const Machine& machine, const std::string& requested, const std::string& place) {
   std::error_code error;
   const auto real = std::filesystem::canonical(
-      machine.root / std::filesystem::path(wanted).relative_path(), error);
-  return !error && wanted.starts_with("/dev/") &&
+      machine.root / std::filesystem::path(requested).relative_path(), error);
+  return !error && requested.starts_with("/dev/") &&
          real.filename() == std::filesystem::path(place).filename();
 }
 
@@ -53,7 +53,7 @@ std::string list_of(const DriverFindings& d) {
 }
 
 /// `the gige camera "123"`, or just of which kind where no serial is asked for.
-std::string wanted_camera(const CameraNeed& n) {
+std::string requested_camera(const CameraNeed& n) {
   return "the " + n.driver + " camera" + (n.serial.empty() ? "" : " " + quoted(n.serial));
 }
 
@@ -66,7 +66,7 @@ Finding missing_at_address(const CameraNeed& n, const std::string& who) {
           {"ping -c 3 " + n.serial}};
 }
 
-void check_presence(const Patient& p, std::vector<Finding>* findings) {
+void check_presence(const CheckContext& p, std::vector<Finding>* findings) {
   if (!p.needs.given) return;
   const auto matched = match_cameras(p);
   std::string present;
@@ -82,7 +82,7 @@ void check_presence(const Patient& p, std::vector<Finding>* findings) {
       findings->push_back(missing_at_address(n, who));
     } else {
       std::string& list = missing[n.driver];
-      list += fmt::format("{}{}: {}", list.empty() ? "" : ", ", who, wanted_camera(n));
+      list += fmt::format("{}{}: {}", list.empty() ? "" : ", ", who, requested_camera(n));
     }
   }
   for (const auto& [driver, list] : missing) {
@@ -96,7 +96,7 @@ void check_presence(const Patient& p, std::vector<Finding>* findings) {
   if (!present.empty()) findings->push_back({"cameras", FindingState::ok, present, {}});
 }
 
-void check_answers(const Patient& p, std::vector<Finding>* findings) {
+void check_answers(const CheckContext& p, std::vector<Finding>* findings) {
   for (const DriverFindings& d : p.inventory.drivers)
     if (!d.answered)
       findings->push_back(
@@ -105,7 +105,7 @@ void check_answers(const Patient& p, std::vector<Finding>* findings) {
 
 /// Nodes of everything that looks like a camera of a kind that is asked for; without a
 /// configuration of every kind.
-std::vector<std::string> camera_nodes(const Patient& p) {
+std::vector<std::string> camera_nodes(const CheckContext& p) {
   const auto asked = [&p](const char* driver) {
     return !p.needs.given || !p.needs.of(driver).empty();
   };
@@ -140,20 +140,20 @@ Finding finding_of_media(const std::string& advice, FindingState when_wrong) {
   return f;
 }
 
-void check_media(const Patient& p, std::vector<Finding>* findings) {
+void check_media(const CheckContext& p, std::vector<Finding>* findings) {
   const auto matched = match_cameras(p);
   for (const DriverFindings& d : p.inventory.drivers)
     for (const FoundCamera& c : d.cameras) {
       if (c.media.empty()) continue;
-      const bool wanted = std::find(matched.begin(), matched.end(), &c) != matched.end();
+      const bool requested = std::find(matched.begin(), matched.end(), &c) != matched.end();
       findings->push_back(
-          finding_of_media(c.media, wanted ? FindingState::problem : FindingState::advice));
+          finding_of_media(c.media, requested ? FindingState::problem : FindingState::advice));
     }
 }
 
 }  // namespace
 
-std::vector<const FoundCamera*> match_cameras(const Patient& p) {
+std::vector<const FoundCamera*> match_cameras(const CheckContext& p) {
   std::vector<const FoundCamera*> matched(p.needs.cameras.size(), nullptr);
   const auto taken = [&](const FoundCamera* c) {
     return std::find(matched.begin(), matched.end(), c) != matched.end();
@@ -173,7 +173,7 @@ std::vector<const FoundCamera*> match_cameras(const Patient& p) {
   return matched;
 }
 
-void check_cameras(const Patient& p, std::vector<Finding>* findings) {
+void check_cameras(const CheckContext& p, std::vector<Finding>* findings) {
   check_answers(p, findings);
   check_presence(p, findings);
   check_nodes(p, {"camera_permission", "video", camera_nodes(p)}, findings);

@@ -16,11 +16,11 @@ const char* to_string(FindingState state) noexcept {
   return "ok";
 }
 
-std::vector<Finding> examine(const Patient& patient) {
+std::vector<Finding> run_checks(const CheckContext& context) {
   std::vector<Finding> findings;
   for (const auto check :
        {check_cameras, check_network, check_usb, check_firewire, check_serial, check_system})
-    check(patient, &findings);
+    check(context, &findings);
   std::stable_sort(findings.begin(), findings.end(),
                    [](const Finding& a, const Finding& b) { return a.state > b.state; });
   return findings;

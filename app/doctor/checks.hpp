@@ -27,7 +27,7 @@ struct Finding {
 };
 
 /// What the checks look at.
-struct Patient {
+struct CheckContext {
   const Machine& machine;
   const Inventory& inventory;
   const Needs& needs;
@@ -36,22 +36,23 @@ struct Patient {
 
 /// All checks; those about devices that neither are there nor are asked for say nothing. Problems
 /// first, then advice, then what is well.
-[[nodiscard]] std::vector<Finding> examine(const Patient& patient);
+[[nodiscard]] std::vector<Finding> run_checks(const CheckContext& context);
 
 // The checks by what they are about; each appends its findings in any order.
 void check_cameras(
-    const Patient& patient,
+    const CheckContext& context,
     std::vector<Finding>* findings);  // asked for and there, permissions, media controllers
-void check_network(const Patient& patient, std::vector<Finding>* findings);  // GigE Vision
-void check_usb(const Patient& patient, std::vector<Finding>* findings);  // memory, budget, sleep
-void check_firewire(const Patient& patient, std::vector<Finding>* findings);  // stack, budget
-void check_serial(const Patient& patient,
+void check_network(const CheckContext& context, std::vector<Finding>* findings);  // GigE Vision
+void check_usb(const CheckContext& context,
+               std::vector<Finding>* findings);  // memory, budget, sleep
+void check_firewire(const CheckContext& context, std::vector<Finding>* findings);  // stack, budget
+void check_serial(const CheckContext& context,
                   std::vector<Finding>* findings);  // permissions, latency timer, ModemManager
-void check_system(const Patient& patient,
+void check_system(const CheckContext& context,
                   std::vector<Finding>* findings);  // limits, governor, clocks, disk
 
 /// The found camera that a configuration means: by serial or place; an empty serial is the next
 /// that no other entry names. Null: none. One entry for each of needs.cameras.
-[[nodiscard]] std::vector<const FoundCamera*> match_cameras(const Patient& patient);
+[[nodiscard]] std::vector<const FoundCamera*> match_cameras(const CheckContext& context);
 
 }  // namespace vergence::app

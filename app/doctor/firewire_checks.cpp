@@ -62,7 +62,7 @@ struct Demand {
 };
 
 /// By the bus that the cameras hang on; those that are not found share the first.
-std::map<std::string, Demand> demands(const Patient& p) {
+std::map<std::string, Demand> demands(const CheckContext& p) {
   std::map<std::string, Demand> buses;
   const auto matched = match_cameras(p);
   const std::string first = p.inventory.firewire.empty() ? "" : p.inventory.firewire.front().bus;
@@ -92,8 +92,8 @@ Finding judged(const Demand& demand) {
           fmt::format("IEEE 1394: an image of {} bytes does not pass at this rate even alone at {}",
                       s.image_bytes, to_string(s.speed)),
           {}};
-  if (const std::string complaint = iidc::budget_complaint(demand.shares); !complaint.empty())
-    return {"firewire_bus", FindingState::problem, "IEEE 1394: " + complaint, {}};
+  if (const std::string error = iidc::budget_error(demand.shares); !error.empty())
+    return {"firewire_bus", FindingState::problem, "IEEE 1394: " + error, {}};
   return {
       "firewire_bus",
       FindingState::ok,
@@ -106,16 +106,16 @@ Finding judged(const Demand& demand) {
 
 }  // namespace
 
-void check_firewire(const Patient& p, std::vector<Finding>* findings) {
-  const bool wanted = !p.needs.of("iidc-1394").empty();
-  if (wanted && !p.machine.exists("/sys/bus/firewire/devices")) {
+void check_firewire(const CheckContext& p, std::vector<Finding>* findings) {
+  const bool requested = !p.needs.of("iidc-1394").empty();
+  if (requested && !p.machine.exists("/sys/bus/firewire/devices")) {
     findings->push_back(
         {"firewire",
          FindingState::problem,
          "this kernel has no FireWire stack; with an adapter card it comes with its driver",
          {"sudo modprobe firewire-ohci",
           "echo firewire-ohci | sudo tee /etc/modules-load.d/vergence.conf"}});
-  } else if (wanted && p.machine.names("/sys/bus/firewire/devices").empty()) {
+  } else if (requested && p.machine.names("/sys/bus/firewire/devices").empty()) {
     findings->push_back({"firewire",
                          FindingState::problem,
                          "there is no FireWire adapter; is the card seated, and its driver loaded?",

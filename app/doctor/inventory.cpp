@@ -38,7 +38,7 @@ std::shared_ptr<Search> begin_search(const CameraDriverRow& row) {
     try {
       const auto driver = make();
       found = driver->enumerate();
-      note = driver->complaint();
+      note = driver->last_error();
     } catch (const std::exception& e) {
       note = std::string("it cannot look: ") + e.what();
     }

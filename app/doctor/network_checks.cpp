@@ -64,7 +64,7 @@ struct Reached {
   const InterfaceAddress* through = nullptr;
 };
 
-std::vector<Reached> gige_cameras(const Patient& p) {
+std::vector<Reached> gige_cameras(const CheckContext& p) {
   std::vector<Reached> all;
   const auto matched = match_cameras(p);
   for (const DriverFindings& d : p.inventory.drivers) {
@@ -88,13 +88,13 @@ std::vector<Reached> gige_cameras(const Patient& p) {
   return all;
 }
 
-void check_receive_buffer(const Patient& p, std::vector<Finding>* findings) {
+void check_receive_buffer(const CheckContext& p, std::vector<Finding>* findings) {
   const auto limit = p.machine.number("/proc/sys/net/core/rmem_max");
   if (!limit) return;
   double image = 0;
   for (const CameraNeed& n : p.needs.of("gige")) image = std::max(image, n.bytes);
-  const auto wanted = std::max(kLeastBuffer, static_cast<std::int64_t>(kBufferedImages * image));
-  const std::int64_t advised = std::max(kRecommendedBuffer, wanted);
+  const auto requested = std::max(kLeastBuffer, static_cast<std::int64_t>(kBufferedImages * image));
+  const std::int64_t advised = std::max(kRecommendedBuffer, requested);
   const std::string holds = image > 0 ? fmt::format(", {:.1f} images of this configuration",
                                                     static_cast<double>(*limit) / image)
                                       : "";
@@ -103,9 +103,9 @@ void check_receive_buffer(const Patient& p, std::vector<Finding>* findings) {
       FindingState::ok,
       fmt::format(
           "net.core.rmem_max is {} KiB{}; the receive buffer of a GigE camera should have {} KiB",
-          *limit / 1024, holds, wanted / 1024),
+          *limit / 1024, holds, requested / 1024),
       {}};
-  if (*limit < wanted) {
+  if (*limit < requested) {
     const bool lost = image > 0 && static_cast<double>(*limit) < kLeastImages * image;
     f.state = lost ? FindingState::problem : FindingState::advice;
     if (lost) f.sentence += ": images will be lost";
@@ -136,7 +136,7 @@ std::vector<std::string> commands_for_network(const Machine& m, std::uint32_t ca
                       wired.size() == 1 ? wired.front() : "INTERFACE")};
 }
 
-void check_reach(const Patient& p, const std::vector<Reached>& cameras,
+void check_reach(const CheckContext& p, const std::vector<Reached>& cameras,
                  std::vector<Finding>* findings) {
   std::string fine;
   for (const Reached& r : cameras) {
@@ -234,7 +234,7 @@ void check_load(const Link& link, std::vector<Finding>* findings) {
         {"link",
          FindingState::advice,
          fmt::format(
-             "{} runs at {:.0f} Mbit/s; GigE cameras need a gigabit: look at cable and switch",
+             "{} runs at {:.0f} Mbit/s; GigE cameras need a gigabit: check cable and switch",
              link.name, link.speed / kMega),
          {}});
   if (link.needs.empty()) return;
@@ -272,7 +272,7 @@ void check_load(const Link& link, std::vector<Finding>* findings) {
   findings->push_back(std::move(f));
 }
 
-void check_rp_filter(const Patient& p, const std::vector<Reached>& cameras,
+void check_rp_filter(const CheckContext& p, const std::vector<Reached>& cameras,
                      std::vector<Finding>* findings) {
   std::vector<std::string> told;
   const auto filter = [&](const std::string& name) {
@@ -302,7 +302,7 @@ void check_rp_filter(const Patient& p, const std::vector<Reached>& cameras,
   }
 }
 
-void check_packet_socket(const Patient& p, std::vector<Finding>* findings) {
+void check_packet_socket(const CheckContext& p, std::vector<Finding>* findings) {
   for (const CameraNeed& n : p.needs.of("gige")) {
     const auto option = n.options.find("packet_socket");
     if (option == n.options.end() || option->second != "on") continue;
@@ -321,7 +321,7 @@ void check_packet_socket(const Patient& p, std::vector<Finding>* findings) {
 
 }  // namespace
 
-void check_network(const Patient& p, std::vector<Finding>* findings) {
+void check_network(const CheckContext& p, std::vector<Finding>* findings) {
   const std::vector<Reached> cameras = gige_cameras(p);
   if (cameras.empty()) return;
   check_receive_buffer(p, findings);

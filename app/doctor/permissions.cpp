@@ -9,7 +9,7 @@ std::vector<std::string> commands_to_install_rules() {
           "sudo udevadm control --reload && sudo udevadm trigger"};
 }
 
-void check_nodes(const Patient& p, const NodesToOpen& what, std::vector<Finding>* findings) {
+void check_nodes(const CheckContext& p, const NodesToOpen& what, std::vector<Finding>* findings) {
   std::vector<std::string> open, closed, stray;  // stray: closed, and not the group's
   for (const std::string& node : what.nodes) {
     if (p.machine.may_use(node)) {

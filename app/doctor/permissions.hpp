@@ -13,7 +13,8 @@ struct NodesToOpen {
 };
 /// Whether this user may read and write them, and if not by what: another login, membership, or a
 /// rule that gives the node to the group.
-void check_nodes(const Patient& patient, const NodesToOpen& what, std::vector<Finding>* findings);
+void check_nodes(const CheckContext& context, const NodesToOpen& what,
+                 std::vector<Finding>* findings);
 
 /// Installs the rules that `vergence devices` writes.
 [[nodiscard]] std::vector<std::string> commands_to_install_rules();

@@ -21,7 +21,7 @@ struct Asker {
 /// not on USB are left alone, XSens' own converters are asked for an INS only. Boards are asked for
 /// first where one is likely, an INS where that is.
 ///
-/// Opening makes boards with an automatic reset start anew, and the question is a few bytes on the
+/// Opening makes boards with an automatic reset restart, and the question is a few bytes on the
 /// line that another device may take for something else: only when the user says so. An INS that
 /// answers has stopped measuring; a drive starts it again.
 /// Time  Up to eight seconds. Errors: none; who does not answer is nobody.

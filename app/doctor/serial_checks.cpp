@@ -16,12 +16,12 @@ bool is_real(const std::string& driver) {
   return !driver.empty() && driver != "none" && driver != "mock";
 }
 
-bool may_be_ins(const Patient& p, const FoundPort& port) {
+bool may_be_ins(const CheckContext& p, const FoundPort& port) {
   return is_real(p.needs.ins_driver) && names_port(p.needs.ins_port, port);
 }
 
 /// Ports that anybody here cares about: those of the configuration, without one all on USB.
-std::vector<const FoundPort*> ports_of(const Patient& p) {
+std::vector<const FoundPort*> ports_of(const CheckContext& p) {
   std::vector<const FoundPort*> some;
   for (const FoundPort& port : p.inventory.ports) {
     const bool trigger = is_real(p.needs.trigger_driver) && names_port(p.needs.trigger_port, port);
@@ -32,7 +32,7 @@ std::vector<const FoundPort*> ports_of(const Patient& p) {
 }
 
 /// A configured port is there; without one there is any.
-void check_presence(const Patient& p, const std::string& group, const std::string& driver,
+void check_presence(const CheckContext& p, const std::string& group, const std::string& driver,
                     const std::string& port, std::vector<Finding>* findings) {
   if (!is_real(driver)) return;
   if (!port.empty()) {
@@ -60,7 +60,7 @@ void check_presence(const Patient& p, const std::string& group, const std::strin
                          {}});
 }
 
-void check_latency(const Patient& p, std::vector<Finding>* findings) {
+void check_latency(const CheckContext& p, std::vector<Finding>* findings) {
   for (const FoundPort* found : ports_of(p)) {
     const FoundPort& port = *found;
     const bool ins = port.kind == SerialKind::ins || port.kind == SerialKind::ftdi;
@@ -93,7 +93,7 @@ bool is_ignored_by_modem_manager(const Machine& m, const std::string& port) {
                    notes->find("ID_MM_PORT_IGNORE=1") != std::string::npos);
 }
 
-void check_modem_manager(const Patient& p, std::vector<Finding>* findings) {
+void check_modem_manager(const CheckContext& p, std::vector<Finding>* findings) {
   std::vector<std::string> exposed;
   bool any = false;
   for (const FoundPort* port : ports_of(p)) {
@@ -122,7 +122,7 @@ void check_modem_manager(const Patient& p, std::vector<Finding>* findings) {
 
 }  // namespace
 
-void check_serial(const Patient& p, std::vector<Finding>* findings) {
+void check_serial(const CheckContext& p, std::vector<Finding>* findings) {
   NodesToOpen nodes{"serial_permission", "dialout", {}};
   for (const FoundPort* port : ports_of(p)) nodes.nodes.push_back(port->info.port);
   check_presence(p, "ins", p.needs.ins_driver, p.needs.ins_port, findings);

@@ -11,7 +11,7 @@ namespace {
 
 constexpr const char* kCpus = "/sys/devices/system/cpu/";
 
-void check_realtime(const Patient& p, std::vector<Finding>* findings) {
+void check_realtime(const CheckContext& p, std::vector<Finding>* findings) {
   if (p.needs.realtime_priority <= 0) return;
   constexpr unsigned kCapSysNice = 23;
   const auto limit = p.machine.limit("Max realtime priority");
@@ -43,7 +43,7 @@ void check_realtime(const Patient& p, std::vector<Finding>* findings) {
              p.machine.user)}});
 }
 
-void check_governor(const Patient& p, std::vector<Finding>* findings) {
+void check_governor(const CheckContext& p, std::vector<Finding>* findings) {
   std::set<std::string> governors;
   bool adapts = true;  // drivers whose `powersave` goes up with the load
   for (const std::string& cpu : p.machine.names(kCpus)) {
@@ -77,7 +77,7 @@ void check_governor(const Patient& p, std::vector<Finding>* findings) {
         "/etc/tmpfiles.d/vergence-governor.conf"}});
 }
 
-void check_clock_source(const Patient& p, std::vector<Finding>* findings) {
+void check_clock_source(const CheckContext& p, std::vector<Finding>* findings) {
   const auto source =
       p.machine.line("/sys/devices/system/clocksource/clocksource0/current_clocksource");
   if (!source || source->empty()) return;
@@ -94,7 +94,7 @@ void check_clock_source(const Patient& p, std::vector<Finding>* findings) {
                         "sudo dmesg | grep -i -e tsc -e clocksource"}});
 }
 
-void check_date(const Patient& p, std::vector<Finding>* findings) {
+void check_date(const CheckContext& p, std::vector<Finding>* findings) {
   constexpr std::array kDaemons{"chronyd", "systemd-timesyncd", "ntpd", "ntpd-rs"};
   std::vector<std::string> running;
   for (const char* name : kDaemons)
@@ -126,7 +126,7 @@ void check_date(const Patient& p, std::vector<Finding>* findings) {
        {}});
 }
 
-void check_disk(const Patient& p, std::vector<Finding>* findings) {
+void check_disk(const CheckContext& p, std::vector<Finding>* findings) {
   const auto free = p.machine.free_bytes(p.out);
   if (!free) return;
   constexpr std::uint64_t kLeast = std::uint64_t{200} << 20, kComfortable = std::uint64_t{2} << 30;
@@ -144,7 +144,7 @@ void check_disk(const Patient& p, std::vector<Finding>* findings) {
 
 }  // namespace
 
-void check_system(const Patient& p, std::vector<Finding>* findings) {
+void check_system(const CheckContext& p, std::vector<Finding>* findings) {
   check_realtime(p, findings);
   check_governor(p, findings);
   check_clock_source(p, findings);

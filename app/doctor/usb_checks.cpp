@@ -28,7 +28,7 @@ const UsbDevice* usb_of(const Inventory& inventory, const FoundCamera& c) {
   return nullptr;
 }
 
-void check_memory(const Patient& p, std::vector<Finding>* findings) {
+void check_memory(const CheckContext& p, std::vector<Finding>* findings) {
   const auto cameras = p.needs.of("iidc-usb");
   if (cameras.empty()) return;
   double megabytes = 0;
@@ -53,7 +53,7 @@ void check_memory(const Patient& p, std::vector<Finding>* findings) {
   findings->push_back(std::move(f));
 }
 
-void check_budget(const Patient& p, std::vector<Finding>* findings) {
+void check_budget(const CheckContext& p, std::vector<Finding>* findings) {
   struct Load {
     double megabytes = 0;
     double mbit = kUsb2;
@@ -92,7 +92,7 @@ void check_budget(const Patient& p, std::vector<Finding>* findings) {
   }
 }
 
-void check_sleep(const Patient& p, std::vector<Finding>* findings) {
+void check_sleep(const CheckContext& p, std::vector<Finding>* findings) {
   for (const UsbDevice& d : p.inventory.usb) {
     if (d.vendor != kPointGrey && d.video.empty()) continue;
     if (d.control == "auto")
@@ -117,7 +117,7 @@ void check_sleep(const Patient& p, std::vector<Finding>* findings) {
 
 }  // namespace
 
-void check_usb(const Patient& p, std::vector<Finding>* findings) {
+void check_usb(const CheckContext& p, std::vector<Finding>* findings) {
   check_memory(p, findings);
   check_budget(p, findings);
   check_sleep(p, findings);

@@ -39,12 +39,12 @@ class TimeHistogram {
   /// most max(). 0 without a time.
   [[nodiscard]] double percentile(double q) const noexcept {
     if (count_ == 0) return 0;
-    const auto wanted = std::max<std::uint64_t>(
+    const auto requested = std::max<std::uint64_t>(
         1, static_cast<std::uint64_t>(std::ceil(q * static_cast<double>(count_))));
     std::uint64_t seen = 0;
     for (std::size_t i = 0; i < kBins; ++i) {
       seen += bins_[i];
-      if (seen >= wanted)
+      if (seen >= requested)
         return std::min(max_, kLeast * std::exp((static_cast<double>(i) + 0.5) * kLogStep));
     }
     return max_;

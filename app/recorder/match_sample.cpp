@@ -10,7 +10,7 @@ void MatchSample::take(const calibration::TrackLog& log) noexcept {
   if (any_ && frame.number <= newest_) return;
   newest_ = frame.number;
   any_ = true;
-  for (const calibration::LoggedSighting& s : frame.sightings)
+  for (const calibration::LoggedObservation& s : frame.observations)
     for (int k = 1; s.by(0) && k < kMaxCameras; ++k) {
       if (!s.by(k)) continue;
       const auto &left = s.raw[0], &other = s.raw[static_cast<std::size_t>(k)];

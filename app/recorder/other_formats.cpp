@@ -76,7 +76,7 @@ void write_enu(const std::vector<StampedPose>& poses, const EarthFigures& earth,
   }
 }
 
-/// A stretch of the way that is one line on the map.
+/// A stretch of the path that is one line on the map.
 struct Stretch {
   std::vector<Geodetic> places{};
   PoseStatus status = PoseStatus::lost;

@@ -14,7 +14,7 @@ namespace vergence::app {
 enum class OtherFormat : std::uint8_t {
   kitti,    // trajectory.kitti: T_world_left, twelve numbers a line, a line a pose
   enu,      // trajectory_enu.tum: T_enu_left
-  geojson,  // drive.geojson: the way on the earth, a line for every stretch of one status
+  geojson,  // drive.geojson: the path on the earth, a line for every stretch of one status
   kml,      // drive.kml: the same
 };
 

@@ -118,7 +118,7 @@ template <class Value, std::size_t N>
 bool Recorder::push(Ring<Value, N>* ring, std::atomic<std::uint64_t>* dropped,
                     const Value& value) noexcept {
   for (;;) {
-    const Doorbell::Rung seen = freed_.look();
+    const WakeEvent::Rung seen = freed_.look();
     if (ring->push(value)) break;
     if (options_.when_full == WhenFull::drop) {
       dropped->fetch_add(1, std::memory_order_relaxed);
@@ -145,7 +145,7 @@ void Recorder::work() {
   auto flushed = Clock::now();
   flush();  // the heads of the tables
   for (;;) {
-    const Doorbell::Rung seen = filled_.look();
+    const WakeEvent::Rung seen = filled_.look();
     const bool stopping = stop_.load(
         std::memory_order_acquire);  // before the ring: what was posted before is still found
     if (take()) {
@@ -359,8 +359,8 @@ void Recorder::note(const CalibrationRecord& c) {
   event.set_sentence(kept.sentence);
   write(event);
   if (!kept.failed) return;
-  const std::lock_guard lock(complaints_mutex_);
-  complaints_.push_back(kept.sentence);
+  const std::lock_guard lock(errors_mutex_);
+  errors_.push_back(kept.sentence);
 }
 
 void Recorder::flush() {
@@ -384,10 +384,10 @@ void Recorder::pretend(Stamp stamp) {
   pretended_ = full;
   for (LineFile* file : files_->all) file->pretend_full(full);
   if (full) {
-    const std::lock_guard lock(complaints_mutex_);
-    complaints_.push_back(files_->poses.path().parent_path().string() +
-                          ": the disk has no room, as the drive's faults want it; the session goes "
-                          "on, lines wait in memory");
+    const std::lock_guard lock(errors_mutex_);
+    errors_.push_back(files_->poses.path().parent_path().string() +
+                      ": the disk has no room, as the drive's faults want it; the session goes "
+                      "on, lines wait in memory");
   }
   flush();
 }
@@ -411,15 +411,14 @@ std::uint64_t Recorder::lost_lines() const {
 }
 
 void Recorder::complain(const LineFile& file) {
-  const std::lock_guard lock(complaints_mutex_);
-  complaints_.push_back(file.path().string() + ": cannot be written (" +
-                        std::strerror(file.fault()) +
-                        "); the session goes on, lines wait in memory: make room on that disk");
+  const std::lock_guard lock(errors_mutex_);
+  errors_.push_back(file.path().string() + ": cannot be written (" + std::strerror(file.fault()) +
+                    "); the session goes on, lines wait in memory: make room on that disk");
 }
 
-std::vector<std::string> Recorder::take_complaints() {
-  const std::lock_guard lock(complaints_mutex_);
-  return std::exchange(complaints_, {});
+std::vector<std::string> Recorder::take_errors() {
+  const std::lock_guard lock(errors_mutex_);
+  return std::exchange(errors_, {});
 }
 
 std::unique_ptr<SessionTotals> Recorder::close() {
@@ -432,9 +431,8 @@ std::unique_ptr<SessionTotals> Recorder::close() {
                                 std::strerror(file->fault()) +
                                 "); make room on that disk and repeat the drive");
     else if (file->lost_lines() > 0)
-      complaints_.push_back(
-          file->path().string() + ": lacks " + std::to_string(file->lost_lines()) +
-          " lines that found no room on the disk in time; the others are all there");
+      errors_.push_back(file->path().string() + ": lacks " + std::to_string(file->lost_lines()) +
+                        " lines that found no room on the disk in time; the others are all there");
   }
   // A file that says nothing would look like a reference that was lost.
   std::error_code ignored;

@@ -15,7 +15,7 @@
 #include "app/recorder/histogram.hpp"
 #include "app/recorder/ins_file.hpp"
 #include "app/recorder/records.hpp"
-#include "app/runtime/doorbell.hpp"
+#include "app/runtime/wake_event.hpp"
 #include "core/memory/ring.hpp"
 
 namespace vergence::app {
@@ -102,7 +102,7 @@ struct Kept {
 /// What has been posted is in the files as soon as the thread comes to it, at the latest after a
 /// second, so a killed session keeps its lines. Stamps are printed from their integers. The same
 /// records give the same bytes.
-/// Threads  post(): one producer. take_complaints(): any. close(): the owner's, after the last
+/// Threads  post(): one producer. take_errors(): any. close(): the owner's, after the last
 ///          post().
 /// Memory   post() takes none. With keep_trajectory a pose of some 100 bytes is kept for every
 ///          frame.
@@ -138,7 +138,7 @@ class Recorder {
   /// Precondition: Options::ins.
   void post(const InsRecord& reading) noexcept;
   /// Sentences about the disk since the last call.
-  [[nodiscard]] std::vector<std::string> take_complaints();
+  [[nodiscard]] std::vector<std::string> take_errors();
   /// Writes what is waiting, closes the files. Once.
   [[nodiscard]] std::unique_ptr<SessionTotals> close();
 
@@ -177,12 +177,12 @@ class Recorder {
 
   Ring<Record, kRing> ring_;
   Ring<InsRecord, kReadings> readings_;
-  Doorbell filled_, freed_;
+  WakeEvent filled_, freed_;
   std::atomic<bool> stop_{false};
   std::atomic<std::uint64_t> dropped_{0}, dropped_readings_{0};
   std::size_t high_water_ = 0;  // the producer's
-  std::mutex complaints_mutex_;
-  std::vector<std::string> complaints_;
+  std::mutex errors_mutex_;
+  std::vector<std::string> errors_;
   std::thread thread_;
 };
 

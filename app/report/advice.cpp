@@ -28,19 +28,19 @@ constexpr std::array kPose{
            "Left and right are swapped, or T_camera_left is inverted: swap cables, folders or the "
            "cameras' order; X_camera = R X_left + t."},
     Advice{"few_inliers",
-           "Poses rested on few points: look at the images of those moments for dirt, blur or a "
+           "Poses rested on few points: check the images of those moments for dirt, blur or a "
            "covered lens."},
     Advice{"one_camera",
-           "One camera did not support the pose: look at its images for dirt, blur or a wrong "
+           "One camera did not support the pose: check its images for dirt, blur or a wrong "
            "exposure."},
     Advice{"no_pose",
-           "Tracking failed: look at the images of those moments; shorter exposure or a higher "
+           "Tracking failed: check the images of those moments; shorter exposure or a higher "
            "frame rate helps in fast turns."},
     Advice{
         "time_gap",
         "Frames are missing: check cables, trigger and the disk's speed; see the events for when."},
     Advice{"scene_restarted",
-           "After a gap the way across was extrapolated: do not use distances that span it."},
+           "After a gap the motion across it was extrapolated: do not use distances that span it."},
     Advice{"weak_geometry",
            "The points did not hold the pose well in some direction: expect it in tunnels, open "
            "fields and beside walls."},

@@ -193,7 +193,7 @@ void take_reference(const Session& s, Analysis* a) {
       "grows after that is drift.",
       laid.stretch,
       laid.by_rotations
-          ? "by attitudes and mean position: the way is too straight for positions alone"
+          ? "by attitudes and mean position: the path is too straight for positions alone"
           : "by positions");
   compare_with_reference(s, m, laid, up_is_z, a);
 }
@@ -339,7 +339,7 @@ std::optional<double> mean_difference(const MatchedTrajectories& m, const Mat3& 
 
 /// Drift against an INS by positions alone, over the longest segments there are. KITTI's figure
 /// would turn each segment by the INS's attitude at its start, whose degree of error alone is 1.7 %
-/// of the way; a receiver's metres weigh least on the longest.
+/// of the distance; a receiver's metres weigh least on the longest.
 void drift_by_positions(const Session& s, Analysis* a) {
   a->segment_error = a->drift;
   a->drift.reset();

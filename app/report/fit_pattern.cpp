@@ -26,7 +26,7 @@ struct Sum {
 }  // namespace
 
 Fit fit_of(const Session& session, bool at_the_end) {
-  const auto wanted = [at_the_end](const ResidualRow& r) {
+  const auto requested = [at_the_end](const ResidualRow& r) {
     return r.camera == 1 && r.at_the_end == at_the_end && r.matches > 0;
   };
   double width = 0, height = 0;
@@ -34,7 +34,7 @@ Fit fit_of(const Session& session, bool at_the_end) {
     width = std::max(width, r.left + r.width), height = std::max(height, r.top + r.height);
   Sum middle, edge;
   for (const ResidualRow& r : session.residuals) {
-    if (!wanted(r)) continue;
+    if (!requested(r)) continue;
     const double from_centre =
         std::hypot(r.left + (r.width - width) / 2, r.top + (r.height - height) / 2);
     (from_centre < std::hypot(width, height) / 4 ? middle : edge).add(r);

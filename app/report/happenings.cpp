@@ -31,7 +31,7 @@ constexpr std::array kSaid{
     Word{"one_camera", "only one camera supported the pose"},
     Word{"no_pose", "tracking failed"},
     Word{"time_gap", "frames were missing"},
-    Word{"scene_restarted", "the way across a gap was extrapolated"},
+    Word{"scene_restarted", "the motion across a gap was extrapolated"},
     Word{"weak_geometry", "points that hold the pose weakly"},
     Word{"moving_scene", "much of the picture moved by itself"},
     Word{"unconfirmed", "waiting until the drive confirms the last drive's calibration"},

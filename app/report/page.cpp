@@ -138,7 +138,7 @@ void error_plots(const Session& s, const Analysis& a, std::string* out) {
         {k.caption, XAxis::time_s, a.time_s, *k.values, a.breaks, k.css, k.from_zero}, a, s.frames);
     if (over_time.empty()) continue;
     *out += figure(std::string(k.caption) + " · over time", over_time);
-    *out += figure(std::string(k.caption) + " · over the way",
+    *out += figure(std::string(k.caption) + " · over the distance travelled",
                    curve_plot({k.caption, XAxis::distance_m, a.distance_m, *k.values, a.breaks,
                                k.css, k.from_zero},
                               a, s.frames));

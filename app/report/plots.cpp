@@ -133,7 +133,6 @@ std::string curve_plot(const CurvePlot& plot, const Analysis& analysis,
 }
 
 // ---- bands
-// ----------------------------------------------------------------------------------------------------------------------
 
 namespace {
 
@@ -239,7 +238,6 @@ std::string bands_picture(const Session& session, const Analysis& analysis) {
 }
 
 // ---- timing
-// -----------------------------------------------------------------------------------------------------------------------
 
 namespace {
 

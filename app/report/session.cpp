@@ -334,7 +334,7 @@ std::optional<Event> parse_event(std::string_view line) {
 
 void read_events(const fs::path& folder, Session* session) {
   const auto text = read_part(folder / "events.jsonl", std::size_t{1} << 30U,
-                              "what happened on the way is not known", session);
+                              "what happened during the drive is not known", session);
   if (!text) return;
   const std::string_view whole = whole_lines(*text);
   Lines lines(whole);

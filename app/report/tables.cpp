@@ -69,7 +69,7 @@ void error_group(const Analysis& a, Figures* f) {
   f->row("heading error, largest", a.heading.max, "{:.2f}°");
   f->row("rotation error", a.rotation_deg_per_m, "{:.4f} °/m");
   if (a.ate_m) f->row("whole path laid on it, rms (ATE)", metres(*a.ate_m));
-  f->row("error at the end", times(a.end_error, 100), "{:.2f} % of the way");
+  f->row("error at the end", times(a.end_error, 100), "{:.2f} % of the distance");
   f->row("scale (reference over ours)", a.scale, "{:.4f}");
 }
 

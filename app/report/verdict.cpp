@@ -88,10 +88,10 @@ void judge_drift(const Analysis& a, Judge* j) {
     return;
   }
   if (!a.drift)
-    j->find(Grade::care, "the drive is too short to tell its drift");
+    j->find(Grade::care, "the drive is too short to measure its drift");
   else if (*a.drift > kGoodDrift)
     j->find(*a.drift > kWorstDrift ? Grade::bad : Grade::care,
-            fmt::format("it drifts by {} of the way{}", percent(*a.drift),
+            fmt::format("it drifts by {} of the distance{}", percent(*a.drift),
                         a.source == ErrorSource::ins ? " against the INS" : ""));
   const double off = a.scale ? std::abs(*a.scale - 1) : 0;
   if (off > kGoodScale) {
@@ -200,15 +200,16 @@ bool fits_as_well(const CalibrationRow& rejected) {
 
 /// What the causes of accepted calibrations ask for.
 void advise_on_causes(const Session& s, Judge* j) {
-  constexpr std::array kCauses{Advice{"knock",
-                                      "The rig was knocked on the way and has been calibrated "
-                                      "anew: look at the camera's mount before the next drive."},
-                               Advice{"collapse",
-                                      "The rig was knocked hard on the way and has been calibrated "
-                                      "anew: look at the camera's mount before the next drive."},
-                               Advice{"drift",
-                                      "The rig crept out of its calibration and was followed: look "
-                                      "for a mount that warms up or works loose."}};
+  constexpr std::array kCauses{
+      Advice{"knock",
+             "The rig was knocked during the drive and has been calibrated "
+             "again: check the camera's mount before the next drive."},
+      Advice{"collapse",
+             "The rig was knocked hard during the drive and has been calibrated "
+             "again: check the camera's mount before the next drive."},
+      Advice{"drift",
+             "The rig crept out of its calibration and was followed: look "
+             "for a mount that warms up or works loose."}};
   for (const Advice& advice : kCauses)
     if (std::any_of(
             s.calibrations.begin(), s.calibrations.end(),
@@ -226,7 +227,7 @@ void advise_on_events(const Session& s, Judge* j) {
     j->advise("A calibration was not kept: " + event->sentence + ".");
   if (const auto event = told("calibration_contradicted"); event != s.events.end()) {
     j->find(Grade::care, "the calibration given is not that of the rig");
-    j->advise("On the way " + event->sentence +
+    j->advise("During the drive " + event->sentence +
               ": keep the calibration.yaml of this session, if the drive has confirmed it.");
   }
   if (const auto event = told("scale_disagrees"); event != s.events.end()) {
@@ -304,10 +305,10 @@ void judge_session(const Session& s, const Analysis& a, Judge* j) {
   }
   if (const auto allocations = number_at(s.summary, "allocations_after_seal");
       allocations && *allocations > 0)
-    j->advise(
-        fmt::format("Memory was taken {:.0f} times on the way, which must not happen: report it "
-                    "with this session.",
-                    *allocations));
+    j->advise(fmt::format(
+        "Memory was taken {:.0f} times during the drive, which must not happen: report it "
+        "with this session.",
+        *allocations));
   const double p99 = number_at(s.summary, "timing_ms.p99").value_or(0) * 1e-3;
   const double slow =
       static_cast<double>(std::count_if(s.frames.begin(), s.frames.end(), [&a](const Frame& f) {

@@ -39,7 +39,7 @@ std::string refusal(const CameraRequest& request, const std::string& serial,
                     const CameraDriverRow& row, CameraDriver& driver, DeviceStatus status) {
   const std::string who = fmt::format("{}: the {} camera {}", request.key, row.name,
                                       serial.empty() ? "" : "\"" + serial + "\" ");
-  std::string said = driver.complaint();
+  std::string said = driver.last_error();
   switch (status) {
     case DeviceStatus::not_found:
       return fmt::format("{}was not found; {}; check cable, power and {}.serial{}", who,
@@ -80,11 +80,11 @@ class Openings {
     OpenedCamera opened;
     opened.device = driver->open(serial, &status);
     if (opened.device == nullptr) throw InputError(refusal(request, serial, row, *driver, status));
-    CameraConfiguration wanted = request.configuration;
-    wanted.sharing = sharing_[request.driver];
-    status = opened.device->configure(wanted, &opened.actual);
+    CameraConfiguration requested = request.configuration;
+    requested.sharing = sharing_[request.driver];
+    status = opened.device->configure(requested, &opened.actual);
     if (status != DeviceStatus::ok) {
-      const std::string said = opened.device->complaint();
+      const std::string said = opened.device->last_error();
       throw InputError(fmt::format(
           "{}: {}", camera_title(request.key, opened.device->info()),
           said.empty() ? fmt::format("cannot do what is asked: {}", to_string(status)) : said));
@@ -102,7 +102,7 @@ class Openings {
       taken_.push_back(who);
       return d.serial;
     }
-    const std::string said = driver.complaint();
+    const std::string said = driver.last_error();
     throw InputError(fmt::format("{}: no {} camera is left to be it; {}; check cable and power{}",
                                  request.key, request.driver, list_of(found),
                                  said.empty() ? "" : ": " + said));

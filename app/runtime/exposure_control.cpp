@@ -26,9 +26,9 @@ class ExposureControl::Watched final : public CameraDevice {
       : owner_(owner), k_(k), camera_(camera) {}
 
   const DeviceInfo& info() const noexcept override { return camera_->info(); }
-  DeviceStatus configure(const CameraConfiguration& wanted,
+  DeviceStatus configure(const CameraConfiguration& requested,
                          CameraConfiguration* actual) noexcept override {
-    return camera_->configure(wanted, actual);
+    return camera_->configure(requested, actual);
   }
   DeviceTiming timing() const noexcept override { return camera_->timing(); }
   DeviceStatus start(Notifier* ready) noexcept override { return camera_->start(ready); }
@@ -42,11 +42,11 @@ class ExposureControl::Watched final : public CameraDevice {
   void release(FrameSlot slot) noexcept override { camera_->release(slot); }
   void stop() noexcept override { camera_->stop(); }
   DeviceStatus trigger_once() noexcept override { return camera_->trigger_once(); }
-  DeviceStatus set_exposure(const ExposureSetting& wanted,
+  DeviceStatus set_exposure(const ExposureSetting& requested,
                             ExposureSetting* actual) noexcept override {
-    return camera_->set_exposure(wanted, actual);
+    return camera_->set_exposure(requested, actual);
   }
-  std::string complaint() const override { return camera_->complaint(); }
+  std::string last_error() const override { return camera_->last_error(); }
   std::string remark() const override { return camera_->remark(); }
   CameraStatistics statistics() const noexcept override { return camera_->statistics(); }
 
@@ -124,22 +124,22 @@ bool ExposureControl::is_without(std::size_t k, const Frame& frame) noexcept {
   return true;
 }
 
-void ExposureControl::ask(const ExposureSetting& wanted) noexcept {
+void ExposureControl::ask(const ExposureSetting& requested) noexcept {
   asked_ = true;
   if (at_once_) {
-    set_all(wanted);
+    set_all(requested);
     return;
   }
   under_way_.store(true, std::memory_order_release);
-  (void)wishes_.push(wanted);  // one at a time: there is room
+  (void)wishes_.push(requested);  // one at a time: there is room
   bell_.ring();
 }
 
-void ExposureControl::set_all(const ExposureSetting& wanted) noexcept {
+void ExposureControl::set_all(const ExposureSetting& requested) noexcept {
   bool unequal = false;
   for (std::size_t k = 0; k < watched_.size(); ++k) {
-    ExposureSetting actual = wanted;
-    const DeviceStatus status = watched_[k]->set_exposure(wanted, &actual);
+    ExposureSetting actual = requested;
+    const DeviceStatus status = watched_[k]->set_exposure(requested, &actual);
     if (status == DeviceStatus::unsupported) unsupported_.store(true);
     if (status != DeviceStatus::ok) {
       refused_.fetch_add(1, std::memory_order_relaxed);
@@ -154,14 +154,14 @@ void ExposureControl::set_all(const ExposureSetting& wanted) noexcept {
 
 void ExposureControl::work() noexcept {
   (void)pthread_setname_np(pthread_self(), "vergence-expose");
-  for (ExposureSetting wanted;;) {
-    const Doorbell::Rung seen = bell_.look();
+  for (ExposureSetting requested;;) {
+    const WakeEvent::Rung seen = bell_.look();
     if (stop_.load(std::memory_order_acquire)) return;
-    if (!wishes_.pop(&wanted)) {
+    if (!wishes_.pop(&requested)) {
       bell_.wait(seen);
       continue;
     }
-    set_all(wanted);
+    set_all(requested);
     under_way_.store(false, std::memory_order_release);
   }
 }

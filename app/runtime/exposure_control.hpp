@@ -6,7 +6,7 @@
 #include <thread>
 #include <vector>
 
-#include "app/runtime/doorbell.hpp"
+#include "app/runtime/wake_event.hpp"
 #include "core/memory/ring.hpp"
 #include "core/types/calibration.hpp"
 #include "drivers/camera.hpp"
@@ -57,8 +57,8 @@ class ExposureControl {
   class Watched;
   void look(std::size_t k, const Frame& frame, const ImageView& image) noexcept;
   [[nodiscard]] bool is_without(std::size_t k, const Frame& frame) noexcept;
-  void ask(const ExposureSetting& wanted) noexcept;
-  void set_all(const ExposureSetting& wanted) noexcept;
+  void ask(const ExposureSetting& requested) noexcept;
+  void set_all(const ExposureSetting& requested) noexcept;
   void work() noexcept;
 
   std::vector<std::unique_ptr<Watched>> watched_;
@@ -76,7 +76,7 @@ class ExposureControl {
   Ring<ExposureSetting, 4> wishes_;
   std::atomic<bool> under_way_{false}, stop_{false}, unsupported_{false};
   std::atomic<std::uint64_t> changes_{0}, refused_{0}, unequal_{0}, again_{0};
-  Doorbell bell_;
+  WakeEvent bell_;
   std::thread thread_;
 };
 

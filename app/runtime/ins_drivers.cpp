@@ -42,7 +42,7 @@ std::string refusal(const InsRequest& request, const InsDriverRow& row, const In
                     DeviceStatus status) {
   const std::string who =
       fmt::format("ins: the {} INS{}", row.name, request.port.empty() ? "" : " on " + request.port);
-  const std::string said = driver.complaint();
+  const std::string said = driver.last_error();
   switch (status) {
     case DeviceStatus::busy:
       return fmt::format(
@@ -86,7 +86,7 @@ std::unique_ptr<InsDevice> open_ins(const InsRequest& request, std::vector<std::
   if (device == nullptr) throw InputError(refusal(request, row, *driver, status));
   status = device->configure(request.rate_hz, nullptr);
   if (status != DeviceStatus::ok) {
-    const std::string said = device->complaint();
+    const std::string said = device->last_error();
     throw InputError(fmt::format(
         "{}: {}", ins_title(device->info()),
         said.empty() ? fmt::format("cannot do what is asked: {}", to_string(status)) : said));

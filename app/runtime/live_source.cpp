@@ -27,12 +27,12 @@ ClockMapperOptions clock_options(const DeviceTiming& t) noexcept {
   return o;
 }
 
-void check(DeviceStatus status, const DeviceInfo& who, const std::string& complaint) {
+void check(DeviceStatus status, const DeviceInfo& who, const std::string& message) {
   if (status == DeviceStatus::ok) return;
-  const std::string why = complaint.empty()
+  const std::string why = message.empty()
                               ? std::string(to_string(status)) +
                                     "; check its cable and its section of the configuration"
-                              : complaint;
+                              : message;
   throw InputError(who.driver + " " + who.serial + " cannot be started: " + why);
 }
 
@@ -62,12 +62,12 @@ LiveSource::~LiveSource() {
 void LiveSource::start() {
   const auto start_camera = [this](std::size_t k) {
     const DeviceStatus status = cameras_[k]->start(this);
-    check(status, cameras_[k]->info(), cameras_[k]->complaint());
+    check(status, cameras_[k]->info(), cameras_[k]->last_error());
   };
   const bool master = options_.sync.mode == SyncMode::master_strobe;
   for (std::size_t k = master ? 1 : 0; k < cameras_.size(); ++k) start_camera(k);
-  if (ins_ != nullptr) check(ins_->start(this), ins_->info(), ins_->complaint());
-  if (trigger_ != nullptr) check(trigger_->start(this), trigger_->info(), trigger_->complaint());
+  if (ins_ != nullptr) check(ins_->start(this), ins_->info(), ins_->last_error());
+  if (trigger_ != nullptr) check(trigger_->start(this), trigger_->info(), trigger_->last_error());
   if (master) start_camera(0);
   thread_ = std::thread([this] { work(); });
 }
@@ -95,7 +95,7 @@ void LiveSource::join() noexcept {
 
 bool LiveSource::next(LiveItem* item) noexcept {
   for (;;) {
-    const Doorbell::Rung seen = filled_.look();
+    const WakeEvent::Rung seen = filled_.look();
     const bool finished = finished_.load(
         std::memory_order_acquire);  // before the ring: what was pushed before is still found
     if (ring_.pop(item)) {
@@ -130,7 +130,7 @@ Stamp LiveSource::stamp_of(HostStamp host) const noexcept {
 void LiveSource::work() {
   (void)pthread_setname_np(pthread_self(), "vergence-sync");
   while (!stop_.load(std::memory_order_acquire)) {
-    const Doorbell::Rung seen = bell_.look();
+    const WakeEvent::Rung seen = bell_.look();
     // Twice: whatever arrived before an item of the first look is there at the second.
     for (int pass = 0; pass < 2; ++pass) {
       for (std::size_t k = 0; k < cameras_.size(); ++k) look(k);
@@ -449,7 +449,7 @@ void LiveSource::push(const LiveItem& item) {
   const bool images = item.kind == LiveItem::Kind::images;
   if (images) waiting_.fetch_add(1, std::memory_order_acq_rel);
   for (;;) {
-    const Doorbell::Rung seen = freed_.look();
+    const WakeEvent::Rung seen = freed_.look();
     if (ring_.push(item)) break;
     if (stop_.load(std::memory_order_acquire)) return;  // nobody may be taking any more
     if (!options_.wait_when_full && item.kind == LiveItem::Kind::reading) {

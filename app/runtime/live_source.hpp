@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "app/runtime/clock_record.hpp"
-#include "app/runtime/doorbell.hpp"
+#include "app/runtime/wake_event.hpp"
 #include "core/memory/ring.hpp"
 #include "drivers/camera.hpp"
 #include "drivers/ins.hpp"
@@ -180,7 +180,7 @@ class LiveSource final : private Notifier {
 
   Ring<LiveItem, kRing> ring_;
   std::atomic<int> waiting_{0};  // sets in the ring
-  Doorbell bell_, filled_, freed_;
+  WakeEvent bell_, filled_, freed_;
   std::atomic<bool> stop_{false}, finished_{false};
   std::atomic<std::uint64_t> skipped_{0};
   LiveCounters counters_{};

@@ -9,12 +9,12 @@ namespace vergence::app {
 
 using std::chrono::steady_clock;
 
-DeviceStatus SoftwareTrigger::configure(const TriggerConfiguration& wanted,
+DeviceStatus SoftwareTrigger::configure(const TriggerConfiguration& requested,
                                         TriggerConfiguration* actual) noexcept {
-  if (!(wanted.rate_hz > 0)) return DeviceStatus::bad_configuration;
-  if (wanted.rate_hz > 1000) return DeviceStatus::unsupported;
-  rate_ = wanted.rate_hz;
-  if (actual != nullptr) *actual = wanted;
+  if (!(requested.rate_hz > 0)) return DeviceStatus::bad_configuration;
+  if (requested.rate_hz > 1000) return DeviceStatus::unsupported;
+  rate_ = requested.rate_hz;
+  if (actual != nullptr) *actual = requested;
   return DeviceStatus::ok;
 }
 

@@ -25,7 +25,7 @@ class SoftwareTrigger final : public TriggerDevice {
   ~SoftwareTrigger() override { stop(); }
 
   const DeviceInfo& info() const noexcept override { return info_; }
-  DeviceStatus configure(const TriggerConfiguration& wanted,
+  DeviceStatus configure(const TriggerConfiguration& requested,
                          TriggerConfiguration* actual) noexcept override;
   DeviceStatus start(Notifier* ready) noexcept override;
   DeviceStatus wait(Duration limit, Pulse* pulse) noexcept override;

@@ -75,8 +75,8 @@ float correlation(const std::array<float, kPatch>& a, const std::array<float, kP
 /// Where the patch around (x, y) of the first picture is in the second: by how much further left.
 /// False: nowhere, or at several places.
 bool find_shift(const Small& first, const Small& second, int x, int y, int* shift) {
-  std::array<float, kPatch> wanted{}, seen{};
-  if (!cut(first, x, y, &wanted)) return false;
+  std::array<float, kPatch> requested{}, seen{};
+  if (!cut(first, x, y, &requested)) return false;
   const int reach = first.width / 4, up = std::max(1, first.height * 6 / 100);
   constexpr float kAlike = 0.85F, kSecondBest = 0.92F;
   float best = 0, second_best = 0;
@@ -85,7 +85,7 @@ bool find_shift(const Small& first, const Small& second, int x, int y, int* shif
        ++u) {
     float here = 0;  // of this column
     for (int v = std::max(kRadius, y - up); v <= std::min(second.height - 1 - kRadius, y + up); ++v)
-      if (cut(second, u, v, &seen)) here = std::max(here, correlation(wanted, seen));
+      if (cut(second, u, v, &seen)) here = std::max(here, correlation(requested, seen));
     if (here > best) {
       if (u - where > 2) second_best = std::max(second_best, best);
       best = here;

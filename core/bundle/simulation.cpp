@@ -112,9 +112,9 @@ Vec3 triangulate(const SimulatedRig& rig, const BundleObservation* first,
     Vec3 ray;
     if (!rig.cameras[o->camera].unproject({o->x, o->y}, &ray)) continue;
     const Vec3 d = (T.R.transpose() * ray).normalized();
-    const Mat3 across = Mat3::Identity() - d * d.transpose();
-    A += across;
-    b += across * T.centre();
+    const Mat3 stereo = Mat3::Identity() - d * d.transpose();
+    A += stereo;
+    b += stereo * T.centre();
   }
   return A.ldlt().solve(b);
 }

@@ -25,9 +25,9 @@ double median_distance(const LoggedFrame& frame, const RigCalibration& rig) noex
   const EpipolarGeometry geometry(rig.T_camera_left[1]);
   std::array<double, kHeldOutMatches> distance;
   std::size_t n = 0;
-  const std::size_t step = frame.sightings.size() / kHeldOutMatches + 1;
-  for (std::size_t i = 0; i < frame.sightings.size() && n < distance.size(); i += step) {
-    const LoggedSighting& s = frame.sightings[i];
+  const std::size_t step = frame.observations.size() / kHeldOutMatches + 1;
+  for (std::size_t i = 0; i < frame.observations.size() && n < distance.size(); i += step) {
+    const LoggedObservation& s = frame.observations[i];
     Vec3 a, b;
     double d = 0;
     if (!s.by(0) || !s.by(1) || !left.unproject(s.raw[0].cast<double>(), &a) ||
@@ -164,7 +164,7 @@ double sigma_excess(const RigCalibration& rig, const CalibrationOptions& o) noex
 namespace {
 
 /// What has to be so whatever was estimated.
-Gate ask_common_gates(const GateQuestion& q, const CalibrationOptions& o) noexcept {
+Gate ask_common_gates(const AcceptanceInput& q, const CalibrationOptions& o) noexcept {
   constexpr double kDegree = std::numbers::pi / 180.0;
   const RigSolution& s = *q.solution;
   if (s.status != RigSolveStatus::ok) return Gate::not_solved;
@@ -180,7 +180,7 @@ Gate ask_common_gates(const GateQuestion& q, const CalibrationOptions& o) noexce
         log_so3(found.R * nominal.R.transpose()).norm() > o.max_rotation_deg * kDegree)
       return Gate::implausible_rotation;
   }
-  // With the lenses free, the depth's own sigma says whether the way was long enough.
+  // With the lenses free, the depth's own sigma says whether the path was long enough.
   const double least = q.lenses ? 0.0 : o.needs_motion_m;
   if (s.travelled_m < std::max(least, kNeedsBaselines * s.rig.baseline)) return Gate::needs_motion;
   if (s.near < o.needs_near_points) return Gate::needs_near_structure;
@@ -189,7 +189,7 @@ Gate ask_common_gates(const GateQuestion& q, const CalibrationOptions& o) noexce
 
 }  // namespace
 
-Gate ask_gates(const GateQuestion& q, const CalibrationOptions& o) noexcept {
+Gate check_acceptance(const AcceptanceInput& q, const CalibrationOptions& o) noexcept {
   const RigSolution& s = *q.solution;
   const Gate common = ask_common_gates(q, o);
   if (common != Gate::open) return common;

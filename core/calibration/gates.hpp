@@ -8,7 +8,7 @@
 
 namespace vergence::calibration {
 
-/// How well a calibration fits frames that it was not solved from: distances of matches across to
+/// How well a calibration fits frames that it was not solved from: distances of stereo matches to
 /// their epipolar lines.
 struct HeldOut {
   int frames = 0;
@@ -67,7 +67,7 @@ enum class Gate : std::uint8_t {
 /// The sentence for events and calibrations.csv; empty for `open`.
 [[nodiscard]] const char* reason(Gate gate) noexcept;
 
-struct GateQuestion {
+struct AcceptanceInput {
   const RigSolution* solution = nullptr;
   const RigCalibration* nominal = nullptr;
   const RigCalibration* in_use = nullptr;  // null: there is none
@@ -84,8 +84,8 @@ struct GateQuestion {
 };
 
 /// METHOD §4: what stands between a solution and its use. Threads pure.
-[[nodiscard]] Gate ask_gates(const GateQuestion& question,
-                             const CalibrationOptions& options) noexcept;
+[[nodiscard]] Gate check_acceptance(const AcceptanceInput& question,
+                                    const CalibrationOptions& options) noexcept;
 
 /// How many times the wanted sigmas the worst of the solution is; ≤ 1: enough.
 [[nodiscard]] double sigma_excess(const RigCalibration& rig,

@@ -6,8 +6,8 @@
 #include <stdexcept>
 #include <string>
 
-#include "core/calibration/detail/monitor_looks.hpp"
-#include "core/calibration/detail/monitor_windows.hpp"
+#include "core/calibration/detail/change_detector.hpp"
+#include "core/calibration/detail/monitor_residuals.hpp"
 
 namespace vergence::calibration {
 namespace {
@@ -51,8 +51,8 @@ struct Monitor::Parts {
   Eigen::Matrix<double, 6, 5> d_offset_d_theta =
       Eigen::Matrix<double, 6, 5>::Zero();  // (φ, τ) by (φ, α, β)
   Mat5 covariance = Mat5::Zero();
-  detail::Looks looks{};
-  detail::Windows windows{};
+  detail::MonitorResiduals looks{};
+  detail::ChangeDetector windows{};
   detail::Decision latest{};
   int agreed = 0, poor = 0, collapsed = 0, standing_over = 0;
   std::uint64_t collapsed_from = 0, standing_from = 0;
@@ -66,7 +66,7 @@ struct Monitor::Parts {
   }
   void watch_collapse(const MonitorFrame& frame) noexcept;
   void watch_matches(const MonitorFrame& frame) noexcept;
-  void watch_standing(const MonitorFrame& frame, const detail::AcrossLook& look) noexcept;
+  void watch_standing(const MonitorFrame& frame, const detail::StereoResiduals& look) noexcept;
 };
 
 std::size_t Monitor::memory_needed(const MonitorOptions&) noexcept {
@@ -111,36 +111,36 @@ void Monitor::reset() noexcept { parts_->forget(); }
 int Monitor::frames_agreed() const noexcept { return parts_->agreed; }
 
 void Monitor::Parts::watch_collapse(const MonitorFrame& frame) noexcept {
-  const bool missing = frame.expected_across >= options.collapse_expected &&
-                       frame.found_across < options.collapse_share * frame.expected_across;
+  const bool missing = frame.expected_stereo >= options.collapse_expected &&
+                       frame.found_stereo < options.collapse_share * frame.expected_stereo;
   if (missing && collapsed == 0) collapsed_from = frame.frame;
   // A frame that expects nothing (night, a covered lens) neither adds nor takes away.
   if (missing)
     ++collapsed;
-  else if (frame.expected_across >= options.collapse_expected)
+  else if (frame.expected_stereo >= options.collapse_expected)
     collapsed = 0;
 }
 
 void Monitor::Parts::watch_matches(const MonitorFrame& frame) noexcept {
   // Of a pair that mostly finds nothing, what is found is chance.
-  const detail::AcrossLook across =
-      collapsed > 0 ? detail::AcrossLook{}
-                    : looks.across(reference, frame, options.min_matches, frame.moving);
-  poor = across.usable ? 0 : poor + 1;
-  if (!across.usable) return;
+  const detail::StereoResiduals stereo =
+      collapsed > 0 ? detail::StereoResiduals{}
+                    : looks.stereo(reference, frame, options.min_matches, frame.moving);
+  poor = stereo.usable ? 0 : poor + 1;
+  if (!stereo.usable) return;
   if (!frame.moving) {
-    watch_standing(frame, across);
+    watch_standing(frame, stereo);
     return;
   }
   standing_over = 0;
   detail::FrameEvidence e;
   e.frame = frame.frame;
   e.before = frame.before;
-  e.evidence.across = across.evidence;
-  e.spread_now = across.spread_now;
-  e.spread_life = across.spread_life;
+  e.evidence.stereo = stereo.evidence;
+  e.spread_now = stereo.spread_now;
+  e.spread_life = stereo.spread_life;
   if (!frame.motion.empty()) {
-    const detail::MotionLook motion = looks.motion(reference, frame);
+    const detail::MotionResiduals motion = looks.motion(reference, frame);
     if (motion.usable) e.evidence.motion = motion.evidence, e.spread_motion = motion.spread;
   }
   windows.push(e);
@@ -152,7 +152,7 @@ void Monitor::Parts::watch_matches(const MonitorFrame& frame) noexcept {
 }
 
 void Monitor::Parts::watch_standing(const MonitorFrame& frame,
-                                    const detail::AcrossLook& look) noexcept {
+                                    const detail::StereoResiduals& look) noexcept {
   if (latest.kind != Kind::quiet && standing_over < kStandingFrames)
     return;  // what moving frames have found stands
   latest.statistic = windows.single(look.evidence, look.spread_now) / kStandingFactor;

@@ -19,7 +19,7 @@ struct MonitorOptions {
       0.12;  // expected of lenses that the drive has confirmed, until it is measured, 0 … 2
   double claimed_bias_px = 0.3;  // and of a calibration that it has not, 0 … 5
   int min_matches =
-      30;  // matches across under which a frame measures nothing (`needs_texture`), 12 … 1000
+      30;  // stereo matches under which a frame measures nothing (`needs_texture`), 12 … 1000
   int short_window = 3;     // moving frames of the shortest window: large knocks, 1 … 10
   int long_window = 300;    // moving frames of the longest window: drift, 60 … 1800
   double lag_frames = 0.3;  // frames: smallest lag of a camera that is called one, 0.1 … 1
@@ -35,7 +35,7 @@ struct MonitorOptions {
 /// A point seen by the left camera and by camera k in one frame. Ideal pinhole pixels (distortion
 /// removed), each camera's own K. Searched for in a band wide enough that the calibration in use
 /// did not force the answer.
-struct AcrossSighting {
+struct StereoObservation {
   Vec2 left, right;
   double sigma_px =
       0;  // of one coordinate, > 0; a common factor does not matter, the spread is measured
@@ -43,7 +43,7 @@ struct AcrossSighting {
 };
 
 /// A point that both cameras saw at an earlier frame (`before`) and see now. One `before` for all
-/// tracks of a frame. A track serves about once in its life: MonitorFeed takes care of it.
+/// tracks of a frame. A track serves about once in its life: MotionTrackBuilder takes care of it.
 struct MotionTrack {
   Vec2 left_before, right_before, left_now, right_now;
   double sigma_px = 0;
@@ -55,15 +55,15 @@ struct MonitorFrame {
   Stamp stamp{};
   std::uint64_t frame = 0;  // strictly increasing
   bool moving = false;      // false: the images repeat themselves, so their errors do not average
-  std::span<const AcrossSighting> across;
+  std::span<const StereoObservation> stereo;
   std::span<const MotionTrack> motion;  // empty in most frames
   Transform T_now_previous{};  // left camera, from the frame before to this one, from the odometry
   std::uint64_t before = 0;    // number of that earlier frame
   Transform T_now_before{};    // left camera, from `before` to now; read with `motion` only
   Transform T_before_earlier{};  // T_now_previous as it was at `before`
-  int expected_across =
+  int expected_stereo =
       0;  // matches a good pair of images would give; 0 where either image is poor by itself
-  int found_across = 0;  // matches there are
+  int found_stereo = 0;  // matches there are
 };
 
 /// What the monitor says after one frame.
@@ -90,22 +90,23 @@ struct MonitorVerdict {
       0;  // knock, out_of_step: first frame of the changed rig; drift: where it began; else `frame`
   int frames_since_onset = 0;  // frames measured since then
   bool needs_motion = false;   // yaw is not known to 0.1° for want of motion
-  bool needs_texture = false;  // too few matches across to measure by
+  bool needs_texture = false;  // too few stereo matches to measure by
 };
 
 /// Watches whether the transform of one further camera still is true (METHOD §4). One Monitor per
 /// further camera.
 ///
-/// Every frame the matches across give, through the distance to the epipolar line, a gradient g and
+/// Every frame the stereo matches give, through the distance to the epipolar line, a gradient g and
 /// an information A of θ = (φ, α, β, κ): the five of moved_on_sphere() and the lag κ of camera k.
-/// Points seen at two instants add what a pair cannot see (yaw): each pair of sightings is a point
-/// with its covariance, and the two must be one rigid motion apart, which is eliminated; the part
-/// of the sightings that speaks of the epipolar distance is not used again. Over a window of frames
+/// Points seen at two instants add what a pair cannot see (yaw): each pair of observations is a
+/// point with its covariance, and the two must be one rigid motion apart, which is eliminated; the
+/// part of the observations that speaks of the epipolar distance is not used again. Over a window
+/// of frames
 ///
 ///     A = Σ A_f/μ,  g = Σ g_f/μ,  μ = λ + n b²/5σ²     λ: spread of whole tracks over the white
 ///     one, measured; b: MonitorOptions::bias_px
-///                             (what is measured of b² counts four times in looks at motion: two
-///                             instants, along the baseline)
+///                             (what is measured of b² counts four times in residuals of motion:
+///                             two instants, along the baseline)
 ///     statistic = gᵀ (A + A C A)⁻¹ g                    C: covariance of the reference; κ held at
 ///     0
 ///
@@ -116,7 +117,7 @@ struct MonitorVerdict {
 ///
 /// Memory   All of it from the arena in the constructor. look() allocates nothing.
 /// Threads  One caller.
-/// Time     Under 0.3 ms for 300 matches across and 200 motion tracks (build/bench/monitor_bench).
+/// Time     Under 0.3 ms for 300 stereo matches and 200 motion tracks (build/bench/monitor_bench).
 /// Errors   The constructor throws (std::invalid_argument with a sentence, std::length_error). What
 ///          is not a number is left out.
 class Monitor {

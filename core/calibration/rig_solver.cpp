@@ -20,7 +20,7 @@ constexpr int kLeastCandidateMatches =
     40;  // across, of the frame whose own transform begins the solve
 constexpr double kHuber = 2.0, kCauchy = 2.5;  // residual scales
 constexpr double kFirstCut = 6.0,
-                 kLastCut = 4.0;  // residual scales beyond which a sighting is left out
+                 kLastCut = 4.0;  // residual scales beyond which a observation is left out
 // Tracks share errors that a cluster a track does not see: clusters are cells of the image and
 // blocks of frames. What is left, variance of the transforms found on recorded and rendered drives
 // over the one by clusters (docs/calibration.md).
@@ -41,7 +41,7 @@ Intrinsics with_sigmas(Intrinsics lens, const std::array<double, kIntrinsicsSize
   return lens;
 }
 
-Vec2 pixel_of(const LoggedSighting& s, int k) noexcept {
+Vec2 pixel_of(const LoggedObservation& s, int k) noexcept {
   return s.raw[static_cast<std::size_t>(k)].cast<double>();
 }
 
@@ -66,11 +66,11 @@ std::size_t RigSolver::memory_needed(const CalibrationOptions& options,
   const BundleCapacities c = capacities(options, cameras, features);
   const auto frames = static_cast<std::size_t>(options.max_frames);
   return TrackLog::memory_needed(frames, features) + BundleAdjuster::memory_needed(c) +
-         Monitor::memory_needed(monitor) + MonitorFeed::memory_needed(features) +
+         Monitor::memory_needed(monitor) + MotionTrackBuilder::memory_needed(features) +
          c.poses * (sizeof(Transform) + sizeof(std::uint16_t) + sizeof(std::uint8_t)) +
          (c.poses + 1) * sizeof(int) + c.points * sizeof(Vec3) +
          c.observations * (sizeof(BundleObservation) + 2 * sizeof(float)) +
-         frames * features * sizeof(Reference) + features * sizeof(AcrossSighting) +
+         frames * features * sizeof(Reference) + features * sizeof(StereoObservation) +
          12 * kCacheLine;
 }
 
@@ -81,7 +81,7 @@ RigSolver::RigSolver(const CalibrationOptions& options, const MonitorOptions& mo
       adjuster_(capacities(options, cameras, features), arena),
       monitor_(monitor, arena),
       expected_scatter_px_(monitor.found_bias_px),
-      feed_(features, arena),
+      track_builder_(features, arena),
       most_frames_(static_cast<std::size_t>(options.max_frames)),
       count_(cameras) {
   const BundleCapacities c = capacities(options, cameras, features);
@@ -96,15 +96,15 @@ RigSolver::RigSolver(const CalibrationOptions& options, const MonitorOptions& mo
   sorted_ = arena.make<float>(c.observations, "calibration residuals");
   references_ = BoundedVector<Reference>(
       arena.make<Reference>(most_frames_ * features, "calibration tracks"));
-  across_ =
-      BoundedVector<AcrossSighting>(arena.make<AcrossSighting>(features, "calibration matches"));
+  stereo_ = BoundedVector<StereoObservation>(
+      arena.make<StereoObservation>(features, "calibration matches"));
 }
 
 bool RigSolver::choose_candidate(const RigCalibration& rig) noexcept {
   const LoggedFrame* best = nullptr;
   for (std::size_t i = 0; i < log_.size(); ++i) {
     const LoggedFrame& f = log_.frame(i);
-    if (!f.unlinked || f.across < kLeastCandidateMatches) continue;
+    if (!f.unlinked || f.stereo < kLeastCandidateMatches) continue;
     if (best == nullptr || f.reprojection_px < best->reprojection_px) best = &f;
   }
   if (best == nullptr) return false;
@@ -130,9 +130,9 @@ bool RigSolver::begin_with(const RigSolveRequest& request) noexcept {
 
 /// As many of the logged frames as there is room for, counted from the newest, so that it is in.
 void RigSolver::choose_frames() noexcept {
-  std::size_t sightings = 0;
-  for (std::size_t i = 0; i < log_.size(); ++i) sightings += log_.frame(i).sightings.size();
-  const std::size_t step = 1 + sightings * static_cast<std::size_t>(count_) /
+  std::size_t observations = 0;
+  for (std::size_t i = 0; i < log_.size(); ++i) observations += log_.frame(i).observations.size();
+  const std::size_t step = 1 + observations * static_cast<std::size_t>(count_) /
                                    static_cast<std::size_t>(options_.max_observations);
   poses_.clear();
   logged_.clear();
@@ -146,9 +146,9 @@ void RigSolver::sort_tracks() noexcept {
   references_.clear();
   for (std::size_t i = 0; i < logged_.size(); ++i) {
     const LoggedFrame& f = log_.frame(logged_[i]);
-    for (std::size_t j = 0; j < f.sightings.size(); ++j)
+    for (std::size_t j = 0; j < f.observations.size(); ++j)
       (void)references_.push(
-          {f.sightings[j].track, static_cast<std::uint16_t>(i), static_cast<std::uint16_t>(j)});
+          {f.observations[j].track, static_cast<std::uint16_t>(i), static_cast<std::uint16_t>(j)});
   }
   std::sort(references_.begin(), references_.end(), [](const Reference& a, const Reference& b) {
     return a.track != b.track ? a.track < b.track : a.frame < b.frame;
@@ -156,19 +156,19 @@ void RigSolver::sort_tracks() noexcept {
 }
 
 bool RigSolver::add_point(std::span<const Reference> track) noexcept {
-  const auto sighting = [&](const Reference& r) -> const LoggedSighting& {
-    return log_.frame(logged_[r.frame]).sightings[r.sighting];
+  const auto observation = [&](const Reference& r) -> const LoggedObservation& {
+    return log_.frame(logged_[r.frame]).observations[r.observation];
   };
   int pairs = 0;
   for (const Reference& r : track)
-    pairs += (sighting(r).cameras & 1U) != 0 && (sighting(r).cameras & ~1U) != 0 ? 1 : 0;
+    pairs += (observation(r).cameras & 1U) != 0 && (observation(r).cameras & ~1U) != 0 ? 1 : 0;
   if (pairs < 2 || points_.full()) return true;  // four images see it, or it is none (METHOD §3)
 
   std::array<RayView, kMostViews * kMaxCameras> views;
   std::size_t n = 0;
   const std::size_t step = (track.size() + kMostViews - 1) / kMostViews;
   for (std::size_t i = 0; i < track.size(); i += step) {
-    const LoggedSighting& s = sighting(track[i]);
+    const LoggedObservation& s = observation(track[i]);
     for (int k = 0; k < count_; ++k) {
       const auto c = static_cast<std::size_t>(k);
       Vec3 ray;
@@ -182,7 +182,7 @@ bool RigSolver::add_point(std::span<const Reference> track) noexcept {
 
   const std::size_t first = observations_.size();
   for (const Reference& r : track) {
-    const LoggedSighting& s = sighting(r);
+    const LoggedObservation& s = observation(r);
     for (int k = 0; k < count_; ++k) {
       if (!s.by(k)) continue;
       const auto c = static_cast<std::size_t>(k);
@@ -225,7 +225,7 @@ void RigSolver::make_points() noexcept {
   }
 }
 
-/// A frame that hardly a track ties to the ones before it (the scene was built anew there) begins a
+/// A frame that hardly a track ties to the ones before it (the scene was rebuilt there) begins a
 /// piece of its own: its pose is held, as the first one is, for nothing else would.
 void RigSolver::hold_pieces() noexcept {
   held_.clear();
@@ -263,7 +263,7 @@ BundleOptions RigSolver::options_of(const RigSolveRequest& request) const noexce
   for (int k = 0; k < count_; ++k) {
     const auto c = static_cast<std::size_t>(k);
     const Intrinsics& lens =
-        (request.told != nullptr && lenses ? *request.told : rig).intrinsics[c];
+        (request.given != nullptr && lenses ? *request.given : rig).intrinsics[c];
     BundleIntrinsics& out = how.intrinsics[c];
     if (options_.refine_intrinsics != 0)
       out.free = kPinhole;
@@ -394,30 +394,32 @@ void RigSolver::write_result(const BundleResult& r, RigSolution* s) const noexce
   rig.scale_sigma = std::hypot(noise, std::hypot(kScaleByFocal * focal, kScaleByRadian * centre));
 }
 
-/// What the monitor would have said on the way, had it known the result: a camera out of step, or
-/// two rigs in one solve.
+/// What the monitor would have said during the drive, had it known the result: a camera out of
+/// step, or two rigs in one solve.
 void RigSolver::watch_frames(RigSolution* s) noexcept {
   const Intrinsics &a = cameras_[0].intrinsics(), &b = cameras_[1].intrinsics();
   const Pinhole left{a.fx, a.fy, a.cx, a.cy}, right{b.fx, b.fy, b.cx, b.cy};
   if (!monitor_.set_reference(s->rig.T_camera_left[1], left, right, s->rig.covariance_wide[1]))
     return;
   monitor_.expect_scatter(expected_scatter_px_);
-  feed_.reset();
+  track_builder_.reset();
   for (std::size_t i = 0; i < poses_.size(); ++i) {
     const LoggedFrame& f = log_.frame(logged_[i]);
-    across_.clear();
-    for (const LoggedSighting& sighting : f.sightings) {
+    stereo_.clear();
+    for (const LoggedObservation& observation : f.observations) {
       Vec3 l, r;
-      if (!sighting.by(0) || !sighting.by(1) || !cameras_[0].unproject(pixel_of(sighting, 0), &l) ||
-          !cameras_[1].unproject(pixel_of(sighting, 1), &r))
+      if (!observation.by(0) || !observation.by(1) ||
+          !cameras_[0].unproject(pixel_of(observation, 0), &l) ||
+          !cameras_[1].unproject(pixel_of(observation, 1), &r))
         continue;
-      (void)across_.push(
+      (void)stereo_.push(
           {Vec2(left.fx * l.x() / l.z() + left.cx, left.fy * l.y() / l.z() + left.cy),
            Vec2(right.fx * r.x() / r.z() + right.cx, right.fy * r.y() / r.z() + right.cy),
-           static_cast<double>(sighting.sigma), sighting.track});
+           static_cast<double>(observation.sigma), observation.track});
     }
     const Transform step = i == 0 ? Transform{} : poses_[i] * poses_[i - 1].inverse();
-    const MonitorVerdict v = monitor_.look(feed_.next(f.stamp, f.number, across_.span(), step));
+    const MonitorVerdict v =
+        monitor_.look(track_builder_.next(f.stamp, f.number, stereo_.span(), step));
     s->lag_frames = v.lag_frames;
     if (v.kind == MonitorVerdict::Kind::out_of_step) s->out_of_step = true;
     if (v.kind == MonitorVerdict::Kind::knock && v.statistic > kCertainChange * v.threshold)

@@ -1,7 +1,7 @@
 #pragma once
 #include "core/bundle/bundle.hpp"
 #include "core/calibration/monitor.hpp"
-#include "core/calibration/monitor_feed.hpp"
+#include "core/calibration/motion_track_builder.hpp"
 #include "core/calibration/options.hpp"
 #include "core/calibration/track_log.hpp"
 #include "core/memory/arena.hpp"
@@ -32,8 +32,8 @@ struct RigSolveRequest {
                           // frame that fits best
   const RigCalibration* known =
       nullptr;  // what earlier frames told, with its covariance; null: nothing
-  const RigCalibration* told = nullptr;  // whose lenses and sigmas are the priors where nothing is
-                                         // known; null: those of `rig`
+  const RigCalibration* given = nullptr;  // whose lenses and sigmas are the priors where nothing is
+                                          // known; null: those of `rig`
 };
 
 struct RigSolution {
@@ -81,7 +81,7 @@ class RigSolver {
   struct Reference {
     std::uint32_t track;
     std::uint16_t frame;
-    std::uint16_t sighting;
+    std::uint16_t observation;
   };
   [[nodiscard]] static BundleCapacities capacities(const CalibrationOptions& options, int cameras,
                                                    std::size_t features) noexcept;
@@ -106,7 +106,7 @@ class RigSolver {
   BundleAdjuster adjuster_;
   Monitor monitor_;
   double expected_scatter_px_;
-  MonitorFeed feed_;
+  MotionTrackBuilder track_builder_;
   std::size_t most_frames_;
   std::array<Camera, kMaxCameras> cameras_{};
   std::array<Transform, kMaxCameras> T_camera_left_{};
@@ -118,7 +118,7 @@ class RigSolver {
   BoundedVector<Vec3> points_;
   BoundedVector<BundleObservation> observations_;
   BoundedVector<Reference> references_;
-  BoundedVector<AcrossSighting> across_;
+  BoundedVector<StereoObservation> stereo_;
   std::span<float> residuals_, sorted_;
 };
 

@@ -6,16 +6,16 @@
 
 namespace vergence::calibration {
 
-Stretches::Stretches(Kind kind, const RigCalibration& told, const RigCalibration& start,
+Stretches::Stretches(Kind kind, const RigCalibration& given, const RigCalibration& start,
                      std::size_t frames, const CalibrationOptions& options,
                      const MonitorOptions& monitor, std::size_t features, Arena& arena)
     : kind_(kind),
       options_(options),
-      told_(told),
+      given_(given),
       start_(start),
       frames_(std::clamp(frames, static_cast<std::size_t>(options.min_frames),
                          static_cast<std::size_t>(options.max_frames))),
-      solver_(options_, monitor, told.cameras, features, arena) {}
+      solver_(options_, monitor, given.cameras, features, arena) {}
 
 std::size_t Stretches::memory_needed(const CalibrationOptions& options,
                                      const MonitorOptions& monitor, int cameras,
@@ -47,7 +47,7 @@ std::optional<RigSolution> Stretches::solve() noexcept {
   request.rig = start_;
   request.freedom = RigFreedom::lenses;
   request.from_rig = true;
-  request.told = &told_;
+  request.given = &given_;
   const Stamp newest = solver_.log().frame(solver_.log().size() - 1).stamp;
   RigCalibration known =
       known_;  // as old as it is now: a solve that fails must not age it for the next

@@ -18,7 +18,7 @@ class Stretches {
     alone,   // each knows nothing of the others: they can be held against each other
     joined,  // each begins with what those before it told: the last one is the drive's
   };
-  Stretches(Kind kind, const RigCalibration& told, const RigCalibration& start, std::size_t frames,
+  Stretches(Kind kind, const RigCalibration& given, const RigCalibration& start, std::size_t frames,
             const CalibrationOptions& options, const MonitorOptions& monitor, std::size_t features,
             Arena& arena);
   [[nodiscard]] static std::size_t memory_needed(const CalibrationOptions& options,
@@ -38,7 +38,7 @@ class Stretches {
 
   Kind kind_;
   CalibrationOptions options_;
-  RigCalibration told_, start_, known_;
+  RigCalibration given_, start_, known_;
   bool any_known_ = false;
   std::size_t frames_;
   RigSolver solver_;

@@ -4,14 +4,14 @@
 
 namespace vergence::calibration {
 
-std::size_t TrackLog::memory_needed(std::size_t frames, std::size_t sightings) noexcept {
-  return frames * (sizeof(LoggedFrame) + sightings * sizeof(LoggedSighting)) + 2 * kCacheLine;
+std::size_t TrackLog::memory_needed(std::size_t frames, std::size_t observations) noexcept {
+  return frames * (sizeof(LoggedFrame) + observations * sizeof(LoggedObservation)) + 2 * kCacheLine;
 }
 
-TrackLog::TrackLog(std::size_t frames, std::size_t sightings, Arena& arena)
+TrackLog::TrackLog(std::size_t frames, std::size_t observations, Arena& arena)
     : frames_(arena.make<LoggedFrame>(frames, "logged frames")),
-      sightings_(arena.make<LoggedSighting>(frames * sightings, "logged tracks")),
-      capacity_(sightings) {}
+      observations_(arena.make<LoggedObservation>(frames * observations, "logged tracks")),
+      capacity_(observations) {}
 
 void TrackLog::begin(const LoggedFrame& frame) noexcept {
   if (size_ == frames_.size())
@@ -20,18 +20,18 @@ void TrackLog::begin(const LoggedFrame& frame) noexcept {
     ++size_;
   const std::size_t at = slot(size_ - 1);
   frames_[at] = frame;
-  frames_[at].sightings = sightings_.subspan(at * capacity_, 0);
+  frames_[at].observations = observations_.subspan(at * capacity_, 0);
 }
 
-void TrackLog::push(const LoggedSighting& sighting) noexcept {
+void TrackLog::push(const LoggedObservation& observation) noexcept {
   const std::size_t at = slot(size_ - 1);
-  std::span<LoggedSighting>& held = frames_[at].sightings;
+  std::span<LoggedObservation>& held = frames_[at].observations;
   if (held.size() == capacity_) {
     ++left_out_;
     return;
   }
-  held = sightings_.subspan(at * capacity_, held.size() + 1);
-  held.back() = sighting;
+  held = observations_.subspan(at * capacity_, held.size() + 1);
+  held.back() = observation;
 }
 
 void TrackLog::drop_before(std::uint64_t number) noexcept {
@@ -59,11 +59,11 @@ void TrackLog::copy(const TrackLog& from, std::size_t frames) noexcept {
 
 void TrackLog::append(const LoggedFrame& frame) noexcept {
   begin(frame);
-  const std::size_t at = slot(size_ - 1), count = std::min(frame.sightings.size(), capacity_);
-  std::copy_n(frame.sightings.begin(), count,
-              sightings_.begin() + static_cast<std::ptrdiff_t>(at * capacity_));
-  frames_[at].sightings = sightings_.subspan(at * capacity_, count);
-  left_out_ += frame.sightings.size() - count;
+  const std::size_t at = slot(size_ - 1), count = std::min(frame.observations.size(), capacity_);
+  std::copy_n(frame.observations.begin(), count,
+              observations_.begin() + static_cast<std::ptrdiff_t>(at * capacity_));
+  frames_[at].observations = observations_.subspan(at * capacity_, count);
+  left_out_ += frame.observations.size() - count;
 }
 
 }  // namespace vergence::calibration

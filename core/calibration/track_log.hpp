@@ -11,7 +11,7 @@
 namespace vergence::calibration {
 
 /// One track in one rig frame: raw pixels, as the images have them.
-struct LoggedSighting {
+struct LoggedObservation {
   std::uint32_t track = 0;
   std::uint8_t cameras = 0;  // bit k: camera k saw it
   float sigma = 0;           // px, of one coordinate
@@ -31,32 +31,32 @@ struct LoggedFrame {
   std::array<Transform, kMaxCameras> T_camera_left{};
   bool unlinked = false;       // T_camera_left was measured in this frame
   double reprojection_px = 0;  // rms of that frame's pose
-  int across = 0;              // tracks that both cameras hold
-  std::span<LoggedSighting> sightings;
+  int stereo = 0;              // tracks that both cameras hold
+  std::span<LoggedObservation> observations;
 };
 
 /// The newest moving rig frames with their tracks: what a calibration is found from.
 ///
-/// Policies when full  Frames: the oldest goes. Sightings of a frame: the rest is left out and
+/// Policies when full  Frames: the oldest goes. Observations of a frame: the rest is left out and
 /// counted. Threads one. Memory from the arena at construction.
 class TrackLog {
  public:
-  TrackLog(std::size_t frames, std::size_t sightings, Arena& arena);
+  TrackLog(std::size_t frames, std::size_t observations, Arena& arena);
   [[nodiscard]] static std::size_t memory_needed(std::size_t frames,
-                                                 std::size_t sightings) noexcept;
+                                                 std::size_t observations) noexcept;
 
   /// A new frame; push() then fills it.
   void begin(const LoggedFrame& frame) noexcept;
-  void push(const LoggedSighting& sighting) noexcept;
+  void push(const LoggedObservation& observation) noexcept;
 
   void clear() noexcept { size_ = 0; }
   /// Forgets frames with a number below.
   void drop_before(std::uint64_t number) noexcept;
   /// The world was scaled about a place: the poses follow.
   void scale_about(const Vec3& centre, double factor) noexcept;
-  /// A frame of another log with its sightings.
+  /// A frame of another log with its observations.
   void append(const LoggedFrame& frame) noexcept;
-  /// The newest `frames` of another log with its sightings, in place of what is here.
+  /// The newest `frames` of another log with its observations, in place of what is here.
   void copy(const TrackLog& from, std::size_t frames) noexcept;
 
   [[nodiscard]] std::size_t size() const noexcept { return size_; }
@@ -72,7 +72,7 @@ class TrackLog {
   }
 
   std::span<LoggedFrame> frames_;
-  std::span<LoggedSighting> sightings_;  // as many a frame as capacity_
+  std::span<LoggedObservation> observations_;  // as many a frame as capacity_
   std::size_t capacity_;
   std::size_t first_ = 0, size_ = 0;
   std::uint64_t left_out_ = 0;

@@ -98,7 +98,7 @@ struct ComparisonCounters {
   std::uint64_t ins_samples = 0;
   std::uint64_t ins_refused = 0;  // out of order, not a number, not a place on the earth
   std::uint64_t ins_restarts =
-      0;  // the INS's stamps went back for good: its history was begun anew
+      0;  // the INS's stamps went back for good: its history was begun again
   std::uint64_t jumps = 0;
   std::uint64_t compared = 0;
   std::uint64_t without_ins = 0;  // poses that went out with an InsMatch other than ok

@@ -28,13 +28,13 @@ Mat3 start(std::span<const PlacementPair> pairs, const Vec3& middle_world,
   Eigen::Quaterniond mean;
   mean.coeffs() = sum.normalized();
   const Mat3 R = sum.norm() > 0 ? mean.toRotationMatrix() : pairs.front().R_enu_world;
-  double along = 0, across = 0;
+  double along = 0, stereo = 0;
   for (const PlacementPair& p : pairs) {
     const Vec3 d = R * (p.p_world_left - middle_world), y = p.p_enu_left - middle_enu;
     along += d.x() * y.x() + d.y() * y.y();
-    across += d.x() * y.y() - d.y() * y.x();
+    stereo += d.x() * y.y() - d.y() * y.x();
   }
-  return exp_so3({0, 0, std::atan2(across, along)}) * R;
+  return exp_so3({0, 0, std::atan2(stereo, along)}) * R;
 }
 
 struct Normal {

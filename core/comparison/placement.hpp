@@ -38,7 +38,7 @@ struct Placement {
 enum class PlacementStatus : std::uint8_t {
   ok,
   too_few,   // fewer than three pairs
-  not_held,  // the way is too short to hold a heading
+  not_held,  // the path is too short to hold a heading
 };
 
 /// Least squares for T_enu_world on positions, with the INS's roll and pitch, and its heading where

@@ -309,7 +309,7 @@ void Estimator::Parts::follow(const odometry::FrameOutcome& out, const RigFrame&
     unmatched_frames = 0;
     // Good images of which no scene can be made: then it is the rig that does not fit.
     give_up_calibration(frame, kUnmatchedAfter);
-    odometry.forget_rig();
+    odometry.reset_extrinsics();
   }
   if (!out.posed) {
     if (++without_pose == kLostAfter) {
@@ -330,7 +330,7 @@ void Estimator::Parts::follow(const odometry::FrameOutcome& out, const RigFrame&
   }
   if (out.restarted) {
     note(EstimatorEvent::Kind::scene_restarted, frame.stamp,
-         "the scene was built anew; the way since the last pose is extrapolated", out.gap_s);
+         "the map was rebuilt; the motion since the last pose is extrapolated", out.gap_s);
     calibrator.scene_lost();
   }
   if (out.relocalised)

@@ -84,7 +84,7 @@ void OnlineCalibrator::SolveTask::operator()() const noexcept {
   }
   if (c.options_.calibration.estimate_lenses == 0) return;
   request.freedom = calibration::RigFreedom::lenses;
-  request.told = &c.told_;  // what the frames have shown since must not be its own witness
+  request.given = &c.given_;  // what the frames have shown since must not be its own witness
   request.known = c.has_prior_ ? &c.prior_ : nullptr;
   c.solved_.lenses = c.rig_solver_.solve(request);
 }
@@ -97,8 +97,9 @@ std::size_t OnlineCalibrator::memory_needed(const EstimatorOptions& o,
          calibration::RigSolver::memory_needed(o.calibration, o.monitor, rig.cameras,
                                                most_tracks(o)) +
          further * (calibration::Monitor::memory_needed(o.monitor) +
-                    calibration::MonitorFeed::memory_needed(most_tracks(o))) +
-         most_tracks(o) * sizeof(calibration::AcrossSighting) + 2 * kCacheLine;
+                    calibration::MotionTrackBuilder::memory_needed(most_tracks(o)) +
+                    calibration::DisparityJumpDetector::memory_needed(most_tracks(o))) +
+         most_tracks(o) * sizeof(calibration::StereoObservation) + 2 * kCacheLine;
 }
 
 OnlineCalibrator::OnlineCalibrator(const EstimatorOptions& options, const RigCalibration& rig,
@@ -107,7 +108,7 @@ OnlineCalibrator::OnlineCalibrator(const EstimatorOptions& options, const RigCal
     : options_(options),
       rig_(rig),
       nominal_(nominal),
-      told_(rig),
+      given_(rig),
       calibrated_(options.trust != CalibrationTrust::none),
       log_(static_cast<std::size_t>(options.calibration.max_frames), most_tracks(options), arena),
       rig_solver_(options.calibration, options.monitor, rig.cameras, most_tracks(options), arena),
@@ -116,9 +117,10 @@ OnlineCalibrator::OnlineCalibrator(const EstimatorOptions& options, const RigCal
   for (int k = 1; k < rig.cameras; ++k) {
     monitors_[static_cast<std::size_t>(k)].emplace(options.monitor, arena);
     feeds_[static_cast<std::size_t>(k)].emplace(most_tracks(options), arena);
+    jumps_[static_cast<std::size_t>(k)].emplace(most_tracks(options), arena);
   }
-  across_ = BoundedVector<calibration::AcrossSighting>(
-      arena.make<calibration::AcrossSighting>(most_tracks(options), "monitored matches"));
+  stereo_ = BoundedVector<calibration::StereoObservation>(
+      arena.make<calibration::StereoObservation>(most_tracks(options), "monitored matches"));
   if (!calibrated_) return;
   watch_calibration();
   begin_segment();
@@ -172,6 +174,7 @@ void OnlineCalibrator::watch_against(int k, const Transform& T_camera_left,
   const auto c = static_cast<std::size_t>(k);
   (void)monitors_[c]->set_reference(T_camera_left, pinhole(0), pinhole(c), covariance);
   feeds_[c]->reset();
+  jumps_[c]->set_reference(rig_.T_camera_left[c], pinhole(0), pinhole(c));
   grace_[c] = kGraceFrames;
 }
 
@@ -196,6 +199,8 @@ void OnlineCalibrator::scene_lost() noexcept {
     if (m) m->reset();
   for (auto& f : feeds_)
     if (f) f->reset();
+  for (auto& j : jumps_)
+    if (j) j->reset();
 }
 
 int OnlineCalibrator::frames_agreed() const noexcept {
@@ -229,13 +234,13 @@ void OnlineCalibrator::log(odometry::Odometry& odometry, const odometry::FrameOu
   f.T_camera_left = odometry.rig().T_camera_left;
   f.unlinked = odometry.linked() == odometry::Link::unlinked;
   f.reprojection_px = outcome.reprojection_px;
-  f.across = outcome.stereo_inliers;
+  f.stereo = outcome.stereo_inliers;
   log_.begin(f);
   for (MapPoint& p : odometry.map().points()) {
-    // A track is taken by what the left camera's pose says of it. Linked, the others' sightings are
-    // taken as they were found: the calibration in use must not choose its own witnesses.
+    // A track is taken by what the left camera's pose says of it. Linked, the others' observations
+    // are taken as they were found: the calibration in use must not choose its own witnesses.
     if (!p.followed() || !p.now.by(0)) continue;
-    calibration::LoggedSighting s;
+    calibration::LoggedObservation s;
     s.track = p.id;
     s.cameras = f.unlinked ? p.now.cameras : p.in_images;
     s.sigma = p.now.sigma[0];
@@ -248,7 +253,7 @@ void OnlineCalibrator::log(odometry::Odometry& odometry, const odometry::FrameOu
   frames_still_ = 0;
 }
 
-int OnlineCalibrator::expected_across(const odometry::Odometry& odometry, int k,
+int OnlineCalibrator::expected_stereo(const odometry::Odometry& odometry, int k,
                                       const Transform& T_left_world) const noexcept {
   const Transform T = rig_.T_camera_left[static_cast<std::size_t>(k)] * T_left_world;
   const Camera& camera = odometry.front_end().lens(k).raw();
@@ -272,7 +277,7 @@ MonitorVerdict OnlineCalibrator::watch(const odometry::Odometry& odometry,
   any_ = true;
   for (int k = 1; k < rig_.cameras; ++k) {
     const auto c = static_cast<std::size_t>(k);
-    across_.clear();
+    stereo_.clear();
     int found = 0;
     for (const MapPoint& p : odometry.map().points()) {
       // A point made in this frame was sought in the band of the calibration in use: it is no
@@ -280,19 +285,25 @@ MonitorVerdict OnlineCalibrator::watch(const odometry::Odometry& odometry,
       if (!p.followed() || p.found < 2 || !p.now.by(0)) continue;
       if (((p.in_images >> static_cast<unsigned>(k)) & 1U) == 0) continue;
       if (p.stage == odometry::PointStage::active) ++found;
-      (void)across_.push({p.now.pixel[0].cast<double>(), p.now.pixel[c].cast<double>(),
+      (void)stereo_.push({p.now.pixel[0].cast<double>(), p.now.pixel[c].cast<double>(),
                           static_cast<double>(std::max(p.now.sigma[0], p.now.sigma[c])), p.id});
     }
-    calibration::MonitorFrame f = feeds_[c]->next(frame.stamp, frame.number, across_.span(), step);
-    f.expected_across =
-        outcome.images_good ? expected_across(odometry, k, outcome.T_left_world) : 0;
-    f.found_across = found;
+    const calibration::DisparityJump jump = jumps_[c]->next(frame.number, stereo_.span(), step);
+    calibration::MonitorFrame f = feeds_[c]->next(frame.stamp, frame.number, stereo_.span(), step);
+    f.expected_stereo =
+        outcome.images_good ? expected_stereo(odometry, k, outcome.T_left_world) : 0;
+    f.found_stereo = found;
     MonitorVerdict v = monitors_[c]->look(f);
     if (grace_[c] > 0) {
       --grace_[c];
       v = MonitorVerdict{};
     }
     learn_reference(k, v);
+    if (jump.confirmed && rank(v.kind) < rank(MonitorVerdict::Kind::knock)) {
+      v.kind = MonitorVerdict::Kind::knock;
+      v.onset_frame = jump.onset_frame;
+    }
+    v.undecided = v.undecided || jump.suspected;
     if (rank(v.kind) > rank(worst.kind) ||
         (rank(v.kind) == rank(worst.kind) && (v.undecided || v.statistic > worst.statistic)))
       worst = v;
@@ -392,9 +403,9 @@ std::optional<CalibrationDecision> OnlineCalibrator::judge(Stamp stamp, std::uin
   return sought_ ? judge_sought(stamp, number, last) : judge_learnt(stamp, number, last);
 }
 
-calibration::GateQuestion OnlineCalibrator::question(const calibration::RigSolution& found,
-                                                     bool last) const noexcept {
-  calibration::GateQuestion q;
+calibration::AcceptanceInput OnlineCalibrator::question(const calibration::RigSolution& found,
+                                                        bool last) const noexcept {
+  calibration::AcceptanceInput q;
   q.solution = &found;
   q.nominal = &nominal_;
   q.in_use = calibrated_ ? &rig_ : nullptr;
@@ -429,7 +440,7 @@ CalibrationDecision OnlineCalibrator::judge_sought(Stamp stamp, std::uint64_t nu
   // well enough; else transforms alone.
   const calibration::RigSolution& found =
       lenses_are_off(last) ? solved_.lenses : solved_.transforms;
-  gate_ = calibration::ask_gates(question(found, last), options_.calibration);
+  gate_ = calibration::check_acceptance(question(found, last), options_.calibration);
   CalibrationDecision d = begin_decision(stamp, number, found);
   d.accepted = gate_ == Gate::open;
   d.reason = calibration::reason(gate_);
@@ -485,9 +496,9 @@ void OnlineCalibrator::assess_lenses(const RigCalibration& in_use_then, std::uin
 bool OnlineCalibrator::lenses_are_off(bool last) const noexcept {
   const calibration::RigSolution &free = solved_.lenses, &held = solved_.transforms;
   if (free.status != calibration::RigSolveStatus::ok) return false;
-  calibration::GateQuestion q = question(free, last);
+  calibration::AcceptanceInput q = question(free, last);
   q.must_be_better = false;
-  if (calibration::ask_gates(q, options_.calibration) != Gate::open) return false;
+  if (calibration::check_acceptance(q, options_.calibration) != Gate::open) return false;
   return held.status != calibration::RigSolveStatus::ok ||
          calibration::fits_better(log_, free.newest, free.rig, held.rig);
 }
@@ -505,9 +516,9 @@ CalibrationDecision OnlineCalibrator::judge_learnt(Stamp stamp, std::uint64_t nu
   const auto most = static_cast<std::size_t>(options_.calibration.max_frames);
   const bool lenses = options_.calibration.estimate_lenses != 0;
   const calibration::RigSolution& found = lenses ? solved_.lenses : solved_.transforms;
-  calibration::GateQuestion q = question(found, last);
+  calibration::AcceptanceInput q = question(found, last);
   q.must_be_better = false;
-  gate_ = calibration::ask_gates(q, options_.calibration);
+  gate_ = calibration::check_acceptance(q, options_.calibration);
   CalibrationDecision d = begin_decision(stamp, number, found);
   d.cause = CalibrationCause::refinement;
   d.learnt = true;

@@ -2,9 +2,10 @@
 #include <array>
 #include <optional>
 
+#include "core/calibration/disparity_jump.hpp"
 #include "core/calibration/gates.hpp"
 #include "core/calibration/monitor.hpp"
-#include "core/calibration/monitor_feed.hpp"
+#include "core/calibration/motion_track_builder.hpp"
 #include "core/calibration/rig_solver.hpp"
 #include "core/calibration/track_log.hpp"
 #include "core/estimator/estimator.hpp"
@@ -106,8 +107,8 @@ class OnlineCalibrator {
   void learn_reference(int k, const calibration::MonitorVerdict& verdict) noexcept;
   [[nodiscard]] CalibrationDecision begin_decision(
       Stamp stamp, std::uint64_t number, const calibration::RigSolution& found) const noexcept;
-  [[nodiscard]] calibration::GateQuestion question(const calibration::RigSolution& found,
-                                                   bool last) const noexcept;
+  [[nodiscard]] calibration::AcceptanceInput question(const calibration::RigSolution& found,
+                                                      bool last) const noexcept;
   /// `last`: no more frames come that could make it better.
   [[nodiscard]] CalibrationDecision judge_sought(Stamp stamp, std::uint64_t number,
                                                  bool last) noexcept;
@@ -120,12 +121,12 @@ class OnlineCalibrator {
                                                          bool last) noexcept;
   void begin_segment() noexcept;
   [[nodiscard]] double pixels_moved(const odometry::Map& map) const noexcept;
-  [[nodiscard]] int expected_across(const odometry::Odometry& odometry, int k,
+  [[nodiscard]] int expected_stereo(const odometry::Odometry& odometry, int k,
                                     const Transform& T_left_world) const noexcept;
 
   const EstimatorOptions& options_;
   RigCalibration rig_, nominal_;
-  const RigCalibration told_;  // the drive began with
+  const RigCalibration given_;  // the drive began with
   bool calibrated_;
   bool verified_ = false, ever_verified_ = false;
   bool watched_ = true;  // the monitor has seen the rig all the time, or has made sure since
@@ -137,8 +138,9 @@ class OnlineCalibrator {
   BackgroundRunner& runner_;
   SolveTask task_;
   std::array<std::optional<calibration::Monitor>, kMaxCameras> monitors_;  // [k] of camera k ≥ 1
-  std::array<std::optional<calibration::MonitorFeed>, kMaxCameras> feeds_;
-  BoundedVector<calibration::AcrossSighting> across_;
+  std::array<std::optional<calibration::MotionTrackBuilder>, kMaxCameras> feeds_;
+  std::array<std::optional<calibration::DisparityJumpDetector>, kMaxCameras> jumps_;
+  BoundedVector<calibration::StereoObservation> stereo_;
   std::array<bool, kMaxCameras> learning_{};
   std::array<int, kMaxCameras> grace_{};  // frames whose verdict does not count yet
   Transform T_left_world_{};

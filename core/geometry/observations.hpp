@@ -42,7 +42,7 @@ struct RigObservations {
   [[nodiscard]] bool usable(std::size_t i, int camera) const noexcept;
 };
 
-/// Owns the arrays of RigObservations in an arena; filled anew every frame. When full, push()
+/// Owns the arrays of RigObservations in an arena; refilled every frame. When full, push()
 /// refuses.
 class RigObservationTable {
  public:

@@ -114,7 +114,8 @@ FrontEnd::FrontEnd(const OdometryOptions& options, const RigCalibration& rig, Ar
 
 void FrontEnd::rebuild_lenses() noexcept {
   for (int k = 0; k < cameras_; ++k)
-    lenses_[static_cast<std::size_t>(k)] = Lens(rig_.intrinsics[static_cast<std::size_t>(k)]);
+    lenses_[static_cast<std::size_t>(k)] =
+        UndistortedCamera(rig_.intrinsics[static_cast<std::size_t>(k)]);
 }
 
 ImageCheck FrontEnd::begin(const RigFrame& frame) noexcept {
@@ -270,7 +271,7 @@ void FrontEnd::find_dense_corners(int k) noexcept {
                          &taken_);
 }
 
-int FrontEnd::find_again(Map& map, int k) noexcept {
+int FrontEnd::relocalise(Map& map, int k) noexcept {
   const auto c = static_cast<std::size_t>(k);
   const std::span<MapPoint> points = map.points();
   for (MapPoint& p : points) p.now.drop(k);
@@ -387,7 +388,7 @@ void FrontEnd::match_corners_freely(int k) noexcept {
   }
 }
 
-void FrontEnd::match_across(const features::Corner& corner, bool exchanged,
+void FrontEnd::match_stereo(const features::Corner& corner, bool exchanged,
                             NewPoint* out) const noexcept {
   out->usable = false;
   out->behind = false;
@@ -433,7 +434,7 @@ void FrontEnd::match_across(const features::Corner& corner, bool exchanged,
     }
     if (out->disparity < -noise) continue;
     out->rho = std::max(rho, 1.0 / (kFarBaselines * baseline));
-    if (!finish(k, a.pixel, out->rho * baseline, &out->across)) continue;
+    if (!finish(k, a.pixel, out->rho * baseline, &out->stereo)) continue;
     out->matched_camera = k;
     out->usable = true;
     return;
@@ -443,18 +444,18 @@ void FrontEnd::match_across(const features::Corner& corner, bool exchanged,
 void FrontEnd::match_all(std::span<const features::Corner> corners, bool exchanged) noexcept {
   const std::size_t half = corners.size() / 2;
   auto first = [&]() noexcept {
-    for (std::size_t i = 0; i < half; ++i) match_across(corners[i], exchanged, &fresh_[i]);
+    for (std::size_t i = 0; i < half; ++i) match_stereo(corners[i], exchanged, &fresh_[i]);
   };
   auto second = [&]() noexcept {
     for (std::size_t i = half; i < corners.size(); ++i)
-      match_across(corners[i], exchanged, &fresh_[i]);
+      match_stereo(corners[i], exchanged, &fresh_[i]);
   };
   runner_.run(TaskRef(first), TaskRef(second));
 }
 
-AcrossCount FrontEnd::add_points(Map& map, const Transform& T_left_world,
+StereoCount FrontEnd::add_points(Map& map, const Transform& T_left_world,
                                  PointStage stage) noexcept {
-  AcrossCount count;
+  StereoCount count;
   const auto start = std::chrono::steady_clock::now();
   taken_.clear();
   for (const MapPoint& p : map.points())
@@ -484,7 +485,7 @@ AcrossCount FrontEnd::add_points(Map& map, const Transform& T_left_world,
     p->patch = f.patch;
     p->found = 1;
     store(f.left, 0, p);
-    store(f.across, f.matched_camera, p);
+    store(f.stereo, f.matched_camera, p);
     p->in_images = p->now.cameras;
   }
   return count;

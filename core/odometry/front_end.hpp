@@ -8,9 +8,9 @@
 #include "core/features/mask.hpp"
 #include "core/features/pyramid.hpp"
 #include "core/odometry/blob_matcher.hpp"
-#include "core/odometry/lens.hpp"
 #include "core/odometry/map.hpp"
 #include "core/odometry/options.hpp"
+#include "core/odometry/undistorted_camera.hpp"
 #include "core/types/parallel.hpp"
 #include "core/types/rig_frame.hpp"
 
@@ -25,7 +25,7 @@ struct ImageCheck {
 };
 
 /// How the search across went for the corners of one frame.
-struct AcrossCount {
+struct StereoCount {
   int corners = 0;
   int matched = 0;  // in front of the rig
   int near = 0;     // of these, with a disparity that measures depth
@@ -37,7 +37,7 @@ struct FreeMatch {
   double sigma = 0;  // px
 };
 
-/// Pixels of one rig frame: pyramids, following points, new corners and their matches across.
+/// Pixels of one rig frame: pyramids, following points, new corners and their stereo matches.
 ///
 /// Ownership  Reads the frame's images until the next begin(). Options, rig and runner are the
 ///            owner's.
@@ -78,9 +78,9 @@ class FrontEnd {
   void set_band(double px) noexcept { band_px_ = px; }
 
   /// Looks for the map's points in camera k wherever they may be, by what they look like. Answers
-  /// how many seem found; their sightings there, wrong ones among them, are rough; those in other
-  /// cameras stay. Some milliseconds: for frames that tracking has lost.
-  [[nodiscard]] int find_again(Map& map, int k) noexcept;
+  /// how many seem found; their observations there, wrong ones among them, are rough; those in
+  /// other cameras stay. Some milliseconds: for frames that tracking has lost.
+  [[nodiscard]] int relocalise(Map& map, int k) noexcept;
 
   /// Corners of `left`, or blobs (OdometryOptions::first_pair), found in camera k with nothing
   /// known of the rig but that it does not turn the image by more than some 20°: mutually best
@@ -89,14 +89,14 @@ class FrontEnd {
   [[nodiscard]] std::span<const FreeMatch> match_free(int k) noexcept;
 
   /// New corners of `left` where there are no points, matched across, as points of the given stage,
-  /// each with its sighting in `now`.
-  AcrossCount add_points(Map& map, const Transform& T_left_world, PointStage stage) noexcept;
+  /// each with its observation in `now`.
+  StereoCount add_points(Map& map, const Transform& T_left_world, PointStage stage) noexcept;
 
   /// How many corners of the last add_points() match where points of a rig with exchanged cameras
   /// would lie: behind it.
   [[nodiscard]] int count_exchanged() noexcept;
 
-  [[nodiscard]] const Lens& lens(int k) const noexcept {
+  [[nodiscard]] const UndistortedCamera& lens(int k) const noexcept {
     return lenses_[static_cast<std::size_t>(k)];
   }
   /// Nothing is looked for at this pixel of camera k.
@@ -120,7 +120,7 @@ class FrontEnd {
     Vec3 ray{};
     Mat2 d_ray_d_pixel{};
     features::Patch patch{};
-    Followed left, across;
+    Followed left, stereo;
   };
 
   [[nodiscard]] Followed follow(const MapPoint& p, const Transform& T_left_world, int k,
@@ -130,7 +130,7 @@ class FrontEnd {
   /// `parallax`: how far this camera stands from where the patch was cut, over the depth there:
   /// what its unknown slope can do.
   [[nodiscard]] bool finish(int k, const Vec2& raw, double parallax, Followed* f) const noexcept;
-  void match_across(const features::Corner& corner, bool exchanged, NewPoint* out) const noexcept;
+  void match_stereo(const features::Corner& corner, bool exchanged, NewPoint* out) const noexcept;
   [[nodiscard]] features::CornerOptions corner_options(int k) const noexcept;
   /// Corners of camera k four times as dense as points are: so that most of the other image's have
   /// their partner.
@@ -156,14 +156,14 @@ class FrontEnd {
   int cameras_;
   std::uint8_t structured_ = 0;
   std::array<Fingerprint, kMaxCameras> fingerprints_{};  // of the last images
-  std::array<Lens, kMaxCameras> lenses_{};
+  std::array<UndistortedCamera, kMaxCameras> lenses_{};
   std::array<features::Mask, kMaxCameras> masks_{};
   std::array<features::Pyramid, kMaxCameras> pyramids_{};
   std::array<std::span<Followed>, kMaxCameras> followed_{};
   BoundedVector<features::Corner> corners_, taken_;
   std::span<NewPoint> fresh_;
   std::span<features::Descriptor>
-      described_;  // of the map's points in find_again(), of dense corners in match_free()
+      described_;  // of the map's points in relocalise(), of dense corners in match_free()
   BoundedVector<FreeMatch> free_matches_;
   BlobMatcher blobs_;  // has no memory unless asked for
   double band_px_;

@@ -41,7 +41,7 @@ enum class PointStage : std::uint8_t {
   free,       // slot not in use
   candidate,  // followed, but not yet seen often enough to hold a pose
   active,     // followed, holds poses
-  dormant,    // no longer followed; the window still adjusts with its sightings
+  dormant,    // no longer followed; the window still adjusts with its observations
 };
 
 /// A point of the scene. p_world in metres; the patch is what it looked like in `left` where it was
@@ -96,7 +96,7 @@ class Map {
   /// A free slot, cleared; null when there is none.
   [[nodiscard]] MapPoint* make_point() noexcept;
   void free_point(MapPoint* p) noexcept { p->stage = PointStage::free; }
-  /// Slot of a new keyframe, dropping the oldest when the window is full. Every point's sighting
+  /// Slot of a new keyframe, dropping the oldest when the window is full. Every point's observation
   /// there is empty.
   [[nodiscard]] std::size_t make_keyframe(const Transform& T_left_world, Stamp stamp) noexcept;
   /// Everything grows by `factor` about a place of the world: points, keyframes and the distances

@@ -26,11 +26,11 @@ constexpr int kNearEnough = 10;    // near points that keep the scale
 constexpr int kCameraHolds = 8;    // inliers for a camera to count as one that supports the pose
 constexpr double kRigidShare =
     0.4;  // of the points found that must agree: below it something else moves
-constexpr double kAcrossShare =
+constexpr double kStereoShare =
     0.5;  // of the points found in two cameras, in which both must agree with the pose
 constexpr double kConfirmedShare = 0.3;  // of points and new corners together: 0.44 to 0.65 on a
                                          // rig that fits, 0.12 to 0.2 a frame out of step
-constexpr int kRestartedFrames = 10;     // frames marked after the scene was built anew
+constexpr int kRestartedFrames = 10;     // frames marked after the scene was rebuilt
 constexpr int kFramesLostBeforeRestart = 3;
 constexpr double kLongestExtrapolation = 2.0;  // s: a vehicle's speed says nothing about later
 constexpr double kCertainShare =
@@ -89,13 +89,13 @@ Odometry::Odometry(const OdometryOptions& options, const RigCalibration& rig, bo
       map_(static_cast<std::size_t>(options.window_keyframes), arena),
       window_(options, rig_, arena),
       poses_(options, rig_, arena),
-      across_(static_cast<std::size_t>(options.features), arena),
+      stereo_(static_cast<std::size_t>(options.features), arena),
       random_(options.seed) {
   for (std::span<double>& column : columns_)
     column = arena.make<double>(static_cast<std::size_t>(options.features), "matches across");
   if (known) return;
   unlink();
-  forget_rig();
+  reset_extrinsics();
 }
 
 void Odometry::link(const RigCalibration& rig) noexcept {
@@ -129,7 +129,7 @@ void Odometry::remember(const Transform& T_left_world, Stamp stamp) noexcept {
 PoseFit Odometry::fit(const Transform& start, bool sample) noexcept {
   if (link_ == Link::unlinked) return poses_.fit_unlinked(map_, start, sample, rig_.T_camera_left);
   PoseFit all = poses_.fit_linked(map_, start, sample);
-  if (!all.found || confirmed_across(all) || all.across == 0) return all;
+  if (!all.found || confirmed_stereo(all) || all.stereo_found == 0) return all;
   // The cameras contradict each other. Which is right the images do not say, but the left one is
   // what the pose is of.
   const PoseFit left = poses_.fit_left(map_, start);
@@ -181,7 +181,7 @@ PoseFit Odometry::track(const Transform& predicted, std::uint8_t structured,
 void Odometry::recover_cameras(const PoseFit& fit) noexcept {
   for (int k = 1; k < rig_.cameras; ++k) {
     if (((fit.cameras >> static_cast<unsigned>(k)) & 1U) != 0 ||
-        front_end_.find_again(map_, k) < kRelocaliseInliers)
+        front_end_.relocalise(map_, k) < kRelocaliseInliers)
       continue;
     Transform& T_camera_left = rig_.T_camera_left[static_cast<std::size_t>(k)];
     Transform T_camera_world;
@@ -208,7 +208,7 @@ int Odometry::points_in_view(const Transform& T_left_world) const noexcept {
 PoseFit Odometry::relocalise(FrameOutcome* out) noexcept {
   StageClock clock(out);
   for (MapPoint& p : map_.points()) p.now.cameras = 0;
-  const int candidates = front_end_.find_again(map_, 0);
+  const int candidates = front_end_.relocalise(map_, 0);
   clock.mark(Stage::match);
   PoseFit fit;
   if (candidates < kRelocaliseInliers) return fit;
@@ -302,9 +302,9 @@ void Odometry::make_keyframe(const PoseFit& fit, Stamp stamp, FrameOutcome* out)
   }
   T_left_world_ = map_.keyframe(slot).T_left_world;
   clock.mark(Stage::window);
-  const AcrossCount across = front_end_.add_points(map_, T_left_world_, PointStage::candidate);
+  const StereoCount stereo = front_end_.add_points(map_, T_left_world_, PointStage::candidate);
   // Of all that the left image offers, how much the other cameras confirm.
-  across_fails_ = across.matched + fit.stereo < kConfirmedShare * (across.corners + fit.inliers);
+  stereo_fails_ = stereo.matched + fit.stereo < kConfirmedShare * (stereo.corners + fit.inliers);
   keyframe_points_ = 0;
   for (MapPoint& p : map_.points()) {
     if (!p.followed()) continue;
@@ -335,7 +335,7 @@ bool Odometry::initialise_rig(FrameOutcome* out) noexcept {
   const StereoMatches rays{columns_[0].first(n), columns_[1].first(n), columns_[2].first(n),
                            columns_[3].first(n), columns_[4].first(n)};
   const StereoEstimate e =
-      across_.estimate_stereo_transform(rays, rig_.baseline, StereoMlesacOptions{}, random_);
+      stereo_.estimate_stereo_transform(rays, rig_.baseline, StereoMlesacOptions{}, random_);
   clock.mark(Stage::match);
   out->reason =
       n < static_cast<std::size_t>(kStartMatches) ? Reason::needs_texture : Reason::uncalibrated;
@@ -355,18 +355,18 @@ bool Odometry::initialise_rig(FrameOutcome* out) noexcept {
 bool Odometry::start_scene(const Transform& T_left_world, Stamp stamp, FrameOutcome* out) noexcept {
   StageClock clock(out);
   map_.clear();
-  const AcrossCount across = front_end_.add_points(map_, T_left_world, PointStage::active);
+  const StereoCount stereo = front_end_.add_points(map_, T_left_world, PointStage::active);
   clock.mark(Stage::match);
-  if (across.corners < kStartMatches)
+  if (stereo.corners < kStartMatches)
     out->reason = Reason::few_features;
-  else if (across.near < kCertainShare * across.corners &&
-           front_end_.count_exchanged() > across.near)
+  else if (stereo.near < kCertainShare * stereo.corners &&
+           front_end_.count_exchanged() > stereo.near)
     out->reason = Reason::cameras_swapped;
-  else if (across.matched < kStartMatches || across.matched < kStartShare * across.corners ||
-           across.near < kNearEnough)
+  else if (stereo.matched < kStartMatches || stereo.matched < kStartShare * stereo.corners ||
+           stereo.near < kNearEnough)
     out->reason = Reason::no_stereo_matches;
   else {
-    across_fails_ = false;
+    stereo_fails_ = false;
     const std::size_t slot = map_.make_keyframe(T_left_world, stamp);
     map_.keyframe(slot).T_camera_left = rig_.T_camera_left;
     keyframe_points_ = 0;
@@ -379,16 +379,16 @@ bool Odometry::start_scene(const Transform& T_left_world, Stamp stamp, FrameOutc
     out->keyframe = true;
     out->reason = Reason::none;
     out->status = PoseStatus::ok;
-    out->inliers = across.matched;
-    out->stereo_inliers = across.matched;
+    out->inliers = stereo.matched;
+    out->stereo_inliers = stereo.matched;
     return true;
   }
   map_.clear();
   return false;
 }
 
-bool Odometry::confirmed_across(const PoseFit& fit) noexcept {
-  return std::popcount(fit.cameras) >= 2 && fit.stereo >= kAcrossShare * fit.across;
+bool Odometry::confirmed_stereo(const PoseFit& fit) noexcept {
+  return std::popcount(fit.cameras) >= 2 && fit.stereo >= kStereoShare * fit.stereo_found;
 }
 
 Reason Odometry::weakness(const ImageCheck& images) const noexcept {
@@ -410,7 +410,7 @@ void Odometry::judge(const PoseFit& fit, const ImageCheck& images,
     out->reason = Reason::time_gap;
   else if (std::popcount(fit.cameras) < 2)
     out->reason = Reason::one_camera;
-  else if (across_fails_ || !confirmed_across(fit))
+  else if (stereo_fails_ || !confirmed_stereo(fit))
     out->reason = Reason::no_stereo_matches;
   else if (fit.inliers < options_.ok_inliers)
     out->reason = Reason::few_inliers;
@@ -461,10 +461,10 @@ void Odometry::begin_scene(const RigFrame& frame, const ImageCheck& images,
 
 void Odometry::lose_scene() noexcept {
   map_.clear();
-  if (link_ == Link::unlinked) forget_rig();
+  if (link_ == Link::unlinked) reset_extrinsics();
 }
 
-void Odometry::forget_rig() noexcept {
+void Odometry::reset_extrinsics() noexcept {
   rig_known_ = false;
   for (Transform& T : rig_.T_camera_left) T = {};
 }
@@ -518,11 +518,11 @@ FrameOutcome Odometry::process(const RigFrame& frame) noexcept {
   out.T_left_world = T_left_world_;
   judge(fit, images, &out);
   if (link_pending_ && weakness(images) == Reason::none) {
-    // The scene was made with another rig: it is built anew, where the camera now is.
+    // The scene was made with another rig: it is rebuilt, where the camera now is.
     take_up_link();
     FrameOutcome built;
     if (!start_scene(T_left_world_, frame.stamp, &built)) out.reason = built.reason;
-  } else if (confirmed_across(fit) && !images.repeated && wants_keyframe()) {
+  } else if (confirmed_stereo(fit) && !images.repeated && wants_keyframe()) {
     make_keyframe(fit, frame.stamp, &out);
     out.T_left_world = T_left_world_;
   }

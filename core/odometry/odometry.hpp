@@ -18,7 +18,7 @@ struct FrameOutcome {
   int stereo_inliers = 0;
   double reprojection_px = 0;
   bool keyframe = false;
-  bool restarted = false;    // the scene was built anew in this frame
+  bool restarted = false;    // the scene was rebuilt in this frame
   bool relocalised = false;  // found again in the window after being lost
   bool initialised = false;  // the rig's transform was found from this frame's images alone
   double gap_s = 0;          // time since the frame before, when it was too long to predict over
@@ -41,7 +41,7 @@ enum class Link : std::uint8_t {
 /// Unlinked, rig() is this frame's transform between the cameras and no calibration. A knock of one
 /// camera is a motion of that camera like any other there.
 /// Frames     T_left_world; world is the left camera of the first frame posed and stays when the
-///            scene is built anew.
+///            scene is rebuilt.
 /// Threads    One caller. Memory: from the arena at construction. Errors: by FrameOutcome.
 class Odometry {
  public:
@@ -56,21 +56,21 @@ class Odometry {
 
   [[nodiscard]] FrameOutcome process(const RigFrame& frame) noexcept;
 
-  /// From the next frame on the cameras are one rig with this calibration: the scene is built anew
+  /// From the next frame on the cameras are one rig with this calibration: the scene is rebuilt
   /// where the left camera then is.
   void link(const RigCalibration& rig) noexcept;
   /// From the next frame on the cameras are not linked; the scene stays.
   void unlink() noexcept;
   /// What is known of the cameras' transform is of no use: unlinked, the next scene begins with
   /// finding it.
-  void forget_rig() noexcept;
+  void reset_extrinsics() noexcept;
   [[nodiscard]] Link linked() const noexcept { return link_; }
 
   [[nodiscard]] const RigCalibration& rig() const noexcept { return rig_; }
   [[nodiscard]] const Map& map() const noexcept { return map_; }
   [[nodiscard]] Map& map() noexcept { return map_; }
   [[nodiscard]] const FrontEnd& front_end() const noexcept { return front_end_; }
-  /// Bit k by map point: camera k's sighting of the last frame agrees with its pose.
+  /// Bit k by map point: camera k's observation of the last frame agrees with its pose.
   [[nodiscard]] std::span<const std::uint8_t> agrees() const noexcept { return poses_.agrees(); }
 
  private:
@@ -96,7 +96,7 @@ class Odometry {
   /// again.
   void lose_scene() noexcept;
   /// The cameras agree about the scene: only then does a frame shape the map.
-  [[nodiscard]] static bool confirmed_across(const PoseFit& fit) noexcept;
+  [[nodiscard]] static bool confirmed_stereo(const PoseFit& fit) noexcept;
   /// What is wrong with the images themselves, `none` if nothing.
   [[nodiscard]] Reason weakness(const ImageCheck& images) const noexcept;
   void judge(const PoseFit& fit, const ImageCheck& images, FrameOutcome* out) const noexcept;
@@ -112,7 +112,7 @@ class Odometry {
   Map map_;
   WindowAdjuster window_;
   PoseEstimator poses_;
-  StereoMlesac across_;
+  StereoMlesac stereo_;
   std::array<std::span<double>, 5>
       columns_{};  // of the matches given to it: left x, y, right x, y, sigma
   Random random_;
@@ -124,7 +124,7 @@ class Odometry {
   Stamp stamp_{};
   bool any_pose_ = false;
   int frames_lost_ = 0;        // in a row, with images that show something
-  bool across_fails_ = false;  // at the last keyframe the other cameras confirmed hardly anything
+  bool stereo_fails_ = false;  // at the last keyframe the other cameras confirmed hardly anything
   int restart_cooldown_ = 0;   // frames still marked after a restart
   int keyframe_points_ = 0;    // active points when the last keyframe was made
 };

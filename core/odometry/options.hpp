@@ -15,7 +15,7 @@ struct OdometryOptions {
   double nearest_baselines =
       4.0;  // nearest depth looked for across, in baselines: sets the largest disparity, 1 … 50
   double band_px = 2.0;       // half width of the band about the epipolar line across, 0.5 … 20
-  double match_zncc = 0.8;    // least normalised correlation of a match across, 0.5 … 0.99
+  double match_zncc = 0.8;    // least normalised correlation of a stereo match, 0.5 … 0.99
   double pixel_sigma = 0.15;  // px, of one coordinate of a tracked corner, level 0; also the floor
                               // of the residual scale (METHOD §2)
   double parallax_sigma = 0.8;    // px more, in quadrature, for a patch seen from one depth further

@@ -95,7 +95,7 @@ void PoseEstimator::count(const Map& map, PoseFit* fit) const noexcept {
     const MapPoint& p = points[i];
     if (!p.holds_poses() || p.now.cameras == 0) continue;
     ++fit->given;
-    if (std::popcount(p.now.cameras) > 1) ++fit->across;
+    if (std::popcount(p.now.cameras) > 1) ++fit->stereo_found;
     const std::uint8_t good = agrees_[i];
     if (good == 0) continue;
     ++fit->inliers;

@@ -6,15 +6,15 @@
 
 namespace vergence::odometry {
 
-/// A pose of the rig found from this frame's sightings of the map, and what it rests on.
+/// A pose of the rig found from this frame's observations of the map, and what it rests on.
 struct PoseFit {
   bool found = false;
   Transform T_left_world{};
   int inliers = 0;
   int stereo = 0;
-  int across = 0;  // points found in two cameras, whether they agree or not
-  int near = 0;    // inliers whose depth this frame measures
-  int given = 0;   // points that were found in the images at all
+  int stereo_found = 0;  // points found in two cameras, whether they agree or not
+  int near = 0;          // inliers whose depth this frame measures
+  int given = 0;         // points that were found in the images at all
   double rms_px = 0;
   std::uint8_t cameras = 0;  // bit k: camera k holds at least a few of the inliers
 };
@@ -32,8 +32,8 @@ class PoseEstimator {
 
   /// From `start`; with `sample` by MLESAC first, else by refinement alone.
   [[nodiscard]] PoseFit fit_linked(const Map& map, const Transform& start, bool sample) noexcept;
-  /// By the left camera's sightings alone; the others' are judged by the pose that comes out. Not
-  /// found: the fit says so.
+  /// By the left camera's observations alone; the others' are judged by the pose that comes out.
+  /// Not found: the fit says so.
   [[nodiscard]] PoseFit fit_left(const Map& map, const Transform& start) noexcept;
   /// Each camera for itself. T_camera_left (in/out, as many as cameras): prediction, then this
   /// frame's; a camera that found no pose keeps its prediction and supports nothing.
@@ -43,7 +43,7 @@ class PoseEstimator {
   [[nodiscard]] bool fit_camera(const Map& map, int k, const Transform& start, bool sample,
                                 Transform* T_camera_world) noexcept;
 
-  /// By map point: bit k set if camera k's sighting agrees with the last fit.
+  /// By map point: bit k set if camera k's observation agrees with the last fit.
   [[nodiscard]] std::span<const std::uint8_t> agrees() const noexcept { return agrees_; }
 
  private:

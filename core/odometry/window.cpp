@@ -3,7 +3,7 @@
 #include <algorithm>
 
 #include "core/calibration/health.hpp"
-#include "core/odometry/lens.hpp"
+#include "core/odometry/undistorted_camera.hpp"
 
 namespace vergence::odometry {
 namespace {
@@ -55,7 +55,7 @@ WindowAdjuster::WindowAdjuster(const OdometryOptions& options, const RigCalibrat
 void WindowAdjuster::take_up_rig() noexcept {
   for (int k = 0; k < rig_.cameras; ++k)
     cameras_[static_cast<std::size_t>(k)] =
-        Lens(rig_.intrinsics[static_cast<std::size_t>(k)]).ideal();
+        UndistortedCamera(rig_.intrinsics[static_cast<std::size_t>(k)]).ideal();
   T_camera_left_ = rig_.T_camera_left;
   doubt_rig();
 }

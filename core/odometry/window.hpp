@@ -10,7 +10,7 @@ struct WindowOutcome {
   BundleTermination termination = BundleTermination::invalid_input;
   int points = 0;
   int observations = 0;
-  int dropped = 0;  // sightings that no longer fit
+  int dropped = 0;  // observations that no longer fit
   int steps = 0;
   double rms_px = 0;
 };
@@ -24,7 +24,8 @@ struct WindowOutcome {
 /// the calibration's depths have (a consider parameter that the window may answer). It is found
 /// afresh in each window, so that nothing is counted twice, and it never leaves the odometry.
 ///
-/// Memory  From the arena at construction. More sightings than fit: the rest are left out of this
+/// Memory  From the arena at construction. More observations than fit: the rest are left out of
+/// this
 ///         adjustment.
 class WindowAdjuster {
  public:
@@ -32,7 +33,7 @@ class WindowAdjuster {
   [[nodiscard]] static std::size_t memory_needed(const OdometryOptions& options,
                                                  const RigCalibration& rig) noexcept;
 
-  /// Writes poses and points back if the result is usable, and drops sightings beyond the robust
+  /// Writes poses and points back if the result is usable, and drops observations beyond the robust
   /// limit. T_camera_left() is what it found.
   WindowOutcome adjust(Map& map) noexcept;
   /// The same with the cameras not linked: every image has a pose of its own, in

@@ -12,7 +12,7 @@ constexpr int kPiece =
 
 /// out[0, count) from sums[0, count + 2). No branches, no aliases: the compiler makes vectors of
 /// it, of the sums' rows below, too.
-void across(const std::uint16_t* __restrict sums, int count,
+void stereo(const std::uint16_t* __restrict sums, int count,
             std::uint8_t* __restrict out) noexcept {
   for (int i = 0; i < count; ++i)
     out[i] = static_cast<std::uint8_t>((sums[i] + 2 * sums[i + 1] + sums[i + 2] + 8) >> 4);
@@ -42,7 +42,7 @@ void bayer_to_grey(const std::uint8_t* raw, std::ptrdiff_t raw_stride, int width
       if (first == 0) sums[0] = sums[2];
       if (first + count == width)
         sums[static_cast<std::size_t>(count) + 1] = sums[static_cast<std::size_t>(count) - 1];
-      across(sums.data(), count, out + y * out_stride + first);
+      stereo(sums.data(), count, out + y * out_stride + first);
     }
   }
 }

@@ -38,7 +38,7 @@ enum class Reason : std::uint8_t {
   one_camera,         // only one camera supports the pose; its scale is remembered, not measured
   no_pose,            // tracking failed
   time_gap,           // no frame for longer than motion can be predicted
-  scene_restarted,    // the map was rebuilt; the way across the gap was extrapolated
+  scene_restarted,    // the map was rebuilt; the motion across the gap was extrapolated
   weak_geometry,      // the points do not hold the pose well in some direction
   moving_scene,       // more outliers than a rigid scene has
   unconfirmed,        // calibration from a state file that the drive has not confirmed yet
@@ -50,7 +50,7 @@ enum class Reason : std::uint8_t {
   out_of_step,   // a camera's images are of another instant than the others'
   needs_motion,  // the calibration has to be found and cannot be without driving
   needs_near_structure,  // the same, without points near the rig
-  needs_texture,         // the same, without anything to match across
+  needs_texture,         // the same, without anything to stereo match
   unproven_pairing,  // what proves that its images were exposed together has contradicted: one of
                      // them alone was used
 };

@@ -29,9 +29,9 @@ const char* ExposureOptions::validate() const noexcept {
   return nullptr;
 }
 
-ExposureSetting within(const ExposureOptions& o, const ExposureSetting& wanted) noexcept {
-  return {std::clamp(wanted.exposure, o.least, o.most),
-          std::clamp(wanted.gain_db, 0.0, o.most_gain_db)};
+ExposureSetting within(const ExposureOptions& o, const ExposureSetting& requested) noexcept {
+  return {std::clamp(requested.exposure, o.least, o.most),
+          std::clamp(requested.gain_db, 0.0, o.most_gain_db)};
 }
 
 ExposureController::ExposureController(const ExposureOptions& options,
@@ -41,7 +41,7 @@ ExposureController::ExposureController(const ExposureOptions& options,
       stops_(stops_of(options_, setting_)),
       since_change_(options.settle_frames) {}
 
-double ExposureController::wanted_stops(const Brightness& image) const noexcept {
+double ExposureController::requested_stops(const Brightness& image) const noexcept {
   const double to_target = std::log2(options_.target / std::max(image.mean, kDarkest));
   if (image.bright < kSaturated)
     return std::min(to_target, std::log2(kSaturated / std::max(image.bright, kDarkest)));
@@ -64,9 +64,10 @@ std::optional<ExposureSetting> ExposureController::step(const Brightness& image)
     ++since_change_;
     if (since_change_ < options_.settle_frames) return std::nullopt;
   }
-  const double wanted = std::clamp(wanted_stops(image), -options_.down_stops, options_.up_stops);
-  if (std::abs(wanted) <= options_.dead_band) return std::nullopt;
-  const ExposureSetting next = split(stops_ + wanted);
+  const double requested =
+      std::clamp(requested_stops(image), -options_.down_stops, options_.up_stops);
+  if (std::abs(requested) <= options_.dead_band) return std::nullopt;
+  const ExposureSetting next = split(stops_ + requested);
   const double stops = stops_of(options_, next);
   if (std::abs(stops - stops_) < 0.5 * options_.dead_band) return std::nullopt;  // at a bound
   stops_ = stops;

@@ -45,7 +45,7 @@ class ExposureController {
   [[nodiscard]] const ExposureSetting& setting() const noexcept { return setting_; }
 
  private:
-  [[nodiscard]] double wanted_stops(const Brightness& image) const noexcept;
+  [[nodiscard]] double requested_stops(const Brightness& image) const noexcept;
   [[nodiscard]] ExposureSetting split(double stops) const noexcept;
 
   ExposureOptions options_;
@@ -56,6 +56,6 @@ class ExposureController {
 
 /// Brought inside the bounds: exposure first.
 [[nodiscard]] ExposureSetting within(const ExposureOptions& options,
-                                     const ExposureSetting& wanted) noexcept;
+                                     const ExposureSetting& requested) noexcept;
 
 }  // namespace vergence::exposure

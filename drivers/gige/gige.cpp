@@ -17,9 +17,9 @@ class GigeDriver final : public CameraDriver {
   std::vector<DeviceInfo> enumerate() override {
     std::vector<DeviceInfo> all;
     for (Found& f : discover()) all.push_back(std::move(f.info));
-    complaint_.clear();
+    last_error_.clear();
     if (all.empty())
-      complaint_ =
+      last_error_ =
           "no GigE camera answers a broadcast; is its address in the network of this host, and no "
           "firewall in between?";
     return all;
@@ -28,22 +28,22 @@ class GigeDriver final : public CameraDriver {
   std::unique_ptr<CameraDevice> open(std::string_view serial, DeviceStatus* status) override {
     std::string where(serial);
     *status = DeviceStatus::not_found;
-    complaint_.clear();
+    last_error_.clear();
     if (!is_address(where)) {
       where.clear();
       for (const Found& f : discover())
         if (where.empty() && (serial.empty() || f.info.serial == serial)) where = f.info.place;
       if (where.empty()) return nullptr;
     }
-    std::unique_ptr<Session> session = Session::open(where, status, &complaint_);
+    std::unique_ptr<Session> session = Session::open(where, status, &last_error_);
     if (session == nullptr) return nullptr;
     return std::make_unique<GigeCamera>(std::move(session));
   }
 
-  std::string complaint() const override { return complaint_; }
+  std::string last_error() const override { return last_error_; }
 
  private:
-  std::string complaint_;
+  std::string last_error_;
 };
 
 }  // namespace

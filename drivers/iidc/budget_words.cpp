@@ -8,7 +8,7 @@
 
 namespace vergence::iidc {
 
-std::string budget_complaint(std::span<const BusShare> shares) {
+std::string budget_error(std::span<const BusShare> shares) {
   const unsigned need = total_units(shares);
   if (shares.empty() || need <= kBandwidthUnits) return {};
   std::string text =

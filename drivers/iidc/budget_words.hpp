@@ -8,6 +8,6 @@ namespace vergence::iidc {
 
 /// Empty when the streams fit on one bus. Else one sentence: what each needs, what there is, and
 /// the packet and rate that would fit if all were equal.
-[[nodiscard]] std::string budget_complaint(std::span<const BusShare> shares);
+[[nodiscard]] std::string budget_error(std::span<const BusShare> shares);
 
 }  // namespace vergence::iidc

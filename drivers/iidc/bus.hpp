@@ -97,7 +97,7 @@ class CameraBus : public RegisterPort {
   [[nodiscard]] virtual const std::uint8_t* bytes(FrameSlot slot) const noexcept = 0;
 
   /// One sentence about the last call that was not ok; empty: the status says it all.
-  [[nodiscard]] virtual std::string complaint() const { return {}; }
+  [[nodiscard]] virtual std::string last_error() const { return {}; }
   /// One sentence about what will be tight with `sharing` cameras of this shape and rate; empty:
   /// nothing.
   [[nodiscard]] virtual std::string remark(const StreamShape& shape, double rate_hz,

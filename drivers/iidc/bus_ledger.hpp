@@ -28,13 +28,13 @@ class BusLedger {
     const std::lock_guard lock(mutex_);
     entries_.erase(who);
   }
-  /// Empty: all that was put for this bus fits. Else budget_complaint().
-  [[nodiscard]] std::string complaint(const std::string& bus) const {
+  /// Empty: all that was put for this bus fits. Else budget_error().
+  [[nodiscard]] std::string last_error(const std::string& bus) const {
     const std::lock_guard lock(mutex_);
     std::vector<BusShare> shares;
     for (const auto& [who, entry] : entries_)
       if (entry.first == bus) shares.push_back(entry.second);
-    return budget_complaint(shares);
+    return budget_error(shares);
   }
   /// The clock of a bus, the same for all its cameras.
   [[nodiscard]] std::shared_ptr<SharedClock> clock(const std::string& bus) {

@@ -116,20 +116,19 @@ constexpr std::array kRows{
 }  // namespace
 
 DeviceStatus parse_options(const std::map<std::string, std::string>& given, CameraOptions* options,
-                           std::string* complaint) {
+                           std::string* message) {
   CameraOptions out;
   for (const auto& [name, text] : given) {
     const Row* row = nullptr;
     for (const Row& r : kRows)
       if (r.name == name) row = &r;
     if (row == nullptr) {
-      *complaint = "there is no option \"" + name + "\"; IIDC cameras have ";
-      for (const Row& r : kRows)
-        *complaint += (&r == kRows.data() ? "" : ", ") + std::string(r.name);
+      *message = "there is no option \"" + name + "\"; IIDC cameras have ";
+      for (const Row& r : kRows) *message += (&r == kRows.data() ? "" : ", ") + std::string(r.name);
       return DeviceStatus::unsupported;
     }
     if (!row->take(text, &out)) {
-      *complaint =
+      *message =
           "option " + name + " cannot be \"" + text + "\"; it takes " + std::string(row->takes);
       return DeviceStatus::bad_configuration;
     }

@@ -31,8 +31,8 @@ struct CameraOptions {
 };
 
 /// Reads them. → ok, unsupported (a name that does not exist), bad_configuration (a value that
-/// cannot be); then *complaint says which.
+/// cannot be); then *error says which.
 [[nodiscard]] DeviceStatus parse_options(const std::map<std::string, std::string>& given,
-                                         CameraOptions* options, std::string* complaint);
+                                         CameraOptions* options, std::string* error);
 
 }  // namespace vergence::iidc

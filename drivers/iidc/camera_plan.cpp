@@ -21,28 +21,28 @@ constexpr std::array kCodings{ColorCoding::mono8,  ColorCoding::raw8,  ColorCodi
 
 class Planner {
  public:
-  Planner(CameraRegisters* registers, const BusTraits& bus, const CameraConfiguration& wanted,
-          CameraPlan* plan, std::string* complaint)
-      : r_(*registers), bus_(bus), wanted_(wanted), plan_(*plan), complaint_(*complaint) {}
+  Planner(CameraRegisters* registers, const BusTraits& bus, const CameraConfiguration& requested,
+          CameraPlan* plan, std::string* error)
+      : r_(*registers), bus_(bus), requested_(requested), plan_(*plan), last_error_(*error) {}
 
   DeviceStatus run() {
     if (const DeviceStatus s = check_numbers(); s != DeviceStatus::ok) return s;
-    if (const DeviceStatus s = parse_options(wanted_.options, &plan_.options, &complaint_);
+    if (const DeviceStatus s = parse_options(requested_.options, &plan_.options, &last_error_);
         s != DeviceStatus::ok)
       return s;
-    plan_.trigger = wanted_.trigger;
-    plan_.wanted_rate_hz = wanted_.rate_hz;
-    plan_.size = {static_cast<std::uint16_t>(wanted_.width),
-                  static_cast<std::uint16_t>(wanted_.height)};
-    plan_.position = {static_cast<std::uint16_t>(wanted_.offset_x),
-                      static_cast<std::uint16_t>(wanted_.offset_y)};
+    plan_.trigger = requested_.trigger;
+    plan_.requested_rate_hz = requested_.rate_hz;
+    plan_.size = {static_cast<std::uint16_t>(requested_.width),
+                  static_cast<std::uint16_t>(requested_.height)};
+    plan_.position = {static_cast<std::uint16_t>(requested_.offset_x),
+                      static_cast<std::uint16_t>(requested_.offset_y)};
     for (const auto step :
          {&Planner::choose_speed, &Planner::choose_trigger, &Planner::choose_features,
           &Planner::choose_strobe, &Planner::choose_mode}) {
       const bool possible = (this->*step)();
       if (r_.status() != DeviceStatus::ok) {
         const DeviceStatus failed = r_.take_status();
-        complaint_ = r_.complaint();
+        last_error_ = r_.last_error();
         return failed;
       }
       if (!possible) return DeviceStatus::unsupported;
@@ -53,20 +53,22 @@ class Planner {
  private:
   DeviceStatus check_numbers() {
     constexpr int kMost = 65535;
-    if (!(wanted_.rate_hz > 0) || !std::isfinite(wanted_.rate_hz) || wanted_.width <= 0 ||
-        wanted_.height <= 0 || wanted_.offset_x < 0 || wanted_.offset_y < 0 ||
-        !std::isfinite(wanted_.gain_db)) {
-      complaint_ = "size and rate must be above zero";
+    if (!(requested_.rate_hz > 0) || !std::isfinite(requested_.rate_hz) || requested_.width <= 0 ||
+        requested_.height <= 0 || requested_.offset_x < 0 || requested_.offset_y < 0 ||
+        !std::isfinite(requested_.gain_db)) {
+      last_error_ = "size and rate must be above zero";
       return DeviceStatus::bad_configuration;
     }
-    if (wanted_.exposure <= Duration{} || wanted_.exposure.to_seconds() * wanted_.rate_hz > 1) {
-      complaint_ = text("an exposure of %.0f us does not fit between two images at %g Hz",
-                        wanted_.exposure.to_seconds() * 1e6, wanted_.rate_hz);
+    if (requested_.exposure <= Duration{} ||
+        requested_.exposure.to_seconds() * requested_.rate_hz > 1) {
+      last_error_ = text("an exposure of %.0f us does not fit between two images at %g Hz",
+                         requested_.exposure.to_seconds() * 1e6, requested_.rate_hz);
       return DeviceStatus::bad_configuration;
     }
-    if (wanted_.width > kMost || wanted_.height > kMost || wanted_.offset_x > kMost ||
-        wanted_.offset_y > kMost) {
-      complaint_ = text("%d x %d is more than any camera has", wanted_.width, wanted_.height);
+    if (requested_.width > kMost || requested_.height > kMost || requested_.offset_x > kMost ||
+        requested_.offset_y > kMost) {
+      last_error_ =
+          text("%d x %d is more than any camera has", requested_.width, requested_.height);
       return DeviceStatus::unsupported;
     }
     return DeviceStatus::ok;
@@ -78,8 +80,8 @@ class Planner {
         bus_.isochronous && !beta ? std::min(bus_.fastest, BusSpeed::s400) : bus_.fastest;
     if (plan_.options.speed && bus_.isochronous) {
       if (*plan_.options.speed > most) {
-        complaint_ = text("option speed: the camera and its bus reach %s",
-                          std::string(to_string(most)).c_str());
+        last_error_ = text("option speed: the camera and its bus reach %s",
+                           std::string(to_string(most)).c_str());
         return false;
       }
       most = *plan_.options.speed;
@@ -92,26 +94,26 @@ class Planner {
   }
 
   bool choose_trigger() {
-    if (wanted_.trigger == CameraTrigger::free) return true;
+    if (requested_.trigger == CameraTrigger::free) return true;
     const TriggerInquiry t = TriggerInquiry::of(r_.get(reg::kTriggerInquiry));
-    const unsigned source = wanted_.trigger == CameraTrigger::software
+    const unsigned source = requested_.trigger == CameraTrigger::software
                                 ? kTriggerSourceSoftware
                                 : plan_.options.trigger_source;
     if (!t.present || !t.has_source(source) || (!t.has_mode(0) && !t.has_mode(14))) {
-      complaint_ = wanted_.trigger == CameraTrigger::software
-                       ? "this camera has no software trigger"
-                       : text("this camera has no trigger input %u", source);
-      complaint_ += offered_triggers(t);
+      last_error_ = requested_.trigger == CameraTrigger::software
+                        ? "this camera has no software trigger"
+                        : text("this camera has no trigger input %u", source);
+      last_error_ += offered_triggers(t);
       return false;
     }
     plan_.trigger_mode = plan_.options.trigger_mode.value_or(t.has_mode(14) ? 14 : 0);
     if (!t.has_mode(plan_.trigger_mode)) {
-      complaint_ =
+      last_error_ =
           text("this camera has no trigger mode %u", plan_.trigger_mode) + offered_triggers(t);
       return false;
     }
     if (!plan_.options.trigger_rising && !t.polarity) {
-      complaint_ =
+      last_error_ =
           "the edge of this camera's trigger cannot be changed; option trigger_edge must be rising";
       return false;
     }
@@ -132,31 +134,32 @@ class Planner {
   bool choose_features() {
     constexpr double kFloat = 1e-6;  // single precision in the camera
     const AbsoluteRange shutter = r_.absolute_range(Feature::shutter);
-    const double s = wanted_.exposure.to_seconds();
+    const double s = requested_.exposure.to_seconds();
     if (!shutter.present) {
-      complaint_ =
+      last_error_ =
           "this camera does not take its exposure in seconds, which version 1.31 of IIDC and later "
           "do";
       return false;
     }
     if (s < shutter.least * (1 - kFloat) || s > shutter.most * (1 + kFloat)) {
-      complaint_ =
+      last_error_ =
           text("an exposure of %.6g us is not possible; this camera offers %.6g to %.6g us",
                s * 1e6, shutter.least * 1e6, shutter.most * 1e6);
       return false;
     }
     const AbsoluteRange gain = r_.absolute_range(Feature::gain);
-    const double slack = kFloat * std::max(1.0, std::abs(wanted_.gain_db));
-    if (gain.present ? wanted_.gain_db < gain.least - slack || wanted_.gain_db > gain.most + slack
-                     : wanted_.gain_db != 0) {
-      complaint_ = gain.present
-                       ? text("a gain of %g dB is not possible; this camera offers %g to %g dB",
-                              wanted_.gain_db, gain.least, gain.most)
-                       : "this camera does not take its gain in dB; gain_db must be 0";
+    const double slack = kFloat * std::max(1.0, std::abs(requested_.gain_db));
+    if (gain.present
+            ? requested_.gain_db < gain.least - slack || requested_.gain_db > gain.most + slack
+            : requested_.gain_db != 0) {
+      last_error_ = gain.present
+                        ? text("a gain of %g dB is not possible; this camera offers %g to %g dB",
+                               requested_.gain_db, gain.least, gain.most)
+                        : "this camera does not take its gain in dB; gain_db must be 0";
       return false;
     }
-    plan_.exposure = wanted_.exposure;
-    plan_.gain_db = wanted_.gain_db;
+    plan_.exposure = requested_.exposure;
+    plan_.gain_db = requested_.gain_db;
     frame_rate_ = r_.absolute_range(Feature::frame_rate);
     return true;
   }
@@ -168,20 +171,20 @@ class Planner {
     if (csr != 0 &&
         (r_.get_at(csr + reg::strobe::inquiry(*plan_.options.strobe_pin)) & bit(31)) != 0)
       return true;
-    complaint_ = csr == 0 ? "this camera has no strobe outputs"
-                          : text("this camera has no strobe output %u", *plan_.options.strobe_pin);
+    last_error_ = csr == 0 ? "this camera has no strobe outputs"
+                           : text("this camera has no strobe output %u", *plan_.options.strobe_pin);
     return false;
   }
 
   [[nodiscard]] std::vector<ColorCoding> codings() {
-    if (wanted_.pixel_format.empty()) return {kCodings.begin(), kCodings.end()};
-    const auto c = color_coding(wanted_.pixel_format);
+    if (requested_.pixel_format.empty()) return {kCodings.begin(), kCodings.end()};
+    const auto c = color_coding(requested_.pixel_format);
     return c ? std::vector{*c} : std::vector<ColorCoding>{};
   }
 
   bool choose_mode() {
     const auto wishes = codings();
-    const bool region = wanted_.offset_x != 0 || wanted_.offset_y != 0;
+    const bool region = requested_.offset_x != 0 || requested_.offset_y != 0;
     const bool may_fixed =
         !region && !plan_.options.packet_bytes && !plan_.options.format7.value_or(false);
     const bool may_format7 = plan_.options.format7.value_or(true);
@@ -192,10 +195,10 @@ class Planner {
     }
     for (const ColorCoding c : wishes)
       if (may_fixed && fixed(c, false)) return true;
-    complaint_ = text("%d x %d", wanted_.width, wanted_.height) +
-                 (wanted_.pixel_format.empty() ? "" : " " + wanted_.pixel_format) +
-                 text(" at %g Hz is not possible", wanted_.rate_hz) +
-                 (why_not_.empty() ? "" : ": " + why_not_) + "; this camera offers " + offers();
+    last_error_ = text("%d x %d", requested_.width, requested_.height) +
+                  (requested_.pixel_format.empty() ? "" : " " + requested_.pixel_format) +
+                  text(" at %g Hz is not possible", requested_.rate_hz) +
+                  (why_not_.empty() ? "" : ": " + why_not_) + "; this camera offers " + offers();
     return false;
   }
 
@@ -203,23 +206,24 @@ class Planner {
   /// packets of which every camera of the rig can send one a cycle.
   bool fixed(ColorCoding coding, bool exactly) {
     for (const FixedMode& m : fixed_modes()) {
-      if (m.coding != coding || m.width != wanted_.width || m.height != wanted_.height ||
+      if (m.coding != coding || m.width != requested_.width || m.height != requested_.height ||
           !r_.has_mode(m.format, m.mode))
         continue;
       const std::uint32_t rates = r_.get(reg::rate_inquiry(m.format, m.mode));
       for (unsigned code = 0; code < kRates; ++code) {
         const std::size_t packet = fixed_packet_bytes(m, code);
         if ((rates & bit(31 - code)) == 0 || packet == 0 || packet > largest_) continue;
-        if (rate_of(code) < wanted_.rate_hz * (1 - kRateSlack)) continue;
+        if (rate_of(code) < requested_.rate_hz * (1 - kRateSlack)) continue;
         if (exactly && crowded(packet)) break;
-        if (exactly && wanted_.trigger == CameraTrigger::free &&
-            rate_of(code) > wanted_.rate_hz * (1 + kRateSlack))
+        if (exactly && requested_.trigger == CameraTrigger::free &&
+            rate_of(code) > requested_.rate_hz * (1 + kRateSlack))
           break;
         plan_.format = m.format;
         plan_.mode = m.mode;
         plan_.rate_code = code;
         plan_.coding = coding;
-        plan_.rate_hz = wanted_.trigger == CameraTrigger::free ? rate_of(code) : wanted_.rate_hz;
+        plan_.rate_hz =
+            requested_.trigger == CameraTrigger::free ? rate_of(code) : requested_.rate_hz;
         plan_.shape.image_bytes = plan_.shape.frame_bytes = frame_bytes(m.width, m.height, coding);
         plan_.shape.packet_bytes = packet;
         return possible_as_grey();
@@ -229,8 +233,8 @@ class Planner {
   }
 
   [[nodiscard]] bool crowded(std::size_t packet) const {
-    return bus_.isochronous && wanted_.sharing > 1 &&
-           bandwidth_units(packet, plan_.shape.speed) * static_cast<unsigned>(wanted_.sharing) >
+    return bus_.isochronous && requested_.sharing > 1 &&
+           bandwidth_units(packet, plan_.shape.speed) * static_cast<unsigned>(requested_.sharing) >
                kBandwidthUnits;
   }
 
@@ -247,18 +251,18 @@ class Planner {
       Size step = Size::of(r_.get_at(csr + kUnitPosition));
       if (step.width == 0 || step.height == 0) step = unit;
       if (unit.width == 0 || unit.height == 0) continue;
-      if (wanted_.offset_x + wanted_.width > most.width ||
-          wanted_.offset_y + wanted_.height > most.height)
+      if (requested_.offset_x + requested_.width > most.width ||
+          requested_.offset_y + requested_.height > most.height)
         continue;
-      if (wanted_.width % unit.width != 0 || wanted_.height % unit.height != 0 ||
-          wanted_.offset_x % step.width != 0 || wanted_.offset_y % step.height != 0)
+      if (requested_.width % unit.width != 0 || requested_.height % unit.height != 0 ||
+          requested_.offset_x % step.width != 0 || requested_.offset_y % step.height != 0)
         continue;
       const std::size_t bytes = frame_bytes(plan_.size.width, plan_.size.height, coding);
       const Size limits = Size::of(r_.get_at(csr + kPacketLimits));  // unit, most
       if (!choose_packet(bytes, limits)) continue;
-      if (wanted_.trigger == CameraTrigger::free && frame_rate_.present &&
-          (wanted_.rate_hz < frame_rate_.least * (1 - kRateSlack) ||
-           wanted_.rate_hz > frame_rate_.most * (1 + kRateSlack))) {
+      if (requested_.trigger == CameraTrigger::free && frame_rate_.present &&
+          (requested_.rate_hz < frame_rate_.least * (1 - kRateSlack) ||
+           requested_.rate_hz > frame_rate_.most * (1 + kRateSlack))) {
         say_why_not(
             text("its frame rate goes from %g to %g Hz", frame_rate_.least, frame_rate_.most));
         continue;
@@ -267,8 +271,8 @@ class Planner {
       plan_.mode = mode;
       plan_.csr = csr;
       plan_.coding = coding;
-      plan_.rate_hz = wanted_.trigger != CameraTrigger::free || frame_rate_.present
-                          ? wanted_.rate_hz
+      plan_.rate_hz = requested_.trigger != CameraTrigger::free || frame_rate_.present
+                          ? requested_.rate_hz
                           : packet_rate(bytes, plan_.shape.packet_bytes);
       plan_.shape.image_bytes = bytes;
       plan_.shape.frame_bytes =
@@ -285,9 +289,10 @@ class Planner {
         limits.height == 0 ? largest_ : std::min<std::size_t>(limits.height, largest_);
     const std::size_t asked = plan_.options.packet_bytes.value_or(0);
     const std::size_t packet =
-        asked != 0 ? asked : packet_for_rate(bytes, wanted_.rate_hz * (1 - kRateSlack), unit, most);
+        asked != 0 ? asked
+                   : packet_for_rate(bytes, requested_.rate_hz * (1 - kRateSlack), unit, most);
     if (packet == 0 || packet > most || packet % unit != 0 ||
-        packet_rate(bytes, packet) < wanted_.rate_hz * (1 - kRateSlack)) {
+        packet_rate(bytes, packet) < requested_.rate_hz * (1 - kRateSlack)) {
       const std::size_t best = asked != 0 && asked <= most ? asked : most / unit * unit;
       say_why_not(text("packets of %zu bytes (largest %zu, in steps of %zu) carry %.4g Hz of it",
                        best, most, unit, packet_rate(bytes, best)));
@@ -295,7 +300,7 @@ class Planner {
     }
     // Larger ones bring the image sooner, where it is not the packets that set a free camera's
     // rate.
-    const bool paced = wanted_.trigger != CameraTrigger::free || frame_rate_.present;
+    const bool paced = requested_.trigger != CameraTrigger::free || frame_rate_.present;
     plan_.shape.packet_bytes =
         asked == 0 && paced ? std::max(packet, std::min(share(), most) / unit * unit) : packet;
     return true;
@@ -303,7 +308,7 @@ class Planner {
 
   /// Bytes of each cycle that are this camera's when all of the rig share the bus alike.
   [[nodiscard]] std::size_t share() const {
-    const auto cameras = static_cast<unsigned>(std::max(wanted_.sharing, 1));
+    const auto cameras = static_cast<unsigned>(std::max(requested_.sharing, 1));
     if (bus_.isochronous) return packet_for_units(kBandwidthUnits / cameras, plan_.shape.speed);
     return static_cast<std::size_t>(bus_.bytes_per_second * kUsbPractical / kCyclesPerSecond) /
            cameras;
@@ -313,7 +318,8 @@ class Planner {
     const bool raw = plan_.coding == ColorCoding::raw8 || plan_.coding == ColorCoding::raw16;
     plan_.grey.coding = plan_.coding;
     plan_.grey.mosaic = raw && bayer_tile(r_.get_optional(reg::kBayerTile)) != BayerTile::none;
-    if (plan_.grey.possible() && (!plan_.grey.mosaic || (wanted_.width > 1 && wanted_.height > 1)))
+    if (plan_.grey.possible() &&
+        (!plan_.grey.mosaic || (requested_.width > 1 && requested_.height > 1)))
       return true;
     say_why_not(std::string(to_string(plan_.coding)) +
                 " of this camera is not turned to grey here");
@@ -353,9 +359,9 @@ class Planner {
 
   CameraRegisters& r_;
   const BusTraits& bus_;
-  const CameraConfiguration& wanted_;
+  const CameraConfiguration& requested_;
   CameraPlan& plan_;
-  std::string& complaint_;
+  std::string& last_error_;
   std::size_t largest_ = 0;  // packet
   AbsoluteRange frame_rate_{};
   std::string why_not_;
@@ -364,10 +370,9 @@ class Planner {
 }  // namespace
 
 DeviceStatus make_plan(CameraRegisters* registers, const BusTraits& bus,
-                       const CameraConfiguration& wanted, CameraPlan* plan,
-                       std::string* complaint) {
+                       const CameraConfiguration& requested, CameraPlan* plan, std::string* error) {
   CameraPlan out;
-  const DeviceStatus status = Planner(registers, bus, wanted, &out, complaint).run();
+  const DeviceStatus status = Planner(registers, bus, requested, &out, error).run();
   if (status == DeviceStatus::ok) *plan = out;
   return status;
 }

@@ -19,7 +19,7 @@ struct CameraPlan {
   std::uint64_t csr = 0;   // Format 7
   Size size{}, position{};
   ColorCoding coding = ColorCoding::mono8;
-  double wanted_rate_hz = 0;
+  double requested_rate_hz = 0;
   // As the camera rounds them, once applied:
   double rate_hz = 0;
   Duration exposure{};
@@ -31,15 +31,15 @@ struct CameraPlan {
 
 /// Finds a mode for it: the fixed one of that size and rate, else a region of Format 7; the
 /// cheapest pixels that give grey first. Only reads registers. → ok, unsupported,
-/// bad_configuration, or why a register failed; then *complaint says what the camera offers.
+/// bad_configuration, or why a register failed; then *error says what the camera offers.
 [[nodiscard]] DeviceStatus make_plan(CameraRegisters* registers, const BusTraits& bus,
-                                     const CameraConfiguration& wanted, CameraPlan* plan,
-                                     std::string* complaint);
+                                     const CameraConfiguration& requested, CameraPlan* plan,
+                                     std::string* error);
 
 /// Stops the camera and writes the plan into it; fills in what the camera made of it. The camera
 /// stays quiet.
-/// → ok, unsupported, or why a register failed; then *complaint says it.
+/// → ok, unsupported, or why a register failed; then *error says it.
 [[nodiscard]] DeviceStatus apply_plan(CameraRegisters* registers, const BusTraits& bus,
-                                      CameraPlan* plan, std::string* complaint);
+                                      CameraPlan* plan, std::string* error);
 
 }  // namespace vergence::iidc

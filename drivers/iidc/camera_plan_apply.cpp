@@ -9,29 +9,29 @@ namespace vergence::iidc {
 namespace {
 
 /// The size and packets of a Format 7 mode, in the order in which region and sensor always agree.
-bool write_format7(CameraRegisters& r, const CameraPlan& plan, std::string* complaint) {
+bool write_format7(CameraRegisters& r, const CameraPlan& plan, std::string* error) {
   using namespace reg::format7;
   r.set_at(plan.csr + kCoding, static_cast<std::uint32_t>(plan.coding) << 24U);
   r.set_at(plan.csr + kPosition, 0);
   r.set_at(plan.csr + kSize, plan.size.quadlet());
   r.set_at(plan.csr + kPosition, plan.position.quadlet());
   if (!r.apply_format7(plan.csr, kErrorRegion)) {
-    *complaint = text("the camera refuses the region %d x %d at (%d, %d)", plan.size.width,
-                      plan.size.height, plan.position.width, plan.position.height);
+    *error = text("the camera refuses the region %d x %d at (%d, %d)", plan.size.width,
+                  plan.size.height, plan.position.width, plan.position.height);
     return false;
   }
   const Size limits = Size::of(r.get_at(plan.csr + kPacketLimits));  // they may depend on the size
   const std::size_t packet = plan.shape.packet_bytes;
   if (limits.height != 0 &&
       (packet > limits.height || (limits.width != 0 && packet % limits.width != 0))) {
-    *complaint =
+    *error =
         text("the camera takes packets of at most %d bytes in steps of %d at this size, not %zu",
              limits.height, limits.width, packet);
     return false;
   }
   r.set_at(plan.csr + kPacketBytes, static_cast<std::uint32_t>(packet) << 16U);
   if (!r.apply_format7(plan.csr, kErrorPacket)) {
-    *complaint = text("the camera refuses packets of %zu bytes", packet);
+    *error = text("the camera refuses packets of %zu bytes", packet);
     return false;
   }
   return true;
@@ -47,7 +47,7 @@ void write_features(CameraRegisters& r, CameraPlan* plan) {
   const AbsoluteRange rate = r.absolute_range(Feature::frame_rate);
   if (plan->trigger == CameraTrigger::free && rate.present && plan->format == 7) {
     plan->rate_hz = r.set_absolute(Feature::frame_rate,
-                                   std::clamp(plan->wanted_rate_hz, rate.least, rate.most));
+                                   std::clamp(plan->requested_rate_hz, rate.least, rate.most));
   } else if (plan->trigger != CameraTrigger::free) {
     r.switch_off(Feature::frame_rate);  // on, it shortens exposures and skips pulses
   }
@@ -78,12 +78,12 @@ void write_strobe(CameraRegisters& r, const CameraOptions& o) {
   if (csr != 0) r.set_at(csr + reg::strobe::control(*o.strobe_pin), s.quadlet());
 }
 
-FrameInfoLayout write_frame_info(CameraRegisters& r, bool wanted) {
+FrameInfoLayout write_frame_info(CameraRegisters& r, bool requested) {
   if (!BasicFunctions::of(r.get(reg::kBasicFunctions)).advanced) return {};
   if ((r.get_optional(reg::kFrameInfo) & kFrameInfoPresent) == 0) return {};
   const std::uint32_t items =
       frame_info_bit(FrameInfoItem::time) | frame_info_bit(FrameInfoItem::counter);
-  r.set(reg::kFrameInfo, kFrameInfoPresent | (wanted ? items : 0));
+  r.set(reg::kFrameInfo, kFrameInfoPresent | (requested ? items : 0));
   return FrameInfoLayout::of(r.get(reg::kFrameInfo));  // what a camera lacks stays off
 }
 
@@ -99,7 +99,7 @@ unsigned effective_bits(CameraRegisters& r, const CameraPlan& plan) {
 }  // namespace
 
 DeviceStatus apply_plan(CameraRegisters* registers, const BusTraits& bus, CameraPlan* plan,
-                        std::string* complaint) {
+                        std::string* error) {
   CameraRegisters& r = *registers;
   CameraPlan out = *plan;
   r.transmit(false);  // also what a program that crashed has left on
@@ -113,7 +113,7 @@ DeviceStatus apply_plan(CameraRegisters* registers, const BusTraits& bus, Camera
     r.set(reg::kIsoChannel, iso.quadlet());
   }
   if (out.format == 7) {
-    if (!write_format7(r, out, complaint) && r.status() == DeviceStatus::ok)
+    if (!write_format7(r, out, error) && r.status() == DeviceStatus::ok)
       return DeviceStatus::unsupported;
     const std::uint32_t total =
         r.get_at(out.csr + reg::format7::kTotalBytesLow);  // the high half: frames of 4 GB
@@ -129,7 +129,7 @@ DeviceStatus apply_plan(CameraRegisters* registers, const BusTraits& bus, Camera
   out.grey.effective_bits = effective_bits(r, out);
   const DeviceStatus status = r.take_status();
   if (status != DeviceStatus::ok) {
-    *complaint = r.complaint();
+    *error = r.last_error();
     return status;
   }
   *plan = out;

@@ -29,7 +29,7 @@ HostStamp monotonic_now() noexcept {
 }
 
 void CameraRegisters::fail(DeviceStatus status, std::uint64_t address, bool writing) noexcept {
-  status_ = told_ = status;
+  status_ = last_failure_ = status;
   failed_at_ = address;
   failed_writing_ = writing;
 }
@@ -133,20 +133,20 @@ DeviceStatus CameraRegisters::take_status() noexcept {
   return status;
 }
 
-std::string CameraRegisters::complaint() const {
-  if (told_ == DeviceStatus::ok) return {};
+std::string CameraRegisters::last_error() const {
+  if (last_failure_ == DeviceStatus::ok) return {};
   std::array<char, 160> text{};
-  const char* what = told_ == DeviceStatus::timeout       ? "did not become ready in time"
-                     : told_ == DeviceStatus::unsupported ? "was refused by the camera"
-                     : told_ == DeviceStatus::gone        ? "was not answered: the camera is gone"
-                                                          : "could not be reached";
+  const char* what = last_failure_ == DeviceStatus::timeout       ? "did not become ready in time"
+                     : last_failure_ == DeviceStatus::unsupported ? "was refused by the camera"
+                     : last_failure_ == DeviceStatus::gone ? "was not answered: the camera is gone"
+                                                           : "could not be reached";
   (void)std::snprintf(text.data(), text.size(), "register 0x%llx %s%s",
                       static_cast<unsigned long long>(failed_at_ - kRegisterSpace), what,
                       failed_writing_ ? " (writing)" : "");
   return text.data();
 }
 
-DeviceStatus read_rom(RegisterPort* port, ConfigRom* rom, std::string* complaint) {
+DeviceStatus read_rom(RegisterPort* port, ConfigRom* rom, std::string* message) {
   std::array<std::uint32_t, kMaxRomQuadlets> quadlets{};
   std::size_t n = 0;
   DeviceStatus status = DeviceStatus::ok;
@@ -155,13 +155,13 @@ DeviceStatus read_rom(RegisterPort* port, ConfigRom* rom, std::string* complaint
     if (status != DeviceStatus::ok) break;
   }
   if (n == 0) {
-    *complaint = "its configuration ROM cannot be read";
+    *message = "its configuration ROM cannot be read";
     return status;
   }
   // Some end their ROM with a time-out instead of a refusal; what was read decides.
   const RomStatus parsed = parse_config_rom(std::span(quadlets).first(n), rom);
   if (parsed == RomStatus::ok) return DeviceStatus::ok;
-  *complaint = to_string(parsed);
+  *message = to_string(parsed);
   return status == DeviceStatus::gone ? status : DeviceStatus::failed;
 }
 

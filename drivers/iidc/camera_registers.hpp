@@ -57,11 +57,11 @@ class CameraRegisters {
   /// failed.
   [[nodiscard]] bool apply_format7(std::uint64_t csr, std::uint32_t error) noexcept;
 
-  /// The first failure since the last call, ok otherwise; begins anew.
+  /// The first failure since the last call, ok otherwise; begins again.
   [[nodiscard]] DeviceStatus take_status() noexcept;
   [[nodiscard]] DeviceStatus status() const noexcept { return status_; }
   /// About the failure: which register, what it did.
-  [[nodiscard]] std::string complaint() const;
+  [[nodiscard]] std::string last_error() const;
 
  private:
   void fail(DeviceStatus status, std::uint64_t address, bool writing) noexcept;
@@ -70,14 +70,14 @@ class CameraRegisters {
   std::uint64_t base_;
   Duration patience_;
   DeviceStatus status_ = DeviceStatus::ok;
-  DeviceStatus told_ = DeviceStatus::ok;  // the last failure, for complaint()
+  DeviceStatus last_failure_ = DeviceStatus::ok;  // the last failure, for last_error()
   std::uint64_t failed_at_ = 0;
   bool failed_writing_ = false;
 };
 
 /// Reads the configuration ROM quadlet by quadlet until it ends (longer reads over the end fail),
 /// and parses it.
-[[nodiscard]] DeviceStatus read_rom(RegisterPort* port, ConfigRom* rom, std::string* complaint);
+[[nodiscard]] DeviceStatus read_rom(RegisterPort* port, ConfigRom* rom, std::string* message);
 
 [[nodiscard]] HostStamp monotonic_now() noexcept;
 

@@ -47,44 +47,43 @@ std::int64_t realtime_us() noexcept {
 }  // namespace
 
 // ---- finding and opening
-// ------------------------------------------------------------------------------------------
 
-std::unique_ptr<FirewireBus> FirewireBus::open(std::string_view wanted,
+std::unique_ptr<FirewireBus> FirewireBus::open(std::string_view requested,
                                                std::shared_ptr<BusLedger> ledger,
-                                               DeviceStatus* status, std::string* complaint) {
+                                               DeviceStatus* status, std::string* message) {
   std::unique_ptr<FirewireBus> bus(new FirewireBus);
   bus->ledger_ = std::move(ledger);
-  *status = bus->open_node(wanted);
+  *status = bus->open_node(requested);
   if (*status == DeviceStatus::ok) return bus;
-  *complaint = bus->complaint_;
+  *message = bus->last_error_;
   return nullptr;
 }
 
-DeviceStatus FirewireBus::open_node(std::string_view wanted) {
+DeviceStatus FirewireBus::open_node(std::string_view requested) {
   silence_library();
-  complaint_.clear();
+  last_error_.clear();
   DeviceStatus status = DeviceStatus::not_found;
-  if (!has_firewire()) complaint_ = "this kernel has no FireWire stack: modprobe firewire-ohci";
+  if (!has_firewire()) last_error_ = "this kernel has no FireWire stack: modprobe firewire-ohci";
   for (const FirewireNode& node : list_firewire_cameras()) {
-    if (!names_camera(wanted, node.rom.guid)) continue;
+    if (!names_camera(requested, node.rom.guid)) continue;
     lock_ = ::open(node.device.c_str(), O_RDWR | O_CLOEXEC);
     if (lock_ < 0) {
       status =
           errno == EACCES || errno == EPERM ? DeviceStatus::no_permission : DeviceStatus::failed;
-      complaint_ =
+      last_error_ =
           "no access to " + node.device + ": " + std::strerror(errno) +
           "; install the udev rules (vergence devices --write-udev), and be in group video";
-      if (!wanted.empty()) return status;
+      if (!requested.empty()) return status;
       continue;
     }
     // The kernel lets any number of programs at a camera; two that stream would spoil each other's
     // registers.
     if (::flock(lock_, LOCK_EX | LOCK_NB) != 0) {
       status = DeviceStatus::busy;
-      complaint_ = node.device + " is locked";
+      last_error_ = node.device + " is locked";
       (void)::close(lock_);
       lock_ = -1;
-      if (!wanted.empty()) return status;
+      if (!requested.empty()) return status;
       continue;
     }
     library_ = dc1394_new();
@@ -92,14 +91,14 @@ DeviceStatus FirewireBus::open_node(std::string_view wanted) {
     if (camera_ == nullptr) {
       close_node();
       status = DeviceStatus::failed;
-      complaint_ = "libdc1394 cannot open " + node.device;
-      if (!wanted.empty()) return status;
+      last_error_ = "libdc1394 cannot open " + node.device;
+      if (!requested.empty()) return status;
       continue;
     }
     node_ = node;
     info_ = {"iidc-1394", guid_text(node.rom.guid),
              node.rom.model[0] != 0 ? node.rom.model.data() : "IIDC camera", node.device};
-    complaint_.clear();
+    last_error_.clear();
     return DeviceStatus::ok;
   }
   return status;
@@ -129,14 +128,14 @@ DeviceStatus FirewireBus::reopen() noexcept {
     drop_orphan();
     const std::size_t other = 1 - generation_.load(std::memory_order_relaxed);
     if (map().base != nullptr && maps_[other].base != nullptr) {
-      complaint_ = "images of before it was unplugged are still in use";
+      last_error_ = "images of before it was unplugged are still in use";
       return DeviceStatus::gone;
     }
     close_node();
     const std::string mine = info_.serial;
     const DeviceStatus status = open_node(mine);
     if (status != DeviceStatus::ok) {
-      if (complaint_.empty()) complaint_ = "the camera is not on the bus";
+      if (last_error_.empty()) last_error_ = "the camera is not on the bus";
       return status == DeviceStatus::no_permission || status == DeviceStatus::busy
                  ? status
                  : DeviceStatus::gone;
@@ -150,7 +149,6 @@ DeviceStatus FirewireBus::reopen() noexcept {
 }
 
 // ---- registers
-// ----------------------------------------------------------------------------------------------------
 
 /// libdc1394 says only that it failed.
 DeviceStatus FirewireBus::failure(HostStamp begun) const noexcept {
@@ -175,7 +173,6 @@ DeviceStatus FirewireBus::write(std::uint64_t address, std::uint32_t value) noex
 }
 
 // ---- the ring
-// -----------------------------------------------------------------------------------------------------
 
 DeviceStatus FirewireBus::allocate(const StreamShape& shape) noexcept {
   tear_down();
@@ -189,24 +186,24 @@ DeviceStatus FirewireBus::allocate(const StreamShape& shape) noexcept {
 }
 
 DeviceStatus FirewireBus::set_up() {
-  complaint_ = ledger_->complaint(node_.bus);
-  if (!complaint_.empty()) return DeviceStatus::no_bandwidth;
+  last_error_ = ledger_->last_error(node_.bus);
+  if (!last_error_.empty()) return DeviceStatus::no_bandwidth;
   const dc1394error_t error = dc1394_capture_setup(
       camera_, static_cast<std::uint32_t>(shape_.buffers), DC1394_CAPTURE_FLAGS_DEFAULT);
   if (error == DC1394_NO_BANDWIDTH || error == DC1394_NO_ISO_CHANNEL) {
-    complaint_ = "the bus has no room left for its " +
-                 std::to_string(bandwidth_units(shape_.packet_bytes, shape_.speed)) +
-                 " bandwidth units, or no channel: another program streams on it";
+    last_error_ = "the bus has no room left for its " +
+                  std::to_string(bandwidth_units(shape_.packet_bytes, shape_.speed)) +
+                  " bandwidth units, or no channel: another program streams on it";
     return DeviceStatus::no_bandwidth;
   }
   if (error != DC1394_SUCCESS) {
-    complaint_ =
+    last_error_ =
         std::string("libdc1394 cannot set up the capture: ") + dc1394_error_get_string(error);
     return ::access(node_.device.c_str(), F_OK) != 0 ? DeviceStatus::gone : DeviceStatus::failed;
   }
   captured_ = true;
   if (!find_map()) {
-    complaint_ = "the capture's memory is not where libdc1394 2.2 puts it";
+    last_error_ = "the capture's memory is not where libdc1394 2.2 puts it";
     tear_down();
     return DeviceStatus::failed;
   }
@@ -293,7 +290,6 @@ void FirewireBus::enqueue_returned() noexcept {
 }
 
 // ---- streaming
-// ----------------------------------------------------------------------------------------------------
 
 DeviceStatus FirewireBus::start(StreamSink* sink) noexcept {
   stop();
@@ -396,7 +392,7 @@ bool FirewireBus::take_one() noexcept {
 std::string FirewireBus::remark(const StreamShape& shape, double, int sharing) const {
   const std::vector<BusShare> shares(static_cast<std::size_t>(std::max(sharing, 1)),
                                      {shape.packet_bytes, shape.speed, shape.image_bytes});
-  const std::string text = budget_complaint(shares);
+  const std::string text = budget_error(shares);
   return text.empty() ? text : "if all are on one bus, " + text;
 }
 

@@ -32,11 +32,10 @@ class FirewireBus final : public CameraBus {
  public:
   static constexpr std::size_t kReserve = 3;
 
-  /// `wanted` as names_camera(). Null: *status and *complaint say why.
-  [[nodiscard]] static std::unique_ptr<FirewireBus> open(std::string_view wanted,
+  /// `requested` as names_camera(). Null: *status and *error say why.
+  [[nodiscard]] static std::unique_ptr<FirewireBus> open(std::string_view requested,
                                                          std::shared_ptr<BusLedger> ledger,
-                                                         DeviceStatus* status,
-                                                         std::string* complaint);
+                                                         DeviceStatus* status, std::string* error);
   ~FirewireBus() override;
   FirewireBus(const FirewireBus&) = delete;
   FirewireBus& operator=(const FirewireBus&) = delete;
@@ -53,7 +52,7 @@ class FirewireBus final : public CameraBus {
   [[nodiscard]] DeviceStatus reopen() noexcept override;
   void give_back(FrameSlot slot) noexcept override;
   [[nodiscard]] const std::uint8_t* bytes(FrameSlot slot) const noexcept override;
-  [[nodiscard]] std::string complaint() const override { return complaint_; }
+  [[nodiscard]] std::string last_error() const override { return last_error_; }
   [[nodiscard]] std::string remark(const StreamShape& shape, double rate_hz,
                                    int sharing) const override;
 
@@ -65,7 +64,7 @@ class FirewireBus final : public CameraBus {
     std::size_t stride = 0;
   };
   FirewireBus() = default;
-  [[nodiscard]] DeviceStatus open_node(std::string_view wanted);
+  [[nodiscard]] DeviceStatus open_node(std::string_view requested);
   void close_node() noexcept;
   [[nodiscard]] DeviceStatus set_up();
   [[nodiscard]] bool find_map();
@@ -91,7 +90,7 @@ class FirewireBus final : public CameraBus {
   FirewireNode node_{};
   DeviceInfo info_{};
   BusTraits traits_{true, BusSpeed::s800, largest_packet(BusSpeed::s800), 0};
-  std::string complaint_;
+  std::string last_error_;
   dc1394_t* library_ = nullptr;
   dc1394camera_t* camera_ = nullptr;
   int lock_ = -1;  // descriptor that keeps other programs of ours away

@@ -15,7 +15,7 @@ namespace {
 class FirewireDriver final : public CameraDriver {
  public:
   std::vector<DeviceInfo> enumerate() override {
-    complaint_ = has_firewire() ? "" : "this kernel has no FireWire stack: modprobe firewire-ohci";
+    last_error_ = has_firewire() ? "" : "this kernel has no FireWire stack: modprobe firewire-ohci";
     std::vector<DeviceInfo> out;
     for (const FirewireNode& n : list_firewire_cameras())
       out.push_back({"iidc-1394", guid_text(n.rom.guid),
@@ -23,18 +23,18 @@ class FirewireDriver final : public CameraDriver {
     return out;
   }
   std::unique_ptr<CameraDevice> open(std::string_view serial, DeviceStatus* status) override {
-    complaint_.clear();
-    auto bus = FirewireBus::open(serial, ledger_, status, &complaint_);
+    last_error_.clear();
+    auto bus = FirewireBus::open(serial, ledger_, status, &last_error_);
     if (bus == nullptr) return nullptr;
     const ConfigRom rom = bus->rom();
     auto clock = bus->clock();
     return std::make_unique<IidcCamera>(std::move(bus), rom, std::move(clock));
   }
-  std::string complaint() const override { return complaint_; }
+  std::string last_error() const override { return last_error_; }
 
  private:
   std::shared_ptr<BusLedger> ledger_ = std::make_shared<BusLedger>();
-  std::string complaint_;
+  std::string last_error_;
 };
 
 }  // namespace

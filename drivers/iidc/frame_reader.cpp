@@ -86,7 +86,7 @@ ReadFrame FrameReader::read(const Arrival& arrival) noexcept {
     doubted_ = true;
     doubted_counter_ = e.counter;
     if (!follows) return f;
-    f.counter = counter_.rebase(e.counter);  // the camera counts anew
+    f.counter = counter_.rebase(e.counter);  // the camera counts from zero
   } else {
     f.missing = counter_.known() ? static_cast<std::uint64_t>(counter_.step(e.counter) - 1) : 0;
     f.counter = counter_.take(e.counter);

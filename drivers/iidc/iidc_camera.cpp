@@ -30,23 +30,22 @@ IidcCamera::IidcCamera(std::unique_ptr<CameraBus> bus, const ConfigRom& rom,
 IidcCamera::~IidcCamera() { stop(); }
 
 DeviceStatus IidcCamera::refused(DeviceStatus status, std::string why) {
-  complaint_ = std::move(why);
+  last_error_ = std::move(why);
   return status;
 }
 
 // ---- the owner's thread
-// -------------------------------------------------------------------------------------------
 
-DeviceStatus IidcCamera::configure(const CameraConfiguration& wanted,
+DeviceStatus IidcCamera::configure(const CameraConfiguration& requested,
                                    CameraConfiguration* actual) noexcept {
   try {
-    return configure_or_throw(wanted, actual);
+    return configure_or_throw(requested, actual);
   } catch (const std::exception&) {  // no memory for the slots, or for a sentence
     return DeviceStatus::failed;
   }
 }
 
-DeviceStatus IidcCamera::configure_or_throw(const CameraConfiguration& wanted,
+DeviceStatus IidcCamera::configure_or_throw(const CameraConfiguration& requested,
                                             CameraConfiguration* actual) {
   if (streaming_.load(std::memory_order_acquire))
     return refused(DeviceStatus::busy, "it is streaming; stop it first");
@@ -54,23 +53,23 @@ DeviceStatus IidcCamera::configure_or_throw(const CameraConfiguration& wanted,
   drain();
   CameraPlan plan;
   std::string why;
-  DeviceStatus status = make_plan(&registers_, bus_->traits(), wanted, &plan, &why);
+  DeviceStatus status = make_plan(&registers_, bus_->traits(), requested, &plan, &why);
   if (status == DeviceStatus::ok) status = apply_plan(&registers_, bus_->traits(), &plan, &why);
   if (status == DeviceStatus::ok && (!configured_ || !(plan.shape == plan_.shape))) {
     configured_ = false;
     status = bus_->allocate(plan.shape);
-    why = bus_->complaint();
+    why = bus_->last_error();
   }
   if (status != DeviceStatus::ok) return refused(status, std::move(why));
   if (!plan.grey.none())
     converted_.allocate(plan.options.buffers, FramePool::stride(plan.size.width) *
                                                   static_cast<std::size_t>(plan.size.height));
   plan_ = plan;
-  sharing_ = wanted.sharing;
+  sharing_ = requested.sharing;
   configured_ = true;
-  complaint_.clear();
+  last_error_.clear();
   if (actual != nullptr) {
-    CameraConfiguration done = wanted;
+    CameraConfiguration done = requested;
     done.rate_hz = plan.rate_hz;
     done.exposure = plan.exposure;
     done.gain_db = plan.gain_db;
@@ -134,7 +133,7 @@ DeviceStatus IidcCamera::begin() {
   std::string why;
   if (lost_.load(std::memory_order_acquire)) {
     const DeviceStatus back = bus_->reopen();
-    if (back != DeviceStatus::ok) return refused(DeviceStatus::gone, bus_->complaint());
+    if (back != DeviceStatus::ok) return refused(DeviceStatus::gone, bus_->last_error());
     lost_.store(false, std::memory_order_release);
   }
   CameraPlan plan = plan_;
@@ -144,7 +143,7 @@ DeviceStatus IidcCamera::begin() {
   if (status == DeviceStatus::timeout || status == DeviceStatus::failed ||
       status == DeviceStatus::unsupported) {
     lost_.store(true, std::memory_order_release);
-    status = DeviceStatus::gone;  // it does not answer as it did; asked again, it is opened anew
+    status = DeviceStatus::gone;  // it does not answer as it did; asked again, it is opened again
   }
   if (status == DeviceStatus::ok && !(plan.shape == plan_.shape)) {
     why = "the camera's frames are not those it was configured for; configure it again";
@@ -168,11 +167,11 @@ DeviceStatus IidcCamera::begin() {
   if (status == DeviceStatus::ok) {
     registers_.transmit(true);
     status = registers_.take_status();
-    if (status != DeviceStatus::ok) why = registers_.complaint();
+    if (status != DeviceStatus::ok) why = registers_.last_error();
     if (status == DeviceStatus::timeout || status == DeviceStatus::unsupported)
       status = DeviceStatus::gone;
   } else {
-    why = bus_->complaint();
+    why = bus_->last_error();
   }
   if (status != DeviceStatus::ok) {
     if (status == DeviceStatus::gone) lost_.store(true, std::memory_order_release);
@@ -180,7 +179,7 @@ DeviceStatus IidcCamera::begin() {
     return refused(status, std::move(why));
   }
   starts_.fetch_add(1, std::memory_order_relaxed);
-  complaint_.clear();
+  last_error_.clear();
   return DeviceStatus::ok;
 }
 
@@ -207,19 +206,19 @@ DeviceStatus IidcCamera::trigger_once() noexcept {
   const DeviceStatus status = registers_.take_status();
   if (status == DeviceStatus::ok) return status;
   try {
-    complaint_ = registers_.complaint();
+    last_error_ = registers_.last_error();
   } catch (const std::exception&) {
-    complaint_.clear();
+    last_error_.clear();
   }
   return status;
 }
 
-DeviceStatus IidcCamera::set_exposure(const ExposureSetting& wanted,
+DeviceStatus IidcCamera::set_exposure(const ExposureSetting& requested,
                                       ExposureSetting* actual) noexcept {
   if (!streaming_.load(std::memory_order_acquire)) return DeviceStatus::stopped;
   if (lost_.load(std::memory_order_acquire)) return DeviceStatus::gone;
   const std::lock_guard lock(asking_);
-  if (wanted.exposure <= Duration{} || wanted.exposure.to_seconds() * plan_.rate_hz > 1)
+  if (requested.exposure <= Duration{} || requested.exposure.to_seconds() * plan_.rate_hz > 1)
     return DeviceStatus::bad_configuration;
   const auto nearest = [](const AbsoluteRange& r, double value) {
     return std::clamp(value, r.least, std::max(r.least, r.most));
@@ -227,9 +226,9 @@ DeviceStatus IidcCamera::set_exposure(const ExposureSetting& wanted,
   ExposureSetting taken{plan_.exposure, plan_.gain_db};
   if (const AbsoluteRange r = registers_.absolute_range(Feature::shutter); r.present)
     taken.exposure = Duration::seconds(
-        registers_.set_absolute(Feature::shutter, nearest(r, wanted.exposure.to_seconds())));
+        registers_.set_absolute(Feature::shutter, nearest(r, requested.exposure.to_seconds())));
   if (const AbsoluteRange r = registers_.absolute_range(Feature::gain); r.present)
-    taken.gain_db = registers_.set_absolute(Feature::gain, nearest(r, wanted.gain_db));
+    taken.gain_db = registers_.set_absolute(Feature::gain, nearest(r, requested.gain_db));
   const DeviceStatus status = registers_.take_status();
   if (status != DeviceStatus::ok)
     return status == DeviceStatus::gone ? status : DeviceStatus::failed;
@@ -245,7 +244,7 @@ std::string IidcCamera::remark() const {
   std::string text = bus_->remark(plan_.shape, plan_.rate_hz, sharing_);
   if (!plan_.info.has(FrameInfoItem::counter))
     text += std::string(text.empty() ? "" : "; ") +
-            "it embeds no counter and no stamp: lost images are told by their times only";
+            "it embeds no counter and no stamp: lost images are noticed by their times only";
   return text;
 }
 
@@ -256,7 +255,6 @@ CameraStatistics IidcCamera::statistics() const noexcept {
 }
 
 // ---- the stream's thread
-// ------------------------------------------------------------------------------------------
 
 bool IidcCamera::frame(const Arrival& arrival) noexcept {
   if (lost_.load(std::memory_order_acquire)) return false;  // nothing follows a `gone`
@@ -308,7 +306,6 @@ void IidcCamera::push(const Delivery& delivery) noexcept {
 }
 
 // ---- the consumer's thread
-// ----------------------------------------------------------------------------------------
 
 DeviceStatus IidcCamera::wait(Duration limit, Frame* frame) noexcept {
   Delivery d;

@@ -25,7 +25,7 @@ namespace vergence::iidc {
 /// Stamps    The camera's own clock where it embeds it (on one 1394 bus common to all cameras),
 ///           else the arrival.
 /// Gone      When the bus says so, or when the stream is out of step for kStrays frames: start()
-///           begins anew.
+///           begins again.
 /// Restart   start() writes all registers again: after a stop or a replug the camera is as
 ///           configured.
 class IidcCamera final : public CameraDevice, private StreamSink {
@@ -41,7 +41,7 @@ class IidcCamera final : public CameraDevice, private StreamSink {
   IidcCamera& operator=(const IidcCamera&) = delete;
 
   [[nodiscard]] const DeviceInfo& info() const noexcept override { return bus_->info(); }
-  [[nodiscard]] DeviceStatus configure(const CameraConfiguration& wanted,
+  [[nodiscard]] DeviceStatus configure(const CameraConfiguration& requested,
                                        CameraConfiguration* actual) noexcept override;
   [[nodiscard]] DeviceTiming timing() const noexcept override;
   [[nodiscard]] DeviceStatus start(Notifier* ready) noexcept override;
@@ -50,9 +50,9 @@ class IidcCamera final : public CameraDevice, private StreamSink {
   void release(FrameSlot slot) noexcept override;
   void stop() noexcept override;
   [[nodiscard]] DeviceStatus trigger_once() noexcept override;
-  [[nodiscard]] DeviceStatus set_exposure(const ExposureSetting& wanted,
+  [[nodiscard]] DeviceStatus set_exposure(const ExposureSetting& requested,
                                           ExposureSetting* actual) noexcept override;
-  [[nodiscard]] std::string complaint() const override { return complaint_; }
+  [[nodiscard]] std::string last_error() const override { return last_error_; }
   [[nodiscard]] std::string remark() const override;
   [[nodiscard]] CameraStatistics statistics() const noexcept override;
 
@@ -67,7 +67,7 @@ class IidcCamera final : public CameraDevice, private StreamSink {
   [[nodiscard]] bool frame(const Arrival& arrival) noexcept override;
   void gone(HostStamp at) noexcept override;
   void push(const Delivery& delivery) noexcept;
-  [[nodiscard]] DeviceStatus configure_or_throw(const CameraConfiguration& wanted,
+  [[nodiscard]] DeviceStatus configure_or_throw(const CameraConfiguration& requested,
                                                 CameraConfiguration* actual);
   [[nodiscard]] DeviceStatus begin();
   [[nodiscard]] Duration transfer_time() const noexcept;
@@ -82,7 +82,7 @@ class IidcCamera final : public CameraDevice, private StreamSink {
   CameraPlan plan_{};
   int sharing_ = 1;
   bool configured_ = false;
-  std::string complaint_;
+  std::string last_error_;
 
   FrameReader reader_;  // the stream's thread
   exposure::AppliedExposure exposures_;

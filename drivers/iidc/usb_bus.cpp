@@ -22,43 +22,43 @@ constexpr std::size_t kSuperSpeedBlock = 1024;  // transfers of USB 3 are whole 
 }  // namespace
 
 // ---- opening
-// -------------------------------------------------------------------------------------------------------
 
-std::unique_ptr<UsbBus> UsbBus::open(std::string_view wanted, DeviceStatus* status,
-                                     std::string* complaint) {
+std::unique_ptr<UsbBus> UsbBus::open(std::string_view requested, DeviceStatus* status,
+                                     std::string* message) {
   std::unique_ptr<UsbBus> bus(new UsbBus);
-  *status = bus->open_device(wanted);
+  *status = bus->open_device(requested);
   if (*status == DeviceStatus::ok) return bus;
-  *complaint = bus->complaint_;
+  *message = bus->last_error_;
   return nullptr;
 }
 
-DeviceStatus UsbBus::open_device(std::string_view wanted) {
-  complaint_.clear();
+DeviceStatus UsbBus::open_device(std::string_view requested) {
+  last_error_.clear();
   // A context of its own: libusb's list of devices is as old as its context where no udev daemon
   // tells it of new ones.
   if (libusb_init(&context_) != LIBUSB_SUCCESS) {
     context_ = nullptr;
-    complaint_ = kNoUsb;
+    last_error_ = kNoUsb;
     return DeviceStatus::failed;
   }
   DeviceStatus status = DeviceStatus::not_found;
-  const bool listed = for_each_usb_camera(context_, &complaint_, [&](FoundUsbCamera* found) {
+  const bool listed = for_each_usb_camera(context_, &last_error_, [&](FoundUsbCamera* found) {
     if (found->handle == nullptr) {  // it may have been the one
       if (status == DeviceStatus::not_found && found->who.access == DeviceStatus::no_permission)
         status = found->who.access;
       return false;
     }
-    if (!names_camera(wanted, found->who.guid, found->who.transport_serial)) return false;
+    if (!names_camera(requested, found->who.guid, found->who.transport_serial)) return false;
     status = claim(found->handle);
-    if (status != DeviceStatus::ok) return !wanted.empty();  // any other will do when none is named
+    if (status != DeviceStatus::ok)
+      return !requested.empty();  // any other will do when none is named
     handle_ = std::exchange(found->handle, nullptr);
     info_ = found->who.info;
     rom_ = found->rom;
     const bool super = libusb_get_device_speed(found->device) >= LIBUSB_SPEED_SUPER;
     traits_ = {false, BusSpeed::s800, super ? std::size_t{65532} : largest_packet(BusSpeed::s800),
                super ? 400e6 : 53e6};
-    complaint_.clear();
+    last_error_.clear();
     return true;
   });
   if (!listed) status = DeviceStatus::failed;
@@ -73,7 +73,7 @@ DeviceStatus UsbBus::claim(libusb_device_handle* handle) {
     (void)libusb_set_configuration(handle, 1);
   libusb_config_descriptor* config = nullptr;
   if (libusb_get_active_config_descriptor(libusb_get_device(handle), &config) != LIBUSB_SUCCESS) {
-    complaint_ = "its USB configuration cannot be read";
+    last_error_ = "its USB configuration cannot be read";
     return DeviceStatus::failed;
   }
   interface_ = -1;
@@ -90,15 +90,15 @@ DeviceStatus UsbBus::claim(libusb_device_handle* handle) {
   }
   libusb_free_config_descriptor(config);
   if (interface_ < 0) {
-    complaint_ =
+    last_error_ =
         "it has no bulk endpoint 0x81 for images: not an IIDC camera, or a USB3 Vision one (driver "
         "gige's library reads those)";
     return DeviceStatus::failed;
   }
   const int error = libusb_claim_interface(handle, interface_);
   if (error == LIBUSB_SUCCESS) return DeviceStatus::ok;
-  complaint_ = error == LIBUSB_ERROR_BUSY ? "another program has claimed it"
-                                          : libusb_strerror(static_cast<libusb_error>(error));
+  last_error_ = error == LIBUSB_ERROR_BUSY ? "another program has claimed it"
+                                           : libusb_strerror(static_cast<libusb_error>(error));
   return usb_status(error);
 }
 
@@ -132,7 +132,7 @@ DeviceStatus UsbBus::reopen() noexcept {
     close_device();
     const DeviceStatus status = open_device(mine);
     if (status != DeviceStatus::ok) {
-      if (complaint_.empty()) complaint_ = "the camera is not plugged in";
+      if (last_error_.empty()) last_error_ = "the camera is not plugged in";
       info_.serial = mine;
       return status == DeviceStatus::no_permission || status == DeviceStatus::busy
                  ? status
@@ -146,7 +146,6 @@ DeviceStatus UsbBus::reopen() noexcept {
 }
 
 // ---- registers
-// ----------------------------------------------------------------------------------------------------
 
 DeviceStatus UsbBus::read(std::uint64_t address, std::uint32_t* value) noexcept {
   return handle_ == nullptr ? DeviceStatus::gone : read_usb_quadlet(handle_, address, value);
@@ -157,7 +156,6 @@ DeviceStatus UsbBus::write(std::uint64_t address, std::uint32_t value) noexcept 
 }
 
 // ---- streaming
-// ----------------------------------------------------------------------------------------------------
 
 DeviceStatus UsbBus::allocate(const StreamShape& shape) noexcept {
   try {
@@ -173,7 +171,7 @@ DeviceStatus UsbBus::allocate(const StreamShape& shape) noexcept {
     shape_ = shape;
     return DeviceStatus::ok;
   } catch (const std::bad_alloc&) {
-    complaint_ = "there is no memory for its images";
+    last_error_ = "there is no memory for its images";
     return DeviceStatus::failed;
   }
 }
@@ -220,11 +218,12 @@ DeviceStatus UsbBus::start(StreamSink* sink) noexcept {
   }
   stop();
   if (error == LIBUSB_ERROR_NO_DEVICE) return DeviceStatus::gone;
-  complaint_ = error == LIBUSB_ERROR_OTHER
-                   ? "no thread for its stream"
-                   : "the kernel takes no more USB memory, or its images are all in use: raise the "
-                     "limit, which is 16 MB for all devices, "
-                     "with echo 256 > /sys/module/usbcore/parameters/usbfs_memory_mb";
+  last_error_ =
+      error == LIBUSB_ERROR_OTHER
+          ? "no thread for its stream"
+          : "the kernel takes no more USB memory, or its images are all in use: raise the "
+            "limit, which is 16 MB for all devices, "
+            "with echo 256 > /sys/module/usbcore/parameters/usbfs_memory_mb";
   return error == LIBUSB_ERROR_OTHER ? DeviceStatus::failed : DeviceStatus::no_bandwidth;
 }
 

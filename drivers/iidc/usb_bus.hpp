@@ -36,9 +36,9 @@ class UsbBus final : public CameraBus {
       4;  // 130 ms at 30 Hz: longer than any scheduling hold-up seen
   static constexpr Duration kCancelLimit = Duration::seconds(2);
 
-  /// `wanted` as names_camera(). Null: *status and *complaint say why.
-  [[nodiscard]] static std::unique_ptr<UsbBus> open(std::string_view wanted, DeviceStatus* status,
-                                                    std::string* complaint);
+  /// `requested` as names_camera(). Null: *status and *error say why.
+  [[nodiscard]] static std::unique_ptr<UsbBus> open(std::string_view requested,
+                                                    DeviceStatus* status, std::string* error);
   ~UsbBus() override;
   UsbBus(const UsbBus&) = delete;
   UsbBus& operator=(const UsbBus&) = delete;
@@ -56,7 +56,7 @@ class UsbBus final : public CameraBus {
   [[nodiscard]] const std::uint8_t* bytes(FrameSlot slot) const noexcept override {
     return memory_->bytes(slot);
   }
-  [[nodiscard]] std::string complaint() const override { return complaint_; }
+  [[nodiscard]] std::string last_error() const override { return last_error_; }
   [[nodiscard]] std::string remark(const StreamShape& shape, double rate_hz,
                                    int sharing) const override;
 
@@ -68,7 +68,7 @@ class UsbBus final : public CameraBus {
     bool flying = false;
   };
   UsbBus() = default;
-  [[nodiscard]] DeviceStatus open_device(std::string_view wanted);
+  [[nodiscard]] DeviceStatus open_device(std::string_view requested);
   [[nodiscard]] DeviceStatus claim(libusb_device_handle* handle);
   void close_device() noexcept;
   void drop_memory() noexcept;
@@ -87,7 +87,7 @@ class UsbBus final : public CameraBus {
   DeviceInfo info_{};
   BusTraits traits_{};
   ConfigRom rom_{};
-  std::string complaint_;
+  std::string last_error_;
 
   StreamShape shape_{};
   std::size_t transfer_bytes_ = 0;

@@ -66,7 +66,7 @@ class HandlePort final : public RegisterPort {
 
 /// Opens a device and asks who it is.
 FoundUsbCamera ask(libusb_device* device, const libusb_device_descriptor& d, const Product& product,
-                   std::string* complaint) {
+                   std::string* message) {
   FoundUsbCamera found;
   found.device = device;
   UsbCandidate& who = found.who;
@@ -75,8 +75,8 @@ FoundUsbCamera ask(libusb_device* device, const libusb_device_descriptor& d, con
   if (error != LIBUSB_SUCCESS) {
     who.access = usb_status(error);
     if (who.access == DeviceStatus::no_permission)
-      *complaint = "no permission to open " + node_of(device) +
-                   ": install the udev rules (vergence devices --write-udev) and plug it in again";
+      *message = "no permission to open " + node_of(device) +
+                 ": install the udev rules (vergence devices --write-udev) and plug it in again";
     return found;
   }
   std::array<unsigned char, 64> text{};
@@ -89,7 +89,7 @@ FoundUsbCamera ask(libusb_device* device, const libusb_device_descriptor& d, con
   std::string why;
   who.access = read_rom(&port, &found.rom, &why);
   if (who.access != DeviceStatus::ok) {
-    *complaint = std::string(product.name) + " at " + place_of(device) + ": " + why;
+    *message = std::string(product.name) + " at " + place_of(device) + ": " + why;
     libusb_close(found.handle);
     found.handle = nullptr;
     return found;
@@ -147,12 +147,12 @@ DeviceStatus write_usb_quadlet(libusb_device_handle* handle, std::uint64_t addre
   return sent == static_cast<int>(b.size()) ? DeviceStatus::ok : DeviceStatus::failed;
 }
 
-bool for_each_usb_camera(libusb_context* context, std::string* complaint,
+bool for_each_usb_camera(libusb_context* context, std::string* message,
                          const std::function<bool(FoundUsbCamera*)>& look) {
   libusb_device** list = nullptr;
   const ssize_t n = libusb_get_device_list(context, &list);
   if (n < 0) {
-    *complaint = kNoUsb;
+    *message = kNoUsb;
     return false;
   }
   bool done = false;
@@ -161,7 +161,7 @@ bool for_each_usb_camera(libusb_context* context, std::string* complaint,
     if (libusb_get_device_descriptor(list[i], &d) != LIBUSB_SUCCESS) continue;
     const Product* product = product_of(d);
     if (product == nullptr) continue;
-    FoundUsbCamera found = ask(list[i], d, *product, complaint);
+    FoundUsbCamera found = ask(list[i], d, *product, message);
     done = look(&found);
     if (found.handle != nullptr) libusb_close(found.handle);
   }
@@ -169,14 +169,14 @@ bool for_each_usb_camera(libusb_context* context, std::string* complaint,
   return true;
 }
 
-std::vector<UsbCandidate> find_usb_cameras(std::string* complaint) {
+std::vector<UsbCandidate> find_usb_cameras(std::string* message) {
   std::vector<UsbCandidate> all;
   libusb_context* context = nullptr;
   if (libusb_init(&context) != LIBUSB_SUCCESS) {
-    *complaint = kNoUsb;
+    *message = kNoUsb;
     return all;
   }
-  (void)for_each_usb_camera(context, complaint, [&all](FoundUsbCamera* found) {
+  (void)for_each_usb_camera(context, message, [&all](FoundUsbCamera* found) {
     all.push_back(std::move(found->who));
     return false;
   });

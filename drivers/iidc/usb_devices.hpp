@@ -23,7 +23,7 @@ struct UsbCandidate {
 };
 
 /// Every device with a known id, each asked for its GUID; in that order.
-[[nodiscard]] std::vector<UsbCandidate> find_usb_cameras(std::string* complaint);
+[[nodiscard]] std::vector<UsbCandidate> find_usb_cameras(std::string* error);
 
 /// One that is looked at; `handle` is null where `who.access` is not ok.
 struct FoundUsbCamera {
@@ -35,7 +35,7 @@ struct FoundUsbCamera {
 /// Opens each in turn and calls back; true ends it. Whoever does not take the handle (sets it to
 /// null) has it closed.
 /// False: the system's devices cannot be listed.
-bool for_each_usb_camera(libusb_context* context, std::string* complaint,
+bool for_each_usb_camera(libusb_context* context, std::string* error,
                          const std::function<bool(FoundUsbCamera*)>& look);
 
 [[nodiscard]] DeviceStatus usb_status(int libusb_error) noexcept;

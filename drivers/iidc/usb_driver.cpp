@@ -12,22 +12,22 @@ namespace {
 class UsbDriver final : public CameraDriver {
  public:
   std::vector<DeviceInfo> enumerate() override {
-    complaint_.clear();
+    last_error_.clear();
     std::vector<DeviceInfo> out;
-    for (UsbCandidate& c : find_usb_cameras(&complaint_)) out.push_back(std::move(c.info));
+    for (UsbCandidate& c : find_usb_cameras(&last_error_)) out.push_back(std::move(c.info));
     return out;
   }
   std::unique_ptr<CameraDevice> open(std::string_view serial, DeviceStatus* status) override {
-    complaint_.clear();
-    auto bus = UsbBus::open(serial, status, &complaint_);
+    last_error_.clear();
+    auto bus = UsbBus::open(serial, status, &last_error_);
     if (bus == nullptr) return nullptr;
     const ConfigRom rom = bus->rom();
     return std::make_unique<IidcCamera>(std::move(bus), rom, nullptr);
   }
-  std::string complaint() const override { return complaint_; }
+  std::string last_error() const override { return last_error_; }
 
  private:
-  std::string complaint_;
+  std::string last_error_;
 };
 
 }  // namespace

@@ -50,7 +50,7 @@ constexpr FaultParameter kMissed[] = {kCamera1, {"pulses", 1, 1, 1e6, "one after
 constexpr FaultParameter kBoardGone[] = {
     kDuration,
     {"powered", 0, 0, 1,
-     "1: it has a supply of its own and pulses on; 0: it stops with the line and starts anew"}};
+     "1: it has a supply of its own and pulses on; 0: it stops with the line and restarts"}};
 constexpr FaultParameter kReboot[] = {{"duration_s", 0.5, 0.01, kLongest, "until it pulses again"}};
 constexpr FaultParameter kInsGone[] = {kDuration};
 constexpr FaultParameter kPositionJump[] = {
@@ -68,7 +68,7 @@ constexpr FaultRow kRows[] = {
      kDrift},
     {FaultKind::recalibrate,
      "recalibrate",
-     "The calibration is asked for anew, as with SIGUSR1; nothing happens to the devices.",
+     "A recalibration is requested, as with SIGUSR1; nothing happens to the devices.",
      {}},
     {FaultKind::lag, "lag",
      "A camera is a frame late: the image of the exposure before, with the counter and the stamp "
@@ -94,7 +94,7 @@ constexpr FaultRow kRows[] = {
     {FaultKind::board_gone, "board_gone", "The line to the trigger board is unplugged.",
      kBoardGone},
     {FaultKind::board_reboot, "board_reboot",
-     "The trigger board starts anew: its pulses stop, then count from 0 again by a clock from 0.",
+     "The trigger board restarts: its pulses stop, then count from 0 again by a clock from 0.",
      kReboot},
     {FaultKind::ins_gone, "ins_gone", "The INS is silent; at 0 it starts late.", kInsGone},
     {FaultKind::no_fix, "no_fix", "The satellite receiver has no position.", kInsGone},

@@ -115,11 +115,12 @@ DeviceStatus FdLine::write(std::span<const std::uint8_t> bytes, Duration limit) 
 }
 
 DeviceStatus FdLine::set_baud(std::uint32_t baud) noexcept {
-  LineSettings wanted = settings_;
-  wanted.baud = baud;
+  LineSettings requested = settings_;
+  requested.baud = baud;
   discard_input();
-  const DeviceStatus status = port_ ? set_port(port_.get(), wanted) : set_raw_tty(fd_, wanted);
-  if (status == DeviceStatus::ok) settings_ = wanted;
+  const DeviceStatus status =
+      port_ ? set_port(port_.get(), requested) : set_raw_tty(fd_, requested);
+  if (status == DeviceStatus::ok) settings_ = requested;
   discard_input();
   return status;
 }

@@ -84,7 +84,7 @@ void PulseMatcher::remember(const Seen& seen) noexcept {
     const Seen& last = frames_[count_ - 1];
     if (seen.counter == last.counter && seen.stamp == last.stamp) return;
     if (advance(last.counter, seen.counter) < 1 || seen.stamp <= last.stamp)
-      count_ = tried_ = 0;  // it began to count anew
+      count_ = tried_ = 0;  // it began to count from zero
   }
   if (count_ == kFrames) {
     std::move(frames_.begin() + 1, frames_.end(), frames_.begin());

@@ -71,7 +71,7 @@ class PulseMatcher {
   /// contradicts: the camera acquires from now on.
   [[nodiscard]] std::optional<std::uint64_t> report(const PulseTrain& train,
                                                     HostStamp arrival) noexcept;
-  /// Forgets everything: the camera or the train began anew.
+  /// Forgets everything: the camera or the train began again.
   void restart() noexcept;
 
   [[nodiscard]] bool proven() const noexcept { return proven_; }

@@ -74,7 +74,7 @@ std::uint64_t RigSynchronizer::number_by_time(const SyncFrame& frame, std::int64
   if (ran_back(time)) {
     ++counters_.contradictions[static_cast<std::size_t>(frame.camera)];
     flushed_ = first_free();
-    anew_ = true;
+    new_clock_ = true;
   }
   const Open *best = nullptr, *newest = nullptr;
   std::int64_t nearest = options_.tolerance.ns();
@@ -87,8 +87,8 @@ std::uint64_t RigSynchronizer::number_by_time(const SyncFrame& frame, std::int64
     best = &o;
   }
   if (best != nullptr) return best->set.number;
-  if (anew_) {
-    anew_ = false;
+  if (new_clock_) {
+    new_clock_ = false;
     return flushed_;
   }
   if (any_out_ && last_out_ >= flushed_ && time - last_time_ <= options_.tolerance.ns())
@@ -129,7 +129,7 @@ void RigSynchronizer::pulse(const Pulse& pulse) noexcept {
   take_pulse(pulse);
 }
 
-void RigSynchronizer::begin_anew() noexcept {
+void RigSynchronizer::begin_again() noexcept {
   ++counters_.reboots;
   flushed_ = first_free();
   for (std::size_t k = 0; k < matchers_.size(); ++k) {
@@ -138,7 +138,7 @@ void RigSynchronizer::begin_anew() noexcept {
   }
 }
 
-/// That camera's proof begins anew: what was in doubt is so for good.
+/// That camera's proof begins again: what was in doubt is so for good.
 void RigSynchronizer::distrust(std::size_t camera) noexcept {
   for (Open& o : open_)
     if (o.used && o.set.present[camera] && o.images[camera].doubtful) o.contradicted = true;
@@ -152,7 +152,7 @@ void RigSynchronizer::acquired(std::size_t camera) noexcept {
 void RigSynchronizer::take_pulse(const Pulse& pulse) noexcept {
   const PulseTrain::Step step = train_.add(pulse, first_free());
   if (step == PulseTrain::Step::known) return;
-  if (step == PulseTrain::Step::began) begin_anew();
+  if (step == PulseTrain::Step::began) begin_again();
   ++pulses_;
   for (std::size_t k = 0; k < static_cast<std::size_t>(options_.cameras); ++k) {
     PulseMatcher& matcher = matchers_[k];

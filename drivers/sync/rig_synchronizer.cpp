@@ -193,7 +193,7 @@ void RigSynchronizer::emit(Open* open, SyncedSet* set) noexcept {
   --open_count_;
 }
 
-/// What can be said of a set's togetherness, and whether the pulses have to be found anew.
+/// What can be said of a set's togetherness, and whether the pulses have to be found again.
 void RigSynchronizer::prove(Open* open, SyncedSet* set) noexcept {
   switch (options_.mode) {
     case SyncMode::software:

@@ -69,9 +69,9 @@ class RigSynchronizer {
   void lost(int camera, std::uint64_t counter) noexcept;
   /// A camera has gone: nobody waits for it.
   void absent(int camera) noexcept;
-  /// It has come back and counts anew. By counter: its first frame joins the pulse nearest in time,
-  /// the others follow. With pulses: it acquires, the others go on; a master's count goes on by its
-  /// clock.
+  /// It has come back and counts from zero. By counter: its first frame joins the pulse nearest in
+  /// time, the others follow. With pulses: it acquires, the others go on; a master's count goes on
+  /// by its clock.
   void restarted(int camera) noexcept;
   /// No more frames will come: everything open goes out by next().
   void finish() noexcept { finishing_ = true; }
@@ -130,7 +130,7 @@ class RigSynchronizer {
   void take_pulse(const Pulse& pulse) noexcept;
   void distrust(std::size_t camera) noexcept;
   void acquired(std::size_t camera) noexcept;
-  void begin_anew() noexcept;
+  void begin_again() noexcept;
   [[nodiscard]] std::uint64_t first_free() const noexcept;
   [[nodiscard]] Duration noise_of(std::size_t camera) const noexcept;
 
@@ -156,7 +156,7 @@ class RigSynchronizer {
   std::uint64_t timed_number_ = 0;
   HostStamp timed_middle_{};
   int back_ = 0;               // frames in a row whose common clock has run back
-  bool anew_ = false;          // … and was set: the next frame begins a new count of time
+  bool new_clock_ = false;     // … and was set: the next frame begins a new count of time
   std::uint64_t flushed_ = 0;  // sets below this number wait for nobody
   PulseTrain train_;
   std::array<PulseMatcher, kMaxCameras> matchers_{};

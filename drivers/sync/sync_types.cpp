@@ -68,7 +68,7 @@ const char* SyncOptions::validate() const noexcept {
     if (c.resolution < Duration{} || c.jitter < Duration{})
       return "a camera's stamps cannot be better than exact";
     if ((c.resolution + c.jitter) * 8 > interval)
-      return "a camera's stamps are too coarse to tell one pulse from the next";
+      return "a camera's stamps are too coarse to distinguish consecutive pulses";
     if (c.latest <= Duration{})
       return "a frame arrives after its pulse: the latest arrival must be positive";
     if (c.delay < Duration{} || c.delay >= interval)

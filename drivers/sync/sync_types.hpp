@@ -145,7 +145,7 @@ struct SyncCounters {
   std::array<std::uint64_t, kMaxCameras> acquisitions{};  // times that its pulses were proven
   std::array<std::uint64_t, kMaxCameras>
       contradictions{};  // times that counter, stamp and pulses did not agree: it acquires again
-  std::uint64_t reboots = 0;     // times that the pulses began anew: all acquire again
+  std::uint64_t reboots = 0;     // times that the pulses began again: all acquire again
   std::uint64_t unreported = 0;  // sets that went out without their pulse's report
   Duration
       worst_acquisition{};  // from the first frame after a (re)start or contradiction to the proof

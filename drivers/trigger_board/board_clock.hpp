@@ -41,7 +41,7 @@ struct TimeQuality {
 ///          (kMoving).
 /// Threads  One caller. Memory: fixed.
 /// Errors   PongWord. kBackward answers in a row from an earlier time than before are a clock that
-///          was set: the fit begins anew.
+///          was set: the fit begins again.
 class BoardClock {
  public:
   static constexpr std::size_t kOpen =

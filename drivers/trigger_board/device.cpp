@@ -7,7 +7,7 @@
 #include <exception>
 #include <utility>
 
-#include "drivers/trigger_board/wanted.hpp"
+#include "drivers/trigger_board/requested_configuration.hpp"
 
 namespace vergence::trigger_board {
 namespace {
@@ -50,14 +50,14 @@ Device::Device(std::unique_ptr<LinePlace> place, const Options& options)
 Device::~Device() { stop(); }
 
 DeviceStatus Device::refuse(DeviceStatus status, std::string sentence) {
-  const std::lock_guard lock(complaint_mutex_);
-  complaint_ = std::move(sentence);
+  const std::lock_guard lock(last_error_mutex_);
+  last_error_ = std::move(sentence);
   return status;
 }
 
-std::string Device::complaint() const {
-  const std::lock_guard lock(complaint_mutex_);
-  return complaint_;
+std::string Device::last_error() const {
+  const std::lock_guard lock(last_error_mutex_);
+  return last_error_;
 }
 
 Duration Device::byte_time() const noexcept {
@@ -91,7 +91,7 @@ DeviceStatus Device::meet(TriggerInfo* who_is_there) {
   Setup setup(*line_, frames_, stopping_, this);
   TriggerInfo who;
   status = setup.find(options_.native_usb ? line_->baud() : options_.baud, &who);
-  if (status != DeviceStatus::ok) return refuse(status, place_->name() + ": " + setup.complaint());
+  if (status != DeviceStatus::ok) return refuse(status, place_->name() + ": " + setup.last_error());
   const std::string serial = hex_of(who.serial);
   // Another board would have other lines: that is for a person to decide.
   if (connected_ && serial != info_.serial)
@@ -110,7 +110,6 @@ DeviceStatus Device::meet(TriggerInfo* who_is_there) {
 }
 
 // ---- the owner's thread
-// ---------------------------------------------------------------------------------------------
 
 DeviceStatus Device::connect() {
   stop();
@@ -121,7 +120,7 @@ DeviceStatus Device::connect() {
   return status;
 }
 
-DeviceStatus Device::configure(const TriggerConfiguration& wanted,
+DeviceStatus Device::configure(const TriggerConfiguration& requested,
                                TriggerConfiguration* actual) noexcept {
   try {
     stop();
@@ -133,7 +132,7 @@ DeviceStatus Device::configure(const TriggerConfiguration& wanted,
     std::string sentence;
     TriggerConfig config;
     const DeviceStatus possible =
-        wire_configuration(wanted, options_, identity_, &config, &sentence);
+        wire_configuration(requested, options_, identity_, &config, &sentence);
     if (possible != DeviceStatus::ok) return refuse(possible, std::move(sentence));
     config_ = config;
     mark_ = mark_of(config);
@@ -145,7 +144,7 @@ DeviceStatus Device::configure(const TriggerConfiguration& wanted,
     if (status != DeviceStatus::ok) return status;
     configured_ = true;
     timing_ = timing_of(config_, byte_time(), place_->latency_timer());
-    remark_ = remark_about(wanted, config_);
+    remark_ = remark_about(requested, config_);
     if (actual != nullptr) *actual = configuration_of(config_);
     return DeviceStatus::ok;
   } catch (const std::exception&) {  // out of memory
@@ -160,7 +159,7 @@ DeviceStatus Device::set_up() {
   if (done == DeviceStatus::ok) done = setup.configure(config_, &status);
   if (done != DeviceStatus::ok) {
     if (done == DeviceStatus::gone) close_line();
-    return refuse(done, place_->name() + ": " + setup.complaint());
+    return refuse(done, place_->name() + ": " + setup.last_error());
   }
   return DeviceStatus::ok;
 }

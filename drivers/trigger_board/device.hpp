@@ -26,7 +26,7 @@ struct BoardStatistics {
       0;                     // right frames of a type or size that this protocol does not have
   std::uint64_t errors = 0;  // ERROR messages that no one waited for
   std::uint64_t writes_refused = 0;     // questions that the line did not take
-  std::uint64_t reboots = 0, gone = 0;  // begun anew; the line was lost
+  std::uint64_t reboots = 0, gone = 0;  // begun again; the line was lost
   std::uint64_t restarts = 0;           // it had stopped by itself, and was started again
   std::uint64_t pps_edges = 0, ins_edges = 0;
   TimeQuality time{};
@@ -38,12 +38,12 @@ struct BoardStatistics {
 /// As TriggerDevice says. connect() and configure() talk to the board and may take a second, at
 /// most seven where none answers. start() never waits: a thread of the device's own asks for the
 /// board's time, starts it, reads, and after `gone` opens and sets it again until it is back. A
-/// board that says nothing for kSilent is gone. One that begins anew (another boot_id) is
+/// board that says nothing for kSilent is gone. One that begins again (another boot_id) is
 /// configured and started by itself, the pulses of another `boot` follow. A board that kept its
 /// pulses going while the line was away goes on with them.
 /// Time     Pulses are mapped: by pings, kFirstPings of them before the board starts, then every
 ///          Options::ping_interval. Where it answers none, they come unmapped.
-/// Memory   The thread allocates only while the board is gone or begins anew.
+/// Memory   The thread allocates only while the board is gone or begins again.
 class Device final : public TriggerDevice, private FrameSink {
  public:
   static constexpr Duration kSilent = Duration::seconds(1);
@@ -61,14 +61,14 @@ class Device final : public TriggerDevice, private FrameSink {
   [[nodiscard]] DeviceStatus connect();
 
   [[nodiscard]] const DeviceInfo& info() const noexcept override { return info_; }
-  [[nodiscard]] DeviceStatus configure(const TriggerConfiguration& wanted,
+  [[nodiscard]] DeviceStatus configure(const TriggerConfiguration& requested,
                                        TriggerConfiguration* actual) noexcept override;
   [[nodiscard]] DeviceTiming timing() const noexcept override { return timing_; }
   [[nodiscard]] DeviceStatus start(Notifier* ready) noexcept override;
   [[nodiscard]] DeviceStatus wait(Duration limit, Pulse* pulse) noexcept override;
   [[nodiscard]] DeviceStatus pause(std::uint32_t pulses) noexcept override;
   void stop() noexcept override;
-  [[nodiscard]] std::string complaint() const override;
+  [[nodiscard]] std::string last_error() const override;
   [[nodiscard]] std::string remark() const override { return remark_; }
   [[nodiscard]] TriggerStatistics statistics() const noexcept override;
 
@@ -132,8 +132,8 @@ class Device final : public TriggerDevice, private FrameSink {
   bool connected_ = false, configured_ = false, virtual_time_ = false;
   DeviceTiming timing_{};
   std::string remark_;
-  mutable std::mutex complaint_mutex_;
-  std::string complaint_;
+  mutable std::mutex last_error_mutex_;
+  std::string last_error_;
 
   std::mutex line_mutex_;  // of the pointer: stop() wakes a line that the thread may be replacing
   std::unique_ptr<ByteLine> line_;  // from here on: of the thread while it runs, else the owner's

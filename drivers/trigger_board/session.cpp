@@ -39,7 +39,7 @@ void Device::work() noexcept {
     if (status == DeviceStatus::stopped) break;  // what still comes until it has stopped counts
     streaming_ = false;
     publish(false);
-    if (status == DeviceStatus::ok) continue;  // it began anew: set it up
+    if (status == DeviceStatus::ok) continue;  // it began again: set it up
     if (status == DeviceStatus::ended) {
       hand_out({Item::What::end, when, {}}, true);
       break;
@@ -58,7 +58,7 @@ DeviceStatus Device::begin() noexcept {
     Setup setup(*line_, frames_, stopping_, this);
     const DeviceStatus status = begin_on(&setup);
     if (status != DeviceStatus::ok && status != DeviceStatus::stopped)
-      (void)refuse(status, place_->name() + ": " + setup.complaint());
+      (void)refuse(status, place_->name() + ": " + setup.last_error());
     // What it will not do it does not do the next time either; but boards are switched, and
     // programs wait.
     return status == DeviceStatus::ok || status == DeviceStatus::stopped ||
@@ -220,7 +220,7 @@ void Device::halt_board() noexcept {
     if (done == DeviceStatus::ok) counted_.board = status;
     if (done == DeviceStatus::ok && status.boot_id == account_.boot())
       account_.end(status.pulses, open_reports());
-    if (done != DeviceStatus::ok) (void)refuse(done, place_->name() + ": " + setup.complaint());
+    if (done != DeviceStatus::ok) (void)refuse(done, place_->name() + ": " + setup.last_error());
     if (done == DeviceStatus::gone) close_line();
   } catch (const std::exception&) {
     close_line();
@@ -259,9 +259,8 @@ void Device::send_pause(HostStamp now) noexcept {
 }
 
 // ---- what comes in
-// --------------------------------------------------------------------------------------------------
 
-/// False: the board has begun anew since it was set up.
+/// False: the board has begun again since it was set up.
 bool Device::same_boot(std::uint32_t boot) noexcept {
   if (!streaming_ || boot == account_.boot()) return true;
   seen_ = Seen::reboot;

@@ -79,7 +79,7 @@ std::uint32_t mark_of(const TriggerConfig& config) noexcept {
 }
 
 Setup::Answer Setup::listen(std::uint8_t type, std::uint8_t first, std::uint8_t last,
-                            std::uint8_t wanted, HostStamp until) {
+                            std::uint8_t requested, HostStamp until) {
   for (;;) {  // ends at `until`
     if (stop_.load(std::memory_order_acquire)) return Answer::stopped;
     TriggerFrame frame;
@@ -90,7 +90,7 @@ Setup::Answer Setup::listen(std::uint8_t type, std::uint8_t first, std::uint8_t 
     if (status != DeviceStatus::ok) return Answer::gone;
     const bool mine =
         frame.sequence < trigger_unasked && steps(first, frame.sequence) <= steps(first, last);
-    if (mine && frame.type == wanted) {
+    if (mine && frame.type == requested) {
       frame_ = frame;
       return Answer::ok;
     }
@@ -105,7 +105,7 @@ Setup::Answer Setup::listen(std::uint8_t type, std::uint8_t first, std::uint8_t 
 }
 
 Setup::Answer Setup::ask(std::uint8_t type, std::span<const std::uint8_t> payload,
-                         std::uint8_t wanted, Duration limit) {
+                         std::uint8_t requested, Duration limit) {
   const HostStamp end = frames_.now() + limit;
   std::uint8_t first = 0, last = 0;
   for (bool again = false;; again = true) {  // each turn listens for kAskAgain of the limit
@@ -113,7 +113,7 @@ Setup::Answer Setup::ask(std::uint8_t type, std::span<const std::uint8_t> payloa
     if (sent == DeviceStatus::gone || sent == DeviceStatus::failed) return Answer::gone;
     if (!again) first = last;
     const Answer answer =
-        listen(type, first, last, wanted, std::min(end, frames_.now() + kAskAgain));
+        listen(type, first, last, requested, std::min(end, frames_.now() + kAskAgain));
     if (answer != Answer::silent || frames_.now() >= end) return answer;
   }
 }
@@ -125,7 +125,7 @@ DeviceStatus Setup::verdict(Answer answer, std::uint8_t type) {
     case Answer::stopped:
       return DeviceStatus::stopped;
     case Answer::refused:
-      complaint_ = text("the trigger board refuses %s: ", words_of(type)) + words_of_error(error_);
+      last_error_ = text("the trigger board refuses %s: ", words_of(type)) + words_of_error(error_);
       return error_ == trigger_error_not_stopped || error_ == trigger_error_not_configured
                  ? DeviceStatus::failed
                  : DeviceStatus::unsupported;
@@ -133,8 +133,8 @@ DeviceStatus Setup::verdict(Answer answer, std::uint8_t type) {
     case Answer::gone:
       break;
   }
-  complaint_ = text("the trigger board did not answer when asked %s; check its cable and supply",
-                    words_of(type));
+  last_error_ = text("the trigger board did not answer when asked %s; check its cable and supply",
+                     words_of(type));
   return DeviceStatus::gone;
 }
 
@@ -148,15 +148,15 @@ DeviceStatus Setup::hello(Duration limit, TriggerInfo* info) {
   const unsigned theirs = frame_.size > 0 ? frame_.payload[0] : 0U;
   if (theirs != trigger_protocol_version) return other_version(theirs);
   if (trigger_get_info(frame_.payload, frame_.size, info)) return DeviceStatus::ok;
-  complaint_ = text(
-      "the trigger board tells %u bytes about itself, which are no INFO; flash this release's "
+  last_error_ = text(
+      "the trigger board answered %u bytes, which are no INFO; flash this release's "
       "firmware",
       static_cast<unsigned>(frame_.size));
   return DeviceStatus::unsupported;
 }
 
 DeviceStatus Setup::other_version(unsigned theirs) {
-  complaint_ = text(
+  last_error_ = text(
       "the trigger board speaks version %u of the protocol and this program version %d; flash this "
       "release's firmware",
       theirs, static_cast<int>(trigger_protocol_version));
@@ -174,7 +174,7 @@ DeviceStatus Setup::name_version() {
     if (answer == Answer::ok) return other_version(v);
     if (answer != Answer::refused) break;
   }
-  complaint_ = text(
+  last_error_ = text(
       "the trigger board does not speak version %d of the protocol, as this program does, nor any "
       "below %d; flash this release's "
       "firmware",
@@ -190,7 +190,7 @@ DeviceStatus Setup::find(std::uint32_t baud, TriggerInfo* info) {
       const std::uint32_t rate = baud != 0 ? baud : candidate;
       if (line_.baud() != rate) {
         if (const DeviceStatus s = line_.set_baud(rate); s != DeviceStatus::ok) {
-          complaint_ = text("the port cannot be set to %u baud", rate);
+          last_error_ = text("the port cannot be set to %u baud", rate);
           return s;
         }
         frames_.attach(&line_);
@@ -201,11 +201,11 @@ DeviceStatus Setup::find(std::uint32_t baud, TriggerInfo* info) {
       if (baud != 0) break;
     }
   }
-  complaint_ = heard.empty() ? std::string(
-                                   "nothing there answers as a trigger board does; check its "
-                                   "cable, supply and firmware")
-                             : "what is there is no trigger board: " + heard +
-                                   "; name the board's port in trigger.port";
+  last_error_ = heard.empty() ? std::string(
+                                    "nothing there answers as a trigger board does; check its "
+                                    "cable, supply and firmware")
+                              : "what is there is no trigger board: " + heard +
+                                    "; name the board's port in trigger.port";
   return DeviceStatus::not_found;
 }
 
@@ -222,7 +222,7 @@ DeviceStatus Setup::ask_status(std::uint8_t type, std::span<const std::uint8_t> 
     *status = s;
     return DeviceStatus::ok;
   }
-  complaint_ =
+  last_error_ =
       text("the trigger board answers when asked %s, and does not do it; switch it off and on",
            words_of(type));
   return DeviceStatus::failed;

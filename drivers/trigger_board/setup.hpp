@@ -21,7 +21,7 @@ class FrameSink {
 /// Threads  One caller. Memory: none, but for the sentence of a refusal. Time: no call outlasts a
 ///          second, find() two a baud rate.
 /// Errors   Statuses: gone (silent, or the line is), stopped (`stop` is set), unsupported (another
-///          protocol version, or refused by the board), failed. complaint() says what and what to
+///          protocol version, or refused by the board), failed. last_error() says what and what to
 ///          do.
 class Setup {
  public:
@@ -37,14 +37,14 @@ class Setup {
   [[nodiscard]] DeviceStatus configure(const TriggerConfig& config, TriggerStatus* status);
   [[nodiscard]] DeviceStatus start(TriggerStatus* status);
 
-  [[nodiscard]] const std::string& complaint() const noexcept { return complaint_; }
+  [[nodiscard]] const std::string& last_error() const noexcept { return last_error_; }
 
  private:
   enum class Answer : std::uint8_t { ok, refused, silent, gone, stopped };
   [[nodiscard]] Answer ask(std::uint8_t type, std::span<const std::uint8_t> payload,
-                           std::uint8_t wanted, Duration limit);
+                           std::uint8_t requested, Duration limit);
   [[nodiscard]] Answer listen(std::uint8_t type, std::uint8_t first, std::uint8_t last,
-                              std::uint8_t wanted, HostStamp until);
+                              std::uint8_t requested, HostStamp until);
   template <class Fits>
   [[nodiscard]] DeviceStatus ask_status(std::uint8_t type, std::span<const std::uint8_t> payload,
                                         TriggerStatus* status, Fits fits);
@@ -59,7 +59,7 @@ class Setup {
   FrameSink* others_;
   TriggerFrame frame_{};  // the answer
   std::uint8_t error_ = 0;
-  std::string complaint_;
+  std::string last_error_;
 };
 
 /// CONFIG as it goes over the wire has this mark in STATUS once it is in effect.

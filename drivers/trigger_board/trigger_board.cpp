@@ -37,7 +37,7 @@ std::vector<std::string> Driver::candidates() const {
 std::unique_ptr<Device> Driver::open_port(const std::string& port, DeviceStatus* status) {
   Options options = options_;
   options.native_usb = options.native_usb || is_native(port);
-  return open_on(ports_.at(port), options, status, &complaint_);
+  return open_on(ports_.at(port), options, status, &last_error_);
 }
 
 std::vector<DeviceInfo> Driver::enumerate() {
@@ -58,12 +58,12 @@ std::unique_ptr<Device> Driver::look_for(std::string_view serial, DeviceStatus* 
     if (board == nullptr) {
       // A board that cannot be used is worth more words than a port without one.
       if (*status != DeviceStatus::not_found && *status != DeviceStatus::gone)
-        trouble = *status, others = complaint_;
+        trouble = *status, others = last_error_;
       continue;
     }
     if (!serial.empty() && board->info().serial != serial) continue;
     if (chosen != nullptr) {
-      complaint_ =
+      last_error_ =
           "there is more than one trigger board; name one's port or serial number in trigger.port";
       *status = DeviceStatus::not_found;
       return nullptr;
@@ -71,7 +71,7 @@ std::unique_ptr<Device> Driver::look_for(std::string_view serial, DeviceStatus* 
     chosen = std::move(board);
   }
   *status = chosen != nullptr ? DeviceStatus::ok : trouble;
-  complaint_ =
+  last_error_ =
       chosen != nullptr ? ""
       : !others.empty() ? others
       : serial.empty()
@@ -82,7 +82,7 @@ std::unique_ptr<Device> Driver::look_for(std::string_view serial, DeviceStatus* 
 }
 
 std::unique_ptr<Device> Driver::open_board(std::string_view where, DeviceStatus* status) {
-  complaint_.clear();
+  last_error_.clear();
   return where.find('/') != std::string_view::npos ? open_port(std::string(where), status)
                                                    : look_for(where, status);
 }
@@ -92,11 +92,11 @@ std::unique_ptr<TriggerDevice> Driver::open(std::string_view where, DeviceStatus
 }
 
 std::unique_ptr<Device> open_on(std::unique_ptr<LinePlace> place, const Options& options,
-                                DeviceStatus* status, std::string* complaint) {
+                                DeviceStatus* status, std::string* error) {
   auto device = std::make_unique<Device>(std::move(place), options);
   *status = device->connect();
   if (*status == DeviceStatus::ok) return device;
-  *complaint = device->complaint();
+  *error = device->last_error();
   return nullptr;
 }
 

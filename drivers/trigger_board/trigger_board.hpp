@@ -39,7 +39,7 @@ class Driver final : public TriggerDriver {
                                                     DeviceStatus* status) override;
   /// The same, with what a trigger board has beyond other TriggerDevices.
   [[nodiscard]] std::unique_ptr<Device> open_board(std::string_view where, DeviceStatus* status);
-  [[nodiscard]] std::string complaint() const override { return complaint_; }
+  [[nodiscard]] std::string last_error() const override { return last_error_; }
 
  private:
   [[nodiscard]] std::unique_ptr<Device> open_port(const std::string& port, DeviceStatus* status);
@@ -48,12 +48,12 @@ class Driver final : public TriggerDriver {
 
   Options options_;
   Ports ports_;
-  std::string complaint_;
+  std::string last_error_;
 };
 
-/// The same on any line: simulators, tests. Null: *status and *complaint say why.
+/// The same on any line: simulators, tests. Null: *status and *error say why.
 [[nodiscard]] std::unique_ptr<Device> open_on(std::unique_ptr<LinePlace> place,
                                               const Options& options, DeviceStatus* status,
-                                              std::string* complaint);
+                                              std::string* error);
 
 }  // namespace vergence::trigger_board

@@ -86,7 +86,7 @@ bool V4l2Camera::take_filled() noexcept {
       node_died_ = true;
       return false;
     }
-    default:  // EIO: the driver's queue is in error until streaming starts anew
+    default:  // EIO: the driver's queue is in error until streaming restarts
       return ++poll_errors_ < kPollErrors;
   }
 }

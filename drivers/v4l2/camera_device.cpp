@@ -32,34 +32,33 @@ V4l2Camera::V4l2Camera(UniqueFd fd, Node node)
 V4l2Camera::~V4l2Camera() { stop(); }
 
 // ---- the owner's side
-// ---------------------------------------------------------------------------------------------
 
 DeviceStatus V4l2Camera::refuse(DeviceStatus status, std::string sentence) noexcept {
-  complaint_ = std::move(sentence);
+  last_error_ = std::move(sentence);
   return status;
 }
 
-DeviceStatus V4l2Camera::configure(const CameraConfiguration& wanted,
+DeviceStatus V4l2Camera::configure(const CameraConfiguration& requested,
                                    CameraConfiguration* actual) noexcept {
-  complaint_.clear();
+  last_error_.clear();
   {
     const std::lock_guard lock(mutex_);
     if (streaming_ || slots_.held() > 0) return DeviceStatus::busy;
   }
   try {
-    if (std::string nonsense = find_nonsense(wanted); !nonsense.empty())
+    if (std::string nonsense = find_nonsense(requested); !nonsense.empty())
       return refuse(DeviceStatus::bad_configuration, nonsense + " is no configuration");
     if (lost_node_)
       if (const DeviceStatus status = open_again(); status != DeviceStatus::ok) return status;
-    const DeviceStatus status = bring_to(wanted, false);
+    const DeviceStatus status = bring_to(requested, false);
     if (status == DeviceStatus::ok) {
-      wanted_ = wanted;
+      requested_ = requested;
       if (actual != nullptr) *actual = settings_->actual;
-    } else if (wanted_) {
-      const std::string why = complaint_;
-      if (bring_to(*wanted_, false) != DeviceStatus::ok)
+    } else if (requested_) {
+      const std::string why = last_error_;
+      if (bring_to(*requested_, false) != DeviceStatus::ok)
         lost_node_ = true;  // start() tries once more, from the beginning
-      complaint_ = why;
+      last_error_ = why;
     }
     return status;
   } catch (const std::exception& e) {
@@ -70,9 +69,9 @@ DeviceStatus V4l2Camera::configure(const CameraConfiguration& wanted,
 }
 
 /// `keep_slots`: of a camera that came back, whose images may be held; its size is the same.
-DeviceStatus V4l2Camera::bring_to(const CameraConfiguration& wanted, bool keep_slots) {
+DeviceStatus V4l2Camera::bring_to(const CameraConfiguration& requested, bool keep_slots) {
   Options options;
-  if (!parse_options(wanted, &options, &complaint_)) return DeviceStatus::unsupported;
+  if (!parse_options(requested, &options, &last_error_)) return DeviceStatus::unsupported;
   Controls controls;
   if (!options.subdevice.empty()) {
     subdevice_.reset(::open(options.subdevice.c_str(), O_RDWR | O_CLOEXEC));
@@ -91,7 +90,7 @@ DeviceStatus V4l2Camera::bring_to(const CameraConfiguration& wanted, bool keep_s
   }
   Settings settings;
   if (const DeviceStatus s =
-          apply(fd_.get(), node_.type, controls_, wanted, options, &settings, &complaint_);
+          apply(fd_.get(), node_.type, controls_, requested, options, &settings, &last_error_);
       s != DeviceStatus::ok)
     return s;
   CaptureQueue queue(fd_.get(), node_.type);
@@ -113,9 +112,9 @@ DeviceStatus V4l2Camera::bring_to(const CameraConfiguration& wanted, bool keep_s
   stamps_ = stamp_kind(queue.description_flags(), 1);
   if (!keep_slots) {
     if (settings.format.layout == Layout::luma_plane)
-      slots_.use_buffers(wanted.width, wanted.height, settings.stride);
+      slots_.use_buffers(requested.width, requested.height, settings.stride);
     else
-      slots_.use_pool(wanted.width, wanted.height);
+      slots_.use_pool(requested.width, requested.height);
   }
   const std::lock_guard lock(mutex_);
   slots_.install(std::move(mappings));
@@ -159,19 +158,19 @@ DeviceTiming V4l2Camera::timing() const noexcept {
 }
 
 DeviceStatus V4l2Camera::start(Notifier* ready) noexcept {
-  complaint_.clear();
+  last_error_.clear();
   {
     const std::lock_guard lock(mutex_);
     if (streaming_ && !gone_) return DeviceStatus::ok;
   }
-  if (!wanted_) return DeviceStatus::bad_configuration;
+  if (!requested_) return DeviceStatus::bad_configuration;
   try {
     const std::lock_guard controlling(controlling_);
     end_thread();
     if (lost_node_) {
       if (const DeviceStatus status = open_again(); status != DeviceStatus::ok) return status;
       // Whatever keeps a camera that is back from its configuration may pass; it is asked again.
-      if (bring_to(*wanted_, true) != DeviceStatus::ok) {
+      if (bring_to(*requested_, true) != DeviceStatus::ok) {
         lost_node_ = true;
         return DeviceStatus::gone;
       }
@@ -258,7 +257,7 @@ void V4l2Camera::stop() noexcept {
   end_thread();
 }
 
-DeviceStatus V4l2Camera::set_exposure(const ExposureSetting& wanted,
+DeviceStatus V4l2Camera::set_exposure(const ExposureSetting& requested,
                                       ExposureSetting* actual) noexcept {
   const std::lock_guard controlling(controlling_);
   {
@@ -266,14 +265,15 @@ DeviceStatus V4l2Camera::set_exposure(const ExposureSetting& wanted,
     if (!streaming_) return DeviceStatus::stopped;
     if (gone_) return DeviceStatus::gone;
   }
-  if (wanted.exposure <= Duration{} || wanted.exposure.to_seconds() * settings_->actual.rate_hz > 1)
+  if (requested.exposure <= Duration{} ||
+      requested.exposure.to_seconds() * settings_->actual.rate_hz > 1)
     return DeviceStatus::bad_configuration;
   ExposureSetting taken;
-  if (const DeviceStatus status = change_exposure(controls_, *settings_, wanted, &taken);
+  if (const DeviceStatus status = change_exposure(controls_, *settings_, requested, &taken);
       status != DeviceStatus::ok)
     return status;
-  wanted_->exposure = taken.exposure;  // also after it was unplugged
-  wanted_->gain_db = taken.gain_db;
+  requested_->exposure = taken.exposure;  // also after it was unplugged
+  requested_->gain_db = taken.gain_db;
   settings_->actual.exposure = taken.exposure;
   settings_->actual.gain_db = taken.gain_db;
   (void)exposures_.change(taken, monotonic_now());
@@ -282,7 +282,6 @@ DeviceStatus V4l2Camera::set_exposure(const ExposureSetting& wanted,
 }
 
 // ---- the consumer's side
-// ------------------------------------------------------------------------------------------
 
 DeviceStatus V4l2Camera::wait(Duration limit, Frame* frame) noexcept {
   std::unique_lock lock(mutex_);

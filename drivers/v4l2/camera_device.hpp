@@ -37,7 +37,7 @@ class V4l2Camera final : public CameraDevice {
   ~V4l2Camera() override;
 
   const DeviceInfo& info() const noexcept override { return info_; }
-  DeviceStatus configure(const CameraConfiguration& wanted,
+  DeviceStatus configure(const CameraConfiguration& requested,
                          CameraConfiguration* actual) noexcept override;
   DeviceTiming timing() const noexcept override;
   DeviceStatus start(Notifier* ready) noexcept override;
@@ -45,15 +45,15 @@ class V4l2Camera final : public CameraDevice {
   ImageView view(FrameSlot slot) const noexcept override { return slots_.view(slot); }
   void release(FrameSlot slot) noexcept override;
   void stop() noexcept override;
-  DeviceStatus set_exposure(const ExposureSetting& wanted,
+  DeviceStatus set_exposure(const ExposureSetting& requested,
                             ExposureSetting* actual) noexcept override;
-  std::string complaint() const override { return complaint_; }
+  std::string last_error() const override { return last_error_; }
   std::string remark() const override { return settings_ ? settings_->remark : std::string(); }
   CameraStatistics statistics() const noexcept override;
 
  private:
   // The owner's.
-  DeviceStatus bring_to(const CameraConfiguration& wanted, bool keep_slots);
+  DeviceStatus bring_to(const CameraConfiguration& requested, bool keep_slots);
   DeviceStatus open_again();
   DeviceStatus start_streaming();
   DeviceStatus refuse(DeviceStatus status, std::string sentence) noexcept;
@@ -76,11 +76,11 @@ class V4l2Camera final : public CameraDevice {
   std::mutex controlling_;  // of node, controls_ and settings_, between start() and set_exposure()
   UniqueFd fd_, subdevice_, wake_;
   Controls controls_;
-  std::optional<CameraConfiguration> wanted_;
+  std::optional<CameraConfiguration> requested_;
   std::optional<Settings> settings_;
   std::optional<CaptureQueue> queue_;
   StampKind stamps_ = StampKind::none;  // as the buffers' description says before the first comes
-  std::string complaint_;
+  std::string last_error_;
   bool lost_node_ = false;  // the descriptor is of a camera that is gone
   std::thread thread_;
 

@@ -57,10 +57,10 @@ Mapping::~Mapping() {
   if (data_ != nullptr) (void)::munmap(data_, bytes_);
 }
 
-int CaptureQueue::request(std::uint32_t wanted, std::vector<Mapping>* mappings) {
+int CaptureQueue::request(std::uint32_t requested, std::vector<Mapping>* mappings) {
   mappings->clear();
   v4l2_requestbuffers ask{};
-  ask.count = wanted;
+  ask.count = requested;
   ask.type = type_;
   ask.memory = V4L2_MEMORY_MMAP;
   if (const int error = control(fd_, VIDIOC_REQBUFS, &ask); error != 0) return error;

@@ -42,8 +42,8 @@ class CaptureQueue {
  public:
   CaptureQueue(int fd, std::uint32_t type) noexcept : fd_(fd), type_(type) {}
 
-  /// About `wanted` buffers, which the kernel may change, each mapped: (*mappings)[index].
-  [[nodiscard]] int request(std::uint32_t wanted, std::vector<Mapping>* mappings);
+  /// About `requested` buffers, which the kernel may change, each mapped: (*mappings)[index].
+  [[nodiscard]] int request(std::uint32_t requested, std::vector<Mapping>* mappings);
   /// Flags of the buffers as they lie there: the kind of their stamps.
   [[nodiscard]] std::uint32_t description_flags() const noexcept { return flags_; }
   /// Gives all buffers back; mappings still held stay valid.

@@ -70,10 +70,10 @@ std::string name_of(std::uint32_t fourcc) {
 }
 
 const PixelFormat* choose_format(std::span<const std::uint32_t> offered,
-                                 std::string_view wanted) noexcept {
+                                 std::string_view requested) noexcept {
   for (const PixelFormat& format : kFormats) {
     if (std::find(offered.begin(), offered.end(), format.fourcc) == offered.end()) continue;
-    if (wanted.empty() || name_of(format.fourcc) == wanted) return &format;
+    if (requested.empty() || name_of(format.fourcc) == requested) return &format;
   }
   return nullptr;
 }

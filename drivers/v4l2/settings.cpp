@@ -50,15 +50,15 @@ DeviceStatus status_of(int error) noexcept {
 /// The steps of apply(), which share what they read and leave behind.
 class Applier {
  public:
-  Applier(int fd, std::uint32_t type, const Controls& controls, const CameraConfiguration& wanted,
-          const Options& options, std::string* complaint)
+  Applier(int fd, std::uint32_t type, const Controls& controls,
+          const CameraConfiguration& requested, const Options& options, std::string* message)
       : fd_(fd),
         type_(type),
         controls_(controls),
-        wanted_(wanted),
+        requested_(requested),
         options_(options),
-        complaint_(complaint) {
-    out_.actual = wanted;
+        last_error_(message) {
+    out_.actual = requested;
     out_.options = options;
   }
 
@@ -75,7 +75,7 @@ class Applier {
 
  private:
   DeviceStatus refuse(DeviceStatus status, std::string sentence) {
-    *complaint_ = std::move(sentence);
+    *last_error_ = std::move(sentence);
     return status;
   }
   DeviceStatus system(int error, const std::string& what) {
@@ -122,19 +122,19 @@ class Applier {
   }
 
   DeviceStatus region() {
-    if (wanted_.offset_x == 0 && wanted_.offset_y == 0) return DeviceStatus::ok;
+    if (requested_.offset_x == 0 && requested_.offset_y == 0) return DeviceStatus::ok;
     v4l2_selection s{};
     s.type = V4L2_BUF_TYPE_VIDEO_CAPTURE;
     s.target = V4L2_SEL_TGT_CROP;
-    s.r = {wanted_.offset_x, wanted_.offset_y, static_cast<__u32>(wanted_.width),
-           static_cast<__u32>(wanted_.height)};
-    if (control(fd_, VIDIOC_S_SELECTION, &s) == 0 && s.r.left == wanted_.offset_x &&
-        s.r.top == wanted_.offset_y && s.r.width == static_cast<__u32>(wanted_.width) &&
-        s.r.height == static_cast<__u32>(wanted_.height))
+    s.r = {requested_.offset_x, requested_.offset_y, static_cast<__u32>(requested_.width),
+           static_cast<__u32>(requested_.height)};
+    if (control(fd_, VIDIOC_S_SELECTION, &s) == 0 && s.r.left == requested_.offset_x &&
+        s.r.top == requested_.offset_y && s.r.width == static_cast<__u32>(requested_.width) &&
+        s.r.height == static_cast<__u32>(requested_.height))
       return DeviceStatus::ok;
     return refuse(DeviceStatus::unsupported, "this camera cannot read out a region at " +
-                                                 std::to_string(wanted_.offset_x) + ", " +
-                                                 std::to_string(wanted_.offset_y) +
+                                                 std::to_string(requested_.offset_x) + ", " +
+                                                 std::to_string(requested_.offset_y) +
                                                  ": leave offset_x and offset_y at 0");
   }
 
@@ -163,19 +163,20 @@ class Applier {
 
   DeviceStatus format() {
     const std::vector<std::uint32_t> list = offered();
-    const PixelFormat* chosen = choose_format(list, wanted_.pixel_format);
+    const PixelFormat* chosen = choose_format(list, requested_.pixel_format);
     if (chosen == nullptr) {
       std::string names;
       for (const std::uint32_t f : list) names += (names.empty() ? "" : ", ") + name_of(f);
-      return refuse(DeviceStatus::unsupported,
-                    (wanted_.pixel_format.empty() ? "no pixel format that gives grey"
-                                                  : "no pixel format " + wanted_.pixel_format) +
-                        "; this camera offers " + (names.empty() ? "none" : names));
+      return refuse(
+          DeviceStatus::unsupported,
+          (requested_.pixel_format.empty() ? "no pixel format that gives grey"
+                                           : "no pixel format " + requested_.pixel_format) +
+              "; this camera offers " + (names.empty() ? "none" : names));
     }
     v4l2_format f{};
     f.type = type_;
-    const auto width = static_cast<__u32>(wanted_.width),
-               height = static_cast<__u32>(wanted_.height);
+    const auto width = static_cast<__u32>(requested_.width),
+               height = static_cast<__u32>(requested_.height);
     const bool planes = V4L2_TYPE_IS_MULTIPLANAR(type_);
     if (planes) {
       f.fmt.pix_mp.width = width;
@@ -213,13 +214,13 @@ class Applier {
     out_.stride = planes ? f.fmt.pix_mp.plane_fmt[0].bytesperline : f.fmt.pix.bytesperline;
     out_.image_size = planes ? f.fmt.pix_mp.plane_fmt[0].sizeimage : f.fmt.pix.sizeimage;
     out_.format = *chosen;
-    if (chosen->layout == Layout::mosaic && (wanted_.width < 2 || wanted_.height < 2))
+    if (chosen->layout == Layout::mosaic && (requested_.width < 2 || requested_.height < 2))
       return refuse(DeviceStatus::unsupported,
                     "a mosaic of colours needs at least two rows and columns");
     if (options_.shift >= 0 && chosen->layout == Layout::words) out_.format.shift = options_.shift;
-    out_.stride = std::max(out_.stride, least_row_bytes(out_.format, wanted_.width));
+    out_.stride = std::max(out_.stride, least_row_bytes(out_.format, requested_.width));
     if (out_.image_size <
-        least_frame_bytes(out_.format, wanted_.width, wanted_.height, out_.stride))
+        least_frame_bytes(out_.format, requested_.width, requested_.height, out_.stride))
       return refuse(DeviceStatus::unsupported,
                     "the driver's buffers of " + std::to_string(out_.image_size) +
                         " bytes do not hold " + size_text(width, height) + " in " +
@@ -234,7 +235,7 @@ class Applier {
     const int error = control(fd_, VIDIOC_G_PARM, &p);
     if (error == 0 && (p.parm.capture.capability & V4L2_CAP_TIMEPERFRAME) != 0) {
       p.parm.capture.timeperframe = {
-          1000, static_cast<__u32>(std::lround(wanted_.rate_hz * options_.thin * 1000))};
+          1000, static_cast<__u32>(std::lround(requested_.rate_hz * options_.thin * 1000))};
       if (const int set_error = control(fd_, VIDIOC_S_PARM, &p); set_error != 0)
         return system(set_error, "setting the rate");
     }
@@ -242,19 +243,20 @@ class Applier {
     if (error == 0 && t.numerator > 0 && t.denominator > 0)
       out_.camera_rate_hz = static_cast<double>(t.denominator) / t.numerator;
     if (error != 0) out_.camera_rate_hz = sensor_rate();
-    if (wanted_.trigger == CameraTrigger::hardware)
+    if (requested_.trigger == CameraTrigger::hardware)
       return DeviceStatus::ok;  // the pulses are the rate
     const double camera = out_.camera_rate_hz;
     if (!(camera > 0)) {
       remark("the camera does not say its rate");
       return DeviceStatus::ok;
     }
-    if (options_.thin > 1 && camera >= wanted_.rate_hz) return DeviceStatus::ok;
-    if (std::abs(camera - wanted_.rate_hz) > kRateTolerance * wanted_.rate_hz)
-      remark("the camera runs at " + number(camera) + " Hz where " + number(wanted_.rate_hz) +
+    if (options_.thin > 1 && camera >= requested_.rate_hz) return DeviceStatus::ok;
+    if (std::abs(camera - requested_.rate_hz) > kRateTolerance * requested_.rate_hz)
+      remark("the camera runs at " + number(camera) + " Hz where " + number(requested_.rate_hz) +
              " was asked for" +
-             (camera > 1.5 * wanted_.rate_hz ? "; the option thin keeps as many as were asked for"
-                                             : ""));
+             (camera > 1.5 * requested_.rate_hz
+                  ? "; the option thin keeps as many as were asked for"
+                  : ""));
     out_.actual.rate_hz = camera;
     return DeviceStatus::ok;
   }
@@ -262,16 +264,16 @@ class Applier {
   /// Of a raw sensor, which has lines, blanking and a pixel clock instead of a rate. 0: not known.
   [[nodiscard]] double sensor_rate() const {
     const double line = line_seconds();
-    const double lines = static_cast<double>(wanted_.height) + read_or(V4L2_CID_VBLANK, 0);
+    const double lines = static_cast<double>(requested_.height) + read_or(V4L2_CID_VBLANK, 0);
     return line > 0 ? 1 / (line * lines) : 0;
   }
   [[nodiscard]] double line_seconds() const {
     const double clock = read_or(V4L2_CID_PIXEL_RATE, 0);
     const double blank = read_or(V4L2_CID_HBLANK, -1);
-    return clock > 0 && blank >= 0 ? (wanted_.width + blank) / clock : 0;
+    return clock > 0 && blank >= 0 ? (requested_.width + blank) / clock : 0;
   }
   [[nodiscard]] Duration sensor_readout() const {
-    return Duration::seconds(line_seconds() * wanted_.height);
+    return Duration::seconds(line_seconds() * requested_.height);
   }
 
   DeviceStatus exposure() {
@@ -291,11 +293,11 @@ class Applier {
   }
   /// `unit`: seconds a step of the control is.
   DeviceStatus set_exposure(const Control& c, double unit) {
-    const std::int64_t steps = std::llround(wanted_.exposure.to_seconds() / unit);
+    const std::int64_t steps = std::llround(requested_.exposure.to_seconds() / unit);
     const std::int64_t value = clamped(c, steps);
     if (std::llabs(value - steps) > c.step)
       return refuse(DeviceStatus::unsupported,
-                    "no exposure of " + number(wanted_.exposure.to_seconds() * 1e6) +
+                    "no exposure of " + number(requested_.exposure.to_seconds() * 1e6) +
                         " us; this camera offers " +
                         number(static_cast<double>(c.least) * unit * 1e6) + " to " +
                         number(static_cast<double>(c.most) * unit * 1e6) + " us at this rate");
@@ -303,7 +305,7 @@ class Applier {
     out_.exposure_id = c.id;
     out_.exposure_unit_s = unit;
     out_.actual.exposure = Duration::seconds(static_cast<double>(value) * unit);
-    if (out_.actual.exposure <= Duration{}) out_.actual.exposure = wanted_.exposure;
+    if (out_.actual.exposure <= Duration{}) out_.actual.exposure = requested_.exposure;
     return DeviceStatus::ok;
   }
 
@@ -312,22 +314,22 @@ class Applier {
     const Control* c = controls_.find(V4L2_CID_ANALOGUE_GAIN);
     if (c == nullptr) c = controls_.find(V4L2_CID_GAIN);
     if (c == nullptr) {
-      if (wanted_.gain_db == 0) return DeviceStatus::ok;
+      if (requested_.gain_db == 0) return DeviceStatus::ok;
       return refuse(DeviceStatus::unsupported,
                     "the camera has no gain control: set gain_db to 0; it has " + controls_.keys());
     }
     for (const auto& [key, text] : options_.controls)
       if (key == c->key) return DeviceStatus::ok;  // given by number
-    if (wanted_.gain_db != 0 && options_.gain_step_db <= 0)
+    if (requested_.gain_db != 0 && options_.gain_step_db <= 0)
       return refuse(DeviceStatus::unsupported,
                     "how many dB a step of " + c->key + " (" + range_of(*c) +
                         ") is, the camera does not say: set the option gain_step_db, or control_" +
                         c->key);
     const double step = options_.gain_step_db > 0 ? options_.gain_step_db : 1;
-    const std::int64_t value = c->least + std::llround(wanted_.gain_db / step);
+    const std::int64_t value = c->least + std::llround(requested_.gain_db / step);
     if (value < c->least || value > c->most)
       return refuse(DeviceStatus::unsupported,
-                    "no gain of " + number(wanted_.gain_db) + " dB; this camera offers 0 to " +
+                    "no gain of " + number(requested_.gain_db) + " dB; this camera offers 0 to " +
                         number(static_cast<double>(c->most - c->least) * step));
     out_.gain_id = c->id;
     out_.gain_unit_db = options_.gain_step_db;
@@ -336,10 +338,10 @@ class Applier {
   }
 
   DeviceStatus trigger() {
-    if (wanted_.trigger == CameraTrigger::software)
+    if (requested_.trigger == CameraTrigger::software)
       return refuse(DeviceStatus::unsupported,
                     "V4L2 has no software trigger: trigger hardware or free");
-    const bool hardware = wanted_.trigger == CameraTrigger::hardware;
+    const bool hardware = requested_.trigger == CameraTrigger::hardware;
     if (options_.trigger_control == "external") return DeviceStatus::ok;
     const Control* c = options_.trigger_control.empty() ? controls_.trigger()
                                                         : controls_.find(options_.trigger_control);
@@ -365,34 +367,36 @@ class Applier {
   int fd_;
   std::uint32_t type_;
   const Controls& controls_;
-  const CameraConfiguration& wanted_;
+  const CameraConfiguration& requested_;
   const Options& options_;
-  std::string* complaint_;
+  std::string* last_error_;
   Settings out_{};
 };
 
 }  // namespace
 
-std::string find_nonsense(const CameraConfiguration& wanted) {
-  if (wanted.width <= 0 || wanted.height <= 0)
-    return "a size of " + std::to_string(wanted.width) + " x " + std::to_string(wanted.height);
-  if (!(wanted.rate_hz > 0) || wanted.rate_hz > 1e6)
-    return "a rate of " + number(wanted.rate_hz) + " Hz";
-  if (wanted.exposure <= Duration{}) return "an exposure that is not positive";
-  if (wanted.exposure.to_seconds() * wanted.rate_hz > 1)
+std::string find_nonsense(const CameraConfiguration& requested) {
+  if (requested.width <= 0 || requested.height <= 0)
+    return "a size of " + std::to_string(requested.width) + " x " +
+           std::to_string(requested.height);
+  if (!(requested.rate_hz > 0) || requested.rate_hz > 1e6)
+    return "a rate of " + number(requested.rate_hz) + " Hz";
+  if (requested.exposure <= Duration{}) return "an exposure that is not positive";
+  if (requested.exposure.to_seconds() * requested.rate_hz > 1)
     return "an exposure longer than the time between two images";
-  if (wanted.offset_x < 0 || wanted.offset_y < 0) return "a region that begins outside the sensor";
-  if (!std::isfinite(wanted.gain_db)) return "a gain that is no number";
+  if (requested.offset_x < 0 || requested.offset_y < 0)
+    return "a region that begins outside the sensor";
+  if (!std::isfinite(requested.gain_db)) return "a gain that is no number";
   return {};
 }
 
-bool parse_options(const CameraConfiguration& wanted, Options* options, std::string* complaint) {
+bool parse_options(const CameraConfiguration& requested, Options* options, std::string* message) {
   Options o;
   const auto bad = [&](const std::string& key, const std::string& what) {
-    *complaint = "option " + key + " is \"" + wanted.options.at(key) + "\"; it wants " + what;
+    *message = "option " + key + " is \"" + requested.options.at(key) + "\"; it wants " + what;
     return false;
   };
-  for (const auto& [key, text] : wanted.options) {
+  for (const auto& [key, text] : requested.options) {
     double value = 0;
     const bool is_number = parse_number(text, &value);
     const auto whole = [&](double least, double most) {
@@ -424,10 +428,10 @@ bool parse_options(const CameraConfiguration& wanted, Options* options, std::str
     } else if (key.starts_with(kControlPrefix)) {
       o.controls.emplace_back(key_of(key.substr(kControlPrefix.size())), text);
     } else {
-      *complaint = "there is no option " + key +
-                   "; V4L2 cameras have readout_us, shift, thin, buffers, subdevice, "
-                   "trigger_control, trigger_value, gain_step_db and "
-                   "control_NAME for each of their controls";
+      *message = "there is no option " + key +
+                 "; V4L2 cameras have readout_us, shift, thin, buffers, subdevice, "
+                 "trigger_control, trigger_value, gain_step_db and "
+                 "control_NAME for each of their controls";
       return false;
     }
   }
@@ -436,13 +440,13 @@ bool parse_options(const CameraConfiguration& wanted, Options* options, std::str
 }
 
 DeviceStatus apply(int fd, std::uint32_t buffer_type, const Controls& controls,
-                   const CameraConfiguration& wanted, const Options& options, Settings* settings,
-                   std::string* complaint) {
-  return Applier(fd, buffer_type, controls, wanted, options, complaint).run(settings);
+                   const CameraConfiguration& requested, const Options& options, Settings* settings,
+                   std::string* message) {
+  return Applier(fd, buffer_type, controls, requested, options, message).run(settings);
 }
 
 DeviceStatus change_exposure(const Controls& controls, const Settings& settings,
-                             const ExposureSetting& wanted, ExposureSetting* actual) noexcept {
+                             const ExposureSetting& requested, ExposureSetting* actual) noexcept {
   const auto status_of = [](int error) {
     return error == 0        ? DeviceStatus::ok
            : error == ENODEV ? DeviceStatus::gone
@@ -452,7 +456,7 @@ DeviceStatus change_exposure(const Controls& controls, const Settings& settings,
       settings.exposure_id != 0 ? controls.find(settings.exposure_id) : nullptr;
   if (exposure == nullptr) return DeviceStatus::unsupported;
   const std::int64_t steps =
-      clamped(*exposure, std::llround(wanted.exposure.to_seconds() / settings.exposure_unit_s));
+      clamped(*exposure, std::llround(requested.exposure.to_seconds() / settings.exposure_unit_s));
   if (const DeviceStatus s = status_of(write(*exposure, steps)); s != DeviceStatus::ok) return s;
   *actual = {Duration::seconds(static_cast<double>(steps) * settings.exposure_unit_s),
              settings.actual.gain_db};
@@ -461,7 +465,7 @@ DeviceStatus change_exposure(const Controls& controls, const Settings& settings,
                             : nullptr;
   if (gain == nullptr) return DeviceStatus::ok;
   const std::int64_t level =
-      clamped(*gain, gain->least + std::llround(wanted.gain_db / settings.gain_unit_db));
+      clamped(*gain, gain->least + std::llround(requested.gain_db / settings.gain_unit_db));
   if (const DeviceStatus s = status_of(write(*gain, level)); s != DeviceStatus::ok) return s;
   actual->gain_db = static_cast<double>(level - gain->least) * settings.gain_unit_db;
   return DeviceStatus::ok;

@@ -24,11 +24,11 @@ struct Options {
   std::vector<std::pair<std::string, std::string>> controls;
 };
 
-/// False: *complaint says which option is wrong and what there is.
-[[nodiscard]] bool parse_options(const CameraConfiguration& wanted, Options* options,
-                                 std::string* complaint);
+/// False: *error says which option is wrong and what there is.
+[[nodiscard]] bool parse_options(const CameraConfiguration& requested, Options* options,
+                                 std::string* error);
 /// What is wrong with the numbers by themselves; empty: nothing.
-[[nodiscard]] std::string find_nonsense(const CameraConfiguration& wanted);
+[[nodiscard]] std::string find_nonsense(const CameraConfiguration& requested);
 
 /// What a camera has been brought to.
 struct Settings {
@@ -49,16 +49,16 @@ struct Settings {
 /// Brings an open camera to a configuration: format, region, rate, exposure, gain, trigger, other
 /// controls.
 ///
-/// → ok, unsupported, busy, gone, failed; not `ok`: *complaint, and the camera may be somewhere in
+/// → ok, unsupported, busy, gone, failed; not `ok`: *error, and the camera may be somewhere in
 ///   between.
 [[nodiscard]] DeviceStatus apply(int fd, std::uint32_t buffer_type, const Controls& controls,
-                                 const CameraConfiguration& wanted, const Options& options,
-                                 Settings* settings, std::string* complaint);
+                                 const CameraConfiguration& requested, const Options& options,
+                                 Settings* settings, std::string* error);
 
 /// The nearest exposure and gain that the camera has, also while it streams. *actual: what it took.
 /// → ok, unsupported, gone, failed
 [[nodiscard]] DeviceStatus change_exposure(const Controls& controls, const Settings& settings,
-                                           const ExposureSetting& wanted,
+                                           const ExposureSetting& requested,
                                            ExposureSetting* actual) noexcept;
 
 }  // namespace vergence::v4l2

@@ -9,16 +9,16 @@ namespace {
 class Driver final : public CameraDriver {
  public:
   std::vector<DeviceInfo> enumerate() override {
-    complaint_.clear();
+    last_error_.clear();
     std::vector<DeviceInfo> found;
     const NodeList list = list_nodes();
     for (const Node& n : list.nodes) found.push_back({"v4l2", n.serial, n.card, n.path});
-    if (found.empty() && !list.closed.empty()) complaint_ = permission(list.closed.front());
+    if (found.empty() && !list.closed.empty()) last_error_ = permission(list.closed.front());
     return found;
   }
 
   std::unique_ptr<CameraDevice> open(std::string_view serial, DeviceStatus* status) override {
-    complaint_.clear();
+    last_error_.clear();
     UniqueFd fd;
     Node node;
     *status = find_node(serial, &fd, &node);
@@ -27,10 +27,10 @@ class Driver final : public CameraDriver {
     const std::string name = serial.empty() ? "any camera" : std::string(serial);
     switch (*status) {
       case DeviceStatus::no_permission:
-        complaint_ = permission(name);
+        last_error_ = permission(name);
         break;
       case DeviceStatus::unsupported:
-        complaint_ =
+        last_error_ =
             name + " is no node that captures and streams; vergence devices lists those that do";
         *status = DeviceStatus::failed;
         break;
@@ -43,7 +43,7 @@ class Driver final : public CameraDriver {
     return nullptr;
   }
 
-  std::string complaint() const override { return complaint_; }
+  std::string last_error() const override { return last_error_; }
 
  private:
   static std::string permission(const std::string& node) {
@@ -51,7 +51,7 @@ class Driver final : public CameraDriver {
            ": no permission to open it; add the user to the group video (sudo usermod -aG video "
            "$USER) and log in again";
   }
-  std::string complaint_;
+  std::string last_error_;
 };
 
 }  // namespace

@@ -72,7 +72,7 @@ void Decoder::take_other(const Message& m) noexcept {
 void Decoder::count_messages(std::uint16_t counter) noexcept {
   if (counted_) {
     const auto ahead = static_cast<std::uint16_t>(counter - last_message_);
-    constexpr std::uint16_t kBelievable = 4096;  // beyond: the device started anew
+    constexpr std::uint16_t kBelievable = 4096;  // beyond: the device restarted
     if (ahead > 1 && ahead < kBelievable) counters_.lost += ahead - 1U;
   }
   counted_ = true;

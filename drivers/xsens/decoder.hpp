@@ -25,7 +25,7 @@ struct DecoderCounters {
       0;  // of the first after a start: the clocks were not tied yet, or turned back
   std::uint64_t other = 0;     // messages of other kinds
   std::uint64_t errors = 0;    // of these, errors that the device told
-  std::uint64_t restarts = 0;  // the device started anew, or its clock was set
+  std::uint64_t restarts = 0;  // the device restarted, or its clock was set
   std::uint64_t layout_wrong =
       0;  // of the malformed: MTData of another length than the settings say
   std::uint8_t last_error = 0;
@@ -52,7 +52,7 @@ class Decoder {
   [[nodiscard]] bool next(InsReading* reading) noexcept;
   /// Nothing came for longer than a frame takes: what looked like the beginning of one was none.
   void quiet() noexcept { stream_.abandon(); }
-  /// The device has told that it starts anew, since the last call.
+  /// The device has told that it restarts, since the last call.
   [[nodiscard]] bool woke() noexcept;
 
   [[nodiscard]] const DecoderCounters& counters() const noexcept { return counters_; }

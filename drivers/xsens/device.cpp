@@ -27,7 +27,6 @@ Device::Device(std::unique_ptr<LinePlace> place, const Options& options)
 Device::~Device() { stop(); }
 
 // ---- the owner's thread
-// ---------------------------------------------------------------------------------------------
 
 DeviceStatus Device::open() {
   LineSettings settings;
@@ -54,14 +53,14 @@ DeviceStatus Device::connect() {
   virtual_time_ = place_->pass(Duration{});
   DeviceStatus status = open();
   if (status != DeviceStatus::ok) {
-    complaint_ = place_->name() + " cannot be opened: " + std::string(to_string(status));
+    last_error_ = place_->name() + " cannot be opened: " + std::string(to_string(status));
     return status;
   }
   Setup setup(*line_, options_, stopping_);
   status = setup.find();
   if (status == DeviceStatus::ok) status = setup.identify(&identity_);
   if (status != DeviceStatus::ok) {
-    complaint_ = place_->name() + ": " + setup.complaint();
+    last_error_ = place_->name() + ": " + setup.last_error();
     close_line();
     return status;
   }
@@ -75,10 +74,10 @@ DeviceStatus Device::connect() {
 
 DeviceStatus Device::configure(double rate_hz, double* actual_hz) noexcept {
   try {
-    complaint_.clear();
+    last_error_.clear();
     remark_.clear();
     if (!(rate_hz > 0 && rate_hz <= 2000)) {
-      complaint_ =
+      last_error_ =
           "a rate of " + std::to_string(rate_hz) + " Hz is none; set ins.rate to 100 or 120";
       return DeviceStatus::bad_configuration;
     }
@@ -91,7 +90,7 @@ DeviceStatus Device::configure(double rate_hz, double* actual_hz) noexcept {
     StreamSettings set;
     if (status == DeviceStatus::ok) status = setup.set(identity_, rate_hz, &set);
     if (status != DeviceStatus::ok) {
-      complaint_ = setup.complaint();
+      last_error_ = setup.last_error();
       return status;
     }
     set_ = set;
@@ -188,7 +187,6 @@ InsStatistics Device::statistics() const noexcept {
 }
 
 // ---- the device's thread
-// --------------------------------------------------------------------------------------------
 
 void Device::work() noexcept {
   (void)pthread_setname_np(pthread_self(), "vergence-ins");

@@ -40,7 +40,7 @@ class Device final : public InsDevice {
   [[nodiscard]] DeviceStatus start(Notifier* ready) noexcept override;
   [[nodiscard]] DeviceStatus wait(Duration limit, InsReading* reading) noexcept override;
   void stop() noexcept override;
-  [[nodiscard]] std::string complaint() const override { return complaint_; }
+  [[nodiscard]] std::string last_error() const override { return last_error_; }
   [[nodiscard]] std::string remark() const override { return remark_; }
   [[nodiscard]] bool keeps_own_time() const noexcept override { return virtual_time_; }
   [[nodiscard]] InsStatistics statistics() const noexcept override;
@@ -72,7 +72,7 @@ class Device final : public InsDevice {
   double rate_hz_ = 0;
   std::uint32_t baud_ = 0;  // at which the device was last heard; 0: not yet
   bool configured_ = false, virtual_time_ = false;
-  std::string complaint_, remark_;
+  std::string last_error_, remark_;
 
   std::mutex line_mutex_;  // of the pointer: stop() wakes a line that the thread may be replacing
   std::unique_ptr<ByteLine> line_;  // of the thread while it runs, else the owner's

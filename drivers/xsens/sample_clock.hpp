@@ -11,7 +11,7 @@ enum class ClockStep : std::uint8_t {
   first,
   forward,
   backward,  // not after the last one: not a new sample
-  restart,   // the clock was set, or the device started anew
+  restart,   // the clock was set, or the device restarted
 };
 
 /// Unwraps SampleTimeFine: 0.1 ms, wrapping at one day on MTi 10/100 series and the 700/710, at 2³²

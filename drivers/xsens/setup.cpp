@@ -23,7 +23,7 @@ constexpr std::uint32_t kLegacySettings =
     settings_format(NumberFormat::fp16_32) | kSettingsQuaternion | kSettingsCounter | kSettingsUtc;
 
 /// What the program wants of an MTi-G-700/710. Without UTC it still has the receiver's.
-OutputConfiguration wanted_outputs(std::uint16_t rate_hz, bool utc) noexcept {
+OutputConfiguration requested_outputs(std::uint16_t rate_hz, bool utc) noexcept {
   OutputConfiguration o;
   if (utc) (void)o.add({wire_id(PacketId::utc), kEveryMessage});
   for (const OutputEntry e :
@@ -95,7 +95,7 @@ DeviceStatus Setup::find() {
     const DeviceStatus status = probe(bauds[i], kProbe);
     if (status == DeviceStatus::ok || status == DeviceStatus::stopped) return status;
     if (status == DeviceStatus::gone) {
-      complaint_ = "the line went dead while the device was looked for; check its cable";
+      last_error_ = "the line went dead while the device was looked for; check its cable";
       return status;
     }
     const std::string heard = dialogue_.heard_instead();
@@ -106,18 +106,18 @@ DeviceStatus Setup::find() {
           text("it sends Xbus messages at %u baud, but does not answer: check the line towards it",
                bauds[i]);
   }
-  complaint_ = instead.empty()
-                   ? "it is silent at every baud rate; check its power, its cable and the port"
-                   : "no XSens INS answers: " + instead + "; check that ins.port is the INS's";
+  last_error_ = instead.empty()
+                    ? "it is silent at every baud rate; check its power, its cable and the port"
+                    : "no XSens INS answers: " + instead + "; check that ins.port is the INS's";
   return DeviceStatus::not_found;
 }
 
 DeviceStatus Setup::failed(const char* what) {
-  complaint_ = reply_.answer == Answer::refused
-                   ? text("it refuses %s: %.*s (error %02X)", what,
-                          static_cast<int>(error_text(reply_.error).size()),
-                          error_text(reply_.error).data(), reply_.error)
-                   : text("it does not answer to %s; check its cable", what);
+  last_error_ = reply_.answer == Answer::refused
+                    ? text("it refuses %s: %.*s (error %02X)", what,
+                           static_cast<int>(error_text(reply_.error).size()),
+                           error_text(reply_.error).data(), reply_.error)
+                    : text("it does not answer to %s; check its cable", what);
   return status_of(reply_.answer);
 }
 
@@ -131,7 +131,7 @@ DeviceStatus Setup::identify(Identity* identity) {
       s != DeviceStatus::ok)
     return s;
   if (reply_.size < 4) {
-    complaint_ = "its id has fewer than four bytes: no XSens INS";
+    last_error_ = "its id has fewer than four bytes: no XSens INS";
     return DeviceStatus::unsupported;
   }
   Identity found;
@@ -162,34 +162,34 @@ DeviceStatus Setup::identify(Identity* identity) {
 }
 
 DeviceStatus Setup::refuse_load(const LineBudget& b, double rate_hz, std::uint32_t baud) {
-  complaint_ =
+  last_error_ =
       text("%.0f Hz need %.0f %% of the line at %u baud, more than the %.0f %% that are safe; ",
            rate_hz, 100 * b.load, baud, 100 * kLineLoadMost);
-  complaint_ += b.baud_needed != 0
-                    ? text("set ins.baud to %u, or ins.rate to %.0f or less", b.baud_needed,
-                           std::floor(b.greatest_rate))
-                    : text("set ins.rate to %.0f or less", std::floor(b.greatest_rate));
+  last_error_ += b.baud_needed != 0
+                     ? text("set ins.baud to %u, or ins.rate to %.0f or less", b.baud_needed,
+                            std::floor(b.greatest_rate))
+                     : text("set ins.rate to %.0f or less", std::floor(b.greatest_rate));
   return DeviceStatus::no_bandwidth;
 }
 
 DeviceStatus Setup::set(const Identity& identity, double rate_hz, StreamSettings* stream) {
-  StreamSettings wanted;
-  wanted.generation = identity.generation;
-  const DeviceStatus set = identity.generation == Generation::legacy ? set_legacy(rate_hz, &wanted)
-                                                                     : set_mark4(rate_hz, &wanted);
+  StreamSettings requested;
+  requested.generation = identity.generation;
+  const DeviceStatus set = identity.generation == Generation::legacy
+                               ? set_legacy(rate_hz, &requested)
+                               : set_mark4(rate_hz, &requested);
   if (set != DeviceStatus::ok) return set;
   if (const DeviceStatus s = set_baud(identity); s != DeviceStatus::ok) return s;
-  *stream = wanted;
+  *stream = requested;
   return DeviceStatus::ok;
 }
 
 // ---- MTi-G
-// ----------------------------------------------------------------------------------------------------------
 
 DeviceStatus Setup::set_legacy(double rate_hz, StreamSettings* stream) {
   const auto period = period_of_rate(rate_hz);
   if (!period) {
-    complaint_ = text(
+    last_error_ = text(
         "an MTi-G has no %.6g Hz: its rates divide 115200 Hz, from 10 to 512, without those that "
         "its receiver cannot correct; "
         "set ins.rate to 100 or 120",
@@ -209,7 +209,7 @@ DeviceStatus Setup::set_legacy(double rate_hz, StreamSettings* stream) {
     return s;
   DeviceConfiguration has;
   if (!read_configuration(reply_.bytes(), &has)) {
-    complaint_ = "its configuration cannot be read: is more than one device on the bus?";
+    last_error_ = "its configuration cannot be read: is more than one device on the bus?";
     return DeviceStatus::unsupported;
   }
   std::array<std::uint8_t, 4> bytes{};
@@ -230,7 +230,7 @@ DeviceStatus Setup::set_legacy(double rate_hz, StreamSettings* stream) {
     s = write(MessageId::data_length_request, {}, "the question for its message's length");
   if (s != DeviceStatus::ok) return s;
   if (reply_.size != 2 || read_u16(reply_.bytes()) != layout.payload_size()) {
-    complaint_ =
+    last_error_ =
         text("its messages have %u bytes where its settings mean %zu: this firmware is not known",
              reply_.size == 2 ? unsigned{read_u16(reply_.bytes())} : 0U,
              layout.payload_size().value_or(0));
@@ -287,13 +287,12 @@ DeviceStatus Setup::set_legacy_lines(double rate_hz, StreamSettings* stream) {
 }
 
 // ---- MTi-G-700/710
-// --------------------------------------------------------------------------------------------------
 
 DeviceStatus Setup::set_mark4(double rate_hz, StreamSettings* stream) {
   const std::uint16_t rate = nearest_rate(rate_hz);
-  OutputConfiguration wanted = wanted_outputs(rate, true);
-  if (!line_budget(wanted, baud_to_be()).fits()) wanted = wanted_outputs(rate, false);
-  const LineBudget budget = line_budget(wanted, baud_to_be());
+  OutputConfiguration requested = requested_outputs(rate, true);
+  if (!line_budget(requested, baud_to_be()).fits()) requested = requested_outputs(rate, false);
+  const LineBudget budget = line_budget(requested, baud_to_be());
   if (!budget.fits()) return refuse_load(budget, rate, baud_to_be());
 
   // Text output, while set, overrides everything else.
@@ -309,9 +308,9 @@ DeviceStatus Setup::set_mark4(double rate_hz, StreamSettings* stream) {
       s != DeviceStatus::ok)
     return s;
   OutputConfiguration has;
-  if (!read_output_configuration(reply_.bytes(), &has) || !(has == wanted)) {
+  if (!read_output_configuration(reply_.bytes(), &has) || !(has == requested)) {
     std::array<std::uint8_t, 4 * kMostOutputs> bytes{};
-    const std::size_t n = write_output_configuration(wanted, bytes);
+    const std::size_t n = write_output_configuration(requested, bytes);
     if (const DeviceStatus s = write(MessageId::output_configuration, std::span(bytes).first(n),
                                      "the outputs asked for");
         s != DeviceStatus::ok)
@@ -329,7 +328,8 @@ DeviceStatus Setup::set_mark4(double rate_hz, StreamSettings* stream) {
     return packet_id(e.id) == PacketId::latitude_longitude;
   });
   if (taken == 0 || taken == kEveryMessage || !clocked || !placed) {
-    complaint_ = "it does not give position and attitude together with its clock: this is no MTi-G";
+    last_error_ =
+        "it does not give position and attitude together with its clock: this is no MTi-G";
     return DeviceStatus::unsupported;
   }
   stream->outputs = has;
@@ -346,7 +346,7 @@ DeviceStatus Setup::set_mark4_lines(StreamSettings* stream) {
     return s;
   SyncSettings has;
   if (!read_sync_settings(reply_.bytes(), &has)) {
-    complaint_ = "its synchronisation settings cannot be read: this firmware is not known";
+    last_error_ = "its synchronisation settings cannot be read: this firmware is not known";
     return DeviceStatus::unsupported;
   }
   // The list replaces the old one: other entries, the receiver's clock among them, stay.
@@ -356,12 +356,12 @@ DeviceStatus Setup::set_mark4_lines(StreamSettings* stream) {
            (options_.sync_in != SyncIn::leave && e.function == kSyncTriggerIndication &&
             e.line == kSyncLineIn1);
   };
-  SyncSettings wanted;
+  SyncSettings requested;
   for (const SyncEntry& e : has.items())
-    if (!ours(e)) wanted.entries[wanted.count++] = e;
-  const auto add = [&wanted](const SyncEntry& e) {
-    if (wanted.count == wanted.entries.size()) return false;
-    wanted.entries[wanted.count++] = e;
+    if (!ours(e)) requested.entries[requested.count++] = e;
+  const auto add = [&requested](const SyncEntry& e) {
+    if (requested.count == requested.entries.size()) return false;
+    requested.entries[requested.count++] = e;
     return true;
   };
   bool room = true;
@@ -379,23 +379,23 @@ DeviceStatus Setup::set_mark4_lines(StreamSettings* stream) {
              options_.sync_in == SyncIn::rising ? kSyncPositive : kSyncNegative, 0, 0, 0, 0, 0}) &&
         room;
   if (!room) {
-    complaint_ = "its list of synchronisation settings is full; clear it with the maker's program";
+    last_error_ = "its list of synchronisation settings is full; clear it with the maker's program";
     return DeviceStatus::unsupported;
   }
-  if (wanted == has) return DeviceStatus::ok;
+  if (requested == has) return DeviceStatus::ok;
   std::array<std::uint8_t, kSyncEntrySize * kMostSyncEntries> bytes{};
-  return write(MessageId::sync_settings, std::span(bytes).first(write_sync_settings(wanted, bytes)),
+  return write(MessageId::sync_settings,
+               std::span(bytes).first(write_sync_settings(requested, bytes)),
                "its synchronisation settings");
 }
 
 // ---- both
-// -----------------------------------------------------------------------------------------------------------
 
 DeviceStatus Setup::set_baud(const Identity& identity) {
   if (options_.baud == 0 || options_.baud == line_.baud()) return DeviceStatus::ok;
   const auto code = baud_code(options_.baud, identity.generation);
   if (!code) {
-    complaint_ =
+    last_error_ =
         text("it has no %u baud; set ins.baud to 115200, 230400, 460800 or 921600", options_.baud);
     return DeviceStatus::unsupported;
   }
@@ -408,7 +408,7 @@ DeviceStatus Setup::set_baud(const Identity& identity) {
   dialogue_.ask(MessageId::reset, {}, &reply_, Duration::milliseconds(100));
   const DeviceStatus status = probe(options_.baud, kAfterReset);
   if (status == DeviceStatus::timeout) {
-    complaint_ = text(
+    last_error_ = text(
         "it does not answer at %u baud after it was set to it; check that the converter can do "
         "that rate",
         options_.baud);

@@ -2,8 +2,8 @@
 #include <cstdint>
 #include <string>
 
-#include "drivers/xsens/dialogue.hpp"
 #include "drivers/xsens/options.hpp"
+#include "drivers/xsens/request_reply.hpp"
 
 namespace vergence::xsens {
 
@@ -12,7 +12,7 @@ namespace vergence::xsens {
 ///
 /// Threads  One caller. Memory: ordinary. Time: find() up to a second for each baud rate, the rest
 ///          at most a few seconds in all.
-/// Errors   Status and complaint(); a device that was found stays in its configuration state.
+/// Errors   Status and last_error(); a device that was found stays in its configuration state.
 class Setup {
  public:
   Setup(ByteLine& line, const Options& options, const std::atomic<bool>& stop)
@@ -28,7 +28,7 @@ class Setup {
   /// → ok, no_bandwidth, gone, stopped, failed
   [[nodiscard]] DeviceStatus measure();
 
-  [[nodiscard]] const std::string& complaint() const noexcept { return complaint_; }
+  [[nodiscard]] const std::string& last_error() const noexcept { return last_error_; }
 
  private:
   [[nodiscard]] DeviceStatus probe(std::uint32_t baud, Duration limit);
@@ -50,9 +50,9 @@ class Setup {
 
   ByteLine& line_;
   Options options_;
-  Dialogue dialogue_;
+  RequestReply dialogue_;
   Reply reply_;
-  std::string complaint_;
+  std::string last_error_;
 };
 
 }  // namespace vergence::xsens

@@ -19,7 +19,7 @@ std::unique_ptr<InsDevice> Driver::open(std::string_view port, DeviceStatus* sta
     const std::vector<DeviceInfo> ports = enumerate();
     if (ports.size() != 1) {
       *status = DeviceStatus::not_found;
-      complaint_ =
+      last_error_ =
           ports.empty()
               ? "there is no serial port on USB; plug the INS in, or name its port in ins.port"
               : "there is more than one serial port on USB; name the INS's in ins.port";
@@ -27,15 +27,15 @@ std::unique_ptr<InsDevice> Driver::open(std::string_view port, DeviceStatus* sta
     }
     name = ports.front().place;
   }
-  return open_on(std::make_unique<SerialPort>(name), options_, status, &complaint_);
+  return open_on(std::make_unique<SerialPort>(name), options_, status, &last_error_);
 }
 
 std::unique_ptr<InsDevice> open_on(std::unique_ptr<LinePlace> place, const Options& options,
-                                   DeviceStatus* status, std::string* complaint) {
+                                   DeviceStatus* status, std::string* error) {
   auto device = std::make_unique<Device>(std::move(place), options);
   *status = device->connect();
   if (*status == DeviceStatus::ok) return device;
-  *complaint = device->complaint();
+  *error = device->last_error();
   return nullptr;
 }
 

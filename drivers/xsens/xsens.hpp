@@ -24,16 +24,16 @@ class Driver final : public InsDriver {
   /// busy, unsupported, gone, failed
   [[nodiscard]] std::unique_ptr<InsDevice> open(std::string_view port,
                                                 DeviceStatus* status) override;
-  [[nodiscard]] std::string complaint() const override { return complaint_; }
+  [[nodiscard]] std::string last_error() const override { return last_error_; }
 
  private:
   Options options_;
-  std::string complaint_;
+  std::string last_error_;
 };
 
-/// The same on any line: simulators, tests. Null: *status and *complaint say why.
+/// The same on any line: simulators, tests. Null: *status and *error say why.
 [[nodiscard]] std::unique_ptr<InsDevice> open_on(std::unique_ptr<LinePlace> place,
                                                  const Options& options, DeviceStatus* status,
-                                                 std::string* complaint);
+                                                 std::string* error);
 
 }  // namespace vergence::xsens

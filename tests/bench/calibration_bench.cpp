@@ -154,19 +154,19 @@ int run_mock(const Arguments& a) {
     o.drive = drive;
     o.from_s = starts[i];
     test::RenderedDrive rendered(o);
-    RigCalibration told = o.rig;
+    RigCalibration given = o.rig;
     if (a.wrong_intrinsics) {
       Random random(1000 + i);
       for (std::size_t k = 0; k < 2; ++k) {
         const double focal = 1 + 0.001 * random.normal();
-        told.intrinsics[k].fx *= focal;
-        told.intrinsics[k].fy *= focal;
-        told.intrinsics[k].cx += 0.5 * random.normal();
-        told.intrinsics[k].cy += 0.5 * random.normal();
+        given.intrinsics[k].fx *= focal;
+        given.intrinsics[k].fy *= focal;
+        given.intrinsics[k].cx += 0.5 * random.normal();
+        given.intrinsics[k].cy += 0.5 * random.normal();
       }
     }
     const Found f =
-        calibrate(a, told, [&](int k) { return &rendered.frame(static_cast<std::uint64_t>(k)); });
+        calibrate(a, given, [&](int k) { return &rendered.frame(static_cast<std::uint64_t>(k)); });
     const Errors e = errors_of(f.rig, o.rig.T_camera_left[1]);
     print(fmt::format("{:.2f} s", starts[i]), f, e);
     std::fflush(stdout);

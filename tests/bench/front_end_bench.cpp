@@ -278,15 +278,15 @@ class Table {
     many_.features = blobs_.features = kManyCorners;
   }
 
-  void add(const std::string& data, bool across, const ImagePair& pair) {
+  void add(const std::string& data, bool stereo, const ImagePair& pair) {
     double ms = 0;
-    const std::string task = across ? "across" : "in time";
+    const std::string task = stereo ? "across" : "in time";
     const auto one = [&](const char* name, const Matches& matches) {
       row(data, task, name).all.push_back(measure(pair, matches, ms));
     };
     one("corners", match_freely(pair, odometry_, &ms));
     one("corners, 1000", match_freely(pair, many_, &ms));
-    if (!across) one("corners followed", follow_corners(pair, odometry_, &ms));
+    if (!stereo) one("corners followed", follow_corners(pair, odometry_, &ms));
     one("SURF-64", match_surf(pair, a_, false, &ms));
     one("SURF-64 upright", match_surf(pair, a_, true, &ms));
     one("SURF-64 upright, aligned", match_freely(pair, blobs_, &ms));

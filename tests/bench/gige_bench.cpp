@@ -73,7 +73,7 @@ Rig make_rig(int packet) {
     c.sharing = kCameras;
     if (camera == nullptr || camera->configure(c, nullptr) != DeviceStatus::ok) {
       std::fprintf(stderr, "camera %d: %s\n", k,
-                   camera == nullptr ? "not opened" : camera->complaint().c_str());
+                   camera == nullptr ? "not opened" : camera->last_error().c_str());
       std::exit(2);
     }
     if (!camera->remark().empty()) std::printf("camera %d: %s\n", k, camera->remark().c_str());
@@ -114,7 +114,7 @@ std::uint64_t run(Rig* rig, double seconds, std::vector<Taken>* all, double* cpu
   const double cpu_before = cpu_seconds();
   for (const auto& c : rig->cameras)
     if (c->start(nullptr) != DeviceStatus::ok) {
-      std::fprintf(stderr, "not started: %s\n", c->complaint().c_str());
+      std::fprintf(stderr, "not started: %s\n", c->last_error().c_str());
       std::exit(2);
     }
   all->assign(kCameras, {});

@@ -46,7 +46,7 @@ bool run(const Case& c, std::uint64_t seed, Errors* errors) {
   xsens::Device device(std::make_unique<mock::SimulatedPlace>(simulator, line), options);
   if (device.configure(c.rate, nullptr) != DeviceStatus::ok ||
       device.start(nullptr) != DeviceStatus::ok) {
-    std::printf("%s\n", device.complaint().c_str());
+    std::printf("%s\n", device.last_error().c_str());
     return false;
   }
   std::vector<InsReading> all;

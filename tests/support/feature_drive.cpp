@@ -92,12 +92,12 @@ void FeatureDrive::next() {
 void FeatureDrive::move() {
   const double dt = 1.0 / options_.rate;
   if (started_) {
-    double wanted = options_.speed;
+    double requested = options_.speed;
     if (options_.drive_s > 0) {
       phase_s_ = std::fmod(phase_s_ + dt, options_.drive_s + options_.stop_s);
-      if (phase_s_ > options_.drive_s - options_.speed / kAcceleration) wanted = 0;
+      if (phase_s_ > options_.drive_s - options_.speed / kAcceleration) requested = 0;
     }
-    speed_ += std::clamp(wanted - speed_, -kAcceleration * dt, kAcceleration * dt);
+    speed_ += std::clamp(requested - speed_, -kAcceleration * dt, kAcceleration * dt);
     rocked_s_ += dt * std::min(1.0, speed_ / 2.0);
   }
   const auto wave = [&](double hertz, std::size_t phase) {

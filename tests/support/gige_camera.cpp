@@ -273,7 +273,6 @@ void GigeCamera::Impl::power(bool on) {
 }
 
 // ---- control
-// --------------------------------------------------------------------------------------------------------
 
 void GigeCamera::Impl::answer() {
   std::array<std::uint8_t, 2048> bytes{};
@@ -482,7 +481,6 @@ void GigeCamera::Impl::follow_registers() {
 }
 
 // ---- exposures
-// ------------------------------------------------------------------------------------------------------
 
 void GigeCamera::Impl::pulse(std::uint64_t number, std::uint32_t source, HostStamp when) {
   const std::lock_guard lock(mutex_);
@@ -611,7 +609,6 @@ void GigeCamera::Impl::expose() {
 }
 
 // ---- the front
-// ------------------------------------------------------------------------------------------------------
 
 GigeCamera::GigeCamera(const GigeCameraOptions& options) : impl_(std::make_unique<Impl>(options)) {}
 GigeCamera::~GigeCamera() = default;

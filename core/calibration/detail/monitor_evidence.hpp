@@ -21,8 +21,8 @@ inline constexpr int kTriangle = kTheta * (kTheta + 1) / 2;
 
 using Theta = std::array<double, kTheta>;
 
-/// Gradient and information of θ from some sightings: with residuals r at θ = 0 and derivatives J,
-/// weights w,
+/// Gradient and information of θ from some observations: with residuals r at θ = 0 and derivatives
+/// J, weights w,
 ///   g = −Σ w Jᵀ r / σ²,   A = Σ w Jᵀ J / σ² (lower triangle, row by row),   n = Σ w / σ², 1/px².
 /// All numbers add up over frames.
 struct Evidence {
@@ -46,9 +46,9 @@ struct Evidence {
 
 /// The two kinds apart: their errors are of different makings, so each has its own inflation.
 struct TwoEvidences {
-  Evidence across, motion;
+  Evidence stereo, motion;
   void add(const TwoEvidences& e, double scale = 1.0) noexcept {
-    across.add(e.across, scale);
+    stereo.add(e.stereo, scale);
     motion.add(e.motion, scale);
   }
 };

@@ -132,12 +132,12 @@ SurfDescriptor surf_descriptor(const IntegralImage& image, const SurfPoint& p) n
                   v = p.scale * (static_cast<float>(j) - 0.5F * (kSide - 1));
       const Gradient g = haar(image, p.x + c * u - s * v, p.y + s * u + c * v, h);
       const float w = kWeights[static_cast<std::size_t>(i)] * kWeights[static_cast<std::size_t>(j)];
-      const float along = w * (c * g.x + s * g.y), across = w * (c * g.y - s * g.x);
+      const float along = w * (c * g.x + s * g.y), stereo = w * (c * g.y - s * g.x);
       float* part = d.values.data() + 4 * (j / kSamples * kParts + i / kSamples);
       part[0] += along;
-      part[1] += across;
+      part[1] += stereo;
       part[2] += std::abs(along);
-      part[3] += std::abs(across);
+      part[3] += std::abs(stereo);
     }
   }
   float square = 0;

@@ -17,22 +17,22 @@ struct Boxes {
         weight(1.F / static_cast<float>(L * L)) {}
 
   [[nodiscard]] BoxHessian at(int x) const noexcept {
-    const auto across = [](const std::uint32_t* row, int from, int to) noexcept {
+    const auto stereo = [](const std::uint32_t* row, int from, int to) noexcept {
       return row[to] - row[from];
     };
     // Modulo 2³² until the end: the sums of boxes and their small multiples fit into 32 bits with
     // sign.
     const int a = x - half, b = x - middle, c = x + middle + 1, d = x + half + 1;
-    const std::uint32_t dxx = across(xx[1], a, d) - across(xx[0], a, d) -
-                              3U * (across(xx[1], b, c) - across(xx[0], b, c));
+    const std::uint32_t dxx = stereo(xx[1], a, d) - stereo(xx[0], a, d) -
+                              3U * (stereo(xx[1], b, c) - stereo(xx[0], b, c));
     const int e = x - lobe + 1, f = x + lobe;
-    const std::uint32_t dyy = across(yy[3], e, f) - across(yy[0], e, f) -
-                              3U * (across(yy[2], e, f) - across(yy[1], e, f));
+    const std::uint32_t dyy = stereo(yy[3], e, f) - stereo(yy[0], e, f) -
+                              3U * (stereo(yy[2], e, f) - stereo(yy[1], e, f));
     const int p = x - lobe, q = x + lobe + 1;
-    const std::uint32_t dxy = across(xy[1], p, x) - across(xy[0], p, x) + across(xy[3], x + 1, q) -
-                              across(xy[2], x + 1, q) -
-                              (across(xy[1], x + 1, q) - across(xy[0], x + 1, q)) -
-                              (across(xy[3], p, x) - across(xy[2], p, x));
+    const std::uint32_t dxy = stereo(xy[1], p, x) - stereo(xy[0], p, x) + stereo(xy[3], x + 1, q) -
+                              stereo(xy[2], x + 1, q) -
+                              (stereo(xy[1], x + 1, q) - stereo(xy[0], x + 1, q)) -
+                              (stereo(xy[3], p, x) - stereo(xy[2], p, x));
     const auto scaled = [this](std::uint32_t sum) noexcept {
       return weight * static_cast<float>(static_cast<std::int32_t>(sum));
     };

@@ -24,7 +24,7 @@ enum class Purpose : std::uint8_t {
 /// The GenICam features of an open camera, with sentences for what it does not have.
 ///
 /// Threads  One caller at a time; each call asks the camera and may take 2.5 s when that is gone.
-/// Errors   Setters return false and leave the sentence in complaint().
+/// Errors   Setters return false and leave the sentence in last_error().
 class Features {
  public:
   explicit Features(ArvDevice* device) : device_(device) {}
@@ -53,15 +53,15 @@ class Features {
   /// choose() where the camera has feature and entry; never complains.
   void choose_if_there(const std::string& name, const std::string& entry);
 
-  [[nodiscard]] const std::string& complaint() const noexcept { return complaint_; }
+  [[nodiscard]] const std::string& last_error() const noexcept { return last_error_; }
 
  private:
   [[nodiscard]] bool refuse(std::string sentence) {
-    complaint_ = std::move(sentence);
+    last_error_ = std::move(sentence);
     return false;
   }
   ArvDevice* device_;
-  std::string complaint_;
+  std::string last_error_;
 };
 
 }  // namespace vergence::gige

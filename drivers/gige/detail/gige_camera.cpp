@@ -38,13 +38,13 @@ GigeCamera::~GigeCamera() {
 
 DeviceStatus GigeCamera::refuse(DeviceStatus status, std::string sentence) {
   const std::lock_guard lock(words_);
-  complaint_ = std::move(sentence);
+  last_error_ = std::move(sentence);
   return status;
 }
 
-std::string GigeCamera::complaint() const {
+std::string GigeCamera::last_error() const {
   const std::lock_guard lock(words_);
-  return complaint_;
+  return last_error_;
 }
 
 std::string GigeCamera::remark() const {
@@ -57,34 +57,34 @@ std::string GigeCamera::remark() const {
 }
 
 // ---- the owner
-// ------------------------------------------------------------------------------------------------------
 
-DeviceStatus GigeCamera::configure(const CameraConfiguration& wanted,
+DeviceStatus GigeCamera::configure(const CameraConfiguration& requested,
                                    CameraConfiguration* actual) noexcept {
   try {
     if (handover_.state() != Handover::State::stopped)
       return refuse(DeviceStatus::busy, "the camera streams; stop it first");
     if (handover_.any_out())
       return refuse(DeviceStatus::busy, "images are still in use; release them first");
-    if (wanted.width <= 0 || wanted.height <= 0 || wanted.offset_x < 0 || wanted.offset_y < 0)
+    if (requested.width <= 0 || requested.height <= 0 || requested.offset_x < 0 ||
+        requested.offset_y < 0)
       return refuse(DeviceStatus::bad_configuration,
-                    "a region of " + size_text(wanted.width, wanted.height) + " px is none");
-    if (!(wanted.rate_hz > 0) || wanted.exposure <= Duration{} ||
-        wanted.exposure.to_seconds() * wanted.rate_hz > 1)
+                    "a region of " + size_text(requested.width, requested.height) + " px is none");
+    if (!(requested.rate_hz > 0) || requested.exposure <= Duration{} ||
+        requested.exposure.to_seconds() * requested.rate_hz > 1)
       return refuse(DeviceStatus::bad_configuration,
                     "rate and exposure must be positive, the exposure shorter than the time "
                     "between two images");
     Options options;
-    if (std::string sentence = parse_options(wanted.options, &options); !sentence.empty())
+    if (std::string sentence = parse_options(requested.options, &options); !sentence.empty())
       return refuse(DeviceStatus::unsupported, std::move(sentence));
     const std::lock_guard lock(device_);
     if (const DeviceStatus s = reach(); s != DeviceStatus::ok) return s;
     Applied applied;
     stale_ = true;
-    if (const DeviceStatus s = session_->apply(wanted, options, &applied); s != DeviceStatus::ok)
-      return refuse(s, session_->complaint());
+    if (const DeviceStatus s = session_->apply(requested, options, &applied); s != DeviceStatus::ok)
+      return refuse(s, session_->last_error());
     stale_ = false;
-    wanted_ = wanted;
+    requested_ = requested;
     options_ = options;
     applied_ = std::move(applied);
     in_force_ = {applied_.actual.exposure, applied_.actual.gain_db};
@@ -105,8 +105,8 @@ void GigeCamera::make_slots() {
   drop_buffers();
   converting_ = applied_.format->how != GreyFormat::How::as_it_is;
   const auto most = static_cast<std::size_t>(options_.buffers);
-  const auto width = static_cast<std::size_t>(wanted_.width),
-             height = static_cast<std::size_t>(wanted_.height);
+  const auto width = static_cast<std::size_t>(requested_.width),
+             height = static_cast<std::size_t>(requested_.height);
   const auto padded = [](std::size_t bytes) {
     return (bytes + kCacheLine - 1) / kCacheLine * kCacheLine;
   };
@@ -114,7 +114,7 @@ void GigeCamera::make_slots() {
            (converting_
                 ? 1
                 : kSpare);  // converting: one more, into which the frame goes that is then refused
-  stride_ = converting_ ? FramePool::stride(wanted_.width) : width;
+  stride_ = converting_ ? FramePool::stride(requested_.width) : width;
   slot_bytes_ = converting_ ? stride_ * height : padded(applied_.payload);
   wire_bytes_ = converting_ ? padded(applied_.payload) : 0;
   arena_ = std::make_unique<Arena>(slots_ * slot_bytes_ + kWireBuffers * wire_bytes_);
@@ -161,8 +161,8 @@ DeviceStatus GigeCamera::reach() {
 /// payload.
 DeviceStatus GigeCamera::apply_again() {
   Applied again;
-  if (const DeviceStatus s = session_->apply(wanted_, options_, &again); s != DeviceStatus::ok)
-    return refuse(s, session_->complaint());
+  if (const DeviceStatus s = session_->apply(requested_, options_, &again); s != DeviceStatus::ok)
+    return refuse(s, session_->last_error());
   if (again.payload != applied_.payload || again.format != applied_.format)
     return refuse(DeviceStatus::gone, "the camera came back with frames of another size");
   applied_ = std::move(again);
@@ -204,7 +204,7 @@ DeviceStatus GigeCamera::start(Notifier* ready) noexcept {
 DeviceStatus GigeCamera::begin(Notifier* ready) {
   if (const DeviceStatus s = session_->open_stream(applied_, &GigeCamera::called, this);
       s != DeviceStatus::ok)
-    return refuse(s, session_->complaint());
+    return refuse(s, session_->last_error());
   stream_ = session_->stream();
   blocks_.restart();
   exposures_.reset(in_force_);
@@ -224,7 +224,7 @@ DeviceStatus GigeCamera::begin(Notifier* ready) {
   if (converting_)
     for (ArvBuffer* b : buffers_) session_->push(b);
   if (const DeviceStatus s = session_->start_acquisition(); s != DeviceStatus::ok)
-    return refuse(s, session_->complaint());
+    return refuse(s, session_->last_error());
   const std::lock_guard words(words_);
   remark_ = session_->remark();
   return DeviceStatus::ok;
@@ -255,22 +255,23 @@ DeviceStatus GigeCamera::standing() const noexcept {
   }
 }
 
-DeviceStatus GigeCamera::set_exposure(const ExposureSetting& wanted,
+DeviceStatus GigeCamera::set_exposure(const ExposureSetting& requested,
                                       ExposureSetting* actual) noexcept {
   try {
     if (const DeviceStatus s = standing(); s != DeviceStatus::ok) return s;
-    if (wanted.exposure <= Duration{} || wanted.exposure.to_seconds() * wanted_.rate_hz > 1)
+    if (requested.exposure <= Duration{} ||
+        requested.exposure.to_seconds() * requested_.rate_hz > 1)
       return refuse(DeviceStatus::bad_configuration,
                     "the exposure must be positive, and shorter than the time between two images");
     const std::lock_guard lock(device_);
     if (session_ == nullptr || standing() != DeviceStatus::ok)
       return standing() == DeviceStatus::stopped ? DeviceStatus::stopped : DeviceStatus::gone;
     ExposureSetting taken;
-    if (const DeviceStatus s = session_->change_exposure(wanted, options_, &taken);
+    if (const DeviceStatus s = session_->change_exposure(requested, options_, &taken);
         s != DeviceStatus::ok)
-      return refuse(s, session_->complaint());
-    wanted_.exposure = taken.exposure;  // also after it was unplugged
-    wanted_.gain_db = taken.gain_db;
+      return refuse(s, session_->last_error());
+    requested_.exposure = taken.exposure;  // also after it was unplugged
+    requested_.gain_db = taken.gain_db;
     in_force_ = taken;
     (void)exposures_.change(taken, monotonic_now());
     if (actual != nullptr) *actual = taken;
@@ -281,26 +282,26 @@ DeviceStatus GigeCamera::set_exposure(const ExposureSetting& wanted,
 }
 
 DeviceStatus GigeCamera::trigger_once() noexcept {
-  if (!configured_ || wanted_.trigger != CameraTrigger::software) return DeviceStatus::unsupported;
+  if (!configured_ || requested_.trigger != CameraTrigger::software)
+    return DeviceStatus::unsupported;
   try {
     if (const DeviceStatus s = standing(); s != DeviceStatus::ok) return s;
     const std::lock_guard lock(device_);
     if (session_ == nullptr || standing() != DeviceStatus::ok)
       return standing() == DeviceStatus::stopped ? DeviceStatus::stopped : DeviceStatus::gone;
     const DeviceStatus s = session_->trigger();
-    return s == DeviceStatus::ok ? s : refuse(s, session_->complaint());
+    return s == DeviceStatus::ok ? s : refuse(s, session_->last_error());
   } catch (const std::exception&) {
     return DeviceStatus::failed;
   }
 }
 
 ImageView GigeCamera::view(FrameSlot slot) const noexcept {
-  return {pixels_.data() + slot * slot_bytes_, wanted_.width, wanted_.height,
+  return {pixels_.data() + slot * slot_bytes_, requested_.width, requested_.height,
           static_cast<std::ptrdiff_t>(stride_)};
 }
 
 // ---- Aravis's thread
-// ------------------------------------------------------------------------------------------------
 
 void GigeCamera::called(void* self, ArvStreamCallbackType type, ArvBuffer*) {
   auto* camera = static_cast<GigeCamera*>(self);
@@ -343,7 +344,7 @@ void GigeCamera::take(ArvBuffer* buffer) noexcept {
     return;
   }
   frame.slot = free_.back();
-  to_grey(*applied_.format, wire_.data() + index * wire_bytes_, wanted_.width, wanted_.height,
+  to_grey(*applied_.format, wire_.data() + index * wire_bytes_, requested_.width, requested_.height,
           pixels_.data() + frame.slot * slot_bytes_, stride_);
   session_->push(buffer);
   if (handover_.offer(frame)) free_.pop_back();
@@ -361,7 +362,7 @@ bool GigeCamera::describe(ArvBuffer* buffer, HostStamp arrival, Frame* frame) no
   frame->counter = step->counter;
   frame->arrival = arrival;
   const ExposureSetting& had = exposures_.at(arrival - applied_.plan.transfer - exposure_now_);
-  const auto told = whole ? told_exposure(buffer) : std::nullopt;
+  const auto told = whole ? reported_exposure(buffer) : std::nullopt;
   frame->status =
       whole && right_size(buffer, told.has_value()) ? FrameStatus::complete : FrameStatus::torn;
   const bool complete = frame->status == FrameStatus::complete;
@@ -380,7 +381,7 @@ bool GigeCamera::describe(ArvBuffer* buffer, HostStamp arrival, Frame* frame) no
 }
 
 /// Precondition: the frame came whole.
-std::optional<Duration> GigeCamera::told_exposure(ArvBuffer* buffer) const noexcept {
+std::optional<Duration> GigeCamera::reported_exposure(ArvBuffer* buffer) const noexcept {
   if (!applied_.exposure_chunk) return std::nullopt;
   std::size_t bytes = 0;
   const auto* data = static_cast<const std::uint8_t*>(arv_buffer_get_data(buffer, &bytes));
@@ -397,10 +398,10 @@ bool GigeCamera::right_size(ArvBuffer* buffer, bool chunks_in_place) noexcept {
     arv_buffer_get_image_region(buffer, &x, &y, &width, &height);
   } else if (chunks_in_place) {  // such a leader does not tell; what is where it has to be behind
                                  // the pixels does
-    width = wanted_.width;
-    height = wanted_.height;
+    width = requested_.width;
+    height = requested_.height;
   }
-  if (width == wanted_.width && height == wanted_.height && bytes >= applied_.payload) {
+  if (width == requested_.width && height == requested_.height && bytes >= applied_.payload) {
     wrong_sizes_.store(0, std::memory_order_relaxed);
     return true;
   }

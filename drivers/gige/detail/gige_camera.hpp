@@ -38,7 +38,7 @@ class GigeCamera final : public CameraDevice {
   ~GigeCamera() override;
 
   const DeviceInfo& info() const noexcept override { return info_; }
-  DeviceStatus configure(const CameraConfiguration& wanted,
+  DeviceStatus configure(const CameraConfiguration& requested,
                          CameraConfiguration* actual) noexcept override;
   DeviceTiming timing() const noexcept override;
   DeviceStatus start(Notifier* ready) noexcept override;
@@ -49,9 +49,9 @@ class GigeCamera final : public CameraDevice {
   void release(FrameSlot slot) noexcept override { handover_.release(slot); }
   void stop() noexcept override;
   DeviceStatus trigger_once() noexcept override;
-  DeviceStatus set_exposure(const ExposureSetting& wanted,
+  DeviceStatus set_exposure(const ExposureSetting& requested,
                             ExposureSetting* actual) noexcept override;
-  std::string complaint() const override;
+  std::string last_error() const override;
   std::string remark() const override;
   CameraStatistics statistics() const noexcept override { return handover_.statistics(); }
 
@@ -70,7 +70,7 @@ class GigeCamera final : public CameraDevice {
   void take(ArvBuffer* buffer) noexcept;
   [[nodiscard]] bool describe(ArvBuffer* buffer, HostStamp arrival, Frame* frame) noexcept;
   [[nodiscard]] bool right_size(ArvBuffer* buffer, bool chunks_in_place) noexcept;
-  [[nodiscard]] std::optional<Duration> told_exposure(ArvBuffer* buffer) const noexcept;
+  [[nodiscard]] std::optional<Duration> reported_exposure(ArvBuffer* buffer) const noexcept;
   void recycle() noexcept;
 
   // The supervisor.
@@ -88,11 +88,11 @@ class GigeCamera final : public CameraDevice {
   mutable std::mutex device_;  // session_, address_
   std::unique_ptr<Session> session_;
   std::string address_;       // where it was last; info_.place is where it was first
-  mutable std::mutex words_;  // complaint_, remark_
-  std::string complaint_, remark_;
+  mutable std::mutex words_;  // last_error_, remark_
+  std::string last_error_, remark_;
 
   // Of configure(); constant while streaming.
-  CameraConfiguration wanted_{};
+  CameraConfiguration requested_{};
   Options options_{};
   Applied applied_{};
   ExposureSetting in_force_{};               // what the camera's registers hold; under device_

@@ -59,20 +59,19 @@ GigeCamera::Trouble GigeCamera::what_is_wrong(HostStamp at, HostStamp* asked) {
   static const Trouble kSilent{"the camera does not answer any more", false};
   if (wrong_sizes_.load(std::memory_order_relaxed) >= kWrongSizes)
     return {"the camera sends " +
-            (seen_width_ > 0 ? size_text(seen_width_, seen_height_)
-                             : "images that do not tell their size") +
-            " where " + size_text(wanted_.width, wanted_.height) +
+            (seen_width_ > 0 ? size_text(seen_width_, seen_height_) : "images without their size") +
+            " where " + size_text(requested_.width, requested_.height) +
             " was configured; power it off and on"};
   const std::lock_guard lock(device_);
   if (session_ == nullptr || handover_.state() != Handover::State::streaming) return {};
   if (session_->lost()) return kSilent;
   const Duration silence = at - HostStamp(heard_ns_.load(std::memory_order_acquire));
-  const Duration period = Duration::seconds(1 / wanted_.rate_hz);
-  if (wanted_.trigger == CameraTrigger::free && silence > std::max(kLeastSilence, period * 10)) {
+  const Duration period = Duration::seconds(1 / requested_.rate_hz);
+  if (requested_.trigger == CameraTrigger::free && silence > std::max(kLeastSilence, period * 10)) {
     if (!session_->in_control()) return kSilent;
     return {"the camera answers, but sends no images; check the firewall, and the MTU on the way"};
   }
-  if (wanted_.trigger != CameraTrigger::free && silence > std::max(kAskEvery, period * 3) &&
+  if (requested_.trigger != CameraTrigger::free && silence > std::max(kAskEvery, period * 3) &&
       at - *asked > kAskEvery) {
     *asked = at;
     if (!session_->in_control()) return kSilent;

@@ -23,9 +23,9 @@ constexpr std::array kFormats{
 }  // namespace
 
 const GreyFormat* choose_format(const std::vector<std::string>& offered,
-                                std::string_view wanted) noexcept {
+                                std::string_view requested) noexcept {
   for (const GreyFormat& f : kFormats)
-    if ((wanted.empty() || wanted == f.name) &&
+    if ((requested.empty() || requested == f.name) &&
         std::find(offered.begin(), offered.end(), f.name) != offered.end())
       return &f;
   return nullptr;

@@ -14,10 +14,10 @@ struct GreyFormat {
   int shift = 0;  // words: bits below the eight that are kept
 };
 
-/// Of the formats a camera offers the one called `wanted`, or without a wish the cheapest. Null:
+/// Of the formats a camera offers the one called `requested`, or without a wish the cheapest. Null:
 /// none that gives grey.
 [[nodiscard]] const GreyFormat* choose_format(const std::vector<std::string>& offered,
-                                              std::string_view wanted) noexcept;
+                                              std::string_view requested) noexcept;
 
 /// Rows of `width` pixels without padding into rows of `stride` bytes.
 ///

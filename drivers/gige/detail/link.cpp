@@ -32,15 +32,15 @@ double packets_of(const LinkLoad& load, int packet_size) noexcept {
 
 Interface interface_of(const std::string& address) {
   Interface found;
-  in_addr wanted{};
-  if (::inet_pton(AF_INET, address.c_str(), &wanted) != 1) return found;
+  in_addr requested{};
+  if (::inet_pton(AF_INET, address.c_str(), &requested) != 1) return found;
   ifaddrs* list = nullptr;
   if (::getifaddrs(&list) != 0) return found;
   for (const ifaddrs* i = list; i != nullptr && found.name.empty(); i = i->ifa_next) {
     if (i->ifa_addr == nullptr || i->ifa_addr->sa_family != AF_INET) continue;
     sockaddr_in own{};
     std::memcpy(&own, i->ifa_addr, sizeof own);
-    if (own.sin_addr.s_addr == wanted.s_addr) found.name = i->ifa_name;
+    if (own.sin_addr.s_addr == requested.s_addr) found.name = i->ifa_name;
   }
   ::freeifaddrs(list);
   if (found.name.empty()) return found;
@@ -109,11 +109,11 @@ int find_udp_socket(std::uint16_t port) {
 }
 
 std::int64_t set_receive_buffer(int socket, std::int64_t bytes) {
-  const int wanted = static_cast<int>(std::min<std::int64_t>(bytes, INT_MAX / 4));
+  const int requested = static_cast<int>(std::min<std::int64_t>(bytes, INT_MAX / 4));
   // Beyond the system's limit where we may (CAP_NET_ADMIN); the plain call is capped by it in
   // silence.
-  if (::setsockopt(socket, SOL_SOCKET, SO_RCVBUFFORCE, &wanted, sizeof wanted) != 0)
-    (void)::setsockopt(socket, SOL_SOCKET, SO_RCVBUF, &wanted, sizeof wanted);
+  if (::setsockopt(socket, SOL_SOCKET, SO_RCVBUFFORCE, &requested, sizeof requested) != 0)
+    (void)::setsockopt(socket, SOL_SOCKET, SO_RCVBUF, &requested, sizeof requested);
   int got = 0;
   socklen_t length = sizeof got;
   if (::getsockopt(socket, SOL_SOCKET, SO_RCVBUF, &got, &length) != 0) return 0;

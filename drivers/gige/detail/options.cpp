@@ -75,7 +75,7 @@ constexpr std::array kRows{
               "What the camera's time stamp is of: the exposure's start or its end."},
     OptionRow{"ptp", "on, off", "off", "The camera's clock follows the network's (IEEE 1588)."},
     OptionRow{"chunks", "auto, off", "auto",
-              "Each frame tells its exposure itself, where the camera can (chunk data)."},
+              "Each frame reports its own exposure, where the camera can (chunk data)."},
     OptionRow{"heartbeat_ms", "ms, 500 to 60000", "the camera's",
               "After so long without a word from us the camera gives up its controller."},
     OptionRow{"feature.NAME", "a value", "",

@@ -51,22 +51,21 @@ std::vector<Found> discover() {
 }
 
 // ---- control
-// --------------------------------------------------------------------------------------------------------
 
 std::unique_ptr<Session> Session::open(const std::string& where, DeviceStatus* status,
-                                       std::string* complaint) {
+                                       std::string* message) {
   Error error;
   Object<ArvDevice> device(
       arv_interface_open_device(arv_gv_interface_get_instance(), where.c_str(), error.out()));
   if (device == nullptr || !ARV_IS_GV_DEVICE(device.get())) {
     *status = DeviceStatus::not_found;
-    *complaint = error ? where + " does not answer: " + error.text()
-                       : where + " does not answer; is its address in the network of this host?";
+    *message = error ? where + " does not answer: " + error.text()
+                     : where + " does not answer; is its address in the network of this host?";
     return nullptr;
   }
   if (arv_gv_device_is_controller(ARV_GV_DEVICE(device.get())) == FALSE) {
     *status = DeviceStatus::busy;
-    *complaint = where + " is controlled by another program, or was by one that ended seconds ago";
+    *message = where + " is controlled by another program, or was by one that ended seconds ago";
     return nullptr;
   }
   *status = DeviceStatus::ok;
@@ -102,10 +101,10 @@ Session::~Session() {
 }
 
 DeviceStatus Session::refuse(DeviceStatus status, std::string sentence) {
-  complaint_ = std::move(sentence);
+  last_error_ = std::move(sentence);
   // A camera that has gone refuses everything; the sentence about the last feature would mislead.
   if (lost() || !in_control()) {
-    complaint_ = "the camera does not answer any more";
+    last_error_ = "the camera does not answer any more";
     return DeviceStatus::gone;
   }
   return status;
@@ -121,13 +120,12 @@ bool Session::in_control() {
 }
 
 // ---- stream
-// ---------------------------------------------------------------------------------------------------------
 
 DeviceStatus Session::open_stream(const Applied& a, ArvStreamCallback callback, void* user) {
   const Options& o = a.options;
   ArvGvDevice* gv = ARV_GV_DEVICE(device_.get());
   if (o.packet_socket && !may_open_packet_socket()) {
-    complaint_ =
+    last_error_ =
         "the packet socket needs CAP_NET_RAW: sudo setcap cap_net_raw+ep on the program, or set "
         "the option packet_socket to off";
     return DeviceStatus::no_permission;
@@ -140,7 +138,7 @@ DeviceStatus Session::open_stream(const Applied& a, ArvStreamCallback callback, 
   if (stream_ == nullptr || !ARV_IS_GV_STREAM(stream_.get())) {
     stream_.reset();
     if (error.is(ARV_DEVICE_ERROR_NOT_CONTROLLER)) {
-      complaint_ = "another program controls the camera";
+      last_error_ = "another program controls the camera";
       return DeviceStatus::gone;
     }
     return refuse(DeviceStatus::failed, "the stream cannot be made: " + error.text());
@@ -179,17 +177,17 @@ DeviceStatus Session::open_stream(const Applied& a, ArvStreamCallback callback, 
 /// Before the first packet, which Aravis does after it: half of all streams would lose their first
 /// frame.
 void Session::enlarge_socket_buffer(const Applied& a) {
-  const std::int64_t wanted =
+  const std::int64_t requested =
       a.options.socket_buffer > 0
           ? a.options.socket_buffer
           : std::max(kLeastSocketBuffer, kBufferedFrames * static_cast<std::int64_t>(a.payload));
   const int socket = find_udp_socket(arv_gv_stream_get_port(ARV_GV_STREAM(stream_.get())));
-  const std::int64_t got = socket < 0 ? 0 : set_receive_buffer(socket, wanted);
+  const std::int64_t got = socket < 0 ? 0 : set_receive_buffer(socket, requested);
   const std::int64_t least = 2 * static_cast<std::int64_t>(a.payload);
-  if (got < std::min(wanted, least))
+  if (got < std::min(requested, least))
     note("the receive buffer holds " + std::to_string(got / 1024) + " KiB instead of " +
-         std::to_string(wanted / 1024) +
-         ": frames will be lost; sudo sysctl -w net.core.rmem_max=" + std::to_string(wanted));
+         std::to_string(requested / 1024) +
+         ": frames will be lost; sudo sysctl -w net.core.rmem_max=" + std::to_string(requested));
 }
 
 void Session::push(ArvBuffer* buffer) noexcept {

@@ -41,18 +41,18 @@ struct Applied {
 ///
 /// Threads  One caller at a time; `lost()` any. Every call may take 2.5 s when the camera has gone,
 ///          and no longer.
-/// Errors   Statuses, with the sentence in complaint().
+/// Errors   Statuses, with the sentence in last_error().
 class Session {
  public:
-  /// By address or Aravis's id. Null: *status and *complaint say why. → ok, not_found, busy, failed
+  /// By address or Aravis's id. Null: *status and *error say why. → ok, not_found, busy, failed
   [[nodiscard]] static std::unique_ptr<Session> open(const std::string& where, DeviceStatus* status,
-                                                     std::string* complaint);
+                                                     std::string* error);
   ~Session();
 
   [[nodiscard]] const DeviceInfo& info() const noexcept { return info_; }
   /// The whole configuration, in the order that cameras want. → ok, unsupported, bad_configuration,
   /// gone
-  [[nodiscard]] DeviceStatus apply(const CameraConfiguration& wanted, const Options& options,
+  [[nodiscard]] DeviceStatus apply(const CameraConfiguration& requested, const Options& options,
                                    Applied* applied);
 
   /// Makes the stream; the callback comes from its thread, from the first push() on. → ok,
@@ -69,28 +69,29 @@ class Session {
   [[nodiscard]] DeviceStatus trigger();
   /// The nearest that the camera has, also while it streams. *actual: as read back. → ok,
   /// unsupported, gone
-  [[nodiscard]] DeviceStatus change_exposure(const ExposureSetting& wanted, const Options& options,
-                                             ExposureSetting* actual);
+  [[nodiscard]] DeviceStatus change_exposure(const ExposureSetting& requested,
+                                             const Options& options, ExposureSetting* actual);
 
   /// Asks the camera: it answers, and we are in control.
   [[nodiscard]] bool in_control();
   /// Noticed by the heartbeat.
   [[nodiscard]] bool lost() const noexcept { return lost_.load(std::memory_order_acquire); }
 
-  [[nodiscard]] const std::string& complaint() const noexcept { return complaint_; }
+  [[nodiscard]] const std::string& last_error() const noexcept { return last_error_; }
   [[nodiscard]] const std::string& remark() const noexcept { return remark_; }
 
  private:
   explicit Session(Object<ArvDevice> device);
   [[nodiscard]] DeviceStatus refuse(DeviceStatus status, std::string sentence);
-  [[nodiscard]] DeviceStatus set_format(const CameraConfiguration& wanted, Applied* applied);
-  [[nodiscard]] DeviceStatus set_region(const CameraConfiguration& wanted);
-  [[nodiscard]] DeviceStatus set_exposure(const CameraConfiguration& wanted, const Options& options,
-                                          Applied* applied);
-  [[nodiscard]] DeviceStatus set_trigger(const CameraConfiguration& wanted, const Options& options);
-  [[nodiscard]] DeviceStatus set_rate(const CameraConfiguration& wanted, Applied* applied);
-  [[nodiscard]] DeviceStatus set_packets(const CameraConfiguration& wanted, const Options& options,
-                                         Applied* applied);
+  [[nodiscard]] DeviceStatus set_format(const CameraConfiguration& requested, Applied* applied);
+  [[nodiscard]] DeviceStatus set_region(const CameraConfiguration& requested);
+  [[nodiscard]] DeviceStatus set_exposure(const CameraConfiguration& requested,
+                                          const Options& options, Applied* applied);
+  [[nodiscard]] DeviceStatus set_trigger(const CameraConfiguration& requested,
+                                         const Options& options);
+  [[nodiscard]] DeviceStatus set_rate(const CameraConfiguration& requested, Applied* applied);
+  [[nodiscard]] DeviceStatus set_packets(const CameraConfiguration& requested,
+                                         const Options& options, Applied* applied);
   [[nodiscard]] DeviceStatus set_clock(const Options& options, Applied* applied);
   void set_chunks(const Options& options, Applied* applied);
   [[nodiscard]] bool ask_for_exposures(const char* mode, Applied* applied);
@@ -102,7 +103,7 @@ class Session {
   Features features_;
   DeviceInfo info_;
   Interface link_;
-  std::string complaint_, remark_;
+  std::string last_error_, remark_;
   std::atomic<bool> lost_{false};
 };
 

@@ -21,10 +21,10 @@ std::string shown(double v) {
 
 }  // namespace
 
-DeviceStatus Session::apply(const CameraConfiguration& wanted, const Options& options,
+DeviceStatus Session::apply(const CameraConfiguration& requested, const Options& options,
                             Applied* applied) {
   Applied a;
-  a.actual = wanted;
+  a.actual = requested;
   a.options = options;
   remark_.clear();
   Error error;
@@ -33,57 +33,58 @@ DeviceStatus Session::apply(const CameraConfiguration& wanted, const Options& op
   features_.choose_if_there("AcquisitionMode", "Continuous");
   if (options.heartbeat_ms > 0 &&
       !features_.set("GevHeartbeatTimeout", options.heartbeat_ms, "ms", nullptr))
-    return refuse(DeviceStatus::unsupported, features_.complaint());
-  DeviceStatus status = set_format(wanted, &a);
-  if (status == DeviceStatus::ok) status = set_region(wanted);
-  if (status == DeviceStatus::ok) status = set_trigger(wanted, options);
-  if (status == DeviceStatus::ok) status = set_exposure(wanted, options, &a);
-  if (status == DeviceStatus::ok) status = set_rate(wanted, &a);
+    return refuse(DeviceStatus::unsupported, features_.last_error());
+  DeviceStatus status = set_format(requested, &a);
+  if (status == DeviceStatus::ok) status = set_region(requested);
+  if (status == DeviceStatus::ok) status = set_trigger(requested, options);
+  if (status == DeviceStatus::ok) status = set_exposure(requested, options, &a);
+  if (status == DeviceStatus::ok) status = set_rate(requested, &a);
   if (status == DeviceStatus::ok) status = set_clock(options, &a);
   if (status != DeviceStatus::ok) return status;
   set_chunks(options, &a);
   for (const auto& [name, value] : options.features)
     if (!features_.set_text(name, value))
-      return refuse(DeviceStatus::unsupported, features_.complaint());
+      return refuse(DeviceStatus::unsupported, features_.last_error());
   const auto payload = features_.number("PayloadSize");
   if (!payload || *payload < 1)
     return refuse(DeviceStatus::unsupported,
                   "the camera does not say how large a frame is (PayloadSize)");
   a.payload = static_cast<std::size_t>(*payload);
-  a.pixels = static_cast<std::size_t>(wanted.width) * static_cast<std::size_t>(wanted.height) *
+  a.pixels = static_cast<std::size_t>(requested.width) *
+             static_cast<std::size_t>(requested.height) *
              (a.format->how == GreyFormat::How::words ? 2 : 1);
   if (a.payload < a.pixels)
     return refuse(DeviceStatus::unsupported, "the camera's frames of " + std::to_string(a.payload) +
                                                  " bytes are smaller than the image");
-  status = set_packets(wanted, options, &a);
+  status = set_packets(requested, options, &a);
   if (status == DeviceStatus::ok) *applied = std::move(a);
   return status;
 }
 
-DeviceStatus Session::set_format(const CameraConfiguration& wanted, Applied* a) {
+DeviceStatus Session::set_format(const CameraConfiguration& requested, Applied* a) {
   const auto offered = features_.choices("PixelFormat");
-  a->format = choose_format(offered, wanted.pixel_format);
+  a->format = choose_format(offered, requested.pixel_format);
   if (a->format == nullptr) {
     std::string all;
     for (const std::string& name : offered)
       if (choose_format({name}, "") != nullptr) all += (all.empty() ? "" : ", ") + name;
     return refuse(
         DeviceStatus::unsupported,
-        (wanted.pixel_format.empty() ? "no pixel format gives grey"
-                                     : "there is no pixel format " + wanted.pixel_format) +
+        (requested.pixel_format.empty() ? "no pixel format gives grey"
+                                        : "there is no pixel format " + requested.pixel_format) +
             "; the camera offers " + (all.empty() ? "none that is known here" : all));
   }
   if (!features_.choose("PixelFormat", a->format->name))
-    return refuse(DeviceStatus::unsupported, features_.complaint());
+    return refuse(DeviceStatus::unsupported, features_.last_error());
   a->actual.pixel_format = a->format->name;
   return DeviceStatus::ok;
 }
 
-DeviceStatus Session::set_region(const CameraConfiguration& wanted) {
+DeviceStatus Session::set_region(const CameraConfiguration& requested) {
   const auto exactly = [&](const char* name, int value) {
     double actual = value;
     if (!features_.set(name, value, "px", &actual))
-      return refuse(DeviceStatus::unsupported, features_.complaint());
+      return refuse(DeviceStatus::unsupported, features_.last_error());
     if (actual == value) return DeviceStatus::ok;
     const auto limits = features_.bounds(name);
     return refuse(DeviceStatus::unsupported,
@@ -96,89 +97,90 @@ DeviceStatus Session::set_region(const CameraConfiguration& wanted) {
   const bool offsets = features_.has("OffsetX") && features_.has("OffsetY");
   if (offsets)
     for (const char* name : {"OffsetX", "OffsetY"}) (void)features_.set(name, 0, "px", nullptr);
-  for (const auto& [name, value] : {std::pair{"Width", wanted.width}, {"Height", wanted.height}})
+  for (const auto& [name, value] :
+       {std::pair{"Width", requested.width}, {"Height", requested.height}})
     if (const DeviceStatus s = exactly(name, value); s != DeviceStatus::ok) return s;
   if (!offsets) {
-    if (wanted.offset_x == 0 && wanted.offset_y == 0) return DeviceStatus::ok;
+    if (requested.offset_x == 0 && requested.offset_y == 0) return DeviceStatus::ok;
     return refuse(DeviceStatus::unsupported, "the camera has no offset of its region");
   }
   for (const auto& [name, value] :
-       {std::pair{"OffsetX", wanted.offset_x}, {"OffsetY", wanted.offset_y}})
+       {std::pair{"OffsetX", requested.offset_x}, {"OffsetY", requested.offset_y}})
     if (const DeviceStatus s = exactly(name, value); s != DeviceStatus::ok) return s;
   return DeviceStatus::ok;
 }
 
-DeviceStatus Session::set_trigger(const CameraConfiguration& wanted, const Options& o) {
+DeviceStatus Session::set_trigger(const CameraConfiguration& requested, const Options& o) {
   if (features_.has("TriggerSelector"))
     for (const std::string& selector : features_.choices("TriggerSelector")) {
       features_.choose_if_there("TriggerSelector", selector);
       features_.choose_if_there("TriggerMode", "Off");
     }
-  if (wanted.trigger == CameraTrigger::free) {
+  if (requested.trigger == CameraTrigger::free) {
     features_.choose_if_there("TriggerMode", "Off");
     return DeviceStatus::ok;
   }
   for (const char* selector : {"AcquisitionStart", "FrameBurstStart", "FrameStart"})
     features_.choose_if_there("TriggerSelector", selector);
-  const bool software = wanted.trigger == CameraTrigger::software;
+  const bool software = requested.trigger == CameraTrigger::software;
   // The mode before the source: some cameras offer sources only then.
   if (!features_.choose("TriggerMode", "On") ||
       !features_.choose("TriggerSource", software ? "Software" : o.line))
-    return refuse(DeviceStatus::unsupported, features_.complaint());
+    return refuse(DeviceStatus::unsupported, features_.last_error());
   if (software) return DeviceStatus::ok;
   const std::string edge = o.edge == "rising" ? "RisingEdge" : "FallingEdge";
   if (edge == "RisingEdge")
     features_.choose_if_there("TriggerActivation", edge);
   else if (!features_.choose("TriggerActivation", edge))
-    return refuse(DeviceStatus::unsupported, features_.complaint());
+    return refuse(DeviceStatus::unsupported, features_.last_error());
   const std::string overlap = o.overlap == "off"              ? "Off"
                               : o.overlap == "readout"        ? "ReadOut"
                               : o.overlap == "previous_frame" ? "PreviousFrame"
                                                               : "";
   if (!overlap.empty() && !features_.choose("TriggerOverlap", overlap))
-    return refuse(DeviceStatus::unsupported, features_.complaint());
+    return refuse(DeviceStatus::unsupported, features_.last_error());
   const char* delay = features_.find(Purpose::trigger_delay);
   if (delay == nullptr && o.trigger_delay_us > 0)
     return refuse(DeviceStatus::unsupported, "the camera has no delay of its trigger");
   if (delay != nullptr && !features_.set(delay, o.trigger_delay_us, "us", nullptr))
-    return refuse(DeviceStatus::unsupported, features_.complaint());
+    return refuse(DeviceStatus::unsupported, features_.last_error());
   if (!o.exposure_line.empty() && (!features_.choose("LineSelector", o.exposure_line) ||
                                    !features_.choose("LineMode", "Output") ||
                                    !features_.choose("LineSource", "ExposureActive")))
-    return refuse(DeviceStatus::unsupported, features_.complaint());
+    return refuse(DeviceStatus::unsupported, features_.last_error());
   return DeviceStatus::ok;
 }
 
-DeviceStatus Session::set_exposure(const CameraConfiguration& wanted, const Options& o,
+DeviceStatus Session::set_exposure(const CameraConfiguration& requested, const Options& o,
                                    Applied* a) {
   for (const char* automatic : {"ExposureAuto", "GainAuto"})
     features_.choose_if_there(automatic, "Off");
   if (o.exposure_mode == "trigger_width") {
     if (!features_.choose("ExposureMode", "TriggerWidth"))
-      return refuse(DeviceStatus::unsupported, features_.complaint());
+      return refuse(DeviceStatus::unsupported, features_.last_error());
   } else {
     features_.choose_if_there("ExposureMode", "Timed");
     const char* exposure = features_.find(Purpose::exposure);
     if (exposure == nullptr)
       return refuse(DeviceStatus::unsupported, "the camera's exposure cannot be set");
     double us = 0;
-    if (!features_.set(exposure, wanted.exposure.to_seconds() * 1e6, "us", &us))
-      return refuse(DeviceStatus::unsupported, features_.complaint());
+    if (!features_.set(exposure, requested.exposure.to_seconds() * 1e6, "us", &us))
+      return refuse(DeviceStatus::unsupported, features_.last_error());
     a->actual.exposure = Duration::seconds(us * 1e-6);
   }
   features_.choose_if_there("GainSelector", "All");
   const char* gain = features_.find(Purpose::gain);
   if (gain == nullptr) {
-    if (wanted.gain_db != 0)
+    if (requested.gain_db != 0)
       return refuse(DeviceStatus::unsupported, "the camera's gain cannot be set");
     return DeviceStatus::ok;
   }
   const auto limits = features_.bounds(gain);
-  double value = wanted.gain_db;
+  double value = requested.gain_db;
   if (value == 0 && limits)
     value = std::max(value, limits->least);  // none asked for: the least there is
   if (std::string(gain) == "GainRaw") {
-    if (wanted.gain_db != 0)
+    if (requested.gain_db != 0)
       return refuse(
           DeviceStatus::unsupported,
           "the camera's gain has no unit: set gain_db to 0 and the option feature.GainRaw" +
@@ -188,11 +190,11 @@ DeviceStatus Session::set_exposure(const CameraConfiguration& wanted, const Opti
     return DeviceStatus::ok;
   }
   if (!features_.set(gain, value, "dB", &a->actual.gain_db))
-    return refuse(DeviceStatus::unsupported, features_.complaint());
+    return refuse(DeviceStatus::unsupported, features_.last_error());
   return DeviceStatus::ok;
 }
 
-DeviceStatus Session::change_exposure(const ExposureSetting& wanted, const Options& o,
+DeviceStatus Session::change_exposure(const ExposureSetting& requested, const Options& o,
                                       ExposureSetting* actual) {
   const char* exposure = features_.find(Purpose::exposure);
   if (o.exposure_mode == "trigger_width" || exposure == nullptr)
@@ -205,10 +207,10 @@ DeviceStatus Session::change_exposure(const ExposureSetting& wanted, const Optio
         unit, taken);
   };
   double us = 0;
-  *actual = wanted;
-  if (!set_nearest(exposure, wanted.exposure.to_seconds() * 1e6, "us", &us))
+  *actual = requested;
+  if (!set_nearest(exposure, requested.exposure.to_seconds() * 1e6, "us", &us))
     return refuse(in_control() ? DeviceStatus::unsupported : DeviceStatus::gone,
-                  features_.complaint());
+                  features_.last_error());
   actual->exposure = Duration::seconds(us * 1e-6);
   const char* gain = features_.find(Purpose::gain);
   if (gain == nullptr ||
@@ -216,14 +218,14 @@ DeviceStatus Session::change_exposure(const ExposureSetting& wanted, const Optio
     actual->gain_db = 0;
     return DeviceStatus::ok;
   }
-  if (!set_nearest(gain, wanted.gain_db, "dB", &actual->gain_db))
+  if (!set_nearest(gain, requested.gain_db, "dB", &actual->gain_db))
     return refuse(in_control() ? DeviceStatus::unsupported : DeviceStatus::gone,
-                  features_.complaint());
+                  features_.last_error());
   return DeviceStatus::ok;
 }
 
-DeviceStatus Session::set_rate(const CameraConfiguration& wanted, Applied* a) {
-  const bool free = wanted.trigger == CameraTrigger::free;
+DeviceStatus Session::set_rate(const CameraConfiguration& requested, Applied* a) {
+  const bool free = requested.trigger == CameraTrigger::free;
   for (const char* enable : {"AcquisitionFrameRateEnable", "AcquisitionFrameRateEnabled"})
     if (features_.has(enable)) (void)features_.switch_on(enable, free);
   features_.choose_if_there("AcquisitionFrameRateAuto", "Off");
@@ -231,8 +233,8 @@ DeviceStatus Session::set_rate(const CameraConfiguration& wanted, Applied* a) {
   const char* rate = features_.find(Purpose::frame_rate);
   if (rate == nullptr)
     return refuse(DeviceStatus::unsupported, "the camera's frame rate cannot be set; trigger it");
-  if (!features_.set(rate, wanted.rate_hz, "Hz", &a->actual.rate_hz))
-    return refuse(DeviceStatus::unsupported, features_.complaint());
+  if (!features_.set(rate, requested.rate_hz, "Hz", &a->actual.rate_hz))
+    return refuse(DeviceStatus::unsupported, features_.last_error());
   return DeviceStatus::ok;
 }
 
@@ -246,7 +248,7 @@ DeviceStatus Session::set_clock(const Options& o, Applied* a) {
     return refuse(DeviceStatus::unsupported,
                   "the camera knows no PTP (IEEE 1588); set the option ptp to off");
   if (enable != nullptr && !features_.switch_on(enable, o.ptp) && o.ptp)
-    return refuse(DeviceStatus::unsupported, features_.complaint());
+    return refuse(DeviceStatus::unsupported, features_.last_error());
   if (!o.ptp) {
     if (a->tick_frequency == 0)
       note("the camera has no clock: its images are stamped when they arrive");
@@ -298,7 +300,8 @@ bool Session::ask_for_exposures(const char* mode, Applied* a) {
   return a->exposure_chunk.has_value();
 }
 
-DeviceStatus Session::set_packets(const CameraConfiguration& wanted, const Options& o, Applied* a) {
+DeviceStatus Session::set_packets(const CameraConfiguration& requested, const Options& o,
+                                  Applied* a) {
   a->link = link_;
   const std::int64_t speed = o.link_speed > 0 ? o.link_speed : a->link.speed;
   const auto limits = features_.bounds("GevSCPSPacketSize");
@@ -316,14 +319,14 @@ DeviceStatus Session::set_packets(const CameraConfiguration& wanted, const Optio
   if (error)
     return refuse(DeviceStatus::unsupported,
                   "packets of " + std::to_string(size) + " bytes were refused: " + error.text());
-  const int cameras = o.link_cameras > 0 ? o.link_cameras : wanted.sharing;
-  const LinkLoad load{static_cast<std::int64_t>(a->payload), wanted.rate_hz, cameras, false};
+  const int cameras = o.link_cameras > 0 ? o.link_cameras : requested.sharing;
+  const LinkLoad load{static_cast<std::int64_t>(a->payload), requested.rate_hz, cameras, false};
   a->plan = plan_link(load, size, speed, o.packet_delay);
   if (a->plan.share > kMostOfPeriod)
     return refuse(DeviceStatus::unsupported,
-                  std::to_string(cameras) + " cameras of " + std::to_string(wanted.width) + " x " +
-                      std::to_string(wanted.height) + " " + a->format->name + " at " +
-                      shown(wanted.rate_hz) + " Hz do not fit on " +
+                  std::to_string(cameras) + " cameras of " + std::to_string(requested.width) +
+                      " x " + std::to_string(requested.height) + " " + a->format->name + " at " +
+                      shown(requested.rate_hz) + " Hz do not fit on " +
                       (a->link.name.empty() ? "the link" : a->link.name) + " of " +
                       shown(static_cast<double>(speed) * 1e-6) + " Mbit/s with packets of " +
                       std::to_string(size) + " bytes; it carries " +
@@ -331,7 +334,7 @@ DeviceStatus Session::set_packets(const CameraConfiguration& wanted, const Optio
   const double ticks = a->plan.delay.to_seconds() * static_cast<double>(a->tick_frequency);
   if (features_.has("GevSCPD")) {
     if (!features_.set("GevSCPD", std::ceil(ticks), "ticks", nullptr))
-      return refuse(DeviceStatus::unsupported, features_.complaint());
+      return refuse(DeviceStatus::unsupported, features_.last_error());
   } else if (ticks > 0) {
     note("the camera has no packet delay: cameras that expose together may overflow the switch");
   }

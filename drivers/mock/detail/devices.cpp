@@ -9,7 +9,6 @@
 namespace vergence::mock {
 
 // ---- camera
-// -------------------------------------------------------------------------------------------------------
 
 MockCamera::MockCamera(RigContext* rig, int k)
     : rig_(rig),
@@ -17,13 +16,14 @@ MockCamera::MockCamera(RigContext* rig, int k)
       info_{"mock", "mock-" + std::to_string(k), "rendered camera", "world"},
       clock_(DeviceOscillator::of(rig->options.seed, k, rig->options.clock_drift_ppm)) {}
 
-DeviceStatus MockCamera::configure(const CameraConfiguration& wanted,
+DeviceStatus MockCamera::configure(const CameraConfiguration& requested,
                                    CameraConfiguration* actual) noexcept {
   const Intrinsics& lens = rig_->truth->mounted().intrinsics[static_cast<std::size_t>(k_)];
-  if (!(wanted.rate_hz > 0) || wanted.exposure <= Duration{} ||
-      wanted.exposure.to_seconds() * wanted.rate_hz > 1)
+  if (!(requested.rate_hz > 0) || requested.exposure <= Duration{} ||
+      requested.exposure.to_seconds() * requested.rate_hz > 1)
     return DeviceStatus::bad_configuration;
-  if (wanted.width != lens.width || wanted.height != lens.height) return DeviceStatus::unsupported;
+  if (requested.width != lens.width || requested.height != lens.height)
+    return DeviceStatus::unsupported;
   if (stream.streaming() || out_.load() > 0 || (rig_->pulsing.load() && !rig_->options.real_time))
     return DeviceStatus::busy;
   const std::unique_lock mine(memory);
@@ -38,23 +38,24 @@ DeviceStatus MockCamera::configure(const CameraConfiguration& wanted,
   } catch (const std::exception&) {
     return DeviceStatus::failed;
   }
-  configuration_ = wanted;
+  configuration_ = requested;
   {
     const std::lock_guard lock(setting_);
-    changes_ = {{0, {wanted.exposure, wanted.gain_db}}};
+    changes_ = {{0, {requested.exposure, requested.gain_db}}};
   }
   generation_.fetch_add(1, std::memory_order_release);
-  if (actual != nullptr) *actual = wanted;
+  if (actual != nullptr) *actual = requested;
   return DeviceStatus::ok;
 }
 
-DeviceStatus MockCamera::set_exposure(const ExposureSetting& wanted,
+DeviceStatus MockCamera::set_exposure(const ExposureSetting& requested,
                                       ExposureSetting* actual) noexcept {
   constexpr double kMostGain = 40;  // dB
   if (!stream.streaming()) return DeviceStatus::stopped;
-  if (wanted.exposure <= Duration{} || wanted.exposure.to_seconds() * configuration_.rate_hz > 1)
+  if (requested.exposure <= Duration{} ||
+      requested.exposure.to_seconds() * configuration_.rate_hz > 1)
     return DeviceStatus::bad_configuration;
-  const ExposureSetting taken{wanted.exposure, std::clamp(wanted.gain_db, 0.0, kMostGain)};
+  const ExposureSetting taken{requested.exposure, std::clamp(requested.gain_db, 0.0, kMostGain)};
   const auto latency = static_cast<std::uint64_t>(std::max(1, rig_->options.exposure_latency));
   const std::uint64_t from = std::max(rig_->looked_at.load() + latency, rig_->planned.load());
   try {
@@ -143,7 +144,6 @@ void MockCamera::take(std::span<const Transform> T_camera_enu,
 }
 
 // ---- INS
-// ----------------------------------------------------------------------------------------------------------
 
 MockIns::MockIns(RigContext* rig)
     : rig_(rig),
@@ -192,24 +192,23 @@ InsStatistics MockIns::statistics() const noexcept {
 }
 
 // ---- trigger board
-// ------------------------------------------------------------------------------------------------
 
 MockTrigger::MockTrigger(RigContext* rig, PulseListener* listener)
     : rig_(rig),
       listener_(listener),
       clock_(DeviceOscillator::of(rig->options.seed, -2, rig->options.clock_drift_ppm)) {}
 
-DeviceStatus MockTrigger::configure(const TriggerConfiguration& wanted,
+DeviceStatus MockTrigger::configure(const TriggerConfiguration& requested,
                                     TriggerConfiguration* actual) noexcept {
-  if (!(wanted.rate_hz > 0) || wanted.width <= Duration{} || wanted.vary < Duration{})
+  if (!(requested.rate_hz > 0) || requested.width <= Duration{} || requested.vary < Duration{})
     return DeviceStatus::bad_configuration;
-  if (wanted.rate_hz > 200) return DeviceStatus::unsupported;
-  const Duration period = Duration::seconds(1 / wanted.rate_hz);
-  if (wanted.vary * 2 > period || wanted.width + wanted.vary >= period)
+  if (requested.rate_hz > 200) return DeviceStatus::unsupported;
+  const Duration period = Duration::seconds(1 / requested.rate_hz);
+  if (requested.vary * 2 > period || requested.width + requested.vary >= period)
     return DeviceStatus::unsupported;
   if (rig_->pulsing.load()) return DeviceStatus::busy;
-  configuration_ = wanted;
-  if (actual != nullptr) *actual = wanted;
+  configuration_ = requested;
+  if (actual != nullptr) *actual = requested;
   return DeviceStatus::ok;
 }
 

@@ -63,9 +63,9 @@ class MockCamera final : public CameraDevice {
   ~MockCamera() override { stop(); }
 
   const DeviceInfo& info() const noexcept override { return info_; }
-  DeviceStatus configure(const CameraConfiguration& wanted,
+  DeviceStatus configure(const CameraConfiguration& requested,
                          CameraConfiguration* actual) noexcept override;
-  DeviceStatus set_exposure(const ExposureSetting& wanted,
+  DeviceStatus set_exposure(const ExposureSetting& requested,
                             ExposureSetting* actual) noexcept override;
   DeviceTiming timing() const noexcept override {
     return {trigger_delay() + configuration_.exposure + kTransfer};
@@ -186,7 +186,7 @@ class MockTrigger final : public TriggerDevice {
   ~MockTrigger() override { stop(); }
 
   const DeviceInfo& info() const noexcept override { return info_; }
-  DeviceStatus configure(const TriggerConfiguration& wanted,
+  DeviceStatus configure(const TriggerConfiguration& requested,
                          TriggerConfiguration* actual) noexcept override;
   DeviceTiming timing() const noexcept override { return {kReportLatency}; }
   DeviceStatus start(Notifier* ready) noexcept override;

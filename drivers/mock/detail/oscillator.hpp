@@ -33,11 +33,11 @@ struct DeviceOscillator {
     return {offset, drift_ppm * 1e-6 * random.uniform(-1, 1), owner};
   }
 
-  [[nodiscard]] DeviceStamp read(HostStamp host, Duration drive_time,
+  [[nodiscard]] DeviceStamp read(HostStamp host, Duration timing_monitor,
                                  const std::vector<Fault>& faults) const noexcept {
     std::int64_t ns = host.ns() + offset + std::llround(drift * static_cast<double>(host.ns()));
     for (const Fault& f : faults)
-      if (f.kind == FaultKind::time_jump && f.camera == owner && drive_time >= f.at)
+      if (f.kind == FaultKind::time_jump && f.camera == owner && timing_monitor >= f.at)
         ns += std::llround(f.jump * 1e9);
     return DeviceStamp(ns / 1000 * 1000);
   }

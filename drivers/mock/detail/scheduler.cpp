@@ -124,7 +124,6 @@ HostStamp Scheduler::jittered(HostStamp least, std::uint64_t device,
 }
 
 // ---- making
-// -------------------------------------------------------------------------------------------------------
 
 void Scheduler::produce() {
   (void)pthread_setname_np(pthread_self(), "vergence-mock");
@@ -442,7 +441,6 @@ void Scheduler::render(const Shooting& shooting) {
 }
 
 // ---- handing out
-// --------------------------------------------------------------------------------------------------
 
 void Scheduler::announce_end(HostStamp at) {
   for (int device = kTriggerDevice; device < static_cast<int>(cameras_.size()); ++device) {

@@ -25,7 +25,6 @@ BoardSimulator::BoardSimulator(PulseSource pulses, const BoardSimulatorOptions& 
 }
 
 // ---- its clock
-// ------------------------------------------------------------------------------------------------------
 
 double BoardSimulator::counts_since_power_on(HostStamp host) const noexcept {
   const double t = (host - options_.power_on).to_seconds();
@@ -41,16 +40,15 @@ std::uint64_t BoardSimulator::count_at(HostStamp host) const noexcept {
 }
 
 HostStamp BoardSimulator::host_at(std::uint64_t count) const noexcept {
-  const double wanted = zero_counts_ + static_cast<double>(count);
-  HostStamp host = options_.power_on + Duration::seconds(wanted / options_.counts_hz);
+  const double requested = zero_counts_ + static_cast<double>(count);
+  HostStamp host = options_.power_on + Duration::seconds(requested / options_.counts_hz);
   // Each turn leaves a part in ten thousand of the error, the crystal's.
   for (int i = 0; i < 4; ++i)
-    host = host + Duration::seconds((wanted - counts_since_power_on(host)) / options_.counts_hz);
+    host = host + Duration::seconds((requested - counts_since_power_on(host)) / options_.counts_hz);
   return host;
 }
 
 // ---- its life
-// -------------------------------------------------------------------------------------------------------
 
 void BoardSimulator::start(HostStamp at) {
   BoardDescription d{};
@@ -171,7 +169,6 @@ void BoardSimulator::plan_pps(HostStamp after) {
 }
 
 // ---- its line
-// -------------------------------------------------------------------------------------------------------
 
 void BoardSimulator::receive(std::span<const std::uint8_t> bytes, HostStamp at) {
   advance(at);

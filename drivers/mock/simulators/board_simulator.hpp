@@ -46,7 +46,7 @@ struct BoardSimulatorOptions {
   Duration duration = Duration::seconds(7 * 86400);  // nothing is sent and no pulse made after it
   Duration boot_time = Duration::milliseconds(20);   // deaf and mute after a start
   std::vector<HostStamp>
-      reboots{};     // it begins anew, by itself, in mid-frame if need be; ascending
+      reboots{};     // it begins again, by itself, in mid-frame if need be; ascending
   bool pps = false;  // a GNSS receiver is wired: an edge every whole second of the host's clock
   std::vector<std::pair<HostStamp, HostStamp>> pps_gaps{};
   Duration ins_interval{};  // of the INS' SyncOut; 0: not wired

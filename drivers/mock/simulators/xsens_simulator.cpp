@@ -78,7 +78,6 @@ std::int64_t XsensSimulator::period_ns() const noexcept {
 double XsensSimulator::rate_hz() const noexcept { return 1e9 / static_cast<double>(period_ns()); }
 
 // ---- states
-// ---------------------------------------------------------------------------------------------------------
 
 void XsensSimulator::wake(HostStamp at) {
   baud_ = stored_baud_;
@@ -109,7 +108,6 @@ bool XsensSimulator::ended() const {
 }
 
 // ---- what the host says
-// ---------------------------------------------------------------------------------------------
 
 void XsensSimulator::receive(std::span<const std::uint8_t> bytes, HostStamp at) {
   now_ = std::max(now_, at);
@@ -313,7 +311,6 @@ void XsensSimulator::send_configuration(HostStamp at) {
 }
 
 // ---- what it measures
-// -----------------------------------------------------------------------------------------------
 
 std::optional<HostStamp> XsensSimulator::next() const {
   std::optional<HostStamp> first;
@@ -586,10 +583,10 @@ void XsensSimulator::send_mark4(const Taken& now, HostStamp at) {
 }
 
 void XsensSimulator::send_fix(HostStamp at) {
-  bool wanted = false;
+  bool requested = false;
   for (const OutputEntry& e : outputs_.items())
-    wanted = wanted || packet_id(e.id) == PacketId::gnss_pvt;
-  if (!wanted) return;
+    requested = requested || packet_id(e.id) == PacketId::gnss_pvt;
+  if (!requested) return;
   const Taken& then = history_.front();
   const InsSample& s = then.sample;
   const Utc utc = utc_of_unix_ns(options_.unix_ns_at_power_on + then.device_ns, 7);

@@ -35,7 +35,7 @@ struct XsensSimulatorOptions {
   int fix_age = 5;  // samples that a receiver's message is older than the inertial one before it
   double missing_position =
       0;  // of the inertial messages: they come without latitude and longitude (MTi-G-700/710)
-  std::vector<HostStamp> dips{};      // the supply dips: the sensor starts anew, by itself
+  std::vector<HostStamp> dips{};      // the supply dips: the sensor restarts, by itself
   std::vector<HostStamp> silences{};  // the sensor stops sending until it is told to measure again
   // Settings stored in the device; the simulator's own defaults when empty or zero.
   xbus::OutputConfiguration outputs{};

@@ -15,8 +15,7 @@ constexpr double kLane = 1.9;         // m left of the centreline: traffic keeps
 constexpr double kArcStep = 0.1;      // m between samples of the speed profile
 constexpr double kTurnRadius = 10.0;  // m
 
-// ---- the way
-// ------------------------------------------------------------------------------------------------------
+// ---- the path
 
 struct Route {
   std::vector<Vec2> corners;  // of the polyline; turned with kTurnRadius
@@ -109,7 +108,6 @@ class Path {
 };
 
 // ---- the driver
-// ---------------------------------------------------------------------------------------------------
 
 /// Distance driven at every kDriveStep: the fastest way along the path within the limits, with
 /// pauses.
@@ -176,7 +174,6 @@ std::vector<double> smoothed(const std::vector<double>& in, double sigma_s) {
 }
 
 // ---- the springs
-// --------------------------------------------------------------------------------------------------
 
 /// A sum of sines with random phases: smooth, bounded, without memory.
 class Unrest {

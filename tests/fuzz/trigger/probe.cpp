@@ -25,7 +25,7 @@ void probe_decoder(const std::uint8_t* data, std::size_t size) {
     const TriggerDecodeStatus status = trigger_decode(&decoder, data[i], &frame);
     promise(decoder.used <= sizeof decoder.buffer, "the decoder stays in its buffer");
     promise(status == trigger_wait || (data[i] == 0 && decoder.used == 0),
-            "only 00 ends a frame, and the next begins anew");
+            "only 00 ends a frame, and the next begins again");
     promise(before.frames + before.bad_coding + before.bad_length + before.bad_crc +
                     (status == trigger_wait ? 0U : 1U) ==
                 decoder.frames + decoder.bad_coding + decoder.bad_length + decoder.bad_crc,
@@ -110,12 +110,12 @@ class Bench {
                                        trigger_pause_payload_size,
                                        trigger_ping_payload_size};
     const std::uint8_t type = script_.byte() % 8;
-    const auto wanted = static_cast<std::uint8_t>(
+    const auto requested = static_cast<std::uint8_t>(
         type < sizeof kSizes ? kSizes[type] : script_.byte() % trigger_max_payload);
-    for (std::uint8_t i = 0; i < wanted; ++i) payload[i] = script_.byte();
+    for (std::uint8_t i = 0; i < requested; ++i) payload[i] = script_.byte();
     if (type == trigger_config)
       payload[3] = 0, payload[2] &= 0xFU, payload[6] = payload[7] = payload[10] = payload[11] = 0;
-    const std::size_t n = trigger_write_frame(type, script_.byte(), payload, wanted, frame);
+    const std::size_t n = trigger_write_frame(type, script_.byte(), payload, requested, frame);
     for (std::size_t i = 0; i < n; ++i) receive(frame[i]);
   }
 

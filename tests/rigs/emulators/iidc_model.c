@@ -147,8 +147,8 @@ double iidc_rate(const struct iidc_camera* c) {
   if (c->format != 7) return nominal_rate(c->rate);
   size_t bytes = iidc_frame_bytes(c), packet = c->f7_packet ? c->f7_packet : 4;
   double bus = 8000.0 / (double)((bytes + packet - 1) / packet + 1),
-         wanted = (double)c->frame_rate_abs;
-  return wanted < bus ? wanted : bus;
+         requested = (double)c->frame_rate_abs;
+  return requested < bus ? requested : bus;
 }
 
 static uint32_t rates_of(bool beta, unsigned format, unsigned mode) {
@@ -527,10 +527,10 @@ int iidc_write(struct iidc_camera* c, uint64_t offset, uint32_t value) {
     return write_command(c, (uint32_t)at - COMMAND, value);
   if (at >= F7_BASE && at < F7_BASE + 0x100) return write_f7(c, (uint32_t)at - F7_BASE, value);
   if (at >= ABS_BASE && at < ABS_BASE + 0x200) {
-    float low, high, wanted = bits_float(value),
+    float low, high, requested = bits_float(value),
                      *f = absolute(c, ((unsigned)at - ABS_BASE) / 16, &low, &high);
-    if (f && at / 4 % 4 == 2 && isfinite(wanted))
-      *f = wanted < low ? low : wanted > high ? high : wanted;
+    if (f && at / 4 % 4 == 2 && isfinite(requested))
+      *f = requested < low ? low : requested > high ? high : requested;
     return RCODE_OK;
   }
   if (at >= STROBE_BASE + 0x200 && at < STROBE_BASE + 0x210) {

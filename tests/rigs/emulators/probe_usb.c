@@ -9,7 +9,7 @@
 #define FRAME (640u * 480u)
 #define FLIGHT 4
 
-static unsigned wanted = 30, got, bad, cancelled;
+static unsigned requested = 30, got, bad, cancelled;
 static uint32_t last;
 
 static uint32_t quadlet(const uint8_t* p) {
@@ -48,7 +48,7 @@ static void done(struct libusb_transfer* t) {
     bad += got && number != last + 1;
     last = number;
   }
-  if (++got < wanted) libusb_submit_transfer(t);
+  if (++got < requested) libusb_submit_transfer(t);
 }
 
 int main(int argc, char** argv) {
@@ -58,7 +58,7 @@ int main(int argc, char** argv) {
   struct timespec a, b;
   unsigned char text[64] = "";
 
-  wanted = argc > 1 ? (unsigned)atoi(argv[1]) : wanted;
+  requested = argc > 1 ? (unsigned)atoi(argv[1]) : requested;
   if (libusb_init(&c) || !(h = libusb_open_device_with_vid_pid(c, 0x1e10, 0x2005)))
     return printf("probe_usb: no camera\n"), 1;
   libusb_get_string_descriptor_ascii(h, 3, text, sizeof text);
@@ -75,7 +75,7 @@ int main(int argc, char** argv) {
     libusb_submit_transfer(t[i]);
   }
   write_register(h, 0x614, 0x80000000u);
-  while (got < wanted) libusb_handle_events(c);
+  while (got < requested) libusb_handle_events(c);
   clock_gettime(CLOCK_MONOTONIC, &b);
   write_register(h, 0x614, 0);
   for (int i = 0; i < FLIGHT; i++) libusb_submit_transfer(t[i]);

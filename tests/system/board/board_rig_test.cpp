@@ -39,7 +39,7 @@ class BoardRig : public ::testing::Test {
       DeviceStatus status = DeviceStatus::ok;
       device = driver_.open_board("", &status);
       return device != nullptr;
-    })) << driver_.complaint();
+    })) << driver_.last_error();
     return device;
   }
   /// Every report against the pulse that was made: number, and the time of the edge within the
@@ -66,12 +66,12 @@ TEST_F(BoardRig, reportsEveryPulseThroughTheRealDriverWithEitherLatencyTimer) {
     ASSERT_NE(device, nullptr);
     std::ofstream("/sys/bus/usb-serial/devices/ttyUSB0/latency_timer") << timer << std::flush;
     ASSERT_EQ(read_latency_timer_ms("/dev/ttyUSB0"), timer);
-    ASSERT_EQ(device->configure(thirty_hertz(), nullptr), DeviceStatus::ok) << device->complaint();
+    ASSERT_EQ(device->configure(thirty_hertz(), nullptr), DeviceStatus::ok) << device->last_error();
     const std::uint64_t before =
         device->statistics().malformed;  // heard at other rates, when the board was looked for
     ASSERT_EQ(device->start(nullptr), DeviceStatus::ok);
     const auto told = take(*device, 90);
-    ASSERT_EQ(told.size(), 90U) << device->complaint();
+    ASSERT_EQ(told.size(), 90U) << device->last_error();
     for (std::size_t i = 1; i < told.size(); ++i)
       ASSERT_EQ(told[i].number, told[i - 1].number + 1) << "none is lost";
     expect_true_edges(told);
@@ -85,7 +85,7 @@ TEST_F(BoardRig, reportsEveryPulseThroughTheRealDriverWithEitherLatencyTimer) {
 TEST_F(BoardRig, comesBackAfterItsConverterWasUnpluggedWithTheBoardsOwnNumbers) {
   auto device = open();
   ASSERT_NE(device, nullptr);
-  ASSERT_EQ(device->configure(thirty_hertz(), nullptr), DeviceStatus::ok) << device->complaint();
+  ASSERT_EQ(device->configure(thirty_hertz(), nullptr), DeviceStatus::ok) << device->last_error();
   ASSERT_EQ(device->start(nullptr), DeviceStatus::ok);
   const auto before = take(*device, 30);
   ASSERT_EQ(before.size(), 30U);

@@ -28,11 +28,11 @@ class Chain {
 
   /// Opens, configures and starts all of it.
   void start() {
-    CameraConfiguration wanted = usual(CameraTrigger::hardware);
-    wanted.rate_hz = 30;
-    wanted.exposure = kExposure;
+    CameraConfiguration requested = usual(CameraTrigger::hardware);
+    requested.rate_hz = 30;
+    requested.exposure = kExposure;
     ASSERT_TRUE(await_cameras(usb_.get(), 2));
-    for (unsigned k = 0; k < 2; ++k) devices_.push_back(open_camera(usb_.get(), k, wanted));
+    for (unsigned k = 0; k < 2; ++k) devices_.push_back(open_camera(usb_.get(), k, requested));
     ASSERT_TRUE(devices_[0] != nullptr && devices_[1] != nullptr);
     trigger_board::Driver boards;
     DeviceStatus status = DeviceStatus::ok;
@@ -40,13 +40,13 @@ class Chain {
       board_device_ = boards.open_board("", &status);
       if (board_device_ == nullptr) std::this_thread::sleep_for(std::chrono::milliseconds(200));
     }
-    ASSERT_NE(board_device_, nullptr) << boards.complaint();
+    ASSERT_NE(board_device_, nullptr) << boards.last_error();
     TriggerConfiguration pulses;
     pulses.rate_hz = kRate;
     pulses.vary = Duration::milliseconds(4);
     pulses.feedback = 0x03;
     ASSERT_EQ(board_device_->configure(pulses, nullptr), DeviceStatus::ok)
-        << board_device_->complaint();
+        << board_device_->last_error();
 
     app::LiveSource::Options o;
     o.sync.mode = SyncMode::board;

@@ -25,7 +25,7 @@ class BusConformance final : public ConformanceRig {
     while (none && camera_ == nullptr && std::chrono::steady_clock::now() < until)
       if (await_cameras(driver_.get(), 1)) camera_ = driver_->open("", &status);
     if (camera_ == nullptr)
-      throw std::runtime_error("the emulated camera does not open: " + driver_->complaint());
+      throw std::runtime_error("the emulated camera does not open: " + driver_->last_error());
   }
   CameraDevice& camera() override { return *camera_; }
   std::vector<CameraConfiguration> possible() override {

@@ -36,10 +36,10 @@ TEST_F(IidcRig, CamerasThatDoNotFitTogetherAreToldInNumbersBeforeTheyStart) {
   EXPECT_NE(cameras_[0]->remark().find("of the bus's 4915"), std::string::npos)
       << cameras_[0]->remark();
   EXPECT_EQ(cameras_[0]->start(nullptr), DeviceStatus::no_bandwidth);
-  EXPECT_NE(cameras_[0]->complaint().find("2 cameras need "), std::string::npos)
-      << cameras_[0]->complaint();
+  EXPECT_NE(cameras_[0]->last_error().find("2 cameras need "), std::string::npos)
+      << cameras_[0]->last_error();
   cameras_.pop_back();  // one alone fits
-  EXPECT_EQ(cameras_[0]->start(nullptr), DeviceStatus::ok) << cameras_[0]->complaint();
+  EXPECT_EQ(cameras_[0]->start(nullptr), DeviceStatus::ok) << cameras_[0]->last_error();
   (void)end();
 }
 

@@ -106,7 +106,7 @@ void Taker::drain(Duration quiet) {
 }
 
 std::unique_ptr<CameraDevice> open_camera(CameraDriver* driver, unsigned camera,
-                                          const CameraConfiguration& wanted) {
+                                          const CameraConfiguration& requested) {
   DeviceStatus status = DeviceStatus::failed;
   auto device = driver->open(emulated_serial(camera), &status);
   // After a bus reset the node that was listed may be on its way out: looked for again.
@@ -114,9 +114,9 @@ std::unique_ptr<CameraDevice> open_camera(CameraDriver* driver, unsigned camera,
     std::this_thread::sleep_for(std::chrono::milliseconds(200));
     device = driver->open(emulated_serial(camera), &status);
   }
-  EXPECT_EQ(status, DeviceStatus::ok) << driver->complaint();
+  EXPECT_EQ(status, DeviceStatus::ok) << driver->last_error();
   if (device == nullptr) return device;
-  EXPECT_EQ(device->configure(wanted, nullptr), DeviceStatus::ok) << device->complaint();
+  EXPECT_EQ(device->configure(requested, nullptr), DeviceStatus::ok) << device->last_error();
   return device;
 }
 

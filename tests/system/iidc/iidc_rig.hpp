@@ -67,7 +67,7 @@ class Taker {
 
 /// Opens and configures; fails the test with the sentence when it cannot.
 [[nodiscard]] std::unique_ptr<CameraDevice> open_camera(CameraDriver* driver, unsigned camera,
-                                                        const CameraConfiguration& wanted);
+                                                        const CameraConfiguration& requested);
 
 /// Until the driver lists so many cameras; the kernel takes two seconds to forget those of an
 /// emulator that ended.

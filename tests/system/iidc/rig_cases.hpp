@@ -25,19 +25,20 @@ class IidcRig : public ::testing::Test {
     if (!inside_rig()) GTEST_SKIP() << "this test runs inside the rig's kernel: ctest -L rig";
   }
   /// The emulator, and its two cameras configured.
-  void begin(const CameraConfiguration& wanted, std::vector<std::string> arguments = {}) {
+  void begin(const CameraConfiguration& requested, std::vector<std::string> arguments = {}) {
     ASSERT_TRUE(await_cameras(driver_.get(), 0)) << "those of the test before";
     emulator_ = std::make_unique<Emulator>(BusUnderTest::kEmulator, std::move(arguments));
     ASSERT_TRUE(await_cameras(driver_.get(), 2));
     for (unsigned k = 0; k < 2; ++k) {
-      cameras_.push_back(open_camera(driver_.get(), k, wanted));
+      cameras_.push_back(open_camera(driver_.get(), k, requested));
       ASSERT_NE(cameras_.back(), nullptr);
     }
     taker_ =
         std::make_unique<Taker>(std::vector<CameraDevice*>{cameras_[0].get(), cameras_[1].get()});
   }
   void start() {
-    for (const auto& c : cameras_) ASSERT_EQ(c->start(nullptr), DeviceStatus::ok) << c->complaint();
+    for (const auto& c : cameras_)
+      ASSERT_EQ(c->start(nullptr), DeviceStatus::ok) << c->last_error();
   }
   /// n pulses, slower than the cameras can take them.
   void pulse(int n) {
@@ -83,7 +84,7 @@ TEST_F(IidcRig, TwoCamerasAreListedWithIdsThatOpenThem) {
   DeviceStatus status = DeviceStatus::ok;
   EXPECT_EQ(driver_->open(emulated_serial(0), &status), nullptr);
   EXPECT_EQ(status, DeviceStatus::busy) << "two programs on one camera";
-  EXPECT_FALSE(driver_->complaint().empty());
+  EXPECT_FALSE(driver_->last_error().empty());
   EXPECT_EQ(driver_->open("15021234", &status), nullptr);
   EXPECT_EQ(status, DeviceStatus::not_found);
   (void)end();
@@ -172,7 +173,8 @@ TEST_F(IidcRig, TheSoftwareTriggerMakesOneFrameACall) {
   ASSERT_NO_FATAL_FAILURE(begin(usual(CameraTrigger::software)));
   ASSERT_NO_FATAL_FAILURE(start());
   for (int i = 0; i < 5; ++i) {
-    for (const auto& c : cameras_) EXPECT_EQ(c->trigger_once(), DeviceStatus::ok) << c->complaint();
+    for (const auto& c : cameras_)
+      EXPECT_EQ(c->trigger_once(), DeviceStatus::ok) << c->last_error();
     EXPECT_TRUE(taker_->take(1, Duration::seconds(3)));
   }
   const std::string report = end();
@@ -246,9 +248,9 @@ TEST_F(IidcRig, UnpluggedWhileStreamingAndPluggedInAgainLeavesNothingBehind) {
     std::uint32_t number = 0;
     if (holds) number = read_stamp(cameras_[1]->view(held.slot)).number;
     EXPECT_EQ(cameras_[1]->start(nullptr), DeviceStatus::gone);
-    EXPECT_FALSE(cameras_[1]->complaint().empty());
+    EXPECT_FALSE(cameras_[1]->last_error().empty());
     BusUnderTest::replug(emulator_.get(), 1);
-    ASSERT_TRUE(start_again(cameras_[1].get())) << cameras_[1]->complaint();
+    ASSERT_TRUE(start_again(cameras_[1].get())) << cameras_[1]->last_error();
     if (holds) {
       EXPECT_EQ(read_stamp(cameras_[1]->view(held.slot)).number, number)
           << "an image that is held stays, whatever happens to its camera";
@@ -256,10 +258,10 @@ TEST_F(IidcRig, UnpluggedWhileStreamingAndPluggedInAgainLeavesNothingBehind) {
     }
     taker_->restarted(1);
     ASSERT_TRUE(taker_->take(10)) << "camera 1 after the replug, camera 0 all along: "
-                                  << cameras_[1]->complaint();
+                                  << cameras_[1]->last_error();
     cameras_[1]->stop();  // what waited for the last image to be released goes now
     taker_->restarted(1);
-    ASSERT_EQ(cameras_[1]->start(nullptr), DeviceStatus::ok) << cameras_[1]->complaint();
+    ASSERT_EQ(cameras_[1]->start(nullptr), DeviceStatus::ok) << cameras_[1]->last_error();
     ASSERT_TRUE(taker_->take(3));
     EXPECT_EQ(Holdings::now(), before)
         << "round " << round << ": " << Holdings::now().descriptors << " descriptors instead of "

@@ -32,7 +32,7 @@ TEST_F(IidcRig, ACameraIsOpenedByTheNumberThatUsbCallsItsSerial) {
     camera = driver_->open("10240000", &status);
     if (camera == nullptr) std::this_thread::sleep_for(std::chrono::milliseconds(50));
   }
-  ASSERT_NE(camera, nullptr) << driver_->complaint();
+  ASSERT_NE(camera, nullptr) << driver_->last_error();
   EXPECT_EQ(camera->info().serial, emulated_serial(0));
 }
 

@@ -53,7 +53,7 @@ class InsRig : public ::testing::Test {
     DeviceStatus status = DeviceStatus::ok;
     xsens::Driver driver(o);
     auto device = driver.open("", &status);  // the only converter there is
-    EXPECT_EQ(status, DeviceStatus::ok) << driver.complaint();
+    EXPECT_EQ(status, DeviceStatus::ok) << driver.last_error();
     return device;
   }
   static void set_latency_timer(int ms) {
@@ -80,7 +80,7 @@ TEST_F(InsRig, streamsThroughTheRealDriverWithEitherLatencyTimer) {
     DeviceStatus status = DeviceStatus::ok;
     EXPECT_EQ(SerialPort(kPort).open({}, &status), nullptr);
     EXPECT_EQ(status, DeviceStatus::busy) << "the line is ours";
-    ASSERT_EQ(device->configure(100, nullptr), DeviceStatus::ok) << device->complaint();
+    ASSERT_EQ(device->configure(100, nullptr), DeviceStatus::ok) << device->last_error();
     ASSERT_EQ(device->start(nullptr), DeviceStatus::ok);
     expect_whole(readings(*device, 300), 300);
     EXPECT_EQ(device->statistics().malformed, 0U);
@@ -91,7 +91,7 @@ TEST_F(InsRig, streamsThroughTheRealDriverWithEitherLatencyTimer) {
 TEST_F(InsRig, comesBackAfterTheConverterWasUnplugged) {
   const auto device = open(115200);
   ASSERT_NE(device, nullptr);
-  ASSERT_EQ(device->configure(100, nullptr), DeviceStatus::ok) << device->complaint();
+  ASSERT_EQ(device->configure(100, nullptr), DeviceStatus::ok) << device->last_error();
   ASSERT_EQ(device->start(nullptr), DeviceStatus::ok);
   expect_whole(readings(*device, 100), 100);
   converter_.command("unplug");

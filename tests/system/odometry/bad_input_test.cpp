@@ -148,7 +148,7 @@ TEST(OdometryInBadConditions, afterTwoSecondsWithoutFramesItSaysSoAndStartsAnew)
   ASSERT_NE(v.at(back), nullptr);
   EXPECT_EQ(v.at(back)->sample.reason, Reason::time_gap);
   v.expect_recovery(kAfterRestart);
-  // Where a scene is built anew, it stands where constant velocity leads to: the step before the
+  // Where a scene is rebuilt, it stands where constant velocity leads to: the step before the
   // gap, as many times as it would have been made.
   const auto restart = std::find_if(v.replayed.answers.begin(), v.replayed.answers.end(),
                                     [](const Answer& a) { return a.restarted; });

@@ -38,7 +38,7 @@ struct StereoDrive {
 struct Answer {
   PoseSample sample;
   Transform T_reference_left{};
-  bool restarted = false;  // an event said that the scene was built anew
+  bool restarted = false;  // an event said that the scene was rebuilt
 };
 
 /// A change of one frame before the estimator sees it. False: the frame never comes.

@@ -57,8 +57,8 @@ class V4l2Loop : public ::testing::Test {
     DeviceStatus status = DeviceStatus::failed;
     auto camera = driver_->open(node(2 * k), &status);
     EXPECT_EQ(status, DeviceStatus::ok);
-    EXPECT_EQ(camera->configure(c, nullptr), DeviceStatus::ok) << camera->complaint();
-    EXPECT_EQ(camera->start(nullptr), DeviceStatus::ok) << camera->complaint();
+    EXPECT_EQ(camera->configure(c, nullptr), DeviceStatus::ok) << camera->last_error();
+    EXPECT_EQ(camera->start(nullptr), DeviceStatus::ok) << camera->last_error();
     return camera;
   }
   std::unique_ptr<CameraDriver> driver_ = make_driver();

@@ -51,8 +51,8 @@ class V4l2Rig : public ::testing::Test {
   }
   std::unique_ptr<CameraDevice> streaming(std::size_t k, const CameraConfiguration& c = webcam()) {
     auto camera = open(k);
-    EXPECT_EQ(camera->configure(c, nullptr), DeviceStatus::ok) << camera->complaint();
-    EXPECT_EQ(camera->start(nullptr), DeviceStatus::ok) << camera->complaint();
+    EXPECT_EQ(camera->configure(c, nullptr), DeviceStatus::ok) << camera->last_error();
+    EXPECT_EQ(camera->start(nullptr), DeviceStatus::ok) << camera->last_error();
     return camera;
   }
   /// Silences the camera, takes what was under way, and holds the counters against the last
@@ -94,7 +94,7 @@ TEST_F(V4l2Rig, camerasAreListedAndOpenedBySerialOrPath) {
   EXPECT_EQ(status, DeviceStatus::not_found);
   EXPECT_EQ(driver_->open("/dev/null", &status), nullptr);
   EXPECT_EQ(status, DeviceStatus::failed);
-  EXPECT_NE(driver_->complaint().find("/dev/null"), std::string::npos);
+  EXPECT_NE(driver_->last_error().find("/dev/null"), std::string::npos);
 }
 
 TEST_F(V4l2Rig, withoutPermissionItSaysSo) {
@@ -103,7 +103,7 @@ TEST_F(V4l2Rig, withoutPermissionItSaysSo) {
   ASSERT_EQ(::seteuid(65534), 0);
   DeviceStatus status = DeviceStatus::ok;
   const auto camera = driver_->open(path, &status);
-  const std::string said = driver_->complaint();
+  const std::string said = driver_->last_error();
   ASSERT_EQ(::seteuid(0), 0);
   ASSERT_EQ(::setegid(0), 0);
   EXPECT_EQ(camera, nullptr);
@@ -144,11 +144,11 @@ TEST_F(V4l2Rig, everyFormatGivesTheSameGrey) {
     c.pixel_format = name;
     auto camera = open(0);
     if (camera->configure(c, &c) != DeviceStatus::ok) {
-      EXPECT_NE(camera->complaint().find("offers"), std::string::npos) << camera->complaint();
+      EXPECT_NE(camera->last_error().find("offers"), std::string::npos) << camera->last_error();
       continue;
     }
     EXPECT_EQ(c.pixel_format, name);
-    ASSERT_EQ(camera->start(nullptr), DeviceStatus::ok) << name << camera->complaint();
+    ASSERT_EQ(camera->start(nullptr), DeviceStatus::ok) << name << camera->last_error();
     Frame frame;
     ASSERT_EQ(next(camera.get(), &frame), DeviceStatus::ok) << name;
     EXPECT_EQ(frame.status, FrameStatus::complete) << name;
@@ -178,30 +178,30 @@ TEST_F(V4l2Rig, whatItCannotDoIsSaidWithWhatItOffers) {
     CameraConfiguration c = webcam();
     change(&c);
     EXPECT_EQ(camera->configure(c, nullptr), DeviceStatus::unsupported);
-    return camera->complaint();
+    return camera->last_error();
   };
   EXPECT_NE(said([](auto* c) { c->width = 641; }).find("640 x 360"), std::string::npos)
-      << camera->complaint();
+      << camera->last_error();
   EXPECT_NE(said([](auto* c) { c->pixel_format = "Mono8"; }).find("GREY"), std::string::npos)
-      << camera->complaint();
+      << camera->last_error();
   EXPECT_NE(said([](auto* c) { c->trigger = CameraTrigger::hardware; }).find("trigger"),
             std::string::npos)
-      << camera->complaint();
+      << camera->last_error();
   EXPECT_NE(said([](auto* c) { c->trigger = CameraTrigger::software; }).find("free"),
             std::string::npos)
-      << camera->complaint();
+      << camera->last_error();
   EXPECT_NE(said([](auto* c) { c->options["control_nonsense"] = "1"; }).find("brightness"),
             std::string::npos)
-      << camera->complaint();
+      << camera->last_error();
   EXPECT_NE(said([](auto* c) { c->options["control_brightness"] = "256"; }).find("0 to 255"),
             std::string::npos)
-      << camera->complaint();
+      << camera->last_error();
   EXPECT_NE(said([](auto* c) { c->options["subdevice"] = "/dev/v4l-subdev9"; }).find("v4l-subdev9"),
             std::string::npos);
   EXPECT_NE(said([](auto* c) { c->gain_db = 6; }).find("gain_step_db"), std::string::npos)
-      << camera->complaint();
+      << camera->last_error();
   CameraConfiguration actual;
-  EXPECT_EQ(camera->configure(webcam(), &actual), DeviceStatus::ok) << camera->complaint();
+  EXPECT_EQ(camera->configure(webcam(), &actual), DeviceStatus::ok) << camera->last_error();
   EXPECT_EQ(actual.rate_hz, 25);
   EXPECT_NE(camera->remark().find("exposure"), std::string::npos)
       << "this camera has none that can be set";
@@ -223,7 +223,7 @@ TEST_F(V4l2Rig, controlsAreSetByName) {
   c.options["control_brightness"] = "200";
   c.options["control_test_pattern"] = "100% Black";
   c.options["control_osd_text_mode"] = "None";
-  ASSERT_EQ(camera->configure(c, nullptr), DeviceStatus::ok) << camera->complaint();
+  ASSERT_EQ(camera->configure(c, nullptr), DeviceStatus::ok) << camera->last_error();
   ASSERT_EQ(camera->start(nullptr), DeviceStatus::ok);
   Frame frame;
   ASSERT_EQ(next(camera.get(), &frame), DeviceStatus::ok);
@@ -318,7 +318,7 @@ TEST_F(V4l2Rig, aQueueInErrorIsGoneAndStartMendsIt) {
   while ((status = next(camera.get(), &frame)) == DeviceStatus::ok) camera->release(frame.slot);
   ASSERT_EQ(status, DeviceStatus::gone);
   EXPECT_GT(frame.arrival.ns(), 0);
-  ASSERT_EQ(camera->start(nullptr), DeviceStatus::ok) << camera->complaint();
+  ASSERT_EQ(camera->start(nullptr), DeviceStatus::ok) << camera->last_error();
   for (int i = 0; i < 40; ++i) {
     ASSERT_EQ(next(camera.get(), &frame), DeviceStatus::ok);
     EXPECT_NE(frame.slot, held);
@@ -340,13 +340,13 @@ TEST_F(V4l2Rig, anUnpluggedCameraComesBackWithItsConfigurationWhileImagesAreHeld
   while ((status = next(camera.get(), &frame)) == DeviceStatus::ok) camera->release(frame.slot);
   ASSERT_EQ(status, DeviceStatus::gone);
   EXPECT_EQ(camera->start(nullptr), DeviceStatus::gone);
-  EXPECT_FALSE(camera->complaint().empty());
+  EXPECT_FALSE(camera->last_error().empty());
   EXPECT_EQ(camera->wait(Duration{}, &frame), DeviceStatus::gone);
   EXPECT_EQ(camera->view(held).at(100, 100), pixel) << "what is held stays";
   camera->release(held);
   for (int i = 0; i < 50 && (status = camera->start(nullptr)) != DeviceStatus::ok; ++i)
     std::this_thread::sleep_for(std::chrono::milliseconds(50));
-  ASSERT_EQ(status, DeviceStatus::ok) << camera->complaint();
+  ASSERT_EQ(status, DeviceStatus::ok) << camera->last_error();
   ASSERT_EQ(next(camera.get(), &frame), DeviceStatus::ok);
   EXPECT_EQ(frame.counter, 0U);
   camera->release(frame.slot);
@@ -357,7 +357,7 @@ TEST_F(V4l2Rig, anotherProgramsStreamIsBusy) {
   const auto first = streaming(0);
   const auto second = open(0);
   EXPECT_EQ(second->configure(webcam(), nullptr), DeviceStatus::busy);
-  EXPECT_NE(second->complaint().find("another program"), std::string::npos);
+  EXPECT_NE(second->last_error().find("another program"), std::string::npos);
 }
 
 TEST_F(V4l2Rig, stopsAndStartsUnderLoadLeakNothing) {
@@ -370,7 +370,7 @@ TEST_F(V4l2Rig, stopsAndStartsUnderLoadLeakNothing) {
     for (auto& camera : cameras) ASSERT_EQ(camera->configure(webcam(), nullptr), DeviceStatus::ok);
     for (int i = 0; i < 15; ++i)
       for (auto& camera : cameras) {
-        ASSERT_EQ(camera->start(nullptr), DeviceStatus::ok) << camera->complaint();
+        ASSERT_EQ(camera->start(nullptr), DeviceStatus::ok) << camera->last_error();
         Frame frame;
         ASSERT_EQ(next(camera.get(), &frame), DeviceStatus::ok);
         if (i % 2 == 0) camera->release(frame.slot);  // else it is given back only after the stop

@@ -61,9 +61,10 @@ typedef struct {
 #define SYSCFG ((SyscfgRegisters*)0x40013800UL)
 #define IWDG ((WatchdogRegisters*)0x40003000UL)
 #define RNG ((RandomRegisters*)0x50060800UL)
-#define FLASH_ACR (*(Register*)0x40023C00UL) /* "Embedded Flash memory interface": access control \
-                                              */
-#define UNIQUE_ID 0x1FFF7A10U                /* "Device electronic signature": 96 bits */
+#define FLASH_ACR                                                                  \
+  (*(Register*)0x40023C00UL)  /* "Embedded Flash memory interface": access control \
+                               */
+#define UNIQUE_ID 0x1FFF7A10U /* "Device electronic signature": 96 bits */
 
 /* PM0214 "Nested vectored interrupt controller", "System control block" */
 #define NVIC_ISER ((Register*)0xE000E100UL)

@@ -24,7 +24,7 @@ constexpr double kNoise = 0.1;  // px
 
 /// Every number of the rig within so many of its own sigmas.
 void expect_recovered(const BoardCalibration& c, const RigCalibration& truth, double sigmas) {
-  ASSERT_EQ(c.complaint, "");
+  ASSERT_EQ(c.error, "");
   for (std::size_t k = 0; k < static_cast<std::size_t>(truth.cameras); ++k) {
     const Intrinsics &found = c.rig.intrinsics[k], &real = truth.intrinsics[k];
     const std::array off{found.fx - real.fx, found.fy - real.fy, found.cx - real.cx,
@@ -104,7 +104,7 @@ TEST(BoardCalibration, theJackknifeAgreesWithTheSigmasWhereNoiseIsAllThereIs) {
   const RigCalibration truth = known_rig(2, CameraModelKind::pinhole_radtan);
   const BoardScene scene = board_scene(truth, kBoard, 30, kNoise, 6);
   const BoardCalibration c = calibrate_boards(scene.views, board_options(truth, kBoard));
-  ASSERT_EQ(c.complaint, "");
+  ASSERT_EQ(c.error, "");
   for (std::size_t i = 0; i < 6;
        ++i) {  // 29 degrees of freedom: 13 % is one sigma, and the views differ in weight
     EXPECT_GT(c.between[1][i], 0.5 * c.rig.sigma_wide[1][i]) << i;
@@ -157,7 +157,7 @@ TEST(BoardCalibration, exchangedCamerasAreNoRig) {
   BoardScene scene = board_scene(truth, kBoard, 10, kNoise, 11);
   for (BoardView& v : scene.views) std::swap(v.corners[0], v.corners[1]);
   const BoardCalibration c = calibrate_boards(scene.views, board_options(truth, kBoard));
-  EXPECT_NE(c.complaint.find("left and right are swapped"), std::string::npos) << c.complaint;
+  EXPECT_NE(c.error.find("left and right are swapped"), std::string::npos) << c.error;
 }
 
 TEST(BoardCalibration, viewsThatDetermineNothingAreSaidToBeThat) {
@@ -168,7 +168,7 @@ TEST(BoardCalibration, viewsThatDetermineNothingAreSaidToBeThat) {
   scene.views.assign(
       6, scene.views.front());  // one board pose six times: its focal length is anybody's guess
   const BoardCalibration c = calibrate_boards(scene.views, board_options(truth, kBoard));
-  if (c.complaint.empty()) {
+  if (c.error.empty()) {
     EXPECT_GT(c.rig.intrinsics[0].sigma[0], 1) << "px: not known, and said so";
   }
 }

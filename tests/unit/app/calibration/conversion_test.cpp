@@ -106,7 +106,6 @@ cv::Mat matrix(const YAML::Node& list, int rows, int columns) {
 }
 
 // ---- Kalibr
-// -------------------------------------------------------------------------------------------------------------
 
 /// By Kalibr's own words: X_cn = T_cn_cnm1 X_cn-1, one after the other.
 std::vector<Reference> reference_of_camchain(const std::string& text) {
@@ -208,7 +207,6 @@ TEST(Kalibr, aThirdCoefficientOfRadiusHasNoPlaceAndIsNotDropped) {
 }
 
 // ---- ROS
-// ----------------------------------------------------------------------------------------------------------------
 
 struct Info {
   cv::Mat K, D, R, P;
@@ -311,7 +309,6 @@ TEST(RosCameraInfo, aPairFromOpenCvsOwnRectificationIsReadAsItProjects) {
 }
 
 // ---- OpenCV
-// -------------------------------------------------------------------------------------------------------------
 
 TEST(OpenCvStereo, whatIsWrittenIsReadByOpenCvAndProjectsAsOurs) {
   for (const auto kind : kModels) {
@@ -370,7 +367,6 @@ TEST(OpenCvStereo, whatOpenCvWritesIsReadAsItProjectsUnderEachOfItsNames) {
 }
 
 // ---- all of them
-// --------------------------------------------------------------------------------------------------------
 
 TEST(Conversion, everyFormatToEveryOtherAndBackIsTheSameRig) {
   const test::TemporaryFolder folder;
@@ -417,7 +413,7 @@ TEST(Conversion, namesAndSerialsSurviveWhereTheyHaveAPlace) {
 }
 
 /// One sentence that names the file and the key.
-std::string complaint(const std::function<void()>& f) {
+std::string last_error(const std::function<void()>& f) {
   try {
     f();
   } catch (const InputError& error) {
@@ -480,7 +476,7 @@ TEST(Conversion, spoiltFilesAreRefusedWithFileAndKey) {
     std::string in = folder.write("in.yaml", cases[i].text).string();
     if (!cases[i].second.empty()) in += "," + folder.write("second.yaml", cases[i].second).string();
     const std::string said =
-        complaint([&] { (void)read_any_calibration(in, std::nullopt, &none); });
+        last_error([&] { (void)read_any_calibration(in, std::nullopt, &none); });
     EXPECT_NE(said.find(cases[i].key), std::string::npos) << "case " << i << " said: " << said;
     EXPECT_EQ(said.find('\n'), std::string::npos) << said;
     EXPECT_NE(said.find(folder.path().string()), std::string::npos) << "which file: " << said;
@@ -495,7 +491,7 @@ TEST(Conversion, rationalLensesAreRefusedUnlessTheyAreNone) {
   const std::string more =
       replaced(replaced(parts[0], "cols: 5", "cols: 8"), "-0.0005, 0]", "-0.0005, 0, 0, 0, 0.02]") +
       parts[1];
-  const std::string said = complaint(
+  const std::string said = last_error(
       [&] { (void)read_opencv({parse_opencv_yaml(more, "m.yml")}, std::nullopt, &none); });
   EXPECT_NE(said.find("D1 has a sixth or later coefficient"), std::string::npos) << said;
 }
@@ -518,14 +514,15 @@ TEST(Conversion, aFileWithSomeBytesChangedIsReadOrRefusedAndNothingElse) {
     if (run % 5 == 0) text.resize(random.below(static_cast<std::uint32_t>(text.size())));
     std::string in = folder.write("in.yaml", text).string();
     if (run % 3 == 1) in += "," + second;
-    if (!complaint([&] { (void)read_any_calibration(in, std::nullopt, &none); }).empty()) ++refused;
+    if (!last_error([&] { (void)read_any_calibration(in, std::nullopt, &none); }).empty())
+      ++refused;
   }
   EXPECT_GT(refused, 100);
 }
 
 TEST(Conversion, wordsOfTheCommandLineAreChecked) {
   EXPECT_EQ(parse_format("ros"), CalibrationFormat::ros);
-  EXPECT_NE(complaint([] { (void)parse_format("kalbr"); }).find("did you mean \"kalibr\""),
+  EXPECT_NE(last_error([] { (void)parse_format("kalbr"); }).find("did you mean \"kalibr\""),
             std::string::npos);
   EXPECT_EQ(parse_size("640x480"), (ImageSize{640, 480}));
   for (const char* bad : {"", "640", "640x", "x480", "640x-1", "640x480x3", "640*480"})

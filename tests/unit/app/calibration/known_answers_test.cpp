@@ -57,7 +57,7 @@ TEST(KnownAnswers, theListedCornersGiveTheListedCalibration) {
   const auto views = listed_corners(*folder);
   ASSERT_EQ(views.size(), 13U);
   const BoardCalibration c = calibrate_boards(views, options());
-  ASSERT_EQ(c.complaint, "");
+  ASSERT_EQ(c.error, "");
   // The listed figures end where they end; the corners have five digits or so behind the point.
   const Intrinsics &left = c.rig.intrinsics[0], &right = c.rig.intrinsics[1];
   const std::array found{left.fx,  left.fy,  left.cx,  left.cy,
@@ -101,7 +101,7 @@ TEST(KnownAnswers, theImagesGiveTheSameCalibration) {
   EXPECT_TRUE(images.remarks.empty()) << images.remarks.front();
   ASSERT_EQ(images.views.size(), 13U) << "the board is found in all 26 images";
   const BoardCalibration c = calibrate_boards(images.views, options());
-  ASSERT_EQ(c.complaint, "");
+  ASSERT_EQ(c.error, "");
   // The corners are refined in another window than the listed ones: "within 0.5 mm and 0.15° is the
   // same answer", rms up to 0.25 px.
   EXPECT_LE(c.rig.reprojection_px, 0.2153) << "not worse than the listed corners";

@@ -68,8 +68,8 @@ TEST(StartingCalibration, fromScratchBeatsTheFileBeatsTheStateBeatsTheConfigurat
   EXPECT_EQ(given.file.rig.T_camera_left[1].t.y(), 0.022);
   EXPECT_EQ(given.source, "mine.yaml");
 
-  for (const CalibrationWish& wish :
-       {CalibrationWish{.from_scratch = true}, CalibrationWish{true, folder / "mine.yaml"}}) {
+  for (const CalibrationSource& wish :
+       {CalibrationSource{.from_scratch = true}, CalibrationSource{true, folder / "mine.yaml"}}) {
     const StartingCalibration scratch = starting_calibration(c, wish, kSerials);
     EXPECT_EQ(scratch.trust, CalibrationTrust::none);
     EXPECT_EQ(scratch.file.rig.T_camera_left[1].R, Mat3(Mat3::Identity()));

@@ -122,7 +122,7 @@ TEST(Configuration, NotANumberIsNeverInsideARange) {
 
 TEST(Configuration, AKeyThatStandsTwiceIsRefused) {
   EXPECT_EQ(refusal("odometry:\n  features: 300\n  features: 301\n"),
-            "drive.yaml:3: the key \"odometry.features\" stands twice");
+            "drive.yaml:3: the key \"odometry.features\" is given twice");
   EXPECT_TRUE(
       contains(refusal("odometry: {features: 300}\nodometry.features: 301\n"), "stands twice"));
 }

@@ -331,7 +331,6 @@ TEST(KittiStamps, theLongestAscendingPartStays) {
 }
 
 // ---- INS
-// ----------------------------------------------------------------------------------------------------------
 
 TEST_F(KittiRaw, packetsBecomeSamplesInEastNorthUp) {
   const RecordedIns recorded = ins();

@@ -41,7 +41,6 @@ std::string refusal(const Action& action) {
 }
 
 // ---- images
-// -------------------------------------------------------------------------------------------------------
 
 constexpr int kWidth = 62, kHeight = 48;  // no multiple of four: BMP pads its rows
 
@@ -148,7 +147,6 @@ TEST_F(StLuciaImages, brokenFoldersAreNamed) {
 }
 
 // ---- INS
-// ----------------------------------------------------------------------------------------------------------
 
 /// An S-shaped way at 10 m/s over a hill, in enu at the first place; the vehicle points along it
 /// and leans into its bends.

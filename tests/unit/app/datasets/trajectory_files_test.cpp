@@ -20,7 +20,7 @@ namespace vergence::app {
 namespace {
 
 /// What the InputError says; empty when there is none.
-std::string complaint(const std::function<void()>& call) {
+std::string last_error(const std::function<void()>& call) {
   try {
     call();
   } catch (const InputError& e) {
@@ -38,7 +38,7 @@ testing::AssertionResult has(const std::string& text, const std::string& part) {
 std::string tum_complaint(const std::string& text) {
   const test::TemporaryFolder folder;
   const auto file = folder.write("t.tum", text);
-  std::string said = complaint([&] { (void)read_tum(file); });
+  std::string said = last_error([&] { (void)read_tum(file); });
   const std::string prefix = folder.path().string() + "/";
   if (said.starts_with(prefix)) said.erase(0, prefix.size());
   return said;
@@ -105,9 +105,9 @@ TEST(Tum, saysFileAndLineOfWhatIsWrong) {
 
 TEST(Tum, saysWhichFileCannotBeRead) {
   const test::TemporaryFolder folder;
-  EXPECT_TRUE(has(complaint([&] { (void)read_tum(folder / "none.tum"); }),
+  EXPECT_TRUE(has(last_error([&] { (void)read_tum(folder / "none.tum"); }),
                   "none.tum: cannot be opened (No such file"));
-  EXPECT_TRUE(has(complaint([&] { (void)read_tum(folder.path()); }), "is a folder"));
+  EXPECT_TRUE(has(last_error([&] { (void)read_tum(folder.path()); }), "is a folder"));
 }
 
 TEST(Kitti, readsPosesWithTheirTimes) {
@@ -140,20 +140,20 @@ TEST(Kitti, normalisesRoundedRotationsAndRefusesOthersByFileAndLine) {
   EXPECT_LT((R * R.transpose() - Mat3::Identity()).norm(), 1e-14);
 
   folder.write("poses.txt", first + "1.0005 0 0 7 0 1 0 8 0 0 1 9\n");  // R Rᵀ − I: 1.0e-3
-  EXPECT_TRUE(has(complaint([&] { (void)read_trajectory(poses); }),
+  EXPECT_TRUE(has(last_error([&] { (void)read_trajectory(poses); }),
                   "poses.txt:2: the matrix is not a rotation"));
   folder.write("poses.txt", first + "1 0.001 0 7 0 1 0 8 0 0 1 9\n");
-  EXPECT_TRUE(has(complaint([&] { (void)read_trajectory(poses); }),
+  EXPECT_TRUE(has(last_error([&] { (void)read_trajectory(poses); }),
                   "poses.txt:2: the matrix is not a rotation"));
   folder.write("poses.txt", first + "1 0 0 7 0 1 0 8 0 0 -1 9\n");
-  EXPECT_TRUE(has(complaint([&] { (void)read_trajectory(poses); }), "a reflection"));
+  EXPECT_TRUE(has(last_error([&] { (void)read_trajectory(poses); }), "a reflection"));
 }
 
 TEST(Kitti, saysWhenPosesAndTimesDoNotBelongTogether) {
   const test::TemporaryFolder folder;
   const std::string line = "1 0 0 0 0 1 0 0 0 0 1 0\n";
   const auto poses = folder.write("poses.txt", line + line);
-  const auto said = [&] { return complaint([&] { (void)read_trajectory(poses); }); };
+  const auto said = [&] { return last_error([&] { (void)read_trajectory(poses); }); };
   EXPECT_TRUE(has(said(), "put the sequence's times.txt beside it"));
   folder.write("times.txt", "0\n");
   EXPECT_TRUE(has(said(), "poses.txt:2: is pose 2, but "));
@@ -197,7 +197,7 @@ TEST(Euroc, readsEightColumnsToo) {
 TEST(Euroc, saysFileAndLineOfWhatIsWrong) {
   const test::TemporaryFolder folder;
   const auto csv = folder.write("data.csv", "5,1,2,3,1,0,0,0\n6,1,2,3,1,0,0\n");
-  const auto said = [&] { return complaint([&] { (void)read_trajectory(csv); }); };
+  const auto said = [&] { return last_error([&] { (void)read_trajectory(csv); }); };
   EXPECT_TRUE(has(said(), "put cam0/sensor.yaml"));
   folder.write("cam0/sensor.yaml", kSensor);
   EXPECT_TRUE(has(said(), "data.csv:2: has 7 columns"));
@@ -227,7 +227,7 @@ TEST(Euroc, saysFileAndLineOfWhatIsWrong) {
 
 TEST(Trajectory, folderWithoutOneSaysWhatWasLookedFor) {
   const test::TemporaryFolder folder;
-  EXPECT_TRUE(has(complaint([&] { (void)read_trajectory(folder.path()); }),
+  EXPECT_TRUE(has(last_error([&] { (void)read_trajectory(folder.path()); }),
                   "has no trajectory.tum, no poses.txt"));
   EXPECT_FALSE(find_truth(folder.path()).has_value());
 }

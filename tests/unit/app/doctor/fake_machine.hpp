@@ -61,7 +61,7 @@ struct FakeMachine {
     machine.addresses.push_back({name, a, mask});
   }
   [[nodiscard]] std::vector<app::Finding> examined() const {
-    return app::examine({machine, inventory, needs, "."});
+    return app::run_checks({machine, inventory, needs, "."});
   }
   /// The findings of one check, the worst first.
   [[nodiscard]] std::vector<app::Finding> of(const std::string& check) const {

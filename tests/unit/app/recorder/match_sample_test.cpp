@@ -10,20 +10,20 @@
 namespace vergence::app {
 namespace {
 
-/// A log whose every frame has so many sightings; the left pixel counts them all.
+/// A log whose every frame has so many observations; the left pixel counts them all.
 class Drive {
  public:
-  explicit Drive(std::size_t sightings)
-      : sightings_(sightings),
-        arena_(calibration::TrackLog::memory_needed(3, sightings) + 64),
-        log_(3, sightings, arena_) {}
+  explicit Drive(std::size_t observations)
+      : observations_(observations),
+        arena_(calibration::TrackLog::memory_needed(3, observations) + 64),
+        log_(3, observations, arena_) {}
 
   void frame(std::uint64_t number, unsigned cameras) {
     calibration::LoggedFrame f;
     f.number = number;
     log_.begin(f);
-    for (std::size_t i = 0; i < sightings_; ++i) {
-      calibration::LoggedSighting s;
+    for (std::size_t i = 0; i < observations_; ++i) {
+      calibration::LoggedObservation s;
       s.cameras = static_cast<std::uint8_t>(cameras);
       s.raw[0] = {static_cast<float>(count_++), 0};
       log_.push(s);
@@ -32,7 +32,7 @@ class Drive {
   [[nodiscard]] const calibration::TrackLog& log() const { return log_; }
 
  private:
-  std::size_t sightings_, count_ = 0;
+  std::size_t observations_, count_ = 0;
   Arena arena_;
   calibration::TrackLog log_;
 };

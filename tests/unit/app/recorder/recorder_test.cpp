@@ -296,7 +296,7 @@ TEST(Recorder, acceptedCalibrationsAreKeptOnItsOwnThreadAndAFailureIsAnEventAndA
     ASSERT_EQ(events.size(), 1U);
     const auto event = nlohmann::json::parse(events[0]);
     EXPECT_EQ(event["kind"], fails ? "calibration_not_kept" : "calibration_kept");
-    EXPECT_EQ(recorder.take_complaints().size(), fails ? 1U : 0U);
+    EXPECT_EQ(recorder.take_errors().size(), fails ? 1U : 0U);
   }
 }
 
@@ -390,9 +390,9 @@ TEST(Recorder, aFullDiskIsASentenceAndTheOtherFilesAreWhole) {
   Recorder recorder(folder.path(), {});
   for (std::uint64_t i = 0; i < 10; ++i) recorder.post(pose(i, PoseStatus::ok, 0));
   const auto totals = recorder.close();
-  const auto complaints = recorder.take_complaints();
-  ASSERT_EQ(complaints.size(), 1U);  // once, not for every line
-  EXPECT_NE(complaints[0].find("poses.csv"), std::string::npos);
+  const auto errors = recorder.take_errors();
+  ASSERT_EQ(errors.size(), 1U);  // once, not for every line
+  EXPECT_NE(errors[0].find("poses.csv"), std::string::npos);
   ASSERT_EQ(totals->faults.size(), 1U);
   EXPECT_NE(totals->faults[0].find("poses.csv: is not complete"), std::string::npos)
       << totals->faults[0];
@@ -436,8 +436,8 @@ TEST(Recorder, aDiskThatIsFullForAWhileCostsNothingThatMemoryHolds) {
             std::vector<std::string>{"the disk takes lines again; 0 were lost"});
   const auto full = nlohmann::json::parse(lines_of(folder / "events.jsonl").front());
   EXPECT_EQ(full["stamp_ns"], kStamp + 20 * std::int64_t{50'000'000});
-  const auto complaints = recorder.take_complaints();
-  EXPECT_TRUE(std::any_of(complaints.begin(), complaints.end(), [](const std::string& c) {
+  const auto errors = recorder.take_errors();
+  EXPECT_TRUE(std::any_of(errors.begin(), errors.end(), [](const std::string& c) {
     return c.find("the disk has no room, as the drive's faults want it; the session goes on") !=
            std::string::npos;
   }));
@@ -460,8 +460,8 @@ TEST(Recorder, aDiskThatIsFullForLongLosesWholeLinesAndSaysHowMany) {
   EXPECT_EQ(told(folder.path(), "disk_room"),
             std::vector<std::string>{"the disk takes lines again; " +
                                      std::to_string(totals->lost_lines) + " were lost"});
-  const auto complaints = recorder.take_complaints();
-  EXPECT_TRUE(std::any_of(complaints.begin(), complaints.end(), [](const std::string& c) {
+  const auto errors = recorder.take_errors();
+  EXPECT_TRUE(std::any_of(errors.begin(), errors.end(), [](const std::string& c) {
     return c.find("lines that found no room on the disk in time; the others are all there") !=
            std::string::npos;
   }));

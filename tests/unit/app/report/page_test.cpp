@@ -57,7 +57,7 @@ TEST(Page, ofAWholeSessionShowsEverythingAndLoadsNothing) {
                            "Horizontal error",
                            "Vertical error",
                            "Heading error",
-                           "over the way",
+                           "over the distance travelled",
                            "rotation x, degrees",
                            "translation z, mm",
                            "focal length x, px",

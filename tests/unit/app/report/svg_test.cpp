@@ -116,10 +116,10 @@ TEST(Colours, areReadableOnBothGroundsInBothThemes) {
   EXPECT_NEAR(contrast("#000000", "#ffffff"), 21, 1e-9);
   for (const Colour& c : kColours)
     for (const Colour& ground : {kPage, kPanel}) {
-      const double wanted = c.text ? 4.5 : 3.0;
-      EXPECT_GE(contrast(c.light, ground.light), wanted)
+      const double requested = c.text ? 4.5 : 3.0;
+      EXPECT_GE(contrast(c.light, ground.light), requested)
           << c.name << " on " << ground.name << ", light";
-      EXPECT_GE(contrast(c.dark, ground.dark), wanted)
+      EXPECT_GE(contrast(c.dark, ground.dark), requested)
           << c.name << " on " << ground.name << ", dark";
     }
 }

@@ -218,8 +218,9 @@ TEST(Verdict, neverACalibrationSaysHowToGetOne) {
 
 TEST(Verdict, aScaleThatDisagreesAndACalibrationThatWasNotKeptAreTold) {
   Case c;
-  c.session.events = {{Stamp(), "scale_disagrees", "the way comes out 90.0 % longer"},
-                      {Stamp(), "calibration_not_kept", "no room"}};
+  c.session.events = {
+      {Stamp(), "scale_disagrees", "the distance travelled comes out 90.0 % longer"},
+      {Stamp(), "calibration_not_kept", "no room"}};
   c.session.calibrations = {attempt(true, "from_scratch", 0, 0.2)};
   const Verdict v = c.verdict();
   EXPECT_EQ(v.grade, Grade::care);

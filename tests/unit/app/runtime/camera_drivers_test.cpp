@@ -89,7 +89,7 @@ TEST(SoftwareTrigger, everyCameraExposesAtEveryPulse) {
   EXPECT_EQ(trigger.configure({0}, nullptr), DeviceStatus::bad_configuration);
   ASSERT_EQ(trigger.configure({40}, nullptr), DeviceStatus::ok);
   for (CameraDevice* camera : devices)
-    ASSERT_EQ(camera->start(nullptr), DeviceStatus::ok) << camera->complaint();
+    ASSERT_EQ(camera->start(nullptr), DeviceStatus::ok) << camera->last_error();
   ASSERT_EQ(trigger.start(nullptr), DeviceStatus::ok);
   for (std::uint64_t n = 0; n < 10; ++n) {
     Pulse pulse;

@@ -168,11 +168,11 @@ class SlowCamera final : public CameraDevice {
   }
   void release(FrameSlot) noexcept override {}
   void stop() noexcept override {}
-  DeviceStatus set_exposure(const ExposureSetting& wanted,
+  DeviceStatus set_exposure(const ExposureSetting& requested,
                             ExposureSetting* actual) noexcept override {
     std::this_thread::sleep_for(std::chrono::milliseconds(300));
     asked.fetch_add(1);
-    if (answer.load() == DeviceStatus::ok) *actual = wanted;
+    if (answer.load() == DeviceStatus::ok) *actual = requested;
     return answer.load();
   }
   CameraStatistics statistics() const noexcept override { return {}; }

@@ -207,7 +207,6 @@ TEST(LiveSource, everySlotComesBack) {
 }
 
 // ---- with the board's pulses
-// --------------------------------------------------------------------------------------
 
 constexpr BenchOptions kByPulses{
     .mode = SyncMode::board, .vary = Duration::milliseconds(2), .seconds = 8};

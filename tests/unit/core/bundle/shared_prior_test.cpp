@@ -174,9 +174,9 @@ void halves_one_after_the_other(const BundleOptions& first, const BundleOptions&
     compare(extrinsic_row(1) + i, off[i]);
   }
   if (intrinsic < 0) return;
-  const Intrinsics &found = two.cameras[1].intrinsics(), &wanted = both.cameras[1].intrinsics();
+  const Intrinsics &found = two.cameras[1].intrinsics(), &requested = both.cameras[1].intrinsics();
   ASSERT_EQ(intrinsic, 0);
-  compare(intrinsic_row(1), found.fx - wanted.fx);
+  compare(intrinsic_row(1), found.fx - requested.fx);
 }
 
 TEST(BundleSharedPrior, twoHalvesOneAfterTheOtherSayWhatBothTogetherSay) {

@@ -118,12 +118,12 @@ TEST(GateRigChanged, aCameraThatIsTurnedOnTheWayIsDated) {
     ASSERT_EQ(s.status, RigSolveStatus::ok);
     EXPECT_GE(s.changed_at, 20U) << axis.transpose();
     EXPECT_LE(s.changed_at, 40U) << axis.transpose();
-    GateQuestion q;
+    AcceptanceInput q;
     q.solution = &s;
     q.nominal = &nominal;
-    EXPECT_EQ(ask_gates(q, {}), Gate::rig_changed) << axis.transpose();
+    EXPECT_EQ(check_acceptance(q, {}), Gate::rig_changed) << axis.transpose();
     q.lenses = true;
-    EXPECT_EQ(ask_gates(q, {}), Gate::rig_changed) << axis.transpose();
+    EXPECT_EQ(check_acceptance(q, {}), Gate::rig_changed) << axis.transpose();
   }
 }
 
@@ -133,10 +133,10 @@ TEST(GateRigChanged, oneRigIsOne) {
     const RigSolution s = solve_with({}, seed, &nominal);
     ASSERT_EQ(s.status, RigSolveStatus::ok);
     EXPECT_EQ(s.changed_at, 0U) << seed;
-    GateQuestion q;
+    AcceptanceInput q;
     q.solution = &s;
     q.nominal = &nominal;
-    EXPECT_NE(ask_gates(q, {}), Gate::rig_changed) << seed;
+    EXPECT_NE(check_acceptance(q, {}), Gate::rig_changed) << seed;
   }
 }
 

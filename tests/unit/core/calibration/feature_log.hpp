@@ -64,10 +64,10 @@ inline void log_drive(FeatureDrive& drive, int frames, const LogStart& start,
         perturbed(drive.T_right_left(), vector(start.rig_rad), vector(start.rig_m));
     f.unlinked = true;
     f.reprojection_px = 0.5;
-    f.across = static_cast<int>(drive.tracks().size());
+    f.stereo = static_cast<int>(drive.tracks().size());
     log.begin(f);
     for (const FeatureTrack& t : drive.tracks()) {
-      calibration::LoggedSighting s;
+      calibration::LoggedObservation s;
       s.track = t.id;
       s.cameras = t.seen;
       s.sigma = static_cast<float>(t.sigma_px);

@@ -22,7 +22,7 @@ struct Case {
   CalibrationOptions options;
   RigCalibration nominal, in_use;
   RigSolution solution;
-  GateQuestion question;
+  AcceptanceInput question;
 
   Case() {
     test::FeatureDrive d(drive);
@@ -43,7 +43,7 @@ struct Case {
     question.nominal = &nominal;
     question.log = &log;
   }
-  [[nodiscard]] Gate ask() const { return ask_gates(question, options); }
+  [[nodiscard]] Gate ask() const { return check_acceptance(question, options); }
   void turn(RigCalibration* rig, const Vec3& degrees) const {
     rig->T_camera_left[1] = perturbed(rig->T_camera_left[1], kDegree * degrees, Vec3::Zero());
   }

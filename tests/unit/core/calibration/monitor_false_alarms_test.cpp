@@ -12,8 +12,8 @@ namespace vergence::test {
 namespace {
 
 using calibration::MonitorVerdict;
+using calibration::detail::ChangeDetector;
 using calibration::detail::Decision;
-using calibration::detail::Windows;
 
 constexpr int kHour = 108000;  // frames at 30 Hz
 
@@ -56,7 +56,7 @@ TEST(MonitorModes, haveTheStatisticsOfWholeTracks) {
       if (trial.step().statistic > 0 && i > 300) tracks.push_back(trial.verdict().statistic);
   }
   ModeDrive drive(o, 3);
-  const auto windows = std::make_unique<Windows>();
+  const auto windows = std::make_unique<ChangeDetector>();
   windows->reset({}, Mat5::Zero());
   for (int i = 0; i < 60000; ++i) {
     const ModeDrive::Frame f = drive.next(Vec5::Zero());
@@ -85,7 +85,7 @@ TEST(MonitorFalseAlarms, areFourAtMostInAHundredHours) {
   }
   Random random(17);
   const calibration::MonitorOptions options;
-  const auto windows = std::make_unique<Windows>();
+  const auto windows = std::make_unique<ChangeDetector>();
   int alarms = 0;
   double worst = 0, worst_standing = 0;
   std::vector<double> hourly;
@@ -107,7 +107,7 @@ TEST(MonitorFalseAlarms, areFourAtMostInAHundredHours) {
         most = std::max(most, d.statistic);
         alarm = d.kind != MonitorVerdict::Kind::quiet;
       } else {
-        const double s = windows->single(f.evidence.evidence.across, f.spread_now) / 1.5;
+        const double s = windows->single(f.evidence.evidence.stereo, f.spread_now) / 1.5;
         worst_standing = std::max(worst_standing, s);
         standing_over = s > options.threshold ? standing_over + 1 : 0;
         alarm = standing_over == 3;

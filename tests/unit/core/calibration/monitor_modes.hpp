@@ -6,8 +6,8 @@
 #include <memory>
 #include <vector>
 
-#include "core/calibration/detail/monitor_looks.hpp"
-#include "core/calibration/detail/monitor_windows.hpp"
+#include "core/calibration/detail/change_detector.hpp"
+#include "core/calibration/detail/monitor_residuals.hpp"
 #include "core/math/random.hpp"
 #include "tests/unit/core/calibration/monitor_trial.hpp"
 
@@ -48,8 +48,8 @@ class ModeDrive {
       const double lasting = (spread_life_ - spread_now_) * (1 - kTrackKeeps) / (2 * kTrackKeeps);
       noise_ = std::sqrt(lasting) * track_ + std::sqrt(spread_now_ - lasting) * draw();
     }  // else the images repeat themselves, and so do their errors
-    auto& [across, motion] = f.evidence.evidence;
-    set_gradient(&across, noise_ + std::sqrt(across.n) * (bias_across_ * bias_), reference_error);
+    auto& [stereo, motion] = f.evidence.evidence;
+    set_gradient(&stereo, noise_ + std::sqrt(stereo.n) * (bias_stereo_ * bias_), reference_error);
     if (motion.n > 0)
       set_gradient(
           &motion,
@@ -89,7 +89,7 @@ class ModeDrive {
   template <class Use>
   static void watch(const FeatureDriveOptions& o, int frames, const Use& use) {
     using namespace calibration::detail;
-    const auto looks = std::make_unique<Looks>();
+    const auto looks = std::make_unique<MonitorResiduals>();
     looks->reset();
     const Reference reference{o.T_right_left,
                               EpipolarGeometry(o.T_right_left),
@@ -101,9 +101,10 @@ class ModeDrive {
     for (int i = 0; i < frames; ++i) {
       (void)trial.step();
       const calibration::MonitorFrame& f = trial.frame();
-      const AcrossLook across = looks->across(reference, f, 30, f.moving);
-      if (!across.usable) continue;
-      use(f, across, f.motion.empty() || !f.moving ? MotionLook{} : looks->motion(reference, f));
+      const StereoResiduals stereo = looks->stereo(reference, f, 30, f.moving);
+      if (!stereo.usable) continue;
+      use(f, stereo,
+          f.motion.empty() || !f.moving ? MotionResiduals{} : looks->motion(reference, f));
     }
   }
 
@@ -111,19 +112,19 @@ class ModeDrive {
     o.drive_s = 60, o.stop_s = 15;
     int moving = 0, looks = 0;
     watch(o, 2250,
-          [&](const calibration::MonitorFrame& frame, const auto& across, const auto& motion) {
+          [&](const calibration::MonitorFrame& frame, const auto& stereo, const auto& motion) {
             Frame f;
             f.moving = frame.moving;
-            f.spread_now = across.spread_now;
-            f.evidence.evidence.across = across.evidence;
-            f.evidence.spread_now = across.spread_now;
-            f.evidence.spread_life = across.spread_life;
+            f.spread_now = stereo.spread_now;
+            f.evidence.evidence.stereo = stereo.evidence;
+            f.evidence.spread_now = stereo.spread_now;
+            f.evidence.spread_life = stereo.spread_life;
             if (motion.usable)
               f.evidence.evidence.motion = motion.evidence,
               f.evidence.spread_motion = motion.spread;
             frames_.push_back(f);
             if (!frame.moving || frame.frame < 100) return;
-            ++moving, spread_now_ += across.spread_now, spread_life_ += across.spread_life;
+            ++moving, spread_now_ += stereo.spread_now, spread_life_ += stereo.spread_life;
             if (motion.usable) ++looks, spread_motion_ += motion.spread;
           });
     spread_now_ /= moving, spread_life_ /= moving, spread_motion_ /= looks;
@@ -134,19 +135,19 @@ class ModeDrive {
     o.white_px = o.constant_px = o.walk_px = 1e-5;
     o.outliers = o.movers = 0;
     o.bias_s = 1;  // many draws of the field
-    Mat6 across_sum = Mat6::Zero(), motion_sum = Mat6::Zero();
-    int across_n = 0, motion_n = 0;
+    Mat6 stereo_sum = Mat6::Zero(), motion_sum = Mat6::Zero();
+    int stereo_n = 0, motion_n = 0;
     const auto add = [](const Evidence& e, Mat6* sum, int* n) {
       const Solved solved(e.A, e.g);
       const Vec6 y = Eigen::Map<const Vec6>(solved.y.data()) / std::sqrt(e.n);
       *sum += y * y.transpose();
       ++*n;
     };
-    watch(o, 2500, [&](const auto&, const auto& across, const auto& motion) {
-      add(across.evidence, &across_sum, &across_n);
+    watch(o, 2500, [&](const auto&, const auto& stereo, const auto& motion) {
+      add(stereo.evidence, &stereo_sum, &stereo_n);
       if (motion.usable) add(motion.evidence, &motion_sum, &motion_n);
     });
-    bias_across_ = Eigen::LLT<Mat6>(across_sum / across_n).matrixL();
+    bias_stereo_ = Eigen::LLT<Mat6>(stereo_sum / stereo_n).matrixL();
     bias_motion_ = Eigen::LLT<Mat6>(motion_sum / motion_n).matrixL();
   }
 
@@ -155,7 +156,7 @@ class ModeDrive {
   std::size_t at_ = 0;
   std::uint64_t number_ = 0;
   double spread_now_ = 0, spread_life_ = 0, spread_motion_ = 0;
-  Mat6 bias_across_ = Mat6::Zero(), bias_motion_ = Mat6::Zero();  // px a mode, whitened
+  Mat6 bias_stereo_ = Mat6::Zero(), bias_motion_ = Mat6::Zero();  // px a mode, whitened
   Vec6 track_, bias_, noise_ = Vec6::Zero();
 };
 

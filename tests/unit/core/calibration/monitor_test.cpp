@@ -47,7 +47,7 @@ TEST_P(MonitorKnock, isNoticedInTimeAndItsOnsetFound) {
       const TrialReference reference = calibrated(o);
       MonitorTrial trial(o, reference.T_right_left, reference.covariance);
       for (int i = 0; i < kBefore; ++i) ASSERT_EQ(trial.step().kind, Kind::quiet) << "frame " << i;
-      ASSERT_GE(trial.frame().found_across, 190);
+      ASSERT_GE(trial.frame().found_stereo, 190);
       const auto frames = trial.frames_until(row.limit);
       ASSERT_TRUE(frames.has_value()) << "statistic " << trial.verdict().statistic;
       EXPECT_NE(trial.verdict().kind, Kind::out_of_step);
@@ -223,7 +223,7 @@ TEST(Monitor, callsNoCollapseWhereNothingIsExpected) {
     ASSERT_EQ(v.kind, Kind::quiet);
   }
   EXPECT_TRUE(trial.monitor().look(night).needs_texture);
-  night.expected_across = 200;
+  night.expected_stereo = 200;
   for (int i = 0; i < 4; ++i) EXPECT_EQ(trial.monitor().look(night).kind, Kind::quiet);
   EXPECT_EQ(trial.monitor().look(night).kind, Kind::collapse);
 }
@@ -246,12 +246,12 @@ TEST(Monitor, saysThatItNeedsMotion) {
 TEST(Monitor, leavesOutWhatIsNotANumber) {
   MonitorTrial clean(street(8, 10)), dirty(street(8, 10));
   const double nan = std::numeric_limits<double>::quiet_NaN();
-  dirty.spoil = [nan](std::vector<calibration::AcrossSighting>& sightings) {
-    sightings.push_back({{nan, 1}, {2, 3}, 0.5, 4'000'000'001U});
-    sightings.push_back(
+  dirty.spoil = [nan](std::vector<calibration::StereoObservation>& observations) {
+    observations.push_back({{nan, 1}, {2, 3}, 0.5, 4'000'000'001U});
+    observations.push_back(
         {{10, 1}, {2, std::numeric_limits<double>::infinity()}, 0.5, 4'000'000'002U});
-    sightings.push_back({{10, 1}, {2, 3}, 0, 4'000'000'003U});
-    sightings.push_back({{10, 1}, {2, 3}, nan, 4'000'000'004U});
+    observations.push_back({{10, 1}, {2, 3}, 0, 4'000'000'003U});
+    observations.push_back({{10, 1}, {2, 3}, nan, 4'000'000'004U});
   };
   for (int i = 0; i < 60; ++i) {
     (void)clean.step();

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "core/calibration/monitor.hpp"
-#include "core/calibration/monitor_feed.hpp"
+#include "core/calibration/motion_track_builder.hpp"
 #include "core/geometry/epipolar.hpp"
 #include "tests/support/feature_drive.hpp"
 
@@ -26,13 +26,13 @@ class MonitorTrial {
   MonitorTrial(const FeatureDriveOptions& drive, const Transform& T_right_left,
                const Mat6& covariance, const calibration::MonitorOptions& options = {})
       : arena_(std::make_unique<Arena>(calibration::Monitor::memory_needed(options) +
-                                       calibration::MonitorFeed::memory_needed(kTracks))),
+                                       calibration::MotionTrackBuilder::memory_needed(kTracks))),
         drive_(drive),
         monitor_(options, *arena_),
-        feed_(kTracks, *arena_),
+        track_builder_(kTracks, *arena_),
         epipolar_(T_right_left) {
     (void)monitor_.set_reference(T_right_left, drive.left, drive.right, covariance);
-    sightings_.reserve(kTracks);
+    observations_.reserve(kTracks);
   }
 
   /// The next frame.
@@ -43,31 +43,33 @@ class MonitorTrial {
 
   /// A frame of some drive.
   const calibration::MonitorVerdict& show(const FeatureDrive& drive) {
-    sightings_.clear();
+    observations_.clear();
     const Pinhole &l = drive.options().left, &r = drive.options().right;
     for (const FeatureTrack& t : drive.tracks()) {
       double off = 0;
       const Vec2 left((t.left.x() - l.cx) / l.fx, (t.left.y() - l.cy) / l.fy),
           right((t.right.x() - r.cx) / r.fx, (t.right.y() - r.cy) / r.fy);
       if (epipolar_.to_line(left, right, &off, nullptr) != EpipolarStatus::ok) continue;
-      if (std::abs(off) * r.fy < gate_px) sightings_.push_back({t.left, t.right, t.sigma_px, t.id});
+      if (std::abs(off) * r.fy < gate_px)
+        observations_.push_back({t.left, t.right, t.sigma_px, t.id});
     }
     Transform T_now_previous = drive.T_now_previous();
     if (disturb) disturb(T_now_previous);
-    frame_ = feed_.next(drive.stamp(), drive.frame(), sightings_, T_now_previous);
-    frame_.expected_across = static_cast<int>(drive.tracks().size());
-    if (spoil) spoil(sightings_), frame_.across = sightings_;
+    frame_ = track_builder_.next(drive.stamp(), drive.frame(), observations_, T_now_previous);
+    frame_.expected_stereo = static_cast<int>(drive.tracks().size());
+    if (spoil) spoil(observations_), frame_.stereo = observations_;
     verdict_ = monitor_.look(frame_);
     return verdict_;
   }
 
-  /// Frames until the verdict is `wanted` or, without one, anything but quiet; nothing within
+  /// Frames until the verdict is `requested` or, without one, anything but quiet; nothing within
   /// `limit` frames.
   [[nodiscard]] std::optional<int> frames_until(
-      int limit, std::optional<calibration::MonitorVerdict::Kind> wanted = {}) {
+      int limit, std::optional<calibration::MonitorVerdict::Kind> requested = {}) {
     for (int i = 1; i <= limit; ++i) {
       const auto kind = step().kind;
-      if (wanted ? kind == *wanted : kind != calibration::MonitorVerdict::Kind::quiet) return i;
+      if (requested ? kind == *requested : kind != calibration::MonitorVerdict::Kind::quiet)
+        return i;
     }
     return {};
   }
@@ -78,7 +80,7 @@ class MonitorTrial {
   [[nodiscard]] calibration::Monitor& monitor() { return monitor_; }
 
   double gate_px = 20;
-  std::function<void(std::vector<calibration::AcrossSighting>&)>
+  std::function<void(std::vector<calibration::StereoObservation>&)>
       spoil;                                // what is done to a frame's matches
   std::function<void(Transform&)> disturb;  // and to its motion
 
@@ -87,9 +89,9 @@ class MonitorTrial {
   std::unique_ptr<Arena> arena_;
   FeatureDrive drive_;
   calibration::Monitor monitor_;
-  calibration::MonitorFeed feed_;
+  calibration::MotionTrackBuilder track_builder_;
   EpipolarGeometry epipolar_;
-  std::vector<calibration::AcrossSighting> sightings_;
+  std::vector<calibration::StereoObservation> observations_;
   calibration::MonitorFrame frame_;
   calibration::MonitorVerdict verdict_;
 };

@@ -36,8 +36,8 @@ TEST(RigSolver, exactTracksGiveTheTransformToTheirRounding) {
   const RigSolution s = solve(drive, held(), rig_of(drive));
   ASSERT_EQ(s.status, RigSolveStatus::ok);
   // Pixels are logged as floats: up to 3e-5 px of rounding near 1000 px. One pair of images turns
-  // that into 3e-8 rad; over tens of thousands of sightings rotation is better than that. t_y and
-  // t_z follow from directions to points 10 to 20 m away: 1e-6 m at most.
+  // that into 3e-8 rad; over tens of thousands of observations rotation is better than that. t_y
+  // and t_z follow from directions to points 10 to 20 m away: 1e-6 m at most.
   const Vec5 e = five_errors(s.rig, drive.T_right_left);
   EXPECT_LT(e.head<3>().cwiseAbs().maxCoeff(), 3e-8) << e.transpose();
   EXPECT_LT(e.tail<2>().cwiseAbs().maxCoeff(), 1e-6) << e.transpose();
@@ -172,7 +172,7 @@ TEST(RigSolver, whatHoldsNoTransformSaysSo) {
   FeatureDrive b(drive);
   log_drive(b, 30, kRough, one_eyed.solver.log());
   for (std::size_t i = 0; i < one_eyed.solver.log().size(); ++i)
-    for (auto& s : one_eyed.solver.log().frame(i).sightings) s.cameras = 1;
+    for (auto& s : one_eyed.solver.log().frame(i).observations) s.cameras = 1;
   EXPECT_EQ(one_eyed.solver.solve(rig).status, RigSolveStatus::too_few_tracks);
 
   SolverInArena garbage(held());
@@ -180,7 +180,7 @@ TEST(RigSolver, whatHoldsNoTransformSaysSo) {
   log_drive(c, 30, kRough, garbage.solver.log());
   Random random(3);
   for (std::size_t i = 0; i < garbage.solver.log().size(); ++i)
-    for (auto& s : garbage.solver.log().frame(i).sightings)
+    for (auto& s : garbage.solver.log().frame(i).observations)
       for (auto& p : s.raw)
         p = Eigen::Vector2f(static_cast<float>(random.uniform(0, 1023)),
                             static_cast<float>(random.uniform(0, 767)));

@@ -14,7 +14,7 @@ namespace {
 
 using calibration::CalibrationOptions;
 using calibration::LoggedFrame;
-using calibration::LoggedSighting;
+using calibration::LoggedObservation;
 using calibration::RigSolution;
 using calibration::RigSolveStatus;
 using calibration::Stretches;
@@ -41,12 +41,12 @@ struct Driven {
     o.drift_mrad = drift_mrad;
     return o;
   }
-  Driven(const FeatureDriveOptions& o, Stretches::Kind kind, const RigCalibration& told,
+  Driven(const FeatureDriveOptions& o, Stretches::Kind kind, const RigCalibration& given,
          const RigCalibration& start, double drift_mrad = 0.3)
       : drive(o),
         options(small(drift_mrad)),
         arena(Stretches::memory_needed(options, monitor, 2, kFeatures)),
-        stretches(kind, told, start, kStretch, options, monitor, kFeatures, arena) {}
+        stretches(kind, given, start, kStretch, options, monitor, kFeatures, arena) {}
   void go(int frames) {
     for (int i = 0; i < frames; i += 10) {
       log_drive(drive, 10, {}, log);
@@ -72,8 +72,8 @@ FeatureDriveOptions little_noise() {
 
 TEST(Stretches, eachByItselfFindsTheTransform) {
   const FeatureDriveOptions o = little_noise();
-  const RigCalibration told = rig_of(o, {o.left, o.right}, kNotGiven);
-  Driven d(o, Stretches::Kind::alone, told, rough(told));
+  const RigCalibration given = rig_of(o, {o.left, o.right}, kNotGiven);
+  Driven d(o, Stretches::Kind::alone, given, rough(given));
   d.go(90);
   ASSERT_EQ(d.solved.size(), 3U);
   for (const RigSolution& s : d.solved) {
@@ -95,9 +95,9 @@ TEST(Stretches, eachByItselfFindsTheTransform) {
 
 TEST(Stretches, joinedTheyKnowMoreEachTime) {
   const FeatureDriveOptions o = little_noise();
-  const RigCalibration told = rig_of(o, {o.left, o.right}, kNotGiven);
-  Driven joined(o, Stretches::Kind::joined, told, rough(told)),
-      alone(o, Stretches::Kind::alone, told, rough(told));
+  const RigCalibration given = rig_of(o, {o.left, o.right}, kNotGiven);
+  Driven joined(o, Stretches::Kind::joined, given, rough(given)),
+      alone(o, Stretches::Kind::alone, given, rough(given));
   joined.go(90);
   alone.go(90);
   ASSERT_EQ(joined.solved.size(), 3U);
@@ -125,8 +125,8 @@ TEST(Stretches, aCentreThatIsToldWrongIsFound) {
   const FeatureDriveOptions o = little_noise();
   Pinhole wrong = o.right;
   wrong.cx -= 5;
-  const RigCalibration told = rig_of(o, {o.left, wrong}, kNotGiven);
-  Driven d(o, Stretches::Kind::joined, told, told);
+  const RigCalibration given = rig_of(o, {o.left, wrong}, kNotGiven);
+  Driven d(o, Stretches::Kind::joined, given, given);
   d.go(90);
   ASSERT_EQ(d.solved.size(), 3U);
   const RigSolution& s = d.solved.back();
@@ -141,8 +141,8 @@ TEST(Stretches, aCentreThatIsToldWrongIsFound) {
 
 TEST(Stretches, framesAreTakenOnceThoughTheyAreShownAgain) {
   const FeatureDriveOptions o = little_noise();
-  const RigCalibration told = rig_of(o, {o.left, o.right}, kNotGiven);
-  Driven d(o, Stretches::Kind::alone, told, told);
+  const RigCalibration given = rig_of(o, {o.left, o.right}, kNotGiven);
+  Driven d(o, Stretches::Kind::alone, given, given);
   log_drive(d.drive, 20, {}, d.log);
   for (int i = 0; i < 5; ++i) EXPECT_FALSE(d.stretches.take(d.log).has_value());
   EXPECT_EQ(d.stretches.frames(), 20U);
@@ -154,9 +154,9 @@ TEST(Stretches, framesAreTakenOnceThoughTheyAreShownAgain) {
 
 TEST(Stretches, whatIsLeftAtTheEndIsSolvedIfItIsEnough) {
   const FeatureDriveOptions o = little_noise();
-  const RigCalibration told = rig_of(o, {o.left, o.right}, kNotGiven);
+  const RigCalibration given = rig_of(o, {o.left, o.right}, kNotGiven);
   for (const int frames : {24, 25}) {  // CalibrationOptions::min_frames is 25
-    Driven d(o, Stretches::Kind::joined, told, told);
+    Driven d(o, Stretches::Kind::joined, given, given);
     log_drive(d.drive, frames, {}, d.log);
     EXPECT_FALSE(d.stretches.take(d.log).has_value());
     const auto s = d.stretches.end();
@@ -173,10 +173,10 @@ TEST(Stretches, whatIsLeftAtTheEndIsSolvedIfItIsEnough) {
 // what was known hardly counts.
 TEST(Stretches, whatWasToldLongAgoCountsForLess) {
   const FeatureDriveOptions o = little_noise();
-  const RigCalibration told = rig_of(o, {o.left, o.right}, kNotGiven);
+  const RigCalibration given = rig_of(o, {o.left, o.right}, kNotGiven);
   double sigma[2];
   for (const bool later : {false, true}) {
-    Driven d(o, Stretches::Kind::joined, told, told);
+    Driven d(o, Stretches::Kind::joined, given, given);
     d.go(30);
     log_drive(d.drive, 30, {}, d.log);
     for (std::size_t i = 0; later && i < d.log.size(); ++i)
@@ -192,10 +192,10 @@ TEST(Stretches, whatWasToldLongAgoCountsForLess) {
 // to add to it.
 TEST(Stretches, oneThatFailsLeavesNoTraceInTheNext) {
   const FeatureDriveOptions o = little_noise();
-  const RigCalibration told = rig_of(o, {o.left, o.right}, kNotGiven);
+  const RigCalibration given = rig_of(o, {o.left, o.right}, kNotGiven);
   RigSolution third[2];
   for (const bool tried : {false, true}) {
-    Driven d(o, Stretches::Kind::joined, told, told, 10);
+    Driven d(o, Stretches::Kind::joined, given, given, 10);
     d.go(30);
     for (std::size_t i = 0; i < kStretch; ++i) {
       d.drive.next();
@@ -226,10 +226,10 @@ TEST(TrackLogAppend, aFrameOfAnotherLogComesWithItsSightings) {
     f.number = number;
     f.stamp = Stamp(static_cast<std::int64_t>(number) * 1'000'000);
     f.T_left_world.t = Vec3(0, 0, static_cast<double>(number));
-    f.across = 7;
+    f.stereo = 7;
     from.begin(f);
     for (std::uint32_t track = 0; track < 2 + 2 * number; ++track) {
-      LoggedSighting s;
+      LoggedObservation s;
       s.track = 100 * static_cast<std::uint32_t>(number) + track;
       s.cameras = 3;
       s.raw[0].x() = static_cast<float>(track);
@@ -237,8 +237,8 @@ TEST(TrackLogAppend, aFrameOfAnotherLogComesWithItsSightings) {
     }
   }
   for (std::size_t i = 0; i < 4; ++i) to.append(from.frame(i));
-  // Room for three: the oldest went. Room for five sightings: of six, and twice of eight, the rest
-  // is left out and counted.
+  // Room for three: the oldest went. Room for five observations: of six, and twice of eight, the
+  // rest is left out and counted.
   ASSERT_EQ(to.size(), 3U);
   EXPECT_EQ(to.left_out(), 1U + 3U + 3U);
   from.clear();
@@ -247,11 +247,11 @@ TEST(TrackLogAppend, aFrameOfAnotherLogComesWithItsSightings) {
     EXPECT_EQ(f.number, i + 2);
     EXPECT_EQ(f.stamp.ns(), static_cast<std::int64_t>(i + 2) * 1'000'000);
     EXPECT_EQ(f.T_left_world.t.z(), static_cast<double>(i + 2));
-    EXPECT_EQ(f.across, 7);
-    ASSERT_EQ(f.sightings.size(), 5U);
+    EXPECT_EQ(f.stereo, 7);
+    ASSERT_EQ(f.observations.size(), 5U);
     for (std::uint32_t track = 0; track < 5; ++track) {
-      EXPECT_EQ(f.sightings[track].track, 100 * (i + 2) + track);
-      EXPECT_EQ(f.sightings[track].raw[0].x(), static_cast<float>(track));
+      EXPECT_EQ(f.observations[track].track, 100 * (i + 2) + track);
+      EXPECT_EQ(f.observations[track].raw[0].x(), static_cast<float>(track));
     }
   }
 }

@@ -13,17 +13,17 @@ namespace {
 struct Log {
   Arena arena;
   TrackLog log;
-  Log(std::size_t frames, std::size_t sightings)
-      : arena(TrackLog::memory_needed(frames, sightings)), log(frames, sightings, arena) {}
-  /// A frame with as many sightings; tracks are numbered 100 · frame + i.
-  void frame(std::uint64_t number, std::uint32_t sightings) {
+  Log(std::size_t frames, std::size_t observations)
+      : arena(TrackLog::memory_needed(frames, observations)), log(frames, observations, arena) {}
+  /// A frame with as many observations; tracks are numbered 100 · frame + i.
+  void frame(std::uint64_t number, std::uint32_t observations) {
     LoggedFrame f;
     f.number = number;
     f.T_left_world.t = Vec3(0, 0, -static_cast<double>(number));
-    f.across = 7;
+    f.stereo = 7;
     log.begin(f);
-    for (std::uint32_t i = 0; i < sightings; ++i) {
-      LoggedSighting s;
+    for (std::uint32_t i = 0; i < observations; ++i) {
+      LoggedObservation s;
       s.track = static_cast<std::uint32_t>(100 * number) + i;
       s.cameras = 0b11;
       log.push(s);
@@ -31,12 +31,13 @@ struct Log {
   }
 };
 
-void expect_frame(const LoggedFrame& f, std::uint64_t number, std::size_t sightings) {
+void expect_frame(const LoggedFrame& f, std::uint64_t number, std::size_t observations) {
   EXPECT_EQ(f.number, number);
   EXPECT_EQ(f.T_left_world.t.z(), -static_cast<double>(number));
-  EXPECT_EQ(f.across, 7);
-  ASSERT_EQ(f.sightings.size(), sightings);
-  for (std::size_t i = 0; i < sightings; ++i) EXPECT_EQ(f.sightings[i].track, 100 * number + i);
+  EXPECT_EQ(f.stereo, 7);
+  ASSERT_EQ(f.observations.size(), observations);
+  for (std::size_t i = 0; i < observations; ++i)
+    EXPECT_EQ(f.observations[i].track, 100 * number + i);
 }
 
 TEST(TrackLog, keepsFramesInOrderWithTheirSightings) {
@@ -66,7 +67,7 @@ TEST(TrackLog, whenFullTheOldestFrameGoesAgainAndAgain) {
   EXPECT_EQ(l.log.left_out(), 0U);
 }
 
-TEST(TrackLog, sightingsBeyondAFramesCapacityAreLeftOutAndCounted) {
+TEST(TrackLog, observationsBeyondAFramesCapacityAreLeftOutAndCounted) {
   Log l(2, 3);
   l.frame(1, 8);
   l.frame(2, 4);

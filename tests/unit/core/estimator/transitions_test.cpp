@@ -72,13 +72,13 @@ TEST(Transitions, everyStateAnswersEveryTriggerAsTheMethodSays) {
   for (std::size_t trigger = 0; trigger < kWanted.size(); ++trigger)
     for (std::size_t s = 0; s < kStates.size(); ++s) {
       const Transition* found = find_transition(kStates[s], static_cast<Trigger>(trigger));
-      const State wanted = kWanted[trigger][s];
-      if (wanted == kStays)
+      const State requested = kWanted[trigger][s];
+      if (requested == kStays)
         EXPECT_EQ(found, nullptr) << to_string(kStates[s]) << ' ' << trigger;
       else if (found == nullptr)
         ADD_FAILURE() << to_string(kStates[s]) << " ignores trigger " << trigger;
       else
-        EXPECT_EQ(found->to, wanted) << to_string(kStates[s]) << ' ' << trigger;
+        EXPECT_EQ(found->to, requested) << to_string(kStates[s]) << ' ' << trigger;
     }
 }
 

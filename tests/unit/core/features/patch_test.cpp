@@ -241,9 +241,9 @@ TEST(Patch, atTheBorderNoByteOutsideTheImageIsRead) {
       options.min_zncc = -1.F;
       // Every position along two borders and across all four corners, in odd steps of a pixel.
       for (double along = -2; along < kSide + 2; along += 0.37)
-        for (const double across : {4.6, 5.5, 6.49, 84.9, 93.2, 94.3, 95.6}) {
-          (void)align(patch, b.pyramid, {along, across}, Mat2::Identity(), options);
-          (void)align(patch, b.pyramid, {across, along}, Mat2::Identity(), options);
+        for (const double stereo : {4.6, 5.5, 6.49, 84.9, 93.2, 94.3, 95.6}) {
+          (void)align(patch, b.pyramid, {along, stereo}, Mat2::Identity(), options);
+          (void)align(patch, b.pyramid, {stereo, along}, Mat2::Identity(), options);
         }
       for (int y = 0; y < kSide; ++y)
         for (const int x : {13, 14, 50, kSide - 15, kSide - 14, kSide - 13}) {

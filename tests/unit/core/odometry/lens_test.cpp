@@ -1,4 +1,4 @@
-#include "core/odometry/lens.hpp"
+#include "core/odometry/undistorted_camera.hpp"
 
 #include <gtest/gtest.h>
 
@@ -29,9 +29,9 @@ Intrinsics wide_lens(CameraModelKind kind) {
 constexpr CameraModelKind kModels[] = {CameraModelKind::pinhole_radtan,
                                        CameraModelKind::pinhole_equidistant};
 
-TEST(Lens, anIdealPixelIsWhereAPinholeWouldSeeTheSameRay) {
+TEST(UndistortedCamera, anIdealPixelIsWhereAPinholeWouldSeeTheSameRay) {
   for (const CameraModelKind kind : kModels) {
-    const Lens lens(wide_lens(kind));
+    const UndistortedCamera lens(wide_lens(kind));
     Random random(3);
     for (int i = 0; i < 200; ++i) {
       const Vec2 raw(random.uniform(20, 732), random.uniform(20, 460));
@@ -46,9 +46,9 @@ TEST(Lens, anIdealPixelIsWhereAPinholeWouldSeeTheSameRay) {
   }
 }
 
-TEST(Lens, derivativesAreThoseOfFiniteDifferences) {
+TEST(UndistortedCamera, derivativesAreThoseOfFiniteDifferences) {
   for (const CameraModelKind kind : kModels) {
-    const Lens lens(wide_lens(kind));
+    const UndistortedCamera lens(wide_lens(kind));
     Random random(4);
     for (int i = 0; i < 100; ++i) {
       const Vec2 raw(random.uniform(20, 732), random.uniform(20, 460));
@@ -80,10 +80,10 @@ TEST(Lens, derivativesAreThoseOfFiniteDifferences) {
   }
 }
 
-TEST(Lens, withoutDistortionNothingMoves) {
+TEST(UndistortedCamera, withoutDistortionNothingMoves) {
   Intrinsics k = wide_lens(CameraModelKind::pinhole_radtan);
   k.distortion = {};
-  const Lens lens(k);
+  const UndistortedCamera lens(k);
   Vec2 ideal;
   double magnification = 0;
   ASSERT_TRUE(lens.undistort({17.25, 401.5}, &ideal, &magnification));
@@ -91,11 +91,11 @@ TEST(Lens, withoutDistortionNothingMoves) {
   EXPECT_EQ(magnification, 1.0);
 }
 
-TEST(Lens, outsideTheModelThereIsNoPixel) {
+TEST(UndistortedCamera, outsideTheModelThereIsNoPixel) {
   Intrinsics k = wide_lens(CameraModelKind::pinhole_radtan);
   k.distortion = {-0.5, 0, 0, 0,
                   0};  // folds at r² = 2/3: no ray is seen further out than 0.54 · 458 px
-  const Lens lens(k);
+  const UndistortedCamera lens(k);
   Vec2 ideal(1, 2);
   Vec3 ray;
   Mat2 J;

@@ -85,7 +85,7 @@ TEST(PoseEstimator, aRigsPoseIsFoundFromExactSightings) {
     expect_exact(fit.T_left_world, s.T_left_world);
     EXPECT_EQ(fit.inliers, kPoints);
     EXPECT_EQ(fit.stereo, kPoints);
-    EXPECT_EQ(fit.across, kPoints);
+    EXPECT_EQ(fit.stereo_found, kPoints);
     EXPECT_EQ(fit.given, kPoints);
     EXPECT_EQ(fit.cameras, 0b11);
     EXPECT_EQ(s.agreeing(e, 0), kPoints);
@@ -117,7 +117,7 @@ TEST(PoseEstimator, aThirdOfWrongSightingsDoNotMoveIt) {
   ASSERT_TRUE(fit.found);
   expect_exact(fit.T_left_world, s.T_left_world);
   EXPECT_EQ(fit.given, kPoints);
-  // A wrong sighting may lie right by chance within a pixel or so, not thirty off in both.
+  // A wrong observation may lie right by chance within a pixel or so, not thirty off in both.
   EXPECT_EQ(fit.inliers, kPoints - 100);
 }
 
@@ -133,7 +133,7 @@ TEST(PoseEstimator, theLeftCamerasPoseIsItsOwn) {
   EXPECT_EQ(s.agreeing(e, 1), 0);
   EXPECT_EQ(fit.cameras, 0b01);
   EXPECT_EQ(fit.stereo, 0);
-  EXPECT_EQ(fit.across, kPoints);
+  EXPECT_EQ(fit.stereo_found, kPoints);
 }
 
 TEST(PoseEstimator, camerasPosedEachForItselfGiveTheRig) {
@@ -209,7 +209,7 @@ TEST(PoseEstimator, oneCamerasPoseAsksForAShareOfItsPoints) {
   Transform T;
   ASSERT_TRUE(e.fit_camera(s.map, 1, s.T_camera_left[1] * s.near(0.01, 0.1), true, &T));
   expect_exact(T, s.T_camera_left[1] * s.T_left_world);
-  // Matches by chance: every sighting somewhere.
+  // Matches by chance: every observation somewhere.
   for (MapPoint& p : s.points())
     p.now.set(1, {s.random.uniform(0, 639), s.random.uniform(0, 479)}, 0.15F);
   EXPECT_FALSE(e.fit_camera(s.map, 1, s.T_camera_left[1] * s.T_left_world, true, &T));

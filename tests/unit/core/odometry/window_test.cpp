@@ -7,7 +7,7 @@
 #include "core/math/random.hpp"
 #include "core/math/so3.hpp"
 #include "core/memory/allocation_guard.hpp"
-#include "core/odometry/lens.hpp"
+#include "core/odometry/undistorted_camera.hpp"
 
 namespace vergence::odometry {
 namespace {
@@ -66,7 +66,7 @@ struct Bend {
   void see(MapPoint* p, std::size_t slot, const Transform& T_left_world) const {
     for (int k = 0; k < 2; ++k) {
       const auto i = static_cast<std::size_t>(k);
-      const Camera camera = Lens(calibration.intrinsics[i]).ideal();
+      const Camera camera = UndistortedCamera(calibration.intrinsics[i]).ideal();
       Vec2 pixel;
       if (camera.project(calibration.T_camera_left[i] * (T_left_world * p->p_world), &pixel,
                          nullptr) == ProjectStatus::ok &&
@@ -94,7 +94,7 @@ struct Bend {
     }
     return worst;
   }
-  [[nodiscard]] int sightings() const {
+  [[nodiscard]] int observations() const {
     int n = 0;
     for (const MapPoint& p : map.points())
       for (const std::uint8_t slot : map.order())
@@ -110,13 +110,13 @@ TEST(WindowAdjuster, exactSightingsBringThePosesBack) {
   const Transform first = b.map.keyframe(b.map.order()[0]).T_left_world;
   b.disturb();
   ASSERT_GT(b.worst_pose_error(), 0.02);
-  const int before = b.sightings();
+  const int before = b.observations();
   const WindowOutcome out = b.adjuster.adjust(b.map);
   EXPECT_LT(b.worst_pose_error(), 1e-6);
   EXPECT_LT(out.rms_px, 1e-4);  // what rounding to floats leaves
   EXPECT_GT(out.points, 100);
   EXPECT_EQ(out.dropped, 0);
-  EXPECT_EQ(b.sightings(), before);
+  EXPECT_EQ(b.observations(), before);
   EXPECT_EQ(b.map.keyframe(b.map.order()[0]).T_left_world.t, first.t)
       << "the oldest keyframe holds the window";
 }
@@ -133,10 +133,10 @@ TEST(WindowAdjuster, grossOutliersAreDroppedAndNothingElse) {
     wrong.push_back(&p);
   }
   ASSERT_GE(wrong.size(), 8U);
-  const int before = b.sightings();
+  const int before = b.observations();
   const WindowOutcome out = b.adjuster.adjust(b.map);
   EXPECT_EQ(out.dropped, static_cast<int>(wrong.size()));
-  EXPECT_EQ(b.sightings(), before - static_cast<int>(wrong.size()));
+  EXPECT_EQ(b.observations(), before - static_cast<int>(wrong.size()));
   for (std::size_t n = 0, i = 3; n < wrong.size(); i += 11) {
     MapPoint& p = b.map.points()[i];
     if (n < wrong.size() && &p == wrong[n]) {
@@ -169,7 +169,7 @@ TEST(WindowAdjuster, oneKeyframeOrNoPointsChangeNothing) {
 }
 
 /// The turn about the camera's y by which the adjuster's rig differs from the one that the
-/// sightings were made with.
+/// observations were made with.
 double turn_left(const Bend& b) {
   return log_so3(Mat3(b.adjuster.T_camera_left()[1].R * rig().T_camera_left[1].R.transpose()))
       .norm();
@@ -186,8 +186,8 @@ TEST(WindowAdjuster, aTurnOfACameraIsOneErrorOfAllPointsAndIsFound) {
   ASSERT_NEAR(turn_left(b), kTurned, 1e-9);
   b.disturb();
   ASSERT_TRUE(b.adjuster.adjust(b.map).usable);
-  // The prior weighs a hundredth of the (0.2 mrad / 50 mrad)² that a window of exact sightings at
-  // 0.15 px would leave it.
+  // The prior weighs a hundredth of the (0.2 mrad / 50 mrad)² that a window of exact observations
+  // at 0.15 px would leave it.
   EXPECT_LT(turn_left(b), 0.01 * kTurned);
   EXPECT_LT(b.worst_pose_error(), 0.01 * 2.0) << "of the 2 m driven";
 }

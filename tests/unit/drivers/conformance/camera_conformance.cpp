@@ -124,8 +124,8 @@ TEST_F(CameraConformance, aWaitEndsWhenTheCameraIsStopped) {
   if (make(13) == nullptr) GTEST_SKIP() << why_;
   auto configuration = rig_->possible().front();
   CameraDevice& camera = rig_->camera();
-  ASSERT_EQ(camera.configure(configuration, nullptr), DeviceStatus::ok) << camera.complaint();
-  ASSERT_EQ(camera.start(nullptr), DeviceStatus::ok) << camera.complaint();
+  ASSERT_EQ(camera.configure(configuration, nullptr), DeviceStatus::ok) << camera.last_error();
+  ASSERT_EQ(camera.start(nullptr), DeviceStatus::ok) << camera.last_error();
   rig_->started();
   std::atomic<bool> ended{false};
   std::thread consumer([&] {
@@ -202,33 +202,33 @@ TEST_F(CameraConformance, anExposureSetWhileStreamingIsToldByFramesAndKeptOverAS
   if (make(18) == nullptr) GTEST_SKIP() << why_;
   CameraDevice& camera = rig_->camera();
   const auto c = rig_->possible().front();
-  ASSERT_EQ(camera.configure(c, nullptr), DeviceStatus::ok) << camera.complaint();
+  ASSERT_EQ(camera.configure(c, nullptr), DeviceStatus::ok) << camera.last_error();
   const std::vector<ExposureSetting> settings = rig_->exposures();
   ExposureSetting actual;
   if (settings.empty()) {
-    ASSERT_EQ(camera.start(nullptr), DeviceStatus::ok) << camera.complaint();
+    ASSERT_EQ(camera.start(nullptr), DeviceStatus::ok) << camera.last_error();
     EXPECT_EQ(camera.set_exposure({c.exposure, c.gain_db}, &actual), DeviceStatus::unsupported);
     return;
   }
   EXPECT_EQ(camera.set_exposure(settings[0], &actual), DeviceStatus::stopped);
-  ASSERT_EQ(camera.start(nullptr), DeviceStatus::ok) << camera.complaint();
+  ASSERT_EQ(camera.start(nullptr), DeviceStatus::ok) << camera.last_error();
   rig_->started();
   EXPECT_TRUE(reaches(*rig_, c, {c.exposure, c.gain_db})) << "as configured";
   EXPECT_EQ(camera.set_exposure({-c.exposure, 0}, &actual), DeviceStatus::bad_configuration);
   EXPECT_EQ(camera.set_exposure({Duration::seconds(2 / c.rate_hz), 0}, &actual),
             DeviceStatus::bad_configuration);
   for (const ExposureSetting& s : settings) {
-    ASSERT_EQ(camera.set_exposure(s, &actual), DeviceStatus::ok) << camera.complaint();
+    ASSERT_EQ(camera.set_exposure(s, &actual), DeviceStatus::ok) << camera.last_error();
     EXPECT_EQ(actual, s);
     EXPECT_TRUE(reaches(*rig_, c, s));
   }
   // Beyond what it has: the nearest.
   ASSERT_EQ(camera.set_exposure({settings[0].exposure, 1e6}, &actual), DeviceStatus::ok)
-      << camera.complaint();
+      << camera.last_error();
   EXPECT_LT(actual.gain_db, 1e6);
   EXPECT_TRUE(reaches(*rig_, c, actual));
   camera.stop();
-  ASSERT_EQ(camera.start(nullptr), DeviceStatus::ok) << camera.complaint();
+  ASSERT_EQ(camera.start(nullptr), DeviceStatus::ok) << camera.last_error();
   EXPECT_TRUE(reaches(*rig_, c, actual));
   camera.stop();
 }
@@ -249,7 +249,7 @@ TEST_F(CameraConformance, ownerConsumerAndReleaserMayBeThreeThreads) {
   if (make(17) == nullptr) GTEST_SKIP() << why_;
   CameraDevice& camera = rig_->camera();
   const auto configuration = rig_->possible().front();
-  ASSERT_EQ(camera.configure(configuration, nullptr), DeviceStatus::ok) << camera.complaint();
+  ASSERT_EQ(camera.configure(configuration, nullptr), DeviceStatus::ok) << camera.last_error();
   std::mutex mutex;
   std::vector<FrameSlot> back;
   std::atomic<bool> over{false};
@@ -280,7 +280,7 @@ TEST_F(CameraConformance, ownerConsumerAndReleaserMayBeThreeThreads) {
   });
   CountingNotifier notifier;
   for (int i = 0; i < 6; ++i) {
-    EXPECT_EQ(camera.start(&notifier), DeviceStatus::ok) << camera.complaint();
+    EXPECT_EQ(camera.start(&notifier), DeviceStatus::ok) << camera.last_error();
     rig_->started();
     for (int k = 0; k < 10; ++k) {
       if (configuration.trigger == CameraTrigger::software) (void)camera.trigger_once();

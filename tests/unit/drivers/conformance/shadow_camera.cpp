@@ -51,9 +51,9 @@ ShadowCamera::~ShadowCamera() {
   release_all();
 }
 
-void ShadowCamera::configure(const CameraConfiguration& wanted) {
+void ShadowCamera::configure(const CameraConfiguration& requested) {
   CameraConfiguration actual;
-  const DeviceStatus status = camera_.configure(wanted, &actual);
+  const DeviceStatus status = camera_.configure(requested, &actual);
   if (state_ == State::streaming || state_ == State::gone) {
     EXPECT_EQ(status, DeviceStatus::busy) << "configured while streaming";
     return;
@@ -62,11 +62,11 @@ void ShadowCamera::configure(const CameraConfiguration& wanted) {
     EXPECT_EQ(status, DeviceStatus::busy) << "configured with slots out";
     return;
   }
-  ASSERT_EQ(status, DeviceStatus::ok) << camera_.complaint();
-  EXPECT_EQ(actual.width, wanted.width);
-  EXPECT_EQ(actual.height, wanted.height);
-  EXPECT_EQ(actual.trigger, wanted.trigger);
-  now_ = wanted;
+  ASSERT_EQ(status, DeviceStatus::ok) << camera_.last_error();
+  EXPECT_EQ(actual.width, requested.width);
+  EXPECT_EQ(actual.height, requested.height);
+  EXPECT_EQ(actual.trigger, requested.trigger);
+  now_ = requested;
   state_ = State::stopped;
   EXPECT_GE(camera_.timing().least_delay, Duration{});
   EXPECT_GT(camera_.timing().resolution, Duration{});
@@ -85,7 +85,7 @@ void ShadowCamera::refuse(const CameraConfiguration& nonsense) {
       << nonsense.rate_hz << " Hz";
   EXPECT_EQ(actual.width, nonsense.width) << "refused, and *actual written";
   if (status == DeviceStatus::unsupported && camera_.info().driver != "mock") {
-    EXPECT_FALSE(camera_.complaint().empty()) << "what the camera offers is not said";
+    EXPECT_FALSE(camera_.last_error().empty()) << "what the camera offers is not said";
   }
 }
 
@@ -96,7 +96,7 @@ void ShadowCamera::start() {
     return;
   }
   if (state_ == State::gone) return;  // only unplug_and_replug() asks for it back
-  ASSERT_EQ(status, DeviceStatus::ok) << camera_.complaint();
+  ASSERT_EQ(status, DeviceStatus::ok) << camera_.last_error();
   if (state_ == State::streaming) return;
   state_ = State::streaming;
   ++starts_;
@@ -120,7 +120,7 @@ void ShadowCamera::trigger_if_asked() {
   if (now_.trigger != CameraTrigger::software || state_ != State::streaming) return;
   const DeviceStatus status = camera_.trigger_once();
   EXPECT_TRUE(status == DeviceStatus::ok || (unplugged_ && status == DeviceStatus::gone))
-      << to_string(status) << camera_.complaint();
+      << to_string(status) << camera_.last_error();
 }
 
 DeviceStatus ShadowCamera::wait(Duration limit) {
@@ -146,7 +146,7 @@ DeviceStatus ShadowCamera::wait(Duration limit) {
       EXPECT_TRUE(state_ == State::unconfigured || state_ == State::stopped);
       break;
     case DeviceStatus::gone:
-      EXPECT_TRUE(unplugged_) << "gone with the cable in: " << camera_.complaint();
+      EXPECT_TRUE(unplugged_) << "gone with the cable in: " << camera_.last_error();
       if (state_ == State::streaming) {
         EXPECT_LE(frame.arrival, now());
         EXPECT_GT(frame.arrival.ns(), 0) << "when it went is not said";
@@ -212,7 +212,7 @@ void ShadowCamera::expect_frames(int count) {
   const auto deadline = steady_clock::now() + std::chrono::nanoseconds(kFirst.ns());
   for (int got = 0; got < count && !::testing::Test::HasFatalFailure();) {
     ASSERT_LT(steady_clock::now(), deadline)
-        << got << " of " << count << " frames came: " << camera_.complaint();
+        << got << " of " << count << " frames came: " << camera_.last_error();
     release_all();
     if (wait(Duration::milliseconds(200)) == DeviceStatus::ok) ++got;
   }
@@ -240,7 +240,7 @@ bool ShadowCamera::unplug_and_replug() {
     if (status == DeviceStatus::ok) break;
     EXPECT_EQ(status, DeviceStatus::gone);
     if (steady_clock::now() > deadline) {
-      ADD_FAILURE() << "plugged in again, and not back: " << camera_.complaint();
+      ADD_FAILURE() << "plugged in again, and not back: " << camera_.last_error();
       return true;
     }
     std::this_thread::sleep_for(std::chrono::milliseconds(100));

@@ -32,7 +32,7 @@ class ShadowCamera {
   [[nodiscard]] std::size_t held() const noexcept { return held_.size(); }
   [[nodiscard]] const CameraConfiguration& configuration() const noexcept { return now_; }
 
-  void configure(const CameraConfiguration& wanted);
+  void configure(const CameraConfiguration& requested);
   /// Must be refused and change nothing.
   void refuse(const CameraConfiguration& nonsense);
   void start();

@@ -26,7 +26,7 @@ TEST(GigeCamera, isConfiguredByTheNamesOfEitherGeneration) {
     c.exposure = Duration::microseconds(1234);
     c.rate_hz = 40;
     CameraConfiguration actual;
-    ASSERT_EQ(b.camera->configure(c, &actual), DeviceStatus::ok) << b.camera->complaint();
+    ASSERT_EQ(b.camera->configure(c, &actual), DeviceStatus::ok) << b.camera->last_error();
     EXPECT_EQ(b.reg(reg::width), 160U);
     EXPECT_EQ(b.reg(reg::height), 120U);
     EXPECT_EQ(b.reg(reg::offset_x), 64U);
@@ -50,7 +50,7 @@ TEST(GigeCamera, whatItCannotDoIsRefusedWithWhatItOffers) {
     CameraConfiguration c = b.wish();
     change(&c);
     EXPECT_EQ(b.camera->configure(c, nullptr), DeviceStatus::unsupported) << word;
-    EXPECT_NE(b.camera->complaint().find(word), std::string::npos) << b.camera->complaint();
+    EXPECT_NE(b.camera->last_error().find(word), std::string::npos) << b.camera->last_error();
   };
   refused([](auto* c) { c->width = 1920; }, "16 to 320 px");
   refused([](auto* c) { c->width = 316; }, "steps of 8");
@@ -127,7 +127,7 @@ TEST(GigeCamera, softwareTriggersAreFrames) {
   EXPECT_EQ(b.camera->trigger_once(), DeviceStatus::stopped);
   b.start();
   for (std::uint64_t n = 0; n < 10; ++n) {
-    ASSERT_EQ(b.camera->trigger_once(), DeviceStatus::ok) << b.camera->complaint();
+    ASSERT_EQ(b.camera->trigger_once(), DeviceStatus::ok) << b.camera->last_error();
     const auto frames = b.take(1);
     ASSERT_EQ(frames.size(), 1U);
     EXPECT_EQ(frames[0].counter, n);
@@ -179,7 +179,7 @@ TEST(GigeCamera, ptpIsSwitchedOnAndItsStateIsTold) {
   old.old_names = true;
   GigeBench without(old, 1);
   EXPECT_EQ(without.camera->configure(c, nullptr), DeviceStatus::unsupported);
-  EXPECT_NE(without.camera->complaint().find("PTP"), std::string::npos);
+  EXPECT_NE(without.camera->last_error().find("PTP"), std::string::npos);
 }
 
 TEST(GigeCamera, packetSizeAndDelayAreComputedForTheLink) {
@@ -194,10 +194,10 @@ TEST(GigeCamera, packetSizeAndDelayAreComputedForTheLink) {
   EXPECT_EQ(b.reg(0xD08), 1692U);
   c.options["link_mbps"] = "50";
   EXPECT_EQ(b.camera->configure(c, nullptr), DeviceStatus::unsupported);
-  EXPECT_NE(b.camera->complaint().find(
+  EXPECT_NE(b.camera->last_error().find(
                 "2 cameras of 320 x 240 Mono8 at 50 Hz do not fit on lo of 50 Mbit/s"),
             std::string::npos)
-      << b.camera->complaint();
+      << b.camera->last_error();
   c.options["packet_size"] = "20000";
   c.options["link_mbps"] = "1000";
   b.configure(c);

@@ -53,7 +53,7 @@ TEST(GigeChunkCamera, everyFrameHadTheExposureThatItsChunkDataSay) {
     Frame frame;
     for (int i = 0; i < 15; ++i) {
       ASSERT_EQ(b.camera->wait(Duration::seconds(1), &frame), DeviceStatus::ok)
-          << b.camera->complaint();
+          << b.camera->last_error();
       EXPECT_EQ(frame.status, FrameStatus::complete);
       if (o.number_images) {
         const std::uint64_t number = b.number(frame);
@@ -78,7 +78,7 @@ TEST(GigeChunkCamera, aChangeWhileItStreamsIsSeenInTheFramesThatHaveIt) {
   for (const int ms : {3, 5, 2, 7, 4, 6}) {
     const std::size_t before = b.numbers.size();
     ASSERT_EQ(b.camera->set_exposure({Duration::milliseconds(ms), 0}, nullptr), DeviceStatus::ok)
-        << b.camera->complaint();
+        << b.camera->last_error();
     const auto frames = b.take(8);
     ASSERT_EQ(frames.size(), 8U);
     expect_told(b, frames, before);

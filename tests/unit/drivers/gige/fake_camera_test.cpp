@@ -18,15 +18,15 @@ TEST(GigeFakeCamera, isConfiguredAndStreams) {
   DeviceStatus status = DeviceStatus::ok;
   const auto driver = gige::make_driver();
   const auto camera = driver->open("127.0.0.1", &status);
-  ASSERT_NE(camera, nullptr) << to_string(status) << driver->complaint();
+  ASSERT_NE(camera, nullptr) << to_string(status) << driver->last_error();
   CameraConfiguration c{256, 200, 40, Duration::milliseconds(3), 0, CameraTrigger::free};
   c.options["packet_size"] = "1400";
-  ASSERT_EQ(camera->configure(c, nullptr), DeviceStatus::ok) << camera->complaint();
-  ASSERT_EQ(camera->start(nullptr), DeviceStatus::ok) << camera->complaint();
+  ASSERT_EQ(camera->configure(c, nullptr), DeviceStatus::ok) << camera->last_error();
+  ASSERT_EQ(camera->start(nullptr), DeviceStatus::ok) << camera->last_error();
   Frame frame;
   for (std::uint64_t n = 0; n < 150; ++n) {  // its ids wrap after 135
     ASSERT_EQ(camera->wait(Duration::seconds(2), &frame), DeviceStatus::ok)
-        << n << camera->complaint();
+        << n << camera->last_error();
     EXPECT_EQ(frame.status, FrameStatus::complete);
     EXPECT_EQ(frame.counter, n);
     camera->release(frame.slot);
@@ -34,9 +34,9 @@ TEST(GigeFakeCamera, isConfiguredAndStreams) {
   EXPECT_EQ(camera->statistics().lost, 0U);
   camera->stop();
   c.trigger = CameraTrigger::software;
-  ASSERT_EQ(camera->configure(c, nullptr), DeviceStatus::ok) << camera->complaint();
-  ASSERT_EQ(camera->start(nullptr), DeviceStatus::ok) << camera->complaint();
-  ASSERT_EQ(camera->trigger_once(), DeviceStatus::ok) << camera->complaint();
+  ASSERT_EQ(camera->configure(c, nullptr), DeviceStatus::ok) << camera->last_error();
+  ASSERT_EQ(camera->start(nullptr), DeviceStatus::ok) << camera->last_error();
+  ASSERT_EQ(camera->trigger_once(), DeviceStatus::ok) << camera->last_error();
   EXPECT_EQ(camera->wait(Duration::seconds(2), &frame), DeviceStatus::ok);
 }
 

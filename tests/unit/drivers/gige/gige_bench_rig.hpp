@@ -29,7 +29,7 @@ struct GigeBench {
     DeviceStatus status = DeviceStatus::ok;
     const auto driver = gige::make_driver();
     camera = driver->open(simulator->options().address, &status);
-    EXPECT_EQ(status, DeviceStatus::ok) << driver->complaint();
+    EXPECT_EQ(status, DeviceStatus::ok) << driver->last_error();
   }
 
   [[nodiscard]] CameraConfiguration wish() const {
@@ -41,9 +41,9 @@ struct GigeBench {
             CameraTrigger::free};
   }
   void configure(const CameraConfiguration& c) {
-    ASSERT_EQ(camera->configure(c, nullptr), DeviceStatus::ok) << camera->complaint();
+    ASSERT_EQ(camera->configure(c, nullptr), DeviceStatus::ok) << camera->last_error();
   }
-  void start() { ASSERT_EQ(camera->start(nullptr), DeviceStatus::ok) << camera->complaint(); }
+  void start() { ASSERT_EQ(camera->start(nullptr), DeviceStatus::ok) << camera->last_error(); }
 
   /// What comes until `count` complete frames came, or a second nothing; all slots given back.
   std::vector<Frame> take(std::size_t count) {

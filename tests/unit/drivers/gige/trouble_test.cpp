@@ -32,7 +32,7 @@ TEST(GigeTrouble, whoIsNotThereIsNotFoundInTime) {
   EXPECT_EQ(status, DeviceStatus::not_found);
   EXPECT_EQ(driver->open(GigeCamera::address(240), &status), nullptr);
   EXPECT_EQ(status, DeviceStatus::not_found);
-  EXPECT_FALSE(driver->complaint().empty());
+  EXPECT_FALSE(driver->last_error().empty());
   EXPECT_LT(seconds_since(begin), 8) << "one look of a second, one address that does not answer";
 }
 
@@ -66,7 +66,8 @@ TEST(GigeTrouble, aCameraOfAnotherProgramIsBusy) {
   DeviceStatus status = DeviceStatus::ok;
   EXPECT_EQ(driver->open(o.address, &status), nullptr);
   EXPECT_EQ(status, DeviceStatus::busy);
-  EXPECT_NE(driver->complaint().find("another program"), std::string::npos) << driver->complaint();
+  EXPECT_NE(driver->last_error().find("another program"), std::string::npos)
+      << driver->last_error();
   simulator.take_control(false);
   EXPECT_NE(driver->open(o.address, &status), nullptr) << "and free again";
 }
@@ -78,14 +79,14 @@ TEST(GigeTrouble, aCameraThatSendsNothingIsGoneWithASentenceAndComesBack) {
   EXPECT_EQ(b.take(3).size(), 3U);
   b.simulator->silence(true);
   ASSERT_TRUE(goes(&b, 6));
-  EXPECT_NE(b.camera->complaint().find("sends no images"), std::string::npos)
-      << b.camera->complaint();
+  EXPECT_NE(b.camera->last_error().find("sends no images"), std::string::npos)
+      << b.camera->last_error();
   b.simulator->silence(false);
   const auto begin = Clock::now();
   DeviceStatus status = DeviceStatus::gone;
   while ((status = b.camera->start(nullptr)) == DeviceStatus::gone && seconds_since(begin) < 10)
     std::this_thread::sleep_for(std::chrono::milliseconds(50));
-  ASSERT_EQ(status, DeviceStatus::ok) << b.camera->complaint();
+  ASSERT_EQ(status, DeviceStatus::ok) << b.camera->last_error();
   const auto frames = b.take(3);
   ASSERT_EQ(frames.size(), 3U);
   EXPECT_EQ(frames[0].counter, 0U);
@@ -103,9 +104,9 @@ TEST(GigeTrouble, anotherSizeThanConfiguredIsToldAndNeverComplete) {
     ASSERT_TRUE(goes(&b, 6)) << width;
     const CameraStatistics s = b.camera->statistics();
     EXPECT_LE(s.delivered - s.torn, whole + 5) << "what was on its way before";
-    EXPECT_NE(b.camera->complaint().find(std::to_string(width) + " x " + std::to_string(height)),
+    EXPECT_NE(b.camera->last_error().find(std::to_string(width) + " x " + std::to_string(height)),
               std::string::npos)
-        << b.camera->complaint();
+        << b.camera->last_error();
   }
 }
 
@@ -149,7 +150,7 @@ TEST(GigeTrouble, thePacketSocketNeedsPermission) {
   b.configure(c);
   allow_raw_sockets(false);
   EXPECT_EQ(b.camera->start(nullptr), DeviceStatus::no_permission);
-  EXPECT_NE(b.camera->complaint().find("CAP_NET_RAW"), std::string::npos);
+  EXPECT_NE(b.camera->last_error().find("CAP_NET_RAW"), std::string::npos);
   allow_raw_sockets(true);
   if (::geteuid() != 0) return;
   b.start();

@@ -73,9 +73,9 @@ TEST(IidcCamera, LostExposuresAreCountedWhenALaterOneComes) {
 
 TEST(IidcCamera, SlotsComeBackInAnyOrderAndTheNewestIsDroppedWithoutOne) {
   CameraUnderTest c;
-  CameraConfiguration wanted = CameraUnderTest::usual();
-  wanted.options["buffers"] = "4";
-  c.configure(wanted);
+  CameraConfiguration requested = CameraUnderTest::usual();
+  requested.options["buffers"] = "4";
+  c.configure(requested);
   ASSERT_EQ(c.camera->start(nullptr), DeviceStatus::ok);
   c.bus->expose(7);
   std::vector<Frame> held;
@@ -119,9 +119,9 @@ TEST(IidcCamera, AFrameShortOfBytesIsTornAndKeepsItsNumber) {
 TEST(IidcCamera, ALostPacketIsFoundByTheNextFramesStampInTheImage) {
   for (const std::size_t lost : {1U, 3U, 100U}) {
     CameraUnderTest c(true);
-    CameraConfiguration wanted = CameraUnderTest::usual();
-    wanted.options["packet_bytes"] = "1024";
-    c.configure(wanted);
+    CameraConfiguration requested = CameraUnderTest::usual();
+    requested.options["packet_bytes"] = "1024";
+    c.configure(requested);
     ASSERT_EQ(c.camera->start(nullptr), DeviceStatus::ok);
     c.bus->expose(1);
     // The receiver fills up with the beginning of the next frame and waits for the start of the one
@@ -157,9 +157,9 @@ TEST(IidcCamera, TheSameOptionSaysWhichInstantIsStamped) {
   std::vector<std::int64_t> starts;
   for (const char* at : {"start", "middle", "end"}) {
     CameraUnderTest c;
-    CameraConfiguration wanted = CameraUnderTest::usual();
-    wanted.options["stamp_at"] = at;
-    c.configure(wanted);
+    CameraConfiguration requested = CameraUnderTest::usual();
+    requested.options["stamp_at"] = at;
+    c.configure(requested);
     ASSERT_EQ(c.camera->start(nullptr), DeviceStatus::ok);
     c.bus->expose(1);
     starts.push_back(c.take_and_release().exposure_start.ns());
@@ -170,10 +170,10 @@ TEST(IidcCamera, TheSameOptionSaysWhichInstantIsStamped) {
 
 TEST(IidcCamera, SixteenBitPixelsBecomeGreyInSlotsOfTheirOwn) {
   CameraUnderTest c;
-  CameraConfiguration wanted = CameraUnderTest::usual();
-  wanted.pixel_format = "Mono16";
-  wanted.options["buffers"] = "5";
-  c.configure(wanted);
+  CameraConfiguration requested = CameraUnderTest::usual();
+  requested.pixel_format = "Mono16";
+  requested.options["buffers"] = "5";
+  c.configure(requested);
   ASSERT_EQ(c.camera->start(nullptr), DeviceStatus::ok);
   c.bus->expose(7);
   EXPECT_EQ(c.camera->statistics().underruns, 2U);
@@ -210,9 +210,9 @@ TEST(IidcCamera, ARestartCountsFromZeroAndForgetsWhatWasUnderWay) {
 
 TEST(IidcCamera, TheSoftwareTriggerFiresOnceACall) {
   CameraUnderTest c;
-  CameraConfiguration wanted = CameraUnderTest::usual();
-  wanted.trigger = CameraTrigger::software;
-  c.configure(wanted);
+  CameraConfiguration requested = CameraUnderTest::usual();
+  requested.trigger = CameraTrigger::software;
+  c.configure(requested);
   EXPECT_EQ(c.camera->trigger_once(), DeviceStatus::stopped);
   ASSERT_EQ(c.camera->start(nullptr), DeviceStatus::ok);
   EXPECT_EQ(c.camera->trigger_once(), DeviceStatus::ok);
@@ -226,9 +226,9 @@ TEST(IidcCamera, TheSoftwareTriggerFiresOnceACall) {
 
 TEST(IidcCamera, WithoutEmbeddedInformationFramesAreCountedAsTheyCome) {
   CameraUnderTest c;
-  CameraConfiguration wanted = CameraUnderTest::usual();
-  wanted.options["embedded"] = "no";
-  c.configure(wanted);
+  CameraConfiguration requested = CameraUnderTest::usual();
+  requested.options["embedded"] = "no";
+  c.configure(requested);
   ASSERT_EQ(c.camera->start(nullptr), DeviceStatus::ok);
   c.bus->expose(3, Duration::milliseconds(100), {1});
   EXPECT_EQ(c.take_and_release().counter, 0U);

@@ -26,11 +26,11 @@ struct CameraUnderTest {
   }
 
   void configure(const CameraConfiguration& c = usual()) {
-    ASSERT_EQ(camera->configure(c, &actual), DeviceStatus::ok) << camera->complaint();
+    ASSERT_EQ(camera->configure(c, &actual), DeviceStatus::ok) << camera->last_error();
   }
   void start() {
     configure();
-    ASSERT_EQ(camera->start(nullptr), DeviceStatus::ok) << camera->complaint();
+    ASSERT_EQ(camera->start(nullptr), DeviceStatus::ok) << camera->last_error();
   }
   /// The next frame, which must be there.
   Frame take() {
@@ -46,7 +46,7 @@ struct CameraUnderTest {
   /// What configure() answers; its sentence in *said.
   DeviceStatus refuse(const CameraConfiguration& c, std::string* said) {
     const DeviceStatus s = camera->configure(c, nullptr);
-    *said = camera->complaint();
+    *said = camera->last_error();
     return s;
   }
 

@@ -14,9 +14,9 @@ void expect_says(const std::string& sentence, std::initializer_list<const char*>
 
 TEST(IidcConfigure, AFixedModeIsTakenWhereSizeAndRateAreItsOwn) {
   CameraUnderTest c;
-  CameraConfiguration wanted = CameraUnderTest::usual();
-  wanted.rate_hz = 30;
-  c.configure(wanted);
+  CameraConfiguration requested = CameraUnderTest::usual();
+  requested.rate_hz = 30;
+  c.configure(requested);
   EXPECT_EQ(c.bus->command(reg::kVideoFormat), 0U << 29U);
   EXPECT_EQ(c.bus->command(reg::kVideoMode), 5U << 29U);
   EXPECT_EQ(c.bus->command(reg::kFrameRate), 4U << 29U);
@@ -28,10 +28,10 @@ TEST(IidcConfigure, AFixedModeIsTakenWhereSizeAndRateAreItsOwn) {
 
 TEST(IidcConfigure, AHigherFixedRateServesTriggers) {
   CameraUnderTest c;
-  CameraConfiguration wanted = CameraUnderTest::usual();
-  wanted.rate_hz = 20;
-  wanted.trigger = CameraTrigger::hardware;
-  c.configure(wanted);
+  CameraConfiguration requested = CameraUnderTest::usual();
+  requested.rate_hz = 20;
+  requested.trigger = CameraTrigger::hardware;
+  c.configure(requested);
   EXPECT_EQ(c.bus->command(reg::kFrameRate), 4U << 29U);  // 30 Hz
   EXPECT_EQ(c.actual.rate_hz, 20);
   const TriggerMode t = TriggerMode::of(c.bus->command(reg::kTriggerMode));
@@ -43,12 +43,12 @@ TEST(IidcConfigure, AHigherFixedRateServesTriggers) {
 
 TEST(IidcConfigure, AnyOtherRateOrRegionIsFormat7) {
   CameraUnderTest c;
-  CameraConfiguration wanted = CameraUnderTest::usual();
-  wanted.width = 320;
-  wanted.height = 240;
-  wanted.offset_x = 64;
-  wanted.offset_y = 32;
-  c.configure(wanted);
+  CameraConfiguration requested = CameraUnderTest::usual();
+  requested.width = 320;
+  requested.height = 240;
+  requested.offset_x = 64;
+  requested.offset_y = 32;
+  c.configure(requested);
   EXPECT_EQ(c.bus->command(reg::kVideoFormat), 7U << 29U);
   EXPECT_EQ(c.bus->model().f7_size, 320U << 16U | 240U);
   EXPECT_EQ(c.bus->model().f7_position, 64U << 16U | 32U);
@@ -62,22 +62,22 @@ TEST(IidcConfigure, AnyOtherRateOrRegionIsFormat7) {
 TEST(IidcConfigure, APacketIsTheCamerasShareOfTheBus) {
   CameraUnderTest bus(true), usb;
   for (const int cameras : {1, 2, 3}) {
-    CameraConfiguration wanted = CameraUnderTest::usual();
-    wanted.sharing = cameras;
-    bus.configure(wanted);
+    CameraConfiguration requested = CameraUnderTest::usual();
+    requested.sharing = cameras;
+    bus.configure(requested);
     const std::size_t packet = bus.bus->shape().packet_bytes,
                       share = kBandwidthUnits / static_cast<unsigned>(cameras);
     EXPECT_LE(bandwidth_units(packet, BusSpeed::s400), share);
     if (packet < 4096) {
       EXPECT_GT(bandwidth_units(packet + 4, BusSpeed::s400), share);
     }
-    usb.configure(wanted);
+    usb.configure(requested);
     EXPECT_LE(static_cast<double>(usb.bus->shape().packet_bytes) * kCyclesPerSecond * cameras,
               33e6);
   }
-  CameraConfiguration wanted = CameraUnderTest::usual();
-  wanted.options["packet_bytes"] = "1024";
-  bus.configure(wanted);
+  CameraConfiguration requested = CameraUnderTest::usual();
+  requested.options["packet_bytes"] = "1024";
+  bus.configure(requested);
   EXPECT_EQ(bus.bus->model().f7_packet, 1024U);
 }
 
@@ -91,17 +91,17 @@ TEST(IidcConfigure, WherePacketsSetTheRateTheyAreTheSmallestThatReachIt) {
 
 TEST(IidcConfigure, MovingALargeRegionNeverLeavesTheSensor) {
   CameraUnderTest c;
-  CameraConfiguration wanted = CameraUnderTest::usual();
-  wanted.width = 320;
-  wanted.height = 240;
-  wanted.offset_x = 960;
-  wanted.offset_y = 720;
-  c.configure(wanted);
-  wanted.width = 1280;
-  wanted.height = 960;
-  wanted.offset_x = wanted.offset_y = 0;
-  wanted.rate_hz = 5;
-  c.configure(wanted);
+  CameraConfiguration requested = CameraUnderTest::usual();
+  requested.width = 320;
+  requested.height = 240;
+  requested.offset_x = 960;
+  requested.offset_y = 720;
+  c.configure(requested);
+  requested.width = 1280;
+  requested.height = 960;
+  requested.offset_x = requested.offset_y = 0;
+  requested.rate_hz = 5;
+  c.configure(requested);
   std::uint32_t x = 0, width = 640;
   for (const auto& [address, value] : c.bus->written) {
     if (address == kRegisterSpace + 0xF08008) x = value >> 16U;
@@ -112,10 +112,10 @@ TEST(IidcConfigure, MovingALargeRegionNeverLeavesTheSensor) {
 
 TEST(IidcConfigure, ExposureAndGainAreAbsoluteAndReadBack) {
   CameraUnderTest c;
-  CameraConfiguration wanted = CameraUnderTest::usual();
-  wanted.exposure = Duration::microseconds(1234);
-  wanted.gain_db = 6.5;
-  c.configure(wanted);
+  CameraConfiguration requested = CameraUnderTest::usual();
+  requested.exposure = Duration::microseconds(1234);
+  requested.gain_db = 6.5;
+  c.configure(requested);
   EXPECT_FLOAT_EQ(c.bus->model().shutter_abs, 0.001234F);
   EXPECT_FLOAT_EQ(c.bus->model().gain_abs, 6.5F);
   EXPECT_NEAR(c.actual.exposure.to_seconds(), 0.001234, 1e-9);
@@ -130,9 +130,9 @@ TEST(IidcConfigure, TheEmbeddedStampAndCounterAreAskedFor) {
   EXPECT_EQ(c.bus->model().frame_info, 0x41U);
   EXPECT_EQ(c.camera->plan().info.size(), 8U);
   EXPECT_TRUE(c.camera->remark().empty());
-  CameraConfiguration wanted = CameraUnderTest::usual();
-  wanted.options["embedded"] = "no";
-  c.configure(wanted);
+  CameraConfiguration requested = CameraUnderTest::usual();
+  requested.options["embedded"] = "no";
+  c.configure(requested);
   EXPECT_EQ(c.bus->model().frame_info, 0U);
   expect_says(c.camera->remark(), {"embeds no counter"});
 }
@@ -146,13 +146,13 @@ TEST(IidcConfigure, ACameraWithoutTheVendorsRegistersIsTakenAsItIs) {
 
 TEST(IidcConfigure, StrobeAndTriggerOptionsReachTheirRegisters) {
   CameraUnderTest c;
-  CameraConfiguration wanted = CameraUnderTest::usual();
-  wanted.trigger = CameraTrigger::hardware;
-  wanted.options = {
+  CameraConfiguration requested = CameraUnderTest::usual();
+  requested.trigger = CameraTrigger::hardware;
+  requested.options = {
       {"strobe_pin", "2"},     {"strobe_delay_us", "1000"}, {"strobe_duration_us", "2000"},
       {"strobe_level", "low"}, {"trigger_edge", "falling"}, {"trigger_source", "1"},
       {"trigger_mode", "0"}};
-  c.configure(wanted);
+  c.configure(requested);
   const StrobeControl s = StrobeControl::of(c.bus->model().strobe[2]);
   EXPECT_TRUE(s.on);
   EXPECT_FALSE(s.high);
@@ -170,31 +170,31 @@ TEST(IidcConfigure, TheBusSpeedIsTheCamerasBest) {
   EXPECT_EQ(legacy.bus->model().iso_speed, 2U);
   beta.configure();
   EXPECT_EQ(beta.bus->model().iso_speed, 3U);
-  CameraConfiguration wanted = CameraUnderTest::usual();
-  wanted.options["speed"] = "800";
+  CameraConfiguration requested = CameraUnderTest::usual();
+  requested.options["speed"] = "800";
   std::string said;
-  EXPECT_EQ(legacy.refuse(wanted, &said), DeviceStatus::unsupported);
+  EXPECT_EQ(legacy.refuse(requested, &said), DeviceStatus::unsupported);
   expect_says(said, {"speed", "S400"});
-  wanted.options["speed"] = "400";
-  beta.configure(wanted);
+  requested.options["speed"] = "400";
+  beta.configure(requested);
   EXPECT_EQ(beta.bus->model().iso_speed, 2U);
 }
 
 TEST(IidcConfigure, APacketThatLeavesNoRoomForTheOthersIsTakenOnlyWhereThereIsNoSmallerOne) {
-  CameraConfiguration wanted = CameraUnderTest::usual();
-  wanted.width = 1280;
-  wanted.height = 960;
-  wanted.rate_hz = 30;
+  CameraConfiguration requested = CameraUnderTest::usual();
+  requested.width = 1280;
+  requested.height = 960;
+  requested.rate_hz = 30;
   CameraUnderTest c(true, true);
-  c.configure(wanted);
+  c.configure(requested);
   EXPECT_EQ(c.bus->shape().packet_bytes, 5120U) << "alone: the fixed mode";
-  wanted.sharing = 2;
-  c.configure(wanted);
+  requested.sharing = 2;
+  c.configure(requested);
   EXPECT_EQ(c.bus->command(reg::kVideoFormat), 7U << 29U);
   EXPECT_LE(2 * bandwidth_units(c.bus->shape().packet_bytes, BusSpeed::s800), kBandwidthUnits);
   EXPECT_NEAR(c.actual.rate_hz, 30, 0.3);
-  wanted.options["format7"] = "no";
-  c.configure(wanted);
+  requested.options["format7"] = "no";
+  c.configure(requested);
   EXPECT_EQ(c.bus->shape().packet_bytes, 5120U);
 }
 
@@ -202,9 +202,9 @@ TEST(IidcConfigure, WhatCannotBeSaysWhatTheCameraOffers) {
   CameraUnderTest c(true);
   std::string said;
   auto with = [](auto change) {
-    CameraConfiguration wanted = CameraUnderTest::usual();
-    change(wanted);
-    return wanted;
+    CameraConfiguration requested = CameraUnderTest::usual();
+    change(requested);
+    return requested;
   };
   EXPECT_EQ(c.refuse(with([](auto& w) { w.width = 641; }), &said), DeviceStatus::unsupported);
   expect_says(said, {"641 x 480", "640 x 480 Mono8 at", "1280 x 960 in steps of 8 x 2"});
@@ -244,19 +244,19 @@ TEST(IidcConfigure, ARefusedRequestWritesNothing) {
   CameraUnderTest c;
   c.configure();
   c.bus->written.clear();
-  CameraConfiguration wanted = CameraUnderTest::usual();
-  wanted.gain_db = 99;
+  CameraConfiguration requested = CameraUnderTest::usual();
+  requested.gain_db = 99;
   std::string said;
-  EXPECT_EQ(c.refuse(wanted, &said), DeviceStatus::unsupported);
+  EXPECT_EQ(c.refuse(requested, &said), DeviceStatus::unsupported);
   EXPECT_TRUE(c.bus->written.empty());
   EXPECT_EQ(c.camera->start(nullptr), DeviceStatus::ok);
 }
 
 TEST(IidcConfigure, WithoutFormat7ARateBetweenTheFixedOnesBecomesTheNext) {
   CameraUnderTest c;
-  CameraConfiguration wanted = CameraUnderTest::usual();
-  wanted.options["format7"] = "no";
-  c.configure(wanted);
+  CameraConfiguration requested = CameraUnderTest::usual();
+  requested.options["format7"] = "no";
+  c.configure(requested);
   EXPECT_EQ(c.actual.rate_hz, 15);
   EXPECT_EQ(c.bus->command(reg::kVideoFormat), 0U);
 }

@@ -69,7 +69,7 @@ class FakeBus final : public iidc::CameraBus {
   DeviceStatus reopen() noexcept override;
   void give_back(FrameSlot slot) noexcept override { memory_.release(slot); }
   const std::uint8_t* bytes(FrameSlot slot) const noexcept override { return memory_.bytes(slot); }
-  std::string complaint() const override { return "the fake bus says so"; }
+  std::string last_error() const override { return "the fake bus says so"; }
   std::string remark(const iidc::StreamShape&, double, int) const override { return {}; }
 
   [[nodiscard]] HostStamp now() const { return HostStamp(kStart + elapsed_); }

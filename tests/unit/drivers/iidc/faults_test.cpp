@@ -16,7 +16,7 @@ TEST(IidcFaults, ARegisterThatNeverBecomesReadyEndsInTime) {
   EXPECT_EQ(c.camera->configure(CameraUnderTest::usual(), nullptr), DeviceStatus::timeout);
   EXPECT_GE(monotonic_now() - begun, kPatience);
   EXPECT_LE(monotonic_now() - begun, kPatience + kSlack);
-  EXPECT_EQ(c.camera->complaint(), "register 0xf0807c did not become ready in time");
+  EXPECT_EQ(c.camera->last_error(), "register 0xf0807c did not become ready in time");
   EXPECT_EQ(c.camera->start(nullptr), DeviceStatus::bad_configuration);
   c.bus->stuck.clear();
   c.start();
@@ -24,27 +24,27 @@ TEST(IidcFaults, ARegisterThatNeverBecomesReadyEndsInTime) {
 
 TEST(IidcFaults, ASoftwareTriggerThatStaysBusyEndsInTime) {
   CameraUnderTest c;
-  CameraConfiguration wanted = CameraUnderTest::usual();
-  wanted.trigger = CameraTrigger::software;
-  c.configure(wanted);
+  CameraConfiguration requested = CameraUnderTest::usual();
+  requested.trigger = CameraTrigger::software;
+  c.configure(requested);
   ASSERT_EQ(c.camera->start(nullptr), DeviceStatus::ok);
   c.bus->stuck[kCommand + reg::kSoftwareTrigger] = bit(31);
   const HostStamp begun = monotonic_now();
   EXPECT_EQ(c.camera->trigger_once(), DeviceStatus::timeout);
   EXPECT_LE(monotonic_now() - begun, kPatience + kSlack);
-  EXPECT_FALSE(c.camera->complaint().empty());
+  EXPECT_FALSE(c.camera->last_error().empty());
 }
 
 TEST(IidcFaults, ARegionThatTheCameraRefusesIsToldAsSuch) {
   CameraUnderTest c;
   c.bus->stuck[kFormat7 + reg::format7::kValueSetting] = reg::format7::kErrorRegion;
   EXPECT_EQ(c.camera->configure(CameraUnderTest::usual(), nullptr), DeviceStatus::unsupported);
-  EXPECT_NE(c.camera->complaint().find("refuses the region 640 x 480"), std::string::npos)
-      << c.camera->complaint();
+  EXPECT_NE(c.camera->last_error().find("refuses the region 640 x 480"), std::string::npos)
+      << c.camera->last_error();
   c.bus->stuck[kFormat7 + reg::format7::kValueSetting] = reg::format7::kErrorPacket;
   EXPECT_EQ(c.camera->configure(CameraUnderTest::usual(), nullptr), DeviceStatus::unsupported);
-  EXPECT_NE(c.camera->complaint().find("refuses packets"), std::string::npos)
-      << c.camera->complaint();
+  EXPECT_NE(c.camera->last_error().find("refuses packets"), std::string::npos)
+      << c.camera->last_error();
 }
 
 TEST(IidcFaults, EveryRegisterMayRefuseAndNothingHangsOrCrashes) {
@@ -61,7 +61,7 @@ TEST(IidcFaults, EveryRegisterMayRefuseAndNothingHangsOrCrashes) {
     const DeviceStatus status = c.camera->configure(CameraUnderTest::usual(), nullptr);
     EXPECT_TRUE(status == DeviceStatus::ok || status == DeviceStatus::unsupported)
         << std::hex << address << ' ' << to_string(status);
-    EXPECT_EQ(status == DeviceStatus::ok, c.camera->complaint().empty()) << std::hex << address;
+    EXPECT_EQ(status == DeviceStatus::ok, c.camera->last_error().empty()) << std::hex << address;
   }
 }
 
@@ -95,7 +95,7 @@ TEST(IidcFaults, AnUnpluggedCameraIsGoneAfterWhatWasUnderWayAndComesBackAsConfig
   EXPECT_EQ(c.camera->view(held.slot).at(0, 1), 2) << "an image that is held stays";
   c.bus->replug();
   EXPECT_FALSE(c.bus->model().transmitting);
-  ASSERT_EQ(c.camera->start(nullptr), DeviceStatus::ok) << c.camera->complaint();
+  ASSERT_EQ(c.camera->start(nullptr), DeviceStatus::ok) << c.camera->last_error();
   EXPECT_EQ(c.bus->model().format, 7U) << "all registers are written anew";
   EXPECT_EQ(c.bus->reopened(), 2);
   c.bus->expose(1);
@@ -120,7 +120,7 @@ TEST(IidcFaults, ACameraThatDoesNotAnswerIsGoneAndNotWaitedFor) {
   c.configure();
   c.bus->all_accesses = DeviceStatus::timeout;
   EXPECT_EQ(c.camera->start(nullptr), DeviceStatus::gone);
-  EXPECT_NE(c.camera->complaint().find("did not become ready"), std::string::npos);
+  EXPECT_NE(c.camera->last_error().find("did not become ready"), std::string::npos);
   c.bus->all_accesses = DeviceStatus::ok;
   EXPECT_EQ(c.camera->start(nullptr), DeviceStatus::ok);
 }
@@ -131,7 +131,7 @@ TEST(IidcFaults, ABusWithoutRoomSaysSoAndLeavesTheCameraQuiet) {
   c.bus->start_status = DeviceStatus::no_bandwidth;
   EXPECT_EQ(c.camera->start(nullptr), DeviceStatus::no_bandwidth);
   EXPECT_FALSE(c.bus->model().transmitting);
-  EXPECT_FALSE(c.camera->complaint().empty());
+  EXPECT_FALSE(c.camera->last_error().empty());
   Frame f;
   EXPECT_EQ(c.camera->wait(Duration{}, &f), DeviceStatus::stopped);
   c.bus->start_status = DeviceStatus::ok;

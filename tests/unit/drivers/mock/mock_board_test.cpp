@@ -129,11 +129,11 @@ TEST(MockBoard, variedIntervalsAreLongerAndShorterAsTheProtocolSays) {
   ASSERT_EQ(b.pulses.size(), times.size());
   ASSERT_EQ(b.frames[1].size(), times.size());
   for (std::size_t i = 0; i + 1 < times.size(); ++i) {
-    const Duration wanted =
+    const Duration requested =
         kPeriod + (trigger_interval_is_longer(static_cast<std::uint32_t>(i)) ? c.vary : -c.vary);
-    EXPECT_EQ(times[i + 1] - times[i], wanted);
+    EXPECT_EQ(times[i + 1] - times[i], requested);
     const Duration by_camera = b.frames[1][i + 1].exposure_start - b.frames[1][i].exposure_start;
-    EXPECT_NEAR(static_cast<double>((by_camera - wanted).ns()), 0, 3000)
+    EXPECT_NEAR(static_cast<double>((by_camera - requested).ns()), 0, 3000)
         << "drift and whole microseconds";
   }
 }

@@ -45,7 +45,7 @@ struct PulseRigOptions {
     double from = 0, until = 0;
   };
   std::vector<Gone> gone{};
-  std::vector<double> reboots{};  // the board begins anew; no pulses for 0.7 s
+  std::vector<double> reboots{};  // the board begins again; no pulses for 0.7 s
   struct Jump {
     int camera = 0;
     double at = 0, seconds = 0;

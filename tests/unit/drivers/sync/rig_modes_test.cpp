@@ -250,7 +250,7 @@ struct MasterRig {
     out.drain(&sync);
     if (sync.wants_pause() == 0) return;
     ++pauses;
-    // The master is stopped and started: its count begins anew, its clock goes on.
+    // The master is stopped and started: its count begins again, its clock goes on.
     time = time + Duration::microseconds(233'400);
     sync.absent(0);
     sync.restarted(0);

@@ -26,7 +26,7 @@ void expect_gapless(const std::vector<Pulse>& all) {
 
 TEST(Board, isMetSetAndRead) {
   BoardRig rig(board_for(Duration::seconds(10)));
-  ASSERT_EQ(rig.device->connect(), DeviceStatus::ok) << rig.device->complaint();
+  ASSERT_EQ(rig.device->connect(), DeviceStatus::ok) << rig.device->last_error();
   EXPECT_EQ(rig.device->info().serial, "30002b000b51333634393138");
   EXPECT_EQ(rig.device->info().model, "trigger board, firmware 1.0.0");
   EXPECT_EQ(rig.device->identity().lines, 4);
@@ -35,7 +35,7 @@ TEST(Board, isMetSetAndRead) {
   EXPECT_EQ(rig.device->start(nullptr), DeviceStatus::bad_configuration) << "not configured";
   TriggerConfiguration actual;
   ASSERT_EQ(rig.device->configure(thirty_hertz(), &actual), DeviceStatus::ok)
-      << rig.device->complaint();
+      << rig.device->last_error();
   EXPECT_EQ(actual.rate_hz, 30);
   EXPECT_TRUE(rig.device->remark().empty());
   ASSERT_EQ(rig.device->start(nullptr), DeviceStatus::ok);
@@ -59,7 +59,7 @@ TEST(Board, isMetSetAndRead) {
 TEST(Board, tellsEveryPulseOfTenMinutes) {
   BoardRig rig(board_for(Duration::seconds(600)), direct_line());
   ASSERT_EQ(rig.device->configure(thirty_hertz(), nullptr), DeviceStatus::ok)
-      << rig.device->complaint();
+      << rig.device->last_error();
   ASSERT_EQ(rig.device->start(nullptr), DeviceStatus::ok);
   const auto all = rig.pulses();
   expect_gapless(all);
@@ -81,14 +81,14 @@ TEST(Board, isFoundAtWhicheverBaudRateItHas) {
     board.baud = baud;
     BoardRig rig(board);
     ASSERT_EQ(rig.device->configure(thirty_hertz(), nullptr), DeviceStatus::ok)
-        << baud << ": " << rig.device->complaint();
+        << baud << ": " << rig.device->last_error();
     ASSERT_EQ(rig.device->start(nullptr), DeviceStatus::ok);
     EXPECT_EQ(rig.pulses(30).size(), 30U);
   }
   mock::BoardSimulatorOptions board = board_for(Duration::seconds(20));
   board.baud = 57600;
   BoardRig other(board, {}, {.baud = 57600});
-  EXPECT_EQ(other.device->connect(), DeviceStatus::ok) << other.device->complaint();
+  EXPECT_EQ(other.device->connect(), DeviceStatus::ok) << other.device->last_error();
 }
 
 TEST(Board, exposureFeedbackComesWithItsPulse) {
@@ -102,10 +102,11 @@ TEST(Board, exposureFeedbackComesWithItsPulse) {
             p.edge + Duration::microseconds(6041 + p.number)};
     return e;
   };
-  TriggerConfiguration wanted = thirty_hertz();
-  wanted.feedback = 0x03;
-  wanted.feedback_active_low = 0x02;
-  ASSERT_EQ(rig.device->configure(wanted, nullptr), DeviceStatus::ok) << rig.device->complaint();
+  TriggerConfiguration requested = thirty_hertz();
+  requested.feedback = 0x03;
+  requested.feedback_active_low = 0x02;
+  ASSERT_EQ(rig.device->configure(requested, nullptr), DeviceStatus::ok)
+      << rig.device->last_error();
   ASSERT_EQ(rig.device->start(nullptr), DeviceStatus::ok);
   const auto all = rig.pulses();
   ASSERT_GT(all.size(), 500U);
@@ -128,9 +129,10 @@ TEST(Board, exposureFeedbackComesWithItsPulse) {
 
 TEST(Board, variedIntervalsAreThoseThatBothSidesKnow) {
   BoardRig rig(board_for(Duration::seconds(10)), direct_line());
-  TriggerConfiguration wanted = thirty_hertz();
-  wanted.vary = Duration::milliseconds(2);
-  ASSERT_EQ(rig.device->configure(wanted, nullptr), DeviceStatus::ok) << rig.device->complaint();
+  TriggerConfiguration requested = thirty_hertz();
+  requested.vary = Duration::milliseconds(2);
+  ASSERT_EQ(rig.device->configure(requested, nullptr), DeviceStatus::ok)
+      << rig.device->last_error();
   ASSERT_EQ(rig.device->start(nullptr), DeviceStatus::ok);
   const auto all = rig.pulses();
   ASSERT_GT(all.size(), 250U);
@@ -146,7 +148,7 @@ TEST(Board, aPauseIsAGapWithoutLoss) {
   BoardRig rig(board_for(Duration::seconds(30)), direct_line());
   ASSERT_EQ(rig.device->pause(4), DeviceStatus::stopped);
   ASSERT_EQ(rig.device->configure(thirty_hertz(), nullptr), DeviceStatus::ok)
-      << rig.device->complaint();
+      << rig.device->last_error();
   ASSERT_EQ(rig.device->start(nullptr), DeviceStatus::ok);
   auto all = rig.pulses(50);
   ASSERT_EQ(rig.device->pause(4), DeviceStatus::ok);
@@ -176,7 +178,7 @@ TEST(Board, aRebootIsANewBootAndTheBoardGoesOnByItself) {
     board.reboots.push_back(at_s(10 + i + 0.000'137 * i));  // at any byte of any frame
   BoardRig rig(board, direct_line());
   ASSERT_EQ(rig.device->configure(thirty_hertz(), nullptr), DeviceStatus::ok)
-      << rig.device->complaint();
+      << rig.device->last_error();
   ASSERT_EQ(rig.device->start(nullptr), DeviceStatus::ok);
   const auto all = rig.pulses();
   EXPECT_EQ(rig.times_gone, 0) << "it answers all the while";
@@ -204,7 +206,7 @@ TEST(Board, pulsesGoOnWhileTheLineIsAwayAndWhatWasMissedIsCounted) {
   line.outages = {{at_s(10), at_s(12.5)}};
   BoardRig rig(board_for(Duration::seconds(20)), line);
   ASSERT_EQ(rig.device->configure(thirty_hertz(), nullptr), DeviceStatus::ok)
-      << rig.device->complaint();
+      << rig.device->last_error();
   ASSERT_EQ(rig.device->start(nullptr), DeviceStatus::ok);
   const auto all = rig.pulses();
   EXPECT_EQ(rig.times_gone, 1);
@@ -227,7 +229,7 @@ TEST(Board, oneThatLostItsSupplyTooBeginsAnew) {
   line.outages = {{at_s(10), at_s(12), false}, {at_s(15), at_s(15.2), false}};
   BoardRig rig(board_for(Duration::seconds(20)), line);
   ASSERT_EQ(rig.device->configure(thirty_hertz(), nullptr), DeviceStatus::ok)
-      << rig.device->complaint();
+      << rig.device->last_error();
   ASSERT_EQ(rig.device->start(nullptr), DeviceStatus::ok);
   const auto all = rig.pulses();
   EXPECT_EQ(rig.times_gone, 2);
@@ -285,9 +287,9 @@ TEST(Board, theReportThatAStopLeavesBehindIsNotLost) {
     e[0] = {true, p.edge + Duration::microseconds(35), p.edge + Duration::milliseconds(30)};
     return e;
   };
-  TriggerConfiguration wanted = thirty_hertz();
-  wanted.feedback = 0x01;
-  ASSERT_EQ(rig.device->configure(wanted, nullptr), DeviceStatus::ok);
+  TriggerConfiguration requested = thirty_hertz();
+  requested.feedback = 0x01;
+  ASSERT_EQ(rig.device->configure(requested, nullptr), DeviceStatus::ok);
   for (int i = 0; i < 20; ++i) {
     ASSERT_EQ(rig.device->start(nullptr), DeviceStatus::ok);
     const auto all = rig.pulses(3);
@@ -307,7 +309,7 @@ TEST(Board, oneThatRanBeforeTheProgramIsStoppedFirst) {
   (void)rig.place->pass(Duration::seconds(8));
   ASSERT_GT(rig.simulator->pulses_made(), 50U);
   ASSERT_EQ(rig.device->configure(thirty_hertz(), nullptr), DeviceStatus::ok)
-      << rig.device->complaint();
+      << rig.device->last_error();
   const std::uint64_t made = rig.simulator->pulses_made();
   (void)rig.place->pass(Duration::seconds(1));
   EXPECT_EQ(rig.simulator->pulses_made(), made);
@@ -344,7 +346,7 @@ TEST(Board, secondsOfPpsAndTheInsAreCountedAndTheTicksLocked) {
   board.ins_interval = Duration::milliseconds(40);
   BoardRig rig(board, direct_line(), {.pps = Edge::rising, .ins = Edge::falling});
   ASSERT_EQ(rig.device->configure(thirty_hertz(), nullptr), DeviceStatus::ok)
-      << rig.device->complaint();
+      << rig.device->last_error();
   ASSERT_EQ(rig.device->start(nullptr), DeviceStatus::ok);
   const auto all = rig.pulses();
   const BoardStatistics s = rig.device->board_statistics();
@@ -384,7 +386,6 @@ TEST(Board, anotherOneInItsPlaceIsNotTaken) {
 }
 
 // ---- what is asked
-// ----------------------------------------------------------------------------------------------------
 
 struct Refusal {
   const char* name;
@@ -399,15 +400,15 @@ TEST_P(Refused, withTheKeyToChange) {
   board.lines = 2;
   board.feedback_inputs = 1;
   BoardRig rig(board);
-  TriggerConfiguration wanted = thirty_hertz();
-  GetParam().change(&wanted);
-  EXPECT_EQ(rig.device->configure(wanted, nullptr), GetParam().status);
-  EXPECT_NE(rig.device->complaint().find(GetParam().word), std::string::npos)
-      << rig.device->complaint();
+  TriggerConfiguration requested = thirty_hertz();
+  GetParam().change(&requested);
+  EXPECT_EQ(rig.device->configure(requested, nullptr), GetParam().status);
+  EXPECT_NE(rig.device->last_error().find(GetParam().word), std::string::npos)
+      << rig.device->last_error();
   EXPECT_EQ(rig.device->start(nullptr), DeviceStatus::bad_configuration);
   EXPECT_EQ(rig.device->configure(thirty_hertz(), nullptr), DeviceStatus::ok)
       << "and it can still be set otherwise";
-  EXPECT_TRUE(rig.device->complaint().empty());
+  EXPECT_TRUE(rig.device->last_error().empty());
 }
 
 INSTANTIATE_TEST_SUITE_P(
@@ -446,17 +447,17 @@ TEST(Configuration, inputsThatTheBoardHasNotAreRefused) {
   board.has_pps = board.has_ins = false;
   BoardRig pps(board, {}, {.pps = Edge::rising});
   EXPECT_EQ(pps.device->configure(thirty_hertz(), nullptr), DeviceStatus::unsupported);
-  EXPECT_NE(pps.device->complaint().find("trigger.pps"), std::string::npos);
+  EXPECT_NE(pps.device->last_error().find("trigger.pps"), std::string::npos);
   BoardRig ins(board, {}, {.ins = Edge::rising});
   EXPECT_EQ(ins.device->configure(thirty_hertz(), nullptr), DeviceStatus::unsupported);
-  EXPECT_NE(ins.device->complaint().find("trigger.ins"), std::string::npos);
+  EXPECT_NE(ins.device->last_error().find("trigger.ins"), std::string::npos);
 }
 
 TEST(Configuration, aRateBetweenThousandthsIsRemarkedOn) {
   BoardRig rig(board_for(Duration::seconds(100)));
-  TriggerConfiguration wanted = thirty_hertz(), actual;
-  wanted.rate_hz = 1000.0 / 33;
-  ASSERT_EQ(rig.device->configure(wanted, &actual), DeviceStatus::ok);
+  TriggerConfiguration requested = thirty_hertz(), actual;
+  requested.rate_hz = 1000.0 / 33;
+  ASSERT_EQ(rig.device->configure(requested, &actual), DeviceStatus::ok);
   EXPECT_EQ(actual.rate_hz, 30.303);
   EXPECT_NE(rig.device->remark().find("30.303"), std::string::npos) << rig.device->remark();
 }

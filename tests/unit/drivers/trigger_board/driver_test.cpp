@@ -92,19 +92,19 @@ TEST(Driver, opensByPortBySerialNumberOrTheOnlyOne) {
   m.add_board("/dev/ttyACM0", 0xAA);
   Driver driver = m.driver();
   DeviceStatus s = DeviceStatus::failed;
-  EXPECT_NE(driver.open("", &s), nullptr) << driver.complaint();
+  EXPECT_NE(driver.open("", &s), nullptr) << driver.last_error();
   EXPECT_EQ(s, DeviceStatus::ok);
   EXPECT_NE(driver.open("/dev/ttyACM0", &s), nullptr);
   m.add_board("/dev/ttyACM1", 0xBB);
   EXPECT_EQ(driver.open("", &s), nullptr);
   EXPECT_EQ(s, DeviceStatus::not_found);
-  EXPECT_NE(driver.complaint().find("trigger.port"), std::string::npos);
+  EXPECT_NE(driver.last_error().find("trigger.port"), std::string::npos);
   const auto one = driver.open("30002b000b513336343931bb", &s);
-  ASSERT_NE(one, nullptr) << driver.complaint();
+  ASSERT_NE(one, nullptr) << driver.last_error();
   EXPECT_EQ(one->info().serial, "30002b000b513336343931bb");
   EXPECT_EQ(driver.open("30002b000b513336343931cc", &s), nullptr);
   EXPECT_EQ(s, DeviceStatus::not_found);
-  EXPECT_NE(driver.complaint().find("30002b000b513336343931cc"), std::string::npos);
+  EXPECT_NE(driver.last_error().find("30002b000b513336343931cc"), std::string::npos);
 }
 
 TEST(Driver, saysWhyThereIsNone) {
@@ -113,7 +113,7 @@ TEST(Driver, saysWhyThereIsNone) {
   DeviceStatus s = DeviceStatus::ok;
   EXPECT_EQ(driver.open("", &s), nullptr);
   EXPECT_EQ(s, DeviceStatus::not_found);
-  EXPECT_NE(driver.complaint().find("plug it in"), std::string::npos);
+  EXPECT_NE(driver.last_error().find("plug it in"), std::string::npos);
   m.add("/dev/ttyUSB9", 0x0403, 0x6001, DeviceStatus::no_permission);
   EXPECT_EQ(driver.open("", &s), nullptr);
   EXPECT_EQ(s, DeviceStatus::no_permission);
@@ -121,7 +121,7 @@ TEST(Driver, saysWhyThereIsNone) {
   EXPECT_EQ(s, DeviceStatus::no_permission);
   EXPECT_EQ(driver.open("/dev/nothing", &s), nullptr);
   EXPECT_EQ(s, DeviceStatus::not_found);
-  EXPECT_FALSE(driver.complaint().empty());
+  EXPECT_FALSE(driver.last_error().empty());
 }
 
 }  // namespace

@@ -33,7 +33,7 @@ Outcome half_a_minute(Tampered::Tamper tamper,
   });
   Outcome o;
   EXPECT_EQ(rig.device->configure(thirty_hertz(), nullptr), DeviceStatus::ok)
-      << rig.device->complaint();
+      << rig.device->last_error();
   EXPECT_EQ(rig.device->start(nullptr), DeviceStatus::ok);
   o.pulses = rig.pulses();
   o.board = rig.device->board_statistics();
@@ -231,8 +231,8 @@ TEST(Hostile, aBoardWhoseNumbersStandStillIsGoneAndNamed) {
   DeviceStatus s = DeviceStatus::ok;
   while (s == DeviceStatus::ok) s = rig.device->wait(Duration::seconds(20), &p);
   EXPECT_EQ(s, DeviceStatus::gone);
-  EXPECT_NE(rig.device->complaint().find("backwards"), std::string::npos)
-      << rig.device->complaint();
+  EXPECT_NE(rig.device->last_error().find("backwards"), std::string::npos)
+      << rig.device->last_error();
   EXPECT_GE(rig.device->board_statistics().pulses.repeated, 8U);
 }
 
@@ -286,7 +286,7 @@ TEST(Hostile, questionsThatAreLostOnTheWayAreAskedAgain) {
   rig.between->lose(
       [&](HostStamp, std::span<const std::uint8_t>) { return random.uniform() < 0.3; });
   ASSERT_EQ(rig.device->configure(thirty_hertz(), nullptr), DeviceStatus::ok)
-      << rig.device->complaint();
+      << rig.device->last_error();
   ASSERT_EQ(rig.device->start(nullptr), DeviceStatus::ok);
   const auto all = rig.pulses();
   EXPECT_EQ(rig.times_gone, 0);
@@ -298,7 +298,6 @@ TEST(Hostile, questionsThatAreLostOnTheWayAreAskedAgain) {
 }
 
 // ---- who is there
-// -----------------------------------------------------------------------------------------------------
 
 /// Something else on the port: says the same every 200 ms, and answers a frame as it is told.
 class Talker final : public mock::DeviceModel {
@@ -339,12 +338,11 @@ class Talker final : public mock::DeviceModel {
 };
 
 std::string complaint_about(std::shared_ptr<mock::DeviceModel> there, DeviceStatus* status) {
-  std::string complaint;
-  const auto device =
-      open_on(std::make_unique<mock::SimulatedPlace>(std::move(there), direct_line()), {}, status,
-              &complaint);
+  std::string error;
+  const auto device = open_on(
+      std::make_unique<mock::SimulatedPlace>(std::move(there), direct_line()), {}, status, &error);
   EXPECT_EQ(device, nullptr);
-  return complaint;
+  return error;
 }
 std::string complaint_about(const std::string& says, DeviceStatus* status) {
   return complaint_about(std::make_shared<Talker>(says), status);
@@ -432,7 +430,7 @@ TEST(AStubbornBoard, thatAnswersAndDoesNothingIsNamed) {
   });
   Device device(std::make_unique<mock::SimulatedPlace>(there, direct_line()), {});
   EXPECT_EQ(device.configure(thirty_hertz(), nullptr), DeviceStatus::failed);
-  EXPECT_TRUE(has(device.complaint(), "does not do it")) << device.complaint();
+  EXPECT_TRUE(has(device.last_error(), "does not do it")) << device.last_error();
 }
 
 }  // namespace

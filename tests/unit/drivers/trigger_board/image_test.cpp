@@ -106,13 +106,13 @@ TEST(Image, isDrivenAndItsRebootSeen) {
   Options options;
   options.native_usb = true;
   DeviceStatus status = DeviceStatus::ok;
-  std::string complaint;
-  const auto board = open_on(machine.place(), options, &status, &complaint);
-  ASSERT_NE(board, nullptr) << complaint;
+  std::string error;
+  const auto board = open_on(machine.place(), options, &status, &error);
+  ASSERT_NE(board, nullptr) << error;
   EXPECT_EQ(board->info().serial.size(), 24U);
-  TriggerConfiguration wanted;
-  wanted.rate_hz = kBoardRate;
-  ASSERT_EQ(board->configure(wanted, nullptr), DeviceStatus::ok) << board->complaint();
+  TriggerConfiguration requested;
+  requested.rate_hz = kBoardRate;
+  ASSERT_EQ(board->configure(requested, nullptr), DeviceStatus::ok) << board->last_error();
 
   const auto take = [&board](std::chrono::milliseconds time) {
     std::vector<Pulse> all;
@@ -127,7 +127,7 @@ TEST(Image, isDrivenAndItsRebootSeen) {
         continue;
       }
       if (s != DeviceStatus::ok && s != DeviceStatus::timeout) {
-        ADD_FAILURE() << to_string(s) << " " << board->complaint();
+        ADD_FAILURE() << to_string(s) << " " << board->last_error();
         break;
       }
     }
@@ -168,7 +168,7 @@ TEST(Image, isDrivenAndItsRebootSeen) {
   EXPECT_EQ(s.reboots, 1U);
   EXPECT_EQ(s.restarts, 0U);
   EXPECT_EQ(s.pulses.refused(), 0U);
-  EXPECT_EQ(s.board.state, trigger_stopped) << board->complaint();
+  EXPECT_EQ(s.board.state, trigger_stopped) << board->last_error();
   EXPECT_LE(s.line.refused(), 1U) << "a frame that the reset has cut";
 }
 

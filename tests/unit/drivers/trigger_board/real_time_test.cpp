@@ -111,7 +111,7 @@ TriggerConfiguration hundred_hertz() {
 TEST(RealTime, ownerConsumerAndOnlookersDoNotMeet) {
   PipeRig rig;
   ASSERT_EQ(rig.device->configure(hundred_hertz(), nullptr), DeviceStatus::ok)
-      << rig.device->complaint();
+      << rig.device->last_error();
   for (int round = 0; round < 2; ++round) {
     ASSERT_EQ(rig.device->start(nullptr), DeviceStatus::ok);
     std::atomic<bool> done{false};
@@ -149,7 +149,7 @@ TEST(RealTime, ownerConsumerAndOnlookersDoNotMeet) {
 TEST(RealTime, aLineThatIsCutIsGoneAndStopsAtOnce) {
   PipeRig rig;
   ASSERT_EQ(rig.device->configure(hundred_hertz(), nullptr), DeviceStatus::ok)
-      << rig.device->complaint();
+      << rig.device->last_error();
   ASSERT_EQ(rig.device->start(nullptr), DeviceStatus::ok);
   Pulse p;
   ASSERT_EQ(rig.device->wait(Duration::seconds(5), &p), DeviceStatus::ok);
@@ -168,7 +168,7 @@ TEST(RealTime, theDevicesThreadAllocatesNothingWhileItReads) {
   std::atomic<bool> seal{false};
   PipeRig rig(seal);
   ASSERT_EQ(rig.device->configure(hundred_hertz(), nullptr), DeviceStatus::ok)
-      << rig.device->complaint();
+      << rig.device->last_error();
   ASSERT_EQ(rig.device->start(nullptr), DeviceStatus::ok);
   Pulse p;
   ASSERT_EQ(rig.device->wait(Duration::seconds(5), &p), DeviceStatus::ok);

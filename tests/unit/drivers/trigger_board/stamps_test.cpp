@@ -36,9 +36,10 @@ Errors errors_of(mock::BoardSimulatorOptions board, mock::SimulatedLineOptions l
           x[1] = {true, p.edge + Duration::microseconds(30), p.edge + Duration::microseconds(8030)};
       return x;
     };
-    TriggerConfiguration wanted = thirty_hertz();
-    wanted.feedback = 0x03;
-    EXPECT_EQ(rig.device->configure(wanted, nullptr), DeviceStatus::ok) << rig.device->complaint();
+    TriggerConfiguration requested = thirty_hertz();
+    requested.feedback = 0x03;
+    EXPECT_EQ(rig.device->configure(requested, nullptr), DeviceStatus::ok)
+        << rig.device->last_error();
     EXPECT_EQ(rig.device->start(nullptr), DeviceStatus::ok);
     const auto all = rig.pulses();
     EXPECT_GT(all.size(), 1700U);

@@ -50,8 +50,8 @@ TEST(V4l2Settings, optionsAreReadIntoTheirTypes) {
                {"gain_step_db", "0.3"},   {"trigger_control", "Trigger Mode"},
                {"trigger_value", "2"},    {"control_Test Pattern", "100% Black"}};
   Options o;
-  std::string complaint;
-  ASSERT_TRUE(parse_options(c, &o, &complaint)) << complaint;
+  std::string error;
+  ASSERT_TRUE(parse_options(c, &o, &error)) << error;
   EXPECT_EQ(o.readout, Duration::nanoseconds(12'500'500));
   EXPECT_EQ(o.thin, 4);
   EXPECT_EQ(o.buffers, 8);
@@ -72,9 +72,9 @@ TEST(V4l2Settings, aWrongOptionIsRefusedWithASentence) {
     CameraConfiguration c = sound();
     c.options = {{key, value}};
     Options o;
-    std::string complaint;
-    EXPECT_FALSE(parse_options(c, &o, &complaint)) << key << " " << value;
-    EXPECT_NE(complaint.find(key), std::string::npos) << complaint;
+    std::string error;
+    EXPECT_FALSE(parse_options(c, &o, &error)) << key << " " << value;
+    EXPECT_NE(error.find(key), std::string::npos) << error;
     EXPECT_EQ(o.buffers, Options().buffers) << "a refusal changes nothing";
   }
 }

@@ -117,7 +117,7 @@ TEST(SampleCounter, wrapsAndBridgesGapsByTheTimeBetween) {
       << "nine minutes of silence at 120 Hz: a whole turn";
   EXPECT_EQ(c.count(), 65'546 + 65'546);
   EXPECT_EQ(c.next(20, 1), ClockStep::backward);
-  EXPECT_EQ(c.next(30'000, 5), ClockStep::restart) << "started anew";
+  EXPECT_EQ(c.next(30'000, 5), ClockStep::restart) << "restarted";
 }
 
 /// Messages of one period behind one another on a line without a converter: each read ends with a

@@ -148,14 +148,14 @@ std::uint8_t QemuBoard::send(std::uint8_t type, const Bytes& payload) {
   return sequence_;
 }
 
-TriggerFrame QemuBoard::wait(const Predicate& wanted) {
+TriggerFrame QemuBoard::wait(const Predicate& requested) {
   std::unique_lock lock(mutex_);
   const auto deadline = std::chrono::steady_clock::now() + kPatience;
   for (;;) {
     while (looked_at_ < heard_.size()) {
       const Heard& h = heard_[looked_at_++];
       arrival_ = h.at;
-      if (wanted(h.frame)) return h.frame;
+      if (requested(h.frame)) return h.frame;
     }
     if (heard_something_.wait_until(lock, deadline) == std::cv_status::timeout)
       throw std::runtime_error("the board said nothing of the kind");

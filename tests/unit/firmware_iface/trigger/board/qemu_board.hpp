@@ -49,9 +49,9 @@ class QemuBoard {
   void bytes(const Bytes& sent);
   /// Sends a message with the next sequence number. → that number
   std::uint8_t send(std::uint8_t type, const Bytes& payload = {});
-  /// The next frame not yet looked at that `wanted` likes, waiting ten seconds; others before it
+  /// The next frame not yet looked at that `requested` likes, waiting ten seconds; others before it
   /// are skipped.
-  TriggerFrame wait(const Predicate& wanted);
+  TriggerFrame wait(const Predicate& requested);
   TriggerFrame wait(std::uint8_t type) {
     return wait([type](const TriggerFrame& f) { return f.type == type; });
   }

@@ -8,13 +8,13 @@ namespace vergence::app {
 /// for the real-time path: wait() sleeps in the kernel.
 ///
 ///     for (;;) {
-///       const Doorbell::Rung seen = bell.look();   // before the look at the ring: a ring in
+///       const WakeEvent::Rung seen = bell.look();   // before the look at the ring: a ring in
 ///       between is not missed if (ring.pop(&item)) break; bell.wait(seen);
 ///     }
 ///
 /// Threads  Everything from any thread. No heap; ring() makes a system call only when somebody
 ///          waits.
-class Doorbell {
+class WakeEvent {
  public:
   using Rung = std::uint32_t;  // the width a futex has: waiting needs no proxy
 

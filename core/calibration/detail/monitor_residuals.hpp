@@ -9,7 +9,7 @@
 
 namespace vergence::calibration::detail {
 
-inline constexpr std::size_t kMaxSightings = 1024;  // of a frame; further ones are left out
+inline constexpr std::size_t kMaxObservations = 1024;  // of a frame; further ones are left out
 
 /// The reference as the looks need it.
 struct Reference {
@@ -20,8 +20,8 @@ struct Reference {
   Pinhole left{}, right{};
 };
 
-/// What one frame's matches across say.
-struct AcrossLook {
+/// What one frame's stereo matches say.
+struct StereoResiduals {
   bool usable = false;  // enough matches
   Evidence evidence;
   double spread_now = 0;   // variance of g, this frame alone, over the white one: mean of the five
@@ -30,27 +30,28 @@ struct AcrossLook {
 };
 
 /// What the tracks through motion of one look say; nothing where there are too few.
-struct MotionLook {
+struct MotionResiduals {
   bool usable = false;
   Evidence evidence;
   double spread = 0;  // as above; a track speaks once
 };
 
-/// Turns sightings into evidence about θ, with redescending weights about the frame's own robust
+/// Turns observations into evidence about θ, with redescending weights about the frame's own robust
 /// fit: a shifted rig is no outlier.
 ///
-/// Memory  Fixed, in place (some 300 kB): lives in an arena. Time: linear in the sightings.
-class Looks {
+/// Memory  Fixed, in place (some 300 kB): lives in an arena. Time: linear in the observations.
+class MonitorResiduals {
  public:
   void reset() noexcept;
   /// `follow`: remember what each track said, for spread_life. Off while the camera stands, where
   /// tracks live for ever.
-  [[nodiscard]] AcrossLook across(const Reference& reference, const MonitorFrame& frame,
-                                  int min_matches, bool follow) noexcept;
-  [[nodiscard]] MotionLook motion(const Reference& reference, const MonitorFrame& frame) noexcept;
+  [[nodiscard]] StereoResiduals stereo(const Reference& reference, const MonitorFrame& frame,
+                                       int min_matches, bool follow) noexcept;
+  [[nodiscard]] MotionResiduals motion(const Reference& reference,
+                                       const MonitorFrame& frame) noexcept;
 
  private:
-  struct AcrossRow {
+  struct StereoRow {
     std::array<double, kTheta> J;  // px
     double r;                      // px
     double inverse_sigma2;         // of r, 1/px²
@@ -66,18 +67,18 @@ class Looks {
   };
   struct Memory {
     std::uint32_t track = 0;
-    std::uint64_t frame = 0;  // of the last sighting, plus one; 0: empty
+    std::uint64_t frame = 0;  // of the last observation, plus one; 0: empty
     std::array<double, kFixed> sum{};
   };
   [[nodiscard]] static bool motion_row(const Reference& reference, const MonitorFrame& frame,
                                        const MotionTrack& track, MotionRow* row) noexcept;
   void spread_of(const Evidence& evidence, const Vec5& fit, std::uint64_t frame, bool follow,
-                 AcrossLook* look) noexcept;
+                 StereoResiduals* look) noexcept;
 
   std::size_t rows_ = 0;
-  std::array<AcrossRow, kMaxSightings> across_{};
-  std::array<MotionRow, kMaxSightings / 2> motion_{};
-  std::array<double, kMaxSightings> sizes_{};  // scratch of the medians
+  std::array<StereoRow, kMaxObservations> stereo_{};
+  std::array<MotionRow, kMaxObservations / 2> motion_{};
+  std::array<double, kMaxObservations> sizes_{};  // scratch of the medians
   std::array<Memory, 4096> memories_{};  // by track number; a newer track takes the place of one
                                          // that has the same last bits
 };

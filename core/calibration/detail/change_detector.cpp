@@ -1,4 +1,4 @@
-#include "core/calibration/detail/monitor_windows.hpp"
+#include "core/calibration/detail/change_detector.hpp"
 
 #include <Eigen/Cholesky>
 #include <Eigen/LU>
@@ -12,8 +12,8 @@ namespace {
 // What correlated tracks bring in over their life, until it is measured: times the spread of the
 // first frame, of the first look; and the frames (looks) that guess weighs.
 constexpr double kFirstLife = 6.5, kFirstMotion = 2.0, kGuessFrames = 30, kGuessLooks = 4;
-// Of the scatter's variance, in looks at motion: two instants have it each, and along the baseline,
-// where no epipolar line measures it, real lenses leave more of it than across.
+// Of the scatter's variance, in residuals of motion: two instants have it each, and along the
+// baseline, where no epipolar line measures it, real lenses leave more of it than across.
 constexpr double kMotionBias = 4;
 constexpr double kForgetAcross = 1.0 / 300, kForgetFast = 1.0 / 10,
                  kForgetMotion = 1.0 / 40;  // a frame, a frame, a look
@@ -47,7 +47,7 @@ constexpr int kLagPatience = 30;  // frames a verdict waits for the rivals to pa
 
 }  // namespace
 
-void Windows::reset(const MonitorOptions& options, const Mat5& covariance) noexcept {
+void ChangeDetector::reset(const MonitorOptions& options, const Mat5& covariance) noexcept {
   options_ = options;
   covariance_ = covariance;
   renew_floor();
@@ -55,42 +55,42 @@ void Windows::reset(const MonitorOptions& options, const Mat5& covariance) noexc
   for (const int frames : {options.short_window, 10, 30, 75, 150, options.long_window}) {
     const auto n = static_cast<std::size_t>(frames);
     if (n > static_cast<std::size_t>(options.long_window) ||
-        (window_count_ > 0 && n <= windows_[window_count_ - 1]))
+        (window_count_ > 0 && n <= detector_[window_count_ - 1]))
       continue;
-    windows_[window_count_++] = n;
+    detector_[window_count_++] = n;
   }
   count_ = closed_ = 0;
   open_ = Entry{};
   total_ = TwoEvidences{};
-  lambda_across_ = lambda_motion_ = now_fast_ = now_slow_ = life_slow_ = 0;
-  looks_ = 0;
+  lambda_stereo_ = lambda_motion_ = now_fast_ = now_slow_ = life_slow_ = 0;
+  residuals_ = 0;
   over_ = 0;
   newest_statistic_ = 0;
 }
 
-void Windows::expect_scatter(double bias_px) noexcept {
+void ChangeDetector::expect_scatter(double bias_px) noexcept {
   scatter_.expect(std::max(bias_px, options_.bias_px));
   renew_floor();
 }
 
-void Windows::renew_floor() noexcept {
+void ChangeDetector::renew_floor() noexcept {
   const double least = options_.bias_px * options_.bias_px / kFixed;
   bias2_ = std::max(least, scatter_.variance());
   motion_bias2_ = std::max(least, kMotionBias * scatter_.variance());
 }
 
 /// The block just closed against those before it.
-void Windows::measure_scatter() noexcept {
+void ChangeDetector::measure_scatter() noexcept {
   // What may be a change of the rig is no scatter.
   if (closed_ == 0 || newest_statistic_ > kRelease * options_.threshold) return;
   Evidence past;
   for (std::size_t i = 0; i < std::min<std::size_t>({closed_, kScatterBlocks, kBlocks}); ++i)
-    past.add(block(i).evidence.across);
-  scatter_.add(open_.evidence.across, past, lambda_across_);
+    past.add(block(i).evidence.stereo);
+  scatter_.add(open_.evidence.stereo, past, lambda_stereo_);
   renew_floor();
 }
 
-void Windows::follow_spread(const FrameEvidence& e) noexcept {
+void ChangeDetector::follow_spread(const FrameEvidence& e) noexcept {
   const auto follow = [](double* mean, double value, double rate) {
     const double most = kSpreadOutlier * *mean;
     if (value > -most) *mean += rate * (std::min(value, most) - *mean);  // also refuses NaN
@@ -106,19 +106,19 @@ void Windows::follow_spread(const FrameEvidence& e) noexcept {
   }
   // Noise that has just grown (rain, dusk) counts at once, for the tracks it will go on to spoil.
   const double grown = now_slow_ > 0 ? std::max(1.0, now_fast_ / now_slow_) : 1.0;
-  lambda_across_ =
+  lambda_stereo_ =
       std::clamp(std::max(life_slow_, now_slow_) * grown, kLeastInflation, kMostInflation);
   if (e.spread_motion < 0) return;
-  if (looks_ == 0)
+  if (residuals_ == 0)
     lambda_motion_ = kFirstMotion * e.spread_motion;
   else
     follow(&lambda_motion_, e.spread_motion,
-           std::max(kForgetMotion, 1.0 / (static_cast<double>(looks_) + kGuessLooks)));
+           std::max(kForgetMotion, 1.0 / (static_cast<double>(residuals_) + kGuessLooks)));
   lambda_motion_ = std::clamp(lambda_motion_, kLeastInflation, kMostInflation);
-  ++looks_;
+  ++residuals_;
 }
 
-void Windows::push(const FrameEvidence& e) noexcept {
+void ChangeDetector::push(const FrameEvidence& e) noexcept {
   follow_spread(e);
   Entry& entry = recent_[count_ % kRecent];
   entry.frame = e.frame;
@@ -137,14 +137,15 @@ void Windows::push(const FrameEvidence& e) noexcept {
   }
 }
 
-Evidence Windows::effective(const TwoEvidences& sum) const noexcept {
+Evidence ChangeDetector::effective(const TwoEvidences& sum) const noexcept {
   Evidence e;
-  e.add(sum.across, 1.0 / (lambda_across_ + bias2_ * sum.across.n));
+  e.add(sum.stereo, 1.0 / (lambda_stereo_ + bias2_ * sum.stereo.n));
   if (sum.motion.n > 0) e.add(sum.motion, 1.0 / (lambda_motion_ + motion_bias2_ * sum.motion.n));
   return e;
 }
 
-double Windows::statistic(const Evidence& e, const Vec5& mean, const Mat5& covariance) noexcept {
+double ChangeDetector::statistic(const Evidence& e, const Vec5& mean,
+                                 const Mat5& covariance) noexcept {
   const Mat5 A = fixed_block(e);
   const Mat5 M = A + A * covariance * A;
   std::array<double, kTriangle> packed{};
@@ -155,14 +156,15 @@ double Windows::statistic(const Evidence& e, const Vec5& mean, const Mat5& covar
   return Solved(packed, g).fixed_gain();
 }
 
-void Windows::learn(const TwoEvidences& window, Vec5* mean, Mat5* covariance) const noexcept {
+void ChangeDetector::learn(const TwoEvidences& window, Vec5* mean,
+                           Mat5* covariance) const noexcept {
   TwoEvidences past = total_;
   past.add(open_.evidence);
   past.add(window, -1.0);
   // Without the floor: window and past share most of the slow error, and the window's own floor
   // stands for what they do not share.
   Evidence e;
-  e.add(past.across, 1.0 / lambda_across_);
+  e.add(past.stereo, 1.0 / lambda_stereo_);
   if (past.motion.n > 0) e.add(past.motion, 1.0 / lambda_motion_);
   // (C⁻¹ + A)⁻¹, written so that neither need have an inverse.
   const Mat5 spread = Mat5::Identity() + covariance_ * fixed_block(e);
@@ -170,7 +172,7 @@ void Windows::learn(const TwoEvidences& window, Vec5* mean, Mat5* covariance) co
   *mean = *covariance * Eigen::Map<const Vec5>(e.g.data());
 }
 
-void Windows::estimate(const Evidence& e, Vec5* theta, Mat5* covariance) const noexcept {
+void ChangeDetector::estimate(const Evidence& e, Vec5* theta, Mat5* covariance) const noexcept {
   Mat5 A = fixed_block(e);
   A.diagonal().array() += 1.0 / (kPriorSigma * kPriorSigma);
   const Eigen::LLT<Mat5> llt(A);
@@ -178,20 +180,20 @@ void Windows::estimate(const Evidence& e, Vec5* theta, Mat5* covariance) const n
   *theta = llt.solve(Eigen::Map<const Vec5>(e.g.data()));
 }
 
-double Windows::single(const Evidence& across, double spread) const noexcept {
+double ChangeDetector::single(const Evidence& stereo, double spread) const noexcept {
   Evidence e;
-  e.add(across, 1.0 / (std::max(spread, kLeastInflation) + bias2_ * across.n));
+  e.add(stereo, 1.0 / (std::max(spread, kLeastInflation) + bias2_ * stereo.n));
   return statistic(e, Vec5::Zero(), covariance_);
 }
 
-void Windows::single_estimate(const Evidence& across, double spread, Vec5* theta,
-                              Mat5* covariance) const noexcept {
+void ChangeDetector::single_estimate(const Evidence& stereo, double spread, Vec5* theta,
+                                     Mat5* covariance) const noexcept {
   Evidence e;
-  e.add(across, 1.0 / (std::max(spread, kLeastInflation) + bias2_ * across.n));
+  e.add(stereo, 1.0 / (std::max(spread, kLeastInflation) + bias2_ * stereo.n));
   estimate(e, theta, covariance);
 }
 
-void Windows::sum_of(std::size_t frames, TwoEvidences* sum) const noexcept {
+void ChangeDetector::sum_of(std::size_t frames, TwoEvidences* sum) const noexcept {
   *sum = open_.evidence;
   const std::size_t open = count_ % kBlock;
   const std::size_t blocks = std::min<std::size_t>(
@@ -199,7 +201,7 @@ void Windows::sum_of(std::size_t frames, TwoEvidences* sum) const noexcept {
   for (std::size_t i = 0; i < blocks; ++i) sum->add(block(i).evidence);
 }
 
-Decision Windows::decide() noexcept {
+Decision ChangeDetector::decide() noexcept {
   Decision d;
   d.lag_sigma = d.yaw_sigma = std::numeric_limits<double>::infinity();
   if (count_ == 0) return d;
@@ -213,24 +215,25 @@ Decision Windows::decide() noexcept {
   };
   TwoEvidences sum;
   std::size_t summed = 0;
-  for (std::size_t w = 0; w < window_count_ && windows_[w] <= count_; ++w) {
-    if (windows_[w] <= kRecent) {
-      for (; summed < windows_[w]; ++summed) sum.add(recent(summed).evidence);
+  for (std::size_t w = 0; w < window_count_ && detector_[w] <= count_; ++w) {
+    if (detector_[w] <= kRecent) {
+      for (; summed < detector_[w]; ++summed) sum.add(recent(summed).evidence);
     } else {
-      sum_of(windows_[w], &sum);
+      sum_of(detector_[w], &sum);
     }
     longest = effective(sum);
     double most = statistic(longest, Vec5::Zero(), covariance_);
-    if (windows_[w] >= kLearnWindow && windows_[w] <= kLearnLongest && count_ >= 2 * windows_[w]) {
+    if (detector_[w] >= kLearnWindow && detector_[w] <= kLearnLongest &&
+        count_ >= 2 * detector_[w]) {
       Vec5 learnt;
       Mat5 covariance;
       learn(sum, &learnt, &covariance);
       most = std::max(most, statistic(longest, learnt, covariance));
     }
-    if (most > d.statistic) d.statistic = most, window = windows_[w];
-    Evidence across;
-    across.add(sum.across, 1.0 / (lambda_across_ + bias2_ * sum.across.n));
-    const Solved solved(across.A, across.g);
+    if (most > d.statistic) d.statistic = most, window = detector_[w];
+    Evidence stereo;
+    stereo.add(sum.stereo, 1.0 / (lambda_stereo_ + bias2_ * sum.stereo.n));
+    const Solved solved(stereo.A, stereo.g);
     d.lag = solved.lag();
     d.lag_sigma = solved.lag_sigma();
     lagging = lagging || stands_out(solved);
@@ -244,7 +247,7 @@ Decision Windows::decide() noexcept {
   return d;
 }
 
-void Windows::search(const Vec5& mean, Search* found) const noexcept {
+void ChangeDetector::search(const Vec5& mean, Search* found) const noexcept {
   struct Moments {
     Evidence zeroth, first, second;  // Σ e, Σ age e, Σ age² e from now back
     void add(const Evidence& e, double scale, double age) noexcept {
@@ -258,11 +261,11 @@ void Windows::search(const Vec5& mean, Search* found) const noexcept {
       return r;
     }
   };
-  Moments all, across;
+  Moments all, stereo;
   TwoEvidences raw;
   const auto take = [&](const Entry& entry, double age, int frames, bool ask) {
-    all.add(entry.evidence.across, 1.0 / lambda_across_, age);
-    across.add(entry.evidence.across, 1.0 / lambda_across_, age);
+    all.add(entry.evidence.stereo, 1.0 / lambda_stereo_, age);
+    stereo.add(entry.evidence.stereo, 1.0 / lambda_stereo_, age);
     if (entry.evidence.motion.n > 0) all.add(entry.evidence.motion, 1.0 / lambda_motion_, age);
     raw.add(entry.evidence);
     if (!ask) return;
@@ -276,14 +279,14 @@ void Windows::search(const Vec5& mean, Search* found) const noexcept {
     const auto keep = [&](Onset* best, double gain, const Evidence& sum) {
       if (gain > best->gain) *best = Onset{gain, entry.frame, frames, sum, raw};
     };
-    const Solved fixed = solved(all.zeroth), lagged = solved(across.zeroth);
+    const Solved fixed = solved(all.zeroth), lagged = solved(stereo.zeroth);
     keep(&found->step, fixed.fixed_gain(), all.zeroth);
-    keep(&found->step_across, lagged.fixed_gain(), across.zeroth);
-    keep(&found->both_across, lagged.fixed_gain() + lagged.lag_gain(), across.zeroth);
+    keep(&found->step_stereo, lagged.fixed_gain(), stereo.zeroth);
+    keep(&found->both_stereo, lagged.fixed_gain() + lagged.lag_gain(), stereo.zeroth);
     if (frames < kRampFrames) return;
-    const Evidence ramp = all.ramp(frames), ramp_across = across.ramp(frames);
+    const Evidence ramp = all.ramp(frames), ramp_stereo = stereo.ramp(frames);
     keep(&found->ramp, solved(ramp).fixed_gain(), ramp);
-    keep(&found->ramp_across, solved(ramp_across).fixed_gain(), ramp_across);
+    keep(&found->ramp_stereo, solved(ramp_stereo).fixed_gain(), ramp_stereo);
   };
   // Single frames up to a block's edge, then blocks.
   const std::size_t open = count_ % kBlock;
@@ -298,16 +301,16 @@ void Windows::search(const Vec5& mean, Search* found) const noexcept {
   }
 }
 
-bool Windows::find_lag(const Search& found, Decision* d) const noexcept {
-  const Onset& both = found.both_across;
+bool ChangeDetector::find_lag(const Search& found, Decision* d) const noexcept {
+  const Onset& both = found.both_stereo;
   Evidence e;
-  e.add(both.raw.across, 1.0 / (lambda_across_ + bias2_ * both.raw.across.n));
+  e.add(both.raw.stereo, 1.0 / (lambda_stereo_ + bias2_ * both.raw.stereo.n));
   const Solved lag(e.A, e.g);
   const double size = std::abs(lag.lag());
   if (both.frames < kLagFrames || !(size > options_.lag_frames && size < kLagMost &&
                                     size > options_.lag_sigmas * lag.lag_sigma()))
     return false;
-  if (both.gain < std::max(found.step_across.gain, found.ramp_across.gain) + kLagMargin)
+  if (both.gain < std::max(found.step_stereo.gain, found.ramp_stereo.gain) + kLagMargin)
     return false;
   d->kind = MonitorVerdict::Kind::out_of_step;
   d->lag = lag.lag();
@@ -318,8 +321,8 @@ bool Windows::find_lag(const Search& found, Decision* d) const noexcept {
   return true;
 }
 
-bool Windows::lag_is_rival(const Search& found) const noexcept {
-  const Onset& step = found.step_across;
+bool ChangeDetector::lag_is_rival(const Search& found) const noexcept {
+  const Onset& step = found.step_stereo;
   const double A = step.since.A[lower(kLag, kLag)], g = step.since.g[kLag];
   if (!(A > 0) || g * g / A < kLagExplains * step.gain) return false;
   const double alone = g / A;
@@ -328,7 +331,7 @@ bool Windows::lag_is_rival(const Search& found) const noexcept {
   return std::abs(both.lag() - alone) < std::max(options_.lag_sigmas * both.lag_sigma(), kLagModel);
 }
 
-TwoEvidences Windows::since(const Onset& onset) const noexcept {
+TwoEvidences ChangeDetector::since(const Onset& onset) const noexcept {
   // A look from before the onset to after it compares two rigs: it alarms, but it measures neither.
   TwoEvidences sum = onset.raw;
   for (std::size_t age = 0;
@@ -340,7 +343,7 @@ TwoEvidences Windows::since(const Onset& onset) const noexcept {
   return sum;
 }
 
-void Windows::attribute(std::size_t window, Decision* d) noexcept {
+void ChangeDetector::attribute(std::size_t window, Decision* d) noexcept {
   // What the rig was before, where that is known: a reference that is a little off is no onset.
   Vec5 mean = Vec5::Zero();
   const std::size_t recent_frames = std::clamp(window, kLearnWindow, kLearnLongest);

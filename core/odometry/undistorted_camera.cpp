@@ -1,4 +1,4 @@
-#include "core/odometry/lens.hpp"
+#include "core/odometry/undistorted_camera.hpp"
 
 #include <cmath>
 
@@ -6,7 +6,7 @@
 
 namespace vergence::odometry {
 
-bool Lens::ray_jacobian(const Vec2& raw, Vec3* ray, Mat2* J) const noexcept {
+bool UndistortedCamera::ray_jacobian(const Vec2& raw, Vec3* ray, Mat2* J) const noexcept {
   if (!raw_.unproject(raw, ray)) return false;
   Vec2 pixel;
   Mat23 by_point;
@@ -18,7 +18,8 @@ bool Lens::ray_jacobian(const Vec2& raw, Vec3* ray, Mat2* J) const noexcept {
   return true;
 }
 
-bool Lens::undistort(const Vec2& raw, Vec2* ideal, double* magnification) const noexcept {
+bool UndistortedCamera::undistort(const Vec2& raw, Vec2* ideal,
+                                  double* magnification) const noexcept {
   if (!distorted_) {
     *ideal = raw;
     *magnification = 1.0;

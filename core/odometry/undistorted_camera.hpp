@@ -5,10 +5,10 @@ namespace vergence::odometry {
 
 /// One camera as the odometry uses it: raw pixels to follow features in, ideal pinhole pixels (same
 /// K, no distortion) to reckon with.
-class Lens {
+class UndistortedCamera {
  public:
-  Lens() noexcept = default;
-  explicit Lens(const Intrinsics& k) noexcept
+  UndistortedCamera() noexcept = default;
+  explicit UndistortedCamera(const Intrinsics& k) noexcept
       : raw_(k), ideal_(without_distortion(k)), distorted_(k.has_distortion()) {}
 
   [[nodiscard]] const Camera& raw() const noexcept { return raw_; }

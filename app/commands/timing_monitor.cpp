@@ -1,4 +1,4 @@
-#include "app/commands/drive_time.hpp"
+#include "app/commands/timing_monitor.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -18,9 +18,9 @@ constexpr double kMicroseconds = 1e6;
 double us(Duration d) { return d.to_seconds() * kMicroseconds; }
 
 template <class... Arguments>
-DriveTime::Sentence sentence(const char* kind, bool aloud, const char* format,
-                             Arguments... arguments) noexcept {
-  DriveTime::Sentence s;
+TimingMonitor::Sentence sentence(const char* kind, bool aloud, const char* format,
+                                 Arguments... arguments) noexcept {
+  TimingMonitor::Sentence s;
   s.kind = kind;
   s.aloud = aloud;
   (void)std::snprintf(s.text.data(), s.text.size(), format, arguments...);
@@ -65,7 +65,7 @@ ClockFigures::Pings pings_of(const trigger_board::TimeQuality& q) {
 
 }  // namespace
 
-DriveTime::Sentence DriveTime::of_device(const LiveItem& item) const noexcept {
+TimingMonitor::Sentence TimingMonitor::of_device(const LiveItem& item) const noexcept {
   using Kind = LiveItem::Kind;
   switch (item.kind) {
     case Kind::device_gone:
@@ -80,7 +80,7 @@ DriveTime::Sentence DriveTime::of_device(const LiveItem& item) const noexcept {
       return sentence("board_back", true, "the trigger board is back");
     case Kind::board_rebooted:
       return sentence("board_rebooted", true,
-                      "the trigger board has started anew: its pulses count from 0, the pairing is "
+                      "the trigger board has restarted: its pulses count from 0, the pairing is "
                       "proven again");
     case Kind::acquiring:
       return sentence(
@@ -98,11 +98,11 @@ DriveTime::Sentence DriveTime::of_device(const LiveItem& item) const noexcept {
   return {};
 }
 
-bool DriveTime::contradicted(const SyncedSet& set) const noexcept {
+bool TimingMonitor::contradicted(const SyncedSet& set) const noexcept {
   return proves_pairing(mode_) && set.proof == SyncProof::unproven;
 }
 
-DriveTime::Sentence DriveTime::of_set(const SyncedSet& set) noexcept {
+TimingMonitor::Sentence TimingMonitor::of_set(const SyncedSet& set) noexcept {
   const bool was = unproven_;
   unproven_ = set.proof == SyncProof::unproven;
   if (was || !unproven_) return {};
@@ -112,7 +112,7 @@ DriveTime::Sentence DriveTime::of_set(const SyncedSet& set) noexcept {
       proves_pairing(mode_) ? "; one of them alone is used" : "");
 }
 
-DriveTime::Sentence DriveTime::of_reading(const LiveItem& item) noexcept {
+TimingMonitor::Sentence TimingMonitor::of_reading(const LiveItem& item) noexcept {
   constexpr int kMany = 3;  // satellites: one more or less is not worth a word
   const InsQuality& q = item.quality;
   ++satellites_.readings;
@@ -132,16 +132,16 @@ DriveTime::Sentence DriveTime::of_reading(const LiveItem& item) noexcept {
   std::array<char, 32> satellites{};
   if (count > 0)
     (void)std::snprintf(satellites.data(), satellites.size(), ", %d satellites", count);
-  const bool told =
+  const bool given =
       q.status != 0 ||
       q.filter_valid;  // a device that says nothing of its filter has no status either
   return sentence("ins_status", false, "the INS has %s%s%s", word_of(fix_), satellites.data(),
-                  !told            ? ""
+                  !given           ? ""
                   : q.filter_valid ? ", its filter is valid"
                                    : ", its filter is not valid");
 }
 
-DriveTime::Sentence DriveTime::of_utc(const LiveItem& item) noexcept {
+TimingMonitor::Sentence TimingMonitor::of_utc(const LiveItem& item) noexcept {
   constexpr double kStep = 0.1;  // s: a clock that was set
   if (!item.quality.utc_valid || item.quality.utc_ns == 0) return {};
   const double ahead = static_cast<double>(item.sample.stamp.ns() - item.quality.utc_ns) * 1e-9;
@@ -157,14 +157,14 @@ DriveTime::Sentence DriveTime::of_utc(const LiveItem& item) noexcept {
                   std::abs(ahead), ahead < 0 ? "behind" : "ahead of");
 }
 
-void DriveTime::note_pose(const SyncedSet& set, float estimate_ms, HostStamp now) noexcept {
+void TimingMonitor::note_pose(const SyncedSet& set, float estimate_ms, HostStamp now) noexcept {
   const double ms =
       virtual_ ? (set.arrival - set.stamp).to_seconds() * 1e3 + static_cast<double>(estimate_ms)
                : (now - set.stamp).to_seconds() * 1e3;
   latency_.add(ms);
 }
 
-TimeFigures DriveTime::figures(const LiveCounters& c, const DriveDevices& devices) const {
+TimeFigures TimingMonitor::figures(const LiveCounters& c, const DriveDevices& devices) const {
   TimeFigures f;
   const auto cameras = devices.cameras().size();
   for (std::size_t k = 0; k < cameras; ++k)

@@ -13,7 +13,7 @@ namespace vergence::app {
 ///
 /// Threads  note…(): the estimator's, sealed. figures(): any, after that has joined. Memory: fixed;
 ///          sentences are in place.
-class DriveTime {
+class TimingMonitor {
  public:
   struct Sentence {
     const char* kind = nullptr;  // null: nothing to tell
@@ -21,7 +21,7 @@ class DriveTime {
     bool aloud = false;
   };
 
-  explicit DriveTime(SyncMode mode, bool virtual_time) : mode_(mode), virtual_(virtual_time) {}
+  explicit TimingMonitor(SyncMode mode, bool virtual_time) : mode_(mode), virtual_(virtual_time) {}
 
   /// What a device's item of another kind than images and readings says.
   [[nodiscard]] Sentence of_device(const LiveItem& item) const noexcept;

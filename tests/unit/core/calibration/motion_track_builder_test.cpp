@@ -1,4 +1,4 @@
-#include "core/calibration/monitor_feed.hpp"
+#include "core/calibration/motion_track_builder.hpp"
 
 #include <gtest/gtest.h>
 
@@ -10,26 +10,26 @@
 namespace vergence::test {
 namespace {
 
-using calibration::AcrossSighting;
-using calibration::MonitorFeed;
 using calibration::MonitorFrame;
+using calibration::MotionTrackBuilder;
+using calibration::StereoObservation;
 
 struct Fed {
-  Arena arena{MonitorFeed::memory_needed(400)};
-  MonitorFeed feed{400, arena};
+  Arena arena{MotionTrackBuilder::memory_needed(400)};
+  MotionTrackBuilder feed{400, arena};
   FeatureDrive drive;
-  std::vector<AcrossSighting> sightings;
+  std::vector<StereoObservation> observations;
   explicit Fed(const FeatureDriveOptions& o) : drive(o) {}
   MonitorFrame next() {
     drive.next();
-    sightings.clear();
+    observations.clear();
     for (const FeatureTrack& t : drive.tracks())
-      sightings.push_back({t.left, t.right, t.sigma_px, t.id});
-    return feed.next(drive.stamp(), drive.frame(), sightings, drive.T_now_previous());
+      observations.push_back({t.left, t.right, t.sigma_px, t.id});
+    return feed.next(drive.stamp(), drive.frame(), observations, drive.T_now_previous());
   }
 };
 
-TEST(MonitorFeed, usesNoStretchOfATrackTwiceAndPairsTheRightSightings) {
+TEST(MotionTrackBuilder, usesNoStretchOfATrackTwiceAndPairsTheRightSightings) {
   Fed fed({});
   struct Seen {
     Vec2 left, right;
@@ -41,7 +41,7 @@ TEST(MonitorFeed, usesNoStretchOfATrackTwiceAndPairsTheRightSightings) {
   for (int i = 0; i < 200; ++i) {
     const MonitorFrame f = fed.next();
     T_left_world[f.frame] = fed.drive.T_left_world();
-    for (const AcrossSighting& s : f.across) seen[{f.frame, s.track}] = {s.left, s.right};
+    for (const StereoObservation& s : f.stereo) seen[{f.frame, s.track}] = {s.left, s.right};
     if (f.motion.empty()) continue;
     ++looks;
     EXPECT_GE(f.before, last);  // stretches may touch
@@ -62,7 +62,7 @@ TEST(MonitorFeed, usesNoStretchOfATrackTwiceAndPairsTheRightSightings) {
   EXPECT_GT(looks, 15);
 }
 
-TEST(MonitorFeed, makesNoLookWhileTheCameraStands) {
+TEST(MotionTrackBuilder, makesNoLookWhileTheCameraStands) {
   FeatureDriveOptions o;
   o.speed = 0;
   Fed fed(o);
@@ -73,20 +73,20 @@ TEST(MonitorFeed, makesNoLookWhileTheCameraStands) {
   }
 }
 
-TEST(MonitorFeed, leavesOutWhatItHasNoRoomFor) {
-  Arena arena(MonitorFeed::memory_needed(20));
-  MonitorFeed feed(20, arena);
+TEST(MotionTrackBuilder, leavesOutWhatItHasNoRoomFor) {
+  Arena arena(MotionTrackBuilder::memory_needed(20));
+  MotionTrackBuilder feed(20, arena);
   FeatureDrive drive({});
-  std::vector<AcrossSighting> sightings;
+  std::vector<StereoObservation> observations;
   std::size_t most = 0;
   for (int i = 0; i < 60; ++i) {
     drive.next();
-    sightings.clear();
+    observations.clear();
     for (const FeatureTrack& t : drive.tracks())
-      sightings.push_back({t.left, t.right, t.sigma_px, t.id});
+      observations.push_back({t.left, t.right, t.sigma_px, t.id});
     const MonitorFrame f =
-        feed.next(drive.stamp(), drive.frame(), sightings, drive.T_now_previous());
-    EXPECT_EQ(f.across.size(), sightings.size());
+        feed.next(drive.stamp(), drive.frame(), observations, drive.T_now_previous());
+    EXPECT_EQ(f.stereo.size(), observations.size());
     most = std::max(most, f.motion.size());
   }
   EXPECT_GT(most, 0U);

@@ -34,10 +34,10 @@ struct Reply {
 ///
 /// Threads  One caller. Memory: in place. Time: no call outlasts its limit (of the line's clock) by
 ///          more than a read of 50 ms.
-class Dialogue {
+class RequestReply {
  public:
   /// `stop`: while true, every question is `stopped`.
-  Dialogue(ByteLine& line, const std::atomic<bool>& stop) noexcept : line_(line), stop_(stop) {}
+  RequestReply(ByteLine& line, const std::atomic<bool>& stop) noexcept : line_(line), stop_(stop) {}
 
   static constexpr Duration kAnswerTime = Duration::milliseconds(500);
 
@@ -54,7 +54,7 @@ class Dialogue {
   void forget() noexcept;
 
  private:
-  [[nodiscard]] Answer listen(std::uint8_t wanted, HostStamp until, Reply* reply);
+  [[nodiscard]] Answer listen(std::uint8_t requested, HostStamp until, Reply* reply);
   void remember(std::span<const std::uint8_t> bytes) noexcept;
 
   ByteLine& line_;

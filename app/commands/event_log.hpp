@@ -20,7 +20,7 @@ namespace vergence::app {
 ///          line the newest are lost, the next one
 /// tells the same and more; of the sentences too, and
 ///          events.jsonl has them.
-class DriveJournal {
+class EventLog {
  public:
   /// The recorder outlives the last note.
   void open(Recorder* recorder, Stamp first) noexcept;
@@ -44,7 +44,7 @@ class DriveJournal {
   void show(Progress* progress, std::uint64_t frames);
 
  private:
-  struct Glimpse {
+  struct ProgressSnapshot {
     std::uint64_t done = 0;  // frames, skipped ones included
     State state = State::initialising;
     Reason reason = Reason::none;
@@ -58,12 +58,12 @@ class DriveJournal {
 
   Recorder* recorder_ = nullptr;
   Stamp first_{};
-  Glimpse now_{};
+  ProgressSnapshot now_{};
   std::uint64_t dropped_ = 0;
   Vec3 last_position_ = Vec3::Zero();
   bool posed_ = false;
   MatchSample matches_;
-  Ring<Glimpse, 64> glimpses_;
+  Ring<ProgressSnapshot, 64> glimpses_;
   Ring<EventRecord, 32> notices_;
 };
 

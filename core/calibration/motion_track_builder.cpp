@@ -1,4 +1,4 @@
-#include "core/calibration/monitor_feed.hpp"
+#include "core/calibration/motion_track_builder.hpp"
 
 #include <algorithm>
 #include <bit>
@@ -16,9 +16,9 @@ constexpr std::size_t kProbes = 16;   // of the table, at most half full
 
 }  // namespace
 
-struct MonitorFeed::Parts {
+struct MotionTrackBuilder::Parts {
   struct Slot {
-    AcrossSighting sighting;
+    StereoObservation observation;
     bool used = false;
   };
   std::span<Slot> slots;
@@ -34,24 +34,24 @@ struct MonitorFeed::Parts {
   [[nodiscard]] Slot* at(std::uint32_t track, std::size_t probe) noexcept {
     return &slots[(static_cast<std::size_t>(track) * 2654435761U + probe) & (slots.size() - 1)];
   }
-  [[nodiscard]] const AcrossSighting* find(std::uint32_t track) noexcept {
+  [[nodiscard]] const StereoObservation* find(std::uint32_t track) noexcept {
     for (std::size_t i = 0; i < kProbes; ++i) {
       const Slot* s = at(track, i);
       if (!s->used) return nullptr;
-      if (s->sighting.track == track) return &s->sighting;
+      if (s->observation.track == track) return &s->observation;
     }
     return nullptr;
   }
-  void remember(std::uint64_t frame, std::span<const AcrossSighting> across,
+  void remember(std::uint64_t frame, std::span<const StereoObservation> stereo,
                 const Transform& T_now_previous) noexcept {
     earlier = frame;
     for (Slot& s : slots) s.used = false;
     stored = 0;
-    for (const AcrossSighting& sighting : across.first(std::min(across.size(), capacity))) {
+    for (const StereoObservation& observation : stereo.first(std::min(stereo.size(), capacity))) {
       for (std::size_t i = 0; i < kProbes; ++i) {
-        Slot* s = at(sighting.track, i);
+        Slot* s = at(observation.track, i);
         if (s->used) continue;
-        *s = Slot{sighting, true};
+        *s = Slot{observation, true};
         ++stored;
         break;
       }
@@ -63,13 +63,13 @@ struct MonitorFeed::Parts {
   }
 };
 
-std::size_t MonitorFeed::memory_needed(std::size_t capacity) noexcept {
+std::size_t MotionTrackBuilder::memory_needed(std::size_t capacity) noexcept {
   return sizeof(Parts) +
          std::bit_ceil(2 * std::max<std::size_t>(capacity, 1)) * sizeof(Parts::Slot) +
          capacity * sizeof(MotionTrack) + 3 * kCacheLine;
 }
 
-MonitorFeed::MonitorFeed(std::size_t capacity, Arena& arena)
+MotionTrackBuilder::MotionTrackBuilder(std::size_t capacity, Arena& arena)
     : parts_(arena.make<Parts>(1, "monitor feed").data()) {
   parts_->capacity = capacity;
   parts_->slots = arena.make<Parts::Slot>(std::bit_ceil(2 * std::max<std::size_t>(capacity, 1)),
@@ -77,17 +77,17 @@ MonitorFeed::MonitorFeed(std::size_t capacity, Arena& arena)
   parts_->motion = arena.make<MotionTrack>(capacity, "monitor feed: tracks");
 }
 
-void MonitorFeed::reset() noexcept { parts_->has_earlier = parts_->has_stamp = false; }
+void MotionTrackBuilder::reset() noexcept { parts_->has_earlier = parts_->has_stamp = false; }
 
-MonitorFrame MonitorFeed::next(Stamp stamp, std::uint64_t frame,
-                               std::span<const AcrossSighting> across,
-                               const Transform& T_now_previous) noexcept {
+MonitorFrame MotionTrackBuilder::next(Stamp stamp, std::uint64_t frame,
+                                      std::span<const StereoObservation> stereo,
+                                      const Transform& T_now_previous) noexcept {
   Parts& p = *parts_;
   MonitorFrame out;
   out.stamp = stamp;
   out.frame = frame;
-  out.across = across;
-  out.found_across = static_cast<int>(across.size());
+  out.stereo = stereo;
+  out.found_stereo = static_cast<int>(stereo.size());
   out.T_now_previous = T_now_previous;
   const double step = T_now_previous.t.norm(),
                seconds = p.has_stamp ? (stamp - p.last).to_seconds() : 0;
@@ -95,15 +95,15 @@ MonitorFrame MonitorFeed::next(Stamp stamp, std::uint64_t frame,
   p.last = stamp;
   p.has_stamp = true;
   if (!p.has_earlier) {
-    p.remember(frame, across, T_now_previous);
+    p.remember(frame, stereo, T_now_previous);
     return out;
   }
   p.T_now_earlier = T_now_previous * p.T_now_earlier;
   p.travelled += step;
   std::size_t n = 0;
-  for (const AcrossSighting& s : across) {
+  for (const StereoObservation& s : stereo) {
     if (n == p.motion.size()) break;
-    const AcrossSighting* before = p.find(s.track);
+    const StereoObservation* before = p.find(s.track);
     if (before == nullptr) continue;
     p.motion[n++] = {
         before->left, before->right, s.left, s.right, std::max(before->sigma_px, s.sigma_px),
@@ -117,7 +117,7 @@ MonitorFrame MonitorFeed::next(Stamp stamp, std::uint64_t frame,
     out.T_now_before = p.T_now_earlier;
     out.T_before_earlier = p.T_earlier_previous;
   }
-  p.remember(frame, across, T_now_previous);
+  p.remember(frame, stereo, T_now_previous);
   return out;
 }
 

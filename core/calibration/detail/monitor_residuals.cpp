@@ -1,4 +1,4 @@
-#include "core/calibration/detail/monitor_looks.hpp"
+#include "core/calibration/detail/monitor_residuals.hpp"
 
 #include <Eigen/Cholesky>
 #include <Eigen/LU>
@@ -9,7 +9,7 @@
 namespace vergence::calibration::detail {
 namespace {
 
-constexpr int kAcrossRounds =
+constexpr int kStereoRounds =
     3;  // of reweighting: the scale falls from that of a knock to that of the noise in two
 constexpr int kMotionRounds = 2;  // the odometry's motion is near, so fewer do
 constexpr double kTukey =
@@ -17,7 +17,7 @@ constexpr double kTukey =
 constexpr double kTukey3 = 6.0;      // the same for the length of three
 constexpr double kMedian1 = 0.6745;  // median of |normal|
 constexpr double kMedian3 = 1.5382;  // of the length of three normals
-constexpr double kMinScale = 0.1;    // of the sigma the sightings claim
+constexpr double kMinScale = 0.1;    // of the sigma the observations claim
 // An M-estimate's covariance has E ψ' where this code sums E w: (E w / E ψ')² for Gaussian errors
 // at the constants above.
 constexpr double kTukeySpread = 1.46, kTukeySpread3 = 1.27;
@@ -117,20 +117,20 @@ double median(Range& scratch, std::size_t n, const Value& value) noexcept {
 
 }  // namespace
 
-void Looks::reset() noexcept {
+void MonitorResiduals::reset() noexcept {
   for (Memory& m : memories_) m.frame = 0;
 }
 
-AcrossLook Looks::across(const Reference& c, const MonitorFrame& frame, int min_matches,
-                         bool follow) noexcept {
+StereoResiduals MonitorResiduals::stereo(const Reference& c, const MonitorFrame& frame,
+                                         int min_matches, bool follow) noexcept {
   const double f = 0.5 * (c.right.fx + c.right.fy);
   const Transform T_previous_now = frame.T_now_previous.inverse();
   const Mat3& E = c.epipolar.E();
   rows_ = 0;
-  for (const AcrossSighting& s : frame.across) {
-    if (rows_ == kMaxSightings) break;
+  for (const StereoObservation& s : frame.stereo) {
+    if (rows_ == kMaxObservations) break;
     if (!(s.sigma_px > 0) || !s.left.allFinite() || !s.right.allFinite()) continue;
-    AcrossRow& row = across_[rows_];
+    StereoRow& row = stereo_[rows_];
     const Vec2 left = ray(c.left, s.left), right = ray(c.right, s.right);
     Vec5 J;
     if (c.epipolar.to_line(left, right, &row.r, &J) != EpipolarStatus::ok) continue;
@@ -145,22 +145,22 @@ AcrossLook Looks::across(const Reference& c, const MonitorFrame& frame, int min_
     row.track = s.track;
     if (std::isfinite(row.r) && std::isfinite(row.inverse_sigma2)) ++rows_;
   }
-  AcrossLook look;
+  StereoResiduals look;
   if (rows_ < static_cast<std::size_t>(min_matches)) return look;
 
   Vec5 fit = Vec5::Zero();
-  for (int round = 0; round < kAcrossRounds; ++round) {
-    const auto rest = [&](const AcrossRow& row) {
+  for (int round = 0; round < kStereoRounds; ++round) {
+    const auto rest = [&](const StereoRow& row) {
       return row.r + Eigen::Map<const Vec5>(row.J.data()).dot(fit);
     };
     const double middle = median(sizes_, rows_, [&](std::size_t i) {
-      return std::abs(rest(across_[i])) * std::sqrt(across_[i].inverse_sigma2);
+      return std::abs(rest(stereo_[i])) * std::sqrt(stereo_[i].inverse_sigma2);
     });
     const double scale = std::max(middle / kMedian1, kMinScale);
     look.evidence = Evidence{};
     Evidence& e = look.evidence;
     for (std::size_t i = 0; i < rows_; ++i) {
-      AcrossRow& row = across_[i];
+      StereoRow& row = stereo_[i];
       const double d = rest(row);
       row.weight = row.inverse_sigma2 * tukey(d * d * row.inverse_sigma2, kTukey * scale);
       if (row.weight == 0) continue;
@@ -181,14 +181,14 @@ AcrossLook Looks::across(const Reference& c, const MonitorFrame& frame, int min_
       fit[i] = s / solved.L[lower(i, i)];
     }
   }
-  look.usable = std::count_if(across_.begin(), across_.begin() + static_cast<std::ptrdiff_t>(rows_),
-                              [](const AcrossRow& r) { return r.weight > 0; }) >= min_matches;
+  look.usable = std::count_if(stereo_.begin(), stereo_.begin() + static_cast<std::ptrdiff_t>(rows_),
+                              [](const StereoRow& r) { return r.weight > 0; }) >= min_matches;
   spread_of(look.evidence, fit, frame.frame, follow && look.usable, &look);
   return look;
 }
 
-void Looks::spread_of(const Evidence& evidence, const Vec5& fit, std::uint64_t frame, bool follow,
-                      AcrossLook* look) noexcept {
+void MonitorResiduals::spread_of(const Evidence& evidence, const Vec5& fit, std::uint64_t frame,
+                                 bool follow, StereoResiduals* look) noexcept {
   // With x the part of a track in the gradient's noise and A = L Lᵀ: trace A⁻¹ Σ x xᵀ = Σ |L⁻¹ x|²,
   // and the variance that the frame adds to a running sum is Σ (x xᵀ + x sᵀ + s xᵀ), s what the
   // track brought before.
@@ -206,7 +206,7 @@ void Looks::spread_of(const Evidence& evidence, const Vec5& fit, std::uint64_t f
   };
   double now = 0, before = 0;
   for (std::size_t i = 0; i < rows_; ++i) {
-    const AcrossRow& row = across_[i];
+    const StereoRow& row = stereo_[i];
     const double size = row.weight * (row.r + Eigen::Map<const Vec5>(row.J.data()).dot(fit));
     std::array<double, kFixed> x, white;
     for (std::size_t a = 0; a < kFixed; ++a) white[a] = x[a] = size * row.J[a];
@@ -225,8 +225,8 @@ void Looks::spread_of(const Evidence& evidence, const Vec5& fit, std::uint64_t f
   look->spread_life = kTukeySpread * (now + before) / kFixed;
 }
 
-bool Looks::motion_row(const Reference& c, const MonitorFrame& frame, const MotionTrack& track,
-                       MotionRow* row) noexcept {
+bool MonitorResiduals::motion_row(const Reference& c, const MonitorFrame& frame,
+                                  const MotionTrack& track, MotionRow* row) noexcept {
   const Transform& T = frame.T_now_before;
   if (!(track.sigma_px > 0)) return false;
   const Transform T_previous_now = frame.T_now_previous.inverse(),
@@ -262,7 +262,7 @@ bool Looks::motion_row(const Reference& c, const MonitorFrame& frame, const Moti
   const Vec3 gap = n.q - now;
   if (!gap.allFinite()) return false;
 
-  // Linearised at the point both sightings agree on: its error and the gap's are independent, so
+  // Linearised at the point both observations agree on: its error and the gap's are independent, so
   // noise in depth does not bias the fit.
   const Mat3 joint = b.information + D.transpose() * n.information * D;
   const Vec3 q = b.q + joint.inverse() * (D.transpose() * (n.information * gap));
@@ -288,13 +288,13 @@ bool Looks::motion_row(const Reference& c, const MonitorFrame& frame, const Moti
   return row->r.allFinite() && row->J_theta.allFinite() && row->J_pose.allFinite();
 }
 
-MotionLook Looks::motion(const Reference& c, const MonitorFrame& frame) noexcept {
+MotionResiduals MonitorResiduals::motion(const Reference& c, const MonitorFrame& frame) noexcept {
   std::size_t n = 0;
   for (const MotionTrack& track : frame.motion) {
     if (n == motion_.size()) break;
     if (motion_row(c, frame, track, &motion_[n])) ++n;
   }
-  MotionLook look;
+  MotionResiduals look;
   if (n < kMinMotionTracks) return look;
 
   Vec6 pose = Vec6::Zero(), theta = Vec6::Zero(), g_theta, g_pose;
@@ -355,7 +355,7 @@ MotionLook Looks::motion(const Reference& c, const MonitorFrame& frame) noexcept
       spread += y[static_cast<std::size_t>(a)] * y[static_cast<std::size_t>(a)];
     }
     look.evidence.n +=
-        1.5 * row.weight;  // three numbers a track, each the difference of two sightings
+        1.5 * row.weight;  // three numbers a track, each the difference of two observations
   }
   // The look's own fit has taken up eleven of its 3 n numbers.
   const double numbers = 3.0 * static_cast<double>(n);

@@ -1,4 +1,4 @@
-#include "drivers/trigger_board/wanted.hpp"
+#include "drivers/trigger_board/requested_configuration.hpp"
 
 #include <array>
 #include <cmath>
@@ -30,7 +30,7 @@ bool beyond(std::uint8_t mask, std::uint8_t lines) noexcept {
 
 }  // namespace
 
-DeviceStatus wire_configuration(const TriggerConfiguration& wanted, const Options& options,
+DeviceStatus wire_configuration(const TriggerConfiguration& requested, const Options& options,
                                 const TriggerInfo& board, TriggerConfig* config,
                                 std::string* sentence) {
   const auto refuse = [sentence](DeviceStatus status, std::string why) {
@@ -44,12 +44,12 @@ DeviceStatus wire_configuration(const TriggerConfiguration& wanted, const Option
     return refuse(DeviceStatus::unsupported, std::move(why));
   };
 
-  if (!(wanted.rate_hz >= 0.001 && wanted.rate_hz <= kFastest))
+  if (!(requested.rate_hz >= 0.001 && requested.rate_hz <= kFastest))
     return bad(
-        text("a trigger.rate of %g Hz is none; choose 0.001 to %g", wanted.rate_hz, kFastest));
-  const auto millihertz = static_cast<std::uint32_t>(std::llround(wanted.rate_hz * 1000));
-  const std::int64_t period_us = 1'000'000'000 / millihertz, width_us = wanted.width.ns() / 1000,
-                     vary_us = wanted.vary.ns() / 1000;
+        text("a trigger.rate of %g Hz is none; choose 0.001 to %g", requested.rate_hz, kFastest));
+  const auto millihertz = static_cast<std::uint32_t>(std::llround(requested.rate_hz * 1000));
+  const std::int64_t period_us = 1'000'000'000 / millihertz, width_us = requested.width.ns() / 1000,
+                     vary_us = requested.vary.ns() / 1000;
   if (width_us < 1) return bad("a pulse needs a width: set trigger.width_us to 1 or more");
   if (width_us > kWidest)
     return bad(text("a pulse of %lld µs is longer than a second; lower trigger.width_us",
@@ -62,13 +62,13 @@ DeviceStatus wire_configuration(const TriggerConfiguration& wanted, const Option
     return bad(text(
         "a pulse of %lld µs does not fit into %lld µs from pulse to pulse; lower trigger.width_us",
         static_cast<long long>(width_us), static_cast<long long>(period_us - vary_us)));
-  if (wanted.lines == 0)
+  if (requested.lines == 0)
     return bad("no line is to be pulsed; name the cameras' lines in trigger.lines");
-  if (beyond(wanted.lines, board.lines) || beyond(wanted.active_low, board.lines))
+  if (beyond(requested.lines, board.lines) || beyond(requested.active_low, board.lines))
     return cannot(text("the trigger board has %u lines, numbered from 0; trigger.lines names more",
                        static_cast<unsigned>(board.lines)));
-  if (beyond(wanted.feedback, board.feedback_inputs) ||
-      beyond(wanted.feedback_active_low, board.feedback_inputs))
+  if (beyond(requested.feedback, board.feedback_inputs) ||
+      beyond(requested.feedback_active_low, board.feedback_inputs))
     return cannot(
         text("the trigger board has %u inputs for exposure feedback, numbered from 0; "
              "trigger.feedback names more",
@@ -82,10 +82,10 @@ DeviceStatus wire_configuration(const TriggerConfiguration& wanted, const Option
   c.rate_millihertz = millihertz;
   c.pulse_us = static_cast<std::uint32_t>(width_us);
   c.vary_us = static_cast<std::uint32_t>(vary_us);
-  c.lines = wanted.lines;
-  c.active_low = wanted.active_low;
-  c.feedback_inputs = wanted.feedback;
-  c.feedback_active_low = wanted.feedback_active_low;
+  c.lines = requested.lines;
+  c.active_low = requested.active_low;
+  c.feedback_inputs = requested.feedback;
+  c.feedback_active_low = requested.feedback_active_low;
   c.pps_edge = edge_kind(options.pps);
   c.ins_edge = edge_kind(options.ins);
   *config = c;
@@ -104,9 +104,9 @@ TriggerConfiguration configuration_of(const TriggerConfig& config) noexcept {
   return c;
 }
 
-std::string remark_about(const TriggerConfiguration& wanted, const TriggerConfig& config) {
+std::string remark_about(const TriggerConfiguration& requested, const TriggerConfig& config) {
   const double rate = static_cast<double>(config.rate_millihertz) / 1000;
-  if (std::abs(rate - wanted.rate_hz) < 1e-6 * wanted.rate_hz) return {};
+  if (std::abs(rate - requested.rate_hz) < 1e-6 * requested.rate_hz) return {};
   return text("it pulses at %.3f Hz: rates are whole thousandths", rate);
 }
 

@@ -1,4 +1,4 @@
-#include "core/calibration/detail/monitor_looks.hpp"
+#include "core/calibration/detail/monitor_residuals.hpp"
 
 #include <gtest/gtest.h>
 
@@ -23,13 +23,13 @@ FeatureDriveOptions exact_street() {
 }
 
 struct Sums {
-  Evidence across, motion;
+  Evidence stereo, motion;
   double spread_now = 0, spread_life = 0, spread_motion = 0;
   int frames = 0, looks = 0;
 };
 
 Sums watch(const FeatureDriveOptions& o, const Transform& T_reference, int frames) {
-  const auto looks = std::make_unique<Looks>();
+  const auto looks = std::make_unique<MonitorResiduals>();
   looks->reset();
   const Reference reference = reference_of(o, T_reference);
   MonitorTrial trial(o, T_reference, Mat6::Zero());
@@ -37,14 +37,14 @@ Sums watch(const FeatureDriveOptions& o, const Transform& T_reference, int frame
   for (int i = 0; i < frames; ++i) {
     (void)trial.step();
     const MonitorFrame& f = trial.frame();
-    const AcrossLook a = looks->across(reference, f, 30, true);
+    const StereoResiduals a = looks->stereo(reference, f, 30, true);
     if (i < 30 || !a.usable) continue;  // tracks of the first frames are not of full age
     ++sums.frames;
-    sums.across.add(a.evidence);
+    sums.stereo.add(a.evidence);
     sums.spread_now += a.spread_now;
     sums.spread_life += a.spread_life;
     if (f.motion.empty()) continue;
-    const MotionLook m = looks->motion(reference, f);
+    const MotionResiduals m = looks->motion(reference, f);
     if (!m.usable) continue;
     ++sums.looks;
     sums.motion.add(m.evidence);
@@ -54,7 +54,7 @@ Sums watch(const FeatureDriveOptions& o, const Transform& T_reference, int frame
 }
 
 /// |g − A θ| over |g|, both in the metric of A⁻¹: 0 where the derivatives are right and the
-/// sightings exact.
+/// observations exact.
 double misfit(const Evidence& e, const Eigen::Matrix<double, kTheta, 1>& theta) {
   Theta rest = e.g;
   for (int i = 0; i < kTheta; ++i)
@@ -77,7 +77,7 @@ TEST(MonitorLooks, gradientsPointFromTheReferenceToTheTruthInEveryParameter) {
     ASSERT_GT(sums.looks, 5);
     // Second order: 0.1 px against disparities of ten and more, a fiftieth of image motions of up
     // to 100 px a frame.
-    EXPECT_LT(misfit(sums.across, theta), 0.05);
+    EXPECT_LT(misfit(sums.stereo, theta), 0.05);
     EXPECT_LT(misfit(sums.motion, theta), 0.05);
   }
 }
@@ -96,8 +96,8 @@ TEST(MonitorLooks, motionSaysNothingOfWhatAPairMeasures) {
   o.T_right_left = moved_on_sphere(T_reference, theta);
   const Sums yaw = watch(o, T_reference, 90);
   const auto gain = [](const Evidence& e) { return Solved(e.A, e.g).fixed_gain(); };
-  EXPECT_LT(gain(pitch.motion), 0.01 * gain(pitch.across));
-  EXPECT_GT(gain(yaw.motion), 5 * gain(yaw.across));
+  EXPECT_LT(gain(pitch.motion), 0.01 * gain(pitch.stereo));
+  EXPECT_GT(gain(yaw.motion), 5 * gain(yaw.stereo));
 }
 
 TEST(MonitorLooks, spreadOfWhiteErrorsIsOneAndOfLastingOnesTheLifeOfATrack) {
@@ -127,7 +127,7 @@ TEST(MonitorLooks, outliersWeighNothing) {
   dirty.outliers = 0.1, dirty.movers = 0.1;
   const Sums a = watch(clean, clean.T_right_left, 300), b = watch(dirty, dirty.T_right_left, 300);
   // In units of the sum's own sigma, inflation 6: outliers may not push the estimate.
-  EXPECT_LT(Solved(b.across.A, b.across.g).fixed_gain() / 6, 25);
+  EXPECT_LT(Solved(b.stereo.A, b.stereo.g).fixed_gain() / 6, 25);
   EXPECT_LT(Solved(b.motion.A, b.motion.g).fixed_gain(), 25);
   EXPECT_NEAR(b.spread_now / b.frames, a.spread_now / a.frames, 0.15);
   EXPECT_NEAR(b.spread_motion / b.looks, a.spread_motion / a.looks, 0.25);

@@ -1,4 +1,4 @@
-#include "app/commands/drive_journal.hpp"
+#include "app/commands/event_log.hpp"
 
 #include <algorithm>
 #include <string>
@@ -35,12 +35,12 @@ std::string state_words(State state, Reason reason) {
 
 }  // namespace
 
-void DriveJournal::open(Recorder* recorder, Stamp first) noexcept {
+void EventLog::open(Recorder* recorder, Stamp first) noexcept {
   recorder_ = recorder;
   first_ = first;
 }
 
-void DriveJournal::note(const Estimator& estimator) noexcept {
+void EventLog::note(const Estimator& estimator) noexcept {
   for (const EstimatorEvent& event : estimator.events()) {
     if (event.kind == EstimatorEvent::Kind::dropped)
       dropped_ += static_cast<std::uint64_t>(std::max(0.0, event.value));
@@ -57,14 +57,14 @@ void DriveJournal::note(const Estimator& estimator) noexcept {
 
 /// A rig that was knocked fits no match from before: a calibration is looked at with those of its
 /// own rig only.
-void DriveJournal::note_change(const CalibrationDecision& decision) noexcept {
+void EventLog::note_change(const CalibrationDecision& decision) noexcept {
   using Cause = CalibrationCause;
   const bool changed = decision.cause == Cause::knock || decision.cause == Cause::drift ||
                        decision.cause == Cause::collapse;
   if (decision.accepted && changed) matches_.rig_changed(decision.onset_frame);
 }
 
-void DriveJournal::note(const PoseSample& sample) noexcept {
+void EventLog::note(const PoseSample& sample) noexcept {
   ++now_.done;
   now_.state = sample.state;
   now_.reason = sample.reason;
@@ -78,13 +78,13 @@ void DriveJournal::note(const PoseSample& sample) noexcept {
   (void)glimpses_.push(now_);
 }
 
-void DriveJournal::note_skipped() noexcept {
+void EventLog::note_skipped() noexcept {
   ++now_.done;
   (void)glimpses_.push(now_);
 }
 
-void DriveJournal::tell(Stamp stamp, const char* kind, std::string_view sentence,
-                        bool to_user) noexcept {
+void EventLog::tell(Stamp stamp, const char* kind, std::string_view sentence,
+                    bool to_user) noexcept {
   EventRecord event;
   event.stamp = stamp;
   event.kind = kind;
@@ -93,13 +93,13 @@ void DriveJournal::tell(Stamp stamp, const char* kind, std::string_view sentence
   if (to_user) (void)notices_.push(event);
 }
 
-void DriveJournal::show(Progress* progress, std::uint64_t frames) {
+void EventLog::show(Progress* progress, std::uint64_t frames) {
   for (EventRecord notice; notices_.pop(&notice);)
     progress->say(fmt::format("vergence: at {:.1f} s {}", (notice.stamp - first_).to_seconds(),
                               notice.sentence.data()));
-  for (const std::string& sentence : recorder_->take_complaints())
+  for (const std::string& sentence : recorder_->take_errors())
     progress->say("vergence: " + sentence);
-  Glimpse newest;
+  ProgressSnapshot newest;
   bool any = false;
   while (glimpses_.pop(&newest)) any = true;
   if (!any) return;

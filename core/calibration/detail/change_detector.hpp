@@ -14,8 +14,8 @@ struct FrameEvidence {
   std::uint64_t frame = 0;
   std::uint64_t before = 0;  // the earlier frame of the motion look
   TwoEvidences evidence;
-  double spread_now = 0, spread_life = 0;  // of the AcrossLook
-  double spread_motion = -1;               // MotionLook::spread; negative: no look
+  double spread_now = 0, spread_life = 0;  // of the StereoResiduals
+  double spread_motion = -1;               // MotionResiduals::spread; negative: no look
 };
 
 /// What all windows together say. Angles rad, as θ.
@@ -35,7 +35,7 @@ struct Decision {
 ///
 /// Memory  Fixed, in place (some 160 kB). Time: a few µs a frame; up to 0.1 ms while something is
 ///         over the threshold.
-class Windows {
+class ChangeDetector {
  public:
   /// covariance: of θ's first five at the reference.
   void reset(const MonitorOptions& options, const Mat5& covariance) noexcept;
@@ -45,12 +45,12 @@ class Windows {
   void push(const FrameEvidence& e) noexcept;
   [[nodiscard]] Decision decide() noexcept;
   /// The statistic of one frame by itself, `spread` its own λ: what a standing camera allows.
-  [[nodiscard]] double single(const Evidence& across, double spread) const noexcept;
+  [[nodiscard]] double single(const Evidence& stereo, double spread) const noexcept;
   /// A⁻¹ g and A⁻¹ of that frame, floors included.
-  void single_estimate(const Evidence& across, double spread, Vec5* theta,
+  void single_estimate(const Evidence& stereo, double spread, Vec5* theta,
                        Mat5* covariance) const noexcept;
 
-  [[nodiscard]] double across_inflation() const noexcept { return lambda_across_; }
+  [[nodiscard]] double stereo_inflation() const noexcept { return lambda_stereo_; }
   [[nodiscard]] double motion_inflation() const noexcept { return lambda_motion_; }
   [[nodiscard]] std::uint64_t frames() const noexcept { return count_; }
 
@@ -72,7 +72,7 @@ class Windows {
   };
   struct Search {
     Onset step, ramp;                             // five; five growing from zero
-    Onset step_across, both_across, ramp_across;  // the same without motion; five and the lag
+    Onset step_stereo, both_stereo, ramp_stereo;  // the same without motion; five and the lag
   };
 
   void follow_spread(const FrameEvidence& e) noexcept;
@@ -99,18 +99,18 @@ class Windows {
   MonitorOptions options_{};
   Mat5 covariance_ = Mat5::Zero();
   double bias2_ = 0;         // px², of a mode: the floor
-  double motion_bias2_ = 0;  // and that of looks at motion
+  double motion_bias2_ = 0;  // and that of residuals of motion
   BlockScatter scatter_{};
-  std::array<std::size_t, 6> windows_{};
+  std::array<std::size_t, 6> detector_{};
   std::size_t window_count_ = 0;
   std::uint64_t count_ = 0, closed_ = 0;  // frames, full blocks
   std::array<Entry, kRecent> recent_{};
   std::array<Entry, kBlocks> blocks_{};
   Entry open_{};          // the block being filled
   TwoEvidences total_{};  // of the blocks kept
-  double lambda_across_ = 0, lambda_motion_ = 0;
+  double lambda_stereo_ = 0, lambda_motion_ = 0;
   double now_fast_ = 0, now_slow_ = 0, life_slow_ = 0;  // running means of the spreads
-  std::uint64_t looks_ = 0;
+  std::uint64_t residuals_ = 0;
   double newest_statistic_ = 0;  // of the last decide()
   int over_ = 0;                 // frames in a row over the threshold
 };

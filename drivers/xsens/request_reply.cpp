@@ -1,4 +1,4 @@
-#include "drivers/xsens/dialogue.hpp"
+#include "drivers/xsens/request_reply.hpp"
 
 #include <algorithm>
 #include <string_view>
@@ -12,8 +12,8 @@ constexpr Duration kWrite = Duration::milliseconds(100);
 
 }  // namespace
 
-void Dialogue::ask(xbus::MessageId id, std::span<const std::uint8_t> payload, Reply* reply,
-                   Duration limit) {
+void RequestReply::ask(xbus::MessageId id, std::span<const std::uint8_t> payload, Reply* reply,
+                       Duration limit) {
   std::array<std::uint8_t, xbus::kMaxFrame> frame{};
   const xbus::WrittenFrame w =
       xbus::write_frame({xbus::kBusMaster, static_cast<std::uint8_t>(id), payload}, frame);
@@ -30,15 +30,15 @@ void Dialogue::ask(xbus::MessageId id, std::span<const std::uint8_t> payload, Re
   } while (reply->answer == Answer::silent && line_.now() < end);
 }
 
-Answer Dialogue::listen(std::uint8_t wanted, HostStamp until, Reply* reply) {
+Answer RequestReply::listen(std::uint8_t requested, HostStamp until, Reply* reply) {
   std::array<std::uint8_t, 512> bytes{};
   for (;;) {  // ends at `until`: reading lets time pass
     for (xbus::Message m; stream_.next(&m);) {
       ++messages_;
-      if (m.id != wanted && !m.is(xbus::MessageId::error)) continue;
+      if (m.id != requested && !m.is(xbus::MessageId::error)) continue;
       reply->size = m.payload.size();
       std::copy(m.payload.begin(), m.payload.end(), reply->payload.begin());
-      if (m.id == wanted) return Answer::ok;
+      if (m.id == requested) return Answer::ok;
       reply->error = m.payload.empty() ? std::uint8_t{0} : m.payload[0];
       // A dip of the supply is told unasked: it answers nothing.
       if (reply->error != xbus::kErrorPowerDip) return Answer::refused;
@@ -57,19 +57,19 @@ Answer Dialogue::listen(std::uint8_t wanted, HostStamp until, Reply* reply) {
   }
 }
 
-void Dialogue::remember(std::span<const std::uint8_t> bytes) noexcept {
+void RequestReply::remember(std::span<const std::uint8_t> bytes) noexcept {
   const std::size_t n = std::min(bytes.size(), heard_.size() - heard_size_);
   std::copy_n(bytes.begin(), n, heard_.begin() + static_cast<std::ptrdiff_t>(heard_size_));
   heard_size_ += n;
 }
 
-void Dialogue::forget() noexcept {
+void RequestReply::forget() noexcept {
   stream_.reset();
   messages_ = 0;
   heard_size_ = 0;
 }
 
-std::string Dialogue::heard_instead() const {
+std::string RequestReply::heard_instead() const {
   const std::string_view heard(reinterpret_cast<const char*>(heard_.data()), heard_size_);
   if (heard.empty() || messages_ > 0) return {};
   if (heard.find("$G") != std::string_view::npos && heard.find("\r\n") != std::string_view::npos)

@@ -1,0 +1,178 @@
+#include "core/calibration/disparity_jump.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+namespace vergence::calibration {
+namespace {
+
+constexpr std::size_t kFewestTracks = 25;
+constexpr int kReweightings = 6;
+constexpr double kTukey = 4.7;        // standard deviations: 95 % efficient for normal errors
+constexpr double kLeastScale = 0.05;  // px: corners are found no better
+constexpr double kMadToSigma = 1.4826;
+constexpr double kDepthStep = 1e-3;   // of the depth, for the numeric derivatives
+constexpr double kLeastJump = 0.6;    // px: twice the largest of untouched drives
+constexpr double kJumpSigmas = 8.0;   // of the frame's own tracks
+constexpr double kJumpScatter = 5.0;  // times the root mean square of this drive's shifts
+constexpr int kFirstFrames = 5;       // measured, before the scatter is known
+constexpr double kForget = 0.05;      // of the mean square, a frame
+constexpr double kGoesBack = 0.5;  // of the shift: more taken back by the next frame is no change
+constexpr int kUnmeasured = 2;     // frames without enough tracks after it: it was a change
+constexpr double kLeastParallax = 1e-4;  // rad: further points say the same at any depth
+
+Vec3 ray(const Pinhole& k, const Vec2& pixel) noexcept {
+  return {(pixel.x() - k.cx) / k.fx, (pixel.y() - k.cy) / k.fy, 1.0};
+}
+
+Vec2 project(const Pinhole& k, const Vec3& p) noexcept {
+  return {k.fx * p.x() / p.z() + k.cx, k.fy * p.y() / p.z() + k.cy};
+}
+
+/// Depth of the left ray where it is nearest to the other camera's; not positive: it has none.
+double depth_of(const Vec3& left, const Vec3& other, const Transform& T_other_left) noexcept {
+  // other ∥ z R left + t, so other × (R left) z = − other × t.
+  const Vec3 a = other.cross(T_other_left.R * left), b = -other.cross(T_other_left.t);
+  const double aa = a.squaredNorm();
+  if (aa < kLeastParallax * kLeastParallax * other.squaredNorm() * left.squaredNorm()) return -1.0;
+  return a.dot(b) / aa;
+}
+
+}  // namespace
+
+std::size_t DisparityJumpDetector::memory_needed(std::size_t capacity) noexcept {
+  return capacity * (2 * sizeof(StereoObservation) + sizeof(Row) + sizeof(double)) + 4 * kCacheLine;
+}
+
+DisparityJumpDetector::DisparityJumpDetector(std::size_t capacity, Arena& arena)
+    : before_(arena.make<StereoObservation>(capacity, "disparity jump: the frame before")),
+      now_(arena.make<StereoObservation>(capacity, "disparity jump: this frame")),
+      rows_(arena.make<Row>(capacity, "disparity jump: tracks")),
+      scratch_(arena.make<double>(capacity, "disparity jump: medians")) {}
+
+void DisparityJumpDetector::set_reference(const Transform& T_camera_left, const Pinhole& left,
+                                          const Pinhole& camera) noexcept {
+  T_camera_left_ = T_camera_left;
+  left_ = left;
+  camera_ = camera;
+  reset();
+}
+
+bool DisparityJumpDetector::row(const StereoObservation& before, const StereoObservation& now,
+                                const Transform& T_now_previous, Row* out) const noexcept {
+  const Vec3 a = ray(left_, before.left);
+  const double depth = depth_of(a, ray(camera_, before.right), T_camera_left_);
+  if (!(depth > 0)) return false;
+  const Vec3 moved = T_now_previous * Vec3(depth * a);
+  if (!(moved.z() > 0)) return false;
+  const auto disparity = [this](const Vec3& p) noexcept {
+    return Vec2(project(camera_, T_camera_left_ * p) - project(left_, p));
+  };
+  const double step = kDepthStep * moved.z();
+  const Vec2 predicted = disparity(moved);
+  const Vec2 by_depth = (disparity(moved + Vec3(0, 0, step)) - predicted) / step;
+  // Along the epipolar line: where a point of that left pixel goes in the other image with its
+  // depth.
+  const Vec2 farther = project(camera_, T_camera_left_ * Vec3(moved * (1.0 + kDepthStep))) -
+                       project(camera_, T_camera_left_ * moved);
+  const double length = farther.norm();
+  if (!(length > 0)) return false;
+  const Vec2 direction = farther / length;
+  out->e = direction.dot(now.right - now.left - predicted);
+  out->along = direction.dot(by_depth);
+  return std::isfinite(out->e) && std::isfinite(out->along);
+}
+
+DisparityJump DisparityJumpDetector::fit(std::span<Row> rows) noexcept {
+  DisparityJump jump;
+  jump.tracks = static_cast<int>(rows.size());
+  if (rows.size() < kFewestTracks) return jump;
+  double s = 0, along = 0, scale = 0, variance = 0;
+  const auto middle = static_cast<std::ptrdiff_t>(rows.size() / 2);
+  const auto median = [&](auto value) noexcept {
+    for (std::size_t i = 0; i < rows.size(); ++i) scratch_[i] = value(rows[i]);
+    const auto begin = scratch_.begin();
+    std::nth_element(begin, begin + middle, begin + static_cast<std::ptrdiff_t>(rows.size()));
+    return *(begin + middle);
+  };
+  s = median([](const Row& r) noexcept { return r.e; });
+  for (int k = 0; k < kReweightings; ++k) {
+    scale = std::max(kLeastScale, kMadToSigma * median([&](const Row& r) noexcept {
+                                    return std::abs(r.e - s - along * r.along);
+                                  }));
+    double w = 0, wa = 0, waa = 0, we = 0, wae = 0;
+    for (const Row& r : rows) {
+      const double u = (r.e - s - along * r.along) / (kTukey * scale);
+      if (std::abs(u) >= 1) continue;
+      const double weight = (1 - u * u) * (1 - u * u);
+      w += weight;
+      wa += weight * r.along;
+      waa += weight * r.along * r.along;
+      we += weight * r.e;
+      wae += weight * r.along * r.e;
+    }
+    const double determinant = w * waa - wa * wa;
+    if (!(determinant > 1e-9 * w * waa)) return jump;
+    s = (waa * we - wa * wae) / determinant;
+    along = (w * wae - wa * we) / determinant;
+    variance = scale * scale * waa / determinant;
+  }
+  jump.measured = true;
+  jump.px = s;
+  jump.sigma_px = std::sqrt(variance);
+  return jump;
+}
+
+void DisparityJumpDetector::judge(std::uint64_t frame, DisparityJump* jump) noexcept {
+  if (pending_.any) {
+    if (!jump->measured && ++pending_.unmeasured < kUnmeasured) {
+      jump->suspected = true;
+      return;
+    }
+    jump->confirmed =
+        !jump->measured || std::abs(jump->px + pending_.px) > kGoesBack * std::abs(pending_.px);
+    jump->onset_frame = pending_.frame;
+    pending_ = Pending{};
+    return;
+  }
+  if (!jump->measured) return;
+  const double limit =
+      std::max({kLeastJump, kJumpSigmas * jump->sigma_px, kJumpScatter * std::sqrt(mean_square_)});
+  if (measured_ >= kFirstFrames && std::abs(jump->px) > limit) {
+    jump->suspected = true;
+    pending_ = Pending{true, frame, jump->px, 0};
+    return;
+  }
+  if (measured_ < kFirstFrames) ++measured_;
+  const double share = std::max(kForget, 1.0 / measured_);
+  mean_square_ += share * (jump->px * jump->px - mean_square_);
+}
+
+DisparityJump DisparityJumpDetector::next(std::uint64_t frame,
+                                          std::span<const StereoObservation> stereo,
+                                          const Transform& T_now_previous) noexcept {
+  const std::size_t n = std::min(stereo.size(), now_.size());
+  std::copy_n(stereo.begin(), n, now_.begin());
+  const auto by_track = [](const StereoObservation& a, const StereoObservation& b) noexcept {
+    return a.track < b.track;
+  };
+  std::sort(now_.begin(), now_.begin() + static_cast<std::ptrdiff_t>(n), by_track);
+  std::size_t rows = 0;
+  for (std::size_t i = 0, j = 0; i < count_ && j < n;) {
+    if (before_[i].track < now_[j].track) {
+      ++i;
+    } else if (now_[j].track < before_[i].track) {
+      ++j;
+    } else {
+      if (row(before_[i++], now_[j++], T_now_previous, &rows_[rows])) ++rows;
+    }
+  }
+  DisparityJump jump = fit(rows_.first(rows));
+  judge(frame, &jump);
+  std::swap(before_, now_);
+  count_ = n;
+  return jump;
+}
+
+}  // namespace vergence::calibration

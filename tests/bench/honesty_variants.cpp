@@ -1,0 +1,247 @@
+// Recorded drives spoilt in the ways in which rigs, lenses, weather and cables spoil them.
+#include "tests/bench/honesty_variants.hpp"
+
+#include <array>
+#include <cmath>
+#include <utility>
+
+#include <fmt/format.h>
+#include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
+
+namespace vergence::bench {
+namespace {
+
+constexpr double kFocalOfWidth = 0.58;  // focal length over width: KITTI's; EuRoC's is 0.61
+
+/// Image moved by (dx, dy) px, turned by `roll_deg` and magnified about its centre.
+void warp(cv::Mat* image, double dx, double dy, double roll_deg, double zoom) {
+  cv::Mat m = cv::getRotationMatrix2D(
+      {static_cast<float>(image->cols) / 2, static_cast<float>(image->rows) / 2}, roll_deg, zoom);
+  m.at<double>(0, 2) += dx;
+  m.at<double>(1, 2) += dy;
+  cv::Mat out;
+  cv::warpAffine(*image, out, m, image->size(), cv::INTER_CUBIC, cv::BORDER_REFLECT);
+  *image = out;
+}
+
+double pixels(const cv::Mat& image, double degrees) {
+  return degrees * CV_PI / 180 * kFocalOfWidth * image.cols;
+}
+
+bool later(std::size_t at, std::size_t count) { return at >= count / 2; }
+
+void noise(cv::Mat* image, double sigma, std::size_t seed) {
+  cv::RNG random(seed + 1);
+  cv::Mat n(image->size(), CV_16S), wide;
+  random.fill(n, cv::RNG::NORMAL, 0, sigma);
+  image->convertTo(wide, CV_16S);
+  wide += n;
+  wide.convertTo(*image, CV_8U);
+}
+
+void darken(cv::Mat* image, double gain, std::size_t seed) {
+  image->convertTo(*image, CV_8U, gain, 4);
+  noise(image, 2.5, seed);
+}
+
+void jpeg(cv::Mat* image, int quality) {
+  std::vector<unsigned char> bytes;
+  cv::imencode(".jpg", *image, bytes, {cv::IMWRITE_JPEG_QUALITY, quality});
+  *image = cv::imdecode(bytes, cv::IMREAD_GRAYSCALE);
+}
+
+/// Blurred grey spots that stay where they are, as drops and mud on a glass.
+void spots(cv::Mat* image, std::uint64_t seed, int count) {
+  cv::RNG random(seed);
+  for (int i = 0; i < count; ++i) {
+    const cv::Point at(random.uniform(0, image->cols), random.uniform(0, image->rows));
+    cv::circle(*image, at, random.uniform(image->cols / 60, image->cols / 20),
+               cv::Scalar(random.uniform(40, 120)), cv::FILLED, cv::LINE_AA);
+  }
+  cv::GaussianBlur(*image, *image, {}, 1.0);
+}
+
+void rain(cv::Mat* image, std::uint64_t seed) {
+  cv::RNG random(seed);
+  for (int i = 0; i < 250; ++i) {
+    const cv::Point at(random.uniform(0, image->cols), random.uniform(0, image->rows));
+    cv::line(*image, at, at + cv::Point(random.uniform(-2, 3), random.uniform(8, 25)),
+             cv::Scalar(random.uniform(160, 240)), 1, cv::LINE_AA);
+  }
+}
+
+/// A textured wall that crosses from left to right and hides up to half of both images.
+void occlude(cv::Mat* left, cv::Mat* right, std::size_t at, std::size_t count) {
+  const double along = 2.0 * static_cast<double>(at) / static_cast<double>(count) - 0.5;
+  const int width = left->cols / 2, x = static_cast<int>(along * left->cols) - width / 2;
+  cv::RNG random(7);
+  cv::Mat texture(left->rows * 3 / 4 / 6, width / 6, CV_8U);
+  random.fill(texture, cv::RNG::UNIFORM, 40, 200);
+  cv::resize(texture, texture, {width, left->rows * 3 / 4}, 0, 0, cv::INTER_CUBIC);
+  const int disparity = left->cols / 25;
+  for (cv::Mat* image : {left, right}) {
+    const int begin = image == left ? x : x - disparity;
+    const cv::Rect whole(begin, image->rows / 8, texture.cols, texture.rows);
+    const cv::Rect seen = whole & cv::Rect(0, 0, image->cols, image->rows);
+    if (seen.empty()) continue;
+    texture(seen - whole.tl()).copyTo((*image)(seen));
+  }
+}
+
+using Pairs = std::vector<app::StereoPair>;
+
+void keep_every(Pairs* pairs, std::size_t step) {
+  Pairs kept;
+  for (std::size_t i = 0; i < pairs->size(); i += step) kept.push_back((*pairs)[i]);
+  *pairs = std::move(kept);
+}
+
+void drop_some(Pairs* pairs) {
+  cv::RNG random(3);
+  Pairs kept;
+  for (const app::StereoPair& p : *pairs)
+    if (random.uniform(0.0, 1.0) >= 0.3) kept.push_back(p);
+  *pairs = std::move(kept);
+}
+
+void lag_right(Pairs* pairs, std::size_t from) {
+  for (std::size_t i = pairs->size() - 1; i > from; --i)
+    (*pairs)[i].file[1] = (*pairs)[i - 1].file[1];
+}
+
+using M = cv::Mat;
+using N = std::size_t;
+
+constexpr std::array kVariants = {
+    HonestyVariant{"untouched", nullptr, nullptr},
+    HonestyVariant{"yaw 0.3° from the start",
+                   [](M*, M* r, N, N) { warp(r, pixels(*r, 0.3), 0, 0, 1); }, nullptr},
+    HonestyVariant{"yaw 1° from the start", [](M*, M* r, N, N) { warp(r, pixels(*r, 1), 0, 0, 1); },
+                   nullptr},
+    HonestyVariant{"yaw 0.3° half-way",
+                   [](M*, M* r, N i, N n) {
+                     if (later(i, n)) warp(r, pixels(*r, 0.3), 0, 0, 1);
+                   },
+                   nullptr},
+    HonestyVariant{"yaw −0.3° half-way",
+                   [](M*, M* r, N i, N n) {
+                     if (later(i, n)) warp(r, pixels(*r, -0.3), 0, 0, 1);
+                   },
+                   nullptr},
+    HonestyVariant{"2 px to the side half-way",
+                   [](M*, M* r, N i, N n) {
+                     if (later(i, n)) warp(r, 2, 0, 0, 1);
+                   },
+                   nullptr},
+    HonestyVariant{"−2 px to the side half-way",
+                   [](M*, M* r, N i, N n) {
+                     if (later(i, n)) warp(r, -2, 0, 0, 1);
+                   },
+                   nullptr},
+    HonestyVariant{"pitch 0.3° half-way",
+                   [](M*, M* r, N i, N n) {
+                     if (later(i, n)) warp(r, 0, pixels(*r, 0.3), 0, 1);
+                   },
+                   nullptr},
+    HonestyVariant{"roll 0.5° half-way",
+                   [](M*, M* r, N i, N n) {
+                     if (later(i, n)) warp(r, 0, 0, 0.5, 1);
+                   },
+                   nullptr},
+    HonestyVariant{"zoom 1 % from the start", [](M*, M* r, N, N) { warp(r, 0, 0, 0, 1.01); },
+                   nullptr},
+    HonestyVariant{"zoom 1 % half-way",
+                   [](M*, M* r, N i, N n) {
+                     if (later(i, n)) warp(r, 0, 0, 0, 1.01);
+                   },
+                   nullptr},
+    HonestyVariant{"knock while covered",
+                   [](M* l, M* r, N i, N n) {
+                     if (i >= n / 2) warp(r, pixels(*r, 0.5), 0, 0, 1);
+                     if (i >= n / 2 - 5 && i < n / 2 + 5) l->setTo(0), r->setTo(0);
+                   },
+                   nullptr},
+    HonestyVariant{"right one frame late", nullptr, [](Pairs* p) { lag_right(p, 0); }},
+    HonestyVariant{"right one frame late half-way", nullptr,
+                   [](Pairs* p) { lag_right(p, p->size() / 2); }},
+    HonestyVariant{"cameras swapped", [](M* l, M* r, N, N) { std::swap(*l, *r); }, nullptr},
+    HonestyVariant{"right mirrored", [](M*, M* r, N, N) { cv::flip(*r, *r, 1); }, nullptr},
+    HonestyVariant{"right covered for a while",
+                   [](M*, M* r, N i, N n) {
+                     if (i >= n / 2 && i < n / 2 + 15) r->setTo(3);
+                   },
+                   nullptr},
+    HonestyVariant{"both covered for a while",
+                   [](M* l, M* r, N i, N n) {
+                     if (i >= n / 2 && i < n / 2 + 8) l->setTo(3), r->setTo(3);
+                   },
+                   nullptr},
+    HonestyVariant{"right dark", [](M*, M* r, N i, N) { darken(r, 0.12, i); }, nullptr},
+    HonestyVariant{"night",
+                   [](M* l, M* r, N i, N) {
+                     darken(l, 0.15, 2 * i);
+                     darken(r, 0.15, 2 * i + 1);
+                   },
+                   nullptr},
+    HonestyVariant{"flicker",
+                   [](M* l, M* r, N i, N) {
+                     l->convertTo(*l, CV_8U, i % 2 == 0 ? 1.3 : 0.7);
+                     r->convertTo(*r, CV_8U, i % 3 == 0 ? 1.3 : 0.7);
+                   },
+                   nullptr},
+    HonestyVariant{"dirt on both",
+                   [](M* l, M* r, N, N) {
+                     spots(l, 11, 25);
+                     spots(r, 12, 25);
+                   },
+                   nullptr},
+    HonestyVariant{"rain",
+                   [](M* l, M* r, N i, N) {
+                     rain(l, 2 * i + 1);
+                     rain(r, 2 * i + 2);
+                   },
+                   nullptr},
+    HonestyVariant{"JPEG 20",
+                   [](M* l, M* r, N, N) {
+                     jpeg(l, 20);
+                     jpeg(r, 20);
+                   },
+                   nullptr},
+    HonestyVariant{"blurred",
+                   [](M* l, M* r, N, N) {
+                     cv::GaussianBlur(*l, *l, {}, 2);
+                     cv::GaussianBlur(*r, *r, {}, 2);
+                   },
+                   nullptr},
+    HonestyVariant{"a wall drives past", occlude, nullptr},
+    HonestyVariant{"30 % of the pairs lost", nullptr, drop_some},
+    HonestyVariant{"every second pair", nullptr, [](Pairs* p) { keep_every(p, 2); }},
+    HonestyVariant{"every third pair", nullptr, [](Pairs* p) { keep_every(p, 3); }},
+};
+
+}  // namespace
+
+std::span<const HonestyVariant> honesty_variants() { return kVariants; }
+
+app::StereoSequence spoil(const test::RecordedSequence& drive, const HonestyVariant& variant,
+                          const std::filesystem::path& folder) {
+  app::StereoSequence s = drive.sequence;
+  if (variant.pairs != nullptr) variant.pairs(&s.pairs);
+  if (variant.image == nullptr) return s;
+  std::filesystem::create_directories(folder);
+  for (std::size_t i = 0; i < s.pairs.size(); ++i) {
+    std::array<cv::Mat, 2> images;
+    for (std::size_t k = 0; k < 2; ++k)
+      images[k] = cv::imread((s.root / s.pairs[i].file[k]).string(), cv::IMREAD_GRAYSCALE);
+    variant.image(&images[0], &images[1], i, s.pairs.size());
+    for (std::size_t k = 0; k < 2; ++k) {
+      const std::filesystem::path file = folder / fmt::format("{}_{:06d}.png", k, i);
+      cv::imwrite(file.string(), images[k], {cv::IMWRITE_PNG_COMPRESSION, 1});
+      s.pairs[i].file[k] = file.string();
+    }
+  }
+  return s;
+}
+
+}  // namespace vergence::bench

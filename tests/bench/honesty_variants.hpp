@@ -1,0 +1,28 @@
+#pragma once
+#include <filesystem>
+#include <span>
+#include <string_view>
+
+#include <opencv2/core.hpp>
+
+#include "tests/support/recorded_sequence.hpp"
+
+namespace vergence::bench {
+
+/// What spoils a recorded drive. `image` changes the images of pair `at` (of `count`) in place;
+/// `pairs` chooses the pairs of the drive, or which right image goes with which left one. Either
+/// may be null. Deterministic: what looks random is drawn from a generator seeded with `at`.
+struct HonestyVariant {
+  std::string_view name;
+  void (*image)(cv::Mat* left, cv::Mat* right, std::size_t at, std::size_t count);
+  void (*pairs)(std::vector<app::StereoPair>* pairs);
+};
+
+[[nodiscard]] std::span<const HonestyVariant> honesty_variants();
+
+/// The drive so spoilt, its changed images in `folder`.
+[[nodiscard]] app::StereoSequence spoil(const test::RecordedSequence& drive,
+                                        const HonestyVariant& variant,
+                                        const std::filesystem::path& folder);
+
+}  // namespace vergence::bench

@@ -1,0 +1,126 @@
+#include "core/calibration/disparity_jump.hpp"
+
+#include <numbers>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "core/math/random.hpp"
+#include "core/math/so3.hpp"
+
+namespace vergence::calibration {
+namespace {
+
+constexpr double kBaseline = 0.54;  // m, KITTI's
+constexpr Pinhole kPinhole{718, 718, 607, 185};
+constexpr double kNoise = 0.2;  // px, of a coordinate
+constexpr std::size_t kTracks = 150;
+
+Transform rig(double yaw_deg) {
+  return {exp_so3(Vec3(0, yaw_deg * std::numbers::pi / 180, 0)), Vec3(-kBaseline, 0, 0)};
+}
+
+/// A street that is driven along; each track is seen in some ten frames. The rig that took the
+/// images may be another than the one that the detector is told.
+class Street {
+ public:
+  explicit Street(const Transform& believed, std::uint64_t seed = 1)
+      : arena_(DisparityJumpDetector::memory_needed(2 * kTracks)),
+        detector_(2 * kTracks, arena_),
+        random_(seed) {
+    detector_.set_reference(believed, kPinhole, kPinhole);
+    for (std::size_t i = 0; i < kTracks; ++i) points_.push_back(fresh());
+  }
+
+  DisparityJump drive(const Transform& T_right_left, double noise = kNoise) {
+    const Transform step{exp_so3(Vec3(0.002, 0.01, 0.001)), Vec3(0.02, 0.01, -0.9)};
+    std::vector<StereoObservation> seen;
+    for (Point& p : points_) {
+      p.at = step * p.at;
+      if (p.at.z() < 4) p = fresh();
+      const Vec3 r = T_right_left * p.at;
+      StereoObservation s;
+      s.left = pixel(p.at, noise);
+      s.right = pixel(r, noise);
+      s.sigma_px = kNoise;
+      s.track = p.track;
+      seen.push_back(s);
+    }
+    return detector_.next(frame_++, seen, step);
+  }
+
+ private:
+  struct Point {
+    Vec3 at;
+    std::uint32_t track;
+  };
+  Point fresh() {
+    return {Vec3(random_.uniform(-12, 12), random_.uniform(-3, 2), random_.uniform(6, 40)),
+            next_track_++};
+  }
+  Vec2 pixel(const Vec3& p, double noise) {
+    return {kPinhole.fx * p.x() / p.z() + kPinhole.cx + noise * random_.normal(),
+            kPinhole.fy * p.y() / p.z() + kPinhole.cy + noise * random_.normal()};
+  }
+
+  Arena arena_;
+  DisparityJumpDetector detector_;
+  Random random_;
+  std::vector<Point> points_;
+  std::uint32_t next_track_ = 1;
+  std::uint64_t frame_ = 0;
+};
+
+TEST(DisparityJump, ATurnOfYawIsSeenInItsFrameAndConfirmedInTheNext) {
+  for (const double yaw : {0.1, -0.1, 0.3, 1.0}) {
+    Street street(rig(0));
+    for (int i = 0; i < 20; ++i) EXPECT_FALSE(street.drive(rig(0)).suspected) << yaw << ", " << i;
+    const DisparityJump jump = street.drive(rig(yaw));
+    EXPECT_TRUE(jump.suspected) << yaw;
+    // A turn by α moves the image by f tan α at its centre, and by up to 1 + (x/f)² of that at the
+    // sides: less than twice as much.
+    const double centre = kPinhole.fx * std::abs(yaw) * std::numbers::pi / 180;
+    EXPECT_GT(std::abs(jump.px), centre - 5 * jump.sigma_px);
+    EXPECT_LT(std::abs(jump.px), 2 * centre);
+    const DisparityJump next = street.drive(rig(yaw));
+    EXPECT_TRUE(next.confirmed) << yaw;
+    EXPECT_EQ(next.onset_frame, 20U);
+  }
+}
+
+TEST(DisparityJump, AWrongCalibrationThatDoesNotChangeIsNoJump) {
+  for (const double yaw : {0.3, -1.0}) {
+    Street street(rig(yaw));
+    for (int i = 0; i < 300; ++i) EXPECT_FALSE(street.drive(rig(0)).suspected) << yaw << ", " << i;
+  }
+}
+
+TEST(DisparityJump, NoiseRaisesNothingInAThousandFrames) {
+  for (std::uint64_t seed = 1; seed <= 5; ++seed) {
+    Street street(rig(0), seed);
+    for (int i = 0; i < 200; ++i) EXPECT_FALSE(street.drive(rig(0)).suspected) << seed << ", " << i;
+  }
+}
+
+TEST(DisparityJump, OneSpoiltImageIsSuspectedAndNotConfirmed) {
+  Street street(rig(0));
+  for (int i = 0; i < 20; ++i) (void)street.drive(rig(0));
+  EXPECT_TRUE(street.drive(rig(0.3)).suspected);
+  const DisparityJump back = street.drive(rig(0));
+  EXPECT_FALSE(back.suspected);
+  EXPECT_FALSE(back.confirmed);
+  EXPECT_FALSE(street.drive(rig(0)).confirmed);
+}
+
+TEST(DisparityJump, TooFewTracksMeasureNothing) {
+  Arena arena(DisparityJumpDetector::memory_needed(10));
+  DisparityJumpDetector detector(10, arena);
+  detector.set_reference(rig(0), kPinhole, kPinhole);
+  const std::vector<StereoObservation> same(
+      40, StereoObservation{Vec2(600, 180), Vec2(580, 180), 0.2, 1});
+  for (std::uint64_t i = 0; i < 4; ++i)
+    EXPECT_FALSE(detector.next(i, same, Transform{}).measured) << i;
+}
+
+}  // namespace
+}  // namespace vergence::calibration
