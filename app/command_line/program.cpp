@@ -10,6 +10,7 @@
 
 #include "app/runtime/nearest.hpp"
 #include "app/runtime/version.hpp"
+#include "core/features/simd_target.hpp"
 
 #include <CLI/Config.hpp>
 #include <CLI/Formatter.hpp>
@@ -92,7 +93,8 @@ ExitCode parse_and_run(int given, const char* const* given_argv, AddCommands add
   const char* const* argv = words.data();
   CLI::App root("Stereo odometry that finds and keeps its own calibration", "vergence");
   ExitCode exit_code = ExitCode::done;
-  root.set_version_flag("--version", "vergence " + std::string(version()));
+  root.set_version_flag("--version",
+                        "vergence " + std::string(version()) + ", " + features::simd_target());
   root.require_subcommand(1);
   add_commands(root, {given_argv, static_cast<std::size_t>(given)}, &exit_code);
   check_first_word(root, argc, argv);

@@ -1,10 +1,14 @@
+#include <filesystem>
 #include <fstream>
 #include <iostream>
 #include <memory>
 #include <string>
 
 #include "app/commands/commands.hpp"
+#include "app/config/configuration.hpp"
 #include "app/doctor/devices_report.hpp"
+#include "app/doctor/needs.hpp"
+#include "app/doctor/rig_devices.hpp"
 #include "app/doctor/udev_rules.hpp"
 
 namespace vergence::app {
@@ -12,10 +16,17 @@ namespace {
 
 struct Arguments {
   bool json = false, probe = false;
+  std::string rig;    // configuration; empty: whatever is plugged in
   std::string rules;  // `-`: standard output
 };
 
 void write_rules(const std::string& file, const std::string& rules) {
+  const std::string kind = std::filesystem::path(file).extension();
+  if (kind == ".yaml" || kind == ".yml")
+    throw InputError(file +
+                     ": rules do not go into a configuration; name it by --rig, as in vergence "
+                     "devices --rig " +
+                     file + " --write-udev");
   std::ofstream out(file, std::ios::binary | std::ios::trunc);
   out << rules;
   out.close();
@@ -29,10 +40,16 @@ void write_rules(const std::string& file, const std::string& rules) {
 }
 
 void list(const Arguments& a, bool rules_asked) {
+  Needs needs;
+  if (!a.rig.empty()) needs = needs_of(load_configuration(a.rig, {}));
+  if (needs.given && !rules_asked)
+    throw InputError("--rig says whose rules are written; add --write-udev");
   InventoryOptions options;
   options.probe = a.probe;
   const Inventory inventory = take_inventory(Machine::here(), options);
-  const std::string rules = rules_asked ? udev_rules(inventory) : "";
+  std::string rules;
+  if (rules_asked)
+    rules = needs.given ? udev_rules(rig_devices(inventory, needs)) : udev_rules(inventory);
   const bool to_stdout = a.rules == "-";
   if (rules_asked && !to_stdout) write_rules(a.rules, rules);
   if (a.json)
@@ -62,6 +79,12 @@ void add_devices(CLI::App& root, ExitCode* exit_code) {
                            ->expected(0, 1)
                            ->default_str("-")
                            ->type_name("[FILE]");
+  command
+      ->add_option(
+          "--rig", a->rig,
+          "With --write-udev: rules for the devices of this configuration alone, each named "
+          "by what it is there")
+      ->type_name("CONFIG");
   command->callback([a, rules, exit_code] {
     if (rules->count() > 0 && a->rules.empty()) a->rules = "-";
     list(*a, rules->count() > 0);

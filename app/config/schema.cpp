@@ -260,16 +260,18 @@ Group ins() {
              "ins", "The inertial navigation system that the pose is compared with.",
              [](auto& c) -> auto& { return c.ins; })
       .text("driver", &I::driver, 16,
-            "What talks to it: `xsens`, `mock` (with mock cameras), or `none`.")
+            "What talks to it: `xsens`, `nmea` or `ubx` (satellite receivers), `mock` (with mock "
+            "cameras), or `none`.")
       .text("port", &I::port, 200,
             "Serial port of the INS, `/dev/ttyUSB0` or better a link that stays: "
             "`/dev/serial/by-id/…`. Empty: the only one on USB.")
       .integer("baud", &I::baud, 0, 2000000, "baud",
                "Rate of that line; the device is brought to it. 0: as the device has it, which is "
                "looked for.")
-      .number(
-          "rate", &I::rate, 1, 400, "Hz",
-          "Readings of the INS a second; an MTi-G-700/710 takes the nearest it has (100 for 120).")
+      .number("rate", &I::rate, 1, 400, "Hz",
+              "Readings of the INS a second; an MTi-G-700/710 takes the nearest it has (100 for "
+              "120). With "
+              "`nmea` and `ubx` what the receiver sends.")
       .number("sync_out_hz", &I::sync_out_hz, -1, 400, "Hz",
               "Pulses a second at the INS's SyncOut; 0: as the device has it, -1: none. An "
               "MTi-G-700/710 makes 400 Hz / n, no 30.")

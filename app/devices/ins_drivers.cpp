@@ -4,6 +4,7 @@
 
 #include "app/runtime/errors.hpp"
 #include "app/runtime/nearest.hpp"
+#include "drivers/gnss/gnss.hpp"
 #include "drivers/xsens/xsens.hpp"
 
 namespace vergence::app {
@@ -26,6 +27,12 @@ std::unique_ptr<InsDriver> make_xsens(const InsRequest& request) {
   o.sync_in = sync_in_of(request.sync_in);
   o.processing = Duration::seconds(request.processing_ms * 1e-3);
   return std::make_unique<xsens::Driver>(o);
+}
+
+template <gnss::Protocol kProtocol>
+std::unique_ptr<InsDriver> make_gnss(const InsRequest& request) {
+  return std::make_unique<gnss::Driver>(
+      gnss::Options{kProtocol, request.baud, Duration::seconds(request.processing_ms * 1e-3)});
 }
 
 const InsDriverRow& row_of(const InsRequest& request) {
@@ -63,6 +70,10 @@ const std::vector<InsDriverRow>& ins_driver_rows() {
   static const std::vector<InsDriverRow> rows{
       {"xsens", "XSens MTi-G or MTi-G-700/710 on a serial port", &make_xsens,
        "add the user to group dialout, and log in again"},
+      {"nmea", "satellite receiver or compass that sends NMEA 0183 on a serial port",
+       &make_gnss<gnss::Protocol::nmea>, "add the user to group dialout, and log in again"},
+      {"ubx", "u-blox receiver that sends UBX-NAV-PVT on a serial port",
+       &make_gnss<gnss::Protocol::ubx>, "add the user to group dialout, and log in again"},
   };
   return rows;
 }
@@ -74,7 +85,8 @@ std::vector<std::string> ins_driver_names() {
 }
 
 std::string ins_title(const DeviceInfo& info) {
-  return fmt::format("ins ({} {}, {} on {})", info.driver, info.serial, info.model, info.place);
+  return fmt::format("ins ({}{}{}, {} on {})", info.driver, info.serial.empty() ? "" : " ",
+                     info.serial, info.model, info.place);
 }
 
 std::unique_ptr<InsDevice> open_ins(const InsRequest& request, std::vector<std::string>* remarks) {

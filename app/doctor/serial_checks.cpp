@@ -5,6 +5,7 @@
 
 #include "app/doctor/checks.hpp"
 #include "app/doctor/permissions.hpp"
+#include "app/doctor/rig_devices.hpp"
 
 namespace vergence::app {
 namespace {
@@ -15,21 +16,15 @@ bool is_real(const std::string& driver) {
   return !driver.empty() && driver != "none" && driver != "mock";
 }
 
-/// Whether a key of the configuration means this port; empty: any on USB.
-bool means(const std::string& key, const FoundPort& port) {
-  if (key.empty()) return port.info.usb_vendor != 0;
-  return key == port.by_id ||
-         std::filesystem::path(key).filename() == std::filesystem::path(port.info.port).filename();
-}
 bool may_be_ins(const CheckContext& p, const FoundPort& port) {
-  return is_real(p.needs.ins_driver) && means(p.needs.ins_port, port);
+  return is_real(p.needs.ins_driver) && names_port(p.needs.ins_port, port);
 }
 
 /// Ports that anybody here cares about: those of the configuration, without one all on USB.
 std::vector<const FoundPort*> ports_of(const CheckContext& p) {
   std::vector<const FoundPort*> some;
   for (const FoundPort& port : p.inventory.ports) {
-    const bool trigger = is_real(p.needs.trigger_driver) && means(p.needs.trigger_port, port);
+    const bool trigger = is_real(p.needs.trigger_driver) && names_port(p.needs.trigger_port, port);
     if (p.needs.given ? may_be_ins(p, port) || trigger : port.info.usb_vendor != 0)
       some.push_back(&port);
   }

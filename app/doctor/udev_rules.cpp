@@ -50,7 +50,7 @@ std::string which(const char* attribute, std::uint16_t vendor, std::uint16_t pro
 
 const char* name_of(SerialKind kind) {
   if (kind == SerialKind::ins) return "ins";
-  return kind == SerialKind::board ? "board" : "serial";
+  return kind == SerialKind::board ? "trigger" : "serial";
 }
 
 std::string port_rules(const FoundPort& port) {
@@ -58,14 +58,16 @@ std::string port_rules(const FoundPort& port) {
   const std::string who = which("ATTRS", i.usb_vendor, i.usb_product, i.usb_serial);
   std::string out = fmt::format("\n# {}: {}{}{}\n", i.port, comment(i.description),
                                 port.device.empty() ? "" : ", ", comment(port.device));
-  out += fmt::format("ENV{{DEVTYPE}}==\"usb_device\", {}, ENV{{ID_MM_DEVICE_IGNORE}}=\"1\"\n",
-                     which("ATTR", i.usb_vendor, i.usb_product, i.usb_serial));
+  out += fmt::format(
+      "ENV{{DEVTYPE}}==\"usb_device\", {}, ENV{{ID_MM_DEVICE_IGNORE}}=\"1\", "
+      "ATTR{{power/control}}=\"on\"\n",
+      which("ATTR", i.usb_vendor, i.usb_product, i.usb_serial));
   out += fmt::format("SUBSYSTEM==\"tty\", {}, GROUP=\"dialout\", MODE=\"0660\", ", who);
   if (!i.usb_serial.empty())
     out += fmt::format("SYMLINK+=\"vergence/{}-{}\", ", name_of(port.kind),
                        part_of_name(i.usb_serial));
   out += "ENV{ID_MM_PORT_IGNORE}=\"1\"\n";
-  if (is_ftdi(i.usb_vendor, i.usb_product) && port.kind != SerialKind::board)
+  if (is_ftdi(i.usb_vendor, i.usb_product))
     out += fmt::format(
         "ACTION==\"add|bind\", SUBSYSTEM==\"usb-serial\", DRIVER==\"ftdi_sio\", {}, "
         "ATTR{{latency_timer}}=\"16\"\n",
@@ -120,6 +122,13 @@ std::string udev_rules(const Inventory& inventory) {
     return head + "# Nothing that needs a rule is plugged in. Network cameras need none.\n";
   return head + "\nACTION==\"remove\", GOTO=\"vergence_rig_end\"\n" + rules +
          "\nLABEL=\"vergence_rig_end\"\n";
+}
+
+std::string udev_rules(const RigDevices& rig) {
+  std::string rules = udev_rules(rig.inventory);
+  for (const std::string& sentence : rig.missing)
+    rules += fmt::format("# Left out, {}\n", comment(sentence));
+  return rules;
 }
 
 }  // namespace vergence::app

@@ -9,6 +9,7 @@
 
 #include "app/runtime/version.hpp"
 #include "core/calibration/health.hpp"
+#include "core/features/simd_target.hpp"
 #include "core/math/so3.hpp"
 
 namespace vergence::app {
@@ -271,6 +272,7 @@ Json summary_json(const SessionTotals& totals, const SummaryInput& input) {
   json["time"] = input.time ? time_json(*input.time) : Json();
   json["truth"] = truth_json(input.truth, input);
   json["version"] = std::string(version());
+  json["simd"] = features::simd_target();
   json["configuration_hash"] = input.configuration_hash;
   return json;
 }

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstdio>
 #include <numbers>
+#include <utility>
 
 namespace vergence::app {
 
@@ -18,6 +19,7 @@ InsComparison::InsComparison(const ComparisonOptions& options, Source source, Ar
 void InsComparison::add(const InsRecord& reading) noexcept {
   output_->post(reading);
   comparison_.add(reading.sample);
+  note_attitude(reading.sample);
   note_jump(reading.sample.stamp);
 }
 
@@ -91,6 +93,7 @@ std::vector<std::pair<std::string, std::uint64_t>> InsComparison::counters() con
   return {{"ins_samples", k.ins_samples},
           {"ins_refused", k.ins_refused},
           {"ins_restarts", k.ins_restarts},
+          {"ins_without_attitude", k.ins_without_attitude},
           {"jumps", k.jumps},
           {"compared", k.compared},
           {"without_ins", k.without_ins},
@@ -110,6 +113,20 @@ void InsComparison::note_placement(Stamp stamp) noexcept {
                       "placed on the earth after %.1f m: heading to %.2f deg, residual %.2f m",
                       p.distance, p.rotation_sigma.z() * kDegrees, p.residual);
   journal_.tell(stamp, "placement", text.data(), false);
+}
+
+/// Once a drive: a receiver never has one, an INS has it after it has aligned.
+void InsComparison::note_attitude(const InsSample& sample) noexcept {
+  if (sample.attitude_valid || sample.heading_source == HeadingSource::none ||
+      std::exchange(attitude_noted_, true))
+    return;
+  const bool heading = sample.heading_source == HeadingSource::heading;
+  journal_.tell(sample.stamp, "ins_without_attitude",
+                heading ? "the INS gives no roll and pitch: taken as level; position and measured "
+                          "heading are compared"
+                        : "the INS gives no attitude: taken as level; position and course are "
+                          "compared",
+                false);
 }
 
 void InsComparison::note_ins(const ComparedPose& pose) noexcept {

@@ -50,6 +50,7 @@ class InsComparison {
   void measure(const ComparedPose& pose) noexcept;
   void note_placement(Stamp stamp) noexcept;
   void note_ins(const ComparedPose& pose) noexcept;
+  void note_attitude(const InsSample& sample) noexcept;
   void note_jump(Stamp stamp) noexcept;
   void note_scale(const ComparedPose& pose) noexcept;
 
@@ -62,7 +63,7 @@ class InsComparison {
   std::array<float, Comparison::kPending> decode_ms_{};  // of the poses that wait, by their count
   std::uint64_t added_ = 0, drained_ = 0;
   std::uint64_t matches_ = 0, jumps_ = 0, scale_disagreements_ = 0;
-  bool scale_disagrees_ = false;
+  bool scale_disagrees_ = false, attitude_noted_ = false;
   std::uint32_t placement_revision_ = 0;
   FixedVector<PlacementRecord, kMostPlacements> placements_;
   EarthErrors errors_{};  // means and roots are squares' sums until earth()

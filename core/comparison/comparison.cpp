@@ -14,7 +14,8 @@ constexpr double kLeastStep =
 constexpr int kBackwardsForGood =
     120;  // samples in a row: a second of an INS whose clock has gone back and stays there
 constexpr double kQuaternionLength = 0.1;
-constexpr double kSigmas = 4.0;  // of the path ratio, before scale_disagrees is said
+constexpr double kLevelSigma = 0.05;  // rad: slopes and suspension, where nobody measures tilt
+constexpr double kSigmas = 4.0;       // of the path ratio, before scale_disagrees is said
 
 bool positive(double v) noexcept { return std::isfinite(v) && v > 0; }
 
@@ -24,6 +25,9 @@ bool attitude_of(const InsSample& s, Mat3* R) noexcept {
   *R = q.normalized().toRotationMatrix();
   return true;
 }
+
+/// A vehicle on a road, at this yaw: level but for its slope, which kLevelSigma covers.
+Mat3 level_at(double yaw) noexcept { return exp_so3({0, 0, yaw}); }
 
 double or_default(double sigma, double fallback) noexcept {
   return positive(sigma) ? sigma : fallback;
@@ -106,7 +110,16 @@ void Comparison::add(const InsSample& sample) noexcept {
   const bool fixed = sample.fix == FixStatus::fix_2d || sample.fix == FixStatus::fix_3d;
   Mat3 R_local_ins;
   if (fixed && !sample.position.plausible()) ++counters_.ins_refused;
-  if (fixed && sample.position.plausible() && attitude_of(sample, &R_local_ins)) {
+  const bool attitude = attitude_of(sample, &R_local_ins);
+  if (!attitude) {
+    ++counters_.ins_without_attitude;
+    if (sample.heading_source != HeadingSource::none && std::isfinite(sample.yaw_enu)) {
+      yaw_ = sample.yaw_enu;
+      has_yaw_ = true;
+    }
+    R_local_ins = level_at(yaw_);  // at a standstill the last heading holds
+  }
+  if (fixed && sample.position.plausible() && (attitude || has_yaw_)) {
     if (!has_origin_) {
       plane_ = LocalTangentPlane(sample.position);
       has_origin_ = true;
@@ -116,7 +129,7 @@ void Comparison::add(const InsSample& sample) noexcept {
     r.R_enu_ins = plane_.rotation_from(sample.position) * R_local_ins;
     r.position_sigma = or_default(sample.position_sigma, options_.position_sigma_m);
     r.height_sigma = or_default(sample.height_sigma, options_.height_sigma_m);
-    r.tilt_sigma = or_default(sample.tilt_sigma, options_.tilt_sigma_rad);
+    r.tilt_sigma = attitude ? or_default(sample.tilt_sigma, options_.tilt_sigma_rad) : kLevelSigma;
     if (end_ > begin_ && reading(end_ - 1).valid) {
       const Reading& before = reading(end_ - 1);
       const double farthest = options_.jump_m + kFastest * (r.stamp - before.stamp).to_seconds();

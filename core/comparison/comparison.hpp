@@ -99,6 +99,7 @@ struct ComparisonCounters {
   std::uint64_t ins_refused = 0;  // out of order, not a number, not a place on the earth
   std::uint64_t ins_restarts =
       0;  // the INS's stamps went back for good: its history was begun again
+  std::uint64_t ins_without_attitude = 0;  // compared by position and heading, taken as level
   std::uint64_t jumps = 0;
   std::uint64_t compared = 0;
   std::uint64_t without_ins = 0;  // poses that went out with an InsMatch other than ok
@@ -182,6 +183,8 @@ class Comparison {
   std::uint64_t begin_ = 0, end_ = 0;  // numbers of the readings held
   int backwards_ = 0;                  // refused in a row for their stamps
 
+  double yaw_ = 0;  // rad, the newest of a sample without attitude
+  bool has_yaw_ = false;
   std::array<PoseSample, kPending> pending_{};
   std::uint64_t pending_begin_ = 0, pending_end_ = 0;
   bool finishing_ = false;

@@ -6,6 +6,7 @@
 #include <new>
 #include <stdexcept>
 #include <string>
+#include <utility>
 
 #include "core/estimator/online_calibrator.hpp"
 #include "core/estimator/transitions.hpp"
@@ -151,6 +152,7 @@ struct Estimator::Parts {
   void take(const CalibrationDecision& decision, Stamp stamp) noexcept;
   void take_learnt(const CalibrationDecision& decision, bool was_verified, Stamp stamp) noexcept;
   void tell_verified(bool was_verified, const CalibrationDecision& decision, Stamp stamp) noexcept;
+  void tell_confirmed(Stamp stamp) noexcept;
   void follow(const odometry::FrameOutcome& out, const RigFrame& frame) noexcept;
   void tell_missing(Stamp stamp) noexcept;
   void grade(const odometry::FrameOutcome& out, Pairing pairing, PoseSample* sample) const noexcept;
@@ -163,12 +165,15 @@ struct Estimator::Parts {
   Stamp last{};
   std::uint64_t last_number = 0;
   bool any = false;
-  bool unconfirmed;         // the calibration in use is the last drive's
-  bool undecided = false;   // something is wrong with the rig, and not yet told what
-  bool verified = false;    // the calibration in use, when last decided about
-  bool superseded = false;  // poses still are of a calibration that was contradicted
-  int out_of_step = 0;      // frames for which that is still believed
+  bool unconfirmed;              // the calibration in use is the last drive's
+  bool undecided = false;        // something is wrong with the rig, and not yet told what
+  bool verified = false;         // the calibration in use, when last decided about
+  double confirmed_percent = 0;  // depth error of the calibration that was confirmed
+  bool relinked = false;         // the frame before took up the calibration that was adopted
+  bool superseded = false;       // poses still are of a calibration that was contradicted
+  int out_of_step = 0;           // frames for which that is still believed
   int without_pose = 0;
+  bool in_gap = false;       // and the last event has said so
   int unmatched_frames = 0;  // in a row
   Reason told_missing = Reason::none;
   std::atomic<bool> requested{false};
@@ -183,7 +188,7 @@ void Estimator::Parts::doubt(CalibrationCause cause, std::uint64_t onset,
   transition(cause == CalibrationCause::requested ? Trigger::requested : Trigger::rig_changed,
              frame.stamp);
   calibrator.seek(cause, onset, frame.number);
-  verified = false;
+  verified = superseded = false;
   odometry.unlink();
 }
 
@@ -198,7 +203,7 @@ void Estimator::Parts::give_up_calibration(const RigFrame& frame, double frames)
     note(EstimatorEvent::Kind::calibration_contradicted, frame.stamp, sentence_of(cause), 0);
   transition(Trigger::rig_changed, frame.stamp);
   calibrator.seek(cause, frame.number, frame.number);
-  verified = false;
+  verified = superseded = false;
   odometry.unlink();
 }
 
@@ -264,8 +269,13 @@ void Estimator::Parts::tell_verified(bool was_verified, const CalibrationDecisio
                                      Stamp stamp) noexcept {
   if (!calibrator.verified() || was_verified) return;
   unconfirmed = false;
+  confirmed_percent = decision.depth_sigma_percent;
+  if (!superseded) tell_confirmed(stamp);
+}
+
+void Estimator::Parts::tell_confirmed(Stamp stamp) noexcept {
   note(EstimatorEvent::Kind::calibration_confirmed, stamp,
-       "the drive confirms the calibration in use", decision.depth_sigma_percent);
+       "the drive confirms the calibration in use", confirmed_percent);
 }
 
 void Estimator::Parts::take(const CalibrationDecision& decision, Stamp stamp) noexcept {
@@ -313,9 +323,11 @@ void Estimator::Parts::tell_missing(Stamp stamp) noexcept {
 
 /// States that follow from whether there is a pose.
 void Estimator::Parts::follow(const odometry::FrameOutcome& out, const RigFrame& frame) noexcept {
-  if (out.gap_s > 0)
+  // Once a gap: covered cameras give frame after frame that lies behind it.
+  if (out.gap_s > 0 && !in_gap)
     note(EstimatorEvent::Kind::time_gap, frame.stamp,
          "no frame for longer than motion can be predicted", out.gap_s);
+  in_gap = out.gap_s > 0 && !out.posed;
   const bool unmatched = !out.posed && out.images_good && out.reason == Reason::no_stereo_matches &&
                          odometry.linked() == odometry::Link::linked;
   unmatched_frames = unmatched ? unmatched_frames + 1 : 0;
@@ -431,6 +443,8 @@ PoseSample Estimator::process(const RigFrame& given) noexcept {
       p.options.online)
     p.doubt(CalibrationCause::requested, frame.number, frame);
 
+  if (p.relinked && std::exchange(p.superseded, false) && p.calibrator.verified())
+    p.tell_confirmed(frame.stamp);
   const odometry::FrameOutcome out = p.odometry.process(frame);
   p.follow(out, frame);
   if (p.options.online) {
@@ -443,7 +457,7 @@ PoseSample Estimator::process(const RigFrame& given) noexcept {
   }
   sample.state = p.state;
   p.grade(out, frame.pairing, &sample);
-  if (out.relinked) p.superseded = false;
+  p.relinked = out.relinked;
   if (out.posed) sample.T_world_left = out.T_left_world.inverse();
   sample.inliers = out.inliers;
   sample.stereo_inliers = out.stereo_inliers;

@@ -29,6 +29,13 @@ enum class FixStatus : std::uint8_t {
   fix_3d,
 };
 
+/// What a heading without an attitude is of.
+enum class HeadingSource : std::uint8_t {
+  none,
+  course,   // the direction of motion: the body's heading while it drives forwards without slip
+  heading,  // measured: two antennas, a compass
+};
+
 /// One reading of the INS: where its sensor body is and how it lies. A value: copied through rings.
 ///
 /// Time    Stamp mapped to host time; `stamp_error` bounds the error of the mapping.
@@ -45,11 +52,15 @@ struct InsSample {
   Geodetic position{};
   std::array<double, 3> velocity_enu{};         // m/s
   std::array<double, 4> q_enu_ins{0, 0, 0, 1};  // Hamilton, x y z w: v_enu = q ⊗ v_ins ⊗ q*
-  double position_sigma = 0;                    // m, horizontal, each axis
-  double height_sigma = 0;                      // m
-  double velocity_sigma = 0;                    // m/s, each axis
-  double tilt_sigma = 0;                        // rad, roll and pitch each
-  double heading_sigma = 0;                     // rad
+  // A receiver has no attitude but may have a heading: yaw of the body about up,
+  // counter-clockwise from east, rad. Means something where attitude_valid is false.
+  HeadingSource heading_source = HeadingSource::none;
+  double yaw_enu = 0;
+  double position_sigma = 0;  // m, horizontal, each axis
+  double height_sigma = 0;    // m
+  double velocity_sigma = 0;  // m/s, each axis
+  double tilt_sigma = 0;      // rad, roll and pitch each
+  double heading_sigma = 0;   // rad
 };
 
 /// Heading as people read it: degrees clockwise from north, [0, 360), from an ENU yaw

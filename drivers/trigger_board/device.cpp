@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <array>
-#include <chrono>
 #include <cstdio>
 #include <exception>
 #include <utility>
@@ -42,9 +41,9 @@ std::string hex_of(const std::uint8_t (&bytes)[12]) {
 }  // namespace
 
 Device::Device(std::unique_ptr<LinePlace> place, const Options& options)
-    : place_(std::move(place)), options_(options) {
+    : SerialDevice(std::move(place), "vergence-board"), options_(options) {
   info_.driver = "board";
-  info_.place = place_->name();
+  info_.place = this->place().name();
 }
 
 Device::~Device() { stop(); }
@@ -69,33 +68,24 @@ DeviceStatus Device::open() {
   LineSettings settings;
   if (const std::uint32_t baud = baud_ != 0 ? baud_ : options_.baud; baud != 0)
     settings.baud = baud;
-  DeviceStatus status = DeviceStatus::ok;
-  auto line = place_->open(settings, &status);
-  const std::lock_guard lock(line_mutex_);
-  line_ = std::move(line);
-  frames_.attach(line_.get());
+  const DeviceStatus status = open_line(settings);
+  frames_.attach(line());
   return status;
-}
-
-void Device::close_line() noexcept {
-  std::unique_ptr<ByteLine> line;
-  const std::lock_guard lock(line_mutex_);
-  line = std::move(line_);
 }
 
 /// Opens the line and asks who is there.
 DeviceStatus Device::meet(TriggerInfo* who_is_there) {
   DeviceStatus status = open();
   if (status != DeviceStatus::ok)
-    return refuse(status, place_->name() + " cannot be opened: " + std::string(to_string(status)));
-  Setup setup(*line_, frames_, stopping_, this);
+    return refuse(status, place().name() + " cannot be opened: " + std::string(to_string(status)));
+  Setup setup(*line(), frames_, stopping(), this);
   TriggerInfo who;
-  status = setup.find(options_.native_usb ? line_->baud() : options_.baud, &who);
-  if (status != DeviceStatus::ok) return refuse(status, place_->name() + ": " + setup.last_error());
+  status = setup.find(options_.native_usb ? line()->baud() : options_.baud, &who);
+  if (status != DeviceStatus::ok) return refuse(status, place().name() + ": " + setup.last_error());
   const std::string serial = hex_of(who.serial);
   // Another board would have other lines: that is for a person to decide.
   if (connected_ && serial != info_.serial)
-    return refuse(DeviceStatus::not_found, place_->name() +
+    return refuse(DeviceStatus::not_found, place().name() +
                                                ": another trigger board is there now (" + serial +
                                                " instead of " + info_.serial + ")");
   if (!connected_) {
@@ -104,7 +94,7 @@ DeviceStatus Device::meet(TriggerInfo* who_is_there) {
                   std::to_string(who.firmware_minor) + "." + std::to_string(who.firmware_patch);
   }
   connected_ = true;
-  baud_ = line_->baud();
+  baud_ = line()->baud();
   *who_is_there = who;
   return DeviceStatus::ok;
 }
@@ -114,7 +104,7 @@ DeviceStatus Device::meet(TriggerInfo* who_is_there) {
 DeviceStatus Device::connect() {
   stop();
   close_line();
-  virtual_time_ = place_->pass(Duration{});
+  look_up_virtual_time();
   const DeviceStatus status = meet(&identity_);
   if (status != DeviceStatus::ok) close_line();
   return status;
@@ -126,7 +116,7 @@ DeviceStatus Device::configure(const TriggerConfiguration& requested,
     stop();
     remark_.clear();
     (void)refuse(DeviceStatus::ok, {});
-    if (line_ == nullptr) {
+    if (line() == nullptr) {
       if (const DeviceStatus s = connect(); s != DeviceStatus::ok) return s;
     }
     std::string sentence;
@@ -143,7 +133,7 @@ DeviceStatus Device::configure(const TriggerConfiguration& requested,
     }
     if (status != DeviceStatus::ok) return status;
     configured_ = true;
-    timing_ = timing_of(config_, byte_time(), place_->latency_timer());
+    timing_ = timing_of(config_, byte_time(), place().latency_timer());
     remark_ = remark_about(requested, config_);
     if (actual != nullptr) *actual = configuration_of(config_);
     return DeviceStatus::ok;
@@ -153,60 +143,30 @@ DeviceStatus Device::configure(const TriggerConfiguration& requested,
 }
 
 DeviceStatus Device::set_up() {
-  Setup setup(*line_, frames_, kNever, this);
+  Setup setup(*line(), frames_, kNever, this);
   TriggerStatus status;
   DeviceStatus done = setup.halt(&status);
   if (done == DeviceStatus::ok) done = setup.configure(config_, &status);
   if (done != DeviceStatus::ok) {
     if (done == DeviceStatus::gone) close_line();
-    return refuse(done, place_->name() + ": " + setup.last_error());
+    return refuse(done, place().name() + ": " + setup.last_error());
   }
   return DeviceStatus::ok;
 }
 
 DeviceStatus Device::start(Notifier* ready) noexcept {
   if (!configured_) return DeviceStatus::bad_configuration;
-  if (!thread_.joinable()) out_.clear();  // of the start before: its pulses are past
-  const DeviceStatus status = out_.start(ready);
-  if (thread_.joinable() || status != DeviceStatus::ok)
-    return status;  // streaming, or gone and perhaps back
-  try {
-    pause_.store(0, std::memory_order_relaxed);
-    told_gone_ = false;
-    thread_ = std::thread([this] { work(); });
-  } catch (const std::exception&) {
-    out_.stop();
-    return DeviceStatus::failed;
-  }
-  starts_.fetch_add(1, std::memory_order_relaxed);
-  return DeviceStatus::ok;
+  if (!running()) pause_.store(0, std::memory_order_relaxed);
+  return start_thread(ready);
 }
 
-void Device::stop() noexcept {
-  if (!thread_.joinable()) return;
-  {
-    const std::scoped_lock lock(rest_mutex_, line_mutex_);
-    stopping_.store(true, std::memory_order_release);
-    if (line_ != nullptr) line_->wake();
-  }
-  stopped_.notify_all();
-  out_.stop();
-  thread_.join();
-  away_.store(false, std::memory_order_relaxed);
-  stopping_.store(false, std::memory_order_release);
-}
+void Device::stop() noexcept { stop_thread(); }
 
-DeviceStatus Device::wait(Duration limit, Pulse* pulse) noexcept {
-  Item item;
-  const DeviceStatus status = out_.take(limit, &item);
-  if (status == DeviceStatus::gone) pulse->arrival = item.arrival;
-  if (status == DeviceStatus::ok) *pulse = item.value;
-  return status;
-}
+DeviceStatus Device::wait(Duration limit, Pulse* pulse) noexcept { return take(limit, pulse); }
 
 DeviceStatus Device::pause(std::uint32_t pulses) noexcept {
-  if (!out_.streaming()) return DeviceStatus::stopped;
-  if (away_.load(std::memory_order_acquire)) return DeviceStatus::gone;
+  if (!streaming()) return DeviceStatus::stopped;
+  if (away()) return DeviceStatus::gone;
   pause_.fetch_add(pulses,
                    std::memory_order_release);  // the thread looks at least every ping_interval
   return DeviceStatus::ok;
@@ -220,8 +180,8 @@ TriggerStatistics Device::statistics() const noexcept {
   s.reboots = b.reboots;
   s.malformed = b.pulses.refused() + b.pulses.exposures_refused + b.line.refused() +
                 b.frames_unknown + b.time.refused;
-  s.overruns = overruns_.load(std::memory_order_relaxed);
-  s.starts = starts_.load(std::memory_order_relaxed);
+  s.overruns = overruns();
+  s.starts = starts();
   return s;
 }
 

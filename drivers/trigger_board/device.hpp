@@ -1,14 +1,11 @@
 #pragma once
 #include <atomic>
-#include <condition_variable>
 #include <memory>
 #include <mutex>
 #include <string>
-#include <thread>
 
 #include "core/math/random.hpp"
-#include "drivers/serial/byte_line.hpp"
-#include "drivers/stream.hpp"
+#include "drivers/common/serial_device.hpp"
 #include "drivers/trigger.hpp"
 #include "drivers/trigger_board/board_clock.hpp"
 #include "drivers/trigger_board/board_line.hpp"
@@ -44,7 +41,9 @@ struct BoardStatistics {
 /// Time     Pulses are mapped: by pings, kFirstPings of them before the board starts, then every
 ///          Options::ping_interval. Where it answers none, they come unmapped.
 /// Memory   The thread allocates only while the board is gone or begins again.
-class Device final : public TriggerDevice, private FrameSink {
+class Device final : public TriggerDevice,
+                     private SerialDevice<Pulse, 256>,  // pulses: eight seconds at 30 Hz
+                     private FrameSink {
  public:
   static constexpr Duration kSilent = Duration::seconds(1);
   static constexpr int kFirstPings = 8;
@@ -52,8 +51,6 @@ class Device final : public TriggerDevice, private FrameSink {
       8;  // events in a row that make no sense: the board is set up anew
 
   Device(std::unique_ptr<LinePlace> place, const Options& options);
-  Device(const Device&) = delete;
-  Device& operator=(const Device&) = delete;
   ~Device() override;
 
   /// Opens the line and asks who is there. → ok, not_found (another make, or nobody),
@@ -78,8 +75,6 @@ class Device final : public TriggerDevice, private FrameSink {
   [[nodiscard]] BoardStatistics board_statistics() const noexcept;
 
  private:
-  static constexpr std::size_t kRing = 256;  // pulses: eight seconds at 30 Hz
-  using Item = Delivery<Pulse>;
   struct AskedPause {
     std::uint32_t pulses = 0;  // 0: none is waiting for its answer
     std::uint8_t sequence = 0;
@@ -98,16 +93,16 @@ class Device final : public TriggerDevice, private FrameSink {
   [[nodiscard]] DeviceStatus set_up();
   [[nodiscard]] DeviceStatus refuse(DeviceStatus status, std::string sentence);
   [[nodiscard]] Duration byte_time() const noexcept;
-  void close_line() noexcept;
 
-  void work() noexcept;
-  [[nodiscard]] DeviceStatus begin() noexcept;
+  [[nodiscard]] DeviceStatus begin() noexcept override;
   [[nodiscard]] DeviceStatus begin_on(Setup* setup);
   [[nodiscard]] DeviceStatus started() noexcept;
   [[nodiscard]] DeviceStatus tie_clocks() noexcept;
-  [[nodiscard]] DeviceStatus read_on() noexcept;
+  [[nodiscard]] DeviceStatus read_on() noexcept override;
+  [[nodiscard]] DeviceStatus reopen() override;
+  void interrupted(DeviceStatus status) noexcept override;
+  void finished() noexcept override;
   [[nodiscard]] DeviceStatus read_one(HostStamp deadline) noexcept;
-  [[nodiscard]] bool come_back() noexcept;
   void halt_board() noexcept;
   [[nodiscard]] std::uint32_t open_reports() const noexcept;
   void ping() noexcept;
@@ -117,26 +112,22 @@ class Device final : public TriggerDevice, private FrameSink {
   void take_pong(const TriggerPong& pong, HostStamp departure) noexcept;
   void take_status(const TriggerStatus& status) noexcept;
   [[nodiscard]] bool same_boot(std::uint32_t boot) noexcept;
-  void hand_out(const Item& item, bool always) noexcept;
   void publish(bool last) noexcept;
   void go_streaming(HostStamp now) noexcept;
-  void rest(Duration time) noexcept;
 
-  std::unique_ptr<LinePlace> place_;
   const Options options_;
   DeviceInfo info_;
   TriggerInfo identity_{};
   TriggerConfig config_{};
   std::uint32_t mark_ = 0;  // of config_, in STATUS
   std::uint32_t baud_ = 0;  // at which the board was last heard; 0: not yet
-  bool connected_ = false, configured_ = false, virtual_time_ = false;
+  bool connected_ = false, configured_ = false;
   DeviceTiming timing_{};
   std::string remark_;
   mutable std::mutex last_error_mutex_;
   std::string last_error_;
 
-  std::mutex line_mutex_;  // of the pointer: stop() wakes a line that the thread may be replacing
-  std::unique_ptr<ByteLine> line_;  // from here on: of the thread while it runs, else the owner's
+  // From here on: of the thread while it runs, else the owner's.
   BoardLine frames_;
   PulseAccount account_;
   BoardClock clock_;
@@ -147,16 +138,9 @@ class Device final : public TriggerDevice, private FrameSink {
   bool known_boot_ = false;  // account_.boot() is one
   bool running_ = false;     // it was started and makes pulses, as far as we know
   bool streaming_ = false;   // events go to the consumer
-  bool told_gone_ = false;   // and not yet that it is back
   HostStamp heard_{}, published_{};
 
-  vergence::Stream<Pulse, kRing> out_;
-  std::atomic<bool> stopping_{false}, away_{false};
   std::atomic<std::uint32_t> pause_{0};  // pulses that shall be left out and are not asked for yet
-  std::mutex rest_mutex_;
-  std::condition_variable stopped_;
-  std::thread thread_;
-  std::atomic<std::uint64_t> overruns_{0}, starts_{0};
   mutable std::mutex published_mutex_;
   BoardStatistics published_statistics_{};
 };

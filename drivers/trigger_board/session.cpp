@@ -1,8 +1,5 @@
-#include <pthread.h>
-
 #include <algorithm>
 #include <array>
-#include <chrono>
 #include <cmath>
 #include <exception>
 #include <utility>
@@ -13,8 +10,6 @@
 namespace vergence::trigger_board {
 namespace {
 
-constexpr Duration kAgain =
-    Duration::milliseconds(500);  // between attempts to open a line that is gone
 constexpr Duration kPublish = Duration::milliseconds(100);  // statistics are as old as this at most
 constexpr Duration kFirstPong =
     Duration::milliseconds(50);  // the first pings wait for their answers
@@ -27,38 +22,23 @@ const std::atomic<bool> kNever{false};
 
 }  // namespace
 
-void Device::work() noexcept {
-  (void)pthread_setname_np(pthread_self(), "vergence-board");
-  while (!stopping_.load(std::memory_order_acquire)) {
-    DeviceStatus status = line_ != nullptr ? begin() : DeviceStatus::gone;
-    HostStamp when = line_ != nullptr ? line_->now() : HostStamp{};
-    if (status == DeviceStatus::ok) {
-      status = read_on();
-      if (line_ != nullptr) when = line_->now();
-    }
-    if (status == DeviceStatus::stopped) break;  // what still comes until it has stopped counts
-    streaming_ = false;
-    publish(false);
-    if (status == DeviceStatus::ok) continue;  // it began again: set it up
-    if (status == DeviceStatus::ended) {
-      hand_out({Item::What::end, when, {}}, true);
-      break;
-    }
-    away_.store(true, std::memory_order_release);
-    ++counted_.gone;
-    if (!std::exchange(told_gone_, true)) hand_out({Item::What::gone, when, {}}, true);
-    if (!come_back()) break;
-  }
-  if (line_ != nullptr) halt_board();
+void Device::interrupted(DeviceStatus status) noexcept {
+  streaming_ = false;
+  publish(false);
+  if (status != DeviceStatus::ok && status != DeviceStatus::ended) ++counted_.gone;
+}
+
+void Device::finished() noexcept {
+  if (line() != nullptr) halt_board();
   publish(true);
 }
 
 DeviceStatus Device::begin() noexcept {
   try {
-    Setup setup(*line_, frames_, stopping_, this);
+    Setup setup(*line(), frames_, stopping(), this);
     const DeviceStatus status = begin_on(&setup);
     if (status != DeviceStatus::ok && status != DeviceStatus::stopped)
-      (void)refuse(status, place_->name() + ": " + setup.last_error());
+      (void)refuse(status, place().name() + ": " + setup.last_error());
     // What it will not do it does not do the next time either; but boards are switched, and
     // programs wait.
     return status == DeviceStatus::ok || status == DeviceStatus::stopped ||
@@ -74,7 +54,7 @@ DeviceStatus Device::begin() noexcept {
 DeviceStatus Device::begin_on(Setup* setup) {
   seen_ = Seen::nothing;
   TriggerInfo who;
-  DeviceStatus status = setup->find(line_->baud(), &who);
+  DeviceStatus status = setup->find(line()->baud(), &who);
   if (status != DeviceStatus::ok) return status;
   clock_.reopen(byte_time());
   frames_.set_byte_time(byte_time());
@@ -82,7 +62,7 @@ DeviceStatus Device::begin_on(Setup* setup) {
   if (running_ && who.boot_id == account_.boot()) {
     // Its pulses may have gone on while the line was away, or it has stopped by itself: it goes on,
     // and what was missed counts.
-    go_streaming(line_->now());
+    go_streaming(line()->now());
     status = setup->start(&board);
     if (status == DeviceStatus::ok && board.configuration == mark_) return started();
     streaming_ = false;
@@ -105,7 +85,7 @@ DeviceStatus Device::begin_on(Setup* setup) {
   status = tie_clocks();
   if (status != DeviceStatus::ok) return status;
   running_ = true;
-  go_streaming(line_->now());
+  go_streaming(line()->now());
   status = setup->start(&board);
   return status == DeviceStatus::ok ? started() : status;
 }
@@ -118,8 +98,7 @@ DeviceStatus Device::started() noexcept {
 
 /// Before the first event is handed out.
 void Device::go_streaming(HostStamp now) noexcept {
-  away_.store(false, std::memory_order_release);
-  if (std::exchange(told_gone_, false)) hand_out({Item::What::back, now, {}}, true);
+  report_streaming(now);
   streaming_ = true;
   heard_ = now;
 }
@@ -129,9 +108,9 @@ DeviceStatus Device::tie_clocks() noexcept {
   for (int i = 0; i < kFirstPings; ++i) {
     const std::uint64_t before = clock_.answers();
     ping();
-    const HostStamp until = line_->now() + kFirstPong;
-    while (clock_.answers() == before && line_->now() < until) {
-      if (stopping_.load(std::memory_order_acquire)) return DeviceStatus::stopped;
+    const HostStamp until = line()->now() + kFirstPong;
+    while (clock_.answers() == before && line()->now() < until) {
+      if (stop_requested()) return DeviceStatus::stopped;
       const DeviceStatus status = read_one(until);
       if (status != DeviceStatus::ok && status != DeviceStatus::timeout &&
           status != DeviceStatus::stopped)
@@ -143,10 +122,10 @@ DeviceStatus Device::tie_clocks() noexcept {
 
 /// → ok (it must be set up anew), stopped, ended, gone, failed
 DeviceStatus Device::read_on() noexcept {
-  HostStamp next_ping = line_->now();
+  HostStamp next_ping = line()->now();
   while (seen_ == Seen::nothing) {
-    if (stopping_.load(std::memory_order_acquire)) return DeviceStatus::stopped;
-    const HostStamp now = line_->now();
+    if (stop_requested()) return DeviceStatus::stopped;
+    const HostStamp now = line()->now();
     send_pause(now);
     if (now - heard_ > kSilent) return DeviceStatus::gone;
     if (now >= next_ping) {
@@ -170,7 +149,7 @@ DeviceStatus Device::read_on() noexcept {
   try {
     (void)refuse(
         DeviceStatus::failed,
-        place_->name() +
+        place().name() +
             ": the trigger board's numbers or ticks run backwards; check its supply and firmware");
   } catch (const std::exception&) {  // out of memory: the counters say it
   }
@@ -185,26 +164,9 @@ DeviceStatus Device::read_one(HostStamp deadline) noexcept {
   return status;
 }
 
-/// Opens and asks again, as often as it takes. False: stopped.
-bool Device::come_back() noexcept {
-  close_line();
-  while (!stopping_.load(std::memory_order_acquire)) {
-    try {
-      TriggerInfo who;
-      if (meet(&who) == DeviceStatus::ok) return true;
-    } catch (const std::exception&) {  // out of memory: perhaps not the next time
-    }
-    close_line();
-    rest(kAgain);
-  }
-  return false;
-}
-
-void Device::rest(Duration time) noexcept {
-  if (place_->pass(time)) return;
-  std::unique_lock lock(rest_mutex_);
-  (void)stopped_.wait_for(lock, std::chrono::nanoseconds(time.ns()),
-                          [this] { return stopping_.load(std::memory_order_acquire); });
+DeviceStatus Device::reopen() {
+  TriggerInfo who;
+  return meet(&who);
 }
 
 /// With exposure feedback the last pulse's report comes after the answer to STOP, when its
@@ -214,13 +176,13 @@ std::uint32_t Device::open_reports() const noexcept { return config_.feedback_in
 /// No pulse after it, and the last ones are counted.
 void Device::halt_board() noexcept {
   try {
-    Setup setup(*line_, frames_, kNever, this);
+    Setup setup(*line(), frames_, kNever, this);
     TriggerStatus status;
     const DeviceStatus done = setup.halt(&status);
     if (done == DeviceStatus::ok) counted_.board = status;
     if (done == DeviceStatus::ok && status.boot_id == account_.boot())
       account_.end(status.pulses, open_reports());
-    if (done != DeviceStatus::ok) (void)refuse(done, place_->name() + ": " + setup.last_error());
+    if (done != DeviceStatus::ok) (void)refuse(done, place().name() + ": " + setup.last_error());
     if (done == DeviceStatus::gone) close_line();
   } catch (const std::exception&) {
     close_line();
@@ -230,7 +192,7 @@ void Device::halt_board() noexcept {
 
 void Device::ping() noexcept {
   std::array<std::uint8_t, trigger_ping_payload_size> payload{};
-  const TriggerPing message{clock_.ask(line_->now())};
+  const TriggerPing message{clock_.ask(line()->now())};
   trigger_put_ping(&message, payload.data());
   if (frames_.send(trigger_ping, payload, nullptr) != DeviceStatus::ok) ++counted_.writes_refused;
 }
@@ -312,7 +274,7 @@ void Device::take_event(const TriggerEvent& event, HostStamp arrival) noexcept {
   pulse.mapped = true;
   pulse.host = mapped.host;
   pulse.host_error = mapped.error;
-  hand_out({Item::What::item, arrival, pulse}, false);
+  hand_out(pulse, arrival);
 }
 
 void Device::take_pong(const TriggerPong& pong, HostStamp departure) noexcept {
@@ -327,17 +289,6 @@ void Device::take_status(const TriggerStatus& status) noexcept {
   clock_.told_lock(status.pps_locked != 0, heard_);
   if (!streaming_ || !same_boot(status.boot_id)) return;
   if (status.state == trigger_stopped || status.configuration != mark_) seen_ = Seen::halted;
-}
-
-void Device::hand_out(const Item& item, bool always) noexcept {
-  while (!out_.push(item)) {
-    if (!virtual_time_ && !always) {
-      overruns_.fetch_add(1, std::memory_order_relaxed);
-      return;
-    }
-    out_.wait_for_room();
-    if (stopping_.load(std::memory_order_acquire)) return;
-  }
 }
 
 void Device::publish(bool last) noexcept {

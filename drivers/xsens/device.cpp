@@ -1,9 +1,6 @@
 #include "drivers/xsens/device.hpp"
 
-#include <pthread.h>
-
 #include <array>
-#include <chrono>
 #include <cmath>
 #include <cstdio>
 #include <exception>
@@ -13,15 +10,13 @@ namespace vergence::xsens {
 namespace {
 
 constexpr Duration kRead = Duration::milliseconds(200);
-constexpr Duration kAgain =
-    Duration::milliseconds(500);  // between attempts to open a line that is gone
 
 }  // namespace
 
 Device::Device(std::unique_ptr<LinePlace> place, const Options& options)
-    : place_(std::move(place)), options_(options) {
+    : SerialDevice(std::move(place), "vergence-ins"), options_(options) {
   info_.driver = "xsens";
-  info_.place = place_->name();
+  info_.place = this->place().name();
 }
 
 Device::~Device() { stop(); }
@@ -34,37 +29,27 @@ DeviceStatus Device::open() {
   // MTi-G built before 2008 want two stop bits; a receiver that wants one takes the second for idle
   // line.
   settings.stop_bits = 2;
-  DeviceStatus status = DeviceStatus::ok;
-  auto line = place_->open(settings, &status);
-  const std::lock_guard lock(line_mutex_);
-  line_ = std::move(line);
-  return status;
-}
-
-void Device::close_line() noexcept {
-  std::unique_ptr<ByteLine> line;
-  const std::lock_guard lock(line_mutex_);
-  line = std::move(line_);
+  return open_line(settings);
 }
 
 DeviceStatus Device::connect() {
   stop();
   close_line();
-  virtual_time_ = place_->pass(Duration{});
+  look_up_virtual_time();
   DeviceStatus status = open();
   if (status != DeviceStatus::ok) {
-    last_error_ = place_->name() + " cannot be opened: " + std::string(to_string(status));
+    last_error_ = place().name() + " cannot be opened: " + std::string(to_string(status));
     return status;
   }
-  Setup setup(*line_, options_, stopping_);
+  Setup setup(*line(), options_, stopping());
   status = setup.find();
   if (status == DeviceStatus::ok) status = setup.identify(&identity_);
   if (status != DeviceStatus::ok) {
-    last_error_ = place_->name() + ": " + setup.last_error();
+    last_error_ = place().name() + ": " + setup.last_error();
     close_line();
     return status;
   }
-  baud_ = line_->baud();
+  baud_ = line()->baud();
   std::array<char, 16> id{};
   (void)std::snprintf(id.data(), id.size(), "%08X", identity_.device_id);
   info_.serial = id.data();
@@ -82,10 +67,10 @@ DeviceStatus Device::configure(double rate_hz, double* actual_hz) noexcept {
       return DeviceStatus::bad_configuration;
     }
     stop();
-    if (line_ == nullptr) {
+    if (line() == nullptr) {
       if (const DeviceStatus s = connect(); s != DeviceStatus::ok) return s;
     }
-    Setup setup(*line_, options_, stopping_);
+    Setup setup(*line(), options_, stopping());
     DeviceStatus status = setup.find();  // back into its configuration state, if it was measuring
     StreamSettings set;
     if (status == DeviceStatus::ok) status = setup.set(identity_, rate_hz, &set);
@@ -94,7 +79,7 @@ DeviceStatus Device::configure(double rate_hz, double* actual_hz) noexcept {
       return status;
     }
     set_ = set;
-    baud_ = line_->baud();
+    baud_ = line()->baud();
     rate_hz_ = rate_hz;
     configured_ = true;
     remark_ = remark_about(rate_hz);
@@ -131,48 +116,21 @@ DeviceTiming Device::timing() const noexcept {
   t.least_delay = options_.processing +
                   Duration::nanoseconds(xbus::wire_time_ns(bytes, baud_ == 0 ? 115200 : baud_));
   t.delay_spread =
-      place_->latency_timer() + Duration::milliseconds(60);  // a burst of 496 bytes at 115200 baud
+      place().latency_timer() + Duration::milliseconds(60);  // a burst of 496 bytes at 115200 baud
   t.resolution = Duration::microseconds(100);
   return t;
 }
 
 DeviceStatus Device::start(Notifier* ready) noexcept {
-  if (!configured_) return DeviceStatus::bad_configuration;
-  if (thread_.joinable()) return out_.start(ready);  // streaming, or gone and perhaps back
-  out_.clear();                                      // of the start before: its readings are past
-  const DeviceStatus status = out_.start(ready);
-  if (status != DeviceStatus::ok) return status;
-  try {
-    stopping_.store(false, std::memory_order_release);
-    thread_ = std::thread([this] { work(); });
-  } catch (const std::exception&) {
-    out_.stop();
-    return DeviceStatus::failed;
-  }
-  starts_.fetch_add(1, std::memory_order_relaxed);
-  return DeviceStatus::ok;
+  return configured_ ? start_thread(ready) : DeviceStatus::bad_configuration;
 }
 
-void Device::stop() noexcept {
-  {
-    const std::scoped_lock lock(pause_mutex_, line_mutex_);
-    stopping_.store(true, std::memory_order_release);
-    if (line_ != nullptr && thread_.joinable()) line_->wake();
-  }
-  stopped_.notify_all();
-  out_.stop();
-  if (thread_.joinable()) thread_.join();
-  stopping_.store(false, std::memory_order_release);
-}
+void Device::stop() noexcept { stop_thread(); }
 
 DeviceStatus Device::wait(Duration limit, InsReading* reading) noexcept {
-  Item item;
-  const DeviceStatus status = out_.take(limit, &item);
-  if (status == DeviceStatus::gone) reading->arrival = item.arrival;
-  if (status != DeviceStatus::ok) return status;
-  *reading = item.value;
-  delivered_.fetch_add(1, std::memory_order_relaxed);
-  return DeviceStatus::ok;
+  const DeviceStatus status = take(limit, reading);
+  if (status == DeviceStatus::ok) delivered_.fetch_add(1, std::memory_order_relaxed);
+  return status;
 }
 
 InsStatistics Device::statistics() const noexcept {
@@ -181,41 +139,20 @@ InsStatistics Device::statistics() const noexcept {
   s.lost = lost_.load(std::memory_order_relaxed);
   s.malformed = malformed_.load(std::memory_order_relaxed);
   s.restarts = restarts_.load(std::memory_order_relaxed);
-  s.overruns = overruns_.load(std::memory_order_relaxed);
-  s.starts = starts_.load(std::memory_order_relaxed);
+  s.overruns = overruns();
+  s.starts = starts();
   return s;
 }
 
 // ---- the device's thread
 
-void Device::work() noexcept {
-  (void)pthread_setname_np(pthread_self(), "vergence-ins");
-  bool told_gone = false;
-  while (!stopping_.load(std::memory_order_acquire)) {
-    DeviceStatus status = line_ != nullptr ? measure() : DeviceStatus::gone;
-    HostStamp when = line_ != nullptr ? line_->now() : HostStamp{};
-    if (status == DeviceStatus::ok) {
-      if (std::exchange(told_gone, false)) hand_out({Item::What::back, when, {}}, true);
-      status = read_on();
-      if (line_ != nullptr) when = line_->now();
-    }
-    if (status == DeviceStatus::stopped) return;
-    if (status == DeviceStatus::ended) {
-      hand_out({Item::What::end, when, {}}, true);
-      return;
-    }
-    if (!std::exchange(told_gone, true)) hand_out({Item::What::gone, when, {}}, true);
-    if (!come_back()) return;
-  }
-}
-
-DeviceStatus Device::measure() noexcept {
+DeviceStatus Device::begin() noexcept {
   try {
-    Setup setup(*line_, options_, stopping_);
+    Setup setup(*line(), options_, stopping());
     DeviceStatus status = setup.find();
     if (status == DeviceStatus::ok) status = setup.measure();
     if (status != DeviceStatus::ok) return status;
-    decoder_.begin(set_, line_->baud(), options_.processing);
+    decoder_.begin(set_, line()->baud(), options_.processing);
     return DeviceStatus::ok;
   } catch (const std::exception&) {
     return DeviceStatus::failed;
@@ -224,15 +161,14 @@ DeviceStatus Device::measure() noexcept {
 
 DeviceStatus Device::read_on() noexcept {
   std::array<std::uint8_t, Decoder::kMostBytes> bytes{};
-  HostStamp heard = line_->now();
+  HostStamp heard = line()->now();
   std::uint64_t frames = decoder_.line_counters().messages;
   for (;;) {
-    if (stopping_.load(std::memory_order_acquire)) return DeviceStatus::stopped;
-    const LineRead r = line_->read(bytes, kRead);
+    if (stop_requested()) return DeviceStatus::stopped;
+    const LineRead r = line()->read(bytes, kRead);
     if (r.status == DeviceStatus::ok) {
       decoder_.accept(std::span(bytes).first(r.size), r.arrival);
-      for (InsReading reading; decoder_.next(&reading);)
-        hand_out({Item::What::item, reading.arrival, reading}, false);
+      for (InsReading reading; decoder_.next(&reading);) hand_out(reading, reading.arrival);
       count();
       if (decoder_.line_counters().messages != frames) heard = r.arrival;
       frames = decoder_.line_counters().messages;
@@ -242,58 +178,26 @@ DeviceStatus Device::read_on() noexcept {
       return r.status;
     }
     // No whole frame for that long, be it silence or noise.
-    if (line_->now() - heard > kSilent) return DeviceStatus::gone;
+    if (line()->now() - heard > kSilent) return DeviceStatus::gone;
   }
 }
 
-/// Opens and sets the device again, as often as it takes. False: stopped.
-bool Device::come_back() noexcept {
-  close_line();
-  while (!stopping_.load(std::memory_order_acquire)) {
-    if (bring_up() == DeviceStatus::ok) return true;
-    close_line();
-    pause(kAgain);
-  }
-  return false;
-}
-
-DeviceStatus Device::bring_up() {
-  try {
-    if (const DeviceStatus s = open(); s != DeviceStatus::ok) return s;
-    Setup setup(*line_, options_, stopping_);
-    Identity who;
-    StreamSettings set;
-    DeviceStatus status = setup.find();
-    if (status == DeviceStatus::ok) status = setup.identify(&who);
-    if (status == DeviceStatus::ok) status = setup.set(who, rate_hz_, &set);
-    // Another one would have another mount: that is for a person to decide.
-    if (status == DeviceStatus::ok && who.device_id != identity_.device_id)
-      status = DeviceStatus::not_found;
-    if (status != DeviceStatus::ok) return status;
-    set_ = set;
-    baud_ = line_->baud();
-    return DeviceStatus::ok;
-  } catch (const std::exception&) {
-    return DeviceStatus::failed;
-  }
-}
-
-void Device::pause(Duration time) noexcept {
-  if (place_->pass(time)) return;
-  std::unique_lock lock(pause_mutex_);
-  (void)stopped_.wait_for(lock, std::chrono::nanoseconds(time.ns()),
-                          [this] { return stopping_.load(std::memory_order_acquire); });
-}
-
-void Device::hand_out(const Item& item, bool always) noexcept {
-  while (!out_.push(item)) {
-    if (!virtual_time_ && !always) {
-      overruns_.fetch_add(1, std::memory_order_relaxed);
-      return;
-    }
-    out_.wait_for_room();
-    if (stopping_.load(std::memory_order_acquire)) return;
-  }
+/// Opens and sets the device again.
+DeviceStatus Device::reopen() {
+  if (const DeviceStatus s = open(); s != DeviceStatus::ok) return s;
+  Setup setup(*line(), options_, stopping());
+  Identity who;
+  StreamSettings set;
+  DeviceStatus status = setup.find();
+  if (status == DeviceStatus::ok) status = setup.identify(&who);
+  if (status == DeviceStatus::ok) status = setup.set(who, rate_hz_, &set);
+  // Another one would have another mount: that is for a person to decide.
+  if (status == DeviceStatus::ok && who.device_id != identity_.device_id)
+    status = DeviceStatus::not_found;
+  if (status != DeviceStatus::ok) return status;
+  set_ = set;
+  baud_ = line()->baud();
+  return DeviceStatus::ok;
 }
 
 void Device::count() noexcept {

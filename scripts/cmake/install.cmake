@@ -1,15 +1,28 @@
-# cmake --install build --prefix DIR: the program, the checkerboard tool where the program looks for it, the example configurations, the udev
-# rules (udev reads them only under /usr/lib, so a package sets --prefix /usr), the documents.
+# cmake --install build --prefix DIR: the program, its manual pages and completion, the checkerboard tool where the program looks for
+# it, examples, udev rules, service (udev and systemd read theirs only under /usr/lib, so a package sets --prefix /usr), documents.
 include(GNUInstallDirs)
+set(packaging ${PROJECT_SOURCE_DIR}/packaging)
 
 # Components, so that a package may bring the program without OpenCV: cmake --install build --component program
 install(TARGETS vergence RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR} COMPONENT program)
 if(VERGENCE_CHECKERBOARD)
   # OPTIONAL: a build of the target vergence alone has none.
-  install(PROGRAMS $<TARGET_FILE:vergence-checkerboard> DESTINATION ${CMAKE_INSTALL_LIBEXECDIR}/vergence COMPONENT checkerboard OPTIONAL)
+  install(TARGETS vergence-checkerboard RUNTIME DESTINATION ${CMAKE_INSTALL_LIBEXECDIR}/vergence COMPONENT checkerboard OPTIONAL)
 endif()
 file(GLOB configurations CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/app/config/*.yaml)
 install(FILES ${configurations} DESTINATION ${CMAKE_INSTALL_DATADIR}/vergence/config COMPONENT program)
+
 install(FILES ${PROJECT_SOURCE_DIR}/udev/99-vergence.rules DESTINATION lib/udev/rules.d COMPONENT program)
-install(FILES ${PROJECT_SOURCE_DIR}/README.md ${PROJECT_SOURCE_DIR}/CHANGELOG.md ${PROJECT_SOURCE_DIR}/LICENSE
+install(FILES ${packaging}/vergence.service DESTINATION lib/systemd/system COMPONENT program)
+install(FILES ${packaging}/60-vergence.conf DESTINATION lib/sysctl.d COMPONENT program)
+install(PROGRAMS ${packaging}/vergence-session DESTINATION ${CMAKE_INSTALL_LIBEXECDIR}/vergence COMPONENT program)
+
+# When installing, so that they are those of the program that is installed.
+set(manuals ${PROJECT_BINARY_DIR}/manuals)
+install(CODE "execute_process(COMMAND \"${CMAKE_COMMAND}\" \"-DPROGRAM=${CMAKE_CROSSCOMPILING_EMULATOR};$<TARGET_FILE:vergence>\"
+    \"-DOUT=${manuals}\" -P \"${PROJECT_SOURCE_DIR}/scripts/cmake/manuals.cmake\" COMMAND_ERROR_IS_FATAL ANY)" COMPONENT program)
+install(DIRECTORY ${manuals}/man1 DESTINATION ${CMAKE_INSTALL_MANDIR} COMPONENT program)
+install(DIRECTORY ${manuals}/completions DESTINATION ${CMAKE_INSTALL_DATADIR}/bash-completion COMPONENT program)
+
+install(FILES ${PROJECT_SOURCE_DIR}/README.md ${PROJECT_SOURCE_DIR}/CHANGELOG.md ${packaging}/debian/copyright
   DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT program)

@@ -7,6 +7,14 @@ target_compile_options(vergence_options INTERFACE
   -Wall -Wextra $<$<NOT:$<BOOL:${VERGENCE_UNITY}>>:-Wshadow> $<$<COMPILE_LANGUAGE:CXX>:-Wconversion> $<$<COMPILE_LANGUAGE:C>:-Wconversion> -Werror)
 # The same bits on every machine: no fused multiply-add behind our back on targets that have it.
 target_compile_options(vergence_options INTERFACE -ffp-contract=off)
+# Vectors of the Scalable Vector Extension are no C++ objects (no arrays, no members): such machines run the NEON kernels.
+if(CMAKE_SYSTEM_PROCESSOR MATCHES "aarch64|arm64")
+  target_compile_definitions(vergence_options INTERFACE "HWY_DISABLED_TARGETS=(HWY_SVE|HWY_SVE2|HWY_SVE_256|HWY_SVE2_128)")
+endif()
+# ARMv7's NEON has no doubles, which half of the kernels are made of: portable code throughout.
+if(CMAKE_SYSTEM_PROCESSOR MATCHES "armv7")
+  target_compile_definitions(vergence_options INTERFACE HWY_DISABLED_TARGETS=HWY_NEON)
+endif()
 if(VERGENCE_SANITIZE)
   target_compile_options(vergence_options INTERFACE -fsanitize=${VERGENCE_SANITIZE} -fno-omit-frame-pointer)
   target_link_options(vergence_options INTERFACE -fsanitize=${VERGENCE_SANITIZE})

@@ -47,7 +47,8 @@ HWY_INLINE void subtract_sums(V x, V y, double* at) {
 
 /// Folds a vector of pairs (x, y, x, y, …) to one pair.
 template <class DPairs>
-HWY_INLINE hn::Vec<hn::FixedTag<double, 2> > fold_pairs(DPairs d, hn::Vec<DPairs> v) {
+HWY_INLINE hn::Vec<hn::FixedTag<double, 2> > fold_pairs([[maybe_unused]] DPairs d,
+                                                        hn::Vec<DPairs> v) {
   if constexpr (sizeof(hn::Vec<DPairs>) > 2 * sizeof(double)) {
     const hn::Half<DPairs> half;
     return fold_pairs(half, hn::Add(hn::LowerHalf(half, v), hn::UpperHalf(half, v)));

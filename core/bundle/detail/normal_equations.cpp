@@ -51,7 +51,8 @@ HWY_INLINE void transform(const double* R, const double* t, const V X[3], V out[
         hn::MulAdd(set(R[3 * r + 1]), X[1], hn::MulAdd(set(R[3 * r + 2]), X[2], set(t[r]))));
 }
 
-/// What a slot says of its points.
+/// What a slot says of its points. Made whole: its default constructor, which nobody writes, would
+/// be compiled for the machine's least instruction set, and a vector's cannot be inlined there.
 struct Residual {
   V x, y;    // observed less predicted, px
   V weight;  // 1/σ², 0 where there is no observation
@@ -71,28 +72,29 @@ HWY_INLINE Residual project(const KernelCamera& camera, const Slot& slot, std::s
   const auto in_front = hn::Ge(Xc[2], set(kMinDepth));
   const auto seen = hn::Gt(inverse_sigma, hn::Zero(d));
   *behind = hn::Add(*behind, hn::IfThenElseZero(hn::AndNot(in_front, seen), one));
-  Residual r;
-  r.iz = hn::Div(one, hn::IfThenElse(in_front, Xc[2], one));
+  const V iz = hn::Div(one, hn::IfThenElse(in_front, Xc[2], one));
   const V x = hn::IfThenElseZero(in_front, Xc[0]), y = hn::IfThenElseZero(in_front, Xc[1]);
-  r.xn = hn::Mul(x, r.iz);
-  r.yn = hn::Mul(y, r.iz);
-  r.x = hn::Sub(load(slot.x + lane), hn::MulAdd(set(camera.fx), r.xn, set(camera.cx)));
-  r.y = hn::Sub(load(slot.y + lane), hn::MulAdd(set(camera.fy), r.yn, set(camera.cy)));
-  r.weight = hn::Mul(inverse_sigma, inverse_sigma);
-  r.depth = hn::IfThenElse(seen, Xc[2], set(kFar));
-  return r;
+  const V xn = hn::Mul(x, iz), yn = hn::Mul(y, iz);
+  return {hn::Sub(load(slot.x + lane), hn::MulAdd(set(camera.fx), xn, set(camera.cx))),
+          hn::Sub(load(slot.y + lane), hn::MulAdd(set(camera.fy), yn, set(camera.cy))),
+          hn::Mul(inverse_sigma, inverse_sigma),
+          hn::IfThenElse(seen, Xc[2], set(kFar)),
+          iz,
+          xn,
+          yn};
 }
 
 /// The same from what the camera model itself has computed.
 HWY_INLINE Residual from_jets(const double* jet, const Slot& slot, std::size_t lane) {
   const V inverse_sigma = load(slot.inverse_sigma + lane);
-  Residual r;
-  r.x = load(jet + 6 * kBatch + lane);
-  r.y = load(jet + 7 * kBatch + lane);
-  r.weight = hn::Mul(inverse_sigma, inverse_sigma);
-  r.depth = load(jet + kJetDepth * kBatch + lane);
-  r.iz = r.xn = r.yn = hn::Zero(D());
-  return r;
+  const V zero = hn::Zero(D());
+  return {load(jet + 6 * kBatch + lane),
+          load(jet + 7 * kBatch + lane),
+          hn::Mul(inverse_sigma, inverse_sigma),
+          load(jet + kJetDepth * kBatch + lane),
+          zero,
+          zero,
+          zero};
 }
 
 /// Twice the loss of s = |ε|²/σ², and its derivative by s in *weight.

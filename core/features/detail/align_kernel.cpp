@@ -4,6 +4,7 @@
 #include <hwy/highway.h>
 
 #include "core/features/detail/align_kernel.hpp"
+#include "core/math/pairwise_sum.hpp"
 
 HWY_BEFORE_NAMESPACE();
 namespace vergence::features::detail {
@@ -51,6 +52,15 @@ void sample_patch(const std::uint8_t* patch, float cx, float cy, const float B[4
   }
 }
 
+/// Sums over a window by its columns, closed in one order whatever the vector's width: targets that
+/// fuse products with sums (AVX2, AVX3, NEON) give the same bits.
+struct ColumnSums {
+  HWY_ALIGN float of[kWindowStride];
+
+  HWY_INLINE void keep(hn::Vec<Tag> column, int c) { hn::Store(column, Tag(), of + c); }
+  [[nodiscard]] float all() const { return pairwise_sum<kWindowStride>(of); }
+};
+
 void MakeWindow(const std::uint8_t* patch, float cx, float cy, const float B[4], Window* w) {
   static_assert(kRows <= kWindowStride);
   constexpr int kStride = kWindowStride + 2;
@@ -64,12 +74,13 @@ void MakeWindow(const std::uint8_t* patch, float cx, float cy, const float B[4],
   HWY_ALIGN float mask[kWindowStride];
   for (int c = 0; c < kWindowStride; ++c) mask[c] = c < kWindow ? 1.F : 0.F;
 
-  auto sum_t = hn::Zero(d), sum_x = hn::Zero(d), sum_y = hn::Zero(d);
+  ColumnSums first, second, third;
   const auto half = hn::Set(d, 0.5F);
-  for (int r = 0; r < kWindow; ++r) {
-    for (int c = 0; c < kWindowStride; c += lanes) {
+  for (int c = 0; c < kWindowStride; c += lanes) {
+    const auto m = hn::Load(d, mask + c);
+    auto sum_t = hn::Zero(d), sum_x = hn::Zero(d), sum_y = hn::Zero(d);
+    for (int r = 0; r < kWindow; ++r) {
       const float* p = t + (r + 1) * kStride + c + 1;
-      const auto m = hn::Load(d, mask + c);
       const auto v = hn::Mul(m, hn::LoadU(d, p));
       const auto gx = hn::Mul(hn::Mul(m, half), hn::Sub(hn::LoadU(d, p + 1), hn::LoadU(d, p - 1)));
       const auto gy =
@@ -81,17 +92,17 @@ void MakeWindow(const std::uint8_t* patch, float cx, float cy, const float B[4],
       sum_x = hn::Add(sum_x, gx);
       sum_y = hn::Add(sum_y, gy);
     }
+    first.keep(sum_t, c), second.keep(sum_x, c), third.keep(sum_y, c);
   }
-  const auto n = hn::Set(d, 1.F / (kWindow * kWindow));
-  const auto mean_t = hn::Mul(n, hn::SumOfLanes(d, sum_t));
-  const auto mean_x = hn::Mul(n, hn::SumOfLanes(d, sum_x));
-  const auto mean_y = hn::Mul(n, hn::SumOfLanes(d, sum_y));
+  constexpr float kShare = 1.F / (kWindow * kWindow);
+  const auto mean_t = hn::Set(d, kShare * first.all()), mean_x = hn::Set(d, kShare * second.all()),
+             mean_y = hn::Set(d, kShare * third.all());
 
-  auto tt = hn::Zero(d), tx = hn::Zero(d), ty = hn::Zero(d);
-  for (int r = 0; r < kWindow; ++r) {
-    for (int c = 0; c < kWindowStride; c += lanes) {
+  for (int c = 0; c < kWindowStride; c += lanes) {
+    const auto m = hn::Load(d, mask + c);
+    auto tt = hn::Zero(d), tx = hn::Zero(d), ty = hn::Zero(d);
+    for (int r = 0; r < kWindow; ++r) {
       const int i = r * kWindowStride + c;
-      const auto m = hn::Load(d, mask + c);
       const auto v = hn::Mul(m, hn::Sub(hn::Load(d, w->value + i), mean_t));
       const auto gx = hn::Mul(m, hn::Sub(hn::Load(d, w->steep_x + i), mean_x));
       const auto gy = hn::Mul(m, hn::Sub(hn::Load(d, w->steep_y + i), mean_y));
@@ -102,25 +113,30 @@ void MakeWindow(const std::uint8_t* patch, float cx, float cy, const float B[4],
       tx = hn::MulAdd(v, gx, tx);
       ty = hn::MulAdd(v, gy, ty);
     }
+    first.keep(tt, c), second.keep(tx, c), third.keep(ty, c);
   }
-  w->variance_sum = hn::GetLane(hn::SumOfLanes(d, tt));
+  w->variance_sum = first.all();
   const float inverse = w->variance_sum > 1e-3F ? 1.F / w->variance_sum : 0.F;
-  const auto along_x = hn::Set(d, hn::GetLane(hn::SumOfLanes(d, tx)) * inverse);
-  const auto along_y = hn::Set(d, hn::GetLane(hn::SumOfLanes(d, ty)) * inverse);
-  auto xx = hn::Zero(d), xy = hn::Zero(d), yy = hn::Zero(d);
-  for (int i = 0; i < kWindow * kWindowStride; i += lanes) {
-    const auto v = hn::Load(d, w->value + i);
-    const auto sx = hn::NegMulAdd(along_x, v, hn::Load(d, w->steep_x + i));
-    const auto sy = hn::NegMulAdd(along_y, v, hn::Load(d, w->steep_y + i));
-    hn::Store(sx, d, w->steep_x + i);
-    hn::Store(sy, d, w->steep_y + i);
-    xx = hn::MulAdd(sx, sx, xx);
-    xy = hn::MulAdd(sx, sy, xy);
-    yy = hn::MulAdd(sy, sy, yy);
+  const auto along_x = hn::Set(d, second.all() * inverse);
+  const auto along_y = hn::Set(d, third.all() * inverse);
+  for (int c = 0; c < kWindowStride; c += lanes) {
+    auto xx = hn::Zero(d), xy = hn::Zero(d), yy = hn::Zero(d);
+    for (int r = 0; r < kWindow; ++r) {
+      const int i = r * kWindowStride + c;
+      const auto v = hn::Load(d, w->value + i);
+      const auto sx = hn::NegMulAdd(along_x, v, hn::Load(d, w->steep_x + i));
+      const auto sy = hn::NegMulAdd(along_y, v, hn::Load(d, w->steep_y + i));
+      hn::Store(sx, d, w->steep_x + i);
+      hn::Store(sy, d, w->steep_y + i);
+      xx = hn::MulAdd(sx, sx, xx);
+      xy = hn::MulAdd(sx, sy, xy);
+      yy = hn::MulAdd(sy, sy, yy);
+    }
+    first.keep(xx, c), second.keep(xy, c), third.keep(yy, c);
   }
-  w->hxx = hn::GetLane(hn::SumOfLanes(d, xx));
-  w->hxy = hn::GetLane(hn::SumOfLanes(d, xy));
-  w->hyy = hn::GetLane(hn::SumOfLanes(d, yy));
+  w->hxx = first.all();
+  w->hxy = second.all();
+  w->hyy = third.all();
 }
 
 void WindowSumsAt(const Window& w, const std::uint8_t* at, std::ptrdiff_t stride, float fx,
@@ -130,7 +146,7 @@ void WindowSumsAt(const Window& w, const std::uint8_t* at, std::ptrdiff_t stride
   const hn::Rebind<std::uint8_t, Tag> d8;
   const int lanes = static_cast<int>(hn::Lanes(d));
   const auto vfx = hn::Set(d, fx), vfy = hn::Set(d, fy);
-  auto sx = hn::Zero(d), sy = hn::Zero(d), sv = hn::Zero(d), s1 = hn::Zero(d), s2 = hn::Zero(d);
+  ColumnSums steep_x, steep_y, value, sum, square;
   HWY_ALIGN float mask[kWindowStride];
   for (int c = 0; c < kWindowStride; ++c) mask[c] = c < kWindow ? 1.F : 0.F;
   for (int c = 0; c < kWindowStride; c += lanes) {
@@ -140,6 +156,7 @@ void WindowSumsAt(const Window& w, const std::uint8_t* at, std::ptrdiff_t stride
       const auto b = hn::ConvertTo(d, hn::PromoteTo(d32, hn::LoadU(d8, p + 1)));
       return hn::MulAdd(vfx, hn::Sub(b, a), a);
     };
+    auto sx = hn::Zero(d), sy = hn::Zero(d), sv = hn::Zero(d), s1 = hn::Zero(d), s2 = hn::Zero(d);
     auto above = lerped(at + c);
     for (int r = 0; r < kWindow; ++r) {
       const auto below = lerped(at + (r + 1) * stride + c);
@@ -152,12 +169,10 @@ void WindowSumsAt(const Window& w, const std::uint8_t* at, std::ptrdiff_t stride
       s2 = hn::MulAdd(v, v, s2);
       above = below;
     }
+    steep_x.keep(sx, c), steep_y.keep(sy, c), value.keep(sv, c), sum.keep(s1, c),
+        square.keep(s2, c);
   }
-  sums->steep_x = hn::GetLane(hn::SumOfLanes(d, sx));
-  sums->steep_y = hn::GetLane(hn::SumOfLanes(d, sy));
-  sums->value = hn::GetLane(hn::SumOfLanes(d, sv));
-  sums->sum = hn::GetLane(hn::SumOfLanes(d, s1));
-  sums->square = hn::GetLane(hn::SumOfLanes(d, s2));
+  *sums = {steep_x.all(), steep_y.all(), value.all(), sum.all(), square.all()};
 }
 
 }  // namespace HWY_NAMESPACE

@@ -5,6 +5,7 @@
 #include <hwy/highway.h>
 
 #include "core/geometry/detail/kernels.hpp"
+#include "core/math/pairwise_sum.hpp"
 
 HWY_BEFORE_NAMESPACE();
 namespace vergence::detail::HWY_NAMESPACE {
@@ -12,17 +13,6 @@ namespace hn = hwy::HWY_NAMESPACE;
 
 using Floats = hn::CappedTag<float, kFloatBlock>;
 using Doubles = hn::CappedTag<double, kDoubleBlock>;
-
-/// Pairwise, so that the order does not depend on the vector's width.
-template <class T, std::size_t N>
-T closed(const T* lanes) {
-  T half[N / 2];
-  for (std::size_t i = 0; i < N / 2; ++i) half[i] = lanes[i] + lanes[i + N / 2];
-  if constexpr (N == 2)
-    return half[0];
-  else
-    return closed<T, N / 2>(half);
-}
 
 template <class D, class V = hn::Vec<D>>
 HWY_INLINE V dot3(V a, V b, V c, V x, V y, V z) {
@@ -60,7 +50,7 @@ float ProjectionCost(const ScoreColumns& c, std::size_t first, std::size_t last,
     }
     hn::StoreU(sum, d, sums + lane);
   }
-  return closed<float, kFloatBlock>(sums);
+  return pairwise_sum<kFloatBlock>(sums);
 }
 
 float SampsonCost(const MatchColumns& c, std::size_t first, std::size_t last,
@@ -91,7 +81,7 @@ float SampsonCost(const MatchColumns& c, std::size_t first, std::size_t last,
     }
     hn::StoreU(sum, d, sums + lane);
   }
-  return closed<float, kFloatBlock>(sums);
+  return pairwise_sum<kFloatBlock>(sums);
 }
 
 struct CameraLanes {
@@ -191,9 +181,9 @@ NormalSums NormalEquations(const RefineColumns& c, std::size_t n, const RefineCa
         keep(27, cost);
   }
   NormalSums out;
-  for (std::size_t i = 0; i < 21; ++i) out.H[i] = closed<double, kDoubleBlock>(sums[i]);
-  for (std::size_t i = 0; i < 6; ++i) out.g[i] = closed<double, kDoubleBlock>(sums[21 + i]);
-  out.cost = closed<double, kDoubleBlock>(sums[27]);
+  for (std::size_t i = 0; i < 21; ++i) out.H[i] = pairwise_sum<kDoubleBlock>(sums[i]);
+  for (std::size_t i = 0; i < 6; ++i) out.g[i] = pairwise_sum<kDoubleBlock>(sums[21 + i]);
+  out.cost = pairwise_sum<kDoubleBlock>(sums[27]);
   return out;
 }
 

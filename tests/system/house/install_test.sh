@@ -17,7 +17,12 @@ program="$work/usr/bin/vergence"
 "$program" run "$work/usr/share/vergence/config/mock.yaml" --fast --duration 1 --quiet --out "$work/session" 2>"$work/err" ||
   [ "$?" -le 1 ] || fail "$(cat "$work/err")"
 [ -f "$work/session/summary.json" ] || fail "the example left no session"
-[ -f "$work/usr/lib/udev/rules.d/99-vergence.rules" ] || fail "no udev rules"
+for file in lib/udev/rules.d/99-vergence.rules lib/systemd/system/vergence.service lib/sysctl.d/60-vergence.conf libexec/vergence/vergence-session; do
+  [ -f "$work/usr/$file" ] || fail "$file is not installed"
+done
+# The manual pages and the completion are those of this program.
+zcat "$work/usr/share/man/man1/vergence-run.1.gz" | cmp - <("$program" manual run) || fail "the manual page is not the program's"
+cmp "$work/usr/share/bash-completion/completions/vergence" <("$program" completion) || fail "the completion is not the program's"
 
 status=0
 "$program" calibrate --convert "$work/session/calibration.yaml" "$work/camchain.yaml" 2>"$work/err" || status=$?

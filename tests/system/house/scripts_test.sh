@@ -23,10 +23,12 @@ expect_refusal() {  # words that the sentence holds, then the command
 expect_refusal "$work/nowhere is not a folder" "$source/scripts/demo" nowhere
 expect_refusal "$work/empty is neither KITTI" "$source/scripts/demo" empty
 expect_refusal "takes nothing, or the word program" "$source/scripts/setup" everything
+expect_refusal "takes arm64 or armhf" "$source/scripts/cross" riscv64
+expect_refusal "takes arm64 or armhf" "$source/scripts/sysroot" arm64 everything
 [ -z "$(find . -mindepth 1 -not -name empty -not -name out -not -name err)" ] || { echo "a script left files behind"; failures=$((failures + 1)); }
 
 # A package stands in one list, and each line names one as Debian does.
-lists="$(cat "$source"/scripts/packages/{program,develop}.txt | sed 's/#.*//' | tr -d ' ' | sed '/^$/d')"
+lists="$(cat "$source"/scripts/packages/*.txt | sed 's/#.*//' | tr -d ' ' | sed '/^$/d')"
 twice="$(printf '%s\n' "$lists" | sort | uniq -d)"
 odd="$(printf '%s\n' "$lists" | grep -vxE '[a-z0-9][a-z0-9+.-]+' || true)"
 if [ -n "$twice$odd" ]; then
@@ -35,7 +37,8 @@ if [ -n "$twice$odd" ]; then
 fi
 
 if command -v shellcheck >/dev/null; then
-  shellcheck "$source"/scripts/{setup,demo,test,bench} "$source/.ci/run" "$source"/tests/system/house/*.sh || failures=$((failures + 1))
+  shellcheck "$source"/scripts/{setup,demo,test,bench,cross,sysroot} "$source/.ci/run" "$source"/tests/system/{house,packages}/*.sh \
+    "$source/packaging/vergence-session" "$source"/packaging/debian/{postinst,prerm,postrm} || failures=$((failures + 1))
   (cd "$source/tests/rigs" && shellcheck -x build-kernel build-qemu run-in-kernel run-in-qemu init-in-kernel check ./*.sh) ||
     failures=$((failures + 1))
 fi

@@ -142,6 +142,29 @@ TEST_F(ToolsRig, theRulesThatAreWrittenWork) {
   EXPECT_EQ(awake, 1U) << rules;
 }
 
+TEST_F(ToolsRig, aRigsRulesNameThePortByWhatTheConfigurationHasOnIt) {
+  const TemporaryFolder folder;
+  fs::create_directories("/run/udev/rules.d");
+  const auto linked_as = [&](const std::string& group, const std::string& driver) {
+    const auto rig = folder.write("rig.yaml", group + ": {driver: " + driver +
+                                                  ", port: /dev/ttyUSB0}\n"
+                                                  "cameras: [{name: left, driver: gige}]\n");
+    const Outcome o = run_vergence("devices --rig '" + rig.string() +
+                                   "' --write-udev /run/udev/rules.d/98-vergence-rig.rules");
+    EXPECT_EQ(o.code, 0) << o.err;
+    EXPECT_EQ(std::system("udevadm control --reload && udevadm trigger --action=add && udevadm "
+                          "settle --timeout=20"),
+              0);
+    for (const auto& entry : fs::directory_iterator("/dev/vergence"))
+      if (entry.path().filename().string().starts_with(group + "-"))
+        return fs::canonical(entry.path()).string();
+    return std::string("nothing");
+  };
+  EXPECT_EQ(linked_as("ins", "xsens"), "/dev/ttyUSB0");
+  EXPECT_EQ(linked_as("trigger", "board"), "/dev/ttyUSB0");
+  fs::remove("/run/udev/rules.d/98-vergence-rig.rules");
+}
+
 TEST_F(ToolsRig, whatTheDoctorPrintsMends) {
   Emulator usb("sim_usb_iidc", {"--cameras", "2"});
   std::ofstream("/sys/bus/usb-serial/devices/ttyUSB0/latency_timer") << 1 << std::flush;

@@ -98,28 +98,27 @@ HWY_INLINE VF sample(const std::int32_t* words, std::int32_t base, int log2_w, i
   return hn::MulAdd(tv, hn::Sub(s1, s0), s0);
 }
 
-/// Where a packet meets a polygon's texture.
+/// Where a packet meets a polygon's texture. Made whole: a default constructor that nobody writes
+/// is compiled for the machine's least instruction set, where a vector's cannot be inlined.
 struct Footprint {
   VF distance, u, v, lu, lv;
 };
 
 HWY_INLINE Footprint footprint(const TileInput& in, const ProjectedPolygon& p, VF x, VF y, VF q) {
   const F f;
-  Footprint at;
-  at.distance = hn::Div(hn::Set(f, 1.0F), q);
-  at.u = hn::Mul(dot(p.u, x, y), at.distance);
-  at.v = hn::Mul(dot(p.v, x, y), at.distance);
+  const VF distance = hn::Div(hn::Set(f, 1.0F), q);
+  const VF u = hn::Mul(dot(p.u, x, y), distance), v = hn::Mul(dot(p.v, x, y), distance);
   // ∂u/∂x = (U_x − u q_x)/q, per pixel
-  const VF sx = hn::Mul(at.distance, hn::Set(f, in.pixel_x)),
-           sy = hn::Mul(at.distance, hn::Set(f, in.pixel_y));
+  const VF sx = hn::Mul(distance, hn::Set(f, in.pixel_x)),
+           sy = hn::Mul(distance, hn::Set(f, in.pixel_y));
   const VF qx = hn::Set(f, p.q[0]), qy = hn::Set(f, p.q[1]);
-  const VF ux = hn::Mul(sx, hn::NegMulAdd(at.u, qx, hn::Set(f, p.u[0]))),
-           uy = hn::Mul(sy, hn::NegMulAdd(at.u, qy, hn::Set(f, p.u[1])));
-  const VF vx = hn::Mul(sx, hn::NegMulAdd(at.v, qx, hn::Set(f, p.v[0]))),
-           vy = hn::Mul(sy, hn::NegMulAdd(at.v, qy, hn::Set(f, p.v[1])));
-  at.lu = hn::Add(half_log2(hn::MulAdd(ux, ux, hn::Mul(uy, uy))), hn::Set(f, kSoftness));
-  at.lv = hn::Add(half_log2(hn::MulAdd(vx, vx, hn::Mul(vy, vy))), hn::Set(f, kSoftness));
-  return at;
+  const VF ux = hn::Mul(sx, hn::NegMulAdd(u, qx, hn::Set(f, p.u[0]))),
+           uy = hn::Mul(sy, hn::NegMulAdd(u, qy, hn::Set(f, p.u[1])));
+  const VF vx = hn::Mul(sx, hn::NegMulAdd(v, qx, hn::Set(f, p.v[0]))),
+           vy = hn::Mul(sy, hn::NegMulAdd(v, qy, hn::Set(f, p.v[1])));
+  return {distance, u, v,
+          hn::Add(half_log2(hn::MulAdd(ux, ux, hn::Mul(uy, uy))), hn::Set(f, kSoftness)),
+          hn::Add(half_log2(hn::MulAdd(vx, vx, hn::Mul(vy, vy))), hn::Set(f, kSoftness))};
 }
 
 HWY_INLINE VF opacity(const TileInput& in, const ProjectedPolygon& p, VF x, VF y, VF q) {
@@ -193,13 +192,12 @@ HWY_INLINE VF coverage(const ProjectedPolygon& p, VF x, VF y) {
   return hn::Mul(across, along);
 }
 
-HWY_INLINE void find_layers(const TileInput& in, VF x, VF y, Layers& l) {
+HWY_INLINE Layers find_layers(const TileInput& in, VF x, VF y) {
   const F f;
   const I i;
   const VF zero = hn::Zero(f);
-  l.q0 = l.q1 = l.q2 = l.q3 = zero;
-  l.c0 = l.c1 = l.c2 = l.c3 = zero;
-  l.p0 = l.p1 = l.p2 = l.p3 = hn::Zero(i);
+  const VI none = hn::Zero(i);
+  Layers l{zero, zero, zero, zero, zero, zero, zero, zero, none, none, none, none};
   float steepest = 0;  // of the surfaces so far, inverse depth per pixel
   for (const Candidate& candidate : in.candidates) {
     // Closed in front of all that is left, with room for what meets it within a pixel: candidates
@@ -223,6 +221,7 @@ HWY_INLINE void find_layers(const TileInput& in, VF x, VF y, Layers& l) {
     // A lane with no coverage carries inverse depth zero and so sinks below every surface.
     insert(l, hn::IfThenElseZero(hn::Gt(c, zero), q), c, hn::Set(i, candidate.polygon));
   }
+  return l;
 }
 
 /// Where two surfaces cut through each other, the pixel belongs to each on its side of the line of
@@ -276,8 +275,7 @@ void ShadeTile(const TileInput& in, float weight, float* out, std::ptrdiff_t out
     for (std::size_t column = 0; column < kTile; column += n) {
       const VF x = hn::LoadU(f, in.ray_x + row * kTile + column),
                y = hn::LoadU(f, in.ray_y + row * kTile + column);
-      Layers l;
-      find_layers(in, x, y, l);
+      Layers l = find_layers(in, x, y);
       // Surfaces that meet within a pixel are not far apart in depth.
       const MF close = hn::Gt(l.q1, hn::Mul(hn::Set(f, 0.5F), l.q0));
       if (!hn::AllFalse(f, close)) l.c0 = share_crossing(in, l, close);

@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 
 #include "app/runtime/version.hpp"
+#include "core/features/simd_target.hpp"
 #include "tests/support/temporary_folder.hpp"
 #include "tests/unit/app/commands/run_vergence.hpp"
 
@@ -31,7 +32,8 @@ bool contains(const std::string& text, const std::string& part) {
 TEST(Program, VersionAndHelpGoToStandardOutput) {
   const Outcome version_asked = run_vergence("--version");
   EXPECT_EQ(version_asked.code, 0);
-  EXPECT_EQ(version_asked.out, "vergence " + std::string(version()) + "\n");
+  EXPECT_EQ(version_asked.out,
+            "vergence " + std::string(version()) + ", " + features::simd_target() + "\n");
   EXPECT_EQ(version_asked.err, "");
   const Outcome help = run_vergence("--help");
   EXPECT_EQ(help.code, 0);

@@ -49,7 +49,7 @@ UsbDevice usb(std::uint16_t vendor, const std::string& serial, std::vector<std::
 }
 
 TEST(UdevRules, nothingPluggedInIsAFileWithoutRules) {
-  const std::string rules = udev_rules({});
+  const std::string rules = udev_rules(Inventory{});
   EXPECT_TRUE(holds_as_rules(rules));
   EXPECT_FALSE(contains(rules, "GROUP"));
 }
@@ -67,14 +67,93 @@ TEST(UdevRules, everyDeviceIsNamedByItsSerial) {
   const std::string rules = udev_rules(i);
   EXPECT_TRUE(holds_as_rules(rules));
   for (const char* name :
-       {"vergence/ins-X07", "vergence/serial-A1B2", "vergence/board-75", "vergence/camera-15021234",
-        "vergence/camera-CAM", "vergence/camera-00b09d0100a1b2c3"})
+       {"vergence/ins-X07", "vergence/serial-A1B2", "vergence/trigger-75",
+        "vergence/camera-15021234", "vergence/camera-CAM", "vergence/camera-00b09d0100a1b2c3"})
     EXPECT_TRUE(contains(rules, name)) << name;
   EXPECT_TRUE(contains(rules, "ATTR{guid}==\"0x00b09d0100a1b2c3\""));
   EXPECT_TRUE(contains(rules, "ATTRS{serial}==\"A1B2\", ATTR{latency_timer}=\"16\""));
   EXPECT_TRUE(contains(rules, "ID_MM_DEVICE_IGNORE"));
   EXPECT_TRUE(contains(rules, "ATTR{power/control}=\"on\""));
   EXPECT_FALSE(contains(rules, "mouse"));
+}
+
+CameraNeed camera(const std::string& key, const std::string& driver, const std::string& serial) {
+  CameraNeed need;
+  need.key = key;
+  need.driver = driver;
+  need.serial = serial;
+  return need;
+}
+
+/// Two FTDI adapters that look alike, a board, two IIDC cameras on USB and one on IEEE 1394.
+Inventory two_rigs() {
+  Inventory i;
+  i.ports = {port(0x0403, 0x6001, "A1"), port(0x0403, 0x6001, "B2"), port(0x0483, 0x5740, "C3")};
+  i.ports[1].info.port = "/dev/ttyUSB1";
+  i.ports[2].info.port = "/dev/ttyACM0";
+  i.usb = {usb(0x1E10, "1", {}), usb(0x1E10, "2", {})};
+  for (int k = 0; k < 2; ++k) {
+    UsbDevice& d = i.usb[static_cast<std::size_t>(k)];
+    d.bus = 1;
+    d.number = 7 + k;
+    d.port = k == 0 ? "1-1" : "1-2";
+  }
+  DriverFindings driver;
+  driver.name = "iidc-usb";
+  driver.cameras = {{{"iidc-usb", "00b09d0000000001", "Chameleon", "usb 001/007"}, {}, {}},
+                    {{"iidc-usb", "00b09d0000000002", "Chameleon", "usb 001/008"}, {}, {}}};
+  i.drivers = {driver};
+  iidc::FirewireNode node;
+  node.rom.guid = 0x00B09D0100A1B2C3;
+  i.firewire = {node};
+  return i;
+}
+
+TEST(UdevRules, aRigsDevicesAreNamedByWhatTheyAreThere) {
+  Needs needs;
+  needs.given = true;
+  needs.ins_driver = "xsens";
+  needs.ins_port = "/dev/ttyUSB1";
+  needs.trigger_driver = "board";
+  needs.cameras = {camera("cameras.0", "iidc-usb", "00b09d0000000002"),
+                   camera("cameras.1", "gige", "15021234")};
+  const RigDevices rig = rig_devices(two_rigs(), needs);
+  EXPECT_TRUE(rig.missing.empty()) << rig.missing.front();
+  const std::string rules = udev_rules(rig);
+  EXPECT_TRUE(holds_as_rules(rules));
+  for (const char* name : {"vergence/ins-B2", "vergence/trigger-C3", "vergence/camera-2"})
+    EXPECT_TRUE(contains(rules, name)) << name << "\n" << rules;
+  for (const char* other : {"A1", "vergence/camera-1", "firewire"})
+    EXPECT_FALSE(contains(rules, other)) << other << "\n" << rules;
+}
+
+TEST(UdevRules, whatARigLacksIsSaid) {
+  Needs needs;
+  needs.given = true;
+  needs.ins_driver = "xsens";  // any port: there are two that may be meant
+  needs.trigger_driver = "board";
+  needs.trigger_port = "/dev/ttyACM7";
+  needs.cameras = {camera("cameras.0", "iidc-usb", "00b09d0000000009"),
+                   camera("cameras.1", "iidc-1394", "00b09d0100a1b2c3")};
+  const RigDevices rig = rig_devices(two_rigs(), needs);
+  ASSERT_EQ(rig.missing.size(), 3U);
+  EXPECT_EQ(rig.missing[0], "ins: 2 serial ports may be meant; name one in ins.port");
+  EXPECT_EQ(rig.missing[1], "trigger: no serial port is there for it");
+  EXPECT_EQ(rig.missing[2], "cameras.0 (iidc-usb 00b09d0000000009): it is not plugged in");
+  const std::string rules = udev_rules(rig);
+  EXPECT_TRUE(holds_as_rules(rules));
+  EXPECT_TRUE(contains(rules, "# Left out, cameras.0 (iidc-usb 00b09d0000000009)"));
+  EXPECT_TRUE(contains(rules, "vergence/camera-00b09d0100a1b2c3"));
+}
+
+TEST(UdevRules, aPortIsNamedInManyWays) {
+  FoundPort p = port(0x0403, 0x6001, "A1");
+  p.by_id = "/dev/serial/by-id/usb-FTDI_A1-if00-port0";
+  for (const char* key : {"", "/dev/ttyUSB0", "ttyUSB0", "A1", "/dev/vergence/ins-A1",
+                          "/dev/vergence/trigger-A1", "/dev/serial/by-id/usb-FTDI_A1-if00-port0"})
+    EXPECT_TRUE(names_port(key, p)) << key;
+  for (const char* key : {"/dev/ttyUSB1", "A", "/dev/vergence/ins-A2"})
+    EXPECT_FALSE(names_port(key, p)) << key;
 }
 
 TEST(UdevRules, aBuiltInPortNeedsNone) {

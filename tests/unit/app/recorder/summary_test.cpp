@@ -57,7 +57,7 @@ TEST(Summary, hasTheKeysOfTheContractAndNullWhereThereIsNoReference) {
   const auto json = summary_json(*totals, input());
   for (const char* key :
        {"frames", "timing_ms", "metrics", "calibration", "recalibrations", "allocations_after_seal",
-        "memory", "drops", "version", "configuration_hash"})
+        "memory", "drops", "version", "simd", "configuration_hash"})
     EXPECT_TRUE(json.contains(key)) << key;
   EXPECT_TRUE(json["metrics"].is_null());
   EXPECT_EQ(

@@ -1,7 +1,6 @@
 #include "core/bundle/bundle.hpp"
 
 #include <gtest/gtest.h>
-#include <hwy/targets.h>
 
 #include "core/memory/allocation_guard.hpp"
 #include "tests/unit/core/bundle/bundle_fixture.hpp"
@@ -280,29 +279,6 @@ TEST(Bundle, solveDoesNotAllocate) {
   EXPECT_EQ(AllocationGuard::allocations_after_seal(), before);
   EXPECT_TRUE(first.has_covariance);
   EXPECT_TRUE(second.has_pose_covariance);
-}
-
-TEST(Bundle, everySimdTargetFindsTheSameOptimum) {
-  SimulationOptions s;
-  s.points = 61;
-  Random random(22);
-  const SimulatedRig original = simulate_rig(s, random);
-  OwnAdjuster own(capacities_for(s));
-  SimulatedRig reference = original;
-  const BundleResult expected = own.adjuster.solve(reference.problem(), calibration_options());
-  for (std::int64_t targets = hwy::SupportedTargets(); targets != 0; targets &= targets - 1) {
-    hwy::SetSupportedTargetsForTest(targets & -targets);
-    hwy::GetChosenTarget().Update(hwy::SupportedTargets());
-    SimulatedRig rig = original;
-    const BundleResult r = own.adjuster.solve(rig.problem(), calibration_options());
-    EXPECT_EQ(r.steps, expected.steps) << hwy::TargetName(targets & -targets);
-    // Sums of 2440 squares in another order: about √2440 roundings of 1e-16.
-    EXPECT_NEAR(r.final_cost, expected.final_cost, 1e-12 * expected.final_cost)
-        << hwy::TargetName(targets & -targets);
-    EXPECT_LT((rig.T_camera_left[1].t - reference.T_camera_left[1].t).norm(), 1e-9);
-  }
-  hwy::SetSupportedTargetsForTest(0);
-  hwy::GetChosenTarget().Update(hwy::SupportedTargets());
 }
 
 TEST(Bundle, everyTerminationHasItsProblem) {

@@ -337,6 +337,50 @@ TEST(Comparison, aLostPoseIsNotComparedButKeepsItsIns) {
   EXPECT_LT(b.out[b.out.size() - 2].error_enu.norm(), 1e-3);
 }
 
+/// As a satellite receiver's: no attitude, the course while it moves.
+bool only_course(double t, InsSample* s) {
+  const Vec3 v = T_enu_ins(t + 1e-3).t - T_enu_ins(t - 1e-3).t;
+  s->attitude_valid = false;
+  s->q_enu_ins = {0, 0, 0, 1};
+  s->heading_source = HeadingSource::course;
+  s->yaw_enu = std::atan2(v.y(), v.x());
+  return true;
+}
+
+TEST(Comparison, positionsAndCourseAloneArePlacedAndCompared) {
+  ComparisonOptions o = Bench::with_mount();
+  o.T_ins_left = mount_of({1.2, 0.4, 0}, Vec3::Zero());
+  Bench b(o);
+  b.drive(0, 60, only_course);
+  const ComparedPose& c = b.out[b.out.size() - 2];
+  ASSERT_TRUE(c.placed && c.compared);
+  EXPECT_EQ(b.comparison.counters().ins_without_attitude, b.comparison.counters().ins_samples);
+  // The lever arm is carried level: against the body's roll of up to 0.02 and pitch of 0.0075 that
+  // errs by 0.4 * 0.02 + 1.2 * 0.0075 = 17 mm. The placement's 100 m reach 18 m to the side, and
+  // the end of the drive is 298 m to that side: 2 * 17 mm * 298 / 18 = 0.56 m.
+  EXPECT_LT(c.error_enu.norm(), 0.56);
+  EXPECT_LT(std::abs(c.error_yaw), 1 * kDegree);
+  EXPECT_GT(b.comparison.placement().rotation_sigma.head<2>().minCoeff(), 0);
+}
+
+TEST(Comparison, withoutAttitudeTheLastHeadingHoldsAtAStandstill) {
+  Bench b;
+  const auto standing = [](double t, InsSample* s) {
+    only_course(t, s);
+    if (t < 1 || t > 2) s->heading_source = HeadingSource::none;
+    return true;
+  };
+  b.drive(0, 3, standing);
+  for (const ComparedPose& c : b.out) {
+    const double t = (c.pose.stamp - at(0)).to_seconds();
+    if (t < 0.9) {
+      EXPECT_NE(c.ins, InsMatch::ok) << t;  // no heading was ever known
+    } else if (t > 1.1) {
+      EXPECT_EQ(c.ins, InsMatch::ok) << t;
+    }
+  }
+}
+
 TEST(Comparison, aWrongScaleIsSeen) {
   for (const double scale : {1.0, 1.01, 1.03, 0.97}) {
     Bench b;

@@ -36,11 +36,14 @@ struct Claim {
     nominal.T_camera_left[1] = {Mat3::Identity(), {-given.baseline, 0, 0}};
     given.sigma_noise[1] = {2e-4, 4e-4, 2e-4, 1e-5, 2e-3, 4e-3};
   }
-  void drive(int last) {
+  /// `knock_at`: from this frame on the rig is turned by `knock`.
+  void drive(int last, int knock_at = -1, const Vec3& knock = Vec3::Zero()) {
     arena.emplace(Estimator::memory_needed(options, given));
     estimator.emplace(options, given, nominal, *arena, runner, solver);
     for (int i = 0; i < last; ++i) {
-      samples.push_back(estimator->process(corridor.frame(i)));
+      auto T_camera_left = corridor.rig().T_camera_left;
+      if (knock_at >= 0 && i >= knock_at) T_camera_left[1].R = exp_so3(knock) * T_camera_left[1].R;
+      samples.push_back(estimator->process(corridor.frame(i, T_camera_left)));
       story += std::to_string(i) + ' ' + std::string(to_string(samples.back().status)) + ' ' +
                std::string(to_string(samples.back().reason)) + '\n';
       for (const EstimatorEvent& e : estimator->events()) {
@@ -120,6 +123,37 @@ TEST(Verifying, aYawThatIsOffIsContradictedAndReplaced) {
   const double yaw = log_so3(found.T_camera_left[1].R * truth.R.transpose()).y();
   const Intrinsics &lens = found.intrinsics[1], &true_lens = c.corridor.rig().intrinsics[1];
   EXPECT_NEAR(yaw + (lens.cx - true_lens.cx) / true_lens.fx, 0, 3e-3) << c.story;
+}
+
+// The pose of the frame in which it is adopted, and of the next, still are those of the rig that
+// was contradicted: 20 % off.
+TEST(Verifying, posesOfAContradictedCalibrationAreNotOk) {
+  Claim c;
+  c.given.T_camera_left[1].R = exp_so3({0, 0.015, 0}) * c.given.T_camera_left[1].R;
+  c.drive(60);
+  const int accepted = c.first(Kind::calibration_accepted),
+            confirmed = c.first(Kind::calibration_confirmed);
+  ASSERT_GE(accepted, 0) << c.story;
+  ASSERT_EQ(confirmed, accepted + 2) << c.story;
+  for (const PoseSample& s : c.samples) {
+    if (static_cast<int>(s.frame) < confirmed)
+      EXPECT_NE(s.status, PoseStatus::ok) << s.frame << '\n' << c.story;
+    else
+      EXPECT_EQ(s.status, PoseStatus::ok) << s.frame << '\n' << c.story;
+  }
+}
+
+// While the calibration is a claim, epipolar lines cannot say whether a yaw is new; disparities
+// that move all at once can. 10 mrad are 2.8 px here.
+TEST(Verifying, aYawKnockedBeforeTheClaimIsConfirmedIsSeenAtOnce) {
+  constexpr int kKnock = 28;  // after the first snapshot, before it is decided
+  Claim c;
+  c.drive(45, kKnock, {0, 0.01, 0});
+  const int noticed = c.first(Kind::rig_changed);
+  ASSERT_GE(noticed, kKnock) << c.story;
+  EXPECT_LE(noticed, kKnock + 1) << c.story;
+  for (const PoseSample& s : c.samples)
+    EXPECT_NE(s.status, PoseStatus::ok) << s.frame << '\n' << c.story;
 }
 
 TEST(Verifying, offlineAClaimStandsAndIsNotCalledUnverified) {

@@ -103,7 +103,10 @@ TEST(Patch, turnedAndScaledPatchesAreFoundWithTheirShape) {
         Mat2 A;
         A << std::cos(a), -std::sin(a) + shear, std::sin(a), std::cos(a);
         A *= scale;
-        const Vec2 there = s.at + Vec2(random.uniform(-3, 3), random.uniform(-3, 3));
+        // One after the other: the order of arguments is the compiler's, and not that of every
+        // machine.
+        const double down = random.uniform(-3, 3), right = random.uniform(-3, 3);
+        const Vec2 there = s.at + Vec2(right, down);
         const Mat2 back = A.inverse();
         const Image warped = draw(
             kWidth, kHeight, [&](const Vec2& p) { return s.texture(s.at + back * (p - there)); });

@@ -10,11 +10,10 @@
 #include <numbers>
 #include <vector>
 
-#include <hwy/targets.h>
-
 #include "core/math/random.hpp"
 #include "core/math/types.hpp"
 #include "core/types/image.hpp"
+#include "tests/support/simd_targets.hpp"
 
 namespace vergence::features::test {
 
@@ -113,16 +112,6 @@ class GuardedImage {
   std::uint8_t* data_ = nullptr;
 };
 
-/// Runs `body` once on every SIMD target of this machine and leaves the choice as it was.
-template <class Body>
-void on_every_target(const Body& body) {
-  for (const std::int64_t target : hwy::SupportedAndGeneratedTargets()) {
-    hwy::SetSupportedTargetsForTest(target);
-    hwy::GetChosenTarget().Update(hwy::SupportedTargets());
-    body(hwy::TargetName(target));
-  }
-  hwy::SetSupportedTargetsForTest(0);
-  hwy::GetChosenTarget().Update(hwy::SupportedTargets());
-}
+using vergence::test::on_every_target;
 
 }  // namespace vergence::features::test

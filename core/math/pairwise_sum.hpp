@@ -1,0 +1,19 @@
+#pragma once
+#include <cstddef>
+
+namespace vergence {
+
+/// Σ of N = 2^k numbers, the second half added to the first until one is left: an order that does
+/// not depend on how wide a machine's vectors are.
+template <std::size_t N, class T>
+[[nodiscard]] constexpr T pairwise_sum(const T* numbers) noexcept {
+  static_assert(N >= 2 && (N & (N - 1)) == 0);
+  T half[N / 2];
+  for (std::size_t i = 0; i < N / 2; ++i) half[i] = numbers[i] + numbers[i + N / 2];
+  if constexpr (N == 2)
+    return half[0];
+  else
+    return pairwise_sum<N / 2>(half);
+}
+
+}  // namespace vergence

@@ -1,0 +1,25 @@
+#include "drivers/common/serial_ports.hpp"
+
+#include "drivers/serial/serial_port.hpp"
+
+namespace vergence {
+
+std::vector<DeviceInfo> usb_serial_ports(std::string_view driver) {
+  std::vector<DeviceInfo> found;
+  for (const SerialPortInfo& port : list_serial_ports())
+    if (port.usb_vendor != 0)
+      found.push_back({std::string(driver), port.usb_serial, port.description, port.port});
+  return found;
+}
+
+std::string only_usb_serial_port(std::string_view port, std::string* error) {
+  if (!port.empty()) return std::string(port);
+  const std::vector<DeviceInfo> ports = usb_serial_ports("");
+  if (ports.size() == 1) return ports.front().place;
+  *error = ports.empty()
+               ? "there is no serial port on USB; plug the INS in, or name its port in ins.port"
+               : "there is more than one serial port on USB; name the INS's in ins.port";
+  return {};
+}
+
+}  // namespace vergence

@@ -1,0 +1,203 @@
+#include "drivers/gnss/decoder.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <utility>
+
+namespace vergence::gnss {
+namespace {
+
+constexpr Duration kClockSet = Duration::seconds(10);  // backwards: the receiver's time was set
+constexpr Duration kShortest = Duration::milliseconds(10);  // no receiver sends faster
+constexpr double kMostLost = 1000;  // at once; beyond: the line was away, or the time was set
+constexpr double kDegree = std::numbers::pi / 180;
+
+ClockMapperOptions mapping(const Options& o) noexcept {
+  ClockMapperOptions m;
+  m.least_delay = o.processing;
+  m.delay_spread = Duration::milliseconds(20);  // a solution takes longer with more satellites
+  m.jump = Duration::milliseconds(200);
+  m.resolution = Duration::milliseconds(1);
+  return m;
+}
+
+FixStatus fix_of(const ubx::Pvt& p) noexcept {
+  if (!p.fix_ok) return FixStatus::none;
+  switch (p.fix) {
+    case ubx::FixType::dead_reckoning:
+      return FixStatus::dead_reckoning;
+    case ubx::FixType::fix_2d:
+      return FixStatus::fix_2d;
+    case ubx::FixType::fix_3d:
+    case ubx::FixType::combined:
+      return FixStatus::fix_3d;
+    case ubx::FixType::none:
+    case ubx::FixType::time_only:
+      break;
+  }
+  return FixStatus::none;
+}
+
+void fill(const ubx::Pvt& p, InsReading* r) noexcept {
+  InsSample& s = r->sample;
+  s.fix = fix_of(p);
+  s.position = {p.latitude_deg, p.longitude_deg, p.height_m};
+  // The horizontal accuracy is of the plane, both axes together.
+  s.position_sigma = p.horizontal_sigma_m / std::numbers::sqrt2;
+  s.height_sigma = p.vertical_sigma_m;
+  s.velocity_sigma = p.speed_sigma;
+  s.velocity_enu = {p.velocity_ned[1], p.velocity_ned[0], -p.velocity_ned[2]};
+  s.velocity_valid = s.fix != FixStatus::none;
+  if (p.heading_deg) {
+    s.heading_source = HeadingSource::heading;
+    s.yaw_enu = yaw_of_heading(*p.heading_deg);
+  } else if (s.velocity_valid && p.ground_speed >= kMoving) {
+    s.heading_source = HeadingSource::course;
+    s.yaw_enu = yaw_of_heading(p.course_deg);
+  }
+  if (s.heading_source != HeadingSource::none) s.heading_sigma = p.course_sigma_deg * kDegree;
+  r->quality.status = static_cast<std::uint32_t>(p.fix);
+  r->quality.satellites = p.satellites;
+  r->quality.position_dop = static_cast<float>(p.position_dop);
+  r->quality.filter_valid = p.fix_ok;
+  r->quality.utc_ns = p.utc_ns.value_or(0);
+  r->quality.utc_valid = p.utc_ns.has_value();
+}
+
+}  // namespace
+
+Decoder::Decoder(const Options& options) noexcept : options_(options), mapper_(mapping(options)) {}
+
+void Decoder::begin(std::uint32_t baud) noexcept {
+  constexpr double kBitsOfByte = 10;
+  byte_ns_ = baud == 0 ? 0 : kBitsOfByte * 1e9 / baud;
+  mapper_.restart();
+  nmea_.abandon();
+  while (ubx_.waiting() > 0) {
+    ubx_.abandon();
+    for (ubx::Frame frame; ubx_.next(&frame);) {
+    }
+  }
+  epochs_.restart();
+  at_ = size_ = 0;
+  quiet_ = false;
+  any_ = false;
+}
+
+void Decoder::accept(std::span<const std::uint8_t> bytes, HostStamp arrival) noexcept {
+  size_ = std::min(bytes.size(), bytes_.size());
+  std::copy_n(bytes.begin(), size_, bytes_.begin());
+  at_ = 0;
+  arrival_ = arrival;
+  quiet_ = false;
+}
+
+bool Decoder::next(InsReading* reading) noexcept {
+  for (Fix fix; options_.protocol == Protocol::nmea ? next_nmea(&fix) : next_ubx(&fix);)
+    if (map(fix, reading)) return true;
+  return false;
+}
+
+bool Decoder::next_nmea(Fix* fix) noexcept {
+  if (at_ == 0) (void)ubx_.accept(std::span(bytes_).first(size_));
+  for (ubx::Frame frame; ubx_.next(&frame);) {
+  }
+  while (at_ < size_) {
+    nmea::Sentence sentence;
+    if (!nmea_.accept(bytes_[at_++], &sentence)) continue;
+    if (sentence.type == nmea::Type::gga || sentence.type == nmea::Type::rmc) ++fixes_;
+    if (epochs_.accept(sentence, nmea_.size(), arrival_, fix)) return true;
+  }
+  return std::exchange(quiet_, false) && epochs_.flush(fix);
+}
+
+bool Decoder::next_ubx(Fix* fix) noexcept {
+  if (at_ < size_) {
+    for (nmea::Sentence ignored; at_ < size_;) (void)nmea_.accept(bytes_[at_++], &ignored);
+    (void)ubx_.accept(std::span(bytes_).first(size_));
+  }
+  for (;;) {
+    for (ubx::Frame frame; ubx_.next(&frame);) {
+      if (!frame.is_pvt()) continue;
+      ubx::Pvt pvt;
+      if (!ubx::decode_pvt(frame.payload, &pvt)) {
+        ++counters_.malformed;
+        continue;
+      }
+      ++fixes_;
+      if (!pvt.utc_ns) {
+        ++counters_.untimed;
+        continue;
+      }
+      *fix = {};
+      fix->measured = DeviceStamp(*pvt.utc_ns);
+      fix->arrival = arrival_;
+      fix->bytes = frame.payload.size() + ubx::kOverhead;
+      fill(pvt, &fix->reading);
+      return true;
+    }
+    // What is still open when the line is quiet is no frame; there may be one within it.
+    if (!quiet_ || ubx_.waiting() == 0) break;
+    ubx_.abandon();
+  }
+  quiet_ = false;
+  return false;
+}
+
+void Decoder::count(Duration step) noexcept {
+  if (step >= kShortest && (period_ == Duration{} || step < period_)) period_ = step;
+  const double periods = period_ == Duration{} ? 1 : step.to_seconds() / period_.to_seconds();
+  const auto steps = static_cast<std::uint64_t>(std::llround(std::clamp(periods, 1.0, kMostLost)));
+  number_ += steps;
+  counters_.lost += steps - 1;
+}
+
+bool Decoder::map(const Fix& fix, InsReading* reading) noexcept {
+  best_heading_ = std::max(best_heading_, fix.reading.sample.heading_source);
+  if (any_) {
+    const Duration step = fix.measured - last_;
+    if (step < Duration{} - kClockSet || step > Duration::seconds(86400)) {
+      ++counters_.restarts;
+      mapper_.restart();
+      ++number_;
+    } else if (step <= Duration{}) {
+      ++counters_.backward;
+      return false;
+    } else {
+      count(step);
+    }
+  } else if (counters_.readings > 0) {
+    ++number_;  // after the line was away: how many are missing nobody knows
+  }
+  any_ = true;
+  last_ = fix.measured;
+  const Duration on_wire =
+      Duration::nanoseconds(std::llround(byte_ns_ * static_cast<double>(fix.bytes)));
+  const MappedStamp mapped = mapper_.map(fix.measured, fix.arrival - on_wire);
+  if (counters_.readings > 0 && mapped.host <= last_host_) {
+    ++counters_.unsettled;
+    return false;
+  }
+  last_host_ = mapped.host;
+  ++counters_.readings;
+  InsReading r = fix.reading;
+  r.sample.number = number_;
+  r.measured = fix.measured;
+  r.arrival = arrival_;
+  r.mapped = true;
+  r.host = mapped.host;
+  r.host_error = mapped.error;
+  *reading = r;
+  return true;
+}
+
+DecoderCounters Decoder::counters() const noexcept {
+  DecoderCounters c = counters_;
+  c.malformed += options_.protocol == Protocol::nmea
+                     ? nmea_.counters().malformed + nmea_.counters().checksum_wrong
+                     : ubx_.counters().checksum_wrong + ubx_.counters().length_refused;
+  return c;
+}
+
+}  // namespace vergence::gnss

@@ -1,0 +1,81 @@
+#pragma once
+#include <array>
+#include <cstdint>
+#include <span>
+
+#include "drivers/gnss/nmea_epochs.hpp"
+#include "drivers/gnss/options.hpp"
+#include "drivers/sync/clock_mapper.hpp"
+#include "firmware_iface/ubx/ubx.hpp"
+
+namespace vergence::gnss {
+
+/// Counters of a stream; all only grow.
+struct DecoderCounters {
+  std::uint64_t readings = 0;
+  std::uint64_t lost = 0;       // epochs missing between two, by the shortest interval seen
+  std::uint64_t malformed = 0;  // sentences and frames that made no sense
+  std::uint64_t backward = 0;   // fixes not newer than the one before
+  std::uint64_t untimed = 0;    // fixes without a time: not handed out
+  std::uint64_t unsettled = 0;  // of the first: mapping improved, and time would have turned back
+  std::uint64_t restarts = 0;   // the receiver's clock was set
+};
+
+/// Bytes of a satellite receiver into readings with times.
+///
+/// Time     A fix's UTC is the device's clock, mapped to the host's by a ClockMapper: the bytes of
+///          an epoch's first message arrive Options::processing and their time on the wire after
+///          the fix, or later. By what `processing` is wrong all stamps are, beyond their bound.
+/// Order    Of measurement; a fix that is not newer than the last is counted and dropped.
+/// Threads  One caller. Memory: in place, no heap.
+/// Errors   Counted; nothing stops the stream.
+class Decoder {
+ public:
+  static constexpr std::size_t kMostBytes = 1024;
+
+  explicit Decoder(const Options& options) noexcept;
+  /// The line was opened, at this rate; 0: bytes take no time (USB). Counters go on.
+  void begin(std::uint32_t baud) noexcept;
+  /// What a read brought. Precondition: next() has said false since the last; at most kMostBytes.
+  void accept(std::span<const std::uint8_t> bytes, HostStamp arrival) noexcept;
+  /// The next reading. False: none, *reading untouched.
+  [[nodiscard]] bool next(InsReading* reading) noexcept;
+  /// The line was quiet for longer than a pause within an epoch: what waits is complete.
+  void quiet() noexcept { quiet_ = true; }
+
+  /// The shortest interval between two fixes; 0: not known yet.
+  [[nodiscard]] Duration period() const noexcept { return period_; }
+  /// Whole messages of either protocol, right in checksum.
+  [[nodiscard]] std::uint64_t sentences() const noexcept { return nmea_.counters().sentences; }
+  [[nodiscard]] std::uint64_t frames() const noexcept { return ubx_.counters().frames; }
+  /// Messages that hold a fix, of the protocol asked for.
+  [[nodiscard]] std::uint64_t fixes() const noexcept { return fixes_; }
+  [[nodiscard]] HeadingSource best_heading() const noexcept { return best_heading_; }
+  [[nodiscard]] DecoderCounters counters() const noexcept;
+
+ private:
+  [[nodiscard]] bool next_nmea(Fix* fix) noexcept;
+  [[nodiscard]] bool next_ubx(Fix* fix) noexcept;
+  [[nodiscard]] bool map(const Fix& fix, InsReading* reading) noexcept;
+  void count(Duration step) noexcept;
+
+  Options options_;
+  ClockMapper mapper_;
+  double byte_ns_ = 0;
+  std::array<std::uint8_t, kMostBytes> bytes_{};
+  std::size_t at_ = 0, size_ = 0;  // of bytes_: not read yet, of the newest read
+  HostStamp arrival_{};
+  bool quiet_ = false;
+  nmea::SentenceStream nmea_;
+  NmeaEpochs epochs_;
+  ubx::FrameStream ubx_;
+  DecoderCounters counters_{};
+  std::uint64_t fixes_ = 0, number_ = 0;
+  HeadingSource best_heading_ = HeadingSource::none;
+  Duration period_{};
+  bool any_ = false;
+  DeviceStamp last_{};
+  HostStamp last_host_{};
+};
+
+}  // namespace vergence::gnss

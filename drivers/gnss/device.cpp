@@ -1,0 +1,246 @@
+#include "drivers/gnss/device.hpp"
+
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <exception>
+#include <filesystem>
+#include <system_error>
+#include <utility>
+
+namespace vergence::gnss {
+namespace {
+
+constexpr Duration kQuiet = Duration::milliseconds(40);     // longer than pauses within an epoch
+constexpr Duration kListen = Duration::milliseconds(1300);  // at a baud rate: an epoch of 1 Hz
+constexpr Duration kMeasure = Duration::milliseconds(3500);
+constexpr std::uint64_t kIntervals = 3;  // of them the shortest is the receiver's interval
+constexpr std::array<std::uint32_t, 7> kBauds{9600, 38400, 115200, 460800, 230400, 57600, 4800};
+constexpr double kOtherRate = 0.2;  // relative; beyond, the receiver's rate is not what was asked
+
+const char* name_of(Protocol protocol) noexcept {
+  return protocol == Protocol::nmea ? "nmea" : "ubx";
+}
+
+/// A receiver with USB of its own: bytes take no time on a line.
+bool has_native_usb(const std::string& port) {
+  std::error_code error;
+  const std::string real = std::filesystem::canonical(port, error).string();
+  return (error ? port : real).find("ttyACM") != std::string::npos;
+}
+
+}  // namespace
+
+Device::Device(std::unique_ptr<LinePlace> place, const Options& options)
+    : SerialDevice(std::move(place), "vergence-ins"), options_(options), decoder_(options) {
+  info_.driver = name_of(options.protocol);
+  info_.place = this->place().name();
+  info_.model =
+      options.protocol == Protocol::nmea ? "NMEA 0183 receiver" : "u-blox receiver (NAV-PVT)";
+}
+
+Device::~Device() { stop(); }
+
+DeviceStatus Device::open() {
+  LineSettings settings;
+  settings.baud = baud_ != 0 ? baud_ : options_.baud != 0 ? options_.baud : kBauds[0];
+  return open_line(settings);
+}
+
+DeviceStatus Device::connect() {
+  stop();
+  close_line();
+  look_up_virtual_time();
+  DeviceStatus status = open();
+  if (status != DeviceStatus::ok) {
+    last_error_ = place().name() + " cannot be opened: " + std::string(to_string(status));
+    return status;
+  }
+  has_native_usb_ = has_native_usb(place().name());
+  status = find();
+  if (status == DeviceStatus::ok) status = measure_rate();
+  if (status != DeviceStatus::ok) close_line();
+  return status;
+}
+
+/// The baud rate asked for alone, or the usual ones.
+DeviceStatus Device::find() {
+  const std::uint64_t sentences = decoder_.sentences(), frames = decoder_.frames();
+  DeviceStatus status = DeviceStatus::not_found;
+  if (options_.baud != 0) {
+    status = listen(options_.baud);
+  } else {
+    if (baud_ != 0) status = listen(baud_);
+    for (std::size_t i = 0; i < kBauds.size() && status == DeviceStatus::not_found; ++i)
+      status = listen(kBauds[i]);
+  }
+  if (status == DeviceStatus::not_found)
+    last_error_ = place().name() + ": " +
+                  heard_instead(decoder_.sentences() - sentences, decoder_.frames() - frames);
+  return status;
+}
+
+std::string Device::heard_instead(std::uint64_t sentences, std::uint64_t frames) const {
+  const bool nmea = options_.protocol == Protocol::nmea;
+  if (nmea && sentences > 0)
+    return "it sends NMEA 0183, but neither GGA nor RMC; enable GGA and RMC on this port";
+  if (nmea && frames > 0)
+    return "it speaks UBX; set ins.driver to ubx, or enable NMEA on this port";
+  if (!nmea && frames > 0)
+    return "it speaks UBX, but sends no NAV-PVT; enable UBX-NAV-PVT on this port (u-center)";
+  if (!nmea && sentences > 0)
+    return "it sends NMEA 0183; set ins.driver to nmea, or enable UBX-NAV-PVT on this port "
+           "(u-center)";
+  return options_.baud != 0
+             ? "no receiver is heard at " + std::to_string(options_.baud) +
+                   " baud; set ins.baud to its rate, or to 0 to look for it"
+             : "no receiver is heard at any usual baud rate; check power, cable and port";
+}
+
+DeviceStatus Device::listen(std::uint32_t baud) {
+  if (line()->baud() != baud) {
+    const DeviceStatus status = line()->set_baud(baud);
+    if (status == DeviceStatus::unsupported) return DeviceStatus::not_found;
+    if (status != DeviceStatus::ok) return status;
+  }
+  decoder_.begin(has_native_usb_ ? 0 : baud);
+  const std::uint64_t fixes = decoder_.fixes();
+  for (const HostStamp until = line()->now() + kListen; line()->now() < until;) {
+    if (stop_requested()) return DeviceStatus::stopped;
+    const DeviceStatus status = read_once(kQuiet, true);
+    if (status != DeviceStatus::ok && status != DeviceStatus::timeout) return status;
+    if (decoder_.fixes() == fixes) continue;
+    baud_ = baud;
+    return DeviceStatus::ok;
+  }
+  return DeviceStatus::not_found;
+}
+
+/// A receiver without a fix may send no time: then its rate shows later.
+DeviceStatus Device::measure_rate() {
+  const std::uint64_t before = decoder_.counters().readings;
+  for (const HostStamp until = line()->now() + kMeasure; line()->now() < until;) {
+    const DeviceStatus status = read_once(kQuiet, true);
+    if (status != DeviceStatus::ok && status != DeviceStatus::timeout) {
+      last_error_ = place().name() + ": " + std::string(to_string(status));
+      return status;
+    }
+    if (decoder_.counters().readings - before > kIntervals) break;
+  }
+  rate_hz_ = decoder_.period() == Duration{} ? 0 : 1 / decoder_.period().to_seconds();
+  return DeviceStatus::ok;
+}
+
+DeviceStatus Device::configure(double rate_hz, double* actual_hz) noexcept {
+  try {
+    last_error_.clear();
+    remark_.clear();
+    stop();
+    if (!(rate_hz > 0)) return DeviceStatus::bad_configuration;
+    if (line() == nullptr) {
+      if (const DeviceStatus s = connect(); s != DeviceStatus::ok) return s;
+    }
+    std::array<char, 160> text{};
+    if (rate_hz_ > 0 && std::abs(rate_hz_ - rate_hz) > kOtherRate * rate_hz_) {
+      (void)std::snprintf(text.data(), text.size(),
+                          "the receiver sends %.3g readings a second, ins.rate is %.4g: set "
+                          "ins.rate to %.3g, or the receiver by its own tool",
+                          rate_hz_, rate_hz, rate_hz_);
+      last_error_ = text.data();
+      return DeviceStatus::unsupported;
+    }
+    const HeadingSource heading = decoder_.best_heading();
+    remark_ = "it gives no attitude: the comparison is of position and ";
+    remark_ += heading == HeadingSource::heading ? "measured heading"
+                                                 : "course, as heading, once the vehicle moves";
+    if (rate_hz_ <= 0) remark_ += "; it has no fix yet";
+    configured_ = true;
+    if (actual_hz != nullptr) *actual_hz = rate_hz_ > 0 ? rate_hz_ : rate_hz;
+    return DeviceStatus::ok;
+  } catch (const std::exception&) {  // out of memory
+    return DeviceStatus::failed;
+  }
+}
+
+DeviceTiming Device::timing() const noexcept {
+  DeviceTiming t;
+  t.least_delay = options_.processing;
+  t.delay_spread = place().latency_timer() + Duration::milliseconds(60);
+  t.resolution = Duration::milliseconds(1);
+  return t;
+}
+
+DeviceStatus Device::start(Notifier* ready) noexcept {
+  return configured_ ? start_thread(ready) : DeviceStatus::bad_configuration;
+}
+
+void Device::stop() noexcept { stop_thread(); }
+
+DeviceStatus Device::wait(Duration limit, InsReading* reading) noexcept {
+  const DeviceStatus status = take(limit, reading);
+  if (status == DeviceStatus::ok) delivered_.fetch_add(1, std::memory_order_relaxed);
+  return status;
+}
+
+InsStatistics Device::statistics() const noexcept {
+  InsStatistics s;
+  s.delivered = delivered_.load(std::memory_order_relaxed);
+  s.lost = lost_.load(std::memory_order_relaxed);
+  s.malformed = malformed_.load(std::memory_order_relaxed);
+  s.restarts = restarts_.load(std::memory_order_relaxed);
+  s.overruns = overruns();
+  s.starts = starts();
+  return s;
+}
+
+// ---- the device's thread
+
+DeviceStatus Device::begin() noexcept {
+  line()->discard_input();  // what waited says nothing about when it was sent
+  decoder_.begin(has_native_usb_ ? 0 : line()->baud());
+  return DeviceStatus::ok;
+}
+
+DeviceStatus Device::read_on() noexcept {
+  HostStamp heard = line()->now();
+  std::uint64_t fixes = decoder_.fixes();
+  for (;;) {
+    if (stop_requested()) return DeviceStatus::stopped;
+    const DeviceStatus status = read_once(kQuiet, false);
+    if (status != DeviceStatus::ok && status != DeviceStatus::timeout &&
+        status != DeviceStatus::stopped)
+      return status;
+    if (decoder_.fixes() != fixes) heard = line()->now();
+    fixes = decoder_.fixes();
+    if (line()->now() - heard > kSilent) return DeviceStatus::gone;
+  }
+}
+
+DeviceStatus Device::read_once(Duration limit, bool discard) noexcept {
+  std::array<std::uint8_t, Decoder::kMostBytes> bytes{};
+  const LineRead r = line()->read(bytes, limit);
+  if (r.status == DeviceStatus::ok)
+    decoder_.accept(std::span(bytes).first(r.size), r.arrival);
+  else if (r.status == DeviceStatus::timeout)
+    decoder_.quiet();
+  else
+    return r.status;
+  for (InsReading reading; decoder_.next(&reading);)
+    if (!discard) hand_out(reading, reading.arrival);
+  count();
+  return r.status;
+}
+
+DeviceStatus Device::reopen() {
+  if (const DeviceStatus s = open(); s != DeviceStatus::ok) return s;
+  return listen(baud_);
+}
+
+void Device::count() noexcept {
+  const DecoderCounters c = decoder_.counters();
+  lost_.store(c.lost, std::memory_order_relaxed);
+  malformed_.store(c.malformed, std::memory_order_relaxed);
+  restarts_.store(c.restarts, std::memory_order_relaxed);
+}
+
+}  // namespace vergence::gnss

@@ -1,0 +1,50 @@
+#include <gtest/gtest.h>
+
+#include "core/bundle/bundle.hpp"
+#include "tests/support/simd_targets.hpp"
+#include "tests/unit/core/bundle/bundle_fixture.hpp"
+
+namespace vergence {
+namespace {
+
+/// The adjuster's kernels sum in another order on each target, and some fuse products with sums:
+/// the optimum is the same to rounding, and so is the number of steps to it.
+TEST(BundleTargets, everySimdTargetFindsTheSameOptimum) {
+  SimulationOptions s;
+  s.points = 61;
+  Random random(22);
+  const SimulatedRig original = simulate_rig(s, random);
+  OwnAdjuster own(capacities_for(s));
+  SimulatedRig reference = original;
+  const BundleResult expected = own.adjuster.solve(reference.problem(), calibration_options());
+  test::on_every_target([&](const char* target) {
+    SimulatedRig rig = original;
+    const BundleResult r = own.adjuster.solve(rig.problem(), calibration_options());
+    EXPECT_EQ(r.steps, expected.steps) << target;
+    // Sums of 2440 squares in another order: about √2440 roundings of 1e-16.
+    EXPECT_NEAR(r.final_cost, expected.final_cost, 1e-12 * expected.final_cost) << target;
+    EXPECT_LT((rig.T_camera_left[1].t - reference.T_camera_left[1].t).norm(), 1e-9) << target;
+    // Points are tens of metres away, their depth three digits weaker than a direction.
+    for (std::size_t i = 0; i < rig.T_left_world.size(); ++i)
+      EXPECT_LT((rig.T_left_world[i].centre() - reference.T_left_world[i].centre()).norm(), 1e-9)
+          << target << ", rig " << i;
+  });
+}
+
+TEST(BundleTargets, oneTargetGivesTheSameBitsTwice) {
+  SimulationOptions s;
+  s.points = 61;
+  Random random(22);
+  const SimulatedRig original = simulate_rig(s, random);
+  OwnAdjuster own(capacities_for(s));
+  test::on_every_target([&](const char* target) {
+    SimulatedRig first = original, second = original;
+    const double cost = own.adjuster.solve(first.problem(), calibration_options()).final_cost;
+    EXPECT_EQ(cost, own.adjuster.solve(second.problem(), calibration_options()).final_cost)
+        << target;
+    EXPECT_EQ(first.T_camera_left[1].t, second.T_camera_left[1].t) << target;
+  });
+}
+
+}  // namespace
+}  // namespace vergence

@@ -1,0 +1,159 @@
+#include "drivers/gnss/device.hpp"
+
+#include <fcntl.h>
+#include <gtest/gtest.h>
+#include <poll.h>
+#include <stdlib.h>
+#include <unistd.h>
+
+#include <atomic>
+#include <chrono>
+#include <functional>
+#include <thread>
+
+#include "drivers/gnss/gnss.hpp"
+#include "tests/support/gnss_bytes.hpp"
+
+namespace vergence::gnss {
+namespace {
+
+/// A receiver behind a pseudo-terminal: an epoch every 100 ms of the real clock, while it is on.
+class Receiver {
+ public:
+  using Epoch = std::function<std::string(int number)>;
+  explicit Receiver(Epoch epoch) : master_(::posix_openpt(O_RDWR | O_NOCTTY | O_NONBLOCK)) {
+    EXPECT_TRUE(master_ >= 0 && ::grantpt(master_) == 0 && ::unlockpt(master_) == 0);
+    port_ = ::ptsname(master_);
+    thread_ = std::thread([this, epoch = std::move(epoch)] {
+      for (int i = 0; !ended_; ++i) {
+        const std::string bytes = epoch(i);
+        if (on_ && ::write(master_, bytes.data(), bytes.size()) < 0) {
+          // Nobody reads yet: a receiver does not care.
+        }
+        std::this_thread::sleep_for(std::chrono::milliseconds(100));
+      }
+    });
+  }
+  ~Receiver() {
+    ended_ = true;
+    thread_.join();
+    ::close(master_);
+  }
+  Receiver(const Receiver&) = delete;
+  Receiver& operator=(const Receiver&) = delete;
+  [[nodiscard]] const std::string& port() const { return port_; }
+  void turn(bool on) { on_ = on; }
+
+ private:
+  int master_;
+  std::string port_;
+  std::atomic<bool> ended_{false}, on_{true};
+  std::thread thread_;
+};
+
+std::string ubx_epoch(int i) {
+  test::PvtBytes pvt;
+  pvt.put(9, 1, i / 600), pvt.put(10, 1, i / 10 % 60), pvt.put(16, 4, i % 10 * 100'000'000);
+  return pvt.frame();
+}
+
+std::string nmea_epoch(int i) {
+  char time[16];
+  (void)std::snprintf(time, sizeof(time), "01%02d%02d.%d0", i / 600 % 60, i / 10 % 60, i % 10);
+  return test::nmea_sentence(std::string("GPRMC,") + time +
+                             ",A,2729.85,S,15300.822,E,10.0,45.0,290224,,,A") +
+         test::nmea_sentence(std::string("GPGGA,") + time +
+                             ",2729.85,S,15300.822,E,1,9,0.9,20.5,M,39.5,M,,");
+}
+
+void expect_readings(InsDevice* device) {
+  double actual = 0;
+  ASSERT_EQ(device->configure(10, &actual), DeviceStatus::ok) << device->last_error();
+  EXPECT_NEAR(actual, 10, 1e-6);
+  EXPECT_NE(device->remark().find("no attitude"), std::string::npos);
+  ASSERT_EQ(device->start(nullptr), DeviceStatus::ok);
+  InsReading last;
+  for (int i = 0; i < 5; ++i) {
+    InsReading r;
+    ASSERT_EQ(device->wait(Duration::seconds(5), &r), DeviceStatus::ok);
+    EXPECT_TRUE(r.mapped);
+    EXPECT_EQ(r.sample.fix, FixStatus::fix_3d);
+    EXPECT_EQ(r.sample.heading_source, HeadingSource::course);
+    EXPECT_NEAR(r.sample.position.latitude_deg, -27.4975, 1e-9);
+    EXPECT_LE(r.host, r.arrival);
+    if (i > 0) {
+      EXPECT_GT(r.measured, last.measured);
+      EXPECT_GT(r.host, last.host);
+    }
+    last = r;
+  }
+  device->stop();
+  EXPECT_EQ(device->statistics().delivered, 5U);
+  EXPECT_EQ(device->statistics().malformed, 0U);
+}
+
+std::unique_ptr<InsDevice> opened(Driver* driver, const std::string& port) {
+  DeviceStatus status = DeviceStatus::failed;
+  auto device = driver->open(port, &status);
+  EXPECT_EQ(status, DeviceStatus::ok) << driver->last_error();
+  return device;
+}
+
+TEST(GnssDevice, ubxIsFoundAndRead) {
+  Receiver receiver(ubx_epoch);
+  Driver driver({Protocol::ubx, 0, {}});
+  const auto device = opened(&driver, receiver.port());
+  ASSERT_NE(device, nullptr);
+  expect_readings(device.get());
+}
+
+TEST(GnssDevice, nmeaIsFoundAndRead) {
+  Receiver receiver(nmea_epoch);
+  Driver driver({Protocol::nmea, 38400, {}});
+  const auto device = opened(&driver, receiver.port());
+  ASSERT_NE(device, nullptr);
+  expect_readings(device.get());
+}
+
+TEST(GnssDevice, theOtherProtocolIsNamed) {
+  Receiver receiver(nmea_epoch);
+  Driver driver({Protocol::ubx, 38400, {}});
+  DeviceStatus status = DeviceStatus::ok;
+  EXPECT_EQ(driver.open(receiver.port(), &status), nullptr);
+  EXPECT_EQ(status, DeviceStatus::not_found);
+  EXPECT_NE(driver.last_error().find("set ins.driver to nmea"), std::string::npos)
+      << driver.last_error();
+}
+
+TEST(GnssDevice, anotherRateIsRefusedWithTheReceiversOwn) {
+  Receiver receiver(ubx_epoch);
+  Driver driver({Protocol::ubx, 9600, {}});
+  const auto device = opened(&driver, receiver.port());
+  ASSERT_NE(device, nullptr);
+  EXPECT_EQ(device->configure(120, nullptr), DeviceStatus::unsupported);
+  EXPECT_NE(device->last_error().find("set ins.rate to 10"), std::string::npos)
+      << device->last_error();
+  EXPECT_EQ(device->start(nullptr), DeviceStatus::bad_configuration);
+}
+
+TEST(GnssDevice, silenceIsGoneAndFixesBringItBack) {
+  Receiver receiver(ubx_epoch);
+  Driver driver({Protocol::ubx, 9600, {}});
+  const auto device = opened(&driver, receiver.port());
+  ASSERT_NE(device, nullptr);
+  ASSERT_EQ(device->configure(10, nullptr), DeviceStatus::ok);
+  ASSERT_EQ(device->start(nullptr), DeviceStatus::ok);
+  receiver.turn(false);
+  InsReading r;
+  DeviceStatus status = DeviceStatus::ok;
+  for (int i = 0; i < 10 && status == DeviceStatus::ok; ++i)
+    status = device->wait(Duration::seconds(10), &r);
+  ASSERT_EQ(status, DeviceStatus::gone);
+  receiver.turn(true);
+  for (int i = 0; i < 200 && device->start(nullptr) == DeviceStatus::gone; ++i)
+    std::this_thread::sleep_for(std::chrono::milliseconds(50));
+  EXPECT_EQ(device->wait(Duration::seconds(5), &r), DeviceStatus::ok);
+}
+
+}  // namespace
+}  // namespace vergence::gnss
