@@ -163,6 +163,9 @@ void Recording::work() noexcept {
     }
     drain(hurried || last, last);
   }
+  if (file_.open() && preamble_due_)
+    (void)write_preamble(
+        static_cast<std::uint64_t>(std::max<std::int64_t>(options_.start.ns(), 0)));
   const int error = file_.finish();
   if (error != 0) (void)notices_.push({Trouble::unfinished, -error, 0, number_});
 }
@@ -203,10 +206,12 @@ Recording::Batch Recording::gather() const noexcept {
     const std::span<const std::uint8_t> waiting = queues_[i]->ring.waiting();
     std::size_t at = 0;
     while (at < waiting.size()) {
-      const std::size_t size = head_of(waiting.subspan(at)).record_size();
+      const McapMessageHead head = head_of(waiting.subspan(at));
+      const std::size_t size = head.record_size();
       batch.filled = batch.messages == McapFile::kMostMessages ||
                      (batch.bytes > 0 && batch.bytes + size > kMostChunkBytes);
       if (batch.filled) break;
+      if (batch.messages == 0) batch.first = head.log_time;
       at += size;
       batch.bytes += size;
       ++batch.messages;
@@ -259,7 +264,8 @@ bool Recording::store(const Batch& batch) noexcept {
   if (!file_.open() && !open_file()) return false;
   const std::int64_t begun = monotonic_ns();
   const std::uint64_t before = file_.size();
-  const int error = file_.write_chunk(std::span(batch.parts).first(queues_.size()));
+  int error = preamble_due_ ? write_preamble(batch.first) : 0;
+  if (error == 0) error = file_.write_chunk(std::span(batch.parts).first(queues_.size()));
   if (error != 0) {
     fail(-error);
     return false;
@@ -277,26 +283,28 @@ bool Recording::store(const Batch& batch) noexcept {
 }
 
 bool Recording::open_file() noexcept {
-  int error = file_.create(path(number_, &path_));
-  if (error == 0 && !preamble_.empty()) {
-    const auto newest = newest_ns_.load(std::memory_order_relaxed);
-    const auto time = newest > 0 ? newest : static_cast<std::uint64_t>(options_.start.ns());
-    for (std::span<std::uint8_t> rest(preamble_); !rest.empty();) {
-      McapMessageHead head = head_of(rest);
-      head.log_time = time;
-      head.write(rest.first<McapMessageHead::kSize>());
-      rest = rest.subspan(head.record_size());
-    }
-    const std::array<std::span<const std::uint8_t>, 1> part{preamble_};
-    error = file_.write_chunk(part);
-    if (error != 0) file_.abandon();
-  }
-  if (error != 0) {
+  if (const int error = file_.create(path(number_, &path_)); error != 0) {
     fail(-error);
     return false;
   }
   files_.fetch_add(1, std::memory_order_relaxed);
+  preamble_due_ = !preamble_.empty();
   return true;
+}
+
+/// In front of the first chunk of a file, at its time: before it nobody knows when the file begins.
+/// → 0
+int Recording::write_preamble(std::uint64_t time) noexcept {
+  for (std::span<std::uint8_t> rest(preamble_); !rest.empty();) {
+    McapMessageHead head = head_of(rest);
+    head.log_time = time;
+    head.write(rest.first<McapMessageHead::kSize>());
+    rest = rest.subspan(head.record_size());
+  }
+  const std::array<std::span<const std::uint8_t>, 1> part{preamble_};
+  const int error = file_.write_chunk(part);
+  preamble_due_ = error != 0;
+  return error;
 }
 
 /// What the system said of a write. A full disk goes on with the same file; any other fault may

@@ -69,7 +69,7 @@ class Recording {
     std::vector<RecordedTopic> topics;
     std::vector<std::size_t> queues;   // bytes of each
     std::vector<Preamble> preamble{};  // messages at the beginning of every file
-    Stamp start{};                     // of the preamble in the first file
+    Stamp start{};                     // of the preamble where nothing follows
     std::uint64_t roll_bytes = 0;      // a file is ended when it has so many; 0: never
     Duration roll_time{};              // … or when its messages span so long; 0: never
     Duration keep{};                   // 0: everything
@@ -117,7 +117,8 @@ class Recording {
   struct Batch {
     std::array<std::span<const std::uint8_t>, McapFile::kMostParts> parts{};
     std::size_t messages = 0, bytes = 0;
-    bool filled = false;  // there is more than a chunk takes
+    std::uint64_t first = 0;  // time of the first one, ns
+    bool filled = false;      // there is more than a chunk takes
   };
 
   void work() noexcept;
@@ -131,6 +132,7 @@ class Recording {
   static void drop_oldest(RecordRing* ring, std::atomic<std::uint64_t>* counter) noexcept;
   [[nodiscard]] bool store(const Batch& batch) noexcept;
   [[nodiscard]] bool open_file() noexcept;
+  [[nodiscard]] int write_preamble(std::uint64_t time) noexcept;
   void fail(int error) noexcept;
   void roll_if_wanted() noexcept;
   void begin_next_number() noexcept;
@@ -147,8 +149,9 @@ class Recording {
   McapFile file_;
 
   // Of the writer's thread.
-  int number_ = 0;        // of the file at hand
-  bool several_ = false;  // files have numbers
+  int number_ = 0;             // of the file at hand
+  bool several_ = false;       // files have numbers
+  bool preamble_due_ = false;  // of the file at hand
   Trouble trouble_ = Trouble::none;
   std::int64_t retry_ns_ = 0, waiting_since_ns_ = 0;  // monotonic
   std::vector<char> path_, other_path_;
