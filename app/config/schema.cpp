@@ -676,7 +676,7 @@ Group record() {
              "`record: [poses, ins, images]`, switches its words on.",
              [](auto& c) -> auto& { return c.record; })
       .choice("poses", &R::poses, off_on, "Odometry, transforms and diagnostics of every frame.")
-      .choice("ins", &R::ins, off_on, "Readings of the INS.")
+      .choice("ins", &R::ins, off_on, "All readings of the INS, as they were compared.")
       .choice("images", &R::images, off_on,
               "All images that the estimator was given, not packed, with their cameras: what "
               "`replay --format session` needs.")

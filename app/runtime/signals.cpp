@@ -34,13 +34,24 @@ SignalGuard::SignalGuard() {
   calibration_asked.store(false);
   install(SIGINT, note_signal, true, &former_interrupt_);
   install(SIGTERM, note_signal, true, &former_terminate_);
+  install(SIGHUP, note_signal, true, &former_hangup_);
+  if (former_hangup_.sa_handler == SIG_IGN)  // nohup: the drive is to outlive its terminal
+    install(SIGHUP, SIG_IGN, false, &former_hangup_);
   install(SIGUSR1, note_calibration_request, false, &former_user_);
+  // A reader of our output that goes, a file at its limit: the write that fails says so.
+  install(SIGPIPE, SIG_IGN, false, &former_pipe_);
+  install(SIGXFSZ, SIG_IGN, false, &former_file_size_);
+  install(SIGUSR2, SIG_IGN, false, &former_user2_);
 }
 
 SignalGuard::~SignalGuard() {
   sigaction(SIGINT, &former_interrupt_, nullptr);
   sigaction(SIGTERM, &former_terminate_, nullptr);
+  sigaction(SIGHUP, &former_hangup_, nullptr);
   sigaction(SIGUSR1, &former_user_, nullptr);
+  sigaction(SIGPIPE, &former_pipe_, nullptr);
+  sigaction(SIGXFSZ, &former_file_size_, nullptr);
+  sigaction(SIGUSR2, &former_user2_, nullptr);
 }
 
 bool SignalGuard::stop_requested() const noexcept {
@@ -56,6 +67,7 @@ std::optional<ExitCode> SignalGuard::stop_code() const noexcept {
     case SIGINT:
       return ExitCode::interrupted;
     case SIGTERM:
+    case SIGHUP:  // the terminal was closed: the session is, too
       return ExitCode::terminated;
     default:
       return std::nullopt;

@@ -7,9 +7,10 @@
 
 namespace vergence::app {
 
-/// SIGINT and SIGTERM become a flag that a command looks at between frames: it stops, closes its
-/// session and returns stop_code(). SIGUSR1 asks for a new calibration; a command that has none to
-/// make takes no notice.
+/// SIGINT, SIGTERM and SIGHUP become a flag that a command looks at between frames: it stops,
+/// closes its session and returns stop_code(). SIGUSR1 asks for a new calibration; a command that
+/// has none to make takes no notice. SIGPIPE, SIGXFSZ and SIGUSR2 are ignored: they would end a
+/// drive without its summary and report.
 ///
 /// Ownership  One at a time in a program; the destructor puts the former handlers back.
 /// Threads    stop_requested(), stop_code() and take_calibration_request() from any thread.
@@ -23,8 +24,8 @@ class SignalGuard {
   SignalGuard& operator=(const SignalGuard&) = delete;
 
   [[nodiscard]] bool stop_requested() const noexcept;
-  /// `interrupted` (130) or `terminated` (143) by the first signal that came; nothing when none
-  /// did.
+  /// `interrupted` (130) or `terminated` (143; SIGHUP, too) by the first signal that came; nothing
+  /// when none did.
   [[nodiscard]] std::optional<ExitCode> stop_code() const noexcept;
   /// Whether SIGUSR1 has come since the last call, however often.
   [[nodiscard]] bool take_calibration_request() const noexcept;
@@ -33,6 +34,10 @@ class SignalGuard {
   struct sigaction former_interrupt_ {};
   struct sigaction former_terminate_ {};
   struct sigaction former_user_ {};
+  struct sigaction former_hangup_ {};
+  struct sigaction former_pipe_ {};
+  struct sigaction former_file_size_ {};
+  struct sigaction former_user2_ {};
 };
 
 }  // namespace vergence::app

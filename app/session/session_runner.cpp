@@ -16,6 +16,7 @@
 #include "app/datasets/reference_track.hpp"
 #include "app/devices/camera_masks.hpp"
 #include "app/runtime/background_thread.hpp"
+#include "app/runtime/service_manager.hpp"
 #include "app/session/drive_recorder.hpp"
 #include "app/session/event_log.hpp"
 #include "app/session/ins_comparison.hpp"
@@ -79,6 +80,8 @@ class SessionRunner {
   std::unique_ptr<InsComparison> comparison_;  // null: there is no INS
 
   std::atomic<bool> calibration_asked_{false};  // by the caller's thread, for the estimator's
+  std::atomic<std::uint64_t> beats_{0};         // items that the estimator's thread has handled
+  ServiceManager service_;                      // of the caller's thread
   std::mutex mutex_;                            // with done_, for the caller's thread that waits
   std::condition_variable changed_;
   bool done_ = false;
@@ -111,6 +114,7 @@ void SessionRunner::estimate() noexcept {
   (void)pthread_setname_np(pthread_self(), "vergence-estim");
   AllocationGuard::seal_thread();
   for (SourceItem item; source_.next(&item);) {
+    beats_.fetch_add(1, std::memory_order_relaxed);
     if (const auto* frame = std::get_if<SourceFrame>(&item)) handle(*frame);
     if (const auto* reading = std::get_if<InsRecord>(&item)) handle(*reading);
     if (const auto* event = std::get_if<SourceEvent>(&item)) handle(*event);
@@ -162,6 +166,7 @@ void SessionRunner::watch(Progress* progress) {
   while (!changed_.wait_for(lock, kLook, [this] { return done_; })) {
     if (signals_.stop_requested()) source_.stop();
     source_.look();
+    service_.alive(beats_.load(std::memory_order_relaxed), std::chrono::steady_clock::now());
     if (facts_.on_request && signals_.take_calibration_request())
       calibration_asked_.store(true, std::memory_order_relaxed);
     lock.unlock();
@@ -290,7 +295,9 @@ ExitCode SessionRunner::run() {
   say_remarks(&progress);
   source_.start(&faults);
   std::thread estimating([this] { estimate(); });
+  service_.ready();
   watch(&progress);
+  service_.stopping();
   estimating.join();
   progress.finish();
   source_.finish(&progress, &faults);

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <span>
 
 #include "core/calibration/health.hpp"
 #include "core/camera/camera.hpp"
@@ -16,6 +17,9 @@ constexpr double kFullWindow = 3.0;         // times the wanted sigmas, at max_f
 constexpr double kBaselineOfSigmas = 0.75;  // m, for which the wanted sigma of t is given
 constexpr int kFewestHeldOut = 3;           // frames that say anything
 constexpr double kWorstFit = 1.5;           // px: matches of frames not in the solve, median
+// And how many times that of the frames that were; under so many pixels they may differ: on
+// recorded drives both are 0.08 to 0.25 px.
+constexpr double kTimesUsed = 3.0, kLeastMisfit = 0.4;
 constexpr double kCertain = 3.0;         // sigmas of depth by which a calibration is contradicted
 constexpr double kNeedsBaselines = 3.0;  // travelled, besides needs_motion_m
 
@@ -52,6 +56,28 @@ void for_held_out(const TrackLog& log, std::uint64_t after, Each each) noexcept 
     each(log.frame(i));
 }
 
+/// Median of frames' medians; px.
+HeldOut fit_of(std::span<double> medians) noexcept {
+  HeldOut h;
+  h.frames = static_cast<int>(medians.size());
+  if (medians.empty()) return h;
+  const auto middle = medians.begin() + static_cast<std::ptrdiff_t>(medians.size() / 2);
+  std::nth_element(medians.begin(), middle, medians.end());
+  h.median_px = *middle;
+  return h;
+}
+
+/// The same of the newest frames that a solution up to `newest` rests on.
+HeldOut fit_of_used(const TrackLog& log, std::uint64_t newest, const RigCalibration& rig) noexcept {
+  std::array<double, kHeldOutFrames> medians;
+  std::size_t n = 0;
+  for (std::size_t i = log.size(); i-- > 0 && n < medians.size();) {
+    if (log.frame(i).number > newest) continue;
+    if (const double m = median_distance(log.frame(i), rig); m >= 0) medians[n++] = m;
+  }
+  return fit_of(std::span(medians).first(n));
+}
+
 double angle_between(const Vec3& a, const Vec3& b) noexcept {
   return std::atan2(a.cross(b).norm(), a.dot(b));
 }
@@ -60,16 +86,11 @@ double angle_between(const Vec3& a, const Vec3& b) noexcept {
 
 HeldOut held_out(const TrackLog& log, std::uint64_t after, const RigCalibration& rig) noexcept {
   std::array<double, kHeldOutFrames> medians;
-  HeldOut h;
+  std::size_t n = 0;
   for_held_out(log, after, [&](const LoggedFrame& f) noexcept {
-    const double m = median_distance(f, rig);
-    if (m >= 0) medians[static_cast<std::size_t>(h.frames++)] = m;
+    if (const double m = median_distance(f, rig); m >= 0) medians[n++] = m;
   });
-  if (h.frames == 0) return h;
-  const auto middle = medians.begin() + h.frames / 2;
-  std::nth_element(medians.begin(), middle, medians.begin() + h.frames);
-  h.median_px = *middle;
-  return h;
+  return fit_of(std::span(medians).first(n));
 }
 
 bool fits_better(const TrackLog& log, std::uint64_t after, const RigCalibration& better,
@@ -203,7 +224,13 @@ Gate check_acceptance(const AcceptanceInput& q, const CalibrationOptions& o) noe
   }
   if (q.log == nullptr) return Gate::open;
   const HeldOut fit = held_out(*q.log, s.newest, s.rig);
-  if (fit.frames >= kFewestHeldOut && fit.median_px > kWorstFit) return Gate::does_not_fit;
+  if (fit.frames >= kFewestHeldOut) {
+    const HeldOut used = fit_of_used(*q.log, s.newest, s.rig);
+    const double worst = used.frames < kFewestHeldOut
+                             ? kWorstFit
+                             : std::clamp(kTimesUsed * used.median_px, kLeastMisfit, kWorstFit);
+    if (fit.median_px > worst) return Gate::does_not_fit;
+  }
   if (q.in_use != nullptr && q.must_be_better && !fits_better(*q.log, s.newest, s.rig, *q.in_use))
     return Gate::no_better;
   return Gate::open;

@@ -535,16 +535,21 @@ CalibrationDecision OnlineCalibrator::judge_learnt(Stamp stamp, std::uint64_t nu
                             ? found_with_lenses_ == d.lenses
                             : a.better;
     if (gate_ == Gate::open && !better && !(a.contradicted && !a.worse)) gate_ = Gate::no_better;
+    // Frames that contradict what was measured before them confirm nothing.
     d.verified = gate_ == Gate::open
                      ? a.sigma_percent <= options_.calibration.tolerated_depth_percent
-                     : a.confirmed;
+                     : a.confirmed && gate_ != Gate::does_not_fit;
     if (d.verified || a.contradicted) set_verified(d.verified);
   }
   d.accepted = gate_ == Gate::open;
   d.reason = calibration::reason(gate_);
-  // A full segment is closed: what it told is the next one's prior.
+  // A full segment is closed: what it told is the next one's prior. So is one that the frames
+  // after it contradict: they are of another rig, and not to be solved with it.
   const bool usable = gate_ == Gate::open || gate_ == Gate::no_better;
-  if (solved_frames_ >= most) {
+  if (gate_ == Gate::does_not_fit) {
+    log_.drop_before(found.newest + 1);
+    begin_segment();
+  } else if (solved_frames_ >= most) {
     if (usable) {
       learnt_ = found.rig;
       any_learnt_ = true;

@@ -54,6 +54,27 @@ TEST(SignalGuard, SigusrAsksForACalibrationEachTimeAndStopsNothing) {
   EXPECT_FALSE(guard.stop_requested());
 }
 
+TEST(SignalGuard, AClosedTerminalEndsTheSessionUnlessItIsToOutliveIt) {
+  {
+    const SignalGuard guard;
+    std::raise(SIGHUP);
+    EXPECT_EQ(guard.stop_code(), ExitCode::terminated);
+  }
+  auto* const before = std::signal(SIGHUP, SIG_IGN);
+  {
+    const SignalGuard guard;
+    std::raise(SIGHUP);
+    EXPECT_FALSE(guard.stop_requested());
+  }
+  std::signal(SIGHUP, before);
+}
+
+TEST(SignalGuard, WhatAReaderOrADiskDoesIsLeftToTheWriteThatFails) {
+  const SignalGuard guard;
+  for (const int number : {SIGPIPE, SIGXFSZ, SIGUSR2}) std::raise(number);
+  EXPECT_FALSE(guard.stop_requested());
+}
+
 TEST(SignalGuardDeathTest, TheSecondSignalEndsTheProgram) {
   EXPECT_EXIT(
       {

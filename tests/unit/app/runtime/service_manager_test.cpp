@@ -1,0 +1,91 @@
+#include "app/runtime/service_manager.hpp"
+
+#include <sys/socket.h>
+#include <sys/un.h>
+#include <unistd.h>
+
+#include <array>
+#include <chrono>
+#include <cstring>
+#include <filesystem>
+#include <string>
+
+#include <gtest/gtest.h>
+
+#include "tests/support/temporary_folder.hpp"
+
+namespace vergence::app {
+namespace {
+
+using namespace std::chrono_literals;
+
+/// What systemd would hear.
+class Manager {
+ public:
+  explicit Manager(const std::filesystem::path& path)
+      : fd_(::socket(AF_UNIX, SOCK_DGRAM | SOCK_NONBLOCK, 0)) {
+    sockaddr_un address{};
+    address.sun_family = AF_UNIX;
+    std::strncpy(address.sun_path, path.c_str(), sizeof address.sun_path - 1);
+    EXPECT_EQ(::bind(fd_, reinterpret_cast<const sockaddr*>(&address), sizeof address), 0);
+  }
+  ~Manager() { ::close(fd_); }
+  /// The next datagram; empty: there is none.
+  std::string heard() {
+    std::array<char, 256> text;
+    const ssize_t n = ::recv(fd_, text.data(), text.size(), 0);
+    return n > 0 ? std::string(text.data(), static_cast<std::size_t>(n)) : "";
+  }
+
+ private:
+  int fd_;
+};
+
+struct ServiceManagerTest : testing::Test {
+  test::TemporaryFolder folder;
+  std::filesystem::path path = folder / "notify";
+  Manager manager{path};
+  std::chrono::steady_clock::time_point begin{};
+};
+
+TEST_F(ServiceManagerTest, SaysReadyAndStopping) {
+  ServiceManager service(path.string(), 0s);
+  service.ready();
+  EXPECT_EQ(manager.heard(), "READY=1");
+  service.stopping();
+  EXPECT_EQ(manager.heard(), "STOPPING=1\nWATCHDOG=1");
+}
+
+TEST_F(ServiceManagerTest, ASlowLoopIsAliveAndAHungOneIsNot) {
+  ServiceManager service(path.string(), 9s);
+  for (int second = 0; second < 9; ++second)
+    service.alive(static_cast<std::uint64_t>(second + 1), begin + second * 1s);
+  // Three signs in nine seconds.
+  for (int i = 0; i < 3; ++i) EXPECT_TRUE(manager.heard().starts_with("WATCHDOG=1\nSTATUS=")) << i;
+  EXPECT_EQ(manager.heard(), "");
+  for (int second = 9; second < 60; ++second) service.alive(9, begin + second * 1s);
+  EXPECT_TRUE(manager.heard().starts_with("WATCHDOG=1")) << "of what was handled before it hung";
+  EXPECT_EQ(manager.heard(), "");
+}
+
+TEST_F(ServiceManagerTest, WithoutAWatchdogTheStatusGoesOutOnceASecond) {
+  ServiceManager service(path.string(), 0s);
+  for (int i = 0; i < 20; ++i) service.alive(static_cast<std::uint64_t>(i + 1), begin + i * 100ms);
+  EXPECT_EQ(manager.heard(), "STATUS=1 frames, readings and events handled");
+  EXPECT_EQ(manager.heard(), "STATUS=11 frames, readings and events handled");
+  EXPECT_EQ(manager.heard(), "");
+}
+
+TEST_F(ServiceManagerTest, NobodyAsksOrTheNameIsNoSocketsName) {
+  for (const std::string& name : {std::string(), std::string("notify"), std::string(300, '/')}) {
+    ServiceManager service(name, 1s);
+    service.ready();
+    service.alive(1, begin);
+  }
+  EXPECT_EQ(manager.heard(), "");
+  ServiceManager gone((folder / "nobody").string(), 1s);
+  gone.ready();  // refused by the kernel; no matter
+}
+
+}  // namespace
+}  // namespace vergence::app
