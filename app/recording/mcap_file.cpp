@@ -17,18 +17,18 @@ constexpr std::size_t kChunkHead = kRecordHead + 40;  // start, end, size u64, c
                                                       // compression u32, size u64
 constexpr std::size_t kScratch = std::size_t{256} << 10;
 
-enum Opcode : std::uint8_t {
-  kHeader = 0x01,
-  kFooter = 0x02,
-  kSchema = 0x03,
-  kChannel = 0x04,
-  kMessage = 0x05,
-  kChunk = 0x06,
-  kMessageIndex = 0x07,
-  kChunkIndex = 0x08,
-  kStatistics = 0x0B,
-  kSummaryOffset = 0x0E,
-  kDataEnd = 0x0F
+enum class Opcode : std::uint8_t {
+  header = 0x01,
+  footer = 0x02,
+  schema = 0x03,
+  channel = 0x04,
+  message = 0x05,
+  chunk = 0x06,
+  message_index = 0x07,
+  chunk_index = 0x08,
+  statistics = 0x0B,
+  summary_offset = 0x0E,
+  data_end = 0x0F
 };
 
 /// A record whose length is known when its content is written.
@@ -45,7 +45,7 @@ void put_record(ByteWriter* out, Opcode opcode, const Content& content) noexcept
 
 void McapMessageHead::write(std::span<std::uint8_t, kSize> out) const noexcept {
   ByteWriter w(out);
-  w.put(static_cast<std::uint8_t>(kMessage));
+  w.put(static_cast<std::uint8_t>(Opcode::message));
   w.put(static_cast<std::uint64_t>(kSize - kRecordHead) + content);
   w.put(channel);
   w.put(sequence);
@@ -123,7 +123,7 @@ int McapFile::create(const char* path) noexcept {
   counts_ = {};
   Appender out(this);
   out.bytes(kMagic.data(), kMagic.size());
-  out.record(kHeader, [this](ByteWriter* w) {
+  out.record(Opcode::header, [this](ByteWriter* w) {
     w->text("ros2");
     w->text(library_);
   });
@@ -136,7 +136,7 @@ int McapFile::create(const char* path) noexcept {
 
 void McapFile::write_schemas(Appender* out) const noexcept {
   for (std::size_t i = 0; i < topics_.size(); ++i)
-    out->record(kSchema, [&](ByteWriter* w) {
+    out->record(Opcode::schema, [&](ByteWriter* w) {
       w->put(static_cast<std::uint16_t>(i + 1));
       w->text(topics_[i].type);
       w->text("ros2msg");
@@ -146,7 +146,7 @@ void McapFile::write_schemas(Appender* out) const noexcept {
 
 void McapFile::write_channels(Appender* out) const noexcept {
   for (std::size_t i = 0; i < topics_.size(); ++i)
-    out->record(kChannel, [&](ByteWriter* w) {
+    out->record(Opcode::channel, [&](ByteWriter* w) {
       constexpr std::string_view kQos = "offered_qos_profiles";
       w->put(static_cast<std::uint16_t>(i + 1));
       w->put(static_cast<std::uint16_t>(i + 1));
@@ -209,7 +209,7 @@ int McapFile::write_chunk(std::span<const std::span<const std::uint8_t>> parts) 
 
   std::array<std::uint8_t, kChunkHead> head{};
   ByteWriter w(head);
-  w.put(static_cast<std::uint8_t>(kChunk));
+  w.put(static_cast<std::uint8_t>(Opcode::chunk));
   w.put(static_cast<std::uint64_t>(kChunkHead - kRecordHead) + chunk.records);
   w.put(chunk.start);
   w.put(chunk.end);
@@ -226,7 +226,7 @@ int McapFile::write_chunk(std::span<const std::span<const std::uint8_t>> parts) 
     const auto mine = [channel](const Entry& e) { return e.channel == channel; };
     if (std::none_of(entries_.begin(), entries_.end(), mine)) continue;
     chunk.index[channel - 1] = static_cast<std::uint32_t>(index.size());
-    put_record(&index, kMessageIndex, [&](ByteWriter* out) {
+    put_record(&index, Opcode::message_index, [&](ByteWriter* out) {
       out->put(static_cast<std::uint16_t>(channel));
       const std::size_t size_at = out->size();
       out->put(std::uint32_t{0});
@@ -260,7 +260,7 @@ int McapFile::write_chunk(std::span<const std::span<const std::uint8_t>> parts) 
 }
 
 void McapFile::write_statistics(Appender* out) const noexcept {
-  out->record(kStatistics, [this](ByteWriter* w) {
+  out->record(Opcode::statistics, [this](ByteWriter* w) {
     std::uint64_t messages = 0;
     for (const std::uint64_t n : counts_) messages += n;
     w->put(messages);
@@ -279,7 +279,7 @@ void McapFile::write_statistics(Appender* out) const noexcept {
 
 void McapFile::write_chunk_indexes(Appender* out) const noexcept {
   for (const ChunkIndex& chunk : chunks_)
-    out->record(kChunkIndex, [&](ByteWriter* w) {
+    out->record(Opcode::chunk_index, [&](ByteWriter* w) {
       w->put(chunk.start);
       w->put(chunk.end);
       w->put(chunk.offset);
@@ -301,7 +301,7 @@ void McapFile::write_chunk_indexes(Appender* out) const noexcept {
 int McapFile::finish() noexcept {
   if (fd_ < 0) return 0;
   Appender out(this);
-  out.record(kDataEnd, [](ByteWriter* w) { w->put(std::uint32_t{0}); });
+  out.record(Opcode::data_end, [](ByteWriter* w) { w->put(std::uint32_t{0}); });
   out.begin_crc();
   const std::uint64_t summary = out.offset();
   struct Part {
@@ -310,17 +310,17 @@ int McapFile::finish() noexcept {
   };
   std::array<Part, 4> groups{};
   write_schemas(&out);
-  groups[0] = {kSchema, summary, out.offset()};
+  groups[0] = {Opcode::schema, summary, out.offset()};
   write_channels(&out);
-  groups[1] = {kChannel, groups[0].end, out.offset()};
+  groups[1] = {Opcode::channel, groups[0].end, out.offset()};
   write_statistics(&out);
-  groups[2] = {kStatistics, groups[1].end, out.offset()};
+  groups[2] = {Opcode::statistics, groups[1].end, out.offset()};
   write_chunk_indexes(&out);
-  groups[3] = {kChunkIndex, groups[2].end, out.offset()};
+  groups[3] = {Opcode::chunk_index, groups[2].end, out.offset()};
   const std::uint64_t offsets = out.offset();
   for (const Part& group : groups)
     if (group.end > group.start)
-      out.record(kSummaryOffset, [&](ByteWriter* w) {
+      out.record(Opcode::summary_offset, [&](ByteWriter* w) {
         w->put(static_cast<std::uint8_t>(group.opcode));
         w->put(group.start);
         w->put(group.end - group.start);
@@ -328,7 +328,7 @@ int McapFile::finish() noexcept {
   // The check sum covers the footer up to itself.
   std::array<std::uint8_t, kRecordHead + 16> footer{};
   ByteWriter w(footer);
-  w.put(static_cast<std::uint8_t>(kFooter));
+  w.put(static_cast<std::uint8_t>(Opcode::footer));
   w.put(std::uint64_t{20});
   w.put(summary);
   w.put(offsets);

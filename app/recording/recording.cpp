@@ -49,6 +49,7 @@ std::int64_t monotonic_ns() noexcept {
 
 std::vector<McapTopic> described(const std::vector<RecordedTopic>& topics) {
   std::vector<McapTopic> out;
+  out.reserve(topics.size());
   for (const RecordedTopic& t : topics)
     out.push_back({t.name, std::string(ros_type_name(t.type)), ros_definition(t.type),
                    kQosOf[t.latched ? 1 : 0]});

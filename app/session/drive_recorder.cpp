@@ -14,21 +14,21 @@ constexpr std::size_t kSmall = std::size_t{4} << 20;  // bytes of a queue withou
 constexpr double kDiskS = 6;  // s of a disk that stalls: one second more than it may take
 constexpr Duration kHealth = Duration::seconds(1);
 
-/// Topics of a recording. Of a camera there are two, from kCameras on.
+/// Topics of a recording. Of a camera there are two, from first_camera_topic on.
 enum Topic : std::size_t {
-  kSession,
-  kFrame,
-  kOdometry,
-  kTf,
-  kTfStatic,
-  kDiagnostics,
-  kReading,
-  kFix,
-  kImu,
-  kCameras
+  session_topic,
+  frame_topic,
+  odometry_topic,
+  tf_topic,
+  tf_static_topic,
+  diagnostics_topic,
+  reading_topic,
+  fix_topic,
+  imu_topic,
+  first_camera_topic
 };
 
-std::size_t image_topic(std::size_t camera) { return kCameras + 2 * camera; }
+std::size_t image_topic(std::size_t camera) { return first_camera_topic + 2 * camera; }
 
 std::vector<RecordedTopic> topics(const CalibrationFile& file) {
   std::vector<RecordedTopic> out{{SessionDescription::kTopic, RosType::text, true},
@@ -105,7 +105,7 @@ Recording::Options options(const Configuration& c, const SourceFacts& facts) {
   Recording::Options o;
   o.topics = topics(facts.begin.file);
   o.queues = {queue_bytes(c, facts)};
-  o.preamble = {{kSession, description(c, facts)}};
+  o.preamble = {{session_topic, description(c, facts)}};
   o.start = facts.first;
   o.roll_bytes = static_cast<std::uint64_t>(c.record.roll_mb) * 1'000'000;
   o.roll_time = Duration::seconds(c.record.roll_s);
@@ -188,7 +188,7 @@ void DriveRecorder::post_image(const RigFrame& frame, std::size_t camera) noexce
 
 void DriveRecorder::post_rig(Stamp stamp) noexcept {
   const auto cameras = static_cast<std::size_t>(rig_.cameras);
-  post(kTfStatic, stamp, kMessageRoom, false, [&](CdrWriter* out) {
+  post(tf_static_topic, stamp, kMessageRoom, false, [&](CdrWriter* out) {
     write_rig_transforms(out, stamp, rig_, std::span(frame_names_).first(cameras));
     return std::size_t{0};
   });
@@ -198,18 +198,18 @@ void DriveRecorder::post_rig(Stamp stamp) noexcept {
 void DriveRecorder::on_pose(const PoseSample& sample) noexcept {
   frame_.sample = sample;
   frame_.solver_done = watch_.found_idle();
-  post(kFrame, sample.stamp, kMessageRoom, false, [&](CdrWriter* out) {
+  post(frame_topic, sample.stamp, kMessageRoom, false, [&](CdrWriter* out) {
     write_frame(out, frame_);
     return std::size_t{0};
   });
   if (settings_.poses == 0) return;
   if (calibrated_ && !rig_posted_) post_rig(sample.stamp);
-  post(kOdometry, sample.stamp, kMessageRoom, false, [&](CdrWriter* out) {
+  post(odometry_topic, sample.stamp, kMessageRoom, false, [&](CdrWriter* out) {
     write_odometry(out, sample);
     return std::size_t{0};
   });
   if (sample.status != PoseStatus::lost)
-    post(kTf, sample.stamp, kMessageRoom, false, [&](CdrWriter* out) {
+    post(tf_topic, sample.stamp, kMessageRoom, false, [&](CdrWriter* out) {
       write_pose_transform(out, sample);
       return std::size_t{0};
     });
@@ -240,7 +240,7 @@ void DriveRecorder::post_health(const PoseSample& sample) noexcept {
       Diagnostic{DiagnosticLevel::ok, "vergence: clocks", "", clocks},
       Diagnostic{lossless ? DiagnosticLevel::ok : DiagnosticLevel::warn, "vergence: recording",
                  lossless ? "" : "not all is recorded", drops}};
-  post(kDiagnostics, sample.stamp, 2 * kMessageRoom, false, [&](CdrWriter* out) {
+  post(diagnostics_topic, sample.stamp, 2 * kMessageRoom, false, [&](CdrWriter* out) {
     write_diagnostics(out, sample.stamp, status);
     return std::size_t{0};
   });
@@ -249,15 +249,15 @@ void DriveRecorder::post_health(const PoseSample& sample) noexcept {
 void DriveRecorder::on_reading(const InsRecord& reading) noexcept {
   if (settings_.ins == 0) return;
   const Stamp stamp = reading.sample.stamp;
-  post(kReading, stamp, kMessageRoom, false, [&](CdrWriter* out) {
+  post(reading_topic, stamp, kMessageRoom, false, [&](CdrWriter* out) {
     write_ins_reading(out, reading.sample, reading.quality);
     return std::size_t{0};
   });
-  post(kFix, stamp, kMessageRoom, false, [&](CdrWriter* out) {
+  post(fix_topic, stamp, kMessageRoom, false, [&](CdrWriter* out) {
     write_nav_sat_fix(out, reading.sample);
     return std::size_t{0};
   });
-  post(kImu, stamp, kMessageRoom, false, [&](CdrWriter* out) {
+  post(imu_topic, stamp, kMessageRoom, false, [&](CdrWriter* out) {
     write_imu(out, reading.sample);
     return std::size_t{0};
   });
@@ -270,7 +270,7 @@ void DriveRecorder::on_event(const EventRecord& event) noexcept {
   if (frames_seen_ > 0) recording_.mark_event(event.stamp);  // before it is set-up
   if (settings_.poses == 0) return;
   const std::array status{Diagnostic{DiagnosticLevel::ok, kind, sentence, {}}};
-  post(kDiagnostics, event.stamp, kMessageRoom, false, [&](CdrWriter* out) {
+  post(diagnostics_topic, event.stamp, kMessageRoom, false, [&](CdrWriter* out) {
     write_diagnostics(out, event.stamp, status);
     return std::size_t{0};
   });

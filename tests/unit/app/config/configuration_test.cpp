@@ -126,7 +126,7 @@ TEST(Configuration, AKeyThatStandsTwiceIsRefused) {
   EXPECT_EQ(refusal("odometry:\n  features: 300\n  features: 301\n"),
             "drive.yaml:3: the key \"odometry.features\" is given twice");
   EXPECT_TRUE(
-      contains(refusal("odometry: {features: 300}\nodometry.features: 301\n"), "stands twice"));
+      contains(refusal("odometry: {features: 300}\nodometry.features: 301\n"), "is given twice"));
 }
 
 TEST(Configuration, KeysThatContradictEachOtherAreRefused) {
