@@ -22,9 +22,9 @@ namespace vergence::app {
 /// A rig frame for the estimator; its slots are the session's until FrameSource::done().
 struct SourceFrame {
   RigFrame rig{};
+  float decode_ms = 0;  // reading and decoding its images; 0 where they came as pixels
   std::optional<bool> solver_idle{};  // of a recorded drive: what the calibration solver answered
                                       // at this frame, and is to answer again (SolverWatch)
-  float decode_ms = 0;  // reading and decoding its images; 0 where they came as pixels
 };
 
 /// Something to be noted, at its place among the frames.
