@@ -96,7 +96,7 @@ Matches follow_corners(const ImagePair& pair, const OdometryOptions& options, do
   features::Pyramid first(c.width, c.height, options.pyramid_levels, arena),
       second(c.width, c.height, options.pyramid_levels, arena);
   BoundedVector<features::Corner> corners(arena.make<features::Corner>(room, "corners"));
-  const odometry::Lens lens(c);
+  const odometry::UndistortedCamera lens(c);
   SequentialRunner one;
   const std::clock_t start = std::clock();
   first.build(pair.images[0]);
@@ -150,8 +150,9 @@ Matches match_surf(const ImagePair& pair, const Arguments& a, bool upright, doub
     descriptors[k] = arena.make<features::SurfDescriptor>(room, "descriptors");
   }
   BoundedVector<features::SurfMatch> found(arena.make<features::SurfMatch>(room, "matches"));
-  const std::array<odometry::Lens, 2> lens{odometry::Lens(pair.intrinsics[0]),
-                                           odometry::Lens(pair.intrinsics[1])};
+  const std::array<odometry::UndistortedCamera, 2> lens{
+      odometry::UndistortedCamera(pair.intrinsics[0]),
+      odometry::UndistortedCamera(pair.intrinsics[1])};
   const std::clock_t start = std::clock();
   std::array<features::SurfView, 2> views;
   for (std::size_t k = 0; k < 2; ++k) {

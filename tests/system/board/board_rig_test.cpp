@@ -9,8 +9,8 @@
 
 #include "drivers/serial/serial.hpp"
 #include "drivers/trigger_board/trigger_board.hpp"
-#include "tests/support/within.hpp"
 #include "tests/rigs/board_rig.hpp"
+#include "tests/support/within.hpp"
 
 namespace vergence {
 namespace {

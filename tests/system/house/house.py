@@ -57,7 +57,7 @@ LIBRARIES = {
 
 # firmware_iface: pure functions and layouts, so these and nothing that reads a clock, a file or another thread.
 PURE_HEADERS = frozenset(
-    "algorithm array bit bitset cassert cmath compare concepts cstddef cstdint cstring limits numbers numeric optional span "
+    "algorithm array bit bitset cassert charconv cmath compare concepts cstddef cstdint cstring limits numbers numeric optional span "
     "string_view tuple type_traits utility variant assert.h limits.h stdbool.h stddef.h stdint.h string.h".split())
 
 # core: no input or output and no threads of its own.

@@ -13,10 +13,10 @@
 #include <thread>
 
 #include "drivers/iidc/iidc.hpp"
-#include "tests/rigs/film.hpp"
-#include "tests/support/xsens_terminal.hpp"
 #include "tests/rigs/board_rig.hpp"
+#include "tests/rigs/film.hpp"
 #include "tests/rigs/iidc_rig.hpp"
+#include "tests/support/xsens_terminal.hpp"
 
 namespace vergence::test {
 namespace {
