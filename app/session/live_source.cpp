@@ -76,6 +76,8 @@ void LiveSource::make_acquisition() {
   acquisition_ = std::make_unique<Acquisition>(
       exposure_ ? exposure_->cameras() : devices_.cameras(), devices_.ins(), devices_.trigger(), o);
   start_ = o.tie_stamp + (devices_.start() - o.tie_host);
+  // In real time the drive's start is known only when the devices are; the session's is now.
+  facts_.first = request_.fast ? start_ : o.tie_stamp;
 }
 
 void LiveSource::make_facts() {
@@ -86,7 +88,6 @@ void LiveSource::make_facts() {
   facts_.expected_frames =
       devices_.frames() > 0 ? devices_.frames()
                             : static_cast<std::size_t>(kUnknownDrive * configuration_.trigger.rate);
-  facts_.first = start_;
   if (devices_.ins() != nullptr)
     facts_.ins = SourceIns{comparison_options(configuration_), InsComparison::Source::device,
                            "the configuration", 0};

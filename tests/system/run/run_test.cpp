@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <cstdint>
 #include <filesystem>
@@ -79,6 +80,7 @@ TEST(Run, everyConfigurationThatComesWithTheProgramRunsAsItStands) {
 TEST(Run, inRealTimeEveryFrameIsPosedOrCounted) {
   const TemporaryFolder folder;
   const auto session = folder / "s";
+  const auto before = std::chrono::system_clock::now().time_since_epoch();
   const Outcome o =
       run_vergence("run '" + kMock + "' --duration 4 --out '" + session.string() + "'" + kSmall);
   ASSERT_EQ(o.code, 0) << o.err;
@@ -92,6 +94,13 @@ TEST(Run, inRealTimeEveryFrameIsPosedOrCounted) {
                 devices["camera0_underruns"].get<int>(),
             81);
   EXPECT_EQ(summary["allocations_after_seal"], 0);
+  std::ifstream lines(session / "events.jsonl");
+  int count = 0;
+  for (std::string line; std::getline(lines, line); ++count)
+    EXPECT_GE(nlohmann::json::parse(line)["stamp_ns"].get<std::int64_t>(),
+              std::chrono::nanoseconds(before).count())
+        << line;
+  EXPECT_GT(count, 0);
 }
 
 TEST(Run, theSameDriveGivesTheSameBytesWhateverTheThreads) {

@@ -201,7 +201,7 @@ TEST(EvaluateCommand, estimatesTheMountBetweenTwoBodies) {
   EXPECT_NEAR(mount["clock_offset_s"]["value"].get<double>(), 0.03, 1e-3);
   EXPECT_LT(mount["lever_arm_m"]["x"]["sigma"].get<double>(), 0.1);
   const Outcome table = evaluate_command({a, b, "--axes", "flu", "--estimate-mount"});
-  EXPECT_NE(table.out.find("told, not applied"), std::string::npos) << table.out;
+  EXPECT_NE(table.out.find("reported, not applied"), std::string::npos) << table.out;
 }
 
 /// A session of a drive round corners on rolling ground with its INS: the left camera 0.9 m forward
