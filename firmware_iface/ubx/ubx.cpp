@@ -42,8 +42,9 @@ std::optional<std::int64_t> utc(Bytes p) noexcept {
   if (year < 1980 || year > 2200 || month < 1 || month > 12 || day < 1 || day > 31 || p[8] > 23 ||
       p[9] > 59 || p[10] > 60 || nano < -1'000'000'000 || nano > 1'000'000'000)
     return std::nullopt;
+  const std::int64_t hour = p[8], minute = p[9], second = p[10];
   const std::int64_t seconds =
-      days_since_1970(year, month, day) * 86400 + p[8] * 3600 + p[9] * 60 + p[10];
+      days_since_1970(year, month, day) * 86400 + hour * 3600 + minute * 60 + second;
   return seconds * 1'000'000'000 + nano;
 }
 
