@@ -1,4 +1,3 @@
-#include <time.h>
 
 #include <atomic>
 #include <chrono>
@@ -15,17 +14,12 @@
 #include "app/devices/drive_devices.hpp"
 #include "app/runtime/signals.hpp"
 #include "drivers/acquisition/acquisition.hpp"
+#include "drivers/clock.hpp"
 
 namespace vergence::app {
 namespace {
 
 namespace fs = std::filesystem;
-
-HostStamp monotonic_now() noexcept {
-  timespec t{};
-  (void)::clock_gettime(CLOCK_MONOTONIC, &t);
-  return HostStamp(static_cast<std::int64_t>(t.tv_sec) * 1'000'000'000 + t.tv_nsec);
-}
 
 const char* phrase(OfferVerdict verdict) {
   switch (verdict) {

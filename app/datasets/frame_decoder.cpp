@@ -63,12 +63,12 @@ FrameDecoder::~FrameDecoder() {
 
 bool FrameDecoder::next(DecodedPair* pair) noexcept {
   for (;;) {
-    const WakeEvent::Rung seen = filled_.look();
+    const WakeEvent::Ticket seen = filled_.ticket();
     if (stop_.load(std::memory_order_acquire)) return false;
     // `finished_` is looked at before the ring: what was pushed before it was set is still found.
     const bool finished = finished_.load(std::memory_order_acquire);
     if (ring_.pop(pair)) {
-      freed_.ring();
+      freed_.signal();
       return true;
     }
     if (finished) return false;
@@ -79,13 +79,13 @@ bool FrameDecoder::next(DecodedPair* pair) noexcept {
 void FrameDecoder::release(const DecodedPair& pair) noexcept {
   if (!pair.decoded) return;
   for (const FrameSlot slot : pair.slots) pool_.release(slot);
-  freed_.ring();
+  freed_.signal();
 }
 
 void FrameDecoder::stop() noexcept {
   stop_.store(true, std::memory_order_release);
-  filled_.ring();
-  freed_.ring();
+  filled_.signal();
+  freed_.signal();
 }
 
 void FrameDecoder::work() {
@@ -98,7 +98,7 @@ void FrameDecoder::work() {
     if (!hand_over(decode(next_index_))) return;
   }
   finished_.store(true, std::memory_order_release);
-  filled_.ring();
+  filled_.signal();
 }
 
 DecodedPair FrameDecoder::decode(std::size_t index) {
@@ -185,7 +185,7 @@ ImageFileStatus FrameDecoder::load_both(const std::string& name, Workspace* work
 
 bool FrameDecoder::wait_for_slot(FrameSlot* slot) noexcept {
   for (;;) {
-    const WakeEvent::Rung seen = freed_.look();
+    const WakeEvent::Ticket seen = freed_.ticket();
     if (stop_.load(std::memory_order_acquire)) return false;
     if (const auto free = pool_.acquire()) {
       *slot = *free;
@@ -197,10 +197,10 @@ bool FrameDecoder::wait_for_slot(FrameSlot* slot) noexcept {
 
 bool FrameDecoder::hand_over(const DecodedPair& pair) noexcept {
   for (;;) {
-    const WakeEvent::Rung seen = freed_.look();
+    const WakeEvent::Ticket seen = freed_.ticket();
     if (stop_.load(std::memory_order_acquire)) return false;
     if (ring_.push(pair)) {
-      filled_.ring();
+      filled_.signal();
       return true;
     }
     freed_.wait(seen);

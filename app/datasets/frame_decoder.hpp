@@ -89,8 +89,8 @@ class FrameDecoder {
   bool any_ = false;  // newest_ means something
 
   Ring<DecodedPair, kAhead> ring_;
-  WakeEvent filled_;  // rung by the decoder: a pair, or the end
-  WakeEvent freed_;   // rung by the consumer: room in the ring, slots in the pool
+  WakeEvent filled_;  // signalled by the decoder: a pair, or the end
+  WakeEvent freed_;   // signalled by the consumer: room in the ring, slots in the pool
   std::atomic<bool> stop_{false};
   std::atomic<bool> finished_{false};
   ThreadRunner both_{ThreadRunner::Worker::of_reader};

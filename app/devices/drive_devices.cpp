@@ -1,7 +1,5 @@
 #include "app/devices/drive_devices.hpp"
 
-#include <time.h>
-
 #include <algorithm>
 #include <cmath>
 #include <sstream>
@@ -16,15 +14,10 @@
 #include "app/devices/trigger_boards.hpp"
 #include "app/runtime/errors.hpp"
 #include "app/runtime/nearest.hpp"
+#include "drivers/clock.hpp"
 
 namespace vergence::app {
 namespace {
-
-HostStamp monotonic_now() noexcept {
-  timespec t{};
-  (void)::clock_gettime(CLOCK_MONOTONIC, &t);
-  return HostStamp(static_cast<std::int64_t>(t.tv_sec) * 1'000'000'000 + t.tv_nsec);
-}
 
 bool all_mock(const Configuration& c) {
   return std::all_of(c.cameras.begin(), c.cameras.end(), [](const CameraSettings& s) {

@@ -79,7 +79,7 @@ std::vector<CameraDevice*> ExposureControl::cameras() const {
 
 void ExposureControl::settle() noexcept {
   stop_.store(true, std::memory_order_release);
-  bell_.ring();
+  wake_.signal();
   if (thread_.joinable()) thread_.join();
 }
 
@@ -132,7 +132,7 @@ void ExposureControl::ask(const ExposureSetting& requested) noexcept {
   }
   under_way_.store(true, std::memory_order_release);
   (void)wishes_.push(requested);  // one at a time: there is room
-  bell_.ring();
+  wake_.signal();
 }
 
 void ExposureControl::set_all(const ExposureSetting& requested) noexcept {
@@ -155,10 +155,10 @@ void ExposureControl::set_all(const ExposureSetting& requested) noexcept {
 void ExposureControl::work() noexcept {
   (void)pthread_setname_np(pthread_self(), "vergence-expose");
   for (ExposureSetting requested;;) {
-    const WakeEvent::Rung seen = bell_.look();
+    const WakeEvent::Ticket seen = wake_.ticket();
     if (stop_.load(std::memory_order_acquire)) return;
     if (!wishes_.pop(&requested)) {
-      bell_.wait(seen);
+      wake_.wait(seen);
       continue;
     }
     set_all(requested);

@@ -76,7 +76,7 @@ class ExposureControl {
   Ring<ExposureSetting, 4> wishes_;
   std::atomic<bool> under_way_{false}, stop_{false}, unsupported_{false};
   std::atomic<std::uint64_t> changes_{0}, refused_{0}, unequal_{0}, again_{0};
-  WakeEvent bell_;
+  WakeEvent wake_;
   std::thread thread_;
 };
 

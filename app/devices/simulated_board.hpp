@@ -18,8 +18,8 @@ namespace vergence::app {
 /// little before the drive; pulses that are made before find nobody armed. The fault `board_gone`
 /// unplugs the line (`powered=0` switches the board off with it), `board_reboot` restarts the
 /// board; how long it is away is then up to the board and the driver. What asks for a pause gets it
-/// at a pulse that differs from run to run: with `trigger.vary_us` nobody asks. Ownership  The rig
-/// (with MockRigOptions::fed) outlives the device. *driver is the real driver
+/// at a pulse that differs from run to run: with `trigger.vary_us` nobody asks.
+/// Ownership  The rig (with MockRigOptions::fed) outlives the device. *driver is the real driver
 ///            inside, for what it measures.
 /// Errors     InputError as the driver's sentence. `remarks`: as open_ins().
 [[nodiscard]] std::unique_ptr<TriggerDevice> make_simulated_board(

@@ -15,8 +15,8 @@ namespace vergence::app {
 ///
 /// Virtual time only: the line's clock is the rig's, and it begins a little before the drive, so
 /// that there is time to find and set the device. The fault `ins_gone` unplugs the line.
-/// Ownership  The rig outlives the device. Errors  InputError as the driver's sentence. `remarks`:
-/// as open_ins().
+/// Ownership  The rig outlives the device.
+/// Errors     InputError as the driver's sentence. `remarks`: as open_ins().
 [[nodiscard]] std::unique_ptr<InsDevice> make_simulated_ins(const Configuration& configuration,
                                                             const mock::MockRig& rig,
                                                             std::vector<std::string>* remarks);

@@ -110,7 +110,7 @@ Recorder::~Recorder() { stop_and_join(); }
 void Recorder::stop_and_join() noexcept {
   if (!thread_.joinable()) return;
   stop_.store(true, std::memory_order_release);
-  filled_.ring();
+  filled_.signal();
   thread_.join();
 }
 
@@ -118,7 +118,7 @@ template <class Value, std::size_t N>
 bool Recorder::push(Ring<Value, N>* ring, std::atomic<std::uint64_t>* dropped,
                     const Value& value) noexcept {
   for (;;) {
-    const WakeEvent::Rung seen = freed_.look();
+    const WakeEvent::Ticket seen = freed_.ticket();
     if (ring->push(value)) break;
     if (options_.when_full == WhenFull::drop) {
       dropped->fetch_add(1, std::memory_order_relaxed);
@@ -126,7 +126,7 @@ bool Recorder::push(Ring<Value, N>* ring, std::atomic<std::uint64_t>* dropped,
     }
     freed_.wait(seen);
   }
-  filled_.ring();
+  filled_.signal();
   return true;
 }
 
@@ -145,7 +145,7 @@ void Recorder::work() {
   auto flushed = Clock::now();
   flush();  // the heads of the tables
   for (;;) {
-    const WakeEvent::Rung seen = filled_.look();
+    const WakeEvent::Ticket seen = filled_.ticket();
     const bool stopping = stop_.load(
         std::memory_order_acquire);  // before the ring: what was posted before is still found
     if (take()) {
@@ -169,7 +169,7 @@ bool Recorder::take() {
   InsRecord reading;
   const bool one = ring_.pop(&record), other = readings_.pop(&reading);
   if (!one && !other) return false;
-  freed_.ring();
+  freed_.signal();
   if (one) std::visit([this](const auto& r) { write(r); }, record);
   if (other) write(reading);
   return true;

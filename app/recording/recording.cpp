@@ -110,7 +110,7 @@ std::span<std::uint8_t> Recording::begin(std::size_t queue, std::size_t topic, S
   const std::size_t spare = bulky ? std::min(kSpare, q.ring.capacity() / 8) : 0;
   const bool fits = size <= q.ring.capacity() / 2 && size <= kMostChunkBytes;
   for (;;) {
-    const WakeEvent::Rung seen = freed_.look();
+    const WakeEvent::Ticket seen = freed_.ticket();
     q.open = fits ? q.ring.begin(size, spare) : std::span<std::uint8_t>{};
     if (!q.open.empty() || !fits || options_.when_full == WhenFull::drop) break;
     {
@@ -231,7 +231,7 @@ bool Recording::due(const Batch& batch) noexcept {
 void Recording::release(const Batch& batch) noexcept {
   for (std::size_t i = 0; i < queues_.size(); ++i) queues_[i]->ring.release(batch.parts[i].size());
   waiting_since_ns_ = 0;
-  if (options_.when_full == WhenFull::wait) freed_.ring();
+  if (options_.when_full == WhenFull::wait) freed_.signal();
 }
 
 void Recording::drop_oldest(RecordRing* ring, std::atomic<std::uint64_t>* counter) noexcept {
@@ -251,14 +251,14 @@ void Recording::pass_over_old(bool hurried, bool all) noexcept {
         break;
       drop_oldest(&q->ring, &passed_over_);
     }
-  if (options_.when_full == WhenFull::wait) freed_.ring();
+  if (options_.when_full == WhenFull::wait) freed_.signal();
 }
 
 /// While the disk takes nothing: the newest are worth more than the oldest.
 void Recording::make_room(bool hurried) noexcept {
   for (const auto& q : queues_)
     while (q->ring.fill() > room_left_at(q->ring, hurried)) drop_oldest(&q->ring, &lost_);
-  if (options_.when_full == WhenFull::wait) freed_.ring();
+  if (options_.when_full == WhenFull::wait) freed_.signal();
 }
 
 bool Recording::store(const Batch& batch) noexcept {

@@ -4,11 +4,12 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cstdlib>
 #include <iostream>
 
 #include <fmt/format.h>
+
+#include "drivers/clock.hpp"
 
 namespace vergence::app {
 namespace {
@@ -43,12 +44,6 @@ std::string clock_text(double seconds) {
 int width_of_stderr() {
   winsize size{};
   return ::ioctl(STDERR_FILENO, TIOCGWINSZ, &size) == 0 ? size.ws_col : 0;
-}
-
-HostStamp monotonic_now() {
-  return HostStamp(std::chrono::duration_cast<std::chrono::nanoseconds>(
-                       std::chrono::steady_clock::now().time_since_epoch())
-                       .count());
 }
 
 Progress::Mode mode_of_stderr(bool quiet) {

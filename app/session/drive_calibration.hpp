@@ -44,7 +44,7 @@ struct DrivePass {
 
 /// Twice over the drive, with twice its features: from scratch, which gives the tracks their rig;
 /// then all of its frames in stretches, joined, and each by itself to be held against the next
-/// (METHOD §6.5). `told`: the drive's own calibration; of it lenses, sigmas and the baseline's
+/// (METHOD §6.5). `given`: the drive's own calibration; of it lenses, sigmas and the baseline's
 /// length are read.
 [[nodiscard]] DriveCalibration calibrate_drive(const DrivePass& pass,
                                                const StartingCalibration& given);

@@ -27,7 +27,8 @@ struct KnownNumbers {
 /// calibration.yaml, a Kalibr camchain, ROS camera_info (left.yaml,right.yaml or a folder with
 /// them) or OpenCV stereo YAML, told by
 /// content. `size`: of the images, where a file has none. What a format did not carry over is a
-/// sentence of *remarks. Errors  InputError
+/// sentence of *remarks.
+/// Errors     InputError
 [[nodiscard]] CalibrationFile read_given_calibration(const std::string& in,
                                                      const CalibrationUse& use,
                                                      const std::optional<ImageSize>& size,

@@ -17,9 +17,9 @@ namespace vergence::app {
 /// What a drive does with its INS, live or recorded alike: the comparison pose by pose into the
 /// recorder, and what there is to tell of it.
 ///
-/// Threads  The estimator's, sealed; after it has joined all is anyone's. Memory  The comparison's,
-/// from the arena. Order    Readings and poses as they come; every add() of a pose is followed by
-/// drain().
+/// Threads    The estimator's, sealed; after it has joined all is anyone's.
+/// Memory     The comparison's, from the arena.
+/// Order      Readings and poses as they come; every add() of a pose is followed by drain().
 class InsComparison {
  public:
   static constexpr std::size_t kMostPlacements = 64;  // that are kept; later ones count

@@ -103,12 +103,12 @@ struct MonitorVerdict {
 /// part of the observations that speaks of the epipolar distance is not used again. Over a window
 /// of frames
 ///
-///     A = Σ A_f/μ,  g = Σ g_f/μ,  μ = λ + n b²/5σ²     λ: spread of whole tracks over the white
-///     one, measured; b: MonitorOptions::bias_px
-///                             (what is measured of b² counts four times in residuals of motion:
-///                             two instants, along the baseline)
-///     statistic = gᵀ (A + A C A)⁻¹ g                    C: covariance of the reference; κ held at
-///     0
+///     A = Σ A_f/μ,  g = Σ g_f/μ,  μ = λ + n b²/5σ²
+///     statistic = gᵀ (A + A C A)⁻¹ g,  κ held at 0
+///
+/// λ: spread of whole tracks over the white one, measured. b: MonitorOptions::bias_px, or what is
+/// measured; in residuals of motion it counts four times (two instants, along the baseline).
+/// C: covariance of the reference.
 ///
 /// The same against what the two minutes before the window have shown, whose covariance is smaller
 /// than the reference's: small knocks. Windows of a few to several hundred moving frames; the

@@ -70,11 +70,11 @@ std::size_t MotionTrackBuilder::memory_needed(std::size_t capacity) noexcept {
 }
 
 MotionTrackBuilder::MotionTrackBuilder(std::size_t capacity, Arena& arena)
-    : parts_(arena.make<Parts>(1, "monitor feed").data()) {
+    : parts_(arena.make<Parts>(1, "motion tracks: state").data()) {
   parts_->capacity = capacity;
   parts_->slots = arena.make<Parts::Slot>(std::bit_ceil(2 * std::max<std::size_t>(capacity, 1)),
-                                          "monitor feed: sightings");
-  parts_->motion = arena.make<MotionTrack>(capacity, "monitor feed: tracks");
+                                          "motion tracks: observations");
+  parts_->motion = arena.make<MotionTrack>(capacity, "motion tracks");
 }
 
 void MotionTrackBuilder::reset() noexcept { parts_->has_earlier = parts_->has_stamp = false; }

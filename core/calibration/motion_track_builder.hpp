@@ -21,7 +21,7 @@ class MotionTrackBuilder {
   MotionTrackBuilder(std::size_t capacity, Arena& arena);
 
   /// Frames in order. The views in the answer live until the next call, `stereo` as long as the
-  /// caller's. Sets across, found_across, motion, the three transforms and moving; expected_across
+  /// caller's. Sets stereo, found_stereo, motion, the three transforms and moving; expected_stereo
   /// is the caller's to set.
   [[nodiscard]] MonitorFrame next(Stamp stamp, std::uint64_t frame,
                                   std::span<const StereoObservation> stereo,

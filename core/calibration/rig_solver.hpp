@@ -24,7 +24,7 @@ enum class RigFreedom : std::uint8_t {
            // §6.1)
 };
 
-/// What to solve for and where to begin. `known` and `told` are read during solve() only.
+/// What to solve for and where to begin. `known` and `given` are read during solve() only.
 struct RigSolveRequest {
   RigCalibration rig{};  // cameras, intrinsics, baseline; T_camera_left with from_rig
   RigFreedom freedom = RigFreedom::transforms;

@@ -8,10 +8,11 @@ namespace vergence::calibration {
 /// A drive's tracks cut into stretches of so many moving frames, each solved with the lenses free
 /// when it is full.
 ///
-/// Ownership  `told`: whose lenses and sigmas are the priors; `start`: where the first solve
+/// Ownership  `given`: whose lenses and sigmas are the priors; `start`: where the first solve
 ///            begins, found in these very tracks or not;
-/// copied. Threads    One caller; solves happen in take() and end(), some hundred milliseconds
-/// each. Memory: from the arena.
+/// copied.
+/// Threads    One caller; solves happen in take() and end(), some hundred milliseconds each.
+///            Memory: from the arena.
 class Stretches {
  public:
   enum class Kind : std::uint8_t {

@@ -30,10 +30,11 @@ enum class EpipolarStatus : std::uint8_t {
 ///
 /// With rays x = (x, y, 1) of the left and x' of the right camera, l = E x, k = Eᵀ x', n = x'ᵀ E x:
 ///
-///     Sampson distance   n / √(l_x² + l_y² + k_x² + k_y²)   (P. Sampson 1982; first order of the
-///     reprojection error) to the line        n / √(l_x² + l_y²)                 (the right point's
-///     distance from the left one's epipolar line)
+///     Sampson distance   n / √(l_x² + l_y² + k_x² + k_y²)
+///     to the line        n / √(l_x² + l_y²)
 ///
+/// The first (P. Sampson 1982) is the reprojection error to first order, the second the right
+/// point's distance from the left one's epipolar line.
 /// Both are signed, in normalised units (times the focal length: px). J: derivative by δ of
 /// moved_on_sphere().
 /// Threads  Const after construction.

@@ -63,9 +63,9 @@ std::optional<StartFailure> Acquisition::start() {
 
 void Acquisition::stop() noexcept {
   stop_.store(true, std::memory_order_release);
-  bell_.ring();
-  filled_.ring();
-  freed_.ring();
+  wake_.signal();
+  filled_.signal();
+  freed_.signal();
 }
 
 void Acquisition::join() noexcept {
@@ -84,7 +84,7 @@ void Acquisition::join() noexcept {
 
 bool Acquisition::next(Acquired* out) noexcept {
   for (Item item;;) {
-    const WakeEvent::Rung seen = filled_.look();
+    const WakeEvent::Ticket seen = filled_.ticket();
     const bool finished = finished_.load(
         std::memory_order_acquire);  // before the ring: what was pushed before is still found
     if (!ring_.pop(&item)) {
@@ -92,7 +92,7 @@ bool Acquisition::next(Acquired* out) noexcept {
       filled_.wait(seen);
       continue;
     }
-    freed_.ring();
+    freed_.signal();
     if (const auto* reading = std::get_if<AcquiredReading>(&item)) {
       *out = *reading;
       return true;
@@ -133,7 +133,7 @@ Stamp Acquisition::stamp_of(HostStamp host) const noexcept {
 void Acquisition::work() {
   (void)pthread_setname_np(pthread_self(), "vergence-sync");
   while (!stop_.load(std::memory_order_acquire)) {
-    const WakeEvent::Rung seen = bell_.look();
+    const WakeEvent::Ticket seen = wake_.ticket();
     // Twice: whatever arrived before an item of the first look is there at the second.
     look();
     look();
@@ -152,7 +152,7 @@ void Acquisition::work() {
         std::all_of(heads_.begin(), heads_.end(), [](const auto& h) { return h.ended; }) &&
         ins_head_.ended;
     if (over) break;
-    bell_.wait(seen);
+    wake_.wait(seen);
   }
   sync_.finish();
   hand_out_sets();
@@ -160,7 +160,7 @@ void Acquisition::work() {
     if (heads_[k].gone) missing_.push_back(static_cast<int>(k));
   }
   finished_.store(true, std::memory_order_release);
-  filled_.ring();
+  filled_.signal();
 }
 
 void Acquisition::look() {
@@ -381,7 +381,7 @@ void Acquisition::push_event(DeviceEvent::Kind kind, HostStamp when, int camera,
 void Acquisition::push(const Item& item) {
   if (std::holds_alternative<AcquiredFrame>(item)) waiting_.fetch_add(1, std::memory_order_acq_rel);
   for (;;) {
-    const WakeEvent::Rung seen = freed_.look();
+    const WakeEvent::Ticket seen = freed_.ticket();
     if (ring_.push(item)) break;
     if (stop_.load(std::memory_order_acquire)) return;  // nobody may be taking any more
     if (!options_.wait_when_full && std::holds_alternative<AcquiredReading>(item)) {
@@ -391,7 +391,7 @@ void Acquisition::push(const Item& item) {
     freed_.wait(seen);  // images: meanwhile the cameras drop, and count
   }
   counters_.ring_high_water = std::max(counters_.ring_high_water, ring_.size());
-  filled_.ring();
+  filled_.signal();
 }
 
 }  // namespace vergence

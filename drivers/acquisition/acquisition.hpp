@@ -116,7 +116,7 @@ class Acquisition final : private Notifier {
   // so many come at once.
   static constexpr int kMostWaiting = static_cast<int>(RigSynchronizer::kOpen);
 
-  void notify() noexcept override { bell_.ring(); }
+  void notify() noexcept override { wake_.signal(); }
   void work();
   void look();
   void look_ins();
@@ -163,7 +163,7 @@ class Acquisition final : private Notifier {
 
   Ring<Item, kRing> ring_;
   std::atomic<int> waiting_{0};  // sets in the ring
-  WakeEvent bell_, filled_, freed_;
+  WakeEvent wake_, filled_, freed_;
   std::atomic<bool> stop_{false}, finished_{false};
   std::atomic<std::uint64_t> skipped_{0};
   AcquisitionCounters counters_{};

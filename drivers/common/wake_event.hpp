@@ -8,26 +8,27 @@ namespace vergence {
 /// for the real-time path: wait() sleeps in the kernel.
 ///
 ///     for (;;) {
-///       const WakeEvent::Rung seen = bell.look();   // before the look at the ring: a ring in
-///       between is not missed if (ring.pop(&item)) break; bell.wait(seen);
+///       const WakeEvent::Ticket seen = event.ticket();  // before the look at the ring, so that
+///       if (ring.pop(&item)) break;                     // what is pushed in between is not missed
+///       event.wait(seen);
 ///     }
 ///
-/// Threads  Everything from any thread. No heap; ring() makes a system call only when somebody
+/// Threads  Everything from any thread. No heap; signal() makes a system call only when somebody
 ///          waits.
 class WakeEvent {
  public:
-  using Rung = std::uint32_t;  // the width a futex has: waiting needs no proxy
+  using Ticket = std::uint32_t;  // the width a futex has: waiting needs no proxy
 
-  [[nodiscard]] Rung look() const noexcept { return rung_.load(std::memory_order_acquire); }
-  void ring() noexcept {
-    rung_.fetch_add(1, std::memory_order_release);
-    rung_.notify_all();
+  [[nodiscard]] Ticket ticket() const noexcept { return count_.load(std::memory_order_acquire); }
+  void signal() noexcept {
+    count_.fetch_add(1, std::memory_order_release);
+    count_.notify_all();
   }
-  /// Returns when ring() was called after that look().
-  void wait(Rung seen) const noexcept { rung_.wait(seen, std::memory_order_acquire); }
+  /// Returns when signal() was called after that ticket().
+  void wait(Ticket seen) const noexcept { count_.wait(seen, std::memory_order_acquire); }
 
  private:
-  std::atomic<Rung> rung_{0};
+  std::atomic<Ticket> count_{0};
 };
 
 }  // namespace vergence

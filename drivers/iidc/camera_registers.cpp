@@ -8,6 +8,8 @@
 #include <cstdio>
 #include <span>
 
+#include "drivers/clock.hpp"
+
 namespace vergence::iidc {
 namespace {
 
@@ -21,12 +23,6 @@ void pause(Duration d) noexcept {
 }
 
 }  // namespace
-
-HostStamp monotonic_now() noexcept {
-  timespec t{};
-  (void)::clock_gettime(CLOCK_MONOTONIC, &t);
-  return HostStamp(static_cast<std::int64_t>(t.tv_sec) * 1'000'000'000 + t.tv_nsec);
-}
 
 void CameraRegisters::fail(DeviceStatus status, std::uint64_t address, bool writing) noexcept {
   status_ = last_failure_ = status;

@@ -79,6 +79,4 @@ class CameraRegisters {
 /// and parses it.
 [[nodiscard]] DeviceStatus read_rom(RegisterPort* port, ConfigRom* rom, std::string* message);
 
-[[nodiscard]] HostStamp monotonic_now() noexcept;
-
 }  // namespace vergence::iidc

@@ -18,6 +18,7 @@
 #include <mutex>
 #include <vector>
 
+#include "drivers/clock.hpp"
 #include "drivers/iidc/budget_words.hpp"
 #include "drivers/iidc/camera_registers.hpp"
 #include "drivers/iidc/identity.hpp"

@@ -5,6 +5,8 @@
 #include <exception>
 #include <utility>
 
+#include "drivers/clock.hpp"
+
 namespace vergence::iidc {
 namespace {
 

@@ -53,8 +53,9 @@ class SlotSet {
 
 /// Buffers of one size, page aligned, that are slots.
 ///
-/// Ownership  acquire() makes a slot the caller's, until release(). Threads  acquire, release,
-/// bytes: any. Memory     All of it at allocate(); neither lock nor system call afterwards.
+/// Ownership  acquire() makes a slot the caller's, until release().
+/// Threads    acquire, release, bytes: any.
+/// Memory     All of it at allocate(); neither lock nor system call afterwards.
 class SlotMemory {
  public:
   /// Throws std::bad_alloc. Precondition: 0 < slots ≤ FramePool::kMaxSlots; none is out.

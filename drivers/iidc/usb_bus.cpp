@@ -10,6 +10,7 @@
 #include <new>
 #include <utility>
 
+#include "drivers/clock.hpp"
 #include "drivers/iidc/camera_registers.hpp"
 #include "drivers/iidc/identity.hpp"
 

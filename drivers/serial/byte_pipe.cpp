@@ -6,7 +6,7 @@
 #include <condition_variable>
 #include <mutex>
 
-#include "drivers/serial/detail/monotonic.hpp"
+#include "drivers/clock.hpp"
 
 namespace vergence {
 namespace {

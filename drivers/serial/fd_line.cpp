@@ -10,7 +10,7 @@
 #include <algorithm>
 #include <array>
 
-#include "drivers/serial/detail/monotonic.hpp"
+#include "drivers/clock.hpp"
 
 namespace vergence {
 namespace {

@@ -1,11 +1,11 @@
 #include <linux/videodev2.h>
 #include <poll.h>
 #include <pthread.h>
-#include <time.h>
 #include <unistd.h>
 
 #include <cerrno>
 
+#include "drivers/clock.hpp"
 #include "drivers/v4l2/camera_device.hpp"
 
 /// What V4l2Camera does on its capture thread.
@@ -17,12 +17,6 @@ constexpr int kPollErrors =
     20;  // looks in a row that end in an error without a frame: nothing comes any more
 
 }  // namespace
-
-HostStamp monotonic_now() noexcept {
-  timespec t{};
-  (void)::clock_gettime(CLOCK_MONOTONIC, &t);
-  return HostStamp(static_cast<std::int64_t>(t.tv_sec) * 1'000'000'000 + t.tv_nsec);
-}
 
 void V4l2Camera::wake_capture() const noexcept {
   const std::uint64_t one = 1;

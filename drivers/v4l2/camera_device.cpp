@@ -11,6 +11,7 @@
 #include <exception>
 #include <utility>
 
+#include "drivers/clock.hpp"
 #include "drivers/v4l2/v4l2.hpp"
 
 namespace vergence::v4l2 {

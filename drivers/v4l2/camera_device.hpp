@@ -22,9 +22,6 @@ namespace vergence::v4l2 {
 inline constexpr std::size_t kBufferReserve =
     2;  // the kernel always has: with none it drops frames, and nobody knows how many
 
-/// CLOCK_MONOTONIC.
-[[nodiscard]] HostStamp monotonic_now() noexcept;
-
 /// A camera behind a video node: drivers/camera.hpp and v4l2.hpp have the contract.
 ///
 /// The capture thread alone calls the kernel while streaming; the owner does in between. What

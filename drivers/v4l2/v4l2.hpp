@@ -22,8 +22,9 @@ namespace vergence::v4l2 {
 ///            arrival serves, and timing() is wide.
 /// Options    readout_us, shift, thin, buffers, subdevice, trigger_control, trigger_value,
 ///            gain_step_db, control_NAME:
-/// docs/cameras/v4l2.md. Errors     configure(): also `busy`, another program streams from it.
-/// start(): also `failed`, the sentence has the kernel's reason.
+/// docs/cameras/v4l2.md.
+/// Errors     configure(): also `busy`, another program streams from it. start(): also `failed`,
+///            the sentence has the kernel's reason.
 [[nodiscard]] std::unique_ptr<CameraDriver> make_driver();
 
 /// What a field engineer needs when a node refuses to stream: the chain of entities from the sensor

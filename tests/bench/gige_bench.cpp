@@ -21,6 +21,7 @@
 #include <thread>
 #include <vector>
 
+#include "drivers/clock.hpp"
 #include "drivers/gige/gige.hpp"
 #include "tests/support/gige_camera.hpp"
 #include "tests/support/gvsp_sender.hpp"
@@ -95,7 +96,7 @@ Taken consume(CameraDevice* camera, const test::GigeCamera* simulator) {
     const DeviceStatus status = camera->wait(Duration::milliseconds(500), &frame);
     if (status == DeviceStatus::stopped || status == DeviceStatus::gone) return taken;
     if (status != DeviceStatus::ok) continue;
-    const HostStamp now = test::monotonic_now();
+    const HostStamp now = monotonic_now();
     ++taken.frames;
     if (frame.status == FrameStatus::complete) {
       ++taken.complete;

@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "drivers/clock.hpp"
 #include "drivers/mock/simulators/board_simulator.hpp"
 #include "tests/rigs/emulator.hpp"
 #include "tests/support/device_terminal.hpp"

@@ -2,7 +2,6 @@
 #include <fcntl.h>
 #include <poll.h>
 #include <stdlib.h>
-#include <time.h>
 #include <unistd.h>
 
 #include <array>
@@ -15,15 +14,10 @@
 #include <utility>
 #include <vector>
 
+#include "drivers/clock.hpp"
 #include "drivers/mock/simulators/device_model.hpp"
 
 namespace vergence::test {
-
-[[nodiscard]] inline HostStamp monotonic_now() {
-  timespec t{};
-  (void)::clock_gettime(CLOCK_MONOTONIC, &t);
-  return HostStamp(t.tv_sec * 1'000'000'000 + t.tv_nsec);
-}
 
 /// A simulated device in real time on a descriptor: the far end of a serial line.
 ///

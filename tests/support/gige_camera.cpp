@@ -20,6 +20,7 @@
 #include <tuple>
 #include <utility>
 
+#include "drivers/clock.hpp"
 #include "tests/support/gvsp_sender.hpp"
 
 namespace vergence::test {

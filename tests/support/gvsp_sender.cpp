@@ -9,6 +9,8 @@
 #include <algorithm>
 #include <stdexcept>
 
+#include "drivers/clock.hpp"
+
 namespace vergence::test {
 namespace {
 
@@ -16,12 +18,6 @@ constexpr std::uint32_t kLeader = 1, kTrailer = 2, kData = 3;
 constexpr std::uint32_t kUnavailable = 0x800C;  // GEV_STATUS_PACKET_UNAVAILABLE
 
 }  // namespace
-
-HostStamp monotonic_now() noexcept {
-  timespec t{};
-  (void)::clock_gettime(CLOCK_MONOTONIC, &t);
-  return HostStamp(static_cast<std::int64_t>(t.tv_sec) * 1'000'000'000 + t.tv_nsec);
-}
 
 void sleep_until(HostStamp when) noexcept {
   const timespec t{when.ns() / 1'000'000'000, when.ns() % 1'000'000'000};

@@ -112,7 +112,6 @@ class GvspSender {
   std::uint64_t dropped_ = 0, asked_ = 0, resent_ = 0, packets_ = 0;
 };
 
-[[nodiscard]] HostStamp monotonic_now() noexcept;
 void sleep_until(HostStamp when) noexcept;
 
 }  // namespace vergence::test

@@ -3,6 +3,7 @@
 #include <stdexcept>
 #include <string>
 
+#include "drivers/clock.hpp"
 #include "drivers/mock/simulators/xsens_simulator.hpp"
 #include "tests/support/device_terminal.hpp"
 

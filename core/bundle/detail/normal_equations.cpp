@@ -5,8 +5,9 @@
 // of METHOD §1 are F times something that does not depend on the camera, in the parametrisation of
 // bundle.hpp:
 //     pose (τ, φ):       B = F [ I  −[X_i]× ]
-//     camera k (τ, φ):   A = F [ I  −[X_i]× ]     (its perturbation is written in the base camera's
-//     axes) point:             C = F R_i
+//     camera k (τ, φ):   A = F [ I  −[X_i]× ]
+//     point:             C = F R_i
+// A camera's perturbation is written in the base camera's axes.
 // So one 3×3 matrix Q = Σ FᵀwF a pose and camera carries everything: P += R_iᵀ Q R_i, O = [I;
 // [X_i]×] Q R_i, and the sums of Bᵀ w B over the points of one camera serve as its share of I, of M
 // and of S alike.

@@ -1,12 +1,12 @@
 #include "drivers/gige/detail/gige_camera.hpp"
 
 #include <pthread.h>
-#include <time.h>
 
 #include <algorithm>
-#include <chrono>
 #include <exception>
 #include <utility>
+
+#include "drivers/clock.hpp"
 
 namespace vergence::gige {
 namespace {
@@ -16,12 +16,6 @@ constexpr std::size_t kSpare =
 constexpr std::size_t kWireBuffers = 4;  // where every frame is converted at once
 
 }  // namespace
-
-HostStamp monotonic_now() noexcept {
-  timespec t{};
-  (void)::clock_gettime(CLOCK_MONOTONIC, &t);
-  return HostStamp(static_cast<std::int64_t>(t.tv_sec) * 1'000'000'000 + t.tv_nsec);
-}
 
 std::string size_text(int width, int height) {
   return std::to_string(width) + " x " + std::to_string(height);

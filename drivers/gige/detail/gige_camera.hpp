@@ -17,8 +17,6 @@
 
 namespace vergence::gige {
 
-/// CLOCK_MONOTONIC.
-[[nodiscard]] HostStamp monotonic_now() noexcept;
 /// `640 x 480`.
 [[nodiscard]] std::string size_text(int width, int height);
 

@@ -4,6 +4,7 @@
 #include <chrono>
 #include <exception>
 
+#include "drivers/clock.hpp"
 #include "drivers/gige/detail/gige_camera.hpp"
 
 /// The half of a camera that watches it, and brings it back.

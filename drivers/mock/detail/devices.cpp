@@ -92,7 +92,7 @@ DeviceStatus MockCamera::start(Notifier* ready) noexcept {
 }
 
 DeviceStatus MockCamera::wait(Duration limit, Frame* frame) noexcept {
-  if (k_ == 0 && rig_->looking.exchange(false)) rig_->room.made();
+  if (k_ == 0 && rig_->looking.exchange(false)) rig_->room.signal();
   Delivery<Frame> d;
   const DeviceStatus status = stream.take(limit, &d);
   if (status == DeviceStatus::ok) {
@@ -105,7 +105,7 @@ DeviceStatus MockCamera::wait(Duration limit, Frame* frame) noexcept {
     frame->arrival = d.arrival;
     delivered_.fetch_add(1, std::memory_order_relaxed);
     out_.fetch_add(1);
-    rig_->room.made();
+    rig_->room.signal();
   } else if (status == DeviceStatus::gone) {
     if (!gone_) frame->arrival = d.arrival;
     gone_ = true;
@@ -116,12 +116,12 @@ DeviceStatus MockCamera::wait(Duration limit, Frame* frame) noexcept {
 void MockCamera::release(FrameSlot slot) noexcept {
   pool_->release(slot);
   out_.fetch_sub(1);
-  rig_->room.made();
+  rig_->room.signal();
 }
 
 void MockCamera::stop() noexcept {
   stream.stop();
-  rig_->room.made();
+  rig_->room.signal();
 }
 
 CameraStatistics MockCamera::statistics() const noexcept {
@@ -173,13 +173,13 @@ DeviceStatus MockIns::wait(Duration limit, InsReading* reading) noexcept {
   *reading = d.value;
   reading->arrival = d.arrival;
   delivered_.fetch_add(1, std::memory_order_relaxed);
-  rig_->room.made();
+  rig_->room.signal();
   return status;
 }
 
 void MockIns::stop() noexcept {
   stream.stop();
-  rig_->room.made();
+  rig_->room.signal();
 }
 
 InsStatistics MockIns::statistics() const noexcept {
@@ -235,7 +235,7 @@ DeviceStatus MockTrigger::wait(Duration limit, Pulse* pulse) noexcept {
   if (status == DeviceStatus::gone) {
     if (!gone_) pulse->arrival = d.arrival;
     gone_ = true;
-    rig_->room.made();
+    rig_->room.signal();
   }
   if (status != DeviceStatus::ok) return status;
   *pulse = d.value.pulse;
@@ -249,7 +249,7 @@ DeviceStatus MockTrigger::wait(Duration limit, Pulse* pulse) noexcept {
     newest_ = d.value.slot;
     boot_ = d.value.pulse.boot;
   }
-  rig_->room.made();
+  rig_->room.signal();
   return status;
 }
 
@@ -271,7 +271,7 @@ DeviceStatus MockTrigger::pause(std::uint32_t pulses) noexcept {
 
 void MockTrigger::stop() noexcept {
   stream.stop();
-  rig_->room.made();
+  rig_->room.signal();
   listener_->halt();
 }
 

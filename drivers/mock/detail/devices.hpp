@@ -9,6 +9,7 @@
 
 #include "core/memory/arena.hpp"
 #include "drivers/camera.hpp"
+#include "drivers/common/wake_event.hpp"
 #include "drivers/ins.hpp"
 #include "drivers/mock/detail/oscillator.hpp"
 #include "drivers/mock/ins_model.hpp"
@@ -20,30 +21,11 @@
 /// through their streams.
 namespace vergence::mock {
 
-/// Tells the scheduler that a consumer has made room: a slot, or a place in a stream.
-///
-/// Threads  Everything from any.
-class Room {
- public:
-  [[nodiscard]] std::uint32_t look() const noexcept {
-    return made_.load(std::memory_order_acquire);
-  }
-  void made() noexcept {
-    made_.fetch_add(1, std::memory_order_release);
-    made_.notify_all();
-  }
-  /// Returns when made() was called after that look().
-  void wait(std::uint32_t seen) const noexcept { made_.wait(seen, std::memory_order_acquire); }
-
- private:
-  std::atomic<std::uint32_t> made_{0};
-};
-
 /// What the devices of one rig share.
 struct RigContext {
   std::shared_ptr<const RigTruth> truth;
   MockRigOptions options;
-  Room room;
+  WakeEvent room;  // signalled by a consumer that has made some: a slot, a place in a stream
   std::atomic<bool> pulsing{false};  // the scheduler's threads use the devices
   // Of camera 0, for who sets exposures: the pulse of the image handed out last, and whether images
   // wait for their consumer or he is at one.

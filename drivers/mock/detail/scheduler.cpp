@@ -1,12 +1,13 @@
 #include "drivers/mock/detail/scheduler.hpp"
 
 #include <pthread.h>
-#include <time.h>
 
 #include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <cstring>
+
+#include "drivers/clock.hpp"
 
 namespace vergence::mock {
 namespace {
@@ -14,12 +15,6 @@ namespace {
 constexpr Duration kNominalExposure = Duration::milliseconds(8);
 constexpr Duration kJitterMean = Duration::microseconds(150);
 constexpr Duration kJitterMost = Duration::microseconds(1900);  // below DeviceTiming::delay_spread
-
-HostStamp monotonic_now() noexcept {
-  timespec t{};
-  (void)::clock_gettime(CLOCK_MONOTONIC, &t);
-  return HostStamp(static_cast<std::int64_t>(t.tv_sec) * 1'000'000'000 + t.tv_nsec);
-}
 
 }  // namespace
 
@@ -95,7 +90,7 @@ void Scheduler::begin(const TriggerConfiguration& c) {
 
 void Scheduler::halt() noexcept {
   stop_.store(true, std::memory_order_release);
-  rig_.room.made();
+  rig_.room.signal();
   { const std::lock_guard lock(mutex_); }
   { const std::lock_guard lock(feeding_); }
   posted_.notify_all();
@@ -129,7 +124,7 @@ void Scheduler::produce() {
   (void)pthread_setname_np(pthread_self(), "vergence-mock");
   for (std::uint64_t n = 0; !stopping() && has_slot(n); ++n) {
     while (rig_.options.reports_taken && !rig_.options.real_time && !stopping()) {
-      const std::uint32_t seen = rig_.room.look();
+      const WakeEvent::Ticket seen = rig_.room.ticket();
       if (trigger_->stream.empty() || !trigger_->stream.streaming()) break;
       rig_.room.wait(seen);
     }
@@ -166,7 +161,7 @@ void Scheduler::produce() {
 /// Every image of camera 0 that has arrived was looked at, and what was asked for then is known.
 void Scheduler::wait_for_exposures() {
   while (rig_.options.exposures_follow && !rig_.options.real_time && !stopping()) {
-    const std::uint32_t seen = rig_.room.look();
+    const WakeEvent::Ticket seen = rig_.room.ticket();
     if ((rig_.unseen.load() == 0 && !rig_.looking.load()) || !cameras_[0]->stream.streaming())
       break;
     rig_.room.wait(seen);
@@ -337,7 +332,7 @@ bool Scheduler::present(std::uint64_t pulse, int k) {
 std::optional<FrameSlot> Scheduler::slot_of(int k) {
   MockCamera& camera = *cameras_[static_cast<std::size_t>(k)];
   for (;;) {
-    const std::uint32_t seen = rig_.room.look();
+    const WakeEvent::Ticket seen = rig_.room.ticket();
     if (stopping()) return std::nullopt;
     {
       const std::lock_guard lock(mutex_);
@@ -497,7 +492,7 @@ void Scheduler::hand_out_in_time() {
 template <class S, class D>
 bool Scheduler::push_or_wait(S* stream, const D& delivery) {
   for (;;) {
-    const std::uint32_t seen = rig_.room.look();
+    const WakeEvent::Ticket seen = rig_.room.ticket();
     if (stopping() || !stream->streaming()) return false;
     if (stream->push(delivery)) return true;
     if (rig_.options.real_time) return false;

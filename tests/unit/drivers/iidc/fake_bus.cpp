@@ -4,6 +4,7 @@
 #include <chrono>
 #include <cstring>
 
+#include "drivers/clock.hpp"
 #include "drivers/iidc/camera_registers.hpp"
 
 namespace vergence::test {
@@ -132,11 +133,11 @@ void FakeBus::work() {
   while (!stopping_) {
     std::this_thread::sleep_for(std::chrono::milliseconds(1));
     if (!plugged_) {
-      sink_->gone(iidc::monotonic_now());
+      sink_->gone(monotonic_now());
       return;
     }
     std::vector<std::uint8_t> image;
-    const HostStamp host = iidc::monotonic_now();
+    const HostStamp host = monotonic_now();
     {
       const std::lock_guard lock(mutex_);
       const auto ns = static_cast<std::uint64_t>(host.ns());

@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include "drivers/clock.hpp"
 #include "tests/unit/drivers/iidc/camera_under_test.hpp"
 
 namespace vergence::test {
