@@ -345,6 +345,7 @@ void OnlineCalibrator::start_solve() noexcept {
   stale_ = false;
   sought_ = seeking_;
   frames_since_snapshot_ = 0;
+  next_judgement_ = std::min(kLeastHeldOut, options_.calibration.adopt_after);
   solved_frames_ = log_.size();
   asked_ = rig_;
   from_rig_ = !seeking_;
@@ -365,18 +366,24 @@ std::optional<CalibrationDecision> OnlineCalibrator::decide(Stamp stamp,
   waited_ms_ = 0;
   if (!solving_) return std::nullopt;
   ++frames_since_snapshot_;
-  const int least = std::min(kLeastHeldOut, options_.calibration.adopt_after);
+  if (frames_since_snapshot_ < next_judgement_) return std::nullopt;
   if (options_.adoption == Adoption::when_ready) {
-    if (runner_.busy() || frames_since_snapshot_ < least) return std::nullopt;
+    if (runner_.busy()) return std::nullopt;
   } else {
-    // What is learnt beside a calibration in use waits for the frames that judge it, no longer:
-    // until then no pose is `ok`.
-    if (frames_since_snapshot_ < (sought_ ? options_.calibration.adopt_after : least))
-      return std::nullopt;
     const auto start = std::chrono::steady_clock::now();
     runner_.wait();
     waited_ms_ =
         std::chrono::duration<float, std::milli>(std::chrono::steady_clock::now() - start).count();
+  }
+  // What is sought is adopted as soon as the frames after it confirm it; it is rejected only when
+  // more of them would not help. What is learnt beside a calibration in use waits for no more than
+  // it is judged by.
+  const bool final_judgement = frames_since_snapshot_ >= options_.calibration.adopt_after;
+  if (sought_ && !outdated() && !final_judgement &&
+      calibration::check_acceptance(question(sought_solution(false), false),
+                                    options_.calibration) != Gate::open) {
+    next_judgement_ = std::min(next_judgement_ + kLeastHeldOut, options_.calibration.adopt_after);
+    return std::nullopt;
   }
   return judge(stamp, number, false);
 }
@@ -399,7 +406,7 @@ bool OnlineCalibrator::start_last_solve() noexcept {
 std::optional<CalibrationDecision> OnlineCalibrator::judge(Stamp stamp, std::uint64_t number,
                                                            bool last) noexcept {
   solving_ = false;
-  if (stale_ || sought_ != seeking_) return std::nullopt;
+  if (outdated()) return std::nullopt;
   return sought_ ? judge_sought(stamp, number, last) : judge_learnt(stamp, number, last);
 }
 
@@ -436,10 +443,7 @@ CalibrationDecision OnlineCalibrator::begin_decision(
 CalibrationDecision OnlineCalibrator::judge_sought(Stamp stamp, std::uint64_t number,
                                                    bool last) noexcept {
   const auto most = static_cast<std::size_t>(options_.calibration.max_frames);
-  // Lenses are taken from the drive where it shows that the ones in use are off, and holds them
-  // well enough; else transforms alone.
-  const calibration::RigSolution& found =
-      lenses_are_off(last) ? solved_.lenses : solved_.transforms;
+  const calibration::RigSolution& found = sought_solution(last);
   gate_ = calibration::check_acceptance(question(found, last), options_.calibration);
   CalibrationDecision d = begin_decision(stamp, number, found);
   d.accepted = gate_ == Gate::open;
@@ -491,6 +495,10 @@ void OnlineCalibrator::assess_lenses(const RigCalibration& in_use_then, std::uin
       calibration::assess(measured.rig, rig_, log_, newest, options_.calibration,
                           options_.odometry.pixel_sigma)
           .difference_percent;
+}
+
+const calibration::RigSolution& OnlineCalibrator::sought_solution(bool last) const noexcept {
+  return lenses_are_off(last) ? solved_.lenses : solved_.transforms;
 }
 
 bool OnlineCalibrator::lenses_are_off(bool last) const noexcept {

@@ -116,7 +116,12 @@ class OnlineCalibrator {
                                                  bool last) noexcept;
   void assess_lenses(const RigCalibration& in_use_then, std::uint64_t newest,
                      CalibrationDecision* d) const noexcept;
+  /// Lenses are taken from the drive where it shows that the ones in use are off, and holds them
+  /// well enough; else transforms alone.
+  [[nodiscard]] const calibration::RigSolution& sought_solution(bool last) const noexcept;
   [[nodiscard]] bool lenses_are_off(bool last) const noexcept;
+  /// The solve under way is of frames that no longer count, or for another purpose than now.
+  [[nodiscard]] bool outdated() const noexcept { return stale_ || sought_ != seeking_; }
   [[nodiscard]] std::optional<CalibrationDecision> judge(Stamp stamp, std::uint64_t number,
                                                          bool last) noexcept;
   void begin_segment() noexcept;
@@ -158,6 +163,7 @@ class OnlineCalibrator {
       false;            // frames were left out for a change once: the rest are taken for one rig
   int rejections_ = 0;  // for other reasons than a want of frames
   int frames_since_snapshot_ = 0;
+  int next_judgement_ = 0;  // frames after the snapshot at which its solution is looked at
   float waited_ms_ = 0;
   int frames_still_ = 0;              // since one was logged
   RigCalibration asked_{}, prior_{};  // of the solve under way
