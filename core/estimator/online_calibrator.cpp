@@ -165,12 +165,13 @@ void OnlineCalibrator::watch_calibration() noexcept {
   }
 }
 
+Pinhole OnlineCalibrator::pinhole(std::size_t c) const noexcept {
+  const Intrinsics& lens = rig_.intrinsics[c];
+  return {lens.fx, lens.fy, lens.cx, lens.cy};
+}
+
 void OnlineCalibrator::watch_against(int k, const Transform& T_camera_left,
                                      const Mat6& covariance) noexcept {
-  const auto pinhole = [&](std::size_t c) {
-    const Intrinsics& lens = rig_.intrinsics[c];
-    return Pinhole{lens.fx, lens.fy, lens.cx, lens.cy};
-  };
   const auto c = static_cast<std::size_t>(k);
   (void)monitors_[c]->set_reference(T_camera_left, pinhole(0), pinhole(c), covariance);
   feeds_[c]->reset();
@@ -268,26 +269,56 @@ int OnlineCalibrator::expected_stereo(const odometry::Odometry& odometry, int k,
   return n;
 }
 
+Transform OnlineCalibrator::step_to(const Transform& T_left_world) noexcept {
+  const Transform step = any_ ? T_left_world * T_left_world_.inverse() : Transform{};
+  T_left_world_ = T_left_world;
+  any_ = true;
+  return step;
+}
+
+int OnlineCalibrator::collect_stereo(const odometry::Map& map, int k) noexcept {
+  const auto c = static_cast<std::size_t>(k);
+  stereo_.clear();
+  int found = 0;
+  for (const MapPoint& p : map.points()) {
+    // A point made in this frame was sought in the band of the calibration in use: it is no
+    // witness.
+    if (!p.followed() || p.found < 2 || !p.now.by(0)) continue;
+    if (((p.in_images >> static_cast<unsigned>(k)) & 1U) == 0) continue;
+    if (p.stage == odometry::PointStage::active) ++found;
+    (void)stereo_.push({p.now.pixel[0].cast<double>(), p.now.pixel[c].cast<double>(),
+                        static_cast<double>(std::max(p.now.sigma[0], p.now.sigma[c])), p.id});
+  }
+  return found;
+}
+
+std::optional<std::uint64_t> OnlineCalibrator::watch_sought(const odometry::Odometry& odometry,
+                                                            const odometry::FrameOutcome& outcome,
+                                                            std::uint64_t number) noexcept {
+  std::optional<std::uint64_t> onset;
+  const bool first = outcome.initialised || outcome.restarted;
+  if (first) any_ = false;
+  const Transform step = step_to(outcome.T_left_world);
+  for (int k = 1; k < rig_.cameras; ++k) {
+    const auto c = static_cast<std::size_t>(k);
+    if (first) jumps_[c]->reset();
+    (void)collect_stereo(odometry.map(), k);
+    jumps_[c]->set_transform(T_camera_left_before_[c]);
+    const calibration::DisparityJump jump = jumps_[c]->next(number, stereo_.span(), step);
+    if (jump.confirmed) onset = std::min(onset.value_or(jump.onset_frame), jump.onset_frame);
+  }
+  T_camera_left_before_ = odometry.rig().T_camera_left;
+  return onset;
+}
+
 MonitorVerdict OnlineCalibrator::watch(const odometry::Odometry& odometry,
                                        const odometry::FrameOutcome& outcome,
                                        const RigFrame& frame) noexcept {
   MonitorVerdict worst;
-  const Transform step = any_ ? outcome.T_left_world * T_left_world_.inverse() : Transform{};
-  T_left_world_ = outcome.T_left_world;
-  any_ = true;
+  const Transform step = step_to(outcome.T_left_world);
   for (int k = 1; k < rig_.cameras; ++k) {
     const auto c = static_cast<std::size_t>(k);
-    stereo_.clear();
-    int found = 0;
-    for (const MapPoint& p : odometry.map().points()) {
-      // A point made in this frame was sought in the band of the calibration in use: it is no
-      // witness.
-      if (!p.followed() || p.found < 2 || !p.now.by(0)) continue;
-      if (((p.in_images >> static_cast<unsigned>(k)) & 1U) == 0) continue;
-      if (p.stage == odometry::PointStage::active) ++found;
-      (void)stereo_.push({p.now.pixel[0].cast<double>(), p.now.pixel[c].cast<double>(),
-                          static_cast<double>(std::max(p.now.sigma[0], p.now.sigma[c])), p.id});
-    }
+    const int found = collect_stereo(odometry.map(), k);
     const calibration::DisparityJump jump = jumps_[c]->next(frame.number, stereo_.span(), step);
     calibration::MonitorFrame f = feeds_[c]->next(frame.stamp, frame.number, stereo_.span(), step);
     f.expected_stereo =
@@ -326,6 +357,10 @@ void OnlineCalibrator::seek(CalibrationCause cause, std::uint64_t onset,
   change_believed_ = false;
   log_.drop_before(onset);
   begin_segment();
+  any_ = false;
+  T_camera_left_before_ = rig_.T_camera_left;
+  for (std::size_t c = 1; c < static_cast<std::size_t>(rig_.cameras); ++c)
+    jumps_[c]->set_reference(rig_.T_camera_left[c], pinhole(0), pinhole(c));
 }
 
 Reason OnlineCalibrator::missing() const noexcept {

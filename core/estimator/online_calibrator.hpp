@@ -40,6 +40,11 @@ class OnlineCalibrator {
   [[nodiscard]] calibration::MonitorVerdict watch(const odometry::Odometry& odometry,
                                                   const odometry::FrameOutcome& outcome,
                                                   const RigFrame& frame) noexcept;
+  /// Frame by frame while the rig is sought with the cameras unlinked: the first frame of a rig
+  /// that has changed meanwhile, if it has.
+  [[nodiscard]] std::optional<std::uint64_t> watch_sought(const odometry::Odometry& odometry,
+                                                          const odometry::FrameOutcome& outcome,
+                                                          std::uint64_t number) noexcept;
 
   /// From now on a calibration is sought. Frames before `onset` belong to another rig and are
   /// forgotten, and so is a solve of them that is still under way.
@@ -124,6 +129,11 @@ class OnlineCalibrator {
   [[nodiscard]] bool outdated() const noexcept { return stale_ || sought_ != seeking_; }
   [[nodiscard]] std::optional<CalibrationDecision> judge(Stamp stamp, std::uint64_t number,
                                                          bool last) noexcept;
+  [[nodiscard]] Pinhole pinhole(std::size_t c) const noexcept;
+  /// Motion of the left camera since the frame watched before.
+  [[nodiscard]] Transform step_to(const Transform& T_left_world) noexcept;
+  /// Camera k's matches into `stereo_`; how many of them hold poses.
+  int collect_stereo(const odometry::Map& map, int k) noexcept;
   void begin_segment() noexcept;
   [[nodiscard]] double pixels_moved(const odometry::Map& map) const noexcept;
   [[nodiscard]] int expected_stereo(const odometry::Odometry& odometry, int k,
@@ -148,6 +158,7 @@ class OnlineCalibrator {
   BoundedVector<calibration::StereoObservation> stereo_;
   std::array<bool, kMaxCameras> learning_{};
   std::array<int, kMaxCameras> grace_{};  // frames whose verdict does not count yet
+  std::array<Transform, kMaxCameras> T_camera_left_before_{};  // with the cameras unlinked
   Transform T_left_world_{};
   bool any_ = false;  // T_left_world_ is the frame before's
 
