@@ -59,6 +59,26 @@ void DisparityJumpDetector::set_reference(const Transform& T_camera_left, const 
   reset();
 }
 
+void DisparityJumpDetector::rebase(const Transform& T_camera_left, const Pinhole& left,
+                                   const Pinhole& camera,
+                                   std::span<const StereoObservation> stereo) noexcept {
+  T_camera_left_ = T_camera_left;
+  left_ = left;
+  camera_ = camera;
+  count_ = take(stereo, before_);
+}
+
+std::size_t DisparityJumpDetector::take(std::span<const StereoObservation> stereo,
+                                        std::span<StereoObservation> into) noexcept {
+  const std::size_t n = std::min(stereo.size(), into.size());
+  std::copy_n(stereo.begin(), n, into.begin());
+  std::sort(into.begin(), into.begin() + static_cast<std::ptrdiff_t>(n),
+            [](const StereoObservation& a, const StereoObservation& b) noexcept {
+              return a.track < b.track;
+            });
+  return n;
+}
+
 bool DisparityJumpDetector::row(const StereoObservation& before, const StereoObservation& now,
                                 const Transform& T_now_previous, Row* out) const noexcept {
   const Vec3 a = ray(left_, before.left);
@@ -152,12 +172,7 @@ void DisparityJumpDetector::judge(std::uint64_t frame, DisparityJump* jump) noex
 DisparityJump DisparityJumpDetector::next(std::uint64_t frame,
                                           std::span<const StereoObservation> stereo,
                                           const Transform& T_now_previous) noexcept {
-  const std::size_t n = std::min(stereo.size(), now_.size());
-  std::copy_n(stereo.begin(), n, now_.begin());
-  const auto by_track = [](const StereoObservation& a, const StereoObservation& b) noexcept {
-    return a.track < b.track;
-  };
-  std::sort(now_.begin(), now_.begin() + static_cast<std::ptrdiff_t>(n), by_track);
+  const std::size_t n = take(stereo, now_);
   std::size_t rows = 0;
   for (std::size_t i = 0, j = 0; i < count_ && j < n;) {
     if (before_[i].track < now_[j].track) {

@@ -42,6 +42,10 @@ class DisparityJumpDetector {
   /// The cameras' transform and pinholes in use; forgets the frame before.
   void set_reference(const Transform& T_camera_left, const Pinhole& left,
                      const Pinhole& camera) noexcept;
+  /// Another calibration of the same rig, and another scene: the frame before is the one of which
+  /// these are the new scene's points. A shift that waits for the next frame still does.
+  void rebase(const Transform& T_camera_left, const Pinhole& left, const Pinhole& camera,
+              std::span<const StereoObservation> stereo) noexcept;
   /// The same rig known better, or from one frame to the next where the cameras are not linked: the
   /// frame before stays.
   void set_transform(const Transform& T_camera_left) noexcept { T_camera_left_ = T_camera_left; }
@@ -64,6 +68,9 @@ class DisparityJumpDetector {
   [[nodiscard]] bool row(const StereoObservation& before, const StereoObservation& now,
                          const Transform& T_now_previous, Row* out) const noexcept;
   [[nodiscard]] DisparityJump fit(std::span<Row> rows) noexcept;
+  /// Sorted by track; how many.
+  std::size_t take(std::span<const StereoObservation> stereo,
+                   std::span<StereoObservation> into) noexcept;
   void judge(std::uint64_t frame, DisparityJump* jump) noexcept;
 
   /// A shift that waits for the next frame.

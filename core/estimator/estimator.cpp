@@ -242,6 +242,7 @@ void Estimator::Parts::watch_sought(const odometry::FrameOutcome& out,
                                     const RigFrame& frame) noexcept {
   const auto onset = calibrator.watch_sought(odometry, out, frame.number);
   if (!onset) return;
+  if (!calibrator.seeking()) return doubt(CalibrationCause::knock, *onset, frame);
   note(EstimatorEvent::Kind::rig_changed, frame.stamp,
        "a camera was knocked while the calibration was sought",
        static_cast<double>(frame.number - *onset));
@@ -461,15 +462,18 @@ PoseSample Estimator::process(const RigFrame& given) noexcept {
 
   if (p.relinked && std::exchange(p.superseded, false) && p.calibrator.verified())
     p.tell_confirmed(frame.stamp);
-  const odometry::FrameOutcome out = p.odometry.process(frame);
+  odometry::FrameOutcome out = p.odometry.process(frame);
   p.follow(out, frame);
   if (p.options.online) {
     if (out.posed) {
       const bool linked = p.odometry.linked() == odometry::Link::linked;
       if (linked && p.state == State::stereo_odometry && !out.restarted) p.watch(out, frame);
-      if (!linked && p.calibrator.seeking()) p.watch_sought(out, frame);
+      if (!linked && (p.calibrator.seeking() || p.calibrator.relink_pending()))
+        p.watch_sought(out, frame);
       p.calibrator.log(p.odometry, out, frame);
     }
+    p.odometry.rebuild(&out);
+    if (out.relinked) p.calibrator.scene_rebuilt(p.odometry);
     p.calibrate(frame);
   }
   sample.state = p.state;

@@ -26,7 +26,9 @@ constexpr std::array kClaimed = {0.05, 0.05, 0.05, 0.1, 0.1, 0.1};
 // model leaves in one stretch.
 constexpr std::array kConfirmed = {2e-4, 5e-4, 2e-4, 0.003, 0.003, 0.006};
 constexpr double kLearnedCovariance =
-    1.5;  // times the monitor's own: the scene it was measured in was one
+    1.5;                     // times the monitor's own: the scene it was measured in was one
+constexpr int kWitness = 2;  // frames: a point just made was sought in the band of the calibration
+                             // in use
 constexpr int kWatchedAgain =
     10;  // moving frames that agree, after an outage in which the rig may have been knocked
 constexpr int kGraceFrames =
@@ -123,6 +125,8 @@ OnlineCalibrator::OnlineCalibrator(const EstimatorOptions& options, const RigCal
       arena.make<calibration::StereoObservation>(most_tracks(options), "monitored matches"));
   if (!calibrated_) return;
   watch_calibration();
+  for (std::size_t c = 1; c < static_cast<std::size_t>(rig_.cameras); ++c)
+    jumps_[c]->set_reference(rig_.T_camera_left[c], pinhole(0), pinhole(c));
   begin_segment();
 }
 
@@ -134,9 +138,8 @@ void OnlineCalibrator::use(const RigCalibration& rig, bool lenses) noexcept {
 }
 
 void OnlineCalibrator::keep() noexcept {
-  watch_calibration();
+  relink_pending_ = true;
   watched_ = true;
-  any_ = false;
   seeking_ = false;
   begin_segment();
 }
@@ -144,7 +147,18 @@ void OnlineCalibrator::keep() noexcept {
 void OnlineCalibrator::refine(const RigCalibration& rig) noexcept {
   rig_ = rig;
   found_with_lenses_ = options_.calibration.estimate_lenses != 0;
+  relink_pending_ = true;
+}
+
+void OnlineCalibrator::scene_rebuilt(const odometry::Odometry& odometry) noexcept {
+  relink_pending_ = false;
   watch_calibration();
+  // Points made in this frame are where the next begins: no frame is between two that are compared.
+  for (int k = 1; k < rig_.cameras; ++k) {
+    const auto c = static_cast<std::size_t>(k);
+    (void)collect_stereo(odometry.map(), k, 1);
+    jumps_[c]->rebase(rig_.T_camera_left[c], pinhole(0), pinhole(c), stereo_.span());
+  }
 }
 
 void OnlineCalibrator::begin_segment() noexcept {
@@ -175,7 +189,6 @@ void OnlineCalibrator::watch_against(int k, const Transform& T_camera_left,
   const auto c = static_cast<std::size_t>(k);
   (void)monitors_[c]->set_reference(T_camera_left, pinhole(0), pinhole(c), covariance);
   feeds_[c]->reset();
-  jumps_[c]->set_reference(rig_.T_camera_left[c], pinhole(0), pinhole(c));
   grace_[c] = kGraceFrames;
 }
 
@@ -276,14 +289,12 @@ Transform OnlineCalibrator::step_to(const Transform& T_left_world) noexcept {
   return step;
 }
 
-int OnlineCalibrator::collect_stereo(const odometry::Map& map, int k) noexcept {
+int OnlineCalibrator::collect_stereo(const odometry::Map& map, int k, int least_found) noexcept {
   const auto c = static_cast<std::size_t>(k);
   stereo_.clear();
   int found = 0;
   for (const MapPoint& p : map.points()) {
-    // A point made in this frame was sought in the band of the calibration in use: it is no
-    // witness.
-    if (!p.followed() || p.found < 2 || !p.now.by(0)) continue;
+    if (!p.followed() || p.found < least_found || !p.now.by(0)) continue;
     if (((p.in_images >> static_cast<unsigned>(k)) & 1U) == 0) continue;
     if (p.stage == odometry::PointStage::active) ++found;
     (void)stereo_.push({p.now.pixel[0].cast<double>(), p.now.pixel[c].cast<double>(),
@@ -302,7 +313,7 @@ std::optional<std::uint64_t> OnlineCalibrator::watch_sought(const odometry::Odom
   for (int k = 1; k < rig_.cameras; ++k) {
     const auto c = static_cast<std::size_t>(k);
     if (first) jumps_[c]->reset();
-    (void)collect_stereo(odometry.map(), k);
+    (void)collect_stereo(odometry.map(), k, kWitness);
     jumps_[c]->set_transform(T_camera_left_before_[c]);
     const calibration::DisparityJump jump = jumps_[c]->next(number, stereo_.span(), step);
     if (jump.confirmed) onset = std::min(onset.value_or(jump.onset_frame), jump.onset_frame);
@@ -318,8 +329,17 @@ MonitorVerdict OnlineCalibrator::watch(const odometry::Odometry& odometry,
   const Transform step = step_to(outcome.T_left_world);
   for (int k = 1; k < rig_.cameras; ++k) {
     const auto c = static_cast<std::size_t>(k);
-    const int found = collect_stereo(odometry.map(), k);
+    const int found = collect_stereo(odometry.map(), k, kWitness);
     const calibration::DisparityJump jump = jumps_[c]->next(frame.number, stereo_.span(), step);
+    if (relink_pending_) {
+      // The monitors wait for the scene of the calibration that they are to watch.
+      worst.undecided = worst.undecided || jump.suspected;
+      if (jump.confirmed) {
+        worst.kind = MonitorVerdict::Kind::knock;
+        worst.onset_frame = jump.onset_frame;
+      }
+      continue;
+    }
     calibration::MonitorFrame f = feeds_[c]->next(frame.stamp, frame.number, stereo_.span(), step);
     f.expected_stereo =
         outcome.images_good ? expected_stereo(odometry, k, outcome.T_left_world) : 0;
@@ -358,6 +378,7 @@ void OnlineCalibrator::seek(CalibrationCause cause, std::uint64_t onset,
   log_.drop_before(onset);
   begin_segment();
   any_ = false;
+  relink_pending_ = false;
   T_camera_left_before_ = rig_.T_camera_left;
   for (std::size_t c = 1; c < static_cast<std::size_t>(rig_.cameras); ++c)
     jumps_[c]->set_reference(rig_.T_camera_left[c], pinhole(0), pinhole(c));

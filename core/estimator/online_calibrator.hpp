@@ -76,6 +76,10 @@ class OnlineCalibrator {
   void finish() noexcept {
     if (solving_) runner_.wait();
   }
+  /// Another calibration is in use, whose scene has just been made; it is watched from here on.
+  void scene_rebuilt(const odometry::Odometry& odometry) noexcept;
+  /// A calibration is adopted and its scene not yet made.
+  [[nodiscard]] bool relink_pending() const noexcept { return relink_pending_; }
   /// The scene was lost: what is logged does not go on.
   void scene_lost() noexcept;
   /// The calibration in use is this one, which the drive has found; `lenses`: with them.
@@ -133,7 +137,7 @@ class OnlineCalibrator {
   /// Motion of the left camera since the frame watched before.
   [[nodiscard]] Transform step_to(const Transform& T_left_world) noexcept;
   /// Camera k's matches into `stereo_`; how many of them hold poses.
-  int collect_stereo(const odometry::Map& map, int k) noexcept;
+  int collect_stereo(const odometry::Map& map, int k, int least_found) noexcept;
   void begin_segment() noexcept;
   [[nodiscard]] double pixels_moved(const odometry::Map& map) const noexcept;
   [[nodiscard]] int expected_stereo(const odometry::Odometry& odometry, int k,
@@ -161,6 +165,7 @@ class OnlineCalibrator {
   std::array<Transform, kMaxCameras> T_camera_left_before_{};  // with the cameras unlinked
   Transform T_left_world_{};
   bool any_ = false;  // T_left_world_ is the frame before's
+  bool relink_pending_ = false;
 
   CalibrationCause cause_ = CalibrationCause::from_scratch;
   bool seeking_ = false, solving_ = false;

@@ -497,6 +497,15 @@ void Odometry::take_up_link() noexcept {
   window_.take_up_rig();
 }
 
+void Odometry::rebuild(FrameOutcome* out) noexcept {
+  if (!link_pending_ || !out->relink_due) return;
+  // The scene was made with another rig: it is rebuilt, where the camera now is.
+  take_up_link();
+  out->relinked = true;
+  FrameOutcome built;
+  if (!start_scene(T_left_world_, stamp_, &built)) out->reason = built.reason;
+}
+
 FrameOutcome Odometry::process(const RigFrame& frame) noexcept {
   FrameOutcome out;
   StageClock clock(&out);
@@ -539,11 +548,7 @@ FrameOutcome Odometry::process(const RigFrame& frame) noexcept {
   out.T_left_world = T_left_world_;
   judge(fit, images, &out);
   if (link_pending_ && weakness(images) == Reason::none) {
-    // The scene was made with another rig: it is rebuilt, where the camera now is.
-    take_up_link();
-    out.relinked = true;
-    FrameOutcome built;
-    if (!start_scene(T_left_world_, frame.stamp, &built)) out.reason = built.reason;
+    out.relink_due = true;
   } else if (confirmed_stereo(fit) && !images.repeated && wants_keyframe()) {
     make_keyframe(fit, frame.stamp, &out);
     out.T_left_world = T_left_world_;

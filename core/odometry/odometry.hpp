@@ -20,7 +20,9 @@ struct FrameOutcome {
   bool keyframe = false;
   bool restarted = false;    // the scene was rebuilt in this frame
   bool relocalised = false;  // found again in the window after being lost
-  bool relinked = false;     // a calibration was taken up after this frame was posed
+  bool relink_due = false;   // a calibration waits to be taken up: rebuild() when this frame's
+                            // tracks are of no more use
+  bool relinked = false;     // it was, in this frame
   bool initialised = false;  // the rig's transform was found from this frame's images alone
   double gap_s = 0;          // time since the frame before, when it was too long to predict over
   bool images_good = false;  // every camera gave an image, new and with structure
@@ -57,9 +59,11 @@ class Odometry {
 
   [[nodiscard]] FrameOutcome process(const RigFrame& frame) noexcept;
 
-  /// From the next frame on the cameras are one rig with this calibration: the scene is rebuilt
-  /// where the left camera then is.
+  /// From the next frame on the cameras are one rig with this calibration: that frame is still
+  /// posed as before, then rebuild() makes a new scene from it.
   void link(const RigCalibration& rig) noexcept;
+  /// After process() of a frame that says `relink_due`. Nothing, if the link was taken back since.
+  void rebuild(FrameOutcome* out) noexcept;
   /// From the next frame on the cameras are not linked; the scene stays.
   void unlink() noexcept;
   /// What is known of the cameras' transform is of no use: unlinked, the next scene begins with

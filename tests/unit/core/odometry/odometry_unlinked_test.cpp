@@ -100,7 +100,9 @@ TEST(OdometryUnlinked, linkedAgainTheWayGoesOnWithoutAJump) {
   d.odometry.link(d.corridor.rig());
   EXPECT_EQ(d.odometry.linked(), Link::unlinked) << "from the next frame on";
   for (int i = 10; i < 20; ++i) {
-    const FrameOutcome out = d.odometry.process(d.corridor.frame(i));
+    FrameOutcome out = d.odometry.process(d.corridor.frame(i));
+    EXPECT_EQ(out.relink_due, i == 10) << i;
+    d.odometry.rebuild(&out);
     ASSERT_TRUE(out.posed) << i;
     EXPECT_FALSE(out.restarted) << i;
     EXPECT_EQ(d.odometry.linked(), Link::linked);
