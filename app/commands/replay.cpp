@@ -7,6 +7,7 @@
 #include "app/command_line/common_options.hpp"
 #include "app/commands/commands.hpp"
 #include "app/datasets/sequence_format.hpp"
+#include "app/publish/publish.hpp"
 #include "app/session/replay_session.hpp"
 
 namespace vergence::app {
@@ -144,7 +145,12 @@ void add_replay(CLI::App& root, ExitCode* exit_code) {
   declare_also(*command, &a->also);
   command->add_flag("--memory", a->memory, "Print what memory is held, by whom");
   a->common.declare(*command);
-  command->callback([a, exit_code] { *exit_code = run_replay(request_of(*a)); });
+  command->callback([a, exit_code] {
+    ReplayRequest request = request_of(*a);
+    Publishing publishing(request.configuration);
+    publishing.attach(&request.session);
+    *exit_code = run_replay(request);
+  });
 }
 
 }  // namespace vergence::app

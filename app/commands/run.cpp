@@ -5,6 +5,7 @@
 
 #include "app/command_line/common_options.hpp"
 #include "app/commands/commands.hpp"
+#include "app/publish/publish.hpp"
 #include "app/session/live_session.hpp"
 
 namespace vergence::app {
@@ -79,7 +80,12 @@ void add_run(CLI::App& root, ExitCode* exit_code) {
   declare_also(*command, &a->also);
   command->add_flag("--memory", a->memory, "Print what memory is held, by whom");
   a->common.declare(*command);
-  command->callback([a, exit_code] { *exit_code = run_drive(request_of(*a)); });
+  command->callback([a, exit_code] {
+    RunRequest request = request_of(*a);
+    Publishing publishing(request.configuration);
+    publishing.attach(&request.session);
+    *exit_code = run_drive(request);
+  });
 }
 
 }  // namespace vergence::app
