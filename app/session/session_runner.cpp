@@ -351,9 +351,10 @@ ExitCode SessionRunner::run() {
       summary_input(*totals, AllocationGuard::allocations_after_seal() - allocations_before);
   write_files(*totals, input, &faults, &progress);
   if (!request_.quiet) print_figures(*totals, input, &progress);
-  const bool usable = write_session_report(request_.out, request_.quiet, &progress);
+  const SessionReport report = write_session_report(request_.out);
   ExitCode code = verdict(*totals, faults, &progress);
-  if (code == ExitCode::done && !usable) code = ExitCode::not_usable;
+  if (code == ExitCode::done && !report.outcome.usable) code = ExitCode::not_usable;
+  say_verdict(report, request_.quiet, &progress);
   return signals_.stop_code().value_or(code);
 }
 
