@@ -1,8 +1,10 @@
 #pragma once
 #include <memory>
+#include <string>
 
 #include "app/config/configuration.hpp"
 #include "app/publish/line_publisher.hpp"
+#include "app/publish/live_page.hpp"
 #include "app/session/session_runner.hpp"
 
 namespace vergence::app {
@@ -21,8 +23,12 @@ class Publishing {
   void attach(SessionOptions* session);
 
  private:
+  void open_page(const Configuration& configuration);
+
   SessionRequests requests_;
-  std::unique_ptr<LinePublisher> lines_;
+  std::unique_ptr<LinePublisher> lines_;  // outlives the page, which shows its latency
+  std::unique_ptr<LivePage> page_;
+  std::string address_{};  // of the page, for a person to open
 };
 
 }  // namespace vergence::app
