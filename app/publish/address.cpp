@@ -38,9 +38,9 @@ std::string HostPort::text() const {
 
 HostPort parse_host_port(std::string_view text, std::string_view key) {
   const auto refuse = [&]() -> HostPort {
-    throw InputError(fmt::format(
-        "{}: \"{}\" is no address; give HOST:PORT, e.g. 127.0.0.1:8080 or [::1]:8080", key,
-        text.substr(0, 120)));
+    throw InputError(
+        fmt::format("{}: \"{}\" is no address; give HOST:PORT, e.g. 127.0.0.1:8080 or [::1]:8080",
+                    key, text.substr(0, 120)));
   };
   const auto colon = text.rfind(':');
   if (colon == std::string_view::npos || colon == 0) return refuse();
@@ -66,15 +66,14 @@ LineAddress parse_line_address(std::string_view text, std::string_view key) {
     return out;
   }
   if (!text.starts_with(kUnix))
-    throw InputError(fmt::format(
-        "{}: \"{}\" is no place for lines; give unix:///PATH or udp://HOST:PORT", key,
-        text.substr(0, 120)));
+    throw InputError(
+        fmt::format("{}: \"{}\" is no place for lines; give unix:///PATH or udp://HOST:PORT", key,
+                    text.substr(0, 120)));
   out.path = text.substr(kUnix.size());
   if (!out.path.starts_with('/') || out.path.find('\0') != std::string::npos ||
       out.path.size() >= sizeof(sockaddr_un::sun_path))
-    throw InputError(
-        fmt::format("{}: the path of a socket begins with / and has at most {} bytes", key,
-                    sizeof(sockaddr_un::sun_path) - 1));
+    throw InputError(fmt::format("{}: the path of a socket begins with / and has at most {} bytes",
+                                 key, sizeof(sockaddr_un::sun_path) - 1));
   return out;
 }
 

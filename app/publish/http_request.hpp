@@ -23,8 +23,8 @@ inline constexpr std::size_t kMostRequestBytes = 4096;  // browsers send some 60
 enum class HttpParse : std::uint8_t {
   incomplete,  // more bytes are wanted
   complete,
-  malformed,   // no HTTP/1.x request
-  too_large,   // no end within kMostRequestBytes
+  malformed,  // no HTTP/1.x request
+  too_large,  // no end within kMostRequestBytes
 };
 
 /// Reads a head from the beginning of `bytes`. A pure function: no memory, no state; bytes of any

@@ -24,7 +24,8 @@ using std::chrono::milliseconds;
 constexpr milliseconds kPatience{5000};  // for a request to arrive, for an answer to be read
 constexpr int kBacklog = 64;
 constexpr int kAcceptsAStep = 256;
-constexpr int kSendBuffer = 256 * 1024;  // bytes: a slow viewer sees the newest, not the last minute
+constexpr int kSendBuffer =
+    256 * 1024;  // bytes: a slow viewer sees the newest, not the last minute
 
 /// What a browser may do with anything from here: nothing but what the page itself holds.
 constexpr const char* kHeaders =
@@ -63,18 +64,17 @@ const char* words_of(int status) {
 
 FileDescriptor listen_at(const HostPort& address) {
   const auto refuse = [&](const char* why, const char* what_to_do) {
-    throw InputError(fmt::format("publish.http: no page at {} ({}); {}", address.text(), why,
-                                 what_to_do));
+    throw InputError(
+        fmt::format("publish.http: no page at {} ({}); {}", address.text(), why, what_to_do));
   };
   addrinfo hints{}, *found = nullptr;
   hints.ai_socktype = SOCK_STREAM;
   hints.ai_flags = AI_PASSIVE;
-  if (const int error = ::getaddrinfo(address.host.c_str(), std::to_string(address.port).c_str(),
-                                      &hints, &found);
+  if (const int error =
+          ::getaddrinfo(address.host.c_str(), std::to_string(address.port).c_str(), &hints, &found);
       error != 0)
     refuse(::gai_strerror(error), "give an address of this machine");
-  FileDescriptor socket(
-      ::socket(found->ai_family, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
+  FileDescriptor socket(::socket(found->ai_family, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
   constexpr int kOn = 1;
   (void)::setsockopt(socket.get(), SOL_SOCKET, SO_REUSEADDR, &kOn, sizeof kOn);
   const bool listens = socket && ::bind(socket.get(), found->ai_addr, found->ai_addrlen) == 0 &&
@@ -122,8 +122,7 @@ void HttpServer::step(milliseconds timeout) {
   const milliseconds limit = waits ? std::min(timeout, milliseconds(500)) : timeout;
   (void)::poll(polled.data(), polled.size(), static_cast<int>(limit.count()));
   std::uint64_t ignored = 0;
-  if (polled[kConnections + 1].revents != 0)
-    (void)!::read(wake_.get(), &ignored, sizeof ignored);
+  if (polled[kConnections + 1].revents != 0) (void)!::read(wake_.get(), &ignored, sizeof ignored);
   for (std::size_t i = 0; i < kConnections; ++i) {
     Connection& c = connections_[i];
     const auto happened = static_cast<unsigned>(polled[i].revents);
@@ -178,7 +177,8 @@ void HttpServer::read(Connection* c) {
     return close(c);
   // Of a request that is being answered, whatever else comes is nothing.
   if (n < 0 || c->phase != Phase::reading) return;
-  c->in.append(bytes.data(), std::min(static_cast<std::size_t>(n), kMostRequestBytes - c->in.size()));
+  c->in.append(bytes.data(),
+               std::min(static_cast<std::size_t>(n), kMostRequestBytes - c->in.size()));
   answer(c);
 }
 

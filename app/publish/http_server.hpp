@@ -13,12 +13,12 @@
 namespace vergence::app {
 
 struct HttpCounters {
-  std::uint64_t requests = 0;       // that were answered
-  std::uint64_t refused = 0;        // … with a refusal
-  std::uint64_t pushed_out = 0;     // connections closed because others waited for their place
-  std::uint64_t viewers = 0;        // that began to look
-  std::uint64_t slow_viewers = 0;   // … and were dropped because they did not read
-  std::uint64_t skipped = 0;        // events that a viewer had no room for
+  std::uint64_t requests = 0;      // that were answered
+  std::uint64_t refused = 0;       // … with a refusal
+  std::uint64_t pushed_out = 0;    // connections closed because others waited for their place
+  std::uint64_t viewers = 0;       // that began to look
+  std::uint64_t slow_viewers = 0;  // … and were dropped because they did not read
+  std::uint64_t skipped = 0;       // events that a viewer had no room for
 };
 
 /// A few connections at a time: one page, one stream of events, a few actions.
@@ -38,8 +38,8 @@ class HttpServer {
   using Action = std::function<void(HttpRoute)>;
 
   /// `page`: the HTML, outlives it. `viewers`: at most so many at a time.
-  HttpServer(const HostPort& address, HttpPolicy policy, std::string_view page,
-             std::size_t viewers, Action action);
+  HttpServer(const HostPort& address, HttpPolicy policy, std::string_view page, std::size_t viewers,
+             Action action);
 
   /// Waits for clients, at most `timeout`, and serves them.
   void step(std::chrono::milliseconds timeout);

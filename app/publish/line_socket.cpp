@@ -21,15 +21,15 @@ namespace {
 
 constexpr std::size_t kReaders = 8;  // robots have a handful of programs that want the pose
 constexpr Duration kPatience = Duration::seconds(5);  // for a reader that does not read
-constexpr int kPending = 4;  // connections that wait between two frames
+constexpr int kPending = 4;                           // connections that wait between two frames
 
 /// Takes away a socket file that nobody listens to any more: of a program that was killed.
 void remove_stale(const sockaddr_un& address, std::string_view key) {
   struct stat status {};
   if (::lstat(address.sun_path, &status) != 0) return;
   if (!S_ISSOCK(status.st_mode))
-    throw InputError(fmt::format("{}: {} is there and is no socket; name another path", key,
-                                 address.sun_path));
+    throw InputError(
+        fmt::format("{}: {} is there and is no socket; name another path", key, address.sun_path));
   const FileDescriptor probe(::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
   if (::connect(probe.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0 ||
       errno == EAGAIN)
@@ -135,8 +135,8 @@ class UdpLineSocket final : public LineSocket {
   UdpLineSocket(const HostPort& address, std::string_view key) {
     addrinfo hints{}, *found = nullptr;
     hints.ai_socktype = SOCK_DGRAM;
-    const int error = ::getaddrinfo(address.host.c_str(), std::to_string(address.port).c_str(),
-                                    &hints, &found);
+    const int error =
+        ::getaddrinfo(address.host.c_str(), std::to_string(address.port).c_str(), &hints, &found);
     if (error != 0)
       throw InputError(fmt::format("{}: {} is not known ({}); give its number, e.g. 127.0.0.1:{}",
                                    key, address.host, ::gai_strerror(error), address.port));

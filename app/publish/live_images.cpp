@@ -48,12 +48,10 @@ void LiveImages::take_images(const RigFrame& frame) noexcept {
   owner_.store(Owner::filling, std::memory_order_relaxed);
 }
 
-void LiveImages::take_points(const RigFrame& frame,
-                             const calibration::TrackLog& tracks) noexcept {
+void LiveImages::take_points(const RigFrame& frame, const calibration::TrackLog& tracks) noexcept {
   if (owner_.load(std::memory_order_relaxed) != Owner::filling) return;
   if (!tracks.empty() && tracks.frame(tracks.size() - 1).number == frame.number)
-    for (const calibration::LoggedObservation& o :
-         tracks.frame(tracks.size() - 1).observations) {
+    for (const calibration::LoggedObservation& o : tracks.frame(tracks.size() - 1).observations) {
       if (!o.by(0)) continue;
       LivePoint point{{o.raw[0].x(), o.raw[0].y()}, {}, o.by(1)};
       if (point.both) point.right = {o.raw[1].x(), o.raw[1].y()};
@@ -96,8 +94,8 @@ bool compress(std::uint8_t* pixels, int width, int height, unsigned char** out,
   jpeg.dct_method = JDCT_IFAST;
   jpeg_start_compress(&jpeg, TRUE);
   while (jpeg.next_scanline < jpeg.image_height) {
-    JSAMPROW row = pixels + static_cast<std::size_t>(jpeg.next_scanline) *
-                                static_cast<std::size_t>(width);
+    JSAMPROW row =
+        pixels + static_cast<std::size_t>(jpeg.next_scanline) * static_cast<std::size_t>(width);
     (void)jpeg_write_scanlines(&jpeg, &row, 1);
   }
   jpeg_finish_compress(&jpeg);
@@ -107,8 +105,7 @@ bool compress(std::uint8_t* pixels, int width, int height, unsigned char** out,
 
 /// Means of `step` columns by `taken` rows.
 std::vector<std::uint8_t> shrunk(const LiveImages::Picture& p, int width, int height) {
-  std::vector<std::uint8_t> out(static_cast<std::size_t>(width) *
-                                static_cast<std::size_t>(height));
+  std::vector<std::uint8_t> out(static_cast<std::size_t>(width) * static_cast<std::size_t>(height));
   const int count = p.step * p.taken;
   auto to = out.begin();
   for (int y = 0; y < height; ++y) {

@@ -54,9 +54,7 @@ class LiveImages {
   void done() noexcept { owner_.store(Owner::nobody, std::memory_order_release); }
   [[nodiscard]] std::uint64_t frame() const noexcept { return frame_; }
   [[nodiscard]] std::span<const Picture, 2> pictures() const noexcept { return pictures_; }
-  [[nodiscard]] std::span<const LivePoint> points() const noexcept {
-    return points_.span();
-  }
+  [[nodiscard]] std::span<const LivePoint> points() const noexcept { return points_.span(); }
 
  private:
   enum class Owner : std::uint8_t { nobody, estimator, filling, viewer };

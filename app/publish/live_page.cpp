@@ -15,9 +15,9 @@ namespace {
 using std::chrono::milliseconds;
 
 constexpr milliseconds kBetweenUpdates{100};  // 10 a second: what an eye follows
-constexpr milliseconds kAlone{500};  // without a viewer: rings of 256 frames hold longer
-constexpr milliseconds kFarewell{200};  // for the end of the drive to reach its viewers
-constexpr int kNiceness = 5;            // beside the estimator's threads
+constexpr milliseconds kAlone{500};           // without a viewer: rings of 256 frames hold longer
+constexpr milliseconds kFarewell{200};        // for the end of the drive to reach its viewers
+constexpr int kNiceness = 5;                  // beside the estimator's threads
 
 }  // namespace
 

@@ -19,7 +19,8 @@ namespace vergence::app {
 
 /// `publish.http`: the live page (docs/publish.md).
 ///
-/// Threads  on_…(): the estimator's, which pushes into rings and, when a viewer waits for a picture,
+/// Threads  on_…(): the estimator's, which pushes into rings and, when a viewer waits for a
+/// picture,
 ///          copies rows of two images; no lock, no system call. Everything else: a thread of its
 ///          own, made by the constructor, that yields to the estimator's where a core is short.
 /// Memory   Rings fixed; the images' memory in on_start(). Ring full: frames are left out, totals
@@ -34,8 +35,7 @@ class LivePage final : public SessionObserver {
   };
 
   /// `requests` outlives it. `line_age_ms`: of the pose lines, 99th percentile; negative: none.
-  LivePage(const Options& options, SessionRequests* requests,
-           std::function<double()> line_age_ms);
+  LivePage(const Options& options, SessionRequests* requests, std::function<double()> line_age_ms);
   ~LivePage() override;
   LivePage(const LivePage&) = delete;
   LivePage& operator=(const LivePage&) = delete;

@@ -81,8 +81,7 @@ void LiveState::add(const PoseRecord& compared) {
   compared_ = compared;
   if (compared.status == PoseStatus::lost && !compared.ins_valid) return;
   Place place;
-  for (std::size_t i = 0; i < 3; ++i)
-    place.world[i] = static_cast<float>(compared.world_left.t[i]);
+  for (std::size_t i = 0; i < 3; ++i) place.world[i] = static_cast<float>(compared.world_left.t[i]);
   place.status = static_cast<std::uint8_t>(compared.status);
   if (compared.status == PoseStatus::lost && !trail_.empty()) place.world = trail_.back().world;
   if (compared.ins_valid)
@@ -105,6 +104,12 @@ void LiveState::add(const PoseRecord& compared) {
 void LiveState::add(const EventRecord& event) {
   if (events_.size() == kEvents) events_.pop_front();
   events_.push_back(event);
+  const std::string_view kind = event.kind;
+  const bool confirmed = kind == "calibration_confirmed";
+  if (confirmed || kind == "calibration_contradicted" || kind == "rig_changed") {
+    confirmed_ = confirmed;
+    calibration_new_ = true;
+  }
   ++events_seen_;
 }
 
@@ -112,7 +117,10 @@ void LiveState::add(const CalibrationRecord& calibration) {
   if (calibrations_.size() == kCalibrations) calibrations_.pop_front();
   calibrations_.push_back(calibration);
   calibration_new_ = true;
+  if (calibration.learnt) measured_ = calibration;
   if (!calibration.accepted) return;
+  measured_.reset();
+  if (calibration.decided) confirmed_ = calibration.verified;
   in_use_ = calibration;
   rig_ = calibration.rig.rig();
 }
@@ -171,17 +179,26 @@ json LiveState::calibration_json() const {
   if (rig_)
     for (std::size_t k = 0; k < static_cast<std::size_t>(rig_->cameras); ++k)
       out["cameras"].push_back(camera_json(*rig_, k));
+  if (measured_) {
+    const RigCalibration rig = measured_->rig.rig();
+    for (std::size_t k = 0; k < static_cast<std::size_t>(rig.cameras); ++k)
+      out["measured"].push_back(camera_json(rig, k));
+  }
+  out["confirmed"] = confirmed_;
   if (in_use_) {
     out["cause"] = in_use_->cause;
     out["frames"] = in_use_->rig.frames;
-    out["depth"] = in_use_->depth_sigma_percent > 0
-                       ? json({{"at_m", rounded(in_use_->judged_depth_m, 1)},
-                               {"sigma_percent", rounded(in_use_->depth_sigma_percent, 2)}})
+    const CalibrationRecord& known = measured_ ? *measured_ : *in_use_;
+    out["depth"] = known.depth_sigma_percent > 0
+                       ? json({{"at_m", rounded(known.judged_depth_m, 1)},
+                               {"sigma_percent", rounded(known.depth_sigma_percent, 2)}})
                        : json(nullptr);
   }
   for (const CalibrationRecord& c : calibrations_)
     out["history"].push_back({{"s", rounded((c.stamp - start_.first).to_seconds(), 1)},
-                              {"what", c.accepted ? "in use" : c.learnt ? "kept" : "rejected"},
+                              {"what", c.accepted ? "in use"
+                                       : c.learnt ? "kept"
+                                                  : "rejected"},
                               {"cause", c.cause},
                               {"reason", c.reason}});
   return out;
@@ -226,7 +243,8 @@ std::string LiveState::hello() const {
 std::string LiveState::update(double line_age_ms) {
   json out{{"ended", ended_}};
   if (any_) out["now"] = frame_json();
-  if (any_) out["now"]["line_age_p99_ms"] = line_age_ms < 0 ? json(nullptr) : rounded(line_age_ms, 2);
+  if (any_)
+    out["now"]["line_age_p99_ms"] = line_age_ms < 0 ? json(nullptr) : rounded(line_age_ms, 2);
   // Thinned, the places are others than those that were shown: all of them anew.
   if (std::exchange(thinned_, false)) {
     shown_ = 0;

@@ -77,6 +77,8 @@ class LiveState {
   std::uint64_t events_seen_ = 0, events_shown_ = 0;
   std::deque<CalibrationRecord> calibrations_{};
   std::optional<CalibrationRecord> in_use_{};
+  std::optional<CalibrationRecord> measured_{};  // by the drive, beside the one in use
+  bool confirmed_ = false;
   std::optional<RigCalibration> rig_{};
   bool calibration_new_ = false;
   std::optional<PublishedPlacement> placement_{};

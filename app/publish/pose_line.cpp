@@ -2,10 +2,29 @@
 
 #include <cmath>
 #include <iterator>
+#include <limits>
 
 #include <fmt/format.h>
 
 namespace vergence::app {
+namespace {
+
+/// JSON knows no infinity.
+void write_number(double value, int digits, std::string* line) {
+  if (std::isfinite(value))
+    fmt::format_to(std::back_inserter(*line), "{:.{}f}", value, digits);
+  else
+    *line += "null";
+}
+
+bool finite(const PoseNumbers& pose) {
+  double sum = 0;
+  for (const double v : pose.t) sum += v;
+  for (const double v : pose.q) sum += v;
+  return std::isfinite(sum);
+}
+
+}  // namespace
 
 PublishedPose PublishedPose::of(const PoseSample& sample, HostStamp out) noexcept {
   PublishedPose p;
@@ -37,7 +56,7 @@ void write_pose_line(const PublishedPose& pose, const std::optional<EarthNumbers
   fmt::format_to(out, R"({{"version":1,"frame":{},"stamp_ns":{},"state":"{}","status":"{}",)",
                  pose.frame, pose.stamp.ns(), to_string(pose.state), to_string(pose.status));
   fmt::format_to(out, R"("reason":"{}","pose":)", to_string(pose.reason));
-  if (pose.status == PoseStatus::lost) {
+  if (pose.status == PoseStatus::lost || !finite(pose.world_left)) {
     *line += "null";
   } else {
     const auto& [t, q] = pose.world_left;
@@ -52,18 +71,18 @@ void write_pose_line(const PublishedPose& pose, const std::optional<EarthNumbers
   if (pose.status == PoseStatus::lost || !earth) {
     *line += "null";
   } else {
-    fmt::format_to(out, R"({{"enu_m":[{:.4f},{:.4f},{:.4f}],"latitude_deg":{:.9f},)",
-                   earth->enu[0], earth->enu[1], earth->enu[2], earth->position.latitude_deg);
+    fmt::format_to(out, R"({{"enu_m":[{:.4f},{:.4f},{:.4f}],"latitude_deg":{:.9f},)", earth->enu[0],
+                   earth->enu[1], earth->enu[2], earth->position.latitude_deg);
     fmt::format_to(out, R"("longitude_deg":{:.9f},"height_m":{:.4f},"heading_deg":{:.4f}}})",
                    earth->position.longitude_deg, earth->position.height_m, earth->heading_deg);
   }
-  fmt::format_to(out, R"(,"inliers":{},"stereo_inliers":{},"reprojection_px":{:.4f},)",
-                 pose.inliers, pose.stereo_inliers, pose.reprojection_px);
-  fmt::format_to(out, R"("estimate_ms":{:.3f},"age_ms":)", pose.estimate_ms);
-  if (age_ms)
-    fmt::format_to(out, "{:.3f}", *age_ms);
-  else
-    *line += "null";
+  fmt::format_to(out, R"(,"inliers":{},"stereo_inliers":{},"reprojection_px":)", pose.inliers,
+                 pose.stereo_inliers);
+  write_number(pose.reprojection_px, 4, line);
+  *line += R"(,"estimate_ms":)";
+  write_number(static_cast<double>(pose.estimate_ms), 3, line);
+  *line += R"(,"age_ms":)";
+  write_number(age_ms.value_or(std::numeric_limits<double>::quiet_NaN()), 3, line);
   fmt::format_to(out, ",\"dropped\":{}}}\n", dropped);
 }
 

@@ -33,9 +33,10 @@ std::string read_token(const std::filesystem::path& file) {
   std::ifstream in(file);
   std::string line(kMostToken + 2, '\0');
   if (!in)
-    throw InputError(fmt::format("publish.token_file: {} cannot be read; write a line of letters "
-                                 "and digits into it",
-                                 file.string()));
+    throw InputError(
+        fmt::format("publish.token_file: {} cannot be read; write a line of letters "
+                    "and digits into it",
+                    file.string()));
   in.getline(line.data(), static_cast<std::streamsize>(line.size()));
   line.resize(std::strlen(line.c_str()));
   const bool plain = std::all_of(line.begin(), line.end(), [](char c) {
@@ -43,9 +44,10 @@ std::string read_token(const std::filesystem::path& file) {
            c == '_';
   });
   if (line.size() < kLeastToken || line.size() > kMostToken || !plain)
-    throw InputError(fmt::format("publish.token_file: the first line of {} is no token: {} to {} "
-                                 "letters, digits, - and _",
-                                 file.string(), kLeastToken, kMostToken));
+    throw InputError(
+        fmt::format("publish.token_file: the first line of {} is no token: {} to {} "
+                    "letters, digits, - and _",
+                    file.string(), kLeastToken, kMostToken));
   return line;
 }
 
@@ -78,13 +80,17 @@ void Publishing::open_page(const Configuration& configuration) {
     page_ = std::make_unique<LivePage>(
         options, &requests_, [lines = lines_.get()] { return lines ? lines->age_p99_ms() : -1; });
     // Behind a # it goes into no request, and into nobody's log.
-    address_ = fmt::format("http://{}/{}{}", options.address.text(),
-                           settings.token_file.empty() ? "#" : "#TOKEN, the first line of ",
-                           settings.token_file.empty() ? options.policy.token
-                                                       : settings.token_file);
+    address_ = settings.token_file.empty()
+                   ? fmt::format("http://{}/#{}", options.address.text(), options.policy.token)
+                   : fmt::format("http://{}/#TOKEN (TOKEN: the first line of {})",
+                                 options.address.text(), settings.token_file);
   } catch (const InputError& e) {
     fmt::print(stderr, "vergence: {}; the drive goes on without its page\n", e.what());
   }
+}
+
+void page_by_default(Configuration* configuration) {
+  if (configuration->publish.http.empty()) configuration->publish.http = "127.0.0.1:8080";
 }
 
 void Publishing::attach(SessionOptions* session) {

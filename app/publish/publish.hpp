@@ -31,4 +31,7 @@ class Publishing {
   std::string address_{};  // of the page, for a person to open
 };
 
+/// `--page`: the live page on this machine, where the configuration names no address.
+void page_by_default(Configuration* configuration);
+
 }  // namespace vergence::app

@@ -43,9 +43,8 @@ std::array<std::string, 3> closing_lines(const ReportOutcome& outcome, const std
             "to do: mend what keeps the report from being written, then vergence report SESSION",
             "report: " + failure};
   const std::string why = outcome.reasons.empty() ? outcome.headline
-                          : outcome.usable
-                              ? outcome.grade + ": " + first_of(outcome.reasons, "")
-                              : "do not use these poses: " + outcome.main_reason;
+                          : outcome.usable ? outcome.grade + ": " + first_of(outcome.reasons, "")
+                                           : "do not use these poses: " + outcome.main_reason;
   return {"verdict: " + why,
           "to do: " + first_of(outcome.advice, "nothing, these poses can be used as they are"),
           "report: " + outcome.page.string()};

@@ -50,15 +50,14 @@ function rows(table, list) {
   if (table.rows.length !== list.length) {
     table.replaceChildren(...list.map(() => {
       const tr = document.createElement("tr");
-      tr.append(document.createElement("th"), document.createElement("td"));
+      tr.append(document.createElement("th"), ...list[0].slice(1).map(() => document.createElement("td")));
       return tr;
     }));
   }
-  list.forEach(([name, value], i) => {
-    const [th, td] = table.rows[i].cells;
-    if (th.textContent !== name) th.textContent = name;
-    if (td.textContent !== String(value)) td.textContent = value;
-  });
+  list.forEach((values, i) => values.forEach((value, k) => {
+    const cell = table.rows[i].cells[k];
+    if (cell.textContent !== String(value)) cell.textContent = value;
+  }));
 }
 
 function item(text) {
@@ -67,32 +66,36 @@ function item(text) {
   return li;
 }
 
+const EVENTS = 10, HISTORY = 4;  // that a page has room for; files have all of them
+
 function showEvents(list, anew) {
   const ul = $("events");
   if (anew) ul.replaceChildren();
   for (const e of list) ul.prepend(item(`${number(e.s, 1)} s · ${e.kind.replaceAll("_", " ")} · ${e.sentence}`));
-  while (ul.childElementCount > 60) ul.lastChild.remove();
+  while (ul.childElementCount > EVENTS) ul.lastChild.remove();
 }
 
 function showCalibration(c) {
   drive.rig = c.cameras;
   const words = c.cameras.length < 2 ? "none yet: drive past things at the roadside"
-    : "in use: " + (c.cause || "given").replaceAll("_", " ");
+    : `${(c.cause || "given").replaceAll("_", " ")}, ${c.confirmed ? "confirmed by the drive" : "not confirmed yet"}`;
   show("calibration_words", words + (c.depth ? ` · depth ±${number(2 * c.depth.sigma_percent, 1)} % at ${number(c.depth.at_m, 0)} m` : ""));
   const names = ["rotation x, °", "rotation y, °", "rotation z, °", "translation x, mm", "translation y, mm", "translation z, mm"];
   const parts = [];
   for (let k = 1; k < c.cameras.length; ++k) {
     const table = document.createElement("table");
-    rows(table, c.cameras[k].figures.map(([value, sigma], i) =>
-      [(c.cameras.length > 2 ? `camera ${k}: ` : "") + names[i],
-       number(value, i < 3 ? 4 : 2) + (sigma === null ? "" : " ± " + number(sigma, i < 3 ? 4 : 2))]));
+    const text = ([value, sigma], i) => number(value, i < 3 ? 4 : 2) + (sigma === null ? "" : " ± " + number(sigma, i < 3 ? 4 : 2));
+    const measured = c.measured ? c.measured[k].figures : null;
+    rows(table, [["", measured ? "in use" : "in use, ± 2 σ", ...(measured ? ["measured, ± 2 σ"] : [])],
+      ...c.cameras[k].figures.map((f, i) =>
+        [(c.cameras.length > 2 ? `camera ${k}: ` : "") + names[i], text(f, i), ...(measured ? [text(measured[i], i)] : [])])]);
     parts.push(table);
   }
   const note = document.createElement("p");
   note.className = "soft";
-  note.textContent = "± is 2 σ, with uncertain lenses; without it none is known yet.";
+  note.textContent = "σ with uncertain lenses; a calibration that was given without has none until the drive has measured.";
   $("calibration").replaceChildren(...parts, ...(parts.length ? [note] : []));
-  $("history").replaceChildren(...c.history.slice().reverse().map(h =>
+  $("history").replaceChildren(...c.history.slice(-HISTORY).reverse().map(h =>
     item(`${number(h.s, 1)} s · ${h.what} · ${h.cause.replaceAll("_", " ")}${h.reason ? " · " + h.reason : ""}`)));
 }
 
