@@ -27,7 +27,7 @@ def main():
     for line in lines(sys.argv[1]):
         pose = json.loads(line)
         place = ["%9.3f" % v for v in pose["pose"]["position_m"]] if pose["pose"] else ["no pose"]
-        print(pose["frame"], pose["status"], pose["reason"], *place, flush=True)
+        print(pose["frame"], pose["status"], pose["reason"] or "-", *place, flush=True)
 
 
 if __name__ == "__main__":
