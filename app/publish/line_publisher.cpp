@@ -1,10 +1,17 @@
 #include "app/publish/line_publisher.hpp"
 
 #include <pthread.h>
+#include <sys/resource.h>
+#include <unistd.h>
 
 #include "drivers/clock.hpp"
 
 namespace vergence::app {
+namespace {
+
+constexpr int kNiceness = -10;
+
+}  // namespace
 
 LinePublisher::LinePublisher(std::unique_ptr<LineSocket> socket)
     : socket_(std::move(socket)), thread_([this] { work(); }) {}
@@ -31,6 +38,9 @@ void LinePublisher::on_placement(const Placement& placement, const Geodetic& ori
 
 void LinePublisher::work() noexcept {
   (void)pthread_setname_np(pthread_self(), "vergence-lines");
+  // A tenth of a percent of a core, for which somebody waits: before other work, where the system
+  // lets us.
+  (void)::setpriority(PRIO_PROCESS, static_cast<id_t>(::gettid()), kNiceness);
   for (;;) {
     const WakeEvent::Ticket seen = wake_.ticket();
     const bool last = stop_.load(std::memory_order_acquire);

@@ -1,14 +1,11 @@
 #include "app/publish/live_images.hpp"
 
 #include <algorithm>
-#include <csetjmp>
-#include <cstdio>
-#include <cstdlib>
+#include <cmath>
 #include <cstring>
 #include <string_view>
 
-#include <jpeglib.h>
-
+#include "app/datasets/jpeg_writer.hpp"
 #include "core/camera/camera.hpp"
 #include "core/geometry/epipolar.hpp"
 #include "core/geometry/triangulate.hpp"
@@ -62,47 +59,6 @@ void LiveImages::take_points(const RigFrame& frame, const calibration::TrackLog&
 
 namespace {
 
-struct JpegFailure {
-  jpeg_error_mgr manager;
-  std::jmp_buf back;
-};
-
-[[noreturn]] void jump_back(j_common_ptr info) {
-  std::longjmp(reinterpret_cast<JpegFailure*>(info->err)->back, 1);
-}
-
-/// Between setjmp and libjpeg's longjmp nothing may stand that has a destructor.
-bool compress(std::uint8_t* pixels, int width, int height, unsigned char** out,
-              unsigned long* size) noexcept {
-  constexpr int kQuality = 70;
-  jpeg_compress_struct jpeg{};
-  JpegFailure failure{};
-  jpeg.err = jpeg_std_error(&failure.manager);
-  failure.manager.error_exit = jump_back;
-  if (setjmp(failure.back) != 0) {
-    jpeg_destroy_compress(&jpeg);
-    return false;
-  }
-  jpeg_create_compress(&jpeg);
-  jpeg_mem_dest(&jpeg, out, size);
-  jpeg.image_width = static_cast<JDIMENSION>(width);
-  jpeg.image_height = static_cast<JDIMENSION>(height);
-  jpeg.input_components = 1;
-  jpeg.in_color_space = JCS_GRAYSCALE;
-  jpeg_set_defaults(&jpeg);
-  jpeg_set_quality(&jpeg, kQuality, TRUE);
-  jpeg.dct_method = JDCT_IFAST;
-  jpeg_start_compress(&jpeg, TRUE);
-  while (jpeg.next_scanline < jpeg.image_height) {
-    JSAMPROW row =
-        pixels + static_cast<std::size_t>(jpeg.next_scanline) * static_cast<std::size_t>(width);
-    (void)jpeg_write_scanlines(&jpeg, &row, 1);
-  }
-  jpeg_finish_compress(&jpeg);
-  jpeg_destroy_compress(&jpeg);
-  return true;
-}
-
 /// Means of `step` columns by `taken` rows.
 std::vector<std::uint8_t> shrunk(const LiveImages::Picture& p, int width, int height) {
   std::vector<std::uint8_t> out(static_cast<std::size_t>(width) * static_cast<std::size_t>(height));
@@ -126,14 +82,9 @@ std::vector<std::uint8_t> shrunk(const LiveImages::Picture& p, int width, int he
 std::string thumbnail(const LiveImages::Picture& picture) {
   const int width = picture.width / picture.step, height = picture.height / picture.step;
   if (width < 1 || height < 1) return {};
-  std::vector<std::uint8_t> pixels = shrunk(picture, width, height);
-  unsigned char* bytes = nullptr;
-  unsigned long size = 0;
-  const bool done = compress(pixels.data(), width, height, &bytes, &size);
-  std::string out;
-  if (done) out.assign(reinterpret_cast<const char*>(bytes), size);
-  std::free(bytes);
-  return out;
+  constexpr int kQuality = 70;  // grey blocks do not show beside the points
+  const std::vector<std::uint8_t> pixels = shrunk(picture, width, height);
+  return grey_jpeg({pixels.data(), width, height, width}, kQuality);
 }
 
 std::string base64(std::string_view bytes) {

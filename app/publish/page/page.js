@@ -316,6 +316,7 @@ function connect() {
     ++window.updates;
   });
   source.addEventListener("images", e => { showImages(JSON.parse(e.data)); });
+  source.onopen = () => link("connected, waiting for the session to begin", false);
   source.onerror = () => {
     link(drive.ended ? "the drive is over; the page waits for the next one" : "no connection: trying again", !drive.ended);
     // A refusal ends the stream for good; the next drive may let us in.
