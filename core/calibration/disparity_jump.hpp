@@ -42,6 +42,9 @@ class DisparityJumpDetector {
   /// The cameras' transform and pinholes in use; forgets the frame before.
   void set_reference(const Transform& T_camera_left, const Pinhole& left,
                      const Pinhole& camera) noexcept;
+  /// The same rig known better, or from one frame to the next where the cameras are not linked: the
+  /// frame before stays.
+  void set_transform(const Transform& T_camera_left) noexcept { T_camera_left_ = T_camera_left; }
   /// The scene was lost: the next frame is compared with none.
   void reset() noexcept {
     count_ = 0;
