@@ -5,7 +5,10 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <cstdio>
+#include <exception>
 
+#include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
 #include "app/publish/page_html.hpp"
@@ -29,7 +32,15 @@ LivePage::LivePage(const Options& options, SessionRequests* requests,
       line_age_ms_(std::move(line_age_ms)),
       server_(options.address, options.policy, page_html(), options.viewers,
               [this](HttpRoute route) { act(route); }),
-      thread_([this] { work(); }) {}
+      thread_([this] {
+        try {
+          work();
+        } catch (
+            const std::exception& e) {  // no memory: whoever looks loses the page, not the drive
+          fmt::print(stderr, "vergence: the live page has ended ({}); the drive goes on\n",
+                     e.what());
+        }
+      }) {}
 
 LivePage::~LivePage() {
   stop_.store(true, std::memory_order_release);

@@ -29,9 +29,12 @@ def seconds_of(process, name):
     """CPU time of the threads of that name."""
     total = 0
     for task in pathlib.Path(f"/proc/{process.pid}/task").iterdir():
-        if (task / "comm").read_text().strip() == name:
-            fields = (task / "stat").read_text().rpartition(")")[2].split()
-            total += (int(fields[11]) + int(fields[12])) / TICKS
+        try:
+            if (task / "comm").read_text().strip() == name:
+                fields = (task / "stat").read_text().rpartition(")")[2].split()
+                total += (int(fields[11]) + int(fields[12])) / TICKS
+        except (FileNotFoundError, ProcessLookupError):
+            pass  # a thread that has just ended is none of those
     return total
 
 

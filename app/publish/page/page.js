@@ -9,6 +9,8 @@ const colour = name => getComputedStyle(document.documentElement).getPropertyVal
 const STATES = {initialising: "starting", parallel_monocular: "without a calibration, cameras apart", calibrating: "calibrating",
                 stereo_odometry: "stereo odometry", recalibrating: "calibrating anew", lost: "lost"};
 const token = () => decodeURIComponent(location.hash.slice(1));
+const CAUSES = {given: "given", state_file: "from the last drive", whole_drive: "from the whole drive", knock: "found anew after a knock",
+                collapse: "found anew after a hard knock", drift: "found anew after a drift"};
 const drive = {trail: [], placement: null, rig: [], now: null, can: {}, ended: false};
 let picture = null, hover = null, drawing = false;
 
@@ -78,7 +80,7 @@ function showEvents(list, anew) {
 function showCalibration(c) {
   drive.rig = c.cameras;
   const words = c.cameras.length < 2 ? "none yet: drive past things at the roadside"
-    : `${(c.cause || "given").replaceAll("_", " ")}, ${c.confirmed ? "confirmed by the drive" : "not confirmed yet"}`;
+    : `${CAUSES[c.cause] || "found: " + (c.cause || "").replaceAll("_", " ")}, ${c.confirmed ? "confirmed by the drive" : "not confirmed yet"}`;
   show("calibration_words", words + (c.depth ? ` · depth ±${number(2 * c.depth.sigma_percent, 1)} % at ${number(c.depth.at_m, 0)} m` : ""));
   const names = ["rotation x, °", "rotation y, °", "rotation z, °", "translation x, mm", "translation y, mm", "translation z, mm"];
   const parts = [];
