@@ -87,7 +87,8 @@ std::string_view name_of(std::string_view host) noexcept {
 bool names_this_machine(std::string_view host, const HttpPolicy& policy) noexcept {
   const std::string_view name = name_of(host);
   if (name == policy.host || name == "localhost" || name == "::1") return true;
-  return name.starts_with("127.") && name.find_first_not_of("0123456789.") == name.npos;
+  return name.starts_with("127.") &&
+         name.find_first_not_of("0123456789.") == std::string_view::npos;
 }
 
 bool same_origin(const HttpRequest& r) noexcept {
