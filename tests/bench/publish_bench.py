@@ -67,13 +67,13 @@ def main():
         driver = browser.Driver(shutil.which("chromedriver"), shutil.which("chromium"), str(below / "profile"))
         try:
             driver.word("POST", "/url", {"url": url})
-            paint = driver.word("POST", "/execute/sync", {"script": "return performance.getEntriesByName('first-contentful-paint')[0].startTime",
-                                                          "args": []})
             time.sleep(2)
             count = {"script": "return [window.updates, performance.now()]", "args": []}
             first, begin = driver.word("POST", "/execute/sync", count)
             watched = shares(run.process, given.seconds, names)
             last, end = driver.word("POST", "/execute/sync", count)
+            paint = driver.word("POST", "/execute/sync", {"script": "return performance.getEntriesByName('first-contentful-paint')[0].startTime",
+                                                          "args": []})
         finally:
             driver.close()
         run.stop()

@@ -51,7 +51,7 @@ def looks(driver, url, problems, pictures):
             backgrounds.add(seen["background"])
             problems += [f"{size}, {theme}: {p}" for p in browser.problems_of(seen, 9.0)]
             problems += [f"{size}, {theme}: console says {e['message'][:200]}" for e in driver.word("POST", "/se/log", {"type": "browser"})]
-            paint = driver.word("POST", "/execute/sync", {"script": "return performance.getEntriesByName('first-contentful-paint')[0].startTime", "args": []})
+            paint = driver.word("POST", "/execute/sync", {"script": "return performance.getEntriesByName('first-contentful-paint')[0]?.startTime ?? 99999", "args": []})
             print(f"{size}, {theme}: first paint after {paint:.0f} ms")
             if paint > 2000:  # of a machine under load; the figure itself is publish_bench's
                 problems.append(f"{size}, {theme}: first paint after {paint:.0f} ms")
