@@ -7,6 +7,7 @@
 #include "app/command_line/common_options.hpp"
 #include "app/commands/commands.hpp"
 #include "app/datasets/sequence_format.hpp"
+#include "app/publish/publish.hpp"
 #include "app/session/replay_session.hpp"
 
 namespace vergence::app {
@@ -22,7 +23,7 @@ struct Arguments {
   std::optional<std::int64_t> frames;
   std::optional<double> baseline, focal;
   std::optional<std::string> distortion;
-  bool from_scratch = false, calibrate_first = false, memory = false;
+  bool from_scratch = false, calibrate_first = false, memory = false, page = false;
 };
 
 std::optional<KnownNumbers> known_numbers(const Arguments& a) {
@@ -143,8 +144,17 @@ void add_replay(CLI::App& root, ExitCode* exit_code) {
                     "found (twice the drive more)");
   declare_also(*command, &a->also);
   command->add_flag("--memory", a->memory, "Print what memory is held, by whom");
+  command->add_flag("--page", a->page,
+                    "Show the session on a page in a browser: publish.http, 127.0.0.1:8080 unless "
+                    "the configuration says otherwise");
   a->common.declare(*command);
-  command->callback([a, exit_code] { *exit_code = run_replay(request_of(*a)); });
+  command->callback([a, exit_code] {
+    ReplayRequest request = request_of(*a);
+    if (a->page) page_by_default(&request.configuration);
+    Publishing publishing(request.configuration);
+    publishing.attach(&request.session);
+    *exit_code = run_replay(request);
+  });
 }
 
 }  // namespace vergence::app

@@ -5,6 +5,7 @@
 
 #include "app/command_line/common_options.hpp"
 #include "app/commands/commands.hpp"
+#include "app/publish/publish.hpp"
 #include "app/session/live_session.hpp"
 
 namespace vergence::app {
@@ -17,7 +18,7 @@ struct Arguments {
   std::vector<std::string> faults;
   std::optional<std::string> calibration, also, record;
   std::optional<double> duration_s;
-  bool fast = false, from_scratch = false, memory = false;
+  bool fast = false, from_scratch = false, memory = false, page = false;
 };
 
 RunRequest request_of(const Arguments& a) {
@@ -78,8 +79,17 @@ void add_run(CLI::App& root, ExitCode* exit_code) {
       ->type_name("WORDS");
   declare_also(*command, &a->also);
   command->add_flag("--memory", a->memory, "Print what memory is held, by whom");
+  command->add_flag("--page", a->page,
+                    "Show the session on a page in a browser: publish.http, 127.0.0.1:8080 unless "
+                    "the configuration says otherwise");
   a->common.declare(*command);
-  command->callback([a, exit_code] { *exit_code = run_drive(request_of(*a)); });
+  command->callback([a, exit_code] {
+    RunRequest request = request_of(*a);
+    if (a->page) page_by_default(&request.configuration);
+    Publishing publishing(request.configuration);
+    publishing.attach(&request.session);
+    *exit_code = run_drive(request);
+  });
 }
 
 }  // namespace vergence::app

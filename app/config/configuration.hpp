@@ -138,6 +138,14 @@ struct RecordSettings {
   [[nodiscard]] bool any() const noexcept { return poses + ins + images > 0; }
 };
 
+/// `publish:` what others see of a running session (docs/publish.md). Empty: nothing.
+struct PublishSettings {
+  std::string lines{};       // unix:///PATH, udp://HOST:PORT
+  std::string http{};        // HOST:PORT of the live page
+  std::string token_file{};  // its first line; empty: a new token each session
+  int viewers = 4;
+};
+
 inline constexpr std::size_t kMostFaults = 16;
 
 /// Everything a user may change, with its defaults. Each member is bound to a row of the schema
@@ -153,6 +161,7 @@ struct Configuration {
   KittiRawSettings kitti_raw{};
   MockSettings mock{};
   RecordSettings record{};
+  PublishSettings publish{};
   std::array<std::string, kMostFaults> faults{};  // `KIND@SECONDS NAME=NUMBER …`; empty: none
   OdometryOptions odometry{};
   calibration::CalibrationOptions calibration{};

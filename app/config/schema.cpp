@@ -693,6 +693,24 @@ Group record() {
       .done();
 }
 
+Group publish() {
+  using P = PublishSettings;
+  return Rows<P>(
+             "publish", "What others see of a running session, live or replayed (docs/publish.md).",
+             [](auto& c) -> auto& { return c.publish; })
+      .text("lines", &P::lines, 200,
+            "One JSON object a frame goes there: `unix:///PATH` (a stream socket that readers "
+            "connect to) or `udp://HOST:PORT`; empty: nowhere.")
+      .text("http", &P::http, 200,
+            "HOST:PORT of the live page, e.g. `127.0.0.1:8080`; beyond this machine viewers need "
+            "the token. Empty: no page.")
+      .text("token_file", &P::token_file, 400,
+            "File whose first line is the page's token, 16 to 128 letters and digits; empty: a "
+            "new one each session, shown when it starts.")
+      .integer("viewers", &P::viewers, 1, 16, "viewers", "So many may look at the page at a time.")
+      .done();
+}
+
 }  // namespace
 
 const std::vector<Group>& schema() {
@@ -700,7 +718,8 @@ const std::vector<Group>& schema() {
                                          exposure(), ins(),        trigger(),
                                          sync(),     odometry(),   calibration_options(),
                                          monitor(),  comparison(), kitti_raw(),
-                                         mock(),     record(),     faults()};
+                                         mock(),     record(),     publish(),
+                                         faults()};
   return groups;
 }
 

@@ -1,4 +1,5 @@
 #pragma once
+#include <array>
 #include <filesystem>
 #include <string>
 #include <vector>
@@ -11,8 +12,16 @@ struct ReportOutcome {
   std::string headline;        // "Good", "Usable with care", "Do not use", and why, in one sentence
   bool usable = true;          // false: no pose can be relied on
   std::string main_reason{};   // then: why, with counts, and what to do
+  std::string grade{};         // the headline's beginning
+  std::vector<std::string> reasons{};  // half sentences, the worst first
+  std::vector<std::string> advice{};   // what to do next, whole sentences
   std::vector<std::string> missing{};  // sentences: files or lines that were not there or not whole
 };
+
+/// The end of a drive for a terminal, three lines: usable or not and why, what to do, where the
+/// report is. `failure`: why there is no report, empty: there is one.
+[[nodiscard]] std::array<std::string, 3> closing_lines(const ReportOutcome& outcome,
+                                                       const std::string& failure);
 
 /// Writes SESSION/report.html from the session's other files (DESIGN §6): one self-contained page,
 /// inline SVG, no script.

@@ -104,11 +104,12 @@ std::string variables(bool dark) {
 
 }  // namespace
 
-std::string style_sheet() {
+std::string palette() {
   // Paper is light whatever the screen's theme.
   return ":root{color-scheme:light dark;" + variables(false) +
-         "}\n@media screen and (prefers-color-scheme:dark){:root{" + variables(true) + "}}" +
-         kRules;
+         "}\n@media screen and (prefers-color-scheme:dark){:root{" + variables(true) + "}}";
 }
+
+std::string style_sheet() { return palette() + kRules; }
 
 }  // namespace vergence::app::report

@@ -22,6 +22,9 @@ inline constexpr std::array kColours{
     Colour{"third", "#7a3fb0", "#c79bf2", true},  Colour{"fourth", "#00707a", "#4fc7d1", true},
 };
 
+/// The colours as CSS variables, light and dark.
+[[nodiscard]] std::string palette();
+
 /// The page's style sheet: both themes, phone, print.
 [[nodiscard]] std::string style_sheet();
 

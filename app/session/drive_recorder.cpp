@@ -139,6 +139,7 @@ DriveRecorder::DriveRecorder(const std::filesystem::path& folder,
 template <class Write>
 std::uint32_t DriveRecorder::post(std::size_t topic, Stamp stamp, std::size_t most, bool bulky,
                                   const Write& write) noexcept {
+  if (stopped_) return 0;
   const auto room = recording_.begin(0, topic, stamp, most, bulky);
   if (room.empty()) return 0;
   CdrWriter out(room);
@@ -283,7 +284,7 @@ void DriveRecorder::on_calibration(const CalibrationRecord& calibration) noexcep
   if (settings_.poses != 0) post_rig(calibration.stamp);
 }
 
-std::vector<std::pair<std::string, std::uint64_t>> DriveRecorder::counters() const {
+std::vector<std::pair<std::string, std::uint64_t>> DriveRecorder::counters() {
   const RecordingCounters c = recording_.counters();
   return {
       {"recorded_messages", c.messages}, {"recorded_bytes", c.bytes},

@@ -38,8 +38,9 @@ class DriveRecorder final : public SessionObserver {
   [[nodiscard]] std::vector<std::string> take_errors() { return recording_.take_errors(); }
   /// Ends the files.
   void close() noexcept { recording_.close(); }
-  /// For the summary.
-  [[nodiscard]] std::vector<std::pair<std::string, std::uint64_t>> counters() const;
+  /// Nothing more is recorded. The estimator's thread.
+  void stop() noexcept { stopped_ = true; }
+  [[nodiscard]] std::vector<std::pair<std::string, std::uint64_t>> counters() override;
   [[nodiscard]] std::size_t memory() const noexcept { return recording_.counters().queue_bytes; }
 
  private:
@@ -58,7 +59,7 @@ class DriveRecorder final : public SessionObserver {
 
   // Of the estimator's thread.
   RigCalibration rig_;
-  bool calibrated_ = false, rig_posted_ = false, recalibrate_ = false;
+  bool calibrated_ = false, rig_posted_ = false, recalibrate_ = false, stopped_ = false;
   FrameRecord frame_{};
   std::uint64_t frames_seen_ = 0;
   Stamp last_health_{};

@@ -15,6 +15,7 @@
 #include "app/runtime/errors.hpp"
 #include "app/runtime/progress.hpp"
 #include "app/session/ins_comparison.hpp"
+#include "app/session/session_observer.hpp"
 #include "app/session/starting_calibration.hpp"
 
 namespace vergence::app {
@@ -61,6 +62,7 @@ struct SourceFacts {
   std::uint64_t frames = 0;                // of the whole drive; 0: nobody knows
   std::size_t expected_frames = 0;         // memory is taken for so many
   Stamp first{};                           // of the drive
+  std::optional<ClockTie> tie{};           // of stamps to this machine's clock, in real time
   std::optional<SourceIns> ins{};
   Trajectory truth{};  // that came with a recording: what an estimate without INS is compared with
   std::vector<SourceRemark> remarks{};

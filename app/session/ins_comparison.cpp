@@ -107,6 +107,7 @@ void InsComparison::note_placement(Stamp stamp) noexcept {
   if (p.revision == placement_revision_) return;
   placement_revision_ = p.revision;
   (void)placements_.push({stamp, p});  // full: the count goes on
+  output_->post(p, comparison_.plane().origin());
   std::array<char, 160> text{};
   constexpr double kDegrees = 180.0 / std::numbers::pi;
   (void)std::snprintf(text.data(), text.size(),

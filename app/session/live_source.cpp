@@ -73,6 +73,7 @@ void LiveSource::make_acquisition() {
         devices_.cameras(), c.width, c.height, masks.views()[0], exposure_options(configuration_),
         starting_exposure(configuration_, 0), request_.fast);
   }
+  if (!request_.fast) facts_.tie = ClockTie{o.tie_stamp, o.tie_host};
   acquisition_ = std::make_unique<Acquisition>(
       exposure_ ? exposure_->cameras() : devices_.cameras(), devices_.ins(), devices_.trigger(), o);
   start_ = o.tie_stamp + (devices_.start() - o.tie_host);

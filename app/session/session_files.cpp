@@ -11,7 +11,6 @@
 #include "app/config/calibration_state.hpp"
 #include "app/recorder/line_file.hpp"
 #include "app/recorder/residual_field.hpp"
-#include "app/report/report.hpp"
 #include "app/runtime/durable_file.hpp"
 #include "app/runtime/errors.hpp"
 #include "app/runtime/thread_runner.hpp"
@@ -137,17 +136,25 @@ void write_session_summary(const std::filesystem::path& session, const SessionTo
   }
 }
 
-bool write_session_report(const std::filesystem::path& session, bool quiet, Progress* progress) {
+SessionReport write_session_report(const std::filesystem::path& session) {
+  SessionReport report;
   try {
-    const ReportOutcome outcome = write_report(session);
-    if (!quiet)
-      progress->say(fmt::format("report {}: {}", outcome.page.string(), outcome.headline));
-    if (!outcome.usable) progress->say("vergence: do not use these poses: " + outcome.main_reason);
-    return outcome.usable;
+    report.outcome = write_report(session);
   } catch (const InputError& e) {
-    progress->say(std::string("vergence: ") + e.what());
-    return true;  // nobody knows better
+    report.failure = e.what();  // the outcome says usable: nobody knows better
   }
+  return report;
+}
+
+void say_verdict(const SessionReport& report, bool quiet, Progress* progress) {
+  if (!quiet) {
+    for (const std::string& line : closing_lines(report.outcome, report.failure))
+      progress->say(line);
+    return;
+  }
+  if (!report.failure.empty()) progress->say("vergence: " + report.failure);
+  if (!report.outcome.usable)
+    progress->say("vergence: do not use these poses: " + report.outcome.main_reason);
 }
 
 void print_memory_table(const std::vector<std::pair<std::string, std::size_t>>& memory) {

@@ -11,6 +11,7 @@
 #include "app/config/calibration_file.hpp"
 #include "app/recorder/match_sample.hpp"
 #include "app/recorder/summary.hpp"
+#include "app/report/report.hpp"
 #include "app/runtime/progress.hpp"
 #include "app/session/session_output.hpp"
 #include "app/session/starting_calibration.hpp"
@@ -61,11 +62,15 @@ void end_session(const std::filesystem::path& session, const StartingCalibration
 void write_session_summary(const std::filesystem::path& session, const SessionTotals& totals,
                            const SummaryInput& input, std::vector<std::string>* faults);
 
-/// report.html of the session, and a line that says where it is and what it says; what goes wrong
-/// is said, too. → false: no pose of the session can be relied on, which is said with the main
-/// reason, quiet or not
-[[nodiscard]] bool write_session_report(const std::filesystem::path& session, bool quiet,
-                                        Progress* progress);
+/// What became of report.html.
+struct SessionReport {
+  ReportOutcome outcome{};
+  std::string failure{};  // why there is none; empty: it is there
+};
+[[nodiscard]] SessionReport write_session_report(const std::filesystem::path& session);
+
+/// The last words of a session: closing_lines(); quiet, only what must not be missed.
+void say_verdict(const SessionReport& report, bool quiet, Progress* progress);
 
 /// The table of --memory, on stdout.
 void print_memory_table(const std::vector<std::pair<std::string, std::size_t>>& memory);

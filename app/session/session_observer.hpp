@@ -1,10 +1,48 @@
 #pragma once
+#include <atomic>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
 #include "app/recorder/ins_file.hpp"
 #include "app/recorder/records.hpp"
+#include "core/calibration/track_log.hpp"
+#include "core/comparison/placement.hpp"
+#include "core/types/calibration.hpp"
 #include "core/types/pose_sample.hpp"
 #include "core/types/rig_frame.hpp"
 
 namespace vergence::app {
+
+/// One moment on both clocks: how stamps of a live session follow from this machine's clock.
+struct ClockTie {
+  Stamp stamp{};
+  HostStamp host{};
+
+  [[nodiscard]] Stamp stamp_at(HostStamp t) const noexcept { return stamp + (t - host); }
+};
+
+/// What is known of a session before its first frame.
+struct SessionStart {
+  std::string name{};             // of the session folder
+  Stamp first{};                  // of the drive
+  std::uint64_t frames = 0;       // of the whole drive; 0: nobody knows
+  std::optional<ClockTie> tie{};  // none in a replay and in virtual time
+  std::size_t image_bytes = 0;    // of one frame of the largest camera
+  bool can_recalibrate = false;   // SessionRequests::recalibrate is listened to
+  bool recording = false;         // a drive.mcap is written
+};
+
+/// What a viewer may ask of a running session. Acts at the next frame.
+///
+/// Threads  Any sets, the estimator's takes. Outlives the session.
+struct SessionRequests {
+  std::atomic<bool> recalibrate{false};     // a new calibration is to be sought
+  std::atomic<bool> mark{false};            // an event `mark` into events.jsonl
+  std::atomic<bool> stop_recording{false};  // no more into drive.mcap; the drive goes on
+};
 
 /// Sees what goes through a session, live or replayed: what a recording of images, a live page or a
 /// line publisher is attached by. RunRequest::observers and ReplayRequest::observers take them.
@@ -25,10 +63,19 @@ class SessionObserver {
  public:
   virtual ~SessionObserver() = default;
 
+  /// The session is about to begin. The caller's thread, not sealed.
+  virtual void on_start(const SessionStart& /*start*/) noexcept {}
+
   /// What the estimator is about to be given: images, stamp, how sure the pairing is.
   virtual void on_frame(const RigFrame& /*frame*/) noexcept {}
   /// What it says of that frame, at once.
   virtual void on_pose(const PoseSample& /*sample*/) noexcept {}
+  /// The newest moving frames with their tracks, after on_pose(); valid until it returns. Empty
+  /// where nothing watches the calibration.
+  virtual void on_tracks(const calibration::TrackLog& /*tracks*/) noexcept {}
+  /// The odometry's world was placed on the earth; `origin` is that of enu. Acts from the next
+  /// pose on.
+  virtual void on_placement(const Placement& /*placement*/, const Geodetic& /*origin*/) noexcept {}
   /// The line of poses.csv: the pose placed on the earth, the INS beside it. Without an INS at
   /// once; with one after the readings around the frame have come.
   virtual void on_compared(const PoseRecord& /*pose*/) noexcept {}
@@ -38,6 +85,9 @@ class SessionObserver {
   virtual void on_event(const EventRecord& /*event*/) noexcept {}
   /// A calibration that was accepted or rejected, or that the session begins with.
   virtual void on_calibration(const CalibrationRecord& /*calibration*/) noexcept {}
+
+  /// For summary.json, block `devices`. The caller's thread, once, after the last frame.
+  [[nodiscard]] virtual std::vector<std::pair<std::string, std::uint64_t>> counters() { return {}; }
 };
 
 }  // namespace vergence::app

@@ -24,6 +24,12 @@ class SessionOutput {
   void post(const PoseSample& sample) noexcept {
     for (SessionObserver* o : observers_) o->on_pose(sample);
   }
+  void post(const calibration::TrackLog& tracks) noexcept {
+    for (SessionObserver* o : observers_) o->on_tracks(tracks);
+  }
+  void post(const Placement& placement, const Geodetic& origin) noexcept {
+    for (SessionObserver* o : observers_) o->on_placement(placement, origin);
+  }
   void post(const PoseRecord& pose) noexcept {
     recorder_->post(Record(pose));
     for (SessionObserver* o : observers_) o->on_compared(pose);

@@ -2,6 +2,7 @@
 
 #include <pthread.h>
 
+#include <algorithm>
 #include <atomic>
 #include <chrono>
 #include <condition_variable>
@@ -39,12 +40,15 @@ class SessionRunner {
 
  private:
   void open(std::vector<std::string>* faults);
+  [[nodiscard]] SessionStart session_start() const;
   void say_remarks(Progress* progress);
   void estimate() noexcept;
   void handle(const SourceFrame& frame) noexcept;
   void handle(const InsRecord& reading) noexcept { comparison_->add(reading); }
   void handle(const SourceEvent& event) noexcept;
   void compare(const PoseSample& sample, float decode_ms) noexcept;
+  void request_recalibration(Stamp stamp, const char* sentence) noexcept;
+  void take_requests(Stamp stamp) noexcept;
   void watch(Progress* progress);
   void say_recording_errors(Progress* progress);
   [[nodiscard]] SummaryInput summary_input(const SessionTotals& totals,
@@ -135,17 +139,37 @@ void SessionRunner::handle(const SourceEvent& event) noexcept {
   journal_.tell(event.record, event.to_user);
 }
 
-void SessionRunner::handle(const SourceFrame& frame) noexcept {
-  if (calibration_asked_.exchange(false, std::memory_order_relaxed)) {
-    estimator_->request_recalibration();
-    journal_.tell(frame.rig.stamp, "recalibration_requested",
-                  "a new calibration was asked for by SIGUSR1", true);
+void SessionRunner::request_recalibration(Stamp stamp, const char* sentence) noexcept {
+  estimator_->request_recalibration();
+  journal_.tell(stamp, "recalibration_requested", sentence, true);
+}
+
+/// What viewers of the session have asked for.
+void SessionRunner::take_requests(Stamp stamp) noexcept {
+  SessionRequests* requests = request_.requests;
+  if (requests == nullptr) return;
+  constexpr auto kOrder = std::memory_order_relaxed;
+  if (requests->recalibrate.exchange(false, kOrder) && facts_.on_request)
+    request_recalibration(stamp, "a new calibration was asked for on the live page");
+  if (requests->mark.exchange(false, kOrder))
+    journal_.tell(stamp, "mark", "marked on the live page", true);
+  if (requests->stop_recording.exchange(false, kOrder) && recording_) {
+    journal_.tell(stamp, "recording_stopped",
+                  "drive.mcap ends here, as asked for on the live page; the drive goes on", true);
+    recording_->stop();
   }
+}
+
+void SessionRunner::handle(const SourceFrame& frame) noexcept {
+  if (calibration_asked_.exchange(false, std::memory_order_relaxed))
+    request_recalibration(frame.rig.stamp, "a new calibration was asked for by SIGUSR1");
+  take_requests(frame.rig.stamp);
   watched_solver_.begin_frame(frame.solver_idle);
   output_.post(frame.rig);
   const PoseSample sample = estimator_->process(frame.rig);
   source_.done(sample);
   output_.post(sample);
+  output_.post(estimator_->tracks());
   journal_.note(*estimator_);
   journal_.note(sample);
   compare(sample, frame.decode_ms);
@@ -200,9 +224,27 @@ void SessionRunner::open(std::vector<std::string>* faults) {
     observers_.push_back(recording_.get());
   }
   output_ = SessionOutput(recorder_.get(), observers_);
+  const SessionStart start = session_start();
+  for (SessionObserver* observer : observers_) observer->on_start(start);
   journal_.open(&output_, facts_.first);
   if (comparison_) comparison_->open(&output_);
   begin_session(request_.out, facts_.begin, facts_.first, &output_, faults);
+}
+
+SessionStart SessionRunner::session_start() const {
+  SessionStart start;
+  start.name = request_.out.filename().string();
+  start.first = facts_.first;
+  start.frames = facts_.frames;
+  start.tie = facts_.tie;
+  const RigCalibration& rig = facts_.begin.file.rig;
+  for (std::size_t k = 0; k < static_cast<std::size_t>(rig.cameras); ++k)
+    start.image_bytes =
+        std::max(start.image_bytes, static_cast<std::size_t>(rig.intrinsics[k].width) *
+                                        static_cast<std::size_t>(rig.intrinsics[k].height));
+  start.can_recalibrate = facts_.on_request;
+  start.recording = recording_ != nullptr;
+  return start;
 }
 
 void SessionRunner::say_remarks(Progress* progress) {
@@ -237,8 +279,8 @@ SummaryInput SessionRunner::summary_input(const SessionTotals& totals,
   input.memory = memory();
   input.configuration_hash = configuration_hash(configuration_);
   source_.describe(totals, *estimator_, &input);
-  if (recording_)
-    for (const auto& counter : recording_->counters()) input.devices.push_back(counter);
+  for (SessionObserver* observer : observers_)
+    for (auto& counter : observer->counters()) input.devices.push_back(std::move(counter));
   return input;
 }
 
@@ -309,9 +351,10 @@ ExitCode SessionRunner::run() {
       summary_input(*totals, AllocationGuard::allocations_after_seal() - allocations_before);
   write_files(*totals, input, &faults, &progress);
   if (!request_.quiet) print_figures(*totals, input, &progress);
-  const bool usable = write_session_report(request_.out, request_.quiet, &progress);
+  const SessionReport report = write_session_report(request_.out);
   ExitCode code = verdict(*totals, faults, &progress);
-  if (code == ExitCode::done && !usable) code = ExitCode::not_usable;
+  if (code == ExitCode::done && !report.outcome.usable) code = ExitCode::not_usable;
+  say_verdict(report, request_.quiet, &progress);
   return signals_.stop_code().value_or(code);
 }
 

@@ -19,6 +19,7 @@ struct SessionOptions {
   bool quiet = false;
   bool print_memory = false;  // a table of what is held, on stdout
   std::vector<SessionObserver*> observers{};
+  SessionRequests* requests = nullptr;  // of observers; null: nobody asks for anything
 };
 
 /// Runs a source through estimator and comparison into a session folder (DESIGN §6): set-up,

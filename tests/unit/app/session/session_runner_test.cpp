@@ -5,7 +5,11 @@
 #include <algorithm>
 #include <array>
 #include <cstdint>
+#include <fstream>
+#include <iterator>
 #include <string>
+#include <string_view>
+#include <utility>
 #include <vector>
 
 #include "core/memory/fixed_vector.hpp"
@@ -167,6 +171,57 @@ TEST(SessionRunner, everyFrameGoesBackToItsSourceWhichIsEndedOnce) {
   const Ran ran = run_black(4);
   EXPECT_EQ(ran.held, 0);
   EXPECT_EQ(ran.finished, 1);
+}
+
+/// Asks for everything with the first frame, as a viewer of a live page would.
+class Asking final : public SessionObserver {
+ public:
+  explicit Asking(SessionRequests* requests) : requests_(requests) {}
+  void on_start(const SessionStart& start) noexcept override { start_ = start; }
+  void on_frame(const RigFrame& /*frame*/) noexcept override {
+    if (frames_++ == 0) requests_->recalibrate = requests_->mark = requests_->stop_recording = true;
+  }
+  void on_event(const EventRecord& event) noexcept override {
+    marks_ += std::string_view(event.kind) == "mark" ? 1 : 0;
+    others_ += std::string_view(event.kind) == "recalibration_requested" ||
+                       std::string_view(event.kind) == "recording_stopped"
+                   ? 1
+                   : 0;
+  }
+  [[nodiscard]] std::vector<std::pair<std::string, std::uint64_t>> counters() override {
+    return {{"asked", 17}};
+  }
+
+  SessionStart start_{};
+  int frames_ = 0, marks_ = 0, others_ = 0;
+
+ private:
+  SessionRequests* requests_;
+};
+
+TEST(SessionRunner, whatAnObserverAsksForActsOnceWhereTheSessionCanAndItsCountersAreInTheSummary) {
+  const test::TemporaryFolder folder;
+  BlackSource source(4);
+  SessionRequests requests;
+  Asking asking(&requests);
+  SessionOptions options;
+  options.out = folder.path() / "session";
+  options.quiet = true;
+  options.observers = {&asking};
+  options.requests = &requests;
+  const SignalGuard signals;
+  testing::internal::CaptureStderr();
+  (void)run_session(source, load_configuration(std::nullopt, {}), options, signals);
+  (void)testing::internal::GetCapturedStderr();
+  EXPECT_EQ(asking.start_.name, "session");
+  EXPECT_EQ(asking.start_.first, at(0));
+  EXPECT_EQ(asking.start_.image_bytes, static_cast<std::size_t>(kWidth * kHeight));
+  EXPECT_FALSE(asking.start_.tie.has_value()) << "no clock of this machine's";
+  EXPECT_EQ(asking.marks_, 1);
+  EXPECT_EQ(asking.others_, 0) << "this source does not recalibrate on request, nothing records";
+  std::ifstream in(options.out / "summary.json");
+  const std::string summary(std::istreambuf_iterator<char>(in), {});
+  EXPECT_NE(summary.find("\"asked\": 17"), std::string::npos);
 }
 
 TEST(SessionRunner, withoutAPoseThatIsTheVerdictWhateverTheSourceThinks) {

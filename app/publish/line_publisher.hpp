@@ -1,0 +1,66 @@
+#pragma once
+#include <atomic>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include "app/publish/line_socket.hpp"
+#include "app/publish/pose_line.hpp"
+#include "app/recorder/histogram.hpp"
+#include "app/session/session_observer.hpp"
+#include "core/memory/ring.hpp"
+#include "drivers/common/wake_event.hpp"
+
+namespace vergence::app {
+
+/// `publish.lines`: one JSON object a frame to robots and bridges (docs/publish.md).
+///
+/// Threads  on_…(): the estimator's, which pushes into a ring and wakes; no lock, no system call
+///          but the wake. Formatting and sending: a thread of its own, made by the constructor.
+/// Memory   Fixed for the estimator's part. Ring full: that line is not made, and counted.
+/// Errors   The constructor throws std::system_error when no thread can be had.
+class LinePublisher final : public SessionObserver {
+ public:
+  explicit LinePublisher(std::unique_ptr<LineSocket> socket);
+  /// Sends what waits, then ends the thread.
+  ~LinePublisher() override;
+  LinePublisher(const LinePublisher&) = delete;
+  LinePublisher& operator=(const LinePublisher&) = delete;
+
+  void on_start(const SessionStart& start) noexcept override { tie_ = start.tie; }
+  void on_pose(const PoseSample& sample) noexcept override;
+  void on_placement(const Placement& placement, const Geodetic& origin) noexcept override;
+  /// Sends what waits first: to be called when no more poses come.
+  [[nodiscard]] std::vector<std::pair<std::string, std::uint64_t>> counters() override;
+  /// From mid-exposure to the line, ms, 99th percentile so far; negative: not known. Any thread.
+  [[nodiscard]] double age_p99_ms() const noexcept {
+    return age_p99_ms_.load(std::memory_order_relaxed);
+  }
+
+ private:
+  void work() noexcept;
+  void send(const PublishedPose& pose);
+  void stop() noexcept;
+
+  std::unique_ptr<LineSocket> socket_;
+  std::optional<ClockTie> tie_{};  // before the first pose
+  Ring<PublishedPose, 64> poses_;
+  Ring<PublishedPlacement, 8> placements_;
+  std::atomic<std::uint64_t> dropped_{0};
+  std::atomic<double> age_p99_ms_{-1};
+  WakeEvent wake_;
+  std::atomic<bool> stop_{false};
+
+  // Of the thread.
+  std::optional<Earth> earth_{};
+  std::string line_;
+  std::uint64_t lines_ = 0;
+  TimeHistogram age_, behind_pose_;  // ms
+  std::thread thread_;
+};
+
+}  // namespace vergence::app

@@ -1,0 +1,176 @@
+#include "app/publish/line_socket.hpp"
+
+#include <netdb.h>
+#include <sys/socket.h>
+#include <sys/stat.h>
+#include <sys/un.h>
+
+#include <array>
+#include <cerrno>
+#include <cstring>
+#include <string>
+
+#include <fmt/format.h>
+
+#include "app/publish/file_descriptor.hpp"
+#include "app/runtime/errors.hpp"
+#include "drivers/clock.hpp"
+
+namespace vergence::app {
+namespace {
+
+constexpr std::size_t kReaders = 8;  // robots have a handful of programs that want the pose
+constexpr Duration kPatience = Duration::seconds(5);  // for a reader that does not read
+constexpr int kPending = 4;                           // connections that wait between two frames
+
+/// Takes away a socket file that nobody listens to any more: of a program that was killed.
+void remove_stale(const sockaddr_un& address, std::string_view key) {
+  struct stat status {};
+  if (::lstat(address.sun_path, &status) != 0) return;
+  if (!S_ISSOCK(status.st_mode))
+    throw InputError(
+        fmt::format("{}: {} is there and is no socket; name another path", key, address.sun_path));
+  const FileDescriptor probe(::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
+  if (::connect(probe.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0 ||
+      errno == EAGAIN)
+    throw InputError(fmt::format("{}: another program sends its lines to {}; name another path",
+                                 key, address.sun_path));
+  (void)::unlink(address.sun_path);
+}
+
+/// A stream, not datagrams: readers come and go as they like without an address of their own, any
+/// number up to kReaders, and a line is what ends with a line feed.
+class UnixLineSocket final : public LineSocket {
+ public:
+  UnixLineSocket(const std::string& path, std::string_view key) : path_(path) {
+    sockaddr_un address{};
+    address.sun_family = AF_UNIX;
+    path.copy(address.sun_path, sizeof address.sun_path - 1);
+    remove_stale(address, key);
+    listener_ = FileDescriptor(::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
+    if (!listener_ ||
+        ::bind(listener_.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0 ||
+        ::listen(listener_.get(), kPending) != 0)
+      throw InputError(fmt::format("{}: no socket at {} ({}); does its folder exist?", key, path,
+                                   std::strerror(errno)));
+    bound_ = true;
+  }
+  ~UnixLineSocket() override {
+    if (bound_) (void)::unlink(path_.c_str());
+  }
+
+  void send(std::string_view line) noexcept override {
+    accept_readers();
+    const HostStamp now = monotonic_now();
+    for (Reader& reader : readers_)
+      if (reader.socket) send(line, now, &reader);
+  }
+  [[nodiscard]] LineSocketCounters counters() const noexcept override { return counters_; }
+
+ private:
+  struct Reader {
+    FileDescriptor socket;
+    std::string rest;      // of a line that went out in part; the next one waits for it
+    HostStamp progress{};  // when it last took something
+  };
+
+  void accept_readers() noexcept {
+    for (int i = 0; i < kPending; ++i) {
+      FileDescriptor socket(
+          ::accept4(listener_.get(), nullptr, nullptr, SOCK_CLOEXEC | SOCK_NONBLOCK));
+      if (!socket) return;
+      Reader* free = nullptr;
+      for (Reader& reader : readers_)
+        if (!reader.socket) free = &reader;
+      if (free == nullptr) {
+        ++counters_.turned_away;
+        continue;
+      }
+      ++counters_.readers;
+      free->socket = std::move(socket);
+      free->rest.clear();
+      free->progress = monotonic_now();
+    }
+  }
+
+  /// Bytes that went out; −1: the reader is gone.
+  static ssize_t write(const Reader& reader, std::string_view bytes) noexcept {
+    const ssize_t n =
+        ::send(reader.socket.get(), bytes.data(), bytes.size(), MSG_DONTWAIT | MSG_NOSIGNAL);
+    if (n >= 0) return n;
+    return errno == EAGAIN || errno == EWOULDBLOCK || errno == EINTR ? 0 : -1;
+  }
+
+  void send(std::string_view line, HostStamp now, Reader* reader) noexcept {
+    if (!reader->rest.empty()) {
+      const ssize_t n = write(*reader, reader->rest);
+      if (n < 0) return reader->socket.reset();
+      if (n > 0) reader->progress = now;
+      reader->rest.erase(0, static_cast<std::size_t>(n));
+    }
+    const bool room = reader->rest.empty();
+    const ssize_t n = room ? write(*reader, line) : 0;
+    if (n < 0) return reader->socket.reset();
+    if (n > 0) {
+      reader->progress = now;
+      reader->rest = line.substr(static_cast<std::size_t>(n));
+      ++counters_.sent;
+      return;
+    }
+    ++counters_.refused;
+    if (now - reader->progress < kPatience) return;
+    ++counters_.closed;
+    reader->socket.reset();
+  }
+
+  std::string path_;
+  FileDescriptor listener_;
+  bool bound_ = false;
+  std::array<Reader, kReaders> readers_{};
+  LineSocketCounters counters_{};
+};
+
+class UdpLineSocket final : public LineSocket {
+ public:
+  UdpLineSocket(const HostPort& address, std::string_view key) {
+    addrinfo hints{}, *found = nullptr;
+    hints.ai_socktype = SOCK_DGRAM;
+    const int error =
+        ::getaddrinfo(address.host.c_str(), std::to_string(address.port).c_str(), &hints, &found);
+    if (error != 0)
+      throw InputError(fmt::format("{}: {} is not known ({}); give its number, e.g. 127.0.0.1:{}",
+                                   key, address.host, ::gai_strerror(error), address.port));
+    socket_ =
+        FileDescriptor(::socket(found->ai_family, SOCK_DGRAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
+    const bool connected =
+        socket_ && ::connect(socket_.get(), found->ai_addr, found->ai_addrlen) == 0;
+    const int reason = errno;
+    ::freeaddrinfo(found);
+    if (!connected)
+      throw InputError(fmt::format("{}: no way to {} ({}); is its network up?", key, address.text(),
+                                   std::strerror(reason)));
+  }
+
+  void send(std::string_view line) noexcept override {
+    if (::send(socket_.get(), line.data(), line.size(), MSG_DONTWAIT | MSG_NOSIGNAL) ==
+        static_cast<ssize_t>(line.size()))
+      ++counters_.sent;
+    else
+      ++counters_.refused;
+  }
+  [[nodiscard]] LineSocketCounters counters() const noexcept override { return counters_; }
+
+ private:
+  FileDescriptor socket_;
+  LineSocketCounters counters_{};
+};
+
+}  // namespace
+
+std::unique_ptr<LineSocket> open_line_socket(const LineAddress& address, std::string_view key) {
+  if (address.kind == LineAddress::Kind::udp)
+    return std::make_unique<UdpLineSocket>(address.udp, key);
+  return std::make_unique<UnixLineSocket>(address.path, key);
+}
+
+}  // namespace vergence::app

@@ -1,0 +1,189 @@
+#include "app/publish/live_page.hpp"
+
+#include <pthread.h>
+#include <sys/resource.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cstdio>
+#include <exception>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include "app/publish/page_html.hpp"
+#include "drivers/clock.hpp"
+
+namespace vergence::app {
+namespace {
+
+using std::chrono::milliseconds;
+
+constexpr milliseconds kBetweenUpdates{100};  // 10 a second: what an eye follows
+constexpr milliseconds kAlone{500};           // without a viewer: rings of 256 frames hold longer
+constexpr milliseconds kFarewell{200};        // for the end of the drive to reach its viewers
+constexpr int kNiceness = 5;                  // beside the estimator's threads
+
+}  // namespace
+
+LivePage::LivePage(const Options& options, SessionRequests* requests,
+                   std::function<double()> line_age_ms)
+    : requests_(requests),
+      line_age_ms_(std::move(line_age_ms)),
+      server_(options.address, options.policy, page_html(), options.viewers,
+              [this](HttpRoute route) { act(route); }),
+      thread_([this] {
+        try {
+          work();
+        } catch (
+            const std::exception& e) {  // no memory: whoever looks loses the page, not the drive
+          fmt::print(stderr, "vergence: the live page has ended ({}); the drive goes on\n",
+                     e.what());
+        }
+      }) {}
+
+LivePage::~LivePage() {
+  stop_.store(true, std::memory_order_release);
+  server_.wake();
+  thread_.join();
+}
+
+// ---- the session's threads
+
+void LivePage::on_start(const SessionStart& start) noexcept {
+  tie_ = start.tie;
+  start_ = start;
+  images_.reserve(start.image_bytes);
+  started_.store(true, std::memory_order_release);
+}
+
+void LivePage::on_frame(const RigFrame& frame) noexcept {
+  frame_ = frame;
+  images_.take_images(frame);
+  if (any_ && frame.number > last_number_ + 1) now_.missing += frame.number - last_number_ - 1;
+  any_ = true;
+  last_number_ = frame.number;
+}
+
+void LivePage::on_pose(const PoseSample& sample) noexcept {
+  const HostStamp out = monotonic_now();
+  now_.pose = PublishedPose::of(sample, out);
+  ++now_.read;
+  ++(sample.status == PoseStatus::ok         ? now_.ok
+     : sample.status == PoseStatus::degraded ? now_.degraded
+                                             : now_.lost);
+  if (sample.status != PoseStatus::lost) {
+    if (posed_) now_.path_m += (sample.T_world_left.t - last_position_).norm();
+    last_position_ = sample.T_world_left.t;
+    posed_ = true;
+  }
+  now_.stamp_error = frame_.stamp_error;
+  now_.spread = frame_.spread;
+  now_.pairing = frame_.pairing;
+  now_.age_ms = tie_ ? (tie_->stamp_at(out) - sample.stamp).to_seconds() * 1e3 : -1;
+  push(&frames_, now_);
+}
+
+void LivePage::on_tracks(const calibration::TrackLog& tracks) noexcept {
+  images_.take_points(frame_, tracks);
+}
+
+void LivePage::on_placement(const Placement& placement, const Geodetic& origin) noexcept {
+  push(&placements_, {PoseNumbers::of(placement.T_enu_world), origin});
+}
+
+void LivePage::on_compared(const PoseRecord& pose) noexcept { push(&compared_, pose); }
+void LivePage::on_event(const EventRecord& event) noexcept { push(&events_, event); }
+void LivePage::on_calibration(const CalibrationRecord& calibration) noexcept {
+  push(&calibrations_, calibration);
+}
+
+std::vector<std::pair<std::string, std::uint64_t>> LivePage::counters() {
+  ended_.store(true, std::memory_order_release);
+  server_.wake();
+  return {{"page_updates", updates_.load(std::memory_order_relaxed)},
+          {"page_dropped", dropped_.load(std::memory_order_relaxed)}};
+}
+
+// ---- the page's thread
+
+void LivePage::work() {
+  (void)pthread_setname_np(pthread_self(), "vergence-page");
+  // On Linux a thread has a niceness of its own.
+  (void)::setpriority(PRIO_PROCESS, static_cast<id_t>(::gettid()), kNiceness);
+  while (!stop_.load(std::memory_order_acquire)) {
+    const bool watched = server_.viewers() > 0;
+    const auto until = shown_ + kBetweenUpdates - Clock::now();
+    const auto wait = std::chrono::ceil<milliseconds>(until);
+    server_.step(watched ? std::clamp(wait, milliseconds(0), kBetweenUpdates) : kAlone);
+    drain();
+    if (server_.viewers() > 0 && Clock::now() >= shown_ + kBetweenUpdates) show();
+  }
+  drain();
+  if (server_.viewers() > 0) show();
+  server_.flush(kFarewell);
+}
+
+void LivePage::drain() {
+  if (!begun_ && started_.load(std::memory_order_acquire)) {
+    state_.begin(start_);
+    begun_ = true;
+  }
+  // Before the rings: what is in them by then is all of the drive.
+  const bool ended = ended_.load(std::memory_order_acquire);
+  for (CalibrationRecord record; calibrations_.pop(&record);) state_.add(record);
+  for (PublishedPlacement placement; placements_.pop(&placement);) state_.add(placement);
+  for (LiveFrame frame; frames_.pop(&frame);) state_.add(frame);
+  for (PoseRecord pose; compared_.pop(&pose);) state_.add(pose);
+  for (EventRecord event; events_.pop(&event);) state_.add(event);
+  if (ended) state_.end();
+}
+
+void LivePage::show() {
+  // Ten a second, not a little fewer; what was late is not made up for.
+  shown_ = std::max(shown_ + kBetweenUpdates, Clock::now() - kBetweenUpdates / 2);
+  if (!begun_) return;  // the mock's world takes its time; viewers wait for the session
+  updates_.fetch_add(1, std::memory_order_relaxed);
+  server_.broadcast("update", state_.update(line_age_ms_()), HttpServer::Skipped::greet_again);
+  // After the update: what a greeting has is not told again.
+  server_.greet("hello", [this] { return state_.hello(); });
+  if (images_.ready()) {
+    show_images();
+    images_.done();
+  }
+  images_.want();
+}
+
+void LivePage::show_images() {
+  nlohmann::json out{{"frame", images_.frame()}, {"images", nlohmann::json::array()}};
+  for (const LiveImages::Picture& picture : images_.pictures())
+    out["images"].push_back({{"width", picture.width},
+                             {"height", picture.height},
+                             {"jpeg", base64(thumbnail(picture))}});
+  const RigCalibration* rig = state_.rig();
+  std::vector<JudgedPoint> judged(images_.points().size());
+  if (rig != nullptr && rig->cameras > 1) judged = judge_points(images_.points(), *rig);
+  auto& points = out["points"] = nlohmann::json::array();
+  // Tenths of pixels, as integers: half the bytes.
+  const auto tenths = [](float v) { return static_cast<int>(v * 10 + 0.5F); };
+  for (std::size_t i = 0; i < judged.size(); ++i) {
+    const LivePoint& p = images_.points()[i];
+    nlohmann::json point{tenths(p.left[0]), tenths(p.left[1]), judged[i].rejected ? 1 : 0,
+                         tenths(judged[i].depth_m)};
+    if (p.both) {
+      point.push_back(tenths(p.right[0]));
+      point.push_back(tenths(p.right[1]));
+    }
+    points.push_back(std::move(point));
+  }
+  server_.broadcast("images", out.dump(), HttpServer::Skipped::harmless);
+}
+
+void LivePage::act(HttpRoute route) noexcept {
+  constexpr auto kOrder = std::memory_order_relaxed;
+  if (route == HttpRoute::recalibrate) requests_->recalibrate.store(true, kOrder);
+  if (route == HttpRoute::mark) requests_->mark.store(true, kOrder);
+  if (route == HttpRoute::stop_recording) requests_->stop_recording.store(true, kOrder);
+}
+
+}  // namespace vergence::app

@@ -1,0 +1,98 @@
+#pragma once
+#include <atomic>
+#include <chrono>
+#include <cstdint>
+#include <functional>
+#include <string>
+#include <string_view>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include "app/publish/http_server.hpp"
+#include "app/publish/live_images.hpp"
+#include "app/publish/live_state.hpp"
+#include "app/session/session_observer.hpp"
+#include "core/memory/ring.hpp"
+
+namespace vergence::app {
+
+/// `publish.http`: the live page (docs/publish.md).
+///
+/// Threads  on_…(): the estimator's, which pushes into rings and, when a viewer waits for a
+/// picture,
+///          copies rows of two images; no lock, no system call. Everything else: a thread of its
+///          own, made by the constructor, that yields to the estimator's where a core is short.
+/// Memory   Rings fixed; the images' memory in on_start(). Ring full: frames are left out, totals
+///          stay true.
+/// Errors   The constructor throws InputError (HttpServer), std::system_error.
+class LivePage final : public SessionObserver {
+ public:
+  struct Options {
+    HostPort address{};
+    HttpPolicy policy{};
+    std::size_t viewers = 4;
+  };
+
+  /// `requests` outlives it. `line_age_ms`: of the pose lines, 99th percentile; negative: none.
+  LivePage(const Options& options, SessionRequests* requests, std::function<double()> line_age_ms);
+  ~LivePage() override;
+  LivePage(const LivePage&) = delete;
+  LivePage& operator=(const LivePage&) = delete;
+
+  void on_start(const SessionStart& start) noexcept override;
+  void on_frame(const RigFrame& frame) noexcept override;
+  void on_pose(const PoseSample& sample) noexcept override;
+  void on_tracks(const calibration::TrackLog& tracks) noexcept override;
+  void on_placement(const Placement& placement, const Geodetic& origin) noexcept override;
+  void on_compared(const PoseRecord& pose) noexcept override;
+  void on_event(const EventRecord& event) noexcept override;
+  void on_calibration(const CalibrationRecord& calibration) noexcept override;
+  /// Shows the end of the drive first.
+  [[nodiscard]] std::vector<std::pair<std::string, std::uint64_t>> counters() override;
+
+ private:
+  using Clock = std::chrono::steady_clock;
+
+  template <class T, std::size_t N>
+  void push(Ring<T, N>* ring, const T& value) noexcept {
+    if (!ring->push(value)) dropped_.fetch_add(1, std::memory_order_relaxed);
+  }
+  void work();
+  void drain();
+  void show();
+  void show_images();
+  void act(HttpRoute route) noexcept;
+
+  SessionRequests* requests_;
+  std::function<double()> line_age_ms_;
+
+  // Of the estimator's thread.
+  std::optional<ClockTie> tie_{};
+  RigFrame frame_{};  // the one in hand; its images only until on_tracks()
+  LiveFrame now_{};
+  Vec3 last_position_ = Vec3::Zero();
+  bool any_ = false, posed_ = false;
+  std::uint64_t last_number_ = 0;
+
+  // From it to the page's.
+  Ring<LiveFrame, 256> frames_;
+  Ring<PoseRecord, 256> compared_;
+  Ring<EventRecord, 64> events_;
+  Ring<CalibrationRecord, 8> calibrations_;
+  Ring<PublishedPlacement, 8> placements_;
+  std::atomic<std::uint64_t> dropped_{0};
+  LiveImages images_;
+  std::atomic<bool> started_{false}, ended_{false}, stop_{false};
+  SessionStart start_{};  // published by started_
+
+  // Of the page's thread.
+  LiveState state_;
+  bool begun_ = false;
+  HttpServer server_;
+  Clock::time_point shown_{};
+  std::atomic<std::uint64_t> updates_{0};
+  std::thread thread_;
+};
+
+}  // namespace vergence::app

@@ -1,0 +1,265 @@
+#include "app/publish/live_state.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <utility>
+
+#include <nlohmann/json.hpp>
+
+#include "app/report/advice.hpp"
+#include "core/math/so3.hpp"
+
+namespace vergence::app {
+namespace {
+
+using nlohmann::json;
+
+constexpr double kDegrees = 180.0 / std::numbers::pi;
+
+/// A number with as many digits as a page needs; none for what is no number.
+json rounded(double value, double digits) {
+  if (!std::isfinite(value)) return nullptr;
+  const double scale = std::pow(10.0, digits);
+  return std::round(value * scale) / scale;
+}
+
+std::string text_of(const json& value) {
+  return value.dump(-1, ' ', false, json::error_handler_t::replace);
+}
+
+const char* to_words(Pairing pairing) {
+  switch (pairing) {
+    case Pairing::assumed:
+      return "assumed";
+    case Pairing::proven:
+      return "proven";
+    case Pairing::contradicted:
+      return "contradicted";
+  }
+  return "";
+}
+
+json event_json(const EventRecord& event, Stamp first) {
+  return {{"s", rounded((event.stamp - first).to_seconds(), 1)},
+          {"kind", event.kind},
+          {"sentence", event.sentence.data()}};
+}
+
+json camera_json(const RigCalibration& rig, std::size_t k) {
+  const Intrinsics& lens = rig.intrinsics[k];
+  const Transform& T = rig.T_camera_left[k];
+  const Vec3 turn = log_so3(T.R) * kDegrees;
+  json camera{{"width", lens.width},
+              {"height", lens.height},
+              {"fisheye", lens.kind == CameraModelKind::pinhole_equidistant},
+              {"k", {lens.fx, lens.fy, lens.cx, lens.cy}},
+              {"d", lens.distortion},
+              {"t", {T.t.x(), T.t.y(), T.t.z()}}};
+  json& rows = camera["r"] = json::array();
+  for (int i = 0; i < 9; ++i) rows.push_back(T.R(i / 3, i % 3));
+  json& figures = camera["figures"] = json::array();
+  const auto& sigma = rig.sigma_wide[k];
+  for (std::size_t i = 0; i < 6; ++i) {
+    const double unit = i < 3 ? kDegrees : 1e3;
+    const auto axis = static_cast<Eigen::Index>(i % 3);
+    figures.push_back({rounded(i < 3 ? turn[axis] : T.t[axis] * unit, i < 3 ? 4 : 2),
+                       sigma[i] > 0 ? rounded(2 * sigma[i] * unit, i < 3 ? 4 : 2) : nullptr});
+  }
+  return camera;
+}
+
+}  // namespace
+
+void LiveState::add(const LiveFrame& frame) {
+  newest_ = frame;
+  any_ = true;
+  estimate_.add(static_cast<double>(frame.pose.estimate_ms));
+}
+
+void LiveState::add(const PoseRecord& compared) {
+  compared_ = compared;
+  if (compared.status == PoseStatus::lost && !compared.ins_valid) return;
+  Place place;
+  for (std::size_t i = 0; i < 3; ++i) place.world[i] = static_cast<float>(compared.world_left.t[i]);
+  place.status = static_cast<std::uint8_t>(compared.status);
+  if (compared.status == PoseStatus::lost && !trail_.empty()) place.world = trail_.back().world;
+  if (compared.ins_valid)
+    place.ins = {static_cast<float>(compared.ins.enu[0]), static_cast<float>(compared.ins.enu[1])};
+  if (!trail_.empty()) {
+    const Place& last = trail_.back();
+    const float moved = std::hypot(place.world[0] - last.world[0], place.world[1] - last.world[1],
+                                   place.world[2] - last.world[2]);
+    if (moved < least_step_m_ && place.status == last.status) return;
+  }
+  if (trail_.size() == kTrail) {
+    for (std::size_t i = 0; i < kTrail / 2; ++i) trail_[i] = trail_[2 * i];
+    trail_.resize(kTrail / 2);
+    least_step_m_ *= 2;
+    thinned_ = true;
+  }
+  trail_.push_back(place);
+}
+
+void LiveState::add(const EventRecord& event) {
+  if (events_.size() == kEvents) events_.pop_front();
+  events_.push_back(event);
+  const std::string_view kind = event.kind;
+  const bool confirmed = kind == "calibration_confirmed";
+  if (confirmed || kind == "calibration_contradicted" || kind == "rig_changed") {
+    confirmed_ = confirmed;
+    calibration_new_ = true;
+  }
+  ++events_seen_;
+}
+
+void LiveState::add(const CalibrationRecord& calibration) {
+  if (calibrations_.size() == kCalibrations) calibrations_.pop_front();
+  calibrations_.push_back(calibration);
+  calibration_new_ = true;
+  if (calibration.learnt) measured_ = calibration;
+  if (!calibration.accepted) return;
+  measured_.reset();
+  if (calibration.decided) confirmed_ = calibration.verified;
+  in_use_ = calibration;
+  rig_ = calibration.rig.rig();
+}
+
+void LiveState::add(const PublishedPlacement& placement) {
+  placement_ = placement;
+  placement_new_ = true;
+}
+
+json LiveState::frame_json() const {
+  const LiveFrame& f = newest_;
+  const PublishedPose& p = f.pose;
+  const std::string_view reason = to_string(p.reason);
+  json out{{"frame", p.frame},
+           {"s", rounded((p.stamp - start_.first).to_seconds(), 2)},
+           {"state", to_string(p.state)},
+           {"status", to_string(p.status)},
+           {"reason", reason},
+           {"advice", p.status == PoseStatus::ok ? "" : report::advice_for(reason)},
+           {"inliers", p.inliers},
+           {"stereo_inliers", p.stereo_inliers},
+           {"reprojection_px", rounded(p.reprojection_px, 3)},
+           {"estimate_ms", rounded(p.estimate_ms, 2)},
+           {"estimate_p50_ms", rounded(estimate_.percentile(0.5), 2)},
+           {"estimate_p99_ms", rounded(estimate_.percentile(0.99), 2)},
+           {"read", f.read},
+           {"ok", f.ok},
+           {"degraded", f.degraded},
+           {"lost", f.lost},
+           {"missing", f.missing},
+           {"path_m", rounded(f.path_m, 2)},
+           {"stamp_error_us", rounded(static_cast<double>(f.stamp_error.ns()) * 1e-3, 1)},
+           {"spread_us", rounded(static_cast<double>(f.spread.ns()) * 1e-3, 1)},
+           {"pairing", to_words(f.pairing)},
+           {"age_ms", f.age_ms < 0 ? json(nullptr) : rounded(f.age_ms, 2)}};
+  if (p.status != PoseStatus::lost)
+    for (const double v : p.world_left.t) out["position_m"].push_back(rounded(v, 3));
+  if (compared_ && compared_->compared) {
+    const auto& e = compared_->error;
+    out["ins"] = {{"across_m", rounded(std::hypot(e[0], e[1]), 2)},
+                  {"up_m", rounded(e[2], 2)},
+                  {"heading_deg", rounded(e[3], 2)}};
+  }
+  if (compared_ && compared_->placed) {
+    const EarthNumbers& ours = compared_->ours;
+    out["earth"] = {{"latitude_deg", rounded(ours.position.latitude_deg, 7)},
+                    {"longitude_deg", rounded(ours.position.longitude_deg, 7)},
+                    {"height_m", rounded(ours.position.height_m, 2)},
+                    {"heading_deg", rounded(ours.heading_deg, 1)}};
+  }
+  return out;
+}
+
+json LiveState::calibration_json() const {
+  json out{{"cameras", json::array()}, {"history", json::array()}};
+  if (rig_)
+    for (std::size_t k = 0; k < static_cast<std::size_t>(rig_->cameras); ++k)
+      out["cameras"].push_back(camera_json(*rig_, k));
+  if (measured_) {
+    const RigCalibration rig = measured_->rig.rig();
+    for (std::size_t k = 0; k < static_cast<std::size_t>(rig.cameras); ++k)
+      out["measured"].push_back(camera_json(rig, k));
+  }
+  out["confirmed"] = confirmed_;
+  if (in_use_) {
+    out["cause"] = in_use_->cause;
+    out["frames"] = in_use_->rig.frames;
+    const CalibrationRecord& known = measured_ ? *measured_ : *in_use_;
+    out["depth"] = known.depth_sigma_percent > 0
+                       ? json({{"at_m", rounded(known.judged_depth_m, 1)},
+                               {"sigma_percent", rounded(known.depth_sigma_percent, 2)}})
+                       : json(nullptr);
+  }
+  for (const CalibrationRecord& c : calibrations_)
+    out["history"].push_back({{"s", rounded((c.stamp - start_.first).to_seconds(), 1)},
+                              {"what", c.accepted ? "in use"
+                                       : c.learnt ? "kept"
+                                                  : "rejected"},
+                              {"cause", c.cause},
+                              {"reason", c.reason}});
+  return out;
+}
+
+namespace {
+
+json placement_json(const PublishedPlacement& placement) {
+  const Transform T = placement.T_enu_world.transform();
+  json rows = json::array();
+  for (int i = 0; i < 2; ++i)
+    for (int j = 0; j < 4; ++j) rows.push_back(j < 3 ? T.R(i, j) : T.t(i));
+  return rows;
+}
+
+}  // namespace
+
+json LiveState::place_json(const Place& p) {
+  json out{rounded(static_cast<double>(p.world[0]), 2), rounded(static_cast<double>(p.world[1]), 2),
+           rounded(static_cast<double>(p.world[2]), 2), p.status};
+  if (p.ins)
+    for (const float v : *p.ins) out.push_back(rounded(static_cast<double>(v), 2));
+  return out;
+}
+
+std::string LiveState::hello() const {
+  json out{{"session", start_.name},
+           {"frames", start_.frames},
+           {"can_recalibrate", start_.can_recalibrate},
+           {"recording", start_.recording},
+           {"ended", ended_}};
+  json& trail = out["trail"] = json::array();
+  for (const Place& p : trail_) trail.push_back(place_json(p));
+  json& events = out["events"] = json::array();
+  for (const EventRecord& event : events_) events.push_back(event_json(event, start_.first));
+  out["calibration"] = calibration_json();
+  if (placement_) out["placement"] = placement_json(*placement_);
+  if (any_) out["now"] = frame_json();
+  return text_of(out);
+}
+
+std::string LiveState::update(double line_age_ms) {
+  json out{{"ended", ended_}};
+  if (any_) out["now"] = frame_json();
+  if (any_)
+    out["now"]["line_age_p99_ms"] = line_age_ms < 0 ? json(nullptr) : rounded(line_age_ms, 2);
+  // Thinned, the places are others than those that were shown: all of them anew.
+  if (std::exchange(thinned_, false)) {
+    shown_ = 0;
+    out["trail_anew"] = true;
+  }
+  json& trail = out["trail"] = json::array();
+  for (; shown_ < trail_.size(); ++shown_) trail.push_back(place_json(trail_[shown_]));
+  json& events = out["events"] = json::array();
+  const auto fresh = std::min<std::uint64_t>(events_seen_ - events_shown_, events_.size());
+  for (auto i = events_.size() - static_cast<std::size_t>(fresh); i < events_.size(); ++i)
+    events.push_back(event_json(events_[i], start_.first));
+  events_shown_ = events_seen_;
+  if (std::exchange(calibration_new_, false)) out["calibration"] = calibration_json();
+  if (std::exchange(placement_new_, false)) out["placement"] = placement_json(*placement_);
+  return text_of(out);
+}
+
+}  // namespace vergence::app

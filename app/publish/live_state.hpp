@@ -1,0 +1,88 @@
+#pragma once
+#include <array>
+#include <cstdint>
+#include <deque>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <nlohmann/json_fwd.hpp>
+
+#include "app/publish/pose_line.hpp"
+#include "app/recorder/histogram.hpp"
+#include "app/recorder/records.hpp"
+#include "app/session/session_observer.hpp"
+
+namespace vergence::app {
+
+/// One frame for the live page, with what has been counted up to it: figures stay true when
+/// frames are left out.
+struct LiveFrame {
+  PublishedPose pose{};
+  std::uint64_t read = 0, ok = 0, degraded = 0, lost = 0;
+  std::uint64_t missing = 0;  // numbers of frames that never came
+  double path_m = 0;
+  Duration stamp_error{}, spread{};
+  Pairing pairing = Pairing::assumed;
+  double age_ms = -1;  // from mid-exposure to the pose; negative: not known
+};
+
+/// What the live page shows, kept so that a viewer who comes late sees the whole drive.
+///
+/// Threads  One. Memory  Bounded: the trail is thinned by half when it is full, of events and
+///          calibrations the newest stay.
+class LiveState {
+ public:
+  static constexpr std::size_t kTrail = 4000;  // points of the map
+  static constexpr std::size_t kEvents = 60, kCalibrations = 30;
+
+  void begin(const SessionStart& start) { start_ = start; }
+  void add(const LiveFrame& frame);
+  void add(const PoseRecord& compared);
+  void add(const EventRecord& event);
+  void add(const CalibrationRecord& calibration);
+  void add(const PublishedPlacement& placement);
+  void end() noexcept { ended_ = true; }
+
+  /// The rig in use, for the judgement of points; not known yet: nullptr.
+  [[nodiscard]] const RigCalibration* rig() const noexcept { return rig_ ? &*rig_ : nullptr; }
+
+  /// All there is to know, for a viewer who has just come.
+  [[nodiscard]] std::string hello() const;
+  /// What is new since the last call, for the others. `line_age_ms`: of the pose lines, 99th
+  /// percentile; negative: none.
+  [[nodiscard]] std::string update(double line_age_ms);
+
+ private:
+  struct Place {
+    std::array<float, 3> world{};
+    std::optional<std::array<float, 2>> ins{};  // east, north
+    std::uint8_t status = 0;
+  };
+
+  [[nodiscard]] static nlohmann::json place_json(const Place& place);
+  [[nodiscard]] nlohmann::json frame_json() const;
+  [[nodiscard]] nlohmann::json calibration_json() const;
+
+  SessionStart start_{};
+  LiveFrame newest_{};
+  bool any_ = false, ended_ = false;
+  TimeHistogram estimate_;
+  std::optional<PoseRecord> compared_{};
+  std::vector<Place> trail_{};
+  float least_step_m_ = 0.5F;
+  std::size_t shown_ = 0;  // places that the last update had
+  bool thinned_ = false;   // since then
+  std::deque<EventRecord> events_{};
+  std::uint64_t events_seen_ = 0, events_shown_ = 0;
+  std::deque<CalibrationRecord> calibrations_{};
+  std::optional<CalibrationRecord> in_use_{};
+  std::optional<CalibrationRecord> measured_{};  // by the drive, beside the one in use
+  bool confirmed_ = false;
+  std::optional<RigCalibration> rig_{};
+  bool calibration_new_ = false;
+  std::optional<PublishedPlacement> placement_{};
+  bool placement_new_ = false;
+};
+
+}  // namespace vergence::app

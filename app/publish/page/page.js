@@ -1,0 +1,335 @@
+
+"use strict";
+(() => {
+const $ = id => document.getElementById(id);
+const show = (id, text) => { const e = $(id), t = String(text); if (e.textContent !== t) e.textContent = t; };
+const number = (v, digits) => v === null || v === undefined ? "–" : Number(v).toFixed(digits);
+const colour = name => getComputedStyle(document.documentElement).getPropertyValue("--" + name).trim();
+
+const STATES = {initialising: "starting", parallel_monocular: "without a calibration, cameras apart", calibrating: "calibrating",
+                stereo_odometry: "stereo odometry", recalibrating: "calibrating anew", lost: "lost"};
+const token = () => decodeURIComponent(location.hash.slice(1));
+const CAUSES = {given: "given", state_file: "from the last drive", whole_drive: "from the whole drive", knock: "found anew after a knock",
+                collapse: "found anew after a hard knock", drift: "found anew after a drift"};
+const drive = {trail: [], placement: null, rig: [], now: null, can: {}, ended: false};
+let picture = null, hover = null, drawing = false;
+
+// ---- figures
+
+function showNow(now) {
+  drive.now = now;
+  $("band").className = "tone-" + now.status;
+  show("status", now.status.toUpperCase());
+  show("state", STATES[now.state] || now.state);
+  const words = now.reason && now.reason !== "none" ? now.reason.replaceAll("_", " ") : "";
+  show("why", words + (now.advice ? (words ? ": " : "") + now.advice : ""));
+  show("frame", now.frame);
+  show("frames", drive.frames ? "of " + drive.frames : "at " + number(now.s, 1) + " s");
+  show("path", number(now.path_m, 1));
+  show("from_ins", now.ins ? number(now.ins.across_m, 2) : "–");
+  show("ins_more", now.ins ? `m · up ${number(now.ins.up_m, 1)} · ${number(now.ins.heading_deg, 1)}°` : "not compared");
+  show("inliers", now.inliers);
+  show("stereo", `points, ${now.stereo_inliers} in both`);
+  show("ms", number(now.estimate_ms, 1));
+  show("ms_more", `ms · p50 ${number(now.estimate_p50_ms, 1)} · p99 ${number(now.estimate_p99_ms, 1)}`);
+  show("age", number(now.age_ms, 1));
+  rows($("times"), [
+    ["frames read", now.read],
+    ["ok / degraded / lost", `${now.ok} / ${now.degraded} / ${now.lost}`],
+    ["frames that never came", now.missing],
+    ["stamp error, at most", number(now.stamp_error_us, 1) + " µs"],
+    ["spread of the exposures", number(now.spread_us, 1) + " µs"],
+    ["images belong together", now.pairing],
+    ["residual", number(now.reprojection_px, 2) + " px"],
+    ["pose lines, age at p99", now.line_age_p99_ms === null || now.line_age_p99_ms === undefined ? "no lines" : number(now.line_age_p99_ms, 1) + " ms"],
+    ["latitude", now.earth ? number(now.earth.latitude_deg, 6) + "°" : "not placed yet"],
+    ["longitude", now.earth ? number(now.earth.longitude_deg, 6) + "°" : "not placed yet"],
+    ["heading", now.earth ? number(now.earth.heading_deg, 1) + "°" : "not placed yet"],
+  ]);
+}
+
+function rows(table, list) {
+  if (table.rows.length !== list.length) {
+    table.replaceChildren(...list.map(() => {
+      const tr = document.createElement("tr");
+      tr.append(document.createElement("th"), ...list[0].slice(1).map(() => document.createElement("td")));
+      return tr;
+    }));
+  }
+  list.forEach((values, i) => values.forEach((value, k) => {
+    const cell = table.rows[i].cells[k];
+    if (cell.textContent !== String(value)) cell.textContent = value;
+  }));
+}
+
+function item(text) {
+  const li = document.createElement("li");
+  li.textContent = text;
+  return li;
+}
+
+const EVENTS = 10, HISTORY = 4;  // that a page has room for; files have all of them
+
+function showEvents(list, anew) {
+  const ul = $("events");
+  if (anew) ul.replaceChildren();
+  for (const e of list) ul.prepend(item(`${number(e.s, 1)} s · ${e.kind.replaceAll("_", " ")} · ${e.sentence}`));
+  while (ul.childElementCount > EVENTS) ul.lastChild.remove();
+}
+
+function showCalibration(c) {
+  drive.rig = c.cameras;
+  const words = c.cameras.length < 2 ? "none yet: drive past things at the roadside"
+    : `${CAUSES[c.cause] || "found: " + (c.cause || "").replaceAll("_", " ")}, ${c.confirmed ? "confirmed by the drive" : "not confirmed yet"}`;
+  show("calibration_words", words + (c.depth ? ` · depth ±${number(2 * c.depth.sigma_percent, 1)} % at ${number(c.depth.at_m, 0)} m` : ""));
+  const names = ["rotation x, °", "rotation y, °", "rotation z, °", "translation x, mm", "translation y, mm", "translation z, mm"];
+  const parts = [];
+  for (let k = 1; k < c.cameras.length; ++k) {
+    const table = document.createElement("table");
+    const text = ([value, sigma], i) => number(value, i < 3 ? 4 : 2) + (sigma === null ? "" : " ± " + number(sigma, i < 3 ? 4 : 2));
+    const measured = c.measured ? c.measured[k].figures : null;
+    rows(table, [["", measured ? "in use" : "in use, ± 2 σ", ...(measured ? ["measured, ± 2 σ"] : [])],
+      ...c.cameras[k].figures.map((f, i) =>
+        [(c.cameras.length > 2 ? `camera ${k}: ` : "") + names[i], text(f, i), ...(measured ? [text(measured[i], i)] : [])])]);
+    parts.push(table);
+  }
+  const note = document.createElement("p");
+  note.className = "soft";
+  note.textContent = "σ with uncertain lenses; a calibration that was given without has none until the drive has measured.";
+  $("calibration").replaceChildren(...parts, ...(parts.length ? [note] : []));
+  $("history").replaceChildren(...c.history.slice(-HISTORY).reverse().map(h =>
+    item(`${number(h.s, 1)} s · ${h.what} · ${h.cause.replaceAll("_", " ")}${h.reason ? " · " + h.reason : ""}`)));
+}
+
+// ---- map
+
+const onEarth = p => {
+  const m = drive.placement;
+  return m ? [m[0] * p[0] + m[1] * p[1] + m[2] * p[2] + m[3], m[4] * p[0] + m[5] * p[1] + m[6] * p[2] + m[7]] : [p[0], p[2]];
+};
+
+function fit(canvas) {
+  const ratio = window.devicePixelRatio || 1, width = Math.round(canvas.clientWidth * ratio);
+  const height = Math.round(width * 0.75);
+  if (canvas.width !== width || canvas.height !== height) { canvas.width = width; canvas.height = height; }
+  return ratio;
+}
+
+function drawMap() {
+  const canvas = $("map"), ratio = fit(canvas), g = canvas.getContext("2d");
+  g.clearRect(0, 0, canvas.width, canvas.height);
+  const ours = drive.trail.map(onEarth), theirs = drive.placement ? drive.trail.filter(p => p.length > 4).map(p => [p[4], p[5]]) : [];
+  show("map_words", drive.placement ? "north is up" : "left camera's start looks up; the INS comes once the drive is placed on the earth");
+  if (!ours.length) return;
+  let [l, b, r, t] = [Infinity, Infinity, -Infinity, -Infinity];
+  for (const [x, y] of ours.concat(theirs)) { l = Math.min(l, x); r = Math.max(r, x); b = Math.min(b, y); t = Math.max(t, y); }
+  const margin = 26 * ratio, least = 10;
+  const scale = Math.min((canvas.width - 2 * margin) / Math.max(r - l, least), (canvas.height - 2 * margin) / Math.max(t - b, least));
+  const at = ([x, y]) => [canvas.width / 2 + (x - (l + r) / 2) * scale, canvas.height / 2 - (y - (b + t) / 2) * scale];
+  const line = (points, name, width, dash) => {
+    g.beginPath();
+    points.forEach((p, i) => { const [x, y] = at(p); if (i) g.lineTo(x, y); else g.moveTo(x, y); });
+    g.strokeStyle = colour(name); g.lineWidth = width * ratio; g.setLineDash(dash.map(d => d * ratio)); g.lineJoin = "round"; g.stroke(); g.setLineDash([]);
+  };
+  line(theirs, "theirs", 4, [10, 6]);
+  line(ours, "ours", 2.5, []);
+  g.fillStyle = colour("care");
+  drive.trail.forEach((p, i) => { if (p[3] === 1) { const [x, y] = at(ours[i]); g.fillRect(x - 2 * ratio, y - 2 * ratio, 4 * ratio, 4 * ratio); } });
+  const [x, y] = at(ours[ours.length - 1]);
+  g.beginPath(); g.arc(x, y, 7 * ratio, 0, 7); g.fillStyle = colour("ours"); g.fill();
+  g.lineWidth = 2 * ratio; g.strokeStyle = colour("panel"); g.stroke();
+  // a bar of a round length
+  const wanted = canvas.width / 4 / scale, ten = 10 ** Math.floor(Math.log10(wanted)), bar = [5, 2, 1].map(k => k * ten).find(v => v <= wanted);
+  g.fillStyle = g.strokeStyle = colour("ink"); g.lineWidth = 2 * ratio;
+  g.beginPath(); g.moveTo(10 * ratio, canvas.height - 10 * ratio); g.lineTo(10 * ratio + bar * scale, canvas.height - 10 * ratio); g.stroke();
+  g.font = `${13 * ratio}px system-ui,sans-serif`;
+  g.fillText(bar + " m", 10 * ratio, canvas.height - 16 * ratio);
+}
+
+// ---- images
+
+const NEAR = 2, FAR = 80;
+const hue = depth => 240 * Math.min(1, Math.max(0, Math.log(depth / NEAR) / Math.log(FAR / NEAR)));
+
+function decode(jpeg) {
+  if (!jpeg) return Promise.resolve(null);
+  const bytes = Uint8Array.from(atob(jpeg), c => c.charCodeAt(0));
+  return createImageBitmap(new Blob([bytes], {type: "image/jpeg"}));
+}
+
+function mark(g, x, y, point, size) {
+  g.lineWidth = size / 2;
+  if (point.rejected) {
+    g.strokeStyle = "#ff4fb0";
+    g.beginPath(); g.moveTo(x - size, y - size); g.lineTo(x + size, y + size); g.moveTo(x + size, y - size); g.lineTo(x - size, y + size); g.stroke();
+  } else if (point.depth > 0) {
+    const h = hue(point.depth);
+    g.fillStyle = `hsl(${h} 100% ${h > 200 ? 70 : 55}%)`;
+    g.beginPath(); g.arc(x, y, size, 0, 7); g.fill();
+  } else {
+    g.strokeStyle = "#d0d6dc";
+    g.beginPath(); g.arc(x, y, size, 0, 7); g.stroke();
+  }
+}
+
+function drawImage(canvas, side) {
+  const image = picture.images[side];
+  const ratio = window.devicePixelRatio || 1, g = canvas.getContext("2d");
+  const width = Math.round(canvas.clientWidth * ratio), height = image.width ? Math.round(width * image.height / image.width) : Math.round(width * 0.75);
+  if (canvas.width !== width || canvas.height !== height) { canvas.width = width; canvas.height = height; }
+  g.clearRect(0, 0, width, height);
+  if (!image.bitmap) return;
+  g.drawImage(image.bitmap, 0, 0, width, height);
+  const scale = width / image.width, size = 2.6 * ratio;
+  for (const p of picture.points) {
+    const at = side ? p.right : p.left;
+    if (at) mark(g, at[0] * scale, at[1] * scale, p, size);
+  }
+  if (hover) drawHover(g, side, scale, ratio);
+}
+
+// The pixel's ray, undistorted, by steps towards the distorted point.
+function ray(camera, [u, v]) {
+  const [fx, fy, cx, cy] = camera.k, x = (u - cx) / fx, y = (v - cy) / fy;
+  if (camera.fisheye) {
+    const far = Math.hypot(x, y);
+    if (far < 1e-9) return [0, 0];
+    let angle = far;
+    for (let i = 0; i < 20; ++i) angle = far / (1 + stretch(camera.d, angle * angle));
+    const s = Math.tan(Math.min(angle, 1.5)) / far;
+    return [x * s, y * s];
+  }
+  let [a, b] = [x, y];
+  for (let i = 0; i < 20; ++i) { const [dx, dy] = distort(camera, a, b); a += x - dx; b += y - dy; }
+  return [a, b];
+}
+const stretch = (d, s) => s * (d[0] + s * (d[1] + s * (d[2] + s * d[3])));
+function distort(camera, x, y) {
+  const d = camera.d, s = x * x + y * y;
+  if (camera.fisheye) {
+    const r = Math.sqrt(s), angle = Math.atan(r), k = r > 1e-9 ? angle * (1 + stretch(d, angle * angle)) / r : 1;
+    return [x * k, y * k];
+  }
+  const k = 1 + s * (d[0] + s * (d[1] + s * d[4]));
+  return [x * k + 2 * d[2] * x * y + d[3] * (s + 2 * x * x), y * k + d[2] * (s + 2 * y * y) + 2 * d[3] * x * y];
+}
+
+// Where the ray of a left pixel runs in the right image, from near to far.
+function epipolar(pixel) {
+  const [left, right] = drive.rig, [a, b] = ray(left, pixel), r = right.r, t = right.t, line = [];
+  for (let i = 0; i <= 60; ++i) {
+    const depth = 0.5 * 2000 ** (i / 60);
+    const p = [0, 1, 2].map(j => (r[3 * j] * a + r[3 * j + 1] * b + r[3 * j + 2]) * depth + t[j]);
+    if (p[2] < 0.1) continue;
+    const [x, y] = distort(right, p[0] / p[2], p[1] / p[2]);
+    line.push([right.k[0] * x + right.k[2], right.k[1] * y + right.k[3]]);
+  }
+  return line;
+}
+
+function drawHover(g, side, scale, ratio) {
+  g.strokeStyle = "#ffe600"; g.lineWidth = 2 * ratio;
+  if (side === 0) {
+    g.beginPath(); g.arc(hover.pixel[0] * scale, hover.pixel[1] * scale, 7 * ratio, 0, 7); g.stroke();
+    return;
+  }
+  if (drive.rig.length > 1) {
+    g.beginPath();
+    epipolar(hover.pixel).forEach(([x, y], i) => { if (i) g.lineTo(x * scale, y * scale); else g.moveTo(x * scale, y * scale); });
+    g.stroke();
+  }
+  if (hover.point && hover.point.right) {
+    g.beginPath(); g.arc(hover.point.right[0] * scale, hover.point.right[1] * scale, 7 * ratio, 0, 7); g.stroke();
+  }
+}
+
+function pointAt(event) {
+  if (!picture || !picture.images[0].width) return;
+  const box = $("left").getBoundingClientRect(), scale = picture.images[0].width / box.width;
+  const pixel = [(event.clientX - box.left) * scale, (event.clientY - box.top) * scale];
+  let nearest = null, best = 14 * scale;
+  for (const p of picture.points) {
+    const d = Math.hypot(p.left[0] - pixel[0], p.left[1] - pixel[1]);
+    if (d < best) { best = d; nearest = p; }
+  }
+  hover = {pixel: nearest ? nearest.left : pixel, point: nearest};
+  show("hover_words", nearest ? nearest.rejected ? "rejected: off its line" : nearest.depth > 0 ? `depth ${number(nearest.depth, 1)} m` : "no depth" : "epipolar line");
+  redraw();
+}
+$("left").addEventListener("pointermove", pointAt);
+$("left").addEventListener("pointerdown", pointAt);
+$("left").addEventListener("pointerleave", () => { hover = null; show("hover_words", "point at the left image for the epipolar line"); redraw(); });
+
+function redraw() {
+  if (drawing) return;
+  drawing = true;
+  requestAnimationFrame(() => {
+    drawing = false;
+    drawMap();
+    if (picture) { drawImage($("left"), 0); drawImage($("right"), 1); }
+  });
+}
+window.addEventListener("resize", redraw);
+matchMedia("(prefers-color-scheme:dark)").addEventListener("change", redraw);
+
+async function showImages(message) {
+  const bitmaps = await Promise.all(message.images.map(i => decode(i.jpeg)));
+  if (picture) for (const i of picture.images) if (i.bitmap) i.bitmap.close();
+  picture = {frame: message.frame, images: message.images.map((i, k) => ({width: i.width, height: i.height, bitmap: bitmaps[k]})),
+             points: message.points.map(p => ({left: [p[0] / 10, p[1] / 10], rejected: p[2] === 1, depth: p[3] / 10, right: p.length > 4 ? [p[4] / 10, p[5] / 10] : null}))};
+  show("image_frame", "frame " + message.frame + " · " + picture.points.length + " points");
+  redraw();
+}
+
+// ---- the program
+
+function link(words, bad) {
+  show("link", words);
+  $("link").className = bad ? "off" : "soft";
+}
+
+function take(message) {
+  if (message.placement) drive.placement = message.placement;
+  if (message.calibration) showCalibration(message.calibration);
+  if (message.trail_anew) drive.trail = [];
+  drive.trail.push(...message.trail);
+  if (message.now) showNow(message.now);
+  drive.ended = message.ended;
+  link((drive.ended ? "the drive is over · " : "live · ") + drive.session, false);
+  redraw();
+}
+
+function connect() {
+  const source = new EventSource("/events?token=" + encodeURIComponent(token()));
+  source.addEventListener("hello", e => {
+    const message = JSON.parse(e.data);
+    Object.assign(drive, {session: message.session, frames: message.frames, trail: [], placement: null});
+    document.title = "vergence · " + message.session;
+    for (const button of document.querySelectorAll("button")) button.disabled = !token()
+      || (button.dataset.action === "recalibrate" && !message.can_recalibrate) || (button.dataset.action === "stop-recording" && !message.recording);
+    show("action_words", token() ? "" : "actions need the token: open the link that the program shows when it starts");
+    showEvents(message.events, true);
+    take(message);
+  });
+  source.addEventListener("update", e => {
+    const message = JSON.parse(e.data);
+    showEvents(message.events, false);
+    take(message);
+    ++window.updates;
+  });
+  source.addEventListener("images", e => { showImages(JSON.parse(e.data)); });
+  source.onopen = () => link("connected, waiting for the session to begin", false);
+  source.onerror = () => {
+    link(drive.ended ? "the drive is over; the page waits for the next one" : "no connection: trying again", !drive.ended);
+    // A refusal ends the stream for good; the next drive may let us in.
+    if (source.readyState === EventSource.CLOSED) setTimeout(connect, 2000);
+  };
+}
+
+for (const button of document.querySelectorAll("button")) button.addEventListener("click", async () => {
+  const answer = await fetch("/" + button.dataset.action, {method: "POST", headers: {"X-Vergence-Token": token()}}).catch(() => null);
+  show("action_words", answer && answer.ok ? button.textContent + ": asked for" : answer && answer.status === 403 ? "refused: the token is of another session" : "the program does not answer");
+});
+window.updates = 0;
+connect();
+})();

@@ -1,0 +1,105 @@
+#include "app/publish/publish.hpp"
+
+#include <sys/random.h>
+
+#include <algorithm>
+#include <array>
+#include <cstdint>
+#include <cstdio>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+
+#include <fmt/format.h>
+
+#include "app/runtime/errors.hpp"
+
+namespace vergence::app {
+namespace {
+
+constexpr std::size_t kLeastToken = 16, kMostToken = 128;
+
+/// 128 bits of the kernel's, in hexadecimal digits.
+std::string new_token() {
+  std::array<std::uint8_t, 16> bytes{};
+  if (::getrandom(bytes.data(), bytes.size(), 0) != static_cast<ssize_t>(bytes.size()))
+    throw InputError("publish.http: the system gives no random numbers; set publish.token_file");
+  std::string token;
+  for (const std::uint8_t byte : bytes) token += fmt::format("{:02x}", byte);
+  return token;
+}
+
+std::string read_token(const std::filesystem::path& file) {
+  std::ifstream in(file);
+  std::string line(kMostToken + 2, '\0');
+  if (!in)
+    throw InputError(
+        fmt::format("publish.token_file: {} cannot be read; write a line of letters "
+                    "and digits into it",
+                    file.string()));
+  in.getline(line.data(), static_cast<std::streamsize>(line.size()));
+  line.resize(std::strlen(line.c_str()));
+  const bool plain = std::all_of(line.begin(), line.end(), [](char c) {
+    return (c >= '0' && c <= '9') || (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || c == '-' ||
+           c == '_';
+  });
+  if (line.size() < kLeastToken || line.size() > kMostToken || !plain)
+    throw InputError(
+        fmt::format("publish.token_file: the first line of {} is no token: {} to {} "
+                    "letters, digits, - and _",
+                    file.string(), kLeastToken, kMostToken));
+  return line;
+}
+
+}  // namespace
+
+Publishing::Publishing(const Configuration& configuration) {
+  const PublishSettings& settings = configuration.publish;
+  if (!settings.lines.empty()) {
+    const LineAddress address = parse_line_address(settings.lines, "publish.lines");
+    try {
+      lines_ = std::make_unique<LinePublisher>(open_line_socket(address, "publish.lines"));
+    } catch (const InputError& e) {
+      fmt::print(stderr, "vergence: {}; the drive goes on without lines\n", e.what());
+    }
+  }
+  if (!settings.http.empty()) open_page(configuration);
+}
+
+void Publishing::open_page(const Configuration& configuration) {
+  const PublishSettings& settings = configuration.publish;
+  LivePage::Options options;
+  options.address = parse_host_port(settings.http, "publish.http");
+  options.policy.host = options.address.host;
+  options.policy.token_to_read = !options.address.loopback();
+  options.policy.token = settings.token_file.empty()
+                             ? new_token()
+                             : read_token(configuration.folder / settings.token_file);
+  options.viewers = static_cast<std::size_t>(settings.viewers);
+  try {
+    page_ = std::make_unique<LivePage>(
+        options, &requests_, [lines = lines_.get()] { return lines ? lines->age_p99_ms() : -1; });
+    // Behind a # it goes into no request, and into nobody's log.
+    address_ = settings.token_file.empty()
+                   ? fmt::format("http://{}/#{}", options.address.text(), options.policy.token)
+                   : fmt::format("http://{}/#TOKEN (TOKEN: the first line of {})",
+                                 options.address.text(), settings.token_file);
+  } catch (const InputError& e) {
+    fmt::print(stderr, "vergence: {}; the drive goes on without its page\n", e.what());
+  }
+}
+
+void page_by_default(Configuration* configuration) {
+  if (configuration->publish.http.empty()) configuration->publish.http = "127.0.0.1:8080";
+}
+
+void Publishing::attach(SessionOptions* session) {
+  if (page_) {
+    session->observers.push_back(page_.get());
+    fmt::print(stderr, "live page: {}\n", address_);
+  }
+  if (lines_) session->observers.push_back(lines_.get());
+  session->requests = &requests_;
+}
+
+}  // namespace vergence::app

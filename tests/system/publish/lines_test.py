@@ -1,0 +1,130 @@
+#!/usr/bin/env python3
+"""Pose lines of a mock drive in real time against its poses.csv: over a Unix socket beside readers that do not read, over UDP, by the
+documented reader; and what is said where the socket cannot be had."""
+import json
+import os
+import pathlib
+import socket
+import subprocess
+import sys
+import tempfile
+import threading
+
+import drive as d
+
+KEYS = {"version", "frame", "stamp_ns", "state", "status", "reason", "pose", "covariance", "earth", "inliers", "stereo_inliers",
+        "reprojection_px", "estimate_ms", "age_ms", "dropped"}
+SLACK_MS = 50  # of a machine that runs other tests beside this one; the figure itself is publish_bench's
+
+
+def check_lines(lines, poses, placed_wanted):
+    """Every line against its row of poses.csv."""
+    assert lines, "no line came"
+    placed = 0
+    frames = [line["frame"] for line in lines]
+    assert frames == sorted(set(frames)), "lines out of order, or one twice"
+    for line in lines:
+        assert set(line) == KEYS, set(line) ^ KEYS
+        row = poses[line["frame"]]
+        assert line["stamp_ns"] == int(row["stamp_ns"])
+        for key in ("state", "status"):
+            assert line[key] == row[key], (line, row)
+        assert line["reason"] == row["reason"], (line, row)
+        assert line["inliers"] == int(row["inliers"])
+        if line["status"] == "lost":
+            assert line["pose"] is None and line["earth"] is None
+            continue
+        for ours, name in zip(line["pose"]["position_m"], "xyz"):
+            assert abs(ours - float(row[name])) < 2e-4, (line, row)
+        assert line["age_ms"] is not None and line["age_ms"] > 0
+        if line["earth"] and row["east"]:
+            placed += 1
+            for ours, name in zip(line["earth"]["enu_m"], ("east", "north", "up")):
+                assert abs(ours - float(row[name])) < 2e-3, (name, line, row)
+            assert abs(line["earth"]["latitude_deg"] - float(row["latitude_deg"])) < 1e-7
+            turn = abs(line["earth"]["heading_deg"] - float(row["heading_deg"]))
+            assert min(turn, 360 - turn) < 1e-2, (line, row)
+    assert placed > 20 or not placed_wanted, f"only {placed} lines are on the earth"
+
+
+def over_unix(below):
+    path = below / "pose.sock"
+    run = d.Drive(below / "unix", 22, "--set", f"publish.lines=unix://{path}", "--set", "comparison.placement_m=15")
+    reader = d.connected(path)
+    idle = [d.connected(path) for _ in range(3)]  # they never read, and disturb nobody
+    lines = [json.loads(line) for line in reader.makefile("r", encoding="utf-8")]
+    assert run.end() == 0, run.messages()
+    for socket_ in idle:
+        socket_.close()
+    poses = run.poses()
+    check_lines(lines, poses, True)
+    assert len(lines) > 0.9 * len(poses), (len(lines), len(poses))
+    devices = run.summary()["devices"]
+    assert devices["lines"] + devices["lines_dropped"] == len(poses), devices
+    assert devices["line_behind_pose_p99_us"] < SLACK_MS * 1000, devices
+    assert devices["line_age_p99_us"] > devices["line_behind_pose_p99_us"], devices
+    assert not path.exists(), "the socket file stays behind"
+    last = run.messages().splitlines()[-3:]
+    assert [line.split(":")[0] for line in last] == ["verdict", "to do", "report"], last
+
+
+def over_udp(below):
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as receiver:
+        receiver.bind(("127.0.0.1", 0))
+        receiver.settimeout(20)
+        run = d.Drive(below / "udp", 6, "--set", "publish.lines=udp://127.0.0.1:%d" % receiver.getsockname()[1])
+        lines = []
+        ended = threading.Event()
+
+        def read():
+            while not ended.is_set():
+                try:
+                    lines.append(json.loads(receiver.recv(65536)))
+                except TimeoutError:
+                    return
+                receiver.settimeout(3)
+
+        thread = threading.Thread(target=read)
+        thread.start()
+        assert run.end() == 0, run.messages()
+        ended.set()
+        thread.join(30)
+    check_lines(lines, run.poses(), False)
+    assert len(lines) > 0.8 * len(run.poses())
+
+
+def documented_reader(below):
+    path = below / "reader.sock"
+    run = d.Drive(below / "reader", 4, "--set", f"publish.lines=unix://{path}")
+    d.connected(path).close()
+    reader = subprocess.run([sys.executable, os.path.join(os.environ["SOURCES"], "docs/read_poses.py"), f"unix://{path}"],
+                            check=True, capture_output=True, text=True, timeout=60)
+    assert run.end() == 0, run.messages()
+    rows = run.poses()
+    printed = [line.split() for line in reader.stdout.splitlines()]
+    assert len(printed) > 0.8 * len(rows), len(printed)
+    for frame, status, reason, *place in printed:
+        row = rows[int(frame)]
+        assert status == row["status"] and reason == (row["reason"] or "-")
+        assert abs(float(place[0]) - float(row["x"])) < 1e-3
+
+
+def without_a_place(below):
+    run = d.Drive(below / "nowhere", 2, "--set", f"publish.lines=unix://{below}/no/folder/pose.sock")
+    assert run.end() == 0, run.messages()
+    assert "the drive goes on without lines" in run.messages(), run.messages()
+    bad = d.Drive(below / "bad", 2, "--set", "publish.lines=tcp://somewhere:1")
+    assert bad.end() == 2, bad.messages()
+    assert "publish.lines" in bad.messages() and not bad.session.exists(), bad.messages()
+
+
+def main():
+    with tempfile.TemporaryDirectory(prefix="vergence-lines-") as below:
+        for case in (over_unix, over_udp, documented_reader, without_a_place):
+            case(pathlib.Path(below))
+            print(f"{case.__name__}: as it should be", flush=True)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

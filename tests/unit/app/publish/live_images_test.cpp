@@ -1,0 +1,151 @@
+#include "app/publish/live_images.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "app/datasets/image_file.hpp"
+#include "core/camera/camera.hpp"
+#include "core/memory/allocation_guard.hpp"
+#include "core/memory/arena.hpp"
+
+namespace vergence::app {
+namespace {
+
+constexpr int kWidth = 960, kHeight = 720;
+
+RigCalibration rig() {
+  RigCalibration r;
+  r.cameras = 2;
+  for (std::size_t k = 0; k < 2; ++k) {
+    Intrinsics& lens = r.intrinsics[k];
+    lens.width = kWidth, lens.height = kHeight;
+    lens.fx = lens.fy = 700, lens.cx = 480, lens.cy = 360;
+    lens.distortion = {-0.1, 0.02, 0, 0, 0};
+  }
+  r.T_camera_left[1].t = {-0.5, 0, 0};
+  return r;
+}
+
+class Images : public testing::Test {
+ protected:
+  Images() : pixels_(static_cast<std::size_t>(kWidth * kHeight)) {
+    for (int y = 0; y < kHeight; ++y)
+      for (int x = 0; x < kWidth; ++x)
+        pixels_[static_cast<std::size_t>(y * kWidth + x)] = static_cast<std::uint8_t>(x / 4);
+    images_->reserve(pixels_.size());
+    frame_.number = 9;
+    frame_.cameras = 2;
+    for (std::size_t k = 0; k < 2; ++k)
+      frame_.images[k] = {pixels_.data(), kWidth, kHeight, kWidth};
+    calibration::LoggedFrame logged;
+    logged.number = 9;
+    tracks_.begin(logged);
+    calibration::LoggedObservation o;
+    o.cameras = 3;
+    o.raw[0] = {500, 300};
+    o.raw[1] = {465, 300};
+    tracks_.push(o);
+    o.cameras = 2;  // not the left one's
+    tracks_.push(o);
+  }
+
+  std::vector<std::uint8_t> pixels_;
+  RigFrame frame_{};
+  Arena arena_{calibration::TrackLog::memory_needed(2, 10) + 4096};
+  calibration::TrackLog tracks_{2, 10, arena_};
+  std::unique_ptr<LiveImages> images_ = std::make_unique<LiveImages>();
+};
+
+TEST_F(Images, areTakenOnceWhenSomebodyWantsThemWithoutMemory) {
+  const SealedScope sealed;
+  const auto before = AllocationGuard::allocations_after_seal();
+  images_->take_images(frame_);
+  images_->take_points(frame_, tracks_);
+  EXPECT_FALSE(images_->ready()) << "nobody asked";
+  images_->want();
+  images_->take_images(frame_);
+  EXPECT_FALSE(images_->ready()) << "its points are still to come";
+  images_->take_points(frame_, tracks_);
+  EXPECT_TRUE(images_->ready());
+  EXPECT_EQ(images_->frame(), 9U);
+  ASSERT_EQ(images_->points().size(), 1U);
+  EXPECT_TRUE(images_->points()[0].both);
+  images_->want();
+  frame_.number = 10;
+  images_->take_images(frame_);
+  EXPECT_EQ(images_->frame(), 9U) << "it belongs to the viewer until done()";
+  images_->done();
+  images_->want();
+  images_->take_images(frame_);
+  images_->take_points(frame_, tracks_);
+  EXPECT_TRUE(images_->points().empty()) << "the tracks are of frame 9";
+  EXPECT_EQ(AllocationGuard::allocations_after_seal(), before);
+}
+
+TEST_F(Images, aThumbnailIsASmallJpegOfTheImage) {
+  images_->want();
+  images_->take_images(frame_);
+  images_->take_points(frame_, tracks_);
+  const std::string jpeg = thumbnail(images_->pictures()[0]);
+  const std::span bytes(reinterpret_cast<const std::uint8_t*>(jpeg.data()), jpeg.size());
+  ImageSize size;
+  ASSERT_EQ(check_image(bytes, &size), ImageFileStatus::ok);
+  EXPECT_EQ(size.width, 480);
+  EXPECT_EQ(size.height, 360);
+  std::vector<std::uint8_t> grey(480 * 360);
+  ASSERT_EQ(decode_grey(bytes, size, grey.data(), 480), ImageFileStatus::ok);
+  for (int x = 0; x < 480; x += 37)
+    EXPECT_NEAR(grey[static_cast<std::size_t>(180 * 480 + x)], x / 2, 4) << x;
+}
+
+TEST_F(Images, anImageOfAnotherSizeThanTheRigsIsLeftOut) {
+  images_->reserve(pixels_.size() / 4);
+  images_->want();
+  images_->take_images(frame_);
+  images_->take_points(frame_, tracks_);
+  ASSERT_TRUE(images_->ready());
+  EXPECT_EQ(images_->pictures()[0].width, 0);
+  EXPECT_TRUE(thumbnail(images_->pictures()[0]).empty() || images_->pictures()[0].width > 0);
+}
+
+TEST(JudgedPoints, haveTheirDepthOrAreRejected) {
+  const RigCalibration r = rig();
+  const Camera left(r.intrinsics[0]), right(r.intrinsics[1]);
+  const auto seen = [&](const Vec3& p, double off_px) {
+    Vec2 a, b;
+    EXPECT_EQ(left.project(p, &a, nullptr), ProjectStatus::ok);
+    EXPECT_EQ(right.project(r.T_camera_left[1] * p, &b, nullptr), ProjectStatus::ok);
+    return LivePoint{{static_cast<float>(a.x()), static_cast<float>(a.y())},
+                     {static_cast<float>(b.x()), static_cast<float>(b.y() + off_px)},
+                     true};
+  };
+  LivePoint alone = seen({0, 0, 8}, 0);
+  alone.both = false;
+  const std::vector points{seen({1, -1, 8}, 0), seen({-2, 0.5, 30}, 0),
+                           seen({1, 1, 8}, 2 * 3.0 * 1.5), alone};
+  const auto judged = judge_points(points, r);
+  EXPECT_NEAR(judged[0].depth_m, 8, 0.01);
+  EXPECT_NEAR(judged[1].depth_m, 30, 0.1);
+  EXPECT_FALSE(judged[0].rejected);
+  EXPECT_TRUE(judged[2].rejected) << "9 px off its line, 6.4 px by Sampson";
+  EXPECT_EQ(judged[3].depth_m, 0);
+  EXPECT_FALSE(judged[3].rejected);
+}
+
+TEST(Base64, knownAnswersOfRfc4648) {
+  EXPECT_EQ(base64(""), "");
+  EXPECT_EQ(base64("f"), "Zg==");
+  EXPECT_EQ(base64("fo"), "Zm8=");
+  EXPECT_EQ(base64("foo"), "Zm9v");
+  EXPECT_EQ(base64("foob"), "Zm9vYg==");
+  EXPECT_EQ(base64("fooba"), "Zm9vYmE=");
+  EXPECT_EQ(base64("foobar"), "Zm9vYmFy");
+}
+
+}  // namespace
+}  // namespace vergence::app

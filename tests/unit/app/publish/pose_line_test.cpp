@@ -1,0 +1,102 @@
+#include "app/publish/pose_line.hpp"
+
+#include <gtest/gtest.h>
+
+#include <limits>
+#include <numbers>
+
+#include <nlohmann/json.hpp>
+
+#include "core/math/so3.hpp"
+
+namespace vergence::app {
+namespace {
+
+PublishedPose sample() {
+  PoseSample s;
+  s.frame = 12;
+  s.stamp = Stamp(1'577'836'800'500'000'001);
+  s.state = State::stereo_odometry;
+  s.status = PoseStatus::degraded;
+  s.reason = Reason::few_inliers;
+  s.T_world_left = {exp_so3({0.1, -0.2, 0.3}), {1.25, -2.5, 3.125}};
+  s.inliers = 44;
+  s.stereo_inliers = 33;
+  s.reprojection_px = 0.25;
+  s.estimate_ms = 7.5F;
+  return PublishedPose::of(s, HostStamp(5));
+}
+
+nlohmann::json line_of(const PublishedPose& pose, const std::optional<EarthNumbers>& earth,
+                       std::optional<double> age) {
+  std::string line = "what was there before";
+  write_pose_line(pose, earth, age, 7, &line);
+  EXPECT_EQ(line.back(), '\n');
+  EXPECT_EQ(line.find('\n'), line.size() - 1) << "one line";
+  return nlohmann::json::parse(line);
+}
+
+TEST(PoseLine, hasWhatTheSchemaSays) {
+  EarthNumbers earth;
+  earth.enu = {1, 2, 3};
+  earth.position = {-27.4975, 153.0137, 60};
+  earth.heading_deg = 358.25;
+  const auto j = line_of(sample(), earth, 21.5);
+  EXPECT_EQ(j["version"], 1);
+  EXPECT_EQ(j["frame"], 12);
+  EXPECT_EQ(j["stamp_ns"], 1'577'836'800'500'000'001);
+  EXPECT_EQ(j["state"], "stereo_odometry");
+  EXPECT_EQ(j["status"], "degraded");
+  EXPECT_EQ(j["reason"], "few_inliers");
+  EXPECT_EQ(j["pose"]["position_m"], (std::vector<double>{1.25, -2.5, 3.125}));
+  const PoseNumbers numbers = sample().world_left;
+  for (std::size_t i = 0; i < 4; ++i)
+    EXPECT_NEAR(j["pose"]["orientation_xyzw"][i].get<double>(), numbers.q[i], 1e-9);
+  EXPECT_TRUE(j["covariance"].is_null());
+  EXPECT_EQ(j["earth"]["enu_m"], (std::vector<double>{1, 2, 3}));
+  EXPECT_EQ(j["earth"]["latitude_deg"], -27.4975);
+  EXPECT_EQ(j["earth"]["heading_deg"], 358.25);
+  EXPECT_EQ(j["inliers"], 44);
+  EXPECT_EQ(j["stereo_inliers"], 33);
+  EXPECT_EQ(j["reprojection_px"], 0.25);
+  EXPECT_EQ(j["estimate_ms"], 7.5);
+  EXPECT_EQ(j["age_ms"], 21.5);
+  EXPECT_EQ(j["dropped"], 7);
+  EXPECT_EQ(j.size(), 15U) << "a key that docs/publish.md does not have";
+}
+
+TEST(PoseLine, ofALostFrameHasNoPlace) {
+  PublishedPose lost = sample();
+  lost.status = PoseStatus::lost;
+  const auto j = line_of(lost, EarthNumbers{}, std::nullopt);
+  EXPECT_TRUE(j["pose"].is_null());
+  EXPECT_TRUE(j["earth"].is_null());
+  EXPECT_TRUE(j["age_ms"].is_null());
+}
+
+TEST(PoseLine, staysJsonWithNumbersThatAreNone) {
+  PublishedPose pose = sample();
+  pose.world_left.t[1] = std::numeric_limits<double>::infinity();
+  pose.reprojection_px = std::numeric_limits<double>::quiet_NaN();
+  const auto j = line_of(pose, std::nullopt, 1e300);
+  EXPECT_TRUE(j["pose"].is_null());
+  EXPECT_TRUE(j["reprojection_px"].is_null());
+}
+
+TEST(Earth, isThatOfTheComparison) {
+  // World looks north: x right is east, y down, z forward is north.
+  Mat3 R_enu_world;
+  R_enu_world << 1, 0, 0, 0, 0, 1, 0, -1, 0;
+  PublishedPlacement placement;
+  placement.T_enu_world = PoseNumbers::of({R_enu_world, {10, 20, 30}});
+  placement.origin = {-27.4975, 153.0137, 60};
+  const EarthNumbers e = Earth(placement).of(PoseNumbers::of({exp_so3({0, 0.1, 0}), {1, 2, 3}}));
+  EXPECT_NEAR(e.enu[0], 11, 1e-12);
+  EXPECT_NEAR(e.enu[1], 23, 1e-12);
+  EXPECT_NEAR(e.enu[2], 28, 1e-12);
+  EXPECT_NEAR(e.heading_deg, 0.1 * 180 / std::numbers::pi, 1e-9) << "turned to the right";
+  EXPECT_NEAR(e.position.height_m, 88, 1e-3);
+}
+
+}  // namespace
+}  // namespace vergence::app
