@@ -283,7 +283,7 @@ ExitCode SessionRunner::verdict(const SessionTotals& totals, const std::vector<s
         "there");
     return ExitCode::not_usable;
   }
-  return faults.empty() ? ExitCode::done : ExitCode::not_usable;
+  return faults.empty() ? ExitCode::done : ExitCode::not_written;
 }
 
 ExitCode SessionRunner::run() {
