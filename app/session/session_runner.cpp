@@ -132,7 +132,7 @@ void SessionRunner::estimate() noexcept {
 void SessionRunner::handle(const SourceEvent& event) noexcept {
   if (event.recalibrate) estimator_->request_recalibration();
   if (event.skipped) journal_.note_skipped();
-  journal_.tell(event.record, event.to_user);
+  if (event.listed) journal_.tell(event.record, event.to_user);
 }
 
 void SessionRunner::handle(const SourceFrame& frame) noexcept {
