@@ -571,8 +571,9 @@ Group calibration_options() {
               "The same of the translation across the baseline, for a baseline of 0.75 m and in "
               "proportion to it.")
       .integer("adopt_after", &C::adopt_after, 0, 1000, "frames",
-               "In a replay and with `--fast` a result is adopted so many frames after its "
-               "snapshot, on every machine alike; live when ready.")
+               "A result is adopted when the frames after its snapshot confirm it, 12 of them or "
+               "more; so many frames after the snapshot it is decided about, one way or the other. "
+               "In a replay and with `--fast` the solver is waited for: alike on every machine.")
       .integer("max_observations", &C::max_observations, 10'000, 1'000'000, "",
                "Sightings that one solve takes; of more, frames are taken at wider steps: time and "
                "memory.")

@@ -13,7 +13,8 @@ struct CalibrationOptions {
   double rotation_sigma_mrad = 0.15;  // enough: noise-only sigma of each axis, 0.001 … 10
   double translation_sigma_mm =
       4.0;  // enough: of t_y and t_z, for a baseline of 0.75 m, in proportion to it, 0.01 … 1000
-  int adopt_after = 30;  // frames from a snapshot to its adoption in replay and --fast, 0 … 1000
+  int adopt_after = 30;  // frames after a snapshot at which its solution is decided about at the
+                         // latest, 0 … 1000
   int estimate_focal_lengths = 1;  // 1: of each further camera, with its prior; 0: held
   int refine_intrinsics =
       0;  // 1: focal lengths and principal points of all cameras, with their priors

@@ -148,6 +148,7 @@ struct Estimator::Parts {
   void doubt(CalibrationCause cause, std::uint64_t onset, const RigFrame& frame) noexcept;
   void give_up_calibration(const RigFrame& frame, double frames) noexcept;
   void watch(const odometry::FrameOutcome& out, const RigFrame& frame) noexcept;
+  void watch_sought(const odometry::FrameOutcome& out, const RigFrame& frame) noexcept;
   void calibrate(const RigFrame& frame) noexcept;
   void take(const CalibrationDecision& decision, Stamp stamp) noexcept;
   void take_learnt(const CalibrationDecision& decision, bool was_verified, Stamp stamp) noexcept;
@@ -233,6 +234,21 @@ void Estimator::Parts::watch(const odometry::FrameOutcome& out, const RigFrame& 
   } else if (v.kind != K::quiet) {
     doubt(cause_of(v.kind), first_frame_of_use(v, frame.number), frame);
   }
+}
+
+/// A rig that changes while it is sought: frames before and after are never one solve, and those
+/// after do not confirm those before.
+void Estimator::Parts::watch_sought(const odometry::FrameOutcome& out,
+                                    const RigFrame& frame) noexcept {
+  const auto onset = calibrator.watch_sought(odometry, out, frame.number);
+  if (!onset) return;
+  note(EstimatorEvent::Kind::rig_changed, frame.stamp,
+       "a camera was knocked while the calibration was sought",
+       static_cast<double>(frame.number - *onset));
+  calibrator.seek(
+      calibrator.calibrated() ? CalibrationCause::knock : CalibrationCause::from_scratch, *onset,
+      frame.number);
+  if (state == State::calibrating) transition(Trigger::calibration_rejected, frame.stamp);
 }
 
 /// Solves are started and decided.
@@ -451,6 +467,7 @@ PoseSample Estimator::process(const RigFrame& given) noexcept {
     if (out.posed) {
       const bool linked = p.odometry.linked() == odometry::Link::linked;
       if (linked && p.state == State::stereo_odometry && !out.restarted) p.watch(out, frame);
+      if (!linked && p.calibrator.seeking()) p.watch_sought(out, frame);
       p.calibrator.log(p.odometry, out, frame);
     }
     p.calibrate(frame);

@@ -27,9 +27,9 @@ enum class CalibrationTrust : std::uint8_t {
 
 /// When a solved calibration is adopted.
 enum class Adoption : std::uint8_t {
-  after_fixed_frames,  // CalibrationOptions::adopt_after frames after its snapshot; the estimator
-                       // waits for the solver there: deterministic
-  when_ready,          // live: at the first frame after the solver is done
+  after_fixed_frames,  // the estimator waits for the solver at the first of the frames at which a
+                       // solution is judged: deterministic
+  when_ready,          // live: once the solver is done
 };
 
 struct EstimatorOptions {

@@ -165,12 +165,13 @@ void OnlineCalibrator::watch_calibration() noexcept {
   }
 }
 
+Pinhole OnlineCalibrator::pinhole(std::size_t c) const noexcept {
+  const Intrinsics& lens = rig_.intrinsics[c];
+  return {lens.fx, lens.fy, lens.cx, lens.cy};
+}
+
 void OnlineCalibrator::watch_against(int k, const Transform& T_camera_left,
                                      const Mat6& covariance) noexcept {
-  const auto pinhole = [&](std::size_t c) {
-    const Intrinsics& lens = rig_.intrinsics[c];
-    return Pinhole{lens.fx, lens.fy, lens.cx, lens.cy};
-  };
   const auto c = static_cast<std::size_t>(k);
   (void)monitors_[c]->set_reference(T_camera_left, pinhole(0), pinhole(c), covariance);
   feeds_[c]->reset();
@@ -268,26 +269,56 @@ int OnlineCalibrator::expected_stereo(const odometry::Odometry& odometry, int k,
   return n;
 }
 
+Transform OnlineCalibrator::step_to(const Transform& T_left_world) noexcept {
+  const Transform step = any_ ? T_left_world * T_left_world_.inverse() : Transform{};
+  T_left_world_ = T_left_world;
+  any_ = true;
+  return step;
+}
+
+int OnlineCalibrator::collect_stereo(const odometry::Map& map, int k) noexcept {
+  const auto c = static_cast<std::size_t>(k);
+  stereo_.clear();
+  int found = 0;
+  for (const MapPoint& p : map.points()) {
+    // A point made in this frame was sought in the band of the calibration in use: it is no
+    // witness.
+    if (!p.followed() || p.found < 2 || !p.now.by(0)) continue;
+    if (((p.in_images >> static_cast<unsigned>(k)) & 1U) == 0) continue;
+    if (p.stage == odometry::PointStage::active) ++found;
+    (void)stereo_.push({p.now.pixel[0].cast<double>(), p.now.pixel[c].cast<double>(),
+                        static_cast<double>(std::max(p.now.sigma[0], p.now.sigma[c])), p.id});
+  }
+  return found;
+}
+
+std::optional<std::uint64_t> OnlineCalibrator::watch_sought(const odometry::Odometry& odometry,
+                                                            const odometry::FrameOutcome& outcome,
+                                                            std::uint64_t number) noexcept {
+  std::optional<std::uint64_t> onset;
+  const bool first = outcome.initialised || outcome.restarted;
+  if (first) any_ = false;
+  const Transform step = step_to(outcome.T_left_world);
+  for (int k = 1; k < rig_.cameras; ++k) {
+    const auto c = static_cast<std::size_t>(k);
+    if (first) jumps_[c]->reset();
+    (void)collect_stereo(odometry.map(), k);
+    jumps_[c]->set_transform(T_camera_left_before_[c]);
+    const calibration::DisparityJump jump = jumps_[c]->next(number, stereo_.span(), step);
+    if (jump.confirmed) onset = std::min(onset.value_or(jump.onset_frame), jump.onset_frame);
+  }
+  T_camera_left_before_ = odometry.rig().T_camera_left;
+  return onset;
+}
+
 MonitorVerdict OnlineCalibrator::watch(const odometry::Odometry& odometry,
                                        const odometry::FrameOutcome& outcome,
                                        const RigFrame& frame) noexcept {
   MonitorVerdict worst;
-  const Transform step = any_ ? outcome.T_left_world * T_left_world_.inverse() : Transform{};
-  T_left_world_ = outcome.T_left_world;
-  any_ = true;
+  const Transform step = step_to(outcome.T_left_world);
   for (int k = 1; k < rig_.cameras; ++k) {
     const auto c = static_cast<std::size_t>(k);
-    stereo_.clear();
-    int found = 0;
-    for (const MapPoint& p : odometry.map().points()) {
-      // A point made in this frame was sought in the band of the calibration in use: it is no
-      // witness.
-      if (!p.followed() || p.found < 2 || !p.now.by(0)) continue;
-      if (((p.in_images >> static_cast<unsigned>(k)) & 1U) == 0) continue;
-      if (p.stage == odometry::PointStage::active) ++found;
-      (void)stereo_.push({p.now.pixel[0].cast<double>(), p.now.pixel[c].cast<double>(),
-                          static_cast<double>(std::max(p.now.sigma[0], p.now.sigma[c])), p.id});
-    }
+    const int found = collect_stereo(odometry.map(), k);
     const calibration::DisparityJump jump = jumps_[c]->next(frame.number, stereo_.span(), step);
     calibration::MonitorFrame f = feeds_[c]->next(frame.stamp, frame.number, stereo_.span(), step);
     f.expected_stereo =
@@ -326,6 +357,10 @@ void OnlineCalibrator::seek(CalibrationCause cause, std::uint64_t onset,
   change_believed_ = false;
   log_.drop_before(onset);
   begin_segment();
+  any_ = false;
+  T_camera_left_before_ = rig_.T_camera_left;
+  for (std::size_t c = 1; c < static_cast<std::size_t>(rig_.cameras); ++c)
+    jumps_[c]->set_reference(rig_.T_camera_left[c], pinhole(0), pinhole(c));
 }
 
 Reason OnlineCalibrator::missing() const noexcept {
@@ -345,6 +380,7 @@ void OnlineCalibrator::start_solve() noexcept {
   stale_ = false;
   sought_ = seeking_;
   frames_since_snapshot_ = 0;
+  next_judgement_ = std::min(kLeastHeldOut, options_.calibration.adopt_after);
   solved_frames_ = log_.size();
   asked_ = rig_;
   from_rig_ = !seeking_;
@@ -365,18 +401,24 @@ std::optional<CalibrationDecision> OnlineCalibrator::decide(Stamp stamp,
   waited_ms_ = 0;
   if (!solving_) return std::nullopt;
   ++frames_since_snapshot_;
-  const int least = std::min(kLeastHeldOut, options_.calibration.adopt_after);
+  if (frames_since_snapshot_ < next_judgement_) return std::nullopt;
   if (options_.adoption == Adoption::when_ready) {
-    if (runner_.busy() || frames_since_snapshot_ < least) return std::nullopt;
+    if (runner_.busy()) return std::nullopt;
   } else {
-    // What is learnt beside a calibration in use waits for the frames that judge it, no longer:
-    // until then no pose is `ok`.
-    if (frames_since_snapshot_ < (sought_ ? options_.calibration.adopt_after : least))
-      return std::nullopt;
     const auto start = std::chrono::steady_clock::now();
     runner_.wait();
     waited_ms_ =
         std::chrono::duration<float, std::milli>(std::chrono::steady_clock::now() - start).count();
+  }
+  // What is sought is adopted as soon as the frames after it confirm it; it is rejected only when
+  // more of them would not help. What is learnt beside a calibration in use waits for no more than
+  // it is judged by.
+  const bool final_judgement = frames_since_snapshot_ >= options_.calibration.adopt_after;
+  if (sought_ && !outdated() && !final_judgement &&
+      calibration::check_acceptance(question(sought_solution(false), false),
+                                    options_.calibration) != Gate::open) {
+    next_judgement_ = std::min(next_judgement_ + kLeastHeldOut, options_.calibration.adopt_after);
+    return std::nullopt;
   }
   return judge(stamp, number, false);
 }
@@ -399,7 +441,7 @@ bool OnlineCalibrator::start_last_solve() noexcept {
 std::optional<CalibrationDecision> OnlineCalibrator::judge(Stamp stamp, std::uint64_t number,
                                                            bool last) noexcept {
   solving_ = false;
-  if (stale_ || sought_ != seeking_) return std::nullopt;
+  if (outdated()) return std::nullopt;
   return sought_ ? judge_sought(stamp, number, last) : judge_learnt(stamp, number, last);
 }
 
@@ -436,10 +478,7 @@ CalibrationDecision OnlineCalibrator::begin_decision(
 CalibrationDecision OnlineCalibrator::judge_sought(Stamp stamp, std::uint64_t number,
                                                    bool last) noexcept {
   const auto most = static_cast<std::size_t>(options_.calibration.max_frames);
-  // Lenses are taken from the drive where it shows that the ones in use are off, and holds them
-  // well enough; else transforms alone.
-  const calibration::RigSolution& found =
-      lenses_are_off(last) ? solved_.lenses : solved_.transforms;
+  const calibration::RigSolution& found = sought_solution(last);
   gate_ = calibration::check_acceptance(question(found, last), options_.calibration);
   CalibrationDecision d = begin_decision(stamp, number, found);
   d.accepted = gate_ == Gate::open;
@@ -491,6 +530,10 @@ void OnlineCalibrator::assess_lenses(const RigCalibration& in_use_then, std::uin
       calibration::assess(measured.rig, rig_, log_, newest, options_.calibration,
                           options_.odometry.pixel_sigma)
           .difference_percent;
+}
+
+const calibration::RigSolution& OnlineCalibrator::sought_solution(bool last) const noexcept {
+  return lenses_are_off(last) ? solved_.lenses : solved_.transforms;
 }
 
 bool OnlineCalibrator::lenses_are_off(bool last) const noexcept {

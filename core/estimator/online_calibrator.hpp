@@ -40,6 +40,11 @@ class OnlineCalibrator {
   [[nodiscard]] calibration::MonitorVerdict watch(const odometry::Odometry& odometry,
                                                   const odometry::FrameOutcome& outcome,
                                                   const RigFrame& frame) noexcept;
+  /// Frame by frame while the rig is sought with the cameras unlinked: the first frame of a rig
+  /// that has changed meanwhile, if it has.
+  [[nodiscard]] std::optional<std::uint64_t> watch_sought(const odometry::Odometry& odometry,
+                                                          const odometry::FrameOutcome& outcome,
+                                                          std::uint64_t number) noexcept;
 
   /// From now on a calibration is sought. Frames before `onset` belong to another rig and are
   /// forgotten, and so is a solve of them that is still under way.
@@ -116,9 +121,19 @@ class OnlineCalibrator {
                                                  bool last) noexcept;
   void assess_lenses(const RigCalibration& in_use_then, std::uint64_t newest,
                      CalibrationDecision* d) const noexcept;
+  /// Lenses are taken from the drive where it shows that the ones in use are off, and holds them
+  /// well enough; else transforms alone.
+  [[nodiscard]] const calibration::RigSolution& sought_solution(bool last) const noexcept;
   [[nodiscard]] bool lenses_are_off(bool last) const noexcept;
+  /// The solve under way is of frames that no longer count, or for another purpose than now.
+  [[nodiscard]] bool outdated() const noexcept { return stale_ || sought_ != seeking_; }
   [[nodiscard]] std::optional<CalibrationDecision> judge(Stamp stamp, std::uint64_t number,
                                                          bool last) noexcept;
+  [[nodiscard]] Pinhole pinhole(std::size_t c) const noexcept;
+  /// Motion of the left camera since the frame watched before.
+  [[nodiscard]] Transform step_to(const Transform& T_left_world) noexcept;
+  /// Camera k's matches into `stereo_`; how many of them hold poses.
+  int collect_stereo(const odometry::Map& map, int k) noexcept;
   void begin_segment() noexcept;
   [[nodiscard]] double pixels_moved(const odometry::Map& map) const noexcept;
   [[nodiscard]] int expected_stereo(const odometry::Odometry& odometry, int k,
@@ -143,6 +158,7 @@ class OnlineCalibrator {
   BoundedVector<calibration::StereoObservation> stereo_;
   std::array<bool, kMaxCameras> learning_{};
   std::array<int, kMaxCameras> grace_{};  // frames whose verdict does not count yet
+  std::array<Transform, kMaxCameras> T_camera_left_before_{};  // with the cameras unlinked
   Transform T_left_world_{};
   bool any_ = false;  // T_left_world_ is the frame before's
 
@@ -158,6 +174,7 @@ class OnlineCalibrator {
       false;            // frames were left out for a change once: the rest are taken for one rig
   int rejections_ = 0;  // for other reasons than a want of frames
   int frames_since_snapshot_ = 0;
+  int next_judgement_ = 0;  // frames after the snapshot at which its solution is looked at
   float waited_ms_ = 0;
   int frames_still_ = 0;              // since one was logged
   RigCalibration asked_{}, prior_{};  // of the solve under way

@@ -95,7 +95,10 @@ class Map {
   void clear() noexcept;
   /// A free slot, cleared; null when there is none.
   [[nodiscard]] MapPoint* make_point() noexcept;
-  void free_point(MapPoint* p) noexcept { p->stage = PointStage::free; }
+  /// Where the next free slot is sought from. Given back by rewind() when all points made since
+  /// are free again, these leave no trace in the order of slots, in which residuals are summed.
+  [[nodiscard]] std::size_t cursor() const noexcept { return next_point_; }
+  void rewind(std::size_t cursor) noexcept { next_point_ = cursor; }
   /// Slot of a new keyframe, dropping the oldest when the window is full. Every point's observation
   /// there is empty.
   [[nodiscard]] std::size_t make_keyframe(const Transform& T_left_world, Stamp stamp) noexcept;

@@ -26,6 +26,13 @@ constexpr int kNearEnough = 10;    // near points that keep the scale
 constexpr int kCameraHolds = 8;    // inliers for a camera to count as one that supports the pose
 constexpr double kRigidShare =
     0.4;  // of the points found that must agree: below it something else moves
+constexpr int kNewPoints = 30;  // tried in a frame, to judge from
+constexpr double kNewPointsKept =
+    0.3;  // of the points just made that fit the motion a frame later: half to nine in ten where
+          // the scene stands, a twentieth where the pose follows what moves in front of it
+constexpr int kFramesUntilTrial =
+    3;  // without new points, before some are made to be tried alone: no keyframe is made while
+        // the rig stands, and it stands for whoever follows a truck alongside
 constexpr double kStereoShare =
     0.5;  // of the points found in two cameras, in which both must agree with the pose
 constexpr double kConfirmedShare = 0.3;  // of points and new corners together: 0.44 to 0.65 on a
@@ -230,9 +237,11 @@ void Odometry::settle_points(const PoseFit& fit) noexcept {
   for (MapPoint& p : map_.points()) p.in_images = p.now.cameras;
   for (std::size_t i = 0; i < map_.points().size(); ++i)
     if (map_.points()[i].holds_poses()) map_.points()[i].now.cameras &= poses_.agrees()[i];
+  int tried = 0, kept = 0;
   for (MapPoint& p : map_.points()) {
     if (!p.followed()) continue;
     if (p.stage == PointStage::candidate) {
+      ++tried;
       for (int k = 0; k < rig_.cameras; ++k) {
         if (!p.now.by(k)) continue;
         const auto c = static_cast<std::size_t>(k);
@@ -243,6 +252,11 @@ void Odometry::settle_points(const PoseFit& fit) noexcept {
         const double limit = kOutlier * p.now.sigma[c] * p.now.sigma[c];
         if (!seen || (pixel - p.now.pixel[c].cast<double>()).squaredNorm() > 4.0 * limit)
           p.now.drop(k);
+      }
+      kept += p.now.cameras != 0 ? 1 : 0;
+      if (on_trial_) {
+        p.stage = PointStage::free;
+        continue;
       }
     }
     if (p.now.cameras != 0) {
@@ -257,6 +271,10 @@ void Odometry::settle_points(const PoseFit& fit) noexcept {
     else if (p.missed > kMissesAllowed)
       p.stage = PointStage::dormant;
   }
+  if (tried >= kNewPoints) scene_moves_ = kept < kNewPointsKept * tried;
+  frames_untried_ = tried > 0 ? 0 : frames_untried_ + 1;
+  if (on_trial_) map_.rewind(cursor_before_trial_);
+  on_trial_ = false;
 }
 
 bool Odometry::wants_keyframe() const noexcept {
@@ -366,7 +384,7 @@ bool Odometry::start_scene(const Transform& T_left_world, Stamp stamp, FrameOutc
            stereo.near < kNearEnough)
     out->reason = Reason::no_stereo_matches;
   else {
-    stereo_fails_ = false;
+    stereo_fails_ = scene_moves_ = false;
     const std::size_t slot = map_.make_keyframe(T_left_world, stamp);
     map_.keyframe(slot).T_camera_left = rig_.T_camera_left;
     keyframe_points_ = 0;
@@ -414,7 +432,7 @@ void Odometry::judge(const PoseFit& fit, const ImageCheck& images,
     out->reason = Reason::no_stereo_matches;
   else if (fit.inliers < options_.ok_inliers)
     out->reason = Reason::few_inliers;
-  else if (fit.inliers < kRigidShare * fit.given)
+  else if (fit.inliers < kRigidShare * fit.given || scene_moves_)
     out->reason = Reason::moving_scene;
   else if (fit.near < kNearEnough)
     out->reason = Reason::weak_geometry;
@@ -529,6 +547,10 @@ FrameOutcome Odometry::process(const RigFrame& frame) noexcept {
   } else if (confirmed_stereo(fit) && !images.repeated && wants_keyframe()) {
     make_keyframe(fit, frame.stamp, &out);
     out.T_left_world = T_left_world_;
+  } else if (frames_untried_ >= kFramesUntilTrial && out.images_good && link_ == Link::linked) {
+    cursor_before_trial_ = map_.cursor();
+    (void)front_end_.add_points(map_, T_left_world_, PointStage::candidate);
+    on_trial_ = true;
   }
   if (restart_cooldown_ > 0) --restart_cooldown_;
   return out;

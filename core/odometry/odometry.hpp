@@ -126,8 +126,12 @@ class Odometry {
   bool any_pose_ = false;
   int frames_lost_ = 0;        // in a row, with images that show something
   bool stereo_fails_ = false;  // at the last keyframe the other cameras confirmed hardly anything
-  int restart_cooldown_ = 0;   // frames still marked after a restart
-  int keyframe_points_ = 0;    // active points when the last keyframe was made
+  bool scene_moves_ = false;   // the last points made do not fit the motion that the pose follows
+  bool on_trial_ = false;      // the candidates are there to be tried and belong to no keyframe
+  std::size_t cursor_before_trial_ = 0;
+  int frames_untried_ = 0;    // since new points were tried
+  int restart_cooldown_ = 0;  // frames still marked after a restart
+  int keyframe_points_ = 0;   // active points when the last keyframe was made
 };
 
 }  // namespace vergence::odometry

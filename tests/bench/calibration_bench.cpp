@@ -258,7 +258,7 @@ int run_knocks(const Arguments& a) {
         fmt::print("    decision {} frames {} held out {:.2f} -> {:.2f} px\n", d.reason,
                    d.calibration.frames, d.held_out_before_px, d.held_out_after_px);
         if (d.accepted) {
-          mended = i;
+          if (mended < 0) mended = i;
           Found f{true, d.calibration, i, d.solve_ms, 0};
           print("    found", f, errors_of(d.calibration, after));
         }
@@ -345,6 +345,7 @@ int main(int argc, char** argv) {
     if (a.what == "knock") return run_knocks(a);
     if (a.what == "drives") return bench::run_drives(a.set, a.only);
     if (a.what == "learning") return bench::run_learning(a.set, a.starts);
+    if (a.what == "jumps") return bench::run_jumps(a.set, a.only);
     if (a.what == "stretches") return bench::run_stretches(a.set, a.only);
     if (a.what == "euroc" || a.what == "kitti") return run_recorded(a);
   } catch (const std::exception& e) {
@@ -353,6 +354,7 @@ int main(int argc, char** argv) {
   }
   fmt::print(
       stderr,
-      "calibration_bench: drives, stretches, learning, mock, knock, euroc or kitti is wanted\n");
+      "calibration_bench: drives, stretches, jumps, learning, mock, knock, euroc or kitti is "
+      "wanted\n");
   return 2;
 }

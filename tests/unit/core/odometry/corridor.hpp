@@ -35,6 +35,10 @@ class Corridor {
     return {exp_so3({0.004 * std::sin(3 * a), 0.02 * std::sin(a), 0.003 * std::cos(2 * a)}),
             {0.1 * std::sin(a), 0, 0.15 * i}};
   }
+  /// From now on a textured panel drives along ahead, as far as the rig does: it hides 0.6 of the
+  /// view.
+  void show_panel() { panel_ = true; }
+
   /// Frame i seen by a rig of these transforms; the images live until the next call.
   [[nodiscard]] RigFrame frame(int i, const std::array<Transform, kMaxCameras>& T_camera_left) {
     RigFrame f;
@@ -43,14 +47,15 @@ class Corridor {
     f.cameras = rig_.cameras;
     for (std::size_t k = 0; k < images_.size(); ++k) {
       Random noise(static_cast<std::uint64_t>(4 * i) + k);
-      const Transform T_world_camera = T_world_left(i) * T_camera_left[k].inverse();
+      const Transform T_left_camera = T_camera_left[k].inverse();
+      const Transform T_world_camera = T_world_left(i) * T_left_camera;
       const Intrinsics& c = rig_.intrinsics[k];
       for (int y = 0; y < kHeight; ++y)
         for (int x = 0; x < kWidth; ++x) {
-          const double grey =
-              shade(T_world_camera.t,
-                    T_world_camera.R * Vec3((x - c.cx) / c.fx, (y - c.cy) / c.fy, 1)) +
-              noise.normal();
+          const Vec3 ray((x - c.cx) / c.fx, (y - c.cy) / c.fy, 1);
+          double grey = noise.normal();
+          if (!on_panel(T_left_camera.t, T_left_camera.R * ray, &grey))
+            grey += shade(T_world_camera.t, T_world_camera.R * ray);
           images_[k].at(x, y) = static_cast<std::uint8_t>(std::clamp(std::lround(grey), 0L, 255L));
         }
       f.images[k] = images_[k].view();
@@ -83,7 +88,19 @@ class Corridor {
                                   : Vec2(p.x(), p.z());
     return textures_[surface](on);
   }
+  /// The panel's grey value is added where the ray (frame: left camera) meets it.
+  [[nodiscard]] bool on_panel(const Vec3& from, const Vec3& ray, double* grey) const {
+    constexpr double kDepth = 2.3, kLeft = -0.9, kRight = 0.7;  // m
+    if (!panel_ || ray.z() <= 0) return false;
+    const Vec3 p = from + (kDepth - from.z()) / ray.z() * ray;
+    if (p.x() < kLeft || p.x() > kRight) return false;
+    *grey += panel_texture_(Vec2(p.x(), p.y()));
+    return true;
+  }
+
   RigCalibration rig_;
+  bool panel_ = false;
+  features::test::Texture panel_texture_{16, 0.08, 0.25};
   std::vector<features::test::Image> images_;
   std::array<features::test::Texture, 5> textures_{
       features::test::Texture(11, 0.7, 2.0), features::test::Texture(12, 0.25, 0.8),

@@ -36,13 +36,25 @@ TEST(Map, whenItsPointsAreUsedUpItRefuses) {
   somewhere.missed = 2;
   somewhere.now.set(0, {1, 2}, 0.1F);
   somewhere.seen[3].set(1, {3, 4}, 0.1F);
-  f.map.free_point(&somewhere);
+  somewhere.stage = PointStage::free;
   MapPoint* again = f.map.make_point();
   ASSERT_EQ(again, &somewhere);
   EXPECT_EQ(again->found, 0);
   EXPECT_EQ(again->missed, 0);
   EXPECT_EQ(again->now.cameras, 0);
   for (const Sighting& s : again->seen) EXPECT_EQ(s.cameras, 0);
+}
+
+TEST(Map, pointsOnTrialLeaveNoTraceInTheOrderOfSlots) {
+  Filled f(3);
+  (void)f.point(PointStage::active);
+  const std::size_t cursor = f.map.cursor();
+  MapPoint* const tried = f.map.make_point();
+  (void)f.map.make_point();
+  for (MapPoint& p : f.map.points())
+    if (p.stage == PointStage::candidate) p.stage = PointStage::free;
+  f.map.rewind(cursor);
+  EXPECT_EQ(f.map.make_point(), tried);
 }
 
 TEST(Map, aFullWindowDropsItsOldestKeyframe) {
