@@ -9,7 +9,7 @@
 
 #include <fmt/format.h>
 
-#include "tests/support/fault_drive.hpp"
+#include "tests/system/faults/fault_drive.hpp"
 
 int main(int argc, char** argv) {
   using namespace vergence::test;

@@ -1,7 +1,7 @@
 // Faults two at a time, and 500 random schedules.
 #include <gtest/gtest.h>
 
-#include "tests/support/fault_drive.hpp"
+#include "tests/system/faults/fault_drive.hpp"
 
 namespace vergence::test {
 namespace {

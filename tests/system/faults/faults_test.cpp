@@ -5,7 +5,7 @@
 #include <cctype>
 #include <string>
 
-#include "tests/support/fault_drive.hpp"
+#include "tests/system/faults/fault_drive.hpp"
 
 namespace vergence::test {
 namespace {

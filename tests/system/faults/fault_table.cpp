@@ -3,7 +3,7 @@
 #include <fmt/format.h>
 
 #include "core/math/random.hpp"
-#include "tests/support/fault_drive.hpp"
+#include "tests/system/faults/fault_drive.hpp"
 
 /// The faults that the table and the random drives are made of.
 namespace vergence::test {

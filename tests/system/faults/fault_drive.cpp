@@ -1,4 +1,4 @@
-#include "tests/support/fault_drive.hpp"
+#include "tests/system/faults/fault_drive.hpp"
 
 #include <algorithm>
 #include <array>
