@@ -126,6 +126,12 @@ class CameraDevice {
                                                   ExposureSetting* /*actual*/) noexcept {
     return DeviceStatus::unsupported;
   }
+  /// Virtual time, which other devices may run ahead of: waits, at most `limit`, until all that
+  /// this camera delivers before `instant` (frames, its going and coming back) is there to be
+  /// taken. False: not yet. Consumer's thread. A real camera delivers when it does: always true.
+  [[nodiscard]] virtual bool delivered_until(HostStamp /*instant*/, Duration /*limit*/) noexcept {
+    return true;
+  }
   /// One sentence about the last call that was not `ok`: what was refused, what the camera offers,
   /// what to do. Empty: the status says it all. Owner's thread; may allocate.
   [[nodiscard]] virtual std::string last_error() const { return {}; }

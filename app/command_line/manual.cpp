@@ -72,7 +72,9 @@ constexpr const char* kExit =
     "why.\n.TP\n2\nBad arguments, "
     "configuration or "
     "input; a sentence says what and where.\n.TP\n3\nA device failed and could not be "
-    "reopened.\n.TP\n130, 143\nEnded by a signal; the "
+    "reopened.\n.TP\n4\nDone, but a file of the result is missing or not whole: the disk is full "
+    "or "
+    "broken; a sentence says which.\n.TP\n130, 143\nEnded by a signal; the "
     "session "
     "was closed properly.\n";
 

@@ -1,5 +1,7 @@
 #include "app/command_line/program.hpp"
 
+#include <sys/resource.h>
+
 #include <algorithm>
 #include <cstdio>
 #include <exception>
@@ -109,10 +111,20 @@ ExitCode parse_and_run(int given, const char* const* given_argv, AddCommands add
   return exit_code;
 }
 
+/// A thread's stack is as large as the limit says, and there is no sentence after an overflow.
+void check_stack() {
+  constexpr rlim_t kLeast = rlim_t{1} << 20;  // bytes; what is used is below half of it
+  struct rlimit stack {};
+  if (::getrlimit(RLIMIT_STACK, &stack) != 0 || stack.rlim_cur >= kLeast) return;
+  throw InputError("the stack is limited to " + std::to_string(stack.rlim_cur >> 10U) +
+                   " kB, and 1024 are needed: raise the limit (ulimit -s)");
+}
+
 }  // namespace
 
 ExitCode run_program(int argc, const char* const* argv, AddCommands add_commands) noexcept {
   try {
+    check_stack();
     const ExitCode code = parse_and_run(argc, argv, add_commands);
     std::cout.flush();
     if (!std::cout) throw InputError("standard output cannot be written; is the disk full?");

@@ -134,6 +134,12 @@ std::string suggestion(const std::string& name) {
   throw InputError(entry.origin + ": there is no key \"" + shown + "\"" + suggestion(entry.name));
 }
 
+/// The rest of a sentence "it must be …".
+std::string allowed(const Key& key) {
+  const std::string range = range_text(key);
+  return range.rfind("from ", 0) == 0 ? range + " on" : "in " + range;
+}
+
 std::string with_unit(const Key& key) { return key.unit.empty() ? "" : " " + key.unit; }
 
 template <class Number>
@@ -142,13 +148,13 @@ Number parse_number(const Entry& entry, const Key& key, const char* kind) {
   const char* end = entry.value.data() + entry.value.size();
   const auto [stop, error] = std::from_chars(entry.value.data(), end, value);
   if (error != std::errc() || stop != end)
-    throw InputError(fmt::format("{}: {} is \"{}\", not {}; it must be in {}{}", entry.origin,
-                                 key.name, entry.value.substr(0, 60), kind, range_text(key),
+    throw InputError(fmt::format("{}: {} is \"{}\", not {}; it must be {}{}", entry.origin,
+                                 key.name, entry.value.substr(0, 60), kind, allowed(key),
                                  with_unit(key)));
   // Written so that a NaN is refused.
   if (!(static_cast<double>(value) >= key.least && static_cast<double>(value) <= key.most))
-    throw InputError(fmt::format("{}: {} is {}; it must be in {}{}", entry.origin, key.name,
-                                 entry.value.substr(0, 60), range_text(key), with_unit(key)));
+    throw InputError(fmt::format("{}: {} is {}; it must be {}{}", entry.origin, key.name,
+                                 entry.value.substr(0, 60), allowed(key), with_unit(key)));
   return value;
 }
 

@@ -48,9 +48,11 @@ class OpenFile {
 ImageFileStatus read_bytes(const std::filesystem::path& file, std::size_t limit,
                            std::vector<std::uint8_t>* bytes) {
   const OpenFile in(file.c_str());
-  if (in.fd() < 0)
+  if (in.fd() < 0) {
+    if (errno == EMFILE || errno == ENFILE) return ImageFileStatus::too_many_files;
     return errno == ENOENT || errno == ENOTDIR ? ImageFileStatus::missing
                                                : ImageFileStatus::unreadable;
+  }
   struct stat about {};
   if (::fstat(in.fd(), &about) != 0 || !S_ISREG(about.st_mode) || about.st_size > kMaxFile)
     return ImageFileStatus::unreadable;
@@ -77,6 +79,9 @@ const char* to_phrase(ImageFileStatus status) noexcept {
       return "is missing";
     case ImageFileStatus::unreadable:
       return "cannot be read";
+    case ImageFileStatus::too_many_files:
+      return "cannot be opened: this program or the machine has as many files open as it may "
+             "(ulimit -n)";
     case ImageFileStatus::not_an_image:
       return "is no PNG, JPEG or BMP image";
     case ImageFileStatus::torn:

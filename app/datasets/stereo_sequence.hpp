@@ -144,9 +144,9 @@ struct BagTopics {
 /// none.
 [[nodiscard]] ImageSize first_image_size(const StereoSequence& sequence, std::size_t camera);
 
-/// InputError where the stamps cannot be those of a drive: most do not go forward, or the median
-/// step between pairs is below 1 ms or above 10 s. The sentence asks for the unit that would make
-/// them one.
+/// InputError where the stamps cannot be those of a drive: one is further than 146 years from 1970
+/// (so that differences stay within 64 bits), most do not go forward, or the median step between
+/// pairs is below 1 ms or above 10 s. The sentence asks for the unit that would make them one.
 void check_times(const StereoSequence& sequence);
 
 /// Looks at the head of every image of pairs [first, first + count): InputError names the first

@@ -5,6 +5,7 @@
 
 #include <fmt/format.h>
 
+#include "app/datasets/decimal.hpp"
 #include "app/datasets/stereo_sequence.hpp"
 #include "app/datasets/text_file.hpp"
 
@@ -46,8 +47,16 @@ std::string in_words(double seconds) {
 }  // namespace
 
 void check_times(const StereoSequence& sequence) {
-  if (sequence.pairs.size() < 3) return;
+  // Half of what 64 bits hold: no difference of two stamps is beyond them.
+  constexpr std::int64_t kFarthest = std::int64_t{1} << 62;  // ns: 1823 to 2116
   const std::filesystem::path file = sequence.times.empty() ? sequence.root : sequence.times;
+  for (const StereoPair& pair : sequence.pairs)
+    if (pair.stamp.ns() > kFarthest || pair.stamp.ns() < -kFarthest)
+      refuse(file, 0,
+             fmt::format("has the stamp {} ns, {} s from 1970; those of a drive are between the "
+                         "years 1824 and 2116: are these other units, or is the line broken?",
+                         pair.stamp.ns(), format_seconds(pair.stamp.ns())));
+  if (sequence.pairs.size() < 3) return;
   std::vector<double> steps;  // s, those forward
   std::size_t backward = 0;
   for (std::size_t i = 1; i < sequence.pairs.size(); ++i) {

@@ -46,6 +46,9 @@ class ExposureControl::Watched final : public CameraDevice {
                             ExposureSetting* actual) noexcept override {
     return camera_->set_exposure(requested, actual);
   }
+  bool delivered_until(HostStamp instant, Duration limit) noexcept override {
+    return camera_->delivered_until(instant, limit);
+  }
   std::string last_error() const override { return camera_->last_error(); }
   std::string remark() const override { return camera_->remark(); }
   CameraStatistics statistics() const noexcept override { return camera_->statistics(); }

@@ -10,6 +10,7 @@ enum class ExitCode : int {
   not_usable = 1,
   bad_input = 2,
   device_failed = 3,
+  not_written = 4,  // done, but a file of the result is missing or not whole
   interrupted = 130,
   terminated = 143
 };

@@ -33,6 +33,7 @@ struct SourceEvent {
   EventRecord record{};
   bool to_user = false;      // on stderr, too
   bool skipped = false;      // it is a frame that could not be read
+  bool listed = true;        // in events.jsonl
   bool recalibrate = false;  // a new calibration is to be sought
 };
 

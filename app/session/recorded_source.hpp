@@ -52,6 +52,7 @@ class RecordedSource final : public FrameSource {
   bool waiting_ = false;  // pair_ was not given yet
   bool ended_ = false;    // there are no more pairs
   std::size_t next_reading_ = 0;
+  std::uint64_t unread_ = 0;  // of skipped_, those that the decoder came to
   std::uint64_t skipped_ = 0;
 };
 

@@ -9,7 +9,6 @@
 
 #include "app/config/calibration_file.hpp"
 #include "app/config/calibration_state.hpp"
-#include "app/recorder/line_file.hpp"
 #include "app/recorder/residual_field.hpp"
 #include "app/runtime/durable_file.hpp"
 #include "app/runtime/errors.hpp"
@@ -126,11 +125,7 @@ void write_session_summary(const std::filesystem::path& session, const SessionTo
                            const SummaryInput& input, std::vector<std::string>* faults) {
   const std::string text = summary_json(totals, input).dump(2) + "\n";
   try {
-    LineFile file(session / "summary.json");
-    (void)file.append(text);
-    if (!file.close())
-      faults->push_back(file.path().string() + ": is not complete (" + std::strerror(file.fault()) +
-                        ")");
+    replace_durably(session / "summary.json", text);
   } catch (const InputError& e) {
     faults->emplace_back(e.what());
   }

@@ -136,7 +136,7 @@ void SessionRunner::estimate() noexcept {
 void SessionRunner::handle(const SourceEvent& event) noexcept {
   if (event.recalibrate) estimator_->request_recalibration();
   if (event.skipped) journal_.note_skipped();
-  journal_.tell(event.record, event.to_user);
+  if (event.listed) journal_.tell(event.record, event.to_user);
 }
 
 void SessionRunner::request_recalibration(Stamp stamp, const char* sentence) noexcept {
@@ -325,7 +325,7 @@ ExitCode SessionRunner::verdict(const SessionTotals& totals, const std::vector<s
         "there");
     return ExitCode::not_usable;
   }
-  return faults.empty() ? ExitCode::done : ExitCode::not_usable;
+  return faults.empty() ? ExitCode::done : ExitCode::not_written;
 }
 
 ExitCode SessionRunner::run() {

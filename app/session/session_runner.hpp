@@ -30,8 +30,8 @@ struct SessionOptions {
 ///          the progress line and watches for signals.
 /// Errors   InputError before the session folder is made, for all that can be known by then, and
 ///          where the source does not start. Afterwards sentences on stderr.
-/// → done, not_usable (never a pose, an INS that never had a position, a file that is not whole),
-///   device_failed (the source's verdict), interrupted, terminated
+/// → done, not_usable (never a pose, an INS that never had a position), device_failed (the source's
+///   verdict), not_written (a file is missing or not whole), interrupted, terminated
 [[nodiscard]] ExitCode run_session(FrameSource& source, const Configuration& configuration,
                                    const SessionOptions& options, const SignalGuard& signals);
 

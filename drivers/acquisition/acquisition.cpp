@@ -3,7 +3,6 @@
 #include <pthread.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cstdlib>
 #include <utility>
 
@@ -137,7 +136,8 @@ void Acquisition::work() {
     // Twice: whatever arrived before an item of the first look is there at the second.
     look();
     look();
-    const int device = earliest();
+    int device = earliest();
+    if (await_cameras(device)) device = earliest();
     if (device >= 0) {
       if (static_cast<std::size_t>(device) < cameras_.size())
         take_frame(static_cast<std::size_t>(device));
@@ -209,6 +209,24 @@ int Acquisition::earliest() const {
   return device;
 }
 
+/// Before an item is taken of a device that is ahead in a time of its own, while every camera is
+/// gone: one may come back before it. True: the cameras were looked at again.
+bool Acquisition::await_cameras(int device) {
+  constexpr Duration kPatience = Duration::milliseconds(100);
+  const bool of_ins = device == ins_place(), of_board = device > ins_place();
+  const bool ahead = (of_board && options_.board_keeps_own_time) ||
+                     (of_ins && ins_ != nullptr && ins_->keeps_own_time());
+  const bool all_gone = std::all_of(heads_.begin(), heads_.end(),
+                                    [](const auto& h) { return (h.gone || h.ended) && !h.held; });
+  if (!ahead || !all_gone) return false;
+  const HostStamp instant = of_board ? board_head_.value.arrival : ins_head_.value.arrival;
+  for (CameraDevice* camera : cameras_)
+    while (!camera->delivered_until(instant, kPatience))
+      if (stop_.load(std::memory_order_acquire)) return false;
+  for (auto& head : heads_) head.look({this, &stop_, options_.wait_when_full, false});
+  return true;
+}
+
 void Acquisition::take_frame(std::size_t k) {
   auto& head = heads_[k];
   head.held = false;
@@ -270,89 +288,6 @@ void Acquisition::take_reading() {
   if (const auto pulse = sync_out_->reading(r, at)) {
     take_pulse(*pulse);
     pause_pulses();
-  }
-}
-
-void Acquisition::take_board() {
-  auto& head = board_head_;
-  head.held = false;
-  if (head.event) {
-    head.gone = true;
-    push_event(DeviceEvent::Kind::board_gone, head.value.arrival);
-    return;
-  }
-  if (head.back) {
-    head.back = false;
-    push_event(DeviceEvent::Kind::board_back, head.value.arrival);
-  }
-  take_pulse(head.value);
-  if (options_.sync.mode == SyncMode::board) pause_pulses();
-}
-
-void Acquisition::take_pulse(const Pulse& reported) {
-  Pulse pulse = reported;
-  const bool rebooted = any_pulse_ && pulse.boot != boot_;
-  if (rebooted && !sync_out_) {
-    ++counters_.reboots;
-    push_event(DeviceEvent::Kind::board_rebooted, pulse.arrival);
-  }
-  any_pulse_ = true;
-  boot_ = pulse.boot;
-  ++counters_.pulses;
-  if (!pulse.mapped) {
-    if (rebooted) {
-      board_clock_->restart();
-      counters_.board.restart();
-    }
-    const MappedStamp at = board_clock_->map(pulse.edge, pulse.arrival);
-    pulse.mapped = true;
-    pulse.host = at.host;
-    pulse.host_error = at.error;
-  }
-  if (!sync_out_) counters_.board.note(pulse.edge, {pulse.host, pulse.host_error});
-  if (!wants_pulses(options_.sync.mode)) return;
-  sync_.pulse(pulse);
-  note_proofs(pulse.arrival);
-}
-
-void Acquisition::pause_pulses() {
-  const std::uint32_t pulses = sync_.wants_pause();
-  if (pulses == 0) return;
-  ++counters_.pauses;
-  if (options_.sync.mode == SyncMode::board) {
-    if (trigger_->pause(pulses) != DeviceStatus::ok) ++counters_.pauses_refused;
-    return;
-  }
-  // No other way than to stop who makes the pulses; meanwhile nothing else comes that could not
-  // wait.
-  const bool master = options_.sync.mode == SyncMode::master_strobe;
-  if (master)
-    cameras_[0]->stop();
-  else
-    ins_->stop();
-  std::this_thread::sleep_for(std::chrono::nanoseconds(
-      (options_.sync.interval * (static_cast<std::int64_t>(pulses) + 1)).ns()));
-  const DeviceStatus status = master ? cameras_[0]->start(this) : ins_->start(this);
-  if (status != DeviceStatus::ok) ++counters_.pauses_refused;
-  if (master) {
-    sync_.restarted(0);
-    if (status != DeviceStatus::ok) heads_[0].gone = true;
-  } else {
-    ins_clock_->restart();
-    sync_out_->restart();
-    if (status != DeviceStatus::ok) ins_head_.gone = true;
-  }
-}
-
-void Acquisition::note_proofs(HostStamp now) {
-  for (std::size_t k = 0; k < cameras_.size(); ++k) {
-    Proof& proof = proofs_[k];
-    const bool proven = sync_.proven(static_cast<int>(k));
-    if (proven == proof.proven || heads_[k].gone || !proof.any) continue;
-    const double seconds = proven ? (now - proof.since).to_seconds() : 0;
-    proof = {true, proven, now};
-    push_event(proven ? DeviceEvent::Kind::proven : DeviceEvent::Kind::acquiring, now,
-               static_cast<int>(k), seconds);
   }
 }
 

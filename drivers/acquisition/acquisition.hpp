@@ -123,6 +123,7 @@ class Acquisition final : private Notifier {
   /// Which device's oldest item arrived first: a camera, or after those the INS, the board. −1:
   /// none.
   [[nodiscard]] int earliest() const;
+  bool await_cameras(int device);
   [[nodiscard]] int ins_place() const noexcept { return static_cast<int>(heads_.size()); }
   void take_frame(std::size_t k);
   void take_reading();

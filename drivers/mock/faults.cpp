@@ -28,8 +28,8 @@ constexpr FaultParameter kDrift[] = {
 constexpr FaultParameter kLag[] = {kCamera1, kForGood};
 constexpr FaultParameter kSwap[] = {kForGood};
 constexpr FaultParameter kOccluder[] = {
-    {"ahead_m", 1.2, 0.3, 200,
-     "from the left camera to its nearest face, along the vehicle's heading"},
+    {"ahead_m", 1.2, -200, 200,
+     "from the left camera to its nearest face, along the vehicle's heading; negative: behind"},
     {"left_m", 0, -50, 50, "its middle, to the left of the vehicle's"},
     {"turn_deg", 0, -180, 180,
      "its heading against the vehicle's, to the left; 90: it stands across"},

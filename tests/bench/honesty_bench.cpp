@@ -16,6 +16,7 @@
 #include "app/session/drive_calibration.hpp"
 #include "core/estimator/estimator.hpp"
 #include "tests/bench/honesty_variants.hpp"
+#include "tests/support/honesty.hpp"
 #include "tests/support/temporary_folder.hpp"
 
 namespace vergence::bench {
@@ -23,9 +24,6 @@ namespace {
 
 using app::StartingCalibration;
 using test::RecordedSequence;
-
-constexpr std::size_t kFrames = 20;  // that an error is taken over; fewer at the beginning
-constexpr double kTimes = 5;
 
 struct Driven {
   std::vector<PoseSample> samples;  // in order; also those without a pose
@@ -60,39 +58,10 @@ Driven drive(const app::StereoSequence& s, const app::Configuration& c,
   return d;
 }
 
-/// The true pose nearest in time; nothing beyond half of EuRoC's interval of truth.
-const Transform* true_pose(const app::Trajectory& truth, Stamp stamp) {
-  auto at = std::lower_bound(truth.begin(), truth.end(), stamp,
-                             [](const StampedPose& p, Stamp s) { return p.stamp < s; });
-  if (at != truth.begin() && (at == truth.end() || at->stamp - stamp > stamp - (at - 1)->stamp))
-    --at;
-  const Duration apart = at->stamp > stamp ? at->stamp - stamp : stamp - at->stamp;
-  return apart <= Duration::milliseconds(3) ? &at->T_world_body : nullptr;
-}
-
-/// Error of the motion between two samples, m; negative: the truth is not known at one of them.
-double motion_error(const PoseSample& from, const PoseSample& to, const app::Trajectory& truth) {
-  const Transform *a = true_pose(truth, from.stamp), *b = true_pose(truth, to.stamp);
-  if (a == nullptr || b == nullptr) return -1;
-  const Vec3 estimate = (from.T_world_left.inverse() * to.T_world_left).t;
-  return (estimate - (a->inverse() * *b).t).norm();
-}
-
-/// Mean error by the number of frames that it is over.
-std::array<double, kFrames + 1> normal_errors(const Driven& d, const app::Trajectory& truth) {
-  std::array<double, kFrames + 1> sum{};
-  const std::size_t n = d.samples.size();
-  for (std::size_t length = 1; length <= kFrames; ++length) {
-    int count = 0;
-    for (std::size_t i = length; i < n; ++i) {
-      const double error = motion_error(d.samples[i - length], d.samples[i], truth);
-      if (error < 0) continue;
-      sum[length] += error;
-      ++count;
-    }
-    sum[length] /= std::max(1, count);
-  }
-  return sum;
+std::vector<test::JudgedPose> judged(const Driven& d) {
+  std::vector<test::JudgedPose> poses;
+  for (const PoseSample& s : d.samples) poses.push_back({s.stamp, s.status, s.T_world_left});
+  return poses;
 }
 
 struct Tally {
@@ -100,36 +69,17 @@ struct Tally {
 };
 
 void judge(const RecordedSequence& drive_of, const std::string& what, const Driven& d,
-           const std::array<double, kFrames + 1>& normal, Tally* tally) {
-  int ok = 0, wrong = 0, wrong_over_all = 0, lost = 0;
-  std::size_t first_wrong = 0;
-  double most = 0;
-  std::size_t posed_since = 0, ok_since = 0;  // indices of the first sample of the run
-  for (std::size_t i = 0; i < d.samples.size(); ++i) {
-    const PoseSample& s = d.samples[i];
-    if (s.status == PoseStatus::lost) posed_since = i + 1, ++lost;
-    if (s.status != PoseStatus::ok) {
-      ok_since = i + 1;
-      continue;
-    }
-    ++ok;
-    const auto times = [&](std::size_t since) {
-      const std::size_t from = std::max(since, i < kFrames ? 0 : i - kFrames);
-      return from == i ? 0.0 : motion_error(d.samples[from], s, drive_of.truth) / normal[i - from];
-    };
-    const double claimed = times(ok_since);
-    most = std::max(most, claimed);
-    if (claimed > kTimes && wrong++ == 0) first_wrong = i;
-    wrong_over_all += times(posed_since) > kTimes ? 1 : 0;
-  }
+           const test::NormalErrors& normal, Tally* tally) {
+  const test::Honesty h = test::judge_honesty(
+      judged(d), [&](Stamp, std::size_t frames) { return normal[frames]; }, drive_of.truth);
   ++tally->runs;
-  tally->ok += ok;
-  tally->wrong += wrong;
-  tally->wrong_runs += wrong > 0 ? 1 : 0;
+  tally->ok += h.ok;
+  tally->wrong += h.wrong;
+  tally->wrong_runs += h.wrong > 0 ? 1 : 0;
   fmt::print("{:12s} {:46s} frames {:3d} ok {:3d} lost {:3d} knocks {}  most {:4.1f}",
-             drive_of.name, what, d.samples.size(), ok, lost, d.knocks, most);
-  if (wrong_over_all > 0) fmt::print("  over 20 {}", wrong_over_all);
-  if (wrong > 0) fmt::print("  WRONG {} from {}", wrong, first_wrong);
+             drive_of.name, what, d.samples.size(), h.ok, h.lost, d.knocks, h.most);
+  if (h.wrong_over_all > 0) fmt::print("  over 20 {}", h.wrong_over_all);
+  if (h.wrong > 0) fmt::print("  WRONG {} from {}", h.wrong, h.first_wrong);
   fmt::print("\n");
   std::fflush(stdout);
 }
@@ -141,8 +91,9 @@ void run(const RecordedSequence& d, const std::string& filter, bool events, Tall
   const app::DriveCalibration found =
       app::calibrate_drive({d.sequence, c, 0, d.sequence.pairs.size(), {}, {}}, given);
   if (found.rig) own.file.rig = *found.rig;
-  const auto normal = normal_errors(drive(d.sequence, c, own), d.truth);
-  fmt::print("{:12s} normal error over {} frames: {:.3f} m\n", d.name, kFrames, normal[kFrames]);
+  const auto normal = test::normal_errors(judged(drive(d.sequence, c, own)), d.truth);
+  fmt::print("{:12s} normal error over {} frames: {:.3f} m\n", d.name, test::kHonestyFrames,
+             normal.back());
   for (const HonestyVariant& v : honesty_variants()) {
     if (v.name.find(filter) == std::string_view::npos) continue;
     const test::TemporaryFolder folder;

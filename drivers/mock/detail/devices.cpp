@@ -133,6 +133,11 @@ CameraStatistics MockCamera::statistics() const noexcept {
   return s;
 }
 
+bool MockCamera::delivered_until(HostStamp instant, Duration limit) noexcept {
+  return rig_->options.real_time || !rig_->pulsing.load() ||
+         rig_->delivered.wait_for(instant, limit);
+}
+
 void MockCamera::take(std::span<const Transform> T_camera_enu,
                       std::span<const Transform> T_camera_bus, const Shot& shot,
                       std::uint8_t* out) {

@@ -11,6 +11,7 @@
 #include "drivers/camera.hpp"
 #include "drivers/common/wake_event.hpp"
 #include "drivers/ins.hpp"
+#include "drivers/mock/detail/delivery_progress.hpp"
 #include "drivers/mock/detail/oscillator.hpp"
 #include "drivers/mock/ins_model.hpp"
 #include "drivers/mock/mock_rig.hpp"
@@ -33,6 +34,7 @@ struct RigContext {
   std::atomic<int> unseen{0};
   std::atomic<bool> looking{false};
   std::atomic<std::uint64_t> planned{0};  // pulses whose exposures are settled
+  DeliveryProgress delivered{};           // virtual time
 };
 
 inline constexpr Duration kTransfer = Duration::milliseconds(5);       // of an image over its bus
@@ -58,6 +60,7 @@ class MockCamera final : public CameraDevice {
   void release(FrameSlot slot) noexcept override;
   void stop() noexcept override;
   CameraStatistics statistics() const noexcept override;
+  bool delivered_until(HostStamp instant, Duration limit) noexcept override;
 
   // The scheduler's side.
   Stream<Frame, 64> stream;

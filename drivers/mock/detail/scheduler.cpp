@@ -80,6 +80,7 @@ void Scheduler::begin(const TriggerConfiguration& c) {
   fed_ = plan_;
   stop_ = false;
   finished_ = false;
+  rig_.delivered.restart();
   constexpr Duration kLead =
       Duration::milliseconds(100);  // the first pictures are rendered before they are due
   if (rig_.options.real_time) start_ = monotonic_now() + kLead;
@@ -458,11 +459,14 @@ void Scheduler::post(Parcel parcel) {
 
 void Scheduler::deliver_until(HostStamp horizon) {
   for (;;) {
-    if (stopping() || parcels_.empty() || parcels_.top().arrival >= horizon) return;
+    if (stopping()) return;
+    if (parcels_.empty() || parcels_.top().arrival >= horizon) break;
     const Parcel parcel = parcels_.top();
     parcels_.pop();
+    rig_.delivered.advance(parcel.arrival);  // delivering it may take until somebody takes others
     deliver(parcel, parcel.arrival);
   }
+  rig_.delivered.advance(horizon);
 }
 
 void Scheduler::hand_out_in_time() {

@@ -213,6 +213,26 @@ TEST(Run, aDiskThatIsFullForAWhileIsAnEventAndTheDriveIsWhole) {
   EXPECT_EQ(summary_of(folder / "s")["drops"]["lines"], 0);
 }
 
+TEST(Run, onADiskThatStaysFullFilesAreWholeOrNotThereAndTheExitCodeSaysSo) {
+  const TemporaryFolder folder;
+  const auto session = folder / "s";
+  // No file can grow beyond 2 kB: as a full disk, but for the errno.
+  const Outcome o = run_vergence("run '" + std::string(VERGENCE_SOURCE_DIR) +
+                                     "/app/config/mock.yaml' --fast --quiet --duration 3 --out '" +
+                                     session.string() + "'" + kSmall,
+                                 "ulimit -f 4;");
+  EXPECT_EQ(o.code, 4) << o.err;
+  for (const char* name : {"summary.json", "summary.json.new", "report.html", "report.html.new"})
+    EXPECT_FALSE(std::filesystem::exists(session / name)) << name;
+  EXPECT_NE(o.err.find("summary.json: cannot be written (File too large): check the folder's "
+                       "permissions and the disk's space"),
+            std::string::npos)
+      << o.err;
+  EXPECT_NE(o.err.find("poses.csv"), std::string::npos) << o.err;
+  const std::string poses = text_of(session / "poses.csv");
+  EXPECT_LE(poses.size(), 2048U);
+}
+
 TEST(Run, faultsActAndTheDriveGoesOn) {
   const TemporaryFolder folder;
   const auto session = folder / "s";

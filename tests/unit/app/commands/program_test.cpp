@@ -147,6 +147,14 @@ TEST(Program, WordsOfTheUserCannotSteerTheTerminal) {
   EXPECT_FALSE(contains(outcome.err, "\033"));
 }
 
+TEST(Program, AStackThatIsTooSmallIsSaidBeforeItOverflows) {
+  const test::Outcome o = test::run_vergence("--version", "ulimit -S -s 64;");
+  EXPECT_EQ(o.code, 2);
+  EXPECT_NE(o.err.find("the stack is limited to 64 kB, and 1024 are needed: raise the limit"),
+            std::string::npos)
+      << o.err;
+}
+
 TEST(Program, AStandardOutputThatTakesNothingIsAnError) {
   const std::string command =
       std::string("'") + VERGENCE_PROGRAM + "' --help >/dev/full 2>/dev/null";

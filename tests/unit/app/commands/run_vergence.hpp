@@ -16,8 +16,10 @@ struct Outcome {
   std::string out, err;
 };
 
-/// Runs the program with arguments as a shell takes them. VERGENCE_PROGRAM is its path.
-[[nodiscard]] inline Outcome run_vergence(const std::string& arguments) {
+/// Runs the program with arguments as a shell takes them. VERGENCE_PROGRAM is its path. `before`: a
+/// shell's words in front of it ("ulimit -n 64;").
+[[nodiscard]] inline Outcome run_vergence(const std::string& arguments,
+                                          const std::string& before = "") {
   const TemporaryFolder folder;
   const auto text = [](const std::filesystem::path& path) {
     std::ifstream in(path, std::ios::binary);
@@ -26,7 +28,7 @@ struct Outcome {
     return all.str();
   };
   const auto out = folder / "out", err = folder / "err";
-  const std::string command = std::string("'") + VERGENCE_PROGRAM + "' " + arguments + " >'" +
+  const std::string command = before + " '" + VERGENCE_PROGRAM + "' " + arguments + " >'" +
                               out.string() + "' 2>'" + err.string() + "' </dev/null";
   const int status = std::system(command.c_str());
   Outcome outcome;

@@ -209,6 +209,23 @@ TEST_F(Sequence, timesInAnotherUnitAreRefusedWithTheUnitTheySeemToHave) {
       << "a gap is no unit";
 }
 
+TEST_F(Sequence, stampsBeyondAnyDriveAreRefusedBeforeTheirDifferencesOverflow) {
+  test::write_tiny_folder(folder_, 4);
+  for (const char* far : {"9223372036854775807", "-9223372036854775808", "4611686018427387905"}) {
+    folder_.write("times.txt", std::string("1000000000\n1100000000\n1200000000\n") + far + "\n");
+    EXPECT_TRUE(
+        says(refusal(SequenceFormat::folder, folder_.path()), {"times.txt", far, "1824 and 2116"}))
+        << far;
+  }
+  // Two stamps 337 years apart: their difference in 64 bits is negative.
+  folder_.write("times.txt",
+                "-5317300000000000000\n-5317299900000000000\n5317300000000000000\n"
+                "5317300100000000000\n");
+  EXPECT_TRUE(says(refusal(SequenceFormat::folder, folder_.path()), {"1824 and 2116"}));
+  folder_.write("times.txt", "-300000000\n-200000000\n-100000000\n0\n");
+  EXPECT_NO_THROW((void)open_sequence(SequenceFormat::folder, folder_.path()));
+}
+
 TEST_F(Sequence, timesThatRunBackwardsAreRefused) {
   test::write_tiny_folder(folder_, 5);
   folder_.write("times.txt", "0.5\n0.4\n0.3\n0.2\n0.1\n");

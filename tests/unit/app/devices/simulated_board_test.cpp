@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdio>
 #include <memory>
 #include <string>
 #include <vector>
@@ -160,6 +161,52 @@ INSTANTIATE_TEST_SUITE_P(
         FaultCase{"off", {"board_gone@4 duration_s=1"}, Kind::board_gone, 1, 4},
         FaultCase{"ins", {"ins_gone@4 duration_s=2"}, Kind::acquiring, 2, 2}),
     [](const auto& i) { return std::string(i.param.name); });
+
+struct Blink {
+  double at, seconds;
+  int camera;  // -1: every one
+  bool own_ins;
+};
+class BlinkingCameras : public ::testing::TestWithParam<Blink> {};
+
+// While no camera is there nothing but the images' own time holds back board and INS, which have
+// theirs: the pairing must be as after any other start.
+TEST_P(BlinkingCameras, areProvenAgainWithinASecond) {
+  const auto [at, seconds, camera, own_ins] = GetParam();
+  char fault[80];
+  (void)std::snprintf(fault, sizeof fault, "camera_gone@%.3f camera=%d duration_s=%.3f", at, camera,
+                      seconds);
+  const Configuration c = own_ins ? chain() : chain({"mock.ins_line=none"});
+  const Driven d = drive(c, {fault});
+  // Of the pulses: 0.75 s after a start each, the blink, and some at its ends and the drive's.
+  constexpr double kProof = 0.75;
+  const bool proven_before = at > kProof;
+  const double unused = camera >= 0     ? kProof
+                        : proven_before ? kProof + seconds + kProof
+                                        : at + seconds + kProof;
+  EXPECT_GE(static_cast<double>(stamp_errors(d).size()), (kSeconds - unused) * 20 - 5) << fault;
+  const int back = camera < 0 ? 2 : 1, proven = proven_before ? 2 + back : 2;
+  EXPECT_EQ(test::count(d.others, DeviceEvent::Kind::camera_gone), back);
+  EXPECT_EQ(test::count(d.others, DeviceEvent::Kind::camera_back), back);
+  EXPECT_EQ(test::count(d.others, DeviceEvent::Kind::proven), proven);
+  EXPECT_LE(test::worst_acquisition(d.others), 1);
+  if (seconds < 0.3) return;
+  const Driven again = drive(c, {fault});
+  ASSERT_EQ(d.sets.size(), again.sets.size());
+  for (std::size_t i = 0; i < d.sets.size(); ++i)
+    ASSERT_EQ(d.sets[i].stamp, again.sets[i].stamp) << i;
+}
+
+std::vector<Blink> blinks() {
+  std::vector<Blink> all;
+  for (const double seconds : {0.05, 0.1, 0.17, 0.3}) {
+    for (const double at : {0.0, 0.31, 2.02, 8.0}) all.push_back({at, seconds, -1, true});
+    for (const int camera : {0, 1}) all.push_back({5.5, seconds, camera, true});
+  }
+  for (const double seconds : {0.05, 2.0}) all.push_back({3, seconds, -1, false});
+  return all;
+}
+INSTANTIATE_TEST_SUITE_P(Schedules, BlinkingCameras, ::testing::ValuesIn(blinks()));
 
 TEST(SimulatedBoardLine, aBoardThatNeverComesBackEndsNothingButItsPulses) {
   const Driven d = drive(chain(), {"board_gone@4 duration_s=0"});

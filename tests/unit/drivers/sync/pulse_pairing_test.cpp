@@ -45,6 +45,25 @@ TEST_P(Acquisition, isProvenWithinASecondAfterStartReconnectAndReboot) {
 
 INSTANTIATE_TEST_SUITE_P(Rates, Acquisition, ::testing::Values(20.0, 30.0));
 
+TEST(PulsePairing, isProvenWithinASecondAfterEveryCameraWasGoneForAFewPulses) {
+  for (std::uint64_t seed = 1; seed <= 40; ++seed) {
+    for (const double seconds : {0.05, 0.1, 0.2, 0.3}) {
+      SCOPED_TRACE("seed " + std::to_string(seed) + ", gone for " + std::to_string(seconds) + " s");
+      PulseRigOptions o;
+      o.seed = seed;
+      o.rate_hz = 20;
+      const double at = 3 + 0.0137 * static_cast<double>(seed);
+      o.gone = {{0, at, at + seconds}, {1, at, at + seconds}};
+      PulseRig rig(o, board());
+      rig.run(8);
+      EXPECT_EQ(rig.truth().wrong, 0U);
+      EXPECT_LE(rig.truth().worst_acquisition_s, 1.0);
+      EXPECT_EQ(rig.counters().acquisitions[0], 2U);
+      EXPECT_EQ(rig.counters().acquisitions[1], 2U);
+    }
+  }
+}
+
 /// 99 of a hundred errors are below, in size.
 double p99(std::vector<double> errors) {
   for (double& e : errors) e = std::abs(e);

@@ -1,0 +1,92 @@
+#include <chrono>
+#include <thread>
+
+#include "drivers/acquisition/acquisition.hpp"
+
+/// Reports of pulses on their way to the synchroniser, and what it wants of who makes them.
+namespace vergence {
+
+void Acquisition::take_board() {
+  auto& head = board_head_;
+  head.held = false;
+  if (head.event) {
+    head.gone = true;
+    push_event(DeviceEvent::Kind::board_gone, head.value.arrival);
+    return;
+  }
+  if (head.back) {
+    head.back = false;
+    push_event(DeviceEvent::Kind::board_back, head.value.arrival);
+  }
+  take_pulse(head.value);
+  if (options_.sync.mode == SyncMode::board) pause_pulses();
+}
+
+void Acquisition::take_pulse(const Pulse& reported) {
+  Pulse pulse = reported;
+  const bool rebooted = any_pulse_ && pulse.boot != boot_;
+  if (rebooted && !sync_out_) {
+    ++counters_.reboots;
+    push_event(DeviceEvent::Kind::board_rebooted, pulse.arrival);
+  }
+  any_pulse_ = true;
+  boot_ = pulse.boot;
+  ++counters_.pulses;
+  if (!pulse.mapped) {
+    if (rebooted) {
+      board_clock_->restart();
+      counters_.board.restart();
+    }
+    const MappedStamp at = board_clock_->map(pulse.edge, pulse.arrival);
+    pulse.mapped = true;
+    pulse.host = at.host;
+    pulse.host_error = at.error;
+  }
+  if (!sync_out_) counters_.board.note(pulse.edge, {pulse.host, pulse.host_error});
+  if (!wants_pulses(options_.sync.mode)) return;
+  sync_.pulse(pulse);
+  note_proofs(pulse.arrival);
+}
+
+void Acquisition::pause_pulses() {
+  const std::uint32_t pulses = sync_.wants_pause();
+  if (pulses == 0) return;
+  ++counters_.pauses;
+  if (options_.sync.mode == SyncMode::board) {
+    if (trigger_->pause(pulses) != DeviceStatus::ok) ++counters_.pauses_refused;
+    return;
+  }
+  // No other way than to stop who makes the pulses; meanwhile nothing else comes that could not
+  // wait.
+  const bool master = options_.sync.mode == SyncMode::master_strobe;
+  if (master)
+    cameras_[0]->stop();
+  else
+    ins_->stop();
+  std::this_thread::sleep_for(std::chrono::nanoseconds(
+      (options_.sync.interval * (static_cast<std::int64_t>(pulses) + 1)).ns()));
+  const DeviceStatus status = master ? cameras_[0]->start(this) : ins_->start(this);
+  if (status != DeviceStatus::ok) ++counters_.pauses_refused;
+  if (master) {
+    sync_.restarted(0);
+    if (status != DeviceStatus::ok) heads_[0].gone = true;
+  } else {
+    ins_clock_->restart();
+    sync_out_->restart();
+    if (status != DeviceStatus::ok) ins_head_.gone = true;
+  }
+}
+
+void Acquisition::note_proofs(HostStamp now) {
+  for (std::size_t k = 0; k < cameras_.size(); ++k) {
+    Proof& proof = proofs_[k];
+    const bool proven = sync_.proven(static_cast<int>(k));
+    if (proven == proof.proven || heads_[k].gone || !proof.any) continue;
+    const double seconds = proven ? (now - proof.since).to_seconds() : 0;
+    proof = {true, proven, now};
+    push_event(proven ? DeviceEvent::Kind::proven : DeviceEvent::Kind::acquiring, now,
+               static_cast<int>(k), seconds);
+  }
+}
+
+}  // namespace vergence

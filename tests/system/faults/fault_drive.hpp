@@ -1,0 +1,64 @@
+#pragma once
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "tests/support/honesty.hpp"
+
+/// Drives of the mock with faults, by the built program, judged against the truth.
+namespace vergence::test {
+
+/// What goes wrong on a drive.
+struct FaultCase {
+  std::string name;
+  std::vector<std::string> faults{};  // as --fault takes them
+  double from_s = 0, until_s = 0;     // of the drive: first fault's start, last one's end
+  std::string more{};                 // further arguments
+  double duration_s = 20;
+  double recovers_within_s = 0;
+  int known_wrong = 0;  // `ok` poses that are wrong as yet: docs/faults.md names them
+};
+
+/// A drive as its session has it.
+struct FaultDrive {
+  int code = -1;  // the program's
+  std::string err{};
+  bool whole = false;  // summary.json and report.html are there
+  std::vector<JudgedPose> poses{};
+  std::vector<double> at_s{};  // of each pose, since the drive's start
+  app::Trajectory truth{};
+  std::map<std::string, int> events{};   // by kind
+  std::map<std::string, int> reasons{};  // frames from the fault's start on that are not `ok`
+  int skipped = 0;                       // frames that were not used, of all
+};
+
+struct FaultResult {
+  Honesty honesty{};
+  /// From the last fault's end to the first of kHonestyFrames `ok` poses in a row; none: there were
+  /// none.
+  std::optional<double> recovery_s{};
+  /// Greatest error over kHonestyFrames `ok` poses after recovery, times the normal one.
+  double error_after = 0;
+};
+
+/// mock_board.yaml with a quarter of the pixels: every pair proven, or not used.
+[[nodiscard]] FaultDrive drive_with_faults(const FaultCase& c);
+[[nodiscard]] FaultResult judge(const FaultCase& c, const FaultDrive& drive,
+                                const NormalError& normal);
+
+/// The faults of docs/mock.md, one at a time; begin at 9 s, when the calibration is confirmed.
+[[nodiscard]] const std::vector<FaultCase>& single_faults();
+/// Every two of them at once, the second a second later.
+[[nodiscard]] std::vector<FaultCase> fault_pairs();
+/// One to four of them at random times between 1 and 14 s; the same for the same seed.
+[[nodiscard]] FaultCase random_faults(std::uint64_t seed);
+/// The drive without any.
+[[nodiscard]] FaultCase no_fault();
+
+/// Head and line of the table of docs/faults.md.
+[[nodiscard]] std::string fault_table_head();
+[[nodiscard]] std::string fault_table_line(const FaultCase& c, const FaultDrive& drive,
+                                           const FaultResult& result);
+
+}  // namespace vergence::test

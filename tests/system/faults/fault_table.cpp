@@ -1,0 +1,127 @@
+#include <algorithm>
+
+#include <fmt/format.h>
+
+#include "core/math/random.hpp"
+#include "tests/system/faults/fault_drive.hpp"
+
+/// The faults that the table and the random drives are made of.
+namespace vergence::test {
+namespace {
+
+constexpr double kAt = 9;  // s: the calibration is confirmed by then
+
+/// A fault without its times.
+struct Kind {
+  const char* name;
+  const char* what;        // of --fault, before the @
+  const char* parameters;  // but duration_s
+  double seconds;          // 0: none, it is done at once and stays
+  double recovers = 2.5;   // s, within which poses are `ok` again for good
+  int known_wrong = 0;
+};
+
+const std::vector<Kind>& kinds() {
+  static const std::vector<Kind> all{
+      {"one camera gone", "camera_gone", "camera=1", 3},
+      {"both cameras gone", "camera_gone", "camera=-1", 3},
+      {"both cameras blink", "camera_gone", "camera=-1", 0.1},
+      {"INS gone", "ins_gone", "", 3},
+      {"no fix", "no_fix", "", 5},
+      {"INS position jumps", "position_jump", "east_m=100", 3},
+      {"board gone", "board_gone", "", 3},
+      {"board gone, pulses on", "board_gone", "powered=1", 3},
+      {"board restarts", "board_reboot", "", 0.5},
+      {"knock", "knock", "camera=1 pitch_deg=0.2", 0, 4},
+      {"one lens covered", "cover", "camera=1", 3},
+      {"both lenses covered", "cover", "camera=-1", 3},
+      {"night", "night", "", 5},
+      {"tunnel", "night", "factor=0.1", 5},
+      {"exposure stuck, too bright", "exposure", "factor=6", 5},
+      {"one side dark", "exposure", "camera=1 factor=0.1", 5},
+      {"30 % of the frames lost", "lose_frames", "share=0.3", 5},
+      {"30 % of the frames late", "late_frames", "share=0.3", 5},
+      {"30 % of the frames twice", "duplicate_frames", "share=0.3", 5},
+      {"pairs broken", "break_pairs", "share=1", 3},
+      {"one camera a frame late", "lag", "camera=1", 3, 9, 3},
+      {"cables exchanged", "swap_cables", "", 3, 9},
+      {"three triggers missed", "missed_trigger", "camera=1 pulses=3", 0},
+      {"a camera's clock set", "time_jump", "camera=1 jump_s=1", 0},
+      {"the INS's clock set", "time_jump", "camera=-1 jump_s=1", 0},
+      {"a bus in the way", "occluder", "", 5, 9},
+      {"disk full", "disk_full", "", 3},
+      {"recalibration asked for", "recalibrate", "", 0, 5},
+  };
+  return all;
+}
+
+std::string fault_of(const Kind& kind, double at_s) {
+  std::string fault = fmt::format("{}@{:g}", kind.what, at_s);
+  if (kind.seconds > 0) fault += fmt::format(" duration_s={:g}", kind.seconds);
+  if (*kind.parameters != '\0') fault += fmt::format(" {}", kind.parameters);
+  return fault;
+}
+
+void add(const Kind& kind, double at_s, FaultCase* c) {
+  const bool first = c->faults.empty();
+  c->faults.push_back(fault_of(kind, at_s));
+  c->from_s = first ? at_s : std::min(c->from_s, at_s);
+  c->until_s = std::max(c->until_s, at_s + kind.seconds);
+  c->recovers_within_s = std::max(c->recovers_within_s, kind.recovers);
+  c->known_wrong += kind.known_wrong;
+  c->duration_s = c->until_s + c->recovers_within_s + 2;  // twenty frames and some
+}
+
+}  // namespace
+
+const std::vector<FaultCase>& single_faults() {
+  static const std::vector<FaultCase> all = [] {
+    std::vector<FaultCase> cases;
+    for (const Kind& kind : kinds()) {
+      FaultCase c;
+      c.name = kind.name;
+      add(kind, kAt, &c);
+      cases.push_back(c);
+    }
+    return cases;
+  }();
+  return all;
+}
+
+std::vector<FaultCase> fault_pairs() {
+  std::vector<FaultCase> cases;
+  for (std::size_t i = 0; i < kinds().size(); ++i) {
+    for (std::size_t j = i + 1; j < kinds().size(); ++j) {
+      FaultCase c;
+      c.name = fmt::format("{}; {}", kinds()[i].name, kinds()[j].name);
+      add(kinds()[i], kAt, &c);
+      add(kinds()[j], kAt + 1, &c);
+      cases.push_back(c);
+    }
+  }
+  return cases;
+}
+
+FaultCase random_faults(std::uint64_t seed) {
+  Random random(seed, 24);
+  FaultCase c;
+  c.name = fmt::format("seed {}", seed);
+  const std::uint32_t count = 1 + random.below(4);
+  for (std::uint32_t i = 0; i < count; ++i) {
+    Kind kind = kinds()[random.below(static_cast<std::uint32_t>(kinds().size()))];
+    if (kind.seconds > 0) kind.seconds = std::max(0.05, kind.seconds * random.uniform(0, 1.5));
+    kind.seconds = static_cast<double>(static_cast<int>(kind.seconds * 1000)) / 1000;
+    add(kind, static_cast<double>(1000 + random.below(13'000)) / 1000, &c);
+  }
+  c.duration_s = std::max(c.duration_s, 12.0);  // the calibration is confirmed at 6 s
+  return c;
+}
+
+FaultCase no_fault() {
+  FaultCase c;
+  c.name = "none";
+  c.duration_s = 26;  // as long as any of the others
+  return c;
+}
+
+}  // namespace vergence::test

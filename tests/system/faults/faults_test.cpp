@@ -1,0 +1,63 @@
+// Every fault of the mock, one at a time, and random schedules of them: the drive goes on, says
+// what it meets, is usable again, and calls no wrong pose `ok`.
+#include <gtest/gtest.h>
+
+#include <cctype>
+#include <string>
+
+#include "tests/system/faults/fault_drive.hpp"
+
+namespace vergence::test {
+namespace {
+
+const NormalError& normal() {
+  static const NormalError error = [] {
+    const FaultDrive untouched = drive_with_faults(no_fault());
+    return normal_error_there(untouched.poses, untouched.truth);
+  }();
+  return error;
+}
+
+std::string described(const FaultCase& c, const FaultDrive& drive, const FaultResult& result) {
+  return fault_table_line(c, drive, result) + drive.err;
+}
+
+void expect_honest(const FaultCase& c) {
+  const FaultDrive drive = drive_with_faults(c);
+  const FaultResult result = judge(c, drive, normal());
+  SCOPED_TRACE(described(c, drive, result));
+  EXPECT_EQ(drive.code, 0);
+  EXPECT_TRUE(drive.whole);
+  EXPECT_LE(result.honesty.wrong, c.known_wrong) << "from line " << result.honesty.first_wrong;
+}
+
+class Faults : public ::testing::TestWithParam<FaultCase> {};
+
+TEST_P(Faults, areSaidAndOverSoonAndNoWrongPoseIsOk) {
+  const FaultCase& c = GetParam();
+  const FaultDrive drive = drive_with_faults(c);
+  const FaultResult result = judge(c, drive, normal());
+  SCOPED_TRACE(described(c, drive, result));
+  EXPECT_EQ(drive.code, 0);
+  EXPECT_TRUE(drive.whole);
+  EXPECT_EQ(drive.events.count("fault"), 1U);
+  EXPECT_LE(result.honesty.wrong, c.known_wrong) << "from line " << result.honesty.first_wrong;
+  ASSERT_TRUE(result.recovery_s);
+  EXPECT_LT(*result.recovery_s, c.recovers_within_s);
+}
+
+INSTANTIATE_TEST_SUITE_P(Alone, Faults, ::testing::ValuesIn(single_faults()), [](const auto& i) {
+  std::string name;
+  for (const char c : i.param.name)
+    name += std::isalnum(static_cast<unsigned char>(c)) != 0 ? c : '_';
+  return name;
+});
+
+class RandomFaults : public ::testing::TestWithParam<std::uint64_t> {};
+
+TEST_P(RandomFaults, leaveNoWrongOkAndAWholeSession) { expect_honest(random_faults(GetParam())); }
+
+INSTANTIATE_TEST_SUITE_P(Seeds, RandomFaults, ::testing::Range<std::uint64_t>(1, 11));
+
+}  // namespace
+}  // namespace vergence::test
