@@ -23,8 +23,10 @@
 #include "app/session/session_files.hpp"
 #include "app/session/session_output.hpp"
 #include "app/session/solver_watch.hpp"
+#include "app/session/thread_names.hpp"
 #include "core/estimator/estimator.hpp"
 #include "core/memory/allocation_guard.hpp"
+#include "core/memory/thread_allocations.hpp"
 
 namespace vergence::app {
 namespace {
@@ -85,6 +87,8 @@ class SessionRunner {
   std::mutex mutex_;                            // with done_, for the caller's thread that waits
   std::condition_variable changed_;
   bool done_ = false;
+  bool delivering_ = false;  // of the estimator's thread: a frame has come
+  ThreadNames threads_;      // of the caller's thread
 };
 
 SessionRunner::SessionRunner(FrameSource& source, const Configuration& configuration,
@@ -120,6 +124,7 @@ void SessionRunner::estimate() noexcept {
     if (const auto* event = std::get_if<SourceEvent>(&item)) handle(*event);
     if (comparison_) comparison_->drain();
   }
+  ThreadAllocations::end();
   estimator_->finish();
   journal_.note(*estimator_);
   if (comparison_) comparison_->finish();
@@ -141,6 +146,8 @@ void SessionRunner::handle(const SourceFrame& frame) noexcept {
     journal_.tell(frame.rig.stamp, "recalibration_requested",
                   "a new calibration was asked for by SIGUSR1", true);
   }
+  if (!delivering_) ThreadAllocations::begin();
+  delivering_ = true;
   watched_solver_.begin_frame(frame.solver_idle);
   output_.post(frame.rig);
   const PoseSample sample = estimator_->process(frame.rig);
@@ -162,6 +169,8 @@ void SessionRunner::compare(const PoseSample& sample, float decode_ms) noexcept 
 
 void SessionRunner::watch(Progress* progress) {
   constexpr std::chrono::milliseconds kLook{50};
+  constexpr int kLooksForThreads = 20;  // once a second
+  int looks = 0;
   std::unique_lock lock(mutex_);
   while (!changed_.wait_for(lock, kLook, [this] { return done_; })) {
     if (signals_.stop_requested()) source_.stop();
@@ -170,11 +179,13 @@ void SessionRunner::watch(Progress* progress) {
     if (facts_.on_request && signals_.take_calibration_request())
       calibration_asked_.store(true, std::memory_order_relaxed);
     lock.unlock();
+    if (looks++ % kLooksForThreads == 0) threads_.look();
     journal_.show(progress, facts_.frames);
     say_recording_errors(progress);
     lock.lock();
   }
   lock.unlock();
+  threads_.look();
   journal_.show(progress, facts_.frames);
 }
 
@@ -234,6 +245,7 @@ SummaryInput SessionRunner::summary_input(const SessionTotals& totals,
   }
   describe_calibration(*estimator_, facts_.begin, totals, options_, journal_.matches(), &input);
   input.allocations_after_seal = allocations;
+  input.allocations = threads_.figures();
   input.memory = memory();
   input.configuration_hash = configuration_hash(configuration_);
   source_.describe(totals, *estimator_, &input);
@@ -265,6 +277,8 @@ void SessionRunner::print_figures(const SessionTotals& totals, const SummaryInpu
       input.skipped, facts_.word_of_skipped, totals.path_m, totals.estimate.mean(),
       totals.estimate.percentile(0.99)));
   if (const std::string sentence = verification_sentence(input); !sentence.empty())
+    progress->say(sentence);
+  if (const std::string sentence = allocations_sentence(input.allocations); !sentence.empty())
     progress->say(sentence);
   source_.print_figures(totals, input, progress);
 }
