@@ -18,12 +18,12 @@
 #include "app/runtime/background_thread.hpp"
 #include "app/runtime/service_manager.hpp"
 #include "app/session/drive_recorder.hpp"
+#include "app/session/drive_threads.hpp"
 #include "app/session/event_log.hpp"
 #include "app/session/ins_comparison.hpp"
 #include "app/session/session_files.hpp"
 #include "app/session/session_output.hpp"
 #include "app/session/solver_watch.hpp"
-#include "app/session/thread_names.hpp"
 #include "core/estimator/estimator.hpp"
 #include "core/memory/allocation_guard.hpp"
 #include "core/memory/thread_allocations.hpp"
@@ -88,7 +88,7 @@ class SessionRunner {
   std::condition_variable changed_;
   bool done_ = false;
   bool delivering_ = false;  // of the estimator's thread: a frame has come
-  ThreadNames threads_;      // of the caller's thread
+  DriveThreads threads_;     // of the caller's thread
 };
 
 SessionRunner::SessionRunner(FrameSource& source, const Configuration& configuration,
@@ -106,7 +106,8 @@ SessionRunner::SessionRunner(FrameSource& source, const Configuration& configura
       comparison_arena_(arena_size(facts_.ins ? Comparison::bytes_needed(facts_.ins->options) : 0)),
       runner_(make_runner(configuration.threads)),
       estimator_(std::make_unique<Estimator>(options_, facts_.begin.file.rig, facts_.begin.nominal,
-                                             estimator_arena_, *runner_, watched_solver_)) {
+                                             estimator_arena_, *runner_, watched_solver_)),
+      threads_(configuration.realtime) {
   if (facts_.ins)
     comparison_ = std::make_unique<InsComparison>(facts_.ins->options, facts_.ins->kind,
                                                   comparison_arena_, journal_);
@@ -169,8 +170,6 @@ void SessionRunner::compare(const PoseSample& sample, float decode_ms) noexcept 
 
 void SessionRunner::watch(Progress* progress) {
   constexpr std::chrono::milliseconds kLook{50};
-  constexpr int kLooksForThreads = 20;  // once a second
-  int looks = 0;
   std::unique_lock lock(mutex_);
   while (!changed_.wait_for(lock, kLook, [this] { return done_; })) {
     if (signals_.stop_requested()) source_.stop();
@@ -179,13 +178,12 @@ void SessionRunner::watch(Progress* progress) {
     if (facts_.on_request && signals_.take_calibration_request())
       calibration_asked_.store(true, std::memory_order_relaxed);
     lock.unlock();
-    if (looks++ % kLooksForThreads == 0) threads_.look();
+    threads_.look(progress);
     journal_.show(progress, facts_.frames);
     say_recording_errors(progress);
     lock.lock();
   }
   lock.unlock();
-  threads_.look();
   journal_.show(progress, facts_.frames);
 }
 
@@ -229,6 +227,7 @@ std::vector<std::pair<std::string, std::size_t>> SessionRunner::memory() const {
            comparison_arena_.capacity() + (facts_.ins ? facts_.ins->reading_bytes : 0)},
           {"images_bytes", facts_.image_bytes},
           {"recording_bytes", recording_ ? recording_->memory() : 0},
+          {"recorder_bytes", recorder_ ? recorder_->memory() : 0},
           {"rings_bytes", sizeof(Recorder) + sizeof(EventLog) + facts_.ring_bytes}};
 }
 
@@ -307,6 +306,7 @@ ExitCode SessionRunner::run() {
   Progress progress = Progress::on_stderr(request_.quiet);
   const auto allocations_before = AllocationGuard::allocations_after_seal();
   say_remarks(&progress);
+  threads_.lock_memory(&progress);
   source_.start(&faults);
   std::thread estimating([this] { estimate(); });
   service_.ready();
