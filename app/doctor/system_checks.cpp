@@ -36,7 +36,8 @@ void check_memory_lock(const CheckContext& p, std::vector<Finding>* findings) {
   if (!p.needs.lock_memory) return;
   constexpr unsigned kCapIpcLock = 14;
   const auto locked = p.machine.limit("Max locked memory");
-  constexpr std::int64_t kEnough = std::int64_t{256} << 20;  // a drive of two cameras
+  constexpr std::int64_t kEnough = std::int64_t{512}
+                                   << 20;  // of two cameras, threads and libraries included
   if (locked && *locked >= 0 && *locked < kEnough && !p.machine.has_capability(kCapIpcLock))
     findings->push_back(
         {"memory_lock",

@@ -88,7 +88,9 @@ Growth drive(int seconds, std::chrono::seconds wall) {
 
 void expect_flat(const Growth& growth) {
   constexpr std::int64_t kMiB = 1024 * kKiB;
-  if (!growth.after_a_minute) GTEST_SKIP() << "this machine is too slow for a minute of the drive";
+  constexpr int kTwoMinutes = 2 * 60 * 20;  // frames
+  if (growth.frames < kTwoMinutes)
+    GTEST_SKIP() << "this machine is too slow: " << growth.frames << " frames";
   EXPECT_LE(growth.at_the_end - *growth.after_a_minute, kMiB)
       << "after " << growth.frames << " frames";
   RecordProperty("frames", growth.frames);
