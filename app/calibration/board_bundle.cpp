@@ -36,11 +36,11 @@ double squared_sum(const BoardProblem& b, const std::array<Camera, kMaxCameras>&
   for (std::size_t k = 0; k < static_cast<std::size_t>(b.rig.cameras); ++k) {
     const auto& corners = b.views[v].corners[k];
     const Transform T = b.rig.T_camera_left[k] * b.T_left_board[v];
-    for (std::size_t i = 0; i < corners.size(); ++i) {
+    for (const BoardCorner& c : corners) {
       Vec2 x;
-      if (cameras[k].project(T * b.board.corner(i), &x, nullptr) != ProjectStatus::ok)
+      if (cameras[k].project(T * b.board.corner(c.index), &x, nullptr) != ProjectStatus::ok)
         return std::numeric_limits<double>::infinity();
-      sum += (x - corners[i]).squaredNorm();
+      sum += (x - c.pixel).squaredNorm();
     }
   }
   return sum;
@@ -77,8 +77,8 @@ ViewNormal linearise(const BoardProblem& b, const BoardParameters& layout,
     Matrix ss = Matrix::Zero(width, width);
     Side sp = Side::Zero(width, 6);
     Vector s = Vector::Zero(width);
-    for (std::size_t i = 0; i < corners.size(); ++i) {
-      const Vec3 in_board = T_b.R * b.board.corner(i), X_left = in_board + T_b.t,
+    for (const BoardCorner& c : corners) {
+      const Vec3 in_board = T_b.R * b.board.corner(c.index), X_left = in_board + T_b.t,
                  turned = T_k.R * X_left, X = turned + T_k.t;
       Vec2 x;
       Mat23 J_point;
@@ -91,7 +91,7 @@ ViewNormal linearise(const BoardProblem& b, const BoardParameters& layout,
       }
       Mat26 J_pose;
       J_pose << -J_point * T_k.R * skew(in_board), J_point * T_k.R;
-      const Vec2 r = x - corners[i];
+      const Vec2 r = x - c.pixel;
       ss.noalias() += J.transpose() * J;
       sp.noalias() += J.transpose() * J_pose;
       s.noalias() += J.transpose() * r;

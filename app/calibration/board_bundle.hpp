@@ -5,16 +5,15 @@
 
 #include <Eigen/Core>
 
-#include "app/calibration/checkerboard.hpp"
+#include "app/calibration/board_pattern.hpp"
 #include "core/types/calibration.hpp"
 
 namespace vergence::app {
 
 /// One board pose as the cameras saw it.
 struct BoardView {
-  std::string name{};  // for sentences: the first image's
-  std::array<std::vector<Vec2>, kMaxCameras>
-      corners{};  // px, in the order of Checkerboard::corner(); empty: not found there
+  std::string name{};                               // for sentences: the first image's
+  std::array<BoardCorners, kMaxCameras> corners{};  // empty: not found there
 };
 
 /// Which numbers of the rig are free: of every camera fx, fy, cx, cy and the first `distortion`
@@ -37,7 +36,7 @@ class BoardParameters {
 
 /// The rig and where the board stood, before and after.
 struct BoardProblem {
-  Checkerboard board{};
+  BoardPattern board{};
   std::vector<BoardView> views{};
   RigCalibration rig{};
   std::vector<Transform> T_left_board{};  // one a view

@@ -97,7 +97,7 @@ bool Calibrator::start_each() {
     T_camera_board_[k].resize(given_.size());
     for (int round = 0;; ++round) {
       std::vector<std::size_t> which;
-      std::vector<const std::vector<Vec2>*> images;
+      std::vector<const BoardCorners*> images;
       for (const std::size_t v : used_) {
         if (given_[v].corners[k].empty()) continue;
         which.push_back(v);

@@ -10,7 +10,7 @@
 namespace vergence::app {
 
 struct BoardCalibrationOptions {
-  Checkerboard board{};
+  BoardPattern board{};
   std::vector<ImageSize>
       sizes{};  // of the cameras' images, px; as many as cameras, 1 to kMaxCameras
   CameraModelKind model = CameraModelKind::pinhole_radtan;

@@ -9,6 +9,7 @@
 
 #include <fmt/format.h>
 
+#include "app/calibration/board_detector.hpp"
 #include "app/runtime/errors.hpp"
 
 namespace vergence::app {
@@ -126,7 +127,7 @@ std::vector<std::vector<fs::path>> group_views(const std::vector<std::vector<fs:
 }
 
 BoardImages read_board_images(const std::vector<std::vector<fs::path>>& views,
-                              const Checkerboard& board,
+                              const BoardPattern& board,
                               const std::function<void(std::size_t, std::size_t)>& told) {
   const std::size_t cameras = views.empty() ? 0 : views.front().size();
   BoardImages images;
@@ -149,13 +150,9 @@ BoardImages read_board_images(const std::vector<std::vector<fs::path>>& views,
             "{}: has {} x {} pixels, the images before it {} x {}; one camera has one size",
             file.string(), grey.size.width, grey.size.height, size.width, size.height));
       const ImageView pixels{grey.pixels.data(), size.width, size.height, size.width};
-      if (auto corners = find_checkerboard(pixels, board, BoardSearch::thorough)) {
-        if (!board.tells_its_ends()) same_way_up(view.corners[0], &*corners);
-        view.corners[k] = std::move(*corners);
-      } else {
-        without.push_back(
-            fmt::format("no board of {}x{} in {}", board.columns, board.rows, file.string()));
-      }
+      view.corners[k] = find_board(pixels, board, BoardSearch::thorough, view.corners[0]);
+      if (view.corners[k].empty())
+        without.push_back(fmt::format("no board of {} in {}", board.words(), file.string()));
     }
     const auto with = std::count_if(view.corners.begin(), view.corners.end(),
                                     [](const auto& c) { return !c.empty(); });

@@ -35,7 +35,7 @@ struct BoardImages {
 /// InputError: no image can be read, or images of one camera differ in size. An image that cannot
 /// be read is a remark.
 [[nodiscard]] BoardImages read_board_images(
-    const std::vector<std::vector<std::filesystem::path>>& views, const Checkerboard& board,
+    const std::vector<std::vector<std::filesystem::path>>& views, const BoardPattern& board,
     const std::function<void(std::size_t done, std::size_t found)>& told);
 
 }  // namespace vergence::app

@@ -138,9 +138,8 @@ std::string format_report(const BoardReport& r) {
   const auto refused = std::count_if(r.found.views.begin(), r.found.views.end(),
                                      [](const BoardViewResult& v) { return !v.used; });
   std::string text =
-      fmt::format("{} views of a {}x{} board with squares of {:g} mm: {} used, {} refused\n",
-                  r.found.views.size(), r.board.columns, r.board.rows, 1e3 * r.board.square,
-                  rig.frames, refused);
+      fmt::format("{} views of a board of {} of {:g} mm: {} used, {} refused\n",
+                  r.found.views.size(), r.board.words(), 1e3 * r.board.square, rig.frames, refused);
   for (const BoardViewResult& v : r.found.views)
     if (!v.used) text += fmt::format("  refused: {}, {:.3g} px rms\n", v.name, v.rms_px);
   text += worst_views(r);
@@ -165,8 +164,12 @@ std::string format_report(const BoardReport& r) {
 nlohmann::ordered_json json_report(const BoardReport& r) {
   using Json = nlohmann::ordered_json;
   const RigCalibration& rig = r.file.rig;
-  Json json{{"board",
-             {{"columns", r.board.columns}, {"rows", r.board.rows}, {"square_m", r.board.square}}},
+  Json board{{"kind", r.board.kind == BoardKind::aprilgrid ? "aprilgrid" : "checkerboard"},
+             {"columns", r.board.columns},
+             {"rows", r.board.rows},
+             {"square_m", r.board.square}};
+  if (r.board.kind == BoardKind::aprilgrid) board["spacing"] = r.board.spacing;
+  Json json{{"board", std::move(board)},
             {"reprojection_px", rig.reprojection_px},
             {"corner_sigma_px", r.found.corner_sigma_px}};
   for (std::size_t k = 0; k < static_cast<std::size_t>(rig.cameras); ++k) {

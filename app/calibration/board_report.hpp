@@ -14,7 +14,7 @@ namespace vergence::app {
 struct BoardReport {
   const BoardCalibration& found;
   const CalibrationFile& file;  // names, and the rig as it is written
-  const Checkerboard& board;
+  const BoardPattern& board;
   const Coverage& coverage;
   std::optional<double> measured_baseline{};  // m
 };

@@ -17,10 +17,10 @@ Vec3 vector_of(const cv::Mat& m) {
   return {flat.at<double>(0), flat.at<double>(1), flat.at<double>(2)};
 }
 
-std::vector<cv::Point3f> object_points(const Checkerboard& board) {
+std::vector<cv::Point3f> object_points(const BoardPattern& board, const BoardCorners& seen) {
   std::vector<cv::Point3f> points;
-  for (std::size_t i = 0; i < board.corners(); ++i) {
-    const Eigen::Vector3f X = board.corner(i).cast<float>();
+  for (const BoardCorner& c : seen) {
+    const Eigen::Vector3f X = board.corner(c.index).cast<float>();
     points.emplace_back(X.x(), X.y(), X.z());
   }
   return points;
@@ -30,13 +30,13 @@ std::vector<cv::Point3f> object_points(const Checkerboard& board) {
 /// they are.
 bool start_perspective(BoardProblem* alone, bool sixth_order) {
   Intrinsics& lens = alone->rig.intrinsics[0];
-  const std::vector<std::vector<cv::Point3f>> object(alone->views.size(),
-                                                     object_points(alone->board));
+  std::vector<std::vector<cv::Point3f>> object;
   std::vector<std::vector<cv::Point2f>> image;
   for (const BoardView& v : alone->views) {
+    object.push_back(object_points(alone->board, v.corners[0]));
     image.emplace_back();
-    for (const Vec2& c : v.corners[0])
-      image.back().emplace_back(static_cast<float>(c.x()), static_cast<float>(c.y()));
+    for (const BoardCorner& c : v.corners[0])
+      image.back().emplace_back(static_cast<float>(c.pixel.x()), static_cast<float>(c.pixel.y()));
   }
   cv::Mat K, D;
   std::vector<cv::Mat> turns, places;
@@ -61,18 +61,19 @@ bool start_equidistant(BoardProblem* alone, double focal) {
   lens.fx = lens.fy = focal;
   lens.cx = 0.5 * (lens.width - 1), lens.cy = 0.5 * (lens.height - 1);
   lens.distortion.fill(0);
-  const std::vector<cv::Point3f> object = object_points(alone->board);
   for (std::size_t v = 0; v < alone->views.size(); ++v) {
     std::vector<cv::Point2d> rays;
-    for (const Vec2& c : alone->views[v].corners[0]) {
-      const Vec2 angle((c.x() - lens.cx) / focal, (c.y() - lens.cy) / focal);
+    const BoardCorners& corners = alone->views[v].corners[0];
+    for (const BoardCorner& c : corners) {
+      const Vec2 angle((c.pixel.x() - lens.cx) / focal, (c.pixel.y() - lens.cy) / focal);
       const double theta = angle.norm();
       if (theta > kWidest) return false;
       const double stretch = theta > 1e-9 ? std::tan(theta) / theta : 1;
       rays.emplace_back(stretch * angle.x(), stretch * angle.y());
     }
     cv::Mat turn, place;
-    if (!cv::solvePnP(object, rays, cv::Mat::eye(3, 3, CV_64F), cv::noArray(), turn, place))
+    if (!cv::solvePnP(object_points(alone->board, corners), rays, cv::Mat::eye(3, 3, CV_64F),
+                      cv::noArray(), turn, place))
       return false;
     alone->T_left_board[v] = {exp_so3(vector_of(turn)), vector_of(place)};
   }
@@ -93,7 +94,7 @@ std::optional<CameraStart> adjusted(BoardProblem alone, int coefficients) {
 
 }  // namespace
 
-std::optional<CameraStart> start_camera(const std::vector<const std::vector<Vec2>*>& images,
+std::optional<CameraStart> start_camera(const std::vector<const BoardCorners*>& images,
                                         const BoardCalibrationOptions& options, ImageSize size) {
   BoardProblem alone;
   alone.board = options.board;

@@ -18,7 +18,7 @@ struct CameraStart {
 /// (OpenCV's fisheye::calibrate ends in wrong minima), then adjusted. Nothing: it does not
 /// converge.
 [[nodiscard]] std::optional<CameraStart> start_camera(
-    const std::vector<const std::vector<Vec2>*>& images, const BoardCalibrationOptions& options,
+    const std::vector<const BoardCorners*>& images, const BoardCalibrationOptions& options,
     ImageSize size);
 
 }  // namespace vergence::app

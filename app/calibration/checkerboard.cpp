@@ -1,20 +1,14 @@
 #include "app/calibration/checkerboard.hpp"
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 
-#include <fmt/format.h>
 #include <opencv2/calib3d.hpp>
 #include <opencv2/imgproc.hpp>
-
-#include "app/runtime/errors.hpp"
 
 namespace vergence::app {
 namespace {
 
-constexpr int kFewest = 3, kMost = 100;                     // inner corners a side
-constexpr double kSmallestSquare = 0.001, kLargest = 10.0;  // m
 constexpr int kLargeImage =
     1200;  // px: from this width on squares may be too large for the detector's windows
 constexpr int kNarrowestWindow = 2, kWidestWindow = 11;  // px, half windows
@@ -24,18 +18,13 @@ constexpr double kBlur =
 constexpr int kRefineSteps = 100;
 constexpr double kRefineTolerance = 1e-4;  // px
 
-bool parse_whole(std::string_view text, int* value) {
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), *value);
-  return error == std::errc() && end == text.data() + text.size();
-}
-
 cv::Mat matrix_of(const ImageView& image) {
   // cv::Mat has no view of constant pixels; nothing below writes them.
   return {image.height, image.width, CV_8U, const_cast<std::uint8_t*>(image.data),
           static_cast<std::size_t>(image.stride)};
 }
 
-double smallest_spacing(const std::vector<cv::Point2f>& corners, const Checkerboard& board) {
+double smallest_spacing(const std::vector<cv::Point2f>& corners, const BoardPattern& board) {
   const auto n = static_cast<std::size_t>(board.columns);
   double least = 1e9;
   for (std::size_t i = 0; i < corners.size(); ++i) {
@@ -45,7 +34,7 @@ double smallest_spacing(const std::vector<cv::Point2f>& corners, const Checkerbo
   return least;
 }
 
-bool detect(const cv::Mat& image, const Checkerboard& board, BoardSearch search,
+bool detect(const cv::Mat& image, const BoardPattern& board, BoardSearch search,
             std::vector<cv::Point2f>* corners) {
   const int flags = cv::CALIB_CB_ADAPTIVE_THRESH | cv::CALIB_CB_NORMALIZE_IMAGE |
                     (search == BoardSearch::quick ? cv::CALIB_CB_FAST_CHECK : 0);
@@ -62,7 +51,7 @@ bool detect(const cv::Mat& image, const Checkerboard& board, BoardSearch search,
 }
 
 /// Rows run to the right when columns run down: a board seen from its front.
-void make_right_handed(const Checkerboard& board, std::vector<cv::Point2f>* corners) {
+void make_right_handed(const BoardPattern& board, std::vector<cv::Point2f>* corners) {
   const auto n = static_cast<std::ptrdiff_t>(board.columns);
   const cv::Point2f along = corners->at(static_cast<std::size_t>(n - 1)) - corners->front();
   const cv::Point2f down =
@@ -72,7 +61,7 @@ void make_right_handed(const Checkerboard& board, std::vector<cv::Point2f>* corn
 }
 
 /// Positive where the square right and below of the first corner is brighter than its neighbours.
-double first_square_brighter(const cv::Mat& image, const Checkerboard& board,
+double first_square_brighter(const cv::Mat& image, const BoardPattern& board,
                              const std::vector<cv::Point2f>& corners) {
   const auto n = static_cast<std::size_t>(board.columns);
   double sum = 0;
@@ -90,31 +79,8 @@ double first_square_brighter(const cv::Mat& image, const Checkerboard& board,
 
 }  // namespace
 
-Checkerboard parse_checkerboard(const std::string& inner_corners, double square) {
-  Checkerboard board;
-  const std::size_t x = inner_corners.find('x');
-  const std::string_view text = inner_corners;
-  if (x == std::string::npos || !parse_whole(text.substr(0, x), &board.columns) ||
-      !parse_whole(text.substr(x + 1), &board.rows) ||
-      std::min(board.columns, board.rows) < kFewest || std::max(board.columns, board.rows) > kMost)
-    throw InputError(fmt::format(
-        "--board is \"{}\"; it takes the inner corners along and down, {} to {}, like 9x6",
-        inner_corners.substr(0, 60), kFewest, kMost));
-  if (board.columns == board.rows)
-    throw InputError(
-        fmt::format("--board {}: a board with as many corners along as down looks the same after a "
-                    "quarter turn; take another",
-                    inner_corners));
-  if (!(square >= kSmallestSquare && square <= kLargest))
-    throw InputError(
-        fmt::format("--square is {}; it takes the side of a square in metres, {} to {}", square,
-                    kSmallestSquare, kLargest));
-  board.square = square;
-  return board;
-}
-
 std::optional<std::vector<Vec2>> find_checkerboard(const ImageView& image,
-                                                   const Checkerboard& board, BoardSearch search) {
+                                                   const BoardPattern& board, BoardSearch search) {
   if (image.empty()) return std::nullopt;
   const cv::Mat pixels = matrix_of(image);
   std::vector<cv::Point2f> corners;

@@ -25,7 +25,7 @@ std::string listed(const std::vector<std::string>& words) {
 
 }  // namespace
 
-Coverage::Coverage(const Checkerboard& board, std::vector<std::string> names,
+Coverage::Coverage(const BoardPattern& board, std::vector<std::string> names,
                    std::vector<ImageSize> sizes, double focal_px)
     : board_(board),
       names_(std::move(names)),
@@ -36,9 +36,9 @@ Coverage::Coverage(const Checkerboard& board, std::vector<std::string> names,
 void Coverage::count(const BoardView& view, std::size_t camera, Seen* seen) const {
   const ImageSize size = sizes_[camera];
   std::array<int, kParts> parts{};
-  for (const Vec2& c : view.corners[camera]) {
-    const double x = std::clamp(c.x() / size.width, 0.0, 0.999),
-                 y = std::clamp(c.y() / size.height, 0.0, 0.999);
+  for (const BoardCorner& c : view.corners[camera]) {
+    const double x = std::clamp(c.pixel.x() / size.width, 0.0, 0.999),
+                 y = std::clamp(c.pixel.y() / size.height, 0.0, 0.999);
     ++seen->cells[static_cast<std::size_t>(y * kRows) * kColumns +
                   static_cast<std::size_t>(x * kColumns)];
     ++parts[part_of(y) * 3 + part_of(x)];
@@ -52,13 +52,13 @@ Coverage::Stand Coverage::stand_of(const BoardView& view) const {
   if (corners.empty()) return stand;
   std::vector<cv::Point3d> object;
   std::vector<cv::Point2d> image;
-  Vec2 least = corners.front(), most = corners.front();
-  for (std::size_t i = 0; i < corners.size(); ++i) {
-    const Vec3 X = board_.corner(i);
+  Vec2 least = corners.front().pixel, most = least;
+  for (const BoardCorner& c : corners) {
+    const Vec3 X = board_.corner(c.index);
     object.emplace_back(X.x(), X.y(), X.z());
-    image.emplace_back(corners[i].x(), corners[i].y());
-    least = least.cwiseMin(corners[i]);
-    most = most.cwiseMax(corners[i]);
+    image.emplace_back(c.pixel.x(), c.pixel.y());
+    least = least.cwiseMin(c.pixel);
+    most = most.cwiseMax(c.pixel);
   }
   stand.extent =
       std::max((most.x() - least.x()) / sizes_[0].width, (most.y() - least.y()) / sizes_[0].height);

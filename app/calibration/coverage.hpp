@@ -22,7 +22,7 @@ class Coverage {
   static constexpr std::size_t kColumns = 12, kRows = 8;  // cells of the grid that is shown
 
   /// `names` and `sizes` one a camera; `focal_px` of camera 0, roughly: it only serves the tilts.
-  Coverage(const Checkerboard& board, std::vector<std::string> names, std::vector<ImageSize> sizes,
+  Coverage(const BoardPattern& board, std::vector<std::string> names, std::vector<ImageSize> sizes,
            double focal_px);
 
   void add(const BoardView& view);
@@ -49,7 +49,7 @@ class Coverage {
   [[nodiscard]] Stand stand_of(const BoardView& view) const;
   void count(const BoardView& view, std::size_t camera, Seen* seen) const;
 
-  Checkerboard board_;
+  BoardPattern board_;
   std::vector<std::string> names_;
   std::vector<ImageSize> sizes_;
   double focal_px_;

@@ -1,14 +1,26 @@
 #include "app/calibration/view_collector.hpp"
 
 #include <algorithm>
+#include <limits>
 
 namespace vergence::app {
 namespace {
 
-double mean_distance(const std::vector<Vec2>& a, const std::vector<Vec2>& b) {
+/// Of the corners that both have; infinite: none.
+double mean_distance(const BoardCorners& a, const BoardCorners& b) {
   double sum = 0;
-  for (std::size_t i = 0; i < a.size(); ++i) sum += (a[i] - b[i]).norm();
-  return sum / static_cast<double>(a.size());
+  int n = 0;
+  for (auto i = a.begin(), j = b.begin(); i != a.end() && j != b.end();) {
+    if (i->index == j->index) {
+      sum += (i->pixel - j->pixel).norm();
+      ++n, ++i, ++j;
+    } else if (i->index < j->index) {
+      ++i;
+    } else {
+      ++j;
+    }
+  }
+  return n == 0 ? std::numeric_limits<double>::infinity() : sum / n;
 }
 
 }  // namespace
@@ -21,9 +33,7 @@ ViewCollector::ViewCollector(Coverage coverage, double image_width_px)
 bool ViewCollector::still(const BoardView& seen) const {
   for (std::size_t k = 0; k < seen.corners.size(); ++k) {
     if (seen.corners[k].empty()) continue;
-    if (last_.corners[k].size() != seen.corners[k].size() ||
-        mean_distance(last_.corners[k], seen.corners[k]) > still_px_)
-      return false;
+    if (mean_distance(last_.corners[k], seen.corners[k]) > still_px_) return false;
   }
   return true;
 }

@@ -18,17 +18,23 @@ CameraModelKind parse_model(const std::string& word) {
 }
 
 CalibrateRequest request_of(const CalibrateOptions& a) {
-  if (a.board.empty())
-    throw InputError("--board is missing: the board's inner corners along and down, like 9x6");
+  if (a.board.empty() && a.aprilgrid.empty())
+    throw InputError(
+        "--board is missing: the board's inner corners along and down, like 9x6; or --aprilgrid: "
+        "its tags along and up, like 6x6");
+  if (!a.board.empty() && !a.aprilgrid.empty())
+    throw InputError("--board and --aprilgrid are two boards; give one");
   if (!a.square)
-    throw InputError("--square is missing: the side of a square in metres, like 0.025");
+    throw InputError(fmt::format("--square is missing: the side of a {} in metres, like 0.025",
+                                 a.board.empty() ? "tag" : "square"));
   if (a.out.empty()) throw InputError("--out is missing: the calibration.yaml to write");
   if (a.baseline && !(*a.baseline > 0 && *a.baseline < 100))
     throw InputError("--baseline needs metres, more than 0 and less than 100");
   if (a.sixth_order && a.model == "equidistant")
     throw InputError("--k3 belongs to radtan; equidistant has k1 to k4");
   CalibrateRequest r;
-  r.board = parse_checkerboard(a.board, *a.square);
+  r.board = a.board.empty() ? parse_aprilgrid(a.aprilgrid, *a.square, a.spacing)
+                            : parse_checkerboard(a.board, *a.square);
   r.model = parse_model(a.model);
   r.sixth_order = a.sixth_order;
   r.out = a.out;

@@ -7,6 +7,7 @@
 
 #include <fmt/format.h>
 
+#include "app/calibration/board_detector.hpp"
 #include "app/calibration/view_collector.hpp"
 #include "app/capture/capture_settings.hpp"
 #include "app/checkerboard/calibrate_session.hpp"
@@ -102,11 +103,8 @@ class Collection {
     seen.name = fmt::format("view {}", collector_.views().size());
     for (int k = 0; k < static_cast<int>(rig_.sizes.size()); ++k) {
       const auto at = static_cast<std::size_t>(k);
-      auto corners = find_checkerboard(frame.images[static_cast<std::size_t>(k)], request_.board,
-                                       BoardSearch::quick);
-      if (!corners) continue;
-      if (!request_.board.tells_its_ends()) same_way_up(seen.corners[0], &*corners);
-      seen.corners[at] = std::move(*corners);
+      seen.corners[at] =
+          find_board(frame.images[at], request_.board, BoardSearch::quick, seen.corners[0]);
     }
     const std::size_t number = collector_.views().size();
     const OfferVerdict verdict = collector_.offer(seen);
@@ -199,10 +197,9 @@ ExitCode calibrate_live(const CalibrateRequest& request, const Configuration& co
         fmt::format("vergence: camera {} did not come back; check its cable and power", camera));
   if (collection.views().size() < kFewestViews) {
     progress.say(fmt::format(
-        "vergence: no calibration: {} views of the board were taken, {} are the least; is it {}x{} "
-        "inner corners, whole and lit "
-        "in every image?",
-        collection.views().size(), kFewestViews, request.board.columns, request.board.rows));
+        "vergence: no calibration: {} views of the board were taken, {} are the least; is it {}, "
+        "whole and lit in every image?",
+        collection.views().size(), kFewestViews, request.board.words()));
     return stopped.value_or(source.missing().empty() ? ExitCode::not_usable
                                                      : ExitCode::device_failed);
   }

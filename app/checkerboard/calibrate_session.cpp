@@ -107,10 +107,13 @@ ExitCode calibrate_images(const CalibrateRequest& request,
   progress.finish();
   for (const std::string& sentence : remarks) progress.say("vergence: " + sentence);
   if (images.views.empty())  // a sentence a view would only hide the one that helps
-    throw InputError(fmt::format(
-        "no view has the board of {}x{} inner corners{}; count them where four squares meet ({})",
-        request.board.columns, request.board.rows, patterns.size() > 1 ? " in two cameras" : "",
-        images.remarks.empty() ? "there are no images" : images.remarks.front()));
+    throw InputError(
+        fmt::format("no view has the board of {}{}; {} ({})", request.board.words(),
+                    patterns.size() > 1 ? " in two cameras" : "",
+                    request.board.kind == BoardKind::aprilgrid
+                        ? "tags are of the family 36h11, and four have to be seen at least"
+                        : "count them where four squares meet",
+                    images.remarks.empty() ? "there are no images" : images.remarks.front()));
   for (const std::string& sentence : images.remarks) progress.say("vergence: " + sentence);
   CalibratedRig rig;
   rig.sizes = images.sizes;

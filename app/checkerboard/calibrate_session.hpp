@@ -14,7 +14,7 @@
 namespace vergence::app {
 
 struct CalibrateRequest {
-  Checkerboard board{};
+  BoardPattern board{};
   CameraModelKind model = CameraModelKind::pinhole_radtan;
   bool sixth_order = false;                   // k3 of radtan
   std::filesystem::path out{};                // calibration.yaml

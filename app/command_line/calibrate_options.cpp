@@ -39,7 +39,15 @@ CLI::App* CalibrateOptions::declare(CLI::App& root) {
       ->type_name("FILE");
   declare_image_topics(*command, &left_topic, &right_topic);
   command->add_option("--board", board, "Inner corners along and down")->type_name("9x6");
-  command->add_option("--square", square, "Side of a square, m")->type_name("M");
+  command
+      ->add_option("--aprilgrid", aprilgrid,
+                   "Instead of --board: tags along and up, family 36h11, as Kalibr prints them")
+      ->type_name("6x6");
+  command->add_option("--square", square, "Side of a square, or of a tag, m")->type_name("M");
+  command
+      ->add_option("--spacing", spacing, "--aprilgrid: gap between two tags over the side of a tag")
+      ->type_name("R")
+      ->capture_default_str();
   command->add_option("--out", out, "calibration.yaml to write")->type_name("F");
   command
       ->add_option("--model", model,

@@ -18,12 +18,14 @@ enum class CalibrateWay : std::uint8_t { board_images, board_live, drive, conver
 /// checkerboard tool, which the program starts with the same words.
 struct CalibrateOptions {
   CommonOptions common{};
-  std::string configuration{}, board{}, out{}, model = "radtan", format{}, size{}, drive{};
+  std::string configuration{}, board{}, aprilgrid{}, out{}, model = "radtan", format{}, size{},
+                                                            drive{};
   std::optional<std::string> calibration{};
   std::vector<std::string> left{}, right{}, convert{};
   std::vector<std::string> more_cameras{};  // one pattern each
   std::optional<std::string> keep_views{};
   std::optional<double> square{}, baseline{};
+  double spacing = 0.3;  // Kalibr's own sheets
   std::string to{};
   std::string left_topic{}, right_topic{};  // --drive
   bool sixth_order = false, json = false, force = false;

@@ -345,6 +345,7 @@ int main(int argc, char** argv) {
     if (a.what == "knock") return run_knocks(a);
     if (a.what == "drives") return bench::run_drives(a.set, a.only);
     if (a.what == "learning") return bench::run_learning(a.set, a.starts);
+    if (a.what == "jumps") return bench::run_jumps(a.set, a.only);
     if (a.what == "stretches") return bench::run_stretches(a.set, a.only);
     if (a.what == "euroc" || a.what == "kitti") return run_recorded(a);
   } catch (const std::exception& e) {
@@ -353,6 +354,7 @@ int main(int argc, char** argv) {
   }
   fmt::print(
       stderr,
-      "calibration_bench: drives, stretches, learning, mock, knock, euroc or kitti is wanted\n");
+      "calibration_bench: drives, stretches, jumps, learning, mock, knock, euroc or kitti is "
+      "wanted\n");
   return 2;
 }

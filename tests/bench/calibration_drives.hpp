@@ -16,4 +16,8 @@ int run_stretches(const std::vector<std::string>& set, const std::string& only);
 /// after every solve. → exit code.
 int run_learning(const std::vector<std::string>& set, int times);
 
+/// `calibration_bench jumps`: how far disparities are from what the frame before makes of them, on
+/// recorded drives that nobody touched. → exit code.
+int run_jumps(const std::vector<std::string>& set, const std::string& only);
+
 }  // namespace vergence::bench

@@ -25,7 +25,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-const app::Checkerboard kBoard = app::parse_checkerboard("9x6", 0.04);
+const app::BoardPattern kBoard = app::parse_checkerboard("9x6", 0.04);
 constexpr const char* kArguments = " --board 9x6 --square 0.04";
 
 /// Fourteen pairs of drawn boards as left/NN.png and right/NN.png, the layout of a folder that
@@ -113,7 +113,7 @@ TEST_F(Calibrate, theTableSaysWhatAPersonWantsToKnow) {
                                  file("t.yaml").string() + "'");
   ASSERT_EQ(o.code, 0) << o.err;
   for (const char* part :
-       {"14 views of a 9x6 board with squares of 40 mm: 14 used, 0 refused",
+       {"14 views of a board of 9x6 inner corners of 40 mm: 14 used, 0 refused",
         "worst views used: ", "reprojection ", "rotation x, °", "t_x, mm", "X_right = R X_left + t",
         "baseline 120.", "corners a cell", "lenses held", "between views"})
     EXPECT_NE(o.out.find(part), std::string::npos) << part << " in\n" << o.out;

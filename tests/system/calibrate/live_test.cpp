@@ -21,7 +21,7 @@
 namespace vergence::test {
 namespace {
 
-const app::Checkerboard kBoard = app::parse_checkerboard("9x6", 0.04);
+const app::BoardPattern kBoard = app::parse_checkerboard("9x6", 0.04);
 constexpr double kRate = 5;  // Hz
 constexpr std::uint64_t kHeldFor =
     8;  // images of one pose: time to find the board twice on a busy machine

@@ -19,7 +19,7 @@ using test::BoardScene;
 using test::known_rig;
 using test::place_error;
 
-const Checkerboard kBoard = parse_checkerboard("9x6", 0.04);
+const BoardPattern kBoard = parse_checkerboard("9x6", 0.04);
 constexpr double kNoise = 0.1;  // px
 
 /// Every number of the rig within so many of its own sigmas.
@@ -144,8 +144,8 @@ TEST(BoardCalibration, aPairOfImagesThatDoNotBelongTogetherIsRefusedAndNothingEl
 TEST(BoardCalibration, aBoardThatMovedBetweenTheExposuresIsRefused) {
   const RigCalibration truth = known_rig(2, CameraModelKind::pinhole_radtan);
   BoardScene scene = board_scene(truth, kBoard, 14, kNoise, 10);
-  for (Vec2& corner : scene.views[7].corners[1])
-    corner.y() += 2.5;  // px: half of it goes into the board's pose
+  for (BoardCorner& corner : scene.views[7].corners[1])
+    corner.pixel.y() += 2.5;  // px: half of it goes into the board's pose
   const BoardCalibration c = calibrate_boards(scene.views, board_options(truth, kBoard));
   expect_recovered(c, truth, 4);
   EXPECT_FALSE(c.views[7].used);
@@ -173,7 +173,7 @@ TEST(BoardCalibration, viewsThatDetermineNothingAreSaidToBeThat) {
   }
 }
 
-TEST(Checkerboard, onlyBoardsThatCanBeToldArePermitted) {
+TEST(BoardPattern, onlyBoardsThatCanBeToldArePermitted) {
   EXPECT_EQ(parse_checkerboard("9x6", 0.1).corners(), 54U);
   for (const char* bad :
        {"", "9", "9x", "x6", "9x6x", "9 x 6", "2x6", "-9x6", "1000x6", "6x6", "9X6"})

@@ -25,7 +25,7 @@ class BoardPainter {
   }
 
   /// Rows of `width` bytes.
-  [[nodiscard]] std::vector<std::uint8_t> paint(const app::Checkerboard& board,
+  [[nodiscard]] std::vector<std::uint8_t> paint(const app::BoardPattern& board,
                                                 const Transform& T_camera_board) const {
     const Transform T_board_camera = T_camera_board.inverse();
     std::vector<std::uint8_t> pixels;
@@ -37,7 +37,7 @@ class BoardPainter {
   }
 
  private:
-  [[nodiscard]] double shade(const app::Checkerboard& board, const Vec3& eye,
+  [[nodiscard]] double shade(const app::BoardPattern& board, const Vec3& eye,
                              const Vec3& ray) const {
     constexpr double kGrey = 110, kMiddle = 125, kContrast = 95;
     const double depth = -eye.z() / ray.z();  // rays have z = 1 in the camera

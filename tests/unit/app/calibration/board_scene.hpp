@@ -37,7 +37,7 @@ inline RigCalibration known_rig(int cameras, CameraModelKind kind) {
 
 /// A board held in front of the rig: how far, how tilted and where in the image changes from view
 /// to view.
-inline Transform held_board(const app::Checkerboard& board, const Intrinsics& lens, int view,
+inline Transform held_board(const app::BoardPattern& board, const Intrinsics& lens, int view,
                             Random& random) {
   const double width = board.square * (board.columns - 1), height = board.square * (board.rows - 1);
   const double far =
@@ -54,7 +54,7 @@ inline Transform held_board(const app::Checkerboard& board, const Intrinsics& le
 
 /// Board poses as somebody shows them who reads what is missing: nine places, four tilts, near and
 /// far.
-inline std::vector<Transform> shown_around(const app::Checkerboard& board,
+inline std::vector<Transform> shown_around(const app::BoardPattern& board,
                                            const RigCalibration& rig) {
   const Intrinsics& lens = rig.intrinsics[0];
   const double width = board.square * (board.columns - 1), height = board.square * (board.rows - 1);
@@ -77,7 +77,7 @@ inline std::vector<Transform> shown_around(const app::Checkerboard& board,
 }
 
 /// Corners without noise; empty for a camera that does not have the whole board.
-inline app::BoardView seen_board(const RigCalibration& rig, const app::Checkerboard& board,
+inline app::BoardView seen_board(const RigCalibration& rig, const app::BoardPattern& board,
                                  const Transform& T_left_board) {
   app::BoardView seen;
   for (std::size_t k = 0; k < static_cast<std::size_t>(rig.cameras); ++k) {
@@ -90,7 +90,7 @@ inline app::BoardView seen_board(const RigCalibration& rig, const app::Checkerbo
         seen.corners[k].clear();
         break;
       }
-      seen.corners[k].push_back(x);
+      seen.corners[k].push_back({i, x});
     }
   }
   return seen;
@@ -104,7 +104,7 @@ struct BoardScene {
 
 /// Corners of `count` board poses with normal noise, px a coordinate. A view is kept where every
 /// camera has the whole board.
-inline BoardScene board_scene(const RigCalibration& rig, const app::Checkerboard& board, int count,
+inline BoardScene board_scene(const RigCalibration& rig, const app::BoardPattern& board, int count,
                               double noise_px, std::uint64_t seed) {
   BoardScene scene;
   scene.rig = rig;
@@ -116,7 +116,8 @@ inline BoardScene board_scene(const RigCalibration& rig, const app::Checkerboard
     bool whole = true;
     for (std::size_t k = 0; k < static_cast<std::size_t>(rig.cameras); ++k) {
       whole = whole && !seen.corners[k].empty();
-      for (Vec2& x : seen.corners[k]) x += noise_px * Vec2(noise.normal(), noise.normal());
+      for (app::BoardCorner& c : seen.corners[k])
+        c.pixel += noise_px * Vec2(noise.normal(), noise.normal());
     }
     if (!whole) continue;
     scene.views.push_back(seen);
@@ -126,7 +127,7 @@ inline BoardScene board_scene(const RigCalibration& rig, const app::Checkerboard
 }
 
 inline app::BoardCalibrationOptions board_options(const RigCalibration& rig,
-                                                  const app::Checkerboard& board) {
+                                                  const app::BoardPattern& board) {
   app::BoardCalibrationOptions o;
   o.board = board;
   o.model = rig.intrinsics[0].kind;

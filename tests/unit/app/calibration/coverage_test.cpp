@@ -16,7 +16,7 @@ using test::known_rig;
 using test::seen_board;
 using test::shown_around;
 
-const Checkerboard kBoard = parse_checkerboard("9x6", 0.04);
+const BoardPattern kBoard = parse_checkerboard("9x6", 0.04);
 
 Coverage nothing_yet(const RigCalibration& rig) {
   return {kBoard, {"left", "right"}, {{640, 480}, {640, 480}}, rig.intrinsics[0].fx};
@@ -85,7 +85,7 @@ TEST(Coverage, theGridCountsCornersWhereTheyAre) {
   };
   EXPECT_EQ(marks(), 0);
   BoardView corner_only;
-  corner_only.corners[0].assign(54, Vec2(1, 1));
+  corner_only.corners[0].assign(54, {0, Vec2(1, 1)});
   c.add(corner_only);
   EXPECT_EQ(marks(), 1);
   const std::string grid = c.grid();
@@ -121,10 +121,10 @@ TEST(ViewCollector, aBoardThatDriftsIsNotTaken) {
   BoardView seen = seen_board(rig, kBoard, shown_around(kBoard, rig)[4]);
   (void)collector.offer(seen);
   for (int i = 0; i < 5; ++i) {
-    for (Vec2& c : seen.corners[1]) c.x() += 1.2;  // px a set: above 0.15 % of 640
+    for (BoardCorner& c : seen.corners[1]) c.pixel.x() += 1.2;  // px a set: above 0.15 % of 640
     EXPECT_EQ(collector.offer(seen), OfferVerdict::moving);
   }
-  for (Vec2& c : seen.corners[1]) c.x() += 0.5;
+  for (BoardCorner& c : seen.corners[1]) c.pixel.x() += 0.5;
   EXPECT_EQ(collector.offer(seen), OfferVerdict::taken);
 }
 
@@ -140,10 +140,10 @@ TEST(ViewCollector, oneCameraAloneDoesNotCountInARig) {
 /// In drawn images, sharper than any lens makes them, cornerSubPix is off by a tenth of a pixel
 /// here and there. Another order would be off by a square, another idea of where a pixel's centre
 /// is by half a pixel all together.
-TEST(Checkerboard, cornersOfADrawnBoardAreFoundInItsOrder) {
+TEST(BoardPattern, cornersOfADrawnBoardAreFoundInItsOrder) {
   const RigCalibration rig = known_rig(1, CameraModelKind::pinhole_radtan);
   const test::BoardPainter painter(rig.intrinsics[0]);
-  for (const Checkerboard& board :
+  for (const BoardPattern& board :
        {kBoard, parse_checkerboard("6x9", 0.04), parse_checkerboard("8x6", 0.04)})
     for (const double roll : {0.0, 0.3, M_PI}) {
       const Vec3 middle = 0.5 * (board.corner(0) + board.corner(board.corners() - 1));
@@ -152,7 +152,9 @@ TEST(Checkerboard, cornersOfADrawnBoardAreFoundInItsOrder) {
       const auto pixels = painter.paint(board, T);
       auto found = find_checkerboard({pixels.data(), 640, 480, 640}, board, BoardSearch::quick);
       ASSERT_TRUE(found) << board.columns << " roll " << roll;
-      const auto truth = seen_board(rig, board, T).corners[0];
+      std::vector<Vec2> truth;
+      const BoardView seen = seen_board(rig, board, T);
+      for (const BoardCorner& c : seen.corners[0]) truth.push_back(c.pixel);
       ASSERT_EQ(truth.size(), found->size());
       if (!board.tells_its_ends()) same_way_up(truth, &*found);
       Vec2 sum = Vec2::Zero();
@@ -165,7 +167,7 @@ TEST(Checkerboard, cornersOfADrawnBoardAreFoundInItsOrder) {
     }
 }
 
-TEST(Checkerboard, whereNoWholeBoardIsNothingIsFound) {
+TEST(BoardPattern, whereNoWholeBoardIsNothingIsFound) {
   const std::vector<std::uint8_t> grey(640 * 480, 128);
   EXPECT_FALSE(find_checkerboard({grey.data(), 640, 480, 640}, kBoard, BoardSearch::thorough));
   EXPECT_FALSE(find_checkerboard({}, kBoard, BoardSearch::thorough));

@@ -44,7 +44,8 @@ std::vector<BoardView> listed_corners(const fs::path& folder) {
     seen.name = std::to_string(view);
     auto& corners = seen.corners[std::string(camera) == "left" ? 0 : 1];
     corners.resize(54);
-    corners[static_cast<std::size_t>(row * 9 + col)] = {u, v};
+    const auto at = static_cast<std::size_t>(row * 9 + col);
+    corners[at] = {at, {u, v}};
   }
   std::vector<BoardView> list;
   for (const auto& [number, view] : views) list.push_back(view);

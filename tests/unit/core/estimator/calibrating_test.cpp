@@ -127,7 +127,7 @@ TEST(Calibrating, adoptionWaitsForTwelveFramesThatConfirmAndNoLongerThanItMust) 
     Drive d(CalibrationTrust::none);
     d.options.calibration.adopt_after = adopt_after;
     d.begin();
-    d.drive(0, 60);
+    for (int i = 0; i < 60 && d.decisions.empty(); ++i) d.drive(i, i + 1);
     EXPECT_FALSE(d.decisions.empty()) << d.story();
     if (d.decisions.empty()) return std::int64_t{0};
     EXPECT_TRUE(d.decisions[0].accepted) << d.story();
@@ -136,6 +136,27 @@ TEST(Calibrating, adoptionWaitsForTwelveFramesThatConfirmAndNoLongerThanItMust) 
   const std::int64_t ten = decided_at(10);
   EXPECT_EQ(decided_at(12), ten + 2) << "asked for fewer than it takes: then";
   EXPECT_EQ(decided_at(30), ten + 2) << "confirmed: no waiting";
+}
+
+// The frames before hold the first rig's calibration, the frames after hold another's, and no
+// epipolar line shows a yaw: frames of both are never one solve, and those after confirm nothing
+// that was found before. 10 mrad are 2.8 px here.
+TEST(Calibrating, aYawKnockedWhileItIsSoughtBeginsTheSearchAnew) {
+  constexpr int kKnock = 28;  // after the first snapshot, before its solution is judged
+  Drive d(CalibrationTrust::none);
+  d.begin();
+  d.drive(0, kKnock);
+  auto knocked = d.corridor.rig().T_camera_left;
+  knocked[1].R = exp_so3({0, 0.01, 0}) * knocked[1].R;
+  d.drive(kKnock, 75, knocked);
+  EXPECT_EQ(d.count(Kind::rig_changed), 1) << d.story();
+  ASSERT_FALSE(d.decisions.empty()) << d.story();
+  for (const CalibrationDecision& decision : d.decisions) {
+    if (!decision.accepted) continue;
+    const Mat3 R = decision.calibration.T_camera_left[1].R;
+    EXPECT_LT(log_so3(R * knocked[1].R.transpose()).norm(), 0.003) << d.story();
+  }
+  EXPECT_TRUE(d.decisions.back().accepted) << d.story();
 }
 
 TEST(Calibrating, aFilesCalibrationIsUnconfirmedUntilThirtyFramesAgree) {

@@ -1,0 +1,15 @@
+#pragma once
+#include "app/calibration/board_pattern.hpp"
+#include "app/calibration/checkerboard.hpp"
+
+namespace vergence::app {
+
+/// What an image shows of the board: of a checkerboard all corners or none, of an AprilGrid those
+/// that are there.
+///
+/// `reference`: what another camera of the rig, mounted the same way up, shows of it at the same
+/// time; it decides where the board does not tell its ends. May be empty.
+[[nodiscard]] BoardCorners find_board(const ImageView& image, const BoardPattern& board,
+                                      BoardSearch search, const BoardCorners& reference);
+
+}  // namespace vergence::app
