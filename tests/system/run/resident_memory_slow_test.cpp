@@ -93,8 +93,9 @@ void expect_flat(const Growth& growth) {
     GTEST_SKIP() << "this machine is too slow: " << growth.frames << " frames";
   EXPECT_LE(growth.at_the_end - *growth.after_a_minute, kMiB)
       << "after " << growth.frames << " frames";
-  RecordProperty("frames", growth.frames);
-  RecordProperty("growth_bytes", static_cast<int>(growth.at_the_end - *growth.after_a_minute));
+  testing::Test::RecordProperty("frames", growth.frames);
+  testing::Test::RecordProperty("growth_bytes",
+                                static_cast<int>(growth.at_the_end - *growth.after_a_minute));
 }
 
 TEST(ResidentMemory, isFlatForAsManyMinutesAsFitTwoOfTheClock) {
