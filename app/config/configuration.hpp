@@ -146,6 +146,14 @@ struct PublishSettings {
   int viewers = 4;
 };
 
+/// `realtime:` scheduling of the drive's threads (docs/realtime.md).
+struct RealtimeSettings {
+  int priority = 0;        // SCHED_FIFO of the most urgent threads; 0: none
+  std::string affinity{};  // processors of all but the solver, `0-1,3`; empty: any
+  std::string solver_affinity{};
+  int lock_memory = 0;  // 1: mlockall
+};
+
 inline constexpr std::size_t kMostFaults = 16;
 
 /// Everything a user may change, with its defaults. Each member is bound to a row of the schema
@@ -162,6 +170,7 @@ struct Configuration {
   MockSettings mock{};
   RecordSettings record{};
   PublishSettings publish{};
+  RealtimeSettings realtime{};
   std::array<std::string, kMostFaults> faults{};  // `KIND@SECONDS NAME=NUMBER …`; empty: none
   OdometryOptions odometry{};
   calibration::CalibrationOptions calibration{};

@@ -10,6 +10,8 @@
 
 #include <fmt/format.h>
 
+#include "app/runtime/cpu_list.hpp"
+
 namespace vergence::app {
 namespace {
 
@@ -711,6 +713,27 @@ Group publish() {
       .done();
 }
 
+Group realtime() {
+  using R = RealtimeSettings;
+  return Rows<R>(
+             "realtime",
+             "Scheduling and memory of the threads of a drive (docs/realtime.md). What the system "
+             "refuses is said, and the drive goes on.",
+             [](auto& c) -> auto& { return c.realtime; })
+      .integer("priority", &R::priority, 0, 90, "",
+               "SCHED_FIFO priority of the threads of cameras, trigger and synchroniser; the "
+               "estimator has one less, the INS two, files three, the solver none. 0: no thread "
+               "has one.")
+      .text("affinity", &R::affinity, 64,
+            "Processors of these threads, as taskset has them: `0-1,3`. Empty: any.")
+      .text("solver_affinity", &R::solver_affinity, 64,
+            "Processors of the calibration solver. Empty: any.")
+      .choice("lock_memory", &R::lock_memory, {"off", "on"},
+              "`on`: memory is locked before the first frame (mlockall), so that none of it is "
+              "ever fetched from a disk.")
+      .done();
+}
+
 }  // namespace
 
 const std::vector<Group>& schema() {
@@ -719,7 +742,7 @@ const std::vector<Group>& schema() {
                                          sync(),     odometry(),   calibration_options(),
                                          monitor(),  comparison(), kitti_raw(),
                                          mock(),     record(),     publish(),
-                                         faults()};
+                                         realtime(), faults()};
   return groups;
 }
 
@@ -738,6 +761,13 @@ std::string find_contradiction(const Configuration& c) {
     return fmt::format(
         "calibration.usable_depth_percent ({}) is below calibration.good_depth_percent ({})",
         c.calibration.usable_depth_percent, c.calibration.good_depth_percent);
+  for (const auto& [key, list] :
+       {std::pair<const char*, const std::string&>{"affinity", c.realtime.affinity},
+        {"solver_affinity", c.realtime.solver_affinity}})
+    if (!list.empty() && !parse_cpu_list(list))
+      return fmt::format(
+          "realtime.{} ({}) is no list of processors; write numbers and ranges, as 0-1,3", key,
+          list);
   return {};
 }
 

@@ -1,5 +1,6 @@
 #include "app/datasets/decimal.hpp"
 
+#include <array>
 #include <charconv>
 #include <limits>
 
@@ -85,13 +86,27 @@ std::optional<std::int64_t> parse_integer(std::string_view text) noexcept {
 }
 
 std::string format_seconds(std::int64_t ns) {
+  std::string text;
+  append_seconds(&text, ns);
+  return text;
+}
+
+void append_seconds(std::string* line, std::int64_t ns) {
   const bool negative = ns < 0;
   // The magnitude in unsigned arithmetic: that of the least integer does not fit a signed one.
   const std::uint64_t magnitude =
       negative ? 0 - static_cast<std::uint64_t>(ns) : static_cast<std::uint64_t>(ns);
-  std::string decimals = std::to_string(magnitude % 1'000'000'000U);
-  decimals.insert(0, static_cast<std::size_t>(kDecimals) - decimals.size(), '0');
-  return (negative ? "-" : "") + std::to_string(magnitude / 1'000'000'000U) + "." + decimals;
+  const auto digits = [](std::uint64_t value, std::array<char, 20>* text) {
+    const char* end = std::to_chars(text->data(), text->data() + text->size(), value).ptr;
+    return std::string_view(text->data(), static_cast<std::size_t>(end - text->data()));
+  };
+  std::array<char, 20> buffer{};  // the largest 64-bit number
+  if (negative) line->push_back('-');
+  line->append(digits(magnitude / 1'000'000'000U, &buffer));
+  line->push_back('.');
+  const std::string_view decimals = digits(magnitude % 1'000'000'000U, &buffer);
+  line->append(static_cast<std::size_t>(kDecimals) - decimals.size(), '0');
+  line->append(decimals);
 }
 
 std::string_view trimmed(std::string_view text) noexcept {

@@ -45,6 +45,8 @@ std::vector<CameraNeed> Needs::of(const std::string& driver) const {
 Needs needs_of(const Configuration& c) {
   Needs needs;
   needs.given = true;
+  needs.realtime_priority = c.realtime.priority;
+  needs.lock_memory = c.realtime.lock_memory != 0;
   for (int k = 0; k < camera_count(c); ++k) {
     const CameraSettings& s = c.cameras[static_cast<std::size_t>(k)];
     CameraNeed n;

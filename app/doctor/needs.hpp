@@ -28,7 +28,8 @@ struct Needs {
   std::vector<CameraNeed> cameras;
   std::string ins_driver, ins_port;
   std::string trigger_driver, trigger_port;
-  int realtime_priority = 0;  // that threads ask for; 0: none does
+  int realtime_priority = 0;  // realtime.priority: that threads ask for; 0: none does
+  bool lock_memory = false;   // realtime.lock_memory
 
   [[nodiscard]] std::vector<CameraNeed> of(const std::string& driver) const;
 };

@@ -30,13 +30,19 @@ void check_realtime(const CheckContext& p, std::vector<Finding>* findings) {
                     "/etc/security/limits.d/60-vergence.conf",
                     p.machine.user, std::max(20, p.needs.realtime_priority))};
   findings->push_back(std::move(f));
+}
+
+void check_memory_lock(const CheckContext& p, std::vector<Finding>* findings) {
+  if (!p.needs.lock_memory) return;
+  constexpr unsigned kCapIpcLock = 14;
   const auto locked = p.machine.limit("Max locked memory");
-  constexpr std::int64_t kEnough = std::int64_t{256} << 20;
-  if (locked && *locked >= 0 && *locked < kEnough)
+  constexpr std::int64_t kEnough = std::int64_t{512}
+                                   << 20;  // of two cameras, threads and libraries included
+  if (locked && *locked >= 0 && *locked < kEnough && !p.machine.has_capability(kCapIpcLock))
     findings->push_back(
         {"memory_lock",
          FindingState::advice,
-         fmt::format("{} MiB of memory may be locked; real-time threads want {} or more",
+         fmt::format("{} MiB of memory may be locked; realtime.lock_memory wants {} or more",
                      *locked >> 20, kEnough >> 20),
          {fmt::format(
              "echo '{} - memlock unlimited' | sudo tee -a /etc/security/limits.d/60-vergence.conf",
@@ -146,6 +152,7 @@ void check_disk(const CheckContext& p, std::vector<Finding>* findings) {
 
 void check_system(const CheckContext& p, std::vector<Finding>* findings) {
   check_realtime(p, findings);
+  check_memory_lock(p, findings);
   check_governor(p, findings);
   check_clock_source(p, findings);
   check_date(p, findings);

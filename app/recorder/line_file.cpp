@@ -17,6 +17,7 @@ LineFile::LineFile(const std::filesystem::path& file, std::size_t pending)
   if (fd_ < 0)
     throw InputError(file.string() + ": cannot be written (" + std::strerror(errno) +
                      "): check the folder's permissions");
+  waiting_.reserve(pending_);
 }
 
 LineFile::~LineFile() { close(); }

@@ -13,7 +13,7 @@ namespace vergence::app {
 /// many bytes wait as it may keep, new lines are refused and counted. So a file never holds a line
 /// that lacks its end in the middle, and goes on when room comes back.
 ///
-/// Threads  One. Memory  Its buffer.
+/// Threads  One. Memory  A buffer of `pending` bytes, taken at the beginning.
 /// Errors   The constructor throws InputError. Afterwards nothing throws: a failure is kept in
 ///          fault().
 class LineFile {
@@ -40,6 +40,7 @@ class LineFile {
   /// errno of the last failure; 0 when none is standing, that is when all has been written since.
   [[nodiscard]] int fault() const noexcept { return fault_; }
   [[nodiscard]] std::uint64_t lost_lines() const noexcept { return lost_lines_; }
+  [[nodiscard]] std::size_t pending() const noexcept { return pending_; }
   [[nodiscard]] const std::filesystem::path& path() const noexcept { return path_; }
 
  private:

@@ -44,11 +44,21 @@ struct Recorder::Files {
 namespace {
 
 void append_tum(std::string* line, Stamp stamp, const PoseNumbers& pose) {
-  *line = format_seconds(stamp.ns());
+  line->clear();
+  append_seconds(line, stamp.ns());
   for (const double v : pose.t) fmt::format_to(std::back_inserter(*line), " {:.9f}", v);
   for (const double v : pose.q) fmt::format_to(std::back_inserter(*line), " {:.9f}", v);
   *line += '\n';
 }
+
+/// Room for `count` values, its pages touched: what fills it later takes no memory from the system.
+template <class Value>
+void take_memory(std::size_t count, std::vector<Value>* values) {
+  values->resize(count);
+  values->clear();
+}
+
+constexpr std::size_t kLongestLine = 2048;  // bytes: calibrations.csv has the longest, some 800
 
 /// east … heading_deg, a comma before each; empty where there is nothing.
 void append_earth(std::string* line, bool valid, const EarthNumbers& e) {
@@ -95,10 +105,15 @@ Recorder::Recorder(const std::filesystem::path& folder, const Options& options)
       files_(std::make_unique<Files>(folder, options.ins)),
       totals_(std::make_unique<SessionTotals>()) {
   if (options.keep_trajectory) {
-    totals_->trajectory.reserve(options.expected_frames);
-    totals_->reference.reserve(options.expected_frames);
-    totals_->statuses.reserve(options.expected_frames);
+    take_memory(options.expected_frames, &totals_->trajectory);
+    take_memory(options.expected_frames, &totals_->reference);
+    take_memory(options.expected_frames, &totals_->statuses);
   }
+  line_.reserve(kLongestLine);
+  memory_ = totals_->trajectory.capacity() * sizeof(StampedPose) +
+            totals_->reference.capacity() * sizeof(StampedPose) +
+            totals_->statuses.capacity() * sizeof(PoseStatus);
+  for (const LineFile* file : files_->all) memory_ += file->pending();
   files_->poses.append(std::string(kPosesHeader) + "\n");
   files_->calibrations.append(std::string(kCalibrationsHeader) + "\n");
   if (files_->ins) files_->ins->append(std::string(kInsHeader) + "\n");

@@ -137,6 +137,8 @@ class Recorder {
   void post(const Record& record) noexcept;
   /// Precondition: Options::ins.
   void post(const InsRecord& reading) noexcept;
+  /// Bytes taken at the beginning: lines that may wait, and the trajectory of the frames expected.
+  [[nodiscard]] std::size_t memory() const noexcept { return memory_; }
   /// Sentences about the disk since the last call.
   [[nodiscard]] std::vector<std::string> take_errors();
   /// Writes what is waiting, closes the files. Once.
@@ -171,7 +173,8 @@ class Recorder {
   PoseNumbers last_pose_{};
   bool have_last_pose_ = false, any_reference_ = false;
   std::string line_;  // being formatted
-  Stamp newest_{};    // of the poses
+  std::size_t memory_ = 0;
+  Stamp newest_{};  // of the poses
   std::uint64_t newest_frame_ = 0;
   bool disk_full_ = false, pretended_ = false;
 

@@ -261,6 +261,8 @@ Json summary_json(const SessionTotals& totals, const SummaryInput& input) {
     sum += bytes;
   }
   memory["sum_bytes"] = sum;
+  memory["allocations_by_thread"] = counters_json(input.allocations.ours);
+  memory["allocations_by_library_thread"] = counters_json(input.allocations.libraries);
   json["memory"] = memory;
   json["drops"] = {
       {"frames", input.skipped},           {"estimator", input.dropped_by_estimator},

@@ -27,6 +27,13 @@ struct TruthFigures {
   std::vector<std::array<double, 6>> calibration_error{};
 };
 
+/// Heap allocations by the name of the thread that made them, from the first frame that is
+/// delivered until the last (docs/realtime.md).
+struct ThreadAllocationFigures {
+  std::vector<std::pair<std::string, std::uint64_t>> ours{};       // 0 where a thread made none
+  std::vector<std::pair<std::string, std::uint64_t>> libraries{};  // of threads that libraries have
+};
+
 /// What summary.json is made of beside the recorder's totals.
 struct SummaryInput {
   std::uint64_t skipped = 0;               // frames that were not read: torn, missing, out of time
@@ -42,6 +49,7 @@ struct SummaryInput {
   CalibrationMistake mistake{};               // that `before` shows
   calibration::CalibrationOptions options{};  // what its words mean
   std::uint64_t allocations_after_seal = 0;
+  ThreadAllocationFigures allocations{};
   std::vector<std::pair<std::string, std::size_t>> memory;  // bytes by what holds them
   std::string configuration_hash;
   std::vector<std::pair<std::string, std::uint64_t>>

@@ -149,7 +149,7 @@ void Recording::mark_event(Stamp stamp) noexcept {
 // ---- the writer
 
 void Recording::work() noexcept {
-  (void)pthread_setname_np(pthread_self(), "vergence-record");
+  (void)pthread_setname_np(pthread_self(), "vergence-mcap");
   (void)::setpriority(PRIO_PROCESS, static_cast<id_t>(::gettid()), kNice);
   const SealedScope sealed;
   for (bool last = false; !last;) {

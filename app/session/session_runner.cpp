@@ -19,6 +19,7 @@
 #include "app/runtime/background_thread.hpp"
 #include "app/runtime/service_manager.hpp"
 #include "app/session/drive_recorder.hpp"
+#include "app/session/drive_threads.hpp"
 #include "app/session/event_log.hpp"
 #include "app/session/ins_comparison.hpp"
 #include "app/session/session_files.hpp"
@@ -26,6 +27,7 @@
 #include "app/session/solver_watch.hpp"
 #include "core/estimator/estimator.hpp"
 #include "core/memory/allocation_guard.hpp"
+#include "core/memory/thread_allocations.hpp"
 
 namespace vergence::app {
 namespace {
@@ -89,6 +91,8 @@ class SessionRunner {
   std::mutex mutex_;                            // with done_, for the caller's thread that waits
   std::condition_variable changed_;
   bool done_ = false;
+  bool delivering_ = false;  // of the estimator's thread: a frame has come
+  DriveThreads threads_;     // of the caller's thread
 };
 
 SessionRunner::SessionRunner(FrameSource& source, const Configuration& configuration,
@@ -106,7 +110,8 @@ SessionRunner::SessionRunner(FrameSource& source, const Configuration& configura
       comparison_arena_(arena_size(facts_.ins ? Comparison::bytes_needed(facts_.ins->options) : 0)),
       runner_(make_runner(configuration.threads)),
       estimator_(std::make_unique<Estimator>(options_, facts_.begin.file.rig, facts_.begin.nominal,
-                                             estimator_arena_, *runner_, watched_solver_)) {
+                                             estimator_arena_, *runner_, watched_solver_)),
+      threads_(configuration.realtime) {
   if (facts_.ins)
     comparison_ = std::make_unique<InsComparison>(facts_.ins->options, facts_.ins->kind,
                                                   comparison_arena_, journal_);
@@ -124,6 +129,7 @@ void SessionRunner::estimate() noexcept {
     if (const auto* event = std::get_if<SourceEvent>(&item)) handle(*event);
     if (comparison_) comparison_->drain();
   }
+  ThreadAllocations::end();
   estimator_->finish();
   journal_.note(*estimator_);
   if (comparison_) comparison_->finish();
@@ -164,6 +170,8 @@ void SessionRunner::handle(const SourceFrame& frame) noexcept {
   if (calibration_asked_.exchange(false, std::memory_order_relaxed))
     request_recalibration(frame.rig.stamp, "a new calibration was asked for by SIGUSR1");
   take_requests(frame.rig.stamp);
+  if (!delivering_) ThreadAllocations::begin();
+  delivering_ = true;
   watched_solver_.begin_frame(frame.solver_idle);
   output_.post(frame.rig);
   const PoseSample sample = estimator_->process(frame.rig);
@@ -194,6 +202,7 @@ void SessionRunner::watch(Progress* progress) {
     if (facts_.on_request && signals_.take_calibration_request())
       calibration_asked_.store(true, std::memory_order_relaxed);
     lock.unlock();
+    threads_.look(progress);
     journal_.show(progress, facts_.frames);
     say_recording_errors(progress);
     lock.lock();
@@ -260,6 +269,7 @@ std::vector<std::pair<std::string, std::size_t>> SessionRunner::memory() const {
            comparison_arena_.capacity() + (facts_.ins ? facts_.ins->reading_bytes : 0)},
           {"images_bytes", facts_.image_bytes},
           {"recording_bytes", recording_ ? recording_->memory() : 0},
+          {"recorder_bytes", recorder_ ? recorder_->memory() : 0},
           {"rings_bytes", sizeof(Recorder) + sizeof(EventLog) + facts_.ring_bytes}};
 }
 
@@ -276,6 +286,7 @@ SummaryInput SessionRunner::summary_input(const SessionTotals& totals,
   }
   describe_calibration(*estimator_, facts_.begin, totals, options_, journal_.matches(), &input);
   input.allocations_after_seal = allocations;
+  input.allocations = threads_.figures();
   input.memory = memory();
   input.configuration_hash = configuration_hash(configuration_);
   source_.describe(totals, *estimator_, &input);
@@ -308,6 +319,8 @@ void SessionRunner::print_figures(const SessionTotals& totals, const SummaryInpu
       totals.estimate.percentile(0.99)));
   if (const std::string sentence = verification_sentence(input); !sentence.empty())
     progress->say(sentence);
+  if (const std::string sentence = allocations_sentence(input.allocations); !sentence.empty())
+    progress->say(sentence);
   source_.print_figures(totals, input, progress);
 }
 
@@ -335,6 +348,7 @@ ExitCode SessionRunner::run() {
   Progress progress = Progress::on_stderr(request_.quiet);
   const auto allocations_before = AllocationGuard::allocations_after_seal();
   say_remarks(&progress);
+  threads_.lock_memory(&progress);
   source_.start(&faults);
   std::thread estimating([this] { estimate(); });
   service_.ready();

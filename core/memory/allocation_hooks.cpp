@@ -4,6 +4,16 @@
 #include <cstddef>
 
 #include "core/memory/allocation_guard.hpp"
+#include "core/memory/thread_allocations.hpp"
+
+namespace {
+
+void note() noexcept {
+  vergence::AllocationGuard::note_allocation();
+  vergence::ThreadAllocations::note_allocation();
+}
+
+}  // namespace
 
 extern "C" {
 
@@ -18,32 +28,32 @@ void* __libc_pvalloc(std::size_t);
 // NOLINTEND(bugprone-reserved-identifier,readability-identifier-naming)
 
 void* malloc(std::size_t size) {
-  vergence::AllocationGuard::note_allocation();
+  note();
   return __libc_malloc(size);
 }
 
 void* calloc(std::size_t n, std::size_t size) {
-  vergence::AllocationGuard::note_allocation();
+  note();
   return __libc_calloc(n, size);
 }
 
 void* realloc(void* p, std::size_t size) {
-  vergence::AllocationGuard::note_allocation();
+  note();
   return __libc_realloc(p, size);
 }
 
 void* memalign(std::size_t alignment, std::size_t size) {
-  vergence::AllocationGuard::note_allocation();
+  note();
   return __libc_memalign(alignment, size);
 }
 
 void* valloc(std::size_t size) {
-  vergence::AllocationGuard::note_allocation();
+  note();
   return __libc_valloc(size);
 }
 
 void* pvalloc(std::size_t size) {
-  vergence::AllocationGuard::note_allocation();
+  note();
   return __libc_pvalloc(size);
 }
 

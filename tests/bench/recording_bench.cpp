@@ -111,7 +111,7 @@ int measure(const Arguments& a, const std::filesystem::path& folder) {
   std::vector<double> post_ms;
   const int frames = static_cast<int>(a.seconds * kRate);
   const auto begun = Clock::now();
-  const double cpu_before = cpu_seconds("vergence-record"), own_before = cpu_seconds("bench-post");
+  const double cpu_before = cpu_seconds("vergence-mcap"), own_before = cpu_seconds("bench-post");
   for (int i = 0; i < frames; ++i) {
     std::this_thread::sleep_until(begun + i * std::chrono::nanoseconds(1'000'000'000 / kRate));
     const auto& l = pictures[static_cast<std::size_t>(2 * i) % pictures.size()];
@@ -121,7 +121,7 @@ int measure(const Arguments& a, const std::filesystem::path& folder) {
                {l.data(), kWidth, kHeight, kWidth}, {r.data(), kWidth, kHeight, kWidth});
     post_ms.push_back(std::chrono::duration<double, std::milli>(Clock::now() - start).count());
   }
-  const double writer = cpu_seconds("vergence-record") - cpu_before;
+  const double writer = cpu_seconds("vergence-mcap") - cpu_before;
   const double poster = cpu_seconds("bench-post") - own_before;
   const double wall = std::chrono::duration<double>(Clock::now() - begun).count();
   recording.close();

@@ -397,6 +397,8 @@ TEST(DoctorSystem, realTimeLimitsMatterWhenThreadsAskForThem) {
   f.needs.realtime_priority = 50;
   EXPECT_EQ(f.of("realtime")[0].state, FindingState::problem);
   EXPECT_TRUE(mends_with(f.of("realtime")[0], "driver - rtprio 50"));
+  EXPECT_TRUE(f.of("memory_lock").empty());
+  f.needs.lock_memory = true;
   EXPECT_EQ(f.of("memory_lock")[0].state, FindingState::advice);
 }
 

@@ -1,0 +1,146 @@
+#include "app/runtime/realtime.hpp"
+
+#include <linux/capability.h>
+#include <sys/mman.h>
+#include <sys/resource.h>
+#include <sys/syscall.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <cstring>
+#include <utility>
+
+#include <fmt/format.h>
+
+namespace vergence::app {
+namespace {
+
+constexpr std::array<std::pair<std::string_view, ThreadRole>, 14> kRoles{{
+    {"vergence-gige", ThreadRole::capture},
+    {"vergence-v4l2", ThreadRole::capture},
+    {"vergence-iidc13", ThreadRole::capture},
+    {"vergence-iidcus", ThreadRole::capture},
+    {"vergence-board", ThreadRole::capture},
+    {"vergence-pace", ThreadRole::capture},
+    {"vergence-sync", ThreadRole::capture},
+    {"vergence-estim", ThreadRole::estimator},
+    {"vergence-front", ThreadRole::estimator},
+    {"vergence-ins", ThreadRole::ins},
+    {"vergence-calib", ThreadRole::solver},
+    // What renders a drive instead of cameras, or reads one instead of them, is no part of it.
+    {"vergence-mock", ThreadRole::other},
+    {"vergence-decode", ThreadRole::other},
+    {"vergence-right", ThreadRole::other},
+}};
+
+/// Whether RLIMIT_MEMLOCK binds this program.
+bool memory_limited() noexcept {
+  rlimit limit{};
+  if (::getrlimit(RLIMIT_MEMLOCK, &limit) == 0 && limit.rlim_cur == RLIM_INFINITY) return false;
+  __user_cap_header_struct header{_LINUX_CAPABILITY_VERSION_3, 0};
+  std::array<__user_cap_data_struct, _LINUX_CAPABILITY_U32S_3> data{};
+  if (::syscall(SYS_capget, &header, data.data()) != 0) return true;
+  return (data[0].effective & (1U << CAP_IPC_LOCK)) == 0;
+}
+
+std::string reason(int error) { return std::strerror(error); }
+
+}  // namespace
+
+ThreadRole thread_role(std::string_view name) noexcept {
+  const auto* row =
+      std::find_if(kRoles.begin(), kRoles.end(), [name](const auto& r) { return r.first == name; });
+  if (row != kRoles.end()) return row->second;
+  return name.starts_with("vergence-") && name != "vergence-mockio" ? ThreadRole::background
+                                                                    : ThreadRole::other;
+}
+
+int role_priority(ThreadRole role, int top) noexcept {
+  if (top <= 0 || role == ThreadRole::solver || role == ThreadRole::other) return 0;
+  const int below = role == ThreadRole::capture     ? 0
+                    : role == ThreadRole::estimator ? 1
+                    : role == ThreadRole::ins       ? 2
+                                                    : 3;
+  return std::max(1, top - below);
+}
+
+int RealtimeSystem::set_fifo(pid_t thread, int priority) {
+  sched_param parameter{};
+  parameter.sched_priority = priority;
+  return ::sched_setscheduler(thread, SCHED_FIFO | SCHED_RESET_ON_FORK, &parameter) == 0 ? 0
+                                                                                         : errno;
+}
+
+int RealtimeSystem::set_affinity(pid_t thread, const cpu_set_t& cpus) {
+  return ::sched_setaffinity(thread, sizeof(cpus), &cpus) == 0 ? 0 : errno;
+}
+
+int RealtimeSystem::lock_memory(Locked* locked) {
+  *locked = Locked::present;
+  if (::mlockall(MCL_CURRENT) != 0) return errno;
+  // Under a limit an allocation beyond it would fail in the middle of a drive.
+  if (memory_limited()) return 0;
+  if (::mlockall(MCL_FUTURE | MCL_ONFAULT) == 0) *locked = Locked::everything;
+  return 0;
+}
+
+std::vector<std::string> RealtimeThreads::lock_memory() {
+  if (!request_.lock_memory) return {};
+  RealtimeSystem::Locked locked = RealtimeSystem::Locked::everything;
+  if (const int error = system_.lock_memory(&locked); error != 0)
+    return {fmt::format(
+        "realtime.lock_memory is refused ({}), the drive goes on without: allow it with `ulimit -l "
+        "unlimited`, in a service with LimitMEMLOCK=infinity",
+        reason(error))};
+  if (locked == RealtimeSystem::Locked::present)
+    return {
+        "realtime.lock_memory: what there is now is locked, memory taken later is not, under "
+        "the limit that is set: lift it with `ulimit -l unlimited`, in a service with "
+        "LimitMEMLOCK=infinity"};
+  return {};
+}
+
+std::vector<std::string> RealtimeThreads::apply(const std::vector<ProcessThread>& threads) {
+  std::vector<std::string> sentences;
+  if (request_.priority <= 0 && !request_.affinity && !request_.solver_affinity) return sentences;
+  for (const ProcessThread& thread : threads) {
+    const ThreadRole role = thread_role(thread.name);
+    if (role == ThreadRole::other) continue;  // it may still be about to get its name
+    const auto [at, is_new] = done_.try_emplace(thread.id, role);
+    if (!is_new && at->second == role) continue;
+    at->second = role;  // the number of a thread that has ended is given again
+    apply(thread, &sentences);
+  }
+  return sentences;
+}
+
+void RealtimeThreads::apply(const ProcessThread& thread, std::vector<std::string>* sentences) {
+  const ThreadRole role = thread_role(thread.name);
+  const bool solver = role == ThreadRole::solver;
+  if (const auto& cpus = solver ? request_.solver_affinity : request_.affinity; cpus)
+    set_affinity(thread.id, *cpus, solver, sentences);
+  const int priority = role_priority(role, request_.priority);
+  if (priority == 0) return;
+  const int error = system_.set_fifo(thread.id, priority);
+  if (error == 0 || error == ESRCH || std::exchange(priority_refused_, true)) return;
+  sentences->push_back(fmt::format(
+      "realtime.priority: {} gets no priority {} ({}), the drive goes on without: allow it with "
+      "`sudo setcap cap_sys_nice,cap_ipc_lock+ep $(command -v vergence)`, in a service with "
+      "LimitRTPRIO={}",
+      thread.name, priority, reason(error), request_.priority));
+}
+
+void RealtimeThreads::set_affinity(pid_t thread, const cpu_set_t& cpus, bool solver,
+                                   std::vector<std::string>* sentences) {
+  const int error = system_.set_affinity(thread, cpus);
+  bool& refused = solver ? solver_affinity_refused_ : affinity_refused_;
+  if (error == 0 || error == ESRCH || std::exchange(refused, true)) return;
+  sentences->push_back(
+      fmt::format("realtime.{}: there is none of these processors for us ({}), the drive goes on "
+                  "on all of them: `taskset -pc $$` lists those that there are",
+                  solver ? "solver_affinity" : "affinity", reason(error)));
+}
+
+}  // namespace vergence::app

@@ -1,0 +1,79 @@
+#pragma once
+#include <sched.h>
+#include <sys/types.h>
+
+#include <map>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "app/runtime/process_threads.hpp"
+
+namespace vergence::app {
+
+/// How urgent a thread is, by its name (docs/realtime.md has the table).
+enum class ThreadRole : std::uint8_t {
+  capture,     // cameras, trigger, synchroniser: short, and never late
+  estimator,   // and its worker
+  ins,         // readings of the INS
+  background,  // files, publishers, exposure control
+  solver,      // the calibration solver: has what the others leave
+  other        // the caller's thread, the mock's world, threads of libraries: left as they are
+};
+
+[[nodiscard]] ThreadRole thread_role(std::string_view name) noexcept;
+
+/// SCHED_FIFO priority of a role where the most urgent has `top`; 0: SCHED_OTHER.
+[[nodiscard]] int role_priority(ThreadRole role, int top) noexcept;
+
+/// `realtime:` of the configuration.
+struct RealtimeRequest {
+  int priority = 0;                     // of ThreadRole::capture; 0: no thread asks for one
+  std::optional<cpu_set_t> affinity{};  // of all roles but `other` and the solver's
+  std::optional<cpu_set_t> solver_affinity{};
+  bool lock_memory = false;
+};
+
+/// The system calls below, for tests to replace. Each returns 0 or errno.
+class RealtimeSystem {
+ public:
+  enum class Locked : std::uint8_t { everything, present };
+
+  virtual ~RealtimeSystem() = default;
+  /// SCHED_FIFO for that thread; what it starts is SCHED_OTHER again.
+  [[nodiscard]] virtual int set_fifo(pid_t thread, int priority);
+  [[nodiscard]] virtual int set_affinity(pid_t thread, const cpu_set_t& cpus);
+  /// Locks what is mapped now, all of it resident, and where no limit stands in the way what is
+  /// mapped later, as it is first used.
+  [[nodiscard]] virtual int lock_memory(Locked* locked);
+};
+
+/// Gives the threads of a drive the scheduling that the configuration asks for. A thread is
+/// recognised by its name, so drivers and publishers need not know of it.
+///
+/// Threads  One, which is none of the drive's.
+/// Errors   A refusal by the system is a sentence, once for each key, with what allows it; the
+///          drive goes on.
+class RealtimeThreads {
+ public:
+  RealtimeThreads(const RealtimeRequest& request, RealtimeSystem& system) noexcept
+      : request_(request), system_(system) {}
+
+  /// Locks memory, if asked for: when everything is set up, before the first frame.
+  [[nodiscard]] std::vector<std::string> lock_memory();
+  /// Priority and processors of the threads that were not there at the last call.
+  [[nodiscard]] std::vector<std::string> apply(const std::vector<ProcessThread>& threads);
+
+ private:
+  void apply(const ProcessThread& thread, std::vector<std::string>* sentences);
+  void set_affinity(pid_t thread, const cpu_set_t& cpus, bool solver,
+                    std::vector<std::string>* sentences);
+
+  RealtimeRequest request_;
+  RealtimeSystem& system_;
+  std::map<pid_t, ThreadRole> done_{};
+  bool priority_refused_ = false, affinity_refused_ = false, solver_affinity_refused_ = false;
+};
+
+}  // namespace vergence::app

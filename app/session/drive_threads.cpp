@@ -1,0 +1,69 @@
+#include "app/session/drive_threads.hpp"
+
+#include <cstdint>
+#include <map>
+
+#include <fmt/format.h>
+
+#include "app/runtime/cpu_list.hpp"
+#include "app/runtime/process_threads.hpp"
+#include "core/memory/thread_allocations.hpp"
+
+namespace vergence::app {
+
+namespace {
+
+RealtimeRequest request_of(const RealtimeSettings& settings) {
+  RealtimeRequest request;
+  request.priority = settings.priority;
+  request.affinity = parse_cpu_list(settings.affinity);
+  request.solver_affinity = parse_cpu_list(settings.solver_affinity);
+  request.lock_memory = settings.lock_memory != 0;
+  return request;
+}
+
+void say(const std::vector<std::string>& sentences, Progress* progress) {
+  for (const std::string& sentence : sentences) progress->say("vergence: " + sentence);
+}
+
+}  // namespace
+
+DriveThreads::DriveThreads(const RealtimeSettings& settings)
+    : realtime_(request_of(settings), system_) {}
+
+void DriveThreads::lock_memory(Progress* progress) { say(realtime_.lock_memory(), progress); }
+
+void DriveThreads::look(Progress* progress) {
+  constexpr int kAtFirst = 20, kLater = 20;  // in the first second always, then once a second
+  const int look = looks_++;
+  if (look >= kAtFirst && look % kLater != 0) return;
+  const std::vector<ProcessThread> threads = process_threads();
+  for (const ProcessThread& thread : threads)
+    if (thread.ours()) ours_.insert(thread.name);
+  say(realtime_.apply(threads), progress);
+}
+
+ThreadAllocationFigures DriveThreads::figures() const {
+  const ThreadAllocations::Counts counts = ThreadAllocations::counts();
+  std::map<std::string, std::uint64_t> ours, libraries;
+  for (const std::string& name : ours_) ours[name] = 0;
+  for (std::size_t i = 0; i < counts.size; ++i) {
+    const std::string name = counts.rows[i].name.data();
+    (ProcessThread{0, name}.ours() ? ours : libraries)[name] += counts.rows[i].count;
+  }
+  if (counts.others > 0) libraries["others"] = counts.others;
+  ThreadAllocationFigures out;
+  out.ours.assign(ours.begin(), ours.end());
+  out.libraries.assign(libraries.begin(), libraries.end());
+  return out;
+}
+
+std::string allocations_sentence(const ThreadAllocationFigures& figures) {
+  std::string list;
+  for (const auto* names : {&figures.ours, &figures.libraries})
+    for (const auto& [name, count] : *names)
+      if (count > 0) list += fmt::format("{}{} {}", list.empty() ? "" : ", ", name, count);
+  return list.empty() ? "" : "heap allocations while frames came: " + list;
+}
+
+}  // namespace vergence::app

@@ -1,0 +1,183 @@
+#include "app/runtime/realtime.hpp"
+
+#include <gtest/gtest.h>
+#include <pthread.h>
+#include <unistd.h>
+
+#include <atomic>
+#include <cerrno>
+#include <map>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "app/runtime/cpu_list.hpp"
+
+namespace vergence::app {
+namespace {
+
+/// A system that remembers what it was asked for and refuses what it is told to.
+class FakeSystem final : public RealtimeSystem {
+ public:
+  int set_fifo(pid_t thread, int priority) override {
+    ++calls;
+    if (fifo_error == 0) priorities[thread] = priority;
+    return fifo_error;
+  }
+  int set_affinity(pid_t thread, const cpu_set_t& cpus) override {
+    if (affinity_error == 0) processors[thread] = CPU_COUNT(&cpus);
+    return affinity_error;
+  }
+  int lock_memory(Locked* locked) override {
+    ++locks;
+    *locked = covers;
+    return lock_error;
+  }
+
+  int fifo_error = 0, affinity_error = 0, lock_error = 0, calls = 0, locks = 0;
+  Locked covers = Locked::everything;
+  std::map<pid_t, int> priorities, processors;
+};
+
+const std::vector<ProcessThread> kDrive{
+    {1, "vergence"},        {2, "vergence-gige"},  {3, "vergence-estim"}, {4, "vergence-ins"},
+    {5, "vergence-record"}, {6, "vergence-calib"}, {7, "vergence-mock"},  {8, "gmain"}};
+
+bool mentions(const std::string& text, const std::string& part) {
+  return text.find(part) != std::string::npos;
+}
+
+TEST(Realtime, theMoreUrgentRoleHasTheHigherPriority) {
+  FakeSystem system;
+  RealtimeRequest request;
+  request.priority = 40;
+  RealtimeThreads threads(request, system);
+  EXPECT_TRUE(threads.apply(kDrive).empty());
+  const std::map<pid_t, int> expected{{2, 40}, {3, 39}, {4, 38}, {5, 37}};
+  EXPECT_EQ(system.priorities, expected) << "solver, mock, caller and libraries stay as they are";
+}
+
+TEST(Realtime, theLowestPriorityIsStillOne) {
+  EXPECT_EQ(role_priority(ThreadRole::background, 1), 1);
+  EXPECT_EQ(role_priority(ThreadRole::capture, 1), 1);
+  EXPECT_EQ(role_priority(ThreadRole::capture, 0), 0);
+}
+
+TEST(Realtime, aThreadIsSetOnceAndALaterOneWhenItComes) {
+  FakeSystem system;
+  RealtimeRequest request;
+  request.priority = 40;
+  RealtimeThreads threads(request, system);
+  (void)threads.apply(kDrive);
+  EXPECT_EQ(system.calls, 4);
+  (void)threads.apply(kDrive);
+  EXPECT_EQ(system.calls, 4);
+  std::vector<ProcessThread> later = kDrive;
+  later.push_back({9, "vergence-v4l2"});
+  (void)threads.apply(later);
+  EXPECT_EQ(system.calls, 5);
+  EXPECT_EQ(system.priorities[9], 40);
+}
+
+TEST(Realtime, theSolverHasProcessorsOfItsOwn) {
+  FakeSystem system;
+  RealtimeRequest request;
+  request.affinity = parse_cpu_list("0");
+  request.solver_affinity = parse_cpu_list("1-3");
+  RealtimeThreads threads(request, system);
+  (void)threads.apply(kDrive);
+  const std::map<pid_t, int> expected{{2, 1}, {3, 1}, {4, 1}, {5, 1}, {6, 3}};
+  EXPECT_EQ(system.processors, expected);
+  EXPECT_TRUE(system.priorities.empty());
+}
+
+TEST(Realtime, aRefusalIsOneSentenceWithWhatAllowsIt) {
+  FakeSystem system;
+  system.fifo_error = EPERM;
+  system.affinity_error = EINVAL;
+  system.lock_error = ENOMEM;
+  RealtimeRequest request;
+  request.priority = 40;
+  request.lock_memory = true;
+  request.affinity = parse_cpu_list("900");
+  RealtimeThreads threads(request, system);
+  const auto memory = threads.lock_memory();
+  ASSERT_EQ(memory.size(), 1U);
+  EXPECT_TRUE(mentions(memory[0], "LimitMEMLOCK") && mentions(memory[0], "ulimit -l")) << memory[0];
+  const auto sentences = threads.apply(kDrive);
+  ASSERT_EQ(sentences.size(), 2U) << "one for each key, however many threads there are";
+  EXPECT_TRUE(mentions(sentences[0], "realtime.affinity")) << sentences[0];
+  EXPECT_TRUE(mentions(sentences[1], "setcap") && mentions(sentences[1], "LimitRTPRIO=40"))
+      << sentences[1];
+  EXPECT_TRUE(threads.apply({{20, "vergence-v4l2"}}).empty());
+}
+
+TEST(Realtime, nothingIsTouchedWhereNothingIsAskedFor) {
+  FakeSystem system;
+  RealtimeThreads threads({}, system);
+  EXPECT_TRUE(threads.apply(kDrive).empty());
+  EXPECT_TRUE(threads.lock_memory().empty());
+  EXPECT_EQ(system.calls + system.locks, 0);
+}
+
+TEST(Realtime, memoryLockedOnlyInPartIsSaid) {
+  FakeSystem system;
+  system.covers = RealtimeSystem::Locked::present;
+  RealtimeRequest request;
+  request.lock_memory = true;
+  RealtimeThreads threads(request, system);
+  EXPECT_EQ(threads.lock_memory().size(), 1U);
+}
+
+/// The kernel itself: a thread of this test is found by its name and gets what was asked for.
+TEST(Realtime, theKernelSchedulesAThreadAsAskedFor) {
+  std::atomic<pid_t> id{0};
+  std::atomic<bool> stop{false};
+  std::thread worker([&] {
+    (void)pthread_setname_np(pthread_self(), "vergence-estim");
+    id = ::gettid();
+    id.notify_one();
+    stop.wait(false);
+  });
+  id.wait(0);
+  cpu_set_t here;
+  CPU_ZERO(&here);
+  ASSERT_EQ(::sched_getaffinity(0, sizeof(here), &here), 0);
+  unsigned first = 0;
+  while (!CPU_ISSET(first, &here)) ++first;
+  RealtimeRequest request;
+  request.priority = 10;
+  request.affinity = parse_cpu_list(std::to_string(first));
+  RealtimeSystem system;
+  RealtimeThreads threads(request, system);
+  const auto sentences = threads.apply(process_threads());
+  sched_param parameter{};
+  const int policy = ::sched_getscheduler(id);
+  EXPECT_EQ(::sched_getparam(id, &parameter), 0);
+  cpu_set_t set;
+  CPU_ZERO(&set);
+  EXPECT_EQ(::sched_getaffinity(id, sizeof(set), &set), 0);
+  stop = true;
+  stop.notify_one();
+  worker.join();
+  EXPECT_EQ(CPU_COUNT(&set), 1);
+  EXPECT_TRUE(CPU_ISSET(first, &set));
+  if (!sentences.empty()) GTEST_SKIP() << "no real-time priority is allowed here: " << sentences[0];
+  EXPECT_EQ(policy, SCHED_FIFO | SCHED_RESET_ON_FORK);
+  EXPECT_EQ(parameter.sched_priority, 9);
+}
+
+TEST(CpuList, isReadAsTasksetReadsIt) {
+  const auto count = [](const char* text) {
+    const auto set = parse_cpu_list(text);
+    return set ? CPU_COUNT(&*set) : -1;
+  };
+  EXPECT_EQ(count("0"), 1);
+  EXPECT_EQ(count("0-1,3"), 3);
+  EXPECT_EQ(count("2,2"), 1);
+  for (const char* bad : {"", ",", "1,", "3-1", "-1", "1-", "a", "1 2", "1024", "99999999999"})
+    EXPECT_EQ(count(bad), -1) << bad;
+}
+
+}  // namespace
+}  // namespace vergence::app
