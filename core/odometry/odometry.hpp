@@ -21,7 +21,7 @@ struct FrameOutcome {
   bool restarted = false;    // the scene was rebuilt in this frame
   bool relocalised = false;  // found again in the window after being lost
   bool relink_due = false;   // a calibration waits to be taken up: rebuild() when this frame's
-                            // tracks are of no more use
+                             // tracks are of no more use
   bool relinked = false;     // it was, in this frame
   bool initialised = false;  // the rig's transform was found from this frame's images alone
   double gap_s = 0;          // time since the frame before, when it was too long to predict over
