@@ -18,7 +18,8 @@ let picture = null, hover = null, drawing = false;
 
 function showNow(now) {
   drive.now = now;
-  $("band").className = "tone-" + now.status;
+  $("band").classList.remove("tone-none", "tone-ok", "tone-degraded", "tone-lost");
+  $("band").classList.add("tone-" + now.status);
   show("status", now.status.toUpperCase());
   show("state", STATES[now.state] || now.state);
   const words = now.reason && now.reason !== "none" ? now.reason.replaceAll("_", " ") : "";
@@ -283,7 +284,9 @@ async function showImages(message) {
 
 // ---- the program
 
-function link(words, bad) {
+// Nobody is to read an OK of a minute ago as one of now: without news the band is grey.
+function link(words, bad, past) {
+  $("band").classList.toggle("past", past);
   show("link", words);
   $("link").className = bad ? "off" : "soft";
 }
@@ -295,7 +298,7 @@ function take(message) {
   drive.trail.push(...message.trail);
   if (message.now) showNow(message.now);
   drive.ended = message.ended;
-  link((drive.ended ? "the drive is over · " : "live · ") + drive.session, false);
+  link((drive.ended ? "the drive is over · " : "live · ") + drive.session, false, drive.ended);
   redraw();
 }
 
@@ -318,9 +321,9 @@ function connect() {
     ++window.updates;
   });
   source.addEventListener("images", e => { showImages(JSON.parse(e.data)); });
-  source.onopen = () => link("connected, waiting for the session to begin", false);
+  source.onopen = () => link("connected, waiting for the session to begin", false, true);
   source.onerror = () => {
-    link(drive.ended ? "the drive is over; the page waits for the next one" : "no connection: trying again", !drive.ended);
+    link(drive.ended ? "the drive is over; the page waits for the next one" : "no connection: trying again", !drive.ended, true);
     // A refusal ends the stream for good; the next drive may let us in.
     if (source.readyState === EventSource.CLOSED) setTimeout(connect, 2000);
   };
