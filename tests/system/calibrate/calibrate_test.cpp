@@ -146,7 +146,8 @@ TEST_F(Calibrate, viewsWithoutABoardAreSaidAndSkipped) {
       "calibrate --quiet --left '{0}/left*.png' --right '{0}/right*.png'{1} --out '{0}/c.yaml'",
       odd.string(), kArguments));
   ASSERT_EQ(o.code, 0) << o.err;
-  EXPECT_NE(o.err.find("no board of 9x6 in " + (odd / "right3.png").string()), std::string::npos)
+  EXPECT_NE(o.err.find("no board of 9x6 inner corners in " + (odd / "right3.png").string()),
+            std::string::npos)
       << o.err;
   EXPECT_NE(o.err.find("left5.png: skipped, not every camera has an image of that number"),
             std::string::npos)

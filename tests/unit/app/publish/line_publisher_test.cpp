@@ -56,8 +56,12 @@ TEST(LinePublisher, aFullRingLosesTheNewestCountsThemAndNeverWaits) {
   EXPECT_GE(lines.size(), 64U) << "all that the ring held";
   EXPECT_LE(lines.size(), 65U) << "and the one in hand";
   EXPECT_EQ(counters.count("line_age_p99_us"), 0U) << "no clock to measure an age by";
-  for (std::size_t i = 0; i < lines.size(); ++i)
+  for (std::size_t i = 0; i < 64; ++i)
     EXPECT_EQ(nlohmann::json::parse(lines[i])["frame"], i) << "in order, the oldest";
+  // The one in hand makes room when the publisher's thread comes to it: for whichever is next.
+  if (lines.size() > 64) {
+    EXPECT_GE(nlohmann::json::parse(lines[64])["frame"], 64U);
+  }
 }
 
 TEST(LinePublisher, takesNoMemoryOnTheEstimatorsThreadAndBringsPosesToTheEarth) {
