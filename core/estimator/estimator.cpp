@@ -396,8 +396,9 @@ void Estimator::Parts::grade(const odometry::FrameOutcome& out, Pairing pairing,
   } else if (sample->status == PoseStatus::ok && (undecided || state == State::recalibrating)) {
     sample->status = PoseStatus::degraded;
     sample->reason = Reason::recalibrating;
-  } else if (sample->status == PoseStatus::ok && options.online &&
-             (superseded || !calibrator.verified())) {
+  } else if (options.online && (superseded || !calibrator.verified()) &&
+             (sample->status == PoseStatus::ok || sample->reason == Reason::moving_scene)) {
+    // Points are lost by a calibration that does not fit as they are by what moves.
     sample->status = PoseStatus::degraded;
     sample->reason = unconfirmed ? Reason::unconfirmed : Reason::unverified_calibration;
   } else if (out.reason == Reason::uncalibrated) {
