@@ -397,7 +397,8 @@ void Estimator::Parts::grade(const odometry::FrameOutcome& out, Pairing pairing,
     sample->status = PoseStatus::degraded;
     sample->reason = Reason::recalibrating;
   } else if (options.online && (superseded || !calibrator.verified()) &&
-             (sample->status == PoseStatus::ok || sample->reason == Reason::moving_scene)) {
+             (sample->status == PoseStatus::ok || (sample->reason == Reason::moving_scene &&
+                                                   odometry.linked() == odometry::Link::linked))) {
     // Points are lost by a calibration that does not fit as they are by what moves.
     sample->status = PoseStatus::degraded;
     sample->reason = unconfirmed ? Reason::unconfirmed : Reason::unverified_calibration;
