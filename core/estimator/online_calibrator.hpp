@@ -91,8 +91,8 @@ class OnlineCalibrator {
   [[nodiscard]] const RigCalibration& in_use() const noexcept { return rig_; }
   [[nodiscard]] bool calibrated() const noexcept { return calibrated_; }
   /// The drive itself has confirmed the calibration in use (METHOD §6.4).
-  /// After an outage it has to confirm it again, from frames since then alone: epipolar lines, which
-  /// a few frames are enough for, do not show a yaw.
+  /// After an outage it has to confirm it again, from frames since then alone: epipolar lines,
+  /// which a few frames are enough for, do not show a yaw.
   [[nodiscard]] bool verified() const noexcept { return verified_ && watched_; }
   /// It has confirmed one before: what does not fit since then is a change of the rig.
   [[nodiscard]] bool ever_verified() const noexcept { return ever_verified_; }
