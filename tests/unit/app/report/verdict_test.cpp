@@ -55,6 +55,17 @@ TEST(Verdict, withoutAReferenceItIsNeverGood) {
   EXPECT_TRUE(any_has(v.reasons, "no reference"));
 }
 
+TEST(Verdict, aDoubtThatPassedIsNoKnock) {
+  Case c;
+  c.session.reasons = {"recalibrating"};
+  c.analysis.by_reason = {3};
+  EXPECT_FALSE(any_has(c.verdict().advice, "knocked"));
+  Event changed;
+  changed.kind = "rig_changed";
+  c.session.events.push_back(changed);
+  EXPECT_TRUE(any_has(c.verdict().advice, "recalibrating (3 frames)"));
+}
+
 TEST(Verdict, driftAndScaleMoveTheGradeAtTheirLimits) {
   const std::vector<std::pair<double, Grade>> drifts{
       {0.02, Grade::good}, {0.021, Grade::care}, {0.05, Grade::care}, {0.051, Grade::bad}};
