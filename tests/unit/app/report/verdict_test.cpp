@@ -102,10 +102,13 @@ TEST(Verdict, theWorstReasonComesFirst) {
 }
 
 TEST(Verdict, everyReasonOfAPoseHasItsAdvice) {
+  Event changed;
+  changed.kind = "rig_changed";
   for (int i = 1; i <= static_cast<int>(Reason::unproven_pairing); ++i) {
     Case c;
     c.session.reasons.emplace_back(to_string(static_cast<Reason>(i)));
     c.analysis.by_reason = {0, 3};
+    c.session.events.push_back(changed);
     EXPECT_TRUE(any_has(c.verdict().advice, "3 frames")) << c.session.reasons.back();
   }
 }
