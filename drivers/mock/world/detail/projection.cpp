@@ -104,6 +104,8 @@ RayTiles::RayTiles(const Camera& camera) {
 void Projection::build(const Scene& scene, const RayTiles& tiles, const Camera& camera,
                        const Transform& T_camera_enu, const Transform* T_camera_bus, bool bayer) {
   polygons_.clear();
+  // At once, for whatever a later view shows: growing by halves would take more on the way.
+  polygons_.reserve(scene.polygons.size());
   candidates_.resize(tiles.bounds.size());
   for (auto& list : candidates_) list.clear();
   const double f = std::max(camera.intrinsics().fx, camera.intrinsics().fy);
