@@ -1,5 +1,6 @@
 #include "app/session/session_runner.hpp"
 
+#include <malloc.h>
 #include <pthread.h>
 
 #include <algorithm>
@@ -363,6 +364,7 @@ ExitCode SessionRunner::run() {
   Progress progress = Progress::on_stderr(request_.quiet);
   const auto allocations_before = AllocationGuard::allocations_after_seal();
   say_remarks(&progress);
+  (void)::malloc_trim(0);  // what setting up took and gave back goes to the system
   threads_.lock_memory(&progress);
   source_.start(&faults);
   std::thread estimating([this] { estimate(); });
