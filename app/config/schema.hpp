@@ -38,7 +38,7 @@ struct Group {
 };
 
 /// All groups in the order of the documentation. A new group is a member of Configuration and a
-/// table in schema.cpp.
+/// table in one of schema_*.cpp.
 [[nodiscard]] const std::vector<Group>& schema();
 
 /// What no single row can say (two keys that contradict each other): the sentence, empty when all
