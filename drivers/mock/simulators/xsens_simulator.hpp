@@ -103,6 +103,11 @@ class XsensSimulator final : public DeviceModel {
     std::int64_t device_ns = 0;
   };
 
+  static constexpr Duration kAnswerTime = Duration::milliseconds(1);
+
+  [[nodiscard]] static std::uint8_t id_of(xbus::MessageId id) noexcept {
+    return static_cast<std::uint8_t>(id);
+  }
   [[nodiscard]] std::int64_t device_ns(HostStamp host) const noexcept;
   [[nodiscard]] bool legacy() const noexcept {
     return options_.generation == xbus::Generation::legacy;

@@ -1,0 +1,261 @@
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+
+#include "drivers/mock/simulators/xsens_simulator.hpp"
+
+/// The data messages of both generations.
+namespace vergence::mock {
+namespace {
+
+using namespace xbus;
+
+std::int32_t rounded(double v) noexcept { return static_cast<std::int32_t>(std::llround(v)); }
+
+using Matrix = std::array<std::array<double, 3>, 3>;
+
+/// v_local = M v_enu, row by row: written out so that the driver's way through quaternions is
+/// checked against another.
+Matrix local_from_enu(LocalFrame frame) noexcept {
+  switch (frame) {
+    case LocalFrame::ned:
+      return {{{0, 1, 0}, {1, 0, 0}, {0, 0, -1}}};
+    case LocalFrame::nwu:
+      return {{{0, 1, 0}, {-1, 0, 0}, {0, 0, 1}}};
+    case LocalFrame::enu:
+      break;
+  }
+  return {{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}};
+}
+
+/// Rotation matrix sensor → local frame.
+Matrix attitude_in(LocalFrame frame, const InsSample& s) noexcept {
+  const double x = s.q_enu_ins[0], y = s.q_enu_ins[1], z = s.q_enu_ins[2], w = s.q_enu_ins[3];
+  const Matrix R{{{1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)},
+                  {2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)},
+                  {2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)}}};
+  const Matrix M = local_from_enu(frame);
+  Matrix out{};
+  for (std::size_t i = 0; i < 3; ++i)
+    for (std::size_t j = 0; j < 3; ++j)
+      for (std::size_t k = 0; k < 3; ++k) out[i][j] += M[i][k] * R[k][j];
+  return out;
+}
+
+Three in_frame(LocalFrame frame, const std::array<double, 3>& v) noexcept {
+  const Matrix M = local_from_enu(frame);
+  Three out{};
+  for (std::size_t i = 0; i < 3; ++i)
+    for (std::size_t k = 0; k < 3; ++k) out[i] += M[i][k] * v[k];
+  return out;
+}
+
+/// w x y z of a rotation matrix, by its largest component.
+std::array<double, 4> quaternion_of(const Matrix& R) noexcept {
+  const double t = R[0][0] + R[1][1] + R[2][2];
+  if (t > 0) {
+    const double s = 2 * std::sqrt(t + 1);
+    return {s / 4, (R[2][1] - R[1][2]) / s, (R[0][2] - R[2][0]) / s, (R[1][0] - R[0][1]) / s};
+  }
+  std::size_t i = R[1][1] > R[0][0] ? 1 : 0;
+  if (R[2][2] > R[i][i]) i = 2;
+  const std::size_t j = (i + 1) % 3, k = (i + 2) % 3;
+  const double s = 2 * std::sqrt(1 + R[i][i] - R[j][j] - R[k][k]);
+  std::array<double, 4> q{};
+  q[0] = (R[k][j] - R[j][k]) / s;
+  q[i + 1] = s / 4;
+  q[j + 1] = (R[j][i] + R[i][j]) / s;
+  q[k + 1] = (R[k][i] + R[i][k]) / s;
+  return q;
+}
+
+Three euler_deg_of(const Matrix& R) noexcept {
+  constexpr double kDegree = 180 / 3.14159265358979323846;
+  return {kDegree * std::atan2(R[2][1], R[2][2]),
+          -kDegree * std::asin(std::clamp(R[2][0], -1.0, 1.0)),
+          kDegree * std::atan2(R[1][0], R[0][0])};
+}
+
+std::array<double, 9> flat(const Matrix& R) noexcept {
+  return {R[0][0], R[0][1], R[0][2], R[1][0], R[1][1], R[1][2], R[2][0], R[2][1], R[2][2]};
+}
+
+Three gravity_in_body(const InsSample& s) noexcept {
+  constexpr double kGravity = 9.79;
+  const Matrix R = attitude_in(LocalFrame::enu, s);
+  return {kGravity * R[2][0], kGravity * R[2][1], kGravity * R[2][2]};
+}
+
+std::uint32_t status_of(const InsSample& s) noexcept {
+  const bool fix = s.fix == FixStatus::fix_2d || s.fix == FixStatus::fix_3d;
+  std::uint32_t status = kStatusSelfTest | kStatusClockSynced;
+  if (s.attitude_valid) status |= kStatusFilterValid;
+  if (fix) status |= kStatusGnssFix | (3U << 23U);
+  if (s.fix == FixStatus::dead_reckoning) status |= 1U << 23U;
+  return status;
+}
+
+}  // namespace
+
+void XsensSimulator::send_legacy(const Taken& now, HostStamp at) {
+  Mtdata d;
+  const LocalFrame frame = layout_.frame();
+  const InsSample& s = now.sample;
+  const Matrix R = attitude_in(frame, s);
+  d.raw = RawInertial{};
+  d.temperature_c = 31.5;
+  d.acceleration = gravity_in_body(s);
+  d.quaternion = quaternion_of(R);
+  d.euler_deg = euler_deg_of(R);
+  d.rotation_matrix = flat(R);
+  d.latitude_longitude_deg = std::array{s.position.latitude_deg, s.position.longitude_deg};
+  d.altitude_m = s.position.height_m;
+  d.velocity = in_frame(frame, s.velocity_enu);
+  d.status = static_cast<std::uint8_t>(status_of(s) & 0x7U);
+  d.sample_counter = counter_++;
+  d.utc = utc_of_unix_ns(options_.unix_ns_at_power_on + now.device_ns, 7);
+  fix_age_ = sample_ns_ >= next_fix_ns_ ? std::uint8_t{0}
+                                        : static_cast<std::uint8_t>(std::min(255, fix_age_ + 1));
+  if (sample_ns_ >= next_fix_ns_) next_fix_ns_ += options_.fix_interval.ns();
+  LegacyFix f;
+  constexpr double kSeaLevel = 101325;
+  f.pressure_2pa = static_cast<std::uint16_t>(kSeaLevel / 2);
+  f.itow_ms = static_cast<std::uint32_t>(now.device_ns / 1'000'000);
+  const InsSample& then = history_.empty() ? s : history_.front().sample;
+  f.latitude_1e7_deg = rounded(then.position.latitude_deg * 1e7);
+  f.longitude_1e7_deg = rounded(then.position.longitude_deg * 1e7);
+  f.height_mm = rounded(then.position.height_m * 1e3);
+  f.velocity_north_cm_s = rounded(then.velocity_enu[1] * 1e2);
+  f.velocity_east_cm_s = rounded(then.velocity_enu[0] * 1e2);
+  f.velocity_down_cm_s = rounded(-then.velocity_enu[2] * 1e2);
+  f.horizontal_accuracy_mm =
+      static_cast<std::uint32_t>(rounded(then.position_sigma * std::sqrt(2.0) * 1e3));
+  f.vertical_accuracy_mm = static_cast<std::uint32_t>(rounded(then.height_sigma * 1e3));
+  f.speed_accuracy_cm_s = static_cast<std::uint32_t>(rounded(then.velocity_sigma * 1e2));
+  f.age = fix_age_;
+  d.fix = f;
+  std::array<std::uint8_t, kMaxPayload> payload{};
+  send(at, id_of(MessageId::mtdata), std::span(payload).first(encode_mtdata(d, layout_, payload)));
+}
+
+void XsensSimulator::put_stamps(std::int64_t sample_ns, PacketWriter* packets) {
+  const auto ticks = static_cast<std::uint64_t>((sample_ns - clock_zero_ns_) / 100'000) +
+                     options_.first_sample_time;
+  for (const OutputEntry& e : outputs_.items()) {
+    if (e.rate_hz != kEveryMessage) continue;
+    switch (packet_id(e.id)) {
+      case PacketId::utc:
+        packets->put_utc(utc_of_unix_ns(options_.unix_ns_at_power_on + sample_ns, 7));
+        break;
+      case PacketId::packet_counter:
+        packets->put_u16(e.id, counter_);
+        break;
+      case PacketId::sample_time_fine:
+        packets->put_u32(e.id, static_cast<std::uint32_t>(ticks % options_.sample_time_modulus));
+        break;
+      default:
+        break;
+    }
+  }
+  ++counter_;
+}
+
+void XsensSimulator::send_mark4(const Taken& now, HostStamp at) {
+  std::array<std::uint8_t, kMaxPayload> buffer{};
+  PacketWriter packets(buffer);
+  const InsSample& s = now.sample;
+  put_stamps(now.device_ns, &packets);
+  const bool place = s.fix != FixStatus::none && !(options_.missing_position > 0 &&
+                                                   random_.uniform() < options_.missing_position);
+  for (const OutputEntry& e : outputs_.items()) {
+    const auto frame = static_cast<LocalFrame>((e.id >> 2U) & 3U);
+    switch (packet_id(e.id)) {
+      case PacketId::quaternion:
+        packets.put_numbers(e.id, quaternion_of(attitude_in(frame, s)));
+        break;
+      case PacketId::euler:
+        packets.put_numbers(e.id, euler_deg_of(attitude_in(frame, s)));
+        break;
+      case PacketId::rotation_matrix:
+        packets.put_numbers(e.id, flat(attitude_in(frame, s)));
+        break;
+      case PacketId::acceleration:
+        packets.put_numbers(e.id, gravity_in_body(s));
+        break;
+      case PacketId::rate_of_turn:
+        packets.put_numbers(e.id, Three{});
+        break;
+      case PacketId::latitude_longitude:
+        if (place)
+          packets.put_numbers(e.id, std::array{s.position.latitude_deg, s.position.longitude_deg});
+        break;
+      case PacketId::altitude_ellipsoid:
+        if (place) packets.put_numbers(e.id, std::array{s.position.height_m});
+        break;
+      case PacketId::velocity:
+        if (place) packets.put_numbers(e.id, in_frame(frame, s.velocity_enu));
+        break;
+      case PacketId::status_word:
+        packets.put_u32(e.id, status_of(s) | (sync_out_within(sample_ns_ - period_ns(), sample_ns_)
+                                                  ? kStatusSyncOutMarker
+                                                  : 0U));
+        break;
+      case PacketId::status_byte:
+        packets.put(e.id, std::array{static_cast<std::uint8_t>(status_of(s))});
+        break;
+      default:
+        break;
+    }
+  }
+  send(at, id_of(MessageId::mtdata2), packets.payload());
+}
+
+void XsensSimulator::send_fix(HostStamp at) {
+  bool requested = false;
+  for (const OutputEntry& e : outputs_.items())
+    requested = requested || packet_id(e.id) == PacketId::gnss_pvt;
+  if (!requested) return;
+  const Taken& then = history_.front();
+  const InsSample& s = then.sample;
+  const Utc utc = utc_of_unix_ns(options_.unix_ns_at_power_on + then.device_ns, 7);
+  GnssPvt p;
+  p.itow_ms = static_cast<std::uint32_t>(then.device_ns / 1'000'000);
+  p.year = utc.year, p.month = utc.month, p.day = utc.day, p.hour = utc.hour, p.minute = utc.minute,
+  p.second = utc.second;
+  p.nanosecond = static_cast<std::int32_t>(utc.nanosecond);
+  p.valid = 0x37;  // bits beyond the documented ones are set, too
+  p.fix = s.fix == FixStatus::fix_3d ? 3 : s.fix == FixStatus::fix_2d ? 2 : 0;
+  p.flags = p.fix > 1 ? 1 : 0;
+  p.satellites = p.fix > 1 ? 11 : 0;
+  p.longitude_1e7_deg = rounded(s.position.longitude_deg * 1e7);
+  p.latitude_1e7_deg = rounded(s.position.latitude_deg * 1e7);
+  p.height_ellipsoid_mm = rounded(s.position.height_m * 1e3);
+  p.height_msl_mm = p.height_ellipsoid_mm - 38'000;
+  const auto accuracy = [&p](double sigma) {
+    return p.fix > 1 ? static_cast<std::uint32_t>(rounded(sigma * 1e3)) : 0xFFFFFFFFU;
+  };
+  p.horizontal_accuracy_mm = accuracy(s.position_sigma * std::sqrt(2.0));
+  p.vertical_accuracy_mm = accuracy(s.height_sigma);
+  p.speed_accuracy_mm_s = accuracy(s.velocity_sigma);
+  p.velocity_east_mm_s = rounded(s.velocity_enu[0] * 1e3);
+  p.velocity_north_mm_s = rounded(s.velocity_enu[1] * 1e3);
+  p.velocity_down_mm_s = rounded(-s.velocity_enu[2] * 1e3);
+  std::array<std::uint8_t, kMaxPayload> buffer{};
+  PacketWriter packets(buffer);
+  packets.put_pvt(p);  // in these messages the data stands before the stamps
+  put_stamps(then.device_ns, &packets);
+  send(at, id_of(MessageId::mtdata2), packets.payload());
+}
+
+bool XsensSimulator::sync_out_within(std::int64_t from_ns, std::int64_t to_ns) const noexcept {
+  for (const SyncEntry& e : sync_.items()) {
+    if (e.function != kSyncIntervalTransition || e.line != kSyncLineOut || e.polarity == 0)
+      continue;
+    const auto period = static_cast<std::int64_t>(1e9 / kSyncOutBase) * (e.skip + 1);
+    if (to_ns / period != from_ns / period) return true;
+  }
+  return false;
+}
+
+}  // namespace vergence::mock
