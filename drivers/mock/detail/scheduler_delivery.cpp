@@ -1,0 +1,119 @@
+#include <pthread.h>
+
+#include <chrono>
+#include <cstdint>
+#include <mutex>
+#include <shared_mutex>
+
+#include "drivers/clock.hpp"
+#include "drivers/mock/detail/scheduler.hpp"
+
+/// Handing out what was made, in the order of arrival.
+namespace vergence::mock {
+
+void Scheduler::announce_end(HostStamp at) {
+  for (int device = kTriggerDevice; device < static_cast<int>(cameras_.size()); ++device) {
+    Parcel p;
+    p.device = device;
+    p.arrival = at;
+    p.frame.what = Delivery<Frame>::What::end;
+    p.reading.what = Delivery<InsReading>::What::end;
+    p.report.what = Delivery<BoardReport>::What::end;
+    post(p);
+  }
+}
+
+void Scheduler::post(Parcel parcel) {
+  const std::lock_guard lock(mutex_);
+  parcel.order = orders_++;
+  parcels_.push(parcel);
+  posted_.notify_all();
+}
+
+void Scheduler::deliver_until(HostStamp horizon) {
+  for (;;) {
+    if (stopping()) return;
+    if (parcels_.empty() || parcels_.top().arrival >= horizon) break;
+    const Parcel parcel = parcels_.top();
+    parcels_.pop();
+    rig_.delivered.advance(parcel.arrival);  // delivering it may take until somebody takes others
+    deliver(parcel, parcel.arrival);
+  }
+  rig_.delivered.advance(horizon);
+}
+
+void Scheduler::hand_out_in_time() {
+  (void)pthread_setname_np(pthread_self(), "vergence-mockio");
+  std::unique_lock lock(mutex_);
+  while (!stopping()) {
+    if (parcels_.empty()) {
+      if (finished_) return;
+      posted_.wait(lock);
+      continue;
+    }
+    const HostStamp now = monotonic_now();
+    const bool end = parcels_.top().frame.what ==
+                     Delivery<Frame>::What::end;  // after the last delivery nothing is waited for
+    if (parcels_.top().arrival > now && !end) {
+      (void)posted_.wait_for(lock, std::chrono::nanoseconds((parcels_.top().arrival - now).ns()));
+      continue;
+    }
+    const Parcel parcel = parcels_.top();
+    parcels_.pop();
+    lock.unlock();
+    deliver(parcel, monotonic_now());
+    lock.lock();
+  }
+}
+
+template <class S, class D>
+bool Scheduler::push_or_wait(S* stream, const D& delivery) {
+  for (;;) {
+    const WakeEvent::Ticket seen = rig_.room.ticket();
+    if (stopping() || !stream->streaming()) return false;
+    if (stream->push(delivery)) return true;
+    if (rig_.options.real_time) return false;
+    rig_.room.wait(seen);
+  }
+}
+
+void Scheduler::deliver(const Parcel& parcel, HostStamp arrival) {
+  if (parcel.device == kTriggerDevice) {
+    Delivery<BoardReport> d = parcel.report;
+    d.arrival = arrival;
+    d.value.pulse.arrival = arrival;
+    // Nobody needs to take the reports; the latest that find no room are counted.
+    if (trigger_->stream.streaming() && !trigger_->stream.push(d))
+      trigger_->overruns.fetch_add(1, std::memory_order_relaxed);
+    return;
+  }
+  if (parcel.device == kInsDevice) {
+    Delivery<InsReading> d = parcel.reading;
+    d.arrival = arrival;
+    if (rig_.options.real_time && ins_.stream.full())
+      ins_.overruns.fetch_add(1, std::memory_order_relaxed);
+    (void)push_or_wait(&ins_.stream, d);
+    return;
+  }
+  Delivery<Frame> d = parcel.frame;
+  d.arrival = arrival;
+  const auto k = static_cast<std::size_t>(parcel.device);
+  if (d.what != Delivery<Frame>::What::item) {
+    (void)push_or_wait(&cameras_[k]->stream, d);
+    return;
+  }
+  senders_[k].on_the_way.fetch_sub(1);
+  const std::shared_lock memory(cameras_[k]->memory);
+  if (parcel.generation != cameras_[k]->generation()) return;  // its memory is no more
+  // The stream is deeper than the slots: frames always find room while somebody takes them.
+  if (k == 0) rig_.unseen.fetch_add(1);
+  if (push_or_wait(&cameras_[k]->stream, d)) return;
+  if (k == 0) rig_.unseen.fetch_sub(1);
+  const std::lock_guard lock(mutex_);
+  Sender& sender = senders_[k];
+  if (sender.spare_generation != parcel.generation) sender.spare.clear();
+  sender.spare_generation = parcel.generation;
+  sender.spare.push_back(d.value.slot);
+}
+
+}  // namespace vergence::mock
