@@ -6,34 +6,19 @@
 #include <algorithm>
 #include <array>
 #include <cerrno>
-#include <charconv>
 #include <cmath>
-#include <cstdio>
 #include <cstring>
+#include <vector>
 
 namespace vergence::v4l2 {
 namespace {
 
-constexpr std::string_view kControlPrefix = "control_";
-constexpr int kLeastBuffers = 4, kMostBuffers = 32;  // 32: the kernel's own limit
-constexpr int kMostThin = 60;
 constexpr double kRateTolerance =
     0.02;  // between what was asked and what the camera chose, before it is worth a remark
 constexpr std::uint32_t kMostListed = 24;  // sizes and formats named in a sentence
 
-std::string number(double value) {
-  std::array<char, 32> text{};
-  (void)std::snprintf(text.data(), text.size(), "%.6g", value);
-  return text.data();
-}
-
 std::string size_text(std::uint32_t width, std::uint32_t height) {
   return std::to_string(width) + " x " + std::to_string(height);
-}
-
-bool parse_number(const std::string& text, double* value) {
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), *value);
-  return error == std::errc{} && end == text.data() + text.size() && std::isfinite(*value);
 }
 
 DeviceStatus status_of(int error) noexcept {
@@ -252,8 +237,8 @@ class Applier {
     }
     if (options_.thin > 1 && camera >= requested_.rate_hz) return DeviceStatus::ok;
     if (std::abs(camera - requested_.rate_hz) > kRateTolerance * requested_.rate_hz)
-      remark("the camera runs at " + number(camera) + " Hz where " + number(requested_.rate_hz) +
-             " was asked for" +
+      remark("the camera runs at " + number_text(camera) + " Hz where " +
+             number_text(requested_.rate_hz) + " was asked for" +
              (camera > 1.5 * requested_.rate_hz
                   ? "; the option thin keeps as many as were asked for"
                   : ""));
@@ -297,10 +282,10 @@ class Applier {
     const std::int64_t value = clamped(c, steps);
     if (std::llabs(value - steps) > c.step)
       return refuse(DeviceStatus::unsupported,
-                    "no exposure of " + number(requested_.exposure.to_seconds() * 1e6) +
+                    "no exposure of " + number_text(requested_.exposure.to_seconds() * 1e6) +
                         " us; this camera offers " +
-                        number(static_cast<double>(c.least) * unit * 1e6) + " to " +
-                        number(static_cast<double>(c.most) * unit * 1e6) + " us at this rate");
+                        number_text(static_cast<double>(c.least) * unit * 1e6) + " to " +
+                        number_text(static_cast<double>(c.most) * unit * 1e6) + " us at this rate");
     if (const DeviceStatus status = set(c, value); status != DeviceStatus::ok) return status;
     out_.exposure_id = c.id;
     out_.exposure_unit_s = unit;
@@ -329,8 +314,9 @@ class Applier {
     const std::int64_t value = c->least + std::llround(requested_.gain_db / step);
     if (value < c->least || value > c->most)
       return refuse(DeviceStatus::unsupported,
-                    "no gain of " + number(requested_.gain_db) + " dB; this camera offers 0 to " +
-                        number(static_cast<double>(c->most - c->least) * step));
+                    "no gain of " + number_text(requested_.gain_db) +
+                        " dB; this camera offers 0 to " +
+                        number_text(static_cast<double>(c->most - c->least) * step));
     out_.gain_id = c->id;
     out_.gain_unit_db = options_.gain_step_db;
     out_.actual.gain_db = static_cast<double>(value - c->least) * options_.gain_step_db;
@@ -374,70 +360,6 @@ class Applier {
 };
 
 }  // namespace
-
-std::string find_nonsense(const CameraConfiguration& requested) {
-  if (requested.width <= 0 || requested.height <= 0)
-    return "a size of " + std::to_string(requested.width) + " x " +
-           std::to_string(requested.height);
-  if (!(requested.rate_hz > 0) || requested.rate_hz > 1e6)
-    return "a rate of " + number(requested.rate_hz) + " Hz";
-  if (requested.exposure <= Duration{}) return "an exposure that is not positive";
-  if (requested.exposure.to_seconds() * requested.rate_hz > 1)
-    return "an exposure longer than the time between two images";
-  if (requested.offset_x < 0 || requested.offset_y < 0)
-    return "a region that begins outside the sensor";
-  if (!std::isfinite(requested.gain_db)) return "a gain that is no number";
-  return {};
-}
-
-bool parse_options(const CameraConfiguration& requested, Options* options, std::string* message) {
-  Options o;
-  const auto bad = [&](const std::string& key, const std::string& what) {
-    *message = "option " + key + " is \"" + requested.options.at(key) + "\"; it wants " + what;
-    return false;
-  };
-  for (const auto& [key, text] : requested.options) {
-    double value = 0;
-    const bool is_number = parse_number(text, &value);
-    const auto whole = [&](double least, double most) {
-      return is_number && value >= least && value <= most && value == std::floor(value);
-    };
-    if (key == "readout_us") {
-      if (!is_number || value < 0 || value > 1e6) return bad(key, "microseconds, 0 to 1000000");
-      o.readout = Duration::seconds(value * 1e-6);
-    } else if (key == "shift") {
-      if (!whole(0, 8)) return bad(key, "bits, 0 to 8");
-      o.shift = static_cast<int>(value);
-    } else if (key == "thin") {
-      if (!whole(1, kMostThin))
-        return bad(key, "how many times the rate the camera is to run at, 1 to 60");
-      o.thin = static_cast<int>(value);
-    } else if (key == "buffers") {
-      if (!whole(kLeastBuffers, kMostBuffers)) return bad(key, "a number, 4 to 32");
-      o.buffers = static_cast<int>(value);
-    } else if (key == "gain_step_db") {
-      if (!is_number || value <= 0 || value > 20)
-        return bad(key, "dB a step, more than 0 and at most 20");
-      o.gain_step_db = value;
-    } else if (key == "subdevice") {
-      o.subdevice = text;
-    } else if (key == "trigger_control") {
-      o.trigger_control = key_of(text);
-    } else if (key == "trigger_value") {
-      o.trigger_value = text;
-    } else if (key.starts_with(kControlPrefix)) {
-      o.controls.emplace_back(key_of(key.substr(kControlPrefix.size())), text);
-    } else {
-      *message = "there is no option " + key +
-                 "; V4L2 cameras have readout_us, shift, thin, buffers, subdevice, "
-                 "trigger_control, trigger_value, gain_step_db and "
-                 "control_NAME for each of their controls";
-      return false;
-    }
-  }
-  *options = std::move(o);
-  return true;
-}
 
 DeviceStatus apply(int fd, std::uint32_t buffer_type, const Controls& controls,
                    const CameraConfiguration& requested, const Options& options, Settings* settings,
