@@ -3,8 +3,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstdio>
 #include <utility>
+
+#include "drivers/xsens/detail/format_text.hpp"
 
 namespace vergence::xsens {
 namespace {
@@ -14,40 +15,6 @@ using namespace xbus;
 constexpr Duration kProbe = Duration::milliseconds(
     500);  // a device that measures speaks within this, one that listens answers
 constexpr Duration kAfterReset = Duration::milliseconds(2500);
-
-// What the program wants of an MTi-G: fixed point 16.32, so that a position keeps its digits; X
-// north, Y west, Z up as it comes.
-constexpr std::uint16_t kLegacyMode =
-    kModeOrientation | kModePosition | kModeVelocity | kModeStatus;
-constexpr std::uint32_t kLegacySettings =
-    settings_format(NumberFormat::fp16_32) | kSettingsQuaternion | kSettingsCounter | kSettingsUtc;
-
-/// What the program wants of an MTi-G-700/710. Without UTC it still has the receiver's.
-OutputConfiguration requested_outputs(std::uint16_t rate_hz, bool utc) noexcept {
-  OutputConfiguration o;
-  if (utc) (void)o.add({wire_id(PacketId::utc), kEveryMessage});
-  for (const OutputEntry e :
-       {OutputEntry{wire_id(PacketId::packet_counter), kEveryMessage},
-        {wire_id(PacketId::sample_time_fine), kEveryMessage},
-        {wire_id(PacketId::quaternion), rate_hz},
-        {wire_id(PacketId::latitude_longitude, NumberFormat::fp16_32), rate_hz},
-        {wire_id(PacketId::altitude_ellipsoid, NumberFormat::fp16_32), rate_hz},
-        {wire_id(PacketId::velocity), rate_hz},
-        {wire_id(PacketId::status_word), kEveryMessage},
-        {wire_id(PacketId::gnss_pvt), 4}})
-    (void)o.add(e);
-  return o;
-}
-
-/// The rate of an MTi-G-700/710 next to the one asked for.
-std::uint16_t nearest_rate(double rate_hz) noexcept {
-  constexpr std::array<std::uint16_t, 15> kRates{1,  2,  4,  5,  8,   10,  16, 20,
-                                                 25, 40, 50, 80, 100, 200, 400};
-  std::uint16_t best = kRates[0];
-  for (const std::uint16_t r : kRates)
-    if (std::abs(r - rate_hz) < std::abs(best - rate_hz)) best = r;
-  return best;
-}
 
 DeviceStatus status_of(Answer answer) noexcept {
   switch (answer) {
@@ -62,13 +29,6 @@ DeviceStatus status_of(Answer answer) noexcept {
       return DeviceStatus::stopped;
   }
   return DeviceStatus::failed;
-}
-
-template <class... Args>
-std::string text(const char* format, Args... args) {
-  std::array<char, 320> buffer{};
-  (void)std::snprintf(buffer.data(), buffer.size(), format, args...);
-  return buffer.data();
 }
 
 }  // namespace
@@ -102,9 +62,9 @@ DeviceStatus Setup::find() {
     // At the wrong rate any device is noise: what is recognised outranks what is not.
     if (!heard.empty() && (instead.empty() || instead == "its bytes are no Xbus")) instead = heard;
     if (dialogue_.messages_heard() > 0)
-      instead =
-          text("it sends Xbus messages at %u baud, but does not answer: check the line towards it",
-               bauds[i]);
+      instead = format_text(
+          "it sends Xbus messages at %u baud, but does not answer: check the line towards it",
+          bauds[i]);
   }
   last_error_ = instead.empty()
                     ? "it is silent at every baud rate; check its power, its cable and the port"
@@ -114,10 +74,10 @@ DeviceStatus Setup::find() {
 
 DeviceStatus Setup::failed(const char* what) {
   last_error_ = reply_.answer == Answer::refused
-                    ? text("it refuses %s: %.*s (error %02X)", what,
-                           static_cast<int>(error_text(reply_.error).size()),
-                           error_text(reply_.error).data(), reply_.error)
-                    : text("it does not answer to %s; check its cable", what);
+                    ? format_text("it refuses %s: %.*s (error %02X)", what,
+                                  static_cast<int>(error_text(reply_.error).size()),
+                                  error_text(reply_.error).data(), reply_.error)
+                    : format_text("it does not answer to %s; check its cable", what);
   return status_of(reply_.answer);
 }
 
@@ -162,13 +122,13 @@ DeviceStatus Setup::identify(Identity* identity) {
 }
 
 DeviceStatus Setup::refuse_load(const LineBudget& b, double rate_hz, std::uint32_t baud) {
-  last_error_ =
-      text("%.0f Hz need %.0f %% of the line at %u baud, more than the %.0f %% that are safe; ",
-           rate_hz, 100 * b.load, baud, 100 * kLineLoadMost);
+  last_error_ = format_text(
+      "%.0f Hz need %.0f %% of the line at %u baud, more than the %.0f %% that are safe; ", rate_hz,
+      100 * b.load, baud, 100 * kLineLoadMost);
   last_error_ += b.baud_needed != 0
-                     ? text("set ins.baud to %u, or ins.rate to %.0f or less", b.baud_needed,
-                            std::floor(b.greatest_rate))
-                     : text("set ins.rate to %.0f or less", std::floor(b.greatest_rate));
+                     ? format_text("set ins.baud to %u, or ins.rate to %.0f or less", b.baud_needed,
+                                   std::floor(b.greatest_rate))
+                     : format_text("set ins.rate to %.0f or less", std::floor(b.greatest_rate));
   return DeviceStatus::no_bandwidth;
 }
 
@@ -184,219 +144,12 @@ DeviceStatus Setup::set(const Identity& identity, double rate_hz, StreamSettings
   return DeviceStatus::ok;
 }
 
-// ---- MTi-G
-
-DeviceStatus Setup::set_legacy(double rate_hz, StreamSettings* stream) {
-  const auto period = period_of_rate(rate_hz);
-  if (!period) {
-    last_error_ = text(
-        "an MTi-G has no %.6g Hz: its rates divide 115200 Hz, from 10 to 512, without those that "
-        "its receiver cannot correct; "
-        "set ins.rate to 100 or 120",
-        rate_hz);
-    return DeviceStatus::unsupported;
-  }
-  // With the receiver's own fix where the line has room for it.
-  MtdataLayout layout{static_cast<std::uint16_t>(kLegacyMode | kModeGnss), kLegacySettings};
-  if (!line_budget(layout, rate_hz, baud_to_be()).fits()) layout.mode = kLegacyMode;
-  if (!line_budget(layout, rate_hz, baud_to_be()).fits()) layout.settings &= ~kSettingsUtc;
-  const LineBudget budget = line_budget(layout, rate_hz, baud_to_be());
-  if (!budget.fits()) return refuse_load(budget, rate_hz, baud_to_be());
-
-  if (const DeviceStatus s =
-          write(MessageId::configuration_request, {}, "the question for its configuration");
-      s != DeviceStatus::ok)
-    return s;
-  DeviceConfiguration has;
-  if (!read_configuration(reply_.bytes(), &has)) {
-    last_error_ = "its configuration cannot be read: is more than one device on the bus?";
-    return DeviceStatus::unsupported;
-  }
-  std::array<std::uint8_t, 4> bytes{};
-  const auto u16 = [&bytes](std::uint16_t v) {
-    return write_u16(bytes, v), std::span<const std::uint8_t>(bytes).first(2);
-  };
-  DeviceStatus s = DeviceStatus::ok;
-  if (has.period != *period) s = write(MessageId::period, u16(*period), "the sample period");
-  if (s == DeviceStatus::ok && has.output_skip != 0)
-    s = write(MessageId::output_skip, u16(0), "the output skip factor");
-  if (s == DeviceStatus::ok && has.output_mode != layout.mode)
-    s = write(MessageId::output_mode, u16(layout.mode), "the output mode");
-  if (s == DeviceStatus::ok && has.output_settings != layout.settings) {
-    write_u32(bytes, layout.settings);
-    s = write(MessageId::output_settings, bytes, "the output settings");
-  }
-  if (s == DeviceStatus::ok)
-    s = write(MessageId::data_length_request, {}, "the question for its message's length");
-  if (s != DeviceStatus::ok) return s;
-  if (reply_.size != 2 || read_u16(reply_.bytes()) != layout.payload_size()) {
-    last_error_ =
-        text("its messages have %u bytes where its settings mean %zu: this firmware is not known",
-             reply_.size == 2 ? unsigned{read_u16(reply_.bytes())} : 0U,
-             layout.payload_size().value_or(0));
-    return DeviceStatus::unsupported;
-  }
-  stream->layout = layout;
-  stream->period_numerator = *period;
-  stream->period_denominator = kPeriodClock;
-  return set_legacy_lines(rate_hz, stream);
-}
-
-DeviceStatus Setup::set_legacy_line(MessageId id, LegacySync parameter, std::uint32_t value) {
-  const std::uint8_t which = static_cast<std::uint8_t>(parameter);
-  if (const DeviceStatus s = write(id, {&which, 1}, "the question for a synchronisation line");
-      s != DeviceStatus::ok)
-    return s;
-  LegacySync told{};
-  std::uint32_t has = 0;
-  if (read_legacy_sync(reply_.bytes(), &told, &has) && told == parameter && has == value)
-    return DeviceStatus::ok;
-  std::array<std::uint8_t, 5> bytes{};
-  return write(id, std::span(bytes).first(write_legacy_sync(parameter, value, bytes)),
-               "a setting of a synchronisation line");
-}
-
-DeviceStatus Setup::set_legacy_lines(double rate_hz, StreamSettings* stream) {
-  const auto out = [this](LegacySync p, std::uint32_t v) {
-    return set_legacy_line(MessageId::legacy_sync_out, p, v);
-  };
-  if (options_.sync_out_hz < 0) {
-    if (const DeviceStatus s = out(LegacySync::mode, kLegacySyncOutOff); s != DeviceStatus::ok)
-      return s;
-  } else if (options_.sync_out_hz > 0) {
-    double actual = 0;
-    const std::uint16_t skip = sync_out_skip(rate_hz, options_.sync_out_hz, &actual);
-    const auto width = static_cast<std::uint32_t>(std::lround(
-        std::clamp(options_.sync_out_width_ms, 0.01, 1000.0) * 1e-3 * kLegacySyncClock));
-    for (const auto& [parameter, value] :
-         {std::pair<LegacySync, std::uint32_t>{LegacySync::skip, skip},
-          {LegacySync::offset, 0},
-          {LegacySync::width, width},
-          {LegacySync::mode, kLegacySyncOutPulse | kLegacySyncOutPositive}})
-      if (const DeviceStatus s = out(parameter, value); s != DeviceStatus::ok) return s;
-    stream->sync_out_hz = actual;
-  }
-  if (options_.sync_in == SyncIn::leave) return DeviceStatus::ok;
-  constexpr std::uint16_t kSendLatest = 4, kRising = 1, kFalling = 2;
-  const std::uint16_t mode =
-      options_.sync_in == SyncIn::off
-          ? std::uint16_t{0}
-          : static_cast<std::uint16_t>(kSendLatest |
-                                       (options_.sync_in == SyncIn::rising ? kRising : kFalling));
-  return set_legacy_line(MessageId::legacy_sync_in, LegacySync::mode, mode);
-}
-
-// ---- MTi-G-700/710
-
-DeviceStatus Setup::set_mark4(double rate_hz, StreamSettings* stream) {
-  const std::uint16_t rate = nearest_rate(rate_hz);
-  OutputConfiguration requested = requested_outputs(rate, true);
-  if (!line_budget(requested, baud_to_be()).fits()) requested = requested_outputs(rate, false);
-  const LineBudget budget = line_budget(requested, baud_to_be());
-  if (!budget.fits()) return refuse_load(budget, rate, baud_to_be());
-
-  // Text output, while set, overrides everything else.
-  dialogue_.ask(MessageId::string_output, &reply_);
-  if (reply_.answer == Answer::ok && reply_.size == 2 && read_u16(reply_.bytes()) != 0) {
-    constexpr std::array<std::uint8_t, 2> kOff{0, 0};
-    if (const DeviceStatus s = write(MessageId::string_output, kOff, "to leave its text output");
-        s != DeviceStatus::ok)
-      return s;
-  }
-  if (const DeviceStatus s =
-          write(MessageId::output_configuration, {}, "the question for its outputs");
-      s != DeviceStatus::ok)
-    return s;
-  OutputConfiguration has;
-  if (!read_output_configuration(reply_.bytes(), &has) || !(has == requested)) {
-    std::array<std::uint8_t, 4 * kMostOutputs> bytes{};
-    const std::size_t n = write_output_configuration(requested, bytes);
-    if (const DeviceStatus s = write(MessageId::output_configuration, std::span(bytes).first(n),
-                                     "the outputs asked for");
-        s != DeviceStatus::ok)
-      return s;
-    if (!read_output_configuration(reply_.bytes(), &has)) has = {};
-  }
-  // It answers with what it took.
-  std::uint16_t taken = 0;
-  for (const OutputEntry& e : has.items())
-    if (e.id == wire_id(PacketId::quaternion)) taken = e.rate_hz;
-  const bool clocked = std::any_of(
-      has.items().begin(), has.items().end(),
-      [](const OutputEntry& e) { return packet_id(e.id) == PacketId::sample_time_fine; });
-  const bool placed = std::any_of(has.items().begin(), has.items().end(), [](const OutputEntry& e) {
-    return packet_id(e.id) == PacketId::latitude_longitude;
-  });
-  if (taken == 0 || taken == kEveryMessage || !clocked || !placed) {
-    last_error_ =
-        "it does not give position and attitude together with its clock: this is no MTi-G";
-    return DeviceStatus::unsupported;
-  }
-  stream->outputs = has;
-  stream->period_numerator = 1;
-  stream->period_denominator = taken;
-  return set_mark4_lines(stream);
-}
-
-DeviceStatus Setup::set_mark4_lines(StreamSettings* stream) {
-  if (options_.sync_out_hz == 0 && options_.sync_in == SyncIn::leave) return DeviceStatus::ok;
-  if (const DeviceStatus s =
-          write(MessageId::sync_settings, {}, "the question for its synchronisation lines");
-      s != DeviceStatus::ok)
-    return s;
-  SyncSettings has;
-  if (!read_sync_settings(reply_.bytes(), &has)) {
-    last_error_ = "its synchronisation settings cannot be read: this firmware is not known";
-    return DeviceStatus::unsupported;
-  }
-  // The list replaces the old one: other entries, the receiver's clock among them, stay.
-  const auto ours = [this](const SyncEntry& e) {
-    return (options_.sync_out_hz != 0 && e.function == kSyncIntervalTransition &&
-            e.line == kSyncLineOut) ||
-           (options_.sync_in != SyncIn::leave && e.function == kSyncTriggerIndication &&
-            e.line == kSyncLineIn1);
-  };
-  SyncSettings requested;
-  for (const SyncEntry& e : has.items())
-    if (!ours(e)) requested.entries[requested.count++] = e;
-  const auto add = [&requested](const SyncEntry& e) {
-    if (requested.count == requested.entries.size()) return false;
-    requested.entries[requested.count++] = e;
-    return true;
-  };
-  bool room = true;
-  if (options_.sync_out_hz > 0) {
-    double actual = 0;
-    const std::uint16_t skip = sync_out_skip(kSyncOutBase, options_.sync_out_hz, &actual);
-    const auto width = static_cast<std::uint16_t>(
-        std::clamp(std::lround(options_.sync_out_width_ms * 10), 1L, 1000L));
-    room = add({kSyncIntervalTransition, kSyncLineOut, kSyncPositive, 0, 0, skip, width, 0});
-    stream->sync_out_hz = actual;
-  }
-  if (options_.sync_in == SyncIn::rising || options_.sync_in == SyncIn::falling)
-    room =
-        add({kSyncTriggerIndication, kSyncLineIn1,
-             options_.sync_in == SyncIn::rising ? kSyncPositive : kSyncNegative, 0, 0, 0, 0, 0}) &&
-        room;
-  if (!room) {
-    last_error_ = "its list of synchronisation settings is full; clear it with the maker's program";
-    return DeviceStatus::unsupported;
-  }
-  if (requested == has) return DeviceStatus::ok;
-  std::array<std::uint8_t, kSyncEntrySize * kMostSyncEntries> bytes{};
-  return write(MessageId::sync_settings,
-               std::span(bytes).first(write_sync_settings(requested, bytes)),
-               "its synchronisation settings");
-}
-
-// ---- both
-
 DeviceStatus Setup::set_baud(const Identity& identity) {
   if (options_.baud == 0 || options_.baud == line_.baud()) return DeviceStatus::ok;
   const auto code = baud_code(options_.baud, identity.generation);
   if (!code) {
-    last_error_ =
-        text("it has no %u baud; set ins.baud to 115200, 230400, 460800 or 921600", options_.baud);
+    last_error_ = format_text("it has no %u baud; set ins.baud to 115200, 230400, 460800 or 921600",
+                              options_.baud);
     return DeviceStatus::unsupported;
   }
   const std::array<std::uint8_t, 1> payload{*code};
@@ -408,7 +161,7 @@ DeviceStatus Setup::set_baud(const Identity& identity) {
   dialogue_.ask(MessageId::reset, {}, &reply_, Duration::milliseconds(100));
   const DeviceStatus status = probe(options_.baud, kAfterReset);
   if (status == DeviceStatus::timeout) {
-    last_error_ = text(
+    last_error_ = format_text(
         "it does not answer at %u baud after it was set to it; check that the converter can do "
         "that rate",
         options_.baud);
