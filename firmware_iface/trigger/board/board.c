@@ -1,21 +1,18 @@
 #include "firmware_iface/trigger/board/board.h"
 
+#include "firmware_iface/trigger/board/board_internal.h"
+
 enum {
   slots_a_poll = 64, /* left out at most in one call: a long pause is walked through in several */
-  start_lead_us = 1000,  /* from START to the first edge */
   arm_ahead_divisor = 4, /* armed at most a quarter of a second ahead: half a turn of a 32-bit
                             counter at 1 GHz is two */
   flag_first = 1,
   flag_late = 2
 };
 
-static uint64_t counts_of_us(const TriggerBoard* board, uint64_t us) {
-  return (us * board->description.counts_hz + 999999U) / 1000000U;
-}
-
 /* ---- messages ---- */
 
-static void put_status(TriggerBoard* board, uint64_t now, uint8_t* payload) {
+void board_put_status(TriggerBoard* board, uint64_t now, uint8_t* payload) {
   const TriggerDecoder* decoder = &board->decoder;
   TriggerStatus status = {0};
   status.boot_id = board->boot_id;
@@ -40,17 +37,10 @@ static void put_status(TriggerBoard* board, uint64_t now, uint8_t* payload) {
   trigger_put_status(&status, payload);
 }
 
-static void answer_status(TriggerBoard* board, uint64_t now, uint8_t sequence) {
+void board_answer_status(TriggerBoard* board, uint64_t now, uint8_t sequence) {
   uint8_t payload[trigger_status_payload_size];
-  put_status(board, now, payload);
+  board_put_status(board, now, payload);
   outbox_answer(&board->outbox, trigger_status, sequence, payload, sizeof payload);
-}
-
-static void answer_error(TriggerBoard* board, const TriggerFrame* frame, TriggerErrorCode code) {
-  const TriggerError error = {frame->type, (uint8_t)code};
-  uint8_t payload[trigger_error_payload_size];
-  trigger_put_error(&error, payload);
-  outbox_answer(&board->outbox, trigger_error, frame->sequence, payload, sizeof payload);
 }
 
 static void tell_edge(TriggerBoard* board, TriggerType type, uint32_t count, uint64_t at) {
@@ -62,7 +52,7 @@ static void tell_edge(TriggerBoard* board, TriggerType type, uint32_t count, uin
 
 /* ---- the pulse whose exposures are collected ---- */
 
-static void close_event(TriggerBoard* board) {
+void board_close_event(TriggerBoard* board) {
   uint8_t payload[trigger_event_payload_size];
   if (!board->event.open) return;
   board->event.open = false;
@@ -85,7 +75,7 @@ static void open_event(TriggerBoard* board, uint64_t count, uint8_t flags) {
     open->event.exposure[k].start_us = TRIGGER_NOT_SEEN;
     open->event.exposure[k].end_us = TRIGGER_NOT_SEEN;
   }
-  if (open->waiting == 0) close_event(board);
+  if (open->waiting == 0) board_close_event(board);
 }
 
 /* An end without its start belongs to an exposure that began before this pulse: no end of this one.
@@ -105,193 +95,14 @@ static void feedback_edge(TriggerBoard* board, unsigned input, bool rising, uint
   if (exposure->start_us == TRIGGER_NOT_SEEN) return;
   exposure->end_us = after_us;
   open->waiting = (uint8_t)(open->waiting & ~bit);
-  if (open->waiting == 0) close_event(board);
+  if (open->waiting == 0) board_close_event(board);
 }
 
-/* ---- what the host asks ---- */
-
-static void on_hello(TriggerBoard* board, const TriggerFrame* frame) {
-  const BoardDescription* description = &board->description;
-  if (frame->payload[0] != trigger_protocol_version) {
-    answer_error(board, frame, trigger_error_version);
-    return;
-  }
-  TriggerInfo info = {0};
-  info.version = trigger_protocol_version;
-  info.firmware_major = board_firmware_major;
-  info.firmware_minor = board_firmware_minor;
-  info.firmware_patch = board_firmware_patch;
-  info.boot_id = board->boot_id;
-  info.tick_hz = description->counts_hz;
-  info.lines = description->lines;
-  info.feedback_inputs = description->feedback_inputs;
-  info.has_pps = description->has_pps ? 1 : 0;
-  info.has_ins = description->has_ins ? 1 : 0;
-  memcpy(info.serial, description->serial, sizeof info.serial);
-  uint8_t payload[trigger_info_payload_size];
-  trigger_put_info(&info, payload);
-  outbox_answer(&board->outbox, trigger_info, frame->sequence, payload, sizeof payload);
-  tick_hold_rate(&board->ticks);
-}
-
-static bool input_exists(uint8_t edge, bool wired) {
-  return edge <= trigger_edge_falling && (edge == trigger_edge_none || wired);
-}
-
-/* 0: the board can do this, and *schedule is set for it; else a TriggerErrorCode. */
-static uint8_t refusal(const TriggerBoard* board, const TriggerConfig* config,
-                       PulseSchedule* schedule) {
-  const BoardDescription* description = &board->description;
-  const unsigned lines = (1U << description->lines) - 1U;
-  const unsigned inputs = (1U << description->feedback_inputs) - 1U;
-  if (config->lines == 0 || ((unsigned)(config->lines | config->active_low) & ~lines) != 0)
-    return trigger_error_line;
-  if (((unsigned)(config->feedback_inputs | config->feedback_active_low) & ~inputs) != 0)
-    return trigger_error_line;
-  if (!input_exists(config->pps_edge, description->has_pps) ||
-      !input_exists(config->ins_edge, description->has_ins))
-    return trigger_error_line;
-  if (config->rate_millihertz == 0 || config->rate_millihertz > description->max_millihertz)
-    return trigger_error_rate;
-  schedule_set(schedule, description->counts_hz, config->rate_millihertz, config->vary_us);
-  if (schedule_shortest(schedule) <
-      (uint64_t)description->counts_hz * 1000U / description->max_millihertz)
-    return trigger_error_rate;
-  if (config->pulse_us == 0 || config->pulse_us > board_max_pulse_us) return trigger_error_pulse;
-  if (counts_of_us(board, config->pulse_us) >= schedule_shortest(schedule))
-    return trigger_error_pulse;
-  return 0;
-}
-
-static void on_config(TriggerBoard* board, const TriggerFrame* frame, uint64_t now) {
-  TriggerConfig config = {0};
-  PulseSchedule schedule = board->schedule;
-  (void)trigger_get_config(frame->payload, frame->size, &config); /* its size was checked */
-  if (board->state != trigger_stopped) {
-    answer_error(board, frame, trigger_error_not_stopped);
-    return;
-  }
-  const uint8_t code = refusal(board, &config, &schedule);
-  if (code != 0) {
-    answer_error(board, frame, (TriggerErrorCode)code);
-    return;
-  }
-  close_event(board);
-  board->config = config;
-  board->schedule = schedule;
-  board->config_crc = trigger_crc32(frame->payload, frame->size);
-  answer_status(board, now, frame->sequence);
-}
-
-static void on_start(TriggerBoard* board, const TriggerFrame* frame, uint64_t now) {
-  if (board->config_crc == 0) {
-    answer_error(board, frame, trigger_error_not_configured);
-    return;
-  }
-  if (board->stop_asked) {
-    answer_error(board, frame, trigger_error_not_stopped);
-    return;
-  }
-  if (board->state == trigger_stopped) {
-    board->state = trigger_running;
-    board->left_out = 0;
-    board->first_pulse = true;
-    schedule_begin(&board->schedule, now + counts_of_us(board, start_lead_us));
-  }
-  answer_status(board, now, frame->sequence);
-}
-
-static void finish_stop(TriggerBoard* board, uint64_t now) {
+void board_finish_stop(TriggerBoard* board, uint64_t now) {
   board->stop_asked = false;
   board->state = trigger_stopped;
   board->left_out = 0;
-  answer_status(board, now, board->stop_sequence);
-}
-
-static void on_stop(TriggerBoard* board, const TriggerFrame* frame, uint64_t now) {
-  if (board->stop_asked) {
-    answer_error(board, frame, trigger_error_not_stopped);
-    return;
-  }
-  board->stop_sequence = frame->sequence;
-  board->stop_asked = board->armed;
-  if (!board->armed) finish_stop(board, now);
-}
-
-static void on_pause(TriggerBoard* board, const TriggerFrame* frame, uint64_t now) {
-  TriggerPause pause = {0};
-  (void)trigger_get_pause(frame->payload, frame->size, &pause);
-  if (board->state == trigger_stopped) {
-    answer_error(board, frame, trigger_error_not_running);
-    return;
-  }
-  if (board->state == trigger_paused) board->first_pulse = true; /* also when this PAUSE is none */
-  board->left_out = pause.pulses;
-  board->state = pause.pulses == 0 ? trigger_running : trigger_paused;
-  answer_status(board, now, frame->sequence);
-}
-
-static void on_ping(TriggerBoard* board, const TriggerFrame* frame, uint64_t count) {
-  TriggerPing ping = {0};
-  (void)trigger_get_ping(frame->payload, frame->size, &ping);
-  const TriggerPong pong = {ping.token, board->boot_id, tick_of(&board->ticks, count), 0};
-  uint8_t payload[trigger_pong_payload_size];
-  trigger_put_pong(&pong, payload);
-  outbox_answer(&board->outbox, trigger_pong, frame->sequence, payload, sizeof payload);
-}
-
-/* Payload size of what a host may send; −1: no such message. */
-static int size_of(uint8_t type) {
-  switch (type) {
-    case trigger_hello:
-      return 1;
-    case trigger_config:
-      return trigger_config_payload_size;
-    case trigger_start:
-    case trigger_stop:
-      return 0;
-    case trigger_pause:
-      return trigger_pause_payload_size;
-    case trigger_ping:
-      return trigger_ping_payload_size;
-    default:
-      return -1;
-  }
-}
-
-void board_receive(TriggerBoard* board, uint64_t now, uint64_t count, uint8_t byte) {
-  TriggerFrame frame;
-  if (trigger_decode(&board->decoder, byte, &frame) != trigger_frame_ready) return;
-  const int size = size_of(frame.type);
-  if (size < 0) {
-    answer_error(board, &frame, trigger_error_unknown_type);
-    return;
-  }
-  if (frame.size != size) {
-    ++board->wrong_sizes;
-    answer_error(board, &frame, trigger_error_wrong_size);
-    return;
-  }
-  switch (frame.type) {
-    case trigger_hello:
-      on_hello(board, &frame);
-      break;
-    case trigger_config:
-      on_config(board, &frame, now);
-      break;
-    case trigger_start:
-      on_start(board, &frame, now);
-      break;
-    case trigger_stop:
-      on_stop(board, &frame, now);
-      break;
-    case trigger_pause:
-      on_pause(board, &frame, now);
-      break;
-    default:
-      on_ping(board, &frame, count);
-      break;
-  }
+  board_answer_status(board, now, board->stop_sequence);
 }
 
 /* ---- what the hardware stamps ---- */
@@ -320,10 +131,10 @@ void board_pulse_made(TriggerBoard* board, uint64_t now, uint64_t count, bool la
   board->armed = false;
   board->armed_late = false;
   board->first_pulse = false;
-  close_event(board);
+  board_close_event(board);
   open_event(board, count, (uint8_t)flags);
   schedule_advance(&board->schedule);
-  if (board->stop_asked) finish_stop(board, now);
+  if (board->stop_asked) board_finish_stop(board, now);
 }
 
 /* ---- what happens by itself ---- */
@@ -350,26 +161,26 @@ static bool slot_is_over(const TriggerBoard* board, uint64_t now) {
 void board_poll(TriggerBoard* board, uint64_t now) {
   tick_advance(&board->ticks, now);
   for (unsigned n = 0; n < slots_a_poll && slot_is_over(board, now); ++n) next_slot(board);
-  if (board->event.open && now >= board->event.close_at) close_event(board);
+  if (board->event.open && now >= board->event.close_at) board_close_event(board);
   const uint8_t locked = board->ticks.locked ? 1 : 0;
   if (now < board->status_due && board->state == board->told_state && locked == board->told_locked)
     return;
   uint8_t payload[trigger_status_payload_size];
-  put_status(board, now, payload);
+  board_put_status(board, now, payload);
   outbox_tell(&board->outbox, trigger_status, payload, sizeof payload);
   board->status_due = now + board->description.counts_hz;
 }
 
 bool board_take_pulse(TriggerBoard* board, uint64_t now, BoardPulse* pulse) {
   const PulseSchedule* schedule = &board->schedule;
-  const uint64_t earliest = now + counts_of_us(board, board_lead_us);
+  const uint64_t earliest = now + board_counts_of_us(board, board_lead_us);
   if (board->state != trigger_running || board->armed || slot_is_over(board, now)) return false;
   if (schedule->due > now + board->description.counts_hz / arm_ahead_divisor) return false;
   const bool late = schedule->due < earliest;
   board->armed = true;
   board->armed_late = board->armed_late || late;
   pulse->count = late ? earliest : schedule->due;
-  pulse->width = counts_of_us(board, board->config.pulse_us);
+  pulse->width = board_counts_of_us(board, board->config.pulse_us);
   pulse->number = schedule->next;
   pulse->lines = board->config.lines;
   pulse->active_low = board->config.active_low;
@@ -383,7 +194,7 @@ bool board_wants_disarm(const TriggerBoard* board) { return board->armed && boar
 void board_pulse_disarmed(TriggerBoard* board, uint64_t now) {
   board->armed = false;
   board->armed_late = false;
-  if (board->stop_asked) finish_stop(board, now);
+  if (board->stop_asked) board_finish_stop(board, now);
 }
 
 size_t board_send(TriggerBoard* board, uint64_t departure, uint8_t* out) {
