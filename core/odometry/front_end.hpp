@@ -10,8 +10,8 @@
 #include "core/odometry/blob_matcher.hpp"
 #include "core/odometry/map.hpp"
 #include "core/odometry/options.hpp"
-#include "core/types/frame_effort.hpp"
 #include "core/odometry/undistorted_camera.hpp"
+#include "core/types/frame_effort.hpp"
 #include "core/types/parallel.hpp"
 #include "core/types/rig_frame.hpp"
 
@@ -108,6 +108,9 @@ class FrontEnd {
   [[nodiscard]] float detect_ms() const noexcept { return detect_ms_; }
 
  private:
+  static constexpr int kSmallestCell =
+      12;  // px: a window's side; nearer corners share their pixels
+
   struct Followed {
     bool found = false;
     Eigen::Vector2f raw{}, ideal{};
