@@ -83,6 +83,9 @@ class RigSolver {
     std::uint16_t frame;
     std::uint16_t observation;
   };
+  [[nodiscard]] static Vec2 pixel_of(const LoggedObservation& s, int k) noexcept {
+    return s.raw[static_cast<std::size_t>(k)].cast<double>();
+  }
   [[nodiscard]] static BundleCapacities capacities(const CalibrationOptions& options, int cameras,
                                                    std::size_t features) noexcept;
   [[nodiscard]] bool choose_candidate(const RigCalibration& rig) noexcept;

@@ -1,0 +1,108 @@
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "core/calibration/rig_solver.hpp"
+
+/// What an adjustment found, as a solution.
+namespace vergence::calibration {
+namespace {
+
+constexpr double kCertainChange =
+    2;  // of the monitor's threshold: the frames have been used to find what they are held against
+
+/// A lens with the sigmas of what was estimated; of the rest it keeps its own.
+Intrinsics with_sigmas(Intrinsics lens, const std::array<double, kIntrinsicsSize>& sigma) noexcept {
+  for (std::size_t i = 0; i < sigma.size(); ++i)
+    if (sigma[i] > 0) (i < 4 ? lens.sigma[i] : lens.distortion_sigma[i - 4]) = sigma[i];
+  return lens;
+}
+
+}  // namespace
+
+void RigSolver::describe(RigSolution* s) const noexcept {
+  for (std::size_t i = 1; i < poses_.size(); ++i)
+    s->travelled_m += (poses_[i].centre() - poses_[i - 1].centre()).norm();
+  std::uint32_t last = ~0U;
+  for (const BundleObservation& o : observations_) {
+    if (o.point == last) continue;
+    last = o.point;
+    ++s->tracks;
+    if ((poses_[o.pose] * points_[o.point]).z() < options_.near_baselines * s->rig.baseline)
+      ++s->near;
+  }
+  s->observations = static_cast<int>(observations_.size());
+}
+
+void RigSolver::write_result(const BundleResult& r, RigSolution* s) const noexcept {
+  // What uncertain intrinsics do to the scale of the path (METHOD's numbers, §3.3 and §5): half of
+  // what the focal lengths are off, and 0.31 % for each mrad that the principal points are off.
+  constexpr double kScaleByFocal = 0.5, kScaleByRadian = 3.1;
+  RigCalibration& rig = s->rig;
+  for (int k = 0; k < count_; ++k) {
+    const auto c = static_cast<std::size_t>(k);
+    const Intrinsics& lens = cameras_[c].intrinsics();
+    rig.intrinsics[c] = with_sigmas(lens, r.intrinsics_sigma[c]);
+    if (k == 0) continue;
+    rig.T_camera_left[c] = {normalised(T_camera_left_[c].R), T_camera_left_[c].t};
+    rig.covariance_wide[c] = r.covariance_wide[c];
+    for (int i = 0; i < 6; ++i) {
+      rig.sigma_noise[c][static_cast<std::size_t>(i)] =
+          std::sqrt(std::max(0.0, r.covariance_noise[c](i, i)));
+      rig.sigma_wide[c][static_cast<std::size_t>(i)] =
+          std::sqrt(std::max(0.0, r.covariance_wide[c](i, i)));
+    }
+  }
+  rig.covariance = r.covariance;
+  rig.inflation = r.inflation;
+  rig.frames = s->frames;
+  rig.found = log_.frame(log_.size() - 1).stamp;
+  rig.reprojection_px = r.rms_px;
+  const double focal = options_.focal_sigma_percent * 0.01,
+               centre = options_.principal_point_sigma_px / rig.intrinsics[0].fx;
+  double noise = 0;
+  if (r.has_pose_covariance && s->travelled_m > 0) {
+    const Vec3 way = poses_.back().t.normalized();
+    const double white = r.covariance_white[1](1, 1), clustered = r.covariance_noise[1](1, 1);
+    const double inflation = white > 0 ? std::max(1.0, clustered / white) : 1.0;
+    noise = std::sqrt(std::max(0.0, way.dot(r.pose_covariance.bottomRightCorner<3, 3>() * way)) *
+                      inflation) /
+            s->travelled_m;
+  }
+  rig.scale_sigma = std::hypot(noise, std::hypot(kScaleByFocal * focal, kScaleByRadian * centre));
+}
+
+/// What the monitor would have said during the drive, had it known the result: a camera out of
+/// step, or two rigs in one solve.
+void RigSolver::watch_frames(RigSolution* s) noexcept {
+  const Intrinsics &a = cameras_[0].intrinsics(), &b = cameras_[1].intrinsics();
+  const Pinhole left{a.fx, a.fy, a.cx, a.cy}, right{b.fx, b.fy, b.cx, b.cy};
+  if (!monitor_.set_reference(s->rig.T_camera_left[1], left, right, s->rig.covariance_wide[1]))
+    return;
+  monitor_.expect_scatter(expected_scatter_px_);
+  track_builder_.reset();
+  for (std::size_t i = 0; i < poses_.size(); ++i) {
+    const LoggedFrame& f = log_.frame(logged_[i]);
+    stereo_.clear();
+    for (const LoggedObservation& observation : f.observations) {
+      Vec3 l, r;
+      if (!observation.by(0) || !observation.by(1) ||
+          !cameras_[0].unproject(pixel_of(observation, 0), &l) ||
+          !cameras_[1].unproject(pixel_of(observation, 1), &r))
+        continue;
+      (void)stereo_.push(
+          {Vec2(left.fx * l.x() / l.z() + left.cx, left.fy * l.y() / l.z() + left.cy),
+           Vec2(right.fx * r.x() / r.z() + right.cx, right.fy * r.y() / r.z() + right.cy),
+           static_cast<double>(observation.sigma), observation.track});
+    }
+    const Transform step = i == 0 ? Transform{} : poses_[i] * poses_[i - 1].inverse();
+    const MonitorVerdict v =
+        monitor_.look(track_builder_.next(f.stamp, f.number, stereo_.span(), step));
+    s->lag_frames = v.lag_frames;
+    if (v.kind == MonitorVerdict::Kind::out_of_step) s->out_of_step = true;
+    if (v.kind == MonitorVerdict::Kind::knock && v.statistic > kCertainChange * v.threshold)
+      s->changed_at = v.onset_frame;
+  }
+}
+
+}  // namespace vergence::calibration
