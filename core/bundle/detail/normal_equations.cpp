@@ -1,5 +1,5 @@
-// One pass over the observations: residuals, normal equations, eliminated points; and the way back.
-// Built once per SIMD target.
+// One pass over the observations: residuals, normal equations, eliminated points. Built once per
+// SIMD target.
 //
 // Every lane is a point. With F = ∂x/∂X_i (2×3, X_i the point in the base camera) all derivatives
 // of METHOD §1 are F times something that does not depend on the camera, in the parametrisation of
@@ -23,100 +23,15 @@
 // clang-format off
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
-#include <hwy/contrib/math/math-inl.h>
+#include "core/bundle/detail/kernel_lanes-inl.hpp"
 // clang-format on
 
 HWY_BEFORE_NAMESPACE();
 namespace vergence::detail {
 namespace HWY_NAMESPACE {
 
-namespace hn = hwy::HWY_NAMESPACE;
-using D = hn::CappedTag<double, kBatch>;
-using V = hn::Vec<D>;
-
 constexpr double kPivotTolerance =
     1e-13;  // of a point's 3×3 block: below, that direction is not seen at all and stays
-constexpr double kDepthShare = 0.8;  // of its least depth that a point moves in one step at most
-
-HWY_INLINE V load(const double* p) { return hn::Load(D(), p); }
-HWY_INLINE V set(double v) { return hn::Set(D(), v); }
-HWY_INLINE void store(V v, double* p) { hn::Store(v, D(), p); }
-HWY_INLINE void add_to(V v, double* p) { store(hn::Add(load(p), v), p); }
-HWY_INLINE double total(V v) { return hn::GetLane(hn::SumOfLanes(D(), v)); }
-
-/// R X + t, row by row.
-HWY_INLINE void transform(const double* R, const double* t, const V X[3], V out[3]) {
-  for (int r = 0; r < 3; ++r)
-    out[r] = hn::MulAdd(
-        set(R[3 * r]), X[0],
-        hn::MulAdd(set(R[3 * r + 1]), X[1], hn::MulAdd(set(R[3 * r + 2]), X[2], set(t[r]))));
-}
-
-/// What a slot says of its points. Made whole: its default constructor, which nobody writes, would
-/// be compiled for the machine's least instruction set, and a vector's cannot be inlined there.
-struct Residual {
-  V x, y;    // observed less predicted, px
-  V weight;  // 1/σ², 0 where there is no observation
-  V depth;   // along the camera's axis; kFar where there is no observation
-  V iz, xn, yn;
-};
-
-/// Pinhole without distortion. Lanes without an observation may stand anywhere: what they compute
-/// is finite and weighs nothing.
-HWY_INLINE Residual project(const KernelCamera& camera, const Slot& slot, std::size_t lane,
-                            const V Xi[3], V* behind) {
-  const D d;
-  V Xc[3] = {Xi[0], Xi[1], Xi[2]};
-  if (!camera.identity) transform(camera.R, camera.t, Xi, Xc);
-  const V inverse_sigma = load(slot.inverse_sigma + lane);
-  const V one = set(1.0);
-  const auto in_front = hn::Ge(Xc[2], set(kMinDepth));
-  const auto seen = hn::Gt(inverse_sigma, hn::Zero(d));
-  *behind = hn::Add(*behind, hn::IfThenElseZero(hn::AndNot(in_front, seen), one));
-  const V iz = hn::Div(one, hn::IfThenElse(in_front, Xc[2], one));
-  const V x = hn::IfThenElseZero(in_front, Xc[0]), y = hn::IfThenElseZero(in_front, Xc[1]);
-  const V xn = hn::Mul(x, iz), yn = hn::Mul(y, iz);
-  return {hn::Sub(load(slot.x + lane), hn::MulAdd(set(camera.fx), xn, set(camera.cx))),
-          hn::Sub(load(slot.y + lane), hn::MulAdd(set(camera.fy), yn, set(camera.cy))),
-          hn::Mul(inverse_sigma, inverse_sigma),
-          hn::IfThenElse(seen, Xc[2], set(kFar)),
-          iz,
-          xn,
-          yn};
-}
-
-/// The same from what the camera model itself has computed.
-HWY_INLINE Residual from_jets(const double* jet, const Slot& slot, std::size_t lane) {
-  const V inverse_sigma = load(slot.inverse_sigma + lane);
-  const V zero = hn::Zero(D());
-  return {load(jet + 6 * kBatch + lane),
-          load(jet + 7 * kBatch + lane),
-          hn::Mul(inverse_sigma, inverse_sigma),
-          load(jet + kJetDepth * kBatch + lane),
-          zero,
-          zero,
-          zero};
-}
-
-/// Twice the loss of s = |ε|²/σ², and its derivative by s in *weight.
-HWY_INLINE V loss(BundleLoss kind, double threshold2, V s, V* weight) {
-  const D d;
-  const V one = set(1.0);
-  if (kind == BundleLoss::none) {
-    *weight = one;
-    return s;
-  }
-  const V c2 = set(threshold2);
-  if (kind == BundleLoss::huber) {  // 2 c √s − c² beyond c
-    const auto linear = hn::Gt(s, c2);
-    const V root = hn::Sqrt(hn::Mul(c2, hn::IfThenElse(linear, s, c2)));
-    *weight = hn::IfThenElse(linear, hn::Div(c2, root), one);
-    return hn::IfThenElse(linear, hn::Sub(hn::Add(root, root), c2), s);
-  }
-  const V u = hn::Add(one, hn::Mul(s, set(1.0 / threshold2)));
-  *weight = hn::Div(one, u);
-  return hn::Mul(c2, hn::Log(d, u));
-}
 
 /// sums += Bᵀ (Q, q) B with B = [I −[X]×]: 21 of the symmetric 6×6 (tt 6, φt 9 row-major, φφ 6),
 /// then the gradient.
@@ -438,109 +353,11 @@ HWY_INLINE void linearise_lanes(KernelJob& job, std::size_t index, std::size_t l
   job.behind = job.behind || total(behind) > 0;
 }
 
-template <bool kJets>
-HWY_INLINE void evaluate_lanes(KernelJob& job, std::size_t index, std::size_t lane) {
-  const D d;
-  const Batch& batch = job.batches[index];
-  V X[3];
-  for (int r = 0; r < 3; ++r)
-    X[r] = load(job.points + (index * 3 + static_cast<std::size_t>(r)) * kBatch + lane);
-  const V zero = hn::Zero(d);
-  V cost = zero, squared = zero, weighted = zero, behind = zero;
-  std::size_t jet_index = 0;
-  for (std::uint32_t at = batch.block_begin; at < batch.block_end; ++at) {
-    const PoseBlock& block = job.blocks[at];
-    V Xi[3];
-    transform(job.poses[block.pose].R, job.poses[block.pose].t, X, Xi);
-    std::size_t slot = block.slot;
-    for (unsigned mask = block.cameras; mask != 0; mask &= mask - 1, ++slot) {
-      const double* jet = kJets ? job.jets + jet_index++ * kJetRows * kBatch : nullptr;
-      const Residual r =
-          kJets ? from_jets(jet, job.slots[slot], lane)
-                : project(job.cameras[std::countr_zero(mask)], job.slots[slot], lane, Xi, &behind);
-      const V r2 = hn::MulAdd(r.x, r.x, hn::Mul(r.y, r.y));
-      const V s = hn::Mul(r.weight, r2);
-      V factor;
-      cost = hn::Add(cost, loss(job.loss, job.threshold2, s, &factor));
-      weighted = hn::MulAdd(s, factor, weighted);
-      squared = hn::Add(squared, hn::IfThenElseZero(hn::Gt(r.weight, zero), r2));
-      if (job.squared != nullptr) {
-        const hn::Rebind<float, D> df;
-        hn::Store(hn::DemoteTo(df, s), df, job.squared + slot * kBatch + lane);
-      }
-    }
-  }
-  job.cost += 0.5 * total(cost);
-  job.weighted += total(weighted);
-  job.squared_px += total(squared);
-  job.behind = job.behind || total(behind) > 0;
-}
-
-HWY_INLINE void back_substitute_lanes(KernelJob& job, std::size_t index, std::size_t lane,
-                                      const double* delta) {
-  const Batch& batch = job.batches[index];
-  const double* factor = job.factors + index * kFactorRows * kBatch + lane;
-  V X[3], v[3];
-  for (std::size_t r = 0; r < 3; ++r) X[r] = load(job.points + (index * 3 + r) * kBatch + lane);
-  for (int r = 0; r < 3; ++r) v[r] = load(factor + (6 + r) * kBatch);
-  for (std::uint32_t at = batch.block_begin; at < batch.block_end; ++at) {
-    const KernelPose& pose = job.poses[job.blocks[at].pose];
-    if (pose.block < 0) continue;
-    const double* step = delta + pose.block * kBlock;  // τ, φ
-    V Xi[3];
-    transform(pose.R, pose.t, X, Xi);
-    const double* y = job.y + static_cast<std::size_t>(at) * kYSize + lane;
-#pragma GCC unroll 3
-    for (int r = 0; r < 3; ++r) {  // how far the step moves X_i: τ + φ × X_i
-      const int a = (r + 1) % 3, b = (r + 2) % 3;
-      const V moved =
-          hn::MulAdd(set(step[3 + a]), Xi[b], hn::NegMulAdd(set(step[3 + b]), Xi[a], set(step[r])));
-#pragma GCC unroll 3
-      for (int c = 0; c < 3; ++c) v[c] = hn::NegMulAdd(load(y + (3 * r + c) * kBatch), moved, v[c]);
-    }
-  }
-  const double* rows =
-      job.y_shared + index * static_cast<std::size_t>(job.shared.blocks) * kYSize + lane;
-  const double* shared_step = delta + job.free_poses * kBlock;
-  for (int i = 0; i < job.shared.size; ++i)
-    for (int c = 0; c < 3; ++c)
-      v[c] = hn::NegMulAdd(load(rows + (3 * i + c) * kBatch), set(shared_step[i]), v[c]);
-  const V m00 = load(factor), m10 = load(factor + kBatch), m11 = load(factor + 2 * kBatch),
-          m20 = load(factor + 3 * kBatch), m21 = load(factor + 4 * kBatch),
-          m22 = load(factor + 5 * kBatch);
-  V step[3] = {hn::MulAdd(m00, v[0], hn::MulAdd(m10, v[1], hn::Mul(m20, v[2]))),
-               hn::MulAdd(m11, v[1], hn::Mul(m21, v[2])), hn::Mul(m22, v[2])};
-  const V length2 =
-      hn::MulAdd(step[0], step[0], hn::MulAdd(step[1], step[1], hn::Mul(step[2], step[2])));
-  const V limit = hn::Mul(set(kDepthShare), load(factor + 9 * kBatch));
-  const V limit2 = hn::Mul(limit, limit);
-  const auto too_far = hn::Gt(length2, limit2);
-  const V scale = hn::IfThenElse(
-      too_far, hn::Sqrt(hn::Div(limit2, hn::IfThenElse(too_far, length2, set(1.0)))), set(1.0));
-  for (std::size_t r = 0; r < 3; ++r)
-    store(hn::MulAdd(scale, step[r], X[r]), job.candidate + (index * 3 + r) * kBatch + lane);
-  job.update += total(length2);
-  job.norm += total(hn::MulAdd(X[0], X[0], hn::MulAdd(X[1], X[1], hn::Mul(X[2], X[2]))));
-}
-
 void linearise_one(KernelJob& job, std::size_t first, std::size_t last) {
   for (std::size_t i = first; i < last; ++i)
     for (std::size_t lane = 0; lane < kBatch; lane += hn::Lanes(D()))
       job.jets != nullptr ? linearise_lanes<true>(job, i, lane)
                           : linearise_lanes<false>(job, i, lane);
-}
-
-void evaluate_one(KernelJob& job, std::size_t first, std::size_t last) {
-  for (std::size_t i = first; i < last; ++i)
-    for (std::size_t lane = 0; lane < kBatch; lane += hn::Lanes(D()))
-      job.jets != nullptr ? evaluate_lanes<true>(job, i, lane)
-                          : evaluate_lanes<false>(job, i, lane);
-}
-
-void back_substitute_one(KernelJob& job, std::size_t first, std::size_t last, const double* delta) {
-  for (std::size_t i = first; i < last; ++i)
-    for (std::size_t lane = 0; lane < kBatch; lane += hn::Lanes(D()))
-      back_substitute_lanes(job, i, lane, delta);
 }
 
 }  // namespace HWY_NAMESPACE
@@ -551,18 +368,9 @@ HWY_AFTER_NAMESPACE();
 namespace vergence::detail {
 
 HWY_EXPORT(linearise_one);
-HWY_EXPORT(evaluate_one);
-HWY_EXPORT(back_substitute_one);
 
 void linearise(KernelJob& job, std::size_t first, std::size_t last) noexcept {
   HWY_DYNAMIC_DISPATCH(linearise_one)(job, first, last);
-}
-void evaluate(KernelJob& job, std::size_t first, std::size_t last) noexcept {
-  HWY_DYNAMIC_DISPATCH(evaluate_one)(job, first, last);
-}
-void back_substitute(KernelJob& job, std::size_t first, std::size_t last,
-                     const double* delta) noexcept {
-  HWY_DYNAMIC_DISPATCH(back_substitute_one)(job, first, last, delta);
 }
 
 }  // namespace vergence::detail
