@@ -35,6 +35,12 @@ struct Recorder::Files {
     if (with_ins) all.push_back(&ins.emplace(folder / "ins.csv", kMinutes));
     told.resize(all.size());
   }
+  /// The first line of a table; empty: the file has none.
+  [[nodiscard]] std::string head(const LineFile* file) const {
+    if (file == &poses) return std::string(kPosesHeader) + "\n";
+    if (file == &calibrations) return std::string(kCalibrationsHeader) + "\n";
+    return ins && file == &*ins ? std::string(kInsHeader) + "\n" : "";
+  }
   LineFile trajectory, reference, poses, calibrations, events;
   std::optional<LineFile> ins{};
   std::vector<LineFile*> all;
@@ -113,10 +119,10 @@ Recorder::Recorder(const std::filesystem::path& folder, const Options& options)
   memory_ = totals_->trajectory.capacity() * sizeof(StampedPose) +
             totals_->reference.capacity() * sizeof(StampedPose) +
             totals_->statuses.capacity() * sizeof(PoseStatus);
-  for (const LineFile* file : files_->all) memory_ += file->pending();
-  files_->poses.append(std::string(kPosesHeader) + "\n");
-  files_->calibrations.append(std::string(kCalibrationsHeader) + "\n");
-  if (files_->ins) files_->ins->append(std::string(kInsHeader) + "\n");
+  for (LineFile* file : files_->all) {
+    memory_ += file->pending();
+    file->append(files_->head(file));
+  }
   thread_ = std::thread([this] { work(); });
 }
 
@@ -163,6 +169,7 @@ void Recorder::work() {
     const WakeEvent::Ticket seen = filled_.ticket();
     const bool stopping = stop_.load(
         std::memory_order_acquire);  // before the ring: what was posted before is still found
+    if (reopen_.exchange(false, std::memory_order_acquire)) reopen_files();
     if (take()) {
       if (Clock::now() - flushed < kFlushAtLeast) continue;
     } else if (stopping) {
@@ -390,6 +397,24 @@ void Recorder::flush() {
   }
   note_disk(pretended_ || std::any_of(files.begin(), files.end(),
                                       [](const LineFile* f) { return f->fault() != 0; }));
+}
+
+void Recorder::reopen() noexcept {
+  reopen_.store(true, std::memory_order_release);
+  filled_.signal();
+}
+
+void Recorder::reopen_files() {
+  for (LineFile* file : files_->all) {
+    bool fresh = false;
+    if (!file->reopen(&fresh)) complain(*file);
+    if (fresh) file->append(files_->head(file));
+  }
+  EventRecord event;
+  event.stamp = newest_;
+  event.kind = "files_reopened";
+  event.set_sentence("the session's files were opened again by their names, as SIGHUP asked for");
+  write(event);
 }
 
 void Recorder::pretend(Stamp stamp) {

@@ -202,6 +202,10 @@ void SessionRunner::watch(Progress* progress) {
     if (facts_.on_request && signals_.take_calibration_request())
       calibration_asked_.store(true, std::memory_order_relaxed);
     lock.unlock();
+    if (signals_.take_reopen_request()) {
+      recorder_->reopen();
+      if (recording_) recording_->roll();
+    }
     threads_.look(progress);
     journal_.show(progress, facts_.frames);
     say_recording_errors(progress);
