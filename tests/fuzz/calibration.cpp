@@ -1,10 +1,12 @@
 /// Any bytes as a calibration: the project's own, Kalibr's, one of ROS or of OpenCV. The byte 0x1e
 /// ends the first of two files. Entry point of libFuzzer.
-#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <cstdlib>
 #include <string_view>
+#include <vector>
+
+#include <yaml-cpp/yaml.h>  // a YamlFile is copied here
 
 #include "app/foreign_calibration/foreign_formats.hpp"
 #include "app/runtime/errors.hpp"

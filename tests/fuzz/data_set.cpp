@@ -23,8 +23,8 @@ using namespace vergence;
 using namespace vergence::app;
 
 /// 96 × 72 grey pixels, none of which is ever decoded here: the head is what readers look at.
-constexpr std::string_view kPng(
-    "\x89PNG\r\n\x1a\n\0\0\0\rIHDR\0\0\0\x60\0\0\0\x48\x08\0\0\0\0", 29);
+constexpr std::string_view kPng("\x89PNG\r\n\x1a\n\0\0\0\rIHDR\0\0\0\x60\0\0\0\x48\x08\0\0\0\0",
+                                29);
 
 struct Layout {
   SequenceFormat format;

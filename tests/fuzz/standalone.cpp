@@ -76,8 +76,8 @@ int main(int argc, char** argv) {
   const auto any = [&] { return corpus[random.below(static_cast<std::uint32_t>(corpus.size()))]; };
   std::uint64_t inputs = corpus.size();
   for (auto begun = Clock::now(); begun < until; ++inputs) {
-    const Bytes input =
-        vergence::test::mutated(random.below(8) == 0 ? crossed(any(), any(), &random) : any(), &random);
+    const Bytes input = vergence::test::mutated(
+        random.below(8) == 0 ? crossed(any(), any(), &random) : any(), &random);
     keep(last, input);
     (void)LLVMFuzzerTestOneInput(input.data(), input.size());
     const auto now = Clock::now();
