@@ -44,6 +44,19 @@ std::string shown(const std::string& scalar) {
   return scalar.size() <= kShown ? scalar : scalar.substr(0, kShown) + "…";
 }
 
+/// Characters that no YAML may have, and with which the library's scanner can go on for ever.
+void refuse_control_characters(std::string_view text, const std::string& name) {
+  const auto bad = std::find_if(text.begin(), text.end(), [](char c) {
+    return (static_cast<unsigned char>(c) < 0x20 && c != '\t' && c != '\n' && c != '\r') ||
+           c == 0x7f;
+  });
+  if (bad == text.end()) return;
+  throw InputError(fmt::format(
+      "{}:{}: is not YAML: byte {} is a control character (0x{:02x}); is it text in UTF-8?", name,
+      1 + std::count(text.begin(), bad, '\n'), bad - text.begin(),
+      static_cast<unsigned>(static_cast<unsigned char>(*bad))));
+}
+
 template <class Number>
 bool parse_whole(const std::string& text, Number* value) {
   const char* end = text.data() + text.size();
@@ -60,6 +73,7 @@ YamlFile YamlFile::read(const std::filesystem::path& path) {
 YamlFile YamlFile::parse(std::string_view text, std::string name) {
   YamlFile file;
   file.name_ = std::move(name);
+  refuse_control_characters(text, file.name_);
   try {
     const auto documents = YAML::LoadAll(std::string(text));
     if (documents.size() > 1)
