@@ -156,7 +156,8 @@ struct RealtimeSettings {
   int priority = 0;        // SCHED_FIFO of the most urgent threads; 0: none
   std::string affinity{};  // processors of all but the solver, `0-1,3`; empty: any
   std::string solver_affinity{};
-  int lock_memory = 0;  // 1: mlockall
+  int lock_memory = 0;         // 1: mlockall
+  double frame_budget_ms = 0;  // of a live drive; 0: its frame interval
 };
 
 inline constexpr std::size_t kMostFaults = 16;

@@ -743,6 +743,9 @@ Group realtime() {
       .choice("lock_memory", &R::lock_memory, {"off", "on"},
               "`on`: memory is locked before the first frame (mlockall), so that none of it is "
               "ever fetched from a disk.")
+      .number("frame_budget_ms", &R::frame_budget_ms, 0, 10000, "ms",
+              "What the estimator may take for a frame of a live drive before it leaves out work "
+              "that the pose does not wait for. 0: the frame interval.")
       .done();
 }
 

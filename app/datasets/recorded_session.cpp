@@ -60,6 +60,11 @@ std::optional<FrameRecord> read_frame(std::span<const std::uint8_t> bytes) {
   (void)in.get<std::int32_t>();
   (void)in.get<double>();
   (void)in.get<float>();
+  FrameEffort& effort = f.sample.effort;
+  effort.points_percent = in.get<std::uint8_t>();
+  effort.window_keyframes = in.get<std::uint8_t>();
+  effort.window_steps = in.get<std::uint8_t>();
+  if (effort.points_percent < 1 || effort.points_percent > 100) return std::nullopt;
   if (!check(bytes, &in) || f.cameras < 2 || f.cameras > kMaxCameras) return std::nullopt;
   return f;
 }

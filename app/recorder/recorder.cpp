@@ -185,6 +185,16 @@ void Recorder::work() {
   }
 }
 
+void WorkDropped::add(const FrameEffort& effort) noexcept {
+  if (effort.whole()) return;
+  ++frames;
+  const bool window = effort.window_keyframes > 0 && effort.window_steps > 0;
+  points += effort.points_percent < 100 ? 1 : 0;
+  keyframes += window && effort.window_keyframes != FrameEffort::kAll ? 1 : 0;
+  steps += window && effort.window_steps != FrameEffort::kAll ? 1 : 0;
+  windows += window ? 0 : 1;
+}
+
 /// The oldest of both rings, as far as there are any. False: there were none.
 bool Recorder::take() {
   Record record;
@@ -216,6 +226,7 @@ void Recorder::write(const PoseRecord& p) {
   if (p.state != State::stereo_odometry && p.state != State::lost)
     totals_->calibrating.add(static_cast<double>(p.estimate_ms));
   totals_->decode.add(static_cast<double>(p.decode_ms));
+  totals_->work_dropped.add(p.effort);
   for (std::size_t i = 0; i < p.stage_ms.size(); ++i)
     totals_->stages[i].add(static_cast<double>(p.stage_ms[i]));
 

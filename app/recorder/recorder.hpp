@@ -62,6 +62,13 @@ struct Contradiction {
   double depth_percent = 0;  // by which its depths were off
 };
 
+/// Frames whose time was over before their work was done (docs/realtime.md), and what was left out.
+struct WorkDropped {
+  std::uint64_t frames = 0, points = 0, keyframes = 0, steps = 0, windows = 0;
+
+  void add(const FrameEffort& effort) noexcept;
+};
+
 /// What a session has come to: for summary.json.
 struct SessionTotals {
   std::uint64_t read = 0, ok = 0, degraded = 0, lost = 0;  // frames
@@ -82,6 +89,7 @@ struct SessionTotals {
   std::uint64_t dropped_records = 0;   // the ring was full (live only)
   std::uint64_t dropped_readings = 0;  // theirs was
   std::uint64_t lost_lines = 0;        // the disk took no more
+  WorkDropped work_dropped{};
   std::size_t ring_high_water = 0;
   std::vector<std::string> faults;  // a sentence for each file that is not whole
 };

@@ -76,6 +76,7 @@ PoseRecord PoseRecord::of(const PoseSample& sample, float decode_ms,
   r.reprojection_px = sample.reprojection_px;
   r.stage_ms = sample.stage_ms;
   r.estimate_ms = sample.estimate_ms;
+  r.effort = sample.effort;
   r.decode_ms = decode_ms;
   return r;
 }

@@ -52,6 +52,7 @@ struct PoseRecord {
   double reprojection_px = 0;
   std::array<float, kStages> stage_ms{};
   float estimate_ms = 0;
+  FrameEffort effort{};
   float decode_ms = 0;
 
   [[nodiscard]] static PoseRecord of(const PoseSample& sample, float decode_ms,

@@ -264,6 +264,13 @@ Json summary_json(const SessionTotals& totals, const SummaryInput& input) {
   memory["allocations_by_thread"] = counters_json(input.allocations.ours);
   memory["allocations_by_library_thread"] = counters_json(input.allocations.libraries);
   json["memory"] = memory;
+  const WorkDropped& work = totals.work_dropped;
+  json["work_dropped"] = {{"budget_ms", ms(input.frame_budget.to_seconds() * 1e3)},
+                          {"frames", work.frames},
+                          {"points", work.points},
+                          {"keyframes", work.keyframes},
+                          {"steps", work.steps},
+                          {"windows", work.windows}};
   json["drops"] = {
       {"frames", input.skipped},           {"estimator", input.dropped_by_estimator},
       {"records", totals.dropped_records}, {"readings", totals.dropped_readings},

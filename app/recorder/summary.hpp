@@ -49,6 +49,7 @@ struct SummaryInput {
   CalibrationMistake mistake{};               // that `before` shows
   calibration::CalibrationOptions options{};  // what its words mean
   std::uint64_t allocations_after_seal = 0;
+  Duration frame_budget{};  // zero: none
   ThreadAllocationFigures allocations{};
   std::vector<std::pair<std::string, std::size_t>> memory;  // bytes by what holds them
   std::string configuration_hash;

@@ -208,6 +208,7 @@ void write_frame(CdrWriter* out, const FrameRecord& f) noexcept {
   put_vector(out, s.T_world_left.t);
   put_quaternion(out, s.T_world_left.R);
   out->put(static_cast<std::int32_t>(s.inliers)).put(s.reprojection_px).put(s.estimate_ms);
+  out->put(s.effort.points_percent).put(s.effort.window_keyframes).put(s.effort.window_steps);
   put_crc(out);
 }
 

@@ -48,7 +48,8 @@ constexpr std::array kDefinitions{
                "uint8 images_recorded\nuint32[] image_crc\nbool recalibration_requested\n"
                "bool solver_done\nuint8 state\nuint8 status\nuint8 reason\n"
                "geometry_msgs/Pose pose\nint32 inliers\nfloat64 reprojection_px\n"
-               "float32 estimate_ms\nuint32 crc\n"},
+               "float32 estimate_ms\nuint8 points_percent\nuint8 window_keyframes\n"
+               "uint8 window_steps\nuint32 crc\n"},
     // A reading of the INS on the host's clock. Body forward, left, up; axes east, north, up.
     Definition{"vergence_msgs/InsReading",
                "std_msgs/Header header\nuint64 number\nint64 stamp_ns\nint64 stamp_error_ns\n"

@@ -2,11 +2,14 @@
 
 #include <algorithm>
 #include <string>
+#include <utility>
 
 #include <fmt/format.h>
 
 namespace vergence::app {
 namespace {
+
+constexpr int kWholeAgain = 100;  // frames, after which dropped work is news
 
 /// What a user wants to hear of at once.
 bool aloud(EstimatorEvent::Kind kind) noexcept {
@@ -64,7 +67,25 @@ void EventLog::note_change(const CalibrationDecision& decision) noexcept {
   if (decision.accepted && changed) matches_.rig_changed(decision.onset_frame);
 }
 
+/// Frames in a row without all of their work are one event.
+void EventLog::note_effort(const PoseSample& sample) noexcept {
+  if (sample.effort.whole()) {
+    ++whole_frames_;
+    return;
+  }
+  if (std::exchange(whole_frames_, 0) < kWholeAgain) return;
+  EventRecord event;
+  event.stamp = sample.stamp;
+  event.kind = "work_dropped";
+  event.set_sentence("frames take longer than there is time: less is done beside the pose");
+  event.fields[0] = {"points_percent", std::int64_t{sample.effort.points_percent}};
+  event.fields[1] = {"window_keyframes", std::int64_t{sample.effort.window_keyframes}};
+  event.fields[2] = {"window_steps", std::int64_t{sample.effort.window_steps}};
+  tell(event, true);
+}
+
 void EventLog::note(const PoseSample& sample) noexcept {
+  note_effort(sample);
   ++now_.done;
   now_.state = sample.state;
   now_.reason = sample.reason;

@@ -1,5 +1,6 @@
 #pragma once
 #include <cstdint>
+#include <limits>
 #include <string_view>
 
 #include "app/recorder/match_sample.hpp"
@@ -56,6 +57,7 @@ class EventLog {
   };
 
   void note_change(const CalibrationDecision& decision) noexcept;
+  void note_effort(const PoseSample& sample) noexcept;
 
   SessionOutput* output_ = nullptr;
   Stamp first_{};
@@ -63,6 +65,7 @@ class EventLog {
   std::uint64_t dropped_ = 0;
   Vec3 last_position_ = Vec3::Zero();
   bool posed_ = false;
+  int whole_frames_ = std::numeric_limits<int>::max() / 2;  // since one had no time for its work
   MatchSample matches_;
   Ring<ProgressSnapshot, 64> glimpses_;
   Ring<EventRecord, 32> notices_;

@@ -68,6 +68,7 @@ struct SourceFacts {
   Trajectory truth{};  // that came with a recording: what an estimate without INS is compared with
   std::vector<SourceRemark> remarks{};
   std::size_t image_bytes = 0, ring_bytes = 0;
+  Duration frame_interval{};  // of a live drive, whose frames do not wait; zero: they do
   const char* word_of_skipped = "skipped";  // frames of the drive that nobody estimated from
   bool on_request = false;                  // SIGUSR1 asks for a new calibration
 };

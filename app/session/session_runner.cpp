@@ -97,6 +97,17 @@ class SessionRunner {
   DriveThreads threads_;     // of the caller's thread
 };
 
+namespace {
+
+/// What a frame may take: in a live drive the next one does not wait.
+Duration frame_budget(const SourceFacts& facts, const RealtimeSettings& realtime) noexcept {
+  if (facts.frame_interval <= Duration{}) return {};
+  return realtime.frame_budget_ms > 0 ? Duration::seconds(1e-3 * realtime.frame_budget_ms)
+                                      : facts.frame_interval;
+}
+
+}  // namespace
+
 SessionRunner::SessionRunner(FrameSource& source, const Configuration& configuration,
                              const SessionOptions& options, const SignalGuard& signals)
     : source_(source),
@@ -106,8 +117,8 @@ SessionRunner::SessionRunner(FrameSource& source, const Configuration& configura
       signals_(signals),
       reference_(facts_.truth),
       masks_(configuration, facts_.begin.file.rig),
-      options_(
-          estimator_options(configuration, facts_.begin.trust, facts_.adoption, masks_.views())),
+      options_(estimator_options(configuration, facts_.begin.trust, facts_.adoption, masks_.views(),
+                                 frame_budget(facts_, configuration.realtime))),
       estimator_arena_(arena_size(Estimator::memory_needed(options_, facts_.begin.file.rig))),
       comparison_arena_(arena_size(facts_.ins ? Comparison::bytes_needed(facts_.ins->options) : 0)),
       runner_(make_runner(configuration.threads)),
@@ -298,6 +309,7 @@ SummaryInput SessionRunner::summary_input(const SessionTotals& totals,
   }
   describe_calibration(*estimator_, facts_.begin, totals, options_, journal_.matches(), &input);
   input.allocations_after_seal = allocations;
+  input.frame_budget = options_.frame_budget;
   input.allocations = threads_.figures();
   input.memory = memory();
   input.configuration_hash = configuration_hash(configuration_);

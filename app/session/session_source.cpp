@@ -124,7 +124,10 @@ SourceFrame SessionSource::load(const RecordedFrame& recorded) noexcept {
   frame.rig.pairing = static_cast<Pairing>(
       std::min(given.pairing, static_cast<std::uint8_t>(Pairing::contradicted)));
   frame.rig.cameras = facts_.begin.file.rig.cameras;
-  if (!other_) frame.solver_idle = given.solver_done;
+  if (!other_) {
+    frame.solver_idle = given.solver_done;
+    frame.rig.effort = given.sample.effort;
+  }
   for (std::size_t k = 0; k < static_cast<std::size_t>(frame.rig.cameras); ++k) {
     if ((given.images_present >> k & 1U) == 0) continue;
     const RecordedImage& image = recorded.images[k];

@@ -139,8 +139,10 @@ StartingCalibration replayed_calibration(const Configuration& c, const StereoSeq
 
 EstimatorOptions estimator_options(const Configuration& c, CalibrationTrust trust,
                                    Adoption adoption,
-                                   const std::array<ImageView, kMaxCameras>& masks) {
+                                   const std::array<ImageView, kMaxCameras>& masks,
+                                   Duration frame_budget) {
   EstimatorOptions o;
+  o.frame_budget = frame_budget;
   o.odometry = c.odometry;
   o.calibration = c.calibration;
   o.monitor = c.monitor;

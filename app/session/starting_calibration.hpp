@@ -52,9 +52,9 @@ struct StartingCalibration {
                                               const RigCalibration& mounted,
                                               const calibration::CalibrationOptions& options);
 
-/// `masks` by camera, as EstimatorOptions has them.
+/// `masks` by camera and `frame_budget` as EstimatorOptions has them.
 [[nodiscard]] EstimatorOptions estimator_options(
     const Configuration& configuration, CalibrationTrust trust, Adoption adoption,
-    const std::array<ImageView, kMaxCameras>& masks = {});
+    const std::array<ImageView, kMaxCameras>& masks = {}, Duration frame_budget = {});
 
 }  // namespace vergence::app

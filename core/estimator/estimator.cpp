@@ -464,7 +464,7 @@ PoseSample Estimator::process(const RigFrame& given) noexcept {
 
   if (p.relinked && std::exchange(p.superseded, false) && p.calibrator.verified())
     p.tell_confirmed(frame.stamp);
-  odometry::FrameOutcome out = p.odometry.process(frame);
+  odometry::FrameOutcome out = p.odometry.process(frame, p.options.frame_budget);
   p.follow(out, frame);
   if (p.options.online) {
     if (out.posed) {
@@ -486,6 +486,7 @@ PoseSample Estimator::process(const RigFrame& given) noexcept {
   sample.stereo_inliers = out.stereo_inliers;
   sample.reprojection_px = out.reprojection_px;
   sample.keyframe = out.keyframe;
+  sample.effort = out.effort;
   sample.stage_ms = out.stage_ms;
   // Waiting for the solver makes a replay the same on every machine; it is no part of a frame's
   // work.

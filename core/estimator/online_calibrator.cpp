@@ -117,7 +117,9 @@ void OnlineCalibrator::begin_segment() noexcept {
 void OnlineCalibrator::scene_lost() noexcept {
   any_ = false;
   watched_ = false;
+  stale_ = solving_;
   log_.clear();
+  begin_segment();
   for (auto& m : monitors_)
     if (m) m->reset();
   for (auto& f : feeds_)
@@ -215,7 +217,8 @@ void OnlineCalibrator::start_solve() noexcept {
   if (any_learnt_) {
     prior_ = learnt_;
     const double hours = (log_.frame(log_.size() - 1).stamp - learnt_.found).to_seconds() / 3600.0;
-    if (sought_)
+    // What was learnt before an outage is no witness that nobody knocked the rig in it.
+    if (sought_ || !watched_)
       calibration::forget_transforms(&prior_);
     else
       calibration::let_drift(hours, options_.calibration, &prior_);
@@ -410,6 +413,7 @@ CalibrationDecision OnlineCalibrator::judge_learnt(Stamp stamp, std::uint64_t nu
                      ? a.sigma_percent <= options_.calibration.tolerated_depth_percent
                      : a.confirmed && gate_ != Gate::does_not_fit;
     if (d.verified || a.contradicted) set_verified(d.verified);
+    watched_ = watched_ || d.verified;
   }
   d.accepted = gate_ == Gate::open;
   d.reason = calibration::reason(gate_);

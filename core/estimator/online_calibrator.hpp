@@ -91,7 +91,8 @@ class OnlineCalibrator {
   [[nodiscard]] const RigCalibration& in_use() const noexcept { return rig_; }
   [[nodiscard]] bool calibrated() const noexcept { return calibrated_; }
   /// The drive itself has confirmed the calibration in use (METHOD §6.4).
-  /// After an outage the monitor first has to see that it still is so.
+  /// After an outage it has to confirm it again, from frames since then alone: epipolar lines,
+  /// which a few frames are enough for, do not show a yaw.
   [[nodiscard]] bool verified() const noexcept { return verified_ && watched_; }
   /// It has confirmed one before: what does not fit since then is a change of the rig.
   [[nodiscard]] bool ever_verified() const noexcept { return ever_verified_; }
@@ -148,7 +149,8 @@ class OnlineCalibrator {
   const RigCalibration given_;  // the drive began with
   bool calibrated_;
   bool verified_ = false, ever_verified_ = false;
-  bool watched_ = true;  // the monitor has seen the rig all the time, or has made sure since
+  bool watched_ = true;  // frames have been watched without an outage since what is in use was
+                         // confirmed
   bool found_with_lenses_ = false;
   RigCalibration learnt_{};  // what closed segments tell, with the lenses free
   bool any_learnt_ = false;

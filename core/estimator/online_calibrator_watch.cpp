@@ -23,8 +23,6 @@ constexpr double kLearnedCovariance =
     1.5;                     // times the monitor's own: the scene it was measured in was one
 constexpr int kWitness = 2;  // frames: a point just made was sought in the band of the calibration
                              // in use
-constexpr int kWatchedAgain =
-    10;  // moving frames that agree, after an outage in which the rig may have been knocked
 constexpr int kGraceFrames =
     5;  // after a new reference: the monitor does not yet know how far matches spread
 constexpr int kLearnFrames = 45;  // moving, in agreement
@@ -202,7 +200,6 @@ MonitorVerdict OnlineCalibrator::watch(const odometry::Odometry& odometry,
         (rank(v.kind) == rank(worst.kind) && (v.undecided || v.statistic > worst.statistic)))
       worst = v;
   }
-  watched_ = watched_ || frames_agreed() >= kWatchedAgain;
   return worst;
 }
 

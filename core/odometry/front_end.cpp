@@ -453,8 +453,8 @@ void FrontEnd::match_all(std::span<const features::Corner> corners, bool exchang
   runner_.run(TaskRef(first), TaskRef(second));
 }
 
-StereoCount FrontEnd::add_points(Map& map, const Transform& T_left_world,
-                                 PointStage stage) noexcept {
+StereoCount FrontEnd::add_points(Map& map, const Transform& T_left_world, PointStage stage,
+                                 const FrameEffort& effort) noexcept {
   StereoCount count;
   const auto start = std::chrono::steady_clock::now();
   taken_.clear();
@@ -462,8 +462,8 @@ StereoCount FrontEnd::add_points(Map& map, const Transform& T_left_world,
     if (p.followed() && p.now.by(0)) (void)taken_.push({p.raw[0].x(), p.raw[0].y(), 0.F});
   features::find_corners(pyramids_[0].level(0), corner_options(0), taken_.span(), runner_,
                          &corners_);
-  const auto room =
-      static_cast<std::size_t>(std::max(0, options_.features - static_cast<int>(taken_.size())));
+  const auto room = static_cast<std::size_t>(std::max(
+      0, options_.features * effort.points_percent / 100 - static_cast<int>(taken_.size())));
   if (corners_.size() > room) corners_.truncate(room);
   detect_ms_ = milliseconds_since(start);
 

@@ -10,6 +10,7 @@
 #include "core/odometry/blob_matcher.hpp"
 #include "core/odometry/map.hpp"
 #include "core/odometry/options.hpp"
+#include "core/types/frame_effort.hpp"
 #include "core/odometry/undistorted_camera.hpp"
 #include "core/types/parallel.hpp"
 #include "core/types/rig_frame.hpp"
@@ -90,7 +91,8 @@ class FrontEnd {
 
   /// New corners of `left` where there are no points, matched across, as points of the given stage,
   /// each with its observation in `now`.
-  StereoCount add_points(Map& map, const Transform& T_left_world, PointStage stage) noexcept;
+  StereoCount add_points(Map& map, const Transform& T_left_world, PointStage stage,
+                         const FrameEffort& effort = {}) noexcept;
 
   /// How many corners of the last add_points() match where points of a rig with exchanged cameras
   /// would lie: behind it.

@@ -63,12 +63,13 @@ class StageClock {
  public:
   explicit StageClock(FrameOutcome* out) noexcept
       : out_(out), last_(std::chrono::steady_clock::now()) {}
-  /// What has passed since the last mark belongs to this stage.
-  void mark(Stage stage) noexcept {
+  /// What has passed since the last mark belongs to this stage; ms.
+  float mark(Stage stage) noexcept {
     const auto now = std::chrono::steady_clock::now();
-    out_->stage_ms[static_cast<std::size_t>(stage)] +=
-        std::chrono::duration<float, std::milli>(now - last_).count();
+    const float ms = std::chrono::duration<float, std::milli>(now - last_).count();
+    out_->stage_ms[static_cast<std::size_t>(stage)] += ms;
     last_ = now;
+    return ms;
   }
 
  private:
@@ -310,17 +311,22 @@ void Odometry::make_keyframe(const PoseFit& fit, Stamp stamp, FrameOutcome* out)
   map_.keyframe(slot).T_camera_left = rig_.T_camera_left;
   for (MapPoint& p : map_.points())
     if (p.followed()) p.seen[slot] = p.now;
+  WindowOutcome window;
   if (link_ == Link::linked) {
-    if (window_.adjust(map_).usable)
+    window = window_.adjust(map_, out->effort);
+    if (window.usable)
       std::copy_n(window_.T_camera_left().begin(), rig_.cameras, rig_.T_camera_left.begin());
   } else {
-    (void)window_.adjust_unlinked(map_);
+    window = window_.adjust_unlinked(map_, out->effort);
     out->scale = renew_scale(slot);
     rig_.T_camera_left = map_.keyframe(slot).T_camera_left;
   }
   T_left_world_ = map_.keyframe(slot).T_left_world;
-  clock.mark(Stage::window);
-  const StereoCount stereo = front_end_.add_points(map_, T_left_world_, PointStage::candidate);
+  const auto keyframes = std::min<std::size_t>(map_.order().size(), out->effort.window_keyframes);
+  budget_.window_took(static_cast<double>(clock.mark(Stage::window)), static_cast<int>(keyframes),
+                      window.steps);
+  const StereoCount stereo =
+      front_end_.add_points(map_, T_left_world_, PointStage::candidate, out->effort);
   // Of all that the left image offers, how much the other cameras confirm.
   stereo_fails_ = stereo.matched + fit.stereo < kConfirmedShare * (stereo.corners + fit.inliers);
   keyframe_points_ = 0;
@@ -329,7 +335,7 @@ void Odometry::make_keyframe(const PoseFit& fit, Stamp stamp, FrameOutcome* out)
     p.seen[slot] = p.now;
     if (p.now.by(0)) ++keyframe_points_;
   }
-  clock.mark(Stage::match);
+  budget_.points_took(static_cast<double>(clock.mark(Stage::match)), out->effort);
   out->stage_ms[static_cast<std::size_t>(Stage::match)] -= front_end_.detect_ms();
   out->stage_ms[static_cast<std::size_t>(Stage::detect)] += front_end_.detect_ms();
   out->keyframe = true;
@@ -506,9 +512,16 @@ void Odometry::rebuild(FrameOutcome* out) noexcept {
   if (!start_scene(T_left_world_, stamp_, &built)) out->reason = built.reason;
 }
 
-FrameOutcome Odometry::process(const RigFrame& frame) noexcept {
+void Odometry::try_points() noexcept {
+  cursor_before_trial_ = map_.cursor();
+  (void)front_end_.add_points(map_, T_left_world_, PointStage::candidate);
+  on_trial_ = true;
+}
+
+FrameOutcome Odometry::process(const RigFrame& frame, Duration budget) noexcept {
   FrameOutcome out;
   StageClock clock(&out);
+  budget_.begin(budget);
   const ImageCheck images = front_end_.begin(frame);
   clock.mark(Stage::pyramid);
   out.images_good = weakness(images) == Reason::none;
@@ -547,15 +560,18 @@ FrameOutcome Odometry::process(const RigFrame& frame) noexcept {
     remember(fit.T_left_world, frame.stamp);
   out.T_left_world = T_left_world_;
   judge(fit, images, &out);
+  const FrameEffort effort =
+      frame.effort ? *frame.effort
+                   : budget_.plan(static_cast<int>(map_.order().size()) + 1, options_.window_steps);
   if (link_pending_ && weakness(images) == Reason::none) {
     out.relink_due = true;
   } else if (confirmed_stereo(fit) && !images.repeated && wants_keyframe()) {
+    out.effort = effort;
     make_keyframe(fit, frame.stamp, &out);
     out.T_left_world = T_left_world_;
   } else if (frames_untried_ >= kFramesUntilTrial && out.images_good && link_ == Link::linked) {
-    cursor_before_trial_ = map_.cursor();
-    (void)front_end_.add_points(map_, T_left_world_, PointStage::candidate);
-    on_trial_ = true;
+    out.effort.points_percent = effort.points_percent;
+    if (effort.points_percent == 100) try_points();
   }
   if (restart_cooldown_ > 0) --restart_cooldown_;
   return out;

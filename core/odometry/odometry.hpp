@@ -4,6 +4,7 @@
 #include "core/odometry/map.hpp"
 #include "core/odometry/pose_estimator.hpp"
 #include "core/odometry/window.hpp"
+#include "core/odometry/work_budget.hpp"
 #include "core/types/pose_sample.hpp"
 
 namespace vergence::odometry {
@@ -18,6 +19,7 @@ struct FrameOutcome {
   int stereo_inliers = 0;
   double reprojection_px = 0;
   bool keyframe = false;
+  FrameEffort effort{};      // what was done of the work beside the pose
   bool restarted = false;    // the scene was rebuilt in this frame
   bool relocalised = false;  // found again in the window after being lost
   bool relink_due = false;   // a calibration waits to be taken up: rebuild() when this frame's
@@ -57,7 +59,9 @@ class Odometry {
                                                  const RigCalibration& rig,
                                                  std::span<const ImageView> masks = {}) noexcept;
 
-  [[nodiscard]] FrameOutcome process(const RigFrame& frame) noexcept;
+  /// `budget`: less is done where the frame would take longer, in WorkBudget's order; zero: all.
+  /// Of a frame that says how much was done, as much.
+  [[nodiscard]] FrameOutcome process(const RigFrame& frame, Duration budget = {}) noexcept;
 
   /// From the next frame on the cameras are one rig with this calibration: that frame is still
   /// posed as before, then rebuild() makes a new scene from it.
@@ -90,6 +94,7 @@ class Odometry {
   void settle_points(const PoseFit& fit) noexcept;
   [[nodiscard]] bool wants_keyframe() const noexcept;
   void make_keyframe(const PoseFit& fit, Stamp stamp, FrameOutcome* out) noexcept;
+  void try_points() noexcept;
   [[nodiscard]] double renew_scale(std::size_t slot) noexcept;
   [[nodiscard]] bool initialise_rig(FrameOutcome* out) noexcept;
   [[nodiscard]] bool start_scene(const Transform& T_left_world, Stamp stamp,
@@ -116,6 +121,7 @@ class Odometry {
   FrontEnd front_end_;
   Map map_;
   WindowAdjuster window_;
+  WorkBudget budget_;
   PoseEstimator poses_;
   StereoMlesac stereo_;
   std::array<std::span<double>, 5>

@@ -89,20 +89,21 @@ void WindowAdjuster::doubt_rig() noexcept {
   }
 }
 
-void WindowAdjuster::gather(Map& map, bool linked) noexcept {
+void WindowAdjuster::gather(Map& map, bool linked, const FrameEffort& effort) noexcept {
   poses_.clear();
   constant_.clear();
   points_.clear();
   owner_.clear();
   observations_.clear();
   const int images = linked ? 1 : rig_.cameras;  // poses a keyframe
-  for (std::size_t i = 0; i < map.order().size(); ++i) {
+  oldest_ = map.order().size() - std::min<std::size_t>(map.order().size(), effort.window_keyframes);
+  for (std::size_t i = oldest_; i < map.order().size(); ++i) {
     const Keyframe& keyframe = map.keyframe(map.order()[i]);
     for (int k = 0; k < images; ++k) {
       (void)poses_.push(linked ? keyframe.T_left_world
                                : keyframe.T_camera_left[static_cast<std::size_t>(k)] *
                                      keyframe.T_left_world);
-      (void)constant_.push(i == 0 ? 1 : 0);
+      (void)constant_.push(i == oldest_ ? 1 : 0);
     }
   }
   const std::span<MapPoint> all = map.points();
@@ -112,14 +113,15 @@ void WindowAdjuster::gather(Map& map, bool linked) noexcept {
     const std::size_t first = observations_.size();
     int keyframes = 0;
     bool fits = !points_.full();
-    for (std::size_t frame = 0; frame < map.order().size() && fits; ++frame) {
+    for (std::size_t frame = oldest_; frame < map.order().size() && fits; ++frame) {
       const Sighting& s = p.seen[map.order()[frame]];
       if (s.cameras == 0) continue;
       ++keyframes;
       for (int k = 0; k < rig_.cameras && fits; ++k) {
         if (!s.by(k)) continue;
         const auto c = static_cast<std::size_t>(k);
-        const std::size_t pose = linked ? frame : frame * static_cast<std::size_t>(images) + c;
+        const std::size_t pose =
+            linked ? frame - oldest_ : (frame - oldest_) * static_cast<std::size_t>(images) + c;
         const Vec3 here = poses_[pose] * p.p_world;
         if ((linked ? rig_.T_camera_left[c] * here : here).z() < kMinDepthOfPoint) continue;
         BundleObservation o;
@@ -153,14 +155,15 @@ int WindowAdjuster::drop_outliers(Map& map) noexcept {
     if (!(residuals_[i] > kOutlier)) continue;
     const BundleObservation& o = observations_[i];
     MapPoint& p = map.points()[owner_[o.point]];
-    const std::size_t images = poses_.size() / map.order().size();
-    p.seen[map.order()[o.pose / images]].drop(o.camera);
+    const std::size_t images = poses_.size() / (map.order().size() - oldest_);
+    p.seen[map.order()[oldest_ + o.pose / images]].drop(o.camera);
     ++dropped;
   }
   return dropped;
 }
 
-WindowOutcome WindowAdjuster::solve(BundleConfiguration configuration) noexcept {
+WindowOutcome WindowAdjuster::solve(BundleConfiguration configuration,
+                                    const FrameEffort& effort) noexcept {
   WindowOutcome outcome;
   outcome.points = static_cast<int>(points_.size());
   outcome.observations = static_cast<int>(observations_.size());
@@ -182,7 +185,7 @@ WindowOutcome WindowAdjuster::solve(BundleConfiguration configuration) noexcept 
   how.configuration = configuration;
   how.loss = BundleLoss::huber;
   how.loss_threshold = options_.huber;
-  how.max_steps = options_.window_steps;
+  how.max_steps = std::min<int>(options_.window_steps, effort.window_steps);
   how.cost_tolerance = 1e-4;
   if (configuration == BundleConfiguration::stereo_calibration)
     how.shared_prior = {&claimed_, kInflation};
@@ -194,24 +197,24 @@ WindowOutcome WindowAdjuster::solve(BundleConfiguration configuration) noexcept 
   return outcome;
 }
 
-WindowOutcome WindowAdjuster::adjust(Map& map) noexcept {
-  gather(map, true);
-  WindowOutcome outcome = solve(BundleConfiguration::stereo_odometry);
+WindowOutcome WindowAdjuster::adjust(Map& map, const FrameEffort& effort) noexcept {
+  gather(map, true, effort);
+  WindowOutcome outcome = solve(BundleConfiguration::stereo_odometry, effort);
   if (!outcome.usable) return outcome;
   for (std::size_t i = 0; i < poses_.size(); ++i)
-    map.keyframe(map.order()[i]).T_left_world = {normalised(poses_[i].R), poses_[i].t};
+    map.keyframe(map.order()[oldest_ + i]).T_left_world = {normalised(poses_[i].R), poses_[i].t};
   for (std::size_t i = 0; i < points_.size(); ++i) map.points()[owner_[i]].p_world = points_[i];
   outcome.dropped = drop_outliers(map);
   return outcome;
 }
 
-WindowOutcome WindowAdjuster::adjust_unlinked(Map& map) noexcept {
-  gather(map, false);
-  WindowOutcome outcome = solve(BundleConfiguration::parallel_monocular);
+WindowOutcome WindowAdjuster::adjust_unlinked(Map& map, const FrameEffort& effort) noexcept {
+  gather(map, false, effort);
+  WindowOutcome outcome = solve(BundleConfiguration::parallel_monocular, effort);
   if (!outcome.usable) return outcome;
   const auto images = static_cast<std::size_t>(rig_.cameras);
-  for (std::size_t i = 0; i < map.order().size(); ++i) {
-    Keyframe& keyframe = map.keyframe(map.order()[i]);
+  for (std::size_t i = 0; oldest_ + i < map.order().size(); ++i) {
+    Keyframe& keyframe = map.keyframe(map.order()[oldest_ + i]);
     const Transform& left = poses_[i * images];
     keyframe.T_left_world = {normalised(left.R), left.t};
     for (std::size_t k = 1; k < images; ++k) {

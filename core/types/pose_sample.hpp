@@ -4,6 +4,7 @@
 #include <string_view>
 
 #include "core/math/se3.hpp"
+#include "core/types/frame_effort.hpp"
 #include "core/types/time.hpp"
 
 namespace vergence {
@@ -76,6 +77,7 @@ struct PoseSample {
   int stereo_inliers = 0;      // of these, seen by a second camera in this frame
   double reprojection_px = 0;  // rms of the inliers' residuals, per coordinate
   bool keyframe = false;
+  FrameEffort effort{};                   // what was done of the work beside the pose
   std::array<float, kStages> stage_ms{};  // wall time; the parallel stages as the slower side took
   float estimate_ms = 0;                  // wall time from the images in hand to this sample
 };

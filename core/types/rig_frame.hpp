@@ -1,8 +1,10 @@
 #pragma once
 #include <array>
 #include <cstdint>
+#include <optional>
 
 #include "core/types/calibration.hpp"
+#include "core/types/frame_effort.hpp"
 #include "core/types/image.hpp"
 #include "core/types/time.hpp"
 
@@ -28,6 +30,7 @@ struct RigFrame {
   Duration spread{};
   Pairing pairing = Pairing::assumed;
   int cameras = 0;
+  std::optional<FrameEffort> effort{};  // of a recorded drive: no more and no less is done again
   std::array<ImageView, kMaxCameras> images{};
 };
 

@@ -17,7 +17,8 @@ struct Kind {
   const char* what;        // of --fault, before the @
   const char* parameters;  // but duration_s
   double seconds;          // 0: none, it is done at once and stays
-  double recovers = 2.5;   // s, within which poses are `ok` again for good
+  // s, within which poses are `ok` again for good: pairing proven, the calibration confirmed anew
+  double recovers = 3;
   int known_wrong = 0;
 };
 

@@ -203,6 +203,21 @@ TEST(Recorded, aLiveDriveReplaysBitForBit) {
   expect_same_poses(folder / "live", folder / "again");
 }
 
+// A drive that has a microsecond a frame has time for its poses alone: as many as there are frames,
+// and the replay, which has all the time there is, leaves out what the drive left out.
+TEST(Recorded, aLiveDriveWithoutTimeForItsWorkReplaysBitForBit) {
+  const TemporaryFolder folder;
+  ASSERT_LE(drive(folder / "drive", "--duration 8 --set realtime.frame_budget_ms=0.001").code, 1);
+  ASSERT_LE(replay(folder / "drive", folder / "again").code, 1);
+  const auto live = summary_of(folder / "drive"), again = summary_of(folder / "again");
+  EXPECT_GT(live["work_dropped"]["windows"], 10);
+  EXPECT_EQ(live["frames"]["lost"], 0);
+  for (const char* what : {"frames", "points", "windows"})
+    EXPECT_EQ(live["work_dropped"][what], again["work_dropped"][what]) << what;
+  EXPECT_NE(text_of(folder / "drive" / "events.jsonl").find("work_dropped"), std::string::npos);
+  expect_same_poses(folder / "drive", folder / "again");
+}
+
 TEST(Recorded, aReplayOfAReplayedRecordingIsTheSame) {
   const TemporaryFolder folder;
   ASSERT_LE(drive(folder / "s", "--fast --duration 4").code, 1);

@@ -1,0 +1,62 @@
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "core/odometry/odometry.hpp"
+#include "tests/unit/core/odometry/corridor.hpp"
+
+namespace vergence::odometry {
+namespace {
+
+constexpr int kFrames = 20;
+
+/// A drive with `budget` a frame; `given`: as much work as these frames say instead.
+std::vector<FrameOutcome> drive(Duration budget, const std::vector<FrameOutcome>& given = {}) {
+  test::Corridor corridor;
+  const OdometryOptions options;
+  Arena arena(Odometry::memory_needed(options, corridor.rig()));
+  SequentialRunner runner;
+  Odometry odometry(options, corridor.rig(), true, arena, runner);
+  std::vector<FrameOutcome> all;
+  for (int i = 0; i < kFrames; ++i) {
+    RigFrame frame = corridor.frame(i);
+    if (!given.empty()) frame.effort = given[static_cast<std::size_t>(i)].effort;
+    all.push_back(odometry.process(frame, budget));
+  }
+  return all;
+}
+
+TEST(OdometryBudget, aFrameWithoutTimeHasItsPoseAllTheSame) {
+  const auto outcomes = drive(Duration::nanoseconds(1));
+  int shortened = 0;
+  for (int i = 0; i < kFrames; ++i) {
+    const FrameOutcome& out = outcomes[static_cast<std::size_t>(i)];
+    ASSERT_TRUE(out.posed) << i;
+    shortened += out.effort.whole() ? 0 : 1;
+    // As far as an image's corner has moved when it is half a pixel off: f is some 300 px, things
+    // stand 3 m away and more.
+    const Vec3 truth =
+        (test::Corridor::T_world_left(0).inverse() * test::Corridor::T_world_left(i)).t;
+    EXPECT_LT((out.T_left_world.inverse().t - truth).norm(), 0.05 + 0.02 * truth.norm()) << i;
+  }
+  EXPECT_GT(shortened, 3);
+}
+
+TEST(OdometryBudget, withTimeEnoughNothingIsLeftOut) {
+  const auto with = drive(Duration::seconds(1000)), without = drive({});
+  for (std::size_t i = 0; i < with.size(); ++i) {
+    EXPECT_TRUE(with[i].effort.whole()) << i;
+    EXPECT_EQ(with[i].T_left_world.t, without[i].T_left_world.t) << i;
+  }
+}
+
+TEST(OdometryBudget, aRecordedDriveIsDrivenAgainWithTheSameWork) {
+  const auto live = drive(Duration::nanoseconds(1)), again = drive({}, live);
+  for (std::size_t i = 0; i < live.size(); ++i) {
+    EXPECT_EQ(live[i].effort, again[i].effort) << i;
+    EXPECT_EQ(live[i].T_left_world.t, again[i].T_left_world.t) << i;
+  }
+}
+
+}  // namespace
+}  // namespace vergence::odometry

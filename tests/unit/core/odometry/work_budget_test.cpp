@@ -1,0 +1,69 @@
+#include "core/odometry/work_budget.hpp"
+
+#include <gtest/gtest.h>
+
+namespace vergence::odometry {
+namespace {
+
+constexpr int kKeyframes = 10, kSteps = 5;
+// s: what the clock passes within a test is nothing beside it.
+constexpr double kPoints = 1000, kStep = 40;  // a step of one keyframe: the window takes 2000
+
+/// Of a frame that begins now with so many seconds, usable ones, with the costs above known.
+FrameEffort effort_in(double usable_s) {
+  WorkBudget budget;
+  budget.points_took(1e3 * kPoints, {});
+  budget.window_took(1e3 * kStep * kKeyframes * kSteps, kKeyframes, kSteps);
+  budget.begin(Duration::seconds(usable_s / 0.9));
+  return budget.plan(kKeyframes, kSteps);
+}
+
+TEST(WorkBudget, withoutABudgetAllIsDone) {
+  WorkBudget budget;
+  budget.points_took(1e9, {});
+  budget.begin({});
+  EXPECT_TRUE(budget.plan(kKeyframes, kSteps).whole());
+}
+
+TEST(WorkBudget, withTimeEnoughAllIsDone) { EXPECT_TRUE(effort_in(3010).whole()); }
+
+TEST(WorkBudget, pointsGoFirst) {
+  const FrameEffort e = effort_in(2601);
+  EXPECT_EQ(e.points_percent, 60);
+  EXPECT_EQ(e.window_keyframes, FrameEffort::kAll);
+  EXPECT_EQ(e.window_steps, FrameEffort::kAll);
+}
+
+TEST(WorkBudget, thenTheWindowIsSmaller) {
+  const FrameEffort e = effort_in(250 + 1401);  // a quarter of the points, seven keyframes
+  EXPECT_EQ(e.points_percent, 25);
+  EXPECT_EQ(e.window_keyframes, 7);
+  EXPECT_EQ(e.window_steps, FrameEffort::kAll);
+}
+
+TEST(WorkBudget, thenItsSolverHasFewerSteps) {
+  const FrameEffort e = effort_in(250 + 321);  // two steps of four keyframes
+  EXPECT_EQ(e.points_percent, 25);
+  EXPECT_EQ(e.window_keyframes, 4);
+  EXPECT_EQ(e.window_steps, 2);
+}
+
+TEST(WorkBudget, atLastThereIsNoWindowAndAQuarterOfThePointsStill) {
+  for (const double usable_s : {300.0, 1.0}) {
+    const FrameEffort e = effort_in(usable_s);
+    EXPECT_EQ(e.points_percent, 25);
+    EXPECT_EQ(e.window_keyframes, 0);
+    EXPECT_EQ(e.window_steps, 0);
+  }
+}
+
+TEST(WorkBudget, oneDearFrameIsForgotten) {
+  WorkBudget budget;
+  budget.points_took(1e9, {});
+  for (int i = 0; i < 40; ++i) budget.points_took(1e3, {});  // 0.8 to the 40th is 1.3e-4
+  budget.begin(Duration::seconds(200));
+  EXPECT_TRUE(budget.plan(kKeyframes, kSteps).whole());
+}
+
+}  // namespace
+}  // namespace vergence::odometry
