@@ -210,19 +210,15 @@ TEST(Configuration, AListOfWhatIsRecordedSwitchesItsWordsOn) {
   EXPECT_TRUE(contains(refusal("record: images\n"), "is a group of keys"));
 }
 
-TEST(Configuration, AControlCharacterIsRefusedBeforeTheScannerSeesIt) {
-  // The scanner of yaml-cpp 0.7 never comes back from this one.
-  for (const std::string& text :
-       {std::string(" ,rig k2: 0.02}\0\0\0\0\0", 20), std::string("threads: 1\nrig: \x04")}) {
-    try {
-      (void)parse_configuration(text, "rig.yaml", {});
-      FAIL() << "taken";
-    } catch (const InputError& e) {
-      const std::string sentence = e.what();
-      EXPECT_NE(sentence.find("control character"), std::string::npos) << sentence;
-      EXPECT_EQ(sentence.find(text[0] == 't' ? "rig.yaml:2:" : "rig.yaml:1:"), 0U) << sentence;
-    }
+TEST(Configuration, ABracketOrCommaThatNothingOpenedIsRefused) {
+  // yaml-cpp 0.7 reads empty documents there for ever.
+  for (const char* text : {",a: 1}", "  ,k: 2]x", "\n, 72], m", "threads: 1\n...\n,a: 1}"}) {
+    const std::string sentence = refusal(text);
+    EXPECT_TRUE(contains(sentence, "is not YAML") || contains(sentence, "several YAML documents"))
+        << text << ": " << sentence;
   }
+  EXPECT_TRUE(contains(refusal("\n,a: 1}"), ":2: is not YAML: a value is expected"))
+      << refusal("\n,a: 1}");
 }
 
 }  // namespace
