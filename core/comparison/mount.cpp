@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <span>
 #include <vector>
 
 #include <Eigen/Dense>
@@ -119,6 +120,31 @@ std::vector<Moment> moments_of(std::span<const StampedPose> estimate,
   return moments;
 }
 
+constexpr Duration kBlock = Duration::milliseconds(3'000);  // in which errors stay alike
+constexpr std::size_t kBlocks = 8;                          // fewer say nothing of their scatter
+
+/// What a block of the drive says of the parameters.
+struct Block {
+  Information information = Information::Zero();
+  Parameters score = Parameters::Zero();
+};
+
+/// Covariance of the sum of the blocks' scores, from their scatter; zero where there are too few.
+/// What one block holds alone it fits: its score is as if the others had been fitted without it
+/// (jackknife: Bell and McCaffrey 2002).
+Information scatter_of(std::span<const Block> blocks, const Information& whole) {
+  Information sum = Information::Zero();
+  if (blocks.size() < kBlocks) return sum;
+  const Information covariance = whole.ldlt().solve(Information::Identity());
+  for (const Block& b : blocks) {
+    const Information rest = Information::Identity() - b.information * covariance;
+    const Parameters g = rest.partialPivLu().solve(b.score);
+    sum += g * g.transpose();
+  }
+  const auto n = static_cast<double>(blocks.size());
+  return (n - 1) / n * sum;
+}
+
 class Fit {
  public:
   Fit(std::vector<Moment> moments, std::span<const StampedPose> estimate,
@@ -147,6 +173,7 @@ class Fit {
   std::array<Noise, kChannels> noise_{};
   bool velocity_ = true;  // every moment has one
   Information information_ = Information::Zero();
+  Information scatter_ = Information::Zero();  // of the blocks' scores
 };
 
 bool Fit::errors_at(const State& s, const Moment& m, Errors* e) const {
@@ -289,7 +316,13 @@ bool Fit::step(Parameters* d) {
   for (int p : {3, 4, 5}) g[p] = H(p, p) * state_.lever[p - lever];
   g[clock] = H(clock, clock) * state_.offset;
   const int used = velocity_ ? kErrors : 6;
+  std::vector<Block> blocks;
+  Stamp block_end = moments_.front().reference.stamp;
   for (std::size_t i = 0; i < at.size(); ++i) {
+    if (moments_[i].reference.stamp >= block_end) {
+      blocks.emplace_back();
+      block_end = moments_[i].reference.stamp + kBlock;
+    }
     for (int k = 0; k < used; ++k) {
       const Noise& noise = noise_[static_cast<std::size_t>(kChannel[static_cast<std::size_t>(k)])];
       const bool chained = moments_[i].follows;
@@ -304,16 +337,24 @@ bool Fit::step(Parameters* d) {
       const double value = weight * (at[i][k] - (chained ? memory * at[i - 1][k] : 0));
       H += row * row.transpose();
       g += row * value;
+      blocks.back().information += row * row.transpose();
+      blocks.back().score += row * value;
     }
   }
   information_ = H;
+  scatter_ = scatter_of(blocks, H);
   *d = -H.ldlt().solve(g);
   return d->allFinite();
 }
 
 void Fit::tell(const Mat3& nominal, Mount* mount) const {
+  // By the model of the errors, or by how far blocks of the drive disagree, whichever is more: what
+  // an estimate drifts by is no Gauss–Markov process.
   const Information covariance = information_.ldlt().solve(Information::Identity());
-  const auto sigma = [&covariance](int p) { return std::sqrt(std::max(0.0, covariance(p, p))); };
+  const Information by_blocks = covariance * scatter_ * covariance;
+  const auto sigma = [&](int p) {
+    return std::sqrt(std::max({0.0, covariance(p, p), by_blocks(p, p)}));
+  };
   const Vec3 turn = log_so3(state_.R_m * nominal.transpose());
   Mount m;
   Vec3 seen = Vec3::Zero();

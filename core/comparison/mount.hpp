@@ -20,8 +20,10 @@
 ///           wander: e of tilt, heading, horizontal and vertical place and velocity are each
 ///           first-order Gauss–Markov, their correlation and size found from the residuals
 ///           (feasible generalised least squares), so that a sigma tells what the drive can tell,
-///           not what its many samples seem to.
-/// Sources   Wahba's problem for the start; Cochrane and Orcutt 1949 for the whitening.
+///           not what its many samples seem to. Where the drive has blocks enough, a sigma is no
+///           smaller than what their scatter tells (cluster-robust covariance).
+/// Sources   Wahba's problem for the start; Cochrane and Orcutt 1949 for the whitening; Bell and
+///           McCaffrey 2002 for the blocks.
 namespace vergence {
 
 /// One moment of the reference.

@@ -19,8 +19,9 @@ namespace {
 constexpr int kLostAfter = 3;  // frames without a pose in a row before the state says so
 
 constexpr std::uint64_t kDriftFrames = 60;  // of a creeping rig that are taken for one
-constexpr int kUnmatchedAfter =
-    15;  // frames with good images that no scene can be made of with the calibration in use
+// Frames with good images that no scene can be made of with the calibration in use; and with one
+// that no frame of the drive has agreed with yet.
+constexpr int kUnmatchedAfter = 15, kUnmatchedClaimAfter = 6;
 constexpr int kInStepAfter =
     60;  // frames without a sign of the cameras being out of step, before that is over
 
@@ -176,6 +177,7 @@ struct Estimator::Parts {
   int without_pose = 0;
   bool in_gap = false;       // and the last event has said so
   int unmatched_frames = 0;  // in a row
+  bool ever_posed = false;
   Reason told_missing = Reason::none;
   std::atomic<bool> requested{false};
   FixedVector<EstimatorEvent, 16> events;         // a frame raises at most eight
@@ -348,10 +350,11 @@ void Estimator::Parts::follow(const odometry::FrameOutcome& out, const RigFrame&
   const bool unmatched = !out.posed && out.images_good && out.reason == Reason::no_stereo_matches &&
                          odometry.linked() == odometry::Link::linked;
   unmatched_frames = unmatched ? unmatched_frames + 1 : 0;
-  if (options.online && unmatched_frames == kUnmatchedAfter) {
+  const int unmatched_after = ever_posed ? kUnmatchedAfter : kUnmatchedClaimAfter;
+  if (options.online && unmatched_frames == unmatched_after) {
     unmatched_frames = 0;
     // Good images of which no scene can be made: then it is the rig that does not fit.
-    give_up_calibration(frame, kUnmatchedAfter);
+    give_up_calibration(frame, unmatched_after);
     odometry.reset_extrinsics();
   }
   if (!out.posed) {
@@ -362,6 +365,7 @@ void Estimator::Parts::follow(const odometry::FrameOutcome& out, const RigFrame&
     return;
   }
   without_pose = 0;
+  ever_posed = true;
   if (state == State::lost)
     transition(odometry.linked() == odometry::Link::linked ? Trigger::pose_found
                : calibrator.calibrated()                   ? Trigger::pose_found_doubtful
