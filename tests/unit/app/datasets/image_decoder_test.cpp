@@ -88,7 +88,7 @@ TEST(PngDecoder, everyKindHasOpenCvsPixelsToTheBit) {
 /// Grey of 16 bits, samples x, x + step, … over a row of eight.
 FileBytes deep_ramp(std::uint16_t first, std::uint16_t step, bool interlaced) {
   const PngKind kind{0, 16, interlaced};
-  FileBytes png = png_head(kind, 8, 1), raw;
+  FileBytes png = test::png_head(kind, 8, 1), raw;
   if (interlaced) {
     // Adam7 of a row of eight: columns 0; 4; 2, 6; 1, 3, 5, 7 in the passes that have the first
     // line.
@@ -109,7 +109,7 @@ FileBytes deep_ramp(std::uint16_t first, std::uint16_t step, bool interlaced) {
       raw.push_back(static_cast<std::uint8_t>(v & 0xff));
     }
   }
-  append_chunk(&png, "IDAT", deflated(raw));
+  append_chunk(&png, "IDAT", test::deflated(raw));
   append_chunk(&png, "IEND", {});
   return png;
 }

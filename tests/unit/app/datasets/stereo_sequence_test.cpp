@@ -293,9 +293,10 @@ TEST_F(Sequence, imagesOfTwelveBitsInSixteenAreTakenForWhatTheyAreAndItIsSaid) {
     const auto s = open_sequence(SequenceFormat::folder, folder_.path());
     EXPECT_EQ(s.deep_bits, c.bits);
     ASSERT_EQ(s.remarks.size(), c.bits < 16 ? 1U : 0U) << c.most;
-    if (c.bits < 16)
+    if (c.bits < 16) {
       EXPECT_TRUE(says(s.remarks[0], {"16 bits a sample", std::to_string(c.most).c_str(),
                                       std::to_string(c.bits).c_str()}));
+    }
   }
   test::write_tiny_folder(folder_, 7);
   EXPECT_EQ(open_sequence(SequenceFormat::folder, folder_.path()).deep_bits, 16)
