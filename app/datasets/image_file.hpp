@@ -47,7 +47,7 @@ struct ImageSize {
 [[nodiscard]] ImageFileStatus check_image(std::span<const std::uint8_t> bytes,
                                           ImageSize* size) noexcept;
 
-/// The greatest sample of a PNG of 16 bits a sample; 0 for other images and such that cannot be
+/// The greatest sample of a grey PNG of 16 bits; 0 for other images and such that cannot be
 /// decoded. Takes memory for the image.
 [[nodiscard]] std::uint16_t peak_of_deep_image(std::span<const std::uint8_t> bytes);
 

@@ -13,11 +13,14 @@
 #include <type_traits>
 
 #include <fmt/format.h>
-#include <nlohmann/json.hpp>
 
 #include "app/datasets/decimal.hpp"
+#include "app/datasets/trajectory_files.hpp"
+#include "app/recorder/calibration_line.hpp"
+#include "app/recorder/event_line.hpp"
 #include "app/recorder/line_file.hpp"
 #include "app/runtime/errors.hpp"
+#include "core/memory/allocation_guard.hpp"
 
 namespace vergence::app {
 
@@ -55,13 +58,6 @@ void append_tum(std::string* line, Stamp stamp, const PoseNumbers& pose) {
   for (const double v : pose.t) fmt::format_to(std::back_inserter(*line), " {:.9f}", v);
   for (const double v : pose.q) fmt::format_to(std::back_inserter(*line), " {:.9f}", v);
   *line += '\n';
-}
-
-/// Room for `count` values, its pages touched: what fills it later takes no memory from the system.
-template <class Value>
-void take_memory(std::size_t count, std::vector<Value>* values) {
-  values->resize(count);
-  values->clear();
 }
 
 constexpr std::size_t kLongestLine = 2048;  // bytes: calibrations.csv has the longest, some 800
@@ -110,15 +106,15 @@ Recorder::Recorder(const std::filesystem::path& folder, const Options& options)
     : options_(options),
       files_(std::make_unique<Files>(folder, options.ins)),
       totals_(std::make_unique<SessionTotals>()) {
-  if (options.keep_trajectory) {
-    take_memory(options.expected_frames, &totals_->trajectory);
-    take_memory(options.expected_frames, &totals_->reference);
-    take_memory(options.expected_frames, &totals_->statuses);
-  }
+  if (options.keep_trajectory)
+    totals_->statuses.reserve(options.expected_frames > 0 ? options.expected_frames
+                                                          : kMostStatuses);
+  totals_->attempts.reserve(kMostAttempts);
   line_.reserve(kLongestLine);
-  memory_ = totals_->trajectory.capacity() * sizeof(StampedPose) +
-            totals_->reference.capacity() * sizeof(StampedPose) +
-            totals_->statuses.capacity() * sizeof(PoseStatus);
+  folder_ = folder.string();
+  if (options.keep) keeper_ = std::make_unique<CalibrationKeeper>(options.keep, &filled_);
+  memory_ = totals_->statuses.capacity() * sizeof(PoseStatus) +
+            totals_->attempts.capacity() * sizeof(CalibrationAttempt);
   for (LineFile* file : files_->all) {
     memory_ += file->pending();
     file->append(files_->head(file));
@@ -165,12 +161,14 @@ void Recorder::work() {
   constexpr std::chrono::seconds kFlushAtLeast{1};
   auto flushed = Clock::now();
   flush();  // the heads of the tables
+  AllocationGuard::seal_thread();
   for (;;) {
     const WakeEvent::Ticket seen = filled_.ticket();
     const bool stopping = stop_.load(
         std::memory_order_acquire);  // before the ring: what was posted before is still found
     if (reopen_.exchange(false, std::memory_order_acquire)) reopen_files();
-    if (take()) {
+    const bool took = take(), told = take_outcome();
+    if (took || told) {
       if (Clock::now() - flushed < kFlushAtLeast) continue;
     } else if (stopping) {
       break;
@@ -218,7 +216,6 @@ void Recorder::write(const PoseRecord& p) {
   if (options_.disk_full) pretend(p.stamp);
   ++totals_->read;
   match_confirmed();
-  if (options_.keep_trajectory) totals_->statuses.push_back(p.status);
   ++(p.status == PoseStatus::ok         ? totals_->ok
      : p.status == PoseStatus::degraded ? totals_->degraded
                                         : totals_->lost);
@@ -255,16 +252,15 @@ void Recorder::write(const PoseRecord& p) {
     line_ += ',';
   fmt::format_to(out, ",{:.3f}\n", p.estimate_ms);
   files_->poses.append(line_);
+  if (posed) append_tum(&line_, p.stamp, p.world_left);
+  const bool in_trajectory = posed && files_->trajectory.append(line_);
+  if (totals_->statuses.size() < totals_->statuses.capacity())
+    totals_->statuses.push_back(in_trajectory ? p.status : PoseStatus::lost);
   if (!posed) return;
-
-  append_tum(&line_, p.stamp, p.world_left);
-  files_->trajectory.append(line_);
   if (p.has_reference) {
     append_tum(&line_, p.stamp, p.reference_left);
     files_->reference.append(line_);
     any_reference_ = true;
-    if (options_.keep_trajectory)
-      totals_->reference.push_back({p.stamp, p.reference_left.transform()});
   }
   if (have_last_pose_)
     totals_->path_m +=
@@ -272,7 +268,6 @@ void Recorder::write(const PoseRecord& p) {
                    p.world_left.t[2] - last_pose_.t[2]);
   last_pose_ = p.world_left;
   have_last_pose_ = true;
-  if (options_.keep_trajectory) totals_->trajectory.push_back({p.stamp, p.world_left.transform()});
 }
 
 /// An event comes before the pose of its frame, or after the last one.
@@ -294,84 +289,13 @@ void Recorder::note(const EventRecord& e) {
 
 void Recorder::write(const EventRecord& e) {
   note(e);
-  nlohmann::ordered_json object;
-  object["stamp_ns"] = e.stamp.ns();
-  object["kind"] = e.kind;
-  object["sentence"] = e.sentence.data();
-  auto& fields = object["fields"] = nlohmann::ordered_json::object();
-  for (const EventField& f : e.fields)
-    if (f.name != nullptr) std::visit([&](auto value) { fields[f.name] = value; }, f.value);
-  // File names may hold any bytes; the line stays JSON.
-  files_->events.append(
-      object.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n");
+  format_event(e, &line_);
+  files_->events.append(line_);
 }
-
-namespace {
-
-/// A comma and a number for each; commas alone where all are zero, which stands for "not given".
-template <std::size_t N>
-void append_sigmas(std::string* line, const std::array<double, N>& values) {
-  const bool given = std::any_of(values.begin(), values.end(), [](double v) { return v > 0; });
-  for (const double v : values)
-    if (given)
-      fmt::format_to(std::back_inserter(*line), ",{:.9f}", v);
-    else
-      *line += ',';
-}
-
-/// The first four coefficients and their sigmas.
-void append_distortion(std::string* line, const Intrinsics& lens) {
-  std::array<double, 4> sigma{};
-  std::copy_n(lens.distortion_sigma.begin(), sigma.size(), sigma.begin());
-  for (std::size_t i = 0; i < sigma.size(); ++i)
-    fmt::format_to(std::back_inserter(*line), ",{:.9f}", lens.distortion[i]);
-  append_sigmas(line, sigma);
-}
-
-/// A word or sentence as one field.
-std::string field(const char* text) {
-  std::string f = text;
-  for (char& c : f)
-    if (c == ',' || c == '\n' || c == '"') c = ';';
-  return f;
-}
-
-}  // namespace
 
 void Recorder::write(const CalibrationRecord& c) {
-  const RigCalibration rig = c.rig.rig();
-  for (std::size_t k = 1; k < static_cast<std::size_t>(rig.cameras); ++k) {
-    line_.clear();
-    const auto out = std::back_inserter(line_);
-    fmt::format_to(out, "{},{},{},{},{}", c.stamp.ns(),
-                   c.accepted ? "accepted"
-                   : c.learnt ? "kept"
-                              : "rejected",
-                   field(c.cause), field(c.reason), rig.frames);
-    if (c.decided)
-      fmt::format_to(out, ",{},{},{:.4f},{:.4f},{:.4f},{:.6f}", c.latency_frames, c.onset_frame,
-                     rig.reprojection_px, c.held_out_before_px, c.held_out_after_px,
-                     rig.scale_sigma);
-    else
-      fmt::format_to(out, ",,,{:.4f},,,{:.6f}", rig.reprojection_px, rig.scale_sigma);
-    const Transform& T = rig.T_camera_left[k];
-    const Vec3 phi = log_so3(T.R);
-    fmt::format_to(out, ",{}", k);
-    for (const double v : {phi.x(), phi.y(), phi.z(), T.t.x(), T.t.y(), T.t.z()})
-      fmt::format_to(out, ",{:.9f}", v);
-    append_sigmas(&line_, rig.sigma_noise[k]);
-    append_sigmas(&line_, rig.sigma_wide[k]);
-    const Intrinsics& lens = rig.intrinsics[k];
-    fmt::format_to(out, ",{:.5f},{:.5f},{:.5f},{:.5f}", lens.fx, lens.fy, lens.cx, lens.cy);
-    append_sigmas(&line_, lens.sigma);
-    append_distortion(&line_, lens);
-    append_distortion(&line_, rig.intrinsics[0]);
-    if (c.decided && c.judged_depth_m > 0)
-      fmt::format_to(out, ",{:.2f},{:.4f},{:.4f},{:d},{:d}", c.judged_depth_m,
-                     c.depth_sigma_percent, c.depth_difference_percent, c.verified, c.lenses);
-    else
-      line_ += ",,,,,";
-    line_ += '\n';
+  for (int k = 1; k < c.rig.cameras; ++k) {
+    format_calibration(c, k, &line_);
     files_->calibrations.append(line_);
   }
   if (c.decided) note(c);
@@ -383,17 +307,18 @@ void Recorder::note(const CalibrationRecord& c) {
   if (totals_->attempts.size() == kMostAttempts) totals_->attempts.erase(totals_->attempts.begin());
   totals_->attempts.push_back(
       {c.stamp, c.cause, c.reason, c.accepted, c.latency_frames, c.rig.frames, c.solve_ms});
-  if (!c.accepted || !options_.keep) return;
-  const Kept kept = options_.keep(c.rig.rig());
-  if (kept.sentence.empty()) return;
-  EventRecord event;
-  event.stamp = c.stamp;
-  event.kind = kept.failed ? "calibration_not_kept" : "calibration_kept";
-  event.set_sentence(kept.sentence);
-  write(event);
-  if (!kept.failed) return;
-  const std::lock_guard lock(errors_mutex_);
-  errors_.push_back(kept.sentence);
+  if (!c.accepted || keeper_ == nullptr) return;
+  if (!keeper_->post(c.stamp, c.rig))
+    complain("a calibration is not kept: the disk has not taken those before it");
+}
+
+/// What became of a calibration. False: there is nothing new.
+bool Recorder::take_outcome() {
+  CalibrationKeeper::Outcome outcome;
+  if (keeper_ == nullptr || !keeper_->next(&outcome)) return false;
+  write(outcome.event);
+  if (outcome.failed) complain("{}", outcome.event.sentence.data());
+  return true;
 }
 
 void Recorder::flush() {
@@ -434,12 +359,11 @@ void Recorder::pretend(Stamp stamp) {
   if (full) flush();  // what came before has found room
   pretended_ = full;
   for (LineFile* file : files_->all) file->pretend_full(full);
-  if (full) {
-    const std::lock_guard lock(errors_mutex_);
-    errors_.push_back(files_->poses.path().parent_path().string() +
-                      ": the disk has no room, as the drive's faults want it; the session goes "
-                      "on, lines wait in memory");
-  }
+  if (full)
+    complain(
+        "{}: the disk has no room, as the drive's faults want it; the session goes on, lines wait "
+        "in memory",
+        folder_);
   flush();
 }
 
@@ -450,8 +374,11 @@ void Recorder::note_disk(bool full) {
   EventRecord event;
   event.stamp = newest_;
   event.kind = full ? "disk_full" : "disk_room";
+  std::array<char, 96> room{};
+  (void)fmt::format_to_n(room.begin(), room.size() - 1, "the disk takes lines again; {} were lost",
+                         lost_lines());
   event.set_sentence(full ? "the disk of the session has no room: lines wait in memory"
-                          : fmt::format("the disk takes lines again; {} were lost", lost_lines()));
+                          : room.data());
   write(event);
 }
 
@@ -462,18 +389,48 @@ std::uint64_t Recorder::lost_lines() const {
 }
 
 void Recorder::complain(const LineFile& file) {
-  const std::lock_guard lock(errors_mutex_);
-  errors_.push_back(file.path().string() + ": cannot be written (" + std::strerror(file.fault()) +
-                    "); the session goes on, lines wait in memory: make room on that disk");
+  const char* words = ::strerrordesc_np(file.fault());  // strerror() may take memory
+  complain(
+      "{}: cannot be written ({}); the session goes on, lines wait in memory: make room on that "
+      "disk",
+      file.path().native(), words != nullptr ? words : "unknown error");
+}
+
+template <class... Arguments>
+void Recorder::complain(const char* format, const Arguments&... arguments) noexcept {
+  Complaint complaint{};
+  (void)fmt::format_to_n(complaint.begin(), complaint.size() - 1, fmt::runtime(format),
+                         arguments...);
+  (void)complaints_.push(complaint);
 }
 
 std::vector<std::string> Recorder::take_errors() {
-  const std::lock_guard lock(errors_mutex_);
-  return std::exchange(errors_, {});
+  std::vector<std::string> sentences;
+  for (Complaint c; complaints_.pop(&c);) sentences.emplace_back(c.data());
+  sentences.insert(sentences.end(), errors_.begin(), errors_.end());
+  errors_.clear();
+  return sentences;
+}
+
+/// The trajectories, from the session's own files: nothing that grows with the drive waits in
+/// memory.
+void Recorder::read_back() {
+  const auto read = [this](const LineFile& file, std::vector<StampedPose>* out) {
+    try {
+      *out = read_tum(file.path());
+    } catch (const InputError& e) {
+      errors_.push_back(std::string(e.what()) + "; the summary lacks what is made from it");
+    }
+  };
+  if (totals_->ok + totals_->degraded > 0) read(files_->trajectory, &totals_->trajectory);
+  if (any_reference_) read(files_->reference, &totals_->reference);
 }
 
 std::unique_ptr<SessionTotals> Recorder::close() {
   stop_and_join();
+  if (keeper_ != nullptr) keeper_->stop();
+  while (take_outcome()) {
+  }
   for (LineFile* file : files_->all) {
     const bool good = file->close();
     totals_->lost_lines += file->lost_lines();
@@ -488,6 +445,7 @@ std::unique_ptr<SessionTotals> Recorder::close() {
   // A file that says nothing would look like a reference that was lost.
   std::error_code ignored;
   if (!any_reference_) std::filesystem::remove(files_->reference.path(), ignored);
+  if (options_.keep_trajectory) read_back();
   totals_->dropped_records = dropped_.load(std::memory_order_relaxed);
   totals_->dropped_readings = dropped_readings_.load(std::memory_order_relaxed);
   totals_->ring_high_water = high_water_;

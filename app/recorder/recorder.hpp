@@ -6,12 +6,13 @@
 #include <filesystem>
 #include <functional>
 #include <memory>
-#include <mutex>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <thread>
 #include <vector>
 
+#include "app/recorder/calibration_keeper.hpp"
 #include "app/recorder/histogram.hpp"
 #include "app/recorder/ins_file.hpp"
 #include "app/recorder/records.hpp"
@@ -50,7 +51,7 @@ void make_session_folder(const std::filesystem::path& folder);
 /// One attempt to calibrate while driving.
 struct CalibrationAttempt {
   Stamp stamp{};
-  std::string cause{}, reason{};  // CalibrationCause's word; why it was rejected
+  std::string_view cause{}, reason{};  // CalibrationCause's word; why it was rejected: constants
   bool accepted = false;
   int latency_frames = 0, frames = 0;
   double solve_ms = 0;
@@ -82,11 +83,11 @@ struct SessionTotals {
   std::optional<Contradiction>
       contradicted{};                   // the first time that it showed another one than was in use
   double path_m = 0;                    // sum of the steps between successive poses
-  std::vector<StampedPose> trajectory;  // if asked for: the poses of trajectory.tum
+  std::vector<StampedPose> trajectory;  // if asked for: the poses of trajectory.tum, read back
   std::vector<StampedPose> reference;   // if asked for: of reference.tum, in its own frame
-  std::vector<PoseStatus> statuses;    // if asked for: of every frame read; those that are not lost
-                                       // have their pose in trajectory
-  std::uint64_t dropped_records = 0;   // the ring was full (live only)
+  std::vector<PoseStatus> statuses;   // if asked for: of every frame read, as far as there is room;
+                                      // those that are not lost have their pose in trajectory
+  std::uint64_t dropped_records = 0;  // the ring was full (live only)
   std::uint64_t dropped_readings = 0;  // theirs was
   std::uint64_t lost_lines = 0;        // the disk took no more
   WorkDropped work_dropped{};
@@ -94,14 +95,9 @@ struct SessionTotals {
   std::vector<std::string> faults;  // a sentence for each file that is not whole
 };
 
+/// Frames whose status SessionTotals keeps where nobody knows the drive's length: 58 h at 20 Hz.
+inline constexpr std::size_t kMostStatuses = std::size_t{1} << 22;
 inline constexpr std::size_t kMostAttempts = 1000;  // in summary.json; calibrations.csv has all
-
-/// What became of a calibration that was to be kept: a line of events.jsonl, a complaint as well
-/// when it failed.
-struct Kept {
-  bool failed = false;
-  std::string sentence{};  // empty: nothing to tell
-};
 
 /// Writes trajectory.tum, reference.tum (gone at the end if there was no reference), poses.csv,
 /// calibrations.csv, events.jsonl and, with an INS, ins.csv of a session as it goes on, on a thread
@@ -110,10 +106,10 @@ struct Kept {
 /// What has been posted is in the files as soon as the thread comes to it, at the latest after a
 /// second, so a killed session keeps its lines. Stamps are printed from their integers. The same
 /// records give the same bytes.
-/// Threads  post(): one producer. take_errors(): any. close(): the owner's, after the last
-///          post().
-/// Memory   post() takes none. With keep_trajectory a pose of some 100 bytes is kept for every
-///          frame.
+/// Threads  post(): one producer. take_errors(): one consumer. close(): the owner's, after the last
+///          post(). The recorder's own is sealed: what takes heap memory is done by others.
+/// Memory   Fixed, whatever the length of the drive; with keep_trajectory a byte for every frame
+///          expected, or for kMostStatuses. close() reads the trajectories back from their files.
 /// Full     wait: the producer waits (replay). drop: the record is dropped and counted (live).
 ///          Readings have a ring of their own: they never push out a pose.
 /// Errors   The constructor throws InputError. A disk that takes no more: a complaint and an event
@@ -126,10 +122,10 @@ class Recorder {
   struct Options {
     WhenFull when_full = WhenFull::wait;
     bool keep_trajectory = true;
-    std::size_t expected_frames = 0;  // memory taken beforehand for the trajectory
+    std::size_t expected_frames = 0;  // 0: nobody knows
     bool ins = false;                 // readings are posted: ins.csv is there
-    /// Called on the recorder's thread with every calibration that was accepted while driving:
-    /// files may be written there. May be empty.
+    /// Called on a thread of its own with every calibration that was accepted while driving: files
+    /// may be written there. May be empty.
     std::function<Kept(const RigCalibration&)> keep{};
     /// Whether the disk is to be taken for full at this time of the drive, which a mock's fault
     /// says. Called on the recorder's thread with the stamp of every pose. May be empty.
@@ -145,7 +141,7 @@ class Recorder {
   void post(const Record& record) noexcept;
   /// Precondition: Options::ins.
   void post(const InsRecord& reading) noexcept;
-  /// Bytes taken at the beginning: lines that may wait, and the trajectory of the frames expected.
+  /// Bytes taken at the beginning: lines that may wait, statuses of the frames expected.
   [[nodiscard]] std::size_t memory() const noexcept { return memory_; }
   /// Opens every file anew by its name, tables with their heads, as soon as the recorder's thread
   /// comes to it; an event `files_reopened`. Any thread.
@@ -163,6 +159,7 @@ class Recorder {
   bool push(Ring<Value, N>* ring, std::atomic<std::uint64_t>* dropped, const Value& value) noexcept;
   void work();
   bool take();
+  bool take_outcome();
   void write(const PoseRecord& pose);
   void write(const EventRecord& event);
   void write(const CalibrationRecord& calibration);
@@ -176,7 +173,11 @@ class Recorder {
   void note_disk(bool full);
   [[nodiscard]] std::uint64_t lost_lines() const;
   void stop_and_join() noexcept;
+  using Complaint = std::array<char, 512>;  // ends with 0, cut at the array's end
   void complain(const LineFile& file);
+  template <class... Arguments>
+  void complain(const char* format, const Arguments&... arguments) noexcept;
+  void read_back();
 
   struct Files;
   Options options_;
@@ -184,7 +185,8 @@ class Recorder {
   std::unique_ptr<SessionTotals> totals_;
   PoseNumbers last_pose_{};
   bool have_last_pose_ = false, any_reference_ = false;
-  std::string line_;  // being formatted
+  std::string line_;    // being formatted
+  std::string folder_;  // for sentences
   std::size_t memory_ = 0;
   Stamp newest_{};  // of the poses
   std::uint64_t newest_frame_ = 0;
@@ -195,9 +197,10 @@ class Recorder {
   WakeEvent filled_, freed_;
   std::atomic<bool> stop_{false}, reopen_{false};
   std::atomic<std::uint64_t> dropped_{0}, dropped_readings_{0};
-  std::size_t high_water_ = 0;  // the producer's
-  std::mutex errors_mutex_;
-  std::vector<std::string> errors_;
+  std::size_t high_water_ = 0;                 // the producer's
+  Ring<Complaint, 16> complaints_;             // full: the newest are lost
+  std::vector<std::string> errors_;            // of close()
+  std::unique_ptr<CalibrationKeeper> keeper_;  // null: nothing is kept
   std::thread thread_;
 };
 

@@ -261,6 +261,7 @@ Json summary_json(const SessionTotals& totals, const SummaryInput& input) {
     sum += bytes;
   }
   memory["sum_bytes"] = sum;
+  memory["resident"] = counters_json(input.resident);
   memory["allocations_by_thread"] = counters_json(input.allocations.ours);
   memory["allocations_by_library_thread"] = counters_json(input.allocations.libraries);
   json["memory"] = memory;

@@ -52,6 +52,8 @@ struct SummaryInput {
   Duration frame_budget{};  // zero: none
   ThreadAllocationFigures allocations{};
   std::vector<std::pair<std::string, std::size_t>> memory;  // bytes by what holds them
+  std::vector<std::pair<std::string, std::uint64_t>>
+      resident{};  // at the drive's end, bytes; sum_bytes is the process's
   std::string configuration_hash;
   std::vector<std::pair<std::string, std::uint64_t>>
       devices{};  // counters of the devices and of the pairing; none in a replay

@@ -61,7 +61,7 @@ struct SourceFacts {
   Recorder::WhenFull when_full = Recorder::WhenFull::wait;
   std::function<bool(Stamp)> disk_full{};  // of Recorder::Options
   std::uint64_t frames = 0;                // of the whole drive; 0: nobody knows
-  std::size_t expected_frames = 0;         // memory is taken for so many
+  std::size_t expected_frames = 0;         // 0: nobody knows
   Stamp first{};                           // of the drive
   std::optional<ClockTie> tie{};           // of stamps to this machine's clock, in real time
   std::optional<SourceIns> ins{};

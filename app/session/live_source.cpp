@@ -82,14 +82,11 @@ void LiveSource::make_acquisition() {
 }
 
 void LiveSource::make_facts() {
-  constexpr double kUnknownDrive = 3600;  // s, memory for as long where nobody knows how long it is
   facts_.adoption = request_.fast ? Adoption::after_fixed_frames : Adoption::when_ready;
   if (!request_.fast) facts_.frame_interval = Duration::seconds(1.0 / configuration_.trigger.rate);
   facts_.when_full = request_.fast ? Recorder::WhenFull::wait : Recorder::WhenFull::drop;
   facts_.frames = devices_.frames();
-  facts_.expected_frames =
-      devices_.frames() > 0 ? devices_.frames()
-                            : static_cast<std::size_t>(kUnknownDrive * configuration_.trigger.rate);
+  facts_.expected_frames = devices_.frames();  // 0: nobody knows
   if (devices_.ins() != nullptr)
     facts_.ins = SourceIns{comparison_options(configuration_), InsComparison::Source::device,
                            "the configuration", 0};

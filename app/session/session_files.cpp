@@ -1,7 +1,6 @@
 #include "app/session/session_files.hpp"
 
 #include <cstring>
-#include <iostream>
 #include <limits>
 
 #include <fmt/format.h>
@@ -150,15 +149,6 @@ void say_verdict(const SessionReport& report, bool quiet, Progress* progress) {
   if (!report.failure.empty()) progress->say("vergence: " + report.failure);
   if (!report.outcome.usable)
     progress->say("vergence: do not use these poses: " + report.outcome.main_reason);
-}
-
-void print_memory_table(const std::vector<std::pair<std::string, std::size_t>>& memory) {
-  std::size_t sum = 0;
-  for (const auto& [what, bytes] : memory) {
-    std::cout << fmt::format("{:<24}{:>14}\n", what, bytes);
-    sum += bytes;
-  }
-  std::cout << fmt::format("{:<24}{:>14}\n", "sum_bytes", sum) << std::flush;
 }
 
 }  // namespace vergence::app

@@ -72,7 +72,4 @@ struct SessionReport {
 /// The last words of a session: closing_lines(); quiet, only what must not be missed.
 void say_verdict(const SessionReport& report, bool quiet, Progress* progress);
 
-/// The table of --memory, on stdout.
-void print_memory_table(const std::vector<std::pair<std::string, std::size_t>>& memory);
-
 }  // namespace vergence::app

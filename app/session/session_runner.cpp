@@ -1,5 +1,6 @@
 #include "app/session/session_runner.hpp"
 
+#include <malloc.h>
 #include <pthread.h>
 
 #include <algorithm>
@@ -22,6 +23,7 @@
 #include "app/session/drive_threads.hpp"
 #include "app/session/event_log.hpp"
 #include "app/session/ins_comparison.hpp"
+#include "app/session/memory_figures.hpp"
 #include "app/session/session_files.hpp"
 #include "app/session/session_output.hpp"
 #include "app/session/session_quota.hpp"
@@ -62,7 +64,7 @@ class SessionRunner {
                      Progress* progress) const;
   [[nodiscard]] ExitCode verdict(const SessionTotals& totals,
                                  const std::vector<std::string>& faults, Progress* progress) const;
-  [[nodiscard]] std::vector<std::pair<std::string, std::size_t>> memory() const;
+  [[nodiscard]] std::vector<MemoryRow> memory() const;
 
   FrameSource& source_;
   const SourceFacts& facts_;
@@ -93,8 +95,9 @@ class SessionRunner {
   std::mutex mutex_;                            // with done_, for the caller's thread that waits
   std::condition_variable changed_;
   bool done_ = false;
-  bool delivering_ = false;  // of the estimator's thread: a frame has come
-  DriveThreads threads_;     // of the caller's thread
+  ResidentMemory resident_{};  // at the drive's end
+  bool delivering_ = false;    // of the estimator's thread: a frame has come
+  DriveThreads threads_;       // of the caller's thread
 };
 
 namespace {
@@ -286,8 +289,8 @@ void SessionRunner::say_remarks(Progress* progress) {
   }
 }
 
-std::vector<std::pair<std::string, std::size_t>> SessionRunner::memory() const {
-  return {{"estimator_bytes", estimator_arena_.capacity()},
+std::vector<MemoryRow> SessionRunner::memory() const {
+  return {{"estimator_bytes", estimator_arena_.capacity(), estimator_arena_.rows()},
           {"comparison_bytes",
            comparison_arena_.capacity() + (facts_.ins ? facts_.ins->reading_bytes : 0)},
           {"images_bytes", facts_.image_bytes},
@@ -311,7 +314,8 @@ SummaryInput SessionRunner::summary_input(const SessionTotals& totals,
   input.allocations_after_seal = allocations;
   input.frame_budget = options_.frame_budget;
   input.allocations = threads_.figures();
-  input.memory = memory();
+  for (const MemoryRow& row : memory()) input.memory.emplace_back(row.name, row.bytes);
+  input.resident = named(resident_);
   input.configuration_hash = configuration_hash(configuration_);
   source_.describe(totals, *estimator_, &input);
   for (SessionObserver* observer : observers_)
@@ -372,6 +376,7 @@ ExitCode SessionRunner::run() {
   Progress progress = Progress::on_stderr(request_.quiet);
   const auto allocations_before = AllocationGuard::allocations_after_seal();
   say_remarks(&progress);
+  (void)::malloc_trim(0);  // what setting up took and gave back goes to the system
   threads_.lock_memory(&progress);
   source_.start(&faults);
   std::thread estimating([this] { estimate(); });
@@ -379,7 +384,10 @@ ExitCode SessionRunner::run() {
   watch(&progress);
   service_.stopping();
   estimating.join();
+  resident_ = resident_memory(
+      {{"estimator_bytes", &estimator_arena_}, {"comparison_bytes", &comparison_arena_}});
   progress.finish();
+  if (request_.print_memory) print_memory_table(resident_);
   source_.finish(&progress, &faults);
 
   if (recording_) recording_->close();

@@ -10,6 +10,8 @@ namespace vergence::calibration {
 namespace {
 
 constexpr std::size_t kFramesATrack = 3;  // at least, on average: sizes the points
+constexpr std::size_t kLanesABlock = 2;   // of the eight, at least, on average: sizes the blocks;
+                                          // recorded drives fill 4.9 to 7.0
 constexpr std::size_t kMostViews = 12;    // of a track that its point is triangulated from
 constexpr double kWildResidual = 40.0;    // px at the start: not the same point
 constexpr double kCertainChange =
@@ -55,7 +57,7 @@ BundleCapacities RigSolver::capacities(const CalibrationOptions& options, int ca
   c.observations =
       std::min(static_cast<std::size_t>(options.max_observations), c.poses * features * c.cameras);
   c.points = c.observations / (kFramesATrack * c.cameras);
-  c.blocks = c.observations / c.cameras;
+  c.blocks = c.observations / (kLanesABlock * c.cameras);
   c.shared = true;
   return c;
 }

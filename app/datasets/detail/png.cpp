@@ -65,7 +65,9 @@ void narrow_row(png_structp png, png_row_infop row, png_bytep data) {
 /// Everything to 8-bit grey.
 void ask_for_grey(png_structp png, png_infop info, DeepSamples* deep) {
   const int colours = png_get_color_type(png, info), depth = png_get_bit_depth(png, info);
-  if (depth == 16) {
+  if (depth == 16 && (colours & PNG_COLOR_MASK_COLOR) != 0) {
+    png_set_strip_16(png);
+  } else if (depth == 16) {
     png_set_read_user_transform_fn(png, narrow_row);
     png_set_user_transform_info(png, deep, 8, 1);
   }

@@ -23,7 +23,7 @@ inline constexpr std::size_t kPngHead = 33;  // bytes of the signature and the w
 /// is_png(). → ok, torn
 [[nodiscard]] ImageFileStatus check_png(std::span<const std::uint8_t> bytes) noexcept;
 
-/// What is done with samples of 16 bits.
+/// What is done with grey samples of 16 bits; of colours the upper 8 are taken.
 struct DeepSamples {
   int bits = 16;           // 8 … 16, of which the upper 8 are taken; what is beyond them is white
   std::uint16_t peak = 0;  // set: the greatest sample; 0 where the file has other samples

@@ -101,10 +101,18 @@ RayTiles::RayTiles(const Camera& camera) {
     }
 }
 
+/// For whatever a later view shows, its pages touched: a drive takes no more memory on its way.
+void Projection::take_memory(const Scene& scene, const RayTiles& tiles) {
+  constexpr std::size_t kUsual = 64;  // polygons of a tile
+  polygons_.resize(scene.polygons.size() + scene.bus.size());
+  candidates_.resize(tiles.bounds.size());
+  for (auto& list : candidates_) list.resize(kUsual);
+}
+
 void Projection::build(const Scene& scene, const RayTiles& tiles, const Camera& camera,
                        const Transform& T_camera_enu, const Transform* T_camera_bus, bool bayer) {
+  if (candidates_.size() != tiles.bounds.size()) take_memory(scene, tiles);
   polygons_.clear();
-  candidates_.resize(tiles.bounds.size());
   for (auto& list : candidates_) list.clear();
   const double f = std::max(camera.intrinsics().fx, camera.intrinsics().fy);
   const double half_angle =

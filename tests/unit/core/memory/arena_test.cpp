@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cstdint>
 #include <cstring>
 #include <limits>
@@ -61,6 +62,41 @@ TEST(Arena, objectsTakeTheirDefaults) {
     EXPECT_EQ(slot.id, -1);
     EXPECT_EQ(slot.score, 0.5F);
   }
+}
+
+TEST(Arena, objectsOfZerosAreZerosWhetherTheyAreConstructedOrNot) {
+  struct Zeros {
+    std::uint64_t number = 0;
+    const char* text = nullptr;
+    std::uint8_t flag = 0;
+  };
+  struct OneAtItsEnd {
+    std::array<std::uint8_t, 200> bytes{};
+    std::uint8_t last = 1;
+  };
+  Arena arena(std::size_t{1} << 16);
+  for (const Zeros& z : arena.make<Zeros>(100, "zeros")) {
+    EXPECT_EQ(z.number, 0U);
+    EXPECT_EQ(z.text, nullptr);
+    EXPECT_EQ(z.flag, 0);
+  }
+  for (const OneAtItsEnd& o : arena.make<OneAtItsEnd>(100, "ones")) {
+    EXPECT_EQ(o.bytes[199], 0);
+    EXPECT_EQ(o.last, 1);
+  }
+}
+
+TEST(Arena, tellsWhoHoldsWhat) {
+  Arena arena(4096);
+  (void)arena.make<std::uint8_t>(65, "tracks");
+  (void)arena.make<double>(8, "poses");
+  (void)arena.make<std::uint8_t>(1, "tracks");
+  ASSERT_EQ(arena.rows().size(), 2U);
+  EXPECT_STREQ(arena.rows()[0].name, "tracks");
+  EXPECT_EQ(arena.rows()[0].bytes, 192U);
+  EXPECT_STREQ(arena.rows()[1].name, "poses");
+  EXPECT_EQ(arena.rows()[1].bytes, 64U);
+  EXPECT_EQ(arena.used(), 256U);
 }
 
 }  // namespace

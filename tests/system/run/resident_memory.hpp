@@ -1,0 +1,131 @@
+#pragma once
+#include <gtest/gtest.h>
+#include <signal.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cstdint>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <optional>
+#include <string>
+#include <thread>
+
+#include "tests/support/temporary_folder.hpp"
+
+/// What is resident of a drive through the mock while it goes on.
+namespace vergence::test {
+
+constexpr std::int64_t kKiB = 1024;
+
+/// Resident bytes. The estimator's arena is zero pages that a drive comes to use one after the
+/// other up to its capacity: it is told apart, with what lies beside it in one mapping.
+struct Resident {
+  std::int64_t arena = 0;   // the largest mapping without a file
+  std::int64_t others = 0;  // all the rest of the process
+};
+
+/// Of a process by its smaps (proc(5)); nothing: it has ended.
+inline std::optional<Resident> resident_of(pid_t process) {
+  std::ifstream smaps("/proc/" + std::to_string(process) + "/smaps");
+  std::int64_t size = 0, largest = 0, all = 0;
+  bool has_file = false;
+  Resident resident;
+  for (std::string line; std::getline(smaps, line);) {
+    const auto dash = line.find('-'), colon = line.find(':');
+    if (dash < colon && dash < line.find(' ')) {  // 7f…-7f… rw-p 00000000 00:00 0   name
+      const std::uint64_t begin = std::strtoull(line.c_str(), nullptr, 16),
+                          end = std::strtoull(line.c_str() + dash + 1, nullptr, 16);
+      size = static_cast<std::int64_t>(end - begin);
+      has_file = line.find_first_of("/[") != std::string::npos;
+    } else if (line.starts_with("Rss:")) {
+      const std::int64_t bytes = kKiB * std::strtoll(line.c_str() + 4, nullptr, 10);
+      all += bytes;
+      if (has_file || size <= largest) continue;
+      largest = size;
+      resident.arena = bytes;
+    }
+  }
+  if (all == 0) return std::nullopt;
+  resident.others = all - resident.arena;
+  return resident;
+}
+
+/// A drive that goes on for `seconds` of its own time with one frame a second.
+struct SlowDrive {
+  int seconds = 0;
+  double speed = 0.0;  // m/s, so that the way lasts as long
+};
+
+constexpr int kMinute = 60;  // frames
+
+inline pid_t start(const SlowDrive& drive, const std::filesystem::path& session) {
+  const std::string file = std::string(VERGENCE_SOURCE_DIR) + "/app/config/mock.yaml",
+                    out = session.string(), duration = std::to_string(drive.seconds),
+                    speed = "mock.speed=" + std::to_string(drive.speed);
+  const pid_t process = ::fork();
+  if (process != 0) return process;
+  ::execl(VERGENCE_PROGRAM, "vergence", "run", file.c_str(), "--fast", "--quiet", "--duration",
+          duration.c_str(), "--out", out.c_str(), "--set", speed.c_str(), "--set",
+          "mock.texture_detail=0", "--set", "cameras.0.size=[320,240]", "--set",
+          "cameras.1.size=[320,240]", "--set", "trigger.rate=1", "--set", "ins.rate=20", "--set",
+          "odometry.max_gap_s=5", nullptr);
+  ::_exit(127);
+}
+
+/// Frames that a session has written the poses of.
+inline int frames_written(const std::filesystem::path& session) {
+  std::ifstream file(session / "poses.csv");
+  return static_cast<int>(std::count(std::istreambuf_iterator<char>(file), {}, '\n')) - 1;
+}
+
+/// Resident after a minute of the drive, and the last before its end or before `wall` is over.
+struct Growth {
+  std::optional<Resident> after_a_minute{};
+  Resident at_the_end{};
+  int frames = 0;
+};
+
+inline Growth growth_of(const SlowDrive& drive, std::chrono::seconds wall) {
+  constexpr int kReport = 5;  // frames before the end: what is written then takes memory of its own
+  constexpr std::chrono::milliseconds kLook{500};
+  const TemporaryFolder folder;
+  const pid_t process = start(drive, folder / "s");
+  const auto until = std::chrono::steady_clock::now() + wall;
+  Growth growth;
+  while (::waitpid(process, nullptr, WNOHANG) == 0) {
+    const auto now = resident_of(process);
+    const int frames = frames_written(folder / "s");
+    if (now && frames >= kMinute && frames < drive.seconds - kReport) {
+      if (!growth.after_a_minute) growth.after_a_minute = now;
+      growth.at_the_end = *now;
+      growth.frames = frames;
+    }
+    if (std::chrono::steady_clock::now() > until) {
+      (void)::kill(process, SIGKILL);
+      (void)::waitpid(process, nullptr, 0);
+      break;
+    }
+    std::this_thread::sleep_for(kLook);
+  }
+  return growth;
+}
+
+/// `least`: frames below which nothing is said of the machine's pace.
+inline void expect_flat(const Growth& growth, int least) {
+  constexpr std::int64_t kMiB = 1024 * kKiB;
+  if (growth.frames < least)
+    GTEST_SKIP() << "this machine is too slow: " << growth.frames << " frames";
+  const std::int64_t others = growth.at_the_end.others - growth.after_a_minute->others,
+                     arena = growth.at_the_end.arena - growth.after_a_minute->arena;
+  EXPECT_LE(others, kMiB) << "after " << growth.frames << " frames";
+  testing::Test::RecordProperty("frames", growth.frames);
+  testing::Test::RecordProperty("growth_bytes", std::to_string(others));
+  testing::Test::RecordProperty("growth_of_the_arena_bytes", std::to_string(arena));
+}
+
+}  // namespace vergence::test
