@@ -1,8 +1,12 @@
 // Runs an entry point of libFuzzer without libFuzzer: NAME_mutations SECONDS CORPUS. Inputs of the
 // corpus as they are, then mutated, in an order that is always the same; what crashes is left in
-// CORPUS/../NAME-last. Blind to coverage, but it needs no second compiler: scripts/fuzz searches.
+// CORPUS-last. Blind to coverage, but it needs no second compiler: scripts/fuzz searches.
+#include <fcntl.h>
+#include <unistd.h>
+
 #include <algorithm>
 #include <chrono>
+#include <csignal>
 #include <cstddef>
 #include <cstdint>
 #include <cstdio>
@@ -36,11 +40,20 @@ std::vector<Bytes> read_corpus(const std::filesystem::path& folder) {
   return inputs;
 }
 
-/// Where the input at hand lies, should the next one not come.
-void keep(const std::filesystem::path& file, const Bytes& input) {
-  std::ofstream out(file, std::ios::binary | std::ios::trunc);
-  out.write(reinterpret_cast<const char*>(input.data()),
-            static_cast<std::streamsize>(input.size()));
+const Bytes* at_hand = nullptr;  // what the entry point is given, for the handler
+std::string last;                // the file that it is left in
+
+/// Only what a handler may call.
+extern "C" void leave_input(int number) {
+  const int fd = ::open(last.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644);
+  if (fd >= 0 && at_hand != nullptr) (void)!::write(fd, at_hand->data(), at_hand->size());
+  std::signal(number, SIG_DFL);
+  std::raise(number);
+}
+
+void probe(const Bytes& input) {
+  at_hand = &input;
+  (void)LLVMFuzzerTestOneInput(input.data(), input.size());
 }
 
 /// Some of one and the rest of another.
@@ -66,11 +79,10 @@ int main(int argc, char** argv) {
     std::fprintf(stderr, "%s: %s holds no inputs\n", argv[0], argv[2]);
     return 2;
   }
-  const std::filesystem::path last = std::string(argv[2]) + "-last";
-  for (const Bytes& input : corpus) {
-    keep(last, input);
-    (void)LLVMFuzzerTestOneInput(input.data(), input.size());
-  }
+  last = std::string(argv[2]) + "-last";
+  for (const int number : {SIGABRT, SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGTERM})
+    std::signal(number, leave_input);
+  for (const Bytes& input : corpus) probe(input);
   const auto until = Clock::now() + std::chrono::duration<double>(std::strtod(argv[1], nullptr));
   vergence::Random random(1, 24);
   const auto any = [&] { return corpus[random.below(static_cast<std::uint32_t>(corpus.size()))]; };
@@ -78,16 +90,14 @@ int main(int argc, char** argv) {
   for (auto begun = Clock::now(); begun < until; ++inputs) {
     const Bytes input = vergence::test::mutated(
         random.below(8) == 0 ? crossed(any(), any(), &random) : any(), &random);
-    keep(last, input);
-    (void)LLVMFuzzerTestOneInput(input.data(), input.size());
+    probe(input);
     const auto now = Clock::now();
     if (std::chrono::duration<double>(now - begun).count() > kLongest) {
-      std::fprintf(stderr, "%s: takes longer than %.0f s\n", last.c_str(), kLongest);
-      return 1;
+      std::fprintf(stderr, "an input takes longer than %.0f s\n", kLongest);
+      std::abort();
     }
     begun = now;
   }
-  std::filesystem::remove(last);
   std::printf("%llu inputs: no finding\n", static_cast<unsigned long long>(inputs));
   return 0;
 }
