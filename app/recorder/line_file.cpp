@@ -20,9 +20,7 @@ int open_for_lines(const std::filesystem::path& file) {
 }  // namespace
 
 LineFile::LineFile(const std::filesystem::path& file, std::size_t pending)
-    : path_(file),
-      pending_(pending),
-      fd_(open_for_lines(file)) {
+    : path_(file), pending_(pending), fd_(open_for_lines(file)) {
   if (fd_ < 0)
     throw InputError(file.string() + ": cannot be written (" + std::strerror(errno) +
                      "): check the folder's permissions");

@@ -44,7 +44,8 @@ struct RecordingCounters {
 /// Queues     One for each producer thread. What is posted lies there as it will lie in the file;
 ///            the thread takes all that waits every 20 ms and writes it as a chunk when its oldest
 ///            message has waited 40 ms. So a process that is killed loses the last 100 ms at most.
-/// Files      Rolled by size, by time, by roll() and when the index is full: drive.mcap becomes drive_0.mcap,
+/// Files      Rolled by size, by time, by roll() and when the index is full: drive.mcap becomes
+/// drive_0.mcap,
 ///            the next is drive_1.mcap. Every file begins with all schemas, channels and the
 ///            preamble.
 /// Events     With keep > 0 only what was posted up to so long before an event and so long after
