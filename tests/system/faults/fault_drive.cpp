@@ -19,6 +19,9 @@ namespace {
 constexpr Stamp kStart{1'577'836'800'000'000'000};  // of every --fast drive
 constexpr Duration kLongestDrive = Duration::seconds(86400.0);
 
+/// Of the drive with this first pose: in real time that is where it begins.
+Stamp start_of(Stamp first) { return first - kStart > kLongestDrive ? first : kStart; }
+
 std::vector<std::string> cells_of(const std::string& line) {
   std::vector<std::string> cells;
   std::istringstream in(line);
@@ -47,7 +50,7 @@ void read_poses(const std::filesystem::path& file, double from_s, FaultDrive* d)
       pose.T_world_left.R =
           Eigen::Quaterniond(n[6], n[3], n[4], n[5]).normalized().toRotationMatrix();
     }
-    if (d->poses.empty() && pose.stamp - kStart > kLongestDrive) start = pose.stamp;
+    if (d->poses.empty()) start = start_of(pose.stamp);
     const double at = (pose.stamp - start).to_seconds();
     if (at >= from_s && pose.status != PoseStatus::ok) ++d->reasons[cells[reason]];
     d->poses.push_back(pose);
@@ -58,8 +61,7 @@ void read_poses(const std::filesystem::path& file, double from_s, FaultDrive* d)
 void read_events(const std::filesystem::path& file, double from_s, FaultDrive* d) {
   std::ifstream in(file);
   Stamp start = kStart;
-  if (!d->poses.empty() && d->poses.front().stamp - kStart > kLongestDrive)
-    start = d->poses.front().stamp;
+  if (!d->poses.empty()) start = start_of(d->poses.front().stamp);
   for (std::string line; std::getline(in, line);) {
     const auto event = nlohmann::json::parse(line);
     const Stamp stamp(event["stamp_ns"].get<std::int64_t>());
@@ -101,7 +103,12 @@ FaultDrive drive_with_faults(const FaultCase& c) {
 FaultResult judge(const FaultCase& c, const FaultDrive& drive, const NormalError& normal) {
   FaultResult r;
   if (drive.truth.empty()) return r;
-  r.honesty = judge_honesty(drive.poses, normal, drive.truth);
+  const Duration later =
+      drive.poses.empty() ? Duration{} : start_of(drive.poses.front().stamp) - kStart;
+  const NormalError there = [&](Stamp at, std::size_t frames) {
+    return normal(at - later, frames);
+  };
+  r.honesty = judge_honesty(drive.poses, there, drive.truth);
   std::size_t first = 0, run = 0;
   for (std::size_t i = 0; i < drive.poses.size() && run < kHonestyFrames; ++i) {
     run = drive.poses[i].status == PoseStatus::ok && drive.at_s[i] >= c.until_s ? run + 1 : 0;
@@ -111,7 +118,7 @@ FaultResult judge(const FaultCase& c, const FaultDrive& drive, const NormalError
   r.recovery_s = drive.at_s[first] - c.until_s;
   const std::vector<JudgedPose> after(drive.poses.begin() + static_cast<std::ptrdiff_t>(first),
                                       drive.poses.end());
-  r.error_after = judge_honesty(after, normal, drive.truth).most_full;
+  r.error_after = judge_honesty(after, there, drive.truth).most_full;
   return r;
 }
 
