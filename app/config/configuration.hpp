@@ -179,6 +179,7 @@ struct Configuration {
   SessionsSettings sessions{};
   RealtimeSettings realtime{};
   std::array<std::string, kMostFaults> faults{};  // `KIND@SECONDS NAME=NUMBER …`; empty: none
+  int preset = 0;  // odometry.preset: 1: small, what other keys are that nobody gave
   OdometryOptions odometry{};
   calibration::CalibrationOptions calibration{};
   int online = 1;  // calibration.online: 0: the calibration given is used for ever

@@ -221,5 +221,19 @@ TEST(Configuration, ABracketOrCommaThatNothingOpenedIsRefused) {
       << refusal("\n,a: 1}");
 }
 
+TEST(Configuration, aPresetIsWhatKeysAreThatNobodyGave) {
+  const Configuration plain = parse_configuration("threads: 2", "c.yaml", {});
+  const Configuration small = parse_configuration("odometry: {features: 333, preset: small}",
+                                                  "c.yaml", {"calibration.max_frames=60"});
+  EXPECT_EQ(small.odometry.features, 333) << "given before it";
+  EXPECT_EQ(small.calibration.max_frames, 60) << "given after it";
+  EXPECT_EQ(small.odometry.window_keyframes, 8);
+  EXPECT_EQ(small.calibration.max_observations, 50'000);
+  const Configuration taken_back =
+      parse_configuration("odometry: {preset: small}", "c.yaml", {"odometry.preset=default"});
+  EXPECT_EQ(canonical_text(taken_back), canonical_text(plain)) << "the last one counts";
+  EXPECT_THROW((void)parse_configuration("odometry: {preset: tiny}", "c.yaml", {}), InputError);
+}
+
 }  // namespace
 }  // namespace vergence::app
