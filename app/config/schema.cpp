@@ -461,8 +461,9 @@ Group mock() {
       .number("suspension", &M::suspension, 0, 3, "",
               "Gain on pitch, roll and heave of the springs.")
       .number("vibration", &M::vibration, 0, 5, "", "Gain on the shake at 6 to 12 Hz.")
-      .number("stop_s", &M::stop_s, 1, 60, "s",
-              "Length of each stop, and of the standing start and end.")
+      .number(
+          "stop_s", &M::stop_s, 1, 3600, "s",
+          "Length of each stop, and of the standing start and end, which last a minute at most.")
       .number("hill_deg", &M::hill_deg, 0, 5, "°", "Steepest slope of the streets.")
       .number("clock_drift_ppm", &M::clock_drift_ppm, 0, 150, "ppm",
               "Largest drift of the devices' clocks; each has its own.")
@@ -722,6 +723,17 @@ Group publish() {
       .done();
 }
 
+Group sessions() {
+  using S = SessionsSettings;
+  return Rows<S>(
+             "sessions", "The session folders beside the one of `--out`.",
+             [](auto& c) -> auto& { return c.sessions; })
+      .integer("quota_mb", &S::quota_mb, 0, 1'000'000'000, "MB",
+               "What they may take together: before a drive the oldest that are over it are "
+               "removed, whole. 0: none is ever removed.")
+      .done();
+}
+
 Group realtime() {
   using R = RealtimeSettings;
   return Rows<R>(
@@ -754,7 +766,7 @@ const std::vector<Group>& schema() {
                                          sync(),     odometry(),   calibration_options(),
                                          monitor(),  comparison(), kitti_raw(),
                                          mock(),     record(),     publish(),
-                                         realtime(), faults()};
+                                         sessions(), realtime(),   faults()};
   return groups;
 }
 

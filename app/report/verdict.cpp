@@ -329,7 +329,11 @@ void advise_by_reasons(const Session& s, const Analysis& a, Judge* j) {
         n > 0)
       j->advise(fmt::format("{} ({} frame{} skipped): {}", skip.word, n, n == 1 ? "" : "s",
                             skip.sentence));
+  const bool changed = std::any_of(s.events.begin(), s.events.end(),
+                                   [](const Event& e) { return e.kind == "rig_changed"; });
   for (const Advice& advice : pose_advice()) {
+    // Frames that were doubted for a moment, or a calibration that was asked for, are no knock.
+    if (advice.word == std::string_view("recalibrating") && !changed) continue;
     const auto found = std::find(s.reasons.begin(), s.reasons.end(), advice.word);
     if (found == s.reasons.end()) continue;
     const auto i = static_cast<std::size_t>(found - s.reasons.begin());

@@ -10,8 +10,8 @@
 #include "core/odometry/blob_matcher.hpp"
 #include "core/odometry/map.hpp"
 #include "core/odometry/options.hpp"
-#include "core/types/frame_effort.hpp"
 #include "core/odometry/undistorted_camera.hpp"
+#include "core/types/frame_effort.hpp"
 #include "core/types/parallel.hpp"
 #include "core/types/rig_frame.hpp"
 

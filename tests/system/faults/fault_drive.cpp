@@ -17,6 +17,7 @@ namespace vergence::test {
 namespace {
 
 constexpr Stamp kStart{1'577'836'800'000'000'000};  // of every --fast drive
+constexpr Duration kLongestDrive = Duration::seconds(86400.0);
 
 std::vector<std::string> cells_of(const std::string& line) {
   std::vector<std::string> cells;
@@ -33,6 +34,7 @@ void read_poses(const std::filesystem::path& file, double from_s, FaultDrive* d)
   enum Column : std::size_t { stamp_ns = 1, status = 3, reason = 4, x = 5, columns = 12 };
   std::ifstream in(file);
   std::string line;
+  Stamp start = kStart;    // in real time it is the first pose's
   std::getline(in, line);  // the head
   while (std::getline(in, line)) {
     const std::vector<std::string> cells = cells_of(line);
@@ -45,7 +47,8 @@ void read_poses(const std::filesystem::path& file, double from_s, FaultDrive* d)
       pose.T_world_left.R =
           Eigen::Quaterniond(n[6], n[3], n[4], n[5]).normalized().toRotationMatrix();
     }
-    const double at = (pose.stamp - kStart).to_seconds();
+    if (d->poses.empty() && pose.stamp - kStart > kLongestDrive) start = pose.stamp;
+    const double at = (pose.stamp - start).to_seconds();
     if (at >= from_s && pose.status != PoseStatus::ok) ++d->reasons[cells[reason]];
     d->poses.push_back(pose);
     d->at_s.push_back(at);
@@ -54,10 +57,13 @@ void read_poses(const std::filesystem::path& file, double from_s, FaultDrive* d)
 
 void read_events(const std::filesystem::path& file, double from_s, FaultDrive* d) {
   std::ifstream in(file);
+  Stamp start = kStart;
+  if (!d->poses.empty() && d->poses.front().stamp - kStart > kLongestDrive)
+    start = d->poses.front().stamp;
   for (std::string line; std::getline(in, line);) {
     const auto event = nlohmann::json::parse(line);
     const Stamp stamp(event["stamp_ns"].get<std::int64_t>());
-    if ((stamp - kStart).to_seconds() >= from_s) ++d->events[event["kind"].get<std::string>()];
+    if ((stamp - start).to_seconds() >= from_s) ++d->events[event["kind"].get<std::string>()];
   }
 }
 
@@ -67,11 +73,14 @@ FaultDrive drive_with_faults(const FaultCase& c) {
   const TemporaryFolder folder;
   const auto session = folder / "s";
   std::string arguments = fmt::format(
-      "run '{}/app/config/mock_board.yaml' --fast --quiet --duration {} --out '{}' "
+      "run '{}/app/config/mock_board.yaml' {} --quiet --duration {} --out '{}' "
       "--set cameras.0.size=[320,240] --set cameras.1.size=[320,240] {}",
-      VERGENCE_SOURCE_DIR, c.duration_s, session.string(), c.more);
+      VERGENCE_SOURCE_DIR, c.system.empty() ? "--fast" : "", c.duration_s, session.string(),
+      c.more);
   for (const std::string& fault : c.faults) arguments += " --fault '" + fault + "'";
-  const Outcome outcome = run_vergence(arguments);
+  const Outcome outcome = run_vergence(
+      arguments,
+      c.system.empty() ? "" : fmt::format("{} LD_PRELOAD='{}'", c.system, VERGENCE_FAULTY_SYSTEM));
   FaultDrive d;
   d.code = outcome.code;
   d.err = outcome.err;
@@ -116,7 +125,8 @@ std::string fault_table_line(const FaultCase& c, const FaultDrive& drive,
   std::string faults, seen;
   for (const std::string& fault : c.faults)
     faults += fmt::format("{}`{}`", faults.empty() ? "" : " ", fault);
-  if (!c.more.empty()) faults += fmt::format("{}`{}`", faults.empty() ? "" : " ", c.more);
+  for (const std::string& more : {c.more, c.system})
+    if (!more.empty()) faults += fmt::format("{}`{}`", faults.empty() ? "" : " ", more);
   for (const auto& [kind, count] : drive.events) {
     if (kind == "fault" || kind == "state") continue;
     seen += fmt::format("{}`{}`{}", seen.empty() ? "" : ", ", kind,

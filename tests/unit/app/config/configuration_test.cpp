@@ -224,5 +224,16 @@ TEST(Configuration, aPresetIsWhatKeysAreThatNobodyGave) {
   EXPECT_THROW((void)parse_configuration("odometry: {preset: tiny}", "c.yaml", {}), InputError);
 }
 
+TEST(Configuration, ABracketOrCommaThatNothingOpenedIsRefused) {
+  // yaml-cpp 0.7 reads empty documents there for ever.
+  for (const char* text : {",a: 1}", "  ,k: 2]x", "\n, 72], m", "threads: 1\n...\n,a: 1}"}) {
+    const std::string sentence = refusal(text);
+    EXPECT_TRUE(contains(sentence, "is not YAML") || contains(sentence, "several YAML documents"))
+        << text << ": " << sentence;
+  }
+  EXPECT_TRUE(contains(refusal("\n,a: 1}"), ":2: is not YAML: a value is expected"))
+      << refusal("\n,a: 1}");
+}
+
 }  // namespace
 }  // namespace vergence::app

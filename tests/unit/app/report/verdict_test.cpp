@@ -55,6 +55,17 @@ TEST(Verdict, withoutAReferenceItIsNeverGood) {
   EXPECT_TRUE(any_has(v.reasons, "no reference"));
 }
 
+TEST(Verdict, aDoubtThatPassedIsNoKnock) {
+  Case c;
+  c.session.reasons = {"recalibrating"};
+  c.analysis.by_reason = {3};
+  EXPECT_FALSE(any_has(c.verdict().advice, "knocked"));
+  Event changed;
+  changed.kind = "rig_changed";
+  c.session.events.push_back(changed);
+  EXPECT_TRUE(any_has(c.verdict().advice, "recalibrating (3 frames)"));
+}
+
 TEST(Verdict, driftAndScaleMoveTheGradeAtTheirLimits) {
   const std::vector<std::pair<double, Grade>> drifts{
       {0.02, Grade::good}, {0.021, Grade::care}, {0.05, Grade::care}, {0.051, Grade::bad}};
@@ -91,10 +102,13 @@ TEST(Verdict, theWorstReasonComesFirst) {
 }
 
 TEST(Verdict, everyReasonOfAPoseHasItsAdvice) {
+  Event changed;
+  changed.kind = "rig_changed";
   for (int i = 1; i <= static_cast<int>(Reason::unproven_pairing); ++i) {
     Case c;
     c.session.reasons.emplace_back(to_string(static_cast<Reason>(i)));
     c.analysis.by_reason = {0, 3};
+    c.session.events.push_back(changed);
     EXPECT_TRUE(any_has(c.verdict().advice, "3 frames")) << c.session.reasons.back();
   }
 }
