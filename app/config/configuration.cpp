@@ -4,6 +4,7 @@
 #include <charconv>
 #include <map>
 #include <set>
+#include <utility>
 
 #include <fmt/format.h>
 #include <yaml-cpp/yaml.h>
@@ -287,9 +288,26 @@ std::vector<Entry> with_record_as_switches(std::vector<Entry> entries) {
   return entries;
 }
 
+/// What `odometry.preset` stands for comes first: a key that is given goes before it. The last
+/// preset counts; one that is none is refused with the other values.
+std::vector<Entry> with_preset(std::vector<Entry> entries) {
+  const auto preset = std::find_if(entries.rbegin(), entries.rend(), [](const Entry& entry) {
+    return entry.name == "odometry.preset";
+  });
+  if (preset == entries.rend() || preset->value != "small") return entries;
+  std::vector<Entry> all;
+  for (const auto& [key, value] : {std::pair{"odometry.features", "250"},
+                                   {"odometry.window_keyframes", "8"},
+                                   {"calibration.max_frames", "100"},
+                                   {"calibration.max_observations", "50000"}})
+    all.push_back({key, value, true, preset->origin});
+  all.insert(all.end(), entries.begin(), entries.end());
+  return all;
+}
+
 Configuration from_entries(const std::vector<Entry>& given, const std::string& name) {
   const std::vector<Entry> entries =
-      with_record_as_switches(with_options_as_text(with_faults_as_text(given)));
+      with_preset(with_record_as_switches(with_options_as_text(with_faults_as_text(given))));
   Configuration configuration;
   for (const Entry& entry : entries) apply(entry, &configuration);
   if (const std::string sentence = find_contradiction(configuration); !sentence.empty())

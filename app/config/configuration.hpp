@@ -138,6 +138,11 @@ struct RecordSettings {
   [[nodiscard]] bool any() const noexcept { return poses + ins + images > 0; }
 };
 
+/// `sessions:` the folders that drives leave side by side.
+struct SessionsSettings {
+  int quota_mb = 0;  // 0: none
+};
+
 /// `publish:` what others see of a running session (docs/publish.md). Empty: nothing.
 struct PublishSettings {
   std::string lines{};       // unix:///PATH, udp://HOST:PORT
@@ -171,8 +176,10 @@ struct Configuration {
   MockSettings mock{};
   RecordSettings record{};
   PublishSettings publish{};
+  SessionsSettings sessions{};
   RealtimeSettings realtime{};
   std::array<std::string, kMostFaults> faults{};  // `KIND@SECONDS NAME=NUMBER …`; empty: none
+  int preset = 0;  // odometry.preset: 1: small, what other keys are that nobody gave
   OdometryOptions odometry{};
   calibration::CalibrationOptions calibration{};
   int online = 1;  // calibration.online: 0: the calibration given is used for ever

@@ -69,7 +69,16 @@ Group odometry() {
                "Most poses tried on random point triples, a frame.")
       .integer("seed", &O::seed, 0, kLargestSeed, "",
                "Seed of that sampling: the same seed gives the same poses.");
-  return rows.done();
+  return rows
+      .also(Rows<Configuration>(
+                "odometry", "", [](auto& c) -> auto& { return c; })
+                .choice("preset", &Configuration::preset, {"default", "small"},
+                        "`small`, for small boards: `odometry.features` 250, "
+                        "`odometry.window_keyframes` 8, `calibration.max_frames` 100 and "
+                        "`calibration.max_observations` 50000 where they are not given; what it "
+                        "costs and saves is in docs/deployment.md.")
+                .done())
+      .done();
 }
 
 Group calibration_options() {

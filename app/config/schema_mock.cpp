@@ -86,8 +86,9 @@ Group mock() {
       .number("suspension", &M::suspension, 0, 3, "",
               "Gain on pitch, roll and heave of the springs.")
       .number("vibration", &M::vibration, 0, 5, "", "Gain on the shake at 6 to 12 Hz.")
-      .number("stop_s", &M::stop_s, 1, 60, "s",
-              "Length of each stop, and of the standing start and end.")
+      .number(
+          "stop_s", &M::stop_s, 1, 3600, "s",
+          "Length of each stop, and of the standing start and end, which last a minute at most.")
       .number("hill_deg", &M::hill_deg, 0, 5, "°", "Steepest slope of the streets.")
       .number("clock_drift_ppm", &M::clock_drift_ppm, 0, 150, "ppm",
               "Largest drift of the devices' clocks; each has its own.")

@@ -1,14 +1,17 @@
 #include "app/config/yaml_file.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cerrno>
 #include <charconv>
 #include <cmath>
 #include <cstring>
 #include <fstream>
+#include <sstream>
 #include <system_error>
 
 #include <fmt/format.h>
+#include <yaml-cpp/eventhandler.h>
 #include <yaml-cpp/yaml.h>
 
 #include "app/runtime/errors.hpp"
@@ -44,6 +47,47 @@ std::string shown(const std::string& scalar) {
   return scalar.size() <= kShown ? scalar : scalar.substr(0, kShown) + "…";
 }
 
+/// Looks at the first two documents of a text without building them.
+class DocumentCounter final : public YAML::EventHandler {
+ public:
+  explicit DocumentCounter(const std::string& text) : in_(text), parser_(in_) {
+    while (count < 2 && parser_.HandleNextDocument(*this)) {
+    }
+  }
+  int count = 0;
+  std::array<YAML::Mark, 2> start{};
+
+  void OnDocumentStart(const YAML::Mark& mark) override {
+    start[static_cast<std::size_t>(count++)] = mark;
+  }
+  void OnDocumentEnd() override {}
+  void OnNull(const YAML::Mark& /*mark*/, YAML::anchor_t /*anchor*/) override {}
+  void OnAlias(const YAML::Mark& /*mark*/, YAML::anchor_t /*anchor*/) override {}
+  void OnScalar(const YAML::Mark& /*mark*/, const std::string& /*tag*/, YAML::anchor_t /*anchor*/,
+                const std::string& /*value*/) override {}
+  void OnSequenceStart(const YAML::Mark& /*mark*/, const std::string& /*tag*/,
+                       YAML::anchor_t /*anchor*/, YAML::EmitterStyle::value /*style*/) override {}
+  void OnSequenceEnd() override {}
+  void OnMapStart(const YAML::Mark& /*mark*/, const std::string& /*tag*/, YAML::anchor_t /*anchor*/,
+                  YAML::EmitterStyle::value /*style*/) override {}
+  void OnMapEnd() override {}
+
+ private:
+  std::istringstream in_;
+  YAML::Parser parser_;
+};
+
+/// At a comma or bracket that nothing opened yaml-cpp 0.7 finds empty documents without end, each
+/// at the same place: LoadAll() never comes back.
+void check_documents(const std::string& text, const std::string& name) {
+  const DocumentCounter documents(text);
+  if (documents.count < 2) return;
+  if (documents.start[0].pos == documents.start[1].pos)
+    throw InputError(
+        fmt::format("{}:{}: is not YAML: a value is expected", name, documents.start[0].line + 1));
+  throw InputError(name + ": holds several YAML documents (lines of ---); one is expected");
+}
+
 template <class Number>
 bool parse_whole(const std::string& text, Number* value) {
   const char* end = text.data() + text.size();
@@ -61,11 +105,9 @@ YamlFile YamlFile::parse(std::string_view text, std::string name) {
   YamlFile file;
   file.name_ = std::move(name);
   try {
-    const auto documents = YAML::LoadAll(std::string(text));
-    if (documents.size() > 1)
-      throw InputError(file.name_ +
-                       ": holds several YAML documents (lines of ---); one is expected");
-    if (!documents.empty()) file.root_.reset(documents.front());
+    const std::string whole(text);
+    check_documents(whole, file.name_);
+    file.root_.reset(YAML::Load(whole));
   } catch (const YAML::Exception& error) {
     const std::string line = error.mark.is_null() ? "" : ":" + std::to_string(error.mark.line + 1);
     throw InputError(file.name_ + line + ": is not YAML: " + error.msg);

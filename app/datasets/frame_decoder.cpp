@@ -152,8 +152,9 @@ ImageFileStatus FrameDecoder::load(const std::string& name, FrameSlot slot, Work
   } catch (const std::bad_alloc&) {  // a file too long for this machine's memory
     return ImageFileStatus::unreadable;
   }
-  if (!sequence_.bayer) return decode_grey(work->bytes, size, out, stride);
-  const ImageFileStatus status = decode_grey(work->bytes, size, work->mosaic.data(), stride);
+  if (!sequence_.bayer) return decode_grey(work->bytes, size, out, stride, sequence_.deep_bits);
+  const ImageFileStatus status =
+      decode_grey(work->bytes, size, work->mosaic.data(), stride, sequence_.deep_bits);
   const auto step = static_cast<std::ptrdiff_t>(stride);
   if (status == ImageFileStatus::ok)
     bayer_to_grey(work->mosaic.data(), step, size.width, size.height, out, step);
@@ -171,7 +172,8 @@ ImageFileStatus FrameDecoder::load_both(const std::string& name, Workspace* work
   }
   const int width = pool_.width(), height = pool_.height();
   const std::size_t stride = FramePool::stride(width), wide = FramePool::stride(2 * width);
-  if (const auto status = decode_grey(work->bytes, {2 * width, height}, work->mosaic.data(), wide);
+  if (const auto status = decode_grey(work->bytes, {2 * width, height}, work->mosaic.data(), wide,
+                                      sequence_.deep_bits);
       status != ImageFileStatus::ok)
     return status;
   for (std::size_t k = 0; k < 2; ++k) {

@@ -121,13 +121,25 @@ ImageFileStatus check_image(std::span<const std::uint8_t> bytes, ImageSize* size
   return detail::is_png(bytes) ? detail::check_png(bytes) : detail::check_jpeg(bytes);
 }
 
+std::uint16_t peak_of_deep_image(std::span<const std::uint8_t> bytes) {
+  ImageSize size;
+  if (check_image(bytes, &size) != ImageFileStatus::ok || !detail::is_png(bytes)) return 0;
+  const auto width = static_cast<std::size_t>(size.width);
+  std::vector<std::uint8_t> pixels(width * static_cast<std::size_t>(size.height));
+  detail::DeepSamples deep;
+  return detail::decode_png(bytes, size, pixels.data(), width, &deep) == ImageFileStatus::ok
+             ? deep.peak
+             : std::uint16_t{0};
+}
+
 ImageFileStatus decode_grey(std::span<const std::uint8_t> bytes, ImageSize size, std::uint8_t* out,
-                            std::size_t stride) noexcept {
+                            std::size_t stride, int deep_bits) noexcept {
   ImageSize found;
   if (const auto status = check_image(bytes, &found); status != ImageFileStatus::ok) return status;
   if (found != size) return ImageFileStatus::wrong_size;
   if (detail::is_bmp(bytes)) return detail::decode_bmp(bytes, size, out, stride);
-  return detail::is_png(bytes) ? detail::decode_png(bytes, size, out, stride)
+  detail::DeepSamples deep{deep_bits};
+  return detail::is_png(bytes) ? detail::decode_png(bytes, size, out, stride, &deep)
                                : detail::decode_jpeg(bytes, size, out, stride);
 }
 

@@ -4,6 +4,7 @@
 #include <system_error>
 
 #include "app/config/calibration_file.hpp"
+#include "app/datasets/deep_samples.hpp"
 #include "app/datasets/detail/formats.hpp"
 #include "app/datasets/detail/kitti_raw.hpp"
 #include "app/datasets/recorded_session.hpp"
@@ -90,6 +91,7 @@ StereoSequence checked(StereoSequence sequence, const std::filesystem::path& sou
                " pixels and the right one " + text({right.width, right.height}) +
                "; both have to be of one size");
   check_image_sizes(sequence, 0, std::min<std::size_t>(1, sequence.pairs.size()));
+  find_deep_bits(&sequence);
   return sequence;
 }
 

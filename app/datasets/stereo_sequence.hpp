@@ -60,6 +60,7 @@ struct StereoSequence {
   std::shared_ptr<const ImageStore> store{};  // has the images; nothing: they are files below root
   std::shared_ptr<const RecordedIns> ins{};   // that came with the images; nothing: it has files of
                                               // its own (read_recorded_ins()), or there is none
+  int deep_bits = 16;  // of images of 16 bits a sample: so many are used (deep_samples.hpp)
   bool bayer = false;  // images are raw mosaics: grey is made of them (core/types/bayer.hpp)
 };
 

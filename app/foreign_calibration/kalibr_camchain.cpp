@@ -65,6 +65,7 @@ CalibrationFile read_kalibr(const YamlFile& file, Remarks* remarks) {
   RigCalibration& rig = calibration.rig;
   bool of_imu = false;
   std::size_t cameras = 0;
+  if (!file.root().IsMap()) file.fail(file.root(), "is not a group of keys (cam0, cam1, …)");
   for (;; ++cameras) {
     const std::string name = fmt::format("cam{}", cameras);
     const YAML::Node& root = file.root();

@@ -1,6 +1,7 @@
 #include "app/recorder/line_file.hpp"
 
 #include <fcntl.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <cerrno>
@@ -10,10 +11,16 @@
 
 namespace vergence::app {
 
+namespace {
+
+int open_for_lines(const std::filesystem::path& file) {
+  return ::open(file.c_str(), O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0644);
+}
+
+}  // namespace
+
 LineFile::LineFile(const std::filesystem::path& file, std::size_t pending)
-    : path_(file),
-      pending_(pending),
-      fd_(::open(file.c_str(), O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0644)) {
+    : path_(file), pending_(pending), fd_(open_for_lines(file)) {
   if (fd_ < 0)
     throw InputError(file.string() + ": cannot be written (" + std::strerror(errno) +
                      "): check the folder's permissions");
@@ -44,6 +51,22 @@ bool LineFile::flush() {
   waiting_.erase(0, done);
   fault_ = error;
   return error == 0;
+}
+
+bool LineFile::reopen(bool* fresh) {
+  *fresh = false;
+  (void)flush();
+  const int fd = open_for_lines(path_);
+  if (fd < 0) {
+    fault_ = errno;
+    return false;
+  }
+  (void)::fdatasync(fd_);
+  (void)::close(fd_);
+  fd_ = fd;
+  struct stat status {};
+  *fresh = ::fstat(fd_, &status) == 0 && status.st_size == 0;
+  return true;
 }
 
 bool LineFile::close() {

@@ -31,6 +31,10 @@ class LineFile {
   bool append(std::string_view line);
   /// Hands the system what is waiting. False: not all was taken; fault() says why.
   bool flush();
+  /// Hands over what is waiting and opens the file anew by its name: what was moved away stays as
+  /// it is, and a new one begins. *fresh: it is empty. False: it cannot be opened, the old one
+  /// stays in use; fault() says why.
+  bool reopen(bool* fresh);
   /// flush(), then asks the system to put it on the disk, and closes. Twice is harmless.
   bool close();
 

@@ -38,6 +38,12 @@ struct Recorder::Files {
     if (with_ins) all.push_back(&ins.emplace(folder / "ins.csv", kMinutes));
     told.resize(all.size());
   }
+  /// The first line of a table; empty: the file has none.
+  [[nodiscard]] std::string head(const LineFile* file) const {
+    if (file == &poses) return std::string(kPosesHeader) + "\n";
+    if (file == &calibrations) return std::string(kCalibrationsHeader) + "\n";
+    return ins && file == &*ins ? std::string(kInsHeader) + "\n" : "";
+  }
   LineFile trajectory, reference, poses, calibrations, events;
   std::optional<LineFile> ins{};
   std::vector<LineFile*> all;
@@ -109,10 +115,10 @@ Recorder::Recorder(const std::filesystem::path& folder, const Options& options)
   if (options.keep) keeper_ = std::make_unique<CalibrationKeeper>(options.keep, &filled_);
   memory_ = totals_->statuses.capacity() * sizeof(PoseStatus) +
             totals_->attempts.capacity() * sizeof(CalibrationAttempt);
-  for (const LineFile* file : files_->all) memory_ += file->pending();
-  files_->poses.append(std::string(kPosesHeader) + "\n");
-  files_->calibrations.append(std::string(kCalibrationsHeader) + "\n");
-  if (files_->ins) files_->ins->append(std::string(kInsHeader) + "\n");
+  for (LineFile* file : files_->all) {
+    memory_ += file->pending();
+    file->append(files_->head(file));
+  }
   thread_ = std::thread([this] { work(); });
 }
 
@@ -160,6 +166,7 @@ void Recorder::work() {
     const WakeEvent::Ticket seen = filled_.ticket();
     const bool stopping = stop_.load(
         std::memory_order_acquire);  // before the ring: what was posted before is still found
+    if (reopen_.exchange(false, std::memory_order_acquire)) reopen_files();
     const bool took = take(), told = take_outcome();
     if (took || told) {
       if (Clock::now() - flushed < kFlushAtLeast) continue;
@@ -326,6 +333,24 @@ void Recorder::flush() {
   }
   note_disk(pretended_ || std::any_of(files.begin(), files.end(),
                                       [](const LineFile* f) { return f->fault() != 0; }));
+}
+
+void Recorder::reopen() noexcept {
+  reopen_.store(true, std::memory_order_release);
+  filled_.signal();
+}
+
+void Recorder::reopen_files() {
+  for (LineFile* file : files_->all) {
+    bool fresh = false;
+    if (!file->reopen(&fresh)) complain(*file);
+    if (fresh) file->append(files_->head(file));
+  }
+  EventRecord event;
+  event.stamp = newest_;
+  event.kind = "files_reopened";
+  event.set_sentence("the session's files were opened again by their names, as SIGHUP asked for");
+  write(event);
 }
 
 void Recorder::pretend(Stamp stamp) {

@@ -143,6 +143,9 @@ class Recorder {
   void post(const InsRecord& reading) noexcept;
   /// Bytes taken at the beginning: lines that may wait, statuses of the frames expected.
   [[nodiscard]] std::size_t memory() const noexcept { return memory_; }
+  /// Opens every file anew by its name, tables with their heads, as soon as the recorder's thread
+  /// comes to it; an event `files_reopened`. Any thread.
+  void reopen() noexcept;
   /// Sentences about the disk since the last call.
   [[nodiscard]] std::vector<std::string> take_errors();
   /// Writes what is waiting, closes the files. Once.
@@ -165,6 +168,7 @@ class Recorder {
   void note(const EventRecord& event);
   void match_confirmed();
   void flush();
+  void reopen_files();
   void pretend(Stamp stamp);
   void note_disk(bool full);
   [[nodiscard]] std::uint64_t lost_lines() const;
@@ -191,7 +195,7 @@ class Recorder {
   Ring<Record, kRing> ring_;
   Ring<InsRecord, kReadings> readings_;
   WakeEvent filled_, freed_;
-  std::atomic<bool> stop_{false};
+  std::atomic<bool> stop_{false}, reopen_{false};
   std::atomic<std::uint64_t> dropped_{0}, dropped_readings_{0};
   std::size_t high_water_ = 0;                 // the producer's
   Ring<Complaint, 16> complaints_;             // full: the newest are lost

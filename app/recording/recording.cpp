@@ -324,7 +324,8 @@ void Recording::fail(int error) noexcept {
 
 void Recording::roll_if_wanted() noexcept {
   const bool wanted =
-      file_.full() || (options_.roll_bytes > 0 && file_.size() >= options_.roll_bytes) ||
+      roll_asked_.exchange(false, std::memory_order_relaxed) || file_.full() ||
+      (options_.roll_bytes > 0 && file_.size() >= options_.roll_bytes) ||
       (options_.roll_time > Duration{} && file_.last_time() - file_.first_time() >=
                                               static_cast<std::uint64_t>(options_.roll_time.ns()));
   if (!wanted) return;

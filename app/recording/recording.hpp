@@ -44,7 +44,8 @@ struct RecordingCounters {
 /// Queues     One for each producer thread. What is posted lies there as it will lie in the file;
 ///            the thread takes all that waits every 20 ms and writes it as a chunk when its oldest
 ///            message has waited 40 ms. So a process that is killed loses the last 100 ms at most.
-/// Files      Rolled by size, by time and when the index is full: drive.mcap becomes drive_0.mcap,
+/// Files      Rolled by size, by time, by roll() and when the index is full: drive.mcap becomes
+/// drive_0.mcap,
 ///            the next is drive_1.mcap. Every file begins with all schemas, channels and the
 ///            preamble.
 /// Events     With keep > 0 only what was posted up to so long before an event and so long after
@@ -91,6 +92,9 @@ class Recording {
   void commit(std::size_t queue, std::size_t size) noexcept;
   /// Something happened: what is around it is kept.
   void mark_event(Stamp stamp) noexcept;
+
+  /// The file at hand ends after its next chunk, and a new one begins. Any thread.
+  void roll() noexcept { roll_asked_.store(true, std::memory_order_relaxed); }
 
   /// Sentences about the disk since the last call.
   [[nodiscard]] std::vector<std::string> take_errors();
@@ -157,6 +161,7 @@ class Recording {
   std::vector<char> path_, other_path_;
 
   std::atomic<std::int64_t> keep_until_ns_;
+  std::atomic<bool> roll_asked_{false};
   std::atomic<std::uint64_t> newest_ns_{0};  // of what was posted
   std::atomic<std::uint64_t> messages_{0}, bytes_{0}, chunks_{0}, files_{0};
   std::atomic<std::uint64_t> dropped_{0}, dropped_images_{0}, lost_{0}, passed_over_{0};

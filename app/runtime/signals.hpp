@@ -1,4 +1,5 @@
 #pragma once
+#include <cstdint>
 #include <optional>
 
 #include <csignal>
@@ -7,18 +8,21 @@
 
 namespace vergence::app {
 
-/// SIGINT, SIGTERM and SIGHUP become a flag that a command looks at between frames: it stops,
-/// closes its session and returns stop_code(). SIGUSR1 asks for a new calibration; a command that
-/// has none to make takes no notice. SIGPIPE, SIGXFSZ and SIGUSR2 are ignored: they would end a
-/// drive without its summary and report.
+/// SIGINT and SIGTERM become a flag that a command looks at between frames: it stops, closes its
+/// session and returns stop_code(). SIGHUP does the same, or with OnHangup::reopen asks for the
+/// session's files to be opened again; that stops, too, where the program's terminal has gone.
+/// SIGUSR1 asks for a new calibration; a command that has none to make takes no notice. SIGPIPE,
+/// SIGXFSZ and SIGUSR2 are ignored: they would end a drive without its summary and report.
 ///
 /// Ownership  One at a time in a program; the destructor puts the former handlers back.
-/// Threads    stop_requested(), stop_code() and take_calibration_request() from any thread.
+/// Threads    All but construction and destruction from any thread.
 /// Errors     A second signal of the same kind ends the program at once, as it would without this:
 ///            the way out of a hang.
 class SignalGuard {
  public:
-  SignalGuard();
+  enum class OnHangup : std::uint8_t { stop, reopen };
+
+  explicit SignalGuard(OnHangup on_hangup = OnHangup::stop);
   ~SignalGuard();
   SignalGuard(const SignalGuard&) = delete;
   SignalGuard& operator=(const SignalGuard&) = delete;
@@ -29,6 +33,8 @@ class SignalGuard {
   [[nodiscard]] std::optional<ExitCode> stop_code() const noexcept;
   /// Whether SIGUSR1 has come since the last call, however often.
   [[nodiscard]] bool take_calibration_request() const noexcept;
+  /// Whether SIGHUP has asked for the files to be opened again since the last call.
+  [[nodiscard]] bool take_reopen_request() const noexcept;
 
  private:
   struct sigaction former_interrupt_ {};

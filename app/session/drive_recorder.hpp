@@ -36,6 +36,8 @@ class DriveRecorder final : public SessionObserver {
 
   /// Sentences about the disk, since the last call.
   [[nodiscard]] std::vector<std::string> take_errors() { return recording_.take_errors(); }
+  /// The file at hand ends, a new one begins. Any thread.
+  void roll() noexcept { recording_.roll(); }
   /// Ends the files.
   void close() noexcept { recording_.close(); }
   /// Nothing more is recorded. The estimator's thread.

@@ -133,7 +133,7 @@ ExitCode replay_recording(const ReplayRequest& request) {
   const auto source = in_words([&] {
     return std::make_unique<SessionSource>(request, std::move(session), std::move(other));
   });
-  const SignalGuard signals;
+  const SignalGuard signals(SignalGuard::OnHangup::reopen);
   return run_session(*source, request.configuration, request.session, signals);
 }
 
@@ -169,7 +169,7 @@ ExitCode run_replay(const ReplayRequest& request) {
     return std::make_unique<RecordedSource>(request, std::move(sequence), std::move(begin),
                                             std::move(truth), std::move(ins));
   });
-  const SignalGuard signals;
+  const SignalGuard signals(SignalGuard::OnHangup::reopen);
   return run_session(*source, request.configuration, request.session, signals);
 }
 

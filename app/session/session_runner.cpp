@@ -26,6 +26,7 @@
 #include "app/session/memory_figures.hpp"
 #include "app/session/session_files.hpp"
 #include "app/session/session_output.hpp"
+#include "app/session/session_quota.hpp"
 #include "app/session/solver_watch.hpp"
 #include "core/estimator/estimator.hpp"
 #include "core/memory/allocation_guard.hpp"
@@ -81,6 +82,7 @@ class SessionRunner {
   std::unique_ptr<Recorder> recorder_;
   std::unique_ptr<DriveRecorder> recording_;  // null: nothing is recorded
   std::vector<SessionObserver*> observers_;
+  std::vector<std::string> removed_;  // sessions over the quota: a sentence each
 
   // Of the estimator's thread; read by others after it has joined.
   SessionOutput output_;
@@ -216,6 +218,10 @@ void SessionRunner::watch(Progress* progress) {
     if (facts_.on_request && signals_.take_calibration_request())
       calibration_asked_.store(true, std::memory_order_relaxed);
     lock.unlock();
+    if (signals_.take_reopen_request()) {
+      recorder_->reopen();
+      if (recording_) recording_->roll();
+    }
     threads_.look(progress);
     journal_.show(progress, facts_.frames);
     say_recording_errors(progress);
@@ -233,6 +239,8 @@ void SessionRunner::say_recording_errors(Progress* progress) {
 
 void SessionRunner::open(std::vector<std::string>* faults) {
   make_session_folder(request_.out);
+  if (const int quota_mb = configuration_.sessions.quota_mb; quota_mb > 0)
+    removed_ = keep_session_quota(request_.out, static_cast<std::uint64_t>(quota_mb) * 1'000'000);
   Recorder::Options to_record;
   to_record.when_full = facts_.when_full;
   to_record.expected_frames = facts_.expected_frames;
@@ -271,6 +279,10 @@ SessionStart SessionRunner::session_start() const {
 }
 
 void SessionRunner::say_remarks(Progress* progress) {
+  for (const std::string& sentence : removed_) {
+    progress->say("vergence: " + sentence);
+    journal_.tell(facts_.first, "session_removed", sentence, false);
+  }
   for (const SourceRemark& remark : facts_.remarks) {
     if (remark.say) progress->say("vergence: " + remark.sentence);
     if (remark.kind != nullptr) journal_.tell(facts_.first, remark.kind, remark.sentence, false);

@@ -1,5 +1,5 @@
 // Drives of the mock with faults, as the table of docs/faults.md:
-//   fault_bench [single | pairs | random [COUNT [FIRST SEED]]] [part of a name]
+//   fault_bench [single | long | pairs | random [COUNT [FIRST SEED]]] [part of a name]
 // Ends with 1 where an `ok` pose was wrong or a session is not whole.
 #include <cstdint>
 #include <cstdio>
@@ -21,7 +21,7 @@ int main(int argc, char** argv) {
                         first = argc > 3 ? std::strtoull(argv[3], nullptr, 10) : 1;
     for (std::uint64_t i = 0; i < count; ++i) cases.push_back(random_faults(first + i));
   } else {
-    cases = what == "pairs" ? fault_pairs() : single_faults();
+    cases = what == "pairs" ? fault_pairs() : what == "long" ? long_faults() : single_faults();
     if (argc > 2) filter = argv[2];
   }
   const FaultDrive untouched = drive_with_faults(no_fault());

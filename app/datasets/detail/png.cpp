@@ -50,10 +50,27 @@ struct Reader {
   Reader& operator=(const Reader&) = delete;
 };
 
+/// A row of 16-bit grey, big endian, to 8 bits in its place.
+void narrow_row(png_structp png, png_row_infop row, png_bytep data) {
+  if (row->bit_depth != 16) return;
+  auto* deep = static_cast<DeepSamples*>(png_get_user_transform_ptr(png));
+  const auto shift = static_cast<unsigned>(deep->bits - 8);
+  for (std::size_t i = 0; i < row->width; ++i) {
+    const auto sample = static_cast<std::uint16_t>(data[2 * i] << 8U | data[2 * i + 1]);
+    deep->peak = std::max(deep->peak, sample);
+    data[i] = static_cast<png_byte>(std::min(sample >> shift, 255));
+  }
+}
+
 /// Everything to 8-bit grey.
-void ask_for_grey(png_structp png, png_infop info) {
+void ask_for_grey(png_structp png, png_infop info, DeepSamples* deep) {
   const int colours = png_get_color_type(png, info), depth = png_get_bit_depth(png, info);
-  if (depth == 16) png_set_strip_16(png);
+  if (depth == 16 && (colours & PNG_COLOR_MASK_COLOR) != 0) {
+    png_set_strip_16(png);
+  } else if (depth == 16) {
+    png_set_read_user_transform_fn(png, narrow_row);
+    png_set_user_transform_info(png, deep, 8, 1);
+  }
   png_set_strip_alpha(png);
   if (colours == PNG_COLOR_TYPE_PALETTE) png_set_palette_to_rgb(png);
   if ((colours & PNG_COLOR_MASK_COLOR) != 0)
@@ -65,7 +82,7 @@ void ask_for_grey(png_structp png, png_infop info) {
 /// Between setjmp and libpng's longjmp nothing may stand that has a destructor: all of it is the
 /// caller's.
 bool read_rows(const Reader& reader, Source* source, ImageSize size, std::uint8_t* out,
-               std::size_t stride) noexcept {
+               std::size_t stride, DeepSamples* deep) noexcept {
   png_structp png = reader.png;
   png_infop info = reader.info;
   if (setjmp(png_jmpbuf(png)) != 0) return false;
@@ -75,7 +92,7 @@ bool read_rows(const Reader& reader, Source* source, ImageSize size, std::uint8_
                                             't', 0,   'i', 'T', 'X', 't', 0};
   png_set_keep_unknown_chunks(png, PNG_HANDLE_CHUNK_NEVER, kTexts.data(), 3);
   png_read_info(png, info);
-  ask_for_grey(png, info);
+  ask_for_grey(png, info, deep);
   const int passes = png_set_interlace_handling(png);
   png_read_update_info(png, info);
   const auto width = static_cast<std::uint32_t>(size.width),
@@ -122,13 +139,13 @@ ImageFileStatus check_png(Bytes b) noexcept {
   return ImageFileStatus::torn;
 }
 
-ImageFileStatus decode_png(Bytes bytes, ImageSize size, std::uint8_t* out,
-                           std::size_t stride) noexcept {
+ImageFileStatus decode_png(Bytes bytes, ImageSize size, std::uint8_t* out, std::size_t stride,
+                           DeepSamples* deep) noexcept {
   const Reader reader;
   if (reader.info == nullptr) return ImageFileStatus::undecodable;  // no memory
   Source source{bytes};
-  return read_rows(reader, &source, size, out, stride) ? ImageFileStatus::ok
-                                                       : ImageFileStatus::undecodable;
+  return read_rows(reader, &source, size, out, stride, deep) ? ImageFileStatus::ok
+                                                             : ImageFileStatus::undecodable;
 }
 
 }  // namespace vergence::app::detail

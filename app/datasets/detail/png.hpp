@@ -23,10 +23,17 @@ inline constexpr std::size_t kPngHead = 33;  // bytes of the signature and the w
 /// is_png(). → ok, torn
 [[nodiscard]] ImageFileStatus check_png(std::span<const std::uint8_t> bytes) noexcept;
 
-/// Rows of `stride` bytes: the upper 8 of 16 bits, palettes and colours as 0.299 R + 0.587 G +
+/// What is done with grey samples of 16 bits; of colours the upper 8 are taken.
+struct DeepSamples {
+  int bits = 16;           // 8 … 16, of which the upper 8 are taken; what is beyond them is white
+  std::uint16_t peak = 0;  // set: the greatest sample; 0 where the file has other samples
+};
+
+/// Rows of `stride` bytes: 8 of 16 bits as `deep` says, palettes and colours as 0.299 R + 0.587 G +
 /// 0.114 B, alpha dropped.
 /// Precondition: check_png() and the size are right. Throws nothing. → ok, undecodable
 [[nodiscard]] ImageFileStatus decode_png(std::span<const std::uint8_t> bytes, ImageSize size,
-                                         std::uint8_t* out, std::size_t stride) noexcept;
+                                         std::uint8_t* out, std::size_t stride,
+                                         DeepSamples* deep) noexcept;
 
 }  // namespace vergence::app::detail

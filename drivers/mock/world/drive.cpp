@@ -109,6 +109,8 @@ class Path {
 
 // ---- the driver
 
+constexpr double kLongestEnd_s = 60;  // of the standing start and end, however long stops are
+
 /// Distance driven at every kDriveStep: the fastest way along the path within the limits, with
 /// pauses.
 std::vector<double> distances(const Path& path, const std::vector<double>& stops,
@@ -129,7 +131,7 @@ std::vector<double> distances(const Path& path, const std::vector<double>& stops
   for (std::size_t i = n; i-- > 0;)
     v2[i] = std::min(v2[i], v2[i + 1] + 2 * 1.3 * o.acceleration * step);
 
-  const double dt = kDriveStep.to_seconds();
+  const double dt = kDriveStep.to_seconds(), ends = std::min(o.stop_s, kLongestEnd_s);
   std::vector<double> out;
   double time = 0;  // at sample i of the path
   const auto emit_until = [&](double until, double s0, double s1, double t0, double v0, double v1) {
@@ -141,8 +143,9 @@ std::vector<double> distances(const Path& path, const std::vector<double>& stops
   for (std::size_t i = 0; i <= n; ++i) {
     const double s = step * static_cast<double>(i);
     if (std::binary_search(halts.begin(), halts.end(), i)) {
-      emit_until(time + o.stop_s, s, s, time, 0, 0);
-      time += o.stop_s;
+      const double stand = i == 0 || i == n ? ends : o.stop_s;
+      emit_until(time + stand, s, s, time, 0, 0);
+      time += stand;
     }
     if (i == n) break;
     const double v0 = std::sqrt(v2[i]), v1 = std::sqrt(v2[i + 1]), span = 2 * step / (v0 + v1);
@@ -207,7 +210,7 @@ const DriveOptions& checked(const DriveOptions& o) {
   in(o.lateral, 0.5, 5, "lateral");
   in(o.suspension, 0, 3, "suspension");
   in(o.vibration, 0, 5, "vibration");
-  in(o.stop_s, 1, 60, "stop_s");
+  in(o.stop_s, 1, 3600, "stop_s");
   return o;
 }
 

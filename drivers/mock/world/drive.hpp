@@ -26,7 +26,8 @@ struct DriveOptions {
   double lateral = 2.6;       // m/s², in corners; 0.5..5
   double suspension = 1.0;    // gain on pitch, roll and heave of the springs; 0: rigid; up to 3
   double vibration = 1.0;     // gain on the shake at 6–12 Hz; 0: none; up to 5
-  double stop_s = 3.0;  // s, length of each stop of the path, and of the standing start and end
+  double stop_s = 3.0;  // s, length of each stop of the path; 1..3600. The standing start and end
+                        // are as long, a minute at most
 };
 
 /// The vehicle at an instant.

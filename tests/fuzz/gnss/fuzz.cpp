@@ -1,4 +1,4 @@
-// Entry of libFuzzer (clang): cmake --build … --target gnss_fuzz; build/fuzz/gnss_fuzz CORPUS
+// Entry point of libFuzzer.
 #include "tests/fuzz/gnss/probe.hpp"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data,

@@ -1,4 +1,4 @@
-// The probe for libFuzzer:  trigger_fuzz CORPUS
+// Entry point of libFuzzer.
 #include "tests/fuzz/trigger/probe.hpp"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data,

@@ -1,4 +1,4 @@
-// Entry of libFuzzer (clang): cmake --build … --target xbus_fuzz; build/fuzz/xbus_fuzz CORPUS
+// Entry point of libFuzzer.
 #include "tests/fuzz/xbus/probe.hpp"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data,

@@ -17,6 +17,10 @@ namespace vergence::test {
 namespace {
 
 constexpr Stamp kStart{1'577'836'800'000'000'000};  // of every --fast drive
+constexpr Duration kLongestDrive = Duration::seconds(86400.0);
+
+/// Of the drive with this first pose: in real time that is where it begins.
+Stamp start_of(Stamp first) { return first - kStart > kLongestDrive ? first : kStart; }
 
 std::vector<std::string> cells_of(const std::string& line) {
   std::vector<std::string> cells;
@@ -33,6 +37,7 @@ void read_poses(const std::filesystem::path& file, double from_s, FaultDrive* d)
   enum Column : std::size_t { stamp_ns = 1, status = 3, reason = 4, x = 5, columns = 12 };
   std::ifstream in(file);
   std::string line;
+  Stamp start = kStart;    // in real time it is the first pose's
   std::getline(in, line);  // the head
   while (std::getline(in, line)) {
     const std::vector<std::string> cells = cells_of(line);
@@ -45,7 +50,8 @@ void read_poses(const std::filesystem::path& file, double from_s, FaultDrive* d)
       pose.T_world_left.R =
           Eigen::Quaterniond(n[6], n[3], n[4], n[5]).normalized().toRotationMatrix();
     }
-    const double at = (pose.stamp - kStart).to_seconds();
+    if (d->poses.empty()) start = start_of(pose.stamp);
+    const double at = (pose.stamp - start).to_seconds();
     if (at >= from_s && pose.status != PoseStatus::ok) ++d->reasons[cells[reason]];
     d->poses.push_back(pose);
     d->at_s.push_back(at);
@@ -54,10 +60,12 @@ void read_poses(const std::filesystem::path& file, double from_s, FaultDrive* d)
 
 void read_events(const std::filesystem::path& file, double from_s, FaultDrive* d) {
   std::ifstream in(file);
+  Stamp start = kStart;
+  if (!d->poses.empty()) start = start_of(d->poses.front().stamp);
   for (std::string line; std::getline(in, line);) {
     const auto event = nlohmann::json::parse(line);
     const Stamp stamp(event["stamp_ns"].get<std::int64_t>());
-    if ((stamp - kStart).to_seconds() >= from_s) ++d->events[event["kind"].get<std::string>()];
+    if ((stamp - start).to_seconds() >= from_s) ++d->events[event["kind"].get<std::string>()];
   }
 }
 
@@ -67,11 +75,14 @@ FaultDrive drive_with_faults(const FaultCase& c) {
   const TemporaryFolder folder;
   const auto session = folder / "s";
   std::string arguments = fmt::format(
-      "run '{}/app/config/mock_board.yaml' --fast --quiet --duration {} --out '{}' "
+      "run '{}/app/config/mock_board.yaml' {} --quiet --duration {} --out '{}' "
       "--set cameras.0.size=[320,240] --set cameras.1.size=[320,240] {}",
-      VERGENCE_SOURCE_DIR, c.duration_s, session.string(), c.more);
+      VERGENCE_SOURCE_DIR, c.system.empty() ? "--fast" : "", c.duration_s, session.string(),
+      c.more);
   for (const std::string& fault : c.faults) arguments += " --fault '" + fault + "'";
-  const Outcome outcome = run_vergence(arguments);
+  const Outcome outcome = run_vergence(
+      arguments,
+      c.system.empty() ? "" : fmt::format("{} LD_PRELOAD='{}'", c.system, VERGENCE_FAULTY_SYSTEM));
   FaultDrive d;
   d.code = outcome.code;
   d.err = outcome.err;
@@ -92,7 +103,12 @@ FaultDrive drive_with_faults(const FaultCase& c) {
 FaultResult judge(const FaultCase& c, const FaultDrive& drive, const NormalError& normal) {
   FaultResult r;
   if (drive.truth.empty()) return r;
-  r.honesty = judge_honesty(drive.poses, normal, drive.truth);
+  const Duration later =
+      drive.poses.empty() ? Duration{} : start_of(drive.poses.front().stamp) - kStart;
+  const NormalError there = [&](Stamp at, std::size_t frames) {
+    return normal(at - later, frames);
+  };
+  r.honesty = judge_honesty(drive.poses, there, drive.truth);
   std::size_t first = 0, run = 0;
   for (std::size_t i = 0; i < drive.poses.size() && run < kHonestyFrames; ++i) {
     run = drive.poses[i].status == PoseStatus::ok && drive.at_s[i] >= c.until_s ? run + 1 : 0;
@@ -102,7 +118,7 @@ FaultResult judge(const FaultCase& c, const FaultDrive& drive, const NormalError
   r.recovery_s = drive.at_s[first] - c.until_s;
   const std::vector<JudgedPose> after(drive.poses.begin() + static_cast<std::ptrdiff_t>(first),
                                       drive.poses.end());
-  r.error_after = judge_honesty(after, normal, drive.truth).most_full;
+  r.error_after = judge_honesty(after, there, drive.truth).most_full;
   return r;
 }
 
@@ -116,7 +132,8 @@ std::string fault_table_line(const FaultCase& c, const FaultDrive& drive,
   std::string faults, seen;
   for (const std::string& fault : c.faults)
     faults += fmt::format("{}`{}`", faults.empty() ? "" : " ", fault);
-  if (!c.more.empty()) faults += fmt::format("{}`{}`", faults.empty() ? "" : " ", c.more);
+  for (const std::string& more : {c.more, c.system})
+    if (!more.empty()) faults += fmt::format("{}`{}`", faults.empty() ? "" : " ", more);
   for (const auto& [kind, count] : drive.events) {
     if (kind == "fault" || kind == "state") continue;
     seen += fmt::format("{}`{}`{}", seen.empty() ? "" : ", ", kind,

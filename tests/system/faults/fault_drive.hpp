@@ -15,6 +15,7 @@ struct FaultCase {
   std::vector<std::string> faults{};  // as --fault takes them
   double from_s = 0, until_s = 0;     // of the drive: first fault's start, last one's end
   std::string more{};                 // further arguments
+  std::string system{};  // what goes wrong below the program, in real time (faulty_system.c)
   double duration_s = 20;
   double recovers_within_s = 0;
   int known_wrong = 0;  // `ok` poses that are wrong as yet: docs/faults.md names them
@@ -53,6 +54,9 @@ struct FaultResult {
 [[nodiscard]] std::vector<FaultCase> fault_pairs();
 /// One to four of them at random times between 1 and 14 s; the same for the same seed.
 [[nodiscard]] FaultCase random_faults(std::uint64_t seed);
+/// A stand of ten minutes in virtual time; a disk that stalls and a host's clock that is set, in
+/// real time: of `system` the times are the process's, some seconds ahead of the drive's.
+[[nodiscard]] const std::vector<FaultCase>& long_faults();
 /// The drive without any.
 [[nodiscard]] FaultCase no_fault();
 

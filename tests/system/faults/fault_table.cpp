@@ -89,6 +89,28 @@ const std::vector<FaultCase>& single_faults() {
   return all;
 }
 
+const std::vector<FaultCase>& long_faults() {
+  static const std::vector<FaultCase> all = [] {
+    FaultCase stand;
+    stand.name = "standing 10 minutes";
+    stand.more = "--set mock.drive=straight --set mock.stop_s=600";
+    // A minute at the start, then 240 m.
+    stand.from_s = 80, stand.until_s = 690;
+    stand.duration_s = stand.until_s + 12;
+    stand.recovers_within_s = 5;
+    FaultCase stall;
+    stall.name = "disk stalled";
+    stall.system = "VERGENCE_STALL='12 3'";
+    FaultCase set;
+    set.name = "the host's clock set";
+    set.system = "VERGENCE_CLOCK_SET='12 3600'";
+    for (FaultCase* c : {&stall, &set})
+      c->from_s = 9, c->until_s = 15, c->duration_s = 20, c->recovers_within_s = 2.5;
+    return std::vector{stand, stall, set};
+  }();
+  return all;
+}
+
 std::vector<FaultCase> fault_pairs() {
   std::vector<FaultCase> cases;
   for (std::size_t i = 0; i < kinds().size(); ++i) {

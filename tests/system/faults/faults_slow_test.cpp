@@ -21,6 +21,10 @@ void expect_honest(const std::vector<FaultCase>& cases) {
 
 TEST(FaultPairs, leaveNoWrongOkAndAWholeSession) { expect_honest(fault_pairs()); }
 
+TEST(LongFaults, aStandAStalledDiskAndAClockThatIsSetLeaveNoWrongOkAndAWholeSession) {
+  expect_honest(long_faults());
+}
+
 class ManyFaults : public ::testing::TestWithParam<std::uint64_t> {};
 
 TEST_P(ManyFaults, atRandomLeaveNoWrongOkAndAWholeSession) {

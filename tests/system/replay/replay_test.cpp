@@ -3,6 +3,7 @@
 #include <filesystem>
 #include <fstream>
 #include <functional>
+#include <sstream>
 #include <string>
 
 #include <fmt/format.h>
@@ -277,6 +278,48 @@ TEST_F(ReplayedFolder, blackImagesOnlyEndWithOneAndSayWhy) {
   const Outcome o = replay();
   EXPECT_EQ(o.code, 1) << o.err;
   EXPECT_NE(read_file(session() / "poses.csv").find("image_dark"), std::string::npos);
+}
+
+TEST_F(ReplayedFolder, imagesOfTwelveBitsInSixteenGiveThePosesOfTheirEight) {
+  const auto rewrite = [this](int depth) {
+    for (std::size_t i = 0; i < kFrames; ++i)
+      for (int k = 0; k < 2; ++k) {
+        const std::string file = (data() / image_name(k, i)).string();
+        cv::Mat image = cv::imread(file, cv::IMREAD_GRAYSCALE), out;
+        image.at<std::uint8_t>(0, 0) = 255;  // of twelve bits the greatest
+        image.convertTo(out, depth, depth == CV_16U ? 16 : 1, depth == CV_16U ? 15 : 0);
+        ASSERT_TRUE(cv::imwrite(file, out));
+      }
+  };
+  rewrite(CV_8U);
+  ASSERT_EQ(replay().code, 0);
+  const std::string poses = read_file(session() / "trajectory.tum");
+  fs::remove_all(session());
+  rewrite(CV_16U);
+  const Outcome o = replay();
+  ASSERT_EQ(o.code, 0) << o.err;
+  EXPECT_TRUE(read_file(session() / "trajectory.tum") == poses);
+  EXPECT_NE((o.err + read_file(session() / "events.jsonl")).find("of which 12 are used"),
+            std::string::npos)
+      << o.err;
+}
+
+TEST_F(ReplayedFolder, ofImagesThatAreMissingAThousandAreListedAndTheRestCounted) {
+  constexpr std::size_t kMissing = 1300;
+  std::string times;
+  for (std::size_t i = 0; i < kFrames + kMissing; ++i)
+    times += fmt::format("{},{:03d}.png\n", 1'577'836'800'000'000'000 + 50'000'000 * i, i);
+  std::ofstream(data() / "times.txt") << times;
+  const Outcome o = replay();
+  ASSERT_TRUE(fs::exists(session() / "events.jsonl")) << o.err;
+  std::size_t listed = 0;
+  std::istringstream events(read_file(session() / "events.jsonl"));
+  std::string last;
+  for (std::string line; std::getline(events, line);)
+    if (line.find("image_missing") != std::string::npos) ++listed, last = line;
+  EXPECT_EQ(listed, 1001U);
+  EXPECT_NE(last.find("1000 frames could not be read"), std::string::npos) << last;
+  EXPECT_EQ(summary()["frames"]["skipped"], kMissing);
 }
 
 }  // namespace

@@ -59,9 +59,8 @@ inline std::optional<Resident> resident_of(pid_t process) {
 struct SlowDrive {
   int seconds = 0;
   double speed = 0.0;  // m/s, so that the way lasts as long
+  int settled = 0;     // frames after which growth counts
 };
-
-constexpr int kMinute = 60;  // frames
 
 inline pid_t start(const SlowDrive& drive, const std::filesystem::path& session) {
   const std::string file = std::string(VERGENCE_SOURCE_DIR) + "/app/config/mock.yaml",
@@ -83,9 +82,9 @@ inline int frames_written(const std::filesystem::path& session) {
   return static_cast<int>(std::count(std::istreambuf_iterator<char>(file), {}, '\n')) - 1;
 }
 
-/// Resident after a minute of the drive, and the last before its end or before `wall` is over.
+/// Resident once the drive has settled, and the last before its end or before `wall` is over.
 struct Growth {
-  std::optional<Resident> after_a_minute{};
+  std::optional<Resident> settled{};
   Resident at_the_end{};
   int frames = 0;
 };
@@ -100,8 +99,8 @@ inline Growth growth_of(const SlowDrive& drive, std::chrono::seconds wall) {
   while (::waitpid(process, nullptr, WNOHANG) == 0) {
     const auto now = resident_of(process);
     const int frames = frames_written(folder / "s");
-    if (now && frames >= kMinute && frames < drive.seconds - kReport) {
-      if (!growth.after_a_minute) growth.after_a_minute = now;
+    if (now && frames >= drive.settled && frames < drive.seconds - kReport) {
+      if (!growth.settled) growth.settled = now;
       growth.at_the_end = *now;
       growth.frames = frames;
     }
@@ -120,8 +119,8 @@ inline void expect_flat(const Growth& growth, int least) {
   constexpr std::int64_t kMiB = 1024 * kKiB;
   if (growth.frames < least)
     GTEST_SKIP() << "this machine is too slow: " << growth.frames << " frames";
-  const std::int64_t others = growth.at_the_end.others - growth.after_a_minute->others,
-                     arena = growth.at_the_end.arena - growth.after_a_minute->arena;
+  const std::int64_t others = growth.at_the_end.others - growth.settled->others,
+                     arena = growth.at_the_end.arena - growth.settled->arena;
   EXPECT_LE(others, kMiB) << "after " << growth.frames << " frames";
   testing::Test::RecordProperty("frames", growth.frames);
   testing::Test::RecordProperty("growth_bytes", std::to_string(others));

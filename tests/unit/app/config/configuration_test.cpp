@@ -210,5 +210,30 @@ TEST(Configuration, AListOfWhatIsRecordedSwitchesItsWordsOn) {
   EXPECT_TRUE(contains(refusal("record: images\n"), "is a group of keys"));
 }
 
+TEST(Configuration, aPresetIsWhatKeysAreThatNobodyGave) {
+  const Configuration plain = parse_configuration("threads: 2", "c.yaml", {});
+  const Configuration small = parse_configuration("odometry: {features: 333, preset: small}",
+                                                  "c.yaml", {"calibration.max_frames=60"});
+  EXPECT_EQ(small.odometry.features, 333) << "given before it";
+  EXPECT_EQ(small.calibration.max_frames, 60) << "given after it";
+  EXPECT_EQ(small.odometry.window_keyframes, 8);
+  EXPECT_EQ(small.calibration.max_observations, 50'000);
+  const Configuration taken_back =
+      parse_configuration("odometry: {preset: small}", "c.yaml", {"odometry.preset=default"});
+  EXPECT_EQ(canonical_text(taken_back), canonical_text(plain)) << "the last one counts";
+  EXPECT_THROW((void)parse_configuration("odometry: {preset: tiny}", "c.yaml", {}), InputError);
+}
+
+TEST(Configuration, ABracketOrCommaThatNothingOpenedIsRefused) {
+  // yaml-cpp 0.7 reads empty documents there for ever.
+  for (const char* text : {",a: 1}", "  ,k: 2]x", "\n, 72], m", "threads: 1\n...\n,a: 1}"}) {
+    const std::string sentence = refusal(text);
+    EXPECT_TRUE(contains(sentence, "is not YAML") || contains(sentence, "several YAML documents"))
+        << text << ": " << sentence;
+  }
+  EXPECT_TRUE(contains(refusal("\n,a: 1}"), ":2: is not YAML: a value is expected"))
+      << refusal("\n,a: 1}");
+}
+
 }  // namespace
 }  // namespace vergence::app

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 #include <sys/resource.h>
 
+#include <array>
 #include <cstdio>
 
 #include <jpeglib.h>
@@ -82,6 +83,51 @@ TEST(PngDecoder, everyKindHasOpenCvsPixelsToTheBit) {
             fmt::format("colours {} depth {} interlaced {} gamma {} transparent {}", kind.colours,
                         kind.depth, kind.interlaced, !gamma.empty(), transparent));
       }
+}
+
+/// Grey of 16 bits, samples x, x + step, … over a row of eight.
+FileBytes deep_ramp(std::uint16_t first, std::uint16_t step, bool interlaced) {
+  const PngKind kind{0, 16, interlaced};
+  FileBytes png = test::png_head(kind, 8, 1), raw;
+  if (interlaced) {
+    // Adam7 of a row of eight: columns 0; 4; 2, 6; 1, 3, 5, 7 in the passes that have the first
+    // line.
+    for (const std::vector<int>& columns :
+         std::vector<std::vector<int>>{{0}, {4}, {2, 6}, {1, 3, 5, 7}}) {
+      raw.push_back(0);
+      for (const int x : columns) {
+        const int v = first + x * step;
+        raw.push_back(static_cast<std::uint8_t>(v >> 8));
+        raw.push_back(static_cast<std::uint8_t>(v & 0xff));
+      }
+    }
+  } else {
+    raw.push_back(0);
+    for (int x = 0; x < 8; ++x) {
+      const int v = first + x * step;
+      raw.push_back(static_cast<std::uint8_t>(v >> 8));
+      raw.push_back(static_cast<std::uint8_t>(v & 0xff));
+    }
+  }
+  append_chunk(&png, "IDAT", test::deflated(raw));
+  append_chunk(&png, "IEND", {});
+  return png;
+}
+
+TEST(PngDecoder, ofSixteenBitsThoseThatAreUsedAreTakenAndWhatIsBeyondIsWhite) {
+  for (const bool interlaced : {false, true}) {
+    const FileBytes png = deep_ramp(0, 585, interlaced);  // to 4095
+    EXPECT_EQ(peak_of_deep_image(png), 4095);
+    std::array<std::uint8_t, 8> out{};
+    for (const int bits : {16, 12, 10}) {
+      ASSERT_EQ(decode_grey(png, {8, 1}, out.data(), 8, bits), ImageFileStatus::ok);
+      for (int x = 0; x < 8; ++x)
+        EXPECT_EQ(out[static_cast<std::size_t>(x)], std::min(585 * x >> (bits - 8), 255))
+            << "bits " << bits << " column " << x << " interlaced " << interlaced;
+    }
+  }
+  EXPECT_EQ(peak_of_deep_image(noisy_png({0, 8, false}, {}, false)), 0);
+  EXPECT_EQ(peak_of_deep_image({}), 0);
 }
 
 /// A picture with structure: noise alone says little about a JPEG.

@@ -3,6 +3,7 @@
 #include <sys/stat.h>
 
 #include <gtest/gtest.h>
+#include <sys/resource.h>
 
 #include <fstream>
 #include <opencv2/imgproc.hpp>
@@ -49,6 +50,36 @@ TEST_F(ImageFile, pngIsDecodedToTheBitIntoPaddedRowsAndPaddingIsLeftAlone) {
       ASSERT_EQ(out[static_cast<std::size_t>(y) * kStride + static_cast<std::size_t>(x)],
                 x < kTinyWidth ? test::tiny_pixel(x, y, 5) : 77)
           << x << " " << y;
+}
+
+/// This process may open no further file while it lives.
+class NoMoreFiles {
+ public:
+  NoMoreFiles() {
+    getrlimit(RLIMIT_NOFILE, &former_);
+    const rlimit none{0, former_.rlim_max};
+    setrlimit(RLIMIT_NOFILE, &none);
+  }
+  ~NoMoreFiles() { setrlimit(RLIMIT_NOFILE, &former_); }
+  NoMoreFiles(const NoMoreFiles&) = delete;
+  NoMoreFiles& operator=(const NoMoreFiles&) = delete;
+
+ private:
+  rlimit former_{};
+};
+
+TEST_F(ImageFile, tooManyOpenFilesAreSaidToBeThat) {
+  const auto file = write("a.png");
+  std::vector<std::uint8_t> bytes;
+  ImageSize size;
+  {
+    const NoMoreFiles none;
+    EXPECT_EQ(read_image_file(file, &bytes), ImageFileStatus::too_many_files);
+    EXPECT_EQ(read_image_size(file, &size), ImageFileStatus::too_many_files);
+  }
+  EXPECT_EQ(read_image_file(file, &bytes), ImageFileStatus::ok);
+  EXPECT_NE(std::string(to_phrase(ImageFileStatus::too_many_files)).find("ulimit -n"),
+            std::string::npos);
 }
 
 /// A tiny grey BMP as OpenCV writes it.

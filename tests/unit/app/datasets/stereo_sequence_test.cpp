@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <opencv2/imgcodecs.hpp>
+
 #include "app/runtime/errors.hpp"
 #include "tests/support/shared_data.hpp"
 #include "tests/unit/app/datasets/tiny_drive.hpp"
@@ -266,6 +268,46 @@ TEST_F(Sequence, aGivenCalibrationReplacesTheDataSetsOwnWhichNeedNotExist) {
   EXPECT_EQ(s.calibration_source, "mine.yaml");
   EXPECT_TRUE(
       says(refusal(SequenceFormat::kitti, folder_.path(), folder_ / "other.yaml"), {"other.yaml"}));
+}
+
+/// All images of the tiny folder in 16 bits, their samples from 0 to `most`.
+void make_deep(const test::TemporaryFolder& folder, int pairs, int most) {
+  for (int i = 0; i < pairs; ++i)
+    for (int k = 0; k < 2; ++k) {
+      cv::Mat image(test::kTinyHeight, test::kTinyWidth, CV_16UC1);
+      for (int y = 0; y < image.rows; ++y)
+        for (int x = 0; x < image.cols; ++x)
+          image.at<std::uint16_t>(y, x) =
+              static_cast<std::uint16_t>(most * (x + y) / (image.rows + image.cols - 2));
+      cv::imwrite((folder / test::folder_name(k, i)).string(), image);
+    }
+}
+
+TEST_F(Sequence, imagesOfTwelveBitsInSixteenAreTakenForWhatTheyAreAndItIsSaid) {
+  struct Case {
+    int most, bits;
+  };
+  for (const Case& c : {Case{4095, 12}, Case{1000, 10}, Case{16383, 14}, Case{40000, 16}}) {
+    test::write_tiny_folder(folder_, 7);
+    make_deep(folder_, 7, c.most);
+    const auto s = open_sequence(SequenceFormat::folder, folder_.path());
+    EXPECT_EQ(s.deep_bits, c.bits);
+    ASSERT_EQ(s.remarks.size(), c.bits < 16 ? 1U : 0U) << c.most;
+    if (c.bits < 16) {
+      EXPECT_TRUE(says(s.remarks[0], {"16 bits a sample", std::to_string(c.most).c_str(),
+                                      std::to_string(c.bits).c_str()}));
+    }
+  }
+  test::write_tiny_folder(folder_, 7);
+  EXPECT_EQ(open_sequence(SequenceFormat::folder, folder_.path()).deep_bits, 16)
+      << "8-bit images have none";
+}
+
+TEST_F(Sequence, oneBrightImageOfThoseLookedAtIsEnoughForSixteenBits) {
+  test::write_tiny_folder(folder_, 5);
+  make_deep(folder_, 5, 3000);
+  make_deep(folder_, 1, 50000);
+  EXPECT_EQ(open_sequence(SequenceFormat::folder, folder_.path()).deep_bits, 16);
 }
 
 TEST_F(Sequence, imagesOfAnotherSizeAreRefusedWherverTheyStand) {

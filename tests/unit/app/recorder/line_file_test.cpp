@@ -91,6 +91,37 @@ TEST(LineFile, whatWaitsIsBoundedAndWhatIsLostIsWholeLinesThatAreCounted) {
   EXPECT_EQ(test::read_file(folder / "a.txt").size(), taken * line.size());
 }
 
+TEST(LineFile, afterAMoveReopenBeginsANewFileAndLosesNoLine) {
+  const test::TemporaryFolder folder;
+  LineFile file(folder / "a.txt");
+  bool fresh = true;
+  EXPECT_TRUE(file.append("one\n"));
+  EXPECT_TRUE(file.reopen(&fresh));
+  EXPECT_FALSE(fresh) << "the file is where it was, and has a line";
+  EXPECT_TRUE(file.append("two\n"));
+  std::filesystem::rename(folder / "a.txt", folder / "a.txt.1");
+  EXPECT_TRUE(file.reopen(&fresh));
+  EXPECT_TRUE(fresh);
+  EXPECT_TRUE(file.append("three\n"));
+  EXPECT_TRUE(file.close());
+  EXPECT_EQ(test::read_file(folder / "a.txt.1"), "one\ntwo\n");
+  EXPECT_EQ(test::read_file(folder / "a.txt"), "three\n");
+}
+
+TEST(LineFile, whatCannotBeReopenedGoesOnInTheOldFile) {
+  const test::TemporaryFolder folder;
+  std::filesystem::create_directory(folder / "s");
+  LineFile file(folder / "s" / "a.txt");
+  std::filesystem::rename(folder / "s", folder / "t");
+  bool fresh = true;
+  EXPECT_FALSE(file.reopen(&fresh));
+  EXPECT_FALSE(fresh);
+  EXPECT_EQ(file.fault(), ENOENT);
+  EXPECT_TRUE(file.append("one\n"));
+  EXPECT_TRUE(file.close());
+  EXPECT_EQ(test::read_file(folder / "t" / "a.txt"), "one\n");
+}
+
 TEST(LineFile, aPlaceThatCannotBeWrittenIsNamed) {
   const test::TemporaryFolder folder;
   try {

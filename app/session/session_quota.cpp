@@ -1,0 +1,94 @@
+#include "app/session/session_quota.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <fstream>
+#include <string_view>
+#include <system_error>
+
+#include <fmt/format.h>
+
+#include "app/recorder/recorder.hpp"
+
+namespace vergence::app {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct OldSession {
+  fs::path folder;
+  fs::file_time_type written{};
+  std::uint64_t bytes = 0;
+};
+
+bool has_poses(const fs::path& folder) {
+  std::ifstream in(folder / "poses.csv", std::ios::binary);
+  std::string head(std::string_view(kPosesHeader).size(), '\0');
+  in.read(head.data(), static_cast<std::streamsize>(head.size()));
+  return in && head == kPosesHeader;
+}
+
+bool may_go_on(const fs::path& folder, fs::file_time_type written) {
+  std::error_code error;
+  return !fs::exists(folder / "summary.json", error) &&
+         fs::file_time_type::clock::now() - written < std::chrono::hours(1);
+}
+
+std::uint64_t bytes_in(const fs::path& folder) {
+  std::uint64_t bytes = 0;
+  std::error_code error;
+  for (fs::recursive_directory_iterator at(folder, error), end; !error && at != end;
+       at.increment(error)) {
+    std::error_code ignored;
+    if (at->is_regular_file(ignored) && !at->is_symlink(ignored))
+      if (const auto size = at->file_size(ignored); !ignored) bytes += size;
+  }
+  return bytes;
+}
+
+/// Oldest first.
+std::vector<OldSession> sessions_beside(const fs::path& session) {
+  std::vector<OldSession> found;
+  std::error_code error;
+  const fs::path above = fs::absolute(session, error).lexically_normal().parent_path();
+  for (fs::directory_iterator at(above, error), end; !error && at != end; at.increment(error)) {
+    std::error_code ignored;
+    if (at->is_symlink(ignored) || !at->is_directory(ignored) ||
+        fs::equivalent(at->path(), session, ignored) || !has_poses(at->path()))
+      continue;
+    const auto written = fs::last_write_time(at->path() / "poses.csv", ignored);
+    if (ignored || may_go_on(at->path(), written)) continue;
+    found.push_back({at->path(), written, bytes_in(at->path())});
+  }
+  std::sort(found.begin(), found.end(), [](const OldSession& a, const OldSession& b) {
+    return a.written != b.written ? a.written < b.written : a.folder < b.folder;
+  });
+  return found;
+}
+
+}  // namespace
+
+std::vector<std::string> keep_session_quota(const fs::path& session, std::uint64_t most_bytes) {
+  const std::vector<OldSession> sessions = sessions_beside(session);
+  std::uint64_t bytes = 0;
+  for (const OldSession& s : sessions) bytes += s.bytes;
+  std::vector<std::string> sentences;
+  for (const OldSession& s : sessions) {
+    if (bytes <= most_bytes) break;
+    std::error_code error;
+    fs::remove_all(s.folder, error);
+    if (error) {
+      sentences.push_back(fmt::format(
+          "{}: is over sessions.quota_mb and cannot be removed ({}): check its permissions",
+          s.folder.string(), error.message()));
+      continue;
+    }
+    bytes -= s.bytes;
+    sentences.push_back(
+        fmt::format("{}: removed ({} MB), the oldest session over sessions.quota_mb",
+                    s.folder.string(), (s.bytes + 999'999) / 1'000'000));
+  }
+  return sentences;
+}
+
+}  // namespace vergence::app

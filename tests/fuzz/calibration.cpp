@@ -1,0 +1,64 @@
+/// Any bytes as a calibration: the project's own, Kalibr's, one of ROS or of OpenCV. The byte 0x1e
+/// ends the first of two files. Entry point of libFuzzer.
+#include <cstddef>
+#include <cstdint>
+#include <cstdlib>
+#include <string_view>
+#include <vector>
+
+#include <yaml-cpp/yaml.h>  // a YamlFile is copied here
+
+#include "app/foreign_calibration/foreign_formats.hpp"
+#include "app/runtime/errors.hpp"
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size);
+
+namespace {
+
+using namespace vergence;
+using namespace vergence::app;
+
+/// What every reader promises of a calibration that it accepts.
+void check(const CalibrationFile& file) {
+  if (file.rig.cameras < 2 || file.rig.cameras > kMaxCameras) std::abort();
+  for (std::size_t k = 0; k < static_cast<std::size_t>(file.rig.cameras); ++k) {
+    const Intrinsics& lens = file.rig.intrinsics[k];
+    if (lens.width <= 0 || lens.height <= 0 || !(lens.fx > 0) || !(lens.fy > 0)) std::abort();
+    if (!file.rig.T_camera_left[k].t.allFinite() || !file.rig.T_camera_left[k].R.allFinite())
+      std::abort();
+  }
+}
+
+template <class Read>
+void probe(const Read& read) {
+  try {
+    check(read());
+  } catch (const InputError&) {
+  }
+}
+
+}  // namespace
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  const std::string_view text(reinterpret_cast<const char*>(data), size);
+  const std::size_t end = text.find('\x1e');
+  const std::string left(text.substr(0, end));
+  const std::string right(end == std::string_view::npos ? text : text.substr(end + 1));
+  Remarks remarks;
+  probe([&] {
+    const CalibrationFile file = parse_calibration(left, "a.yaml");
+    check(parse_calibration(format_calibration(file), "again.yaml"));  // what is written reads back
+    return file;
+  });
+  probe([&] { return parse_calibration(left, "a.yaml", {.length_only = true, .baseline = 0.5}); });
+  probe([&] { return read_kalibr(YamlFile::parse(left, "a.yaml"), &remarks); });
+  probe([&] {
+    return read_ros(YamlFile::parse(left, "a.yaml"), YamlFile::parse(right, "b.yaml"), &remarks);
+  });
+  probe([&] {
+    const std::vector<YamlFile> files{parse_opencv_yaml(left, "a.yaml"),
+                                      parse_opencv_yaml(right, "b.yaml")};
+    return read_opencv(files, ImageSize{640, 480}, &remarks);
+  });
+  return 0;
+}

@@ -1,0 +1,22 @@
+/// Any bytes as a configuration. Entry point of libFuzzer.
+#include <cstddef>
+#include <cstdint>
+#include <cstdlib>
+#include <string_view>
+
+#include "app/config/configuration.hpp"
+#include "app/runtime/errors.hpp"
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size);
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  using namespace vergence::app;
+  const std::string_view text(reinterpret_cast<const char*>(data), size);
+  try {
+    const Configuration c = parse_configuration(text, "fuzz.yaml", {});
+    if (c.threads < 1 || c.cameras.size() < 2) std::abort();  // what every command rests on
+    if (configuration_hash(c).size() != 16) std::abort();
+  } catch (const InputError&) {
+  }
+  return 0;
+}

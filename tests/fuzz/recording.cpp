@@ -1,0 +1,34 @@
+/// Any bytes as drive.mcap of a session, read for a replay. Entry point of libFuzzer.
+#include <cstddef>
+#include <cstdint>
+#include <string_view>
+#include <vector>
+
+#include "app/datasets/recorded_session.hpp"
+#include "app/runtime/errors.hpp"
+#include "tests/fuzz/scratch_folder.hpp"
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size);
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  using namespace vergence;
+  constexpr int kMostPixels = 1 << 20;
+  static const test::ScratchFolder folder;
+  folder.write("drive.mcap", {reinterpret_cast<const char*>(data), size});
+  try {
+    const auto session = app::RecordedSession::open(folder.path());
+    std::vector<std::uint8_t> pixels;
+    for (const app::RecordedFrame& frame : session.frames())
+      for (std::size_t k = 0; k < frame.images.size(); ++k) {
+        const app::RecordedImage& image = frame.images[k];
+        if (image.offset == 0 || image.width <= 0 || image.height <= 0 ||
+            image.width > kMostPixels / image.height)
+          continue;
+        pixels.resize(static_cast<std::size_t>(image.width) *
+                      static_cast<std::size_t>(image.height));
+        (void)session.read(frame, k, pixels.data(), static_cast<std::size_t>(image.width));
+      }
+  } catch (const app::InputError&) {
+  }
+  return 0;
+}

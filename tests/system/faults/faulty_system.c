@@ -1,0 +1,69 @@
+// What goes wrong below the program, in front of the C library (LD_PRELOAD):
+//   VERGENCE_STALL='AT SECONDS'      writes to files, begun in that time since the start, last to
+//   its end VERGENCE_CLOCK_SET='AT SECONDS'  CLOCK_REALTIME is so much later from then on
+#define _GNU_SOURCE
+#include <stdio.h>
+#include <stdlib.h>
+#include <sys/stat.h>
+#include <sys/syscall.h>
+#include <sys/uio.h>
+#include <time.h>
+#include <unistd.h>
+
+static double started;
+
+static double now(void) {
+  struct timespec t;
+  (void)syscall(SYS_clock_gettime, CLOCK_MONOTONIC, &t);
+  return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
+}
+
+__attribute__((constructor)) static void start(void) { started = now(); }
+
+static int asked(const char* name, double* at, double* seconds) {
+  const char* text = getenv(name);
+  return text != NULL && sscanf(text, "%lf %lf", at, seconds) == 2;
+}
+
+static void stall(int fd) {
+  double at = 0;
+  double seconds = 0;
+  struct stat about;
+  if (!asked("VERGENCE_STALL", &at, &seconds) || fstat(fd, &about) != 0 || !S_ISREG(about.st_mode))
+    return;
+  const double since = now() - started;
+  if (since < at || since > at + seconds) return;
+  const double rest = at + seconds - since;
+  const struct timespec pause = {(time_t)rest, (long)(1e9 * (rest - (double)(time_t)rest))};
+  (void)nanosleep(&pause, NULL);
+}
+
+ssize_t write(int fd, const void* data, size_t size) {
+  stall(fd);
+  return syscall(SYS_write, fd, data, size);
+}
+
+ssize_t writev(int fd, const struct iovec* parts, int count) {
+  stall(fd);
+  return syscall(SYS_writev, fd, parts, count);
+}
+
+int fdatasync(int fd) {
+  stall(fd);
+  return (int)syscall(SYS_fdatasync, fd);
+}
+
+int fsync(int fd) {
+  stall(fd);
+  return (int)syscall(SYS_fsync, fd);
+}
+
+int clock_gettime(clockid_t clock, struct timespec* t) {
+  const int status = (int)syscall(SYS_clock_gettime, clock, t);
+  double at = 0;
+  double seconds = 0;
+  if (status == 0 && clock == CLOCK_REALTIME && asked("VERGENCE_CLOCK_SET", &at, &seconds) &&
+      now() - started >= at)
+    t->tv_sec += (time_t)seconds;
+  return status;
+}
