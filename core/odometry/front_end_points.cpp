@@ -2,8 +2,8 @@
 #include <chrono>
 #include <cmath>
 
-#include "core/features/patch.hpp"
 #include "core/features/epipolar_search.hpp"
+#include "core/features/patch.hpp"
 #include "core/odometry/detail/warp.hpp"
 #include "core/odometry/front_end.hpp"
 
