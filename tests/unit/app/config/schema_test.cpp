@@ -145,7 +145,7 @@ void expect_rows_for(const std::map<std::string, std::string>& declared,
     const auto other = renamed.find(field);
     const std::string& name = other == renamed.end() ? field : other->second;
     ASSERT_TRUE(rows.contains(name))
-        << "app/config/schema.cpp has no row for " << group_name << "'s " << field;
+        << "the schema (app/config/schema_*.cpp) has no row for " << group_name << "'s " << field;
     if (range.empty()) continue;
     EXPECT_EQ(range_text(*rows[name]), range) << name;
   }
