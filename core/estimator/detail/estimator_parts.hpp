@@ -1,0 +1,80 @@
+#pragma once
+#include <atomic>
+
+#include "core/estimator/online_calibrator.hpp"
+#include "core/estimator/transitions.hpp"
+#include "core/memory/fixed_vector.hpp"
+#include "core/odometry/odometry.hpp"
+
+/// What an Estimator is made of, for its own sources.
+namespace vergence {
+
+struct Estimator::Parts {
+  Parts(const EstimatorOptions& o, const RigCalibration& r, const RigCalibration& nominal,
+        Arena& arena, PairRunner& runner, BackgroundRunner& solver)
+      : options(o),
+        odometry(options.odometry, r, o.trust != CalibrationTrust::none, arena, runner, o.masks),
+        calibrator(options, r, nominal, arena, solver),
+        unconfirmed(o.trust == CalibrationTrust::unconfirmed) {}
+
+  void transition(Trigger trigger, Stamp stamp) noexcept {
+    const Transition* t = find_transition(state, trigger);
+    if (t == nullptr) return;
+    EstimatorEvent e;
+    e.stamp = stamp;
+    e.kind = EstimatorEvent::Kind::state;
+    e.from = t->from;
+    e.to = t->to;
+    e.why = t->why;
+    (void)events.push(e);
+    state = t->to;
+  }
+  void note(EstimatorEvent::Kind kind, Stamp stamp, const char* why, double value) noexcept {
+    EstimatorEvent e;
+    e.stamp = stamp;
+    e.kind = kind;
+    e.from = e.to = state;
+    e.why = why;
+    e.value = value;
+    (void)events.push(e);
+  }
+
+  void doubt(CalibrationCause cause, std::uint64_t onset, const RigFrame& frame) noexcept;
+  void give_up_calibration(const RigFrame& frame, double frames) noexcept;
+  void watch(const odometry::FrameOutcome& out, const RigFrame& frame) noexcept;
+  void watch_sought(const odometry::FrameOutcome& out, const RigFrame& frame) noexcept;
+  void calibrate(const RigFrame& frame) noexcept;
+  void take(const CalibrationDecision& decision, Stamp stamp) noexcept;
+  void take_learnt(const CalibrationDecision& decision, bool was_verified, Stamp stamp) noexcept;
+  void tell_verified(bool was_verified, const CalibrationDecision& decision, Stamp stamp) noexcept;
+  void tell_confirmed(Stamp stamp) noexcept;
+  void follow(const odometry::FrameOutcome& out, const RigFrame& frame) noexcept;
+  void tell_missing(Stamp stamp) noexcept;
+  void grade(const odometry::FrameOutcome& out, Pairing pairing, PoseSample* sample) const noexcept;
+  [[nodiscard]] Reason why_uncalibrated() const noexcept;
+
+  EstimatorOptions options;
+  odometry::Odometry odometry;
+  OnlineCalibrator calibrator;
+  State state = State::initialising;
+  Stamp last{};
+  std::uint64_t last_number = 0;
+  bool any = false;
+  bool unconfirmed;              // the calibration in use is the last drive's
+  bool undecided = false;        // something is wrong with the rig, and not yet told what
+  bool verified = false;         // the calibration in use, when last decided about
+  double confirmed_percent = 0;  // depth error of the calibration that was confirmed
+  bool relinked = false;         // the frame before took up the calibration that was adopted
+  bool superseded = false;       // poses still are of a calibration that was contradicted
+  int out_of_step = 0;           // frames for which that is still believed
+  int without_pose = 0;
+  bool in_gap = false;       // and the last event has said so
+  int unmatched_frames = 0;  // in a row
+  bool ever_posed = false;
+  Reason told_missing = Reason::none;
+  std::atomic<bool> requested{false};
+  FixedVector<EstimatorEvent, 16> events;         // a frame raises at most eight
+  FixedVector<CalibrationDecision, 3> decisions;  // three in finish() at most
+};
+
+}  // namespace vergence

@@ -1,0 +1,220 @@
+#include <algorithm>
+#include <utility>
+
+#include "core/estimator/detail/estimator_parts.hpp"
+
+/// What the estimator does about its rig's calibration, frame by frame.
+namespace vergence {
+namespace {
+
+constexpr std::uint64_t kDriftFrames = 60;  // of a creeping rig that are taken for one
+constexpr int kInStepAfter =
+    60;  // frames without a sign of the cameras being out of step, before that is over
+
+/// From which frame on the tracks tell of the rig as it is now.
+std::uint64_t first_frame_of_use(const calibration::MonitorVerdict& v, std::uint64_t now) noexcept {
+  using K = calibration::MonitorVerdict::Kind;
+  if (v.kind == K::collapse) return now;  // until now there were wrong matches only
+  // A rig that creeps is another one by and by.
+  if (v.kind == K::drift) return std::max(v.onset_frame, now - std::min(now, kDriftFrames));
+  return v.onset_frame;
+}
+
+CalibrationCause cause_of(calibration::MonitorVerdict::Kind kind) noexcept {
+  using K = calibration::MonitorVerdict::Kind;
+  switch (kind) {
+    case K::drift:
+      return CalibrationCause::drift;
+    case K::collapse:
+      return CalibrationCause::collapse;
+    case K::out_of_step:
+      return CalibrationCause::out_of_step;
+    case K::knock:
+    case K::quiet:
+      break;
+  }
+  return CalibrationCause::knock;
+}
+
+const char* sentence_of(CalibrationCause cause) noexcept {
+  switch (cause) {
+    case CalibrationCause::from_scratch:
+      return "there is no calibration";
+    case CalibrationCause::knock:
+      return "the rig has changed: a camera was knocked";
+    case CalibrationCause::drift:
+      return "the rig is creeping away from its calibration";
+    case CalibrationCause::collapse:
+      return "left and right hardly match any more: a camera was knocked far off or is out of "
+             "focus";
+    case CalibrationCause::out_of_step:
+      return "the cameras' images are not of the same instant";
+    case CalibrationCause::requested:
+      return "a new calibration is asked for";
+    case CalibrationCause::contradicted:
+      return "left and right hardly match with the calibration in use: it is not that of the rig";
+    case CalibrationCause::refinement:
+      break;  // no reason to seek one
+  }
+  return "";
+}
+
+}  // namespace
+
+void Estimator::Parts::doubt(CalibrationCause cause, std::uint64_t onset,
+                             const RigFrame& frame) noexcept {
+  note(EstimatorEvent::Kind::rig_changed, frame.stamp, sentence_of(cause),
+       static_cast<double>(frame.number - std::min(onset, frame.number)));
+  transition(cause == CalibrationCause::requested ? Trigger::requested : Trigger::rig_changed,
+             frame.stamp);
+  calibrator.seek(cause, onset, frame.number);
+  verified = superseded = false;
+  odometry.unlink();
+}
+
+/// Left and right hardly match with the calibration in use. One that the drive never confirmed was
+/// not the rig's from the start; one that it did was knocked away.
+void Estimator::Parts::give_up_calibration(const RigFrame& frame, double frames) noexcept {
+  const CalibrationCause cause =
+      calibrator.ever_verified() ? CalibrationCause::collapse : CalibrationCause::contradicted;
+  if (cause == CalibrationCause::collapse)
+    note(EstimatorEvent::Kind::rig_changed, frame.stamp, sentence_of(cause), frames);
+  else
+    note(EstimatorEvent::Kind::calibration_contradicted, frame.stamp, sentence_of(cause), 0);
+  transition(Trigger::rig_changed, frame.stamp);
+  calibrator.seek(cause, frame.number, frame.number);
+  verified = superseded = false;
+  odometry.unlink();
+}
+
+/// What the monitors say of a frame posed with the calibration in use.
+void Estimator::Parts::watch(const odometry::FrameOutcome& out, const RigFrame& frame) noexcept {
+  using K = calibration::MonitorVerdict::Kind;
+  const calibration::MonitorVerdict v = calibrator.watch(odometry, out, frame);
+  undecided = v.undecided;
+  if (v.kind == K::out_of_step) {
+    if (out_of_step == 0)
+      note(EstimatorEvent::Kind::rig_changed, frame.stamp,
+           sentence_of(CalibrationCause::out_of_step), v.lag_frames);
+    out_of_step = kInStepAfter;
+    return;
+  }
+  if (out_of_step > 0) {
+    // A rig out of step fits no calibration: what else the monitor says is of no use until that is
+    // over.
+    if (v.kind == K::quiet && !v.undecided && --out_of_step == 0)
+      note(EstimatorEvent::Kind::calibration_confirmed, frame.stamp,
+           "the cameras are in step again", 0);
+    return;
+  }
+  if (v.kind == K::collapse) {
+    give_up_calibration(frame,
+                        static_cast<double>(frame.number - std::min(v.onset_frame, frame.number)));
+  } else if (v.kind != K::quiet) {
+    doubt(cause_of(v.kind), first_frame_of_use(v, frame.number), frame);
+  }
+}
+
+/// A rig that changes while it is sought: frames before and after are never one solve, and those
+/// after do not confirm those before.
+void Estimator::Parts::watch_sought(const odometry::FrameOutcome& out,
+                                    const RigFrame& frame) noexcept {
+  const auto onset = calibrator.watch_sought(odometry, out, frame.number);
+  if (!onset) return;
+  if (!calibrator.seeking()) return doubt(CalibrationCause::knock, *onset, frame);
+  note(EstimatorEvent::Kind::rig_changed, frame.stamp,
+       "a camera was knocked while the calibration was sought",
+       static_cast<double>(frame.number - *onset));
+  calibrator.seek(
+      calibrator.calibrated() ? CalibrationCause::knock : CalibrationCause::from_scratch, *onset,
+      frame.number);
+  if (state == State::calibrating) transition(Trigger::calibration_rejected, frame.stamp);
+}
+
+/// Solves are started and decided.
+void Estimator::Parts::calibrate(const RigFrame& frame) noexcept {
+  if (const auto decision = calibrator.decide(frame.stamp, frame.number))
+    take(*decision, frame.stamp);
+  const bool solves = state == State::parallel_monocular || state == State::recalibrating ||
+                      state == State::stereo_odometry;
+  if (solves && calibrator.can_solve()) {
+    calibrator.start_solve();
+    if (calibrator.seeking()) transition(Trigger::frames_enough, frame.stamp);
+  }
+  tell_missing(frame.stamp);
+}
+
+/// What the drive has measured of the rig while it went on.
+void Estimator::Parts::take_learnt(const CalibrationDecision& decision, bool was_verified,
+                                   Stamp stamp) noexcept {
+  if (decision.cause == CalibrationCause::contradicted && !was_verified)
+    note(EstimatorEvent::Kind::calibration_contradicted, stamp,
+         "the calibration in use is not that of the rig", decision.depth_difference_percent);
+  if (decision.accepted) {
+    note(EstimatorEvent::Kind::calibration_accepted, stamp, "a better calibration is adopted",
+         decision.calibration.frames);
+    calibrator.refine(decision.calibration);
+    odometry.link(decision.calibration);
+    superseded = decision.cause == CalibrationCause::contradicted;
+    undecided = false;
+  }
+  tell_verified(was_verified, decision, stamp);
+}
+
+void Estimator::Parts::tell_verified(bool was_verified, const CalibrationDecision& decision,
+                                     Stamp stamp) noexcept {
+  if (!calibrator.verified() || was_verified) return;
+  unconfirmed = false;
+  confirmed_percent = decision.depth_sigma_percent;
+  if (!superseded) tell_confirmed(stamp);
+}
+
+void Estimator::Parts::tell_confirmed(Stamp stamp) noexcept {
+  note(EstimatorEvent::Kind::calibration_confirmed, stamp,
+       "the drive confirms the calibration in use", confirmed_percent);
+}
+
+void Estimator::Parts::take(const CalibrationDecision& decision, Stamp stamp) noexcept {
+  (void)decisions.push(decision);
+  const bool was_verified = verified;
+  verified = calibrator.verified();
+  if (decision.learnt) return take_learnt(decision, was_verified, stamp);
+  if (decision.accepted) {
+    note(EstimatorEvent::Kind::calibration_accepted, stamp, "a calibration is accepted",
+         decision.calibration.frames);
+    calibrator.use(decision.calibration, decision.lenses);
+    odometry.link(decision.calibration);
+    undecided = false;
+    transition(Trigger::calibration_accepted, stamp);
+    tell_verified(was_verified, decision, stamp);
+    return;
+  }
+  note(EstimatorEvent::Kind::calibration_rejected, stamp, decision.reason,
+       decision.calibration.frames);
+  switch (calibrator.last_gate()) {
+    case calibration::Gate::no_better:
+      calibrator.keep();
+      odometry.link(calibrator.in_use());
+      transition(Trigger::calibration_kept, stamp);
+      break;
+    case calibration::Gate::out_of_step:
+      out_of_step = kInStepAfter;
+      [[fallthrough]];
+    default:
+      transition(Trigger::calibration_rejected, stamp);
+  }
+}
+
+void Estimator::Parts::tell_missing(Stamp stamp) noexcept {
+  const Reason missing = calibrator.missing();
+  if (missing == told_missing) return;
+  told_missing = missing;
+  if (missing == Reason::needs_motion)
+    note(EstimatorEvent::Kind::calibration_waits, stamp,
+         "the rig has to move before it can be calibrated", 0);
+  else if (missing == Reason::needs_near_structure)
+    note(EstimatorEvent::Kind::calibration_waits, stamp,
+         "nearer things have to be seen before the rig can be calibrated", 0);
+}
+
+}  // namespace vergence

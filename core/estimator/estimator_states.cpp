@@ -1,0 +1,95 @@
+#include "core/estimator/detail/estimator_parts.hpp"
+
+/// States and the status of poses.
+namespace vergence {
+namespace {
+
+constexpr int kLostAfter = 3;  // frames without a pose in a row before the state says so
+// Frames with good images that no scene can be made of with the calibration in use; and with one
+// that no frame of the drive has agreed with yet.
+constexpr int kUnmatchedAfter = 15, kUnmatchedClaimAfter = 6;
+
+}  // namespace
+
+/// States that follow from whether there is a pose.
+void Estimator::Parts::follow(const odometry::FrameOutcome& out, const RigFrame& frame) noexcept {
+  // Once a gap: covered cameras give frame after frame that lies behind it.
+  if (out.gap_s > 0 && !in_gap)
+    note(EstimatorEvent::Kind::time_gap, frame.stamp,
+         "no frame for longer than motion can be predicted", out.gap_s);
+  in_gap = out.gap_s > 0 && !out.posed;
+  const bool unmatched = !out.posed && out.images_good && out.reason == Reason::no_stereo_matches &&
+                         odometry.linked() == odometry::Link::linked;
+  unmatched_frames = unmatched ? unmatched_frames + 1 : 0;
+  const int unmatched_after = ever_posed ? kUnmatchedAfter : kUnmatchedClaimAfter;
+  if (options.online && unmatched_frames == unmatched_after) {
+    unmatched_frames = 0;
+    // Good images of which no scene can be made: then it is the rig that does not fit.
+    give_up_calibration(frame, unmatched_after);
+    odometry.reset_extrinsics();
+  }
+  if (!out.posed) {
+    if (++without_pose == kLostAfter) {
+      transition(Trigger::pose_lost, frame.stamp);
+      calibrator.scene_lost();
+    }
+    return;
+  }
+  without_pose = 0;
+  ever_posed = true;
+  if (state == State::lost)
+    transition(odometry.linked() == odometry::Link::linked ? Trigger::pose_found
+               : calibrator.calibrated()                   ? Trigger::pose_found_doubtful
+                                                           : Trigger::pose_found_uncalibrated,
+               frame.stamp);
+  if (state == State::initialising) {
+    transition(Trigger::pair_found, frame.stamp);
+    calibrator.seek(CalibrationCause::from_scratch, 0, frame.number);
+  }
+  if (out.restarted) {
+    note(EstimatorEvent::Kind::scene_restarted, frame.stamp,
+         "the map was rebuilt; the motion since the last pose is extrapolated", out.gap_s);
+    calibrator.scene_lost();
+  }
+  if (out.relocalised)
+    note(EstimatorEvent::Kind::relocalised, frame.stamp, "found again among the window's points",
+         0);
+}
+
+/// What the state of the calibration makes of a pose's status.
+void Estimator::Parts::grade(const odometry::FrameOutcome& out, Pairing pairing,
+                             PoseSample* sample) const noexcept {
+  sample->status = out.posed ? out.status : PoseStatus::lost;
+  sample->reason = out.reason;
+  if (!out.posed) return;
+  if (pairing == Pairing::contradicted && sample->status != PoseStatus::lost) {
+    sample->status = PoseStatus::degraded;
+    sample->reason = Reason::unproven_pairing;
+  } else if (sample->status == PoseStatus::ok && out_of_step > 0) {
+    sample->status = PoseStatus::degraded;
+    sample->reason = Reason::out_of_step;
+  } else if (sample->status == PoseStatus::ok && (undecided || state == State::recalibrating)) {
+    sample->status = PoseStatus::degraded;
+    sample->reason = Reason::recalibrating;
+  } else if (options.online && (superseded || !calibrator.verified()) &&
+             (sample->status == PoseStatus::ok || (sample->reason == Reason::moving_scene &&
+                                                   odometry.linked() == odometry::Link::linked))) {
+    // Points are lost by a calibration that does not fit as they are by what moves.
+    sample->status = PoseStatus::degraded;
+    sample->reason = unconfirmed ? Reason::unconfirmed : Reason::unverified_calibration;
+  } else if (out.reason == Reason::uncalibrated) {
+    sample->reason = why_uncalibrated();
+  }
+}
+
+/// What a pose of cameras that are not linked says of its calibration: the most particular that is
+/// known.
+Reason Estimator::Parts::why_uncalibrated() const noexcept {
+  if (calibrator.last_gate() == calibration::Gate::cameras_swapped) return Reason::cameras_swapped;
+  if (out_of_step > 0) return Reason::out_of_step;
+  if (calibrator.missing() != Reason::none) return calibrator.missing();
+  return state == State::parallel_monocular || state == State::calibrating ? Reason::uncalibrated
+                                                                           : Reason::recalibrating;
+}
+
+}  // namespace vergence

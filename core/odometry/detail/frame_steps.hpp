@@ -1,0 +1,32 @@
+#pragma once
+#include <chrono>
+
+#include "core/odometry/odometry.hpp"
+
+/// What the sources of Odometry share.
+namespace vergence::odometry::detail {
+
+inline constexpr int kNearEnough = 10;  // near points that keep the scale
+inline constexpr double kRigidShare =
+    0.4;  // of the points found that must agree: below it something else moves
+
+/// Times of a frame's stages.
+class StageClock {
+ public:
+  explicit StageClock(FrameOutcome* out) noexcept
+      : out_(out), last_(std::chrono::steady_clock::now()) {}
+  /// What has passed since the last mark belongs to this stage; ms.
+  float mark(Stage stage) noexcept {
+    const auto now = std::chrono::steady_clock::now();
+    const float ms = std::chrono::duration<float, std::milli>(now - last_).count();
+    out_->stage_ms[static_cast<std::size_t>(stage)] += ms;
+    last_ = now;
+    return ms;
+  }
+
+ private:
+  FrameOutcome* out_;
+  std::chrono::steady_clock::time_point last_;
+};
+
+}  // namespace vergence::odometry::detail

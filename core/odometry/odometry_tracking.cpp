@@ -1,0 +1,188 @@
+#include "core/odometry/odometry.hpp"
+
+#include <algorithm>
+#include <bit>
+
+#include "core/odometry/detail/frame_steps.hpp"
+
+/// How a frame's pose is found among the points that are there.
+namespace vergence::odometry {
+
+using detail::kRigidShare;
+using detail::StageClock;
+
+namespace {
+
+constexpr int kSample =
+    100;  // points followed from far away: enough for MLESAC, a third of the work
+constexpr int kSampleInliers = 12;         // of the sample, below which the prediction was wrong
+constexpr double kSampleShare = 0.3;       // and of those found, which must agree
+constexpr double kLeastSampleShare = 0.2;  // where no start does better: a calibration that does
+                                           // not fit leaves a quarter of the far points
+constexpr double kSampleResidual =
+    3.0;  // px: worse than that is no agreement, however many take part in it
+constexpr int kRelocaliseInliers = 15;    // that agree on one pose: by chance of rough matches 8 do
+constexpr double kRecognisedShare = 0.5;  // of the points in view that must be found again where
+                                          // the way to a place was not followed
+constexpr std::uint8_t kMissesAllowed = 2;  // frames a point may be hidden
+constexpr std::uint16_t kFoundEnough =
+    2;                             // rig frames, so four images, before a point holds a pose
+constexpr double kOutlier = 9.21;  // squared sigmas, two coordinates at 99 %
+constexpr int kNewPoints = 30;     // tried in a frame, to judge from
+constexpr double kNewPointsKept =
+    0.3;  // of the points just made that fit the motion a frame later: half to nine in ten where
+          // the scene stands, a twentieth where the pose follows what moves in front of it
+
+/// A pose of the sample that all points may be followed from.
+bool sample_agrees(const PoseFit& fit, double share) noexcept {
+  return fit.inliers >= kSampleInliers && fit.inliers > share * fit.given &&
+         fit.rms_px < kSampleResidual;
+}
+
+}  // namespace
+
+PoseFit Odometry::fit(const Transform& start, bool sample) noexcept {
+  if (link_ == Link::unlinked) return poses_.fit_unlinked(map_, start, sample, rig_.T_camera_left);
+  PoseFit all = poses_.fit_linked(map_, start, sample);
+  if (!all.found || confirmed_stereo(all) || all.stereo_found == 0) return all;
+  // The cameras contradict each other. Which is right the images do not say, but the left one is
+  // what the pose is of.
+  const PoseFit left = poses_.fit_left(map_, start);
+  return left.found && left.inliers >= options_.ok_inliers ? left : all;
+}
+
+PoseFit Odometry::track(const Transform& predicted, std::uint8_t structured,
+                        FrameOutcome* out) noexcept {
+  PoseFit fit;
+  if (structured == 0) return fit;
+  StageClock clock(out);
+  // From the prediction; if that was wrong, from further away; if that was, from where the last
+  // frame stood.
+  struct Attempt {
+    const Transform* start;
+    int coarsest;
+  };
+  PoseFit best;
+  for (const Attempt& a :
+       {Attempt{&predicted, 2}, Attempt{&predicted, 3}, Attempt{&T_left_world_, 3}}) {
+    front_end_.follow_sample(map_, *a.start, kSample, a.coarsest);
+    clock.mark(Stage::track);
+    fit = this->fit(*a.start, true);
+    clock.mark(Stage::pose);
+    if (sample_agrees(fit, kLeastSampleShare) && fit.inliers > best.inliers) best = fit;
+    if (sample_agrees(fit, kSampleShare)) break;
+  }
+  fit = best;
+  bool doubtful = frames_lost_ > 0 || out->gap_s > 0;
+  if (!sample_agrees(fit, kLeastSampleShare)) {
+    fit = relocalise(out);
+    if (!fit.found) return fit;
+    doubtful = true;
+  }
+  const Transform coarse = fit.T_left_world;
+  if (link_ == Link::unlinked) recover_cameras(fit);
+  front_end_.follow_all(map_, coarse);
+  clock.mark(Stage::track);
+  fit = this->fit(coarse, false);
+  if (!fit.found || fit.inliers < kRigidShare * fit.given) fit = this->fit(coarse, true);
+  // One facade looks like the next: a place is believed again only if most of what should be seen
+  // from there is.
+  if (doubtful && fit.inliers < kRecognisedShare * points_in_view(fit.T_left_world))
+    fit.found = false;
+  clock.mark(Stage::pose);
+  return fit;
+}
+
+void Odometry::recover_cameras(const PoseFit& fit) noexcept {
+  for (int k = 1; k < rig_.cameras; ++k) {
+    if (((fit.cameras >> static_cast<unsigned>(k)) & 1U) != 0 ||
+        front_end_.relocalise(map_, k) < kRelocaliseInliers)
+      continue;
+    Transform& T_camera_left = rig_.T_camera_left[static_cast<std::size_t>(k)];
+    Transform T_camera_world;
+    if (!poses_.fit_camera(map_, k, T_camera_left * fit.T_left_world, true, &T_camera_world))
+      continue;
+    T_camera_left = T_camera_world * fit.T_left_world.inverse();
+  }
+}
+
+int Odometry::points_in_view(const Transform& T_left_world) const noexcept {
+  constexpr double kBorder = 12.0;  // px: nearer to the edge a patch does not fit
+  int n = 0;
+  for (const MapPoint& p : map_.points()) {
+    Vec2 pixel;
+    const Camera& camera = front_end_.lens(0).raw();
+    if (p.stage == PointStage::active &&
+        camera.project(T_left_world * p.p_world, &pixel, nullptr) == ProjectStatus::ok &&
+        camera.inside(pixel, kBorder) && !front_end_.hides(0, pixel))
+      ++n;
+  }
+  return n;
+}
+
+PoseFit Odometry::relocalise(FrameOutcome* out) noexcept {
+  StageClock clock(out);
+  for (MapPoint& p : map_.points()) p.now.cameras = 0;
+  const int candidates = front_end_.relocalise(map_, 0);
+  clock.mark(Stage::match);
+  PoseFit fit;
+  if (candidates < kRelocaliseInliers) return fit;
+  fit = this->fit(T_left_world_, true);
+  clock.mark(Stage::pose);
+  fit.found = fit.inliers >= kRelocaliseInliers;
+  if (!fit.found) return fit;
+  out->relocalised = true;
+  // Points long out of sight are followed again; those that do not show are dropped as any other.
+  for (MapPoint& p : map_.points()) {
+    if (p.stage != PointStage::dormant) continue;
+    p.stage = PointStage::active;
+    p.missed = 0;
+  }
+  return fit;
+}
+
+void Odometry::settle_points(const PoseFit& fit) noexcept {
+  for (MapPoint& p : map_.points()) p.in_images = p.now.cameras;
+  for (std::size_t i = 0; i < map_.points().size(); ++i)
+    if (map_.points()[i].holds_poses()) map_.points()[i].now.cameras &= poses_.agrees()[i];
+  int tried = 0, kept = 0;
+  for (MapPoint& p : map_.points()) {
+    if (!p.followed()) continue;
+    if (p.stage == PointStage::candidate) {
+      ++tried;
+      for (int k = 0; k < rig_.cameras; ++k) {
+        if (!p.now.by(k)) continue;
+        const auto c = static_cast<std::size_t>(k);
+        Vec2 pixel;
+        const bool seen = front_end_.lens(k).ideal().project(
+                              rig_.T_camera_left[c] * (fit.T_left_world * p.p_world), &pixel,
+                              nullptr) == ProjectStatus::ok;
+        const double limit = kOutlier * p.now.sigma[c] * p.now.sigma[c];
+        if (!seen || (pixel - p.now.pixel[c].cast<double>()).squaredNorm() > 4.0 * limit)
+          p.now.drop(k);
+      }
+      kept += p.now.cameras != 0 ? 1 : 0;
+      if (on_trial_) {
+        p.stage = PointStage::free;
+        continue;
+      }
+    }
+    if (p.now.cameras != 0) {
+      p.missed = 0;
+      ++p.found;
+      if (p.stage == PointStage::candidate && p.found >= kFoundEnough) p.stage = PointStage::active;
+      continue;
+    }
+    ++p.missed;
+    if (p.stage == PointStage::candidate)
+      p.stage = PointStage::free;
+    else if (p.missed > kMissesAllowed)
+      p.stage = PointStage::dormant;
+  }
+  if (tried >= kNewPoints) scene_moves_ = kept < kNewPointsKept * tried;
+  frames_untried_ = tried > 0 ? 0 : frames_untried_ + 1;
+  if (on_trial_) map_.rewind(cursor_before_trial_);
+  on_trial_ = false;
+}
+
+}  // namespace vergence::odometry
