@@ -183,6 +183,7 @@ void Estimator::Parts::take(const CalibrationDecision& decision, Stamp stamp) no
     note(EstimatorEvent::Kind::calibration_accepted, stamp, "a calibration is accepted",
          decision.calibration.frames);
     calibrator.use(decision.calibration, decision.lenses);
+    verified = calibrator.verified();
     odometry.link(decision.calibration);
     undecided = false;
     transition(Trigger::calibration_accepted, stamp);
@@ -194,6 +195,7 @@ void Estimator::Parts::take(const CalibrationDecision& decision, Stamp stamp) no
   switch (calibrator.last_gate()) {
     case calibration::Gate::no_better:
       calibrator.keep();
+      verified = calibrator.verified();
       odometry.link(calibrator.in_use());
       transition(Trigger::calibration_kept, stamp);
       break;

@@ -32,6 +32,7 @@ void Estimator::Parts::follow(const odometry::FrameOutcome& out, const RigFrame&
     if (++without_pose == kLostAfter) {
       transition(Trigger::pose_lost, frame.stamp);
       calibrator.scene_lost();
+      verified = calibrator.verified();
     }
     return;
   }
@@ -50,6 +51,7 @@ void Estimator::Parts::follow(const odometry::FrameOutcome& out, const RigFrame&
     note(EstimatorEvent::Kind::scene_restarted, frame.stamp,
          "the map was rebuilt; the motion since the last pose is extrapolated", out.gap_s);
     calibrator.scene_lost();
+    verified = calibrator.verified();
   }
   if (out.relocalised)
     note(EstimatorEvent::Kind::relocalised, frame.stamp, "found again among the window's points",
