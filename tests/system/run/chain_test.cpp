@@ -54,8 +54,9 @@ void expect_true_stamps(const std::filesystem::path& session, double most_us) {
 
 TEST(Chain, boardAndInsAsBytesOnLinesGiveProvenPairsAndTheSameBytesOnEveryRunWhateverGoes) {
   const TemporaryFolder folder;
+  // Long enough after the last fault for the drive to confirm its calibration again.
   const std::string faults =
-      "--duration 9 --fault board_reboot@3 --fault 'camera_gone@6 camera=1 duration_s=0.5'";
+      "--duration 12 --fault board_reboot@3 --fault 'camera_gone@6 camera=1 duration_s=0.5'";
   const Outcome o = drive("mock_chain.yaml", folder / "a", faults + " --threads 2");
   ASSERT_EQ(o.code, 0) << o.err;
   ASSERT_EQ(drive("mock_chain.yaml", folder / "b", faults + " --threads 1").code, 0);
