@@ -10,7 +10,7 @@ namespace {
 constexpr std::string_view kOpening = R"(# Configuration
 
 Every key that `vergence` understands, with its default. Nothing has to be set: without a configuration the defaults act.
-This page is written from the table that the program checks its input with (`app/config/schema.cpp`).
+This page is written from the table that the program checks its input with (`app/config/schema*.cpp`).
 
 A configuration is a YAML file. Keys stand in groups:
 
