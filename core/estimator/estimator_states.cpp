@@ -5,9 +5,8 @@ namespace vergence {
 namespace {
 
 constexpr int kLostAfter = 3;  // frames without a pose in a row before the state says so
-// Frames with good images that no scene can be made of with the calibration in use; and with one
-// that no frame of the drive has agreed with yet.
-constexpr int kUnmatchedAfter = 15, kUnmatchedClaimAfter = 6;
+// Frames with good images that no scene can be made of with the calibration in use.
+constexpr int kUnmatchedAfter = 15;
 
 }  // namespace
 
@@ -21,11 +20,10 @@ void Estimator::Parts::follow(const odometry::FrameOutcome& out, const RigFrame&
   const bool unmatched = !out.posed && out.images_good && out.reason == Reason::no_stereo_matches &&
                          odometry.linked() == odometry::Link::linked;
   unmatched_frames = unmatched ? unmatched_frames + 1 : 0;
-  const int unmatched_after = ever_posed ? kUnmatchedAfter : kUnmatchedClaimAfter;
-  if (options.online && unmatched_frames == unmatched_after) {
+  if (options.online && unmatched_frames == kUnmatchedAfter) {
     unmatched_frames = 0;
     // Good images of which no scene can be made: then it is the rig that does not fit.
-    give_up_calibration(frame, unmatched_after);
+    give_up_calibration(frame, kUnmatchedAfter);
     odometry.reset_extrinsics();
   }
   if (!out.posed) {
@@ -37,7 +35,6 @@ void Estimator::Parts::follow(const odometry::FrameOutcome& out, const RigFrame&
     return;
   }
   without_pose = 0;
-  ever_posed = true;
   if (state == State::lost)
     transition(odometry.linked() == odometry::Link::linked ? Trigger::pose_found
                : calibrator.calibrated()                   ? Trigger::pose_found_doubtful

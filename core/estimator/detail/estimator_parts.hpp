@@ -70,7 +70,6 @@ struct Estimator::Parts {
   int without_pose = 0;
   bool in_gap = false;       // and the last event has said so
   int unmatched_frames = 0;  // in a row
-  bool ever_posed = false;
   Reason told_missing = Reason::none;
   std::atomic<bool> requested{false};
   FixedVector<EstimatorEvent, 16> events;         // a frame raises at most eight
