@@ -123,7 +123,10 @@ ImageFileStatus check_image(std::span<const std::uint8_t> bytes, ImageSize* size
 
 std::uint16_t peak_of_deep_image(std::span<const std::uint8_t> bytes) {
   ImageSize size;
-  if (check_image(bytes, &size) != ImageFileStatus::ok || !detail::is_png(bytes)) return 0;
+  constexpr std::size_t kDepthAt = 24;  // of the header: other depths are not worth decoding
+  if (check_image(bytes, &size) != ImageFileStatus::ok || !detail::is_png(bytes) ||
+      bytes.size() <= kDepthAt || bytes[kDepthAt] != 16)
+    return 0;
   const auto width = static_cast<std::size_t>(size.width);
   std::vector<std::uint8_t> pixels(width * static_cast<std::size_t>(size.height));
   detail::DeepSamples deep;

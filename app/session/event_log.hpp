@@ -18,9 +18,8 @@ namespace vergence::app {
 /// Threads  note…(), tell(): the estimator's, sealed. show(): the caller's. After the estimator's
 ///          thread has joined all is anyone's.
 /// Memory   Fixed, most of it the sample of matches: not for a stack. Full: of the states for the
-///          line the newest are lost, the next one
-/// tells the same and more; of the sentences too, and
-///          events.jsonl has them.
+///          line the newest are lost, the next one tells the same and more; of the sentences too,
+///          and events.jsonl has them.
 class EventLog {
  public:
   /// The output outlives the last note.

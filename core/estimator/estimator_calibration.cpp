@@ -145,9 +145,8 @@ void Estimator::Parts::calibrate(const RigFrame& frame) noexcept {
 }
 
 /// What the drive has measured of the rig while it went on.
-void Estimator::Parts::take_learnt(const CalibrationDecision& decision, bool was_verified,
-                                   Stamp stamp) noexcept {
-  if (decision.cause == CalibrationCause::contradicted && !was_verified)
+void Estimator::Parts::take_learnt(const CalibrationDecision& decision, Stamp stamp) noexcept {
+  if (decision.cause == CalibrationCause::contradicted && !verified)
     note(EstimatorEvent::Kind::calibration_contradicted, stamp,
          "the calibration in use is not that of the rig", decision.depth_difference_percent);
   if (decision.accepted) {
@@ -158,12 +157,12 @@ void Estimator::Parts::take_learnt(const CalibrationDecision& decision, bool was
     superseded = decision.cause == CalibrationCause::contradicted;
     undecided = false;
   }
-  tell_verified(was_verified, decision, stamp);
+  tell_verified(decision, stamp);
 }
 
-void Estimator::Parts::tell_verified(bool was_verified, const CalibrationDecision& decision,
-                                     Stamp stamp) noexcept {
-  if (!calibrator.verified() || was_verified) return;
+void Estimator::Parts::tell_verified(const CalibrationDecision& decision, Stamp stamp) noexcept {
+  const bool was_verified = std::exchange(verified, calibrator.verified());
+  if (!verified || was_verified) return;
   unconfirmed = false;
   confirmed_percent = decision.depth_sigma_percent;
   if (!superseded) tell_confirmed(stamp);
@@ -176,18 +175,15 @@ void Estimator::Parts::tell_confirmed(Stamp stamp) noexcept {
 
 void Estimator::Parts::take(const CalibrationDecision& decision, Stamp stamp) noexcept {
   (void)decisions.push(decision);
-  const bool was_verified = verified;
-  verified = calibrator.verified();
-  if (decision.learnt) return take_learnt(decision, was_verified, stamp);
+  if (decision.learnt) return take_learnt(decision, stamp);
   if (decision.accepted) {
     note(EstimatorEvent::Kind::calibration_accepted, stamp, "a calibration is accepted",
          decision.calibration.frames);
     calibrator.use(decision.calibration, decision.lenses);
-    verified = calibrator.verified();
     odometry.link(decision.calibration);
     undecided = false;
     transition(Trigger::calibration_accepted, stamp);
-    tell_verified(was_verified, decision, stamp);
+    tell_verified(decision, stamp);
     return;
   }
   note(EstimatorEvent::Kind::calibration_rejected, stamp, decision.reason,
@@ -195,7 +191,6 @@ void Estimator::Parts::take(const CalibrationDecision& decision, Stamp stamp) no
   switch (calibrator.last_gate()) {
     case calibration::Gate::no_better:
       calibrator.keep();
-      verified = calibrator.verified();
       odometry.link(calibrator.in_use());
       transition(Trigger::calibration_kept, stamp);
       break;

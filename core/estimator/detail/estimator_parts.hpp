@@ -45,8 +45,8 @@ struct Estimator::Parts {
   void watch_sought(const odometry::FrameOutcome& out, const RigFrame& frame) noexcept;
   void calibrate(const RigFrame& frame) noexcept;
   void take(const CalibrationDecision& decision, Stamp stamp) noexcept;
-  void take_learnt(const CalibrationDecision& decision, bool was_verified, Stamp stamp) noexcept;
-  void tell_verified(bool was_verified, const CalibrationDecision& decision, Stamp stamp) noexcept;
+  void take_learnt(const CalibrationDecision& decision, Stamp stamp) noexcept;
+  void tell_verified(const CalibrationDecision& decision, Stamp stamp) noexcept;
   void tell_confirmed(Stamp stamp) noexcept;
   void follow(const odometry::FrameOutcome& out, const RigFrame& frame) noexcept;
   void tell_missing(Stamp stamp) noexcept;
@@ -62,7 +62,7 @@ struct Estimator::Parts {
   bool any = false;
   bool unconfirmed;              // the calibration in use is the last drive's
   bool undecided = false;        // something is wrong with the rig, and not yet told what
-  bool verified = false;         // the calibration in use, when last decided about
+  bool verified = false;         // the calibration in use, as far as has been told
   double confirmed_percent = 0;  // depth error of the calibration that was confirmed
   bool relinked = false;         // the frame before took up the calibration that was adopted
   bool superseded = false;       // poses still are of a calibration that was contradicted
