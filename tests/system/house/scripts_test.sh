@@ -25,6 +25,7 @@ expect_refusal "$work/empty is neither KITTI" "$source/scripts/demo" empty
 expect_refusal "takes nothing, or the word program" "$source/scripts/setup" everything
 expect_refusal "takes arm64 or armhf" "$source/scripts/cross" riscv64
 expect_refusal "takes arm64 or armhf" "$source/scripts/sysroot" arm64 everything
+expect_refusal "takes nothing, or --keep and a folder" "$source/scripts/deployment-test" arm64
 [ -z "$(find . -mindepth 1 -not -name empty -not -name out -not -name err)" ] || { echo "a script left files behind"; failures=$((failures + 1)); }
 
 # A package stands in one list, and each line names one as Debian does.
@@ -37,7 +38,7 @@ if [ -n "$twice$odd" ]; then
 fi
 
 if command -v shellcheck >/dev/null; then
-  shellcheck "$source"/scripts/{setup,demo,test,bench,cross,sysroot} "$source/.ci/run" "$source"/tests/system/{house,packages}/*.sh \
+  shellcheck "$source"/scripts/{setup,demo,test,bench,cross,sysroot,deployment-test} "$source/.ci/run" "$source"/tests/system/{house,packages,deployment}/*.sh \
     "$source/packaging/vergence-session" "$source"/packaging/debian/{postinst,prerm,postrm} || failures=$((failures + 1))
   (cd "$source/tests/rigs" && shellcheck -x build-kernel build-qemu run-in-kernel run-in-qemu init-in-kernel check ./*.sh) ||
     failures=$((failures + 1))

@@ -8,11 +8,16 @@
 #ifndef VERGENCE_BOARD_CRYSTAL_MHZ
 #define VERGENCE_BOARD_CRYSTAL_MHZ 8
 #endif
+/* What the timers count a second on the internal oscillator. QEMU's count 1 GHz whatever the clocks
+ * are: with that here, a second of an emulated board's is one of the host's. */
+#ifndef VERGENCE_BOARD_INTERNAL_HZ
+#define VERGENCE_BOARD_INTERNAL_HZ 16000000
+#endif
 _Static_assert(VERGENCE_BOARD_CRYSTAL_MHZ >= 4 && VERGENCE_BOARD_CRYSTAL_MHZ <= 26,
                "HSE takes 4 to 26 MHz");
 
 enum {
-  internal_hz = 16000000,
+  internal_hz = VERGENCE_BOARD_INTERNAL_HZ,
   internal_ppm = 20000, /* +-1 % at 25 degrees, more when it is hot: data sheet "HSI oscillator" */
   crystal_ppm = 200,    /* crystals of such boards have 20 to 50 */
   system_hz = 168000000,
