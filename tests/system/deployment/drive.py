@@ -85,7 +85,7 @@ class Vehicle:
 
 def install(machine):
     done(machine, "mkdir -p /parcel && mount -o ro /dev/vdb /parcel")
-    done(machine, "apt-get install -y --no-download /parcel/vergence.deb", 300)
+    done(machine, "DEBIAN_FRONTEND=noninteractive apt-get install -qq -y /parcel/vergence.deb", 300)
     need(machine.run("systemctl is-enabled vergence")[1] == "disabled", "installing has enabled the service")
     say("installed: %s, user %s" % (done(machine, "vergence --version | head -n 1"), done(machine, "id vergence")))
 

@@ -62,7 +62,7 @@ class Machine:
         while True:
             self.heard = b""
             try:
-                self.run("stty -echo -onlcr; cd /", 5)
+                self.run("stty -F /dev/hvc0 -echo -onlcr; cd /", 5)
                 self.run("true", 5)
                 return
             except MachineError:
