@@ -90,6 +90,13 @@ TEST(Analysis, framesThatOnlyWaitedForTheCalibrationAreCountedApart) {
   EXPECT_NEAR(*a.confirmed_s, 10, 1e-9);
 }
 
+TEST(Analysis, framesBeforeADriveFromScratchFoundItsCalibrationWaitedToo) {
+  Session s = unverified_drive(100);
+  s.reasons[1] = "uncalibrated";
+  s.events = {{s.frames[100].stamp, "calibration_confirmed", ""}};
+  EXPECT_EQ(analyse(s).waited, 99U);
+}
+
 TEST(Analysis, aDriveThatNeverConfirmedItsCalibrationWaitedToItsEnd) {
   const Analysis a = analyse(unverified_drive(100));
   EXPECT_EQ(a.waited, 100U);
