@@ -244,6 +244,7 @@ void compare(const Session& s, Analysis* a) {
       std::any_of(s.frames.begin(), s.frames.end(), [](const Frame& f) { return f.has_ins; });
   if (placed) return take_ins(s, a);
   if (ins) {
+    a->ins_unplaced = true;
     a->source_sentence =
         "There was an INS, but the drive could not be placed on the earth with it: no errors are "
         "shown.";

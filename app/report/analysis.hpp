@@ -28,6 +28,7 @@ struct Analysis {
   ErrorSource source = ErrorSource::none;
   std::string
       source_sentence;  // what was compared with what, and how the two were laid on each other
+  bool ins_unplaced = false;  // there was an INS, and no frame was placed on the earth with it
   std::vector<double> horizontal_m, vertical_m, heading_deg;
   struct Spread {
     double rms = kNone, max = kNone, end = kNone;

@@ -202,6 +202,7 @@ TEST(Analysis, anInsThatNeverGaveAPlacementGivesNoErrors) {
   const Analysis a = analyse(with_reference(s, Transform{}));
   EXPECT_EQ(a.source, ErrorSource::none);
   EXPECT_NE(a.source_sentence.find("could not be placed"), std::string::npos);
+  EXPECT_TRUE(a.ins_unplaced);
 }
 
 TEST(Analysis, withoutASummaryTheFiguresAreReckonedAgain) {
