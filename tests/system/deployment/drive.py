@@ -43,7 +43,8 @@ def done(machine, command, limit=120):
 
 
 class Vehicle:
-    """The machine and what is wired to it. The trigger board has a supply of its own: it runs through power cuts."""
+    """The machine and what is wired to it. The trigger board has a supply of its own: it runs through power cuts. The INS gets power
+    when the machine's shell answers, which is later than an enabled service starts."""
 
     def __init__(self, given):
         self.given = given
@@ -188,10 +189,11 @@ def after_the_cut(vehicle, whole, cut, rows_before):
     machine = vehicle.machine
     say("powered on again, shell after %.0f s" % vehicle.power_on())
     say("file system: %s" % done(machine, "journalctl -b -k -o cat --no-pager | grep -i 'EXT4-fs (vda)' | head -n 3; dumpe2fs -h /dev/vda 2>/dev/null | grep 'Filesystem state'"))
-    deadline = time.monotonic() + 180
+    deadline = time.monotonic() + 300
     while machine.run("systemctl is-active vergence")[1] != "active":
         need(time.monotonic() < deadline, "the enabled service did not start:\n" + machine.run("systemctl status vergence --no-pager -n 30")[1])
         time.sleep(2)
+    say("the enabled service drives, after %s starts that failed for want of the INS" % done(machine, "systemctl show -P NRestarts vergence"))
     session = newest_session(machine, cut)
     need(session not in (whole, cut), "the session's name is taken")
     drive(machine, session, 30)
@@ -216,8 +218,8 @@ def test(given):
         configure(machine)
         rules(machine)
         whole = service_drives(machine)
-        first = mock_drive(machine, "mock-1", 12)
-        need(first["frames"]["ok"] > 0, "no pose is ok")
+        first = mock_drive(machine, "mock-1", 6)
+        need(first["frames"]["ok"] > 0 and first["calibration"]["accepted"] > 0, "no pose is ok, or no calibration was accepted")
 
         done(machine, "systemctl enable vergence && sync")
         start_service(machine)
@@ -228,8 +230,8 @@ def test(given):
         machine.power_cut()
 
         after_the_cut(vehicle, whole, cut, lines)
-        second = mock_drive(machine, "mock-2", 3)
-        need(second["calibration"]["source"] != "none" and second["frames"]["ok"] > 0, "the stored calibration was not taken up")
+        second = mock_drive(machine, "mock-2", 2)
+        need(second["calibration"]["source"].endswith("calibration_state.yaml"), "the stored calibration was not taken up")
         started = time.monotonic()
         machine.power_off()
         say("switched off after %.0f s" % (time.monotonic() - started))
