@@ -13,7 +13,7 @@ import subprocess
 import sys
 import time
 
-from machine import Machine, MachineError
+from machine import WITH_US, Line, Machine, MachineError
 
 HERE = os.path.dirname(os.path.abspath(__file__))
 SESSIONS = "/var/lib/vergence/sessions"
@@ -57,18 +57,19 @@ class Vehicle:
         subprocess.run(["mke2fs", "-q", "-F", "-t", "ext4", "-d", folder, parcel, "32M"], check=True)
         self.machine = Machine(given.image, disk, parcel, given.work, [INS, TRIGGER])
         self.ins = None
+        self.line = Line(self.machine.path("line"), self.machine.path("serial-" + TRIGGER))
         log = open(os.path.join(given.work, "board.log"), "w", encoding="utf-8")
         # 256 ns an instruction and not faster than the clock on the wall: some 4 million instructions a second, a fifth of a processor.
         self.board = subprocess.Popen(
-            ["qemu-system-arm", "-machine", "netduinoplus2", "-nodefaults", "-display", "none", "-icount", "shift=8,align=on,sleep=on",
-             "-kernel", given.board, "-chardev", "socket,id=line,path=%s,reconnect=1" % self.machine.path("serial-" + TRIGGER),
+            WITH_US + ["qemu-system-arm", "-machine", "netduinoplus2", "-nodefaults", "-display", "none", "-icount", "shift=8,align=on,sleep=on",
+             "-kernel", given.board, "-chardev", "socket,id=line,path=" + self.machine.path("line"),
              "-serial", "chardev:line"], stdin=subprocess.DEVNULL, stdout=log, stderr=log)
 
     def power_on(self):
         self.ins_off()
         started = time.monotonic()
         self.machine.power_on()
-        self.ins = subprocess.Popen(self.given.ins + [self.machine.path("serial-" + INS)], stdin=subprocess.DEVNULL)
+        self.ins = subprocess.Popen(WITH_US + self.given.ins + [self.machine.path("serial-" + INS)], stdin=subprocess.DEVNULL)
         return time.monotonic() - started
 
     def ins_off(self):
@@ -81,6 +82,7 @@ class Vehicle:
         self.ins_off()
         self.board.kill()
         self.board.wait()
+        self.line.close()
         self.machine.close()
 
 

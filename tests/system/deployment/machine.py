@@ -1,11 +1,14 @@
 """An emulated arm64 board with a Debian on its disk: QEMU, a shell of root's on its second console, serial devices on its USB."""
 import os
 import re
+import select
 import signal
 import socket
 import subprocess
+import threading
 import time
 
+WITH_US = ["setpriv", "--pdeathsig", "KILL"]  # before a command: it ends when this program does, however that ends
 PATIENCE = 600  # s: from power to the shell, on a busy machine
 
 
@@ -27,7 +30,7 @@ class Machine:
         self.shell = None
         self.heard = b""
         self.commands = 0
-        self.arguments = [
+        self.arguments = WITH_US + [
             "qemu-system-aarch64", "-machine", "virt", "-cpu", "cortex-a72", "-accel", "tcg,thread=multi", "-smp", "2", "-m", "1G",
             "-nodefaults", "-display", "none", "-no-reboot",
             "-kernel", os.path.join(image, "kernel"), "-initrd", os.path.join(image, "initramfs"),
@@ -113,3 +116,61 @@ class Machine:
         if self.process is not None and self.process.poll() is None:
             self.process.kill()
             self.process.wait()
+
+
+class Line:
+    """A serial line from a device's emulator to the machine's converter: what the machine does not take is lost, as on a wire.
+
+    Were the two sockets one, a machine that has no program at the port would stop the emulator until it has one. The device connects to
+    `path`; the machine is looked for again whenever it is gone.
+    """
+
+    def __init__(self, path, machine_path):
+        self.machine_path = machine_path
+        if os.path.exists(path):
+            os.unlink(path)
+        self.server = socket.socket(socket.AF_UNIX)
+        self.server.bind(path)
+        self.server.listen(1)
+        self.ended = False
+        self.thread = threading.Thread(target=self.work, daemon=True)
+        self.thread.start()
+
+    def work(self):
+        device, _ = self.server.accept()
+        while not self.ended:
+            machine = socket.socket(socket.AF_UNIX)
+            machine.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, 1024)
+            if machine.connect_ex(self.machine_path) == 0:
+                machine.setblocking(False)
+                self.carry(device, machine)
+            else:
+                self.ended = self.ended or not self.lose(device)
+            machine.close()
+        device.close()
+
+    def carry(self, device, machine):
+        while not self.ended:
+            for end in select.select([device, machine], [], [], 0.5)[0]:
+                try:
+                    data = end.recv(4096)
+                    if not data:
+                        self.ended = self.ended or end is device
+                        return
+                    if end is machine:
+                        device.sendall(data)
+                    else:
+                        machine.send(data)
+                except BlockingIOError:
+                    pass
+                except OSError:
+                    return
+
+    @staticmethod
+    def lose(device):
+        """→ whether the device is still there."""
+        return not select.select([device], [], [], 0.2)[0] or bool(device.recv(4096))
+
+    def close(self):
+        self.ended = True
+        self.server.close()
