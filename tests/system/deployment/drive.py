@@ -171,13 +171,13 @@ def service_drives(machine):
 
 
 MOCK = (AS_USER + "vergence run /usr/share/vergence/config/mock.yaml --fast --quiet --set rig.state_dir=/var/lib/vergence/mock "
-        "--set mock.world=suburb --duration %d --out %s/%s")
+        "--set trigger.rate=10 --duration %d --out %s/%s %s")
 
 
-def mock_drive(machine, name, seconds):
+def mock_drive(machine, name, seconds, more=""):
     """A drive through the rendered suburb, in virtual time: the poses are known to be good or not."""
     started = time.monotonic()
-    status, text = machine.run("mkdir -p /var/lib/vergence/mock && chown vergence: /var/lib/vergence/mock && " + MOCK % (seconds, SESSIONS, name), 1200)
+    status, text = machine.run("mkdir -p /var/lib/vergence/mock && chown vergence: /var/lib/vergence/mock && " + MOCK % (seconds, SESSIONS, name, more), 1200)
     need(status in (0, 1), "the mock drive: %d\n%s" % (status, text))
     summary = json.loads(done(machine, "cat %s/%s/summary.json" % (SESSIONS, name)))
     frames, calibration = summary["frames"], summary["calibration"]
@@ -220,8 +220,8 @@ def test(given):
         configure(machine)
         rules(machine)
         whole = service_drives(machine)
-        first = mock_drive(machine, "mock-1", 6)
-        need(first["frames"]["ok"] > 0 and first["calibration"]["accepted"] > 0, "no pose is ok, or no calibration was accepted")
+        first = mock_drive(machine, "mock-1", 6, "--from-scratch")
+        need(first["calibration"]["accepted"] > 0, "no calibration was accepted")
 
         done(machine, "systemctl enable vergence && sync")
         start_service(machine)
@@ -232,7 +232,8 @@ def test(given):
         machine.power_cut()
 
         after_the_cut(vehicle, whole, cut, lines)
-        second = mock_drive(machine, "mock-2", 2)
+        second = mock_drive(machine, "mock-2", 8)
+        need(second["frames"]["ok"] > 0, "no pose is ok")
         need(second["calibration"]["source"].endswith("calibration_state.yaml"), "the stored calibration was not taken up")
         started = time.monotonic()
         machine.power_off()
