@@ -9,7 +9,7 @@ import threading
 import time
 
 WITH_US = ["setpriv", "--pdeathsig", "KILL"]  # before a command: it ends when this program does, however that ends
-PATIENCE = 600  # s: from power to the shell, on a busy machine
+PATIENCE = 900  # s: from power to the shell, on a busy machine
 
 
 class MachineError(Exception):
@@ -61,14 +61,17 @@ class Machine:
             self.check_alive()
             time.sleep(0.1)
         self.shell.settimeout(1)
-        # The shell's first line asks for no echo; what it said before that is of no interest.
+        # The shell's first line asks for no echo; what it said before that is of no interest. Waits grow, or a machine that is slower
+        # than they are would never be done with what it was asked before.
+        limit = 5
         while True:
             self.heard = b""
             try:
-                self.run("stty -F /dev/hvc0 -echo -onlcr; cd /", 5)
-                self.run("true", 5)
+                self.run("stty -F /dev/hvc0 -echo -onlcr; cd /", limit)
+                self.run("true", limit)
                 return
             except MachineError:
+                limit = min(2 * limit, 120)
                 if time.monotonic() > deadline:
                     raise MachineError("no shell %d s after power-on; the console is in %s" % (PATIENCE, console)) from None
                 self.check_alive()
