@@ -335,7 +335,7 @@ TwoEvidences ChangeDetector::since(const Onset& onset) const noexcept {
   // A look from before the onset to after it compares two rigs: it alarms, but it measures neither.
   TwoEvidences sum = onset.raw;
   for (std::size_t age = 0;
-       age < std::min<std::uint64_t>({static_cast<std::uint64_t>(onset.frames), kRecent, count_});
+       age < std::min<std::size_t>({static_cast<std::size_t>(onset.frames), kRecent, count_});
        ++age) {
     const Entry& e = recent(age);
     if (e.evidence.motion.n > 0 && e.before < onset.frame) sum.motion.add(e.evidence.motion, -1.0);

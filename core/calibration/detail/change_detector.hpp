@@ -103,7 +103,8 @@ class ChangeDetector {
   BlockScatter scatter_{};
   std::array<std::size_t, 6> detector_{};
   std::size_t window_count_ = 0;
-  std::uint64_t count_ = 0, closed_ = 0;  // frames, full blocks
+  // Frames, full blocks; where indices have 32 bits, 30 Hz for four and a half years.
+  std::size_t count_ = 0, closed_ = 0;
   std::array<Entry, kRecent> recent_{};
   std::array<Entry, kBlocks> blocks_{};
   Entry open_{};          // the block being filled
