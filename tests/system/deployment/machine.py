@@ -112,7 +112,7 @@ class Machine:
 
     def power_off(self):
         self.shell.sendall(b"systemctl poweroff\n")
-        self.process.wait(120)
+        self.process.wait(300)
         self.shell.close()
 
     def close(self):
