@@ -52,7 +52,8 @@ class Pairs {
                            "gige",
                            o.address,
                            {kWidth, kHeight, rate, Duration::milliseconds(2), 0}};
-      r.configuration.options = {{"packet_size", "16000"}, {"resend", resend}};
+      give<gige::Options>(&r.configuration, "packet_size", "16000");
+      give<gige::Options>(&r.configuration, "resend", resend);
       requests.push_back(std::move(r));
     }
     std::vector<std::string> remarks;

@@ -16,6 +16,7 @@
 
 #include "drivers/v4l2/v4l2.hpp"
 #include "tests/rigs/vivid.hpp"
+#include "tests/support/camera_options.hpp"
 
 namespace vergence::v4l2 {
 namespace {
@@ -220,9 +221,9 @@ TEST_F(V4l2Rig, aRateItDoesNotHaveIsRoundedAndRemarked) {
 TEST_F(V4l2Rig, controlsAreSetByName) {
   auto camera = open(0);
   CameraConfiguration c = webcam();
-  c.options["control_brightness"] = "200";
-  c.options["control_test_pattern"] = "100% Black";
-  c.options["control_osd_text_mode"] = "None";
+  test::give<v4l2::Options>(&c, "control_brightness", "200");
+  test::give<v4l2::Options>(&c, "control_test_pattern", "100% Black");
+  test::give<v4l2::Options>(&c, "control_osd_text_mode", "None");
   ASSERT_EQ(camera->configure(c, nullptr), DeviceStatus::ok) << camera->last_error();
   ASSERT_EQ(camera->start(nullptr), DeviceStatus::ok);
   Frame frame;
@@ -239,7 +240,8 @@ TEST_F(V4l2Rig, stampsOfTheStartOfExposureAreTakenAsTheyAre) {
   Duration age[2];
   for (int source = 0; source < 2; ++source) {
     CameraConfiguration c = webcam();
-    c.options["control_timestamp_source"] = source == 0 ? "End of Frame" : "Start of Exposure";
+    test::give<v4l2::Options>(&c, "control_timestamp_source",
+                              source == 0 ? "End of Frame" : "Start of Exposure");
     auto camera = streaming(0, c);
     Frame frame;
     age[source] = Duration::seconds(1);
@@ -384,8 +386,8 @@ TEST_F(V4l2Rig, stopsAndStartsUnderLoadLeakNothing) {
 TEST_F(V4l2Rig, thinnedCamerasKeepFramesOfTheSameMoments) {
   CameraConfiguration c = webcam(), actual;
   c.rate_hz = 5;
-  c.options["thin"] = "5";
-  c.options["control_timestamp_source"] = "Start of Exposure";
+  test::give<v4l2::Options>(&c, "thin", "5");
+  test::give<v4l2::Options>(&c, "control_timestamp_source", "Start of Exposure");
   auto left = open(0), right = open(1);
   ASSERT_EQ(left->configure(c, &actual), DeviceStatus::ok);
   EXPECT_EQ(actual.rate_hz, 5);
