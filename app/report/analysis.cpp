@@ -1,6 +1,7 @@
 #include "app/report/analysis.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numbers>
 
@@ -67,9 +68,11 @@ void count_waiting(const Session& s, Analysis* a) {
   for (const Frame& f : s.frames) {
     if (f.status != PoseStatus::degraded || (confirmed != nullptr && f.stamp > confirmed->stamp))
       continue;
+    constexpr std::array kWaits{Reason::uncalibrated, Reason::unconfirmed,
+                                Reason::unverified_calibration};
     const std::string& reason = s.reasons[f.reason];
-    if (reason != to_string(Reason::unverified_calibration) &&
-        reason != to_string(Reason::unconfirmed))
+    if (std::none_of(kWaits.begin(), kWaits.end(),
+                     [&reason](Reason r) { return reason == to_string(r); }))
       continue;
     ++a->waited;
     ++a->waited_by_reason[f.reason];
@@ -241,6 +244,7 @@ void compare(const Session& s, Analysis* a) {
       std::any_of(s.frames.begin(), s.frames.end(), [](const Frame& f) { return f.has_ins; });
   if (placed) return take_ins(s, a);
   if (ins) {
+    a->ins_unplaced = true;
     a->source_sentence =
         "There was an INS, but the drive could not be placed on the earth with it: no errors are "
         "shown.";

@@ -28,6 +28,7 @@ struct Analysis {
   ErrorSource source = ErrorSource::none;
   std::string
       source_sentence;  // what was compared with what, and how the two were laid on each other
+  bool ins_unplaced = false;  // there was an INS, and no frame was placed on the earth with it
   std::vector<double> horizontal_m, vertical_m, heading_deg;
   struct Spread {
     double rms = kNone, max = kNone, end = kNone;
@@ -40,7 +41,7 @@ struct Analysis {
   std::size_t read = 0, ok = 0, degraded = 0, lost = 0, unknown = 0, skipped = 0;  // frames
   std::vector<std::size_t> by_reason;  // frames that were not ok, by Session::reasons
   // Of the degraded ones, and of by_reason: without another fault than that the drive had not yet
-  // confirmed its calibration. A drive is not judged by that wait.
+  // found or confirmed its calibration. A drive is not judged by that wait.
   std::size_t waited = 0;
   std::vector<std::size_t> waited_by_reason;
   std::optional<double>

@@ -80,6 +80,14 @@ void judge_frames(const Session& s, const Analysis& a, const Usability& use, Jud
 }
 
 void judge_drift(const Analysis& a, Judge* j) {
+  if (a.ins_unplaced) {
+    j->find(Grade::care,
+            "nothing says how far it drifted: the drive was not placed on the earth with its INS");
+    j->advise(
+        "Errors are shown from comparison.placement_m (100 m) driven with a valid fix on: drive "
+        "further, or set it lower.");
+    return;
+  }
   if (a.source == ErrorSource::none) {
     j->find(Grade::care, "nothing says how far it drifted: there was no reference");
     j->advise(

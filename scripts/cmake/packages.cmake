@@ -26,11 +26,11 @@ set(CPACK_DEBIAN_PACKAGE_ARCHITECTURE ${debian_architecture_${CMAKE_SYSTEM_PROCE
 # Explicit, not computed: dpkg-shlibdeps wants the libraries of a foreign architecture installed. The names are the same on all
 # three; a test compares them with dpkg-shlibdeps' on the host (tests/system/packages).
 set(libraries_of_both
-  "libaravis-0.8-0 (>= 0.8.26)" "libc6 (>= 2.36)" "libdc1394-25 (>= 2.2.6)" "libfmt9 (>= 9.1.0)" "libgcc-s1 (>= 3.5)" "libgeographiclib23"
+  "libaravis-0.8-0 (>= 0.8.26)" "libc6 (>= 2.36)" "libdc1394-25 (>= 2.2.6)" "libdeflate0" "libfmt9 (>= 9.1.0)" "libgcc-s1 (>= 3.5)" "libgeographiclib23"
   "libglib2.0-0 (>= 2.74)" "libhwy1 (>= 1.0.3)" "libjpeg62-turbo (>= 1:2.1)" "libpng16-16 (>= 1.6.2)" "libserialport0" "libstdc++6 (>= 12)"
-  "libusb-1.0-0 (>= 2:1.0.26)" "libyaml-cpp0.7" "zlib1g")
+  "libusb-1.0-0 (>= 2:1.0.26)" "libyaml-cpp0.7")
 list(JOIN libraries_of_both ", " libraries_of_both)
-set(CPACK_DEBIAN_PROGRAM_PACKAGE_DEPENDS "adduser, ${libraries_of_both}, libbz2-1.0, libdeflate0, liblz4-1, libzstd1 (>= 1.5.2)")
+set(CPACK_DEBIAN_PROGRAM_PACKAGE_DEPENDS "adduser, ${libraries_of_both}, libbz2-1.0, liblz4-1, libzstd1 (>= 1.5.2)")
 set(CPACK_DEBIAN_PROGRAM_PACKAGE_NAME vergence)
 set(CPACK_DEBIAN_PROGRAM_PACKAGE_SECTION science)
 set(CPACK_DEBIAN_PROGRAM_PACKAGE_SUGGESTS "vergence-checkerboard, systemd, udev, bash-completion")

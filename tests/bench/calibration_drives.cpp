@@ -246,59 +246,6 @@ int run_jumps(const std::vector<std::string>& set, const std::string& only) {
   return for_drives(set, only, print_jumps);
 }
 
-int run_learning(const std::vector<std::string>& set, int times) {
-  const app::Configuration c = app::load_configuration(std::nullopt, set);
-  const auto d = test::open_recorded("kitti00_151");
-  if (!d) {
-    fmt::print(stderr,
-               "calibration_bench: no recorded drives; set VERGENCE_SHARED to the folder that "
-               "holds data/\n");
-    return 2;
-  }
-  // To and fro over the same road: the speed changes its sign at the ends, the rig stays what it
-  // is.
-  StereoSequence s = d->sequence;
-  const std::size_t n = d->sequence.pairs.size();
-  const Duration step = d->sequence.pairs[1].stamp - d->sequence.pairs[0].stamp;
-  s.pairs.clear();
-  for (int time = 0; time < times; ++time)
-    for (std::size_t i = time == 0 ? 0 : 1; i < n; ++i) {
-      app::StereoPair pair = d->sequence.pairs[time % 2 == 0 ? i : n - 1 - i];
-      pair.stamp = s.pairs.empty() ? d->sequence.pairs[0].stamp : s.pairs.back().stamp + step;
-      s.pairs.push_back(pair);
-    }
-  const StartingCalibration scratch = test::blank(app::replayed_calibration(c, s, false));
-  int knocks = 0;
-  const auto rig = app::drive_once(
-      {s, c, 0, s.pairs.size(), {}, {}}, scratch,
-      [&](const Estimator& e, const PoseSample& sample) {
-        for (const EstimatorEvent& event : e.events())
-          knocks += event.kind == EstimatorEvent::Kind::rig_changed ? 1 : 0;
-        for (const CalibrationDecision& decision : e.calibrations()) {
-          const RigCalibration& r = decision.calibration;
-          const Vec3 phi = 1e3 * log_so3(r.T_camera_left[1].R), t = 1e3 * r.T_camera_left[1].t;
-          fmt::print(
-              "frame {:5d} {:8s} {:4d} frames  yaw {:.3f} ({:.3f}) mrad  t_y {:.2f} t_z {:.2f} mm  "
-              "cx {:.2f} ({:.2f})  depth ± {:.2f} %  held "
-              "out {:.4f} px  {:.0f} ms\n",
-              sample.frame,
-              decision.accepted ? "adopted"
-              : decision.learnt ? "kept"
-                                : "rejected",
-              r.frames, phi.y(), 1e3 * r.sigma_noise[1][1], t.y(), t.z(), r.intrinsics[1].cx,
-              r.intrinsics[1].sigma[2], decision.depth_sigma_percent, decision.held_out_after_px,
-              decision.solve_ms);
-          std::fflush(stdout);
-        }
-      });
-  fmt::print("{} knocks told\n", knocks);
-  if (!rig) return 1;
-  StartingCalibration learnt = app::replayed_calibration(c, d->sequence, false);
-  learnt.file.rig = *rig;
-  print(d->name, "with what was learnt", drive_recorded(*d, d->sequence, c, learnt));
-  return 0;
-}
-
 int run_stretches(const std::vector<std::string>& set, const std::string& only) {
   const int recorded =
       for_drives(set, only, [](const RecordedSequence& d, const app::Configuration& c) {

@@ -12,10 +12,6 @@ int run_drives(const std::vector<std::string>& set, const std::string& only);
 /// (METHOD §6.5), of recorded drives and of a rendered one. → exit code.
 int run_stretches(const std::vector<std::string>& set, const std::string& only);
 
-/// `calibration_bench learning`: KITTI 00 so many times to and fro, from scratch; what is known
-/// after every solve. → exit code.
-int run_learning(const std::vector<std::string>& set, int times);
-
 /// `calibration_bench jumps`: how far disparities are from what the frame before makes of them, on
 /// recorded drives that nobody touched. → exit code.
 int run_jumps(const std::vector<std::string>& set, const std::string& only);

@@ -1,6 +1,7 @@
 #include "tests/support/rendered_drive.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <optional>
 #include <thread>
 
@@ -54,6 +55,17 @@ struct RenderedDrive::Parts {
     }
     frame.cameras = o.rig.cameras;
   }
+  /// Into the drive, of frame i.
+  [[nodiscard]] Duration time(std::uint64_t i) const {
+    double t = static_cast<double>(i) / options.rate;
+    if (options.to_and_fro) {
+      const double length = drive.duration().to_seconds() - options.from_s;
+      t = std::fmod(t, 2 * length);
+      if (t > length) t = 2 * length - t;
+    }
+    return Duration::seconds(options.from_s + t);
+  }
+
   RenderedDriveOptions options;
   mock::Drive drive;
   std::vector<mock::Renderer> renderers;
@@ -73,15 +85,12 @@ Transform RenderedDrive::T_camera_left(int k, std::uint64_t i) const {
 }
 
 Transform RenderedDrive::T_enu_left(std::uint64_t i) const {
-  const auto at =
-      Duration::seconds(parts_->options.from_s + static_cast<double>(i) / parts_->options.rate);
-  return mock::camera_pose(parts_->drive.at(at), mock::default_T_body_left()).inverse();
+  return mock::camera_pose(parts_->drive.at(parts_->time(i)), mock::default_T_body_left())
+      .inverse();
 }
 
 double RenderedDrive::speed(std::uint64_t i) const {
-  return parts_->drive
-      .at(Duration::seconds(parts_->options.from_s + static_cast<double>(i) / parts_->options.rate))
-      .velocity.norm();
+  return parts_->drive.at(parts_->time(i)).velocity.norm();
 }
 
 const RigFrame& RenderedDrive::frame(std::uint64_t i) {

@@ -18,8 +18,9 @@ namespace vergence::test {
 struct RenderedDriveOptions {
   RigCalibration rig = paper_rig();  // true
   mock::DriveOptions drive{};
-  double from_s = 8;  // into the drive, of frame 0
-  double rate = 30;   // Hz
+  double from_s = 8;        // into the drive, of frame 0
+  double rate = 30;         // Hz
+  bool to_and_fro = false;  // at the drive's end backwards to from_s, and so on; else it stands
   /// The true T_camera_left of camera k in frame i; empty: the rig's.
   std::function<Transform(int k, std::uint64_t frame)> placed;
 };

@@ -1,6 +1,6 @@
 #include "app/datasets/detail/mcap.hpp"
 
-#include <zlib.h>
+#include <libdeflate.h>
 
 #include <algorithm>
 #include <array>
@@ -82,7 +82,7 @@ std::string unpack(const ByteSource& file, const ChunkHead& head,
            "\"; lz4, zstd and none can be read";
   if (!decompress(head.compression, packed, *records))
     return "a chunk whose " + head.compression + " data do not unpack";
-  if (head.crc != 0 && ::crc32(0, records->data(), static_cast<uInt>(records->size())) != head.crc)
+  if (head.crc != 0 && libdeflate_crc32(0, records->data(), records->size()) != head.crc)
     return "a chunk whose check sum fails";
   return "";
 }

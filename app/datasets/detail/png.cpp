@@ -1,13 +1,14 @@
 #include "app/datasets/detail/png.hpp"
 
+#include <libdeflate.h>
 #include <png.h>
-#include <zlib.h>
 
 #include <algorithm>
 #include <array>
 #include <csetjmp>
 #include <cstring>
 
+#include "app/datasets/detail/grey_png.hpp"
 #include "app/datasets/detail/image_size.hpp"
 
 namespace vergence::app::detail {
@@ -122,25 +123,32 @@ ImageFileStatus png_size(Bytes b, ImageSize* size) noexcept {
   return accept_size(u32(b, 16), u32(b, 20), size);
 }
 
-ImageFileStatus check_png(Bytes b) noexcept {
+bool next_chunk(Bytes png, std::size_t* at, PngChunk* chunk) noexcept {
   constexpr std::size_t kFrame = 12;  // length, type, check sum
-  std::size_t at = kSignature.size();
+  if (*at > png.size() || png.size() - *at < kFrame) return false;
+  const std::size_t length = u32(png, *at);
+  if (length > png.size() - *at - kFrame) return false;
+  *chunk = {png.subspan(*at + 4, length + 4), u32(png, *at + 8 + length)};
+  *at += length + kFrame;
+  return true;
+}
+
+ImageFileStatus check_png(Bytes b) noexcept {
+  PngChunk chunk;
   bool pixels = false;
-  while (b.size() - at >= kFrame) {
-    const std::size_t length = u32(b, at);
-    if (length > b.size() - at - kFrame) return ImageFileStatus::torn;
-    const auto sum = crc32(0, &b[at + 4], static_cast<uInt>(length + 4));
-    if (sum != u32(b, at + 8 + length)) return ImageFileStatus::torn;
-    if (std::memcmp(&b[at + 4], "IDAT", 4) == 0) pixels = true;
-    if (std::memcmp(&b[at + 4], "IEND", 4) == 0)
-      return pixels ? ImageFileStatus::ok : ImageFileStatus::torn;
-    at += length + kFrame;
+  for (std::size_t at = kPngChunks; next_chunk(b, &at, &chunk);) {
+    const Bytes summed = chunk.type_and_content;
+    if (libdeflate_crc32(0, summed.data(), summed.size()) != chunk.check_sum)
+      return ImageFileStatus::torn;
+    if (chunk.is("IDAT")) pixels = true;
+    if (chunk.is("IEND")) return pixels ? ImageFileStatus::ok : ImageFileStatus::torn;
   }
   return ImageFileStatus::torn;
 }
 
 ImageFileStatus decode_png(Bytes bytes, ImageSize size, std::uint8_t* out, std::size_t stride,
                            DeepSamples* deep) noexcept {
+  if (decode_grey_png(bytes, size, out, stride)) return ImageFileStatus::ok;
   const Reader reader;
   if (reader.info == nullptr) return ImageFileStatus::undecodable;  // no memory
   Source source{bytes};

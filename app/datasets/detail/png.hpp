@@ -1,12 +1,13 @@
 #pragma once
 #include <cstddef>
 #include <cstdint>
+#include <cstring>
 #include <span>
 
 #include "app/datasets/image_file.hpp"
 
-/// PNG by libpng. Files are hostile: chunks are walked with their check sums and the size is
-/// accepted before libpng sees a byte.
+/// PNG by libpng, plain grey ones by libdeflate (grey_png.hpp). Files are hostile: chunks are
+/// walked with their check sums and the size is accepted before libpng sees a byte.
 namespace vergence::app::detail {
 
 inline constexpr std::size_t kPngHead = 33;  // bytes of the signature and the whole IHDR chunk
@@ -22,6 +23,21 @@ inline constexpr std::size_t kPngHead = 33;  // bytes of the signature and the w
 /// Every chunk with its check sum, up to IEND; what follows it is nobody's business. Precondition:
 /// is_png(). → ok, torn
 [[nodiscard]] ImageFileStatus check_png(std::span<const std::uint8_t> bytes) noexcept;
+
+struct PngChunk {
+  std::span<const std::uint8_t> type_and_content;  // four letters, then the content
+  std::uint32_t check_sum = 0;                     // as the file has it, CRC-32 of both
+
+  [[nodiscard]] bool is(const char (&type)[5]) const noexcept {
+    return std::memcmp(type_and_content.data(), type, 4) == 0;
+  }
+};
+
+inline constexpr std::size_t kPngChunks = 8;  // bytes before the first chunk
+
+/// The chunk that begins at *at, and *at behind it. → false: it does not fit into the file
+[[nodiscard]] bool next_chunk(std::span<const std::uint8_t> png, std::size_t* at,
+                              PngChunk* chunk) noexcept;
 
 /// What is done with grey samples of 16 bits; of colours the upper 8 are taken.
 struct DeepSamples {

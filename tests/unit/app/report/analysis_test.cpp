@@ -90,6 +90,13 @@ TEST(Analysis, framesThatOnlyWaitedForTheCalibrationAreCountedApart) {
   EXPECT_NEAR(*a.confirmed_s, 10, 1e-9);
 }
 
+TEST(Analysis, framesBeforeADriveFromScratchFoundItsCalibrationWaitedToo) {
+  Session s = unverified_drive(100);
+  s.reasons[1] = "uncalibrated";
+  s.events = {{s.frames[100].stamp, "calibration_confirmed", ""}};
+  EXPECT_EQ(analyse(s).waited, 99U);
+}
+
 TEST(Analysis, aDriveThatNeverConfirmedItsCalibrationWaitedToItsEnd) {
   const Analysis a = analyse(unverified_drive(100));
   EXPECT_EQ(a.waited, 100U);
@@ -195,6 +202,7 @@ TEST(Analysis, anInsThatNeverGaveAPlacementGivesNoErrors) {
   const Analysis a = analyse(with_reference(s, Transform{}));
   EXPECT_EQ(a.source, ErrorSource::none);
   EXPECT_NE(a.source_sentence.find("could not be placed"), std::string::npos);
+  EXPECT_TRUE(a.ins_unplaced);
 }
 
 TEST(Analysis, withoutASummaryTheFiguresAreReckonedAgain) {

@@ -163,6 +163,16 @@ TEST(Verdict, aRejectedCalibrationIsADoubtUnlessTheOneInUseFitsAsWell) {
   EXPECT_EQ(c.verdict().grade, Grade::good);
 }
 
+TEST(Verdict, aDriveThatWasNotPlacedWithItsInsSaysSoAndNotThatThereWasNone) {
+  Case c;
+  c.analysis.source = ErrorSource::none;
+  c.analysis.ins_unplaced = true;
+  const Verdict v = c.verdict();
+  EXPECT_TRUE(any_has(v.reasons, "was not placed on the earth"));
+  EXPECT_FALSE(any_has(v.reasons, "no reference"));
+  EXPECT_TRUE(any_has(v.advice, "comparison.placement_m"));
+}
+
 TEST(Verdict, aMeasurementThatWasNotTakenIsNoRejection) {
   Case c;
   c.session.calibrations = {attempt(true, "given", 0, 0), attempt(false, "refinement", 1.4, 0.2)};
