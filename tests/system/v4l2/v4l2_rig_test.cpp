@@ -191,13 +191,19 @@ TEST_F(V4l2Rig, whatItCannotDoIsSaidWithWhatItOffers) {
   EXPECT_NE(said([](auto* c) { c->trigger = CameraTrigger::software; }).find("free"),
             std::string::npos)
       << camera->last_error();
-  EXPECT_NE(said([](auto* c) { c->options["control_nonsense"] = "1"; }).find("brightness"),
+  EXPECT_NE(said([](auto* c) {
+              test::give<v4l2::Options>(c, "control_nonsense", "1");
+            }).find("brightness"),
             std::string::npos)
       << camera->last_error();
-  EXPECT_NE(said([](auto* c) { c->options["control_brightness"] = "256"; }).find("0 to 255"),
+  EXPECT_NE(said([](auto* c) {
+              test::give<v4l2::Options>(c, "control_brightness", "256");
+            }).find("0 to 255"),
             std::string::npos)
       << camera->last_error();
-  EXPECT_NE(said([](auto* c) { c->options["subdevice"] = "/dev/v4l-subdev9"; }).find("v4l-subdev9"),
+  EXPECT_NE(said([](auto* c) {
+              test::give<v4l2::Options>(c, "subdevice", "/dev/v4l-subdev9");
+            }).find("v4l-subdev9"),
             std::string::npos);
   EXPECT_NE(said([](auto* c) { c->gain_db = 6; }).find("gain_step_db"), std::string::npos)
       << camera->last_error();

@@ -67,17 +67,17 @@ TEST(GigeCamera, whatItCannotDoIsRefusedWithWhatItOffers) {
   refused(
       [](auto* c) {
         c->trigger = CameraTrigger::hardware;
-        c->options["trigger_line"] = "Line7";
+        c->options = gige::Options{.line = "Line7"};
       },
       "Software, Line1, Line2");
   refused(
       [](auto* c) {
         c->trigger = CameraTrigger::hardware;
-        c->options["trigger_overlap"] = "previous_frame";
+        c->options = gige::Options{.overlap = gige::TriggerOverlap::previous_frame};
       },
       "Off, ReadOut");
-  refused([](auto* c) { c->options["feature.Gamma"] = "2"; }, "Gamma");
-  refused([](auto* c) { c->options["packetsize"] = "2"; }, "packet_size");
+  refused([](auto* c) { c->options = gige::Options{.features = {{"Gamma", "2"}}}; }, "Gamma");
+  refused([](auto* c) { c->options = gige::Options{.packet_size = 2}; }, "packet_size");
   // What was configured before is in force again.
   b.start();
   EXPECT_EQ(b.take(3).size(), 3U);
@@ -88,11 +88,11 @@ TEST(GigeCamera, hardwareTriggerSetsLineEdgeOverlapAndDelay) {
   GigeBench b;
   CameraConfiguration c = b.wish();
   c.trigger = CameraTrigger::hardware;
-  c.options = Options{.line = "Line2",
-                      .edge = TriggerEdge::falling,
-                      .overlap = TriggerOverlap::readout,
-                      .trigger_delay_us = 250,
-                      .exposure_line = "Line2"};
+  c.options = gige::Options{.line = "Line2",
+                            .edge = gige::TriggerEdge::falling,
+                            .overlap = gige::TriggerOverlap::readout,
+                            .trigger_delay_us = 250,
+                            .exposure_line = "Line2"};
   b.configure(c);
   EXPECT_EQ(b.reg(reg::trigger_mode), 1U);
   EXPECT_EQ(b.reg(reg::trigger_source), 2U);
