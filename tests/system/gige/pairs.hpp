@@ -14,6 +14,7 @@
 #include "app/devices/camera_drivers.hpp"
 #include "drivers/acquisition/acquisition.hpp"
 #include "drivers/gige/detail/link.hpp"
+#include "tests/support/camera_options.hpp"
 #include "tests/support/gige_camera.hpp"
 
 namespace vergence::test {
