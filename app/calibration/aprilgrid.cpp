@@ -9,8 +9,9 @@
 
 #include <apriltag/apriltag.h>
 #include <apriltag/tag36h11.h>
-#include <opencv2/calib3d.hpp>
 #include <opencv2/imgproc.hpp>
+
+#include "app/calibration/tag_corners.hpp"
 
 namespace vergence::app {
 namespace {
@@ -20,10 +21,7 @@ constexpr std::size_t kFewestTags = 4;
 constexpr double kWindowOfGap = 0.4;  // half window: a wider one meets the next tag's edge
 constexpr int kNarrowestWindow = 2, kWidestWindow = 8;  // px, half windows
 constexpr double kMostRefined = 4;                      // px: grown twice, corners lie 2.8 px in
-constexpr double kBlur = 0.7;                           // px, as for checkerboards
-constexpr int kRefineSteps = 100;
-constexpr double kRefineTolerance = 1e-4;  // px
-constexpr double kFlatToSide = 0.2;        // mean residual of a flat board: more is another layout
+constexpr double kFlatToSide = 0.2;  // mean residual of a flat board: more is another layout
 
 struct Tag {
   std::size_t id = 0;
@@ -120,21 +118,16 @@ struct Layout {
   }
 };
 
-/// Mean distance, px, of the corners to those of a flat board numbered like this.
+/// Of the corners numbered like this.
 double misfit(const std::vector<Tag>& tags, const BoardPattern& board, const Layout& layout) {
-  std::vector<cv::Point2d> on_board, in_image, back;
+  std::vector<cv::Point2d> on_board, in_image;
   for (const Tag& tag : tags)
     for (std::size_t k = 0; k < 4; ++k) {
       const Vec3 X = board.corner(layout.index(board, tag.id, k));
       on_board.emplace_back(X.x(), X.y());
       in_image.emplace_back(tag.corners[k]);
     }
-  const cv::Mat H = cv::findHomography(on_board, in_image);
-  if (H.empty()) return std::numeric_limits<double>::infinity();
-  cv::perspectiveTransform(on_board, back, H);
-  double sum = 0;
-  for (std::size_t i = 0; i < back.size(); ++i) sum += cv::norm(back[i] - in_image[i]);
-  return sum / static_cast<double>(back.size());
+  return homography_misfit(on_board, in_image);
 }
 
 double mean_side(const std::vector<Tag>& tags) {
@@ -144,45 +137,18 @@ double mean_side(const std::vector<Tag>& tags) {
   return sum / static_cast<double>(4 * tags.size());
 }
 
-cv::Mat matrix_of(const ImageView& image) {
-  // cv::Mat has no view of constant pixels; nothing below writes them.
-  return {image.height, image.width, CV_8U, const_cast<std::uint8_t*>(image.data),
-          static_cast<std::size_t>(image.stride)};
-}
-
-/// To the saddle between tag and square; corners too near to the image's edge, or that go
-/// elsewhere, are left out.
+/// To the saddle between tag and square.
 BoardCorners refined(const cv::Mat& image, const BoardPattern& board, const Layout& layout,
                      const std::vector<Tag>& tags) {
   const int window = std::clamp(static_cast<int>(kWindowOfGap * board.spacing * mean_side(tags)),
                                 kNarrowestWindow, kWidestWindow);
-  cv::Mat soft;
-  cv::GaussianBlur(image, soft, {}, kBlur);
-  const float margin = static_cast<float>(window) + 2;
-  std::vector<std::size_t> indices;
-  std::vector<cv::Point2f> rough;
+  BoardCorners rough;
   for (const Tag& tag : tags)
-    for (std::size_t k = 0; k < 4; ++k) {
+    for (std::size_t k = 0; k < 4; ++k)
       // The library's pixels have their corner at integers.
-      const cv::Point2f c = tag.corners[k] - cv::Point2f(0.5F, 0.5F);
-      if (c.x < margin || c.y < margin || c.x > static_cast<float>(image.cols - 1) - margin ||
-          c.y > static_cast<float>(image.rows - 1) - margin)
-        continue;
-      indices.push_back(layout.index(board, tag.id, k));
-      rough.push_back(c);
-    }
-  BoardCorners corners;
-  if (rough.empty()) return corners;
-  std::vector<cv::Point2f> fine = rough;
-  cv::cornerSubPix(
-      soft, fine, {window, window}, {-1, -1},
-      {cv::TermCriteria::COUNT + cv::TermCriteria::EPS, kRefineSteps, kRefineTolerance});
-  for (std::size_t i = 0; i < fine.size(); ++i)
-    if (cv::norm(fine[i] - rough[i]) <= kMostRefined)
-      corners.push_back({indices[i], Vec2(fine[i].x, fine[i].y)});
-  std::sort(corners.begin(), corners.end(),
-            [](const BoardCorner& a, const BoardCorner& b) { return a.index < b.index; });
-  return corners;
+      rough.push_back({layout.index(board, tag.id, k),
+                       Vec2(tag.corners[k].x, tag.corners[k].y) - Vec2(0.5, 0.5)});
+  return refine_corners(image, rough, window, kMostRefined);
 }
 
 }  // namespace

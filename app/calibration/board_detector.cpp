@@ -1,6 +1,7 @@
 #include "app/calibration/board_detector.hpp"
 
 #include "app/calibration/aprilgrid.hpp"
+#include "app/calibration/charuco.hpp"
 
 namespace vergence::app {
 namespace {
@@ -17,6 +18,7 @@ std::vector<Vec2> pixels_of(const BoardCorners& corners) {
 BoardCorners find_board(const ImageView& image, const BoardPattern& board, BoardSearch search,
                         const BoardCorners& reference) {
   if (board.kind == BoardKind::aprilgrid) return find_aprilgrid(image, board, search);
+  if (board.kind == BoardKind::charuco) return find_charuco(image, board);
   auto found = find_checkerboard(image, board, search);
   if (!found) return {};
   if (!board.tells_its_ends()) same_way_up(pixels_of(reference), &*found);

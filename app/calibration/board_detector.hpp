@@ -4,8 +4,8 @@
 
 namespace vergence::app {
 
-/// What an image shows of the board: of a checkerboard all corners or none, of an AprilGrid those
-/// that are there.
+/// What an image shows of the board: of a checkerboard all corners or none, of an AprilGrid or a
+/// ChArUco board those that are there.
 ///
 /// `reference`: what another camera of the rig, mounted the same way up, shows of it at the same
 /// time; it decides where the board does not tell its ends. May be empty.

@@ -164,11 +164,16 @@ std::string format_report(const BoardReport& r) {
 nlohmann::ordered_json json_report(const BoardReport& r) {
   using Json = nlohmann::ordered_json;
   const RigCalibration& rig = r.file.rig;
-  Json board{{"kind", r.board.kind == BoardKind::aprilgrid ? "aprilgrid" : "checkerboard"},
+  constexpr std::array kKinds = {"checkerboard", "aprilgrid", "charuco"};
+  Json board{{"kind", kKinds[static_cast<std::size_t>(r.board.kind)]},
              {"columns", r.board.columns},
              {"rows", r.board.rows},
              {"square_m", r.board.square}};
   if (r.board.kind == BoardKind::aprilgrid) board["spacing"] = r.board.spacing;
+  if (r.board.kind == BoardKind::charuco) {
+    board["marker"] = r.board.marker;
+    board["dictionary"] = std::string(kMarkerDictionaries[r.board.dictionary]);
+  }
   Json json{{"board", std::move(board)},
             {"reprojection_px", rig.reprojection_px},
             {"corner_sigma_px", r.found.corner_sigma_px}};

@@ -17,24 +17,34 @@ CameraModelKind parse_model(const std::string& word) {
                                : CameraModelKind::pinhole_radtan;
 }
 
-CalibrateRequest request_of(const CalibrateOptions& a) {
-  if (a.board.empty() && a.aprilgrid.empty())
+BoardPattern board_of(const CalibrateOptions& a) {
+  const int boards =
+      (a.board.empty() ? 0 : 1) + (a.aprilgrid.empty() ? 0 : 1) + (a.charuco.empty() ? 0 : 1);
+  if (boards == 0)
     throw InputError(
         "--board is missing: the board's inner corners along and down, like 9x6; or --aprilgrid: "
-        "its tags along and up, like 6x6");
-  if (!a.board.empty() && !a.aprilgrid.empty())
-    throw InputError("--board and --aprilgrid are two boards; give one");
+        "its tags along and up, like 6x6; or --charuco: its squares along and down, like 11x8");
+  if (boards > 1)
+    throw InputError("--board, --aprilgrid and --charuco are different boards; give one");
   if (!a.square)
     throw InputError(fmt::format("--square is missing: the side of a {} in metres, like 0.025",
-                                 a.board.empty() ? "tag" : "square"));
+                                 a.aprilgrid.empty() ? "square" : "tag"));
+  if (!a.aprilgrid.empty()) return parse_aprilgrid(a.aprilgrid, *a.square, a.spacing);
+  if (!a.board.empty()) return parse_checkerboard(a.board, *a.square);
+  if (!a.marker)
+    throw InputError("--marker is missing: the side of a marker in metres, like 0.018");
+  return parse_charuco(a.charuco, *a.square, *a.marker, a.dictionary);
+}
+
+CalibrateRequest request_of(const CalibrateOptions& a) {
+  const BoardPattern board = board_of(a);
   if (a.out.empty()) throw InputError("--out is missing: the calibration.yaml to write");
   if (a.baseline && !(*a.baseline > 0 && *a.baseline < 100))
     throw InputError("--baseline needs metres, more than 0 and less than 100");
   if (a.sixth_order && a.model == "equidistant")
     throw InputError("--k3 belongs to radtan; equidistant has k1 to k4");
   CalibrateRequest r;
-  r.board = a.board.empty() ? parse_aprilgrid(a.aprilgrid, *a.square, a.spacing)
-                            : parse_checkerboard(a.board, *a.square);
+  r.board = board;
   r.model = parse_model(a.model);
   r.sixth_order = a.sixth_order;
   r.out = a.out;

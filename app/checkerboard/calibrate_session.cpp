@@ -47,6 +47,19 @@ void remark(const CalibrationFile& file, Progress* progress) {
   }
 }
 
+const char* how_to_count(BoardKind kind) {
+  switch (kind) {
+    case BoardKind::aprilgrid:
+      return "tags are of the family 36h11, and four have to be seen at least";
+    case BoardKind::charuco:
+      return "count squares of both colours; four markers have to be seen at least, and "
+             "--dictionary has to be theirs";
+    case BoardKind::checkerboard:
+      break;
+  }
+  return "count them where four squares meet";
+}
+
 }  // namespace
 
 ExitCode conclude_calibration(const CalibrateRequest& request, const CalibratedRig& rig,
@@ -109,10 +122,7 @@ ExitCode calibrate_images(const CalibrateRequest& request,
   if (images.views.empty())  // a sentence a view would only hide the one that helps
     throw InputError(
         fmt::format("no view has the board of {}{}; {} ({})", request.board.words(),
-                    patterns.size() > 1 ? " in two cameras" : "",
-                    request.board.kind == BoardKind::aprilgrid
-                        ? "tags are of the family 36h11, and four have to be seen at least"
-                        : "count them where four squares meet",
+                    patterns.size() > 1 ? " in two cameras" : "", how_to_count(request.board.kind),
                     images.remarks.empty() ? "there are no images" : images.remarks.front()));
   for (const std::string& sentence : images.remarks) progress.say("vergence: " + sentence);
   CalibratedRig rig;

@@ -43,7 +43,16 @@ CLI::App* CalibrateOptions::declare(CLI::App& root) {
       ->add_option("--aprilgrid", aprilgrid,
                    "Instead of --board: tags along and up, family 36h11, as Kalibr prints them")
       ->type_name("6x6");
+  command
+      ->add_option("--charuco", charuco,
+                   "Instead of --board: squares along and down of a ChArUco board")
+      ->type_name("11x8");
   command->add_option("--square", square, "Side of a square, or of a tag, m")->type_name("M");
+  command->add_option("--marker", marker, "--charuco: side of a marker, m")->type_name("M");
+  command
+      ->add_option("--dictionary", dictionary, "--charuco: the markers' dictionary, OpenCV's names")
+      ->type_name("NAME")
+      ->capture_default_str();
   command
       ->add_option("--spacing", spacing, "--aprilgrid: gap between two tags over the side of a tag")
       ->type_name("R")

@@ -18,13 +18,14 @@ enum class CalibrateWay : std::uint8_t { board_images, board_live, drive, conver
 /// checkerboard tool, which the program starts with the same words.
 struct CalibrateOptions {
   CommonOptions common{};
-  std::string configuration{}, board{}, aprilgrid{}, out{}, model = "radtan", format{}, size{},
-                                                            drive{};
+  std::string configuration{}, board{}, aprilgrid{}, charuco{}, out{}, model = "radtan", format{},
+                                                                       size{}, drive{};
   std::optional<std::string> calibration{};
   std::vector<std::string> left{}, right{}, convert{};
   std::vector<std::string> more_cameras{};  // one pattern each
   std::optional<std::string> keep_views{};
-  std::optional<double> square{}, baseline{};
+  std::optional<double> square{}, marker{}, baseline{};
+  std::string dictionary = "5X5_1000";
   double spacing = 0.3;  // Kalibr's own sheets
   std::string to{};
   std::string left_topic{}, right_topic{};  // --drive

@@ -65,6 +65,7 @@ td.w,span.w{white-space:nowrap}
 .clocks td.n,.clocks th.n{padding-left:10px;overflow-wrap:normal}
 .clocks td.n{white-space:nowrap}
 .clocks{margin-bottom:8px}
+.clocks th[scope=row]{min-width:4.5em}
 .health{max-width:640px;margin-bottom:4px}
 .health td.n,.health th.n{white-space:nowrap;overflow-wrap:normal;padding-left:8px}
 .scroll{overflow-x:auto}

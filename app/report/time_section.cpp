@@ -214,12 +214,12 @@ std::string latency_picture(const std::vector<Bar>& bars) {
       const double height = std::max(1.0, bars[i].count / most * (kBottom - kTop));
       svg.rect("f-ours", x + 1, kBottom - height, width - 2, height);
     }
-    svg.text("", Anchor::middle, x, kBottom + 16, fmt::format("{:g}", bars[i].from));
+    svg.text("", Anchor::middle, x, kBottom + 20, fmt::format("{:g}", bars[i].from));
   }
   if (std::isfinite(bars.back().to))
-    svg.text("", Anchor::end, kRight + 6, kBottom + 16, fmt::format("{:g}", bars.back().to));
+    svg.text("", Anchor::end, kRight + 6, kBottom + 20, fmt::format("{:g}", bars.back().to));
   svg.line("axis", kLeft, kBottom, kRight, kBottom);
-  svg.text("", Anchor::middle, (kLeft + kRight) / 2, kBottom + 33,
+  svg.text("", Anchor::middle, (kLeft + kRight) / 2, kBottom + 36,
            "from the middle of the exposure to the pose, ms");
   return std::move(svg).finish();
 }

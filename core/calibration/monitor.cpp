@@ -20,6 +20,8 @@ constexpr int kStandingFrames = 3;       // in a row over the threshold while st
 constexpr double kStandingFactor = 1.5;  // of the threshold: one frame's few hundred errors are
                                          // less normal than the sum of many frames'
 constexpr double kAgrees = 0.5;          // of the threshold: below, a frame agrees
+constexpr double kNoLag = 0.5;  // of the smallest lag that is called one: there is none …
+constexpr double kTold = 0.6;   // … if its sigma, of the lag found before, tells it from that
 
 void check(bool good, const char* name, const char* range) {
   if (!good)
@@ -56,6 +58,7 @@ struct Monitor::Parts {
   detail::Decision latest{};
   int agreed = 0, poor = 0, collapsed = 0, standing_over = 0;
   std::uint64_t collapsed_from = 0, standing_from = 0;
+  double lag_found = 0;  // the last one that was `out_of_step`, frames
 
   void forget() noexcept {
     looks.reset();
@@ -186,6 +189,10 @@ MonitorVerdict Monitor::look(const MonitorFrame& frame) noexcept {
   v.covariance = p.d_offset_d_theta * d.covariance * p.d_offset_d_theta.transpose();
   v.lag_frames = d.lag;
   v.lag_sigma = d.lag_sigma;
+  if (d.kind == Kind::out_of_step) p.lag_found = std::abs(d.lag);
+  v.in_step = d.kind == Kind::quiet && !d.undecided &&
+              std::abs(d.lag) < kNoLag * p.options.lag_frames &&
+              d.lag_sigma < kTold * std::max(p.lag_found, p.options.lag_frames);
   v.onset_frame = d.kind == Kind::quiet ? frame.frame : d.onset;
   v.frames_since_onset = d.kind == Kind::quiet ? 0 : d.frames;
   if (p.collapsed >= p.options.collapse_frames) {

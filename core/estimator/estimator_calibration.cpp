@@ -8,8 +8,8 @@ namespace vergence {
 namespace {
 
 constexpr std::uint64_t kDriftFrames = 60;  // of a creeping rig that are taken for one
-constexpr int kInStepAfter =
-    60;  // frames without a sign of the cameras being out of step, before that is over
+// Frames that show the cameras in step, before their being out of step is over.
+constexpr int kInStepAfter = 30;
 
 /// From which frame on the tracks tell of the rig as it is now.
 std::uint64_t first_frame_of_use(const calibration::MonitorVerdict& v, std::uint64_t now) noexcept {
@@ -97,14 +97,19 @@ void Estimator::Parts::watch(const odometry::FrameOutcome& out, const RigFrame& 
       note(EstimatorEvent::Kind::rig_changed, frame.stamp,
            sentence_of(CalibrationCause::out_of_step), v.lag_frames);
     out_of_step = kInStepAfter;
+    // Frames out of step would speak for a lag in the monitor's windows long after its end, and
+    // are no frames to calibrate from.
+    calibrator.begin_anew();
     return;
   }
   if (out_of_step > 0) {
     // A rig out of step fits no calibration: what else the monitor says is of no use until that is
     // over.
-    if (v.kind == K::quiet && !v.undecided && --out_of_step == 0)
+    if (v.in_step && --out_of_step == 0) {
       note(EstimatorEvent::Kind::calibration_confirmed, frame.stamp,
            "the cameras are in step again", 0);
+      calibrator.begin_anew();
+    }
     return;
   }
   if (v.kind == K::collapse) {

@@ -114,14 +114,18 @@ void OnlineCalibrator::begin_segment() noexcept {
   wanted_ = static_cast<std::size_t>(options_.calibration.min_frames);
 }
 
-void OnlineCalibrator::scene_lost() noexcept {
-  any_ = false;
-  watched_ = false;
+void OnlineCalibrator::begin_anew() noexcept {
   stale_ = solving_;
   log_.clear();
   begin_segment();
   for (auto& m : monitors_)
     if (m) m->reset();
+}
+
+void OnlineCalibrator::scene_lost() noexcept {
+  any_ = false;
+  watched_ = false;
+  begin_anew();
   for (auto& f : feeds_)
     if (f) f->reset();
   for (auto& j : jumps_)

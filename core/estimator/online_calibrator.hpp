@@ -85,6 +85,9 @@ class OnlineCalibrator {
   void scene_rebuilt(const odometry::Odometry& odometry) noexcept;
   /// A calibration is adopted and its scene not yet made.
   [[nodiscard]] bool relink_pending() const noexcept { return relink_pending_; }
+  /// Frames until now do not speak of the rig from here on: monitors and log begin again, the
+  /// calibration in use stays.
+  void begin_anew() noexcept;
   /// The scene was lost: what is logged does not go on.
   void scene_lost() noexcept;
   /// The calibration in use is this one, which the drive has found; `lenses`: with them.

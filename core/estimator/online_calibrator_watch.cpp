@@ -167,6 +167,7 @@ MonitorVerdict OnlineCalibrator::watch(const odometry::Odometry& odometry,
                                        const odometry::FrameOutcome& outcome,
                                        const RigFrame& frame) noexcept {
   MonitorVerdict worst;
+  bool in_step = true;
   const Transform step = step_to(outcome.T_left_world);
   for (int k = 1; k < rig_.cameras; ++k) {
     const auto c = static_cast<std::size_t>(k);
@@ -175,6 +176,7 @@ MonitorVerdict OnlineCalibrator::watch(const odometry::Odometry& odometry,
     if (relink_pending_) {
       // The monitors wait for the scene of the calibration that they are to watch.
       worst.undecided = worst.undecided || jump.suspected;
+      in_step = false;
       if (jump.confirmed) {
         worst.kind = MonitorVerdict::Kind::knock;
         worst.onset_frame = jump.onset_frame;
@@ -190,6 +192,7 @@ MonitorVerdict OnlineCalibrator::watch(const odometry::Odometry& odometry,
       --grace_[c];
       v = MonitorVerdict{};
     }
+    in_step = in_step && v.in_step;
     learn_reference(k, v);
     if (jump.confirmed && rank(v.kind) < rank(MonitorVerdict::Kind::knock)) {
       v.kind = MonitorVerdict::Kind::knock;
@@ -200,6 +203,7 @@ MonitorVerdict OnlineCalibrator::watch(const odometry::Odometry& odometry,
         (rank(v.kind) == rank(worst.kind) && (v.undecided || v.statistic > worst.statistic)))
       worst = v;
   }
+  worst.in_step = in_step;
   return worst;
 }
 

@@ -43,7 +43,7 @@ set(CPACK_DEBIAN_PROGRAM_PACKAGE_CONTROL_EXTRA ${scripts}/postinst ${scripts}/pr
 set(CPACK_DEBIAN_PROGRAM_PACKAGE_CONTROL_STRICT_PERMISSION TRUE)
 
 set(CPACK_DEBIAN_CHECKERBOARD_PACKAGE_DEPENDS
-  "vergence (= ${PROJECT_VERSION}), ${libraries_of_both}, libapriltag3 (>= 3.3.0), libopencv-calib3d406, libopencv-core406, libopencv-imgproc406")
+  "vergence (= ${PROJECT_VERSION}), ${libraries_of_both}, libapriltag3 (>= 3.3.0), libopencv-calib3d406, libopencv-contrib406, libopencv-core406, libopencv-imgproc406")
 set(CPACK_DEBIAN_CHECKERBOARD_PACKAGE_NAME vergence-checkerboard)
 set(CPACK_DEBIAN_CHECKERBOARD_PACKAGE_SECTION science)
 set(CPACK_COMPONENT_CHECKERBOARD_DESCRIPTION "calibration of vergence's cameras with a board

@@ -92,10 +92,11 @@ void run_drive(const RecordedSequence& d, const app::Configuration& c) {
     const DriveOutcome r = drive_recorded(d, s, c, first, at);
     fmt::print(
         "{:12s} knock at {} by ({:g}, {:g}, {:g}) deg: told after {}, mended after {}, {} ok "
-        "before that, {} false before it\n",
+        "before that, {} false before it; seg {:.3f} % ATE {:.4f} m\n",
         d.name, at, turn.x(), turn.y(), turn.z(),
         r.told_at < 0 ? -1 : r.told_at - static_cast<int>(at),
-        r.mended_at < 0 ? -1 : r.mended_at - static_cast<int>(at), r.ok_before_mended, r.knocks);
+        r.mended_at < 0 ? -1 : r.mended_at - static_cast<int>(at), r.ok_before_mended, r.knocks,
+        r.segments_percent, r.ate_m);
     std::fflush(stdout);
   }
 }

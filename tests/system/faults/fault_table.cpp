@@ -44,7 +44,7 @@ const std::vector<Kind>& kinds() {
       {"30 % of the frames late", "late_frames", "share=0.3", 5},
       {"30 % of the frames twice", "duplicate_frames", "share=0.3", 5},
       {"pairs broken", "break_pairs", "share=1", 3},
-      {"one camera a frame late", "lag", "camera=1", 3, 9, 3},
+      {"one camera a frame late", "lag", "camera=1", 3, 5, 3},
       {"cables exchanged", "swap_cables", "", 3, 9},
       {"three triggers missed", "missed_trigger", "camera=1 pulses=3", 0},
       {"a camera's clock set", "time_jump", "camera=1 jump_s=1", 0},

@@ -32,6 +32,14 @@ def tear(folder):
     return folder
 
 
+def drive(folder):
+    """A session with every section filled, figures as they really are: the mock's board and INS on simulated lines."""
+    configuration = HERE.parents[2] / "app" / "config" / "mock_board.yaml"
+    subprocess.run([os.environ["VERGENCE"], "run", str(configuration), "--fast", "--quiet", "--duration", "16", "--out", str(folder),
+                    "--set", "comparison.placement_m=40", "--fault", "knock@10 camera=1 pitch_deg=0.2"], check=True, capture_output=True)
+    return folder
+
+
 def look(*pages):
     """Exit code and words of the looker."""
     run = subprocess.run([sys.executable, str(HERE / "report_in_chromium.py"), *map(str, pages)], check=False, capture_output=True, text=True)
@@ -56,7 +64,7 @@ def main():
         if code != 1 or not found:
             return code if code == SKIPPED else 1
         sessions = [make(below / "faults", "6000"), make(below / "good", "2000", "no-faults"), make(below / "no_reference", "800", "no-ins"),
-                    tear(make(below / "torn", "3000"))]
+                    tear(make(below / "torn", "3000")), drive(below / "mock_board")]
         pages = []
         for session in sessions:
             written = subprocess.run([os.environ["VERGENCE"], "report", str(session)], check=True, capture_output=True, text=True)

@@ -10,6 +10,7 @@
 
 #include "app/calibration/aprilgrid.hpp"
 #include "app/runtime/errors.hpp"
+#include "tests/unit/app/calibration/board_painter.hpp"
 #include "tests/unit/app/calibration/board_scene.hpp"
 
 namespace vergence::app {
@@ -17,8 +18,7 @@ namespace {
 
 using test::known_rig;
 
-/// An AprilGrid as it is printed, drawn as a camera sees it: each pixel is the mean over a grid of
-/// points within it.
+/// An AprilGrid as it is printed, drawn as a camera sees it.
 class GridPainter {
  public:
   /// `border`: black cells around a tag's code; `from_below`: tag 0 at the lower left.
@@ -39,34 +39,15 @@ class GridPainter {
 
   [[nodiscard]] std::vector<std::uint8_t> paint(const Intrinsics& lens,
                                                 const Transform& T_camera_board) const {
-    constexpr int kSteps = 4;
-    const Camera camera(lens);
-    const Transform T_board_camera = T_camera_board.inverse();
-    std::vector<std::uint8_t> pixels;
-    for (int y = 0; y < lens.height; ++y)
-      for (int x = 0; x < lens.width; ++x) {
-        Vec3 ray(0, 0, 1), right(0, 0, 1), below(0, 0, 1);
-        (void)camera.unproject({x - 0.0, y - 0.0}, &ray);
-        (void)camera.unproject({x + 1.0, y - 0.0}, &right);
-        (void)camera.unproject({x - 0.0, y + 1.0}, &below);
-        double sum = 0;
-        for (int i = 0; i < kSteps * kSteps; ++i) {
-          const double along = (i % kSteps + 0.5) / kSteps - 0.5,
-                       down = (i / kSteps + 0.5) / kSteps - 0.5;
-          const Vec3 d =
-              T_board_camera.R * Vec3(ray + along * (right - ray) + down * (below - ray));
-          const double depth = -T_board_camera.t.z() / d.z();
-          const Vec3 p = T_board_camera.t + depth * d;
-          sum += depth > 0 ? grey(p.x() / board_.square, p.y() / board_.square) : 110;
-        }
-        pixels.push_back(static_cast<std::uint8_t>(sum / (kSteps * kSteps) + 0.5));
-      }
-    return pixels;
+    return test::paint_board(lens, T_camera_board, [this](double x, double y) {
+      return grey(x / board_.square, y / board_.square);
+    });
   }
 
  private:
   static constexpr std::size_t kCode = 6;  // cells a side
-  static constexpr double kWhite = 220, kBlack = 30, kGrey = 110;
+  static constexpr double kWhite = test::kPaintedWhite, kBlack = test::kPaintedBlack,
+                          kGrey = test::kPaintedGrey;
 
   /// x to the right and y up, in sides of a tag from the lower left corner.
   [[nodiscard]] double grey(double x, double y) const {

@@ -133,6 +133,31 @@ TEST(Monitor, findsACameraOneFrameOutOfStepWithinASecond) {
       }
 }
 
+TEST(Monitor, saysInStepOnlyOnceALagHasEnded) {
+  constexpr std::uint64_t kFrom = 150, kUntil = 240;
+  for (const double speed : {3.0, 8.0, 15.0})
+    for (const double lag : {1.0, -1.0}) {
+      SCOPED_TRACE(testing::Message() << lag << " frames at " << speed << " m/s");
+      FeatureDriveOptions o = street(speed, 3, 300);
+      o.lags = {{kFrom, lag}, {kUntil, 0.0}};
+      MonitorTrial trial(o);
+      for (std::uint64_t i = 0; i < kFrom; ++i) (void)trial.step();
+      ASSERT_TRUE(trial.frames_until(30, Kind::out_of_step).has_value());
+      // As the estimator does: what was out of step is forgotten each time that it is found.
+      trial.monitor().reset();
+      while (trial.frame().frame + 1 < kUntil) {
+        const MonitorVerdict& v = trial.step();
+        ASSERT_FALSE(v.in_step) << "frame " << trial.frame().frame << ", lag " << v.lag_frames
+                                << " ± " << v.lag_sigma;
+        if (v.kind == Kind::out_of_step) trial.monitor().reset();
+      }
+      int frames = 0;
+      while (frames < 60 && !trial.step().in_step) ++frames;
+      EXPECT_LT(frames, 60) << "lag " << trial.verdict().lag_frames << " ± "
+                            << trial.verdict().lag_sigma;
+    }
+}
+
 TEST(Monitor, findsALagThatTheCalibrationHasSwallowed) {
   FeatureDriveOptions o = street(8, 4, 300);
   o.lags = {{0, 1.0}};
