@@ -1,6 +1,5 @@
 #pragma once
 #include <cstdint>
-#include <map>
 #include <memory>
 #include <string>
 #include <string_view>
@@ -9,6 +8,7 @@
 #include "core/memory/frame_pool.hpp"
 #include "core/types/image.hpp"
 #include "drivers/device.hpp"
+#include "drivers/options/options.hpp"
 
 namespace vergence {
 
@@ -17,6 +17,8 @@ enum class CameraTrigger : std::uint8_t {
   software,  // the driver asks for each
   free,      // the camera's own clock
 };
+/// The word of the configuration: `hardware`.
+[[nodiscard]] const char* to_string(CameraTrigger) noexcept;
 
 /// What a camera is asked to do, and what it then does.
 struct CameraConfiguration {
@@ -30,9 +32,7 @@ struct CameraConfiguration {
   int offset_y = 0;            // px
   std::string pixel_format{};  // the device's own name (Mono8, BayerGB8, GREY …); empty: the driver
                                // takes the cheapest that gives grey
-  std::map<std::string, std::string>
-      options{};    // what only this kind of camera has (docs/cameras.md); an unknown name is
-                    // unsupported
+  CameraOptions options{};  // what only this kind of camera has; another kind's are unsupported
   int sharing = 1;  // cameras of the rig on this camera's link or bus, itself included: its share
                     // of the bandwidth
 };

@@ -1,5 +1,7 @@
 #include "drivers/device.hpp"
 
+#include "drivers/camera.hpp"
+
 namespace vergence {
 
 std::string_view to_string(DeviceStatus status) noexcept {
@@ -28,6 +30,18 @@ std::string_view to_string(DeviceStatus status) noexcept {
       return "no bandwidth";
     case DeviceStatus::failed:
       return "failed";
+  }
+  return "";
+}
+
+const char* to_string(CameraTrigger trigger) noexcept {
+  switch (trigger) {
+    case CameraTrigger::hardware:
+      return "hardware";
+    case CameraTrigger::software:
+      return "software";
+    case CameraTrigger::free:
+      return "free";
   }
   return "";
 }

@@ -59,9 +59,11 @@ struct BoardSolution {
 /// T_left_board X) − corner|².
 ///
 /// Levenberg–Marquardt with the poses eliminated (Schur); derivatives are those of core/camera.
-/// Pinhole with radtan or equidistant
-/// distortion, one to kMaxCameras cameras, views that some cameras do not have. The start has to
-/// project every corner.
+/// Pinhole with radtan or equidistant distortion, one to kMaxCameras cameras, views that some
+/// cameras do not have. The start has to project every corner.
+/// Not core/bundle, which eliminates the points: a board's points are known, its poses are what is
+/// eliminated, and wanted are the joint covariance of all lenses and places and each view's
+/// influence on them, which a fixed arena has no room for.
 /// Memory ordinary. Errors  Not converged: the problem is as the last good step left it.
 [[nodiscard]] BoardSolution solve_boards(BoardProblem* problem, const BoardParameters& parameters);
 

@@ -6,7 +6,7 @@ namespace vergence::app {
 
 Configuration capture_configuration(const Configuration& configuration) {
   Configuration c = configuration;
-  if (sync_mode_of(c.sync.mode) != SyncMode::ins_syncout) c.ins.driver = "none";
+  if (c.sync.mode != SyncMode::ins_syncout) c.ins.driver = "none";
   return c;
 }
 

@@ -42,15 +42,15 @@ double rounded(double v, int decimals) {
 bool is_mock(const Configuration& c) { return c.cameras[0].driver == "mock"; }
 
 /// The same cameras, made to expose another way; nobody else's pulses are needed then.
-Configuration triggered(Configuration c, const std::string& how) {
+Configuration triggered(Configuration c, CameraTrigger how) {
   for (CameraSettings& s : c.cameras) s.trigger = how;
   c.trigger.driver = "none";
   c.ins.driver = "none";
-  if (how == "free") {
-    c.sync.mode = "software";
+  if (how == CameraTrigger::free) {
+    c.sync.mode = SyncMode::software;
     c.sync.tolerance_ms = std::max(c.sync.tolerance_ms, 0.5e3 / c.trigger.rate);
-  } else if (c.sync.mode != "software") {
-    c.sync.mode = "counter";
+  } else if (c.sync.mode != SyncMode::software) {
+    c.sync.mode = SyncMode::counter;
   }
   return c;
 }
@@ -96,27 +96,27 @@ Taking Snap::attempt(const Configuration& c) {
   const std::optional<double> duration =
       is_mock(c) ? std::optional(1 + request_.count / c.trigger.rate) : std::nullopt;
   devices_ = std::make_unique<DriveDevices>(c, std::vector<std::string>{}, is_mock(c), duration);
-  trigger_ = is_mock(c) ? "mock" : c.cameras[0].trigger;
+  trigger_ = is_mock(c) ? "mock" : to_string(c.cameras[0].trigger);
   for (const std::string& remark : devices_->remarks()) note(remark);
   TakingOptions o;
   o.count = request_.count;
   o.limit = Duration::seconds(request_.wait_s);
-  o.skip = is_mock(c) || c.cameras[0].trigger == "hardware" ? 0 : 2;
+  o.skip = is_mock(c) || c.cameras[0].trigger == CameraTrigger::hardware ? 0 : 2;
   return take_sets(*devices_, o, signals_, [this](const TakenSet& set) { keep(set); });
 }
 
 /// Nothing came with a hardware trigger: the cameras are asked by command, or run freely.
 Taking Snap::without_pulses(Taking taking) {
-  for (const char* how : {"software", "free"}) {
+  for (const CameraTrigger how : {CameraTrigger::software, CameraTrigger::free}) {
     const Configuration c = triggered(configuration_, how);
     try {
       note(fmt::format("no pulse triggers the cameras within {:g} s; {}", request_.wait_s,
-                       std::string(how) == "software"
+                       how == CameraTrigger::software
                            ? "they are asked one after the other by command (trigger: software)"
                            : "they run freely (trigger: free), images are paired by their stamps"));
       taking = attempt(c);
     } catch (const InputError& e) {
-      if (std::string(how) == "free") throw;
+      if (how == CameraTrigger::free) throw;
       note(std::string("by command they cannot be triggered: ") + e.what());
       continue;
     }
@@ -133,7 +133,7 @@ ExitCode Snap::run() {
                                    [](std::uint64_t n) { return n == 0; });
   const bool gone = std::find(taking.gone.begin(), taking.gone.end(), true) != taking.gone.end();
   if (taking.end == Taking::End::timeout && nothing && !gone &&
-      configuration_.cameras[0].trigger == "hardware" && !is_mock(configuration_))
+      configuration_.cameras[0].trigger == CameraTrigger::hardware && !is_mock(configuration_))
     taking = without_pulses(std::move(taking));
   if (!sets_.empty()) write_report();
   return verdict(taking);

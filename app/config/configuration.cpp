@@ -9,6 +9,7 @@
 #include <fmt/format.h>
 #include <yaml-cpp/yaml.h>
 
+#include "app/config/camera_options.hpp"
 #include "app/config/schema.hpp"
 #include "app/config/yaml_file.hpp"
 #include "app/runtime/errors.hpp"
@@ -240,33 +241,44 @@ std::vector<Entry> with_faults_as_text(const std::vector<Entry>& entries) {
   return out;
 }
 
-/// Camera options that stand as groups, `cameras.N.options.NAME`, become texts of one line:
-/// `NAME=VALUE …`.
-std::vector<Entry> with_options_as_text(const std::vector<Entry>& entries) {
-  constexpr std::string_view kGroup = ".options.";
-  std::vector<Entry> out;
-  std::map<std::string, std::map<std::string, Entry>>
-      options;  // by `cameras.N.options`, then by name; the last one wins
+/// The camera that an entry `cameras.N.options` or `cameras.N.options.NAME` is for; nullopt: it is
+/// for another key. *name: NAME, empty for all of them.
+std::optional<std::size_t> camera_of_options(const Entry& entry, std::string* name) {
+  constexpr std::string_view kList = "cameras.", kGroup = ".options";
+  const auto at = entry.name.find(kGroup);
+  if (!entry.name.starts_with(kList) || at != kList.size() + 1) return std::nullopt;
+  const auto after = at + kGroup.size();
+  const std::size_t camera = static_cast<std::size_t>(entry.name[kList.size()] - '0');
+  if (camera >= kMaxCameras) return std::nullopt;
+  if (entry.name.size() == after) {
+    name->clear();
+    return camera;
+  }
+  if (entry.name[after] != '.') return std::nullopt;
+  *name = entry.name.substr(after + 1);
+  return camera;
+}
+
+/// After every other key: which options there are is the driver's matter.
+void apply_camera_options(const std::vector<Entry>& entries, Configuration* configuration) {
   for (const Entry& entry : entries) {
-    const auto at = entry.name.find(kGroup);
-    if (!entry.name.starts_with("cameras.") || at == std::string::npos) {
-      out.push_back(entry);
-      continue;
-    }
-    if (!entry.scalar || entry.value.empty() ||
-        entry.value.find_first_of(" =") != std::string::npos)
-      throw InputError(entry.origin + ": " + entry.name.substr(0, 120) +
-                       " takes one number or word");
-    const auto list = at + kGroup.size() - 1;
-    options[entry.name.substr(0, list)].insert_or_assign(entry.name.substr(list + 1), entry);
+    std::string name;
+    const auto camera = camera_of_options(entry, &name);
+    if (!camera) continue;
+    CameraSettings& settings = configuration->cameras[*camera];
+    std::string why;
+    if (name.empty() && !entry.scalar)
+      settings.options = {};  // an empty group
+    else if (name.empty())
+      why = set_camera_options(entry.value, &settings);
+    else if (!entry.scalar || entry.value.empty() ||
+             entry.value.find_first_of(" =") != std::string::npos)
+      why = name.substr(0, 120) + " takes one number or word";
+    else
+      why = set_camera_option(name, entry.value, &settings);
+    if (!why.empty())
+      throw InputError(fmt::format("{}: cameras.{}.options: {}", entry.origin, *camera, why));
   }
-  for (const auto& [name, parts] : options) {
-    std::string text;
-    for (const auto& [key, entry] : parts)
-      text += (text.empty() ? "" : " ") + key + "=" + entry.value;
-    out.push_back({name, text, true, parts.begin()->second.origin});
-  }
-  return out;
 }
 
 /// `record: [poses, images]` switches its words on.
@@ -307,9 +319,11 @@ std::vector<Entry> with_preset(std::vector<Entry> entries) {
 
 Configuration from_entries(const std::vector<Entry>& given, const std::string& name) {
   const std::vector<Entry> entries =
-      with_preset(with_record_as_switches(with_options_as_text(with_faults_as_text(given))));
+      with_preset(with_record_as_switches(with_faults_as_text(given)));
   Configuration configuration;
-  for (const Entry& entry : entries) apply(entry, &configuration);
+  for (const Entry& entry : entries)
+    if (std::string option; !camera_of_options(entry, &option)) apply(entry, &configuration);
+  apply_camera_options(entries, &configuration);
   if (const std::string sentence = find_contradiction(configuration); !sentence.empty())
     throw InputError(name + ": " + sentence);
   return configuration;

@@ -12,6 +12,11 @@
 #include "core/calibration/options.hpp"
 #include "core/odometry/options.hpp"
 #include "core/types/calibration.hpp"
+#include "drivers/camera.hpp"
+#include "drivers/options/options.hpp"
+#include "drivers/sync/sync_types.hpp"
+#include "drivers/trigger_board/options.hpp"
+#include "drivers/xsens/options.hpp"
 
 namespace vergence::app {
 
@@ -30,8 +35,9 @@ struct CameraSettings {
   std::string name{}, driver{}, serial{};
   int width = 640, height = 480;   // px
   int offset_x = 0, offset_y = 0;  // px, of the region on the sensor
-  std::string pixel_format{}, trigger = "hardware";
-  std::string options{};  // `NAME=VALUE …`, of the kind of camera
+  std::string pixel_format{};
+  CameraTrigger trigger = CameraTrigger::hardware;
+  CameraOptions options{};  // of the driver
   double exposure_us = 8000;
   double trigger_delay_us = 0;  // from the pulse's edge to the exposure's start
   double stamp_jitter_us = 0;   // 0: what the driver's kind of stamp has
@@ -58,7 +64,7 @@ struct InsSettings {
   double rate = 120;       // Hz
   double sync_out_hz = 0;  // 0: as the device has it; negative: off
   double sync_out_width_ms = 1;
-  std::string sync_in = "leave";
+  xsens::SyncIn sync_in = xsens::SyncIn::leave;
   double processing_ms = 2;               // from a sample to its first byte on the line
   std::array<double, 3> lever_arm_m{};    // of the left camera in the INS's body: forward, left, up
   std::array<double, 3> boresight_deg{};  // roll, pitch, yaw
@@ -72,11 +78,12 @@ struct TriggerSettings {
   double width_us = 200, vary_us = 0;
   int lines = 0;  // masks, bit k for line k; 0: one line for each camera
   int active_low = 0, feedback = 0, feedback_active_low = 0;
-  std::string pps = "none", ins = "none";  // edge of an input: none, rising, falling
+  trigger_board::Edge pps = trigger_board::Edge::none;  // of the GNSS receiver's pulse
+  trigger_board::Edge ins = trigger_board::Edge::none;  // of the INS's SyncOut
 };
 
 struct SyncSettings {
-  std::string mode = "counter";
+  SyncMode mode = SyncMode::counter;
   double hold_ms = 100;
   double tolerance_ms = 2;
 };

@@ -52,13 +52,14 @@ Group mock() {
              "mock", "The world and the vehicle of the mock drivers; see docs/mock.md.",
              [](auto& c) -> auto& { return c.mock; })
       .text("world", &M::world, 16, "What is driven through: `suburb`.")
-      .text("drive", &M::drive, 16,
+      .word("drive", &M::drive, {"loop", "figure-eight", "straight", "brief", "still"},
             "Where: `loop` (1 km), `figure-eight`, `straight`, `brief` (120 m) or `still`.")
       .integer("seed", &M::seed, 0, kLargestSeed, "",
                "Of the town, the vehicle's unrest and all noise: the same seed, the same drive.")
-      .text("pattern", &M::pattern, 8, "Sensors: `grey`, or `gbrg` (Bayer).")
-      .text("ins", &M::ins, 8, "Errors of the INS: `noisy` as an MTi-G, or `ideal`.")
-      .text("ins_line", &M::ins_line, 16,
+      .word("pattern", &M::pattern, {"grey", "gbrg"}, "Sensors: `grey`, or `gbrg` (Bayer).")
+      .word("ins", &M::ins, {"noisy", "ideal"},
+            "Errors of the INS: `noisy` as an MTi-G, or `ideal`.")
+      .word("ins_line", &M::ins_line, {"none", "mti-g", "mti-g-710"},
             "With `--fast`: the INS as bytes on a simulated line, read by the real driver: `mti-g` "
             "or `mti-g-710`; `none`.")
       .integer("ins_latency_timer_ms", &M::ins_latency_timer_ms, 0, 255, "ms",
@@ -67,7 +68,7 @@ Group mock() {
               "Of its reads: they come late …")
       .number("ins_late_ms", &M::ins_late_ms, 0, 1000, "ms",
               "… by an exponential time of this mean.")
-      .text("board_line", &M::board_line, 8,
+      .word("board_line", &M::board_line, {"none", "usb", "ftdi"},
             "With `--fast`: the trigger board as bytes on a simulated line, read by the real "
             "driver, its pulses trigger the cameras: `usb`, "
             "packets as they are full, or `ftdi`, a converter with a latency timer; `none`.")

@@ -6,6 +6,22 @@
 #include "app/config/detail/schema_groups.hpp"
 
 namespace vergence::app::groups {
+namespace {
+
+std::vector<std::pair<std::string, trigger_board::Edge>> edges() {
+  using trigger_board::Edge;
+  return {{"none", Edge::none}, {"rising", Edge::rising}, {"falling", Edge::falling}};
+}
+
+std::vector<std::pair<std::string, SyncMode>> sync_modes() {
+  std::vector<std::pair<std::string, SyncMode>> modes;
+  for (const SyncMode mode : {SyncMode::board, SyncMode::ins_syncout, SyncMode::master_strobe,
+                              SyncMode::bus, SyncMode::ptp, SyncMode::counter, SyncMode::software})
+    modes.emplace_back(to_string(mode), mode);
+  return modes;
+}
+
+}  // namespace
 
 Group rig() {
   using R = RigSettings;
@@ -49,13 +65,18 @@ Group cameras() {
             .text("pixel_format", &C::pixel_format, 32,
                   "The device's own name (`Mono8`, `BayerGB8`, `GREY`); empty: the cheapest that "
                   "gives grey.")
-            .text("trigger", &C::trigger, 16,
-                  "What makes it expose: `hardware`, a pulse at its input; `software`, a command "
-                  "at `trigger.rate`; `free`, its own "
-                  "clock. All cameras alike.")
-            .text("options", &C::options, 400,
-                  "What only this kind of camera has (docs/cameras): `NAME=VALUE …`, or a group: "
-                  "`{packet_size: 9000}`.")
+            .choice<CameraTrigger>(
+                "trigger", &C::trigger,
+                {{"hardware", CameraTrigger::hardware},
+                 {"software", CameraTrigger::software},
+                 {"free", CameraTrigger::free}},
+                "What makes it expose: `hardware`, a pulse at its input; `software`, a command "
+                "at `trigger.rate`; `free`, its own "
+                "clock. All cameras alike.")
+            .options(
+                "options", &C::options, 400,
+                "What only this kind of camera has (docs/cameras): `NAME=VALUE …`, or a group: "
+                "`{packet_size: 9000}`.")
             .number("exposure_us", &C::exposure_us, 10, 1e6, "µs",
                     "Time of an exposure; 8000 is daylight in the mock's world.")
             .number("trigger_delay_us", &C::trigger_delay_us, 0, 20000, "µs",
@@ -159,11 +180,12 @@ Group trigger() {
                "then the measured middle of the exposure.")
       .integer("feedback_active_low", &T::feedback_active_low, 0, 15, "",
                "Of these, the ones that are low while a camera exposes.")
-      .text("pps", &T::pps, 8,
-            "Edge of the GNSS receiver's pulse per second at the board: `none` is wired, `rising` "
-            "or `falling`.")
-      .text("ins", &T::ins, 8,
-            "Edge of the INS's SyncOut at the board: `none` is wired, `rising` or `falling`.")
+      .choice(
+          "pps", &T::pps, edges(),
+          "Edge of the GNSS receiver's pulse per second at the board: `none` is wired, `rising` "
+          "or `falling`.")
+      .choice("ins", &T::ins, edges(),
+              "Edge of the INS's SyncOut at the board: `none` is wired, `rising` or `falling`.")
       .done();
 }
 
@@ -171,14 +193,15 @@ Group sync() {
   using S = SyncSettings;
   return Rows<S>(
              "sync", "How images are paired.", [](auto& c) -> auto& { return c.sync; })
-      .text("mode", &S::mode, 16,
-            "By what images are paired, and what proves it (docs/time.md). Proven: `board`, by a "
-            "trigger board's pulses; `ins_syncout`, by "
-            "the INS's; `master_strobe`, camera 0 triggers the others; `bus`, stamps of one IEEE "
-            "1394 cycle timer; `ptp`, stamps of one PTP "
-            "clock. Not proven: `counter`, exposure n of every camera belongs together; "
-            "`software`, what was exposed within "
-            "`tolerance_ms` by the host's clock, for cameras that nothing triggers.")
+      .choice<SyncMode>(
+          "mode", &S::mode, sync_modes(),
+          "By what images are paired, and what proves it (docs/time.md). Proven: `board`, by a "
+          "trigger board's pulses; `ins_syncout`, by "
+          "the INS's; `master_strobe`, camera 0 triggers the others; `bus`, stamps of one IEEE "
+          "1394 cycle timer; `ptp`, stamps of one PTP "
+          "clock. Not proven: `counter`, exposure n of every camera belongs together; "
+          "`software`, what was exposed within "
+          "`tolerance_ms` by the host's clock, for cameras that nothing triggers.")
       .number("hold_ms", &S::hold_ms, 1, 10000, "ms",
               "How long the images of a pulse wait for one that is late.")
       .number("tolerance_ms", &S::tolerance_ms, 0.01, 1000, "ms",

@@ -30,6 +30,12 @@ struct RecordedFrame {
 
 /// A recording, opened. Memory  Some 400 bytes a frame and 250 a reading; pixels stay in the files.
 /// Threads  read(): any number at once.
+///
+///     const RecordedSession session = RecordedSession::open("sessions/monday");
+///     for (const RecordedFrame& frame : session.frames()) {
+///       const auto width = static_cast<std::size_t>(frame.images[0].width);
+///       if (!session.read(frame, 0, pixels.data(), width)) continue;  // damaged, or not recorded
+///     }
 class RecordedSession {
  public:
   /// The recording in a session's folder, or in a folder of its files alone. InputError: no

@@ -125,6 +125,9 @@ struct BagTopics {
 /// images, numbers of images and times that do not go together, times that are no numbers, times in
 /// another unit or running backwards (check_times()), a calibration that makes no rig, images of
 /// another size than the calibration.
+///
+///     const StereoSequence drive = open_sequence(SequenceFormat::euroc, "MH_01_easy");
+///     for (const StereoPair& pair : drive.pairs) use(drive.root / pair.file[0], pair.stamp);
 [[nodiscard]] StereoSequence open_sequence(
     SequenceFormat format, const std::filesystem::path& folder,
     const std::optional<std::filesystem::path>& calibration = std::nullopt,

@@ -7,6 +7,7 @@
 
 #include <fmt/format.h>
 
+#include "app/devices/device_sentences.hpp"
 #include "app/runtime/errors.hpp"
 #include "app/runtime/nearest.hpp"
 #include "drivers/gige/gige.hpp"
@@ -83,12 +84,8 @@ class Openings {
     CameraConfiguration requested = request.configuration;
     requested.sharing = sharing_[request.driver];
     status = opened.device->configure(requested, &opened.actual);
-    if (status != DeviceStatus::ok) {
-      const std::string said = opened.device->last_error();
-      throw InputError(fmt::format(
-          "{}: {}", camera_title(request.key, opened.device->info()),
-          said.empty() ? fmt::format("cannot do what is asked: {}", to_string(status)) : said));
-    }
+    require_configured(camera_title(request.key, opened.device->info()), status,
+                       opened.device->last_error());
     return opened;
   }
 

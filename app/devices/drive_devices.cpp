@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <sstream>
 
 #include <fmt/format.h>
 
@@ -23,14 +22,6 @@ bool all_mock(const Configuration& c) {
   return std::all_of(c.cameras.begin(), c.cameras.end(), [](const CameraSettings& s) {
     return s.driver.empty() || s.driver == "mock";
   });
-}
-
-CameraTrigger trigger_of(const std::string& key, const std::string& word) {
-  if (word == "hardware") return CameraTrigger::hardware;
-  if (word == "software") return CameraTrigger::software;
-  if (word == "free") return CameraTrigger::free;
-  throw InputError(fmt::format("{}.trigger is \"{}\"{}; it is one of hardware, software, free", key,
-                               word, did_you_mean(word, {"hardware", "software", "free"})));
 }
 
 /// The MTi-G-700/710 makes pulses of 400 Hz / n and marks the reading each left with; the MTi-G
@@ -71,17 +62,15 @@ std::vector<CameraRequest> requests_of(const Configuration& c) {
     r.driver = s.driver;
     r.serial = s.serial;
     const ExposureSetting start = starting_exposure(c, static_cast<std::size_t>(k));
-    r.configuration = {s.width,        s.height,      c.trigger.rate,
-                       start.exposure, start.gain_db, trigger_of(key, s.trigger)};
+    r.configuration = {s.width, s.height, c.trigger.rate, start.exposure, start.gain_db, s.trigger};
     r.configuration.offset_x = s.offset_x;
     r.configuration.offset_y = s.offset_y;
     r.configuration.pixel_format = s.pixel_format;
-    r.configuration.options = parse_camera_options(key + ".options", s.options);
-    if (c.sync.mode != "master_strobe" &&
-        r.configuration.trigger != trigger_of("cameras.0", c.cameras[0].trigger))
+    r.configuration.options = s.options;
+    if (c.sync.mode != SyncMode::master_strobe && s.trigger != c.cameras[0].trigger)
       throw InputError(fmt::format(
           "{}.trigger is {}, that of camera 0 is {}; all cameras of a rig are triggered alike", key,
-          s.trigger, c.cameras[0].trigger));
+          to_string(s.trigger), to_string(c.cameras[0].trigger)));
     requests.push_back(std::move(r));
   }
   if (c.trigger.driver != "none" && c.trigger.driver != "board")
@@ -93,7 +82,7 @@ std::vector<CameraRequest> requests_of(const Configuration& c) {
     throw InputError(
         fmt::format("trigger.driver is board and cameras[].trigger {}; the board's pulses are for "
                     "cameras with trigger: hardware",
-                    c.cameras[0].trigger));
+                    to_string(c.cameras[0].trigger)));
   return requests;
 }
 
@@ -105,22 +94,6 @@ InsRequest ins_request(const InsSettings& s) {
 }
 
 }  // namespace
-
-std::map<std::string, std::string> parse_camera_options(const std::string& key,
-                                                        const std::string& text) {
-  std::map<std::string, std::string> options;
-  std::istringstream words(text);
-  for (std::string word; words >> word;) {
-    const auto equals = word.find('=');
-    if (equals == std::string::npos || equals == 0 || equals + 1 == word.size())
-      throw InputError(
-          fmt::format("{} has \"{}\"; it takes NAME=VALUE, as in packet_size=9000, or a group "
-                      "{{packet_size: 9000}}",
-                      key, word.substr(0, 60)));
-    options.insert_or_assign(word.substr(0, equals), word.substr(equals + 1));
-  }
-  return options;
-}
 
 void start_acquisition(Acquisition* acquisition) {
   const auto failure = acquisition->start();

@@ -79,8 +79,4 @@ class DriveDevices {
 /// Acquisition::start(); InputError names the device that cannot be started.
 void start_acquisition(Acquisition* acquisition);
 
-/// `NAME=VALUE NAME=VALUE …` of `cameras.N.options`. InputError names the key.
-[[nodiscard]] std::map<std::string, std::string> parse_camera_options(const std::string& key,
-                                                                      const std::string& text);
-
 }  // namespace vergence::app

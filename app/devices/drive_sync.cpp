@@ -8,16 +8,12 @@
 #include <fmt/format.h>
 
 #include "app/runtime/errors.hpp"
-#include "app/runtime/nearest.hpp"
 
 namespace vergence::app {
 namespace {
 
-const std::vector<std::string> kModes{"board", "ins_syncout", "master_strobe", "bus",
-                                      "ptp",   "counter",     "software"};
-
 [[noreturn]] void refuse(const Configuration& c, const std::string& why) {
-  throw InputError(fmt::format("sync.mode is {}: {}", c.sync.mode, why));
+  throw InputError(fmt::format("sync.mode is {}: {}", to_string(c.sync.mode), why));
 }
 
 bool is_mock(const CameraSettings& camera) {
@@ -61,14 +57,14 @@ void check_master(const Configuration& c, int cameras) {
       refuse(c, fmt::format("cameras.{}.driver is mock, whose cameras are triggered by the mock's "
                             "board; use mode board",
                             k));
-    if (k == 0 && s.trigger == "hardware")
+    if (k == 0 && s.trigger == CameraTrigger::hardware)
       refuse(
           c,
           "cameras.0.trigger is hardware; camera 0 triggers the others, so it is free or software");
-    if (k > 0 && s.trigger != "hardware")
+    if (k > 0 && s.trigger != CameraTrigger::hardware)
       refuse(c, fmt::format(
                     "cameras.{}.trigger is {}; camera 0's strobe triggers it, so it is hardware", k,
-                    s.trigger));
+                    to_string(s.trigger)));
   });
 }
 
@@ -86,14 +82,15 @@ void check_ptp(const Configuration& c, int cameras) {
     if (s.driver != "gige")
       refuse(c, fmt::format("cameras.{}.driver is {}; PTP clocks are those of gige cameras", k,
                             s.driver));
-    if (s.options.find("ptp=on") == std::string::npos)
+    const auto* options = std::get_if<gige::Options>(&s.options);
+    if (options == nullptr || !options->ptp)
       refuse(c, fmt::format(
                     "cameras.{}.options does not say ptp: on, so its clock follows nobody's", k));
   });
 }
 
-void check_mode(const Configuration& c, SyncMode mode, int cameras) {
-  switch (mode) {
+void check_mode(const Configuration& c, int cameras) {
+  switch (c.sync.mode) {
     case SyncMode::board:
       return check_board(c);
     case SyncMode::ins_syncout:
@@ -105,7 +102,7 @@ void check_mode(const Configuration& c, SyncMode mode, int cameras) {
     case SyncMode::ptp:
       return check_ptp(c, cameras);
     case SyncMode::counter:
-      if (c.cameras[0].trigger == "free")
+      if (c.cameras[0].trigger == CameraTrigger::free)
         throw InputError(
             "cameras[].trigger is free: nothing makes the cameras expose together, so their "
             "counters cannot pair the images; "
@@ -149,25 +146,21 @@ Duration microseconds(double us) { return Duration::nanoseconds(std::llround(us 
 }  // namespace
 
 SyncOptions sync_options(const Configuration& c, int cameras) {
-  const auto mode = sync_mode_of(c.sync.mode);
-  if (!mode)
-    throw InputError(fmt::format("sync.mode is \"{}\"{}; it is one of {}", c.sync.mode,
-                                 did_you_mean(c.sync.mode, kModes), fmt::join(kModes, ", ")));
-  check_mode(c, *mode, cameras);
+  check_mode(c, cameras);
   check_exposures(c, cameras);
   SyncOptions o;
   o.cameras = cameras;
   o.interval = Duration::seconds(1 / c.trigger.rate);
   o.hold = Duration::seconds(c.sync.hold_ms * 1e-3);
   o.tolerance = Duration::seconds(c.sync.tolerance_ms * 1e-3);
-  o.mode = *mode;
+  o.mode = c.sync.mode;
   for_each_camera(c, cameras, [&](int k, const CameraSettings& s) {
     SyncCameraOptions& camera = o.camera[static_cast<std::size_t>(k)];
     camera.delay = microseconds(s.trigger_delay_us);
     camera.jitter = jitter_of(s);
   });
   if (const char* sentence = o.validate())
-    throw InputError(fmt::format("sync ({}): {}", c.sync.mode, sentence));
+    throw InputError(fmt::format("sync ({}): {}", to_string(c.sync.mode), sentence));
   return o;
 }
 

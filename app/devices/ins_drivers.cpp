@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include "app/devices/device_sentences.hpp"
 #include "app/runtime/errors.hpp"
 #include "app/runtime/nearest.hpp"
 #include "drivers/gnss/gnss.hpp"
@@ -10,21 +11,12 @@
 namespace vergence::app {
 namespace {
 
-xsens::SyncIn sync_in_of(const std::string& word) {
-  if (word == "leave") return xsens::SyncIn::leave;
-  if (word == "off") return xsens::SyncIn::off;
-  if (word == "rising") return xsens::SyncIn::rising;
-  if (word == "falling") return xsens::SyncIn::falling;
-  throw InputError(fmt::format("ins.sync_in is \"{}\"{}; it is one of leave, off, rising, falling",
-                               word, did_you_mean(word, {"leave", "off", "rising", "falling"})));
-}
-
 std::unique_ptr<InsDriver> make_xsens(const InsRequest& request) {
   xsens::Options o;
   o.baud = request.baud;
   o.sync_out_hz = request.sync_out_hz;
   o.sync_out_width_ms = request.sync_out_width_ms;
-  o.sync_in = sync_in_of(request.sync_in);
+  o.sync_in = request.sync_in;
   o.processing = Duration::seconds(request.processing_ms * 1e-3);
   return std::make_unique<xsens::Driver>(o);
 }
@@ -44,36 +36,15 @@ const InsDriverRow& row_of(const InsRequest& request) {
       request.driver, did_you_mean(request.driver, names), fmt::join(names, ", ")));
 }
 
-/// The sentence for an open() that gave nothing.
-std::string refusal(const InsRequest& request, const InsDriverRow& row, const InsDriver& driver,
-                    DeviceStatus status) {
-  const std::string who =
-      fmt::format("ins: the {} INS{}", row.name, request.port.empty() ? "" : " on " + request.port);
-  const std::string said = driver.last_error();
-  switch (status) {
-    case DeviceStatus::busy:
-      return fmt::format(
-          "{} is in use by another program; end that one (ModemManager opens new ports: tell it "
-          "not to)",
-          who);
-    case DeviceStatus::no_permission:
-      return fmt::format("{} cannot be opened without permission; {}", who, row.permission);
-    default:
-      return fmt::format("{} cannot be used: {}", who,
-                         said.empty() ? std::string(to_string(status)) : said);
-  }
-}
-
 }  // namespace
 
 const std::vector<InsDriverRow>& ins_driver_rows() {
   static const std::vector<InsDriverRow> rows{
-      {"xsens", "XSens MTi-G or MTi-G-700/710 on a serial port", &make_xsens,
-       "add the user to group dialout, and log in again"},
+      {"xsens", "XSens MTi-G or MTi-G-700/710 on a serial port", &make_xsens},
       {"nmea", "satellite receiver or compass that sends NMEA 0183 on a serial port",
-       &make_gnss<gnss::Protocol::nmea>, "add the user to group dialout, and log in again"},
+       &make_gnss<gnss::Protocol::nmea>},
       {"ubx", "u-blox receiver that sends UBX-NAV-PVT on a serial port",
-       &make_gnss<gnss::Protocol::ubx>, "add the user to group dialout, and log in again"},
+       &make_gnss<gnss::Protocol::ubx>},
   };
   return rows;
 }
@@ -95,14 +66,13 @@ std::unique_ptr<InsDevice> open_ins(const InsRequest& request, std::vector<std::
   const std::unique_ptr<InsDriver> driver = row.make(request);
   DeviceStatus status = DeviceStatus::ok;
   std::unique_ptr<InsDevice> device = driver->open(request.port, &status);
-  if (device == nullptr) throw InputError(refusal(request, row, *driver, status));
+  if (device == nullptr)
+    throw InputError(
+        serial_open_error(fmt::format("ins: the {} INS{}", row.name,
+                                      request.port.empty() ? "" : " on " + request.port),
+                          status, driver->last_error()));
   status = device->configure(request.rate_hz, nullptr);
-  if (status != DeviceStatus::ok) {
-    const std::string said = device->last_error();
-    throw InputError(fmt::format(
-        "{}: {}", ins_title(device->info()),
-        said.empty() ? fmt::format("cannot do what is asked: {}", to_string(status)) : said));
-  }
+  require_configured(ins_title(device->info()), status, device->last_error());
   if (const std::string remark = device->remark(); !remark.empty())
     remarks->push_back(ins_title(device->info()) + ": " + remark);
   return device;

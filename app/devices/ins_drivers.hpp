@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "drivers/ins.hpp"
+#include "drivers/xsens/options.hpp"
 
 namespace vergence::app {
 
@@ -15,7 +16,7 @@ struct InsRequest {
   std::uint32_t baud = 0;  // 0: as the device has it
   double sync_out_hz = 0;  // 0: as the device has it; negative: off
   double sync_out_width_ms = 1;
-  std::string sync_in = "leave";  // leave, off, rising, falling
+  xsens::SyncIn sync_in = xsens::SyncIn::leave;
   double processing_ms = 2;
 };
 
@@ -24,7 +25,6 @@ struct InsDriverRow {
   const char* name;     // of `ins.driver`
   const char* meaning;  // for lists
   std::unique_ptr<InsDriver> (*make)(const InsRequest& request);
-  const char* permission;  // what to do where the system does not let us
 };
 
 /// The table of drivers for real INS: everything that talks to one is chosen here. The mock's INS

@@ -71,14 +71,9 @@ void check_drive(const Configuration& c) {
   }
   one_of("ins.driver", c.ins.driver, {"mock", "none"});
   one_of("trigger.driver", c.trigger.driver, {"mock"});
+  one_of("mock.world", c.mock.world, {"suburb"});
   (void)sync_options(c, n);
   (void)trigger_configuration(c, n);
-  one_of("mock.world", c.mock.world, {"suburb"});
-  one_of("mock.drive", c.mock.drive, {"loop", "figure-eight", "straight", "brief", "still"});
-  one_of("mock.pattern", c.mock.pattern, {"grey", "gbrg"});
-  one_of("mock.ins", c.mock.ins, {"noisy", "ideal"});
-  one_of("mock.ins_line", c.mock.ins_line, {"none", "mti-g", "mti-g-710"});
-  one_of("mock.board_line", c.mock.board_line, {"none", "usb", "ftdi"});
 }
 
 MockDrive make_mock_drive(const Configuration& c, const std::vector<std::string>& more_faults,
@@ -114,7 +109,8 @@ MockDrive make_mock_drive(const Configuration& c, const std::vector<std::string>
     o.clock_drift_ppm = c.mock.clock_drift_ppm;
     o.fed = c.mock.board_line != "none";
     o.reports_taken =
-        !o.fed && c.sync.mode == "board";  // else nobody asks for a pause, nor need take them
+        !o.fed &&
+        c.sync.mode == SyncMode::board;  // else nobody asks for a pause, nor need take them
     for (std::size_t k = 0; k < static_cast<std::size_t>(rig.cameras); ++k)
       o.trigger_delay[k] = trigger_delay(c, k);
     o.exposures_follow = exposes_by_itself(c);

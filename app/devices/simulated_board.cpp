@@ -71,7 +71,7 @@ mock::BoardSimulatorOptions board_of(const Configuration& c, const mock::MockRig
   o.clock_ppm = c.mock.clock_drift_ppm;
   o.power_on = rig.start() - kBefore;
   o.duration = kBefore + length_of(c, rig) + kAfter;
-  o.pps = c.trigger.pps != "none";
+  o.pps = c.trigger.pps != trigger_board::Edge::none;
   o.seed = static_cast<std::uint64_t>(c.mock.seed);
   for (const mock::Fault& f : rig.truth().faults())
     if (f.kind == mock::FaultKind::board_reboot) o.reboots.push_back(rig.start() + f.at);

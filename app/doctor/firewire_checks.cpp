@@ -11,11 +11,9 @@
 namespace vergence::app {
 namespace {
 
-iidc::BusSpeed speed_of(const CameraNeed& n) {
-  const double s = n.option("speed", 400);
-  if (s >= 800) return iidc::BusSpeed::s800;
-  if (s >= 400) return iidc::BusSpeed::s400;
-  return s >= 200 ? iidc::BusSpeed::s200 : iidc::BusSpeed::s100;
+iidc::Options options_of(const CameraNeed& n) {
+  const auto* given = std::get_if<iidc::Options>(&n.options);
+  return given != nullptr ? *given : iidc::Options{};
 }
 
 struct Share {
@@ -29,11 +27,12 @@ struct Share {
 Share share_of(const CameraNeed& n, std::size_t sharing) {
   Share share;
   iidc::BusShare& bus = share.bus;
-  bus.speed = speed_of(n);
+  const iidc::Options options = options_of(n);
+  bus.speed = options.speed.value_or(iidc::BusSpeed::s400);
   bus.image_bytes = static_cast<std::size_t>(std::max(0.0, n.bytes));
   const std::size_t most = iidc::largest_packet(bus.speed);
-  if (const double given = n.option("packet_bytes", 0); given > 0) {
-    bus.packet_bytes = static_cast<std::size_t>(std::min(given, static_cast<double>(most)));
+  if (options.packet_bytes) {
+    bus.packet_bytes = std::min(*options.packet_bytes, most);
     return share;
   }
   const auto code = iidc::rate_code_for(n.rate_hz);

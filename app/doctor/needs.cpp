@@ -1,11 +1,9 @@
 #include "app/doctor/needs.hpp"
 
 #include <algorithm>
-#include <cstdlib>
 
 #include <fmt/format.h>
 
-#include "app/devices/drive_devices.hpp"
 #include "app/devices/rig_settings.hpp"
 
 namespace vergence::app {
@@ -26,14 +24,6 @@ double bytes_per_pixel(const CameraSettings& s) {
 }
 
 }  // namespace
-
-double CameraNeed::option(const std::string& word, double fallback) const {
-  const auto it = options.find(word);
-  if (it == options.end()) return fallback;
-  char* end = nullptr;
-  const double value = std::strtod(it->second.c_str(), &end);
-  return end != it->second.c_str() && *end == '\0' && value > 0 ? value : fallback;
-}
 
 std::vector<CameraNeed> Needs::of(const std::string& driver) const {
   std::vector<CameraNeed> some;
@@ -57,9 +47,10 @@ Needs needs_of(const Configuration& c) {
     n.width = s.width;
     n.height = s.height;
     n.bytes = bytes_per_pixel(s) * s.width * s.height;
-    n.options = parse_camera_options(n.key + ".options", s.options);
-    n.rate_hz = c.trigger.rate * n.option("thin", 1);
-    n.free = s.trigger == "free";
+    n.options = s.options;
+    const auto* v4l2 = std::get_if<v4l2::Options>(&s.options);
+    n.rate_hz = c.trigger.rate * (v4l2 != nullptr ? v4l2->thin : 1);
+    n.free = s.trigger == CameraTrigger::free;
     needs.cameras.push_back(std::move(n));
   }
   needs.ins_driver = c.ins.driver;

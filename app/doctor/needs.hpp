@@ -1,5 +1,4 @@
 #pragma once
-#include <map>
 #include <string>
 #include <vector>
 
@@ -15,11 +14,9 @@ struct CameraNeed {
   int width = 0, height = 0;
   double rate_hz = 0;  // that the camera runs at, which may be more than the rig's
   bool free = false;
-  std::map<std::string, std::string> options;
+  CameraOptions options;
 
   [[nodiscard]] double bytes_per_second() const noexcept { return bytes * rate_hz; }
-  /// A number among the options; `fallback` where there is none, or nonsense.
-  [[nodiscard]] double option(const std::string& word, double fallback) const;
 };
 
 /// What a drive with a configuration asks of the machine.
@@ -34,7 +31,7 @@ struct Needs {
   [[nodiscard]] std::vector<CameraNeed> of(const std::string& driver) const;
 };
 
-/// InputError: a hole in the list of cameras, or options that cannot be read.
+/// InputError: a hole in the list of cameras.
 [[nodiscard]] Needs needs_of(const Configuration& configuration);
 
 }  // namespace vergence::app

@@ -22,7 +22,8 @@ constexpr std::int64_t kRecommendedBuffer = 10'485'760;
 constexpr int kJumbo = 9000, kStandard = 1500;  // bytes
 constexpr double kGigabit = 1e9;                // bit/s, where the system does not say
 constexpr double kMega = 1e6;
-constexpr double kMostOnLink = 16, kLargestPacket = 65'000, kMostMegabits = 1e6;
+constexpr std::size_t kMostOnLink = 16;
+constexpr double kMostMegabits = 1e6;
 
 std::optional<std::uint32_t> ipv4(const std::string& text) {
   in_addr a{};
@@ -243,13 +244,15 @@ void check_load(const Link& link, std::vector<Finding>* findings) {
     gige::LinkDemand d;
     d.image_bytes = static_cast<std::int64_t>(n->bytes);
     d.rate_hz = n->rate_hz;
-    d.cameras = std::clamp(
-        static_cast<int>(std::min(
-            kMostOnLink, n->option("link_cameras", static_cast<double>(link.needs.size())))),
-        1, 16);
+    const auto* given = std::get_if<gige::Options>(&n->options);
+    const gige::Options options = given != nullptr ? *given : gige::Options{};
+    d.cameras = options.link_cameras > 0
+                    ? options.link_cameras
+                    : static_cast<int>(std::clamp<std::size_t>(link.needs.size(), 1, kMostOnLink));
     d.mtu = link.mtu;
-    d.packet_size = static_cast<int>(std::min(kLargestPacket, n->option("packet_size", 0)));
-    megabits = std::clamp(n->option("link_mbps", slowest / kMega), 1.0, kMostMegabits);
+    d.packet_size = options.packet_size;
+    megabits =
+        options.link_mbps > 0 ? options.link_mbps : std::clamp(slowest / kMega, 1.0, kMostMegabits);
     d.speed = static_cast<std::int64_t>(megabits * kMega);
     const gige::LinkBudget budget = gige::link_budget(d);
     if (budget.used >= used) used = budget.used, highest = budget.highest_hz;
@@ -304,8 +307,8 @@ void check_rp_filter(const CheckContext& p, const std::vector<Reached>& cameras,
 
 void check_packet_socket(const CheckContext& p, std::vector<Finding>* findings) {
   for (const CameraNeed& n : p.needs.of("gige")) {
-    const auto option = n.options.find("packet_socket");
-    if (option == n.options.end() || option->second != "on") continue;
+    const auto* options = std::get_if<gige::Options>(&n.options);
+    if (options == nullptr || !options->packet_socket) continue;
     const bool may = p.machine.has_capability(CAP_NET_RAW);
     findings->push_back(
         {"packet_socket", may ? FindingState::ok : FindingState::problem,

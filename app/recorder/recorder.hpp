@@ -103,6 +103,11 @@ inline constexpr std::size_t kMostAttempts = 1000;  // in summary.json; calibrat
 /// calibrations.csv, events.jsonl and, with an INS, ins.csv of a session as it goes on, on a thread
 /// of its own: the estimator never waits for a disk.
 ///
+///     make_session_folder("sessions/monday");
+///     Recorder recorder("sessions/monday", {});
+///     recorder.post(PoseRecord::of(sample, 0, std::nullopt));  // of each frame
+///     const std::unique_ptr<SessionTotals> totals = recorder.close();
+///
 /// What has been posted is in the files as soon as the thread comes to it, at the latest after a
 /// second, so a killed session keeps its lines. Stamps are printed from their integers. The same
 /// records give the same bytes.

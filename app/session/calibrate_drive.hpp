@@ -24,6 +24,12 @@ struct DriveCalibrationRequest {
 /// Calibrates, writes the file and prints what was found on standard output.
 /// → done, not_usable (nothing was found, or the depth is not known well enough)
 /// Errors  InputError: data, calibration, a file that cannot be written.
+///
+///     DriveCalibrationRequest request;
+///     request.data = "MH_01_easy";
+///     request.format = SequenceFormat::euroc;
+///     request.out = "calibration.yaml";
+///     const ExitCode code = calibrate_from_drive(request);
 [[nodiscard]] ExitCode calibrate_from_drive(const DriveCalibrationRequest& request);
 
 }  // namespace vergence::app

@@ -25,6 +25,11 @@ struct SessionOptions {
 /// Runs a source through estimator and comparison into a session folder (DESIGN §6): set-up,
 /// watching, events, comparison, summary, report and verdict, the same for devices and recordings.
 ///
+///     LiveSource source(request);
+///     SessionOptions options;
+///     options.out = "sessions/monday";
+///     const ExitCode code = run_session(source, request.configuration, options, signals);
+///
 /// Threads  The source's own, the estimator (sealed, with the comparison and the observers), its
 ///          worker, the calibration solver (sealed, too), the recorder; the caller's thread draws
 ///          the progress line and watches for signals.

@@ -229,6 +229,18 @@ struct BundleWorkspace;
 ///            world origin costs no digits); camera k: R_k ← R_k Exp(φ), t_k ← t_k + R_k τ, with
 ///            `exact` t_k kept at its length. Points: X ← X + δ, |δ| at most 0.8 of the point's
 ///            least depth, so that no point passes through a camera.
+///
+///     const BundleCapacities capacities{.poses = poses.size(), .points = points.size()};
+///     Arena arena(BundleAdjuster::memory_needed(capacities));
+///     BundleAdjuster adjuster(capacities, arena);
+///     BundleProblem problem;
+///     problem.cameras = cameras;
+///     problem.T_camera_left = T_camera_left;
+///     problem.T_left_world = poses;  // in/out; the first is held
+///     problem.points = points;       // in/out
+///     problem.observations = observations;
+///     const BundleResult result = adjuster.solve(problem, BundleOptions{});  // stereo odometry
+///
 /// Ownership  The problem's arrays are the caller's; nothing of them is kept after solve().
 /// Threads    solve() by one thread at a time; adjusters are independent of each other.
 /// Memory     memory_needed() bytes of the arena at construction, nothing in solve().

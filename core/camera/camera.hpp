@@ -17,6 +17,14 @@ inline constexpr double kMinDepth = 1e-3;  // m: nearer than any lens
 /// radtan       x_d = x (1 + k1 r² + k2 r⁴ + k3 r⁶) + 2 p1 x y + p2 (r² + 2x²), likewise y; r² = x²
 /// + y², (x, y) = (X, Y)/Z equidistant  θ = atan r, θ_d = θ (1 + k1 θ² + k2 θ⁴ + k3 θ⁶ + k4 θ⁸),
 /// (x_d, y_d) = (x, y) θ_d / r pixel        (fx x_d + cx, fy y_d + cy)
+///
+///     const Camera camera(intrinsics);
+///     Vec2 pixel;
+///     Mat23 d_pixel_d_point;
+///     if (camera.project({1, -0.5, 8}, &pixel, &d_pixel_d_point) != ProjectStatus::ok) return;
+///     Vec3 ray;
+///     if (!camera.unproject(pixel, &ray)) return;  // 8 * ray is the point again
+///
 /// Threads    Const after construction.
 class Camera {
  public:

@@ -109,6 +109,13 @@ struct ComparisonCounters {
 /// Our poses against a geodetic INS, frame by frame: interpolation, placement on the earth, errors,
 /// scale (DESIGN §6).
 ///
+///     Arena arena(Comparison::bytes_needed(options));
+///     Comparison comparison(options, arena);
+///     comparison.add(reading);  // as they come
+///     comparison.add(pose);
+///     for (ComparedPose compared; comparison.next(&compared);)
+///       if (compared.compared) use(compared.error_enu);
+///
 /// Ownership  Memory comes from the arena given at construction; nothing is taken later. Values in,
 ///            values out.
 /// Threads    One thread calls everything. Rings bring samples and poses to it.

@@ -9,6 +9,10 @@ namespace vergence {
 /// East, north, up at a fixed point of WGS84: exact Cartesian axes, no projection (DESIGN §3,
 /// `enu`).
 ///
+///     const LocalTangentPlane plane(Geodetic{-27.5, 153.0, 40});
+///     const Vec3 p_enu = plane.to_enu({-27.499, 153.001, 41});  // m east, north, up of that place
+///     const Geodetic back = plane.to_geodetic(p_enu);
+///
 /// Threads  Const calls may overlap. Memory: none. Units: metres, degrees in Geodetic.
 /// Errors   None; a place that is not plausible gives numbers that mean nothing: the caller asks
 ///          Geodetic::plausible() first.

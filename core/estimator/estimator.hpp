@@ -74,6 +74,15 @@ struct EstimatorEvent {
 
 /// Rig frames in, a pose for each out: the front door of core.
 ///
+///     Arena arena(Estimator::memory_needed(options, rig));
+///     SequentialRunner runner;
+///     Estimator estimator(options, rig, rig, arena, runner, solver);
+///     for (RigFrame frame; next_frame(&frame);) {
+///       const PoseSample sample = estimator.process(frame);
+///       if (sample.status != PoseStatus::lost) use(sample);
+///     }
+///     estimator.finish();
+///
 /// Ownership  Keeps references to the arena and the runners; images are read during process() only,
 ///            masks in the constructor only.
 /// Threads    One caller; process() uses `runner` for the other images' front end and `solver` for

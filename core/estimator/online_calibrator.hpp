@@ -23,6 +23,11 @@ namespace vergence {
 /// refines it. Learning grows a segment of frames, solving again and again; a full segment is
 /// closed, and what it told is the next one's prior.
 ///
+///     calibrator.log(odometry, out, frame);  // of every posed frame
+///     if (calibrator.can_solve()) calibrator.start_solve();
+///     if (const auto decision = calibrator.decide(frame.stamp, frame.number))
+///       if (decision->accepted) calibrator.use(decision->calibration, decision->lenses);
+///
 /// Threads one, but for the solver's task. Memory from the arena at construction.
 class OnlineCalibrator {
  public:

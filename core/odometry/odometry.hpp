@@ -45,6 +45,12 @@ enum class Link : std::uint8_t {
 ///
 /// Unlinked, rig() is this frame's transform between the cameras and no calibration. A knock of one
 /// camera is a motion of that camera like any other there.
+///
+///     odometry::Odometry odometry(options, rig, true, arena, runner);
+///     odometry::FrameOutcome out = odometry.process(frame);
+///     if (out.posed) use(out.T_left_world);
+///     if (out.relink_due) odometry.rebuild(&out);
+///
 /// Frames     T_left_world; world is the left camera of the first frame posed and stays when the
 ///            scene is rebuilt.
 /// Threads    One caller. Memory: from the arena at construction. Errors: by FrameOutcome.

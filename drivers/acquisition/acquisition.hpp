@@ -59,6 +59,16 @@ struct StartFailure {
 ///            the synchroniser wants is asked for when a report is taken: in virtual time always at
 ///            the same one. With `ins_syncout` the INS's readings report the pulses; where a gap is
 ///            wanted its stream is stopped for as long, as camera 0's is with `master_strobe`.
+///
+///     Acquisition acquisition({&left, &right}, &ins, &board, options);
+///     if (const auto failure = acquisition.start()) return;  // failure->device does not start
+///     for (Acquired item; acquisition.next(&item);)
+///       if (const auto* frame = std::get_if<AcquiredFrame>(&item)) {
+///         use(frame->rig);
+///         acquisition.release(*frame);
+///       }
+///     acquisition.join();
+///
 /// Ownership  Devices are configured and outlive it. Slots of a frame are the consumer's until
 ///            release(). All slots go back to their cameras on the consumer's thread.
 /// Threads    next(), release(): one consumer, which may be sealed. stop(): any. The rest: the

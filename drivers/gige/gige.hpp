@@ -1,6 +1,5 @@
 #pragma once
 #include <memory>
-#include <span>
 
 #include "drivers/camera.hpp"
 
@@ -12,14 +11,5 @@ namespace vergence::gige {
 /// enumerate() takes a second (the standard's time for answers); open() of a camera that is not
 /// there two to four.
 [[nodiscard]] std::unique_ptr<CameraDriver> make_driver();
-
-/// What CameraConfiguration::options may hold: the table behind docs/cameras/gige.md.
-struct OptionRow {
-  const char* name;
-  const char* values;  // in words: `on, off`, `µs`
-  const char* fallback;
-  const char* meaning;
-};
-[[nodiscard]] std::span<const OptionRow> option_rows() noexcept;
 
 }  // namespace vergence::gige

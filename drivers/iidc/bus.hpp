@@ -5,6 +5,7 @@
 
 #include "core/memory/frame_pool.hpp"
 #include "drivers/device.hpp"
+#include "drivers/options/iidc_options.hpp"
 #include "firmware_iface/iidc/bandwidth.hpp"
 
 /// What an IIDC camera hangs on: registers and a stream, the same for USB, IEEE 1394 and a test's
@@ -33,8 +34,6 @@ struct StreamShape {
   std::size_t buffers = 0;  // slots, 4 … kMaxBuffers
   [[nodiscard]] bool operator==(const StreamShape&) const noexcept = default;
 };
-inline constexpr std::size_t kMaxBuffers =
-    32;  // half of FramePool::kMaxSlots: two generations of a ring fit into one range of slots
 
 /// One filled buffer.
 struct Arrival {

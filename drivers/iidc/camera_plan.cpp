@@ -27,9 +27,9 @@ class Planner {
 
   DeviceStatus run() {
     if (const DeviceStatus s = check_numbers(); s != DeviceStatus::ok) return s;
-    if (const DeviceStatus s = parse_options(requested_.options, &plan_.options, &last_error_);
-        s != DeviceStatus::ok)
-      return s;
+    if (!take_options(requested_.options, option_table(), "IIDC cameras", &plan_.options,
+                      &last_error_))
+      return DeviceStatus::unsupported;
     plan_.trigger = requested_.trigger;
     plan_.requested_rate_hz = requested_.rate_hz;
     plan_.size = {static_cast<std::uint16_t>(requested_.width),

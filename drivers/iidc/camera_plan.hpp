@@ -3,15 +3,15 @@
 #include <string>
 
 #include "drivers/camera.hpp"
-#include "drivers/iidc/camera_options.hpp"
 #include "drivers/iidc/camera_registers.hpp"
 #include "drivers/iidc/grey.hpp"
+#include "drivers/options/iidc_options.hpp"
 
 namespace vergence::iidc {
 
 /// How one camera is going to do what it is asked for: the mode, its packets, what is embedded.
 struct CameraPlan {
-  CameraOptions options{};
+  Options options{};
   CameraTrigger trigger = CameraTrigger::hardware;
   unsigned trigger_mode = 0;  // 0 or 14
   unsigned format = 0, mode = 0;

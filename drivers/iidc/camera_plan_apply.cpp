@@ -64,7 +64,7 @@ void write_trigger(CameraRegisters& r, const CameraPlan& plan) {
   r.set(reg::kTriggerMode, t.quadlet());
 }
 
-void write_strobe(CameraRegisters& r, const CameraOptions& o) {
+void write_strobe(CameraRegisters& r, const Options& o) {
   if (!o.strobe_pin) return;
   const auto ticks = [](Duration d) {
     return static_cast<std::uint32_t>(std::min(4095.0, std::round(d.to_seconds() * 1024e3)));

@@ -3,13 +3,7 @@
 #include <cstddef>
 
 namespace vergence {
-namespace {
-
-constexpr std::array<SyncMode, 7> kModes{
-    SyncMode::counter,       SyncMode::software, SyncMode::board, SyncMode::ins_syncout,
-    SyncMode::master_strobe, SyncMode::bus,      SyncMode::ptp};
-
-}  // namespace
+namespace {}  // namespace
 
 const char* to_string(SyncMode mode) noexcept {
   switch (mode) {
@@ -29,12 +23,6 @@ const char* to_string(SyncMode mode) noexcept {
       return "ptp";
   }
   return "";
-}
-
-std::optional<SyncMode> sync_mode_of(std::string_view name) noexcept {
-  for (const SyncMode m : kModes)
-    if (name == to_string(m)) return m;
-  return std::nullopt;
 }
 
 const char* to_string(SyncProof proof) noexcept {

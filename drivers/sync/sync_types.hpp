@@ -1,8 +1,6 @@
 #pragma once
 #include <array>
 #include <cstdint>
-#include <optional>
-#include <string_view>
 
 #include "core/memory/frame_pool.hpp"
 #include "core/types/calibration.hpp"
@@ -26,7 +24,6 @@ enum class SyncMode : std::uint8_t {
   ptp,  // the stamps are of one PTP clock: within `tolerance` in it
 };
 [[nodiscard]] const char* to_string(SyncMode) noexcept;
-[[nodiscard]] std::optional<SyncMode> sync_mode_of(std::string_view name) noexcept;
 /// Frames are tied to pulses that are offered by RigSynchronizer::pulse().
 [[nodiscard]] constexpr bool wants_pulses(SyncMode m) noexcept {
   return m == SyncMode::board || m == SyncMode::ins_syncout;

@@ -72,7 +72,10 @@ DeviceStatus V4l2Camera::configure(const CameraConfiguration& requested,
 /// `keep_slots`: of a camera that came back, whose images may be held; its size is the same.
 DeviceStatus V4l2Camera::bring_to(const CameraConfiguration& requested, bool keep_slots) {
   Options options;
-  if (!parse_options(requested, &options, &last_error_)) return DeviceStatus::unsupported;
+  if (!take_options(requested.options, option_table(), "V4L2 cameras", &options, &last_error_))
+    return DeviceStatus::unsupported;
+  options.trigger_control = key_of(options.trigger_control);
+  for (auto& control : options.controls) control.first = key_of(control.first);
   Controls controls;
   if (!options.subdevice.empty()) {
     subdevice_.reset(::open(options.subdevice.c_str(), O_RDWR | O_CLOEXEC));

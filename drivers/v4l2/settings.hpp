@@ -6,7 +6,7 @@
 #include "drivers/v4l2/controls.hpp"
 #include "drivers/v4l2/formats.hpp"
 #include "drivers/v4l2/node.hpp"
-#include "drivers/v4l2/options.hpp"
+#include "drivers/v4l2/request_checks.hpp"
 
 namespace vergence::v4l2 {
 

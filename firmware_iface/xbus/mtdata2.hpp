@@ -194,6 +194,13 @@ class PacketWriter {
 
 /// Decodes a message's payload. `torn`: *out untouched. Never `end`. A packet's length outranks its
 /// id's format bits: firmware has been seen to announce a double and send four bytes.
+///
+///     Message message;  // of a FrameStream
+///     Mtdata2 data;
+///     while (stream.next(&message))
+///       if (message.is(MessageId::mtdata2) &&
+///           decode_mtdata2(message.payload, &data) == PacketStatus::ok && data.quaternion)
+///         use(*data.quaternion);
 [[nodiscard]] PacketStatus decode_mtdata2(std::span<const std::uint8_t> payload,
                                           Mtdata2* out) noexcept;
 

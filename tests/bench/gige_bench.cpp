@@ -23,6 +23,7 @@
 
 #include "drivers/clock.hpp"
 #include "drivers/gige/gige.hpp"
+#include "tests/support/camera_options.hpp"
 #include "tests/support/gige_camera.hpp"
 #include "tests/support/gvsp_sender.hpp"
 
@@ -70,7 +71,7 @@ Rig make_rig(int packet) {
     auto camera = gige::make_driver()->open(o.address, &status);
     CameraConfiguration c{
         kWidth, kHeight, kRate, Duration::milliseconds(5), 0, CameraTrigger::free};
-    c.options["packet_size"] = std::to_string(packet);
+    test::give<gige::Options>(&c, "packet_size", std::to_string(packet));
     c.sharing = kCameras;
     if (camera == nullptr || camera->configure(c, nullptr) != DeviceStatus::ok) {
       std::fprintf(stderr, "camera %d: %s\n", k,

@@ -10,6 +10,7 @@
 #include <variant>
 #include <vector>
 
+#include "app/config/camera_options.hpp"
 #include "app/config/schema.hpp"
 
 /// The groups that schema() is made of, and what builds one. One source for each kind of group:
@@ -87,6 +88,45 @@ class Rows {
           return words[static_cast<std::size_t>(s.*field)];
         });
     group_.keys.back().words = words;
+    return *this;
+  }
+
+  /// One of the values of an enumeration, by its word.
+  template <class Enum>
+  Rows& choice(const char* name, Enum Settings::*field,
+               const std::vector<std::pair<std::string, Enum>>& choices, const char* meaning) {
+    add(
+        name, KeyType::text, 0, 0, "", meaning,
+        [field, choices](Settings& s, const KeyValue& v) {
+          for (const auto& [word, value] : choices)
+            if (word == std::get<std::string>(v)) s.*field = value;
+        },
+        [field, choices](const Settings& s) -> KeyValue {
+          for (const auto& [word, value] : choices)
+            if (value == s.*field) return word;
+          return std::string();
+        });
+    for (const auto& [word, value] : choices) group_.keys.back().words.push_back(word);
+    return *this;
+  }
+
+  /// A text that is one of a few words.
+  Rows& word(const char* name, std::string Settings::*field, std::vector<std::string> words,
+             const char* meaning) {
+    text(name, field, 0, meaning);
+    group_.keys.back().words = std::move(words);
+    return *this;
+  }
+
+  /// The options of a camera's driver, as one text.
+  Rows& options(const char* name, CameraOptions Settings::*field, std::size_t longest,
+                const char* meaning) {
+    add(
+        name, KeyType::text, 0, static_cast<double>(longest), "", meaning,
+        [](Settings& s, const KeyValue& v) {
+          (void)set_camera_options(std::get<std::string>(v), &s);
+        },
+        [field](const Settings& s) -> KeyValue { return options_text(s.*field); });
     return *this;
   }
 

@@ -65,8 +65,9 @@ DeviceStatus GigeCamera::configure(const CameraConfiguration& requested,
                     "rate and exposure must be positive, the exposure shorter than the time "
                     "between two images");
     Options options;
-    if (std::string sentence = parse_options(requested.options, &options); !sentence.empty())
-      return refuse(DeviceStatus::unsupported, std::move(sentence));
+    if (std::string why;
+        !take_options(requested.options, option_table(), "GigE cameras", &options, &why))
+      return refuse(DeviceStatus::unsupported, std::move(why));
     const std::lock_guard lock(device_);
     if (const DeviceStatus s = reach(); s != DeviceStatus::ok) return s;
     Applied applied;

@@ -156,10 +156,8 @@ DeviceStatus Session::open_stream(const Applied& a, ArvStreamCallback callback, 
   const bool can =
       arv_device_read_register(device_.get(), kCapabilities, &capabilities, error.out()) != FALSE &&
       (capabilities & kCanResend) != 0;
-  const bool resend =
-      o.resend == Options::Resend::on || (o.resend == Options::Resend::automatic && can);
-  if (o.resend == Options::Resend::on && !can)
-    note("the camera says that it cannot send packets again");
+  const bool resend = o.resend == Resend::on || (o.resend == Resend::automatic && can);
+  if (o.resend == Resend::on && !can) note("the camera says that it cannot send packets again");
   const Duration period = Duration::seconds(1 / a.actual.rate_hz);
   const Duration retention =
       o.frame_retention > Duration{}
@@ -178,8 +176,8 @@ DeviceStatus Session::open_stream(const Applied& a, ArvStreamCallback callback, 
 /// frame.
 void Session::enlarge_socket_buffer(const Applied& a) {
   const std::int64_t requested =
-      a.options.socket_buffer > 0
-          ? a.options.socket_buffer
+      a.options.socket_buffer_kb > 0
+          ? std::int64_t{a.options.socket_buffer_kb} * 1024
           : std::max(kLeastSocketBuffer, kBufferedFrames * static_cast<std::int64_t>(a.payload));
   const int socket = find_udp_socket(arv_gv_stream_get_port(ARV_GV_STREAM(stream_.get())));
   const std::int64_t got = socket < 0 ? 0 : set_receive_buffer(socket, requested);

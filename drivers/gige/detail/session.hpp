@@ -12,7 +12,7 @@
 #include "drivers/gige/detail/glib.hpp"
 #include "drivers/gige/detail/grey.hpp"
 #include "drivers/gige/detail/link.hpp"
-#include "drivers/gige/detail/options.hpp"
+#include "drivers/options/gige_options.hpp"
 
 namespace vergence::gige {
 

@@ -19,6 +19,17 @@ std::string shown(double v) {
   return text.data();
 }
 
+const char* feature_value(TriggerOverlap overlap) {
+  switch (overlap) {
+    case TriggerOverlap::readout:
+      return "ReadOut";
+    case TriggerOverlap::previous_frame:
+      return "PreviousFrame";
+    default:
+      return "Off";
+  }
+}
+
 }  // namespace
 
 DeviceStatus Session::apply(const CameraConfiguration& requested, const Options& options,
@@ -128,16 +139,12 @@ DeviceStatus Session::set_trigger(const CameraConfiguration& requested, const Op
       !features_.choose("TriggerSource", software ? "Software" : o.line))
     return refuse(DeviceStatus::unsupported, features_.last_error());
   if (software) return DeviceStatus::ok;
-  const std::string edge = o.edge == "rising" ? "RisingEdge" : "FallingEdge";
-  if (edge == "RisingEdge")
-    features_.choose_if_there("TriggerActivation", edge);
-  else if (!features_.choose("TriggerActivation", edge))
+  if (o.edge == TriggerEdge::rising)
+    features_.choose_if_there("TriggerActivation", "RisingEdge");
+  else if (!features_.choose("TriggerActivation", "FallingEdge"))
     return refuse(DeviceStatus::unsupported, features_.last_error());
-  const std::string overlap = o.overlap == "off"              ? "Off"
-                              : o.overlap == "readout"        ? "ReadOut"
-                              : o.overlap == "previous_frame" ? "PreviousFrame"
-                                                              : "";
-  if (!overlap.empty() && !features_.choose("TriggerOverlap", overlap))
+  if (o.overlap != TriggerOverlap::unset &&
+      !features_.choose("TriggerOverlap", feature_value(o.overlap)))
     return refuse(DeviceStatus::unsupported, features_.last_error());
   const char* delay = features_.find(Purpose::trigger_delay);
   if (delay == nullptr && o.trigger_delay_us > 0)
@@ -155,7 +162,7 @@ DeviceStatus Session::set_exposure(const CameraConfiguration& requested, const O
                                    Applied* a) {
   for (const char* automatic : {"ExposureAuto", "GainAuto"})
     features_.choose_if_there(automatic, "Off");
-  if (o.exposure_mode == "trigger_width") {
+  if (o.exposure_mode == ExposureMode::trigger_width) {
     if (!features_.choose("ExposureMode", "TriggerWidth"))
       return refuse(DeviceStatus::unsupported, features_.last_error());
   } else {
@@ -197,7 +204,7 @@ DeviceStatus Session::set_exposure(const CameraConfiguration& requested, const O
 DeviceStatus Session::change_exposure(const ExposureSetting& requested, const Options& o,
                                       ExposureSetting* actual) {
   const char* exposure = features_.find(Purpose::exposure);
-  if (o.exposure_mode == "trigger_width" || exposure == nullptr)
+  if (o.exposure_mode == ExposureMode::trigger_width || exposure == nullptr)
     return refuse(DeviceStatus::unsupported, "the camera's exposure cannot be set");
   const auto set_nearest = [this](const char* name, double value, const char* unit, double* taken) {
     const auto limits = features_.bounds(name);
@@ -303,7 +310,8 @@ bool Session::ask_for_exposures(const char* mode, Applied* a) {
 DeviceStatus Session::set_packets(const CameraConfiguration& requested, const Options& o,
                                   Applied* a) {
   a->link = link_;
-  const std::int64_t speed = o.link_speed > 0 ? o.link_speed : a->link.speed;
+  const std::int64_t speed =
+      o.link_mbps > 0 ? std::int64_t{o.link_mbps} * 1'000'000 : a->link.speed;
   const auto limits = features_.bounds("GevSCPSPacketSize");
   const auto least = limits ? std::max(limits->least, 576.0) : 576.0,
              most = limits && limits->most >= least ? limits->most : 9000.0;

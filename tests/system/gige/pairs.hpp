@@ -14,6 +14,7 @@
 #include "app/devices/camera_drivers.hpp"
 #include "drivers/acquisition/acquisition.hpp"
 #include "drivers/gige/detail/link.hpp"
+#include "tests/support/camera_options.hpp"
 #include "tests/support/gige_camera.hpp"
 
 namespace vergence::test {
@@ -52,7 +53,8 @@ class Pairs {
                            "gige",
                            o.address,
                            {kWidth, kHeight, rate, Duration::milliseconds(2), 0}};
-      r.configuration.options = {{"packet_size", "16000"}, {"resend", resend}};
+      give<gige::Options>(&r.configuration, "packet_size", "16000");
+      give<gige::Options>(&r.configuration, "resend", resend);
       requests.push_back(std::move(r));
     }
     std::vector<std::string> remarks;

@@ -5,6 +5,7 @@
 #include <thread>
 
 #include "tests/rigs/iidc_rig.hpp"
+#include "tests/support/camera_options.hpp"
 #include "tests/unit/drivers/conformance/camera_conformance.hpp"
 
 namespace vergence::test {
@@ -30,7 +31,7 @@ class BusConformance final : public ConformanceRig {
   CameraDevice& camera() override { return *camera_; }
   std::vector<CameraConfiguration> possible() override {
     CameraConfiguration free{320, 240, 30, Duration::milliseconds(4), 0, CameraTrigger::free};
-    free.options["buffers"] = "8";
+    test::give<iidc::Options>(&free, "buffers", "8");
     CameraConfiguration pulsed = free;
     pulsed.trigger = CameraTrigger::hardware;
     CameraConfiguration asked = free;
@@ -51,7 +52,7 @@ class BusConformance final : public ConformanceRig {
     all[1].gain_db = 60;
     all[2].exposure = Duration::microseconds(2);
     all[3].pixel_format = "Mono9";
-    all[4].options["zoom"] = "2";
+    all[4].options = v4l2::Options{};
     all[5].offset_x = 1200;
     return all;
   }

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "tests/rigs/iidc_rig.hpp"
+#include "tests/support/camera_options.hpp"
 
 /// What holds on both buses: one set of cases, included once by each bus's test with its own
 /// BusUnderTest.
@@ -275,7 +276,7 @@ TEST_F(IidcRig, UnpluggedWhileStreamingAndPluggedInAgainLeavesNothingBehind) {
 
 TEST_F(IidcRig, WhatIsDroppedForWantOfASlotIsCountedExactly) {
   CameraConfiguration few = usual();
-  few.options["buffers"] = "6";
+  test::give<iidc::Options>(&few, "buffers", "6");
   ASSERT_NO_FATAL_FAILURE(begin(few));
   ASSERT_NO_FATAL_FAILURE(start());
   ASSERT_TRUE(taker_->take(5));

@@ -11,6 +11,7 @@
 
 #include "drivers/v4l2/v4l2.hpp"
 #include "tests/rigs/vivid.hpp"
+#include "tests/support/camera_options.hpp"
 
 namespace vergence::v4l2 {
 namespace {
@@ -50,7 +51,7 @@ class V4l2Loop : public ::testing::Test {
   static CameraConfiguration configuration(double rate_hz) {
     CameraConfiguration c{kWidth, kHeight, rate_hz, Duration::milliseconds(5)};
     c.trigger = CameraTrigger::free;
-    c.options["control_timestamp_source"] = "Start of Exposure";
+    test::give<v4l2::Options>(&c, "control_timestamp_source", "Start of Exposure");
     return c;
   }
   std::unique_ptr<CameraDevice> streaming(int k, const CameraConfiguration& c) {
@@ -101,7 +102,7 @@ TEST_F(V4l2Loop, everyImageShownArrivesWholeInOrderAndInItsOwnCamera) {
 TEST_F(V4l2Loop, thinnedCamerasSeeTheSameImagesAndEveryOne) {
   VividPlayer player({node(1), node(3)}, kInterval_ns, draw_number);
   CameraConfiguration c = configuration(10);
-  c.options["thin"] = "6";
+  test::give<v4l2::Options>(&c, "thin", "6");
   std::unique_ptr<CameraDevice> cameras[2] = {streaming(0, c), streaming(1, c)};
   // By the interval of the clock its exposure began in.
   std::map<std::int64_t, std::int64_t> seen[2];

@@ -16,6 +16,7 @@
 
 #include "drivers/v4l2/v4l2.hpp"
 #include "tests/rigs/vivid.hpp"
+#include "tests/support/camera_options.hpp"
 
 namespace vergence::v4l2 {
 namespace {
@@ -190,13 +191,19 @@ TEST_F(V4l2Rig, whatItCannotDoIsSaidWithWhatItOffers) {
   EXPECT_NE(said([](auto* c) { c->trigger = CameraTrigger::software; }).find("free"),
             std::string::npos)
       << camera->last_error();
-  EXPECT_NE(said([](auto* c) { c->options["control_nonsense"] = "1"; }).find("brightness"),
+  EXPECT_NE(said([](auto* c) {
+              test::give<v4l2::Options>(c, "control_nonsense", "1");
+            }).find("brightness"),
             std::string::npos)
       << camera->last_error();
-  EXPECT_NE(said([](auto* c) { c->options["control_brightness"] = "256"; }).find("0 to 255"),
+  EXPECT_NE(said([](auto* c) {
+              test::give<v4l2::Options>(c, "control_brightness", "256");
+            }).find("0 to 255"),
             std::string::npos)
       << camera->last_error();
-  EXPECT_NE(said([](auto* c) { c->options["subdevice"] = "/dev/v4l-subdev9"; }).find("v4l-subdev9"),
+  EXPECT_NE(said([](auto* c) {
+              test::give<v4l2::Options>(c, "subdevice", "/dev/v4l-subdev9");
+            }).find("v4l-subdev9"),
             std::string::npos);
   EXPECT_NE(said([](auto* c) { c->gain_db = 6; }).find("gain_step_db"), std::string::npos)
       << camera->last_error();
@@ -220,9 +227,9 @@ TEST_F(V4l2Rig, aRateItDoesNotHaveIsRoundedAndRemarked) {
 TEST_F(V4l2Rig, controlsAreSetByName) {
   auto camera = open(0);
   CameraConfiguration c = webcam();
-  c.options["control_brightness"] = "200";
-  c.options["control_test_pattern"] = "100% Black";
-  c.options["control_osd_text_mode"] = "None";
+  test::give<v4l2::Options>(&c, "control_brightness", "200");
+  test::give<v4l2::Options>(&c, "control_test_pattern", "100% Black");
+  test::give<v4l2::Options>(&c, "control_osd_text_mode", "None");
   ASSERT_EQ(camera->configure(c, nullptr), DeviceStatus::ok) << camera->last_error();
   ASSERT_EQ(camera->start(nullptr), DeviceStatus::ok);
   Frame frame;
@@ -239,7 +246,8 @@ TEST_F(V4l2Rig, stampsOfTheStartOfExposureAreTakenAsTheyAre) {
   Duration age[2];
   for (int source = 0; source < 2; ++source) {
     CameraConfiguration c = webcam();
-    c.options["control_timestamp_source"] = source == 0 ? "End of Frame" : "Start of Exposure";
+    test::give<v4l2::Options>(&c, "control_timestamp_source",
+                              source == 0 ? "End of Frame" : "Start of Exposure");
     auto camera = streaming(0, c);
     Frame frame;
     age[source] = Duration::seconds(1);
@@ -384,8 +392,8 @@ TEST_F(V4l2Rig, stopsAndStartsUnderLoadLeakNothing) {
 TEST_F(V4l2Rig, thinnedCamerasKeepFramesOfTheSameMoments) {
   CameraConfiguration c = webcam(), actual;
   c.rate_hz = 5;
-  c.options["thin"] = "5";
-  c.options["control_timestamp_source"] = "Start of Exposure";
+  test::give<v4l2::Options>(&c, "thin", "5");
+  test::give<v4l2::Options>(&c, "control_timestamp_source", "Start of Exposure");
   auto left = open(0), right = open(1);
   ASSERT_EQ(left->configure(c, &actual), DeviceStatus::ok);
   EXPECT_EQ(actual.rate_hz, 5);

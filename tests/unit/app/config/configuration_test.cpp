@@ -235,5 +235,72 @@ TEST(Configuration, ABracketOrCommaThatNothingOpenedIsRefused) {
       << refusal("\n,a: 1}");
 }
 
+TEST(CameraOptionKeys, AreTypedByTheDriversTable) {
+  const Configuration c = parse_configuration(R"(
+cameras:
+  - {driver: gige, options: {packet_size: 9000, ptp: yes, feature.BlackLevel: 3}}
+  - {options: packet_bytes=1024 embedded=no, driver: iidc-usb}
+  - {driver: v4l2, options: {thin: 3}}
+)",
+                                              "rig.yaml", {"cameras.2.options.thin=4"});
+  const auto& gige = std::get<gige::Options>(c.cameras[0].options);
+  EXPECT_EQ(gige.packet_size, 9000);
+  EXPECT_TRUE(gige.ptp);
+  EXPECT_EQ(gige.features.at(0).second, "3");
+  const auto& iidc = std::get<iidc::Options>(c.cameras[1].options);
+  EXPECT_EQ(iidc.packet_bytes, std::optional<std::size_t>(1024));
+  EXPECT_FALSE(iidc.embedded);
+  EXPECT_EQ(std::get<v4l2::Options>(c.cameras[2].options).thin, 4);
+  EXPECT_NE(canonical_text(c).find("cameras.1.options=embedded=off packet_bytes=1024\n"),
+            std::string::npos)
+      << canonical_text(c);
+}
+
+TEST(CameraOptionKeys, TheLastOneWinsWhicheverFormItHas) {
+  const std::string yaml = "cameras: [{driver: v4l2, options: {thin: 3, buffers: 8}}]\n";
+  const auto options = [&yaml](const std::vector<std::string>& set) {
+    return std::get<v4l2::Options>(parse_configuration(yaml, "rig.yaml", set).cameras[0].options);
+  };
+  EXPECT_EQ(options({"cameras.0.options.thin=5"}).thin, 5);
+  EXPECT_EQ(options({"cameras.0.options.thin=5"}).buffers, 8);
+  EXPECT_EQ(options({"cameras.0.options=thin=6"}).thin, 6);
+  EXPECT_EQ(options({"cameras.0.options=thin=6"}).buffers, v4l2::Options{}.buffers) << "all anew";
+}
+
+TEST(CameraOptionKeys, WhatCannotBeIsRefusedWithItsPlaceAndWhatThereIs) {
+  const auto said = [](const std::string& options) {
+    return refusal("cameras:\n  - {driver: gige, options: " + options + "}\n");
+  };
+  EXPECT_EQ(said("{buffers: 3}"),
+            "drive.yaml:2: cameras.0.options: buffers is \"3\"; it takes 4 to 48");
+  const std::string unknown = said("{paket_size: 9000}");
+  for (const char* part : {"drive.yaml:2", "there is no option \"paket_size\"",
+                           "did you mean \"packet_size\"?", "trigger_overlap"})
+    EXPECT_NE(unknown.find(part), std::string::npos) << unknown;
+  for (const char* bad :
+       {"{buffers: }", "{trigger_line: a b}", "{buffers: [4]}", "buffers", "buffers=", "=4"})
+    EXPECT_NE(said(bad).find("cameras.0.options"), std::string::npos) << said(bad);
+}
+
+TEST(CameraOptionKeys, AMockHasNone) {
+  const Configuration c =
+      parse_configuration("cameras: [{driver: mock, options: {thin: 3}}]\n", "rig.yaml", {});
+  EXPECT_TRUE(std::holds_alternative<std::monostate>(c.cameras[0].options));
+}
+
+TEST(ChosenWords, AreTypedAndRefusedWhereTheyStand) {
+  const Configuration c = parse_configuration(
+      "sync: {mode: master_strobe}\ntrigger: {pps: rising}\nins: {sync_in: off}\n"
+      "cameras: [{trigger: free}]\n",
+      "rig.yaml", {});
+  EXPECT_EQ(c.sync.mode, SyncMode::master_strobe);
+  EXPECT_EQ(c.trigger.pps, trigger_board::Edge::rising);
+  EXPECT_EQ(c.ins.sync_in, xsens::SyncIn::off);
+  EXPECT_EQ(c.cameras[0].trigger, CameraTrigger::free);
+  for (const char* yaml : {"sync: {mode: bored}", "trigger: {ins: up}", "ins: {sync_in: on}",
+                           "cameras: [{trigger: hard}]", "mock: {drive: lop}"})
+    EXPECT_THROW((void)parse_configuration(yaml, "rig.yaml", {}), InputError) << yaml;
+}
+
 }  // namespace
 }  // namespace vergence::app

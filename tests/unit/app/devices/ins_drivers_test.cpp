@@ -44,9 +44,6 @@ TEST(InsDrivers, whatCannotBeOpenedIsToldInOneSentence) {
                 .find("/dev/ttyNotThere cannot be opened: not found"),
             std::string::npos)
       << refusal(xsens_on("/dev/ttyNotThere", 100));
-  InsRequest word = xsens_on("/dev/ttyNotThere", 100);
-  word.sync_in = "upwards";
-  EXPECT_NE(refusal(word).find("ins.sync_in"), std::string::npos);
 }
 
 TEST(InsDrivers, readsARealTerminalInRealTime) {

@@ -150,7 +150,7 @@ TEST(DoctorNetwork, thePacketSocketNeedsACapabilityOnlyWhenAskedFor) {
   FakeMachine f;
   put_gige(&f);
   EXPECT_TRUE(f.of("packet_socket").empty());
-  f.needs.cameras[0].options["packet_socket"] = "on";
+  f.needs.cameras[0].options = gige::Options{.packet_socket = true};
   EXPECT_EQ(f.of("packet_socket")[0].state, FindingState::problem);
   EXPECT_TRUE(mends_with(f.of("packet_socket")[0], "setcap cap_net_raw+ep"));
   f.file("/proc/self/status", "CapEff:\t0000000000002000\n");
@@ -286,7 +286,7 @@ TEST(DoctorFirewire, theBudgetIsTheDriversOwn) {
   EXPECT_EQ(f.of("firewire_bus")[0].state, FindingState::ok)
       << "2 x 2572 units in the fixed mode are too many, Format 7 does with less";
   EXPECT_TRUE(contains(f.of("firewire_bus")[0].sentence, "Format 7"));
-  for (CameraNeed& n : f.needs.cameras) n.options["speed"] = "800";
+  for (CameraNeed& n : f.needs.cameras) n.options = iidc::Options{.speed = iidc::BusSpeed::s800};
   EXPECT_EQ(f.of("firewire_bus")[0].state, FindingState::ok);
   EXPECT_TRUE(contains(f.of("firewire_bus")[0].sentence, "2572 of the bus's 4915"));
   EXPECT_FALSE(contains(f.of("firewire_bus")[0].sentence, "Format 7"));
@@ -438,10 +438,6 @@ TEST(Needs, aConfigurationBecomesBytesAndRates) {
   EXPECT_EQ(n.cameras[0].bytes, 2 * 640 * 480);
   EXPECT_EQ(n.cameras[1].bytes, 640 * 480);
   EXPECT_EQ(n.cameras[1].serial, "B");
-  CameraNeed odd;
-  odd.options = {{"speed", "fast"}, {"packet_bytes", "-4"}};
-  EXPECT_EQ(odd.option("speed", 400), 400);
-  EXPECT_EQ(odd.option("packet_bytes", 7), 7);
 }
 
 }  // namespace

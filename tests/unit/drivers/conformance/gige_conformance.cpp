@@ -4,6 +4,7 @@
 #include <memory>
 #include <stdexcept>
 
+#include "tests/support/camera_options.hpp"
 #include "tests/support/gige_camera.hpp"
 #include "tests/unit/drivers/conformance/camera_conformance.hpp"
 
@@ -31,7 +32,7 @@ class GigeConformance final : public ConformanceRig {
     CameraConfiguration region = free;
     region.width = 96;
     region.offset_x = 32;
-    region.options["packet_size"] = "1000";
+    test::give<gige::Options>(&region, "packet_size", "1000");
     CameraConfiguration words = free;
     words.pixel_format = "Mono12";
     return {free, software, region, words, free};
@@ -40,7 +41,7 @@ class GigeConformance final : public ConformanceRig {
     std::vector<CameraConfiguration> all(4, possible().front());
     all[0].width = 4096;
     all[1].pixel_format = "RGB8";
-    all[2].options["packet_sise"] = "1500";
+    all[2].options = v4l2::Options{};
     all[3].gain_db = 90;
     return all;
   }

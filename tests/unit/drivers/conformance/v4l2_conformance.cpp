@@ -5,6 +5,7 @@
 
 #include "drivers/v4l2/v4l2.hpp"
 #include "tests/rigs/vivid.hpp"
+#include "tests/support/camera_options.hpp"
 #include "tests/unit/drivers/conformance/camera_conformance.hpp"
 
 namespace vergence::test {
@@ -21,19 +22,19 @@ class V4l2Rig final : public ConformanceRig {
     for (CameraConfiguration& c : all) {
       c = {320, 180, 50, Duration::milliseconds(5)};
       c.trigger = CameraTrigger::free;
-      c.options["control_timestamp_source"] = "Start of Exposure";
+      test::give<v4l2::Options>(&c, "control_timestamp_source", "Start of Exposure");
     }
     all[1].pixel_format = "YUYV";  // turned to grey, so the slots are a pool's
     all[2].width = 640;
     all[2].height = 360;
-    all[2].options["buffers"] = "8";
+    test::give<v4l2::Options>(&all[2], "buffers", "8");
     return all;
   }
   std::vector<CameraConfiguration> impossible() override {
     std::vector<CameraConfiguration> all(5, possible().front());
     all[0].width = 322;
     all[1].pixel_format = "Mono12Packed";
-    all[2].options["packet_size"] = "9000";
+    all[2].options = gige::Options{.packet_size = 9000};
     all[3].trigger = CameraTrigger::hardware;
     all[4].gain_db = 3;
     return all;

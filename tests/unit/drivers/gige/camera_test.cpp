@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "drivers/gige/detail/link.hpp"
+#include "tests/support/camera_options.hpp"
 #include "tests/unit/drivers/gige/gige_bench_rig.hpp"
 
 namespace vergence::test {
@@ -66,17 +67,17 @@ TEST(GigeCamera, whatItCannotDoIsRefusedWithWhatItOffers) {
   refused(
       [](auto* c) {
         c->trigger = CameraTrigger::hardware;
-        c->options["trigger_line"] = "Line7";
+        c->options = gige::Options{.line = "Line7"};
       },
       "Software, Line1, Line2");
   refused(
       [](auto* c) {
         c->trigger = CameraTrigger::hardware;
-        c->options["trigger_overlap"] = "previous_frame";
+        c->options = gige::Options{.overlap = gige::TriggerOverlap::previous_frame};
       },
       "Off, ReadOut");
-  refused([](auto* c) { c->options["feature.Gamma"] = "2"; }, "Gamma");
-  refused([](auto* c) { c->options["packetsize"] = "2"; }, "packet_size");
+  refused([](auto* c) { c->options = gige::Options{.features = {{"Gamma", "2"}}}; }, "Gamma");
+  refused([](auto* c) { c->options = gige::Options{.packet_size = 2}; }, "packet_size");
   // What was configured before is in force again.
   b.start();
   EXPECT_EQ(b.take(3).size(), 3U);
@@ -87,11 +88,11 @@ TEST(GigeCamera, hardwareTriggerSetsLineEdgeOverlapAndDelay) {
   GigeBench b;
   CameraConfiguration c = b.wish();
   c.trigger = CameraTrigger::hardware;
-  c.options = {{"trigger_line", "Line2"},
-               {"trigger_edge", "falling"},
-               {"trigger_overlap", "readout"},
-               {"trigger_delay_us", "250"},
-               {"exposure_line", "Line2"}};
+  c.options = gige::Options{.line = "Line2",
+                            .edge = gige::TriggerEdge::falling,
+                            .overlap = gige::TriggerOverlap::readout,
+                            .trigger_delay_us = 250,
+                            .exposure_line = "Line2"};
   b.configure(c);
   EXPECT_EQ(b.reg(reg::trigger_mode), 1U);
   EXPECT_EQ(b.reg(reg::trigger_source), 2U);
@@ -169,7 +170,7 @@ TEST(GigeCamera, withoutAClockItSaysSoAndStampsByArrival) {
 TEST(GigeCamera, ptpIsSwitchedOnAndItsStateIsTold) {
   GigeBench b;
   CameraConfiguration c = b.wish();
-  c.options["ptp"] = "on";
+  test::give<gige::Options>(&c, "ptp", "on");
   b.configure(c);
   EXPECT_EQ(b.reg(reg::ptp_enable), 1U);
   EXPECT_EQ(b.camera->remark().find("PTP"), std::string::npos)
@@ -186,20 +187,20 @@ TEST(GigeCamera, packetSizeAndDelayAreComputedForTheLink) {
   GigeBench b;
   CameraConfiguration c = b.wish();
   c.sharing = 2;
-  c.options["link_mbps"] = "1000";
-  c.options["packet_size"] = "1500";
+  test::give<gige::Options>(&c, "link_mbps", "1000");
+  test::give<gige::Options>(&c, "packet_size", "1500");
   b.configure(c);
   EXPECT_EQ(b.reg(0xD04) & 0xFFFFU, 1500U);
   // 13.534 µs of 125 MHz.
   EXPECT_EQ(b.reg(0xD08), 1692U);
-  c.options["link_mbps"] = "50";
+  test::give<gige::Options>(&c, "link_mbps", "50");
   EXPECT_EQ(b.camera->configure(c, nullptr), DeviceStatus::unsupported);
   EXPECT_NE(b.camera->last_error().find(
                 "2 cameras of 320 x 240 Mono8 at 50 Hz do not fit on lo of 50 Mbit/s"),
             std::string::npos)
       << b.camera->last_error();
-  c.options["packet_size"] = "20000";
-  c.options["link_mbps"] = "1000";
+  test::give<gige::Options>(&c, "packet_size", "20000");
+  test::give<gige::Options>(&c, "link_mbps", "1000");
   b.configure(c);
   EXPECT_NE(b.camera->remark().find("packets of 16000 bytes instead of 20000"), std::string::npos)
       << b.camera->remark();
@@ -238,7 +239,7 @@ TEST(GigeCamera, theReceiveBufferIsThereBeforeTheFirstPacket) {
   GigeBench b;
   for (const int kib : {64, 150}) {  // below what any system allows
     CameraConfiguration c = b.wish();
-    c.options["socket_buffer_kb"] = std::to_string(kib);
+    test::give<gige::Options>(&c, "socket_buffer_kb", std::to_string(kib));
     b.configure(c);
     b.start();
     const int socket = gige::find_udp_socket(static_cast<std::uint16_t>(b.reg(0xD00)));

@@ -1,3 +1,4 @@
+#include "tests/support/camera_options.hpp"
 #include "tests/unit/drivers/gige/gige_bench_rig.hpp"
 
 namespace vergence::test {
@@ -90,7 +91,7 @@ TEST(GigeChunkCamera, aChangeWhileItStreamsIsSeenInTheFramesThatHaveIt) {
 TEST(GigeChunkCamera, stampsOfTheEndGoBackByTheExposureThatWas) {
   GigeBench b(with_chunks());
   CameraConfiguration c = b.wish();
-  c.options["stamp_at"] = "end";
+  test::give<gige::Options>(&c, "stamp_at", "end");
   b.configure(c);
   b.start();
   const auto frames = b.take(10);
@@ -113,7 +114,7 @@ TEST(GigeChunkCamera, withoutThemOrSwitchedOffTheExposureIsReckoned) {
     CameraConfiguration c = b.wish();
     if (off) {
       b.simulator->write(reg::chunk_mode, 1);  // as another program left it
-      c.options["chunks"] = "off";
+      test::give<gige::Options>(&c, "chunks", "off");
     }
     b.configure(c);
     EXPECT_EQ(b.reg(reg::chunk_mode), 0U);

@@ -5,6 +5,7 @@
 
 #include "drivers/gige/detail/glib.hpp"
 #include "drivers/gige/gige.hpp"
+#include "tests/support/camera_options.hpp"
 
 namespace vergence {
 namespace {
@@ -20,7 +21,7 @@ TEST(GigeFakeCamera, isConfiguredAndStreams) {
   const auto camera = driver->open("127.0.0.1", &status);
   ASSERT_NE(camera, nullptr) << to_string(status) << driver->last_error();
   CameraConfiguration c{256, 200, 40, Duration::milliseconds(3), 0, CameraTrigger::free};
-  c.options["packet_size"] = "1400";
+  test::give<gige::Options>(&c, "packet_size", "1400");
   ASSERT_EQ(camera->configure(c, nullptr), DeviceStatus::ok) << camera->last_error();
   ASSERT_EQ(camera->start(nullptr), DeviceStatus::ok) << camera->last_error();
   Frame frame;

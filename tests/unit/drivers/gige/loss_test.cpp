@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <set>
 
+#include "tests/support/camera_options.hpp"
 #include "tests/unit/drivers/gige/gige_bench_rig.hpp"
 
 namespace vergence::test {
@@ -21,8 +22,8 @@ void expect_equal_accounts(const GigeBench& b, std::size_t taken) {
 
 CameraConfiguration many_packets(const GigeBench& b, const char* resend) {
   CameraConfiguration c = b.wish();
-  c.options["packet_size"] = "600";  // 137 packets a frame
-  c.options["resend"] = resend;
+  test::give<gige::Options>(&c, "packet_size", "600");  // 137 packets a frame
+  test::give<gige::Options>(&c, "resend", resend);
   return c;
 }
 

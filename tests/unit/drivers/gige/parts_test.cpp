@@ -2,9 +2,6 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
-#include <fstream>
-#include <map>
-#include <set>
 #include <string>
 #include <vector>
 
@@ -12,7 +9,6 @@
 #include "drivers/gige/detail/grey.hpp"
 #include "drivers/gige/detail/handover.hpp"
 #include "drivers/gige/detail/link.hpp"
-#include "drivers/gige/detail/options.hpp"
 #include "drivers/gige/gige.hpp"
 
 namespace vergence::gige {
@@ -109,67 +105,6 @@ TEST(GigeLink, aReceiveBufferIsReadBack) {
   EXPECT_EQ(set_receive_buffer(fd, 100'000), 100'000);
   ::close(fd);
   EXPECT_EQ(find_udp_socket(1), -1);
-}
-
-TEST(GigeOptions, everyRowOfTheTableIsUnderstood) {
-  const std::map<std::string, std::string> all{{"packet_size", "1500"},
-                                               {"packet_delay_us", "12.5"},
-                                               {"link_mbps", "1000"},
-                                               {"link_cameras", "2"},
-                                               {"packet_socket", "on"},
-                                               {"resend", "off"},
-                                               {"frame_retention_ms", "20"},
-                                               {"socket_buffer_kb", "8192"},
-                                               {"buffers", "16"},
-                                               {"trigger_line", "Line2"},
-                                               {"trigger_edge", "falling"},
-                                               {"trigger_overlap", "readout"},
-                                               {"trigger_delay_us", "10"},
-                                               {"exposure_mode", "trigger_width"},
-                                               {"exposure_line", "Line3"},
-                                               {"stamp_at", "end"},
-                                               {"ptp", "on"},
-                                               {"chunks", "off"},
-                                               {"heartbeat_ms", "5000"},
-                                               {"feature.BlackLevel", "3"}};
-  EXPECT_EQ(all.size(), option_rows().size());
-  Options o;
-  EXPECT_EQ(parse_options(all, &o), "");
-  EXPECT_EQ(o.packet_size, 1500);
-  EXPECT_EQ(o.packet_delay, Duration::nanoseconds(12'500));
-  EXPECT_EQ(o.link_speed, kGigabit);
-  EXPECT_EQ(o.resend, Options::Resend::off);
-  EXPECT_EQ(o.socket_buffer, 8192 * 1024);
-  EXPECT_TRUE(o.packet_socket && o.ptp && o.stamp_at_end && !o.chunks);
-  ASSERT_EQ(o.features.size(), 1U);
-  EXPECT_EQ(o.features[0].first, "BlackLevel");
-}
-
-TEST(GigeOptions, whatIsNotUnderstoodIsNamedWithWhatThereIs) {
-  Options o;
-  EXPECT_NE(parse_options({{"packet_sise", "1500"}}, &o).find("packet_size"), std::string::npos);
-  for (const auto& [name, value] : std::map<std::string, std::string>{{"packet_size", "ten"},
-                                                                      {"packet_delay_us", "nan"},
-                                                                      {"buffers", "3"},
-                                                                      {"heartbeat_ms", "1e9"},
-                                                                      {"link_cameras", "1.5"},
-                                                                      {"resend", "perhaps"},
-                                                                      {"chunks", "on"},
-                                                                      {"trigger_edge", ""},
-                                                                      {"feature.", "1"}})
-    EXPECT_NE(parse_options({{name, value}}, &o).find(name), std::string::npos) << name;
-}
-
-TEST(GigeOptions, thePageHasEveryRowAsItStands) {
-  std::ifstream page(std::string(VERGENCE_SOURCE_DIR) + "/docs/cameras/gige.md");
-  std::set<std::string> lines;
-  for (std::string line; std::getline(page, line);) lines.insert(line);
-  for (const OptionRow& r : option_rows()) {
-    const std::string fallback = *r.fallback == '\0' ? "–" : r.fallback;
-    const std::string line = std::string("| `") + r.name + "` | " + r.values + " | " + fallback +
-                             " | " + r.meaning + " |";
-    EXPECT_TRUE(lines.contains(line)) << line;
-  }
 }
 
 TEST(GigeGrey, theCheapestFormatIsTaken) {

@@ -2,6 +2,7 @@
 #include <sys/syscall.h>
 #include <unistd.h>
 
+#include "tests/support/camera_options.hpp"
 #include "tests/unit/drivers/gige/gige_bench_rig.hpp"
 
 namespace vergence::test {
@@ -146,7 +147,7 @@ void allow_raw_sockets(bool allowed) {
 TEST(GigeTrouble, thePacketSocketNeedsPermission) {
   GigeBench b;
   CameraConfiguration c = b.wish();
-  c.options["packet_socket"] = "on";
+  test::give<gige::Options>(&c, "packet_socket", "on");
   b.configure(c);
   allow_raw_sockets(false);
   EXPECT_EQ(b.camera->start(nullptr), DeviceStatus::no_permission);

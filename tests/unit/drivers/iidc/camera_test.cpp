@@ -2,6 +2,7 @@
 
 #include <vector>
 
+#include "tests/support/camera_options.hpp"
 #include "tests/unit/drivers/iidc/camera_under_test.hpp"
 
 namespace vergence::test {
@@ -74,7 +75,7 @@ TEST(IidcCamera, LostExposuresAreCountedWhenALaterOneComes) {
 TEST(IidcCamera, SlotsComeBackInAnyOrderAndTheNewestIsDroppedWithoutOne) {
   CameraUnderTest c;
   CameraConfiguration requested = CameraUnderTest::usual();
-  requested.options["buffers"] = "4";
+  test::give<iidc::Options>(&requested, "buffers", "4");
   c.configure(requested);
   ASSERT_EQ(c.camera->start(nullptr), DeviceStatus::ok);
   c.bus->expose(7);
@@ -120,7 +121,7 @@ TEST(IidcCamera, ALostPacketIsFoundByTheNextFramesStampInTheImage) {
   for (const std::size_t lost : {1U, 3U, 100U}) {
     CameraUnderTest c(true);
     CameraConfiguration requested = CameraUnderTest::usual();
-    requested.options["packet_bytes"] = "1024";
+    test::give<iidc::Options>(&requested, "packet_bytes", "1024");
     c.configure(requested);
     ASSERT_EQ(c.camera->start(nullptr), DeviceStatus::ok);
     c.bus->expose(1);
@@ -158,7 +159,7 @@ TEST(IidcCamera, TheSameOptionSaysWhichInstantIsStamped) {
   for (const char* at : {"start", "middle", "end"}) {
     CameraUnderTest c;
     CameraConfiguration requested = CameraUnderTest::usual();
-    requested.options["stamp_at"] = at;
+    test::give<iidc::Options>(&requested, "stamp_at", at);
     c.configure(requested);
     ASSERT_EQ(c.camera->start(nullptr), DeviceStatus::ok);
     c.bus->expose(1);
@@ -172,7 +173,7 @@ TEST(IidcCamera, SixteenBitPixelsBecomeGreyInSlotsOfTheirOwn) {
   CameraUnderTest c;
   CameraConfiguration requested = CameraUnderTest::usual();
   requested.pixel_format = "Mono16";
-  requested.options["buffers"] = "5";
+  test::give<iidc::Options>(&requested, "buffers", "5");
   c.configure(requested);
   ASSERT_EQ(c.camera->start(nullptr), DeviceStatus::ok);
   c.bus->expose(7);
@@ -227,7 +228,7 @@ TEST(IidcCamera, TheSoftwareTriggerFiresOnceACall) {
 TEST(IidcCamera, WithoutEmbeddedInformationFramesAreCountedAsTheyCome) {
   CameraUnderTest c;
   CameraConfiguration requested = CameraUnderTest::usual();
-  requested.options["embedded"] = "no";
+  test::give<iidc::Options>(&requested, "embedded", "no");
   c.configure(requested);
   ASSERT_EQ(c.camera->start(nullptr), DeviceStatus::ok);
   c.bus->expose(3, Duration::milliseconds(100), {1});

@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include "tests/support/camera_options.hpp"
 #include "tests/unit/drivers/iidc/camera_under_test.hpp"
 
 namespace vergence::test {
@@ -76,7 +77,7 @@ TEST(IidcConfigure, APacketIsTheCamerasShareOfTheBus) {
               33e6);
   }
   CameraConfiguration requested = CameraUnderTest::usual();
-  requested.options["packet_bytes"] = "1024";
+  test::give<iidc::Options>(&requested, "packet_bytes", "1024");
   bus.configure(requested);
   EXPECT_EQ(bus.bus->model().f7_packet, 1024U);
 }
@@ -131,7 +132,7 @@ TEST(IidcConfigure, TheEmbeddedStampAndCounterAreAskedFor) {
   EXPECT_EQ(c.camera->plan().info.size(), 8U);
   EXPECT_TRUE(c.camera->remark().empty());
   CameraConfiguration requested = CameraUnderTest::usual();
-  requested.options["embedded"] = "no";
+  test::give<iidc::Options>(&requested, "embedded", "no");
   c.configure(requested);
   EXPECT_EQ(c.bus->model().frame_info, 0U);
   expect_says(c.camera->remark(), {"embeds no counter"});
@@ -148,10 +149,13 @@ TEST(IidcConfigure, StrobeAndTriggerOptionsReachTheirRegisters) {
   CameraUnderTest c;
   CameraConfiguration requested = CameraUnderTest::usual();
   requested.trigger = CameraTrigger::hardware;
-  requested.options = {
-      {"strobe_pin", "2"},     {"strobe_delay_us", "1000"}, {"strobe_duration_us", "2000"},
-      {"strobe_level", "low"}, {"trigger_edge", "falling"}, {"trigger_source", "1"},
-      {"trigger_mode", "0"}};
+  requested.options = Options{.trigger_mode = 0,
+                              .trigger_source = 1,
+                              .trigger_rising = false,
+                              .strobe_pin = 2,
+                              .strobe_high = false,
+                              .strobe_delay = Duration::milliseconds(1),
+                              .strobe_duration = Duration::milliseconds(2)};
   c.configure(requested);
   const StrobeControl s = StrobeControl::of(c.bus->model().strobe[2]);
   EXPECT_TRUE(s.on);
@@ -171,11 +175,11 @@ TEST(IidcConfigure, TheBusSpeedIsTheCamerasBest) {
   beta.configure();
   EXPECT_EQ(beta.bus->model().iso_speed, 3U);
   CameraConfiguration requested = CameraUnderTest::usual();
-  requested.options["speed"] = "800";
+  test::give<iidc::Options>(&requested, "speed", "800");
   std::string said;
   EXPECT_EQ(legacy.refuse(requested, &said), DeviceStatus::unsupported);
   expect_says(said, {"speed", "S400"});
-  requested.options["speed"] = "400";
+  test::give<iidc::Options>(&requested, "speed", "400");
   beta.configure(requested);
   EXPECT_EQ(beta.bus->model().iso_speed, 2U);
 }
@@ -193,7 +197,7 @@ TEST(IidcConfigure, APacketThatLeavesNoRoomForTheOthersIsTakenOnlyWhereThereIsNo
   EXPECT_EQ(c.bus->command(reg::kVideoFormat), 7U << 29U);
   EXPECT_LE(2 * bandwidth_units(c.bus->shape().packet_bytes, BusSpeed::s800), kBandwidthUnits);
   EXPECT_NEAR(c.actual.rate_hz, 30, 0.3);
-  requested.options["format7"] = "no";
+  test::give<iidc::Options>(&requested, "format7", "no");
   c.configure(requested);
   EXPECT_EQ(c.bus->shape().packet_bytes, 5120U);
 }
@@ -220,19 +224,21 @@ TEST(IidcConfigure, WhatCannotBeSaysWhatTheCameraOffers) {
             DeviceStatus::unsupported);
   expect_says(said, {"RGB8", "Mono8 Mono16 Raw8"});
   EXPECT_EQ(c.refuse(with([](auto& w) {
-                       w.trigger = CameraTrigger::hardware, w.options["trigger_source"] = "3";
+                       w.trigger = CameraTrigger::hardware,
+                       w.options = Options{.trigger_source = 3};
                      }),
                      &said),
             DeviceStatus::unsupported);
   expect_says(said, {"input 3", "inputs 0 1", "software", "modes 0 14 15"});
-  EXPECT_EQ(c.refuse(with([](auto& w) { w.options["shutter_mode"] = "x"; }), &said),
+  EXPECT_EQ(c.refuse(with([](auto& w) { w.options = v4l2::Options{}; }), &said),
             DeviceStatus::unsupported);
-  expect_says(said, {"shutter_mode", "packet_bytes", "trigger_mode"});
-  EXPECT_EQ(c.refuse(with([](auto& w) { w.options["packet_bytes"] = "1022"; }), &said),
-            DeviceStatus::bad_configuration);
-  expect_says(said, {"1022", "multiple of 4"});
+  expect_says(said, {"another kind of camera", "IIDC"});
+  EXPECT_EQ(c.refuse(with([](auto& w) { w.options = Options{.packet_bytes = 1022}; }), &said),
+            DeviceStatus::unsupported);
+  expect_says(said, {"packet_bytes", "steps of 4"});
   EXPECT_EQ(
-      c.refuse(with([](auto& w) { w.options["packet_bytes"] = "256", w.rate_hz = 25; }), &said),
+      c.refuse(with([](auto& w) { w.options = Options{.packet_bytes = 256}, w.rate_hz = 25; }),
+               &said),
       DeviceStatus::unsupported);
   expect_says(said, {"packets of 256 bytes"});
   EXPECT_EQ(c.refuse(with([](auto& w) { w.exposure = Duration::milliseconds(150); }), &said),
@@ -255,7 +261,7 @@ TEST(IidcConfigure, ARefusedRequestWritesNothing) {
 TEST(IidcConfigure, WithoutFormat7ARateBetweenTheFixedOnesBecomesTheNext) {
   CameraUnderTest c;
   CameraConfiguration requested = CameraUnderTest::usual();
-  requested.options["format7"] = "no";
+  test::give<iidc::Options>(&requested, "format7", "no");
   c.configure(requested);
   EXPECT_EQ(c.actual.rate_hz, 15);
   EXPECT_EQ(c.bus->command(reg::kVideoFormat), 0U);

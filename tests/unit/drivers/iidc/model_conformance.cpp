@@ -1,6 +1,7 @@
 #include <cstring>
 
 #include "drivers/iidc/iidc_camera.hpp"
+#include "tests/support/camera_options.hpp"
 #include "tests/unit/drivers/conformance/camera_conformance.hpp"
 #include "tests/unit/drivers/iidc/fake_bus.hpp"
 
@@ -22,7 +23,7 @@ class ModelConformance final : public ConformanceRig {
   CameraDevice& camera() override { return *camera_; }
   std::vector<CameraConfiguration> possible() override {
     CameraConfiguration free{160, 120, 50, Duration::milliseconds(4), 0, CameraTrigger::free};
-    free.options["buffers"] = "8";
+    test::give<iidc::Options>(&free, "buffers", "8");
     CameraConfiguration pulsed = free;
     pulsed.trigger = CameraTrigger::hardware;
     CameraConfiguration asked = free;
@@ -40,8 +41,8 @@ class ModelConformance final : public ConformanceRig {
     all[2].exposure = Duration::microseconds(2);
     all[3].gain_db = 60;
     all[4].pixel_format = "Mono9";
-    all[5].options["zoom"] = "2";
-    all[6].options["trigger_source"] = "many";
+    all[5].options = v4l2::Options{};
+    all[6].options = iidc::Options{.trigger_source = 4};
     return all;
   }
   std::vector<ExposureSetting> exposures() override {

@@ -1,0 +1,17 @@
+#pragma once
+#include <string>
+
+#include "drivers/device.hpp"
+
+/// What a user is told of a device that does not open or does not do what is asked.
+namespace vergence::app {
+
+/// Why a device on a serial port cannot be opened. `who`: `ins: the xsens INS on /dev/ttyUSB0`;
+/// `error`: the driver's sentence, may be empty.
+[[nodiscard]] std::string serial_open_error(const std::string& who, DeviceStatus status,
+                                            const std::string& error);
+
+/// Throws InputError unless `ok`: the device's title, and its sentence or the status.
+void require_configured(const std::string& title, DeviceStatus status, const std::string& error);
+
+}  // namespace vergence::app

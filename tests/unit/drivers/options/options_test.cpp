@@ -1,0 +1,195 @@
+#include "drivers/options/options.hpp"
+
+#include <fstream>
+#include <map>
+#include <set>
+#include <string>
+
+#include <gtest/gtest.h>
+
+namespace vergence {
+namespace {
+
+using Texts = std::map<std::string, std::string>;
+
+/// A value of every option that is not what it begins with.
+const std::map<std::string, Texts>& other_values() {
+  static const std::map<std::string, Texts> all{{"gige",
+                                                 {{"packet_size", "1500"},
+                                                  {"packet_delay_us", "12.5"},
+                                                  {"link_mbps", "1000"},
+                                                  {"link_cameras", "2"},
+                                                  {"packet_socket", "on"},
+                                                  {"resend", "off"},
+                                                  {"frame_retention_ms", "20"},
+                                                  {"socket_buffer_kb", "8192"},
+                                                  {"buffers", "16"},
+                                                  {"trigger_line", "Line2"},
+                                                  {"trigger_edge", "falling"},
+                                                  {"trigger_overlap", "readout"},
+                                                  {"trigger_delay_us", "10"},
+                                                  {"exposure_mode", "trigger_width"},
+                                                  {"exposure_line", "Line3"},
+                                                  {"stamp_at", "end"},
+                                                  {"ptp", "on"},
+                                                  {"chunks", "off"},
+                                                  {"heartbeat_ms", "5000"},
+                                                  {"feature.BlackLevel", "3"}}},
+                                                {"iidc-usb",
+                                                 {{"trigger_source", "3"},
+                                                  {"trigger_edge", "falling"},
+                                                  {"trigger_mode", "14"},
+                                                  {"strobe_pin", "0"},
+                                                  {"strobe_level", "low"},
+                                                  {"strobe_delay_us", "1000"},
+                                                  {"strobe_duration_us", "3998"},
+                                                  {"format7", "off"},
+                                                  {"packet_bytes", "1024"},
+                                                  {"speed", "800"},
+                                                  {"buffers", "32"},
+                                                  {"embedded", "off"},
+                                                  {"stamp_at", "middle"}}},
+                                                {"v4l2",
+                                                 {{"readout_us", "12500.5"},
+                                                  {"thin", "4"},
+                                                  {"buffers", "8"},
+                                                  {"shift", "2"},
+                                                  {"subdevice", "/dev/v4l-subdev3"},
+                                                  {"trigger_control", "trigger_mode"},
+                                                  {"trigger_value", "2"},
+                                                  {"gain_step_db", "0.3"},
+                                                  {"control_test_pattern", "black"}}}};
+  return all;
+}
+
+CameraOptions begin_of(const std::string& driver) { return default_options(driver).value(); }
+
+TEST(CameraOptions, everyRowIsReadAndWrittenAgain) {
+  for (const auto& [driver, texts] : other_values()) {
+    CameraOptions all = begin_of(driver);
+    EXPECT_EQ(texts.size(), option_rows(all).size()) << driver;
+    EXPECT_EQ(options_text(all), "") << driver;
+    std::string expected;
+    for (const auto& [name, value] : texts) {
+      CameraOptions one = begin_of(driver);
+      ASSERT_TRUE(set_option(name, value, &one)) << name;
+      EXPECT_EQ(options_text(one), name + "=" + value);
+      ASSERT_TRUE(set_option(name, value, &all));
+      ASSERT_TRUE(set_option(name, value, &all)) << "twice is once";
+      expected += (expected.empty() ? "" : " ") + name + "=" + value;
+    }
+    EXPECT_EQ(options_text(all), expected) << driver;
+  }
+}
+
+TEST(CameraOptions, areOfTheirOwnTypes) {
+  CameraOptions gige = begin_of("gige"), iidc = begin_of("iidc-1394"), v4l2 = begin_of("v4l2");
+  for (const auto& [name, value] : other_values().at("gige"))
+    ASSERT_TRUE(set_option(name, value, &gige));
+  for (const auto& [name, value] : other_values().at("iidc-usb"))
+    ASSERT_TRUE(set_option(name, value, &iidc));
+  for (const auto& [name, value] : other_values().at("v4l2"))
+    ASSERT_TRUE(set_option(name, value, &v4l2));
+  const auto& g = std::get<gige::Options>(gige);
+  EXPECT_EQ(g.packet_size, 1500);
+  EXPECT_EQ(g.packet_delay, Duration::nanoseconds(12'500));
+  EXPECT_EQ(g.frame_retention, Duration::milliseconds(20));
+  EXPECT_EQ(g.resend, gige::Resend::off);
+  EXPECT_TRUE(g.packet_socket && g.ptp && g.stamp_at_end && !g.chunks);
+  ASSERT_EQ(g.features.size(), 1U);
+  EXPECT_EQ(g.features[0].first, "BlackLevel");
+  const auto& i = std::get<iidc::Options>(iidc);
+  EXPECT_EQ(i.format7, std::optional(false));
+  EXPECT_EQ(i.packet_bytes, std::optional<std::size_t>(1024));
+  EXPECT_EQ(i.speed, std::optional(iidc::BusSpeed::s800));
+  EXPECT_EQ(i.strobe_delay, Duration::milliseconds(1));
+  const auto& v = std::get<v4l2::Options>(v4l2);
+  EXPECT_EQ(v.readout, Duration::nanoseconds(12'500'500));
+  EXPECT_EQ(v.gain_step_db, 0.3);
+  EXPECT_EQ(v.controls[0].first, "test_pattern");
+}
+
+TEST(CameraOptions, aValueThatCannotBeChangesNothing) {
+  const std::map<std::string, std::vector<std::pair<std::string, std::string>>> wrong{
+      {"gige",
+       {{"packet_size", "ten"},
+        {"packet_size", "575"},
+        {"packet_delay_us", "nan"},
+        {"buffers", "3"},
+        {"heartbeat_ms", "1e9"},
+        {"link_cameras", "1.5"},
+        {"resend", "perhaps"},
+        {"chunks", "on"},
+        {"trigger_edge", ""},
+        {"trigger_line", ""},
+        {"feature.", "1"}}},
+      {"iidc-usb",
+       {{"packet_bytes", "1022"},
+        {"buffers", "33"},
+        {"trigger_mode", "1"},
+        {"trigger_source", "-1"},
+        {"speed", "fast"},
+        {"embedded", "2"}}},
+      {"v4l2",
+       {{"readout_us", "-1"},
+        {"thin", "0"},
+        {"buffers", "8.5"},
+        {"shift", ""},
+        {"gain_step_db", "0"},
+        {"packet_size", "9000"}}}};
+  for (const auto& [driver, pairs] : wrong)
+    for (const auto& [name, value] : pairs) {
+      CameraOptions o = begin_of(driver);
+      EXPECT_FALSE(set_option(name, value, &o)) << name << "=" << value;
+      EXPECT_EQ(options_text(o), "") << name << "=" << value;
+    }
+  CameraOptions none;
+  EXPECT_FALSE(set_option("buffers", "8", &none));
+  EXPECT_FALSE(default_options("mock").has_value());
+}
+
+TEST(CameraOptions, switchesTakeWhatPeopleWrite) {
+  for (const auto& [text, on] : {std::pair{"on", true},
+                                 {"yes", true},
+                                 {"true", true},
+                                 {"off", false},
+                                 {"no", false},
+                                 {"false", false}}) {
+    CameraOptions o = iidc::Options{};
+    ASSERT_TRUE(set_option("format7", text, &o));
+    EXPECT_EQ(std::get<iidc::Options>(o).format7, std::optional(on)) << text;
+  }
+}
+
+TEST(CameraOptions, aDriverTakesItsOwnKindAndWhatIsPossible) {
+  gige::Options taken;
+  taken.buffers = 7;
+  std::string error;
+  EXPECT_FALSE(take_options(v4l2::Options{}, gige::option_table(), "GigE cameras", &taken, &error));
+  EXPECT_NE(error.find("GigE cameras"), std::string::npos) << error;
+  EXPECT_FALSE(take_options(gige::Options{.buffers = 3}, gige::option_table(), "", &taken, &error));
+  EXPECT_NE(error.find("buffers takes 4 to 48"), std::string::npos) << error;
+  EXPECT_EQ(taken.buffers, 7) << "a refusal changes nothing";
+  EXPECT_TRUE(take_options(gige::Options{.buffers = 9}, gige::option_table(), "", &taken, &error));
+  EXPECT_EQ(taken.buffers, 9);
+  EXPECT_TRUE(take_options(std::monostate{}, gige::option_table(), "", &taken, &error));
+  EXPECT_EQ(taken.buffers, gige::Options{}.buffers);
+}
+
+TEST(CameraOptions, thePagesHaveEveryRowAsItStands) {
+  std::set<std::string> lines;
+  for (const char* page : {"gige.md", "iidc_usb.md", "iidc_1394.md", "v4l2.md"}) {
+    std::ifstream file(std::string(VERGENCE_SOURCE_DIR) + "/docs/cameras/" + page);
+    for (std::string line; std::getline(file, line);) lines.insert(line);
+  }
+  for (const char* driver : {"gige", "iidc-usb", "v4l2"})
+    for (const OptionRow& r : option_rows(begin_of(driver))) {
+      const std::string fallback = r.fallback.empty() ? "–" : r.fallback;
+      const std::string line =
+          "| `" + r.name + "` | " + r.values + " | " + fallback + " | " + r.meaning + " |";
+      EXPECT_TRUE(lines.contains(line)) << line;
+    }
+}
+
+}  // namespace
+}  // namespace vergence
