@@ -53,6 +53,10 @@ bool LineFile::flush() {
   return error == 0;
 }
 
+void LineFile::write_back() noexcept {
+  (void)::sync_file_range(fd_, 0, 0, SYNC_FILE_RANGE_WRITE);  // a pipe refuses: nothing is lost
+}
+
 bool LineFile::reopen(bool* fresh) {
   *fresh = false;
   (void)flush();

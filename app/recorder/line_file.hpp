@@ -31,6 +31,9 @@ class LineFile {
   bool append(std::string_view line);
   /// Hands the system what is waiting. False: not all was taken; fault() says why.
   bool flush();
+  /// Asks the system to begin with writing what it was handed to the disk, and does not wait. By
+  /// itself it begins after 30 s (vm.dirty_expire_centisecs), and so much a power cut would cost.
+  void write_back() noexcept;
   /// Hands over what is waiting and opens the file anew by its name: what was moved away stays as
   /// it is, and a new one begins. *fresh: it is empty. False: it cannot be opened, the old one
   /// stays in use; fault() says why.

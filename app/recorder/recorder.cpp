@@ -158,8 +158,15 @@ void Recorder::post(const InsRecord& reading) noexcept {
 void Recorder::work() {
   (void)pthread_setname_np(pthread_self(), "vergence-record");
   using Clock = std::chrono::steady_clock;
-  constexpr std::chrono::seconds kFlushAtLeast{1};
-  auto flushed = Clock::now();
+  constexpr std::chrono::seconds kFlushAtLeast{1}, kWriteBack{2};
+  auto flushed = Clock::now(), written_back = flushed;
+  const auto hand_over = [&] {
+    flush();
+    flushed = Clock::now();
+    if (flushed - written_back < kWriteBack) return;
+    for (LineFile* file : files_->all) file->write_back();
+    written_back = flushed;
+  };
   flush();  // the heads of the tables
   AllocationGuard::seal_thread();
   for (;;) {
@@ -173,13 +180,11 @@ void Recorder::work() {
     } else if (stopping) {
       break;
     } else {
-      flush();
-      flushed = Clock::now();
+      hand_over();
       filled_.wait(seen);
       continue;
     }
-    flush();
-    flushed = Clock::now();
+    hand_over();
   }
 }
 

@@ -27,11 +27,11 @@ struct OptionRow {
 /// of the documentation.
 ///
 ///     static const auto table = OptionTable<Options>()
-///         .number("packet_delay_us", &Options::packet_delay, {0, 10000}, "µs", "computed", "Pause
-///         …") .choice("stamp_at", &Options::stamp, {{"start", Stamp::start}, {"end", Stamp::end}},
-///         "…");
+///         .number("delay_us", &Options::delay, {0, 10000}, "µs", "computed", "Pause …")
+///         .choice("stamp_at", &Options::stamp, {{"start", At::start}, {"end", At::end}}, "start",
+///                 "Which instant …");
 ///     Options o;
-///     table.set("packet_delay_us", "12.5", &o);  // o.packet_delay is 12.5 µs
+///     table.set("delay_us", "12.5", &o);  // o.delay is 12.5 µs
 ///
 /// Threads  A table that is made is only read. Memory: ordinary.
 template <class Options>

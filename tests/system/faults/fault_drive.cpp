@@ -93,6 +93,9 @@ FaultDrive drive_with_faults(const FaultCase& c) {
   read_events(session / "events.jsonl", c.from_s, &d);
   if (std::filesystem::exists(session / "truth.tum"))
     d.truth = app::read_tum(session / "truth.tum");
+  // An error without truth beside it would be none.
+  d.whole = d.whole && !d.truth.empty() && !d.poses.empty() &&
+            d.truth.back().stamp + Duration::seconds(1) >= d.poses.back().stamp;
   if (d.whole) {
     std::ifstream in(session / "summary.json");
     d.skipped = nlohmann::json::parse(in)["frames"]["skipped"].get<int>();
