@@ -15,12 +15,12 @@
 namespace vergence::app {
 namespace {
 
-/// Checks a key that takes one of a few words.
+/// Checks a key that takes one of a few words where cameras are the mock's.
 void one_of(const std::string& key, const std::string& value,
             const std::vector<std::string>& words) {
   for (const std::string& word : words)
     if (value == word) return;
-  throw InputError(fmt::format("{} is \"{}\"{}; this version knows {}", key, value,
+  throw InputError(fmt::format("{} is \"{}\"{}; with mock cameras it takes {}", key, value,
                                did_you_mean(value, words), fmt::join(words, ", ")));
 }
 
