@@ -20,8 +20,9 @@ constexpr int kStandingFrames = 3;       // in a row over the threshold while st
 constexpr double kStandingFactor = 1.5;  // of the threshold: one frame's few hundred errors are
                                          // less normal than the sum of many frames'
 constexpr double kAgrees = 0.5;          // of the threshold: below, a frame agrees
-constexpr double kNoLag = 0.5;  // of the smallest lag that is called one: there is none …
-constexpr double kTold = 0.6;   // … if its sigma, of the lag found before, tells it from that
+// There is no lag: less than this of the smallest that is called one, with a sigma of less than
+// that of the last one found.
+constexpr double kNoLag = 0.5, kLagSigma = 0.6;
 
 void check(bool good, const char* name, const char* range) {
   if (!good)
@@ -192,7 +193,7 @@ MonitorVerdict Monitor::look(const MonitorFrame& frame) noexcept {
   if (d.kind == Kind::out_of_step) p.lag_found = std::abs(d.lag);
   v.in_step = d.kind == Kind::quiet && !d.undecided &&
               std::abs(d.lag) < kNoLag * p.options.lag_frames &&
-              d.lag_sigma < kTold * std::max(p.lag_found, p.options.lag_frames);
+              d.lag_sigma < kLagSigma * std::max(p.lag_found, p.options.lag_frames);
   v.onset_frame = d.kind == Kind::quiet ? frame.frame : d.onset;
   v.frames_since_onset = d.kind == Kind::quiet ? 0 : d.frames;
   if (p.collapsed >= p.options.collapse_frames) {
