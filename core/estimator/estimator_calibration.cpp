@@ -97,8 +97,8 @@ void Estimator::Parts::watch(const odometry::FrameOutcome& out, const RigFrame& 
       note(EstimatorEvent::Kind::rig_changed, frame.stamp,
            sentence_of(CalibrationCause::out_of_step), v.lag_frames);
     out_of_step = kInStepAfter;
-    // Frames out of step would speak for a lag in the monitor's windows long after its end, and
-    // are no frames to calibrate from.
+    // Frames out of step would speak for a lag in the monitor's windows long after its end; those
+    // logged for a calibration are dropped with them.
     calibrator.begin_anew();
     return;
   }
